@@ -1,0 +1,154 @@
+/* Vectors, 3x3 matrices and quaternions.
+ *
+ * Conventions (docs/conventions.md): quaternions are scalar last {x, y, z, w}, unit, Hamilton
+ * product; q_b_from_a takes the coordinates of a vector in frame a to its coordinates in frame b.
+ * Matrices are row-major. */
+#ifndef BST_CORE_VEC_H
+#define BST_CORE_VEC_H
+
+#include <math.h>
+
+#define BST_PI 3.14159265358979323846
+#define BST_ARCSEC_RAD (BST_PI / 648000.0)
+#define BST_DEG_RAD (BST_PI / 180.0)
+
+typedef struct bst_vec3 {
+    double x, y, z;
+} bst_vec3;
+
+typedef struct bst_quat {
+    double x, y, z, w;
+} bst_quat;
+
+typedef struct bst_mat3 {
+    double m[3][3];
+} bst_mat3;
+
+#define BST_QUAT_IDENTITY ((bst_quat){0.0, 0.0, 0.0, 1.0})
+
+static inline bst_vec3 bst_vec3_make(double x, double y, double z) {
+    return (bst_vec3){x, y, z};
+}
+static inline bst_vec3 bst_vec3_add(bst_vec3 a, bst_vec3 b) {
+    return (bst_vec3){a.x + b.x, a.y + b.y, a.z + b.z};
+}
+static inline bst_vec3 bst_vec3_sub(bst_vec3 a, bst_vec3 b) {
+    return (bst_vec3){a.x - b.x, a.y - b.y, a.z - b.z};
+}
+static inline bst_vec3 bst_vec3_scale(bst_vec3 a, double s) {
+    return (bst_vec3){a.x * s, a.y * s, a.z * s};
+}
+/* a + s b */
+static inline bst_vec3 bst_vec3_axpy(bst_vec3 a, double s, bst_vec3 b) {
+    return (bst_vec3){a.x + s * b.x, a.y + s * b.y, a.z + s * b.z};
+}
+static inline double bst_vec3_dot(bst_vec3 a, bst_vec3 b) {
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+static inline bst_vec3 bst_vec3_cross(bst_vec3 a, bst_vec3 b) {
+    return (bst_vec3){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+static inline double bst_vec3_norm(bst_vec3 a) {
+    return sqrt(bst_vec3_dot(a, a));
+}
+/* Unit vector along a; a zero vector gives zero. */
+static inline bst_vec3 bst_vec3_unit(bst_vec3 a) {
+    double n = bst_vec3_norm(a);
+    return n > 0.0 ? bst_vec3_scale(a, 1.0 / n) : a;
+}
+/* Angle between a and b, rad, in [0, pi]; accurate for parallel and antiparallel vectors. */
+static inline double bst_vec3_angle(bst_vec3 a, bst_vec3 b) {
+    return atan2(bst_vec3_norm(bst_vec3_cross(a, b)), bst_vec3_dot(a, b));
+}
+/* A unit vector perpendicular to a (a not zero), by dropping a's smallest component. */
+static inline bst_vec3 bst_vec3_perpendicular(bst_vec3 a) {
+    double ax = fabs(a.x), ay = fabs(a.y), az = fabs(a.z);
+    bst_vec3 e = ax <= ay && ax <= az ? (bst_vec3){1, 0, 0}
+                 : ay <= az           ? (bst_vec3){0, 1, 0}
+                                      : (bst_vec3){0, 0, 1};
+    return bst_vec3_unit(bst_vec3_cross(a, e));
+}
+/* Unit vector at right ascension, declination (rad). */
+static inline bst_vec3 bst_vec3_from_radec(double ra_rad, double dec_rad) {
+    double c = cos(dec_rad);
+    return (bst_vec3){c * cos(ra_rad), c * sin(ra_rad), sin(dec_rad)};
+}
+/* Right ascension in [0, 2 pi) and declination of v (any length). */
+static inline void bst_vec3_to_radec(bst_vec3 v, double *ra_rad, double *dec_rad) {
+    double ra = atan2(v.y, v.x);
+    *ra_rad = ra < 0.0 ? ra + 2.0 * BST_PI : ra;
+    *dec_rad = atan2(v.z, hypot(v.x, v.y));
+}
+
+static inline bst_vec3 bst_mat3_mul_vec(const bst_mat3 *a, bst_vec3 v) {
+    return (bst_vec3){a->m[0][0] * v.x + a->m[0][1] * v.y + a->m[0][2] * v.z,
+                      a->m[1][0] * v.x + a->m[1][1] * v.y + a->m[1][2] * v.z,
+                      a->m[2][0] * v.x + a->m[2][1] * v.y + a->m[2][2] * v.z};
+}
+static inline bst_vec3 bst_mat3_transpose_mul_vec(const bst_mat3 *a, bst_vec3 v) {
+    return (bst_vec3){a->m[0][0] * v.x + a->m[1][0] * v.y + a->m[2][0] * v.z,
+                      a->m[0][1] * v.x + a->m[1][1] * v.y + a->m[2][1] * v.z,
+                      a->m[0][2] * v.x + a->m[1][2] * v.y + a->m[2][2] * v.z};
+}
+static inline bst_mat3 bst_mat3_mul(const bst_mat3 *a, const bst_mat3 *b) {
+    bst_mat3 r;
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) {
+            r.m[i][j] = a->m[i][0] * b->m[0][j] + a->m[i][1] * b->m[1][j] + a->m[i][2] * b->m[2][j];
+        }
+    }
+    return r;
+}
+static inline bst_mat3 bst_mat3_transpose(const bst_mat3 *a) {
+    bst_mat3 r;
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) {
+            r.m[i][j] = a->m[j][i];
+        }
+    }
+    return r;
+}
+
+/* Hamilton product: bst_quat_mul(q_c_from_b, q_b_from_a) = q_c_from_a. */
+static inline bst_quat bst_quat_mul(bst_quat p, bst_quat q) {
+    return (bst_quat){p.w * q.x + p.x * q.w + p.y * q.z - p.z * q.y,
+                      p.w * q.y - p.x * q.z + p.y * q.w + p.z * q.x,
+                      p.w * q.z + p.x * q.y - p.y * q.x + p.z * q.w,
+                      p.w * q.w - p.x * q.x - p.y * q.y - p.z * q.z};
+}
+static inline bst_quat bst_quat_conj(bst_quat q) {
+    return (bst_quat){-q.x, -q.y, -q.z, q.w};
+}
+/* Unit quaternion along q; a zero quaternion gives the identity. */
+static inline bst_quat bst_quat_unit(bst_quat q) {
+    double n = sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);
+    return n > 0.0 ? (bst_quat){q.x / n, q.y / n, q.z / n, q.w / n} : BST_QUAT_IDENTITY;
+}
+/* Coordinates of v in b, given q_b_from_a and v in a. */
+static inline bst_vec3 bst_quat_rotate(bst_quat q, bst_vec3 v) {
+    bst_vec3 u = {q.x, q.y, q.z};
+    bst_vec3 t = bst_vec3_scale(bst_vec3_cross(u, v), 2.0);
+    return bst_vec3_add(bst_vec3_axpy(v, q.w, t), bst_vec3_cross(u, t));
+}
+static inline bst_mat3 bst_quat_to_mat3(bst_quat q) {
+    double x = q.x, y = q.y, z = q.z, w = q.w;
+    return (bst_mat3){{{1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)},
+                       {2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)},
+                       {2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)}}};
+}
+/* Quaternion of a proper rotation matrix (Shepperd's method: largest component first). */
+bst_quat bst_quat_from_mat3(const bst_mat3 *a);
+/* exp: the quaternion q with bst_quat_rotate(q, v) = v turned by |r| about r (right hand), rad.
+ * Note: a *frame* that turns by r has q_new_from_old = bst_quat_from_rotvec(-r). */
+bst_quat bst_quat_from_rotvec(bst_vec3 r);
+/* log: rotation vector of q, |r| in [0, pi]; takes the short way for antipodal representations. */
+bst_vec3 bst_quat_to_rotvec(bst_quat q);
+/* Spherical linear interpolation, s in [0, 1] (extrapolates outside); short way; right for
+ * antipodal representations of one attitude and for nearly equal ones. */
+bst_quat bst_quat_slerp(bst_quat a, bst_quat b, double s);
+/* Attitude q_cam_from_ref of a camera whose +z is boresight_ref and whose +x lies as close as can
+ * be to x_hint_ref (both reference-frame vectors, any length). Parallel vectors: some perpendicular
+ * x is taken. */
+bst_quat bst_quat_look(bst_vec3 boresight_ref, bst_vec3 x_hint_ref);
+
+#endif

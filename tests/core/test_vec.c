@@ -1,0 +1,97 @@
+#include "sim/core/vec.h"
+#include "tests/test_support.h"
+
+static void assert_vec(bst_vec3 a, bst_vec3 e, double tol) {
+    bst_assert_close(a.x, e.x, tol);
+    bst_assert_close(a.y, e.y, tol);
+    bst_assert_close(a.z, e.z, tol);
+}
+
+static void quaternion_and_matrix_agree(void **state) {
+    (void)state;
+    bst_quat q = bst_quat_unit((bst_quat){0.1, -0.7, 0.3, 0.5});
+    bst_mat3 m = bst_quat_to_mat3(q);
+    bst_vec3 v = {1.5, -2.0, 0.25};
+    assert_vec(bst_quat_rotate(q, v), bst_mat3_mul_vec(&m, v),
+               1e-15 * 8); /* rounding of a few products */
+    bst_quat p = bst_quat_from_mat3(&m);
+    bst_assert_close(fabs(p.x * q.x + p.y * q.y + p.z * q.z + p.w * q.w), 1.0, 1e-15 * 4);
+}
+
+/* Every branch of Shepperd's method, and the exact half turns. */
+static void matrix_to_quaternion_at_half_turns(void **state) {
+    (void)state;
+    const bst_quat cases[] = {
+        {1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}, {0.6, 0.8, 0, 1e-12}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        bst_quat q = bst_quat_unit(cases[i]);
+        bst_mat3 m = bst_quat_to_mat3(q);
+        bst_quat p = bst_quat_from_mat3(&m);
+        bst_assert_close(fabs(p.x * q.x + p.y * q.y + p.z * q.z + p.w * q.w), 1.0, 1e-15 * 4);
+    }
+}
+
+static void rotation_vectors_round_trip(void **state) {
+    (void)state;
+    const double angles[] = {0.0, 1e-16, 1e-9, 1e-4, 0.5, 3.0, BST_PI - 1e-9};
+    bst_vec3 axis = bst_vec3_unit((bst_vec3){1, -2, 3});
+    for (size_t i = 0; i < sizeof angles / sizeof *angles; i++) {
+        bst_vec3 r = bst_vec3_scale(axis, angles[i]);
+        bst_quat q = bst_quat_from_rotvec(r);
+        assert_vec(bst_quat_to_rotvec(q), r, 1e-15 * 8);
+        bst_quat antipode = {-q.x, -q.y, -q.z, -q.w};
+        assert_vec(bst_quat_to_rotvec(antipode), r, 1e-15 * 8);
+    }
+}
+
+static void slerp_takes_the_short_way(void **state) {
+    (void)state;
+    bst_quat a = BST_QUAT_IDENTITY;
+    bst_quat b = bst_quat_from_rotvec((bst_vec3){0, 0, 0.8});
+    bst_quat minus_b = {-b.x, -b.y, -b.z, -b.w};
+    assert_vec(bst_quat_to_rotvec(bst_quat_slerp(a, b, 0.25)), (bst_vec3){0, 0, 0.2}, 1e-15);
+    assert_vec(bst_quat_to_rotvec(bst_quat_slerp(a, minus_b, 0.25)), (bst_vec3){0, 0, 0.2}, 1e-15);
+    assert_vec(bst_quat_to_rotvec(bst_quat_slerp(a, a, 0.5)), (bst_vec3){0, 0, 0}, 0.0);
+}
+
+static void look_survives_parallel_vectors(void **state) {
+    (void)state;
+    const bst_vec3 z = {0.3, -0.4, 0.2};
+    const bst_vec3 hints[] = {{0.3, -0.4, 0.2}, {-0.3, 0.4, -0.2}, {0, 0, 0}, {1, 0, 0}};
+    for (size_t i = 0; i < sizeof hints / sizeof *hints; i++) {
+        bst_quat q = bst_quat_look(z, hints[i]);
+        assert_vec(bst_quat_rotate(q, bst_vec3_unit(z)), (bst_vec3){0, 0, 1}, 1e-15 * 4);
+    }
+    bst_quat q = bst_quat_look((bst_vec3){0, 0, 2}, (bst_vec3){1, 0, 1});
+    assert_vec(bst_quat_rotate(q, (bst_vec3){1, 0, 0}), (bst_vec3){1, 0, 0}, 1e-15 * 4);
+}
+
+static void angle_is_accurate_at_both_ends(void **state) {
+    (void)state;
+    bst_assert_close(bst_vec3_angle((bst_vec3){1, 0, 0}, (bst_vec3){1, 1e-12, 0}), 1e-12, 1e-27);
+    bst_assert_close(bst_vec3_angle((bst_vec3){1, 0, 0}, (bst_vec3){-1, 1e-9, 0}), BST_PI - 1e-9,
+                     1e-15);
+}
+
+static void radec_wraps(void **state) {
+    (void)state;
+    double ra, dec;
+    bst_vec3_to_radec(bst_vec3_from_radec(6.2, -1.5), &ra, &dec);
+    bst_assert_close(ra, 6.2, 1e-13); /* near the pole RA loses 1/cos(dec) = 14 */
+    bst_assert_close(dec, -1.5, 1e-15);
+    bst_vec3_to_radec((bst_vec3){0, 0, -2}, &ra, &dec);
+    bst_assert_close(dec, -BST_PI / 2, 0.0);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(quaternion_and_matrix_agree),
+        cmocka_unit_test(matrix_to_quaternion_at_half_turns),
+        cmocka_unit_test(rotation_vectors_round_trip),
+        cmocka_unit_test(slerp_takes_the_short_way),
+        cmocka_unit_test(look_survives_parallel_vectors),
+        cmocka_unit_test(angle_is_accurate_at_both_ends),
+        cmocka_unit_test(radec_wraps),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
