@@ -1,0 +1,62 @@
+/* The star catalogue: one memory-mapped, sky-indexed file, or the stars embedded in the program. */
+#ifndef BST_WORLD_STARS_H
+#define BST_WORLD_STARS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "sim/core/status.h"
+#include "sim/core/vec.h"
+
+/* A star as a query returns it. */
+typedef struct bst_star {
+    bst_vec3 icrs;   /* unit vector, ICRS, proper motion applied to the query's epoch */
+    float v_mag;     /* Johnson V */
+    float b_minus_v; /* Johnson B-V; NAN where the catalogue has one colour only */
+    uint32_t id;     /* Tycho-2 identity, see bst_star_id_make */
+} bst_star;
+
+/* Tycho-2 identity TYC tyc1-tyc2-tyc3 in 30 bits, and back. */
+static inline uint32_t bst_star_id_make(unsigned tyc1, unsigned tyc2, unsigned tyc3) {
+    return (uint32_t)(tyc1 << 16 | tyc2 << 2 | (tyc3 & 3u));
+}
+static inline void bst_star_id_split(uint32_t id, unsigned *tyc1, unsigned *tyc2, unsigned *tyc3) {
+    *tyc1 = id >> 16;
+    *tyc2 = id >> 2 & 0x3FFFu;
+    *tyc3 = (id & 3u) ? (id & 3u) : 4u;
+}
+
+/* An open catalogue; immutable, shareable between threads. */
+typedef struct bst_stars bst_stars;
+
+typedef struct bst_stars_info {
+    char source[64];          /* "Tycho-2" or "embedded default" */
+    char path[512];           /* "" when embedded */
+    long long count;          /* stars */
+    double complete_to_v_mag; /* whole sky */
+    bool embedded;
+} bst_stars_info;
+
+/* Opens a catalogue: "embedded", "default" (the user's full catalogue when it is there, else the
+ * embedded one, which is logged as a warning that says how to fetch the full one), or a path. */
+bst_status bst_stars_open(bst_ctx *ctx, const char *name, bst_stars **out) BST_MUST_CHECK;
+void bst_stars_close(bst_stars *stars);
+void bst_stars_get_info(const bst_stars *stars, bst_stars_info *out);
+
+/* Where the user's full catalogue lives: $XDG_DATA_HOME/boresight or ~/.local/share/boresight. */
+bst_status bst_stars_default_path(bst_ctx *ctx, char *buffer, size_t bytes) BST_MUST_CHECK;
+
+/* Stars within radius_rad of `centre` (unit, ICRS) that are not fainter than v_limit, with proper
+ * motion to julian_year (for example 2022.46). Writes at most `capacity` stars, in the catalogue's
+ * order (by sky cell, brightest first in each, ties by identity), and returns in *count how many
+ * there are in all (may exceed capacity: then those written are the first ones met and the caller
+ * asks again with more room). No allocation. */
+bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre, double radius_rad,
+                           double v_limit, double julian_year, bst_star *out, int capacity,
+                           int *count) BST_MUST_CHECK;
+
+/* Looks a star up by identity; BST_ERR_NOT_FOUND. */
+bst_status bst_stars_find(bst_ctx *ctx, const bst_stars *stars, uint32_t id, double julian_year,
+                          bst_star *out) BST_MUST_CHECK;
+
+#endif
