@@ -350,7 +350,7 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
                                                window.y0 + 0.5 * (window.height - 1));
     bst_vec3 centre = bst_quat_rotate(bst_quat_conj(field->q_mid), centre_cam);
     double radius = atan(bst_camera_scale_rad(camera) *
-                         (0.5 * hypot(window.width, window.height) + M_SQRT2 * margin_px)) +
+                         (0.5 * hypot(window.width, window.height) + sqrt(2.0) * margin_px)) +
                     APPARENT_SHIFT_RAD;
     double tt1, tt2;
     bst_time_tt(bst_world_time(field->world, mid_s), &tt1, &tt2);
