@@ -26,6 +26,8 @@ typedef struct waiting_frame {
 
 struct bst_loop_summary {
     bst_camera camera;
+    bst_view *view;
+    int observer;
     double rate_hz;
     int target;
     bst_loop_frame_fn fn;
@@ -46,25 +48,36 @@ struct bst_loop_summary {
     int64_t bins[BINS];
 };
 
-bst_status bst_loop_summary_create(bst_ctx *ctx, const bst_camera *camera, int64_t tick_rate_hz,
-                                   int target_object, bst_loop_summary **out) {
+bst_status bst_loop_summary_create(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
+                                   int64_t tick_rate_hz, int target_object,
+                                   bst_loop_summary **out) {
+    *out = NULL;
     bst_loop_summary *s = calloc(1, sizeof *s);
-    *out = s;
     if (!s) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the summary");
     }
-    s->camera = *camera;
+    bst_status status = bst_view_create(ctx, world, &s->view);
+    if (status != BST_OK) {
+        free(s);
+        return status;
+    }
+    s->camera = *bst_world_camera(world, observer, sensor);
+    s->observer = observer;
     s->rate_hz = (double)tick_rate_hz;
     s->target = target_object;
     s->confirm_tick = -1;
     s->settle_tick = -1;
     s->figures.time_to_confirm_s = NAN;
     s->figures.time_to_settle_s = NAN;
+    *out = s;
     return BST_OK;
 }
 
 void bst_loop_summary_free(bst_loop_summary *s) {
-    free(s);
+    if (s) {
+        bst_view_free(s->view);
+        free(s);
+    }
 }
 
 void bst_loop_summary_on_frame(bst_loop_summary *s, bst_loop_frame_fn fn, void *user) {
@@ -130,8 +143,35 @@ static void retire(bst_loop_summary *s) {
     }
 }
 
-void bst_loop_summary_truth(bst_loop_summary *s, const bst_truth *truth, int64_t tick) {
-    (void)tick;
+/* The true target at mid-exposure, in or out of the field. */
+static bst_status look_at_target(bst_ctx *ctx, bst_loop_summary *s, const bst_truth *truth,
+                                 waiting_frame *w) {
+    bst_loop_frame *f = &w->frame;
+    bst_sight sight;
+    bst_status status = bst_view_sight(ctx, s->view, s->observer, s->target, f->time_s, &sight);
+    if (status == BST_ERR_NUMERIC) {
+        return BST_OK; /* decayed: nothing to see */
+    }
+    BST_TRY(status);
+    w->direction = sight.geometric;
+    f->visible = !sight.occulted && isfinite(sight.v_mag);
+    bst_vec3 cam = bst_quat_rotate(truth->q_cam_from_gcrf_mid, sight.apparent);
+    if (bst_camera_project(&s->camera, cam, &f->target_x_px, &f->target_y_px)) {
+        f->error_x_px = f->target_x_px - truth->boresight_x_px;
+        f->error_y_px = f->target_y_px - truth->boresight_y_px;
+        f->error_px = hypot(f->error_x_px, f->error_y_px);
+    }
+    for (int i = 0; i < truth->count; i++) {
+        const bst_truth_item *item = &truth->items[i];
+        if (item->kind == BST_SOURCE_OBJECT && (int)item->id == s->target &&
+            (item->flags & BST_TRUTH_IN_FIELD)) {
+            f->target_snr = item->snr;
+        }
+    }
+    return BST_OK;
+}
+
+bst_status bst_loop_summary_truth(bst_ctx *ctx, bst_loop_summary *s, const bst_truth *truth) {
     if (s->next - s->first == WAITING) {
         retire(s);
     }
@@ -144,19 +184,8 @@ void bst_loop_summary_truth(bst_loop_summary *s, const bst_truth *truth, int64_t
     f->error_px = f->error_x_px = f->error_y_px = NAN;
     f->target_x_px = f->target_y_px = NAN;
     f->mode = s->mode;
-    for (int i = 0; i < truth->count; i++) {
-        const bst_truth_item *item = &truth->items[i];
-        if (item->kind != BST_SOURCE_OBJECT || (int)item->id != s->target) {
-            continue;
-        }
-        f->target_x_px = item->x_mean_px;
-        f->target_y_px = item->y_mean_px;
-        f->error_x_px = item->x_mid_px - truth->boresight_x_px;
-        f->error_y_px = item->y_mid_px - truth->boresight_y_px;
-        f->error_px = hypot(f->error_x_px, f->error_y_px);
-        f->target_snr = item->flags & BST_TRUTH_IN_FIELD ? item->snr : 0.0;
-        f->visible = item->electrons > 0.0 && !(item->flags & BST_TRUTH_OCCULTED);
-        w->direction = bst_vec3_from_radec(item->ra_rad, item->dec_rad);
+    if (s->target >= 0) {
+        BST_TRY(look_at_target(ctx, s, truth, w));
     }
     if (s->settle_tick < 0 && s->confirm_tick >= 0 && s->mode == BST_MODE_TRACK &&
         f->error_px < SETTLED_PX) {
@@ -164,13 +193,11 @@ void bst_loop_summary_truth(bst_loop_summary *s, const bst_truth *truth, int64_t
         s->figures.time_to_settle_s = (double)truth->start_tick / s->rate_hz;
     }
     f->settled = s->settle_tick >= 0;
-    /* a target that the renderer left out (outside the field) is still judged: its direction is
-     * unknown, so no track can be on it; such a frame counts as visible only if it was seen before
-     */
     s->figures.frames++;
     s->newest = *f;
     s->newest.in_track = s->last_in_track;
     s->next++;
+    return BST_OK;
 }
 
 void bst_loop_summary_tracks(bst_loop_summary *s, const bst_tracks *tracks, int64_t tick) {
@@ -200,8 +227,7 @@ void bst_loop_summary_tracks(bst_loop_summary *s, const bst_tracks *tracks, int6
     }
 }
 
-void bst_loop_summary_status(bst_loop_summary *s, const bst_control_status *status, int64_t tick) {
-    (void)tick;
+void bst_loop_summary_status(bst_loop_summary *s, const bst_control_status *status) {
     s->mode = status->mode;
     s->figures.final_mode = status->mode;
 }

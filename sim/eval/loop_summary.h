@@ -3,7 +3,7 @@
 #define BST_EVAL_LOOP_SUMMARY_H
 
 #include "sim/core/messages.h"
-#include "sim/world/camera.h"
+#include "sim/world/world.h"
 
 typedef struct bst_loop_summary bst_loop_summary;
 
@@ -35,9 +35,11 @@ typedef struct bst_loop_figures {
     int64_t pointing_frames;
 } bst_loop_figures;
 
-/* target_object: index of the right target in the world, -1 when there is none. */
-bst_status bst_loop_summary_create(bst_ctx *ctx, const bst_camera *camera, int64_t tick_rate_hz,
-                                   int target_object, bst_loop_summary **out) BST_MUST_CHECK;
+/* target_object: index of the right target in the world, -1 when there is none. The world must
+ * outlive the summary. */
+bst_status bst_loop_summary_create(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
+                                   int64_t tick_rate_hz, int target_object,
+                                   bst_loop_summary **out) BST_MUST_CHECK;
 void bst_loop_summary_free(bst_loop_summary *summary);
 
 /* Called once for every frame when its verdict is final (a few frames late, the last ones at the
@@ -46,7 +48,8 @@ typedef void (*bst_loop_frame_fn)(void *user, const bst_loop_frame *frame);
 void bst_loop_summary_on_frame(bst_loop_summary *summary, bst_loop_frame_fn fn, void *user);
 
 /* Messages as they are published. */
-void bst_loop_summary_truth(bst_loop_summary *summary, const bst_truth *truth, int64_t tick);
+bst_status bst_loop_summary_truth(bst_ctx *ctx, bst_loop_summary *summary,
+                                  const bst_truth *truth) BST_MUST_CHECK;
 void bst_loop_summary_tracks(bst_loop_summary *summary, const bst_tracks *tracks, int64_t tick);
 void bst_loop_summary_status(bst_loop_summary *summary, const bst_control_status *status,
                              int64_t tick);
