@@ -20,18 +20,26 @@ typedef enum bst_sgp4_error {
     BST_SGP4_DECAYED = 6
 } bst_sgp4_error;
 
-/* One initialised satellite. Plain data; the fields are the model's own and private to sgp4.c. */
+/* One initialised satellite. Never changes once made. */
 typedef struct bst_sgp4 bst_sgp4;
 
-/* Makes a propagator. Returns BST_ERR_NUMERIC with the code in the message for elements that the
- * model refuses. */
+/* Makes a propagator from an element set; *out is freed with bst_sgp4_free, NULL on error. Orbits
+ * of 225 minutes or longer get the deep-space model. BST_ERR_NUMERIC with the code in the message
+ * for an eccentricity outside 0 <= e < 1 or a mean motion that is not above 0 (also once Kozai's is
+ * turned to Brouwer's); BST_ERR_ARGUMENT for values that are not finite or an inclination outside 0
+ * to pi. Equations: Hoots and Roehrich, Spacetrack Report 3 (1980), with the corrections and
+ * constants of Vallado et al., AIAA 2006-6753; BST_SGP4_AFSPC takes that paper's sidereal time and
+ * node of the operational code. */
 bst_status bst_sgp4_create(bst_ctx *ctx, const bst_elements *elements, bst_sgp4_gravity gravity,
                            bst_sgp4_mode mode, bst_sgp4 **out) BST_MUST_CHECK;
+/* NULL allowed. */
 void bst_sgp4_free(bst_sgp4 *sgp4);
 
-/* State at `minutes` after the element epoch: TEME, km and km/s. Pure: no state is kept between
- * calls, so any order of times gives the same bits and threads may share one propagator.
- * position/velocity are still written on BST_SGP4_DECAYED, else untouched on error. */
+/* State at `minutes` after the element epoch (UTC taken as uniform, as the theory does): TEME, km
+ * and km/s. Pure: no state is kept between calls, so any order of times gives the same bits and
+ * threads may share one propagator. position/velocity are still written on BST_SGP4_DECAYED, else
+ * untouched on error. Times beyond 1e9 minutes or not finite give BST_SGP4_MEAN_MOTION. Cost: about
+ * 0.15 microseconds; resonant orbits add 1.4 microseconds for each 30 days from the epoch. */
 bst_sgp4_error bst_sgp4_propagate(const bst_sgp4 *sgp4, double minutes, double position_teme_km[3],
                                   double velocity_teme_kmps[3]);
 

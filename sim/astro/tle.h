@@ -3,6 +3,7 @@
 #define BST_ASTRO_TLE_H
 
 #include <stdbool.h>
+#include <stddef.h>
 
 #include "sim/astro/time.h"
 
@@ -20,20 +21,37 @@ typedef struct bst_elements {
     int element_set, revolution;
 } bst_elements;
 
-/* Reads one element set from its two lines (no newline needed). Errors say line 1 or 2, column and
- * content. */
+/* Reads one element set from its two lines (no newline needed, trailing white space allowed).
+ * Checked: length 69, printable ASCII, blank separator columns, checksums, equal catalogue numbers,
+ * number formats, and the ranges: inclination 0 to 180 degrees, other angles 0 to 360, epoch day
+ * within its year (57 to 99: 1957 to 1999; 00 to 56: 2000 to 2056), mean motion above 0. Blanks
+ * count as zeros in the eccentricity and as 0 in blank B*, derivative, set and revolution
+ * fields. Errors: BST_ERR_FORMAT with line 1 or 2, column, what was found and what was expected;
+ * *out is then undefined. Format: Hoots and Roehrich, Spacetrack Report 3; Alpha-5 numbers as
+ * space-track.org documents them (A to Z without I and O stand for 10 to 33). */
 bst_status bst_tle_parse(bst_ctx *ctx, const char *line1, const char *line2,
                          bst_elements *out) BST_MUST_CHECK;
 
 typedef struct bst_tle_options {
     bool
         skip_bad_sets; /* true: a bad set is logged as a warning with its line number and skipped */
-    int norad;         /* only this number; 0: all */
+    int norad;         /* only this number, sets of others are not checked; 0: all */
 } bst_tle_options;
 
-/* Reads a file of 2LE or 3LE sets (mixed; blank lines and # comments allowed; CRLF allowed). *out:
- * array of *count, freed with free(). Errors: file and line number. */
+/* Reads a file of 2LE or 3LE sets (mixed; blank lines and # comments allowed; CRLF and a UTF-8 byte
+ * order mark allowed; a satellite may come more than once). A line that starts with "1 " or "2 " is
+ * part of a set, another line is the name of the next set, cut to 31 characters, "0 " before it
+ * dropped. options NULL: all sets, no bad ones. *out: array of *count > 0 sets in the order of the
+ * file, freed with free(); NULL and 0 on error. Errors start with "path:line: "; BST_ERR_FORMAT for
+ * content, also when there is no set at all; BST_ERR_NOT_FOUND when there is no such file or no set
+ * of options->norad; BST_ERR_IO when it cannot be read, is a directory or is over 1 GiB. */
 bst_status bst_tle_load(bst_ctx *ctx, const char *path, const bst_tle_options *options,
                         bst_elements **out, int *count) BST_MUST_CHECK;
+
+/* As bst_tle_load, from memory: `bytes` bytes at data (any bytes, no terminator needed); `name`
+ * stands for the path in messages. */
+bst_status bst_tle_read_buffer(bst_ctx *ctx, const char *name, const char *data, size_t bytes,
+                               const bst_tle_options *options, bst_elements **out,
+                               int *count) BST_MUST_CHECK;
 
 #endif

@@ -1,0 +1,201 @@
+/* SGP4: creation's front door and propagation. */
+#include "sim/astro/sgp4_internal.h"
+
+/* Beyond 1,900 years the polynomials in time mean nothing, and a resonant orbit would integrate for
+ * long. */
+#define MAX_MINUTES 1e9
+
+#define KEPLER_STEPS 10
+#define KEPLER_LONGEST_STEP 0.95
+
+void bst_sgp4_set_plane(const bst_sgp4_constants *k, double sin_i, double cos_i,
+                        bst_sgp4_plane *plane) {
+    double c2 = cos_i * cos_i;
+    double one_c = 1.0 + cos_i;
+    /* an orbit of inclination 180 degrees would divide by zero (VCHK) */
+    double divisor = fabs(one_c) > 1.5e-12 ? one_c : 1.5e-12;
+    plane->sin_i = sin_i;
+    plane->cos_i = cos_i;
+    plane->y_long = -0.5 * k->j3_over_j2 * sin_i;
+    plane->l_long = -0.25 * k->j3_over_j2 * sin_i * (3.0 + 5.0 * cos_i) / divisor;
+    plane->three_c2_m1 = 3.0 * c2 - 1.0;
+    plane->one_m_c2 = 1.0 - c2;
+    plane->seven_c2_m1 = 7.0 * c2 - 1.0;
+}
+
+/* Solves u = E - ax sin E + ay cos E for the eccentric longitude E by Newton's method from E = u;
+ * gives sin E and cos E. A step d leaves an error of at most d^2 / (2 (1 - e cos E)), so the last
+ * step is known by its size without one more evaluation. */
+static void solve_kepler(double u, double ax, double ay, double *sin_e, double *cos_e) {
+    double s = sin(u), c = cos(u);
+    double delta = 0.0;
+    for (int step = 0; step < KEPLER_STEPS; step++) {
+        double slope = 1.0 - (ax * c + ay * s);
+        double d = ((ax * s - ay * c) - delta) / slope;
+        if (fabs(d) > KEPLER_LONGEST_STEP) {
+            d = d > 0.0 ? KEPLER_LONGEST_STEP : -KEPLER_LONGEST_STEP;
+        }
+        delta += d;
+        bst_sgp4_turn(u + delta, d, &s, &c);
+        if (d * d < 2e-15 * slope) {
+            break;
+        }
+    }
+    *sin_e = s;
+    *cos_e = c;
+}
+
+bst_sgp4_error bst_sgp4_propagate(const bst_sgp4 *s, double minutes, double position_teme_km[3],
+                                  double velocity_teme_kmps[3]) {
+    /* Comparisons are written so that NaN takes the error branch. */
+    const double t = minutes;
+    if (!(fabs(t) <= MAX_MINUTES)) {
+        return BST_SGP4_MEAN_MOTION;
+    }
+
+    /* Secular gravity and drag: STR3 section 6; HSG appendix B. */
+    bst_sgp4_mean x = {.n = s->n0,
+                       .e = s->e0,
+                       .i = s->i0,
+                       .m = s->m0 + s->m_rate * t,
+                       .argp = s->argp0 + s->argp_rate * t,
+                       .raan = s->raan0 + t * (s->raan_rate + t * s->raan_drag)};
+    double a = s->a0, root_a_ratio, e_loss, l_gain;
+    if (s->short_drag) {
+        root_a_ratio = 1.0 - s->a_drag[0] * t;
+        e_loss = s->e_drag * t;
+        l_gain = s->l_drag[0] * t * t;
+    } else {
+        double sin_m = sin(x.m), cos_m = cos(x.m);
+        double w = 1.0 + s->eta * cos_m;
+        double shift = s->argp_drag * t + s->m_drag * (w * w * w - s->cube_m0);
+        x.m += shift;
+        x.argp -= shift;
+        bst_sgp4_turn(x.m, shift, &sin_m, &cos_m);
+        const double *ad = s->a_drag, *ld = s->l_drag;
+        root_a_ratio = 1.0 - t * (ad[0] + t * (ad[1] + t * (ad[2] + t * ad[3])));
+        e_loss = s->e_drag * t + s->e_drag_sin * (sin_m - s->sin_m0);
+        l_gain = t * t * (ld[0] + t * (ld[1] + t * (ld[2] + t * ld[3])));
+    }
+    if (s->deep_space) {
+        bst_sgp4_deep_secular(s, t, &x);
+        if (!(x.n > 0.0)) {
+            return BST_SGP4_MEAN_MOTION;
+        }
+        if (s->deep.resonance != BST_SGP4_NOT_RESONANT) {
+            double root = cbrt(s->k.ke / x.n);
+            a = root * root;
+        }
+    }
+    a *= root_a_ratio * root_a_ratio;
+    x.e -= e_loss;
+    x.m += l_gain;
+    /* Summed and wrapped as the reference does: after years the rounding of this sum, at perigee of
+     * an eccentric orbit, is the largest of all. */
+    x.m = fmod(x.m + x.argp + x.raan, BST_SGP4_TWO_PI) - x.argp - x.raan;
+    if (!(x.e < 1.0 && x.e >= -0.001)) {
+        return BST_SGP4_MEAN_ECCENTRICITY;
+    }
+    if (x.e < 1e-6) {
+        x.e = 1e-6; /* VCHK */
+    }
+
+    double sin_raan, cos_raan;
+    const bst_sgp4_plane *plane = &s->plane;
+    bst_sgp4_plane moved;
+    if (s->deep_space) {
+        double i[2], node[2];
+        bst_sgp4_deep_periodic(s, t, &x, i, node);
+        if (!(x.e >= 0.0 && x.e <= 1.0)) {
+            return BST_SGP4_PERTURBED_ECCENTRICITY;
+        }
+        bst_sgp4_set_plane(&s->k, i[0], i[1], &moved);
+        plane = &moved;
+        sin_raan = node[0];
+        cos_raan = node[1];
+    } else {
+        sin_raan = sin(x.raan);
+        cos_raan = cos(x.raan);
+    }
+
+    /* Long periodics by J3; the node drops out of the argument of Kepler's equation. */
+    double inv_p_mean = 1.0 / (a * (1.0 - x.e * x.e));
+    double ax = x.e * cos(x.argp);
+    double ay = x.e * sin(x.argp) + inv_p_mean * plane->y_long;
+    double u = x.m + x.argp + inv_p_mean * plane->l_long * ax;
+    double e2 = ax * ax + ay * ay;
+    double p = a * (1.0 - e2);
+    if (!(p >= 0.0)) {
+        return BST_SGP4_SEMI_LATUS_RECTUM;
+    }
+    double sin_e, cos_e;
+    solve_kepler(u, ax, ay, &sin_e, &cos_e);
+
+    /* Short periodics by J2, lengths in Earth radii, speeds in units of ke. */
+    double e_cos_e = ax * cos_e + ay * sin_e;
+    double e_sin_e = ax * sin_e - ay * cos_e;
+    double beta = sqrt(1.0 - e2);
+    double root_a = sqrt(a);
+    double r = a * (1.0 - e_cos_e);
+    double inv_r = 1.0 / r;
+    double r_rate = root_a * e_sin_e * inv_r;
+    double rf_rate = root_a * beta * inv_r;
+    double skew = e_sin_e / (1.0 + beta);
+    double sin_u = a * inv_r * (sin_e - ay - ax * skew);
+    double cos_u = a * inv_r * (cos_e - ax + ay * skew);
+    double sin_2u = 2.0 * cos_u * sin_u;
+    double cos_2u = 1.0 - 2.0 * sin_u * sin_u;
+    double inv_p = 1.0 / p;
+    double g1 = 0.5 * s->k.j2 * inv_p;
+    double g2 = g1 * inv_p;
+    double n = 1.0 / (a * root_a);
+
+    double r_now =
+        r * (1.0 - 1.5 * g2 * beta * plane->three_c2_m1) + 0.5 * g1 * plane->one_m_c2 * cos_2u;
+    double u_shift = -0.25 * g2 * plane->seven_c2_m1 * sin_2u;
+    double raan_shift = 1.5 * g2 * plane->cos_i * sin_2u;
+    double i_shift = 1.5 * g2 * plane->cos_i * plane->sin_i * cos_2u;
+    double v_radial = r_rate - n * g1 * plane->one_m_c2 * sin_2u;
+    double v_along = rf_rate + n * g1 * (plane->one_m_c2 * cos_2u + 1.5 * plane->three_c2_m1);
+
+    double sin_i = plane->sin_i, cos_i = plane->cos_i;
+    if (fabs(u_shift) < 0.125) {
+        bst_sgp4_turn(0.0, u_shift, &sin_u, &cos_u);
+    } else {
+        bst_sgp4_turn(atan2(sin_u, cos_u) + u_shift, u_shift, &sin_u, &cos_u);
+    }
+    bst_sgp4_turn(x.raan + raan_shift, raan_shift, &sin_raan, &cos_raan);
+    bst_sgp4_turn(x.i + i_shift, i_shift, &sin_i, &cos_i);
+
+    /* Unit vectors along the radius and along track. */
+    double m_x = -sin_raan * cos_i, m_y = cos_raan * cos_i;
+    double radial[3] = {m_x * sin_u + cos_raan * cos_u, m_y * sin_u + sin_raan * cos_u,
+                        sin_i * sin_u};
+    double along[3] = {m_x * cos_u - cos_raan * sin_u, m_y * cos_u - sin_raan * sin_u,
+                       sin_i * cos_u};
+    double r_km = r_now * s->k.radius_km;
+    double vr = v_radial * s->k.speed_kmps, va = v_along * s->k.speed_kmps;
+    for (int j = 0; j < 3; j++) {
+        position_teme_km[j] = r_km * radial[j];
+        velocity_teme_kmps[j] = vr * radial[j] + va * along[j];
+    }
+    return r_now >= 1.0 ? BST_SGP4_OK : BST_SGP4_DECAYED;
+}
+
+const char *bst_sgp4_error_text(bst_sgp4_error error) {
+    switch (error) {
+        case BST_SGP4_OK:
+            return "no error";
+        case BST_SGP4_MEAN_ECCENTRICITY:
+            return "mean eccentricity is not within 0 and 1";
+        case BST_SGP4_MEAN_MOTION:
+            return "mean motion is not above zero, or the time is out of reach";
+        case BST_SGP4_PERTURBED_ECCENTRICITY:
+            return "eccentricity disturbed by Sun and Moon is not within 0 and 1";
+        case BST_SGP4_SEMI_LATUS_RECTUM:
+            return "semi-latus rectum is below zero";
+        case BST_SGP4_DECAYED:
+            return "satellite has decayed";
+    }
+    return "unknown SGP4 error";
+}
