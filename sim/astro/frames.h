@@ -10,34 +10,41 @@ typedef struct bst_eop bst_eop;
 
 typedef struct bst_eop_values {
     double ut1_minus_utc_s;
-    double xp_rad, yp_rad; /* pole */
-    double dx_rad, dy_rad; /* celestial pole offsets to IAU 2006/2000A */
+    double xp_rad, yp_rad; /* coordinates of the pole */
 } bst_eop_values;
 
-/* Makes the table of the dates of the shipped scenarios that is part of the program. */
+/* Makes the table that is part of the program: IERS EOP 20 C04, 2020-01-01 to 2026-01-01, 0h UTC.
+ * Freed with bst_eop_free. */
 bst_status bst_eop_builtin(bst_ctx *ctx, bst_eop **out) BST_MUST_CHECK;
-/* Reads an IERS EOP C04 file. Errors carry the line number. */
+/* Reads an IERS EOP C04 file, of the 20 C04 series (hour column) or the 14 C04 series (none). Rows
+ * are one a day at 0h UTC, without gaps. Errors carry file and line number. */
 bst_status bst_eop_load(bst_ctx *ctx, const char *path, bst_eop **out) BST_MUST_CHECK;
-void bst_eop_free(bst_eop *eop);
-/* Values at t: linear interpolation, leap seconds handled. Outside the table: BST_ERR_RANGE naming
- * the dates covered. */
+void bst_eop_free(bst_eop *eop); /* NULL allowed */
+/* Values at t: linear interpolation between 0h UTC values, leap seconds handled; no sub-daily
+ * tides. Outside the table: BST_ERR_RANGE naming the dates covered. */
 bst_status bst_eop_at(bst_ctx *ctx, const bst_eop *eop, bst_time t,
                       bst_eop_values *out) BST_MUST_CHECK;
 
-/* Rotations at one instant. */
+/* Rotations at one instant, for positions and velocities alike. The frames TEME and GCRF turn
+ * against each other by 8e-12 rad/s, which velocities leave out (0.3 mm/s at a geostationary
+ * distance); for the turn of ITRF see bst_earth_rate_gcrf. */
 typedef struct bst_earth_frames {
     bst_mat3 gcrf_from_teme;
     bst_mat3 itrf_from_gcrf;
 } bst_earth_frames;
 
-/* Rotations at t (docs/conventions.md for the chain: GMST82(UT1), Earth rotation angle, CIO by
- * eraC2i06a, polar motion). About 100 us: callers that need many instants interpolate (see
- * sim/world). */
+/* Rotations at t, by the chain that astropy uses: TEME - Greenwich mean sidereal time of 1982 -
+ * Earth rotation angle - IAU 2006/2000A celestial intermediate pole and origin (eraC2i06a) - GCRF;
+ * GCRF - the same pole, Earth rotation angle - TIO locator and polar motion - ITRF. The IERS's
+ * celestial pole offsets (below 0.5 mas, 0.1 m at a geostationary distance) are left out, as there.
+ * Errors as bst_eop_at. About 50 us: callers that need many instants use sim/astro/sky_clock.h.
+ * Source: IERS Conventions (2010) chapter 5; Vallado et al., AIAA 2006-6753, for TEME. */
 bst_status bst_earth_frames_at(bst_ctx *ctx, const bst_eop *eop, bst_time t,
                                bst_earth_frames *out) BST_MUST_CHECK;
 
-/* GCRF velocity from an ITRF-fixed point and back need the Earth's rotation vector, rad/s in GCRF.
- */
+/* The Earth's rotation vector, rad/s in GCRF: a point fixed in ITRF at r (GCRF axes) has GCRF
+ * velocity rate x r. Along the celestial intermediate pole, at the nominal rate of the Earth
+ * rotation angle. */
 bst_vec3 bst_earth_rate_gcrf(const bst_earth_frames *frames);
 
 #endif

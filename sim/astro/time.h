@@ -6,34 +6,35 @@
 
 #include "sim/core/status.h"
 
-/* An instant: a two-part Julian date in TAI. jd1 is the Julian date of a midnight (x.5), jd2 in [0,
- * 1) the fraction of the day; resolution better than 1e-10 s. */
+/* An instant: a two-part Julian date in TAI. jd1 is the Julian date of a midnight (x.5), jd2 in
+ * [0, 1) the fraction of the day; resolution better than 1e-10 s. */
 typedef struct bst_time {
     double jd1, jd2;
 } bst_time;
 
 /* Reads "YYYY-MM-DDThh:mm:ss[.fff...][Z]" (UTC; second 60 in a leap second only). Errors:
  * BST_ERR_FORMAT with the text and what is allowed; BST_ERR_RANGE before 1960 or more than 5 years
- * after ERFA's last known date. */
+ * after the release of the leap-second table of ERFA. */
 bst_status bst_time_from_utc(bst_ctx *ctx, const char *iso, bst_time *out) BST_MUST_CHECK;
 
-/* Writes UTC as "YYYY-MM-DDThh:mm:ss.fffZ" with `digits` decimals (0 to 9); buffer of >= 40 bytes.
- * Rounds, carrying into the minute, hour and day as leap seconds demand. */
+/* Writes UTC as "YYYY-MM-DDThh:mm:ss.fffZ" with `digits` decimals (taken into 0..9); buffer of
+ * >= 40 bytes. Rounds, carrying into the minute, hour and day as leap seconds demand. */
 void bst_time_to_utc(bst_time t, int digits, char *buffer, size_t bytes);
 
-/* t + seconds (SI), exact to 1e-10 s for any |seconds| < 1e10. */
+/* t + seconds (SI), rounded once, to better than 1e-10 s, for any |seconds| < 1e10. */
 bst_time bst_time_add(bst_time t, double seconds);
 
-/* epoch + ticks / ticks_per_second without accumulating: whole days are split off in integers. */
+/* epoch + ticks / ticks_per_second without accumulating: whole days are split off in integers.
+ * ticks_per_second in 1..1e14; tick may be negative. */
 bst_time bst_time_at_tick(bst_time epoch, int64_t tick, int64_t ticks_per_second);
 
 /* a - b in SI seconds. */
 double bst_time_diff(bst_time a, bst_time b);
 
-/* The instant as two-part Julian dates of other scales. */
+/* The instant as two-part Julian dates of other scales, split like bst_time. */
 void bst_time_tt(bst_time t, double *jd1, double *jd2);
 void bst_time_utc(bst_time t, double *jd1, double *jd2); /* ERFA's quasi-JD */
-/* The instant of a quasi-JD in UTC, as TLE epochs are given. */
+/* The instant of a quasi-JD in UTC, as TLE epochs are given. BST_ERR_RANGE as bst_time_from_utc. */
 bst_status bst_time_from_utc_jd(bst_ctx *ctx, double jd1, double jd2, bst_time *out) BST_MUST_CHECK;
 
 #endif

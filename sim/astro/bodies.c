@@ -1,0 +1,20 @@
+#include "sim/astro/bodies.h"
+
+#include <erfa.h>
+#include <erfam.h>
+
+static bst_vec3 scaled(const double v[3], double scale) {
+    return (bst_vec3){v[0] * scale, v[1] * scale, v[2] * scale};
+}
+
+void bst_bodies_at(bst_time t, bst_bodies *out) {
+    double tt1, tt2, earth_helio[2][3], earth_bary[2][3], moon[2][3];
+    bst_time_tt(t, &tt1, &tt2);
+    /* Its status warns of dates outside 1900..2100, where the model only loses accuracy. */
+    (void)eraEpv00(tt1, tt2, earth_helio, earth_bary);
+    eraMoon98(tt1, tt2, moon);
+    out->sun_m = scaled(earth_helio[0], -BST_AU_M);
+    out->moon_m = scaled(moon[0], BST_AU_M);
+    out->earth_bary_m = scaled(earth_bary[0], BST_AU_M);
+    out->earth_bary_mps = scaled(earth_bary[1], BST_AU_M / ERFA_DAYSEC);
+}

@@ -1,0 +1,194 @@
+#include <erfa.h>
+#include <erfam.h>
+#include <errno.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/astro/eop_table.h"
+#include "sim/astro/frames.h"
+
+struct bst_eop {
+    int first_mjd; /* of rows[0], 0h UTC */
+    int count;     /* >= 2 */
+    bst_eop_values *rows;
+};
+
+static bst_status out_of_memory(bst_ctx *ctx) {
+    return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the Earth-orientation table");
+}
+
+bst_status bst_eop_builtin(bst_ctx *ctx, bst_eop **out) {
+    int count = bst_eop_table_rows;
+    bst_eop *eop = calloc(1, sizeof *eop);
+    bst_eop_values *rows = malloc((size_t)count * sizeof *rows);
+    if (!eop || !rows) {
+        free(eop);
+        free(rows);
+        return out_of_memory(ctx);
+    }
+    for (int i = 0; i < count; i++) {
+        const bst_eop_table_row *row = &bst_eop_table[i];
+        rows[i] = (bst_eop_values){row->ut1_minus_utc * 1e-7, row->xp_uas * (1e-6 * BST_ARCSEC_RAD),
+                                   row->yp_uas * (1e-6 * BST_ARCSEC_RAD)};
+    }
+    *eop = (bst_eop){bst_eop_table_first_mjd, count, rows};
+    *out = eop;
+    return BST_OK;
+}
+
+void bst_eop_free(bst_eop *eop) {
+    if (eop) {
+        free(eop->rows);
+        free(eop);
+    }
+}
+
+/* Reads up to `wanted` numbers; returns how many there were. */
+static int read_numbers(const char *text, double *values, int wanted) {
+    int n = 0;
+    while (n < wanted) {
+        char *end;
+        values[n] = strtod(text, &end);
+        if (end == text) {
+            break;
+        }
+        text = end;
+        n++;
+    }
+    return n;
+}
+
+/* One data row: year month day [hour] MJD x y UT1-UTC ...; the hour tells the 20 C04 series. */
+static bst_status read_row(bst_ctx *ctx, const char *line, int *mjd, bst_eop_values *row) {
+    double v[8];
+    int n = read_numbers(line, v, 8);
+    int hour = n > 3 && v[3] < 24.0;
+    if (n < 7 + hour) {
+        return bst_fail(ctx, BST_ERR_FORMAT,
+                        "expected year month day [hour] MJD x y UT1-UTC of an IERS EOP C04 file, "
+                        "found %d numbers in \"%.60s\"",
+                        n, line);
+    }
+    const double *data = v + 3 + hour;
+    double djm0, djm;
+    bool dated = v[0] >= 1900.0 && v[0] < 2200.0 && v[1] >= 1.0 && v[1] <= 12.0 && v[2] >= 1.0 &&
+                 v[2] <= 31.0 && eraCal2jd((int)v[0], (int)v[1], (int)v[2], &djm0, &djm) == 0;
+    if (!dated || djm != data[0] || (hour && v[3] != 0.0)) {
+        return bst_fail(ctx, BST_ERR_FORMAT,
+                        "date and MJD are not one and the same midnight in \"%.60s\"", line);
+    }
+    if (!(fabs(data[1]) < 2.0 && fabs(data[2]) < 2.0 && fabs(data[3]) < 1.5)) {
+        return bst_fail(ctx, BST_ERR_FORMAT,
+                        "pole of 2 arcsec or more, or UT1-UTC of 1.5 s or more, in \"%.60s\"",
+                        line);
+    }
+    *mjd = (int)djm;
+    *row = (bst_eop_values){data[3], data[1] * BST_ARCSEC_RAD, data[2] * BST_ARCSEC_RAD};
+    return BST_OK;
+}
+
+static bst_status append_row(bst_ctx *ctx, bst_eop *eop, int *capacity, int mjd,
+                             bst_eop_values row) {
+    if (eop->count == 0) {
+        eop->first_mjd = mjd;
+    } else if (mjd != eop->first_mjd + eop->count) {
+        return bst_fail(ctx, BST_ERR_FORMAT, "MJD %d does not follow MJD %d: rows must be daily",
+                        mjd, eop->first_mjd + eop->count - 1);
+    }
+    if (eop->count == *capacity) {
+        int grown = *capacity ? 2 * *capacity : 1024;
+        bst_eop_values *rows = realloc(eop->rows, (size_t)grown * sizeof *rows);
+        if (!rows) {
+            return out_of_memory(ctx);
+        }
+        eop->rows = rows;
+        *capacity = grown;
+    }
+    eop->rows[eop->count++] = row;
+    return BST_OK;
+}
+
+static bst_status read_file(bst_ctx *ctx, FILE *file, const char *path, bst_eop *eop) {
+    char line[512];
+    int capacity = 0;
+    for (int number = 1; fgets(line, sizeof line, file); number++) {
+        line[strcspn(line, "\r\n")] = '\0';
+        const char *text = line + strspn(line, " \t");
+        bool numeric = *text >= '0' && *text <= '9';
+        if (!numeric && (eop->count == 0 || *text == '#' || *text == '\0')) {
+            continue; /* the heading, a comment */
+        }
+        int mjd = 0;
+        bst_eop_values row = {0};
+        bst_status status = read_row(ctx, line, &mjd, &row);
+        if (status == BST_OK) {
+            status = append_row(ctx, eop, &capacity, mjd, row);
+        }
+        if (status != BST_OK) {
+            return bst_fail_prefix(ctx, status, "%s:%d", path, number);
+        }
+    }
+    if (ferror(file)) {
+        return bst_fail(ctx, BST_ERR_IO, "%s: %s", path, strerror(errno));
+    }
+    if (eop->count < 2) {
+        return bst_fail(ctx, BST_ERR_FORMAT,
+                        "%s: %d rows of Earth orientation found, at least 2 are needed; expected "
+                        "an IERS EOP C04 file",
+                        path, eop->count);
+    }
+    return BST_OK;
+}
+
+bst_status bst_eop_load(bst_ctx *ctx, const char *path, bst_eop **out) {
+    FILE *file = fopen(path, "r");
+    if (!file) {
+        return bst_fail(ctx, errno == ENOENT ? BST_ERR_NOT_FOUND : BST_ERR_IO,
+                        "%s: %s; give an IERS EOP C04 file", path, strerror(errno));
+    }
+    bst_eop *eop = calloc(1, sizeof *eop);
+    bst_status status = eop ? read_file(ctx, file, path, eop) : out_of_memory(ctx);
+    fclose(file);
+    if (status != BST_OK) {
+        bst_eop_free(eop);
+        return status;
+    }
+    *out = eop;
+    return BST_OK;
+}
+
+static bst_status fail_outside(bst_ctx *ctx, const bst_eop *eop, bst_time t) {
+    char when[40];
+    int first[3], last[3];
+    double fraction;
+    bst_time_to_utc(t, 0, when, sizeof when);
+    eraJd2cal(ERFA_DJM0, eop->first_mjd, &first[0], &first[1], &first[2], &fraction);
+    eraJd2cal(ERFA_DJM0, eop->first_mjd + eop->count - 1, &last[0], &last[1], &last[2], &fraction);
+    return bst_fail(ctx, BST_ERR_RANGE,
+                    "%s is outside the Earth-orientation table, which covers %04d-%02d-%02d to "
+                    "%04d-%02d-%02d 0h UTC; give an IERS EOP C04 file that covers it",
+                    when, first[0], first[1], first[2], last[0], last[1], last[2]);
+}
+
+bst_status bst_eop_at(bst_ctx *ctx, const bst_eop *eop, bst_time t, bst_eop_values *out) {
+    double utc1, utc2;
+    bst_time_utc(t, &utc1, &utc2);
+    double day = utc1 - ERFA_DJM0 - eop->first_mjd;
+    /* The instant of the last row itself is still covered. */
+    bool last = day == eop->count - 1 && utc2 == 0.0;
+    if (!(day >= 0.0 && (day < eop->count - 1 || last))) {
+        return fail_outside(ctx, eop, t);
+    }
+    int i = last ? eop->count - 2 : (int)day;
+    double f = last ? 1.0 : utc2;
+    const bst_eop_values *a = &eop->rows[i], *b = &eop->rows[i + 1];
+    /* A leap second at the end of the day moves UT1-UTC by a whole second at b. */
+    double step = b->ut1_minus_utc_s - a->ut1_minus_utc_s;
+    step -= round(step);
+    out->ut1_minus_utc_s = last ? b->ut1_minus_utc_s : a->ut1_minus_utc_s + f * step;
+    out->xp_rad = a->xp_rad + f * (b->xp_rad - a->xp_rad);
+    out->yp_rad = a->yp_rad + f * (b->yp_rad - a->yp_rad);
+    return BST_OK;
+}

@@ -1,0 +1,106 @@
+#include "sim/astro/sky_clock.h"
+
+#include <stdint.h>
+#include <stdlib.h>
+
+#include "sim/astro/frames_internal.h"
+
+#define STEPS_PER_DAY 720
+/* Enough that look-backs over a grid point do not push out what the present needs. */
+#define NODES 4
+
+typedef struct node {
+    int64_t index;
+    bool valid;
+    bst_earth_parts parts;
+    bst_bodies bodies;
+} node;
+
+struct bst_sky_clock {
+    const bst_eop *eop;
+    node nodes[NODES];
+};
+
+bst_status bst_sky_clock_create(bst_ctx *ctx, const bst_eop *eop, bst_sky_clock **out) {
+    bst_sky_clock *clock = calloc(1, sizeof *clock);
+    if (!clock) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a sky clock");
+    }
+    clock->eop = eop;
+    *out = clock;
+    return BST_OK;
+}
+
+void bst_sky_clock_free(bst_sky_clock *clock) {
+    free(clock);
+}
+
+/* The grid value of an index, from its slot or worked out anew. */
+static bst_status node_at(bst_ctx *ctx, bst_sky_clock *clock, int64_t index, const node **out) {
+    node *n = &clock->nodes[index % NODES];
+    if (!n->valid || n->index != index) {
+        int64_t day = index / STEPS_PER_DAY, step = index % STEPS_PER_DAY;
+        bst_time t = {(double)day + 0.5, (double)step / STEPS_PER_DAY};
+        n->valid = false;
+        BST_TRY(bst_earth_parts_at(ctx, clock->eop, t, &n->parts));
+        bst_bodies_at(t, &n->bodies);
+        n->index = index;
+        n->valid = true;
+    }
+    *out = n;
+    return BST_OK;
+}
+
+static bst_vec3 lerp(bst_vec3 a, bst_vec3 b, double f) {
+    return bst_vec3_axpy(a, f, bst_vec3_sub(b, a));
+}
+
+/* Over one step these rotations turn by 1e-8 rad: linear in their elements they stay rotations to
+ * double precision. */
+static bst_mat3 lerp_rotation(const bst_mat3 *a, const bst_mat3 *b, double f) {
+    bst_mat3 r;
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) {
+            r.m[i][j] = a->m[i][j] + f * (b->m[i][j] - a->m[i][j]);
+        }
+    }
+    return r;
+}
+
+static double lerp_angle(double a, double b, double f) {
+    double step = b - a;
+    if (step < -BST_PI) {
+        step += 2.0 * BST_PI;
+    } else if (step > BST_PI) {
+        step -= 2.0 * BST_PI;
+    }
+    return a + f * step;
+}
+
+bst_status bst_sky_clock_at(bst_ctx *ctx, bst_sky_clock *clock, bst_time t, bst_sky *out) {
+    if (!(t.jd1 >= 0.5 && t.jd1 < 1e8 && t.jd2 >= 0.0 && t.jd2 < 1.0)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "JD %g + %g is not an instant", t.jd1, t.jd2);
+    }
+    double steps = t.jd2 * STEPS_PER_DAY;
+    int64_t step = (int64_t)steps;
+    if (step >= STEPS_PER_DAY) { /* rounding just before midnight */
+        step = STEPS_PER_DAY - 1;
+    }
+    int64_t index = (int64_t)t.jd1 * STEPS_PER_DAY + step;
+    double f = (t.jd2 - (double)step / STEPS_PER_DAY) * STEPS_PER_DAY;
+    const node *a, *b;
+    BST_TRY(node_at(ctx, clock, index, &a));
+    BST_TRY(node_at(ctx, clock, index + 1, &b));
+    bst_earth_parts parts = {
+        .cirs_from_gcrf = lerp_rotation(&a->parts.cirs_from_gcrf, &b->parts.cirs_from_gcrf, f),
+        .itrf_from_tirs = lerp_rotation(&a->parts.itrf_from_tirs, &b->parts.itrf_from_tirs, f),
+        .era_rad = lerp_angle(a->parts.era_rad, b->parts.era_rad, f),
+        .teme_turn_rad = lerp_angle(a->parts.teme_turn_rad, b->parts.teme_turn_rad, f),
+    };
+    out->frames = bst_earth_frames_from_parts(&parts);
+    out->bodies.sun_m = lerp(a->bodies.sun_m, b->bodies.sun_m, f);
+    out->bodies.moon_m = lerp(a->bodies.moon_m, b->bodies.moon_m, f);
+    out->bodies.earth_bary_m = lerp(a->bodies.earth_bary_m, b->bodies.earth_bary_m, f);
+    out->bodies.earth_bary_mps = lerp(a->bodies.earth_bary_mps, b->bodies.earth_bary_mps, f);
+    return BST_OK;
+}

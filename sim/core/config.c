@@ -1,0 +1,368 @@
+#include "sim/core/config.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cjson/cJSON.h>
+
+static const double MAX_EXACT_INTEGER = 9007199254740992.0; /* 2^53 */
+
+typedef struct reader {
+    bst_ctx *ctx;
+    const char *file;
+} reader;
+
+static bst_status read_object(const reader *r, const cJSON *node, const char *path,
+                              const bst_config_desc *table, void *object);
+
+/* The offending value as text, shortened. */
+static void value_text(const cJSON *value, char *buffer, size_t bytes) {
+    char *text = cJSON_PrintUnformatted(value);
+    snprintf(buffer, bytes, "%s", text ? text : "?");
+    if (text && strlen(text) >= bytes && bytes > 4) {
+        memcpy(buffer + bytes - 4, "...", 4);
+    }
+    free(text);
+}
+
+static bst_status wrong(const reader *r, const char *path, const cJSON *value, const char *what,
+                        const char *allowed) {
+    char found[80];
+    value_text(value, found, sizeof found);
+    return bst_fail(r->ctx, BST_ERR_CONFIG, "%s: %s: %s (found %s; allowed: %s)", r->file,
+                    *path ? path : "/", what, found, allowed);
+}
+
+static void range_text(const bst_config_desc *d, char *buffer, size_t bytes) {
+    const char *unit = d->unit && *d->unit ? d->unit : "";
+    snprintf(buffer, bytes, "%s from %.15g to %.15g%s%s",
+             d->type == BST_CONFIG_INT ? "an integer" : "a number", d->minimum, d->maximum,
+             *unit ? " " : "", unit);
+}
+
+/* Edit distance of two short words (Levenshtein), capped by the buffers' size. */
+static size_t edit_distance(const char *a, const char *b) {
+    size_t n = strlen(a), m = strlen(b);
+    size_t row[65];
+    if (n > 64 || m > 64) {
+        return 64;
+    }
+    for (size_t j = 0; j <= m; j++) {
+        row[j] = j;
+    }
+    for (size_t i = 1; i <= n; i++) {
+        size_t diagonal = row[0];
+        row[0] = i;
+        for (size_t j = 1; j <= m; j++) {
+            size_t substitute = diagonal + (a[i - 1] != b[j - 1]);
+            diagonal = row[j];
+            size_t best = row[j] + 1 < row[j - 1] + 1 ? row[j] + 1 : row[j - 1] + 1;
+            row[j] = substitute < best ? substitute : best;
+        }
+    }
+    return row[m];
+}
+
+static bst_status unknown_key(const reader *r, const char *path, const char *key,
+                              const bst_config_desc *table) {
+    const char *nearest = NULL;
+    size_t nearest_distance = 4;
+    char known[400] = "";
+    for (const bst_config_desc *d = table; d->key; d++) {
+        size_t distance = edit_distance(key, d->key);
+        if (distance < nearest_distance && distance < strlen(d->key)) {
+            nearest_distance = distance;
+            nearest = d->key;
+        }
+        size_t used = strlen(known);
+        snprintf(known + used, sizeof known - used, "%s%s", used ? ", " : "", d->key);
+    }
+    if (nearest) {
+        return bst_fail(r->ctx, BST_ERR_CONFIG, "%s: %s/%s: unknown key; did you mean \"%s\"?",
+                        r->file, path, key, nearest);
+    }
+    return bst_fail(r->ctx, BST_ERR_CONFIG, "%s: %s/%s: unknown key (allowed: %s)", r->file, path,
+                    key, known);
+}
+
+static bst_status read_number(const reader *r, const cJSON *value, const char *path,
+                              const bst_config_desc *d, double *out) {
+    char allowed[160];
+    range_text(d, allowed, sizeof allowed);
+    if (!cJSON_IsNumber(value)) {
+        return wrong(r, path, value, "wrong type", allowed);
+    }
+    double number = value->valuedouble;
+    if (d->type == BST_CONFIG_INT &&
+        (number != floor(number) || fabs(number) > MAX_EXACT_INTEGER)) {
+        return wrong(r, path, value, "not an integer", allowed);
+    }
+    if (!(number >= d->minimum && number <= d->maximum)) {
+        return wrong(r, path, value, "out of range", allowed);
+    }
+    *out = number;
+    return BST_OK;
+}
+
+static bst_status read_list(const reader *r, const cJSON *value, const char *path,
+                            const bst_config_desc *d, bst_config_list *out) {
+    char allowed[120];
+    snprintf(allowed, sizeof allowed, "an array of %.0f to %.0f objects", d->minimum, d->maximum);
+    if (!cJSON_IsArray(value)) {
+        return wrong(r, path, value, "wrong type", allowed);
+    }
+    int count = cJSON_GetArraySize(value);
+    if (count < d->minimum || count > d->maximum) {
+        char found[48];
+        snprintf(found, sizeof found, "an array of %d", count);
+        return bst_fail(r->ctx, BST_ERR_CONFIG,
+                        "%s: %s: wrong number of elements (found %s; allowed: %s)", r->file, path,
+                        found, allowed);
+    }
+    char *items = calloc((size_t)(count ? count : 1), d->item_bytes);
+    if (!items) {
+        return bst_fail(r->ctx, BST_ERR_MEMORY, "%s: %s: out of memory", r->file, path);
+    }
+    /* stored at once, so that bst_config_free finds what was read before an error */
+    *out = (bst_config_list){items, 0};
+    for (const cJSON *item = value->child; item; item = item->next) {
+        char item_path[512];
+        snprintf(item_path, sizeof item_path, "%s/%d", path, out->count);
+        out->count++;
+        BST_TRY(read_object(r, item, item_path, d->children,
+                            items + (size_t)(out->count - 1) * d->item_bytes));
+    }
+    return BST_OK;
+}
+
+static bst_status read_seed(const reader *r, const cJSON *value, const char *path, uint64_t *out) {
+    const char *allowed = "a hexadecimal string such as \"0x1F\", up to 64 bits";
+    if (!cJSON_IsString(value)) {
+        return wrong(r, path, value, "wrong type", allowed);
+    }
+    const char *text = value->valuestring;
+    size_t digits = strlen(text) > 2 ? strlen(text) - 2 : 0;
+    if (strncmp(text, "0x", 2) != 0 || digits == 0 || digits > 16 ||
+        strspn(text + 2, "0123456789abcdefABCDEF") != digits) {
+        return wrong(r, path, value, "not a seed", allowed);
+    }
+    *out = strtoull(text + 2, NULL, 16);
+    return BST_OK;
+}
+
+static bst_status read_enum(const reader *r, const cJSON *value, const char *path,
+                            const bst_config_desc *d, int32_t *out) {
+    char allowed[320] = "";
+    for (int i = 0; d->choices[i]; i++) {
+        if (cJSON_IsString(value) && strcmp(value->valuestring, d->choices[i]) == 0) {
+            *out = i;
+            return BST_OK;
+        }
+        size_t used = strlen(allowed);
+        snprintf(allowed + used, sizeof allowed - used, "%s\"%s\"", used ? ", " : "",
+                 d->choices[i]);
+    }
+    return wrong(r, path, value, cJSON_IsString(value) ? "unknown choice" : "wrong type", allowed);
+}
+
+static bst_status read_value(const reader *r, const cJSON *value, const char *path,
+                             const bst_config_desc *d, void *object) {
+    char *member = (char *)object + d->offset;
+    double number;
+    char text[120];
+    switch (d->type) {
+        case BST_CONFIG_BOOL:
+            if (!cJSON_IsBool(value)) {
+                return wrong(r, path, value, "wrong type", "true or false");
+            }
+            *(bool *)(void *)member = cJSON_IsTrue(value);
+            return BST_OK;
+        case BST_CONFIG_INT:
+            BST_TRY(read_number(r, value, path, d, &number));
+            *(int64_t *)(void *)member = (int64_t)number;
+            return BST_OK;
+        case BST_CONFIG_REAL:
+            BST_TRY(read_number(r, value, path, d, &number));
+            *(double *)(void *)member = number;
+            return BST_OK;
+        case BST_CONFIG_STRING:
+            snprintf(text, sizeof text, "a string of at most %zu bytes", d->size - 1);
+            if (!cJSON_IsString(value)) {
+                return wrong(r, path, value, "wrong type", text);
+            }
+            if (strlen(value->valuestring) >= d->size) {
+                return wrong(r, path, value, "too long", text);
+            }
+            memcpy(member, value->valuestring, strlen(value->valuestring) + 1);
+            return BST_OK;
+        case BST_CONFIG_ENUM:
+            return read_enum(r, value, path, d, (int32_t *)(void *)member);
+        case BST_CONFIG_SEED:
+            return read_seed(r, value, path, (uint64_t *)(void *)member);
+        case BST_CONFIG_REALS: {
+            int count = (int)(d->size / sizeof(double));
+            snprintf(text, sizeof text, "an array of %d numbers", count);
+            if (!cJSON_IsArray(value) || cJSON_GetArraySize(value) != count) {
+                return wrong(r, path, value, "wrong type", text);
+            }
+            int i = 0;
+            for (const cJSON *item = value->child; item; item = item->next, i++) {
+                char item_path[512];
+                snprintf(item_path, sizeof item_path, "%s/%d", path, i);
+                BST_TRY(read_number(r, item, item_path, d, (double *)(void *)member + i));
+            }
+            return BST_OK;
+        }
+        case BST_CONFIG_OBJECT:
+            return read_object(r, value, path, d->children, member);
+        case BST_CONFIG_LIST:
+            return read_list(r, value, path, d, (bst_config_list *)(void *)member);
+        case BST_CONFIG_RAW:
+            return BST_OK;
+    }
+    return bst_fail(r->ctx, BST_ERR_ARGUMENT, "%s: descriptor of unknown type %d", path,
+                    (int)d->type);
+}
+
+static const bst_config_desc *find(const bst_config_desc *table, const char *key) {
+    for (const bst_config_desc *d = table; d->key; d++) {
+        if (strcmp(d->key, key) == 0) {
+            return d;
+        }
+    }
+    return NULL;
+}
+
+static bst_status read_object(const reader *r, const cJSON *node, const char *path,
+                              const bst_config_desc *table, void *object) {
+    if (node && !cJSON_IsObject(node)) {
+        return wrong(r, path, node, "wrong type", "an object");
+    }
+    for (const cJSON *item = node ? node->child : NULL; item; item = item->next) {
+        if (!find(table, item->string) && strcmp(item->string, "$schema") != 0 &&
+            strcmp(item->string, "description") != 0) {
+            return unknown_key(r, path, item->string, table);
+        }
+    }
+    for (const bst_config_desc *d = table; d->key; d++) {
+        char child_path[512];
+        snprintf(child_path, sizeof child_path, "%s/%s", path, d->key);
+        const cJSON *value = node ? cJSON_GetObjectItemCaseSensitive(node, d->key) : NULL;
+        if (value) {
+            BST_TRY(read_value(r, value, child_path, d, object));
+        } else if (d->fallback) {
+            cJSON *fallback = cJSON_Parse(d->fallback);
+            if (!fallback) {
+                return bst_fail(r->ctx, BST_ERR_ARGUMENT, "descriptor of %s: default %s is no JSON",
+                                child_path, d->fallback);
+            }
+            bst_status status = read_value(r, fallback, child_path, d, object);
+            cJSON_Delete(fallback);
+            BST_TRY(status);
+        } else if (d->type != BST_CONFIG_RAW) {
+            return bst_fail(r->ctx, BST_ERR_CONFIG, "%s: %s: missing; it is required: %s", r->file,
+                            child_path, d->doc);
+        }
+    }
+    return BST_OK;
+}
+
+static size_t table_bytes(const bst_config_desc *table) {
+    size_t bytes = 0;
+    for (const bst_config_desc *d = table; d->key; d++) {
+        size_t end = d->type == BST_CONFIG_RAW ? 0 : d->offset + d->size;
+        bytes = end > bytes ? end : bytes;
+    }
+    return bytes;
+}
+
+bst_status bst_config_read(bst_ctx *ctx, const bst_json *json, const cJSON *node, const char *path,
+                           const bst_config_desc *table, void *object) {
+    memset(object, 0, table_bytes(table));
+    reader r = {ctx, bst_json_name(json)};
+    bst_status status = read_object(&r, node, path, table, object);
+    if (status != BST_OK) {
+        bst_config_free(table, object);
+    }
+    return status;
+}
+
+bst_status bst_config_defaults(bst_ctx *ctx, const bst_config_desc *table, void *object) {
+    memset(object, 0, table_bytes(table));
+    reader r = {ctx, "defaults"};
+    bst_status status = read_object(&r, NULL, "", table, object);
+    if (status != BST_OK) {
+        bst_config_free(table, object);
+    }
+    return status;
+}
+
+void bst_config_free(const bst_config_desc *table, void *object) {
+    for (const bst_config_desc *d = table; d->key; d++) {
+        char *member = (char *)object + d->offset;
+        if (d->type == BST_CONFIG_OBJECT) {
+            bst_config_free(d->children, member);
+        } else if (d->type == BST_CONFIG_LIST) {
+            bst_config_list *list = (bst_config_list *)(void *)member;
+            for (int i = 0; i < list->count; i++) {
+                bst_config_free(d->children, (char *)list->items + (size_t)i * d->item_bytes);
+            }
+            free(list->items);
+            *list = (bst_config_list){NULL, 0};
+        }
+    }
+}
+
+static cJSON *echo_value(const bst_config_desc *d, const void *object) {
+    const char *member = (const char *)object + d->offset;
+    switch (d->type) {
+        case BST_CONFIG_BOOL:
+            return cJSON_CreateBool(*(const bool *)(const void *)member);
+        case BST_CONFIG_INT:
+            return cJSON_CreateNumber((double)*(const int64_t *)(const void *)member);
+        case BST_CONFIG_REAL:
+            return cJSON_CreateNumber(*(const double *)(const void *)member);
+        case BST_CONFIG_STRING:
+            return cJSON_CreateString(member);
+        case BST_CONFIG_ENUM:
+            return cJSON_CreateString(d->choices[*(const int32_t *)(const void *)member]);
+        case BST_CONFIG_SEED: {
+            char text[24];
+            snprintf(text, sizeof text, "0x%" PRIX64, *(const uint64_t *)(const void *)member);
+            return cJSON_CreateString(text);
+        }
+        case BST_CONFIG_REALS:
+            return cJSON_CreateDoubleArray((const double *)(const void *)member,
+                                           (int)(d->size / sizeof(double)));
+        case BST_CONFIG_OBJECT:
+            return bst_config_echo(d->children, member);
+        case BST_CONFIG_LIST: {
+            const bst_config_list *list = (const bst_config_list *)(const void *)member;
+            cJSON *array = cJSON_CreateArray();
+            for (int i = 0; i < list->count; i++) {
+                cJSON_AddItemToArray(
+                    array, bst_config_echo(d->children,
+                                           (const char *)list->items + (size_t)i * d->item_bytes));
+            }
+            return array;
+        }
+        case BST_CONFIG_RAW:
+            return NULL;
+    }
+    return NULL;
+}
+
+cJSON *bst_config_echo(const bst_config_desc *table, const void *object) {
+    cJSON *node = cJSON_CreateObject();
+    for (const bst_config_desc *d = table; d->key && node; d++) {
+        cJSON *value = echo_value(d, object);
+        if (value) {
+            cJSON_AddItemToObject(node, d->key, value);
+        }
+    }
+    return node;
+}

@@ -1,0 +1,107 @@
+#include <string.h>
+
+#include <cjson/cJSON.h>
+
+#include "sim/core/config.h"
+
+/* The largest magnitude that is shown as a bound; wider ranges mean "any finite number". */
+static const double OPEN_BOUND = 1e300;
+
+static void add_range(cJSON *node, const bst_config_desc *d) {
+    if (d->minimum > -OPEN_BOUND) {
+        cJSON_AddNumberToObject(node, "minimum", d->minimum);
+    }
+    if (d->maximum < OPEN_BOUND) {
+        cJSON_AddNumberToObject(node, "maximum", d->maximum);
+    }
+}
+
+static cJSON *value_schema(const bst_config_desc *d) {
+    cJSON *node =
+        d->type == BST_CONFIG_OBJECT ? bst_config_schema(d->children) : cJSON_CreateObject();
+    switch (d->type) {
+        case BST_CONFIG_BOOL:
+            cJSON_AddStringToObject(node, "type", "boolean");
+            break;
+        case BST_CONFIG_INT:
+        case BST_CONFIG_REAL:
+            cJSON_AddStringToObject(node, "type", d->type == BST_CONFIG_INT ? "integer" : "number");
+            add_range(node, d);
+            break;
+        case BST_CONFIG_STRING:
+            cJSON_AddStringToObject(node, "type", "string");
+            cJSON_AddNumberToObject(node, "maxLength", (double)d->size - 1.0);
+            break;
+        case BST_CONFIG_ENUM: {
+            cJSON *choices = cJSON_AddArrayToObject(node, "enum");
+            for (int i = 0; d->choices[i]; i++) {
+                cJSON_AddItemToArray(choices, cJSON_CreateString(d->choices[i]));
+            }
+            break;
+        }
+        case BST_CONFIG_SEED:
+            cJSON_AddStringToObject(node, "type", "string");
+            cJSON_AddStringToObject(node, "pattern", "^0x[0-9a-fA-F]{1,16}$");
+            break;
+        case BST_CONFIG_REALS: {
+            cJSON_AddStringToObject(node, "type", "array");
+            double count = (double)(d->size / sizeof(double));
+            cJSON_AddNumberToObject(node, "minItems", count);
+            cJSON_AddNumberToObject(node, "maxItems", count);
+            cJSON *item = cJSON_AddObjectToObject(node, "items");
+            cJSON_AddStringToObject(item, "type", "number");
+            add_range(item, d);
+            break;
+        }
+        case BST_CONFIG_LIST:
+            cJSON_AddStringToObject(node, "type", "array");
+            cJSON_AddNumberToObject(node, "minItems", d->minimum);
+            cJSON_AddNumberToObject(node, "maxItems", d->maximum);
+            cJSON_AddItemToObject(node, "items", bst_config_schema(d->children));
+            break;
+        case BST_CONFIG_OBJECT:
+        case BST_CONFIG_RAW:
+            break;
+    }
+    if (d->doc) {
+        char text[600];
+        const char *unit = d->unit && *d->unit ? d->unit : NULL;
+        size_t length = strlen(d->doc);
+        if (unit && length + strlen(unit) + 4 < sizeof text) {
+            memcpy(text, d->doc, length);
+            text[length] = '\0';
+            strcat(text, " [");
+            strcat(text, unit);
+            strcat(text, "]");
+            cJSON_AddStringToObject(node, "description", text);
+        } else {
+            cJSON_AddStringToObject(node, "description", d->doc);
+        }
+    }
+    if (d->fallback && d->type != BST_CONFIG_OBJECT) {
+        cJSON_AddItemToObject(node, "default", cJSON_Parse(d->fallback));
+    }
+    return node;
+}
+
+cJSON *bst_config_schema(const bst_config_desc *table) {
+    cJSON *node = cJSON_CreateObject();
+    cJSON_AddStringToObject(node, "type", "object");
+    cJSON_AddBoolToObject(node, "additionalProperties", 0);
+    cJSON *properties = cJSON_AddObjectToObject(node, "properties");
+    cJSON *required = cJSON_CreateArray();
+    for (const bst_config_desc *d = table; d->key; d++) {
+        cJSON_AddItemToObject(properties, d->key, value_schema(d));
+        if (!d->fallback && d->type != BST_CONFIG_RAW) {
+            cJSON_AddItemToArray(required, cJSON_CreateString(d->key));
+        }
+    }
+    cJSON *text = cJSON_AddObjectToObject(properties, "description");
+    cJSON_AddStringToObject(text, "type", "string");
+    if (cJSON_GetArraySize(required) > 0) {
+        cJSON_AddItemToObject(node, "required", required);
+    } else {
+        cJSON_Delete(required);
+    }
+    return node;
+}

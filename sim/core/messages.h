@@ -1,0 +1,297 @@
+/* The payloads that modules exchange. One struct per channel; the table in messages.c gives each
+ * channel its kind.
+ *
+ * Camera frame: +z boresight, +x along columns (image x), +y along rows (image y), right-handed.
+ * Pixel (0, 0) has its centre at (0.0, 0.0). Directions are unit vectors in GCRF axes (ICRS
+ * orientation). "Apparent" directions contain stellar aberration of the observer; "geometric" ones
+ * have it removed and hold light time. */
+#ifndef BST_CORE_MESSAGES_H
+#define BST_CORE_MESSAGES_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "sim/core/frame.h"
+#include "sim/core/vec.h"
+
+/* Names of the channels, without their "observer/sensor/" scope. */
+#define BST_CHANNEL_SENSOR_COMMAND "sensor_command"
+#define BST_CHANNEL_EXPOSURE "exposure"
+#define BST_CHANNEL_LOS_COMMAND "los_command"
+#define BST_CHANNEL_LOS_HISTORY "los_history"
+#define BST_CHANNEL_POINTING_TELEMETRY "pointing_telemetry"
+#define BST_CHANNEL_NAV_TELEMETRY "nav_telemetry"
+#define BST_CHANNEL_FRAME "frame"
+#define BST_CHANNEL_TRUTH "truth"
+#define BST_CHANNEL_DETECTIONS "detections"
+#define BST_CHANNEL_PREDICTIONS "predictions"
+#define BST_CHANNEL_TRACKS "tracks"
+#define BST_CHANNEL_CONTROL_STATUS "control_status"
+
+/* A read-out window in full-sensor pixels. */
+typedef struct bst_window {
+    int x0, y0, width, height;
+} bst_window;
+
+/* sensor_command (latest): what control asks of the exposure clock; latched at the next exposure's
+ * start. */
+typedef struct bst_sensor_command {
+    double exposure_s; /* <= 0: keep */
+    double period_s;   /* <= 0: keep */
+    bst_window window; /* width 0: full sensor */
+    int binning;       /* 0: keep */
+} bst_sensor_command;
+
+/* exposure (queue): published at the tick at which the exposure ends. */
+typedef struct bst_exposure {
+    int64_t id; /* 0, 1, 2, ... */
+    int64_t start_tick, end_tick;
+    bst_window window;
+    int binning;
+    bool dropped; /* the frame will be lost on its way: rendered truth is kept, no frame is
+                     delivered */
+} bst_exposure;
+
+/* los_history (latest, written in place): ring of the true camera attitude at the plant rate.
+ * Sample number n (0, 1, ...) is items[n % capacity]; the newest is number written - 1. */
+typedef struct bst_los_sample {
+    int64_t tick;
+    bst_quat q_cam_from_gcrf;
+} bst_los_sample;
+
+typedef struct bst_los_history {
+    int64_t written;
+    int32_t capacity;
+    bst_los_sample items[];
+} bst_los_history;
+
+/* pointing_telemetry (latest, written in place): ring of what encoders and attitude sensors say. */
+typedef struct bst_pointing_sample {
+    int64_t tick;
+    bst_quat q_cam_from_gcrf; /* measured: attitude estimate and encoders */
+    double axis_rad[2];       /* encoder readings, outer and inner axis */
+} bst_pointing_sample;
+
+typedef struct bst_pointing_telemetry {
+    int64_t written;
+    int32_t capacity;
+    bst_quat q_body_from_gcrf; /* newest body attitude as the spacecraft believes it */
+    bool settled;              /* the servo is within its settling tolerance of the command */
+    bool limited;              /* an axis is at a rate, acceleration or travel limit */
+    bst_pointing_sample items[];
+} bst_pointing_telemetry;
+
+/* nav_telemetry (latest): what the spacecraft knows of its own orbit. */
+typedef struct bst_nav_telemetry {
+    int64_t tick;               /* of validity */
+    bst_vec3 position_gcrf_m;   /* geocentric */
+    bst_vec3 velocity_gcrf_mps; /* geocentric */
+    bst_vec3 velocity_bary_mps; /* relative to the solar-system barycentre, for aberration */
+    bst_vec3 sun_m;             /* observer to Sun */
+} bst_nav_telemetry;
+
+/* los_command (latest): where the boresight shall be, as the onboard attitude knowledge sees it.
+ * The command at tick t is the unit vector along direction + rate * (t - tick) / tick rate. */
+typedef struct bst_los_command {
+    int64_t tick;             /* of reference */
+    bst_vec3 direction_gcrf;  /* unit, apparent */
+    bst_vec3 rate_gcrf_radps; /* d(direction)/dt, perpendicular to direction */
+} bst_los_command;
+
+/* frame (queue). The channel slot owns one reference of `frame`. */
+typedef struct bst_frame_message {
+    bst_frame *frame;
+    int64_t exposure_id;
+    int64_t start_tick, end_tick;
+    bst_window window;
+    int binning;
+    int bits; /* 8 to 16 */
+} bst_frame_message;
+
+typedef enum bst_source_kind { BST_SOURCE_STAR = 0, BST_SOURCE_OBJECT = 1 } bst_source_kind;
+
+enum {
+    BST_TRUTH_IN_FIELD = 1u << 0, /* mean position on the window */
+    BST_TRUTH_OCCULTED = 1u << 1, /* behind the Earth */
+    BST_TRUTH_SATURATED = 1u << 2,
+};
+
+/* One source of the true scene. Pixels are full-sensor coordinates; NAN where behind the camera. */
+typedef struct bst_truth_item {
+    int32_t kind;  /* bst_source_kind */
+    uint32_t id;   /* star: Tycho-2 identity; object: index in the world */
+    int32_t norad; /* object: catalogue number, else 0 */
+    uint32_t flags;
+    double x_start_px, y_start_px, x_mid_px, y_mid_px, x_end_px, y_end_px;
+    double x_mean_px, y_mean_px; /* mean over the exposure: where the light's centroid is */
+    double ra_rad,
+        dec_rad; /* ICRS; star: catalogue place at epoch; object: geometric with light time, mid */
+    double v_mag;
+    double electrons;       /* detected in the exposure, whole PSF */
+    double snr;             /* sqrt(sum s^2 / sigma^2), sigma without the source's own light */
+    double sunlit_fraction; /* object: of the Sun's disc, mid */
+    double phase_rad;       /* object: Sun - object - observer */
+    double range_m;         /* object: mid */
+} bst_truth_item;
+
+/* truth (queue): the true scene of one exposure. */
+typedef struct bst_truth {
+    int64_t exposure_id;
+    int64_t start_tick, end_tick;
+    bool dropped;
+    bst_quat q_cam_from_gcrf_mid; /* at the middle of the exposure, jitter included */
+    bst_quat
+        q_cam_from_gcrf_mean; /* averaged over the exposure: the attitude of the header's WCS */
+    bst_vec3 observer_gcrf_m, observer_gcrf_mps; /* mid */
+    bst_vec3 velocity_bary_mps;            /* mid; with sun_m it gives the light's corrections */
+    bst_vec3 sun_m;                        /* observer to Sun, mid */
+    double boresight_x_px, boresight_y_px; /* where the boresight meets the focal plane */
+    double background_e, dark_e;           /* expected electrons per pixel */
+    int32_t count, lost;                   /* items; sources that found no room */
+    bst_truth_item items[];
+} bst_truth;
+
+typedef enum bst_label {
+    BST_LABEL_UNKNOWN = 0,
+    BST_LABEL_STAR,     /* identified in the onboard catalogue */
+    BST_LABEL_OBJECT,   /* not a star: moves, or no catalogue star is there */
+    BST_LABEL_ARTEFACT, /* hot pixel, edge, radiation hit */
+} bst_label;
+
+enum {
+    BST_DETECTION_SATURATED = 1u << 0,
+    BST_DETECTION_EDGE = 1u << 1,
+    BST_DETECTION_STREAK = 1u << 2, /* elongated beyond the PSF */
+    BST_DETECTION_BLEND = 1u << 3,
+};
+
+typedef struct bst_detection {
+    double x_px, y_px;             /* full-sensor coordinates, mid-exposure centroid */
+    double cov_xx, cov_xy, cov_yy; /* px^2 */
+    double flux_e, flux_sigma_e;
+    double snr;
+    double length_px, width_px, angle_rad; /* extent; angle of the long axis from +x towards +y */
+    double v_mag;                          /* from flux and the onboard zero point */
+    uint32_t flags;
+    uint32_t star_id; /* Tycho-2 identity, 0 when none */
+    int32_t label;    /* bst_label */
+} bst_detection;
+
+/* detections (queue): what image processing (or the generator) found in one frame. */
+typedef struct bst_detections {
+    int64_t exposure_id;
+    int64_t start_tick, end_tick;
+    bst_quat q_cam_from_gcrf;       /* onboard attitude used for star identification, mid-exposure:
+                                       telemetry with the       tracker's predicted correction */
+    bst_quat q_telemetry_from_gcrf; /* telemetry alone, mid-exposure */
+    double background_e, noise_e;   /* median per pixel */
+    double threshold_snr;
+    int32_t stars_identified;
+    int32_t count, lost; /* items; detections that found no room */
+    bst_detection items[];
+} bst_detections;
+
+typedef enum bst_track_status {
+    BST_TRACK_TENTATIVE = 0,
+    BST_TRACK_CONFIRMED,
+    BST_TRACK_COASTING, /* confirmed, no detection in the latest frames */
+} bst_track_status;
+
+typedef struct bst_track {
+    int64_t id; /* 1, 2, ...: never reused */
+    int32_t status;
+    bool target_of_interest;
+    bst_vec3 direction_gcrf;  /* unit, geometric */
+    bst_vec3 rate_gcrf_radps; /* d(direction)/dt, perpendicular to direction */
+    /* covariance of (direction, rate) along two tangent axes e1 = unit(z x d) (or unit(x x d) near
+     * the pole), e2 = d x e1: order d1, d2, r1, r2; rad^2, rad^2/s, rad^2/s^2 */
+    double covariance[4][4];
+    double v_mag;
+    double snr; /* of the latest detection */
+    int32_t hits, misses_in_row;
+    int64_t first_tick, last_update_tick;
+    double x_px, y_px; /* latest detection, full-sensor coordinates */
+} bst_track;
+
+/* Attitude from stars, and the telemetry's error that follows from it. */
+typedef struct bst_attitude_fix {
+    bool valid;
+    int32_t stars;
+    int64_t tick;             /* mid-exposure */
+    bst_quat q_cam_from_gcrf; /* from stars */
+    bst_vec3 error_cam_rad;   /* rotation vector e, camera axes: q_stars = bst_quat_from_rotvec(e) *
+                                 q_telemetry */
+    double sigma_rad[3];      /* standard deviation about camera x, y, z */
+    double rms_px;            /* of the star residuals */
+} bst_attitude_fix;
+
+/* tracks (queue): the tracker's state after one frame, valid at `tick` (mid-exposure). */
+typedef struct bst_tracks {
+    int64_t exposure_id;
+    int64_t tick;
+    bst_attitude_fix attitude;
+    int64_t target_id; /* track of interest, 0 when none */
+    int32_t count, lost;
+    bst_track items[];
+} bst_tracks;
+
+typedef struct bst_prediction {
+    int64_t track_id;
+    bst_vec3 direction_gcrf; /* geometric, at the header's tick */
+    bst_vec3 rate_gcrf_radps;
+    double sigma_rad;
+    bool target_of_interest;
+} bst_prediction;
+
+/* predictions (latest): the tracker's help for image processing of later frames. */
+typedef struct bst_predictions {
+    int64_t tick; /* of validity */
+    bool attitude_valid;
+    bst_vec3 attitude_error_cam_rad; /* as in bst_attitude_fix, filtered */
+    bst_vec3 attitude_error_rate_cam_radps;
+    int32_t count, lost;
+    bst_prediction items[];
+} bst_predictions;
+
+typedef enum bst_mode {
+    BST_MODE_IDLE = 0,
+    BST_MODE_SLEW,    /* to the cue */
+    BST_MODE_SEARCH,  /* step-stare pattern about the cue */
+    BST_MODE_ACQUIRE, /* a candidate is being centred and confirmed */
+    BST_MODE_TRACK,
+    BST_MODE_REACQUIRE, /* target lost: predicted place, then search about it */
+    BST_MODE_STARE,     /* open loop, inertial */
+    BST_MODE_RATE,      /* open loop, on the cue */
+    BST_MODE_COUNT
+} bst_mode;
+
+/* control_status (latest): for the record, the progress line and the evaluator. */
+typedef struct bst_control_status {
+    int64_t tick;
+    int32_t mode; /* bst_mode */
+    int64_t target_id;
+    int32_t search_step;
+    double aim_error_px[2]; /* as control believes: where the target is from the boresight */
+} bst_control_status;
+
+/* "track" for BST_MODE_TRACK, and so on. */
+const char *bst_mode_name(int mode);
+
+typedef enum bst_channel_kind { BST_CHANNEL_LATEST, BST_CHANNEL_QUEUE } bst_channel_kind;
+
+/* How a channel stores its payload: `header_bytes` then `capacity` items of `item_bytes`. */
+typedef struct bst_channel_type {
+    const char *name;
+    bst_channel_kind kind;
+    size_t header_bytes;
+    size_t item_bytes; /* 0: no items */
+    bool in_place;     /* a ring that its writer extends in place: cannot be read with a delay */
+    void (*release)(
+        void *payload); /* lets go of what a slot owns before it is written again; may be NULL */
+} bst_channel_type;
+
+/* The type of a channel by its unscoped name; NULL when there is none. */
+const bst_channel_type *bst_channel_type_find(const char *name);
+
+#endif

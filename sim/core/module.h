@@ -1,0 +1,111 @@
+/* What a module is: a static descriptor, a configuration table, ports, and three functions. */
+#ifndef BST_CORE_MODULE_H
+#define BST_CORE_MODULE_H
+
+#include "sim/core/config.h"
+#include "sim/core/messages.h"
+#include "sim/core/rng.h"
+
+#define BST_MODULE_ABI 1
+
+struct bst_world;     /* sim/world: what is true */
+struct bst_knowledge; /* sim/world: what the onboard side knows */
+struct bst_device;    /* sim/device */
+struct bst_step;      /* sim/engine; reached through the functions below */
+
+typedef enum bst_port_direction {
+    BST_PORT_IN,
+    BST_PORT_OUT,
+    BST_PORT_MODIFY, /* changes in place what another module wrote, before any reader sees it */
+} bst_port_direction;
+
+enum {
+    BST_PORT_OPTIONAL = 1u << 0, /* input: may have no writer */
+    BST_PORT_TRIGGER = 1u << 1, /* input: the module steps whenever a new message becomes visible */
+    BST_PORT_FEEDBACK = 1u << 2, /* input: closes a loop; read with a delay of at least one tick */
+};
+
+typedef struct bst_port {
+    const char *channel; /* BST_CHANNEL_... */
+    bst_port_direction direction;
+    unsigned flags;
+    double
+        max_age_s; /* input: older than this at the time of reading is stale; 0: any age is fresh */
+    int capacity; /* output with items: default number; bst_env_set_capacity changes it in create */
+} bst_port;
+
+enum {
+    BST_MODULE_READS_TRUTH = 1u << 0, /* gets env->world; onboard modules do not */
+    BST_MODULE_NEEDS_DEVICE = 1u << 1,
+};
+
+/* What create gets. Pointers outlive the module. */
+typedef struct bst_module_env {
+    bst_ctx *ctx;
+    const char *instance; /* "observer/sensor/module" */
+    int64_t tick_rate_hz;
+    int64_t period_ticks; /* 0: stepped by triggers only */
+    uint64_t seed, run;
+    const struct bst_world *world; /* NULL unless the descriptor says BST_MODULE_READS_TRUTH */
+    const struct bst_knowledge *knowledge; /* of this sensor */
+    struct bst_device *device;             /* NULL unless the descriptor asks for it */
+    int observer, sensor;                  /* indices in the world */
+    void *engine_private;
+} bst_module_env;
+
+typedef struct bst_module_desc {
+    uint32_t abi;     /* BST_MODULE_ABI */
+    const char *role; /* "gimbal", "scenegen", "imgproc", "tracker", "control", ... */
+    const char *type; /* "two_axis": what a scenario writes as "type" */
+    const char *doc;
+    unsigned flags;
+    const bst_config_desc *config;
+    size_t config_bytes;
+    double default_rate_hz; /* used when the scenario gives no "rate_hz"; 0: triggers only */
+    const bst_port *ports;
+    int port_count;
+    /* `config` is the filled struct; it outlives the module. */
+    bst_status (*create)(const bst_module_env *env, const void *config, void **self);
+    bst_status (*step)(void *self, struct bst_step *step);
+    void (*destroy)(void *self);
+} bst_module_desc;
+
+/* In create: number of items that an output's payload shall hold. `port` indexes desc->ports. */
+void bst_env_set_capacity(const bst_module_env *env, int port, int items);
+/* In create: a key of a random stream of this instance. */
+static inline bst_rng_key bst_env_rng(const bst_module_env *env, const char *stream) {
+    return bst_rng_make_key(env->seed, env->run, env->instance, stream);
+}
+
+/* One message as a reader sees it. payload is NULL when nothing valid is there yet. */
+typedef struct bst_sample {
+    const void *payload;
+    int64_t written_tick; /* when its writer wrote it; it became visible `delay` later */
+    int64_t sequence;     /* 0, 1, ... per channel */
+    bool stale; /* older than the port's max_age_s: to be treated as absent unless the module knows
+                   better */
+} bst_sample;
+
+/* In step. Port numbers index desc->ports. */
+bst_ctx *bst_step_ctx(struct bst_step *step);
+int64_t bst_step_tick(const struct bst_step *step);
+double bst_step_seconds(const struct bst_step *step); /* tick / rate, since the scenario's epoch */
+/* The newest visible message of an input. Queue messages stay unread. */
+bst_sample bst_step_latest(struct bst_step *step, int port);
+/* The next unread visible message of a queue input; payload NULL when there is none. */
+bst_sample bst_step_next(struct bst_step *step, int port);
+/* The payload to fill; visible to readers when the step returns BST_OK. A latest channel's payload
+ * keeps what was written last; a queue slot holds an old message to overwrite. *capacity (may be
+ * NULL): number of items there is room for. */
+void *bst_step_write(struct bst_step *step, int port, int *capacity);
+/* MODIFY port: the message written at this tick, NULL when none was. */
+void *bst_step_modify(struct bst_step *step, int port);
+/* Asks to be stepped at an absolute tick (later than now) besides the period and the triggers. */
+void bst_step_wake_at(struct bst_step *step, int64_t tick);
+/* An event for the record: kind is a short fixed word, text free. */
+void bst_step_event(struct bst_step *step, const char *kind, const char *format, ...)
+    BST_PRINTF(3, 4);
+/* Counts a condition of the data ("saturated", "queue_overflow", ...) for the run summary. */
+void bst_step_count(struct bst_step *step, const char *what);
+
+#endif

@@ -1,0 +1,42 @@
+/* OpenCL: choice of the device, programs from embedded sources, buffers. */
+#ifndef BST_DEVICE_DEVICE_H
+#define BST_DEVICE_DEVICE_H
+
+#define CL_TARGET_OPENCL_VERSION 120
+#include <CL/cl.h>
+
+#include "sim/core/status.h"
+
+typedef struct bst_device bst_device;
+
+/* Opens a device. `selector`: "" for the default (PoCL's CPU device if there is one, else the first
+ * device), or a part of a platform's or device's name, case ignored, or "P:D" by index. threads > 0
+ * limits a CPU device to that many compute units (sub-device). An unknown selector lists what there
+ * is in the message. */
+bst_status bst_device_open(bst_ctx *ctx, const char *selector, int threads,
+                           bst_device **out) BST_MUST_CHECK;
+void bst_device_close(bst_device *device);
+
+cl_context bst_device_context(const bst_device *device);
+cl_command_queue bst_device_queue(const bst_device *device);
+cl_device_id bst_device_id(const bst_device *device);
+/* "PoCL 3.1: cpu-..., 2 compute units" for the manifest. */
+const char *bst_device_description(const bst_device *device);
+
+/* A kernel source that was embedded at build time (see cmake/embed.cmake). */
+typedef struct bst_kernel_source {
+    const char *name; /* file name, for messages */
+    const char *text;
+    unsigned hash_high, hash_low; /* FNV-1a 64 of the text, for the manifest */
+} bst_kernel_source;
+
+/* Builds (or takes from the device's cache) the concatenation of `count` sources with the given
+ * options. A build error's message holds the log's first lines with file names. */
+bst_status bst_device_build(bst_ctx *ctx, bst_device *device,
+                            const bst_kernel_source *const *sources, int count, const char *options,
+                            cl_program *out) BST_MUST_CHECK;
+
+/* BST_OK for CL_SUCCESS, else BST_ERR_DEVICE with "what: CL_NAME". */
+bst_status bst_device_check(bst_ctx *ctx, cl_int code, const char *what) BST_MUST_CHECK;
+
+#endif

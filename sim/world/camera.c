@@ -1,0 +1,50 @@
+#include "sim/world/camera.h"
+
+const bst_config_desc bst_camera_config[] = {
+    BST_INT(bst_camera, width_px, "px", 1, 16384, "1024", "Columns of the sensor."),
+    BST_INT(bst_camera, height_px, "px", 1, 16384, "1024", "Rows of the sensor."),
+    BST_REAL(bst_camera, pixel_scale_arcsec, "arcsec/px", 1e-3, 600, NULL,
+             "Angle that a pixel spans at the boresight (gnomonic projection)."),
+    BST_REAL(bst_camera, aperture_m, "m", 1e-3, 20, NULL, "Diameter of the entrance pupil."),
+    BST_REAL(bst_camera, obscuration, "", 0, 0.99, "0",
+             "Fraction of the pupil's area that is blocked."),
+    BST_REAL(bst_camera, throughput, "", 0, 1, "0.8", "Transmission of the optics, band mean."),
+    BST_REAL(bst_camera, quantum_efficiency, "", 0, 1, "0.8", "Quantum efficiency, band mean."),
+    BST_REAL(bst_camera, photon_flux_v0_per_s_m2, "1/s/m2", 1, 1e15, "8.8e9",
+             "Photons of a star of V = 0 in the camera's band, above the optics. The default is "
+             "the V band itself: "
+             "995.5 photons/s/cm2/A (Bessell, Castelli and Plez 1998) over 88 nm; an unfiltered "
+             "silicon detector sees "
+             "four to five times as many."),
+    BST_REAL(bst_camera, psf_fwhm_px, "px", 0.3, 50, "2",
+             "Full width at half maximum of the Gaussian PSF."),
+    BST_REAL(bst_camera, background_mag_arcsec2, "mag/arcsec2", 5, 40, "22",
+             "V surface brightness of the sky (zodiacal light and the like), uniform."),
+    BST_REAL(bst_camera, dark_current_e_per_s, "e/s", 0, 1e6, "0", "Dark current per pixel."),
+    BST_REAL(bst_camera, read_noise_e, "e", 0, 1e4, "8", "RMS of the read noise."),
+    BST_REAL(bst_camera, full_well_e, "e", 1, 1e8, "100000", "Charge at which a pixel saturates."),
+    BST_REAL(bst_camera, gain_e_per_dn, "e/DN", 1e-4, 1e6, "1.5", "Electrons per digital number."),
+    BST_REAL(bst_camera, offset_dn, "DN", 0, 60000, "500",
+             "Digital number of a pixel without charge."),
+    BST_INT(bst_camera, bits, "", 8, 16, "16", "Bits of the quantisation."),
+    BST_CONFIG_END,
+};
+
+double bst_camera_half_diagonal_rad(const bst_camera *c) {
+    return atan(0.5 * bst_camera_scale_rad(c) * hypot((double)c->width_px, (double)c->height_px));
+}
+
+double bst_camera_electrons_per_s(const bst_camera *c, double v_mag) {
+    double area_m2 = 0.25 * BST_PI * c->aperture_m * c->aperture_m * (1.0 - c->obscuration);
+    return c->photon_flux_v0_per_s_m2 * pow(10.0, -0.4 * v_mag) * area_m2 * c->throughput *
+           c->quantum_efficiency;
+}
+
+double bst_camera_v_mag(const bst_camera *c, double electrons_per_s) {
+    return -2.5 * log10(electrons_per_s / bst_camera_electrons_per_s(c, 0.0));
+}
+
+double bst_camera_background_e_per_s(const bst_camera *c) {
+    double pixel_arcsec2 = c->pixel_scale_arcsec * c->pixel_scale_arcsec;
+    return bst_camera_electrons_per_s(c, c->background_mag_arcsec2) * pixel_arcsec2;
+}

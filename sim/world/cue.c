@@ -1,0 +1,51 @@
+#include "sim/world/world_internal.h"
+
+bst_status bst_cue_nominal_direction(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
+                                     bst_sky_clock *clock, double seconds, bst_vec3 *out) {
+    const world_sensor *s = &world->observers[observer].sensors[sensor];
+    if (s->cue_object < 0) {
+        const double *radec = s->config.cue.direction_radec_deg;
+        *out = bst_vec3_from_radec(radec[0] * BST_DEG_RAD, radec[1] * BST_DEG_RAD);
+        return BST_OK;
+    }
+    bst_sky sky;
+    BST_TRY(bst_sky_clock_at(ctx, clock, bst_time_add(world->epoch, seconds), &sky));
+    bst_state eye, target;
+    BST_TRY(bst_orbit_state(ctx, &world->observers[observer].orbit, clock, world->epoch, seconds,
+                            true, &eye));
+    bst_vec3 geometric;
+    double emission_s;
+    BST_TRY(bst_orbit_line_of_sight(ctx, &world->objects[s->cue_object].orbit, &eye, clock,
+                                    world->epoch, &sky.bodies, seconds, false, &geometric, &target,
+                                    &emission_s));
+    *out = bst_vec3_unit(geometric);
+    return BST_OK;
+}
+
+bst_status bst_cue_resolve(bst_ctx *ctx, const char *scenario, bst_world *world, int observer,
+                           int sensor, bst_sky_clock *clock) {
+    world_sensor *s = &world->observers[observer].sensors[sensor];
+    const bst_cue_config *cue = &s->config.cue;
+    s->cue_object = *cue->object ? bst_world_find_object(world, cue->object) : -1;
+    if (*cue->object && s->cue_object < 0) {
+        return bst_fail(
+            ctx, BST_ERR_CONFIG,
+            "%s: /observers/%d/sensors/%d/cue/object: there is no object \"%s\" in /world/objects",
+            scenario, observer, sensor, cue->object);
+    }
+    bst_vec3 nominal;
+    BST_TRY(bst_cue_nominal_direction(ctx, world, observer, sensor, clock, 0.0, &nominal));
+    /* The error is a rotation about the image axis at right angles to the one along which the cue
+     * is wrong. */
+    const double *x = s->config.x_axis_gcrf;
+    bst_vec3 hint = {x[0], x[1], x[2]};
+    bst_quat gcrf_from_cam = bst_quat_conj(bst_quat_look(nominal, hint));
+    static const double axes[4][3] = {
+        {0, 1, 0}, {0, -1, 0}, {-1, 0, 0}, {1, 0, 0}}; /* x, -x, y, -y */
+    const double *a = axes[cue->offset_axis];
+    s->cue_rotation = bst_quat_rotate(
+        gcrf_from_cam, bst_vec3_scale((bst_vec3){a[0], a[1], a[2]}, cue->offset_deg * BST_DEG_RAD));
+    s->body_attitude =
+        bst_quat_look(bst_quat_rotate(bst_quat_from_rotvec(s->cue_rotation), nominal), hint);
+    return BST_OK;
+}

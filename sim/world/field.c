@@ -1,0 +1,482 @@
+#include "sim/world/field.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/world/world_internal.h"
+
+/* Aberration at most, and some for the deflection of light: how far an apparent place lies from the
+ * catalogue's. */
+#define APPARENT_SHIFT_RAD (30.0 * BST_ARCSEC_RAD)
+
+/* Attitudes and instants at which a position is evaluated to average it over the exposure: the
+ * sigma points of the joint first and second moments of (attitude deviation, time), Julier and
+ * Uhlmann 1997. Exact to second order. */
+enum { SIGMA_DIMENSIONS = 4, SIGMA_POINTS = 2 * SIGMA_DIMENSIONS + 1 };
+
+struct bst_field {
+    const bst_world *world;
+    bst_view *view;
+    const bst_camera *camera;
+    int observer;
+    double *time_s;
+    bst_quat *q;
+    int track_capacity;
+    bst_star *stars;
+    int star_capacity;
+    bst_source *sources;
+    int source_capacity;
+    bst_quat q_mid;
+    double exposure_s;
+    bst_quat sigma_q[SIGMA_POINTS];
+    double sigma_time[SIGMA_POINTS]; /* fraction of the exposure */
+    double sigma_weight[SIGMA_POINTS];
+};
+
+bst_status bst_field_create(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
+                            bst_field **out) {
+    *out = NULL;
+    bst_field *field = calloc(1, sizeof *field);
+    if (!field) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a field query");
+    }
+    field->world = world;
+    field->observer = observer;
+    field->camera = bst_world_camera(world, observer, sensor);
+    field->star_capacity = 4096;
+    field->stars = malloc((size_t)field->star_capacity * sizeof *field->stars);
+    bst_status status = field->stars
+                            ? bst_view_create(ctx, world, &field->view)
+                            : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a field query");
+    if (status != BST_OK) {
+        bst_field_free(field);
+        return status;
+    }
+    *out = field;
+    return BST_OK;
+}
+
+void bst_field_free(bst_field *field) {
+    if (field) {
+        bst_view_free(field->view);
+        free(field->time_s);
+        free(field->q);
+        free(field->stars);
+        free(field->sources);
+        free(field);
+    }
+}
+
+static const bst_los_sample *ring_sample(const bst_los_history *history, int64_t number) {
+    return &history->items[number % history->capacity];
+}
+
+static bst_quat same_sign(bst_quat q, bst_quat as) {
+    double dot = q.x * as.x + q.y * as.y + q.z * as.z + q.w * as.w;
+    return dot < 0.0 ? (bst_quat){-q.x, -q.y, -q.z, -q.w} : q;
+}
+
+/* Attitude at `tick` between samples number and number + 1. */
+static bst_quat between(const bst_los_history *history, int64_t number, int64_t tick) {
+    const bst_los_sample *a = ring_sample(history, number);
+    if (a->tick >= tick) {
+        return a->q_cam_from_gcrf;
+    }
+    const bst_los_sample *b = ring_sample(history, number + 1);
+    double s = (double)(tick - a->tick) / (double)(b->tick - a->tick);
+    return bst_quat_slerp(a->q_cam_from_gcrf, b->q_cam_from_gcrf, s);
+}
+
+static bst_status reserve_track(bst_ctx *ctx, bst_field *field, int count) {
+    if (count <= field->track_capacity) {
+        return BST_OK;
+    }
+    double *time_s = realloc(field->time_s, (size_t)count * sizeof *time_s);
+    field->time_s = time_s ? time_s : field->time_s;
+    bst_quat *q = realloc(field->q, (size_t)count * sizeof *q);
+    field->q = q ? q : field->q;
+    if (!time_s || !q) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d line-of-sight samples", count);
+    }
+    field->track_capacity = count;
+    return BST_OK;
+}
+
+bst_status bst_field_track(bst_ctx *ctx, bst_field *field, const bst_los_history *history,
+                           int64_t start_tick, int64_t end_tick, int64_t tick_rate_hz,
+                           bst_los_track *out) {
+    int64_t newest = history->written - 1;
+    int64_t oldest =
+        history->written > history->capacity ? history->written - history->capacity : 0;
+    if (newest < 0 || ring_sample(history, oldest)->tick > start_tick ||
+        ring_sample(history, newest)->tick < end_tick) {
+        return bst_fail(ctx, BST_ERR_STATE,
+                        "the line-of-sight history (ticks %lld to %lld) does not cover the "
+                        "exposure (%lld to %lld): "
+                        "give the gimbal a longer history_s or a rate that divides the exposure",
+                        newest < 0 ? 0LL : (long long)ring_sample(history, oldest)->tick,
+                        newest < 0 ? -1LL : (long long)ring_sample(history, newest)->tick,
+                        (long long)start_tick, (long long)end_tick);
+    }
+    /* last sample not after the start, by bisection: ticks ascend */
+    int64_t low = oldest, high = newest;
+    while (low < high) {
+        int64_t middle = low + (high - low + 1) / 2;
+        if (ring_sample(history, middle)->tick <= start_tick) {
+            low = middle;
+        } else {
+            high = middle - 1;
+        }
+    }
+    int64_t last = low;
+    while (last < newest && ring_sample(history, last)->tick < end_tick) {
+        last++;
+    }
+    int inner = (int)(last - low > 0 ? last - low - 1 : 0);
+    BST_TRY(reserve_track(ctx, field, inner + 2));
+    double rate = (double)tick_rate_hz;
+    field->time_s[0] = 0.0;
+    field->q[0] = between(history, low, start_tick);
+    int count = 1;
+    for (int64_t n = low + 1; n < last; n++) {
+        const bst_los_sample *sample = ring_sample(history, n);
+        field->time_s[count] = (double)(sample->tick - start_tick) / rate;
+        field->q[count] = same_sign(sample->q_cam_from_gcrf, field->q[count - 1]);
+        count++;
+    }
+    field->time_s[count] = (double)(end_tick - start_tick) / rate;
+    field->q[count] =
+        same_sign(between(history, last > low ? last - 1 : low, end_tick), field->q[count - 1]);
+    *out = (bst_los_track){count + 1, field->time_s, field->q};
+    return BST_OK;
+}
+
+/* Rotation vector from attitude `from` to `to`, camera axes. */
+static bst_vec3 deviation(bst_quat from, bst_quat to) {
+    return bst_quat_to_rotvec(bst_quat_mul(to, bst_quat_conj(from)));
+}
+
+static bst_quat attitude_at(const bst_los_track *track, double time_s) {
+    int k = 0;
+    while (k + 2 < track->count && track->time_s[k + 1] < time_s) {
+        k++;
+    }
+    double span = track->time_s[k + 1] - track->time_s[k];
+    double s = span > 0.0 ? (time_s - track->time_s[k]) / span : 0.0;
+    return bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], s);
+}
+
+/* Sigma points of the exposure, the mean attitude, and the largest displacement (px) of any image
+ * point from its place at mid-exposure. */
+static void summarise_track(bst_field *field, const bst_los_track *track, bst_quat *mean,
+                            double *reach_px) {
+    enum { D = SIGMA_DIMENSIONS };
+    double exposure = track->time_s[track->count - 1];
+    field->exposure_s = exposure;
+    field->q_mid = attitude_at(track, 0.5 * exposure);
+    double first[D] = {0}, second[D][D] = {{0}}, total = 0.0, reach = 0.0;
+    double half_px = 0.5 * hypot((double)field->camera->width_px, (double)field->camera->height_px);
+    double scale = bst_camera_scale_rad(field->camera);
+    double previous[D] = {0};
+    for (int k = 0; k < track->count; k++) {
+        bst_vec3 d = deviation(field->q_mid, track->q_cam_from_gcrf[k]);
+        double now[D] = {d.x, d.y, d.z, exposure > 0.0 ? track->time_s[k] / exposure : 0.5};
+        reach = fmax(reach, hypot(d.x, d.y) / scale + fabs(d.z) * half_px);
+        /* moments of the piecewise linear path between the samples */
+        double w = k > 0 ? (exposure > 0.0 ? track->time_s[k] - track->time_s[k - 1] : 1.0) : 0.0;
+        for (int i = 0; i < D; i++) {
+            first[i] += 0.5 * w * (previous[i] + now[i]);
+            for (int j = 0; j < D; j++) {
+                second[i][j] += w / 6.0 *
+                                (2.0 * previous[i] * previous[j] + 2.0 * now[i] * now[j] +
+                                 previous[i] * now[j] + now[i] * previous[j]);
+            }
+        }
+        total += w;
+        memcpy(previous, now, sizeof now);
+    }
+    double chol[D][D] = {{0}};
+    for (int i = 0; i < D; i++) {
+        first[i] /= total;
+    }
+    for (int i = 0; i < D; i++) {
+        for (int j = 0; j <= i; j++) {
+            double c = second[i][j] / total - first[i] * first[j];
+            for (int m = 0; m < j; m++) {
+                c -= chol[i][m] * chol[j][m];
+            }
+            /* a direction without spread gives a zero column */
+            chol[i][j] = i == j ? sqrt(fmax(c, 0.0)) : chol[j][j] > 1e-300 ? c / chol[j][j] : 0.0;
+        }
+    }
+    const double spread = sqrt((double)D); /* centre weight 0 */
+    for (int p = 0; p < SIGMA_POINTS; p++) {
+        double point[D];
+        for (int i = 0; i < D; i++) {
+            double step = p == 0 ? 0.0 : chol[i][(p - 1) / 2] * spread * ((p & 1) ? 1.0 : -1.0);
+            point[i] = first[i] + step;
+        }
+        field->sigma_q[p] = bst_quat_mul(
+            bst_quat_from_rotvec((bst_vec3){point[0], point[1], point[2]}), field->q_mid);
+        field->sigma_time[p] = point[3];
+        field->sigma_weight[p] = p == 0 ? 0.0 : 0.5 / D;
+    }
+    *mean = field->sigma_q[0];
+    *reach_px = reach;
+}
+
+static bst_vec3 apparent_at(const bst_source *s, double u) {
+    if (s->kind == BST_SOURCE_STAR) {
+        return s->apparent_mid;
+    }
+    double a = (2.0 * u - 1.0) * (u - 1.0), b = 4.0 * u * (1.0 - u), c = u * (2.0 * u - 1.0);
+    return bst_vec3_axpy(bst_vec3_axpy(bst_vec3_scale(s->apparent_start, a), b, s->apparent_mid), c,
+                         s->apparent_end);
+}
+
+bool bst_field_project(const bst_camera *camera, const bst_los_track *track, int k,
+                       const bst_source *source, double *x_px, double *y_px) {
+    double exposure = track->time_s[track->count - 1];
+    double u = exposure > 0.0 ? track->time_s[k] / exposure : 0.5;
+    return bst_camera_project(
+        camera, bst_quat_rotate(track->q_cam_from_gcrf[k], apparent_at(source, u)), x_px, y_px);
+}
+
+static bst_status query_stars(bst_ctx *ctx, bst_field *field, bst_vec3 centre, double radius,
+                              double v_limit, double julian_year, int *count) {
+    for (;;) {
+        BST_TRY(bst_stars_query(ctx, bst_world_stars(field->world), centre, radius, v_limit,
+                                julian_year, field->stars, field->star_capacity, count));
+        if (*count <= field->star_capacity) {
+            return BST_OK;
+        }
+        bst_star *more = realloc(field->stars, (size_t)*count * sizeof *more);
+        if (!more) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d stars", *count);
+        }
+        field->stars = more;
+        field->star_capacity = *count;
+    }
+}
+
+static bst_status reserve_sources(bst_ctx *ctx, bst_field *field, int count) {
+    if (count > field->source_capacity) {
+        bst_source *more = realloc(field->sources, (size_t)count * sizeof *more);
+        if (!more) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d sources", count);
+        }
+        field->sources = more;
+        field->source_capacity = count;
+    }
+    return BST_OK;
+}
+
+static bool near_window(const bst_field *field, bst_quat q, bst_vec3 direction, bst_window window,
+                        double margin_px) {
+    double x, y;
+    return bst_camera_project(field->camera, bst_quat_rotate(q, direction), &x, &y) &&
+           x >= window.x0 - margin_px && y >= window.y0 - margin_px &&
+           x <= window.x0 + window.width - 1 + margin_px &&
+           y <= window.y0 + window.height - 1 + margin_px;
+}
+
+static bst_status add_object(bst_ctx *ctx, bst_field *field, int object, double start_s,
+                             double end_s, bst_source *out, bool *visible_state) {
+    bst_sight sight[3];
+    const double times[3] = {start_s, 0.5 * (start_s + end_s), end_s};
+    *visible_state = true;
+    for (int i = 0; i < 3; i++) {
+        bst_status status =
+            bst_view_sight(ctx, field->view, field->observer, object, times[i], &sight[i]);
+        if (status == BST_ERR_NUMERIC) {
+            *visible_state = false; /* decayed: no longer there */
+            return BST_OK;
+        }
+        BST_TRY(status);
+    }
+    const bst_sight *mid = &sight[1];
+    *out = (bst_source){.kind = BST_SOURCE_OBJECT,
+                        .id = (uint32_t)object,
+                        .apparent_start = sight[0].apparent,
+                        .apparent_mid = mid->apparent,
+                        .apparent_end = sight[2].apparent,
+                        .v_mag = mid->v_mag,
+                        .sunlit_fraction = mid->sunlit_fraction,
+                        .phase_rad = mid->phase_rad,
+                        .range_m = mid->range_m,
+                        .occulted = mid->occulted};
+    out->electrons_per_s = mid->occulted || isinf(mid->v_mag)
+                               ? 0.0
+                               : bst_camera_electrons_per_s(field->camera, mid->v_mag);
+    bst_vec3_to_radec(mid->geometric, &out->ra_rad, &out->dec_rad);
+    return BST_OK;
+}
+
+bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *track,
+                           int64_t start_tick, int64_t end_tick, int64_t tick_rate_hz,
+                           bst_window window, const bst_field_options *options, bst_truth *truth,
+                           const bst_source **sources, int *count) {
+    const bst_camera *camera = field->camera;
+    double start_s = (double)start_tick / (double)tick_rate_hz,
+           end_s = (double)end_tick / (double)tick_rate_hz;
+    double mid_s = 0.5 * (start_s + end_s), exposure = end_s - start_s;
+    double reach_px;
+    bst_quat mean;
+    summarise_track(field, track, &mean, &reach_px);
+
+    bst_state eye;
+    bst_bodies bodies;
+    BST_TRY(bst_view_observer_state(ctx, field->view, field->observer, mid_s, &eye));
+    BST_TRY(bst_view_bodies(ctx, field->view, mid_s, &bodies));
+    bst_earth_frames frames;
+    BST_TRY(bst_view_earth_frames(ctx, field->view, mid_s, &frames));
+    bst_light light = bst_light_at(&bodies, eye.position_m, eye.velocity_mps);
+
+    truth->start_tick = start_tick;
+    truth->end_tick = end_tick;
+    truth->q_cam_from_gcrf_mid = field->q_mid;
+    truth->q_cam_from_gcrf_mean = mean;
+    truth->observer_gcrf_m = eye.position_m;
+    truth->observer_gcrf_mps = eye.velocity_mps;
+    truth->velocity_bary_mps = light.velocity_mps;
+    truth->sun_m = light.sun_m;
+    truth->boresight_x_px = bst_camera_centre_x(camera);
+    truth->boresight_y_px = bst_camera_centre_y(camera);
+    truth->background_e = bst_camera_background_e_per_s(camera) * exposure;
+    truth->dark_e = camera->dark_current_e_per_s * exposure;
+
+    double margin_px = options->margin_px + reach_px;
+    bst_vec3 centre_cam = bst_camera_unproject(camera, window.x0 + 0.5 * (window.width - 1),
+                                               window.y0 + 0.5 * (window.height - 1));
+    bst_vec3 centre = bst_quat_rotate(bst_quat_conj(field->q_mid), centre_cam);
+    double radius = atan(bst_camera_scale_rad(camera) *
+                         (0.5 * hypot(window.width, window.height) + sqrt(2.0) * margin_px)) +
+                    APPARENT_SHIFT_RAD;
+    double tt1, tt2;
+    bst_time_tt(bst_world_time(field->world, mid_s), &tt1, &tt2);
+    int star_count;
+    BST_TRY(query_stars(ctx, field, centre, radius, options->v_limit,
+                        2000.0 + (tt1 - 2451545.0 + tt2) / 365.25, &star_count));
+    int object_count = bst_world_object_count(field->world);
+    BST_TRY(reserve_sources(ctx, field, star_count + object_count));
+    int n = 0;
+    for (int i = 0; i < star_count; i++) {
+        const bst_star *star = &field->stars[i];
+        bst_vec3 apparent = bst_light_apparent_star(&light, star->icrs);
+        if (!near_window(field, field->q_mid, apparent, window, margin_px)) {
+            continue;
+        }
+        bst_source *s = &field->sources[n++];
+        *s =
+            (bst_source){.kind = BST_SOURCE_STAR,
+                         .id = star->id,
+                         .apparent_start = apparent,
+                         .apparent_mid = apparent,
+                         .apparent_end = apparent,
+                         .electrons_per_s = bst_camera_electrons_per_s(camera, (double)star->v_mag),
+                         .v_mag = (double)star->v_mag,
+                         .sunlit_fraction = NAN,
+                         .phase_rad = NAN,
+                         .range_m = INFINITY};
+        /* the Earth hides stars too: a point far along the line of sight stands for the star */
+        s->occulted =
+            bst_earth_occults(eye.position_m, bst_vec3_axpy(eye.position_m, 1e12, star->icrs),
+                              &frames.itrf_from_gcrf);
+        if (s->occulted) {
+            s->electrons_per_s = 0.0;
+        }
+        bst_vec3_to_radec(star->icrs, &s->ra_rad, &s->dec_rad);
+    }
+    for (int i = 0; i < object_count; i++) {
+        bool there;
+        BST_TRY(add_object(ctx, field, i, start_s, end_s, &field->sources[n], &there));
+        if (!there) {
+            continue;
+        }
+        const bst_source *s = &field->sources[n];
+        double own_px = (bst_vec3_angle(s->apparent_start, s->apparent_mid) +
+                         bst_vec3_angle(s->apparent_mid, s->apparent_end)) /
+                        bst_camera_scale_rad(camera);
+        n += near_window(field, field->q_mid, s->apparent_mid, window, margin_px + own_px);
+    }
+    *sources = field->sources;
+    *count = n;
+    return BST_OK;
+}
+
+/* Integral of the squared image (per px^2) of a unit source: a Gaussian of standard deviation sigma
+ * along a straight streak of length L. 1 / (4 pi sigma^2) for L = 0; else (1 / (2 sqrt(pi) sigma))
+ * times the line integral of the autocorrelation of a uniform segment. */
+static double squared_image(double sigma, double length) {
+    const double root_pi = sqrt(BST_PI);
+    double a = length / (2.0 * sigma);
+    double along = a < 1e-3 ? 1.0 / (2.0 * root_pi * sigma) * (1.0 - a * a / 6.0)
+                            : erf(a) / length -
+                                  (2.0 * sigma / (length * length * root_pi)) * (1.0 - exp(-a * a));
+    return along / (2.0 * root_pi * sigma);
+}
+
+void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
+                          const bst_source *source, bst_window window, const bst_truth *header,
+                          bst_truth_item *out) {
+    const bst_camera *camera = field->camera;
+    *out = (bst_truth_item){.kind = source->kind,
+                            .id = source->id,
+                            .norad = source->kind == BST_SOURCE_OBJECT
+                                         ? bst_world_object(field->world, (int)source->id)->norad
+                                         : 0,
+                            .ra_rad = source->ra_rad,
+                            .dec_rad = source->dec_rad,
+                            .v_mag = source->v_mag,
+                            .electrons = source->electrons_per_s * field->exposure_s,
+                            .sunlit_fraction = source->sunlit_fraction,
+                            .phase_rad = source->phase_rad,
+                            .range_m = source->range_m,
+                            .x_start_px = NAN,
+                            .y_start_px = NAN,
+                            .x_mid_px = NAN,
+                            .y_mid_px = NAN,
+                            .x_end_px = NAN,
+                            .y_end_px = NAN,
+                            .x_mean_px = NAN,
+                            .y_mean_px = NAN};
+    (void)bst_field_project(camera, track, 0, source, &out->x_start_px, &out->y_start_px);
+    (void)bst_field_project(camera, track, track->count - 1, source, &out->x_end_px,
+                            &out->y_end_px);
+    (void)bst_camera_project(camera, bst_quat_rotate(field->q_mid, source->apparent_mid),
+                             &out->x_mid_px, &out->y_mid_px);
+    double x_mean = 0.0, y_mean = 0.0;
+    for (int p = 0; p < SIGMA_POINTS; p++) {
+        double x = NAN, y = NAN;
+        bst_vec3 d = apparent_at(source, field->sigma_time[p]);
+        (void)bst_camera_project(camera, bst_quat_rotate(field->sigma_q[p], d), &x, &y);
+        if (field->sigma_weight[p] > 0.0) {
+            x_mean += field->sigma_weight[p] * x;
+            y_mean += field->sigma_weight[p] * y;
+        }
+    }
+    out->x_mean_px = x_mean;
+    out->y_mean_px = y_mean;
+    double sigma =
+        hypot(bst_camera_psf_sigma_px(camera), sqrt(1.0 / 12.0)); /* the pixel's own width */
+    double length = hypot(out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px);
+    double variance =
+        header->background_e + header->dark_e + camera->read_noise_e * camera->read_noise_e;
+    if (isfinite(length) && variance > 0.0) {
+        out->snr = out->electrons * sqrt(squared_image(sigma, length) / variance);
+    }
+    if (source->occulted) {
+        out->flags |= BST_TRUTH_OCCULTED;
+    }
+    if (x_mean >= window.x0 - 0.5 && x_mean < window.x0 + window.width - 0.5 &&
+        y_mean >= window.y0 - 0.5 && y_mean < window.y0 + window.height - 0.5) {
+        out->flags |= BST_TRUTH_IN_FIELD;
+    }
+    /* peak of the image: of a point 1 / (2 pi sigma^2), of a long streak 1 / (sqrt(2 pi) sigma
+     * length) */
+    double peak =
+        out->electrons / (2.0 * BST_PI * sigma * hypot(sigma, length / sqrt(2.0 * BST_PI)));
+    if (peak + header->background_e + header->dark_e > camera->full_well_e) {
+        out->flags |= BST_TRUTH_SATURATED;
+    }
+}

@@ -1,0 +1,106 @@
+#include "sim/world/knowledge.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/world/world_internal.h"
+
+struct bst_knowledge_view {
+    const bst_knowledge *knowledge;
+    bst_sky_clock *clock;
+};
+
+bst_status bst_knowledge_create(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
+                                bst_knowledge **out) {
+    *out = NULL;
+    bst_knowledge *k = calloc(1, sizeof *k);
+    if (!k) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for onboard knowledge");
+    }
+    const bst_sensor_config *config = &world->observers[observer].sensors[sensor].config;
+    k->world = world;
+    k->observer = observer;
+    k->sensor = sensor;
+    k->camera = config->camera;
+    double tt1, tt2;
+    bst_time_tt(world->epoch, &tt1, &tt2);
+    k->julian_year = 2000.0 + (tt1 - 2451545.0 + tt2) / 365.25;
+    if (*config->knowledge.star_catalogue) {
+        bst_status status = bst_stars_open(ctx, config->knowledge.star_catalogue, &k->own_stars);
+        if (status != BST_OK) {
+            bst_knowledge_free(k);
+            return bst_fail_prefix(ctx, status, "/observers/%d/sensors/%d/knowledge/star_catalogue",
+                                   observer, sensor);
+        }
+    }
+    *out = k;
+    return BST_OK;
+}
+
+void bst_knowledge_free(bst_knowledge *k) {
+    if (k) {
+        bst_stars_close(k->own_stars);
+        free(k);
+    }
+}
+
+const bst_camera *bst_knowledge_camera(const bst_knowledge *k) {
+    return &k->camera;
+}
+const bst_stars *bst_knowledge_stars(const bst_knowledge *k) {
+    return k->own_stars ? k->own_stars : k->world->stars;
+}
+double bst_knowledge_julian_year(const bst_knowledge *k) {
+    return k->julian_year;
+}
+bst_quat bst_knowledge_body_attitude(const bst_knowledge *k) {
+    return k->body_attitude;
+}
+
+bst_status bst_knowledge_view_create(bst_ctx *ctx, const bst_knowledge *knowledge,
+                                     bst_knowledge_view **out) {
+    *out = NULL;
+    bst_knowledge_view *view = calloc(1, sizeof *view);
+    if (!view) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a view of onboard knowledge");
+    }
+    view->knowledge = knowledge;
+    bst_status status = bst_sky_clock_create(ctx, knowledge->world->eop, &view->clock);
+    if (status != BST_OK) {
+        free(view);
+        return status;
+    }
+    *out = view;
+    return BST_OK;
+}
+
+void bst_knowledge_view_free(bst_knowledge_view *view) {
+    if (view) {
+        bst_sky_clock_free(view->clock);
+        free(view);
+    }
+}
+
+bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
+                                bst_cue *out) {
+    const bst_knowledge *k = view->knowledge;
+    /* central difference: the third derivative of a LEO-to-GEO direction leaves < 1e-12 rad/s */
+    const double h = 0.5;
+    bst_vec3 d[3];
+    for (int i = 0; i < 3; i++) {
+        BST_TRY(bst_cue_nominal_direction(ctx, k->world, k->observer, k->sensor, view->clock,
+                                          seconds + (i - 1) * h, &d[i]));
+    }
+    const world_sensor *sensor = &k->world->observers[k->observer].sensors[k->sensor];
+    const bst_cue_config *cue = &sensor->config.cue;
+    bst_quat error = bst_quat_from_rotvec(sensor->cue_rotation);
+    out->valid = true;
+    out->direction_gcrf = bst_quat_rotate(error, d[1]);
+    out->rate_gcrf_radps =
+        bst_quat_rotate(error, bst_vec3_scale(bst_vec3_sub(d[2], d[0]), 0.5 / h));
+    out->sigma_rad = cue->sigma_deg * BST_DEG_RAD;
+    out->rate_sigma_radps = cue->rate_sigma_arcsec_per_s * BST_ARCSEC_RAD;
+    out->v_mag = cue->v_mag;
+    out->v_mag_sigma = cue->v_mag_sigma;
+    return BST_OK;
+}

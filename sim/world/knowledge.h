@@ -1,0 +1,40 @@
+/* What the onboard side of one sensor knows: its own catalogue, camera, and the cue it was given.
+ * No true state of anything can be reached from here. */
+#ifndef BST_WORLD_KNOWLEDGE_H
+#define BST_WORLD_KNOWLEDGE_H
+
+#include "sim/world/world.h"
+
+typedef struct bst_knowledge bst_knowledge;
+
+const bst_camera *bst_knowledge_camera(const bst_knowledge *knowledge);
+const bst_stars *bst_knowledge_stars(const bst_knowledge *knowledge);
+double bst_knowledge_julian_year(
+    const bst_knowledge *knowledge); /* at the epoch, for proper motion */
+
+/* The cue: where the target is believed to be. */
+typedef struct bst_cue {
+    bool valid;
+    bst_vec3
+        direction_gcrf; /* unit, geometric (light time in, aberration out), cue error included */
+    bst_vec3 rate_gcrf_radps;  /* d(direction)/dt */
+    double sigma_rad;          /* 1 sigma per axis of the direction's error */
+    double rate_sigma_radps;   /* 1 sigma per axis of the rate's error */
+    double v_mag, v_mag_sigma; /* believed brightness; sigma INFINITY: unknown */
+} bst_cue;
+
+/* A cheap per-user window, as bst_view is for the world. */
+typedef struct bst_knowledge_view bst_knowledge_view;
+bst_status bst_knowledge_view_create(bst_ctx *ctx, const bst_knowledge *knowledge,
+                                     bst_knowledge_view **out) BST_MUST_CHECK;
+void bst_knowledge_view_free(bst_knowledge_view *view);
+
+/* The cue at `seconds` after the epoch. */
+bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
+                                bst_cue *out) BST_MUST_CHECK;
+
+/* The body attitude in which the spacecraft starts and that it tries to hold (see
+ * bst_world_body_attitude). */
+bst_quat bst_knowledge_body_attitude(const bst_knowledge *knowledge);
+
+#endif

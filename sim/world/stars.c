@@ -1,0 +1,265 @@
+#include "sim/world/stars.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "sim/world/star_index.h"
+
+/* Defined in stars_embedded.S. */
+extern const unsigned char bst_stars_embedded_begin[];
+extern const unsigned char bst_stars_embedded_end[];
+
+struct bst_stars {
+    bst_star_view view;
+    void *mapping; /* NULL when embedded */
+    size_t mapping_bytes;
+    char path[512];
+};
+
+bst_status bst_stars_default_path(bst_ctx *ctx, char *buffer, size_t bytes) {
+    const char *data = getenv("XDG_DATA_HOME");
+    const char *home = getenv("HOME");
+    int n;
+    /* The XDG base directory specification: a relative path is to be ignored. */
+    if (data && data[0] == '/') {
+        n = snprintf(buffer, bytes, "%s/boresight/tycho2.stars", data);
+    } else if (home && home[0] == '/') {
+        n = snprintf(buffer, bytes, "%s/.local/share/boresight/tycho2.stars", home);
+    } else {
+        return bst_fail(ctx, BST_ERR_NOT_FOUND,
+                        "no user's data directory: set HOME or XDG_DATA_HOME to an absolute path");
+    }
+    if (n < 0 || (size_t)n >= bytes) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "the path of the user's data directory is longer than %zu bytes", bytes);
+    }
+    return BST_OK;
+}
+
+static bst_status open_file(bst_ctx *ctx, const char *path, bst_stars *s) {
+    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    if (fd < 0) {
+        return bst_fail(ctx, errno == ENOENT ? BST_ERR_NOT_FOUND : BST_ERR_IO,
+                        "star catalogue %s: %s; `boresight stars fetch` makes the full one, and "
+                        "\"embedded\" names the one in the program",
+                        path, strerror(errno));
+    }
+    bst_status status = BST_OK;
+    struct stat st;
+    if (fstat(fd, &st) != 0) {
+        status = bst_fail(ctx, BST_ERR_IO, "star catalogue %s: %s", path, strerror(errno));
+    } else if (!S_ISREG(st.st_mode) || st.st_size < 8) {
+        /* An empty file cannot be mapped; a zero header gives the message for a foreign one. */
+        uint64_t none = 0;
+        status = bst_star_view_init(ctx, path, &none, sizeof none, &s->view);
+    } else {
+        s->mapping_bytes = (size_t)st.st_size;
+        void *p = mmap(NULL, s->mapping_bytes, PROT_READ, MAP_PRIVATE, fd, 0);
+        if (p == MAP_FAILED) {
+            status = bst_fail(ctx, BST_ERR_IO, "star catalogue %s: %s", path, strerror(errno));
+        } else {
+            s->mapping = p;
+            status = bst_star_view_init(ctx, path, p, s->mapping_bytes, &s->view);
+        }
+    }
+    close(fd);
+    return status;
+}
+
+static bst_status open_embedded(bst_ctx *ctx, bst_stars *s) {
+    size_t bytes = (size_t)(bst_stars_embedded_end - bst_stars_embedded_begin);
+    return bst_star_view_init(ctx, "embedded in the program", bst_stars_embedded_begin, bytes,
+                              &s->view);
+}
+
+bst_status bst_stars_open(bst_ctx *ctx, const char *name, bst_stars **out) {
+    *out = NULL;
+    bst_stars *s = calloc(1, sizeof *s);
+    if (!s) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the star catalogue");
+    }
+    bst_status status = BST_OK;
+    bool use_default = strcmp(name, "default") == 0;
+    if (use_default) {
+        status = bst_stars_default_path(ctx, s->path, sizeof s->path);
+        /* Without a home directory there is no full catalogue either. */
+        if (status != BST_OK || access(s->path, F_OK) != 0) {
+            s->path[0] = '\0';
+            status = BST_OK;
+        }
+    } else if (strcmp(name, "embedded") != 0) {
+        int n = snprintf(s->path, sizeof s->path, "%s", name);
+        if (n < 0 || (size_t)n >= sizeof s->path) {
+            status =
+                bst_fail(ctx, BST_ERR_ARGUMENT,
+                         "the star catalogue's path is longer than %zu bytes", sizeof s->path - 1);
+        }
+    }
+    if (status == BST_OK) {
+        status = s->path[0] ? open_file(ctx, s->path, s) : open_embedded(ctx, s);
+    }
+    if (status != BST_OK) {
+        bst_stars_close(s);
+        return status;
+    }
+    if (use_default && !s->mapping) {
+        bst_log(ctx, BST_LOG_WARNING,
+                "the full star catalogue is not there: using the stars embedded in the program "
+                "(all to V %.1f, fainter in %u patches of sky only); `boresight stars fetch` gets "
+                "the full one",
+                s->view.header->complete_to_v_mag, s->view.header->patch_count);
+    }
+    *out = s;
+    return BST_OK;
+}
+
+void bst_stars_close(bst_stars *stars) {
+    if (stars && stars->mapping) {
+        munmap(stars->mapping, stars->mapping_bytes);
+    }
+    free(stars);
+}
+
+void bst_stars_get_info(const bst_stars *stars, bst_stars_info *out) {
+    const bst_star_header *h = stars->view.header;
+    memset(out, 0, sizeof *out);
+    out->embedded = stars->mapping == NULL;
+    if (out->embedded) {
+        snprintf(out->source, sizeof out->source, "embedded default");
+    } else {
+        snprintf(out->source, sizeof out->source, "%.*s", (int)sizeof h->source, h->source);
+    }
+    snprintf(out->path, sizeof out->path, "%s", stars->path);
+    out->count = (long long)h->star_count;
+    out->complete_to_v_mag = h->complete_to_v_mag;
+    out->patches = (int)h->patch_count;
+}
+
+void bst_stars_patch(const bst_stars *stars, int index, bst_vec3 *centre, double *radius_rad,
+                     double *v_mag) {
+    const bst_star_patch *p = &stars->view.patches[index];
+    *centre = bst_vec3_from_radec(p->ra_deg * BST_DEG_RAD, p->dec_deg * BST_DEG_RAD);
+    *radius_rad = p->radius_deg * BST_DEG_RAD;
+    *v_mag = p->v_mag;
+}
+
+double bst_stars_complete_to(const bst_stars *stars, bst_vec3 centre, double radius_rad) {
+    double best = stars->view.header->complete_to_v_mag;
+    for (uint32_t i = 0; i < stars->view.header->patch_count; i++) {
+        bst_vec3 c;
+        double radius, v;
+        bst_stars_patch(stars, (int)i, &c, &radius, &v);
+        if (v > best && bst_vec3_angle(c, centre) + radius_rad <= radius) {
+            best = v;
+        }
+    }
+    return best;
+}
+
+/* A box in stored right ascension and declination that holds the cone of radius_rad around centre:
+ * integer comparisons drop most of a cell's stars before any trigonometry. */
+typedef struct radec_box {
+    int64_t dec_min, dec_max;
+    uint32_t ra_min, ra_width;
+} radec_box;
+
+static radec_box box_around(bst_vec3 centre, double radius_rad) {
+    const double unit = 4294967296.0 / (2.0 * BST_PI);
+    double ra, dec;
+    bst_vec3_to_radec(centre, &ra, &dec);
+    radius_rad += 1e-8; /* rounding of the stored positions and of what follows */
+    radec_box box = {(int64_t)floor((dec - radius_rad) * unit),
+                     (int64_t)ceil((dec + radius_rad) * unit), 0, UINT32_MAX};
+    if (fabs(dec) + radius_rad < BST_PI / 2.0 - 1e-6) {
+        /* The cone's largest difference in right ascension: sin(dra) = sin(r) / cos(dec). */
+        double half = asin(fmin(1.0, sin(radius_rad) / cos(dec))) * unit + 2.0;
+        if (half < 2147483647.0) {
+            box.ra_min = (uint32_t)(int64_t)floor(ra * unit - half);
+            box.ra_width = (uint32_t)ceil(2.0 * half);
+        }
+    }
+    return box;
+}
+
+static void unpack(const bst_star_record *r, uint32_t tyc1, bst_vec3 direction, bst_star *out) {
+    int colour = (int)(r->pm_ra_colour & 0x3FFFu) - BST_STAR_COLOUR_OFFSET;
+    out->icrs = direction;
+    out->v_mag = (float)(bst_star_record_v(r) / 1e5);
+    /* B-V = 0.850 (BT-VT): Tycho-2 ReadMe, note 7. */
+    out->b_minus_v = r->pm_dec_flags & BST_STAR_NO_COLOUR ? NAN : (float)(0.850 * colour / 1000.0);
+    out->id = tyc1 << 16 | (r->tyc_vt & 0xFFFFu);
+}
+
+bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre, double radius_rad,
+                           double v_limit, double julian_year, bst_star *out, int capacity,
+                           int *count) {
+    *count = 0;
+    if (!(radius_rad >= 0.0 && radius_rad <= BST_PI) || isnan(v_limit) || !isfinite(julian_year) ||
+        !(fabs(bst_vec3_norm(centre) - 1.0) < 1e-6) || capacity < 0 || (!out && capacity > 0)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "star query: radius %g rad (0 to pi), limit V %g, year %g, |centre| %g "
+                        "(1), room for %d stars",
+                        radius_rad, v_limit, julian_year, bst_vec3_norm(centre), capacity);
+    }
+    double years = julian_year - BST_STAR_EPOCH_YEAR;
+    double chord = 2.0 * sin(radius_rad / 2.0);
+    /* Rounding must not lose the antipode. */
+    double chord2 = radius_rad >= BST_PI - 1e-9 ? 5.0 : chord * chord;
+    int found = 0;
+    for (uint32_t c = 0; c < BST_STAR_CELLS; c++) {
+        const bst_star_cell *cell = &stars->view.cells[c];
+        double drift = cell->pm_max_radpyr * fabs(years);
+        double reach = radius_rad + cell->radius_rad + drift;
+        bst_vec3 d = {centre.x - cell->centre[0], centre.y - cell->centre[1],
+                      centre.z - cell->centre[2]};
+        /* A chord is shorter than its angle: no cell is missed. */
+        if (cell->count == 0 || bst_vec3_dot(d, d) > reach * reach) {
+            continue;
+        }
+        radec_box box = box_around(centre, radius_rad + drift);
+        const bst_star_record *r = stars->view.records + cell->first;
+        for (const bst_star_record *end = r + cell->count; r < end; r++) {
+            if (bst_star_record_v(r) / 1e5 > v_limit) {
+                break; /* brightest first */
+            }
+            if (r->dec < box.dec_min || r->dec > box.dec_max || r->ra - box.ra_min > box.ra_width) {
+                continue;
+            }
+            bst_vec3 direction = bst_star_record_direction(r, years);
+            d = bst_vec3_sub(direction, centre);
+            if (bst_vec3_dot(d, d) <= chord2) {
+                if (found < capacity) {
+                    unpack(r, c, direction, &out[found]);
+                }
+                found++;
+            }
+        }
+    }
+    *count = found;
+    return BST_OK;
+}
+
+bst_status bst_stars_find(bst_ctx *ctx, const bst_stars *stars, uint32_t id, double julian_year,
+                          bst_star *out) {
+    uint32_t c = id >> 16;
+    if (c < BST_STAR_CELLS && isfinite(julian_year)) {
+        const bst_star_cell *cell = &stars->view.cells[c];
+        for (uint32_t i = 0; i < cell->count; i++) {
+            const bst_star_record *r = &stars->view.records[cell->first + i];
+            if ((r->tyc_vt & 0xFFFFu) == (id & 0xFFFFu)) {
+                unpack(r, c, bst_star_record_direction(r, julian_year - BST_STAR_EPOCH_YEAR), out);
+                return BST_OK;
+            }
+        }
+    }
+    unsigned tyc1, tyc2, tyc3;
+    bst_star_id_split(id, &tyc1, &tyc2, &tyc3);
+    return bst_fail(ctx, BST_ERR_NOT_FOUND, "star TYC %u-%u-%u is not in the catalogue", tyc1, tyc2,
+                    tyc3);
+}

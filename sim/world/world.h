@@ -1,0 +1,82 @@
+/* The true world of one run: time, Earth orientation, stars, space objects, observers and their
+ * sensors. */
+#ifndef BST_WORLD_WORLD_H
+#define BST_WORLD_WORLD_H
+
+#include "sim/astro/bodies.h"
+#include "sim/core/config.h"
+#include "sim/world/camera.h"
+#include "sim/world/stars.h"
+
+typedef struct bst_world bst_world; /* immutable once made; shareable between threads */
+
+/* A cheap per-user window on the world: caches rotations and bodies near the times asked for. One
+ * per module instance; not shareable between threads; memory does not grow. */
+typedef struct bst_view bst_view;
+
+typedef struct bst_object_info {
+    char name[64];
+    int norad;      /* 0: none */
+    double area_m2; /* cross-section of the sphere */
+    double albedo;  /* diffuse (Lambertian) */
+} bst_object_info;
+
+/* Geocentric state in GCRF. */
+typedef struct bst_state {
+    bst_vec3 position_m;
+    bst_vec3 velocity_mps;
+} bst_state;
+
+/* The instant `seconds` after the scenario's epoch. */
+bst_time bst_world_time(const bst_world *world, double seconds);
+const bst_stars *bst_world_stars(const bst_world *world);
+int bst_world_object_count(const bst_world *world);
+const bst_object_info *bst_world_object(const bst_world *world, int object);
+/* Index of the object with this name, -1 when there is none. */
+int bst_world_find_object(const bst_world *world, const char *name);
+int bst_world_observer_count(const bst_world *world);
+const char *bst_world_observer_name(const bst_world *world, int observer);
+/* The sensor's true camera. */
+const bst_camera *bst_world_camera(const bst_world *world, int observer, int sensor);
+
+/* Body attitude that the spacecraft starts in and holds: +z towards the (erroneous) cue at the
+ * epoch, +x as near as can be to the sensor's x_axis_gcrf. The camera has these axes when both
+ * gimbal angles are zero. */
+bst_quat bst_world_body_attitude(const bst_world *world, int observer, int sensor);
+
+bst_status bst_view_create(bst_ctx *ctx, const bst_world *world, bst_view **out) BST_MUST_CHECK;
+void bst_view_free(bst_view *view);
+
+/* True state of an object or observer `seconds` after the epoch. BST_ERR_NUMERIC when its orbit has
+ * no state then (decayed). */
+bst_status bst_view_object_state(bst_ctx *ctx, bst_view *view, int object, double seconds,
+                                 bst_state *out) BST_MUST_CHECK;
+bst_status bst_view_observer_state(bst_ctx *ctx, bst_view *view, int observer, double seconds,
+                                   bst_state *out) BST_MUST_CHECK;
+/* Rotations and bodies then, interpolated. */
+bst_status bst_view_earth_frames(bst_ctx *ctx, bst_view *view, double seconds,
+                                 bst_earth_frames *out) BST_MUST_CHECK;
+bst_status bst_view_bodies(bst_ctx *ctx, bst_view *view, double seconds,
+                           bst_bodies *out) BST_MUST_CHECK;
+
+/* What an observer sees of an object: light time solved, Sun and shadow at the time the light left.
+ */
+typedef struct bst_sight {
+    bst_vec3 geometric; /* unit, GCRF: object at emission minus observer at reception */
+    bst_vec3 apparent;  /* the same with stellar aberration */
+    double range_m, light_time_s;
+    double phase_rad;       /* Sun - object - observer */
+    double sunlit_fraction; /* of the Sun's disc, 0..1 */
+    double v_mag;           /* Lambertian sphere times sunlit fraction; +INFINITY when dark */
+    bool occulted;          /* behind the Earth */
+} bst_sight;
+bst_status bst_view_sight(bst_ctx *ctx, bst_view *view, int observer, int object, double seconds,
+                          bst_sight *out) BST_MUST_CHECK;
+
+/* V magnitude of a Lambertian sphere of cross-section area_m2 and albedo at phase angle and range:
+ * V_sun - 2.5 log10(2 albedo area ((pi - phi) cos phi + sin phi) / (3 pi^2 range^2)), V_sun =
+ * -26.74 at 1 au. */
+double bst_lambert_sphere_v_mag(double area_m2, double albedo, double phase_rad, double range_m,
+                                double sun_distance_m);
+
+#endif

@@ -1,0 +1,111 @@
+#include "sim/world/world_config.h"
+
+static const char *const orbit_sources[] = {"sgp4", "relative", NULL};
+static const char *const axes[] = {"x", "-x", "y", "-y", NULL};
+
+static const bst_config_desc orbit_table[] = {
+    BST_ENUM(
+        bst_orbit_config, source, orbit_sources, "\"sgp4\"",
+        "Where the orbit comes from: a two-line element set, or another object plus an offset."),
+    BST_STRING(bst_orbit_config, tle_file, "\"\"",
+               "sgp4: file of element sets, relative to the scenario's folder."),
+    BST_INT(bst_orbit_config, norad, "", 0, 339999, "0", "sgp4: catalogue number in that file."),
+    BST_STRING(bst_orbit_config, reference, "\"\"",
+               "relative: the object that the offset is added to."),
+    BST_REAL(bst_orbit_config, at_s, "s", -1e9, 1e9, "0",
+             "relative: time at which the offset holds."),
+    BST_REALS(bst_orbit_config, offset_rtn_m, "m", -1e9, 1e9, "[0, 0, 0]",
+              "relative: offset along radius, transverse and normal of the reference's orbit."),
+    BST_REALS(bst_orbit_config, rate_rtn_mps, "m/s", -1e5, 1e5, "[0, 0, 0]",
+              "relative: change of the offset."),
+    BST_CONFIG_END,
+};
+
+static const bst_config_desc burn_table[] = {
+    BST_REAL(bst_burn_config, time_s, "s", -1e9, 1e9, NULL, "Time of the impulse after the epoch."),
+    BST_REALS(bst_burn_config, dv_rtn_mps, "m/s", -1e5, 1e5, NULL,
+              "Change of velocity along radius, transverse and normal."),
+    BST_CONFIG_END,
+};
+
+static const bst_config_desc object_table[] = {
+    BST_STRING(bst_object_config, name, NULL, "Name, unique in the scenario."),
+    BST_OBJECT(bst_object_config, orbit, orbit_table, NULL, "The object's orbit."),
+    BST_REAL(bst_object_config, area_m2, "m2", 0, 1e6, "4",
+             "Cross-section of the sphere that stands for it."),
+    BST_REAL(bst_object_config, albedo, "", 0, 1, "0.25",
+             "Diffuse albedo of the sphere; 0 makes it dark."),
+    BST_LIST(bst_object_config, burns, bst_burn_config, burn_table, 0, 64, "[]",
+             "Impulsive burns in the order of time. The cue does not know of them."),
+    BST_CONFIG_END,
+};
+
+const bst_config_desc bst_world_config_table[] = {
+    BST_STRING(
+        bst_world_config, star_catalogue, "\"default\"",
+        "\"default\" (the user's full catalogue, else the embedded one), \"embedded\", or a file."),
+    BST_STRING(bst_world_config, earth_orientation, "\"builtin\"",
+               "\"builtin\" or a file in the IERS EOP C04 format."),
+    BST_LIST(bst_world_config, objects, bst_object_config, object_table, 0, 100000, "[]",
+             "The space objects."),
+    BST_CONFIG_END,
+};
+
+static const bst_config_desc exposure_table[] = {
+    BST_REAL(bst_exposure_config, exposure_s, "s", 0, 3600, "0.5", "Exposure time."),
+    BST_REAL(bst_exposure_config, period_s, "s", 1e-3, 1e5, "1",
+             "Time from one exposure's start to the next."),
+    BST_REAL(bst_exposure_config, first_s, "s", 0, 1e9, "0", "Start of the first exposure."),
+    BST_REAL(bst_exposure_config, dropped_fraction, "", 0, 1, "0",
+             "Fraction of the frames that are lost between sensor and processing, at random."),
+    BST_CONFIG_END,
+};
+
+static const bst_config_desc cue_table[] = {
+    BST_STRING(bst_cue_config, object, "\"\"",
+               "Object whose catalogued orbit (burns left out) is the cue."),
+    BST_REALS(bst_cue_config, direction_radec_deg, "deg", -360, 360, "[0, 0]",
+              "Right ascension and declination (ICRS), used when no object is named."),
+    BST_REAL(bst_cue_config, offset_deg, "deg", 0, 90, "0",
+             "Error of the cue: a constant rotation of its direction."),
+    BST_ENUM(bst_cue_config, offset_axis, axes, "\"x\"",
+             "Image axis along which the cue is wrong."),
+    BST_REAL(bst_cue_config, sigma_deg, "deg", 1e-6, 90, "0.5",
+             "What the onboard side takes the cue's error to be, 1 sigma per axis."),
+    BST_REAL(bst_cue_config, rate_sigma_arcsec_per_s, "arcsec/s", 1e-6, 1e5, "0.5",
+             "The same of the cue's rate."),
+    BST_REAL(bst_cue_config, v_mag, "mag", -30, 40, "13",
+             "Brightness that the onboard side expects."),
+    BST_REAL(bst_cue_config, v_mag_sigma, "mag", 0.01, 100, "1", "1 sigma of that; 100: unknown."),
+    BST_CONFIG_END,
+};
+
+static const bst_config_desc knowledge_table[] = {
+    BST_STRING(bst_knowledge_config, star_catalogue, "\"\"",
+               "Onboard star catalogue; empty: the world's own."),
+    BST_CONFIG_END,
+};
+
+const bst_config_desc bst_sensor_config_table[] = {
+    BST_STRING(bst_sensor_config, name, "\"camera\"", "Name, unique on its observer."),
+    BST_OBJECT(bst_sensor_config, camera, bst_camera_config, NULL, "Optics and detector."),
+    BST_REALS(
+        bst_sensor_config, x_axis_gcrf, "", -1, 1, "[0, 0, 1]",
+        "Direction (GCRF) that the image's x axis lies closest to when the gimbal is at zero."),
+    BST_OBJECT(bst_sensor_config, exposure, exposure_table, "{}", "Exposure clock."),
+    BST_OBJECT(bst_sensor_config, cue, cue_table, "{}", "Where the target is believed to be."),
+    BST_OBJECT(bst_sensor_config, knowledge, knowledge_table, "{}",
+               "What the onboard side knows otherwise than it is."),
+    {.key = "modules",
+     .type = BST_CONFIG_RAW,
+     .doc = "The modules of this sensor by role: {\"gimbal\": {\"type\": ...}, ...}."},
+    BST_CONFIG_END,
+};
+
+const bst_config_desc bst_observer_config_table[] = {
+    BST_STRING(bst_observer_config, name, NULL, "Name, unique in the scenario."),
+    BST_OBJECT(bst_observer_config, orbit, orbit_table, NULL, "The observer's orbit."),
+    BST_LIST(bst_observer_config, sensors, bst_sensor_config, bst_sensor_config_table, 1, 16, NULL,
+             "Its sensors."),
+    BST_CONFIG_END,
+};

@@ -1,0 +1,92 @@
+/* The parts of a scenario that describe the world, as the configuration tables fill them. */
+#ifndef BST_WORLD_WORLD_CONFIG_H
+#define BST_WORLD_WORLD_CONFIG_H
+
+#include "sim/astro/time.h"
+#include "sim/core/config.h"
+#include "sim/world/camera.h"
+
+enum { BST_ORBIT_SGP4, BST_ORBIT_RELATIVE };
+
+typedef struct bst_orbit_config {
+    int32_t source;     /* BST_ORBIT_... */
+    char tle_file[256]; /* sgp4: path relative to the scenario's folder */
+    int64_t norad;      /* sgp4 */
+    char reference[64]; /* relative: name of an object with an orbit of its own, earlier in the list
+                         */
+    double at_s;        /* relative: time at which offset_rtn_m holds */
+    double offset_rtn_m[3];
+    double rate_rtn_mps[3];
+} bst_orbit_config;
+
+typedef struct bst_burn_config {
+    double time_s;
+    double dv_rtn_mps[3];
+} bst_burn_config;
+
+typedef struct bst_object_config {
+    char name[64];
+    bst_orbit_config orbit;
+    double area_m2, albedo;
+    bst_config_list burns; /* bst_burn_config, by time */
+} bst_object_config;
+
+typedef struct bst_world_config {
+    char star_catalogue[256];
+    char earth_orientation[256];
+    bst_config_list objects; /* bst_object_config */
+} bst_world_config;
+
+typedef struct bst_cue_config {
+    char object[64];               /* "" : no cue */
+    double direction_radec_deg[2]; /* used when there is no object */
+    double offset_deg;
+    int32_t offset_axis; /* index into {"x", "-x", "y", "-y"} */
+    double sigma_deg, rate_sigma_arcsec_per_s;
+    double v_mag, v_mag_sigma;
+} bst_cue_config;
+
+typedef struct bst_exposure_config {
+    double exposure_s, period_s, first_s;
+    double dropped_fraction;
+} bst_exposure_config;
+
+typedef struct bst_knowledge_config {
+    char star_catalogue[256]; /* "": the world's */
+} bst_knowledge_config;
+
+typedef struct bst_sensor_config {
+    char name[64];
+    bst_camera camera;
+    double x_axis_gcrf[3];
+    bst_exposure_config exposure;
+    bst_cue_config cue;
+    bst_knowledge_config knowledge;
+} bst_sensor_config;
+
+typedef struct bst_observer_config {
+    char name[64];
+    bst_orbit_config orbit;
+    bst_config_list sensors; /* bst_sensor_config */
+} bst_observer_config;
+
+extern const bst_config_desc bst_world_config_table[];
+extern const bst_config_desc bst_observer_config_table[];
+extern const bst_config_desc bst_sensor_config_table[];
+
+struct bst_world;
+struct bst_knowledge;
+
+/* Makes the world. `observers` lists bst_observer_config; `base_dir` is the folder that relative
+ * paths start from. `scenario` names the scenario file in messages. The configuration is copied. */
+bst_status bst_world_create(bst_ctx *ctx, const char *scenario, const bst_world_config *world,
+                            const bst_config_list *observers, const char *base_dir, bst_time epoch,
+                            struct bst_world **out) BST_MUST_CHECK;
+void bst_world_free(struct bst_world *world);
+
+/* The onboard knowledge of one sensor; equal to the truth where the scenario says nothing else. */
+bst_status bst_knowledge_create(bst_ctx *ctx, const struct bst_world *world, int observer,
+                                int sensor, struct bst_knowledge **out) BST_MUST_CHECK;
+void bst_knowledge_free(struct bst_knowledge *knowledge);
+
+#endif

@@ -1,0 +1,89 @@
+/* Inside of the world, shared by the files of sim/world only. */
+#ifndef BST_WORLD_WORLD_INTERNAL_H
+#define BST_WORLD_WORLD_INTERNAL_H
+
+#include "sim/astro/sgp4.h"
+#include "sim/astro/sky_clock.h"
+#include "sim/world/knowledge.h"
+#include "sim/world/world_config.h"
+
+/* An orbit ready to be evaluated; immutable. */
+typedef struct bst_orbit {
+    bst_sgp4 *sgp4;        /* NULL: relative */
+    double epoch_offset_s; /* scenario epoch minus element epoch */
+    const struct bst_orbit *reference;
+    double at_s;
+    bst_vec3 offset_rtn_m, rate_rtn_mps;
+    bst_burn_config *burns;
+    int burn_count;
+    const char *name; /* for messages; borrowed */
+} bst_orbit;
+
+typedef struct world_object {
+    bst_object_info info;
+    bst_orbit orbit;
+} world_object;
+
+typedef struct world_sensor {
+    bst_sensor_config config;
+    int cue_object;         /* -1: a fixed direction */
+    bst_vec3 cue_rotation;  /* the cue's error: rotation vector, GCRF */
+    bst_quat body_attitude; /* see bst_world_body_attitude */
+} world_sensor;
+
+typedef struct world_observer {
+    char name[64];
+    bst_orbit orbit;
+    world_sensor *sensors;
+    int sensor_count;
+} world_observer;
+
+struct bst_world {
+    bst_time epoch;
+    bst_eop *eop;
+    bst_stars *stars;
+    world_object *objects;
+    int object_count;
+    world_observer *observers;
+    int observer_count;
+};
+
+struct bst_knowledge {
+    const bst_world
+        *world;           /* for the nominal orbits and Earth orientation only; never handed out */
+    bst_stars *own_stars; /* NULL: the world's */
+    bst_camera camera;
+    bst_cue_config cue;
+    int observer, sensor;
+    int cue_object;        /* -1: a fixed direction */
+    bst_vec3 cue_rotation; /* the cue's error: rotation vector, GCRF */
+    bst_quat body_attitude;
+    double julian_year;
+};
+
+/* State at `seconds` after the scenario's epoch; `with_burns` false gives the orbit as catalogued.
+ */
+bst_status bst_orbit_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *clock,
+                           bst_time epoch, double seconds, bool with_burns,
+                           bst_state *out) BST_MUST_CHECK;
+
+/* Light-time solution: where the object was when the light left that reaches the observer at
+ * `seconds`. *geometric_m: from the observer at reception to the object at emission in barycentric
+ * axes (its direction is what stars are compared with); *emission_s: the time of emission. */
+bst_status bst_orbit_line_of_sight(bst_ctx *ctx, const bst_orbit *object, const bst_state *observer,
+                                   bst_sky_clock *clock, bst_time epoch, const bst_bodies *bodies,
+                                   double seconds, bool with_burns, bst_vec3 *geometric_m,
+                                   bst_state *object_state, double *emission_s) BST_MUST_CHECK;
+
+/* Works out a sensor's cue: object index, error rotation, body attitude. `scenario` names the file
+ * in messages. */
+bst_status bst_cue_resolve(bst_ctx *ctx, const char *scenario, bst_world *world, int observer,
+                           int sensor, bst_sky_clock *clock) BST_MUST_CHECK;
+
+/* Direction of the cue (unit, GCRF, geometric) without its error: the object's catalogued orbit as
+ * seen from the observer, light time in. */
+bst_status bst_cue_nominal_direction(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
+                                     bst_sky_clock *clock, double seconds,
+                                     bst_vec3 *out) BST_MUST_CHECK;
+
+#endif
