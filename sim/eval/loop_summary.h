@@ -51,8 +51,7 @@ void bst_loop_summary_on_frame(bst_loop_summary *summary, bst_loop_frame_fn fn, 
 bst_status bst_loop_summary_truth(bst_ctx *ctx, bst_loop_summary *summary,
                                   const bst_truth *truth) BST_MUST_CHECK;
 void bst_loop_summary_tracks(bst_loop_summary *summary, const bst_tracks *tracks, int64_t tick);
-void bst_loop_summary_status(bst_loop_summary *summary, const bst_control_status *status,
-                             int64_t tick);
+void bst_loop_summary_status(bst_loop_summary *summary, const bst_control_status *status);
 
 /* Settles the frames that still wait for their tracks. */
 void bst_loop_summary_finish(bst_loop_summary *summary);
