@@ -12,4 +12,6 @@ static const bst_module_desc *const modules[] = {
 
 static const bst_registry registry = {modules, sizeof modules / sizeof *modules};
 
-const bst_registry *bst_app_registry(void) { return &registry; }
+const bst_registry *bst_app_registry(void) {
+    return &registry;
+}
