@@ -35,9 +35,11 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
     clock->binning = 1;
     clock->dropped_fraction = c->dropped_fraction;
     clock->drop_key = bst_env_rng(env, "dropped_frames");
-    bst_status status = bst_seconds_to_ticks(env->ctx, env->tick_rate_hz, c->exposure_s, &clock->exposure_ticks);
+    bst_status status =
+        bst_seconds_to_ticks(env->ctx, env->tick_rate_hz, c->exposure_s, &clock->exposure_ticks);
     if (status == BST_OK) {
-        status = bst_seconds_to_ticks(env->ctx, env->tick_rate_hz, c->period_s, &clock->period_ticks);
+        status =
+            bst_seconds_to_ticks(env->ctx, env->tick_rate_hz, c->period_s, &clock->period_ticks);
     }
     if (status == BST_OK) {
         status = bst_seconds_to_ticks(env->ctx, env->tick_rate_hz, c->first_s, &clock->start_tick);
@@ -79,7 +81,8 @@ static void open_exposure(exposure_clock *clock, bst_sample command) {
     if (command.payload && !command.stale) {
         latch(clock, command.payload);
     }
-    int64_t later = clock->exposure_ticks > clock->period_ticks ? clock->exposure_ticks : clock->period_ticks;
+    int64_t later =
+        clock->exposure_ticks > clock->period_ticks ? clock->exposure_ticks : clock->period_ticks;
     clock->next_start_tick = clock->start_tick + later;
     clock->open = true;
 }
@@ -97,21 +100,26 @@ static bst_status step(void *self, struct bst_step *step) {
                               .end_tick = clock->start_tick + clock->exposure_ticks,
                               .window = clock->window,
                               .binning = clock->binning};
-        out->dropped = clock->dropped_fraction > 0.0 &&
-                       bst_rng_uniform(clock->drop_key, (uint64_t)clock->id, 0) < clock->dropped_fraction;
+        out->dropped =
+            clock->dropped_fraction > 0.0 &&
+            bst_rng_uniform(clock->drop_key, (uint64_t)clock->id, 0) < clock->dropped_fraction;
         clock->id++;
         clock->open = false;
         clock->start_tick = clock->next_start_tick;
     }
-    /* an exposure that starts in the very tick in which the last one ended is opened now, not a tick late */
+    /* an exposure that starts in the very tick in which the last one ended is opened now, not a
+     * tick late */
     if (!clock->open && clock->start_tick <= tick) {
         open_exposure(clock, bst_step_latest(step, PORT_COMMAND));
     }
-    bst_step_wake_at(step, clock->open ? clock->start_tick + clock->exposure_ticks : clock->start_tick);
+    bst_step_wake_at(step,
+                     clock->open ? clock->start_tick + clock->exposure_ticks : clock->start_tick);
     return BST_OK;
 }
 
-static void destroy(void *self) { free(self); }
+static void destroy(void *self) {
+    free(self);
+}
 
 static const bst_port ports[] = {
     [PORT_COMMAND] = {.channel = BST_CHANNEL_SENSOR_COMMAND,
