@@ -60,6 +60,7 @@ typedef struct bst_column {
 /* A cell. NAN and NULL text are stored as SQL NULL. */
 typedef struct bst_value {
     bst_column_type type;
+    bool is_null;
     union {
         int64_t integer;
         double real;
@@ -70,19 +71,29 @@ typedef struct bst_value {
 static inline bst_value bst_int_value(int64_t value) {
     bst_value v;
     v.type = BST_COLUMN_INT;
+    v.is_null = false;
     v.as.integer = value;
     return v;
 }
 static inline bst_value bst_real_value(double value) {
     bst_value v;
     v.type = BST_COLUMN_REAL;
+    v.is_null = value != value;
     v.as.real = value;
     return v;
 }
 static inline bst_value bst_text_value(const char *value) {
     bst_value v;
     v.type = BST_COLUMN_TEXT;
+    v.is_null = value == NULL;
     v.as.text = value;
+    return v;
+}
+
+static inline bst_value bst_null_value(bst_column_type type) {
+    bst_value v = bst_int_value(0);
+    v.type = type;
+    v.is_null = true;
     return v;
 }
 

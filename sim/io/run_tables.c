@@ -192,16 +192,14 @@ bst_status bst_table_append(bst_ctx *ctx, bst_table *table, const bst_value *val
             return bst_fail(ctx, BST_ERR_ARGUMENT, "table %s: column %d takes %s", table->name,
                             k + 1, type_name(table->types[k]));
         }
-        switch (values[k].type) {
-            case BST_COLUMN_INT:
-                code = sqlite3_bind_int64(table->insert, k + 1, values[k].as.integer);
-                break;
-            case BST_COLUMN_REAL: /* SQLite stores a NaN as NULL */
-                code = sqlite3_bind_double(table->insert, k + 1, values[k].as.real);
-                break;
-            default:
-                code =
-                    sqlite3_bind_text(table->insert, k + 1, values[k].as.text, -1, SQLITE_STATIC);
+        if (values[k].is_null) {
+            code = sqlite3_bind_null(table->insert, k + 1);
+        } else if (values[k].type == BST_COLUMN_INT) {
+            code = sqlite3_bind_int64(table->insert, k + 1, values[k].as.integer);
+        } else if (values[k].type == BST_COLUMN_REAL) {
+            code = sqlite3_bind_double(table->insert, k + 1, values[k].as.real);
+        } else {
+            code = sqlite3_bind_text(table->insert, k + 1, values[k].as.text, -1, SQLITE_STATIC);
         }
         if (code != SQLITE_OK) {
             return fail_sql(ctx, run, table->name);

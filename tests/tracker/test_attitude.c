@@ -1,0 +1,256 @@
+/* Attitude from stars against its bound, with wrong identities, and where it must say no. */
+#include "sim/core/rng.h"
+#include "tests/test_support.h"
+#include "tracker/attitude.h"
+#include "tracker/attitude_error.h"
+
+#define AS BST_ARCSEC_RAD
+#define MAX_STARS 4000
+
+static const bst_camera camera = {.width_px = 1024, .height_px = 1024, .pixel_scale_arcsec = 3.0};
+static const bst_attitude_params params = {
+    .floor_px = 0.0, .reject_chi2 = 18.4, .max_cross_rad = 6.0 * AS, .max_roll_rad = 600.0 * AS};
+
+typedef struct scene {
+    bst_quat q_true;
+    bst_attitude_star stars[MAX_STARS];
+    int count;
+} scene;
+
+static scene work;
+
+/* Stars all over the sensor with centroid errors of 0.1 px (a third of them of 0.3 px); the last
+ * `wrong` ones are displaced by 2 to 40 px. */
+static scene *make_scene(uint64_t seed, int count, int wrong, double extent_px) {
+    bst_rng_key key = bst_rng_make_key(seed, 0, "test", "attitude");
+    scene *s = &work;
+    double a[2], b[2];
+    bst_rng_normal2(key, 0, 0, a);
+    bst_rng_normal2(key, 0, 1, b);
+    s->q_true = bst_quat_unit((bst_quat){a[0], a[1], b[0], b[1]});
+    s->count = count;
+    for (int i = 0; i < count; i++) {
+        uint64_t n = 10 + 10 * (uint64_t)i;
+        double x = 511.5 + extent_px * (bst_rng_uniform(key, 1, n) - 0.5);
+        double y = 511.5 + extent_px * (bst_rng_uniform(key, 1, n + 1) - 0.5);
+        double sigma = i % 3 == 2 ? 0.3 : 0.1, e[2], angle;
+        bst_rng_normal2(key, 1, n + 2, e);
+        angle = 2 * BST_PI * bst_rng_uniform(key, 1, n + 3);
+        double off = i >= count - wrong ? 2.0 + 38.0 * bst_rng_uniform(key, 1, n + 4) : 0.0;
+        s->stars[i] =
+            (bst_attitude_star){.apparent_gcrf = bst_quat_rotate(
+                                    bst_quat_conj(s->q_true), bst_camera_unproject(&camera, x, y)),
+                                .x_px = x + sigma * e[0] + off * cos(angle),
+                                .y_px = y + sigma * e[1] + off * sin(angle),
+                                .cov_xx = sigma * sigma,
+                                .cov_yy = sigma * sigma};
+    }
+    return s;
+}
+
+/* RMS over trials of each axis' error over its Cramer-Rao bound (from the right stars alone). */
+static void check_bound(int count, int wrong) {
+    enum { TRIALS = 500 };
+    double ratio[3] = {0}, nees = 0.0;
+    int valid = 0;
+    for (uint64_t t = 0; t < TRIALS; t++) {
+        scene *s = make_scene(t + 1000, count, wrong, 1000.0);
+        bst_rng_key key = bst_rng_make_key(t, 0, "test", "start");
+        double shift[2];
+        bst_rng_normal2(key, 0, 0, shift);
+        /* telemetry off by some 100 px and 0.1 degree of roll */
+        bst_vec3 off = {300 * AS * shift[0], 300 * AS * shift[1], 0.002};
+        bst_quat start = bst_quat_mul(bst_quat_from_rotvec(off), s->q_true);
+        /* the bound, from the closed form of the information of small rotations: a star at tangent
+         * coordinates (a, b) has rows (-ab, 1+a^2, -b) and (-(1+b^2), ab, a), per pixel */
+        double info[3][3] = {{0}};
+        for (int i = 0; i < count - wrong; i++) {
+            bst_vec3 v = bst_quat_rotate(s->q_true, s->stars[i].apparent_gcrf);
+            double a = v.x / v.z, b = v.y / v.z, f = 1.0 / (3.0 * AS);
+            double j[2][3] = {{-a * b * f, (1 + a * a) * f, -b * f},
+                              {-(1 + b * b) * f, a * b * f, a * f}};
+            for (int k = 0; k < 3; k++) {
+                for (int m = 0; m < 3; m++) {
+                    info[k][m] += (j[0][k] * j[0][m] + j[1][k] * j[1][m]) / s->stars[i].cov_xx;
+                }
+            }
+        }
+        bst_attitude_solution out;
+        bst_attitude_solve(&camera, &params, start, s->stars, s->count, &out);
+        if (!out.valid) {
+            continue;
+        }
+        valid++;
+        bst_vec3 e =
+            bst_quat_to_rotvec(bst_quat_mul(out.q_cam_from_gcrf, bst_quat_conj(s->q_true)));
+        double x[3] = {e.x, e.y, e.z};
+        double det = info[0][0] * (info[1][1] * info[2][2] - info[1][2] * info[2][1]) -
+                     info[0][1] * (info[1][0] * info[2][2] - info[1][2] * info[2][0]) +
+                     info[0][2] * (info[1][0] * info[2][1] - info[1][1] * info[2][0]);
+        for (int k = 0; k < 3; k++) {
+            int p = (k + 1) % 3, q = (k + 2) % 3;
+            double bound = (info[p][p] * info[q][q] - info[p][q] * info[q][p]) / det;
+            ratio[k] += x[k] * x[k] / bound;
+            for (int m = 0; m < 3; m++) {
+                nees += x[k] * info[k][m] * x[m];
+            }
+        }
+    }
+    print_message("%d stars, %d wrong: valid %d, error / bound %.3f %.3f %.3f, NEES/3 %.3f\n",
+                  count, wrong, valid, sqrt(ratio[0] / valid), sqrt(ratio[1] / valid),
+                  sqrt(ratio[2] / valid), nees / 3.0 / valid);
+    assert_true(valid >= TRIALS * 99 / 100);
+    for (int k = 0; k < 3; k++) {
+        /* the ratio's own 1 sigma over 500 trials is 0.032 */
+        assert_true(sqrt(ratio[k] / valid) <= 1.1);
+        assert_true(sqrt(ratio[k] / valid) >=
+                    0.9); /* better than the bound would be a wrong bound */
+    }
+}
+
+static void error_meets_the_bound(void **state) {
+    (void)state;
+    check_bound(3, 0);
+    check_bound(10, 0);
+    check_bound(100, 0);
+    check_bound(10, 1);
+    check_bound(100, 10);
+}
+
+static void exact_without_noise(void **state) {
+    (void)state;
+    scene *s = make_scene(5, 2, 0, 900.0);
+    for (int i = 0; i < s->count; i++) {
+        bst_vec3 v = bst_quat_rotate(s->q_true, s->stars[i].apparent_gcrf);
+        assert_true(bst_camera_project(&camera, v, &s->stars[i].x_px, &s->stars[i].y_px));
+    }
+    /* a start 2 degrees and 5 degrees of roll away */
+    bst_quat start = bst_quat_mul(bst_quat_from_rotvec((bst_vec3){0.02, -0.028, 0.087}), s->q_true);
+    bst_attitude_solution out;
+    bst_attitude_solve(&camera, &params, start, s->stars, s->count, &out);
+    assert_true(out.valid);
+    bst_vec3 e = bst_quat_to_rotvec(bst_quat_mul(out.q_cam_from_gcrf, bst_quat_conj(s->q_true)));
+    /* pixels of 1.5e-5 rad hold 1e-13 of themselves; roll has 450 px of lever */
+    bst_assert_close(bst_vec3_norm(e), 0.0, 1e-13);
+}
+
+static void thousands_of_stars(void **state) {
+    (void)state;
+    scene *s = make_scene(6, MAX_STARS, MAX_STARS / 5, 1000.0);
+    bst_attitude_solution out;
+    bst_attitude_solve(&camera, &params, s->q_true, s->stars, s->count, &out);
+    assert_true(out.valid);
+    assert_true(out.stars_used >= MAX_STARS * 79 / 100 && out.stars_used <= MAX_STARS * 81 / 100);
+    bst_vec3 e = bst_quat_to_rotvec(bst_quat_mul(out.q_cam_from_gcrf, bst_quat_conj(s->q_true)));
+    assert_true(fabs(e.x) < 4.5 * sqrt(out.covariance[0][0]));
+    assert_true(fabs(e.y) < 4.5 * sqrt(out.covariance[1][1]));
+    assert_true(fabs(e.z) < 4.5 * sqrt(out.covariance[2][2]));
+}
+
+static void says_no(void **state) {
+    (void)state;
+    bst_attitude_solution out;
+    scene *s = make_scene(7, 1, 0, 900.0);
+    bst_attitude_solve(&camera, &params, s->q_true, s->stars, 0, &out);
+    assert_false(out.valid);
+    bst_attitude_solve(&camera, &params, s->q_true, s->stars, 1, &out);
+    assert_false(out.valid);
+    /* two stars a few px apart tell no roll */
+    s = make_scene(8, 2, 0, 4.0);
+    bst_attitude_solve(&camera, &params, s->q_true, s->stars, 2, &out);
+    assert_false(out.valid);
+    /* one star twice */
+    s->stars[1] = s->stars[0];
+    bst_attitude_solve(&camera, &params, s->q_true, s->stars, 2, &out);
+    assert_false(out.valid);
+    /* two stars whose separation is wrong, and three of which one is wrong: nobody can tell which
+     */
+    for (uint64_t seed = 0; seed < 50; seed++) {
+        s = make_scene(seed, 2, 0, 900.0);
+        bst_vec3 along = {s->stars[1].x_px - s->stars[0].x_px, s->stars[1].y_px - s->stars[0].y_px,
+                          0};
+        along = bst_vec3_unit(along);
+        s->stars[1].x_px += 3.0 * along.x;
+        s->stars[1].y_px += 3.0 * along.y;
+        bst_attitude_solve(&camera, &params, s->q_true, s->stars, 2, &out);
+        assert_false(out.valid);
+    }
+    /* half of the identities wrong, each in its own way */
+    int accepted = 0;
+    for (uint64_t seed = 0; seed < 50; seed++) {
+        s = make_scene(seed, 10, 5, 900.0);
+        bst_attitude_solve(&camera, &params, s->q_true, s->stars, 10, &out);
+        accepted += out.valid;
+    }
+    assert_int_equal(accepted, 0);
+    /* a star behind the camera and covariances that are none */
+    s = make_scene(9, 3, 0, 900.0);
+    s->stars[0].apparent_gcrf = bst_vec3_scale(s->stars[0].apparent_gcrf, -1.0);
+    s->stars[1].cov_xx = -1.0;
+    s->stars[2].x_px = NAN;
+    bst_attitude_solve(&camera, &params, s->q_true, s->stars, 3, &out);
+    assert_false(out.valid);
+}
+
+/* Drift of 5 arcsec/s, fixes with 0.1 px error, 20 % of them missing. */
+static void telemetry_error_is_followed(void **state) {
+    (void)state;
+    const bst_attitude_error_params p = {.rate_sigma_radps = 20 * AS,
+                                         .noise_rad2ps3 = pow(0.3 * AS, 2),
+                                         .jitter_rad = 0.6 * AS,
+                                         .gate_chi2 = 30,
+                                         .gate_patience = 3,
+                                         .telemetry_sigma_rad = 60 * AS};
+    bst_attitude_error f = {0};
+    bst_rng_key key = bst_rng_make_key(2, 0, "test", "drift");
+    bst_vec3 drift = {3 * AS, -4 * AS, 1 * AS}, error, rate;
+    double cov[3][3];
+    bst_attitude_error_get(&f, &p, BST_QUAT_IDENTITY, &error, &rate, cov);
+    bst_assert_close(sqrt(cov[0][0]), hypot(60, 0.6) * AS, 1e-12); /* closed form */
+    double sum = 0.0, chi2 = 0.0;
+    int n = 0;
+    for (int k = 0; k < 400; k++) {
+        /* the camera turns by 0.02 rad a frame; the error keeps its inertial direction */
+        bst_quat q = bst_quat_from_rotvec((bst_vec3){0.01 * k, 0.02 * k, 0.0});
+        bst_vec3 true_error = bst_quat_rotate(q, bst_vec3_scale(drift, k));
+        bst_attitude_error_predict(&f, &p, 1.0);
+        bst_attitude_error_get(&f, &p, q, &error, &rate, cov);
+        if (k > 5) {
+            bst_vec3 off = bst_vec3_sub(error, true_error);
+            sum += bst_vec3_dot(off, off) / 3.0;
+            chi2 += off.x * off.x / cov[0][0];
+            n++;
+        }
+        if (bst_rng_uniform(key, (uint64_t)k, 9) < 0.2) {
+            continue;
+        }
+        double e[2], g[2];
+        bst_rng_normal2(key, (uint64_t)k, 0, e);
+        bst_rng_normal2(key, (uint64_t)k, 1, g);
+        bst_vec3 z = bst_vec3_add(true_error,
+                                  (bst_vec3){0.67 * AS * e[0], 0.67 * AS * e[1], 60 * AS * g[0]});
+        const double r[3][3] = {
+            {0.09 * AS * AS, 0, 0}, {0, 0.09 * AS * AS, 0}, {0, 0, 3600 * AS * AS}};
+        assert_true(bst_attitude_error_update(&f, &p, q, z, r));
+    }
+    print_message("predicted telemetry error: chi2 of x %.2f\n", chi2 / n);
+    assert_true(chi2 / n < 1.2); /* the model allows more drift noise than there is */
+    bst_vec3 in_camera = bst_quat_rotate(bst_quat_from_rotvec((bst_vec3){3.99, 7.98, 0.0}), drift);
+    bst_assert_close(bst_vec3_norm(bst_vec3_sub(rate, in_camera)), 0.0, 2 * AS);
+    /* a jump of the telemetry: refused twice, then believed */
+    bst_vec3 z = {4000 * AS, 0, 0};
+    const double r[3][3] = {{1e-12, 0, 0}, {0, 1e-12, 0}, {0, 0, 1e-12}};
+    assert_false(bst_attitude_error_update(&f, &p, BST_QUAT_IDENTITY, z, r));
+    assert_false(bst_attitude_error_update(&f, &p, BST_QUAT_IDENTITY, z, r));
+    assert_true(bst_attitude_error_update(&f, &p, BST_QUAT_IDENTITY, z, r));
+    bst_attitude_error_get(&f, &p, BST_QUAT_IDENTITY, &error, &rate, NULL);
+    bst_assert_close(error.x, 4000 * AS, 1e-12);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(error_meets_the_bound), cmocka_unit_test(exact_without_noise),
+        cmocka_unit_test(thousands_of_stars), cmocka_unit_test(says_no),
+        cmocka_unit_test(telemetry_error_is_followed)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

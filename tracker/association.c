@@ -1,0 +1,273 @@
+/* Which detection belongs to which track. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "tracker/multitarget_internal.h"
+
+static double component(bst_vec3 v, int axis) {
+    return axis == 0 ? v.x : axis == 1 ? v.y : v.z;
+}
+
+/* Heap sort: in place, no worst case, no library sort that may allocate. */
+static void sift(double *key, int *order, int root, int count) {
+    for (;;) {
+        int child = 2 * root + 1;
+        if (child >= count) {
+            return;
+        }
+        if (child + 1 < count && key[child + 1] > key[child]) {
+            child++;
+        }
+        if (!(key[child] > key[root])) {
+            return;
+        }
+        double k = key[root];
+        int o = order[root];
+        key[root] = key[child];
+        order[root] = order[child];
+        key[child] = k;
+        order[child] = o;
+        root = child;
+    }
+}
+
+void bst_mtt_pool_index(bst_mtt_pool *pool) {
+    double low[3] = {2, 2, 2}, high[3] = {-2, -2, -2};
+    for (int i = 0; i < pool->count; i++) {
+        for (int a = 0; a < 3; a++) {
+            double v = component(pool->items[i].sky.direction, a);
+            low[a] = fmin(low[a], v);
+            high[a] = fmax(high[a], v);
+        }
+    }
+    pool->axis = 0;
+    for (int a = 1; a < 3; a++) {
+        if (high[a] - low[a] > high[pool->axis] - low[pool->axis]) {
+            pool->axis = a;
+        }
+    }
+    for (int i = 0; i < pool->count; i++) {
+        pool->key[i] = component(pool->items[i].sky.direction, pool->axis);
+        pool->order[i] = i;
+    }
+    for (int i = pool->count / 2 - 1; i >= 0; i--) {
+        sift(pool->key, pool->order, i, pool->count);
+    }
+    for (int end = pool->count - 1; end > 0; end--) {
+        double k = pool->key[0];
+        int o = pool->order[0];
+        pool->key[0] = pool->key[end];
+        pool->order[0] = pool->order[end];
+        pool->key[end] = k;
+        pool->order[end] = o;
+        sift(pool->key, pool->order, 0, end);
+    }
+}
+
+static int lower_bound(const bst_mtt_pool *pool, double key) {
+    int low = 0, high = pool->count;
+    while (low < high) {
+        int mid = low + (high - low) / 2;
+        if (pool->key[mid] < key) {
+            low = mid + 1;
+        } else {
+            high = mid;
+        }
+    }
+    return low;
+}
+
+void bst_mtt_pool_range(const bst_mtt_pool *pool, bst_vec3 direction, double chord, int *begin,
+                        int *end) {
+    double centre = component(direction, pool->axis);
+    *begin = lower_bound(pool, centre - chord);
+    *end = *begin;
+    while (*end < pool->count && pool->key[*end] <= centre + chord) {
+        ++*end;
+    }
+}
+
+/* Brightness counts, but a flare or an eclipse must not cost a track its detection. */
+static double brightness_cost(const bst_mtt_track *track, const bst_mtt_detection *detection) {
+    double variance =
+        track->v_mag_variance + 0.09 + detection->v_mag_sigma * detection->v_mag_sigma;
+    double difference = track->v_mag - detection->v_mag;
+    double chi2 = difference * difference / variance;
+    return isfinite(chi2) ? 0.5 * fmin(chi2, 9.0) : 0.0;
+}
+
+/* Largest standard deviation of a measurement among the frame's detections. */
+static double largest_sigma(const bst_mtt_pool *pool) {
+    double variance = 0.0;
+    for (int i = 0; i < pool->count; i++) {
+        variance = fmax(variance, pool->items[i].sky.cov_11 + pool->items[i].sky.cov_22);
+    }
+    return sqrt(variance);
+}
+
+/* Candidates of one row, the BST_MTT_CANDIDATES cheapest. */
+static int collect(const bst_mtt *mtt, const bst_mtt_track *track, double detection_sigma,
+                   int *columns, double *costs) {
+    const bst_mtt_params *params = &mtt->params;
+    double sigma = sqrt(track->state.covariance[0][0] + track->state.covariance[1][1]);
+    double radius = sqrt(params->gate_chi2) * hypot(sigma, detection_sigma);
+    int begin, end, count = 0;
+    bst_mtt_pool_range(&mtt->now, track->state.direction, radius, &begin, &end);
+    for (int i = begin; i < end; i++) {
+        int column = mtt->now.order[i];
+        const bst_mtt_detection *detection = &mtt->now.items[column];
+        bst_sky_innovation innovation;
+        if (mtt->now.used[column] ||
+            bst_vec3_norm(bst_vec3_sub(detection->sky.direction, track->state.direction)) >
+                radius ||
+            !bst_sky_innovate(&track->state, &detection->sky, NULL, &innovation) ||
+            innovation.chi2 > params->gate_chi2) {
+            continue;
+        }
+        double cost = 0.5 * innovation.chi2 + 0.5 * innovation.log_det_s + log(2.0 * BST_PI) +
+                      log(mtt->clutter_density) - log(params->detection_probability) +
+                      brightness_cost(track, detection);
+        int at = count;
+        if (count == BST_MTT_CANDIDATES) {
+            at = 0;
+            for (int k = 1; k < count; k++) {
+                if (costs[k] > costs[at]) {
+                    at = k;
+                }
+            }
+            if (costs[at] <= cost) {
+                continue;
+            }
+        } else {
+            count++;
+        }
+        columns[at] = column;
+        costs[at] = cost;
+    }
+    return count;
+}
+
+static void assign_group(bst_mtt *mtt, bool tentative, double detection_sigma) {
+    int rows = 0, edges = 0;
+    for (int t = 0; t < mtt->track_count; t++) {
+        if ((mtt->tracks[t].status == BST_TRACK_TENTATIVE) != tentative || !mtt->observable[t]) {
+            continue;
+        }
+        mtt->rows[rows] = t;
+        mtt->first[rows] = edges;
+        mtt->miss_costs[rows] = -log(1.0 - mtt->params.detection_probability);
+        edges += collect(mtt, &mtt->tracks[t], detection_sigma, mtt->edge_columns + edges,
+                         mtt->edge_costs + edges);
+        rows++;
+    }
+    mtt->first[rows] = edges;
+    bst_assignment_solve(mtt->assignment, rows, mtt->now.count, mtt->first, mtt->edge_columns,
+                         mtt->edge_costs, mtt->miss_costs, mtt->column_of_row);
+    for (int r = 0; r < rows; r++) {
+        int column = mtt->column_of_row[r];
+        mtt->detection_of_track[mtt->rows[r]] = column;
+        if (column >= 0) {
+            mtt->now.used[column] = true;
+        }
+    }
+}
+
+/* Widening of a detection that tracks a and b may share, in a's axes: the light's centroid lies
+ * somewhere between them. */
+static void widen(const bst_mtt *mtt, const bst_mtt_track *a, const bst_mtt_track *b,
+                  double out[3]) {
+    bst_tangent axes = bst_tangent_at(a->state.direction);
+    bst_vec3 to = bst_tangent_log(a->state.direction, b->state.direction);
+    double s1 = bst_vec3_dot(to, axes.e1), s2 = bst_vec3_dot(to, axes.e2);
+    double floor2 = mtt->params.merge_floor_rad * mtt->params.merge_floor_rad;
+    out[0] = s1 * s1 + floor2;
+    out[1] = s1 * s2;
+    out[2] = s2 * s2 + floor2;
+}
+
+static bool fits(const bst_mtt *mtt, const bst_mtt_track *track, int column,
+                 const double extra[3]) {
+    bst_sky_innovation innovation;
+    return bst_sky_innovate(&track->state, &mtt->now.items[column].sky, extra, &innovation) &&
+           innovation.chi2 <= mtt->params.gate_chi2;
+}
+
+/* The free detection nearest to the middle of a and b, within merge_rad of it. */
+static int free_between(const bst_mtt *mtt, const bst_mtt_track *a, const bst_mtt_track *b) {
+    bst_vec3 middle = bst_vec3_unit(bst_vec3_add(a->state.direction, b->state.direction));
+    int begin, end, best = -1;
+    double nearest = mtt->params.merge_rad;
+    bst_mtt_pool_range(&mtt->now, middle, nearest, &begin, &end);
+    for (int i = begin; i < end; i++) {
+        int column = mtt->now.order[i];
+        double distance = bst_vec3_norm(bst_vec3_sub(mtt->now.items[column].sky.direction, middle));
+        if (!mtt->now.used[column] && distance < nearest) {
+            nearest = distance;
+            best = column;
+        }
+    }
+    return best;
+}
+
+/* A missed confirmed track beside another one may have melted into one detection with it: both
+ * then take that detection, widened along the line between them. */
+static void share(bst_mtt *mtt) {
+    double near2 = mtt->params.merge_rad * mtt->params.merge_rad;
+    for (int t = 0; t < mtt->track_count; t++) {
+        bst_mtt_track *missed = &mtt->tracks[t];
+        if (missed->status == BST_TRACK_TENTATIVE || !mtt->observable[t] ||
+            mtt->detection_of_track[t] >= 0) {
+            continue;
+        }
+        int partner = -1;
+        double nearest2 = near2;
+        for (int u = 0; u < mtt->track_count; u++) {
+            if (u == t || mtt->tracks[u].status == BST_TRACK_TENTATIVE) {
+                continue;
+            }
+            bst_vec3 apart = bst_vec3_sub(mtt->tracks[u].state.direction, missed->state.direction);
+            if (bst_vec3_dot(apart, apart) < nearest2) {
+                nearest2 = bst_vec3_dot(apart, apart);
+                partner = u;
+            }
+        }
+        if (partner < 0) {
+            continue;
+        }
+        bst_mtt_track *other = &mtt->tracks[partner];
+        int column = mtt->detection_of_track[partner];
+        if (column < 0) {
+            column = free_between(mtt, missed, other);
+        }
+        double extra[3], extra_other[3];
+        widen(mtt, missed, other, extra);
+        widen(mtt, other, missed, extra_other);
+        if (column < 0 || !fits(mtt, missed, column, extra) ||
+            !fits(mtt, other, column, extra_other)) {
+            continue;
+        }
+        mtt->detection_of_track[t] = mtt->detection_of_track[partner] = column;
+        mtt->shared[t] = mtt->shared[partner] = true;
+        memcpy(mtt->extra[t], extra, sizeof extra);
+        memcpy(mtt->extra[partner], extra_other, sizeof extra_other);
+        mtt->now.used[column] = true;
+    }
+}
+
+void bst_mtt_associate(bst_mtt *mtt) {
+    double sigma = largest_sigma(&mtt->now);
+    for (int t = 0; t < mtt->track_count; t++) {
+        mtt->detection_of_track[t] = -1;
+        mtt->shared[t] = false;
+    }
+    /* confirmed tracks choose first: a false start must not take their detections */
+    assign_group(mtt, false, sigma);
+    share(mtt);
+    int unused = 0;
+    for (int i = 0; i < mtt->now.count; i++) {
+        unused += !mtt->now.used[i];
+    }
+    mtt->clutter_density =
+        fmax(fmax(mtt->clutter, unused), mtt->params.false_alarms_per_frame) / mtt->params.field_sr;
+    assign_group(mtt, true, sigma);
+}

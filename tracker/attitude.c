@@ -1,0 +1,189 @@
+#include "tracker/attitude.h"
+
+#include "tracker/symmetric3.h"
+
+/* Residual of a star (measured - predicted) and its derivative by the camera rotation vector. */
+typedef struct star_residual {
+    double r[2];
+    double j[2][3];
+    double w[3]; /* inverse covariance: xx, xy, yy */
+    double chi2;
+} star_residual;
+
+static bool evaluate(const bst_camera *camera, double floor_px, bst_quat q,
+                     const bst_attitude_star *star, star_residual *out) {
+    bst_vec3 v = bst_quat_rotate(q, star->apparent_gcrf);
+    double x, y;
+    if (!bst_camera_project(camera, v, &x, &y)) {
+        return false;
+    }
+    double cxx = star->cov_xx + floor_px * floor_px, cyy = star->cov_yy + floor_px * floor_px,
+           cxy = star->cov_xy, det = cxx * cyy - cxy * cxy;
+    if (!(det > 0.0) || !(cxx > 0.0)) {
+        return false;
+    }
+    out->r[0] = star->x_px - x;
+    out->r[1] = star->y_px - y;
+    out->w[0] = cyy / det;
+    out->w[1] = -cxy / det;
+    out->w[2] = cxx / det;
+    out->chi2 = out->w[0] * out->r[0] * out->r[0] + 2 * out->w[1] * out->r[0] * out->r[1] +
+                out->w[2] * out->r[1] * out->r[1];
+    /* v turns by e x v; x = vx / vz, y = vy / vz in units of the pixel scale */
+    double f = 1.0 / bst_camera_scale_rad(camera), a = v.x / v.z, b = v.y / v.z;
+    double jx[3] = {-a * b * f, (1 + a * a) * f, -b * f};
+    double jy[3] = {-(1 + b * b) * f, a * b * f, a * f};
+    for (int k = 0; k < 3; k++) {
+        out->j[0][k] = jx[k];
+        out->j[1][k] = jy[k];
+    }
+    return isfinite(out->chi2);
+}
+
+typedef enum weighting { WEIGHT_CAUCHY, WEIGHT_GIVEN } weighting;
+
+/* One Gauss-Newton step; false when the normal matrix cannot be inverted. */
+static bool step(const bst_camera *camera, double floor_px, const bst_attitude_star *stars,
+                 int count, weighting how, double scale2, bst_quat *q, double covariance[3][3],
+                 double *moved_rad) {
+    double n[3][3] = {{0}}, g[3] = {0};
+    for (int i = 0; i < count; i++) {
+        star_residual s;
+        if (!evaluate(camera, floor_px, *q, &stars[i], &s)) {
+            continue;
+        }
+        double weight = how == WEIGHT_GIVEN ? stars[i].weight : 1.0 / (1.0 + s.chi2 / scale2);
+        for (int k = 0; k < 3; k++) {
+            double a = weight * (s.w[0] * s.j[0][k] + s.w[1] * s.j[1][k]);
+            double b = weight * (s.w[1] * s.j[0][k] + s.w[2] * s.j[1][k]);
+            g[k] += a * s.r[0] + b * s.r[1];
+            for (int m = 0; m < 3; m++) {
+                n[k][m] += a * s.j[0][m] + b * s.j[1][m];
+            }
+        }
+    }
+    if (!bst_symmetric3_invert(n, covariance)) {
+        return false;
+    }
+    bst_vec3 e = {covariance[0][0] * g[0] + covariance[0][1] * g[1] + covariance[0][2] * g[2],
+                  covariance[1][0] * g[0] + covariance[1][1] * g[1] + covariance[1][2] * g[2],
+                  covariance[2][0] * g[0] + covariance[2][1] * g[1] + covariance[2][2] * g[2]};
+    *moved_rad = bst_vec3_norm(e);
+    if (!(*moved_rad < 0.5)) {
+        return false;
+    }
+    *q = bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(e), *q));
+    return true;
+}
+
+/* Gives weight 1 to the stars within reject_chi2, 0 to the others; how many changed. */
+static int select_stars(const bst_camera *camera, const bst_attitude_params *params, bst_quat q,
+                        bst_attitude_star *stars, int count, int *used) {
+    int changed = 0;
+    *used = 0;
+    for (int i = 0; i < count; i++) {
+        star_residual s;
+        double weight =
+            evaluate(camera, params->floor_px, q, &stars[i], &s) && s.chi2 <= params->reject_chi2
+                ? 1.0
+                : 0.0;
+        changed += weight != stars[i].weight;
+        stars[i].weight = weight;
+        *used += weight > 0.0;
+    }
+    return changed;
+}
+
+static double mean_chi2(const bst_camera *camera, double floor_px, bst_quat q,
+                        const bst_attitude_star *stars, int count) {
+    double sum = 0.0;
+    int n = 0;
+    for (int i = 0; i < count; i++) {
+        star_residual s;
+        if (evaluate(camera, floor_px, q, &stars[i], &s)) {
+            sum += s.chi2;
+            n++;
+        }
+    }
+    return n > 0 ? sum / n : 0.0;
+}
+
+/* Iterations are bounded by what the scales need: each halves, from at most 1e6 sigma. */
+enum { MAX_ANNEAL = 24, MAX_RESELECT = 8, MAX_NEWTON = 6 };
+
+static bool solve(const bst_camera *camera, const bst_attitude_params *params,
+                  bst_attitude_star *stars, int count, bst_quat *q, double covariance[3][3],
+                  int *used) {
+    double moved;
+    double scale2 = fmax(mean_chi2(camera, params->floor_px, *q, stars, count), 4.0);
+    for (int i = 0; i < MAX_ANNEAL; i++) {
+        if (!step(camera, params->floor_px, stars, count, WEIGHT_CAUCHY, scale2, q, covariance,
+                  &moved)) {
+            return false;
+        }
+        if (scale2 <= 4.0 && moved < 1e-9) {
+            break;
+        }
+        /* a common shift of all stars leaves at the first step: follow what remains */
+        double now = mean_chi2(camera, params->floor_px, *q, stars, count);
+        scale2 = fmax(fmin(0.25 * scale2, now), 4.0);
+    }
+    for (int i = 0; i < count; i++) {
+        stars[i].weight = -1.0;
+    }
+    for (int i = 0; i < MAX_RESELECT; i++) {
+        if (select_stars(camera, params, *q, stars, count, used) == 0) {
+            break;
+        }
+        if (*used < 2) {
+            return false;
+        }
+        for (int k = 0; k < MAX_NEWTON; k++) {
+            if (!step(camera, params->floor_px, stars, count, WEIGHT_GIVEN, 1.0, q, covariance,
+                      &moved)) {
+                return false;
+            }
+            if (moved < 1e-12) {
+                break;
+            }
+        }
+    }
+    return *used >= 2;
+}
+
+void bst_attitude_solve(const bst_camera *camera, const bst_attitude_params *params,
+                        bst_quat q_start, bst_attitude_star *stars, int count,
+                        bst_attitude_solution *out) {
+    *out = (bst_attitude_solution){.q_cam_from_gcrf = q_start};
+    if (count < 2) {
+        return;
+    }
+    bst_quat q = bst_quat_unit(q_start);
+    int used = 0;
+    if (!solve(camera, params, stars, count, &q, out->covariance, &used)) {
+        return;
+    }
+    double square = 0.0;
+    for (int i = 0; i < count; i++) {
+        star_residual s;
+        if (stars[i].weight > 0.0 && evaluate(camera, params->floor_px, q, &stars[i], &s)) {
+            out->chi2 += s.chi2;
+            square += s.r[0] * s.r[0] + s.r[1] * s.r[1];
+        }
+    }
+    out->q_cam_from_gcrf = q;
+    out->stars_used = used;
+    out->dof = 2 * used - 3;
+    out->rms_px = sqrt(square / (2.0 * used));
+    if (out->dof >= 10 && out->chi2 > out->dof) {
+        for (int i = 0; i < 3; i++) {
+            for (int j = 0; j < 3; j++) {
+                out->covariance[i][j] *= out->chi2 / out->dof;
+            }
+        }
+    }
+    bool agree = used >= (used < count ? 3 : 2) && used * 10 >= count * 6;
+    out->valid = agree && sqrt(out->covariance[0][0]) <= params->max_cross_rad &&
+                 sqrt(out->covariance[1][1]) <= params->max_cross_rad &&
+                 sqrt(out->covariance[2][2]) <= params->max_roll_rad;
+}

@@ -1,0 +1,121 @@
+/* New tracks from pairs of detections. */
+#include <string.h>
+
+#include "tracker/multitarget_internal.h"
+
+/* What a pair must fulfil: its rate lies within `gate_radps` of `rate`. */
+typedef struct rate_gate {
+    bst_vec3 rate_radps; /* in the tangent plane at the new detection */
+    double gate_radps;
+    int reserve; /* places of the table that such tracks leave free */
+    int history; /* number of earlier frames to look at */
+} rate_gate;
+
+static double spread(const bst_mtt_detection *d) {
+    return d->sky.cov_11 + d->sky.cov_22;
+}
+
+/* The unused earlier detection whose pairing with `detection` lies nearest to the gate's centre,
+ * newest frame first; NULL when there is none. */
+static bst_mtt_pool *find_partner(bst_mtt *mtt, const bst_mtt_detection *detection,
+                                  const rate_gate *gate, int *partner) {
+    for (int h = 0; h < mtt->history_count && h < gate->history; h++) {
+        bst_mtt_pool *pool = &mtt->history[h];
+        double dt = mtt->now.seconds - pool->seconds;
+        if (!(dt > 0.0) || dt > mtt->params.initiation_gap_s) {
+            continue;
+        }
+        bst_vec3 d = detection->sky.direction;
+        bst_vec3 back = bst_tangent_exp(d, bst_vec3_scale(gate->rate_radps, -dt));
+        /* sums of two variances are the largest that the error's ellipse can be across */
+        double reach = gate->gate_radps * dt + 3.0 * sqrt(2.0 * spread(detection));
+        int begin, end;
+        double best = INFINITY;
+        bst_mtt_pool_range(pool, back, reach, &begin, &end);
+        for (int i = begin; i < end; i++) {
+            int k = pool->order[i];
+            const bst_mtt_detection *earlier = &pool->items[k];
+            double off = bst_vec3_norm(bst_vec3_sub(earlier->sky.direction, back));
+            double noise = 3.0 * sqrt(spread(detection) + spread(earlier));
+            double dim = fabs(earlier->v_mag - detection->v_mag);
+            double dim_limit = 1.0 + 3.0 * hypot(earlier->v_mag_sigma, detection->v_mag_sigma);
+            if (pool->used[k] || off > gate->gate_radps * dt + noise || dim > dim_limit ||
+                off >= best) {
+                continue;
+            }
+            best = off;
+            *partner = k;
+        }
+        if (best < INFINITY) {
+            return pool;
+        }
+    }
+    return NULL;
+}
+
+static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bst_mtt_pool *pool,
+                        const bst_mtt_detection *later, const rate_gate *gate) {
+    double dt = mtt->now.seconds - pool->seconds;
+    double reach = gate->gate_radps * dt + 3.0 * sqrt(spread(earlier) + spread(later));
+    double variance = 0.04 + earlier->v_mag_sigma * earlier->v_mag_sigma;
+    bst_mtt_track *track = &mtt->tracks[mtt->track_count++];
+    *track = (bst_mtt_track){
+        .id = mtt->next_id++,
+        .status = BST_TRACK_TENTATIVE,
+        .v_mag = 0.5 * (earlier->v_mag + later->v_mag),
+        .v_mag_variance = isfinite(variance) ? 0.5 * variance : 25.0,
+        .snr = later->snr,
+        .x_px = later->x_px,
+        .y_px = later->y_px,
+        .hits = 2,
+        .frames = 2,
+        .score = fmax(0.0, log(mtt->params.detection_probability /
+                               (mtt->clutter_density * BST_PI * reach * reach))),
+        .last_chi2 = -1.0,
+        .first_tick = pool->tick,
+        .last_update_tick = mtt->now.tick,
+        .last_update_s = mtt->now.seconds,
+    };
+    bst_sky_from_pair(&earlier->sky, &later->sky, dt, mtt->params.noise_rad2ps3, &track->state);
+}
+
+static void start_all(bst_mtt *mtt, rate_gate gate, const bst_mtt_frame *frame, bool from_cue) {
+    for (int i = 0; i < mtt->now.count; i++) {
+        if (mtt->now.used[i]) {
+            continue;
+        }
+        bst_mtt_detection *detection = &mtt->now.items[i];
+        if (from_cue) {
+            gate.rate_radps =
+                bst_tangent_carry(frame->cue_direction, detection->sky.direction,
+                                  bst_tangent_project(frame->cue_direction, frame->cue_rate_radps));
+        }
+        int partner = -1;
+        bst_mtt_pool *pool = find_partner(mtt, detection, &gate, &partner);
+        if (!pool) {
+            continue;
+        }
+        if (mtt->track_count + gate.reserve >= mtt->params.max_tracks) {
+            mtt->lost++;
+            continue;
+        }
+        start_track(mtt, &pool->items[partner], pool, detection, &gate);
+        pool->used[partner] = true;
+        mtt->now.used[i] = true;
+    }
+}
+
+void bst_mtt_initiate(bst_mtt *mtt, const bst_mtt_frame *frame) {
+    const bst_mtt_params *params = &mtt->params;
+    if (frame->cue_valid) {
+        rate_gate gate = {
+            .gate_radps = 4.0 * frame->cue_rate_sigma_radps + params->cue_rate_margin_radps,
+            .history = BST_MTT_HISTORY};
+        start_all(mtt, gate, frame, true);
+    }
+    /* without the cue the gate is wide: only the newest frame, and a quarter of the table stays
+     * free for what looks like the target */
+    rate_gate gate = {
+        .gate_radps = params->max_rate_radps, .reserve = params->max_tracks / 4, .history = 1};
+    start_all(mtt, gate, frame, false);
+}

@@ -1,0 +1,158 @@
+#include "tracker/module.h"
+
+#include <stdlib.h>
+
+#include "sim/world/knowledge.h"
+#include "tracker/tracker.h"
+
+enum { PORT_DETECTIONS, PORT_POINTING, PORT_NAV, PORT_TRACKS, PORT_PREDICTIONS, PORT_COUNT };
+
+static const bst_port ports[PORT_COUNT] = {
+    [PORT_DETECTIONS] = {BST_CHANNEL_DETECTIONS, BST_PORT_IN, BST_PORT_TRIGGER, 0.0, 0},
+    [PORT_POINTING] = {BST_CHANNEL_POINTING_TELEMETRY, BST_PORT_IN, BST_PORT_OPTIONAL, 0.0, 0},
+    [PORT_NAV] = {BST_CHANNEL_NAV_TELEMETRY, BST_PORT_IN, 0, 0.0, 0},
+    [PORT_TRACKS] = {BST_CHANNEL_TRACKS, BST_PORT_OUT, 0, 0.0, 256},
+    [PORT_PREDICTIONS] = {BST_CHANNEL_PREDICTIONS, BST_PORT_OUT, 0, 0.0, 256},
+};
+
+typedef struct tracker_module {
+    bst_tracker *tracker;
+    bst_knowledge_view *view;
+    const bst_stars *stars;
+    double julian_year;
+    double tick_rate_hz;
+} tracker_module;
+
+static bool find_star(void *user, uint32_t star_id, bst_vec3 *icrs) {
+    const tracker_module *m = user;
+    bst_ctx quiet = {0}; /* an unknown identity is no failure of the run */
+    bst_star star;
+    if (bst_stars_find(&quiet, m->stars, star_id, m->julian_year, &star) != BST_OK) {
+        return false;
+    }
+    *icrs = star.icrs;
+    return true;
+}
+
+static void destroy(void *self) {
+    tracker_module *m = self;
+    if (m) {
+        bst_tracker_free(m->tracker);
+        bst_knowledge_view_free(m->view);
+        free(m);
+    }
+}
+
+static bst_status create(const bst_module_env *env, const void *config, void **self) {
+    const bst_tracker_config *c = config;
+    tracker_module *m = calloc(1, sizeof *m);
+    *self = NULL;
+    if (!m) {
+        return bst_fail(env->ctx, BST_ERR_MEMORY, "tracker: out of memory");
+    }
+    m->stars = bst_knowledge_stars(env->knowledge);
+    m->julian_year = bst_knowledge_julian_year(env->knowledge);
+    m->tick_rate_hz = (double)env->tick_rate_hz;
+    bst_status status = bst_knowledge_view_create(env->ctx, env->knowledge, &m->view);
+    if (status == BST_OK) {
+        status = bst_tracker_create(env->ctx, c, bst_knowledge_camera(env->knowledge),
+                                    env->tick_rate_hz, find_star, m, &m->tracker);
+    }
+    if (status != BST_OK) {
+        destroy(m);
+        return status;
+    }
+    bst_env_set_capacity(env, PORT_TRACKS, (int)c->max_tracks);
+    bst_env_set_capacity(env, PORT_PREDICTIONS, (int)c->max_tracks);
+    *self = m;
+    return BST_OK;
+}
+
+static void report(struct bst_step *step, const bst_tracker *tracker) {
+    static const char *const kinds[] = {"track_confirmed", "track_lost", "target_selected",
+                                        "target_lost", "attitude_lost"};
+    int count;
+    const bst_tracker_event *events = bst_tracker_events(tracker, &count);
+    for (int i = 0; i < count; i++) {
+        const bst_tracker_event *e = &events[i];
+        if (e->kind == BST_TRACKER_ATTITUDE_LOST) {
+            bst_step_event(step, kinds[e->kind], "too few identified stars");
+        } else if (e->kind == BST_TRACKER_TARGET_LOST) {
+            bst_step_event(step, kinds[e->kind], "track %lld", (long long)e->track_id);
+        } else {
+            double ra, dec;
+            bst_vec3_to_radec(e->direction_gcrf, &ra, &dec);
+            bst_step_event(step, kinds[e->kind],
+                           "track %lld at RA %.5f Dec %.5f deg, %.3f arcsec/s, V %.2f",
+                           (long long)e->track_id, ra / BST_DEG_RAD, dec / BST_DEG_RAD,
+                           bst_vec3_norm(e->rate_gcrf_radps) / BST_ARCSEC_RAD, e->v_mag);
+        }
+    }
+}
+
+static bst_status take(tracker_module *m, struct bst_step *step, const bst_detections *detections) {
+    if (bst_tracker_check(m->tracker, detections) != BST_TRACKER_USED) {
+        bst_step_count(step, "tracker_frame_ignored");
+        return BST_OK;
+    }
+    bst_sample nav = bst_step_latest(step, PORT_NAV);
+    if (!nav.payload || nav.stale) {
+        bst_step_count(step, "tracker_no_navigation");
+        return BST_OK;
+    }
+    bst_sample pointing = bst_step_latest(step, PORT_POINTING);
+    const bst_pointing_telemetry *telemetry = pointing.payload;
+    bst_tracker_input input = {.detections = detections, .nav = nav.payload};
+    if (telemetry && !pointing.stale && telemetry->written > 0) {
+        input.q_telemetry_now =
+            &telemetry->items[(telemetry->written - 1) % telemetry->capacity].q_cam_from_gcrf;
+    }
+    double seconds =
+        0.5 * (double)(detections->start_tick + detections->end_tick) / m->tick_rate_hz;
+    bst_cue cue;
+    BST_TRY(bst_knowledge_cue_at(bst_step_ctx(step), m->view, seconds, &cue));
+    input.cue = (bst_tracker_cue){.valid = cue.valid,
+                                  .direction_gcrf = cue.direction_gcrf,
+                                  .rate_gcrf_radps = cue.rate_gcrf_radps,
+                                  .sigma_rad = cue.sigma_rad,
+                                  .rate_sigma_radps = cue.rate_sigma_radps,
+                                  .v_mag = cue.v_mag,
+                                  .v_mag_sigma = cue.v_mag_sigma};
+    int track_room, prediction_room;
+    bst_tracks *tracks = bst_step_write(step, PORT_TRACKS, &track_room);
+    bst_predictions *predictions = bst_step_write(step, PORT_PREDICTIONS, &prediction_room);
+    bst_tracker_outcome outcome =
+        bst_tracker_step(m->tracker, &input, tracks, track_room, predictions, prediction_room);
+    if (outcome == BST_TRACKER_NO_ATTITUDE) {
+        bst_step_count(step, "tracker_no_attitude");
+    }
+    if (tracks->lost > 0) {
+        bst_step_count(step, "tracker_overflow");
+    }
+    report(step, m->tracker);
+    return BST_OK;
+}
+
+static bst_status step_module(void *self, struct bst_step *step) {
+    for (;;) {
+        bst_sample sample = bst_step_next(step, PORT_DETECTIONS);
+        if (!sample.payload) {
+            return BST_OK;
+        }
+        BST_TRY(take(self, step, sample.payload));
+    }
+}
+
+const bst_module_desc bst_tracker_module = {
+    .abi = BST_MODULE_ABI,
+    .role = "tracker",
+    .type = "ekf",
+    .doc = "Attitude from stars, extended Kalman filters, nearest-neighbour association.",
+    .config = bst_tracker_config_table,
+    .config_bytes = sizeof(bst_tracker_config),
+    .ports = ports,
+    .port_count = PORT_COUNT,
+    .create = create,
+    .step = step_module,
+    .destroy = destroy,
+};

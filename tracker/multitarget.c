@@ -1,0 +1,343 @@
+#include "tracker/multitarget.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "tracker/multitarget_internal.h"
+
+static bool pool_create(bst_mtt_pool *pool, int capacity) {
+    size_t n = (size_t)capacity + 1;
+    pool->order = calloc(n, sizeof *pool->order);
+    pool->key = calloc(n, sizeof *pool->key);
+    pool->items = calloc(n, sizeof *pool->items);
+    pool->used = calloc(n, sizeof *pool->used);
+    return pool->order && pool->key && pool->items && pool->used;
+}
+
+static void pool_free(bst_mtt_pool *pool) {
+    free(pool->order);
+    free(pool->key);
+    free(pool->items);
+    free(pool->used);
+}
+
+static bst_status check(bst_ctx *ctx, const bst_mtt_params *p) {
+    if (p->max_tracks < 1 || p->max_detections < 1 || p->confirm_hits < 2 ||
+        p->confirm_frames < p->confirm_hits || !(p->field_sr > 0.0) ||
+        !(p->detection_probability > 0.0 && p->detection_probability < 1.0) ||
+        !(p->false_alarms_per_frame > 0.0) || !(p->gate_chi2 > 0.0) || !(p->noise_rad2ps3 >= 0.0)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "tracker: parameters out of range (need at least one track and detection, "
+                        "2 <= confirm_hits <= confirm_frames, detection_probability in (0, 1), "
+                        "positive field, false alarms and gate)");
+    }
+    return BST_OK;
+}
+
+bst_status bst_mtt_create(bst_ctx *ctx, const bst_mtt_params *params, bst_mtt **out) {
+    *out = NULL;
+    BST_TRY(check(ctx, params));
+    bst_mtt *m = calloc(1, sizeof *m);
+    if (!m) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "tracker: out of memory");
+    }
+    m->params = *params;
+    m->next_id = 1;
+    m->clutter = params->false_alarms_per_frame;
+    m->clutter_density = params->false_alarms_per_frame / params->field_sr;
+    size_t nt = (size_t)params->max_tracks + 1, ne = nt * BST_MTT_CANDIDATES;
+    m->tracks = calloc(nt, sizeof *m->tracks);
+    m->events = calloc(2 * nt, sizeof *m->events);
+    m->rows = calloc(nt, sizeof *m->rows);
+    m->first = calloc(nt, sizeof *m->first);
+    m->column_of_row = calloc(nt, sizeof *m->column_of_row);
+    m->miss_costs = calloc(nt, sizeof *m->miss_costs);
+    m->edge_columns = calloc(ne, sizeof *m->edge_columns);
+    m->edge_costs = calloc(ne, sizeof *m->edge_costs);
+    m->detection_of_track = calloc(nt, sizeof *m->detection_of_track);
+    m->extra = calloc(nt, sizeof *m->extra);
+    m->shared = calloc(nt, sizeof *m->shared);
+    m->observable = calloc(nt, sizeof *m->observable);
+    bool ok = m->tracks && m->events && m->rows && m->first && m->column_of_row && m->miss_costs &&
+              m->edge_columns && m->edge_costs && m->detection_of_track && m->extra && m->shared &&
+              m->observable && pool_create(&m->now, params->max_detections);
+    for (int h = 0; ok && h < BST_MTT_HISTORY; h++) {
+        ok = pool_create(&m->history[h], params->max_detections);
+    }
+    bst_status status =
+        ok ? bst_assignment_create(ctx, params->max_tracks, params->max_detections, &m->assignment)
+           : bst_fail(ctx, BST_ERR_MEMORY, "tracker: out of memory for %d tracks, %d detections",
+                      params->max_tracks, params->max_detections);
+    if (status != BST_OK) {
+        bst_mtt_free(m);
+        return status;
+    }
+    *out = m;
+    return BST_OK;
+}
+
+void bst_mtt_free(bst_mtt *m) {
+    if (!m) {
+        return;
+    }
+    free(m->tracks);
+    free(m->events);
+    free(m->rows);
+    free(m->first);
+    free(m->column_of_row);
+    free(m->miss_costs);
+    free(m->edge_columns);
+    free(m->edge_costs);
+    free(m->detection_of_track);
+    free(m->extra);
+    free(m->shared);
+    free(m->observable);
+    pool_free(&m->now);
+    for (int h = 0; h < BST_MTT_HISTORY; h++) {
+        pool_free(&m->history[h]);
+    }
+    bst_assignment_free(m->assignment);
+    free(m);
+}
+
+static void record(bst_mtt *m, bst_mtt_event_kind kind, const bst_mtt_track *track) {
+    m->events[m->event_count++] = (bst_mtt_event){.kind = kind, .track = *track};
+}
+
+/* What the cue's motion has that a constant rate has not, as tangent vectors at the cue's present
+ * direction. */
+static bool cue_acceleration(const bst_mtt_frame *frame, double dt_s, bst_vec3 *step,
+                             bst_vec3 *rate) {
+    if (!frame->cue_valid || !frame->cue_before_valid) {
+        return false;
+    }
+    bst_sky_state cue = {.direction = frame->cue_before_direction,
+                         .rate_radps = bst_tangent_project(frame->cue_before_direction,
+                                                           frame->cue_before_rate_radps)};
+    bst_sky_predict(&cue, dt_s, 0.0);
+    bst_vec3 now = frame->cue_direction;
+    if (!(bst_vec3_dot(cue.direction, now) > 0.9)) {
+        return false;
+    }
+    *step = bst_vec3_scale(bst_tangent_log(now, cue.direction), -1.0);
+    *rate = bst_vec3_sub(bst_tangent_project(now, frame->cue_rate_radps),
+                         bst_tangent_carry(cue.direction, now, cue.rate_radps));
+    return true;
+}
+
+static void predict(bst_mtt *m, const bst_mtt_frame *frame) {
+    double dt = frame->seconds - m->seconds;
+    bst_vec3 step, rate;
+    bool forward = m->started && cue_acceleration(frame, dt, &step, &rate);
+    double near = cos(m->params.feed_forward_rad);
+    for (int t = 0; t < m->track_count; t++) {
+        bst_sky_state *state = &m->tracks[t].state;
+        bst_sky_predict(state, dt, m->params.noise_rad2ps3);
+        if (forward && bst_vec3_dot(state->direction, frame->cue_direction) > near) {
+            bst_sky_shift(state, bst_tangent_carry(frame->cue_direction, state->direction, step),
+                          bst_tangent_carry(frame->cue_direction, state->direction, rate));
+        }
+        m->observable[t] = !frame->in_field || frame->in_field(frame->user, state->direction);
+    }
+    m->seconds = frame->seconds;
+    m->started = true;
+    m->event_count = 0;
+    m->lost = 0;
+}
+
+static void load_detections(bst_mtt *m, const bst_mtt_frame *frame) {
+    bst_mtt_pool *now = &m->now;
+    now->seconds = frame->seconds;
+    now->tick = frame->tick;
+    now->count = frame->count < m->params.max_detections ? frame->count : m->params.max_detections;
+    m->lost += frame->count - now->count;
+    memcpy(now->items, frame->detections, (size_t)now->count * sizeof *now->items);
+    memset(now->used, 0, (size_t)now->count * sizeof *now->used);
+    bst_mtt_pool_index(now);
+}
+
+static void take_brightness(bst_mtt_track *track, const bst_mtt_detection *detection) {
+    double r = 0.04 + detection->v_mag_sigma * detection->v_mag_sigma;
+    if (!isfinite(r) || !isfinite(detection->v_mag)) {
+        return;
+    }
+    double p = track->v_mag_variance + 0.0025; /* walks by 0.05 mag a frame */
+    double gain = p / (p + r);
+    track->v_mag += gain * (detection->v_mag - track->v_mag);
+    track->v_mag_variance = (1.0 - gain) * p;
+}
+
+static void hit(bst_mtt *m, int t) {
+    bst_mtt_track *track = &m->tracks[t];
+    const bst_mtt_detection *detection = &m->now.items[m->detection_of_track[t]];
+    bst_sky_innovation innovation;
+    if (!bst_sky_innovate(&track->state, &detection->sky, m->shared[t] ? m->extra[t] : NULL,
+                          &innovation)) {
+        return;
+    }
+    bst_sky_update(&track->state, &innovation);
+    track->x_px = detection->x_px;
+    track->y_px = detection->y_px;
+    track->snr = detection->snr;
+    if (m->shared[t]) {
+        track->merged_in_row++;
+        return;
+    }
+    track->merged_in_row = 0;
+    track->misses_in_row = 0;
+    track->hits++;
+    track->chi2 += innovation.chi2;
+    track->last_chi2 = innovation.chi2;
+    track->score += log(m->params.detection_probability / m->clutter_density) - log(2.0 * BST_PI) -
+                    0.5 * innovation.log_det_s - 0.5 * innovation.chi2;
+    track->last_update_tick = m->now.tick;
+    track->last_update_s = m->now.seconds;
+    take_brightness(track, detection);
+}
+
+/* 99.9 % quantile of chi-square (Wilson and Hilferty 1931). */
+static double chi2_limit(int dof) {
+    double v = 2.0 / (9.0 * dof), c = 1.0 - v + 3.0902 * sqrt(v);
+    return dof * c * c * c;
+}
+
+static bool may_confirm(const bst_mtt *m, const bst_mtt_track *track) {
+    int dof = 2 * (track->hits - 2);
+    if (track->hits < m->params.confirm_hits || track->score < m->params.confirm_score ||
+        (dof > 0 && track->chi2 > chi2_limit(dof))) {
+        return false;
+    }
+    /* a second copy of what is tracked already is no new object */
+    for (int u = 0; u < m->track_count; u++) {
+        const bst_mtt_track *other = &m->tracks[u];
+        if (other->status != BST_TRACK_TENTATIVE &&
+            bst_vec3_dot(other->state.direction, track->state.direction) > 0.99999 &&
+            bst_sky_distance2(&other->state, &track->state) < 13.3) { /* 99 %, 4 dof */
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Should this track go? */
+static bool is_finished(const bst_mtt *m, const bst_mtt_track *track, bool observed) {
+    const bst_mtt_params *p = &m->params;
+    double variance = fmax(track->state.covariance[0][0], track->state.covariance[1][1]);
+    if (!(variance < p->max_sigma_rad * p->max_sigma_rad) ||
+        m->seconds - track->last_update_s > p->max_coast_s) {
+        return true;
+    }
+    if (track->status != BST_TRACK_TENTATIVE) {
+        return track->misses_in_row > p->max_misses;
+    }
+    int allowed = p->confirm_frames - p->confirm_hits;
+    return (observed && track->misses_in_row > allowed) ||
+           (track->frames >= p->confirm_frames && track->hits < p->confirm_hits) ||
+           track->frames >= 3 * p->confirm_frames;
+}
+
+static void judge(bst_mtt *m) {
+    for (int t = 0; t < m->track_count; t++) {
+        bst_mtt_track *track = &m->tracks[t];
+        bool taken = m->detection_of_track[t] >= 0 && track->merged_in_row <= m->params.max_merged;
+        track->frames += m->observable[t];
+        if (m->observable[t] && !taken) {
+            track->misses_in_row++;
+            track->score += log(1.0 - m->params.detection_probability);
+        }
+        if (track->status != BST_TRACK_TENTATIVE) {
+            track->status = taken ? BST_TRACK_CONFIRMED : BST_TRACK_COASTING;
+        } else if (taken && may_confirm(m, track)) {
+            track->status = BST_TRACK_CONFIRMED;
+            record(m, BST_MTT_CONFIRMED, track);
+        }
+    }
+    int kept = 0;
+    for (int t = 0; t < m->track_count; t++) {
+        const bst_mtt_track *track = &m->tracks[t];
+        if (!is_finished(m, track, m->observable[t])) {
+            m->tracks[kept++] = *track;
+        } else if (track->status != BST_TRACK_TENTATIVE) {
+            record(m, BST_MTT_LOST, track);
+        }
+    }
+    m->track_count = kept;
+}
+
+/* The frame's unused detections wait for partners. */
+static void remember(bst_mtt *m) {
+    bst_mtt_pool oldest = m->history[BST_MTT_HISTORY - 1];
+    for (int h = BST_MTT_HISTORY - 1; h > 0; h--) {
+        m->history[h] = m->history[h - 1];
+    }
+    bst_mtt_pool *now = &m->now;
+    int kept = 0;
+    for (int i = 0; i < now->count; i++) {
+        if (!now->used[i]) {
+            now->items[kept] = now->items[i];
+            now->used[kept++] = false;
+        }
+    }
+    now->count = kept;
+    bst_mtt_pool_index(now);
+    m->history[0] = *now;
+    m->now = oldest;
+    if (m->history_count < BST_MTT_HISTORY) {
+        m->history_count++;
+    }
+}
+
+void bst_mtt_step(bst_mtt *m, const bst_mtt_frame *frame) {
+    predict(m, frame);
+    load_detections(m, frame);
+    m->clutter_density = fmax(m->clutter, m->params.false_alarms_per_frame) / m->params.field_sr;
+    bst_mtt_associate(m);
+    int unused = 0;
+    for (int t = 0; t < m->track_count; t++) {
+        m->tracks[t].last_chi2 = -1.0;
+        if (m->detection_of_track[t] >= 0) {
+            hit(m, t);
+        }
+    }
+    for (int i = 0; i < m->now.count; i++) {
+        unused += !m->now.used[i];
+    }
+    m->clutter += 0.1 * (unused - m->clutter);
+    judge(m);
+    bst_mtt_initiate(m, frame);
+    remember(m);
+}
+
+void bst_mtt_skip(bst_mtt *m, const bst_mtt_frame *frame) {
+    predict(m, frame);
+    m->now.count = 0;
+    for (int t = 0; t < m->track_count; t++) {
+        m->observable[t] = false;
+        m->detection_of_track[t] = -1;
+        m->tracks[t].last_chi2 = -1.0;
+    }
+    judge(m);
+}
+
+const bst_mtt_track *bst_mtt_tracks(const bst_mtt *m, int *count) {
+    *count = m->track_count;
+    return m->tracks;
+}
+
+const bst_mtt_track *bst_mtt_find(const bst_mtt *m, int64_t id) {
+    for (int t = 0; t < m->track_count; t++) {
+        if (m->tracks[t].id == id) {
+            return &m->tracks[t];
+        }
+    }
+    return NULL;
+}
+
+const bst_mtt_event *bst_mtt_events(const bst_mtt *m, int *count) {
+    *count = m->event_count;
+    return m->events;
+}
+
+int bst_mtt_lost(const bst_mtt *m) {
+    return m->lost;
+}

@@ -1,0 +1,106 @@
+/* Multi-target tracking on the sky: gating, global nearest neighbour, two-point initiation, M-of-N
+ * confirmation, coasting and deletion.
+ *
+ * A track that two detections start is tentative; it is confirmed when it has M hits in its first N
+ * frames, its innovations fit their covariances, and its log-likelihood ratio against clutter
+ * (Blackman and Popoli 1999, section 6.2) is high enough, so that dense clutter asks for more hits.
+ * Frames in which a track lies outside the field count neither for nor against it. */
+#ifndef BST_TRACKER_MULTITARGET_H
+#define BST_TRACKER_MULTITARGET_H
+
+#include <stdint.h>
+
+#include "sim/core/messages.h"
+#include "sim/core/status.h"
+#include "tracker/sky_filter.h"
+
+typedef struct bst_mtt_params {
+    int max_tracks, max_detections;
+    double noise_rad2ps3; /* acceleration's power spectral density */
+    double gate_chi2;     /* 2 degrees of freedom */
+    double detection_probability;
+    double false_alarms_per_frame;    /* least density of clutter that is believed */
+    double field_sr;                  /* solid angle of the field */
+    int confirm_hits, confirm_frames; /* M of N, the two initial detections included */
+    double confirm_score;             /* least log-likelihood ratio */
+    double max_rate_radps;            /* of tracks that start without the cue */
+    double cue_rate_margin_radps;     /* widens the cue's rate sigma */
+    double initiation_gap_s; /* longest time between the two detections that start a track */
+    int max_misses;          /* in a row, after which a confirmed track is deleted */
+    double max_coast_s;      /* longest time without a detection */
+    double max_sigma_rad;    /* a track with a direction worse than this is deleted */
+    double merge_rad;        /* closer than this two objects may share one detection */
+    double merge_floor_rad;  /* 1 sigma per axis added to a shared detection */
+    int max_merged;          /* frames in a row that a track may live on shared detections */
+    double feed_forward_rad; /* tracks this close to the cue follow the cue's acceleration */
+} bst_mtt_params;
+
+/* One detection that is not a star, on the sky. */
+typedef struct bst_mtt_detection {
+    bst_sky_measurement sky; /* geometric */
+    double x_px, y_px;
+    double v_mag, v_mag_sigma; /* sigma INFINITY: no brightness */
+    double snr;
+} bst_mtt_detection;
+
+/* What one frame brings. */
+typedef struct bst_mtt_frame {
+    int64_t tick;   /* mid-exposure */
+    double seconds; /* the same, since the epoch */
+    const bst_mtt_detection *detections;
+    int count;
+    /* Is a geometric direction on the sensor, well away from its edge? NULL: everything is. */
+    bool (*in_field)(const void *user, bst_vec3 direction);
+    const void *user;
+    /* The cue's direction and rate at the previous frame and at this one; feeds acceleration
+     * forward and opens a rate gate for initiation. */
+    bool cue_valid, cue_before_valid;
+    bst_vec3 cue_direction, cue_rate_radps;
+    bst_vec3 cue_before_direction, cue_before_rate_radps;
+    double cue_rate_sigma_radps;
+} bst_mtt_frame;
+
+typedef struct bst_mtt_track {
+    int64_t id;
+    bst_track_status status;
+    bst_sky_state state;
+    double v_mag, v_mag_variance;
+    double snr, x_px, y_px; /* latest detection */
+    int hits, misses_in_row, merged_in_row;
+    int frames;       /* observable frames since the first detection */
+    double score;     /* log-likelihood ratio against clutter */
+    double chi2;      /* sum over the hits after initiation, 2 degrees of freedom each */
+    double last_chi2; /* of the latest detection; negative when the latest frame brought none */
+    int64_t first_tick, last_update_tick;
+    double last_update_s;
+} bst_mtt_track;
+
+typedef enum bst_mtt_event_kind { BST_MTT_CONFIRMED, BST_MTT_LOST } bst_mtt_event_kind;
+
+typedef struct bst_mtt_event {
+    bst_mtt_event_kind kind;
+    bst_mtt_track track; /* as it was */
+} bst_mtt_event;
+
+typedef struct bst_mtt bst_mtt;
+
+/* The caller frees. All memory is taken here. */
+bst_status bst_mtt_create(bst_ctx *ctx, const bst_mtt_params *params, bst_mtt **out) BST_MUST_CHECK;
+void bst_mtt_free(bst_mtt *mtt);
+
+/* Takes one frame; frames must come in order of time (later than the one before). At most
+ * max_detections detections are looked at; the rest are counted by bst_mtt_lost. */
+void bst_mtt_step(bst_mtt *mtt, const bst_mtt_frame *frame);
+
+/* Moves the tracks to a frame that says nothing about them (no attitude): no misses are counted. */
+void bst_mtt_skip(bst_mtt *mtt, const bst_mtt_frame *frame);
+
+/* Tracks after the latest frame, by ascending id; lent until the next step. */
+const bst_mtt_track *bst_mtt_tracks(const bst_mtt *mtt, int *count);
+const bst_mtt_track *bst_mtt_find(const bst_mtt *mtt, int64_t id);
+/* What happened in the latest frame; lent until the next step. */
+const bst_mtt_event *bst_mtt_events(const bst_mtt *mtt, int *count);
+/* Tracks and detections of the latest frame that found no room. */
+int bst_mtt_lost(const bst_mtt *mtt);
+
+#endif

@@ -1,0 +1,62 @@
+/* Shared by the files of the multi-target tracker. */
+#ifndef BST_TRACKER_MULTITARGET_INTERNAL_H
+#define BST_TRACKER_MULTITARGET_INTERNAL_H
+
+#include "tracker/assignment.h"
+#include "tracker/multitarget.h"
+
+/* Frames whose unused detections wait for a partner. */
+#define BST_MTT_HISTORY 3
+/* Candidates kept per track: the likeliest. */
+#define BST_MTT_CANDIDATES 16
+
+/* Unused detections of one frame, sorted along one axis. */
+typedef struct bst_mtt_pool {
+    double seconds;
+    int64_t tick;
+    int count;
+    int axis;    /* 0, 1, 2: of the direction's component that detections are sorted by */
+    int *order;  /* indices into items by ascending component */
+    double *key; /* component of items[order[i]] */
+    bst_mtt_detection *items;
+    bool *used;
+} bst_mtt_pool;
+
+struct bst_mtt {
+    bst_mtt_params params;
+    bst_mtt_track *tracks;
+    int track_count;
+    int64_t next_id;
+    double seconds; /* of the latest frame */
+    bool started;
+    double clutter;         /* smoothed number of unused detections per frame */
+    double clutter_density; /* per steradian, for this frame */
+    int lost;
+    bst_mtt_event *events;
+    int event_count;
+    bst_assignment *assignment;
+    bst_mtt_pool now;
+    bst_mtt_pool history[BST_MTT_HISTORY]; /* newest first */
+    int history_count;
+    /* work space of association, per track or per edge */
+    int *rows; /* track of each assignment row */
+    int *first, *edge_columns, *column_of_row;
+    double *edge_costs, *miss_costs;
+    int *detection_of_track; /* index into now.items, -1 none */
+    double (*extra)[3];      /* widening of a shared detection, tangent axes of the track */
+    bool *shared, *observable;
+};
+
+/* Sorts the pool's detections so that ranges can be looked up. */
+void bst_mtt_pool_index(bst_mtt_pool *pool);
+/* Range of sorted positions whose component lies within `chord` of direction's. */
+void bst_mtt_pool_range(const bst_mtt_pool *pool, bst_vec3 direction, double chord, int *begin,
+                        int *end);
+
+/* Fills detection_of_track, shared and extra for the tracks of this frame (already predicted). */
+void bst_mtt_associate(bst_mtt *mtt);
+
+/* Starts tentative tracks from unused detections of this frame and of earlier ones. */
+void bst_mtt_initiate(bst_mtt *mtt, const bst_mtt_frame *frame);
+
+#endif

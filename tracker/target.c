@@ -1,0 +1,116 @@
+#include "tracker/target.h"
+
+/* x^T P^-1 x + ln det P of a 2-vector; INFINITY for a bad P or a misfit beyond `limit`. */
+static double misfit2(const double x[2], double p11, double p12, double p22, double limit) {
+    double det = p11 * p22 - p12 * p12;
+    double chi2 = (p22 * x[0] * x[0] - 2.0 * p12 * x[0] * x[1] + p11 * x[1] * x[1]) / det;
+    return det > 0.0 && chi2 <= limit ? chi2 + log(det) : INFINITY;
+}
+
+/* The misfit of the rate alone, without its determinant: for the release of a kept target. */
+static void rate_difference(const bst_target_params *params, const bst_target_cue *cue,
+                            const bst_mtt_track *track, double x[2], double p[3]) {
+    const bst_sky_state *s = &track->state;
+    bst_tangent axes = bst_tangent_at(s->direction);
+    bst_vec3 cue_rate = bst_tangent_carry(cue->direction, s->direction,
+                                          bst_tangent_project(cue->direction, cue->rate_radps));
+    bst_vec3 difference = bst_vec3_sub(s->rate_radps, cue_rate);
+    double own = cue->rate_sigma_radps * cue->rate_sigma_radps +
+                 params->rate_floor_radps * params->rate_floor_radps;
+    x[0] = bst_vec3_dot(difference, axes.e1);
+    x[1] = bst_vec3_dot(difference, axes.e2);
+    p[0] = s->covariance[2][2] + own;
+    p[1] = s->covariance[2][3];
+    p[2] = s->covariance[3][3] + own;
+}
+
+double bst_target_misfit(const bst_target_params *params, const bst_target_cue *cue,
+                         const bst_mtt_track *track) {
+    const bst_sky_state *s = &track->state;
+    double limit2 = params->max_rate_sigma_radps * params->max_rate_sigma_radps;
+    int dof = 2 * (track->hits - 2);
+    if (!cue->valid || track->status == BST_TRACK_TENTATIVE || s->covariance[2][2] > limit2 ||
+        s->covariance[3][3] > limit2 || (dof > 0 && track->chi2 > params->max_chi2 * dof)) {
+        return INFINITY;
+    }
+    double x[2], p[3];
+    rate_difference(params, cue, track, x, p);
+    double sum = misfit2(x, p[0], p[1], p[2], params->rate_chi2);
+    bst_tangent axes = bst_tangent_at(s->direction);
+    bst_vec3 to = bst_tangent_log(s->direction, cue->direction);
+    double d[2] = {bst_vec3_dot(to, axes.e1), bst_vec3_dot(to, axes.e2)};
+    double variance = cue->sigma_rad * cue->sigma_rad;
+    sum += misfit2(d, s->covariance[0][0] + variance, s->covariance[0][1],
+                   s->covariance[1][1] + variance, params->direction_chi2);
+    if (isfinite(cue->v_mag) && isfinite(cue->v_mag_sigma) && isfinite(track->v_mag)) {
+        double v = cue->v_mag_sigma * cue->v_mag_sigma + track->v_mag_variance + 0.01;
+        double m = track->v_mag - cue->v_mag;
+        sum += m * m / v <= params->magnitude_chi2 ? m * m / v + log(v) : INFINITY;
+    }
+    return sum;
+}
+
+static const bst_mtt_track *find(const bst_mtt_track *tracks, int count, int64_t id) {
+    for (int i = 0; i < count; i++) {
+        if (tracks[i].id == id) {
+            return &tracks[i];
+        }
+    }
+    return NULL;
+}
+
+/* A kept target is let go only when its rate has become that of something else: a star, say. */
+static bool is_released(const bst_target_params *params, const bst_target_cue *cue,
+                        const bst_mtt_track *track) {
+    if (!cue->valid) {
+        return false;
+    }
+    double x[2], p[3];
+    rate_difference(params, cue, track, x, p);
+    double det = p[0] * p[2] - p[1] * p[1];
+    return (p[2] * x[0] * x[0] - 2.0 * p[1] * x[0] * x[1] + p[0] * x[1] * x[1]) / det >
+           params->release_chi2;
+}
+
+void bst_target_step(bst_target *target, const bst_target_params *params, const bst_target_cue *cue,
+                     double seconds, const bst_mtt_track *tracks, int count) {
+    if (target->id != 0) {
+        const bst_mtt_track *kept = find(tracks, count, target->id);
+        if (kept && !is_released(params, cue, kept)) {
+            target->memory = kept->state;
+            target->memory_seconds = seconds;
+            return;
+        }
+        /* what let itself be mistaken for the target says nothing about where the target is */
+        target->remembered = kept == NULL;
+        target->lost_seconds = seconds;
+        target->id = 0;
+    }
+    bst_sky_state memory = target->memory;
+    bool bound = target->remembered && seconds - target->lost_seconds <= params->memory_s;
+    if (bound) {
+        bst_sky_predict(&memory, seconds - target->memory_seconds, params->memory_noise_rad2ps3);
+    }
+    const bst_mtt_track *best = NULL;
+    double lowest = INFINITY, second = INFINITY;
+    for (int i = 0; i < count; i++) {
+        double misfit = bst_target_misfit(params, cue, &tracks[i]);
+        if (bound && misfit < INFINITY) {
+            double distance2 = bst_sky_distance2(&memory, &tracks[i].state);
+            misfit = distance2 <= params->memory_chi2 ? misfit + distance2 : INFINITY;
+        }
+        if (misfit < lowest) {
+            second = lowest;
+            lowest = misfit;
+            best = &tracks[i];
+        } else if (misfit < second) {
+            second = misfit;
+        }
+    }
+    if (best && (0.5 * (second - lowest) >= params->margin || best->hits >= params->margin_hits)) {
+        target->id = best->id;
+        target->memory = best->state;
+        target->memory_seconds = seconds;
+        target->remembered = false;
+    }
+}

@@ -1,0 +1,51 @@
+/* Which confirmed track is the target of interest. */
+#ifndef BST_TRACKER_TARGET_H
+#define BST_TRACKER_TARGET_H
+
+#include "tracker/multitarget.h"
+
+typedef struct bst_target_params {
+    double direction_chi2;       /* largest misfit of the cue's direction, 2 degrees of freedom */
+    double rate_chi2;            /* of the rate, 2 */
+    double magnitude_chi2;       /* of the brightness, 1 */
+    double release_chi2;         /* a kept target whose rate misfits the cue by more is let go */
+    double rate_floor_radps;     /* 1 sigma per axis by which any cue's rate may be wrong */
+    double max_rate_sigma_radps; /* a track is judged once its rate is known to this */
+    double max_chi2;    /* a track whose mean innovation (per degree of freedom) exceeds this is
+                           not taken */
+    double margin;      /* log-likelihood by which the best must lead the second ... */
+    int margin_hits;    /* ... unless it has this many hits */
+    double memory_s;    /* a lost target's extrapolation binds the next choice for this long */
+    double memory_chi2; /* its largest misfit, 4 degrees of freedom */
+    double memory_noise_rad2ps3; /* acceleration that a lost target may have */
+} bst_target_params;
+
+/* The cue as the onboard side has it. */
+typedef struct bst_target_cue {
+    bool valid;
+    bst_vec3 direction, rate_radps;
+    double sigma_rad, rate_sigma_radps;
+    double v_mag, v_mag_sigma;
+} bst_target_cue;
+
+typedef struct bst_target {
+    int64_t id; /* 0: none */
+    bool remembered;
+    bst_sky_state memory; /* of the present or last target, at memory_seconds */
+    double memory_seconds;
+    double lost_seconds; /* when the last target was lost */
+} bst_target;
+
+/* Squared misfit of a track to the cue over direction, rate and brightness plus the logarithm of
+ * its covariances' determinants (twice the negative log-likelihood but for a constant); INFINITY
+ * when any part is beyond its limit, the track is not confirmed, or its rate is not known well
+ * enough yet. */
+double bst_target_misfit(const bst_target_params *params, const bst_target_cue *cue,
+                         const bst_mtt_track *track);
+
+/* Keeps the target while its track lives; else chooses among the tracks by the cue and, after a
+ * loss, by the lost target's extrapolation. Without a cue nothing new is chosen. */
+void bst_target_step(bst_target *target, const bst_target_params *params, const bst_target_cue *cue,
+                     double seconds, const bst_mtt_track *tracks, int count);
+
+#endif

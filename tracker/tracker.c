@@ -1,0 +1,491 @@
+#include "tracker/tracker.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/astro/bodies.h"
+#include "tracker/attitude.h"
+#include "tracker/attitude_error.h"
+#include "tracker/target.h"
+
+/* Places in the cache of catalogue directions; a power of two. */
+#define STAR_CACHE 4096
+/* Stars of one frame that the attitude looks at. */
+#define MAX_STARS 8192
+
+typedef struct cached_star {
+    uint32_t id; /* 0: empty */
+    bst_vec3 icrs;
+} cached_star;
+
+struct bst_tracker {
+    bst_camera camera;
+    double tick_rate_hz;
+    bst_tracker_star_fn star;
+    void *star_user;
+    bst_attitude_params attitude_params;
+    bst_attitude_error_params error_params;
+    bst_target_params target_params;
+    double blend_variance_px2, edge_margin_px, max_attitude_sigma_rad;
+    int max_detections;
+    bst_mtt *mtt;
+    cached_star *cache;
+    bst_attitude_star *stars;
+    bst_mtt_detection *detections;
+    bst_tracker_event *events;
+    int event_count;
+    bst_attitude_error error;
+    bst_target target;
+    bst_tracker_cue cue_before;
+    bool started, attitude_was_lost;
+    int64_t last_exposure_id, last_tick;
+};
+
+static double arcsec(double v) {
+    return v * BST_ARCSEC_RAD;
+}
+
+static double square(double v) {
+    return v * v;
+}
+
+static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_params *mtt) {
+    double scale = bst_camera_scale_rad(&t->camera);
+    t->attitude_params = (bst_attitude_params){.floor_px = c->star_floor_px,
+                                               .reject_chi2 = c->star_reject_chi2,
+                                               .max_cross_rad = c->max_attitude_sigma_px * scale,
+                                               .max_roll_rad = arcsec(c->max_roll_sigma_arcsec)};
+    t->error_params =
+        (bst_attitude_error_params){.rate_sigma_radps = arcsec(c->drift_sigma_arcsec_per_s),
+                                    .noise_rad2ps3 = square(arcsec(c->drift_noise_arcsec_per_s15)),
+                                    .jitter_rad = c->jitter_px * scale,
+                                    .gate_chi2 = 30.0,
+                                    .gate_patience = 3,
+                                    .telemetry_sigma_rad = arcsec(c->telemetry_sigma_arcsec)};
+    t->target_params = (bst_target_params){
+        .direction_chi2 = c->target_direction_chi2,
+        .rate_chi2 = c->target_rate_chi2,
+        .magnitude_chi2 = c->target_magnitude_chi2,
+        .release_chi2 = c->target_release_chi2,
+        .rate_floor_radps = arcsec(c->target_rate_floor_arcsec_per_s),
+        .max_rate_sigma_radps = arcsec(c->target_max_rate_sigma_arcsec_per_s),
+        .max_chi2 = 4.0,
+        .margin = 2.0,
+        .margin_hits = 8,
+        .memory_s = c->target_memory_s,
+        .memory_chi2 = 23.5, /* 99.99 %, 4 degrees of freedom */
+        /* what was lost may have manoeuvred: ten times the usual acceleration */
+        .memory_noise_rad2ps3 = square(10.0 * arcsec(c->process_noise_arcsec_per_s15))};
+    t->blend_variance_px2 = square(c->blend_sigma_px);
+    t->edge_margin_px = c->edge_margin_px;
+    t->max_attitude_sigma_rad = c->max_attitude_sigma_px * scale;
+    t->max_detections = (int)c->max_detections;
+    *mtt = (bst_mtt_params){
+        .max_tracks = (int)c->max_tracks,
+        .max_detections = (int)c->max_detections,
+        .noise_rad2ps3 = square(arcsec(c->process_noise_arcsec_per_s15)),
+        .gate_chi2 = c->gate_chi2,
+        .detection_probability = c->detection_probability,
+        .false_alarms_per_frame = c->false_alarms_per_frame,
+        .field_sr = (double)t->camera.width_px * (double)t->camera.height_px * scale * scale,
+        .confirm_hits = (int)c->confirm_hits,
+        .confirm_frames = (int)c->confirm_frames,
+        .confirm_score = c->confirm_score,
+        .max_rate_radps = arcsec(c->max_rate_arcsec_per_s),
+        .cue_rate_margin_radps = arcsec(c->cue_rate_margin_arcsec_per_s),
+        .initiation_gap_s = c->initiation_gap_s,
+        .max_misses = (int)c->max_misses,
+        .max_coast_s = c->max_coast_s,
+        .max_sigma_rad = arcsec(c->max_sigma_arcsec),
+        .merge_rad = c->merge_px * scale,
+        .merge_floor_rad = c->merge_floor_px * scale,
+        .max_merged = 30,
+        .feed_forward_rad = c->feed_forward_deg * BST_DEG_RAD};
+}
+
+bst_status bst_tracker_create(bst_ctx *ctx, const bst_tracker_config *config,
+                              const bst_camera *camera, int64_t tick_rate_hz,
+                              bst_tracker_star_fn star, void *star_user, bst_tracker **out) {
+    *out = NULL;
+    if (tick_rate_hz <= 0 || !star) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "tracker: needs a positive tick rate and a star look-up");
+    }
+    if (config->confirm_frames < config->confirm_hits) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "tracker: confirm_frames (%lld) must not be less than confirm_hits (%lld)",
+                        (long long)config->confirm_frames, (long long)config->confirm_hits);
+    }
+    bst_tracker *t = calloc(1, sizeof *t);
+    if (!t) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "tracker: out of memory");
+    }
+    t->camera = *camera;
+    t->tick_rate_hz = (double)tick_rate_hz;
+    t->star = star;
+    t->star_user = star_user;
+    bst_mtt_params mtt;
+    make_params(t, config, &mtt);
+    t->cache = calloc(STAR_CACHE, sizeof *t->cache);
+    t->stars = calloc(MAX_STARS, sizeof *t->stars);
+    t->detections = calloc((size_t)t->max_detections, sizeof *t->detections);
+    t->events = calloc(2 * (size_t)mtt.max_tracks + 8, sizeof *t->events);
+    bst_status status = t->cache && t->stars && t->detections && t->events
+                            ? bst_mtt_create(ctx, &mtt, &t->mtt)
+                            : bst_fail(ctx, BST_ERR_MEMORY, "tracker: out of memory");
+    if (status != BST_OK) {
+        bst_tracker_free(t);
+        return status;
+    }
+    *out = t;
+    return BST_OK;
+}
+
+void bst_tracker_free(bst_tracker *t) {
+    if (!t) {
+        return;
+    }
+    bst_mtt_free(t->mtt);
+    free(t->cache);
+    free(t->stars);
+    free(t->detections);
+    free(t->events);
+    free(t);
+}
+
+const bst_tracker_event *bst_tracker_events(const bst_tracker *t, int *count) {
+    *count = t->event_count;
+    return t->events;
+}
+
+static bool find_star(bst_tracker *t, uint32_t id, bst_vec3 *icrs) {
+    cached_star *slot = &t->cache[(id * 2654435761u >> 16) & (STAR_CACHE - 1)];
+    if (slot->id != id) {
+        bst_vec3 direction;
+        if (!t->star(t->star_user, id, &direction)) {
+            return false;
+        }
+        *slot = (cached_star){.id = id, .icrs = direction};
+    }
+    *icrs = slot->icrs;
+    return true;
+}
+
+/* The attitude of one frame and how well it is known. */
+typedef struct frame_attitude {
+    bst_attitude_fix fix;
+    bst_quat q_cam_from_gcrf;
+    double covariance_cam[3][3];
+    bool usable;
+} frame_attitude;
+
+static void solve_attitude(bst_tracker *t, const bst_detections *d, const bst_light *light,
+                           bst_attitude_solution *out) {
+    int count = 0;
+    for (int i = 0; i < d->count && count < MAX_STARS; i++) {
+        const bst_detection *item = &d->items[i];
+        bst_vec3 icrs;
+        if (item->label != BST_LABEL_STAR || item->star_id == 0 ||
+            (item->flags & (BST_DETECTION_EDGE | BST_DETECTION_BLEND)) ||
+            !find_star(t, item->star_id, &icrs)) {
+            continue;
+        }
+        t->stars[count++] =
+            (bst_attitude_star){.apparent_gcrf = bst_light_apparent_star(light, icrs),
+                                .x_px = item->x_px,
+                                .y_px = item->y_px,
+                                .cov_xx = item->cov_xx,
+                                .cov_xy = item->cov_xy,
+                                .cov_yy = item->cov_yy};
+    }
+    /* the stars were identified with this attitude: it is near */
+    bst_quat q = d->q_cam_from_gcrf;
+    bool given = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w > 0.5;
+    bst_attitude_solve(&t->camera, &t->attitude_params, given ? q : d->q_telemetry_from_gcrf,
+                       t->stars, count, out);
+}
+
+static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_light *light,
+                          int64_t tick, double dt_s, frame_attitude *out) {
+    memset(out, 0, sizeof *out);
+    bst_quat q_telemetry = bst_quat_unit(d->q_telemetry_from_gcrf);
+    bst_attitude_solution solution;
+    solve_attitude(t, d, light, &solution);
+    bst_attitude_error_predict(&t->error, &t->error_params, dt_s);
+    out->fix.tick = tick;
+    out->fix.stars = solution.stars_used;
+    out->fix.valid = solution.valid;
+    out->fix.rms_px = solution.rms_px;
+    if (solution.valid) {
+        out->q_cam_from_gcrf = solution.q_cam_from_gcrf;
+        memcpy(out->covariance_cam, solution.covariance, sizeof out->covariance_cam);
+        out->fix.error_cam_rad =
+            bst_quat_to_rotvec(bst_quat_mul(solution.q_cam_from_gcrf, bst_quat_conj(q_telemetry)));
+        (void)bst_attitude_error_update(&t->error, &t->error_params, q_telemetry,
+                                        out->fix.error_cam_rad, solution.covariance);
+    } else {
+        bst_vec3 rate;
+        bst_attitude_error_get(&t->error, &t->error_params, q_telemetry, &out->fix.error_cam_rad,
+                               &rate, out->covariance_cam);
+        out->q_cam_from_gcrf =
+            bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(out->fix.error_cam_rad), q_telemetry));
+    }
+    out->fix.q_cam_from_gcrf = out->q_cam_from_gcrf;
+    for (int i = 0; i < 3; i++) {
+        out->fix.sigma_rad[i] = sqrt(out->covariance_cam[i][i]);
+    }
+    out->usable = fmax(out->fix.sigma_rad[0], out->fix.sigma_rad[1]) <= t->max_attitude_sigma_rad;
+}
+
+/* A detection as a geometric direction with the covariance of centroid and attitude. */
+static bst_sky_measurement to_sky(const bst_tracker *t, const bst_detection *item,
+                                  const frame_attitude *attitude, const bst_light *light) {
+    bst_vec3 v = bst_camera_unproject(&t->camera, item->x_px, item->y_px);
+    bst_quat back = bst_quat_conj(attitude->q_cam_from_gcrf);
+    bst_vec3 apparent = bst_quat_rotate(back, v);
+    bst_sky_measurement m = {.direction = bst_light_unaberrate(light, apparent)};
+    bst_tangent axes = bst_tangent_at(m.direction);
+    double scale = bst_camera_scale_rad(&t->camera) * v.z; /* rad per px towards the field's edge */
+    double extra =
+        item->flags & (BST_DETECTION_BLEND | BST_DETECTION_EDGE) ? t->blend_variance_px2 : 0.0;
+    /* derivatives of the direction by x, y (px) and by rotation about camera x, y, z */
+    bst_vec3 unit[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, columns[5];
+    for (int i = 0; i < 2; i++) {
+        columns[i] = bst_vec3_scale(bst_tangent_project(v, unit[i]), scale);
+    }
+    for (int i = 0; i < 3; i++) {
+        columns[i + 2] = bst_vec3_cross(unit[i], v);
+    }
+    double j[2][5];
+    for (int i = 0; i < 5; i++) {
+        bst_vec3 g = bst_quat_rotate(back, columns[i]);
+        j[0][i] = bst_vec3_dot(g, axes.e1);
+        j[1][i] = bst_vec3_dot(g, axes.e2);
+    }
+    double c[5][5] = {{item->cov_xx + extra, item->cov_xy}, {item->cov_xy, item->cov_yy + extra}};
+    for (int i = 0; i < 3; i++) {
+        for (int k = 0; k < 3; k++) {
+            c[i + 2][k + 2] = attitude->covariance_cam[i][k];
+        }
+    }
+    for (int i = 0; i < 5; i++) {
+        for (int k = 0; k < 5; k++) {
+            m.cov_11 += j[0][i] * c[i][k] * j[0][k];
+            m.cov_12 += j[0][i] * c[i][k] * j[1][k];
+            m.cov_22 += j[1][i] * c[i][k] * j[1][k];
+        }
+    }
+    return m;
+}
+
+static int collect_objects(bst_tracker *t, const bst_detections *d, const frame_attitude *attitude,
+                           const bst_light *light, int *lost) {
+    int count = 0;
+    *lost = 0;
+    for (int i = 0; i < d->count; i++) {
+        const bst_detection *item = &d->items[i];
+        bool positive =
+            item->cov_xx > 0.0 && item->cov_xx * item->cov_yy > item->cov_xy * item->cov_xy;
+        if ((item->label != BST_LABEL_OBJECT && item->label != BST_LABEL_UNKNOWN) || !positive ||
+            !isfinite(item->x_px) || !isfinite(item->y_px)) {
+            continue;
+        }
+        if (count == t->max_detections) {
+            ++*lost;
+            continue;
+        }
+        double sigma = item->flux_e > 0.0 ? 1.0857 * item->flux_sigma_e / item->flux_e : INFINITY;
+        bool bright = isfinite(item->v_mag) && isfinite(sigma);
+        t->detections[count++] = (bst_mtt_detection){.sky = to_sky(t, item, attitude, light),
+                                                     .x_px = item->x_px,
+                                                     .y_px = item->y_px,
+                                                     .v_mag = bright ? item->v_mag : 0.0,
+                                                     .v_mag_sigma = bright ? sigma : INFINITY,
+                                                     .snr = item->snr};
+    }
+    return count;
+}
+
+typedef struct field_test {
+    const bst_tracker *tracker;
+    bst_quat q_cam_from_gcrf;
+    bst_light light;
+} field_test;
+
+static bool in_field(const void *user, bst_vec3 direction) {
+    const field_test *f = user;
+    const bst_camera *camera = &f->tracker->camera;
+    double x, y, margin = f->tracker->edge_margin_px;
+    bst_vec3 v = bst_quat_rotate(f->q_cam_from_gcrf, bst_light_aberrate(&f->light, direction));
+    return bst_camera_project(camera, v, &x, &y) && x >= margin && y >= margin &&
+           x <= (double)(camera->width_px - 1) - margin &&
+           y <= (double)(camera->height_px - 1) - margin;
+}
+
+static void add_event(bst_tracker *t, bst_tracker_event_kind kind, const bst_mtt_track *track) {
+    bst_tracker_event *event = &t->events[t->event_count++];
+    *event = (bst_tracker_event){.kind = kind};
+    if (track) {
+        event->track_id = track->id;
+        event->direction_gcrf = track->state.direction;
+        event->rate_gcrf_radps = track->state.rate_radps;
+        event->v_mag = track->v_mag;
+    }
+}
+
+static void choose_target(bst_tracker *t, const bst_tracker_cue *cue, double seconds) {
+    int count;
+    const bst_mtt_event *events = bst_mtt_events(t->mtt, &count);
+    for (int i = 0; i < count; i++) {
+        add_event(t,
+                  events[i].kind == BST_MTT_CONFIRMED ? BST_TRACKER_TRACK_CONFIRMED
+                                                      : BST_TRACKER_TRACK_LOST,
+                  &events[i].track);
+    }
+    int64_t before = t->target.id;
+    const bst_mtt_track *tracks = bst_mtt_tracks(t->mtt, &count);
+    bst_target_cue c = {.valid = cue->valid,
+                        .direction = cue->direction_gcrf,
+                        .rate_radps = cue->rate_gcrf_radps,
+                        .sigma_rad = cue->sigma_rad,
+                        .rate_sigma_radps = cue->rate_sigma_radps,
+                        .v_mag = cue->v_mag,
+                        .v_mag_sigma = cue->v_mag_sigma};
+    bst_target_step(&t->target, &t->target_params, &c, seconds, tracks, count);
+    if (t->target.id != before && before != 0) {
+        add_event(t, BST_TRACKER_TARGET_LOST, NULL);
+        t->events[t->event_count - 1].track_id = before;
+    }
+    if (t->target.id != before && t->target.id != 0) {
+        add_event(t, BST_TRACKER_TARGET_SELECTED, bst_mtt_find(t->mtt, t->target.id));
+    }
+}
+
+static void write_track(const bst_mtt_track *track, int64_t target_id, bst_track *out) {
+    *out = (bst_track){.id = track->id,
+                       .status = track->status,
+                       .target_of_interest = track->id == target_id,
+                       .direction_gcrf = track->state.direction,
+                       .rate_gcrf_radps = track->state.rate_radps,
+                       .v_mag = track->v_mag,
+                       .snr = track->snr,
+                       .hits = track->hits,
+                       .misses_in_row = track->misses_in_row,
+                       .first_tick = track->first_tick,
+                       .last_update_tick = track->last_update_tick,
+                       .x_px = track->x_px,
+                       .y_px = track->y_px};
+    memcpy(out->covariance, track->state.covariance, sizeof out->covariance);
+}
+
+/* 0 target, 1 confirmed, 2 tentative */
+static int rank(const bst_mtt_track *track, int64_t target_id) {
+    return track->id == target_id ? 0 : track->status == BST_TRACK_TENTATIVE ? 2 : 1;
+}
+
+static void write_outputs(bst_tracker *t, const bst_detections *d, const frame_attitude *attitude,
+                          const bst_quat *q_now, int detections_lost, bst_tracks *tracks,
+                          int track_capacity, bst_predictions *predictions,
+                          int prediction_capacity) {
+    int64_t tick = attitude->fix.tick;
+    bst_quat q = q_now ? *q_now : bst_quat_unit(d->q_telemetry_from_gcrf);
+    double p[3][3];
+    *tracks = (bst_tracks){.exposure_id = d->exposure_id,
+                           .tick = tick,
+                           .attitude = attitude->fix,
+                           .target_id = t->target.id,
+                           .lost = bst_mtt_lost(t->mtt) + detections_lost};
+    *predictions = (bst_predictions){.tick = tick};
+    bst_attitude_error_get(&t->error, &t->error_params, q, &predictions->attitude_error_cam_rad,
+                           &predictions->attitude_error_rate_cam_radps, p);
+    predictions->attitude_valid =
+        t->error.started && sqrt(fmax(p[0][0], p[1][1])) <= 10.0 * t->max_attitude_sigma_rad;
+    int count;
+    const bst_mtt_track *all = bst_mtt_tracks(t->mtt, &count);
+    for (int r = 0; r < 3; r++) {
+        for (int i = 0; i < count; i++) {
+            if (rank(&all[i], t->target.id) != r) {
+                continue;
+            }
+            if (tracks->count < track_capacity) {
+                write_track(&all[i], t->target.id, &tracks->items[tracks->count++]);
+            } else {
+                tracks->lost++;
+            }
+            if (r == 2) {
+                continue;
+            }
+            if (predictions->count < prediction_capacity) {
+                const bst_sky_state *s = &all[i].state;
+                predictions->items[predictions->count++] = (bst_prediction){
+                    .track_id = all[i].id,
+                    .direction_gcrf = s->direction,
+                    .rate_gcrf_radps = s->rate_radps,
+                    .sigma_rad = sqrt(fmax(s->covariance[0][0], s->covariance[1][1])),
+                    .target_of_interest = r == 0};
+            } else {
+                predictions->lost++;
+            }
+        }
+    }
+}
+
+static int64_t mid_tick(const bst_detections *d) {
+    return d->start_tick + (d->end_tick - d->start_tick) / 2;
+}
+
+bst_tracker_outcome bst_tracker_check(const bst_tracker *t, const bst_detections *d) {
+    if (t->started && d->exposure_id == t->last_exposure_id) {
+        return BST_TRACKER_DUPLICATE;
+    }
+    return t->started && mid_tick(d) <= t->last_tick ? BST_TRACKER_BACKWARDS : BST_TRACKER_USED;
+}
+
+bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *input,
+                                     bst_tracks *tracks, int track_capacity,
+                                     bst_predictions *predictions, int prediction_capacity) {
+    const bst_detections *d = input->detections;
+    int64_t tick = mid_tick(d);
+    bst_tracker_outcome refusal = bst_tracker_check(t, d);
+    if (refusal != BST_TRACKER_USED) {
+        return refusal;
+    }
+    double seconds = (double)tick / t->tick_rate_hz;
+    double dt = t->started ? (double)(tick - t->last_tick) / t->tick_rate_hz : 0.0;
+    bst_light light = {.velocity_mps = input->nav->velocity_bary_mps, .sun_m = input->nav->sun_m};
+    frame_attitude attitude;
+    find_attitude(t, d, &light, tick, dt, &attitude);
+    t->event_count = 0;
+    field_test field = {.tracker = t, .q_cam_from_gcrf = attitude.q_cam_from_gcrf, .light = light};
+    bst_mtt_frame frame = {.tick = tick,
+                           .seconds = seconds,
+                           .detections = t->detections,
+                           .in_field = in_field,
+                           .user = &field,
+                           .cue_valid = input->cue.valid,
+                           .cue_before_valid = t->cue_before.valid,
+                           .cue_direction = input->cue.direction_gcrf,
+                           .cue_rate_radps = input->cue.rate_gcrf_radps,
+                           .cue_before_direction = t->cue_before.direction_gcrf,
+                           .cue_before_rate_radps = t->cue_before.rate_gcrf_radps,
+                           .cue_rate_sigma_radps = input->cue.rate_sigma_radps};
+    int detections_lost = 0;
+    if (attitude.usable) {
+        frame.count = collect_objects(t, d, &attitude, &light, &detections_lost);
+        bst_mtt_step(t->mtt, &frame);
+    } else {
+        bst_mtt_skip(t->mtt, &frame);
+        if (!t->attitude_was_lost) {
+            add_event(t, BST_TRACKER_ATTITUDE_LOST, NULL);
+        }
+    }
+    t->attitude_was_lost = !attitude.usable;
+    choose_target(t, &input->cue, seconds);
+    write_outputs(t, d, &attitude, input->q_telemetry_now, detections_lost, tracks, track_capacity,
+                  predictions, prediction_capacity);
+    t->cue_before = input->cue;
+    t->started = true;
+    t->last_exposure_id = d->exposure_id;
+    t->last_tick = tick;
+    return attitude.usable ? BST_TRACKER_USED : BST_TRACKER_NO_ATTITUDE;
+}

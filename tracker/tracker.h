@@ -1,0 +1,98 @@
+/* The tracker: one frame's detections in, tracks and predictions out.
+ *
+ * Attitude from identified stars, the other detections as inertial directions, multi-target
+ * tracking, the target of interest. It sees detections, telemetry, the onboard catalogue and the
+ * cue; never the truth. */
+#ifndef BST_TRACKER_TRACKER_H
+#define BST_TRACKER_TRACKER_H
+
+#include "sim/core/config.h"
+#include "sim/core/messages.h"
+#include "sim/world/camera.h"
+
+/* Values of a scenario's tracker block; the table says what each is. */
+typedef struct bst_tracker_config {
+    double star_floor_px, star_reject_chi2, max_attitude_sigma_px, max_roll_sigma_arcsec;
+    double drift_sigma_arcsec_per_s, drift_noise_arcsec_per_s15, jitter_px, telemetry_sigma_arcsec;
+    double process_noise_arcsec_per_s15, gate_chi2, detection_probability, false_alarms_per_frame;
+    int64_t confirm_hits, confirm_frames;
+    double confirm_score, max_rate_arcsec_per_s, cue_rate_margin_arcsec_per_s, initiation_gap_s;
+    int64_t max_misses;
+    double max_coast_s, max_sigma_arcsec;
+    double merge_px, merge_floor_px, blend_sigma_px, edge_margin_px;
+    double feed_forward_deg;
+    double target_direction_chi2, target_rate_chi2, target_magnitude_chi2, target_release_chi2,
+        target_rate_floor_arcsec_per_s, target_max_rate_sigma_arcsec_per_s, target_memory_s;
+    int64_t max_tracks, max_detections;
+} bst_tracker_config;
+
+extern const bst_config_desc bst_tracker_config_table[];
+
+/* Looks up a catalogue star: unit direction, ICRS, proper motion applied. False when unknown. */
+typedef bool (*bst_tracker_star_fn)(void *user, uint32_t star_id, bst_vec3 *icrs);
+
+/* The cue at one time, as bst_cue of sim/world has it. */
+typedef struct bst_tracker_cue {
+    bool valid;
+    bst_vec3 direction_gcrf, rate_gcrf_radps;
+    double sigma_rad, rate_sigma_radps;
+    double v_mag, v_mag_sigma;
+} bst_tracker_cue;
+
+typedef struct bst_tracker_input {
+    const bst_detections *detections;
+    const bst_nav_telemetry *nav; /* required */
+    /* attitude telemetry now, for the axes of the predicted attitude error; NULL: that of the
+     * detections' exposure */
+    const bst_quat *q_telemetry_now;
+    /* the cue at the middle of the exposure */
+    bst_tracker_cue cue;
+} bst_tracker_input;
+
+typedef enum bst_tracker_event_kind {
+    BST_TRACKER_TRACK_CONFIRMED,
+    BST_TRACKER_TRACK_LOST,
+    BST_TRACKER_TARGET_SELECTED,
+    BST_TRACKER_TARGET_LOST,
+    BST_TRACKER_ATTITUDE_LOST, /* no attitude good enough to measure directions with */
+} bst_tracker_event_kind;
+
+typedef struct bst_tracker_event {
+    bst_tracker_event_kind kind;
+    int64_t track_id; /* 0 where none is meant */
+    bst_vec3 direction_gcrf, rate_gcrf_radps;
+    double v_mag;
+} bst_tracker_event;
+
+/* What became of a frame. */
+typedef enum bst_tracker_outcome {
+    BST_TRACKER_USED = 0,
+    BST_TRACKER_NO_ATTITUDE, /* outputs written, tracks only predicted */
+    BST_TRACKER_DUPLICATE,   /* this exposure was seen before: nothing done */
+    BST_TRACKER_BACKWARDS,   /* not later than the frame before: nothing done */
+} bst_tracker_outcome;
+
+typedef struct bst_tracker bst_tracker;
+
+/* `camera` and `star_user` outlive the tracker. The caller frees it. All memory is taken here. */
+bst_status bst_tracker_create(bst_ctx *ctx, const bst_tracker_config *config,
+                              const bst_camera *camera, int64_t tick_rate_hz,
+                              bst_tracker_star_fn star, void *star_user,
+                              bst_tracker **out) BST_MUST_CHECK;
+void bst_tracker_free(bst_tracker *tracker);
+
+/* What bst_tracker_step would answer before it looks at the content: BST_TRACKER_USED, or why the
+ * frame is refused. */
+bst_tracker_outcome bst_tracker_check(const bst_tracker *tracker, const bst_detections *detections);
+
+/* Takes one frame and, unless it is a duplicate or late, fills `tracks` (room for track_capacity
+ * items) and `predictions`. The target of interest comes first, then confirmed tracks, then
+ * tentative ones, each by identity; what finds no room is counted in their `lost`. */
+bst_tracker_outcome bst_tracker_step(bst_tracker *tracker, const bst_tracker_input *input,
+                                     bst_tracks *tracks, int track_capacity,
+                                     bst_predictions *predictions, int prediction_capacity);
+
+/* Events of the latest frame that was used; lent until the next step. */
+const bst_tracker_event *bst_tracker_events(const bst_tracker *tracker, int *count);
+
+#endif
