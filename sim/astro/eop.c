@@ -120,8 +120,8 @@ static bst_status read_file(bst_ctx *ctx, FILE *file, const char *path, bst_eop 
         if (!numeric && (eop->count == 0 || *text == '#' || *text == '\0')) {
             continue; /* the heading, a comment */
         }
-        int mjd;
-        bst_eop_values row;
+        int mjd = 0;
+        bst_eop_values row = {0};
         bst_status status = read_row(ctx, line, &mjd, &row);
         if (status == BST_OK) {
             status = append_row(ctx, eop, &capacity, mjd, row);

@@ -20,25 +20,26 @@ static bst_mat3 turn_z_mul(double angle_rad, const bst_mat3 *a) {
     return r;
 }
 
-static bst_status ut1_at(bst_ctx *ctx, bst_time t, const bst_eop_values *eop, double *ut1,
-                         double *ut2) {
-    double utc1, utc2, fraction, tai_minus_utc_s;
+/* TAI to UT1 in seconds at t. */
+static bst_status ut1_minus_tai(bst_ctx *ctx, bst_time t, const bst_eop_values *eop,
+                                double *seconds) {
+    double utc1, utc2, fraction, tai_minus_utc_s = 0.0;
     int year, month, day;
     bst_time_utc(t, &utc1, &utc2);
     if (eraJd2cal(utc1, utc2, &year, &month, &day, &fraction) != 0 ||
         eraDat(year, month, day, fraction, &tai_minus_utc_s) < 0) {
         return bst_fail(ctx, BST_ERR_RANGE, "no UTC is defined at JD %.6f", utc1 + utc2);
     }
-    *ut1 = t.jd1;
-    *ut2 = t.jd2 + (eop->ut1_minus_utc_s - tai_minus_utc_s) / ERFA_DAYSEC;
+    *seconds = eop->ut1_minus_utc_s - tai_minus_utc_s;
     return BST_OK;
 }
 
 bst_status bst_earth_parts_at(bst_ctx *ctx, const bst_eop *eop, bst_time t, bst_earth_parts *out) {
     bst_eop_values values;
-    double tt1, tt2, ut1, ut2, m[3][3];
+    double tt1, tt2, ut1_minus_tai_s = 0.0, m[3][3];
     BST_TRY(bst_eop_at(ctx, eop, t, &values));
-    BST_TRY(ut1_at(ctx, t, &values, &ut1, &ut2));
+    BST_TRY(ut1_minus_tai(ctx, t, &values, &ut1_minus_tai_s));
+    double ut1 = t.jd1, ut2 = t.jd2 + ut1_minus_tai_s / ERFA_DAYSEC;
     bst_time_tt(t, &tt1, &tt2);
     double tio_rad = eraSp00(tt1, tt2);
     eraC2i06a(tt1, tt2, m);

@@ -90,6 +90,8 @@ bst_sgp4_error bst_sgp4_propagate(const bst_sgp4 *s, double minutes, double posi
     a *= root_a_ratio * root_a_ratio;
     x.e -= e_loss;
     x.m += l_gain;
+    /* Summed and wrapped as the reference does: after years the rounding of this sum, at perigee of
+     * an eccentric orbit, is the largest of all. */
     x.m = fmod(x.m + x.argp + x.raan, BST_SGP4_TWO_PI) - x.argp - x.raan;
     if (!(x.e < 1.0 && x.e >= -0.001)) {
         return BST_SGP4_MEAN_ECCENTRICITY;

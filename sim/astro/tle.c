@@ -1,39 +1,18 @@
-#include "sim/astro/tle.h"
-
-#include <errno.h>
+/* One two-line element set: columns to elements. */
 #include <stdint.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
+#include "sim/astro/tle_internal.h"
 #include "sim/core/vec.h"
 
 #define LINE_CHARS 69
-#define MAX_FILE_BYTES ((size_t)1 << 30)
 #define QUOTE_BYTES 160
-
-/* A line of text: not terminated, without its line end and trailing white space. */
-typedef struct text_line {
-    const char *text;
-    size_t length;
-    int number; /* in the file; 0 outside a file */
-} text_line;
-
-/* Where messages point. */
-typedef struct reader {
-    bst_ctx *ctx;
-    const char *name; /* of the file; NULL outside a file */
-    bst_elements *sets;
-    int count, capacity;
-    int skipped; /* bad sets */
-    int others;  /* sets of other satellites than the one asked for */
-} reader;
 
 /* A run of columns of one line of a set. Columns count from 1, as the format is documented. */
 typedef struct field {
-    const reader *r;
-    const text_line *line;
+    const bst_tle_source *source;
+    const bst_tle_line *line;
     int first, last;
     const char *what;
 } field;
@@ -66,17 +45,17 @@ static void quote(const char *text, size_t length, char out[QUOTE_BYTES]) {
     out[used] = '\0';
 }
 
-/* "file:12" or, outside a file, "line 1" by the line's own first character's role. */
-static bst_status fail_at(const reader *r, const text_line *line, const char *problem,
-                          const char *found, size_t found_length, const char *expected) {
+bst_status bst_tle_fail_at(const bst_tle_source *source, const bst_tle_line *line,
+                           const char *problem, const char *found, size_t found_length,
+                           const char *expected) {
     char quoted[QUOTE_BYTES];
     quote(found, found_length, quoted);
-    if (r->name) {
-        return bst_fail(r->ctx, BST_ERR_FORMAT, "%.400s:%d: %s (found %s, expected %s)", r->name,
-                        line->number, problem, quoted, expected);
+    if (source->name) {
+        return bst_fail(source->ctx, BST_ERR_FORMAT, "%.400s:%d: %s (found %s, expected %s)",
+                        source->name, line->number, problem, quoted, expected);
     }
-    return bst_fail(r->ctx, BST_ERR_FORMAT, "line %d: %s (found %s, expected %s)", line->number,
-                    problem, quoted, expected);
+    return bst_fail(source->ctx, BST_ERR_FORMAT, "line %d: %s (found %s, expected %s)",
+                    line->number, problem, quoted, expected);
 }
 
 static bst_status fail_field(const field *f, const char *problem, const char *expected) {
@@ -86,7 +65,8 @@ static bst_status fail_field(const field *f, const char *problem, const char *ex
     } else {
         snprintf(text, sizeof text, "columns %d-%d: %s %s", f->first, f->last, f->what, problem);
     }
-    return fail_at(f->r, f->line, text, field_text(f), (size_t)field_length(f), expected);
+    return bst_tle_fail_at(f->source, f->line, text, field_text(f), (size_t)field_length(f),
+                           expected);
 }
 
 static bool is_digit(char c) {
@@ -233,8 +213,7 @@ static bst_status read_eccentricity(const field *f, double *out) {
     return BST_OK;
 }
 
-/* Five digits, or Alpha-5: a letter for the two leading digits 10 to 33, without I and O. */
-static bool decode_number(const char *text, int *out) {
+bool bst_tle_decode_number(const char *text, int *out) {
     static const char letters[] = "ABCDEFGHJKLMNPQRSTUVWXYZ";
     int value = 0, i = 0;
     while (i < 4 && text[i] == ' ') {
@@ -256,7 +235,7 @@ static bool decode_number(const char *text, int *out) {
 }
 
 static bst_status read_number(const field *f, int *out) {
-    if (!decode_number(field_text(f), out)) {
+    if (!bst_tle_decode_number(field_text(f), out)) {
         return fail_field(f, "is not one",
                           "5 digits, or Alpha-5: a letter other than I and O and 4 digits");
     }
@@ -264,9 +243,10 @@ static bst_status read_number(const field *f, int *out) {
 }
 
 /* Year of two digits and day of the year with fraction, as a Julian date in two parts. */
-static bst_status read_epoch(const reader *r, const text_line *line, bst_elements *out) {
-    field year_field = {r, line, 19, 20, "epoch year"};
-    field day_field = {r, line, 21, 32, "epoch day"};
+static bst_status read_epoch(const bst_tle_source *source, const bst_tle_line *line,
+                             bst_elements *out) {
+    field year_field = {source, line, 19, 20, "epoch year"};
+    field day_field = {source, line, 21, 32, "epoch day"};
     const char *y = field_text(&year_field);
     if (!(is_digit(y[1]) && (is_digit(y[0]) || y[0] == ' '))) {
         return fail_field(&year_field, "is not a number", "2 digits");
@@ -293,7 +273,7 @@ static bst_status read_epoch(const reader *r, const text_line *line, bst_element
 }
 
 /* What both lines have: length, characters, checksum and blank columns. */
-static bst_status check_line(const reader *r, const text_line *line, char role,
+static bst_status check_line(const bst_tle_source *source, const bst_tle_line *line, char role,
                              const int *blank_columns) {
     for (size_t i = 0; i < line->length; i++) {
         unsigned char c = (unsigned char)line->text[i];
@@ -301,28 +281,29 @@ static bst_status check_line(const reader *r, const text_line *line, char role,
             char problem[80];
             snprintf(problem, sizeof problem, "column %zu: character is not printable ASCII",
                      i + 1);
-            return fail_at(r, line, problem, line->text + i, 1, "letters, digits, signs, blanks");
+            return bst_tle_fail_at(source, line, problem, line->text + i, 1,
+                                   "letters, digits, signs, blanks");
         }
     }
     if (line->length < LINE_CHARS) {
         char problem[80];
         snprintf(problem, sizeof problem, "line %c of the set is cut short at %zu characters", role,
                  line->length);
-        return fail_at(r, line, problem, line->text, line->length, "69 characters");
+        return bst_tle_fail_at(source, line, problem, line->text, line->length, "69 characters");
     }
     if (line->length > LINE_CHARS) {
         char problem[80];
         snprintf(problem, sizeof problem, "line %c of the set goes on after column 69", role);
-        return fail_at(r, line, problem, line->text + LINE_CHARS, line->length - LINE_CHARS,
-                       "69 characters");
+        return bst_tle_fail_at(source, line, problem, line->text + LINE_CHARS,
+                               line->length - LINE_CHARS, "69 characters");
     }
     if (line->text[0] != role) {
-        field f = {r, line, 1, 1, "line number"};
+        field f = {source, line, 1, 1, "line number"};
         return fail_field(&f, "is wrong", role == '1' ? "1" : "2");
     }
     for (const int *column = blank_columns; *column; column++) {
         if (line->text[*column - 1] != ' ') {
-            field f = {r, line, *column, *column, "separator"};
+            field f = {source, line, *column, *column, "separator"};
             return fail_field(&f, "is not blank: the line's columns are shifted", "a blank");
         }
     }
@@ -333,13 +314,13 @@ static bst_status check_line(const reader *r, const text_line *line, char role,
     }
     char expected[2] = {(char)('0' + sum % 10), '\0'};
     if (line->text[LINE_CHARS - 1] != expected[0]) {
-        field f = {r, line, LINE_CHARS, LINE_CHARS, "checksum"};
+        field f = {source, line, LINE_CHARS, LINE_CHARS, "checksum"};
         return fail_field(&f, "is wrong: a character of the line was changed", expected);
     }
     return BST_OK;
 }
 
-static void copy_trimmed(const char *text, size_t length, char *out, size_t out_bytes) {
+void bst_tle_copy_trimmed(const char *text, size_t length, char *out, size_t out_bytes) {
     while (length > 0 && *text == ' ') {
         text++;
         length--;
@@ -352,44 +333,47 @@ static void copy_trimmed(const char *text, size_t length, char *out, size_t out_
     out[length] = '\0';
 }
 
-static bst_status parse_line1(const reader *r, const text_line *l, bst_elements *out) {
+static bst_status parse_line1(const bst_tle_source *source, const bst_tle_line *l,
+                              bst_elements *out) {
     static const int blanks[] = {2, 9, 18, 33, 44, 53, 62, 64, 0};
-    BST_TRY(check_line(r, l, '1', blanks));
+    BST_TRY(check_line(source, l, '1', blanks));
     int ephemeris_type;
-    BST_TRY(read_number(&(field){r, l, 3, 7, "catalogue number"}, &out->norad));
-    copy_trimmed(l->text + 9, 8, out->designator, sizeof out->designator);
-    BST_TRY(read_epoch(r, l, out));
-    BST_TRY(read_decimal(&(field){r, l, 34, 43, "first derivative of mean motion"}, -1e3, 1e3,
+    BST_TRY(read_number(&(field){source, l, 3, 7, "catalogue number"}, &out->norad));
+    bst_tle_copy_trimmed(l->text + 9, 8, out->designator, sizeof out->designator);
+    BST_TRY(read_epoch(source, l, out));
+    BST_TRY(read_decimal(&(field){source, l, 34, 43, "first derivative of mean motion"}, -1e3, 1e3,
                          "the form \"-.00000123\"", &out->ndot_rev_day2));
-    BST_TRY(read_implied(&(field){r, l, 45, 52, "second derivative of mean motion"},
+    BST_TRY(read_implied(&(field){source, l, 45, 52, "second derivative of mean motion"},
                          &out->nddot_rev_day3));
-    BST_TRY(read_implied(&(field){r, l, 54, 61, "B*"}, &out->bstar));
-    BST_TRY(read_count(&(field){r, l, 63, 63, "ephemeris type"}, &ephemeris_type));
-    return read_count(&(field){r, l, 65, 68, "element set number"}, &out->element_set);
+    BST_TRY(read_implied(&(field){source, l, 54, 61, "B*"}, &out->bstar));
+    BST_TRY(read_count(&(field){source, l, 63, 63, "ephemeris type"}, &ephemeris_type));
+    return read_count(&(field){source, l, 65, 68, "element set number"}, &out->element_set);
 }
 
-static bst_status parse_line2(const reader *r, const text_line *l, bst_elements *out) {
+static bst_status parse_line2(const bst_tle_source *source, const bst_tle_line *l,
+                              bst_elements *out) {
     static const int blanks[] = {2, 8, 17, 26, 34, 43, 52, 0};
     const char *angle = "0 to 360 degrees";
-    BST_TRY(check_line(r, l, '2', blanks));
-    int number;
-    field number_field = {r, l, 3, 7, "catalogue number"};
+    BST_TRY(check_line(source, l, '2', blanks));
+    int number = 0;
+    field number_field = {source, l, 3, 7, "catalogue number"};
     BST_TRY(read_number(&number_field, &number));
     if (number != out->norad) {
         char expected[40];
         snprintf(expected, sizeof expected, "that of line 1, which is %d", out->norad);
         return fail_field(&number_field, "is of another satellite", expected);
     }
-    double degrees[4], rev_per_day;
-    BST_TRY(read_decimal(&(field){r, l, 9, 16, "inclination"}, 0.0, 180.0, "0 to 180 degrees",
+    double degrees[4] = {0}, rev_per_day = 0.0;
+    BST_TRY(read_decimal(&(field){source, l, 9, 16, "inclination"}, 0.0, 180.0, "0 to 180 degrees",
                          &degrees[0]));
-    BST_TRY(read_decimal(&(field){r, l, 18, 25, "right ascension of the node"}, 0.0, 360.0, angle,
-                         &degrees[1]));
-    BST_TRY(read_eccentricity(&(field){r, l, 27, 33, "eccentricity"}, &out->eccentricity));
-    BST_TRY(read_decimal(&(field){r, l, 35, 42, "argument of perigee"}, 0.0, 360.0, angle,
+    BST_TRY(read_decimal(&(field){source, l, 18, 25, "right ascension of the node"}, 0.0, 360.0,
+                         angle, &degrees[1]));
+    BST_TRY(read_eccentricity(&(field){source, l, 27, 33, "eccentricity"}, &out->eccentricity));
+    BST_TRY(read_decimal(&(field){source, l, 35, 42, "argument of perigee"}, 0.0, 360.0, angle,
                          &degrees[2]));
-    BST_TRY(read_decimal(&(field){r, l, 44, 51, "mean anomaly"}, 0.0, 360.0, angle, &degrees[3]));
-    field motion = {r, l, 53, 63, "mean motion"};
+    BST_TRY(
+        read_decimal(&(field){source, l, 44, 51, "mean anomaly"}, 0.0, 360.0, angle, &degrees[3]));
+    field motion = {source, l, 53, 63, "mean motion"};
     BST_TRY(read_decimal(&motion, 0.0, 1e4, "revolutions per day above 0", &rev_per_day));
     if (!(rev_per_day > 0.0)) {
         return fail_field(&motion, "is not above 0", "revolutions per day above 0");
@@ -399,17 +383,17 @@ static bst_status parse_line2(const reader *r, const text_line *l, bst_elements 
     out->arg_perigee_rad = degrees[2] * BST_DEG_RAD;
     out->mean_anomaly_rad = degrees[3] * BST_DEG_RAD;
     out->mean_motion_radpmin = rev_per_day * (2.0 * BST_PI / 1440.0);
-    return read_count(&(field){r, l, 64, 68, "revolution number"}, &out->revolution);
+    return read_count(&(field){source, l, 64, 68, "revolution number"}, &out->revolution);
 }
 
-static bst_status parse_set(const reader *r, const text_line *line1, const text_line *line2,
-                            bst_elements *out) {
+bst_status bst_tle_parse_set(const bst_tle_source *source, const bst_tle_line *line1,
+                             const bst_tle_line *line2, bst_elements *out) {
     memset(out, 0, sizeof *out);
-    BST_TRY(parse_line1(r, line1, out));
-    return parse_line2(r, line2, out);
+    BST_TRY(parse_line1(source, line1, out));
+    return parse_line2(source, line2, out);
 }
 
-static void trim_end(text_line *line) {
+void bst_tle_trim_end(bst_tle_line *line) {
     while (line->length > 0) {
         char c = line->text[line->length - 1];
         if (c != ' ' && c != '\t' && c != '\r' && c != '\n') {
@@ -420,226 +404,9 @@ static void trim_end(text_line *line) {
 }
 
 bst_status bst_tle_parse(bst_ctx *ctx, const char *line1, const char *line2, bst_elements *out) {
-    reader r = {.ctx = ctx};
-    text_line first = {line1, strlen(line1), 1}, second = {line2, strlen(line2), 2};
-    trim_end(&first);
-    trim_end(&second);
-    return parse_set(&r, &first, &second, out);
-}
-
-static bst_status append(reader *r, const bst_elements *set) {
-    if (r->count == r->capacity) {
-        int capacity = r->capacity ? 2 * r->capacity : 16;
-        bst_elements *sets = realloc(r->sets, (size_t)capacity * sizeof *sets);
-        if (!sets) {
-            return bst_fail(r->ctx, BST_ERR_MEMORY, "%.400s: no memory for %d element sets",
-                            r->name, capacity);
-        }
-        r->sets = sets;
-        r->capacity = capacity;
-    }
-    r->sets[r->count++] = *set;
-    return BST_OK;
-}
-
-/* A format error stops reading, or is logged and counted where the caller asked for that. */
-static bst_status tolerate(reader *r, const bst_tle_options *options, bst_status status) {
-    if (status == BST_ERR_FORMAT && options->skip_bad_sets) {
-        r->skipped++;
-        bst_log(r->ctx, BST_LOG_WARNING, "%s; element set left out", r->ctx ? r->ctx->message : "");
-        if (r->ctx) {
-            r->ctx->message[0] = '\0';
-        }
-        return BST_OK;
-    }
-    return status;
-}
-
-static bst_status read_set(reader *r, const bst_tle_options *options, const text_line *name,
-                           const text_line *line1, const text_line *line2) {
-    int number;
-    if (options->norad != 0 && line1->length >= 7 && decode_number(line1->text + 2, &number) &&
-        number != options->norad) {
-        r->others++;
-        return BST_OK;
-    }
-    bst_elements set;
-    BST_TRY(parse_set(r, line1, line2, &set));
-    if (name->text) {
-        bool prefixed = name->length >= 2 && name->text[0] == '0' && name->text[1] == ' ';
-        size_t skip = prefixed ? 2 : 0;
-        copy_trimmed(name->text + skip, name->length - skip, set.name, sizeof set.name);
-    }
-    return append(r, &set);
-}
-
-static bst_status check_name(const reader *r, const text_line *name) {
-    for (size_t i = 0; i < name->length; i++) {
-        unsigned char c = (unsigned char)name->text[i];
-        if (c < 0x20 || c >= 0x7f) {
-            return fail_at(r, name, "name has a character that is not printable ASCII", name->text,
-                           name->length, "a plain ASCII name or line 1 of an element set");
-        }
-    }
-    return BST_OK;
-}
-
-/* Walks over the lines; `name` and `line1` wait for what must follow them. */
-static bst_status read_lines(reader *r, const char *data, size_t bytes,
-                             const bst_tle_options *options) {
-    const text_line none = {NULL, 0, 0};
-    text_line name = none, line1 = none, line = none;
-    const char *next = data, *end = data + bytes;
-    if (bytes >= 3 && memcmp(data, "\xEF\xBB\xBF", 3) == 0) {
-        next += 3;
-    }
-    int number = 0;
-    while (next < end) {
-        const char *stop = memchr(next, '\n', (size_t)(end - next));
-        stop = stop ? stop : end;
-        line = (text_line){next, (size_t)(stop - next), ++number};
-        next = stop < end ? stop + 1 : end;
-        trim_end(&line);
-        if (line.length == 0 || line.text[0] == '#') {
-            continue;
-        }
-        bool blank_second = line.length >= 2 && line.text[1] == ' ';
-        bool is_line1 = blank_second && line.text[0] == '1';
-        bool is_line2 = blank_second && line.text[0] == '2';
-        if (line1.text && !is_line2) {
-            BST_TRY(tolerate(r, options,
-                             fail_at(r, &line, "element set has no line 2", line.text, line.length,
-                                     "a line that starts with \"2 \"")));
-            line1 = name = none;
-        }
-        if (is_line2) {
-            if (line1.text) {
-                BST_TRY(tolerate(r, options, read_set(r, options, &name, &line1, &line)));
-            } else {
-                BST_TRY(tolerate(r, options,
-                                 fail_at(r, &line, "element set has no line 1", line.text,
-                                         line.length, "a line that starts with \"1 \" before it")));
-            }
-            line1 = name = none;
-        } else if (is_line1) {
-            line1 = line;
-        } else {
-            if (name.text) {
-                BST_TRY(
-                    tolerate(r, options,
-                             fail_at(r, &line, "no element set follows the name before this line",
-                                     line.text, line.length, "a line that starts with \"1 \"")));
-            }
-            bst_status status = tolerate(r, options, check_name(r, &line));
-            if (status != BST_OK) {
-                return status;
-            }
-            name = line;
-        }
-    }
-    if (line1.text || name.text) {
-        const text_line *last = line1.text ? &line1 : &name;
-        return tolerate(
-            r, options,
-            fail_at(r, last, "the file ends within an element set", last->text, last->length,
-                    line1.text ? "a line that starts with \"2 \" after it"
-                               : "a line that starts with \"1 \" after it"));
-    }
-    return BST_OK;
-}
-
-bst_status bst_tle_read_buffer(bst_ctx *ctx, const char *name, const char *data, size_t bytes,
-                               const bst_tle_options *options, bst_elements **out, int *count) {
-    const bst_tle_options defaults = {0};
-    options = options ? options : &defaults;
-    *out = NULL;
-    *count = 0;
-    reader r = {.ctx = ctx, .name = name};
-    bst_status status = bytes > 0 ? read_lines(&r, data, bytes, options) : BST_OK;
-    if (status == BST_OK && r.count == 0) {
-        if (bytes == 0) {
-            status = bst_fail(ctx, BST_ERR_FORMAT,
-                              "%.400s:1: the file is empty (expected two-line element sets)", name);
-        } else if (r.others > 0) {
-            status = bst_fail(ctx, BST_ERR_NOT_FOUND,
-                              "%.400s: no element set of satellite %d, only %d of others", name,
-                              options->norad, r.others);
-        } else {
-            status = bst_fail(ctx, BST_ERR_FORMAT,
-                              "%.400s:1: the file holds no element set that can be used (%d bad "
-                              "ones left out; expected two-line element sets)",
-                              name, r.skipped);
-        }
-    }
-    if (status != BST_OK) {
-        free(r.sets);
-        return status;
-    }
-    *out = r.sets;
-    *count = r.count;
-    return BST_OK;
-}
-
-static bst_status read_stream(bst_ctx *ctx, const char *path, FILE *file, char **data,
-                              size_t *bytes) {
-    size_t capacity = 0, used = 0;
-    char *buffer = NULL;
-    for (;;) {
-        if (used == capacity) {
-            capacity = capacity ? 2 * capacity : 65536;
-            char *larger = capacity <= MAX_FILE_BYTES ? realloc(buffer, capacity) : NULL;
-            if (!larger) {
-                free(buffer);
-                return capacity > MAX_FILE_BYTES
-                           ? bst_fail(ctx, BST_ERR_IO,
-                                      "%.400s: over 1 GiB, too large for a file of element sets",
-                                      path)
-                           : bst_fail(ctx, BST_ERR_MEMORY, "%.400s: no memory for %zu bytes", path,
-                                      capacity);
-            }
-            buffer = larger;
-        }
-        size_t got = fread(buffer + used, 1, capacity - used, file);
-        used += got;
-        if (got == 0) {
-            break;
-        }
-    }
-    if (ferror(file)) {
-        int error = errno;
-        free(buffer);
-        return bst_fail(ctx, BST_ERR_IO, "%.400s: cannot be read: %s", path, strerror(error));
-    }
-    *data = buffer;
-    *bytes = used;
-    return BST_OK;
-}
-
-bst_status bst_tle_load(bst_ctx *ctx, const char *path, const bst_tle_options *options,
-                        bst_elements **out, int *count) {
-    *out = NULL;
-    *count = 0;
-    struct stat info;
-    FILE *file = fopen(path, "rb");
-    if (!file) {
-        int error = errno;
-        return bst_fail(ctx, error == ENOENT ? BST_ERR_NOT_FOUND : BST_ERR_IO,
-                        "%.400s: cannot be opened: %s; give a file of two-line element sets", path,
-                        strerror(error));
-    }
-    bst_status status = BST_OK;
-    char *data = NULL;
-    size_t bytes = 0;
-    if (fstat(fileno(file), &info) == 0 && S_ISDIR(info.st_mode)) {
-        status = bst_fail(ctx, BST_ERR_IO,
-                          "%.400s: is a directory; give a file of two-line element sets", path);
-    } else {
-        status = read_stream(ctx, path, file, &data, &bytes);
-    }
-    fclose(file);
-    if (status == BST_OK) {
-        status = bst_tle_read_buffer(ctx, path, data, bytes, options, out, count);
-    }
-    free(data);
-    return status;
+    bst_tle_source source = {ctx, NULL};
+    bst_tle_line first = {line1, strlen(line1), 1}, second = {line2, strlen(line2), 2};
+    bst_tle_trim_end(&first);
+    bst_tle_trim_end(&second);
+    return bst_tle_parse_set(&source, &first, &second, out);
 }

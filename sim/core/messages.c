@@ -8,23 +8,25 @@ static void release_frame(void *payload) {
     message->frame = NULL;
 }
 
+#define HEADER_ONLY(name, kind, header) \
+    { name, kind, sizeof(header), 0, false, NULL }
+#define WITH_ITEMS(name, kind, header, item, in_place) \
+    { name, kind, sizeof(header), sizeof(item), in_place, NULL }
+
 static const bst_channel_type types[] = {
-    {BST_CHANNEL_SENSOR_COMMAND, BST_CHANNEL_LATEST, sizeof(bst_sensor_command), 0, NULL},
-    {BST_CHANNEL_EXPOSURE, BST_CHANNEL_QUEUE, sizeof(bst_exposure), 0, NULL},
-    {BST_CHANNEL_LOS_COMMAND, BST_CHANNEL_LATEST, sizeof(bst_los_command), 0, NULL},
-    {BST_CHANNEL_LOS_HISTORY, BST_CHANNEL_LATEST, sizeof(bst_los_history), sizeof(bst_los_sample),
-     NULL},
-    {BST_CHANNEL_POINTING_TELEMETRY, BST_CHANNEL_LATEST, sizeof(bst_pointing_telemetry),
-     sizeof(bst_pointing_sample), NULL},
-    {BST_CHANNEL_NAV_TELEMETRY, BST_CHANNEL_LATEST, sizeof(bst_nav_telemetry), 0, NULL},
-    {BST_CHANNEL_FRAME, BST_CHANNEL_QUEUE, sizeof(bst_frame_message), 0, release_frame},
-    {BST_CHANNEL_TRUTH, BST_CHANNEL_QUEUE, sizeof(bst_truth), sizeof(bst_truth_item), NULL},
-    {BST_CHANNEL_DETECTIONS, BST_CHANNEL_QUEUE, sizeof(bst_detections), sizeof(bst_detection),
-     NULL},
-    {BST_CHANNEL_PREDICTIONS, BST_CHANNEL_LATEST, sizeof(bst_predictions), sizeof(bst_prediction),
-     NULL},
-    {BST_CHANNEL_TRACKS, BST_CHANNEL_QUEUE, sizeof(bst_tracks), sizeof(bst_track), NULL},
-    {BST_CHANNEL_CONTROL_STATUS, BST_CHANNEL_LATEST, sizeof(bst_control_status), 0, NULL},
+    HEADER_ONLY(BST_CHANNEL_SENSOR_COMMAND, BST_CHANNEL_LATEST, bst_sensor_command),
+    HEADER_ONLY(BST_CHANNEL_EXPOSURE, BST_CHANNEL_QUEUE, bst_exposure),
+    HEADER_ONLY(BST_CHANNEL_LOS_COMMAND, BST_CHANNEL_LATEST, bst_los_command),
+    WITH_ITEMS(BST_CHANNEL_LOS_HISTORY, BST_CHANNEL_LATEST, bst_los_history, bst_los_sample, true),
+    WITH_ITEMS(BST_CHANNEL_POINTING_TELEMETRY, BST_CHANNEL_LATEST, bst_pointing_telemetry,
+               bst_pointing_sample, true),
+    HEADER_ONLY(BST_CHANNEL_NAV_TELEMETRY, BST_CHANNEL_LATEST, bst_nav_telemetry),
+    {BST_CHANNEL_FRAME, BST_CHANNEL_QUEUE, sizeof(bst_frame_message), 0, false, release_frame},
+    WITH_ITEMS(BST_CHANNEL_TRUTH, BST_CHANNEL_QUEUE, bst_truth, bst_truth_item, false),
+    WITH_ITEMS(BST_CHANNEL_DETECTIONS, BST_CHANNEL_QUEUE, bst_detections, bst_detection, false),
+    WITH_ITEMS(BST_CHANNEL_PREDICTIONS, BST_CHANNEL_LATEST, bst_predictions, bst_prediction, false),
+    WITH_ITEMS(BST_CHANNEL_TRACKS, BST_CHANNEL_QUEUE, bst_tracks, bst_track, false),
+    HEADER_ONLY(BST_CHANNEL_CONTROL_STATUS, BST_CHANNEL_LATEST, bst_control_status),
 };
 
 const bst_channel_type *bst_channel_type_find(const char *name) {

@@ -286,6 +286,7 @@ typedef struct bst_channel_type {
     bst_channel_kind kind;
     size_t header_bytes;
     size_t item_bytes; /* 0: no items */
+    bool in_place;     /* a ring that its writer extends in place: cannot be read with a delay */
     void (*release)(
         void *payload); /* lets go of what a slot owns before it is written again; may be NULL */
 } bst_channel_type;

@@ -1,0 +1,31 @@
+/* Apparent direction of an ideally pointed line of sight: nodes on a fine time grid, interpolated.
+ */
+#ifndef BST_GIMBAL_IDEAL_H
+#define BST_GIMBAL_IDEAL_H
+
+#include <stdint.h>
+
+#include "sim/core/status.h"
+#include "sim/core/vec.h"
+
+/* Nodes per second. The cubic through four nodes is off by at most 9/384 h^4 |d4 u/dt4|; a pass at
+ * 0.03 rad/s (500 km range, 15 km/s) has about 2e-5 rad/s^4: below 1e-10 rad. */
+#define BST_IDEAL_NODES_PER_S 10
+
+/* Apparent direction (unit, GCRF axes) `seconds` after the epoch. */
+typedef bst_status (*bst_ideal_fn)(void *user, bst_ctx *ctx, double seconds, bst_vec3 *direction);
+
+typedef struct bst_ideal {
+    bst_ideal_fn direction_at;
+    void *user;
+    int64_t first; /* number of node[0]; node k is at k / BST_IDEAL_NODES_PER_S */
+    int filled;    /* 0 or 4 */
+    bst_vec3 node[4];
+} bst_ideal;
+
+/* Direction at `seconds`; nodes are never before time 0 when seconds >= 0, and at most two grid
+ * steps later than asked. Passes on what direction_at fails with. */
+bst_status bst_ideal_at(bst_ideal *ideal, bst_ctx *ctx, double seconds,
+                        bst_vec3 *direction) BST_MUST_CHECK;
+
+#endif

@@ -1,0 +1,88 @@
+#include "gimbal/jitter.h"
+
+#include <math.h>
+
+#include "sim/core/vec.h"
+
+/* Rotation steps between two evaluations of the exact phase: rounding grows to about 1e-14. */
+#define RESYNC_STEPS 256
+
+static void draw_band(bst_jitter_axis *axis, int first, int lines, double rms_axis_rad,
+                      double min_hz, double max_hz, double dt_s, bst_rng_key key, int axis_number) {
+    double amplitude = rms_axis_rad * sqrt(2.0 / lines);
+    for (int i = 0; i < lines; i++) {
+        int line = first + i;
+        uint64_t draw = (uint64_t)(2 * line);
+        double u = bst_rng_uniform(key, (uint64_t)axis_number, draw);
+        double f = min_hz + (max_hz - min_hz) * (i + u) / lines;
+        axis->amplitude[line] = amplitude;
+        axis->frequency_hz[line] = f;
+        axis->phase_cycles[line] = bst_rng_uniform(key, (uint64_t)axis_number, draw + 1);
+        axis->turn_re[line] = cos(2.0 * BST_PI * f * dt_s);
+        axis->turn_im[line] = sin(2.0 * BST_PI * f * dt_s);
+    }
+}
+
+void bst_jitter_init(bst_jitter *jitter, const bst_jitter_spec *spec, double dt_s,
+                     bst_rng_key key) {
+    *jitter = (bst_jitter){.dt_s = dt_s, .index = -1};
+    jitter->silent = spec->low_rms_rad == 0.0 && spec->high_rms_rad == 0.0;
+    for (int a = 0; a < 2; a++) {
+        draw_band(&jitter->axis[a], 0, BST_JITTER_LOW_LINES, spec->low_rms_rad * sqrt(0.5), 0.0,
+                  spec->low_cutoff_hz, dt_s, key, a);
+        draw_band(&jitter->axis[a], BST_JITTER_LOW_LINES, BST_JITTER_HIGH_LINES,
+                  spec->high_rms_rad * sqrt(0.5), spec->high_min_hz, spec->high_max_hz, dt_s, key,
+                  a);
+    }
+}
+
+static void synchronise(bst_jitter *jitter, int64_t n) {
+    double t = (double)n * jitter->dt_s;
+    for (int a = 0; a < 2; a++) {
+        bst_jitter_axis *axis = &jitter->axis[a];
+        for (int i = 0; i < BST_JITTER_LINES; i++) {
+            double cycles = axis->frequency_hz[i] * t;
+            double phase = 2.0 * BST_PI * (cycles - floor(cycles) + axis->phase_cycles[i]);
+            axis->re[i] = axis->amplitude[i] * cos(phase);
+            axis->im[i] = axis->amplitude[i] * sin(phase);
+        }
+    }
+}
+
+static void rotate(bst_jitter_axis *axis) {
+    for (int i = 0; i < BST_JITTER_LINES; i++) {
+        double re = axis->re[i] * axis->turn_re[i] - axis->im[i] * axis->turn_im[i];
+        axis->im[i] = axis->re[i] * axis->turn_im[i] + axis->im[i] * axis->turn_re[i];
+        axis->re[i] = re;
+    }
+}
+
+/* Four partial sums: a single chain of additions would cost more than the rotation. */
+static double sum(const bst_jitter_axis *axis) {
+    double s[4] = {0.0, 0.0, 0.0, 0.0};
+    for (int i = 0; i < BST_JITTER_LINES; i += 4) {
+        for (int j = 0; j < 4; j++) {
+            s[j] += axis->re[i + j];
+        }
+    }
+    return (s[0] + s[1]) + (s[2] + s[3]);
+}
+
+void bst_jitter_at(bst_jitter *jitter, int64_t n, double out_rad[2]) {
+    if (jitter->silent) {
+        out_rad[0] = out_rad[1] = 0.0;
+        return;
+    }
+    int64_t block = n - n % RESYNC_STEPS;
+    if (jitter->index < block || jitter->index > n) {
+        synchronise(jitter, block);
+        jitter->index = block;
+    }
+    while (jitter->index < n) {
+        rotate(&jitter->axis[0]);
+        rotate(&jitter->axis[1]);
+        jitter->index++;
+    }
+    out_rad[0] = sum(&jitter->axis[0]);
+    out_rad[1] = sum(&jitter->axis[1]);
+}

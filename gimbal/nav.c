@@ -1,0 +1,16 @@
+#include "gimbal/nav.h"
+
+bst_status bst_gimbal_nav(bst_ctx *ctx, bst_view *view, int observer, int64_t tick, double seconds,
+                          bst_nav_telemetry *out) {
+    bst_state state;
+    bst_bodies bodies;
+    BST_TRY(bst_view_observer_state(ctx, view, observer, seconds, &state));
+    BST_TRY(bst_view_bodies(ctx, view, seconds, &bodies));
+    bst_light light = bst_light_at(&bodies, state.position_m, state.velocity_mps);
+    out->tick = tick;
+    out->position_gcrf_m = state.position_m;
+    out->velocity_gcrf_mps = state.velocity_mps;
+    out->velocity_bary_mps = light.velocity_mps;
+    out->sun_m = light.sun_m;
+    return BST_OK;
+}

@@ -1,0 +1,12 @@
+/* Navigation telemetry and publication that both gimbal types share. */
+#ifndef BST_GIMBAL_NAV_H
+#define BST_GIMBAL_NAV_H
+
+#include "sim/core/messages.h"
+#include "sim/world/world.h"
+
+/* Fills navigation telemetry with the observer's true state at `tick` (seconds after the epoch). */
+bst_status bst_gimbal_nav(bst_ctx *ctx, bst_view *view, int observer, int64_t tick, double seconds,
+                          bst_nav_telemetry *out) BST_MUST_CHECK;
+
+#endif

@@ -1,0 +1,142 @@
+#include "gimbal/platform.h"
+
+#define P bst_platform_config
+const bst_config_desc bst_platform_config_table[] = {
+    BST_REALS(P, drift_arcsec_per_s, "arcsec/s", -3600, 3600, "[0, 0, 0]",
+              "Constant rotation rate of the true body about its own axes, unknown onboard."),
+    BST_REAL(P, jitter_low_px_rms, "px", 0, 100, "0",
+             "RMS (radial) of the slow jitter of the line of sight."),
+    BST_REAL(P, jitter_low_cutoff_hz, "Hz", 1e-6, 1000, "0.05",
+             "Highest frequency of the slow jitter; its spectrum is flat from zero."),
+    BST_REAL(P, jitter_high_px_rms, "px", 0, 100, "0",
+             "RMS (radial) of the fast jitter of the line of sight."),
+    BST_REALS(P, jitter_high_band_hz, "Hz", 0, 10000, "[5, 200]",
+              "Lowest and highest frequency of the fast jitter; its spectrum is flat between."),
+    BST_REALS(P, attitude_bias_arcsec, "arcsec", -36000, 36000, "[0, 0, 0]",
+              "Constant error of the believed body attitude, as a rotation about body axes."),
+    BST_REAL(
+        P, attitude_noise_arcsec, "arcsec", 0, 3600, "0",
+        "White noise of the reported body attitude about each axis, one draw a sample; it does "
+        "not move the gimbal."),
+    BST_REAL(P, history_s, "s", 0.01, 3600, "4",
+             "Time that the ring of true line-of-sight samples covers."),
+    BST_REAL(P, telemetry_rate_hz, "Hz", 0.01, 10000, "100",
+             "Rate of pointing telemetry; divides the plant's rate."),
+    BST_REAL(P, telemetry_history_s, "s", 0.01, 3600, "8",
+             "Time that the ring of pointing telemetry covers."),
+    BST_REAL(P, nav_rate_hz, "Hz", 0.001, 10000, "10",
+             "Rate of navigation telemetry; divides the plant's rate."),
+    BST_CONFIG_END};
+#undef P
+
+static bst_vec3 arcsec_vector(const double v[3]) {
+    return bst_vec3_scale((bst_vec3){v[0], v[1], v[2]}, BST_ARCSEC_RAD);
+}
+
+/* A frame that turns by r (its own axes) has q_new_from_old = from_rotvec(-r). */
+static bst_quat turned(bst_quat q, bst_vec3 r) {
+    return bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(r, -1.0)), q);
+}
+
+bst_status bst_platform_init(bst_ctx *ctx, bst_platform *platform,
+                             const bst_platform_config *config, bst_quat q_nominal_from_gcrf,
+                             double pixel_rad, double dt_s, bst_rng_key jitter_key,
+                             bst_rng_key attitude_key) {
+    const double *band = config->jitter_high_band_hz;
+    if (config->jitter_high_px_rms > 0.0) {
+        if (!(band[1] > band[0])) {
+            return bst_fail(ctx, BST_ERR_CONFIG,
+                            "platform/jitter_high_band_hz: [%g, %g] is empty; give the lower "
+                            "frequency first",
+                            band[0], band[1]);
+        }
+        if (band[1] * dt_s > 0.4) {
+            return bst_fail(
+                ctx, BST_ERR_CONFIG,
+                "platform/jitter_high_band_hz: a plant at %g Hz cannot follow jitter of "
+                "%g Hz; raise rate_hz to at least %g or lower the band",
+                1.0 / dt_s, band[1], 2.5 * band[1]);
+        }
+    }
+    if (config->jitter_low_px_rms > 0.0 && config->jitter_low_cutoff_hz * dt_s > 0.4) {
+        return bst_fail(
+            ctx, BST_ERR_CONFIG,
+            "platform/jitter_low_cutoff_hz: a plant at %g Hz cannot follow jitter of %g "
+            "Hz; raise rate_hz to at least %g or lower the cut-off",
+            1.0 / dt_s, config->jitter_low_cutoff_hz, 2.5 * config->jitter_low_cutoff_hz);
+    }
+    bst_jitter_spec spec = {.low_rms_rad = config->jitter_low_px_rms * pixel_rad,
+                            .low_cutoff_hz = config->jitter_low_cutoff_hz,
+                            .high_rms_rad = config->jitter_high_px_rms * pixel_rad,
+                            .high_min_hz = band[0],
+                            .high_max_hz = band[1]};
+    platform->q_nominal_from_gcrf = q_nominal_from_gcrf;
+    platform->q_believed_from_gcrf =
+        turned(q_nominal_from_gcrf, arcsec_vector(config->attitude_bias_arcsec));
+    platform->drift_radps = arcsec_vector(config->drift_arcsec_per_s);
+    platform->attitude_noise_rad = config->attitude_noise_arcsec * BST_ARCSEC_RAD;
+    platform->attitude_key = attitude_key;
+    bst_jitter_init(&platform->jitter, &spec, dt_s, jitter_key);
+    return BST_OK;
+}
+
+bst_quat bst_platform_true_camera(bst_platform *platform, int64_t n, double seconds,
+                                  bst_quat q_cam_from_body) {
+    bst_quat body =
+        turned(platform->q_nominal_from_gcrf, bst_vec3_scale(platform->drift_radps, seconds));
+    double shake[2];
+    bst_jitter_at(&platform->jitter, n, shake);
+    return bst_quat_unit(
+        turned(bst_quat_mul(q_cam_from_body, body), (bst_vec3){shake[0], shake[1], 0.0}));
+}
+
+bst_quat bst_platform_measured_body(const bst_platform *platform, int64_t n) {
+    if (platform->attitude_noise_rad == 0.0) {
+        return platform->q_believed_from_gcrf;
+    }
+    double a[2], b[2];
+    bst_rng_normal2(platform->attitude_key, (uint64_t)n, 0, a);
+    bst_rng_normal2(platform->attitude_key, (uint64_t)n, 1, b);
+    return turned(platform->q_believed_from_gcrf,
+                  bst_vec3_scale((bst_vec3){a[0], a[1], b[0]}, platform->attitude_noise_rad));
+}
+
+bst_status bst_platform_divider(bst_ctx *ctx, const char *key, double plant_rate_hz,
+                                double wanted_hz, int64_t *out) {
+    double ratio = plant_rate_hz / wanted_hz;
+    double steps = round(ratio);
+    if (steps < 1.0 || fabs(ratio - steps) > 1e-9 * ratio) {
+        double fewer = floor(ratio) < 1.0 ? 1.0 : floor(ratio);
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "platform/%s: %g Hz does not divide the plant's rate of %g Hz; the nearest "
+                        "rates that do are %g and %g Hz",
+                        key, wanted_hz, plant_rate_hz, plant_rate_hz / fewer,
+                        plant_rate_hz / (fewer + 1.0));
+    }
+    *out = (int64_t)steps;
+    return BST_OK;
+}
+
+void bst_platform_append_los(bst_los_history *history, int capacity, int64_t tick,
+                             bst_quat q_cam_from_gcrf) {
+    history->capacity = capacity;
+    bst_los_sample *sample = &history->items[history->written % capacity];
+    sample->tick = tick;
+    sample->q_cam_from_gcrf = q_cam_from_gcrf;
+    history->written++;
+}
+
+void bst_platform_append_pointing(bst_pointing_telemetry *telemetry, int capacity, int64_t tick,
+                                  bst_quat q_cam_from_gcrf, const double axis_rad[2],
+                                  bst_quat q_body_from_gcrf, bool settled, bool limited) {
+    telemetry->capacity = capacity;
+    telemetry->q_body_from_gcrf = q_body_from_gcrf;
+    telemetry->settled = settled;
+    telemetry->limited = limited;
+    bst_pointing_sample *sample = &telemetry->items[telemetry->written % capacity];
+    sample->tick = tick;
+    sample->q_cam_from_gcrf = q_cam_from_gcrf;
+    sample->axis_rad[0] = axis_rad[0];
+    sample->axis_rad[1] = axis_rad[1];
+    telemetry->written++;
+}

@@ -1,0 +1,137 @@
+#include "gimbal/two_axis.h"
+
+static const double two_pi = 2.0 * BST_PI;
+
+/* Below this distance from the pole (rad) the outer angle is not defined well enough to follow. */
+#define POLE_RAD 1e-9
+
+#define C bst_two_axis_config
+const bst_config_desc bst_two_axis_config_table[] = {
+    BST_REAL(C, rate_limit_degps, "deg/s", 1e-6, 1000, "2", "Greatest rate of either axis."),
+    BST_REAL(C, accel_limit_degps2, "deg/s^2", 1e-6, 10000, "4",
+             "Greatest acceleration of either axis."),
+    BST_REAL(C, natural_frequency_hz, "Hz", 0.01, 1000, "8", "Natural frequency of the servo."),
+    BST_REAL(C, damping, "", 0.05, 10, "0.7", "Damping ratio of the servo."),
+    BST_REAL(C, encoder_noise_arcsec, "arcsec", 0, 3600, "0.1",
+             "White noise of an encoder reading, one draw a plant step; the servo follows it."),
+    BST_REAL(C, inner_travel_deg, "deg", 0.1, 90, "90", "Stops of the inner axis, both ways."),
+    BST_REAL(C, settle_tolerance_arcsec, "arcsec", 1e-6, 36000, "3",
+             "The servo reports `settled` within this angle of its command."),
+    BST_OBJECT(C, platform, bst_platform_config_table, "{}",
+               "The spacecraft: drift, jitter, attitude knowledge, telemetry."),
+    BST_CONFIG_END};
+#undef C
+
+bst_status bst_two_axis_init(bst_ctx *ctx, bst_two_axis *plant, const bst_two_axis_config *config,
+                             bst_quat q_nominal_from_gcrf, double pixel_rad, double dt_s,
+                             const bst_two_axis_keys *keys) {
+    *plant =
+        (bst_two_axis){.encoder_noise_rad = config->encoder_noise_arcsec * BST_ARCSEC_RAD,
+                       .inner_travel_rad = config->inner_travel_deg * BST_DEG_RAD,
+                       .settle_tolerance_rad = config->settle_tolerance_arcsec * BST_ARCSEC_RAD,
+                       .encoder_key = keys->encoder,
+                       .dt_s = dt_s};
+    bst_axis_spec spec = {.rate_limit_radps = config->rate_limit_degps * BST_DEG_RAD,
+                          .accel_limit_radps2 = config->accel_limit_degps2 * BST_DEG_RAD,
+                          .natural_frequency_radps = two_pi * config->natural_frequency_hz,
+                          .damping = config->damping,
+                          .dt_s = dt_s};
+    bst_axis_init(&plant->axis[0], &spec);
+    bst_axis_init(&plant->axis[1], &spec);
+    return bst_platform_init(ctx, &plant->platform, &config->platform, q_nominal_from_gcrf,
+                             pixel_rad, dt_s, keys->jitter, keys->attitude);
+}
+
+void bst_two_axis_solve(bst_vec3 b, bst_vec3 rate, double outer_at_pole_rad, double angle_rad[2],
+                        double rate_radps[2]) {
+    double h2 = b.x * b.x + b.z * b.z;
+    double h = sqrt(h2);
+    angle_rad[1] = atan2(-b.y, h);
+    if (h < POLE_RAD) {
+        angle_rad[0] = outer_at_pole_rad;
+        rate_radps[0] = rate_radps[1] = 0.0;
+        return;
+    }
+    angle_rad[0] = atan2(b.x, b.z);
+    rate_radps[0] = (b.z * rate.x - b.x * rate.z) / h2;
+    rate_radps[1] = -rate.y / h;
+}
+
+bst_quat bst_two_axis_attitude(const double angle_rad[2]) {
+    double so = sin(0.5 * angle_rad[0]), co = cos(0.5 * angle_rad[0]);
+    double si = sin(0.5 * angle_rad[1]), ci = cos(0.5 * angle_rad[1]);
+    /* from_rotvec(-inner x) * from_rotvec(-outer y), multiplied out */
+    return (bst_quat){-si * co, -ci * so, si * so, ci * co};
+}
+
+static double wrap(double angle) {
+    return angle - two_pi * ceil(angle / two_pi - 0.5);
+}
+
+/* Where the axes shall be at this step. */
+static void target(const bst_two_axis *plant, const bst_los_command *command, double age_s,
+                   double angle_rad[2], double rate_radps[2], bool *at_stop) {
+    bst_vec3 v = bst_vec3_axpy(command->direction_gcrf, age_s, command->rate_gcrf_radps);
+    double scale = 1.0 / bst_vec3_norm(v);
+    bst_vec3 d = bst_vec3_scale(v, scale);
+    bst_vec3 r = bst_vec3_scale(command->rate_gcrf_radps, scale);
+    r = bst_vec3_axpy(r, -bst_vec3_dot(r, d), d);
+    bst_quat body = plant->platform.q_believed_from_gcrf;
+    bst_two_axis_solve(bst_quat_rotate(body, d), bst_quat_rotate(body, r),
+                       plant->axis[0].reference_rad, angle_rad, rate_radps);
+    /* the way round that is nearer to the present angle */
+    angle_rad[0] = plant->axis[0].reference_rad + wrap(angle_rad[0] - plant->axis[0].reference_rad);
+    *at_stop = fabs(angle_rad[1]) > plant->inner_travel_rad;
+    if (*at_stop) {
+        angle_rad[1] = copysign(plant->inner_travel_rad, angle_rad[1]);
+        rate_radps[1] = 0.0;
+    }
+}
+
+void bst_two_axis_step(bst_two_axis *plant, const bst_los_command *command, double command_age_s,
+                       bool measure) {
+    int64_t n = plant->steps++;
+    double noise[2] = {0.0, 0.0};
+    if (plant->encoder_noise_rad > 0.0) {
+        bst_rng_normal2(plant->encoder_key, (uint64_t)n, 0, noise);
+        noise[0] *= plant->encoder_noise_rad;
+        noise[1] *= plant->encoder_noise_rad;
+    }
+    double angle[2], rate[2];
+    bool at_stop = false;
+    if (command) {
+        target(plant, command, command_age_s, angle, rate, &at_stop);
+    } else {
+        for (int a = 0; a < 2; a++) {
+            angle[a] = plant->axis[a].reference_rad;
+            rate[a] = 0.0;
+        }
+    }
+    bst_axis *outer = &plant->axis[0], *inner = &plant->axis[1];
+    if (n > 0) {
+        bst_axis_step(outer, angle[0], rate[0], noise[0]);
+        bst_axis_step(inner, angle[1], rate[1], noise[1]);
+    }
+    double cross = cos(inner->angle_rad);
+    double off_o = (outer->angle_rad - angle[0]) * cross, off_i = inner->angle_rad - angle[1];
+    double rate_o = (outer->rate_radps - rate[0]) * cross, rate_i = inner->rate_radps - rate[1];
+    double settle_rate = plant->settle_tolerance_rad * outer->spec.natural_frequency_radps;
+    plant->settled =
+        hypot(off_o, off_i) <= plant->settle_tolerance_rad && hypot(rate_o, rate_i) <= settle_rate;
+    plant->limited = at_stop || outer->limited || inner->limited;
+
+    if (fabs(outer->reference_rad) > BST_PI) {
+        bst_axis_unwind(outer, outer->reference_rad > 0.0 ? -1.0 : 1.0);
+    }
+    double truth[2] = {outer->angle_rad, inner->angle_rad};
+    bst_quat q_cam_from_body = bst_two_axis_attitude(truth);
+    plant->q_cam_from_gcrf =
+        bst_platform_true_camera(&plant->platform, n, (double)n * plant->dt_s, q_cam_from_body);
+    if (measure) {
+        plant->encoder_rad[0] = wrap(truth[0]) + noise[0];
+        plant->encoder_rad[1] = truth[1] + noise[1];
+        plant->q_measured_body_from_gcrf = bst_platform_measured_body(&plant->platform, n);
+        plant->q_measured_from_gcrf = bst_quat_unit(bst_quat_mul(
+            bst_two_axis_attitude(plant->encoder_rad), plant->q_measured_body_from_gcrf));
+    }
+}

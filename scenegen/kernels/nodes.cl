@@ -1,0 +1,53 @@
+/* From sources and node tables to the frame's nodes: place and electrons of every node, and the
+ * boxes of pixels that blocks and sources touch. One work-item per source. */
+
+static float max_of(float16 v) {
+    float8 a = fmax(v.lo, v.hi);
+    float4 b = fmax(a.lo, a.hi);
+    float2 c = fmax(b.lo, b.hi);
+    return fmax(c.lo, c.hi);
+}
+
+static float min_of(float16 v) {
+    return -max_of(-v);
+}
+
+/* nodes: per block x[16], y[16], electrons[16], px and e-. block_box: x0, y0, x1, y1 (inclusive
+ * pixels). source_box: the same for sources, by groups of 16: x0[16], y0[16], x1[16], y1[16]. */
+kernel void bst_scene_nodes(global const bst_scene_source *sources, int count,
+                            global const float16 *table, float centre_x, float centre_y,
+                            global float16 *nodes, global float4 *block_box,
+                            global float *source_box) {
+    int i = (int)get_global_id(0);
+    global float *box = source_box + (i / BST_BLOCK) * 4 * BST_BLOCK + i % BST_BLOCK;
+    float x0 = 1e9f, y0 = 1e9f, x1 = -1e9f, y1 = -1e9f;
+    if (i < count) {
+        bst_scene_source s = sources[i];
+        float reach_x = (float)(8 * s.chunks), reach_y = (float)s.radius;
+        for (int b = 0; b < s.blocks; b++) {
+            global const float16 *t = table + (s.first_table + b) * BST_TABLE_ROWS;
+            float16 depth = t[6] * s.x_px + t[7] * s.y_px;
+            float16 scale = 1.0f / (depth + t[8]);
+            float16 dx = (t[0] * s.x_px + t[1] * s.y_px + t[2] - depth * s.x_px) * scale;
+            float16 dy = (t[3] * s.x_px + t[4] * s.y_px + t[5] - depth * s.y_px) * scale;
+            /* far outside any sensor all places are alike; keeps the integer maths in range */
+            float16 x = clamp(centre_x + s.x_px + dx, -1e6f, 1e6f);
+            float16 y = clamp(centre_y + s.y_px + dy, -1e6f, 1e6f);
+            int block = s.first_block + b;
+            nodes[3 * block] = x;
+            nodes[3 * block + 1] = y;
+            nodes[3 * block + 2] = t[9] * s.electrons;
+            float4 r = (float4)(floor(min_of(x)) - reach_x + 1.0f, floor(min_of(y)) - reach_y,
+                                floor(max_of(x)) + reach_x, floor(max_of(y)) + reach_y + 1.0f);
+            block_box[block] = r;
+            x0 = fmin(x0, r.x);
+            y0 = fmin(y0, r.y);
+            x1 = fmax(x1, r.z);
+            y1 = fmax(y1, r.w);
+        }
+    }
+    box[0] = x0;
+    box[BST_BLOCK] = y0;
+    box[2 * BST_BLOCK] = x1;
+    box[3 * BST_BLOCK] = y1;
+}

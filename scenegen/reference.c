@@ -1,0 +1,125 @@
+#include "scenegen/reference.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Beyond this many standard deviations a Gaussian's tail is under 1e-21. */
+#define REACH_SIGMAS 9.5
+
+/* Four-point Gauss-Legendre on [0, 1] (Abramowitz and Stegun, table 25.4). */
+static const double gauss_place[4] = {0.06943184420297371, 0.33000947820757187, 0.66999052179242813,
+                                      0.93056815579702629};
+static const double gauss_weight[4] = {0.17392742256872693, 0.32607257743127307,
+                                       0.32607257743127307, 0.17392742256872693};
+
+double bst_reference_pixel_share(double x, double sigma_px, int n) {
+    double scale = 1.0 / (sigma_px * sqrt(2.0));
+    double a = (n - 0.5 - x) * scale, b = (n + 0.5 - x) * scale;
+    /* erfc on the side away from the centre keeps the wings' relative precision */
+    if (a > 0.0) {
+        return 0.5 * (erfc(a) - erfc(b));
+    }
+    if (b < 0.0) {
+        return 0.5 * (erfc(-b) - erfc(-a));
+    }
+    return 0.5 * (erf(b) - erf(a));
+}
+
+static bst_vec3 direction_at(const bst_source *s, double u) {
+    double a = 2.0 * (u - 0.5) * (u - 1.0), b = 4.0 * u * (1.0 - u), c = 2.0 * u * (u - 0.5);
+    return bst_vec3_axpy(bst_vec3_axpy(bst_vec3_scale(s->apparent_start, a), b, s->apparent_mid), c,
+                         s->apparent_end);
+}
+
+static int clamp_int(double v, int low, int high) {
+    return v <= low ? low : v >= high ? high : (int)v;
+}
+
+/* Adds the PSF at x, y (full-sensor px) with `electrons`; line: room for a row of shares. */
+static void add_psf(bst_window w, double sigma, double x, double y, double electrons, double *line,
+                    double *image) {
+    double reach = REACH_SIGMAS * sigma + 1.0;
+    int x0 = clamp_int(floor(x - reach), w.x0, w.x0 + w.width);
+    int x1 = clamp_int(ceil(x + reach), w.x0 - 1, w.x0 + w.width - 1);
+    int y0 = clamp_int(floor(y - reach), w.y0, w.y0 + w.height);
+    int y1 = clamp_int(ceil(y + reach), w.y0 - 1, w.y0 + w.height - 1);
+    for (int i = x0; i <= x1; i++) {
+        line[i - w.x0] = electrons * bst_reference_pixel_share(x, sigma, i);
+    }
+    for (int j = y0; j <= y1; j++) {
+        double share = bst_reference_pixel_share(y, sigma, j);
+        double *row = image + (size_t)(j - w.y0) * (size_t)w.width;
+        for (int i = x0; i <= x1; i++) {
+            row[i - w.x0] += share * line[i - w.x0];
+        }
+    }
+}
+
+/* One source with every stretch between LOS samples in `parts` parts. */
+static void render_source(const bst_camera *camera, bst_window w, const bst_los_track *track,
+                          const bst_source *s, int parts, double *line, double *image) {
+    double duration = track->time_s[track->count - 1];
+    double sigma = bst_camera_psf_sigma_px(camera);
+    for (int k = 0; k + 1 < track->count; k++) {
+        double dt = track->time_s[k + 1] - track->time_s[k];
+        for (int n = 0; n < 4 * parts && dt > 0.0; n++) {
+            double u = ((double)(n / 4) + gauss_place[n % 4]) / parts;
+            double x, y;
+            bst_quat q =
+                bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
+            bst_vec3 v = direction_at(s, (track->time_s[k] + u * dt) / duration);
+            if (bst_camera_project(camera, bst_quat_rotate(q, v), &x, &y)) {
+                add_psf(w, sigma, x, y, s->electrons_per_s * dt * gauss_weight[n % 4] / parts, line,
+                        image);
+            }
+        }
+    }
+}
+
+bst_status bst_reference_render(bst_ctx *ctx, const bst_camera *camera, bst_window window,
+                                const bst_los_track *track, const bst_source *sources, int count,
+                                double tolerance, double *image) {
+    size_t pixels = (size_t)window.width * (size_t)window.height;
+    double *coarse = malloc(pixels * sizeof *coarse), *fine = malloc(pixels * sizeof *fine);
+    double *line = malloc((size_t)window.width * sizeof *line);
+    bst_status status = BST_OK;
+    if (!coarse || !fine || !line) {
+        status = bst_fail(ctx, BST_ERR_MEMORY, "no memory for a reference image of %d x %d pixels",
+                          window.width, window.height);
+        goto exit;
+    }
+    for (int i = 0; i < count; i++) {
+        if (sources[i].occulted || !(sources[i].electrons_per_s > 0.0)) {
+            continue;
+        }
+        memset(fine, 0, pixels * sizeof *fine);
+        render_source(camera, window, track, &sources[i], 1, line, fine);
+        double change = 1.0, peak = 0.0;
+        for (int parts = 2; change > tolerance * peak; parts *= 2) {
+            if (parts > 1 << 14) {
+                status = bst_fail(ctx, BST_ERR_NUMERIC,
+                                  "the reference image of source %d does not settle", i);
+                goto exit;
+            }
+            double *swap = coarse;
+            coarse = fine;
+            fine = swap;
+            memset(fine, 0, pixels * sizeof *fine);
+            render_source(camera, window, track, &sources[i], parts, line, fine);
+            change = peak = 0.0;
+            for (size_t p = 0; p < pixels; p++) {
+                change = fmax(change, fabs(fine[p] - coarse[p]));
+                peak = fmax(peak, fine[p]);
+            }
+        }
+        for (size_t p = 0; p < pixels; p++) {
+            image[p] += fine[p];
+        }
+    }
+exit:
+    free(coarse);
+    free(fine);
+    free(line);
+    return status;
+}

@@ -1,0 +1,441 @@
+#include "scenegen/renderer.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bst_device_kernels.h"
+#include "bst_scenegen_kernels.h"
+#include "scenegen/frame_pool.h"
+#include "scenegen/reference.h"
+#include "scenegen/smear.h"
+
+enum { MAX_TAPS = 512, BOX_FLOATS = 4 };
+
+/* A device buffer that grows. */
+typedef struct growing {
+    cl_mem buffer;
+    size_t bytes;
+} growing;
+
+struct bst_renderer {
+    bst_camera camera;
+    bst_renderer_options options;
+    int taps;
+    cl_context context;
+    cl_command_queue queue;
+    cl_program program;
+    cl_kernel nodes_kernel, frame_kernel, expected_kernel;
+    bst_smear *smear;
+    bst_frame_pool *pool;
+    cl_mem profiles;
+    growing table, sources, nodes, block_box, source_box, saturated, expected;
+    bst_scene_source *list; /* drawn sources */
+    double *peak_e;         /* of all sources of the request */
+    int list_capacity, tiles;
+    bst_render_stats stats;
+};
+
+bst_renderer_options bst_renderer_default_options(void) {
+    return (bst_renderer_options){.error_sigma = 0.03, .cut_sigma = 0.02, .pool_frames = 4};
+}
+
+static bst_status check_camera(bst_ctx *ctx, const bst_camera *c) {
+    if (c->width_px < 1 || c->height_px < 1 || c->width_px > 65536 || c->height_px > 65536 ||
+        c->bits < 8 || c->bits > 16) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "cannot render %lld x %lld pixels of %lld bits: allowed are 1 to 65536 "
+                        "pixels and 8 to 16 bits",
+                        (long long)c->width_px, (long long)c->height_px, (long long)c->bits);
+    }
+    if (!(c->psf_fwhm_px > 0.0) || c->psf_fwhm_px > 70.0) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "cannot render a PSF of psf_fwhm_px %g: allowed are 0 to 70 pixels",
+                        c->psf_fwhm_px);
+    }
+    return BST_OK;
+}
+
+/* Stamps up to 8 standard deviations on each side: beyond, less than 1e-15 of the light is left. */
+static int taps_for(double sigma_px) {
+    int taps = 16 * (int)ceil((2.0 * 8.0 * sigma_px + 2.0) / 16.0);
+    return taps > MAX_TAPS ? MAX_TAPS : taps;
+}
+
+static bst_status choose_tiles(bst_ctx *ctx, const bst_device *device,
+                               bst_renderer_options *options) {
+    cl_device_type type = 0;
+    cl_ulong local_bytes = 0;
+    BST_TRY(bst_device_check(
+        ctx, clGetDeviceInfo(bst_device_id(device), CL_DEVICE_TYPE, sizeof type, &type, NULL),
+        "asking for the device's type"));
+    BST_TRY(bst_device_check(ctx,
+                             clGetDeviceInfo(bst_device_id(device), CL_DEVICE_LOCAL_MEM_SIZE,
+                                             sizeof local_bytes, &local_bytes, NULL),
+                             "asking for the device's local memory"));
+    if (options->tile_width == 0) {
+        bool large = (type & CL_DEVICE_TYPE_CPU) && local_bytes >= 128 * 1024;
+        options->tile_width = large ? 256 : 32;
+        options->tile_height = large ? 64 : 4;
+        options->group = large ? 1 : 16;
+    }
+    size_t need = (size_t)(options->tile_width + 32) * (size_t)options->tile_height *
+                  sizeof(float) * (size_t)options->group;
+    if (options->tile_width < 16 || options->tile_width % 16 != 0 || options->tile_height < 1 ||
+        options->group < 1 || need > local_bytes) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "tiles of %d x %d pixels in groups of %d need %zu bytes of local memory "
+                        "(the device has %llu) and a width that is a multiple of 16",
+                        options->tile_width, options->tile_height, options->group, need,
+                        (unsigned long long)local_bytes);
+    }
+    return BST_OK;
+}
+
+static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
+    const bst_kernel_source *sources[] = {&bst_kernel_scene_shared, &bst_kernel_nodes,
+                                          &bst_kernel_splat, &bst_kernel_detector,
+                                          &bst_kernel_tile};
+    char options[128];
+    snprintf(options, sizeof options, "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d",
+             r->options.tile_width, r->options.tile_height, r->options.group, r->taps);
+    BST_TRY(bst_device_build(ctx, device, sources, 5, options, &r->program));
+    static const char *const names[3] = {"bst_scene_nodes", "bst_scene_frame",
+                                         "bst_scene_expected"};
+    cl_kernel *kernels[3] = {&r->nodes_kernel, &r->frame_kernel, &r->expected_kernel};
+    for (int i = 0; i < 3; i++) {
+        cl_int code;
+        *kernels[i] = clCreateKernel(r->program, names[i], &code);
+        BST_TRY(bst_device_check(ctx, code, names[i]));
+    }
+    return BST_OK;
+}
+
+/* [BST_PHASES + 1][taps]: shares of a profile centred phase / BST_PHASES right of a pixel. */
+static bst_status make_profiles(bst_ctx *ctx, bst_renderer *r) {
+    size_t bytes = (size_t)(BST_PHASES + 1) * (size_t)r->taps * sizeof(float);
+    float *table = malloc(bytes);
+    if (!table) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the PSF table");
+    }
+    double sigma = bst_camera_psf_sigma_px(&r->camera);
+    for (int p = 0; p <= BST_PHASES; p++) {
+        for (int j = 0; j < r->taps; j++) {
+            table[p * r->taps + j] = (float)bst_reference_pixel_share((double)p / BST_PHASES, sigma,
+                                                                      j - (r->taps / 2 - 1));
+        }
+    }
+    cl_int code;
+    r->profiles =
+        clCreateBuffer(r->context, CL_MEM_READ_ONLY | CL_MEM_COPY_HOST_PTR, bytes, table, &code);
+    free(table);
+    return bst_device_check(ctx, code, "allocating the PSF table");
+}
+
+/* Makes room for `bytes`; the content is lost when the buffer grows. */
+static bst_status grow(bst_ctx *ctx, bst_renderer *r, growing *g, size_t bytes) {
+    if (g->bytes >= bytes && g->buffer) {
+        return BST_OK;
+    }
+    if (g->buffer) {
+        clReleaseMemObject(g->buffer);
+        g->buffer = NULL;
+    }
+    size_t room = bytes > 2 * g->bytes ? bytes : 2 * g->bytes;
+    room = room < 4096 ? 4096 : room;
+    cl_int code;
+    g->buffer =
+        clCreateBuffer(r->context, CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR, room, NULL, &code);
+    g->bytes = room;
+    return bst_device_check(ctx, code, "allocating scene memory");
+}
+
+/* Copies through a mapping, which PoCL serves without a copy of its own. */
+static bst_status upload(bst_ctx *ctx, bst_renderer *r, growing *g, const void *data,
+                         size_t bytes) {
+    BST_TRY(grow(ctx, r, g, bytes));
+    if (bytes == 0) {
+        return BST_OK;
+    }
+    cl_int code;
+    void *p = clEnqueueMapBuffer(r->queue, g->buffer, CL_TRUE, CL_MAP_WRITE_INVALIDATE_REGION, 0,
+                                 bytes, 0, NULL, NULL, &code);
+    BST_TRY(bst_device_check(ctx, code, "mapping scene memory"));
+    memcpy(p, data, bytes);
+    return bst_device_check(ctx, clEnqueueUnmapMemObject(r->queue, g->buffer, p, 0, NULL, NULL),
+                            "unmapping scene memory");
+}
+
+bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
+                               const bst_renderer_options *options, bst_renderer **out) {
+    *out = NULL;
+    BST_TRY(check_camera(ctx, camera));
+    bst_renderer *r = calloc(1, sizeof *r);
+    if (!r) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the renderer");
+    }
+    r->camera = *camera;
+    r->options = options ? *options : bst_renderer_default_options();
+    r->taps = taps_for(bst_camera_psf_sigma_px(camera));
+    r->context = bst_device_context(device);
+    r->queue = bst_device_queue(device);
+    clRetainContext(r->context);
+    clRetainCommandQueue(r->queue);
+    bst_smear_options smear = {r->options.error_sigma, r->options.cut_sigma, r->taps};
+    bst_status status = choose_tiles(ctx, device, &r->options);
+    if (status == BST_OK) {
+        status = build(ctx, r, device);
+    }
+    if (status == BST_OK) {
+        status = make_profiles(ctx, r);
+    }
+    if (status == BST_OK) {
+        status = bst_smear_create(ctx, camera, &smear, &r->smear);
+    }
+    if (status == BST_OK) {
+        status = bst_frame_pool_create(ctx, device, (int)camera->width_px, (int)camera->height_px,
+                                       r->options.pool_frames, &r->pool);
+    }
+    if (status != BST_OK) {
+        bst_renderer_free(r);
+        return status;
+    }
+    *out = r;
+    return BST_OK;
+}
+
+void bst_renderer_free(bst_renderer *r) {
+    if (!r) {
+        return;
+    }
+    clFinish(r->queue);
+    cl_mem buffers[] = {r->profiles,         r->table.buffer,     r->sources.buffer,
+                        r->nodes.buffer,     r->block_box.buffer, r->source_box.buffer,
+                        r->saturated.buffer, r->expected.buffer};
+    for (size_t i = 0; i < sizeof buffers / sizeof *buffers; i++) {
+        if (buffers[i]) {
+            clReleaseMemObject(buffers[i]);
+        }
+    }
+    cl_kernel kernels[] = {r->nodes_kernel, r->frame_kernel, r->expected_kernel};
+    for (size_t i = 0; i < 3; i++) {
+        if (kernels[i]) {
+            clReleaseKernel(kernels[i]);
+        }
+    }
+    if (r->program) {
+        clReleaseProgram(r->program);
+    }
+    bst_frame_pool_free(r->pool);
+    bst_smear_free(r->smear);
+    clReleaseCommandQueue(r->queue);
+    clReleaseContext(r->context);
+    free(r->list);
+    free(r->peak_e);
+    free(r);
+}
+
+static bst_status check_request(bst_ctx *ctx, const bst_renderer *r, const bst_render_request *q) {
+    bst_window w = q->window;
+    if (w.x0 < 0 || w.y0 < 0 || w.width < 1 || w.height < 1 ||
+        w.x0 + (int64_t)w.width > r->camera.width_px ||
+        w.y0 + (int64_t)w.height > r->camera.height_px) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "the window of %d x %d pixels at (%d, %d) is not inside the sensor of "
+                        "%lld x %lld",
+                        w.width, w.height, w.x0, w.y0, (long long)r->camera.width_px,
+                        (long long)r->camera.height_px);
+    }
+    if (!(q->background_e >= 0.0) || !isfinite(q->background_e) || q->track->count < 2) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "a request needs a background that is finite and not negative (it is %g) "
+                        "and two samples of the line of sight (there are %d)",
+                        q->background_e, q->track->count);
+    }
+    return BST_OK;
+}
+
+/* Chooses nodes and stamps of all sources: fills list and stats. */
+static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q, int *blocks) {
+    if (q->count > r->list_capacity) {
+        int capacity = q->count > 2 * r->list_capacity ? q->count : 2 * r->list_capacity;
+        free(r->list);
+        free(r->peak_e);
+        r->list = malloc((size_t)capacity * sizeof *r->list);
+        r->peak_e = malloc((size_t)capacity * sizeof *r->peak_e);
+        r->list_capacity = r->list && r->peak_e ? capacity : 0;
+        if (r->list_capacity == 0) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d sources", q->count);
+        }
+    }
+    double read = r->camera.read_noise_e;
+    BST_TRY(bst_smear_begin(ctx, r->smear, q->track, q->background_e + read * read));
+    r->stats = (bst_render_stats){0};
+    *blocks = 0;
+    for (int i = 0; i < q->count; i++) {
+        bst_scene_source *s = &r->list[r->stats.sources];
+        bool visible;
+        BST_TRY(bst_smear_source(ctx, r->smear, &q->sources[i], s, &visible));
+        r->peak_e[i] = bst_smear_last_peak_e(r->smear);
+        if (visible) {
+            s->first_block = *blocks;
+            *blocks += s->blocks;
+            r->stats.sources++;
+            r->stats.predicted_sigma =
+                fmax(r->stats.predicted_sigma, bst_smear_last_error_sigma(r->smear));
+        }
+    }
+    r->stats.nodes = (long long)*blocks * BST_BLOCK;
+    return BST_OK;
+}
+
+static bst_status set_args(bst_ctx *ctx, cl_kernel kernel, const void *const *values,
+                           const size_t *bytes, int count) {
+    for (int i = 0; i < count; i++) {
+        BST_TRY(bst_device_check(ctx, clSetKernelArg(kernel, (cl_uint)i, bytes[i], values[i]),
+                                 "setting a kernel argument"));
+    }
+    return BST_OK;
+}
+
+/* Uploads sources and tables and enqueues the nodes kernel. *groups: groups of 16 sources. */
+static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, int blocks, int *groups) {
+    int table_blocks, count = r->stats.sources;
+    const float *table = bst_smear_table(r->smear, &table_blocks);
+    *groups = (count + BST_BLOCK - 1) / BST_BLOCK;
+    size_t block_bytes = BST_BLOCK * sizeof(float);
+    BST_TRY(upload(ctx, r, &r->table, table, (size_t)table_blocks * BST_TABLE_ROWS * block_bytes));
+    BST_TRY(upload(ctx, r, &r->sources, r->list, (size_t)count * sizeof *r->list));
+    BST_TRY(grow(ctx, r, &r->nodes, (size_t)blocks * 3 * block_bytes));
+    BST_TRY(grow(ctx, r, &r->block_box, (size_t)blocks * BOX_FLOATS * sizeof(float)));
+    BST_TRY(grow(ctx, r, &r->source_box, (size_t)*groups * BOX_FLOATS * block_bytes));
+    if (count == 0) {
+        return BST_OK;
+    }
+    float centre_x = (float)bst_camera_centre_x(&r->camera);
+    float centre_y = (float)bst_camera_centre_y(&r->camera);
+    const void *values[] = {
+        &r->sources.buffer, &count,           &r->table.buffer,     &centre_x,
+        &centre_y,          &r->nodes.buffer, &r->block_box.buffer, &r->source_box.buffer};
+    const size_t m = sizeof(cl_mem), f = sizeof(float);
+    const size_t bytes[] = {m, sizeof count, m, f, f, m, m, m};
+    BST_TRY(set_args(ctx, r->nodes_kernel, values, bytes, 8));
+    size_t global = (size_t)*groups * BST_BLOCK, local = BST_BLOCK;
+    return bst_device_check(
+        ctx,
+        clEnqueueNDRangeKernel(r->queue, r->nodes_kernel, 1, NULL, &global, &local, 0, NULL, NULL),
+        "placing the scene's nodes");
+}
+
+static bst_scene_params make_params(const bst_renderer *r, const bst_render_request *q,
+                                    int groups) {
+    const bst_camera *c = &r->camera;
+    bst_window w = q->window;
+    return (bst_scene_params){
+        .window_x0 = w.x0,
+        .window_y0 = w.y0,
+        .window_width = w.width,
+        .window_height = w.height,
+        .sensor_width = (int)c->width_px,
+        .tiles_x = (w.width + r->options.tile_width - 1) / r->options.tile_width,
+        .tiles_y = (w.height + r->options.tile_height - 1) / r->options.tile_height,
+        .source_groups = groups,
+        .key0 = q->key.k[0],
+        .key1 = q->key.k[1],
+        .exposure_low = (unsigned)((uint64_t)q->exposure_id & 0xFFFFFFFFu),
+        .exposure_high = (unsigned)((uint64_t)q->exposure_id >> 32),
+        .background_e = (float)q->background_e,
+        .read_noise_e = (float)c->read_noise_e,
+        .full_well_e = (float)c->full_well_e,
+        .dn_per_e = (float)(1.0 / c->gain_e_per_dn),
+        .offset_dn = (float)c->offset_dn,
+        .max_dn = (float)((1 << c->bits) - 1),
+    };
+}
+
+/* The common way of both kinds of image: the kernels' first six arguments are the same. */
+static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
+                                cl_kernel kernel, cl_mem out) {
+    int blocks = 0, groups = 0;
+    BST_TRY(plan(ctx, r, q, &blocks));
+    BST_TRY(enqueue_nodes(ctx, r, blocks, &groups));
+    bst_scene_params p = make_params(r, q, groups);
+    r->tiles = p.tiles_x * p.tiles_y;
+    size_t tiles = (size_t)r->tiles;
+    BST_TRY(grow(ctx, r, &r->saturated, tiles * sizeof(cl_int)));
+    const void *values[] = {&p,
+                            &r->sources.buffer,
+                            &r->nodes.buffer,
+                            &r->block_box.buffer,
+                            &r->source_box.buffer,
+                            &r->profiles,
+                            &out,
+                            &r->saturated.buffer};
+    const size_t m = sizeof(cl_mem), bytes[] = {sizeof p, m, m, m, m, m, m, m};
+    BST_TRY(set_args(ctx, kernel, values, bytes, kernel == r->frame_kernel ? 8 : 7));
+    size_t group = (size_t)r->options.group, global = (tiles + group - 1) / group * group;
+    BST_TRY(bst_device_check(
+        ctx, clEnqueueNDRangeKernel(r->queue, kernel, 1, NULL, &global, &group, 0, NULL, NULL),
+        "rendering a frame"));
+    return bst_device_check(ctx, clFlush(r->queue), "starting the rendering");
+}
+
+bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *r, const bst_render_request *request,
+                               bst_frame **out) {
+    *out = NULL;
+    BST_TRY(check_request(ctx, r, request));
+    bst_frame *frame;
+    cl_mem buffer;
+    BST_TRY(bst_frame_pool_take(ctx, r->pool, request->window.width, request->window.height, &frame,
+                                &buffer));
+    bst_status status = enqueue_tiles(ctx, r, request, r->frame_kernel, buffer);
+    if (status != BST_OK) {
+        bst_frame_release(frame);
+        return status;
+    }
+    *out = frame;
+    return BST_OK;
+}
+
+bst_status bst_renderer_render_noise_free(bst_ctx *ctx, bst_renderer *r,
+                                          const bst_render_request *request, float *image) {
+    BST_TRY(check_request(ctx, r, request));
+    size_t bytes = (size_t)request->window.width * (size_t)request->window.height * sizeof(float);
+    BST_TRY(grow(ctx, r, &r->expected, bytes));
+    BST_TRY(enqueue_tiles(ctx, r, request, r->expected_kernel, r->expected.buffer));
+    return bst_device_check(
+        ctx,
+        clEnqueueReadBuffer(r->queue, r->expected.buffer, CL_TRUE, 0, bytes, image, 0, NULL, NULL),
+        "reading a noise-free image");
+}
+
+bst_status bst_renderer_saturated(bst_ctx *ctx, bst_renderer *r, long long *pixels) {
+    *pixels = 0;
+    if (r->tiles == 0) {
+        return BST_OK;
+    }
+    cl_int code;
+    size_t bytes = (size_t)r->tiles * sizeof(cl_int);
+    cl_int *p = clEnqueueMapBuffer(r->queue, r->saturated.buffer, CL_TRUE, CL_MAP_READ, 0, bytes, 0,
+                                   NULL, NULL, &code);
+    BST_TRY(bst_device_check(ctx, code, "mapping the count of saturated pixels"));
+    for (int i = 0; i < r->tiles; i++) {
+        *pixels += p[i];
+    }
+    return bst_device_check(
+        ctx, clEnqueueUnmapMemObject(r->queue, r->saturated.buffer, p, 0, NULL, NULL),
+        "unmapping the count of saturated pixels");
+}
+
+void bst_renderer_get_stats(const bst_renderer *r, bst_render_stats *out) {
+    *out = r->stats;
+}
+
+double bst_renderer_peak_e(const bst_renderer *r, int index) {
+    return r->peak_e[index];
+}
+
+int bst_renderer_margin_px(const bst_renderer *r) {
+    return r->taps / 2 + 1;
+}

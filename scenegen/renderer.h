@@ -1,0 +1,78 @@
+/* The renderer: from a line-of-sight track and sources to a frame of digital numbers, on OpenCL.
+ *
+ * Every source has its own track through the exposure. Its light is a sum of weighted nodes, each
+ * the product of two pixel-integrated Gaussian profiles; nodes are as many as the source's
+ * brightness needs. Then shot noise, full well, read noise, gain, offset and quantisation. Noise is
+ * keyed by (key, exposure, pixel of the full sensor): the same bytes come from any number of
+ * threads, work-group size and window. */
+#ifndef BST_SCENEGEN_RENDERER_H
+#define BST_SCENEGEN_RENDERER_H
+
+#include "sim/core/rng.h"
+#include "sim/device/device.h"
+#include "sim/world/field.h"
+
+typedef struct bst_renderer bst_renderer;
+
+typedef struct bst_renderer_options {
+    double error_sigma; /* aim for the error of each source's image in any pixel, in sigma of that
+                           pixel (default 0.03) */
+    double cut_sigma; /* light per pixel that a stamp may leave out, in sigma of a dark pixel (0.02)
+                       */
+    int pool_frames;  /* frames that may be alive at a time (4) */
+    int tile_width, tile_height, group; /* pixels per work-item (width a multiple of 16) and
+                                           work-items per group; 0: chosen for the device */
+} bst_renderer_options;
+
+bst_renderer_options bst_renderer_default_options(void);
+
+/* Builds the kernels and allocates. `options` may be NULL. BST_ERR_ARGUMENT for a camera that
+ * cannot be drawn (psf_fwhm_px above 70, no pixels, bits outside 8..16). */
+bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
+                               const bst_renderer_options *options,
+                               bst_renderer **out) BST_MUST_CHECK;
+/* Frames that are still referenced stay valid. */
+void bst_renderer_free(bst_renderer *renderer);
+
+/* One exposure. Pointers are borrowed for the call. */
+typedef struct bst_render_request {
+    bst_window window;          /* inside the sensor */
+    const bst_los_track *track; /* its last time is the exposure's duration */
+    const bst_source *sources;
+    int count;
+    double background_e; /* expected electrons per pixel: sky and dark current */
+    bst_rng_key key;
+    int64_t exposure_id;
+} bst_render_request;
+
+/* What the latest rendering took and did. */
+typedef struct bst_render_stats {
+    int sources;            /* drawn */
+    long long nodes;        /* all sources, filled blocks included */
+    double predicted_sigma; /* largest predicted error of a source's image, sigma */
+} bst_render_stats;
+
+/* Renders; does not wait. *out gets a frame with one reference. */
+bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *renderer,
+                               const bst_render_request *request, bst_frame **out) BST_MUST_CHECK;
+
+/* The same sources and nodes without noise or detector: expected electrons per pixel (background
+ * included), [height][width]. Waits. */
+bst_status bst_renderer_render_noise_free(bst_ctx *ctx, bst_renderer *renderer,
+                                          const bst_render_request *request,
+                                          float *image) BST_MUST_CHECK;
+
+/* Pixels of the latest frame with a full well or the highest digital number. Waits for it. */
+bst_status bst_renderer_saturated(bst_ctx *ctx, bst_renderer *renderer,
+                                  long long *pixels) BST_MUST_CHECK;
+
+void bst_renderer_get_stats(const bst_renderer *renderer, bst_render_stats *out);
+
+/* Expected electrons of source `index` (of the latest request) in its brightest pixel, without
+ * background. */
+double bst_renderer_peak_e(const bst_renderer *renderer, int index);
+
+/* Pixels outside the window from which a source can still light it. */
+int bst_renderer_margin_px(const bst_renderer *renderer);
+
+#endif

@@ -1,0 +1,318 @@
+#include "scenegen/smear.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "scenegen/nodes.h"
+#include "scenegen/reference.h"
+
+/* Fidelities: level n is right to about 0.03 * 10^(-n/2) of the smeared image's peak. */
+enum { LEVELS = 10, TABLE_FLOATS = BST_TABLE_ROWS * BST_BLOCK, MAX_TAPS = 512 };
+
+typedef struct level {
+    int first_block, blocks; /* blocks 0: not made in this frame */
+} level;
+
+struct bst_smear {
+    bst_camera camera;
+    bst_smear_options options;
+    double sigma_px;
+    double tail[MAX_TAPS / 2]; /* profile at r px from the centre, over the centre's */
+    double tolerance[LEVELS];
+    double half_diagonal_px;
+
+    bst_los_track track;
+    double dark_variance_e2, duration_s;
+    bst_quat q_reference;
+    double star_share; /* largest share of a star's light on one pixel */
+    double last_peak_e, last_error_sigma;
+    level levels[LEVELS];
+
+    bst_path_point *path, *own_path;
+    int path_count, path_capacity, own_capacity;
+    bst_node_list nodes; /* scratch */
+    float *table;
+    int table_blocks, table_capacity;
+};
+
+bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
+                            const bst_smear_options *options, bst_smear **out) {
+    bst_smear *s = calloc(1, sizeof *s);
+    *out = s;
+    if (!s) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the smear of an exposure");
+    }
+    s->camera = *camera;
+    s->options = *options;
+    s->sigma_px = bst_camera_psf_sigma_px(camera);
+    double centre = bst_reference_pixel_share(0.0, s->sigma_px, 0);
+    for (int r = 0; r < MAX_TAPS / 2; r++) {
+        s->tail[r] = bst_reference_pixel_share(0.0, s->sigma_px, r) / centre;
+    }
+    for (int n = 0; n < LEVELS; n++) {
+        s->tolerance[n] = 0.03 * pow(10.0, -0.5 * n);
+    }
+    s->half_diagonal_px = 0.5 * hypot((double)camera->width_px, (double)camera->height_px);
+    return BST_OK;
+}
+
+void bst_smear_free(bst_smear *s) {
+    if (s) {
+        free(s->path);
+        free(s->own_path);
+        free(s->nodes.items);
+        free(s->table);
+        free(s);
+    }
+}
+
+static bst_status reserve(bst_ctx *ctx, void **items, int *capacity, int need, size_t bytes) {
+    if (need <= *capacity) {
+        return BST_OK;
+    }
+    int grown = need > 2 * *capacity ? need : 2 * *capacity;
+    void *p = realloc(*items, (size_t)grown * bytes);
+    if (!p) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d points of a smear", grown);
+    }
+    *items = p;
+    *capacity = grown;
+    return BST_OK;
+}
+
+/* Into how many straight parts the path from sample k to k + 1 goes: the attitude turns about one
+ * axis, the image of it bends. */
+static int parts_of(const bst_smear *s, int k) {
+    const bst_quat *q = s->track.q_cam_from_gcrf;
+    bst_vec3 r = bst_quat_to_rotvec(bst_quat_mul(q[k + 1], bst_quat_conj(q[k])));
+    double n = ceil(bst_vec3_norm(r) / 1e-3);
+    return n > 64.0 ? 64 : n < 1.0 ? 1 : (int)n;
+}
+
+static bst_quat attitude_at(const bst_los_track *track, double time_s) {
+    int k = 0;
+    while (k + 2 < track->count && track->time_s[k + 1] < time_s) {
+        k++;
+    }
+    double dt = track->time_s[k + 1] - track->time_s[k];
+    double u = dt > 0.0 ? (time_s - track->time_s[k]) / dt : 0.0;
+    return bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
+}
+
+/* The camera's turn from the reference attitude as a path point: two tilts in pixels of image
+ * motion, and roll by what it moves in the sensor's corners. */
+static bst_path_point attitude_point(const bst_smear *s, bst_quat q, double time) {
+    bst_vec3 r = bst_quat_to_rotvec(bst_quat_mul(q, bst_quat_conj(s->q_reference)));
+    double scale = 1.0 / bst_camera_scale_rad(&s->camera);
+    return (bst_path_point){{r.x * scale, r.y * scale, r.z * s->half_diagonal_px}, time};
+}
+
+/* Appends nodes to the table in whole blocks; to_table fills one column of BST_TABLE_ROWS. */
+static bst_status append_nodes(bst_ctx *ctx, bst_smear *s, const bst_node_list *list,
+                               void (*to_table)(const bst_smear *, const bst_node *, float *),
+                               level *out) {
+    int blocks = (list->count + BST_BLOCK - 1) / BST_BLOCK;
+    BST_TRY(reserve(ctx, (void **)&s->table, &s->table_capacity, s->table_blocks + blocks,
+                    TABLE_FLOATS * sizeof(float)));
+    *out = (level){s->table_blocks, blocks};
+    s->table_blocks += blocks;
+    for (int n = 0; n < blocks * BST_BLOCK; n++) {
+        float *block = s->table + (size_t)(out->first_block + n / BST_BLOCK) * TABLE_FLOATS;
+        /* the last block is filled up with dark copies of the last node */
+        to_table(s, &list->items[n < list->count ? n : list->count - 1], block + n % BST_BLOCK);
+        if (n >= list->count) {
+            block[9 * BST_BLOCK + n % BST_BLOCK] = 0.0f;
+        }
+    }
+    return BST_OK;
+}
+
+/* Node of the camera's turn: v_node = M v_reference as a map of the tangent plane in pixels,
+ * x' - x = ((m00 - m22) x + m01 y + m02 / a - x d) / (d + m22), d = a (m20 x + m21 y). */
+static void attitude_to_table(const bst_smear *s, const bst_node *node, float *t) {
+    double a = bst_camera_scale_rad(&s->camera);
+    bst_quat q = bst_quat_from_rotvec(
+        (bst_vec3){node->p[0] * a, node->p[1] * a, node->p[2] / s->half_diagonal_px});
+    bst_mat3 m = bst_quat_to_mat3(q);
+    double rows[BST_TABLE_ROWS] = {
+        m.m[0][0] - m.m[2][2], m.m[0][1],     m.m[0][2] / a, m.m[1][0], m.m[1][1] - m.m[2][2],
+        m.m[1][2] / a,         m.m[2][0] * a, m.m[2][1] * a, m.m[2][2], node->weight};
+    for (int i = 0; i < BST_TABLE_ROWS; i++) {
+        t[i * BST_BLOCK] = (float)rows[i];
+    }
+}
+
+/* Node of an own path: a shift of the image. */
+static void shift_to_table(const bst_smear *s, const bst_node *node, float *t) {
+    (void)s;
+    double rows[BST_TABLE_ROWS] = {0, 0, node->p[0], 0, 0, node->p[1], 0, 0, 1.0, node->weight};
+    for (int i = 0; i < BST_TABLE_ROWS; i++) {
+        t[i * BST_BLOCK] = (float)rows[i];
+    }
+}
+
+static bst_status make_level(bst_ctx *ctx, bst_smear *s, int n) {
+    if (s->levels[n].blocks == 0) {
+        s->nodes.count = 0;
+        BST_TRY(bst_nodes_from_path(ctx, s->path, s->path_count, s->sigma_px, s->tolerance[n],
+                                    &s->nodes));
+        BST_TRY(append_nodes(ctx, s, &s->nodes, attitude_to_table, &s->levels[n]));
+    }
+    return BST_OK;
+}
+
+bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_los_track *track,
+                           double dark_variance_e2) {
+    s->track = *track;
+    s->dark_variance_e2 = fmax(dark_variance_e2, 1e-2);
+    s->duration_s = track->time_s[track->count - 1];
+    s->q_reference = attitude_at(track, 0.5 * s->duration_s);
+    s->table_blocks = s->path_count = 0;
+    for (int n = 0; n < LEVELS; n++) {
+        s->levels[n].blocks = 0;
+    }
+    double inverse = s->duration_s > 0.0 ? 1.0 / s->duration_s : 0.0;
+    for (int k = 0; k + 1 < track->count; k++) {
+        int parts = parts_of(s, k);
+        BST_TRY(reserve(ctx, (void **)&s->path, &s->path_capacity, s->path_count + parts + 1,
+                        sizeof *s->path));
+        for (int n = 0; n < parts + (k + 2 == track->count); n++) {
+            double u = (double)n / parts;
+            bst_quat q =
+                bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
+            double t = track->time_s[k] + u * (track->time_s[k + 1] - track->time_s[k]);
+            s->path[s->path_count++] = attitude_point(s, q, t * inverse);
+        }
+    }
+    BST_TRY(make_level(ctx, s, 0));
+    s->star_share = bst_nodes_peak_share(s->nodes.items, s->nodes.count, s->sigma_px);
+    return BST_OK;
+}
+
+/* The coarsest level whose predicted error is within the aim. */
+static int choose_level(bst_smear *s, double peak_e) {
+    double sigmas = peak_e / sqrt(peak_e + s->dark_variance_e2);
+    int n = 0;
+    while (n + 1 < LEVELS && s->tolerance[n] * sigmas > s->options.error_sigma) {
+        n++;
+    }
+    s->last_error_sigma = s->tolerance[n] * sigmas;
+    return n;
+}
+
+/* Rows beyond the two nearest pixels: what lies outside stays under the cut. */
+static int choose_radius(const bst_smear *s, double peak_e) {
+    double limit = s->options.cut_sigma * sqrt(s->dark_variance_e2);
+    int most = s->options.taps / 2 - 1, r = 1;
+    while (r < most && peak_e * s->tail[r + 1] > limit) {
+        r++;
+    }
+    return r;
+}
+
+static bool project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, double *y) {
+    bst_vec3 c = bst_quat_rotate(q, v);
+    if (!bst_camera_project(&s->camera, c, x, y)) {
+        return false;
+    }
+    *x -= bst_camera_centre_x(&s->camera);
+    *y -= bst_camera_centre_y(&s->camera);
+    return fabs(*x) < 1e6 && fabs(*y) < 1e6;
+}
+
+static bst_vec3 direction_at(const bst_source *source, double u) {
+    double a = 2.0 * (u - 0.5) * (u - 1.0), b = 4.0 * u * (1.0 - u), c = 2.0 * u * (u - 0.5);
+    return bst_vec3_axpy(
+        bst_vec3_axpy(bst_vec3_scale(source->apparent_start, a), b, source->apparent_mid), c,
+        source->apparent_end);
+}
+
+static bool moves(const bst_source *source) {
+    return bst_vec3_norm(bst_vec3_sub(source->apparent_start, source->apparent_mid)) > 0.0 ||
+           bst_vec3_norm(bst_vec3_sub(source->apparent_end, source->apparent_mid)) > 0.0;
+}
+
+/* A moving source's path over the image, relative to (x0, y0). */
+static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_source *source, double x0,
+                           double y0, int *count, bool *visible) {
+    const bst_los_track *track = &s->track;
+    int least = 16 / track->count + 1; /* the motion is curved even where the attitude is not */
+    *count = 0;
+    *visible = true;
+    for (int k = 0; k + 1 < track->count; k++) {
+        int parts = parts_of(s, k);
+        parts = parts < least ? least : parts;
+        BST_TRY(reserve(ctx, (void **)&s->own_path, &s->own_capacity, *count + parts + 1,
+                        sizeof *s->own_path));
+        for (int n = 0; n < parts + (k + 2 == track->count); n++) {
+            double u = (double)n / parts, x, y;
+            double t = track->time_s[k] + u * (track->time_s[k + 1] - track->time_s[k]);
+            t = s->duration_s > 0.0 ? t / s->duration_s : 0.0;
+            bst_quat q =
+                bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
+            if (!project(s, q, direction_at(source, t), &x, &y)) {
+                *visible = false;
+                return BST_OK;
+            }
+            s->own_path[(*count)++] = (bst_path_point){{x - x0, y - y0, 0.0}, t};
+        }
+    }
+    return BST_OK;
+}
+
+bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source,
+                            bst_scene_source *out, bool *visible) {
+    double x, y, electrons = source->electrons_per_s * s->duration_s;
+    s->last_peak_e = 0.0;
+    *visible = !source->occulted && electrons > 0.0 && electrons < 1e30 &&
+               project(s, s->q_reference, source->apparent_mid, &x, &y);
+    if (!*visible) {
+        return BST_OK;
+    }
+    level own;
+    const level *used;
+    if (moves(source)) {
+        int count;
+        BST_TRY(own_path(ctx, s, source, x, y, &count, visible));
+        if (!*visible) {
+            return BST_OK;
+        }
+        s->nodes.count = 0;
+        BST_TRY(
+            bst_nodes_from_path(ctx, s->own_path, count, s->sigma_px, s->tolerance[0], &s->nodes));
+        s->last_peak_e =
+            electrons * bst_nodes_peak_share(s->nodes.items, s->nodes.count, s->sigma_px);
+        s->nodes.count = 0;
+        BST_TRY(bst_nodes_from_path(ctx, s->own_path, count, s->sigma_px,
+                                    s->tolerance[choose_level(s, s->last_peak_e)], &s->nodes));
+        BST_TRY(append_nodes(ctx, s, &s->nodes, shift_to_table, &own));
+        used = &own;
+    } else {
+        s->last_peak_e = electrons * s->star_share;
+        int n = choose_level(s, s->last_peak_e);
+        BST_TRY(make_level(ctx, s, n));
+        used = &s->levels[n];
+    }
+    int radius = choose_radius(s, s->last_peak_e);
+    *out = (bst_scene_source){.x_px = (float)x,
+                              .y_px = (float)y,
+                              .electrons = (float)electrons,
+                              .first_table = used->first_block,
+                              .blocks = used->blocks,
+                              .radius = radius,
+                              .chunks = (2 * radius + 2 + 15) / 16};
+    return BST_OK;
+}
+
+double bst_smear_last_peak_e(const bst_smear *s) {
+    return s->last_peak_e;
+}
+
+double bst_smear_last_error_sigma(const bst_smear *s) {
+    return s->last_error_sigma;
+}
+
+const float *bst_smear_table(const bst_smear *s, int *blocks) {
+    *blocks = s->table_blocks;
+    return s->table;
+}

@@ -1,0 +1,42 @@
+/* The smear of one exposure: node tables that stars share, own ones for what moves by itself, and
+ * for each source how finely it is drawn. */
+#ifndef BST_SCENEGEN_SMEAR_H
+#define BST_SCENEGEN_SMEAR_H
+
+#include <stdbool.h>
+
+#include "scenegen/kernels/scene_shared.h"
+#include "sim/world/field.h"
+
+typedef struct bst_smear bst_smear;
+
+typedef struct bst_smear_options {
+    double error_sigma; /* aim: error of a source's image in any pixel, in that pixel's sigma */
+    double cut_sigma;   /* light per pixel outside the stamp, in sigma of a dark pixel */
+    int taps;           /* length of the profile table, px */
+} bst_smear_options;
+
+bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
+                            const bst_smear_options *options, bst_smear **out) BST_MUST_CHECK;
+void bst_smear_free(bst_smear *smear);
+
+/* Starts a frame: takes the line-of-sight track (needed until the frame's last source) and the
+ * noise variance of a dark pixel (background, dark and read noise), e-^2. */
+bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *smear, const bst_los_track *track,
+                           double dark_variance_e2) BST_MUST_CHECK;
+
+/* Chooses a source's nodes and stamp. *visible is false for one that gives no light (occulted, not
+ * in front of the camera); *out is then untouched. first_block is left 0. */
+bst_status bst_smear_source(bst_ctx *ctx, bst_smear *smear, const bst_source *source,
+                            bst_scene_source *out, bool *visible) BST_MUST_CHECK;
+
+/* Largest expected electrons in one pixel of the source given last. */
+double bst_smear_last_peak_e(const bst_smear *smear);
+
+/* Predicted error of the image of the source given last, in sigma of its worst pixel. */
+double bst_smear_last_error_sigma(const bst_smear *smear);
+
+/* The frame's node table so far: *blocks blocks of BST_TABLE_ROWS x BST_BLOCK floats. */
+const float *bst_smear_table(const bst_smear *smear, int *blocks);
+
+#endif

@@ -1,0 +1,317 @@
+#include "sim/device/device.h"
+
+#include <ctype.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MAX_PLATFORMS = 16, MAX_DEVICES = 32, NAME_BYTES = 256 };
+
+struct bst_device {
+    cl_device_id parent, id; /* equal unless a sub-device was made */
+    cl_context context;
+    cl_command_queue queue;
+    char description[4 * NAME_BYTES];
+};
+
+static const struct {
+    cl_int code;
+    const char *name;
+} code_names[] = {
+    {CL_DEVICE_NOT_FOUND, "CL_DEVICE_NOT_FOUND"},
+    {CL_DEVICE_NOT_AVAILABLE, "CL_DEVICE_NOT_AVAILABLE"},
+    {CL_COMPILER_NOT_AVAILABLE, "CL_COMPILER_NOT_AVAILABLE"},
+    {CL_MEM_OBJECT_ALLOCATION_FAILURE, "CL_MEM_OBJECT_ALLOCATION_FAILURE"},
+    {CL_OUT_OF_RESOURCES, "CL_OUT_OF_RESOURCES"},
+    {CL_OUT_OF_HOST_MEMORY, "CL_OUT_OF_HOST_MEMORY"},
+    {CL_BUILD_PROGRAM_FAILURE, "CL_BUILD_PROGRAM_FAILURE"},
+    {CL_MAP_FAILURE, "CL_MAP_FAILURE"},
+    {CL_DEVICE_PARTITION_FAILED, "CL_DEVICE_PARTITION_FAILED"},
+    {CL_INVALID_VALUE, "CL_INVALID_VALUE"},
+    {CL_INVALID_DEVICE, "CL_INVALID_DEVICE"},
+    {CL_INVALID_CONTEXT, "CL_INVALID_CONTEXT"},
+    {CL_INVALID_MEM_OBJECT, "CL_INVALID_MEM_OBJECT"},
+    {CL_INVALID_BUILD_OPTIONS, "CL_INVALID_BUILD_OPTIONS"},
+    {CL_INVALID_PROGRAM, "CL_INVALID_PROGRAM"},
+    {CL_INVALID_KERNEL_NAME, "CL_INVALID_KERNEL_NAME"},
+    {CL_INVALID_KERNEL, "CL_INVALID_KERNEL"},
+    {CL_INVALID_ARG_INDEX, "CL_INVALID_ARG_INDEX"},
+    {CL_INVALID_ARG_VALUE, "CL_INVALID_ARG_VALUE"},
+    {CL_INVALID_ARG_SIZE, "CL_INVALID_ARG_SIZE"},
+    {CL_INVALID_KERNEL_ARGS, "CL_INVALID_KERNEL_ARGS"},
+    {CL_INVALID_WORK_GROUP_SIZE, "CL_INVALID_WORK_GROUP_SIZE"},
+    {CL_INVALID_BUFFER_SIZE, "CL_INVALID_BUFFER_SIZE"},
+    {CL_INVALID_GLOBAL_WORK_SIZE, "CL_INVALID_GLOBAL_WORK_SIZE"},
+    {-1001, "CL_PLATFORM_NOT_FOUND_KHR"},
+};
+
+bst_status bst_device_check(bst_ctx *ctx, cl_int code, const char *what) {
+    if (code == CL_SUCCESS) {
+        return BST_OK;
+    }
+    for (size_t i = 0; i < sizeof code_names / sizeof *code_names; i++) {
+        if (code_names[i].code == code) {
+            return bst_fail(ctx, BST_ERR_DEVICE, "%s: %s", what, code_names[i].name);
+        }
+    }
+    return bst_fail(ctx, BST_ERR_DEVICE, "%s: OpenCL error %d", what, (int)code);
+}
+
+typedef struct candidate {
+    cl_device_id id;
+    int platform_index, device_index;
+    bool cpu, pocl;
+    char platform[NAME_BYTES], name[NAME_BYTES];
+} candidate;
+
+static void device_string(cl_device_id id, cl_device_info what, char *out, size_t bytes) {
+    if (clGetDeviceInfo(id, what, bytes, out, NULL) != CL_SUCCESS) {
+        snprintf(out, bytes, "unknown");
+    }
+}
+
+static bst_status list_devices(bst_ctx *ctx, candidate *list, int *count) {
+    cl_platform_id platforms[MAX_PLATFORMS];
+    cl_uint platform_count = 0;
+    cl_int code = clGetPlatformIDs(MAX_PLATFORMS, platforms, &platform_count);
+    if (code != CL_SUCCESS || platform_count == 0) {
+        return bst_fail(ctx, BST_ERR_DEVICE,
+                        "no OpenCL platform found: install one (Debian: pocl-opencl-icd)");
+    }
+    *count = 0;
+    for (cl_uint p = 0; p < platform_count && p < MAX_PLATFORMS; p++) {
+        char platform[NAME_BYTES] = "unknown";
+        if (clGetPlatformInfo(platforms[p], CL_PLATFORM_NAME, sizeof platform, platform, NULL) !=
+            CL_SUCCESS) {
+            continue;
+        }
+        cl_device_id ids[MAX_DEVICES];
+        cl_uint n = 0;
+        if (clGetDeviceIDs(platforms[p], CL_DEVICE_TYPE_ALL, MAX_DEVICES, ids, &n) != CL_SUCCESS) {
+            continue;
+        }
+        for (cl_uint d = 0; d < n && d < MAX_DEVICES && *count < MAX_DEVICES; d++) {
+            candidate *c = &list[(*count)++];
+            *c = (candidate){.id = ids[d], .platform_index = (int)p, .device_index = (int)d};
+            snprintf(c->platform, sizeof c->platform, "%s", platform);
+            device_string(ids[d], CL_DEVICE_NAME, c->name, sizeof c->name);
+            cl_device_type type = 0;
+            if (clGetDeviceInfo(ids[d], CL_DEVICE_TYPE, sizeof type, &type, NULL) == CL_SUCCESS) {
+                c->cpu = (type & CL_DEVICE_TYPE_CPU) != 0;
+            }
+            c->pocl = strstr(platform, "Portable Computing Language") != NULL;
+        }
+    }
+    if (*count == 0) {
+        return bst_fail(ctx, BST_ERR_DEVICE, "the OpenCL platforms offer no device");
+    }
+    return BST_OK;
+}
+
+static bool contains_ignoring_case(const char *text, const char *part) {
+    for (; *text; text++) {
+        size_t i = 0;
+        while (part[i] && tolower((unsigned char)text[i]) == tolower((unsigned char)part[i])) {
+            i++;
+        }
+        if (!part[i]) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static int choose(const candidate *list, int count, const char *selector) {
+    if (!*selector) {
+        for (int i = 0; i < count; i++) {
+            if (list[i].pocl && list[i].cpu) {
+                return i;
+            }
+        }
+        return 0;
+    }
+    int p, d, end = 0;
+    if (sscanf(selector, "%d:%d%n", &p, &d, &end) == 2 && selector[end] == '\0') {
+        for (int i = 0; i < count; i++) {
+            if (list[i].platform_index == p && list[i].device_index == d) {
+                return i;
+            }
+        }
+        return -1;
+    }
+    for (int i = 0; i < count; i++) {
+        if (contains_ignoring_case(list[i].platform, selector) ||
+            contains_ignoring_case(list[i].name, selector)) {
+            return i;
+        }
+    }
+    return -1;
+}
+
+static bst_status unknown_selector(bst_ctx *ctx, const char *selector, const candidate *list,
+                                   int count) {
+    char text[BST_MESSAGE_BYTES / 2] = "";
+    size_t used = 0;
+    for (int i = 0; i < count && used < sizeof text; i++) {
+        int n =
+            snprintf(text + used, sizeof text - used, "%s%d:%d %s / %s", i ? "; " : "",
+                     list[i].platform_index, list[i].device_index, list[i].platform, list[i].name);
+        used += n > 0 ? (size_t)n : 0;
+    }
+    return bst_fail(ctx, BST_ERR_NOT_FOUND, "no OpenCL device matches \"%s\"; there is: %s",
+                    selector, text);
+}
+
+static bst_status limit_threads(bst_ctx *ctx, bst_device *device, const candidate *c, int threads,
+                                cl_uint *units) {
+    BST_TRY(bst_device_check(
+        ctx, clGetDeviceInfo(c->id, CL_DEVICE_MAX_COMPUTE_UNITS, sizeof *units, units, NULL),
+        "asking for the number of compute units"));
+    if (threads <= 0 || !c->cpu || (cl_uint)threads >= *units) {
+        return BST_OK;
+    }
+    cl_device_partition_property properties[] = {CL_DEVICE_PARTITION_BY_COUNTS, threads,
+                                                 CL_DEVICE_PARTITION_BY_COUNTS_LIST_END, 0};
+    cl_device_id sub;
+    cl_int code = clCreateSubDevices(c->id, properties, 1, &sub, NULL);
+    if (code != CL_SUCCESS) {
+        char what[64];
+        snprintf(what, sizeof what, "limiting the device to %d threads", threads);
+        return bst_device_check(ctx, code, what);
+    }
+    device->id = sub;
+    *units = (cl_uint)threads;
+    return BST_OK;
+}
+
+bst_status bst_device_open(bst_ctx *ctx, const char *selector, int threads, bst_device **out) {
+    *out = NULL;
+    candidate *list = calloc(MAX_DEVICES, sizeof *list);
+    bst_device *device = calloc(1, sizeof *device);
+    bst_status status = BST_OK;
+    if (!list || !device) {
+        status = bst_fail(ctx, BST_ERR_MEMORY, "no memory for the OpenCL device");
+        goto exit;
+    }
+    int count = 0;
+    if ((status = list_devices(ctx, list, &count)) != BST_OK) {
+        goto exit;
+    }
+    int chosen = choose(list, count, selector ? selector : "");
+    if (chosen < 0) {
+        status = unknown_selector(ctx, selector, list, count);
+        goto exit;
+    }
+    const candidate *c = &list[chosen];
+    device->parent = device->id = c->id;
+    cl_uint units = 1;
+    if ((status = limit_threads(ctx, device, c, threads, &units)) != BST_OK) {
+        goto exit;
+    }
+    cl_int code;
+    device->context = clCreateContext(NULL, 1, &device->id, NULL, NULL, &code);
+    if ((status = bst_device_check(ctx, code, "creating the OpenCL context")) != BST_OK) {
+        goto exit;
+    }
+    device->queue = clCreateCommandQueue(device->context, device->id, 0, &code);
+    if ((status = bst_device_check(ctx, code, "creating the OpenCL queue")) != BST_OK) {
+        goto exit;
+    }
+    char version[NAME_BYTES];
+    device_string(c->id, CL_DRIVER_VERSION, version, sizeof version);
+    snprintf(device->description, sizeof device->description, "%s %s: %s, %u compute unit%s",
+             c->pocl ? "PoCL" : c->platform, version, c->name, (unsigned)units,
+             units == 1 ? "" : "s");
+    *out = device;
+    device = NULL;
+exit:
+    bst_device_close(device);
+    free(list);
+    return status;
+}
+
+void bst_device_close(bst_device *device) {
+    if (!device) {
+        return;
+    }
+    if (device->queue) {
+        clFinish(device->queue);
+        clReleaseCommandQueue(device->queue);
+    }
+    if (device->context) {
+        clReleaseContext(device->context);
+    }
+    if (device->id != device->parent) {
+        clReleaseDevice(device->id);
+    }
+    free(device);
+}
+
+cl_context bst_device_context(const bst_device *device) {
+    return device->context;
+}
+cl_command_queue bst_device_queue(const bst_device *device) {
+    return device->queue;
+}
+cl_device_id bst_device_id(const bst_device *device) {
+    return device->id;
+}
+const char *bst_device_description(const bst_device *device) {
+    return device->description;
+}
+
+/* The log's first lines, as much as a message holds. */
+static bst_status build_failure(bst_ctx *ctx, const bst_device *device, cl_program program,
+                                const char *first_name) {
+    size_t bytes = 0;
+    clGetProgramBuildInfo(program, device->id, CL_PROGRAM_BUILD_LOG, 0, NULL, &bytes);
+    char *log = calloc(bytes + 1, 1);
+    if (log && bytes) {
+        clGetProgramBuildInfo(program, device->id, CL_PROGRAM_BUILD_LOG, bytes, log, NULL);
+    }
+    bst_status status =
+        bst_fail(ctx, BST_ERR_DEVICE, "building OpenCL kernels (%s ...) for %s failed:\n%.700s",
+                 first_name, device->description, log && *log ? log : "(no log)");
+    free(log);
+    return status;
+}
+
+bst_status bst_device_build(bst_ctx *ctx, bst_device *device,
+                            const bst_kernel_source *const *sources, int count, const char *options,
+                            cl_program *out) {
+    *out = NULL;
+    /* a #line before each text, so that the log names the file */
+    const char **texts = calloc((size_t)count * 2, sizeof *texts);
+    char(*lines)[NAME_BYTES] = calloc((size_t)count, sizeof *lines);
+    cl_program program = NULL;
+    bst_status status = BST_OK;
+    if (!texts || !lines) {
+        status = bst_fail(ctx, BST_ERR_MEMORY, "no memory for the kernel sources");
+        goto exit;
+    }
+    for (int i = 0; i < count; i++) {
+        snprintf(lines[i], sizeof lines[i], "\n#line 1 \"%s\"\n", sources[i]->name);
+        texts[2 * i] = lines[i];
+        texts[2 * i + 1] = sources[i]->text;
+    }
+    cl_int code;
+    program = clCreateProgramWithSource(device->context, (cl_uint)count * 2, texts, NULL, &code);
+    if ((status = bst_device_check(ctx, code, "creating an OpenCL program")) != BST_OK) {
+        goto exit;
+    }
+    code = clBuildProgram(program, 1, &device->id, options ? options : "", NULL, NULL);
+    if (code != CL_SUCCESS) {
+        status = build_failure(ctx, device, program, sources[0]->name);
+        goto exit;
+    }
+    *out = program;
+    program = NULL;
+exit:
+    if (program) {
+        clReleaseProgram(program);
+    }
+    free(texts);
+    free(lines);
+    return status;
+}

@@ -1,0 +1,290 @@
+#include "sim/engine/engine.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "sim/engine/engine_internal.h"
+
+bst_status bst_engine_create(bst_ctx *ctx, int64_t tick_rate_hz, bst_engine **out) {
+    *out = NULL;
+    if (tick_rate_hz < 1 || tick_rate_hz > 1000000) {
+        return bst_fail(ctx, BST_ERR_CONFIG, "tick rate %lld Hz: allowed are 1 to 1000000",
+                        (long long)tick_rate_hz);
+    }
+    bst_engine *engine = calloc(1, sizeof *engine);
+    if (!engine) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the engine");
+    }
+    engine->tick_rate_hz = tick_rate_hz;
+    engine->tick = -1;
+    *out = engine;
+    return BST_OK;
+}
+
+void bst_engine_free(bst_engine *engine) {
+    if (!engine) {
+        return;
+    }
+    /* what the channels own goes back to its makers before they are destroyed */
+    for (int c = 0; c < engine->channel_count; c++) {
+        channel *ch = &engine->channels[c];
+        for (int s = 0; ch->slots && s < ch->depth; s++) {
+            if (ch->slots[s].owned && ch->type->release) {
+                ch->type->release(ch->slots[s].payload);
+            }
+            free(ch->slots[s].payload);
+        }
+        free(ch->slots);
+    }
+    free(engine->channels);
+    for (int i = engine->instance_count - 1; i >= 0; i--) {
+        instance *self = engine->instances[i];
+        if (self->created) {
+            self->spec.desc->destroy(self->self);
+        }
+        free(self->scope);
+        free(self->name);
+        free(self);
+    }
+    free(engine->instances);
+    free(engine);
+}
+
+void bst_engine_set_hooks(bst_engine *engine, const bst_engine_hooks *hooks) {
+    engine->hooks = *hooks;
+}
+
+bst_status bst_engine_add(bst_ctx *ctx, bst_engine *engine, const bst_instance_spec *spec) {
+    if (engine->loaded) {
+        return bst_fail(ctx, BST_ERR_STATE, "%s: modules are added before loading", spec->instance);
+    }
+    if (spec->desc->abi != BST_MODULE_ABI) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "%s: module %s/%s was built for interface %u, this is %d", spec->instance,
+                        spec->desc->role, spec->desc->type, spec->desc->abi, BST_MODULE_ABI);
+    }
+    if (spec->desc->port_count > MAX_PORTS) {
+        return bst_fail(ctx, BST_ERR_CONFIG, "%s: %d ports (allowed: %d)", spec->instance,
+                        spec->desc->port_count, MAX_PORTS);
+    }
+    if (engine->instance_count == engine->instance_capacity) {
+        int capacity = engine->instance_capacity ? 2 * engine->instance_capacity : 16;
+        instance **more = realloc(engine->instances, (size_t)capacity * sizeof *more);
+        if (!more) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for modules");
+        }
+        engine->instances = more;
+        engine->instance_capacity = capacity;
+    }
+    instance *self = calloc(1, sizeof *self);
+    if (self) {
+        self->scope = strdup(spec->scope);
+        self->name = strdup(spec->instance);
+    }
+    if (!self || !self->scope || !self->name) {
+        if (self) {
+            free(self->scope);
+            free(self->name);
+        }
+        free(self);
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %s", spec->instance);
+    }
+    self->spec = *spec;
+    self->spec.scope = self->scope;
+    self->spec.instance = self->name;
+    self->next_period = spec->period_ticks > 0 ? spec->offset_ticks : INT64_MAX;
+    self->wake = INT64_MAX;
+    for (int p = 0; p < MAX_PORTS; p++) {
+        self->ports[p].channel = -1;
+    }
+    engine->instances[engine->instance_count++] = self;
+    return BST_OK;
+}
+
+bst_status bst_engine_load(bst_ctx *ctx, bst_engine *engine) {
+    if (engine->loaded) {
+        return bst_fail(ctx, BST_ERR_STATE, "the engine is loaded already");
+    }
+    engine->loaded = true;
+    BST_TRY(bst_engine_wire(ctx, engine));
+    for (int i = 0; i < engine->instance_count; i++) {
+        instance *self = engine->instances[i];
+        const bst_instance_spec *spec = &self->spec;
+        unsigned flags = spec->desc->flags;
+        bst_module_env env = {.ctx = ctx,
+                              .instance = self->name,
+                              .tick_rate_hz = engine->tick_rate_hz,
+                              .period_ticks = spec->period_ticks,
+                              .seed = spec->seed,
+                              .run = spec->run,
+                              .world = flags & BST_MODULE_READS_TRUTH ? spec->world : NULL,
+                              .knowledge = spec->knowledge,
+                              .device = flags & BST_MODULE_NEEDS_DEVICE ? spec->device : NULL,
+                              .observer = spec->observer,
+                              .sensor = spec->sensor,
+                              .engine_private = self};
+        bst_status status = spec->desc->create(&env, spec->config, &self->self);
+        if (status != BST_OK) {
+            return bst_fail_prefix(ctx, status, "%s", self->name);
+        }
+        self->created = true;
+        /* a module without period or trigger is stepped once, so that it can ask to be woken */
+        bool triggered = false;
+        for (int p = 0; p < spec->desc->port_count; p++) {
+            triggered |=
+                (spec->desc->ports[p].flags & BST_PORT_TRIGGER) && self->ports[p].channel >= 0;
+        }
+        if (spec->period_ticks == 0 && !triggered) {
+            self->wake = spec->offset_ticks;
+        }
+        self->due = bst_engine_due(self);
+    }
+    return bst_engine_allocate_channels(ctx, engine);
+}
+
+int64_t bst_engine_due(const instance *self) {
+    int64_t due = self->next_period < self->wake ? self->next_period : self->wake;
+    for (int p = 0; p < self->spec.desc->port_count; p++) {
+        const port_state *port = &self->ports[p];
+        if (port->trigger_count > 0 && port->trigger[port->trigger_head] < due) {
+            due = port->trigger[port->trigger_head];
+        }
+    }
+    return due;
+}
+
+static bst_status step_instance(bst_ctx *ctx, bst_engine *engine, int index, int64_t tick) {
+    instance *self = engine->instances[index];
+    if (self->next_period <= tick) {
+        self->next_period += self->spec.period_ticks;
+    }
+    if (self->wake <= tick) {
+        self->wake = INT64_MAX;
+    }
+    for (int p = 0; p < self->spec.desc->port_count; p++) {
+        port_state *port = &self->ports[p];
+        while (port->trigger_count > 0 && port->trigger[port->trigger_head] <= tick) {
+            port->trigger_head = (port->trigger_head + 1) % TRIGGER_RING;
+            port->trigger_count--;
+        }
+    }
+    struct bst_step step = {engine, self, index, ctx, tick, BST_OK};
+    self->steps++;
+    bst_status status = self->spec.desc->step(self->self, &step);
+    if (status == BST_OK) {
+        status = bst_engine_commit(&step);
+    }
+    if (status != BST_OK) {
+        return bst_fail_prefix(ctx, status, "%s at %.6f s", self->name,
+                               (double)tick / (double)engine->tick_rate_hz);
+    }
+    self->due = bst_engine_due(self);
+    return BST_OK;
+}
+
+static double wall_seconds(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) {
+    if (!engine->loaded) {
+        return bst_fail(ctx, BST_ERR_STATE, "the engine is not loaded");
+    }
+    double asked = wall_seconds();
+    int since_clock = 0;
+    for (;;) {
+        int64_t tick = INT64_MAX;
+        for (int i = 0; i < engine->instance_count; i++) {
+            if (engine->instances[i]->due < tick) {
+                tick = engine->instances[i]->due;
+            }
+        }
+        if (tick >= until_tick) {
+            return BST_OK;
+        }
+        engine->tick = tick;
+        int stepped = 0;
+        for (int i = 0; i < engine->instance_count; i++) {
+            if (engine->instances[i]->due <= tick) {
+                BST_TRY(step_instance(ctx, engine, i, tick));
+                stepped++;
+            }
+        }
+        bst_engine_release_read(engine);
+        /* reading the clock costs as much as a plant step: only now and then, or after a step that
+         * may be long */
+        if (engine->hooks.interrupted && (++since_clock >= 256 || stepped > 1)) {
+            since_clock = 0;
+            double now = wall_seconds();
+            if (now - asked > 0.02) {
+                asked = now;
+                if (engine->hooks.interrupted(engine->hooks.user, tick)) {
+                    return bst_fail(ctx, BST_ERR_INTERRUPTED, "interrupted at %.3f s",
+                                    (double)tick / (double)engine->tick_rate_hz);
+                }
+            }
+        }
+    }
+}
+
+int64_t bst_engine_tick(const bst_engine *engine) {
+    return engine->tick;
+}
+int bst_engine_instance_count(const bst_engine *engine) {
+    return engine->instance_count;
+}
+const char *bst_engine_instance_name(const bst_engine *engine, int index) {
+    return engine->instances[index]->name;
+}
+int64_t bst_engine_instance_steps(const bst_engine *engine, int index) {
+    return engine->instances[index]->steps;
+}
+
+bool bst_engine_counter(const bst_engine *engine, int index, const char **name, int64_t *count) {
+    if (index < 0 || index >= engine->counter_count) {
+        return false;
+    }
+    *name = engine->counters[index].name;
+    *count = engine->counters[index].count;
+    return true;
+}
+
+bst_status bst_period_ticks(bst_ctx *ctx, int64_t tick_rate_hz, double rate_hz, int64_t *out) {
+    double period = (double)tick_rate_hz / rate_hz;
+    double nearest = floor(period + 0.5);
+    if (!(rate_hz > 0.0) || nearest < 1.0 || nearest > 9e15) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "a rate of %g Hz is not between 0 and the tick rate of %lld Hz", rate_hz,
+                        (long long)tick_rate_hz);
+    }
+    if (fabs(period - nearest) > 1e-9 * period) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "a rate of %g Hz does not divide the tick rate of %lld Hz; the nearest "
+                        "that do are %.9g and %.9g Hz",
+                        rate_hz, (long long)tick_rate_hz, (double)tick_rate_hz / ceil(period),
+                        (double)tick_rate_hz / floor(period));
+    }
+    *out = (int64_t)nearest;
+    return BST_OK;
+}
+
+bst_status bst_seconds_to_ticks(bst_ctx *ctx, int64_t tick_rate_hz, double seconds, int64_t *out) {
+    double ticks = seconds * (double)tick_rate_hz;
+    double nearest = floor(ticks + 0.5);
+    if (!(fabs(ticks) < 9e15)) {
+        return bst_fail(ctx, BST_ERR_CONFIG, "a time of %g s is out of range", seconds);
+    }
+    if (fabs(ticks - nearest) > 1e-6 * fmax(1.0, fabs(ticks) * 1e-6)) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "a time of %.12g s is no whole number of ticks at %lld Hz; the nearest "
+                        "that are %.12g and %.12g s",
+                        seconds, (long long)tick_rate_hz, floor(ticks) / (double)tick_rate_hz,
+                        ceil(ticks) / (double)tick_rate_hz);
+    }
+    *out = (int64_t)nearest;
+    return BST_OK;
+}

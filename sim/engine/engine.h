@@ -1,0 +1,83 @@
+/* The fixed-step scheduler: modules, channels between them, one clock of integer ticks. */
+#ifndef BST_ENGINE_ENGINE_H
+#define BST_ENGINE_ENGINE_H
+
+#include "sim/core/module.h"
+
+typedef struct bst_engine bst_engine;
+
+/* Reading an input later than it was written. */
+typedef struct bst_input_delay {
+    int port; /* index into desc->ports */
+    int64_t ticks;
+} bst_input_delay;
+
+enum { BST_MAX_DELAYS = 16 };
+
+/* One module to run. */
+typedef struct bst_instance_spec {
+    const bst_module_desc *desc;
+    const char *scope;    /* "observer/sensor": where its channels live */
+    const char *instance; /* "observer/sensor/module": unique */
+    const void *config;   /* outlives the engine */
+    int64_t period_ticks; /* 0: triggers only */
+    int64_t offset_ticks; /* first periodic step */
+    bst_input_delay delays[BST_MAX_DELAYS];
+    int delay_count;
+    /* what the module gets to see; filled into its env as the descriptor's flags allow */
+    const struct bst_world *world;
+    const struct bst_knowledge *knowledge;
+    struct bst_device *device;
+    int observer, sensor;
+    uint64_t seed, run;
+} bst_instance_spec;
+
+/* Sees what happens; any member may be NULL. Called from the stepping thread. */
+typedef struct bst_engine_hooks {
+    void *user;
+    /* A message was published (before any MODIFY port touches it). */
+    bst_status (*message)(void *user, const char *scope, const char *channel, const void *payload,
+                          int64_t tick);
+    bst_status (*event)(void *user, int64_t tick, const char *instance, const char *kind,
+                        const char *text);
+    /* Asked about every 20 ms of wall time; true ends the run with BST_ERR_INTERRUPTED. */
+    bool (*interrupted)(void *user, int64_t tick);
+} bst_engine_hooks;
+
+bst_status bst_engine_create(bst_ctx *ctx, int64_t tick_rate_hz, bst_engine **out) BST_MUST_CHECK;
+void bst_engine_free(bst_engine *engine);
+void bst_engine_set_hooks(bst_engine *engine, const bst_engine_hooks *hooks);
+
+/* Adds a module; before bst_engine_load. The spec is copied, its strings too. */
+bst_status bst_engine_add(bst_ctx *ctx, bst_engine *engine,
+                          const bst_instance_spec *spec) BST_MUST_CHECK;
+
+/* Wires the channels, sorts the modules (topologically; ties by instance name), creates them.
+ * Errors (BST_ERR_CONFIG): an input that nobody writes, two writers of a channel, a cycle without a
+ * declared delay (the message shows it), a delay on a ring that is extended in place, two instances
+ * of one name. */
+bst_status bst_engine_load(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
+
+/* Steps everything that is due before `until_tick` (exclusive). */
+bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) BST_MUST_CHECK;
+
+/* Tick of the last step, -1 before the first. */
+int64_t bst_engine_tick(const bst_engine *engine);
+/* Instance names in the order of stepping. */
+int bst_engine_instance_count(const bst_engine *engine);
+const char *bst_engine_instance_name(const bst_engine *engine, int index);
+/* Steps that an instance has made. */
+int64_t bst_engine_instance_steps(const bst_engine *engine, int index);
+/* Conditions counted so far by name ("queue_overflow", "stale_input", what modules count); false
+ * after the last. */
+bool bst_engine_counter(const bst_engine *engine, int index, const char **name, int64_t *count);
+
+/* Period in ticks of a rate. BST_ERR_CONFIG when tick_rate / rate is no integer: the message names
+ * the nearest rates that are. */
+bst_status bst_period_ticks(bst_ctx *ctx, int64_t tick_rate_hz, double rate_hz,
+                            int64_t *out) BST_MUST_CHECK;
+/* Whole ticks of a time. BST_ERR_CONFIG when it is none, naming the nearest times that are. */
+bst_status bst_seconds_to_ticks(bst_ctx *ctx, int64_t tick_rate_hz, double seconds,
+                                int64_t *out) BST_MUST_CHECK;
+
+#endif

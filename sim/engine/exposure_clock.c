@@ -1,0 +1,143 @@
+#include "sim/engine/exposure_clock.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "sim/engine/engine.h"
+#include "sim/world/world.h"
+#include "sim/world/world_config.h"
+
+enum { PORT_COMMAND, PORT_EXPOSURE };
+
+typedef struct exposure_clock {
+    int64_t tick_rate_hz;
+    int64_t exposure_ticks, period_ticks;
+    bst_window full, window;
+    int binning;
+    double dropped_fraction;
+    bst_rng_key drop_key;
+    int64_t id;
+    int64_t start_tick; /* of the running or the next exposure */
+    int64_t next_start_tick;
+    bool open;
+} exposure_clock;
+
+static bst_status create(const bst_module_env *env, const void *config, void **self) {
+    const bst_exposure_config *c = config;
+    exposure_clock *clock = calloc(1, sizeof *clock);
+    if (!clock) {
+        return bst_fail(env->ctx, BST_ERR_MEMORY, "out of memory for the exposure clock");
+    }
+    const bst_camera *camera = bst_world_camera(env->world, env->observer, env->sensor);
+    clock->tick_rate_hz = env->tick_rate_hz;
+    clock->full = (bst_window){0, 0, (int)camera->width_px, (int)camera->height_px};
+    clock->window = clock->full;
+    clock->binning = 1;
+    clock->dropped_fraction = c->dropped_fraction;
+    clock->drop_key = bst_env_rng(env, "dropped_frames");
+    bst_status status =
+        bst_seconds_to_ticks(env->ctx, env->tick_rate_hz, c->exposure_s, &clock->exposure_ticks);
+    if (status == BST_OK) {
+        status =
+            bst_seconds_to_ticks(env->ctx, env->tick_rate_hz, c->period_s, &clock->period_ticks);
+    }
+    if (status == BST_OK) {
+        status = bst_seconds_to_ticks(env->ctx, env->tick_rate_hz, c->first_s, &clock->start_tick);
+    }
+    if (status != BST_OK) {
+        free(clock);
+        return status;
+    }
+    *self = clock;
+    return BST_OK;
+}
+
+/* Takes what control asked for, clipped to what the sensor can do. */
+static void latch(exposure_clock *clock, const bst_sensor_command *command) {
+    double rate = (double)clock->tick_rate_hz;
+    if (command->exposure_s > 0.0) {
+        clock->exposure_ticks = (int64_t)floor(command->exposure_s * rate + 0.5);
+    }
+    if (command->period_s > 0.0) {
+        int64_t period = (int64_t)floor(command->period_s * rate + 0.5);
+        clock->period_ticks = period > 0 ? period : 1;
+    }
+    if (command->binning > 0) {
+        clock->binning = command->binning;
+    }
+    const bst_window *w = &command->window;
+    clock->window = clock->full;
+    if (w->width > 0 && w->height > 0) {
+        int x0 = w->x0 < 0 ? 0 : w->x0, y0 = w->y0 < 0 ? 0 : w->y0;
+        int x1 = w->x0 + w->width < clock->full.width ? w->x0 + w->width : clock->full.width;
+        int y1 = w->y0 + w->height < clock->full.height ? w->y0 + w->height : clock->full.height;
+        if (x1 > x0 && y1 > y0) {
+            clock->window = (bst_window){x0, y0, x1 - x0, y1 - y0};
+        }
+    }
+}
+
+static void open_exposure(exposure_clock *clock, bst_sample command) {
+    if (command.payload && !command.stale) {
+        latch(clock, command.payload);
+    }
+    int64_t later =
+        clock->exposure_ticks > clock->period_ticks ? clock->exposure_ticks : clock->period_ticks;
+    clock->next_start_tick = clock->start_tick + later;
+    clock->open = true;
+}
+
+static bst_status step(void *self, struct bst_step *step) {
+    exposure_clock *clock = self;
+    int64_t tick = bst_step_tick(step);
+    if (!clock->open && tick >= clock->start_tick) {
+        open_exposure(clock, bst_step_latest(step, PORT_COMMAND));
+    }
+    if (clock->open && tick >= clock->start_tick + clock->exposure_ticks) {
+        bst_exposure *out = bst_step_write(step, PORT_EXPOSURE, NULL);
+        *out = (bst_exposure){.id = clock->id,
+                              .start_tick = clock->start_tick,
+                              .end_tick = clock->start_tick + clock->exposure_ticks,
+                              .window = clock->window,
+                              .binning = clock->binning};
+        out->dropped =
+            clock->dropped_fraction > 0.0 &&
+            bst_rng_uniform(clock->drop_key, (uint64_t)clock->id, 0) < clock->dropped_fraction;
+        clock->id++;
+        clock->open = false;
+        clock->start_tick = clock->next_start_tick;
+    }
+    /* an exposure that starts in the very tick in which the last one ended is opened now, not a
+     * tick late */
+    if (!clock->open && clock->start_tick <= tick) {
+        open_exposure(clock, bst_step_latest(step, PORT_COMMAND));
+    }
+    bst_step_wake_at(step,
+                     clock->open ? clock->start_tick + clock->exposure_ticks : clock->start_tick);
+    return BST_OK;
+}
+
+static void destroy(void *self) {
+    free(self);
+}
+
+static const bst_port ports[] = {
+    [PORT_COMMAND] = {.channel = BST_CHANNEL_SENSOR_COMMAND,
+                      .direction = BST_PORT_IN,
+                      .flags = BST_PORT_OPTIONAL | BST_PORT_FEEDBACK},
+    [PORT_EXPOSURE] = {.channel = BST_CHANNEL_EXPOSURE, .direction = BST_PORT_OUT},
+};
+
+const bst_module_desc bst_exposure_clock_module = {
+    .abi = BST_MODULE_ABI,
+    .role = "exposure",
+    .type = "clock",
+    .doc = "Opens and closes exposures at exact ticks.",
+    .flags = BST_MODULE_READS_TRUTH,
+    .config_bytes = sizeof(bst_exposure_config),
+    .ports = ports,
+    .port_count = sizeof ports / sizeof *ports,
+    .create = create,
+    .step = step,
+    .destroy = destroy,
+};

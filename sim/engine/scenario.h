@@ -1,0 +1,61 @@
+/* A scenario: one JSON document, read, checked and resolved. */
+#ifndef BST_ENGINE_SCENARIO_H
+#define BST_ENGINE_SCENARIO_H
+
+#include "sim/engine/engine.h"
+#include "sim/engine/recorder.h"
+#include "sim/world/world_config.h"
+
+/* All modules that a scenario may name; the list is the program's (or a test's). */
+typedef struct bst_registry {
+    const bst_module_desc *const *modules;
+    int count;
+} bst_registry;
+
+/* One entry of a sensor's "modules" block. */
+typedef struct bst_module_config {
+    int observer, sensor;
+    char name[64]; /* key in the block; equals the role of the built-in modules */
+    const bst_module_desc *desc;
+    void *config;   /* desc->config_bytes, filled */
+    double rate_hz; /* 0: triggers only */
+    double offset_s;
+    int64_t period_ticks, offset_ticks;
+    bst_input_delay delays[BST_MAX_DELAYS];
+    int delay_count;
+} bst_module_config;
+
+typedef struct bst_scenario {
+    int64_t format; /* "boresight": version of the scenario format */
+    char name[64];
+    char epoch_utc[48];
+    double duration_s;
+    int64_t tick_rate_hz;
+    uint64_t seed;
+    int64_t run;
+    bst_world_config world;
+    bst_config_list observers; /* bst_observer_config */
+    bst_record_config record;
+    /* filled by bst_scenario_read, not by the table */
+    char file[512];     /* for messages */
+    char base_dir[512]; /* folder that relative paths start from */
+    bst_time epoch;
+    int64_t duration_ticks;
+    bst_module_config *modules;
+    int module_count;
+} bst_scenario;
+
+extern const bst_config_desc bst_scenario_table[];
+
+/* Reads and checks a scenario; nothing is opened or written but the JSON. Free with
+ * bst_scenario_free, also after an error. */
+bst_status bst_scenario_read(bst_ctx *ctx, const bst_json *json, const bst_registry *registry,
+                             bst_scenario *out) BST_MUST_CHECK;
+void bst_scenario_free(bst_scenario *scenario);
+
+/* The scenario with every default written out; the caller deletes it. NULL when out of memory. */
+struct cJSON *bst_scenario_echo(const bst_scenario *scenario);
+/* JSON Schema (draft 2020-12) of scenarios for these modules; the caller deletes it. */
+struct cJSON *bst_scenario_schema(const bst_registry *registry);
+
+#endif

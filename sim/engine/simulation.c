@@ -1,0 +1,151 @@
+#include "sim/engine/simulation.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "sim/device/device.h"
+#include "sim/engine/exposure_clock.h"
+#include "sim/world/knowledge.h"
+
+struct bst_simulation {
+    bst_world *world;
+    bst_device *device;
+    bst_knowledge **knowledge; /* [sensors of all observers] */
+    int knowledge_count;
+    bst_engine *engine;
+};
+
+static bst_status make_knowledge(bst_ctx *ctx, const bst_scenario *scenario, bst_simulation *sim) {
+    const bst_observer_config *observers = scenario->observers.items;
+    int total = 0;
+    for (int i = 0; i < scenario->observers.count; i++) {
+        total += observers[i].sensors.count;
+    }
+    sim->knowledge = calloc((size_t)total + 1, sizeof *sim->knowledge);
+    if (!sim->knowledge) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d sensors", total);
+    }
+    for (int i = 0; i < scenario->observers.count; i++) {
+        for (int s = 0; s < observers[i].sensors.count; s++) {
+            bst_status status =
+                bst_knowledge_create(ctx, sim->world, i, s, &sim->knowledge[sim->knowledge_count]);
+            if (status != BST_OK) {
+                return bst_fail_prefix(ctx, status, "%s", scenario->file);
+            }
+            sim->knowledge_count++;
+        }
+    }
+    return BST_OK;
+}
+
+/* The part of a spec that does not depend on the module. */
+static bst_instance_spec sensor_spec(const bst_scenario *scenario, const bst_simulation *sim,
+                                     int observer, int sensor, const char *scope) {
+    const bst_observer_config *observers = scenario->observers.items;
+    int index = sensor;
+    for (int i = 0; i < observer; i++) {
+        index += observers[i].sensors.count;
+    }
+    return (bst_instance_spec){.scope = scope,
+                               .world = sim->world,
+                               .knowledge = sim->knowledge[index],
+                               .device = sim->device,
+                               .observer = observer,
+                               .sensor = sensor,
+                               .seed = scenario->seed,
+                               .run = (uint64_t)scenario->run};
+}
+
+static bst_status add_modules(bst_ctx *ctx, const bst_scenario *scenario, bst_simulation *sim) {
+    const bst_observer_config *observers = scenario->observers.items;
+    for (int i = 0; i < scenario->observers.count; i++) {
+        const bst_sensor_config *sensors = observers[i].sensors.items;
+        for (int s = 0; s < observers[i].sensors.count; s++) {
+            char scope[160], name[256];
+            snprintf(scope, sizeof scope, "%s/%s", observers[i].name, sensors[s].name);
+            bst_instance_spec spec = sensor_spec(scenario, sim, i, s, scope);
+            snprintf(name, sizeof name, "%s/exposure", scope);
+            spec.instance = name;
+            spec.desc = &bst_exposure_clock_module;
+            spec.config = &sensors[s].exposure;
+            BST_TRY(bst_engine_add(ctx, sim->engine, &spec));
+            for (int m = 0; m < scenario->module_count; m++) {
+                const bst_module_config *module = &scenario->modules[m];
+                if (module->observer != i || module->sensor != s) {
+                    continue;
+                }
+                snprintf(name, sizeof name, "%s/%s", scope, module->name);
+                spec.instance = name;
+                spec.desc = module->desc;
+                spec.config = module->config;
+                spec.period_ticks = module->period_ticks;
+                spec.offset_ticks = module->offset_ticks;
+                spec.delay_count = module->delay_count;
+                for (int d = 0; d < module->delay_count; d++) {
+                    spec.delays[d] = module->delays[d];
+                }
+                BST_TRY(bst_engine_add(ctx, sim->engine, &spec));
+            }
+        }
+    }
+    return BST_OK;
+}
+
+static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
+                        const bst_simulation_options *options, bst_simulation *sim) {
+    BST_TRY(bst_world_create(ctx, scenario->file, &scenario->world, &scenario->observers,
+                             scenario->base_dir, scenario->epoch, &sim->world));
+    BST_TRY(make_knowledge(ctx, scenario, sim));
+    for (int m = 0; m < scenario->module_count && !sim->device; m++) {
+        if (scenario->modules[m].desc->flags & BST_MODULE_NEEDS_DEVICE) {
+            BST_TRY(bst_device_open(ctx, options->device ? options->device : "", options->threads,
+                                    &sim->device));
+        }
+    }
+    BST_TRY(bst_engine_create(ctx, scenario->tick_rate_hz, &sim->engine));
+    bst_status status = add_modules(ctx, scenario, sim);
+    if (status == BST_OK) {
+        status = bst_engine_load(ctx, sim->engine);
+    }
+    return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "%s", scenario->file);
+}
+
+bst_status bst_simulation_create(bst_ctx *ctx, const bst_scenario *scenario,
+                                 const bst_simulation_options *options, bst_simulation **out) {
+    *out = NULL;
+    bst_simulation *sim = calloc(1, sizeof *sim);
+    if (!sim) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the simulation");
+    }
+    bst_status status = build(ctx, scenario, options, sim);
+    if (status != BST_OK) {
+        bst_simulation_free(sim);
+        return status;
+    }
+    *out = sim;
+    return BST_OK;
+}
+
+void bst_simulation_free(bst_simulation *sim) {
+    if (!sim) {
+        return;
+    }
+    bst_engine_free(sim->engine);
+    for (int i = 0; i < sim->knowledge_count; i++) {
+        bst_knowledge_free(sim->knowledge[i]);
+    }
+    free(sim->knowledge);
+    bst_device_close(sim->device);
+    bst_world_free(sim->world);
+    free(sim);
+}
+
+bst_engine *bst_simulation_engine(bst_simulation *sim) {
+    return sim->engine;
+}
+const struct bst_world *bst_simulation_world(const bst_simulation *sim) {
+    return sim->world;
+}
+const char *bst_simulation_device(const bst_simulation *sim) {
+    return sim->device ? bst_device_description(sim->device) : "";
+}

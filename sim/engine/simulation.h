@@ -1,0 +1,27 @@
+/* A simulation: a scenario's world, device, onboard knowledge and modules, ready to run. */
+#ifndef BST_ENGINE_SIMULATION_H
+#define BST_ENGINE_SIMULATION_H
+
+#include "sim/engine/scenario.h"
+
+typedef struct bst_simulation bst_simulation;
+
+typedef struct bst_simulation_options {
+    const char *device; /* selector as in bst_device_open; NULL: default */
+    int threads;        /* 0: all */
+} bst_simulation_options;
+
+/* Opens what the scenario names (catalogue, orbits, the OpenCL device if a module needs one), makes
+ * every module and wires it. The scenario must outlive the simulation. Nothing is written anywhere.
+ */
+bst_status bst_simulation_create(bst_ctx *ctx, const bst_scenario *scenario,
+                                 const bst_simulation_options *options,
+                                 bst_simulation **out) BST_MUST_CHECK;
+void bst_simulation_free(bst_simulation *simulation);
+
+bst_engine *bst_simulation_engine(bst_simulation *simulation);
+const struct bst_world *bst_simulation_world(const bst_simulation *simulation);
+/* "" when no module needed a device. */
+const char *bst_simulation_device(const bst_simulation *simulation);
+
+#endif

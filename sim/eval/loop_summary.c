@@ -1,0 +1,261 @@
+#include "sim/eval/loop_summary.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* A track within this many pixels of the true target is the target's: 2.5 FWHM of the shipped
+ * cameras. */
+#define RIGHT_TARGET_PX 5.0
+/* The loop has settled when it is in track mode and the target lies this close to the boresight. */
+#define SETTLED_PX 3.0
+
+enum { WAITING = 16 };
+
+/* Pointing errors in logarithmic bins of 1 %, from 1e-4 px: percentiles of a run of any length in
+ * fixed memory. */
+enum { BINS = 2400 };
+#define BIN_RATIO 1.01
+#define BIN_FIRST 1e-4
+
+typedef struct waiting_frame {
+    bst_loop_frame frame;
+    bst_vec3 direction; /* true, geometric */
+    int64_t mid_tick;
+    bool judged; /* tracks of this very exposure have come */
+} waiting_frame;
+
+struct bst_loop_summary {
+    bst_camera camera;
+    bst_view *view;
+    int observer;
+    double rate_hz;
+    int target;
+    bst_loop_frame_fn fn;
+    void *user;
+    waiting_frame waiting[WAITING]; /* frames first..next-1 by position % WAITING */
+    int64_t first, next;
+    /* latest track of interest, for frames that never get tracks of their own */
+    bst_track toi;
+    bool has_toi;
+    int64_t toi_tick;
+    int mode;
+    bool last_in_track;
+    bst_loop_frame newest;
+    bst_loop_figures figures;
+    int64_t confirm_tick, settle_tick; /* -1: not yet */
+    int64_t visible_after, in_track_after;
+    double sum2, sum_x, sum_y;
+    int64_t bins[BINS];
+};
+
+bst_status bst_loop_summary_create(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
+                                   int64_t tick_rate_hz, int target_object,
+                                   bst_loop_summary **out) {
+    *out = NULL;
+    bst_loop_summary *s = calloc(1, sizeof *s);
+    if (!s) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the summary");
+    }
+    bst_status status = bst_view_create(ctx, world, &s->view);
+    if (status != BST_OK) {
+        free(s);
+        return status;
+    }
+    s->camera = *bst_world_camera(world, observer, sensor);
+    s->observer = observer;
+    s->rate_hz = (double)tick_rate_hz;
+    s->target = target_object;
+    s->confirm_tick = -1;
+    s->settle_tick = -1;
+    s->figures.time_to_confirm_s = NAN;
+    s->figures.time_to_settle_s = NAN;
+    *out = s;
+    return BST_OK;
+}
+
+void bst_loop_summary_free(bst_loop_summary *s) {
+    if (s) {
+        bst_view_free(s->view);
+        free(s);
+    }
+}
+
+void bst_loop_summary_on_frame(bst_loop_summary *s, bst_loop_frame_fn fn, void *user) {
+    s->fn = fn;
+    s->user = user;
+}
+
+static bst_vec3 track_direction_at(const bst_track *track, double seconds) {
+    return bst_vec3_unit(bst_vec3_axpy(track->direction_gcrf, seconds, track->rate_gcrf_radps));
+}
+
+/* Whether the track, carried to the frame's middle, is on the true target. */
+static bool on_target(const bst_loop_summary *s, const waiting_frame *w, const bst_track *track,
+                      int64_t tick) {
+    bst_vec3 d = track_direction_at(track, (double)(w->mid_tick - tick) / s->rate_hz);
+    return bst_vec3_angle(d, w->direction) <= RIGHT_TARGET_PX * bst_camera_scale_rad(&s->camera);
+}
+
+static void judge(bst_loop_summary *s, waiting_frame *w, const bst_track *track, int64_t track_tick,
+                  int64_t now) {
+    w->frame.in_track = false;
+    if (!track) {
+        return;
+    }
+    if (s->target >= 0 && on_target(s, w, track, track_tick)) {
+        w->frame.in_track = true;
+        if (s->confirm_tick < 0) {
+            s->confirm_tick = now;
+            s->figures.time_to_confirm_s = (double)now / s->rate_hz;
+        }
+    } else {
+        s->figures.wrong_target_frames++;
+    }
+}
+
+static void add_pointing(bst_loop_summary *s, const bst_loop_frame *f) {
+    s->figures.pointing_frames++;
+    s->sum2 += f->error_px * f->error_px;
+    s->sum_x += f->error_x_px;
+    s->sum_y += f->error_y_px;
+    double bin = f->error_px > BIN_FIRST ? log(f->error_px / BIN_FIRST) / log(BIN_RATIO) : 0.0;
+    s->bins[bin < BINS - 1 ? (int)bin : BINS - 1]++;
+}
+
+/* The verdict on the oldest waiting frame is final. */
+static void retire(bst_loop_summary *s) {
+    waiting_frame *w = &s->waiting[s->first % WAITING];
+    bst_loop_frame *f = &w->frame;
+    if (!w->judged) {
+        judge(s, w, s->has_toi ? &s->toi : NULL, s->toi_tick, w->mid_tick);
+    }
+    s->first++;
+    if (s->confirm_tick >= 0 && w->mid_tick >= s->confirm_tick && f->visible) {
+        s->visible_after++;
+        s->in_track_after += f->in_track;
+    }
+    if (f->settled && !isnan(f->error_px)) {
+        add_pointing(s, f);
+    }
+    s->last_in_track = f->in_track;
+    if (s->fn) {
+        s->fn(s->user, f);
+    }
+}
+
+/* The true target at mid-exposure, in or out of the field. */
+static bst_status look_at_target(bst_ctx *ctx, bst_loop_summary *s, const bst_truth *truth,
+                                 waiting_frame *w) {
+    bst_loop_frame *f = &w->frame;
+    bst_sight sight;
+    bst_status status = bst_view_sight(ctx, s->view, s->observer, s->target, f->time_s, &sight);
+    if (status == BST_ERR_NUMERIC) {
+        return BST_OK; /* decayed: nothing to see */
+    }
+    BST_TRY(status);
+    w->direction = sight.geometric;
+    f->visible = !sight.occulted && isfinite(sight.v_mag);
+    bst_vec3 cam = bst_quat_rotate(truth->q_cam_from_gcrf_mid, sight.apparent);
+    if (bst_camera_project(&s->camera, cam, &f->target_x_px, &f->target_y_px)) {
+        f->error_x_px = f->target_x_px - truth->boresight_x_px;
+        f->error_y_px = f->target_y_px - truth->boresight_y_px;
+        f->error_px = hypot(f->error_x_px, f->error_y_px);
+    }
+    for (int i = 0; i < truth->count; i++) {
+        const bst_truth_item *item = &truth->items[i];
+        if (item->kind == BST_SOURCE_OBJECT && (int)item->id == s->target &&
+            (item->flags & BST_TRUTH_IN_FIELD)) {
+            f->target_snr = item->snr;
+        }
+    }
+    return BST_OK;
+}
+
+bst_status bst_loop_summary_truth(bst_ctx *ctx, bst_loop_summary *s, const bst_truth *truth) {
+    if (s->next - s->first == WAITING) {
+        retire(s);
+    }
+    waiting_frame *w = &s->waiting[s->next % WAITING];
+    memset(w, 0, sizeof *w);
+    bst_loop_frame *f = &w->frame;
+    w->mid_tick = truth->start_tick + (truth->end_tick - truth->start_tick) / 2;
+    f->exposure_id = truth->exposure_id;
+    f->time_s = 0.5 * (double)(truth->start_tick + truth->end_tick) / s->rate_hz;
+    f->error_px = f->error_x_px = f->error_y_px = NAN;
+    f->target_x_px = f->target_y_px = NAN;
+    f->mode = s->mode;
+    if (s->target >= 0) {
+        BST_TRY(look_at_target(ctx, s, truth, w));
+    }
+    if (s->settle_tick < 0 && s->confirm_tick >= 0 && s->mode == BST_MODE_TRACK &&
+        f->error_px < SETTLED_PX) {
+        s->settle_tick = truth->start_tick;
+        s->figures.time_to_settle_s = (double)truth->start_tick / s->rate_hz;
+    }
+    f->settled = s->settle_tick >= 0;
+    s->figures.frames++;
+    s->newest = *f;
+    s->newest.in_track = s->last_in_track;
+    s->next++;
+    return BST_OK;
+}
+
+void bst_loop_summary_tracks(bst_loop_summary *s, const bst_tracks *tracks, int64_t tick) {
+    s->has_toi = false;
+    for (int i = 0; i < tracks->count; i++) {
+        const bst_track *t = &tracks->items[i];
+        if (t->target_of_interest &&
+            (t->status == BST_TRACK_CONFIRMED || t->status == BST_TRACK_COASTING)) {
+            s->toi = *t;
+            s->has_toi = true;
+            s->toi_tick = tracks->tick;
+        }
+    }
+    for (int64_t n = s->first; n < s->next; n++) {
+        waiting_frame *w = &s->waiting[n % WAITING];
+        if (w->frame.exposure_id == tracks->exposure_id && !w->judged) {
+            w->judged = true;
+            judge(s, w, s->has_toi ? &s->toi : NULL, s->toi_tick, tick);
+            s->newest.in_track = w->frame.in_track;
+            s->last_in_track = w->frame.in_track;
+        }
+    }
+    /* frames are judged in order, so everything before this exposure is final */
+    while (s->first < s->next &&
+           s->waiting[s->first % WAITING].frame.exposure_id <= tracks->exposure_id) {
+        retire(s);
+    }
+}
+
+void bst_loop_summary_status(bst_loop_summary *s, const bst_control_status *status) {
+    s->mode = status->mode;
+    s->figures.final_mode = status->mode;
+}
+
+void bst_loop_summary_finish(bst_loop_summary *s) {
+    while (s->first < s->next) {
+        retire(s);
+    }
+}
+
+void bst_loop_summary_figures(const bst_loop_summary *s, bst_loop_figures *out) {
+    *out = s->figures;
+    out->track_fraction =
+        s->visible_after > 0 ? (double)s->in_track_after / (double)s->visible_after : 0.0;
+    int64_t n = s->figures.pointing_frames;
+    out->pointing_rms_px = n > 0 ? sqrt(s->sum2 / (double)n) : NAN;
+    out->pointing_bias_px = n > 0 ? hypot(s->sum_x, s->sum_y) / (double)n : NAN;
+    out->pointing_p99_px = NAN;
+    int64_t seen = 0;
+    for (int b = 0; b < BINS && n > 0; b++) {
+        seen += s->bins[b];
+        if ((double)seen >= 0.99 * (double)n) {
+            out->pointing_p99_px = BIN_FIRST * pow(BIN_RATIO, b + 0.5);
+            break;
+        }
+    }
+}
+
+void bst_loop_summary_newest(const bst_loop_summary *s, bst_loop_frame *out) {
+    *out = s->newest;
+}

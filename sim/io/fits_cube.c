@@ -1,0 +1,241 @@
+/* The datacube. cfitsio makes the header and, at the end, the table; the planes go to the file
+ * directly, and NAXIS3 is raised only after a plane is whole, so that a killed run leaves a valid
+ * cube of the planes it completed. */
+#include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "sim/io/fits_internal.h"
+
+#define FITS_BLOCK 2880
+/* SIMPLE, BITPIX, NAXIS, NAXIS1, NAXIS2, NAXIS3 in this order: FITS 4.0, section 4.4.1.1 */
+#define NAXIS3_OFFSET (5 * 80)
+
+static bool write_at(int fd, const void *data, size_t bytes, long long offset) {
+    const char *p = data;
+    while (bytes > 0) {
+        ssize_t n = pwrite(fd, p, bytes, (off_t)offset);
+        if (n < 0 && errno != EINTR) {
+            return false;
+        }
+        if (n > 0) {
+            p += n;
+            bytes -= (size_t)n;
+            offset += n;
+        }
+    }
+    return true;
+}
+
+bst_status bst_fits_cube_open(bst_ctx *ctx, bst_fits *fits) {
+    bst_fits_cube *cube = &fits->cube;
+    char path[BST_FITS_PATH_BYTES];
+    memcpy(path, fits->path, sizeof path);
+    memcpy(path + strlen(path), ".rows", 6);
+    cube->rows = open(path, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+    if (cube->rows < 0 || unlink(path) != 0) {
+        return bst_fits_fail_errno(ctx, fits, "cannot make the table's file");
+    }
+    cube->buffer = malloc(BST_FITS_CUBE_BUFFER * sizeof *cube->buffer);
+    return cube->buffer ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
+}
+
+/* The header of a cube without planes; then the file leaves cfitsio's hands. */
+static bst_status start(bst_ctx *ctx, bst_fits *fits, int width, int height) {
+    bst_fits_cube *cube = &fits->cube;
+    long size[3] = {width, height, 0};
+    LONGLONG head, data, end;
+    int code = 0;
+    errno = 0;
+    fits_create_img(fits->file, USHORT_IMG, 3, size, &code);
+    bst_fits_put_run_keys(fits->file, &fits->names, &code);
+    fits_write_comment(
+        fits->file, "Third axis: frames. Row k of the table FRAMES holds time and WCS of plane k.",
+        &code);
+    bst_fits_put_statements(fits->file, &code);
+    fits_flush_file(fits->file, &code);
+    fits_get_hduaddrll(fits->file, &head, &data, &end, &code);
+    BST_TRY(bst_fits_check(ctx, fits, code, "cannot be written"));
+    fitsfile *file = fits->file;
+    fits->file = NULL;
+    fits_close_file(file, &code);
+    BST_TRY(bst_fits_check(ctx, fits, code, "cannot be written"));
+    cube->file = open(fits->path, O_RDWR | O_CLOEXEC);
+    if (cube->file < 0) {
+        return bst_fits_fail_errno(ctx, fits, "cannot be opened");
+    }
+    char card[9];
+    if (pread(cube->file, card, sizeof card, NAXIS3_OFFSET) != (ssize_t)sizeof card ||
+        memcmp(card, "NAXIS3  =", sizeof card) != 0) {
+        return bst_fail(ctx, BST_ERR_FORMAT, "%s: NAXIS3 is not where it belongs", fits->path);
+    }
+    cube->width = width;
+    cube->height = height;
+    cube->data_start = data;
+    return BST_OK;
+}
+
+/* Signed big-endian, as BZERO 32768 wants it: v - 32768 flips the top bit. */
+static void to_fits(uint16_t *restrict out, const uint16_t *restrict in, size_t count) {
+    for (size_t i = 0; i < count; i++) {
+        uint16_t v = (uint16_t)(in[i] ^ 0x8000u);
+        uint8_t *b = (uint8_t *)&out[i];
+        b[0] = (uint8_t)(v >> 8);
+        b[1] = (uint8_t)v;
+    }
+}
+
+bst_status bst_fits_cube_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,
+                               const uint16_t *pixels, int width, int height) {
+    bst_fits_cube *cube = &fits->cube;
+    if (cube->file < 0) {
+        BST_TRY(start(ctx, fits, width, height));
+    }
+    if (width != cube->width || height != cube->height) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "%s: a frame of %d x %d pixels does not fit a cube of %d x %d; record "
+                        "frames as extensions when windows change",
+                        fits->path, width, height, cube->width, cube->height);
+    }
+    static const char zeros[FITS_BLOCK] = {0};
+    size_t count = (size_t)width * (size_t)height;
+    long long bytes = (long long)count * 2;
+    long long offset = cube->data_start + cube->planes * bytes;
+    bool ok = write_at(cube->rows, frame, sizeof *frame,
+                       (long long)sizeof *frame * (long long)cube->planes);
+    for (size_t done = 0; ok && done < count;) {
+        size_t n = count - done < BST_FITS_CUBE_BUFFER ? count - done : BST_FITS_CUBE_BUFFER;
+        to_fits(cube->buffer, pixels + done, n);
+        ok = write_at(cube->file, cube->buffer, n * 2, offset + (long long)done * 2);
+        done += n;
+    }
+    long long used = (cube->planes + 1) * bytes % FITS_BLOCK;
+    if (ok && used > 0) {
+        ok = write_at(cube->file, zeros, (size_t)(FITS_BLOCK - used), offset + bytes);
+    }
+    char value[24];
+    snprintf(value, sizeof value, "%20lld", (long long)(cube->planes + 1));
+    ok = ok && write_at(cube->file, value, 20, NAXIS3_OFFSET + 10);
+    if (!ok) {
+        return bst_fits_fail_errno(ctx, fits, "cannot be written");
+    }
+    cube->planes++;
+    return BST_OK;
+}
+
+enum { TABLE_COLUMNS = 21 };
+
+static void make_table(fitsfile *file, LONGLONG rows, int *code) {
+    static const char *const columns[TABLE_COLUMNS][3] = {
+        {"FRAMEID", "1K", ""},        {"DATE-OBS", "26A", ""},      {"MJD-OBS", "1D", "d"},
+        {"DATE-AVG", "26A", ""},      {"MJD-AVG", "1D", "d"},       {"EXPTIME", "1D", "s"},
+        {"WINX0", "1J", "pixel"},     {"WINY0", "1J", "pixel"},     {"BINNING", "1J", ""},
+        {"CRPIX1", "1D", "pixel"},    {"CRPIX2", "1D", "pixel"},    {"CRVAL1", "1D", "deg"},
+        {"CRVAL2", "1D", "deg"},      {"CD1_1", "1D", "deg/pixel"}, {"CD1_2", "1D", "deg/pixel"},
+        {"CD2_1", "1D", "deg/pixel"}, {"CD2_2", "1D", "deg/pixel"}, {"WCSRESID", "1D", "pixel"},
+        {"OBSPOS", "3D", "m"},        {"OBSVEL", "3D", "m/s"},      {"BITS", "1J", "bit"},
+    };
+    char *names[TABLE_COLUMNS], *forms[TABLE_COLUMNS], *units[TABLE_COLUMNS];
+    for (int i = 0; i < TABLE_COLUMNS; i++) {
+        /* cfitsio's prototype lacks const */
+        names[i] = (char *)(uintptr_t)columns[i][0];
+        forms[i] = (char *)(uintptr_t)columns[i][1];
+        units[i] = (char *)(uintptr_t)columns[i][2];
+    }
+    fits_create_tbl(file, BINARY_TBL, rows, TABLE_COLUMNS, names, forms, units, "FRAMES", code);
+    fits_write_key_str(file, "TIMESYS", "UTC", "time scale of the dates", code);
+    fits_write_key_str(file, "RADESYS", "ICRS", "reference system of the WCS", code);
+    fits_write_key_str(file, "CTYPE1", "RA---TAN", "projection of the WCS in each row", code);
+    fits_write_key_str(file, "CTYPE2", "DEC--TAN", "projection of the WCS in each row", code);
+    fits_write_key_str(file, "ABERRAT", "absorbed", "stellar aberration is in the WCS", code);
+    bst_fits_put_statements(file, code);
+}
+
+static void put_row(fitsfile *file, LONGLONG row, const bst_fits_frame *f, int *code) {
+    char date[2][40];
+    char *texts[2] = {date[0], date[1]};
+    double mjd[2] = {bst_fits_date(f, BST_FITS_BEGIN, date[0]),
+                     bst_fits_date(f, BST_FITS_MIDDLE, date[1])};
+    double missing = NAN;
+    long long id = f->id;
+    int binning = f->binning > 1 ? f->binning : 1;
+    bst_wcs w = {.crpix = {missing, missing},
+                 .crval_deg = {missing, missing},
+                 .cd_deg = {{missing, missing}, {missing, missing}},
+                 .residual_px = missing};
+    if (f->has_wcs) {
+        w = bst_wcs_window(&f->wcs, f->window, binning);
+    }
+    double observer[6] = {missing, missing, missing, missing, missing, missing};
+    if (f->has_observer) {
+        memcpy(observer, &f->observer_gcrf_m, 3 * sizeof(double));
+        memcpy(observer + 3, &f->observer_gcrf_mps, 3 * sizeof(double));
+    }
+    int integers[3] = {f->window.x0, f->window.y0, binning};
+    int bits = f->bits;
+    double reals[9] = {w.crpix[0],     w.crpix[1],     w.crval_deg[0],
+                       w.crval_deg[1], w.cd_deg[0][0], w.cd_deg[0][1],
+                       w.cd_deg[1][0], w.cd_deg[1][1], w.residual_px};
+    double exposure_s = f->exposure_s;
+    fits_write_col(file, TLONGLONG, 1, row, 1, 1, &id, code);
+    for (int k = 0; k < 2; k++) {
+        fits_write_col(file, TSTRING, 2 + 2 * k, row, 1, 1, &texts[k], code);
+        fits_write_col(file, TDOUBLE, 3 + 2 * k, row, 1, 1, &mjd[k], code);
+    }
+    fits_write_col(file, TDOUBLE, 6, row, 1, 1, &exposure_s, code);
+    for (int k = 0; k < 3; k++) {
+        fits_write_col(file, TINT, 7 + k, row, 1, 1, &integers[k], code);
+    }
+    for (int k = 0; k < 9; k++) {
+        fits_write_col(file, TDOUBLE, 10 + k, row, 1, 1, &reals[k], code);
+    }
+    fits_write_col(file, TDOUBLE, 19, row, 1, 3, observer, code);
+    fits_write_col(file, TDOUBLE, 20, row, 1, 3, observer + 3, code);
+    fits_write_col(file, TINT, 21, row, 1, 1, &bits, code);
+}
+
+bst_status bst_fits_cube_finish(bst_ctx *ctx, bst_fits *fits) {
+    bst_fits_cube *cube = &fits->cube;
+    int code = 0;
+    errno = 0;
+    if (cube->file < 0) {
+        if (!fits->file) {
+            return BST_OK; /* the header could not be written; that was reported */
+        }
+        fits_create_img(fits->file, BYTE_IMG, 0, NULL, &code);
+        bst_fits_put_run_keys(fits->file, &fits->names, &code);
+        return bst_fits_check(ctx, fits, code, "cannot be completed");
+    }
+    int closed = close(cube->file);
+    cube->file = -1;
+    if (closed != 0) {
+        return bst_fits_fail_errno(ctx, fits, "cannot be completed");
+    }
+    fits_open_diskfile(&fits->file, fits->path, READWRITE, &code);
+    if (code == 0) {
+        make_table(fits->file, cube->planes, &code);
+    }
+    for (int64_t k = 0; code == 0 && k < cube->planes; k++) {
+        bst_fits_frame frame;
+        if (pread(cube->rows, &frame, sizeof frame, (off_t)(k * (int64_t)sizeof frame)) !=
+            (ssize_t)sizeof frame) {
+            return bst_fits_fail_errno(ctx, fits, "cannot read the table's file");
+        }
+        put_row(fits->file, k + 1, &frame, &code);
+    }
+    return bst_fits_check(ctx, fits, code, "cannot be completed");
+}
+
+void bst_fits_cube_free(bst_fits *fits) {
+    if (fits->cube.file >= 0) {
+        close(fits->cube.file);
+    }
+    if (fits->cube.rows >= 0) {
+        close(fits->cube.rows);
+    }
+    free(fits->cube.buffer);
+}

@@ -1,0 +1,56 @@
+/* Frames to FITS as they come: an image extension per frame, or a datacube with a table of times
+ * and WCS. */
+#ifndef BST_IO_FITS_FRAMES_H
+#define BST_IO_FITS_FRAMES_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "sim/astro/time.h"
+#include "sim/io/wcs.h"
+
+typedef enum bst_fits_layout { BST_FITS_EXTENSIONS, BST_FITS_CUBE } bst_fits_layout;
+
+/* What holds for the whole file; read in create only. */
+typedef struct bst_fits_info {
+    const char *observer;     /* OBSERVER: spacecraft */
+    const char *instrument;   /* INSTRUME: sensor */
+    const char *object;       /* OBJECT: what is looked for; may be NULL */
+    const char *program;      /* CREATOR: "boresight 0.1.0"; may be NULL */
+    const bst_camera *camera; /* the true camera */
+} bst_fits_info;
+
+/* What holds for one frame. */
+typedef struct bst_fits_frame {
+    int64_t id;     /* exposure */
+    bst_time start; /* of the exposure */
+    double exposure_s;
+    bst_window window; /* full-sensor pixels */
+    int binning;
+    int bits;
+    bool has_wcs, has_observer;
+    bst_wcs wcs; /* of the whole sensor: the writer shifts and scales it to the window */
+    bst_vec3 observer_gcrf_m, observer_gcrf_mps; /* mid exposure, geocentric */
+} bst_fits_frame;
+
+typedef struct bst_fits bst_fits;
+
+/* Makes the file (an existing one is refused). The layout of the pixels: unsigned 16 bit through
+ * BZERO 32768, row y = 0 first. Memory does not depend on the number of frames, which need not be
+ * known. */
+bst_status bst_fits_create(bst_ctx *ctx, const char *path, bst_fits_layout layout,
+                           const bst_fits_info *info, bst_fits **out) BST_MUST_CHECK;
+
+/* Writes a frame of width x height pixels (row-major, after windowing and binning) and hands it to
+ * the operating system: when this returns, the frame outlives the process. BST_ERR_IO with file and
+ * reason (disk full ...); BST_ERR_ARGUMENT when a cube's frame size changes. *index (may be NULL):
+ * extension number counted from 1, or plane counted from 0. */
+bst_status bst_fits_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,
+                          const uint16_t *pixels, int width, int height,
+                          int64_t *index) BST_MUST_CHECK;
+
+/* Completes the file (a cube gets its table FRAMES here) and frees `fits` in every case. NULL is
+ * allowed. */
+bst_status bst_fits_close(bst_ctx *ctx, bst_fits *fits) BST_MUST_CHECK;
+
+#endif

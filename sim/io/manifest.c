@@ -1,0 +1,66 @@
+#include "sim/io/manifest.h"
+
+#include <cjson/cJSON.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static bool write_all(int fd, const char *data, size_t bytes) {
+    while (bytes > 0) {
+        ssize_t n = write(fd, data, bytes);
+        if (n < 0 && errno != EINTR) {
+            return false;
+        }
+        if (n > 0) {
+            data += n;
+            bytes -= (size_t)n;
+        }
+    }
+    return true;
+}
+
+bst_status bst_write_file_atomic(bst_ctx *ctx, const char *path, const void *data, size_t bytes) {
+    char draft[4096];
+    int n = snprintf(draft, sizeof draft, "%s.tmp.%ld", path, (long)getpid());
+    if (n < 0 || (size_t)n >= sizeof draft) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", path);
+    }
+    int fd = open(draft, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+    if (fd < 0) {
+        return bst_fail(ctx, BST_ERR_IO, "%s: cannot be made: %s", path, strerror(errno));
+    }
+    bool ok = write_all(fd, data, bytes) && fsync(fd) == 0;
+    int error = ok ? 0 : errno;
+    if (close(fd) != 0 && ok) {
+        ok = false;
+        error = errno;
+    }
+    if (ok && rename(draft, path) != 0) {
+        ok = false;
+        error = errno;
+    }
+    if (!ok) {
+        unlink(draft);
+        return bst_fail(ctx, BST_ERR_IO, "%s: cannot be written: %s", path, strerror(error));
+    }
+    return BST_OK;
+}
+
+bst_status bst_run_write_json(bst_ctx *ctx, const bst_run *run, const char *name,
+                              const struct cJSON *json) {
+    char path[4096];
+    BST_TRY(bst_run_file(ctx, run, name, path, sizeof path));
+    char *text = cJSON_Print(json);
+    if (!text) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "%s: out of memory", path);
+    }
+    /* the terminating zero makes room for the newline */
+    size_t bytes = strlen(text);
+    text[bytes] = '\n';
+    bst_status status = bst_write_file_atomic(ctx, path, text, bytes + 1);
+    cJSON_free(text);
+    return status;
+}

@@ -1,0 +1,39 @@
+/* What run_store.c (the folder) and run_tables.c (the database) share. */
+#ifndef BST_IO_RUN_INTERNAL_H
+#define BST_IO_RUN_INTERNAL_H
+
+#include <sqlite3.h>
+#include <time.h>
+
+#include "sim/io/run_store.h"
+
+#define BST_RUN_PATH_BYTES 4096
+#define BST_RUN_DATABASE "run.sqlite"
+
+struct bst_table {
+    bst_run *run;
+    bst_table *next;
+    sqlite3_stmt *insert;
+    char name[64];
+    int columns;
+    bst_column_type types[BST_TABLE_COLUMNS];
+};
+
+struct bst_run {
+    char out[BST_RUN_PATH_BYTES];    /* final name */
+    char folder[BST_RUN_PATH_BYTES]; /* out + ".partial" */
+    bool overwrite;
+    int lock; /* descriptor that holds the lock on folder/lock */
+    sqlite3 *db;
+    bst_table *tables;
+    sqlite3_stmt *note_table, *note_column;
+    bool in_batch;
+    int batch_rows;
+    struct timespec batch_start;
+};
+
+bst_status bst_run_open_database(bst_ctx *ctx, bst_run *run) BST_MUST_CHECK;
+/* Commits, folds the journal in and closes. Closes in every case. */
+bst_status bst_run_close_database(bst_ctx *ctx, bst_run *run) BST_MUST_CHECK;
+
+#endif

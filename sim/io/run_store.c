@@ -1,0 +1,372 @@
+#include "sim/io/run_store.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "sim/io/run_internal.h"
+
+#define LOCK_NAME "lock"
+
+static bst_status join(bst_ctx *ctx, char *buffer, size_t bytes, const char *folder,
+                       const char *name) {
+    int n = snprintf(buffer, bytes, "%s/%s", folder, name);
+    if (n < 0 || (size_t)n >= bytes) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "%s/%s: the path is too long", folder, name);
+    }
+    return BST_OK;
+}
+
+static bst_status fail_errno(bst_ctx *ctx, const char *path, const char *what) {
+    return bst_fail(ctx, BST_ERR_IO, "%s: %s: %s", path, what, strerror(errno));
+}
+
+static bool is_dots(const char *name) {
+    return strcmp(name, ".") == 0 || strcmp(name, "..") == 0;
+}
+
+/* Removes what `name` under `parent` is; links are removed, not followed. False with errno. */
+static bool remove_tree(int parent, const char *name) {
+    if (unlinkat(parent, name, 0) == 0) {
+        return true;
+    }
+    if (errno != EISDIR && errno != EPERM) {
+        return false;
+    }
+    int fd = openat(parent, name, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+    DIR *dir = fd >= 0 ? fdopendir(fd) : NULL;
+    if (!dir) {
+        if (fd >= 0) {
+            close(fd);
+        }
+        return false;
+    }
+    bool ok = true;
+    for (struct dirent *entry; ok && (entry = readdir(dir));) {
+        ok = is_dots(entry->d_name) || remove_tree(fd, entry->d_name);
+    }
+    int saved = errno;
+    closedir(dir);
+    errno = saved;
+    return ok && unlinkat(parent, name, AT_REMOVEDIR) == 0;
+}
+
+/* Whether a folder may be taken for a run's: it is empty or holds one of a run's files. */
+static bool looks_like_run(const char *folder) {
+    DIR *dir = opendir(folder);
+    if (!dir) {
+        return false;
+    }
+    bool empty = true, known = false;
+    for (struct dirent *entry; (entry = readdir(dir));) {
+        if (!is_dots(entry->d_name)) {
+            empty = false;
+            known = known || strcmp(entry->d_name, "manifest.json") == 0 ||
+                    strcmp(entry->d_name, BST_RUN_DATABASE) == 0 ||
+                    strcmp(entry->d_name, LOCK_NAME) == 0;
+        }
+    }
+    closedir(dir);
+    return empty || known;
+}
+
+static bst_status make_parents(bst_ctx *ctx, const char *path) {
+    char parent[BST_RUN_PATH_BYTES];
+    for (const char *slash = path; (slash = strchr(slash + 1, '/'));) {
+        size_t n = (size_t)(slash - path);
+        memcpy(parent, path, n);
+        parent[n] = '\0';
+        if (mkdir(parent, 0777) != 0 && errno != EEXIST) {
+            /* a folder that is there may answer EROFS or EACCES before EEXIST */
+            struct stat info;
+            int saved = errno;
+            if (stat(parent, &info) != 0 || !S_ISDIR(info.st_mode)) {
+                errno = saved;
+                return fail_errno(ctx, parent, "cannot make the folder");
+            }
+        }
+    }
+    return BST_OK;
+}
+
+/* Opens folder/lock and locks it; -1 with errno (EWOULDBLOCK: a living process holds it). */
+static int take_lock(const char *folder, int flags) {
+    char path[BST_RUN_PATH_BYTES];
+    if (join(NULL, path, sizeof path, folder, LOCK_NAME) != BST_OK) {
+        errno = ENAMETOOLONG;
+        return -1;
+    }
+    int fd = open(path, O_RDWR | O_CLOEXEC | flags, 0666);
+    if (fd < 0) {
+        return -1;
+    }
+    /* The lock counts only if the file still is the one at that path: another run may have replaced
+     * the folder between open and flock. */
+    struct stat held, named;
+    int error = 0;
+    if (flock(fd, LOCK_EX | LOCK_NB) != 0 || fstat(fd, &held) != 0 || stat(path, &named) != 0) {
+        error = errno;
+    } else if (held.st_ino != named.st_ino || held.st_dev != named.st_dev) {
+        error = EWOULDBLOCK;
+    }
+    if (error) {
+        close(fd);
+        errno = error;
+        return -1;
+    }
+    return fd;
+}
+
+/* Moves the .partial folder of a dead run out of the way and removes it. */
+static bst_status clear_dead_run(bst_ctx *ctx, const char *folder) {
+    if (!looks_like_run(folder)) {
+        return bst_fail(ctx, BST_ERR_IO,
+                        "%s: is in the way and does not look like an unfinished run; move it or "
+                        "choose another output folder",
+                        folder);
+    }
+    int lock = take_lock(folder, O_CREAT);
+    if (lock < 0) {
+        if (errno == EWOULDBLOCK) {
+            return bst_fail(ctx, BST_ERR_IO,
+                            "%s: another run is writing it; choose another output folder or wait",
+                            folder);
+        }
+        return fail_errno(ctx, folder, "cannot replace the unfinished run");
+    }
+    bst_log(ctx, BST_LOG_WARNING, "%s: replacing what an unfinished run left", folder);
+    char dead[BST_RUN_PATH_BYTES];
+    int n = snprintf(dead, sizeof dead, "%s.dead.%ld", folder, (long)getpid());
+    bool ok = n > 0 && (size_t)n < sizeof dead && rename(folder, dead) == 0 &&
+              remove_tree(AT_FDCWD, dead);
+    bst_status status = ok ? BST_OK : fail_errno(ctx, folder, "cannot remove the unfinished run");
+    close(lock);
+    return status;
+}
+
+/* Makes the .partial folder with its lock taken: prepared under a name of its own, then renamed, so
+ * that nobody ever sees it unlocked. */
+static bst_status claim_folder(bst_ctx *ctx, bst_run *run) {
+    char draft[BST_RUN_PATH_BYTES];
+    int made = -1;
+    for (int i = 0; i < 1000 && made != 0; i++) {
+        int n = snprintf(draft, sizeof draft, "%s.%ld.%d", run->folder, (long)getpid(), i);
+        if (n < 0 || (size_t)n >= sizeof draft) {
+            return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", run->out);
+        }
+        made = mkdir(draft, 0777);
+        if (made != 0 && errno != EEXIST) {
+            break;
+        }
+    }
+    if (made != 0) {
+        return fail_errno(ctx, run->folder, "cannot make the folder");
+    }
+    bst_status status = BST_OK;
+    run->lock = take_lock(draft, O_CREAT | O_EXCL);
+    if (run->lock < 0) {
+        status = fail_errno(ctx, draft, "cannot make the lock");
+    } else if (rename(draft, run->folder) != 0) {
+        if (errno == ENOTEMPTY || errno == EEXIST) {
+            status = clear_dead_run(ctx, run->folder);
+            if (status == BST_OK && rename(draft, run->folder) != 0) {
+                status = fail_errno(ctx, run->folder, "cannot make the folder");
+            }
+        } else {
+            status = fail_errno(ctx, run->folder, "cannot make the folder");
+        }
+    }
+    if (status != BST_OK) {
+        remove_tree(AT_FDCWD, draft);
+    }
+    return status;
+}
+
+static bst_status check_out(bst_ctx *ctx, const bst_run *run) {
+    struct stat info;
+    if (lstat(run->out, &info) != 0) {
+        return BST_OK;
+    }
+    if (!run->overwrite) {
+        return bst_fail(ctx, BST_ERR_IO,
+                        "%s: exists already; choose another output folder, remove it, or ask to "
+                        "overwrite it",
+                        run->out);
+    }
+    if (!S_ISDIR(info.st_mode) || !looks_like_run(run->out)) {
+        return bst_fail(ctx, BST_ERR_IO,
+                        "%s: is not the folder of a run, so it is not overwritten; choose another "
+                        "output folder",
+                        run->out);
+    }
+    return BST_OK;
+}
+
+bst_status bst_run_create(bst_ctx *ctx, const char *out_path, bool overwrite, bst_run **out) {
+    *out = NULL;
+    size_t length = out_path ? strlen(out_path) : 0;
+    while (length > 1 && out_path[length - 1] == '/') {
+        length--;
+    }
+    const char *last = out_path;
+    for (size_t i = 0; i < length; i++) {
+        last = out_path[i] == '/' ? out_path + i + 1 : last;
+    }
+    size_t last_bytes = length - (size_t)(last - out_path);
+    if (last_bytes == 0 || (last_bytes == 1 && last[0] == '.') ||
+        (last_bytes == 2 && memcmp(last, "..", 2) == 0)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "'%s' is not a name for an output folder",
+                        out_path ? out_path : "");
+    }
+    /* room for the names of the files inside */
+    if (length > BST_RUN_PATH_BYTES - 256) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "the path of the output folder is too long");
+    }
+    bst_run *run = calloc(1, sizeof *run);
+    if (!run) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
+    }
+    run->lock = -1;
+    run->overwrite = overwrite;
+    memcpy(run->out, out_path, length);
+    snprintf(run->folder, sizeof run->folder, "%.*s.partial", (int)length, out_path);
+
+    bst_status status = check_out(ctx, run);
+    if (status == BST_OK) {
+        status = make_parents(ctx, run->out);
+    }
+    if (status == BST_OK) {
+        status = claim_folder(ctx, run);
+    }
+    if (status == BST_OK) {
+        status = bst_run_open_database(ctx, run);
+    }
+    if (status != BST_OK) {
+        if (run->lock >= 0) {
+            close(run->lock);
+        }
+        free(run);
+        return status;
+    }
+    *out = run;
+    return BST_OK;
+}
+
+const char *bst_run_folder(const bst_run *run) {
+    return run->folder;
+}
+
+bst_status bst_run_file(bst_ctx *ctx, const bst_run *run, const char *name, char *buffer,
+                        size_t bytes) {
+    return join(ctx, buffer, bytes, run->folder, name);
+}
+
+/* fsync of a file or folder. */
+static bst_status sync_path(bst_ctx *ctx, const char *path) {
+    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    /* some file systems do not take fsync of a folder: EINVAL */
+    if (fd < 0 || (fsync(fd) != 0 && errno != EINVAL)) {
+        bst_status status = fail_errno(ctx, path, "cannot flush to disk");
+        if (fd >= 0) {
+            close(fd);
+        }
+        return status;
+    }
+    close(fd);
+    return BST_OK;
+}
+
+static bst_status sync_folder(bst_ctx *ctx, const char *folder) {
+    DIR *dir = opendir(folder);
+    if (!dir) {
+        return fail_errno(ctx, folder, "cannot read the folder");
+    }
+    bst_status status = BST_OK;
+    for (struct dirent *entry; status == BST_OK && (entry = readdir(dir));) {
+        char path[BST_RUN_PATH_BYTES];
+        if (!is_dots(entry->d_name)) {
+            status = join(ctx, path, sizeof path, folder, entry->d_name);
+            status = status == BST_OK ? sync_path(ctx, path) : status;
+        }
+    }
+    closedir(dir);
+    return status == BST_OK ? sync_path(ctx, folder) : status;
+}
+
+static bst_status publish(bst_ctx *ctx, bst_run *run) {
+    char old[BST_RUN_PATH_BYTES] = "";
+    if (run->overwrite) {
+        BST_TRY(check_out(ctx, run));
+        int n = snprintf(old, sizeof old, "%s.replaced.%ld", run->out, (long)getpid());
+        if (n < 0 || (size_t)n >= sizeof old) {
+            return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", run->out);
+        }
+        if (rename(run->out, old) != 0) {
+            if (errno != ENOENT) {
+                return fail_errno(ctx, run->out, "cannot be replaced");
+            }
+            old[0] = '\0';
+        }
+    }
+    if (rename(run->folder, run->out) != 0) {
+        int error = errno;
+        if (old[0] && rename(old, run->out) != 0) {
+            bst_log(ctx, BST_LOG_WARNING, "%s: the former run is now %s", run->out, old);
+        }
+        errno = error;
+        if (error == ENOTEMPTY || error == EEXIST) {
+            return bst_fail(ctx, BST_ERR_IO,
+                            "%s: another run took this name meanwhile; this one stays in %s",
+                            run->out, run->folder);
+        }
+        return fail_errno(ctx, run->out, "cannot name the finished run");
+    }
+    if (old[0] && !remove_tree(AT_FDCWD, old)) {
+        bst_log(ctx, BST_LOG_WARNING, "%s: cannot be removed: %s", old, strerror(errno));
+    }
+    char parent[BST_RUN_PATH_BYTES];
+    memcpy(parent, run->out, sizeof parent);
+    char *slash = strrchr(parent, '/');
+    if (!slash) {
+        memcpy(parent, ".", 2);
+    } else {
+        slash[slash == parent ? 1 : 0] = '\0';
+    }
+    return sync_path(ctx, parent);
+}
+
+bst_status bst_run_finish(bst_ctx *ctx, bst_run *run) {
+    bst_status status = bst_run_close_database(ctx, run);
+    char lock_path[BST_RUN_PATH_BYTES];
+    bool have_lock_path = join(NULL, lock_path, sizeof lock_path, run->folder, LOCK_NAME) == BST_OK;
+    if (status == BST_OK && have_lock_path && unlink(lock_path) != 0) {
+        status = fail_errno(ctx, lock_path, "cannot be removed");
+    }
+    if (status == BST_OK) {
+        status = sync_folder(ctx, run->folder);
+    }
+    if (status == BST_OK) {
+        status = publish(ctx, run);
+    }
+    close(run->lock);
+    free(run);
+    return status;
+}
+
+void bst_run_abandon(bst_run *run) {
+    if (!run) {
+        return;
+    }
+    bst_ctx unheard;
+    bst_ctx_init(&unheard, NULL, NULL, BST_LOG_ERROR);
+    bst_status status = bst_run_close_database(&unheard, run);
+    (void)status; /* a run that is given up keeps what could be saved */
+    close(run->lock);
+    free(run);
+}

@@ -1,0 +1,117 @@
+/* A run's folder: written as "<out>.partial", renamed to "<out>" when complete, with its SQLite
+ * tables (run.sqlite). */
+#ifndef BST_IO_RUN_STORE_H
+#define BST_IO_RUN_STORE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "sim/core/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct bst_run bst_run;
+typedef struct bst_table bst_table;
+
+/* Makes "<out>.partial" (and missing parents, as mkdir -p) with an empty database in it. Nothing is
+ * written before this call.
+ * An existing <out> is refused with BST_ERR_IO unless `overwrite` is set: then it is replaced when
+ * the run finishes, and only if it is an empty folder or holds a run (manifest.json or run.sqlite).
+ * A .partial that a dead run left is logged as a warning and replaced; one that a living process
+ * still writes (it holds a lock on it) is refused.
+ * Errors: BST_ERR_IO with the path and the system's reason; BST_ERR_ARGUMENT for an empty path. */
+bst_status bst_run_create(bst_ctx *ctx, const char *out_path, bool overwrite,
+                          bst_run **out) BST_MUST_CHECK;
+
+/* The folder that is being written ("<out>.partial"); owned by the run. */
+const char *bst_run_folder(const bst_run *run);
+
+/* Path of a file in that folder. BST_ERR_ARGUMENT when it does not fit. */
+bst_status bst_run_file(bst_ctx *ctx, const bst_run *run, const char *name, char *buffer,
+                        size_t bytes) BST_MUST_CHECK;
+
+/* Completes the run: commits and closes the tables (one run.sqlite, no journal beside it), flushes
+ * every file to disk and renames the folder to its final name in one step. Frees `run` in every
+ * case; on an error the .partial folder stays. BST_ERR_IO when another run took the name meanwhile.
+ */
+bst_status bst_run_finish(bst_ctx *ctx, bst_run *run) BST_MUST_CHECK;
+
+/* Commits what there is as well as it can, and frees `run`; "<out>.partial" stays, readable. NULL
+ * is allowed. */
+void bst_run_abandon(bst_run *run);
+
+typedef enum bst_column_type {
+    BST_COLUMN_INT,
+    BST_COLUMN_REAL,
+    BST_COLUMN_TEXT,
+} bst_column_type;
+
+/* A column. `name` carries the unit as the project names fields (x_px, ra_deg); unit and doc go
+ * into the table "columns". */
+typedef struct bst_column {
+    const char *name;
+    bst_column_type type;
+    const char *unit; /* "px", "deg", "" ... */
+    const char *doc;
+} bst_column;
+
+/* A cell. NAN and NULL text are stored as SQL NULL. */
+typedef struct bst_value {
+    bst_column_type type;
+    bool is_null;
+    union {
+        int64_t integer;
+        double real;
+        const char *text;
+    } as;
+} bst_value;
+
+static inline bst_value bst_int_value(int64_t value) {
+    bst_value v;
+    v.type = BST_COLUMN_INT;
+    v.is_null = false;
+    v.as.integer = value;
+    return v;
+}
+static inline bst_value bst_real_value(double value) {
+    bst_value v;
+    v.type = BST_COLUMN_REAL;
+    v.is_null = value != value;
+    v.as.real = value;
+    return v;
+}
+static inline bst_value bst_text_value(const char *value) {
+    bst_value v;
+    v.type = BST_COLUMN_TEXT;
+    v.is_null = value == NULL;
+    v.as.text = value;
+    return v;
+}
+
+static inline bst_value bst_null_value(bst_column_type type) {
+    bst_value v = bst_int_value(0);
+    v.type = type;
+    v.is_null = true;
+    return v;
+}
+
+/* Creates a table of `count` columns (1 to BST_TABLE_COLUMNS) and notes it in "tables" and
+ * "columns". Names are ASCII letters, digits and underscores. The handle is owned by the run. */
+#define BST_TABLE_COLUMNS 64
+bst_status bst_table_create(bst_ctx *ctx, bst_run *run, const char *name, const char *doc,
+                            const bst_column *columns, int count, bst_table **out) BST_MUST_CHECK;
+
+/* Appends one row of as many values as the table has columns, of their types. Rows are committed in
+ * batches: after 50,000 rows or 2 s, so that a killed run loses no more than that. */
+bst_status bst_table_append(bst_ctx *ctx, bst_table *table, const bst_value *values) BST_MUST_CHECK;
+
+/* Commits the open batch now. */
+bst_status bst_run_commit(bst_ctx *ctx, bst_run *run) BST_MUST_CHECK;
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

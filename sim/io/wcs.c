@@ -1,0 +1,150 @@
+#include "sim/io/wcs.h"
+
+#include <math.h>
+
+#define GRID 9
+#define DEG (180.0 / BST_PI)
+
+/* Tangent plane at a place: unit vectors to it, east and north. */
+typedef struct tangent {
+    bst_vec3 centre, east, north;
+} tangent;
+
+static tangent tangent_at(double ra_rad, double dec_rad) {
+    double sr = sin(ra_rad), cr = cos(ra_rad), sd = sin(dec_rad), cd = cos(dec_rad);
+    return (tangent){{cd * cr, cd * sr, sd}, {-sr, cr, 0.0}, {-sd * cr, -sd * sr, cd}};
+}
+
+/* Standard coordinates (rad); false beyond the plane's horizon. */
+static bool to_plane(const tangent *t, bst_vec3 v, double *xi, double *eta) {
+    double z = bst_vec3_dot(t->centre, v);
+    if (!(z > 0.0)) {
+        return false;
+    }
+    *xi = bst_vec3_dot(t->east, v) / z;
+    *eta = bst_vec3_dot(t->north, v) / z;
+    return true;
+}
+
+static bst_vec3 from_plane(const tangent *t, double xi, double eta) {
+    return bst_vec3_unit(bst_vec3_axpy(bst_vec3_axpy(t->centre, xi, t->east), eta, t->north));
+}
+
+/* One grid point: offset from the boresight (px) and catalogue place. */
+typedef struct sample {
+    double dx, dy;
+    bst_vec3 icrs;
+} sample;
+
+/* Fits (xi, eta) = offset + cd * (dx, dy). The grid is symmetric about the boresight, so that the
+ * normal equations are diagonal. */
+static bool fit_plane(const tangent *t, const sample *samples, double offset[2], double cd[2][2]) {
+    double sum[2] = {0, 0}, sx[2] = {0, 0}, sy[2] = {0, 0}, sxx = 0, syy = 0;
+    for (int i = 0; i < GRID * GRID; i++) {
+        double p[2];
+        if (!to_plane(t, samples[i].icrs, &p[0], &p[1])) {
+            return false;
+        }
+        sxx += samples[i].dx * samples[i].dx;
+        syy += samples[i].dy * samples[i].dy;
+        for (int k = 0; k < 2; k++) {
+            sum[k] += p[k];
+            sx[k] += p[k] * samples[i].dx;
+            sy[k] += p[k] * samples[i].dy;
+        }
+    }
+    for (int k = 0; k < 2; k++) {
+        offset[k] = sum[k] / (GRID * GRID);
+        cd[k][0] = sx[k] / sxx;
+        cd[k][1] = sy[k] / syy;
+    }
+    return true;
+}
+
+bst_status bst_wcs_fit(bst_ctx *ctx, const bst_camera *camera, bst_quat q_cam_from_gcrf,
+                       const bst_light *light, bst_wcs *out) {
+    bst_quat q_gcrf_from_cam = bst_quat_conj(q_cam_from_gcrf);
+    double cx = bst_camera_centre_x(camera), cy = bst_camera_centre_y(camera);
+    /* a sensor one pixel wide still needs a grid of some width */
+    double half_x = fmax(cx, 1.0), half_y = fmax(cy, 1.0);
+    sample samples[GRID * GRID];
+    for (int i = 0; i < GRID * GRID; i++) {
+        sample *s = &samples[i];
+        s->dx = half_x * (2.0 * (i % GRID) / (GRID - 1) - 1.0);
+        s->dy = half_y * (2.0 * (i / GRID) / (GRID - 1) - 1.0);
+        bst_vec3 cam = bst_camera_unproject(camera, cx + s->dx, cy + s->dy);
+        s->icrs = bst_light_catalogue_star(light, bst_quat_rotate(q_gcrf_from_cam, cam));
+    }
+    double ra, dec, offset[2], cd[2][2];
+    bst_vec3_to_radec(samples[GRID * GRID / 2].icrs, &ra, &dec);
+    bool good = true;
+    /* moving the tangent point by the mean offset converges at once: two rounds and a check */
+    for (int round = 0; round < 3 && good; round++) {
+        tangent t = tangent_at(ra, dec);
+        good = fit_plane(&t, samples, offset, cd);
+        if (good && round < 2) {
+            bst_vec3_to_radec(from_plane(&t, offset[0], offset[1]), &ra, &dec);
+        }
+    }
+    double det = good ? cd[0][0] * cd[1][1] - cd[0][1] * cd[1][0] : 0.0;
+    if (!good || !(fabs(det) > 0.0)) {
+        return bst_fail(ctx, BST_ERR_NUMERIC,
+                        "no tangent-plane coordinate system fits a field this wide; reduce the "
+                        "pixel scale or the number of pixels");
+    }
+    tangent t = tangent_at(ra, dec);
+    double worst = 0.0;
+    for (int i = 0; i < GRID * GRID; i++) {
+        double xi, eta;
+        if (!to_plane(&t, samples[i].icrs, &xi, &eta)) {
+            return bst_fail(ctx, BST_ERR_NUMERIC, "the field is too wide for one tangent plane");
+        }
+        double ex = (cd[1][1] * xi - cd[0][1] * eta) / det - samples[i].dx;
+        double ey = (cd[0][0] * eta - cd[1][0] * xi) / det - samples[i].dy;
+        worst = fmax(worst, hypot(ex, ey));
+    }
+    *out = (bst_wcs){.crpix = {cx + 1.0, cy + 1.0},
+                     .crval_deg = {ra * DEG, dec * DEG},
+                     .cd_deg = {{cd[0][0] * DEG, cd[0][1] * DEG}, {cd[1][0] * DEG, cd[1][1] * DEG}},
+                     .residual_px = worst};
+    return BST_OK;
+}
+
+bst_wcs bst_wcs_window(const bst_wcs *wcs, bst_window window, int binning) {
+    bst_wcs w = *wcs;
+    double b = binning > 1 ? binning : 1;
+    /* full-sensor FITS pixel p covers (p - 0.5, p + 0.5) */
+    w.crpix[0] = (wcs->crpix[0] - 0.5 - window.x0) / b + 0.5;
+    w.crpix[1] = (wcs->crpix[1] - 0.5 - window.y0) / b + 0.5;
+    w.residual_px /= b;
+    for (int i = 0; i < 2; i++) {
+        for (int j = 0; j < 2; j++) {
+            w.cd_deg[i][j] *= b;
+        }
+    }
+    return w;
+}
+
+bool bst_wcs_sky_to_px(const bst_wcs *wcs, double ra_rad, double dec_rad, double *x_px,
+                       double *y_px) {
+    tangent t = tangent_at(wcs->crval_deg[0] / DEG, wcs->crval_deg[1] / DEG);
+    double xi, eta;
+    if (!to_plane(&t, bst_vec3_from_radec(ra_rad, dec_rad), &xi, &eta)) {
+        return false;
+    }
+    const double(*m)[2] = wcs->cd_deg;
+    double det = (m[0][0] * m[1][1] - m[0][1] * m[1][0]) / DEG;
+    *x_px = (m[1][1] * xi - m[0][1] * eta) / det + wcs->crpix[0] - 1.0;
+    *y_px = (m[0][0] * eta - m[1][0] * xi) / det + wcs->crpix[1] - 1.0;
+    return true;
+}
+
+void bst_wcs_px_to_sky(const bst_wcs *wcs, double x_px, double y_px, double *ra_rad,
+                       double *dec_rad) {
+    tangent t = tangent_at(wcs->crval_deg[0] / DEG, wcs->crval_deg[1] / DEG);
+    double dx = x_px + 1.0 - wcs->crpix[0], dy = y_px + 1.0 - wcs->crpix[1];
+    const double(*m)[2] = wcs->cd_deg;
+    bst_vec3_to_radec(
+        from_plane(&t, (m[0][0] * dx + m[0][1] * dy) / DEG, (m[1][0] * dx + m[1][1] * dy) / DEG),
+        ra_rad, dec_rad);
+}
