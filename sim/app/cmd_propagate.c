@@ -1,12 +1,11 @@
 /* boresight propagate: positions and velocities from two-line element sets, by SGP4. */
-#include "sim/app/cmd_propagate.h"
-
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
+#include "sim/app/app.h"
 #include "sim/app/options.h"
 #include "sim/astro/frames.h"
 #include "sim/astro/sgp4.h"

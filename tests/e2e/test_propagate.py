@@ -24,7 +24,7 @@ BORESIGHT = sys.argv.pop(1)
 CATALOGUE = "scenarios/catalogue_2022-06.tle"
 START, STOP = "2022-06-16T22:10:00Z", "2022-06-17T22:10:00Z"
 DECAYING = """DECAYING
-1 28350U 04019A   06167.21788666  .16154492  76267-5  18678-3 0  8894
+1 28350U 04020A   06167.21788666  .16154492  76267-5  18678-3 0  8894
 2 28350  64.9977 345.6130 0024870 260.7578  99.9590 16.47856722116490
 """
 
@@ -35,7 +35,8 @@ def run(*arguments, **options):
 
 
 def element_sets(path):
-    lines = [line.rstrip("\n") for line in open(path, encoding="ascii")]
+    with open(path, encoding="ascii") as file:
+        lines = file.read().splitlines()
     sets = {}
     for i, line in enumerate(lines):
         if line.startswith("1 "):
