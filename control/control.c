@@ -190,11 +190,12 @@ static const bst_track *find_track(const bst_tracks *tracks, int64_t id) {
     return NULL;
 }
 
-/* Distance of a track's place from the true boresight of its frame, px; believed attitude when the
- * frame gave none. */
+/* Distance of a track's place from the true boresight of its frame, px; when the frame gave no
+ * attitude, of its place now from where the boresight is believed to be now. */
 static double off_boresight_px(const bst_control *c, const bst_tracks *tracks,
                                const bst_track *track) {
     bst_quat q;
+    double dt = 0.0;
     if (tracks->attitude.valid) {
         q = tracks->attitude.q_cam_from_gcrf;
     } else if (c->pointing_valid) {

@@ -11,7 +11,7 @@ static void show(const char *name, const sim_result *r) {
         "%s: track at %.1f s, rms %.3f px (in track %.3f), p99 %.2f px, %.1f %% of frames, "
         "tiles %d, jump %.2f px\n",
         name, r->confirmed_s, r->rms_px, r->rms_track_px, r->p99_px, 100.0 * r->track_fraction,
-        r->tiles);
+        r->tiles, r->worst_jump_px);
 }
 
 static void check_limits(const sim_result *r) {

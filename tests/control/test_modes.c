@@ -59,7 +59,7 @@ static void rig_close(rig *r) {
 /* A gimbal that is where it was told to be, at once. */
 static void step(rig *r, int64_t tick, bool frame) {
     bst_nav_telemetry nav = {.tick = tick, .sun_m = {1.5e11, 0, 0}};
-    bst_vec3 d = {1, 0, 0};
+    bst_vec3 d = {0, 0, 1};
     if (r->commanded) {
         d = bst_vec3_unit(bst_vec3_axpy(r->command.direction_gcrf,
                                         (double)(tick - r->command.tick) / TICKS,
