@@ -202,10 +202,12 @@ static double off_boresight_px(const bst_control *c, const bst_tracks *tracks,
         q = bst_quat_mul(
             c->pointing.q_cam_from_gcrf,
             bst_pointing_error_at(&c->pointing_error, c->pointing.tick, c->env.tick_rate_hz));
+        dt = (double)(c->pointing.tick - tracks->tick) / c->env.tick_rate_hz;
     } else {
         return INFINITY;
     }
-    bst_vec3 v = bst_quat_rotate(q, apparent_of(c, track->direction_gcrf));
+    bst_vec3 d = bst_vec3_unit(bst_vec3_axpy(track->direction_gcrf, dt, track->rate_gcrf_radps));
+    bst_vec3 v = bst_quat_rotate(q, apparent_of(c, d));
     return bst_vec3_angle(v, (bst_vec3){0, 0, 1}) / c->env.pixel_rad;
 }
 
