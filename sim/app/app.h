@@ -1,5 +1,6 @@
-/* The program's commands: each takes its own argv (argv[0] is the command's name) and returns the exit code:
- * 0 done, 1 failed, 2 called wrongly, 3 the run ended without its target in track (only where asked), 130 interrupted. */
+/* The program's commands: each takes its own argv (argv[0] is the command's name) and returns the
+ * exit code: 0 done, 1 failed, 2 called wrongly, 3 the run ended without its target in track (only
+ * where asked), 130 interrupted. */
 #ifndef BST_APP_APP_H
 #define BST_APP_APP_H
 

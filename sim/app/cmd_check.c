@@ -28,7 +28,10 @@ int bst_cmd_check(int argc, char **argv) {
     bst_load_options load = BST_LOAD_DEFAULTS;
     const bst_option table[] = {
         BST_LOAD_OPTIONS(load),
-        {.name = "quiet", .kind = BST_OPTION_FLAG, .target = &quiet, .doc = "print nothing when the scenario is right"},
+        {.name = "quiet",
+         .kind = BST_OPTION_FLAG,
+         .target = &quiet,
+         .doc = "print nothing when the scenario is right"},
         {.name = "help", .kind = BST_OPTION_FLAG, .target = &help, .doc = "print this"},
         {.name = NULL},
     };
@@ -41,9 +44,11 @@ int bst_cmd_check(int argc, char **argv) {
     if (help) {
         printf(
             "usage: boresight check SCENARIO.json [options]\n\n"
-            "Reads and validates a scenario, opens what it names (orbits, star catalogue), wires its modules, and\n"
+            "Reads and validates a scenario, opens what it names (orbits, star catalogue), wires "
+            "its modules, and\n"
             "prints the scenario with every default written out. Nothing is written to disk.\n\n"
-            "  boresight check scenarios/neossat_geo_track.json --set /duration_s=60\n\noptions:\n");
+            "  boresight check scenarios/neossat_geo_track.json --set "
+            "/duration_s=60\n\noptions:\n");
         bst_options_print(stdout, table);
         return BST_EXIT_OK;
     }
@@ -85,7 +90,8 @@ int bst_cmd_schema(int argc, char **argv) {
     if (help) {
         printf(
             "usage: boresight schema\n\n"
-            "Prints the JSON Schema (draft 2020-12) of scenarios. Editors check and complete a scenario that names it:\n\n"
+            "Prints the JSON Schema (draft 2020-12) of scenarios. Editors check and complete a "
+            "scenario that names it:\n\n"
             "  boresight schema > scenarios/boresight.schema.json\n"
             "  {\"$schema\": \"boresight.schema.json\", \"boresight\": 1, ...}\n");
         return BST_EXIT_OK;

@@ -24,8 +24,8 @@ static bst_status apply(bst_ctx *ctx, const bst_load_options *options, bst_json 
     return BST_OK;
 }
 
-bst_status bst_load_scenario(bst_ctx *ctx, const char *path, const bst_load_options *options, bst_json **json,
-                             bst_scenario *out) {
+bst_status bst_load_scenario(bst_ctx *ctx, const char *path, const bst_load_options *options,
+                             bst_json **json, bst_scenario *out) {
     BST_TRY(bst_json_load(ctx, path, json));
     bst_status status = apply(ctx, options, *json);
     if (status == BST_OK) {

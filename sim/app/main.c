@@ -15,8 +15,8 @@ static const command commands[] = {
     {"check", bst_cmd_check, "validate a scenario and print it with every default written out"},
     {"schema", bst_cmd_schema, "print the JSON Schema of scenarios"},
     {"stars", bst_cmd_stars, "get, import or describe the star catalogue"},
-    {"propagate", bst_cmd_propagate, "print an orbit from a two-line element set"},
-    {"bench", bst_cmd_bench, "measure speed and error"},
+
+
 };
 
 void bst_app_log(void *user, bst_log_level level, const char *message) {
@@ -39,13 +39,14 @@ static void usage(FILE *stream) {
     for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {
         fprintf(stream, "  %-10s %s\n", commands[i].name, commands[i].doc);
     }
-    fprintf(stream,
-            "\n"
-            "A first run:\n"
-            "  boresight run scenarios/neossat_geo_track.json --out runs/first\n"
-            "\n"
-            "\"boresight COMMAND --help\" tells more. Exit codes: 0 done, 1 failed, 2 called wrongly,\n"
-            "130 interrupted.\n");
+    fprintf(
+        stream,
+        "\n"
+        "A first run:\n"
+        "  boresight run scenarios/neossat_geo_track.json --out runs/first\n"
+        "\n"
+        "\"boresight COMMAND --help\" tells more. Exit codes: 0 done, 1 failed, 2 called wrongly,\n"
+        "130 interrupted.\n");
 }
 
 int main(int argc, char **argv) {
@@ -53,7 +54,8 @@ int main(int argc, char **argv) {
         usage(stderr);
         return BST_EXIT_USAGE;
     }
-    if (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0 || strcmp(argv[1], "help") == 0) {
+    if (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0 ||
+        strcmp(argv[1], "help") == 0) {
         usage(stdout);
         return BST_EXIT_OK;
     }

@@ -1,6 +1,6 @@
-#include "control/control.h"
+#include "control/modules.h"
 #include "gimbal/modules.h"
-#include "imgproc/module.h"
+#include "imgproc/imgproc.h"
 #include "scenegen/module.h"
 #include "sim/app/app.h"
 #include "tracker/module.h"
@@ -12,4 +12,6 @@ static const bst_module_desc *const modules[] = {
 
 static const bst_registry registry = {modules, sizeof modules / sizeof *modules};
 
-const bst_registry *bst_app_registry(void) { return &registry; }
+const bst_registry *bst_app_registry(void) {
+    return &registry;
+}

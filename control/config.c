@@ -1,0 +1,52 @@
+#include "control/control.h"
+
+static const char *const strategies[] = {"track", "stare", "rate", NULL};
+
+#define C bst_control_config
+const bst_config_desc bst_control_config_table[] = {
+    BST_ENUM(C, strategy, strategies, "\"track\"",
+             "track: closed loop; stare: inertially at the cue's place at stare_time_s; rate: open "
+             "loop along the cue."),
+    BST_REAL(C, stare_time_s, "s", -1e6, 1e9, "0",
+             "strategy stare: time after the epoch whose cue is stared at."),
+    BST_REAL(C, exposure_s, "s", 0, 3600, "0",
+             "Exposure time asked of the sensor; 0 leaves the sensor's own."),
+    BST_REAL(C, period_s, "s", 0, 3600, "0",
+             "Frame period asked of the sensor; 0 leaves the sensor's own."),
+    BST_REAL(C, command_latency_s, "s", 0, 60, "0.1",
+             "Time from a command's publication to its effect: the instant it is computed for."),
+    BST_BOOL(C, compensate_attitude, "true",
+             "Correct the pointing by what identified stars say of the attitude."),
+    BST_REAL(C, disturbance_px_rms, "px", 1e-6, 1000, "0.5",
+             "Expected slow jitter (radial RMS), for the compensator's gains."),
+    BST_REAL(C, disturbance_cutoff_hz, "Hz", 1e-6, 100, "0.05",
+             "Highest frequency of the slow jitter, for the compensator's gains."),
+    BST_REAL(C, fix_sigma_floor_px, "px", 1e-6, 100, "0.02",
+             "Attitude fixes are never taken to be better than this."),
+    BST_REAL(C, attitude_sigma_arcsec, "arcsec", 1e-6, 360000, "60",
+             "Expected error of the spacecraft's own attitude at the start (1 sigma)."),
+    BST_REAL(C, drift_sigma_arcsec_per_s, "arcsec/s", 1e-6, 3600, "10",
+             "Expected drift rate of the body at the start (1 sigma)."),
+    BST_REAL(C, arrive_tolerance_px, "px", 0.01, 10000, "20",
+             "A slew has arrived when the servo has settled within this of the aim."),
+    BST_REAL(C, search_sigmas, "", 0, 20, "3",
+             "The search covers this many sigma of the cue's error each way, per image axis."),
+    BST_REAL(C, search_max_deg, "deg", 0, 90, "2", "The search never reaches farther than this."),
+    BST_REAL(C, search_step, "", 0.05, 1, "0.85",
+             "Distance of neighbouring search fields, as a fraction of the field of view."),
+    BST_INT(C, dwell_frames, "frames", 1, 10000, "3",
+            "Frames exposed wholly at rest at each place of the search."),
+    BST_REAL(C, dwell_timeout_s, "s", 0.001, 1e6, "15",
+             "The search goes on after this time when frames fail to come."),
+    BST_INT(C, candidate_hits, "frames", 1, 1000, "2",
+            "Detections that make a tentative track with a plausible rate a candidate."),
+    BST_REAL(C, candidate_rate_sigmas, "", 0.1, 1000, "4",
+             "A candidate's rate is within this many sigma of the cue's."),
+    BST_REAL(C, acquire_timeout_s, "s", 0.1, 1e6, "20",
+             "A candidate that is not confirmed within this time is given up."),
+    BST_REAL(C, track_entry_px, "px", 0.01, 10000, "3",
+             "Track mode begins when the target is within this of the boresight."),
+    BST_REAL(C, reacquire_extent_deg, "deg", 0, 90, "1",
+             "How far each way from its predicted place a lost target is searched."),
+    BST_CONFIG_END};
+#undef C
