@@ -223,12 +223,13 @@ static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_lig
         memcpy(out->covariance_cam, solution.covariance, sizeof out->covariance_cam);
         out->fix.error_cam_rad =
             bst_quat_to_rotvec(bst_quat_mul(solution.q_cam_from_gcrf, bst_quat_conj(q_telemetry)));
-        (void)bst_attitude_error_update(&t->error, &t->error_params, q_telemetry,
-                                        out->fix.error_cam_rad, solution.covariance);
+        out->usable = bst_attitude_error_update(&t->error, &t->error_params, q_telemetry,
+                                                out->fix.error_cam_rad, solution.covariance);
     } else {
         bst_vec3 rate;
         bst_attitude_error_get(&t->error, &t->error_params, q_telemetry, &out->fix.error_cam_rad,
                                &rate, out->covariance_cam);
+        out->usable = true;
         out->q_cam_from_gcrf =
             bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(out->fix.error_cam_rad), q_telemetry));
     }
@@ -236,7 +237,10 @@ static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_lig
     for (int i = 0; i < 3; i++) {
         out->fix.sigma_rad[i] = sqrt(out->covariance_cam[i][i]);
     }
-    out->usable = fmax(out->fix.sigma_rad[0], out->fix.sigma_rad[1]) <= t->max_attitude_sigma_rad;
+    /* Stars that contradict the telemetry's history were seen from a camera that turned unevenly in
+     * the exposure: their attitude is not that of its middle. */
+    out->usable = out->usable &&
+                  fmax(out->fix.sigma_rad[0], out->fix.sigma_rad[1]) <= t->max_attitude_sigma_rad;
 }
 
 /* A detection as a geometric direction with the covariance of centroid and attitude. */
