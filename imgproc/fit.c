@@ -247,6 +247,14 @@ bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
     return true;
 }
 
+double bst_fit_norm(const bst_fit *fit, const bst_stamp *stamp) {
+    double sum = 0.0;
+    for (int i = 0; i < stamp->width * stamp->height; i++) {
+        sum += fit->model[i] * fit->model[i];
+    }
+    return sqrt(sum);
+}
+
 bool bst_fit_moments(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
                      const bst_source *source, const bst_source *const *fixed, int fixed_count,
                      double out[3]) {
