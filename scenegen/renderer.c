@@ -381,6 +381,12 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
     return bst_device_check(ctx, clFlush(r->queue), "starting the rendering");
 }
 
+bst_status bst_renderer_plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *request) {
+    int blocks;
+    BST_TRY(check_request(ctx, r, request));
+    return plan(ctx, r, request, &blocks);
+}
+
 bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *r, const bst_render_request *request,
                                bst_frame **out) {
     *out = NULL;

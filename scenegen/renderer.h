@@ -56,6 +56,11 @@ typedef struct bst_render_stats {
 bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *renderer,
                                const bst_render_request *request, bst_frame **out) BST_MUST_CHECK;
 
+/* Only chooses nodes and stamps, as the calls below do first: for bst_renderer_peak_e and the
+ * statistics of an exposure that is not rendered. */
+bst_status bst_renderer_plan(bst_ctx *ctx, bst_renderer *renderer,
+                             const bst_render_request *request) BST_MUST_CHECK;
+
 /* The same sources and nodes without noise or detector: expected electrons per pixel (background
  * included), [height][width]. Waits. */
 bst_status bst_renderer_render_noise_free(bst_ctx *ctx, bst_renderer *renderer,

@@ -236,7 +236,12 @@ static bool moves(const bst_source *source) {
 static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_source *source, double x0,
                            double y0, int *count, bool *visible) {
     const bst_los_track *track = &s->track;
-    int least = 16 / track->count + 1; /* the motion is curved even where the attitude is not */
+    /* the motion is curved even where the attitude is not: n chords miss a bend of b by b / n^2 */
+    bst_vec3 bend = bst_vec3_sub(
+        bst_vec3_scale(bst_vec3_add(source->apparent_start, source->apparent_end), 0.5),
+        source->apparent_mid);
+    double chords = sqrt(bst_vec3_norm(bend) / bst_camera_scale_rad(&s->camera) / 0.002);
+    int least = (int)fmin(chords, 1e4) / (track->count - 1) + 1;
     *count = 0;
     *visible = true;
     for (int k = 0; k + 1 < track->count; k++) {

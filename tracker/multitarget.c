@@ -127,7 +127,7 @@ static bool cue_acceleration(const bst_mtt_frame *frame, double dt_s, bst_vec3 *
 
 static void predict(bst_mtt *m, const bst_mtt_frame *frame) {
     double dt = frame->seconds - m->seconds;
-    bst_vec3 step, rate;
+    bst_vec3 step = {0}, rate = {0};
     bool forward = m->started && cue_acceleration(frame, dt, &step, &rate);
     double near = cos(m->params.feed_forward_rad);
     for (int t = 0; t < m->track_count; t++) {

@@ -70,6 +70,7 @@ static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_par
         .rate_floor_radps = arcsec(c->target_rate_floor_arcsec_per_s),
         .max_rate_sigma_radps = arcsec(c->target_max_rate_sigma_arcsec_per_s),
         .max_chi2 = 4.0,
+        .min_hits = (int)c->target_min_hits,
         .margin = 2.0,
         .margin_hits = 8,
         .memory_s = c->target_memory_s,

@@ -5,7 +5,7 @@
 /* Nodes travel in blocks of this many, one vector register. */
 #define BST_BLOCK 16
 /* Sub-pixel phases of the profile table; one more row closes the interval. */
-#define BST_PHASES 128
+#define BST_PHASES 256
 /* Floats per node of a node table: the homography from the reference attitude's tangent plane to
  * the node's, as nine coefficients, then the weight. */
 #define BST_TABLE_ROWS 10

@@ -82,8 +82,9 @@ static void show_progress(void *user, const char *what, long long done, long lon
         return;
     }
     double rate = (double)done / elapsed;
-    fprintf(stderr, "\r\033[K%s: %3.0f %%, %.2f million/s, %.0f s left", what,
-            100.0 * (double)done / (double)total, 1e-6 * rate, (double)(total - done) / rate);
+    const char *unit = strcmp(what, "downloading") == 0 ? "MB/s" : "million stars/s";
+    fprintf(stderr, "\r\033[K%s: %3.0f %%, %.1f %s, %.0f s left", what,
+            100.0 * (double)done / (double)total, 1e-6 * rate, unit, (double)(total - done) / rate);
 }
 
 static progress_line progress_begin(void) {

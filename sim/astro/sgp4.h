@@ -38,8 +38,8 @@ void bst_sgp4_free(bst_sgp4 *sgp4);
 /* State at `minutes` after the element epoch (UTC taken as uniform, as the theory does): TEME, km
  * and km/s. Pure: no state is kept between calls, so any order of times gives the same bits and
  * threads may share one propagator. position/velocity are still written on BST_SGP4_DECAYED, else
- * untouched on error. Times beyond 1e9 minutes or not finite give BST_SGP4_MEAN_MOTION. Cost: about
- * 0.15 microseconds; resonant orbits add 1.4 microseconds for each 30 days from the epoch. */
+ * untouched on error. Times beyond 1e9 minutes or not finite give BST_SGP4_MEAN_MOTION. Resonant
+ * orbits are integrated from the epoch each time, in steps of half a day. */
 bst_sgp4_error bst_sgp4_propagate(const bst_sgp4 *sgp4, double minutes, double position_teme_km[3],
                                   double velocity_teme_kmps[3]);
 

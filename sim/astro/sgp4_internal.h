@@ -87,7 +87,7 @@ struct bst_sgp4 {
     bst_sgp4_deep deep;
 };
 
-/* What Sun, Moon and resonance do to the mean elements and to the periodics at one time. */
+/* Mean elements at one time. */
 typedef struct bst_sgp4_mean {
     double n, e, i, m, argp, raan;
 } bst_sgp4_mean;

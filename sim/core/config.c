@@ -1,6 +1,5 @@
 #include "sim/core/config.h"
 
-#include <errno.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -8,6 +7,8 @@
 #include <string.h>
 
 #include <cjson/cJSON.h>
+
+#include "sim/core/text.h"
 
 static const double MAX_EXACT_INTEGER = 9007199254740992.0; /* 2^53 */
 
@@ -44,38 +45,13 @@ static void range_text(const bst_config_desc *d, char *buffer, size_t bytes) {
              *unit ? " " : "", unit);
 }
 
-/* Edit distance of two short words (Levenshtein), capped by the buffers' size. */
-static size_t edit_distance(const char *a, const char *b) {
-    size_t n = strlen(a), m = strlen(b);
-    size_t row[65];
-    if (n > 64 || m > 64) {
-        return 64;
-    }
-    for (size_t j = 0; j <= m; j++) {
-        row[j] = j;
-    }
-    for (size_t i = 1; i <= n; i++) {
-        size_t diagonal = row[0];
-        row[0] = i;
-        for (size_t j = 1; j <= m; j++) {
-            size_t substitute = diagonal + (a[i - 1] != b[j - 1]);
-            diagonal = row[j];
-            size_t best = row[j] + 1 < row[j - 1] + 1 ? row[j] + 1 : row[j - 1] + 1;
-            row[j] = substitute < best ? substitute : best;
-        }
-    }
-    return row[m];
-}
-
 static bst_status unknown_key(const reader *r, const char *path, const char *key,
                               const bst_config_desc *table) {
     const char *nearest = NULL;
-    size_t nearest_distance = 4;
+    size_t best = SIZE_MAX;
     char known[400] = "";
     for (const bst_config_desc *d = table; d->key; d++) {
-        size_t distance = edit_distance(key, d->key);
-        if (distance < nearest_distance && distance < strlen(d->key)) {
-            nearest_distance = distance;
+        if (bst_text_is_nearer(key, d->key, &best)) {
             nearest = d->key;
         }
         size_t used = strlen(known);

@@ -39,10 +39,11 @@ bst_status bst_star_subset_read(bst_ctx *ctx, const char *path,
 
 /* Reads one row without its newline. Rows of 206 bytes are of the main table, of 122 bytes of
  * supplement 1. Positions are brought to J2000: the main table's mean positions are there already;
- * a row without one (flag X) gives its observed position, and supplement 1 gives J1991.25, moved on
- * by the proper motion where the row has one. A row with one of BT and VT only (and the
- * supplement's Hp, taken as VT) is given BT-VT = 0.7, a typical star's, and marked as without
- * colour. BST_ERR_FORMAT says which bytes are wrong. */
+ * a row without one (flag X) gives its observed position as it is; a double star's component whose
+ * mean position is the pair's photocentre (flag P) gives its own observed position, moved on by the
+ * pair's proper motion; supplement 1 gives J1991.25, moved on where the row has a proper motion.
+ * A row with one of BT and VT only (and the supplement's Hp, taken as VT) is given BT-VT = 0.7, a
+ * typical star's, and marked as without colour. BST_ERR_FORMAT says which bytes are wrong. */
 bst_status bst_star_parse_row(bst_ctx *ctx, const char *row, size_t bytes,
                               bst_star_values *out) BST_MUST_CHECK;
 

@@ -148,6 +148,13 @@ bst_status bst_star_parse_row(bst_ctx *ctx, const char *row, size_t bytes, bst_s
     if (bytes == MAIN_BYTES) {
         if (row[13] == 'X') {
             read_position(&r, 153, 166, out);
+        } else if (row[13] == 'P') {
+            read_position(&r, 153, 166, out);
+            double epoch = 1990.0 + 0.005 * (double)(need_fixed(&r, 179, 182, 2) +
+                                                     need_fixed(&r, 184, 187, 2));
+            if (read_motion(&r, out) && r.status == BST_OK) {
+                move_epoch(out, BST_STAR_EPOCH_YEAR - epoch);
+            }
         } else {
             read_position(&r, 16, 29, out);
             read_motion(&r, out);

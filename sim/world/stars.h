@@ -75,7 +75,10 @@ bst_status bst_stars_default_path(bst_ctx *ctx, char *buffer, size_t bytes) BST_
  *
  * Motion is uniform along the great circle's tangent, without radial velocity and parallax: over 35
  * years that is right to 1 mas but for the nearest stars, where the neglected change of perspective
- * grows to 0.7 arcsec (Barnard's star; all others under 0.2). */
+ * grows to 0.7 arcsec (Barnard's star; all others under 0.2). Tycho-2 itself has no proper motion
+ * for 5 % of its stars, those without a mean position (109,445) and Tycho-1's (13,082): they stay
+ * where they were observed about 1991.5, fast ones such as Polaris, 61 Cygni and GJ 887 among them.
+ */
 bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre, double radius_rad,
                            double v_limit, double julian_year, bst_star *out, int capacity,
                            int *count) BST_MUST_CHECK;

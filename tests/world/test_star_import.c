@@ -32,6 +32,10 @@
 #define DOUBLE_B                                                                                 \
     "0049 01674 1|H|039.65311086|+03.44338599|   34.9|    7.9| 36.8| 24.6|  1.2|  1.2|H|      |" \
     "     |10.511|0.130|  9|T| 12318B\n"
+#define PHOTOCENTRE                                                                          \
+    "0001 00017 1|P|  0.05059802|  1.77144349|   32.1|  -20.7| 21| 31| 1.6| 1.6|1989.29|198" \
+    "5.38| 5|1.4|0.6|1.4|0.6|11.318|0.070|10.521|0.051| 18|T|         |  0.05086583|  1.771" \
+    "51389|1.78|1.55| 30.0| 45.6|D|-0.2\n"
 #define SIRIUS_HP                                                                                \
     "5949 02777 1|H|101.28854105|-16.71314306| -546.0|-1223.1|  1.2|  1.0|  1.3|  1.2|H|      |" \
     "     |-1.088|0.002|999| | 32349 \n"
@@ -63,14 +67,15 @@ static int setup(void **state) {
     int fd = mkstemp(s->path);
     close(fd);
     bst_star_import_options options = bst_star_import_all();
-    options.expected_rows = 8;
+    options.expected_rows = 9;
     long long written = 0;
     /* Supplement first and out of order: the importer sorts. */
-    bst_status status = import_text(
-        &s->ctx, SIRIUS_HP DOUBLE_B TYCHO1_NO_MOTION NO_MEAN_POSITION NORMAL NO_BT NO_VT DOUBLE_A,
-        &options, s->path, &written);
+    bst_status status = import_text(&s->ctx,
+                                    SIRIUS_HP DOUBLE_B TYCHO1_NO_MOTION NO_MEAN_POSITION NORMAL
+                                        PHOTOCENTRE NO_BT NO_VT DOUBLE_A,
+                                    &options, s->path, &written);
     *state = s;
-    return status == BST_OK && written == 8 && bst_stars_open(&s->ctx, s->path, &s->stars) == BST_OK
+    return status == BST_OK && written == 9 && bst_stars_open(&s->ctx, s->path, &s->stars) == BST_OK
                ? 0
                : -1;
 }
@@ -113,6 +118,14 @@ static void test_no_mean_position_gives_the_observed_one(void **state) {
     bst_star star = find(*state, 1, 41, 1, 2000.0);
     bst_assert_close(star.v_mag, 12.235 - 0.090 * 0.800, 1e-6); /* float */
     bst_assert_close(star.b_minus_v, 0.850 * 0.800, 1e-7);      /* float */
+}
+
+static void test_photocentre_gives_the_component(void **state) {
+    /* Observed 1.78 and 1.55 years after 1990 in the two axes: their mean is the epoch. */
+    double years = 10.0 - 0.5 * (1.78 + 1.55);
+    assert_at(find(*state, 1, 17, 1, 2000.0),
+              0.05086583 + 32.1 * 1e-3 / 3600.0 * years / cos(1.77151389 * BST_DEG_RAD),
+              1.77151389 + -20.7 * 1e-3 / 3600.0 * years);
 }
 
 static void test_one_magnitude_only(void **state) {
@@ -253,6 +266,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_main_table),
         cmocka_unit_test(test_no_mean_position_gives_the_observed_one),
+        cmocka_unit_test(test_photocentre_gives_the_component),
         cmocka_unit_test(test_one_magnitude_only),
         cmocka_unit_test(test_supplement_is_moved_from_its_epoch),
         cmocka_unit_test(test_double_star_with_one_identity),

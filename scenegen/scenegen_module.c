@@ -1,0 +1,183 @@
+#include <math.h>
+#include <stdlib.h>
+
+#include "scenegen/module.h"
+#include "scenegen/renderer.h"
+
+typedef struct scenegen_config {
+    double v_limit, margin_px, error_sigma, cut_sigma;
+    int64_t truth_capacity, pool_frames;
+} scenegen_config;
+
+static const bst_config_desc config[] = {
+    BST_REAL(scenegen_config, v_limit, "mag", -30.0, 30.0, "16",
+             "Stars fainter than this are not drawn."),
+    BST_REAL(scenegen_config, margin_px, "px", 0.0, 1e4, "0",
+             "Sources this far outside the window are drawn too; at least what the PSF needs."),
+    BST_REAL(scenegen_config, error_sigma, "sigma", 1e-4, 1.0, "0.03",
+             "Aim for the rendering error of a source in any pixel, in that pixel's noise."),
+    BST_REAL(scenegen_config, cut_sigma, "sigma", 1e-6, 1.0, "0.02",
+             "Light per pixel that a source's stamp may leave out, in a dark pixel's noise."),
+    BST_INT(scenegen_config, truth_capacity, "", 1, 1048576, "4096",
+            "Sources that the truth of one exposure has room for."),
+    BST_INT(scenegen_config, pool_frames, "", 2, 256, "8",
+            "Frames that may be alive at a time: in queues, being rendered, being read."),
+    BST_CONFIG_END,
+};
+
+enum { PORT_EXPOSURE, PORT_LOS, PORT_FRAME, PORT_TRUTH, PORT_COUNT };
+
+static const bst_port ports[PORT_COUNT] = {
+    [PORT_EXPOSURE] = {BST_CHANNEL_EXPOSURE, BST_PORT_IN, BST_PORT_TRIGGER, 0.0, 0},
+    [PORT_LOS] = {BST_CHANNEL_LOS_HISTORY, BST_PORT_IN, 0, 0.0, 0},
+    [PORT_FRAME] = {BST_CHANNEL_FRAME, BST_PORT_OUT, 0, 0.0, 0},
+    [PORT_TRUTH] = {BST_CHANNEL_TRUTH, BST_PORT_OUT, 0, 0.0, 4096},
+};
+
+typedef struct scenegen {
+    const bst_camera *camera;
+    bst_field_options options;
+    int64_t tick_rate_hz;
+    bst_rng_key key;
+    bst_field *field;
+    bst_renderer *renderer;
+} scenegen;
+
+static void destroy(void *self) {
+    scenegen *s = self;
+    if (s) {
+        bst_renderer_free(s->renderer);
+        bst_field_free(s->field);
+        free(s);
+    }
+}
+
+static bst_status create(const bst_module_env *env, const void *config_object, void **self) {
+    const scenegen_config *c = config_object;
+    scenegen *s = calloc(1, sizeof *s);
+    *self = NULL;
+    if (!s) {
+        return bst_fail(env->ctx, BST_ERR_MEMORY, "no memory for %s", env->instance);
+    }
+    s->camera = bst_world_camera(env->world, env->observer, env->sensor);
+    s->tick_rate_hz = env->tick_rate_hz;
+    s->key = bst_env_rng(env, "detector");
+    bst_renderer_options options = bst_renderer_default_options();
+    options.error_sigma = c->error_sigma;
+    options.cut_sigma = c->cut_sigma;
+    options.pool_frames = (int)c->pool_frames;
+    bst_status status =
+        bst_renderer_create(env->ctx, env->device, s->camera, &options, &s->renderer);
+    if (status == BST_OK) {
+        status = bst_field_create(env->ctx, env->world, env->observer, env->sensor, &s->field);
+    }
+    if (status != BST_OK) {
+        destroy(s);
+        return status;
+    }
+    s->options.v_limit = c->v_limit;
+    s->options.margin_px = fmax(c->margin_px, bst_renderer_margin_px(s->renderer));
+    bst_env_set_capacity(env, PORT_TRUTH, (int)c->truth_capacity);
+    *self = s;
+    return BST_OK;
+}
+
+/* Fills the truth's items; whatever finds no room is counted in `lost`. */
+static void write_items(const scenegen *s, const bst_los_track *track, const bst_source *sources,
+                        int count, const bst_exposure *e, bst_truth *truth, int capacity) {
+    truth->count = count < capacity ? count : capacity;
+    truth->lost = count - truth->count;
+    double top_e =
+        ((double)((1 << s->camera->bits) - 1) - s->camera->offset_dn) * s->camera->gain_e_per_dn;
+    double limit_e = fmin(s->camera->full_well_e, top_e) - truth->background_e - truth->dark_e;
+    for (int i = 0; i < truth->count; i++) {
+        bst_field_truth_item(s->field, track, &sources[i], e->window, truth, &truth->items[i]);
+        if (bst_renderer_peak_e(s->renderer, i) >= limit_e) {
+            truth->items[i].flags |= BST_TRUTH_SATURATED;
+        }
+    }
+}
+
+static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure *e,
+                         const bst_los_history *history) {
+    bst_ctx *ctx = bst_step_ctx(step);
+    if (e->binning > 1) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "exposure %lld asks for binning %d; the renderer reads every pixel out by "
+                        "itself: use binning 1",
+                        (long long)e->id, e->binning);
+    }
+    bst_los_track track;
+    BST_TRY(bst_field_track(ctx, s->field, history, e->start_tick, e->end_tick, s->tick_rate_hz,
+                            &track));
+    int capacity, count;
+    const bst_source *sources;
+    bst_truth *truth = bst_step_write(step, PORT_TRUTH, &capacity);
+    truth->exposure_id = e->id;
+    truth->dropped = e->dropped;
+    BST_TRY(bst_field_query(ctx, s->field, &track, e->start_tick, e->end_tick, s->tick_rate_hz,
+                            e->window, &s->options, truth, &sources, &count));
+    bst_render_request request = {.window = e->window,
+                                  .track = &track,
+                                  .sources = sources,
+                                  .count = count,
+                                  .background_e = truth->background_e + truth->dark_e,
+                                  .key = s->key,
+                                  .exposure_id = e->id};
+    if (e->dropped) {
+        BST_TRY(bst_renderer_plan(ctx, s->renderer, &request));
+    } else {
+        bst_frame *frame;
+        BST_TRY(bst_renderer_render(ctx, s->renderer, &request, &frame));
+        bst_frame_message *message = bst_step_write(step, PORT_FRAME, NULL);
+        *message = (bst_frame_message){.frame = frame,
+                                       .exposure_id = e->id,
+                                       .start_tick = e->start_tick,
+                                       .end_tick = e->end_tick,
+                                       .window = e->window,
+                                       .binning = 1,
+                                       .bits = (int)s->camera->bits};
+    }
+    /* while the device renders */
+    write_items(s, &track, sources, count, e, truth, capacity);
+    if (truth->lost > 0) {
+        bst_step_count(step, "truth_overflow");
+    }
+    if (!e->dropped) {
+        long long saturated;
+        BST_TRY(bst_renderer_saturated(ctx, s->renderer, &saturated));
+        if (saturated > 0) {
+            bst_step_count(step, "saturated");
+        }
+    }
+    return BST_OK;
+}
+
+static bst_status step_module(void *self, struct bst_step *step) {
+    bst_sample exposure;
+    while ((exposure = bst_step_next(step, PORT_EXPOSURE)).payload) {
+        bst_sample history = bst_step_latest(step, PORT_LOS);
+        if (!history.payload) {
+            return bst_fail(bst_step_ctx(step), BST_ERR_STATE,
+                            "an exposure ended before any line of sight was published");
+        }
+        BST_TRY(expose(self, step, exposure.payload, history.payload));
+    }
+    return BST_OK;
+}
+
+const bst_module_desc bst_scenegen_module = {
+    .abi = BST_MODULE_ABI,
+    .role = "scenegen",
+    .type = "opencl",
+    .doc = "Renders frames of the true sky on an OpenCL device, with a full detector.",
+    .flags = BST_MODULE_READS_TRUTH | BST_MODULE_NEEDS_DEVICE,
+    .config = config,
+    .config_bytes = sizeof(scenegen_config),
+    .default_rate_hz = 0.0,
+    .ports = ports,
+    .port_count = PORT_COUNT,
+    .create = create,
+    .step = step_module,
+    .destroy = destroy,
+};

@@ -1,0 +1,464 @@
+#include <errno.h>
+#include <math.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <cjson/cJSON.h>
+
+#include "sim/app/app.h"
+#include "sim/app/load.h"
+#include "sim/app/run_pictures.h"
+#include "sim/app/version.h"
+#include "sim/engine/recorder.h"
+#include "sim/engine/simulation.h"
+#include "sim/eval/loop_summary.h"
+#include "sim/io/manifest.h"
+
+static volatile sig_atomic_t stop_requested;
+
+static void on_signal(int number) {
+    (void)number;
+    stop_requested = 1;
+}
+
+/* One sensor as the run watches it. */
+typedef struct watched_sensor {
+    char scope[160];
+    int recorder_index;
+    bst_loop_summary *summary;
+} watched_sensor;
+
+typedef struct run_state {
+    bst_ctx *ctx;
+    const bst_scenario *scenario;
+    bst_recorder *recorder;
+    watched_sensor *sensors;
+    int sensor_count;
+    bst_run_pictures *pictures; /* of the first sensor */
+    bool progress;
+    double started, shown; /* wall seconds */
+} run_state;
+
+static double wall_seconds(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+static bst_status on_message(void *user, const char *scope, const char *channel,
+                             const void *payload, int64_t tick) {
+    run_state *run = user;
+    watched_sensor *sensor = run->sensors;
+    while (strcmp(sensor->scope, scope) != 0) {
+        sensor++; /* every scope of the engine is watched */
+    }
+    if (strcmp(channel, BST_CHANNEL_LOS_HISTORY) == 0) {
+        return BST_OK; /* the plant's rate: nothing below reads it */
+    }
+    if (bst_recorder_wants(run->recorder, channel)) {
+        BST_TRY(bst_recorder_channel(run->ctx, run->recorder, sensor->recorder_index, channel,
+                                     payload, tick));
+    }
+    if (sensor == run->sensors) {
+        BST_TRY(bst_run_pictures_message(run->ctx, run->pictures, channel, payload));
+    }
+    if (strcmp(channel, BST_CHANNEL_TRUTH) == 0) {
+        return bst_loop_summary_truth(run->ctx, sensor->summary, payload);
+    }
+    if (strcmp(channel, BST_CHANNEL_TRACKS) == 0) {
+        bst_loop_summary_tracks(sensor->summary, payload, tick);
+    } else if (strcmp(channel, BST_CHANNEL_CONTROL_STATUS) == 0) {
+        bst_loop_summary_status(sensor->summary, payload);
+    }
+    return BST_OK;
+}
+
+static bst_status on_event(void *user, int64_t tick, const char *instance, const char *kind,
+                           const char *text) {
+    run_state *run = user;
+    return bst_recorder_event(run->ctx, run->recorder, tick, instance, kind, text);
+}
+
+static void on_judged(void *user, const bst_loop_frame *frame) {
+    bst_run_pictures_judged(user, frame);
+}
+
+static void show_progress(run_state *run, int64_t tick, bool last) {
+    double now = wall_seconds();
+    if (!run->progress || (!last && now - run->shown < 0.2)) {
+        return;
+    }
+    run->shown = now;
+    double rate = (double)run->scenario->tick_rate_hz;
+    double simulated = (double)tick / rate, total = run->scenario->duration_s;
+    double wall = now - run->started, factor = wall > 0.0 ? simulated / wall : 0.0;
+    double left = factor > 0.0 ? (total - simulated) / factor : 0.0;
+    bst_loop_figures figures;
+    bst_loop_frame newest;
+    bst_loop_summary_figures(run->sensors[0].summary, &figures);
+    bst_loop_summary_newest(run->sensors[0].summary, &newest);
+    char error[32] = "-", snr[32] = "-";
+    if (newest.error_px < 1e5) {
+        snprintf(error, sizeof error, "%.2f px", newest.error_px);
+    }
+    if (newest.target_snr > 0.0) {
+        snprintf(snr, sizeof snr, "%.1f", newest.target_snr);
+    }
+    fprintf(stderr,
+            "\r\033[K%7.1f / %.0f s  frame %lld  %-9s %s  error %s  SNR %s  %.1f x real time  %.0f "
+            "s left",
+            simulated, total, (long long)figures.frames, bst_mode_name(figures.final_mode),
+            newest.in_track ? "in track" : "no track", error, snr, factor, left);
+    if (last) {
+        fputc('\n', stderr);
+    }
+    fflush(stderr);
+}
+
+static bool interrupted(void *user, int64_t tick) {
+    show_progress(user, tick, false);
+    return stop_requested != 0;
+}
+
+static void add_number(cJSON *node, const char *key, double value) {
+    if (isfinite(value)) {
+        cJSON_AddNumberToObject(node, key, value);
+    } else {
+        cJSON_AddNullToObject(node, key);
+    }
+}
+
+static cJSON *summary_json(const bst_loop_figures *f, double real_time_factor) {
+    cJSON *node = cJSON_CreateObject();
+    cJSON_AddNumberToObject(node, "frames", (double)f->frames);
+    cJSON_AddStringToObject(node, "final_mode", bst_mode_name(f->final_mode));
+    add_number(node, "time_to_confirm_s", f->time_to_confirm_s);
+    add_number(node, "track_fraction", f->track_fraction);
+    add_number(node, "pointing_rms_px", f->pointing_rms_px);
+    add_number(node, "pointing_p99_px", f->pointing_p99_px);
+    add_number(node, "real_time_factor", real_time_factor);
+    add_number(node, "time_to_settle_s", f->time_to_settle_s);
+    add_number(node, "pointing_bias_px", f->pointing_bias_px);
+    cJSON_AddNumberToObject(node, "wrong_target_frames", (double)f->wrong_target_frames);
+    return node;
+}
+
+static bst_status write_manifest(const run_state *run, bst_simulation *sim, const bst_run *store,
+                                 double wall, bool complete) {
+    const bst_scenario *scenario = run->scenario;
+    cJSON *root = cJSON_CreateObject();
+    char text[64];
+    cJSON_AddStringToObject(root, "program", "boresight");
+    cJSON_AddStringToObject(root, "version", BST_VERSION);
+    cJSON_AddStringToObject(root, "git_revision", BST_GIT_REVISION);
+    cJSON_AddStringToObject(root, "scenario", scenario->name);
+    cJSON_AddStringToObject(root, "scenario_file", scenario->file);
+    cJSON_AddStringToObject(root, "epoch_utc", scenario->epoch_utc);
+    cJSON_AddBoolToObject(root, "complete", complete);
+    snprintf(text, sizeof text, "0x%llX", (unsigned long long)scenario->seed);
+    cJSON_AddStringToObject(root, "seed", text);
+    cJSON_AddNumberToObject(root, "run", (double)scenario->run);
+    cJSON_AddStringToObject(root, "device", bst_simulation_device(sim));
+    bst_stars_info stars;
+    bst_stars_get_info(bst_world_stars(bst_simulation_world(sim)), &stars);
+    cJSON_AddStringToObject(root, "star_catalogue", stars.source);
+    cJSON_AddNumberToObject(root, "stars", (double)stars.count);
+    cJSON_AddNumberToObject(root, "last_tick", (double)bst_engine_tick(bst_simulation_engine(sim)));
+    cJSON_AddNumberToObject(root, "wall_time_s", wall);
+    cJSON_AddNumberToObject(root, "warnings", run->ctx->warnings);
+    cJSON *counters = cJSON_AddObjectToObject(root, "counters");
+    const char *name;
+    int64_t count;
+    for (int i = 0; bst_engine_counter(bst_simulation_engine(sim), i, &name, &count); i++) {
+        cJSON_AddNumberToObject(counters, name, (double)count);
+    }
+    double simulated =
+        (double)(bst_engine_tick(bst_simulation_engine(sim)) + 1) / (double)scenario->tick_rate_hz;
+    double factor = wall > 0.0 ? simulated / wall : NAN;
+    bst_loop_figures figures;
+    if (run->sensor_count > 1) {
+        cJSON *sensors = cJSON_AddObjectToObject(root, "sensors");
+        for (int i = 0; i < run->sensor_count; i++) {
+            bst_loop_summary_figures(run->sensors[i].summary, &figures);
+            cJSON_AddItemToObject(sensors, run->sensors[i].scope, summary_json(&figures, factor));
+        }
+    }
+    bst_loop_summary_figures(run->sensors[0].summary, &figures);
+    cJSON_AddItemToObject(root, "summary", summary_json(&figures, factor));
+    bst_status status = bst_run_write_json(run->ctx, store, "manifest.json", root);
+    cJSON_Delete(root);
+    return status;
+}
+
+static void print_row(const char *name, const char *format, double value, const char *unit) {
+    char text[48] = "-";
+    if (isfinite(value)) {
+        snprintf(text, sizeof text, format, value);
+    }
+    printf("  %-28s %12s %s\n", name, text, unit);
+}
+
+static void print_table(const run_state *run, bst_simulation *sim, const char *out, double wall) {
+    double simulated = (double)(bst_engine_tick(bst_simulation_engine(sim)) + 1) /
+                       (double)run->scenario->tick_rate_hz;
+    for (int i = 0; i < run->sensor_count; i++) {
+        bst_loop_figures f;
+        bst_loop_summary_figures(run->sensors[i].summary, &f);
+        printf("%s\n", run->sensors[i].scope);
+        print_row("frames", "%.0f", (double)f.frames, "");
+        printf("  %-28s %12s\n", "final mode", bst_mode_name(f.final_mode));
+        print_row("time to confirm", "%.2f", f.time_to_confirm_s, "s");
+        print_row("time to settle", "%.2f", f.time_to_settle_s, "s");
+        print_row("in confirmed track", "%.2f", 100.0 * f.track_fraction,
+                  "% of visible frames after confirmation");
+        print_row("pointing RMS", "%.3f", f.pointing_rms_px, "px");
+        print_row("pointing 99th percentile", "%.3f", f.pointing_p99_px, "px");
+    }
+    print_row("wall time", "%.2f", wall, "s");
+    print_row("speed", "%.1f", wall > 0.0 ? simulated / wall : NAN, "x real time");
+    printf("  %-28s %s\n", "results", out);
+}
+
+static bst_status watch_sensors(run_state *run, const bst_world *world) {
+    const bst_observer_config *observers = run->scenario->observers.items;
+    int total = 0;
+    for (int i = 0; i < run->scenario->observers.count; i++) {
+        total += observers[i].sensors.count;
+    }
+    run->sensors = calloc((size_t)total, sizeof *run->sensors);
+    if (!run->sensors) {
+        return bst_fail(run->ctx, BST_ERR_MEMORY, "out of memory for %d sensors", total);
+    }
+    for (int i = 0; i < run->scenario->observers.count; i++) {
+        const bst_sensor_config *sensors = observers[i].sensors.items;
+        for (int s = 0; s < observers[i].sensors.count; s++) {
+            watched_sensor *w = &run->sensors[run->sensor_count];
+            snprintf(w->scope, sizeof w->scope, "%s/%s", observers[i].name, sensors[s].name);
+            int target =
+                *sensors[s].cue.object ? bst_world_find_object(world, sensors[s].cue.object) : -1;
+            BST_TRY(bst_loop_summary_create(run->ctx, world, i, s, run->scenario->tick_rate_hz,
+                                            target, &w->summary));
+            if (run->sensor_count == 0) {
+                BST_TRY(bst_run_pictures_create(run->ctx, &sensors[s].camera,
+                                                run->scenario->tick_rate_hz, run->scenario->epoch,
+                                                target, &run->pictures));
+                bst_loop_summary_on_frame(w->summary, on_judged, run->pictures);
+            }
+            run->sensor_count++;
+        }
+    }
+    return BST_OK;
+}
+
+static bool has_module(const bst_scenario *scenario, int observer, int sensor, const char *role) {
+    for (int i = 0; i < scenario->module_count; i++) {
+        const bst_module_config *m = &scenario->modules[i];
+        if (m->observer == observer && m->sensor == sensor && strcmp(m->desc->role, role) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static bst_status open_recorder(run_state *run, bst_run *store) {
+    const bst_scenario *scenario = run->scenario;
+    const bst_observer_config *observers = scenario->observers.items;
+    bst_recorder_sensor *list = calloc((size_t)run->sensor_count, sizeof *list);
+    if (!list) {
+        return bst_fail(run->ctx, BST_ERR_MEMORY, "out of memory for the recorder");
+    }
+    int n = 0;
+    for (int i = 0; i < scenario->observers.count; i++) {
+        const bst_sensor_config *sensors = observers[i].sensors.items;
+        for (int s = 0; s < observers[i].sensors.count; s++) {
+            list[n++] = (bst_recorder_sensor){
+                .observer = observers[i].name,
+                .sensor = sensors[s].name,
+                .target = *sensors[s].cue.object ? sensors[s].cue.object : NULL,
+                .camera = &sensors[s].camera,
+                .has_truth = has_module(scenario, i, s, "scenegen")};
+        }
+    }
+    bst_recorder_info info = {.epoch = scenario->epoch,
+                              .tick_rate_hz = scenario->tick_rate_hz,
+                              .program = "boresight " BST_VERSION,
+                              .sensors = list,
+                              .sensor_count = n};
+    bst_status status =
+        bst_recorder_create(run->ctx, store, &scenario->record, &info, &run->recorder);
+    for (int i = 0; status == BST_OK && i < n; i++) {
+        run->sensors[i].recorder_index =
+            bst_recorder_find(run->recorder, list[i].observer, list[i].sensor);
+    }
+    free(list);
+    return status;
+}
+
+static void free_run(run_state *run) {
+    for (int i = 0; i < run->sensor_count; i++) {
+        bst_loop_summary_free(run->sensors[i].summary);
+    }
+    free(run->sensors);
+    bst_run_pictures_free(run->pictures);
+}
+
+/* Steps the simulation and writes what belongs into the folder; the folder is complete when this
+ * returns BST_OK. An interrupted run is closed properly and keeps its .partial name. */
+static bst_status execute(run_state *run, bst_simulation *sim, const char *out, bool overwrite) {
+    bst_ctx *ctx = run->ctx;
+    bst_run *store = NULL;
+    BST_TRY(bst_run_create(ctx, out, overwrite, &store));
+    cJSON *echo = bst_scenario_echo(run->scenario);
+    bst_status status = echo ? bst_run_write_json(ctx, store, "scenario.json", echo)
+                             : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the scenario");
+    cJSON_Delete(echo);
+    if (status == BST_OK) {
+        status = open_recorder(run, store);
+    }
+    double wall = 0.0;
+    bool stepped = false;
+    if (status == BST_OK) {
+        const bst_engine_hooks hooks = {run, on_message, on_event, interrupted};
+        bst_engine_set_hooks(bst_simulation_engine(sim), &hooks);
+        run->started = wall_seconds();
+        status = bst_engine_run(ctx, bst_simulation_engine(sim), run->scenario->duration_ticks);
+        wall = wall_seconds() - run->started;
+        stepped = true;
+        for (int i = 0; i < run->sensor_count; i++) {
+            bst_loop_summary_finish(run->sensors[i].summary);
+        }
+        show_progress(run, bst_engine_tick(bst_simulation_engine(sim)), true);
+    }
+    /* closing must not hide why the run ended */
+    bst_ctx closing = *ctx;
+    bst_status closed = bst_recorder_close(&closing, run->recorder);
+    if (status == BST_OK && closed != BST_OK) {
+        *ctx = closing;
+        status = closed;
+    }
+    if (stepped && (status == BST_OK || status == BST_ERR_INTERRUPTED)) {
+        char why[BST_MESSAGE_BYTES];
+        memcpy(why, ctx->message, sizeof why);
+        bst_status written =
+            bst_run_pictures_write(ctx, run->pictures, bst_run_folder(store), run->scenario->name);
+        if (written == BST_OK) {
+            written = write_manifest(run, sim, store, wall, status == BST_OK);
+        }
+        if (status == BST_OK) {
+            status = written;
+        } else if (written == BST_OK) {
+            memcpy(ctx->message, why, sizeof why);
+        }
+    }
+    if (status == BST_OK) {
+        status = bst_run_finish(ctx, store);
+    } else {
+        bst_run_abandon(store);
+    }
+    if (status == BST_OK) {
+        print_table(run, sim, out, wall);
+    }
+    return status;
+}
+
+static const char help_text[] =
+    "usage: boresight run SCENARIO.json [options]\n"
+    "\n"
+    "Runs a scenario and writes its results to a folder: frames.fits (opens in ds9), run.sqlite "
+    "(truth,\n"
+    "detections, tracks, commands, telemetry, events), manifest.json, quicklook.png, pointing.png. "
+    "While it runs\n"
+    "the folder is called OUT.partial.\n"
+    "\n"
+    "  boresight run scenarios/neossat_geo_track.json --out runs/demo\n"
+    "  boresight run scenarios/neossat_geo_track.json --seed 0x2A --duration 60 --set "
+    "/record/frames=none\n"
+    "\n"
+    "options:\n";
+
+int bst_cmd_run(int argc, char **argv) {
+    bool help = false, overwrite = false, quiet = false;
+    const char *out = NULL;
+    bst_simulation_options sim_options = {NULL, 0};
+    int64_t threads = 0;
+    bst_load_options load = BST_LOAD_DEFAULTS;
+    const bst_option table[] = {
+        {.name = "out",
+         .kind = BST_OPTION_TEXT,
+         .target = &out,
+         .argument = "FOLDER",
+         .doc = "where the results go (default runs/NAME)"},
+        {.name = "overwrite",
+         .kind = BST_OPTION_FLAG,
+         .target = &overwrite,
+         .doc = "replace an earlier run there"},
+        BST_LOAD_OPTIONS(load),
+        {.name = "device",
+         .kind = BST_OPTION_TEXT,
+         .target = &sim_options.device,
+         .argument = "NAME",
+         .doc = "OpenCL device: part of its name, or PLATFORM:DEVICE by number (default PoCL)"},
+        {.name = "threads",
+         .kind = BST_OPTION_INT,
+         .target = &threads,
+         .argument = "N",
+         .doc = "threads for the OpenCL device (default all)",
+         .minimum = 1,
+         .maximum = 1024},
+        {.name = "quiet", .kind = BST_OPTION_FLAG, .target = &quiet, .doc = "no progress line"},
+        {.name = "help", .kind = BST_OPTION_FLAG, .target = &help, .doc = "print this"},
+        {.name = NULL},
+    };
+    bst_ctx ctx;
+    bst_ctx_init(&ctx, bst_app_log, NULL, BST_LOG_INFO);
+    int arguments = 0;
+    if (bst_options_parse(&ctx, table, argc, argv, &arguments) != BST_OK) {
+        return bst_options_misuse(&ctx, "run");
+    }
+    if (help) {
+        fputs(help_text, stdout);
+        bst_options_print(stdout, table);
+        return BST_EXIT_OK;
+    }
+    if (arguments != 1) {
+        bst_fail(&ctx, BST_ERR_ARGUMENT, "one scenario file is expected, %d were given", arguments);
+        return bst_options_misuse(&ctx, "run");
+    }
+    sim_options.threads = (int)threads;
+    bst_json *json = NULL;
+    bst_scenario scenario;
+    if (bst_load_scenario(&ctx, argv[1], &load, &json, &scenario) != BST_OK) {
+        fprintf(stderr, "boresight: %s\n", ctx.message);
+        return BST_EXIT_FAILED;
+    }
+    char default_out[128];
+    snprintf(default_out, sizeof default_out, "runs/%s", scenario.name);
+    stop_requested = 0;
+    struct sigaction action = {.sa_handler = on_signal};
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+    run_state run = {
+        .ctx = &ctx, .scenario = &scenario, .progress = !quiet && isatty(STDERR_FILENO)};
+    bst_simulation *sim = NULL;
+    bst_status status = bst_simulation_create(&ctx, &scenario, &sim_options, &sim);
+    if (status == BST_OK) {
+        status = watch_sensors(&run, bst_simulation_world(sim));
+    }
+    if (status == BST_OK) {
+        status = execute(&run, sim, out ? out : default_out, overwrite);
+    }
+    if (status != BST_OK) {
+        fprintf(stderr, "boresight: %s\n", ctx.message);
+    }
+    free_run(&run);
+    bst_simulation_free(sim);
+    bst_scenario_free(&scenario);
+    bst_json_free(json);
+    return status == BST_OK                ? BST_EXIT_OK
+           : status == BST_ERR_INTERRUPTED ? BST_EXIT_INTERRUPTED
+                                           : BST_EXIT_FAILED;
+}

@@ -1,0 +1,49 @@
+/* Reading a scenario as the command line asks: file, overrides, shortcuts. */
+#ifndef BST_APP_LOAD_H
+#define BST_APP_LOAD_H
+
+#include "sim/app/options.h"
+#include "sim/engine/scenario.h"
+
+/* What several commands take. */
+typedef struct bst_load_options {
+    bst_option_list set;
+    const char *seed;
+    double duration_s; /* < 0: as the scenario says */
+    int64_t run;       /* < 0: as the scenario says */
+} bst_load_options;
+
+/* Entries of an options table that fill a bst_load_options named `load`. */
+#define BST_LOAD_OPTIONS(load)                                                                 \
+    {.name = "set",                                                                            \
+     .kind = BST_OPTION_LIST,                                                                  \
+     .target = &(load).set,                                                                    \
+     .argument = "/PATH=VALUE",                                                                \
+     .doc = "override a value of the scenario; may be given several times"},                   \
+        {.name = "seed",                                                                       \
+         .kind = BST_OPTION_TEXT,                                                              \
+         .target = &(load).seed,                                                               \
+         .argument = "HEX",                                                                    \
+         .doc = "master seed, for example 0x2A"},                                              \
+        {.name = "duration",                                                                   \
+         .kind = BST_OPTION_REAL,                                                              \
+         .target = &(load).duration_s,                                                         \
+         .argument = "S",                                                                      \
+         .doc = "simulated time in seconds",                                                   \
+         .minimum = 0,                                                                         \
+         .maximum = 1e9},                                                                      \
+    {                                                                                          \
+        .name = "run-number", .kind = BST_OPTION_INT, .target = &(load).run, .argument = "N",  \
+        .doc = "number of the run in a study: other random numbers, same scene", .minimum = 0, \
+        .maximum = 9e15                                                                        \
+    }
+
+#define BST_LOAD_DEFAULTS \
+    { .duration_s = -1.0, .run = -1 }
+
+/* Loads `path`, applies the options, reads the scenario. *json is kept for as long as the scenario;
+ * free both. */
+bst_status bst_load_scenario(bst_ctx *ctx, const char *path, const bst_load_options *options,
+                             bst_json **json, bst_scenario *out) BST_MUST_CHECK;
+
+#endif

@@ -1,0 +1,72 @@
+#include <stdio.h>
+#include <string.h>
+
+#include "sim/app/app.h"
+#include "sim/app/version.h"
+
+typedef struct command {
+    const char *name;
+    int (*run)(int argc, char **argv);
+    const char *doc;
+} command;
+
+static const command commands[] = {
+    {"run", bst_cmd_run, "run a scenario"},
+    {"check", bst_cmd_check, "validate a scenario and print it with every default written out"},
+    {"schema", bst_cmd_schema, "print the JSON Schema of scenarios"},
+    {"stars", bst_cmd_stars, "get, import or describe the star catalogue"},
+    {"propagate", bst_cmd_propagate, "positions and velocities from two-line element sets"},
+};
+
+void bst_app_log(void *user, bst_log_level level, const char *message) {
+    (void)user;
+    static const char *const names[] = {"error", "warning", "info", "debug"};
+    if (level == BST_LOG_INFO) {
+        fprintf(stderr, "boresight: %s\n", message);
+    } else {
+        fprintf(stderr, "boresight: %s: %s\n", names[level], message);
+    }
+}
+
+static void usage(FILE *stream) {
+    fprintf(stream,
+            "Boresight simulates a space-based telescope that finds and tracks satellites.\n"
+            "\n"
+            "usage: boresight COMMAND [options]\n"
+            "\n"
+            "commands:\n");
+    for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {
+        fprintf(stream, "  %-10s %s\n", commands[i].name, commands[i].doc);
+    }
+    fprintf(
+        stream,
+        "\n"
+        "A first run:\n"
+        "  boresight run scenarios/neossat_geo_track.json --out runs/first\n"
+        "\n"
+        "\"boresight COMMAND --help\" tells more. Exit codes: 0 done, 1 failed, 2 called wrongly,\n"
+        "130 interrupted.\n");
+}
+
+int main(int argc, char **argv) {
+    if (argc < 2) {
+        usage(stderr);
+        return BST_EXIT_USAGE;
+    }
+    if (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0 ||
+        strcmp(argv[1], "help") == 0) {
+        usage(stdout);
+        return BST_EXIT_OK;
+    }
+    if (strcmp(argv[1], "--version") == 0) {
+        printf("boresight %s (%s)\n", BST_VERSION, BST_GIT_REVISION);
+        return BST_EXIT_OK;
+    }
+    for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {
+        if (strcmp(argv[1], commands[i].name) == 0) {
+            return commands[i].run(argc - 1, argv + 1);
+        }
+    }
+    fprintf(stderr, "boresight: there is no command \"%s\"; see boresight --help\n", argv[1]);
+    return BST_EXIT_USAGE;
+}

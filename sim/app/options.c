@@ -1,0 +1,197 @@
+#include "sim/app/options.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/core/text.h"
+
+static const bst_option *find(const bst_option *table, const char *name, size_t length) {
+    for (const bst_option *o = table; o->name; o++) {
+        if (strlen(o->name) == length && strncmp(o->name, name, length) == 0) {
+            return o;
+        }
+    }
+    return NULL;
+}
+
+static bst_status unknown(bst_ctx *ctx, const bst_option *table, const char *word) {
+    char name[64];
+    size_t dashes = strspn(word, "-");
+    snprintf(name, sizeof name, "%.*s", (int)strcspn(word + dashes, "="), word + dashes);
+    const bst_option *nearest = NULL;
+    size_t best = SIZE_MAX;
+    for (const bst_option *o = table; o->name; o++) {
+        if (bst_text_is_nearer(name, o->name, &best)) {
+            nearest = o;
+        }
+    }
+    if (nearest) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "unknown option %.80s; did you mean --%s?", word,
+                        nearest->name);
+    }
+    return bst_fail(ctx, BST_ERR_ARGUMENT, "unknown option %.80s", word);
+}
+
+static bst_status read_number(bst_ctx *ctx, const bst_option *o, const char *text, double *out) {
+    char *end;
+    double value = strtod(text, &end);
+    bool is_int = o->kind == BST_OPTION_INT;
+    if (end != text && !*end && isfinite(value) && !(is_int && value != floor(value)) &&
+        value >= o->minimum && value <= o->maximum) {
+        *out = value;
+        return BST_OK;
+    }
+    return is_int ? bst_fail(ctx, BST_ERR_ARGUMENT, "--%s %.80s: give an integer from %.0f to %.0f",
+                             o->name, text, o->minimum, o->maximum)
+                  : bst_fail(ctx, BST_ERR_ARGUMENT, "--%s %.80s: give a number from %.15g to %.15g",
+                             o->name, text, o->minimum, o->maximum);
+}
+
+static bst_status read_choice(bst_ctx *ctx, const bst_option *o, const char *text) {
+    int index = 0;
+    for (const char *word = o->argument;; index++) {
+        size_t length = strcspn(word, "|");
+        if (strlen(text) == length && strncmp(word, text, length) == 0) {
+            *(int *)o->target = index;
+            return BST_OK;
+        }
+        if (!word[length]) {
+            return bst_fail(ctx, BST_ERR_ARGUMENT, "--%s %.80s: give one of %s", o->name, text,
+                            o->argument);
+        }
+        word += length + 1;
+    }
+}
+
+static bst_status store(bst_ctx *ctx, const bst_option *o, const char *value) {
+    double number = 0.0;
+    switch (o->kind) {
+        case BST_OPTION_FLAG:
+            *(bool *)o->target = true;
+            return BST_OK;
+        case BST_OPTION_TEXT:
+            if (!*value) {
+                return bst_fail(ctx, BST_ERR_ARGUMENT, "--%s needs a value: --%s %s", o->name,
+                                o->name, o->argument);
+            }
+            *(const char **)o->target = value;
+            return BST_OK;
+        case BST_OPTION_INT:
+            BST_TRY(read_number(ctx, o, value, &number));
+            *(int64_t *)o->target = (int64_t)number;
+            return BST_OK;
+        case BST_OPTION_REAL:
+            BST_TRY(read_number(ctx, o, value, &number));
+            *(double *)o->target = number;
+            return BST_OK;
+        case BST_OPTION_CHOICE:
+            return read_choice(ctx, o, value);
+        case BST_OPTION_LIST: {
+            bst_option_list *list = o->target;
+            if (list->count == BST_OPTION_LIST_MAX) {
+                return bst_fail(ctx, BST_ERR_ARGUMENT, "--%s is given more than %d times", o->name,
+                                BST_OPTION_LIST_MAX);
+            }
+            list->items[list->count++] = value;
+            return BST_OK;
+        }
+    }
+    return bst_fail(ctx, BST_ERR_ARGUMENT, "--%s: option of unknown kind", o->name);
+}
+
+/* Reads the option at argv[*i], and its value where it has one, leaving *i at the last word used.
+ */
+static bst_status read_option(bst_ctx *ctx, const bst_option *table, int argc, char **argv, int *i,
+                              const bst_option **out) {
+    const char *word = argv[*i];
+    const char *name = strcmp(word, "-h") == 0 ? "help" : word + 2;
+    size_t length = strcspn(name, "=");
+    const bst_option *o = word[1] == '-' || name != word + 2 ? find(table, name, length) : NULL;
+    if (!o) {
+        return unknown(ctx, table, word);
+    }
+    *out = o;
+    const char *value = name[length] == '=' ? name + length + 1 : NULL;
+    if (o->kind == BST_OPTION_FLAG) {
+        return value ? bst_fail(ctx, BST_ERR_ARGUMENT, "--%s takes no value", o->name)
+                     : store(ctx, o, "");
+    }
+    if (!value) {
+        if (*i + 1 >= argc || strncmp(argv[*i + 1], "--", 2) == 0) {
+            return bst_fail(ctx, BST_ERR_ARGUMENT, "--%s needs a value: --%s %s", o->name, o->name,
+                            o->argument);
+        }
+        value = argv[++*i];
+    }
+    return store(ctx, o, value);
+}
+
+static bool is_given(const bst_option *const *given, int count, const bst_option *o) {
+    for (int i = 0; i < count; i++) {
+        if (given[i] == o) {
+            return true;
+        }
+    }
+    return false;
+}
+
+bst_status bst_options_parse(bst_ctx *ctx, const bst_option *table, int argc, char **argv,
+                             int *arguments) {
+    enum { MOST_REQUIRED = 16 };
+    const bst_option *given[MOST_REQUIRED];
+    int given_count = 0;
+    int kept = 0;
+    bool options_end = false;
+    for (int i = 1; i < argc; i++) {
+        char *word = argv[i];
+        if (!options_end && strcmp(word, "--") == 0) {
+            options_end = true;
+        } else if (!options_end && word[0] == '-' && word[1]) {
+            const bst_option *o = NULL;
+            BST_TRY(read_option(ctx, table, argc, argv, &i, &o));
+            if (strcmp(o->name, "help") == 0) {
+                return BST_OK;
+            }
+            if (o->required && given_count < MOST_REQUIRED && !is_given(given, given_count, o)) {
+                given[given_count++] = o;
+            }
+        } else if (!arguments) {
+            return bst_fail(ctx, BST_ERR_ARGUMENT,
+                            "\"%.80s\" is not expected here: every value follows its option", word);
+        } else {
+            argv[++kept] = word;
+        }
+    }
+    for (const bst_option *o = table; o->name; o++) {
+        if (o->required && !is_given(given, given_count, o)) {
+            return bst_fail(ctx, BST_ERR_ARGUMENT, "--%s is missing: add --%s %s", o->name, o->name,
+                            o->argument);
+        }
+    }
+    if (arguments) {
+        *arguments = kept;
+    }
+    return BST_OK;
+}
+
+void bst_options_print(FILE *stream, const bst_option *table) {
+    int width = 0;
+    for (const bst_option *o = table; o->name; o++) {
+        int length = (int)(strlen(o->name) + (o->argument ? strlen(o->argument) + 1 : 0));
+        width = length > width ? length : width;
+    }
+    for (const bst_option *o = table; o->name; o++) {
+        int length = fprintf(stream, "  --%s%s%s", o->name, o->argument ? " " : "",
+                             o->argument ? o->argument : "");
+        fprintf(stream, "%*s  %s\n", width + 4 - length, "", o->doc);
+    }
+}
+
+int bst_options_misuse(const bst_ctx *ctx, const char *command) {
+    fprintf(stderr,
+            "boresight %s: %s\n"
+            "Try: boresight %s --help\n",
+            command, ctx->message, command);
+    return 2;
+}

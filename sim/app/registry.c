@@ -1,0 +1,17 @@
+#include "control/modules.h"
+#include "gimbal/modules.h"
+#include "imgproc/imgproc.h"
+#include "scenegen/module.h"
+#include "sim/app/app.h"
+#include "tracker/module.h"
+
+static const bst_module_desc *const modules[] = {
+    &bst_gimbal_two_axis_module, &bst_gimbal_ideal_module, &bst_scenegen_module,
+    &bst_imgproc_module,         &bst_tracker_module,      &bst_control_standard_module,
+};
+
+static const bst_registry registry = {modules, sizeof modules / sizeof *modules};
+
+const bst_registry *bst_app_registry(void) {
+    return &registry;
+}

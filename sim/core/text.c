@@ -1,0 +1,37 @@
+#include "sim/core/text.h"
+
+#include <string.h>
+
+enum { LONGEST_WORD = 64, FARTHEST_SUGGESTION = 3 };
+
+size_t bst_text_distance(const char *a, const char *b) {
+    size_t n = strlen(a), m = strlen(b);
+    size_t row[LONGEST_WORD + 1];
+    if (n > LONGEST_WORD || m > LONGEST_WORD) {
+        return LONGEST_WORD;
+    }
+    for (size_t j = 0; j <= m; j++) {
+        row[j] = j;
+    }
+    for (size_t i = 1; i <= n; i++) {
+        size_t diagonal = row[0];
+        row[0] = i;
+        for (size_t j = 1; j <= m; j++) {
+            size_t substitute = diagonal + (a[i - 1] != b[j - 1]);
+            diagonal = row[j];
+            size_t best = row[j] + 1 < row[j - 1] + 1 ? row[j] + 1 : row[j - 1] + 1;
+            row[j] = substitute < best ? substitute : best;
+        }
+    }
+    return row[m];
+}
+
+int bst_text_is_nearer(const char *word, const char *candidate, size_t *best) {
+    size_t distance = bst_text_distance(word, candidate);
+    /* a word that shares no letter with the candidate is no misspelling of it */
+    if (distance > FARTHEST_SUGGESTION || distance >= strlen(candidate) || distance >= *best) {
+        return 0;
+    }
+    *best = distance;
+    return 1;
+}

@@ -1,0 +1,23 @@
+/* Small helpers on text. */
+#ifndef BST_CORE_TEXT_H
+#define BST_CORE_TEXT_H
+
+#include <stddef.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* The number of single-byte insertions, deletions and replacements that turn one word into the
+ * other (Levenshtein 1966); 64 when either is longer than 64 bytes. */
+size_t bst_text_distance(const char *a, const char *b);
+
+/* Whether `candidate` is near enough to the mistyped `word` to be suggested for it, and nearer than
+ * *best; then *best becomes its distance. Start with *best = SIZE_MAX. */
+int bst_text_is_nearer(const char *word, const char *candidate, size_t *best);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
