@@ -214,7 +214,8 @@ static void expand_row(const bst_background *b, const float *nodes, float *out) 
     float step = 1.0f / (float)b->mesh_px;
     float centre = 0.5f * (float)(b->mesh_px - 1);
     for (int i = -1; i < b->columns; i++) {
-        int end = i + 1 < b->columns ? (int)ceilf(centre + (float)((i + 1) * b->mesh_px)) : b->width;
+        int end =
+            i + 1 < b->columns ? (int)ceilf(centre + (float)((i + 1) * b->mesh_px)) : b->width;
         end = end < b->width ? end : b->width;
         float left = nodes[i < 0 ? 0 : i];
         float right = nodes[i + 1 < b->columns ? i + 1 : b->columns - 1];

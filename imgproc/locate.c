@@ -7,13 +7,13 @@ enum { BAND = 16, MAX_FIXED = 12 };
 
 static const double WIDTH_FIT_SNR = 20.0; /* from here the widening is measured */
 static const double MOMENTS_SNR = 10.0;   /* below, extents are the model's own */
-static const double CLOSE_SHARE = 0.8;    /* filter outputs closer than this: both shapes are tried */
+static const double CLOSE_SHARE = 0.8; /* filter outputs closer than this: both shapes are tried */
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
 
 bst_status bst_locator_create(bst_ctx *ctx, int capacity, int max_height, int max_side,
                               bst_locator *out) {
-    *out = (bst_locator){
-        .max_side = max_side, .capacity = capacity, .buckets = max_height / BAND + 1};
+    *out =
+        (bst_locator){.max_side = max_side, .capacity = capacity, .buckets = max_height / BAND + 1};
     bst_psf_init(&out->psf);
     out->found = calloc((size_t)capacity, sizeof *out->found);
     out->bucket = calloc((size_t)out->buckets, sizeof *out->bucket);
@@ -149,8 +149,8 @@ static bool fit_one(bst_locator *l, const bst_locate_frame *f, int i, const bst_
     bst_fit_data data = {f->signal, f->width, f->height, l->found[i].noise_e};
     double path = hypot(copies[0].shape.dx_px, copies[0].shape.dy_px);
     double limit = 1.5 + f->sigma_px + 0.4 * path;
-    bool ok = bst_fit_run(&l->fit, &data, stamp, free_sources, c.free_count, c.fixed,
-                          c.fixed_count, free_width && c.free_count == 1, limit);
+    bool ok = bst_fit_run(&l->fit, &data, stamp, free_sources, c.free_count, c.fixed, c.fixed_count,
+                          free_width && c.free_count == 1, limit);
     if (ok) {
         l->found[i].source = copies[0];
     }
@@ -200,8 +200,7 @@ static bool shape_is_open(const bst_locate_frame *f, const bst_found *found) {
 /* First fit: shape and place. */
 static void locate_one(bst_locator *l, const bst_locate_frame *f, int i) {
     bst_found *found = &l->found[i];
-    double widening =
-        l->widening_weight > 0.0 ? l->widening_sum / l->widening_weight : 0.0;
+    double widening = l->widening_weight > 0.0 ? l->widening_sum / l->widening_weight : 0.0;
     found->source.widening_px2 = widening;
     if (shape_is_open(f, found)) {
         bst_source point = as_shape(f, found, false), streak = as_shape(f, found, true);
@@ -281,9 +280,9 @@ static double try_path(bst_locator *l, const bst_locate_frame *f, int i, const b
     return fit_one(l, f, i, stamp, false) ? found->source.chi_square : INFINITY;
 }
 
-/* A point that is longer than the PSF: fits it as a streak along the axis of its moments, as long as
- * that lowers chi-square on the same pixels. Moments give the length roughly, the parabola through
- * three values of chi-square gives it well. */
+/* A point that is longer than the PSF: fits it as a streak along the axis of its moments, as long
+ * as that lowers chi-square on the same pixels. Moments give the length roughly, the parabola
+ * through three values of chi-square gives it well. */
 static void fit_own_streak(bst_locator *l, const bst_locate_frame *f, int i) {
     bst_found *found = &l->found[i];
     double psf_fwhm = FWHM_PER_SIGMA * f->sigma_px;
@@ -418,9 +417,9 @@ void bst_locate(bst_locator *l, const bst_locate_frame *f, const bst_candidates 
             fit_own_streak(l, f, i);
         }
         measure_extent(l, f, i, 0.0);
-        if (found->streak || (found->snr >= MOMENTS_SNR &&
-                              found->length_px > 1.5 * fmax(found->width_px, 1.0) &&
-                              found->length_px > 1.5 * FWHM_PER_SIGMA * f->sigma_px)) {
+        if (found->streak ||
+            (found->snr >= MOMENTS_SNR && found->length_px > 1.5 * fmax(found->width_px, 1.0) &&
+             found->length_px > 1.5 * FWHM_PER_SIGMA * f->sigma_px)) {
             found->flags |= BST_DETECTION_STREAK;
         }
     }

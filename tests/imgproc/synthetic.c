@@ -226,9 +226,9 @@ int synthetic_sound(const bst_detections *d) {
     int sound = isfinite(d->background_e) && isfinite(d->noise_e) && isfinite(d->threshold_snr);
     for (int i = 0; i < d->count; i++) {
         const bst_detection *t = &d->items[i];
-        const double numbers[] = {t->x_px,   t->y_px,      t->cov_xx,   t->cov_xy,
-                                  t->cov_yy, t->flux_e,    t->flux_sigma_e, t->snr,
-                                  t->length_px, t->width_px, t->angle_rad, t->v_mag};
+        const double numbers[] = {t->x_px,      t->y_px,     t->cov_xx,       t->cov_xy,
+                                  t->cov_yy,    t->flux_e,   t->flux_sigma_e, t->snr,
+                                  t->length_px, t->width_px, t->angle_rad,    t->v_mag};
         for (size_t k = 0; k < sizeof numbers / sizeof *numbers; k++) {
             sound = sound && isfinite(numbers[k]);
         }

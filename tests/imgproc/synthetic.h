@@ -30,8 +30,8 @@ void synthetic_expose(synthetic *s, bst_rng_key key, uint64_t frame);
 double synthetic_norm(const synthetic *s, double x, double y, double dx, double dy);
 /* Noise of a background pixel, electrons: sky, read noise and quantisation. */
 double synthetic_noise(const synthetic *s);
-/* Cramer-Rao bound of x and y (covariance xx, xy, yy) with unknown flux, the source's own shot noise
- * included, by numerical derivatives of the image. */
+/* Cramer-Rao bound of x and y (covariance xx, xy, yy) with unknown flux, the source's own shot
+ * noise included, by numerical derivatives of the image. */
 void synthetic_bound(const synthetic *s, double x, double y, double flux_e, double dx, double dy,
                      double cov[3]);
 

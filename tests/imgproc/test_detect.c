@@ -136,7 +136,8 @@ static void widened_psf_keeps_fluxes(void **state) {
     expose(&f, NULL);
     double sum[2] = {0};
     for (int i = 0; i < 36; i++) {
-        const bst_detection *d = near_to(&f, 30 + i % 6 * 38 + 0.1 * i, 30 + i / 6 * 38 + 0.07 * i, 1);
+        const bst_detection *d =
+            near_to(&f, 30 + i % 6 * 38 + 0.1 * i, 30 + i / 6 * 38 + 0.07 * i, 1);
         sum[i >= 12] += d->flux_e;
     }
     /* means of 12 and 24 sources of 2 % and 6 %: three standard errors; a fixed width gives -6 % */
@@ -192,8 +193,8 @@ static void fill(fixture *f, int kind) {
     }
 }
 
-/* All zero, constant, all saturated, and one bright gradient: no false sources beyond the gradient's
- * own edges, no NaN. */
+/* All zero, constant, all saturated, and one bright gradient: no false sources beyond the
+ * gradient's own edges, no NaN. */
 static void dull_images(void **state) {
     (void)state;
     for (int kind = 0; kind < 4; kind++) {
@@ -372,8 +373,7 @@ static void calibration_maps(void **state) {
     }
     synthetic_expose(&f.s, f.key, 1);
     bst_imgproc_maps maps = {dark, flat, NULL};
-    bst_assert_ok(&f.ctx,
-                  bst_imgproc_create(&f.ctx, &f.s.camera, 1e8, &f.s.config, &maps, &f.ip));
+    bst_assert_ok(&f.ctx, bst_imgproc_create(&f.ctx, &f.s.camera, 1e8, &f.s.config, &maps, &f.ip));
     process(&f, NULL);
     /* sky and dark's shot noise, mean 150 e- + 4 e-^2; the flat's spread changes it by 2 % */
     bst_assert_close(f.d->noise_e, sqrt(154.0), 0.5);

@@ -12,8 +12,7 @@ static bst_quat turning(double seconds, bst_vec3 rate_radps) {
 }
 
 static bst_pointing_telemetry *telemetry(int samples, int64_t step_ticks, bst_vec3 rate) {
-    bst_pointing_telemetry *t =
-        calloc(1, sizeof *t + CAPACITY * sizeof(bst_pointing_sample));
+    bst_pointing_telemetry *t = calloc(1, sizeof *t + CAPACITY * sizeof(bst_pointing_sample));
     assert_non_null(t);
     t->capacity = CAPACITY;
     t->written = samples;
@@ -41,7 +40,7 @@ static void constant_rate(void **state) {
     static const struct {
         int samples;
         int64_t start, end;
-    } cases[] = {{40, 600, 3600}, {40, 613, 3571}, {10, 300, 3300},
+    } cases[] = {{40, 600, 3600},  {40, 613, 3571},  {10, 300, 3300},
                  {200, 100, 3100}, {40, 1000, 1000}, {40, 1050, 1051}};
     for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
         bst_pointing_telemetry *t = telemetry(cases[c].samples, 100, rate);
@@ -95,12 +94,12 @@ static void streak_is_the_stars_path(void **state) {
     (void)state;
     bst_camera c = {.width_px = 1024, .height_px = 1024, .pixel_scale_arcsec = 3.0};
     bst_motion m = {bst_quat_unit((bst_quat){0.1, 0.2, 0.3, 0.9}), {1e-4, -5e-5, 2e-3}};
-    bst_quat end = bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(m.turn_cam_rad, 0.5)),
-                                m.q_cam_from_gcrf);
-    bst_quat start = bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(m.turn_cam_rad, -0.5)),
-                                  m.q_cam_from_gcrf);
-    bst_vec3 star = bst_quat_rotate(bst_quat_conj(m.q_cam_from_gcrf),
-                                    bst_camera_unproject(&c, 900.0, 100.0));
+    bst_quat end =
+        bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(m.turn_cam_rad, 0.5)), m.q_cam_from_gcrf);
+    bst_quat start =
+        bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(m.turn_cam_rad, -0.5)), m.q_cam_from_gcrf);
+    bst_vec3 star =
+        bst_quat_rotate(bst_quat_conj(m.q_cam_from_gcrf), bst_camera_unproject(&c, 900.0, 100.0));
     double x0 = 0, y0 = 0, x1 = 0, y1 = 0, dx, dy;
     assert_true(bst_camera_project(&c, bst_quat_rotate(start, star), &x0, &y0));
     assert_true(bst_camera_project(&c, bst_quat_rotate(end, star), &x1, &y1));

@@ -132,7 +132,8 @@ static void derivatives_are_slopes(void **state) {
 /* A source outside its stamp, or larger than it, touches only the stamp and stays finite. */
 static void stamps_may_cut_the_source(void **state) {
     fixture *f = *state;
-    static const double centres[][2] = {{-500, 30}, {9.6, 19.6}, {57.9, 68.2}, {1e6, -1e6}, {30, 90}};
+    static const double centres[][2] = {
+        {-500, 30}, {9.6, 19.6}, {57.9, 68.2}, {1e6, -1e6}, {30, 90}};
     for (size_t c = 0; c < sizeof centres / sizeof *centres; c++) {
         bst_shape s = {centres[c][0], centres[c][1], 30, 40, 1.3};
         bst_psf_render(&f->psf, &s, &stamp, f->share, f->by_x, f->by_y, f->by_variance);

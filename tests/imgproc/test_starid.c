@@ -23,7 +23,7 @@ static int setup(void **state) {
     scene *s = calloc(1, sizeof *s);
     assert_non_null(s);
     s->key = bst_rng_make_key(5, 0, "test", "starid");
-    s->options = (bst_starid_options){60.0, 3.0, 511.5, 511.5};
+    s->options = (bst_starid_options){60.0, 3.0, 511.5, 511.5, 1024, 1024};
     bst_assert_ok(&s->ctx, bst_starid_create(&s->ctx, MOST, MOST, 60.0, &s->id));
     *state = s;
     return 0;
@@ -128,7 +128,8 @@ static void shifted_field_with_false_detections(void **state) {
     bst_assert_close(s->result.rms_px, 0.1, 0.04);
 }
 
-/* Few stars: 3 and 2 among as many others, over many draws. Never a wrong star, hardly ever none. */
+/* Few stars: 3 and 2 among as many others, over many draws. Never a wrong star, hardly ever none.
+ */
 static void few_stars(void **state) {
     scene *s = *state;
     int found = 0, trials = 200, wrongs = 0;

@@ -6,8 +6,8 @@
 
 typedef struct tally {
     int sources, found;
-    double bias_along, bias_across;   /* px */
-    double ratio_along, ratio_across; /* RMS over the Cramer-Rao bound */
+    double bias_along, bias_across;       /* px */
+    double ratio_along, ratio_across;     /* RMS over the Cramer-Rao bound */
     double claimed_along, claimed_across; /* RMS over the reported sigma */
     double flux_bias, flux_scatter_ratio;
 } tally;
@@ -23,7 +23,8 @@ static tally measure(double dx, double dy, double snr, int frames) {
     bst_imgproc_frame frame = synthetic_frame(&s);
     bst_rng_key key = bst_rng_make_key(9, 0, "test", "sources");
     double flux = snr * synthetic_noise(&s) / synthetic_norm(&s, 100.3, 100.7, dx, dy);
-    double length = hypot(dx, dy), ux = length > 0 ? dx / length : 1, uy = length > 0 ? dy / length : 0;
+    double length = hypot(dx, dy), ux = length > 0 ? dx / length : 1,
+           uy = length > 0 ? dy / length : 0;
     double sum[2] = {0}, square[2] = {0}, bound[2] = {0}, claim[2] = {0};
     double flux_sum = 0, flux_square = 0, flux_claim = 0;
     tally t = {0};
@@ -90,11 +91,11 @@ static void finds_snr_six(void **state) {
     assert_true(streak.found >= 0.85 * streak.sources);
 }
 
-/* 1.15 is what is required; 360 sources give the RMS to 4 %. The claimed sigma is held to 12 %, three
- * of those. */
+/* 1.15 is what is required; 360 sources give the RMS to 4 %. The claimed sigma is held to 12 %,
+ * three of those. */
 static void locates_to_the_bound(void **state) {
     (void)state;
-    static const double cases[][3] = {{0, 0, 15}, {0, 0, 60}, {0, 0, 500},
+    static const double cases[][3] = {{0, 0, 15}, {0, 0, 60},   {0, 0, 500},
                                       {8, 0, 15}, {5, 6.5, 15}, {5, 6.5, 200}};
     for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
         tally t = measure(cases[c][0], cases[c][1], cases[c][2], 10);
