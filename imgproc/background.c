@@ -6,7 +6,7 @@
 
 #include "imgproc/rows.h"
 
-enum { SAMPLE = 512, CLIP_PASSES = 3 };
+enum { SAMPLE = 256, CLIP_PASSES = 2, ENOUGH_PIXELS = 2048 };
 
 bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int max_height,
                                  bst_background *out) {
@@ -99,9 +99,10 @@ static bool estimate_mesh(bst_background *b, const float *image, int stride, int
     if (!first_guess(b, image, stride, width, height, noise_floor, level, noise)) {
         return false;
     }
+    int row_step = width * height >= 2 * ENOUGH_PIXELS ? 2 : 1;
     for (int pass = 0; pass < CLIP_PASSES; pass++) {
         bst_row_sums sums = {0};
-        for (int y = 0; y < height; y++) {
+        for (int y = 0; y < height; y += row_step) {
             bst_row_clipped_sums(image + (size_t)y * (size_t)stride, width, *level, 3.0f * *noise,
                                  &sums);
         }
@@ -213,7 +214,8 @@ static void expand_row(const bst_background *b, const float *nodes, float *out) 
     float step = 1.0f / (float)b->mesh_px;
     float centre = 0.5f * (float)(b->mesh_px - 1);
     for (int i = -1; i < b->columns; i++) {
-        int end = i + 1 < b->columns ? (int)ceilf(centre + (float)((i + 1) * b->mesh_px)) : b->width;
+        int end =
+            i + 1 < b->columns ? (int)ceilf(centre + (float)((i + 1) * b->mesh_px)) : b->width;
         end = end < b->width ? end : b->width;
         float left = nodes[i < 0 ? 0 : i];
         float right = nodes[i + 1 < b->columns ? i + 1 : b->columns - 1];

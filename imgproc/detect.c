@@ -132,8 +132,7 @@ static void correct_row(const bst_imgproc *ip, const bst_imgproc_frame *frame, i
             }
         }
         bad = bad || !(flat > 0.0f);
-        row[x] = bad ? BST_PIXEL_BAD
-                     : (row[x] - dark * (float)frame->exposure_s) / (flat * share);
+        row[x] = bad ? BST_PIXEL_BAD : (row[x] - dark * (float)frame->exposure_s) / (flat * share);
     }
 }
 
@@ -149,7 +148,8 @@ static void to_electrons(bst_imgproc *ip, const bst_imgproc_frame *frame, int wi
     }
 }
 
-/* The digital number from which a pixel no longer measures: the converter's end or the full well. */
+/* The digital number from which a pixel no longer measures: the converter's end or the full well.
+ */
 static int saturation_dn(const bst_imgproc *ip, const bst_imgproc_frame *frame) {
     double top = ldexp(1.0, frame->bits) - 1.0;
     double well = ip->camera.full_well_e * frame->binning * frame->binning;

@@ -195,8 +195,8 @@ bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
             /* a hundredth of the standard deviation that the diagonal promises, at least 1e-5 px */
             double slack_x = fmax(1e-5, 0.01 / a[3 * s][3 * s]);
             double slack_y = fmax(1e-5, 0.01 / a[3 * s + 1][3 * s + 1]);
-            settled = settled && fabs(x - f->shape.x_px) < slack_x &&
-                      fabs(y - f->shape.y_px) < slack_y;
+            settled =
+                settled && fabs(x - f->shape.x_px) < slack_x && fabs(y - f->shape.y_px) < slack_y;
             double product = f->flux_e * f->widening_px2;
             double flux = f->flux_e + step[2];
             flux = flux > 0.1 * f->flux_e ? flux : 0.1 * f->flux_e;
@@ -239,12 +239,19 @@ bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
         double last[BST_FIT_MAX_PARAMETERS] = {0};
         last[parameters - 1] = 1.0;
         solve(a, parameters, last);
-        free[0]->widening_variance =
-            last[parameters - 1] / (free[0]->flux_e * free[0]->flux_e);
+        free[0]->widening_variance = last[parameters - 1] / (free[0]->flux_e * free[0]->flux_e);
     }
     free[0]->chi_square = chi;
     free[0]->fitted = true;
     return true;
+}
+
+double bst_fit_norm(const bst_fit *fit, const bst_stamp *stamp) {
+    double sum = 0.0;
+    for (int i = 0; i < stamp->width * stamp->height; i++) {
+        sum += fit->model[i] * fit->model[i];
+    }
+    return sqrt(sum);
 }
 
 bool bst_fit_moments(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,

@@ -75,8 +75,7 @@ static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
     BST_TRY(bst_imgproc_create(env->ctx, &m->camera, bst_camera_electrons_per_s(&m->camera, 0.0),
                                m->config, NULL, &m->ip));
     BST_TRY(bst_sky_create(env->ctx, &m->camera, bst_knowledge_stars(env->knowledge),
-                           bst_knowledge_julian_year(env->knowledge), CATALOGUE_CAPACITY,
-                           &m->sky));
+                           bst_knowledge_julian_year(env->knowledge), CATALOGUE_CAPACITY, &m->sky));
     BST_TRY(bst_starid_create(env->ctx, CATALOGUE_CAPACITY, (int)m->config->capacity,
                               m->config->search_radius_px, &m->starid));
     bst_env_set_capacity(env, PORT_DETECTIONS, (int)m->config->capacity);
@@ -130,9 +129,12 @@ static bst_status identify(imgproc_module *m, bst_ctx *ctx, const bst_nav_teleme
     int expected = 0;
     BST_TRY(bst_sky_expect(ctx, &m->sky, out->q_cam_from_gcrf, &light, window,
                            m->config->search_radius_px, v_limit, &expected));
-    bst_starid_options options = {m->config->search_radius_px, m->config->match_tolerance_px,
+    bst_starid_options options = {m->config->search_radius_px,
+                                  m->config->match_tolerance_px,
                                   bst_camera_centre_x(&m->camera),
-                                  bst_camera_centre_y(&m->camera)};
+                                  bst_camera_centre_y(&m->camera),
+                                  window.width,
+                                  window.height};
     bst_starid_result result = {0};
     if (locked && LOCKED_RADIUS_PX < options.search_radius_px) {
         options.search_radius_px = LOCKED_RADIUS_PX;
@@ -161,16 +163,16 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
     out->end_tick = message->end_tick;
 
     bst_motion motion = {BST_QUAT_IDENTITY, {0, 0, 0}};
-    bool oriented = pointing.payload &&
-                    bst_motion_from_telemetry(pointing.payload, message->start_tick,
-                                              message->end_tick, &motion);
+    bool oriented =
+        pointing.payload && bst_motion_from_telemetry(pointing.payload, message->start_tick,
+                                                      message->end_tick, &motion);
     out->q_telemetry_from_gcrf = motion.q_cam_from_gcrf;
     const bst_predictions *predictions = predicted.stale ? NULL : predicted.payload;
     bool locked = oriented && predictions && predictions->attitude_valid;
     if (locked) {
         double middle = 0.5 * ((double)message->start_tick + (double)message->end_tick);
-        motion.q_cam_from_gcrf = bst_quat_unit(
-            bst_quat_mul(correction(m, predictions, middle), motion.q_cam_from_gcrf));
+        motion.q_cam_from_gcrf =
+            bst_quat_unit(bst_quat_mul(correction(m, predictions, middle), motion.q_cam_from_gcrf));
     }
     out->q_cam_from_gcrf = motion.q_cam_from_gcrf;
 
@@ -179,10 +181,8 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
         .window = message->window,
         .binning = message->binning,
         .bits = message->bits,
-        .exposure_s =
-            (double)(message->end_tick - message->start_tick) / (double)m->tick_rate_hz};
-    BST_TRY(
-        bst_imgproc_detect(ctx, m->ip, &frame, oriented ? &motion : NULL, out, capacity));
+        .exposure_s = (double)(message->end_tick - message->start_tick) / (double)m->tick_rate_hz};
+    BST_TRY(bst_imgproc_detect(ctx, m->ip, &frame, oriented ? &motion : NULL, out, capacity));
     if (oriented && nav.payload) {
         BST_TRY(identify(m, ctx, nav.payload, message->window, locked, out));
     }

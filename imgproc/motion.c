@@ -29,9 +29,8 @@ bool bst_motion_from_telemetry(const bst_pointing_telemetry *telemetry, int64_t 
         return false;
     }
     int64_t newest = telemetry->written - 1;
-    int64_t oldest = telemetry->written > telemetry->capacity
-                         ? telemetry->written - telemetry->capacity
-                         : 0;
+    int64_t oldest =
+        telemetry->written > telemetry->capacity ? telemetry->written - telemetry->capacity : 0;
     /* first: the last sample not after the exposure's start, or the ring's first */
     int64_t first = newest;
     while (first > oldest && sample_at(telemetry, first)->tick > start_tick) {

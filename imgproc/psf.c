@@ -102,7 +102,7 @@ void bst_psf_render(const bst_psf *psf, const bst_shape *shape, const bst_stamp 
     memset(by_y, 0, bytes);
     memset(by_variance, 0, bytes);
     double length = hypot(shape->dx_px, shape->dy_px) / shape->sigma_px;
-    int nodes = length < 1e-3 ? 1 : (int)fmin(4.0 + 0.95 * length, BST_PSF_MAX_NODES);
+    int nodes = length < 1e-3 ? 1 : (int)fmin(5.0 + 1.15 * length, BST_PSF_MAX_NODES);
     const double *node = psf->node + nodes * (nodes - 1) / 2;
     const double *weight = psf->weight + nodes * (nodes - 1) / 2;
     profile px, py;

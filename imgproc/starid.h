@@ -12,9 +12,10 @@ typedef struct bst_expected_star {
 } bst_expected_star;
 
 typedef struct bst_starid_options {
-    double search_radius_px;   /* greatest shift between expectation and detection */
-    double tolerance_px;       /* of a single star, after the shift */
-    double centre_x_px, centre_y_px; /* about which the field may be turned */
+    double search_radius_px;                /* greatest shift between expectation and detection */
+    double tolerance_px;                    /* of a single star, after the shift */
+    double centre_x_px, centre_y_px;        /* about which the field may be turned */
+    double field_width_px, field_height_px; /* of the window that detections come from */
 } bst_starid_options;
 
 typedef struct bst_starid_result {
