@@ -1,13 +1,19 @@
 #include "tracker/target.h"
 
-/* x^T P^-1 x + ln det P of a 2-vector; INFINITY for a bad P or a misfit beyond `limit`. */
-static double misfit2(const double x[2], double p11, double p12, double p22, double limit) {
+/* Adds x^T P^-1 x and ln det P of a 2-vector; INFINITY for a bad P or a misfit beyond `limit`. */
+static void add2(bst_target_fit *fit, const double x[2], double p11, double p12, double p22,
+                 double limit) {
     double det = p11 * p22 - p12 * p12;
     double chi2 = (p22 * x[0] * x[0] - 2.0 * p12 * x[0] * x[1] + p11 * x[1] * x[1]) / det;
-    return det > 0.0 && chi2 <= limit ? chi2 + log(det) : INFINITY;
+    if (det > 0.0 && chi2 <= limit) {
+        fit->chi2 += chi2;
+        fit->log_det += log(det);
+    } else {
+        fit->chi2 = INFINITY;
+    }
 }
 
-/* The misfit of the rate alone, without its determinant: for the release of a kept target. */
+/* Rate of the track less that of the cue, and its covariance (11, 12, 22), in the track's axes. */
 static void rate_difference(const bst_target_params *params, const bst_target_cue *cue,
                             const bst_mtt_track *track, double x[2], double p[3]) {
     const bst_sky_state *s = &track->state;
@@ -24,30 +30,33 @@ static void rate_difference(const bst_target_params *params, const bst_target_cu
     p[2] = s->covariance[3][3] + own;
 }
 
-double bst_target_misfit(const bst_target_params *params, const bst_target_cue *cue,
-                         const bst_mtt_track *track) {
+bst_target_fit bst_target_misfit(const bst_target_params *params, const bst_target_cue *cue,
+                                 const bst_mtt_track *track) {
     const bst_sky_state *s = &track->state;
+    bst_target_fit fit = {.chi2 = INFINITY};
     double limit2 = params->max_rate_sigma_radps * params->max_rate_sigma_radps;
     int dof = 2 * (track->hits - 2);
     if (!cue->valid || track->status == BST_TRACK_TENTATIVE || s->covariance[2][2] > limit2 ||
         s->covariance[3][3] > limit2 || (dof > 0 && track->chi2 > params->max_chi2 * dof)) {
-        return INFINITY;
+        return fit;
     }
+    fit.chi2 = 0.0;
     double x[2], p[3];
     rate_difference(params, cue, track, x, p);
-    double sum = misfit2(x, p[0], p[1], p[2], params->rate_chi2);
+    add2(&fit, x, p[0], p[1], p[2], params->rate_chi2);
     bst_tangent axes = bst_tangent_at(s->direction);
     bst_vec3 to = bst_tangent_log(s->direction, cue->direction);
     double d[2] = {bst_vec3_dot(to, axes.e1), bst_vec3_dot(to, axes.e2)};
     double variance = cue->sigma_rad * cue->sigma_rad;
-    sum += misfit2(d, s->covariance[0][0] + variance, s->covariance[0][1],
-                   s->covariance[1][1] + variance, params->direction_chi2);
+    add2(&fit, d, s->covariance[0][0] + variance, s->covariance[0][1],
+         s->covariance[1][1] + variance, params->direction_chi2);
     if (isfinite(cue->v_mag) && isfinite(cue->v_mag_sigma) && isfinite(track->v_mag)) {
         double v = cue->v_mag_sigma * cue->v_mag_sigma + track->v_mag_variance + 0.01;
         double m = track->v_mag - cue->v_mag;
-        sum += m * m / v <= params->magnitude_chi2 ? m * m / v + log(v) : INFINITY;
+        fit.chi2 += m * m / v <= params->magnitude_chi2 ? m * m / v : INFINITY;
+        fit.log_det += log(v);
     }
-    return sum;
+    return fit;
 }
 
 static const bst_mtt_track *find(const bst_mtt_track *tracks, int count, int64_t id) {
@@ -92,20 +101,25 @@ void bst_target_step(bst_target *target, const bst_target_params *params, const 
         bst_sky_predict(&memory, seconds - target->memory_seconds, params->memory_noise_rad2ps3);
     }
     const bst_mtt_track *best = NULL;
-    double lowest = INFINITY, second = INFINITY;
+    double lowest = INFINITY, lowest_chi2 = INFINITY, second = INFINITY;
     for (int i = 0; i < count; i++) {
-        double misfit = bst_target_misfit(params, cue, &tracks[i]);
-        if (bound && misfit < INFINITY) {
+        bst_target_fit fit = bst_target_misfit(params, cue, &tracks[i]);
+        if (bound && fit.chi2 < INFINITY) {
             double distance2 = bst_sky_distance2(&memory, &tracks[i].state);
-            misfit = distance2 <= params->memory_chi2 ? misfit + distance2 : INFINITY;
+            fit.chi2 = distance2 <= params->memory_chi2 ? fit.chi2 + distance2 : INFINITY;
         }
+        double misfit = fit.chi2 + fit.log_det;
         if (misfit < lowest) {
             second = lowest;
             lowest = misfit;
+            lowest_chi2 = fit.chi2;
             best = &tracks[i];
         } else if (misfit < second) {
             second = misfit;
         }
+    }
+    if (best && best->hits < params->min_hits + (int)(0.5 * lowest_chi2)) {
+        return;
     }
     if (best && (0.5 * (second - lowest) >= params->margin || best->hits >= params->margin_hits)) {
         target->id = best->id;

@@ -11,8 +11,11 @@ typedef struct bst_target_params {
     double release_chi2;         /* a kept target whose rate misfits the cue by more is let go */
     double rate_floor_radps;     /* 1 sigma per axis by which any cue's rate may be wrong */
     double max_rate_sigma_radps; /* a track is judged once its rate is known to this */
-    double max_chi2;    /* a track whose mean innovation (per degree of freedom) exceeds this is
-                           not taken */
+    double max_chi2; /* a track whose mean innovation (per degree of freedom) exceeds this is
+                        not taken */
+    /* the fewest hits that a track is taken with, and one more for every 2 of its chi-square: a
+     * poor candidate waits for a better one */
+    int min_hits;
     double margin;      /* log-likelihood by which the best must lead the second ... */
     int margin_hits;    /* ... unless it has this many hits */
     double memory_s;    /* a lost target's extrapolation binds the next choice for this long */
@@ -36,12 +39,15 @@ typedef struct bst_target {
     double lost_seconds; /* when the last target was lost */
 } bst_target;
 
-/* Squared misfit of a track to the cue over direction, rate and brightness plus the logarithm of
- * its covariances' determinants (twice the negative log-likelihood but for a constant); INFINITY
- * when any part is beyond its limit, the track is not confirmed, or its rate is not known well
- * enough yet. */
-double bst_target_misfit(const bst_target_params *params, const bst_target_cue *cue,
-                         const bst_mtt_track *track);
+/* Misfit of a track to the cue over direction, rate and brightness. */
+typedef struct bst_target_fit {
+    double chi2;    /* sum of the parts; INFINITY when any is beyond its limit, the track is not
+                       confirmed, or its rate is not known well enough yet */
+    double log_det; /* sum of the logarithms of their covariances' determinants: chi2 + log_det is
+                       twice the negative log-likelihood but for a constant */
+} bst_target_fit;
+bst_target_fit bst_target_misfit(const bst_target_params *params, const bst_target_cue *cue,
+                                 const bst_mtt_track *track);
 
 /* Keeps the target while its track lives; else chooses among the tracks by the cue and, after a
  * loss, by the lost target's extrapolation. Without a cue nothing new is chosen. */

@@ -15,8 +15,7 @@ static const command commands[] = {
     {"check", bst_cmd_check, "validate a scenario and print it with every default written out"},
     {"schema", bst_cmd_schema, "print the JSON Schema of scenarios"},
     {"stars", bst_cmd_stars, "get, import or describe the star catalogue"},
-    {"propagate", bst_cmd_propagate, "print an orbit from a two-line element set"},
-    {"bench", bst_cmd_bench, "measure speed and error"},
+    {"propagate", bst_cmd_propagate, "positions and velocities from two-line element sets"},
 };
 
 void bst_app_log(void *user, bst_log_level level, const char *message) {

@@ -1,6 +1,6 @@
-#include "control/control.h"
+#include "control/modules.h"
 #include "gimbal/modules.h"
-#include "imgproc/module.h"
+#include "imgproc/imgproc.h"
 #include "scenegen/module.h"
 #include "sim/app/app.h"
 #include "tracker/module.h"

@@ -3,7 +3,8 @@
 
 #include "sim/io/fits_internal.h"
 
-#define DIGITS (-15) /* significant digits of a real key */
+#define DIGITS (-15)     /* significant digits of a real key */
+#define MJD_DIGITS (-16) /* of a modified Julian date: 1e-11 d, about what a double holds */
 
 static void put_real(fitsfile *file, const char *key, double value, const char *comment,
                      int *code) {
@@ -109,11 +110,11 @@ void bst_fits_put_frame_keys(fitsfile *file, const bst_fits_names *names,
     put_int(file, "FRAMEID", frame->id, "number of the exposure", code);
     double mjd = bst_fits_date(frame, BST_FITS_BEGIN, date);
     fits_write_key_str(file, "DATE-OBS", date, "start of the exposure, UTC", code);
-    put_real(file, "MJD-OBS", mjd, "[d] start of the exposure, UTC", code);
+    fits_write_key_dbl(file, "MJD-OBS", mjd, MJD_DIGITS, "[d] start of the exposure, UTC", code);
     for (int k = 0; k < 3; k++) {
         mjd = bst_fits_date(frame, (bst_fits_moment)k, date);
         fits_write_key_str(file, date_keys[k], date, moments[k], code);
-        put_real(file, mjd_keys[k], mjd, "[d]", code);
+        fits_write_key_dbl(file, mjd_keys[k], mjd, MJD_DIGITS, "[d] UTC", code);
     }
     fits_write_key_str(file, "TIMESYS", "UTC", "time scale of the dates", code);
     put_real(file, "EXPTIME", frame->exposure_s, "[s] exposure", code);

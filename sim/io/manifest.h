@@ -4,6 +4,10 @@
 
 #include "sim/io/run_store.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 struct cJSON;
 
 /* Writes `bytes` bytes to `path` through a temporary file beside it, flushed and renamed: readers
@@ -16,5 +20,9 @@ bst_status bst_write_file_atomic(bst_ctx *ctx, const char *path, const void *dat
  * double, a newline at the end. "manifest.json" is to be the last file before bst_run_finish. */
 bst_status bst_run_write_json(bst_ctx *ctx, const bst_run *run, const char *name,
                               const struct cJSON *json) BST_MUST_CHECK;
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -1,0 +1,117 @@
+/* The standard controller: brings the target into view, keeps the boresight on it, and finds it
+ * again. */
+#ifndef BST_CONTROL_CONTROL_H
+#define BST_CONTROL_CONTROL_H
+
+#include "control/pointing_error.h"
+#include "control/search.h"
+#include "sim/core/config.h"
+#include "sim/core/messages.h"
+#include "sim/world/knowledge.h"
+
+typedef enum bst_control_strategy {
+    BST_CONTROL_TRACK = 0, /* closed loop */
+    BST_CONTROL_STARE,     /* where the cue is at stare_time_s, inertially */
+    BST_CONTROL_RATE,      /* along the cue */
+} bst_control_strategy;
+
+typedef struct bst_control_config {
+    int32_t strategy;
+    double stare_time_s;
+    double exposure_s, period_s;
+    double command_latency_s;
+    bool compensate_attitude;
+    double disturbance_px_rms, disturbance_cutoff_hz;
+    double fix_sigma_floor_px;
+    double attitude_sigma_arcsec, drift_sigma_arcsec_per_s;
+    double arrive_tolerance_px;
+    double search_sigmas, search_max_deg, search_step;
+    int64_t dwell_frames;
+    double dwell_timeout_s;
+    int64_t candidate_hits;
+    double candidate_rate_sigmas;
+    double acquire_timeout_s, track_entry_px;
+    double reacquire_coast_s, reacquire_extent_deg;
+} bst_control_config;
+
+extern const bst_config_desc bst_control_config_table[];
+
+/* The cue `seconds` after the epoch. */
+typedef bst_status (*bst_control_cue_fn)(void *user, bst_ctx *ctx, double seconds, bst_cue *out);
+
+/* What a controller knows besides its messages. */
+typedef struct bst_control_env {
+    double tick_rate_hz;
+    double pixel_rad;
+    int width_px, height_px;
+    bst_control_cue_fn cue_at;
+    void *cue_user;
+} bst_control_env;
+
+typedef struct bst_control_transition {
+    int from, to; /* bst_mode */
+    const char *reason;
+} bst_control_transition;
+
+/* A track as last heard of. */
+typedef struct bst_control_held {
+    int64_t id, tick;
+    bst_vec3 direction_gcrf, rate_gcrf_radps; /* geometric */
+} bst_control_held;
+
+#define BST_CONTROL_TRANSITIONS 4 /* greatest number in one observe and one update */
+
+typedef struct bst_control {
+    bst_control_config config;
+    bst_control_env env;
+    bst_pointing_error pointing_error;
+    int mode;
+    int64_t mode_tick; /* since when */
+    bst_control_transition transitions[BST_CONTROL_TRANSITIONS];
+    int transition_count;
+    bst_nav_telemetry nav;
+    bool nav_valid;
+    bst_control_held held;                    /* the track that the aim is on */
+    bst_control_held lost;                    /* the target that BST_MODE_REACQUIRE looks for */
+    int64_t target_id;                        /* 0: the tracker names none */
+    int64_t rejected_id;                      /* candidates up to this one have been given up */
+    int64_t frame_tick, frame_interval_ticks; /* mid of the newest frame; shortest seen, 0: none */
+    /* search, about the cue or about what is lost */
+    bst_search search;
+    int32_t search_step;
+    int search_mode; /* BST_MODE_SEARCH or BST_MODE_REACQUIRE: where a failed acquisition goes */
+    bst_vec3 search_x_gcrf; /* image x axis at the start of the search */
+    int64_t tile_tick;      /* when the tile was commanded */
+    int64_t arrival_tick;   /* when the boresight came to rest on it; < 0: not yet */
+    int64_t frames;         /* seen since */
+    /* newest telemetry */
+    bst_pointing_sample pointing;
+    bool pointing_valid, settled;
+    bst_vec3 stare_gcrf;
+    bool stare_valid;
+} bst_control;
+
+/* Copies config and env. BST_ERR_CONFIG for settings that do not fit together. */
+bst_status bst_control_init(bst_ctx *ctx, bst_control *control, const bst_control_config *config,
+                            const bst_control_env *env) BST_MUST_CHECK;
+
+/* Takes in telemetry (either may be NULL: nothing new). */
+void bst_control_telemetry(bst_control *control, const bst_pointing_telemetry *pointing,
+                           const bst_nav_telemetry *nav);
+
+/* Takes in the tracker's message about one frame: attitude fix, target, candidates. `tick` is now.
+ */
+bst_status bst_control_observe(bst_ctx *ctx, bst_control *control, int64_t tick,
+                               const bst_tracks *tracks) BST_MUST_CHECK;
+
+/* Runs the mode logic at `tick` and fills the command and the status. *commanded is false (and
+ * *command untouched) while there is nothing to aim at or no navigation telemetry yet. */
+bst_status bst_control_update(bst_ctx *ctx, bst_control *control, int64_t tick, bool *commanded,
+                              bst_los_command *command, bst_control_status *status) BST_MUST_CHECK;
+
+/* The geometric direction (unit, GCRF) that the boresight is to be on at a tick; *valid false when
+ * there is none. */
+bst_status bst_control_aim(bst_ctx *ctx, const bst_control *control, int64_t tick, bool *valid,
+                           bst_vec3 *direction) BST_MUST_CHECK;
+
+#endif

@@ -1,0 +1,9 @@
+/* The controllers that a scenario can name. */
+#ifndef BST_CONTROL_MODULES_H
+#define BST_CONTROL_MODULES_H
+
+#include "sim/core/module.h"
+
+extern const bst_module_desc bst_control_standard_module; /* role "control", type "standard" */
+
+#endif

@@ -1,0 +1,110 @@
+#include <stdlib.h>
+
+#include "control/control.h"
+#include "control/modules.h"
+
+enum { PORT_TRACKS, PORT_POINTING, PORT_NAV, PORT_COMMAND, PORT_SENSOR, PORT_STATUS, PORT_COUNT };
+
+static const bst_port ports[PORT_COUNT] = {
+    [PORT_TRACKS] = {.channel = BST_CHANNEL_TRACKS,
+                     .direction = BST_PORT_IN,
+                     .flags = BST_PORT_TRIGGER | BST_PORT_OPTIONAL},
+    [PORT_POINTING] = {.channel = BST_CHANNEL_POINTING_TELEMETRY, .direction = BST_PORT_IN},
+    [PORT_NAV] = {.channel = BST_CHANNEL_NAV_TELEMETRY, .direction = BST_PORT_IN},
+    [PORT_COMMAND] = {.channel = BST_CHANNEL_LOS_COMMAND, .direction = BST_PORT_OUT},
+    [PORT_SENSOR] = {.channel = BST_CHANNEL_SENSOR_COMMAND, .direction = BST_PORT_OUT},
+    [PORT_STATUS] = {.channel = BST_CHANNEL_CONTROL_STATUS, .direction = BST_PORT_OUT},
+};
+
+typedef struct module {
+    bst_control control;
+    bst_knowledge_view *view;
+    bool sensor_told;
+} module;
+
+static bst_status cue_at(void *user, bst_ctx *ctx, double seconds, bst_cue *out) {
+    return bst_knowledge_cue_at(ctx, user, seconds, out);
+}
+
+static void destroy(void *self) {
+    module *m = self;
+    if (m) {
+        bst_knowledge_view_free(m->view);
+        free(m);
+    }
+}
+
+static bst_status create(const bst_module_env *env, const void *config, void **self) {
+    module *m = calloc(1, sizeof *m);
+    if (!m) {
+        return bst_fail(env->ctx, BST_ERR_MEMORY, "out of memory for a controller");
+    }
+    bst_status status = bst_knowledge_view_create(env->ctx, env->knowledge, &m->view);
+    if (status == BST_OK) {
+        const bst_camera *camera = bst_knowledge_camera(env->knowledge);
+        bst_control_env control_env = {.tick_rate_hz = (double)env->tick_rate_hz,
+                                       .pixel_rad = bst_camera_scale_rad(camera),
+                                       .width_px = (int)camera->width_px,
+                                       .height_px = (int)camera->height_px,
+                                       .cue_at = cue_at,
+                                       .cue_user = m->view};
+        status = bst_control_init(env->ctx, &m->control, config, &control_env);
+    }
+    if (status != BST_OK) {
+        destroy(m);
+        return status;
+    }
+    *self = m;
+    return BST_OK;
+}
+
+static bst_status step(void *self, struct bst_step *s) {
+    module *m = self;
+    bst_control *c = &m->control;
+    bst_ctx *ctx = bst_step_ctx(s);
+    int64_t tick = bst_step_tick(s);
+    bst_control_telemetry(c, bst_step_latest(s, PORT_POINTING).payload,
+                          bst_step_latest(s, PORT_NAV).payload);
+    for (bst_sample next = bst_step_next(s, PORT_TRACKS); next.payload;
+         next = bst_step_next(s, PORT_TRACKS)) {
+        BST_TRY(bst_control_observe(ctx, c, tick, next.payload));
+    }
+    bool commanded;
+    bst_los_command command;
+    bst_control_status *status = bst_step_write(s, PORT_STATUS, NULL);
+    BST_TRY(bst_control_update(ctx, c, tick, &commanded, &command, status));
+    if (commanded) {
+        bst_los_command *out = bst_step_write(s, PORT_COMMAND, NULL);
+        *out = command;
+    }
+    if (!m->sensor_told) {
+        bst_sensor_command *sensor = bst_step_write(s, PORT_SENSOR, NULL);
+        *sensor = (bst_sensor_command){.exposure_s = c->config.exposure_s,
+                                       .period_s = c->config.period_s};
+        m->sensor_told = true;
+    }
+    for (int i = 0; i < c->transition_count; i++) {
+        const bst_control_transition *t = &c->transitions[i];
+        bst_step_event(s, "mode", "%s -> %s: %s", bst_mode_name(t->from), bst_mode_name(t->to),
+                       t->reason);
+    }
+    c->transition_count = 0;
+    return BST_OK;
+}
+
+const bst_module_desc bst_control_standard_module = {
+    .abi = BST_MODULE_ABI,
+    .role = "control",
+    .type = "standard",
+    .doc =
+        "Slew to the cue, search, acquire, track, reacquire; or stare, or follow the cue open "
+        "loop. Corrects the pointing by what the stars say.",
+    .config = bst_control_config_table,
+    .config_bytes = sizeof(bst_control_config),
+    .default_rate_hz = 20.0,
+    .ports = ports,
+    .port_count = PORT_COUNT,
+    .create = create,
+    .step = step,
+    .destroy = destroy,
+};

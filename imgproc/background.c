@@ -1,0 +1,249 @@
+#include "imgproc/background.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "imgproc/rows.h"
+
+enum { SAMPLE = 256, CLIP_PASSES = 2, ENOUGH_PIXELS = 2048 };
+
+bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int max_height,
+                                 bst_background *out) {
+    *out = (bst_background){.mesh_px = mesh_px,
+                            .max_columns = (max_width + mesh_px - 1) / mesh_px,
+                            .max_rows = (max_height + mesh_px - 1) / mesh_px};
+    size_t columns = (size_t)out->max_columns, meshes = columns * (size_t)out->max_rows;
+    out->level = calloc(meshes, sizeof(float));
+    out->noise = calloc(meshes, sizeof(float));
+    out->scratch = calloc(meshes > SAMPLE ? meshes : SAMPLE, sizeof(float));
+    out->row_level = calloc(columns, sizeof(float));
+    out->row_noise = calloc(columns, sizeof(float));
+    if (!out->level || !out->noise || !out->scratch || !out->row_level || !out->row_noise) {
+        bst_background_free(out);
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu background meshes", meshes);
+    }
+    return BST_OK;
+}
+
+void bst_background_free(bst_background *b) {
+    free(b->level);
+    free(b->noise);
+    free(b->scratch);
+    free(b->row_level);
+    free(b->row_noise);
+    *b = (bst_background){0};
+}
+
+/* The k-th smallest of values, which are reordered (Hoare's quickselect, median of three). */
+static float select_kth(float *values, int count, int k) {
+    int lo = 0, hi = count - 1;
+    while (lo < hi) {
+        float a = values[lo], b = values[lo + (hi - lo) / 2], c = values[hi];
+        float pivot = a < b ? (b < c ? b : (a < c ? c : a)) : (a < c ? a : (b < c ? c : b));
+        int i = lo, j = hi;
+        while (i <= j) {
+            while (values[i] < pivot) {
+                i++;
+            }
+            while (values[j] > pivot) {
+                j--;
+            }
+            if (i <= j) {
+                float swap = values[i];
+                values[i++] = values[j];
+                values[j--] = swap;
+            }
+        }
+        if (k <= j) {
+            hi = j;
+        } else if (k >= i) {
+            lo = i;
+        } else {
+            break;
+        }
+    }
+    return values[k];
+}
+
+/* First guess from at most SAMPLE pixels spread over the mesh. False when none is usable. */
+static bool first_guess(bst_background *b, const float *image, int stride, int width, int height,
+                        float noise_floor, float *level, float *noise) {
+    int total = width * height;
+    int step = (total + SAMPLE - 1) / SAMPLE;
+    /* a step that shares a factor with the width would sample a few columns only */
+    while (step > 1 && width % step == 0) {
+        step++;
+    }
+    int count = 0;
+    for (int i = 0; i < total && count < SAMPLE; i += step) {
+        float v = image[(size_t)(i / width) * (size_t)stride + (size_t)(i % width)];
+        if (v > BST_PIXEL_NONE) {
+            b->scratch[count++] = v;
+        }
+    }
+    if (count == 0) {
+        return false;
+    }
+    float median = select_kth(b->scratch, count, count / 2);
+    for (int i = 0; i < count; i++) {
+        b->scratch[i] = fabsf(b->scratch[i] - median);
+    }
+    *level = median;
+    *noise = fmaxf(1.4826f * select_kth(b->scratch, count, count / 2), noise_floor);
+    return true;
+}
+
+static bool estimate_mesh(bst_background *b, const float *image, int stride, int width, int height,
+                          float noise_floor, float *level, float *noise) {
+    if (!first_guess(b, image, stride, width, height, noise_floor, level, noise)) {
+        return false;
+    }
+    int row_step = width * height >= 2 * ENOUGH_PIXELS ? 2 : 1;
+    for (int pass = 0; pass < CLIP_PASSES; pass++) {
+        bst_row_sums sums = {0};
+        for (int y = 0; y < height; y += row_step) {
+            bst_row_clipped_sums(image + (size_t)y * (size_t)stride, width, *level, 3.0f * *noise,
+                                 &sums);
+        }
+        double n = 0.0, s = 0.0, q = 0.0;
+        for (int i = 0; i < BST_ROW_LANES; i++) {
+            n += (double)sums.count[i];
+            s += (double)sums.sum[i];
+            q += (double)sums.square[i];
+        }
+        if (n < 2.0) {
+            break;
+        }
+        double mean = s / n;
+        /* 0.97334 = 1 - 6 phi(3) / (2 Phi(3) - 1): variance of a normal cut at 3 sigma */
+        double variance = fmax(q - n * mean * mean, 0.0) / ((n - 1.0) * 0.97334);
+        *level += (float)mean;
+        *noise = fmaxf((float)sqrt(variance), noise_floor);
+    }
+    return true;
+}
+
+static float median_of(bst_background *b, const float *values, int count) {
+    memcpy(b->scratch, values, (size_t)count * sizeof(float));
+    return select_kth(b->scratch, count, count / 2);
+}
+
+void bst_background_estimate(bst_background *b, const float *image, int width, int height,
+                             float noise_floor) {
+    b->width = width;
+    b->height = height;
+    /* a rest narrower than half a mesh joins its neighbour */
+    int half = b->mesh_px / 2;
+    b->columns = (width + half) / b->mesh_px > 0 ? (width + half) / b->mesh_px : 1;
+    b->rows = (height + half) / b->mesh_px > 0 ? (height + half) / b->mesh_px : 1;
+    int good = 0;
+    for (int j = 0; j < b->rows; j++) {
+        int y0 = j * b->mesh_px, y1 = j + 1 == b->rows ? height : y0 + b->mesh_px;
+        for (int i = 0; i < b->columns; i++) {
+            int x0 = i * b->mesh_px, x1 = i + 1 == b->columns ? width : x0 + b->mesh_px;
+            int k = j * b->columns + i;
+            b->noise[k] = -1.0f;
+            if (estimate_mesh(b, image + (size_t)y0 * (size_t)width + (size_t)x0, width, x1 - x0,
+                              y1 - y0, noise_floor, &b->level[k], &b->noise[k])) {
+                good++;
+            }
+        }
+    }
+    int count = b->columns * b->rows;
+    b->median_level = 0.0f;
+    b->median_noise = noise_floor;
+    if (good == count) {
+        b->median_level = median_of(b, b->level, count);
+        b->median_noise = median_of(b, b->noise, count);
+        return;
+    }
+    int kept = 0;
+    for (int k = 0; k < count; k++) {
+        if (b->noise[k] > 0.0f) {
+            b->scratch[kept++] = b->level[k];
+        }
+    }
+    if (kept > 0) {
+        b->median_level = select_kth(b->scratch, kept, kept / 2);
+        kept = 0;
+        for (int k = 0; k < count; k++) {
+            if (b->noise[k] > 0.0f) {
+                b->scratch[kept++] = b->noise[k];
+            }
+        }
+        b->median_noise = select_kth(b->scratch, kept, kept / 2);
+    }
+    for (int k = 0; k < count; k++) {
+        if (!(b->noise[k] > 0.0f)) {
+            b->level[k] = b->median_level;
+            b->noise[k] = b->median_noise;
+        }
+    }
+}
+
+/* Mesh index and fraction for a coordinate; centres at (i + 1/2) mesh - 1/2. */
+static int mesh_position(double p, int mesh, int count, float *fraction) {
+    double u = (p + 0.5) / mesh - 0.5;
+    if (!(u > 0.0) || count < 2) {
+        *fraction = 0.0f;
+        return 0;
+    }
+    if (u >= count - 1) {
+        *fraction = 1.0f;
+        return count - 2;
+    }
+    int i = (int)u;
+    *fraction = (float)(u - i);
+    return i;
+}
+
+static void interpolate_rows(const bst_background *b, const float *values, int y, float *out) {
+    float f;
+    int j = mesh_position(y, b->mesh_px, b->rows, &f);
+    const float *a = values + (size_t)j * (size_t)b->columns;
+    const float *c = b->rows > 1 ? a + b->columns : a;
+    for (int i = 0; i < b->columns; i++) {
+        out[i] = a[i] + f * (c[i] - a[i]);
+    }
+}
+
+/* Straight lines between mesh centres. */
+static void expand_row(const bst_background *b, const float *nodes, float *out) {
+    int x = 0;
+    float step = 1.0f / (float)b->mesh_px;
+    float centre = 0.5f * (float)(b->mesh_px - 1);
+    for (int i = -1; i < b->columns; i++) {
+        int end =
+            i + 1 < b->columns ? (int)ceilf(centre + (float)((i + 1) * b->mesh_px)) : b->width;
+        end = end < b->width ? end : b->width;
+        float left = nodes[i < 0 ? 0 : i];
+        float right = nodes[i + 1 < b->columns ? i + 1 : b->columns - 1];
+        float slope = (right - left) * step;
+        float origin = centre + (float)(i * b->mesh_px);
+        for (; x < end; x++) {
+            out[x] = left + slope * ((float)x - origin);
+        }
+    }
+}
+
+void bst_background_row(const bst_background *b, int y, float *level, float *inverse_noise) {
+    interpolate_rows(b, b->level, y, b->row_level);
+    interpolate_rows(b, b->noise, y, b->row_noise);
+    for (int i = 0; i < b->columns; i++) {
+        b->row_noise[i] = 1.0f / b->row_noise[i];
+    }
+    expand_row(b, b->row_level, level);
+    expand_row(b, b->row_noise, inverse_noise);
+}
+
+double bst_background_noise_at(const bst_background *b, double x_px, double y_px) {
+    float fx, fy;
+    int i = mesh_position(x_px, b->mesh_px, b->columns, &fx);
+    int j = mesh_position(y_px, b->mesh_px, b->rows, &fy);
+    int right = b->columns > 1 ? 1 : 0, down = b->rows > 1 ? b->columns : 0;
+    const float *n = b->noise + (size_t)j * (size_t)b->columns + (size_t)i;
+    float top = n[0] + fx * (n[right] - n[0]);
+    float bottom = n[down] + fx * (n[down + right] - n[down]);
+    return (double)(top + fy * (bottom - top));
+}

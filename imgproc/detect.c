@@ -1,0 +1,300 @@
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "imgproc/heapsort.h"
+#include "imgproc/imgproc.h"
+#include "imgproc/locate.h"
+#include "imgproc/rows.h"
+
+struct bst_imgproc {
+    bst_camera camera;
+    bst_imgproc_config config;
+    bst_imgproc_maps maps;
+    uint8_t *bad; /* [height_px][width_px]: the maps' and the list's bad pixels; NULL: none */
+    double electrons_per_s_v0;
+    float *electrons; /* [height][width] of the frame; signal once filtered */
+    bst_background background;
+    bst_filter filter;
+    bst_candidates candidates;
+    bst_locator locator;
+    int *order;
+    /* of the latest frame */
+    double exposure_s, binning, streak_px;
+};
+
+static bst_status make_bad_map(bst_ctx *ctx, bst_imgproc *ip) {
+    const bst_bad_pixel *list = ip->config.bad_pixels.items;
+    if (!ip->maps.bad && ip->config.bad_pixels.count == 0) {
+        return BST_OK;
+    }
+    size_t width = (size_t)ip->camera.width_px, height = (size_t)ip->camera.height_px;
+    ip->bad = calloc(width, height);
+    if (!ip->bad) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a bad-pixel map");
+    }
+    if (ip->maps.bad) {
+        memcpy(ip->bad, ip->maps.bad, width * height);
+    }
+    for (int i = 0; i < ip->config.bad_pixels.count; i++) {
+        if (list[i].x < 0 || list[i].y < 0 || list[i].x >= ip->camera.width_px ||
+            list[i].y >= ip->camera.height_px) {
+            return bst_fail(ctx, BST_ERR_CONFIG,
+                            "bad_pixels/%d: (%lld, %lld) is outside the sensor of %lld x %lld", i,
+                            (long long)list[i].x, (long long)list[i].y,
+                            (long long)ip->camera.width_px, (long long)ip->camera.height_px);
+        }
+        ip->bad[(size_t)list[i].y * width + (size_t)list[i].x] = 1;
+    }
+    return BST_OK;
+}
+
+static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
+    int width = (int)ip->camera.width_px, height = (int)ip->camera.height_px;
+    double fwhm = ip->camera.psf_fwhm_px, streak = ip->config.streak_max_px;
+    int side = (int)ceil(streak + 6.0 * fwhm) + 14;
+    side = side < BST_PSF_MAX_SIDE ? side : BST_PSF_MAX_SIDE;
+    int capacity = (int)ip->config.capacity;
+    ip->electrons = calloc((size_t)width * (size_t)height, sizeof(float));
+    ip->order = calloc((size_t)capacity, sizeof(int));
+    if (!ip->electrons || !ip->order) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a frame of %d x %d", width, height);
+    }
+    BST_TRY(make_bad_map(ctx, ip));
+    BST_TRY(bst_background_create(ctx, (int)ip->config.mesh_px, width, height, &ip->background));
+    BST_TRY(bst_filter_create(ctx, width, height, streak, &ip->filter));
+    BST_TRY(bst_candidates_create(ctx, width, height, &ip->candidates));
+    return bst_locator_create(ctx, capacity, height, side, &ip->locator);
+}
+
+bst_status bst_imgproc_create(bst_ctx *ctx, const bst_camera *camera, double electrons_per_s_v0,
+                              const bst_imgproc_config *config, const bst_imgproc_maps *maps,
+                              bst_imgproc **out) {
+    *out = NULL;
+    if (camera->width_px < 1 || camera->height_px < 1 || camera->width_px > 32768 ||
+        camera->height_px > 32768 || !(camera->psf_fwhm_px > 0.0) || camera->psf_fwhm_px > 16.0 ||
+        !(camera->gain_e_per_dn > 0.0) || config->capacity < 1 || config->mesh_px < 4 ||
+        !(config->false_alarms_per_frame > 0.0)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "image processing needs 1 to 32768 pixels a side, a PSF of up to 16 px "
+                        "FWHM, a positive gain, room for a detection, meshes of at least 4 px and "
+                        "a positive false-alarm rate");
+    }
+    bst_imgproc *ip = calloc(1, sizeof *ip);
+    if (!ip) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for image processing");
+    }
+    ip->camera = *camera;
+    ip->config = *config;
+    ip->electrons_per_s_v0 = electrons_per_s_v0;
+    if (maps) {
+        ip->maps = *maps;
+    }
+    bst_status status = allocate(ctx, ip);
+    if (status != BST_OK) {
+        bst_imgproc_free(ip);
+        return status;
+    }
+    *out = ip;
+    return BST_OK;
+}
+
+void bst_imgproc_free(bst_imgproc *ip) {
+    if (!ip) {
+        return;
+    }
+    free(ip->bad);
+    free(ip->electrons);
+    free(ip->order);
+    bst_background_free(&ip->background);
+    bst_filter_free(&ip->filter);
+    bst_candidates_free(&ip->candidates);
+    bst_locator_free(&ip->locator);
+    free(ip);
+}
+
+/* Dark, flat and bad pixels of one binned row, from the full-sensor maps. */
+static void correct_row(const bst_imgproc *ip, const bst_imgproc_frame *frame, int y, int width,
+                        float *row) {
+    int b = frame->binning;
+    size_t stride = (size_t)ip->camera.width_px;
+    float share = 1.0f / (float)(b * b);
+    for (int x = 0; x < width; x++) {
+        float dark = 0.0f, flat = 0.0f;
+        bool bad = false;
+        for (int j = 0; j < b; j++) {
+            size_t k = (size_t)(frame->window.y0 + y * b + j) * stride +
+                       (size_t)(frame->window.x0 + x * b);
+            for (int i = 0; i < b; i++, k++) {
+                dark += ip->maps.dark_e_per_s ? ip->maps.dark_e_per_s[k] : 0.0f;
+                flat += ip->maps.flat ? ip->maps.flat[k] : 1.0f;
+                bad = bad || (ip->bad && ip->bad[k]);
+            }
+        }
+        bad = bad || !(flat > 0.0f);
+        row[x] = bad ? BST_PIXEL_BAD : (row[x] - dark * (float)frame->exposure_s) / (flat * share);
+    }
+}
+
+static void to_electrons(bst_imgproc *ip, const bst_imgproc_frame *frame, int width, int height) {
+    bool corrected = ip->maps.dark_e_per_s || ip->maps.flat || ip->bad;
+    for (int y = 0; y < height; y++) {
+        size_t row = (size_t)y * (size_t)width;
+        bst_row_electrons(frame->pixels + row, width, (float)ip->camera.offset_dn,
+                          (float)ip->camera.gain_e_per_dn, ip->electrons + row);
+        if (corrected) {
+            correct_row(ip, frame, y, width, ip->electrons + row);
+        }
+    }
+}
+
+/* The digital number from which a pixel no longer measures: the converter's end or the full well.
+ */
+static int saturation_dn(const bst_imgproc *ip, const bst_imgproc_frame *frame) {
+    double top = ldexp(1.0, frame->bits) - 1.0;
+    double well = ip->camera.full_well_e * frame->binning * frame->binning;
+    double full = ip->camera.offset_dn + 0.98 * well / ip->camera.gain_e_per_dn;
+    return (int)fmin(top, fmax(full, 1.0));
+}
+
+/* The path of stars on the window's middle, on a grid of half a pixel: small changes of the
+ * telemetry leave the filter as it is. 0, 0 when too short or too long to filter for. */
+static void filter_path(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_motion *motion,
+                        double *dx, double *dy) {
+    *dx = *dy = 0.0;
+    if (!motion) {
+        return;
+    }
+    const bst_window *w = &frame->window;
+    bst_motion_streak(motion, &ip->camera, w->x0 + 0.5 * (w->width - 1),
+                      w->y0 + 0.5 * (w->height - 1), dx, dy);
+    double length = hypot(*dx, *dy) / frame->binning;
+    if (length < ip->config.streak_min_px || length > ip->config.streak_max_px) {
+        *dx = *dy = 0.0;
+        return;
+    }
+    *dx = 0.5 * round(2.0 * *dx / frame->binning);
+    *dy = 0.5 * round(2.0 * *dy / frame->binning);
+}
+
+static bst_status check_frame(bst_ctx *ctx, const bst_imgproc *ip, const bst_imgproc_frame *f) {
+    const bst_window *w = &f->window;
+    if (f->binning < 1 || w->x0 < 0 || w->y0 < 0 || w->width < f->binning ||
+        w->height < f->binning || w->width > ip->camera.width_px - w->x0 ||
+        w->height > ip->camera.height_px - w->y0) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "window %d x %d at (%d, %d) with binning %d does not fit a sensor of %lld "
+                        "x %lld",
+                        w->width, w->height, w->x0, w->y0, f->binning,
+                        (long long)ip->camera.width_px, (long long)ip->camera.height_px);
+    }
+    if (f->bits < 1 || f->bits > 16 || !(f->exposure_s >= 0.0)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "a frame of %d bits and %g s: 1 to 16 bits, 0 s up",
+                        f->bits, f->exposure_s);
+    }
+    return BST_OK;
+}
+
+static bool before_on_sensor(const void *context, int a, int b) {
+    const bst_found *found = context;
+    const bst_shape *p = &found[a].source.shape, *q = &found[b].source.shape;
+    if (p->y_px != q->y_px) {
+        return p->y_px < q->y_px;
+    }
+    return p->x_px != q->x_px ? p->x_px < q->x_px : a < b;
+}
+
+static bst_detection report(const bst_imgproc *ip, const bst_locate_frame *f,
+                            const bst_found *found) {
+    const bst_source *s = &found->source;
+    double b = f->binning;
+    bst_detection d = {0};
+    d.x_px = f->origin_x_px + b * s->shape.x_px;
+    d.y_px = f->origin_y_px + b * s->shape.y_px;
+    d.cov_xx = b * b * s->cov_xx;
+    d.cov_xy = b * b * s->cov_xy;
+    d.cov_yy = b * b * s->cov_yy;
+    d.flux_e = s->flux_e;
+    d.flux_sigma_e = sqrt(s->flux_variance);
+    d.snr = found->snr;
+    d.length_px = b * found->length_px;
+    d.width_px = b * found->width_px;
+    d.angle_rad = found->angle_rad;
+    double rate = s->flux_e / fmax(ip->exposure_s, 1e-9);
+    d.v_mag = -2.5 * log10(rate / ip->electrons_per_s_v0);
+    d.flags = found->flags;
+    d.label = found->artefact ? BST_LABEL_ARTEFACT : BST_LABEL_UNKNOWN;
+    return d;
+}
+
+bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
+                              const bst_motion *motion, bst_detections *out, int capacity) {
+    BST_TRY(check_frame(ctx, ip, frame));
+    int width = frame->window.width / frame->binning;
+    int height = frame->window.height / frame->binning;
+    double sigma = hypot(bst_camera_psf_sigma_px(&ip->camera), ip->config.jitter_px);
+    sigma = fmax(sigma / frame->binning, 0.2);
+    ip->exposure_s = frame->exposure_s;
+    ip->binning = frame->binning;
+
+    to_electrons(ip, frame, width, height);
+    /* no pixel is better known than its quantisation */
+    float floor_e = (float)(ip->camera.gain_e_per_dn / sqrt(12.0));
+    bst_background_estimate(&ip->background, ip->electrons, width, height, floor_e);
+    double dx, dy;
+    filter_path(ip, frame, motion, &dx, &dy);
+    ip->streak_px = hypot(dx, dy) * frame->binning;
+    bst_filter_set(&ip->filter, sigma, dx, dy);
+    double threshold = bst_filter_threshold(&ip->filter, ip->config.false_alarms_per_frame,
+                                            (double)width * (double)height);
+    bst_filter_run(&ip->filter, &ip->background, frame->pixels, ip->electrons, width, height,
+                   saturation_dn(ip, frame), (float)threshold);
+    BST_TRY(bst_candidates_find(ctx, &ip->candidates, &ip->filter));
+    bst_locate_frame view = {.signal = ip->electrons,
+                             .width = width,
+                             .height = height,
+                             .background = &ip->background,
+                             .filter = &ip->filter,
+                             .sigma_px = sigma,
+                             .motion = motion,
+                             .camera = &ip->camera,
+                             .binning = frame->binning};
+    view.origin_x_px = frame->window.x0 + 0.5 * (frame->binning - 1);
+    view.origin_y_px = frame->window.y0 + 0.5 * (frame->binning - 1);
+    bst_locate(&ip->locator, &view, &ip->candidates);
+
+    int kept = 0, room = capacity < ip->locator.capacity ? capacity : ip->locator.capacity;
+    int lost = ip->candidates.count - ip->locator.count;
+    for (int i = 0; i < ip->locator.count; i++) {
+        if (ip->locator.found[i].dropped) {
+            continue;
+        }
+        if (kept < room) {
+            ip->order[kept++] = i;
+        } else {
+            lost++;
+        }
+    }
+    bst_heapsort_indices(ip->order, kept, before_on_sensor, ip->locator.found);
+    out->background_e = (double)ip->background.median_level;
+    out->noise_e = (double)ip->background.median_noise;
+    out->threshold_snr = threshold;
+    out->stars_identified = 0;
+    out->count = kept;
+    out->lost = lost;
+    for (int i = 0; i < kept; i++) {
+        out->items[i] = report(ip, &view, &ip->locator.found[ip->order[i]]);
+    }
+    return BST_OK;
+}
+
+double bst_imgproc_v_limit(const bst_imgproc *ip, double snr) {
+    const bst_filter *f = &ip->filter;
+    double norm = f->streak ? f->streak_norm : f->norm;
+    double electrons = snr * (double)ip->background.median_noise / norm;
+    return -2.5 * log10(electrons / (fmax(ip->exposure_s, 1e-9) * ip->electrons_per_s_v0));
+}
+
+double bst_imgproc_streak_px(const bst_imgproc *ip) {
+    return ip->streak_px;
+}

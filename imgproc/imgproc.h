@@ -1,0 +1,86 @@
+/* Image processing: from one raw frame to located, measured and identified detections. Onboard
+ * side: sees frames, telemetry and the onboard knowledge, never the truth.
+ *
+ * Pixel coordinates are full-sensor coordinates at every public boundary; electrons are detected
+ * electrons above the background. */
+#ifndef BST_IMGPROC_IMGPROC_H
+#define BST_IMGPROC_IMGPROC_H
+
+#include "imgproc/motion.h"
+#include "sim/core/messages.h"
+#include "sim/core/module.h"
+#include "sim/world/camera.h"
+
+typedef struct bst_bad_pixel {
+    int64_t x, y; /* full-sensor coordinates */
+} bst_bad_pixel;
+
+typedef struct bst_imgproc_config {
+    int64_t capacity;              /* detections per frame */
+    int64_t mesh_px;               /* side of a background mesh */
+    double false_alarms_per_frame; /* on noise alone */
+    double jitter_px;              /* RMS per axis by which the PSF is expected to be widened */
+    double streak_min_px, streak_max_px;
+    double search_radius_px, match_tolerance_px;
+    bst_config_list bad_pixels; /* of bst_bad_pixel */
+} bst_imgproc_config;
+
+extern const bst_config_desc bst_imgproc_config_table[];
+
+/* Calibration maps on the full sensor, row-major [height_px][width_px]; any may be NULL: uniform
+ * dark, uniform flat, no bad pixels. They must outlive the bst_imgproc that uses them. */
+typedef struct bst_imgproc_maps {
+    const float *dark_e_per_s; /* dark signal's departure from its mean; taken off */
+    const float *flat;         /* relative response, > 0; divided by */
+    const uint8_t *bad;        /* non-zero: pixel is left out */
+} bst_imgproc_maps;
+
+/* One frame as it was read out. */
+typedef struct bst_imgproc_frame {
+    const uint16_t *pixels; /* [window.height / binning][window.width / binning], DN */
+    bst_window window;      /* full-sensor pixels */
+    int binning;            /* sensor pixels summed per side of a pixel, >= 1 */
+    int bits;
+    double exposure_s;
+} bst_imgproc_frame;
+
+/* Work space for one camera. */
+typedef struct bst_imgproc bst_imgproc;
+
+/* Makes the work space: all memory that bst_imgproc_detect needs. `camera` is copied;
+ * electrons_per_s_v0 is bst_camera_electrons_per_s(camera, 0). BST_ERR_CONFIG for a bad pixel
+ * outside the sensor, BST_ERR_ARGUMENT for a camera out of range, BST_ERR_MEMORY. */
+bst_status bst_imgproc_create(bst_ctx *ctx, const bst_camera *camera, double electrons_per_s_v0,
+                              const bst_imgproc_config *config, const bst_imgproc_maps *maps,
+                              bst_imgproc **out) BST_MUST_CHECK;
+void bst_imgproc_free(bst_imgproc *ip);
+
+/* Finds and measures the sources of one frame.
+ *
+ * Steps: artefact correction; electrons; background and noise by mesh (clipped mean and standard
+ * deviation); two matched filters, for points and for the streak that stars draw when the camera
+ * moves by `motion` (NULL: at rest), both normalised to unit noise; threshold on the greater of the
+ * two; connected components, split at saddles; weighted least-squares fit of the pixel-integrated
+ * Gaussian or streak, close neighbours together. The greater of two matched-filter outputs is the
+ * generalised likelihood ratio test between both shapes (Kay, Fundamentals of Statistical Signal
+ * Processing II, 1998, ch. 7).
+ *
+ * Fills background_e, noise_e, threshold_snr, count, lost and items of *out (room for `capacity`),
+ * sorted by y, then x; label is UNKNOWN or ARTEFACT, star_id 0. When there is no room the brightest
+ * stay. The covariance is the inverse of the Fisher matrix, without background uncertainty; snr is
+ * sqrt(sum s^2 / sigma^2) with the background's noise only; length_px and width_px are the full
+ * widths at half maximum of the Gaussian with the source's second moments. No output is NaN.
+ * BST_ERR_ARGUMENT for a window or binning that does not fit the sensor. */
+bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
+                              const bst_motion *motion, bst_detections *out,
+                              int capacity) BST_MUST_CHECK;
+
+/* V magnitude of the faintest star that the latest frame could show at `snr`, with the shape
+ * (point or streak) that stars had in it. */
+double bst_imgproc_v_limit(const bst_imgproc *ip, double snr);
+/* Length of the star streak that the latest frame was filtered for, px; 0: points only. */
+double bst_imgproc_streak_px(const bst_imgproc *ip);
+
+extern const bst_module_desc bst_imgproc_module;
+
+#endif

@@ -1,0 +1,426 @@
+#include "imgproc/locate.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { BAND = 16, MAX_FIXED = 12 };
+
+static const double WIDTH_FIT_SNR = 20.0; /* from here the widening is measured */
+static const double MOMENTS_SNR = 10.0;   /* below, extents are the model's own */
+static const double CLOSE_SHARE = 0.8; /* filter outputs closer than this: both shapes are tried */
+static const double FWHM_PER_SIGMA = 2.3548200450309493;
+
+bst_status bst_locator_create(bst_ctx *ctx, int capacity, int max_height, int max_side,
+                              bst_locator *out) {
+    *out =
+        (bst_locator){.max_side = max_side, .capacity = capacity, .buckets = max_height / BAND + 1};
+    bst_psf_init(&out->psf);
+    out->found = calloc((size_t)capacity, sizeof *out->found);
+    out->bucket = calloc((size_t)out->buckets, sizeof *out->bucket);
+    if (!out->found || !out->bucket) {
+        bst_locator_free(out);
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d detections", capacity);
+    }
+    bst_status status = bst_fit_create(ctx, &out->psf, max_side, &out->fit);
+    if (status != BST_OK) {
+        bst_locator_free(out);
+    }
+    return status;
+}
+
+void bst_locator_free(bst_locator *l) {
+    free(l->found);
+    free(l->bucket);
+    bst_fit_free(&l->fit);
+    *l = (bst_locator){0};
+}
+
+static void star_path(const bst_locate_frame *f, double x, double y, double *dx, double *dy) {
+    bst_motion_streak(f->motion, f->camera, f->origin_x_px + f->binning * x,
+                      f->origin_y_px + f->binning * y, dx, dy);
+    *dx /= f->binning;
+    *dy /= f->binning;
+}
+
+static double shape_norm(const bst_locate_frame *f, bool streak) {
+    return streak ? f->filter->streak_norm : f->filter->norm;
+}
+
+/* Distance around a path inside which a source's light counts, px. */
+static double reach(const bst_locate_frame *f) {
+    return fmax(3.0, ceil(3.6 * f->sigma_px));
+}
+
+/* Starts a source at its candidate. */
+static void start(const bst_locate_frame *f, const bst_candidate *c, bst_found *out) {
+    *out = (bst_found){.peak_snr = c->snr, .peak_x = c->x, .peak_y = c->y};
+    out->noise_e = bst_background_noise_at(f->background, c->x, c->y);
+    bst_source *s = &out->source;
+    s->shape = (bst_shape){c->x, c->y, 0.0, 0.0, f->sigma_px};
+    out->streak = f->filter->streak && c->snr > bst_filter_point_at(f->filter, c->x, c->y);
+    if (out->streak) {
+        star_path(f, c->x, c->y, &s->shape.dx_px, &s->shape.dy_px);
+    }
+    s->flux_e = (double)c->snr * out->noise_e / shape_norm(f, out->streak);
+}
+
+static void index_rows(bst_locator *l) {
+    for (int i = 0; i < l->buckets; i++) {
+        l->bucket[i] = -1;
+    }
+    for (int i = l->count - 1; i >= 0; i--) {
+        int band = l->found[i].peak_y / BAND;
+        l->found[i].next = l->bucket[band];
+        l->bucket[band] = i;
+    }
+}
+
+typedef struct company {
+    bst_source *free[BST_FIT_MAX_FREE];
+    int free_count;
+    const bst_source *fixed[MAX_FIXED];
+    int fixed_count;
+} company;
+
+/* The sources that share light with number i: those centred on its stamp are free, the brightest
+ * first; those that only reach into it are fixed. */
+static void gather(bst_locator *l, const bst_locate_frame *f, int i, const bst_stamp *stamp,
+                   company *out) {
+    out->free[0] = &l->found[i].source;
+    out->free_count = 1;
+    out->fixed_count = 0;
+    int margin = (int)reach(f) + l->max_side / 2;
+    int lo = (stamp->y0 - margin) / BAND, hi = (stamp->y0 + stamp->height + margin) / BAND;
+    lo = lo > 0 ? lo : 0;
+    hi = hi < l->buckets - 1 ? hi : l->buckets - 1;
+    int near[MAX_FIXED + BST_FIT_MAX_FREE], count = 0;
+    for (int band = lo; band <= hi; band++) {
+        for (int k = l->bucket[band]; k >= 0; k = l->found[k].next) {
+            if (k == i || l->found[k].dropped) {
+                continue;
+            }
+            bst_stamp other =
+                bst_fit_stamp(&l->found[k].source, reach(f), l->max_side, f->width, f->height);
+            if (other.x0 >= stamp->x0 + stamp->width || stamp->x0 >= other.x0 + other.width ||
+                other.y0 >= stamp->y0 + stamp->height || stamp->y0 >= other.y0 + other.height) {
+                continue;
+            }
+            /* keep the brightest, in order of number */
+            int at = count;
+            while (at > 0 && near[at - 1] > k) {
+                at--;
+            }
+            if (count == MAX_FIXED + BST_FIT_MAX_FREE && at == count) {
+                continue;
+            }
+            count += count < MAX_FIXED + BST_FIT_MAX_FREE;
+            for (int m = count - 1; m > at; m--) {
+                near[m] = near[m - 1];
+            }
+            near[at] = k;
+        }
+    }
+    for (int n = 0; n < count; n++) {
+        bst_source *s = &l->found[near[n]].source;
+        /* a centre just outside still has half its light inside */
+        bool inside = s->shape.x_px >= stamp->x0 - 1.5 && s->shape.y_px >= stamp->y0 - 1.5 &&
+                      s->shape.x_px <= stamp->x0 + stamp->width + 0.5 &&
+                      s->shape.y_px <= stamp->y0 + stamp->height + 0.5;
+        if (inside && out->free_count < BST_FIT_MAX_FREE) {
+            out->free[out->free_count++] = s;
+        } else if (out->fixed_count < MAX_FIXED) {
+            out->fixed[out->fixed_count++] = s;
+        }
+    }
+}
+
+/* Fits number i in the shape that its source has. The neighbours' own entries stay as they are:
+ * each gets its values from its own fit. */
+static bool fit_one(bst_locator *l, const bst_locate_frame *f, int i, const bst_stamp *stamp,
+                    bool free_width) {
+    company c;
+    gather(l, f, i, stamp, &c);
+    bst_source copies[BST_FIT_MAX_FREE];
+    bst_source *free_sources[BST_FIT_MAX_FREE];
+    for (int k = 0; k < c.free_count; k++) {
+        copies[k] = *c.free[k];
+        free_sources[k] = &copies[k];
+    }
+    bst_fit_data data = {f->signal, f->width, f->height, l->found[i].noise_e};
+    double path = hypot(copies[0].shape.dx_px, copies[0].shape.dy_px);
+    double limit = 1.5 + f->sigma_px + 0.4 * path;
+    bool ok = bst_fit_run(&l->fit, &data, stamp, free_sources, c.free_count, c.fixed, c.fixed_count,
+                          free_width && c.free_count == 1, limit);
+    if (ok) {
+        l->found[i].source = copies[0];
+    }
+    if (c.free_count > 1) {
+        l->found[i].flags |= BST_DETECTION_BLEND;
+    }
+    return ok;
+}
+
+static bst_source as_shape(const bst_locate_frame *f, const bst_found *found, bool streak) {
+    bst_source s = found->source;
+    s.shape.x_px = found->peak_x;
+    s.shape.y_px = found->peak_y;
+    s.shape.dx_px = s.shape.dy_px = 0.0;
+    if (streak) {
+        star_path(f, s.shape.x_px, s.shape.y_px, &s.shape.dx_px, &s.shape.dy_px);
+    }
+    s.flux_e = (double)found->peak_snr * found->noise_e / shape_norm(f, streak);
+    return s;
+}
+
+static bst_stamp stamp_of(const bst_locator *l, const bst_locate_frame *f, const bst_source *s) {
+    return bst_fit_stamp(s, reach(f), l->max_side, f->width, f->height);
+}
+
+/* Whether the filters leave the shape open. */
+static bool shape_is_open(const bst_locate_frame *f, const bst_found *found) {
+    if (!f->filter->streak) {
+        return false;
+    }
+    float best = found->peak_snr, other = 0.0f;
+    if (found->streak) {
+        for (int dy = -2; dy <= 2; dy++) {
+            for (int dx = -2; dx <= 2; dx++) {
+                int x = found->peak_x + dx, y = found->peak_y + dy;
+                if (x >= 0 && y >= 0 && x < f->width && y < f->height) {
+                    other = fmaxf(other, bst_filter_point_at(f->filter, x, y));
+                }
+            }
+        }
+    } else {
+        other = bst_filter_streak_at(f->filter, found->peak_x, found->peak_y);
+    }
+    return (double)other > CLOSE_SHARE * (double)best;
+}
+
+/* First fit: shape and place. */
+static void locate_one(bst_locator *l, const bst_locate_frame *f, int i) {
+    bst_found *found = &l->found[i];
+    double widening = l->widening_weight > 0.0 ? l->widening_sum / l->widening_weight : 0.0;
+    found->source.widening_px2 = widening;
+    if (shape_is_open(f, found)) {
+        bst_source point = as_shape(f, found, false), streak = as_shape(f, found, true);
+        bst_stamp stamp = stamp_of(l, f, &streak);
+        found->source = streak;
+        bool streak_ok = fit_one(l, f, i, &stamp, false);
+        streak = found->source;
+        found->source = point;
+        bool point_ok = fit_one(l, f, i, &stamp, false);
+        found->streak = streak_ok && (!point_ok || streak.chi_square < found->source.chi_square);
+        found->source = found->streak ? streak : found->source;
+    }
+    bst_stamp stamp = stamp_of(l, f, &found->source);
+    bool bright = (double)found->peak_snr > WIDTH_FIT_SNR;
+    found->source.fitted = fit_one(l, f, i, &stamp, bright);
+    bool measured = found->source.fitted && found->source.widening_variance > 0.0;
+    double variance = f->sigma_px * f->sigma_px;
+    if (measured && fabs(found->source.widening_px2) < 0.5 * variance) {
+        /* no single source counts for more than one that is good to 3 % */
+        double floor = 0.03 * variance;
+        double weight = 1.0 / (found->source.widening_variance + floor * floor);
+        l->widening_sum += weight * found->source.widening_px2;
+        l->widening_weight += weight;
+    }
+}
+
+/* Principal axes of the measured or modelled second moments. */
+static bool measure_extent(bst_locator *l, const bst_locate_frame *f, int i, double wider) {
+    bst_found *found = &l->found[i];
+    const bst_shape *s = &found->source.shape;
+    double base = s->sigma_px * s->sigma_px + fmax(found->source.widening_px2, 0.0);
+    double m[3] = {base + s->dx_px * s->dx_px / 12.0, s->dx_px * s->dy_px / 12.0,
+                   base + s->dy_px * s->dy_px / 12.0};
+    bool measured = false;
+    if (found->snr >= MOMENTS_SNR && !(found->flags & BST_DETECTION_EDGE)) {
+        bst_stamp stamp =
+            bst_fit_stamp(&found->source, reach(f) + wider, l->max_side, f->width, f->height);
+        company c;
+        gather(l, f, i, &stamp, &c);
+        const bst_source *others[BST_FIT_MAX_FREE + MAX_FIXED];
+        int count = 0;
+        for (int k = 1; k < c.free_count; k++) {
+            others[count++] = c.free[k];
+        }
+        for (int k = 0; k < c.fixed_count; k++) {
+            others[count++] = c.fixed[k];
+        }
+        bst_fit_data data = {f->signal, f->width, f->height, found->noise_e};
+        double d[3];
+        if (bst_fit_moments(&l->fit, &data, &stamp, &found->source, others, count, d)) {
+            /* the pixel's own variance off */
+            d[0] = fmax(d[0] - 1.0 / 12.0, 0.01);
+            d[2] = fmax(d[2] - 1.0 / 12.0, 0.01);
+            if (d[0] * d[2] > d[1] * d[1]) {
+                m[0] = d[0];
+                m[1] = d[1];
+                m[2] = d[2];
+                measured = true;
+            }
+        }
+    }
+    double mean = 0.5 * (m[0] + m[2]), half = hypot(0.5 * (m[0] - m[2]), m[1]);
+    double limit = 0.5 * l->max_side;
+    found->length_px = fmin(FWHM_PER_SIGMA * sqrt(mean + half), limit);
+    found->width_px = fmin(FWHM_PER_SIGMA * sqrt(fmax(mean - half, 0.0)), limit);
+    found->angle_rad = half > 1e-9 * mean ? 0.5 * atan2(2.0 * m[1], m[0] - m[2]) : 0.0;
+    return measured;
+}
+
+/* Fits number i with its path set to `path` px along `angle`; chi-square, or infinity. */
+static double try_path(bst_locator *l, const bst_locate_frame *f, int i, const bst_stamp *stamp,
+                       const bst_source *start_from, double path, double angle) {
+    bst_found *found = &l->found[i];
+    found->source = *start_from;
+    found->source.shape.dx_px = path * cos(angle);
+    found->source.shape.dy_px = path * sin(angle);
+    return fit_one(l, f, i, stamp, false) ? found->source.chi_square : INFINITY;
+}
+
+/* A point that is longer than the PSF: fits it as a streak along the axis of its moments, as long
+ * as that lowers chi-square on the same pixels. Moments give the length roughly, the parabola
+ * through three values of chi-square gives it well. */
+static void fit_own_streak(bst_locator *l, const bst_locate_frame *f, int i) {
+    bst_found *found = &l->found[i];
+    double psf_fwhm = FWHM_PER_SIGMA * f->sigma_px;
+    for (int round = 0; round < 4; round++) {
+        if (!measure_extent(l, f, i, 2.0 * reach(f)) || found->length_px < 1.5 * psf_fwhm) {
+            return;
+        }
+        double spread = (found->length_px * found->length_px - psf_fwhm * psf_fwhm) /
+                        (FWHM_PER_SIGMA * FWHM_PER_SIGMA);
+        double path = fmin(sqrt(12.0 * spread), 0.4 * l->max_side), angle = found->angle_rad;
+        bst_found before = *found;
+        bst_source longest = before.source;
+        longest.shape.dx_px = 1.2 * path * cos(angle);
+        longest.shape.dy_px = 1.2 * path * sin(angle);
+        bst_stamp stamp = stamp_of(l, f, &longest);
+        double old_path = hypot(before.source.shape.dx_px, before.source.shape.dy_px);
+        double old_angle = atan2(before.source.shape.dy_px, before.source.shape.dx_px);
+        double old_chi = try_path(l, f, i, &stamp, &before.source, old_path, old_angle);
+        double low = try_path(l, f, i, &stamp, &before.source, 0.8 * path, angle);
+        double high = try_path(l, f, i, &stamp, &before.source, 1.2 * path, angle);
+        double chi = try_path(l, f, i, &stamp, &before.source, path, angle);
+        double bend = low + high - 2.0 * chi, step = 0.0;
+        if (isfinite(bend)) {
+            step = bend > 0.0 ? 0.1 * (low - high) / bend : low < high ? -0.2 : 0.2;
+            step = fmax(-0.2, fmin(step, 0.2));
+            chi = try_path(l, f, i, &stamp, &before.source, path * (1.0 + step), angle);
+        }
+        if (!(chi < old_chi - 9.0)) {
+            *found = before;
+            return;
+        }
+        found->streak = true;
+        found->snr = found->source.flux_e * bst_fit_norm(&l->fit, &stamp) / found->noise_e;
+    }
+}
+
+/* Flags and plausibility. */
+static void judge(const bst_locate_frame *f, bst_found *found) {
+    const bst_source *s = &found->source;
+    double half_x = 0.5 * fabs(s->shape.dx_px) + 2.0 * f->sigma_px;
+    double half_y = 0.5 * fabs(s->shape.dy_px) + 2.0 * f->sigma_px;
+    double x = s->shape.x_px, y = s->shape.y_px;
+    if (x - half_x < -0.5 || y - half_y < -0.5 || x + half_x > f->width - 0.5 ||
+        y + half_y > f->height - 0.5) {
+        found->flags |= BST_DETECTION_EDGE;
+    }
+    int x0 = (int)fmax(x - half_x - 1.0, 0.0), x1 = (int)fmin(x + half_x + 1.0, f->width - 1.0);
+    int y0 = (int)fmax(y - half_y - 1.0, 0.0), y1 = (int)fmin(y + half_y + 1.0, f->height - 1.0);
+    for (int j = y0; j <= y1; j++) {
+        for (int i = x0; i <= x1; i++) {
+            if (f->signal[(size_t)j * (size_t)f->width + (size_t)i] == BST_PIXEL_SATURATED) {
+                found->flags |= BST_DETECTION_SATURATED;
+            }
+        }
+    }
+    float hottest = 0.0f;
+    for (int j = found->peak_y - 1; j <= found->peak_y + 1; j++) {
+        for (int i = found->peak_x - 1; i <= found->peak_x + 1; i++) {
+            if (i >= 0 && j >= 0 && i < f->width && j < f->height) {
+                hottest = fmaxf(hottest, f->signal[(size_t)j * (size_t)f->width + (size_t)i]);
+            }
+        }
+    }
+    /* one pixel alone explains the light better than the PSF does: it has the greater SNR */
+    bool hot = !(found->flags & BST_DETECTION_SATURATED) &&
+               (double)hottest / found->noise_e > 1.1 * (double)found->peak_snr + 2.5;
+    bool outside = x < -0.5 || y < -0.5 || x > f->width - 0.5 || y > f->height - 0.5;
+    found->artefact = hot || outside || !s->fitted;
+}
+
+/* A candidate whose fit failed keeps its maximum's place. */
+static void use_maximum(const bst_locate_frame *f, bst_found *found) {
+    found->source = as_shape(f, found, found->streak);
+    found->source.cov_xx = found->source.cov_yy = 1.0;
+    found->source.cov_xy = 0.0;
+    double sigma = found->noise_e / shape_norm(f, found->streak);
+    found->source.flux_variance = sigma * sigma + found->source.flux_e;
+}
+
+static void drop_doubles(bst_locator *l, const bst_locate_frame *f) {
+    double radius = 0.6 * FWHM_PER_SIGMA * f->sigma_px;
+    for (int i = 0; i < l->count; i++) {
+        const bst_shape *a = &l->found[i].source.shape;
+        int band = l->found[i].peak_y / BAND;
+        for (int b = band > 0 ? band - 1 : 0; b <= band + 1 && b < l->buckets; b++) {
+            for (int k = l->bucket[b]; k >= 0; k = l->found[k].next) {
+                const bst_shape *c = &l->found[k].source.shape;
+                /* numbers are by brightness: the fainter goes */
+                if (k < i && !l->found[k].dropped &&
+                    hypot(a->x_px - c->x_px, a->y_px - c->y_px) < radius) {
+                    l->found[i].dropped = true;
+                }
+            }
+        }
+    }
+}
+
+void bst_locate(bst_locator *l, const bst_locate_frame *f, const bst_candidates *candidates) {
+    l->count = candidates->count < l->capacity ? candidates->count : l->capacity;
+    for (int i = 0; i < l->count; i++) {
+        start(f, &candidates->items[candidates->order[i]], &l->found[i]);
+    }
+    index_rows(l);
+    double variance = f->sigma_px * f->sigma_px;
+    l->widening_sum = 0.0;
+    l->widening_weight = 1.0 / (0.0025 * variance * variance); /* no widening, to 5 % */
+    for (int i = 0; i < l->count; i++) {
+        locate_one(l, f, i);
+    }
+    drop_doubles(l, f);
+    /* blends again, now that every neighbour has its place */
+    for (int i = 0; i < l->count; i++) {
+        bst_found *found = &l->found[i];
+        if (!found->dropped && (found->flags & BST_DETECTION_BLEND) && found->source.fitted) {
+            found->flags &= ~(unsigned)BST_DETECTION_BLEND;
+            bst_stamp stamp = stamp_of(l, f, &found->source);
+            found->source.fitted = fit_one(l, f, i, &stamp, false);
+        }
+    }
+    for (int i = 0; i < l->count; i++) {
+        bst_found *found = &l->found[i];
+        if (found->dropped) {
+            continue;
+        }
+        if (!found->source.fitted) {
+            use_maximum(f, found);
+        }
+        found->snr = found->source.flux_e * shape_norm(f, found->streak) / found->noise_e;
+        judge(f, found);
+        bool alone = !(found->flags & (BST_DETECTION_BLEND | BST_DETECTION_EDGE));
+        if (alone && !found->streak && !found->artefact && found->snr >= MOMENTS_SNR) {
+            fit_own_streak(l, f, i);
+        }
+        measure_extent(l, f, i, 0.0);
+        if (found->streak ||
+            (found->snr >= MOMENTS_SNR && found->length_px > 1.5 * fmax(found->width_px, 1.0) &&
+             found->length_px > 1.5 * FWHM_PER_SIGMA * f->sigma_px)) {
+            found->flags |= BST_DETECTION_STREAK;
+        }
+    }
+}

@@ -1,0 +1,225 @@
+#include <stdlib.h>
+
+#include "imgproc/imgproc.h"
+#include "imgproc/sky.h"
+#include "sim/world/knowledge.h"
+
+static const bst_config_desc bad_pixel_table[] = {
+    BST_INT(bst_bad_pixel, x, "px", 0, 32767, NULL, "Column, 0 the first."),
+    BST_INT(bst_bad_pixel, y, "px", 0, 32767, NULL, "Row, 0 the first."),
+    BST_CONFIG_END,
+};
+
+const bst_config_desc bst_imgproc_config_table[] = {
+    BST_INT(bst_imgproc_config, capacity, "", 1, 65536, "2048",
+            "Detections kept per frame, the brightest first."),
+    BST_INT(bst_imgproc_config, mesh_px, "px", 8, 1024, "64",
+            "Side of the meshes in which background and noise are estimated."),
+    BST_REAL(bst_imgproc_config, false_alarms_per_frame, "", 1e-6, 1e4, "1",
+             "Detections per frame that noise alone may cause, on average."),
+    BST_REAL(bst_imgproc_config, jitter_px, "px", 0, 5, "0",
+             "RMS per axis of the line-of-sight jitter that widens the onboard PSF."),
+    BST_REAL(bst_imgproc_config, streak_min_px, "px", 0.5, 100, "1.5",
+             "Star streaks shorter than this are taken for points."),
+    BST_REAL(bst_imgproc_config, streak_max_px, "px", 1, 128, "64",
+             "Star streaks longer than this are not filtered for."),
+    BST_REAL(bst_imgproc_config, search_radius_px, "px", 2, 500, "60",
+             "Greatest pointing error over which stars are identified."),
+    BST_REAL(bst_imgproc_config, match_tolerance_px, "px", 0.5, 20, "3",
+             "Greatest distance of one star from its place after the common shift."),
+    BST_LIST(bst_imgproc_config, bad_pixels, bst_bad_pixel, bad_pixel_table, 0, 1000000, "[]",
+             "Sensor pixels to leave out."),
+    BST_CONFIG_END,
+};
+
+enum { PORT_FRAME, PORT_PREDICTIONS, PORT_POINTING, PORT_NAV, PORT_DETECTIONS, PORT_COUNT };
+
+static const bst_port ports[PORT_COUNT] = {
+    {BST_CHANNEL_FRAME, BST_PORT_IN, BST_PORT_TRIGGER, 0.0, 0},
+    {BST_CHANNEL_PREDICTIONS, BST_PORT_IN, BST_PORT_OPTIONAL | BST_PORT_FEEDBACK, 30.0, 0},
+    {BST_CHANNEL_POINTING_TELEMETRY, BST_PORT_IN, 0, 0.0, 0},
+    {BST_CHANNEL_NAV_TELEMETRY, BST_PORT_IN, 0, 0.0, 0},
+    {BST_CHANNEL_DETECTIONS, BST_PORT_OUT, 0, 0.0, 2048},
+};
+
+enum { CATALOGUE_CAPACITY = 16384 };
+
+/* Stars this much fainter than the limit of detection may still show, brightened by noise. */
+static const double SNR_SHARE_EXPECTED = 0.7;
+/* Once the tracker knows the pointing error, stars are looked for this close first. */
+static const double LOCKED_RADIUS_PX = 10.0;
+
+typedef struct imgproc_module {
+    const bst_imgproc_config *config;
+    bst_camera camera;
+    int64_t tick_rate_hz;
+    bst_imgproc *ip;
+    bst_starid *starid;
+    bst_sky sky;
+} imgproc_module;
+
+static void destroy(void *self) {
+    imgproc_module *m = self;
+    if (!m) {
+        return;
+    }
+    bst_imgproc_free(m->ip);
+    bst_starid_free(m->starid);
+    bst_sky_free(&m->sky);
+    free(m);
+}
+
+static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
+    m->camera = *bst_knowledge_camera(env->knowledge);
+    m->tick_rate_hz = env->tick_rate_hz;
+    BST_TRY(bst_imgproc_create(env->ctx, &m->camera, bst_camera_electrons_per_s(&m->camera, 0.0),
+                               m->config, NULL, &m->ip));
+    BST_TRY(bst_sky_create(env->ctx, &m->camera, bst_knowledge_stars(env->knowledge),
+                           bst_knowledge_julian_year(env->knowledge), CATALOGUE_CAPACITY, &m->sky));
+    BST_TRY(bst_starid_create(env->ctx, CATALOGUE_CAPACITY, (int)m->config->capacity,
+                              m->config->search_radius_px, &m->starid));
+    bst_env_set_capacity(env, PORT_DETECTIONS, (int)m->config->capacity);
+    return BST_OK;
+}
+
+static bst_status create(const bst_module_env *env, const void *config, void **self) {
+    imgproc_module *m = calloc(1, sizeof *m);
+    *self = NULL;
+    if (!m) {
+        return bst_fail(env->ctx, BST_ERR_MEMORY, "no memory for image processing");
+    }
+    m->config = config;
+    bst_status status = prepare(env, m);
+    if (status != BST_OK) {
+        destroy(m);
+        return status;
+    }
+    *self = m;
+    return BST_OK;
+}
+
+/* The tracker's estimate of the telemetry's error, carried to the middle of the exposure. */
+static bst_quat correction(const imgproc_module *m, const bst_predictions *predictions,
+                           double mid_tick) {
+    double dt = (mid_tick - (double)predictions->tick) / (double)m->tick_rate_hz;
+    return bst_quat_from_rotvec(bst_vec3_axpy(predictions->attitude_error_cam_rad, dt,
+                                              predictions->attitude_error_rate_cam_radps));
+}
+
+/* Labels stars; what is no star is an object, unless it moved as stars do. */
+static void label(bst_detections *out, bool found_field, double streak_px) {
+    for (int i = 0; i < out->count; i++) {
+        bst_detection *d = &out->items[i];
+        if (d->label != BST_LABEL_UNKNOWN) {
+            continue;
+        }
+        bool moved_as_stars = streak_px >= 3.0 && (d->flags & BST_DETECTION_STREAK);
+        if (d->flags & BST_DETECTION_EDGE) {
+            d->label = BST_LABEL_ARTEFACT;
+        } else if (!moved_as_stars && (found_field || streak_px >= 3.0)) {
+            d->label = BST_LABEL_OBJECT;
+        }
+    }
+}
+
+static bst_status identify(imgproc_module *m, bst_ctx *ctx, const bst_nav_telemetry *nav,
+                           bst_window window, bool locked, bst_detections *out) {
+    bst_light light = {nav->velocity_bary_mps, nav->sun_m};
+    double v_limit = bst_imgproc_v_limit(m->ip, SNR_SHARE_EXPECTED * out->threshold_snr);
+    int expected = 0;
+    BST_TRY(bst_sky_expect(ctx, &m->sky, out->q_cam_from_gcrf, &light, window,
+                           m->config->search_radius_px, v_limit, &expected));
+    bst_starid_options options = {m->config->search_radius_px,
+                                  m->config->match_tolerance_px,
+                                  bst_camera_centre_x(&m->camera),
+                                  bst_camera_centre_y(&m->camera),
+                                  window.width,
+                                  window.height};
+    bst_starid_result result = {0};
+    if (locked && LOCKED_RADIUS_PX < options.search_radius_px) {
+        options.search_radius_px = LOCKED_RADIUS_PX;
+        bst_starid_match(m->starid, &options, m->sky.expected, expected, out->items, out->count,
+                         &result);
+        options.search_radius_px = m->config->search_radius_px;
+    }
+    if (result.matched == 0) {
+        bst_starid_match(m->starid, &options, m->sky.expected, expected, out->items, out->count,
+                         &result);
+    }
+    out->stars_identified = result.matched;
+    return BST_OK;
+}
+
+static bst_status process(imgproc_module *m, struct bst_step *step,
+                          const bst_frame_message *message, const uint16_t *pixels) {
+    bst_ctx *ctx = bst_step_ctx(step);
+    bst_sample pointing = bst_step_latest(step, PORT_POINTING);
+    bst_sample nav = bst_step_latest(step, PORT_NAV);
+    bst_sample predicted = bst_step_latest(step, PORT_PREDICTIONS);
+    int capacity = 0;
+    bst_detections *out = bst_step_write(step, PORT_DETECTIONS, &capacity);
+    out->exposure_id = message->exposure_id;
+    out->start_tick = message->start_tick;
+    out->end_tick = message->end_tick;
+
+    bst_motion motion = {BST_QUAT_IDENTITY, {0, 0, 0}};
+    bool oriented =
+        pointing.payload && bst_motion_from_telemetry(pointing.payload, message->start_tick,
+                                                      message->end_tick, &motion);
+    out->q_telemetry_from_gcrf = motion.q_cam_from_gcrf;
+    const bst_predictions *predictions = predicted.stale ? NULL : predicted.payload;
+    bool locked = oriented && predictions && predictions->attitude_valid;
+    if (locked) {
+        double middle = 0.5 * ((double)message->start_tick + (double)message->end_tick);
+        motion.q_cam_from_gcrf =
+            bst_quat_unit(bst_quat_mul(correction(m, predictions, middle), motion.q_cam_from_gcrf));
+    }
+    out->q_cam_from_gcrf = motion.q_cam_from_gcrf;
+
+    bst_imgproc_frame frame = {
+        .pixels = pixels,
+        .window = message->window,
+        .binning = message->binning,
+        .bits = message->bits,
+        .exposure_s = (double)(message->end_tick - message->start_tick) / (double)m->tick_rate_hz};
+    BST_TRY(bst_imgproc_detect(ctx, m->ip, &frame, oriented ? &motion : NULL, out, capacity));
+    if (oriented && nav.payload) {
+        BST_TRY(identify(m, ctx, nav.payload, message->window, locked, out));
+    }
+    label(out, out->stars_identified > 0, bst_imgproc_streak_px(m->ip));
+    if (out->stars_identified == 0) {
+        bst_step_count(step, "frame_without_stars");
+    }
+    if (out->lost > 0) {
+        bst_step_count(step, "detections_overflow");
+    }
+    return BST_OK;
+}
+
+static bst_status step_module(void *self, struct bst_step *step) {
+    imgproc_module *m = self;
+    bst_sample sample = bst_step_next(step, PORT_FRAME);
+    if (!sample.payload) {
+        return BST_OK;
+    }
+    const bst_frame_message *message = sample.payload;
+    const uint16_t *pixels;
+    BST_TRY(bst_frame_map(message->frame, bst_step_ctx(step), &pixels));
+    bst_status status = process(m, step, message, pixels);
+    bst_frame_unmap(message->frame);
+    return status;
+}
+
+const bst_module_desc bst_imgproc_module = {
+    .abi = BST_MODULE_ABI,
+    .role = "imgproc",
+    .type = "standard",
+    .doc = "Calibrates frames, detects and locates sources with matched filters, identifies stars.",
+    .config = bst_imgproc_config_table,
+    .config_bytes = sizeof(bst_imgproc_config),
+    .ports = ports,
+    .port_count = PORT_COUNT,
+    .create = create,
+    .step = step_module,
+    .destroy = destroy,
+};

@@ -1,0 +1,93 @@
+#include "imgproc/motion.h"
+
+static const bst_pointing_sample *sample_at(const bst_pointing_telemetry *t, int64_t n) {
+    return &t->items[n % t->capacity];
+}
+
+/* Sums of a piecewise linear rotation vector r(t), t from the exposure's middle. */
+typedef struct moments {
+    bst_vec3 zeroth, first; /* integrals of r and t r */
+} moments;
+
+static void add_segment(moments *m, double t0, double t1, bst_vec3 r0, bst_vec3 r1) {
+    double h = t1 - t0;
+    bst_vec3 mean = bst_vec3_scale(bst_vec3_add(r0, r1), 0.5);
+    bst_vec3 difference = bst_vec3_sub(r1, r0);
+    m->zeroth = bst_vec3_axpy(m->zeroth, h, mean);
+    /* integral of t r over a linear piece: midpoint term plus h^2 (r1 - r0) / 12 */
+    m->first = bst_vec3_axpy(m->first, 0.5 * h * (t0 + t1), mean);
+    m->first = bst_vec3_axpy(m->first, h * h / 12.0, difference);
+}
+
+static bst_vec3 lerp(bst_vec3 a, bst_vec3 b, double s) {
+    return bst_vec3_axpy(a, s, bst_vec3_sub(b, a));
+}
+
+bool bst_motion_from_telemetry(const bst_pointing_telemetry *telemetry, int64_t start_tick,
+                               int64_t end_tick, bst_motion *out) {
+    if (telemetry->written <= 0 || telemetry->capacity <= 0) {
+        return false;
+    }
+    int64_t newest = telemetry->written - 1;
+    int64_t oldest =
+        telemetry->written > telemetry->capacity ? telemetry->written - telemetry->capacity : 0;
+    /* first: the last sample not after the exposure's start, or the ring's first */
+    int64_t first = newest;
+    while (first > oldest && sample_at(telemetry, first)->tick > start_tick) {
+        first--;
+    }
+    bst_quat reference = sample_at(telemetry, first)->q_cam_from_gcrf;
+    bst_quat inverse = bst_quat_conj(reference);
+    if (first == newest && first > oldest) {
+        first--;
+    }
+    double middle = 0.5 * ((double)(end_tick - start_tick));
+    double half = middle > 0.0 ? middle : 0.0;
+    moments m = {{0, 0, 0}, {0, 0, 0}};
+    bst_vec3 at_middle = {0, 0, 0};
+    for (int64_t n = first; n < newest; n++) {
+        const bst_pointing_sample *a = sample_at(telemetry, n), *b = sample_at(telemetry, n + 1);
+        double ta = (double)(a->tick - start_tick) - middle;
+        double tb = (double)(b->tick - start_tick) - middle;
+        if (!(tb > ta)) {
+            continue;
+        }
+        bst_vec3 ra = bst_quat_to_rotvec(bst_quat_mul(a->q_cam_from_gcrf, inverse));
+        bst_vec3 rb = bst_quat_to_rotvec(bst_quat_mul(b->q_cam_from_gcrf, inverse));
+        double lo = n == first || ta < -half ? -half : ta;
+        double hi = n + 1 == newest || tb > half ? half : tb;
+        if ((n == first || ta <= 0.0) && (n + 1 == newest || tb >= 0.0)) {
+            at_middle = lerp(ra, rb, (0.0 - ta) / (tb - ta));
+        }
+        if (hi > lo) {
+            add_segment(&m, lo, hi, lerp(ra, rb, (lo - ta) / (tb - ta)),
+                        lerp(ra, rb, (hi - ta) / (tb - ta)));
+        }
+        if (tb >= half) {
+            break;
+        }
+    }
+    bst_vec3 mean = at_middle, turn = {0, 0, 0};
+    if (half > 0.0) {
+        double span = 2.0 * half;
+        mean = bst_vec3_scale(m.zeroth, 1.0 / span);
+        /* slope = 12 / T^3 integral of t r; the turn is slope times T */
+        turn = bst_vec3_scale(m.first, 12.0 / (span * span));
+    }
+    out->q_cam_from_gcrf = bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(mean), reference));
+    out->turn_cam_rad = turn;
+    return true;
+}
+
+void bst_motion_streak(const bst_motion *motion, const bst_camera *camera, double x_px, double y_px,
+                       double *dx_px, double *dy_px) {
+    bst_vec3 v = bst_camera_unproject(camera, x_px, y_px);
+    bst_quat half = bst_quat_from_rotvec(bst_vec3_scale(motion->turn_cam_rad, 0.5));
+    double x0, y0, x1, y1;
+    *dx_px = *dy_px = 0.0;
+    if (bst_camera_project(camera, bst_quat_rotate(bst_quat_conj(half), v), &x0, &y0) &&
+        bst_camera_project(camera, bst_quat_rotate(half, v), &x1, &y1)) {
+        *dx_px = x1 - x0;
+        *dy_px = y1 - y0;
+    }
+}

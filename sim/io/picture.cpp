@@ -1,0 +1,260 @@
+#include "sim/io/picture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <new>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <string>
+#include <vector>
+
+#include "sim/io/manifest.h"
+
+/* Everything is drawn at twice the size and reduced when saved: smoother strokes and letters. */
+static constexpr int kOver = 2;
+static constexpr int kShift = 4; /* fractional bits of OpenCV's coordinates */
+
+struct bst_picture {
+    cv::Mat image; /* BGR, kOver times as large as the picture */
+    cv::Rect clip;
+};
+
+namespace {
+
+cv::Scalar scalar(bst_colour c) {
+    return cv::Scalar(c.b, c.g, c.r);
+}
+
+/* Centre of picture pixel v in the enlarged image, fixed point. */
+int fixed(double v) {
+    double over = (v + 0.5) * kOver - 0.5;
+    return static_cast<int>(std::lround(std::clamp(over, -1e6, 1e6) * (1 << kShift)));
+}
+
+int stroke(double thickness) {
+    return std::max(1, static_cast<int>(std::lround(std::min(thickness, 1000.0) * kOver)));
+}
+
+cv::Rect enlarged(bst_box box) {
+    return cv::Rect(box.x * kOver, box.y * kOver, box.width * kOver, box.height * kOver);
+}
+
+/* Runs body(view, origin) on the clipped part of the image. Drawing cannot fail in a way that a
+ * caller could mend; an exception leaves the shape out. */
+template <typename Body>
+void draw(bst_picture *picture, Body body) noexcept {
+    try {
+        cv::Rect clip = picture->clip & cv::Rect(0, 0, picture->image.cols, picture->image.rows);
+        if (clip.area() > 0) {
+            cv::Mat view = picture->image(clip);
+            body(view, cv::Point(clip.x << kShift, clip.y << kShift));
+        }
+    } catch (...) {
+    }
+}
+
+constexpr int kFont = cv::FONT_HERSHEY_DUPLEX;
+constexpr double kCapital = 21.0; /* height of a capital letter of the Hershey fonts at scale 1 */
+
+double font_scale(double height) {
+    return height * kOver / kCapital;
+}
+
+int font_stroke(double height, bool bold) {
+    double width = height * kOver / kCapital * (bold ? 2.4 : 1.3);
+    return std::max(1, static_cast<int>(std::lround(width)));
+}
+
+std::string ascii(const char *text) {
+    std::string s(text ? text : "");
+    for (char &c : s) {
+        c = c >= ' ' && c <= '~' ? c : '?';
+    }
+    return s;
+}
+
+cv::Mat to_grey(const cv::Mat &frame, bst_stretch s) {
+    cv::Mat table(1, 65536, CV_8U);
+    double top = std::asinh((s.white - s.black) / s.softening);
+    for (int i = 0; i < 65536; i++) {
+        double v = std::asinh((i - s.black) / s.softening) / top;
+        table.at<uchar>(i) = static_cast<uchar>(std::lround(255.0 * std::clamp(v, 0.0, 1.0)));
+    }
+    cv::Mat grey(frame.size(), CV_8U);
+    for (int y = 0; y < frame.rows; y++) {
+        const uint16_t *in = frame.ptr<uint16_t>(y);
+        uchar *out = grey.ptr<uchar>(y);
+        for (int x = 0; x < frame.cols; x++) {
+            out[x] = table.ptr<uchar>(0)[in[x]];
+        }
+    }
+    return grey;
+}
+
+}  // namespace
+
+extern "C" bst_status bst_picture_create(bst_ctx *ctx, int width, int height, bst_colour background,
+                                         bst_picture **out) noexcept {
+    *out = nullptr;
+    if (width < 1 || height < 1 || width > 16384 || height > 16384) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "a picture of %d x %d pixels", width, height);
+    }
+    try {
+        bst_picture *picture = new bst_picture;
+        try {
+            picture->image.create(height * kOver, width * kOver, CV_8UC3);
+            picture->image.setTo(scalar(background));
+            picture->clip = cv::Rect(0, 0, width * kOver, height * kOver);
+        } catch (...) {
+            delete picture;
+            throw;
+        }
+        *out = picture;
+        return BST_OK;
+    } catch (...) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a picture of %d x %d pixels", width,
+                        height);
+    }
+}
+
+extern "C" void bst_picture_free(bst_picture *picture) noexcept {
+    delete picture;
+}
+
+extern "C" bst_stretch bst_stretch_of(const uint16_t *pixels, int width, int height) noexcept {
+    size_t count = static_cast<size_t>(width) * static_cast<size_t>(height);
+    uint32_t histogram[65536] = {0};
+    for (size_t i = 0; i < count; i++) {
+        histogram[pixels[i]]++;
+    }
+    size_t seen = 0;
+    int quarter = -1, median = 65535;
+    for (int v = 0; v < 65536; v++) {
+        seen += histogram[v];
+        if (quarter < 0 && 4 * seen >= count) {
+            quarter = v;
+        }
+        if (2 * seen >= count) {
+            median = v;
+            break;
+        }
+    }
+    double sigma = std::max(1.0, 1.4826 * (median - quarter));
+    return bst_stretch{median - 0.7 * sigma, median + 60.0 * sigma, 3.0 * sigma};
+}
+
+extern "C" bst_status bst_picture_frame(bst_ctx *ctx, bst_picture *picture, bst_box to,
+                                        const uint16_t *pixels, int width, int height, int x0,
+                                        int y0, int columns, int rows,
+                                        bst_stretch stretch) noexcept {
+    if (columns < 1 || rows < 1 || to.width < 1 || to.height < 1 ||
+        !(stretch.white > stretch.black) || !(stretch.softening > 0.0)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "an empty part of a frame, box or stretch");
+    }
+    try {
+        cv::Rect target = enlarged(to);
+        if ((target & cv::Rect(0, 0, picture->image.cols, picture->image.rows)) != target) {
+            return bst_fail(ctx, BST_ERR_ARGUMENT, "the frame's box leaves the picture");
+        }
+        cv::Mat frame(height, width, CV_16U, const_cast<uint16_t *>(pixels));
+        cv::Mat part = cv::Mat::zeros(rows, columns, CV_8U);
+        cv::Rect source = cv::Rect(x0, y0, columns, rows) & cv::Rect(0, 0, width, height);
+        if (source.area() > 0) {
+            to_grey(frame(source), stretch)
+                .copyTo(part(cv::Rect(source.x - x0, source.y - y0, source.width, source.height)));
+        }
+        cv::Mat scaled, colour;
+        bool smaller = target.width < columns;
+        cv::resize(part, scaled, target.size(), 0, 0, smaller ? cv::INTER_AREA : cv::INTER_NEAREST);
+        cv::cvtColor(scaled, colour, cv::COLOR_GRAY2BGR);
+        colour.copyTo(picture->image(target));
+        return BST_OK;
+    } catch (const std::exception &e) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "cannot paint a frame: %s", e.what());
+    } catch (...) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "cannot paint a frame");
+    }
+}
+
+extern "C" void bst_picture_clip(bst_picture *picture, bst_box box) noexcept {
+    picture->clip = enlarged(box);
+}
+
+extern "C" void bst_picture_unclip(bst_picture *picture) noexcept {
+    picture->clip = cv::Rect(0, 0, picture->image.cols, picture->image.rows);
+}
+
+extern "C" void bst_picture_line(bst_picture *picture, double x0, double y0, double x1, double y1,
+                                 bst_colour colour, double thickness) noexcept {
+    draw(picture, [&](cv::Mat &view, cv::Point origin) {
+        cv::line(view, cv::Point(fixed(x0), fixed(y0)) - origin,
+                 cv::Point(fixed(x1), fixed(y1)) - origin, scalar(colour), stroke(thickness),
+                 cv::LINE_AA, kShift);
+    });
+}
+
+extern "C" void bst_picture_circle(bst_picture *picture, double x, double y, double radius,
+                                   bst_colour colour, double thickness) noexcept {
+    draw(picture, [&](cv::Mat &view, cv::Point origin) {
+        int r = static_cast<int>(std::lround(std::clamp(radius, 0.0, 1e5) * kOver * (1 << kShift)));
+        cv::circle(view, cv::Point(fixed(x), fixed(y)) - origin, r, scalar(colour),
+                   stroke(thickness), cv::LINE_AA, kShift);
+    });
+}
+
+extern "C" void bst_picture_rectangle(bst_picture *picture, double x, double y, double width,
+                                      double height, bst_colour colour, double thickness) noexcept {
+    draw(picture, [&](cv::Mat &view, cv::Point origin) {
+        cv::rectangle(view, cv::Point(fixed(x), fixed(y)) - origin,
+                      cv::Point(fixed(x + width), fixed(y + height)) - origin, scalar(colour),
+                      stroke(thickness), cv::LINE_AA, kShift);
+    });
+}
+
+extern "C" void bst_picture_fill(bst_picture *picture, bst_box box, bst_colour colour) noexcept {
+    draw(picture, [&](cv::Mat &view, cv::Point origin) {
+        cv::Rect r = enlarged(box) - cv::Point(origin.x >> kShift, origin.y >> kShift);
+        cv::rectangle(view, r, scalar(colour), cv::FILLED);
+    });
+}
+
+extern "C" double bst_picture_text(bst_picture *picture, double x, double y, double height,
+                                   bst_colour colour, bool bold, const char *text) noexcept {
+    draw(picture, [&](cv::Mat &view, cv::Point origin) {
+        cv::Point at((fixed(x) - origin.x) >> kShift, (fixed(y) - origin.y) >> kShift);
+        cv::putText(view, ascii(text), at, kFont, font_scale(height), scalar(colour),
+                    font_stroke(height, bold), cv::LINE_AA);
+    });
+    return bst_picture_text_width(height, bold, text);
+}
+
+extern "C" double bst_picture_text_width(double height, bool bold, const char *text) noexcept {
+    try {
+        int base = 0;
+        cv::Size size = cv::getTextSize(ascii(text), kFont, font_scale(height),
+                                        font_stroke(height, bold), &base);
+        return static_cast<double>(size.width) / kOver;
+    } catch (...) {
+        return 0.0;
+    }
+}
+
+extern "C" bst_status bst_picture_save(bst_ctx *ctx, const bst_picture *picture,
+                                       const char *path) noexcept {
+    try {
+        cv::Mat final_size;
+        cv::resize(picture->image, final_size, cv::Size(), 1.0 / kOver, 1.0 / kOver,
+                   cv::INTER_AREA);
+        std::vector<uchar> bytes;
+        if (!cv::imencode(".png", final_size, bytes)) {
+            return bst_fail(ctx, BST_ERR_IO, "%s: OpenCV cannot make a PNG", path);
+        }
+        return bst_write_file_atomic(ctx, path, bytes.data(), bytes.size());
+    } catch (const std::exception &e) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "%s: %s", path, e.what());
+    } catch (...) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "%s: cannot be made", path);
+    }
+}

@@ -1,0 +1,115 @@
+#include "sim/io/plot.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <spawn.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+extern char **environ;
+
+/* A path inside gnuplot's single quotes: a quote is doubled. */
+static void put_quoted(FILE *script, const char *text) {
+    fputc('\'', script);
+    for (const char *c = text; *c; c++) {
+        if (*c == '\'') {
+            fputc('\'', script);
+        }
+        fputc(*c, script);
+    }
+    fputc('\'', script);
+}
+
+bst_status bst_plot_begin(bst_ctx *ctx, bst_plot *plot, const char *path, int width, int height) {
+    int n = snprintf(plot->path, sizeof plot->path, "%s", path);
+    int d = snprintf(plot->draft, sizeof plot->draft, "%s.XXXXXX", path);
+    if (n < 0 || d < 0 || (size_t)d >= sizeof plot->draft || strchr(path, '\n')) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: not a path for a plot", path);
+    }
+    /* The script has no name: nothing is left when the process dies. gnuplot draws into a file of
+     * another name, so that a plot appears whole or not at all. */
+    int fd = mkstemp(plot->draft);
+    if (fd < 0) {
+        return bst_fail(ctx, BST_ERR_IO, "%s: cannot be made: %s", path, strerror(errno));
+    }
+    unlink(plot->draft);
+    plot->script = fdopen(fd, "w+");
+    if (!plot->script) {
+        close(fd);
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
+    }
+    fprintf(plot->script,
+            "if (strstrt(GPVAL_TERMINALS, 'pngcairo')) {\n"
+            "  set terminal pngcairo size %d,%d font 'DejaVu Sans,11' background '#ffffff'\n"
+            "} else {\n"
+            "  set terminal png size %d,%d background '#ffffff'\n"
+            "}\nset encoding utf8\nset output ",
+            width, height, width, height);
+    put_quoted(plot->script, plot->draft);
+    fputc('\n', plot->script);
+    return BST_OK;
+}
+
+/* Runs gnuplot with the script as its standard input; false when it is missing or fails. */
+static bool run_gnuplot(int script) {
+    posix_spawn_file_actions_t actions;
+    if (posix_spawn_file_actions_init(&actions) != 0) {
+        return false;
+    }
+    char name[] = "gnuplot";
+    char *arguments[] = {name, NULL};
+    pid_t child;
+    bool ok =
+        posix_spawn_file_actions_adddup2(&actions, script, STDIN_FILENO) == 0 &&
+        posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0) == 0 &&
+        posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0) == 0 &&
+        posix_spawnp(&child, name, &actions, NULL, arguments, environ) == 0;
+    posix_spawn_file_actions_destroy(&actions);
+    int result = 0;
+    if (ok) {
+        while (waitpid(child, &result, 0) < 0) {
+            if (errno != EINTR) {
+                return false;
+            }
+        }
+    }
+    return ok && WIFEXITED(result) && WEXITSTATUS(result) == 0;
+}
+
+bst_status bst_plot_end(bst_ctx *ctx, bst_plot *plot, bool *made) {
+    bool drawn = false;
+    fputs("\nunset output\n", plot->script);
+    bool written = fflush(plot->script) == 0 && !ferror(plot->script) &&
+                   lseek(fileno(plot->script), 0, SEEK_SET) == 0;
+    bst_status status = BST_OK;
+    if (!written) {
+        status =
+            bst_fail(ctx, BST_ERR_IO, "%s: cannot be written: %s", plot->path, strerror(errno));
+    } else {
+        struct stat info;
+        drawn =
+            run_gnuplot(fileno(plot->script)) && stat(plot->draft, &info) == 0 && info.st_size > 0;
+        if (drawn && (chmod(plot->draft, 0644) != 0 || rename(plot->draft, plot->path) != 0)) {
+            drawn = false;
+            status =
+                bst_fail(ctx, BST_ERR_IO, "%s: cannot be made: %s", plot->path, strerror(errno));
+        } else if (!drawn) {
+            bst_log(ctx, BST_LOG_WARNING,
+                    "%s: not drawn: gnuplot is missing or failed (install the package gnuplot-nox)",
+                    plot->path);
+        }
+    }
+    if (!drawn) {
+        unlink(plot->draft);
+    }
+    fclose(plot->script);
+    plot->script = NULL;
+    if (made) {
+        *made = drawn;
+    }
+    return status;
+}

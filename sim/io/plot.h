@@ -1,0 +1,43 @@
+/* Plots through the gnuplot program. */
+#ifndef BST_IO_PLOT_H
+#define BST_IO_PLOT_H
+
+#include <stdbool.h>
+#include <stdio.h>
+
+#include "sim/core/status.h"
+
+/* A plot that is being written: `script` takes gnuplot commands and inline data ("$name << EOD").
+ */
+typedef struct bst_plot {
+    FILE *script;
+    char path[4096];
+    char draft[4096];
+} bst_plot;
+
+/* Begins a PNG of width x height pixels at `path`: terminal (pngcairo, or png where gnuplot lacks
+ * it) and output are set. */
+bst_status bst_plot_begin(bst_ctx *ctx, bst_plot *plot, const char *path, int width,
+                          int height) BST_MUST_CHECK;
+/* Lets gnuplot draw it. A missing or failing gnuplot is a logged warning and *made = false, not an
+ * error: nothing is left at `path` then. `made` may be NULL. Errors: BST_ERR_IO when the script
+ * cannot be written. */
+bst_status bst_plot_end(bst_ctx *ctx, bst_plot *plot, bool *made) BST_MUST_CHECK;
+
+/* One point of a pointing plot. */
+typedef struct bst_pointing_point {
+    double time_s;
+    double dx_px, dy_px; /* true target from the boresight, mean of the exposure */
+    int mode;            /* bst_mode */
+    bool in_track;       /* the right target is in confirmed track */
+    bool visible;        /* false: the point is left out of the figures */
+} bst_pointing_point;
+
+/* Plots the pointing error against time: radial error on a logarithmic scale with the modes as
+ * coloured ground, and both components after confirmation. `title` may be NULL; `limit_px` > 0
+ * draws a line at the error that is asked for. */
+bst_status bst_pointing_plot(bst_ctx *ctx, const char *path, const char *title,
+                             const bst_pointing_point *points, int count, double limit_px,
+                             bool *made) BST_MUST_CHECK;
+
+#endif

@@ -1,0 +1,175 @@
+/* The choice of the target of interest among tracks made by hand. */
+#include "tests/test_support.h"
+#include "tracker/target.h"
+
+#define AS BST_ARCSEC_RAD
+
+static const bst_target_params params = {.direction_chi2 = 18.4,
+                                         .rate_chi2 = 11.8,
+                                         .magnitude_chi2 = 16,
+                                         .release_chi2 = 200,
+                                         .rate_floor_radps = 0.1 * AS,
+                                         .max_rate_sigma_radps = 0.8 * AS,
+                                         .max_chi2 = 4,
+                                         .min_hits = 4,
+                                         .margin = 2,
+                                         .margin_hits = 8,
+                                         .memory_s = 600,
+                                         .memory_chi2 = 23.5,
+                                         .memory_noise_rad2ps3 = 0.04 * AS * AS};
+
+static bst_vec3 place(double a1_as, double a2_as) {
+    bst_vec3 centre = bst_vec3_from_radec(0.0, 0.5);
+    bst_tangent axes = bst_tangent_at(centre);
+    return bst_tangent_exp(centre, bst_tangent_vector(&axes, a1_as * AS, a2_as * AS));
+}
+
+static bst_target_cue make_cue(void) {
+    bst_target_cue cue = {.valid = true,
+                          .direction = place(0, 0),
+                          .sigma_rad = 0.5 * BST_DEG_RAD,
+                          .rate_sigma_radps = 0.5 * AS,
+                          .v_mag = 13,
+                          .v_mag_sigma = 1};
+    bst_tangent axes = bst_tangent_at(cue.direction);
+    cue.rate_radps = bst_tangent_vector(&axes, 50 * AS, 0);
+    return cue;
+}
+
+static bst_mtt_track make_track(int64_t id, double a1_as, double rate_off_as, double v_mag) {
+    bst_mtt_track t = {.id = id,
+                       .status = BST_TRACK_CONFIRMED,
+                       .v_mag = v_mag,
+                       .v_mag_variance = 0.01,
+                       .hits = 10,
+                       .chi2 = 16};
+    t.state.direction = place(a1_as, 30);
+    bst_vec3 centre = place(0, 0);
+    bst_tangent axes = bst_tangent_at(centre);
+    t.state.rate_radps = bst_tangent_carry(centre, t.state.direction,
+                                           bst_tangent_vector(&axes, 50 * AS, rate_off_as * AS));
+    for (int i = 0; i < 4; i++) {
+        t.state.covariance[i][i] = i < 2 ? 0.04 * AS * AS : 0.0025 * AS * AS;
+    }
+    return t;
+}
+
+static int64_t choose(bst_mtt_track *tracks, int count) {
+    bst_target target = {0};
+    bst_target_cue cue = make_cue();
+    bst_target_step(&target, &params, &cue, 0.0, tracks, count);
+    return target.id;
+}
+
+static void misfit_is_chi_square(void **state) {
+    (void)state;
+    bst_target_cue cue = make_cue();
+    bst_mtt_track t = make_track(1, 2160, 1.0, 14.0); /* 0.6 degree away */
+    bst_target_fit fit = bst_target_misfit(&params, &cue, &t);
+    /* (2160^2 + 30^2) / 1800^2 + 1 / (0.5^2 + 0.1^2 + 0.05^2) + 1 / 1.02; the track's own 0.2
+     * arcsec adds to the cue's 1800 */
+    double expected = (2160.0 * 2160.0 + 900.0) / (1800.0 * 1800.0) + 1.0 / 0.2625 + 1.0 / 1.02;
+    bst_assert_close(fit.chi2, expected, 1e-6);
+}
+
+static void takes_the_likeliest(void **state) {
+    (void)state;
+    bst_mtt_track t[3] = {make_track(1, 100, 1.6, 13), make_track(2, 2160, 0.1, 13),
+                          make_track(3, 50, -30, 13)};
+    /* nearer to the cue, but its rate is wrong by 1.6 arcsec/s: the far one is the target */
+    assert_int_equal(choose(t, 3), 2);
+    /* brightness decides among equals */
+    bst_mtt_track b[2] = {make_track(1, 500, 0.1, 15.5), make_track(2, 500, 0.1, 13.2)};
+    assert_int_equal(choose(b, 2), 2);
+}
+
+static void takes_nothing_wrong(void **state) {
+    (void)state;
+    bst_mtt_track t = make_track(1, 0, 2.5, 13); /* wrong rate */
+    assert_int_equal(choose(&t, 1), 0);
+    t = make_track(1, 0, 0, 13);
+    t.state.rate_radps = (bst_vec3){0, 0, 0}; /* a star */
+    assert_int_equal(choose(&t, 1), 0);
+    t = make_track(1, 0, 0, 13);
+    t.status = BST_TRACK_TENTATIVE;
+    assert_int_equal(choose(&t, 1), 0);
+    t = make_track(1, 0, 0, 18); /* 5 sigma too faint */
+    assert_int_equal(choose(&t, 1), 0);
+    t = make_track(1, 9000, 0, 13); /* 2.5 degrees away */
+    assert_int_equal(choose(&t, 1), 0);
+    t = make_track(1, 0, 0, 13);
+    t.state.covariance[2][2] = AS * AS; /* a rate that fits only because it is not known */
+    assert_int_equal(choose(&t, 1), 0);
+    t = make_track(1, 0, 0, 13);
+    t.chi2 = 80; /* moves unlike any object */
+    assert_int_equal(choose(&t, 1), 0);
+    /* a poor candidate needs more hits than a good one */
+    t = make_track(1, 0, 1.6, 13);
+    t.hits = 6;
+    assert_int_equal(choose(&t, 1), 0);
+    t.hits = 12;
+    assert_int_equal(choose(&t, 1), 1);
+    t = make_track(1, 0, 0, 13);
+    t.hits = 4;
+    t.chi2 = 4;
+    assert_int_equal(choose(&t, 1), 1);
+    /* two young tracks that nothing tells apart: wait */
+    bst_mtt_track two[2] = {make_track(1, 10, 0.1, 13), make_track(2, 20, -0.1, 13)};
+    two[0].hits = two[1].hits = 6;
+    assert_int_equal(choose(two, 2), 0);
+    assert_int_equal(choose(two, 0), 0);
+    /* no cue */
+    bst_target target = {0};
+    bst_target_cue none = {.valid = false};
+    bst_target_step(&target, &params, &none, 0.0, two, 2);
+    assert_int_equal(target.id, 0);
+    /* unknown brightness of the cue does not matter */
+    bst_target_cue cue = make_cue();
+    cue.v_mag_sigma = INFINITY;
+    t = make_track(1, 0, 0, 18);
+    bst_target_step(&target, &params, &cue, 0.0, &t, 1);
+    assert_int_equal(target.id, 1);
+}
+
+static void keeps_and_lets_go(void **state) {
+    (void)state;
+    bst_target target = {0};
+    bst_target_cue cue = make_cue();
+    bst_mtt_track t[2] = {make_track(1, 300, 0.8, 13), make_track(2, 0, 0, 13)};
+    bst_target_step(&target, &params, &cue, 0.0, t, 1);
+    assert_int_equal(target.id, 1);
+    /* a better one comes, the rate changes by a burn: identity holds */
+    t[0] = make_track(1, 300, 3.0, 13);
+    bst_target_step(&target, &params, &cue, 1.0, t, 2);
+    assert_int_equal(target.id, 1);
+    /* it has become a star */
+    t[0].state.rate_radps = (bst_vec3){0, 0, 0};
+    bst_target_step(&target, &params, &cue, 2.0, t, 1);
+    assert_int_equal(target.id, 0);
+    /* after a loss the place must fit, too */
+    target = (bst_target){0};
+    t[0] = make_track(1, 300, 0.1, 13);
+    bst_target_step(&target, &params, &cue, 0.0, t, 1);
+    bst_target_step(&target, &params, &cue, 10.0, NULL, 0);
+    assert_int_equal(target.id, 0);
+    t[0] = make_track(5, 300, 0.1, 13); /* where the target was, not where it must be by now */
+    bst_target_step(&target, &params, &cue, 10.0, t, 1);
+    assert_int_equal(target.id, 0);
+    t[0] = make_track(6, 800, 0.1, 13); /* 50 arcsec/s later */
+    bst_target_step(&target, &params, &cue, 10.0, t, 1);
+    assert_int_equal(target.id, 6);
+    /* and when the memory has faded, the cue alone decides */
+    bst_target_step(&target, &params, &cue, 20.0, NULL, 0);
+    t[0] = make_track(7, 300, 0.1, 13);
+    bst_target_step(&target, &params, &cue, 400.0, t, 1);
+    assert_int_equal(target.id, 0);
+    bst_target_step(&target, &params, &cue, 700.0, t, 1);
+    assert_int_equal(target.id, 7);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(misfit_is_chi_square), cmocka_unit_test(takes_the_likeliest),
+        cmocka_unit_test(takes_nothing_wrong), cmocka_unit_test(keeps_and_lets_go)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
