@@ -7,6 +7,9 @@
 #include "imgproc/locate.h"
 #include "imgproc/rows.h"
 
+/* Bends that noise of the telemetry may feign. */
+static const double BEND_IGNORED_PX = 0.15;
+
 struct bst_imgproc {
     bst_camera camera;
     bst_imgproc_config config;
@@ -227,6 +230,25 @@ static bst_detection report(const bst_imgproc *ip, const bst_locate_frame *f,
     return d;
 }
 
+/* Light that was not spread evenly along its path has its centroid elsewhere than where the even
+ * model puts it, by about the path's bend. */
+static void allow_for_bend(const bst_imgproc *ip, const bst_motion *motion, bst_detections *out) {
+    double x, y;
+    bst_motion_bend(motion, &ip->camera, &x, &y);
+    double size = 2.0 * hypot(x, y);
+    if (!(size > BEND_IGNORED_PX)) {
+        return;
+    }
+    double share = (size - BEND_IGNORED_PX) / size;
+    x *= 2.0 * share;
+    y *= 2.0 * share;
+    for (int i = 0; i < out->count; i++) {
+        out->items[i].cov_xx += x * x;
+        out->items[i].cov_xy += x * y;
+        out->items[i].cov_yy += y * y;
+    }
+}
+
 bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
                               const bst_motion *motion, bst_detections *out, int capacity) {
     BST_TRY(check_frame(ctx, ip, frame));
@@ -284,6 +306,9 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
     out->lost = lost;
     for (int i = 0; i < kept; i++) {
         out->items[i] = report(ip, &view, &ip->locator.found[ip->order[i]]);
+    }
+    if (motion) {
+        allow_for_bend(ip, motion, out);
     }
     return BST_OK;
 }

@@ -162,7 +162,7 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
     out->start_tick = message->start_tick;
     out->end_tick = message->end_tick;
 
-    bst_motion motion = {BST_QUAT_IDENTITY, {0, 0, 0}};
+    bst_motion motion = {BST_QUAT_IDENTITY, {0, 0, 0}, {0, 0, 0}};
     bool oriented =
         pointing.payload && bst_motion_from_telemetry(pointing.payload, message->start_tick,
                                                       message->end_tick, &motion);

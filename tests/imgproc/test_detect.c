@@ -146,6 +146,23 @@ static void widened_psf_keeps_fluxes(void **state) {
     end(&f);
 }
 
+/* A motion that bends by 1 px is paid for in the covariance, along the bend only. */
+static void uneven_motion_widens_the_covariance(void **state) {
+    (void)state;
+    fixture f = begin(128, 128);
+    synthetic_add(&f.s, 60.3, 62.8, 4000, 0, 0);
+    bst_motion motion = synthetic_motion(&f.s, 0, 0);
+    expose(&f, &motion);
+    bst_detection even = *near_to(&f, 60.3, 62.8, 1.0);
+    motion.bend_cam_rad = (bst_vec3){0, bst_camera_scale_rad(&f.s.camera), 0};
+    process(&f, &motion);
+    const bst_detection *d = near_to(&f, 60.3, 62.8, 1.0);
+    /* twice the bend less the 0.15 px that are ignored; rounding */
+    bst_assert_close(d->cov_xx - even.cov_xx, 1.85 * 1.85, 1e-9);
+    bst_assert_close(d->cov_yy, even.cov_yy, 1e-9);
+    end(&f);
+}
+
 /* In a stare the target streaks and no telemetry says how. */
 static void unknown_streak_is_measured(void **state) {
     (void)state;
@@ -426,6 +443,7 @@ int main(void) {
         cmocka_unit_test(target_beside_a_streaking_star),
         cmocka_unit_test(extents_and_magnitude),
         cmocka_unit_test(widened_psf_keeps_fluxes),
+        cmocka_unit_test(uneven_motion_widens_the_covariance),
         cmocka_unit_test(unknown_streak_is_measured),
         cmocka_unit_test(saturated_star),
         cmocka_unit_test(dull_images),
