@@ -7,9 +7,6 @@
 #include "imgproc/locate.h"
 #include "imgproc/rows.h"
 
-/* Bends that noise of the telemetry may feign. */
-static const double BEND_IGNORED_PX = 0.15;
-
 struct bst_imgproc {
     bst_camera camera;
     bst_imgproc_config config;
@@ -24,6 +21,7 @@ struct bst_imgproc {
     int *order;
     /* of the latest frame */
     double exposure_s, binning, streak_px;
+    bool smeared;
 };
 
 static bst_status make_bad_map(bst_ctx *ctx, bst_imgproc *ip) {
@@ -165,13 +163,18 @@ static int saturation_dn(const bst_imgproc *ip, const bst_imgproc_frame *frame) 
 static void filter_path(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_motion *motion,
                         double *dx, double *dy) {
     *dx = *dy = 0.0;
+    ip->smeared = false;
     if (!motion) {
         return;
     }
     const bst_window *w = &frame->window;
     bst_motion_streak(motion, &ip->camera, w->x0 + 0.5 * (w->width - 1),
                       w->y0 + 0.5 * (w->height - 1), dx, dy);
+    double bend_x, bend_y;
+    bst_motion_bend(motion, &ip->camera, &bend_x, &bend_y);
     double length = hypot(*dx, *dy) / frame->binning;
+    double bend = hypot(bend_x, bend_y) / frame->binning;
+    ip->smeared = length + 2.0 * bend > ip->config.streak_max_px;
     if (length < ip->config.streak_min_px || length > ip->config.streak_max_px) {
         *dx = *dy = 0.0;
         return;
@@ -228,25 +231,6 @@ static bst_detection report(const bst_imgproc *ip, const bst_locate_frame *f,
     d.flags = found->flags;
     d.label = found->artefact ? BST_LABEL_ARTEFACT : BST_LABEL_UNKNOWN;
     return d;
-}
-
-/* Light that was not spread evenly along its path has its centroid elsewhere than where the even
- * model puts it, by about the path's bend. */
-static void allow_for_bend(const bst_imgproc *ip, const bst_motion *motion, bst_detections *out) {
-    double x, y;
-    bst_motion_bend(motion, &ip->camera, &x, &y);
-    double size = 2.0 * hypot(x, y);
-    if (!(size > BEND_IGNORED_PX)) {
-        return;
-    }
-    double share = (size - BEND_IGNORED_PX) / size;
-    x *= 2.0 * share;
-    y *= 2.0 * share;
-    for (int i = 0; i < out->count; i++) {
-        out->items[i].cov_xx += x * x;
-        out->items[i].cov_xy += x * y;
-        out->items[i].cov_yy += y * y;
-    }
 }
 
 bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
@@ -307,9 +291,6 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
     for (int i = 0; i < kept; i++) {
         out->items[i] = report(ip, &view, &ip->locator.found[ip->order[i]]);
     }
-    if (motion) {
-        allow_for_bend(ip, motion, out);
-    }
     return BST_OK;
 }
 
@@ -322,4 +303,8 @@ double bst_imgproc_v_limit(const bst_imgproc *ip, double snr) {
 
 double bst_imgproc_streak_px(const bst_imgproc *ip) {
     return ip->streak_px;
+}
+
+bool bst_imgproc_smeared(const bst_imgproc *ip) {
+    return ip->smeared;
 }

@@ -81,6 +81,9 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
 double bst_imgproc_v_limit(const bst_imgproc *ip, double snr);
 /* Length of the star streak that the latest frame was filtered for, px; 0: points only. */
 double bst_imgproc_streak_px(const bst_imgproc *ip);
+/* Whether stars moved further in the latest frame than is modelled (streak_max_px): what was found
+ * then is parts of streaks, and no place of it is to be trusted. */
+bool bst_imgproc_smeared(const bst_imgproc *ip);
 
 extern const bst_module_desc bst_imgproc_module;
 
