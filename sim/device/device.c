@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 enum { MAX_PLATFORMS = 16, MAX_DEVICES = 32, NAME_BYTES = 256 };
 
@@ -231,12 +232,29 @@ exit:
     return status;
 }
 
+/* PoCL 3.1 reports a command complete before its worker thread has let go of the command's event,
+ * and crashes when queue and context are gone by then. An event holds a reference of its queue, so
+ * waiting for the references to go is waiting for the workers. Others may hold references for good
+ * reasons: the wait is bounded. */
+static void wait_for_workers(cl_command_queue queue) {
+    const struct timespec pause = {0, 200000};
+    cl_uint references = 2;
+    for (int i = 0; i < 100 && references > 1; i++) {
+        if (clGetCommandQueueInfo(queue, CL_QUEUE_REFERENCE_COUNT, sizeof references, &references,
+                                  NULL) != CL_SUCCESS) {
+            return;
+        }
+        nanosleep(&pause, NULL); /* also after the last: the worker is on its way out */
+    }
+}
+
 void bst_device_close(bst_device *device) {
     if (!device) {
         return;
     }
     if (device->queue) {
         clFinish(device->queue);
+        wait_for_workers(device->queue);
         clReleaseCommandQueue(device->queue);
     }
     if (device->context) {
