@@ -9,11 +9,15 @@
 
 enum { MAX_PLATFORMS = 16, MAX_DEVICES = 32, NAME_BYTES = 256 };
 
+enum { MAX_BUILT = 64 };
+
 struct bst_device {
     cl_device_id parent, id; /* equal unless a sub-device was made */
     cl_context context;
     cl_command_queue queue;
     char description[4 * NAME_BYTES];
+    const bst_kernel_source *built[MAX_BUILT]; /* sources of all programs, each once */
+    int built_count;
 };
 
 static const struct {
@@ -295,6 +299,21 @@ static bst_status build_failure(bst_ctx *ctx, const bst_device *device, cl_progr
     return status;
 }
 
+static void note_built(bst_device *device, const bst_kernel_source *source) {
+    for (int i = 0; i < device->built_count; i++) {
+        if (device->built[i] == source) {
+            return;
+        }
+    }
+    if (device->built_count < MAX_BUILT) {
+        device->built[device->built_count++] = source;
+    }
+}
+
+const bst_kernel_source *bst_device_built(const bst_device *device, int index) {
+    return index >= 0 && index < device->built_count ? device->built[index] : NULL;
+}
+
 bst_status bst_device_build(bst_ctx *ctx, bst_device *device,
                             const bst_kernel_source *const *sources, int count, const char *options,
                             cl_program *out) {
@@ -322,6 +341,9 @@ bst_status bst_device_build(bst_ctx *ctx, bst_device *device,
     if (code != CL_SUCCESS) {
         status = build_failure(ctx, device, program, sources[0]->name);
         goto exit;
+    }
+    for (int i = 0; i < count; i++) {
+        note_built(device, sources[i]);
     }
     *out = program;
     program = NULL;
