@@ -302,10 +302,11 @@ bst_status bst_control_observe(bst_ctx *ctx, bst_control *c, int64_t tick,
     if (c->config.compensate_attitude) {
         bst_pointing_error_update(&c->pointing_error, &tracks->attitude, c->env.tick_rate_hz);
     }
-    int64_t interval = tracks->tick - c->frame_tick;
-    if (c->frame_tick != INT64_MIN && interval > 0 &&
-        (c->frame_interval_ticks == 0 || interval < c->frame_interval_ticks)) {
-        c->frame_interval_ticks = interval;
+    if (c->frame_tick != INT64_MIN && tracks->tick > c->frame_tick) {
+        int64_t interval = tracks->tick - c->frame_tick;
+        if (c->frame_interval_ticks == 0 || interval < c->frame_interval_ticks) {
+            c->frame_interval_ticks = interval;
+        }
     }
     c->frame_tick = tracks->tick;
     c->target_id = tracks->target_id;

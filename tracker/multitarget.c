@@ -223,8 +223,13 @@ static bool may_confirm(const bst_mtt *m, const bst_mtt_track *track) {
 static bool is_finished(const bst_mtt *m, const bst_mtt_track *track, bool observed) {
     const bst_mtt_params *p = &m->params;
     double variance = fmax(track->state.covariance[0][0], track->state.covariance[1][1]);
+    /* nothing is known of a tentative track that would be worth waiting for */
+    double patience_s =
+        track->status == BST_TRACK_TENTATIVE
+            ? fmin(p->max_coast_s, p->initiation_gap_s * (p->confirm_frames - p->confirm_hits + 1))
+            : p->max_coast_s;
     if (!(variance < p->max_sigma_rad * p->max_sigma_rad) ||
-        m->seconds - track->last_update_s > p->max_coast_s) {
+        m->seconds - track->last_update_s > patience_s) {
         return true;
     }
     if (track->status != BST_TRACK_TENTATIVE) {
