@@ -244,9 +244,8 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
     ip->binning = frame->binning;
 
     to_electrons(ip, frame, width, height);
-    /* no pixel is better known than its quantisation */
-    float floor_e = (float)(ip->camera.gain_e_per_dn / sqrt(12.0));
-    bst_background_estimate(&ip->background, ip->electrons, width, height, floor_e);
+    bst_background_estimate(&ip->background, ip->electrons, width, height,
+                            (float)ip->camera.gain_e_per_dn);
     double dx, dy;
     filter_path(ip, frame, motion, &dx, &dy);
     ip->streak_px = hypot(dx, dy) * frame->binning;
