@@ -29,7 +29,7 @@ void bst_background_free(bst_background *background);
  * row of a large mesh, the deviation corrected for the clipping. noise_floor (> 0) is the least
  * noise reported. A mesh without usable pixels takes the frame's medians. */
 void bst_background_estimate(bst_background *background, const float *image, int width, int height,
-                             float noise_floor);
+                             float step_e);
 
 /* Level and 1 / noise for every pixel of image row y, bilinear between mesh centres, constant
  * outside them. */

@@ -34,8 +34,8 @@ bst_stamp bst_fit_stamp(const bst_source *source, double reach_px, int max_side,
                         int height) {
     const bst_shape *s = &source->shape;
     double limit = 0.5 * (max_side - 2);
-    double rx = fmin(0.5 * fabs(s->dx_px) + reach_px, limit);
-    double ry = fmin(0.5 * fabs(s->dy_px) + reach_px, limit);
+    double rx = fmin(0.5 * fabs(s->dx_px) + fabs(s->bend_x_px) + reach_px, limit);
+    double ry = fmin(0.5 * fabs(s->dy_px) + fabs(s->bend_y_px) + reach_px, limit);
     int x0 = (int)fmax(floor(s->x_px - rx + 0.5), 0.0);
     int y0 = (int)fmax(floor(s->y_px - ry + 0.5), 0.0);
     int x1 = (int)fmin(floor(s->x_px + rx + 0.5), width - 1.0);
@@ -263,9 +263,9 @@ bool bst_fit_moments(bst_fit *fit, const bst_fit_data *data, const bst_stamp *st
     }
     const bst_shape *s = &source->shape;
     double base = s->sigma_px * s->sigma_px + fmax(source->widening_px2, 0.0) + 1.0 / 12.0;
-    double wxx = 2.0 * (base + s->dx_px * s->dx_px / 12.0);
-    double wyy = 2.0 * (base + s->dy_px * s->dy_px / 12.0);
-    double wxy = 2.0 * s->dx_px * s->dy_px / 12.0;
+    double path[3];
+    bst_shape_path_variance(s, path);
+    double wxx = 2.0 * (base + path[0]), wxy = 2.0 * path[1], wyy = 2.0 * (base + path[2]);
     double det = wxx * wyy - wxy * wxy;
     double ixx = wyy / det, iyy = wxx / det, ixy = -wxy / det;
     double sum = 0.0, mxx = 0.0, mxy = 0.0, myy = 0.0;

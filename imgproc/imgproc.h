@@ -67,10 +67,11 @@ void bst_imgproc_free(bst_imgproc *ip);
  *
  * Fills background_e, noise_e, threshold_snr, count, lost and items of *out (room for `capacity`),
  * sorted by y, then x; label is UNKNOWN or ARTEFACT, star_id 0. When there is no room the brightest
- * stay. The covariance is the inverse of the Fisher matrix, without background uncertainty; snr is
- * sqrt(sum s^2 / sigma^2) with the background's noise only; length_px and width_px are the full
- * widths at half maximum of the Gaussian with the source's second moments. No output is NaN.
- * BST_ERR_ARGUMENT for a window or binning that does not fit the sensor. */
+ * stay. The covariance is the inverse of the Fisher matrix, without background uncertainty, plus
+ * what a motion that was not uniform may add; snr is sqrt(sum s^2 / sigma^2) with the background's
+ * noise only; length_px and width_px are the full widths at half maximum of the Gaussian with the
+ * source's second moments. No output is NaN. BST_ERR_ARGUMENT for a window or binning that does not
+ * fit the sensor. */
 bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
                               const bst_motion *motion, bst_detections *out,
                               int capacity) BST_MUST_CHECK;
@@ -80,6 +81,9 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
 double bst_imgproc_v_limit(const bst_imgproc *ip, double snr);
 /* Length of the star streak that the latest frame was filtered for, px; 0: points only. */
 double bst_imgproc_streak_px(const bst_imgproc *ip);
+/* Whether stars moved further in the latest frame than is modelled (streak_max_px): what was found
+ * then is parts of streaks, and no place of it is to be trusted. */
+bool bst_imgproc_smeared(const bst_imgproc *ip);
 
 extern const bst_module_desc bst_imgproc_module;
 

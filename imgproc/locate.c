@@ -35,11 +35,14 @@ void bst_locator_free(bst_locator *l) {
     *l = (bst_locator){0};
 }
 
-static void star_path(const bst_locate_frame *f, double x, double y, double *dx, double *dy) {
-    bst_motion_streak(f->motion, f->camera, f->origin_x_px + f->binning * x,
-                      f->origin_y_px + f->binning * y, dx, dy);
-    *dx /= f->binning;
-    *dy /= f->binning;
+static void set_star_path(const bst_locate_frame *f, bst_shape *s) {
+    bst_motion_streak(f->motion, f->camera, f->origin_x_px + f->binning * s->x_px,
+                      f->origin_y_px + f->binning * s->y_px, &s->dx_px, &s->dy_px);
+    bst_motion_bend(f->motion, f->camera, &s->bend_x_px, &s->bend_y_px);
+    s->dx_px /= f->binning;
+    s->dy_px /= f->binning;
+    s->bend_x_px /= f->binning;
+    s->bend_y_px /= f->binning;
 }
 
 static double shape_norm(const bst_locate_frame *f, bool streak) {
@@ -56,10 +59,10 @@ static void start(const bst_locate_frame *f, const bst_candidate *c, bst_found *
     *out = (bst_found){.peak_snr = c->snr, .peak_x = c->x, .peak_y = c->y};
     out->noise_e = bst_background_noise_at(f->background, c->x, c->y);
     bst_source *s = &out->source;
-    s->shape = (bst_shape){c->x, c->y, 0.0, 0.0, f->sigma_px};
+    s->shape = (bst_shape){.x_px = c->x, .y_px = c->y, .sigma_px = f->sigma_px};
     out->streak = f->filter->streak && c->snr > bst_filter_point_at(f->filter, c->x, c->y);
     if (out->streak) {
-        star_path(f, c->x, c->y, &s->shape.dx_px, &s->shape.dy_px);
+        set_star_path(f, &s->shape);
     }
     s->flux_e = (double)c->snr * out->noise_e / shape_norm(f, out->streak);
 }
@@ -162,11 +165,9 @@ static bool fit_one(bst_locator *l, const bst_locate_frame *f, int i, const bst_
 
 static bst_source as_shape(const bst_locate_frame *f, const bst_found *found, bool streak) {
     bst_source s = found->source;
-    s.shape.x_px = found->peak_x;
-    s.shape.y_px = found->peak_y;
-    s.shape.dx_px = s.shape.dy_px = 0.0;
+    s.shape = (bst_shape){.x_px = found->peak_x, .y_px = found->peak_y, .sigma_px = f->sigma_px};
     if (streak) {
-        star_path(f, s.shape.x_px, s.shape.y_px, &s.shape.dx_px, &s.shape.dy_px);
+        set_star_path(f, &s.shape);
     }
     s.flux_e = (double)found->peak_snr * found->noise_e / shape_norm(f, streak);
     return s;
@@ -232,8 +233,10 @@ static bool measure_extent(bst_locator *l, const bst_locate_frame *f, int i, dou
     bst_found *found = &l->found[i];
     const bst_shape *s = &found->source.shape;
     double base = s->sigma_px * s->sigma_px + fmax(found->source.widening_px2, 0.0);
-    double m[3] = {base + s->dx_px * s->dx_px / 12.0, s->dx_px * s->dy_px / 12.0,
-                   base + s->dy_px * s->dy_px / 12.0};
+    double m[3];
+    bst_shape_path_variance(s, m);
+    m[0] += base;
+    m[2] += base;
     bool measured = false;
     if (found->snr >= MOMENTS_SNR && !(found->flags & BST_DETECTION_EDGE)) {
         bst_stamp stamp =
@@ -322,8 +325,8 @@ static void fit_own_streak(bst_locator *l, const bst_locate_frame *f, int i) {
 /* Flags and plausibility. */
 static void judge(const bst_locate_frame *f, bst_found *found) {
     const bst_source *s = &found->source;
-    double half_x = 0.5 * fabs(s->shape.dx_px) + 2.0 * f->sigma_px;
-    double half_y = 0.5 * fabs(s->shape.dy_px) + 2.0 * f->sigma_px;
+    double half_x = 0.5 * fabs(s->shape.dx_px) + fabs(s->shape.bend_x_px) + 2.0 * f->sigma_px;
+    double half_y = 0.5 * fabs(s->shape.dy_px) + fabs(s->shape.bend_y_px) + 2.0 * f->sigma_px;
     double x = s->shape.x_px, y = s->shape.y_px;
     if (x - half_x < -0.5 || y - half_y < -0.5 || x + half_x > f->width - 0.5 ||
         y + half_y > f->height - 0.5) {

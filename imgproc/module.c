@@ -162,7 +162,7 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
     out->start_tick = message->start_tick;
     out->end_tick = message->end_tick;
 
-    bst_motion motion = {BST_QUAT_IDENTITY, {0, 0, 0}};
+    bst_motion motion = {BST_QUAT_IDENTITY, {0, 0, 0}, {0, 0, 0}};
     bool oriented =
         pointing.payload && bst_motion_from_telemetry(pointing.payload, message->start_tick,
                                                       message->end_tick, &motion);
@@ -183,10 +183,13 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
         .bits = message->bits,
         .exposure_s = (double)(message->end_tick - message->start_tick) / (double)m->tick_rate_hz};
     BST_TRY(bst_imgproc_detect(ctx, m->ip, &frame, oriented ? &motion : NULL, out, capacity));
-    if (oriented && nav.payload) {
+    bool smeared = bst_imgproc_smeared(m->ip);
+    if (oriented && nav.payload && !smeared) {
         BST_TRY(identify(m, ctx, nav.payload, message->window, locked, out));
     }
-    label(out, out->stars_identified > 0, bst_imgproc_streak_px(m->ip));
+    if (!smeared) {
+        label(out, out->stars_identified > 0, bst_imgproc_streak_px(m->ip));
+    }
     if (out->stars_identified == 0) {
         bst_step_count(step, "frame_without_stars");
     }

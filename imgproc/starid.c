@@ -73,8 +73,12 @@ static bool detection_brighter(const void *context, int a, int b) {
     return items[a].flux_e != items[b].flux_e ? items[a].flux_e > items[b].flux_e : a < b;
 }
 
-/* Saturated sources may be brighter than they seem, cut ones too. */
+/* Whether a detection may be a star: saturated sources may be brighter than they seem, cut ones
+ * too. */
 static bool consistent(const bst_detection *d, const bst_expected_star *s) {
+    if (d->label == BST_LABEL_ARTEFACT) {
+        return false;
+    }
     double sigma = d->flux_e > 0.0 ? 1.0857 * d->flux_sigma_e / d->flux_e : 1.0;
     double limit = 1.0 + 3.0 * fmin(sigma, 1.0);
     double excess = d->v_mag - s->v_mag; /* > 0: fainter than the star */

@@ -39,7 +39,7 @@ void bst_starid_free(bst_starid *starid);
  * frames (Poisson, at the density of consistent pairs). Then the nearest consistent partners are
  * matched one to one, shift and turn fitted by least squares, and again with a closer tolerance.
  * Sets star_id and label STAR of the matched ones, leaves the others untouched. ARTEFACT detections
- * take part unless they are outside the tolerance of magnitudes. */
+ * take no part. */
 void bst_starid_match(bst_starid *starid, const bst_starid_options *options,
                       const bst_expected_star *stars, int star_count, bst_detection *items,
                       int count, bst_starid_result *out);

@@ -371,7 +371,7 @@ static void choose_target(bst_tracker *t, const bst_tracker_cue *cue, double sec
 
 static void write_track(const bst_mtt_track *track, int64_t target_id, bst_track *out) {
     *out = (bst_track){.id = track->id,
-                       .status = track->status,
+                       .status = (int32_t)track->status,
                        .target_of_interest = track->id == target_id,
                        .direction_gcrf = track->state.direction,
                        .rate_gcrf_radps = track->state.rate_radps,

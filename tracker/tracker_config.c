@@ -42,7 +42,7 @@ const bst_config_desc bst_tracker_config_table[] = {
              "Longest time without a detection, in the field or not."),
     BST_REAL(C, max_sigma_arcsec, "arcsec", 0.01, 1e6, "60",
              "A track whose direction is worse than this is deleted."),
-    BST_REAL(C, merge_px, "px", 0, 100, "4",
+    BST_REAL(C, merge_px, "px", 0, 100, "6",
              "Objects nearer to each other than this may share one detection."),
     BST_REAL(C, merge_floor_px, "px", 0, 100, "0.3",
              "Standard deviation added to a shared detection."),

@@ -72,6 +72,9 @@ typedef struct bst_module_desc {
 
 /* In create: number of items that an output's payload shall hold. `port` indexes desc->ports. */
 void bst_env_set_capacity(const bst_module_env *env, int port, int items);
+/* In create of a module that wakes itself (bst_step_wake_at): about how often it will step at most.
+ * Queues behind it are sized by that. */
+void bst_env_set_rate(const bst_module_env *env, double rate_hz);
 /* In create: a key of a random stream of this instance. */
 static inline bst_rng_key bst_env_rng(const bst_module_env *env, const char *stream) {
     return bst_rng_make_key(env->seed, env->run, env->instance, stream);
@@ -100,7 +103,8 @@ bst_sample bst_step_next(struct bst_step *step, int port);
 void *bst_step_write(struct bst_step *step, int port, int *capacity);
 /* MODIFY port: the message written at this tick, NULL when none was. */
 void *bst_step_modify(struct bst_step *step, int port);
-/* Asks to be stepped at an absolute tick (later than now) besides the period and the triggers. */
+/* Asks to be stepped at an absolute tick (later than now) besides the period and the triggers. One
+ * wish is kept, the earliest, until it comes true. */
 void bst_step_wake_at(struct bst_step *step, int64_t tick);
 /* An event for the record: kind is a short fixed word, text free. */
 void bst_step_event(struct bst_step *step, const char *kind, const char *format, ...)

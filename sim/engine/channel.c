@@ -29,7 +29,7 @@ double bst_step_seconds(const struct bst_step *step) {
 
 static bst_sample sample_at(const struct bst_step *step, const channel *ch, const port_state *port,
                             int64_t sequence) {
-    const slot *s = &ch->slots[sequence % ch->depth];
+    const slot *s = bst_engine_slot(ch, sequence);
     bst_sample sample = {s->payload, s->written_tick, sequence, false};
     if (port->max_age_ticks > 0 && step->tick - s->written_tick > port->max_age_ticks) {
         sample.stale = true;
@@ -47,7 +47,7 @@ bst_sample bst_step_latest(struct bst_step *step, int port_index) {
     const channel *ch = &step->engine->channels[port->channel];
     int64_t oldest = ch->written > ch->depth ? ch->written - ch->depth : 0;
     for (int64_t sequence = ch->written - 1; sequence >= oldest; sequence--) {
-        if (ch->slots[sequence % ch->depth].written_tick + port->delay_ticks <= step->tick) {
+        if (bst_engine_slot(ch, sequence)->written_tick + port->delay_ticks <= step->tick) {
             return sample_at(step, ch, port, sequence);
         }
     }
@@ -62,13 +62,12 @@ bst_sample bst_step_next(struct bst_step *step, int port_index) {
     }
     const channel *ch = &step->engine->channels[port->channel];
     int64_t oldest = ch->written > ch->depth ? ch->written - ch->depth : 0;
-    port->uses_next = true;
     while (port->cursor < oldest) {
         port->cursor++;
         bst_engine_count(step->engine, "queue_overflow");
     }
     if (port->cursor >= ch->written ||
-        ch->slots[port->cursor % ch->depth].written_tick + port->delay_ticks > step->tick) {
+        bst_engine_slot(ch, port->cursor)->written_tick + port->delay_ticks > step->tick) {
         return none;
     }
     return sample_at(step, ch, port, port->cursor++);
@@ -82,31 +81,23 @@ static void release_slot(const channel *ch, slot *s) {
     s->owned = false;
 }
 
-static bst_status commit_port(struct bst_step *step, int port_index) {
+static bst_status publish(struct bst_step *step, int port_index) {
     bst_engine *engine = step->engine;
-    port_state *port = &step->self->ports[port_index];
-    channel *ch = &engine->channels[port->channel];
-    slot *s = &ch->slots[ch->written % ch->depth];
+    channel *ch = &engine->channels[step->self->ports[port_index].channel];
+    slot *s = &ch->slots[ch->head];
     s->written_tick = step->tick;
     s->owned = ch->type->release != NULL;
     ch->written++;
-    port->writing = false;
-    for (int i = 0; i < engine->instance_count; i++) {
-        instance *reader = engine->instances[i];
-        for (int p = 0; p < reader->spec.desc->port_count; p++) {
-            port_state *in = &reader->ports[p];
-            if (in->channel != port->channel ||
-                !(reader->spec.desc->ports[p].flags & BST_PORT_TRIGGER)) {
-                continue;
+    ch->head = ch->head + 1 == ch->depth ? 0 : ch->head + 1;
+    step->writing &= ~(1u << port_index);
+    for (int r = 0; r < ch->reader_count; r++) {
+        int index = ch->readers[r].instance, p = ch->readers[r].port;
+        const instance *other = engine->instances[index];
+        if (other->spec.desc->ports[p].flags & BST_PORT_TRIGGER) {
+            int64_t visible = step->tick + other->ports[p].delay_ticks;
+            if (visible < engine->due[index]) {
+                bst_engine_set_due(engine, index, visible);
             }
-            if (in->trigger_count == TRIGGER_RING) {
-                bst_engine_count(engine, "trigger_overflow");
-                continue;
-            }
-            in->trigger[(in->trigger_head + in->trigger_count) % TRIGGER_RING] =
-                step->tick + in->delay_ticks;
-            in->trigger_count++;
-            reader->due = bst_engine_due(reader);
         }
     }
     if (engine->hooks.message) {
@@ -117,34 +108,31 @@ static bst_status commit_port(struct bst_step *step, int port_index) {
 }
 
 bst_status bst_engine_commit(struct bst_step *step) {
-    const bst_module_desc *desc = step->self->spec.desc;
     BST_TRY(step->hook_status);
-    for (int p = 0; p < desc->port_count; p++) {
-        if (step->self->ports[p].writing) {
-            BST_TRY(commit_port(step, p));
+    for (int p = 0; step->writing; p++) {
+        if (step->writing & 1u << p) {
+            BST_TRY(publish(step, p));
         }
     }
     return BST_OK;
 }
 
 void *bst_step_write(struct bst_step *step, int port_index, int *capacity) {
-    port_state *port = &step->self->ports[port_index];
+    const port_state *port = &step->self->ports[port_index];
     channel *ch = &step->engine->channels[port->channel];
-    if (port->writing) {
+    if (step->writing & 1u << port_index) {
         /* a second message in one step: the first goes out */
-        bst_status status = commit_port(step, port_index);
+        bst_status status = publish(step, port_index);
         if (step->hook_status == BST_OK) {
             step->hook_status = status;
         }
     }
-    slot *s = &ch->slots[ch->written % ch->depth];
+    slot *s = &ch->slots[ch->head];
     release_slot(ch, s);
     if (ch->type->kind == BST_CHANNEL_LATEST && ch->depth > 1 && ch->written > 0) {
-        const slot *previous = &ch->slots[(ch->written - 1) % ch->depth];
-        memcpy(s->payload, previous->payload,
-               ch->type->header_bytes + ch->type->item_bytes * (size_t)ch->capacity);
+        memcpy(s->payload, bst_engine_slot(ch, ch->written - 1)->payload, ch->payload_bytes);
     }
-    port->writing = true;
+    step->writing |= 1u << port_index;
     if (capacity) {
         *capacity = ch->capacity;
     }
@@ -160,34 +148,32 @@ void *bst_step_modify(struct bst_step *step, int port_index) {
     if (ch->written == 0) {
         return NULL;
     }
-    slot *s = &ch->slots[(ch->written - 1) % ch->depth];
+    slot *s = bst_engine_slot(ch, ch->written - 1);
     return s->written_tick == step->tick ? s->payload : NULL;
 }
 
 /* Frames go back to their pool as soon as every reader has read them. */
 void bst_engine_release_read(bst_engine *engine) {
-    for (int c = 0; c < engine->channel_count; c++) {
-        channel *ch = &engine->channels[c];
-        if (!ch->type->release || ch->released == ch->written) {
+    for (int k = 0; k < engine->releasable_count; k++) {
+        channel *ch = &engine->channels[engine->releasable[k]];
+        if (ch->released == ch->written) {
             continue;
         }
         int64_t read_by_all = ch->written;
-        for (int i = 0; i < engine->instance_count; i++) {
-            const instance *reader = engine->instances[i];
-            for (int p = 0; p < reader->spec.desc->port_count; p++) {
-                const port_state *port = &reader->ports[p];
-                if (port->channel == c && reader->spec.desc->ports[p].direction == BST_PORT_IN &&
-                    port->cursor < read_by_all) {
-                    read_by_all = port->cursor;
-                }
+        for (int r = 0; r < ch->reader_count; r++) {
+            const instance *other = engine->instances[ch->readers[r].instance];
+            int p = ch->readers[r].port;
+            if (other->spec.desc->ports[p].direction == BST_PORT_IN &&
+                other->ports[p].cursor < read_by_all) {
+                read_by_all = other->ports[p].cursor;
             }
         }
-        int64_t oldest = ch->written > ch->depth ? ch->written - ch->depth : 0;
+        int64_t oldest = ch->written - ch->depth;
         if (ch->released < oldest) {
-            ch->released = oldest;
+            ch->released = oldest; /* writing over them has let them go */
         }
         for (; ch->released < read_by_all; ch->released++) {
-            release_slot(ch, &ch->slots[ch->released % ch->depth]);
+            release_slot(ch, bst_engine_slot(ch, ch->released));
         }
     }
 }
@@ -222,4 +208,9 @@ void bst_step_count(struct bst_step *step, const char *what) {
 void bst_env_set_capacity(const bst_module_env *env, int port, int items) {
     instance *self = env->engine_private;
     self->ports[port].capacity = items;
+}
+
+void bst_env_set_rate(const bst_module_env *env, double rate_hz) {
+    instance *self = env->engine_private;
+    self->own_rate_hz = rate_hz;
 }

@@ -39,6 +39,11 @@ void bst_engine_free(bst_engine *engine) {
         free(ch->slots);
     }
     free(engine->channels);
+    free(engine->readers);
+    free(engine->releasable);
+    free(engine->due);
+    free(engine->heap);
+    free(engine->place);
     for (int i = engine->instance_count - 1; i >= 0; i--) {
         instance *self = engine->instances[i];
         if (self->created) {
@@ -131,28 +136,12 @@ bst_status bst_engine_load(bst_ctx *ctx, bst_engine *engine) {
         }
         self->created = true;
         /* a module without period or trigger is stepped once, so that it can ask to be woken */
-        bool triggered = false;
-        for (int p = 0; p < spec->desc->port_count; p++) {
-            triggered |=
-                (spec->desc->ports[p].flags & BST_PORT_TRIGGER) && self->ports[p].channel >= 0;
-        }
-        if (spec->period_ticks == 0 && !triggered) {
+        if (spec->period_ticks == 0 && self->trigger_count == 0) {
             self->wake = spec->offset_ticks;
         }
-        self->due = bst_engine_due(self);
     }
-    return bst_engine_allocate_channels(ctx, engine);
-}
-
-int64_t bst_engine_due(const instance *self) {
-    int64_t due = self->next_period < self->wake ? self->next_period : self->wake;
-    for (int p = 0; p < self->spec.desc->port_count; p++) {
-        const port_state *port = &self->ports[p];
-        if (port->trigger_count > 0 && port->trigger[port->trigger_head] < due) {
-            due = port->trigger[port->trigger_head];
-        }
-    }
-    return due;
+    BST_TRY(bst_engine_allocate_channels(ctx, engine));
+    return bst_engine_make_schedule(ctx, engine);
 }
 
 static bst_status step_instance(bst_ctx *ctx, bst_engine *engine, int index, int64_t tick) {
@@ -163,14 +152,19 @@ static bst_status step_instance(bst_ctx *ctx, bst_engine *engine, int index, int
     if (self->wake <= tick) {
         self->wake = INT64_MAX;
     }
-    for (int p = 0; p < self->spec.desc->port_count; p++) {
-        port_state *port = &self->ports[p];
-        while (port->trigger_count > 0 && port->trigger[port->trigger_head] <= tick) {
-            port->trigger_head = (port->trigger_head + 1) % TRIGGER_RING;
-            port->trigger_count--;
+    for (int t = 0; t < self->trigger_count; t++) {
+        port_state *port = &self->ports[self->triggers[t]];
+        const channel *ch = &engine->channels[port->channel];
+        if (port->trigger_cursor < ch->written - ch->depth) {
+            port->trigger_cursor = ch->written - ch->depth;
+        }
+        while (port->trigger_cursor < ch->written &&
+               bst_engine_slot(ch, port->trigger_cursor)->written_tick + port->delay_ticks <=
+                   tick) {
+            port->trigger_cursor++;
         }
     }
-    struct bst_step step = {engine, self, index, ctx, tick, BST_OK};
+    struct bst_step step = {engine, self, ctx, tick, 0, BST_OK};
     self->steps++;
     bst_status status = self->spec.desc->step(self->self, &step);
     if (status == BST_OK) {
@@ -180,7 +174,7 @@ static bst_status step_instance(bst_ctx *ctx, bst_engine *engine, int index, int
         return bst_fail_prefix(ctx, status, "%s at %.6f s", self->name,
                                (double)tick / (double)engine->tick_rate_hz);
     }
-    self->due = bst_engine_due(self);
+    bst_engine_set_due(engine, index, bst_engine_earliest(engine, self));
     return BST_OK;
 }
 
@@ -196,23 +190,15 @@ bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) 
     }
     double asked = wall_seconds();
     int since_clock = 0;
-    for (;;) {
-        int64_t tick = INT64_MAX;
-        for (int i = 0; i < engine->instance_count; i++) {
-            if (engine->instances[i]->due < tick) {
-                tick = engine->instances[i]->due;
-            }
-        }
+    while (engine->instance_count > 0) {
+        int64_t tick = engine->due[engine->heap[0]];
         if (tick >= until_tick) {
-            return BST_OK;
+            break;
         }
         engine->tick = tick;
         int stepped = 0;
-        for (int i = 0; i < engine->instance_count; i++) {
-            if (engine->instances[i]->due <= tick) {
-                BST_TRY(step_instance(ctx, engine, i, tick));
-                stepped++;
-            }
+        for (; engine->due[engine->heap[0]] <= tick; stepped++) {
+            BST_TRY(step_instance(ctx, engine, engine->heap[0], tick));
         }
         bst_engine_release_read(engine);
         /* reading the clock costs as much as a plant step: only now and then, or after a step that
@@ -229,6 +215,7 @@ bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) 
             }
         }
     }
+    return BST_OK;
 }
 
 int64_t bst_engine_tick(const bst_engine *engine) {
@@ -256,7 +243,7 @@ bool bst_engine_counter(const bst_engine *engine, int index, const char **name, 
 bst_status bst_period_ticks(bst_ctx *ctx, int64_t tick_rate_hz, double rate_hz, int64_t *out) {
     double period = (double)tick_rate_hz / rate_hz;
     double nearest = floor(period + 0.5);
-    if (!(rate_hz > 0.0) || nearest < 1.0 || nearest > 9e15) {
+    if (!(rate_hz > 0.0) || period < 1.0 - 1e-9 || nearest > 9e15) {
         return bst_fail(ctx, BST_ERR_CONFIG,
                         "a rate of %g Hz is not between 0 and the tick rate of %lld Hz", rate_hz,
                         (long long)tick_rate_hz);

@@ -10,34 +10,39 @@ typedef struct slot {
     bool owned; /* the payload holds what type->release lets go of */
 } slot;
 
-/* A channel of one scope: a ring of slots. Message `sequence` lies in slots[sequence % depth]. */
+/* A port that reads a channel. */
+typedef struct channel_reader {
+    int instance, port;
+} channel_reader;
+
+/* A channel of one scope: a ring of slots that holds the last `depth` messages. */
 typedef struct channel {
     const bst_channel_type *type;
     const char *scope; /* borrowed from an instance */
-    int writer;        /* instance, -1: none */
+    int writer;        /* instance */
     int writer_port;
     slot *slots;
     int depth;
-    int64_t written;  /* messages so far */
+    int head;        /* slot of the next message */
+    int64_t written; /* messages so far */
+    size_t payload_bytes;
     int capacity;     /* items */
-    double rate_hz;   /* at most how often it is written */
+    double rate_hz;   /* about how often it is written */
     int64_t released; /* sequences below have been let go */
+    channel_reader *readers;  /* BST_PORT_IN and BST_PORT_MODIFY ports, part of engine->readers */
+    int reader_count;
 } channel;
 
-enum { MAX_PORTS = 16, TRIGGER_RING = 64 };
+enum { MAX_PORTS = 16 };
 
 /* What an instance needs to know about one of its ports. */
 typedef struct port_state {
     int channel; /* -1: optional and absent */
     int64_t delay_ticks;
-    int64_t max_age_ticks; /* 0: none */
-    int64_t cursor;        /* next sequence to read */
-    bool uses_next;        /* has read by bst_step_next: losses count */
-    bool writing;          /* a payload was handed out and is not yet committed */
+    int64_t max_age_ticks;  /* 0: none */
+    int64_t cursor;         /* next sequence to read */
+    int64_t trigger_cursor; /* next sequence to be stepped for */
     int capacity;
-    /* ticks at which trigger messages become visible, ascending */
-    int64_t trigger[TRIGGER_RING];
-    int trigger_head, trigger_count;
 } port_state;
 
 typedef struct instance {
@@ -46,9 +51,11 @@ typedef struct instance {
     void *self;
     bool created;
     port_state ports[MAX_PORTS];
+    int triggers[MAX_PORTS]; /* ports whose messages make it step */
+    int trigger_count;
     int64_t next_period, wake; /* INT64_MAX: none */
-    int64_t due;
     int64_t steps;
+    double own_rate_hz; /* set by bst_env_set_rate */
     double rate_hz;
 } instance;
 
@@ -65,6 +72,13 @@ struct bst_engine {
     int instance_count, instance_capacity;
     channel *channels;
     int channel_count;
+    channel_reader *readers;
+    int *releasable; /* channels whose payloads own something */
+    int releasable_count;
+    /* schedule.c: a heap of instances, the next to be stepped at its top */
+    int64_t *due; /* [instance] */
+    int *heap;    /* [place] instance */
+    int *place;   /* [instance] in the heap */
     bst_engine_hooks hooks;
     int64_t tick;
     bool loaded;
@@ -76,9 +90,9 @@ struct bst_engine {
 struct bst_step {
     bst_engine *engine;
     instance *self;
-    int self_index;
     bst_ctx *ctx;
     int64_t tick;
+    unsigned writing; /* bit of each port whose payload was handed out and not yet published */
     bst_status hook_status; /* first failure of a hook during this step */
 };
 
@@ -89,7 +103,16 @@ bst_status bst_engine_allocate_channels(bst_ctx *ctx, bst_engine *engine) BST_MU
 bst_status bst_engine_commit(struct bst_step *step) BST_MUST_CHECK;
 void bst_engine_release_read(bst_engine *engine);
 void bst_engine_count(bst_engine *engine, const char *what);
+/* schedule.c */
+bst_status bst_engine_make_schedule(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
 /* Earliest tick at which an instance wants to be stepped. */
-int64_t bst_engine_due(const instance *i);
+int64_t bst_engine_earliest(const bst_engine *engine, const instance *self);
+void bst_engine_set_due(bst_engine *engine, int instance, int64_t due);
+
+/* The slot of a message among the last `depth`, or of the next one (sequence == written). */
+static inline slot *bst_engine_slot(const channel *ch, int64_t sequence) {
+    int back = (int)(ch->written - sequence);
+    return &ch->slots[ch->head >= back ? ch->head - back : ch->head - back + ch->depth];
+}
 
 #endif

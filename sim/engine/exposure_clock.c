@@ -48,18 +48,30 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
         free(clock);
         return status;
     }
+    int64_t cycle =
+        clock->exposure_ticks > clock->period_ticks ? clock->exposure_ticks : clock->period_ticks;
+    bst_env_set_rate(env, (double)env->tick_rate_hz / (double)cycle);
     *self = clock;
     return BST_OK;
 }
 
+/* Whole ticks of a commanded time; no exposure or period is longer than a day. */
+static int64_t commanded_ticks(const exposure_clock *clock, double seconds) {
+    return (int64_t)floor(fmin(seconds, 86400.0) * (double)clock->tick_rate_hz + 0.5);
+}
+
+static int clip_end(int start, int length, int limit) {
+    int64_t end = (int64_t)start + length;
+    return end < limit ? (int)end : limit;
+}
+
 /* Takes what control asked for, clipped to what the sensor can do. */
 static void latch(exposure_clock *clock, const bst_sensor_command *command) {
-    double rate = (double)clock->tick_rate_hz;
     if (command->exposure_s > 0.0) {
-        clock->exposure_ticks = (int64_t)floor(command->exposure_s * rate + 0.5);
+        clock->exposure_ticks = commanded_ticks(clock, command->exposure_s);
     }
     if (command->period_s > 0.0) {
-        int64_t period = (int64_t)floor(command->period_s * rate + 0.5);
+        int64_t period = commanded_ticks(clock, command->period_s);
         clock->period_ticks = period > 0 ? period : 1;
     }
     if (command->binning > 0) {
@@ -69,8 +81,8 @@ static void latch(exposure_clock *clock, const bst_sensor_command *command) {
     clock->window = clock->full;
     if (w->width > 0 && w->height > 0) {
         int x0 = w->x0 < 0 ? 0 : w->x0, y0 = w->y0 < 0 ? 0 : w->y0;
-        int x1 = w->x0 + w->width < clock->full.width ? w->x0 + w->width : clock->full.width;
-        int y1 = w->y0 + w->height < clock->full.height ? w->y0 + w->height : clock->full.height;
+        int x1 = clip_end(w->x0, w->width, clock->full.width);
+        int y1 = clip_end(w->y0, w->height, clock->full.height);
         if (x1 > x0 && y1 > y0) {
             clock->window = (bst_window){x0, y0, x1 - x0, y1 - y0};
         }
@@ -81,40 +93,41 @@ static void open_exposure(exposure_clock *clock, bst_sample command) {
     if (command.payload && !command.stale) {
         latch(clock, command.payload);
     }
-    int64_t later =
+    int64_t cycle =
         clock->exposure_ticks > clock->period_ticks ? clock->exposure_ticks : clock->period_ticks;
-    clock->next_start_tick = clock->start_tick + later;
+    clock->next_start_tick = clock->start_tick + cycle;
     clock->open = true;
+}
+
+static void close_exposure(exposure_clock *clock, bst_exposure *out) {
+    *out = (bst_exposure){.id = clock->id,
+                          .start_tick = clock->start_tick,
+                          .end_tick = clock->start_tick + clock->exposure_ticks,
+                          .window = clock->window,
+                          .binning = clock->binning,
+                          .dropped = clock->dropped_fraction > 0.0 &&
+                                     bst_rng_uniform(clock->drop_key, (uint64_t)clock->id, 0) <
+                                         clock->dropped_fraction};
+    clock->id++;
+    clock->open = false;
+    clock->start_tick = clock->next_start_tick;
 }
 
 static bst_status step(void *self, struct bst_step *step) {
     exposure_clock *clock = self;
     int64_t tick = bst_step_tick(step);
-    if (!clock->open && tick >= clock->start_tick) {
-        open_exposure(clock, bst_step_latest(step, PORT_COMMAND));
+    /* in one tick an exposure may end and the next one begin, and end too when it has no length */
+    for (;;) {
+        if (!clock->open && clock->start_tick <= tick) {
+            open_exposure(clock, bst_step_latest(step, PORT_COMMAND));
+        }
+        int64_t end_tick = clock->start_tick + clock->exposure_ticks;
+        if (!clock->open || end_tick > tick) {
+            bst_step_wake_at(step, clock->open ? end_tick : clock->start_tick);
+            return BST_OK;
+        }
+        close_exposure(clock, bst_step_write(step, PORT_EXPOSURE, NULL));
     }
-    if (clock->open && tick >= clock->start_tick + clock->exposure_ticks) {
-        bst_exposure *out = bst_step_write(step, PORT_EXPOSURE, NULL);
-        *out = (bst_exposure){.id = clock->id,
-                              .start_tick = clock->start_tick,
-                              .end_tick = clock->start_tick + clock->exposure_ticks,
-                              .window = clock->window,
-                              .binning = clock->binning};
-        out->dropped =
-            clock->dropped_fraction > 0.0 &&
-            bst_rng_uniform(clock->drop_key, (uint64_t)clock->id, 0) < clock->dropped_fraction;
-        clock->id++;
-        clock->open = false;
-        clock->start_tick = clock->next_start_tick;
-    }
-    /* an exposure that starts in the very tick in which the last one ended is opened now, not a
-     * tick late */
-    if (!clock->open && clock->start_tick <= tick) {
-        open_exposure(clock, bst_step_latest(step, PORT_COMMAND));
-    }
-    bst_step_wake_at(step,
-                     clock->open ? clock->start_tick + clock->exposure_ticks : clock->start_tick);
-    return BST_OK;
 }
 
 static void destroy(void *self) {

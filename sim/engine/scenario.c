@@ -1,3 +1,4 @@
+#define _XOPEN_SOURCE 700 /* realpath */
 #include "sim/engine/scenario.h"
 
 #include <math.h>
@@ -108,7 +109,7 @@ static bst_status read_delays(bst_ctx *ctx, const bst_scenario *scenario, const 
         char inputs[300] = "";
         for (int p = 0; p < module->desc->port_count; p++) {
             const bst_port *candidate = &module->desc->ports[p];
-            if (candidate->direction == BST_PORT_OUT) {
+            if (candidate->direction != BST_PORT_IN) {
                 continue;
             }
             if (strcmp(candidate->channel, item->string) == 0) {
@@ -289,6 +290,77 @@ static bst_status check_names(bst_ctx *ctx, const bst_scenario *s) {
     return BST_OK;
 }
 
+/* Makes the path of a file that exists absolute, so that the resolved scenario can be run from any
+ * folder. A file that does not exist is left to those who open it. */
+static bst_status resolve_path(bst_ctx *ctx, const bst_scenario *s, const char *where, char *path,
+                               size_t bytes) {
+    if (!*path) {
+        return BST_OK;
+    }
+    char joined[sizeof s->base_dir + 520];
+    if (path[0] == '/') {
+        snprintf(joined, sizeof joined, "%s", path);
+    } else {
+        snprintf(joined, sizeof joined, "%s/%s", s->base_dir, path);
+    }
+    char *real = realpath(joined, NULL);
+    if (!real) {
+        return BST_OK;
+    }
+    size_t length = strlen(real);
+    bst_status status =
+        length < bytes ? BST_OK
+                       : bst_fail(ctx, BST_ERR_CONFIG,
+                                  "%s: %s: the full path of \"%s\" is %zu bytes long (allowed: "
+                                  "%zu); move the file",
+                                  s->file, where, path, length, bytes - 1);
+    if (status == BST_OK) {
+        memcpy(path, real, length + 1);
+    }
+    free(real);
+    return status;
+}
+
+static bst_status resolve_catalogue(bst_ctx *ctx, const bst_scenario *s, const char *where,
+                                    char *name, size_t bytes) {
+    if (strcmp(name, "default") == 0 || strcmp(name, "embedded") == 0) {
+        return BST_OK;
+    }
+    return resolve_path(ctx, s, where, name, bytes);
+}
+
+static bst_status resolve_paths(bst_ctx *ctx, bst_scenario *s) {
+    char where[100];
+    bst_world_config *world = &s->world;
+    BST_TRY(resolve_catalogue(ctx, s, "/world/star_catalogue", world->star_catalogue,
+                              sizeof world->star_catalogue));
+    if (strcmp(world->earth_orientation, "builtin") != 0) {
+        BST_TRY(resolve_path(ctx, s, "/world/earth_orientation", world->earth_orientation,
+                             sizeof world->earth_orientation));
+    }
+    bst_object_config *objects = world->objects.items;
+    for (int i = 0; i < world->objects.count; i++) {
+        char *file = objects[i].orbit.tle_file;
+        snprintf(where, sizeof where, "/world/objects/%d/orbit/tle_file", i);
+        BST_TRY(resolve_path(ctx, s, where, file, sizeof objects[i].orbit.tle_file));
+    }
+    bst_observer_config *observers = s->observers.items;
+    for (int i = 0; i < s->observers.count; i++) {
+        char *file = observers[i].orbit.tle_file;
+        snprintf(where, sizeof where, "/observers/%d/orbit/tle_file", i);
+        BST_TRY(resolve_path(ctx, s, where, file, sizeof observers[i].orbit.tle_file));
+        bst_sensor_config *sensors = observers[i].sensors.items;
+        for (int k = 0; k < observers[i].sensors.count; k++) {
+            char *catalogue = sensors[k].knowledge.star_catalogue;
+            snprintf(where, sizeof where, "/observers/%d/sensors/%d/knowledge/star_catalogue", i,
+                     k);
+            BST_TRY(resolve_catalogue(ctx, s, where, catalogue,
+                                      sizeof sensors[k].knowledge.star_catalogue));
+        }
+    }
+    return BST_OK;
+}
+
 bst_status bst_scenario_read(bst_ctx *ctx, const bst_json *json, const bst_registry *registry,
                              bst_scenario *out) {
     memset(out, 0, sizeof *out);
@@ -309,6 +381,7 @@ bst_status bst_scenario_read(bst_ctx *ctx, const bst_json *json, const bst_regis
         return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: /duration_s", out->file);
     }
     BST_TRY(check_names(ctx, out));
+    BST_TRY(resolve_paths(ctx, out));
     return read_modules(ctx, json, registry, out);
 }
 
@@ -389,7 +462,7 @@ static cJSON *module_schema(const bst_module_desc *m) {
     cJSON_AddBoolToObject(delays, "additionalProperties", 0);
     cJSON *inputs = cJSON_AddObjectToObject(delays, "properties");
     for (int p = 0; p < m->port_count; p++) {
-        if (m->ports[p].direction != BST_PORT_OUT) {
+        if (m->ports[p].direction == BST_PORT_IN) {
             cJSON *input = cJSON_AddObjectToObject(inputs, m->ports[p].channel);
             cJSON_AddStringToObject(input, "type", "number");
             cJSON_AddNumberToObject(input, "minimum", 0);

@@ -1,3 +1,4 @@
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -88,6 +89,14 @@ static bst_status connect_inputs(bst_ctx *ctx, bst_engine *engine) {
             if (state->delay_ticks < 1 && (port->flags & BST_PORT_FEEDBACK)) {
                 state->delay_ticks = 1;
             }
+            if (state->delay_ticks > 0 && port->direction == BST_PORT_MODIFY) {
+                return bst_fail(ctx, BST_ERR_CONFIG,
+                                "%s: %s is changed in place and takes no delay", reader->name,
+                                type->name);
+            }
+            if (port->flags & BST_PORT_TRIGGER) {
+                reader->triggers[reader->trigger_count++] = p;
+            }
             if (state->delay_ticks > 0 && type->in_place) {
                 return bst_fail(ctx, BST_ERR_CONFIG,
                                 "%s: %s is extended in place and cannot be read with a delay",
@@ -117,7 +126,7 @@ static bool must_follow(const bst_engine *engine, int a, int b) {
         if (engine->channels[state->channel].writer == a) {
             return true;
         }
-        if (port->direction != BST_PORT_IN) {
+        if (port->direction != BST_PORT_IN || a == b) {
             continue;
         }
         /* readers come after those who change the message */
@@ -183,7 +192,7 @@ static bst_status sort_instances(bst_ctx *ctx, bst_engine *engine) {
         for (int b = 0; b < n && next < 0; b++) {
             bool ready = !placed[b];
             for (int a = 0; a < n && ready; a++) {
-                ready = a == b || placed[a] || !must_follow(engine, a, b);
+                ready = placed[a] || !must_follow(engine, a, b);
             }
             next = ready ? b : -1;
         }
@@ -231,62 +240,98 @@ static void settle_rates(bst_engine *engine) {
     for (int round = 0; round < 8; round++) {
         for (int i = 0; i < engine->instance_count; i++) {
             instance *self = engine->instances[i];
-            double rate = self->spec.period_ticks > 0
-                              ? (double)engine->tick_rate_hz / (double)self->spec.period_ticks
-                              : 0.0;
-            for (int p = 0; p < self->spec.desc->port_count; p++) {
-                if ((self->spec.desc->ports[p].flags & BST_PORT_TRIGGER) &&
-                    self->ports[p].channel >= 0) {
-                    rate += engine->channels[self->ports[p].channel].rate_hz;
-                }
+            double rate = self->own_rate_hz;
+            if (self->spec.period_ticks > 0) {
+                rate += (double)engine->tick_rate_hz / (double)self->spec.period_ticks;
             }
-            self->rate_hz = rate > 0.0 ? rate : self->spec.desc->default_rate_hz;
+            for (int t = 0; t < self->trigger_count; t++) {
+                rate += engine->channels[self->ports[self->triggers[t]].channel].rate_hz;
+            }
+            self->rate_hz = rate;
             for (int p = 0; p < self->spec.desc->port_count; p++) {
                 if (self->spec.desc->ports[p].direction == BST_PORT_OUT) {
-                    engine->channels[self->ports[p].channel].rate_hz = self->rate_hz;
+                    engine->channels[self->ports[p].channel].rate_hz = rate;
                 }
             }
         }
     }
 }
 
-bst_status bst_engine_allocate_channels(bst_ctx *ctx, bst_engine *engine) {
-    settle_rates(engine);
+/* Who reads each channel, and which channels own what must be let go. */
+static bst_status list_readers(bst_ctx *ctx, bst_engine *engine) {
+    int most = 0;
+    for (int i = 0; i < engine->instance_count; i++) {
+        most += engine->instances[i]->spec.desc->port_count;
+    }
+    engine->readers = calloc((size_t)most + 1, sizeof *engine->readers);
+    engine->releasable = calloc((size_t)engine->channel_count + 1, sizeof *engine->releasable);
+    if (!engine->readers || !engine->releasable) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for channels");
+    }
+    channel_reader *next = engine->readers;
     for (int c = 0; c < engine->channel_count; c++) {
         channel *ch = &engine->channels[c];
-        int64_t longest = 0;
+        if (ch->type->release) {
+            engine->releasable[engine->releasable_count++] = c;
+        }
+        ch->readers = next;
         for (int i = 0; i < engine->instance_count; i++) {
-            instance *reader = engine->instances[i];
-            for (int p = 0; p < reader->spec.desc->port_count; p++) {
-                if (reader->spec.desc->ports[p].direction != BST_PORT_OUT &&
-                    reader->ports[p].channel == c && reader->ports[p].delay_ticks > longest) {
-                    longest = reader->ports[p].delay_ticks;
+            const instance *self = engine->instances[i];
+            for (int p = 0; p < self->spec.desc->port_count; p++) {
+                if (self->spec.desc->ports[p].direction != BST_PORT_OUT &&
+                    self->ports[p].channel == c) {
+                    *next++ = (channel_reader){i, p};
                 }
             }
         }
-        double waiting = (double)longest / (double)engine->tick_rate_hz * ch->rate_hz;
-        if (waiting > 1e5) {
-            return bst_fail(ctx, BST_ERR_CONFIG,
-                            "%s/%s: a delay of %lld ticks would hold %.0f messages", ch->scope,
-                            ch->type->name, (long long)longest, waiting);
-        }
-        /* delay / period + 1, and one more each for the message being written and for one more
-         * writer's step in the tick */
-        ch->depth = ch->type->in_place ? 1 : (int)ceil(waiting) + 3;
-        ch->capacity = engine->instances[ch->writer]->ports[ch->writer_port].capacity;
-        ch->slots = calloc((size_t)ch->depth, sizeof *ch->slots);
-        size_t bytes = ch->type->header_bytes + ch->type->item_bytes * (size_t)ch->capacity;
-        for (int s = 0; ch->slots && s < ch->depth; s++) {
-            ch->slots[s].payload = calloc(1, bytes);
-            if (!ch->slots[s].payload) {
-                return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the channel %s/%s",
-                                ch->scope, ch->type->name);
-            }
-        }
-        if (!ch->slots) {
-            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the channel %s/%s", ch->scope,
-                            ch->type->name);
-        }
+        ch->reader_count = (int)(next - ch->readers);
+    }
+    return BST_OK;
+}
+
+/* Seconds for which a message may have to wait for this reader. */
+static double longest_wait_s(const bst_engine *engine, const channel *ch, channel_reader r) {
+    const instance *self = engine->instances[r.instance];
+    double wait = (double)self->ports[r.port].delay_ticks / (double)engine->tick_rate_hz;
+    bool triggered = self->spec.desc->ports[r.port].flags & BST_PORT_TRIGGER;
+    if (ch->type->kind == BST_CHANNEL_QUEUE && !triggered && self->rate_hz > 0.0) {
+        wait += 1.0 / self->rate_hz;
+    }
+    return wait;
+}
+
+static bst_status allocate_channel(bst_ctx *ctx, const bst_engine *engine, channel *ch) {
+    double waiting = 0.0;
+    for (int r = 0; r < ch->reader_count; r++) {
+        waiting = fmax(waiting, ch->rate_hz * longest_wait_s(engine, ch, ch->readers[r]));
+    }
+    if (waiting > 1e5) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "%s/%s: %.0f messages would wait for a reader (allowed: 100000); shorten "
+                        "the delay or the rates' ratio",
+                        ch->scope, ch->type->name, waiting);
+    }
+    /* delay / period + 1, and one more each for the message being written and for one more
+     * writer's step in the tick */
+    ch->depth = ch->type->in_place ? 1 : (int)ceil(waiting) + 3;
+    ch->capacity = engine->instances[ch->writer]->ports[ch->writer_port].capacity;
+    ch->payload_bytes = ch->type->header_bytes + ch->type->item_bytes * (size_t)ch->capacity;
+    ch->slots = calloc((size_t)ch->depth, sizeof *ch->slots);
+    bool enough = ch->slots != NULL;
+    for (int s = 0; enough && s < ch->depth; s++) {
+        ch->slots[s].payload = calloc(1, ch->payload_bytes);
+        enough = ch->slots[s].payload != NULL;
+    }
+    return enough ? BST_OK
+                  : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the channel %s/%s", ch->scope,
+                             ch->type->name);
+}
+
+bst_status bst_engine_allocate_channels(bst_ctx *ctx, bst_engine *engine) {
+    BST_TRY(list_readers(ctx, engine));
+    settle_rates(engine);
+    for (int c = 0; c < engine->channel_count; c++) {
+        BST_TRY(allocate_channel(ctx, engine, &engine->channels[c]));
     }
     return BST_OK;
 }

@@ -9,7 +9,8 @@
 /* The loop has settled when it is in track mode and the target lies this close to the boresight. */
 #define SETTLED_PX 3.0
 
-enum { WAITING = 16 };
+/* Frames that may wait for their tracks: 1 s of latency at 60 Hz. */
+enum { WAITING = 64 };
 
 /* Pointing errors in logarithmic bins of 1 %, from 1e-4 px: percentiles of a run of any length in
  * fixed memory. */
@@ -21,6 +22,7 @@ typedef struct waiting_frame {
     bst_loop_frame frame;
     bst_vec3 direction; /* true, geometric */
     int64_t mid_tick;
+    bool known;  /* the target has a place: not decayed */
     bool judged; /* tracks of this very exposure have come */
 } waiting_frame;
 
@@ -102,7 +104,7 @@ static void judge(bst_loop_summary *s, waiting_frame *w, const bst_track *track,
     if (!track) {
         return;
     }
-    if (s->target >= 0 && on_target(s, w, track, track_tick)) {
+    if (w->known && on_target(s, w, track, track_tick)) {
         w->frame.in_track = true;
         if (s->confirm_tick < 0) {
             s->confirm_tick = now;
@@ -153,6 +155,7 @@ static bst_status look_at_target(bst_ctx *ctx, bst_loop_summary *s, const bst_tr
         return BST_OK; /* decayed: nothing to see */
     }
     BST_TRY(status);
+    w->known = true;
     w->direction = sight.geometric;
     f->visible = !sight.occulted && isfinite(sight.v_mag);
     bst_vec3 cam = bst_quat_rotate(truth->q_cam_from_gcrf_mid, sight.apparent);
@@ -201,6 +204,12 @@ bst_status bst_loop_summary_truth(bst_ctx *ctx, bst_loop_summary *s, const bst_t
 }
 
 void bst_loop_summary_tracks(bst_loop_summary *s, const bst_tracks *tracks, int64_t tick) {
+    /* tracks come in the order of their exposures: earlier frames will have none, and are judged by
+     * what was known before these */
+    while (s->first < s->next &&
+           s->waiting[s->first % WAITING].frame.exposure_id < tracks->exposure_id) {
+        retire(s);
+    }
     s->has_toi = false;
     for (int i = 0; i < tracks->count; i++) {
         const bst_track *t = &tracks->items[i];
@@ -211,19 +220,12 @@ void bst_loop_summary_tracks(bst_loop_summary *s, const bst_tracks *tracks, int6
             s->toi_tick = tracks->tick;
         }
     }
-    for (int64_t n = s->first; n < s->next; n++) {
-        waiting_frame *w = &s->waiting[n % WAITING];
-        if (w->frame.exposure_id == tracks->exposure_id && !w->judged) {
-            w->judged = true;
-            judge(s, w, s->has_toi ? &s->toi : NULL, s->toi_tick, tick);
-            s->newest.in_track = w->frame.in_track;
-            s->last_in_track = w->frame.in_track;
-        }
-    }
-    /* frames are judged in order, so everything before this exposure is final */
-    while (s->first < s->next &&
-           s->waiting[s->first % WAITING].frame.exposure_id <= tracks->exposure_id) {
+    waiting_frame *w = &s->waiting[s->first % WAITING];
+    if (s->first < s->next && w->frame.exposure_id == tracks->exposure_id) {
+        w->judged = true;
+        judge(s, w, s->has_toi ? &s->toi : NULL, s->toi_tick, tick);
         retire(s);
+        s->newest.in_track = s->last_in_track;
     }
 }
 

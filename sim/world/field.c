@@ -11,7 +11,7 @@
 
 /* Attitudes and instants at which a position is evaluated to average it over the exposure: the
  * sigma points of the joint first and second moments of (attitude deviation, time), Julier and
- * Uhlmann 1997. Exact to second order. */
+ * Uhlmann 1997. Exact to second order; the first, the mean itself, has no weight. */
 enum { SIGMA_DIMENSIONS = 4, SIGMA_POINTS = 2 * SIGMA_DIMENSIONS + 1 };
 
 struct bst_field {
@@ -30,7 +30,6 @@ struct bst_field {
     double exposure_s;
     bst_quat sigma_q[SIGMA_POINTS];
     double sigma_time[SIGMA_POINTS]; /* fraction of the exposure */
-    double sigma_weight[SIGMA_POINTS];
 };
 
 bst_status bst_field_create(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
@@ -177,11 +176,13 @@ static void summarise_track(bst_field *field, const bst_los_track *track, bst_qu
     double first[D] = {0}, second[D][D] = {{0}}, total = 0.0, reach = 0.0;
     double half_px = 0.5 * hypot((double)field->camera->width_px, (double)field->camera->height_px);
     double scale = bst_camera_scale_rad(field->camera);
+    /* a tilt moves points at the corner further than at the centre */
+    double stretch = 1.0 + half_px * half_px * scale * scale;
     double previous[D] = {0};
     for (int k = 0; k < track->count; k++) {
         bst_vec3 d = deviation(field->q_mid, track->q_cam_from_gcrf[k]);
         double now[D] = {d.x, d.y, d.z, exposure > 0.0 ? track->time_s[k] / exposure : 0.5};
-        reach = fmax(reach, hypot(d.x, d.y) / scale + fabs(d.z) * half_px);
+        reach = fmax(reach, hypot(d.x, d.y) / scale * stretch + fabs(d.z) * half_px);
         /* moments of the piecewise linear path between the samples */
         double w = k > 0 ? (exposure > 0.0 ? track->time_s[k] - track->time_s[k - 1] : 1.0) : 0.0;
         for (int i = 0; i < D; i++) {
@@ -219,7 +220,6 @@ static void summarise_track(bst_field *field, const bst_los_track *track, bst_qu
         field->sigma_q[p] = bst_quat_mul(
             bst_quat_from_rotvec((bst_vec3){point[0], point[1], point[2]}), field->q_mid);
         field->sigma_time[p] = point[3];
-        field->sigma_weight[p] = p == 0 ? 0.0 : 0.5 / D;
     }
     *mean = field->sigma_q[0];
     *reach_px = reach;
@@ -404,16 +404,58 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     return BST_OK;
 }
 
-/* Integral of the squared image (per px^2) of a unit source: a Gaussian of standard deviation sigma
- * along a straight streak of length L. 1 / (4 pi sigma^2) for L = 0; else (1 / (2 sqrt(pi) sigma))
- * times the line integral of the autocorrelation of a uniform segment. */
-static double squared_image(double sigma, double length) {
+/* Integral of the squared image (per px^2) of a unit source: a straight streak of length L, blurred
+ * by a Gaussian of standard deviation `along` in its direction and `across` at right angles.
+ * 1 / (4 pi along across) for L = 0; else (1 / (2 sqrt(pi) across)) times the line integral of the
+ * autocorrelation of a uniform segment. */
+static double squared_image(double along, double across, double length) {
     const double root_pi = sqrt(BST_PI);
-    double a = length / (2.0 * sigma);
-    double along = a < 1e-3 ? 1.0 / (2.0 * root_pi * sigma) * (1.0 - a * a / 6.0)
-                            : erf(a) / length -
-                                  (2.0 * sigma / (length * length * root_pi)) * (1.0 - exp(-a * a));
-    return along / (2.0 * root_pi * sigma);
+    double a = length / (2.0 * along);
+    double line = a < 1e-3 ? 1.0 / (2.0 * root_pi * along) * (1.0 - a * a / 6.0)
+                           : erf(a) / length -
+                                 (2.0 * along / (length * length * root_pi)) * (1.0 - exp(-a * a));
+    return line / (2.0 * root_pi * across);
+}
+
+/* Mean and covariance over the exposure of where a source's image is; NAN when it is behind the
+ * camera. */
+typedef struct smear {
+    double x_mean, y_mean, xx, xy, yy;
+} smear;
+
+static smear smear_of(const bst_field *field, const bst_source *source) {
+    smear m = {0};
+    double x[SIGMA_POINTS], y[SIGMA_POINTS];
+    for (int p = 0; p < SIGMA_POINTS; p++) {
+        bst_vec3 d = apparent_at(source, field->sigma_time[p]);
+        x[p] = y[p] = NAN;
+        (void)bst_camera_project(field->camera, bst_quat_rotate(field->sigma_q[p], d), &x[p],
+                                 &y[p]);
+    }
+    for (int p = 1; p < SIGMA_POINTS; p++) {
+        m.x_mean += x[p] / (SIGMA_POINTS - 1);
+        m.y_mean += y[p] / (SIGMA_POINTS - 1);
+    }
+    for (int p = 1; p < SIGMA_POINTS; p++) {
+        double dx = x[p] - m.x_mean, dy = y[p] - m.y_mean;
+        m.xx += dx * dx / (SIGMA_POINTS - 1);
+        m.xy += dx * dy / (SIGMA_POINTS - 1);
+        m.yy += dy * dy / (SIGMA_POINTS - 1);
+    }
+    return m;
+}
+
+/* The PSF with the pixel's own width, widened along and across the way from the first to the last
+ * position by what the smear has beyond a uniform straight streak of that length (jitter, bends).
+ */
+static void blur(const bst_camera *camera, const smear *m, double dx, double dy, double *along,
+                 double *across) {
+    double psf = bst_camera_psf_sigma_px(camera);
+    double variance = psf * psf + 1.0 / 12.0, length = hypot(dx, dy);
+    double c = length > 0.0 ? dx / length : 1.0, s = length > 0.0 ? dy / length : 0.0;
+    double uu = m->xx * c * c + 2.0 * m->xy * c * s + m->yy * s * s;
+    *along = sqrt(variance + fmax(uu - length * length / 12.0, 0.0));
+    *across = sqrt(variance + fmax(m->xx + m->yy - uu, 0.0));
 }
 
 void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
@@ -445,37 +487,29 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
                             &out->y_end_px);
     (void)bst_camera_project(camera, bst_quat_rotate(field->q_mid, source->apparent_mid),
                              &out->x_mid_px, &out->y_mid_px);
-    double x_mean = 0.0, y_mean = 0.0;
-    for (int p = 0; p < SIGMA_POINTS; p++) {
-        double x = NAN, y = NAN;
-        bst_vec3 d = apparent_at(source, field->sigma_time[p]);
-        (void)bst_camera_project(camera, bst_quat_rotate(field->sigma_q[p], d), &x, &y);
-        if (field->sigma_weight[p] > 0.0) {
-            x_mean += field->sigma_weight[p] * x;
-            y_mean += field->sigma_weight[p] * y;
-        }
-    }
-    out->x_mean_px = x_mean;
-    out->y_mean_px = y_mean;
-    double sigma =
-        hypot(bst_camera_psf_sigma_px(camera), sqrt(1.0 / 12.0)); /* the pixel's own width */
-    double length = hypot(out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px);
+    smear image = smear_of(field, source);
+    out->x_mean_px = image.x_mean;
+    out->y_mean_px = image.y_mean;
     double variance =
         header->background_e + header->dark_e + camera->read_noise_e * camera->read_noise_e;
+    double length = hypot(out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px);
+    double along, across;
+    blur(camera, &image, out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px, &along,
+         &across);
     if (isfinite(length) && variance > 0.0) {
-        out->snr = out->electrons * sqrt(squared_image(sigma, length) / variance);
+        out->snr = out->electrons * sqrt(squared_image(along, across, length) / variance);
     }
     if (source->occulted) {
         out->flags |= BST_TRUTH_OCCULTED;
     }
-    if (x_mean >= window.x0 - 0.5 && x_mean < window.x0 + window.width - 0.5 &&
-        y_mean >= window.y0 - 0.5 && y_mean < window.y0 + window.height - 0.5) {
+    if (image.x_mean >= window.x0 - 0.5 && image.x_mean < window.x0 + window.width - 0.5 &&
+        image.y_mean >= window.y0 - 0.5 && image.y_mean < window.y0 + window.height - 0.5) {
         out->flags |= BST_TRUTH_IN_FIELD;
     }
     /* peak of the image: of a point 1 / (2 pi sigma^2), of a long streak 1 / (sqrt(2 pi) sigma
      * length) */
     double peak =
-        out->electrons / (2.0 * BST_PI * sigma * hypot(sigma, length / sqrt(2.0 * BST_PI)));
+        out->electrons / (2.0 * BST_PI * across * hypot(along, length / sqrt(2.0 * BST_PI)));
     if (peak + header->background_e + header->dark_e > camera->full_well_e) {
         out->flags |= BST_TRUTH_SATURATED;
     }

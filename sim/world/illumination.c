@@ -6,9 +6,10 @@
 
 double bst_lambert_sphere_v_mag(double area_m2, double albedo, double phase_rad, double range_m,
                                 double sun_distance_m) {
-    double phase = (BST_PI - phase_rad) * cos(phase_rad) + sin(phase_rad);
+    double phi = fabs(phase_rad);
+    double phase = (BST_PI - phi) * cos(phi) + sin(phi);
     double au = sun_distance_m / BST_AU_M;
-    double ratio = 2.0 * albedo * area_m2 * fmax(phase, 0.0) /
-                   (3.0 * BST_PI * BST_PI * range_m * range_m * au * au);
-    return ratio > 0.0 ? SUN_V_MAG - 2.5 * log10(ratio) : INFINITY;
+    double ratio =
+        2.0 * albedo * area_m2 * phase / (3.0 * BST_PI * BST_PI * range_m * range_m * au * au);
+    return phi < BST_PI && ratio > 0.0 ? SUN_V_MAG - 2.5 * log10(ratio) : INFINITY;
 }

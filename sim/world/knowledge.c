@@ -54,7 +54,7 @@ double bst_knowledge_julian_year(const bst_knowledge *k) {
     return k->julian_year;
 }
 bst_quat bst_knowledge_body_attitude(const bst_knowledge *k) {
-    return k->body_attitude;
+    return k->world->observers[k->observer].sensors[k->sensor].body_attitude;
 }
 
 bst_status bst_knowledge_view_create(bst_ctx *ctx, const bst_knowledge *knowledge,
@@ -84,7 +84,7 @@ void bst_knowledge_view_free(bst_knowledge_view *view) {
 bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                 bst_cue *out) {
     const bst_knowledge *k = view->knowledge;
-    /* central difference: the third derivative of a LEO-to-GEO direction leaves < 1e-12 rad/s */
+    /* central difference: the third derivative of a LEO-to-GEO direction leaves < 1e-11 rad/s */
     const double h = 0.5;
     bst_vec3 d[3];
     for (int i = 0; i < 3; i++) {

@@ -1,3 +1,5 @@
+#include <stdlib.h>
+
 #include "sim/world/kepler.h"
 #include "sim/world/world_internal.h"
 
@@ -49,47 +51,52 @@ static bst_status relative_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_c
     return BST_OK;
 }
 
-/* What the burns up to `seconds` have added. Each burn's effect is the difference of two two-body
- * orbits from the time of the burn, so that the perturbations that the analytic orbit already has
- * are kept (Encke's idea; the neglected difference of perturbations grows as the separation does:
- * below 1 m per km in an hour at GEO). */
-static bst_status add_burns(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *clock,
-                            bst_time epoch, double seconds, bst_state *state) {
-    bst_state deviation = {{0, 0, 0},
-                           {0, 0, 0}}; /* from the catalogued orbit, carried from burn to burn */
-    double from_s = 0.0;
-    for (int i = 0; i <= orbit->burn_count; i++) {
-        bool last = i == orbit->burn_count || orbit->burns[i].time_s > seconds;
-        double next_s = last ? seconds : orbit->burns[i].time_s;
-        if (i > 0) {
-            bst_state base, moved[2];
-            BST_TRY(bst_orbit_state(ctx, orbit, clock, epoch, from_s, false, &base));
-            BST_TRY(bst_kepler_propagate(ctx, BST_EARTH_MU_M3PS2, base.position_m,
-                                         base.velocity_mps, next_s - from_s, &moved[0].position_m,
-                                         &moved[0].velocity_mps));
-            BST_TRY(bst_kepler_propagate(
-                ctx, BST_EARTH_MU_M3PS2, bst_vec3_add(base.position_m, deviation.position_m),
-                bst_vec3_add(base.velocity_mps, deviation.velocity_mps), next_s - from_s,
-                &moved[1].position_m, &moved[1].velocity_mps));
-            deviation.position_m = bst_vec3_sub(moved[1].position_m, moved[0].position_m);
-            deviation.velocity_mps = bst_vec3_sub(moved[1].velocity_mps, moved[0].velocity_mps);
-        }
-        if (last) {
-            break;
-        }
-        bst_state base;
-        BST_TRY(bst_orbit_state(ctx, orbit, clock, epoch, next_s, false, &base));
-        base.position_m = bst_vec3_add(base.position_m, deviation.position_m);
-        base.velocity_mps = bst_vec3_add(base.velocity_mps, deviation.velocity_mps);
-        bst_vec3 r, t, n;
-        rtn_axes(&base, &r, &t, &n);
-        const double *dv = orbit->burns[i].dv_rtn_mps;
-        deviation.velocity_mps = bst_vec3_add(deviation.velocity_mps,
-                                              from_rtn(r, t, n, (bst_vec3){dv[0], dv[1], dv[2]}));
-        from_s = next_s;
+/* Deviation from the catalogued orbit at `seconds`, not before `burn`: the difference of two
+ * two-body orbits from the time of the burn, so that the perturbations that the analytic orbit
+ * already has are kept (Encke's idea; the neglected difference of perturbations grows as the
+ * separation does: below 1 m per km in an hour at GEO). */
+static bst_status deviation_at(bst_ctx *ctx, const bst_burn *burn, double seconds, bst_state *out) {
+    bst_state base, moved;
+    double dt = seconds - burn->time_s;
+    BST_TRY(bst_kepler_propagate(ctx, BST_EARTH_MU_M3PS2, burn->base.position_m,
+                                 burn->base.velocity_mps, dt, &base.position_m,
+                                 &base.velocity_mps));
+    BST_TRY(bst_kepler_propagate(
+        ctx, BST_EARTH_MU_M3PS2, bst_vec3_add(burn->base.position_m, burn->deviation.position_m),
+        bst_vec3_add(burn->base.velocity_mps, burn->deviation.velocity_mps), dt, &moved.position_m,
+        &moved.velocity_mps));
+    out->position_m = bst_vec3_sub(moved.position_m, base.position_m);
+    out->velocity_mps = bst_vec3_sub(moved.velocity_mps, base.velocity_mps);
+    return BST_OK;
+}
+
+static void add_state(bst_state *to, const bst_state *what) {
+    to->position_m = bst_vec3_add(to->position_m, what->position_m);
+    to->velocity_mps = bst_vec3_add(to->velocity_mps, what->velocity_mps);
+}
+
+bst_status bst_orbit_set_burns(bst_ctx *ctx, bst_orbit *orbit, bst_sky_clock *clock, bst_time epoch,
+                               const bst_burn_config *burns, int count) {
+    orbit->burns = calloc((size_t)count + 1, sizeof *orbit->burns);
+    if (!orbit->burns) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for burns");
     }
-    state->position_m = bst_vec3_add(state->position_m, deviation.position_m);
-    state->velocity_mps = bst_vec3_add(state->velocity_mps, deviation.velocity_mps);
+    for (int i = 0; i < count; i++) {
+        bst_burn *burn = &orbit->burns[i];
+        burn->time_s = burns[i].time_s;
+        BST_TRY(bst_orbit_state(ctx, orbit, clock, epoch, burn->time_s, false, &burn->base));
+        if (i > 0) {
+            BST_TRY(deviation_at(ctx, burn - 1, burn->time_s, &burn->deviation));
+        }
+        bst_state before = burn->base;
+        add_state(&before, &burn->deviation);
+        bst_vec3 r, t, n;
+        rtn_axes(&before, &r, &t, &n);
+        const double *dv = burns[i].dv_rtn_mps;
+        burn->deviation.velocity_mps = bst_vec3_add(
+            burn->deviation.velocity_mps, from_rtn(r, t, n, (bst_vec3){dv[0], dv[1], dv[2]}));
+        orbit->burn_count = i + 1;
+    }
     return BST_OK;
 }
 
@@ -100,8 +107,14 @@ bst_status bst_orbit_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *
     } else {
         BST_TRY(relative_state(ctx, orbit, clock, epoch, seconds, with_burns, out));
     }
-    if (with_burns && orbit->burn_count > 0 && orbit->burns[0].time_s <= seconds) {
-        BST_TRY(add_burns(ctx, orbit, clock, epoch, seconds, out));
+    int burn = with_burns ? orbit->burn_count - 1 : -1;
+    while (burn >= 0 && orbit->burns[burn].time_s > seconds) {
+        burn--;
+    }
+    if (burn >= 0) {
+        bst_state deviation;
+        BST_TRY(deviation_at(ctx, &orbit->burns[burn], seconds, &deviation));
+        add_state(out, &deviation);
     }
     return BST_OK;
 }

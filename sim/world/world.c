@@ -9,7 +9,30 @@ typedef struct builder {
     const char *scenario;
     const char *base_dir;
     bst_world *world;
+    bst_sky_clock *clock;
 } builder;
+
+/* A path that may be relative to the scenario's folder. */
+typedef struct full_path {
+    char text[1100];
+} full_path;
+
+static full_path join(const builder *b, const char *path) {
+    full_path full;
+    bool as_it_is = path[0] == '/' || !*path || !*b->base_dir;
+    snprintf(full.text, sizeof full.text, "%s%s%s", as_it_is ? "" : b->base_dir,
+             as_it_is ? "" : "/", path);
+    return full;
+}
+
+static bst_status open_stars(const builder *b, const char *name, const char *where,
+                             bst_stars **out) {
+    bool word = strcmp(name, "default") == 0 || strcmp(name, "embedded") == 0;
+    full_path file = join(b, name);
+    bst_status status = bst_stars_open(b->ctx, word ? name : file.text, out);
+    return status == BST_OK ? BST_OK
+                            : bst_fail_prefix(b->ctx, status, "%s: %s", b->scenario, where);
+}
 
 static bst_status make_sgp4(const builder *b, const bst_orbit_config *config, const char *path,
                             bst_orbit *orbit, int *norad) {
@@ -18,19 +41,12 @@ static bst_status make_sgp4(const builder *b, const bst_orbit_config *config, co
                         "%s: %s: source \"sgp4\" needs \"tle_file\" and \"norad\"", b->scenario,
                         path);
     }
-    char file[1024];
-    snprintf(file, sizeof file, "%s%s%s", config->tle_file[0] == '/' ? "" : b->base_dir,
-             config->tle_file[0] == '/' || !*b->base_dir ? "" : "/", config->tle_file);
+    full_path file = join(b, config->tle_file);
     bst_elements *sets = NULL;
     int count = 0;
     bst_tle_options options = {.norad = (int)config->norad};
-    if (bst_tle_load(b->ctx, file, &options, &sets, &count) != BST_OK) {
+    if (bst_tle_load(b->ctx, file.text, &options, &sets, &count) != BST_OK) {
         return bst_fail_prefix(b->ctx, BST_ERR_CONFIG, "%s: %s/tle_file", b->scenario, path);
-    }
-    if (count == 0) {
-        free(sets);
-        return bst_fail(b->ctx, BST_ERR_CONFIG, "%s: %s/norad: no element set of %lld in %s",
-                        b->scenario, path, (long long)config->norad, file);
     }
     /* of several sets the one whose epoch is nearest to the scenario's */
     int best = 0;
@@ -115,13 +131,11 @@ static bst_status make_objects(const builder *b, const bst_config_list *list) {
                         b->scenario, i, k);
                 }
             }
-            size_t bytes = (size_t)config->burns.count * sizeof *burns;
-            object->orbit.burns = malloc(bytes);
-            if (!object->orbit.burns) {
-                return bst_fail(b->ctx, BST_ERR_MEMORY, "out of memory for burns");
+            if (bst_orbit_set_burns(b->ctx, &object->orbit, b->clock, world->epoch, burns,
+                                    config->burns.count) != BST_OK) {
+                return bst_fail_prefix(b->ctx, BST_ERR_CONFIG, "%s: /world/objects/%d/burns",
+                                       b->scenario, i);
             }
-            memcpy(object->orbit.burns, burns, bytes);
-            object->orbit.burn_count = config->burns.count;
         }
     }
     return BST_OK;
@@ -156,6 +170,33 @@ static bst_status make_observers(const builder *b, const bst_config_list *list) 
     return BST_OK;
 }
 
+static bst_status build(builder *b, const bst_world_config *config,
+                        const bst_config_list *observers) {
+    bst_world *world = b->world;
+    bool builtin = strcmp(config->earth_orientation, "builtin") == 0;
+    full_path eop_file = join(b, config->earth_orientation);
+    bst_status status = builtin ? bst_eop_builtin(b->ctx, &world->eop)
+                                : bst_eop_load(b->ctx, eop_file.text, &world->eop);
+    if (status != BST_OK) {
+        return bst_fail_prefix(b->ctx, status, "%s: /world/earth_orientation", b->scenario);
+    }
+    bst_eop_values values;
+    status = bst_eop_at(b->ctx, world->eop, world->epoch, &values);
+    if (status != BST_OK) {
+        return bst_fail_prefix(b->ctx, status, "%s: /epoch_utc", b->scenario);
+    }
+    BST_TRY(open_stars(b, config->star_catalogue, "/world/star_catalogue", &world->stars));
+    BST_TRY(bst_sky_clock_create(b->ctx, world->eop, &b->clock));
+    BST_TRY(make_objects(b, &config->objects));
+    BST_TRY(make_observers(b, observers));
+    for (int i = 0; i < world->observer_count; i++) {
+        for (int k = 0; k < world->observers[i].sensor_count; k++) {
+            BST_TRY(bst_cue_resolve(b->ctx, b->scenario, world, i, k, b->clock));
+        }
+    }
+    return BST_OK;
+}
+
 bst_status bst_world_create(bst_ctx *ctx, const char *scenario, const bst_world_config *config,
                             const bst_config_list *observers, const char *base_dir, bst_time epoch,
                             bst_world **out) {
@@ -165,39 +206,9 @@ bst_status bst_world_create(bst_ctx *ctx, const char *scenario, const bst_world_
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the world");
     }
     world->epoch = epoch;
-    builder b = {ctx, scenario, base_dir, world};
-    bst_status status = strcmp(config->earth_orientation, "builtin") == 0
-                            ? bst_eop_builtin(ctx, &world->eop)
-                            : bst_eop_load(ctx, config->earth_orientation, &world->eop);
-    bst_eop_values values;
-    if (status == BST_OK) {
-        status = bst_eop_at(ctx, world->eop, epoch, &values);
-        if (status != BST_OK) {
-            bst_fail_prefix(ctx, status, "%s: /epoch_utc", scenario);
-        }
-    }
-    if (status == BST_OK) {
-        status = bst_stars_open(ctx, config->star_catalogue, &world->stars);
-        if (status != BST_OK) {
-            bst_fail_prefix(ctx, status, "%s: /world/star_catalogue", scenario);
-        }
-    }
-    if (status == BST_OK) {
-        status = make_objects(&b, &config->objects);
-    }
-    if (status == BST_OK) {
-        status = make_observers(&b, observers);
-    }
-    bst_sky_clock *clock = NULL;
-    if (status == BST_OK) {
-        status = bst_sky_clock_create(ctx, world->eop, &clock);
-    }
-    for (int i = 0; status == BST_OK && i < world->observer_count; i++) {
-        for (int k = 0; status == BST_OK && k < world->observers[i].sensor_count; k++) {
-            status = bst_cue_resolve(ctx, scenario, world, i, k, clock);
-        }
-    }
-    bst_sky_clock_free(clock);
+    builder b = {ctx, scenario, base_dir, world, NULL};
+    bst_status status = build(&b, config, observers);
+    bst_sky_clock_free(b.clock);
     if (status != BST_OK) {
         bst_world_free(world);
         return status;

@@ -62,9 +62,10 @@ bst_status bst_view_bodies(bst_ctx *ctx, bst_view *view, double seconds,
 /* What an observer sees of an object: light time solved, Sun and shadow at the time the light left.
  */
 typedef struct bst_sight {
-    bst_vec3 geometric; /* unit, GCRF: object at emission minus observer at reception */
-    bst_vec3 apparent;  /* the same with stellar aberration */
-    double range_m, light_time_s;
+    bst_vec3 geometric;     /* unit, GCRF: object at emission minus observer at reception */
+    bst_vec3 apparent;      /* the same with stellar aberration */
+    double range_m;         /* geocentric: observer at reception to object at emission */
+    double light_time_s;    /* barycentric: length of the light's path over c */
     double phase_rad;       /* Sun - object - observer */
     double sunlit_fraction; /* of the Sun's disc, 0..1 */
     double v_mag;           /* Lambertian sphere times sunlit fraction; +INFINITY when dark */
@@ -75,7 +76,8 @@ bst_status bst_view_sight(bst_ctx *ctx, bst_view *view, int observer, int object
 
 /* V magnitude of a Lambertian sphere of cross-section area_m2 and albedo at phase angle and range:
  * V_sun - 2.5 log10(2 albedo area ((pi - phi) cos phi + sin phi) / (3 pi^2 range^2)), V_sun =
- * -26.74 at 1 au. */
+ * -26.74 at 1 au. +INFINITY where there is no light: a black or empty sphere, a phase of pi, or a
+ * value that is not a number. */
 double bst_lambert_sphere_v_mag(double area_m2, double albedo, double phase_rad, double range_m,
                                 double sun_distance_m);
 

@@ -43,7 +43,8 @@ static const bst_config_desc object_table[] = {
 const bst_config_desc bst_world_config_table[] = {
     BST_STRING(
         bst_world_config, star_catalogue, "\"default\"",
-        "\"default\" (the user's full catalogue, else the embedded one), \"embedded\", or a file."),
+        "\"default\" (the user's full catalogue, else the embedded one), \"embedded\", or a file, "
+        "relative to the scenario's folder."),
     BST_STRING(bst_world_config, earth_orientation, "\"builtin\"",
                "\"builtin\" or a file in the IERS EOP C04 format."),
     BST_LIST(bst_world_config, objects, bst_object_config, object_table, 0, 100000, "[]",

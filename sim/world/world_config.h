@@ -10,7 +10,7 @@ enum { BST_ORBIT_SGP4, BST_ORBIT_RELATIVE };
 
 typedef struct bst_orbit_config {
     int32_t source;     /* BST_ORBIT_... */
-    char tle_file[256]; /* sgp4: path relative to the scenario's folder */
+    char tle_file[512]; /* sgp4: path, relative to the scenario's folder */
     int64_t norad;      /* sgp4 */
     char reference[64]; /* relative: name of an object with an orbit of its own, earlier in the list
                          */
@@ -32,9 +32,9 @@ typedef struct bst_object_config {
 } bst_object_config;
 
 typedef struct bst_world_config {
-    char star_catalogue[256];
-    char earth_orientation[256];
-    bst_config_list objects; /* bst_object_config */
+    char star_catalogue[512];    /* "default", "embedded" or a path as above */
+    char earth_orientation[512]; /* "builtin" or a path as above */
+    bst_config_list objects;     /* bst_object_config */
 } bst_world_config;
 
 typedef struct bst_cue_config {
@@ -52,7 +52,7 @@ typedef struct bst_exposure_config {
 } bst_exposure_config;
 
 typedef struct bst_knowledge_config {
-    char star_catalogue[256]; /* "": the world's */
+    char star_catalogue[512]; /* "": the world's */
 } bst_knowledge_config;
 
 typedef struct bst_sensor_config {

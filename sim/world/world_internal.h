@@ -7,6 +7,13 @@
 #include "sim/world/knowledge.h"
 #include "sim/world/world_config.h"
 
+/* A burn with what it has made of the orbit; worked out once. */
+typedef struct bst_burn {
+    double time_s;
+    bst_state base;      /* the catalogued orbit at that time */
+    bst_state deviation; /* from it, right after this burn, of all burns so far */
+} bst_burn;
+
 /* An orbit ready to be evaluated; immutable. */
 typedef struct bst_orbit {
     bst_sgp4 *sgp4;        /* NULL: relative */
@@ -14,7 +21,7 @@ typedef struct bst_orbit {
     const struct bst_orbit *reference;
     double at_s;
     bst_vec3 offset_rtn_m, rate_rtn_mps;
-    bst_burn_config *burns;
+    bst_burn *burns;
     int burn_count;
     const char *name; /* for messages; borrowed */
 } bst_orbit;
@@ -53,11 +60,7 @@ struct bst_knowledge {
         *world;           /* for the nominal orbits and Earth orientation only; never handed out */
     bst_stars *own_stars; /* NULL: the world's */
     bst_camera camera;
-    bst_cue_config cue;
     int observer, sensor;
-    int cue_object;        /* -1: a fixed direction */
-    bst_vec3 cue_rotation; /* the cue's error: rotation vector, GCRF */
-    bst_quat body_attitude;
     double julian_year;
 };
 
@@ -66,6 +69,11 @@ struct bst_knowledge {
 bst_status bst_orbit_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *clock,
                            bst_time epoch, double seconds, bool with_burns,
                            bst_state *out) BST_MUST_CHECK;
+
+/* Fills orbit->burns (by time, freed by the caller's owner) once the orbit itself is made.
+ * BST_ERR_NUMERIC when the orbit has no state at a burn. */
+bst_status bst_orbit_set_burns(bst_ctx *ctx, bst_orbit *orbit, bst_sky_clock *clock, bst_time epoch,
+                               const bst_burn_config *burns, int count) BST_MUST_CHECK;
 
 /* Light-time solution: where the object was when the light left that reaches the observer at
  * `seconds`. *geometric_m: from the observer at reception to the object at emission in barycentric

@@ -100,11 +100,14 @@ void synthetic_add(synthetic *s, double x, double y, double flux_e, double dx, d
 
 /* Inversion below 50; above, a rounded normal (skew 1 / sqrt(mean) < 0.15, far below what these
  * tests resolve). `normal` is the deviate to use then. */
-static double poisson(double mean, double uniform, double normal) {
+static double poisson(double mean, double normal) {
+    if (mean <= 0.0) {
+        return 0.0;
+    }
     if (mean > 50.0) {
         return fmax(0.0, floor(mean + sqrt(mean) * normal + 0.5));
     }
-    double p = exp(-mean), sum = p;
+    double uniform = 0.5 * erfc(-normal / sqrt(2.0)), p = exp(-mean), sum = p;
     int k = 0;
     while (uniform > sum && k < 400) {
         k++;
@@ -119,7 +122,7 @@ void synthetic_expose(synthetic *s, bst_rng_key key, uint64_t frame) {
     for (int i = 0; i < s->width * s->height; i++) {
         double z[2];
         bst_rng_normal2(key, frame, (uint64_t)i, z);
-        double e = poisson(s->mean_e[i], 0.5 * erfc(-z[1] / sqrt(2.0)), z[1]);
+        double e = poisson(s->mean_e[i], z[1]);
         e = fmin(e, s->camera.full_well_e) + s->read_e * z[0];
         double dn = floor(s->camera.offset_dn + e / s->camera.gain_e_per_dn + 0.5);
         s->pixels[i] = (uint16_t)fmin(fmax(dn, 0.0), top);
@@ -187,7 +190,7 @@ void synthetic_bound(const synthetic *s, double x, double y, double flux_e, doub
 bst_motion synthetic_motion(const synthetic *s, double dx, double dy) {
     /* a turn r moves the boresight direction by r x z = (r_y, -r_x) */
     double scale = bst_camera_scale_rad(&s->camera);
-    return (bst_motion){BST_QUAT_IDENTITY, {-dy * scale, dx * scale, 0.0}};
+    return (bst_motion){BST_QUAT_IDENTITY, {-dy * scale, dx * scale, 0.0}, {0, 0, 0}};
 }
 
 bst_imgproc_frame synthetic_frame(const synthetic *s) {

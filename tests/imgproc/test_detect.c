@@ -146,6 +146,36 @@ static void widened_psf_keeps_fluxes(void **state) {
     end(&f);
 }
 
+/* Stars under an accelerated motion: the mean place is found, not that of the even streak. */
+static void bent_path_keeps_its_mean(void **state) {
+    (void)state;
+    fixture f = begin(128, 128);
+    double noise = synthetic_noise(&f.s), flux = 0.0;
+    /* a path from rest: 8 t^2 px, drawn by 40 short even pieces; its mean is 8/3 px on */
+    enum { PIECES = 40 };
+    for (int k = 0; k < PIECES; k++) {
+        double a = (double)k / PIECES, b = (k + 1.0) / PIECES;
+        double from = 8 * a * a, to = 8 * b * b;
+        flux += 200 * noise / PIECES;
+        synthetic_add(&f.s, 60.3 - 8.0 / 3.0 + 0.5 * (from + to), 62.8, 200 * noise / PIECES,
+                      to - from, 0);
+    }
+    bst_motion motion = synthetic_motion(&f.s, 8, 0);
+    /* 8 t^2 = 8/3 + 8 (u/2) + (8/6) P2(u) with t = (u + 1) / 2 */
+    motion.bend_cam_rad = (bst_vec3){0, 8.0 / 6.0 * bst_camera_scale_rad(&f.s.camera), 0};
+    expose(&f, &motion);
+    const bst_detection *d = near_to(&f, 60.3, 62.8, 1.5);
+    /* four sigma of SNR 50 along and across the path */
+    bst_assert_close(d->x_px, 60.3, 0.3);
+    bst_assert_close(d->y_px, 62.8, 0.12);
+    bst_assert_close(d->flux_e / flux, 1.0, 0.08);
+    assert_false(bst_imgproc_smeared(f.ip));
+    motion = synthetic_motion(&f.s, 70, 0);
+    process(&f, &motion);
+    assert_true(bst_imgproc_smeared(f.ip));
+    end(&f);
+}
+
 /* In a stare the target streaks and no telemetry says how. */
 static void unknown_streak_is_measured(void **state) {
     (void)state;
@@ -426,6 +456,7 @@ int main(void) {
         cmocka_unit_test(target_beside_a_streaking_star),
         cmocka_unit_test(extents_and_magnitude),
         cmocka_unit_test(widened_psf_keeps_fluxes),
+        cmocka_unit_test(bent_path_keeps_its_mean),
         cmocka_unit_test(unknown_streak_is_measured),
         cmocka_unit_test(saturated_star),
         cmocka_unit_test(dull_images),

@@ -52,12 +52,13 @@ static void constant_rate(void **state) {
         bst_assert_close(m.turn_cam_rad.x, rate.x * span, 1e-12);
         bst_assert_close(m.turn_cam_rad.y, rate.y * span, 1e-12);
         bst_assert_close(m.turn_cam_rad.z, rate.z * span, 1e-12);
+        bst_assert_close(bst_vec3_norm(m.bend_cam_rad), 0.0, 1e-12);
         free(t);
     }
 }
 
-/* Constant acceleration about x: mean r = a T^2 / 6 and least-squares turn a T^2 / 2, exposure from
- * rest; 1e-9 rad: chords of 1/60 s under 1e-3 rad/s^2 err by a h^2 / 12. */
+/* Constant acceleration about x: mean r = a T^2 / 6, least-squares turn a T^2 / 2, bend a T^2 / 12,
+ * exposure from rest; 1e-9 rad: chords of 1/60 s under 1e-3 rad/s^2 err by a h^2 / 12. */
 static void accelerated(void **state) {
     (void)state;
     bst_pointing_telemetry *t = telemetry(40, 100, (bst_vec3){0, 0, 0});
@@ -72,13 +73,14 @@ static void accelerated(void **state) {
     double limit = a / (60.0 * 60.0) / 6.0;
     bst_assert_close(mean.x, a * 0.25 / 6.0, limit);
     bst_assert_close(m.turn_cam_rad.x, a * 0.25 / 2.0, limit);
+    bst_assert_close(m.bend_cam_rad.x, a * 0.25 / 12.0, limit);
     free(t);
 }
 
 static void few_samples(void **state) {
     (void)state;
     bst_pointing_telemetry *t = telemetry(0, 100, (bst_vec3){0, 0, 0});
-    bst_motion m = {{9, 9, 9, 9}, {9, 9, 9}};
+    bst_motion m = {{9, 9, 9, 9}, {9, 9, 9}, {9, 9, 9}};
     assert_false(bst_motion_from_telemetry(t, 0, 100, &m));
     assert_true(m.turn_cam_rad.x == 9.0);
     free(t);
@@ -93,7 +95,7 @@ static void few_samples(void **state) {
 static void streak_is_the_stars_path(void **state) {
     (void)state;
     bst_camera c = {.width_px = 1024, .height_px = 1024, .pixel_scale_arcsec = 3.0};
-    bst_motion m = {bst_quat_unit((bst_quat){0.1, 0.2, 0.3, 0.9}), {1e-4, -5e-5, 2e-3}};
+    bst_motion m = {bst_quat_unit((bst_quat){0.1, 0.2, 0.3, 0.9}), {1e-4, -5e-5, 2e-3}, {0, 0, 0}};
     bst_quat end =
         bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(m.turn_cam_rad, 0.5)), m.q_cam_from_gcrf);
     bst_quat start =

@@ -159,6 +159,8 @@ static void false_alarms_are_as_requested(void **state) {
         synthetic s;
         synthetic_init(&s, 128, 128);
         s.config.false_alarms_per_frame = 2.0;
+        s.sky_e = 0.0;
+        synthetic_clear(&s);
         bst_imgproc *ip = synthetic_processor(&ctx, &s);
         bst_detections *d = synthetic_detections(2048);
         bst_motion motion = synthetic_motion(&s, paths[c][0], paths[c][1]);

@@ -77,6 +77,8 @@ static bst_world *make_world(bst_ctx *ctx) {
     bst_world *out;
     bst_assert_ok(
         ctx, bst_world_create(ctx, "test", &world, &observers, "tests/scenegen/data", epoch, &out));
+    bst_config_free(bst_world_config_table, &world);
+    bst_config_free(bst_sensor_config_table, &sensor);
     return out;
 }
 
