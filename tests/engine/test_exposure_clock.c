@@ -1,0 +1,269 @@
+/* The exposure clock inside a simulation: exact ticks, latching, clipping, dropped frames. */
+#include "sim/engine/exposure_clock.h"
+#include "sim/engine/simulation.h"
+#include "tests/test_support.h"
+
+/* A control that writes one sensor_command at a tick of the test's choice. */
+typedef struct commander {
+    double exposure_s, period_s;
+    int64_t at_tick, x0, y0, width, height, binning;
+} commander;
+
+static const bst_config_desc commander_table[] = {
+    BST_REAL(commander, exposure_s, "s", -1, 1e300, "0", "Exposure."),
+    BST_REAL(commander, period_s, "s", -1, 1e300, "0", "Period."),
+    BST_INT(commander, at_tick, "", 0, 1e9, "0", "When."),
+    BST_INT(commander, x0, "px", -2147483647, 2147483647, "0", "Window."),
+    BST_INT(commander, y0, "px", -2147483647, 2147483647, "0", "Window."),
+    BST_INT(commander, width, "px", 0, 2147483647, "0", "Window."),
+    BST_INT(commander, height, "px", 0, 2147483647, "0", "Window."),
+    BST_INT(commander, binning, "px", 0, 16, "0", "Binning."),
+    BST_CONFIG_END};
+
+static bst_status commander_create(const bst_module_env *env, const void *config, void **self) {
+    (void)env;
+    union {
+        const void *in;
+        void *out;
+    } keep = {config}; /* read only */
+    *self = keep.out;
+    return BST_OK;
+}
+
+static bst_status commander_step(void *self, struct bst_step *step) {
+    const commander *c = self;
+    if (bst_step_tick(step) < c->at_tick) {
+        bst_step_wake_at(step, c->at_tick);
+        return BST_OK;
+    }
+    bst_sensor_command *out = bst_step_write(step, 0, NULL);
+    *out = (bst_sensor_command){c->exposure_s,
+                                c->period_s,
+                                {(int)c->x0, (int)c->y0, (int)c->width, (int)c->height},
+                                (int)c->binning};
+    return BST_OK;
+}
+
+static void commander_destroy(void *self) {
+    (void)self;
+}
+
+static const bst_port commander_ports[] = {
+    {.channel = BST_CHANNEL_SENSOR_COMMAND, .direction = BST_PORT_OUT}};
+static const bst_module_desc commander_module = {.abi = BST_MODULE_ABI,
+                                                 .role = "control",
+                                                 .type = "commander",
+                                                 .doc = "Writes one sensor command.",
+                                                 .config = commander_table,
+                                                 .config_bytes = sizeof(commander),
+                                                 .ports = commander_ports,
+                                                 .port_count = 1,
+                                                 .create = commander_create,
+                                                 .step = commander_step,
+                                                 .destroy = commander_destroy};
+static const bst_module_desc *const modules[] = {&commander_module};
+static const bst_registry registry = {modules, 1};
+
+typedef struct train {
+    bst_exposure items[400];
+    int64_t ticks[400];
+    int count;
+} train;
+
+static bst_status keep(void *user, const char *scope, const char *channel, const void *payload,
+                       int64_t tick) {
+    train *l = user;
+    if (strcmp(channel, BST_CHANNEL_EXPOSURE) == 0) {
+        assert_string_equal(scope, "sat/cam");
+        assert_true(l->count < 400);
+        l->ticks[l->count] = tick;
+        l->items[l->count++] = *(const bst_exposure *)payload;
+    }
+    return BST_OK;
+}
+
+/* Runs a scenario whose sensor has these "exposure" and "modules" blocks. */
+static void run(const char *exposure, const char *module_block, const char *extra,
+                int64_t until_tick, train *out) {
+    static const char format[] =
+        "{\"boresight\": 1, \"epoch_utc\": \"2022-06-16T22:10:00Z\", \"duration_s\": 300, %s"
+        "\"world\": {\"star_catalogue\": \"embedded\"}, \"observers\": [{\"name\": \"sat\","
+        "\"orbit\": {\"tle_file\": \"catalogue_2022-06.tle\", \"norad\": 39089},"
+        "\"sensors\": [{\"name\": \"cam\", \"camera\": {\"width_px\": 640, \"height_px\": 480,"
+        "\"pixel_scale_arcsec\": 3, \"aperture_m\": 0.15}, \"exposure\": {%s}, \"modules\": {%s}}]"
+        "}]}";
+    char text[2000];
+    snprintf(text, sizeof text, format, extra, exposure, module_block);
+    bst_ctx ctx = {0};
+    bst_json *json = NULL;
+    bst_assert_ok(&ctx, bst_json_parse(&ctx, "scenarios/x.json", text, strlen(text), &json));
+    bst_scenario scenario;
+    bst_assert_ok(&ctx, bst_scenario_read(&ctx, json, &registry, &scenario));
+    bst_simulation *sim = NULL;
+    bst_simulation_options options = {0};
+    bst_assert_ok(&ctx, bst_simulation_create(&ctx, &scenario, &options, &sim));
+    assert_string_equal(bst_simulation_device(sim), ""); /* none was asked for */
+    memset(out, 0, sizeof *out);
+    bst_engine *engine = bst_simulation_engine(sim);
+    bst_engine_set_hooks(engine, &(bst_engine_hooks){.user = out, .message = keep});
+    bst_assert_ok(&ctx, bst_engine_run(&ctx, engine, until_tick));
+    bst_simulation_free(sim);
+    bst_scenario_free(&scenario);
+    bst_json_free(json);
+}
+
+static void expect_train(const train *l, int count, int64_t first, int64_t exposure,
+                         int64_t cycle) {
+    assert_int_equal(l->count, count);
+    for (int i = 0; i < count; i++) {
+        const bst_exposure *e = &l->items[i];
+        assert_int_equal(e->id, i);
+        assert_int_equal(e->start_tick, first + i * cycle);
+        assert_int_equal(e->end_tick, e->start_tick + exposure);
+        assert_int_equal(l->ticks[i], e->end_tick); /* published when it ends */
+        assert_false(e->dropped);
+        assert_int_equal(e->window.width, 640);
+        assert_int_equal(e->window.height, 480);
+        assert_int_equal(e->window.x0, 0);
+        assert_int_equal(e->binning, 1);
+    }
+}
+
+static void exposures_start_and_end_at_exact_ticks(void **state) {
+    (void)state;
+    train l;
+    run("\"exposure_s\": 0.5, \"period_s\": 1", "", "", 1800000, &l);
+    expect_train(&l, 300, 0, 3000, 6000);
+    run("\"exposure_s\": 0.5, \"period_s\": 1, \"first_s\": 2.5", "", "", 1800000, &l);
+    expect_train(&l, 297, 15000, 3000, 6000);
+    /* back to back */
+    run("\"exposure_s\": 0.25, \"period_s\": 0.25", "", "", 60001, &l);
+    expect_train(&l, 40, 0, 1500, 1500);
+    /* longer than its period: the next starts when it ends */
+    run("\"exposure_s\": 2, \"period_s\": 0.5", "", "", 60001, &l);
+    expect_train(&l, 5, 0, 12000, 12000);
+    /* no length */
+    run("\"exposure_s\": 0, \"period_s\": 1", "", "", 60001, &l);
+    expect_train(&l, 11, 0, 0, 6000);
+}
+
+/* The end of a run is exclusive: an exposure that ends in the last tick is published, one that ends
+ * with the run is not. */
+static void the_last_frame_ends_before_the_run(void **state) {
+    (void)state;
+    train l;
+    run("\"exposure_s\": 1, \"period_s\": 1", "", "", 12000, &l);
+    expect_train(&l, 1, 0, 6000, 6000);
+    run("\"exposure_s\": 1, \"period_s\": 1", "", "", 12001, &l);
+    expect_train(&l, 2, 0, 6000, 6000);
+}
+
+/* A command during an exposure counts from the next one's start. */
+static void commands_are_latched_at_the_start(void **state) {
+    (void)state;
+    train l;
+    run("\"exposure_s\": 0.5, \"period_s\": 1",
+        "\"control\": {\"type\": \"commander\", \"at_tick\": 7000, \"exposure_s\": 0.1, "
+        "\"period_s\": 2, \"binning\": 2, \"x0\": 10, \"y0\": 20, \"width\": 30, \"height\": 40}",
+        "", 60000, &l);
+    const int64_t starts[] = {0, 6000, 12000, 24000, 36000, 48000};
+    assert_int_equal(l.count, 6);
+    for (int i = 0; i < 6; i++) {
+        const bst_exposure *e = &l.items[i];
+        assert_int_equal(e->start_tick, starts[i]);
+        assert_int_equal(e->end_tick - e->start_tick, i < 2 ? 3000 : 600);
+        assert_int_equal(e->binning, i < 2 ? 1 : 2);
+        assert_int_equal(e->window.x0, i < 2 ? 0 : 10);
+        assert_int_equal(e->window.y0, i < 2 ? 0 : 20);
+        assert_int_equal(e->window.width, i < 2 ? 640 : 30);
+        assert_int_equal(e->window.height, i < 2 ? 480 : 40);
+    }
+    /* written in the very tick of a start: seen one tick later, so it counts for the next */
+    run("\"exposure_s\": 0.5, \"period_s\": 1",
+        "\"control\": {\"type\": \"commander\", \"at_tick\": 6000, \"binning\": 2}", "", 20000, &l);
+    assert_int_equal(l.items[1].binning, 1);
+    assert_int_equal(l.items[2].binning, 2);
+    /* one tick earlier it counts */
+    run("\"exposure_s\": 0.5, \"period_s\": 1",
+        "\"control\": {\"type\": \"commander\", \"at_tick\": 5999, \"binning\": 2}", "", 20000, &l);
+    assert_int_equal(l.items[1].binning, 2);
+}
+
+static void odd_commands_do_no_harm(void **state) {
+    (void)state;
+    train l;
+    /* partly outside: clipped */
+    run("\"exposure_s\": 0.5, \"period_s\": 1",
+        "\"control\": {\"type\": \"commander\", \"x0\": -20, \"y0\": 400, \"width\": 100, "
+        "\"height\": 2147483647}",
+        "", 20000, &l);
+    const bst_window *w = &l.items[2].window;
+    assert_int_equal(w->x0, 0);
+    assert_int_equal(w->width, 80);
+    assert_int_equal(w->y0, 400);
+    assert_int_equal(w->height, 80);
+    /* wholly outside: the full sensor */
+    run("\"exposure_s\": 0.5, \"period_s\": 1",
+        "\"control\": {\"type\": \"commander\", \"x0\": 700, \"y0\": 0, \"width\": 100, "
+        "\"height\": 100}",
+        "", 20000, &l);
+    assert_int_equal(l.items[2].window.width, 640);
+    /* an exposure and period shorter than half a tick, straight after another: one a tick */
+    run("\"exposure_s\": 0.5, \"period_s\": 0.5",
+        "\"control\": {\"type\": \"commander\", \"exposure_s\": 1e-9, \"period_s\": 1e-9, "
+        "\"at_tick\": 10}",
+        "", 3100, &l);
+    assert_int_equal(l.count, 101);
+    assert_int_equal(l.items[1].start_tick, 3000);
+    assert_int_equal(l.items[1].end_tick, 3000);
+    assert_int_equal(l.items[100].start_tick, 3099);
+    /* absurdly long: a day at most, and no overflow */
+    run("\"exposure_s\": 0.5, \"period_s\": 1",
+        "\"control\": {\"type\": \"commander\", \"exposure_s\": 1e300, \"period_s\": 1e300}", "",
+        1800000, &l);
+    assert_int_equal(l.count, 1);
+}
+
+static int dropped(const train *l) {
+    int n = 0;
+    for (int i = 0; i < l->count; i++) {
+        n += l->items[i].dropped;
+    }
+    return n;
+}
+
+static void dropped_frames_follow_the_seed(void **state) {
+    (void)state;
+    const char *exposure = "\"exposure_s\": 0.5, \"period_s\": 1, \"dropped_fraction\": 0.2";
+    train a, b, c, d;
+    run(exposure, "", "", 1800000, &a);
+    run(exposure, "", "", 1800000, &b);
+    run(exposure, "", "\"seed\": \"0x2\", ", 1800000, &c);
+    run(exposure, "", "\"run\": 1, ", 1800000, &d);
+    assert_int_equal(a.count, 300);
+    int same_seed = 0, other_seed = 0, other_run = 0;
+    for (int i = 0; i < 300; i++) {
+        same_seed += a.items[i].dropped == b.items[i].dropped;
+        other_seed += a.items[i].dropped == c.items[i].dropped;
+        other_run += a.items[i].dropped == d.items[i].dropped;
+    }
+    assert_int_equal(same_seed, 300);
+    assert_true(other_seed < 300 && other_run < 300);
+    /* binomial, 300 frames of 0.2: mean 60, sigma 6.9; 4.5 sigma, fixed seeds */
+    bst_assert_close(dropped(&a), 60, 31);
+    bst_assert_close(dropped(&c), 60, 31);
+    run("\"dropped_fraction\": 1", "", "", 60000, &a);
+    assert_int_equal(dropped(&a), a.count);
+    assert_int_equal(a.count, 10);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(exposures_start_and_end_at_exact_ticks),
+        cmocka_unit_test(the_last_frame_ends_before_the_run),
+        cmocka_unit_test(commands_are_latched_at_the_start),
+        cmocka_unit_test(odd_commands_do_no_harm),
+        cmocka_unit_test(dropped_frames_follow_the_seed),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
