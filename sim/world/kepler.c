@@ -25,12 +25,23 @@ static void stumpff(double z, double *c2, double *c3) {
     }
 }
 
+/* How far chi can get on a hyperbola: the way takes least time for its change of anomaly, 2 y, when
+ * it is symmetric about the pericentre, and then n t = 2 (e sinh y - y) >= 2 (e - 1) sinh y. */
+static double hyperbolic_limit(double p, double alpha, double target) {
+    double e2_1 = -alpha * p, e_1 = e2_1 / (1.0 + sqrt(1.0 + e2_1)); /* e^2 - 1, e - 1 */
+    double root = sqrt(-alpha);
+    return 2.0 * asinh(0.5 * fabs(target) * -alpha * root / e_1) / root;
+}
+
 /* Solves Kepler's universal equation f(chi) = 0. Its slope is the radius, so f only rises: steps of
- * Laguerre's that leave the bracket (a start far out on a hyperbola overflows, and counts as too
- * far) give way to bisection. Ends where f is nothing but rounding. */
-static bool solve(double r0, double sigma0, double alpha, double target, double *chi) {
-    double low = target < 0.0 ? -INFINITY : 0.0, high = target > 0.0 ? INFINITY : 0.0;
+ * Laguerre's that leave the bracket give way to bisection. Ends where f is nothing but rounding. */
+static bool solve(double r0, double sigma0, double p, double alpha, double target, double *chi) {
+    double limit = alpha < 0.0 ? hyperbolic_limit(p, alpha, target) : INFINITY;
+    double low = target < 0.0 ? -limit : 0.0, high = target > 0.0 ? limit : 0.0;
     double x = alpha > 0.0 ? target * alpha : target / r0;
+    if (!(x >= low && x <= high)) {
+        x = 0.5 * (low + high);
+    }
     for (int iteration = 0; iteration < 200; iteration++) {
         double z = alpha * x * x, c2, c3;
         stumpff(z, &c2, &c3);
@@ -40,8 +51,7 @@ static bool solve(double r0, double sigma0, double alpha, double target, double 
             *chi = x;
             return true;
         }
-        bool too_far = target > 0.0 ? !(f < 0.0) : !(f > 0.0);
-        if (too_far == (target > 0.0)) {
+        if (f > 0.0) {
             high = x;
         } else {
             low = x;
@@ -82,7 +92,7 @@ bst_status bst_kepler_propagate(bst_ctx *ctx, double mu, bst_vec3 position_m, bs
         seconds = remainder(seconds, period);
     }
     double chi;
-    if (!solve(r0, sigma0, alpha, root_mu * seconds, &chi)) {
+    if (!solve(r0, sigma0, h * h / mu, alpha, root_mu * seconds, &chi)) {
         return bst_fail(ctx, BST_ERR_NUMERIC, "two-body motion over %g s did not converge",
                         seconds);
     }

@@ -87,15 +87,37 @@ static void the_main_scene_is_as_described(void **state) {
         assert_true(a.sunlit_fraction == 1.0);
         assert_false(a.occulted);
     }
-    /* within a revolution of NEOSSat the Earth gets in between, and it is dark where the object is
-     * in the shadow */
-    int hidden = 0;
-    for (double t = 0; t < 6100; t += 20) {
-        bst_assert_ok(&ctx, bst_view_sight(&ctx, view, 0, 0, t, &a));
-        hidden += a.occulted;
-        assert_true(a.sunlit_fraction > 0 || isinf(a.v_mag));
+    bst_view_free(view);
+    bst_world_free(world);
+}
+
+/* In the course of a day the Earth gets in between, and in spring and autumn the satellite passes
+ * through its shadow. */
+static void the_earth_hides_and_shades(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    const char *text = "{\"world\": {\"star_catalogue\": \"embedded\", \"objects\": [" GX5
+                       "]}, \"observers\": [{\"name\": \"n\", " TEST_NEOSSAT
+                       ", \"sensors\": [{" TEST_CAMERA "}]}]}";
+    bst_world *world;
+    bst_assert_ok(&ctx, test_world_try(&ctx, "2022-03-21T00:00:00Z", text, &world));
+    bst_view *view;
+    bst_assert_ok(&ctx, bst_view_create(&ctx, world, &view));
+    int hidden = 0, dark = 0, dim = 0;
+    const int step = 30, n = 86400 / step;
+    for (int i = 0; i < n; i++) {
+        bst_sight s;
+        bst_assert_ok(&ctx, bst_view_sight(&ctx, view, 0, 0, i * step, &s));
+        hidden += s.occulted;
+        dark += s.sunlit_fraction == 0.0;
+        dim += s.sunlit_fraction > 0.0 && s.sunlit_fraction < 1.0;
+        assert_true(isinf(s.v_mag) == (s.sunlit_fraction == 0.0));
     }
-    assert_true(hidden > 0 && hidden < 200);
+    /* the longest umbra of a geostationary orbit lasts 67 to 69 minutes, the penumbra 2 on either
+     * side (Montenbruck and Gill, section 3.4: angles of 17.4 and 0.53 degrees) */
+    bst_assert_close(dark * step / 60.0, 68, 3);
+    bst_assert_close(dim * step / 60.0, 4.3, 1.5);
+    assert_true(hidden > 0 && hidden < n / 2);
     bst_view_free(view);
     bst_world_free(world);
 }
@@ -235,6 +257,7 @@ int main(void) {
         cmocka_unit_test(sight_agrees_with_astropy),
         cmocka_unit_test(light_time_is_consistent),
         cmocka_unit_test(the_main_scene_is_as_described),
+        cmocka_unit_test(the_earth_hides_and_shades),
         cmocka_unit_test(a_wrong_cue_is_wrong_along_its_axis),
         cmocka_unit_test(the_cue_s_rate_is_its_derivative),
         cmocka_unit_test(knowledge_never_sees_burns),
