@@ -46,6 +46,8 @@ const bst_config_desc bst_control_config_table[] = {
              "A candidate that is not confirmed within this time is given up."),
     BST_REAL(C, track_entry_px, "px", 0.01, 10000, "3",
              "Track mode begins when the target is within this of the boresight."),
+    BST_REAL(C, reacquire_coast_s, "s", 0, 1e6, "20",
+             "A lost target is awaited at its predicted place for this time before the search."),
     BST_REAL(C, reacquire_extent_deg, "deg", 0, 90, "1",
              "How far each way from its predicted place a lost target is searched."),
     BST_CONFIG_END};

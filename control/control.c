@@ -12,7 +12,8 @@ bst_status bst_control_init(bst_ctx *ctx, bst_control *control, const bst_contro
                         "other",
                         config->exposure_s, config->period_s);
     }
-    *control = (bst_control){.config = *config, .env = *env, .mode = BST_MODE_IDLE};
+    *control = (bst_control){
+        .config = *config, .env = *env, .mode = BST_MODE_IDLE, .frame_tick = INT64_MIN};
     bst_pointing_error_init(&control->pointing_error, config->disturbance_px_rms * env->pixel_rad,
                             config->disturbance_cutoff_hz,
                             config->fix_sigma_floor_px * env->pixel_rad,
@@ -35,12 +36,13 @@ static bst_status cue_at(bst_ctx *ctx, const bst_control *c, int64_t tick, bst_c
 
 /* ---- aim ---- */
 
-/* The held track at a tick. Its rate changes along the arc as the cue's does. */
-static bst_status held_at(bst_ctx *ctx, const bst_control *c, int64_t tick, bst_vec3 *direction) {
-    double dt = (double)(tick - c->held.tick) / c->env.tick_rate_hz;
-    bst_vec3 d = bst_vec3_axpy(c->held.direction_gcrf, dt, c->held.rate_gcrf_radps);
+/* A held track at a tick. Its rate changes along the arc as the cue's does. */
+static bst_status held_at(bst_ctx *ctx, const bst_control *c, const bst_control_held *held,
+                          int64_t tick, bst_vec3 *direction) {
+    double dt = (double)(tick - held->tick) / c->env.tick_rate_hz;
+    bst_vec3 d = bst_vec3_axpy(held->direction_gcrf, dt, held->rate_gcrf_radps);
     bst_cue then, now;
-    BST_TRY(cue_at(ctx, c, c->held.tick, &then));
+    BST_TRY(cue_at(ctx, c, held->tick, &then));
     BST_TRY(cue_at(ctx, c, tick, &now));
     if (then.valid && now.valid) {
         bst_vec3 straight = bst_vec3_axpy(then.direction_gcrf, dt, then.rate_gcrf_radps);
@@ -75,10 +77,10 @@ bst_status bst_control_aim(bst_ctx *ctx, const bst_control *c, int64_t tick, boo
             return BST_OK;
         case BST_MODE_ACQUIRE:
         case BST_MODE_TRACK:
-            return held_at(ctx, c, tick, direction);
+            return held_at(ctx, c, &c->held, tick, direction);
         case BST_MODE_REACQUIRE: {
             bst_vec3 d;
-            BST_TRY(held_at(ctx, c, tick, &d));
+            BST_TRY(held_at(ctx, c, &c->lost, tick, &d));
             *direction = offset_by(d, c->search_x_gcrf, c->search.tile[c->search_step]);
             return BST_OK;
         }
@@ -158,6 +160,11 @@ static void resume_search(bst_control *c, int64_t tick, const char *reason) {
 }
 
 static bst_status next_tile(bst_ctx *ctx, bst_control *c, int64_t tick) {
+    /* the predicted place is the best one for as long as the prediction is good */
+    if (c->mode == BST_MODE_REACQUIRE && c->search_step == 0 &&
+        tick - c->lost.tick < ticks_of(c, c->config.reacquire_coast_s)) {
+        return BST_OK;
+    }
     if (c->search_step + 1 < c->search.count) {
         go_to_tile(c, c->search_step + 1, tick);
         return BST_OK;
@@ -183,21 +190,24 @@ static const bst_track *find_track(const bst_tracks *tracks, int64_t id) {
     return NULL;
 }
 
-/* Distance of a track's place from the true boresight of its frame, px; believed attitude when the
- * frame gave none. */
+/* Distance of a track's place from the true boresight of its frame, px; when the frame gave no
+ * attitude, of its place now from where the boresight is believed to be now. */
 static double off_boresight_px(const bst_control *c, const bst_tracks *tracks,
                                const bst_track *track) {
     bst_quat q;
+    double dt = 0.0;
     if (tracks->attitude.valid) {
         q = tracks->attitude.q_cam_from_gcrf;
     } else if (c->pointing_valid) {
         q = bst_quat_mul(
             c->pointing.q_cam_from_gcrf,
             bst_pointing_error_at(&c->pointing_error, c->pointing.tick, c->env.tick_rate_hz));
+        dt = (double)(c->pointing.tick - tracks->tick) / c->env.tick_rate_hz;
     } else {
         return INFINITY;
     }
-    bst_vec3 v = bst_quat_rotate(q, apparent_of(c, track->direction_gcrf));
+    bst_vec3 d = bst_vec3_unit(bst_vec3_axpy(track->direction_gcrf, dt, track->rate_gcrf_radps));
+    bst_vec3 v = bst_quat_rotate(q, apparent_of(c, d));
     return bst_vec3_angle(v, (bst_vec3){0, 0, 1}) / c->env.pixel_rad;
 }
 
@@ -207,7 +217,7 @@ static bst_status best_candidate(bst_ctx *ctx, const bst_control *c, const bst_t
     bst_cue cue;
     BST_TRY(cue_at(ctx, c, tracks->tick, &cue));
     *out = NULL;
-    bst_vec3 rate = c->mode == BST_MODE_REACQUIRE ? c->held.rate_gcrf_radps : cue.rate_gcrf_radps;
+    bst_vec3 rate = c->mode == BST_MODE_REACQUIRE ? c->lost.rate_gcrf_radps : cue.rate_gcrf_radps;
     double rate_sigma = cue.valid ? cue.rate_sigma_radps : 0.0, best = 0.0;
     if (!cue.valid && c->mode != BST_MODE_REACQUIRE) {
         return BST_OK;
@@ -232,6 +242,14 @@ static bst_status best_candidate(bst_ctx *ctx, const bst_control *c, const bst_t
     return BST_OK;
 }
 
+/* Whether a frame with this mid-exposure was exposed wholly after the arrival. An exposure of
+ * unknown length is taken to fill its frame period. */
+static bool at_rest(const bst_control *c, int64_t mid_tick) {
+    int64_t half = c->config.exposure_s > 0.0 ? ticks_of(c, 0.5 * c->config.exposure_s)
+                                              : c->frame_interval_ticks / 2;
+    return c->arrival_tick >= 0 && half > 0 && mid_tick - half >= c->arrival_tick;
+}
+
 /* A frame while nothing is held: take the target, or a candidate, or count the frame. */
 static bst_status observe_searching(bst_ctx *ctx, bst_control *c, int64_t tick,
                                     const bst_tracks *tracks, const bst_track *target) {
@@ -250,8 +268,7 @@ static bst_status observe_searching(bst_ctx *ctx, bst_control *c, int64_t tick,
         enter(c, BST_MODE_ACQUIRE, tick, "a candidate moves as the target should");
         return BST_OK;
     }
-    int64_t start = tracks->tick - ticks_of(c, 0.5 * c->config.exposure_s);
-    if (c->arrival_tick >= 0 && start >= c->arrival_tick && ++c->frames >= c->config.dwell_frames) {
+    if (at_rest(c, tracks->tick) && ++c->frames >= c->config.dwell_frames) {
         return next_tile(ctx, c, tick);
     }
     return BST_OK;
@@ -262,6 +279,7 @@ static bst_status observe_holding(bst_ctx *ctx, bst_control *c, int64_t tick,
     bool was_target = c->mode == BST_MODE_TRACK;
     const bst_track *track = target ? target : find_track(tracks, c->held.id);
     if (was_target && !target) {
+        c->lost = c->held;
         return start_search(ctx, c, BST_MODE_REACQUIRE, tick, "the tracker has lost the target");
     }
     if (!track) {
@@ -284,6 +302,13 @@ bst_status bst_control_observe(bst_ctx *ctx, bst_control *c, int64_t tick,
     if (c->config.compensate_attitude) {
         bst_pointing_error_update(&c->pointing_error, &tracks->attitude, c->env.tick_rate_hz);
     }
+    if (c->frame_tick != INT64_MIN && tracks->tick > c->frame_tick) {
+        int64_t interval = tracks->tick - c->frame_tick;
+        if (c->frame_interval_ticks == 0 || interval < c->frame_interval_ticks) {
+            c->frame_interval_ticks = interval;
+        }
+    }
+    c->frame_tick = tracks->tick;
     c->target_id = tracks->target_id;
     const bst_track *target = find_track(tracks, tracks->target_id);
     switch (c->mode) {

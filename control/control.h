@@ -31,7 +31,7 @@ typedef struct bst_control_config {
     int64_t candidate_hits;
     double candidate_rate_sigmas;
     double acquire_timeout_s, track_entry_px;
-    double reacquire_extent_deg;
+    double reacquire_coast_s, reacquire_extent_deg;
 } bst_control_config;
 
 extern const bst_config_desc bst_control_config_table[];
@@ -53,6 +53,12 @@ typedef struct bst_control_transition {
     const char *reason;
 } bst_control_transition;
 
+/* A track as last heard of. */
+typedef struct bst_control_held {
+    int64_t id, tick;
+    bst_vec3 direction_gcrf, rate_gcrf_radps; /* geometric */
+} bst_control_held;
+
 #define BST_CONTROL_TRANSITIONS 4 /* greatest number in one observe and one update */
 
 typedef struct bst_control {
@@ -65,14 +71,12 @@ typedef struct bst_control {
     int transition_count;
     bst_nav_telemetry nav;
     bool nav_valid;
-    /* the track that the aim is on, as last heard of */
-    struct {
-        int64_t id, tick;
-        bst_vec3 direction_gcrf, rate_gcrf_radps; /* geometric */
-    } held;
-    int64_t target_id;   /* 0: the tracker names none */
-    int64_t rejected_id; /* candidates up to this one have been given up */
-    /* search, about the cue or about what is held */
+    bst_control_held held;                    /* the track that the aim is on */
+    bst_control_held lost;                    /* the target that BST_MODE_REACQUIRE looks for */
+    int64_t target_id;                        /* 0: the tracker names none */
+    int64_t rejected_id;                      /* candidates up to this one have been given up */
+    int64_t frame_tick, frame_interval_ticks; /* mid of the newest frame; shortest seen, 0: none */
+    /* search, about the cue or about what is lost */
     bst_search search;
     int32_t search_step;
     int search_mode; /* BST_MODE_SEARCH or BST_MODE_REACQUIRE: where a failed acquisition goes */

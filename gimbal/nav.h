@@ -1,4 +1,4 @@
-/* Navigation telemetry and publication that both gimbal types share. */
+/* Navigation telemetry, which both gimbal types publish. */
 #ifndef BST_GIMBAL_NAV_H
 #define BST_GIMBAL_NAV_H
 

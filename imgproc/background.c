@@ -6,7 +6,10 @@
 
 #include "imgproc/rows.h"
 
-enum { SAMPLE = 512, CLIP_PASSES = 3 };
+/* no pixel is better known than its step: 1 / sqrt(12) */
+static const float QUANTISATION = 0.28867513f;
+
+enum { SAMPLE = 256, CLIP_PASSES = 2, ENOUGH_PIXELS = 2048 };
 
 bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int max_height,
                                  bst_background *out) {
@@ -68,7 +71,7 @@ static float select_kth(float *values, int count, int k) {
 
 /* First guess from at most SAMPLE pixels spread over the mesh. False when none is usable. */
 static bool first_guess(bst_background *b, const float *image, int stride, int width, int height,
-                        float noise_floor, float *level, float *noise) {
+                        float step_e, float *level, float *noise) {
     int total = width * height;
     int step = (total + SAMPLE - 1) / SAMPLE;
     /* a step that shares a factor with the width would sample a few columns only */
@@ -90,20 +93,22 @@ static bool first_guess(bst_background *b, const float *image, int stride, int w
         b->scratch[i] = fabsf(b->scratch[i] - median);
     }
     *level = median;
-    *noise = fmaxf(1.4826f * select_kth(b->scratch, count, count / 2), noise_floor);
+    /* coarse steps make the median deviation anything from 0 up: leave room for a step */
+    *noise = fmaxf(1.4826f * select_kth(b->scratch, count, count / 2), step_e);
     return true;
 }
 
 static bool estimate_mesh(bst_background *b, const float *image, int stride, int width, int height,
-                          float noise_floor, float *level, float *noise) {
-    if (!first_guess(b, image, stride, width, height, noise_floor, level, noise)) {
+                          float step_e, float *level, float *noise) {
+    if (!first_guess(b, image, stride, width, height, step_e, level, noise)) {
         return false;
     }
+    int row_step = width * height >= 2 * ENOUGH_PIXELS ? 2 : 1;
     for (int pass = 0; pass < CLIP_PASSES; pass++) {
         bst_row_sums sums = {0};
-        for (int y = 0; y < height; y++) {
-            bst_row_clipped_sums(image + (size_t)y * (size_t)stride, width, *level, 3.0f * *noise,
-                                 &sums);
+        float limit = fmaxf(3.0f * *noise, 1.5f * step_e);
+        for (int y = 0; y < height; y += row_step) {
+            bst_row_clipped_sums(image + (size_t)y * (size_t)stride, width, *level, limit, &sums);
         }
         double n = 0.0, s = 0.0, q = 0.0;
         for (int i = 0; i < BST_ROW_LANES; i++) {
@@ -118,7 +123,7 @@ static bool estimate_mesh(bst_background *b, const float *image, int stride, int
         /* 0.97334 = 1 - 6 phi(3) / (2 Phi(3) - 1): variance of a normal cut at 3 sigma */
         double variance = fmax(q - n * mean * mean, 0.0) / ((n - 1.0) * 0.97334);
         *level += (float)mean;
-        *noise = fmaxf((float)sqrt(variance), noise_floor);
+        *noise = fmaxf((float)sqrt(variance), QUANTISATION * step_e);
     }
     return true;
 }
@@ -129,7 +134,7 @@ static float median_of(bst_background *b, const float *values, int count) {
 }
 
 void bst_background_estimate(bst_background *b, const float *image, int width, int height,
-                             float noise_floor) {
+                             float step_e) {
     b->width = width;
     b->height = height;
     /* a rest narrower than half a mesh joins its neighbour */
@@ -144,14 +149,14 @@ void bst_background_estimate(bst_background *b, const float *image, int width, i
             int k = j * b->columns + i;
             b->noise[k] = -1.0f;
             if (estimate_mesh(b, image + (size_t)y0 * (size_t)width + (size_t)x0, width, x1 - x0,
-                              y1 - y0, noise_floor, &b->level[k], &b->noise[k])) {
+                              y1 - y0, step_e, &b->level[k], &b->noise[k])) {
                 good++;
             }
         }
     }
     int count = b->columns * b->rows;
     b->median_level = 0.0f;
-    b->median_noise = noise_floor;
+    b->median_noise = QUANTISATION * step_e;
     if (good == count) {
         b->median_level = median_of(b, b->level, count);
         b->median_noise = median_of(b, b->noise, count);
@@ -213,7 +218,8 @@ static void expand_row(const bst_background *b, const float *nodes, float *out) 
     float step = 1.0f / (float)b->mesh_px;
     float centre = 0.5f * (float)(b->mesh_px - 1);
     for (int i = -1; i < b->columns; i++) {
-        int end = i + 1 < b->columns ? (int)ceilf(centre + (float)((i + 1) * b->mesh_px)) : b->width;
+        int end =
+            i + 1 < b->columns ? (int)ceilf(centre + (float)((i + 1) * b->mesh_px)) : b->width;
         end = end < b->width ? end : b->width;
         float left = nodes[i < 0 ? 0 : i];
         float right = nodes[i + 1 < b->columns ? i + 1 : b->columns - 1];

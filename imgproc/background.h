@@ -25,11 +25,11 @@ bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int m
 void bst_background_free(bst_background *background);
 
 /* Estimates level and noise in each mesh of image [height][width]: median and median absolute
- * deviation of a sample, then mean and standard deviation within 3 sigma, three times, the deviation
- * corrected for the clipping. noise_floor (> 0) is the least noise reported. A mesh without usable
- * pixels takes the frame's medians. */
+ * deviation of a sample, then mean and standard deviation within 3 sigma, twice, on every second
+ * row of a large mesh, the deviation corrected for the clipping. noise_floor (> 0) is the least
+ * noise reported. A mesh without usable pixels takes the frame's medians. */
 void bst_background_estimate(bst_background *background, const float *image, int width, int height,
-                             float noise_floor);
+                             float step_e);
 
 /* Level and 1 / noise for every pixel of image row y, bilinear between mesh centres, constant
  * outside them. */

@@ -14,11 +14,11 @@ typedef struct bst_candidate {
 
 typedef struct bst_candidates {
     bst_cv_components *components;
-    int *pixel;            /* indices of one component's pixels */
-    int32_t *owner;        /* [pixels of a frame], candidate + 1, 0 outside a component */
+    int *pixel;     /* indices of one component's pixels */
+    int32_t *owner; /* [pixels of a frame], candidate + 1, 0 outside a component */
     bst_candidate *items;
-    int *order;            /* of items: SNR falling, then y, then x */
-    int32_t *parent;       /* of a candidate that was merged */
+    int *order;      /* of items: SNR falling, then y, then x */
+    int32_t *parent; /* of a candidate that was merged */
     int count, capacity;
 } bst_candidates;
 

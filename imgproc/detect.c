@@ -21,6 +21,7 @@ struct bst_imgproc {
     int *order;
     /* of the latest frame */
     double exposure_s, binning, streak_px;
+    bool smeared;
 };
 
 static bst_status make_bad_map(bst_ctx *ctx, bst_imgproc *ip) {
@@ -132,8 +133,7 @@ static void correct_row(const bst_imgproc *ip, const bst_imgproc_frame *frame, i
             }
         }
         bad = bad || !(flat > 0.0f);
-        row[x] = bad ? BST_PIXEL_BAD
-                     : (row[x] - dark * (float)frame->exposure_s) / (flat * share);
+        row[x] = bad ? BST_PIXEL_BAD : (row[x] - dark * (float)frame->exposure_s) / (flat * share);
     }
 }
 
@@ -149,7 +149,8 @@ static void to_electrons(bst_imgproc *ip, const bst_imgproc_frame *frame, int wi
     }
 }
 
-/* The digital number from which a pixel no longer measures: the converter's end or the full well. */
+/* The digital number from which a pixel no longer measures: the converter's end or the full well.
+ */
 static int saturation_dn(const bst_imgproc *ip, const bst_imgproc_frame *frame) {
     double top = ldexp(1.0, frame->bits) - 1.0;
     double well = ip->camera.full_well_e * frame->binning * frame->binning;
@@ -162,13 +163,18 @@ static int saturation_dn(const bst_imgproc *ip, const bst_imgproc_frame *frame) 
 static void filter_path(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_motion *motion,
                         double *dx, double *dy) {
     *dx = *dy = 0.0;
+    ip->smeared = false;
     if (!motion) {
         return;
     }
     const bst_window *w = &frame->window;
     bst_motion_streak(motion, &ip->camera, w->x0 + 0.5 * (w->width - 1),
                       w->y0 + 0.5 * (w->height - 1), dx, dy);
+    double bend_x, bend_y;
+    bst_motion_bend(motion, &ip->camera, &bend_x, &bend_y);
     double length = hypot(*dx, *dy) / frame->binning;
+    double bend = hypot(bend_x, bend_y) / frame->binning;
+    ip->smeared = length + 2.0 * bend > ip->config.streak_max_px;
     if (length < ip->config.streak_min_px || length > ip->config.streak_max_px) {
         *dx = *dy = 0.0;
         return;
@@ -238,9 +244,8 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
     ip->binning = frame->binning;
 
     to_electrons(ip, frame, width, height);
-    /* no pixel is better known than its quantisation */
-    float floor_e = (float)(ip->camera.gain_e_per_dn / sqrt(12.0));
-    bst_background_estimate(&ip->background, ip->electrons, width, height, floor_e);
+    bst_background_estimate(&ip->background, ip->electrons, width, height,
+                            (float)ip->camera.gain_e_per_dn);
     double dx, dy;
     filter_path(ip, frame, motion, &dx, &dy);
     ip->streak_px = hypot(dx, dy) * frame->binning;
@@ -297,4 +302,8 @@ double bst_imgproc_v_limit(const bst_imgproc *ip, double snr) {
 
 double bst_imgproc_streak_px(const bst_imgproc *ip) {
     return ip->streak_px;
+}
+
+bool bst_imgproc_smeared(const bst_imgproc *ip) {
+    return ip->smeared;
 }

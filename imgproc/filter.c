@@ -70,9 +70,9 @@ static void add_tap(bst_filter *f, int x, int y, double weight) {
     }
 }
 
-/* Samples one pixel apart along the longer axis; between the two nearest pixels of the other axis by
- * linear interpolation, which broadens the kernel by at most 1/4 px^2 and costs 0.3 % of the SNR at
- * FWHM 2. */
+/* Samples one pixel apart along the longer axis; between the two nearest pixels of the other axis
+ * by linear interpolation, which broadens the kernel by at most 1/4 px^2 and costs 0.3 % of the SNR
+ * at FWHM 2. */
 static void set_streak(bst_filter *f, double dx, double dy) {
     bool along_x = fabs(dx) >= fabs(dy);
     double major = along_x ? dx : dy, minor = along_x ? dy : dx;
@@ -158,11 +158,11 @@ static double tail_given_tail(double u, double v, double rho) {
     return sum / total;
 }
 
-/* Separate excursions per pixel above u of a field with these lag-1 correlations along x, y and both
- * diagonals. */
+/* Separate excursions per pixel above u of a field with these lag-1 correlations along x, y and
+ * both diagonals. */
 static double excursion_rate(double u, double rx, double ry, double rising, double falling) {
-    double rate = upper_tail(u) * (1.0 - tail_given_tail(u, u, rx)) *
-                  (1.0 - tail_given_tail(u, u, ry));
+    double rate =
+        upper_tail(u) * (1.0 - tail_given_tail(u, u, rx)) * (1.0 - tail_given_tail(u, u, ry));
     double lxx = 2.0 * (1.0 - rx), lyy = 2.0 * (1.0 - ry), lxy = 0.5 * (falling - rising);
     double tilt = lxx * lyy > 0.0 ? 1.0 - lxy * lxy / (lxx * lyy) : 1.0;
     return rate * sqrt(fmax(tilt, 0.01));
@@ -276,8 +276,7 @@ void bst_filter_run(bst_filter *f, const bst_background *background, const uint1
         f->width = width;
         f->height = height;
         f->stride = width + 2 * f->pad;
-        memset(f->point, 0,
-               (size_t)f->stride * (size_t)(height + 2 * f->pad) * sizeof(float));
+        memset(f->point, 0, (size_t)f->stride * (size_t)(height + 2 * f->pad) * sizeof(float));
     }
     edge_factors(f, width, f->edge_x);
     edge_factors(f, height, f->edge_y);

@@ -16,7 +16,8 @@ typedef struct bst_filter {
     float *best;                            /* [height][width]: the greater SNR */
     uint8_t *mask;                          /* [height][width]: 255 above the threshold */
     float *lines; /* rows of the separable pass: normalised, level, 1 / noise, ring */
-    float *edge_x, *edge_y; /* 1 / norm of the kernel's part inside the frame, over the whole norm */
+    float *edge_x,
+        *edge_y; /* 1 / norm of the kernel's part inside the frame, over the whole norm */
     int first_row, last_row; /* rows with anything above the threshold; last < first: none */
     /* the PSF, one axis, unit norm */
     int radius;

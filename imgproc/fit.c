@@ -34,8 +34,8 @@ bst_stamp bst_fit_stamp(const bst_source *source, double reach_px, int max_side,
                         int height) {
     const bst_shape *s = &source->shape;
     double limit = 0.5 * (max_side - 2);
-    double rx = fmin(0.5 * fabs(s->dx_px) + reach_px, limit);
-    double ry = fmin(0.5 * fabs(s->dy_px) + reach_px, limit);
+    double rx = fmin(0.5 * fabs(s->dx_px) + fabs(s->bend_x_px) + reach_px, limit);
+    double ry = fmin(0.5 * fabs(s->dy_px) + fabs(s->bend_y_px) + reach_px, limit);
     int x0 = (int)fmax(floor(s->x_px - rx + 0.5), 0.0);
     int y0 = (int)fmax(floor(s->y_px - ry + 0.5), 0.0);
     int x1 = (int)fmin(floor(s->x_px + rx + 0.5), width - 1.0);
@@ -195,8 +195,8 @@ bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
             /* a hundredth of the standard deviation that the diagonal promises, at least 1e-5 px */
             double slack_x = fmax(1e-5, 0.01 / a[3 * s][3 * s]);
             double slack_y = fmax(1e-5, 0.01 / a[3 * s + 1][3 * s + 1]);
-            settled = settled && fabs(x - f->shape.x_px) < slack_x &&
-                      fabs(y - f->shape.y_px) < slack_y;
+            settled =
+                settled && fabs(x - f->shape.x_px) < slack_x && fabs(y - f->shape.y_px) < slack_y;
             double product = f->flux_e * f->widening_px2;
             double flux = f->flux_e + step[2];
             flux = flux > 0.1 * f->flux_e ? flux : 0.1 * f->flux_e;
@@ -239,12 +239,19 @@ bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
         double last[BST_FIT_MAX_PARAMETERS] = {0};
         last[parameters - 1] = 1.0;
         solve(a, parameters, last);
-        free[0]->widening_variance =
-            last[parameters - 1] / (free[0]->flux_e * free[0]->flux_e);
+        free[0]->widening_variance = last[parameters - 1] / (free[0]->flux_e * free[0]->flux_e);
     }
     free[0]->chi_square = chi;
     free[0]->fitted = true;
     return true;
+}
+
+double bst_fit_norm(const bst_fit *fit, const bst_stamp *stamp) {
+    double sum = 0.0;
+    for (int i = 0; i < stamp->width * stamp->height; i++) {
+        sum += fit->model[i] * fit->model[i];
+    }
+    return sqrt(sum);
 }
 
 bool bst_fit_moments(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
@@ -256,9 +263,9 @@ bool bst_fit_moments(bst_fit *fit, const bst_fit_data *data, const bst_stamp *st
     }
     const bst_shape *s = &source->shape;
     double base = s->sigma_px * s->sigma_px + fmax(source->widening_px2, 0.0) + 1.0 / 12.0;
-    double wxx = 2.0 * (base + s->dx_px * s->dx_px / 12.0);
-    double wyy = 2.0 * (base + s->dy_px * s->dy_px / 12.0);
-    double wxy = 2.0 * s->dx_px * s->dy_px / 12.0;
+    double path[3];
+    bst_shape_path_variance(s, path);
+    double wxx = 2.0 * (base + path[0]), wxy = 2.0 * path[1], wyy = 2.0 * (base + path[2]);
     double det = wxx * wyy - wxy * wxy;
     double ixx = wyy / det, iyy = wxx / det, ixy = -wxy / det;
     double sum = 0.0, mxx = 0.0, mxy = 0.0, myy = 0.0;

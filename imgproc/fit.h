@@ -54,6 +54,10 @@ bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
                  bst_source *const *free, int free_count, const bst_source *const *fixed,
                  int fixed_count, bool free_width, double limit_px);
 
+/* sqrt(sum share^2) of the first source of the latest bst_fit_run on this stamp: its SNR is flux
+ * times this over the background's noise. */
+double bst_fit_norm(const bst_fit *fit, const bst_stamp *stamp);
+
 /* Second moments (variance along x, covariance, variance along y) of the source in its stamp with
  * the fixed sources taken off, from moments under a Gaussian window of twice the model's
  * covariance. False when they are not those of a peak. */

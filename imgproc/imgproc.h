@@ -23,6 +23,8 @@ typedef struct bst_imgproc_config {
     double streak_min_px, streak_max_px;
     double search_radius_px, match_tolerance_px;
     bst_config_list bad_pixels; /* of bst_bad_pixel */
+    /* FITS images of the maps; "": none. bst_imgproc_create leaves them to the caller. */
+    char dark_file[512], flat_file[512], bad_pixel_file[512];
 } bst_imgproc_config;
 
 extern const bst_config_desc bst_imgproc_config_table[];
@@ -67,10 +69,11 @@ void bst_imgproc_free(bst_imgproc *ip);
  *
  * Fills background_e, noise_e, threshold_snr, count, lost and items of *out (room for `capacity`),
  * sorted by y, then x; label is UNKNOWN or ARTEFACT, star_id 0. When there is no room the brightest
- * stay. The covariance is the inverse of the Fisher matrix, without background uncertainty; snr is
- * sqrt(sum s^2 / sigma^2) with the background's noise only; length_px and width_px are the full
- * widths at half maximum of the Gaussian with the source's second moments. No output is NaN.
- * BST_ERR_ARGUMENT for a window or binning that does not fit the sensor. */
+ * stay. The covariance is the inverse of the Fisher matrix, without background uncertainty, plus
+ * what a motion that was not uniform may add; snr is sqrt(sum s^2 / sigma^2) with the background's
+ * noise only; length_px and width_px are the full widths at half maximum of the Gaussian with the
+ * source's second moments. No output is NaN. BST_ERR_ARGUMENT for a window or binning that does not
+ * fit the sensor. */
 bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
                               const bst_motion *motion, bst_detections *out,
                               int capacity) BST_MUST_CHECK;
@@ -80,6 +83,9 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
 double bst_imgproc_v_limit(const bst_imgproc *ip, double snr);
 /* Length of the star streak that the latest frame was filtered for, px; 0: points only. */
 double bst_imgproc_streak_px(const bst_imgproc *ip);
+/* Whether stars moved further in the latest frame than is modelled (streak_max_px): what was found
+ * then is parts of streaks, and no place of it is to be trusted. */
+bool bst_imgproc_smeared(const bst_imgproc *ip);
 
 extern const bst_module_desc bst_imgproc_module;
 

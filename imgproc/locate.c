@@ -7,13 +7,13 @@ enum { BAND = 16, MAX_FIXED = 12 };
 
 static const double WIDTH_FIT_SNR = 20.0; /* from here the widening is measured */
 static const double MOMENTS_SNR = 10.0;   /* below, extents are the model's own */
-static const double CLOSE_SHARE = 0.8;    /* filter outputs closer than this: both shapes are tried */
+static const double CLOSE_SHARE = 0.8; /* filter outputs closer than this: both shapes are tried */
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
 
 bst_status bst_locator_create(bst_ctx *ctx, int capacity, int max_height, int max_side,
                               bst_locator *out) {
-    *out = (bst_locator){
-        .max_side = max_side, .capacity = capacity, .buckets = max_height / BAND + 1};
+    *out =
+        (bst_locator){.max_side = max_side, .capacity = capacity, .buckets = max_height / BAND + 1};
     bst_psf_init(&out->psf);
     out->found = calloc((size_t)capacity, sizeof *out->found);
     out->bucket = calloc((size_t)out->buckets, sizeof *out->bucket);
@@ -35,11 +35,14 @@ void bst_locator_free(bst_locator *l) {
     *l = (bst_locator){0};
 }
 
-static void star_path(const bst_locate_frame *f, double x, double y, double *dx, double *dy) {
-    bst_motion_streak(f->motion, f->camera, f->origin_x_px + f->binning * x,
-                      f->origin_y_px + f->binning * y, dx, dy);
-    *dx /= f->binning;
-    *dy /= f->binning;
+static void set_star_path(const bst_locate_frame *f, bst_shape *s) {
+    bst_motion_streak(f->motion, f->camera, f->origin_x_px + f->binning * s->x_px,
+                      f->origin_y_px + f->binning * s->y_px, &s->dx_px, &s->dy_px);
+    bst_motion_bend(f->motion, f->camera, &s->bend_x_px, &s->bend_y_px);
+    s->dx_px /= f->binning;
+    s->dy_px /= f->binning;
+    s->bend_x_px /= f->binning;
+    s->bend_y_px /= f->binning;
 }
 
 static double shape_norm(const bst_locate_frame *f, bool streak) {
@@ -56,10 +59,10 @@ static void start(const bst_locate_frame *f, const bst_candidate *c, bst_found *
     *out = (bst_found){.peak_snr = c->snr, .peak_x = c->x, .peak_y = c->y};
     out->noise_e = bst_background_noise_at(f->background, c->x, c->y);
     bst_source *s = &out->source;
-    s->shape = (bst_shape){c->x, c->y, 0.0, 0.0, f->sigma_px};
+    s->shape = (bst_shape){.x_px = c->x, .y_px = c->y, .sigma_px = f->sigma_px};
     out->streak = f->filter->streak && c->snr > bst_filter_point_at(f->filter, c->x, c->y);
     if (out->streak) {
-        star_path(f, c->x, c->y, &s->shape.dx_px, &s->shape.dy_px);
+        set_star_path(f, &s->shape);
     }
     s->flux_e = (double)c->snr * out->noise_e / shape_norm(f, out->streak);
 }
@@ -122,9 +125,10 @@ static void gather(bst_locator *l, const bst_locate_frame *f, int i, const bst_s
     }
     for (int n = 0; n < count; n++) {
         bst_source *s = &l->found[near[n]].source;
-        bool inside = s->shape.x_px >= stamp->x0 && s->shape.y_px >= stamp->y0 &&
-                      s->shape.x_px <= stamp->x0 + stamp->width - 1 &&
-                      s->shape.y_px <= stamp->y0 + stamp->height - 1;
+        /* a centre just outside still has half its light inside */
+        bool inside = s->shape.x_px >= stamp->x0 - 1.5 && s->shape.y_px >= stamp->y0 - 1.5 &&
+                      s->shape.x_px <= stamp->x0 + stamp->width + 0.5 &&
+                      s->shape.y_px <= stamp->y0 + stamp->height + 0.5;
         if (inside && out->free_count < BST_FIT_MAX_FREE) {
             out->free[out->free_count++] = s;
         } else if (out->fixed_count < MAX_FIXED) {
@@ -148,8 +152,8 @@ static bool fit_one(bst_locator *l, const bst_locate_frame *f, int i, const bst_
     bst_fit_data data = {f->signal, f->width, f->height, l->found[i].noise_e};
     double path = hypot(copies[0].shape.dx_px, copies[0].shape.dy_px);
     double limit = 1.5 + f->sigma_px + 0.4 * path;
-    bool ok = bst_fit_run(&l->fit, &data, stamp, free_sources, c.free_count, c.fixed,
-                          c.fixed_count, free_width && c.free_count == 1, limit);
+    bool ok = bst_fit_run(&l->fit, &data, stamp, free_sources, c.free_count, c.fixed, c.fixed_count,
+                          free_width && c.free_count == 1, limit);
     if (ok) {
         l->found[i].source = copies[0];
     }
@@ -161,11 +165,9 @@ static bool fit_one(bst_locator *l, const bst_locate_frame *f, int i, const bst_
 
 static bst_source as_shape(const bst_locate_frame *f, const bst_found *found, bool streak) {
     bst_source s = found->source;
-    s.shape.x_px = found->peak_x;
-    s.shape.y_px = found->peak_y;
-    s.shape.dx_px = s.shape.dy_px = 0.0;
+    s.shape = (bst_shape){.x_px = found->peak_x, .y_px = found->peak_y, .sigma_px = f->sigma_px};
     if (streak) {
-        star_path(f, s.shape.x_px, s.shape.y_px, &s.shape.dx_px, &s.shape.dy_px);
+        set_star_path(f, &s.shape);
     }
     s.flux_e = (double)found->peak_snr * found->noise_e / shape_norm(f, streak);
     return s;
@@ -199,8 +201,7 @@ static bool shape_is_open(const bst_locate_frame *f, const bst_found *found) {
 /* First fit: shape and place. */
 static void locate_one(bst_locator *l, const bst_locate_frame *f, int i) {
     bst_found *found = &l->found[i];
-    double widening =
-        l->widening_weight > 0.0 ? l->widening_sum / l->widening_weight : 0.0;
+    double widening = l->widening_weight > 0.0 ? l->widening_sum / l->widening_weight : 0.0;
     found->source.widening_px2 = widening;
     if (shape_is_open(f, found)) {
         bst_source point = as_shape(f, found, false), streak = as_shape(f, found, true);
@@ -232,8 +233,10 @@ static bool measure_extent(bst_locator *l, const bst_locate_frame *f, int i, dou
     bst_found *found = &l->found[i];
     const bst_shape *s = &found->source.shape;
     double base = s->sigma_px * s->sigma_px + fmax(found->source.widening_px2, 0.0);
-    double m[3] = {base + s->dx_px * s->dx_px / 12.0, s->dx_px * s->dy_px / 12.0,
-                   base + s->dy_px * s->dy_px / 12.0};
+    double m[3];
+    bst_shape_path_variance(s, m);
+    m[0] += base;
+    m[2] += base;
     bool measured = false;
     if (found->snr >= MOMENTS_SNR && !(found->flags & BST_DETECTION_EDGE)) {
         bst_stamp stamp =
@@ -270,44 +273,60 @@ static bool measure_extent(bst_locator *l, const bst_locate_frame *f, int i, dou
     return measured;
 }
 
-/* A point that is longer than the PSF: fits it as a streak of the length and angle that its moments
- * give, as long as that lowers chi-square on the same pixels. */
+/* Fits number i with its path set to `path` px along `angle`; chi-square, or infinity. */
+static double try_path(bst_locator *l, const bst_locate_frame *f, int i, const bst_stamp *stamp,
+                       const bst_source *start_from, double path, double angle) {
+    bst_found *found = &l->found[i];
+    found->source = *start_from;
+    found->source.shape.dx_px = path * cos(angle);
+    found->source.shape.dy_px = path * sin(angle);
+    return fit_one(l, f, i, stamp, false) ? found->source.chi_square : INFINITY;
+}
+
+/* A point that is longer than the PSF: fits it as a streak along the axis of its moments, as long
+ * as that lowers chi-square on the same pixels. Moments give the length roughly, the parabola
+ * through three values of chi-square gives it well. */
 static void fit_own_streak(bst_locator *l, const bst_locate_frame *f, int i) {
     bst_found *found = &l->found[i];
+    double psf_fwhm = FWHM_PER_SIGMA * f->sigma_px;
     for (int round = 0; round < 4; round++) {
-        if (!measure_extent(l, f, i, 2.0 * reach(f)) ||
-            found->length_px < 1.5 * FWHM_PER_SIGMA * f->sigma_px) {
+        if (!measure_extent(l, f, i, 2.0 * reach(f)) || found->length_px < 1.5 * psf_fwhm) {
             return;
         }
-        double length = found->length_px / FWHM_PER_SIGMA, width = f->sigma_px;
-        double path = sqrt(12.0 * fmax(length * length - width * width, 0.0));
-        path = fmin(path, 0.5 * l->max_side);
+        double spread = (found->length_px * found->length_px - psf_fwhm * psf_fwhm) /
+                        (FWHM_PER_SIGMA * FWHM_PER_SIGMA);
+        double path = fmin(sqrt(12.0 * spread), 0.4 * l->max_side), angle = found->angle_rad;
         bst_found before = *found;
-        bst_source longer = found->source;
-        longer.shape.dx_px = path * cos(found->angle_rad);
-        longer.shape.dy_px = path * sin(found->angle_rad);
-        bst_stamp stamp = stamp_of(l, f, &longer);
-        /* the same pixels for the shape that it has now */
-        if (!fit_one(l, f, i, &stamp, false)) {
-            *found = before;
-            return;
+        bst_source longest = before.source;
+        longest.shape.dx_px = 1.2 * path * cos(angle);
+        longest.shape.dy_px = 1.2 * path * sin(angle);
+        bst_stamp stamp = stamp_of(l, f, &longest);
+        double old_path = hypot(before.source.shape.dx_px, before.source.shape.dy_px);
+        double old_angle = atan2(before.source.shape.dy_px, before.source.shape.dx_px);
+        double old_chi = try_path(l, f, i, &stamp, &before.source, old_path, old_angle);
+        double low = try_path(l, f, i, &stamp, &before.source, 0.8 * path, angle);
+        double high = try_path(l, f, i, &stamp, &before.source, 1.2 * path, angle);
+        double chi = try_path(l, f, i, &stamp, &before.source, path, angle);
+        double bend = low + high - 2.0 * chi, step = 0.0;
+        if (isfinite(bend)) {
+            step = bend > 0.0 ? 0.1 * (low - high) / bend : low < high ? -0.2 : 0.2;
+            step = fmax(-0.2, fmin(step, 0.2));
+            chi = try_path(l, f, i, &stamp, &before.source, path * (1.0 + step), angle);
         }
-        double chi = found->source.chi_square;
-        found->source = longer;
-        if (!fit_one(l, f, i, &stamp, false) || found->source.chi_square > chi - 9.0) {
+        if (!(chi < old_chi - 9.0)) {
             *found = before;
             return;
         }
         found->streak = true;
-        found->snr = found->source.flux_e * before.snr / before.source.flux_e;
+        found->snr = found->source.flux_e * bst_fit_norm(&l->fit, &stamp) / found->noise_e;
     }
 }
 
 /* Flags and plausibility. */
 static void judge(const bst_locate_frame *f, bst_found *found) {
     const bst_source *s = &found->source;
-    double half_x = 0.5 * fabs(s->shape.dx_px) + 2.0 * f->sigma_px;
-    double half_y = 0.5 * fabs(s->shape.dy_px) + 2.0 * f->sigma_px;
+    double half_x = 0.5 * fabs(s->shape.dx_px) + fabs(s->shape.bend_x_px) + 2.0 * f->sigma_px;
+    double half_y = 0.5 * fabs(s->shape.dy_px) + fabs(s->shape.bend_y_px) + 2.0 * f->sigma_px;
     double x = s->shape.x_px, y = s->shape.y_px;
     if (x - half_x < -0.5 || y - half_y < -0.5 || x + half_x > f->width - 0.5 ||
         y + half_y > f->height - 0.5) {
@@ -401,9 +420,9 @@ void bst_locate(bst_locator *l, const bst_locate_frame *f, const bst_candidates 
             fit_own_streak(l, f, i);
         }
         measure_extent(l, f, i, 0.0);
-        if (found->streak || (found->snr >= MOMENTS_SNR &&
-                              found->length_px > 1.5 * fmax(found->width_px, 1.0) &&
-                              found->length_px > 1.5 * FWHM_PER_SIGMA * f->sigma_px)) {
+        if (found->streak ||
+            (found->snr >= MOMENTS_SNR && found->length_px > 1.5 * fmax(found->width_px, 1.0) &&
+             found->length_px > 1.5 * FWHM_PER_SIGMA * f->sigma_px)) {
             found->flags |= BST_DETECTION_STREAK;
         }
     }

@@ -6,7 +6,7 @@ static const bst_pointing_sample *sample_at(const bst_pointing_telemetry *t, int
 
 /* Sums of a piecewise linear rotation vector r(t), t from the exposure's middle. */
 typedef struct moments {
-    bst_vec3 zeroth, first; /* integrals of r and t r */
+    bst_vec3 zeroth, first, second; /* integrals of r, t r and t^2 r */
 } moments;
 
 static void add_segment(moments *m, double t0, double t1, bst_vec3 r0, bst_vec3 r1) {
@@ -17,6 +17,9 @@ static void add_segment(moments *m, double t0, double t1, bst_vec3 r0, bst_vec3 
     /* integral of t r over a linear piece: midpoint term plus h^2 (r1 - r0) / 12 */
     m->first = bst_vec3_axpy(m->first, 0.5 * h * (t0 + t1), mean);
     m->first = bst_vec3_axpy(m->first, h * h / 12.0, difference);
+    double middle = 0.5 * (t0 + t1);
+    m->second = bst_vec3_axpy(m->second, h * (middle * middle + h * h / 12.0), mean);
+    m->second = bst_vec3_axpy(m->second, h * h * middle / 6.0, difference);
 }
 
 static bst_vec3 lerp(bst_vec3 a, bst_vec3 b, double s) {
@@ -29,9 +32,8 @@ bool bst_motion_from_telemetry(const bst_pointing_telemetry *telemetry, int64_t 
         return false;
     }
     int64_t newest = telemetry->written - 1;
-    int64_t oldest = telemetry->written > telemetry->capacity
-                         ? telemetry->written - telemetry->capacity
-                         : 0;
+    int64_t oldest =
+        telemetry->written > telemetry->capacity ? telemetry->written - telemetry->capacity : 0;
     /* first: the last sample not after the exposure's start, or the ring's first */
     int64_t first = newest;
     while (first > oldest && sample_at(telemetry, first)->tick > start_tick) {
@@ -44,7 +46,7 @@ bool bst_motion_from_telemetry(const bst_pointing_telemetry *telemetry, int64_t 
     }
     double middle = 0.5 * ((double)(end_tick - start_tick));
     double half = middle > 0.0 ? middle : 0.0;
-    moments m = {{0, 0, 0}, {0, 0, 0}};
+    moments m = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
     bst_vec3 at_middle = {0, 0, 0};
     for (int64_t n = first; n < newest; n++) {
         const bst_pointing_sample *a = sample_at(telemetry, n), *b = sample_at(telemetry, n + 1);
@@ -68,15 +70,19 @@ bool bst_motion_from_telemetry(const bst_pointing_telemetry *telemetry, int64_t 
             break;
         }
     }
-    bst_vec3 mean = at_middle, turn = {0, 0, 0};
+    bst_vec3 mean = at_middle, turn = {0, 0, 0}, bend = {0, 0, 0};
     if (half > 0.0) {
         double span = 2.0 * half;
         mean = bst_vec3_scale(m.zeroth, 1.0 / span);
         /* slope = 12 / T^3 integral of t r; the turn is slope times T */
         turn = bst_vec3_scale(m.first, 12.0 / (span * span));
+        /* (5 / T) integral of P2(2 t / T) r, P2 the Legendre polynomial */
+        bend = bst_vec3_axpy(bst_vec3_scale(m.zeroth, -2.5 / span), 30.0 / (span * span * span),
+                             m.second);
     }
     out->q_cam_from_gcrf = bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(mean), reference));
     out->turn_cam_rad = turn;
+    out->bend_cam_rad = bend;
     return true;
 }
 
@@ -91,4 +97,11 @@ void bst_motion_streak(const bst_motion *motion, const bst_camera *camera, doubl
         *dx_px = x1 - x0;
         *dy_px = y1 - y0;
     }
+}
+
+void bst_motion_bend(const bst_motion *motion, const bst_camera *camera, double *x_px,
+                     double *y_px) {
+    double scale = bst_camera_scale_rad(camera);
+    *x_px = motion->bend_cam_rad.y / scale;
+    *y_px = -motion->bend_cam_rad.x / scale;
 }

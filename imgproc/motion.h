@@ -12,17 +12,22 @@ typedef struct bst_motion {
     bst_vec3 turn_cam_rad;    /* rotation vector, camera axes: the attitude at the exposure's end is
                                  bst_quat_from_rotvec(turn / 2) * q_cam_from_gcrf, at its start with
                                  -turn / 2 */
+    bst_vec3 bend_cam_rad; /* coefficient of (3 u^2 - 1) / 2, u from -1 to 1 over the exposure: how
+                              far the motion departs from a uniform one */
 } bst_motion;
 
-/* Mean and least-squares slope of the telemetry attitude over [start_tick, end_tick]; attitudes
- * between samples are interpolated and beyond the ring's ends extrapolated from the two last
- * samples there. A zero-length exposure gives the attitude then and no turn. False, and *out
- * untouched, when the ring is empty. */
+/* Mean, least-squares slope and bend of the telemetry attitude over [start_tick, end_tick];
+ * attitudes between samples are interpolated and beyond the ring's ends extrapolated from the two
+ * last samples there. A zero-length exposure gives the attitude then, no turn and no bend. False,
+ * and *out untouched, when the ring is empty. */
 bool bst_motion_from_telemetry(const bst_pointing_telemetry *telemetry, int64_t start_tick,
                                int64_t end_tick, bst_motion *out);
 
 /* Path of a star that is at (x_px, y_px) in mid-exposure: end minus start, px. */
 void bst_motion_streak(const bst_motion *motion, const bst_camera *camera, double x_px, double y_px,
                        double *dx_px, double *dy_px);
+/* The bend of a star's path near the boresight, px. */
+void bst_motion_bend(const bst_motion *motion, const bst_camera *camera, double *x_px,
+                     double *y_px);
 
 #endif

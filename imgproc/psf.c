@@ -101,16 +101,20 @@ void bst_psf_render(const bst_psf *psf, const bst_shape *shape, const bst_stamp 
     memset(by_x, 0, bytes);
     memset(by_y, 0, bytes);
     memset(by_variance, 0, bytes);
-    double length = hypot(shape->dx_px, shape->dy_px) / shape->sigma_px;
-    int nodes = length < 1e-3 ? 1 : (int)fmin(4.0 + 0.95 * length, BST_PSF_MAX_NODES);
+    /* path at the greatest speed, which is at an end */
+    double length =
+        (hypot(shape->dx_px, shape->dy_px) + 6.0 * hypot(shape->bend_x_px, shape->bend_y_px)) /
+        shape->sigma_px;
+    int nodes = length < 1e-3 ? 1 : (int)fmin(5.0 + 1.15 * length, BST_PSF_MAX_NODES);
     const double *node = psf->node + nodes * (nodes - 1) / 2;
     const double *weight = psf->weight + nodes * (nodes - 1) / 2;
     profile px, py;
     for (int k = 0; k < nodes; k++) {
-        make_profile(psf, shape->x_px + node[k] * shape->dx_px - stamp->x0, shape->sigma_px,
-                     stamp->width, &px);
-        make_profile(psf, shape->y_px + node[k] * shape->dy_px - stamp->y0, shape->sigma_px,
-                     stamp->height, &py);
+        double bow = 6.0 * node[k] * node[k] - 0.5;
+        double x = shape->x_px + node[k] * shape->dx_px + bow * shape->bend_x_px;
+        double y = shape->y_px + node[k] * shape->dy_px + bow * shape->bend_y_px;
+        make_profile(psf, x - stamp->x0, shape->sigma_px, stamp->width, &px);
+        make_profile(psf, y - stamp->y0, shape->sigma_px, stamp->height, &py);
         for (int j = 0; j < py.count; j++) {
             double p = weight[k] * py.share[j], d = weight[k] * py.slope[j];
             double half_p = 0.5 * p, half_c = 0.5 * weight[k] * py.curvature[j];
@@ -124,4 +128,10 @@ void bst_psf_render(const bst_psf *psf, const bst_shape *shape, const bst_stamp 
             }
         }
     }
+}
+
+void bst_shape_path_variance(const bst_shape *s, double out[3]) {
+    out[0] = s->dx_px * s->dx_px / 12.0 + s->bend_x_px * s->bend_x_px / 5.0;
+    out[1] = s->dx_px * s->dy_px / 12.0 + s->bend_x_px * s->bend_y_px / 5.0;
+    out[2] = s->dy_px * s->dy_px / 12.0 + s->bend_y_px * s->bend_y_px / 5.0;
 }

@@ -20,10 +20,14 @@ typedef struct bst_psf {
 
 /* A source of unit flux. */
 typedef struct bst_shape {
-    double x_px, y_px;   /* centroid */
-    double dx_px, dy_px; /* path during the exposure; 0, 0: at rest */
+    double x_px, y_px;           /* centroid */
+    double dx_px, dy_px;         /* path during the exposure; 0, 0: at rest */
+    double bend_x_px, bend_y_px; /* of the path: coefficient of (3 u^2 - 1) / 2, u from -1 to 1 */
     double sigma_px;
 } bst_shape;
+
+/* Second moments of the path alone: variance along x, covariance, variance along y. */
+void bst_shape_path_variance(const bst_shape *shape, double out[3]);
 
 /* A rectangle of pixels [height][width] whose first pixel is (x0, y0). */
 typedef struct bst_stamp {
@@ -34,8 +38,8 @@ void bst_psf_init(bst_psf *psf);
 
 /* Writes the share of the source's light in each pixel of the stamp and its derivatives, each
  * [height][width]: by x, by y, and by sigma^2 (half the Laplacian: the heat equation). The streak
- * is uniform in time; its integral along the path is a Gauss-Legendre sum with an error below 1e-5
- * of the peak. Light beyond 6 sigma is left out. Sides at most BST_PSF_MAX_SIDE. */
+ * is quadratic in time; its integral along the path is a Gauss-Legendre sum with an error below
+ * 1e-5 of the peak. Light beyond 6 sigma is left out. Sides at most BST_PSF_MAX_SIDE. */
 void bst_psf_render(const bst_psf *psf, const bst_shape *shape, const bst_stamp *stamp,
                     double *share, double *by_x, double *by_y, double *by_variance);
 

@@ -8,7 +8,7 @@
  * the clones round alike. */
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
     !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-#define ROW_FUNCTION __attribute__((target_clones("default", "avx2"), optimize("O3")))
+#define ROW_FUNCTION __attribute__((target_clones("default", "avx2")))
 #else
 #define ROW_FUNCTION
 #endif

@@ -1,5 +1,6 @@
-/* The inner loops over image rows. Each element is computed by the same operations in the same order
- * on every processor, so results do not depend on the instruction set that the loader picks. */
+/* The inner loops over image rows. Each element is computed by the same operations in the same
+ * order on every processor, so results do not depend on the instruction set that the loader picks.
+ */
 #ifndef BST_IMGPROC_ROWS_H
 #define BST_IMGPROC_ROWS_H
 
@@ -14,7 +15,8 @@ typedef struct bst_row_sums {
 } bst_row_sums;
 
 /* Adds count, sum and sum of squares of (value - level) where |value - level| <= limit. */
-void bst_row_clipped_sums(const float *row, int count, float level, float limit, bst_row_sums *sums);
+void bst_row_clipped_sums(const float *row, int count, float level, float limit,
+                          bst_row_sums *sums);
 
 /* out = (raw - offset) * gain */
 void bst_row_electrons(const uint16_t *raw, int count, float offset, float gain, float *out);

@@ -32,10 +32,9 @@ bst_status bst_sky_expect(bst_ctx *ctx, bst_sky *sky, bst_quat q_cam_from_gcrf,
     double x0 = window.x0 - margin_px, x1 = window.x0 + window.width - 1 + margin_px;
     double y0 = window.y0 - margin_px, y1 = window.y0 + window.height - 1 + margin_px;
     bst_vec3 centre = bst_camera_unproject(sky->camera, 0.5 * (x0 + x1), 0.5 * (y0 + y1));
-    bst_vec3 corners[4] = {bst_camera_unproject(sky->camera, x0, y0),
-                           bst_camera_unproject(sky->camera, x1, y0),
-                           bst_camera_unproject(sky->camera, x0, y1),
-                           bst_camera_unproject(sky->camera, x1, y1)};
+    bst_vec3 corners[4] = {
+        bst_camera_unproject(sky->camera, x0, y0), bst_camera_unproject(sky->camera, x1, y0),
+        bst_camera_unproject(sky->camera, x0, y1), bst_camera_unproject(sky->camera, x1, y1)};
     double radius = 0.0;
     for (int i = 0; i < 4; i++) {
         radius = fmax(radius, bst_vec3_angle(centre, corners[i]));
@@ -57,8 +56,7 @@ bst_status bst_sky_expect(bst_ctx *ctx, bst_sky *sky, bst_quat q_cam_from_gcrf,
         double x, y;
         if (bst_camera_project(sky->camera, bst_quat_rotate(q_cam_from_gcrf, apparent), &x, &y) &&
             x >= x0 && x <= x1 && y >= y0 && y <= y1) {
-            sky->expected[(*count)++] =
-                (bst_expected_star){x, y, (double)star->v_mag, star->id};
+            sky->expected[(*count)++] = (bst_expected_star){x, y, (double)star->v_mag, star->id};
         }
     }
     return BST_OK;

@@ -15,9 +15,9 @@ static const double ROLL_SIGMA_RAD = 3e-3; /* onboard knowledge of the roll, as 
 struct bst_starid {
     int max_stars, max_detections, cells; /* cells per side of the vote map */
     uint16_t *votes;
-    int *by_y;       /* stars in order of y */
-    int *bright;     /* brightest stars, brightest detections */
-    int *star_of;    /* [detections], -1 none */
+    int *by_y;         /* stars in order of y */
+    int *bright;       /* brightest stars, brightest detections */
+    int *star_of;      /* [detections], -1 none */
     int *detection_of; /* [stars], -1 none */
     double *distance;  /* [stars] of its detection */
 };
@@ -73,8 +73,12 @@ static bool detection_brighter(const void *context, int a, int b) {
     return items[a].flux_e != items[b].flux_e ? items[a].flux_e > items[b].flux_e : a < b;
 }
 
-/* Saturated sources may be brighter than they seem, cut ones too. */
+/* Whether a detection may be a star: saturated sources may be brighter than they seem, cut ones
+ * too. */
 static bool consistent(const bst_detection *d, const bst_expected_star *s) {
+    if (d->label == BST_LABEL_ARTEFACT) {
+        return false;
+    }
     double sigma = d->flux_e > 0.0 ? 1.0857 * d->flux_sigma_e / d->flux_e : 1.0;
     double limit = 1.0 + 3.0 * fmin(sigma, 1.0);
     double excess = d->v_mag - s->v_mag; /* > 0: fainter than the star */
@@ -119,13 +123,9 @@ static bool vote(bst_starid *s, const bst_starid_options *o, const bst_expected_
         half = (side - 2) / 2;
     }
     memset(s->votes, 0, (size_t)side * (size_t)side * sizeof *s->votes);
-    double min_x = 1e30, max_x = -1e30, min_y = 1e30, max_y = -1e30, pairs = 0.0;
+    double pairs = 0.0;
     for (int j = 0; j < m; j++) {
         const bst_expected_star *star = &stars[bright_stars[j]];
-        min_x = fmin(min_x, star->x_px);
-        max_x = fmax(max_x, star->x_px);
-        min_y = fmin(min_y, star->y_px);
-        max_y = fmax(max_y, star->y_px);
         for (int i = 0; i < n; i++) {
             const bst_detection *d = &items[bright_items[i]];
             if (!consistent(d, star)) {
@@ -158,9 +158,9 @@ static bool vote(bst_starid *s, const bst_starid_options *o, const bst_expected_
     if (best == 0) {
         return false;
     }
-    /* density of differences by chance: pairs over an area not smaller than the search itself */
+    /* density of differences by chance: pairs over the area that the expected stars come from */
     double search = 2.0 * o->search_radius_px;
-    double area = fmax(max_x - min_x, search) * fmax(max_y - min_y, search);
+    double area = (o->field_width_px + search) * (o->field_height_px + search);
     double mean = pairs * 4.0 * CELL_PX * CELL_PX / area;
     double trials = fmax(search * search / (4.0 * CELL_PX * CELL_PX), 1.0);
     return trials * poisson_tail(mean, best) < CHANCE;
@@ -201,8 +201,8 @@ static int pair_up(bst_starid *s, const bst_starid_options *o, const bst_expecte
         double sigma = sqrt(fmax(d->cov_xx + d->cov_yy, 0.0) + floor_px * floor_px);
         double tolerance = fmin(o->tolerance_px, 4.0 * sigma);
         /* undo shift and turn of the detection to find the rows to look at */
-        double y = d->y_px - r->shift_y_px -
-                   r->roll_rad * (d->x_px - r->shift_x_px - o->centre_x_px);
+        double y =
+            d->y_px - r->shift_y_px - r->roll_rad * (d->x_px - r->shift_x_px - o->centre_x_px);
         int best = -1;
         double closest = tolerance;
         for (int k = first_not_below(s, stars, star_count, y - o->tolerance_px - 1.0);

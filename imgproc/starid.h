@@ -12,9 +12,10 @@ typedef struct bst_expected_star {
 } bst_expected_star;
 
 typedef struct bst_starid_options {
-    double search_radius_px;   /* greatest shift between expectation and detection */
-    double tolerance_px;       /* of a single star, after the shift */
-    double centre_x_px, centre_y_px; /* about which the field may be turned */
+    double search_radius_px;                /* greatest shift between expectation and detection */
+    double tolerance_px;                    /* of a single star, after the shift */
+    double centre_x_px, centre_y_px;        /* about which the field may be turned */
+    double field_width_px, field_height_px; /* of the window that detections come from */
 } bst_starid_options;
 
 typedef struct bst_starid_result {
@@ -38,7 +39,7 @@ void bst_starid_free(bst_starid *starid);
  * frames (Poisson, at the density of consistent pairs). Then the nearest consistent partners are
  * matched one to one, shift and turn fitted by least squares, and again with a closer tolerance.
  * Sets star_id and label STAR of the matched ones, leaves the others untouched. ARTEFACT detections
- * take part unless they are outside the tolerance of magnitudes. */
+ * take no part. */
 void bst_starid_match(bst_starid *starid, const bst_starid_options *options,
                       const bst_expected_star *stars, int star_count, bst_detection *items,
                       int count, bst_starid_result *out);

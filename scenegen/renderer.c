@@ -38,7 +38,7 @@ struct bst_renderer {
 };
 
 bst_renderer_options bst_renderer_default_options(void) {
-    return (bst_renderer_options){.error_sigma = 0.03, .cut_sigma = 0.02, .pool_frames = 4};
+    return (bst_renderer_options){.error_sigma = 0.02, .cut_sigma = 0.015, .pool_frames = 4};
 }
 
 static bst_status check_camera(bst_ctx *ctx, const bst_camera *c) {

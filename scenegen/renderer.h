@@ -16,10 +16,11 @@ typedef struct bst_renderer bst_renderer;
 
 typedef struct bst_renderer_options {
     double error_sigma; /* aim for the error of each source's image in any pixel, in sigma of that
-                           pixel (default 0.03) */
-    double cut_sigma; /* light per pixel that a stamp may leave out, in sigma of a dark pixel (0.02)
-                       */
-    int pool_frames;  /* frames that may be alive at a time (4) */
+                           pixel (default 0.02) */
+    double
+        cut_sigma;   /* light per pixel that a stamp may leave out, in sigma of a dark pixel (0.015)
+                      */
+    int pool_frames; /* frames that may be alive at a time (4) */
     int tile_width, tile_height, group; /* pixels per work-item (width a multiple of 16) and
                                            work-items per group; 0: chosen for the device */
 } bst_renderer_options;

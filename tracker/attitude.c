@@ -76,17 +76,14 @@ static bool step(const bst_camera *camera, double floor_px, const bst_attitude_s
     return true;
 }
 
-/* Gives weight 1 to the stars within reject_chi2, 0 to the others; how many changed. */
-static int select_stars(const bst_camera *camera, const bst_attitude_params *params, bst_quat q,
+/* Gives weight 1 to the stars within `limit`, 0 to the others; how many changed. */
+static int select_stars(const bst_camera *camera, double floor_px, double limit, bst_quat q,
                         bst_attitude_star *stars, int count, int *used) {
     int changed = 0;
     *used = 0;
     for (int i = 0; i < count; i++) {
         star_residual s;
-        double weight =
-            evaluate(camera, params->floor_px, q, &stars[i], &s) && s.chi2 <= params->reject_chi2
-                ? 1.0
-                : 0.0;
+        double weight = evaluate(camera, floor_px, q, &stars[i], &s) && s.chi2 <= limit ? 1.0 : 0.0;
         changed += weight != stars[i].weight;
         stars[i].weight = weight;
         *used += weight > 0.0;
@@ -106,6 +103,38 @@ static double mean_chi2(const bst_camera *camera, double floor_px, bst_quat q,
         }
     }
     return n > 0 ? sum / n : 0.0;
+}
+
+/* Factor by which the stars' stated variances are too small, from the median of their chi-square
+ * (ln 4 for 2 degrees of freedom); 1 when they are right, when there are too few stars to tell, or
+ * when the misfit cannot come from optimistic variances. */
+static double variance_factor(const bst_camera *camera, double floor_px, bst_quat q,
+                              bst_attitude_star *stars, int count) {
+    enum { FEWEST = 6 };
+    const double largest = 36.0;
+    if (count < FEWEST) {
+        return 1.0;
+    }
+    for (int i = 0; i < count; i++) {
+        star_residual s;
+        stars[i].weight = evaluate(camera, floor_px, q, &stars[i], &s) ? s.chi2 : INFINITY;
+    }
+    /* the median by bisection: no memory, any order */
+    double low = 0.0, high = 2.0 * largest * log(4.0);
+    for (int k = 0; k < 30; k++) {
+        double middle = 0.5 * (low + high);
+        int below = 0;
+        for (int i = 0; i < count; i++) {
+            below += stars[i].weight <= middle;
+        }
+        if (2 * below >= count) {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    double factor = high / log(4.0);
+    return factor > largest ? 1.0 : fmax(factor, 1.0);
 }
 
 /* Iterations are bounded by what the scales need: each halves, from at most 1e6 sigma. */
@@ -128,11 +157,13 @@ static bool solve(const bst_camera *camera, const bst_attitude_params *params,
         double now = mean_chi2(camera, params->floor_px, *q, stars, count);
         scale2 = fmax(fmin(0.25 * scale2, now), 4.0);
     }
+    double limit =
+        params->reject_chi2 * variance_factor(camera, params->floor_px, *q, stars, count);
     for (int i = 0; i < count; i++) {
         stars[i].weight = -1.0;
     }
     for (int i = 0; i < MAX_RESELECT; i++) {
-        if (select_stars(camera, params, *q, stars, count, used) == 0) {
+        if (select_stars(camera, params->floor_px, limit, *q, stars, count, used) == 0) {
             break;
         }
         if (*used < 2) {

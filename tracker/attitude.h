@@ -33,7 +33,9 @@ typedef struct bst_attitude_solution {
 /* Finds the rotation that brings `count` stars onto their centroids, starting from q_start (within
  * a few degrees). Gauss-Newton on the rotation vector; misidentified stars lose their weight by
  * graduated non-convexity (Cauchy weights whose scale shrinks; Black and Rangarajan 1996), then
- * those beyond reject_chi2 are dropped and the rest is solved by weighted least squares.
+ * those beyond reject_chi2 are dropped and the rest is solved by weighted least squares. With at
+ * least 6 stars reject_chi2 follows the median misfit, so that variances that are stated up to 25
+ * times too small cost no stars.
  * Not valid when: fewer than 2 stars agree, fewer than 3 when any star was rejected, less than 60 %
  * of the stars agree, two stars' separation is wrong, or the geometry leaves an axis worse than its
  * limit. The covariance is that of least squares, widened by chi2 / dof where that exceeds 1 with

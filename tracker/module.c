@@ -76,7 +76,7 @@ static void report(struct bst_step *step, const bst_tracker *tracker) {
     for (int i = 0; i < count; i++) {
         const bst_tracker_event *e = &events[i];
         if (e->kind == BST_TRACKER_ATTITUDE_LOST) {
-            bst_step_event(step, kinds[e->kind], "too few identified stars");
+            bst_step_event(step, kinds[e->kind], "no attitude from stars that is good enough");
         } else if (e->kind == BST_TRACKER_TARGET_LOST) {
             bst_step_event(step, kinds[e->kind], "track %lld", (long long)e->track_id);
         } else {

@@ -127,7 +127,7 @@ static bool cue_acceleration(const bst_mtt_frame *frame, double dt_s, bst_vec3 *
 
 static void predict(bst_mtt *m, const bst_mtt_frame *frame) {
     double dt = frame->seconds - m->seconds;
-    bst_vec3 step, rate;
+    bst_vec3 step = {0}, rate = {0};
     bool forward = m->started && cue_acceleration(frame, dt, &step, &rate);
     double near = cos(m->params.feed_forward_rad);
     for (int t = 0; t < m->track_count; t++) {
@@ -223,8 +223,13 @@ static bool may_confirm(const bst_mtt *m, const bst_mtt_track *track) {
 static bool is_finished(const bst_mtt *m, const bst_mtt_track *track, bool observed) {
     const bst_mtt_params *p = &m->params;
     double variance = fmax(track->state.covariance[0][0], track->state.covariance[1][1]);
+    /* nothing is known of a tentative track that would be worth waiting for */
+    double patience_s =
+        track->status == BST_TRACK_TENTATIVE
+            ? fmin(p->max_coast_s, p->initiation_gap_s * (p->confirm_frames - p->confirm_hits + 1))
+            : p->max_coast_s;
     if (!(variance < p->max_sigma_rad * p->max_sigma_rad) ||
-        m->seconds - track->last_update_s > p->max_coast_s) {
+        m->seconds - track->last_update_s > patience_s) {
         return true;
     }
     if (track->status != BST_TRACK_TENTATIVE) {

@@ -26,7 +26,7 @@ struct bst_tracker {
     bst_attitude_params attitude_params;
     bst_attitude_error_params error_params;
     bst_target_params target_params;
-    double blend_variance_px2, edge_margin_px, max_attitude_sigma_rad;
+    double floor_variance_px2, blend_variance_px2, edge_margin_px, max_attitude_sigma_rad;
     int max_detections;
     bst_mtt *mtt;
     cached_star *cache;
@@ -77,6 +77,7 @@ static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_par
         .memory_chi2 = 23.5, /* 99.99 %, 4 degrees of freedom */
         /* what was lost may have manoeuvred: ten times the usual acceleration */
         .memory_noise_rad2ps3 = square(10.0 * arcsec(c->process_noise_arcsec_per_s15))};
+    t->floor_variance_px2 = square(c->object_floor_px);
     t->blend_variance_px2 = square(c->blend_sigma_px);
     t->edge_margin_px = c->edge_margin_px;
     t->max_attitude_sigma_rad = c->max_attitude_sigma_px * scale;
@@ -222,12 +223,17 @@ static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_lig
         memcpy(out->covariance_cam, solution.covariance, sizeof out->covariance_cam);
         out->fix.error_cam_rad =
             bst_quat_to_rotvec(bst_quat_mul(solution.q_cam_from_gcrf, bst_quat_conj(q_telemetry)));
-        (void)bst_attitude_error_update(&t->error, &t->error_params, q_telemetry,
-                                        out->fix.error_cam_rad, solution.covariance);
+        /* Stars that contradict the telemetry's history were seen from a camera that turned
+         * unevenly in the exposure: their attitude is not that of its middle, and nobody may steer
+         * by it. */
+        out->usable = bst_attitude_error_update(&t->error, &t->error_params, q_telemetry,
+                                                out->fix.error_cam_rad, solution.covariance);
+        out->fix.valid = out->usable;
     } else {
         bst_vec3 rate;
         bst_attitude_error_get(&t->error, &t->error_params, q_telemetry, &out->fix.error_cam_rad,
                                &rate, out->covariance_cam);
+        out->usable = true;
         out->q_cam_from_gcrf =
             bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(out->fix.error_cam_rad), q_telemetry));
     }
@@ -235,7 +241,8 @@ static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_lig
     for (int i = 0; i < 3; i++) {
         out->fix.sigma_rad[i] = sqrt(out->covariance_cam[i][i]);
     }
-    out->usable = fmax(out->fix.sigma_rad[0], out->fix.sigma_rad[1]) <= t->max_attitude_sigma_rad;
+    out->usable = out->usable &&
+                  fmax(out->fix.sigma_rad[0], out->fix.sigma_rad[1]) <= t->max_attitude_sigma_rad;
 }
 
 /* A detection as a geometric direction with the covariance of centroid and attitude. */
@@ -247,8 +254,10 @@ static bst_sky_measurement to_sky(const bst_tracker *t, const bst_detection *ite
     bst_sky_measurement m = {.direction = bst_light_unaberrate(light, apparent)};
     bst_tangent axes = bst_tangent_at(m.direction);
     double scale = bst_camera_scale_rad(&t->camera) * v.z; /* rad per px towards the field's edge */
-    double extra =
-        item->flags & (BST_DETECTION_BLEND | BST_DETECTION_EDGE) ? t->blend_variance_px2 : 0.0;
+    double extra = t->floor_variance_px2;
+    if (item->flags & (BST_DETECTION_BLEND | BST_DETECTION_EDGE)) {
+        extra += t->blend_variance_px2;
+    }
     /* derivatives of the direction by x, y (px) and by rotation about camera x, y, z */
     bst_vec3 unit[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, columns[5];
     for (int i = 0; i < 2; i++) {
@@ -364,7 +373,7 @@ static void choose_target(bst_tracker *t, const bst_tracker_cue *cue, double sec
 
 static void write_track(const bst_mtt_track *track, int64_t target_id, bst_track *out) {
     *out = (bst_track){.id = track->id,
-                       .status = track->status,
+                       .status = (int32_t)track->status,
                        .target_of_interest = track->id == target_id,
                        .direction_gcrf = track->state.direction,
                        .rate_gcrf_radps = track->state.rate_radps,

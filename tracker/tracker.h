@@ -19,7 +19,7 @@ typedef struct bst_tracker_config {
     double confirm_score, max_rate_arcsec_per_s, cue_rate_margin_arcsec_per_s, initiation_gap_s;
     int64_t max_misses;
     double max_coast_s, max_sigma_arcsec;
-    double merge_px, merge_floor_px, blend_sigma_px, edge_margin_px;
+    double merge_px, merge_floor_px, object_floor_px, blend_sigma_px, edge_margin_px;
     double feed_forward_deg;
     double target_direction_chi2, target_rate_chi2, target_magnitude_chi2, target_release_chi2,
         target_rate_floor_arcsec_per_s, target_max_rate_sigma_arcsec_per_s, target_memory_s;

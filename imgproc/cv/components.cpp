@@ -34,8 +34,9 @@ extern "C" bst_status bst_cv_components_label(bst_ctx *ctx, bst_cv_components *c
                                               int *count) noexcept {
     if (width < 1 || height < 1 || width > components->max_width ||
         height > components->max_height) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT, "a mask of %d x %d does not fit a work space of %d x %d",
-                        width, height, components->max_width, components->max_height);
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "a mask of %d x %d does not fit a work space of %d x %d", width, height,
+                        components->max_width, components->max_height);
     }
     try {
         const cv::Mat image(height, width, CV_8UC1, const_cast<uint8_t *>(mask));

@@ -70,16 +70,19 @@ static void normal16(uint16 radius_word, uint16 angle_word, float16 *z0, float16
  * III.2), all lanes in step; lanes outside `wanted` give 0. */
 static float16 poisson_search16(float16 mean, float16 u, int16 wanted) {
     float16 count = (float16)0.0f;
-    float16 p = exp(-mean);
+    float16 p = exp(-fmin(mean, POISSON_SWITCH));
     float16 rest = u;
     int16 active = wanted & (rest > p);
     /* the bound is never reached: the mean is below 30 and the search ends where p fades */
-    for (int k = 1; any(active) && k < 200; k++) {
-        rest = select(rest, rest - p, active);
-        count = select(count, (float16)(float)k, active);
-        p *= mean * (1.0f / (float)k);
-        /* beyond the mode a p below 2^-30 is less than u resolves: the search ends */
-        active &= (rest > p) & ((p > 0x1p-30f) | (mean > (float)k));
+    for (int k = 0; any16(active) && k < 200;) {
+        for (int step = 0; step < 4; step++) { /* lanes that are done ignore the steps too many */
+            k++;
+            rest = select(rest, rest - p, active);
+            count = select(count, (float16)(float)k, active);
+            p *= mean * (1.0f / (float)k);
+            /* beyond the mode a p below 2^-30 is less than u resolves: the search ends */
+            active &= (rest > p) & ((p > 0x1p-30f) | (mean > (float)k));
+        }
     }
     return count;
 }
@@ -105,8 +108,11 @@ static ushort16 detect16(bst_scene_params p, uint first, float16 mean, int16 *fu
     float16 z0, z1;
     normal16(w2, w3, &z0, &z1);
     int16 small = mean < POISSON_SWITCH;
-    float16 electrons = poisson_search16(mean, unit16(w0), small);
-    if (any(~small)) {
+    float16 electrons = (float16)0.0f;
+    if (any16(small)) {
+        electrons = poisson_search16(mean, unit16(w0), small);
+    }
+    if (any16(~small)) {
         electrons = select(poisson_expand16(mean, z0), electrons, small);
     }
     int16 well = electrons >= p.full_well_e;

@@ -8,6 +8,14 @@
 #define STRIDE (TILE_W + 2 * PAD)
 #define HALF (TAPS / 2)
 
+/* any(), by halves: some compilers test lane after lane. */
+static int any16(int16 v) {
+    int8 a = v.lo | v.hi;
+    int4 b = a.lo | a.hi;
+    int2 c = b.lo | b.hi;
+    return (c.lo | c.hi) < 0;
+}
+
 /* Tap j of a profile whose centre is f pixels (0 <= f < 1) right of pixel n belongs to pixel
  * n + j - (HALF - 1). profiles: [BST_PHASES + 1][TAPS]. */
 static void splat_node(local float *sum, int tile_x, int tile_y, float x, float y, float electrons,
@@ -78,7 +86,7 @@ static void splat_tile(local float *sum, int tile_x, int tile_y, int source_grou
         global const float *box = source_box + g * 4 * BST_BLOCK;
         int16 hit = (vload16(0, box) <= x1) & (vload16(1, box) <= y1) & (vload16(2, box) >= x0) &
                     (vload16(3, box) >= y0);
-        if (!any(hit)) {
+        if (!any16(hit)) {
             continue;
         }
         int hits[BST_BLOCK];

@@ -13,6 +13,7 @@
 #include "sim/app/load.h"
 #include "sim/app/run_pictures.h"
 #include "sim/app/version.h"
+#include "sim/device/device.h"
 #include "sim/engine/recorder.h"
 #include "sim/engine/simulation.h"
 #include "sim/eval/loop_summary.h"
@@ -162,7 +163,14 @@ static bst_status write_manifest(const run_state *run, bst_simulation *sim, cons
     snprintf(text, sizeof text, "0x%llX", (unsigned long long)scenario->seed);
     cJSON_AddStringToObject(root, "seed", text);
     cJSON_AddNumberToObject(root, "run", (double)scenario->run);
-    cJSON_AddStringToObject(root, "device", bst_simulation_device(sim));
+    const bst_device *device = bst_simulation_device(sim);
+    cJSON_AddStringToObject(root, "device", device ? bst_device_description(device) : "");
+    cJSON *kernels = cJSON_AddObjectToObject(root, "kernels");
+    for (int i = 0; device && bst_device_built(device, i); i++) {
+        const bst_kernel_source *kernel = bst_device_built(device, i);
+        snprintf(text, sizeof text, "%08x%08x", kernel->hash_high, kernel->hash_low);
+        cJSON_AddStringToObject(kernels, kernel->name, text);
+    }
     bst_stars_info stars;
     bst_stars_get_info(bst_world_stars(bst_simulation_world(sim)), &stars);
     cJSON_AddStringToObject(root, "star_catalogue", stars.source);

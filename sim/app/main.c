@@ -15,8 +15,8 @@ static const command commands[] = {
     {"check", bst_cmd_check, "validate a scenario and print it with every default written out"},
     {"schema", bst_cmd_schema, "print the JSON Schema of scenarios"},
     {"stars", bst_cmd_stars, "get, import or describe the star catalogue"},
-
-
+    {"propagate", bst_cmd_propagate, "positions and velocities from two-line element sets"},
+    {"bench", bst_cmd_bench, "measure speed and error"},
 };
 
 void bst_app_log(void *user, bst_log_level level, const char *message) {

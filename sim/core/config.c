@@ -10,7 +10,8 @@
 
 #include "sim/core/text.h"
 
-static const double MAX_EXACT_INTEGER = 9007199254740992.0; /* 2^53 */
+/* 2^53, which the text 2^53 + 1 also reads as */
+static const double END_OF_EXACT_INTEGERS = 9007199254740992.0;
 
 typedef struct reader {
     bst_ctx *ctx;
@@ -20,12 +21,31 @@ typedef struct reader {
 static bst_status read_object(const reader *r, const cJSON *node, const char *path,
                               const bst_config_desc *table, void *object);
 
+/* A number as the shortest text that reads back as the same bits, which cJSON's own printing (15
+ * digits, compared with a tolerance) does not promise. */
+static void exact_text(double value, char *buffer, size_t bytes) {
+    for (int digits = 15; digits <= 17; digits++) {
+        snprintf(buffer, bytes, "%.*g", digits, value);
+        if (strtod(buffer, NULL) == value) {
+            return;
+        }
+    }
+}
+
 /* The offending value as text, shortened. */
 static void value_text(const cJSON *value, char *buffer, size_t bytes) {
+    if (cJSON_IsNumber(value)) {
+        exact_text(value->valuedouble, buffer, bytes);
+        return;
+    }
     char *text = cJSON_PrintUnformatted(value);
     snprintf(buffer, bytes, "%s", text ? text : "?");
     if (text && strlen(text) >= bytes && bytes > 4) {
-        memcpy(buffer + bytes - 4, "...", 4);
+        size_t end = bytes - 4;
+        while (end > 0 && ((unsigned char)buffer[end] & 0xC0) == 0x80) {
+            end--; /* not in the middle of a UTF-8 character */
+        }
+        memcpy(buffer + end, "...", 4);
     }
     free(text);
 }
@@ -40,9 +60,13 @@ static bst_status wrong(const reader *r, const char *path, const cJSON *value, c
 
 static void range_text(const bst_config_desc *d, char *buffer, size_t bytes) {
     const char *unit = d->unit && *d->unit ? d->unit : "";
-    snprintf(buffer, bytes, "%s from %.15g to %.15g%s%s",
-             d->type == BST_CONFIG_INT ? "an integer" : "a number", d->minimum, d->maximum,
-             *unit ? " " : "", unit);
+    if (d->type == BST_CONFIG_INT) {
+        snprintf(buffer, bytes, "an integer from %.0f to %.0f%s%s", d->minimum, d->maximum,
+                 *unit ? " " : "", unit);
+    } else {
+        snprintf(buffer, bytes, "a number from %.15g to %.15g%s%s", d->minimum, d->maximum,
+                 *unit ? " " : "", unit);
+    }
 }
 
 static bst_status unknown_key(const reader *r, const char *path, const char *key,
@@ -74,7 +98,7 @@ static bst_status read_number(const reader *r, const cJSON *value, const char *p
     }
     double number = value->valuedouble;
     if (d->type == BST_CONFIG_INT &&
-        (number != floor(number) || fabs(number) > MAX_EXACT_INTEGER)) {
+        (number != floor(number) || fabs(number) >= END_OF_EXACT_INTEGERS)) {
         return wrong(r, path, value, "not an integer", allowed);
     }
     if (!(number >= d->minimum && number <= d->maximum)) {
@@ -166,6 +190,7 @@ static bst_status read_value(const reader *r, const cJSON *value, const char *pa
             *(double *)(void *)member = number;
             return BST_OK;
         case BST_CONFIG_STRING:
+        case BST_CONFIG_PATH:
             snprintf(text, sizeof text, "a string of at most %zu bytes", d->size - 1);
             if (!cJSON_IsString(value)) {
                 return wrong(r, path, value, "wrong type", text);
@@ -293,16 +318,31 @@ void bst_config_free(const bst_config_desc *table, void *object) {
     }
 }
 
+static cJSON *exact_number(double value) {
+    char text[40];
+    exact_text(value, text, sizeof text);
+    return isfinite(value) ? cJSON_CreateRaw(text) : cJSON_CreateNull();
+}
+
+static cJSON *exact_numbers(const double *values, size_t count) {
+    cJSON *array = cJSON_CreateArray();
+    for (size_t i = 0; i < count && array; i++) {
+        cJSON_AddItemToArray(array, exact_number(values[i]));
+    }
+    return array;
+}
+
 static cJSON *echo_value(const bst_config_desc *d, const void *object) {
     const char *member = (const char *)object + d->offset;
     switch (d->type) {
         case BST_CONFIG_BOOL:
             return cJSON_CreateBool(*(const bool *)(const void *)member);
         case BST_CONFIG_INT:
-            return cJSON_CreateNumber((double)*(const int64_t *)(const void *)member);
+            return exact_number((double)*(const int64_t *)(const void *)member);
         case BST_CONFIG_REAL:
-            return cJSON_CreateNumber(*(const double *)(const void *)member);
+            return exact_number(*(const double *)(const void *)member);
         case BST_CONFIG_STRING:
+        case BST_CONFIG_PATH:
             return cJSON_CreateString(member);
         case BST_CONFIG_ENUM:
             return cJSON_CreateString(d->choices[*(const int32_t *)(const void *)member]);
@@ -312,8 +352,7 @@ static cJSON *echo_value(const bst_config_desc *d, const void *object) {
             return cJSON_CreateString(text);
         }
         case BST_CONFIG_REALS:
-            return cJSON_CreateDoubleArray((const double *)(const void *)member,
-                                           (int)(d->size / sizeof(double)));
+            return exact_numbers((const double *)(const void *)member, d->size / sizeof(double));
         case BST_CONFIG_OBJECT:
             return bst_config_echo(d->children, member);
         case BST_CONFIG_LIST: {

@@ -14,6 +14,7 @@ typedef enum bst_config_type {
     BST_CONFIG_INT,    /* int64_t */
     BST_CONFIG_REAL,   /* double */
     BST_CONFIG_STRING, /* char[size], size in the descriptor */
+    BST_CONFIG_PATH,   /* the same: a file; a scenario's are made absolute when it is read */
     BST_CONFIG_ENUM,   /* int32_t, index into choices */
     BST_CONFIG_SEED,   /* uint64_t, hex string "0x..." */
     BST_CONFIG_REALS,  /* double[size / sizeof(double)], a fixed-length array */
@@ -66,6 +67,11 @@ typedef struct bst_config_desc {
         .key = #m, .type = BST_CONFIG_STRING, .unit = "", .fallback = def_, .doc = doc_, \
         BST_FIELD_(s, m)                                                                 \
     }
+#define BST_PATH(s, m, def_, doc_)                                                     \
+    {                                                                                  \
+        .key = #m, .type = BST_CONFIG_PATH, .unit = "", .fallback = def_, .doc = doc_, \
+        BST_FIELD_(s, m)                                                               \
+    }
 #define BST_SEED(s, m, def_, doc_)                                                     \
     {                                                                                  \
         .key = #m, .type = BST_CONFIG_SEED, .unit = "", .fallback = def_, .doc = doc_, \
@@ -95,8 +101,9 @@ typedef struct bst_config_desc {
 #define BST_CONFIG_END \
     { .key = NULL }
 
-/* A parsed JSON document: text strictly checked (no trailing garbage, no duplicate keys, no
- * non-finite numbers, no integers beyond 2^53, depth and size bounded). */
+/* A parsed JSON document: text strictly checked (UTF-8, the grammar of RFC 8259, no trailing
+ * garbage, no duplicate keys, no numbers beyond double, no \u0000, depth at most 64, size bounded).
+ */
 typedef struct bst_json bst_json;
 struct cJSON;
 
@@ -126,7 +133,7 @@ bst_status bst_config_defaults(bst_ctx *ctx, const bst_config_desc *table,
                                void *object) BST_MUST_CHECK;
 
 /* The object as JSON with every default written out; the caller frees with cJSON_Delete. NULL when
- * out of memory. */
+ * out of memory. For printing: numbers are raw items whose text reads back as the same bits. */
 struct cJSON *bst_config_echo(const bst_config_desc *table, const void *object);
 /* The JSON Schema (draft 2020-12) of a table as an object node; caller frees. */
 struct cJSON *bst_config_schema(const bst_config_desc *table);

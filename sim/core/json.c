@@ -61,13 +61,56 @@ static size_t utf8_error(const char *text, size_t bytes) {
     return bytes;
 }
 
-/* Offset of the first bracket that nests deeper than MAX_DEPTH, or `bytes`. */
-static size_t depth_error(const char *text, size_t bytes) {
+/* Bytes of the JSON number at text (RFC 8259, section 6), or 0 when it is none. */
+static size_t number_length(const char *text, size_t bytes) {
+    size_t i = bytes && text[0] == '-' ? 1 : 0;
+    size_t start = i;
+    while (i < bytes && isdigit((unsigned char)text[i])) {
+        i++;
+    }
+    if (i == start || (text[start] == '0' && i > start + 1)) {
+        return 0;
+    }
+    if (i < bytes && text[i] == '.') {
+        start = ++i;
+        while (i < bytes && isdigit((unsigned char)text[i])) {
+            i++;
+        }
+        if (i == start) {
+            return 0;
+        }
+    }
+    if (i < bytes && (text[i] == 'e' || text[i] == 'E')) {
+        i++;
+        i += i < bytes && (text[i] == '+' || text[i] == '-');
+        start = i;
+        while (i < bytes && isdigit((unsigned char)text[i])) {
+            i++;
+        }
+        if (i == start) {
+            return 0;
+        }
+    }
+    return i;
+}
+
+/* Offset of the first thing that cJSON would let pass and JSON or we do not, or `bytes`; *what says
+ * which. */
+static size_t lenience_error(const char *text, size_t bytes, const char **what) {
     int depth = 0;
     bool in_string = false;
     for (size_t i = 0; i < bytes; i++) {
-        char c = text[i];
+        unsigned char c = (unsigned char)text[i];
+        if (c < 0x20 && (in_string || !strchr("\t\n\r", c))) {
+            *what = in_string ? "a control character within a string (write \\n, \\t or \\u00XX)"
+                              : "a control character";
+            return i;
+        }
         if (in_string) {
+            if (c == '\\' && bytes - i >= 6 && memcmp(text + i, "\\u0000", 6) == 0) {
+                *what = "\\u0000 within a string is not allowed";
+                return i;
+            }
             if (c == '\\') {
                 i++;
             } else if (c == '"') {
@@ -77,13 +120,50 @@ static size_t depth_error(const char *text, size_t bytes) {
             in_string = true;
         } else if (c == '{' || c == '[') {
             if (++depth > MAX_DEPTH) {
+                *what = "nested too deep (allowed: 64 levels)";
                 return i;
             }
         } else if (c == '}' || c == ']') {
             depth--;
+        } else if (c == '-' || isdigit(c)) {
+            size_t length = number_length(text + i, bytes - i);
+            if (length == 0) {
+                *what = "this is not a JSON number";
+                return i;
+            }
+            i += length - 1;
         }
     }
     return bytes;
+}
+
+static int compare_keys(const void *a, const void *b) {
+    return strcmp(*(const char *const *)a, *(const char *const *)b);
+}
+
+/* Finds a key that an object has twice; sorting keeps hostile objects of a million keys cheap. */
+static bst_status find_duplicate(bst_ctx *ctx, const cJSON *object, const char **key) {
+    *key = NULL;
+    int count = cJSON_GetArraySize(object);
+    if (count < 2) {
+        return BST_OK;
+    }
+    const char **keys = malloc((size_t)count * sizeof *keys);
+    if (!keys) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
+    }
+    int n = 0;
+    for (const cJSON *child = object->child; child; child = child->next) {
+        keys[n++] = child->string;
+    }
+    qsort(keys, (size_t)n, sizeof *keys, compare_keys);
+    for (int i = 1; i < n && !*key; i++) {
+        if (strcmp(keys[i - 1], keys[i]) == 0) {
+            *key = keys[i];
+        }
+    }
+    free(keys);
+    return BST_OK;
 }
 
 /* Duplicate keys and numbers that are not finite, anywhere in the tree. */
@@ -94,16 +174,18 @@ static bst_status check_tree(bst_ctx *ctx, const char *name, const cJSON *node, 
             "%s: %s: the number is too large to be represented (allowed: |number| < 1.8e308)", name,
             *path ? path : "/");
     }
+    if (cJSON_IsObject(node)) {
+        const char *twice;
+        BST_TRY(find_duplicate(ctx, node, &twice));
+        if (twice) {
+            return bst_fail(ctx, BST_ERR_CONFIG, "%s: %s/%s: the key is given twice", name, path,
+                            twice);
+        }
+    }
     int index = 0;
     for (const cJSON *child = node->child; child; child = child->next, index++) {
         char child_path[512];
         if (cJSON_IsObject(node)) {
-            for (const cJSON *earlier = node->child; earlier != child; earlier = earlier->next) {
-                if (strcmp(earlier->string, child->string) == 0) {
-                    return bst_fail(ctx, BST_ERR_CONFIG, "%s: %s/%s: the key is given twice", name,
-                                    path, child->string);
-                }
-            }
             snprintf(child_path, sizeof child_path, "%s/%s", path, child->string);
         } else {
             snprintf(child_path, sizeof child_path, "%s/%d", path, index);
@@ -139,11 +221,11 @@ bst_status bst_json_parse(bst_ctx *ctx, const char *name, const char *text, size
         return bst_fail(ctx, BST_ERR_FORMAT, "%s:%d:%d: byte 0x%02X is not UTF-8 text", name, line,
                         column, (unsigned char)text[bad]);
     }
-    bad = depth_error(text, bytes);
+    const char *what = NULL;
+    bad = lenience_error(text, bytes, &what);
     if (bad < bytes) {
         locate(text, bad, &line, &column);
-        return bst_fail(ctx, BST_ERR_FORMAT, "%s:%d:%d: nested too deep (allowed: %d levels)", name,
-                        line, column, MAX_DEPTH);
+        return bst_fail(ctx, BST_ERR_FORMAT, "%s:%d:%d: %s", name, line, column, what);
     }
     const char *end = NULL;
     cJSON *root = cJSON_ParseWithLengthOpts(text, bytes, &end, 0);
@@ -184,25 +266,22 @@ bst_status bst_json_parse(bst_ctx *ctx, const char *name, const char *text, size
 bst_status bst_json_load(bst_ctx *ctx, const char *path, bst_json **out) {
     *out = NULL;
     struct stat info;
-    FILE *file = fopen(path, "rb");
-    if (!file || fstat(fileno(file), &info) != 0) {
-        bst_status status =
-            bst_fail(ctx, BST_ERR_IO, "%s: cannot be opened: %s", path, strerror(errno));
-        if (file) {
-            fclose(file);
-        }
-        return status;
+    if (stat(path, &info) != 0) {
+        return bst_fail(ctx, BST_ERR_IO, "%s: cannot be opened: %s", path, strerror(errno));
     }
+    /* before opening, which would wait on a pipe */
     if (!S_ISREG(info.st_mode)) {
-        fclose(file);
         return bst_fail(ctx, BST_ERR_IO, "%s: not a file%s", path,
                         S_ISDIR(info.st_mode) ? " but a folder" : "");
     }
     if (info.st_size > MAX_BYTES) {
-        fclose(file);
         return bst_fail(ctx, BST_ERR_FORMAT,
                         "%s: %lld bytes are too many for a scenario (allowed: %lld)", path,
                         (long long)info.st_size, MAX_BYTES);
+    }
+    FILE *file = fopen(path, "rb");
+    if (!file) {
+        return bst_fail(ctx, BST_ERR_IO, "%s: cannot be opened: %s", path, strerror(errno));
     }
     size_t bytes = (size_t)info.st_size;
     char *text = malloc(bytes + 1);
@@ -238,16 +317,17 @@ const char *bst_json_name(const bst_json *json) {
 /* The child that one segment of a JSON pointer names; NULL when there is none. */
 static cJSON *child_of(cJSON *node, const char *segment) {
     if (cJSON_IsArray(node)) {
-        char *end;
-        long index = strtol(segment, &end, 10);
-        return *segment && !*end && index >= 0 ? cJSON_GetArrayItem(node, (int)index) : NULL;
+        size_t digits = strspn(segment, "0123456789");
+        bool is_index = digits > 0 && digits < 10 && !segment[digits];
+        return is_index ? cJSON_GetArrayItem(node, (int)strtol(segment, NULL, 10)) : NULL;
     }
     return cJSON_GetObjectItemCaseSensitive(node, segment);
 }
 
 bst_status bst_json_set(bst_ctx *ctx, bst_json *json, const char *assignment) {
     const char *equals = strchr(assignment, '=');
-    if (assignment[0] != '/' || !equals || equals == assignment + 1) {
+    if (assignment[0] != '/' || !equals ||
+        (size_t)(equals - assignment) == strspn(assignment, "/")) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "--set %s: expected /json/path=value, for example --set /duration_s=60",
                         assignment);
@@ -277,7 +357,11 @@ bst_status bst_json_set(bst_ctx *ctx, bst_json *json, const char *assignment) {
     bst_status status = BST_OK;
     char *save = NULL;
     char *segment = strtok_r(path, "/", &save);
-    while (segment && status == BST_OK) {
+    for (int depth = 1; segment && status == BST_OK; depth++) {
+        if (depth > MAX_DEPTH) {
+            status = bst_fail(ctx, BST_ERR_ARGUMENT, "--set %.80s: nested too deep", assignment);
+            break;
+        }
         char *next = strtok_r(NULL, "/", &save);
         cJSON *child = child_of(node, segment);
         if (!next) {

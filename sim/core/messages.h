@@ -204,8 +204,8 @@ typedef struct bst_track {
     bool target_of_interest;
     bst_vec3 direction_gcrf;  /* unit, geometric */
     bst_vec3 rate_gcrf_radps; /* d(direction)/dt, perpendicular to direction */
-    /* covariance of (direction, rate) along two tangent axes e1 = unit(z x d) (or unit(x x d) near
-     * the pole), e2 = d x e1: order d1, d2, r1, r2; rad^2, rad^2/s, rad^2/s^2 */
+    /* covariance of (direction, rate) along two tangent axes e1 = unit(z x d) (or unit(x x d) where
+     * hypot(d.x, d.y) < 1e-6), e2 = d x e1: order d1, d2, r1, r2; rad^2, rad^2/s, rad^2/s^2 */
     double covariance[4][4];
     double v_mag;
     double snr; /* of the latest detection */

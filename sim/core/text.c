@@ -26,12 +26,16 @@ size_t bst_text_distance(const char *a, const char *b) {
     return row[m];
 }
 
-int bst_text_is_nearer(const char *word, const char *candidate, size_t *best) {
-    size_t distance = bst_text_distance(word, candidate);
+bool bst_text_is_nearer(const char *word, const char *candidate, size_t *best) {
+    size_t length = strlen(word);
+    /* a key without its unit: "rate" for "rate_hz" */
+    bool lacks_unit =
+        length > 1 && strncmp(word, candidate, length) == 0 && candidate[length] == '_';
+    size_t distance = lacks_unit ? 1 : bst_text_distance(word, candidate);
     /* a word that shares no letter with the candidate is no misspelling of it */
     if (distance > FARTHEST_SUGGESTION || distance >= strlen(candidate) || distance >= *best) {
-        return 0;
+        return false;
     }
     *best = distance;
-    return 1;
+    return true;
 }

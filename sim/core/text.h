@@ -2,6 +2,7 @@
 #ifndef BST_CORE_TEXT_H
 #define BST_CORE_TEXT_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 #ifdef __cplusplus
@@ -13,8 +14,9 @@ extern "C" {
 size_t bst_text_distance(const char *a, const char *b);
 
 /* Whether `candidate` is near enough to the mistyped `word` to be suggested for it, and nearer than
- * *best; then *best becomes its distance. Start with *best = SIZE_MAX. */
-int bst_text_is_nearer(const char *word, const char *candidate, size_t *best);
+ * *best; then *best becomes its distance. Start with *best = SIZE_MAX. A word that lacks only the
+ * unit ("rate" for "rate_hz") counts as 1. */
+bool bst_text_is_nearer(const char *word, const char *candidate, size_t *best);
 
 #ifdef __cplusplus
 }

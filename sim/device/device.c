@@ -5,14 +5,19 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 enum { MAX_PLATFORMS = 16, MAX_DEVICES = 32, NAME_BYTES = 256 };
+
+enum { MAX_BUILT = 64 };
 
 struct bst_device {
     cl_device_id parent, id; /* equal unless a sub-device was made */
     cl_context context;
     cl_command_queue queue;
     char description[4 * NAME_BYTES];
+    const bst_kernel_source *built[MAX_BUILT]; /* sources of all programs, each once */
+    int built_count;
 };
 
 static const struct {
@@ -231,12 +236,29 @@ exit:
     return status;
 }
 
+/* PoCL 3.1 reports a command complete before its worker thread has let go of the command's event,
+ * and crashes when queue and context are gone by then. An event holds a reference of its queue, so
+ * waiting for the references to go is waiting for the workers. Others may hold references for good
+ * reasons: the wait is bounded. */
+static void wait_for_workers(cl_command_queue queue) {
+    const struct timespec pause = {0, 200000};
+    cl_uint references = 2;
+    for (int i = 0; i < 100 && references > 1; i++) {
+        if (clGetCommandQueueInfo(queue, CL_QUEUE_REFERENCE_COUNT, sizeof references, &references,
+                                  NULL) != CL_SUCCESS) {
+            return;
+        }
+        nanosleep(&pause, NULL); /* also after the last: the worker is on its way out */
+    }
+}
+
 void bst_device_close(bst_device *device) {
     if (!device) {
         return;
     }
     if (device->queue) {
         clFinish(device->queue);
+        wait_for_workers(device->queue);
         clReleaseCommandQueue(device->queue);
     }
     if (device->context) {
@@ -277,6 +299,21 @@ static bst_status build_failure(bst_ctx *ctx, const bst_device *device, cl_progr
     return status;
 }
 
+static void note_built(bst_device *device, const bst_kernel_source *source) {
+    for (int i = 0; i < device->built_count; i++) {
+        if (device->built[i] == source) {
+            return;
+        }
+    }
+    if (device->built_count < MAX_BUILT) {
+        device->built[device->built_count++] = source;
+    }
+}
+
+const bst_kernel_source *bst_device_built(const bst_device *device, int index) {
+    return index >= 0 && index < device->built_count ? device->built[index] : NULL;
+}
+
 bst_status bst_device_build(bst_ctx *ctx, bst_device *device,
                             const bst_kernel_source *const *sources, int count, const char *options,
                             cl_program *out) {
@@ -304,6 +341,9 @@ bst_status bst_device_build(bst_ctx *ctx, bst_device *device,
     if (code != CL_SUCCESS) {
         status = build_failure(ctx, device, program, sources[0]->name);
         goto exit;
+    }
+    for (int i = 0; i < count; i++) {
+        note_built(device, sources[i]);
     }
     *out = program;
     program = NULL;

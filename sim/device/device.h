@@ -36,6 +36,10 @@ bst_status bst_device_build(bst_ctx *ctx, bst_device *device,
                             const bst_kernel_source *const *sources, int count, const char *options,
                             cl_program *out) BST_MUST_CHECK;
 
+/* The kernel sources that were built on this device, in the order of first use; NULL after the
+ * last. */
+const bst_kernel_source *bst_device_built(const bst_device *device, int index);
+
 /* BST_OK for CL_SUCCESS, else BST_ERR_DEVICE with "what: CL_NAME". */
 bst_status bst_device_check(bst_ctx *ctx, cl_int code, const char *what) BST_MUST_CHECK;
 

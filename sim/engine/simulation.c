@@ -146,6 +146,6 @@ bst_engine *bst_simulation_engine(bst_simulation *sim) {
 const struct bst_world *bst_simulation_world(const bst_simulation *sim) {
     return sim->world;
 }
-const char *bst_simulation_device(const bst_simulation *sim) {
-    return sim->device ? bst_device_description(sim->device) : "";
+const struct bst_device *bst_simulation_device(const bst_simulation *sim) {
+    return sim->device;
 }

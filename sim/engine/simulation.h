@@ -21,7 +21,8 @@ void bst_simulation_free(bst_simulation *simulation);
 
 bst_engine *bst_simulation_engine(bst_simulation *simulation);
 const struct bst_world *bst_simulation_world(const bst_simulation *simulation);
-/* "" when no module needed a device. */
-const char *bst_simulation_device(const bst_simulation *simulation);
+struct bst_device;
+/* NULL when no module needed a device. */
+const struct bst_device *bst_simulation_device(const bst_simulation *simulation);
 
 #endif

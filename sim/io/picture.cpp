@@ -142,7 +142,7 @@ extern "C" bst_stretch bst_stretch_of(const uint16_t *pixels, int width, int hei
         }
     }
     double sigma = std::max(1.0, 1.4826 * (median - quarter));
-    return bst_stretch{median - 1.0 * sigma, median + 150.0 * sigma, 3.0 * sigma};
+    return bst_stretch{median - 1.0 * sigma, median + 15.0 * sigma, 1.5 * sigma};
 }
 
 extern "C" bst_status bst_picture_frame(bst_ctx *ctx, bst_picture *picture, bst_box to,

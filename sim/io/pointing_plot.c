@@ -104,7 +104,7 @@ static void put_upper(FILE *s, const char *title, const bst_pointing_point *poin
     fprintf(s, "set yrange [%g:%.9g]\n", FLOOR_PX,
             fmax(pow(10.0, ceil(log10(fmax(f->top, 1.0)))), 10.0));
     fputs(
-        "set key top right opaque width 1 spacing 1.15 samplen 2 fillcolor rgb '#ffffff'\n"
+        "set key top right opaque width 1 spacing 1.15 samplen 2\n"
         "plot ",
         s);
     for (int m = 0; m < BST_MODE_COUNT; m++) {
@@ -128,7 +128,7 @@ static void put_upper(FILE *s, const char *title, const bst_pointing_point *poin
 }
 
 static void put_lower(FILE *s, double limit_px, const figures *f) {
-    double span = f->count ? fmax(1.25 * f->spread, limit_px > 0.0 ? 1.5 * limit_px : 0.1) : 1.0;
+    double span = f->count ? fmax(1.45 * f->spread, limit_px > 0.0 ? 1.5 * limit_px : 0.1) : 1.0;
     fputs(
         "unset title\nunset object\nunset logscale y\nset tmargin 0.6\nset bmargin 3.4\n"
         "set format x '%g'\nset xlabel 'time since the epoch  [s]'\n"

@@ -95,12 +95,41 @@ static void draw_scale(bst_picture *p, const bst_quicklook_frame *f, const view 
     bst_picture_text(p, x, y - 10, 9.0, white, false, text);
 }
 
+static bool target_is_inside(const bst_quicklook_frame *f) {
+    return f->has_target && f->target_x_px > -0.5 && f->target_y_px > -0.5 &&
+           f->target_x_px < f->width - 0.5 && f->target_y_px < f->height - 0.5;
+}
+
+/* An arrow at the boresight, towards a target that is not on the frame. */
+static void draw_pointer(bst_picture *p, const bst_quicklook_frame *f, const view *v) {
+    double dx = f->target_x_px - f->boresight_x_px, dy = f->target_y_px - f->boresight_y_px;
+    double r = hypot(dx, dy);
+    if (!f->has_target || target_is_inside(f) || !(r > 0.0) || !isfinite(r)) {
+        return;
+    }
+    dx /= r;
+    dy /= r;
+    double x0 = view_x(v, f->boresight_x_px) + 28 * dx;
+    double y0 = view_y(v, f->boresight_y_px) + 28 * dy;
+    double x1 = x0 + 70 * dx, y1 = y0 + 70 * dy;
+    bst_picture_clip(p, v->box);
+    bst_picture_line(p, x0, y0, x1, y1, target_colour, 1.8);
+    bst_picture_line(p, x1, y1, x1 - 11 * dx - 6 * dy, y1 - 11 * dy + 6 * dx, target_colour, 1.8);
+    bst_picture_line(p, x1, y1, x1 - 11 * dx + 6 * dy, y1 - 11 * dy - 6 * dx, target_colour, 1.8);
+    char text[64];
+    snprintf(text, sizeof text, "target: %.0f px away", r);
+    double width = bst_picture_text_width(9.5, false, text);
+    /* beyond the point, or beside it when the arrow runs up or down */
+    double x = fabs(dx) < 0.5 ? x1 + 10 : dx > 0.0 ? x1 + 8 : x1 - 8 - width;
+    bst_picture_text(p, x, y1 + 5, 9.5, target_colour, false, text);
+    bst_picture_unclip(p);
+}
+
 /* The surroundings of the target, enlarged, in the panel's upper right corner, or in the upper left
  * when that would hide what it shows. */
 static bst_status draw_inset(bst_ctx *ctx, bst_picture *p, const bst_quicklook_frame *f,
                              const view *panel, bst_stretch stretch) {
-    bool inside = f->has_target && f->target_x_px > -0.5 && f->target_y_px > -0.5 &&
-                  f->target_x_px < f->width - 0.5 && f->target_y_px < f->height - 0.5;
+    bool inside = target_is_inside(f);
     double x = inside ? f->target_x_px : f->boresight_x_px;
     double y = inside ? f->target_y_px : f->boresight_y_px;
     int side = INSET < panel->box.height / 2 ? INSET : panel->box.height / 2;
@@ -117,7 +146,7 @@ static bst_status draw_inset(bst_ctx *ctx, bst_picture *p, const bst_quicklook_f
     v.y0 = y0 - 0.5;
     BST_TRY(bst_picture_frame(ctx, p, v.box, f->pixels, f->width, f->height, x0, y0, INSET_PX,
                               INSET_PX, stretch));
-    draw_marks(p, f, &v, 1.6);
+    draw_marks(p, f, &v, 2.6);
     bst_picture_rectangle(p, v.box.x, v.box.y, v.box.width - 1, v.box.height - 1, soft, 1.2);
     /* the part that it shows, on the panel */
     bst_picture_rectangle(p, view_x(panel, v.x0), view_y(panel, v.y0), INSET_PX * panel->scale,
@@ -144,6 +173,7 @@ static bst_status draw_panel(bst_ctx *ctx, bst_picture *p, const bst_quicklook_f
                               f->height, stretch));
     draw_marks(p, f, &v, 1.0);
     BST_TRY(draw_inset(ctx, p, f, &v, stretch));
+    draw_pointer(p, f, &v);
     draw_scale(p, f, &v);
     bst_picture_rectangle(p, v.box.x - 1, v.box.y - 1, v.box.width + 1, v.box.height + 1, soft,
                           1.0);

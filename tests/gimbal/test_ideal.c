@@ -28,7 +28,7 @@ static void interpolation_is_good_to_a_nanoradian(void **state) {
     double worst = 0.0;
     for (int n = 0; n <= 40000; n++) {
         double t = n * 1e-3;
-        bst_vec3 got, want;
+        bst_vec3 got = {0}, want = {0};
         bst_assert_ok(&ctx, bst_ideal_at(&ideal, &ctx, t, &got));
         pass q = {.fail_after = INFINITY};
         bst_assert_ok(&ctx, fly_by(&q, &ctx, t, &want));

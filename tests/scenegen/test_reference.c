@@ -106,8 +106,8 @@ static void occulted_and_dark_sources_give_nothing(void **state) {
 static void wings_keep_relative_precision(void **state) {
     (void)state;
     /* Q(8) = 6.220960574271785e-16, Q(9) = 1.1285884059538405e-19 */
-    bst_assert_close(bst_reference_pixel_share(0.5, 1.0, 9), 6.220960574271785e-16 - 1.1285884059538405e-19,
-                     1e-28);
+    bst_assert_close(bst_reference_pixel_share(0.5, 1.0, 9),
+                     6.220960574271785e-16 - 1.1285884059538405e-19, 1e-28);
     bst_assert_close(bst_reference_pixel_share(-0.5, 1.0, -9),
                      6.220960574271785e-16 - 1.1285884059538405e-19, 1e-28);
 }

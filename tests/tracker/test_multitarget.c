@@ -27,7 +27,7 @@ static bst_mtt_params defaults(void) {
                             .max_misses = 12,
                             .max_coast_s = 120,
                             .max_sigma_rad = 60 * AS,
-                            .merge_rad = 4 * PX,
+                            .merge_rad = 6 * PX,
                             .merge_floor_rad = 0.3 * PX,
                             .max_merged = 30,
                             .feed_forward_rad = 0.09};

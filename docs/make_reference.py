@@ -1,0 +1,113 @@
+#!/usr/bin/env python3
+"""Turns `boresight schema` into docs/reference.md.
+
+usage: build/boresight schema | docs/make_reference.py > docs/reference.md
+"""
+import json
+import sys
+
+SKIPPED = {"description", "$schema"}
+
+
+def kind_of(node):
+    if "const" in node:
+        return f'`"{node["const"]}"`'
+    if "enum" in node:
+        return ", ".join(f"`{choice}`" for choice in node["enum"])
+    kind = node.get("type", "object")
+    if "pattern" in node:
+        return "hexadecimal string"
+    if kind == "array" and node["items"].get("type") == "object":
+        return "list of objects"
+    if kind == "array":
+        return f"{node['minItems']} numbers"
+    return kind
+
+
+def number(value):
+    text = f"{value:.12g}" if abs(value) < 1e6 else f"{value:.6e}"
+    if "e" in text and "." in text:
+        mantissa, exponent = text.split("e")
+        text = mantissa.rstrip("0").rstrip(".") + "e" + exponent
+    return text.replace("e+0", "e").replace("e-0", "e-").replace("e+", "e")
+
+
+def range_of(node):
+    if node.get("type") == "array":
+        item = node.get("items", {})
+        if item.get("type") == "object":
+            return f"{number(node['minItems'])} to {number(node['maxItems'])} of them"
+        node = item
+    if "minimum" in node:
+        return f"{number(node['minimum'])} to {number(node['maximum'])}"
+    if "maxLength" in node:
+        return f"up to {number(node['maxLength'])} bytes"
+    return ""
+
+
+def split_unit(text):
+    if text.endswith("]") and " [" in text:
+        doc, unit = text[:-1].rsplit(" [", 1)
+        return doc, unit
+    return text, ""
+
+
+def cell(text):
+    return text.replace("|", "\\|")
+
+
+def table(node):
+    """Rows of an object's own keys, and the blocks below it."""
+    rows, below = [], []
+    required = node.get("required", [])
+    for key, child in node.get("properties", {}).items():
+        if key in SKIPPED and child.get("type") == "string" and len(child) == 1:
+            continue
+        doc, unit = split_unit(child.get("description", ""))
+        default = f"`{json.dumps(child['default'])}`" if "default" in child else ""
+        if key in required:
+            default = "required"
+        rows.append(f"| `{key}` | {kind_of(child)} | {cell(unit)} | {range_of(child)} | {cell(default)} | "
+                    f"{cell(doc)} |")
+        if child.get("type") == "array" and child["items"].get("type") == "object":
+            below.append((key, "[]", child["items"]))
+        elif "properties" in child and key != "delay_s":
+            below.append((key, "", child))
+    return rows, below
+
+
+def write(node, path, level):
+    rows, below = table(node)
+    modules = [b for b in below if b[0] == "modules"]
+    print("| key | type | unit | allowed | default | meaning |\n|---|---|---|---|---|---|")
+    print("\n".join(rows) + "\n")
+    for key, tail, child in below:
+        if (key, tail, child) in modules:
+            continue
+        here = f"{path}/{key}{tail}"
+        print(f"{'#' * level} `{here}`\n")
+        if "description" in child:
+            print(split_unit(child["description"])[0] + "\n")
+        write(child, here, min(level + 1, 4))
+    for key, _, child in modules:
+        for role, choices in child["properties"].items():
+            for choice in choices["oneOf"]:
+                kind = choice["properties"]["type"]
+                delays = choice["properties"]["delay_s"]["properties"]
+                print(f"## Module `{role}` of type `{kind['const']}`\n\n{kind.get('description', '')}\n")
+                print("Inputs that `delay_s` may name: "
+                      + (", ".join(f"`{d}`" for d in delays) or "none") + ".\n")
+                write(choice, f"modules/{role}", 3)
+
+
+def main():
+    schema = json.load(sys.stdin)
+    print("# Reference of the scenario keys\n\n"
+          "Made from the program's own tables: `build/boresight schema | docs/make_reference.py > "
+          "docs/reference.md`.\nEvery object also takes a `description`, which is ignored. The path of a "
+          "key is what `--set` takes, with\nthe number of the element in place of `[]`.\n\n## The scenario\n")
+    write(schema, "", 2)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,49 @@
+/* A closed loop without images: the gimbal's and the controller's typed cores, a frame a second,
+ * stars and target measured with noise, a constant-velocity tracker, and the latencies between. */
+#ifndef BST_TESTS_LOOP_SIM_H
+#define BST_TESTS_LOOP_SIM_H
+
+#include <stdbool.h>
+
+#include "control/control.h"
+#include "gimbal/two_axis.h"
+
+#define SIM_TICKS_PER_S 6000
+#define SIM_STEP_TICKS 6
+#define SIM_PIXEL_RAD (3.0 * BST_ARCSEC_RAD)
+
+typedef struct sim_options {
+    uint64_t seed;
+    double duration_s;
+    double cue_error_x_deg, cue_error_y_deg; /* along image axes */
+    double cue_sigma_deg;
+    double burn_at_s, burn_mps;            /* unknown to the cue */
+    double drop_share;                     /* of frames, at random */
+    double dark_from_s, dark_to_s;         /* no detections of the target */
+    double blackout_from_s, blackout_to_s; /* no frames at all */
+    double detection_probability;
+    double drift_arcsec_per_s[3];
+    double jitter_low_px_rms, jitter_high_px_rms;
+    double centroid_sigma_px, fix_sigma_px;
+    bool clutter; /* a false candidate with a plausible rate at each place of the search */
+    bst_quat q_body_from_gcrf; /* zero: towards the cue */
+} sim_options;
+
+typedef struct sim_result {
+    double confirmed_s;    /* first time of track mode; INFINITY: never */
+    double rms_px, p99_px; /* boresight to true target after that, each plant step */
+    double track_fraction; /* of the frames after it: in track mode and target held */
+    double rms_track_px;   /* in track mode only */
+    double rate_worst_radps, accel_worst_radps2;
+    int mode_count[BST_MODE_COUNT]; /* entries */
+    int final_mode;
+    int tiles;            /* greatest search step */
+    double worst_jump_px; /* of the command at a change of mode to track */
+} sim_result;
+
+sim_options sim_defaults(void);
+/* A body attitude whose +y axis points at the target's place at t_s. */
+bst_quat sim_body_with_pole_at(double t_s);
+void sim_run(const sim_options *options, sim_result *result);
+
+#endif

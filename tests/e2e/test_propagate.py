@@ -1,0 +1,244 @@
+#!/usr/bin/env python3
+"""boresight propagate against python3-sgp4 and astropy, and its behaviour at the command line.
+
+Usage, from the repository root: /usr/bin/python3 tests/e2e/test_propagate.py BORESIGHT
+No network is used.
+"""
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import astropy.units as u
+import numpy as np
+from astropy.coordinates import (GCRS, TEME, CartesianDifferential, CartesianRepresentation)
+from astropy.time import Time
+from astropy.utils import iers
+from sgp4.api import WGS72, WGS84, Satrec
+
+iers.conf.auto_download = False
+iers.conf.iers_degraded_accuracy = "ignore"
+
+BORESIGHT = sys.argv.pop(1)
+CATALOGUE = "scenarios/catalogue_2022-06.tle"
+START, STOP = "2022-06-16T22:10:00Z", "2022-06-17T22:10:00Z"
+DECAYING = """DECAYING
+1 28350U 04020A   06167.21788666  .16154492  76267-5  18678-3 0  8894
+2 28350  64.9977 345.6130 0024870 260.7578  99.9590 16.47856722116490
+"""
+
+
+def run(*arguments, **options):
+    return subprocess.run([BORESIGHT, "propagate", *arguments], capture_output=True, text=True,
+                          timeout=60, **options)
+
+
+def element_sets(path):
+    with open(path, encoding="ascii") as file:
+        lines = file.read().splitlines()
+    sets = {}
+    for i, line in enumerate(lines):
+        if line.startswith("1 "):
+            sets[int(line[2:7])] = (lines[i - 1], line, lines[i + 1])
+    return sets
+
+
+def rows_of(text):
+    lines = text.splitlines()
+    assert lines[0] == "utc,norad,x_km,y_km,z_km,vx_kmps,vy_kmps,vz_kmps", lines[0]
+    return [line.split(",") for line in lines[1:]]
+
+
+def state(row):
+    return np.array([float(x) for x in row[2:]])
+
+
+def reference(lines, utc, gravity=WGS72, mode="i"):
+    """Position and velocity in TEME by python3-sgp4."""
+    satellite = Satrec.twoline2rv(lines[1], lines[2], gravity)
+    t = Time(utc.rstrip("Z"), scale="utc")
+    minutes = (t.jd1 - satellite.jdsatepoch) * 1440 + (t.jd2 - satellite.jdsatepochF) * 1440
+    if mode == "a":
+        satellite.sgp4init(gravity, "a", satellite.satnum,
+                           satellite.jdsatepoch - 2433281.5 + satellite.jdsatepochF,
+                           satellite.bstar, satellite.ndot, satellite.nddot, satellite.ecco,
+                           satellite.argpo, satellite.inclo, satellite.mo, satellite.no_kozai,
+                           satellite.nodeo)
+    error, r, v = satellite.sgp4_tsince(minutes)
+    assert error == 0
+    return np.array(r + v)
+
+
+class Numbers(unittest.TestCase):
+    def compare_teme(self, gravity, mode):
+        result = run("--tle", CATALOGUE, "--start", START, "--stop", STOP, "--step", "3600",
+                     "--gravity", {WGS72: "wgs72", WGS84: "wgs84"}[gravity], "--opsmode", mode)
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        sets = element_sets(CATALOGUE)
+        rows = rows_of(result.stdout)
+        self.assertEqual(len(rows), 25 * len(sets))
+        for row in rows:
+            difference = state(row) - reference(sets[int(row[1])], row[0], gravity, mode)
+            # 2e-7 km and 1e-9 km/s is what SGP4 itself is held to; a Julian date in two parts
+            # places the instant to 5e-11 s; printing rounds to 5e-10
+            self.assertLess(np.abs(difference[:3]).max(), 3e-7, row)
+            self.assertLess(np.abs(difference[3:]).max(), 2e-9, row)
+
+    def test_teme(self):
+        self.compare_teme(WGS72, "i")
+
+    def test_teme_other_constants(self):
+        self.compare_teme(WGS84, "i")
+
+    def test_teme_operational_mode(self):
+        self.compare_teme(WGS72, "a")
+
+    def test_gcrf(self):
+        result = run("--tle", CATALOGUE, "--start", START, "--stop", STOP, "--step", "14400",
+                     "--frame", "gcrf")
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        sets = element_sets(CATALOGUE)
+        for row in rows_of(result.stdout):
+            t = Time(row[0].rstrip("Z"), scale="utc")
+            teme = reference(sets[int(row[1])], row[0])
+            gcrs = TEME(CartesianRepresentation(teme[:3] * u.km, differentials=CartesianDifferential(
+                teme[3:] * u.km / u.s)), obstime=t).transform_to(GCRS(obstime=t))
+            expected = gcrs.cartesian.xyz.to_value(u.km)
+            velocity = gcrs.velocity.d_xyz.to_value(u.km / u.s)
+            # the issue asks for 1 m; the tables of Earth orientation on both sides differ by less
+            self.assertLess(np.linalg.norm(state(row)[:3] - expected), 1e-3, row)
+            # turning of TEME against GCRF: 8e-12 rad/s, 0.4 mm/s at 45,000 km; with the
+            # numerical differences that astropy takes, 1 mm/s
+            self.assertLess(np.linalg.norm(state(row)[3:] - velocity), 1e-6, row)
+
+    def test_leap_second_is_a_row(self):
+        sets = element_sets(CATALOGUE)
+        result = run("--tle", CATALOGUE, "--norad", "44801", "--start", "2016-12-31T23:59:58Z",
+                     "--stop", "2017-01-01T00:00:01Z", "--step", "1")
+        rows = rows_of(result.stdout)
+        self.assertEqual([row[0] for row in rows],
+                         ["2016-12-31T23:59:58.000Z", "2016-12-31T23:59:59.000Z",
+                          "2016-12-31T23:59:60.000Z", "2017-01-01T00:00:00.000Z",
+                          "2017-01-01T00:00:01.000Z"])
+        for row in (rows[0], rows[3], rows[4]):
+            difference = state(row) - reference(sets[44801], row[0])
+            # rounding of 4,000 steps of the resonance's integrator on both sides, 5.5 years back;
+            # a wrong second would be 3 km
+            self.assertLess(np.abs(difference[:3]).max(), 1e-5, row)
+
+    def test_step_does_not_accumulate(self):
+        # 0.1 is no binary number: a summed clock would be 1e-7 s off after a day
+        result = run("--tle", CATALOGUE, "--norad", "39089", "--start", START, "--stop",
+                     "2022-06-17T01:10:00Z", "--step", "0.1")
+        rows = rows_of(result.stdout)
+        self.assertEqual(len(rows), 108001)
+        self.assertEqual(rows[-1][0], "2022-06-17T01:10:00.000Z")
+        self.assertEqual(rows[77777][0], "2022-06-17T00:19:37.700Z")
+
+
+class Oem(unittest.TestCase):
+    def test_segments(self):
+        result = run("--tle", CATALOGUE, "--start", START, "--stop", "2022-06-16T22:12:00.0005Z",
+                     "--step", "60", "--format", "oem", "--frame", "gcrf")
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        lines = result.stdout.splitlines()
+        self.assertEqual(lines[0], "CCSDS_OEM_VERS = 2.0")
+        self.assertRegex(lines[1], r"^CREATION_DATE = \d{4}-\d\d-\d\dT\d\d:\d\d:\d\d$")
+        self.assertEqual(lines[2], "ORIGINATOR = BORESIGHT")
+        self.assertEqual(lines.count("META_START"), 5)
+        first = lines.index("META_START")
+        self.assertEqual(lines[first:first + 9], [
+            "META_START", "OBJECT_NAME = NEOSSAT", "OBJECT_ID = 2013-009D",
+            "CENTER_NAME = EARTH", "REF_FRAME = GCRF", "TIME_SYSTEM = UTC",
+            "START_TIME = 2022-06-16T22:10:00.000", "STOP_TIME = 2022-06-16T22:12:00.000",
+            "META_STOP"])
+        csv = rows_of(run("--tle", CATALOGUE, "--start", START, "--stop", "2022-06-16T22:12:00Z",
+                          "--step", "60", "--frame", "gcrf").stdout)
+        data = [line.split() for line in lines if line.startswith("2022-06-16T")]
+        self.assertEqual([[row[0].rstrip("Z")] + row[2:] for row in csv], data)
+
+    def test_stop_time_is_the_last_row_written(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "decaying.tle")
+            with open(path, "w", encoding="ascii") as file:
+                file.write(DECAYING)
+            result = run("--tle", path, "--start", "2006-06-16T05:13:45Z", "--stop",
+                         "2006-06-18T05:13:45Z", "--step", "600", "--format", "oem")
+        self.assertEqual(result.returncode, 1)
+        lines = result.stdout.splitlines()
+        stop = [line for line in lines if line.startswith("STOP_TIME")][0].split(" = ")[1]
+        self.assertEqual(lines[-1].split()[0], stop)
+        self.assertRegex(result.stderr,
+                         r"^boresight propagate: DECAYING \(28350\) at 2006-06-1\S+Z: "
+                         r"SGP4 error \d: .+\n$")
+
+
+class CommandLine(unittest.TestCase):
+    window = ("--start", START, "--stop", "2022-06-16T22:11:00Z", "--step", "60")
+
+    def fails(self, code, message, *arguments):
+        result = run(*arguments)
+        self.assertEqual(result.returncode, code, result.stderr)
+        self.assertIn(message, result.stderr)
+        self.assertEqual(result.stdout, "")
+
+    def test_misuse(self):
+        tle = ("--tle", CATALOGUE)
+        self.fails(2, "--tle is missing: add --tle FILE", *self.window)
+        self.fails(2, "did you mean --norad?", *tle, "--nrad", "3", *self.window)
+        self.fails(2, "--frame j2000: give one of teme|gcrf", *tle, "--frame", "j2000",
+                   *self.window)
+        self.fails(2, "--step 0: give a number from 1e-06", *tle, *self.window, "--step", "0")
+        self.fails(2, "is before --start", *tle, *self.window, "--stop", "2022-06-16T22:09:59Z")
+        self.fails(2, "--start: \"yesterday\" is not a UTC time", *tle, *self.window, "--start",
+                   "yesterday")
+        self.fails(2, "give whole microseconds", *tle, *self.window, "--step", "1.00000005")
+
+    def test_failures(self):
+        self.fails(1, "no_such_file.tle", "--tle", "no_such_file.tle", *self.window)
+        self.fails(1, "12345", "--tle", CATALOGUE, "--norad", "12345", *self.window)
+        self.fails(1, "--frame gcrf needs --eop FILE here", "--tle", CATALOGUE, "--frame", "gcrf",
+                   "--start", "2016-06-16T00:00:00Z", "--stop", "2016-06-16T00:00:00Z", "--step",
+                   "1")
+        self.fails(1, "cannot be written", "--tle", CATALOGUE, *self.window, "--output",
+                   "no_such_folder/x.csv")
+
+    def test_full_disk(self):
+        if os.path.exists("/dev/full"):
+            self.fails(1, "is the disk full?", "--tle", CATALOGUE, *self.window, "--output",
+                       "/dev/full")
+
+    def test_output_file_is_what_is_printed(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "with space.csv")
+            result = run("--tle", CATALOGUE, *self.window, "--output", path)
+            self.assertEqual((result.returncode, result.stdout, result.stderr), (0, "", ""))
+            with open(path, encoding="ascii") as file:
+                self.assertEqual(file.read(), run("--tle", CATALOGUE, *self.window).stdout)
+
+    def test_nearest_of_several_sets(self):
+        sets = element_sets(CATALOGUE)
+        name, line1, line2 = sets[44801]
+        # the same set three days later, its checksum made right
+        later = line1[:18] + "22170" + line1[23:68]
+        later += str(sum(int(c) if c.isdigit() else c == "-" for c in later) % 10)
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "two.tle")
+            with open(path, "w", encoding="ascii") as file:
+                file.write("\n".join([name, later, line2, name, line1, line2]) + "\n")
+            result = run("--tle", path, *self.window)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(result.stdout,
+                         run("--tle", CATALOGUE, "--norad", "44801", *self.window).stdout)
+
+    def test_help_teaches(self):
+        result = run("--help")
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        self.assertIn("Examples:", result.stdout)
+        for option in ("--tle", "--norad", "--start", "--stop", "--step", "--frame", "--format"):
+            self.assertIn(option, result.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()

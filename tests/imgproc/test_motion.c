@@ -1,0 +1,123 @@
+#include <stdlib.h>
+
+#include "imgproc/motion.h"
+#include "tests/test_support.h"
+
+enum { CAPACITY = 64 };
+
+/* Attitude that turns at a constant rate about a fixed camera axis. */
+static bst_quat turning(double seconds, bst_vec3 rate_radps) {
+    bst_quat start = bst_quat_unit((bst_quat){0.3, -0.5, 0.2, 0.7});
+    return bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(rate_radps, seconds)), start);
+}
+
+static bst_pointing_telemetry *telemetry(int samples, int64_t step_ticks, bst_vec3 rate) {
+    bst_pointing_telemetry *t = calloc(1, sizeof *t + CAPACITY * sizeof(bst_pointing_sample));
+    assert_non_null(t);
+    t->capacity = CAPACITY;
+    t->written = samples;
+    for (int n = 0; n < samples; n++) {
+        bst_quat q = turning((double)(n * step_ticks) / 6000.0, rate);
+        if (n % 3 == 1) {
+            q = (bst_quat){-q.x, -q.y, -q.z, -q.w}; /* the same attitude */
+        }
+        t->items[n % CAPACITY] =
+            (bst_pointing_sample){.tick = n * step_ticks, .q_cam_from_gcrf = q};
+    }
+    return t;
+}
+
+static double difference(bst_quat a, bst_quat b) {
+    return bst_vec3_norm(bst_quat_to_rotvec(bst_quat_mul(a, bst_quat_conj(b))));
+}
+
+/* At a constant rate the mean is the attitude at mid-exposure and the turn is rate times time,
+ * whether samples bracket the exposure, lie inside it, end before it, or were overwritten before
+ * it. 1e-12 rad: rounding. */
+static void constant_rate(void **state) {
+    (void)state;
+    bst_vec3 rate = {1e-3, -2e-3, 5e-4};
+    static const struct {
+        int samples;
+        int64_t start, end;
+    } cases[] = {{40, 600, 3600},  {40, 613, 3571},  {10, 300, 3300},
+                 {200, 100, 3100}, {40, 1000, 1000}, {40, 1050, 1051}};
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        bst_pointing_telemetry *t = telemetry(cases[c].samples, 100, rate);
+        bst_motion m;
+        assert_true(bst_motion_from_telemetry(t, cases[c].start, cases[c].end, &m));
+        double span = (double)(cases[c].end - cases[c].start) / 6000.0;
+        double middle = 0.5 * (double)(cases[c].start + cases[c].end) / 6000.0;
+        bst_assert_close(difference(m.q_cam_from_gcrf, turning(middle, rate)), 0.0, 1e-12);
+        bst_assert_close(m.turn_cam_rad.x, rate.x * span, 1e-12);
+        bst_assert_close(m.turn_cam_rad.y, rate.y * span, 1e-12);
+        bst_assert_close(m.turn_cam_rad.z, rate.z * span, 1e-12);
+        bst_assert_close(bst_vec3_norm(m.bend_cam_rad), 0.0, 1e-12);
+        free(t);
+    }
+}
+
+/* Constant acceleration about x: mean r = a T^2 / 6, least-squares turn a T^2 / 2, bend a T^2 / 12,
+ * exposure from rest; 1e-9 rad: chords of 1/60 s under 1e-3 rad/s^2 err by a h^2 / 12. */
+static void accelerated(void **state) {
+    (void)state;
+    bst_pointing_telemetry *t = telemetry(40, 100, (bst_vec3){0, 0, 0});
+    const double a = 1e-3;
+    for (int n = 0; n < 40; n++) {
+        double s = n / 60.0;
+        t->items[n].q_cam_from_gcrf = bst_quat_from_rotvec((bst_vec3){0.5 * a * s * s, 0, 0});
+    }
+    bst_motion m;
+    assert_true(bst_motion_from_telemetry(t, 0, 3000, &m));
+    bst_vec3 mean = bst_quat_to_rotvec(m.q_cam_from_gcrf);
+    double limit = a / (60.0 * 60.0) / 6.0;
+    bst_assert_close(mean.x, a * 0.25 / 6.0, limit);
+    bst_assert_close(m.turn_cam_rad.x, a * 0.25 / 2.0, limit);
+    bst_assert_close(m.bend_cam_rad.x, a * 0.25 / 12.0, limit);
+    free(t);
+}
+
+static void few_samples(void **state) {
+    (void)state;
+    bst_pointing_telemetry *t = telemetry(0, 100, (bst_vec3){0, 0, 0});
+    bst_motion m = {{9, 9, 9, 9}, {9, 9, 9}, {9, 9, 9}};
+    assert_false(bst_motion_from_telemetry(t, 0, 100, &m));
+    assert_true(m.turn_cam_rad.x == 9.0);
+    free(t);
+    t = telemetry(1, 100, (bst_vec3){1, 0, 0});
+    assert_true(bst_motion_from_telemetry(t, 50, 150, &m));
+    bst_assert_close(difference(m.q_cam_from_gcrf, t->items[0].q_cam_from_gcrf), 0.0, 1e-15);
+    bst_assert_close(bst_vec3_norm(m.turn_cam_rad), 0.0, 0.0);
+    free(t);
+}
+
+/* The path against projecting a fixed direction at both ends. */
+static void streak_is_the_stars_path(void **state) {
+    (void)state;
+    bst_camera c = {.width_px = 1024, .height_px = 1024, .pixel_scale_arcsec = 3.0};
+    bst_motion m = {bst_quat_unit((bst_quat){0.1, 0.2, 0.3, 0.9}), {1e-4, -5e-5, 2e-3}, {0, 0, 0}};
+    bst_quat end =
+        bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(m.turn_cam_rad, 0.5)), m.q_cam_from_gcrf);
+    bst_quat start =
+        bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(m.turn_cam_rad, -0.5)), m.q_cam_from_gcrf);
+    bst_vec3 star =
+        bst_quat_rotate(bst_quat_conj(m.q_cam_from_gcrf), bst_camera_unproject(&c, 900.0, 100.0));
+    double x0 = 0, y0 = 0, x1 = 0, y1 = 0, dx, dy;
+    assert_true(bst_camera_project(&c, bst_quat_rotate(start, star), &x0, &y0));
+    assert_true(bst_camera_project(&c, bst_quat_rotate(end, star), &x1, &y1));
+    bst_motion_streak(&m, &c, 900.0, 100.0, &dx, &dy);
+    /* rounding of rotations at 1e5 px per radian */
+    bst_assert_close(dx, x1 - x0, 1e-8);
+    bst_assert_close(dy, y1 - y0, 1e-8);
+    assert_true(hypot(dx, dy) > 3.0);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(constant_rate),
+        cmocka_unit_test(accelerated),
+        cmocka_unit_test(few_samples),
+        cmocka_unit_test(streak_is_the_stars_path),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

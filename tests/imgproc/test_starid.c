@@ -1,0 +1,258 @@
+#include <stdlib.h>
+
+#include "imgproc/starid.h"
+#include "sim/core/rng.h"
+#include "tests/test_support.h"
+
+enum { MOST = 12000 };
+
+typedef struct scene {
+    bst_ctx ctx;
+    bst_starid *id;
+    bst_rng_key key;
+    bst_expected_star stars[MOST];
+    int star_count;
+    bst_detection items[MOST];
+    int truth[MOST]; /* star of each detection, -1: none */
+    int count;
+    bst_starid_options options;
+    bst_starid_result result;
+} scene;
+
+static int setup(void **state) {
+    scene *s = calloc(1, sizeof *s);
+    assert_non_null(s);
+    s->key = bst_rng_make_key(5, 0, "test", "starid");
+    s->options = (bst_starid_options){60.0, 3.0, 511.5, 511.5, 1024, 1024};
+    bst_assert_ok(&s->ctx, bst_starid_create(&s->ctx, MOST, MOST, 60.0, &s->id));
+    *state = s;
+    return 0;
+}
+static int teardown(void **state) {
+    scene *s = *state;
+    bst_starid_free(s->id);
+    free(s);
+    return 0;
+}
+
+static double uniform(const scene *s, uint64_t stream, int i) {
+    return bst_rng_uniform(s->key, stream, (uint64_t)i);
+}
+
+/* Stars over the field and its margin, numbers growing as 10^(0.4 V) from V 8 to 13. */
+static void make_stars(scene *s, uint64_t seed, int count) {
+    s->star_count = count;
+    s->count = 0;
+    for (int i = 0; i < count; i++) {
+        double v = 13.0 + log10(fmax(uniform(s, seed, 3 * i), 0.01)) / 0.4;
+        s->stars[i] = (bst_expected_star){-60.0 + 1144.0 * uniform(s, seed, 3 * i + 1),
+                                          -60.0 + 1144.0 * uniform(s, seed, 3 * i + 2), v,
+                                          (uint32_t)(1000 + i)};
+    }
+}
+
+static void detect(scene *s, double x, double y, double v, int star) {
+    if (x < 0 || y < 0 || x > 1023 || y > 1023) {
+        return;
+    }
+    bst_detection *d = &s->items[s->count];
+    double flux = 1e4 * pow(10.0, -0.4 * (v - 10.0));
+    *d = (bst_detection){.x_px = x,
+                         .y_px = y,
+                         .cov_xx = 0.01,
+                         .cov_yy = 0.01,
+                         .flux_e = flux,
+                         .flux_sigma_e = 0.05 * flux,
+                         .v_mag = v,
+                         .label = BST_LABEL_UNKNOWN};
+    s->truth[s->count++] = star;
+}
+
+/* The stars shifted and turned with 0.1 px and 0.05 mag of error; every one of `drop` is missed. */
+static void detect_stars(scene *s, uint64_t seed, double dx, double dy, double roll, int drop) {
+    for (int i = 0; i < s->star_count; i++) {
+        if (drop > 0 && i % drop == 0) {
+            continue;
+        }
+        double z[2], m[2];
+        bst_rng_normal2(s->key, seed, (uint64_t)(2 * i), z);
+        bst_rng_normal2(s->key, seed, (uint64_t)(2 * i + 1), m);
+        double rx = s->stars[i].x_px - 511.5, ry = s->stars[i].y_px - 511.5;
+        detect(s, s->stars[i].x_px + dx - roll * ry + 0.1 * z[0],
+               s->stars[i].y_px + dy + roll * rx + 0.1 * z[1], s->stars[i].v_mag + 0.05 * m[0], i);
+    }
+}
+
+/* `count` detections that are no stars. */
+static void detect_others(scene *s, uint64_t seed, int count) {
+    for (int i = 0; i < count; i++) {
+        detect(s, 1023 * uniform(s, seed, 3 * i), 1023 * uniform(s, seed, 3 * i + 1),
+               9.0 + 4.0 * uniform(s, seed, 3 * i + 2), -1);
+    }
+}
+
+static void match(scene *s) {
+    bst_starid_match(s->id, &s->options, s->stars, s->star_count, s->items, s->count, &s->result);
+}
+
+static void score(const scene *s, int *right, int *wrong, int *missed) {
+    *right = *wrong = *missed = 0;
+    for (int i = 0; i < s->count; i++) {
+        int expected = s->truth[i] >= 0 ? 1000 + s->truth[i] : 0;
+        bool matched = s->items[i].star_id != 0;
+        assert_int_equal(matched, s->items[i].label == BST_LABEL_STAR);
+        *right += matched && (int)s->items[i].star_id == expected;
+        *wrong += matched && (int)s->items[i].star_id != expected;
+        *missed += !matched && expected;
+    }
+}
+
+/* The case that is asked for: shift (37, -22) px, 30 % of the detections false, one star of five
+ * missing. */
+static void shifted_field_with_false_detections(void **state) {
+    scene *s = *state;
+    make_stars(s, 1, 80);
+    detect_stars(s, 2, 37.0, -22.0, 5e-4, 5);
+    detect_others(s, 3, s->count * 3 / 7);
+    match(s);
+    int right, wrong, missed;
+    score(s, &right, &wrong, &missed);
+    assert_int_equal(wrong, 0);
+    assert_int_equal(missed, 0);
+    assert_int_equal(right, s->result.matched);
+    assert_true(right > 40);
+    /* 0.1 px over the square root of 50 stars, four times; roll: 0.1 px over 40 stars at 400 px */
+    bst_assert_close(s->result.shift_x_px, 37.0, 0.06);
+    bst_assert_close(s->result.shift_y_px, -22.0, 0.06);
+    bst_assert_close(s->result.roll_rad, 5e-4, 2e-4);
+    bst_assert_close(s->result.rms_px, 0.1, 0.04);
+}
+
+/* Few stars: 3 and 2 among as many others, over many draws. Never a wrong star, hardly ever none.
+ */
+static void few_stars(void **state) {
+    scene *s = *state;
+    int found = 0, trials = 200, wrongs = 0;
+    for (int t = 0; t < trials; t++) {
+        make_stars(s, (uint64_t)(100 + t), 2 + t % 2);
+        for (int i = 0; i < s->star_count; i++) {
+            s->stars[i].x_px = 100 + 800 * uniform(s, (uint64_t)(5000 + t), 2 * i);
+            s->stars[i].y_px = 100 + 800 * uniform(s, (uint64_t)(5000 + t), 2 * i + 1);
+        }
+        detect_stars(s, (uint64_t)(9000 + t), -31.0, 44.0, 0.0, 0);
+        detect_others(s, (uint64_t)(20000 + t), 2);
+        match(s);
+        int right, wrong, missed;
+        score(s, &right, &wrong, &missed);
+        found += missed == 0;
+        wrongs += wrong;
+    }
+    assert_int_equal(wrongs, 0);
+    assert_true(found >= trials * 95 / 100);
+}
+
+/* One star, searched for within the reach of a locked tracker. */
+static void single_star_when_locked(void **state) {
+    scene *s = *state;
+    s->options.search_radius_px = 10.0;
+    make_stars(s, 1, 1);
+    s->stars[0].x_px = 300;
+    s->stars[0].y_px = 700;
+    detect_stars(s, 2, 0.4, -0.3, 0.0, 0);
+    detect_others(s, 3, 1);
+    match(s);
+    assert_int_equal(s->result.matched, 1);
+    assert_int_equal(s->items[0].star_id, 1000);
+}
+
+/* Detections that have nothing to do with the catalogue: nothing is identified, in 95 of 100 fields
+ * (the test of chance is at 1 %). */
+static void chance_is_not_a_match(void **state) {
+    scene *s = *state;
+    int fooled = 0;
+    for (int t = 0; t < 100; t++) {
+        make_stars(s, (uint64_t)(100 + t), 5 + t);
+        detect_others(s, (uint64_t)(700 + t), 60);
+        match(s);
+        fooled += s->result.matched > 0;
+    }
+    assert_true(fooled <= 5);
+}
+
+/* No stars, no detections, or neither. */
+static void nothing_to_match(void **state) {
+    scene *s = *state;
+    match(s);
+    assert_int_equal(s->result.matched, 0);
+    make_stars(s, 1, 50);
+    match(s);
+    assert_int_equal(s->result.matched, 0);
+    s->star_count = 0;
+    detect_others(s, 3, 20);
+    match(s);
+    assert_int_equal(s->result.matched, 0);
+    for (int i = 0; i < s->count; i++) {
+        assert_int_equal(s->items[i].label, BST_LABEL_UNKNOWN);
+    }
+}
+
+/* A target of another brightness close to a star, and one as bright but 5 px away, stay targets. */
+static void target_beside_a_star(void **state) {
+    scene *s = *state;
+    make_stars(s, 1, 60);
+    detect_stars(s, 2, 10.0, 5.0, 0.0, 0);
+    int near_star = s->truth[3], far_star = s->truth[8];
+    int first = s->count;
+    detect(s, s->items[3].x_px + 1.5, s->items[3].y_px + 1.0, s->items[3].v_mag + 3.0, -1);
+    detect(s, s->items[8].x_px - 5.0, s->items[8].y_px, s->items[8].v_mag, -1);
+    assert_int_equal(s->count, first + 2);
+    match(s);
+    assert_int_equal(s->items[first].star_id, 0);
+    assert_int_equal(s->items[first + 1].star_id, 0);
+    assert_int_equal(s->items[3].star_id, 1000 + near_star);
+    assert_int_equal(s->items[8].star_id, 1000 + far_star);
+}
+
+/* 10 000 stars and as many detections. */
+static void crowded_field(void **state) {
+    scene *s = *state;
+    make_stars(s, 1, 10000);
+    detect_stars(s, 2, -41.3, 17.7, 0.0, 0);
+    match(s);
+    int right, wrong, missed;
+    score(s, &right, &wrong, &missed);
+    /* 10 px between stars, 3 px tolerance shrinking to four sigma: confusion below 1 % */
+    assert_true(wrong * 100 < right);
+    assert_true(missed * 50 < right);
+}
+
+/* The same in, the same out. */
+static void repeatable(void **state) {
+    scene *s = *state;
+    make_stars(s, 1, 200);
+    detect_stars(s, 2, 12.0, -7.0, 1e-3, 4);
+    detect_others(s, 3, 50);
+    scene *copy = malloc(sizeof *copy);
+    assert_non_null(copy);
+    memcpy(copy, s, sizeof *s);
+    match(s);
+    match(copy);
+    assert_memory_equal(s->items, copy->items, sizeof s->items);
+    assert_memory_equal(&s->result, &copy->result, sizeof s->result);
+    free(copy);
+}
+
+int main(void) {
+#define STARID_TEST(f) cmocka_unit_test_setup_teardown(f, setup, teardown)
+    const struct CMUnitTest tests[] = {
+        STARID_TEST(shifted_field_with_false_detections),
+        STARID_TEST(few_stars),
+        STARID_TEST(single_star_when_locked),
+        STARID_TEST(chance_is_not_a_match),
+        STARID_TEST(nothing_to_match),
+        STARID_TEST(target_beside_a_star),
+        STARID_TEST(crowded_field),
+        STARID_TEST(repeatable),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
