@@ -139,6 +139,8 @@ static void test_quicklook(void **state) {
     for (int i = 0; i < 2; i++) {
         frames[0].width = slit[i];
         frames[0].height = slit[1 - i];
+        frames[0].boresight_x_px = 0.5 * (frames[0].width - 1);
+        frames[0].boresight_y_px = 0.5 * (frames[0].height - 1);
         bst_assert_ok(&ctx, bst_quicklook_write(&ctx, path, NULL, &frames[0], NULL));
     }
     frames[0].width = 0;
