@@ -23,6 +23,8 @@ typedef struct bst_imgproc_config {
     double streak_min_px, streak_max_px;
     double search_radius_px, match_tolerance_px;
     bst_config_list bad_pixels; /* of bst_bad_pixel */
+    /* FITS images of the maps; "": none. bst_imgproc_create leaves them to the caller. */
+    char dark_file[512], flat_file[512], bad_pixel_file[512];
 } bst_imgproc_config;
 
 extern const bst_config_desc bst_imgproc_config_table[];

@@ -1,5 +1,6 @@
 #include <stdlib.h>
 
+#include "imgproc/calibration.h"
 #include "imgproc/imgproc.h"
 #include "imgproc/sky.h"
 #include "sim/world/knowledge.h"
@@ -29,6 +30,14 @@ const bst_config_desc bst_imgproc_config_table[] = {
              "Greatest distance of one star from its place after the common shift."),
     BST_LIST(bst_imgproc_config, bad_pixels, bst_bad_pixel, bad_pixel_table, 0, 1000000, "[]",
              "Sensor pixels to leave out."),
+    BST_PATH(
+        bst_imgproc_config, dark_file, "\"\"",
+        "FITS image of the sensor's size: each pixel's dark signal less the mean, e-/s; empty: "
+        "uniform."),
+    BST_PATH(bst_imgproc_config, flat_file, "\"\"",
+             "FITS image of the sensor's size: each pixel's relative response; empty: uniform."),
+    BST_PATH(bst_imgproc_config, bad_pixel_file, "\"\"",
+             "FITS image of the sensor's size: what is not zero is left out; empty: none."),
     BST_CONFIG_END,
 };
 
@@ -37,8 +46,8 @@ enum { PORT_FRAME, PORT_PREDICTIONS, PORT_POINTING, PORT_NAV, PORT_DETECTIONS, P
 static const bst_port ports[PORT_COUNT] = {
     {BST_CHANNEL_FRAME, BST_PORT_IN, BST_PORT_TRIGGER, 0.0, 0},
     {BST_CHANNEL_PREDICTIONS, BST_PORT_IN, BST_PORT_OPTIONAL | BST_PORT_FEEDBACK, 30.0, 0},
-    {BST_CHANNEL_POINTING_TELEMETRY, BST_PORT_IN, 0, 0.0, 0},
-    {BST_CHANNEL_NAV_TELEMETRY, BST_PORT_IN, 0, 0.0, 0},
+    {BST_CHANNEL_POINTING_TELEMETRY, BST_PORT_IN, 0, 10.0, 0},
+    {BST_CHANNEL_NAV_TELEMETRY, BST_PORT_IN, 0, 60.0, 0},
     {BST_CHANNEL_DETECTIONS, BST_PORT_OUT, 0, 0.0, 2048},
 };
 
@@ -53,6 +62,7 @@ typedef struct imgproc_module {
     const bst_imgproc_config *config;
     bst_camera camera;
     int64_t tick_rate_hz;
+    bst_imgproc_maps maps;
     bst_imgproc *ip;
     bst_starid *starid;
     bst_sky sky;
@@ -64,6 +74,7 @@ static void destroy(void *self) {
         return;
     }
     bst_imgproc_free(m->ip);
+    bst_calibration_free(&m->maps);
     bst_starid_free(m->starid);
     bst_sky_free(&m->sky);
     free(m);
@@ -72,8 +83,9 @@ static void destroy(void *self) {
 static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
     m->camera = *bst_knowledge_camera(env->knowledge);
     m->tick_rate_hz = env->tick_rate_hz;
+    BST_TRY(bst_calibration_load(env->ctx, m->config, &m->camera, &m->maps));
     BST_TRY(bst_imgproc_create(env->ctx, &m->camera, bst_camera_electrons_per_s(&m->camera, 0.0),
-                               m->config, NULL, &m->ip));
+                               m->config, &m->maps, &m->ip));
     BST_TRY(bst_sky_create(env->ctx, &m->camera, bst_knowledge_stars(env->knowledge),
                            bst_knowledge_julian_year(env->knowledge), CATALOGUE_CAPACITY, &m->sky));
     BST_TRY(bst_starid_create(env->ctx, CATALOGUE_CAPACITY, (int)m->config->capacity,
@@ -163,9 +175,9 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
     out->end_tick = message->end_tick;
 
     bst_motion motion = {BST_QUAT_IDENTITY, {0, 0, 0}, {0, 0, 0}};
-    bool oriented =
-        pointing.payload && bst_motion_from_telemetry(pointing.payload, message->start_tick,
-                                                      message->end_tick, &motion);
+    bool oriented = pointing.payload && !pointing.stale &&
+                    bst_motion_from_telemetry(pointing.payload, message->start_tick,
+                                              message->end_tick, &motion);
     out->q_telemetry_from_gcrf = motion.q_cam_from_gcrf;
     const bst_predictions *predictions = predicted.stale ? NULL : predicted.payload;
     bool locked = oriented && predictions && predictions->attitude_valid;
@@ -184,7 +196,7 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
         .exposure_s = (double)(message->end_tick - message->start_tick) / (double)m->tick_rate_hz};
     BST_TRY(bst_imgproc_detect(ctx, m->ip, &frame, oriented ? &motion : NULL, out, capacity));
     bool smeared = bst_imgproc_smeared(m->ip);
-    if (oriented && nav.payload && !smeared) {
+    if (oriented && nav.payload && !nav.stale && !smeared) {
         BST_TRY(identify(m, ctx, nav.payload, message->window, locked, out));
     }
     if (!smeared) {
@@ -200,17 +212,18 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
 }
 
 static bst_status step_module(void *self, struct bst_step *step) {
-    imgproc_module *m = self;
-    bst_sample sample = bst_step_next(step, PORT_FRAME);
-    if (!sample.payload) {
-        return BST_OK;
+    for (;;) {
+        bst_sample sample = bst_step_next(step, PORT_FRAME);
+        if (!sample.payload) {
+            return BST_OK;
+        }
+        const bst_frame_message *message = sample.payload;
+        const uint16_t *pixels;
+        BST_TRY(bst_frame_map(message->frame, bst_step_ctx(step), &pixels));
+        bst_status status = process(self, step, message, pixels);
+        bst_frame_unmap(message->frame);
+        BST_TRY(status);
     }
-    const bst_frame_message *message = sample.payload;
-    const uint16_t *pixels;
-    BST_TRY(bst_frame_map(message->frame, bst_step_ctx(step), &pixels));
-    bst_status status = process(m, step, message, pixels);
-    bst_frame_unmap(message->frame);
-    return status;
 }
 
 const bst_module_desc bst_imgproc_module = {

@@ -190,6 +190,7 @@ static bst_status read_value(const reader *r, const cJSON *value, const char *pa
             *(double *)(void *)member = number;
             return BST_OK;
         case BST_CONFIG_STRING:
+        case BST_CONFIG_PATH:
             snprintf(text, sizeof text, "a string of at most %zu bytes", d->size - 1);
             if (!cJSON_IsString(value)) {
                 return wrong(r, path, value, "wrong type", text);
@@ -341,6 +342,7 @@ static cJSON *echo_value(const bst_config_desc *d, const void *object) {
         case BST_CONFIG_REAL:
             return exact_number(*(const double *)(const void *)member);
         case BST_CONFIG_STRING:
+        case BST_CONFIG_PATH:
             return cJSON_CreateString(member);
         case BST_CONFIG_ENUM:
             return cJSON_CreateString(d->choices[*(const int32_t *)(const void *)member]);

@@ -14,6 +14,7 @@ typedef enum bst_config_type {
     BST_CONFIG_INT,    /* int64_t */
     BST_CONFIG_REAL,   /* double */
     BST_CONFIG_STRING, /* char[size], size in the descriptor */
+    BST_CONFIG_PATH,   /* the same: a file; a scenario's are made absolute when it is read */
     BST_CONFIG_ENUM,   /* int32_t, index into choices */
     BST_CONFIG_SEED,   /* uint64_t, hex string "0x..." */
     BST_CONFIG_REALS,  /* double[size / sizeof(double)], a fixed-length array */
@@ -65,6 +66,11 @@ typedef struct bst_config_desc {
     {                                                                                    \
         .key = #m, .type = BST_CONFIG_STRING, .unit = "", .fallback = def_, .doc = doc_, \
         BST_FIELD_(s, m)                                                                 \
+    }
+#define BST_PATH(s, m, def_, doc_)                                                     \
+    {                                                                                  \
+        .key = #m, .type = BST_CONFIG_PATH, .unit = "", .fallback = def_, .doc = doc_, \
+        BST_FIELD_(s, m)                                                               \
     }
 #define BST_SEED(s, m, def_, doc_)                                                     \
     {                                                                                  \

@@ -29,6 +29,7 @@ static cJSON *value_schema(const bst_config_desc *d) {
             add_range(node, d);
             break;
         case BST_CONFIG_STRING:
+        case BST_CONFIG_PATH:
             cJSON_AddStringToObject(node, "type", "string");
             cJSON_AddNumberToObject(node, "maxLength", (double)d->size - 1.0);
             break;

@@ -102,6 +102,29 @@ static void list_names(const bst_registry *registry, const char *role, char *buf
     }
 }
 
+static bst_status resolve_path(bst_ctx *ctx, const bst_scenario *s, const char *where, char *path,
+                               size_t bytes);
+
+/* Makes the files that a module's table names absolute. */
+static bst_status resolve_module_paths(bst_ctx *ctx, const bst_scenario *s, const char *where,
+                                       const bst_config_desc *table, void *object) {
+    for (const bst_config_desc *d = table; d && d->key; d++) {
+        char path[400];
+        char *member = (char *)object + d->offset;
+        snprintf(path, sizeof path, "%s/%s", where, d->key);
+        if (d->type == BST_CONFIG_OBJECT) {
+            BST_TRY(resolve_module_paths(ctx, s, path, d->children, member));
+        } else if (d->type == BST_CONFIG_PATH && *member) {
+            BST_TRY(resolve_path(ctx, s, path, member, d->size));
+            if (member[0] != '/') {
+                return bst_fail(ctx, BST_ERR_CONFIG, "%s: %s: there is no file %s/%s", s->file,
+                                path, s->base_dir, member);
+            }
+        }
+    }
+    return BST_OK;
+}
+
 static bst_status read_delays(bst_ctx *ctx, const bst_scenario *scenario, const cJSON *node,
                               const char *path, bst_module_config *module) {
     for (const cJSON *item = node ? node->child : NULL; item; item = item->next) {
@@ -182,6 +205,9 @@ static bst_status read_module(bst_ctx *ctx, const bst_json *json, const bst_regi
                                        module->desc->config ? module->desc->config : no_keys,
                                        module->config)
                      : bst_fail(ctx, BST_ERR_MEMORY, "%s: out of memory", path);
+    }
+    if (status == BST_OK) {
+        status = resolve_module_paths(ctx, scenario, path, module->desc->config, module->config);
     }
     if (status == BST_OK) {
         module->rate_hz = common.rate_hz > 0.0 ? common.rate_hz : module->desc->default_rate_hz;
