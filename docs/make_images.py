@@ -3,8 +3,9 @@
 
 usage: docs/make_images.py RUN_FOLDER
 
-Writes quicklook.png and pointing.png with a palette of at most 48 colours: noise in a picture costs
-most of its bytes, and its last bits show nothing. Needs numpy only.
+Writes quicklook.png and pointing.png with a palette of at most 48 colours, the further apart the
+larger the file would be: noise in a picture costs most of its bytes, and its last bits show nothing.
+Needs numpy only.
 """
 import pathlib
 import struct
@@ -14,7 +15,7 @@ import zlib
 import numpy as np
 
 COLOURS = 48
-MERGE = 14  # colours nearer than this, in 8-bit steps, become one
+LARGEST = 290_000  # bytes
 
 
 def read_png(path):
@@ -63,15 +64,15 @@ def read_png(path):
     return rows[1:].reshape(height, width, 3)
 
 
-def quantise(image):
-    """Palette and indices: the commonest colours that lie MERGE apart, each pixel's nearest."""
+def quantise(image, apart):
+    """Palette and indices: the commonest colours that lie so far apart, each pixel's nearest."""
     coarse = (image >> 1).astype(np.uint32)
     codes = coarse[..., 0] << 16 | coarse[..., 1] << 8 | coarse[..., 2]
     values, inverse, counts = np.unique(codes, return_inverse=True, return_counts=True)
     rgb = np.stack([values >> 16 & 255, values >> 8 & 255, values & 255], axis=1).astype(int) * 2
     palette = []
     for i in np.argsort(-counts, kind="stable"):
-        if all(np.abs(rgb[i] - p).max() >= MERGE for p in palette):
+        if all(np.abs(rgb[i] - p).max() >= apart for p in palette):
             palette.append(rgb[i])
             if len(palette) == COLOURS:
                 break
@@ -84,15 +85,15 @@ def chunk(kind, body):
     return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
 
 
-def write_png(path, palette, indices):
+def make_png(palette, indices):
     height, width = indices.shape
     lines = np.zeros((height, width + 1), dtype=np.uint8)
     lines[:, 1:] = indices
-    path.write_bytes(b"\x89PNG\r\n\x1a\n"
-                     + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 3, 0, 0, 0))
-                     + chunk(b"PLTE", palette.tobytes())
-                     + chunk(b"IDAT", zlib.compress(lines.tobytes(), 9))
-                     + chunk(b"IEND", b""))
+    return (b"\x89PNG\r\n\x1a\n"
+            + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 3, 0, 0, 0))
+            + chunk(b"PLTE", palette.tobytes())
+            + chunk(b"IDAT", zlib.compress(lines.tobytes(), 9))
+            + chunk(b"IEND", b""))
 
 
 def main():
@@ -101,9 +102,13 @@ def main():
     folder = pathlib.Path(__file__).resolve().parent / "images"
     folder.mkdir(exist_ok=True)
     for name in ("quicklook.png", "pointing.png"):
-        palette, indices = quantise(read_png(pathlib.Path(sys.argv[1]) / name))
-        write_png(folder / name, palette, indices)
-        print(f"{folder.name}/{name}: {(folder / name).stat().st_size / 1e3:.0f} kB")
+        image = read_png(pathlib.Path(sys.argv[1]) / name)
+        for apart in (14, 20, 28, 40):
+            png = make_png(*quantise(image, apart))
+            if len(png) <= LARGEST:
+                break
+        (folder / name).write_bytes(png)
+        print(f"{folder.name}/{name}: {len(png) / 1e3:.0f} kB")
 
 
 if __name__ == "__main__":

@@ -223,8 +223,12 @@ static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_lig
         memcpy(out->covariance_cam, solution.covariance, sizeof out->covariance_cam);
         out->fix.error_cam_rad =
             bst_quat_to_rotvec(bst_quat_mul(solution.q_cam_from_gcrf, bst_quat_conj(q_telemetry)));
+        /* Stars that contradict the telemetry's history were seen from a camera that turned
+         * unevenly in the exposure: their attitude is not that of its middle, and nobody may steer
+         * by it. */
         out->usable = bst_attitude_error_update(&t->error, &t->error_params, q_telemetry,
                                                 out->fix.error_cam_rad, solution.covariance);
+        out->fix.valid = out->usable;
     } else {
         bst_vec3 rate;
         bst_attitude_error_get(&t->error, &t->error_params, q_telemetry, &out->fix.error_cam_rad,
@@ -237,8 +241,6 @@ static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_lig
     for (int i = 0; i < 3; i++) {
         out->fix.sigma_rad[i] = sqrt(out->covariance_cam[i][i]);
     }
-    /* Stars that contradict the telemetry's history were seen from a camera that turned unevenly in
-     * the exposure: their attitude is not that of its middle. */
     out->usable = out->usable &&
                   fmax(out->fix.sigma_rad[0], out->fix.sigma_rad[1]) <= t->max_attitude_sigma_rad;
 }

@@ -222,6 +222,9 @@ static bst_status sort_instances(bst_ctx *ctx, bst_engine *engine) {
 }
 
 bst_status bst_engine_wire(bst_ctx *ctx, bst_engine *engine) {
+    if (engine->instance_count == 0) {
+        return BST_OK;
+    }
     qsort(engine->instances, (size_t)engine->instance_count, sizeof *engine->instances, by_name);
     for (int i = 1; i < engine->instance_count; i++) {
         if (strcmp(engine->instances[i - 1]->name, engine->instances[i]->name) == 0) {

@@ -99,7 +99,7 @@ def scene(case, seed):
     if case == "snr6":
         v_mag = 13 + 2.5 * np.log10(4 / SNR6_AREA_M2)
         return [f"/world/objects/0/area_m2={SNR6_AREA_M2}",
-                runs.SENSOR + f"/cue/v_mag={v_mag:.2f}"], 300 if options.long else 80
+                runs.SENSOR + f"/cue/v_mag={v_mag:.2f}"], 300 if options.long else 150
     at_s = int(rng.uniform(60, 250 if options.long else 80))
     return ["/world/objects=" + json.dumps([MAIN, neighbour(rng, at_s)])], \
         300 if options.long else at_s + 40

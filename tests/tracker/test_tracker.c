@@ -443,6 +443,8 @@ static void a_frame_of_an_uneven_turn(void **state) {
         bst_vec3 before = w.predictions->attitude_error_cam_rad;
         assert_int_equal(bst_tracker_step(w.tracker, &input, w.tracks, 256, w.predictions, 256),
                          k == 20 ? BST_TRACKER_NO_ATTITUDE : BST_TRACKER_USED);
+        /* what the tracker does not trust, control must not steer by */
+        assert_int_equal(w.tracks->attitude.valid, k != 20);
         if (k == 19) {
             target = w.tracks->target_id;
             assert_int_not_equal(target, 0);

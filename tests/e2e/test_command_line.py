@@ -1,0 +1,244 @@
+#!/usr/bin/env python3
+"""The program at the command line: exit codes, messages, help, the resolved scenario, the schema.
+
+Usage, from the repository root: /usr/bin/python3 tests/e2e/test_command_line.py BORESIGHT
+"""
+import glob
+import json
+import os
+import re
+import subprocess
+import unittest
+
+import runs
+
+try:
+    import jsonschema
+except ImportError:
+    jsonschema = None
+
+SCENARIOS = sorted(set(glob.glob("scenarios/*.json")) - {"scenarios/boresight.schema.json"})
+GIMBAL = runs.SENSOR + "/modules/gimbal"
+
+
+def call(*words, **options):
+    return subprocess.run([runs.BORESIGHT, *words], capture_output=True, text=True, timeout=120,
+                          **options)
+
+
+class Messages(unittest.TestCase):
+    """What is wrong is said with file, place, value and what is allowed; nothing is written."""
+
+    def setUp(self):
+        self.folder = runs.scratch()
+        self.out = os.path.join(self.folder, "run")
+
+    def fails(self, code, pattern, *words):
+        result = call(*words)
+        self.assertEqual(result.returncode, code, result.stderr)
+        self.assertRegex(result.stderr, pattern)
+        self.assertEqual(result.stdout, "")
+        self.assertEqual(os.listdir(self.folder), [])
+
+    def bad_set(self, assignment, pattern):
+        self.fails(1, re.escape(runs.TRACK) + pattern, "run", runs.TRACK, "--out", self.out, "--set",
+                   assignment)
+
+    def test_usage(self):
+        self.fails(2, "usage: boresight COMMAND")
+        self.fails(2, 'no command "rum"', "rum")
+        self.fails(2, "one scenario file is expected, 0 were given", "run")
+        self.fails(2, "one scenario file is expected, 2 were given", "check", "a", "b")
+        self.fails(2, r"unknown option --sed; did you mean --seed\?|--set\?", "run", runs.TRACK,
+                   "--sed", "3")
+        self.fails(2, "--threads 0: give an integer from 1", "run", runs.TRACK, "--threads", "0")
+        self.fails(2, "--duration long: give a number", "run", runs.TRACK, "--duration", "long")
+        self.fails(2, "--out needs a value", "run", runs.TRACK, "--out")
+        self.fails(2, '"x" is not expected here', "schema", "x")
+        self.fails(2, "--tle is missing", "propagate")
+
+    def test_bad_values(self):
+        self.bad_set("/world/object=3", ': /world/object: unknown key; did you mean "objects"')
+        self.bad_set("/duration_s=-1", r": /duration_s: out of range \(found -1; allowed: .*from 0")
+        self.bad_set("/duration_s=long", r": /duration_s: wrong type \(found \"?long")
+        self.bad_set("/seed=5", ": /seed: wrong type .*hexadecimal")
+        self.bad_set("/epoch_utc=yesterday", ": /epoch_utc")
+        self.bad_set(GIMBAL + "/type=three_axis", f": {GIMBAL}/type: there is no gimbal of type "
+                     '"three_axis" .*"two_axis"')
+        self.bad_set(GIMBAL + "/rate_hz=999", f": {GIMBAL}/rate_hz: .*857.142857 and 1000 Hz")
+        self.bad_set(GIMBAL + "/platform/jitter_high_band_hz=[5]", r": .*/platform/jitter_high_band_hz: wrong type \(found \[5\]; "
+                     "allowed: an array of 2 numbers")
+        self.bad_set("/world/objects/0/orbit/norad=1", ": /world/objects/0/orbit/tle_file: .*no element set of satellite 1, ")
+        self.bad_set("/world/objects/0/orbit/tle_file=none.tle",
+                     ": /world/objects/0/orbit/tle_file: .*none.tle: cannot be opened")
+        self.bad_set(runs.SENSOR + "/modules/imgproc={\"type\": \"standard\", \"delay_s\": "
+                     "{\"frames\": 1}}", ": .*/imgproc/delay_s/frames: not an input .*allowed: frame")
+
+    def test_override_that_is_none(self):
+        self.fails(1, "--set duration_s=3: expected /json/path=value", "run", runs.TRACK, "--out",
+                   self.out, "--set", "duration_s=3")
+        self.fails(1, 'there is no element "3"', "run", runs.TRACK, "--out", self.out, "--set",
+                   "/observers/3/name=x")
+
+    def test_missing_module(self):
+        scenario = json.loads(call("check", runs.TRACK).stdout)
+        del scenario["observers"][0]["sensors"][0]["modules"]["gimbal"]
+        self.bad_scenario(json.dumps(scenario), "which no module writes; add the module")
+
+    def bad_scenario(self, text, pattern):
+        path = os.path.join(runs.scratch(), "bad.json")
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(text)
+        self.fails(1, re.escape(path) + f".*(?:{pattern})", "run", path, "--out", self.out)
+
+    def test_bad_files(self):
+        self.fails(1, "none.json: cannot be opened: No such file", "run", "none.json", "--out",
+                   self.out)
+        with open(runs.TRACK, encoding="utf-8") as file:
+            text = file.read()
+        self.bad_scenario(text[:-200], ":")
+        self.bad_scenario(text + "{}", "after")
+        self.bad_scenario(text.replace('"duration_s": 300', '"duration_s": 300, "duration_s": 30'),
+                          "duration_s.*twice|duplicate")
+        self.bad_scenario(text.replace('"duration_s": 300', '"duration_s": 1e400'), "duration_s: the number is too large")
+        self.bad_scenario(text.replace('"duration_s": 300,', ""), "duration_s")
+
+    def test_unknown_device(self):
+        self.fails(1, 'no OpenCL device matches "abacus"; there is: ', "run", runs.TRACK, "--out",
+                   self.out, "--device", "abacus")
+
+
+class Folders(unittest.TestCase):
+    quick = ("--quiet", "--duration", "1", "--set", runs.NO_FRAMES, "--set",
+             "/world/star_catalogue=embedded")
+
+    def run_to(self, out, *words):
+        return call("run", runs.TRACK, "--out", out, *self.quick, *words)
+
+    def test_existing_folder(self):
+        out = os.path.join(runs.scratch(), "deep", "run")
+        self.assertEqual(self.run_to(out).returncode, 0)
+        first = os.stat(os.path.join(out, "manifest.json")).st_ino
+        result = self.run_to(out)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn(f"{out}: exists already", result.stderr)
+        self.assertEqual(os.stat(os.path.join(out, "manifest.json")).st_ino, first)
+        self.assertEqual(self.run_to(out, "--overwrite").returncode, 0)
+        self.assertEqual(os.listdir(os.path.dirname(out)), ["run"])
+
+    def test_what_is_no_run_is_not_overwritten(self):
+        folder = runs.scratch()
+        with open(os.path.join(folder, "thesis.tex"), "w", encoding="ascii") as file:
+            file.write("x")
+        result = self.run_to(folder, "--overwrite")
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("not overwritten", result.stderr)
+        self.assertEqual(os.listdir(folder), ["thesis.tex"])
+
+    def test_folder_that_cannot_be_made(self):
+        folder = runs.scratch()
+        with open(os.path.join(folder, "file"), "w", encoding="ascii"):
+            pass
+        result = self.run_to(os.path.join(folder, "file", "run"))
+        self.assertEqual(result.returncode, 1)
+        self.assertRegex(result.stderr, f"{folder}/file.*Not a directory")
+
+    def test_read_only_folder(self):
+        folder, home = runs.scratch(), runs.scratch()
+        os.chmod(folder, 0o555)
+        options = {}
+        if os.geteuid() == 0:  # who may write everywhere; so as nobody
+            os.chown(home, 65534, 65534)
+            options = {"user": 65534, "group": 65534, "env": {**os.environ, "HOME": home}}
+            try:
+                with open(runs.TRACK, "rb"):
+                    call("--version", **options)
+            except PermissionError:
+                self.skipTest("the program is out of reach for the user nobody")
+        result = call("run", runs.TRACK, "--out", os.path.join(folder, "run"), *self.quick,
+                      **options)
+        self.assertEqual(result.returncode, 1)
+        self.assertRegex(result.stderr, f"{folder}/run.*Permission denied")
+
+
+class Help(unittest.TestCase):
+    def test_help(self):
+        result = call("--help")
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        commands = re.findall(r"^  ([a-z]+) {2,}\S", result.stdout, re.MULTILINE)
+        self.assertLessEqual({"run", "check", "schema", "stars", "propagate"}, set(commands))
+        for command in commands:
+            result = call(command, "--help")
+            self.assertEqual((result.returncode, result.stderr), (0, ""), command)
+            # what it does, and an example
+            self.assertIn(f"boresight {command}", result.stdout)
+            self.assertGreater(len(result.stdout.splitlines()), 4, command)
+
+    def test_version(self):
+        result = call("--version")
+        self.assertEqual(result.returncode, 0)
+        self.assertRegex(result.stdout, r"^boresight \d+\.\d+\.\d+ \(\S*\)\n$")
+
+
+class Resolved(unittest.TestCase):
+    def test_check_is_a_fixed_point_and_runs_identically(self):
+        first = call("check", runs.TRACK, "--set", "/world/star_catalogue=embedded", "--set",
+                     runs.NO_FRAMES, "--duration", "5", "--seed", "0xABC")
+        self.assertEqual((first.returncode, first.stderr), (0, ""))
+        scenario = json.loads(first.stdout)
+        self.assertEqual((scenario["duration_s"], scenario["seed"]), (5, "0xABC"))
+        folder = runs.scratch()
+        path = os.path.join(folder, "resolved.json")
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(first.stdout)
+        self.assertEqual(call("check", path).stdout, first.stdout)
+        runs.run(path, os.path.join(folder, "a"))
+        runs.run(runs.TRACK, os.path.join(folder, "b"), runs.NO_FRAMES, duration=5, seed=0xABC)
+        dumps = ["\n".join(runs.database(os.path.join(folder, name)).iterdump()) for name in "ab"]
+        self.assertEqual(*dumps)
+        # the run keeps the resolved scenario, from which it can be repeated
+        with open(os.path.join(folder, "b", "scenario.json"), encoding="utf-8") as file:
+            self.assertEqual(json.load(file), scenario)
+
+    def test_check_writes_nothing(self):
+        folder = runs.scratch()
+        result = call("check", os.path.abspath(runs.TRACK), "--quiet", cwd=folder)
+        self.assertEqual((result.returncode, result.stdout, result.stderr), (0, "", ""))
+        self.assertEqual(os.listdir(folder), [])
+
+    def test_shipped_scenarios(self):
+        self.assertGreaterEqual(len(SCENARIOS), 4)
+        for path in SCENARIOS:
+            result = call("check", path, "--quiet")
+            self.assertEqual((result.returncode, result.stderr), (0, ""), path)
+
+
+class Schema(unittest.TestCase):
+    def test_shipped_schema_is_current(self):
+        result = call("schema")
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        schema = json.loads(result.stdout)
+        self.assertEqual(schema["$schema"], "https://json-schema.org/draft/2020-12/schema")
+        with open("scenarios/boresight.schema.json", encoding="utf-8") as file:
+            self.assertEqual(file.read(), result.stdout, "to make it current: build/boresight "
+                             "schema > scenarios/boresight.schema.json")
+
+    @unittest.skipIf(jsonschema is None, "needs python3-jsonschema")
+    def test_scenarios_fit_the_schema(self):
+        schema = json.loads(call("schema").stdout)
+        for path in SCENARIOS:
+            with open(path, encoding="utf-8") as file:
+                jsonschema.validate(json.load(file), schema)
+
+    def test_scenarios_name_the_schema(self):
+        for path in SCENARIOS:
+            with open(path, encoding="utf-8") as file:
+                self.assertEqual(json.load(file)["$schema"], "boresight.schema.json", path)
+
+
+def tearDownModule():
+    runs.clean()
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,437 @@
+/* The field query against brute force. */
+#include "sim/world/field.h"
+
+#include <stdlib.h>
+
+#include "tests/world/world_support.h"
+
+#define GX5 "{\"name\": \"GX5\", " TEST_GX5 "}"
+enum { RATE = 6000, HISTORY = 2000 };
+
+typedef struct scene {
+    bst_ctx ctx;
+    bst_world *world;
+    bst_field *field;
+    bst_los_history *history;
+    bst_quat target; /* camera on GX5 at the epoch */
+    bst_truth truth;
+    const bst_source *sources;
+    int count;
+    bst_los_track track;
+} scene;
+
+static scene make_scene(const char *objects) {
+    scene s = {.world = test_world_with(objects, ", \"cue\": {\"object\": \"GX5\"}")};
+    bst_assert_ok(&s.ctx, bst_field_create(&s.ctx, s.world, 0, 0, &s.field));
+    s.history = calloc(1, sizeof *s.history + HISTORY * sizeof *s.history->items);
+    assert_non_null(s.history);
+    s.history->capacity = HISTORY;
+    s.target = bst_world_body_attitude(s.world, 0, 0);
+    return s;
+}
+
+static void free_scene(scene *s) {
+    bst_field_free(s->field);
+    bst_world_free(s->world);
+    free(s->history);
+}
+
+static void push(bst_los_history *h, int64_t tick, bst_quat q) {
+    h->items[h->written++ % h->capacity] = (bst_los_sample){tick, q};
+}
+
+/* Attitude turned by a rotation vector in camera axes, given as the displacement in px of an image
+ * point at the boresight and a roll in rad. */
+static bst_quat turned(bst_quat q, double x_px, double y_px, double roll) {
+    const double scale = 3.0 * BST_ARCSEC_RAD;
+    return bst_quat_mul(bst_quat_from_rotvec((bst_vec3){-y_px * scale, x_px * scale, roll}), q);
+}
+
+static void query(scene *s, int64_t end_tick, bst_window window) {
+    bst_field_options options = {.v_limit = 13, .margin_px = 5};
+    bst_assert_ok(&s->ctx,
+                  bst_field_track(&s->ctx, s->field, s->history, 0, end_tick, RATE, &s->track));
+    bst_assert_ok(&s->ctx, bst_field_query(&s->ctx, s->field, &s->track, 0, end_tick, RATE, window,
+                                           &options, &s->truth, &s->sources, &s->count));
+}
+
+static const bst_window full = {0, 0, 1024, 1024};
+
+/* Deterministic noise in [-1, 1). */
+static double noise(unsigned *seed) {
+    *seed = *seed * 1664525u + 1013904223u;
+    return (double)(*seed >> 8) / 8388608.0 - 1.0;
+}
+
+/* Fills 0.5 s: a straight way of (dx, dy) px, a roll, and jitter of rms px per axis, by the sum of
+ * sines between 5 and 200 Hz. */
+static void fill(scene *s, double dx, double dy, double roll, double rms) {
+    unsigned seed = 7;
+    double a[2][20], f[20], p[2][20];
+    for (int k = 0; k < 20; k++) {
+        f[k] = 5 + 195.0 * k / 19;
+        for (int i = 0; i < 2; i++) {
+            a[i][k] = rms * sqrt(2.0 / 20);
+            p[i][k] = 3.14 * noise(&seed);
+        }
+    }
+    s->history->written = 0;
+    for (int64_t tick = 0; tick <= 3000; tick += 6) {
+        double t = (double)tick / RATE, u = t / 0.5 - 0.5, j[2] = {0, 0};
+        for (int i = 0; i < 2; i++) {
+            for (int k = 0; k < 20; k++) {
+                j[i] += a[i][k] * sin(2 * BST_PI * f[k] * t + p[i][k]);
+            }
+        }
+        push(s->history, tick, turned(s->target, dx * u + j[0], dy * u + j[1], roll * u));
+    }
+}
+
+/* Where the source is at many instants of the exposure, with equal weights. */
+enum { FINE = 16, MOST = 500 * FINE + 16 };
+static int dense_track(const scene *s, const bst_source *source, double *x, double *y) {
+    const bst_camera *camera = bst_world_camera(s->world, 0, 0);
+    double total = s->track.time_s[s->track.count - 1];
+    int n = 0;
+    for (int k = 0; k + 1 < s->track.count; k++) {
+        for (int i = 0; i < FINE; i++) {
+            double f = (i + 0.5) / FINE;
+            bst_quat q =
+                bst_quat_slerp(s->track.q_cam_from_gcrf[k], s->track.q_cam_from_gcrf[k + 1], f);
+            double t = s->track.time_s[k] + f * (s->track.time_s[k + 1] - s->track.time_s[k]);
+            double u = t / total;
+            /* objects: the quadratic through three points, as the header says */
+            bst_vec3 d = bst_vec3_axpy(
+                bst_vec3_axpy(bst_vec3_scale(source->apparent_start, (1 - u) * (1 - 2 * u)),
+                              4 * u * (1 - u), source->apparent_mid),
+                u * (2 * u - 1), source->apparent_end);
+            assert_true(n < MOST);
+            assert_true(bst_camera_project(camera, bst_quat_rotate(q, d), &x[n], &y[n]));
+            n++;
+        }
+    }
+    return n;
+}
+
+static double x_of[MOST], y_of[MOST];
+
+static void expect_means(scene *s, double tolerance_px) {
+    assert_true(s->count > 20); /* a patch of the catalogue to V 12 lies there */
+    bool object = false;
+    for (int i = 0; i < s->count; i++) {
+        int n = dense_track(s, &s->sources[i], x_of, y_of);
+        double x = 0, y = 0;
+        for (int k = 0; k < n; k++) {
+            x += x_of[k] / n;
+            y += y_of[k] / n;
+        }
+        bst_truth_item item;
+        bst_field_truth_item(s->field, &s->track, &s->sources[i], full, &s->truth, &item);
+        bst_assert_close(item.x_mean_px, x, tolerance_px);
+        bst_assert_close(item.y_mean_px, y, tolerance_px);
+        assert_int_equal((item.flags & BST_TRUTH_IN_FIELD) != 0,
+                         x >= -0.5 && x < 1023.5 && y >= -0.5 && y < 1023.5);
+        object |= item.kind == BST_SOURCE_OBJECT;
+    }
+    assert_true(object);
+}
+
+static void mean_places_are_those_of_the_light(void **state) {
+    (void)state;
+    scene s = make_scene(GX5);
+    fill(&s, 3, 8, 0, 10); /* tracked, with jitter of 10 px */
+    query(&s, 3000, full);
+    expect_means(&s, 0.002);                  /* the task's: a tenth of the best centroid */
+    fill(&s, 200, 224, 2 * BST_DEG_RAD, 0.2); /* a streak of 300 px that turns */
+    query(&s, 3000, full);
+    expect_means(&s, 0.02);
+    free_scene(&s);
+}
+
+/* sum over pixels of the squared image of one electron. */
+static double brute_squared_image(int n, double sigma) {
+    enum { SIZE = 420 };
+    static double image[SIZE][SIZE];
+    memset(image, 0, sizeof image);
+    double x0 = 0, y0 = 0;
+    for (int k = 0; k < n; k++) {
+        x0 += x_of[k] / n;
+        y0 += y_of[k] / n;
+    }
+    const double r = sigma * sqrt(2.0);
+    int left = (int)floor(x0) - SIZE / 2, top = (int)floor(y0) - SIZE / 2;
+    for (int k = 0; k < n; k++) {
+        int cx = (int)floor(x_of[k] + 0.5) - left, cy = (int)floor(y_of[k] + 0.5) - top;
+        double wx[15], wy[15];
+        for (int i = -7; i <= 7; i++) {
+            double dx = cx + left + i - x_of[k], dy = cy + top + i - y_of[k];
+            wx[i + 7] = 0.5 * (erf((dx + 0.5) / r) - erf((dx - 0.5) / r));
+            wy[i + 7] = 0.5 * (erf((dy + 0.5) / r) - erf((dy - 0.5) / r));
+        }
+        for (int j = -7; j <= 7; j++) {
+            for (int i = -7; i <= 7; i++) {
+                assert_true(cx + i >= 0 && cx + i < SIZE && cy + j >= 0 && cy + j < SIZE);
+                image[cy + j][cx + i] += wx[i + 7] * wy[j + 7] / n;
+            }
+        }
+    }
+    double sum = 0;
+    for (int j = 0; j < SIZE; j++) {
+        for (int i = 0; i < SIZE; i++) {
+            sum += image[j][i] * image[j][i];
+        }
+    }
+    return sum;
+}
+
+static void snr_is_that_of_the_smeared_image(void **state) {
+    (void)state;
+    scene s = make_scene(GX5);
+    const double cases[][4] = {/* dx, dy, roll in degrees, jitter rms px */
+                               {0, 0, 0, 0},   {1, 0.5, 0, 0}, {10, -7, 0, 0},  {200, 220, 0, 0},
+                               {0, 0, 0, 0.2}, {0, 0, 0, 0.6}, {25, 5, 0, 0.2}, {-40, 160, 1, 0.2}};
+    /* 2 % is the task's. What is left: the phase within the pixel (0.5 %), jitter that is not
+     * Gaussian, the bend of the last */
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        fill(&s, cases[c][0], cases[c][1], cases[c][2] * BST_DEG_RAD, cases[c][3]);
+        query(&s, 3000, full);
+        double variance = s.truth.background_e + s.truth.dark_e + 64;
+        /* by hand: 4.44645 e/s of sky, 0.5 e/s of dark current, half a second */
+        bst_assert_close(variance, 0.5 * (4.44645 + 0.5) + 64, 1e-4);
+        for (int i = 0; i < s.count; i += 1 + s.count / 12) {
+            int n = dense_track(&s, &s.sources[i], x_of, y_of);
+            double squared =
+                brute_squared_image(n, bst_camera_psf_sigma_px(bst_world_camera(s.world, 0, 0)));
+            bst_truth_item item;
+            bst_field_truth_item(s.field, &s.track, &s.sources[i], full, &s.truth, &item);
+            bst_assert_close(item.electrons, s.sources[i].electrons_per_s * 0.5, 1e-9);
+            bst_assert_close(item.snr / (item.electrons * sqrt(squared / variance)), 1, 0.02);
+        }
+    }
+    free_scene(&s);
+}
+
+static bool has_star(const scene *s, uint32_t id) {
+    for (int i = 0; i < s->count; i++) {
+        if (s->sources[i].kind == BST_SOURCE_STAR && s->sources[i].id == id) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Every star of the whole sky that is on the window at any sample is among the sources. */
+static void no_star_is_missed(void **state) {
+    (void)state;
+    scene s = make_scene(GX5);
+    const bst_camera *camera = bst_world_camera(s.world, 0, 0);
+    const double cases[][3] = {{0, 0, 0}, {300, 0, 0}, {-200, 250, 0}, {50, 0, 5}, {900, 900, 20}};
+    const bst_window windows[] = {{0, 0, 1024, 1024}, {700, 10, 200, 100}, {1000, 1000, 24, 24}};
+    enum { ROOM = 400000 };
+    bst_star *all = malloc(ROOM * sizeof *all);
+    assert_non_null(all);
+    for (int c = 0; c < 5; c++) {
+        fill(&s, cases[c][0], cases[c][1], cases[c][2] * BST_DEG_RAD, 0.2);
+        for (int w = 0; w < 3; w++) {
+            query(&s, 3000, windows[w]);
+            bst_light light = {s.truth.velocity_bary_mps, s.truth.sun_m};
+            /* a wide cone stands for the whole sky, with proper motion to the same date */
+            bst_vec3 centre = bst_quat_rotate(bst_quat_conj(s.target), (bst_vec3){0, 0, 1});
+            int n = 0, there = 0;
+            bst_assert_ok(&s.ctx, bst_stars_query(&s.ctx, bst_world_stars(s.world), centre,
+                                                  6 * BST_DEG_RAD, 13, 2022.457, all, ROOM, &n));
+            assert_true(n < ROOM);
+            for (int i = 0; i < n; i++) {
+                bst_vec3 apparent = bst_light_apparent_star(&light, all[i].icrs);
+                bool on = false;
+                for (int k = 0; k < s.track.count && !on; k += 10) {
+                    double x, y;
+                    const bst_window *win = &windows[w];
+                    on = bst_camera_project(camera,
+                                            bst_quat_rotate(s.track.q_cam_from_gcrf[k], apparent),
+                                            &x, &y) &&
+                         x >= win->x0 - 4.9 && x <= win->x0 + win->width - 1 + 4.9 &&
+                         y >= win->y0 - 4.9 && y <= win->y0 + win->height - 1 + 4.9;
+                }
+                there += on;
+                if (on && !has_star(&s, all[i].id)) {
+                    fail_msg("case %d window %d: star %08x is missing", c, w, all[i].id);
+                }
+            }
+            assert_true(w > 0 || there > 20);
+        }
+    }
+    free(all);
+    free_scene(&s);
+}
+
+static void an_exposure_of_no_length(void **state) {
+    (void)state;
+    scene s = make_scene(GX5);
+    push(s.history, 0, s.target);
+    query(&s, 0, full);
+    assert_int_equal(s.track.count, 2);
+    assert_true(s.truth.background_e == 0 && s.truth.dark_e == 0);
+    assert_true(s.count > 10);
+    for (int i = 0; i < s.count; i++) {
+        bst_truth_item item;
+        bst_field_truth_item(s.field, &s.track, &s.sources[i], full, &s.truth, &item);
+        assert_true(item.electrons == 0 && item.snr == 0);
+        bst_assert_close(item.x_mean_px, item.x_mid_px, 1e-9);
+        bst_assert_close(item.x_start_px, item.x_mid_px, 1e-9);
+        bst_assert_close(item.y_end_px, item.y_mid_px, 1e-9);
+    }
+    free_scene(&s);
+}
+
+/* The object's place on a camera that points at it, and its numbers. */
+static void the_target_is_where_the_sight_says(void **state) {
+    (void)state;
+    scene s = make_scene(GX5);
+    fill(&s, 0, 0, 0, 0);
+    query(&s, 3000, full);
+    const bst_source *object = &s.sources[s.count - 1];
+    assert_int_equal(object->kind, BST_SOURCE_OBJECT);
+    bst_view *view;
+    bst_sight mid, end;
+    bst_assert_ok(&s.ctx, bst_view_create(&s.ctx, s.world, &view));
+    bst_assert_ok(&s.ctx, bst_view_sight(&s.ctx, view, 0, 0, 0.25, &mid));
+    bst_assert_ok(&s.ctx, bst_view_sight(&s.ctx, view, 0, 0, 0.5, &end));
+    bst_truth_item item;
+    bst_field_truth_item(s.field, &s.track, object, full, &s.truth, &item);
+    const bst_camera *camera = bst_world_camera(s.world, 0, 0);
+    double x = NAN, y = NAN;
+    assert_true(bst_camera_project(camera, bst_quat_rotate(s.target, mid.apparent), &x, &y));
+    bst_assert_close(item.x_mid_px, x, 1e-8);
+    bst_assert_close(item.y_mid_px, y, 1e-8);
+    assert_true(bst_camera_project(camera, bst_quat_rotate(s.target, end.apparent), &x, &y));
+    bst_assert_close(item.x_end_px, x, 1e-8);
+    assert_int_equal(item.norad, 44801);
+    bst_assert_close(item.v_mag, mid.v_mag, 1e-12);
+    bst_assert_close(item.range_m, mid.range_m, 1e-6);
+    bst_assert_close(item.electrons, 0.5 * bst_camera_electrons_per_s(camera, mid.v_mag), 1e-9);
+    /* half a second at 45 to 50 arcsec/s and 3 arcsec/px */
+    bst_assert_close(hypot(item.x_end_px - item.x_start_px, item.y_end_px - item.y_start_px), 8, 1);
+    /* the mean attitude of a camera at rest is the attitude */
+    bst_assert_close(bst_vec3_norm(bst_quat_to_rotvec(
+                         bst_quat_mul(s.truth.q_cam_from_gcrf_mean, bst_quat_conj(s.target)))),
+                     0, 1e-14);
+    bst_view_free(view);
+    free_scene(&s);
+}
+
+static void the_earth_hides_stars(void **state) {
+    (void)state;
+    scene s = make_scene(GX5);
+    bst_view *view;
+    bst_state eye;
+    bst_assert_ok(&s.ctx, bst_view_create(&s.ctx, s.world, &view));
+    bst_assert_ok(&s.ctx, bst_view_observer_state(&s.ctx, view, 0, 0.25, &eye));
+    bst_vec3 down = bst_vec3_scale(eye.position_m, -1.0);
+    s.target = bst_quat_look(down, (bst_vec3){0, 0, 1});
+    fill(&s, 0, 0, 0, 0);
+    query(&s, 3000, full);
+    assert_true(s.count > 0);
+    for (int i = 0; i < s.count; i++) {
+        bst_truth_item item;
+        bst_field_truth_item(s.field, &s.track, &s.sources[i], full, &s.truth, &item);
+        assert_true(item.flags & BST_TRUTH_OCCULTED);
+        assert_true(item.electrons == 0 && item.snr == 0 && isfinite(item.v_mag));
+    }
+    /* the opposite way all shine */
+    s.target = bst_quat_look(eye.position_m, (bst_vec3){0, 0, 1});
+    fill(&s, 0, 0, 0, 0);
+    query(&s, 3000, full);
+    assert_true(s.count > 0);
+    for (int i = 0; i < s.count; i++) {
+        assert_false(s.sources[i].occulted);
+        assert_true(s.sources[i].electrons_per_s > 0);
+    }
+    bst_view_free(view);
+    free_scene(&s);
+}
+
+static void what_came_down_is_not_there(void **state) {
+    (void)state;
+    scene s = make_scene(
+        "{\"name\": \"gone\", \"orbit\": {\"tle_file\": "
+        "\"tests/world/data/decayed.tle\", \"norad\": 28872}}, " GX5);
+    fill(&s, 0, 0, 0, 0);
+    query(&s, 3000, full);
+    assert_int_equal(s.sources[s.count - 1].kind, BST_SOURCE_OBJECT);
+    assert_int_equal(s.sources[s.count - 1].id, 1);
+    assert_int_equal(s.sources[s.count - 2].kind, BST_SOURCE_STAR);
+    free_scene(&s);
+}
+
+/* A ring of 100 samples that has been round several times gives the same as one that has not. */
+static void the_ring_may_have_wrapped(void **state) {
+    (void)state;
+    scene s = make_scene(GX5);
+    bst_los_history *h = s.history;
+    for (int capacity = 100; capacity <= HISTORY; capacity += HISTORY - 100) {
+        h->capacity = capacity;
+        h->written = 0;
+        for (int64_t n = 0; n < 777; n++) {
+            /* each second sample with the other sign: the same attitude */
+            bst_quat q = turned(s.target, 0.1 * (double)n, 0, 0);
+            push(h, 6 * n, n % 2 ? (bst_quat){-q.x, -q.y, -q.z, -q.w} : q);
+        }
+        bst_los_track t;
+        /* between samples 700 and 770: ticks 4203 (half way) to 4618 (two thirds of a step) */
+        bst_assert_ok(&s.ctx, bst_field_track(&s.ctx, s.field, h, 4203, 4618, RATE, &t));
+        assert_int_equal(t.count, 71); /* the ends and 701 to 769 */
+        bst_assert_close(t.time_s[0], 0, 0);
+        bst_assert_close(t.time_s[1], 3.0 / RATE, 1e-15);
+        bst_assert_close(t.time_s[70], 415.0 / RATE, 1e-15);
+        for (int k = 0; k < t.count; k++) {
+            double sample = (4203 + t.time_s[k] * RATE) / 6;
+            bst_quat want = turned(s.target, 0.1 * sample, 0, 0);
+            bst_vec3 off =
+                bst_quat_to_rotvec(bst_quat_mul(t.q_cam_from_gcrf[k], bst_quat_conj(want)));
+            bst_assert_close(bst_vec3_norm(off), 0, 1e-14);
+            if (k > 0) { /* neighbouring signs agree */
+                bst_quat a = t.q_cam_from_gcrf[k - 1], b = t.q_cam_from_gcrf[k];
+                assert_true(a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w > 0.99);
+            }
+        }
+    }
+    free_scene(&s);
+}
+
+static void an_exposure_outside_the_history_is_refused(void **state) {
+    (void)state;
+    scene s = make_scene(GX5);
+    bst_los_history *h = s.history;
+    bst_los_track t;
+    assert_int_equal(bst_field_track(&s.ctx, s.field, h, 0, 10, RATE, &t), BST_ERR_STATE);
+    h->capacity = 100;
+    for (int64_t n = 0; n < 150; n++) {
+        push(h, 6 * n, s.target);
+    }
+    /* the ring holds samples 50 to 149: ticks 300 to 894 */
+    bst_assert_ok(&s.ctx, bst_field_track(&s.ctx, s.field, h, 300, 894, RATE, &t));
+    assert_int_equal(t.count, 100);
+    assert_int_equal(bst_field_track(&s.ctx, s.field, h, 299, 894, RATE, &t), BST_ERR_STATE);
+    assert_string_equal(s.ctx.message,
+                        "the line-of-sight history (ticks 300 to 894) does not cover the exposure "
+                        "(299 to 894): give the gimbal a longer history_s or a rate that divides "
+                        "the exposure");
+    assert_int_equal(bst_field_track(&s.ctx, s.field, h, 300, 895, RATE, &t), BST_ERR_STATE);
+    free_scene(&s);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(mean_places_are_those_of_the_light),
+        cmocka_unit_test(snr_is_that_of_the_smeared_image),
+        cmocka_unit_test(no_star_is_missed),
+        cmocka_unit_test(an_exposure_of_no_length),
+        cmocka_unit_test(the_target_is_where_the_sight_says),
+        cmocka_unit_test(the_earth_hides_stars),
+        cmocka_unit_test(what_came_down_is_not_there),
+        cmocka_unit_test(the_ring_may_have_wrapped),
+        cmocka_unit_test(an_exposure_outside_the_history_is_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
