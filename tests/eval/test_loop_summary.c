@@ -1,0 +1,332 @@
+/* The loop's figures on made-up streams of truth, tracks and modes. */
+#include "sim/eval/loop_summary.h"
+
+#include <stdlib.h>
+
+#include "tests/world/world_support.h"
+
+enum { RATE = 6000 };
+
+typedef struct scene {
+    bst_ctx ctx;
+    bst_world *world;
+    bst_view *view;
+    bst_loop_summary *summary;
+    bst_tracks *tracks;
+    bst_loop_frame judged[3000];
+    int judged_count;
+} scene;
+
+static void on_frame(void *user, const bst_loop_frame *frame) {
+    scene *s = user;
+    assert_int_equal(frame->exposure_id, s->judged_count); /* each once, in order */
+    s->judged[s->judged_count++] = *frame;
+}
+
+static scene *open_scene(const char *object, int target) {
+    scene *s = calloc(1, sizeof *s);
+    assert_non_null(s);
+    s->world = test_world_with(object, "");
+    bst_assert_ok(&s->ctx, bst_view_create(&s->ctx, s->world, &s->view));
+    bst_assert_ok(&s->ctx,
+                  bst_loop_summary_create(&s->ctx, s->world, 0, 0, RATE, target, &s->summary));
+    bst_loop_summary_on_frame(s->summary, on_frame, s);
+    s->tracks = calloc(1, sizeof *s->tracks + 4 * sizeof *s->tracks->items);
+    assert_non_null(s->tracks);
+    return s;
+}
+
+static void close_scene(scene *s) {
+    bst_loop_summary_free(s->summary);
+    bst_view_free(s->view);
+    bst_world_free(s->world);
+    free(s->tracks);
+    free(s);
+}
+
+#define GX5 "{\"name\": \"GX5\", " TEST_GX5 "}"
+
+static bst_sight sight_at(scene *s, double t) {
+    bst_sight sight;
+    bst_assert_ok(&s->ctx, bst_view_sight(&s->ctx, s->view, 0, 0, t, &sight));
+    return sight;
+}
+
+/* Exposures of half a second, one a second. */
+static double mid_of(int64_t id) {
+    return (double)id + 0.25;
+}
+
+/* One frame whose target lies (x, y) px from the boresight. */
+static void truth_at(scene *s, int64_t id, double x, double y) {
+    bst_sight sight = sight_at(s, mid_of(id));
+    const double scale = 3.0 * BST_ARCSEC_RAD;
+    bst_quat q = bst_quat_look(sight.apparent, (bst_vec3){0, 0, 1});
+    /* the attitude in which that apparent direction has these tangent-plane coordinates */
+    bst_vec3 want = bst_vec3_unit((bst_vec3){x * scale, y * scale, 1});
+    bst_vec3 axis = bst_vec3_cross((bst_vec3){0, 0, 1}, want);
+    double angle = bst_vec3_angle((bst_vec3){0, 0, 1}, want);
+    q = bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(bst_vec3_unit(axis), angle)), q);
+    bst_truth truth = {.exposure_id = id,
+                       .start_tick = id * RATE,
+                       .end_tick = id * RATE + RATE / 2,
+                       .q_cam_from_gcrf_mid = q,
+                       .boresight_x_px = 511.5,
+                       .boresight_y_px = 511.5};
+    bst_assert_ok(&s->ctx, bst_loop_summary_truth(&s->ctx, s->summary, &truth));
+}
+
+/* Tracks of frame `id`, published 0.4 s after its end; the track of interest lies `off` px beside
+ * the target (out along the pole's direction) and moves as the target does. status < 0: no track.
+ */
+static void tracks_at(scene *s, int64_t id, int status, double off_px) {
+    bst_sight a = sight_at(s, mid_of(id) - 0.5), b = sight_at(s, mid_of(id) + 0.5),
+              m = sight_at(s, mid_of(id));
+    bst_vec3 rate = bst_vec3_sub(b.geometric, a.geometric);
+    bst_vec3 aside = bst_vec3_unit(
+        bst_vec3_cross(bst_vec3_cross(m.geometric, (bst_vec3){0, 0, 1}), m.geometric));
+    memset(s->tracks, 0, sizeof *s->tracks);
+    s->tracks->exposure_id = id;
+    s->tracks->tick = id * RATE + RATE / 4;
+    s->tracks->count = 2;
+    /* another one, confirmed and not of interest, right on the target: must not count */
+    s->tracks->items[0] = (bst_track){.id = 1,
+                                      .status = BST_TRACK_CONFIRMED,
+                                      .direction_gcrf = m.geometric,
+                                      .rate_gcrf_radps = rate};
+    s->tracks->items[1] = (bst_track){.id = 2,
+                                      .status = status,
+                                      .target_of_interest = status >= 0,
+                                      .direction_gcrf = bst_vec3_unit(bst_vec3_axpy(
+                                          m.geometric, off_px * 3 * BST_ARCSEC_RAD, aside)),
+                                      .rate_gcrf_radps = rate};
+    bst_loop_summary_tracks(s->summary, s->tracks, id * RATE + 5400);
+}
+
+static void mode(scene *s, int64_t id, int m) {
+    bst_control_status status = {.tick = id * RATE, .mode = m};
+    bst_loop_summary_status(s->summary, &status);
+}
+
+static void a_target_that_is_never_confirmed(void **state) {
+    (void)state;
+    scene *s = open_scene(GX5, 0);
+    for (int id = 0; id < 40; id++) {
+        mode(s, id, BST_MODE_SEARCH);
+        truth_at(s, id, 100, 50);
+        tracks_at(s, id, id % 2 ? BST_TRACK_TENTATIVE : -1, 0);
+    }
+    bst_loop_summary_finish(s->summary);
+    bst_loop_figures f;
+    bst_loop_summary_figures(s->summary, &f);
+    assert_int_equal(f.frames, 40);
+    assert_int_equal(f.final_mode, BST_MODE_SEARCH);
+    assert_true(isnan(f.time_to_confirm_s) && isnan(f.time_to_settle_s));
+    assert_true(f.track_fraction == 0);
+    assert_int_equal(f.wrong_target_frames, 0);
+    assert_int_equal(f.pointing_frames, 0);
+    assert_true(isnan(f.pointing_rms_px) && isnan(f.pointing_p99_px) && isnan(f.pointing_bias_px));
+    assert_int_equal(s->judged_count, 40);
+    for (int id = 0; id < 40; id++) {
+        assert_true(s->judged[id].visible);
+        assert_false(s->judged[id].in_track || s->judged[id].settled);
+        bst_assert_close(s->judged[id].error_x_px, 100, 1e-7); /* 1e-16 / 1.5e-5 rad per px */
+        bst_assert_close(s->judged[id].error_y_px, 50, 1e-7);
+        bst_assert_close(s->judged[id].error_px, hypot(100, 50), 1e-7);
+        bst_assert_close(s->judged[id].target_x_px, 611.5, 1e-7);
+        bst_assert_close(s->judged[id].time_s, id + 0.25, 0);
+    }
+    close_scene(s);
+}
+
+/* Confirmed with the tracks of frame 10; in track mode from frame 12, within 3 px from frame 15. */
+static void times_to_confirm_and_to_settle(void **state) {
+    (void)state;
+    scene *s = open_scene(GX5, 0);
+    for (int id = 0; id < 40; id++) {
+        mode(s, id, id < 12 ? BST_MODE_ACQUIRE : BST_MODE_TRACK);
+        truth_at(s, id, id < 15 ? 4 : 0.3, id < 15 ? 0 : -0.4);
+        tracks_at(s, id, id < 10 ? BST_TRACK_TENTATIVE : BST_TRACK_CONFIRMED, 0.2);
+    }
+    bst_loop_summary_finish(s->summary);
+    bst_loop_figures f;
+    bst_loop_summary_figures(s->summary, &f);
+    bst_assert_close(f.time_to_confirm_s, 10.9, 1e-12); /* 0.4 s after the end of frame 10 */
+    bst_assert_close(f.time_to_settle_s, 15, 1e-12);
+    assert_int_equal(f.final_mode, BST_MODE_TRACK);
+    /* of the frames after 10.9 s, all */
+    assert_true(f.track_fraction == 1);
+    assert_int_equal(f.pointing_frames, 25);
+    bst_assert_close(f.pointing_rms_px, 0.5, 1e-7);
+    bst_assert_close(f.pointing_bias_px, 0.5, 1e-7);
+    assert_true(s->judged[10].in_track && !s->judged[9].in_track);
+    assert_true(s->judged[15].settled && !s->judged[14].settled);
+    assert_int_equal(s->judged[12].mode, BST_MODE_TRACK);
+    close_scene(s);
+}
+
+/* A track on something else is no track of the target, and is counted; 5 px is the limit. */
+static void the_wrong_target_counts_as_wrong(void **state) {
+    (void)state;
+    scene *s = open_scene(GX5, 0);
+    for (int id = 0; id < 30; id++) {
+        mode(s, id, BST_MODE_TRACK);
+        truth_at(s, id, 0, 1);
+        tracks_at(s, id, id < 10 ? BST_TRACK_CONFIRMED : BST_TRACK_COASTING, id < 20 ? 4.9 : 5.1);
+    }
+    bst_loop_summary_finish(s->summary);
+    bst_loop_figures f;
+    bst_loop_summary_figures(s->summary, &f);
+    bst_assert_close(f.time_to_confirm_s, 0.9, 1e-12);
+    assert_int_equal(f.wrong_target_frames, 10);
+    /* frames 1 to 29 begin after the confirmation at 0.9 s; 1 to 19 are right */
+    bst_assert_close(f.track_fraction, 19.0 / 29.0, 1e-15);
+    close_scene(s);
+}
+
+/* Every third frame has no tracks of its own: judged by what was known before. After frame 21 the
+ * track of interest is deleted; frames without tracks are then lost too. */
+static void dropped_frames_are_judged_by_the_track_known_before(void **state) {
+    (void)state;
+    scene *s = open_scene(GX5, 0);
+    for (int id = 0; id < 30; id++) {
+        mode(s, id, BST_MODE_TRACK);
+        truth_at(s, id, 0, 1);
+        if (id % 3 != 2) {
+            tracks_at(s, id, id <= 21 ? BST_TRACK_CONFIRMED : -1, 0.5);
+        }
+    }
+    bst_loop_summary_finish(s->summary);
+    bst_loop_figures f;
+    bst_loop_summary_figures(s->summary, &f);
+    assert_int_equal(s->judged_count, 30);
+    for (int id = 0; id < 30; id++) {
+        assert_int_equal(s->judged[id].in_track, id <= 21);
+    }
+    bst_assert_close(f.track_fraction, 21.0 / 29.0, 1e-15);
+    close_scene(s);
+
+    /* the other way round: a frame before the first track is not in track, although the next
+     * frame's is */
+    s = open_scene(GX5, 0);
+    truth_at(s, 0, 0, 1);
+    truth_at(s, 1, 0, 1);
+    tracks_at(s, 1, BST_TRACK_CONFIRMED, 0);
+    assert_int_equal(s->judged_count, 2);
+    assert_false(s->judged[0].in_track);
+    assert_true(s->judged[1].in_track);
+    bst_loop_frame newest;
+    bst_loop_summary_newest(s->summary, &newest);
+    assert_int_equal(newest.exposure_id, 1);
+    assert_true(newest.in_track);
+    close_scene(s);
+}
+
+/* Tracks that never come do not hold up more than a bounded number of frames. */
+static void frames_do_not_wait_for_ever(void **state) {
+    (void)state;
+    scene *s = open_scene(GX5, 0);
+    for (int id = 0; id < 200; id++) {
+        truth_at(s, id, 0, 1);
+    }
+    assert_true(s->judged_count >= 200 - 64 && s->judged_count < 200);
+    bst_loop_summary_finish(s->summary);
+    assert_int_equal(s->judged_count, 200);
+    bst_loop_figures f;
+    bst_loop_summary_figures(s->summary, &f);
+    assert_int_equal(f.frames, 200);
+    close_scene(s);
+}
+
+static int by_size(const void *a, const void *b) {
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Rayleigh-distributed errors: the RMS is exact, the percentile right to the bin of 1 %. */
+static void rms_is_exact_and_p99_within_a_bin(void **state) {
+    (void)state;
+    scene *s = open_scene(GX5, 0);
+    enum { N = 1000 };
+    double errors[N], sum2 = 0, sx = 0, sy = 0;
+    mode(s, 0, BST_MODE_TRACK);
+    truth_at(s, 0, 0, 1);
+    tracks_at(s, 0, BST_TRACK_CONFIRMED, 0);
+    unsigned seed = 1;
+    for (int i = 0; i < N; i++) {
+        double u[2];
+        for (int k = 0; k < 2; k++) {
+            seed = seed * 1664525u + 1013904223u;
+            u[k] = ((double)(seed >> 8) + 0.5) / 16777216.0;
+        }
+        double r = 0.4 * sqrt(-2 * log(u[0])), phi = 2 * BST_PI * u[1];
+        double x = r * cos(phi) + 0.05, y = r * sin(phi);
+        errors[i] = hypot(x, y);
+        sum2 += x * x + y * y;
+        sx += x;
+        sy += y;
+        truth_at(s, i + 1, x, y);
+    }
+    bst_loop_summary_finish(s->summary);
+    bst_loop_figures f;
+    bst_loop_summary_figures(s->summary, &f);
+    assert_int_equal(f.pointing_frames, N);
+    bst_assert_close(f.pointing_rms_px, sqrt(sum2 / N), 1e-8);
+    bst_assert_close(f.pointing_bias_px, hypot(sx, sy) / N, 1e-8);
+    qsort(errors, N, sizeof *errors, by_size);
+    double p99 = errors[(int)ceil(0.99 * N) - 1];
+    bst_assert_close(f.pointing_p99_px / p99, 1, 0.01);
+    close_scene(s);
+}
+
+/* In the dark nothing is visible: such frames count neither for nor against. */
+static void frames_without_light_do_not_count(void **state) {
+    (void)state;
+    scene *s = open_scene("{\"name\": \"GX5\", \"albedo\": 0, " TEST_GX5 "}", 0);
+    for (int id = 0; id < 20; id++) {
+        mode(s, id, BST_MODE_TRACK);
+        truth_at(s, id, 0, 1);
+        tracks_at(s, id, BST_TRACK_CONFIRMED, 0);
+        assert_false(s->judged[id].visible);
+    }
+    bst_loop_figures f;
+    bst_loop_summary_figures(s->summary, &f);
+    assert_true(f.track_fraction == 0);
+    close_scene(s);
+}
+
+/* No target at all, or one that has come down: whatever is tracked is wrong. */
+static void without_a_target_every_track_is_wrong(void **state) {
+    (void)state;
+    for (int k = 0; k < 2; k++) {
+        scene *s = open_scene(GX5
+                              ", {\"name\": \"gone\", \"orbit\": {\"tle_file\": "
+                              "\"tests/world/data/decayed.tle\", \"norad\": 28872}}",
+                              k == 0 ? -1 : 1);
+        for (int id = 0; id < 5; id++) {
+            truth_at(s, id, 0, 1);
+            tracks_at(s, id, BST_TRACK_CONFIRMED, 0);
+        }
+        bst_loop_figures f;
+        bst_loop_summary_figures(s->summary, &f);
+        assert_int_equal(f.wrong_target_frames, 5);
+        assert_true(isnan(f.time_to_confirm_s));
+        assert_true(isnan(s->judged[0].error_px));
+        assert_false(s->judged[0].visible);
+        close_scene(s);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_target_that_is_never_confirmed),
+        cmocka_unit_test(times_to_confirm_and_to_settle),
+        cmocka_unit_test(the_wrong_target_counts_as_wrong),
+        cmocka_unit_test(dropped_frames_are_judged_by_the_track_known_before),
+        cmocka_unit_test(frames_do_not_wait_for_ever),
+        cmocka_unit_test(rms_is_exact_and_p99_within_a_bin),
+        cmocka_unit_test(frames_without_light_do_not_count),
+        cmocka_unit_test(without_a_target_every_track_is_wrong),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
