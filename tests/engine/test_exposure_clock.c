@@ -102,7 +102,7 @@ static void run(const char *exposure, const char *module_block, const char *extr
     bst_simulation *sim = NULL;
     bst_simulation_options options = {0};
     bst_assert_ok(&ctx, bst_simulation_create(&ctx, &scenario, &options, &sim));
-    assert_string_equal(bst_simulation_device(sim), ""); /* none was asked for */
+    assert_null(bst_simulation_device(sim)); /* none was asked for */
     memset(out, 0, sizeof *out);
     bst_engine *engine = bst_simulation_engine(sim);
     bst_engine_set_hooks(engine, &(bst_engine_hooks){.user = out, .message = keep});
