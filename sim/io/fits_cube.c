@@ -53,9 +53,9 @@ static bst_status start(bst_ctx *ctx, bst_fits *fits, int width, int height) {
     errno = 0;
     fits_create_img(fits->file, USHORT_IMG, 3, size, &code);
     bst_fits_put_run_keys(fits->file, &fits->names, &code);
-    fits_write_comment(
-        fits->file, "Third axis: frames. Row k of the table FRAMES holds time and WCS of plane k.",
-        &code);
+    fits_write_comment(fits->file,
+                       "Third axis: frames. Row k of the table FRAMES has plane k's time and WCS.",
+                       &code);
     bst_fits_put_statements(fits->file, &code);
     fits_flush_file(fits->file, &code);
     fits_get_hduaddrll(fits->file, &head, &data, &end, &code);

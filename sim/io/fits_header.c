@@ -66,16 +66,18 @@ void bst_fits_put_run_keys(fitsfile *file, const bst_fits_names *names, int *cod
 }
 
 void bst_fits_put_statements(fitsfile *file, int *code) {
+    /* a COMMENT card holds 72 characters */
     static const char *const lines[] = {
-        "Pixels: first row in the file is y = 0 of the sensor. DATE-OBS is the start",
-        "of the exposure, UTC at the observer.",
-        "Stellar aberration and the Sun's light deflection: absorbed. The WCS takes",
-        "ICRS catalogue places (with proper motion, without parallax) to pixels as an",
-        "astrometric solution of this frame would; the attitude is averaged over the",
-        "exposure. No aberration needs to be applied to places read from it.",
-        "Light time: moving objects are seen where they were when the light left. A",
-        "place read from the WCS is the astrometric place: object at emission minus",
-        "observer at reception, not corrected for light time.",
+        "Pixels: first row in the file is y = 0 of the sensor. DATE-OBS is the",
+        "start of the exposure, UTC at the observer.",
+        "Stellar aberration and the Sun's light deflection: absorbed. The WCS",
+        "takes ICRS catalogue places (with proper motion, without parallax) to",
+        "pixels as an astrometric solution of this frame would; the attitude is",
+        "averaged over the exposure. No aberration needs to be applied to",
+        "places read from it.",
+        "Light time: moving objects are seen where they were when the light",
+        "left. A place read from the WCS is the astrometric place: object at",
+        "emission minus observer at reception, not corrected for light time.",
         "OBSPOS and OBSVEL: observer, geocentric, GCRF axes, at mid exposure.",
     };
     for (size_t i = 0; i < sizeof lines / sizeof *lines; i++) {
