@@ -222,6 +222,8 @@ static bst_status best_candidate(bst_ctx *ctx, const bst_control *c, const bst_t
     if (!cue.valid && c->mode != BST_MODE_REACQUIRE) {
         return BST_OK;
     }
+    double own = c->config.candidate_rate_sigmas * rate_sigma;
+    double widest = fmax(2.0 * own, bst_vec3_norm(rate));
     for (int i = 0; i < tracks->count; i++) {
         const bst_track *t = &tracks->items[i];
         if (t->hits < c->config.candidate_hits || t->id <= c->rejected_id) {
@@ -230,7 +232,8 @@ static bst_status best_candidate(bst_ctx *ctx, const bst_control *c, const bst_t
         double off = bst_vec3_norm(bst_vec3_sub(t->rate_gcrf_radps, rate));
         double variance = rate_sigma * rate_sigma + fmax(t->covariance[2][2], t->covariance[3][3]);
         double gate = c->config.candidate_rate_sigmas * sqrt(variance);
-        if (off > gate) {
+        /* a rate so uncertain that the track might as well stand still says nothing */
+        if (off > gate || gate > widest) {
             continue;
         }
         double score = t->hits + 1.0 - off / gate; /* more hits first, then the nearer rate */
@@ -268,7 +271,9 @@ static bst_status observe_searching(bst_ctx *ctx, bst_control *c, int64_t tick,
         enter(c, BST_MODE_ACQUIRE, tick, "a candidate moves as the target should");
         return BST_OK;
     }
-    if (at_rest(c, tracks->tick) && ++c->frames >= c->config.dwell_frames) {
+    /* stars that give no valid attitude: the frame could show nothing */
+    bool wasted = tracks->attitude.stars > 0 && !tracks->attitude.valid;
+    if (!wasted && at_rest(c, tracks->tick) && ++c->frames >= c->config.dwell_frames) {
         return next_tile(ctx, c, tick);
     }
     return BST_OK;

@@ -27,6 +27,7 @@ static void restart(bst_pointing_error *e, int64_t tick, bst_quat error) {
     e->p_ee = e->initial_sigma_rad * e->initial_sigma_rad;
     e->p_er = 0.0;
     e->p_rr = e->initial_rate_sigma_radps * e->initial_rate_sigma_radps;
+    e->taken = 1;
     e->rejected = 0;
 }
 
@@ -58,7 +59,8 @@ bool bst_pointing_error_update(bst_pointing_error *e, const bst_attitude_fix *fi
     double across = bst_vec3_norm(bst_vec3_cross(innovation, boresight));
     double s = p_ee + r;
     if (across * across > 2.0 * GATE_SIGMA * GATE_SIGMA * s) {
-        if (++e->rejected <= REJECT_MAX) {
+        int32_t patience = e->taken - 2 < REJECT_MAX ? e->taken - 2 : REJECT_MAX;
+        if (++e->rejected <= patience) {
             return false;
         }
         restart(e, fix->tick, measured);
@@ -73,6 +75,7 @@ bool bst_pointing_error_update(bst_pointing_error *e, const bst_attitude_fix *fi
     e->p_er = p_er * (1.0 - alpha);
     e->p_rr = p_rr - beta * p_er;
     e->tick = fix->tick;
+    e->taken += e->taken < REJECT_MAX + 2;
     e->rejected = 0;
     return true;
 }

@@ -39,6 +39,7 @@ typedef struct bst_pointing_error {
     bst_quat error;
     bst_vec3 rate_gcrf_radps;
     double p_ee, p_er, p_rr;
+    int32_t taken;    /* fixes since the start */
     int32_t rejected; /* fixes in a row */
 } bst_pointing_error;
 
@@ -48,8 +49,9 @@ void bst_pointing_error_init(bst_pointing_error *e, double disturbance_rms_rad,
                              double initial_sigma_rad, double initial_rate_sigma_radps);
 
 /* Takes a fix in; invalid ones and ones older than the state change nothing. A fix that is off by
- * more than 8 sigma is left out, but not more than three in a row: then the filter starts afresh
- * from it. Returns whether the fix was used. */
+ * more than 8 sigma is left out, but not more than three in a row (fewer after fewer than five
+ * fixes, none after two, which only define error and rate): then the filter starts afresh from it.
+ * Returns whether the fix was used. */
 bool bst_pointing_error_update(bst_pointing_error *e, const bst_attitude_fix *fix,
                                double tick_rate_hz);
 

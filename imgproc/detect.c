@@ -210,6 +210,23 @@ static bool before_on_sensor(const void *context, int a, int b) {
     return p->x_px != q->x_px ? p->x_px < q->x_px : a < b;
 }
 
+/* A detection is to stand for the mean of its path, but a fit that does not follow the camera's
+ * uneven turn finds the place where the source dwelt: half the bend away when most of the path is
+ * there. */
+static void widen_by_bend(const bst_imgproc *ip, const bst_locate_frame *f, const bst_shape *shape,
+                          bst_detection *d) {
+    if (!f->motion) {
+        return;
+    }
+    double x, y;
+    bst_motion_bend(f->motion, &ip->camera, &x, &y);
+    x = 0.5 * (x - f->binning * shape->bend_x_px);
+    y = 0.5 * (y - f->binning * shape->bend_y_px);
+    d->cov_xx += x * x;
+    d->cov_xy += x * y;
+    d->cov_yy += y * y;
+}
+
 static bst_detection report(const bst_imgproc *ip, const bst_locate_frame *f,
                             const bst_found *found) {
     const bst_source *s = &found->source;
@@ -229,6 +246,7 @@ static bst_detection report(const bst_imgproc *ip, const bst_locate_frame *f,
     double rate = s->flux_e / fmax(ip->exposure_s, 1e-9);
     d.v_mag = -2.5 * log10(rate / ip->electrons_per_s_v0);
     d.flags = found->flags;
+    widen_by_bend(ip, f, &s->shape, &d);
     d.label = found->artefact ? BST_LABEL_ARTEFACT : BST_LABEL_UNKNOWN;
     return d;
 }

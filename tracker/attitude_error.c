@@ -44,6 +44,7 @@ static void start(bst_attitude_error *filter, const bst_attitude_error_params *p
                   const double z[3], const double r[3][3]) {
     memset(filter, 0, sizeof *filter);
     filter->started = true;
+    filter->fixes = 1;
     for (int i = 0; i < 3; i++) {
         filter->e[i] = z[i];
         for (int j = 0; j < 3; j++) {
@@ -81,13 +82,18 @@ bool bst_attitude_error_update(bst_attitude_error *filter, const bst_attitude_er
         }
     }
     if (!invertible || chi2 > params->gate_chi2) {
-        if (++filter->rejected_in_row >= params->gate_patience) {
+        /* two fixes only define error and rate: what contradicts them is as likely to be right */
+        int patience = filter->fixes - 1;
+        patience = patience < 1 ? 1 : patience;
+        patience = patience < params->gate_patience ? patience : params->gate_patience;
+        if (++filter->rejected_in_row >= patience) {
             start(filter, params, z, r);
             return true;
         }
         return false;
     }
     filter->rejected_in_row = 0;
+    filter->fixes += filter->fixes <= params->gate_patience;
     double k[6][3], a[6][6] = {{0}}, t[6][6];
     for (int i = 0; i < 6; i++) {
         a[i][i] = 1.0;

@@ -16,7 +16,8 @@ typedef struct bst_attitude_error_params {
     double noise_rad2ps3;    /* power spectral density of the drift rate's random walk */
     double jitter_rad;       /* 1 sigma per axis of a frame's own error, not carried to the next */
     double gate_chi2;        /* fixes beyond this (3 degrees of freedom) are not taken ... */
-    int gate_patience;       /* ... until this many in a row: then the filter starts anew */
+    int gate_patience;       /* ... until this many in a row, fewer while only a few were taken:
+                                then the filter starts anew */
     double telemetry_sigma_rad; /* 1 sigma per axis of the telemetry before any fix */
 } bst_attitude_error_params;
 
@@ -24,6 +25,7 @@ typedef struct bst_attitude_error {
     bool started;
     double e[6];    /* rad, rad/s */
     double p[6][6]; /* covariance */
+    int fixes;      /* taken since the start */
     int rejected_in_row;
 } bst_attitude_error;
 

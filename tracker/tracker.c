@@ -26,7 +26,8 @@ struct bst_tracker {
     bst_attitude_params attitude_params;
     bst_attitude_error_params error_params;
     bst_target_params target_params;
-    double floor_variance_px2, blend_variance_px2, edge_margin_px, max_attitude_sigma_rad;
+    double floor_variance_px2, blend_variance_px2, max_variance_px2, edge_margin_px,
+        max_attitude_sigma_rad;
     int max_detections;
     bst_mtt *mtt;
     cached_star *cache;
@@ -79,6 +80,7 @@ static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_par
         .memory_noise_rad2ps3 = square(10.0 * arcsec(c->process_noise_arcsec_per_s15))};
     t->floor_variance_px2 = square(c->object_floor_px);
     t->blend_variance_px2 = square(c->blend_sigma_px);
+    t->max_variance_px2 = square(c->max_attitude_sigma_px);
     t->edge_margin_px = c->edge_margin_px;
     t->max_attitude_sigma_rad = c->max_attitude_sigma_px * scale;
     t->max_detections = (int)c->max_detections;
@@ -296,8 +298,10 @@ static int collect_objects(bst_tracker *t, const bst_detections *d, const frame_
         const bst_detection *item = &d->items[i];
         bool positive =
             item->cov_xx > 0.0 && item->cov_xx * item->cov_yy > item->cov_xy * item->cov_xy;
+        /* places as uncertain as an attitude that is not used would only feed false tracks */
+        bool sharp = item->cov_xx <= t->max_variance_px2 && item->cov_yy <= t->max_variance_px2;
         if ((item->label != BST_LABEL_OBJECT && item->label != BST_LABEL_UNKNOWN) || !positive ||
-            !isfinite(item->x_px) || !isfinite(item->y_px)) {
+            !sharp || !isfinite(item->x_px) || !isfinite(item->y_px)) {
             continue;
         }
         if (count == t->max_detections) {

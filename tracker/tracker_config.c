@@ -7,8 +7,10 @@ const bst_config_desc bst_tracker_config_table[] = {
              "Standard deviation added to every star's centroid (catalogue, distortion)."),
     BST_REAL(C, star_reject_chi2, "", 4, 1e6, "18.4",
              "Stars that fit worse (2 degrees of freedom) do not count for the attitude."),
-    BST_REAL(C, max_attitude_sigma_px, "px", 1e-3, 1e3, "2",
-             "Frames whose attitude is worse than this are not used for tracking."),
+    BST_REAL(
+        C, max_attitude_sigma_px, "px", 1e-3, 1e3, "2",
+        "Frames whose attitude, and detections whose place, is worse than this are not used for "
+        "tracking."),
     BST_REAL(C, max_roll_sigma_arcsec, "arcsec", 1e-3, 1e6, "600",
              "A fix with a worse roll about the boresight is not valid."),
     BST_REAL(C, drift_sigma_arcsec_per_s, "arcsec/s", 0, 1e5, "20",

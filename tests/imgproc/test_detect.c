@@ -176,6 +176,27 @@ static void bent_path_keeps_its_mean(void **state) {
     end(&f);
 }
 
+/* A point beside streaks of an uneven turn: where its mean lies is known to half the bend only. */
+static void bend_widens_what_does_not_follow_it(void **state) {
+    (void)state;
+    double variance[2];
+    for (int bent = 0; bent < 2; bent++) {
+        fixture f = begin(128, 128);
+        double noise = synthetic_noise(&f.s);
+        synthetic_add(&f.s, 60.3, 62.8, 20 * noise / synthetic_norm(&f.s, 60, 62, 0, 0), 0, 0);
+        bst_motion motion = synthetic_motion(&f.s, 8, 0);
+        motion.bend_cam_rad = (bst_vec3){0, bent * 1.4 * bst_camera_scale_rad(&f.s.camera), 0};
+        expose(&f, &motion);
+        const bst_detection *d = near_to(&f, 60.3, 62.8, 1.0);
+        assert_false(d->flags & BST_DETECTION_STREAK);
+        variance[bent] = d->cov_xx;
+        assert_true(d->cov_yy < 0.02); /* FWHM / (2 SNR) is 0.05 px */
+        end(&f);
+    }
+    /* the fit itself is the same in both */
+    bst_assert_close(variance[1] - variance[0], 0.7 * 0.7, 1e-6);
+}
+
 /* In a stare the target streaks and no telemetry says how. */
 static void unknown_streak_is_measured(void **state) {
     (void)state;
@@ -457,6 +478,7 @@ int main(void) {
         cmocka_unit_test(extents_and_magnitude),
         cmocka_unit_test(widened_psf_keeps_fluxes),
         cmocka_unit_test(bent_path_keeps_its_mean),
+        cmocka_unit_test(bend_widens_what_does_not_follow_it),
         cmocka_unit_test(unknown_streak_is_measured),
         cmocka_unit_test(saturated_star),
         cmocka_unit_test(dull_images),
