@@ -162,6 +162,32 @@ static void from_idle_to_track_and_back(void **state) {
     rig_close(&r);
 }
 
+/* Frames whose stars contradict each other show no target: the search waits for better ones. A
+ * track whose rate is so uncertain that it might stand still is no candidate. */
+static void wasted_frames_and_vague_tracks(void **state) {
+    (void)state;
+    rig r;
+    rig_open(&r, NULL, true);
+    step(&r, 0, false);
+    step(&r, 50, false);
+    assert_int_equal(r.status.mode, BST_MODE_SEARCH);
+    r.tracks->attitude.stars = 20;
+    for (int k = 1; k <= 6; k++) {
+        step(&r, 500 + 1000 * k, true);
+        assert_int_equal(r.status.search_step, 0);
+    }
+    put_track(&r, 1, 2, 100, 0.0, 7500 - 400);
+    r.tracks->items[0].covariance[2][2] = r.tracks->items[0].covariance[3][3] =
+        13.0 * BST_ARCSEC_RAD * 13.0 * BST_ARCSEC_RAD; /* four sigma are 52 of 50 arcsec/s */
+    step(&r, 7500, true);
+    assert_int_equal(r.status.mode, BST_MODE_SEARCH);
+    r.tracks->items[0].covariance[2][2] = r.tracks->items[0].covariance[3][3] =
+        11.0 * BST_ARCSEC_RAD * 11.0 * BST_ARCSEC_RAD;
+    step(&r, 8500, true);
+    assert_int_equal(r.status.mode, BST_MODE_ACQUIRE);
+    rig_close(&r);
+}
+
 static void a_candidate_that_dies_or_stalls_is_given_up(void **state) {
     (void)state;
     rig r;
@@ -293,6 +319,7 @@ static void contradictory_settings_are_refused(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(from_idle_to_track_and_back),
+        cmocka_unit_test(wasted_frames_and_vague_tracks),
         cmocka_unit_test(a_candidate_that_dies_or_stalls_is_given_up),
         cmocka_unit_test(without_frames_the_search_still_goes_on),
         cmocka_unit_test(open_loop_strategies),

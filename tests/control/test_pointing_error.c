@@ -165,6 +165,24 @@ static void wrong_fixes_are_left_out_until_they_insist(void **state) {
     assert_false(bst_pointing_error_update(&e, &fix, TICKS));
 }
 
+/* Error and rate from two fixes, the first of them wrong: the third is worth as much. */
+static void a_bad_first_fix_is_forgotten_at_once(void **state) {
+    (void)state;
+    bst_pointing_error e;
+    make(&e);
+    bst_quat wrong = bst_quat_from_rotvec((bst_vec3){0, 0, 3.0 * PX});
+    for (int k = 0; k < 4; k++) {
+        bst_attitude_fix fix =
+            fix_of(k * TICKS, telemetry_at(k), k == 0 ? wrong : BST_QUAT_IDENTITY, 0.02 * PX);
+        assert_true(bst_pointing_error_update(&e, &fix, TICKS));
+        if (k >= 2) {
+            /* the fixes' own error; the rate of the first two would have led 3 px astray */
+            assert_true(difference(bst_pointing_error_at(&e, k * TICKS, TICKS), BST_QUAT_IDENTITY) <
+                        0.1 * PX);
+        }
+    }
+}
+
 static void nothing_known_is_no_error(void **state) {
     (void)state;
     bst_pointing_error e;
@@ -179,6 +197,7 @@ int main(void) {
         cmocka_unit_test(gains_settle_where_the_riccati_equation_says),
         cmocka_unit_test(slow_jitter_leaves_less_than_a_fifth_of_a_pixel),
         cmocka_unit_test(wrong_fixes_are_left_out_until_they_insist),
+        cmocka_unit_test(a_bad_first_fix_is_forgotten_at_once),
         cmocka_unit_test(nothing_known_is_no_error),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

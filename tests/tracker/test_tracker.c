@@ -464,6 +464,43 @@ static void a_frame_of_an_uneven_turn(void **state) {
     world_close(&w);
 }
 
+/* The camera starts from rest: the first frame's stars are off, the second is right. */
+static void a_bad_first_frame(void **state) {
+    (void)state;
+    static world w;
+    world_open(&w, 6, &plain);
+    for (int k = 0; k < 12; k++) {
+        (void)expose(&w, k);
+        for (int i = 0; k == 0 && i < w.detections->count; i++) {
+            w.detections->items[i].x_px += 6.0;
+        }
+        bst_tracker_input input = make_input(&w, k);
+        assert_int_equal(bst_tracker_step(w.tracker, &input, w.tracks, 256, w.predictions, 256),
+                         BST_TRACKER_USED);
+    }
+    assert_int_not_equal(w.tracks->target_id, 0);
+    world_close(&w);
+}
+
+/* Places known to no better than 5 px start no tracks. */
+static void vague_detections(void **state) {
+    (void)state;
+    static world w;
+    world_open(&w, 6, &plain);
+    for (int k = 0; k < 12; k++) {
+        (void)expose(&w, k);
+        for (int i = 0; i < w.detections->count; i++) {
+            bst_detection *d = &w.detections->items[i];
+            d->cov_xx += d->label == BST_LABEL_OBJECT ? 25.0 : 0.0;
+        }
+        bst_tracker_input input = make_input(&w, k);
+        assert_int_equal(bst_tracker_step(w.tracker, &input, w.tracks, 256, w.predictions, 256),
+                         BST_TRACKER_USED);
+        assert_int_equal(w.tracks->count, 0);
+    }
+    world_close(&w);
+}
+
 /* Predictions foresee the telemetry's error and the target's place of the next frame. */
 static void predictions_hold(void **state) {
     (void)state;
@@ -505,6 +542,8 @@ int main(void) {
                                        cmocka_unit_test(frames_without_stars),
                                        cmocka_unit_test(refuses_duplicates_and_late_frames),
                                        cmocka_unit_test(a_frame_of_an_uneven_turn),
+                                       cmocka_unit_test(a_bad_first_frame),
+                                       cmocka_unit_test(vague_detections),
                                        cmocka_unit_test(predictions_hold)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
