@@ -132,7 +132,8 @@ static bst_status draw_inset(bst_ctx *ctx, bst_picture *p, const bst_quicklook_f
     bool inside = target_is_inside(f);
     double x = inside ? f->target_x_px : f->boresight_x_px;
     double y = inside ? f->target_y_px : f->boresight_y_px;
-    int side = INSET < panel->box.height / 2 ? INSET : panel->box.height / 2;
+    int shorter = panel->box.width < panel->box.height ? panel->box.width : panel->box.height;
+    int side = INSET < shorter / 2 ? INSET : shorter / 2;
     if (side < 40 || !isfinite(x) || !isfinite(y)) {
         return BST_OK;
     }

@@ -134,6 +134,15 @@ static void test_quicklook(void **state) {
     frames[0].width = 1;
     frames[0].height = 3;
     bst_assert_ok(&ctx, bst_quicklook_write(&ctx, path, NULL, &frames[0], NULL));
+    /* a slit: its panel is narrower than the inset's usual side */
+    const int slit[2] = {64, 1024};
+    for (int i = 0; i < 2; i++) {
+        frames[0].width = slit[i];
+        frames[0].height = slit[1 - i];
+        frames[0].boresight_x_px = 0.5 * (frames[0].width - 1);
+        frames[0].boresight_y_px = 0.5 * (frames[0].height - 1);
+        bst_assert_ok(&ctx, bst_quicklook_write(&ctx, path, NULL, &frames[0], NULL));
+    }
     frames[0].width = 0;
     assert_int_equal(bst_quicklook_write(&ctx, path, NULL, &frames[0], NULL), BST_ERR_ARGUMENT);
     free(pixels[0]);
