@@ -12,6 +12,7 @@
 
 typedef struct lengths {
     double total_s, flat_after_s;
+    const char *telemetry_hz; /* NULL: as in the scenario */
 } lengths;
 
 typedef struct observed {
@@ -92,6 +93,10 @@ static void test_long_run(void **state) {
     bst_assert_ok(&ctx, bst_json_load(&ctx, SCENARIO, &json));
     bst_assert_ok(&ctx, bst_json_set(&ctx, json, "/world/star_catalogue=embedded"));
     bst_assert_ok(&ctx, bst_json_set(&ctx, json, set));
+    if (length->telemetry_hz) {
+        snprintf(set, sizeof set, "/record/telemetry_hz=%s", length->telemetry_hz);
+        bst_assert_ok(&ctx, bst_json_set(&ctx, json, set));
+    }
     bst_assert_ok(&ctx, bst_scenario_read(&ctx, json, bst_app_registry(), &scenario));
     const bst_simulation_options options = {NULL, 1};
     bst_simulation *sim = NULL;
@@ -140,11 +145,11 @@ static void test_long_run(void **state) {
 }
 
 int main(int argc, char **argv) {
-    if (argc != 3) {
-        fprintf(stderr, "usage: %s SECONDS FLAT_AFTER_SECONDS\n", argv[0]);
+    if (argc != 3 && argc != 4) {
+        fprintf(stderr, "usage: %s SECONDS FLAT_AFTER_SECONDS [TELEMETRY_HZ]\n", argv[0]);
         return 2;
     }
-    lengths length = {atof(argv[1]), atof(argv[2])};
+    lengths length = {atof(argv[1]), atof(argv[2]), argc == 4 ? argv[3] : NULL};
     const struct CMUnitTest tests[] = {cmocka_unit_test_prestate(test_long_run, &length)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -163,7 +163,8 @@ class Seeds(unittest.TestCase):
     def setUpClass(cls):
         play.folder = runs.scratch()
         cls.cases = options.cases.split(",")
-        jobs = [(case, seed) for case in cls.cases for seed in seeds_of(case)]
+        jobs = sorted(((case, seed) for case in cls.cases for seed in seeds_of(case)),
+                      key=lambda job: job[1])
         cls.outcomes = runs.parallel(play, jobs)
 
     def of(self, case):

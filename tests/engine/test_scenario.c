@@ -13,6 +13,9 @@ typedef struct gadget {
     double vector[3];
     char note[16];
     bst_config_list parts;
+    struct {
+        char file[512];
+    } map;
 } gadget;
 
 typedef struct part {
@@ -21,12 +24,20 @@ typedef struct part {
 
 static const bst_config_desc part_table[] = {
     BST_REAL(part, weight, "kg", 0, 10, "1", "Weight of the part."), BST_CONFIG_END};
+static const bst_config_desc map_table[] = {{.key = "file",
+                                             .type = BST_CONFIG_PATH,
+                                             .unit = "",
+                                             .fallback = "\"\"",
+                                             .doc = "A map.",
+                                             .size = 512},
+                                            BST_CONFIG_END};
 static const bst_config_desc gadget_table[] = {
     BST_REAL(gadget, gain_px, "px", 0, 1, "0.1", "Gain."),
     BST_INT(gadget, size, "", 1, 100, NULL, "Size."),
     BST_REALS(gadget, vector, "", -1, 1, "[0, 0, 0.3]", "A vector."),
     BST_STRING(gadget, note, "\"none\"", "A note."),
     BST_LIST(gadget, parts, part, part_table, 0, 4, "[]", "Parts."),
+    BST_OBJECT(gadget, map, map_table, "{}", "A map."),
     BST_CONFIG_END};
 
 static const bst_port gimbal_ports[] = {
@@ -236,6 +247,20 @@ static void paths_are_made_absolute(void **state) {
     assert_string_equal(s.world.star_catalogue, "default"); /* words stay words */
     assert_string_equal(s.world.earth_orientation, "builtin");
     bst_scenario_free(&s);
+    /* a module's files too; those have to be there */
+    bst_assert_ok(
+        &ctx, read_named(&ctx, "scenarios/x.json",
+                         SCENARIO(GIMBAL "\"map\": {\"file\": \"catalogue_2022-06.tle\"}}"), &s));
+    const gadget *config = s.modules[0].config;
+    assert_string_equal(config->map.file, expected);
+    cJSON *echo = bst_scenario_echo(&s);
+    char *text = cJSON_PrintUnformatted(echo);
+    assert_non_null(strstr(text, expected));
+    cJSON_free(text);
+    cJSON_Delete(echo);
+    bst_scenario_free(&s);
+    refuse(SCENARIO(GIMBAL "\"map\": {\"file\": \"maps/dark.fits\"}}"),
+           PATH "/map/file: there is no file scenarios/maps/dark.fits");
     /* a file that is not there is left to those who open it */
     bst_assert_ok(&ctx, read_named(&ctx, "x.json", SCENARIO(""), &s));
     o = s.observers.items;

@@ -1,0 +1,172 @@
+/* The adapter between channels and image processing, in the real engine. */
+#include "tests/imgproc/module_support.h"
+
+static const double PIXEL_RAD = 12.0 * BST_ARCSEC_RAD; /* of the sensor in onboard.h */
+
+/* An engine with telemetry from the given ticks on, one exposure of the catalogue's stars, frames
+ * every `period` ticks. */
+static void begin(bench *b, int64_t first_frame, int64_t period, bool predictions,
+                  int64_t first_pointing, int64_t first_nav) {
+    bench_draw_stars(b);
+    synthetic_expose(&b->s, bst_rng_make_key(5, 0, "test", "module"), 1);
+    bst_assert_ok(&b->o.ctx, bench_configure(b, "{}"));
+    onboard_add_telemetry(&b->o, first_pointing, first_nav);
+    bst_assert_ok(&b->o.ctx, bench_load(b, first_frame, period, predictions));
+}
+
+static double angle(bst_quat a, bst_quat b) {
+    return bst_vec3_norm(bst_quat_to_rotvec(bst_quat_mul(a, bst_quat_conj(b))));
+}
+
+/* Every detection that names a star lies where that star was drawn. */
+static int stars_right(const bench *b, const bst_detections *d) {
+    int named = 0;
+    for (int i = 0; i < d->count; i++) {
+        for (int k = 0; d->items[i].star_id != 0 && k < b->o.star_count; k++) {
+            if (b->o.stars[k].id == d->items[i].star_id) {
+                /* the faintest that is found has SNR 5: 1.2 px / 5, four sigma */
+                bst_assert_close(d->items[i].x_px, b->o.stars[k].x_px, 1.0);
+                bst_assert_close(d->items[i].y_px, b->o.stars[k].y_px, 1.0);
+                named++;
+            }
+        }
+    }
+    return named;
+}
+
+static void one_message_per_frame(void **state) {
+    (void)state;
+    bench b;
+    bench_init(&b);
+    begin(&b, 1000, 1000, false, 0, 0);
+    bst_assert_ok(&b.o.ctx, bst_engine_run(&b.o.ctx, b.o.engine, 4000));
+    assert_int_equal(b.count, 3);
+    for (int i = 0; i < 3; i++) {
+        const bst_detections *d = b.kept[i];
+        assert_int_equal(b.kept_at[i], 1000 * (i + 1)); /* the frame's own tick */
+        assert_int_equal(d->exposure_id, i);
+        assert_int_equal(d->start_tick, 1000 * (i + 1) - BENCH_EXPOSURE);
+        assert_int_equal(d->end_tick, 1000 * (i + 1));
+        assert_true(d->stars_identified >= 15);
+        assert_int_equal(stars_right(&b, d), d->stars_identified);
+        /* nobody predicts: the attitude is telemetry's, which is constant (rounding) */
+        assert_true(angle(d->q_cam_from_gcrf, b.o.q_telemetry) < 1e-14);
+        assert_true(angle(d->q_telemetry_from_gcrf, b.o.q_telemetry) < 1e-14);
+    }
+    assert_int_equal(b.recycled, 0); /* the test's own reference */
+    assert_int_equal(b.frame.references, 1);
+    assert_int_equal(b.frame.maps, 0);
+    assert_int_equal(fake_counter(b.o.engine, "frame_without_stars"), 0);
+    bench_free(&b);
+}
+
+static void all_waiting_frames_are_taken_in_order(void **state) {
+    (void)state;
+    bench b;
+    bench_init(&b);
+    b.camera.value = 3;
+    begin(&b, 2000, 2000, false, 0, 0);
+    bst_assert_ok(&b.o.ctx, bst_engine_run(&b.o.ctx, b.o.engine, 4001));
+    assert_int_equal(b.count, 6);
+    for (int i = 0; i < 6; i++) {
+        assert_int_equal(b.kept_at[i], i < 3 ? 2000 : 4000);
+        assert_int_equal(b.kept[i]->exposure_id, i);
+        assert_int_equal(b.kept[i]->end_tick, (i < 3 ? 2000 : 4000) - (2 - i % 3) * BENCH_EXPOSURE);
+    }
+    assert_int_equal(b.frame.references, 1);
+    assert_int_equal(fake_counter(b.o.engine, "queue_overflow"), 0);
+    bench_free(&b);
+}
+
+/* Sources are found and reported, but nothing is identified or called an object. */
+static void expect_unidentified(const bst_detections *d) {
+    assert_int_equal(d->stars_identified, 0);
+    assert_true(d->count >= 15);
+    for (int i = 0; i < d->count; i++) {
+        assert_int_equal(d->items[i].star_id, 0);
+        assert_true(d->items[i].label == BST_LABEL_UNKNOWN ||
+                    d->items[i].label == BST_LABEL_ARTEFACT);
+    }
+}
+
+static void missing_telemetry(void **state) {
+    (void)state;
+    /* frames at 1, 2 and 3 s; pointing from 1.5 s, navigation from 2.5 s on */
+    bench b;
+    bench_init(&b);
+    begin(&b, 1000, 1000, false, 1500, 2500);
+    bst_assert_ok(&b.o.ctx, bst_engine_run(&b.o.ctx, b.o.engine, 3001));
+    assert_int_equal(b.count, 3);
+    expect_unidentified(b.kept[0]);
+    assert_true(angle(b.kept[0]->q_telemetry_from_gcrf, BST_QUAT_IDENTITY) < 1e-14);
+    expect_unidentified(b.kept[1]);
+    assert_true(angle(b.kept[1]->q_telemetry_from_gcrf, b.o.q_telemetry) < 1e-14);
+    assert_true(b.kept[2]->stars_identified >= 15);
+    assert_int_equal(fake_counter(b.o.engine, "frame_without_stars"), 2);
+    bench_free(&b);
+}
+
+/* Telemetry that ended is used up to its greatest age: 10 s of pointing, 60 s of navigation. */
+static void stale_telemetry(void **state) {
+    (void)state;
+    for (int which = 0; which < 2; which++) {
+        bench b;
+        bench_init(&b);
+        int64_t limit = which == 0 ? 10000 : 60000, last = 1000;
+        (which == 0 ? &b.o.pointing : &b.o.navigation)->value = last;
+        begin(&b, last + limit, 1, false, 0, 0);
+        bst_assert_ok(&b.o.ctx, bst_engine_run(&b.o.ctx, b.o.engine, last + limit + 2));
+        assert_int_equal(b.count, 2);
+        assert_true(b.kept[0]->stars_identified >= 15);
+        expect_unidentified(b.kept[1]);
+        assert_int_equal(fake_counter(b.o.engine, "stale_input"), 1);
+        bench_free(&b);
+    }
+}
+
+/* Telemetry that is wrong by 100 px, beyond the search radius: no star is found without the
+ * tracker's estimate of the error, all with it, and the attitude is telemetry's turned by it,
+ * carried to mid-exposure by its rate. */
+static void predicted_error_is_applied(void **state) {
+    (void)state;
+    const bst_vec3 error = {-60.0 * PIXEL_RAD, 80.0 * PIXEL_RAD, 1e-4};
+    const bst_vec3 rate = {3.0 * PIXEL_RAD, -2.0 * PIXEL_RAD, 1e-5};
+    enum { WITHOUT, VALID, INVALID, CASES };
+    for (int which = 0; which < CASES; which++) {
+        bench b;
+        bench_init(&b);
+        onboard_set_error(&b.o, error);
+        /* predicted for tick 0: at mid-exposure, 1.75 s, it is the error */
+        b.predictions.attitude_valid = which == VALID;
+        b.predictions.attitude_error_cam_rad = bst_vec3_axpy(error, -1.75, rate);
+        b.predictions.attitude_error_rate_cam_radps = rate;
+        begin(&b, 2000, 29000, which != WITHOUT, 0, 0);
+        bst_assert_ok(&b.o.ctx, bst_engine_run(&b.o.ctx, b.o.engine, 31001));
+        assert_int_equal(b.count, 2);
+        assert_true(angle(b.kept[0]->q_telemetry_from_gcrf, b.o.q_telemetry) < 1e-14);
+        if (which == VALID) {
+            /* rounding; the error is 6e-3 rad */
+            assert_true(angle(b.kept[0]->q_cam_from_gcrf, b.o.q_true) < 1e-14);
+            assert_true(b.kept[0]->stars_identified >= 15);
+            assert_int_equal(stars_right(&b, b.kept[0]), b.kept[0]->stars_identified);
+        } else {
+            assert_true(angle(b.kept[0]->q_cam_from_gcrf, b.o.q_telemetry) < 1e-14);
+            assert_int_equal(b.kept[0]->stars_identified, 0);
+        }
+        /* predictions of 31 s ago are too old */
+        assert_true(angle(b.kept[1]->q_cam_from_gcrf, b.o.q_telemetry) < 1e-14);
+        assert_int_equal(b.kept[1]->stars_identified, 0);
+        bench_free(&b);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(one_message_per_frame),
+        cmocka_unit_test(all_waiting_frames_are_taken_in_order),
+        cmocka_unit_test(missing_telemetry),
+        cmocka_unit_test(stale_telemetry),
+        cmocka_unit_test(predicted_error_is_applied),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

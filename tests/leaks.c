@@ -1,0 +1,9 @@
+/* What the leak sanitizer is to overlook: what the OpenCL compiler keeps until the program ends.
+ * Linked into every test of a sanitized build. */
+const char *__lsan_default_suppressions(void);
+
+const char *__lsan_default_suppressions(void) {
+    return "leak:libpocl.so\n"
+           "leak:libLLVM\n"
+           "leak:libclang-cpp\n";
+}
