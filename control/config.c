@@ -34,8 +34,9 @@ const bst_config_desc bst_control_config_table[] = {
     BST_REAL(C, search_max_deg, "deg", 0, 90, "2", "The search never reaches farther than this."),
     BST_REAL(C, search_step, "", 0.05, 1, "0.85",
              "Distance of neighbouring search fields, as a fraction of the field of view."),
-    BST_INT(C, dwell_frames, "frames", 1, 10000, "3",
-            "Frames exposed wholly at rest at each place of the search."),
+    BST_INT(C, dwell_frames, "frames", 1, 10000, "4",
+            "Frames exposed wholly at rest at each place of the search. Two of them must show the "
+            "target, which three do not surely do near the detection limit."),
     BST_REAL(C, dwell_timeout_s, "s", 0.001, 1e6, "15",
              "The search goes on after this time when frames fail to come."),
     BST_INT(C, candidate_hits, "frames", 1, 1000, "2",

@@ -195,8 +195,8 @@ static bst_status check_out(bst_ctx *ctx, const bst_run *run) {
     }
     if (!run->overwrite) {
         return bst_fail(ctx, BST_ERR_IO,
-                        "%s: exists already; choose another output folder, remove it, or ask to "
-                        "overwrite it",
+                        "%s: exists already; choose another output folder, remove it, or overwrite "
+                        "it (--overwrite)",
                         run->out);
     }
     if (!S_ISDIR(info.st_mode) || !looks_like_run(run->out)) {

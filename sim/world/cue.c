@@ -39,6 +39,12 @@ bst_status bst_cue_resolve(bst_ctx *ctx, const char *scenario, bst_world *world,
      * is wrong. */
     const double *x = s->config.x_axis_gcrf;
     bst_vec3 hint = {x[0], x[1], x[2]};
+    if (!(bst_vec3_norm(hint) > 0.0)) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "%s: /observers/%d/sensors/%d/x_axis_gcrf: a direction of length zero "
+                        "(found [0, 0, 0]; allowed: any other)",
+                        scenario, observer, sensor);
+    }
     bst_quat gcrf_from_cam = bst_quat_conj(bst_quat_look(nominal, hint));
     static const double axes[4][3] = {
         {0, 1, 0}, {0, -1, 0}, {-1, 0, 0}, {1, 0, 0}}; /* x, -x, y, -y */

@@ -35,6 +35,7 @@ static void rig_open(rig *r, bst_control_config *config_or_null, bool cue_valid)
     bst_control_config config;
     bst_assert_ok(&r->ctx, bst_config_defaults(&r->ctx, bst_control_config_table, &config));
     config.exposure_s = 0.5;
+    config.dwell_frames = 3; /* what the steps of these tests count on */
     if (config_or_null) {
         config = *config_or_null;
     }
