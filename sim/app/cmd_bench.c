@@ -11,6 +11,7 @@
 
 #include "sim/app/app.h"
 #include "sim/app/bench.h"
+#include "sim/app/json_number.h"
 #include "sim/app/options.h"
 #include "sim/app/version.h"
 #include "sim/device/device.h"
@@ -72,26 +73,18 @@ static double peak_rss_mib(void) {
     return (double)usage.ru_maxrss / 1024.0;
 }
 
-static void add_number(cJSON *node, const char *key, double value) {
-    if (isfinite(value)) {
-        cJSON_AddNumberToObject(node, key, value);
-    } else {
-        cJSON_AddNullToObject(node, key);
-    }
-}
-
 static void add_result(cJSON *list, const bst_bench_result *r, const char *device, int threads) {
     cJSON *node = cJSON_CreateObject();
     cJSON_AddStringToObject(node, "name", r->name);
-    add_number(node, "frames_per_s", r->frames_per_s);
-    add_number(node, "ms_median", r->ms_median);
-    add_number(node, "ms_min", r->ms_min);
-    add_number(node, "cpu_ms", r->cpu_ms);
-    add_number(node, "error_sigma_max", r->error_sigma_max);
-    add_number(node, "error_sigma_rms", r->error_sigma_rms);
-    add_number(node, "flux_error_rel", r->flux_error_rel);
+    bst_json_add_number(node, "frames_per_s", r->frames_per_s);
+    bst_json_add_number(node, "ms_median", r->ms_median);
+    bst_json_add_number(node, "ms_min", r->ms_min);
+    bst_json_add_number(node, "cpu_ms", r->cpu_ms);
+    bst_json_add_number(node, "error_sigma_max", r->error_sigma_max);
+    bst_json_add_number(node, "error_sigma_rms", r->error_sigma_rms);
+    bst_json_add_number(node, "flux_error_rel", r->flux_error_rel);
     cJSON_AddNumberToObject(node, "error_sources", r->error_sources);
-    add_number(node, "peak_rss_mib", r->peak_rss_mib);
+    bst_json_add_number(node, "peak_rss_mib", r->peak_rss_mib);
     cJSON_AddStringToObject(node, "device", device);
     cJSON_AddNumberToObject(node, "threads", threads);
     cJSON_AddItemToArray(list, node);

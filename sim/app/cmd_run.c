@@ -4,15 +4,16 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <cjson/cJSON.h>
 
 #include "sim/app/app.h"
+#include "sim/app/json_number.h"
 #include "sim/app/load.h"
 #include "sim/app/run_pictures.h"
 #include "sim/app/version.h"
+#include "sim/core/wall_clock.h"
 #include "sim/device/device.h"
 #include "sim/engine/recorder.h"
 #include "sim/engine/simulation.h"
@@ -43,12 +44,6 @@ typedef struct run_state {
     bool progress;
     double started, shown; /* wall seconds */
 } run_state;
-
-static double wall_seconds(void) {
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
 
 static bst_status on_message(void *user, const char *scope, const char *channel,
                              const void *payload, int64_t tick) {
@@ -89,7 +84,7 @@ static void on_judged(void *user, const bst_loop_frame *frame) {
 }
 
 static void show_progress(run_state *run, int64_t tick, bool last) {
-    double now = wall_seconds();
+    double now = bst_wall_seconds();
     if (!run->progress || (!last && now - run->shown < 0.2)) {
         return;
     }
@@ -125,25 +120,17 @@ static bool interrupted(void *user, int64_t tick) {
     return stop_requested != 0;
 }
 
-static void add_number(cJSON *node, const char *key, double value) {
-    if (isfinite(value)) {
-        cJSON_AddNumberToObject(node, key, value);
-    } else {
-        cJSON_AddNullToObject(node, key);
-    }
-}
-
 static cJSON *summary_json(const bst_loop_figures *f, double real_time_factor) {
     cJSON *node = cJSON_CreateObject();
     cJSON_AddNumberToObject(node, "frames", (double)f->frames);
     cJSON_AddStringToObject(node, "final_mode", bst_mode_name(f->final_mode));
-    add_number(node, "time_to_confirm_s", f->time_to_confirm_s);
-    add_number(node, "track_fraction", f->track_fraction);
-    add_number(node, "pointing_rms_px", f->pointing_rms_px);
-    add_number(node, "pointing_p99_px", f->pointing_p99_px);
-    add_number(node, "real_time_factor", real_time_factor);
-    add_number(node, "time_to_settle_s", f->time_to_settle_s);
-    add_number(node, "pointing_bias_px", f->pointing_bias_px);
+    bst_json_add_number(node, "time_to_confirm_s", f->time_to_confirm_s);
+    bst_json_add_number(node, "track_fraction", f->track_fraction);
+    bst_json_add_number(node, "pointing_rms_px", f->pointing_rms_px);
+    bst_json_add_number(node, "pointing_p99_px", f->pointing_p99_px);
+    bst_json_add_number(node, "real_time_factor", real_time_factor);
+    bst_json_add_number(node, "time_to_settle_s", f->time_to_settle_s);
+    bst_json_add_number(node, "pointing_bias_px", f->pointing_bias_px);
     cJSON_AddNumberToObject(node, "wrong_target_frames", (double)f->wrong_target_frames);
     return node;
 }
@@ -332,9 +319,9 @@ static bst_status execute(run_state *run, bst_simulation *sim, const char *out, 
     if (status == BST_OK) {
         const bst_engine_hooks hooks = {run, on_message, on_event, interrupted};
         bst_engine_set_hooks(bst_simulation_engine(sim), &hooks);
-        run->started = wall_seconds();
+        run->started = bst_wall_seconds();
         status = bst_engine_run(ctx, bst_simulation_engine(sim), run->scenario->duration_ticks);
-        wall = wall_seconds() - run->started;
+        wall = bst_wall_seconds() - run->started;
         stepped = true;
         for (int i = 0; i < run->sensor_count; i++) {
             bst_loop_summary_finish(run->sensors[i].summary);

@@ -1,10 +1,10 @@
 /* boresight stars fetch | import | info */
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "sim/app/cmd_stars.h"
+#include "sim/core/wall_clock.h"
 #include "sim/world/star_fetch.h"
 #include "sim/world/star_import.h"
 #include "sim/world/stars.h"
@@ -45,12 +45,6 @@ static int failed(const bst_ctx *ctx) {
     return EXIT_FAILED;
 }
 
-static double now_s(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 typedef struct progress_line {
     const char *what; /* the stage on show; NULL before the first */
     double started_s, shown_s;
@@ -60,7 +54,7 @@ typedef struct progress_line {
 /* One line on the terminal, rewritten up to five times a second: stage, share, rate, time left. */
 static void show_progress(void *user, const char *what, long long done, long long total) {
     progress_line *line = user;
-    double now = now_s();
+    double now = bst_wall_seconds();
     if (!line->on_terminal) {
         return;
     }

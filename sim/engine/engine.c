@@ -3,8 +3,8 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
+#include "sim/core/wall_clock.h"
 #include "sim/engine/engine_internal.h"
 
 bst_status bst_engine_create(bst_ctx *ctx, int64_t tick_rate_hz, bst_engine **out) {
@@ -178,17 +178,11 @@ static bst_status step_instance(bst_ctx *ctx, bst_engine *engine, int index, int
     return BST_OK;
 }
 
-static double wall_seconds(void) {
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
 bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) {
     if (!engine->loaded) {
         return bst_fail(ctx, BST_ERR_STATE, "the engine is not loaded");
     }
-    double asked = wall_seconds();
+    double asked = bst_wall_seconds();
     int since_clock = 0;
     while (engine->instance_count > 0) {
         int64_t tick = engine->due[engine->heap[0]];
@@ -205,7 +199,7 @@ bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) 
          * may be long */
         if (engine->hooks.interrupted && (++since_clock >= 256 || stepped > 1)) {
             since_clock = 0;
-            double now = wall_seconds();
+            double now = bst_wall_seconds();
             if (now - asked > 0.02) {
                 asked = now;
                 if (engine->hooks.interrupted(engine->hooks.user, tick)) {
