@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "sim/world/star_index.h"
+#include "sim/world/world_internal.h"
 
 /* Defined in stars_embedded.S. */
 extern const unsigned char bst_stars_embedded_begin[];
@@ -139,6 +140,10 @@ void bst_stars_get_info(const bst_stars *stars, bst_stars_info *out) {
     out->count = (long long)h->star_count;
     out->complete_to_v_mag = h->complete_to_v_mag;
     out->patches = (int)h->patch_count;
+}
+
+const bst_star_view *bst_stars_records(const bst_stars *stars) {
+    return &stars->view;
 }
 
 void bst_stars_patch(const bst_stars *stars, int index, bst_vec3 *centre, double *radius_rad,
