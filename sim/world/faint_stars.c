@@ -24,6 +24,7 @@ struct bst_faint_stars {
     const bst_faint_sky *sky;
     slot *slots;
     int slot_count, slot_capacity;
+    int empty_slots; /* slots without a cell */
     int32_t *slot_of_cell; /* -1: not in the cache */
     int64_t query;
     int64_t stars_held, stars_limit;
@@ -168,7 +169,7 @@ static bst_status draw_cell(bst_ctx *ctx, const bst_faint_sky *sky, int band, ui
 
 /* A slot without a cell, else a new one; -1 when there is no memory. */
 static int empty_slot(bst_faint_stars *f) {
-    for (int i = 0; i < f->slot_count; i++) {
+    for (int i = 0; f->empty_slots > 0 && i < f->slot_count; i++) {
         if (f->slots[i].cell == NO_CELL) {
             return i;
         }
@@ -183,6 +184,7 @@ static int empty_slot(bst_faint_stars *f) {
         f->slot_capacity = capacity;
     }
     f->slots[f->slot_count] = (slot){.cell = NO_CELL};
+    f->empty_slots++;
     return f->slot_count++;
 }
 
@@ -204,6 +206,7 @@ static void make_room(bst_faint_stars *f) {
         f->slot_of_cell[oldest->cell] = -1;
         f->stars_held -= oldest->count;
         oldest->cell = NO_CELL;
+        f->empty_slots++;
         oldest->bins = oldest->count = 0;
         if (!keep_memory) {
             free(oldest->stars);
@@ -224,6 +227,7 @@ static bst_status find_slot(bst_ctx *ctx, bst_faint_stars *f, uint32_t cell, slo
         }
         f->slot_of_cell[cell] = index;
         f->slots[index].cell = cell;
+        f->empty_slots--;
     }
     *out = &f->slots[index];
     (*out)->used = f->query;
