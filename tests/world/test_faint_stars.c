@@ -297,7 +297,7 @@ static void deeper_limits_only_add_stars(void **state) {
     sky c = open_sky("embedded", 1);
     look(&c, at, 0.03, 17.5);
     int same_places = 0;
-    for (int i = 0; i < c.count; i++) {
+    for (int i = 0; i < c.count && i < 100; i++) {
         for (int k = 0; k < b.count; k++) {
             same_places += bst_vec3_dot(c.stars[i].icrs, b.stars[k].icrs) > 1 - 1e-17;
         }
