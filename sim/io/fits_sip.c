@@ -7,7 +7,7 @@
 
 static void put_polynomial(fitsfile *file, const char *name, const double *c, int lowest, int order,
                            int *code) {
-    char key[16];
+    char key[48];
     snprintf(key, sizeof key, "%s_ORDER", name);
     fits_write_key_lng(file, key, order, "order of the polynomial", code);
     for (int n = lowest; n <= order; n++) {
