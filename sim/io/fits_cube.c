@@ -218,6 +218,9 @@ bst_status bst_fits_cube_finish(bst_ctx *ctx, bst_fits *fits) {
     fits_open_diskfile(&fits->file, fits->path, READWRITE, &code);
     if (code == 0) {
         make_table(fits->file, cube->planes, &code);
+        if (bst_camera_distorted(&fits->names.camera)) {
+            bst_fits_sip_columns(fits->file, &code);
+        }
     }
     for (int64_t k = 0; code == 0 && k < cube->planes; k++) {
         bst_fits_frame frame;
@@ -226,6 +229,10 @@ bst_status bst_fits_cube_finish(bst_ctx *ctx, bst_fits *fits) {
             return bst_fits_fail_errno(ctx, fits, "cannot read the table's file");
         }
         put_row(fits->file, k + 1, &frame, &code);
+        if (bst_camera_distorted(&fits->names.camera)) {
+            bst_wcs wcs = bst_wcs_window(&frame.wcs, frame.window, frame.binning);
+            bst_fits_sip_row(fits->file, k + 1, &wcs.sip, &code);
+        }
     }
     return bst_fits_check(ctx, fits, code, "cannot be completed");
 }
