@@ -12,7 +12,7 @@
 #include "sim/app/app.h"
 #include "sim/app/bench.h"
 #include "sim/app/json_number.h"
-#include "sim/app/options.h"
+#include "sim/app/load.h"
 #include "sim/app/version.h"
 #include "sim/device/device.h"
 #include "sim/io/manifest.h"
@@ -215,18 +215,7 @@ int bst_cmd_bench(int argc, char **argv) {
          .target = &json,
          .argument = "FILE",
          .doc = "write the results there"},
-        {.name = "device",
-         .kind = BST_OPTION_TEXT,
-         .target = &options.device,
-         .argument = "NAME",
-         .doc = "OpenCL device (default PoCL)"},
-        {.name = "threads",
-         .kind = BST_OPTION_INT,
-         .target = &threads,
-         .argument = "N",
-         .doc = "threads for the OpenCL device (default all)",
-         .minimum = 1,
-         .maximum = 1024},
+        BST_DEVICE_OPTIONS(options.device, threads),
         {.name = "tle",
          .kind = BST_OPTION_TEXT,
          .target = &options.tle_file,

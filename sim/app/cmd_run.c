@@ -392,18 +392,7 @@ int bst_cmd_run(int argc, char **argv) {
          .target = &overwrite,
          .doc = "replace an earlier run there"},
         BST_LOAD_OPTIONS(load),
-        {.name = "device",
-         .kind = BST_OPTION_TEXT,
-         .target = &sim_options.device,
-         .argument = "NAME",
-         .doc = "OpenCL device: part of its name, or PLATFORM:DEVICE by number (default PoCL)"},
-        {.name = "threads",
-         .kind = BST_OPTION_INT,
-         .target = &threads,
-         .argument = "N",
-         .doc = "threads for the OpenCL device (default all)",
-         .minimum = 1,
-         .maximum = 1024},
+        BST_DEVICE_OPTIONS(sim_options.device, threads),
         {.name = "quiet", .kind = BST_OPTION_FLAG, .target = &quiet, .doc = "no progress line"},
         {.name = "help", .kind = BST_OPTION_FLAG, .target = &help, .doc = "print this"},
         {.name = NULL},
@@ -424,6 +413,9 @@ int bst_cmd_run(int argc, char **argv) {
         return bst_options_misuse(&ctx, "run");
     }
     sim_options.threads = (int)threads;
+    if (bst_load_check(&ctx, &load) != BST_OK) {
+        return bst_options_misuse(&ctx, "run");
+    }
     bst_json *json = NULL;
     bst_scenario scenario;
     if (bst_load_scenario(&ctx, argv[1], &load, &json, &scenario) != BST_OK) {

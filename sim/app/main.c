@@ -12,6 +12,7 @@ typedef struct command {
 
 static const command commands[] = {
     {"run", bst_cmd_run, "run a scenario"},
+    {"info", bst_cmd_info, "what the folder of a run holds"},
     {"check", bst_cmd_check, "validate a scenario and print it with every default written out"},
     {"schema", bst_cmd_schema, "print the JSON Schema of scenarios"},
     {"stars", bst_cmd_stars, "get, import or describe the star catalogue"},
