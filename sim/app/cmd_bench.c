@@ -13,7 +13,7 @@
 #include "sim/app/bench.h"
 #include "sim/app/json_number.h"
 #include "sim/app/load.h"
-#include "sim/app/version.h"
+#include "sim/core/version.h"
 #include "sim/device/device.h"
 #include "sim/io/manifest.h"
 
@@ -113,8 +113,8 @@ static cJSON *machine(void) {
     }
     cJSON_AddStringToObject(node, "processor", model);
     cJSON_AddNumberToObject(node, "processors", (double)sysconf(_SC_NPROCESSORS_ONLN));
-    cJSON_AddStringToObject(node, "version", BST_VERSION);
-    cJSON_AddStringToObject(node, "git_revision", BST_GIT_REVISION);
+    cJSON_AddStringToObject(node, "version", bst_version());
+    cJSON_AddStringToObject(node, "git_revision", bst_git_revision());
     return node;
 }
 

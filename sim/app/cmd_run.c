@@ -12,7 +12,7 @@
 #include "sim/app/json_number.h"
 #include "sim/app/load.h"
 #include "sim/app/run_pictures.h"
-#include "sim/app/version.h"
+#include "sim/core/version.h"
 #include "sim/core/wall_clock.h"
 #include "sim/device/device.h"
 #include "sim/engine/recorder.h"
@@ -141,8 +141,8 @@ static bst_status write_manifest(const run_state *run, bst_simulation *sim, cons
     cJSON *root = cJSON_CreateObject();
     char text[64];
     cJSON_AddStringToObject(root, "program", "boresight");
-    cJSON_AddStringToObject(root, "version", BST_VERSION);
-    cJSON_AddStringToObject(root, "git_revision", BST_GIT_REVISION);
+    cJSON_AddStringToObject(root, "version", bst_version());
+    cJSON_AddStringToObject(root, "git_revision", bst_git_revision());
     cJSON_AddStringToObject(root, "scenario", scenario->name);
     cJSON_AddStringToObject(root, "scenario_file", scenario->file);
     cJSON_AddStringToObject(root, "epoch_utc", scenario->epoch_utc);
@@ -278,9 +278,11 @@ static bst_status open_recorder(run_state *run, bst_run *store) {
                 .has_truth = has_module(scenario, i, s, "scenegen")};
         }
     }
+    char program[64];
+    snprintf(program, sizeof program, "boresight %s", bst_version());
     bst_recorder_info info = {.epoch = scenario->epoch,
                               .tick_rate_hz = scenario->tick_rate_hz,
-                              .program = "boresight " BST_VERSION,
+                              .program = program,
                               .sensors = list,
                               .sensor_count = n};
     bst_status status =

@@ -2,7 +2,7 @@
 #include <string.h>
 
 #include "sim/app/app.h"
-#include "sim/app/version.h"
+#include "sim/core/version.h"
 
 typedef struct command {
     const char *name;
@@ -61,7 +61,7 @@ int main(int argc, char **argv) {
         return BST_EXIT_OK;
     }
     if (strcmp(argv[1], "--version") == 0) {
-        printf("boresight %s (%s)\n", BST_VERSION, BST_GIT_REVISION);
+        printf("boresight %s (%s)\n", bst_version(), bst_git_revision());
         return BST_EXIT_OK;
     }
     for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {
