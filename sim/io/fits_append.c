@@ -4,6 +4,7 @@
  * readers (astropy, cfitsio) that what follows the last HDU is not one. */
 #include <errno.h>
 #include <fcntl.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -29,27 +30,78 @@ bool bst_fits_write_at(int fd, const void *data, size_t bytes, long long offset)
     return true;
 }
 
+/* Signed big-endian, as BZERO 32768 wants it: v - 32768 flips the top bit. */
+static void to_fits(uint16_t *restrict out, const uint16_t *restrict in, size_t count) {
+    for (size_t i = 0; i < count; i++) {
+        uint16_t v = (uint16_t)(in[i] ^ 0x8000u);
+        uint8_t *b = (uint8_t *)&out[i];
+        b[0] = (uint8_t)(v >> 8);
+        b[1] = (uint8_t)v;
+    }
+}
+
+bool bst_fits_write_pixels(bst_fits *fits, const uint16_t *pixels, size_t count, long long offset,
+                           long long fill) {
+    static const char zeros[BST_FITS_BLOCK] = {0};
+    bool ok = true;
+    for (size_t done = 0; ok && done < count;) {
+        size_t n = count - done < BST_FITS_BUFFER_PIXELS ? count - done : BST_FITS_BUFFER_PIXELS;
+        to_fits(fits->buffer, pixels + done, n);
+        ok = bst_fits_write_at(fits->file, fits->buffer, n * 2, offset + (long long)done * 2);
+        done += n;
+    }
+    return ok && bst_fits_write_at(fits->file, zeros, (size_t)fill, offset + (long long)count * 2);
+}
+
+/* cfitsio takes the size of its memory for the length of a file, so that memory which is kept has
+ * to carry its size before itself. */
+typedef union memory_head {
+    size_t capacity;
+    max_align_t align;
+} memory_head;
+
+static void *grow_kept(void *bytes, size_t size) {
+    memory_head *head = bytes ? (memory_head *)bytes - 1 : NULL;
+    if (head && size <= head->capacity) {
+        return bytes;
+    }
+    size_t capacity = size + size / 4;
+    head = realloc(head, sizeof *head + capacity);
+    if (!head) {
+        return NULL;
+    }
+    head->capacity = capacity;
+    return head + 1;
+}
+
+void bst_fits_memory_free(bst_fits_memory *memory) {
+    if (memory->bytes) {
+        free((memory_head *)memory->bytes - 1);
+    }
+}
+
 void bst_fits_memory_open(bst_fits_memory *memory, bool primary, int *code) {
     if (!memory->bytes && *code == 0) {
-        memory->capacity = BST_FITS_BLOCK;
-        memory->bytes = malloc(memory->capacity);
+        memory->bytes = grow_kept(NULL, BST_FITS_BLOCK);
         if (!memory->bytes) {
             *code = MEMORY_ALLOCATION;
         }
     }
-    fits_create_memfile(&memory->file, &memory->bytes, &memory->capacity, 64 * BST_FITS_BLOCK,
-                        realloc, code);
+    memory->size = 0;
+    /* it grows by a block: cfitsio 4.2 loses the end of a file that grows by more at a time */
+    fits_create_memfile(&memory->file, &memory->bytes, &memory->size, BST_FITS_BLOCK, grow_kept,
+                        code);
     if (primary) {
         fits_create_img(memory->file, BYTE_IMG, 0, NULL, code);
     }
 }
 
-void bst_fits_memory_hdu(bst_fits_memory *memory, const char **bytes, long long *count, int *code) {
+void bst_fits_memory_hdu(bst_fits_memory *memory, char **bytes, long long *count, int *code) {
     LONGLONG head = 0, data, end = 0;
     fits_flush_file(memory->file, code);
     fits_get_hduaddrll(memory->file, &head, &data, &end, code);
     if (*code == 0) {
-        *bytes = (const char *)memory->bytes + head;
+        *bytes = (char *)memory->bytes + head;
         *count = end - head;
     }
 }
@@ -90,27 +142,44 @@ static long long find_end_card(const char *hdu, long long bytes) {
     return -1;
 }
 
-bst_status bst_fits_append_hdu(bst_ctx *ctx, bst_fits *fits, const char *hdu, long long bytes) {
+/* Appends `bytes` of an HDU and, after them, pixels (NULL: none). */
+static bst_status append(bst_ctx *ctx, bst_fits *fits, const char *hdu, long long bytes,
+                         const uint16_t *pixels, size_t count) {
     long long end_card = find_end_card(hdu, bytes);
     if (end_card < 0 || bytes % BST_FITS_BLOCK != 0) {
         return bst_fail(ctx, BST_ERR_FORMAT, "%s: an HDU without an end", fits->path);
     }
-    long long after = end_card + 3;
+    long long data = (long long)count * 2,
+              fill = (BST_FITS_BLOCK - data % BST_FITS_BLOCK) % BST_FITS_BLOCK;
+    long long whole = bytes + data + fill, after = end_card + 3;
     /* cards begin at multiples of 16 bytes, so that three letters never cross a memory page: the
      * last write is done or not done */
-    if (bst_fits_open_tail(fits, bytes) &&
+    bool ok =
+        bst_fits_open_tail(fits, whole) &&
         bst_fits_write_at(fits->file, hdu, (size_t)end_card, fits->end) &&
         bst_fits_write_at(fits->file, hdu + after, (size_t)(bytes - after), fits->end + after) &&
-        bst_fits_write_at(fits->file, hdu + end_card, 3, fits->end + end_card)) {
-        fits->end += bytes;
+        bst_fits_write_pixels(fits, pixels, count, fits->end + bytes, fill) &&
+        bst_fits_write_at(fits->file, hdu + end_card, 3, fits->end + end_card);
+    if (ok) {
+        fits->end += whole;
         if (bst_fits_close_tail(fits)) {
             return BST_OK;
         }
-        fits->end -= bytes;
+        fits->end -= whole;
     }
     bst_status status = bst_fits_fail_errno(ctx, fits, "cannot be written");
     if (!bst_fits_close_tail(fits)) {
-        bst_log(ctx, BST_LOG_WARNING, "%s: its last %lld bytes are not valid", fits->path, bytes);
+        bst_log(ctx, BST_LOG_WARNING, "%s: what follows the last whole frame is not valid",
+                fits->path);
     }
     return status;
+}
+
+bst_status bst_fits_append_hdu(bst_ctx *ctx, bst_fits *fits, const char *hdu, long long bytes) {
+    return append(ctx, fits, hdu, bytes, NULL, 0);
+}
+
+bst_status bst_fits_append_image(bst_ctx *ctx, bst_fits *fits, const char *header, long long bytes,
+                                 const uint16_t *pixels, size_t count) {
+    return append(ctx, fits, header, bytes, pixels, count);
 }

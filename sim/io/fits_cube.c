@@ -23,15 +23,14 @@ bst_status bst_fits_cube_open(bst_ctx *ctx, bst_fits *fits) {
     if (cube->rows < 0 || unlink(path) != 0) {
         return bst_fits_fail_errno(ctx, fits, "cannot make the table's file");
     }
-    cube->buffer = malloc(BST_FITS_CUBE_BUFFER * sizeof *cube->buffer);
-    return cube->buffer ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
+    return BST_OK;
 }
 
 /* The header of a cube without planes. */
 static bst_status start(bst_ctx *ctx, bst_fits *fits, int width, int height) {
     bst_fits_cube *cube = &fits->cube;
     long size[3] = {width, height, 0};
-    const char *hdu = NULL;
+    char *hdu = NULL;
     long long bytes = 0;
     int code = 0;
     errno = 0;
@@ -39,9 +38,8 @@ static bst_status start(bst_ctx *ctx, bst_fits *fits, int width, int height) {
     fitsfile *file = fits->memory.file;
     fits_create_img(file, USHORT_IMG, 3, size, &code);
     bst_fits_put_run_keys(file, &fits->names, &code);
-    fits_write_comment(file,
-                       "Third axis: frames. Row k of the table FRAMES has plane k's time and WCS.",
-                       &code);
+    fits_write_comment(
+        file, "Third axis: frames. Row k of the table FRAMES has plane k's time and WCS.", &code);
     bst_fits_put_statements(file, &code);
     bst_fits_memory_hdu(&fits->memory, &hdu, &bytes, &code);
     bst_status status = bst_fits_check(ctx, fits, code, "cannot be made");
@@ -56,16 +54,6 @@ static bst_status start(bst_ctx *ctx, bst_fits *fits, int width, int height) {
     cube->height = height;
     cube->data_start = bytes;
     return status;
-}
-
-/* Signed big-endian, as BZERO 32768 wants it: v - 32768 flips the top bit. */
-static void to_fits(uint16_t *restrict out, const uint16_t *restrict in, size_t count) {
-    for (size_t i = 0; i < count; i++) {
-        uint16_t v = (uint16_t)(in[i] ^ 0x8000u);
-        uint8_t *b = (uint8_t *)&out[i];
-        b[0] = (uint8_t)(v >> 8);
-        b[1] = (uint8_t)v;
-    }
 }
 
 static bool write_row(const bst_fits_cube *cube, const bst_fits_frame *frame) {
@@ -85,19 +73,13 @@ bst_status bst_fits_cube_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_fram
                         "frames as extensions when windows change",
                         fits->path, width, height, cube->width, cube->height);
     }
-    static const char zeros[BST_FITS_BLOCK] = {0};
     size_t count = (size_t)width * (size_t)height;
     long long plane = (long long)count * 2;
     long long offset = cube->data_start + cube->planes * plane, after = offset + plane;
-    long long fill = (BST_FITS_BLOCK - (after - cube->data_start) % BST_FITS_BLOCK) % BST_FITS_BLOCK;
-    bool ok = write_row(cube, frame) && bst_fits_open_tail(fits, after + fill - fits->end);
-    for (size_t done = 0; ok && done < count;) {
-        size_t n = count - done < BST_FITS_CUBE_BUFFER ? count - done : BST_FITS_CUBE_BUFFER;
-        to_fits(cube->buffer, pixels + done, n);
-        ok = bst_fits_write_at(fits->file, cube->buffer, n * 2, offset + (long long)done * 2);
-        done += n;
-    }
-    ok = ok && bst_fits_write_at(fits->file, zeros, (size_t)fill, after);
+    long long fill =
+        (BST_FITS_BLOCK - (after - cube->data_start) % BST_FITS_BLOCK) % BST_FITS_BLOCK;
+    bool ok = write_row(cube, frame) && bst_fits_open_tail(fits, after + fill - fits->end) &&
+              bst_fits_write_pixels(fits, pixels, count, offset, fill);
     char value[24];
     snprintf(value, sizeof value, "%20lld", (long long)(cube->planes + 1));
     /* the card lies within one memory page: this write is done or not done */
@@ -189,7 +171,7 @@ bst_status bst_fits_cube_finish(bst_ctx *ctx, bst_fits *fits) {
     if (fits->file < 0) {
         return BST_OK; /* no frame came, or the file could not be made; that was reported */
     }
-    const char *hdu = NULL;
+    char *hdu = NULL;
     long long bytes = 0;
     int code = 0;
     errno = 0;
@@ -207,7 +189,6 @@ bst_status bst_fits_cube_finish(bst_ctx *ctx, bst_fits *fits) {
             put_row(fits->memory.file, k + 1, &frame, &code);
         }
     }
-    fits_write_chksum(fits->memory.file, &code);
     bst_fits_memory_hdu(&fits->memory, &hdu, &bytes, &code);
     if (status == BST_OK) {
         status = bst_fits_check(ctx, fits, code, "cannot be completed");
@@ -223,5 +204,4 @@ void bst_fits_cube_free(bst_fits *fits) {
     if (fits->cube.rows >= 0) {
         close(fits->cube.rows);
     }
-    free(fits->cube.buffer);
 }

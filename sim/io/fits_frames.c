@@ -31,7 +31,7 @@ static void copy_name(char to[BST_FITS_NAME_BYTES], const char *from) {
 
 /* The primary HDU of a file of extensions, or of a cube without planes. */
 static bst_status write_primary(bst_ctx *ctx, bst_fits *fits) {
-    const char *hdu = NULL;
+    char *hdu = NULL;
     long long bytes = 0;
     int code = 0;
     errno = 0;
@@ -53,7 +53,8 @@ static void free_fits(bst_fits *fits) {
     if (fits->file >= 0) {
         close(fits->file);
     }
-    free(fits->memory.bytes);
+    bst_fits_memory_free(&fits->memory);
+    free(fits->buffer);
     free(fits);
 }
 
@@ -68,6 +69,11 @@ bst_status bst_fits_create(bst_ctx *ctx, const char *path, bst_fits_layout layou
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
     }
     fits->file = fits->cube.rows = -1;
+    fits->buffer = malloc(BST_FITS_BUFFER_PIXELS * sizeof *fits->buffer);
+    if (!fits->buffer) {
+        free_fits(fits);
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
+    }
     int n = snprintf(fits->path, sizeof fits->path, "%s", path);
     if (n < 0 || (size_t)n + 16 >= sizeof fits->path) {
         free_fits(fits);
@@ -102,17 +108,34 @@ bst_status bst_fits_create(bst_ctx *ctx, const char *path, bst_fits_layout layou
     return BST_OK;
 }
 
+/* Gives the header of an image without pixels its size; false when the cards are elsewhere. */
+static bool set_size(char *header, int width, int height) {
+    const int size[2] = {width, height};
+    for (int k = 0; k < 2; k++) {
+        /* after XTENSION, BITPIX and NAXIS: FITS 4.0, section 4.4.1.2 */
+        char *card = header + (size_t)(3 + k) * 80, start[11], value[21];
+        snprintf(start, sizeof start, "NAXIS%d  = ", k + 1);
+        if (memcmp(card, start, 10) != 0) {
+            return false;
+        }
+        snprintf(value, sizeof value, "%20d", size[k]);
+        memcpy(card + 10, value, 20);
+    }
+    return true;
+}
+
 bst_status bst_fits_write_extension(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,
-                                    const uint16_t *pixels, int width, int height,
-                                    int64_t number) {
-    long size[2] = {width, height};
-    const char *hdu = NULL;
+                                    const uint16_t *pixels, int width, int height, int64_t number) {
+    bool rice = fits->compression == BST_FITS_RICE;
+    long size[2] = {rice ? width : 0, rice ? height : 0};
+    size_t count = (size_t)width * (size_t)height;
+    char *hdu = NULL;
     long long bytes = 0;
     int code = 0;
     errno = 0;
     bst_fits_memory_open(&fits->memory, true, &code);
     fitsfile *file = fits->memory.file;
-    if (fits->compression == BST_FITS_RICE) {
+    if (rice) {
         fits_set_compression_type(file, RICE_1, &code);
     }
     fits_create_img(file, USHORT_IMG, 2, size, &code);
@@ -121,13 +144,19 @@ bst_status bst_fits_write_extension(bst_ctx *ctx, bst_fits *fits, const bst_fits
     fits_write_key_log(file, "INHERIT", 1, "keys of the primary header hold here", &code);
     bst_fits_put_frame_keys(file, &fits->names, frame, &code);
     bst_fits_put_statements(file, &code);
-    /* cfitsio's prototype lacks const; it does not write to the array */
-    fits_write_img(file, TUSHORT, 1, (LONGLONG)width * height, (void *)(uintptr_t)pixels, &code);
-    fits_write_chksum(file, &code);
+    if (rice) {
+        /* cfitsio's prototype lacks const; it does not write to the array */
+        fits_write_img(file, TUSHORT, 1, (LONGLONG)count, (void *)(uintptr_t)pixels, &code);
+    }
     bst_fits_memory_hdu(&fits->memory, &hdu, &bytes, &code);
     bst_status status = bst_fits_check(ctx, fits, code, "cannot be written");
-    if (status == BST_OK) {
+    if (status == BST_OK && rice) {
         status = bst_fits_append_hdu(ctx, fits, hdu, bytes);
+    } else if (status == BST_OK) {
+        status =
+            set_size(hdu, width, height)
+                ? bst_fits_append_image(ctx, fits, hdu, bytes, pixels, count)
+                : bst_fail(ctx, BST_ERR_FORMAT, "%s: NAXIS1 is not where it belongs", fits->path);
     }
     bst_fits_memory_close(&fits->memory, &code);
     return status;

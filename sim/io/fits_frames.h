@@ -50,11 +50,10 @@ bst_status bst_fits_create(bst_ctx *ctx, const char *path, bst_fits_layout layou
 /* Writes a frame of width x height pixels (row-major, after windowing and binning) and hands it to
  * the operating system: when this returns, a frame that is not compressed outlives the process. At
  * every moment the file is one that readers open without error: a frame is in it whole or not at
- * all, also when the process is killed or the disk is full. Compressed frames wait for their thread,
- * at most four of them: then this waits too.
- * BST_ERR_IO with file and reason (disk full ...; of a compressed frame at one of the next calls);
- * BST_ERR_ARGUMENT when a cube's frame size changes. *index (may be NULL): extension number counted
- * from 1, or plane counted from 0. */
+ * all, also when the process is killed or the disk is full. Compressed frames wait for their
+ * thread, at most four of them: then this waits too. BST_ERR_IO with file and reason (disk full
+ * ...; of a compressed frame at one of the next calls); BST_ERR_ARGUMENT when a cube's frame size
+ * changes. *index (may be NULL): extension number counted from 1, or plane counted from 0. */
 bst_status bst_fits_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,
                           const uint16_t *pixels, int width, int height,
                           int64_t *index) BST_MUST_CHECK;

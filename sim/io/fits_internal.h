@@ -21,7 +21,7 @@ typedef struct bst_fits_names {
 typedef struct bst_fits_memory {
     fitsfile *file;
     void *bytes;
-    size_t capacity;
+    size_t size;
 } bst_fits_memory;
 
 /* A datacube that is being written. */
@@ -30,10 +30,9 @@ typedef struct bst_fits_cube {
     int width, height;
     long long data_start;
     int64_t planes;
-    uint16_t *buffer; /* BST_FITS_CUBE_BUFFER pixels, big-endian */
 } bst_fits_cube;
 
-#define BST_FITS_CUBE_BUFFER 65536
+#define BST_FITS_BUFFER_PIXELS 65536
 
 struct bst_fits_queue;
 
@@ -46,6 +45,7 @@ struct bst_fits {
     long long end; /* bytes of the HDUs that are complete */
     int64_t frames;
     bst_fits_memory memory;
+    uint16_t *buffer; /* BST_FITS_BUFFER_PIXELS, big-endian */
     bst_fits_cube cube;
     struct bst_fits_queue *queue; /* NULL: frames are written by the caller's thread */
 };
@@ -59,11 +59,15 @@ bst_status bst_fits_fail_errno(bst_ctx *ctx, const bst_fits *fits, const char *w
 /* Opens a FITS file in memory with an empty primary HDU when `primary` is set. */
 void bst_fits_memory_open(bst_fits_memory *memory, bool primary, int *code);
 /* Completes its current HDU; the bytes of that HDU hold until the memory is opened again. */
-void bst_fits_memory_hdu(bst_fits_memory *memory, const char **bytes, long long *count, int *code);
+void bst_fits_memory_hdu(bst_fits_memory *memory, char **bytes, long long *count, int *code);
 /* Closes it, in every case. */
 void bst_fits_memory_close(bst_fits_memory *memory, int *code);
+void bst_fits_memory_free(bst_fits_memory *memory);
 
 bool bst_fits_write_at(int fd, const void *data, size_t bytes, long long offset);
+/* Writes pixels as FITS wants them, and zeros up to the end of the block. */
+bool bst_fits_write_pixels(bst_fits *fits, const uint16_t *pixels, size_t count, long long offset,
+                           long long fill);
 
 /* Makes the file with one HDU in it: it appears whole or not at all. */
 bst_status bst_fits_start_file(bst_ctx *ctx, bst_fits *fits, const char *hdu,
@@ -73,6 +77,9 @@ bst_status bst_fits_start_file(bst_ctx *ctx, bst_fits *fits, const char *hdu,
  * the file is as it was before. */
 bst_status bst_fits_append_hdu(bst_ctx *ctx, bst_fits *fits, const char *hdu,
                                long long bytes) BST_MUST_CHECK;
+/* The same for a header and its pixels. */
+bst_status bst_fits_append_image(bst_ctx *ctx, bst_fits *fits, const char *header, long long bytes,
+                                 const uint16_t *pixels, size_t count) BST_MUST_CHECK;
 /* Makes room for `bytes` of data after the complete ones so that readers do not take what is
  * written there for an HDU; then cuts the file at fits->end, when that has been raised or not. */
 bool bst_fits_open_tail(const bst_fits *fits, long long bytes);
