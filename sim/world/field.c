@@ -185,7 +185,8 @@ static void summarise_track(bst_field *field, const bst_los_track *track, bst_qu
     double half_px = 0.5 * hypot((double)field->camera->width_px, (double)field->camera->height_px);
     double scale = bst_camera_scale_rad(field->camera);
     /* a tilt moves points at the corner further than at the centre */
-    double stretch = 1.0 + half_px * half_px * scale * scale;
+    double stretch = (1.0 + half_px * half_px * scale * scale) * bst_camera_stretch(field->camera);
+    half_px *= bst_camera_stretch(field->camera);
     double previous[D] = {0};
     for (int k = 0; k < track->count; k++) {
         bst_vec3 d = deviation(field->q_mid, track->q_cam_from_gcrf[k]);
@@ -377,9 +378,15 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     bst_vec3 centre_cam = bst_camera_unproject(camera, window.x0 + 0.5 * (window.width - 1),
                                                window.y0 + 0.5 * (window.height - 1));
     bst_vec3 centre = bst_quat_rotate(bst_quat_conj(field->q_mid), centre_cam);
-    double radius = atan(bst_camera_scale_rad(camera) *
-                         (0.5 * hypot(window.width, window.height) + sqrt(2.0) * margin_px)) +
-                    APPARENT_SHIFT_RAD;
+    double radius = APPARENT_SHIFT_RAD;
+    if (camera->geometry.general) {
+        radius += bst_camera_reach_rad(camera, centre_cam, window.x0 - margin_px,
+                                       window.y0 - margin_px, window.x0 + window.width + margin_px,
+                                       window.y0 + window.height + margin_px);
+    } else {
+        radius += atan(bst_camera_scale_rad(camera) *
+                       (0.5 * hypot(window.width, window.height) + sqrt(2.0) * margin_px));
+    }
     double tt1, tt2;
     bst_time_tt(bst_world_time(field->world, mid_s), &tt1, &tt2);
     int star_count;
@@ -430,7 +437,7 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
         const bst_source *s = &field->sources[n];
         double own_px = (bst_vec3_angle(s->apparent_start, s->apparent_mid) +
                          bst_vec3_angle(s->apparent_mid, s->apparent_end)) /
-                        bst_camera_scale_rad(camera);
+                        bst_camera_scale_rad(camera) * bst_camera_stretch(camera);
         n += near_window(field, field->q_mid, s->apparent_mid, window, margin_px + own_px);
     }
     *sources = field->sources;

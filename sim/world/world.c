@@ -37,6 +37,12 @@ static bst_status make_observers(const bst_world_builder *b, const bst_config_li
         }
         for (int s = 0; s < config->sensors.count; s++) {
             observer->sensors[s].config = ((const bst_sensor_config *)config->sensors.items)[s];
+            bst_status status = bst_camera_prepare(b->ctx, &observer->sensors[s].config.camera);
+            if (status != BST_OK) {
+                return bst_fail_prefix(b->ctx, status,
+                                       "%s: /observers/%d/sensors/%d/camera/distortion",
+                                       b->scenario, i, s);
+            }
         }
     }
     return BST_OK;
