@@ -12,7 +12,7 @@
 #include "sim/app/json_number.h"
 #include "sim/app/load.h"
 #include "sim/app/run_pictures.h"
-#include "sim/app/version.h"
+#include "sim/core/version.h"
 #include "sim/core/wall_clock.h"
 #include "sim/device/device.h"
 #include "sim/engine/recorder.h"
@@ -165,8 +165,8 @@ static bst_status write_manifest(const run_state *run, bst_simulation *sim, cons
     cJSON *root = cJSON_CreateObject();
     char text[64];
     cJSON_AddStringToObject(root, "program", "boresight");
-    cJSON_AddStringToObject(root, "version", BST_VERSION);
-    cJSON_AddStringToObject(root, "git_revision", BST_GIT_REVISION);
+    cJSON_AddStringToObject(root, "version", bst_version());
+    cJSON_AddStringToObject(root, "git_revision", bst_git_revision());
     cJSON_AddStringToObject(root, "scenario", scenario->name);
     cJSON_AddStringToObject(root, "scenario_file", scenario->file);
     cJSON_AddStringToObject(root, "epoch_utc", scenario->epoch_utc);
@@ -309,9 +309,11 @@ static bst_status open_recorder(run_state *run, bst_run *store) {
                 .has_truth = has_module(scenario, i, s, "scenegen")};
         }
     }
+    char program[64];
+    snprintf(program, sizeof program, "boresight %s", bst_version());
     bst_recorder_info info = {.epoch = scenario->epoch,
                               .tick_rate_hz = scenario->tick_rate_hz,
-                              .program = "boresight " BST_VERSION,
+                              .program = program,
                               .sensors = list,
                               .sensor_count = n};
     bst_status status =
@@ -476,18 +478,7 @@ int bst_cmd_run(int argc, char **argv) {
          .target = &overwrite,
          .doc = "replace an earlier run there"},
         BST_LOAD_OPTIONS(load),
-        {.name = "device",
-         .kind = BST_OPTION_TEXT,
-         .target = &sim_options.device,
-         .argument = "NAME",
-         .doc = "OpenCL device: part of its name, or PLATFORM:DEVICE by number (default PoCL)"},
-        {.name = "threads",
-         .kind = BST_OPTION_INT,
-         .target = &threads,
-         .argument = "N",
-         .doc = "threads for the OpenCL device (default all)",
-         .minimum = 1,
-         .maximum = 1024},
+        BST_DEVICE_OPTIONS(sim_options.device, threads),
         {.name = "quiet", .kind = BST_OPTION_FLAG, .target = &quiet, .doc = "no progress line"},
         {.name = "help", .kind = BST_OPTION_FLAG, .target = &help, .doc = "print this"},
         {.name = NULL},
@@ -508,6 +499,9 @@ int bst_cmd_run(int argc, char **argv) {
         return bst_options_misuse(&ctx, "run");
     }
     sim_options.threads = (int)threads;
+    if (bst_load_check(&ctx, &load) != BST_OK) {
+        return bst_options_misuse(&ctx, "run");
+    }
     bst_json *json = NULL;
     bst_scenario scenario;
     if (bst_load_scenario(&ctx, argv[1], &load, &json, &scenario) != BST_OK) {

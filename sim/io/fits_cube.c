@@ -178,6 +178,9 @@ bst_status bst_fits_cube_finish(bst_ctx *ctx, bst_fits *fits) {
     bst_fits_memory_open(&fits->memory, true, &code);
     if (code == 0) {
         make_table(fits->memory.file, cube->planes, &code);
+        if (bst_camera_distorted(&fits->names.camera)) {
+            bst_fits_sip_columns(fits->memory.file, &code);
+        }
     }
     bst_status status = BST_OK;
     for (int64_t k = 0; status == BST_OK && code == 0 && k < cube->planes; k++) {
@@ -187,6 +190,10 @@ bst_status bst_fits_cube_finish(bst_ctx *ctx, bst_fits *fits) {
             status = bst_fits_fail_errno(ctx, fits, "cannot read the table's file");
         } else {
             put_row(fits->memory.file, k + 1, &frame, &code);
+            if (bst_camera_distorted(&fits->names.camera)) {
+                bst_wcs wcs = bst_wcs_window(&frame.wcs, frame.window, frame.binning);
+                bst_fits_sip_row(fits->memory.file, k + 1, &wcs.sip, &code);
+            }
         }
     }
     bst_fits_memory_hdu(&fits->memory, &hdu, &bytes, &code);

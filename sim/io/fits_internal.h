@@ -107,6 +107,14 @@ void bst_fits_put_statements(fitsfile *file, int *code);
 void bst_fits_put_frame_keys(fitsfile *file, const bst_fits_names *names,
                              const bst_fits_frame *frame, int *code);
 
+/* Keys of the distortion polynomials of a WCS. */
+void bst_fits_put_sip(fitsfile *file, const bst_sip *sip, int *code);
+/* Rotation and distortion of the camera; none for a camera without. */
+void bst_fits_put_lens(fitsfile *file, const bst_camera *camera, int *code);
+/* A cube's table: columns for the polynomials of each row's WCS, and the values of a row. */
+void bst_fits_sip_columns(fitsfile *file, int *code);
+void bst_fits_sip_row(fitsfile *file, long long row, const bst_sip *sip, int *code);
+
 typedef enum bst_fits_moment { BST_FITS_BEGIN, BST_FITS_MIDDLE, BST_FITS_END } bst_fits_moment;
 /* UTC of a moment of the exposure as FITS writes it (no Z), and as modified Julian date. */
 double bst_fits_date(const bst_fits_frame *frame, bst_fits_moment moment, char text[40]);
