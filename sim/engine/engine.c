@@ -129,6 +129,7 @@ bst_status bst_engine_load(bst_ctx *ctx, bst_engine *engine) {
                               .device = flags & BST_MODULE_NEEDS_DEVICE ? spec->device : NULL,
                               .observer = spec->observer,
                               .sensor = spec->sensor,
+                              .exposure_s = spec->exposure_s,
                               .engine_private = self};
         bst_status status = spec->desc->create(&env, spec->config, &self->self);
         if (status != BST_OK) {

@@ -275,7 +275,7 @@ class Faults(unittest.TestCase):
         os.remove(tle)
         result = call(scenario, out, duration=1)
         self.assertEqual(result.returncode, 1)
-        self.assertRegex(result.stderr, rf"^boresight: {scenario}: /world/objects/0/orbit/tle_file:"
+        self.assertRegex(result.stderr, rf"^boresight: {scenario}: /world/objects/0/orbit/elements_file:"
                          rf" .*catalogue_2022-06\.tle: .*{os.strerror(errno.ENOENT)}")
         shutil.copy("scenarios/catalogue_2022-06.tle", place)
         stars = os.path.join(place, "none.stars")
