@@ -56,46 +56,125 @@ static void wrong_contents(void **state) {
         bst_status status;
         const char *message;
     } cases[] = {
-        {{"SIMPLE  =                    F"},
-         0,
-         BST_ERR_IO,
-         ": cannot be read: second keyword not BITPIX"},
+        {{SIMPLE}, 0, BST_ERR_FORMAT, ": HDU 1: the header has no END"},
+        {{SIMPLE, "END"}, 0, BST_ERR_FORMAT, ": HDU 1: BITPIX, NAXIS or one of NAXISn is missing"},
         {{SIMPLE, "BITPIX  =                    8", "NAXIS   =                    0", "END"},
+         0,
+         BST_ERR_FORMAT,
+         ": has no image of two axes"},
+        {{"SIMPLE  =                    F", "BITPIX  =                    8",
+          "NAXIS   =                    0", "END"},
          0,
          BST_ERR_FORMAT,
          ": has no image of two axes"},
         {{SIMPLE, "BITPIX  =                    7", TWO_AXES, "END"},
          0,
-         BST_ERR_IO,
-         ": cannot be read: illegal BITPIX keyword value"},
+         BST_ERR_FORMAT,
+         ": HDU 1: BITPIX is wrong (found 7; allowed: 8, 16, 32, 64, -32, -64)"},
+        {{SIMPLE, "BITPIX  =                    0", TWO_AXES, "END"},
+         0,
+         BST_ERR_FORMAT,
+         ": HDU 1: BITPIX is wrong (found 0; allowed: 8, 16, 32, 64, -32, -64)"},
+        {{SIMPLE, "BITPIX  =                   -8", TWO_AXES, "END"},
+         0,
+         BST_ERR_FORMAT,
+         ": HDU 1: BITPIX is wrong (found -8; allowed: 8, 16, 32, 64, -32, -64)"},
+        {{SIMPLE, "BITPIX  =                  8.0", TWO_AXES, "END"},
+         0,
+         BST_ERR_FORMAT,
+         ": HDU 1: BITPIX is wrong (found 8.0; allowed: 8, 16, 32, 64, -32, -64)"},
+        {{SIMPLE, "BITPIX  =                1e400", TWO_AXES, "END"},
+         0,
+         BST_ERR_FORMAT,
+         ": HDU 1: BITPIX is wrong (found 1e400; allowed: 8, 16, 32, 64, -32, -64)"},
+        {{SIMPLE, "BITPIX  =                  NaN", TWO_AXES, "END"},
+         0,
+         BST_ERR_FORMAT,
+         ": HDU 1: BITPIX is wrong (found NaN; allowed: 8, 16, 32, 64, -32, -64)"},
+        {{SIMPLE, "BITPIX  =                    8", "NAXIS   =", "END"},
+         0,
+         BST_ERR_FORMAT,
+         ": HDU 1: NAXIS is wrong (found nothing; allowed: an integer from 0 to 9)"},
+        {{SIMPLE, "BITPIX  =                    8", "NAXIS   =                   10", "END"},
+         0,
+         BST_ERR_FORMAT,
+         ": HDU 1: NAXIS is wrong (found 10; allowed: an integer from 0 to 9)"},
         {{SIMPLE, "BITPIX  =                    8", TWO_AXES, "NAXIS1  =                   -1",
           "NAXIS2  =                    1", "END"},
          BLOCK,
-         BST_ERR_IO,
-         ": cannot be read: illegal NAXISn keyword value"},
-        {{SIMPLE, "BITPIX  =                    8", TWO_AXES, "NAXIS1  =                    0",
+         BST_ERR_FORMAT,
+         ": HDU 1: NAXIS1 is wrong (found -1; allowed: an integer from 0 to 1000000000000)"},
+        {{SIMPLE, "BITPIX  =                    8", TWO_AXES, "NAXIS1  =  9223372036854775807",
           "NAXIS2  =                    1", "END"},
          BLOCK,
          BST_ERR_FORMAT,
-         ": an image of 0 x 1 pixels (allowed: sides of 1 to 32768, at most 268435456 pixels)"},
-        {{SIMPLE, "BITPIX  =                    8", TWO_AXES, "NAXIS1  =                30000",
-          "NAXIS2  =                30000", "END"},
+         ": HDU 1: NAXIS1 is wrong (found 9223372036854775807; allowed: an integer from 0 to "
+         "1000000000000)"},
+        {{SIMPLE, "BITPIX  =                    8", TWO_AXES, "NAXIS1  =                  1.5",
+          "NAXIS2  =                    1", "END"},
          BLOCK,
          BST_ERR_FORMAT,
-         ": an image of 30000 x 30000 pixels (allowed: sides of 1 to 32768, at most 268435456 "
-         "pixels)"},
+         ": HDU 1: NAXIS1 is wrong (found 1.5; allowed: an integer from 0 to 1000000000000)"},
+        {{SIMPLE, "BITPIX  =                    8", TWO_AXES, "NAXIS1  =                1e400",
+          "NAXIS2  =                    1", "END"},
+         BLOCK,
+         BST_ERR_FORMAT,
+         ": HDU 1: NAXIS1 is wrong (found 1e400; allowed: an integer from 0 to 1000000000000)"},
+        {{SIMPLE, "BITPIX  =                    8", TWO_AXES, "NAXIS1  =                    T",
+          "NAXIS2  =                    1", "END"},
+         BLOCK,
+         BST_ERR_FORMAT,
+         ": HDU 1: NAXIS1 is wrong (found T; allowed: an integer from 0 to 1000000000000)"},
+        {{SIMPLE, "BITPIX  =                    8", TWO_AXES, "NAXIS1  =                    5",
+          "NAXIS2  =                    1", "NAXIS1  =                    6", "END"},
+         BLOCK,
+         BST_ERR_FORMAT,
+         ": HDU 1: NAXIS1 is given twice"},
+        {{SIMPLE, "BITPIX  =                    8", "BITPIX  =                   16", TWO_AXES,
+          "NAXIS1  =                    5", "NAXIS2  =                    1", "END"},
+         BLOCK,
+         BST_ERR_FORMAT,
+         ": HDU 1: BITPIX is given twice"},
+        {{SIMPLE, "BITPIX  =                    8", TWO_AXES, "NAXIS1  =                    5",
+          "END"},
+         BLOCK,
+         BST_ERR_FORMAT,
+         ": HDU 1: BITPIX, NAXIS or one of NAXISn is missing"},
+        {{SIMPLE, TWO_AXES, "BITPIX  =                    8", "NAXIS1  =                    5",
+          "NAXIS2  =                    1", "END"},
+         BLOCK,
+         BST_ERR_IO,
+         ": cannot be read: second keyword not BITPIX"},
+        {{SIMPLE, "BITPIX  =                    8", TWO_AXES, "NAXIS1  =                    0",
+          "NAXIS2  =                    1", "END"},
+         0,
+         BST_ERR_FORMAT,
+         ": an image of 0 x 1 pixels (allowed: sides of 1 to 32768, at most 268435456 pixels)"},
+        {{SIMPLE, "BITPIX  =                    8", TWO_AXES, "NAXIS1  =                30000",
+          "NAXIS2  =                    0", "END"},
+         0,
+         BST_ERR_FORMAT,
+         ": an image of 30000 x 0 pixels (allowed: sides of 1 to 32768, at most 268435456 pixels)"},
         {{SIMPLE, "BITPIX  =                  -64", TWO_AXES, "NAXIS1  =                16384",
           "NAXIS2  =                16384", "END"},
          BLOCK,
          BST_ERR_FORMAT,
-         ": is cut short: an image of 16384 x 16384 pixels of 64 bits that ends at byte "
-         "2147486528 of 5760"},
-        {{SIMPLE, "BITPIX  =                    8", TWO_AXES, "NAXIS1  =   9223372036854775807",
-          "NAXIS2  =   9223372036854775807", "END"},
+         ": HDU 1: is cut short: 2147483648 bytes of data, 2880 in the file"},
+        {{SIMPLE, "BITPIX  =                  -64", TWO_AXES, "NAXIS1  =        1000000000000",
+          "NAXIS2  =        1000000000000", "END"},
          BLOCK,
          BST_ERR_FORMAT,
-         ": an image of 9223372036854775807 x 9223372036854775807 pixels (allowed: sides of 1 to "
-         "32768, at most 268435456 pixels)"},
+         ": HDU 1: is cut short: 576460752303423480 bytes of data, 2880 in the file"},
+        {{SIMPLE, "BITPIX  =                    8", TWO_AXES, "NAXIS1  =                    5",
+          "NAXIS2  =                    5", "END"},
+         BLOCK + 1,
+         BST_ERR_FORMAT,
+         ": HDU 2: the header has no END"},
+        {{SIMPLE, "BITPIX  =                    8", TWO_AXES, "NAXIS1  =                    5",
+          "NAXIS2  =                    5", "END"},
+         3 * BLOCK,
+         BST_ERR_FORMAT,
+         ": HDU 2: does not begin with XTENSION"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         size_t bytes;
@@ -108,6 +187,55 @@ static void wrong_contents(void **state) {
     bad_text(&reader, "\xFF\xFES", BST_ERR_FORMAT, START);
     bad_bytes(&reader, "\x1F\x8B\x08\0\0\0\0\0\0\3", 10, BST_ERR_FORMAT, START); /* gzip */
     bad_text(&reader, "PK\3\4", BST_ERR_FORMAT, START);                          /* zip */
+}
+
+/* A compressed image, by the keys that its room is made by. */
+static void wrong_compressions(void **state) {
+    (void)state;
+    enum { SIDES = 1, TILE = 4, TYPE = 6 };
+    static const char *const good[] = {
+        "ZBITPIX =                   16", "ZNAXIS1 =                    8",
+        "ZNAXIS2 =                    6", "ZNAXIS  =                    2",
+        "ZTILE1  =                    8", "ZTILE2  =                    1",
+        "ZCMPTYPE= 'RICE_1  '",           "ZIMAGE  =                    T",
+        "PCOUNT  =                    0", "TFIELDS =                    1",
+    };
+    static const struct {
+        int card;
+        const char *text, *message;
+    } cases[] = {
+        {0, "ZBITPIX =                   12",
+         ": HDU 1: ZBITPIX is wrong (found 12; allowed: 8, 16, 32, 64, -32, -64)"},
+        {0, "COMMENT", ": HDU 1: a compressed image without ZBITPIX, ZNAXIS or TFIELDS"},
+        {SIDES, "ZNAXIS1 =                40000",
+         ": HDU 1: ZNAXIS1 is wrong (found 40000; allowed: an integer from 1 to 32768)"},
+        {SIDES, "COMMENT", ": HDU 1: a compressed image without ZNAXIS1 or ZNAXIS2"},
+        {TILE, "ZTILE1  =                    0",
+         ": HDU 1: ZTILE1 is wrong (found 0; allowed: an integer from 1 to 32768)"},
+        {TILE, "ZTILE1  =                    9",
+         ": HDU 1: ZTILE1 is wrong (found 9; allowed: at most ZNAXIS1, 8)"},
+        {TYPE, "ZCMPTYPE= 'HCOMPRESS_1'",
+         ": HDU 1: ZCMPTYPE is wrong (found HCOMPRESS_1; allowed: RICE_1, GZIP_1, GZIP_2)"},
+        {TYPE, "COMMENT",
+         ": HDU 1: ZCMPTYPE is wrong (found nothing; allowed: RICE_1, GZIP_1, GZIP_2)"},
+        {8, "PCOUNT  =                   -1",
+         ": HDU 1: PCOUNT is wrong (found -1; allowed: an integer from 0 to 1000000000000)"},
+        {9, "TFIELDS =                 1000",
+         ": HDU 1: TFIELDS is wrong (found 1000; allowed: an integer from 0 to 999)"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        const char *cards[20] = {SIMPLE, "BITPIX  =                    8", TWO_AXES,
+                                 "NAXIS1  =                    8",
+                                 "NAXIS2  =                    6"};
+        for (int k = 0; k < 10; k++) {
+            cards[5 + k] = k == cases[i].card ? cases[i].text : good[k];
+        }
+        cards[15] = "END";
+        size_t bytes;
+        char *file = make(cards, BLOCK, &bytes);
+        bad_bytes(&reader, file, bytes, BST_ERR_FORMAT, cases[i].message);
+        free(file);
+    }
 }
 
 static void every_truncation(void **state) {
@@ -143,6 +271,7 @@ int main(void) {
         cmocka_unit_test(paths),
         cmocka_unit_test(names_are_names),
         cmocka_unit_test(wrong_contents),
+        cmocka_unit_test(wrong_compressions),
         cmocka_unit_test(every_truncation),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
