@@ -9,8 +9,8 @@
 
 /* Checks that a file of `bytes` bytes at `data` is a sequence of HDUs whose sizes, by BITPIX,
  * NAXIS, NAXISn and PCOUNT, are plain integers that fit into the file, each given once; that
- * nothing follows the last; and that a compressed image is of RICE_1, GZIP_1 or GZIP_2 with tiles
- * no larger than the image, whose sides are at most 32768. `name` stands for the file in messages.
+ * nothing follows the last; and that there is no compressed image: cfitsio 4.2 reads beyond its
+ * memory on damaged ones, whatever their headers say. `name` stands for the file in messages.
  * BST_ERR_FORMAT: "NAME: HDU 2: NAXIS1 is wrong (found -1; allowed: ...)". Source: FITS
  * Standard 4.0, sections 3, 4.4.1 and 10. */
 bst_status bst_fits_check_structure(bst_ctx *ctx, const char *name, const void *data,
