@@ -102,7 +102,7 @@ static const bst_column truth_columns[] = {
     REAL("y_mean_px", "px", "row of the light's centroid"),
     REAL("ra_deg", "deg", "ICRS; star: catalogue place; object: geometric with light time"),
     REAL("dec_deg", "deg", "ICRS"),
-    REAL("v_mag", "mag", "Johnson V"),
+    REAL("v_mag", "mag", "Johnson V; NULL: sends no light"),
     REAL("electrons", "e-", "detected in the exposure, whole PSF"),
     REAL("snr", "", "sqrt(sum s^2 / sigma^2), sigma without its own light"),
     REAL("sunlit_fraction", "", "object: of the Sun's disc"),
