@@ -377,6 +377,10 @@ static bst_status resolve_paths(bst_ctx *ctx, bst_scenario *s) {
         BST_TRY(resolve_path(ctx, s, where, file, sizeof observers[i].orbit.tle_file));
         bst_sensor_config *sensors = observers[i].sensors.items;
         for (int k = 0; k < observers[i].sensors.count; k++) {
+            snprintf(where, sizeof where, "/observers/%d/sensors/%d/camera/distortion", i, k);
+            if (bst_camera_prepare(ctx, &sensors[k].camera) != BST_OK) {
+                return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: %s", s->file, where);
+            }
             char *catalogue = sensors[k].knowledge.star_catalogue;
             snprintf(where, sizeof where, "/observers/%d/sensors/%d/knowledge/star_catalogue", i,
                      k);
