@@ -68,15 +68,18 @@ class Messages(unittest.TestCase):
         self.bad_set(GIMBAL + "/rate_hz=999", f": {GIMBAL}/rate_hz: .*857.142857 and 1000 Hz")
         self.bad_set(GIMBAL + "/platform/jitter_high_band_hz=[5]", r": .*/platform/jitter_high_band_hz: wrong type \(found \[5\]; "
                      "allowed: an array of 2 numbers")
-        self.bad_set("/world/objects/0/orbit/norad=1", ": /world/objects/0/orbit/tle_file: .*no element set of satellite 1, ")
-        self.bad_set("/world/objects/0/orbit/tle_file=none.tle",
-                     ": /world/objects/0/orbit/tle_file: .*none.tle: cannot be opened")
+        self.bad_set("/world/objects/0/orbit/norad=1", ": /world/objects/0/orbit/elements_file: .*no element set of satellite 1, ")
+        self.bad_set("/world/objects/0/orbit/elements_file=none.tle",
+                     ": /world/objects/0/orbit/elements_file: .*none.tle: cannot be opened")
         self.bad_set(runs.SENSOR + "/modules/imgproc={\"type\": \"standard\", \"delay_s\": "
                      "{\"frames\": 1}}", ": .*/imgproc/delay_s/frames: not an input .*allowed: frame")
 
     def test_override_that_is_none(self):
-        self.fails(1, "--set duration_s=3: expected /json/path=value", "run", runs.TRACK, "--out",
-                   self.out, "--set", "duration_s=3")
+        for command in (("run", runs.TRACK, "--out", self.out), ("check", runs.TRACK)):
+            self.fails(2, "--set duration_s=3: expected /json/path=value", *command, "--set",
+                       "duration_s=3")
+            self.fails(2, "--set /duration_s: expected /json/path=value", *command, "--set",
+                       "/duration_s")
         self.fails(1, 'there is no element "3"', "run", runs.TRACK, "--out", self.out, "--set",
                    "/observers/3/name=x")
 
