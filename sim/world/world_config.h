@@ -62,8 +62,34 @@ typedef struct bst_exposure_config {
     double dropped_fraction;
 } bst_exposure_config;
 
+/* Errors of the onboard star catalogue; a star's fate follows from its identity and the seed. */
+typedef struct bst_star_errors_config {
+    double dropped_fraction, displaced_fraction, displaced_sigma_arcsec;
+    uint64_t seed;
+} bst_star_errors_config;
+
+/* How the onboard camera differs from the true one. */
+typedef struct bst_camera_errors_config {
+    double scale_error_ppm;
+    double rotation_error_deg;
+    bool own_distortion;       /* false: the camera's own coefficients are known */
+    bst_distortion distortion; /* with own_distortion: what is known instead */
+    double psf_fwhm_px;        /* 0: the camera's */
+    char psf_file[512];        /* "": none */
+    double psf_oversampling;   /* of psf_file; 0: its keyword OVERSAMP */
+} bst_camera_errors_config;
+
+typedef struct bst_orbit_error_config {
+    double position_rtn_m[3], velocity_rtn_mps[3];
+    double along_track_mps; /* growth of the position error from the epoch on */
+} bst_orbit_error_config;
+
 typedef struct bst_knowledge_config {
     char star_catalogue[512]; /* "": the world's */
+    bst_star_errors_config stars;
+    bst_camera_errors_config camera;
+    double clock_offset_s; /* onboard time minus true time */
+    bst_orbit_error_config orbit;
 } bst_knowledge_config;
 
 typedef struct bst_sensor_config {

@@ -69,6 +69,7 @@ struct bst_knowledge {
     const bst_world
         *world;           /* for the nominal orbits and Earth orientation only; never handed out */
     bst_stars *own_stars; /* NULL: the world's */
+    bst_stars *altered;   /* those with the catalogue's errors; NULL: it has none */
     bst_camera camera;
     int observer, sensor;
     double julian_year;
@@ -102,9 +103,23 @@ bst_status bst_cue_resolve(bst_ctx *ctx, const char *scenario, bst_world *world,
                            int sensor, bst_sky_clock *clock) BST_MUST_CHECK;
 
 /* Direction of the cue (unit, GCRF, geometric) without its error: the object's catalogued orbit as
- * seen from the observer, light time in. */
+ * seen from an observer in state `eye`, light time in. */
 bst_status bst_cue_nominal_direction(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
-                                     bst_sky_clock *clock, double seconds,
+                                     bst_sky_clock *clock, double seconds, const bst_state *eye,
                                      bst_vec3 *out) BST_MUST_CHECK;
+
+/* Time after the epoch that the onboard clock shows `seconds` after the epoch. */
+double bst_believed_seconds(const bst_world *world, int observer, int sensor, double seconds);
+
+/* Where a sensor's onboard side believes its observer to be when its clock shows believed_s. */
+bst_status bst_believed_state(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
+                              bst_sky_clock *clock, double believed_s,
+                              bst_state *out) BST_MUST_CHECK;
+
+/* The same stars with errors: those of `stars` that are dropped are not found, the displaced ones
+ * lie elsewhere. Shares the memory of `stars`, which must outlive *out. */
+bst_status bst_stars_with_errors(bst_ctx *ctx, const bst_stars *stars,
+                                 const bst_star_errors_config *errors,
+                                 bst_stars **out) BST_MUST_CHECK;
 
 #endif
