@@ -127,6 +127,12 @@ static bst_status resolve_module_paths(bst_ctx *ctx, const bst_scenario *s, cons
 
 static bst_status read_delays(bst_ctx *ctx, const bst_scenario *scenario, const cJSON *node,
                               const char *path, bst_module_config *module) {
+    char where[400];
+    snprintf(where, sizeof where, "%s/delay_s", path);
+    if (node && !cJSON_IsObject(node)) {
+        return bst_config_fail(ctx, scenario->file, where, node, "wrong type",
+                               "an object of seconds by channel");
+    }
     for (const cJSON *item = node ? node->child : NULL; item; item = item->next) {
         int port = -1;
         char inputs[300] = "";
@@ -148,9 +154,10 @@ static bst_status read_delays(bst_ctx *ctx, const bst_scenario *scenario, const 
                             scenario->file, path, item->string, inputs);
         }
         if (!cJSON_IsNumber(item) || !(item->valuedouble >= 0.0 && item->valuedouble <= 1e6)) {
-            return bst_fail(ctx, BST_ERR_CONFIG,
-                            "%s: %s/delay_s/%s: a number of seconds from 0 to 1e6 is expected",
-                            scenario->file, path, item->string);
+            snprintf(where, sizeof where, "%s/delay_s/%s", path, item->string);
+            return bst_config_fail(ctx, scenario->file, where, item,
+                                   cJSON_IsNumber(item) ? "out of range" : "wrong type",
+                                   "a number from 0 to 1e6 s");
         }
         if (module->delay_count == BST_MAX_DELAYS) {
             return bst_fail(ctx, BST_ERR_CONFIG, "%s: %s/delay_s: too many delays", scenario->file,
@@ -178,8 +185,8 @@ static bst_status read_module(bst_ctx *ctx, const bst_json *json, const bst_regi
                         scenario->file, path, names);
     }
     if (!cJSON_IsObject(node)) {
-        return bst_fail(ctx, BST_ERR_CONFIG, "%s: %s: an object with a \"type\" is expected",
-                        scenario->file, path);
+        return bst_config_fail(ctx, scenario->file, path, node, "wrong type",
+                               "an object with a \"type\"");
     }
     cJSON *common_part = part_of(node, true), *own_part = part_of(node, false);
     common_config common;
@@ -248,8 +255,7 @@ static bst_status read_modules(bst_ctx *ctx, const bst_json *json, const bst_reg
                 char path[200];
                 snprintf(path, sizeof path, "/observers/%d/sensors/%d/modules", i, s);
                 if (block && !cJSON_IsObject(block)) {
-                    return bst_fail(ctx, BST_ERR_CONFIG, "%s: %s: an object is expected", out->file,
-                                    path);
+                    return bst_config_fail(ctx, out->file, path, block, "wrong type", "an object");
                 }
                 if (pass == 0) {
                     total += cJSON_GetArraySize(block);
