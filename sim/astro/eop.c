@@ -114,10 +114,19 @@ static bst_status append_row(bst_ctx *ctx, bst_eop *eop, int *capacity, int mjd,
     return BST_OK;
 }
 
+static int count_words(const char *text) {
+    int words = 0;
+    for (text += strspn(text, " \t"); *text; text += strspn(text, " \t")) {
+        text += strcspn(text, " \t");
+        words++;
+    }
+    return words;
+}
+
 static bst_status read_rows(bst_ctx *ctx, const char *name, const char *data, size_t bytes,
                             bst_eop *eop) {
     char line[512];
-    int capacity = 0, number = 0;
+    int capacity = 0, number = 0, columns = 0;
     for (const char *next = data, *end = data + bytes; next < end;) {
         number++;
         const char *stop = memchr(next, '\n', (size_t)(end - next));
@@ -136,6 +145,14 @@ static bst_status read_rows(bst_ctx *ctx, const char *name, const char *data, si
         bool numeric = *text >= '0' && *text <= '9';
         if (!numeric && (eop->count == 0 || *text == '#' || *text == '\0')) {
             continue; /* the heading, a comment */
+        }
+        /* a file that was cut short may end within a number */
+        int words = count_words(line);
+        columns = columns ? columns : words;
+        if (words != columns) {
+            return bst_fail(ctx, BST_ERR_FORMAT,
+                            "%.400s:%d: %d columns where the rows before have %d in \"%.60s\"",
+                            name, number, words, columns, line);
         }
         int mjd = 0;
         bst_eop_values row = {0};

@@ -104,11 +104,12 @@ static bst_status read_number(const reader *r, const cJSON *value, const char *p
         return wrong(r, path, value, "wrong type", allowed);
     }
     double number = value->valuedouble;
-    if (d->type == BST_CONFIG_INT &&
-        (number != floor(number) || fabs(number) >= END_OF_EXACT_INTEGERS)) {
+    bool is_int = d->type == BST_CONFIG_INT;
+    if (is_int && number != floor(number)) {
         return wrong(r, path, value, "not an integer", allowed);
     }
-    if (!(number >= d->minimum && number <= d->maximum)) {
+    if (!(number >= d->minimum && number <= d->maximum) ||
+        (is_int && fabs(number) >= END_OF_EXACT_INTEGERS)) {
         return wrong(r, path, value, "out of range", allowed);
     }
     *out = number;

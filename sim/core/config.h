@@ -121,6 +121,8 @@ void bst_json_free(bst_json *json);
 struct cJSON *bst_json_root(const bst_json *json);
 const char *bst_json_name(const bst_json *json);
 
+/* Whether an override has the form "/json/path=value"; BST_ERR_ARGUMENT when not. */
+bst_status bst_json_check_assignment(bst_ctx *ctx, const char *assignment) BST_MUST_CHECK;
 /* Applies one override "/json/path=value" (JSON pointer; value is JSON text, or a bare word taken
  * as a string). Objects on the way are made when missing; array elements must exist. */
 bst_status bst_json_set(bst_ctx *ctx, bst_json *json, const char *assignment) BST_MUST_CHECK;

@@ -168,7 +168,7 @@ static cJSON *child_of(cJSON *node, const char *segment) {
     return cJSON_GetObjectItemCaseSensitive(node, segment);
 }
 
-bst_status bst_json_set(bst_ctx *ctx, bst_json *json, const char *assignment) {
+bst_status bst_json_check_assignment(bst_ctx *ctx, const char *assignment) {
     const char *equals = strchr(assignment, '=');
     if (assignment[0] != '/' || !equals ||
         (size_t)(equals - assignment) == strspn(assignment, "/")) {
@@ -176,6 +176,12 @@ bst_status bst_json_set(bst_ctx *ctx, bst_json *json, const char *assignment) {
                         "--set %s: expected /json/path=value, for example --set /duration_s=60",
                         assignment);
     }
+    return BST_OK;
+}
+
+bst_status bst_json_set(bst_ctx *ctx, bst_json *json, const char *assignment) {
+    BST_TRY(bst_json_check_assignment(ctx, assignment));
+    const char *equals = strchr(assignment, '=');
     /* a value that is no JSON is a bare word, taken as a string */
     cJSON *value = NULL;
     bst_json *parsed = NULL;

@@ -387,6 +387,9 @@ bst_status bst_scenario_read(bst_ctx *ctx, const bst_json *json, const bst_regis
         BST_OK) {
         return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: /duration_s", out->file);
     }
+    if (bst_record_config_check(ctx, &out->record) != BST_OK) {
+        return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s", out->file);
+    }
     BST_TRY(check_names(ctx, out));
     BST_TRY(resolve_paths(ctx, out, "", bst_scenario_table, out, false));
     return read_modules(ctx, json, registry, out);

@@ -3,13 +3,14 @@
 #include <fitsio.h>
 #include <inttypes.h>
 #include <math.h>
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 #include "sim/core/file.h"
 
-enum { LONGEST_SIDE = 32768, MOST_PIXELS = 1 << 28 };
+enum { LONGEST_SIDE = 32768, MOST_PIXELS = 1 << 28, BLOCK = 2880 };
 static const uint64_t MAX_FILE_BYTES = (uint64_t)4 << 30;
 
 static bst_status fail_cfitsio(bst_ctx *ctx, const char *path, int code) {
@@ -45,20 +46,26 @@ static bst_status find_image(bst_ctx *ctx, const char *path, fitsfile *file, lon
                      : fail_cfitsio(ctx, path, code);
 }
 
-/* An image that is not compressed needs its bytes in the file: refuses to make room for others. */
+/* Refuses to make room for pixels that the file does not hold, and to take the zeros that cfitsio
+ * gives for what lies beyond its end. Of a compressed image, at most the last block may be short.
+ */
 static bst_status check_room(bst_ctx *ctx, const char *path, fitsfile *file, const long size[2],
                              uint64_t bytes) {
     int code = 0, type = 0;
+    LONGLONG header = 0, data = 0, end = 0;
     fits_get_img_type(file, &type, &code);
+    fits_get_hduaddrll(file, &header, &data, &end, &code);
+    bool compressed = fits_is_compressed_image(file, &code);
     if (code != 0) {
         return fail_cfitsio(ctx, path, code);
     }
-    uint64_t needed = (uint64_t)size[0] * (uint64_t)size[1] * (uint64_t)(abs(type) / 8);
-    if (!fits_is_compressed_image(file, &code) && needed > bytes) {
+    uint64_t pixels = (uint64_t)size[0] * (uint64_t)size[1] * (uint64_t)(abs(type) / 8);
+    uint64_t needed = compressed ? (uint64_t)end - (BLOCK - 1) : (uint64_t)data + pixels;
+    if (needed > bytes) {
         return bst_fail(ctx, BST_ERR_FORMAT,
-                        "%.400s: is cut short: an image of %ld x %ld pixels of %d bits in a file "
-                        "of %" PRIu64 " bytes",
-                        path, size[0], size[1], abs(type), bytes);
+                        "%.400s: is cut short: an image of %ld x %ld pixels of %d bits that ends "
+                        "at byte %" PRIu64 " of %" PRIu64,
+                        path, size[0], size[1], abs(type), needed, bytes);
     }
     return BST_OK;
 }

@@ -124,7 +124,12 @@ static bst_status read_rows(bst_ctx *ctx, FILE *rows, const bst_star_import_opti
     char line[512];
     long long count = 0;
     while (fgets(line, sizeof line, rows)) {
-        count++;
+        if (++count > options->expected_rows && options->expected_rows) {
+            return bst_fail(ctx, BST_ERR_FORMAT,
+                            "found more than %lld stars, all that Tycho-2 has: this is not the "
+                            "catalogue; run `boresight stars fetch`",
+                            options->expected_rows);
+        }
         size_t bytes = strcspn(line, "\r\n");
         bst_star_values values;
         bst_star_record record;

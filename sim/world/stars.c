@@ -9,6 +9,7 @@
 
 #include "sim/core/file.h"
 #include "sim/world/star_index.h"
+#include "sim/world/world_internal.h"
 
 #define MAX_FILE_BYTES ((uint64_t)1 << 30)
 
@@ -142,6 +143,10 @@ void bst_stars_get_info(const bst_stars *stars, bst_stars_info *out) {
     out->count = (long long)h->star_count;
     out->complete_to_v_mag = h->complete_to_v_mag;
     out->patches = (int)h->patch_count;
+}
+
+const bst_star_view *bst_stars_records(const bst_stars *stars) {
+    return &stars->view;
 }
 
 void bst_stars_patch(const bst_stars *stars, int index, bst_vec3 *centre, double *radius_rad,

@@ -27,7 +27,7 @@ typedef struct bad_reader {
 static inline void bad_expect(const bad_reader *r, const char *path, bst_status status,
                               const char *message) {
     bst_ctx ctx = {0};
-    char expected[BST_MESSAGE_BYTES];
+    char expected[4 * BST_MESSAGE_BYTES];
     bst_status got = r->read(&ctx, path);
     snprintf(expected, sizeof expected, "%s%s%s", r->prefix, path, message);
     assert_string_equal(ctx.message, expected);

@@ -220,8 +220,9 @@ static void what_is_wrong_is_said(void **state) {
     for (int i = 0; i < 720; i++) {
         big_endian(&f, 0, 4);
     }
-    expect_error(&f, BST_ERR_FORMAT,
-                 "is cut short: an image of 720 x 100 pixels of 32 bits in a file of 5760 bytes");
+    expect_error(
+        &f, BST_ERR_FORMAT,
+        "is cut short: an image of 720 x 100 pixels of 32 bits that ends at byte 290880 of 5760");
 }
 
 int main(void) {
