@@ -1,16 +1,22 @@
 #include "sim/world/world_config.h"
 
-static const char *const orbit_sources[] = {"sgp4", "relative", NULL};
+#include "sim/astro/elements.h"
+
+static const char *const orbit_sources[] = {"sgp4", "relative", "oem", "injected", NULL};
+static const char *const states_frames[] = {"gcrf", "teme", NULL};
 static const char *const faint_kinds[] = {"none", "statistical", NULL};
 static const char *const axes[] = {"x", "-x", "y", "-y", NULL};
 
 static const bst_config_desc orbit_table[] = {
     BST_ENUM(
         bst_orbit_config, source, orbit_sources, "\"sgp4\"",
-        "Where the orbit comes from: a two-line element set, or another object plus an offset."),
+        "Where the orbit comes from: an element set, another object plus an offset, an ephemeris "
+        "file, or states given per frame."),
     BST_PATH(bst_orbit_config, elements_file, "\"\"",
-             "sgp4: file of element sets, relative to the scenario's folder."),
-    BST_INT(bst_orbit_config, norad, "", 0, 339999, "0", "sgp4: catalogue number in that file."),
+             "sgp4: file of element sets (TLE, or OMM as JSON or CSV), relative to the scenario's "
+             "folder."),
+    BST_INT(bst_orbit_config, norad, "", 0, BST_NORAD_MAX, "0",
+            "sgp4: catalogue number in that file."),
     BST_STRING(bst_orbit_config, reference, "\"\"",
                "relative: the object that the offset is added to."),
     BST_REAL(bst_orbit_config, at_s, "s", -1e9, 1e9, "0",
@@ -19,6 +25,17 @@ static const bst_config_desc orbit_table[] = {
               "relative: offset along radius, transverse and normal of the reference's orbit."),
     BST_REALS(bst_orbit_config, rate_rtn_mps, "m/s", -1e5, 1e5, "[0, 0, 0]",
               "relative: change of the offset."),
+    BST_PATH(bst_orbit_config, oem_file, "\"\"",
+             "oem: CCSDS OEM file (KVN), relative to the scenario's folder."),
+    BST_STRING(bst_orbit_config, oem_object, "\"\"",
+               "oem: OBJECT_NAME or OBJECT_ID in that file; empty: its only object."),
+    BST_PATH(bst_orbit_config, states_file, "\"\"",
+             "injected: CSV file of states at the start and end of each frame, relative to the "
+             "scenario's folder."),
+    BST_STRING(bst_orbit_config, states_object, "\"\"",
+               "injected: the object in that file; empty: its only one."),
+    BST_ENUM(bst_orbit_config, states_frame, states_frames, "\"gcrf\"",
+             "injected: axes of the states, GCRF or true equator and mean equinox of date."),
     BST_CONFIG_END,
 };
 

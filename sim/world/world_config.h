@@ -6,7 +6,9 @@
 #include "sim/core/config.h"
 #include "sim/world/camera.h"
 
-enum { BST_ORBIT_SGP4, BST_ORBIT_RELATIVE };
+enum { BST_ORBIT_SGP4, BST_ORBIT_RELATIVE, BST_ORBIT_OEM, BST_ORBIT_INJECTED };
+
+enum { BST_STATES_GCRF, BST_STATES_TEME };
 
 typedef struct bst_orbit_config {
     int32_t source;          /* BST_ORBIT_... */
@@ -17,6 +19,11 @@ typedef struct bst_orbit_config {
     double at_s;        /* relative: time at which offset_rtn_m holds */
     double offset_rtn_m[3];
     double rate_rtn_mps[3];
+    char oem_file[512]; /* oem: path as above */
+    char oem_object[64];
+    char states_file[512]; /* injected: path as above */
+    char states_object[64];
+    int32_t states_frame; /* BST_STATES_... */
 } bst_orbit_config;
 
 typedef struct bst_burn_config {
@@ -120,6 +127,11 @@ struct bst_knowledge;
 bst_status bst_world_create(bst_ctx *ctx, const char *scenario, const bst_world_config *world,
                             const bst_config_list *observers, const char *base_dir, bst_time epoch,
                             struct bst_world **out) BST_MUST_CHECK;
+/* Checks that the files of states that observers and cued objects come from cover a run from the
+ * epoch on. BST_ERR_CONFIG with file, JSON path and both spans. Other objects may come and go: they
+ * are not there outside their files. */
+bst_status bst_world_check_spans(bst_ctx *ctx, const char *scenario, const struct bst_world *world,
+                                 double duration_s) BST_MUST_CHECK;
 void bst_world_free(struct bst_world *world);
 
 /* The onboard knowledge of one sensor; equal to the truth where the scenario says nothing else. */
