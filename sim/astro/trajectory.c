@@ -40,8 +40,8 @@ static bst_status check(bst_ctx *ctx, const bst_trajectory_options *o) {
                         "the initial state lies at a height of %.1f km, orbits end below %.0f km",
                         1e-3 * height, 1e-3 * BST_TRAJECTORY_FLOOR_M);
     }
-    if (!(o->tolerance >= 0.0 && o->tolerance < 1.0)) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT, "tolerance %g of an orbit (allowed: 0 to 1)",
+    if (!(o->tolerance == 0.0 || (o->tolerance >= 1e-11 && o->tolerance <= 1e-3))) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "tolerance %g of an orbit (allowed: 1e-11 to 1e-3)",
                         o->tolerance);
     }
     for (int i = 0; i < o->burn_count; i++) {

@@ -4,6 +4,7 @@
 
 #include "sim/astro/sgp4.h"
 #include "sim/astro/sky_clock.h"
+#include "sim/astro/trajectory.h"
 #include "sim/world/knowledge.h"
 #include "sim/world/name_index.h"
 #include "sim/world/world_config.h"
@@ -25,6 +26,9 @@ typedef struct bst_orbit {
     const struct bst_orbit *reference;
     double at_s;
     bst_vec3 offset_rtn_m, rate_rtn_mps;
+    /* numerical */
+    bst_gravity *gravity;
+    bst_trajectory *unburnt, *burnt; /* burnt NULL: there are no burns */
 
     bst_burn *burns;
     int burn_count;
