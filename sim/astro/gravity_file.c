@@ -1,14 +1,12 @@
 /* Gravity fields in the ICGEM format. */
-#include <errno.h>
 #include <stdbool.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #include "sim/astro/gravity_internal.h"
+#include "sim/core/file.h"
 
-#define MAX_FILE_BYTES ((size_t)256 << 20)
+#define MAX_FILE_BYTES ((uint64_t)256 << 20)
 
 enum { LINE_BYTES = 512, MAX_WORDS = 8, HIGHEST_DEGREE = 100000 };
 
@@ -52,10 +50,6 @@ static bst_status next_line(reader *r, bool *there) {
     if (length >= LINE_BYTES) {
         return bst_fail(r->ctx, BST_ERR_FORMAT, "%.400s:%d: line of %zu characters (at most %d)",
                         r->name, r->line_number, length, LINE_BYTES - 1);
-    }
-    if (memchr(r->next, '\0', length)) {
-        return bst_fail(r->ctx, BST_ERR_FORMAT, "%.400s:%d: a zero byte in the text", r->name,
-                        r->line_number);
     }
     memcpy(r->line, r->next, length);
     r->line[length] = '\0';
@@ -236,6 +230,7 @@ bst_status bst_gravity_read_buffer(bst_ctx *ctx, const char *name, const char *d
                         "to the degree)",
                         degree, order, BST_GRAVITY_MAX_DEGREE);
     }
+    BST_TRY(bst_file_check_text(ctx, name, data, bytes));
     size_t count = bst_gravity_index(degree + 1, 0);
     reader r = {.ctx = ctx,
                 .name = name,
@@ -260,37 +255,11 @@ bst_status bst_gravity_read_buffer(bst_ctx *ctx, const char *name, const char *d
 bst_status bst_gravity_load(bst_ctx *ctx, const char *path, int degree, int order,
                             bst_gravity **out) {
     *out = NULL;
-    FILE *file = fopen(path, "rb");
-    if (!file) {
-        int error = errno;
-        return bst_fail(ctx, error == ENOENT ? BST_ERR_NOT_FOUND : BST_ERR_IO,
-                        "%.400s: cannot be opened: %s; give a gravity field in the ICGEM format",
-                        path, strerror(error));
-    }
-    struct stat info;
-    bst_status status = BST_OK;
-    char *data = NULL;
-    size_t bytes = 0;
-    if (fstat(fileno(file), &info) != 0 || !S_ISREG(info.st_mode)) {
-        status =
-            bst_fail(ctx, BST_ERR_IO,
-                     "%.400s: is not a plain file; give a gravity field in the ICGEM format", path);
-    } else if (info.st_size > (off_t)MAX_FILE_BYTES) {
-        status =
-            bst_fail(ctx, BST_ERR_IO, "%.400s: over 256 MiB, too large for a gravity field", path);
-    } else {
-        bytes = (size_t)info.st_size;
-        data = malloc(bytes + 1);
-        if (!data) {
-            status = bst_fail(ctx, BST_ERR_MEMORY, "%.400s: no memory for %zu bytes", path, bytes);
-        } else if (fread(data, 1, bytes, file) != bytes) {
-            status = bst_fail(ctx, BST_ERR_IO, "%.400s: cannot be read", path);
-        }
-    }
-    fclose(file);
-    if (status == BST_OK) {
-        status = bst_gravity_read_buffer(ctx, path, data, bytes, degree, order, out);
-    }
+    char *data;
+    size_t bytes;
+    BST_TRY(bst_file_read(ctx, path, MAX_FILE_BYTES, "a gravity field in the ICGEM format", &data,
+                          &bytes));
+    bst_status status = bst_gravity_read_buffer(ctx, path, data, bytes, degree, order, out);
     free(data);
     return status;
 }
