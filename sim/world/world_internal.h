@@ -6,6 +6,7 @@
 #include "sim/astro/oem.h"
 #include "sim/astro/sgp4.h"
 #include "sim/astro/sky_clock.h"
+#include "sim/astro/trajectory.h"
 #include "sim/world/faint_stars.h"
 #include "sim/world/knowledge.h"
 #include "sim/world/name_index.h"
@@ -35,6 +36,9 @@ typedef struct bst_orbit {
     int file_object;
     bool in_teme;        /* injected */
     double from_s, to_s; /* span of the states, after the epoch */
+    /* numerical */
+    bst_gravity *gravity;
+    bst_trajectory *unburnt, *burnt; /* burnt NULL: there are no burns */
 
     bst_burn *burns;
     int burn_count;
