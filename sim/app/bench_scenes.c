@@ -98,11 +98,9 @@ static void move(scene_state *st, uint64_t frame, double centre_px[2]) {
 
 static bst_source place(const bst_camera *camera, int kind, double x, double y, double rate) {
     bst_vec3 v = bst_camera_unproject(camera, x, y);
-    return (bst_source){.kind = kind,
-                        .apparent_start = v,
-                        .apparent_mid = v,
-                        .apparent_end = v,
-                        .electrons_per_s = rate};
+    bst_source source = {.kind = kind, .electrons_per_s = rate};
+    bst_source_set_path(&source, v, v, v);
+    return source;
 }
 
 static void make_sources(scene_state *st) {
@@ -131,8 +129,9 @@ static void place_targets(scene_state *st, uint64_t frame) {
             0.5 * s->side + 200.0 * (bst_rng_uniform(key, frame, (uint64_t)(2 * i + 1)) - 0.5);
         bst_source *t = &st->sources[s->stars + i];
         *t = place(&st->camera, BST_SOURCE_OBJECT, x, y, 2000.0);
-        t->apparent_start = bst_camera_unproject(&st->camera, x + half, y + half);
-        t->apparent_end = bst_camera_unproject(&st->camera, x - half, y - half);
+        bst_source_set_path(t, bst_camera_unproject(&st->camera, x + half, y + half),
+                            t->apparent[BST_SOURCE_MID],
+                            bst_camera_unproject(&st->camera, x - half, y - half));
     }
 }
 

@@ -225,21 +225,12 @@ static void summarise_track(bst_field *field, const bst_los_track *track, bst_qu
     *reach_px = reach;
 }
 
-static bst_vec3 apparent_at(const bst_source *s, double u) {
-    if (s->kind == BST_SOURCE_STAR) {
-        return s->apparent_mid;
-    }
-    double a = (2.0 * u - 1.0) * (u - 1.0), b = 4.0 * u * (1.0 - u), c = u * (2.0 * u - 1.0);
-    return bst_vec3_axpy(bst_vec3_axpy(bst_vec3_scale(s->apparent_start, a), b, s->apparent_mid), c,
-                         s->apparent_end);
-}
-
 bool bst_field_project(const bst_camera *camera, const bst_los_track *track, int k,
                        const bst_source *source, double *x_px, double *y_px) {
     double exposure = track->time_s[track->count - 1];
     double u = exposure > 0.0 ? track->time_s[k] / exposure : 0.5;
     return bst_camera_project(
-        camera, bst_quat_rotate(track->q_cam_from_gcrf[k], apparent_at(source, u)), x_px, y_px);
+        camera, bst_quat_rotate(track->q_cam_from_gcrf[k], bst_source_at(source, u)), x_px, y_px);
 }
 
 static bst_status query_stars(bst_ctx *ctx, bst_field *field, bst_vec3 centre, double radius,
@@ -282,34 +273,74 @@ static bool near_window(const bst_field *field, bst_quat q, bst_vec3 direction, 
 
 static bst_status add_object(bst_ctx *ctx, bst_field *field, int object, double start_s,
                              double end_s, bst_source *out, bool *visible_state) {
-    bst_sight sight[3];
-    const double times[3] = {start_s, 0.5 * (start_s + end_s), end_s};
+    bst_sight sight[BST_SOURCE_NODES];
     *visible_state = true;
-    for (int i = 0; i < 3; i++) {
-        bst_status status =
-            bst_view_sight(ctx, field->view, field->observer, object, times[i], &sight[i]);
+    for (int i = 0; i < BST_SOURCE_NODES; i++) {
+        double t = start_s + (end_s - start_s) * i / (BST_SOURCE_NODES - 1);
+        bst_status status = bst_view_sight(ctx, field->view, field->observer, object, t, &sight[i]);
         if (status == BST_ERR_NUMERIC) {
             *visible_state = false; /* decayed: no longer there */
             return BST_OK;
         }
         BST_TRY(status);
     }
-    const bst_sight *mid = &sight[1];
+    const bst_sight *mid = &sight[BST_SOURCE_MID];
+    if (!(mid->range_m > 0.0)) {
+        *visible_state = false; /* the observer itself */
+        return BST_OK;
+    }
     *out = (bst_source){.kind = BST_SOURCE_OBJECT,
                         .id = (uint32_t)object,
-                        .apparent_start = sight[0].apparent,
-                        .apparent_mid = mid->apparent,
-                        .apparent_end = sight[2].apparent,
                         .v_mag = mid->v_mag,
                         .sunlit_fraction = mid->sunlit_fraction,
                         .phase_rad = mid->phase_rad,
                         .range_m = mid->range_m,
                         .occulted = mid->occulted};
+    for (int i = 0; i < BST_SOURCE_NODES; i++) {
+        out->apparent[i] = bst_vec3_scale(sight[i].apparent, sight[i].range_m / mid->range_m);
+    }
     out->electrons_per_s = mid->occulted || isinf(mid->v_mag)
                                ? 0.0
                                : bst_camera_electrons_per_s(field->camera, mid->v_mag);
     bst_vec3_to_radec(mid->geometric, &out->ra_rad, &out->dec_rad);
     return BST_OK;
+}
+
+/* Whether the object's path over the image comes within margin_px of the window. `centre` and
+ * `radius`: a cone (GCRF) that holds the window with its margin. */
+static bool path_touches(const bst_field *field, const bst_source *s, bst_vec3 centre,
+                         double radius, bst_window window, double margin_px) {
+    enum { PIECES = 8 };
+    bst_vec3 at[PIECES + 1];
+    double x[PIECES + 1], y[PIECES + 1], bend = 0.0;
+    bool front[PIECES + 1];
+    for (int k = 0; k <= PIECES; k++) {
+        at[k] = bst_source_at(s, (double)k / PIECES);
+        x[k] = y[k] = 0.0;
+        front[k] =
+            bst_camera_project(field->camera, bst_quat_rotate(field->q_mid, at[k]), &x[k], &y[k]);
+    }
+    for (int k = 1; k < PIECES; k++) {
+        /* an eighth of this is what the path lies off the chord */
+        bend = front[k - 1] && front[k] && front[k + 1]
+                   ? fmax(bend,
+                          hypot(x[k - 1] - 2.0 * x[k] + x[k + 1], y[k - 1] - 2.0 * y[k] + y[k + 1]))
+                   : INFINITY;
+    }
+    for (int k = 0; k < PIECES; k++) {
+        double arc = bst_vec3_angle(at[k], at[k + 1]);
+        if (bst_vec3_angle(centre, at[k]) > radius + 1.25 * arc) {
+            continue;
+        }
+        double reach = margin_px + bend;
+        if (fmax(x[k], x[k + 1]) >= window.x0 - reach &&
+            fmin(x[k], x[k + 1]) <= window.x0 + window.width - 1 + reach &&
+            fmax(y[k], y[k + 1]) >= window.y0 - reach &&
+            fmin(y[k], y[k + 1]) <= window.y0 + window.height - 1 + reach) {
+            return true;
+        }
+    }
+    return false;
 }
 
 bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *track,
@@ -370,14 +401,12 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
         *s =
             (bst_source){.kind = BST_SOURCE_STAR,
                          .id = star->id,
-                         .apparent_start = apparent,
-                         .apparent_mid = apparent,
-                         .apparent_end = apparent,
                          .electrons_per_s = bst_camera_electrons_per_s(camera, (double)star->v_mag),
                          .v_mag = (double)star->v_mag,
                          .sunlit_fraction = NAN,
                          .phase_rad = NAN,
                          .range_m = INFINITY};
+        bst_source_set_path(s, apparent, apparent, apparent);
         /* the Earth hides stars too: a point far along the line of sight stands for the star */
         s->occulted =
             bst_earth_occults(eye.position_m, bst_vec3_axpy(eye.position_m, 1e12, star->icrs),
@@ -393,11 +422,7 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
         if (!there) {
             continue;
         }
-        const bst_source *s = &field->sources[n];
-        double own_px = (bst_vec3_angle(s->apparent_start, s->apparent_mid) +
-                         bst_vec3_angle(s->apparent_mid, s->apparent_end)) /
-                        bst_camera_scale_rad(camera);
-        n += near_window(field, field->q_mid, s->apparent_mid, window, margin_px + own_px);
+        n += path_touches(field, &field->sources[n], centre, radius, window, margin_px);
     }
     *sources = field->sources;
     *count = n;
@@ -427,7 +452,7 @@ static smear smear_of(const bst_field *field, const bst_source *source) {
     smear m = {0};
     double x[SIGMA_POINTS], y[SIGMA_POINTS];
     for (int p = 0; p < SIGMA_POINTS; p++) {
-        bst_vec3 d = apparent_at(source, field->sigma_time[p]);
+        bst_vec3 d = bst_source_at(source, field->sigma_time[p]);
         x[p] = y[p] = NAN;
         (void)bst_camera_project(field->camera, bst_quat_rotate(field->sigma_q[p], d), &x[p],
                                  &y[p]);
@@ -485,7 +510,8 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
     (void)bst_field_project(camera, track, 0, source, &out->x_start_px, &out->y_start_px);
     (void)bst_field_project(camera, track, track->count - 1, source, &out->x_end_px,
                             &out->y_end_px);
-    (void)bst_camera_project(camera, bst_quat_rotate(field->q_mid, source->apparent_mid),
+    (void)bst_camera_project(camera,
+                             bst_quat_rotate(field->q_mid, source->apparent[BST_SOURCE_MID]),
                              &out->x_mid_px, &out->y_mid_px);
     smear image = smear_of(field, source);
     out->x_mean_px = image.x_mean;
