@@ -62,7 +62,7 @@ static void render_source(const bst_camera *camera, bst_window w, const bst_los_
             double x, y;
             bst_quat q =
                 bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
-            bst_vec3 v = bst_source_at(s, (track->time_s[k] + u * dt) / duration);
+            bst_vec3 v = bst_source_direction(s, (track->time_s[k] + u * dt) / duration);
             if (bst_camera_project(camera, bst_quat_rotate(q, v), &x, &y)) {
                 add_psf(w, sigma, x, y, s->electrons_per_s * dt * gauss_weight[n % 4] / parts, line,
                         image);

@@ -220,16 +220,6 @@ static bool project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, doubl
     return fabs(*x) < 1e6 && fabs(*y) < 1e6;
 }
 
-static bool moves(const bst_source *source) {
-    const bst_vec3 *p = source->apparent;
-    for (int k = 0; k < BST_SOURCE_NODES && source->kind != BST_SOURCE_STAR; k++) {
-        if (bst_vec3_norm(bst_vec3_sub(p[k], p[BST_SOURCE_MID])) > 0.0) {
-            return true;
-        }
-    }
-    return false;
-}
-
 /* Light further than this from the sensor's centre stays off it: the PSF's table ends before. */
 static double far_px(const bst_smear *s) {
     return s->half_diagonal_px + MAX_TAPS;
@@ -243,7 +233,8 @@ static double chords_of(const bst_smear *s, const bst_source *source) {
     double x[N + 1], y[N + 1], far = far_px(s), chords = 0.0;
     bool front[N + 1];
     for (int k = 0; k <= N; k++) {
-        front[k] = project(s, s->q_reference, bst_source_at(source, (double)k / N), &x[k], &y[k]);
+        front[k] =
+            project(s, s->q_reference, bst_source_direction(source, (double)k / N), &x[k], &y[k]);
     }
     for (int k = 0; k < N; k++) {
         if (!front[k] || !front[k + 1]) {
@@ -286,7 +277,7 @@ static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_source *source,
             t = s->duration_s > 0.0 ? t / s->duration_s : 0.0;
             bst_quat q =
                 bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
-            bool front = project(s, q, bst_source_at(source, t), &x, &y);
+            bool front = project(s, q, bst_source_direction(source, t), &x, &y);
             s->own_path[(*count)++] =
                 (bst_path_point){{front ? x - x0 : NAN, front ? y - y0 : NAN, 0.0}, t};
         }
@@ -324,8 +315,8 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
                             bst_scene_source *out, bool *visible) {
     double x, y, electrons = source->electrons_per_s * s->duration_s;
     s->last_peak_e = 0.0;
-    bool moving = moves(source);
-    bool front = project(s, s->q_reference, source->apparent[BST_SOURCE_MID], &x, &y);
+    bool moving = source->path != NULL;
+    bool front = project(s, s->q_reference, source->apparent_mid, &x, &y);
     *visible = !source->occulted && electrons > 0.0 && electrons < 1e30 && (front || moving);
     if (!*visible) {
         return BST_OK;

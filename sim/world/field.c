@@ -26,6 +26,8 @@ struct bst_field {
     int star_capacity;
     bst_source *sources;
     int source_capacity;
+    bst_source_path *paths; /* [path_capacity], of the objects among the sources */
+    int path_capacity;
     bst_quat q_mid;
     double exposure_s;
     bst_quat sigma_q[SIGMA_POINTS];
@@ -62,6 +64,7 @@ void bst_field_free(bst_field *field) {
         free(field->q);
         free(field->stars);
         free(field->sources);
+        free(field->paths);
         free(field);
     }
 }
@@ -230,7 +233,8 @@ bool bst_field_project(const bst_camera *camera, const bst_los_track *track, int
     double exposure = track->time_s[track->count - 1];
     double u = exposure > 0.0 ? track->time_s[k] / exposure : 0.5;
     return bst_camera_project(
-        camera, bst_quat_rotate(track->q_cam_from_gcrf[k], bst_source_at(source, u)), x_px, y_px);
+        camera, bst_quat_rotate(track->q_cam_from_gcrf[k], bst_source_direction(source, u)), x_px,
+        y_px);
 }
 
 static bst_status query_stars(bst_ctx *ctx, bst_field *field, bst_vec3 centre, double radius,
@@ -262,6 +266,18 @@ static bst_status reserve_sources(bst_ctx *ctx, bst_field *field, int count) {
     return BST_OK;
 }
 
+static bst_status reserve_paths(bst_ctx *ctx, bst_field *field, int count) {
+    if (count > field->path_capacity) {
+        free(field->paths);
+        field->paths = malloc((size_t)count * sizeof *field->paths);
+        field->path_capacity = field->paths ? count : 0;
+        if (!field->paths) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d objects", count);
+        }
+    }
+    return BST_OK;
+}
+
 static bool near_window(const bst_field *field, bst_quat q, bst_vec3 direction, bst_window window,
                         double margin_px) {
     double x, y;
@@ -271,38 +287,54 @@ static bool near_window(const bst_field *field, bst_quat q, bst_vec3 direction, 
            y <= window.y0 + window.height - 1 + margin_px;
 }
 
+/* Fills a source and its path; *there false when the object cannot be seen from where the observer
+ * is: decayed, or the observer itself. */
 static bst_status add_object(bst_ctx *ctx, bst_field *field, int object, double start_s,
-                             double end_s, bst_source *out, bool *visible_state) {
-    bst_sight sight[BST_SOURCE_NODES];
-    *visible_state = true;
-    for (int i = 0; i < BST_SOURCE_NODES; i++) {
-        double t = start_s + (end_s - start_s) * i / (BST_SOURCE_NODES - 1);
-        bst_status status = bst_view_sight(ctx, field->view, field->observer, object, t, &sight[i]);
+                             double end_s, bst_source_path *path, bst_source *out, bool *there) {
+    bst_sight mid = {.range_m = 0.0};
+    *there = false;
+    for (int i = 0; i < BST_PATH_NODES; i++) {
+        double t = start_s + (end_s - start_s) * i / (BST_PATH_NODES - 1);
+        bst_state eye, target;
+        bst_sight sight;
+        BST_TRY(bst_view_observer_state(ctx, field->view, field->observer, t, &eye));
+        bst_status status = bst_view_object_state(ctx, field->view, object, t, &target);
+        if (status == BST_OK) {
+            status = bst_view_sight(ctx, field->view, field->observer, object, t, &sight);
+        }
         if (status == BST_ERR_NUMERIC) {
-            *visible_state = false; /* decayed: no longer there */
             return BST_OK;
         }
         BST_TRY(status);
+        path->place[i] = bst_vec3_sub(target.position_m, eye.position_m);
+        bst_vec3 unit = bst_vec3_unit(path->place[i]);
+        bst_vec3 shift = bst_vec3_scale(bst_vec3_sub(eye.velocity_mps, target.velocity_mps),
+                                        1.0 / BST_LIGHT_SPEED_MPS);
+        double length = bst_vec3_dot(sight.apparent, bst_vec3_add(unit, shift));
+        if (i % 2 == 0) {
+            path->shift[i / 2] = bst_vec3_sub(bst_vec3_scale(sight.apparent, length), unit);
+        }
+        if (i == BST_PATH_NODES / 2) {
+            mid = sight;
+        }
     }
-    const bst_sight *mid = &sight[BST_SOURCE_MID];
-    if (!(mid->range_m > 0.0)) {
-        *visible_state = false; /* the observer itself */
+    if (!(mid.range_m > 0.0)) {
         return BST_OK;
     }
+    *there = true;
     *out = (bst_source){.kind = BST_SOURCE_OBJECT,
                         .id = (uint32_t)object,
-                        .v_mag = mid->v_mag,
-                        .sunlit_fraction = mid->sunlit_fraction,
-                        .phase_rad = mid->phase_rad,
-                        .range_m = mid->range_m,
-                        .occulted = mid->occulted};
-    for (int i = 0; i < BST_SOURCE_NODES; i++) {
-        out->apparent[i] = bst_vec3_scale(sight[i].apparent, sight[i].range_m / mid->range_m);
-    }
-    out->electrons_per_s = mid->occulted || isinf(mid->v_mag)
+                        .apparent_mid = mid.apparent,
+                        .path = path,
+                        .v_mag = mid.v_mag,
+                        .sunlit_fraction = mid.sunlit_fraction,
+                        .phase_rad = mid.phase_rad,
+                        .range_m = mid.range_m,
+                        .occulted = mid.occulted};
+    out->electrons_per_s = mid.occulted || isinf(mid.v_mag)
                                ? 0.0
-                               : bst_camera_electrons_per_s(field->camera, mid->v_mag);
-    bst_vec3_to_radec(mid->geometric, &out->ra_rad, &out->dec_rad);
+                               : bst_camera_electrons_per_s(field->camera, mid.v_mag);
+    bst_vec3_to_radec(mid.geometric, &out->ra_rad, &out->dec_rad);
     return BST_OK;
 }
 
@@ -315,7 +347,7 @@ static bool path_touches(const bst_field *field, const bst_source *s, bst_vec3 c
     double x[PIECES + 1], y[PIECES + 1], bend = 0.0;
     bool front[PIECES + 1];
     for (int k = 0; k <= PIECES; k++) {
-        at[k] = bst_source_at(s, (double)k / PIECES);
+        at[k] = bst_source_direction(s, (double)k / PIECES);
         x[k] = y[k] = 0.0;
         front[k] =
             bst_camera_project(field->camera, bst_quat_rotate(field->q_mid, at[k]), &x[k], &y[k]);
@@ -401,12 +433,12 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
         *s =
             (bst_source){.kind = BST_SOURCE_STAR,
                          .id = star->id,
+                         .apparent_mid = apparent,
                          .electrons_per_s = bst_camera_electrons_per_s(camera, (double)star->v_mag),
                          .v_mag = (double)star->v_mag,
                          .sunlit_fraction = NAN,
                          .phase_rad = NAN,
                          .range_m = INFINITY};
-        bst_source_set_path(s, apparent, apparent, apparent);
         /* the Earth hides stars too: a point far along the line of sight stands for the star */
         s->occulted =
             bst_earth_occults(eye.position_m, bst_vec3_axpy(eye.position_m, 1e12, star->icrs),
@@ -416,13 +448,16 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
         }
         bst_vec3_to_radec(star->icrs, &s->ra_rad, &s->dec_rad);
     }
+    BST_TRY(reserve_paths(ctx, field, object_count));
+    int objects = 0;
     for (int i = 0; i < object_count; i++) {
         bool there;
-        BST_TRY(add_object(ctx, field, i, start_s, end_s, &field->sources[n], &there));
-        if (!there) {
-            continue;
+        BST_TRY(add_object(ctx, field, i, start_s, end_s, &field->paths[objects],
+                           &field->sources[n], &there));
+        if (there && path_touches(field, &field->sources[n], centre, radius, window, margin_px)) {
+            n++;
+            objects++;
         }
-        n += path_touches(field, &field->sources[n], centre, radius, window, margin_px);
     }
     *sources = field->sources;
     *count = n;
@@ -452,7 +487,7 @@ static smear smear_of(const bst_field *field, const bst_source *source) {
     smear m = {0};
     double x[SIGMA_POINTS], y[SIGMA_POINTS];
     for (int p = 0; p < SIGMA_POINTS; p++) {
-        bst_vec3 d = bst_source_at(source, field->sigma_time[p]);
+        bst_vec3 d = bst_source_direction(source, field->sigma_time[p]);
         x[p] = y[p] = NAN;
         (void)bst_camera_project(field->camera, bst_quat_rotate(field->sigma_q[p], d), &x[p],
                                  &y[p]);
@@ -510,8 +545,7 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
     (void)bst_field_project(camera, track, 0, source, &out->x_start_px, &out->y_start_px);
     (void)bst_field_project(camera, track, track->count - 1, source, &out->x_end_px,
                             &out->y_end_px);
-    (void)bst_camera_project(camera,
-                             bst_quat_rotate(field->q_mid, source->apparent[BST_SOURCE_MID]),
+    (void)bst_camera_project(camera, bst_quat_rotate(field->q_mid, source->apparent_mid),
                              &out->x_mid_px, &out->y_mid_px);
     smear image = smear_of(field, source);
     out->x_mean_px = image.x_mean;

@@ -6,51 +6,63 @@
 #include "sim/core/messages.h"
 #include "sim/world/world.h"
 
-/* Where a source is in the course of an exposure: places at this many equidistant times from its
- * start to its end. */
-enum { BST_SOURCE_NODES = 5, BST_SOURCE_MID = BST_SOURCE_NODES / 2 };
+/* Apparent motion of an object during an exposure, at equidistant times from its start to its end.
+ * A near object passes along an almost straight line at almost constant speed: its place is what a
+ * polynomial follows, its direction is not. What light time and aberration add in direction is
+ * first of all the relative velocity over c, which changes little. Any unit of length. */
+enum { BST_PATH_NODES = 5 };
+typedef struct bst_source_path {
+    bst_vec3 place[BST_PATH_NODES]; /* object minus observer at the same instant, GCRF axes */
+    bst_vec3 shift[3]; /* at start, middle and end: place + |place| shift has the apparent direction
+                        */
+} bst_source_path;
 
 /* A source that may put light on the window. */
 typedef struct bst_source {
-    int32_t kind; /* bst_source_kind */
-    uint32_t id;  /* star: Tycho-2 identity; object: index in the world */
-    /* Apparent places relative to the observer, GCRF axes, in units of the range at mid-exposure
-     * ([BST_SOURCE_MID] has length 1). A near object passes along an almost straight line, whose
-     * direction alone no polynomial would follow. Stars: five times the same unit vector. */
-    bst_vec3 apparent[BST_SOURCE_NODES];
-    double electrons_per_s; /* detected, at mid exposure */
+    int32_t kind;                /* bst_source_kind */
+    uint32_t id;                 /* star: Tycho-2 identity; object: index in the world */
+    bst_vec3 apparent_mid;       /* at mid-exposure, GCRF axes, unit */
+    const bst_source_path *path; /* NULL: at rest; owned by who made the source */
+    double electrons_per_s;      /* detected, at mid exposure */
     double v_mag;
     double ra_rad, dec_rad; /* as in bst_truth_item */
     double sunlit_fraction, phase_rad, range_m;
-    bool occulted; /* objects: no light */
+    bool occulted; /* no light */
 } bst_source;
 
-/* Apparent place (of any length, see bst_source) at time u in [0, 1] of the exposure: the quartic
- * through the five places. For orbits of angular rate w about the Earth it misses the path by
+/* Apparent direction (any length) at time u in [0, 1] of the exposure: the quartic through the five
+ * places. For orbits of radius r and angular rate w about the Earth it misses the path by
  * 1e-3 r (w T / 2)^5: 1 um in LEO for an exposure T of 20 s. */
-static inline bst_vec3 bst_source_at(const bst_source *s, double u) {
-    if (s->kind == BST_SOURCE_STAR) {
-        return s->apparent[BST_SOURCE_MID];
+static inline bst_vec3 bst_source_direction(const bst_source *s, double u) {
+    if (!s->path) {
+        return s->apparent_mid;
     }
+    const bst_source_path *p = s->path;
     double a = 4.0 * u, b = a - 1.0, c = a - 2.0, d = a - 3.0, e = a - 4.0;
-    const double w[BST_SOURCE_NODES] = {b * c * d * e / 24.0, -a * c * d * e / 6.0,
-                                        a * b * d * e / 4.0, -a * b * c * e / 6.0,
-                                        a * b * c * d / 24.0};
-    bst_vec3 sum = bst_vec3_scale(s->apparent[0], w[0]);
-    for (int k = 1; k < BST_SOURCE_NODES; k++) {
-        sum = bst_vec3_axpy(sum, w[k], s->apparent[k]);
+    const double w[BST_PATH_NODES] = {b * c * d * e / 24.0, -a * c * d * e / 6.0,
+                                      a * b * d * e / 4.0, -a * b * c * e / 6.0,
+                                      a * b * c * d / 24.0};
+    bst_vec3 place = bst_vec3_scale(p->place[0], w[0]);
+    for (int k = 1; k < BST_PATH_NODES; k++) {
+        place = bst_vec3_axpy(place, w[k], p->place[k]);
     }
-    return sum;
+    bst_vec3 shift = bst_vec3_scale(p->shift[0], 0.125 * c * e);
+    shift = bst_vec3_axpy(shift, -0.25 * a * e, p->shift[1]);
+    shift = bst_vec3_axpy(shift, 0.125 * a * c, p->shift[2]);
+    return bst_vec3_axpy(place, bst_vec3_norm(place), shift);
 }
 
-/* Sets the places to the quadratic through three; thrice the same for a source at rest. */
-static inline void bst_source_set_path(bst_source *s, bst_vec3 start, bst_vec3 mid, bst_vec3 end) {
+/* A path whose direction is the quadratic through three (in apparent_mid's unit), for scenes that
+ * are not made of orbits. */
+static inline bst_source_path bst_source_path_through(bst_vec3 start, bst_vec3 mid, bst_vec3 end) {
+    bst_source_path path = {.place = {{0}}};
     bst_vec3 slope = bst_vec3_sub(end, start);
     bst_vec3 bend = bst_vec3_sub(bst_vec3_add(start, end), bst_vec3_scale(mid, 2.0));
-    for (int k = 0; k < BST_SOURCE_NODES; k++) {
-        double h = (k - BST_SOURCE_MID) / (BST_SOURCE_NODES - 1.0);
-        s->apparent[k] = bst_vec3_axpy(bst_vec3_axpy(mid, h, slope), 2.0 * h * h, bend);
+    for (int k = 0; k < BST_PATH_NODES; k++) {
+        double h = (k - 2) / (BST_PATH_NODES - 1.0);
+        path.place[k] = bst_vec3_axpy(bst_vec3_axpy(mid, h, slope), 2.0 * h * h, bend);
     }
+    return path;
 }
 
 /* The true attitude during an exposure, cut out of a los_history. */

@@ -119,13 +119,15 @@ static void moving_objects_have_their_own_tracks(void **state) {
     double cx = bst_camera_centre_x(&camera), cy = bst_camera_centre_y(&camera);
     bst_source tracked = scene_star(&camera, cx, cy, 4e4);
     tracked.kind = BST_SOURCE_OBJECT;
-    bst_vec3 middle = tracked.apparent[BST_SOURCE_MID];
-    bst_source_set_path(&tracked, bst_camera_unproject(&camera, cx + 3.75, cy + 1.25), middle,
-                        bst_camera_unproject(&camera, cx - 3.75, cy - 1.25));
+    bst_vec3 middle = tracked.apparent_mid;
+    bst_source_path path =
+        bst_source_path_through(bst_camera_unproject(&camera, cx + 3.75, cy + 1.25), middle,
+                                bst_camera_unproject(&camera, cx - 3.75, cy - 1.25));
+    tracked.path = &path;
     bst_assert_close(error_sigma(f, &camera, &demo, &tracked, 1, 1.0), 0.0, 0.05);
     bst_source crossing = tracked;
-    bst_source_set_path(&crossing, bst_camera_unproject(&camera, cx - 30.0, cy + 2.0), middle,
-                        bst_camera_unproject(&camera, cx + 30.0, cy + 5.0));
+    path = bst_source_path_through(bst_camera_unproject(&camera, cx - 30.0, cy + 2.0), middle,
+                                   bst_camera_unproject(&camera, cx + 30.0, cy + 5.0));
     scene_motion still = {.duration_s = 0.5, .samples = 2};
     bst_assert_close(error_sigma(f, &camera, &still, &crossing, 1, 1.0), 0.0, 0.05);
     still.jitter_px = 0.2;
@@ -144,7 +146,9 @@ static void near_passes_are_drawn_where_they_cross(void **state) {
     for (int c = 0; c < 2; c++) {
         bst_vec3 mid = bst_camera_unproject(&camera, 90.0, 70.0);
         bst_vec3 step = c == 0 ? (bst_vec3){0.15, 0.05, 0.0} : (bst_vec3){0.2, -0.3, 1.3};
-        bst_source_set_path(&pass, bst_vec3_sub(mid, step), mid, bst_vec3_add(mid, step));
+        bst_source_path path =
+            bst_source_path_through(bst_vec3_sub(mid, step), mid, bst_vec3_add(mid, step));
+        pass.path = &path;
         double error = error_sigma(f, &camera, &still, &pass, 1, 1.0);
         bst_assert_close(error, 0.0, 0.05);
     }
@@ -267,8 +271,7 @@ static void hard_cases(void **state) {
     bst_source none[4] = {star, star, star, star};
     none[0].occulted = true;
     none[1].electrons_per_s = 0.0;
-    const bst_vec3 behind = {0.0, 0.0, -1.0};
-    bst_source_set_path(&none[2], behind, behind, behind);
+    none[2].apparent_mid = (bst_vec3){0.0, 0.0, -1.0};
     none[3] = scene_star(&camera, 1e5, 0.0, 1e6);
     q.sources = none;
     q.count = 4;

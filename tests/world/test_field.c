@@ -99,7 +99,7 @@ static int dense_track(const scene *s, const bst_source *source, double *x, doub
             bst_quat q =
                 bst_quat_slerp(s->track.q_cam_from_gcrf[k], s->track.q_cam_from_gcrf[k + 1], f);
             double t = s->track.time_s[k] + f * (s->track.time_s[k + 1] - s->track.time_s[k]);
-            bst_vec3 d = bst_source_at(source, t / total);
+            bst_vec3 d = bst_source_direction(source, t / total);
             assert_true(n < MOST);
             assert_true(bst_camera_project(camera, bst_quat_rotate(q, d), &x[n], &y[n]));
             n++;
@@ -395,7 +395,8 @@ static void fast_passes_are_followed(void **state) {
         for (int i = 0; i <= 100; i++) {
             double u = i / 100.0;
             bst_assert_ok(&s.ctx, bst_view_sight(&s.ctx, view, 0, 2, u * duration, &sight));
-            double off = test_distance(bst_vec3_unit(bst_source_at(source, u)), sight.apparent);
+            double off =
+                test_distance(bst_vec3_unit(bst_source_direction(source, u)), sight.apparent);
             bst_assert_close(off / (0.5 * BST_ARCSEC_RAD), 0, cases[c].tolerance_px);
         }
         bst_view_free(view);
