@@ -40,7 +40,7 @@ typedef struct bst_config_desc {
                              is required */
     const char *doc;      /* one sentence */
     size_t offset, size;  /* of the member in its struct */
-    const char *const *choices;             /* ENUM: names, NULL-terminated */
+    const char *const *choices; /* ENUM: names, PATH: words that are no file; NULL-terminated */
     const struct bst_config_desc *children; /* OBJECT, LIST */
     size_t item_bytes;                      /* LIST: size of one struct */
 } bst_config_desc;
@@ -71,6 +71,12 @@ typedef struct bst_config_desc {
     {                                                                                  \
         .key = #m, .type = BST_CONFIG_PATH, .unit = "", .fallback = def_, .doc = doc_, \
         BST_FIELD_(s, m)                                                               \
+    }
+/* A file, or one of a NULL-terminated list of words. */
+#define BST_PATH_OR(s, m, words_, def_, doc_)                                          \
+    {                                                                                  \
+        .key = #m, .type = BST_CONFIG_PATH, .unit = "", .fallback = def_, .doc = doc_, \
+        .choices = words_, BST_FIELD_(s, m)                                            \
     }
 #define BST_SEED(s, m, def_, doc_)                                                     \
     {                                                                                  \

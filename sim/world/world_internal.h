@@ -5,6 +5,7 @@
 #include "sim/astro/sgp4.h"
 #include "sim/astro/sky_clock.h"
 #include "sim/world/knowledge.h"
+#include "sim/world/name_index.h"
 #include "sim/world/world_config.h"
 
 /* A burn with what it has made of the orbit; worked out once. */
@@ -16,11 +17,15 @@ typedef struct bst_burn {
 
 /* An orbit ready to be evaluated; immutable. */
 typedef struct bst_orbit {
-    bst_sgp4 *sgp4;        /* NULL: relative */
+    int32_t source; /* BST_ORBIT_... */
+    /* sgp4 */
+    bst_sgp4 *sgp4;
     double epoch_offset_s; /* scenario epoch minus element epoch */
+    /* relative */
     const struct bst_orbit *reference;
     double at_s;
     bst_vec3 offset_rtn_m, rate_rtn_mps;
+
     bst_burn *burns;
     int burn_count;
     const char *name; /* for messages; borrowed */
@@ -51,6 +56,7 @@ struct bst_world {
     bst_stars *stars;
     world_object *objects;
     int object_count;
+    bst_name_index *object_names;
     world_observer *observers;
     int observer_count;
 };

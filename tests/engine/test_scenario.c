@@ -63,7 +63,7 @@ static const bst_module_desc *const modules[] = {&gimbal_a, &gimbal_b, &tracker}
 static const bst_registry registry = {modules, 3};
 
 #define HEAD "\"boresight\": 1, \"epoch_utc\": \"2022-06-16T22:10:00Z\", \"duration_s\": 300"
-#define ORBIT "\"orbit\": {\"tle_file\": \"catalogue_2022-06.tle\", \"norad\": 39089}"
+#define ORBIT "\"orbit\": {\"elements_file\": \"catalogue_2022-06.tle\", \"norad\": 39089}"
 #define CAMERA "\"camera\": {\"pixel_scale_arcsec\": 3, \"aperture_m\": 0.15}"
 #define OBSERVER(name_, sensor_) \
     "{\"name\": \"" name_ "\", " ORBIT ", \"sensors\": [{" sensor_ "}]}"
@@ -243,7 +243,7 @@ static void paths_are_made_absolute(void **state) {
     /* relative to the scenario's folder, not to ours */
     bst_assert_ok(&ctx, read_named(&ctx, "scenarios/x.json", SCENARIO(""), &s));
     o = s.observers.items;
-    assert_string_equal(o->orbit.tle_file, expected);
+    assert_string_equal(o->orbit.elements_file, expected);
     assert_string_equal(s.world.star_catalogue, "default"); /* words stay words */
     assert_string_equal(s.world.earth_orientation, "builtin");
     bst_scenario_free(&s);
@@ -264,7 +264,7 @@ static void paths_are_made_absolute(void **state) {
     /* a file that is not there is left to those who open it */
     bst_assert_ok(&ctx, read_named(&ctx, "x.json", SCENARIO(""), &s));
     o = s.observers.items;
-    assert_string_equal(o->orbit.tle_file, "catalogue_2022-06.tle");
+    assert_string_equal(o->orbit.elements_file, "catalogue_2022-06.tle");
     bst_scenario_free(&s);
 
     /* deep down in the file system, so that the full path does not fit */
@@ -286,7 +286,7 @@ static void paths_are_made_absolute(void **state) {
     assert_int_equal(read_named(&ctx, "x.json", SCENARIO(""), &s), BST_ERR_CONFIG);
     assert_non_null(realpath("catalogue_2022-06.tle", expected));
     snprintf(message, sizeof message,
-             "x.json: /observers/0/orbit/tle_file: the full path of \"catalogue_2022-06.tle\" is "
+             "x.json: /observers/0/orbit/elements_file: the full path of \"catalogue_2022-06.tle\" is "
              "%zu bytes long (allowed: 511); move the file",
              strlen(expected));
     assert_string_equal(ctx.message, message);
