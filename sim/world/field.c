@@ -28,6 +28,7 @@ struct bst_field {
     int source_capacity;
     bst_source_path *paths; /* [path_capacity], of the objects among the sources */
     int path_capacity;
+    int *near; /* objects that may be in the field; room for all */
     bst_quat q_mid;
     double exposure_s;
     bst_quat sigma_q[SIGMA_POINTS];
@@ -46,7 +47,8 @@ bst_status bst_field_create(bst_ctx *ctx, const bst_world *world, int observer, 
     field->camera = bst_world_camera(world, observer, sensor);
     field->star_capacity = 4096;
     field->stars = malloc((size_t)field->star_capacity * sizeof *field->stars);
-    bst_status status = field->stars
+    field->near = malloc(((size_t)bst_world_object_count(world) + 1) * sizeof *field->near);
+    bst_status status = field->stars && field->near
                             ? bst_view_create(ctx, world, &field->view)
                             : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a field query");
     if (status != BST_OK) {
@@ -65,6 +67,7 @@ void bst_field_free(bst_field *field) {
         free(field->stars);
         free(field->sources);
         free(field->paths);
+        free(field->near);
         free(field);
     }
 }
@@ -291,33 +294,14 @@ static bool near_window(const bst_field *field, bst_quat q, bst_vec3 direction, 
  * is: decayed, or the observer itself. */
 static bst_status add_object(bst_ctx *ctx, bst_field *field, int object, double start_s,
                              double end_s, bst_source_path *path, bst_source *out, bool *there) {
-    bst_sight mid = {.range_m = 0.0};
+    bst_sight mid;
     *there = false;
-    for (int i = 0; i < BST_PATH_NODES; i++) {
-        double t = start_s + (end_s - start_s) * i / (BST_PATH_NODES - 1);
-        bst_state eye, target;
-        bst_sight sight;
-        BST_TRY(bst_view_observer_state(ctx, field->view, field->observer, t, &eye));
-        bst_status status = bst_view_object_state(ctx, field->view, object, t, &target);
-        if (status == BST_OK) {
-            status = bst_view_sight(ctx, field->view, field->observer, object, t, &sight);
-        }
-        if (status == BST_ERR_NUMERIC) {
-            return BST_OK;
-        }
-        BST_TRY(status);
-        path->place[i] = bst_vec3_sub(target.position_m, eye.position_m);
-        bst_vec3 unit = bst_vec3_unit(path->place[i]);
-        bst_vec3 shift = bst_vec3_scale(bst_vec3_sub(eye.velocity_mps, target.velocity_mps),
-                                        1.0 / BST_LIGHT_SPEED_MPS);
-        double length = bst_vec3_dot(sight.apparent, bst_vec3_add(unit, shift));
-        if (i % 2 == 0) {
-            path->shift[i / 2] = bst_vec3_sub(bst_vec3_scale(sight.apparent, length), unit);
-        }
-        if (i == BST_PATH_NODES / 2) {
-            mid = sight;
-        }
+    bst_status status =
+        bst_view_path(ctx, field->view, field->observer, object, start_s, end_s, path, &mid);
+    if (status == BST_ERR_NUMERIC) {
+        return BST_OK;
     }
+    BST_TRY(status);
     if (!(mid.range_m > 0.0)) {
         return BST_OK;
     }
@@ -420,8 +404,10 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     int star_count;
     BST_TRY(query_stars(ctx, field, centre, radius, options->v_limit,
                         2000.0 + (tt1 - 2451545.0 + tt2) / 365.25, &star_count));
-    int object_count = bst_world_object_count(field->world);
-    BST_TRY(reserve_sources(ctx, field, star_count + object_count));
+    int near_count;
+    BST_TRY(bst_view_near(ctx, field->view, field->observer, start_s, end_s, centre, radius,
+                          field->near, &near_count));
+    BST_TRY(reserve_sources(ctx, field, star_count + near_count));
     int n = 0;
     for (int i = 0; i < star_count; i++) {
         const bst_star *star = &field->stars[i];
@@ -448,11 +434,11 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
         }
         bst_vec3_to_radec(star->icrs, &s->ra_rad, &s->dec_rad);
     }
-    BST_TRY(reserve_paths(ctx, field, object_count));
+    BST_TRY(reserve_paths(ctx, field, near_count));
     int objects = 0;
-    for (int i = 0; i < object_count; i++) {
+    for (int i = 0; i < near_count; i++) {
         bool there;
-        BST_TRY(add_object(ctx, field, i, start_s, end_s, &field->paths[objects],
+        BST_TRY(add_object(ctx, field, field->near[i], start_s, end_s, &field->paths[objects],
                            &field->sources[n], &there));
         if (there && path_touches(field, &field->sources[n], centre, radius, window, margin_px)) {
             n++;
