@@ -20,6 +20,7 @@ struct bst_smear {
     double tail[MAX_TAPS / 2]; /* profile at r px from the centre, over the centre's */
     double tolerance[LEVELS];
     double half_diagonal_px;
+    double stretch; /* of the image by distortion where it is greatest */
 
     bst_los_track track;
     double dark_variance_e2, duration_s;
@@ -52,7 +53,12 @@ bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
     for (int n = 0; n < LEVELS; n++) {
         s->tolerance[n] = 0.03 * pow(10.0, -0.5 * n);
     }
-    s->half_diagonal_px = 0.5 * hypot((double)camera->width_px, (double)camera->height_px);
+    s->stretch = bst_camera_stretch(camera);
+    s->half_diagonal_px =
+        tan(bst_camera_half_diagonal_rad(camera)) / bst_camera_scale_rad(camera) * s->stretch;
+    if (!camera->geometry.general) {
+        s->half_diagonal_px = 0.5 * hypot((double)camera->width_px, (double)camera->height_px);
+    }
     return BST_OK;
 }
 
@@ -99,11 +105,22 @@ static bst_quat attitude_at(const bst_los_track *track, double time_s) {
     return bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
 }
 
-/* The camera's turn from the reference attitude as a path point: two tilts in pixels of image
- * motion, and roll by what it moves in the sensor's corners. */
+/* Turns a vector from camera axes to those of the focal plane (sign +1) or back (-1). */
+static bst_vec3 turned(const bst_smear *s, bst_vec3 v, double sign) {
+    if (!s->camera.geometry.general) {
+        return v;
+    }
+    double cs = s->camera.geometry.cos_rotation, sn = sign * s->camera.geometry.sin_rotation;
+    return (bst_vec3){cs * v.x + sn * v.y, cs * v.y - sn * v.x, v.z};
+}
+
+/* The camera's turn from the reference attitude as a path point, in the focal plane's axes: two
+ * tilts in pixels of image motion where the distortion stretches most, and roll by what it moves in
+ * the sensor's corners. */
 static bst_path_point attitude_point(const bst_smear *s, bst_quat q, double time) {
     bst_vec3 r = bst_quat_to_rotvec(bst_quat_mul(q, bst_quat_conj(s->q_reference)));
-    double scale = 1.0 / bst_camera_scale_rad(&s->camera);
+    r = turned(s, r, 1.0);
+    double scale = 1.0 / bst_camera_scale_rad(&s->camera) * s->stretch;
     return (bst_path_point){{r.x * scale, r.y * scale, r.z * s->half_diagonal_px}, time};
 }
 
@@ -127,12 +144,13 @@ static bst_status append_nodes(bst_ctx *ctx, bst_smear *s, const bst_node_list *
     return BST_OK;
 }
 
-/* Node of the camera's turn: v_node = M v_reference as a map of the tangent plane in pixels,
+/* Node of the camera's turn: v_node = M v_reference as a map of the undistorted tangent plane, in
+ * pixels and the focal plane's axes,
  * x' - x = ((m00 - m22) x + m01 y + m02 / a - x d) / (d + m22), d = a (m20 x + m21 y). */
 static void attitude_to_table(const bst_smear *s, const bst_node *node, float *t) {
-    double a = bst_camera_scale_rad(&s->camera);
+    double a = bst_camera_scale_rad(&s->camera), tilt = a / s->stretch;
     bst_quat q = bst_quat_from_rotvec(
-        (bst_vec3){node->p[0] * a, node->p[1] * a, node->p[2] / s->half_diagonal_px});
+        (bst_vec3){node->p[0] * tilt, node->p[1] * tilt, node->p[2] / s->half_diagonal_px});
     bst_mat3 m = bst_quat_to_mat3(q);
     double rows[BST_TABLE_ROWS] = {
         m.m[0][0] - m.m[2][2], m.m[0][1],     m.m[0][2] / a, m.m[1][0], m.m[1][1] - m.m[2][2],
@@ -144,11 +162,22 @@ static void attitude_to_table(const bst_smear *s, const bst_node *node, float *t
 
 /* Node of an own path: a shift of the image. */
 static void shift_to_table(const bst_smear *s, const bst_node *node, float *t) {
-    (void)s;
-    double rows[BST_TABLE_ROWS] = {0, 0, node->p[0], 0, 0, node->p[1], 0, 0, 1.0, node->weight};
+    double x = node->p[0] / s->stretch, y = node->p[1] / s->stretch;
+    double rows[BST_TABLE_ROWS] = {0, 0, x, 0, 0, y, 0, 0, 1.0, node->weight};
     for (int i = 0; i < BST_TABLE_ROWS; i++) {
         t[i * BST_BLOCK] = (float)rows[i];
     }
+}
+
+/* Largest share of light on one pixel over the scratch nodes, where the distortion stretches the
+ * image least. Spoils their places. */
+static double largest_share(bst_smear *s) {
+    double least = bst_camera_shrink(&s->camera) / s->stretch;
+    for (int n = 0; n < s->nodes.count && least < 1.0; n++) {
+        s->nodes.items[n].p[0] *= least;
+        s->nodes.items[n].p[1] *= least;
+    }
+    return bst_nodes_peak_share(s->nodes.items, s->nodes.count, s->sigma_px);
 }
 
 static bst_status make_level(bst_ctx *ctx, bst_smear *s, int n) {
@@ -185,7 +214,7 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_los_track *trac
         }
     }
     BST_TRY(make_level(ctx, s, 0));
-    s->star_share = bst_nodes_peak_share(s->nodes.items, s->nodes.count, s->sigma_px);
+    s->star_share = largest_share(s);
     return BST_OK;
 }
 
@@ -210,6 +239,8 @@ static int choose_radius(const bst_smear *s, double peak_e) {
     return r;
 }
 
+/* Place on the focal plane from the boresight, px, without the distortion, which the kernel adds;
+ * false when it has no image or one far away. */
 static bool project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, double *y) {
     bst_vec3 c = bst_quat_rotate(q, v);
     if (!bst_camera_project(&s->camera, c, x, y)) {
@@ -217,12 +248,21 @@ static bool project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, doubl
     }
     *x -= bst_camera_centre_x(&s->camera);
     *y -= bst_camera_centre_y(&s->camera);
-    return fabs(*x) < 1e6 && fabs(*y) < 1e6;
+    bool near = fabs(*x) < 1e6 && fabs(*y) < 1e6;
+    if (s->camera.geometry.general) {
+        c = turned(s, c, 1.0);
+        double f = 1.0 / (bst_camera_scale_rad(&s->camera) * c.z);
+        *x = c.x * f;
+        *y = c.y * f;
+    }
+    return near;
 }
 
-/* Light further than this from the sensor's centre stays off it: the PSF's table ends before. */
+/* Light further than this from the boresight (px, without distortion) stays off the sensor: the
+ * PSF's table ends before. */
 static double far_px(const bst_smear *s) {
-    return s->half_diagonal_px + MAX_TAPS;
+    return tan(bst_camera_half_diagonal_rad(&s->camera)) / bst_camera_scale_rad(&s->camera) +
+           MAX_TAPS / bst_camera_shrink(&s->camera);
 }
 
 /* How many chords the curved motion over the image wants: of a parabola they miss
@@ -246,16 +286,18 @@ static double chords_of(const bst_smear *s, const bst_source *source) {
         chords = fmax(chords, near ? N * step / far : 0.0);
         if (near && k > 0 && front[k - 1]) {
             double bend = hypot(x[k - 1] - 2.0 * x[k] + x[k + 1], y[k - 1] - 2.0 * y[k] + y[k + 1]);
-            chords = fmax(chords, N * sqrt(0.125 * bend / 0.002));
+            chords = fmax(chords, N * sqrt(0.125 * bend * s->stretch / 0.002));
         }
     }
     return fmin(chords, 1e4);
 }
 
 /* Neither end nor anything between is near the sensor. */
-static bool passes_by(const bst_path_point *a, const bst_path_point *b, double x0, double y0,
-                      double far) {
-    double ax = a->p[0] + x0, ay = a->p[1] + y0, bx = b->p[0] + x0, by = b->p[1] + y0;
+static bool passes_by(const bst_smear *s, const bst_path_point *a, const bst_path_point *b,
+                      double x0, double y0, double far) {
+    double f = 1.0 / s->stretch;
+    double ax = a->p[0] * f + x0, ay = a->p[1] * f + y0, bx = b->p[0] * f + x0,
+           by = b->p[1] * f + y0;
     return fmin(ax, bx) > far || fmax(ax, bx) < -far || fmin(ay, by) > far || fmax(ay, by) < -far;
 }
 
@@ -278,8 +320,8 @@ static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_source *source,
             bst_quat q =
                 bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
             bool front = project(s, q, bst_source_direction(source, t), &x, &y);
-            s->own_path[(*count)++] =
-                (bst_path_point){{front ? x - x0 : NAN, front ? y - y0 : NAN, 0.0}, t};
+            s->own_path[(*count)++] = (bst_path_point){
+                {front ? (x - x0) * s->stretch : NAN, front ? (y - y0) * s->stretch : NAN, 0.0}, t};
         }
     }
     return BST_OK;
@@ -295,7 +337,7 @@ static bst_status own_nodes(bst_ctx *ctx, bst_smear *s, int count, double x0, do
     for (int first = 0, last; first + 1 < count; first = last > first ? last : first + 1) {
         last = first;
         while (last + 1 < count && !isnan(p[last].p[0]) && !isnan(p[last + 1].p[0]) &&
-               !passes_by(&p[last], &p[last + 1], x0, y0, far)) {
+               !passes_by(s, &p[last], &p[last + 1], x0, y0, far)) {
             last++;
         }
         if (last > first) {
@@ -335,8 +377,7 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
             *visible = false;
             return BST_OK;
         }
-        s->last_peak_e =
-            electrons * bst_nodes_peak_share(s->nodes.items, s->nodes.count, s->sigma_px);
+        s->last_peak_e = electrons * largest_share(s);
         BST_TRY(own_nodes(ctx, s, count, x, y, s->tolerance[choose_level(s, s->last_peak_e)]));
         BST_TRY(append_nodes(ctx, s, &s->nodes, shift_to_table, &own));
         used = &own;

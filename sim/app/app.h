@@ -4,19 +4,17 @@
 #ifndef BST_APP_APP_H
 #define BST_APP_APP_H
 
-#include "sim/engine/scenario.h"
+#include "sim/app/registry.h"
 
 enum { BST_EXIT_OK = 0, BST_EXIT_FAILED = 1, BST_EXIT_USAGE = 2, BST_EXIT_INTERRUPTED = 130 };
 
 int bst_cmd_run(int argc, char **argv);
+int bst_cmd_info(int argc, char **argv);
 int bst_cmd_check(int argc, char **argv);
 int bst_cmd_schema(int argc, char **argv);
 int bst_cmd_stars(int argc, char **argv);
 int bst_cmd_propagate(int argc, char **argv);
 int bst_cmd_bench(int argc, char **argv);
-
-/* Every module that a scenario can name. */
-const bst_registry *bst_app_registry(void);
 
 /* Log sink that writes to standard error: "boresight: warning: ...". */
 void bst_app_log(void *user, bst_log_level level, const char *message);

@@ -12,8 +12,8 @@
 #include "sim/app/app.h"
 #include "sim/app/bench.h"
 #include "sim/app/json_number.h"
-#include "sim/app/options.h"
-#include "sim/app/version.h"
+#include "sim/app/load.h"
+#include "sim/core/version.h"
 #include "sim/device/device.h"
 #include "sim/io/manifest.h"
 
@@ -113,8 +113,8 @@ static cJSON *machine(void) {
     }
     cJSON_AddStringToObject(node, "processor", model);
     cJSON_AddNumberToObject(node, "processors", (double)sysconf(_SC_NPROCESSORS_ONLN));
-    cJSON_AddStringToObject(node, "version", BST_VERSION);
-    cJSON_AddStringToObject(node, "git_revision", BST_GIT_REVISION);
+    cJSON_AddStringToObject(node, "version", bst_version());
+    cJSON_AddStringToObject(node, "git_revision", bst_git_revision());
     return node;
 }
 
@@ -215,18 +215,7 @@ int bst_cmd_bench(int argc, char **argv) {
          .target = &json,
          .argument = "FILE",
          .doc = "write the results there"},
-        {.name = "device",
-         .kind = BST_OPTION_TEXT,
-         .target = &options.device,
-         .argument = "NAME",
-         .doc = "OpenCL device (default PoCL)"},
-        {.name = "threads",
-         .kind = BST_OPTION_INT,
-         .target = &threads,
-         .argument = "N",
-         .doc = "threads for the OpenCL device (default all)",
-         .minimum = 1,
-         .maximum = 1024},
+        BST_DEVICE_OPTIONS(options.device, threads),
         {.name = "tle",
          .kind = BST_OPTION_TEXT,
          .target = &options.tle_file,

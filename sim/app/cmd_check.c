@@ -56,6 +56,9 @@ int bst_cmd_check(int argc, char **argv) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "one scenario file is expected, %d were given", arguments);
         return bst_options_misuse(&ctx, "check");
     }
+    if (bst_load_check(&ctx, &load) != BST_OK) {
+        return bst_options_misuse(&ctx, "check");
+    }
     bst_json *json = NULL;
     bst_scenario scenario;
     if (bst_load_scenario(&ctx, argv[1], &load, &json, &scenario) != BST_OK) {

@@ -24,6 +24,13 @@ static bst_status apply(bst_ctx *ctx, const bst_load_options *options, bst_json 
     return BST_OK;
 }
 
+bst_status bst_load_check(bst_ctx *ctx, const bst_load_options *options) {
+    for (int i = 0; i < options->set.count; i++) {
+        BST_TRY(bst_json_check_assignment(ctx, options->set.items[i]));
+    }
+    return BST_OK;
+}
+
 bst_status bst_load_scenario(bst_ctx *ctx, const char *path, const bst_load_options *options,
                              bst_json **json, bst_scenario *out) {
     BST_TRY(bst_json_load(ctx, path, json));

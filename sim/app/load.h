@@ -41,6 +41,23 @@ typedef struct bst_load_options {
 #define BST_LOAD_DEFAULTS \
     { .duration_s = -1.0, .run = -1 }
 
+/* Entries of an options table that choose the OpenCL device: `device_` is a const char *,
+ * `threads_` an int64_t. */
+#define BST_DEVICE_OPTIONS(device_, threads_)                                                \
+    {.name = "device",                                                                       \
+     .kind = BST_OPTION_TEXT,                                                                \
+     .target = &(device_),                                                                   \
+     .argument = "NAME",                                                                     \
+     .doc = "OpenCL device: part of its name, or PLATFORM:DEVICE by number (default PoCL)"}, \
+    {                                                                                        \
+        .name = "threads", .kind = BST_OPTION_INT, .target = &(threads_), .argument = "N",   \
+        .doc = "threads for the OpenCL device (default all)", .minimum = 1, .maximum = 1024  \
+    }
+
+/* Whether the overrides have the form /path=value; BST_ERR_ARGUMENT when one has not: the command
+ * was called wrongly. */
+bst_status bst_load_check(bst_ctx *ctx, const bst_load_options *options) BST_MUST_CHECK;
+
 /* Loads `path`, applies the options, reads the scenario. *json is kept for as long as the scenario;
  * free both. */
 bst_status bst_load_scenario(bst_ctx *ctx, const char *path, const bst_load_options *options,

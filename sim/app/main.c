@@ -2,7 +2,7 @@
 #include <string.h>
 
 #include "sim/app/app.h"
-#include "sim/app/version.h"
+#include "sim/core/version.h"
 
 typedef struct command {
     const char *name;
@@ -12,6 +12,7 @@ typedef struct command {
 
 static const command commands[] = {
     {"run", bst_cmd_run, "run a scenario"},
+    {"info", bst_cmd_info, "what the folder of a run holds"},
     {"check", bst_cmd_check, "validate a scenario and print it with every default written out"},
     {"schema", bst_cmd_schema, "print the JSON Schema of scenarios"},
     {"stars", bst_cmd_stars, "get, import or describe the star catalogue"},
@@ -60,7 +61,7 @@ int main(int argc, char **argv) {
         return BST_EXIT_OK;
     }
     if (strcmp(argv[1], "--version") == 0) {
-        printf("boresight %s (%s)\n", BST_VERSION, BST_GIT_REVISION);
+        printf("boresight %s (%s)\n", bst_version(), bst_git_revision());
         return BST_EXIT_OK;
     }
     for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {

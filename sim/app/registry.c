@@ -1,8 +1,9 @@
+#include "sim/app/registry.h"
+
 #include "control/modules.h"
 #include "gimbal/modules.h"
 #include "imgproc/imgproc.h"
 #include "scenegen/module.h"
-#include "sim/app/app.h"
 #include "tracker/module.h"
 
 static const bst_module_desc *const modules[] = {

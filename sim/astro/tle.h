@@ -44,7 +44,8 @@ typedef struct bst_tle_options {
  * dropped. options NULL: all sets, no bad ones. *out: array of *count > 0 sets in the order of the
  * file, freed with free(); NULL and 0 on error. Errors start with "path:line: "; BST_ERR_FORMAT for
  * content, also when there is no set at all; BST_ERR_NOT_FOUND when there is no such file or no set
- * of options->norad; BST_ERR_IO when it cannot be read, is a directory or is over 1 GiB. */
+ * of options->norad; BST_ERR_IO when it cannot be read or is no regular file; BST_ERR_FORMAT
+ * also when it is over 256 MiB. */
 bst_status bst_tle_load(bst_ctx *ctx, const char *path, const bst_tle_options *options,
                         bst_elements **out, int *count) BST_MUST_CHECK;
 

@@ -1,13 +1,12 @@
 /* Element-set files: lines to sets. */
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #include "sim/astro/tle_internal.h"
+#include "sim/core/file.h"
 
-#define MAX_FILE_BYTES ((size_t)1 << 30)
+#define MAX_FILE_BYTES ((uint64_t)256 << 20)
 
 typedef struct reader {
     bst_tle_source source;
@@ -142,7 +141,10 @@ bst_status bst_tle_read_buffer(bst_ctx *ctx, const char *name, const char *data,
     *out = NULL;
     *count = 0;
     reader r = {.source = {ctx, name}};
-    bst_status status = bytes > 0 ? read_lines(&r, data, bytes, options) : BST_OK;
+    bst_status status = bst_file_check_text(ctx, name, data, bytes);
+    if (status == BST_OK && bytes > 0) {
+        status = read_lines(&r, data, bytes, options);
+    }
     if (status == BST_OK && r.count == 0) {
         if (bytes == 0) {
             status = bst_fail(ctx, BST_ERR_FORMAT,
@@ -167,66 +169,15 @@ bst_status bst_tle_read_buffer(bst_ctx *ctx, const char *name, const char *data,
     return BST_OK;
 }
 
-static bst_status read_stream(bst_ctx *ctx, const char *path, FILE *file, char **data,
-                              size_t *bytes) {
-    size_t capacity = 0, used = 0;
-    char *buffer = NULL;
-    for (;;) {
-        if (used == capacity) {
-            capacity = capacity ? 2 * capacity : 65536;
-            char *larger = capacity <= MAX_FILE_BYTES ? realloc(buffer, capacity) : NULL;
-            if (!larger) {
-                free(buffer);
-                return capacity > MAX_FILE_BYTES
-                           ? bst_fail(ctx, BST_ERR_IO,
-                                      "%.400s: over 1 GiB, too large for a file of element sets",
-                                      path)
-                           : bst_fail(ctx, BST_ERR_MEMORY, "%.400s: no memory for %zu bytes", path,
-                                      capacity);
-            }
-            buffer = larger;
-        }
-        size_t got = fread(buffer + used, 1, capacity - used, file);
-        used += got;
-        if (got == 0) {
-            break;
-        }
-    }
-    if (ferror(file)) {
-        int error = errno;
-        free(buffer);
-        return bst_fail(ctx, BST_ERR_IO, "%.400s: cannot be read: %s", path, strerror(error));
-    }
-    *data = buffer;
-    *bytes = used;
-    return BST_OK;
-}
-
 bst_status bst_tle_load(bst_ctx *ctx, const char *path, const bst_tle_options *options,
                         bst_elements **out, int *count) {
     *out = NULL;
     *count = 0;
-    struct stat info;
-    FILE *file = fopen(path, "rb");
-    if (!file) {
-        int error = errno;
-        return bst_fail(ctx, error == ENOENT ? BST_ERR_NOT_FOUND : BST_ERR_IO,
-                        "%.400s: cannot be opened: %s; give a file of two-line element sets", path,
-                        strerror(error));
-    }
-    bst_status status = BST_OK;
-    char *data = NULL;
-    size_t bytes = 0;
-    if (fstat(fileno(file), &info) == 0 && S_ISDIR(info.st_mode)) {
-        status = bst_fail(ctx, BST_ERR_IO,
-                          "%.400s: is a directory; give a file of two-line element sets", path);
-    } else {
-        status = read_stream(ctx, path, file, &data, &bytes);
-    }
-    fclose(file);
-    if (status == BST_OK) {
-        status = bst_tle_read_buffer(ctx, path, data, bytes, options, out, count);
-    }
+    char *data;
+    size_t bytes;
+    BST_TRY(
+        bst_file_read(ctx, path, MAX_FILE_BYTES, "a file of two-line element sets", &data, &bytes));
+    bst_status status = bst_tle_read_buffer(ctx, path, data, bytes, options, out, count);
     free(data);
     return status;
 }

@@ -108,8 +108,8 @@ typedef struct bst_config_desc {
     { .key = NULL }
 
 /* A parsed JSON document: text strictly checked (UTF-8, the grammar of RFC 8259, no trailing
- * garbage, no duplicate keys, no numbers beyond double, no \u0000, depth at most 64, size bounded).
- */
+ * garbage, no duplicate keys, no numbers beyond double, no \u0000, depth at most 64, at most
+ * 8 million values, size bounded). */
 typedef struct bst_json bst_json;
 struct cJSON;
 
@@ -121,6 +121,8 @@ void bst_json_free(bst_json *json);
 struct cJSON *bst_json_root(const bst_json *json);
 const char *bst_json_name(const bst_json *json);
 
+/* Whether an override has the form "/json/path=value"; BST_ERR_ARGUMENT when not. */
+bst_status bst_json_check_assignment(bst_ctx *ctx, const char *assignment) BST_MUST_CHECK;
 /* Applies one override "/json/path=value" (JSON pointer; value is JSON text, or a bare word taken
  * as a string). Objects on the way are made when missing; array elements must exist. */
 bst_status bst_json_set(bst_ctx *ctx, bst_json *json, const char *assignment) BST_MUST_CHECK;
@@ -131,6 +133,10 @@ bst_status bst_json_set(bst_ctx *ctx, bst_json *json, const char *assignment) BS
 bst_status bst_config_read(bst_ctx *ctx, const bst_json *json, const struct cJSON *node,
                            const char *path, const bst_config_desc *table,
                            void *object) BST_MUST_CHECK;
+/* Says what is wrong with a value, in the words of bst_config_read: "FILE: PATH: WHAT (found VALUE;
+ * allowed: ALLOWED)". BST_ERR_CONFIG. */
+bst_status bst_config_fail(bst_ctx *ctx, const char *file, const char *path,
+                           const struct cJSON *value, const char *what, const char *allowed);
 /* Frees the lists inside an object that bst_config_read filled. */
 void bst_config_free(const bst_config_desc *table, void *object);
 /* Fills `object` with the table's defaults (every key must have one); for tests and typed callers.

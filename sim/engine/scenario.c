@@ -173,6 +173,12 @@ static bst_status resolve_paths(bst_ctx *ctx, const bst_scenario *s, const char 
 
 static bst_status read_delays(bst_ctx *ctx, const bst_scenario *scenario, const cJSON *node,
                               const char *path, bst_module_config *module) {
+    char where[400];
+    snprintf(where, sizeof where, "%s/delay_s", path);
+    if (node && !cJSON_IsObject(node)) {
+        return bst_config_fail(ctx, scenario->file, where, node, "wrong type",
+                               "an object of seconds by channel");
+    }
     for (const cJSON *item = node ? node->child : NULL; item; item = item->next) {
         int port = -1;
         char inputs[300] = "";
@@ -194,9 +200,10 @@ static bst_status read_delays(bst_ctx *ctx, const bst_scenario *scenario, const 
                             scenario->file, path, item->string, inputs);
         }
         if (!cJSON_IsNumber(item) || !(item->valuedouble >= 0.0 && item->valuedouble <= 1e6)) {
-            return bst_fail(ctx, BST_ERR_CONFIG,
-                            "%s: %s/delay_s/%s: a number of seconds from 0 to 1e6 is expected",
-                            scenario->file, path, item->string);
+            snprintf(where, sizeof where, "%s/delay_s/%s", path, item->string);
+            return bst_config_fail(ctx, scenario->file, where, item,
+                                   cJSON_IsNumber(item) ? "out of range" : "wrong type",
+                                   "a number from 0 to 1e6 s");
         }
         if (module->delay_count == BST_MAX_DELAYS) {
             return bst_fail(ctx, BST_ERR_CONFIG, "%s: %s/delay_s: too many delays", scenario->file,
@@ -224,8 +231,8 @@ static bst_status read_module(bst_ctx *ctx, const bst_json *json, const bst_regi
                         scenario->file, path, names);
     }
     if (!cJSON_IsObject(node)) {
-        return bst_fail(ctx, BST_ERR_CONFIG, "%s: %s: an object with a \"type\" is expected",
-                        scenario->file, path);
+        return bst_config_fail(ctx, scenario->file, path, node, "wrong type",
+                               "an object with a \"type\"");
     }
     cJSON *common_part = part_of(node, true), *own_part = part_of(node, false);
     common_config common;
@@ -294,8 +301,7 @@ static bst_status read_modules(bst_ctx *ctx, const bst_json *json, const bst_reg
                 char path[200];
                 snprintf(path, sizeof path, "/observers/%d/sensors/%d/modules", i, s);
                 if (block && !cJSON_IsObject(block)) {
-                    return bst_fail(ctx, BST_ERR_CONFIG, "%s: %s: an object is expected", out->file,
-                                    path);
+                    return bst_config_fail(ctx, out->file, path, block, "wrong type", "an object");
                 }
                 if (pass == 0) {
                     total += cJSON_GetArraySize(block);
@@ -380,6 +386,9 @@ bst_status bst_scenario_read(bst_ctx *ctx, const bst_json *json, const bst_regis
     if (bst_seconds_to_ticks(ctx, out->tick_rate_hz, out->duration_s, &out->duration_ticks) !=
         BST_OK) {
         return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: /duration_s", out->file);
+    }
+    if (bst_record_config_check(ctx, &out->record) != BST_OK) {
+        return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s", out->file);
     }
     BST_TRY(check_names(ctx, out));
     BST_TRY(resolve_paths(ctx, out, "", bst_scenario_table, out, false));

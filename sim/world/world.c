@@ -38,6 +38,12 @@ static bst_status make_observers(const bst_world_builder *b, const bst_config_li
         }
         for (int s = 0; s < config->sensors.count; s++) {
             observer->sensors[s].config = ((const bst_sensor_config *)config->sensors.items)[s];
+            bst_status status = bst_camera_prepare(b->ctx, &observer->sensors[s].config.camera);
+            if (status != BST_OK) {
+                return bst_fail_prefix(b->ctx, status,
+                                       "%s: /observers/%d/sensors/%d/camera/distortion",
+                                       b->scenario, i, s);
+            }
         }
     }
     return BST_OK;
@@ -59,6 +65,10 @@ static bst_status build(bst_world_builder *b, const bst_world_config *config,
         return bst_fail_prefix(b->ctx, status, "%s: /epoch_utc", b->scenario);
     }
     BST_TRY(open_stars(b, config->star_catalogue, "/world/star_catalogue", &world->stars));
+    if (config->faint_stars == BST_FAINT_STATISTICAL) {
+        world->faint_limit_v_mag = config->faint_limit_v_mag;
+        BST_TRY(bst_faint_sky_create(b->ctx, world->stars, config->faint_seed, &world->faint));
+    }
     BST_TRY(bst_sky_clock_create(b->ctx, world->eop, &b->clock));
     BST_TRY(bst_world_build_objects(b, config));
     BST_TRY(make_observers(b, observers));
@@ -105,6 +115,7 @@ void bst_world_free(bst_world *world) {
     bst_name_index_free(world->object_names);
     free(world->objects);
     free(world->observers);
+    bst_faint_sky_free(world->faint);
     bst_stars_close(world->stars);
     bst_eop_free(world->eop);
     free(world);

@@ -1,6 +1,7 @@
 #include "sim/world/world_config.h"
 
 static const char *const orbit_sources[] = {"sgp4", "relative", NULL};
+static const char *const faint_kinds[] = {"none", "statistical", NULL};
 static const char *const axes[] = {"x", "-x", "y", "-y", NULL};
 
 static const bst_config_desc orbit_table[] = {
@@ -59,6 +60,14 @@ const bst_config_desc bst_world_config_table[] = {
         bst_world_config, star_catalogue, catalogue_words, "\"default\"",
         "\"default\" (the user's full catalogue, else the embedded one), \"embedded\", or a file, "
         "relative to the scenario's folder."),
+    BST_ENUM(bst_world_config, faint_stars, faint_kinds, "\"none\"",
+             "Stars beyond the catalogue's limit: none, or drawn by place from a table of star "
+             "counts. The onboard side does not know them."),
+    BST_REAL(bst_world_config, faint_limit_v_mag, "mag", 6, 21, "16",
+             "Statistical stars are drawn one by one down to this V (and the renderer's v_limit); "
+             "those fainter add to the background."),
+    BST_SEED(bst_world_config, faint_seed, "\"0x5ca1ab1edeadbeef\"",
+             "Seed of the statistical sky, a hexadecimal string: the same sky in all runs."),
     BST_PATH_OR(bst_world_config, earth_orientation, builtin_word, "\"builtin\"",
                 "\"builtin\" or a file in the IERS EOP C04 format."),
     BST_LIST(bst_world_config, objects, bst_object_config, object_table, 0, 100000, "[]",

@@ -36,8 +36,13 @@ typedef struct bst_catalogue_config {
     double area_m2, albedo;  /* of every object */
 } bst_catalogue_config;
 
+enum { BST_FAINT_NONE, BST_FAINT_STATISTICAL };
+
 typedef struct bst_world_config {
-    char star_catalogue[512];    /* "default", "embedded" or a path as above */
+    char star_catalogue[512]; /* "default", "embedded" or a path as above */
+    int32_t faint_stars;      /* BST_FAINT_... */
+    double faint_limit_v_mag; /* single stars down to this V */
+    uint64_t faint_seed;
     char earth_orientation[512]; /* "builtin" or a path as above */
     bst_config_list objects;     /* bst_object_config */
     bst_config_list catalogues;  /* bst_catalogue_config */

@@ -4,8 +4,10 @@
 
 #include "sim/astro/sgp4.h"
 #include "sim/astro/sky_clock.h"
+#include "sim/world/faint_stars.h"
 #include "sim/world/knowledge.h"
 #include "sim/world/name_index.h"
+#include "sim/world/star_index.h"
 #include "sim/world/world_config.h"
 
 /* A burn with what it has made of the orbit; worked out once. */
@@ -54,6 +56,8 @@ struct bst_world {
     bst_time epoch;
     bst_eop *eop;
     bst_stars *stars;
+    bst_faint_sky *faint; /* NULL: no statistical stars */
+    double faint_limit_v_mag;
     world_object *objects;
     int object_count;
     bst_name_index *object_names;
@@ -70,6 +74,9 @@ struct bst_knowledge {
     int observer, sensor;
     double julian_year;
 };
+
+/* The catalogue's cells and records; lent. */
+const bst_star_view *bst_stars_records(const bst_stars *stars);
 
 /* State at `seconds` after the scenario's epoch; `with_burns` false gives the orbit as catalogued.
  */

@@ -75,8 +75,11 @@ class Messages(unittest.TestCase):
                      "{\"frames\": 1}}", ": .*/imgproc/delay_s/frames: not an input .*allowed: frame")
 
     def test_override_that_is_none(self):
-        self.fails(1, "--set duration_s=3: expected /json/path=value", "run", runs.TRACK, "--out",
-                   self.out, "--set", "duration_s=3")
+        for command in (("run", runs.TRACK, "--out", self.out), ("check", runs.TRACK)):
+            self.fails(2, "--set duration_s=3: expected /json/path=value", *command, "--set",
+                       "duration_s=3")
+            self.fails(2, "--set /duration_s: expected /json/path=value", *command, "--set",
+                       "/duration_s")
         self.fails(1, 'there is no element "3"', "run", runs.TRACK, "--out", self.out, "--set",
                    "/observers/3/name=x")
 

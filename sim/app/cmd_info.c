@@ -1,0 +1,505 @@
+/* boresight info: what a run's folder holds. */
+#include <dirent.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include <cjson/cJSON.h>
+
+#include "sim/app/app.h"
+#include "sim/app/json_number.h"
+#include "sim/app/options.h"
+#include "sim/astro/time.h"
+#include "sim/io/fits_reader.h"
+#include "sim/io/run_reader.h"
+
+static const cJSON *get(const cJSON *node, const char *key) {
+    return cJSON_GetObjectItemCaseSensitive(node, key);
+}
+
+static const char *text_of(const cJSON *node, const char *key, const char *fallback) {
+    const cJSON *item = get(node, key);
+    return cJSON_IsString(item) ? item->valuestring : fallback;
+}
+
+static double number_of(const cJSON *node, const char *key) {
+    const cJSON *item = get(node, key);
+    return cJSON_IsNumber(item) ? item->valuedouble : NAN;
+}
+
+/* Copies a member when it is there, else makes it null. */
+static void copy(cJSON *to, const char *key, const cJSON *from, const char *from_key) {
+    const cJSON *item = get(from, from_key);
+    cJSON_AddItemToObject(to, key, item ? cJSON_Duplicate(item, true) : cJSON_CreateNull());
+}
+
+/* A query's rows handed to `add`; a failure becomes a problem of the run. */
+static void each_row(bst_run_reader *run, const char *sql, int64_t parameter,
+                     void (*add)(cJSON *to, const bst_rows *rows), cJSON *to) {
+    bst_ctx ctx = {0};
+    bst_rows *rows = NULL;
+    bool more = false;
+    if (!bst_run_reader_has_tables(run)) {
+        return;
+    }
+    bst_status status = bst_rows_open(&ctx, run, sql, parameter, 0, &rows);
+    while (status == BST_OK && (status = bst_rows_next(&ctx, rows, &more)) == BST_OK && more) {
+        add(to, rows);
+    }
+    bst_rows_close(rows);
+    if (status != BST_OK) {
+        bst_run_reader_note_problem(run, "%s", ctx.message);
+    }
+}
+
+/* ------------------------------------------------------------------ what is gathered */
+
+static void add_span(bst_run_reader *run, cJSON *out) {
+    const cJSON *manifest = bst_run_reader_manifest(run), *scenario = bst_run_reader_scenario(run);
+    const char *epoch = text_of(manifest, "epoch_utc", text_of(scenario, "epoch_utc", ""));
+    double rate = number_of(scenario, "tick_rate_hz");
+    double last = number_of(manifest, "last_tick");
+    double simulated = number_of(scenario, "duration_s");
+    if (bst_run_reader_state(run) != BST_RUN_COMPLETE) {
+        if (isnan(last)) {
+            last = (double)bst_run_reader_int(run, "SELECT max(end_tick) FROM frames", 0, -1);
+            last =
+                fmax(last, (double)bst_run_reader_int(run, "SELECT max(tick) FROM control", 0, -1));
+        }
+        simulated = (last + 1.0) / rate;
+    }
+    bst_time start;
+    bst_ctx unheard = {0};
+    char text[2][40] = {"", ""};
+    if (*epoch && bst_time_from_utc(&unheard, epoch, &start) == BST_OK) {
+        bst_time_to_utc(start, 3, text[0], sizeof text[0]);
+        if (isfinite(simulated)) {
+            bst_time_to_utc(bst_time_add(start, simulated), 3, text[1], sizeof text[1]);
+        }
+    }
+    cJSON_AddStringToObject(out, "start_utc", text[0]);
+    cJSON_AddStringToObject(out, "end_utc", text[1]);
+    bst_json_add_number(out, "simulated_s", simulated);
+}
+
+static void add_identity(bst_run_reader *run, cJSON *out) {
+    const cJSON *manifest = bst_run_reader_manifest(run), *scenario = bst_run_reader_scenario(run);
+    cJSON_AddStringToObject(out, "folder", bst_run_reader_folder(run));
+    static const char *const words[] = {[BST_RUN_COMPLETE] = "complete",
+                                        [BST_RUN_INTERRUPTED] = "interrupted",
+                                        [BST_RUN_RUNNING] = "running",
+                                        [BST_RUN_KILLED] = "killed"};
+    cJSON_AddStringToObject(out, "state", words[bst_run_reader_state(run)]);
+    copy(out, "scenario", scenario ? scenario : manifest, scenario ? "name" : "scenario");
+    copy(out, "scenario_file", manifest, "scenario_file");
+    copy(out, "version", manifest, "version");
+    copy(out, "git_revision", manifest, "git_revision");
+    copy(out, "seed", manifest ? manifest : scenario, "seed");
+    copy(out, "run", manifest ? manifest : scenario, "run");
+    copy(out, "device", manifest, "device");
+    copy(out, "star_catalogue", manifest, "star_catalogue");
+    copy(out, "stars", manifest, "stars");
+    copy(out, "wall_time_s", manifest, "wall_time_s");
+    copy(out, "warnings", manifest, "warnings");
+    add_span(run, out);
+}
+
+static void put_program(cJSON *to, const bst_rows *rows) {
+    /* "boresight 0.1.0" */
+    const char *text = bst_rows_text(rows, 0), *space = strchr(text, ' ');
+    cJSON_ReplaceItemInObjectCaseSensitive(to, "version",
+                                           cJSON_CreateString(space ? space + 1 : text));
+}
+
+static void put_sensor(cJSON *to, const bst_rows *rows) {
+    cJSON *node = cJSON_CreateObject();
+    cJSON_AddNumberToObject(node, "sensor", (double)bst_rows_int(rows, 0));
+    cJSON_AddStringToObject(node, "observer", bst_rows_text(rows, 1));
+    cJSON_AddStringToObject(node, "name", bst_rows_text(rows, 2));
+    cJSON_AddStringToObject(node, "target", bst_rows_text(rows, 3));
+    cJSON_AddStringToObject(node, "file", bst_rows_text(rows, 4));
+    cJSON_AddNumberToObject(node, "width_px", (double)bst_rows_int(rows, 5));
+    cJSON_AddNumberToObject(node, "height_px", (double)bst_rows_int(rows, 6));
+    cJSON_AddItemToArray(to, node);
+}
+
+/* What the sensor's FITS file holds. */
+static void add_file(bst_run_reader *run, cJSON *sensor, int64_t kept) {
+    const char *name = text_of(sensor, "file", "");
+    char path[4096];
+    struct stat info;
+    bst_ctx ctx = {0};
+    bst_fits_reader *fits = NULL;
+    bool complete = bst_run_reader_state(run) == BST_RUN_COMPLETE;
+    /* a name from a damaged database is not to lead out of the folder */
+    bool usable = *name && !strchr(name, '/') &&
+                  bst_run_reader_file(&ctx, run, name, path, sizeof path) == BST_OK;
+    if (!usable || stat(path, &info) != 0) {
+        if (usable && kept > 0) {
+            bst_run_reader_note_problem(run, "%s is missing", name);
+        }
+        cJSON_AddNumberToObject(sensor, "frames_in_file", 0);
+        return;
+    }
+    cJSON_AddNumberToObject(sensor, "file_bytes", (double)info.st_size);
+    if (bst_fits_reader_open(&ctx, path, &fits) != BST_OK) {
+        /* a run that was killed early leaves a file without a whole header */
+        if (complete) {
+            bst_run_reader_note_problem(run, "%s", ctx.message);
+        }
+        cJSON_AddNumberToObject(sensor, "frames_in_file", 0);
+        cJSON_AddBoolToObject(sensor, "cut_off", true);
+        return;
+    }
+    const bst_fits_file_info *f = bst_fits_reader_info(fits);
+    cJSON_AddNumberToObject(sensor, "frames_in_file", (double)f->frames);
+    cJSON_AddStringToObject(sensor, "layout", f->cube ? "cube" : "extensions");
+    cJSON_AddStringToObject(sensor, "compression", f->compressed ? "rice" : "none");
+    cJSON_AddBoolToObject(sensor, "cut_off", f->cut_off);
+    if (complete && (f->cut_off || f->frames != kept)) {
+        bst_run_reader_note_problem(run, "%s holds %lld whole frames, the table frames %lld", name,
+                                    (long long)f->frames, (long long)kept);
+    }
+    bst_fits_reader_close(fits);
+}
+
+static void add_sensors(bst_run_reader *run, cJSON *out) {
+    cJSON *list = cJSON_AddArrayToObject(out, "sensors");
+    each_row(run,
+             "SELECT sensor, observer, name, target, file, width_px, height_px FROM sensors"
+             " ORDER BY sensor",
+             0, put_sensor, list);
+    cJSON *sensor;
+    cJSON_ArrayForEach(sensor, list) {
+        int64_t index = (int64_t)number_of(sensor, "sensor");
+        int64_t kept = bst_run_reader_int(
+            run, "SELECT count(fits_index) FROM frames WHERE sensor = ?1", index, 0);
+        cJSON_AddNumberToObject(
+            sensor, "frames",
+            (double)bst_run_reader_int(run, "SELECT count(*) FROM frames WHERE sensor = ?1", index,
+                                       0));
+        cJSON_AddNumberToObject(
+            sensor, "bits",
+            (double)bst_run_reader_int(run, "SELECT max(bits) FROM frames WHERE sensor = ?1", index,
+                                       0));
+        add_file(run, sensor, kept);
+    }
+}
+
+static void put_table(cJSON *to, const bst_rows *rows) {
+    cJSON *node = cJSON_CreateObject();
+    cJSON_AddStringToObject(node, "name", bst_rows_text(rows, 0));
+    cJSON_AddStringToObject(node, "doc", bst_rows_text(rows, 1));
+    cJSON_AddItemToArray(to, node);
+}
+
+/* Puts a column under its table. */
+static void put_column(cJSON *to, const bst_rows *rows) {
+    cJSON *table;
+    cJSON_ArrayForEach(table, to) {
+        if (strcmp(text_of(table, "name", ""), bst_rows_text(rows, 0)) == 0) {
+            cJSON *columns = cJSON_GetObjectItemCaseSensitive(table, "columns");
+            cJSON *node = cJSON_CreateObject();
+            cJSON_AddStringToObject(node, "name", bst_rows_text(rows, 1));
+            cJSON_AddStringToObject(node, "type", bst_rows_text(rows, 2));
+            cJSON_AddStringToObject(node, "unit", bst_rows_text(rows, 3));
+            cJSON_AddStringToObject(node, "doc", bst_rows_text(rows, 4));
+            cJSON_AddItemToArray(columns ? columns : cJSON_AddArrayToObject(table, "columns"),
+                                 node);
+        }
+    }
+}
+
+static void put_count(cJSON *to, const bst_rows *rows) {
+    cJSON_AddNumberToObject(to, "rows", (double)bst_rows_int(rows, 0));
+}
+
+static void add_tables(bst_run_reader *run, cJSON *out) {
+    cJSON *list = cJSON_AddArrayToObject(out, "tables");
+    each_row(run, "SELECT \"table\", doc FROM tables ORDER BY rowid", 0, put_table, list);
+    cJSON *table;
+    cJSON_ArrayForEach(table, list) {
+        char sql[200];
+        const char *name = text_of(table, "name", "");
+        /* the writer's names need no quoting; others are not asked for */
+        if (!strpbrk(name, "\"'") && strlen(name) < 100) {
+            snprintf(sql, sizeof sql, "SELECT count(*) FROM \"%s\"", name);
+            each_row(run, sql, 0, put_count, table);
+        }
+    }
+    each_row(run,
+             "SELECT \"table\", \"column\", type, unit, doc FROM columns ORDER BY \"table\","
+             " position",
+             0, put_column, list);
+}
+
+static void put_event(cJSON *to, const bst_rows *rows) {
+    cJSON_AddNumberToObject(to, bst_rows_text(rows, 0), (double)bst_rows_int(rows, 1));
+}
+
+static int by_name(const struct dirent **a, const struct dirent **b) {
+    return strcmp((*a)->d_name, (*b)->d_name);
+}
+
+static void add_files(const bst_run_reader *run, cJSON *out) {
+    struct dirent **entries = NULL;
+    int count = scandir(bst_run_reader_folder(run), &entries, NULL, by_name);
+    cJSON *list = cJSON_AddArrayToObject(out, "files");
+    double bytes = 0.0, blocks = 0.0;
+    for (int i = 0; i < count; i++) {
+        char path[4096];
+        struct stat info;
+        if (bst_run_reader_file(NULL, run, entries[i]->d_name, path, sizeof path) == BST_OK &&
+            lstat(path, &info) == 0 && S_ISREG(info.st_mode)) {
+            cJSON *node = cJSON_CreateObject();
+            cJSON_AddStringToObject(node, "name", entries[i]->d_name);
+            cJSON_AddNumberToObject(node, "bytes", (double)info.st_size);
+            cJSON_AddItemToArray(list, node);
+            bytes += (double)info.st_size;
+            blocks += 512.0 * (double)info.st_blocks;
+        }
+        free(entries[i]);
+    }
+    free(entries);
+    cJSON_AddNumberToObject(out, "bytes", bytes);
+    cJSON_AddNumberToObject(out, "disk_bytes", blocks);
+}
+
+static cJSON *gather(bst_run_reader *run) {
+    cJSON *out = cJSON_CreateObject();
+    add_identity(run, out);
+    if (!bst_run_reader_manifest(run) && bst_run_reader_has_tables(run)) {
+        each_row(run, "SELECT program FROM run", 0, put_program, out);
+    }
+    copy(out, "summary", bst_run_reader_manifest(run), "summary");
+    if (get(bst_run_reader_manifest(run), "sensors")) {
+        copy(out, "sensor_summaries", bst_run_reader_manifest(run), "sensors");
+    }
+    copy(out, "counters", bst_run_reader_manifest(run), "counters");
+    add_sensors(run, out);
+    add_tables(run, out);
+    cJSON *events = cJSON_AddObjectToObject(out, "events");
+    if (bst_run_reader_int(run, "SELECT 1 FROM tables WHERE \"table\" = 'events'", 0, 0) == 1) {
+        each_row(run, "SELECT kind, count(*) FROM events GROUP BY kind ORDER BY kind", 0, put_event,
+                 events);
+    }
+    add_files(run, out);
+    cJSON *problems = cJSON_AddArrayToObject(out, "problems");
+    const char *text;
+    for (int i = 0; (text = bst_run_reader_problem(run, i)); i++) {
+        cJSON_AddItemToArray(problems, cJSON_CreateString(text));
+    }
+    return out;
+}
+
+/* ------------------------------------------------------------------ for people */
+
+static void line(const char *name, const char *text) {
+    printf("  %-26s %s\n", name, *text ? text : "-");
+}
+
+static void print_bytes(double bytes) {
+    if (bytes < 1e4) {
+        printf("%.0f B", bytes);
+    } else if (bytes < 1e6) {
+        printf("%.1f kB", bytes / 1e3);
+    } else {
+        printf("%.1f MB", bytes / 1e6);
+    }
+}
+
+static void print_identity(const cJSON *info) {
+    char text[400];
+    line("scenario", text_of(info, "scenario", ""));
+    snprintf(text, sizeof text, "boresight %s%s%s%s",
+             text_of(info, "version", "of unknown version"),
+             *text_of(info, "git_revision", "") ? " (" : "", text_of(info, "git_revision", ""),
+             *text_of(info, "git_revision", "") ? ")" : "");
+    line("program", text);
+    snprintf(text, sizeof text, "%s, run %.0f", text_of(info, "seed", "?"), number_of(info, "run"));
+    line("seed", text);
+    line("device", text_of(info, "device", ""));
+    snprintf(text, sizeof text, "%s to %s (%.3f s)", text_of(info, "start_utc", "?"),
+             text_of(info, "end_utc", "?"), number_of(info, "simulated_s"));
+    line("span", text);
+    if (isfinite(number_of(info, "stars"))) {
+        snprintf(text, sizeof text, "%s, %.0f stars", text_of(info, "star_catalogue", ""),
+                 number_of(info, "stars"));
+        line("star catalogue", text);
+    }
+    if (isfinite(number_of(info, "wall_time_s"))) {
+        snprintf(text, sizeof text, "%.2f s, %.0f warnings", number_of(info, "wall_time_s"),
+                 number_of(info, "warnings"));
+        line("wall time", text);
+    }
+}
+
+static void print_sensors(const cJSON *info) {
+    const cJSON *sensor;
+    printf("sensors\n");
+    cJSON_ArrayForEach(sensor, get(info, "sensors")) {
+        printf("  %s/%s: %.0f frames, %.0f x %.0f px", text_of(sensor, "observer", ""),
+               text_of(sensor, "name", ""), number_of(sensor, "frames"),
+               number_of(sensor, "width_px"), number_of(sensor, "height_px"));
+        if (number_of(sensor, "bits") > 0) {
+            printf(", %.0f bit", number_of(sensor, "bits"));
+        }
+        if (*text_of(sensor, "target", "")) {
+            printf(", target %s", text_of(sensor, "target", ""));
+        }
+        printf("\n");
+        if (!*text_of(sensor, "file", "")) {
+            printf("    frames are not kept\n");
+        } else if (*text_of(sensor, "layout", "")) {
+            bool cube = strcmp(text_of(sensor, "layout", ""), "cube") == 0;
+            printf("    %s: %.0f %s, %s, ", text_of(sensor, "file", ""),
+                   number_of(sensor, "frames_in_file"),
+                   cube ? "planes of a cube" : "image extensions",
+                   strcmp(text_of(sensor, "compression", ""), "rice") == 0 ? "Rice" : "raw");
+            print_bytes(number_of(sensor, "file_bytes"));
+            printf("%s\n", cJSON_IsTrue(get(sensor, "cut_off")) ? ", cut off after these" : "");
+        } else {
+            printf("    %s: no whole frame\n", text_of(sensor, "file", ""));
+        }
+    }
+}
+
+/* The figures of a summary with the units that their keys carry. */
+static void print_figures(const char *name, const cJSON *summary) {
+    const cJSON *item;
+    if (!cJSON_IsObject(summary)) {
+        return;
+    }
+    printf("%s\n", name);
+    cJSON_ArrayForEach(item, summary) {
+        char text[64] = "-";
+        if (cJSON_IsNumber(item)) {
+            snprintf(text, sizeof text, "%.6g", item->valuedouble);
+        } else if (cJSON_IsString(item)) {
+            snprintf(text, sizeof text, "%s", item->valuestring);
+        }
+        line(item->string, text);
+    }
+}
+
+static void print_tables(const cJSON *info, bool columns) {
+    const cJSON *table, *column;
+    printf("tables%s\n", columns ? "" : " (--columns tells what each holds)");
+    cJSON_ArrayForEach(table, get(info, "tables")) {
+        printf("  %-18s %10.0f rows %4d columns  %s\n", text_of(table, "name", ""),
+               number_of(table, "rows"), cJSON_GetArraySize(get(table, "columns")),
+               text_of(table, "doc", ""));
+        const cJSON *list = columns ? get(table, "columns") : NULL;
+        cJSON_ArrayForEach(column, list) {
+            printf("    %-28s %-8s %-10s %s\n", text_of(column, "name", ""),
+                   text_of(column, "type", ""), text_of(column, "unit", ""),
+                   text_of(column, "doc", ""));
+        }
+    }
+}
+
+static void print_text(const bst_run_reader *run, const cJSON *info, bool columns) {
+    const cJSON *item;
+    printf("%s: %s%s\n", bst_run_reader_folder(run), bst_run_state_name(bst_run_reader_state(run)),
+           cJSON_GetArraySize(get(info, "problems")) > 0 ? ", damaged" : "");
+    print_identity(info);
+    print_sensors(info);
+    print_figures("summary", get(info, "summary"));
+    const cJSON *sensors = get(info, "sensor_summaries");
+    cJSON_ArrayForEach(item, sensors) {
+        print_figures(item->string, item);
+    }
+    print_tables(info, columns);
+    print_figures("events", get(info, "events"));
+    print_figures("counters", get(info, "counters"));
+    printf("files\n");
+    cJSON_ArrayForEach(item, get(info, "files")) {
+        printf("  %-26s ", text_of(item, "name", ""));
+        print_bytes(number_of(item, "bytes"));
+        printf("\n");
+    }
+    printf("  %-26s ", "on disk");
+    print_bytes(number_of(info, "disk_bytes"));
+    printf("\n");
+}
+
+static const char help_text[] =
+    "usage: boresight info RUN [options]\n"
+    "\n"
+    "Tells what the folder of a run holds: scenario, version, seed, device, span of time, how the "
+    "run ended,\n"
+    "frames per sensor, tables, summary figures, events and files. It reads folders of complete, "
+    "interrupted\n"
+    "and killed runs, and of runs that are still being written, and never changes anything in "
+    "them.\n"
+    "\n"
+    "  boresight info runs/demo\n"
+    "  boresight info runs/demo.partial --json | jq .state\n"
+    "\n"
+    "Exit code: 0; 1 when the folder is damaged or not a run's (what is wrong is on the standard "
+    "error); 2\n"
+    "wrong usage.\n"
+    "\n"
+    "options:\n";
+
+int bst_cmd_info(int argc, char **argv) {
+    bool help = false, json = false, columns = false;
+    const bst_option table[] = {
+        {.name = "json",
+         .kind = BST_OPTION_FLAG,
+         .target = &json,
+         .doc = "print JSON, for scripts"},
+        {.name = "columns",
+         .kind = BST_OPTION_FLAG,
+         .target = &columns,
+         .doc = "list the columns of the tables too"},
+        {.name = "help", .kind = BST_OPTION_FLAG, .target = &help, .doc = "print this"},
+        {.name = NULL},
+    };
+    bst_ctx ctx;
+    bst_ctx_init(&ctx, bst_app_log, NULL, BST_LOG_WARNING);
+    int arguments = 0;
+    if (bst_options_parse(&ctx, table, argc, argv, &arguments) != BST_OK) {
+        return bst_options_misuse(&ctx, "info");
+    }
+    if (help) {
+        fputs(help_text, stdout);
+        bst_options_print(stdout, table);
+        return BST_EXIT_OK;
+    }
+    if (arguments != 1) {
+        bst_fail(&ctx, BST_ERR_ARGUMENT, "one folder of a run is expected, %d were given",
+                 arguments);
+        return bst_options_misuse(&ctx, "info");
+    }
+    bst_run_reader *run = NULL;
+    if (bst_run_reader_open(&ctx, argv[1], &run) != BST_OK) {
+        fprintf(stderr, "boresight: %s\n", ctx.message);
+        return BST_EXIT_FAILED;
+    }
+    cJSON *info = gather(run);
+    int code = BST_EXIT_OK;
+    if (json) {
+        char *text = cJSON_Print(info);
+        printf("%s\n", text ? text : "");
+        code = text ? code : BST_EXIT_FAILED;
+        cJSON_free(text);
+    } else {
+        print_text(run, info, columns);
+    }
+    fflush(stdout);
+    const char *problem;
+    for (int i = 0; (problem = bst_run_reader_problem(run, i)); i++) {
+        fprintf(stderr, "boresight: %s\n", problem);
+        code = BST_EXIT_FAILED;
+    }
+    if (ferror(stdout)) {
+        fprintf(stderr, "boresight: the output cannot be written\n");
+        code = BST_EXIT_FAILED;
+    }
+    cJSON_Delete(info);
+    bst_run_reader_close(run);
+    return code;
+}

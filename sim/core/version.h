@@ -1,0 +1,18 @@
+/* The version of the library that is running. */
+#ifndef BST_CORE_VERSION_H
+#define BST_CORE_VERSION_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* "0.1.0": major, minor and patch by semantic versioning. Never NULL. */
+const char *bst_version(void);
+/* The revision of the sources as `git describe` names it; "" when they were no git tree. */
+const char *bst_git_revision(void);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

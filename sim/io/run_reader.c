@@ -1,0 +1,387 @@
+#include "sim/io/run_reader.h"
+
+#include <cjson/cJSON.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "sim/core/config.h"
+#include "sim/io/run_internal.h"
+
+enum { MAX_PROBLEMS = 16 };
+
+struct bst_run_reader {
+    char folder[BST_RUN_PATH_BYTES];
+    bst_run_state state;
+    bst_json *manifest, *scenario;
+    sqlite3 *db;
+    char problems[MAX_PROBLEMS][BST_MESSAGE_BYTES];
+    int problem_count;
+};
+
+struct bst_rows {
+    const bst_run_reader *reader;
+    sqlite3_stmt *statement;
+};
+
+bst_status bst_run_reader_file(bst_ctx *ctx, const bst_run_reader *reader, const char *name,
+                               char *buffer, size_t bytes) {
+    int n = snprintf(buffer, bytes, "%s/%s", reader->folder, name);
+    if (n < 0 || (size_t)n >= bytes) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "%s/%s: the path is too long", reader->folder, name);
+    }
+    return BST_OK;
+}
+
+void bst_run_reader_note_problem(bst_run_reader *reader, const char *format, ...) {
+    if (reader->problem_count < MAX_PROBLEMS) {
+        va_list arguments;
+        va_start(arguments, format);
+        vsnprintf(reader->problems[reader->problem_count++], BST_MESSAGE_BYTES, format, arguments);
+        va_end(arguments);
+    }
+}
+
+static bool has_file(const bst_run_reader *reader, const char *name) {
+    char path[BST_RUN_PATH_BYTES];
+    struct stat info;
+    return bst_run_reader_file(NULL, reader, name, path, sizeof path) == BST_OK &&
+           stat(path, &info) == 0 && S_ISREG(info.st_mode);
+}
+
+/* Whether a living process holds the folder's lock. */
+static bool is_locked(const bst_run_reader *reader) {
+    char path[BST_RUN_PATH_BYTES];
+    if (bst_run_reader_file(NULL, reader, "lock", path, sizeof path) != BST_OK) {
+        return false;
+    }
+    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    if (fd < 0) {
+        return false;
+    }
+    bool held = flock(fd, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+    close(fd);
+    return held;
+}
+
+static bst_json *load_json(bst_run_reader *reader, const char *name, const char *when_missing) {
+    char path[BST_RUN_PATH_BYTES];
+    bst_json *json = NULL;
+    bst_ctx ctx = {0};
+    if (!has_file(reader, name)) {
+        if (when_missing) {
+            bst_run_reader_note_problem(reader, "%s", when_missing);
+        }
+    } else if (bst_run_reader_file(&ctx, reader, name, path, sizeof path) != BST_OK ||
+               bst_json_load(&ctx, path, &json) != BST_OK) {
+        bst_run_reader_note_problem(reader, "%s", ctx.message);
+    } else if (!cJSON_IsObject(bst_json_root(json))) {
+        bst_run_reader_note_problem(reader, "%s: is not a JSON object", path);
+        bst_json_free(json);
+        json = NULL;
+    }
+    return json;
+}
+
+/* Whether the file's header says that it has a journal of the kind WAL. */
+static bool wants_journal(const char *path) {
+    unsigned char head[20] = {0};
+    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    ssize_t n = fd >= 0 ? read(fd, head, sizeof head) : -1;
+    if (fd >= 0) {
+        close(fd);
+    }
+    return n == (ssize_t)sizeof head && head[18] == 2;
+}
+
+/* "file:" URI of a path with every byte but the plainest escaped. */
+static void make_uri(char *uri, size_t bytes, const char *path, const char *parameters) {
+    size_t n = (size_t)snprintf(uri, bytes, "file:");
+    for (const unsigned char *c = (const unsigned char *)path; *c && n + 64 < bytes; c++) {
+        bool plain = (*c >= '0' && *c <= '9') || (*c >= 'A' && *c <= 'Z') ||
+                     (*c >= 'a' && *c <= 'z') || strchr("/._-", *c);
+        n += (size_t)snprintf(uri + n, bytes - n, plain ? "%c" : "%%%02X", *c);
+    }
+    snprintf(uri + n, bytes - n, "?%s", parameters);
+}
+
+static void open_database(bst_run_reader *reader) {
+    char path[BST_RUN_PATH_BYTES], uri[3 * BST_RUN_PATH_BYTES + 128];
+    if (!has_file(reader, BST_RUN_DATABASE)) {
+        bst_run_reader_note_problem(reader, BST_RUN_DATABASE " is missing");
+        return;
+    }
+    if (bst_run_reader_file(NULL, reader, BST_RUN_DATABASE, path, sizeof path) != BST_OK) {
+        return;
+    }
+    /* A living run is read as SQLite means it to be, through the locks and the shared index that
+     * its writer keeps. Nobody writes the others: without locks, and with the journal's index in
+     * memory, SQLite has nothing to write. "immutable" is for a database that lost its journal. */
+    bool journal = has_file(reader, BST_RUN_DATABASE "-wal");
+    bool living = reader->state == BST_RUN_RUNNING;
+    make_uri(uri, sizeof uri, path,
+             living                            ? "mode=ro"
+             : journal || !wants_journal(path) ? "mode=ro&vfs=unix-none"
+                                               : "mode=ro&immutable=1");
+    int flags = SQLITE_OPEN_READONLY | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX;
+    int code = sqlite3_open_v2(uri, &reader->db, flags, NULL);
+    if (code == SQLITE_OK) {
+        sqlite3_db_config(reader->db, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, (int *)NULL);
+        sqlite3_busy_timeout(reader->db, 2000);
+        code = sqlite3_exec(reader->db,
+                            living ? "PRAGMA query_only=1; SELECT count(*) FROM sqlite_master;"
+                                   : "PRAGMA locking_mode=EXCLUSIVE; PRAGMA query_only=1;"
+                                     "SELECT count(*) FROM sqlite_master;",
+                            NULL, NULL, NULL);
+    }
+    if (code != SQLITE_OK) {
+        bst_run_reader_note_problem(reader, "%s: cannot be read: %s", path,
+                                    reader->db ? sqlite3_errmsg(reader->db) : "out of memory");
+        sqlite3_close(reader->db);
+        reader->db = NULL;
+    }
+}
+
+static bst_run_state find_state(const bst_run_reader *reader) {
+    if (is_locked(reader)) {
+        return BST_RUN_RUNNING;
+    }
+    if (!reader->manifest) {
+        return BST_RUN_KILLED;
+    }
+    const cJSON *complete =
+        cJSON_GetObjectItemCaseSensitive(bst_json_root(reader->manifest), "complete");
+    if (!cJSON_IsTrue(complete)) {
+        return BST_RUN_INTERRUPTED;
+    }
+    /* what is whole has lost its lock and got its name; a run killed while it closed has not */
+    const char *tail = ".partial";
+    size_t length = strlen(reader->folder), n = strlen(tail);
+    bool unnamed = length > n && strcmp(reader->folder + length - n, tail) == 0;
+    return unnamed || has_file(reader, "lock") ? BST_RUN_KILLED : BST_RUN_COMPLETE;
+}
+
+static bst_status check_folder(bst_ctx *ctx, const char *path) {
+    struct stat info;
+    if (stat(path, &info) != 0) {
+        int error = errno;
+        char partial[BST_RUN_PATH_BYTES];
+        int n = snprintf(partial, sizeof partial, "%s.partial", path);
+        bool beside = n > 0 && (size_t)n < sizeof partial && stat(partial, &info) == 0;
+        return bst_fail(ctx, error == ENOENT ? BST_ERR_NOT_FOUND : BST_ERR_IO, "%s: %s%s%s", path,
+                        strerror(error), beside ? "; there is an unfinished run, " : "",
+                        beside ? partial : "");
+    }
+    if (!S_ISDIR(info.st_mode)) {
+        return bst_fail(ctx, BST_ERR_FORMAT, "%s: is not a folder; give the folder of a run", path);
+    }
+    if (access(path, R_OK | X_OK) != 0) {
+        return bst_fail(ctx, BST_ERR_IO, "%s: cannot be read: %s", path, strerror(errno));
+    }
+    return BST_OK;
+}
+
+/* A manifest.json that another program wrote does not make a folder a run's. */
+static bool is_ours(const bst_json *manifest) {
+    const cJSON *program = cJSON_GetObjectItemCaseSensitive(bst_json_root(manifest), "program");
+    return cJSON_IsString(program) && strcmp(program->valuestring, "boresight") == 0;
+}
+
+bst_status bst_run_reader_open(bst_ctx *ctx, const char *path, bst_run_reader **out) {
+    *out = NULL;
+    size_t length = strlen(path);
+    while (length > 1 && path[length - 1] == '/') {
+        length--;
+    }
+    if (length == 0 || length > BST_RUN_PATH_BYTES - 256) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "'%.80s' is not a path of a folder", path);
+    }
+    bst_run_reader *reader = calloc(1, sizeof *reader);
+    if (!reader) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
+    }
+    memcpy(reader->folder, path, length);
+    bst_status status = check_folder(ctx, reader->folder);
+    bool has_lock = has_file(reader, "lock"), has_db = has_file(reader, BST_RUN_DATABASE);
+    if (status == BST_OK && !has_lock && !has_db && !has_file(reader, "manifest.json")) {
+        status = bst_fail(ctx, BST_ERR_FORMAT,
+                          "%s: is not the folder of a run: it holds neither manifest.json nor "
+                          "run.sqlite",
+                          reader->folder);
+    }
+    if (status == BST_OK) {
+        reader->manifest =
+            load_json(reader, "manifest.json", has_lock ? NULL : "manifest.json is missing");
+        if (reader->manifest && !is_ours(reader->manifest)) {
+            bst_run_reader_note_problem(reader, "manifest.json is not one of boresight");
+            bst_json_free(reader->manifest);
+            reader->manifest = NULL;
+        }
+        if (!reader->manifest && !has_lock && !has_db) {
+            status = bst_fail(ctx, BST_ERR_FORMAT, "%s: is not the folder of a run: %s",
+                              reader->folder, reader->problems[0]);
+        }
+    }
+    if (status != BST_OK) {
+        bst_run_reader_close(reader);
+        return status;
+    }
+    reader->state = find_state(reader);
+    bool begun = has_db || reader->state == BST_RUN_COMPLETE;
+    reader->scenario =
+        load_json(reader, "scenario.json", begun ? "scenario.json is missing" : NULL);
+    open_database(reader);
+    *out = reader;
+    return BST_OK;
+}
+
+void bst_run_reader_close(bst_run_reader *reader) {
+    if (reader) {
+        sqlite3_close(reader->db);
+        bst_json_free(reader->manifest);
+        bst_json_free(reader->scenario);
+        free(reader);
+    }
+}
+
+const char *bst_run_reader_folder(const bst_run_reader *reader) {
+    return reader->folder;
+}
+
+bst_run_state bst_run_reader_state(const bst_run_reader *reader) {
+    return reader->state;
+}
+
+const char *bst_run_state_name(bst_run_state state) {
+    switch (state) {
+        case BST_RUN_COMPLETE:
+            return "complete";
+        case BST_RUN_INTERRUPTED:
+            return "interrupted";
+        case BST_RUN_RUNNING:
+            return "still running";
+        case BST_RUN_KILLED:
+            return "left over from a killed run";
+    }
+    return "unknown";
+}
+
+const char *bst_run_reader_problem(const bst_run_reader *reader, int index) {
+    return index >= 0 && index < reader->problem_count ? reader->problems[index] : NULL;
+}
+
+const cJSON *bst_run_reader_manifest(const bst_run_reader *reader) {
+    return reader->manifest ? bst_json_root(reader->manifest) : NULL;
+}
+
+const cJSON *bst_run_reader_scenario(const bst_run_reader *reader) {
+    return reader->scenario ? bst_json_root(reader->scenario) : NULL;
+}
+
+bool bst_run_reader_has_tables(const bst_run_reader *reader) {
+    return reader->db != NULL;
+}
+
+static bst_status fail_sql(bst_ctx *ctx, const bst_run_reader *reader) {
+    return bst_fail(ctx, BST_ERR_FORMAT, "%s/%s: %s", reader->folder, BST_RUN_DATABASE,
+                    sqlite3_errmsg(reader->db));
+}
+
+bst_status bst_rows_open(bst_ctx *ctx, const bst_run_reader *reader, const char *sql,
+                         int64_t parameter1, int64_t parameter2, bst_rows **out) {
+    *out = NULL;
+    if (!reader->db) {
+        return bst_fail(ctx, BST_ERR_NOT_FOUND, "%s: has no tables that could be read",
+                        reader->folder);
+    }
+    bst_rows *rows = calloc(1, sizeof *rows);
+    if (!rows) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
+    }
+    rows->reader = reader;
+    if (sqlite3_prepare_v2(reader->db, sql, -1, &rows->statement, NULL) != SQLITE_OK) {
+        free(rows);
+        return fail_sql(ctx, reader);
+    }
+    const int64_t values[2] = {parameter1, parameter2};
+    for (int i = 0; i < 2 && i < sqlite3_bind_parameter_count(rows->statement); i++) {
+        sqlite3_bind_int64(rows->statement, i + 1, values[i]);
+    }
+    *out = rows;
+    return BST_OK;
+}
+
+bst_status bst_rows_next(bst_ctx *ctx, bst_rows *rows, bool *more) {
+    int code = sqlite3_step(rows->statement);
+    *more = code == SQLITE_ROW;
+    return code == SQLITE_ROW || code == SQLITE_DONE ? BST_OK : fail_sql(ctx, rows->reader);
+}
+
+int bst_rows_columns(const bst_rows *rows) {
+    return sqlite3_column_count(rows->statement);
+}
+
+const char *bst_rows_column_name(const bst_rows *rows, int column) {
+    const char *name = sqlite3_column_name(rows->statement, column);
+    return name ? name : "";
+}
+
+bst_cell_kind bst_rows_kind(const bst_rows *rows, int column) {
+    switch (sqlite3_column_type(rows->statement, column)) {
+        case SQLITE_NULL:
+            return BST_CELL_NULL;
+        case SQLITE_INTEGER:
+            return BST_CELL_INT;
+        case SQLITE_FLOAT:
+            return BST_CELL_REAL;
+        default:
+            return BST_CELL_TEXT;
+    }
+}
+
+bool bst_rows_is_null(const bst_rows *rows, int column) {
+    return bst_rows_kind(rows, column) == BST_CELL_NULL;
+}
+
+int64_t bst_rows_int(const bst_rows *rows, int column) {
+    return sqlite3_column_int64(rows->statement, column);
+}
+
+double bst_rows_real(const bst_rows *rows, int column) {
+    return bst_rows_is_null(rows, column) ? NAN : sqlite3_column_double(rows->statement, column);
+}
+
+const char *bst_rows_text(const bst_rows *rows, int column) {
+    const char *text = (const char *)sqlite3_column_text(rows->statement, column);
+    return text ? text : "";
+}
+
+void bst_rows_close(bst_rows *rows) {
+    if (rows) {
+        sqlite3_finalize(rows->statement);
+        free(rows);
+    }
+}
+
+int64_t bst_run_reader_int(const bst_run_reader *reader, const char *sql, int64_t parameter,
+                           int64_t fallback) {
+    bst_rows *rows;
+    bst_ctx unheard = {0};
+    bool more = false;
+    if (bst_rows_open(&unheard, reader, sql, parameter, 0, &rows) != BST_OK) {
+        return fallback;
+    }
+    int64_t value = fallback;
+    if (bst_rows_next(&unheard, rows, &more) == BST_OK && more && !bst_rows_is_null(rows, 0)) {
+        value = bst_rows_int(rows, 0);
+    }
+    bst_rows_close(rows);
+    return value;
+}

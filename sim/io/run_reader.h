@@ -1,0 +1,82 @@
+/* Reading a run's folder, whatever became of the run. Nothing in the folder is ever changed, and
+ * nothing is made there. */
+#ifndef BST_IO_RUN_READER_H
+#define BST_IO_RUN_READER_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "sim/core/status.h"
+
+struct cJSON;
+
+typedef enum bst_run_state {
+    BST_RUN_COMPLETE,
+    BST_RUN_INTERRUPTED, /* closed properly before its end */
+    BST_RUN_RUNNING,     /* a living process writes it */
+    BST_RUN_KILLED       /* its process is gone and did not close it */
+} bst_run_state;
+
+typedef struct bst_run_reader bst_run_reader;
+
+/* Opens a run's folder. What is missing or damaged inside is no error but a problem (below); the
+ * parts that are whole can be read. A table that the run's process had not folded into its database
+ * yet is read from the journal. Errors: BST_ERR_NOT_FOUND when there is nothing at `path`;
+ * BST_ERR_FORMAT when it is no folder, or one that holds no run; BST_ERR_IO when it cannot be
+ * looked into. The caller closes. */
+bst_status bst_run_reader_open(bst_ctx *ctx, const char *path, bst_run_reader **out) BST_MUST_CHECK;
+/* NULL is allowed. */
+void bst_run_reader_close(bst_run_reader *reader);
+
+const char *bst_run_reader_folder(const bst_run_reader *reader);
+bst_run_state bst_run_reader_state(const bst_run_reader *reader);
+/* "complete", "interrupted", "still running", "left over from a killed run". */
+const char *bst_run_state_name(bst_run_state state);
+
+/* What is wrong with the folder, in words; NULL after the last. */
+const char *bst_run_reader_problem(const bst_run_reader *reader, int index);
+/* Adds a problem that a reader of the parts found. The list holds 16; more are dropped. */
+void bst_run_reader_note_problem(bst_run_reader *reader, const char *format, ...) BST_PRINTF(2, 3);
+
+/* manifest.json and scenario.json; NULL when missing or damaged. Borrowed. */
+const struct cJSON *bst_run_reader_manifest(const bst_run_reader *reader);
+const struct cJSON *bst_run_reader_scenario(const bst_run_reader *reader);
+/* Whether there is a database that could be opened. */
+bool bst_run_reader_has_tables(const bst_run_reader *reader);
+
+/* Path of a file in the folder. BST_ERR_ARGUMENT when it does not fit. */
+bst_status bst_run_reader_file(bst_ctx *ctx, const bst_run_reader *reader, const char *name,
+                               char *buffer, size_t bytes) BST_MUST_CHECK;
+
+/* A query on the run's tables, row by row. Memory does not grow with the rows. */
+typedef struct bst_rows bst_rows;
+
+/* Prepares one SELECT with up to two integer parameters (?1, ?2). BST_ERR_FORMAT, with SQLite's
+ * reason, when the database has no such table or column, or is damaged; BST_ERR_NOT_FOUND when the
+ * run has no database. */
+bst_status bst_rows_open(bst_ctx *ctx, const bst_run_reader *reader, const char *sql,
+                         int64_t parameter1, int64_t parameter2, bst_rows **out) BST_MUST_CHECK;
+/* Goes to the next row; *more is false after the last. BST_ERR_FORMAT when the file is damaged. */
+bst_status bst_rows_next(bst_ctx *ctx, bst_rows *rows, bool *more) BST_MUST_CHECK;
+/* The current row's columns, counted from 0. A NULL is 0, NAN and "". Text lives until the next
+ * call of bst_rows_next. */
+int bst_rows_columns(const bst_rows *rows);
+const char *bst_rows_column_name(const bst_rows *rows, int column);
+bool bst_rows_is_null(const bst_rows *rows, int column);
+int64_t bst_rows_int(const bst_rows *rows, int column);
+double bst_rows_real(const bst_rows *rows, int column);
+const char *bst_rows_text(const bst_rows *rows, int column);
+typedef enum bst_cell_kind {
+    BST_CELL_NULL,
+    BST_CELL_INT,
+    BST_CELL_REAL,
+    BST_CELL_TEXT
+} bst_cell_kind;
+bst_cell_kind bst_rows_kind(const bst_rows *rows, int column);
+void bst_rows_close(bst_rows *rows);
+
+/* First integer of a query's only row; `fallback` when it has none or fails. */
+int64_t bst_run_reader_int(const bst_run_reader *reader, const char *sql, int64_t parameter,
+                           int64_t fallback);
+
+#endif

@@ -1,0 +1,167 @@
+#!/usr/bin/env python3
+"""What `cmake --install` leaves: a tree that can be moved, out of which a C program is built with
+pkg-config and with CMake, far from the sources.
+
+Usage, from the repository root:
+/usr/bin/python3 tests/e2e/test_install.py BORESIGHT CMAKE CC BUILD_FOLDER
+"""
+import glob
+import os
+import re
+import shutil
+import subprocess
+import sys
+import unittest
+
+CMAKE, CC, BUILD = sys.argv[2:5]
+del sys.argv[2:5]
+import runs  # noqa: E402  (takes the program's path off the arguments)
+
+ROOT = os.getcwd()
+EXAMPLE = os.path.join(ROOT, "docs", "examples", "use_library")
+
+
+def call(*words, **options):
+    result = subprocess.run(words, capture_output=True, text=True, timeout=300, **options)
+    if result.returncode != 0:
+        raise AssertionError(f"{words}: exit code {result.returncode}\n{result.stdout}"
+                             f"{result.stderr}")
+    return result.stdout
+
+
+def only(pattern):
+    found = glob.glob(pattern, recursive=True)
+    assert len(found) == 1, f"{pattern}: {found}"
+    return found[0]
+
+
+class Installed(unittest.TestCase):
+    """The stage is made under one name and used under another."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = runs.scratch()
+        first = os.path.join(cls.folder, "made here")
+        call(CMAKE, "--install", BUILD, "--prefix", first)
+        cls.stage = os.path.join(cls.folder, "moved")
+        os.rename(first, cls.stage)
+        cls.libdir = os.path.dirname(only(cls.stage + "/lib*/**/libboresight.so"))
+        cls.scenario = cls.stage + "/share/boresight/scenarios/neossat_geo_stare.json"
+
+    def check_output(self, text):
+        lines = text.splitlines()
+        version = call(self.stage + "/bin/boresight", "--version").split()[1]
+        self.assertEqual(lines[0], f"libboresight {version}")
+        frames = [line for line in lines if line.startswith("frame ")]
+        self.assertEqual(len(frames), 3)
+        for line in frames:
+            found = re.fullmatch(r"frame \d+: (\d+) x (\d+) px, mean ([0-9.]+) DN, peak (\d+) DN",
+                                 line)
+            self.assertTrue(found, line)
+            # an offset of 500 DN under everything; stars far above the mean
+            self.assertGreater(float(found[3]), 500.0)
+            self.assertLess(float(found[3]), 2000.0)
+            self.assertGreater(int(found[4]), 2 * float(found[3]))
+        detections = [int(line.split()[0]) for line in lines if "detections" in line]
+        self.assertEqual(len(detections), 3)
+        self.assertGreater(min(detections), 0)
+        self.assertEqual(sum(line.endswith(" tracks") for line in lines), 3)
+
+    @unittest.skipUnless(shutil.which("pkg-config"), "needs pkg-config")
+    def test_pkg_config(self):
+        work = os.path.join(self.folder, "by pkg-config")
+        os.mkdir(work)
+        shutil.copy(os.path.join(EXAMPLE, "first_frames.c"), work)
+        environment = {**os.environ, "PKG_CONFIG_PATH": self.libdir + "/pkgconfig"}
+        # one word a line, as the path may hold spaces; the language's extensions off and on
+        flags = call("pkg-config", "--cflags", "--libs", "boresight", env=environment)
+        self.assertEqual(call("pkg-config", "--modversion", "boresight", env=environment).strip(),
+                         call(self.stage + "/bin/boresight", "--version").split()[1])
+        for dialect in ("-std=c17", "-std=gnu11"):
+            call(CC, dialect, "-Wall", "-Wextra", "-Werror", "first_frames.c", *flags.split(), "-o",
+                 "first_frames", cwd=work)
+        out = call("./first_frames", self.scenario, "3", cwd=work,
+                   env={**os.environ, "LD_LIBRARY_PATH": self.libdir})
+        self.check_output(out)
+
+    def test_cmake_package(self):
+        work = os.path.join(self.folder, "by cmake")
+        shutil.copytree(EXAMPLE, work)
+        build = os.path.join(work, "build")
+        call(CMAKE, "-S", work, "-B", build, f"-DCMAKE_PREFIX_PATH={self.stage}",
+             f"-DCMAKE_C_COMPILER={CC}")
+        call(CMAKE, "--build", build)
+        self.check_output(call(build + "/first_frames", self.scenario, "3", cwd=work))
+        # another minor version may have other interfaces
+        with open(work + "/CMakeLists.txt", encoding="utf-8") as file:
+            text = file.read()
+        with open(work + "/CMakeLists.txt", "w", encoding="utf-8") as file:
+            file.write(text.replace("boresight 0.1", "boresight 9.1"))
+        result = subprocess.run([CMAKE, "-S", work, "-B", build + "2",
+                                 f"-DCMAKE_PREFIX_PATH={self.stage}"], capture_output=True,
+                                text=True, timeout=120)
+        self.assertNotEqual(result.returncode, 0)
+        self.assertRegex(result.stderr, r'compatible with requested\s+version "9.1"')
+
+    def test_headers(self):
+        include = self.stage + "/include/boresight"
+        headers = sorted(os.path.relpath(path, include)
+                         for path in glob.glob(include + "/**/*.h", recursive=True))
+        self.assertGreater(len(headers), 40)
+        self.assertIn("sim/app/registry.h", headers)
+        self.assertIn("imgproc/imgproc.h", headers)
+        self.assertEqual([h for h in headers if "_internal" in h or "kernels" in h], [])
+        source = os.path.join(self.folder, "headers.c")
+        with open(source, "w", encoding="ascii") as file:
+            file.writelines(f'#include "{header}"\n' for header in headers)
+        call(CC, "-std=gnu17", "-Wall", "-Werror", "-fsyntax-only", "-I", include, source)
+
+    def test_symbols(self):
+        library = os.path.join(self.libdir, "libboresight.so")
+        names = [line.split()[-1] for line in
+                 call("nm", "-D", "--defined-only", library).splitlines()]
+        self.assertIn("bst_simulation_create", names)
+        self.assertIn("bst_gimbal_two_axis_module", names)
+        self.assertEqual([n for n in names if not n.startswith("bst_")], [])
+
+    def test_nothing_names_the_build(self):
+        forbidden = [ROOT.encode(), os.path.abspath(BUILD).encode(),
+                     os.path.join(self.folder, "made here").encode()]
+        for folder, _, names in os.walk(self.stage):
+            for name in names:
+                path = os.path.join(folder, name)
+                with open(path, "rb") as file:
+                    data = file.read()
+                self.assertEqual([f for f in forbidden if f in data], [], path)
+
+    def test_program_and_its_files(self):
+        program = self.stage + "/bin/boresight"
+        work = runs.scratch()
+        # the installed scenarios run from anywhere
+        call(program, "run", self.scenario, "--out", "run", "--duration", "2", "--quiet",
+             "--threads", "1", "--set", runs.NO_FRAMES, cwd=work)
+        self.assertTrue(os.path.exists(work + "/run/manifest.json"))
+        for name in ("share/boresight/scenarios/boresight.schema.json",
+                     "share/man/man1/boresight.1", "share/doc/boresight/LICENSE",
+                     "share/doc/boresight/docs/user_guide.md",
+                     "share/doc/boresight/docs/examples/use_library/first_frames.c"):
+            self.assertTrue(os.path.exists(os.path.join(self.stage, name)), name)
+        for file in (program, os.path.join(self.libdir, "libboresight.so")):
+            dynamic = call("readelf", "-d", file)
+            self.assertNotIn("RPATH", dynamic)
+            self.assertNotIn("RUNPATH", dynamic)
+
+    def test_destdir(self):
+        folder = runs.scratch()
+        call(CMAKE, "--install", BUILD, "--prefix", "/usr/local",
+             env={**os.environ, "DESTDIR": folder})
+        self.assertEqual(os.listdir(folder), ["usr"])
+        self.assertTrue(os.path.exists(folder + "/usr/local/bin/boresight"))
+
+
+def tearDownModule():
+    runs.clean()
+
+
+if __name__ == "__main__":
+    unittest.main()
