@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/world/world_internal.h"
+#include "sim/world/field_objects.h"
 
 /* Aberration at most, and some for the deflection of light: how far an apparent place lies from the
  * catalogue's. */
@@ -319,75 +319,6 @@ static bool near_window(const bst_field *field, bst_quat q, bst_vec3 direction, 
            y <= window.y0 + window.height - 1 + margin_px;
 }
 
-/* Fills a source and its path; *there false when the object cannot be seen from where the observer
- * is: decayed, or the observer itself. */
-static bst_status add_object(bst_ctx *ctx, bst_field *field, int object, double start_s,
-                             double end_s, bst_source_path *path, bst_source *out, bool *there) {
-    bst_sight mid;
-    *there = false;
-    bst_status status =
-        bst_view_path(ctx, field->view, field->observer, object, start_s, end_s, path, &mid);
-    if (status == BST_ERR_NUMERIC) {
-        return BST_OK;
-    }
-    BST_TRY(status);
-    if (!(mid.range_m > 0.0)) {
-        return BST_OK;
-    }
-    *there = true;
-    *out = (bst_source){.kind = BST_SOURCE_OBJECT,
-                        .id = (uint32_t)object,
-                        .apparent_mid = mid.apparent,
-                        .path = path,
-                        .v_mag = mid.v_mag,
-                        .sunlit_fraction = mid.sunlit_fraction,
-                        .phase_rad = mid.phase_rad,
-                        .range_m = mid.range_m,
-                        .occulted = mid.occulted};
-    out->electrons_per_s = mid.occulted || isinf(mid.v_mag)
-                               ? 0.0
-                               : bst_camera_electrons_per_s(field->camera, mid.v_mag);
-    bst_vec3_to_radec(mid.geometric, &out->ra_rad, &out->dec_rad);
-    return BST_OK;
-}
-
-/* Whether the object's path over the image comes within margin_px of the window. `centre` and
- * `radius`: a cone (GCRF) that holds the window with its margin. */
-static bool path_touches(const bst_field *field, const bst_source *s, bst_vec3 centre,
-                         double radius, bst_window window, double margin_px) {
-    enum { PIECES = 8 };
-    bst_vec3 at[PIECES + 1];
-    double x[PIECES + 1], y[PIECES + 1], bend = 0.0;
-    bool front[PIECES + 1];
-    for (int k = 0; k <= PIECES; k++) {
-        at[k] = bst_source_direction(s, (double)k / PIECES);
-        x[k] = y[k] = 0.0;
-        front[k] =
-            bst_camera_project(field->camera, bst_quat_rotate(field->q_mid, at[k]), &x[k], &y[k]);
-    }
-    for (int k = 1; k < PIECES; k++) {
-        /* an eighth of this is what the path lies off the chord */
-        bend = front[k - 1] && front[k] && front[k + 1]
-                   ? fmax(bend,
-                          hypot(x[k - 1] - 2.0 * x[k] + x[k + 1], y[k - 1] - 2.0 * y[k] + y[k + 1]))
-                   : INFINITY;
-    }
-    for (int k = 0; k < PIECES; k++) {
-        double arc = bst_vec3_angle(at[k], at[k + 1]);
-        if (bst_vec3_angle(centre, at[k]) > radius + 1.25 * arc) {
-            continue;
-        }
-        double reach = margin_px + bend;
-        if (fmax(x[k], x[k + 1]) >= window.x0 - reach &&
-            fmin(x[k], x[k + 1]) <= window.x0 + window.width - 1 + reach &&
-            fmax(y[k], y[k + 1]) >= window.y0 - reach &&
-            fmin(y[k], y[k + 1]) <= window.y0 + window.height - 1 + reach) {
-            return true;
-        }
-    }
-    return false;
-}
-
 bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *track,
                            int64_t start_tick, int64_t end_tick, int64_t tick_rate_hz,
                            bst_window window, const bst_field_options *options, bst_truth *truth,
@@ -476,15 +407,14 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
         bst_vec3_to_radec(star->icrs, &s->ra_rad, &s->dec_rad);
     }
     BST_TRY(reserve_paths(ctx, field, near_count));
-    int objects = 0;
-    for (int i = 0; i < near_count; i++) {
+    const bst_object_query objects = {field->view,  camera, field->observer, start_s, end_s,
+                                      field->q_mid, window, margin_px,       centre,  radius};
+    for (int i = 0, used = 0; i < near_count; i++) {
         bool there;
-        BST_TRY(add_object(ctx, field, field->near[i], start_s, end_s, &field->paths[objects],
-                           &field->sources[n], &there));
-        if (there && path_touches(field, &field->sources[n], centre, radius, window, margin_px)) {
-            n++;
-            objects++;
-        }
+        BST_TRY(bst_field_object(ctx, &objects, field->near[i], &field->paths[used],
+                                 &field->sources[n], &there));
+        n += there;
+        used += there;
     }
     *sources = field->sources;
     *count = n;
