@@ -171,7 +171,8 @@ static void bad_files_are_explained(void **state) {
         {"2022 6 10 59740 0.1 189 -0.08\n", ":1: pole of 2 arcsec or more"},
         {"2022 6 10 59740 0.1 0.4 37\n", ":1: pole of 2 arcsec or more"},
     };
-    char path[] = "/tmp/bst_eop_XXXXXX";
+    char path[BST_TEST_PATH];
+    bst_test_template(path, "bst_eop");
     int fd = mkstemp(path);
     assert_true(fd >= 0);
     close(fd);
