@@ -22,7 +22,7 @@ static const bst_port ports[PORT_COUNT] = {
 typedef struct module {
     bst_two_axis plant;
     bst_view *view;
-    int observer;
+    int observer, sensor;
     double tick_rate_hz;
     int64_t telemetry_steps, nav_steps;
 } module;
@@ -45,6 +45,7 @@ static bst_status create(const bst_module_env *env, const void *config_in, void 
         return bst_fail(env->ctx, BST_ERR_MEMORY, "out of memory for a gimbal");
     }
     m->observer = env->observer;
+    m->sensor = env->sensor;
     m->tick_rate_hz = (double)env->tick_rate_hz;
     double dt = (double)env->period_ticks / m->tick_rate_hz;
     const bst_platform_config *platform = &config->platform;
@@ -99,8 +100,8 @@ static bst_status step(void *self, struct bst_step *s) {
     }
     if (n % m->nav_steps == 0) {
         bst_nav_telemetry *nav = bst_step_write(s, PORT_NAV, NULL);
-        BST_TRY(
-            bst_gimbal_nav(bst_step_ctx(s), m->view, m->observer, tick, bst_step_seconds(s), nav));
+        BST_TRY(bst_gimbal_nav(bst_step_ctx(s), m->view, m->observer, m->sensor, tick,
+                               bst_step_seconds(s), nav));
     }
     return BST_OK;
 }

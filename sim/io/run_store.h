@@ -3,6 +3,7 @@
 #ifndef BST_IO_RUN_STORE_H
 #define BST_IO_RUN_STORE_H
 
+#include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -67,7 +68,8 @@ typedef struct bst_column {
     const char *doc;
 } bst_column;
 
-/* A cell. NAN and NULL text are stored as SQL NULL. */
+/* A cell. What is no finite number (the magnitude of what sends no light, say) and NULL text are
+ * stored as SQL NULL. */
 typedef struct bst_value {
     bst_column_type type;
     bool is_null;
@@ -88,7 +90,7 @@ static inline bst_value bst_int_value(int64_t value) {
 static inline bst_value bst_real_value(double value) {
     bst_value v;
     v.type = BST_COLUMN_REAL;
-    v.is_null = value != value;
+    v.is_null = !isfinite(value);
     v.as.real = value;
     return v;
 }

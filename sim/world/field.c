@@ -321,9 +321,12 @@ static bst_status reserve_sources(bst_ctx *ctx, bst_field *field, int count) {
 static bool near_window(const bst_field *field, bst_quat q, bst_vec3 direction, bst_window window,
                         double margin_px) {
     double x, y;
-    return bst_camera_project(field->camera, bst_quat_rotate(q, direction), &x, &y) &&
-           x >= window.x0 - margin_px && y >= window.y0 - margin_px &&
-           x <= window.x0 + window.width - 1 + margin_px &&
+    bst_vec3 v = bst_quat_rotate(q, direction);
+    if (field->camera->geometry.general && bst_camera_beyond_fold(field->camera, v, margin_px)) {
+        return true; /* no image now, but it may come within the exposure */
+    }
+    return bst_camera_project(field->camera, v, &x, &y) && x >= window.x0 - margin_px &&
+           y >= window.y0 - margin_px && x <= window.x0 + window.width - 1 + margin_px &&
            y <= window.y0 + window.height - 1 + margin_px;
 }
 
@@ -400,7 +403,7 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     if (camera->geometry.general) {
         radius += bst_camera_reach_rad(camera, centre_cam, window.x0 - margin_px,
                                        window.y0 - margin_px, window.x0 + window.width + margin_px,
-                                       window.y0 + window.height + margin_px);
+                                       window.y0 + window.height + margin_px, margin_px);
     } else {
         radius += atan(bst_camera_scale_rad(camera) *
                        (0.5 * hypot(window.width, window.height) + sqrt(2.0) * margin_px));
