@@ -6,6 +6,7 @@
 #include "sim/astro/oem.h"
 #include "sim/astro/sgp4.h"
 #include "sim/astro/sky_clock.h"
+#include "sim/astro/trajectory.h"
 #include "sim/world/faint_stars.h"
 #include "sim/world/knowledge.h"
 #include "sim/world/name_index.h"
@@ -35,6 +36,9 @@ typedef struct bst_orbit {
     int file_object;
     bool in_teme;        /* injected */
     double from_s, to_s; /* span of the states, after the epoch */
+    /* numerical */
+    bst_gravity *gravity;
+    bst_trajectory *unburnt, *burnt; /* burnt NULL: there are no burns */
 
     bst_burn *burns;
     int burn_count;
@@ -86,6 +90,7 @@ struct bst_knowledge {
     const bst_world
         *world;           /* for the nominal orbits and Earth orientation only; never handed out */
     bst_stars *own_stars; /* NULL: the world's */
+    bst_stars *altered;   /* those with the catalogue's errors; NULL: it has none */
     bst_camera camera;
     int observer, sensor;
     double julian_year;
@@ -123,9 +128,23 @@ bst_status bst_cue_resolve(bst_ctx *ctx, const char *scenario, bst_world *world,
                            int sensor, bst_sky_clock *clock) BST_MUST_CHECK;
 
 /* Direction of the cue (unit, GCRF, geometric) without its error: the object's catalogued orbit as
- * seen from the observer, light time in. */
+ * seen from an observer in state `eye`, light time in. */
 bst_status bst_cue_nominal_direction(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
-                                     bst_sky_clock *clock, double seconds,
+                                     bst_sky_clock *clock, double seconds, const bst_state *eye,
                                      bst_vec3 *out) BST_MUST_CHECK;
+
+/* Time after the epoch that the onboard clock shows `seconds` after the epoch. */
+double bst_believed_seconds(const bst_world *world, int observer, int sensor, double seconds);
+
+/* Where a sensor's onboard side believes its observer to be when its clock shows believed_s. */
+bst_status bst_believed_state(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
+                              bst_sky_clock *clock, double believed_s,
+                              bst_state *out) BST_MUST_CHECK;
+
+/* The same stars with errors: those of `stars` that are dropped are not found, the displaced ones
+ * lie elsewhere. Shares the memory of `stars`, which must outlive *out. */
+bst_status bst_stars_with_errors(bst_ctx *ctx, const bst_stars *stars,
+                                 const bst_star_errors_config *errors,
+                                 bst_stars **out) BST_MUST_CHECK;
 
 #endif
