@@ -136,7 +136,7 @@ static void large_fits(void **state) {
     expect(&fits, header,
            "COMMENT                                                              "
            "           ",
-           0, BST_ERR_IO);
+           0, BST_ERR_FORMAT);
 }
 
 int main(void) {
