@@ -112,6 +112,7 @@ static bst_status prepare(const bst_module_env *env, const config *c, module *m)
     m->x_hint_gcrf = bst_quat_rotate(bst_quat_conj(nominal), (bst_vec3){1, 0, 0});
     BST_TRY(bst_platform_init(env->ctx, &m->platform, platform, nominal, pixel, m->dt_s,
                               bst_env_rng(env, "jitter"), bst_env_rng(env, "attitude")));
+    BST_TRY(bst_platform_check_history(env->ctx, platform, env->exposure_s));
     BST_TRY(bst_platform_divider(env->ctx, "telemetry_rate_hz", 1.0 / m->dt_s,
                                  platform->telemetry_rate_hz, &m->telemetry_steps));
     BST_TRY(bst_platform_divider(env->ctx, "nav_rate_hz", 1.0 / m->dt_s, platform->nav_rate_hz,

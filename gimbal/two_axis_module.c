@@ -55,6 +55,9 @@ static bst_status create(const bst_module_env *env, const void *config_in, void 
     double pixel = bst_camera_scale_rad(bst_world_camera(env->world, env->observer, env->sensor));
     bst_status status = bst_two_axis_init(env->ctx, &m->plant, config, nominal, pixel, dt, &keys);
     if (status == BST_OK) {
+        status = bst_platform_check_history(env->ctx, platform, env->exposure_s);
+    }
+    if (status == BST_OK) {
         status = bst_platform_divider(env->ctx, "telemetry_rate_hz", 1.0 / dt,
                                       platform->telemetry_rate_hz, &m->telemetry_steps);
     }
