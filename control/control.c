@@ -140,10 +140,10 @@ static bst_status start_search(bst_ctx *ctx, bst_control *c, int mode, int64_t t
     }
     bst_search_plan(&c->search, extent, 2.0 * atan(0.5 * c->env.width_px * c->env.pixel_rad),
                     2.0 * atan(0.5 * c->env.height_px * c->env.pixel_rad), c->config.search_step);
-    c->search_x_gcrf =
-        c->pointing_valid
-            ? bst_quat_rotate(bst_quat_conj(c->pointing.q_cam_from_gcrf), (bst_vec3){1, 0, 0})
-            : (bst_vec3){1, 0, 0};
+    bst_vec3 image_x = {cos(c->env.rotation_rad), sin(c->env.rotation_rad), 0.0};
+    c->search_x_gcrf = c->pointing_valid
+                           ? bst_quat_rotate(bst_quat_conj(c->pointing.q_cam_from_gcrf), image_x)
+                           : (bst_vec3){1, 0, 0};
     c->search_mode = mode;
     go_to_tile(c, 0, tick);
     enter(c, mode, tick, reason);

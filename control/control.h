@@ -43,7 +43,8 @@ typedef bst_status (*bst_control_cue_fn)(void *user, bst_ctx *ctx, double second
 typedef struct bst_control_env {
     double tick_rate_hz;
     double pixel_rad;
-    int width_px, height_px;
+    double rotation_rad; /* of the image's axes about the boresight, from camera +x towards +y */
+    int width_px, height_px; /* of the field, undistorted */
     bst_control_cue_fn cue_at;
     void *cue_user;
 } bst_control_env;

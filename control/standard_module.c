@@ -42,10 +42,13 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
     bst_status status = bst_knowledge_view_create(env->ctx, env->knowledge, &m->view);
     if (status == BST_OK) {
         const bst_camera *camera = bst_knowledge_camera(env->knowledge);
+        double width_px, height_px;
+        bst_camera_field_px(camera, &width_px, &height_px);
         bst_control_env control_env = {.tick_rate_hz = (double)env->tick_rate_hz,
                                        .pixel_rad = bst_camera_scale_rad(camera),
-                                       .width_px = (int)camera->width_px,
-                                       .height_px = (int)camera->height_px,
+                                       .rotation_rad = camera->rotation_deg * BST_DEG_RAD,
+                                       .width_px = (int)width_px,
+                                       .height_px = (int)height_px,
                                        .cue_at = cue_at,
                                        .cue_user = m->view};
         status = bst_control_init(env->ctx, &m->control, config, &control_env);

@@ -1,3 +1,4 @@
+#include <math.h>
 #include <stdlib.h>
 
 #include "imgproc/calibration.h"
@@ -57,6 +58,8 @@ enum { CATALOGUE_CAPACITY = 16384 };
 static const double SNR_SHARE_EXPECTED = 0.7;
 /* Once the tracker knows the pointing error, stars are looked for this close first. */
 static const double LOCKED_RADIUS_PX = 10.0;
+/* Shift beyond which a distorted field is matched twice. */
+static const double RESHIFT_PX = 2.0;
 
 typedef struct imgproc_module {
     const bst_imgproc_config *config;
@@ -134,6 +137,10 @@ static void label(bst_detections *out, bool found_field, double streak_px) {
     }
 }
 
+static double shift_px(const bst_starid_result *r) {
+    return hypot(r->shift_x_px, r->shift_y_px);
+}
+
 static bst_status identify(imgproc_module *m, bst_ctx *ctx, const bst_nav_telemetry *nav,
                            bst_window window, bool locked, bst_detections *out) {
     bst_light light = {nav->velocity_bary_mps, nav->sun_m};
@@ -155,6 +162,25 @@ static bst_status identify(imgproc_module *m, bst_ctx *ctx, const bst_nav_teleme
         options.search_radius_px = m->config->search_radius_px;
     }
     if (result.matched == 0) {
+        bst_starid_match(m->starid, &options, m->sky.expected, expected, out->items, out->count,
+                         &result);
+    }
+    if (m->camera.geometry.general && result.matched > 0 && shift_px(&result) > RESHIFT_PX) {
+        /* distortion makes a shift uneven over the field: look again from where the stars were */
+        bst_vec3 seen = bst_camera_unproject(&m->camera, options.centre_x_px + result.shift_x_px,
+                                             options.centre_y_px + result.shift_y_px);
+        bst_vec3 turn = bst_vec3_cross((bst_vec3){0, 0, 1}, seen);
+        turn.z = result.roll_rad;
+        bst_quat q = bst_quat_mul(bst_quat_from_rotvec(turn), out->q_cam_from_gcrf);
+        for (int i = 0; i < out->count; i++) {
+            if (out->items[i].label == BST_LABEL_STAR) {
+                out->items[i].label = BST_LABEL_UNKNOWN;
+                out->items[i].star_id = 0;
+            }
+        }
+        BST_TRY(bst_sky_expect(ctx, &m->sky, bst_quat_unit(q), &light, window,
+                               m->config->search_radius_px, v_limit, &expected));
+        options.search_radius_px = fmin(options.search_radius_px, LOCKED_RADIUS_PX);
         bst_starid_match(m->starid, &options, m->sky.expected, expected, out->items, out->count,
                          &result);
     }

@@ -101,7 +101,9 @@ void bst_motion_streak(const bst_motion *motion, const bst_camera *camera, doubl
 
 void bst_motion_bend(const bst_motion *motion, const bst_camera *camera, double *x_px,
                      double *y_px) {
-    double scale = bst_camera_scale_rad(camera);
-    *x_px = motion->bend_cam_rad.y / scale;
-    *y_px = -motion->bend_cam_rad.x / scale;
+    double scale = bst_camera_scale_rad(camera), k[2][2];
+    bst_camera_jacobian(camera, (bst_vec3){0, 0, 1}, k);
+    double a = motion->bend_cam_rad.y, b = -motion->bend_cam_rad.x;
+    *x_px = (k[0][0] * a + k[0][1] * b) / scale;
+    *y_px = (k[1][0] * a + k[1][1] * b) / scale;
 }

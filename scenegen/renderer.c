@@ -97,9 +97,19 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
     const bst_kernel_source *sources[] = {&bst_kernel_scene_shared, &bst_kernel_nodes,
                                           &bst_kernel_splat, &bst_kernel_detector,
                                           &bst_kernel_tile};
-    char options[128];
-    snprintf(options, sizeof options, "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d",
-             r->options.tile_width, r->options.tile_height, r->options.group, r->taps);
+    char options[512];
+    int length = snprintf(options, sizeof options,
+                          "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d",
+                          r->options.tile_width, r->options.tile_height, r->options.group, r->taps);
+    const bst_distortion *d = &r->camera.distortion;
+    if (bst_camera_distorted(&r->camera)) {
+        double a = bst_camera_scale_rad(&r->camera), a2 = a * a,
+               out = r->camera.geometry.domain / a;
+        snprintf(
+            options + length, sizeof options - (size_t)length,
+            " -DDISTORTED -DK1=%.9ef -DK2=%.9ef -DK3=%.9ef -DP1=%.9ef -DP2=%.9ef -DFOLD2=%.9ef",
+            d->k1 * a2, d->k2 * a2 * a2, d->k3 * a2 * a2 * a2, d->p1 * a, d->p2 * a, out * out);
+    }
     BST_TRY(bst_device_build(ctx, device, sources, 5, options, &r->program));
     static const char *const names[3] = {"bst_scene_nodes", "bst_scene_frame",
                                          "bst_scene_expected"};

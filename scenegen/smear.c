@@ -20,6 +20,7 @@ struct bst_smear {
     double tail[MAX_TAPS / 2]; /* profile at r px from the centre, over the centre's */
     double tolerance[LEVELS];
     double half_diagonal_px;
+    double stretch; /* of the image by distortion where it is greatest */
 
     bst_los_track track;
     double dark_variance_e2, duration_s;
@@ -52,7 +53,12 @@ bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
     for (int n = 0; n < LEVELS; n++) {
         s->tolerance[n] = 0.03 * pow(10.0, -0.5 * n);
     }
-    s->half_diagonal_px = 0.5 * hypot((double)camera->width_px, (double)camera->height_px);
+    s->stretch = bst_camera_stretch(camera);
+    s->half_diagonal_px =
+        tan(bst_camera_half_diagonal_rad(camera)) / bst_camera_scale_rad(camera) * s->stretch;
+    if (!camera->geometry.general) {
+        s->half_diagonal_px = 0.5 * hypot((double)camera->width_px, (double)camera->height_px);
+    }
     return BST_OK;
 }
 
@@ -99,11 +105,22 @@ static bst_quat attitude_at(const bst_los_track *track, double time_s) {
     return bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
 }
 
-/* The camera's turn from the reference attitude as a path point: two tilts in pixels of image
- * motion, and roll by what it moves in the sensor's corners. */
+/* Turns a vector from camera axes to those of the focal plane (sign +1) or back (-1). */
+static bst_vec3 turned(const bst_smear *s, bst_vec3 v, double sign) {
+    if (!s->camera.geometry.general) {
+        return v;
+    }
+    double cs = s->camera.geometry.cos_rotation, sn = sign * s->camera.geometry.sin_rotation;
+    return (bst_vec3){cs * v.x + sn * v.y, cs * v.y - sn * v.x, v.z};
+}
+
+/* The camera's turn from the reference attitude as a path point, in the focal plane's axes: two
+ * tilts in pixels of image motion where the distortion stretches most, and roll by what it moves in
+ * the sensor's corners. */
 static bst_path_point attitude_point(const bst_smear *s, bst_quat q, double time) {
     bst_vec3 r = bst_quat_to_rotvec(bst_quat_mul(q, bst_quat_conj(s->q_reference)));
-    double scale = 1.0 / bst_camera_scale_rad(&s->camera);
+    r = turned(s, r, 1.0);
+    double scale = 1.0 / bst_camera_scale_rad(&s->camera) * s->stretch;
     return (bst_path_point){{r.x * scale, r.y * scale, r.z * s->half_diagonal_px}, time};
 }
 
@@ -127,12 +144,13 @@ static bst_status append_nodes(bst_ctx *ctx, bst_smear *s, const bst_node_list *
     return BST_OK;
 }
 
-/* Node of the camera's turn: v_node = M v_reference as a map of the tangent plane in pixels,
+/* Node of the camera's turn: v_node = M v_reference as a map of the undistorted tangent plane, in
+ * pixels and the focal plane's axes,
  * x' - x = ((m00 - m22) x + m01 y + m02 / a - x d) / (d + m22), d = a (m20 x + m21 y). */
 static void attitude_to_table(const bst_smear *s, const bst_node *node, float *t) {
-    double a = bst_camera_scale_rad(&s->camera);
+    double a = bst_camera_scale_rad(&s->camera), tilt = a / s->stretch;
     bst_quat q = bst_quat_from_rotvec(
-        (bst_vec3){node->p[0] * a, node->p[1] * a, node->p[2] / s->half_diagonal_px});
+        (bst_vec3){node->p[0] * tilt, node->p[1] * tilt, node->p[2] / s->half_diagonal_px});
     bst_mat3 m = bst_quat_to_mat3(q);
     double rows[BST_TABLE_ROWS] = {
         m.m[0][0] - m.m[2][2], m.m[0][1],     m.m[0][2] / a, m.m[1][0], m.m[1][1] - m.m[2][2],
@@ -144,11 +162,22 @@ static void attitude_to_table(const bst_smear *s, const bst_node *node, float *t
 
 /* Node of an own path: a shift of the image. */
 static void shift_to_table(const bst_smear *s, const bst_node *node, float *t) {
-    (void)s;
-    double rows[BST_TABLE_ROWS] = {0, 0, node->p[0], 0, 0, node->p[1], 0, 0, 1.0, node->weight};
+    double x = node->p[0] / s->stretch, y = node->p[1] / s->stretch;
+    double rows[BST_TABLE_ROWS] = {0, 0, x, 0, 0, y, 0, 0, 1.0, node->weight};
     for (int i = 0; i < BST_TABLE_ROWS; i++) {
         t[i * BST_BLOCK] = (float)rows[i];
     }
+}
+
+/* Largest share of light on one pixel over the scratch nodes, where the distortion stretches the
+ * image least. Spoils their places. */
+static double largest_share(bst_smear *s) {
+    double least = bst_camera_shrink(&s->camera) / s->stretch;
+    for (int n = 0; n < s->nodes.count && least < 1.0; n++) {
+        s->nodes.items[n].p[0] *= least;
+        s->nodes.items[n].p[1] *= least;
+    }
+    return bst_nodes_peak_share(s->nodes.items, s->nodes.count, s->sigma_px);
 }
 
 static bst_status make_level(bst_ctx *ctx, bst_smear *s, int n) {
@@ -185,7 +214,7 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_los_track *trac
         }
     }
     BST_TRY(make_level(ctx, s, 0));
-    s->star_share = bst_nodes_peak_share(s->nodes.items, s->nodes.count, s->sigma_px);
+    s->star_share = largest_share(s);
     return BST_OK;
 }
 
@@ -210,6 +239,8 @@ static int choose_radius(const bst_smear *s, double peak_e) {
     return r;
 }
 
+/* Place on the focal plane from the boresight, px, without the distortion, which the kernel adds;
+ * false when it has no image or one far away. */
 static bool project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, double *y) {
     bst_vec3 c = bst_quat_rotate(q, v);
     if (!bst_camera_project(&s->camera, c, x, y)) {
@@ -217,7 +248,14 @@ static bool project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, doubl
     }
     *x -= bst_camera_centre_x(&s->camera);
     *y -= bst_camera_centre_y(&s->camera);
-    return fabs(*x) < 1e6 && fabs(*y) < 1e6;
+    bool near = fabs(*x) < 1e6 && fabs(*y) < 1e6;
+    if (s->camera.geometry.general) {
+        c = turned(s, c, 1.0);
+        double f = 1.0 / (bst_camera_scale_rad(&s->camera) * c.z);
+        *x = c.x * f;
+        *y = c.y * f;
+    }
+    return near;
 }
 
 static bst_vec3 direction_at(const bst_source *source, double u) {
@@ -240,7 +278,8 @@ static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_source *source,
     bst_vec3 bend = bst_vec3_sub(
         bst_vec3_scale(bst_vec3_add(source->apparent_start, source->apparent_end), 0.5),
         source->apparent_mid);
-    double chords = sqrt(bst_vec3_norm(bend) / bst_camera_scale_rad(&s->camera) / 0.002);
+    double chords =
+        sqrt(bst_vec3_norm(bend) / bst_camera_scale_rad(&s->camera) * s->stretch / 0.002);
     int least = (int)fmin(chords, 1e4) / (track->count - 1) + 1;
     *count = 0;
     *visible = true;
@@ -259,7 +298,8 @@ static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_source *source,
                 *visible = false;
                 return BST_OK;
             }
-            s->own_path[(*count)++] = (bst_path_point){{x - x0, y - y0, 0.0}, t};
+            s->own_path[(*count)++] =
+                (bst_path_point){{(x - x0) * s->stretch, (y - y0) * s->stretch, 0.0}, t};
         }
     }
     return BST_OK;
@@ -285,8 +325,7 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
         s->nodes.count = 0;
         BST_TRY(
             bst_nodes_from_path(ctx, s->own_path, count, s->sigma_px, s->tolerance[0], &s->nodes));
-        s->last_peak_e =
-            electrons * bst_nodes_peak_share(s->nodes.items, s->nodes.count, s->sigma_px);
+        s->last_peak_e = electrons * largest_share(s);
         s->nodes.count = 0;
         BST_TRY(bst_nodes_from_path(ctx, s->own_path, count, s->sigma_px,
                                     s->tolerance[choose_level(s, s->last_peak_e)], &s->nodes));

@@ -29,13 +29,14 @@ static bool evaluate(const bst_camera *camera, double floor_px, bst_quat q,
     out->w[2] = cxx / det;
     out->chi2 = out->w[0] * out->r[0] * out->r[0] + 2 * out->w[1] * out->r[0] * out->r[1] +
                 out->w[2] * out->r[1] * out->r[1];
-    /* v turns by e x v; x = vx / vz, y = vy / vz in units of the pixel scale */
+    /* v turns by e x v; the pixel follows from a = vx / vz and b = vy / vz */
     double f = 1.0 / bst_camera_scale_rad(camera), a = v.x / v.z, b = v.y / v.z;
-    double jx[3] = {-a * b * f, (1 + a * a) * f, -b * f};
-    double jy[3] = {-(1 + b * b) * f, a * b * f, a * f};
+    const double ja[3] = {-a * b, 1 + a * a, -b}, jb[3] = {-(1 + b * b), a * b, a};
+    double by_tangent[2][2];
+    bst_camera_jacobian(camera, v, by_tangent);
     for (int k = 0; k < 3; k++) {
-        out->j[0][k] = jx[k];
-        out->j[1][k] = jy[k];
+        out->j[0][k] = (by_tangent[0][0] * ja[k] + by_tangent[0][1] * jb[k]) * f;
+        out->j[1][k] = (by_tangent[1][0] * ja[k] + by_tangent[1][1] * jb[k]) * f;
     }
     return isfinite(out->chi2);
 }

@@ -262,8 +262,13 @@ static bst_sky_measurement to_sky(const bst_tracker *t, const bst_detection *ite
     }
     /* derivatives of the direction by x, y (px) and by rotation about camera x, y, z */
     bst_vec3 unit[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, columns[5];
+    double s[2][2];
+    bst_camera_jacobian(&t->camera, v, s);
+    double det = s[0][0] * s[1][1] - s[0][1] * s[1][0];
+    const bst_vec3 by_px[2] = {{s[1][1] / det, -s[1][0] / det, 0.0},
+                               {-s[0][1] / det, s[0][0] / det, 0.0}};
     for (int i = 0; i < 2; i++) {
-        columns[i] = bst_vec3_scale(bst_tangent_project(v, unit[i]), scale);
+        columns[i] = bst_vec3_scale(bst_tangent_project(v, by_px[i]), scale);
     }
     for (int i = 0; i < 3; i++) {
         columns[i + 2] = bst_vec3_cross(unit[i], v);

@@ -12,6 +12,20 @@ static float min_of(float16 v) {
     return -max_of(-v);
 }
 
+#ifdef DISTORTED
+/* Distortion (sim/world/camera.h); k1, k2, k3, p1, p2 in pixels instead of tangents. What lies
+ * beyond the fold gives no light on the sensor. */
+static void add_distortion(float16 *x, float16 *y) {
+    float16 s = *x * *x + *y * *y;
+    float16 l = s * (K1 + s * (K2 + s * K3));
+    float16 xy = 2.0f * *x * *y;
+    float16 dx = *x * l + P1 * xy + P2 * (s + 2.0f * *x * *x);
+    float16 dy = *y * l + P1 * (s + 2.0f * *y * *y) + P2 * xy;
+    *x = select(*x + dx, (float16)(1e6f), s > FOLD2);
+    *y = select(*y + dy, (float16)(1e6f), s > FOLD2);
+}
+#endif
+
 /* nodes: per block x[16], y[16], electrons[16], px and e-. block_box: x0, y0, x1, y1 (inclusive
  * pixels). source_box: the same for sources, by groups of 16: x0[16], y0[16], x1[16], y1[16]. */
 kernel void bst_scene_nodes(global const bst_scene_source *sources, int count,
@@ -31,8 +45,16 @@ kernel void bst_scene_nodes(global const bst_scene_source *sources, int count,
             float16 dx = (t[0] * s.x_px + t[1] * s.y_px + t[2] - depth * s.x_px) * scale;
             float16 dy = (t[3] * s.x_px + t[4] * s.y_px + t[5] - depth * s.y_px) * scale;
             /* far outside any sensor all places are alike; keeps the integer maths in range */
+#ifdef DISTORTED
+            dx += s.x_px;
+            dy += s.y_px;
+            add_distortion(&dx, &dy);
+            float16 x = clamp(centre_x + dx, -1e6f, 1e6f);
+            float16 y = clamp(centre_y + dy, -1e6f, 1e6f);
+#else
             float16 x = clamp(centre_x + s.x_px + dx, -1e6f, 1e6f);
             float16 y = clamp(centre_y + s.y_px + dy, -1e6f, 1e6f);
+#endif
             int block = s.first_block + b;
             nodes[3 * block] = x;
             nodes[3 * block + 1] = y;

@@ -27,7 +27,7 @@ typedef struct bst_scene_params {
 
 /* One source on its way to its nodes. */
 typedef struct bst_scene_source {
-    float x_px, y_px; /* at the reference attitude, from the boresight */
+    float x_px, y_px; /* at the reference attitude, from the boresight, without distortion */
     float electrons;  /* in the exposure */
     int first_table;  /* block of the node table */
     int first_block;  /* block of the frame's nodes */

@@ -276,9 +276,9 @@ static bst_status propagate(bst_ctx *ctx, const request *q, bool *complete) {
     int count = 0;
     bst_eop *eop = NULL;
     states s = {.request = q, .stream = stdout};
-    const bst_tle_options only = {.norad = (int)q->norad};
+    const bst_elements_options only = {.norad = (int)q->norad};
     const char *name = q->output ? q->output : "standard output";
-    bst_status status = bst_tle_load(ctx, q->tle, &only, &sets, &count);
+    bst_status status = bst_elements_load(ctx, q->tle, &only, &sets, &count);
     if (status == BST_OK && q->frame == FRAME_GCRF) {
         status = q->eop_path ? bst_eop_load(ctx, q->eop_path, &eop) : bst_eop_builtin(ctx, &eop);
         if (status == BST_OK) {

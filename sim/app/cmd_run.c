@@ -22,9 +22,32 @@
 
 static volatile sig_atomic_t stop_requested;
 
+static const int stop_signals[] = {SIGINT, SIGTERM, SIGHUP};
+enum { STOP_SIGNALS = sizeof stop_signals / sizeof *stop_signals };
+
+/* The first one asks the run to end; the second one, of whatever kind, ends the process. */
 static void on_signal(int number) {
     (void)number;
     stop_requested = 1;
+    for (int i = 0; i < STOP_SIGNALS; i++) {
+        signal(stop_signals[i], SIG_DFL);
+    }
+}
+
+static void catch_signals(void) {
+    stop_requested = 0;
+    for (int i = 0; i < STOP_SIGNALS; i++) {
+        struct sigaction action = {.sa_handler = on_signal}, before;
+        /* nohup has the program ignore the end of the terminal */
+        if (stop_signals[i] != SIGHUP ||
+            (sigaction(SIGHUP, NULL, &before) == 0 && before.sa_handler != SIG_IGN)) {
+            sigaction(stop_signals[i], &action, NULL);
+        }
+    }
+    /* a limit on the size of files and a reader that went away are errors of a write, not the end
+     * of the process */
+    signal(SIGXFSZ, SIG_IGN);
+    signal(SIGPIPE, SIG_IGN);
 }
 
 /* One sensor as the run watches it. */
@@ -135,8 +158,9 @@ static cJSON *summary_json(const bst_loop_figures *f, double real_time_factor) {
     return node;
 }
 
+/* `why`: the message of a run that failed, else NULL. */
 static bst_status write_manifest(const run_state *run, bst_simulation *sim, const bst_run *store,
-                                 double wall, bool complete) {
+                                 double wall, bst_status ended, const char *why) {
     const bst_scenario *scenario = run->scenario;
     cJSON *root = cJSON_CreateObject();
     char text[64];
@@ -146,7 +170,14 @@ static bst_status write_manifest(const run_state *run, bst_simulation *sim, cons
     cJSON_AddStringToObject(root, "scenario", scenario->name);
     cJSON_AddStringToObject(root, "scenario_file", scenario->file);
     cJSON_AddStringToObject(root, "epoch_utc", scenario->epoch_utc);
-    cJSON_AddBoolToObject(root, "complete", complete);
+    cJSON_AddBoolToObject(root, "complete", ended == BST_OK);
+    cJSON_AddStringToObject(root, "ended",
+                            ended == BST_OK                ? "complete"
+                            : ended == BST_ERR_INTERRUPTED ? "interrupted"
+                                                           : "failed");
+    if (why) {
+        cJSON_AddStringToObject(root, "error", why);
+    }
     snprintf(text, sizeof text, "0x%llX", (unsigned long long)scenario->seed);
     cJSON_AddStringToObject(root, "seed", text);
     cJSON_AddNumberToObject(root, "run", (double)scenario->run);
@@ -303,11 +334,69 @@ static void free_run(run_state *run) {
     bst_run_pictures_free(run->pictures);
 }
 
+/* What a run leaves behind its frames and tables, and last of all the manifest, once everything
+ * else is safe. `ended`: how the run ended; of a run that failed, what can be written is. */
+static bst_status write_ending(run_state *run, bst_simulation *sim, bst_run *store, double wall,
+                               bst_status ended, bst_ctx *ctx) {
+    char why[BST_MESSAGE_BYTES];
+    memcpy(why, ctx->message, sizeof why);
+    bool failed = ended != BST_OK && ended != BST_ERR_INTERRUPTED;
+    bst_status status = BST_OK;
+    if (!failed) {
+        status =
+            bst_run_pictures_write(ctx, run->pictures, bst_run_folder(store), run->scenario->name);
+    }
+    bst_status sealed = bst_run_seal(status == BST_OK ? ctx : NULL, store);
+    status = status == BST_OK ? sealed : status;
+    if (status != BST_OK && !failed) {
+        memcpy(why, ctx->message, sizeof why);
+    }
+    bst_ctx *own = run->ctx;
+    bst_ctx unheard = *ctx;
+    run->ctx = status == BST_OK ? ctx : &unheard;
+    bst_status worst = failed ? ended : status != BST_OK ? status : ended;
+    bst_status written =
+        write_manifest(run, sim, store, wall, worst, failed || status != BST_OK ? why : NULL);
+    run->ctx = own;
+    return status == BST_OK ? written : status;
+}
+
+/* Warns when the disk does not look large enough for the frames. */
+static void warn_of_space(const run_state *run, const char *out) {
+    const bst_scenario *scenario = run->scenario;
+    const bst_observer_config *observers = scenario->observers.items;
+    double bytes = 0.0;
+    for (int i = 0; i < scenario->observers.count; i++) {
+        const bst_sensor_config *sensors = observers[i].sensors.items;
+        for (int s = 0; s < observers[i].sensors.count; s++) {
+            const bst_exposure_config *e = &sensors[s].exposure;
+            double frames = floor((scenario->duration_s - e->first_s) / e->period_s);
+            bytes += fmax(frames, 0.0) * 2.0 * (double)sensors[s].camera.width_px *
+                     (double)sensors[s].camera.height_px;
+        }
+    }
+    /* Rice takes 8-bit noise to about half */
+    bytes *= scenario->record.compression ? 0.5 : 1.0;
+    double free_bytes = (double)bst_run_free_bytes(out);
+    if (scenario->record.frames != BST_RECORD_NO_FRAMES && free_bytes >= 0.0 &&
+        bytes > free_bytes) {
+        bst_log(run->ctx, BST_LOG_WARNING,
+                "%s: the frames will take about %.1f GB and %.1f GB are free there; shorten the "
+                "run (--duration), set /record/compression=rice or /record/frames=none, or choose "
+                "another output folder",
+                out, bytes * 1e-9, free_bytes * 1e-9);
+    }
+}
+
 /* Steps the simulation and writes what belongs into the folder; the folder is complete when this
  * returns BST_OK. An interrupted run is closed properly and keeps its .partial name. */
 static bst_status execute(run_state *run, bst_simulation *sim, const char *out, bool overwrite) {
     bst_ctx *ctx = run->ctx;
     bst_run *store = NULL;
+    if (stop_requested) {
+        return bst_fail(ctx, BST_ERR_INTERRUPTED, "interrupted before the run began");
+    }
+    warn_of_space(run, out);
     BST_TRY(bst_run_create(ctx, out, overwrite, &store));
     cJSON *echo = bst_scenario_echo(run->scenario);
     bst_status status = echo ? bst_run_write_json(ctx, store, "scenario.json", echo)
@@ -337,18 +426,12 @@ static bst_status execute(run_state *run, bst_simulation *sim, const char *out, 
         *ctx = closing;
         status = closed;
     }
-    if (stepped && (status == BST_OK || status == BST_ERR_INTERRUPTED)) {
-        char why[BST_MESSAGE_BYTES];
-        memcpy(why, ctx->message, sizeof why);
-        bst_status written =
-            bst_run_pictures_write(ctx, run->pictures, bst_run_folder(store), run->scenario->name);
-        if (written == BST_OK) {
-            written = write_manifest(run, sim, store, wall, status == BST_OK);
-        }
-        if (status == BST_OK) {
+    if (stepped) {
+        bst_ctx after = *ctx;
+        bst_status written = write_ending(run, sim, store, wall, status, &after);
+        if (status == BST_OK && written != BST_OK) {
+            *ctx = after;
             status = written;
-        } else if (written == BST_OK) {
-            memcpy(ctx->message, why, sizeof why);
         }
     }
     if (status == BST_OK) {
@@ -369,7 +452,8 @@ static const char help_text[] =
     "(truth,\n"
     "detections, tracks, commands, telemetry, events), manifest.json, quicklook.png, pointing.png. "
     "While it runs\n"
-    "the folder is called OUT.partial.\n"
+    "the folder is called OUT.partial. Ctrl-C closes the run properly, a second one ends it at "
+    "once.\n"
     "\n"
     "  boresight run scenarios/neossat_geo_track.json --out runs/demo\n"
     "  boresight run scenarios/neossat_geo_track.json --seed 0x2A --duration 60 --set "
@@ -426,10 +510,7 @@ int bst_cmd_run(int argc, char **argv) {
     }
     char default_out[128];
     snprintf(default_out, sizeof default_out, "runs/%s", scenario.name);
-    stop_requested = 0;
-    struct sigaction action = {.sa_handler = on_signal};
-    sigaction(SIGINT, &action, NULL);
-    sigaction(SIGTERM, &action, NULL);
+    catch_signals();
     run_state run = {
         .ctx = &ctx, .scenario = &scenario, .progress = !quiet && isatty(STDERR_FILENO)};
     bst_simulation *sim = NULL;

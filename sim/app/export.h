@@ -16,7 +16,7 @@ typedef struct bst_export_sensor {
 
 typedef struct bst_export {
     const bst_run_reader *run;
-    const char *out; /* folder */
+    const char *out;    /* folder */
     const char *sensor; /* NULL: all; "name" or "observer/name" */
     const volatile sig_atomic_t *stop;
     /* frames */
@@ -25,7 +25,7 @@ typedef struct bst_export {
     int64_t first, last, every, longest_side; /* longest_side 0: as it is */
     double frame_rate;
     /* orbits */
-    bool czml;
+    bool czml, names_oem; /* names_oem: observations name the orbits' file */
     double step_s;
 } bst_export;
 

@@ -26,6 +26,7 @@ typedef struct job {
     int width, height; /* of a picture */
     bst_stretch stretch;
     bst_video *video;
+    bool refused; /* ffmpeg took no more */
     uint8_t *bgr;
     char stem[256], path[4096];
 } job;
@@ -88,9 +89,8 @@ static bst_status write_frame(bst_ctx *ctx, job *j, int64_t k) {
     if (j->e->annotate) {
         BST_TRY(bst_frame_marks_get(ctx, j->marks, j->ids[k], &overlay));
     }
-    bst_stretch stretch = j->e->each_stretch
-                              ? bst_stretch_of(frame.pixels, frame.width, frame.height)
-                              : j->stretch;
+    bst_stretch stretch =
+        j->e->each_stretch ? bst_stretch_of(frame.pixels, frame.width, frame.height) : j->stretch;
     /* a PNG has its frame's own size, a film one for all */
     int width = j->width, height = j->height;
     if (!j->e->film) {
@@ -104,7 +104,10 @@ static bst_status write_frame(bst_ctx *ctx, job *j, int64_t k) {
     bst_status status;
     if (j->e->film) {
         status = bst_picture_copy(ctx, picture, j->bgr);
-        status = status == BST_OK ? bst_video_add(ctx, j->video, j->bgr) : status;
+        if (status == BST_OK) {
+            status = bst_video_add(ctx, j->video, j->bgr);
+            j->refused = status != BST_OK;
+        }
     } else {
         char path[4200];
         snprintf(path, sizeof path, "%s/frame_%06" PRId64 ".png", j->path, j->ids[k]);
@@ -146,10 +149,9 @@ static bst_status write_frames(bst_ctx *ctx, job *j) {
     if (!j->video) {
         return status;
     }
-    if (status == BST_OK || status == BST_ERR_IO) {
-        /* where ffmpeg ended early, it says why */
-        bst_status ended = bst_video_end(ctx, j->video);
-        status = status == BST_OK ? ended : status;
+    if (status == BST_OK || j->refused) {
+        /* ffmpeg's own words, where it ended early */
+        status = bst_video_end(ctx, j->video);
     } else {
         bst_video_abandon(j->video);
     }

@@ -65,18 +65,14 @@ static bst_status make_sql(bst_ctx *ctx, const bst_export *e, int64_t number, co
     return status;
 }
 
-typedef struct reporter {
-    bst_progress progress;
-} reporter;
-
 static void report(void *user, int64_t rows) {
-    bst_progress_update(&((reporter *)user)->progress, rows);
+    bst_progress_update(user, rows);
 }
 
 static bst_status export_table(bst_ctx *ctx, const bst_export *e, int64_t number,
                                const char *name) {
     char sql[400], path[4096];
-    reporter r;
+    bst_progress progress;
     int64_t rows;
     BST_TRY(bst_export_check(ctx, e));
     BST_TRY(make_sql(ctx, e, number, name, sql, sizeof sql));
@@ -84,10 +80,11 @@ static bst_status export_table(bst_ctx *ctx, const bst_export *e, int64_t number
     if (n < 0 || (size_t)n >= sizeof path) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", e->out);
     }
-    bst_progress_start(&r.progress, name, "rows",
-                       bst_run_reader_int(e->run, "SELECT 0 WHERE ?1", 0, 0));
-    bst_status status = bst_csv_write(ctx, e->run, sql, path, report, &r, &rows);
-    bst_progress_end(&r.progress);
+    char count[128];
+    snprintf(count, sizeof count, "SELECT count(*) FROM \"%.63s\"", name);
+    bst_progress_start(&progress, name, "rows", bst_run_reader_int(e->run, count, 0, 0));
+    bst_status status = bst_csv_write(ctx, e->run, sql, path, report, &progress, &rows);
+    bst_progress_end(&progress);
     if (status == BST_OK) {
         printf("%s: %lld rows\n", path, (long long)rows);
     }

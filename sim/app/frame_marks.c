@@ -21,16 +21,21 @@ enum { FRAMES, EXPOSURES, OBJECTS, DETECTIONS, TRACKS, MODES, CURSORS };
 /* The first column is the key that the cursor advances by; ?1 is the sensor. Rows were written in
  * the order of exposures. */
 static const char *const queries[CURSORS] = {
-    [FRAMES] = "SELECT exposure_id, x0_px, y0_px, binning, utc(start_s + exposure_s / 2),"
-               " exposure_s, (start_tick + end_tick) / 2 FROM frames WHERE sensor = ?1",
-    [EXPOSURES] = "SELECT exposure_id, boresight_x_px, boresight_y_px FROM exposures"
-                  " WHERE sensor = ?1",
-    [OBJECTS] = "SELECT exposure_id, id, norad, x_mean_px, y_mean_px FROM truth"
-                " WHERE sensor = ?1 AND kind = 'object' AND in_field = 1",
-    [DETECTIONS] = "SELECT exposure_id, label, x_px, y_px, length_px FROM detections"
-                   " WHERE sensor = ?1",
-    [TRACKS] = "SELECT exposure_id, track_id, status, target_of_interest, x_px, y_px, snr"
-               " FROM tracks WHERE sensor = ?1 AND misses_in_row = 0",
+    [FRAMES] =
+        "SELECT exposure_id, x0_px, y0_px, binning, utc(start_s + exposure_s / 2),"
+        " exposure_s, (start_tick + end_tick) / 2 FROM frames WHERE sensor = ?1",
+    [EXPOSURES] =
+        "SELECT exposure_id, boresight_x_px, boresight_y_px FROM exposures"
+        " WHERE sensor = ?1",
+    [OBJECTS] =
+        "SELECT exposure_id, id, norad, x_mean_px, y_mean_px FROM truth"
+        " WHERE sensor = ?1 AND kind = 'object' AND in_field = 1",
+    [DETECTIONS] =
+        "SELECT exposure_id, label, x_px, y_px, length_px FROM detections"
+        " WHERE sensor = ?1",
+    [TRACKS] =
+        "SELECT exposure_id, track_id, status, target_of_interest, x_px, y_px, snr"
+        " FROM tracks WHERE sensor = ?1 AND misses_in_row = 0",
     [MODES] = "SELECT tick, mode FROM control WHERE sensor = ?1",
 };
 
@@ -52,8 +57,7 @@ bst_status bst_frame_marks_create(bst_ctx *ctx, const bst_run_reader *run, int64
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the marks");
     }
     snprintf(m->target, sizeof m->target, "%s", target);
-    const cJSON *world =
-        cJSON_GetObjectItemCaseSensitive(bst_run_reader_scenario(run), "world");
+    const cJSON *world = cJSON_GetObjectItemCaseSensitive(bst_run_reader_scenario(run), "world");
     m->objects = cJSON_GetObjectItemCaseSensitive(world, "objects");
     bst_ctx unheard = {0};
     for (int i = 0; i < CURSORS; i++) {
@@ -165,8 +169,8 @@ static bst_status get_frame(bst_ctx *ctx, bst_frame_marks *m, int64_t id) {
     m->x0 = (double)bst_rows_int(c->rows, 1);
     m->y0 = (double)bst_rows_int(c->rows, 2);
     m->binning = fmax(1.0, (double)bst_rows_int(c->rows, 3));
-    char utc[40];
-    snprintf(utc, sizeof utc, "%s", bst_rows_text(c->rows, 4));
+    char utc[32];
+    snprintf(utc, sizeof utc, "%.23sZ", bst_rows_text(c->rows, 4)); /* to the millisecond */
     double exposure_s = bst_rows_real(c->rows, 5);
     int64_t tick = bst_rows_int(c->rows, 6);
     for (cursor *modes = &m->cursors[MODES];;) {
@@ -200,9 +204,8 @@ bst_status bst_frame_marks_get(bst_ctx *ctx, bst_frame_marks *m, int64_t id, bst
                 add_track(m, rows);
             } else {
                 bool star = strcmp(bst_rows_text(rows, 1), "star") == 0;
-                bst_overlay_mark *mark =
-                    add(m, star ? BST_OVERLAY_STAR : BST_OVERLAY_DETECTION, bst_rows_real(rows, 2),
-                        bst_rows_real(rows, 3));
+                bst_overlay_mark *mark = add(m, star ? BST_OVERLAY_STAR : BST_OVERLAY_DETECTION,
+                                             bst_rows_real(rows, 2), bst_rows_real(rows, 3));
                 if (mark) {
                     mark->radius_px = 0.5 * bst_rows_real(rows, 4) / m->binning + 2.0;
                 }

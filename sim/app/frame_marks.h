@@ -1,5 +1,5 @@
-/* What a run's tables know of its frames, exposure after exposure: one pass over each table, however
- * many frames there are. */
+/* What a run's tables know of its frames, exposure after exposure: one pass over each table,
+ * however many frames there are. */
 #ifndef BST_APP_FRAME_MARKS_H
 #define BST_APP_FRAME_MARKS_H
 

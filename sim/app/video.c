@@ -1,6 +1,7 @@
 #include "sim/app/video.h"
 
 #include <errno.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,6 +12,7 @@
 struct bst_video {
     char path[4096], draft[4128], words[4128];
     size_t bytes; /* of a frame */
+    bool refused; /* a frame was not taken: whatever is there is not whole */
     bst_child child;
 };
 
@@ -36,7 +38,7 @@ static bst_status has_x264(bst_ctx *ctx, bool *out) {
 bst_status bst_video_begin(bst_ctx *ctx, const char *path, int width, int height, double frame_rate,
                            bst_video **out) {
     *out = NULL;
-    bool x264;
+    bool x264 = false;
     BST_TRY(has_x264(ctx, &x264));
     bst_video *v = calloc(1, sizeof *v);
     if (!v) {
@@ -56,19 +58,37 @@ bst_status bst_video_begin(bst_ctx *ctx, const char *path, int width, int height
     snprintf(size, sizeof size, "%dx%d", width, height);
     snprintf(rate, sizeof rate, "%.6g", frame_rate);
     snprintf(output, sizeof output, "file:%s", v->draft);
-    const char *const argv[] = {"ffmpeg",     "-hide_banner", "-nostdin",
-                                "-loglevel",  "error",        "-y",
-                                "-f",         "rawvideo",     "-pixel_format",
-                                "bgr24",      "-video_size",  size,
-                                "-framerate", rate,           "-i",
-                                "pipe:0",     "-an",          "-vf",
+    const char *const argv[] = {"ffmpeg",
+                                "-hide_banner",
+                                "-nostdin",
+                                "-loglevel",
+                                "error",
+                                "-y",
+                                "-f",
+                                "rawvideo",
+                                "-pixel_format",
+                                "bgr24",
+                                "-video_size",
+                                size,
+                                "-framerate",
+                                rate,
+                                "-i",
+                                "pipe:0",
+                                "-an",
+                                "-vf",
                                 "pad=ceil(iw/2)*2:ceil(ih/2)*2",
-                                "-pix_fmt",   "yuv420p",      "-c:v",
+                                "-pix_fmt",
+                                "yuv420p",
+                                "-c:v",
                                 x264 ? "libx264" : "mpeg4",
                                 x264 ? "-crf" : "-q:v",
                                 x264 ? "18" : "3",
-                                "-movflags",  "+faststart",   "-f",
-                                "mp4",        output,         NULL};
+                                "-movflags",
+                                "+faststart",
+                                "-f",
+                                "mp4",
+                                output,
+                                NULL};
     bst_status status = bst_child_start_fed(ctx, argv, v->words, &v->child);
     if (status != BST_OK) {
         free(v);
@@ -80,6 +100,7 @@ bst_status bst_video_begin(bst_ctx *ctx, const char *path, int width, int height
 
 bst_status bst_video_add(bst_ctx *ctx, bst_video *video, const uint8_t *bgr) {
     if (fwrite(bgr, 1, video->bytes, video->child.input) != video->bytes) {
+        video->refused = true;
         return bst_fail(ctx, BST_ERR_IO, "%s: ffmpeg does not take frames any more: %s",
                         video->path, strerror(errno));
     }
@@ -104,13 +125,13 @@ bst_status bst_video_end(bst_ctx *ctx, bst_video *video) {
     bst_status status = BST_OK;
     char words[400];
     int code = bst_child_wait(&video->child);
-    if (code != 0) {
+    if (code != 0 || video->refused) {
         read_words(video, words, sizeof words);
         status = bst_fail(ctx, BST_ERR_IO, "%s: ffmpeg failed (exit code %d): %s", video->path,
                           code, words);
     } else if (rename(video->draft, video->path) != 0) {
-        status = bst_fail(ctx, BST_ERR_IO, "%s: cannot be written: %s", video->path,
-                          strerror(errno));
+        status =
+            bst_fail(ctx, BST_ERR_IO, "%s: cannot be written: %s", video->path, strerror(errno));
     }
     if (status != BST_OK) {
         unlink(video->draft);

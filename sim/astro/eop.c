@@ -1,13 +1,14 @@
 #include <erfa.h>
 #include <erfam.h>
-#include <errno.h>
 #include <stdbool.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "sim/astro/eop_table.h"
 #include "sim/astro/frames.h"
+#include "sim/core/file.h"
+
+#define MAX_FILE_BYTES ((uint64_t)64 << 20)
 
 struct bst_eop {
     int first_mjd; /* of rows[0], 0h UTC */
@@ -45,13 +46,14 @@ void bst_eop_free(bst_eop *eop) {
     }
 }
 
-/* Reads up to `wanted` numbers; returns how many there were. */
+/* Reads up to `wanted` numbers, each a word of its own; returns how many there were. */
 static int read_numbers(const char *text, double *values, int wanted) {
     int n = 0;
     while (n < wanted) {
         char *end;
         values[n] = strtod(text, &end);
-        if (end == text) {
+        bool is_hexadecimal = memchr(text, 'x', (size_t)(end - text)) != NULL;
+        if (end == text || is_hexadecimal || (*end && !strchr(" \t", *end))) {
             break;
         }
         text = end;
@@ -73,8 +75,10 @@ static bst_status read_row(bst_ctx *ctx, const char *line, int *mjd, bst_eop_val
     }
     const double *data = v + 3 + hour;
     double djm0, djm;
-    bool dated = v[0] >= 1900.0 && v[0] < 2200.0 && v[1] >= 1.0 && v[1] <= 12.0 && v[2] >= 1.0 &&
-                 v[2] <= 31.0 && eraCal2jd((int)v[0], (int)v[1], (int)v[2], &djm0, &djm) == 0;
+    bool whole = v[0] == floor(v[0]) && v[1] == floor(v[1]) && v[2] == floor(v[2]);
+    bool dated = whole && v[0] >= 1900.0 && v[0] < 2200.0 && v[1] >= 1.0 && v[1] <= 12.0 &&
+                 v[2] >= 1.0 && v[2] <= 31.0 &&
+                 eraCal2jd((int)v[0], (int)v[1], (int)v[2], &djm0, &djm) == 0;
     if (!dated || djm != data[0] || (hour && v[3] != 0.0)) {
         return bst_fail(ctx, BST_ERR_FORMAT,
                         "date and MJD are not one and the same midnight in \"%.60s\"", line);
@@ -110,15 +114,45 @@ static bst_status append_row(bst_ctx *ctx, bst_eop *eop, int *capacity, int mjd,
     return BST_OK;
 }
 
-static bst_status read_file(bst_ctx *ctx, FILE *file, const char *path, bst_eop *eop) {
+static int count_words(const char *text) {
+    int words = 0;
+    for (text += strspn(text, " \t"); *text; text += strspn(text, " \t")) {
+        text += strcspn(text, " \t");
+        words++;
+    }
+    return words;
+}
+
+static bst_status read_rows(bst_ctx *ctx, const char *name, const char *data, size_t bytes,
+                            bst_eop *eop) {
     char line[512];
-    int capacity = 0;
-    for (int number = 1; fgets(line, sizeof line, file); number++) {
-        line[strcspn(line, "\r\n")] = '\0';
+    int capacity = 0, number = 0, columns = 0;
+    for (const char *next = data, *end = data + bytes; next < end;) {
+        number++;
+        const char *stop = memchr(next, '\n', (size_t)(end - next));
+        size_t length = (size_t)((stop ? stop : end) - next);
+        if (length >= sizeof line) {
+            return bst_fail(ctx, BST_ERR_FORMAT,
+                            "%.400s:%d: a line of %zu bytes (allowed: at most %zu); expected an "
+                            "IERS EOP C04 file",
+                            name, number, length, sizeof line - 1);
+        }
+        memcpy(line, next, length);
+        line[length] = '\0';
+        line[strcspn(line, "\r")] = '\0';
+        next = stop ? stop + 1 : end;
         const char *text = line + strspn(line, " \t");
         bool numeric = *text >= '0' && *text <= '9';
         if (!numeric && (eop->count == 0 || *text == '#' || *text == '\0')) {
             continue; /* the heading, a comment */
+        }
+        /* a file that was cut short may end within a number */
+        int words = count_words(line);
+        columns = columns ? columns : words;
+        if (words != columns) {
+            return bst_fail(ctx, BST_ERR_FORMAT,
+                            "%.400s:%d: %d columns where the rows before have %d in \"%.60s\"",
+                            name, number, words, columns, line);
         }
         int mjd = 0;
         bst_eop_values row = {0};
@@ -127,36 +161,40 @@ static bst_status read_file(bst_ctx *ctx, FILE *file, const char *path, bst_eop 
             status = append_row(ctx, eop, &capacity, mjd, row);
         }
         if (status != BST_OK) {
-            return bst_fail_prefix(ctx, status, "%s:%d", path, number);
+            return bst_fail_prefix(ctx, status, "%.400s:%d", name, number);
         }
-    }
-    if (ferror(file)) {
-        return bst_fail(ctx, BST_ERR_IO, "%s: %s", path, strerror(errno));
     }
     if (eop->count < 2) {
         return bst_fail(ctx, BST_ERR_FORMAT,
-                        "%s: %d rows of Earth orientation found, at least 2 are needed; expected "
-                        "an IERS EOP C04 file",
-                        path, eop->count);
+                        "%.400s: %d rows of Earth orientation found, at least 2 are needed; "
+                        "expected an IERS EOP C04 file",
+                        name, eop->count);
     }
     return BST_OK;
 }
 
-bst_status bst_eop_load(bst_ctx *ctx, const char *path, bst_eop **out) {
-    FILE *file = fopen(path, "r");
-    if (!file) {
-        return bst_fail(ctx, errno == ENOENT ? BST_ERR_NOT_FOUND : BST_ERR_IO,
-                        "%s: %s; give an IERS EOP C04 file", path, strerror(errno));
-    }
+bst_status bst_eop_read_buffer(bst_ctx *ctx, const char *name, const char *data, size_t bytes,
+                               bst_eop **out) {
+    *out = NULL;
+    BST_TRY(bst_file_check_text(ctx, name, data, bytes));
     bst_eop *eop = calloc(1, sizeof *eop);
-    bst_status status = eop ? read_file(ctx, file, path, eop) : out_of_memory(ctx);
-    fclose(file);
+    bst_status status = eop ? read_rows(ctx, name, data, bytes, eop) : out_of_memory(ctx);
     if (status != BST_OK) {
         bst_eop_free(eop);
         return status;
     }
     *out = eop;
     return BST_OK;
+}
+
+bst_status bst_eop_load(bst_ctx *ctx, const char *path, bst_eop **out) {
+    *out = NULL;
+    char *data;
+    size_t bytes;
+    BST_TRY(bst_file_read(ctx, path, MAX_FILE_BYTES, "an IERS EOP C04 file", &data, &bytes));
+    bst_status status = bst_eop_read_buffer(ctx, path, data, bytes, out);
+    free(data);
+    return status;
 }
 
 static bst_status fail_outside(bst_ctx *ctx, const bst_eop *eop, bst_time t) {

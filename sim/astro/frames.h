@@ -17,8 +17,11 @@ typedef struct bst_eop_values {
  * Freed with bst_eop_free. */
 bst_status bst_eop_builtin(bst_ctx *ctx, bst_eop **out) BST_MUST_CHECK;
 /* Reads an IERS EOP C04 file, of the 20 C04 series (hour column) or the 14 C04 series (none). Rows
- * are one a day at 0h UTC, without gaps. Errors carry file and line number. */
+ * are one a day at 0h UTC, without gaps; at most 64 MiB. Errors carry file and line number. */
 bst_status bst_eop_load(bst_ctx *ctx, const char *path, bst_eop **out) BST_MUST_CHECK;
+/* The same from memory; `name` stands for the path in messages. */
+bst_status bst_eop_read_buffer(bst_ctx *ctx, const char *name, const char *data, size_t bytes,
+                               bst_eop **out) BST_MUST_CHECK;
 void bst_eop_free(bst_eop *eop); /* NULL allowed */
 /* Values at t: linear interpolation between 0h UTC values, leap seconds handled; no sub-daily
  * tides. Outside the table: BST_ERR_RANGE naming the dates covered. */

@@ -50,17 +50,24 @@ static void value_text(const cJSON *value, char *buffer, size_t bytes) {
     free(text);
 }
 
-static bst_status wrong(const reader *r, const char *path, const cJSON *value, const char *what,
-                        const char *allowed) {
+bst_status bst_config_fail(bst_ctx *ctx, const char *file, const char *path, const cJSON *value,
+                           const char *what, const char *allowed) {
     char found[80];
     value_text(value, found, sizeof found);
-    return bst_fail(r->ctx, BST_ERR_CONFIG, "%s: %s: %s (found %s; allowed: %s)", r->file,
+    return bst_fail(ctx, BST_ERR_CONFIG, "%s: %s: %s (found %s; allowed: %s)", file,
                     *path ? path : "/", what, found, allowed);
+}
+
+static bst_status wrong(const reader *r, const char *path, const cJSON *value, const char *what,
+                        const char *allowed) {
+    return bst_config_fail(r->ctx, r->file, path, value, what, allowed);
 }
 
 static void range_text(const bst_config_desc *d, char *buffer, size_t bytes) {
     const char *unit = d->unit && *d->unit ? d->unit : "";
-    if (d->type == BST_CONFIG_INT) {
+    if (d->type == BST_CONFIG_INT && d->minimum == d->maximum) {
+        snprintf(buffer, bytes, "%.0f", d->minimum);
+    } else if (d->type == BST_CONFIG_INT) {
         snprintf(buffer, bytes, "an integer from %.0f to %.0f%s%s", d->minimum, d->maximum,
                  *unit ? " " : "", unit);
     } else {
@@ -97,11 +104,12 @@ static bst_status read_number(const reader *r, const cJSON *value, const char *p
         return wrong(r, path, value, "wrong type", allowed);
     }
     double number = value->valuedouble;
-    if (d->type == BST_CONFIG_INT &&
-        (number != floor(number) || fabs(number) >= END_OF_EXACT_INTEGERS)) {
+    bool is_int = d->type == BST_CONFIG_INT;
+    if (is_int && number != floor(number)) {
         return wrong(r, path, value, "not an integer", allowed);
     }
-    if (!(number >= d->minimum && number <= d->maximum)) {
+    if (!(number >= d->minimum && number <= d->maximum) ||
+        (is_int && fabs(number) >= END_OF_EXACT_INTEGERS)) {
         return wrong(r, path, value, "out of range", allowed);
     }
     *out = number;

@@ -40,7 +40,7 @@ typedef struct bst_config_desc {
                              is required */
     const char *doc;      /* one sentence */
     size_t offset, size;  /* of the member in its struct */
-    const char *const *choices;             /* ENUM: names, NULL-terminated */
+    const char *const *choices; /* ENUM: names, PATH: words that are no file; NULL-terminated */
     const struct bst_config_desc *children; /* OBJECT, LIST */
     size_t item_bytes;                      /* LIST: size of one struct */
 } bst_config_desc;
@@ -72,6 +72,12 @@ typedef struct bst_config_desc {
         .key = #m, .type = BST_CONFIG_PATH, .unit = "", .fallback = def_, .doc = doc_, \
         BST_FIELD_(s, m)                                                               \
     }
+/* A file, or one of a NULL-terminated list of words. */
+#define BST_PATH_OR(s, m, words_, def_, doc_)                                          \
+    {                                                                                  \
+        .key = #m, .type = BST_CONFIG_PATH, .unit = "", .fallback = def_, .doc = doc_, \
+        .choices = words_, BST_FIELD_(s, m)                                            \
+    }
 #define BST_SEED(s, m, def_, doc_)                                                     \
     {                                                                                  \
         .key = #m, .type = BST_CONFIG_SEED, .unit = "", .fallback = def_, .doc = doc_, \
@@ -102,8 +108,8 @@ typedef struct bst_config_desc {
     { .key = NULL }
 
 /* A parsed JSON document: text strictly checked (UTF-8, the grammar of RFC 8259, no trailing
- * garbage, no duplicate keys, no numbers beyond double, no \u0000, depth at most 64, size bounded).
- */
+ * garbage, no duplicate keys, no numbers beyond double, no \u0000, depth at most 64, at most
+ * 8 million values, size bounded). */
 typedef struct bst_json bst_json;
 struct cJSON;
 
@@ -127,6 +133,10 @@ bst_status bst_json_set(bst_ctx *ctx, bst_json *json, const char *assignment) BS
 bst_status bst_config_read(bst_ctx *ctx, const bst_json *json, const struct cJSON *node,
                            const char *path, const bst_config_desc *table,
                            void *object) BST_MUST_CHECK;
+/* Says what is wrong with a value, in the words of bst_config_read: "FILE: PATH: WHAT (found VALUE;
+ * allowed: ALLOWED)". BST_ERR_CONFIG. */
+bst_status bst_config_fail(bst_ctx *ctx, const char *file, const char *path,
+                           const struct cJSON *value, const char *what, const char *allowed);
 /* Frees the lists inside an object that bst_config_read filled. */
 void bst_config_free(const bst_config_desc *table, void *object);
 /* Fills `object` with the table's defaults (every key must have one); for tests and typed callers.

@@ -1,17 +1,14 @@
-#include <ctype.h>
-#include <errno.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #include <cjson/cJSON.h>
 
 #include "sim/core/config.h"
+#include "sim/core/file.h"
+#include "sim/core/json_internal.h"
 
-enum { MAX_DEPTH = 64 };
-static const long long MAX_BYTES = 64LL << 20;
+static const uint64_t MAX_BYTES = 64 << 20;
 
 struct bst_json {
     char *name;
@@ -30,111 +27,6 @@ static void locate(const char *text, size_t offset, int *line, int *column) {
             (*column)++;
         }
     }
-}
-
-/* Offset of the first byte that is not UTF-8 (RFC 3629), or `bytes` when all is well. */
-static size_t utf8_error(const char *text, size_t bytes) {
-    const unsigned char *p = (const unsigned char *)text;
-    size_t i = 0;
-    while (i < bytes) {
-        unsigned c = p[i];
-        size_t length = c < 0x80                ? 1
-                        : c >= 0xC2 && c < 0xE0 ? 2
-                        : c >= 0xE0 && c < 0xF0 ? 3
-                        : c >= 0xF0 && c < 0xF5 ? 4
-                                                : 0;
-        if (length == 0 || i + length > bytes) {
-            return i;
-        }
-        for (size_t k = 1; k < length; k++) {
-            if ((p[i + k] & 0xC0) != 0x80) {
-                return i;
-            }
-        }
-        /* overlong forms and surrogates */
-        if ((c == 0xE0 && p[i + 1] < 0xA0) || (c == 0xED && p[i + 1] > 0x9F) ||
-            (c == 0xF0 && p[i + 1] < 0x90) || (c == 0xF4 && p[i + 1] > 0x8F)) {
-            return i;
-        }
-        i += length;
-    }
-    return bytes;
-}
-
-/* Bytes of the JSON number at text (RFC 8259, section 6), or 0 when it is none. */
-static size_t number_length(const char *text, size_t bytes) {
-    size_t i = bytes && text[0] == '-' ? 1 : 0;
-    size_t start = i;
-    while (i < bytes && isdigit((unsigned char)text[i])) {
-        i++;
-    }
-    if (i == start || (text[start] == '0' && i > start + 1)) {
-        return 0;
-    }
-    if (i < bytes && text[i] == '.') {
-        start = ++i;
-        while (i < bytes && isdigit((unsigned char)text[i])) {
-            i++;
-        }
-        if (i == start) {
-            return 0;
-        }
-    }
-    if (i < bytes && (text[i] == 'e' || text[i] == 'E')) {
-        i++;
-        i += i < bytes && (text[i] == '+' || text[i] == '-');
-        start = i;
-        while (i < bytes && isdigit((unsigned char)text[i])) {
-            i++;
-        }
-        if (i == start) {
-            return 0;
-        }
-    }
-    return i;
-}
-
-/* Offset of the first thing that cJSON would let pass and JSON or we do not, or `bytes`; *what says
- * which. */
-static size_t lenience_error(const char *text, size_t bytes, const char **what) {
-    int depth = 0;
-    bool in_string = false;
-    for (size_t i = 0; i < bytes; i++) {
-        unsigned char c = (unsigned char)text[i];
-        if (c < 0x20 && (in_string || !strchr("\t\n\r", c))) {
-            *what = in_string ? "a control character within a string (write \\n, \\t or \\u00XX)"
-                              : "a control character";
-            return i;
-        }
-        if (in_string) {
-            if (c == '\\' && bytes - i >= 6 && memcmp(text + i, "\\u0000", 6) == 0) {
-                *what = "\\u0000 within a string is not allowed";
-                return i;
-            }
-            if (c == '\\') {
-                i++;
-            } else if (c == '"') {
-                in_string = false;
-            }
-        } else if (c == '"') {
-            in_string = true;
-        } else if (c == '{' || c == '[') {
-            if (++depth > MAX_DEPTH) {
-                *what = "nested too deep (allowed: 64 levels)";
-                return i;
-            }
-        } else if (c == '}' || c == ']') {
-            depth--;
-        } else if (c == '-' || isdigit(c)) {
-            size_t length = number_length(text + i, bytes - i);
-            if (length == 0) {
-                *what = "this is not a JSON number";
-                return i;
-            }
-            i += length - 1;
-        }
-    }
-    return bytes;
 }
 
 static int compare_keys(const void *a, const void *b) {
@@ -166,14 +58,17 @@ static bst_status find_duplicate(bst_ctx *ctx, const cJSON *object, const char *
     return BST_OK;
 }
 
-/* Duplicate keys and numbers that are not finite, anywhere in the tree. */
-static bst_status check_tree(bst_ctx *ctx, const char *name, const cJSON *node, const char *path) {
-    if (cJSON_IsNumber(node) && !isfinite(node->valuedouble)) {
-        return bst_fail(
-            ctx, BST_ERR_CONFIG,
-            "%s: %s: the number is too large to be represented (allowed: |number| < 1.8e308)", name,
-            *path ? path : "/");
+static bool has_control_character(const char *text) {
+    for (; *text; text++) {
+        if ((unsigned char)*text < 0x20) {
+            return true;
+        }
     }
+    return false;
+}
+
+/* Duplicate keys, and keys that would break a message, anywhere in the tree. */
+static bst_status check_tree(bst_ctx *ctx, const char *name, const cJSON *node, const char *path) {
     if (cJSON_IsObject(node)) {
         const char *twice;
         BST_TRY(find_duplicate(ctx, node, &twice));
@@ -186,6 +81,11 @@ static bst_status check_tree(bst_ctx *ctx, const char *name, const cJSON *node, 
     for (const cJSON *child = node->child; child; child = child->next, index++) {
         char child_path[512];
         if (cJSON_IsObject(node)) {
+            if (has_control_character(child->string)) {
+                return bst_fail(ctx, BST_ERR_CONFIG,
+                                "%s: %s: element %d has a control character in its key", name,
+                                *path ? path : "/", index);
+            }
             snprintf(child_path, sizeof child_path, "%s/%s", path, child->string);
         } else {
             snprintf(child_path, sizeof child_path, "%s/%d", path, index);
@@ -198,52 +98,22 @@ static bst_status check_tree(bst_ctx *ctx, const char *name, const cJSON *node, 
 bst_status bst_json_parse(bst_ctx *ctx, const char *name, const char *text, size_t bytes,
                           bst_json **out) {
     *out = NULL;
-    int line, column;
     if (bytes >= 3 && memcmp(text, "\xEF\xBB\xBF", 3) == 0) {
         text += 3;
         bytes -= 3;
     }
-    size_t blank = 0;
-    while (blank < bytes && isspace((unsigned char)text[blank])) {
-        blank++;
+    bst_json_fault fault;
+    if (bytes >= 2 && (memcmp(text, "\xFF\xFE", 2) == 0 || memcmp(text, "\xFE\xFF", 2) == 0)) {
+        return bst_file_check_text(ctx, name, text, bytes);
     }
-    if (blank == bytes) {
-        return bst_fail(ctx, BST_ERR_FORMAT, "%s: the file is empty (a JSON object is expected)",
-                        name);
+    if (!bst_json_check(text, bytes, &fault)) {
+        int line, column;
+        locate(text, fault.offset, &line, &column);
+        return bst_fail(ctx, BST_ERR_FORMAT, "%.400s:%d:%d: %s", name, line, column, fault.what);
     }
-    const char *nul = memchr(text, '\0', bytes);
-    size_t bad = utf8_error(text, bytes);
-    if (nul && (size_t)(nul - text) < bad) {
-        bad = (size_t)(nul - text);
-    }
-    if (bad < bytes) {
-        locate(text, bad, &line, &column);
-        return bst_fail(ctx, BST_ERR_FORMAT, "%s:%d:%d: byte 0x%02X is not UTF-8 text", name, line,
-                        column, (unsigned char)text[bad]);
-    }
-    const char *what = NULL;
-    bad = lenience_error(text, bytes, &what);
-    if (bad < bytes) {
-        locate(text, bad, &line, &column);
-        return bst_fail(ctx, BST_ERR_FORMAT, "%s:%d:%d: %s", name, line, column, what);
-    }
-    const char *end = NULL;
-    cJSON *root = cJSON_ParseWithLengthOpts(text, bytes, &end, 0);
+    cJSON *root = cJSON_ParseWithLength(text, bytes);
     if (!root) {
-        size_t offset = end && end >= text && end <= text + bytes ? (size_t)(end - text) : 0;
-        locate(text, offset, &line, &column);
-        return bst_fail(ctx, BST_ERR_FORMAT, "%s:%d:%d: this is not valid JSON", name, line,
-                        column);
-    }
-    size_t offset = (size_t)(end - text);
-    while (offset < bytes && isspace((unsigned char)text[offset])) {
-        offset++;
-    }
-    if (offset < bytes) {
-        cJSON_Delete(root);
-        locate(text, offset, &line, &column);
-        return bst_fail(ctx, BST_ERR_FORMAT, "%s:%d:%d: text after the end of the JSON value", name,
-                        line, column);
+        return bst_fail(ctx, BST_ERR_MEMORY, "%.400s: out of memory", name);
     }
     bst_status status = check_tree(ctx, name, root, "");
     if (status != BST_OK) {
@@ -265,36 +135,10 @@ bst_status bst_json_parse(bst_ctx *ctx, const char *name, const char *text, size
 
 bst_status bst_json_load(bst_ctx *ctx, const char *path, bst_json **out) {
     *out = NULL;
-    struct stat info;
-    if (stat(path, &info) != 0) {
-        return bst_fail(ctx, BST_ERR_IO, "%s: cannot be opened: %s", path, strerror(errno));
-    }
-    /* before opening, which would wait on a pipe */
-    if (!S_ISREG(info.st_mode)) {
-        return bst_fail(ctx, BST_ERR_IO, "%s: not a file%s", path,
-                        S_ISDIR(info.st_mode) ? " but a folder" : "");
-    }
-    if (info.st_size > MAX_BYTES) {
-        return bst_fail(ctx, BST_ERR_FORMAT,
-                        "%s: %lld bytes are too many for a scenario (allowed: %lld)", path,
-                        (long long)info.st_size, MAX_BYTES);
-    }
-    FILE *file = fopen(path, "rb");
-    if (!file) {
-        return bst_fail(ctx, BST_ERR_IO, "%s: cannot be opened: %s", path, strerror(errno));
-    }
-    size_t bytes = (size_t)info.st_size;
-    char *text = malloc(bytes + 1);
-    if (!text) {
-        fclose(file);
-        return bst_fail(ctx, BST_ERR_MEMORY, "%s: out of memory", path);
-    }
-    size_t got = fread(text, 1, bytes, file);
-    bool failed = ferror(file) != 0;
-    fclose(file);
-    bst_status status =
-        failed ? bst_fail(ctx, BST_ERR_IO, "%s: cannot be read: %s", path, strerror(errno))
-               : bst_json_parse(ctx, path, text, got, out);
+    char *text;
+    size_t bytes;
+    BST_TRY(bst_file_read(ctx, path, MAX_BYTES, "a JSON file", &text, &bytes));
+    bst_status status = bst_json_parse(ctx, path, text, bytes, out);
     free(text);
     return status;
 }
@@ -364,7 +208,7 @@ bst_status bst_json_set(bst_ctx *ctx, bst_json *json, const char *assignment) {
     char *save = NULL;
     char *segment = strtok_r(path, "/", &save);
     for (int depth = 1; segment && status == BST_OK; depth++) {
-        if (depth > MAX_DEPTH) {
+        if (depth > BST_JSON_MAX_DEPTH) {
             status = bst_fail(ctx, BST_ERR_ARGUMENT, "--set %.80s: nested too deep", assignment);
             break;
         }

@@ -10,6 +10,15 @@ void bst_ctx_init(bst_ctx *ctx, bst_log_fn log, void *log_user, bst_log_level le
     ctx->log_level = level;
 }
 
+/* Messages quote what was found: no control character of it may reach a terminal. */
+static void hide_controls(char *text) {
+    for (; *text; text++) {
+        if (((unsigned char)*text < 0x20 && *text != '\n') || *text == 0x7f) {
+            *text = '?';
+        }
+    }
+}
+
 bst_status bst_fail(bst_ctx *ctx, bst_status status, const char *format, ...) {
     if (ctx) {
         /* Through a copy, so that a caller may quote the previous message in the new one. */
@@ -18,6 +27,7 @@ bst_status bst_fail(bst_ctx *ctx, bst_status status, const char *format, ...) {
         va_start(args, format);
         vsnprintf(text, sizeof text, format, args);
         va_end(args);
+        hide_controls(text);
         memcpy(ctx->message, text, sizeof text);
     }
     return status;
@@ -31,6 +41,7 @@ bst_status bst_fail_prefix(bst_ctx *ctx, bst_status status, const char *format, 
         va_start(args, format);
         vsnprintf(prefix, sizeof prefix, format, args);
         va_end(args);
+        hide_controls(prefix);
         snprintf(text, sizeof text, "%s: %s", prefix, ctx->message);
         text[BST_MESSAGE_BYTES - 1] = '\0';
         memcpy(ctx->message, text, BST_MESSAGE_BYTES);

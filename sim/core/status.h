@@ -60,7 +60,7 @@ typedef struct bst_ctx {
 void bst_ctx_init(bst_ctx *ctx, bst_log_fn log, void *log_user, bst_log_level level);
 
 /* Stores a printf-style message in ctx (NULL allowed: the message is dropped) and returns status.
- */
+ * Control characters but the newline become '?'. */
 bst_status bst_fail(bst_ctx *ctx, bst_status status, const char *format, ...) BST_PRINTF(3, 4);
 
 /* Puts "prefix: " before the message already stored, for callers that know more, and returns

@@ -9,10 +9,15 @@
 
 static const char *const frame_choices[] = {"extensions", "cube", "none", NULL};
 
+static const char *const compression_choices[] = {"none", "rice", NULL};
+
 const bst_config_desc bst_record_config_table[] = {
     BST_ENUM(bst_record_config, frames, frame_choices, "\"extensions\"",
              "Frames in FITS: an image extension each, one datacube with a table of times and "
              "WCS, or none."),
+    BST_ENUM(bst_record_config, compression, compression_choices, "\"none\"",
+             "Of frames in extensions: \"rice\" is lossless FITS tile compression, done beside "
+             "the simulation by a thread of its own."),
     BST_BOOL(bst_record_config, truth, "true", "True exposures and sources."),
     BST_BOOL(bst_record_config, truth_stars, "true", "Stars among the true sources."),
     BST_BOOL(bst_record_config, detections, "true", "What image processing found."),
@@ -24,6 +29,15 @@ const bst_config_desc bst_record_config_table[] = {
              "not at all."),
     BST_CONFIG_END,
 };
+
+bst_status bst_record_config_check(bst_ctx *ctx, const bst_record_config *config) {
+    if (config->compression != BST_FITS_RAW && config->frames == BST_RECORD_CUBE) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "/record/compression: \"rice\" compresses frames in extensions only; give "
+                        "/record/frames \"extensions\", or /record/compression \"none\"");
+    }
+    return BST_OK;
+}
 
 /* A channel that is recorded: what of it needs which table. */
 typedef struct channel_rows {
@@ -123,6 +137,15 @@ static bst_status fill(bst_ctx *ctx, bst_recorder *recorder, const bst_recorder_
     return bst_run_commit(ctx, recorder->run);
 }
 
+/* Rows are committed after the frames that they speak of. */
+static bst_status flush_frames(bst_ctx *ctx, void *user) {
+    bst_recorder *recorder = user;
+    for (int i = 0; i < recorder->sensor_count; i++) {
+        BST_TRY(bst_fits_flush(ctx, recorder->sensors[i].fits));
+    }
+    return BST_OK;
+}
+
 bst_status bst_recorder_create(bst_ctx *ctx, bst_run *run, const bst_record_config *config,
                                const bst_recorder_info *info, bst_recorder **out) {
     *out = NULL;
@@ -139,11 +162,15 @@ bst_status bst_recorder_create(bst_ctx *ctx, bst_run *run, const bst_record_conf
     recorder->epoch = info->epoch;
     recorder->tick_rate_hz = info->tick_rate_hz;
     recorder->sensor_count = info->sensor_count;
-    bst_status status = fill(ctx, recorder, info);
+    bst_status status = bst_record_config_check(ctx, config);
+    if (status == BST_OK) {
+        status = fill(ctx, recorder, info);
+    }
     if (status != BST_OK) {
         free(recorder);
         return status;
     }
+    bst_run_set_before_commit(run, flush_frames, recorder);
     *out = recorder;
     return BST_OK;
 }
@@ -156,7 +183,10 @@ static bst_status open_fits(bst_ctx *ctx, bst_recorder *recorder, bst_recorder_s
                           .instrument = s->sensor,
                           .object = s->target,
                           .program = recorder->program,
-                          .camera = &s->camera};
+                          .camera = &s->camera,
+                          .compression = recorder->config.compression == BST_FITS_RICE
+                                             ? BST_FITS_RICE
+                                             : BST_FITS_RAW};
     bst_fits_layout layout =
         recorder->config.frames == BST_RECORD_CUBE ? BST_FITS_CUBE : BST_FITS_EXTENSIONS;
     return bst_fits_create(ctx, path, layout, &info, &s->fits);
@@ -301,14 +331,17 @@ bst_status bst_recorder_close(bst_ctx *ctx, bst_recorder *recorder) {
     }
     bst_status status = BST_OK;
     for (int i = 0; i < recorder->sensor_count; i++) {
-        bst_status waiting = write_waiting(ctx, recorder, i, NULL);
-        status = status == BST_OK ? waiting : status;
-        /* the first failure's message is kept */
+        bst_status waiting = write_waiting(status == BST_OK ? ctx : NULL, recorder, i, NULL);
+        status = status == BST_OK ? waiting : status; /* the first failure's message is kept */
+    }
+    bst_status committed = bst_run_commit(status == BST_OK ? ctx : NULL, recorder->run);
+    status = status == BST_OK ? committed : status;
+    bst_run_set_before_commit(recorder->run, NULL, NULL);
+    for (int i = 0; i < recorder->sensor_count; i++) {
         bst_status closed =
             bst_fits_close(status == BST_OK ? ctx : NULL, recorder->sensors[i].fits);
         status = status == BST_OK ? closed : status;
     }
-    bst_status committed = bst_run_commit(status == BST_OK ? ctx : NULL, recorder->run);
     free(recorder);
-    return status == BST_OK ? committed : status;
+    return status;
 }

@@ -16,7 +16,8 @@ typedef enum bst_record_frames {
 
 /* The scenario's "record" block. */
 typedef struct bst_record_config {
-    int32_t frames; /* bst_record_frames */
+    int32_t frames;      /* bst_record_frames */
+    int32_t compression; /* bst_fits_compression, of extensions */
     bool truth;
     bool truth_stars;
     bool detections;
@@ -27,6 +28,9 @@ typedef struct bst_record_config {
 } bst_record_config;
 
 extern const bst_config_desc bst_record_config_table[];
+
+/* Checks what the table cannot: BST_ERR_CONFIG when a cube is to be compressed. */
+bst_status bst_record_config_check(bst_ctx *ctx, const bst_record_config *config) BST_MUST_CHECK;
 
 /* A sensor whose channels are recorded. Names and camera are copied or used in create only. */
 typedef struct bst_recorder_sensor {
@@ -62,7 +66,8 @@ bool bst_recorder_wants(const bst_recorder *recorder, const char *channel);
 /* Records a message that was written at `written_tick`. Frames are retained until their truth is
  * there, at most one per sensor. Channels that are not wanted are ignored. Telemetry written in
  * place is recorded at config->telemetry_hz, on the grid of ticks; control_status on the same grid
- * and whenever mode or target change. Errors: BST_ERR_IO with the file and the reason. */
+ * and whenever mode or target change. Errors: BST_ERR_IO with the file and the reason; of a
+ * compressed frame at one of the next calls, or at close. */
 bst_status bst_recorder_channel(bst_ctx *ctx, bst_recorder *recorder, int sensor,
                                 const char *channel, const void *payload,
                                 int64_t written_tick) BST_MUST_CHECK;

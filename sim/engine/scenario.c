@@ -102,21 +102,67 @@ static void list_names(const bst_registry *registry, const char *role, char *buf
     }
 }
 
+/* Makes the path of a file that exists absolute, so that the resolved scenario can be run from any
+ * folder. A file that does not exist is left to those who open it. */
 static bst_status resolve_path(bst_ctx *ctx, const bst_scenario *s, const char *where, char *path,
-                               size_t bytes);
+                               size_t bytes) {
+    if (!*path) {
+        return BST_OK;
+    }
+    char joined[sizeof s->base_dir + 520];
+    if (path[0] == '/') {
+        snprintf(joined, sizeof joined, "%s", path);
+    } else {
+        snprintf(joined, sizeof joined, "%s/%s", s->base_dir, path);
+    }
+    char *real = realpath(joined, NULL);
+    if (!real) {
+        return BST_OK;
+    }
+    size_t length = strlen(real);
+    bst_status status =
+        length < bytes ? BST_OK
+                       : bst_fail(ctx, BST_ERR_CONFIG,
+                                  "%s: %s: the full path of \"%s\" is %zu bytes long (allowed: "
+                                  "%zu); move the file",
+                                  s->file, where, path, length, bytes - 1);
+    if (status == BST_OK) {
+        memcpy(path, real, length + 1);
+    }
+    free(real);
+    return status;
+}
 
-/* Makes the files that a module's table names absolute. */
-static bst_status resolve_module_paths(bst_ctx *ctx, const bst_scenario *s, const char *where,
-                                       const bst_config_desc *table, void *object) {
+/* Whether a path is one of the words that stand for something else than a file. */
+static bool is_word(const bst_config_desc *desc, const char *path) {
+    for (const char *const *word = desc->choices; word && *word; word++) {
+        if (strcmp(*word, path) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Makes the files that a table names absolute. `must_exist`: a file that is not there is an error,
+ * outside of lists. */
+static bst_status resolve_paths(bst_ctx *ctx, const bst_scenario *s, const char *where,
+                                const bst_config_desc *table, void *object, bool must_exist) {
     for (const bst_config_desc *d = table; d && d->key; d++) {
         char path[400];
         char *member = (char *)object + d->offset;
         snprintf(path, sizeof path, "%s/%s", where, d->key);
         if (d->type == BST_CONFIG_OBJECT) {
-            BST_TRY(resolve_module_paths(ctx, s, path, d->children, member));
-        } else if (d->type == BST_CONFIG_PATH && *member) {
+            BST_TRY(resolve_paths(ctx, s, path, d->children, member, must_exist));
+        } else if (d->type == BST_CONFIG_LIST) {
+            const bst_config_list *list = (const void *)member;
+            for (int i = 0; i < list->count; i++) {
+                snprintf(path, sizeof path, "%s/%s/%d", where, d->key, i);
+                BST_TRY(resolve_paths(ctx, s, path, d->children,
+                                      (char *)list->items + (size_t)i * d->item_bytes, false));
+            }
+        } else if (d->type == BST_CONFIG_PATH && *member && !is_word(d, member)) {
             BST_TRY(resolve_path(ctx, s, path, member, d->size));
-            if (member[0] != '/') {
+            if (must_exist && member[0] != '/') {
                 return bst_fail(ctx, BST_ERR_CONFIG, "%s: %s: there is no file %s/%s", s->file,
                                 path, s->base_dir, member);
             }
@@ -127,6 +173,12 @@ static bst_status resolve_module_paths(bst_ctx *ctx, const bst_scenario *s, cons
 
 static bst_status read_delays(bst_ctx *ctx, const bst_scenario *scenario, const cJSON *node,
                               const char *path, bst_module_config *module) {
+    char where[400];
+    snprintf(where, sizeof where, "%s/delay_s", path);
+    if (node && !cJSON_IsObject(node)) {
+        return bst_config_fail(ctx, scenario->file, where, node, "wrong type",
+                               "an object of seconds by channel");
+    }
     for (const cJSON *item = node ? node->child : NULL; item; item = item->next) {
         int port = -1;
         char inputs[300] = "";
@@ -148,9 +200,10 @@ static bst_status read_delays(bst_ctx *ctx, const bst_scenario *scenario, const 
                             scenario->file, path, item->string, inputs);
         }
         if (!cJSON_IsNumber(item) || !(item->valuedouble >= 0.0 && item->valuedouble <= 1e6)) {
-            return bst_fail(ctx, BST_ERR_CONFIG,
-                            "%s: %s/delay_s/%s: a number of seconds from 0 to 1e6 is expected",
-                            scenario->file, path, item->string);
+            snprintf(where, sizeof where, "%s/delay_s/%s", path, item->string);
+            return bst_config_fail(ctx, scenario->file, where, item,
+                                   cJSON_IsNumber(item) ? "out of range" : "wrong type",
+                                   "a number from 0 to 1e6 s");
         }
         if (module->delay_count == BST_MAX_DELAYS) {
             return bst_fail(ctx, BST_ERR_CONFIG, "%s: %s/delay_s: too many delays", scenario->file,
@@ -178,8 +231,8 @@ static bst_status read_module(bst_ctx *ctx, const bst_json *json, const bst_regi
                         scenario->file, path, names);
     }
     if (!cJSON_IsObject(node)) {
-        return bst_fail(ctx, BST_ERR_CONFIG, "%s: %s: an object with a \"type\" is expected",
-                        scenario->file, path);
+        return bst_config_fail(ctx, scenario->file, path, node, "wrong type",
+                               "an object with a \"type\"");
     }
     cJSON *common_part = part_of(node, true), *own_part = part_of(node, false);
     common_config common;
@@ -207,7 +260,7 @@ static bst_status read_module(bst_ctx *ctx, const bst_json *json, const bst_regi
                      : bst_fail(ctx, BST_ERR_MEMORY, "%s: out of memory", path);
     }
     if (status == BST_OK) {
-        status = resolve_module_paths(ctx, scenario, path, module->desc->config, module->config);
+        status = resolve_paths(ctx, scenario, path, module->desc->config, module->config, true);
     }
     if (status == BST_OK) {
         module->rate_hz = common.rate_hz > 0.0 ? common.rate_hz : module->desc->default_rate_hz;
@@ -248,8 +301,7 @@ static bst_status read_modules(bst_ctx *ctx, const bst_json *json, const bst_reg
                 char path[200];
                 snprintf(path, sizeof path, "/observers/%d/sensors/%d/modules", i, s);
                 if (block && !cJSON_IsObject(block)) {
-                    return bst_fail(ctx, BST_ERR_CONFIG, "%s: %s: an object is expected", out->file,
-                                    path);
+                    return bst_config_fail(ctx, out->file, path, block, "wrong type", "an object");
                 }
                 if (pass == 0) {
                     total += cJSON_GetArraySize(block);
@@ -316,77 +368,6 @@ static bst_status check_names(bst_ctx *ctx, const bst_scenario *s) {
     return BST_OK;
 }
 
-/* Makes the path of a file that exists absolute, so that the resolved scenario can be run from any
- * folder. A file that does not exist is left to those who open it. */
-static bst_status resolve_path(bst_ctx *ctx, const bst_scenario *s, const char *where, char *path,
-                               size_t bytes) {
-    if (!*path) {
-        return BST_OK;
-    }
-    char joined[sizeof s->base_dir + 520];
-    if (path[0] == '/') {
-        snprintf(joined, sizeof joined, "%s", path);
-    } else {
-        snprintf(joined, sizeof joined, "%s/%s", s->base_dir, path);
-    }
-    char *real = realpath(joined, NULL);
-    if (!real) {
-        return BST_OK;
-    }
-    size_t length = strlen(real);
-    bst_status status =
-        length < bytes ? BST_OK
-                       : bst_fail(ctx, BST_ERR_CONFIG,
-                                  "%s: %s: the full path of \"%s\" is %zu bytes long (allowed: "
-                                  "%zu); move the file",
-                                  s->file, where, path, length, bytes - 1);
-    if (status == BST_OK) {
-        memcpy(path, real, length + 1);
-    }
-    free(real);
-    return status;
-}
-
-static bst_status resolve_catalogue(bst_ctx *ctx, const bst_scenario *s, const char *where,
-                                    char *name, size_t bytes) {
-    if (strcmp(name, "default") == 0 || strcmp(name, "embedded") == 0) {
-        return BST_OK;
-    }
-    return resolve_path(ctx, s, where, name, bytes);
-}
-
-static bst_status resolve_paths(bst_ctx *ctx, bst_scenario *s) {
-    char where[100];
-    bst_world_config *world = &s->world;
-    BST_TRY(resolve_catalogue(ctx, s, "/world/star_catalogue", world->star_catalogue,
-                              sizeof world->star_catalogue));
-    if (strcmp(world->earth_orientation, "builtin") != 0) {
-        BST_TRY(resolve_path(ctx, s, "/world/earth_orientation", world->earth_orientation,
-                             sizeof world->earth_orientation));
-    }
-    bst_object_config *objects = world->objects.items;
-    for (int i = 0; i < world->objects.count; i++) {
-        char *file = objects[i].orbit.tle_file;
-        snprintf(where, sizeof where, "/world/objects/%d/orbit/tle_file", i);
-        BST_TRY(resolve_path(ctx, s, where, file, sizeof objects[i].orbit.tle_file));
-    }
-    bst_observer_config *observers = s->observers.items;
-    for (int i = 0; i < s->observers.count; i++) {
-        char *file = observers[i].orbit.tle_file;
-        snprintf(where, sizeof where, "/observers/%d/orbit/tle_file", i);
-        BST_TRY(resolve_path(ctx, s, where, file, sizeof observers[i].orbit.tle_file));
-        bst_sensor_config *sensors = observers[i].sensors.items;
-        for (int k = 0; k < observers[i].sensors.count; k++) {
-            char *catalogue = sensors[k].knowledge.star_catalogue;
-            snprintf(where, sizeof where, "/observers/%d/sensors/%d/knowledge/star_catalogue", i,
-                     k);
-            BST_TRY(resolve_catalogue(ctx, s, where, catalogue,
-                                      sizeof sensors[k].knowledge.star_catalogue));
-        }
-    }
-    return BST_OK;
-}
-
 bst_status bst_scenario_read(bst_ctx *ctx, const bst_json *json, const bst_registry *registry,
                              bst_scenario *out) {
     memset(out, 0, sizeof *out);
@@ -406,8 +387,11 @@ bst_status bst_scenario_read(bst_ctx *ctx, const bst_json *json, const bst_regis
         BST_OK) {
         return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: /duration_s", out->file);
     }
+    if (bst_record_config_check(ctx, &out->record) != BST_OK) {
+        return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s", out->file);
+    }
     BST_TRY(check_names(ctx, out));
-    BST_TRY(resolve_paths(ctx, out));
+    BST_TRY(resolve_paths(ctx, out, "", bst_scenario_table, out, false));
     return read_modules(ctx, json, registry, out);
 }
 

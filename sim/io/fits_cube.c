@@ -1,6 +1,6 @@
-/* The datacube. cfitsio makes the header and, at the end, the table; the planes go to the file
- * directly, and NAXIS3 is raised only after a plane is whole, so that a killed run leaves a valid
- * cube of the planes it completed. */
+/* The datacube. cfitsio makes the header and, at the end, the table in memory; the planes go to the
+ * file directly, and NAXIS3 is raised only after a plane is whole, so that a killed run leaves a
+ * valid cube of the planes it completed. */
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
@@ -11,25 +11,8 @@
 
 #include "sim/io/fits_internal.h"
 
-#define FITS_BLOCK 2880
 /* SIMPLE, BITPIX, NAXIS, NAXIS1, NAXIS2, NAXIS3 in this order: FITS 4.0, section 4.4.1.1 */
 #define NAXIS3_OFFSET (5 * 80)
-
-static bool write_at(int fd, const void *data, size_t bytes, long long offset) {
-    const char *p = data;
-    while (bytes > 0) {
-        ssize_t n = pwrite(fd, p, bytes, (off_t)offset);
-        if (n < 0 && errno != EINTR) {
-            return false;
-        }
-        if (n > 0) {
-            p += n;
-            bytes -= (size_t)n;
-            offset += n;
-        }
-    }
-    return true;
-}
 
 bst_status bst_fits_cube_open(bst_ctx *ctx, bst_fits *fits) {
     bst_fits_cube *cube = &fits->cube;
@@ -40,59 +23,48 @@ bst_status bst_fits_cube_open(bst_ctx *ctx, bst_fits *fits) {
     if (cube->rows < 0 || unlink(path) != 0) {
         return bst_fits_fail_errno(ctx, fits, "cannot make the table's file");
     }
-    cube->buffer = malloc(BST_FITS_CUBE_BUFFER * sizeof *cube->buffer);
-    return cube->buffer ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
-}
-
-/* The header of a cube without planes; then the file leaves cfitsio's hands. */
-static bst_status start(bst_ctx *ctx, bst_fits *fits, int width, int height) {
-    bst_fits_cube *cube = &fits->cube;
-    long size[3] = {width, height, 0};
-    LONGLONG head, data, end;
-    int code = 0;
-    errno = 0;
-    fits_create_img(fits->file, USHORT_IMG, 3, size, &code);
-    bst_fits_put_run_keys(fits->file, &fits->names, &code);
-    fits_write_comment(fits->file,
-                       "Third axis: frames. Row k of the table FRAMES has plane k's time and WCS.",
-                       &code);
-    bst_fits_put_statements(fits->file, &code);
-    fits_flush_file(fits->file, &code);
-    fits_get_hduaddrll(fits->file, &head, &data, &end, &code);
-    BST_TRY(bst_fits_check(ctx, fits, code, "cannot be written"));
-    fitsfile *file = fits->file;
-    fits->file = NULL;
-    fits_close_file(file, &code);
-    BST_TRY(bst_fits_check(ctx, fits, code, "cannot be written"));
-    cube->file = open(fits->path, O_RDWR | O_CLOEXEC);
-    if (cube->file < 0) {
-        return bst_fits_fail_errno(ctx, fits, "cannot be opened");
-    }
-    char card[9];
-    if (pread(cube->file, card, sizeof card, NAXIS3_OFFSET) != (ssize_t)sizeof card ||
-        memcmp(card, "NAXIS3  =", sizeof card) != 0) {
-        return bst_fail(ctx, BST_ERR_FORMAT, "%s: NAXIS3 is not where it belongs", fits->path);
-    }
-    cube->width = width;
-    cube->height = height;
-    cube->data_start = data;
     return BST_OK;
 }
 
-/* Signed big-endian, as BZERO 32768 wants it: v - 32768 flips the top bit. */
-static void to_fits(uint16_t *restrict out, const uint16_t *restrict in, size_t count) {
-    for (size_t i = 0; i < count; i++) {
-        uint16_t v = (uint16_t)(in[i] ^ 0x8000u);
-        uint8_t *b = (uint8_t *)&out[i];
-        b[0] = (uint8_t)(v >> 8);
-        b[1] = (uint8_t)v;
+/* The header of a cube without planes. */
+static bst_status start(bst_ctx *ctx, bst_fits *fits, int width, int height) {
+    bst_fits_cube *cube = &fits->cube;
+    long size[3] = {width, height, 0};
+    char *hdu = NULL;
+    long long bytes = 0;
+    int code = 0;
+    errno = 0;
+    bst_fits_memory_open(&fits->memory, false, &code);
+    fitsfile *file = fits->memory.file;
+    fits_create_img(file, USHORT_IMG, 3, size, &code);
+    bst_fits_put_run_keys(file, &fits->names, &code);
+    fits_write_comment(
+        file, "Third axis: frames. Row k of the table FRAMES has plane k's time and WCS.", &code);
+    bst_fits_put_statements(file, &code);
+    bst_fits_memory_hdu(&fits->memory, &hdu, &bytes, &code);
+    bst_status status = bst_fits_check(ctx, fits, code, "cannot be made");
+    if (status == BST_OK && memcmp(hdu + NAXIS3_OFFSET, "NAXIS3  =", 9) != 0) {
+        status = bst_fail(ctx, BST_ERR_FORMAT, "%s: NAXIS3 is not where it belongs", fits->path);
     }
+    if (status == BST_OK) {
+        status = bst_fits_start_file(ctx, fits, hdu, bytes);
+    }
+    bst_fits_memory_close(&fits->memory, &code);
+    cube->width = width;
+    cube->height = height;
+    cube->data_start = bytes;
+    return status;
+}
+
+static bool write_row(const bst_fits_cube *cube, const bst_fits_frame *frame) {
+    return bst_fits_write_at(cube->rows, frame, sizeof *frame,
+                             (long long)sizeof *frame * (long long)cube->planes);
 }
 
 bst_status bst_fits_cube_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,
                                const uint16_t *pixels, int width, int height) {
     bst_fits_cube *cube = &fits->cube;
-    if (cube->file < 0) {
+    if (fits->file < 0) {
         BST_TRY(start(ctx, fits, width, height));
     }
     if (width != cube->width || height != cube->height) {
@@ -101,30 +73,26 @@ bst_status bst_fits_cube_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_fram
                         "frames as extensions when windows change",
                         fits->path, width, height, cube->width, cube->height);
     }
-    static const char zeros[FITS_BLOCK] = {0};
     size_t count = (size_t)width * (size_t)height;
-    long long bytes = (long long)count * 2;
-    long long offset = cube->data_start + cube->planes * bytes;
-    bool ok = write_at(cube->rows, frame, sizeof *frame,
-                       (long long)sizeof *frame * (long long)cube->planes);
-    for (size_t done = 0; ok && done < count;) {
-        size_t n = count - done < BST_FITS_CUBE_BUFFER ? count - done : BST_FITS_CUBE_BUFFER;
-        to_fits(cube->buffer, pixels + done, n);
-        ok = write_at(cube->file, cube->buffer, n * 2, offset + (long long)done * 2);
-        done += n;
-    }
-    long long used = (cube->planes + 1) * bytes % FITS_BLOCK;
-    if (ok && used > 0) {
-        ok = write_at(cube->file, zeros, (size_t)(FITS_BLOCK - used), offset + bytes);
-    }
+    long long plane = (long long)count * 2;
+    long long offset = cube->data_start + cube->planes * plane, after = offset + plane;
+    long long fill =
+        (BST_FITS_BLOCK - (after - cube->data_start) % BST_FITS_BLOCK) % BST_FITS_BLOCK;
+    bool ok = write_row(cube, frame) && bst_fits_open_tail(fits, after + fill - fits->end) &&
+              bst_fits_write_pixels(fits, pixels, count, offset, fill);
     char value[24];
     snprintf(value, sizeof value, "%20lld", (long long)(cube->planes + 1));
-    ok = ok && write_at(cube->file, value, 20, NAXIS3_OFFSET + 10);
-    if (!ok) {
-        return bst_fits_fail_errno(ctx, fits, "cannot be written");
+    /* the card lies within one memory page: this write is done or not done */
+    ok = ok && bst_fits_write_at(fits->file, value, 20, NAXIS3_OFFSET + 10);
+    bst_status status = ok ? BST_OK : bst_fits_fail_errno(ctx, fits, "cannot be written");
+    if (ok) {
+        cube->planes++;
+        fits->end = after + fill;
     }
-    cube->planes++;
-    return BST_OK;
+    if (fits->file >= 0 && !bst_fits_close_tail(fits) && ok) {
+        status = bst_fits_fail_errno(ctx, fits, "cannot be written");
+    }
+    return status;
 }
 
 enum { TABLE_COLUMNS = 21 };
@@ -200,42 +168,47 @@ static void put_row(fitsfile *file, LONGLONG row, const bst_fits_frame *f, int *
 
 bst_status bst_fits_cube_finish(bst_ctx *ctx, bst_fits *fits) {
     bst_fits_cube *cube = &fits->cube;
+    if (fits->file < 0) {
+        return BST_OK; /* no frame came, or the file could not be made; that was reported */
+    }
+    char *hdu = NULL;
+    long long bytes = 0;
     int code = 0;
     errno = 0;
-    if (cube->file < 0) {
-        if (!fits->file) {
-            return BST_OK; /* the header could not be written; that was reported */
-        }
-        fits_create_img(fits->file, BYTE_IMG, 0, NULL, &code);
-        bst_fits_put_run_keys(fits->file, &fits->names, &code);
-        return bst_fits_check(ctx, fits, code, "cannot be completed");
-    }
-    int closed = close(cube->file);
-    cube->file = -1;
-    if (closed != 0) {
-        return bst_fits_fail_errno(ctx, fits, "cannot be completed");
-    }
-    fits_open_diskfile(&fits->file, fits->path, READWRITE, &code);
+    bst_fits_memory_open(&fits->memory, true, &code);
     if (code == 0) {
-        make_table(fits->file, cube->planes, &code);
+        make_table(fits->memory.file, cube->planes, &code);
+        if (bst_camera_distorted(&fits->names.camera)) {
+            bst_fits_sip_columns(fits->memory.file, &code);
+        }
     }
-    for (int64_t k = 0; code == 0 && k < cube->planes; k++) {
+    bst_status status = BST_OK;
+    for (int64_t k = 0; status == BST_OK && code == 0 && k < cube->planes; k++) {
         bst_fits_frame frame;
         if (pread(cube->rows, &frame, sizeof frame, (off_t)(k * (int64_t)sizeof frame)) !=
             (ssize_t)sizeof frame) {
-            return bst_fits_fail_errno(ctx, fits, "cannot read the table's file");
+            status = bst_fits_fail_errno(ctx, fits, "cannot read the table's file");
+        } else {
+            put_row(fits->memory.file, k + 1, &frame, &code);
+            if (bst_camera_distorted(&fits->names.camera)) {
+                bst_wcs wcs = bst_wcs_window(&frame.wcs, frame.window, frame.binning);
+                bst_fits_sip_row(fits->memory.file, k + 1, &wcs.sip, &code);
+            }
         }
-        put_row(fits->file, k + 1, &frame, &code);
     }
-    return bst_fits_check(ctx, fits, code, "cannot be completed");
+    bst_fits_memory_hdu(&fits->memory, &hdu, &bytes, &code);
+    if (status == BST_OK) {
+        status = bst_fits_check(ctx, fits, code, "cannot be completed");
+    }
+    if (status == BST_OK) {
+        status = bst_fits_append_hdu(ctx, fits, hdu, bytes);
+    }
+    bst_fits_memory_close(&fits->memory, &code);
+    return status;
 }
 
 void bst_fits_cube_free(bst_fits *fits) {
-    if (fits->cube.file >= 0) {
-        close(fits->cube.file);
-    }
     if (fits->cube.rows >= 0) {
         close(fits->cube.rows);
     }
-    free(fits->cube.buffer);
 }

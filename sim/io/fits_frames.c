@@ -4,6 +4,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "sim/io/fits_internal.h"
 
@@ -27,69 +29,137 @@ static void copy_name(char to[BST_FITS_NAME_BYTES], const char *from) {
     snprintf(to, BST_FITS_NAME_BYTES, "%s", from ? from : "");
 }
 
+/* The primary HDU of a file of extensions, or of a cube without planes. */
+static bst_status write_primary(bst_ctx *ctx, bst_fits *fits) {
+    char *hdu = NULL;
+    long long bytes = 0;
+    int code = 0;
+    errno = 0;
+    bst_fits_memory_open(&fits->memory, true, &code);
+    bst_fits_put_run_keys(fits->memory.file, &fits->names, &code);
+    bst_fits_put_statements(fits->memory.file, &code);
+    bst_fits_memory_hdu(&fits->memory, &hdu, &bytes, &code);
+    bst_status status = bst_fits_check(ctx, fits, code, "cannot be made");
+    if (status == BST_OK) {
+        status = bst_fits_start_file(ctx, fits, hdu, bytes);
+    }
+    bst_fits_memory_close(&fits->memory, &code);
+    return status;
+}
+
+static void free_fits(bst_fits *fits) {
+    bst_fits_queue_free(fits);
+    bst_fits_cube_free(fits);
+    if (fits->file >= 0) {
+        close(fits->file);
+    }
+    bst_fits_memory_free(&fits->memory);
+    free(fits->buffer);
+    free(fits);
+}
+
 bst_status bst_fits_create(bst_ctx *ctx, const char *path, bst_fits_layout layout,
                            const bst_fits_info *info, bst_fits **out) {
     *out = NULL;
+    if (layout == BST_FITS_CUBE && info->compression != BST_FITS_RAW) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: a cube is not compressed", path);
+    }
     bst_fits *fits = calloc(1, sizeof *fits);
     if (!fits) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
     }
+    fits->file = fits->cube.rows = -1;
+    fits->buffer = malloc(BST_FITS_BUFFER_PIXELS * sizeof *fits->buffer);
+    if (!fits->buffer) {
+        free_fits(fits);
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
+    }
     int n = snprintf(fits->path, sizeof fits->path, "%s", path);
     if (n < 0 || (size_t)n + 16 >= sizeof fits->path) {
-        free(fits);
+        free_fits(fits);
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", path);
     }
     fits->layout = layout;
+    fits->compression = info->compression;
     copy_name(fits->names.observer, info->observer);
     copy_name(fits->names.instrument, info->instrument);
     copy_name(fits->names.object, info->object);
     copy_name(fits->names.program, info->program);
     fits->names.camera = *info->camera;
-    fits->cube.file = fits->cube.rows = -1;
 
-    /* "disk file": a path with brackets is a path, not cfitsio's extended syntax */
-    int code = 0;
-    errno = 0;
-    fits_create_diskfile(&fits->file, fits->path, &code);
-    bst_status status = bst_fits_check(ctx, fits, code, "cannot be made");
-    if (status == BST_OK && layout == BST_FITS_CUBE) {
+    bst_status status = BST_OK;
+    struct stat there;
+    if (lstat(fits->path, &there) == 0) {
+        errno = EEXIST;
+        status = bst_fits_fail_errno(ctx, fits, "cannot be made");
+    } else if (layout == BST_FITS_CUBE) {
         status = bst_fits_cube_open(ctx, fits);
-    } else if (status == BST_OK) {
-        fits_create_img(fits->file, BYTE_IMG, 0, NULL, &code);
-        bst_fits_put_run_keys(fits->file, &fits->names, &code);
-        bst_fits_put_statements(fits->file, &code);
-        fits_flush_file(fits->file, &code);
-        status = bst_fits_check(ctx, fits, code, "cannot be written");
+    } else {
+        status = write_primary(ctx, fits);
+    }
+    if (status == BST_OK && fits->compression == BST_FITS_RICE) {
+        status = bst_fits_queue_create(ctx, fits);
     }
     if (status != BST_OK) {
-        int ignored = 0;
-        if (fits->file) {
-            fits_close_file(fits->file, &ignored);
-        }
-        bst_fits_cube_free(fits);
-        free(fits);
+        free_fits(fits);
         return status;
     }
     *out = fits;
     return BST_OK;
 }
 
-static bst_status write_extension(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,
-                                  const uint16_t *pixels, int width, int height) {
-    long size[2] = {width, height};
+/* Gives the header of an image without pixels its size; false when the cards are elsewhere. */
+static bool set_size(char *header, int width, int height) {
+    const int size[2] = {width, height};
+    for (int k = 0; k < 2; k++) {
+        /* after XTENSION, BITPIX and NAXIS: FITS 4.0, section 4.4.1.2 */
+        char *card = header + (size_t)(3 + k) * 80, start[11], value[21];
+        snprintf(start, sizeof start, "NAXIS%d  = ", k + 1);
+        if (memcmp(card, start, 10) != 0) {
+            return false;
+        }
+        snprintf(value, sizeof value, "%20d", size[k]);
+        memcpy(card + 10, value, 20);
+    }
+    return true;
+}
+
+bst_status bst_fits_write_extension(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,
+                                    const uint16_t *pixels, int width, int height, int64_t number) {
+    bool rice = fits->compression == BST_FITS_RICE;
+    long size[2] = {rice ? width : 0, rice ? height : 0};
+    size_t count = (size_t)width * (size_t)height;
+    char *hdu = NULL;
+    long long bytes = 0;
     int code = 0;
     errno = 0;
-    fits_create_img(fits->file, USHORT_IMG, 2, size, &code);
-    fits_write_key_str(fits->file, "EXTNAME", "FRAME", "", &code);
-    fits_write_key_lng(fits->file, "EXTVER", fits->frames + 1, "counted from 1", &code);
-    fits_write_key_log(fits->file, "INHERIT", 1, "keys of the primary header hold here", &code);
-    bst_fits_put_frame_keys(fits->file, &fits->names, frame, &code);
-    bst_fits_put_statements(fits->file, &code);
-    /* cfitsio's prototype lacks const; it does not write to the array */
-    fits_write_img(fits->file, TUSHORT, 1, (LONGLONG)width * height, (void *)(uintptr_t)pixels,
-                   &code);
-    fits_flush_file(fits->file, &code);
-    return bst_fits_check(ctx, fits, code, "cannot be written");
+    bst_fits_memory_open(&fits->memory, true, &code);
+    fitsfile *file = fits->memory.file;
+    if (rice) {
+        fits_set_compression_type(file, RICE_1, &code);
+    }
+    fits_create_img(file, USHORT_IMG, 2, size, &code);
+    fits_write_key_str(file, "EXTNAME", "FRAME", "", &code);
+    fits_write_key_lng(file, "EXTVER", number, "counted from 1", &code);
+    fits_write_key_log(file, "INHERIT", 1, "keys of the primary header hold here", &code);
+    bst_fits_put_frame_keys(file, &fits->names, frame, &code);
+    bst_fits_put_statements(file, &code);
+    if (rice) {
+        /* cfitsio's prototype lacks const; it does not write to the array */
+        fits_write_img(file, TUSHORT, 1, (LONGLONG)count, (void *)(uintptr_t)pixels, &code);
+    }
+    bst_fits_memory_hdu(&fits->memory, &hdu, &bytes, &code);
+    bst_status status = bst_fits_check(ctx, fits, code, "cannot be written");
+    if (status == BST_OK && rice) {
+        status = bst_fits_append_hdu(ctx, fits, hdu, bytes);
+    } else if (status == BST_OK) {
+        status =
+            set_size(hdu, width, height)
+                ? bst_fits_append_image(ctx, fits, hdu, bytes, pixels, count)
+                : bst_fail(ctx, BST_ERR_FORMAT, "%s: NAXIS1 is not where it belongs", fits->path);
+    }
+    bst_fits_memory_close(&fits->memory, &code);
+    return status;
 }
 
 bst_status bst_fits_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,
@@ -98,10 +168,13 @@ bst_status bst_fits_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *fr
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: a frame of %d x %d pixels at %d bits",
                         fits->path, width, height, frame->bits);
     }
+    int64_t number = fits->frames + 1;
     if (fits->layout == BST_FITS_CUBE) {
         BST_TRY(bst_fits_cube_write(ctx, fits, frame, pixels, width, height));
+    } else if (fits->queue) {
+        BST_TRY(bst_fits_queue_put(ctx, fits, frame, pixels, width, height, number));
     } else {
-        BST_TRY(write_extension(ctx, fits, frame, pixels, width, height));
+        BST_TRY(bst_fits_write_extension(ctx, fits, frame, pixels, width, height, number));
     }
     fits->frames++;
     if (index) {
@@ -110,23 +183,23 @@ bst_status bst_fits_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *fr
     return BST_OK;
 }
 
+bst_status bst_fits_flush(bst_ctx *ctx, bst_fits *fits) {
+    return fits && fits->queue ? bst_fits_queue_drain(ctx, fits) : BST_OK;
+}
+
 bst_status bst_fits_close(bst_ctx *ctx, bst_fits *fits) {
     if (!fits) {
         return BST_OK;
     }
-    bst_status status = BST_OK;
+    bst_status status = bst_fits_flush(ctx, fits);
     if (fits->layout == BST_FITS_CUBE) {
         status = bst_fits_cube_finish(ctx, fits);
     }
-    if (fits->file) {
-        int code = 0;
-        errno = 0;
-        fits_close_file(fits->file, &code);
-        if (status == BST_OK) {
-            status = bst_fits_check(ctx, fits, code, "cannot be completed");
-        }
+    int file = fits->file;
+    fits->file = -1;
+    if (file >= 0 && close(file) != 0 && status == BST_OK) {
+        status = bst_fits_fail_errno(ctx, fits, "cannot be completed");
     }
-    bst_fits_cube_free(fits);
-    free(fits);
+    free_fits(fits);
     return status;
 }

@@ -11,6 +11,9 @@
 
 typedef enum bst_fits_layout { BST_FITS_EXTENSIONS, BST_FITS_CUBE } bst_fits_layout;
 
+/* Rice: FITS tile compression (FITS 4.0, section 10), lossless, a tile a row; extensions only. */
+typedef enum bst_fits_compression { BST_FITS_RAW, BST_FITS_RICE } bst_fits_compression;
+
 /* What holds for the whole file; read in create only. */
 typedef struct bst_fits_info {
     const char *observer;     /* OBSERVER: spacecraft */
@@ -18,6 +21,7 @@ typedef struct bst_fits_info {
     const char *object;       /* OBJECT: what is looked for; may be NULL */
     const char *program;      /* CREATOR: "boresight 0.1.0"; may be NULL */
     const bst_camera *camera; /* the true camera */
+    bst_fits_compression compression;
 } bst_fits_info;
 
 /* What holds for one frame. */
@@ -35,19 +39,28 @@ typedef struct bst_fits_frame {
 
 typedef struct bst_fits bst_fits;
 
-/* Makes the file (an existing one is refused). The layout of the pixels: unsigned 16 bit through
- * BZERO 32768, row y = 0 first. Memory does not depend on the number of frames, which need not be
- * known. */
+/* Makes the file (an existing one is refused; a cube's appears with its first frame). The layout of
+ * the pixels: unsigned 16 bit through BZERO 32768, row y = 0 first. Memory does not depend on the
+ * number of frames, which need not be known. Compressed frames are made and written by a thread of
+ * this file's own (by the caller's where cfitsio was built without threads). BST_ERR_ARGUMENT for a
+ * compressed cube. */
 bst_status bst_fits_create(bst_ctx *ctx, const char *path, bst_fits_layout layout,
                            const bst_fits_info *info, bst_fits **out) BST_MUST_CHECK;
 
 /* Writes a frame of width x height pixels (row-major, after windowing and binning) and hands it to
- * the operating system: when this returns, the frame outlives the process. BST_ERR_IO with file and
- * reason (disk full ...); BST_ERR_ARGUMENT when a cube's frame size changes. *index (may be NULL):
- * extension number counted from 1, or plane counted from 0. */
+ * the operating system: when this returns, a frame that is not compressed outlives the process. At
+ * every moment the file is one that readers open without error: a frame is in it whole or not at
+ * all, also when the process is killed or the disk is full. Compressed frames wait for their
+ * thread, at most four of them: then this waits too. BST_ERR_IO with file and reason (disk full
+ * ...; of a compressed frame at one of the next calls); BST_ERR_ARGUMENT when a cube's frame size
+ * changes. *index (may be NULL): extension number counted from 1, or plane counted from 0. */
 bst_status bst_fits_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,
                           const uint16_t *pixels, int width, int height,
                           int64_t *index) BST_MUST_CHECK;
+
+/* Waits until every frame given so far is with the operating system; reports what failed. NULL is
+ * allowed. */
+bst_status bst_fits_flush(bst_ctx *ctx, bst_fits *fits) BST_MUST_CHECK;
 
 /* Completes the file (a cube gets its table FRAMES here) and frees `fits` in every case. NULL is
  * allowed. */

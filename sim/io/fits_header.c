@@ -61,6 +61,7 @@ void bst_fits_put_run_keys(fitsfile *file, const bst_fits_names *names, int *cod
     put_real(file, "PIXSCALE", c->pixel_scale_arcsec, "[arcsec/pixel] at the boresight, unbinned",
              code);
     put_real(file, "APTDIA", c->aperture_m, "[m] diameter of the entrance pupil", code);
+    bst_fits_put_lens(file, c, code);
     fits_write_key_str(file, "TIMESYS", "UTC", "time scale of the dates", code);
     fits_write_key_str(file, "RADESYS", "ICRS", "reference system of the WCS", code);
 }
@@ -86,8 +87,10 @@ void bst_fits_put_statements(fitsfile *file, int *code) {
 }
 
 static void put_wcs(fitsfile *file, const bst_wcs *w, int *code) {
-    fits_write_key_str(file, "CTYPE1", "RA---TAN", "gnomonic projection", code);
-    fits_write_key_str(file, "CTYPE2", "DEC--TAN", "gnomonic projection", code);
+    bool sip = w->sip.order > 0;
+    const char *what = sip ? "gnomonic projection, SIP polynomials" : "gnomonic projection";
+    fits_write_key_str(file, "CTYPE1", sip ? "RA---TAN-SIP" : "RA---TAN", what, code);
+    fits_write_key_str(file, "CTYPE2", sip ? "DEC--TAN-SIP" : "DEC--TAN", what, code);
     fits_write_key_str(file, "CUNIT1", "deg", "", code);
     fits_write_key_str(file, "CUNIT2", "deg", "", code);
     put_real(file, "CRPIX1", w->crpix[0], "[pixel] boresight; first pixel's centre is 1", code);
@@ -100,6 +103,9 @@ static void put_wcs(fitsfile *file, const bst_wcs *w, int *code) {
     put_real(file, "CD2_2", w->cd_deg[1][1], "[deg/pixel]", code);
     put_real(file, "WCSRESID", w->residual_px, "[pixel] largest misfit of the WCS", code);
     fits_write_key_str(file, "ABERRAT", "absorbed", "stellar aberration is in the WCS", code);
+    if (sip) {
+        bst_fits_put_sip(file, &w->sip, code);
+    }
 }
 
 void bst_fits_put_frame_keys(fitsfile *file, const bst_fits_names *names,
@@ -134,6 +140,7 @@ void bst_fits_put_frame_keys(fitsfile *file, const bst_fits_names *names,
     int binning = frame->binning > 1 ? frame->binning : 1;
     put_real(file, "PIXSCALE", names->camera.pixel_scale_arcsec * binning,
              "[arcsec/pixel] at the boresight", code);
+    bst_fits_put_lens(file, &names->camera, code);
     put_int(file, "WINX0", frame->window.x0, "[pixel] window's corner on the sensor, from 0", code);
     put_int(file, "WINY0", frame->window.y0, "[pixel] window's corner on the sensor, from 0", code);
     put_int(file, "BINNING", binning, "sensor pixels per pixel and axis", code);

@@ -6,6 +6,7 @@
 
 #include "sim/io/fits_frames.h"
 
+#define BST_FITS_BLOCK 2880
 #define BST_FITS_PATH_BYTES 4096
 #define BST_FITS_NAME_BYTES 69
 
@@ -16,25 +17,37 @@ typedef struct bst_fits_names {
     bst_camera camera;
 } bst_fits_names;
 
+/* A FITS file that cfitsio makes in memory; the memory is kept from one to the next. */
+typedef struct bst_fits_memory {
+    fitsfile *file;
+    void *bytes;
+    size_t size;
+} bst_fits_memory;
+
 /* A datacube that is being written. */
 typedef struct bst_fits_cube {
-    int file; /* -1 until the first frame */
-    int rows; /* unlinked file of bst_fits_frame, the future table */
+    int rows; /* unlinked file of bst_fits_frame, the future table; -1 without one */
     int width, height;
     long long data_start;
     int64_t planes;
-    uint16_t *buffer; /* BST_FITS_CUBE_BUFFER pixels, big-endian */
 } bst_fits_cube;
 
-#define BST_FITS_CUBE_BUFFER 65536
+#define BST_FITS_BUFFER_PIXELS 65536
+
+struct bst_fits_queue;
 
 struct bst_fits {
     char path[BST_FITS_PATH_BYTES];
     bst_fits_layout layout;
+    bst_fits_compression compression;
     bst_fits_names names;
-    fitsfile *file; /* open with cfitsio; NULL while a cube takes planes */
+    int file;      /* -1: not made yet */
+    long long end; /* bytes of the HDUs that are complete */
     int64_t frames;
+    bst_fits_memory memory;
+    uint16_t *buffer; /* BST_FITS_BUFFER_PIXELS, big-endian */
     bst_fits_cube cube;
+    struct bst_fits_queue *queue; /* NULL: frames are written by the caller's thread */
 };
 
 /* BST_OK when code is 0; else BST_ERR_IO with file, cfitsio's and the system's reason. */
@@ -43,6 +56,49 @@ bst_status bst_fits_check(bst_ctx *ctx, const bst_fits *fits, int code,
 /* The same for a failed system call. */
 bst_status bst_fits_fail_errno(bst_ctx *ctx, const bst_fits *fits, const char *what);
 
+/* Opens a FITS file in memory with an empty primary HDU when `primary` is set. */
+void bst_fits_memory_open(bst_fits_memory *memory, bool primary, int *code);
+/* Completes its current HDU; the bytes of that HDU hold until the memory is opened again. */
+void bst_fits_memory_hdu(bst_fits_memory *memory, char **bytes, long long *count, int *code);
+/* Closes it, in every case. */
+void bst_fits_memory_close(bst_fits_memory *memory, int *code);
+void bst_fits_memory_free(bst_fits_memory *memory);
+
+bool bst_fits_write_at(int fd, const void *data, size_t bytes, long long offset);
+/* Writes pixels as FITS wants them, and zeros up to the end of the block. */
+bool bst_fits_write_pixels(bst_fits *fits, const uint16_t *pixels, size_t count, long long offset,
+                           long long fill);
+
+/* Makes the file with one HDU in it: it appears whole or not at all. */
+bst_status bst_fits_start_file(bst_ctx *ctx, bst_fits *fits, const char *hdu,
+                               long long bytes) BST_MUST_CHECK;
+/* Appends a whole HDU (header and data, blocks filled). A reader of the file, also after the death
+ * of this process at any instruction, finds the HDU complete or does not find it; after an error
+ * the file is as it was before. */
+bst_status bst_fits_append_hdu(bst_ctx *ctx, bst_fits *fits, const char *hdu,
+                               long long bytes) BST_MUST_CHECK;
+/* The same for a header and its pixels. */
+bst_status bst_fits_append_image(bst_ctx *ctx, bst_fits *fits, const char *header, long long bytes,
+                                 const uint16_t *pixels, size_t count) BST_MUST_CHECK;
+/* Makes room for `bytes` of data after the complete ones so that readers do not take what is
+ * written there for an HDU; then cuts the file at fits->end, when that has been raised or not. */
+bool bst_fits_open_tail(const bst_fits *fits, long long bytes);
+bool bst_fits_close_tail(const bst_fits *fits);
+
+/* Makes and appends the extension of a frame. */
+bst_status bst_fits_write_extension(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,
+                                    const uint16_t *pixels, int width, int height,
+                                    int64_t number) BST_MUST_CHECK;
+
+/* The thread that compresses and writes extensions. */
+bst_status bst_fits_queue_create(bst_ctx *ctx, bst_fits *fits) BST_MUST_CHECK;
+bst_status bst_fits_queue_put(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,
+                              const uint16_t *pixels, int width, int height,
+                              int64_t number) BST_MUST_CHECK;
+bst_status bst_fits_queue_drain(bst_ctx *ctx, bst_fits *fits) BST_MUST_CHECK;
+/* Ends the thread after what waits has been written. NULL queue allowed. */
+void bst_fits_queue_free(bst_fits *fits);
+
 /* Keys of the whole file. As all of cfitsio: nothing is done when *code is not 0. */
 void bst_fits_put_run_keys(fitsfile *file, const bst_fits_names *names, int *code);
 /* The statements about time scale, light time and aberration. */
@@ -50,6 +106,14 @@ void bst_fits_put_statements(fitsfile *file, int *code);
 /* Keys of one frame. */
 void bst_fits_put_frame_keys(fitsfile *file, const bst_fits_names *names,
                              const bst_fits_frame *frame, int *code);
+
+/* Keys of the distortion polynomials of a WCS. */
+void bst_fits_put_sip(fitsfile *file, const bst_sip *sip, int *code);
+/* Rotation and distortion of the camera; none for a camera without. */
+void bst_fits_put_lens(fitsfile *file, const bst_camera *camera, int *code);
+/* A cube's table: columns for the polynomials of each row's WCS, and the values of a row. */
+void bst_fits_sip_columns(fitsfile *file, int *code);
+void bst_fits_sip_row(fitsfile *file, long long row, const bst_sip *sip, int *code);
 
 typedef enum bst_fits_moment { BST_FITS_BEGIN, BST_FITS_MIDDLE, BST_FITS_END } bst_fits_moment;
 /* UTC of a moment of the exposure as FITS writes it (no Z), and as modified Julian date. */
@@ -60,7 +124,7 @@ double bst_fits_saturation_dn(const bst_camera *camera, int bits);
 bst_status bst_fits_cube_open(bst_ctx *ctx, bst_fits *fits) BST_MUST_CHECK;
 bst_status bst_fits_cube_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,
                                const uint16_t *pixels, int width, int height) BST_MUST_CHECK;
-/* Writes the table; leaves the file open with cfitsio. */
+/* Writes the table. */
 bst_status bst_fits_cube_finish(bst_ctx *ctx, bst_fits *fits) BST_MUST_CHECK;
 void bst_fits_cube_free(bst_fits *fits);
 

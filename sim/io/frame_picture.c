@@ -90,7 +90,9 @@ static void draw_overlay(bst_picture *p, const bst_overlay *overlay, int width, 
         double x = box.x + (m->x_px + 0.5) * scale - 0.5, y = box.y + (m->y_px + 0.5) * scale - 0.5;
         double r = draw_mark(p, m->kind, x, y, m->radius_px * scale);
         if (m->label[0]) {
-            bst_picture_text(p, x + r + 4.0, y - r + h, 0.8 * h, colours[m->kind], false, m->label);
+            /* a track's above, an object's below: they are often at one place */
+            double base = m->kind == BST_OVERLAY_TRACK ? y - 0.5 * r : y + 0.5 * r + 0.8 * h;
+            bst_picture_text(p, x + r + 6.0, base, 0.8 * h, colours[m->kind], false, m->label);
         }
     }
     bst_picture_unclip(p);

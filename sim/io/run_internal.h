@@ -30,10 +30,15 @@ struct bst_run {
     bool in_batch;
     int batch_rows;
     struct timespec batch_start;
+    bst_run_before_commit before_commit;
+    void *before_commit_user;
 };
 
+/* Fails when the folder was removed, moved or replaced while the run writes it. */
+bst_status bst_run_check_folder(bst_ctx *ctx, const bst_run *run) BST_MUST_CHECK;
+
 bst_status bst_run_open_database(bst_ctx *ctx, bst_run *run) BST_MUST_CHECK;
-/* Commits, folds the journal in and closes. Closes in every case. */
+/* Commits, folds the journal in and closes. Closes in every case; nothing is done when closed. */
 bst_status bst_run_close_database(bst_ctx *ctx, bst_run *run) BST_MUST_CHECK;
 
 #endif

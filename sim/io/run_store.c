@@ -8,11 +8,15 @@
 #include <string.h>
 #include <sys/file.h>
 #include <sys/stat.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include "sim/io/run_internal.h"
 
 #define LOCK_NAME "lock"
+/* The lock keeps this much of the disk and gives it back when the run is abandoned: reading tables
+ * with a journal takes 32 KiB of disk, also of a full one. */
+#define SPARE_BYTES 65536
 
 static bst_status join(bst_ctx *ctx, char *buffer, size_t bytes, const char *folder,
                        const char *name) {
@@ -170,8 +174,10 @@ static bst_status claim_folder(bst_ctx *ctx, bst_run *run) {
     }
     bst_status status = BST_OK;
     run->lock = take_lock(draft, O_CREAT | O_EXCL);
-    if (run->lock < 0) {
-        status = fail_errno(ctx, draft, "cannot make the lock");
+    int full = run->lock < 0 ? 0 : posix_fallocate(run->lock, 0, SPARE_BYTES);
+    if (run->lock < 0 || full == ENOSPC || full == EFBIG) {
+        errno = full ? full : errno;
+        status = fail_errno(ctx, run->folder, "cannot make the lock");
     } else if (rename(draft, run->folder) != 0) {
         if (errno == ENOTEMPTY || errno == EEXIST) {
             status = clear_dead_run(ctx, run->folder);
@@ -267,6 +273,43 @@ bst_status bst_run_file(bst_ctx *ctx, const bst_run *run, const char *name, char
     return join(ctx, buffer, bytes, run->folder, name);
 }
 
+bst_status bst_run_check_folder(bst_ctx *ctx, const bst_run *run) {
+    char path[BST_RUN_PATH_BYTES];
+    struct stat held, named;
+    BST_TRY(join(ctx, path, sizeof path, run->folder, LOCK_NAME));
+    if (stat(path, &named) != 0 || fstat(run->lock, &held) != 0 || held.st_ino != named.st_ino ||
+        held.st_dev != named.st_dev) {
+        return bst_fail(
+            ctx, BST_ERR_IO,
+            "%s: the folder was removed, moved or replaced while the run was writing it",
+            run->folder);
+    }
+    return BST_OK;
+}
+
+int64_t bst_run_free_bytes(const char *path) {
+    char folder[BST_RUN_PATH_BYTES];
+    if (snprintf(folder, sizeof folder, "%s", path) >= (int)sizeof folder) {
+        return -1;
+    }
+    for (;;) {
+        struct statvfs info;
+        if (statvfs(folder, &info) == 0) {
+            double bytes = (double)info.f_bavail * (double)info.f_frsize;
+            return bytes < 9e18 ? (int64_t)bytes : INT64_MAX;
+        }
+        char *slash = strrchr(folder, '/');
+        if (errno != ENOENT || strcmp(folder, ".") == 0 || slash == folder) {
+            return -1;
+        }
+        if (slash) {
+            *slash = '\0';
+        } else {
+            memcpy(folder, ".", 2);
+        }
+    }
+}
+
 /* fsync of a file or folder. */
 static bst_status sync_path(bst_ctx *ctx, const char *path) {
     int fd = open(path, O_RDONLY | O_CLOEXEC);
@@ -341,15 +384,22 @@ static bst_status publish(bst_ctx *ctx, bst_run *run) {
     return sync_path(ctx, parent);
 }
 
+bst_status bst_run_seal(bst_ctx *ctx, bst_run *run) {
+    bst_status status = bst_run_check_folder(ctx, run);
+    bst_status closed = bst_run_close_database(status == BST_OK ? ctx : NULL, run);
+    status = status == BST_OK ? closed : status;
+    return status == BST_OK ? sync_folder(ctx, run->folder) : status;
+}
+
 bst_status bst_run_finish(bst_ctx *ctx, bst_run *run) {
-    bst_status status = bst_run_close_database(ctx, run);
+    bst_status status = run->db ? bst_run_seal(ctx, run) : bst_run_check_folder(ctx, run);
     char lock_path[BST_RUN_PATH_BYTES];
     bool have_lock_path = join(NULL, lock_path, sizeof lock_path, run->folder, LOCK_NAME) == BST_OK;
     if (status == BST_OK && have_lock_path && unlink(lock_path) != 0) {
         status = fail_errno(ctx, lock_path, "cannot be removed");
     }
     if (status == BST_OK) {
-        status = sync_folder(ctx, run->folder);
+        status = sync_path(ctx, run->folder);
     }
     if (status == BST_OK) {
         status = publish(ctx, run);
@@ -367,6 +417,8 @@ void bst_run_abandon(bst_run *run) {
     bst_ctx_init(&unheard, NULL, NULL, BST_LOG_ERROR);
     bst_status status = bst_run_close_database(&unheard, run);
     (void)status; /* a run that is given up keeps what could be saved */
+    int given = ftruncate(run->lock, 0);
+    (void)given; /* the space would have been a reader's */
     close(run->lock);
     free(run);
 }

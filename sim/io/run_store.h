@@ -32,15 +32,24 @@ const char *bst_run_folder(const bst_run *run);
 bst_status bst_run_file(bst_ctx *ctx, const bst_run *run, const char *name, char *buffer,
                         size_t bytes) BST_MUST_CHECK;
 
-/* Completes the run: commits and closes the tables (one run.sqlite, no journal beside it), flushes
- * every file to disk and renames the folder to its final name in one step. Frees `run` in every
- * case; on an error the .partial folder stays. BST_ERR_IO when another run took the name meanwhile.
- */
+/* Closes the tables (one run.sqlite, no journal beside it) and flushes every file to disk; no rows
+ * are taken after it. What is left to do is the manifest and bst_run_finish or bst_run_abandon: a
+ * manifest that is written after this speaks of data that are safe. BST_ERR_IO with file and
+ * reason. */
+bst_status bst_run_seal(bst_ctx *ctx, bst_run *run) BST_MUST_CHECK;
+
+/* Completes the run: seals it where that was not done, and renames the folder to its final name in
+ * one step. Frees `run` in every case; on an error the .partial folder stays. BST_ERR_IO when
+ * another run took the name meanwhile. */
 bst_status bst_run_finish(bst_ctx *ctx, bst_run *run) BST_MUST_CHECK;
 
 /* Commits what there is as well as it can, and frees `run`; "<out>.partial" stays, readable. NULL
  * is allowed. */
 void bst_run_abandon(bst_run *run);
+
+/* Bytes that are free for this user where `path`, or the nearest folder above it that exists, lies;
+ * -1 when the system does not tell. */
+int64_t bst_run_free_bytes(const char *path);
 
 typedef enum bst_column_type {
     BST_COLUMN_INT,
@@ -104,11 +113,17 @@ bst_status bst_table_create(bst_ctx *ctx, bst_run *run, const char *name, const 
                             const bst_column *columns, int count, bst_table **out) BST_MUST_CHECK;
 
 /* Appends one row of as many values as the table has columns, of their types. Rows are committed in
- * batches: after 50,000 rows or 2 s, so that a killed run loses no more than that. */
+ * batches: after 50,000 rows, or with the first row that comes 2 s after the batch's first, so that
+ * a killed run loses no more than that. */
 bst_status bst_table_append(bst_ctx *ctx, bst_table *table, const bst_value *values) BST_MUST_CHECK;
 
-/* Commits the open batch now. */
+/* Commits the open batch now. BST_ERR_IO also when the folder is no longer where it was made. */
 bst_status bst_run_commit(bst_ctx *ctx, bst_run *run) BST_MUST_CHECK;
+
+/* Has `before` called before each commit, so that files that rows speak of hold it first; when it
+ * fails the batch is rolled back and the commit fails with it. NULL: none. */
+typedef bst_status (*bst_run_before_commit)(bst_ctx *ctx, void *user);
+void bst_run_set_before_commit(bst_run *run, bst_run_before_commit before, void *user);
 
 #ifdef __cplusplus
 }

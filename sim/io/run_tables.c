@@ -70,8 +70,24 @@ bst_status bst_run_commit(bst_ctx *ctx, bst_run *run) {
     if (!run->in_batch) {
         return BST_OK;
     }
+    bst_status status = bst_run_check_folder(ctx, run);
+    if (status == BST_OK && run->before_commit) {
+        status = run->before_commit(ctx, run->before_commit_user);
+    }
+    if (status == BST_OK) {
+        status = execute(ctx, run, "COMMIT", "cannot store the rows");
+    }
     run->in_batch = false;
-    return execute(ctx, run, "COMMIT", "cannot store the rows");
+    if (status != BST_OK) {
+        /* after a failed COMMIT the transaction may be open or not */
+        sqlite3_exec(run->db, "ROLLBACK", NULL, NULL, NULL);
+    }
+    return status;
+}
+
+void bst_run_set_before_commit(bst_run *run, bst_run_before_commit before, void *user) {
+    run->before_commit = before;
+    run->before_commit_user = user;
 }
 
 static bst_status begin_batch(bst_ctx *ctx, bst_run *run) {
@@ -86,6 +102,9 @@ static bst_status begin_batch(bst_ctx *ctx, bst_run *run) {
 }
 
 bst_status bst_run_close_database(bst_ctx *ctx, bst_run *run) {
+    if (!run->db) {
+        return BST_OK;
+    }
     bst_status status = bst_run_commit(ctx, run);
     for (bst_table *table = run->tables, *next; table; table = next) {
         next = table->next;

@@ -2,33 +2,10 @@
 
 #include <math.h>
 
+#include "sim/io/tangent.h"
+
 #define GRID 9
 #define DEG (180.0 / BST_PI)
-
-/* Tangent plane at a place: unit vectors to it, east and north. */
-typedef struct tangent {
-    bst_vec3 centre, east, north;
-} tangent;
-
-static tangent tangent_at(double ra_rad, double dec_rad) {
-    double sr = sin(ra_rad), cr = cos(ra_rad), sd = sin(dec_rad), cd = cos(dec_rad);
-    return (tangent){{cd * cr, cd * sr, sd}, {-sr, cr, 0.0}, {-sd * cr, -sd * sr, cd}};
-}
-
-/* Standard coordinates (rad); false beyond the plane's horizon. */
-static bool to_plane(const tangent *t, bst_vec3 v, double *xi, double *eta) {
-    double z = bst_vec3_dot(t->centre, v);
-    if (!(z > 0.0)) {
-        return false;
-    }
-    *xi = bst_vec3_dot(t->east, v) / z;
-    *eta = bst_vec3_dot(t->north, v) / z;
-    return true;
-}
-
-static bst_vec3 from_plane(const tangent *t, double xi, double eta) {
-    return bst_vec3_unit(bst_vec3_axpy(bst_vec3_axpy(t->centre, xi, t->east), eta, t->north));
-}
 
 /* One grid point: offset from the boresight (px) and catalogue place. */
 typedef struct sample {
@@ -38,11 +15,12 @@ typedef struct sample {
 
 /* Fits (xi, eta) = offset + cd * (dx, dy). The grid is symmetric about the boresight, so that the
  * normal equations are diagonal. */
-static bool fit_plane(const tangent *t, const sample *samples, double offset[2], double cd[2][2]) {
+static bool fit_plane(const bst_sky_plane *t, const sample *samples, double offset[2],
+                      double cd[2][2]) {
     double sum[2] = {0, 0}, sx[2] = {0, 0}, sy[2] = {0, 0}, sxx = 0, syy = 0;
     for (int i = 0; i < GRID * GRID; i++) {
         double p[2];
-        if (!to_plane(t, samples[i].icrs, &p[0], &p[1])) {
+        if (!bst_sky_to_plane(t, samples[i].icrs, &p[0], &p[1])) {
             return false;
         }
         sxx += samples[i].dx * samples[i].dx;
@@ -61,12 +39,39 @@ static bool fit_plane(const tangent *t, const sample *samples, double offset[2],
     return true;
 }
 
+static bst_status too_wide(bst_ctx *ctx) {
+    return bst_fail(ctx, BST_ERR_NUMERIC,
+                    "no tangent-plane coordinate system fits a field this wide; reduce the "
+                    "pixel scale or the number of pixels");
+}
+
+static bst_status fit_distorted(bst_ctx *ctx, const bst_camera *camera, bst_quat q_cam_from_gcrf,
+                                const bst_light *light, bst_wcs *out) {
+    double crval[2], cd[2][2];
+    *out =
+        (bst_wcs){.crpix = {bst_camera_centre_x(camera) + 1.0, bst_camera_centre_y(camera) + 1.0}};
+    if (!bst_sip_fit(camera, q_cam_from_gcrf, light, crval, cd, &out->sip, &out->residual_px)) {
+        return too_wide(ctx);
+    }
+    for (int i = 0; i < 2; i++) {
+        out->crval_deg[i] = crval[i] * DEG;
+        for (int j = 0; j < 2; j++) {
+            out->cd_deg[i][j] = cd[i][j] * DEG;
+        }
+    }
+    return BST_OK;
+}
+
 bst_status bst_wcs_fit(bst_ctx *ctx, const bst_camera *camera, bst_quat q_cam_from_gcrf,
                        const bst_light *light, bst_wcs *out) {
+    if (bst_camera_distorted(camera)) {
+        return fit_distorted(ctx, camera, q_cam_from_gcrf, light, out);
+    }
     bst_quat q_gcrf_from_cam = bst_quat_conj(q_cam_from_gcrf);
     double cx = bst_camera_centre_x(camera), cy = bst_camera_centre_y(camera);
     /* a sensor one pixel wide still needs a grid of some width */
-    double half_x = fmax(cx, 1.0), half_y = fmax(cy, 1.0);
+    double half_x = fmax(fmax(cx, (double)(camera->width_px - 1) - cx), 1.0);
+    double half_y = fmax(fmax(cy, (double)(camera->height_px - 1) - cy), 1.0);
     sample samples[GRID * GRID];
     for (int i = 0; i < GRID * GRID; i++) {
         sample *s = &samples[i];
@@ -80,23 +85,21 @@ bst_status bst_wcs_fit(bst_ctx *ctx, const bst_camera *camera, bst_quat q_cam_fr
     bool good = true;
     /* moving the tangent point by the mean offset converges at once: two rounds and a check */
     for (int round = 0; round < 3 && good; round++) {
-        tangent t = tangent_at(ra, dec);
+        bst_sky_plane t = bst_sky_plane_at(ra, dec);
         good = fit_plane(&t, samples, offset, cd);
         if (good && round < 2) {
-            bst_vec3_to_radec(from_plane(&t, offset[0], offset[1]), &ra, &dec);
+            bst_vec3_to_radec(bst_sky_from_plane(&t, offset[0], offset[1]), &ra, &dec);
         }
     }
     double det = good ? cd[0][0] * cd[1][1] - cd[0][1] * cd[1][0] : 0.0;
     if (!good || !(fabs(det) > 0.0)) {
-        return bst_fail(ctx, BST_ERR_NUMERIC,
-                        "no tangent-plane coordinate system fits a field this wide; reduce the "
-                        "pixel scale or the number of pixels");
+        return too_wide(ctx);
     }
-    tangent t = tangent_at(ra, dec);
+    bst_sky_plane t = bst_sky_plane_at(ra, dec);
     double worst = 0.0;
     for (int i = 0; i < GRID * GRID; i++) {
         double xi, eta;
-        if (!to_plane(&t, samples[i].icrs, &xi, &eta)) {
+        if (!bst_sky_to_plane(&t, samples[i].icrs, &xi, &eta)) {
             return bst_fail(ctx, BST_ERR_NUMERIC, "the field is too wide for one tangent plane");
         }
         double ex = (cd[1][1] * xi - cd[0][1] * eta) / det - samples[i].dx;
@@ -117,6 +120,7 @@ bst_wcs bst_wcs_window(const bst_wcs *wcs, bst_window window, int binning) {
     w.crpix[0] = (wcs->crpix[0] - 0.5 - window.x0) / b + 0.5;
     w.crpix[1] = (wcs->crpix[1] - 0.5 - window.y0) / b + 0.5;
     w.residual_px /= b;
+    bst_sip_bin(&w.sip, b);
     for (int i = 0; i < 2; i++) {
         for (int j = 0; j < 2; j++) {
             w.cd_deg[i][j] *= b;
@@ -127,24 +131,27 @@ bst_wcs bst_wcs_window(const bst_wcs *wcs, bst_window window, int binning) {
 
 bool bst_wcs_sky_to_px(const bst_wcs *wcs, double ra_rad, double dec_rad, double *x_px,
                        double *y_px) {
-    tangent t = tangent_at(wcs->crval_deg[0] / DEG, wcs->crval_deg[1] / DEG);
+    bst_sky_plane t = bst_sky_plane_at(wcs->crval_deg[0] / DEG, wcs->crval_deg[1] / DEG);
     double xi, eta;
-    if (!to_plane(&t, bst_vec3_from_radec(ra_rad, dec_rad), &xi, &eta)) {
+    if (!bst_sky_to_plane(&t, bst_vec3_from_radec(ra_rad, dec_rad), &xi, &eta)) {
         return false;
     }
     const double(*m)[2] = wcs->cd_deg;
     double det = (m[0][0] * m[1][1] - m[0][1] * m[1][0]) / DEG;
-    *x_px = (m[1][1] * xi - m[0][1] * eta) / det + wcs->crpix[0] - 1.0;
-    *y_px = (m[0][0] * eta - m[1][0] * xi) / det + wcs->crpix[1] - 1.0;
+    double u = (m[1][1] * xi - m[0][1] * eta) / det, v = (m[0][0] * eta - m[1][0] * xi) / det;
+    bst_sip_distort(&wcs->sip, u, v, &u, &v);
+    *x_px = u + wcs->crpix[0] - 1.0;
+    *y_px = v + wcs->crpix[1] - 1.0;
     return true;
 }
 
 void bst_wcs_px_to_sky(const bst_wcs *wcs, double x_px, double y_px, double *ra_rad,
                        double *dec_rad) {
-    tangent t = tangent_at(wcs->crval_deg[0] / DEG, wcs->crval_deg[1] / DEG);
-    double dx = x_px + 1.0 - wcs->crpix[0], dy = y_px + 1.0 - wcs->crpix[1];
+    bst_sky_plane t = bst_sky_plane_at(wcs->crval_deg[0] / DEG, wcs->crval_deg[1] / DEG);
+    double dx, dy;
+    bst_sip_undistort(&wcs->sip, x_px + 1.0 - wcs->crpix[0], y_px + 1.0 - wcs->crpix[1], &dx, &dy);
     const double(*m)[2] = wcs->cd_deg;
-    bst_vec3_to_radec(
-        from_plane(&t, (m[0][0] * dx + m[0][1] * dy) / DEG, (m[1][0] * dx + m[1][1] * dy) / DEG),
-        ra_rad, dec_rad);
+    bst_vec3_to_radec(bst_sky_from_plane(&t, (m[0][0] * dx + m[0][1] * dy) / DEG,
+                                         (m[1][0] * dx + m[1][1] * dy) / DEG),
+                      ra_rad, dec_rad);
 }

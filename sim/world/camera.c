@@ -1,5 +1,18 @@
 #include "sim/world/camera.h"
 
+#define DISTORTION(k, doc) BST_REAL(bst_distortion, k, "", -1e30, 1e30, "0", doc)
+const bst_config_desc bst_distortion_config[] = {
+    DISTORTION(k1,
+               "Radial, factor of r^2, r the tangent of the angle from the boresight (Brown "
+               "1971; sign and order of OpenCV)."),
+    DISTORTION(k2, "Radial, factor of r^4."),
+    DISTORTION(k3, "Radial, factor of r^6."),
+    DISTORTION(p1, "Tangential: 2 p1 x y in x, p1 (r^2 + 2 y^2) in y."),
+    DISTORTION(p2, "Tangential: p2 (r^2 + 2 x^2) in x, 2 p2 x y in y."),
+    BST_CONFIG_END,
+};
+#undef DISTORTION
+
 const bst_config_desc bst_camera_config[] = {
     BST_INT(bst_camera, width_px, "px", 1, 16384, "1024", "Columns of the sensor."),
     BST_INT(bst_camera, height_px, "px", 1, 16384, "1024", "Rows of the sensor."),
@@ -27,12 +40,16 @@ const bst_config_desc bst_camera_config[] = {
     BST_REAL(bst_camera, offset_dn, "DN", 0, 60000, "500",
              "Digital number of a pixel without charge."),
     BST_INT(bst_camera, bits, "", 8, 16, "16", "Bits of the quantisation."),
+    BST_REAL(bst_camera, rotation_deg, "deg", -360, 360, "0",
+             "Rotation of the focal plane about the boresight, from the gimbal's +x towards its "
+             "+y."),
+    BST_REALS(bst_camera, boresight_offset_px, "px", -8192, 8192, "[0, 0]",
+              "Where the boresight meets the focal plane, from the sensor's centre."),
+    BST_OBJECT(bst_camera, distortion, bst_distortion_config, "{}",
+               "Lens distortion, in the focal plane's axes about the boresight. It must not fold "
+               "the image inside the sensor."),
     BST_CONFIG_END,
 };
-
-double bst_camera_half_diagonal_rad(const bst_camera *c) {
-    return atan(0.5 * bst_camera_scale_rad(c) * hypot((double)c->width_px, (double)c->height_px));
-}
 
 double bst_camera_electrons_per_s(const bst_camera *c, double v_mag) {
     double area_m2 = 0.25 * BST_PI * c->aperture_m * c->aperture_m * (1.0 - c->obscuration);

@@ -9,6 +9,9 @@
  * catalogue's. */
 #define APPARENT_SHIFT_RAD (30.0 * BST_ARCSEC_RAD)
 
+/* Statistical stars that a field query keeps for the next one: 40 MiB. */
+#define FAINT_CACHE_STARS 1048576
+
 /* Attitudes and instants at which a position is evaluated to average it over the exposure: the
  * sigma points of the joint first and second moments of (attitude deviation, time), Julier and
  * Uhlmann 1997. Exact to second order; the first, the mean itself, has no weight. */
@@ -24,6 +27,7 @@ struct bst_field {
     int track_capacity;
     bst_star *stars;
     int star_capacity;
+    bst_faint_stars *faint; /* NULL: none */
     bst_source *sources;
     int source_capacity;
     bst_quat q_mid;
@@ -47,6 +51,9 @@ bst_status bst_field_create(bst_ctx *ctx, const bst_world *world, int observer, 
     bst_status status = field->stars
                             ? bst_view_create(ctx, world, &field->view)
                             : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a field query");
+    if (status == BST_OK && world->faint) {
+        status = bst_faint_stars_create(ctx, world->faint, FAINT_CACHE_STARS, &field->faint);
+    }
     if (status != BST_OK) {
         bst_field_free(field);
         return status;
@@ -58,6 +65,7 @@ bst_status bst_field_create(bst_ctx *ctx, const bst_world *world, int observer, 
 void bst_field_free(bst_field *field) {
     if (field) {
         bst_view_free(field->view);
+        bst_faint_stars_free(field->faint);
         free(field->time_s);
         free(field->q);
         free(field->stars);
@@ -177,7 +185,8 @@ static void summarise_track(bst_field *field, const bst_los_track *track, bst_qu
     double half_px = 0.5 * hypot((double)field->camera->width_px, (double)field->camera->height_px);
     double scale = bst_camera_scale_rad(field->camera);
     /* a tilt moves points at the corner further than at the centre */
-    double stretch = 1.0 + half_px * half_px * scale * scale;
+    double stretch = (1.0 + half_px * half_px * scale * scale) * bst_camera_stretch(field->camera);
+    half_px *= bst_camera_stretch(field->camera);
     double previous[D] = {0};
     for (int k = 0; k < track->count; k++) {
         bst_vec3 d = deviation(field->q_mid, track->q_cam_from_gcrf[k]);
@@ -242,20 +251,40 @@ bool bst_field_project(const bst_camera *camera, const bst_los_track *track, int
         camera, bst_quat_rotate(track->q_cam_from_gcrf[k], apparent_at(source, u)), x_px, y_px);
 }
 
-static bst_status query_stars(bst_ctx *ctx, bst_field *field, bst_vec3 centre, double radius,
-                              double v_limit, double julian_year, int *count) {
-    for (;;) {
-        BST_TRY(bst_stars_query(ctx, bst_world_stars(field->world), centre, radius, v_limit,
-                                julian_year, field->stars, field->star_capacity, count));
-        if (*count <= field->star_capacity) {
-            return BST_OK;
-        }
-        bst_star *more = realloc(field->stars, (size_t)*count * sizeof *more);
+static bst_status reserve_stars(bst_ctx *ctx, bst_field *field, int count) {
+    if (count > field->star_capacity) {
+        bst_star *more = realloc(field->stars, (size_t)count * sizeof *more);
         if (!more) {
-            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d stars", *count);
+            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d stars", count);
         }
         field->stars = more;
-        field->star_capacity = *count;
+        field->star_capacity = count;
+    }
+    return BST_OK;
+}
+
+/* The catalogue's stars, then the statistical ones down to faint_limit. */
+static bst_status query_stars(bst_ctx *ctx, bst_field *field, bst_vec3 centre, double radius,
+                              double v_limit, double faint_limit, double julian_year, int *count) {
+    int known, drawn = 0;
+    for (;;) {
+        BST_TRY(bst_stars_query(ctx, bst_world_stars(field->world), centre, radius, v_limit,
+                                julian_year, field->stars, field->star_capacity, &known));
+        if (known > field->star_capacity) {
+            BST_TRY(reserve_stars(ctx, field, known));
+            continue;
+        }
+        if (field->faint) {
+            int room = field->star_capacity - known;
+            BST_TRY(bst_faint_stars_query(ctx, field->faint, centre, radius, faint_limit,
+                                          field->stars + known, room, &drawn));
+            if (drawn > room) {
+                BST_TRY(reserve_stars(ctx, field, known + drawn + drawn / 4));
+                continue;
+            }
+        }
+        *count = known + drawn;
+        return BST_OK;
     }
 }
 
@@ -349,13 +378,25 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     bst_vec3 centre_cam = bst_camera_unproject(camera, window.x0 + 0.5 * (window.width - 1),
                                                window.y0 + 0.5 * (window.height - 1));
     bst_vec3 centre = bst_quat_rotate(bst_quat_conj(field->q_mid), centre_cam);
-    double radius = atan(bst_camera_scale_rad(camera) *
-                         (0.5 * hypot(window.width, window.height) + sqrt(2.0) * margin_px)) +
-                    APPARENT_SHIFT_RAD;
+    double radius = APPARENT_SHIFT_RAD;
+    if (camera->geometry.general) {
+        radius += bst_camera_reach_rad(camera, centre_cam, window.x0 - margin_px,
+                                       window.y0 - margin_px, window.x0 + window.width + margin_px,
+                                       window.y0 + window.height + margin_px);
+    } else {
+        radius += atan(bst_camera_scale_rad(camera) *
+                       (0.5 * hypot(window.width, window.height) + sqrt(2.0) * margin_px));
+    }
     double tt1, tt2;
     bst_time_tt(bst_world_time(field->world, mid_s), &tt1, &tt2);
     int star_count;
-    BST_TRY(query_stars(ctx, field, centre, radius, options->v_limit,
+    double faint_limit = fmin(options->v_limit, field->world->faint_limit_v_mag);
+    if (field->faint) {
+        double pixel_sr = bst_camera_scale_rad(camera) * bst_camera_scale_rad(camera);
+        truth->background_e += bst_faint_sky_unresolved(field->world->faint, centre, faint_limit) *
+                               pixel_sr * bst_camera_electrons_per_s(camera, 0.0) * exposure;
+    }
+    BST_TRY(query_stars(ctx, field, centre, radius, options->v_limit, faint_limit,
                         2000.0 + (tt1 - 2451545.0 + tt2) / 365.25, &star_count));
     int object_count = bst_world_object_count(field->world);
     BST_TRY(reserve_sources(ctx, field, star_count + object_count));
@@ -396,7 +437,7 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
         const bst_source *s = &field->sources[n];
         double own_px = (bst_vec3_angle(s->apparent_start, s->apparent_mid) +
                          bst_vec3_angle(s->apparent_mid, s->apparent_end)) /
-                        bst_camera_scale_rad(camera);
+                        bst_camera_scale_rad(camera) * bst_camera_stretch(camera);
         n += near_window(field, field->q_mid, s->apparent_mid, window, margin_px + own_px);
     }
     *sources = field->sources;

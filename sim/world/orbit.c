@@ -102,10 +102,12 @@ bst_status bst_orbit_set_burns(bst_ctx *ctx, bst_orbit *orbit, bst_sky_clock *cl
 
 bst_status bst_orbit_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *clock,
                            bst_time epoch, double seconds, bool with_burns, bst_state *out) {
-    if (orbit->sgp4) {
-        BST_TRY(sgp4_state(ctx, orbit, clock, epoch, seconds, out));
-    } else {
-        BST_TRY(relative_state(ctx, orbit, clock, epoch, seconds, with_burns, out));
+    switch (orbit->source) {
+        case BST_ORBIT_SGP4:
+            BST_TRY(sgp4_state(ctx, orbit, clock, epoch, seconds, out));
+            break;
+        default:
+            BST_TRY(relative_state(ctx, orbit, clock, epoch, seconds, with_burns, out));
     }
     int burn = with_burns ? orbit->burn_count - 1 : -1;
     while (burn >= 0 && orbit->burns[burn].time_s > seconds) {

@@ -6,6 +6,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "sim/core/file.h"
 #include "sim/world/child.h"
 
 #define ROWS_PER_PROGRESS 20000
@@ -28,44 +29,62 @@ bst_star_import_options bst_star_import_all(void) {
     return o;
 }
 
-bst_status bst_star_subset_read(bst_ctx *ctx, const char *path, bst_star_subset *out) {
-    memset(out, 0, sizeof *out);
-    FILE *f = fopen(path, "r");
-    if (!f) {
-        return bst_fail(ctx, BST_ERR_NOT_FOUND, "%s: %s", path, strerror(errno));
+/* One line that is not blank, without its comment. */
+static bool read_subset_line(const char *line, int *sky_lines, bst_star_subset *out) {
+    bst_star_patch p;
+    double v;
+    char rest[2];
+    if (sscanf(line, " sky %lf %1s", &v, rest) == 1 && isfinite(v) && *sky_lines == 0) {
+        out->v_limit = v;
+        ++*sky_lines;
+        return true;
     }
-    char line[256];
+    if (sscanf(line, " cone %lf %lf %lf %lf %1s", &p.ra_deg, &p.dec_deg, &p.radius_deg, &p.v_mag,
+               rest) == 4 &&
+        p.ra_deg >= 0.0 && p.ra_deg < 360.0 && fabs(p.dec_deg) <= 90.0 && p.radius_deg > 0.0 &&
+        p.radius_deg <= 180.0 && isfinite(p.v_mag) &&
+        out->patch_count < (int)BST_STAR_PATCHES_MAX) {
+        out->patches[out->patch_count++] = p;
+        return true;
+    }
+    return false;
+}
+
+bst_status bst_star_subset_read_buffer(bst_ctx *ctx, const char *name, const char *data,
+                                       size_t bytes, bst_star_subset *out) {
+    memset(out, 0, sizeof *out);
+    BST_TRY(bst_file_check_text(ctx, name, data, bytes));
     int number = 0, sky_lines = 0;
-    bst_status status = BST_OK;
-    while (status == BST_OK && fgets(line, sizeof line, f)) {
+    for (const char *next = data, *end = data + bytes; next < end;) {
+        char line[256];
         number++;
-        line[strcspn(line, "#\n")] = '\0';
-        bst_star_patch p;
-        double v;
-        char rest[2];
-        if (line[strspn(line, " \t")] == '\0') {
+        const char *stop = memchr(next, '\n', (size_t)(end - next));
+        size_t length = (size_t)((stop ? stop : end) - next);
+        bool fits = length < sizeof line;
+        memcpy(line, next, fits ? length : sizeof line - 1);
+        line[fits ? length : sizeof line - 1] = '\0';
+        line[strcspn(line, "#\r")] = '\0';
+        next = stop ? stop + 1 : end;
+        if (fits && line[strspn(line, " \t")] == '\0') {
             continue;
         }
-        if (sscanf(line, " sky %lf %1s", &v, rest) == 1 && isfinite(v) && sky_lines == 0) {
-            out->v_limit = v;
-            sky_lines++;
-        } else if (sscanf(line, " cone %lf %lf %lf %lf %1s", &p.ra_deg, &p.dec_deg, &p.radius_deg,
-                          &p.v_mag, rest) == 4 &&
-                   p.ra_deg >= 0.0 && p.ra_deg < 360.0 && fabs(p.dec_deg) <= 90.0 &&
-                   p.radius_deg > 0.0 && p.radius_deg <= 180.0 && isfinite(p.v_mag) &&
-                   out->patch_count < (int)BST_STAR_PATCHES_MAX) {
-            out->patches[out->patch_count++] = p;
-        } else {
-            status = bst_fail(ctx, BST_ERR_FORMAT,
-                              "%s:%d: expected one \"sky V\" and up to %u \"cone RA DEC RADIUS V\" "
-                              "(degrees; RA 0 to 360), found \"%s\"",
-                              path, number, BST_STAR_PATCHES_MAX, line);
+        if (!fits || !read_subset_line(line, &sky_lines, out)) {
+            return bst_fail(ctx, BST_ERR_FORMAT,
+                            "%.400s:%d: expected one \"sky V\" and up to %u \"cone RA DEC RADIUS "
+                            "V\" (degrees; RA 0 to 360), found \"%s\"",
+                            name, number, BST_STAR_PATCHES_MAX, line);
         }
     }
-    if (status == BST_OK && sky_lines == 0) {
-        status = bst_fail(ctx, BST_ERR_FORMAT, "%s: no line \"sky V\"", path);
-    }
-    fclose(f);
+    return sky_lines ? BST_OK : bst_fail(ctx, BST_ERR_FORMAT, "%.400s: no line \"sky V\"", name);
+}
+
+bst_status bst_star_subset_read(bst_ctx *ctx, const char *path, bst_star_subset *out) {
+    char *data;
+    size_t bytes;
+    BST_TRY(bst_file_read(ctx, path, 1 << 20, "a file with lines \"sky V\" and \"cone ...\"", &data,
+                          &bytes));
+    bst_status status = bst_star_subset_read_buffer(ctx, path, data, bytes, out);
+    free(data);
     return status;
 }
 
@@ -105,7 +124,12 @@ static bst_status read_rows(bst_ctx *ctx, FILE *rows, const bst_star_import_opti
     char line[512];
     long long count = 0;
     while (fgets(line, sizeof line, rows)) {
-        count++;
+        if (++count > options->expected_rows && options->expected_rows) {
+            return bst_fail(ctx, BST_ERR_FORMAT,
+                            "found more than %lld stars, all that Tycho-2 has: this is not the "
+                            "catalogue; run `boresight stars fetch`",
+                            options->expected_rows);
+        }
         size_t bytes = strcspn(line, "\r\n");
         bst_star_values values;
         bst_star_record record;
@@ -292,9 +316,11 @@ bst_status bst_star_import_tarball(bst_ctx *ctx, const char *tarball_path,
     if (stars_written) {
         *stars_written = 0;
     }
-    if (access(tarball_path, R_OK) != 0) {
-        return bst_fail(ctx, BST_ERR_NOT_FOUND, "%s: %s", tarball_path, strerror(errno));
-    }
+    int fd;
+    uint64_t tarball_bytes;
+    BST_TRY(bst_file_open(ctx, tarball_path, (uint64_t)1 << 30, "Debian's tycho2_2.orig.tar.xz",
+                          &fd, &tarball_bytes));
+    close(fd);
     const char *argv[] = {"tar",         "-xJf",         tarball_path,  "--to-stdout",
                           "--wildcards", "*suppl_1.dat", "*tyc2.dat.*", NULL};
     bst_child tar;

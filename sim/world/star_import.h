@@ -36,6 +36,9 @@ bst_star_import_options bst_star_import_all(void);
  * '#' starts a comment. BST_ERR_FORMAT names file and line. */
 bst_status bst_star_subset_read(bst_ctx *ctx, const char *path,
                                 bst_star_subset *out) BST_MUST_CHECK;
+/* The same from memory; `name` stands for the path in messages. */
+bst_status bst_star_subset_read_buffer(bst_ctx *ctx, const char *name, const char *data,
+                                       size_t bytes, bst_star_subset *out) BST_MUST_CHECK;
 
 /* Reads one row without its newline. Rows of 206 bytes are of the main table, of 122 bytes of
  * supplement 1. Positions are brought to J2000: the main table's mean positions are there already;

@@ -1,15 +1,17 @@
 #include "sim/world/stars.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
+#include "sim/core/file.h"
 #include "sim/world/star_index.h"
+#include "sim/world/world_internal.h"
+
+#define MAX_FILE_BYTES ((uint64_t)1 << 30)
 
 /* Defined in stars_embedded.S. */
 extern const unsigned char bst_stars_embedded_begin[];
@@ -43,23 +45,21 @@ bst_status bst_stars_default_path(bst_ctx *ctx, char *buffer, size_t bytes) {
 }
 
 static bst_status open_file(bst_ctx *ctx, const char *path, bst_stars *s) {
-    int fd = open(path, O_RDONLY | O_CLOEXEC);
-    if (fd < 0) {
-        return bst_fail(ctx, errno == ENOENT ? BST_ERR_NOT_FOUND : BST_ERR_IO,
-                        "star catalogue %s: %s; `boresight stars fetch` makes the full one, and "
-                        "\"embedded\" names the one in the program",
-                        path, strerror(errno));
+    int fd;
+    uint64_t bytes;
+    bst_status status = bst_file_open(ctx, path, MAX_FILE_BYTES,
+                                      "a star catalogue: `boresight stars fetch` makes the full "
+                                      "one, and \"embedded\" names the one in the program",
+                                      &fd, &bytes);
+    if (status != BST_OK) {
+        return bst_fail_prefix(ctx, status, "star catalogue");
     }
-    bst_status status = BST_OK;
-    struct stat st;
-    if (fstat(fd, &st) != 0) {
-        status = bst_fail(ctx, BST_ERR_IO, "star catalogue %s: %s", path, strerror(errno));
-    } else if (!S_ISREG(st.st_mode) || st.st_size < 8) {
+    if (bytes < 8) {
         /* An empty file cannot be mapped; a zero header gives the message for a foreign one. */
         uint64_t none = 0;
         status = bst_star_view_init(ctx, path, &none, sizeof none, &s->view);
     } else {
-        s->mapping_bytes = (size_t)st.st_size;
+        s->mapping_bytes = (size_t)bytes;
         void *p = mmap(NULL, s->mapping_bytes, PROT_READ, MAP_PRIVATE, fd, 0);
         if (p == MAP_FAILED) {
             status = bst_fail(ctx, BST_ERR_IO, "star catalogue %s: %s", path, strerror(errno));
@@ -93,6 +93,10 @@ bst_status bst_stars_open(bst_ctx *ctx, const char *name, bst_stars **out) {
             s->path[0] = '\0';
             status = BST_OK;
         }
+    } else if (!*name) {
+        status = bst_fail(ctx, BST_ERR_ARGUMENT,
+                          "the star catalogue's name is empty (allowed: \"default\", "
+                          "\"embedded\" or a path)");
     } else if (strcmp(name, "embedded") != 0) {
         int n = snprintf(s->path, sizeof s->path, "%s", name);
         if (n < 0 || (size_t)n >= sizeof s->path) {
@@ -139,6 +143,10 @@ void bst_stars_get_info(const bst_stars *stars, bst_stars_info *out) {
     out->count = (long long)h->star_count;
     out->complete_to_v_mag = h->complete_to_v_mag;
     out->patches = (int)h->patch_count;
+}
+
+const bst_star_view *bst_stars_records(const bst_stars *stars) {
+    return &stars->view;
 }
 
 void bst_stars_patch(const bst_stars *stars, int index, bst_vec3 *centre, double *radius_rad,

@@ -1,15 +1,20 @@
 #include "sim/world/world_config.h"
 
+#include "sim/astro/elements.h"
+
 static const char *const orbit_sources[] = {"sgp4", "relative", NULL};
+static const char *const faint_kinds[] = {"none", "statistical", NULL};
 static const char *const axes[] = {"x", "-x", "y", "-y", NULL};
 
 static const bst_config_desc orbit_table[] = {
     BST_ENUM(
         bst_orbit_config, source, orbit_sources, "\"sgp4\"",
         "Where the orbit comes from: a two-line element set, or another object plus an offset."),
-    BST_STRING(bst_orbit_config, tle_file, "\"\"",
-               "sgp4: file of element sets, relative to the scenario's folder."),
-    BST_INT(bst_orbit_config, norad, "", 0, 339999, "0", "sgp4: catalogue number in that file."),
+    BST_PATH(bst_orbit_config, elements_file, "\"\"",
+             "sgp4: file of element sets (TLE, or OMM as JSON or CSV), relative to the scenario's "
+             "folder."),
+    BST_INT(bst_orbit_config, norad, "", 0, BST_NORAD_MAX, "0",
+            "sgp4: catalogue number in that file."),
     BST_STRING(bst_orbit_config, reference, "\"\"",
                "relative: the object that the offset is added to."),
     BST_REAL(bst_orbit_config, at_s, "s", -1e9, 1e9, "0",
@@ -40,15 +45,39 @@ static const bst_config_desc object_table[] = {
     BST_CONFIG_END,
 };
 
+static const bst_config_desc catalogue_table[] = {
+    BST_PATH(
+        bst_catalogue_config, elements_file, NULL,
+        "File of element sets, relative to the scenario's folder: each satellite in it becomes "
+        "an object, but for those that the list of objects has by number."),
+    BST_REAL(bst_catalogue_config, area_m2, "m2", 0, 1e6, "4",
+             "Cross-section of the sphere that stands for each."),
+    BST_REAL(bst_catalogue_config, albedo, "", 0, 1, "0.25", "Diffuse albedo of the sphere."),
+    BST_CONFIG_END,
+};
+
+static const char *const catalogue_words[] = {"default", "embedded", NULL};
+static const char *const builtin_word[] = {"builtin", NULL};
+
 const bst_config_desc bst_world_config_table[] = {
-    BST_STRING(
-        bst_world_config, star_catalogue, "\"default\"",
+    BST_PATH_OR(
+        bst_world_config, star_catalogue, catalogue_words, "\"default\"",
         "\"default\" (the user's full catalogue, else the embedded one), \"embedded\", or a file, "
         "relative to the scenario's folder."),
-    BST_STRING(bst_world_config, earth_orientation, "\"builtin\"",
-               "\"builtin\" or a file in the IERS EOP C04 format."),
+    BST_ENUM(bst_world_config, faint_stars, faint_kinds, "\"none\"",
+             "Stars beyond the catalogue's limit: none, or drawn by place from a table of star "
+             "counts. The onboard side does not know them."),
+    BST_REAL(bst_world_config, faint_limit_v_mag, "mag", 6, 21, "16",
+             "Statistical stars are drawn one by one down to this V (and the renderer's v_limit); "
+             "those fainter add to the background."),
+    BST_SEED(bst_world_config, faint_seed, "\"0x5ca1ab1edeadbeef\"",
+             "Seed of the statistical sky, a hexadecimal string: the same sky in all runs."),
+    BST_PATH_OR(bst_world_config, earth_orientation, builtin_word, "\"builtin\"",
+                "\"builtin\" or a file in the IERS EOP C04 format."),
     BST_LIST(bst_world_config, objects, bst_object_config, object_table, 0, 100000, "[]",
              "The space objects."),
+    BST_LIST(bst_world_config, catalogues, bst_catalogue_config, catalogue_table, 0, 16, "[]",
+             "Files of element sets whose satellites are there as well."),
     BST_CONFIG_END,
 };
 
@@ -82,8 +111,8 @@ static const bst_config_desc cue_table[] = {
 };
 
 static const bst_config_desc knowledge_table[] = {
-    BST_STRING(bst_knowledge_config, star_catalogue, "\"\"",
-               "Onboard star catalogue; empty: the world's own."),
+    BST_PATH_OR(bst_knowledge_config, star_catalogue, catalogue_words, "\"\"",
+                "Onboard star catalogue; empty: the world's own."),
     BST_CONFIG_END,
 };
 
@@ -106,6 +135,8 @@ const bst_config_desc bst_sensor_config_table[] = {
 const bst_config_desc bst_observer_config_table[] = {
     BST_STRING(bst_observer_config, name, NULL, "Name, unique in the scenario."),
     BST_OBJECT(bst_observer_config, orbit, orbit_table, NULL, "The observer's orbit."),
+    BST_LIST(bst_observer_config, burns, bst_burn_config, burn_table, 0, 64, "[]",
+             "Impulsive burns in the order of time."),
     BST_LIST(bst_observer_config, sensors, bst_sensor_config, bst_sensor_config_table, 1, 16, NULL,
              "Its sensors."),
     BST_CONFIG_END,

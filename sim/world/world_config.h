@@ -9,9 +9,9 @@
 enum { BST_ORBIT_SGP4, BST_ORBIT_RELATIVE };
 
 typedef struct bst_orbit_config {
-    int32_t source;     /* BST_ORBIT_... */
-    char tle_file[512]; /* sgp4: path, relative to the scenario's folder */
-    int64_t norad;      /* sgp4 */
+    int32_t source;          /* BST_ORBIT_... */
+    char elements_file[512]; /* sgp4: path, relative to the scenario's folder */
+    int64_t norad;           /* sgp4 */
     char reference[64]; /* relative: name of an object with an orbit of its own, earlier in the list
                          */
     double at_s;        /* relative: time at which offset_rtn_m holds */
@@ -31,10 +31,21 @@ typedef struct bst_object_config {
     bst_config_list burns; /* bst_burn_config, by time */
 } bst_object_config;
 
+typedef struct bst_catalogue_config {
+    char elements_file[512]; /* path as above */
+    double area_m2, albedo;  /* of every object */
+} bst_catalogue_config;
+
+enum { BST_FAINT_NONE, BST_FAINT_STATISTICAL };
+
 typedef struct bst_world_config {
-    char star_catalogue[512];    /* "default", "embedded" or a path as above */
+    char star_catalogue[512]; /* "default", "embedded" or a path as above */
+    int32_t faint_stars;      /* BST_FAINT_... */
+    double faint_limit_v_mag; /* single stars down to this V */
+    uint64_t faint_seed;
     char earth_orientation[512]; /* "builtin" or a path as above */
     bst_config_list objects;     /* bst_object_config */
+    bst_config_list catalogues;  /* bst_catalogue_config */
 } bst_world_config;
 
 typedef struct bst_cue_config {
@@ -67,6 +78,7 @@ typedef struct bst_sensor_config {
 typedef struct bst_observer_config {
     char name[64];
     bst_orbit_config orbit;
+    bst_config_list burns;   /* bst_burn_config, by time */
     bst_config_list sensors; /* bst_sensor_config */
 } bst_observer_config;
 

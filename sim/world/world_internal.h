@@ -4,7 +4,10 @@
 
 #include "sim/astro/sgp4.h"
 #include "sim/astro/sky_clock.h"
+#include "sim/world/faint_stars.h"
 #include "sim/world/knowledge.h"
+#include "sim/world/name_index.h"
+#include "sim/world/star_index.h"
 #include "sim/world/world_config.h"
 
 /* A burn with what it has made of the orbit; worked out once. */
@@ -16,11 +19,15 @@ typedef struct bst_burn {
 
 /* An orbit ready to be evaluated; immutable. */
 typedef struct bst_orbit {
-    bst_sgp4 *sgp4;        /* NULL: relative */
+    int32_t source; /* BST_ORBIT_... */
+    /* sgp4 */
+    bst_sgp4 *sgp4;
     double epoch_offset_s; /* scenario epoch minus element epoch */
+    /* relative */
     const struct bst_orbit *reference;
     double at_s;
     bst_vec3 offset_rtn_m, rate_rtn_mps;
+
     bst_burn *burns;
     int burn_count;
     const char *name; /* for messages; borrowed */
@@ -49,8 +56,11 @@ struct bst_world {
     bst_time epoch;
     bst_eop *eop;
     bst_stars *stars;
+    bst_faint_sky *faint; /* NULL: no statistical stars */
+    double faint_limit_v_mag;
     world_object *objects;
     int object_count;
+    bst_name_index *object_names;
     world_observer *observers;
     int observer_count;
 };
@@ -63,6 +73,9 @@ struct bst_knowledge {
     int observer, sensor;
     double julian_year;
 };
+
+/* The catalogue's cells and records; lent. */
+const bst_star_view *bst_stars_records(const bst_stars *stars);
 
 /* State at `seconds` after the scenario's epoch; `with_burns` false gives the orbit as catalogued.
  */

@@ -390,7 +390,7 @@ static void loads_from_disk(void **state) {
     assert_int_equal(bst_tle_load(&ctx, path, NULL, &sets, &count), BST_ERR_NOT_FOUND);
     assert_message(&ctx, path);
     assert_int_equal(bst_tle_load(&ctx, "tests", NULL, &sets, &count), BST_ERR_IO);
-    assert_message(&ctx, "tests: is a directory");
+    assert_message(&ctx, "tests: is a folder; give a file of two-line element sets");
     assert_null(sets);
     assert_int_equal(count, 0);
 }

@@ -83,7 +83,7 @@ static void test_messages(void **state) {
         {"{\"frames\": 0}",
          "f.json: /frames: out of range (found 0; allowed: an integer from 1 to 1000)"},
         {"{\"big\": 9007199254740993}",
-         "f.json: /big: not an integer (found 9007199254740992; allowed: an integer from "
+         "f.json: /big: out of range (found 9007199254740992; allowed: an integer from "
          "-9007199254740991 to 9007199254740991)"},
         {"{\"rate_hz\": 0.05}",
          "f.json: /rate_hz: out of range (found 0.05; allowed: a number from 0.1 to 10000 Hz)"},

@@ -1,7 +1,6 @@
 /* The JSON reader: what it refuses, in which words, and overrides. */
 #include <cjson/cJSON.h>
 #include <stdlib.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "sim/core/config.h"
@@ -20,42 +19,128 @@ static void test_refused_texts(void **state) {
     static const struct {
         const char *text, *message;
     } cases[] = {
-        {"", "f.json: the file is empty (a JSON object is expected)"},
-        {" \n\t ", "f.json: the file is empty (a JSON object is expected)"},
-        {"\xEF\xBB\xBF", "f.json: the file is empty (a JSON object is expected)"},
-        {"{", "f.json:1:1: this is not valid JSON"},
-        {"{\"a\": 1", "f.json:1:7: this is not valid JSON"},
-        {"{\"a\": \"b", "f.json:1:8: this is not valid JSON"},
-        {"{\"a\": 1,}", "f.json:1:9: this is not valid JSON"},
-        {"{\n  \"a\": 1\n  \"b\": 2\n}", "f.json:3:3: this is not valid JSON"},
-        {"{\"a\": NaN}", "f.json:1:7: this is not valid JSON"},
-        {"{\"a\": Infinity}", "f.json:1:7: this is not valid JSON"},
-        {"{'a': 1}", "f.json:1:3: this is not valid JSON"},
-        {"{\"a\": 1} // note", "f.json:1:10: text after the end of the JSON value"},
-        {"{\"a\": 1}\n{}", "f.json:2:1: text after the end of the JSON value"},
-        {"{\"a\": 01}", "f.json:1:7: this is not a JSON number"},
-        {"{\"a\": 1.}", "f.json:1:7: this is not a JSON number"},
-        {"{\"a\": -}", "f.json:1:7: this is not a JSON number"},
-        {"{\"a\": 1e}", "f.json:1:7: this is not a JSON number"},
-        {"{\"a\": 0x10}", "f.json:1:8: this is not valid JSON"},
-        {"{\"a\": .5}", "f.json:1:7: this is not valid JSON"},
-        {"{\"a\": +5}", "f.json:1:7: this is not valid JSON"},
+        {"", "f.json:1:1: the file is empty (a JSON object is expected)"},
+        {" \n\t ", "f.json:1:1: the file is empty (a JSON object is expected)"},
+        {"\xEF\xBB\xBF", "f.json:1:1: the file is empty (a JSON object is expected)"},
+        {"{",
+         "f.json:1:2: this is not valid JSON (found the end of the text; allowed: a key in double "
+         "quotes or })"},
+        {"{\"a\": 1",
+         "f.json:1:8: this is not valid JSON (found the end of the text; allowed: a comma or })"},
+        {"{\"a\"",
+         "f.json:1:5: this is not valid JSON (found the end of the text; allowed: a colon between "
+         "key and value)"},
+        {"{\"a\":",
+         "f.json:1:6: this is not valid JSON (found the end of the text; allowed: a value: {...}, "
+         "[...], \"...\", a finite number, true, false, null)"},
+        {"[1, 2",
+         "f.json:1:6: this is not valid JSON (found the end of the text; allowed: a comma or ])"},
+        {"{\"a\": \"b", "f.json:1:7: the string that begins here has no closing \" in its line"},
         {"{\"a\": \"x\ny\"}",
+         "f.json:1:7: the string that begins here has no closing \" in its line"},
+        {"{\"a\": 1,}",
+         "f.json:1:9: this is not valid JSON (found \"}\"; allowed: a key in double quotes)"},
+        {"[1,]",
+         "f.json:1:4: this is not valid JSON (found \"]\"; allowed: a value: {...}, [...], "
+         "\"...\", a finite number, true, false, null)"},
+        {"[1 2]", "f.json:1:4: this is not valid JSON (found \"2\"; allowed: a comma or ])"},
+        {"[}",
+         "f.json:1:2: this is not valid JSON (found \"}\"; allowed: a value: {...}, [...], "
+         "\"...\", a finite number, true, false, null, or ])"},
+        {"{]",
+         "f.json:1:2: this is not valid JSON (found \"]\"; allowed: a key in double quotes or })"},
+        {"{1: 2}",
+         "f.json:1:2: this is not valid JSON (found \"1\"; allowed: a key in double quotes or })"},
+        {"{\"a\" 1}",
+         "f.json:1:6: this is not valid JSON (found \"1\"; allowed: a colon between key and "
+         "value)"},
+        {"{\n  \"a\": 1\n  \"b\": 2\n}",
+         "f.json:3:3: this is not valid JSON (found a string; allowed: a comma or })"},
+        {"{\"a\": NaN}",
+         "f.json:1:7: this is not valid JSON (found \"NaN\"; allowed: a value: {...}, [...], "
+         "\"...\", a finite number, true, false, null)"},
+        {"{\"a\": Infinity}",
+         "f.json:1:7: this is not valid JSON (found \"Infinity\"; allowed: a value: {...}, [...], "
+         "\"...\", a finite number, true, false, null)"},
+        {"{\"a\": -Infinity}",
+         "f.json:1:7: this is not a JSON number (found \"-Infinity\"; allowed: such as 12, -0.5, "
+         "6.7e-11, without leading zeros)"},
+        {"{'a': 1}",
+         "f.json:1:2: this is not valid JSON (found \"'\"; allowed: a key in double quotes or })"},
+        {"tru",
+         "f.json:1:1: this is not valid JSON (found \"tru\"; allowed: a value: {...}, [...], "
+         "\"...\", a finite number, true, false, null)"},
+        {"{\"a\": 1} // note",
+         "f.json:1:10: text after the end of the JSON value (found \"/\"; allowed: nothing more)"},
+        {"{\"a\": 1}\n{}",
+         "f.json:2:1: text after the end of the JSON value (found \"{\"; allowed: nothing more)"},
+        {"[1] \xC3\xA9\xC3\xA8",
+         "f.json:1:5: text after the end of the JSON value (found \"\xC3\xA9\"; allowed: nothing "
+         "more)"},
+        {"{\"a\": 01}",
+         "f.json:1:7: this is not a JSON number (found \"01\"; allowed: such as 12, -0.5, 6.7e-11, "
+         "without leading zeros)"},
+        {"{\"a\": 1.}",
+         "f.json:1:7: this is not a JSON number (found \"1.\"; allowed: such as 12, -0.5, 6.7e-11, "
+         "without leading zeros)"},
+        {"{\"a\": -}",
+         "f.json:1:7: this is not a JSON number (found \"-\"; allowed: such as 12, -0.5, 6.7e-11, "
+         "without leading zeros)"},
+        {"{\"a\": 1e}",
+         "f.json:1:7: this is not a JSON number (found \"1e\"; allowed: such as 12, -0.5, 6.7e-11, "
+         "without leading zeros)"},
+        {"{\"a\": 0x10}",
+         "f.json:1:8: this is not valid JSON (found \"x10\"; allowed: a comma or })"},
+        {"{\"a\": .5}",
+         "f.json:1:7: this is not valid JSON (found \".5\"; allowed: a value: {...}, [...], "
+         "\"...\", a finite number, true, false, null)"},
+        {"{\"a\": +5}",
+         "f.json:1:7: this is not valid JSON (found \"+5\"; allowed: a value: {...}, [...], "
+         "\"...\", a finite number, true, false, null)"},
+        {"{\"a\": [1, 1e400]}",
+         "f.json:1:11: the number is too large (found \"1e400\"; allowed: |number| < 1.8e308)"},
+        {"-1e999",
+         "f.json:1:1: the number is too large (found \"-1e999\"; allowed: |number| < 1.8e308)"},
+        {"1111111111222222222233333333334444444444555555555566666666667777",
+         "f.json:1:1: a number of more than 63 characters"},
+        {"{\"a\": \"x\ty\"}",
          "f.json:1:9: a control character within a string (write \\n, \\t or \\u00XX)"},
-        {"{\"a\":\f1}", "f.json:1:6: a control character"},
+        {"{\"a\":\f1}",
+         "f.json:1:6: this is not valid JSON (found the control character 0x0C; allowed: a value: "
+         "{...}, [...], \"...\", a finite number, true, false, null)"},
         {"{\"a\": \"x\\u0000y\"}", "f.json:1:9: \\u0000 within a string is not allowed"},
-        {"{\"a\": \"\\ud800\"}", "f.json:1:8: this is not valid JSON"},
-        {"\xFF\xFE{", "f.json:1:1: byte 0xFF is not UTF-8 text"},
-        {"{\"a\": \"gr\xFC\xDF\"}", "f.json:1:10: byte 0xFC is not UTF-8 text"},
-        {"{\"a\": \"\xC0\xAF\"}", "f.json:1:8: byte 0xC0 is not UTF-8 text"},
-        {"{\"a\": \"\xED\xA0\x80\"}", "f.json:1:8: byte 0xED is not UTF-8 text"},
-        {"{\"a\": \"\xF4\x90\x80\x80\"}", "f.json:1:8: byte 0xF4 is not UTF-8 text"},
-        {"{\"a\": \"\xE2\x82", "f.json:1:8: byte 0xE2 is not UTF-8 text"},
+        {"{\"a\": \"\\ud800\"}",
+         "f.json:1:8: \\u is not followed by the four hexadecimal digits of a character (a "
+         "character beyond U+FFFF takes two such, a high and a low surrogate)"},
+        {"{\"a\": \"\\udc00\"}",
+         "f.json:1:8: \\u is not followed by the four hexadecimal digits of a character (a "
+         "character beyond U+FFFF takes two such, a high and a low surrogate)"},
+        {"{\"a\": \"\\ud800\\u0041\"}",
+         "f.json:1:8: \\u is not followed by the four hexadecimal digits of a character (a "
+         "character beyond U+FFFF takes two such, a high and a low surrogate)"},
+        {"{\"a\": \"\\u12\"}",
+         "f.json:1:8: \\u is not followed by the four hexadecimal digits of a character (a "
+         "character beyond U+FFFF takes two such, a high and a low surrogate)"},
+        {"{\"a\": \"C:\\dir\"}",
+         "f.json:1:10: unknown escape in a string (allowed: \\\" \\\\ \\/ \\b \\f \\n \\r \\t \\u "
+         "and four hexadecimal digits; a backslash itself is \\\\)"},
+        {"{\"a\": \"x\\",
+         "f.json:1:9: unknown escape in a string (allowed: \\\" \\\\ \\/ \\b \\f \\n \\r \\t \\u "
+         "and four hexadecimal digits; a backslash itself is \\\\)"},
+        {"\xFF\xFE{", "f.json:1: the file is UTF-16 text (allowed: ASCII or UTF-8)"},
+        {"\xFE\xFF", "f.json:1: the file is UTF-16 text (allowed: ASCII or UTF-8)"},
+        {"{\"a\": \"gr\xFC\xDF\"}", "f.json:1:10: byte 0xFC is not UTF-8 text (allowed: UTF-8)"},
+        {"{\"a\": \"\xC0\xAF\"}", "f.json:1:8: byte 0xC0 is not UTF-8 text (allowed: UTF-8)"},
+        {"{\"a\": \"\xED\xA0\x80\"}", "f.json:1:8: byte 0xED is not UTF-8 text (allowed: UTF-8)"},
+        {"{\"a\": \"\xF4\x90\x80\x80\"}",
+         "f.json:1:8: byte 0xF4 is not UTF-8 text (allowed: UTF-8)"},
+        {"{\"a\": \"\xE2\x82", "f.json:1:8: byte 0xE2 is not UTF-8 text (allowed: UTF-8)"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         expect_refused(cases[i].text, strlen(cases[i].text), BST_ERR_FORMAT, cases[i].message);
     }
-    expect_refused("{\"a\": 1}\0", 9, BST_ERR_FORMAT, "f.json:1:9: byte 0x00 is not UTF-8 text");
+    expect_refused("{\"a\": 1}\0", 9, BST_ERR_FORMAT,
+                   "f.json:1:9: byte 0x00 is not UTF-8 text (allowed: UTF-8)");
 }
 
 static void test_refused_content(void **state) {
@@ -63,13 +148,11 @@ static void test_refused_content(void **state) {
     static const struct {
         const char *text, *message;
     } cases[] = {
-        {"{\"a\": {\"b\": [1, 1e400]}}",
-         "f.json: /a/b/1: the number is too large to be represented (allowed: |number| < 1.8e308)"},
-        {"-1e999",
-         "f.json: /: the number is too large to be represented (allowed: |number| < 1.8e308)"},
         {"{\"a\": 1, \"b\": 2, \"a\": 3}", "f.json: /a: the key is given twice"},
         {"{\"l\": [0, {\"x\": 1, \"x\": 1}]}", "f.json: /l/1/x: the key is given twice"},
         {"{\"a\": 1, \"\\u0061\": 2}", "f.json: /a: the key is given twice"},
+        {"{\"o\": {\"x\": 1, \"a\\nb\": 1}}",
+         "f.json: /o: element 1 has a control character in its key"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         expect_refused(cases[i].text, strlen(cases[i].text), BST_ERR_CONFIG, cases[i].message);
@@ -140,46 +223,18 @@ static void test_every_truncation_is_refused(void **state) {
 
 static void test_load(void **state) {
     (void)state;
-    char folder[] = "/tmp/boresight_json_XXXXXX";
-    assert_non_null(mkdtemp(folder));
-    char path[64], expected[200];
-    snprintf(path, sizeof path, "%s/f.json", folder);
-    bst_ctx ctx = {0};
-    bst_json *json = NULL;
-    assert_int_equal(bst_json_load(&ctx, path, &json), BST_ERR_IO);
-    snprintf(expected, sizeof expected, "%s: cannot be opened: No such file or directory", path);
-    assert_string_equal(ctx.message, expected);
-    assert_null(json);
-
-    assert_int_equal(bst_json_load(&ctx, folder, &json), BST_ERR_IO);
-    snprintf(expected, sizeof expected, "%s: not a file but a folder", folder);
-    assert_string_equal(ctx.message, expected);
-
-    assert_int_equal(mkfifo(path, 0600), 0);
-    assert_int_equal(bst_json_load(&ctx, path, &json), BST_ERR_IO);
-    snprintf(expected, sizeof expected, "%s: not a file", path);
-    assert_string_equal(ctx.message, expected);
-    unlink(path);
-
-    FILE *file = fopen(path, "w");
-    assert_non_null(file);
-    assert_int_equal(ftruncate(fileno(file), (64 << 20) + 1), 0);
-    fclose(file);
-    assert_int_equal(bst_json_load(&ctx, path, &json), BST_ERR_FORMAT);
-    snprintf(expected, sizeof expected,
-             "%s: 67108865 bytes are too many for a scenario (allowed: 67108864)", path);
-    assert_string_equal(ctx.message, expected);
-
-    file = fopen(path, "w");
+    char path[] = "/tmp/boresight_json_XXXXXX";
+    FILE *file = fdopen(mkstemp(path), "w");
     assert_non_null(file);
     fputs("{\"a\": 3}\n", file);
     fclose(file);
+    bst_ctx ctx = {0};
+    bst_json *json = NULL;
     bst_assert_ok(&ctx, bst_json_load(&ctx, path, &json));
     assert_string_equal(bst_json_name(json), path);
     assert_true(cJSON_HasObjectItem(bst_json_root(json), "a"));
     bst_json_free(json);
     unlink(path);
-    rmdir(folder);
 }
 
 static bst_status set(bst_ctx *ctx, const char *assignment, char *result, size_t bytes) {

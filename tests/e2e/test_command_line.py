@@ -68,9 +68,9 @@ class Messages(unittest.TestCase):
         self.bad_set(GIMBAL + "/rate_hz=999", f": {GIMBAL}/rate_hz: .*857.142857 and 1000 Hz")
         self.bad_set(GIMBAL + "/platform/jitter_high_band_hz=[5]", r": .*/platform/jitter_high_band_hz: wrong type \(found \[5\]; "
                      "allowed: an array of 2 numbers")
-        self.bad_set("/world/objects/0/orbit/norad=1", ": /world/objects/0/orbit/tle_file: .*no element set of satellite 1, ")
-        self.bad_set("/world/objects/0/orbit/tle_file=none.tle",
-                     ": /world/objects/0/orbit/tle_file: .*none.tle: cannot be opened")
+        self.bad_set("/world/objects/0/orbit/norad=1", ": /world/objects/0/orbit/elements_file: .*no element set of satellite 1, ")
+        self.bad_set("/world/objects/0/orbit/elements_file=none.tle",
+                     ": /world/objects/0/orbit/elements_file: .*none.tle: cannot be opened")
         self.bad_set(runs.SENSOR + "/modules/imgproc={\"type\": \"standard\", \"delay_s\": "
                      "{\"frames\": 1}}", ": .*/imgproc/delay_s/frames: not an input .*allowed: frame")
 

@@ -29,7 +29,7 @@ import numpy as np
 import runs
 
 MAIN = {"name": "INMARSAT GX5", "area_m2": 4, "albedo": 0.25,
-        "orbit": {"source": "sgp4", "tle_file": "catalogue_2022-06.tle", "norad": 44801}}
+        "orbit": {"source": "sgp4", "elements_file": "catalogue_2022-06.tle", "norad": 44801}}
 # the true SNR is proportional to the area: 35.7 with 4 m2 at 60 s, 36.2 on average over 300 s
 SNR6_AREA_M2 = 0.664
 PIXEL_RAD = np.radians(3 / 3600)

@@ -88,7 +88,7 @@ static void run(const char *exposure, const char *module_block, const char *extr
     static const char format[] =
         "{\"boresight\": 1, \"epoch_utc\": \"2022-06-16T22:10:00Z\", \"duration_s\": 300, %s"
         "\"world\": {\"star_catalogue\": \"embedded\"}, \"observers\": [{\"name\": \"sat\","
-        "\"orbit\": {\"tle_file\": \"catalogue_2022-06.tle\", \"norad\": 39089},"
+        "\"orbit\": {\"elements_file\": \"catalogue_2022-06.tle\", \"norad\": 39089},"
         "\"sensors\": [{\"name\": \"cam\", \"camera\": {\"width_px\": 640, \"height_px\": 480,"
         "\"pixel_scale_arcsec\": 3, \"aperture_m\": 0.15}, \"exposure\": {%s}, \"modules\": {%s}}]"
         "}]}";

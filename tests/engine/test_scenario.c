@@ -63,7 +63,7 @@ static const bst_module_desc *const modules[] = {&gimbal_a, &gimbal_b, &tracker}
 static const bst_registry registry = {modules, 3};
 
 #define HEAD "\"boresight\": 1, \"epoch_utc\": \"2022-06-16T22:10:00Z\", \"duration_s\": 300"
-#define ORBIT "\"orbit\": {\"tle_file\": \"catalogue_2022-06.tle\", \"norad\": 39089}"
+#define ORBIT "\"orbit\": {\"elements_file\": \"catalogue_2022-06.tle\", \"norad\": 39089}"
 #define CAMERA "\"camera\": {\"pixel_scale_arcsec\": 3, \"aperture_m\": 0.15}"
 #define OBSERVER(name_, sensor_) \
     "{\"name\": \"" name_ "\", " ORBIT ", \"sensors\": [{" sensor_ "}]}"
@@ -95,8 +95,8 @@ static void wrong_modules_are_refused(void **state) {
            "scenarios/x.json: /observers/0/sensors/0/modules/gimbal/type: there is no gimbal of "
            "type \"three_axis\" (allowed: \"two_axis\", \"ideal\")");
     refuse(SCENARIO("\"gimbal\": \"ideal\""),
-           "scenarios/x.json: /observers/0/sensors/0/modules/gimbal: an object with a \"type\" is "
-           "expected");
+           "scenarios/x.json: /observers/0/sensors/0/modules/gimbal: wrong type (found \"ideal\"; "
+           "allowed: an object with a \"type\")");
     refuse(SCENARIO("\"gimbal\": {}"),
            "scenarios/x.json: /observers/0/sensors/0/modules/gimbal/type: missing; it is required: "
            "Which of the alternatives is used.");
@@ -104,7 +104,8 @@ static void wrong_modules_are_refused(void **state) {
            "scenarios/x.json: /observers/0/sensors/0/modules/gimbal/size: missing; it is required: "
            "Size.");
     refuse("{" HEAD ", \"observers\": [" OBSERVER("sat", CAMERA ", \"modules\": []") "]}",
-           "scenarios/x.json: /observers/0/sensors/0/modules: an object is expected");
+           "scenarios/x.json: /observers/0/sensors/0/modules: wrong type (found []; allowed: an "
+           "object)");
     refuse(SCENARIO("\"gimbal\": {\"type\": \"two_axis\", \"size\": 2, \"parts\": [{\"weight\": "
                     "1}, {\"weight\": 11}]}"),
            "scenarios/x.json: /observers/0/sensors/0/modules/gimbal/parts/1/weight: out of range "
@@ -129,9 +130,13 @@ static void wrong_times_are_refused(void **state) {
     refuse(SCENARIO(GIMBAL "\"delay_s\": {\"nav_telemetry\": 1}}"), PATH
            "/delay_s/nav_telemetry: not an input of this module (allowed: los_command, tracks)");
     refuse(SCENARIO(GIMBAL "\"delay_s\": {\"tracks\": -1}}"),
-           PATH "/delay_s/tracks: a number of seconds from 0 to 1e6 is expected");
+           PATH "/delay_s/tracks: out of range (found -1; allowed: a number from 0 to 1e6 s)");
     refuse(SCENARIO(GIMBAL "\"delay_s\": {\"tracks\": \"1\"}}"),
-           PATH "/delay_s/tracks: a number of seconds from 0 to 1e6 is expected");
+           PATH "/delay_s/tracks: wrong type (found \"1\"; allowed: a number from 0 to 1e6 s)");
+    refuse(SCENARIO(GIMBAL "\"delay_s\": [1]}"),
+           PATH "/delay_s: wrong type (found [1]; allowed: an object of seconds by channel)");
+    refuse(SCENARIO(GIMBAL "\"delay_s\": 1}"),
+           PATH "/delay_s: wrong type (found 1; allowed: an object of seconds by channel)");
     refuse(SCENARIO(GIMBAL "\"delay_s\": {\"tracks\": 0.00005}}"), PATH
            "/delay_s/tracks: a time of 5e-05 s is no whole number of ticks at 6000 Hz; the "
            "nearest that are 0 and 0.000166666666667 s");
@@ -151,7 +156,7 @@ static void missing_keys_and_names_are_refused(void **state) {
         "{\"epoch_utc\": \"2022-06-16T22:10:00Z\", \"duration_s\": 1" REST,
         "scenarios/x.json: /boresight: missing; it is required: Version of the scenario format.");
     refuse("{\"boresight\": 2, \"epoch_utc\": \"2022-06-16T22:10:00Z\", \"duration_s\": 1" REST,
-           "scenarios/x.json: /boresight: out of range (found 2; allowed: an integer from 1 to 1)");
+           "scenarios/x.json: /boresight: out of range (found 2; allowed: 1)");
     refuse("{\"boresight\": 1, \"duration_s\": 1" REST,
            "scenarios/x.json: /epoch_utc: missing; it is required: Start of the simulated time, "
            "UTC: YYYY-MM-DDThh:mm:ss[.f]Z.");
@@ -243,7 +248,7 @@ static void paths_are_made_absolute(void **state) {
     /* relative to the scenario's folder, not to ours */
     bst_assert_ok(&ctx, read_named(&ctx, "scenarios/x.json", SCENARIO(""), &s));
     o = s.observers.items;
-    assert_string_equal(o->orbit.tle_file, expected);
+    assert_string_equal(o->orbit.elements_file, expected);
     assert_string_equal(s.world.star_catalogue, "default"); /* words stay words */
     assert_string_equal(s.world.earth_orientation, "builtin");
     bst_scenario_free(&s);
@@ -264,7 +269,7 @@ static void paths_are_made_absolute(void **state) {
     /* a file that is not there is left to those who open it */
     bst_assert_ok(&ctx, read_named(&ctx, "x.json", SCENARIO(""), &s));
     o = s.observers.items;
-    assert_string_equal(o->orbit.tle_file, "catalogue_2022-06.tle");
+    assert_string_equal(o->orbit.elements_file, "catalogue_2022-06.tle");
     bst_scenario_free(&s);
 
     /* deep down in the file system, so that the full path does not fit */
@@ -286,7 +291,7 @@ static void paths_are_made_absolute(void **state) {
     assert_int_equal(read_named(&ctx, "x.json", SCENARIO(""), &s), BST_ERR_CONFIG);
     assert_non_null(realpath("catalogue_2022-06.tle", expected));
     snprintf(message, sizeof message,
-             "x.json: /observers/0/orbit/tle_file: the full path of \"catalogue_2022-06.tle\" is "
+             "x.json: /observers/0/orbit/elements_file: the full path of \"catalogue_2022-06.tle\" is "
              "%zu bytes long (allowed: 511); move the file",
              strlen(expected));
     assert_string_equal(ctx.message, message);

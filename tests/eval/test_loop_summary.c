@@ -300,7 +300,7 @@ static void without_a_target_every_track_is_wrong(void **state) {
     (void)state;
     for (int k = 0; k < 2; k++) {
         scene *s = open_scene(GX5
-                              ", {\"name\": \"gone\", \"orbit\": {\"tle_file\": "
+                              ", {\"name\": \"gone\", \"orbit\": {\"elements_file\": "
                               "\"tests/world/data/decayed.tle\", \"norad\": 28872}}",
                               k == 0 ? -1 : 1);
         for (int id = 0; id < 5; id++) {

@@ -56,7 +56,8 @@ static void wrong_maps_are_refused(void **state) {
     static const char *const keys[] = {"dark_file", "flat_file", "bad_pixel_file"};
     for (int i = 0; i < 3; i++) {
         snprintf(files[i], 512, "%.511s", scratch_path(&f.place, "absent.fits"));
-        refuse(&f, BST_ERR_IO, keys[i], files[i], "cannot be read: could not open the named file");
+        refuse(&f, BST_ERR_NOT_FOUND, keys[i], files[i],
+               "cannot be opened: No such file or directory; give a FITS file");
         char name[16];
         snprintf(name, sizeof name, "turned%d", i);
         snprintf(files[i], 512, "%.511s", write_map(&f.place, name, f.map, 2, 3));
@@ -96,10 +97,10 @@ static void the_module_says_which_file(void **state) {
     bench_init(&b);
     onboard_add_telemetry(&b.o, 0, 0);
     bst_assert_ok(&b.o.ctx, bench_configure(&b, "{\"flat_file\": \"absent.fits\"}"));
-    assert_int_equal(bench_load(&b, 1000, 1000, false), BST_ERR_IO);
+    assert_int_equal(bench_load(&b, 1000, 1000, false), BST_ERR_NOT_FOUND);
     assert_string_equal(b.o.ctx.message,
-                        "imgproc: flat_file: absent.fits: cannot be read: could not open the named "
-                        "file");
+                        "imgproc: flat_file: absent.fits: cannot be opened: No such file or "
+                        "directory; give a FITS file");
     bench_free(&b);
 }
 

@@ -68,7 +68,7 @@ static bst_world *make_world(bst_ctx *ctx) {
     bst_json_free(json);
     bst_assert_ok(ctx, bst_config_defaults(ctx, bst_world_config_table, &world));
     snprintf(world.star_catalogue, sizeof world.star_catalogue, "embedded");
-    snprintf(observer.orbit.tle_file, sizeof observer.orbit.tle_file, "observer.tle");
+    snprintf(observer.orbit.elements_file, sizeof observer.orbit.elements_file, "observer.tle");
     observer.orbit.norad = 39089;
     observer.sensors = (bst_config_list){&sensor, 1};
     bst_config_list observers = {&observer, 1};

@@ -97,6 +97,70 @@ static void images_agree_with_the_reference(void **state) {
     free(stars);
 }
 
+/* Rotation and distortion: 20 % in the corner, pincushion and barrel, stars and a moving object
+ * against the reference, which projects every instant. */
+static void distorted_images_agree_with_the_reference(void **state) {
+    fixture *f = *state;
+    const double signs[] = {1.0, -1.0};
+    for (int i = 0; i < 2; i++) {
+        bst_camera camera = scene_camera(192, 160);
+        double corner = 125.0 * bst_camera_scale_rad(&camera);
+        camera.rotation_deg = 30.0;
+        camera.distortion.k1 = signs[i] * 0.2 / (corner * corner);
+        camera.distortion.p2 = 0.01 / corner;
+        camera.boresight_offset_px[0] = -3.5;
+        if (signs[i] < 0.0) {
+            camera.distortion.k1 *= 0.5; /* 10 %: a barrel of 20 % nearly folds */
+        }
+        bst_assert_ok(&f->ctx, bst_camera_prepare(&f->ctx, &camera));
+        enum { STARS = 14 };
+        bst_source *stars = scene_stars(&camera, STARS, 1e6, 5.0, 9);
+        /* the last is an object that crosses the field by itself */
+        bst_source *object = &stars[STARS - 1];
+        object->kind = BST_SOURCE_OBJECT;
+        object->electrons_per_s = 3e5;
+        object->apparent_start = bst_camera_unproject(&camera, 30.0, 60.0);
+        object->apparent_mid = bst_camera_unproject(&camera, 90.0, 75.0);
+        object->apparent_end = bst_camera_unproject(&camera, 140.0, 100.0);
+        bst_assert_close(error_sigma(f, &camera, &demo, stars, STARS, 1.0), 0.0, 0.05);
+        scene_motion fast = {.x_px = 60.0,
+                             .y_px = 35.0,
+                             .roll_rad = 0.02,
+                             .jitter_px = 0.15,
+                             .duration_s = 0.5,
+                             .samples = 501};
+        bst_assert_close(error_sigma(f, &camera, &fast, stars, STARS, 1.0), 0.0, 0.05);
+        scene_motion sparse = {.x_px = 60.0, .y_px = -20.0, .duration_s = 0.5, .samples = 2};
+        bst_assert_close(error_sigma(f, &camera, &sparse, stars, STARS, 1.0), 0.0, 0.05);
+        free(stars);
+    }
+}
+
+/* All light of a source arrives, wherever distortion puts it. */
+static void distortion_keeps_the_light(void **state) {
+    fixture *f = *state;
+    bst_camera camera = scene_camera(192, 160);
+    double corner = 125.0 * bst_camera_scale_rad(&camera);
+    camera.rotation_deg = -75.0;
+    camera.distortion.k1 = 0.3 / (corner * corner);
+    bst_assert_ok(&f->ctx, bst_camera_prepare(&f->ctx, &camera));
+    bst_source star = scene_star(&camera, 165.25, 130.5, 1e5);
+    scene_track track = scene_track_make(&camera, &demo);
+    bst_renderer *r = make(f, &camera, NULL);
+    bst_render_request q = {
+        .window = {0, 0, 192, 160}, .track = &track.track, .sources = &star, .count = 1};
+    static float image[192 * 160];
+    bst_assert_ok(&f->ctx, bst_renderer_render_noise_free(&f->ctx, r, &q, image));
+    double sum = 0.0;
+    for (int i = 0; i < 192 * 160; i++) {
+        sum += (double)image[i];
+    }
+    /* 5e4 electrons; the stamp leaves out 0.015 of 8 e per pixel over some hundred pixels */
+    bst_assert_close(sum, 5e4, 10.0);
+    bst_renderer_free(r);
+    scene_track_free(&track);
+}
+
 /* Stamps over several vectors, a star far over the full well, and a PSF narrower than a pixel. */
 static void wide_narrow_and_bright(void **state) {
     fixture *f = *state;
@@ -363,6 +427,8 @@ static void wrong_requests_and_cameras_are_refused(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(images_agree_with_the_reference),
+        cmocka_unit_test(distorted_images_agree_with_the_reference),
+        cmocka_unit_test(distortion_keeps_the_light),
         cmocka_unit_test(wide_narrow_and_bright),
         cmocka_unit_test(moving_objects_have_their_own_tracks),
         cmocka_unit_test(bytes_do_not_depend_on_how_they_are_made),

@@ -354,7 +354,7 @@ static void the_earth_hides_stars(void **state) {
 static void what_came_down_is_not_there(void **state) {
     (void)state;
     scene s = make_scene(
-        "{\"name\": \"gone\", \"orbit\": {\"tle_file\": "
+        "{\"name\": \"gone\", \"orbit\": {\"elements_file\": "
         "\"tests/world/data/decayed.tle\", \"norad\": 28872}}, " GX5);
     fill(&s, 0, 0, 0, 0);
     query(&s, 3000, full);

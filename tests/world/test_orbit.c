@@ -178,8 +178,9 @@ static void burns_add_up(void **state) {
                                               ", \"sensors\": [{" TEST_CAMERA "}]}]}",
             &world),
         BST_ERR_CONFIG);
-    assert_string_equal(
-        ctx.message, "test: /world/objects/1/burns/1/time_s: burns must be in the order of time");
+    assert_string_equal(ctx.message,
+                        "test: /world/objects/1/burns/1/time_s: burns must be in the order of time "
+                        "(found 99 after 100)");
 }
 
 static void refuse(const char *epoch, const char *objects, const char *sensor,
@@ -203,14 +204,14 @@ static void wrong_worlds_are_refused(void **state) {
     refuse(TEST_EPOCH, GX5 ", " GX5, "",
            "test: /world/objects/1/name: \"GX5\" is the name of /world/objects/0 too");
     refuse(TEST_EPOCH, "{\"name\": \"a\", \"orbit\": {}}", "",
-           "test: /world/objects/0/orbit: source \"sgp4\" needs \"tle_file\" and \"norad\"");
+           "test: /world/objects/0/orbit: source \"sgp4\" needs \"elements_file\" and \"norad\"");
     refuse(TEST_EPOCH,
-           "{\"name\": \"a\", \"orbit\": {\"tle_file\": \"nowhere.tle\", \"norad\": 5}}", "",
-           "test: /world/objects/0/orbit/tle_file: nowhere.tle");
+           "{\"name\": \"a\", \"orbit\": {\"elements_file\": \"nowhere.tle\", \"norad\": 5}}", "",
+           "test: /world/objects/0/orbit/elements_file: nowhere.tle");
     refuse(TEST_EPOCH,
-           "{\"name\": \"a\", \"orbit\": {\"tle_file\": \"scenarios/catalogue_2022-06.tle\", "
+           "{\"name\": \"a\", \"orbit\": {\"elements_file\": \"scenarios/catalogue_2022-06.tle\", "
            "\"norad\": 5}}",
-           "", "test: /world/objects/0/orbit/tle_file: scenarios/catalogue_2022-06.tle");
+           "", "test: /world/objects/0/orbit/elements_file: scenarios/catalogue_2022-06.tle");
     refuse(TEST_EPOCH,
            "{\"name\": \"a\", \"orbit\": {\"source\": \"relative\", \"reference\": \"GX5\"}}, " GX5,
            "",

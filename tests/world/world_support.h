@@ -17,8 +17,9 @@ static const bst_config_desc test_scene_table[] = {
     BST_CONFIG_END};
 
 #define TEST_NEOSSAT \
-    "\"orbit\": {\"tle_file\": \"scenarios/catalogue_2022-06.tle\", \"norad\": 39089}"
-#define TEST_GX5 "\"orbit\": {\"tle_file\": \"scenarios/catalogue_2022-06.tle\", \"norad\": 44801}"
+    "\"orbit\": {\"elements_file\": \"scenarios/catalogue_2022-06.tle\", \"norad\": 39089}"
+#define TEST_GX5 \
+    "\"orbit\": {\"elements_file\": \"scenarios/catalogue_2022-06.tle\", \"norad\": 44801}"
 #define TEST_CAMERA                                                                       \
     "\"camera\": {\"pixel_scale_arcsec\": 3, \"aperture_m\": 0.15, \"throughput\": 0.7, " \
     "\"quantum_efficiency\": 0.7, \"photon_flux_v0_per_s_m2\": 3.6e10, "                  \

@@ -1,0 +1,25 @@
+/* What the parts of the JSON reader share. */
+#ifndef BST_CORE_JSON_INTERNAL_H
+#define BST_CORE_JSON_INTERNAL_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+enum {
+    BST_JSON_MAX_DEPTH = 64,
+    /* cJSON takes about 80 bytes for each, so that any text stays below 1 GiB */
+    BST_JSON_MAX_VALUES = 8000000,
+};
+
+/* Why and where a text is not the JSON that is read here. */
+typedef struct bst_json_fault {
+    size_t offset;  /* byte in the text */
+    char what[240]; /* "... (found ...; allowed: ...)" */
+} bst_json_fault;
+
+/* Whether a text is one JSON value in UTF-8 (RFC 8259 and 3629), without \u0000, lone surrogates,
+ * zero bytes, nesting beyond BST_JSON_MAX_DEPTH and more than BST_JSON_MAX_VALUES values. Takes
+ * time in proportion to bytes, and no memory. */
+bool bst_json_check(const char *text, size_t bytes, bst_json_fault *fault);
+
+#endif

@@ -1,0 +1,203 @@
+/* The world's space objects: those of the list, then those of the catalogues. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/world/world_build.h"
+
+/* One satellite of a catalogue. */
+typedef struct candidate {
+    const bst_elements *set;
+    const bst_catalogue_config *catalogue;
+    double age_s; /* distance of the set's epoch from the scenario's */
+    int catalogue_index, order;
+} candidate;
+
+static int compare_numbers(const void *a, const void *b) {
+    int x = *(const int *)a, y = *(const int *)b;
+    return (x > y) - (x < y);
+}
+
+/* By number, then nearest epoch, then place in the files. */
+static int compare_candidates(const void *a, const void *b) {
+    const candidate *x = a, *y = b;
+    if (x->set->norad != y->set->norad) {
+        return x->set->norad < y->set->norad ? -1 : 1;
+    }
+    if (x->age_s != y->age_s) {
+        return x->age_s < y->age_s ? -1 : 1;
+    }
+    return x->order - y->order;
+}
+
+static int compare_order(const void *a, const void *b) {
+    return ((const candidate *)a)->order - ((const candidate *)b)->order;
+}
+
+static bst_status reserve(const bst_world_builder *b, int capacity) {
+    bst_world *world = b->world;
+    world->objects = calloc((size_t)capacity + 1, sizeof *world->objects);
+    if (!world->objects) {
+        return bst_fail(b->ctx, BST_ERR_MEMORY, "out of memory for %d objects", capacity);
+    }
+    return bst_name_index_create(b->ctx, capacity, &world->object_names);
+}
+
+static bst_status build_listed(const bst_world_builder *b, const bst_config_list *list) {
+    bst_world *world = b->world;
+    const bst_object_config *configs = list->items;
+    for (int i = 0; i < list->count; i++) {
+        const bst_object_config *config = &configs[i];
+        world_object *object = &world->objects[i];
+        int same = bst_world_find_object(world, config->name);
+        if (same >= 0) {
+            return bst_fail(
+                b->ctx, BST_ERR_CONFIG,
+                "%s: /world/objects/%d/name: \"%s\" is the name of /world/objects/%d too",
+                b->scenario, i, config->name, same);
+        }
+        memcpy(object->info.name, config->name, sizeof object->info.name);
+        object->info.area_m2 = config->area_m2;
+        object->info.albedo = config->albedo;
+        char path[64];
+        snprintf(path, sizeof path, "/world/objects/%d/orbit", i);
+        world->object_count = i + 1;
+        BST_TRY(bst_orbit_build(b, &config->orbit, &config->burns, path, object->info.name,
+                                &object->orbit, &object->info.norad));
+        bst_name_index_add(world->object_names, object->info.name, i);
+    }
+    return BST_OK;
+}
+
+/* The name in the file, with the number where it is empty or taken. */
+static void name_object(const bst_world *world, const bst_elements *set, bst_object_info *info) {
+    snprintf(info->name, sizeof info->name, "%s", set->name);
+    if (!*info->name || bst_world_find_object(world, info->name) >= 0) {
+        snprintf(info->name, sizeof info->name, "%s %d", *set->name ? set->name : "NORAD",
+                 set->norad);
+    }
+}
+
+/* Sets that SGP4 cannot start from are left out and counted: a catalogue of thousands has some. */
+static bst_status build_candidates(const bst_world_builder *b, const candidate *list, int count) {
+    bst_world *world = b->world;
+    int unusable = 0, example = 0;
+    for (int i = 0; i < count; i++) {
+        world_object *object = &world->objects[world->object_count];
+        name_object(world, list[i].set, &object->info);
+        if (bst_world_find_object(world, object->info.name) >= 0) {
+            return bst_fail(b->ctx, BST_ERR_CONFIG,
+                            "%s: /world/catalogues/%d: \"%s\" is the name of another object",
+                            b->scenario, list[i].catalogue_index, object->info.name);
+        }
+        bst_status status = bst_orbit_build_sgp4(b, list[i].set, object->info.name, &object->orbit);
+        if (status == BST_ERR_NUMERIC || status == BST_ERR_ARGUMENT) {
+            example = unusable++ ? example : list[i].set->norad;
+            memset(object, 0, sizeof *object);
+            continue;
+        }
+        world->object_count++;
+        BST_TRY(status);
+        object->info.norad = list[i].set->norad;
+        object->info.area_m2 = list[i].catalogue->area_m2;
+        object->info.albedo = list[i].catalogue->albedo;
+        bst_name_index_add(world->object_names, object->info.name, world->object_count - 1);
+    }
+    if (unusable > 0) {
+        bst_log(b->ctx, BST_LOG_WARNING,
+                "%s: /world/catalogues: %d element sets cannot be propagated and are left out "
+                "(the first: satellite %d)",
+                b->scenario, unusable, example);
+    }
+    return BST_OK;
+}
+
+/* Leaves one candidate per satellite, none of those that are listed, in the order of the files. */
+static int choose(candidate *list, int count, const int *listed, int listed_count) {
+    qsort(list, (size_t)count, sizeof *list, compare_candidates);
+    int kept = 0;
+    for (int i = 0; i < count; i++) {
+        int norad = list[i].set->norad;
+        bool again = kept > 0 && list[kept - 1].set->norad == norad;
+        if (!again &&
+            !bsearch(&norad, listed, (size_t)listed_count, sizeof norad, compare_numbers)) {
+            list[kept++] = list[i];
+        }
+    }
+    qsort(list, (size_t)kept, sizeof *list, compare_order);
+    return kept;
+}
+
+/* The element sets of the catalogues as they come. */
+typedef struct catalogue_sets {
+    bst_elements *sets[16];
+    int count[16];
+    int catalogues, total;
+} catalogue_sets;
+
+static bst_status load_sets(const bst_world_builder *b, const bst_config_list *catalogues,
+                            catalogue_sets *out) {
+    const bst_catalogue_config *configs = catalogues->items;
+    for (int i = 0; i < catalogues->count; i++) {
+        bst_world_path file = bst_world_path_join(b, configs[i].elements_file);
+        bst_elements_options options = {.norad = 0};
+        bst_status status =
+            bst_elements_load(b->ctx, file.text, &options, &out->sets[i], &out->count[i]);
+        out->catalogues = i + 1;
+        if (status != BST_OK) {
+            return bst_fail_prefix(b->ctx, BST_ERR_CONFIG, "%s: /world/catalogues/%d/elements_file",
+                                   b->scenario, i);
+        }
+        out->total += out->count[i];
+    }
+    return BST_OK;
+}
+
+static bst_status list_candidates(const bst_world_builder *b, const bst_config_list *catalogues,
+                                  const catalogue_sets *loaded, candidate *list) {
+    int n = 0;
+    for (int i = 0; i < loaded->catalogues; i++) {
+        for (int k = 0; k < loaded->count[i]; k++, n++) {
+            const bst_elements *set = &loaded->sets[i][k];
+            bst_time epoch;
+            BST_TRY(bst_time_from_utc_jd(b->ctx, set->epoch_utc_jd1, set->epoch_utc_jd2, &epoch));
+            list[n] = (candidate){.set = set,
+                                  .catalogue = (const bst_catalogue_config *)catalogues->items + i,
+                                  .age_s = fabs(bst_time_diff(b->world->epoch, epoch)),
+                                  .catalogue_index = i,
+                                  .order = n};
+        }
+    }
+    return BST_OK;
+}
+
+static bst_status build_all(const bst_world_builder *b, const bst_world_config *config,
+                            const catalogue_sets *loaded, candidate *list, int *listed) {
+    BST_TRY(reserve(b, config->objects.count + loaded->total));
+    BST_TRY(build_listed(b, &config->objects));
+    for (int i = 0; i < b->world->object_count; i++) {
+        listed[i] = b->world->objects[i].info.norad;
+    }
+    qsort(listed, (size_t)b->world->object_count, sizeof *listed, compare_numbers);
+    BST_TRY(list_candidates(b, &config->catalogues, loaded, list));
+    int count = choose(list, loaded->total, listed, b->world->object_count);
+    return build_candidates(b, list, count);
+}
+
+bst_status bst_world_build_objects(const bst_world_builder *b, const bst_world_config *config) {
+    catalogue_sets loaded = {.total = 0};
+    bst_status status = load_sets(b, &config->catalogues, &loaded);
+    if (status == BST_OK) {
+        candidate *list = calloc((size_t)loaded.total + 1, sizeof *list);
+        int *listed = calloc((size_t)config->objects.count + 1, sizeof *listed);
+        status = list && listed ? build_all(b, config, &loaded, list, listed)
+                                : bst_fail(b->ctx, BST_ERR_MEMORY,
+                                           "out of memory for %d element sets", loaded.total);
+        free(list);
+        free(listed);
+    }
+    for (int i = 0; i < loaded.catalogues; i++) {
+        free(loaded.sets[i]);
+    }
+    return status;
+}

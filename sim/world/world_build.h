@@ -1,0 +1,40 @@
+/* Making a world from its configuration; shared by the files of sim/world only. */
+#ifndef BST_WORLD_WORLD_BUILD_H
+#define BST_WORLD_WORLD_BUILD_H
+
+#include "sim/world/world_internal.h"
+
+typedef struct bst_world_builder {
+    bst_ctx *ctx;
+    const char *scenario; /* file, for messages */
+    const char *base_dir; /* folder that relative paths start from */
+    bst_world *world;     /* being made; its epoch and Earth orientation are there */
+    bst_sky_clock *clock;
+} bst_world_builder;
+
+/* A path that may be relative to the scenario's folder. */
+typedef struct bst_world_path {
+    char text[1100];
+} bst_world_path;
+
+bst_world_path bst_world_path_join(const bst_world_builder *b, const char *path);
+
+/* Makes an orbit of any source. `path` is its place in the scenario ("/observers/0/orbit"), `name`
+ * (borrowed by the orbit) and `burns` belong to the object; a relative orbit may refer to the
+ * world's objects so far. *norad: catalogue number, 0 when there is none. On error the orbit holds
+ * what was made of it, for bst_orbit_free. */
+bst_status bst_orbit_build(const bst_world_builder *b, const bst_orbit_config *config,
+                           const bst_config_list *burns, const char *path, const char *name,
+                           bst_orbit *orbit, int *norad) BST_MUST_CHECK;
+
+/* Makes an sgp4 orbit from an element set. */
+bst_status bst_orbit_build_sgp4(const bst_world_builder *b, const bst_elements *set,
+                                const char *name, bst_orbit *orbit) BST_MUST_CHECK;
+
+void bst_orbit_free(bst_orbit *orbit);
+
+/* Fills world->objects from the list of objects and then from the catalogues. */
+bst_status bst_world_build_objects(const bst_world_builder *b,
+                                   const bst_world_config *config) BST_MUST_CHECK;
+
+#endif

@@ -1,0 +1,149 @@
+/* FITS images that are wrong: calibration maps and other files that cfitsio reads for us. */
+#include "sim/io/fits_image.h"
+#include "tests/bad_input/faults.h"
+
+enum { BLOCK = 2880, CARD = 80 };
+
+static bst_status read_fits(bst_ctx *ctx, const char *path) {
+    int width, height;
+    float *pixels;
+    bst_status status = bst_fits_read_image(ctx, path, &width, &height, &pixels);
+    assert_true((status == BST_OK) == (pixels != NULL));
+    free(pixels);
+    return status;
+}
+
+static const bad_reader reader = {read_fits, "a FITS file", "", 4ull << 30};
+
+static void paths(void **state) {
+    (void)state;
+    bad_paths(&reader);
+}
+
+/* cfitsio's extended file names must not be understood: brackets and pipes are part of the name. */
+static void names_are_names(void **state) {
+    (void)state;
+    static const char *const names[] = {
+        "x.fits[1:2,1:2]",           "x.fits(y.fits)", "mem://x", "-",
+        "http://localhost:1/x.fits", "| cat x",        "x.fits+1"};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        bad_expect_kind(&reader, names[i], BST_ERR_NOT_FOUND,
+                        "cannot be opened: No such file or directory");
+    }
+}
+
+/* One block of cards, padded, and `data_bytes` zero bytes after it. */
+static char *make(const char *const *cards, size_t data_bytes, size_t *bytes) {
+    char *file = calloc(1, BLOCK + data_bytes + 1);
+    assert_non_null(file);
+    memset(file, ' ', BLOCK);
+    for (int i = 0; cards[i]; i++) {
+        memcpy(file + i * CARD, cards[i], strlen(cards[i]));
+    }
+    *bytes = BLOCK + data_bytes;
+    return file;
+}
+
+#define SIMPLE "SIMPLE  =                    T"
+#define TWO_AXES "NAXIS   =                    2"
+#define START ": does not begin as a FITS file does (allowed: FITS, not compressed as a whole)"
+
+static void wrong_contents(void **state) {
+    (void)state;
+    static const struct {
+        const char *cards[8];
+        size_t data_bytes;
+        bst_status status;
+        const char *message;
+    } cases[] = {
+        {{"SIMPLE  =                    F"},
+         0,
+         BST_ERR_IO,
+         ": cannot be read: second keyword not BITPIX"},
+        {{SIMPLE, "BITPIX  =                    8", "NAXIS   =                    0", "END"},
+         0,
+         BST_ERR_FORMAT,
+         ": has no image of two axes"},
+        {{SIMPLE, "BITPIX  =                    7", TWO_AXES, "END"},
+         0,
+         BST_ERR_IO,
+         ": cannot be read: illegal BITPIX keyword value"},
+        {{SIMPLE, "BITPIX  =                    8", TWO_AXES, "NAXIS1  =                   -1",
+          "NAXIS2  =                    1", "END"},
+         BLOCK,
+         BST_ERR_IO,
+         ": cannot be read: illegal NAXISn keyword value"},
+        {{SIMPLE, "BITPIX  =                    8", TWO_AXES, "NAXIS1  =                    0",
+          "NAXIS2  =                    1", "END"},
+         BLOCK,
+         BST_ERR_FORMAT,
+         ": an image of 0 x 1 pixels (allowed: sides of 1 to 32768, at most 268435456 pixels)"},
+        {{SIMPLE, "BITPIX  =                    8", TWO_AXES, "NAXIS1  =                30000",
+          "NAXIS2  =                30000", "END"},
+         BLOCK,
+         BST_ERR_FORMAT,
+         ": an image of 30000 x 30000 pixels (allowed: sides of 1 to 32768, at most 268435456 "
+         "pixels)"},
+        {{SIMPLE, "BITPIX  =                  -64", TWO_AXES, "NAXIS1  =                16384",
+          "NAXIS2  =                16384", "END"},
+         BLOCK,
+         BST_ERR_FORMAT,
+         ": is cut short: an image of 16384 x 16384 pixels of 64 bits that ends at byte "
+         "2147486528 of 5760"},
+        {{SIMPLE, "BITPIX  =                    8", TWO_AXES, "NAXIS1  =   9223372036854775807",
+          "NAXIS2  =   9223372036854775807", "END"},
+         BLOCK,
+         BST_ERR_FORMAT,
+         ": an image of 9223372036854775807 x 9223372036854775807 pixels (allowed: sides of 1 to "
+         "32768, at most 268435456 pixels)"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        size_t bytes;
+        char *file = make(cases[i].cards, cases[i].data_bytes, &bytes);
+        bad_bytes(&reader, file, bytes, cases[i].status, cases[i].message);
+        free(file);
+    }
+    bad_text(&reader, "", BST_ERR_FORMAT, START);
+    bad_text(&reader, "SIMPLE", BST_ERR_FORMAT, START);
+    bad_text(&reader, "\xFF\xFES", BST_ERR_FORMAT, START);
+    bad_bytes(&reader, "\x1F\x8B\x08\0\0\0\0\0\0\3", 10, BST_ERR_FORMAT, START); /* gzip */
+    bad_text(&reader, "PK\3\4", BST_ERR_FORMAT, START);                          /* zip */
+}
+
+static void every_truncation(void **state) {
+    (void)state;
+    static const char *const cards[] = {SIMPLE,
+                                        "BITPIX  =                   16",
+                                        TWO_AXES,
+                                        "NAXIS1  =                   10",
+                                        "NAXIS2  =                    8",
+                                        "END",
+                                        NULL};
+    size_t bytes;
+    char *file = make(cards, BLOCK, &bytes);
+    const size_t needed = BLOCK + 10 * 8 * 2;
+    for (size_t n = 0; n <= bytes; n++) {
+        bst_ctx ctx = {0};
+        int width, height;
+        float *pixels;
+        bst_status status =
+            bst_fits_read_image_buffer(&ctx, "x", file, n, &width, &height, &pixels);
+        if (n < needed) {
+            assert_int_not_equal(status, BST_OK);
+            assert_memory_equal(ctx.message, "x: ", 3);
+        }
+        assert_true((status == BST_OK) == (pixels != NULL));
+        free(pixels);
+    }
+    free(file);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(paths),
+        cmocka_unit_test(names_are_names),
+        cmocka_unit_test(wrong_contents),
+        cmocka_unit_test(every_truncation),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
