@@ -24,7 +24,8 @@ static bst_status check_names(bst_ctx *ctx, const bst_export *e, const char *tab
         bool more = true, known = false;
         char name[64], all[700] = "";
         snprintf(name, sizeof name, "%.*s", (int)strcspn(word, ","), word);
-        BST_TRY(bst_rows_open(ctx, e->run, "SELECT \"table\" FROM tables", 0, 0, &rows));
+        BST_TRY(
+            bst_rows_open(ctx, e->run, "SELECT \"table\" FROM tables ORDER BY rowid", 0, 0, &rows));
         bst_status status = BST_OK;
         while (!known && (status = bst_rows_next(ctx, rows, &more)) == BST_OK && more) {
             known = strcmp(bst_rows_text(rows, 0), name) == 0;
