@@ -148,7 +148,8 @@ bool bst_text_number(bst_text_span span, double *out) {
     if (whole + decimals == 0) {
         return false;
     }
-    if (i < n && (c[i] == 'e' || c[i] == 'E')) {
+    bool has_exponent = i < n && (c[i] == 'e' || c[i] == 'E');
+    if (has_exponent) {
         i++;
         i += i < n && (c[i] == '-' || c[i] == '+');
         size_t exponent = digits_at(c + i, n - i);
@@ -159,6 +160,18 @@ bool bst_text_number(bst_text_span span, double *out) {
     }
     if (i != n) {
         return false;
+    }
+    /* up to 15 digits and a power of ten up to 1e15 are exact, so that one division rounds */
+    static const double tens[] = {1e0, 1e1, 1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
+                                  1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15};
+    if (whole + decimals <= 15 && !has_exponent) {
+        long long digits = 0;
+        for (size_t k = 0; k < n; k++) {
+            digits = is_digit(c[k]) ? 10 * digits + (c[k] - '0') : digits;
+        }
+        double value = (double)digits / tens[decimals];
+        *out = c[0] == '-' ? -value : value;
+        return true;
     }
     /* strtod wants the locale's own decimal point */
     char text[LONGEST + 32];
@@ -197,17 +210,26 @@ int bst_text_split_csv(const bst_text_line *line, char *scratch, bst_text_span *
         }
         bst_text_span field = {c, 0};
         if (c < end && *c == '"') {
+            const char *raw = ++c;
+            bool doubled = false;
             field.text = scratch;
-            for (c++; c < end; c++) {
-                if (*c == '"' && (c + 1 == end || c[1] != '"')) {
-                    break;
+            for (; c < end; c++) {
+                if (*c == '"') {
+                    if (c + 1 == end || c[1] != '"') {
+                        break;
+                    }
+                    doubled = true;
+                    c++;
                 }
-                c += *c == '"';
-                *scratch++ = *c;
-                field.length++;
+                scratch[field.length++] = *c;
             }
             if (c == end) {
                 return -1;
+            }
+            if (doubled) {
+                scratch += field.length;
+            } else {
+                field.text = raw;
             }
             for (c++; c < end && is_blank(*c);) {
                 c++;

@@ -69,9 +69,9 @@ bool bst_text_number(bst_text_span span, double *out);
 bool bst_text_count(bst_text_span span, int maximum, int *out);
 
 /* Splits a line of comma-separated values (RFC 4180; blanks around a field are dropped) into at
- * most `maximum` fields; quoted fields are unquoted into `scratch`, of line->length bytes. Returns
- * how many there are, maximum + 1 when more, or -1 when a quote is not closed or is followed by
- * other text. */
+ * most `maximum` fields. A field with doubled quotes is unquoted into `scratch`, of line->length
+ * bytes; the others are parts of the line. Returns how many there are, maximum + 1 when more, or -1
+ * when a quote is not closed or is followed by other text. */
 int bst_text_split_csv(const bst_text_line *line, char *scratch, bst_text_span *fields,
                        int maximum);
 

@@ -100,6 +100,10 @@ bst_status bst_orbit_build(const bst_world_builder *b, const bst_orbit_config *c
         case BST_ORBIT_SGP4:
             BST_TRY(build_sgp4(b, config, path, name, orbit, norad));
             break;
+        case BST_ORBIT_OEM:
+        case BST_ORBIT_INJECTED:
+            BST_TRY(bst_orbit_build_file(b, config, path, orbit));
+            break;
         default:
             BST_TRY(build_relative(b, config, path, orbit));
     }
