@@ -37,6 +37,10 @@ bst_status bst_orbit_build_file(const bst_world_builder *b, const bst_orbit_conf
 
 /* Closes the files that orbits came from. */
 void bst_world_files_free(bst_world *world);
+/* Makes a numerical orbit; called by bst_orbit_build, arguments as there. */
+bst_status bst_orbit_build_numerical(const bst_world_builder *b, const bst_orbit_config *config,
+                                     const bst_config_list *burns, const char *path,
+                                     const char *name, bst_orbit *orbit, int *norad) BST_MUST_CHECK;
 
 void bst_orbit_free(bst_orbit *orbit);
 

@@ -2,7 +2,8 @@
 
 #include "sim/astro/elements.h"
 
-static const char *const orbit_sources[] = {"sgp4", "relative", "oem", "injected", NULL};
+static const char *const orbit_sources[] = {"sgp4",     "relative",  "oem",
+                                            "injected", "numerical", NULL};
 static const char *const states_frames[] = {"gcrf", "teme", NULL};
 static const char *const faint_kinds[] = {"none", "statistical", NULL};
 static const char *const axes[] = {"x", "-x", "y", "-y", NULL};
@@ -11,7 +12,7 @@ static const bst_config_desc orbit_table[] = {
     BST_ENUM(
         bst_orbit_config, source, orbit_sources, "\"sgp4\"",
         "Where the orbit comes from: an element set, another object plus an offset, an ephemeris "
-        "file, or states given per frame."),
+        "file, states given per frame, or numerical integration from a state."),
     BST_PATH(bst_orbit_config, elements_file, "\"\"",
              "sgp4: file of element sets (TLE, or OMM as JSON or CSV), relative to the scenario's "
              "folder."),
@@ -36,11 +37,19 @@ static const bst_config_desc orbit_table[] = {
                "injected: the object in that file; empty: its only one."),
     BST_ENUM(bst_orbit_config, states_frame, states_frames, "\"gcrf\"",
              "injected: axes of the states, GCRF or true equator and mean equinox of date."),
+    BST_OBJECT(bst_orbit_config, state, bst_initial_state_table, "{}",
+               "numerical: what it starts from."),
+    BST_OBJECT(bst_orbit_config, forces, bst_force_table, "{}", "numerical: what acts on it."),
+    BST_OBJECT(bst_orbit_config, spacecraft, bst_spacecraft_table, "{}",
+               "numerical: what drag and solar pressure act on."),
     BST_CONFIG_END,
 };
 
 static const bst_config_desc burn_table[] = {
-    BST_REAL(bst_burn_config, time_s, "s", -1e9, 1e9, NULL, "Time of the impulse after the epoch."),
+    BST_REAL(bst_burn_config, time_s, "s", -1e9, 1e9, NULL, "Time of the burn after the epoch."),
+    BST_REAL(bst_burn_config, duration_s, "s", 0, 1e9, "0",
+             "How long it lasts from then on, thrust constant in axes that turn with the orbit; 0: "
+             "an impulse. Above 0 for numerical orbits only."),
     BST_REALS(bst_burn_config, dv_rtn_mps, "m/s", -1e5, 1e5, NULL,
               "Change of velocity along radius, transverse and normal."),
     BST_CONFIG_END,
@@ -54,7 +63,7 @@ static const bst_config_desc object_table[] = {
     BST_REAL(bst_object_config, albedo, "", 0, 1, "0.25",
              "Diffuse albedo of the sphere; 0 makes it dark."),
     BST_LIST(bst_object_config, burns, bst_burn_config, burn_table, 0, 64, "[]",
-             "Impulsive burns in the order of time. The cue does not know of them."),
+             "Burns in the order of time. The cue does not know of them."),
     BST_CONFIG_END,
 };
 
@@ -199,7 +208,7 @@ const bst_config_desc bst_observer_config_table[] = {
     BST_STRING(bst_observer_config, name, NULL, "Name, unique in the scenario."),
     BST_OBJECT(bst_observer_config, orbit, orbit_table, NULL, "The observer's orbit."),
     BST_LIST(bst_observer_config, burns, bst_burn_config, burn_table, 0, 64, "[]",
-             "Impulsive burns in the order of time."),
+             "Burns in the order of time."),
     BST_LIST(bst_observer_config, sensors, bst_sensor_config, bst_sensor_config_table, 1, 16, NULL,
              "Its sensors."),
     BST_CONFIG_END,

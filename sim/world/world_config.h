@@ -6,9 +6,31 @@
 #include "sim/core/config.h"
 #include "sim/world/camera.h"
 
-enum { BST_ORBIT_SGP4, BST_ORBIT_RELATIVE, BST_ORBIT_OEM, BST_ORBIT_INJECTED };
+enum { BST_ORBIT_SGP4, BST_ORBIT_RELATIVE, BST_ORBIT_OEM, BST_ORBIT_INJECTED, BST_ORBIT_NUMERICAL };
 
 enum { BST_STATES_GCRF, BST_STATES_TEME };
+
+enum { BST_STATE_CARTESIAN, BST_STATE_KEPLERIAN, BST_STATE_ELEMENT_SET, BST_STATE_RELATIVE };
+
+typedef struct bst_initial_state_config {
+    int32_t from; /* BST_STATE_... */
+    double at_s;
+    double position_gcrf_m[3], velocity_gcrf_mps[3];
+    double perigee_radius_m, eccentricity;
+    double inclination_deg, raan_deg, arg_perigee_deg, true_anomaly_deg;
+} bst_initial_state_config;
+
+typedef struct bst_force_config {
+    char gravity[512]; /* "builtin", "two_body", "j6" or a path as below */
+    int64_t degree, order;
+    bool sun, moon, solar_pressure, drag;
+    double density_scale;
+    double tolerance;
+} bst_force_config;
+
+typedef struct bst_spacecraft_config {
+    double mass_kg, drag_area_m2, cd, srp_area_m2, cr;
+} bst_spacecraft_config;
 
 typedef struct bst_orbit_config {
     int32_t source;          /* BST_ORBIT_... */
@@ -24,10 +46,15 @@ typedef struct bst_orbit_config {
     char states_file[512]; /* injected: path as above */
     char states_object[64];
     int32_t states_frame; /* BST_STATES_... */
+    /* numerical */
+    bst_initial_state_config state;
+    bst_force_config forces;
+    bst_spacecraft_config spacecraft;
 } bst_orbit_config;
 
 typedef struct bst_burn_config {
     double time_s;
+    double duration_s; /* 0: an impulse */
     double dv_rtn_mps[3];
 } bst_burn_config;
 
@@ -115,6 +142,9 @@ typedef struct bst_observer_config {
     bst_config_list sensors; /* bst_sensor_config */
 } bst_observer_config;
 
+extern const bst_config_desc bst_initial_state_table[];
+extern const bst_config_desc bst_force_table[];
+extern const bst_config_desc bst_spacecraft_table[];
 extern const bst_config_desc bst_world_config_table[];
 extern const bst_config_desc bst_observer_config_table[];
 extern const bst_config_desc bst_sensor_config_table[];
@@ -133,6 +163,11 @@ bst_status bst_world_create(bst_ctx *ctx, const char *scenario, const bst_world_
 bst_status bst_world_check_spans(bst_ctx *ctx, const char *scenario, const struct bst_world *world,
                                  double duration_s) BST_MUST_CHECK;
 void bst_world_free(struct bst_world *world);
+
+/* Before the first frame, and before the world is shared: lets the work on thousands of orbits be
+ * done by `threads` threads (0: one per processor) and does what can be done ahead. Optional;
+ * changes no value. */
+bst_status bst_world_prepare(bst_ctx *ctx, struct bst_world *world, int threads) BST_MUST_CHECK;
 
 /* The onboard knowledge of one sensor; equal to the truth where the scenario says nothing else. */
 bst_status bst_knowledge_create(bst_ctx *ctx, const struct bst_world *world, int observer,
