@@ -22,7 +22,8 @@ typedef struct bst_table bst_table;
  * the run finishes, and only if it is an empty folder or holds a run (manifest.json or run.sqlite).
  * A .partial that a dead run left is logged as a warning and replaced; one that a living process
  * still writes (it holds a lock on it) is refused.
- * Errors: BST_ERR_IO with the path and the system's reason; BST_ERR_ARGUMENT for an empty path. */
+ * Errors, which leave nothing behind: BST_ERR_IO with the path and the system's reason;
+ * BST_ERR_ARGUMENT for an empty path. */
 bst_status bst_run_create(bst_ctx *ctx, const char *out_path, bool overwrite,
                           bst_run **out) BST_MUST_CHECK;
 
