@@ -8,17 +8,18 @@
 /* Knots of the polynomial, and those that its error is estimated from: its own and one more on
  * either side. */
 enum { POINTS = 10, CHECKED = POINTS + 2, BEFORE = CHECKED / 2 - 1 };
+/* Each of so many shares of the bodies makes its next knot at another time in the interval. */
+enum { SHARES = 16 };
 /* Knots kept per body; a power of two. More than CHECKED, so that the next ones can be made one by
  * one and looking back a little costs nothing. */
 enum { RING = 16, ROTATIONS = 32 };
-enum { STEP_CLASSES = 7, SHORTEST_STEP_S = 16 };
+enum { STEP_CLASSES = 5, SHORTEST_STEP_S = 16 };
 
 /* Largest product |(u - o_0) ... (u - o_9)| / 10! between the two middle knots, in steps: times the
  * tenth difference it is the error of the polynomial. */
 #define ERROR_OF_DIFFERENCE 2.4033e-4
-/* The estimate from tenth differences may be this much too small where an orbit is not smooth: the
- * resonances of SDP4 are integrated in steps of half a day, with a small jump from one to the next,
- * of which a tenth difference shows no less. */
+/* The estimate is kept below the tolerance by this: a jump that a tenth difference shows a
+ * thirtieth of would still be seen. */
 #define SAFETY 16.0
 #define ROUNDING_M 20e-6
 /* What comes nearer to the Earth's centre than SGP4's radius has decayed; which is decided by SGP4
@@ -59,10 +60,10 @@ typedef struct table {
 
 struct bst_ephemeris {
     const bst_world *world;
-    pthread_mutex_t lock; /* over all that follows */
-    bst_parallel *pool;   /* NULL: none */
-    bst_sky_clock *clock;
-    double limit_m; /* of the estimated error */
+    pthread_mutex_t lock;                      /* over all that follows */
+    bst_parallel *pool;                        /* NULL: none */
+    bst_sky_clock *clock_knots, *clock_tables; /* two: each knows the time around its last one */
+    double limit_m;                            /* of the estimated error */
     body *bodies;
     int body_count, object_count;
     rotations rotations[STEP_CLASSES];
@@ -116,6 +117,18 @@ static bool smooth(double p[3][CHECKED], double limit_m) {
     return ERROR_OF_DIFFERENCE * sqrt(a) <= limit_m && ERROR_OF_DIFFERENCE * sqrt(b) <= limit_m;
 }
 
+/* Whether the polynomial from knot `first` + 1 on would run over a place where the model jumps. */
+static bool jumps(const bst_orbit *orbit, double step, int64_t first) {
+    double period = 60.0 * bst_sgp4_step_minutes(orbit->sgp4);
+    if (!(period > 0.0)) {
+        return false;
+    }
+    double from = orbit->epoch_offset_s + (double)(first + 1) * step;
+    double jump = ceil(from / period) * period;
+    jump = jump == 0.0 ? period : jump; /* none at the epoch itself */
+    return jump <= from + (POINTS - 1) * step;
+}
+
 /* ---- knots ---- */
 
 static int slot_of(int64_t knot, int slots) {
@@ -128,7 +141,7 @@ static const bst_mat3 *rotation_at(bst_ephemeris *e, int step_class, int64_t kno
     if (r->knot[slot] != knot) {
         bst_sky sky;
         bst_time t = bst_time_add(e->world->epoch, (double)knot * step_of(step_class));
-        if (bst_sky_clock_at(NULL, e->clock, t, &sky) != BST_OK) {
+        if (bst_sky_clock_at(NULL, e->clock_knots, t, &sky) != BST_OK) {
             sky.frames.gcrf_from_teme = (bst_mat3){{{NAN, NAN, NAN}}};
         }
         r->gcrf_from_teme[slot] = sky.frames.gcrf_from_teme;
@@ -169,6 +182,9 @@ bool bst_ephemeris_at(bst_ephemeris *e, int index, double seconds, bst_vec3 *pos
     }
     double step = step_of(b->step_class), whole = floor(seconds / step);
     int64_t first = (int64_t)whole - BEFORE;
+    if (jumps(b->orbit, step, first)) {
+        return false;
+    }
     double p[3][CHECKED];
     pthread_mutex_lock(&e->lock);
     make_knots(e, b, first, first + CHECKED - 1);
@@ -203,6 +219,7 @@ bool bst_ephemeris_at(bst_ephemeris *e, int index, double seconds, bst_vec3 *pos
 /* What the bodies of one class have in common at the instant of a table. */
 typedef struct table_class {
     int64_t first;       /* of the CHECKED knots */
+    double late;         /* of the interval between knots, how much has gone by */
     double weight[RING]; /* by slot; 0 for those that do not take part */
 } table_class;
 
@@ -237,12 +254,8 @@ static void table_rows(void *user, int begin, int end) {
             continue;
         }
         const table_class *c = &job->classes[b->step_class];
-        /* each sixteenth of the bodies makes its next knot at another time */
-        double ahead = (double)(i % 16) / 16.0 * step_of(b->step_class);
-        double late =
-            (double)t->index * TABLE_STEP_S - (double)(c->first + BEFORE) * step_of(b->step_class);
-        make_knots(job->e, b, c->first,
-                   c->first + CHECKED - 1 + (late + ahead >= step_of(b->step_class)));
+        int ahead = c->late + (double)(i % SHARES) / SHARES >= 1.0;
+        make_knots(job->e, b, c->first, c->first + CHECKED - 1 + ahead);
         double p[3] = {0};
         for (int j = 0; j < 3; j++) {
             for (int slot = 0; slot < RING; slot++) {
@@ -274,20 +287,25 @@ static void make_table(bst_ephemeris *e, table *t, int64_t index) {
         for (int j = 0; j < POINTS; j++) {
             out->weight[slot_of(out->first + 1 + j, RING)] = weight[j];
         }
-        for (int j = 0; j <= CHECKED; j++) {
+        out->late = seconds / step - whole;
+        int ahead = out->late + (double)(SHARES - 1) / SHARES >= 1.0;
+        for (int j = 0; j < CHECKED + ahead; j++) {
             (void)rotation_at(e, c, out->first + j); /* the threads only read */
         }
     }
     for (int i = 0; i < 3; i++) {
         bst_sky sky;
         bst_time time = bst_time_add(e->world->epoch, seconds + (i - 1) * TABLE_STEP_S);
-        if (bst_sky_clock_at(NULL, e->clock, time, &sky) != BST_OK) {
+        if (bst_sky_clock_at(NULL, e->clock_tables, time, &sky) != BST_OK) {
             sky.frames.gcrf_from_teme = (bst_mat3){{{NAN, NAN, NAN}}};
         }
         job.gcrf_from_teme[i] = sky.frames.gcrf_from_teme;
     }
+    /* the next table in turn makes few knots: not worth waking anybody, who may come late */
+    const table *before = &e->tables[slot_of(index - 1, TABLES)];
+    bool in_turn = before->valid && before->index == index - 1;
     t->index = index;
-    bst_parallel_for(e->pool, e->object_count, GRAIN, table_rows, &job);
+    bst_parallel_for(in_turn ? NULL : e->pool, e->object_count, GRAIN, table_rows, &job);
     t->valid = true;
 }
 
@@ -381,9 +399,9 @@ static int choose_class(const bst_ephemeris *e, const bst_orbit *orbit) {
     }
     double rate = sqrt(mu / a) / a;
     int c = STEP_CLASSES - 1;
-    /* half of it is left to what is no two-body motion */
+    /* the rest is left to what is no two-body motion: twice and three times the orbital rate */
     while (c > 0 && !(rate * step_of(c) < 0.5 &&
-                      a * perigee_error(eccentricity, rate * step_of(c)) < 0.5 * e->limit_m)) {
+                      a * perigee_error(eccentricity, rate * step_of(c)) < 0.05 * e->limit_m)) {
         c--;
     }
     return c;
@@ -427,8 +445,11 @@ bst_status bst_ephemeris_create(bst_ctx *ctx, const bst_world *world, bst_epheme
     e->table_memory = calloc(rows * 4 * TABLES, sizeof *e->table_memory);
     bst_status status =
         e->bodies && e->table_memory
-            ? bst_sky_clock_create(ctx, world->eop, &e->clock)
+            ? bst_sky_clock_create(ctx, world->eop, &e->clock_knots)
             : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for an ephemeris of %d", e->body_count);
+    if (status == BST_OK) {
+        status = bst_sky_clock_create(ctx, world->eop, &e->clock_tables);
+    }
     if (status != BST_OK) {
         bst_ephemeris_free(e);
         return status;
@@ -471,7 +492,8 @@ bst_status bst_ephemeris_prepare(bst_ctx *ctx, bst_ephemeris *e, int threads) {
 void bst_ephemeris_free(bst_ephemeris *e) {
     if (e) {
         bst_parallel_free(e->pool);
-        bst_sky_clock_free(e->clock);
+        bst_sky_clock_free(e->clock_knots);
+        bst_sky_clock_free(e->clock_tables);
         free(e->bodies);
         free(e->table_memory);
         pthread_mutex_destroy(&e->lock);
