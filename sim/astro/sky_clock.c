@@ -55,8 +55,8 @@ static bst_vec3 lerp(bst_vec3 a, bst_vec3 b, double f) {
     return bst_vec3_axpy(a, f, bst_vec3_sub(b, a));
 }
 
-/* Over one step these rotations turn by 1e-8 rad: linear in their elements they stay rotations to
- * double precision. */
+/* Linear in their elements, rotations that are so near to each other stay rotations to double
+ * precision. */
 static bst_mat3 lerp_rotation(const bst_mat3 *a, const bst_mat3 *b, double f) {
     bst_mat3 r;
     for (int i = 0; i < 3; i++) {
@@ -77,6 +77,16 @@ static double lerp_angle(double a, double b, double f) {
     return a + f * step;
 }
 
+bst_earth_parts bst_earth_parts_between(const bst_earth_parts *a, const bst_earth_parts *b,
+                                        double f) {
+    return (bst_earth_parts){
+        .cirs_from_gcrf = lerp_rotation(&a->cirs_from_gcrf, &b->cirs_from_gcrf, f),
+        .itrf_from_tirs = lerp_rotation(&a->itrf_from_tirs, &b->itrf_from_tirs, f),
+        .era_rad = lerp_angle(a->era_rad, b->era_rad, f),
+        .teme_turn_rad = lerp_angle(a->teme_turn_rad, b->teme_turn_rad, f),
+    };
+}
+
 bst_status bst_sky_clock_at(bst_ctx *ctx, bst_sky_clock *clock, bst_time t, bst_sky *out) {
     if (!(t.jd1 >= 0.5 && t.jd1 < 1e8 && t.jd2 >= 0.0 && t.jd2 < 1.0)) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "JD %g + %g is not an instant", t.jd1, t.jd2);
@@ -91,12 +101,7 @@ bst_status bst_sky_clock_at(bst_ctx *ctx, bst_sky_clock *clock, bst_time t, bst_
     const node *a, *b;
     BST_TRY(node_at(ctx, clock, index, &a));
     BST_TRY(node_at(ctx, clock, index + 1, &b));
-    bst_earth_parts parts = {
-        .cirs_from_gcrf = lerp_rotation(&a->parts.cirs_from_gcrf, &b->parts.cirs_from_gcrf, f),
-        .itrf_from_tirs = lerp_rotation(&a->parts.itrf_from_tirs, &b->parts.itrf_from_tirs, f),
-        .era_rad = lerp_angle(a->parts.era_rad, b->parts.era_rad, f),
-        .teme_turn_rad = lerp_angle(a->parts.teme_turn_rad, b->parts.teme_turn_rad, f),
-    };
+    bst_earth_parts parts = bst_earth_parts_between(&a->parts, &b->parts, f);
     out->frames = bst_earth_frames_from_parts(&parts);
     out->bodies.sun_m = lerp(a->bodies.sun_m, b->bodies.sun_m, f);
     out->bodies.moon_m = lerp(a->bodies.moon_m, b->bodies.moon_m, f);

@@ -19,8 +19,8 @@ typedef struct bst_source_path {
 
 /* A source that may put light on the window. */
 typedef struct bst_source {
-    int32_t kind;                /* bst_source_kind */
-    uint32_t id;                 /* star: Tycho-2 identity; object: index in the world */
+    int32_t kind; /* bst_source_kind */
+    uint32_t id;  /* star: Tycho-2 identity, or statistical (bit 31); object: index in the world */
     bst_vec3 apparent_mid;       /* at mid-exposure, GCRF axes, unit */
     const bst_source_path *path; /* NULL: at rest; owned by who made the source */
     double electrons_per_s;      /* detected, at mid exposure */

@@ -33,6 +33,14 @@ static bst_status sgp4_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock
     return BST_OK;
 }
 
+static bst_status numerical_state(bst_ctx *ctx, const bst_orbit *orbit, double seconds,
+                                  bool with_burns, bst_state *out) {
+    const bst_trajectory *path = with_burns && orbit->burnt ? orbit->burnt : orbit->unburnt;
+    bst_status status =
+        bst_trajectory_state(ctx, path, seconds, &out->position_m, &out->velocity_mps);
+    return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "orbit of %s", orbit->name);
+}
+
 static bst_status relative_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *clock,
                                  bst_time epoch, double seconds, bool with_burns, bst_state *out) {
     bst_state ref;
@@ -106,6 +114,12 @@ bst_status bst_orbit_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *
         case BST_ORBIT_SGP4:
             BST_TRY(sgp4_state(ctx, orbit, clock, epoch, seconds, out));
             break;
+        case BST_ORBIT_OEM:
+        case BST_ORBIT_INJECTED:
+            BST_TRY(bst_orbit_file_state(ctx, orbit, clock, epoch, seconds, out));
+            break;
+        case BST_ORBIT_NUMERICAL:
+            return numerical_state(ctx, orbit, seconds, with_burns, out);
         default:
             BST_TRY(relative_state(ctx, orbit, clock, epoch, seconds, with_burns, out));
     }

@@ -33,8 +33,8 @@ static bst_status build_sgp4(const bst_world_builder *b, const bst_orbit_config 
     bst_world_path file = bst_world_path_join(b, config->elements_file);
     bst_elements *sets = NULL;
     int count = 0;
-    bst_tle_options options = {.norad = (int)config->norad};
-    if (bst_tle_load(b->ctx, file.text, &options, &sets, &count) != BST_OK) {
+    bst_elements_options options = {.norad = (int)config->norad};
+    if (bst_elements_load(b->ctx, file.text, &options, &sets, &count) != BST_OK) {
         return bst_fail_prefix(b->ctx, BST_ERR_CONFIG, "%s: %s/elements_file", b->scenario, path);
     }
     /* of several sets the one whose epoch is nearest to the scenario's */
@@ -74,11 +74,18 @@ static bst_status build_relative(const bst_world_builder *b, const bst_orbit_con
 }
 
 /* `path` of the orbit is "OWNER/orbit"; burns are at "OWNER/burns". */
-static bst_status check_burns(const bst_world_builder *b, const bst_config_list *list,
+static bst_status check_burns(const bst_world_builder *b, const bst_config_list *list, int source,
                               const char *path) {
     const bst_burn_config *burns = list->items;
-    for (int k = 1; k < list->count; k++) {
-        if (burns[k].time_s < burns[k - 1].time_s) {
+    for (int k = 0; k < list->count; k++) {
+        if (burns[k].duration_s > 0.0 && source != BST_ORBIT_NUMERICAL) {
+            return bst_fail(b->ctx, BST_ERR_CONFIG,
+                            "%s: %.*s/burns/%d/duration_s: a burn that lasts needs an orbit of "
+                            "source \"numerical\" (found %g; allowed: 0)",
+                            b->scenario, (int)(strlen(path) - strlen("/orbit")), path, k,
+                            burns[k].duration_s);
+        }
+        if (k > 0 && burns[k].time_s < burns[k - 1].time_s) {
             return bst_fail(b->ctx, BST_ERR_CONFIG,
                             "%s: %.*s/burns/%d/time_s: burns must be in the order of time "
                             "(found %g after %g)",
@@ -95,11 +102,17 @@ bst_status bst_orbit_build(const bst_world_builder *b, const bst_orbit_config *c
     orbit->source = config->source;
     orbit->name = name;
     *norad = 0;
-    BST_TRY(check_burns(b, burns, path));
+    BST_TRY(check_burns(b, burns, config->source, path));
     switch (config->source) {
         case BST_ORBIT_SGP4:
             BST_TRY(build_sgp4(b, config, path, name, orbit, norad));
             break;
+        case BST_ORBIT_OEM:
+        case BST_ORBIT_INJECTED:
+            BST_TRY(bst_orbit_build_file(b, config, path, orbit));
+            break;
+        case BST_ORBIT_NUMERICAL:
+            return bst_orbit_build_numerical(b, config, burns, path, name, orbit, norad);
         default:
             BST_TRY(build_relative(b, config, path, orbit));
     }
@@ -113,5 +126,8 @@ bst_status bst_orbit_build(const bst_world_builder *b, const bst_orbit_config *c
 
 void bst_orbit_free(bst_orbit *orbit) {
     bst_sgp4_free(orbit->sgp4);
+    bst_trajectory_free(orbit->unburnt);
+    bst_trajectory_free(orbit->burnt);
+    bst_gravity_free(orbit->gravity);
     free(orbit->burns);
 }

@@ -1,0 +1,62 @@
+/* Burns as edges in time. */
+#include <stdlib.h>
+
+#include "sim/astro/trajectory_internal.h"
+
+static int by_time(const void *a, const void *b) {
+    double x = ((const bst_edge *)a)->time_s, y = ((const bst_edge *)b)->time_s;
+    return (x > y) - (x < y);
+}
+
+/* When a burn ends; its start for an impulse, also one too short for the clock to tell. */
+static double end_of(const bst_thrust *burn) {
+    return burn->time_s + burn->duration_s;
+}
+
+static bool is_impulse(const bst_thrust *burn) {
+    return !(end_of(burn) > burn->time_s);
+}
+
+bst_status bst_edges_make(bst_ctx *ctx, const bst_thrust *burns, int count, bst_edges *out) {
+    *out = (bst_edges){NULL, 0, NULL};
+    out->items = calloc(2 * (size_t)count + 1, sizeof *out->items);
+    out->impulses_rtn_mps = calloc((size_t)count + 1, sizeof *out->impulses_rtn_mps);
+    if (!out->items || !out->impulses_rtn_mps) {
+        bst_edges_free(out);
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d burns", count);
+    }
+    int n = 0;
+    for (int i = 0; i < count; i++) {
+        out->items[n++].time_s = burns[i].time_s;
+        if (!is_impulse(&burns[i])) {
+            out->items[n++].time_s = end_of(&burns[i]);
+        }
+    }
+    qsort(out->items, (size_t)n, sizeof *out->items, by_time);
+    int impulses = 0;
+    for (int i = 0; i < n; i++) {
+        double time = out->items[i].time_s;
+        if (out->count > 0 && out->items[out->count - 1].time_s == time) {
+            continue;
+        }
+        bst_edge *edge = &out->items[out->count++];
+        *edge = (bst_edge){.time_s = time, .first_impulse = impulses};
+        for (int k = 0; k < count; k++) {
+            const bst_thrust *b = &burns[k];
+            if (is_impulse(b) && b->time_s == time) {
+                out->impulses_rtn_mps[impulses++] = b->dv_rtn_mps;
+            } else if (!is_impulse(b) && b->time_s <= time && time < end_of(b)) {
+                edge->thrust_rtn_mps2 = bst_vec3_axpy(edge->thrust_rtn_mps2,
+                                                      1.0 / (end_of(b) - b->time_s), b->dv_rtn_mps);
+            }
+        }
+        edge->impulse_count = impulses - edge->first_impulse;
+    }
+    return BST_OK;
+}
+
+void bst_edges_free(bst_edges *edges) {
+    free(edges->items);
+    free(edges->impulses_rtn_mps);
+    *edges = (bst_edges){NULL, 0, NULL};
+}

@@ -1,0 +1,184 @@
+/* Numerical orbits from their configuration. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/world/world_build.h"
+
+static const char *const state_kinds[] = {"cartesian", "keplerian", "element_set", "relative",
+                                          NULL};
+
+const bst_config_desc bst_initial_state_table[] = {
+    BST_ENUM(bst_initial_state_config, from, state_kinds, "\"cartesian\"",
+             "cartesian: position and velocity below. keplerian: the elements below. element_set: "
+             "what the orbit's elements_file and norad give at that time by SGP4. relative: the "
+             "orbit's reference, offset_rtn_m and rate_rtn_mps at that time."),
+    BST_REAL(bst_initial_state_config, at_s, "s", -1e9, 1e9, "0", "Time of the state."),
+    BST_REALS(bst_initial_state_config, position_gcrf_m, "m", -1e10, 1e10, "[0, 0, 0]",
+              "cartesian: geocentric position."),
+    BST_REALS(bst_initial_state_config, velocity_gcrf_mps, "m/s", -1e6, 1e6, "[0, 0, 0]",
+              "cartesian: velocity."),
+    BST_REAL(bst_initial_state_config, perigee_radius_m, "m", 0, 1e10, "0",
+             "keplerian: distance of the perigee from the Earth's centre."),
+    BST_REAL(bst_initial_state_config, eccentricity, "", 0, 100, "0",
+             "keplerian: any conic, hyperbolas too."),
+    BST_REAL(bst_initial_state_config, inclination_deg, "deg", 0, 180, "0",
+             "keplerian: against the equator of GCRF."),
+    BST_REAL(bst_initial_state_config, raan_deg, "deg", -360, 360, "0",
+             "keplerian: right ascension of the ascending node."),
+    BST_REAL(bst_initial_state_config, arg_perigee_deg, "deg", -360, 360, "0",
+             "keplerian: argument of perigee."),
+    BST_REAL(bst_initial_state_config, true_anomaly_deg, "deg", -360, 360, "0",
+             "keplerian: true anomaly."),
+    BST_CONFIG_END,
+};
+
+static const char *const gravity_words[] = {"builtin", "two_body", "j6", NULL};
+
+const bst_config_desc bst_force_table[] = {
+    BST_PATH_OR(
+        bst_force_config, gravity, gravity_words, "\"builtin\"",
+        "\"builtin\" (EGM2008), \"two_body\", \"j6\" (its zonal terms 2 to 6), or a file in "
+        "the ICGEM format (.gfc), relative to the scenario's folder."),
+    BST_INT(bst_force_config, degree, "", 0, BST_GRAVITY_MAX_DEGREE, "20",
+            "builtin or file: degree of the field (builtin has 20)."),
+    BST_INT(bst_force_config, order, "", 0, BST_GRAVITY_MAX_DEGREE, "20",
+            "builtin or file: order of the field, at most its degree."),
+    BST_BOOL(bst_force_config, sun, "true", "The Sun's gravity."),
+    BST_BOOL(bst_force_config, moon, "true", "The Moon's gravity."),
+    BST_BOOL(bst_force_config, solar_pressure, "true",
+             "Pressure of sunlight, with the Earth's shadow."),
+    BST_BOOL(bst_force_config, drag, "true", "Drag of air that turns with the Earth."),
+    BST_REAL(bst_force_config, density_scale, "", 0, 1000, "1",
+             "What the mean density of the air is multiplied by."),
+    BST_REAL(bst_force_config, tolerance, "", 1e-11, 1e-3, "1e-9",
+             "Of the integrator's steps: relative size of the last term of the acceleration."),
+    BST_CONFIG_END,
+};
+
+const bst_config_desc bst_spacecraft_table[] = {
+    BST_REAL(bst_spacecraft_config, mass_kg, "kg", 1e-6, 1e9, "500", "Mass."),
+    BST_REAL(bst_spacecraft_config, drag_area_m2, "m2", 0, 1e6, "4", "Cross-section in the air."),
+    BST_REAL(bst_spacecraft_config, cd, "", 0, 10, "2.2", "Coefficient of drag."),
+    BST_REAL(bst_spacecraft_config, srp_area_m2, "m2", 0, 1e6, "4", "Cross-section in sunlight."),
+    BST_REAL(bst_spacecraft_config, cr, "", 0, 10, "1.3",
+             "Coefficient of solar pressure: 1 black, 2 a mirror that faces the Sun."),
+    BST_CONFIG_END,
+};
+
+static bst_vec3 vec(const double v[3]) {
+    return (bst_vec3){v[0], v[1], v[2]};
+}
+
+static bst_status keplerian(const bst_world_builder *b, const bst_initial_state_config *s,
+                            const char *path, double gm, bst_state *out) {
+    double p = s->perigee_radius_m * (1.0 + s->eccentricity);
+    double nu = s->true_anomaly_deg * BST_DEG_RAD, opening = 1.0 + s->eccentricity * cos(nu);
+    if (!(p > 0.0) || !(opening > 1e-9)) {
+        return bst_fail(b->ctx, BST_ERR_CONFIG,
+                        "%s: %s/state: keplerian elements need \"perigee_radius_m\" above 0 and a "
+                        "true anomaly that the orbit reaches",
+                        b->scenario, path);
+    }
+    double r = p / opening, speed = sqrt(gm / p);
+    bst_vec3 position = {r * cos(nu), r * sin(nu), 0.0};
+    bst_vec3 velocity = {-speed * sin(nu), speed * (s->eccentricity + cos(nu)), 0.0};
+    bst_quat turn = bst_quat_mul(
+        bst_quat_from_rotvec((bst_vec3){0.0, 0.0, s->raan_deg * BST_DEG_RAD}),
+        bst_quat_mul(bst_quat_from_rotvec((bst_vec3){s->inclination_deg * BST_DEG_RAD, 0.0, 0.0}),
+                     bst_quat_from_rotvec((bst_vec3){0.0, 0.0, s->arg_perigee_deg * BST_DEG_RAD})));
+    out->position_m = bst_quat_rotate(turn, position);
+    out->velocity_mps = bst_quat_rotate(turn, velocity);
+    return BST_OK;
+}
+
+static bst_status initial_state(const bst_world_builder *b, const bst_orbit_config *config,
+                                const char *path, const char *name, double gm, bst_state *out,
+                                int *norad) {
+    const bst_initial_state_config *s = &config->state;
+    if (s->from == BST_STATE_CARTESIAN) {
+        *out = (bst_state){vec(s->position_gcrf_m), vec(s->velocity_gcrf_mps)};
+        return BST_OK;
+    }
+    if (s->from == BST_STATE_KEPLERIAN) {
+        return keplerian(b, s, path, gm, out);
+    }
+    /* an orbit of another source, asked once */
+    bst_orbit_config other = *config;
+    other.source = s->from == BST_STATE_ELEMENT_SET ? BST_ORBIT_SGP4 : BST_ORBIT_RELATIVE;
+    other.at_s = s->at_s;
+    const bst_config_list no_burns = {NULL, 0};
+    bst_orbit orbit = {0};
+    bst_status status = bst_orbit_build(b, &other, &no_burns, path, name, &orbit, norad);
+    if (status == BST_OK &&
+        bst_orbit_state(b->ctx, &orbit, b->clock, b->world->epoch, s->at_s, true, out) != BST_OK) {
+        status = bst_fail_prefix(b->ctx, BST_ERR_CONFIG, "%s: %s/state", b->scenario, path);
+    }
+    bst_orbit_free(&orbit);
+    return status;
+}
+
+static bst_status make_gravity(const bst_world_builder *b, const bst_force_config *f,
+                               const char *path, bst_gravity **out) {
+    bst_ctx *ctx = b->ctx;
+    if (f->order > f->degree) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "%s: %s/forces/order: at most the degree, %d (found %d)", b->scenario, path,
+                        (int)f->degree, (int)f->order);
+    }
+    bst_status status;
+    if (strcmp(f->gravity, "two_body") == 0) {
+        status = bst_gravity_point(ctx, BST_EARTH_MU_M3PS2, out);
+    } else if (strcmp(f->gravity, "j6") == 0) {
+        status = bst_gravity_builtin(ctx, 6, 0, out);
+    } else if (strcmp(f->gravity, "builtin") == 0) {
+        status = bst_gravity_builtin(ctx, (int)f->degree, (int)f->order, out);
+    } else {
+        bst_world_path file = bst_world_path_join(b, f->gravity);
+        status = bst_gravity_load(ctx, file.text, (int)f->degree, (int)f->order, out);
+    }
+    return status == BST_OK
+               ? BST_OK
+               : bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: %s/forces/gravity", b->scenario, path);
+}
+
+bst_status bst_orbit_build_numerical(const bst_world_builder *b, const bst_orbit_config *config,
+                                     const bst_config_list *burns, const char *path,
+                                     const char *name, bst_orbit *orbit, int *norad) {
+    BST_TRY(make_gravity(b, &config->forces, path, &orbit->gravity));
+    bst_state state;
+    BST_TRY(initial_state(b, config, path, name, bst_gravity_gm(orbit->gravity), &state, norad));
+    const bst_force_config *f = &config->forces;
+    const bst_spacecraft_config *s = &config->spacecraft;
+    bst_trajectory_options options = {
+        .forces = {.gravity = orbit->gravity,
+                   .eop = b->world->eop,
+                   .sun = f->sun,
+                   .moon = f->moon,
+                   .solar_pressure = f->solar_pressure,
+                   .drag = f->drag,
+                   .density_scale = f->density_scale,
+                   .spacecraft = {s->mass_kg, s->drag_area_m2, s->cd, s->srp_area_m2, s->cr}},
+        .epoch = b->world->epoch,
+        .at_s = config->state.at_s,
+        .position_m = state.position_m,
+        .velocity_mps = state.velocity_mps,
+        .tolerance = f->tolerance};
+    bst_status status = bst_trajectory_create(b->ctx, &options, &orbit->unburnt);
+    if (status == BST_OK && burns->count > 0) {
+        const bst_burn_config *items = burns->items;
+        bst_thrust *thrusts = calloc((size_t)burns->count, sizeof *thrusts);
+        if (!thrusts) {
+            return bst_fail(b->ctx, BST_ERR_MEMORY, "out of memory for burns");
+        }
+        for (int i = 0; i < burns->count; i++) {
+            thrusts[i] =
+                (bst_thrust){items[i].time_s, items[i].duration_s, vec(items[i].dv_rtn_mps)};
+        }
+        options.burns = thrusts;
+        options.burn_count = burns->count;
+        status = bst_trajectory_create(b->ctx, &options, &orbit->burnt);
+        free(thrusts);
+    }
+    return status == BST_OK ? BST_OK
+                            : bst_fail_prefix(b->ctx, BST_ERR_CONFIG, "%s: %s", b->scenario, path);
+}
