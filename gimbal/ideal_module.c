@@ -44,7 +44,7 @@ typedef struct module {
     bst_platform platform;
     bst_ideal ideal;
     bst_view *view;
-    int target, observer, object;
+    int target, observer, sensor, object;
     bst_vec3 icrs;
     bst_vec3 x_hint_gcrf; /* body x: the camera's x stays as near to it as can be */
     double dt_s;
@@ -112,6 +112,7 @@ static bst_status prepare(const bst_module_env *env, const config *c, module *m)
     m->x_hint_gcrf = bst_quat_rotate(bst_quat_conj(nominal), (bst_vec3){1, 0, 0});
     BST_TRY(bst_platform_init(env->ctx, &m->platform, platform, nominal, pixel, m->dt_s,
                               bst_env_rng(env, "jitter"), bst_env_rng(env, "attitude")));
+    BST_TRY(bst_platform_check_history(env->ctx, platform, env->exposure_s));
     BST_TRY(bst_platform_divider(env->ctx, "telemetry_rate_hz", 1.0 / m->dt_s,
                                  platform->telemetry_rate_hz, &m->telemetry_steps));
     BST_TRY(bst_platform_divider(env->ctx, "nav_rate_hz", 1.0 / m->dt_s, platform->nav_rate_hz,
@@ -134,6 +135,7 @@ static bst_status create(const bst_module_env *env, const void *config_in, void 
         return bst_fail(env->ctx, BST_ERR_MEMORY, "out of memory for a gimbal");
     }
     m->observer = env->observer;
+    m->sensor = env->sensor;
     m->dt_s = (double)env->period_ticks / (double)env->tick_rate_hz;
     m->ideal = (bst_ideal){.direction_at = apparent, .user = m};
     bst_status status = prepare(env, config_in, m);
@@ -171,7 +173,7 @@ static bst_status step(void *self, struct bst_step *s) {
     }
     if (n % m->nav_steps == 0) {
         bst_nav_telemetry *nav = bst_step_write(s, PORT_NAV, NULL);
-        BST_TRY(bst_gimbal_nav(ctx, m->view, m->observer, tick, seconds, nav));
+        BST_TRY(bst_gimbal_nav(ctx, m->view, m->observer, m->sensor, tick, seconds, nav));
     }
     return BST_OK;
 }

@@ -5,8 +5,9 @@
 #include "sim/core/messages.h"
 #include "sim/world/world.h"
 
-/* Fills navigation telemetry with the observer's true state at `tick` (seconds after the epoch). */
-bst_status bst_gimbal_nav(bst_ctx *ctx, bst_view *view, int observer, int64_t tick, double seconds,
-                          bst_nav_telemetry *out) BST_MUST_CHECK;
+/* Fills navigation telemetry with the state that the spacecraft believes itself in at `tick`
+ * (seconds after the epoch), the errors of its orbit and clock in it. */
+bst_status bst_gimbal_nav(bst_ctx *ctx, bst_view *view, int observer, int sensor, int64_t tick,
+                          double seconds, bst_nav_telemetry *out) BST_MUST_CHECK;
 
 #endif

@@ -101,6 +101,17 @@ bst_quat bst_platform_measured_body(const bst_platform *platform, int64_t n) {
                   bst_vec3_scale((bst_vec3){a[0], a[1], b[0]}, platform->attitude_noise_rad));
 }
 
+bst_status bst_platform_check_history(bst_ctx *ctx, const bst_platform_config *config,
+                                      double exposure_s) {
+    if (config->history_s < exposure_s) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "platform/history_s: %g s do not cover the sensor's exposure/exposure_s of "
+                        "%g s; make history_s at least as long",
+                        config->history_s, exposure_s);
+    }
+    return BST_OK;
+}
+
 bst_status bst_platform_divider(bst_ctx *ctx, const char *key, double plant_rate_hz,
                                 double wanted_hz, int64_t *out) {
     double ratio = plant_rate_hz / wanted_hz;

@@ -54,6 +54,11 @@ bst_quat bst_platform_measured_body(const bst_platform *platform, int64_t n);
 bst_status bst_platform_divider(bst_ctx *ctx, const char *key, double plant_rate_hz,
                                 double wanted_hz, int64_t *out) BST_MUST_CHECK;
 
+/* BST_ERR_CONFIG when the ring of line-of-sight samples does not reach back over an exposure of
+ * exposure_s. */
+bst_status bst_platform_check_history(bst_ctx *ctx, const bst_platform_config *config,
+                                      double exposure_s) BST_MUST_CHECK;
+
 /* Samples in a ring that covers history_s at rate_hz, both ends included. */
 static inline int bst_platform_ring(double history_s, double rate_hz) {
     double samples = ceil(history_s * rate_hz) + 1.0;

@@ -22,7 +22,7 @@ static const bst_port ports[PORT_COUNT] = {
 typedef struct module {
     bst_two_axis plant;
     bst_view *view;
-    int observer;
+    int observer, sensor;
     double tick_rate_hz;
     int64_t telemetry_steps, nav_steps;
 } module;
@@ -45,6 +45,7 @@ static bst_status create(const bst_module_env *env, const void *config_in, void 
         return bst_fail(env->ctx, BST_ERR_MEMORY, "out of memory for a gimbal");
     }
     m->observer = env->observer;
+    m->sensor = env->sensor;
     m->tick_rate_hz = (double)env->tick_rate_hz;
     double dt = (double)env->period_ticks / m->tick_rate_hz;
     const bst_platform_config *platform = &config->platform;
@@ -53,6 +54,9 @@ static bst_status create(const bst_module_env *env, const void *config_in, void 
     bst_quat nominal = bst_world_body_attitude(env->world, env->observer, env->sensor);
     double pixel = bst_camera_scale_rad(bst_world_camera(env->world, env->observer, env->sensor));
     bst_status status = bst_two_axis_init(env->ctx, &m->plant, config, nominal, pixel, dt, &keys);
+    if (status == BST_OK) {
+        status = bst_platform_check_history(env->ctx, platform, env->exposure_s);
+    }
     if (status == BST_OK) {
         status = bst_platform_divider(env->ctx, "telemetry_rate_hz", 1.0 / dt,
                                       platform->telemetry_rate_hz, &m->telemetry_steps);
@@ -96,8 +100,8 @@ static bst_status step(void *self, struct bst_step *s) {
     }
     if (n % m->nav_steps == 0) {
         bst_nav_telemetry *nav = bst_step_write(s, PORT_NAV, NULL);
-        BST_TRY(
-            bst_gimbal_nav(bst_step_ctx(s), m->view, m->observer, tick, bst_step_seconds(s), nav));
+        BST_TRY(bst_gimbal_nav(bst_step_ctx(s), m->view, m->observer, m->sensor, tick,
+                               bst_step_seconds(s), nav));
     }
     return BST_OK;
 }

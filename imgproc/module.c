@@ -4,6 +4,7 @@
 #include "imgproc/calibration.h"
 #include "imgproc/imgproc.h"
 #include "imgproc/sky.h"
+#include "sim/io/psf_fits.h"
 #include "sim/world/knowledge.h"
 
 static const bst_config_desc bad_pixel_table[] = {
@@ -86,6 +87,18 @@ static void destroy(void *self) {
 static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
     m->camera = *bst_knowledge_camera(env->knowledge);
     m->tick_rate_hz = env->tick_rate_hz;
+    double oversampling;
+    const char *psf_file = bst_knowledge_psf_file(env->knowledge, &oversampling);
+    if (*psf_file) {
+        bst_psf_summary psf;
+        bst_status status = bst_psf_fits_read(env->ctx, psf_file, oversampling, &psf);
+        if (status != BST_OK) {
+            return bst_fail_prefix(env->ctx, status,
+                                   "/observers/%d/sensors/%d/knowledge/camera/psf_file",
+                                   env->observer, env->sensor);
+        }
+        m->camera.psf_fwhm_px = psf.fwhm_px;
+    }
     BST_TRY(bst_calibration_load(env->ctx, m->config, &m->camera, &m->maps));
     BST_TRY(bst_imgproc_create(env->ctx, &m->camera, bst_camera_electrons_per_s(&m->camera, 0.0),
                                m->config, &m->maps, &m->ip));

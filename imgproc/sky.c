@@ -40,7 +40,7 @@ bst_status bst_sky_expect(bst_ctx *ctx, bst_sky *sky, bst_quat q_cam_from_gcrf,
         radius = fmax(radius, bst_vec3_angle(centre, corners[i]));
     }
     if (sky->camera->geometry.general) {
-        radius = bst_camera_reach_rad(sky->camera, centre, x0, y0, x1, y1);
+        radius = bst_camera_reach_rad(sky->camera, centre, x0, y0, x1, y1, 0.0);
     }
     bst_vec3 direction = bst_quat_rotate(bst_quat_conj(q_cam_from_gcrf), centre);
     direction = bst_light_catalogue_star(light, direction);

@@ -18,8 +18,9 @@ static const bst_config_desc config[] = {
              "Aim for the rendering error of a source in any pixel, in that pixel's noise."),
     BST_REAL(scenegen_config, cut_sigma, "sigma", 1e-6, 1.0, "0.015",
              "Light per pixel that a source's stamp may leave out, in a dark pixel's noise."),
-    BST_INT(scenegen_config, truth_capacity, "", 1, 1048576, "4096",
-            "Sources that the truth of one exposure has room for."),
+    BST_INT(
+        scenegen_config, truth_capacity, "", 1, 1048576, "4096",
+        "Sources that the truth of one exposure has room for: objects, then the brightest stars."),
     BST_INT(scenegen_config, pool_frames, "", 2, 256, "8",
             "Frames that may be alive at a time: in queues, being rendered, being read."),
     BST_CONFIG_END,
@@ -34,6 +35,13 @@ static const bst_port ports[PORT_COUNT] = {
     [PORT_TRUTH] = {BST_CHANNEL_TRUTH, BST_PORT_OUT, 0, 0.0, 4096},
 };
 
+/* A source that asks for room in the truth. */
+typedef struct pick {
+    double rate;
+    int index;
+    bool object;
+} pick;
+
 typedef struct scenegen {
     const bst_camera *camera;
     bst_field_options options;
@@ -41,6 +49,8 @@ typedef struct scenegen {
     bst_rng_key key;
     bst_field *field;
     bst_renderer *renderer;
+    pick *picks;
+    int pick_capacity;
 } scenegen;
 
 static void destroy(void *self) {
@@ -48,6 +58,7 @@ static void destroy(void *self) {
     if (s) {
         bst_renderer_free(s->renderer);
         bst_field_free(s->field);
+        free(s->picks);
         free(s);
     }
 }
@@ -82,20 +93,60 @@ static bst_status create(const bst_module_env *env, const void *config_object, v
     return BST_OK;
 }
 
+static int objects_then_brightest(const void *a, const void *b) {
+    const pick *p = a, *q = b;
+    if (p->object != q->object) {
+        return p->object ? -1 : 1;
+    }
+    return p->rate != q->rate ? (p->rate > q->rate ? -1 : 1)
+                              : (p->index > q->index) - (p->index < q->index);
+}
+
+static int by_index(const void *a, const void *b) {
+    int p = ((const pick *)a)->index, q = ((const pick *)b)->index;
+    return (p > q) - (p < q);
+}
+
+/* Where there are more sources than the truth has room for: the objects and the brightest stars, in
+ * the order of the sources. */
+static bst_status pick_sources(bst_ctx *ctx, scenegen *s, const bst_source *sources, int count,
+                               int capacity) {
+    if (count > s->pick_capacity) {
+        pick *more = realloc(s->picks, 2 * (size_t)count * sizeof *more);
+        if (!more) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the truth of %d sources", count);
+        }
+        s->picks = more;
+        s->pick_capacity = 2 * count;
+    }
+    for (int i = 0; i < count; i++) {
+        s->picks[i] = (pick){sources[i].electrons_per_s, i, sources[i].kind == BST_SOURCE_OBJECT};
+    }
+    qsort(s->picks, (size_t)count, sizeof *s->picks, objects_then_brightest);
+    qsort(s->picks, (size_t)capacity, sizeof *s->picks, by_index);
+    return BST_OK;
+}
+
 /* Fills the truth's items; whatever finds no room is counted in `lost`. */
-static void write_items(const scenegen *s, const bst_los_track *track, const bst_source *sources,
-                        int count, const bst_exposure *e, bst_truth *truth, int capacity) {
+static bst_status write_items(bst_ctx *ctx, scenegen *s, const bst_los_track *track,
+                              const bst_source *sources, int count, const bst_exposure *e,
+                              bst_truth *truth, int capacity) {
     truth->count = count < capacity ? count : capacity;
     truth->lost = count - truth->count;
+    if (truth->lost > 0) {
+        BST_TRY(pick_sources(ctx, s, sources, count, capacity));
+    }
     double top_e =
         ((double)((1 << s->camera->bits) - 1) - s->camera->offset_dn) * s->camera->gain_e_per_dn;
     double limit_e = fmin(s->camera->full_well_e, top_e) - truth->background_e - truth->dark_e;
     for (int i = 0; i < truth->count; i++) {
-        bst_field_truth_item(s->field, track, &sources[i], e->window, truth, &truth->items[i]);
-        if (bst_renderer_peak_e(s->renderer, i) >= limit_e) {
+        int k = truth->lost > 0 ? s->picks[i].index : i;
+        bst_field_truth_item(s->field, track, &sources[k], e->window, truth, &truth->items[i]);
+        if (bst_renderer_peak_e(s->renderer, k) >= limit_e) {
             truth->items[i].flags |= BST_TRUTH_SATURATED;
         }
     }
+    return BST_OK;
 }
 
 static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure *e,
@@ -139,7 +190,7 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
                                        .bits = (int)s->camera->bits};
     }
     /* while the device renders */
-    write_items(s, &track, sources, count, e, truth, capacity);
+    BST_TRY(write_items(ctx, s, &track, sources, count, e, truth, capacity));
     if (truth->lost > 0) {
         bst_step_count(step, "truth_overflow");
     }

@@ -240,22 +240,22 @@ static int choose_radius(const bst_smear *s, double peak_e) {
 }
 
 /* Place on the focal plane from the boresight, px, without the distortion, which the kernel adds;
- * false when it has no image or one far away. */
+ * false when it is not in front of the camera or far away. */
 static bool project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, double *y) {
     bst_vec3 c = bst_quat_rotate(q, v);
-    if (!bst_camera_project(&s->camera, c, x, y)) {
-        return false;
-    }
-    *x -= bst_camera_centre_x(&s->camera);
-    *y -= bst_camera_centre_y(&s->camera);
-    bool near = fabs(*x) < 1e6 && fabs(*y) < 1e6;
     if (s->camera.geometry.general) {
         c = turned(s, c, 1.0);
         double f = 1.0 / (bst_camera_scale_rad(&s->camera) * c.z);
         *x = c.x * f;
         *y = c.y * f;
+        return c.z > 0.0 && fabs(*x) < 1e6 && fabs(*y) < 1e6;
     }
-    return near;
+    if (!bst_camera_project(&s->camera, c, x, y)) {
+        return false;
+    }
+    *x -= bst_camera_centre_x(&s->camera);
+    *y -= bst_camera_centre_y(&s->camera);
+    return fabs(*x) < 1e6 && fabs(*y) < 1e6;
 }
 
 static bst_vec3 direction_at(const bst_source *source, double u) {

@@ -1,4 +1,4 @@
-/* boresight propagate: positions and velocities from two-line element sets, by SGP4. */
+/* boresight propagate: positions and velocities from element sets, by SGP4. */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
@@ -10,11 +10,13 @@
 #include "sim/astro/frames.h"
 #include "sim/astro/sgp4.h"
 #include "sim/astro/sky_clock.h"
+#include "sim/io/czml_writer.h"
+#include "sim/io/oem_writer.h"
 
 static const char HELP[] =
-    "boresight propagate: positions and velocities from two-line element sets, by SGP4\n"
+    "boresight propagate: positions and velocities from element sets, by SGP4\n"
     "\n"
-    "  boresight propagate --tle FILE --start UTC --stop UTC --step S [options]\n"
+    "  boresight propagate --elements FILE --start UTC --stop UTC --step S [options]\n"
     "\n";
 
 static const char HELP_END[] =
@@ -26,23 +28,28 @@ static const char HELP_END[] =
     "nearest to --start is taken. GCRF needs the Earth's orientation: a table of 2020 to 2025 is\n"
     "part of the program, another one is read with --eop.\n"
     "\n"
+    "Element sets are read as TLE, as three lines each, and as OMM in JSON or CSV; which of them "
+    "a\n"
+    "file holds is seen from its content. CZML is for Cesium, and always in GCRF.\n"
+    "\n"
     "Examples:\n"
-    "  boresight propagate --tle scenarios/catalogue_2022-06.tle --norad 39089 \\\n"
+    "  boresight propagate --elements scenarios/catalogue_2022-06.tle --norad 39089 \\\n"
     "      --start 2022-06-16T22:10:00Z --stop 2022-06-16T22:15:00Z --step 60 --frame gcrf\n"
-    "  boresight propagate --tle scenarios/catalogue_2022-06.tle --format oem --output all.oem \\\n"
+    "  boresight propagate --elements scenarios/catalogue_2022-06.tle --format oem --output "
+    "all.oem \\\n"
     "      --start 2022-06-16T00:00:00Z --stop 2022-06-17T00:00:00Z --step 300\n"
     "\n"
     "Exit code: 0 done; 1 failed, or SGP4 ended early for a satellite (rows before that are\n"
     "written); 2 wrong usage.\n";
 
 enum { FRAME_TEME, FRAME_GCRF };
-enum { FORMAT_CSV, FORMAT_OEM };
+enum { FORMAT_CSV, FORMAT_OEM, FORMAT_CZML };
 
 /* Steps are whole microseconds, so that times are ticks and nothing accumulates. */
 static const int64_t TICKS_PER_SECOND = 1000000;
 
 typedef struct request {
-    const char *tle, *start_text, *stop_text, *output, *eop_path;
+    const char *elements, *start_text, *stop_text, *output, *eop_path;
     int64_t norad;
     double step_s;
     int frame, format, gravity, mode;
@@ -57,6 +64,13 @@ typedef struct states {
     bst_sky_clock *clock; /* NULL in TEME */
     FILE *stream;
 } states;
+
+/* One satellite, as the writers ask for its states. */
+typedef struct satellite {
+    const states *states;
+    const bst_elements *elements;
+    const bst_sgp4 *sgp4;
+} satellite;
 
 static bst_status read_time(bst_ctx *ctx, const char *option, const char *text, bst_time *out) {
     bst_status status = bst_time_from_utc(ctx, text, out);
@@ -131,10 +145,14 @@ static void object_name(const bst_elements *e, char *buffer, size_t bytes) {
     }
 }
 
-static void write_file_head(const request *q, FILE *stream) {
+static bst_status write_file_head(bst_ctx *ctx, const request *q, FILE *stream) {
+    if (q->format == FORMAT_CZML) {
+        return bst_czml_write_head(ctx, stream, "boresight propagate", q->start,
+                                   time_of(q, q->rows - 1), 60.0);
+    }
     if (q->format == FORMAT_CSV) {
         fputs("utc,norad,x_km,y_km,z_km,vx_kmps,vy_kmps,vz_kmps\n", stream);
-        return;
+        return BST_OK;
     }
     char created[32] = "";
     time_t now = time(NULL);
@@ -142,66 +160,66 @@ static void write_file_head(const request *q, FILE *stream) {
     if (gmtime_r(&now, &utc)) {
         strftime(created, sizeof created, "%Y-%m-%dT%H:%M:%S", &utc);
     }
-    fprintf(stream,
-            "CCSDS_OEM_VERS = 2.0\n"
-            "CREATION_DATE = %s\n"
-            "ORIGINATOR = BORESIGHT\n",
-            created);
+    return bst_oem_write_head(ctx, stream, created, "BORESIGHT", NULL);
 }
 
-/* Time of a row, without the Z in OEM, whose metadata name the scale. */
-static void row_time(const request *q, bst_time t, char text[40]) {
-    bst_time_to_utc(t, q->time_digits, text, 40);
-    if (q->format == FORMAT_OEM) {
-        text[strcspn(text, "Z")] = '\0';
-    }
-}
-
-static void write_object_head(const request *q, const bst_elements *e, int64_t rows, FILE *stream) {
-    char name[48], id[32], first[40], last[40];
-    object_name(e, name, sizeof name);
-    object_id(e, id, sizeof id);
-    row_time(q, q->start, first);
-    row_time(q, time_of(q, rows - 1), last);
-    fprintf(stream,
-            "\n"
-            "META_START\n"
-            "OBJECT_NAME = %s\n"
-            "OBJECT_ID = %s\n"
-            "CENTER_NAME = EARTH\n"
-            "REF_FRAME = %s\n"
-            "TIME_SYSTEM = UTC\n"
-            "START_TIME = %s\n"
-            "STOP_TIME = %s\n"
-            "META_STOP\n"
-            "\n"
-            "COMMENT SGP4, catalogue number %d, %s, opsmode %c\n",
-            name, id, q->frame == FRAME_GCRF ? "GCRF" : "TEME", first, last, e->norad,
-            q->gravity == BST_SGP4_WGS84 ? "WGS-84" : "WGS-72",
-            q->mode == BST_SGP4_AFSPC ? 'a' : 'i');
-}
-
-static bst_status write_row(bst_ctx *ctx, const states *s, const bst_elements *e,
-                            const bst_sgp4 *sgp4, int64_t row) {
-    const request *q = s->request;
-    bst_time t = time_of(q, row);
-    double r[3] = {0}, v[3] = {0};
-    (void)bst_sgp4_propagate(sgp4, minutes_of(e, t), r, v);
-    bst_vec3 position = {r[0], r[1], r[2]}, velocity = {v[0], v[1], v[2]};
-    if (s->clock) {
+/* State at a row, km and km/s. */
+static bst_status state_km(bst_ctx *ctx, const satellite *s, int64_t row, bst_time *t, bst_vec3 *r,
+                           bst_vec3 *v) {
+    double p[3] = {0}, w[3] = {0};
+    *t = time_of(s->states->request, row);
+    (void)bst_sgp4_propagate(s->sgp4, minutes_of(s->elements, *t), p, w);
+    *r = (bst_vec3){p[0], p[1], p[2]};
+    *v = (bst_vec3){w[0], w[1], w[2]};
+    if (s->states->clock) {
         bst_sky sky;
-        BST_TRY(bst_sky_clock_at(ctx, s->clock, t, &sky));
-        position = bst_mat3_mul_vec(&sky.frames.gcrf_from_teme, position);
-        velocity = bst_mat3_mul_vec(&sky.frames.gcrf_from_teme, velocity);
+        BST_TRY(bst_sky_clock_at(ctx, s->states->clock, *t, &sky));
+        *r = bst_mat3_mul_vec(&sky.frames.gcrf_from_teme, *r);
+        *v = bst_mat3_mul_vec(&sky.frames.gcrf_from_teme, *v);
     }
-    char text[40];
-    row_time(q, t, text);
-    if (q->format == FORMAT_CSV) {
-        fprintf(s->stream, "%s,%d,%.9f,%.9f,%.9f,%.9f,%.9f,%.9f\n", text, e->norad, position.x,
-                position.y, position.z, velocity.x, velocity.y, velocity.z);
-    } else {
-        fprintf(s->stream, "%s %.9f %.9f %.9f %.9f %.9f %.9f\n", text, position.x, position.y,
-                position.z, velocity.x, velocity.y, velocity.z);
+    return BST_OK;
+}
+
+static bst_status state_m(void *user, bst_ctx *ctx, int64_t row, bst_time *t, bst_vec3 *r,
+                          bst_vec3 *v) {
+    BST_TRY(state_km(ctx, user, row, t, r, v));
+    *r = bst_vec3_scale(*r, 1000.0);
+    *v = bst_vec3_scale(*v, 1000.0);
+    return BST_OK;
+}
+
+static bst_status write_rows(bst_ctx *ctx, satellite *s, int64_t rows) {
+    const request *q = s->states->request;
+    const bst_elements *e = s->elements;
+    FILE *stream = s->states->stream;
+    const bst_state_series series = {.rows = rows, .state = state_m, .user = s};
+    char name[48], id[32], text[120];
+    object_name(e, name, sizeof name);
+    if (q->format == FORMAT_OEM) {
+        object_id(e, id, sizeof id);
+        snprintf(text, sizeof text, "SGP4, catalogue number %d, %s, opsmode %c", e->norad,
+                 q->gravity == BST_SGP4_WGS84 ? "WGS-84" : "WGS-72",
+                 q->mode == BST_SGP4_AFSPC ? 'a' : 'i');
+        const bst_oem_segment segment = {.object_name = name,
+                                         .object_id = id,
+                                         .ref_frame = q->frame == FRAME_GCRF ? "GCRF" : "TEME",
+                                         .comment = text,
+                                         .series = series};
+        return bst_oem_write_segment(ctx, stream, &segment);
+    }
+    if (q->format == FORMAT_CZML) {
+        snprintf(id, sizeof id, "%d", e->norad);
+        const bst_czml_object object = {
+            .id = id, .name = name, .label = true, .path_s = 86400.0, .series = series};
+        return bst_czml_write_object(ctx, stream, &object);
+    }
+    for (int64_t row = 0; row < rows && !ferror(stream); row++) {
+        bst_time t;
+        bst_vec3 r, v;
+        BST_TRY(state_km(ctx, s, row, &t, &r, &v));
+        bst_time_to_utc(t, q->time_digits, text, sizeof text);
+        fprintf(stream, "%s,%d,%.9f,%.9f,%.9f,%.9f,%.9f,%.9f\n", text, e->norad, r.x, r.y, r.z, v.x,
+                v.y, v.z);
     }
     return BST_OK;
 }
@@ -223,11 +241,8 @@ static bst_status write_object(bst_ctx *ctx, const states *s, const bst_elements
     }
     bst_sgp4_error error = BST_SGP4_OK;
     int64_t rows = valid_rows(q, e, sgp4, &error);
-    if (rows > 0 && q->format == FORMAT_OEM) {
-        write_object_head(q, e, rows, s->stream);
-    }
-    for (int64_t row = 0; row < rows && status == BST_OK && !ferror(s->stream); row++) {
-        status = write_row(ctx, s, e, sgp4, row);
+    if (rows > 0) {
+        status = write_rows(ctx, &(satellite){s, e, sgp4}, rows);
     }
     if (status == BST_OK && rows < q->rows) {
         char text[40];
@@ -241,33 +256,63 @@ static bst_status write_object(bst_ctx *ctx, const states *s, const bst_elements
     return status;
 }
 
-/* Whether another set of the same satellite is nearer to the start (of equals, the first holds). */
-static bool is_superseded(const request *q, const bst_elements *sets, int count, int index) {
-    double own = fabs(minutes_of(&sets[index], q->start));
-    for (int i = 0; i < count; i++) {
-        if (sets[i].norad == sets[index].norad && i != index) {
-            double other = fabs(minutes_of(&sets[i], q->start));
-            if (other < own || (i < index && !(own < other))) {
-                return true;
-            }
-        }
+typedef struct candidate {
+    int norad, index;
+    double age_minutes;
+} candidate;
+
+/* By satellite, then nearest to the start (of equals, the first in the file). */
+static int compare_candidates(const void *x, const void *y) {
+    const candidate *a = x, *b = y;
+    if (a->norad != b->norad) {
+        return a->norad < b->norad ? -1 : 1;
     }
-    return false;
+    if (a->age_minutes != b->age_minutes) {
+        return a->age_minutes < b->age_minutes ? -1 : 1;
+    }
+    return a->index - b->index;
+}
+
+/* Marks the one set of each satellite that is taken. */
+static bst_status choose(bst_ctx *ctx, const request *q, const bst_elements *sets, int count,
+                         bool *taken) {
+    candidate *list = malloc((size_t)count * sizeof *list);
+    if (!list) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d element sets", count);
+    }
+    for (int i = 0; i < count; i++) {
+        list[i] = (candidate){sets[i].norad, i, fabs(minutes_of(&sets[i], q->start))};
+    }
+    qsort(list, (size_t)count, sizeof *list, compare_candidates);
+    for (int i = 0; i < count; i++) {
+        taken[list[i].index] = i == 0 || list[i].norad != list[i - 1].norad;
+    }
+    free(list);
+    return BST_OK;
 }
 
 static bst_status write_all(bst_ctx *ctx, const states *s, const bst_elements *sets, int count,
                             bool *complete) {
     const request *q = s->request;
+    bool *taken = calloc((size_t)count, sizeof *taken);
+    bst_status status =
+        taken ? choose(ctx, q, sets, count, taken) : bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
     *complete = true;
-    write_file_head(q, s->stream);
-    for (int i = 0; i < count && !ferror(s->stream); i++) {
-        if (!is_superseded(q, sets, count, i)) {
+    if (status == BST_OK) {
+        status = write_file_head(ctx, q, s->stream);
+    }
+    for (int i = 0; i < count && status == BST_OK && !ferror(s->stream); i++) {
+        if (taken[i]) {
             bool whole;
-            BST_TRY(write_object(ctx, s, &sets[i], &whole));
+            status = write_object(ctx, s, &sets[i], &whole);
             *complete = *complete && whole;
         }
     }
-    return BST_OK;
+    free(taken);
+    if (status == BST_OK && q->format == FORMAT_CZML) {
+        status = bst_czml_write_tail(ctx, s->stream);
+    }
+    return status;
 }
 
 /* Opens what the request needs, writes, and closes everything. */
@@ -276,9 +321,9 @@ static bst_status propagate(bst_ctx *ctx, const request *q, bool *complete) {
     int count = 0;
     bst_eop *eop = NULL;
     states s = {.request = q, .stream = stdout};
-    const bst_tle_options only = {.norad = (int)q->norad};
+    const bst_elements_options only = {.norad = (int)q->norad};
     const char *name = q->output ? q->output : "standard output";
-    bst_status status = bst_tle_load(ctx, q->tle, &only, &sets, &count);
+    bst_status status = bst_elements_load(ctx, q->elements, &only, &sets, &count);
     if (status == BST_OK && q->frame == FRAME_GCRF) {
         status = q->eop_path ? bst_eop_load(ctx, q->eop_path, &eop) : bst_eop_builtin(ctx, &eop);
         if (status == BST_OK) {
@@ -305,7 +350,7 @@ static bst_status propagate(bst_ctx *ctx, const request *q, bool *complete) {
         status = write_all(ctx, &s, sets, count, complete);
         bool failed = ferror(s.stream) != 0;
         failed = (s.stream == stdout ? fflush(s.stream) : fclose(s.stream)) != 0 || failed;
-        if (failed && status == BST_OK) {
+        if (failed && (status == BST_OK || status == BST_ERR_IO)) {
             status = bst_fail(ctx, BST_ERR_IO, "%s: writing failed; is the disk full?", name);
         }
     }
@@ -318,19 +363,23 @@ static bst_status propagate(bst_ctx *ctx, const request *q, bool *complete) {
 int bst_cmd_propagate(int argc, char **argv) {
     request q = {.gravity = BST_SGP4_WGS72, .mode = BST_SGP4_IMPROVED};
     const bst_option table[] = {
+        {.name = "elements",
+         .kind = BST_OPTION_TEXT,
+         .target = &q.elements,
+         .argument = "FILE",
+         .doc = "element sets: TLE, or OMM as JSON or CSV (required)"},
         {.name = "tle",
          .kind = BST_OPTION_TEXT,
-         .target = &q.tle,
+         .target = &q.elements,
          .argument = "FILE",
-         .doc = "element sets, two or three lines each",
-         .required = true},
+         .doc = "the same"},
         {.name = "norad",
          .kind = BST_OPTION_INT,
          .target = &q.norad,
          .argument = "N",
          .doc = "only the satellite with this catalogue number",
          .minimum = 1,
-         .maximum = 339999},
+         .maximum = BST_NORAD_MAX},
         {.name = "start",
          .kind = BST_OPTION_TEXT,
          .target = &q.start_text,
@@ -359,8 +408,8 @@ int bst_cmd_propagate(int argc, char **argv) {
         {.name = "format",
          .kind = BST_OPTION_CHOICE,
          .target = &q.format,
-         .argument = "csv|oem",
-         .doc = "comma-separated (default), or CCSDS OEM 2.0"},
+         .argument = "csv|oem|czml",
+         .doc = "comma-separated (default), CCSDS OEM 2.0, or CZML"},
         {.name = "gravity",
          .kind = BST_OPTION_CHOICE,
          .target = &q.gravity,
@@ -394,6 +443,11 @@ int bst_cmd_propagate(int argc, char **argv) {
         fputs(HELP_END, stdout);
         return 0;
     }
+    if (!q.elements) {
+        (void)bst_fail(&ctx, BST_ERR_ARGUMENT, "--elements is missing: add --elements FILE");
+        return bst_options_misuse(&ctx, "propagate");
+    }
+    q.frame = q.format == FORMAT_CZML ? FRAME_GCRF : q.frame;
     if (read_times(&ctx, &q) != BST_OK) {
         return bst_options_misuse(&ctx, "propagate");
     }

@@ -146,17 +146,17 @@ static bst_status read_rows(bst_ctx *ctx, const char *name, const char *data, si
         if (!numeric && (eop->count == 0 || *text == '#' || *text == '\0')) {
             continue; /* the heading, a comment */
         }
-        /* a file that was cut short may end within a number */
-        int words = count_words(line);
-        columns = columns ? columns : words;
-        if (words != columns) {
-            return bst_fail(ctx, BST_ERR_FORMAT,
-                            "%.400s:%d: %d columns where the rows before have %d in \"%.60s\"",
-                            name, number, words, columns, line);
-        }
         int mjd = 0;
         bst_eop_values row = {0};
         bst_status status = read_row(ctx, line, &mjd, &row);
+        /* a file that was cut short may end within a number */
+        int words = count_words(line);
+        columns = columns ? columns : words;
+        if (status == BST_OK && words != columns) {
+            status = bst_fail(ctx, BST_ERR_FORMAT,
+                              "%d columns where the rows before have %d in \"%.60s\"", words,
+                              columns, line);
+        }
         if (status == BST_OK) {
             status = append_row(ctx, eop, &capacity, mjd, row);
         }

@@ -7,12 +7,11 @@
 #include "sim/core/vec.h"
 
 #define LINE_CHARS 69
-#define QUOTE_BYTES 160
 
 /* A run of columns of one line of a set. Columns count from 1, as the format is documented. */
 typedef struct field {
-    const bst_tle_source *source;
-    const bst_tle_line *line;
+    const bst_text_source *source;
+    const bst_text_line *line;
     int first, last;
     const char *what;
 } field;
@@ -25,39 +24,6 @@ static int field_length(const field *f) {
     return f->last - f->first + 1;
 }
 
-/* Puts text in quotes, what is not printable ASCII as \xNN, cut to what fits. */
-static void quote(const char *text, size_t length, char out[QUOTE_BYTES]) {
-    size_t used = 0;
-    out[used++] = '"';
-    for (size_t i = 0; i < length; i++) {
-        if (used + 10 > QUOTE_BYTES) {
-            used += (size_t)snprintf(out + used, QUOTE_BYTES - used, "...");
-            break;
-        }
-        unsigned char c = (unsigned char)text[i];
-        if (c >= 0x20 && c < 0x7f) {
-            out[used++] = (char)c;
-        } else {
-            used += (size_t)snprintf(out + used, QUOTE_BYTES - used, "\\x%02X", c);
-        }
-    }
-    out[used++] = '"';
-    out[used] = '\0';
-}
-
-bst_status bst_tle_fail_at(const bst_tle_source *source, const bst_tle_line *line,
-                           const char *problem, const char *found, size_t found_length,
-                           const char *expected) {
-    char quoted[QUOTE_BYTES];
-    quote(found, found_length, quoted);
-    if (source->name) {
-        return bst_fail(source->ctx, BST_ERR_FORMAT, "%.400s:%d: %s (found %s, expected %s)",
-                        source->name, line->number, problem, quoted, expected);
-    }
-    return bst_fail(source->ctx, BST_ERR_FORMAT, "line %d: %s (found %s, expected %s)",
-                    line->number, problem, quoted, expected);
-}
-
 static bst_status fail_field(const field *f, const char *problem, const char *expected) {
     char text[120];
     if (f->first == f->last) {
@@ -65,8 +31,8 @@ static bst_status fail_field(const field *f, const char *problem, const char *ex
     } else {
         snprintf(text, sizeof text, "columns %d-%d: %s %s", f->first, f->last, f->what, problem);
     }
-    return bst_tle_fail_at(f->source, f->line, text, field_text(f), (size_t)field_length(f),
-                           expected);
+    return bst_text_fail_at(f->source, f->line, text, field_text(f), (size_t)field_length(f),
+                            expected);
 }
 
 static bool is_digit(char c) {
@@ -243,7 +209,7 @@ static bst_status read_number(const field *f, int *out) {
 }
 
 /* Year of two digits and day of the year with fraction, as a Julian date in two parts. */
-static bst_status read_epoch(const bst_tle_source *source, const bst_tle_line *line,
+static bst_status read_epoch(const bst_text_source *source, const bst_text_line *line,
                              bst_elements *out) {
     field year_field = {source, line, 19, 20, "epoch year"};
     field day_field = {source, line, 21, 32, "epoch day"};
@@ -273,7 +239,7 @@ static bst_status read_epoch(const bst_tle_source *source, const bst_tle_line *l
 }
 
 /* What both lines have: length, characters, checksum and blank columns. */
-static bst_status check_line(const bst_tle_source *source, const bst_tle_line *line, char role,
+static bst_status check_line(const bst_text_source *source, const bst_text_line *line, char role,
                              const int *blank_columns) {
     for (size_t i = 0; i < line->length; i++) {
         unsigned char c = (unsigned char)line->text[i];
@@ -281,21 +247,21 @@ static bst_status check_line(const bst_tle_source *source, const bst_tle_line *l
             char problem[80];
             snprintf(problem, sizeof problem, "column %zu: character is not printable ASCII",
                      i + 1);
-            return bst_tle_fail_at(source, line, problem, line->text + i, 1,
-                                   "letters, digits, signs, blanks");
+            return bst_text_fail_at(source, line, problem, line->text + i, 1,
+                                    "letters, digits, signs, blanks");
         }
     }
     if (line->length < LINE_CHARS) {
         char problem[80];
         snprintf(problem, sizeof problem, "line %c of the set is cut short at %zu characters", role,
                  line->length);
-        return bst_tle_fail_at(source, line, problem, line->text, line->length, "69 characters");
+        return bst_text_fail_at(source, line, problem, line->text, line->length, "69 characters");
     }
     if (line->length > LINE_CHARS) {
         char problem[80];
         snprintf(problem, sizeof problem, "line %c of the set goes on after column 69", role);
-        return bst_tle_fail_at(source, line, problem, line->text + LINE_CHARS,
-                               line->length - LINE_CHARS, "69 characters");
+        return bst_text_fail_at(source, line, problem, line->text + LINE_CHARS,
+                                line->length - LINE_CHARS, "69 characters");
     }
     if (line->text[0] != role) {
         field f = {source, line, 1, 1, "line number"};
@@ -320,26 +286,13 @@ static bst_status check_line(const bst_tle_source *source, const bst_tle_line *l
     return BST_OK;
 }
 
-void bst_tle_copy_trimmed(const char *text, size_t length, char *out, size_t out_bytes) {
-    while (length > 0 && *text == ' ') {
-        text++;
-        length--;
-    }
-    while (length > 0 && text[length - 1] == ' ') {
-        length--;
-    }
-    length = length < out_bytes - 1 ? length : out_bytes - 1;
-    memcpy(out, text, length);
-    out[length] = '\0';
-}
-
-static bst_status parse_line1(const bst_tle_source *source, const bst_tle_line *l,
+static bst_status parse_line1(const bst_text_source *source, const bst_text_line *l,
                               bst_elements *out) {
     static const int blanks[] = {2, 9, 18, 33, 44, 53, 62, 64, 0};
     BST_TRY(check_line(source, l, '1', blanks));
     int ephemeris_type;
     BST_TRY(read_number(&(field){source, l, 3, 7, "catalogue number"}, &out->norad));
-    bst_tle_copy_trimmed(l->text + 9, 8, out->designator, sizeof out->designator);
+    bst_text_copy((bst_text_span){l->text + 9, 8}, out->designator, sizeof out->designator);
     BST_TRY(read_epoch(source, l, out));
     BST_TRY(read_decimal(&(field){source, l, 34, 43, "first derivative of mean motion"}, -1e3, 1e3,
                          "the form \"-.00000123\"", &out->ndot_rev_day2));
@@ -350,7 +303,7 @@ static bst_status parse_line1(const bst_tle_source *source, const bst_tle_line *
     return read_count(&(field){source, l, 65, 68, "element set number"}, &out->element_set);
 }
 
-static bst_status parse_line2(const bst_tle_source *source, const bst_tle_line *l,
+static bst_status parse_line2(const bst_text_source *source, const bst_text_line *l,
                               bst_elements *out) {
     static const int blanks[] = {2, 8, 17, 26, 34, 43, 52, 0};
     const char *angle = "0 to 360 degrees";
@@ -386,27 +339,17 @@ static bst_status parse_line2(const bst_tle_source *source, const bst_tle_line *
     return read_count(&(field){source, l, 64, 68, "revolution number"}, &out->revolution);
 }
 
-bst_status bst_tle_parse_set(const bst_tle_source *source, const bst_tle_line *line1,
-                             const bst_tle_line *line2, bst_elements *out) {
+bst_status bst_tle_parse_set(const bst_text_source *source, const bst_text_line *line1,
+                             const bst_text_line *line2, bst_elements *out) {
     memset(out, 0, sizeof *out);
     BST_TRY(parse_line1(source, line1, out));
     return parse_line2(source, line2, out);
 }
 
-void bst_tle_trim_end(bst_tle_line *line) {
-    while (line->length > 0) {
-        char c = line->text[line->length - 1];
-        if (c != ' ' && c != '\t' && c != '\r' && c != '\n') {
-            break;
-        }
-        line->length--;
-    }
-}
-
 bst_status bst_tle_parse(bst_ctx *ctx, const char *line1, const char *line2, bst_elements *out) {
-    bst_tle_source source = {ctx, NULL};
-    bst_tle_line first = {line1, strlen(line1), 1}, second = {line2, strlen(line2), 2};
-    bst_tle_trim_end(&first);
-    bst_tle_trim_end(&second);
+    bst_text_source source = {ctx, NULL};
+    bst_text_line first = {line1, strlen(line1), 1}, second = {line2, strlen(line2), 2};
+    bst_text_trim_end(&first);
+    bst_text_trim_end(&second);
     return bst_tle_parse_set(&source, &first, &second, out);
 }

@@ -120,7 +120,7 @@ enum {
 /* One source of the true scene. Pixels are full-sensor coordinates; NAN where behind the camera. */
 typedef struct bst_truth_item {
     int32_t kind;  /* bst_source_kind */
-    uint32_t id;   /* star: Tycho-2 identity; object: index in the world */
+    uint32_t id;   /* star: Tycho-2 identity, or statistical (bit 31); object: index in the world */
     int32_t norad; /* object: catalogue number, else 0 */
     uint32_t flags;
     double x_start_px, y_start_px, x_mid_px, y_mid_px, x_end_px, y_end_px;
@@ -140,9 +140,9 @@ typedef struct bst_truth {
     int64_t exposure_id;
     int64_t start_tick, end_tick;
     bool dropped;
-    bst_quat q_cam_from_gcrf_mid; /* at the middle of the exposure, jitter included */
-    bst_quat
-        q_cam_from_gcrf_mean; /* averaged over the exposure: the attitude of the header's WCS */
+    bst_quat q_cam_from_gcrf_mid;  /* at the middle of the exposure, jitter included */
+    bst_quat q_cam_from_gcrf_mean; /* averaged over the exposure, so that it shows stars at their
+                                      mean places: the attitude of the header's WCS */
     bst_vec3 observer_gcrf_m, observer_gcrf_mps; /* mid */
     bst_vec3 velocity_bary_mps;            /* mid; with sun_m it gives the light's corrections */
     bst_vec3 sun_m;                        /* observer to Sun, mid */

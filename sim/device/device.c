@@ -7,6 +7,8 @@
 #include <string.h>
 #include <time.h>
 
+#include "sim/device/kernel_cache.h"
+
 enum { MAX_PLATFORMS = 16, MAX_DEVICES = 32, NAME_BYTES = 256 };
 
 enum { MAX_BUILT = 64 };
@@ -109,7 +111,10 @@ static bst_status list_devices(bst_ctx *ctx, candidate *list, int *count) {
         }
     }
     if (*count == 0) {
-        return bst_fail(ctx, BST_ERR_DEVICE, "the OpenCL platforms offer no device");
+        char cache[NAME_BYTES + 512];
+        return bst_kernel_cache_is_unusable(cache, sizeof cache)
+                   ? bst_fail(ctx, BST_ERR_DEVICE, "%s", cache)
+                   : bst_fail(ctx, BST_ERR_DEVICE, "the OpenCL platforms offer no device");
     }
     return BST_OK;
 }
@@ -286,6 +291,12 @@ const char *bst_device_description(const bst_device *device) {
 /* The log's first lines, as much as a message holds. */
 static bst_status build_failure(bst_ctx *ctx, const bst_device *device, cl_program program,
                                 const char *first_name) {
+    char cache[NAME_BYTES + 512];
+    if (strncmp(device->description, "PoCL", 4) == 0 &&
+        bst_kernel_cache_is_unusable(cache, sizeof cache)) {
+        return bst_fail(ctx, BST_ERR_DEVICE, "building OpenCL kernels (%s ...) failed: %s",
+                        first_name, cache);
+    }
     size_t bytes = 0;
     clGetProgramBuildInfo(program, device->id, CL_PROGRAM_BUILD_LOG, 0, NULL, &bytes);
     char *log = calloc(bytes + 1, 1);

@@ -129,6 +129,7 @@ bst_status bst_engine_load(bst_ctx *ctx, bst_engine *engine) {
                               .device = flags & BST_MODULE_NEEDS_DEVICE ? spec->device : NULL,
                               .observer = spec->observer,
                               .sensor = spec->sensor,
+                              .exposure_s = spec->exposure_s,
                               .engine_private = self};
         bst_status status = spec->desc->create(&env, spec->config, &self->self);
         if (status != BST_OK) {
@@ -167,13 +168,11 @@ static bst_status step_instance(bst_ctx *ctx, bst_engine *engine, int index, int
     struct bst_step step = {engine, self, ctx, tick, 0, BST_OK};
     self->steps++;
     bst_status status = self->spec.desc->step(self->self, &step);
-    if (status == BST_OK) {
-        status = bst_engine_commit(&step);
-    }
     if (status != BST_OK) {
         return bst_fail_prefix(ctx, status, "%s at %.6f s", self->name,
                                (double)tick / (double)engine->tick_rate_hz);
     }
+    BST_TRY(bst_engine_commit(&step)); /* a hook's failure is not the instance's */
     bst_engine_set_due(engine, index, bst_engine_earliest(engine, self));
     return BST_OK;
 }

@@ -339,6 +339,21 @@ static bst_status check_name(bst_ctx *ctx, const bst_scenario *s, const char *pa
     return BST_OK;
 }
 
+static bst_status prepare_cameras(bst_ctx *ctx, bst_scenario *s) {
+    const bst_observer_config *observers = s->observers.items;
+    for (int i = 0; i < s->observers.count; i++) {
+        bst_sensor_config *sensors = observers[i].sensors.items;
+        for (int k = 0; k < observers[i].sensors.count; k++) {
+            if (bst_camera_prepare(ctx, &sensors[k].camera) != BST_OK) {
+                return bst_fail_prefix(ctx, BST_ERR_CONFIG,
+                                       "%s: /observers/%d/sensors/%d/camera/distortion", s->file, i,
+                                       k);
+            }
+        }
+    }
+    return BST_OK;
+}
+
 static bst_status check_names(bst_ctx *ctx, const bst_scenario *s) {
     const bst_observer_config *observers = s->observers.items;
     for (int i = 0; i < s->observers.count; i++) {
@@ -390,6 +405,7 @@ bst_status bst_scenario_read(bst_ctx *ctx, const bst_json *json, const bst_regis
     if (bst_record_config_check(ctx, &out->record) != BST_OK) {
         return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s", out->file);
     }
+    BST_TRY(prepare_cameras(ctx, out));
     BST_TRY(check_names(ctx, out));
     BST_TRY(resolve_paths(ctx, out, "", bst_scenario_table, out, false));
     return read_modules(ctx, json, registry, out);

@@ -46,14 +46,17 @@ static bst_instance_spec sensor_spec(const bst_scenario *scenario, const bst_sim
     for (int i = 0; i < observer; i++) {
         index += observers[i].sensors.count;
     }
-    return (bst_instance_spec){.scope = scope,
-                               .world = sim->world,
-                               .knowledge = sim->knowledge[index],
-                               .device = sim->device,
-                               .observer = observer,
-                               .sensor = sensor,
-                               .seed = scenario->seed,
-                               .run = (uint64_t)scenario->run};
+    return (bst_instance_spec){
+        .scope = scope,
+        .world = sim->world,
+        .knowledge = sim->knowledge[index],
+        .device = sim->device,
+        .observer = observer,
+        .sensor = sensor,
+        .exposure_s = ((const bst_sensor_config *)observers[observer].sensors.items)[sensor]
+                          .exposure.exposure_s,
+        .seed = scenario->seed,
+        .run = (uint64_t)scenario->run};
 }
 
 static bst_status add_modules(bst_ctx *ctx, const bst_scenario *scenario, bst_simulation *sim) {
@@ -95,6 +98,7 @@ static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
                         const bst_simulation_options *options, bst_simulation *sim) {
     BST_TRY(bst_world_create(ctx, scenario->file, &scenario->world, &scenario->observers,
                              scenario->base_dir, scenario->epoch, &sim->world));
+    BST_TRY(bst_world_check_spans(ctx, scenario->file, sim->world, scenario->duration_s));
     BST_TRY(make_knowledge(ctx, scenario, sim));
     for (int m = 0; m < scenario->module_count && !sim->device; m++) {
         if (scenario->modules[m].desc->flags & BST_MODULE_NEEDS_DEVICE) {

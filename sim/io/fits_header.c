@@ -32,6 +32,13 @@ double bst_fits_saturation_dn(const bst_camera *camera, int bits) {
     return fmin(full, (double)((1 << bits) - 1));
 }
 
+/* V magnitude of a source that gives one detected electron per second, in the camera's own band. */
+static double zero_point_mag(const bst_camera *c) {
+    double pupil_m2 = 0.25 * BST_PI * c->aperture_m * c->aperture_m * (1.0 - c->obscuration);
+    return 2.5 *
+           log10(c->photon_flux_v0_per_s_m2 * pupil_m2 * c->throughput * c->quantum_efficiency);
+}
+
 double bst_fits_date(const bst_fits_frame *frame, bst_fits_moment moment, char text[40]) {
     bst_time t = bst_time_add(frame->start, 0.5 * (double)moment * frame->exposure_s);
     bst_time_to_utc(t, 6, text, 40);
@@ -60,6 +67,8 @@ void bst_fits_put_run_keys(fitsfile *file, const bst_fits_names *names, int *cod
     put_int(file, "BITS", c->bits, "[bit] of the converter", code);
     put_real(file, "PIXSCALE", c->pixel_scale_arcsec, "[arcsec/pixel] at the boresight, unbinned",
              code);
+    put_real(file, "ZEROPNT", zero_point_mag(c), "[mag] V of a source of 1 detected e-/s", code);
+    put_real(file, "DARKCUR", c->dark_current_e_per_s, "[e-/s] dark current per pixel", code);
     put_real(file, "APTDIA", c->aperture_m, "[m] diameter of the entrance pupil", code);
     bst_fits_put_lens(file, c, code);
     fits_write_key_str(file, "TIMESYS", "UTC", "time scale of the dates", code);
@@ -132,6 +141,8 @@ void bst_fits_put_frame_keys(fitsfile *file, const bst_fits_names *names,
     put_real(file, "RDNOISE", names->camera.read_noise_e, "[e-] read noise, 1 sigma", code);
     put_real(file, "OFFSET", names->camera.offset_dn, "[adu] value of a pixel without charge",
              code);
+    put_real(file, "ZEROPNT", zero_point_mag(&names->camera),
+             "[mag] V of a source of 1 detected e-/s", code);
     put_real(file, "SATURATE", bst_fits_saturation_dn(&names->camera, frame->bits),
              "[adu] full well or end of the converter", code);
     put_text(file, "OBJECT", names->object, "target of interest", code);

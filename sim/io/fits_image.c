@@ -1,14 +1,15 @@
 #include "sim/io/fits_image.h"
 
+#include <errno.h>
 #include <fitsio.h>
-#include <inttypes.h>
 #include <math.h>
-#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
 #include "sim/core/file.h"
+#include "sim/io/fits_check.h"
 
 enum { LONGEST_SIDE = 32768, MOST_PIXELS = 1 << 28, BLOCK = 2880 };
 static const uint64_t MAX_FILE_BYTES = (uint64_t)4 << 30;
@@ -46,30 +47,6 @@ static bst_status find_image(bst_ctx *ctx, const char *path, fitsfile *file, lon
                      : fail_cfitsio(ctx, path, code);
 }
 
-/* Refuses to make room for pixels that the file does not hold, and to take the zeros that cfitsio
- * gives for what lies beyond its end. Of a compressed image, at most the last block may be short.
- */
-static bst_status check_room(bst_ctx *ctx, const char *path, fitsfile *file, const long size[2],
-                             uint64_t bytes) {
-    int code = 0, type = 0;
-    LONGLONG header = 0, data = 0, end = 0;
-    fits_get_img_type(file, &type, &code);
-    fits_get_hduaddrll(file, &header, &data, &end, &code);
-    bool compressed = fits_is_compressed_image(file, &code);
-    if (code != 0) {
-        return fail_cfitsio(ctx, path, code);
-    }
-    uint64_t pixels = (uint64_t)size[0] * (uint64_t)size[1] * (uint64_t)(abs(type) / 8);
-    uint64_t needed = compressed ? (uint64_t)end - (BLOCK - 1) : (uint64_t)data + pixels;
-    if (needed > bytes) {
-        return bst_fail(ctx, BST_ERR_FORMAT,
-                        "%.400s: is cut short: an image of %ld x %ld pixels of %d bits that ends "
-                        "at byte %" PRIu64 " of %" PRIu64,
-                        path, size[0], size[1], abs(type), needed, bytes);
-    }
-    return BST_OK;
-}
-
 static bst_status read_pixels(bst_ctx *ctx, const char *path, fitsfile *file, const long size[2],
                               float **pixels) {
     size_t count = (size_t)size[0] * (size_t)size[1];
@@ -89,13 +66,10 @@ static bst_status read_pixels(bst_ctx *ctx, const char *path, fitsfile *file, co
     return BST_OK;
 }
 
-static bst_status read_image(bst_ctx *ctx, const char *path, fitsfile *file, uint64_t bytes,
-                             int *width, int *height, float **pixels) {
+static bst_status read_image(bst_ctx *ctx, const char *path, fitsfile *file, int *width,
+                             int *height, float **pixels) {
     long size[2] = {0, 0};
     bst_status status = find_image(ctx, path, file, size);
-    if (status == BST_OK) {
-        status = check_room(ctx, path, file, size, bytes);
-    }
     if (status == BST_OK) {
         status = read_pixels(ctx, path, file, size, pixels);
     }
@@ -109,55 +83,66 @@ static bst_status read_image(bst_ctx *ctx, const char *path, fitsfile *file, uin
     return status;
 }
 
-/* cfitsio also takes compressed files, which may unpack to any size, and other formats. */
-static bst_status check_start(bst_ctx *ctx, const char *path, const char *start, size_t bytes) {
+/* cfitsio also takes files that are compressed as a whole, which may unpack to any size, and other
+ * formats, and believes sizes. */
+static bst_status check(bst_ctx *ctx, const char *path, const void *data, uint64_t bytes) {
     static const char expected[] = "SIMPLE  = ";
-    if (bytes < sizeof expected - 1 || memcmp(start, expected, sizeof expected - 1) != 0) {
+    if (bytes < sizeof expected - 1 || memcmp(data, expected, sizeof expected - 1) != 0) {
         return bst_fail(ctx, BST_ERR_FORMAT,
                         "%.400s: does not begin as a FITS file does (allowed: FITS, not "
                         "compressed as a whole)",
                         path);
     }
-    return BST_OK;
+    return bst_fits_check_structure(ctx, path, data, bytes);
+}
+
+static bst_status check_file(bst_ctx *ctx, const char *path) {
+    int fd;
+    uint64_t bytes;
+    BST_TRY(bst_file_open(ctx, path, MAX_FILE_BYTES, "a FITS file", &fd, &bytes));
+    void *data = bytes ? mmap(NULL, (size_t)bytes, PROT_READ, MAP_PRIVATE, fd, 0) : NULL;
+    close(fd);
+    if (data == MAP_FAILED) {
+        return bst_fail(ctx, BST_ERR_IO, "%.400s: cannot be read: %s", path, strerror(errno));
+    }
+    bst_status status = check(ctx, path, data, bytes);
+    if (data) {
+        munmap(data, (size_t)bytes);
+    }
+    return status;
 }
 
 bst_status bst_fits_read_image(bst_ctx *ctx, const char *path, int *width, int *height,
                                float **pixels) {
     *pixels = NULL;
     *width = *height = 0;
-    int fd;
-    uint64_t bytes;
-    BST_TRY(bst_file_open(ctx, path, MAX_FILE_BYTES, "a FITS file", &fd, &bytes));
-    char start[16];
-    ssize_t got = read(fd, start, sizeof start);
-    close(fd);
-    BST_TRY(check_start(ctx, path, start, got > 0 ? (size_t)got : 0));
+    BST_TRY(check_file(ctx, path));
     fitsfile *file = NULL;
     int code = 0;
     /* "disk file": a path with brackets is a path, not cfitsio's extended syntax */
     if (fits_open_diskfile(&file, path, READONLY, &code) != 0) {
         return fail_cfitsio(ctx, path, code);
     }
-    return read_image(ctx, path, file, bytes, width, height, pixels);
+    return read_image(ctx, path, file, width, height, pixels);
 }
 
 bst_status bst_fits_read_image_buffer(bst_ctx *ctx, const char *name, const void *data,
                                       size_t bytes, int *width, int *height, float **pixels) {
     *pixels = NULL;
     *width = *height = 0;
-    BST_TRY(check_start(ctx, name, data, bytes));
-    /* cfitsio wants to own what it may change */
-    void *copy = malloc(bytes);
+    BST_TRY(check(ctx, name, data, bytes));
+    /* cfitsio wants to own what it may change, and reads whole blocks, also beyond the end */
+    size_t copy_bytes = (bytes + BLOCK - 1) / BLOCK * BLOCK;
+    void *copy = calloc(1, copy_bytes);
     if (!copy) {
         return bst_fail(ctx, BST_ERR_MEMORY, "%.400s: no memory for %zu bytes", name, bytes);
     }
     memcpy(copy, data, bytes);
     fitsfile *file = NULL;
-    size_t copy_bytes = bytes;
     int code = 0;
     bst_status status =
         fits_open_memfile(&file, "memory", READONLY, &copy, &copy_bytes, 0, NULL, &code) == 0
-            ? read_image(ctx, name, file, bytes, width, height, pixels)
+            ? read_image(ctx, name, file, width, height, pixels)
             : fail_cfitsio(ctx, name, code);
     free(copy);
     return status;

@@ -7,10 +7,10 @@
 #include "sim/core/status.h"
 
 /* Reads the file's first image of two axes, in the primary array or an extension, of any BITPIX,
- * tile-compressed ones too. *pixels is row-major [*height][*width], physical values (BSCALE and
+ * not compressed. *pixels is row-major [*height][*width], physical values (BSCALE and
  * BZERO applied), NAN where the image has none (BLANK, NaN); the first row of the file is row 0.
  * The caller frees *pixels. BST_ERR_NOT_FOUND, BST_ERR_IO: the file cannot be opened or read, with
- * the system's or cfitsio's reason; BST_ERR_FORMAT: it is no FITS file, or compressed as a whole,
+ * the system's or cfitsio's reason; BST_ERR_FORMAT: it is no FITS file, or compressed,
  * or has no such image, or a side is longer than 32768, or it has more than 2^28 pixels, or is cut
  * short; BST_ERR_MEMORY. Source: FITS Standard 4.0, sections 4.4.2 and 5. */
 bst_status bst_fits_read_image(bst_ctx *ctx, const char *path, int *width, int *height,

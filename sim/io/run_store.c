@@ -252,6 +252,9 @@ bst_status bst_run_create(bst_ctx *ctx, const char *out_path, bool overwrite, bs
     }
     if (status == BST_OK) {
         status = bst_run_open_database(ctx, run);
+        if (status != BST_OK) {
+            remove_tree(AT_FDCWD, run->folder); /* ours, and nothing is in it yet */
+        }
     }
     if (status != BST_OK) {
         if (run->lock >= 0) {

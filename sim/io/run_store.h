@@ -3,6 +3,7 @@
 #ifndef BST_IO_RUN_STORE_H
 #define BST_IO_RUN_STORE_H
 
+#include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -21,7 +22,8 @@ typedef struct bst_table bst_table;
  * the run finishes, and only if it is an empty folder or holds a run (manifest.json or run.sqlite).
  * A .partial that a dead run left is logged as a warning and replaced; one that a living process
  * still writes (it holds a lock on it) is refused.
- * Errors: BST_ERR_IO with the path and the system's reason; BST_ERR_ARGUMENT for an empty path. */
+ * Errors, which leave nothing behind: BST_ERR_IO with the path and the system's reason;
+ * BST_ERR_ARGUMENT for an empty path. */
 bst_status bst_run_create(bst_ctx *ctx, const char *out_path, bool overwrite,
                           bst_run **out) BST_MUST_CHECK;
 
@@ -66,7 +68,8 @@ typedef struct bst_column {
     const char *doc;
 } bst_column;
 
-/* A cell. NAN and NULL text are stored as SQL NULL. */
+/* A cell. What is no finite number (the magnitude of what sends no light, say) and NULL text are
+ * stored as SQL NULL. */
 typedef struct bst_value {
     bst_column_type type;
     bool is_null;
@@ -87,7 +90,7 @@ static inline bst_value bst_int_value(int64_t value) {
 static inline bst_value bst_real_value(double value) {
     bst_value v;
     v.type = BST_COLUMN_REAL;
-    v.is_null = value != value;
+    v.is_null = !isfinite(value);
     v.as.real = value;
     return v;
 }

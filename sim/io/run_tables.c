@@ -10,19 +10,25 @@
 #define SQL_BYTES 8192
 
 static bst_status fail_sql(bst_ctx *ctx, const bst_run *run, const char *what) {
+    int last = errno, code = run->db ? sqlite3_errcode(run->db) & 0xff : 0;
     int error = run->db ? sqlite3_system_errno(run->db) : 0;
+    if (error == 0 && (code == SQLITE_IOERR || code == SQLITE_FULL)) {
+        error = last; /* SQLite does not always keep it; it was cleared before the call */
+    }
     return bst_fail(ctx, BST_ERR_IO, "%s/%s: %s: %s%s%s%s", run->folder, BST_RUN_DATABASE, what,
                     run->db ? sqlite3_errmsg(run->db) : "out of memory", error ? " (" : "",
                     error ? strerror(error) : "", error ? ")" : "");
 }
 
 static bst_status execute(bst_ctx *ctx, bst_run *run, const char *sql, const char *what) {
+    errno = 0;
     return sqlite3_exec(run->db, sql, NULL, NULL, NULL) == SQLITE_OK ? BST_OK
                                                                      : fail_sql(ctx, run, what);
 }
 
 /* Runs a prepared statement that returns no rows. */
 static bst_status step_once(bst_ctx *ctx, bst_run *run, sqlite3_stmt *statement, const char *what) {
+    errno = 0;
     bst_status status = sqlite3_step(statement) == SQLITE_DONE ? BST_OK : fail_sql(ctx, run, what);
     sqlite3_reset(statement);
     return status;

@@ -109,16 +109,21 @@ static inline bst_vec3 bst_camera_unproject(const bst_camera *c, double x_px, do
         (bst_vec3){(x_px - bst_camera_centre_x(c)) * s, (y_px - bst_camera_centre_y(c)) * s, 1.0});
 }
 
+/* Whether a direction has no image because it lies beyond the fold of the distortion, but by no
+ * more than margin_px of undistorted pixels. */
+bool bst_camera_beyond_fold(const bst_camera *c, bst_vec3 v_cam, double margin_px);
+
 /* Derivative of the pixel by the direction's tangent coordinates in camera axes, a = v.x / v.z and
  * b = v.y / v.z, times the pixel scale: d(x, y) / d(a, b) = k / bst_camera_scale_rad.
  * Dimensionless; the identity without rotation and distortion. */
 void bst_camera_jacobian(const bst_camera *c, bst_vec3 v_cam, double k[2][2]);
 
 /* Angle from `centre` (unit, camera frame) within which all directions lie that fall into the
- * rectangle of pixel places [x0, x1] x [y0, y1]. For rotated or distorted cameras; includes what
- * lies between the places of the border that are tried. */
+ * rectangle of pixel places [x0, x1] x [y0, y1], or may move into it by margin_px from beyond the
+ * fold. For rotated or distorted cameras; includes what lies between the places of the border that
+ * are tried. */
 double bst_camera_reach_rad(const bst_camera *c, bst_vec3 centre, double x0, double y0, double x1,
-                            double y1);
+                            double y1, double margin_px);
 
 /* Sides of a rectangle about the boresight, in undistorted pixels along the focal plane's axes, all
  * of which the sensor sees: what a search may count on. */

@@ -1,7 +1,8 @@
 #include "sim/world/world_internal.h"
 
 bst_status bst_cue_nominal_direction(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
-                                     bst_sky_clock *clock, double seconds, bst_vec3 *out) {
+                                     bst_sky_clock *clock, double seconds, const bst_state *eye,
+                                     bst_vec3 *out) {
     const world_sensor *s = &world->observers[observer].sensors[sensor];
     if (s->cue_object < 0) {
         const double *radec = s->config.cue.direction_radec_deg;
@@ -10,12 +11,10 @@ bst_status bst_cue_nominal_direction(bst_ctx *ctx, const bst_world *world, int o
     }
     bst_sky sky;
     BST_TRY(bst_sky_clock_at(ctx, clock, bst_time_add(world->epoch, seconds), &sky));
-    bst_state eye, target;
-    BST_TRY(bst_orbit_state(ctx, &world->observers[observer].orbit, clock, world->epoch, seconds,
-                            true, &eye));
+    bst_state target;
     bst_vec3 geometric;
     double emission_s;
-    BST_TRY(bst_orbit_line_of_sight(ctx, &world->objects[s->cue_object].orbit, &eye, clock,
+    BST_TRY(bst_orbit_line_of_sight(ctx, &world->objects[s->cue_object].orbit, eye, clock,
                                     world->epoch, &sky.bodies, seconds, false, &geometric, &target,
                                     &emission_s));
     *out = bst_vec3_unit(geometric);
@@ -34,7 +33,10 @@ bst_status bst_cue_resolve(bst_ctx *ctx, const char *scenario, bst_world *world,
             scenario, observer, sensor, cue->object);
     }
     bst_vec3 nominal;
-    BST_TRY(bst_cue_nominal_direction(ctx, world, observer, sensor, clock, 0.0, &nominal));
+    bst_state eye;
+    BST_TRY(bst_orbit_state(ctx, &world->observers[observer].orbit, clock, world->epoch, 0.0, true,
+                            &eye));
+    BST_TRY(bst_cue_nominal_direction(ctx, world, observer, sensor, clock, 0.0, &eye, &nominal));
     /* The error is a rotation about the image axis at right angles to the one along which the cue
      * is wrong. */
     const double *x = s->config.x_axis_gcrf;

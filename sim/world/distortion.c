@@ -158,6 +158,12 @@ bool bst_camera_project_general(const bst_camera *c, bst_vec3 v, double *x_px, d
     return true;
 }
 
+bool bst_camera_beyond_fold(const bst_camera *c, bst_vec3 v, double margin_px) {
+    double r = hypot(v.x, v.y) / v.z;
+    return v.z > 0.0 && r > c->geometry.domain &&
+           r <= c->geometry.domain + margin_px * bst_camera_scale_rad(c);
+}
+
 bst_vec3 bst_camera_unproject_general(const bst_camera *c, double x_px, double y_px) {
     double s = bst_camera_scale_rad(c);
     plane u = undistort(
@@ -181,7 +187,7 @@ void bst_camera_jacobian(const bst_camera *c, bst_vec3 v, double k[2][2]) {
 }
 
 double bst_camera_reach_rad(const bst_camera *c, bst_vec3 centre, double x0, double y0, double x1,
-                            double y1) {
+                            double y1, double margin_px) {
     enum { SIDE = 16 };
     double reach = 0.0, gap = 0.0;
     bst_vec3 last = bst_camera_unproject(c, x0, y0);
@@ -203,7 +209,11 @@ double bst_camera_reach_rad(const bst_camera *c, bst_vec3 centre, double x0, dou
         gap = fmax(gap, bst_vec3_angle(last, v));
         last = v;
     }
-    return reach + gap;
+    double far_x = fmax(x1 - bst_camera_centre_x(c), bst_camera_centre_x(c) - x0);
+    double far_y = fmax(y1 - bst_camera_centre_y(c), bst_camera_centre_y(c) - y0);
+    bool folds = hypot(far_x, far_y) * bst_camera_scale_rad(c) > c->geometry.image_radius;
+    /* what is beyond the fold may come over it */
+    return reach + gap + (folds ? margin_px * bst_camera_scale_rad(c) : 0.0);
 }
 
 void bst_camera_field_px(const bst_camera *c, double *width_px, double *height_px) {

@@ -173,6 +173,24 @@ static bst_quat attitude_at(const bst_los_track *track, double time_s) {
     return bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], s);
 }
 
+/* The attitude that shows a star near the boresight at the mean of its places in the exposure. The
+ * mean of the rotation alone is beside it when the camera turns about its axis while it slews: the
+ * track of the star is bent. */
+static bst_quat attitude_of_mean_place(const bst_field *field) {
+    bst_quat mean = field->sigma_q[0];
+    bst_vec3 axis = bst_quat_rotate(bst_quat_conj(mean), (bst_vec3){0, 0, 1});
+    double x = 0.0, y = 0.0;
+    for (int p = 1; p < SIGMA_POINTS; p++) {
+        bst_vec3 seen = bst_quat_rotate(field->sigma_q[p], axis);
+        x += seen.x / seen.z / (SIGMA_POINTS - 1);
+        y += seen.y / seen.z / (SIGMA_POINTS - 1);
+    }
+    if (!isfinite(x) || !isfinite(y)) {
+        return mean; /* turned by a right angle: there is no image of anything */
+    }
+    return bst_quat_mul(bst_quat_from_rotvec((bst_vec3){-y, x, 0.0}), mean);
+}
+
 /* Sigma points of the exposure, the mean attitude, and the largest displacement (px) of any image
  * point from its place at mid-exposure. */
 static void summarise_track(bst_field *field, const bst_los_track *track, bst_quat *mean,
@@ -230,7 +248,7 @@ static void summarise_track(bst_field *field, const bst_los_track *track, bst_qu
             bst_quat_from_rotvec((bst_vec3){point[0], point[1], point[2]}), field->q_mid);
         field->sigma_time[p] = point[3];
     }
-    *mean = field->sigma_q[0];
+    *mean = attitude_of_mean_place(field);
     *reach_px = reach;
 }
 
@@ -303,9 +321,12 @@ static bst_status reserve_sources(bst_ctx *ctx, bst_field *field, int count) {
 static bool near_window(const bst_field *field, bst_quat q, bst_vec3 direction, bst_window window,
                         double margin_px) {
     double x, y;
-    return bst_camera_project(field->camera, bst_quat_rotate(q, direction), &x, &y) &&
-           x >= window.x0 - margin_px && y >= window.y0 - margin_px &&
-           x <= window.x0 + window.width - 1 + margin_px &&
+    bst_vec3 v = bst_quat_rotate(q, direction);
+    if (field->camera->geometry.general && bst_camera_beyond_fold(field->camera, v, margin_px)) {
+        return true; /* no image now, but it may come within the exposure */
+    }
+    return bst_camera_project(field->camera, v, &x, &y) && x >= window.x0 - margin_px &&
+           y >= window.y0 - margin_px && x <= window.x0 + window.width - 1 + margin_px &&
            y <= window.y0 + window.height - 1 + margin_px;
 }
 
@@ -382,7 +403,7 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     if (camera->geometry.general) {
         radius += bst_camera_reach_rad(camera, centre_cam, window.x0 - margin_px,
                                        window.y0 - margin_px, window.x0 + window.width + margin_px,
-                                       window.y0 + window.height + margin_px);
+                                       window.y0 + window.height + margin_px, margin_px);
     } else {
         radius += atan(bst_camera_scale_rad(camera) *
                        (0.5 * hypot(window.width, window.height) + sqrt(2.0) * margin_px));

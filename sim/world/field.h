@@ -10,7 +10,7 @@
  * exposure is the quadratic through three points. */
 typedef struct bst_source {
     int32_t kind; /* bst_source_kind */
-    uint32_t id;  /* star: Tycho-2 identity; object: index in the world */
+    uint32_t id;  /* star: Tycho-2 identity, or statistical (bit 31); object: index in the world */
     bst_vec3 apparent_start, apparent_mid, apparent_end; /* GCRF axes, unit; equal for stars */
     double electrons_per_s;                              /* detected, at mid exposure */
     double v_mag;

@@ -10,6 +10,20 @@ struct bst_knowledge_view {
     bst_sky_clock *clock;
 };
 
+static bst_status alter_camera(bst_ctx *ctx, const bst_camera_errors_config *errors,
+                               bst_knowledge *k) {
+    bst_camera *c = &k->camera;
+    c->pixel_scale_arcsec *= 1.0 + 1e-6 * errors->scale_error_ppm;
+    c->rotation_deg += errors->rotation_error_deg;
+    c->distortion = errors->own_distortion ? errors->distortion : c->distortion;
+    c->psf_fwhm_px = errors->psf_fwhm_px > 0.0 ? errors->psf_fwhm_px : c->psf_fwhm_px;
+    bst_status status = bst_camera_prepare(ctx, c);
+    return status == BST_OK
+               ? status
+               : bst_fail_prefix(ctx, status, "/observers/%d/sensors/%d/knowledge/camera",
+                                 k->observer, k->sensor);
+}
+
 bst_status bst_knowledge_create(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
                                 bst_knowledge **out) {
     *out = NULL;
@@ -33,22 +47,40 @@ bst_status bst_knowledge_create(bst_ctx *ctx, const bst_world *world, int observ
                                    observer, sensor);
         }
     }
+    bst_status status = alter_camera(ctx, &config->knowledge.camera, k);
+    const bst_star_errors_config *errors = &config->knowledge.stars;
+    if (status == BST_OK && (errors->dropped_fraction > 0.0 || errors->displaced_fraction > 0.0)) {
+        status = bst_stars_with_errors(ctx, k->own_stars ? k->own_stars : world->stars, errors,
+                                       &k->altered);
+    }
+    if (status != BST_OK) {
+        bst_knowledge_free(k);
+        return status;
+    }
     *out = k;
     return BST_OK;
 }
 
 void bst_knowledge_free(bst_knowledge *k) {
     if (k) {
+        bst_stars_close(k->altered);
         bst_stars_close(k->own_stars);
         free(k);
     }
+}
+
+const char *bst_knowledge_psf_file(const bst_knowledge *k, double *oversampling) {
+    const bst_camera_errors_config *camera =
+        &k->world->observers[k->observer].sensors[k->sensor].config.knowledge.camera;
+    *oversampling = camera->psf_oversampling;
+    return camera->psf_file;
 }
 
 const bst_camera *bst_knowledge_camera(const bst_knowledge *k) {
     return &k->camera;
 }
 const bst_stars *bst_knowledge_stars(const bst_knowledge *k) {
-    return k->own_stars ? k->own_stars : k->world->stars;
+    return k->altered ? k->altered : k->own_stars ? k->own_stars : k->world->stars;
 }
 double bst_knowledge_julian_year(const bst_knowledge *k) {
     return k->julian_year;
@@ -88,8 +120,11 @@ bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double s
     const double h = 0.5;
     bst_vec3 d[3];
     for (int i = 0; i < 3; i++) {
-        BST_TRY(bst_cue_nominal_direction(ctx, k->world, k->observer, k->sensor, view->clock,
-                                          seconds + (i - 1) * h, &d[i]));
+        double t = bst_believed_seconds(k->world, k->observer, k->sensor, seconds + (i - 1) * h);
+        bst_state eye;
+        BST_TRY(bst_believed_state(ctx, k->world, k->observer, k->sensor, view->clock, t, &eye));
+        BST_TRY(bst_cue_nominal_direction(ctx, k->world, k->observer, k->sensor, view->clock, t,
+                                          &eye, &d[i]));
     }
     const world_sensor *sensor = &k->world->observers[k->observer].sensors[k->sensor];
     const bst_cue_config *cue = &sensor->config.cue;

@@ -8,6 +8,9 @@
 typedef struct bst_knowledge bst_knowledge;
 
 const bst_camera *bst_knowledge_camera(const bst_knowledge *knowledge);
+/* The FITS image of the PSF that is known on board ("": none, the camera's psf_fwhm_px holds), and
+ * its samples per pixel (0: the file says). */
+const char *bst_knowledge_psf_file(const bst_knowledge *knowledge, double *oversampling);
 const bst_stars *bst_knowledge_stars(const bst_knowledge *knowledge);
 double bst_knowledge_julian_year(
     const bst_knowledge *knowledge); /* at the epoch, for proper motion */

@@ -140,9 +140,9 @@ static bst_status load_sets(const bst_world_builder *b, const bst_config_list *c
     const bst_catalogue_config *configs = catalogues->items;
     for (int i = 0; i < catalogues->count; i++) {
         bst_world_path file = bst_world_path_join(b, configs[i].elements_file);
-        bst_tle_options options = {.norad = 0};
+        bst_elements_options options = {.norad = 0};
         bst_status status =
-            bst_tle_load(b->ctx, file.text, &options, &out->sets[i], &out->count[i]);
+            bst_elements_load(b->ctx, file.text, &options, &out->sets[i], &out->count[i]);
         out->catalogues = i + 1;
         if (status != BST_OK) {
             return bst_fail_prefix(b->ctx, BST_ERR_CONFIG, "%s: /world/catalogues/%d/elements_file",

@@ -114,6 +114,10 @@ bst_status bst_orbit_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *
         case BST_ORBIT_SGP4:
             BST_TRY(sgp4_state(ctx, orbit, clock, epoch, seconds, out));
             break;
+        case BST_ORBIT_OEM:
+        case BST_ORBIT_INJECTED:
+            BST_TRY(bst_orbit_file_state(ctx, orbit, clock, epoch, seconds, out));
+            break;
         case BST_ORBIT_NUMERICAL:
             return numerical_state(ctx, orbit, seconds, with_burns, out);
         default:

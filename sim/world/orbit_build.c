@@ -33,8 +33,8 @@ static bst_status build_sgp4(const bst_world_builder *b, const bst_orbit_config 
     bst_world_path file = bst_world_path_join(b, config->elements_file);
     bst_elements *sets = NULL;
     int count = 0;
-    bst_tle_options options = {.norad = (int)config->norad};
-    if (bst_tle_load(b->ctx, file.text, &options, &sets, &count) != BST_OK) {
+    bst_elements_options options = {.norad = (int)config->norad};
+    if (bst_elements_load(b->ctx, file.text, &options, &sets, &count) != BST_OK) {
         return bst_fail_prefix(b->ctx, BST_ERR_CONFIG, "%s: %s/elements_file", b->scenario, path);
     }
     /* of several sets the one whose epoch is nearest to the scenario's */
@@ -106,6 +106,10 @@ bst_status bst_orbit_build(const bst_world_builder *b, const bst_orbit_config *c
     switch (config->source) {
         case BST_ORBIT_SGP4:
             BST_TRY(build_sgp4(b, config, path, name, orbit, norad));
+            break;
+        case BST_ORBIT_OEM:
+        case BST_ORBIT_INJECTED:
+            BST_TRY(bst_orbit_build_file(b, config, path, orbit));
             break;
         case BST_ORBIT_NUMERICAL:
             return bst_orbit_build_numerical(b, config, burns, path, name, orbit, norad);

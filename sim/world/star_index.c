@@ -1,6 +1,8 @@
 #include "sim/world/star_index.h"
 
 #include <inttypes.h>
+#include <math.h>
+#include <stdbool.h>
 #include <string.h>
 
 #define REMEDY "run `boresight stars fetch` to make it again"
@@ -75,10 +77,27 @@ uint64_t bst_star_checksum(const void *data, size_t bytes) {
     return sum ^ sum >> 32;
 }
 
+static bool is_finite_cell(const bst_star_cell *c) {
+    return isfinite(c->centre[0]) && isfinite(c->centre[1]) && isfinite(c->centre[2]) &&
+           isfinite(c->radius_rad) && isfinite(c->pm_max_radpyr);
+}
+
+static bst_status check_patches(bst_ctx *ctx, const char *label, const bst_star_view *view) {
+    for (uint32_t i = 0; i < view->header->patch_count; i++) {
+        const bst_star_patch *p = &view->patches[i];
+        if (!(p->ra_deg >= 0.0 && p->ra_deg < 360.0 && fabs(p->dec_deg) <= 90.0 &&
+              p->radius_deg > 0.0 && p->radius_deg <= 180.0 && isfinite(p->v_mag))) {
+            return bst_fail(ctx, BST_ERR_FORMAT,
+                            "star catalogue %s is damaged (patch %" PRIu32 "): " REMEDY, label, i);
+        }
+    }
+    return BST_OK;
+}
+
 static bst_status check_cells(bst_ctx *ctx, const char *label, const bst_star_view *view) {
     uint64_t next = 0;
     for (uint32_t i = 0; i < view->header->cell_count; i++) {
-        if (view->cells[i].first != next) {
+        if (view->cells[i].first != next || !is_finite_cell(&view->cells[i])) {
             return bst_fail(ctx, BST_ERR_FORMAT,
                             "star catalogue %s is damaged (sky cell %" PRIu32 "): " REMEDY, label,
                             i);
@@ -135,16 +154,17 @@ bst_status bst_star_view_init(bst_ctx *ctx, const char *label, const void *data,
                         label, sum, h->checksum);
     }
     if (h->cell_count != BST_STAR_CELLS || h->patch_count > BST_STAR_PATCHES_MAX ||
-        h->star_count > UINT32_MAX ||
+        h->star_count > UINT32_MAX || !isfinite(h->complete_to_v_mag) ||
         bytes != sizeof *h + h->patch_count * sizeof(bst_star_patch) +
                      h->cell_count * sizeof(bst_star_cell) +
                      h->star_count * sizeof(bst_star_record)) {
         return bst_fail(ctx, BST_ERR_FORMAT,
-                        "star catalogue %s is damaged (sizes in the header): " REMEDY, label);
+                        "star catalogue %s is damaged (numbers in the header): " REMEDY, label);
     }
     out->header = h;
     out->patches = (const bst_star_patch *)(h + 1);
     out->cells = (const bst_star_cell *)(out->patches + h->patch_count);
     out->records = (const bst_star_record *)(out->cells + h->cell_count);
+    BST_TRY(check_patches(ctx, label, out));
     return check_cells(ctx, label, out);
 }

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "sim/core/file.h"
+#include "sim/core/rng.h"
 #include "sim/world/star_index.h"
 #include "sim/world/world_internal.h"
 
@@ -22,7 +23,46 @@ struct bst_stars {
     void *mapping; /* NULL when embedded */
     size_t mapping_bytes;
     char path[512];
+    bool borrowed; /* the mapping is another catalogue's */
+    bool altered;
+    bst_star_errors_config errors;
+    bst_rng_key key;
 };
+
+/* Beyond this many standard deviations nothing is drawn: Box and Muller of 53 bits end at 8.6. */
+#define MOST_SIGMAS 9.0
+
+/* Draws of one star. */
+enum { DRAW_DROPPED, DRAW_DISPLACED, DRAW_OFFSET };
+
+/* Gives a star the errors of this catalogue; false when it is dropped. */
+static bool alter(const bst_stars *s, uint32_t id, bst_vec3 *direction) {
+    const bst_star_errors_config *e = &s->errors;
+    if (bst_rng_uniform(s->key, id, DRAW_DROPPED) < e->dropped_fraction) {
+        return false;
+    }
+    if (bst_rng_uniform(s->key, id, DRAW_DISPLACED) < e->displaced_fraction) {
+        double offset[2], sigma = e->displaced_sigma_arcsec * BST_ARCSEC_RAD;
+        bst_rng_normal2(s->key, id, DRAW_OFFSET, offset);
+        bst_vec3 a = bst_vec3_perpendicular(*direction), b = bst_vec3_cross(*direction, a);
+        *direction = bst_vec3_unit(
+            bst_vec3_axpy(bst_vec3_axpy(*direction, sigma * offset[0], a), sigma * offset[1], b));
+    }
+    return true;
+}
+
+bst_status bst_stars_with_errors(bst_ctx *ctx, const bst_stars *stars,
+                                 const bst_star_errors_config *errors, bst_stars **out) {
+    *out = malloc(sizeof **out);
+    if (!*out) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the star catalogue");
+    }
+    **out = *stars;
+    (*out)->borrowed = (*out)->altered = true;
+    (*out)->errors = *errors;
+    (*out)->key = bst_rng_make_key(errors->seed, 0, "knowledge", "stars");
+    return BST_OK;
+}
 
 bst_status bst_stars_default_path(bst_ctx *ctx, char *buffer, size_t bytes) {
     const char *data = getenv("XDG_DATA_HOME");
@@ -124,7 +164,7 @@ bst_status bst_stars_open(bst_ctx *ctx, const char *name, bst_stars **out) {
 }
 
 void bst_stars_close(bst_stars *stars) {
-    if (stars && stars->mapping) {
+    if (stars && stars->mapping && !stars->borrowed) {
         munmap(stars->mapping, stars->mapping_bytes);
     }
     free(stars);
@@ -219,18 +259,22 @@ bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre
     double chord = 2.0 * sin(radius_rad / 2.0);
     /* Rounding must not lose the antipode. */
     double chord2 = radius_rad >= BST_PI - 1e-9 ? 5.0 : chord * chord;
+    /* what is displaced may come from outside */
+    double slack = stars->altered && stars->errors.displaced_fraction > 0.0
+                       ? MOST_SIGMAS * stars->errors.displaced_sigma_arcsec * BST_ARCSEC_RAD
+                       : 0.0;
     int found = 0;
     for (uint32_t c = 0; c < BST_STAR_CELLS; c++) {
         const bst_star_cell *cell = &stars->view.cells[c];
         double drift = cell->pm_max_radpyr * fabs(years);
-        double reach = radius_rad + cell->radius_rad + drift;
+        double reach = radius_rad + cell->radius_rad + drift + slack;
         bst_vec3 d = {centre.x - cell->centre[0], centre.y - cell->centre[1],
                       centre.z - cell->centre[2]};
         /* A chord is shorter than its angle: no cell is missed. */
         if (cell->count == 0 || bst_vec3_dot(d, d) > reach * reach) {
             continue;
         }
-        radec_box box = box_around(centre, radius_rad + drift);
+        radec_box box = box_around(centre, radius_rad + drift + slack);
         const bst_star_record *r = stars->view.records + cell->first;
         for (const bst_star_record *end = r + cell->count; r < end; r++) {
             if (bst_star_record_v(r) / 1e5 > v_limit) {
@@ -240,6 +284,9 @@ bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre
                 continue;
             }
             bst_vec3 direction = bst_star_record_direction(r, years);
+            if (stars->altered && !alter(stars, c << 16 | (r->tyc_vt & 0xFFFFu), &direction)) {
+                continue;
+            }
             d = bst_vec3_sub(direction, centre);
             if (bst_vec3_dot(d, d) <= chord2) {
                 if (found < capacity) {
@@ -261,7 +308,12 @@ bst_status bst_stars_find(bst_ctx *ctx, const bst_stars *stars, uint32_t id, dou
         for (uint32_t i = 0; i < cell->count; i++) {
             const bst_star_record *r = &stars->view.records[cell->first + i];
             if ((r->tyc_vt & 0xFFFFu) == (id & 0xFFFFu)) {
-                unpack(r, c, bst_star_record_direction(r, julian_year - BST_STAR_EPOCH_YEAR), out);
+                bst_vec3 direction =
+                    bst_star_record_direction(r, julian_year - BST_STAR_EPOCH_YEAR);
+                if (stars->altered && !alter(stars, id, &direction)) {
+                    break;
+                }
+                unpack(r, c, direction, out);
                 return BST_OK;
             }
         }

@@ -42,6 +42,13 @@ bst_status bst_view_observer_state(bst_ctx *ctx, bst_view *view, int observer, d
                            view->world->epoch, seconds, true, out);
 }
 
+bst_status bst_view_believed(bst_ctx *ctx, bst_view *view, int observer, int sensor, double seconds,
+                             bst_state *state, bst_bodies *bodies) {
+    double t = bst_believed_seconds(view->world, observer, sensor, seconds);
+    BST_TRY(bst_believed_state(ctx, view->world, observer, sensor, view->clock, t, state));
+    return bst_view_bodies(ctx, view, t, bodies);
+}
+
 bst_status bst_view_earth_frames(bst_ctx *ctx, bst_view *view, double seconds,
                                  bst_earth_frames *out) {
     bst_sky sky;

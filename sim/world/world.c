@@ -110,6 +110,7 @@ void bst_world_free(bst_world *world) {
         bst_orbit_free(&world->observers[i].orbit);
         free(world->observers[i].sensors);
     }
+    bst_world_files_free(world);
     bst_name_index_free(world->object_names);
     free(world->objects);
     free(world->observers);

@@ -53,6 +53,10 @@ bst_status bst_view_object_state(bst_ctx *ctx, bst_view *view, int object, doubl
                                  bst_state *out) BST_MUST_CHECK;
 bst_status bst_view_observer_state(bst_ctx *ctx, bst_view *view, int observer, double seconds,
                                    bst_state *out) BST_MUST_CHECK;
+/* What the onboard side of a sensor believes then: the observer's state with its orbit error, and
+ * the bodies, both at the time that its clock shows. */
+bst_status bst_view_believed(bst_ctx *ctx, bst_view *view, int observer, int sensor, double seconds,
+                             bst_state *state, bst_bodies *bodies) BST_MUST_CHECK;
 /* Rotations and bodies then, interpolated. */
 bst_status bst_view_earth_frames(bst_ctx *ctx, bst_view *view, double seconds,
                                  bst_earth_frames *out) BST_MUST_CHECK;

@@ -31,6 +31,12 @@ bst_status bst_orbit_build(const bst_world_builder *b, const bst_orbit_config *c
 bst_status bst_orbit_build_sgp4(const bst_world_builder *b, const bst_elements *set,
                                 const char *name, bst_orbit *orbit) BST_MUST_CHECK;
 
+/* Makes an orbit of source oem or injected; called by bst_orbit_build. */
+bst_status bst_orbit_build_file(const bst_world_builder *b, const bst_orbit_config *config,
+                                const char *path, bst_orbit *orbit) BST_MUST_CHECK;
+
+/* Closes the files that orbits came from. */
+void bst_world_files_free(bst_world *world);
 /* Makes a numerical orbit; called by bst_orbit_build, arguments as there. */
 bst_status bst_orbit_build_numerical(const bst_world_builder *b, const bst_orbit_config *config,
                                      const bst_config_list *burns, const char *path,

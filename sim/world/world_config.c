@@ -1,17 +1,23 @@
 #include "sim/world/world_config.h"
 
-static const char *const orbit_sources[] = {"sgp4", "relative", "numerical", NULL};
+#include "sim/astro/elements.h"
+
+static const char *const orbit_sources[] = {"sgp4",     "relative",  "oem",
+                                            "injected", "numerical", NULL};
+static const char *const states_frames[] = {"gcrf", "teme", NULL};
 static const char *const faint_kinds[] = {"none", "statistical", NULL};
 static const char *const axes[] = {"x", "-x", "y", "-y", NULL};
 
 static const bst_config_desc orbit_table[] = {
     BST_ENUM(
         bst_orbit_config, source, orbit_sources, "\"sgp4\"",
-        "Where the orbit comes from: a two-line element set, another object plus an offset, or "
-        "numerical integration from a state."),
+        "Where the orbit comes from: an element set, another object plus an offset, an ephemeris "
+        "file, states given per frame, or numerical integration from a state."),
     BST_PATH(bst_orbit_config, elements_file, "\"\"",
-             "sgp4: file of element sets, relative to the scenario's folder."),
-    BST_INT(bst_orbit_config, norad, "", 0, 339999, "0", "sgp4: catalogue number in that file."),
+             "sgp4: file of element sets (TLE, or OMM as JSON or CSV), relative to the scenario's "
+             "folder."),
+    BST_INT(bst_orbit_config, norad, "", 0, BST_NORAD_MAX, "0",
+            "sgp4: catalogue number in that file."),
     BST_STRING(bst_orbit_config, reference, "\"\"",
                "relative: the object that the offset is added to."),
     BST_REAL(bst_orbit_config, at_s, "s", -1e9, 1e9, "0",
@@ -20,6 +26,17 @@ static const bst_config_desc orbit_table[] = {
               "relative: offset along radius, transverse and normal of the reference's orbit."),
     BST_REALS(bst_orbit_config, rate_rtn_mps, "m/s", -1e5, 1e5, "[0, 0, 0]",
               "relative: change of the offset."),
+    BST_PATH(bst_orbit_config, oem_file, "\"\"",
+             "oem: CCSDS OEM file (KVN), relative to the scenario's folder."),
+    BST_STRING(bst_orbit_config, oem_object, "\"\"",
+               "oem: OBJECT_NAME or OBJECT_ID in that file; empty: its only object."),
+    BST_PATH(bst_orbit_config, states_file, "\"\"",
+             "injected: CSV file of states at the start and end of each frame, relative to the "
+             "scenario's folder."),
+    BST_STRING(bst_orbit_config, states_object, "\"\"",
+               "injected: the object in that file; empty: its only one."),
+    BST_ENUM(bst_orbit_config, states_frame, states_frames, "\"gcrf\"",
+             "injected: axes of the states, GCRF or true equator and mean equinox of date."),
     BST_OBJECT(bst_orbit_config, state, bst_initial_state_table, "{}",
                "numerical: what it starts from."),
     BST_OBJECT(bst_orbit_config, forces, bst_force_table, "{}", "numerical: what acts on it."),
@@ -115,9 +132,59 @@ static const bst_config_desc cue_table[] = {
     BST_CONFIG_END,
 };
 
+static const bst_config_desc star_errors_table[] = {
+    BST_REAL(bst_star_errors_config, dropped_fraction, "", 0, 1, "0",
+             "Fraction of the stars that are missing on board."),
+    BST_REAL(bst_star_errors_config, displaced_fraction, "", 0, 1, "0",
+             "Fraction of the stars whose onboard place is wrong."),
+    BST_REAL(bst_star_errors_config, displaced_sigma_arcsec, "arcsec", 0, 3600, "0",
+             "By how much: 1 sigma per axis, Gaussian."),
+    BST_SEED(bst_star_errors_config, seed, "\"0x0\"",
+             "Draws which ones; the same star has the same fate for the same seed."),
+    BST_CONFIG_END,
+};
+
+static const bst_config_desc camera_errors_table[] = {
+    BST_REAL(bst_camera_errors_config, scale_error_ppm, "ppm", -1e5, 1e5, "0",
+             "Onboard pixel scale over the true one, minus 1."),
+    BST_REAL(bst_camera_errors_config, rotation_error_deg, "deg", -180, 180, "0",
+             "Onboard rotation of the focal plane minus the true one."),
+    BST_BOOL(bst_camera_errors_config, own_distortion, "false",
+             "Whether the onboard side has distortion coefficients of its own; false: it knows the "
+             "camera's."),
+    BST_OBJECT(bst_camera_errors_config, distortion, bst_distortion_config, "{}",
+               "own_distortion: the coefficients on board."),
+    BST_REAL(bst_camera_errors_config, psf_fwhm_px, "px", 0, 16, "0",
+             "Onboard width of the PSF; 0: the camera's."),
+    BST_PATH(bst_camera_errors_config, psf_file, "\"\"",
+             "FITS image of the PSF, relative to the scenario's folder; the onboard Gaussian gets "
+             "the width with the same noise-equivalent area, instead of psf_fwhm_px."),
+    BST_REAL(bst_camera_errors_config, psf_oversampling, "", 0, 1000, "0",
+             "psf_file: samples per detector pixel and axis; 0: its keyword OVERSAMP."),
+    BST_CONFIG_END,
+};
+
+static const bst_config_desc orbit_error_table[] = {
+    BST_REALS(bst_orbit_error_config, position_rtn_m, "m", -1e8, 1e8, "[0, 0, 0]",
+              "Believed minus true position along radius, transverse and normal."),
+    BST_REALS(bst_orbit_error_config, velocity_rtn_mps, "m/s", -1e5, 1e5, "[0, 0, 0]",
+              "Believed minus true velocity; it does not move the believed position."),
+    BST_REAL(bst_orbit_error_config, along_track_mps, "m/s", -1e5, 1e5, "0",
+             "Growth of the transverse position error from the epoch on."),
+    BST_CONFIG_END,
+};
+
 static const bst_config_desc knowledge_table[] = {
     BST_PATH_OR(bst_knowledge_config, star_catalogue, catalogue_words, "\"\"",
                 "Onboard star catalogue; empty: the world's own."),
+    BST_OBJECT(bst_knowledge_config, stars, star_errors_table, "{}",
+               "Errors of the onboard star catalogue."),
+    BST_OBJECT(bst_knowledge_config, camera, camera_errors_table, "{}",
+               "What is known of the camera otherwise than it is."),
+    BST_REAL(bst_knowledge_config, clock_offset_s, "s", -1e6, 1e6, "0",
+             "Onboard time minus true time: orbits and bodies are evaluated that much later."),
+    BST_OBJECT(bst_knowledge_config, orbit, orbit_error_table, "{}",
+               "Error of the onboard knowledge of the observer's own orbit."),
     BST_CONFIG_END,
 };
 

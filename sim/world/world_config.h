@@ -6,7 +6,9 @@
 #include "sim/core/config.h"
 #include "sim/world/camera.h"
 
-enum { BST_ORBIT_SGP4, BST_ORBIT_RELATIVE, BST_ORBIT_NUMERICAL };
+enum { BST_ORBIT_SGP4, BST_ORBIT_RELATIVE, BST_ORBIT_OEM, BST_ORBIT_INJECTED, BST_ORBIT_NUMERICAL };
+
+enum { BST_STATES_GCRF, BST_STATES_TEME };
 
 enum { BST_STATE_CARTESIAN, BST_STATE_KEPLERIAN, BST_STATE_ELEMENT_SET, BST_STATE_RELATIVE };
 
@@ -39,6 +41,11 @@ typedef struct bst_orbit_config {
     double at_s;        /* relative: time at which offset_rtn_m holds */
     double offset_rtn_m[3];
     double rate_rtn_mps[3];
+    char oem_file[512]; /* oem: path as above */
+    char oem_object[64];
+    char states_file[512]; /* injected: path as above */
+    char states_object[64];
+    int32_t states_frame; /* BST_STATES_... */
     /* numerical */
     bst_initial_state_config state;
     bst_force_config forces;
@@ -89,8 +96,34 @@ typedef struct bst_exposure_config {
     double dropped_fraction;
 } bst_exposure_config;
 
+/* Errors of the onboard star catalogue; a star's fate follows from its identity and the seed. */
+typedef struct bst_star_errors_config {
+    double dropped_fraction, displaced_fraction, displaced_sigma_arcsec;
+    uint64_t seed;
+} bst_star_errors_config;
+
+/* How the onboard camera differs from the true one. */
+typedef struct bst_camera_errors_config {
+    double scale_error_ppm;
+    double rotation_error_deg;
+    bool own_distortion;       /* false: the camera's own coefficients are known */
+    bst_distortion distortion; /* with own_distortion: what is known instead */
+    double psf_fwhm_px;        /* 0: the camera's */
+    char psf_file[512];        /* "": none */
+    double psf_oversampling;   /* of psf_file; 0: its keyword OVERSAMP */
+} bst_camera_errors_config;
+
+typedef struct bst_orbit_error_config {
+    double position_rtn_m[3], velocity_rtn_mps[3];
+    double along_track_mps; /* growth of the position error from the epoch on */
+} bst_orbit_error_config;
+
 typedef struct bst_knowledge_config {
     char star_catalogue[512]; /* "": the world's */
+    bst_star_errors_config stars;
+    bst_camera_errors_config camera;
+    double clock_offset_s; /* onboard time minus true time */
+    bst_orbit_error_config orbit;
 } bst_knowledge_config;
 
 typedef struct bst_sensor_config {
@@ -124,6 +157,11 @@ struct bst_knowledge;
 bst_status bst_world_create(bst_ctx *ctx, const char *scenario, const bst_world_config *world,
                             const bst_config_list *observers, const char *base_dir, bst_time epoch,
                             struct bst_world **out) BST_MUST_CHECK;
+/* Checks that the files of states that observers and cued objects come from cover a run from the
+ * epoch on. BST_ERR_CONFIG with file, JSON path and both spans. Other objects may come and go: they
+ * are not there outside their files. */
+bst_status bst_world_check_spans(bst_ctx *ctx, const char *scenario, const struct bst_world *world,
+                                 double duration_s) BST_MUST_CHECK;
 void bst_world_free(struct bst_world *world);
 
 /* The onboard knowledge of one sensor; equal to the truth where the scenario says nothing else. */

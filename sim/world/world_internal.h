@@ -2,6 +2,8 @@
 #ifndef BST_WORLD_WORLD_INTERNAL_H
 #define BST_WORLD_WORLD_INTERNAL_H
 
+#include "sim/astro/injected.h"
+#include "sim/astro/oem.h"
 #include "sim/astro/sgp4.h"
 #include "sim/astro/sky_clock.h"
 #include "sim/astro/trajectory.h"
@@ -28,6 +30,12 @@ typedef struct bst_orbit {
     const struct bst_orbit *reference;
     double at_s;
     bst_vec3 offset_rtn_m, rate_rtn_mps;
+    /* oem, injected: borrowed from the world's files */
+    const bst_oem *oem;
+    const bst_injected *injected;
+    int file_object;
+    bool in_teme;        /* injected */
+    double from_s, to_s; /* span of the states, after the epoch */
     /* numerical */
     bst_gravity *gravity;
     bst_trajectory *unburnt, *burnt; /* burnt NULL: there are no burns */
@@ -56,6 +64,13 @@ typedef struct world_observer {
     int sensor_count;
 } world_observer;
 
+/* A file of states that objects share. */
+typedef struct bst_world_file {
+    char *key;
+    bst_oem *oem;
+    bst_injected *injected;
+} bst_world_file;
+
 struct bst_world {
     bst_time epoch;
     bst_eop *eop;
@@ -65,6 +80,8 @@ struct bst_world {
     world_object *objects;
     int object_count;
     bst_name_index *object_names;
+    bst_world_file *files;
+    int file_count;
     world_observer *observers;
     int observer_count;
 };
@@ -73,6 +90,7 @@ struct bst_knowledge {
     const bst_world
         *world;           /* for the nominal orbits and Earth orientation only; never handed out */
     bst_stars *own_stars; /* NULL: the world's */
+    bst_stars *altered;   /* those with the catalogue's errors; NULL: it has none */
     bst_camera camera;
     int observer, sensor;
     double julian_year;
@@ -86,6 +104,10 @@ const bst_star_view *bst_stars_records(const bst_stars *stars);
 bst_status bst_orbit_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *clock,
                            bst_time epoch, double seconds, bool with_burns,
                            bst_state *out) BST_MUST_CHECK;
+
+/* The same of an orbit from a file, without burns. */
+bst_status bst_orbit_file_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *clock,
+                                bst_time epoch, double seconds, bst_state *out) BST_MUST_CHECK;
 
 /* Fills orbit->burns (by time, freed by the caller's owner) once the orbit itself is made.
  * BST_ERR_NUMERIC when the orbit has no state at a burn. */
@@ -106,9 +128,23 @@ bst_status bst_cue_resolve(bst_ctx *ctx, const char *scenario, bst_world *world,
                            int sensor, bst_sky_clock *clock) BST_MUST_CHECK;
 
 /* Direction of the cue (unit, GCRF, geometric) without its error: the object's catalogued orbit as
- * seen from the observer, light time in. */
+ * seen from an observer in state `eye`, light time in. */
 bst_status bst_cue_nominal_direction(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
-                                     bst_sky_clock *clock, double seconds,
+                                     bst_sky_clock *clock, double seconds, const bst_state *eye,
                                      bst_vec3 *out) BST_MUST_CHECK;
+
+/* Time after the epoch that the onboard clock shows `seconds` after the epoch. */
+double bst_believed_seconds(const bst_world *world, int observer, int sensor, double seconds);
+
+/* Where a sensor's onboard side believes its observer to be when its clock shows believed_s. */
+bst_status bst_believed_state(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
+                              bst_sky_clock *clock, double believed_s,
+                              bst_state *out) BST_MUST_CHECK;
+
+/* The same stars with errors: those of `stars` that are dropped are not found, the displaced ones
+ * lie elsewhere. Shares the memory of `stars`, which must outlive *out. */
+bst_status bst_stars_with_errors(bst_ctx *ctx, const bst_stars *stars,
+                                 const bst_star_errors_config *errors,
+                                 bst_stars **out) BST_MUST_CHECK;
 
 #endif

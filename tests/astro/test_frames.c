@@ -2,8 +2,6 @@
 #include "tests/astro/astropy_reference.h"
 #include "tests/test_support.h"
 
-#include <stdlib.h>
-#include <unistd.h>
 
 static bst_time utc(const char *text) {
     bst_ctx ctx = {0};
@@ -149,53 +147,6 @@ static void outside_the_table_is_an_error(void **state) {
     bst_eop_free(eop);
 }
 
-static void bad_files_are_explained(void **state) {
-    (void)state;
-#define GOOD "2022   6  10   0  59740.00    0.1 0.4 -0.08 0 0\n"
-    static const struct {
-        const char *content;
-        const char *says;
-    } cases[] = {
-        {"", ": 0 rows of Earth orientation found"},
-        {"# heading only\n", ": 0 rows of Earth orientation found"},
-        {GOOD, ": 1 rows of Earth orientation found"},
-        {"# c\n" GOOD "2022   6  12   0  59742.00    0.1 0.4 -0.08 0 0\n",
-         ":3: MJD 59742 does not follow MJD 59740"},
-        {GOOD GOOD, ":2: MJD 59740 does not follow MJD 59740"},
-        {GOOD "nonsense\n", ":2: expected year month day"},
-        {GOOD "2022 6 11 0 59741.00 0.1\n", ":2: expected year month day"},
-        {"2022 6 11 59740 0.1 0.4 -0.08\n", ":1: date and MJD are not one and the same"},
-        {"2022 6 10 6 59740.25 0.1 0.4 -0.08 0 0\n", ":1: date and MJD are not one and the same"},
-        {"2022 6 31 59761 0.1 0.4 -0.08\n", ":1: date and MJD are not one and the same"},
-        {"2022 6 10 59740 nan 0.4 -0.08\n", ":1: pole of 2 arcsec or more"},
-        {"2022 6 10 59740 0.1 189 -0.08\n", ":1: pole of 2 arcsec or more"},
-        {"2022 6 10 59740 0.1 0.4 37\n", ":1: pole of 2 arcsec or more"},
-    };
-    char path[] = "/tmp/bst_eop_XXXXXX";
-    int fd = mkstemp(path);
-    assert_true(fd >= 0);
-    close(fd);
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        bst_ctx ctx = {0};
-        bst_eop *eop = NULL;
-        FILE *file = fopen(path, "w");
-        assert_non_null(file);
-        fputs(cases[i].content, file);
-        fclose(file);
-        bst_status status = bst_eop_load(&ctx, path, &eop);
-        if (status != BST_ERR_FORMAT || !strstr(ctx.message, cases[i].says)) {
-            fail_msg("case %zu: status %d, \"%s\"", i, (int)status, ctx.message);
-        }
-        assert_null(eop);
-    }
-    unlink(path);
-    bst_ctx ctx = {0};
-    bst_eop *eop = NULL;
-    assert_int_equal(bst_eop_load(&ctx, path, &eop), BST_ERR_NOT_FOUND);
-    assert_non_null(strstr(ctx.message, "give an IERS EOP C04 file"));
-    assert_int_equal(bst_eop_load(&ctx, "tests/astro", &eop), BST_ERR_IO);
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(geostationary_positions_agree_with_astropy),
@@ -204,7 +155,6 @@ int main(void) {
         cmocka_unit_test(builtin_table_holds_the_published_values),
         cmocka_unit_test(earth_turns_evenly_through_a_leap_second),
         cmocka_unit_test(outside_the_table_is_an_error),
-        cmocka_unit_test(bad_files_are_explained),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

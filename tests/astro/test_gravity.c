@@ -19,9 +19,9 @@ static double distance(bst_vec3 a, bst_vec3 b) {
 /* Points all over the sphere, at heights of 0 to 40,000 km, and on and beside the polar axis. */
 enum { POINTS = 300 };
 static bst_vec3 point(int i) {
-    static const bst_vec3 special[] = {{0, 0, 6.8e6},     {0, 0, -6.8e6},   {1e-9, 0, 6.5e6},
-                                       {0, 1e-3, -7e6},   {1, -1, 6.4e6},   {100, 50, 6.6e6},
-                                       {6378137, 0, 0},   {0, -4.2e7, 0},   {1e9, 1e9, -1e9}};
+    static const bst_vec3 special[] = {{0, 0, 6.8e6},   {0, 0, -6.8e6}, {1e-9, 0, 6.5e6},
+                                       {0, 1e-3, -7e6}, {1, -1, 6.4e6}, {100, 50, 6.6e6},
+                                       {6378137, 0, 0}, {0, -4.2e7, 0}, {1e9, 1e9, -1e9}};
     if (i < (int)(sizeof special / sizeof *special)) {
         return special[i];
     }
@@ -240,8 +240,8 @@ static void the_largest_field_is_sound(void **state) {
         bst_vec3 p = point(i * 14), a = bst_gravity_acceleration(g, p);
         const double xyz[3] = {p.x, p.y, p.z};
         double d[3];
-        test_spherical_harmonic(3.986004415e14, 6378136.3, degree, degree,
-                                (const double(*)[2])cs, xyz, d);
+        test_spherical_harmonic(3.986004415e14, 6378136.3, degree, degree, (const double(*)[2])cs,
+                                xyz, d);
         /* 65,000 terms whose recursions gather rounding over 360 degrees */
         bst_assert_close(distance(a, (bst_vec3){d[0], d[1], d[2]}) / bst_vec3_norm(a), 0, 1e-13);
     }

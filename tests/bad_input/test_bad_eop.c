@@ -34,9 +34,16 @@ static void exact_messages(void **state) {
         {HEAD ROW_1,
          ": 1 rows of Earth orientation found, at least 2 are needed; expected an IERS EOP C04 "
          "file"},
-        {HEAD ROW_1 "garbage\n" ROW_2, ":3: 1 columns where the rows before have 9 in \"garbage\""},
-        {HEAD ROW_1 ROW_2 "2022 6 17\n",
-         ":4: 3 columns where the rows before have 9 in \"2022 6 17\""},
+        {HEAD ROW_1 "garbage\n" ROW_2, ":3: " FORM "found 0 numbers in \"garbage\""},
+        {HEAD ROW_1 ROW_2 "2022 6 17\n", ":4: " FORM "found 3 numbers in \"2022 6 17\""},
+        {HEAD ROW_1 "2022 6 16 0 59746.00 0.3806 0.4541 -0.07\n",
+         ":3: 8 columns where the rows before have 9 in \"2022 6 16 0 59746.00 0.3806 0.4541 "
+         "-0.07\""},
+        {"2022 6 10 6 59740.25 0.1 0.4 -0.08 0 0\n",
+         ":1: date and MJD are not one and the same midnight in \"2022 6 10 6 59740.25 0.1 0.4 "
+         "-0.08 0 0\""},
+        {"2022 6 11 59740 0.1 0.4 -0.08\n",
+         ":1: date and MJD are not one and the same midnight in \"2022 6 11 59740 0.1 0.4 -0.08\""},
         {"2022 6 15 0\n", ":1: " FORM "found 4 numbers in \"2022 6 15 0\""},
         {"2022 6 15 0 59745 0.379 0.4545x -0.079 0\n",
          ":1: " FORM "found 6 numbers in \"2022 6 15 0 59745 0.379 0.4545x -0.079 0\""},

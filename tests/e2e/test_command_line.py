@@ -55,7 +55,7 @@ class Messages(unittest.TestCase):
         self.fails(2, "--duration long: give a number", "run", runs.TRACK, "--duration", "long")
         self.fails(2, "--out needs a value", "run", runs.TRACK, "--out")
         self.fails(2, '"x" is not expected here', "schema", "x")
-        self.fails(2, "--tle is missing", "propagate")
+        self.fails(2, "--elements is missing", "propagate")
 
     def test_bad_values(self):
         self.bad_set("/world/object=3", ': /world/object: unknown key; did you mean "objects"')
@@ -66,6 +66,11 @@ class Messages(unittest.TestCase):
         self.bad_set(GIMBAL + "/type=three_axis", f": {GIMBAL}/type: there is no gimbal of type "
                      '"three_axis" .*"two_axis"')
         self.bad_set(GIMBAL + "/rate_hz=999", f": {GIMBAL}/rate_hz: .*857.142857 and 1000 Hz")
+        self.bad_set(GIMBAL + "/platform/history_s=0.4", "neossat/telescope/gimbal: platform/"
+                     r"history_s: 0\.4 s do not cover the sensor's exposure/exposure_s of 0\.5 s; "
+                     "make history_s at least as long")
+        self.bad_set("/record={\"frames\": \"cube\", \"compression\": \"rice\"}",
+                     ': /record/compression: "rice" compresses frames in extensions only; ')
         self.bad_set(GIMBAL + "/platform/jitter_high_band_hz=[5]", r": .*/platform/jitter_high_band_hz: wrong type \(found \[5\]; "
                      "allowed: an array of 2 numbers")
         self.bad_set("/world/objects/0/orbit/norad=1", ": /world/objects/0/orbit/elements_file: .*no element set of satellite 1, ")

@@ -236,6 +236,88 @@ class Track(unittest.TestCase):
         self.assertLess(rms, 0.15)
 
 
+def sky_of(header, row=None):
+    """WCS of a frame: its own header, or a row of the table of a cube with the table's header."""
+    if row is None:
+        return WCS(header)
+    keys = fits.Header()
+    for key in ("CTYPE1", "CTYPE2", "RADESYS"):
+        keys[key] = header[key]
+    for key in ("CRPIX1", "CRPIX2", "CRVAL1", "CRVAL2", "CD1_1", "CD1_2", "CD2_1", "CD2_2"):
+        keys[key] = float(row[key])
+    return WCS(keys)
+
+
+class Moving(unittest.TestCase):
+    """A spacecraft that drifts and turns about the line of sight during the exposures, and a
+    telescope that slews between them: the WCS of every frame holds."""
+    DRIFT = runs.SENSOR + "/modules/gimbal/platform/drift_arcsec_per_s=[200, -150, 1200]"
+    FORMS = {"extensions": ["/record/frames=extensions"],
+             "rice": ["/record/frames=extensions", "/record/compression=rice"],
+             "cube": ["/record/frames=cube"]}
+
+    @classmethod
+    def setUpClass(cls):
+        folder = runs.scratch()
+        cls.out = {form: os.path.join(folder, form) for form in cls.FORMS}
+        runs.parallel(lambda form: runs.run(runs.TRACK, cls.out[form], *cls.FORMS[form], cls.DRIFT,
+                                            duration=30), cls.FORMS)
+
+    def check(self, form):
+        db = runs.database(self.out[form])
+        worst, places, swept, heads = [], [], [], []
+        with fits.open(os.path.join(self.out[form], "frames.fits")) as hdus:
+            hdus.verify("exception")
+            if form == "cube":
+                frames = [(hdus["FRAMES"].header, row, int(row["FRAMEID"]))
+                          for row in hdus["FRAMES"].data]
+            else:
+                frames = [(hdu.header, None, hdu.header["FRAMEID"]) for hdu in hdus[1:]]
+        for header, row, number in frames:
+            sky = sky_of(header, row)
+            heads.append(sky.wcs.crval.copy())
+            stars = np.array([tuple(r) for r in db.execute(
+                "SELECT ra_deg, dec_deg, x_mean_px, y_mean_px, hypot_px FROM (SELECT *, "
+                "(x_end_px - x_start_px) * (x_end_px - x_start_px) + (y_end_px - y_start_px) * "
+                "(y_end_px - y_start_px) AS hypot_px FROM truth) WHERE kind = 'star' AND in_field "
+                "AND exposure_id = ?", (number,))])
+            self.assertGreater(len(stars), 3, number)
+            x, y = sky.all_world2pix(stars[:, 0], stars[:, 1], 0)
+            worst.append(np.hypot(x - stars[:, 2], y - stars[:, 3]).max())
+            swept.append(np.sqrt(stars[:, 4].max()))
+            places.append(len(stars))
+        between = max(np.hypot(*(b - a)) for a, b in zip(heads, heads[1:])) * 3600 / 3
+        print(f"moving, {form}: {len(worst)} frames, {sum(places)} places of stars, the WCS is off "
+              f"by at most {max(worst):.4f} px; swept at most {max(swept):.0f} px in an exposure, "
+              f"{between:.0f} px between two")
+        self.assertEqual(len(worst), 30)
+        # the frames do move
+        self.assertGreater(max(swept), 20)
+        self.assertGreater(between, 100)
+        # an attitude averaged over a turn of 0.003 rad: r (angle)^2 / 24 = 3e-4 px at the corner;
+        # acceleration of the slew bends the track of a star by as little
+        self.assertLess(max(worst), 0.05)
+
+    def test_extensions(self):
+        self.check("extensions")
+
+    def test_rice(self):
+        self.check("rice")
+        with fits.open(os.path.join(self.out["extensions"], "frames.fits")) as raw, \
+                fits.open(os.path.join(self.out["rice"], "frames.fits")) as packed:
+            self.assertEqual(len(raw), len(packed))
+            for one, other in zip(raw[1:], packed[1:]):
+                self.assertTrue(np.array_equal(one.data, other.data))
+                self.assertEqual((one.name, one.ver), (other.name, other.ver))
+                for key in one.header:
+                    if key not in ("XTENSION", "COMMENT", "", "PCOUNT", "GCOUNT", "BZERO",
+                                   "BSCALE"):
+                        self.assertEqual(one.header[key], other.header[key], key)
+
+    def test_cube(self):
+        self.check("cube")
+
+
 def tearDownModule():
     runs.clean()
 

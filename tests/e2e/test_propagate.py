@@ -4,6 +4,9 @@
 Usage, from the repository root: /usr/bin/python3 tests/e2e/test_propagate.py BORESIGHT
 No network is used.
 """
+import csv
+import io
+import json
 import os
 import subprocess
 import sys
@@ -16,6 +19,7 @@ from astropy.coordinates import (GCRS, TEME, CartesianDifferential, CartesianRep
 from astropy.time import Time
 from astropy.utils import iers
 from sgp4.api import WGS72, WGS84, Satrec
+from sgp4.exporter import export_omm
 
 iers.conf.auto_download = False
 iers.conf.iers_degraded_accuracy = "ignore"
@@ -72,7 +76,7 @@ def reference(lines, utc, gravity=WGS72, mode="i"):
 
 class Numbers(unittest.TestCase):
     def compare_teme(self, gravity, mode):
-        result = run("--tle", CATALOGUE, "--start", START, "--stop", STOP, "--step", "3600",
+        result = run("--elements", CATALOGUE, "--start", START, "--stop", STOP, "--step", "3600",
                      "--gravity", {WGS72: "wgs72", WGS84: "wgs84"}[gravity], "--opsmode", mode)
         self.assertEqual((result.returncode, result.stderr), (0, ""))
         sets = element_sets(CATALOGUE)
@@ -95,7 +99,7 @@ class Numbers(unittest.TestCase):
         self.compare_teme(WGS72, "a")
 
     def test_gcrf(self):
-        result = run("--tle", CATALOGUE, "--start", START, "--stop", STOP, "--step", "14400",
+        result = run("--elements", CATALOGUE, "--start", START, "--stop", STOP, "--step", "14400",
                      "--frame", "gcrf")
         self.assertEqual((result.returncode, result.stderr), (0, ""))
         sets = element_sets(CATALOGUE)
@@ -114,7 +118,7 @@ class Numbers(unittest.TestCase):
 
     def test_leap_second_is_a_row(self):
         sets = element_sets(CATALOGUE)
-        result = run("--tle", CATALOGUE, "--norad", "44801", "--start", "2016-12-31T23:59:58Z",
+        result = run("--elements", CATALOGUE, "--norad", "44801", "--start", "2016-12-31T23:59:58Z",
                      "--stop", "2017-01-01T00:00:01Z", "--step", "1")
         rows = rows_of(result.stdout)
         self.assertEqual([row[0] for row in rows],
@@ -129,7 +133,7 @@ class Numbers(unittest.TestCase):
 
     def test_step_does_not_accumulate(self):
         # 0.1 is no binary number: a summed clock would be 1e-7 s off after a day
-        result = run("--tle", CATALOGUE, "--norad", "39089", "--start", START, "--stop",
+        result = run("--elements", CATALOGUE, "--norad", "39089", "--start", START, "--stop",
                      "2022-06-17T01:10:00Z", "--step", "0.1")
         rows = rows_of(result.stdout)
         self.assertEqual(len(rows), 108001)
@@ -139,7 +143,7 @@ class Numbers(unittest.TestCase):
 
 class Oem(unittest.TestCase):
     def test_segments(self):
-        result = run("--tle", CATALOGUE, "--start", START, "--stop", "2022-06-16T22:12:00.0005Z",
+        result = run("--elements", CATALOGUE, "--start", START, "--stop", "2022-06-16T22:12:00.0005Z",
                      "--step", "60", "--format", "oem", "--frame", "gcrf")
         self.assertEqual((result.returncode, result.stderr), (0, ""))
         lines = result.stdout.splitlines()
@@ -148,15 +152,18 @@ class Oem(unittest.TestCase):
         self.assertEqual(lines[2], "ORIGINATOR = BORESIGHT")
         self.assertEqual(lines.count("META_START"), 5)
         first = lines.index("META_START")
-        self.assertEqual(lines[first:first + 9], [
+        self.assertEqual(lines[first:first + 11], [
             "META_START", "OBJECT_NAME = NEOSSAT", "OBJECT_ID = 2013-009D",
             "CENTER_NAME = EARTH", "REF_FRAME = GCRF", "TIME_SYSTEM = UTC",
             "START_TIME = 2022-06-16T22:10:00.000", "STOP_TIME = 2022-06-16T22:12:00.000",
-            "META_STOP"])
-        csv = rows_of(run("--tle", CATALOGUE, "--start", START, "--stop", "2022-06-16T22:12:00Z",
-                          "--step", "60", "--frame", "gcrf").stdout)
+            "INTERPOLATION = HERMITE", "INTERPOLATION_DEGREE = 7", "META_STOP"])
+        rows = rows_of(run("--elements", CATALOGUE, "--start", START, "--stop", "2022-06-16T22:12:00Z",
+                           "--step", "60", "--frame", "gcrf").stdout)
         data = [line.split() for line in lines if line.startswith("2022-06-16T")]
-        self.assertEqual([[row[0].rstrip("Z")] + row[2:] for row in csv], data)
+        self.assertEqual([row[0].rstrip("Z") for row in rows], [row[0] for row in data])
+        numbers = np.array([row[1:] for row in data], dtype=float)
+        # the digits that CSV prints, rounded
+        self.assertLess(np.abs(numbers - [state(row) for row in rows]).max(), 0.6e-9)
 
     def test_stop_time_is_the_last_row_written(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -174,6 +181,72 @@ class Oem(unittest.TestCase):
                          r"SGP4 error \d: .+\n$")
 
 
+class Forms(unittest.TestCase):
+    """Element sets as OMM give the states that the same sets as TLE give."""
+    window = ("--start", START, "--stop", "2022-06-17T22:10:00Z", "--step", "7200")
+
+    def fields(self):
+        """OMM fields of the catalogue by python3-sgp4."""
+        out = []
+        for name, line1, line2 in element_sets(CATALOGUE).values():
+            fields = export_omm(Satrec.twoline2rv(line1, line2), name.removeprefix("0 "))
+            fields["EPOCH"] = fields["EPOCH"][:26]
+            out.append(fields)
+        return out
+
+    def states(self, name, text):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, name)
+            with open(path, "w", encoding="ascii") as file:
+                file.write(text)
+            result = run("--elements", path, *self.window)
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        return rows_of(result.stdout)
+
+    def test_json_and_csv(self):
+        wanted = rows_of(run("--elements", CATALOGUE, *self.window).stdout)
+        fields = self.fields()
+        table = io.StringIO()
+        writer = csv.DictWriter(table, fields[0].keys())
+        writer.writeheader()
+        writer.writerows(fields)
+        texts = [{key: str(value) for key, value in f.items()} for f in fields]
+        for name, text in (("a.json", json.dumps(fields)), ("b.json", json.dumps(texts, indent=1)),
+                           ("c.csv", table.getvalue())):
+            rows = self.states(name, text)
+            self.assertEqual([row[:2] for row in rows], [row[:2] for row in wanted])
+            difference = [state(a) - state(b) for a, b in zip(rows, wanted)]
+            # export_omm turns radians back to degrees and rounds epochs to 1 us: 8 mm at LEO
+            self.assertLess(np.abs(difference).max(), 1e-5, name)
+
+    def test_nine_digits(self):
+        fields = self.fields()[0]
+        for number in (100000, 339999, 340000, 799501234, 999999999):
+            fields["NORAD_CAT_ID"] = number
+            rows = self.states("one.json", json.dumps(fields))
+            self.assertEqual({row[1] for row in rows}, {str(number)})
+
+    def test_czml(self):
+        result = run("--elements", CATALOGUE, *self.window, "--format", "czml")
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        document, *packets = json.loads(result.stdout)
+        self.assertEqual((document["id"], document["version"]), ("document", "1.0"))
+        self.assertEqual(document["clock"]["interval"],
+                         "2022-06-16T22:10:00.000Z/2022-06-17T22:10:00.000Z")
+        gcrf = rows_of(run("--elements", CATALOGUE, *self.window, "--frame", "gcrf").stdout)
+        self.assertEqual([p["id"] for p in packets], list(dict.fromkeys(row[1] for row in gcrf)))
+        for packet in packets:
+            position = packet["position"]
+            self.assertEqual((position["referenceFrame"], position["interpolationAlgorithm"],
+                              position["interpolationDegree"], position["epoch"]),
+                             ("INERTIAL", "LAGRANGE", 5, "2022-06-16T22:10:00.000Z"))
+            table = np.array(position["cartesian"]).reshape(-1, 4)
+            self.assertEqual(table[:, 0].tolist(), [7200.0 * k for k in range(13)])
+            wanted = [state(row)[:3] * 1000 for row in gcrf if row[1] == packet["id"]]
+            # printed to 0.1 mm
+            self.assertLess(np.abs(table[:, 1:] - wanted).max(), 0.6e-4)
+
+
 class CommandLine(unittest.TestCase):
     window = ("--start", START, "--stop", "2022-06-16T22:11:00Z", "--step", "60")
 
@@ -184,38 +257,38 @@ class CommandLine(unittest.TestCase):
         self.assertEqual(result.stdout, "")
 
     def test_misuse(self):
-        tle = ("--tle", CATALOGUE)
-        self.fails(2, "--tle is missing: add --tle FILE", *self.window)
-        self.fails(2, "did you mean --norad?", *tle, "--nrad", "3", *self.window)
-        self.fails(2, "--frame j2000: give one of teme|gcrf", *tle, "--frame", "j2000",
+        sets = ("--elements", CATALOGUE)
+        self.fails(2, "--elements is missing: add --elements FILE", *self.window)
+        self.fails(2, "did you mean --norad?", *sets, "--nrad", "3", *self.window)
+        self.fails(2, "--frame j2000: give one of teme|gcrf", *sets, "--frame", "j2000",
                    *self.window)
-        self.fails(2, "--step 0: give a number from 1e-06", *tle, *self.window, "--step", "0")
-        self.fails(2, "is before --start", *tle, *self.window, "--stop", "2022-06-16T22:09:59Z")
-        self.fails(2, "--start: \"yesterday\" is not a UTC time", *tle, *self.window, "--start",
+        self.fails(2, "--step 0: give a number from 1e-06", *sets, *self.window, "--step", "0")
+        self.fails(2, "is before --start", *sets, *self.window, "--stop", "2022-06-16T22:09:59Z")
+        self.fails(2, "--start: \"yesterday\" is not a UTC time", *sets, *self.window, "--start",
                    "yesterday")
-        self.fails(2, "give whole microseconds", *tle, *self.window, "--step", "1.00000005")
+        self.fails(2, "give whole microseconds", *sets, *self.window, "--step", "1.00000005")
 
     def test_failures(self):
         self.fails(1, "no_such_file.tle", "--tle", "no_such_file.tle", *self.window)
-        self.fails(1, "12345", "--tle", CATALOGUE, "--norad", "12345", *self.window)
-        self.fails(1, "--frame gcrf needs --eop FILE here", "--tle", CATALOGUE, "--frame", "gcrf",
+        self.fails(1, "12345", "--elements", CATALOGUE, "--norad", "12345", *self.window)
+        self.fails(1, "--frame gcrf needs --eop FILE here", "--elements", CATALOGUE, "--frame", "gcrf",
                    "--start", "2016-06-16T00:00:00Z", "--stop", "2016-06-16T00:00:00Z", "--step",
                    "1")
-        self.fails(1, "cannot be written", "--tle", CATALOGUE, *self.window, "--output",
+        self.fails(1, "cannot be written", "--elements", CATALOGUE, *self.window, "--output",
                    "no_such_folder/x.csv")
 
     def test_full_disk(self):
         if os.path.exists("/dev/full"):
-            self.fails(1, "is the disk full?", "--tle", CATALOGUE, *self.window, "--output",
+            self.fails(1, "is the disk full?", "--elements", CATALOGUE, *self.window, "--output",
                        "/dev/full")
 
     def test_output_file_is_what_is_printed(self):
         with tempfile.TemporaryDirectory() as folder:
             path = os.path.join(folder, "with space.csv")
-            result = run("--tle", CATALOGUE, *self.window, "--output", path)
+            result = run("--elements", CATALOGUE, *self.window, "--output", path)
             self.assertEqual((result.returncode, result.stdout, result.stderr), (0, "", ""))
             with open(path, encoding="ascii") as file:
-                self.assertEqual(file.read(), run("--tle", CATALOGUE, *self.window).stdout)
+                self.assertEqual(file.read(), run("--elements", CATALOGUE, *self.window).stdout)
 
     def test_nearest_of_several_sets(self):
         sets = element_sets(CATALOGUE)
@@ -230,13 +303,13 @@ class CommandLine(unittest.TestCase):
             result = run("--tle", path, *self.window)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertEqual(result.stdout,
-                         run("--tle", CATALOGUE, "--norad", "44801", *self.window).stdout)
+                         run("--elements", CATALOGUE, "--norad", "44801", *self.window).stdout)
 
     def test_help_teaches(self):
         result = run("--help")
         self.assertEqual((result.returncode, result.stderr), (0, ""))
         self.assertIn("Examples:", result.stdout)
-        for option in ("--tle", "--norad", "--start", "--stop", "--step", "--frame", "--format"):
+        for option in ("--elements", "--norad", "--start", "--stop", "--step", "--frame", "--format"):
             self.assertIn(option, result.stdout)
 
 

@@ -92,9 +92,7 @@ static void few_samples(void **state) {
 }
 
 /* The path against projecting a fixed direction at both ends. */
-static void streak_is_the_stars_path(void **state) {
-    (void)state;
-    bst_camera c = {.width_px = 1024, .height_px = 1024, .pixel_scale_arcsec = 3.0};
+static void check_streak(bst_camera c) {
     bst_motion m = {bst_quat_unit((bst_quat){0.1, 0.2, 0.3, 0.9}), {1e-4, -5e-5, 2e-3}, {0, 0, 0}};
     bst_quat end =
         bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(m.turn_cam_rad, 0.5)), m.q_cam_from_gcrf);
@@ -110,6 +108,26 @@ static void streak_is_the_stars_path(void **state) {
     bst_assert_close(dx, x1 - x0, 1e-8);
     bst_assert_close(dy, y1 - y0, 1e-8);
     assert_true(hypot(dx, dy) > 3.0);
+}
+
+static void streak_is_the_stars_path(void **state) {
+    (void)state;
+    bst_camera c = {.width_px = 1024, .height_px = 1024, .pixel_scale_arcsec = 3.0};
+    check_streak(c);
+    bst_ctx ctx = {0};
+    c.rotation_deg = -37;
+    c.distortion.k1 = 300;
+    bst_assert_ok(&ctx, bst_camera_prepare(&ctx, &c));
+    check_streak(c);
+    /* the bend at the boresight: tilted by a small rotation vector, the boresight's own direction
+     * moves as projecting it says */
+    bst_motion m = {BST_QUAT_IDENTITY, {0, 0, 0}, {3e-5, -7e-5, 0}};
+    double bx, by, x = 0, y = 0;
+    bst_motion_bend(&m, &c, &bx, &by);
+    bst_vec3 v = bst_quat_rotate(bst_quat_from_rotvec(m.bend_cam_rad), (bst_vec3){0, 0, 1});
+    assert_true(bst_camera_project(&c, v, &x, &y));
+    bst_assert_close(bx, x - 511.5, 1e-4); /* third order: 300 (7e-5)^2 of 5 px */
+    bst_assert_close(by, y - 511.5, 1e-4);
 }
 
 int main(void) {

@@ -1,6 +1,7 @@
 """Reads the files that test_fits.c wrote with astropy and compares them with what it wrote.
 
-Usage: check_fits.py FOLDER
+Usage: check_fits.py FOLDER        all that test_astropy_reads wrote
+       check_fits.py FOLDER full   a.fits, that a full disk ended
 """
 
 import os
@@ -67,7 +68,7 @@ def check_extensions(path, places):
         assert f[0].header["CREATOR"] == "boresight test"
         for i in range(FRAMES):
             hdu = f["FRAME", i + 1]
-            assert hdu.data.dtype == np.uint16 and (hdu.data == pixels(i)).all()
+            assert hdu.data.dtype == np.uint16 and (hdu.data == pixels(i)).all(), i
             check_image_header(hdu.header, i, places)
         part = f["FRAME", FRAMES + 1]
         assert (part.data == pixels(FRAMES, 20, 10)).all()
@@ -116,6 +117,62 @@ def check_killed(folder, places):
                 assert (f[0].data[i] == pixels(i)).all()
 
 
+def check_packed(folder):
+    """Compressed frames hold the same pixels and keys, and the same bytes each time."""
+    with open(os.path.join(folder, "rice.fits"), "rb") as one, \
+            open(os.path.join(folder, "rice_again.fits"), "rb") as other:
+        assert one.read() == other.read()
+    with fits.open(os.path.join(folder, "rice.fits"), disable_image_compression=True) as f:
+        assert f[1].header["ZCMPTYPE"] == "RICE_1" and f[1].header["XTENSION"] == "BINTABLE"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with fits.open(os.path.join(folder, "killed_rice.fits")) as f:
+            assert len(f) == FRAMES + 1
+            for i in range(FRAMES):
+                assert (f[i + 1].data == pixels(i)).all()
+
+
+def states_of_append(folder):
+    """Every order of events in which a process may die while it appends a frame, played on the last
+    frame of a file: the frames before it are read without an error, and none that is torn."""
+    with open(os.path.join(folder, "killed_ext.fits"), "rb") as f:
+        whole = f.read()
+    with fits.open(os.path.join(folder, "killed_ext.fits")) as f:
+        start = f[FRAMES].fileinfo()["hdrLoc"]
+    hdu = whole[start:]
+    end = hdu.index(b"END" + b" " * 77)
+    states = []
+    for done in [0, 1, 80, end] + list(range(end + 3, len(hdu), 997)) + [len(hdu)]:
+        written = bytearray(hdu[:done].ljust(len(hdu), b"\0"))
+        written[end:end + 3] = b"\0\0\0"
+        states.append((FRAMES - 1, whole[:start] + bytes(written) + b"\0"))
+    states.append((FRAMES, whole + b"\0"))
+    states.append((FRAMES, whole))
+    cut_path = os.path.join(folder, "state.fits")
+    for k, (frames, content) in enumerate(states):
+        with open(cut_path, "wb") as f:
+            f.write(content)
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            with fits.open(cut_path) as f:
+                assert len(f) == frames + 1, (k, len(f))
+                for i in range(frames):
+                    assert (f[i + 1].data == pixels(i)).all(), (k, i)
+        assert not any("truncated" in str(one.message) for one in said), k
+
+
+def check_full(folder):
+    """What a full disk left: whole frames, and not a warning."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with fits.open(os.path.join(folder, "a.fits")) as f:
+            f.verify("exception")
+            frames = list(f[0].data) if f[0].data is not None else [hdu.data for hdu in f[1:]]
+            assert len(frames) > 1
+            for i, frame in enumerate(frames):
+                assert (frame == pixels(i)).all(), i
+
+
 def check_cut(folder):
     """Killed in the middle of the last frame, wherever that is: the frames before it are there."""
     with open(os.path.join(folder, "killed_ext.fits"), "rb") as f:
@@ -135,11 +192,16 @@ def check_cut(folder):
 
 def main():
     folder = sys.argv[1]
+    if sys.argv[2:] == ["full"]:
+        return check_full(folder)
     places = np.loadtxt(os.path.join(folder, "places.txt"))
     check_extensions(os.path.join(folder, "ext[1].fits"), places)
     check_cube(os.path.join(folder, "cube.fits"), places)
     check_killed(folder, places)
     check_cut(folder)
+    check_extensions(os.path.join(folder, "rice.fits"), places)
+    check_packed(folder)
+    states_of_append(folder)
 
 
 if __name__ == "__main__":

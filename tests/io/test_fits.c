@@ -40,6 +40,9 @@ static bst_fits_info make_info(const bst_camera *camera) {
                            .camera = camera};
 }
 
+/* Which of the three kinds of file. */
+typedef enum file_kind { EXTENSIONS, RICE, CUBE } file_kind;
+
 static bst_fits_frame make_frame(bst_ctx *ctx, const bst_camera *camera, int64_t id) {
     bst_fits_frame frame = {.id = id,
                             .exposure_s = 0.5,
@@ -61,9 +64,11 @@ static bst_fits_frame make_frame(bst_ctx *ctx, const bst_camera *camera, int64_t
 }
 
 /* Writes `count` frames, the last of them a binned window when `window` is set. */
-static bst_fits *write_frames(bst_ctx *ctx, const char *path, bst_fits_layout layout, int count) {
+static bst_fits *write_frames(bst_ctx *ctx, const char *path, file_kind kind, int count) {
     bst_camera camera = small_camera();
     bst_fits_info info = make_info(&camera);
+    info.compression = kind == RICE ? BST_FITS_RICE : BST_FITS_RAW;
+    bst_fits_layout layout = kind == CUBE ? BST_FITS_CUBE : BST_FITS_EXTENSIONS;
     bst_fits *fits;
     bst_assert_ok(ctx, bst_fits_create(ctx, path, layout, &info, &fits));
     uint16_t pixels[WIDTH * HEIGHT];
@@ -89,13 +94,14 @@ static void write_window(bst_ctx *ctx, bst_fits *fits) {
 }
 
 /* A child that writes frames and kills itself. */
-static void write_and_die(const char *path, bst_fits_layout layout, int count) {
+static void write_and_die(const char *path, file_kind kind, int count) {
     pid_t child = fork();
     if (child == 0) {
         bst_ctx ctx;
         bst_ctx_init(&ctx, NULL, NULL, BST_LOG_INFO);
-        write_frames(&ctx, path, layout, count);
-        raise(SIGKILL);
+        bst_fits *fits = write_frames(&ctx, path, kind, count);
+        bst_status flushed = bst_fits_flush(&ctx, fits);
+        raise(flushed == BST_OK ? SIGKILL : SIGABRT);
     }
     int status;
     waitpid(child, &status, 0);
@@ -131,19 +137,25 @@ static void test_astropy_reads(void **state) {
     bst_ctx ctx;
     bst_ctx_init(&ctx, NULL, NULL, BST_LOG_INFO);
     /* brackets are cfitsio's extended syntax, and no more than a name to us */
-    bst_fits *fits =
-        write_frames(&ctx, scratch_path(&s, "ext[1].fits"), BST_FITS_EXTENSIONS, FRAMES);
+    bst_fits *fits = write_frames(&ctx, scratch_path(&s, "ext[1].fits"), EXTENSIONS, FRAMES);
     write_window(&ctx, fits);
     bst_assert_ok(&ctx, bst_fits_close(&ctx, fits));
-    fits = write_frames(&ctx, scratch_path(&s, "cube.fits"), BST_FITS_CUBE, FRAMES);
+    fits = write_frames(&ctx, scratch_path(&s, "cube.fits"), CUBE, FRAMES);
     bst_assert_ok(&ctx, bst_fits_close(&ctx, fits));
-    fits = write_frames(&ctx, scratch_path(&s, "empty_cube.fits"), BST_FITS_CUBE, 0);
+    fits = write_frames(&ctx, scratch_path(&s, "empty_cube.fits"), CUBE, 0);
     bst_assert_ok(&ctx, bst_fits_close(&ctx, fits));
-    write_and_die(scratch_path(&s, "killed_ext.fits"), BST_FITS_EXTENSIONS, FRAMES);
-    write_and_die(scratch_path(&s, "killed_cube.fits"), BST_FITS_CUBE, FRAMES);
+    write_and_die(scratch_path(&s, "killed_ext.fits"), EXTENSIONS, FRAMES);
+    write_and_die(scratch_path(&s, "killed_cube.fits"), CUBE, FRAMES);
+    write_and_die(scratch_path(&s, "killed_rice.fits"), RICE, FRAMES);
+    for (int i = 0; i < 2; i++) {
+        fits = write_frames(&ctx, scratch_path(&s, i == 0 ? "rice.fits" : "rice_again.fits"), RICE,
+                            FRAMES);
+        write_window(&ctx, fits);
+        bst_assert_ok(&ctx, bst_fits_close(&ctx, fits));
+    }
     write_places(&ctx, scratch_path(&s, "places.txt"));
     assert_false(scratch_has(scratch_path(&s, "empty_cube.fits")));
-    assert_int_equal(scratch_count(s.folder), 5); /* no table file is left by anyone */
+    assert_int_equal(scratch_count(s.folder), 8); /* no table file is left by anyone */
 
     char command[700];
     snprintf(command, sizeof command, "/usr/bin/python3 tests/io/check_fits.py '%s'", s.folder);
@@ -165,7 +177,13 @@ static void test_errors(void **state) {
         BST_ERR_IO);
     assert_non_null(strstr(ctx.message, "no/a.fits"));
     assert_non_null(strstr(ctx.message, strerror(ENOENT)));
-    fits = write_frames(&ctx, scratch_path(&s, "cube.fits"), BST_FITS_CUBE, 1);
+    info.compression = BST_FITS_RICE;
+    assert_int_equal(
+        bst_fits_create(&ctx, scratch_path(&s, "rice.fits"), BST_FITS_CUBE, &info, &fits),
+        BST_ERR_ARGUMENT);
+    assert_non_null(strstr(ctx.message, "rice.fits: a cube is not compressed"));
+    info.compression = BST_FITS_RAW;
+    fits = write_frames(&ctx, scratch_path(&s, "cube.fits"), CUBE, 1);
     bst_fits_frame frame = make_frame(&ctx, &camera, 1);
     uint16_t pixels[WIDTH * HEIGHT] = {0};
     assert_int_equal(bst_fits_write(&ctx, fits, &frame, pixels, WIDTH, HEIGHT - 1, NULL),
@@ -180,8 +198,9 @@ static void test_errors(void **state) {
     scratch_remove(&s);
 }
 
-/* A full disk, played by a limit on the size of files. */
-static void full_disk(bst_fits_layout layout) {
+/* A full disk, played by a limit on the size of files: the error names file and reason, and the
+ * frames before it stay, whole. */
+static void full_disk(file_kind kind, rlim_t bytes) {
     scratch s;
     scratch_make(&s);
     pid_t child = fork();
@@ -189,34 +208,42 @@ static void full_disk(bst_fits_layout layout) {
         bst_ctx ctx;
         bst_ctx_init(&ctx, NULL, NULL, BST_LOG_INFO);
         signal(SIGXFSZ, SIG_IGN);
-        const struct rlimit limit = {40000, 40000};
-        bst_fits *fits = write_frames(&ctx, scratch_path(&s, "a.fits"), layout, 1);
+        const struct rlimit limit = {bytes, bytes};
+        bst_fits *fits = write_frames(&ctx, scratch_path(&s, "a.fits"), kind, 1);
         bst_camera camera = small_camera();
         uint16_t pixels[WIDTH * HEIGHT] = {0};
-        if (setrlimit(RLIMIT_FSIZE, &limit) != 0) {
+        if (bst_fits_flush(&ctx, fits) != BST_OK || setrlimit(RLIMIT_FSIZE, &limit) != 0) {
             _exit(1);
         }
         bst_status status = BST_OK;
-        for (int i = 1; i < 100 && status == BST_OK; i++) {
+        for (int64_t i = 1; i < 100 && status == BST_OK; i++) {
+            fill(pixels, i, WIDTH, HEIGHT);
             bst_fits_frame frame = make_frame(&ctx, &camera, i);
             status = bst_fits_write(&ctx, fits, &frame, pixels, WIDTH, HEIGHT, NULL);
         }
         bool said = strstr(ctx.message, "a.fits") && strstr(ctx.message, strerror(EFBIG));
+        /* a failure stays one for who asks later */
+        bst_status again = kind == RICE ? bst_fits_flush(NULL, fits) : BST_ERR_IO;
         bst_status closed = bst_fits_close(&ctx, fits);
         (void)closed; /* must neither crash nor hang; it may or may not succeed */
-        _exit(status != BST_ERR_IO ? 2 : said ? 0 : 3);
+        _exit(status != BST_ERR_IO || again != BST_ERR_IO ? 2 : said ? 0 : 3);
     }
     int status;
     waitpid(child, &status, 0);
     assert_true(WIFEXITED(status));
     assert_int_equal(WEXITSTATUS(status), 0);
+    char command[700];
+    snprintf(command, sizeof command, "/usr/bin/python3 tests/io/check_fits.py '%s' full",
+             s.folder);
+    assert_int_equal(system(command), 0);
     scratch_remove(&s);
 }
 
 static void test_full_disk(void **state) {
     (void)state;
-    full_disk(BST_FITS_EXTENSIONS);
-    full_disk(BST_FITS_CUBE);
+    full_disk(EXTENSIONS, 40000);
+    full_disk(RICE, 60000);
+    full_disk(CUBE, 40000);
 }
 
 /* More extensions than the tables of cfitsio hold at first. */

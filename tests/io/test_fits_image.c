@@ -199,7 +199,7 @@ static void what_is_wrong_is_said(void **state) {
 
     f = begin();
     put(&f, "SIMPLE  = ", 10);
-    expect_error(&f, BST_ERR_IO, "cannot be read: error reading from FITS file");
+    expect_error(&f, BST_ERR_FORMAT, "HDU 1: the header has no END");
 
     f = begin();
     header(&f, true, 8, 0, 0, 0);
@@ -209,6 +209,9 @@ static void what_is_wrong_is_said(void **state) {
     f = begin();
     header(&f, true, 8, 2, 40000, 1);
     end_header(&f);
+    for (int i = 0; i < 5000; i++) {
+        big_endian(&f, 0, 8);
+    }
     expect_error(
         &f, BST_ERR_FORMAT,
         "an image of 40000 x 1 pixels (allowed: sides of 1 to 32768, at most 268435456 pixels)");
@@ -220,9 +223,7 @@ static void what_is_wrong_is_said(void **state) {
     for (int i = 0; i < 720; i++) {
         big_endian(&f, 0, 4);
     }
-    expect_error(
-        &f, BST_ERR_FORMAT,
-        "is cut short: an image of 720 x 100 pixels of 32 bits that ends at byte 290880 of 5760");
+    expect_error(&f, BST_ERR_FORMAT, "HDU 1: is cut short: 288000 bytes of data, 2880 in the file");
 }
 
 int main(void) {

@@ -67,6 +67,9 @@ static void test_finished_run(void **state) {
     const bst_value nulls[] = {bst_null_value(BST_COLUMN_INT), bst_real_value(NAN),
                                bst_text_value(NULL)};
     bst_assert_ok(&ctx, bst_table_append(&ctx, table, nulls));
+    const bst_value infinite[] = {bst_null_value(BST_COLUMN_INT), bst_real_value(-INFINITY),
+                                  bst_text_value(NULL)};
+    bst_assert_ok(&ctx, bst_table_append(&ctx, table, infinite));
     cJSON *json = cJSON_CreateObject();
     cJSON_AddNumberToObject(json, "tenth", 0.1);
     cJSON_AddNumberToObject(json, "third", 1.0 / 3.0);
@@ -79,13 +82,13 @@ static void test_finished_run(void **state) {
     char db[700], manifest[700];
     snprintf(db, sizeof db, "%s/run.sqlite", out);
     query(db, "SELECT count(*) FROM spots", text, sizeof text);
-    assert_string_equal(text, "1001");
+    assert_string_equal(text, "1002");
     query(db, "SELECT count(*) FROM spots WHERE tick = 7 AND x_px = 0.1 * 7 AND label = 'a ''b'''",
           text, sizeof text);
     assert_string_equal(text, "1");
     query(db, "SELECT count(*) FROM spots WHERE tick IS NULL AND x_px IS NULL AND label IS NULL",
           text, sizeof text);
-    assert_string_equal(text, "1");
+    assert_string_equal(text, "2");
     query(db, "SELECT unit || '/' || type || '/' || doc FROM columns WHERE \"column\" = 'x_px'",
           text, sizeof text);
     assert_string_equal(text, "px/REAL/column");

@@ -183,6 +183,30 @@ static void frames_show_what_truth_says(void **state) {
     assert_true(step.truth_written && !step.frame_written && step.truth->dropped);
     assert_int_equal(step.truth->count, count);
     assert_memory_equal(step.truth->items, items, (size_t)count * sizeof *items);
+
+    /* with less room, the brightest are kept, in the same order, and the rest is counted */
+    enum { ROOM = 25 };
+    assert_true(count > 2 * ROOM);
+    step.capacity = ROOM;
+    step.overflow = 0;
+    step.exposure = &exposure;
+    bst_assert_ok(&ctx, d->step(self, &step));
+    assert_int_equal(step.truth->count, ROOM);
+    assert_int_equal(step.truth->lost, count - ROOM);
+    assert_int_equal(step.overflow, 1);
+    int kept = 0;
+    double faintest_kept = 0.0, brightest_lost = INFINITY;
+    for (int i = 0; i < count; i++) {
+        if (kept < ROOM && memcmp(&step.truth->items[kept], &items[i], sizeof *items) == 0) {
+            faintest_kept = fmax(faintest_kept, items[i].v_mag);
+            kept++;
+        } else {
+            brightest_lost = fmin(brightest_lost, items[i].v_mag);
+        }
+    }
+    assert_int_equal(kept, ROOM);
+    assert_true(faintest_kept <= brightest_lost);
+    step.capacity = CAPACITY;
     free(items);
 
     /* binning is refused, an exposure that the ring does not hold too */

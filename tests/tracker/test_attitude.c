@@ -7,7 +7,7 @@
 #define AS BST_ARCSEC_RAD
 #define MAX_STARS 4000
 
-static const bst_camera camera = {.width_px = 1024, .height_px = 1024, .pixel_scale_arcsec = 3.0};
+static bst_camera camera = {.width_px = 1024, .height_px = 1024, .pixel_scale_arcsec = 3.0};
 static const bst_attitude_params params = {
     .floor_px = 0.0, .reject_chi2 = 18.4, .max_cross_rad = 6.0 * AS, .max_roll_rad = 600.0 * AS};
 
@@ -132,6 +132,39 @@ static void exact_without_noise(void **state) {
     bst_vec3 e = bst_quat_to_rotvec(bst_quat_mul(out.q_cam_from_gcrf, bst_quat_conj(s->q_true)));
     /* pixels of 1.5e-5 rad hold 1e-13 of themselves; roll has 450 px of lever */
     bst_assert_close(bst_vec3_norm(e), 0.0, 1e-13);
+}
+
+/* Rotation and 10 % of distortion in the corner change nothing in how well the attitude is known.
+ */
+static void distorted_cameras_are_as_good(void **state) {
+    bst_camera plain = camera;
+    double corner = 724.0 * bst_camera_scale_rad(&camera);
+    camera.rotation_deg = -37.0;
+    camera.distortion.k1 = 0.1 / (corner * corner);
+    camera.distortion.p1 = 0.003 / corner;
+    bst_ctx ctx = {0};
+    bst_assert_ok(&ctx, bst_camera_prepare(&ctx, &camera));
+    exact_without_noise(state);
+    double ratio[3] = {0};
+    enum { TRIALS = 300 };
+    for (uint64_t t = 0; t < TRIALS; t++) {
+        scene *s = make_scene(3000 + t, 30, 0, 1000.0);
+        bst_attitude_solution out;
+        bst_attitude_solve(&camera, &params, s->q_true, s->stars, s->count, &out);
+        assert_true(out.valid);
+        bst_vec3 e =
+            bst_quat_to_rotvec(bst_quat_mul(out.q_cam_from_gcrf, bst_quat_conj(s->q_true)));
+        const double axis[3] = {e.x, e.y, e.z};
+        for (int k = 0; k < 3; k++) {
+            ratio[k] += axis[k] * axis[k] / out.covariance[k][k] / TRIALS;
+        }
+    }
+    for (int k = 0; k < 3; k++) {
+        /* 1 sigma of the mean of 300 squared normals is 0.08, and the covariance is widened by
+         * chance misfits */
+        bst_assert_close(ratio[k], 1.0, 0.3);
+    }
+    camera = plain;
 }
 
 static void thousands_of_stars(void **state) {
@@ -270,11 +303,10 @@ static void telemetry_error_is_followed(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(error_meets_the_bound),
-                                       cmocka_unit_test(exact_without_noise),
-                                       cmocka_unit_test(thousands_of_stars),
-                                       cmocka_unit_test(optimistic_variances),
-                                       cmocka_unit_test(says_no),
-                                       cmocka_unit_test(telemetry_error_is_followed)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(error_meets_the_bound),         cmocka_unit_test(exact_without_noise),
+        cmocka_unit_test(distorted_cameras_are_as_good), cmocka_unit_test(thousands_of_stars),
+        cmocka_unit_test(optimistic_variances),          cmocka_unit_test(says_no),
+        cmocka_unit_test(telemetry_error_is_followed)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -213,7 +213,7 @@ static void reach_holds_the_field(void **state) {
         for (int w = 0; w < 2; w++) {
             const double *r = windows[w];
             bst_vec3 centre = bst_camera_unproject(&c, 0.5 * (r[0] + r[2]), 0.5 * (r[1] + r[3]));
-            double reach = bst_camera_reach_rad(&c, centre, r[0], r[1], r[2], r[3]), seen = 0;
+            double reach = bst_camera_reach_rad(&c, centre, r[0], r[1], r[2], r[3], 0), seen = 0;
             for (int k = 0; k <= 100; k++) {
                 for (int m = 0; m <= 100; m++) {
                     bst_vec3 v = bst_camera_unproject(&c, r[0] + 0.01 * k * (r[2] - r[0]),

@@ -75,9 +75,10 @@ static void a_catalogue_adds_each_satellite_once(void **state) {
 
     assert_int_equal(make(&ctx, "", "{\"elements_file\": \"nowhere.tle\"}", &world),
                      BST_ERR_CONFIG);
-    assert_string_equal(ctx.message,
-                        "test: /world/catalogues/0/elements_file: nowhere.tle: cannot be opened: "
-                        "No such file or directory; give a file of two-line element sets");
+    assert_string_equal(
+        ctx.message,
+        "test: /world/catalogues/0/elements_file: nowhere.tle: cannot be opened: "
+        "No such file or directory; give a file of element sets (TLE, or OMM as JSON or CSV)");
     scratch_remove(&s);
 }
 

@@ -88,6 +88,24 @@ static void test_damaged(void **state) {
     }
 }
 
+/* Not a number at a place, with the right checksum. */
+static void refuse_nan(file_bytes *f, size_t place, bool is_double, const char *what) {
+    bst_star_header h;
+    const float single = NAN;
+    const double twofold = NAN;
+    char text[100], kept[8];
+    size_t bytes = is_double ? sizeof twofold : sizeof single;
+    size_t skip = offsetof(bst_star_header, checksum) + sizeof h.checksum;
+    memcpy(kept, f->data + place, bytes);
+    memcpy(f->data + place, is_double ? (const void *)&twofold : (const void *)&single, bytes);
+    memcpy(&h, f->data, sizeof h);
+    h.checksum = bst_star_checksum(f->data + skip, f->bytes - skip);
+    memcpy(f->data, &h, sizeof h);
+    snprintf(text, sizeof text, "is damaged (%s)", what);
+    refuse(f, f->bytes, text);
+    memcpy(f->data + place, kept, bytes);
+}
+
 /* Right checksum, wrong content: what a faulty writer could leave. */
 static void test_inconsistent(void **state) {
     file_bytes *f = *state;
@@ -99,7 +117,7 @@ static void test_inconsistent(void **state) {
     memcpy(f->data, &h, sizeof h);
     h.checksum = bst_star_checksum(f->data + skip, f->bytes - skip);
     memcpy(f->data, &h, sizeof h);
-    refuse(f, f->bytes, "is damaged (sizes in the header)");
+    refuse(f, f->bytes, "is damaged (numbers in the header)");
     h = original;
     memcpy(f->data, &h, sizeof h);
     size_t cell = sizeof h + h.patch_count * sizeof(bst_star_patch) + 500 * sizeof(bst_star_cell) +
@@ -109,6 +127,10 @@ static void test_inconsistent(void **state) {
     memcpy(f->data, &h, sizeof h);
     refuse(f, f->bytes, "is damaged (sky cell 500)");
     f->data[cell] ^= 1;
+    refuse_nan(f, offsetof(bst_star_header, complete_to_v_mag), true, "numbers in the header");
+    refuse_nan(f, sizeof h + 2 * sizeof(bst_star_patch) + offsetof(bst_star_patch, radius_deg),
+               true, "patch 2");
+    refuse_nan(f, cell - offsetof(bst_star_cell, first), false, "sky cell 500");
     memcpy(f->data, &original, sizeof original);
 }
 

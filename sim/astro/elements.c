@@ -1,0 +1,152 @@
+#include "sim/astro/elements.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/astro/elements_internal.h"
+#include "sim/astro/tle.h"
+#include "sim/core/file.h"
+
+#define MAX_FILE_BYTES ((uint64_t)256 << 20)
+
+bst_elements_reader bst_elements_start(bst_ctx *ctx, const char *name,
+                                       const bst_elements_options *options) {
+    bst_elements_reader reader = {.source = {ctx, name}};
+    if (options) {
+        reader.options = *options;
+    }
+    return reader;
+}
+
+bst_status bst_elements_append(bst_elements_reader *r, const bst_elements *set) {
+    if (r->count == r->capacity) {
+        int capacity = r->capacity ? 2 * r->capacity : 16;
+        bst_elements *sets = realloc(r->sets, (size_t)capacity * sizeof *sets);
+        if (!sets) {
+            return bst_fail(r->source.ctx, BST_ERR_MEMORY, "%.400s: no memory for %d element sets",
+                            r->source.name, capacity);
+        }
+        r->sets = sets;
+        r->capacity = capacity;
+    }
+    r->sets[r->count++] = *set;
+    return BST_OK;
+}
+
+bst_status bst_elements_tolerate(bst_elements_reader *r, bst_status status) {
+    if (status == BST_ERR_FORMAT && r->options.skip_bad_sets) {
+        r->skipped++;
+        bst_log(r->source.ctx, BST_LOG_WARNING, "%s; element set left out",
+                r->source.ctx ? r->source.ctx->message : "");
+        if (r->source.ctx) {
+            r->source.ctx->message[0] = '\0';
+        }
+        return BST_OK;
+    }
+    return status;
+}
+
+bst_status bst_elements_finish(bst_elements_reader *r, bst_status status, bool empty,
+                               const char *expected, bst_elements **out, int *count) {
+    bst_ctx *ctx = r->source.ctx;
+    *out = NULL;
+    *count = 0;
+    if (status == BST_OK && r->count == 0) {
+        if (empty) {
+            status = bst_fail(ctx, BST_ERR_FORMAT, "%.400s:1: the file is empty (expected %s)",
+                              r->source.name, expected);
+        } else if (r->others > 0) {
+            status = bst_fail(ctx, BST_ERR_NOT_FOUND,
+                              "%.400s: no element set of satellite %d, only %d of others",
+                              r->source.name, r->options.norad, r->others);
+        } else {
+            status = bst_fail(ctx, BST_ERR_FORMAT,
+                              "%.400s:1: the file holds no element set that can be used (%d bad "
+                              "ones left out; expected %s)",
+                              r->source.name, r->skipped, expected);
+        }
+    }
+    if (status != BST_OK) {
+        free(r->sets);
+        return status;
+    }
+    *out = r->sets;
+    *count = r->count;
+    return BST_OK;
+}
+
+typedef enum form { FORM_LINES, FORM_JSON, FORM_CSV, FORM_OTHER } form;
+
+static bool starts_with(const bst_text_line *line, const char *text) {
+    size_t length = strlen(text);
+    return line->length >= length && memcmp(line->text, text, length) == 0;
+}
+
+/* The form of a file from its first line that says something. */
+static form recognise(const char *data, size_t bytes, bst_text_line *line) {
+    bst_text_cursor cursor = bst_text_start(data, bytes);
+    while (bst_text_next_line(&cursor, line)) {
+        bst_text_span s = bst_text_trimmed((bst_text_span){line->text, line->length});
+        if (s.length == 0 || s.text[0] == '#') {
+            continue;
+        }
+        if (s.text[0] == '{' || s.text[0] == '[') {
+            return FORM_JSON;
+        }
+        if (s.text[0] == '<' || starts_with(line, "CCSDS_")) {
+            return FORM_OTHER;
+        }
+        /* a header row: one of its columns has one of these names */
+        while (s.length > 0) {
+            const char *comma = memchr(s.text, ',', s.length);
+            size_t length = comma ? (size_t)(comma - s.text) : s.length;
+            bst_text_span column = bst_text_trimmed((bst_text_span){s.text, length});
+            if (column.length > 1 && column.text[0] == '"') {
+                column = (bst_text_span){column.text + 1, column.length - 2};
+            }
+            if (bst_text_is(column, "EPOCH") || bst_text_is(column, "NORAD_CAT_ID")) {
+                return FORM_CSV;
+            }
+            s = comma ? (bst_text_span){comma + 1, s.length - length - 1} : (bst_text_span){0};
+        }
+        return FORM_LINES;
+    }
+    return FORM_LINES;
+}
+
+bst_status bst_elements_read_buffer(bst_ctx *ctx, const char *name, const char *data, size_t bytes,
+                                    const bst_elements_options *options, bst_elements **out,
+                                    int *count) {
+    *out = NULL;
+    *count = 0;
+    BST_TRY(bst_file_check_text(ctx, name, data, bytes));
+    bst_elements_reader reader = bst_elements_start(ctx, name, options);
+    bst_text_line line;
+    switch (recognise(data, bytes, &line)) {
+        case FORM_JSON:
+            return bst_elements_finish(&reader, bst_omm_read_json(&reader, data, bytes), false,
+                                       "orbit mean-elements messages", out, count);
+        case FORM_CSV:
+            return bst_elements_finish(&reader, bst_omm_read_csv(&reader, data, bytes), false,
+                                       "rows of orbit mean-elements messages", out, count);
+        case FORM_OTHER:
+            return bst_text_fail_at(&reader.source, &line,
+                                    "the file is in a form that is not read here", line.text,
+                                    line.length, "two-line element sets, or OMM as JSON or CSV");
+        default:
+            return bst_tle_read_buffer(ctx, name, data, bytes, options, out, count);
+    }
+}
+
+bst_status bst_elements_load(bst_ctx *ctx, const char *path, const bst_elements_options *options,
+                             bst_elements **out, int *count) {
+    *out = NULL;
+    *count = 0;
+    char *data;
+    size_t bytes;
+    BST_TRY(bst_file_read(ctx, path, MAX_FILE_BYTES,
+                          "a file of element sets (TLE, or OMM as JSON or CSV)", &data, &bytes));
+    bst_status status = bst_elements_read_buffer(ctx, path, data, bytes, options, out, count);
+    free(data);
+    return status;
+}

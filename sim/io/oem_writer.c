@@ -1,0 +1,66 @@
+#include "sim/io/oem_writer.h"
+
+#include "sim/io/text_writer_internal.h"
+
+enum { DEFAULT_DEGREE = 7 };
+
+bst_status bst_oem_write_head(bst_ctx *ctx, FILE *stream, const char *creation_utc,
+                              const char *originator, const char *comment) {
+    bst_kvn_write(stream, "CCSDS_OEM_VERS", "2.0");
+    bst_kvn_comment(stream, comment);
+    bst_kvn_write(stream, "CREATION_DATE", creation_utc);
+    bst_kvn_write(stream, "ORIGINATOR", originator);
+    return bst_text_stream_ok(ctx, stream);
+}
+
+static bst_status write_metadata(bst_ctx *ctx, FILE *stream, const bst_oem_segment *s,
+                                 bst_time *first) {
+    bst_time last;
+    bst_vec3 r, v;
+    char start[BST_TIME_TEXT_BYTES], stop[BST_TIME_TEXT_BYTES], degree[16];
+    BST_TRY(s->series.state(s->series.user, ctx, s->series.rows - 1, &last, &r, &v));
+    BST_TRY(s->series.state(s->series.user, ctx, 0, first, &r, &v));
+    bst_text_utc(*first, start);
+    bst_text_utc(last, stop);
+    snprintf(degree, sizeof degree, "%d", s->hermite_degree ? s->hermite_degree : DEFAULT_DEGREE);
+    fputs("\nMETA_START\n", stream);
+    bst_kvn_write(stream, "OBJECT_NAME", s->object_name);
+    bst_kvn_write(stream, "OBJECT_ID", s->object_id);
+    bst_kvn_write(stream, "CENTER_NAME", "EARTH");
+    bst_kvn_write(stream, "REF_FRAME", s->ref_frame);
+    bst_kvn_write(stream, "TIME_SYSTEM", "UTC");
+    bst_kvn_write(stream, "START_TIME", start);
+    bst_kvn_write(stream, "STOP_TIME", stop);
+    bst_kvn_write(stream, "INTERPOLATION", "HERMITE");
+    bst_kvn_write(stream, "INTERPOLATION_DEGREE", degree);
+    fputs("META_STOP\n\n", stream);
+    bst_kvn_comment(stream, s->comment);
+    return bst_text_stream_ok(ctx, stream);
+}
+
+bst_status bst_oem_write_segment(bst_ctx *ctx, FILE *stream, const bst_oem_segment *s) {
+    if (!s->object_name || !*s->object_name || !s->object_id || !*s->object_id || !s->ref_frame) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "an OEM segment needs OBJECT_NAME and OBJECT_ID");
+    }
+    if (s->series.rows < 1) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "%.200s: an OEM segment needs at least one state",
+                        s->object_name);
+    }
+    bst_time before;
+    BST_TRY(write_metadata(ctx, stream, s, &before));
+    for (int64_t row = 0; row < s->series.rows; row++) {
+        bst_time t;
+        bst_vec3 r, v;
+        char text[BST_TIME_TEXT_BYTES];
+        BST_TRY(s->series.state(s->series.user, ctx, row, &t, &r, &v));
+        if (row > 0) {
+            BST_TRY(bst_text_rising(ctx, s->object_name, row, before, t));
+        }
+        before = t;
+        bst_text_utc(t, text);
+        fprintf(stream, "%s %.9f %.9f %.9f %.12f %.12f %.12f\n", text, r.x * 1e-3, r.y * 1e-3,
+                r.z * 1e-3, v.x * 1e-3, v.y * 1e-3, v.z * 1e-3);
+        BST_TRY(bst_text_stream_ok(ctx, stream));
+    }
+    return BST_OK;
+}

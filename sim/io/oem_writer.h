@@ -1,0 +1,36 @@
+/* Writes orbits as a CCSDS Orbit Ephemeris Message (OEM 2.0, KVN; CCSDS 502.0-B-2 and -3). */
+#ifndef BST_IO_OEM_WRITER_H
+#define BST_IO_OEM_WRITER_H
+
+#include <stdio.h>
+
+#include "sim/io/state_series.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct bst_oem_segment {
+    const char *object_name, *object_id; /* "INMARSAT GX5", "2019-081A"; not empty */
+    const char *ref_frame;               /* of the series, as OEM names it: "GCRF", "TEME" ... */
+    const char *comment;                 /* one or more lines; NULL: none */
+    int hermite_degree;                  /* that readers shall interpolate with; 0: 7 */
+    bst_state_series series;             /* at least one row */
+} bst_oem_segment;
+
+/* Starts the message. `creation_utc` is "YYYY-MM-DDThh:mm:ss"; `comment` may be NULL. The stream is
+ * the caller's. What is not printable ASCII in a text is written as '_'. Every function:
+ * BST_ERR_ARGUMENT for an empty name or no rows; BST_ERR_IO when the stream has an error. */
+bst_status bst_oem_write_head(bst_ctx *ctx, FILE *stream, const char *creation_utc,
+                              const char *originator, const char *comment) BST_MUST_CHECK;
+
+/* One object: metadata with the series' span, TIME_SYSTEM UTC and HERMITE interpolation, then a row
+ * per state: UTC to 1 ns, km to 1e-9, km/s to 1e-12. Rows must rise in time (BST_ERR_ARGUMENT). */
+bst_status bst_oem_write_segment(bst_ctx *ctx, FILE *stream,
+                                 const bst_oem_segment *segment) BST_MUST_CHECK;
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,31 @@
+/* A point spread function from a FITS image, as what the onboard side knows of it: one width. */
+#ifndef BST_IO_PSF_FITS_H
+#define BST_IO_PSF_FITS_H
+
+#include "sim/core/status.h"
+
+/* Longest side of the image. */
+#define BST_PSF_LONGEST_SIDE 4096
+
+typedef struct bst_psf_summary {
+    int width, height;
+    double oversampling;        /* samples per detector pixel and axis */
+    double noise_equivalent_px; /* area (sum p)^2 / sum p^2, detector px^2 */
+    double fwhm_px;             /* of the Gaussian with that area */
+} bst_psf_summary;
+
+/* Reads the file's first image of two axes (see bst_fits_read_image) as samples of the PSF on a
+ * square grid, before integration over the pixel, on any scale and anywhere in the image. Samples
+ * per detector pixel: `oversampling` when it is > 0, else the keyword OVERSAMP of the image.
+ *
+ * The onboard filter is a Gaussian: it gets the width with the same noise-equivalent area, which is
+ * what sets the detectability of a point in white noise. For a Gaussian the area is 4 pi sigma^2
+ * (King 1983, PASP 95, 163), so FWHM = 2.3548 sqrt(area / (4 pi)).
+ *
+ * BST_ERR_FORMAT, naming file and value: a value that is not finite or negative, a sum of zero, a
+ * side longer than BST_PSF_LONGEST_SIDE, no or a wrong OVERSAMP (0.1 to 1000); and all that
+ * bst_fits_read_image refuses. */
+bst_status bst_psf_fits_read(bst_ctx *ctx, const char *path, double oversampling,
+                             bst_psf_summary *out) BST_MUST_CHECK;
+
+#endif

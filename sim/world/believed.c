@@ -1,0 +1,32 @@
+/* What an observer's computer believes of its orbit and clock. */
+#include "sim/world/world_internal.h"
+
+static const bst_knowledge_config *knowledge_of(const bst_world *world, int observer, int sensor) {
+    return &world->observers[observer].sensors[sensor].config.knowledge;
+}
+
+double bst_believed_seconds(const bst_world *world, int observer, int sensor, double seconds) {
+    return seconds + knowledge_of(world, observer, sensor)->clock_offset_s;
+}
+
+bst_status bst_believed_state(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
+                              bst_sky_clock *clock, double believed_s, bst_state *out) {
+    const bst_orbit_error_config *error = &knowledge_of(world, observer, sensor)->orbit;
+    BST_TRY(bst_orbit_state(ctx, &world->observers[observer].orbit, clock, world->epoch, believed_s,
+                            true, out));
+    const double *p = error->position_rtn_m, *v = error->velocity_rtn_mps;
+    double along = p[1] + error->along_track_mps * believed_s;
+    if (p[0] == 0.0 && along == 0.0 && p[2] == 0.0 && v[0] == 0.0 && v[1] == 0.0 && v[2] == 0.0) {
+        return BST_OK;
+    }
+    bst_vec3 r = bst_vec3_unit(out->position_m);
+    bst_vec3 n = bst_vec3_unit(bst_vec3_cross(out->position_m, out->velocity_mps));
+    bst_vec3 t = bst_vec3_cross(n, r);
+    const bst_vec3 axes[3] = {r, t, n};
+    const double position[3] = {p[0], along, p[2]};
+    for (int i = 0; i < 3; i++) {
+        out->position_m = bst_vec3_axpy(out->position_m, position[i], axes[i]);
+        out->velocity_mps = bst_vec3_axpy(out->velocity_mps, v[i], axes[i]);
+    }
+    return BST_OK;
+}

@@ -1,0 +1,171 @@
+/* Orbits from files of states: ephemerides (OEM) and states injected per frame. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/world/kepler.h"
+#include "sim/world/world_build.h"
+
+/* How far beyond its ends a file is continued, by two-body motion: what light time before a run's
+ * first exposure and a controller's look ahead need. Earth's oblateness makes 0.1 m of it at LEO.
+ */
+#define MARGIN_S 5.0
+
+/* The file as it was read for another object, or a new entry that is still empty. The entry's name
+ * is `key` (a path, with what else the reading depends on); NULL when there is no memory. */
+static bst_world_file *find_file(bst_world *world, const char *key) {
+    for (int i = 0; i < world->file_count; i++) {
+        if (strcmp(world->files[i].key, key) == 0) {
+            return &world->files[i];
+        }
+    }
+    bst_world_file *files = realloc(world->files, ((size_t)world->file_count + 1) * sizeof *files);
+    if (!files) {
+        return NULL;
+    }
+    world->files = files;
+    bst_world_file *file = &files[world->file_count];
+    *file = (bst_world_file){.key = strdup(key)};
+    if (!file->key) {
+        return NULL;
+    }
+    world->file_count++;
+    return file;
+}
+
+static bst_status open_oem(const bst_world_builder *b, const char *object, bst_world_file *file,
+                           const char *path, bst_orbit *orbit) {
+    if (!file->oem) {
+        BST_TRY(bst_oem_load(b->ctx, path, &file->oem));
+    }
+    orbit->oem = file->oem;
+    BST_TRY(bst_oem_find(b->ctx, orbit->oem, object, &orbit->file_object));
+    bst_time start, stop;
+    bst_oem_span(orbit->oem, orbit->file_object, &start, &stop);
+    orbit->from_s = bst_time_diff(start, b->world->epoch);
+    orbit->to_s = bst_time_diff(stop, b->world->epoch);
+    return BST_OK;
+}
+
+static bst_status open_injected(const bst_world_builder *b, const char *object,
+                                bst_world_file *file, const char *path, bst_orbit *orbit) {
+    if (!file->injected) {
+        BST_TRY(bst_injected_load(b->ctx, path, b->world->epoch, &file->injected));
+    }
+    orbit->injected = file->injected;
+    BST_TRY(bst_injected_find(b->ctx, orbit->injected, object, &orbit->file_object));
+    bst_injected_span(orbit->injected, orbit->file_object, &orbit->from_s, &orbit->to_s);
+    return BST_OK;
+}
+
+bst_status bst_orbit_build_file(const bst_world_builder *b, const bst_orbit_config *config,
+                                const char *path, bst_orbit *orbit) {
+    bool oem = config->source == BST_ORBIT_OEM;
+    const char *key = oem ? "oem_file" : "states_file";
+    const char *given = oem ? config->oem_file : config->states_file;
+    const char *object = oem ? config->oem_object : config->states_object;
+    if (!*given) {
+        return bst_fail(b->ctx, BST_ERR_CONFIG, "%s: %s: source \"%s\" needs \"%s\"", b->scenario,
+                        path, oem ? "oem" : "injected", key);
+    }
+    bst_world_path full = bst_world_path_join(b, given);
+    char name[sizeof full.text + 16];
+    snprintf(name, sizeof name, "%s:%s", oem ? "oem" : "injected", full.text);
+    bst_world_file *file = find_file(b->world, name);
+    if (!file) {
+        return bst_fail(b->ctx, BST_ERR_MEMORY, "out of memory for files of states");
+    }
+    orbit->in_teme = !oem && config->states_frame == BST_STATES_TEME;
+    bst_status status = oem ? open_oem(b, object, file, full.text, orbit)
+                            : open_injected(b, object, file, full.text, orbit);
+    return status == BST_OK
+               ? BST_OK
+               : bst_fail_prefix(b->ctx, status == BST_ERR_MEMORY ? status : BST_ERR_CONFIG,
+                                 "%s: %s/%s", b->scenario, path, key);
+}
+
+static bst_status state_within(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *clock,
+                               bst_time epoch, double seconds, bst_state *out) {
+    if (orbit->source == BST_ORBIT_OEM) {
+        return bst_oem_state(ctx, orbit->oem, orbit->file_object, clock,
+                             bst_time_add(epoch, seconds), &out->position_m, &out->velocity_mps);
+    }
+    BST_TRY(bst_injected_state(ctx, orbit->injected, orbit->file_object, seconds, &out->position_m,
+                               &out->velocity_mps));
+    if (orbit->in_teme) {
+        bst_sky sky;
+        BST_TRY(bst_sky_clock_at(ctx, clock, bst_time_add(epoch, seconds), &sky));
+        out->position_m = bst_mat3_mul_vec(&sky.frames.gcrf_from_teme, out->position_m);
+        out->velocity_mps = bst_mat3_mul_vec(&sky.frames.gcrf_from_teme, out->velocity_mps);
+    }
+    return BST_OK;
+}
+
+bst_status bst_orbit_file_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *clock,
+                                bst_time epoch, double seconds, bst_state *out) {
+    double end_s = fmax(orbit->from_s, fmin(orbit->to_s, seconds));
+    double beyond_s = seconds - end_s;
+    if (!(fabs(beyond_s) <= MARGIN_S)) {
+        end_s = seconds; /* for the reader's own message */
+        beyond_s = 0.0;
+    }
+    bst_status status = state_within(ctx, orbit, clock, epoch, end_s, out);
+    if (status == BST_OK && beyond_s != 0.0) {
+        bst_state end = *out;
+        status = bst_kepler_propagate(ctx, BST_EARTH_MU_M3PS2, end.position_m, end.velocity_mps,
+                                      beyond_s, &out->position_m, &out->velocity_mps);
+    }
+    return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "orbit of %s", orbit->name);
+}
+
+/* Fails unless the file that the orbit, or what it is relative to, comes from covers the run. */
+static bst_status check_span(bst_ctx *ctx, const char *scenario, const bst_world *world,
+                             const bst_orbit *orbit, double duration_s, const char *path) {
+    while (orbit->reference) {
+        orbit = orbit->reference;
+    }
+    bool oem = orbit->source == BST_ORBIT_OEM;
+    if (!oem && orbit->source != BST_ORBIT_INJECTED) {
+        return BST_OK;
+    }
+    bool covers = oem ? bst_oem_covers(orbit->oem, orbit->file_object, world->epoch,
+                                       bst_time_add(world->epoch, duration_s))
+                      : orbit->from_s <= 1e-6 && orbit->to_s >= duration_s - 1e-6;
+    if (covers) {
+        return BST_OK;
+    }
+    bool gap = orbit->from_s <= 0.0 && orbit->to_s >= duration_s;
+    return bst_fail(ctx, BST_ERR_CONFIG,
+                    "%s: %s: the states of \"%s\" do not cover the run (found %.6g s to %.6g s "
+                    "after the epoch%s; needed: 0 s to %.6g s)",
+                    scenario, path, orbit->name, orbit->from_s, orbit->to_s,
+                    gap ? ", with a gap" : "", duration_s);
+}
+
+bst_status bst_world_check_spans(bst_ctx *ctx, const char *scenario, const bst_world *world,
+                                 double duration_s) {
+    char path[96];
+    for (int i = 0; i < world->observer_count; i++) {
+        const world_observer *observer = &world->observers[i];
+        snprintf(path, sizeof path, "/observers/%d/orbit", i);
+        BST_TRY(check_span(ctx, scenario, world, &observer->orbit, duration_s, path));
+        for (int s = 0; s < observer->sensor_count; s++) {
+            int cue = observer->sensors[s].cue_object;
+            snprintf(path, sizeof path, "/observers/%d/sensors/%d/cue/object", i, s);
+            if (cue >= 0) {
+                BST_TRY(
+                    check_span(ctx, scenario, world, &world->objects[cue].orbit, duration_s, path));
+            }
+        }
+    }
+    return BST_OK;
+}
+
+void bst_world_files_free(bst_world *world) {
+    for (int i = 0; i < world->file_count; i++) {
+        free(world->files[i].key);
+        bst_oem_free(world->files[i].oem);
+        bst_injected_free(world->files[i].injected);
+    }
+    free(world->files);
+}

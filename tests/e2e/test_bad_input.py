@@ -1,0 +1,107 @@
+#!/usr/bin/env python3
+"""Bad input at the command line: exit code 1, one line that names the file, and soon.
+
+What each reader says by content is tested in tests/bad_input; this is about what reaches the user.
+
+Usage, from the repository root: /usr/bin/python3 tests/e2e/test_bad_input.py BORESIGHT
+"""
+import os
+import subprocess
+import unittest
+
+import runs
+
+SECONDS = 30  # a reader that waits for a pipe or reads a device to its end would take for ever
+GOES = ("1 10061U 77048A   22166.94040701  .00000081  00000+0  00000+0 0  9993\n"
+        "2 10061   9.8539 307.1213 0011382  31.5637 332.0402  0.99393421 31740\n")
+SPAN = ("--start", "2022-06-16T00:00:00Z", "--stop", "2022-06-16T00:01:00Z", "--step", "60")
+
+
+def set_to(path, key):
+    return "check", runs.STARE, "--quiet", "--set", f"{key}={path}"
+
+
+# how to hand each reader a file
+READERS = {
+    "scenario of check": lambda path: ("check", path),
+    "scenario of run": lambda path: ("run", path, "--out", "/dev/null/run"),
+    "element sets": lambda path: ("propagate", "--tle", path, *SPAN),
+    "element sets in a scenario":
+        lambda path: set_to(path, "/world/objects/0/orbit/elements_file"),
+    "Earth orientation":
+        lambda path: ("propagate", "--tle", "scenarios/catalogue_2022-06.tle", "--frame", "gcrf",
+                      "--eop", path, *SPAN),
+    "Earth orientation in a scenario": lambda path: set_to(path, "/world/earth_orientation"),
+    "star catalogue": lambda path: ("stars", "info", path),
+    "star catalogue in a scenario": lambda path: set_to(path, "/world/star_catalogue"),
+    "star import": lambda path: ("stars", "import", path, "--out", "/dev/null/x.stars"),
+    "star subset": lambda path: ("stars", "import", "none.tar.xz", "--out", "/dev/null/x.stars",
+                                 "--subset", path),
+    "calibration map":
+        lambda path: set_to(path, runs.SENSOR + "/modules/imgproc/dark_file"),
+}
+
+
+class BadInput(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        folder = cls.folder = runs.scratch()
+
+        def write(name, content):
+            with open(os.path.join(folder, name), "wb") as file:
+                file.write(content)
+
+        write("empty", b"")
+        write("garbage", b"\x00\x01\xfe\xff" * 1000)
+        write("html", b"<!DOCTYPE html>\n<html><body>404</body></html>\n")
+        write("utf16", "\ufeff{\"boresight\": 1}\n".encode("utf-16-le"))
+        write("text_after_zero", b"\0" + GOES.encode())
+        write("deep", b"[" * 10000)
+        with open(os.path.join(folder, "hole"), "wb") as file:
+            file.truncate(5 << 30)
+        os.mkdir(os.path.join(folder, "folder"))
+        os.mkfifo(os.path.join(folder, "pipe"))
+        os.symlink("loop", os.path.join(folder, "loop"))
+        os.symlink("nowhere", os.path.join(folder, "dangling"))
+
+    def call(self, *words, **environment):
+        return subprocess.run([runs.BORESIGHT, *words], capture_output=True, text=True,
+                              timeout=SECONDS, stdin=subprocess.DEVNULL,
+                              env={**os.environ, **environment})
+
+    def refused(self, result, name):
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertEqual(result.stdout, "")
+        self.assertRegex(result.stderr, r"\Aboresight[ a-z]*: [^\n]+\n\Z")
+        self.assertIn(name, result.stderr)
+
+    def test_every_reader(self):
+        names = ["missing", "empty", "garbage", "html", "utf16", "text_after_zero", "deep", "hole",
+                 "folder", "pipe", "loop", "dangling"]
+        paths = [os.path.join(self.folder, name) for name in names] + ["/dev/zero", "/dev/null"]
+        jobs = [(reader, path) for reader in READERS for path in paths]
+        results = runs.parallel(lambda job: self.call(*READERS[job[0]](job[1])), jobs)
+        for (reader, path), result in zip(jobs, results):
+            with self.subTest(reader=reader, path=path):
+                self.refused(result, path)
+
+    def test_output_that_cannot_be_written(self):
+        result = self.call("propagate", "--tle", "scenarios/catalogue_2022-06.tle", *SPAN,
+                           "--output", os.path.join(self.folder, "folder"))
+        self.refused(result, "folder")
+
+    def test_kernel_cache_that_cannot_be_written(self):
+        result = self.call("run", runs.STARE, "--quiet", "--duration", "1", "--out",
+                           os.path.join(self.folder, "run"), POCL_CACHE_DIR="/dev/null/kcache")
+        if result.returncode == 0:
+            self.skipTest("there is another OpenCL device than PoCL's")
+        self.refused(result, "/dev/null/kcache")
+        self.assertIn("set POCL_CACHE_DIR to a folder that can be written", result.stderr)
+
+
+def tearDownModule():
+    runs.clean()
+
+
+if __name__ == "__main__":
+    unittest.main()
