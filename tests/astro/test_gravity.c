@@ -1,4 +1,5 @@
 /* The Earth's gravity field against GeographicLib, closed forms and wrong files. */
+#include <stdbool.h>
 #include <stdlib.h>
 
 #include "sim/astro/gravity_internal.h"
