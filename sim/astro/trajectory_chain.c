@@ -28,8 +28,8 @@ static bst_status undo_impulse(bst_ctx *ctx, bst_vec3 r, bst_vec3 dv, bst_vec3 *
     bst_vec3 flat = bst_vec3_axpy(*v, -v_radial, radial);
     double speed = bst_vec3_norm(flat), root2 = speed * speed - dv.z * dv.z;
     double after = root2 >= 0.0 ? sqrt(root2) : -1.0; /* transverse, after the burn */
-    if (after - dv.y < 0.0) {
-        after = -after; /* a burn that turned the orbit round */
+    if (-after - dv.y >= 0.0) {
+        after = -after; /* a burn that turned the orbit round, from the slower of two */
     }
     if (!(root2 >= 0.0) || !(after - dv.y >= 0.0) || !(speed > 0.0)) {
         return bst_fail(ctx, BST_ERR_NUMERIC, "no orbit before a burn leads to the one after it");
