@@ -93,7 +93,8 @@ bst_status bst_view_observer_state(bst_ctx *ctx, bst_view *view, int observer, d
 bst_status bst_view_believed(bst_ctx *ctx, bst_view *view, int observer, int sensor, double seconds,
                              bst_state *state, bst_bodies *bodies) {
     double t = bst_believed_seconds(view->world, observer, sensor, seconds);
-    BST_TRY(bst_believed_state(ctx, view->world, observer, sensor, view->clock, t, state));
+    BST_TRY(bst_view_observer_state(ctx, view, observer, t, state));
+    bst_believe(view->world, observer, sensor, t, state);
     return bst_view_bodies(ctx, view, t, bodies);
 }
 
