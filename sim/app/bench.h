@@ -13,6 +13,7 @@ typedef struct bst_bench_result {
     int error_sources; /* how many sources the error was measured on, 0: does not apply */
     double peak_rss_mib;
     double setup_s, ms_max, error_px;
+    double error_m; /* of a place */
 } bst_bench_result;
 
 typedef struct bst_bench_options {
@@ -36,6 +37,11 @@ bst_status bst_bench_star_cull(bst_ctx *ctx, const bst_bench *self,
                                bst_bench_result *out) BST_MUST_CHECK;
 /* Objects by the thousand (bench_ephemeris.c). */
 bst_status bst_bench_ephemeris(bst_ctx *ctx, const bst_bench *self,
+                               const bst_bench_options *options,
+                               bst_bench_result *out) BST_MUST_CHECK;
+/* A day of a numerical low orbit with all forces, its error against a tolerance a hundred times
+ * finer (bench_orbits.c). */
+bst_status bst_bench_numerical(bst_ctx *ctx, const bst_bench *self,
                                const bst_bench_options *options,
                                bst_bench_result *out) BST_MUST_CHECK;
 /* Rendering scenes, by self->name (bench_scenes.c). */

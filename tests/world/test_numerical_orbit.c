@@ -1,0 +1,203 @@
+/* Numerical orbits out of scenarios, and the rendezvous. */
+#include "tests/world/world_support.h"
+
+#define NUMERICAL "{\"name\": \"n\", \"orbit\": {\"source\": \"numerical\", "
+#define KEPLERIAN                                                                             \
+    "\"state\": {\"from\": \"keplerian\", \"at_s\": 100, \"perigee_radius_m\": 7e6, "         \
+    "\"eccentricity\": 0.1, \"inclination_deg\": 60, \"raan_deg\": 30, \"arg_perigee_deg\": " \
+    "40, \"true_anomaly_deg\": 50}"
+
+static bst_state object_at(bst_view *view, int object, double seconds) {
+    bst_ctx ctx = {0};
+    bst_state s;
+    bst_assert_ok(&ctx, bst_view_object_state(&ctx, view, object, seconds, &s));
+    return s;
+}
+
+static bst_view *view_of(const bst_world *world) {
+    bst_ctx ctx = {0};
+    bst_view *view;
+    bst_assert_ok(&ctx, bst_view_create(&ctx, world, &view));
+    return view;
+}
+
+static void keplerian_elements_give_the_orbit(void **state) {
+    (void)state;
+    bst_world *world = test_world_with(NUMERICAL KEPLERIAN
+                                       ", \"forces\": {\"gravity\": "
+                                       "\"two_body\"}}}",
+                                       "");
+    bst_view *view = view_of(world);
+    bst_state s = object_at(view, 0, 100);
+    bst_vec3 h = bst_vec3_cross(s.position_m, s.velocity_mps), n = bst_vec3_unit(h);
+    double r = bst_vec3_norm(s.position_m), gm = BST_EARTH_MU_M3PS2;
+    bst_vec3 e = bst_vec3_axpy(bst_vec3_scale(bst_vec3_cross(s.velocity_mps, h), 1 / gm), -1 / r,
+                               s.position_m);
+    const double deg = BST_DEG_RAD;
+    /* rounding of 7e6 m and angles */
+    bst_assert_close(bst_vec3_norm(e), 0.1, 1e-13);
+    bst_assert_close(n.z, cos(60 * deg), 1e-13);
+    bst_assert_close(atan2(n.x, -n.y), 30 * deg, 1e-13);
+    bst_vec3 node = {cos(30 * deg), sin(30 * deg), 0};
+    bst_assert_close(bst_vec3_angle(node, e), 40 * deg, 1e-12);
+    bst_assert_close(bst_vec3_angle(e, s.position_m), 50 * deg, 1e-12);
+    bst_assert_close(r * (1 + 0.1 * cos(50 * deg)), 7e6 * 1.1, 1e-6);
+    bst_view_free(view);
+    bst_world_free(world);
+}
+
+static void element_sets_and_other_objects_start_one_too(void **state) {
+    (void)state;
+    bst_world *world = test_world_with(
+        "{\"name\": \"GX5\", " TEST_GX5 "}, " NUMERICAL
+        "\"elements_file\": \"scenarios/catalogue_2022-06.tle\", \"norad\": 44801, \"state\": "
+        "{\"from\": \"element_set\", \"at_s\": 500}}}, {\"name\": \"m\", \"orbit\": {\"source\": "
+        "\"numerical\", \"reference\": \"GX5\", \"offset_rtn_m\": [10, -200, 30], "
+        "\"rate_rtn_mps\": [0.1, 0, 0], \"state\": {\"from\": \"relative\", \"at_s\": -50}}}",
+        "");
+    assert_int_equal(bst_world_object(world, 1)->norad, 44801);
+    bst_view *view = view_of(world);
+    bst_state a = object_at(view, 0, 500), b = object_at(view, 1, 500);
+    /* the first is interpolated, to 20 um */
+    bst_assert_close(test_distance(a.position_m, b.position_m), 0, 1e-4);
+    /* SGP4's own error of velocity (0.1 m/s) and what it leaves out, over an hour */
+    bst_assert_close(
+        test_distance(object_at(view, 0, 4100).position_m, object_at(view, 1, 4100).position_m), 0,
+        1000);
+    a = object_at(view, 0, -50);
+    b = object_at(view, 2, -50);
+    bst_vec3 r = bst_vec3_unit(a.position_m), d = bst_vec3_sub(b.position_m, a.position_m);
+    bst_vec3 n = bst_vec3_unit(bst_vec3_cross(a.position_m, a.velocity_mps));
+    /* rounding of 4e7 m */
+    bst_assert_close(bst_vec3_dot(d, r), 10, 1e-7);
+    bst_assert_close(bst_vec3_dot(d, bst_vec3_cross(n, r)), -200, 1e-7);
+    bst_assert_close(bst_vec3_dot(d, n), 30, 1e-7);
+    bst_view_free(view);
+    bst_world_free(world);
+}
+
+static void the_cue_leaves_burns_out(void **state) {
+    (void)state;
+    bst_world *world =
+        test_world_with(NUMERICAL KEPLERIAN
+                        "}, \"burns\": [{\"time_s\": 200, \"dv_rtn_mps\": [0, 1, 0]}, "
+                        "{\"time_s\": 300, \"duration_s\": 60, \"dv_rtn_mps\": [0, 1, 0]}]}",
+                        "");
+    const bst_orbit *orbit = &world->objects[0].orbit;
+    bst_ctx ctx = {0};
+    for (double t = 0; t < 600; t += 50) {
+        bst_state with, without;
+        bst_assert_ok(&ctx, bst_orbit_state(&ctx, orbit, NULL, world->epoch, t, true, &with));
+        bst_assert_ok(&ctx, bst_orbit_state(&ctx, orbit, NULL, world->epoch, t, false, &without));
+        double dv = test_distance(with.velocity_mps, without.velocity_mps);
+        double spent = t < 200 ? 0 : 1 + fmin(fmax((t - 300) / 60, 0), 1);
+        /* tides of the burnt orbit: n t of it */
+        bst_assert_close(dv, spent, t < 200 ? 1e-9 : 0.3);
+        assert_true(t < 200 || dv > 0.5 * spent);
+    }
+    bst_world_free(world);
+}
+
+static void refuse(const char *objects, const char *message) {
+    bst_ctx ctx = {0};
+    bst_world *world;
+    char text[4000];
+    snprintf(text, sizeof text,
+             "{\"world\": {\"star_catalogue\": \"embedded\", \"objects\": [%s]}, \"observers\": "
+             "[{\"name\": \"o\", " TEST_NEOSSAT ", \"sensors\": [{" TEST_CAMERA "}]}]}",
+             objects);
+    assert_int_equal(test_world_try(&ctx, TEST_EPOCH, text, &world), BST_ERR_CONFIG);
+    assert_null(world);
+    assert_string_equal(ctx.message, message);
+}
+
+static void wrong_ones_are_refused(void **state) {
+    (void)state;
+    refuse(NUMERICAL "\"state\": {}}}",
+           "test: /world/objects/0/orbit: the initial state lies at a height of -6378.1 km, orbits "
+           "end below 80 km");
+    refuse(NUMERICAL "\"state\": {\"from\": \"keplerian\"}}}",
+           "test: /world/objects/0/orbit/state: keplerian elements need \"perigee_radius_m\" above "
+           "0 and a true anomaly that the orbit reaches");
+    refuse(NUMERICAL
+           "\"state\": {\"from\": \"keplerian\", \"perigee_radius_m\": 7e6, "
+           "\"eccentricity\": 2, \"true_anomaly_deg\": 150}}}",
+           "test: /world/objects/0/orbit/state: keplerian elements need \"perigee_radius_m\" above "
+           "0 and a true anomaly that the orbit reaches");
+    refuse(NUMERICAL KEPLERIAN ", \"forces\": {\"degree\": 4, \"order\": 5}}}",
+           "test: /world/objects/0/orbit/forces/order: at most the degree, 4 (found 5)");
+    refuse(NUMERICAL KEPLERIAN ", \"forces\": {\"degree\": 30, \"order\": 5}}}",
+           "test: /world/objects/0/orbit/forces/gravity: built-in gravity field of degree 30, "
+           "order 5 (allowed: degree 0 to 20, order 0 to the degree)");
+    refuse(NUMERICAL KEPLERIAN ", \"forces\": {\"gravity\": \"nowhere.gfc\"}}}",
+           "test: /world/objects/0/orbit/forces/gravity: nowhere.gfc: cannot be opened: No such "
+           "file or directory; give a gravity field in the ICGEM format");
+    refuse("{\"name\": \"GX5\", " TEST_GX5
+           ", \"burns\": [{\"time_s\": 0, \"duration_s\": 5, \"dv_rtn_mps\": [0, 1, 0]}]}",
+           "test: /world/objects/0/burns/0/duration_s: a burn that lasts needs an orbit of source "
+           "\"numerical\" (found 5; allowed: 0)");
+}
+
+/* What the description of the scenario says: the range at its way points. */
+static void the_rendezvous_closes_to_200_m(void **state) {
+    (void)state;
+    static const bst_config_desc table[] = {
+        BST_OBJECT(test_scene, world, bst_world_config_table, "{}", "The world."),
+        BST_LIST(test_scene, observers, bst_observer_config, bst_observer_config_table, 1, 10, NULL,
+                 "Observers."),
+        {.key = "boresight", .type = BST_CONFIG_RAW},
+        {.key = "name", .type = BST_CONFIG_RAW},
+        {.key = "epoch_utc", .type = BST_CONFIG_RAW},
+        {.key = "duration_s", .type = BST_CONFIG_RAW},
+        {.key = "tick_rate_hz", .type = BST_CONFIG_RAW},
+        {.key = "seed", .type = BST_CONFIG_RAW},
+        {.key = "record", .type = BST_CONFIG_RAW},
+        BST_CONFIG_END};
+    bst_ctx ctx = {0};
+    bst_json *json;
+    test_scene scene;
+    bst_time epoch;
+    bst_world *world;
+    bst_assert_ok(&ctx, bst_json_load(&ctx, "scenarios/rendezvous.json", &json));
+    bst_assert_ok(&ctx, bst_config_read(&ctx, json, bst_json_root(json), "", table, &scene));
+    bst_assert_ok(&ctx, bst_time_from_utc(&ctx, "2022-10-15T00:00:00Z", &epoch));
+    strcpy(scene.world.star_catalogue, "embedded");
+    bst_assert_ok(&ctx, bst_world_create(&ctx, "rendezvous.json", &scene.world, &scene.observers,
+                                         "scenarios", epoch, &world));
+    bst_view *view = view_of(world);
+    /* time, range and how far off the aim is allowed: linear theory about a circular orbit misses
+     * by range^2 / radius and eccentricity times range */
+    static const double way[][3] = {
+        {0, 50000, 1}, {3660, 5000, 600}, {5160, 1000, 10}, {6090, 200, 2}, {6300, 200, 2}};
+    for (size_t i = 0; i < sizeof way / sizeof *way; i++) {
+        bst_sight sight;
+        bst_assert_ok(&ctx, bst_view_sight(&ctx, view, 0, 0, way[i][0], &sight));
+        bst_assert_close(sight.range_m, way[i][1], way[i][2]);
+    }
+    double last = 5.01e4;
+    for (double t = 100; t < 6300; t += 10) {
+        bst_sight sight;
+        bst_assert_ok(&ctx, bst_view_sight(&ctx, view, 0, 0, t, &sight));
+        assert_true(sight.range_m < 1.01 * last); /* it closes all the way, and then stays */
+        last = fmin(last, sight.range_m);
+        assert_true(sight.range_m > 195);
+        assert_false(sight.occulted);
+        assert_true(sight.sunlit_fraction == 1);
+        bst_assert_close(sight.phase_rad, 90 * BST_DEG_RAD, 2 * BST_DEG_RAD);
+    }
+    bst_view_free(view);
+    bst_world_free(world);
+    bst_config_free(table, &scene);
+    bst_json_free(json);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(keplerian_elements_give_the_orbit),
+        cmocka_unit_test(element_sets_and_other_objects_start_one_too),
+        cmocka_unit_test(the_cue_leaves_burns_out),
+        cmocka_unit_test(wrong_ones_are_refused),
+        cmocka_unit_test(the_rendezvous_closes_to_200_m),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
