@@ -66,7 +66,8 @@ static bst_status place_of(bst_ctx *ctx, bst_view *view, int body, double second
 }
 
 /* The velocity is the orbit's own, as where an orbit is evaluated directly: SGP4's differs from the
- * derivative of its position by 0.1 m/s in low orbits, by more at a low perigee of eccentric ones.
+ * derivative of its position by 0.1 m/s in low orbits, by metres per second at the perigee of
+ * transfer orbits.
  */
 static bst_status state_of(bst_ctx *ctx, bst_view *view, int body, double seconds, from source,
                            bst_state *out) {

@@ -88,7 +88,7 @@ static void error_is_below_a_thousandth_of_a_pixel(void **state) {
     const double pixels[] = {0.5, 3.0}; /* 3: the sharpest that is shipped */
     for (int c = 0; c < 2; c++) {
         bst_ctx ctx = {0};
-        enum { EACH = 4, TIMES = 250 };
+        enum { EACH = 4, TIMES = 100 };
         bst_world *world = populated(EACH * FAMILIES, pixels[c]);
         bst_sky_clock *clock;
         bst_assert_ok(&ctx, bst_sky_clock_create(&ctx, world->eop, &clock));
