@@ -35,13 +35,22 @@ if(NOT BORESIGHT_SANITIZE AND NOT BORESIGHT_FUZZ)
   # #include "sim/core/status.h" works unchanged with include/boresight on the path. Of a subsystem,
   # only the header with its modules: what two of them call the same does not meet inside.
   set(headers ${CMAKE_INSTALL_INCLUDEDIR}/boresight)
+  # a header that includes an internal one is internal too
+  set(inner "")
+  file(GLOB_RECURSE all CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR} sim/*.h)
+  foreach(header ${all})
+    file(STRINGS ${header} lines REGEX "^#include \".*_internal\\.h\"")
+    if(lines)
+      list(APPEND inner PATTERN ${header} EXCLUDE)
+    endif()
+  endforeach()
   install(DIRECTORY sim DESTINATION ${headers}
     FILES_MATCHING PATTERN "*.h"
     PATTERN "*_internal.h" EXCLUDE
     PATTERN "sim/app" EXCLUDE
     PATTERN "sim/astro/eop_table.h" EXCLUDE
-    PATTERN "sim/world/world_build.h" EXCLUDE
-    PATTERN "sim/*/data" EXCLUDE)
+    PATTERN "sim/*/data" EXCLUDE
+    ${inner})
   foreach(header control/modules.h gimbal/modules.h imgproc/imgproc.h imgproc/motion.h
       scenegen/module.h sim/app/registry.h tracker/module.h)
     get_filename_component(folder ${header} DIRECTORY)
