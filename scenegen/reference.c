@@ -26,12 +26,6 @@ double bst_reference_pixel_share(double x, double sigma_px, int n) {
     return 0.5 * (erf(b) - erf(a));
 }
 
-static bst_vec3 direction_at(const bst_source *s, double u) {
-    double a = 2.0 * (u - 0.5) * (u - 1.0), b = 4.0 * u * (1.0 - u), c = 2.0 * u * (u - 0.5);
-    return bst_vec3_axpy(bst_vec3_axpy(bst_vec3_scale(s->apparent_start, a), b, s->apparent_mid), c,
-                         s->apparent_end);
-}
-
 static int clamp_int(double v, int low, int high) {
     return v <= low ? low : v >= high ? high : (int)v;
 }
@@ -68,7 +62,7 @@ static void render_source(const bst_camera *camera, bst_window w, const bst_los_
             double x, y;
             bst_quat q =
                 bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
-            bst_vec3 v = direction_at(s, (track->time_s[k] + u * dt) / duration);
+            bst_vec3 v = bst_source_direction(s, (track->time_s[k] + u * dt) / duration);
             if (bst_camera_project(camera, bst_quat_rotate(q, v), &x, &y)) {
                 add_psf(w, sigma, x, y, s->electrons_per_s * dt * gauss_weight[n % 4] / parts, line,
                         image);

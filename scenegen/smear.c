@@ -258,31 +258,56 @@ static bool project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, doubl
     return fabs(*x) < 1e6 && fabs(*y) < 1e6;
 }
 
-static bst_vec3 direction_at(const bst_source *source, double u) {
-    double a = 2.0 * (u - 0.5) * (u - 1.0), b = 4.0 * u * (1.0 - u), c = 2.0 * u * (u - 0.5);
-    return bst_vec3_axpy(
-        bst_vec3_axpy(bst_vec3_scale(source->apparent_start, a), b, source->apparent_mid), c,
-        source->apparent_end);
+/* Light further than this from the boresight (px, without distortion) stays off the sensor: the
+ * PSF's table ends before. */
+static double far_px(const bst_smear *s) {
+    return tan(bst_camera_half_diagonal_rad(&s->camera)) / bst_camera_scale_rad(&s->camera) +
+           MAX_TAPS / bst_camera_shrink(&s->camera);
 }
 
-static bool moves(const bst_source *source) {
-    return bst_vec3_norm(bst_vec3_sub(source->apparent_start, source->apparent_mid)) > 0.0 ||
-           bst_vec3_norm(bst_vec3_sub(source->apparent_end, source->apparent_mid)) > 0.0;
+/* How many chords the curved motion over the image wants: of a parabola they miss
+ * (its bend) / chords^2. Seen at 17 instants; those that are off the sensor do not count, but a
+ * chord must not step over it. */
+static double chords_of(const bst_smear *s, const bst_source *source) {
+    enum { N = 16 };
+    double x[N + 1], y[N + 1], far = far_px(s), chords = 0.0;
+    bool front[N + 1];
+    for (int k = 0; k <= N; k++) {
+        front[k] =
+            project(s, s->q_reference, bst_source_direction(source, (double)k / N), &x[k], &y[k]);
+    }
+    for (int k = 0; k < N; k++) {
+        if (!front[k] || !front[k + 1]) {
+            continue;
+        }
+        bool near = fmin(hypot(x[k], y[k]), hypot(x[k + 1], y[k + 1])) < far ||
+                    x[k] * x[k + 1] < 0.0 || y[k] * y[k + 1] < 0.0;
+        double step = hypot(x[k + 1] - x[k], y[k + 1] - y[k]);
+        chords = fmax(chords, near ? N * step / far : 0.0);
+        if (near && k > 0 && front[k - 1]) {
+            double bend = hypot(x[k - 1] - 2.0 * x[k] + x[k + 1], y[k - 1] - 2.0 * y[k] + y[k + 1]);
+            chords = fmax(chords, N * sqrt(0.125 * bend * s->stretch / 0.002));
+        }
+    }
+    return fmin(chords, 1e4);
 }
 
-/* A moving source's path over the image, relative to (x0, y0). */
+/* Neither end nor anything between is near the sensor. */
+static bool passes_by(const bst_smear *s, const bst_path_point *a, const bst_path_point *b,
+                      double x0, double y0, double far) {
+    double f = 1.0 / s->stretch;
+    double ax = a->p[0] * f + x0, ay = a->p[1] * f + y0, bx = b->p[0] * f + x0,
+           by = b->p[1] * f + y0;
+    return fmin(ax, bx) > far || fmax(ax, bx) < -far || fmin(ay, by) > far || fmax(ay, by) < -far;
+}
+
+/* A moving source's path over the image, relative to (x0, y0); NAN where the source is not in front
+ * of the camera. */
 static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_source *source, double x0,
-                           double y0, int *count, bool *visible) {
+                           double y0, int *count) {
     const bst_los_track *track = &s->track;
-    /* the motion is curved even where the attitude is not: n chords miss a bend of b by b / n^2 */
-    bst_vec3 bend = bst_vec3_sub(
-        bst_vec3_scale(bst_vec3_add(source->apparent_start, source->apparent_end), 0.5),
-        source->apparent_mid);
-    double chords =
-        sqrt(bst_vec3_norm(bend) / bst_camera_scale_rad(&s->camera) * s->stretch / 0.002);
-    int least = (int)fmin(chords, 1e4) / (track->count - 1) + 1;
+    int least = (int)chords_of(s, source) / (track->count - 1) + 1;
     *count = 0;
-    *visible = true;
     for (int k = 0; k + 1 < track->count; k++) {
         int parts = parts_of(s, k);
         parts = parts < least ? least : parts;
@@ -294,12 +319,35 @@ static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_source *source,
             t = s->duration_s > 0.0 ? t / s->duration_s : 0.0;
             bst_quat q =
                 bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
-            if (!project(s, q, direction_at(source, t), &x, &y)) {
-                *visible = false;
-                return BST_OK;
+            bool front = project(s, q, bst_source_direction(source, t), &x, &y);
+            s->own_path[(*count)++] = (bst_path_point){
+                {front ? (x - x0) * s->stretch : NAN, front ? (y - y0) * s->stretch : NAN, 0.0}, t};
+        }
+    }
+    return BST_OK;
+}
+
+/* Nodes of the stretches of own_path[count] that may put light on the sensor; their weights are
+ * shares of the whole exposure. */
+static bst_status own_nodes(bst_ctx *ctx, bst_smear *s, int count, double x0, double y0,
+                            double tolerance) {
+    const bst_path_point *p = s->own_path;
+    double far = far_px(s), total = p[count - 1].s - p[0].s;
+    s->nodes.count = 0;
+    for (int first = 0, last; first + 1 < count; first = last > first ? last : first + 1) {
+        last = first;
+        while (last + 1 < count && !isnan(p[last].p[0]) && !isnan(p[last + 1].p[0]) &&
+               !passes_by(s, &p[last], &p[last + 1], x0, y0, far)) {
+            last++;
+        }
+        if (last > first) {
+            int n = s->nodes.count;
+            BST_TRY(bst_nodes_from_path(ctx, p + first, last - first + 1, s->sigma_px, tolerance,
+                                        &s->nodes));
+            for (double part = total > 0.0 ? (p[last].s - p[first].s) / total : 1.0;
+                 n < s->nodes.count && part < 1.0; n++) {
+                s->nodes.items[n].weight *= part;
             }
-            s->own_path[(*count)++] =
-                (bst_path_point){{(x - x0) * s->stretch, (y - y0) * s->stretch, 0.0}, t};
         }
     }
     return BST_OK;
@@ -309,26 +357,28 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
                             bst_scene_source *out, bool *visible) {
     double x, y, electrons = source->electrons_per_s * s->duration_s;
     s->last_peak_e = 0.0;
-    *visible = !source->occulted && electrons > 0.0 && electrons < 1e30 &&
-               project(s, s->q_reference, source->apparent_mid, &x, &y);
+    bool moving = source->path != NULL;
+    bool front = project(s, s->q_reference, source->apparent_mid, &x, &y);
+    *visible = !source->occulted && electrons > 0.0 && electrons < 1e30 && (front || moving);
     if (!*visible) {
         return BST_OK;
     }
     level own;
     const level *used;
-    if (moves(source)) {
+    if (moving) {
+        /* nodes are kept as small floats relative to a place on the sensor */
+        double far = far_px(s);
+        x = front ? fmin(fmax(x, -far), far) : 0.0;
+        y = front ? fmin(fmax(y, -far), far) : 0.0;
         int count;
-        BST_TRY(own_path(ctx, s, source, x, y, &count, visible));
-        if (!*visible) {
+        BST_TRY(own_path(ctx, s, source, x, y, &count));
+        BST_TRY(own_nodes(ctx, s, count, x, y, s->tolerance[0]));
+        if (s->nodes.count == 0) {
+            *visible = false;
             return BST_OK;
         }
-        s->nodes.count = 0;
-        BST_TRY(
-            bst_nodes_from_path(ctx, s->own_path, count, s->sigma_px, s->tolerance[0], &s->nodes));
         s->last_peak_e = electrons * largest_share(s);
-        s->nodes.count = 0;
-        BST_TRY(bst_nodes_from_path(ctx, s->own_path, count, s->sigma_px,
-                                    s->tolerance[choose_level(s, s->last_peak_e)], &s->nodes));
+        BST_TRY(own_nodes(ctx, s, count, x, y, s->tolerance[choose_level(s, s->last_peak_e)]));
         BST_TRY(append_nodes(ctx, s, &s->nodes, shift_to_table, &own));
         used = &own;
     } else {

@@ -9,15 +9,17 @@ typedef struct bst_bench_result {
     const char *name;
     double frames_per_s;              /* or calls per second */
     double ms_median, ms_min, cpu_ms; /* per frame (or call) */
-    double error_sigma_max, error_sigma_rms, flux_error_rel, centroid_error_px;
+    double error_sigma_max, error_sigma_rms, flux_error_rel;
     int error_sources; /* how many sources the error was measured on, 0: does not apply */
     double peak_rss_mib;
+    double setup_s, ms_max, error_px;
 } bst_bench_result;
 
 typedef struct bst_bench_options {
-    const char *device; /* selector, NULL: default */
-    int threads;        /* 0: all */
-    const char *tle_file, *scenario;
+    const char *device;   /* selector, NULL: default */
+    int threads;          /* 0: all */
+    const char *tle_file; /* NULL: each benchmark's own */
+    const char *scenario;
 } bst_bench_options;
 
 typedef struct bst_bench {
@@ -30,6 +32,10 @@ typedef struct bst_bench {
 bst_status bst_bench_sgp4(bst_ctx *ctx, const bst_bench *self, const bst_bench_options *options,
                           bst_bench_result *out) BST_MUST_CHECK;
 bst_status bst_bench_star_cull(bst_ctx *ctx, const bst_bench *self,
+                               const bst_bench_options *options,
+                               bst_bench_result *out) BST_MUST_CHECK;
+/* Objects by the thousand (bench_ephemeris.c). */
+bst_status bst_bench_ephemeris(bst_ctx *ctx, const bst_bench *self,
                                const bst_bench_options *options,
                                bst_bench_result *out) BST_MUST_CHECK;
 /* Rendering scenes, by self->name (bench_scenes.c). */

@@ -17,7 +17,8 @@ bst_status bst_bench_sgp4(bst_ctx *ctx, const bst_bench *self, const bst_bench_o
     bst_elements *sets = NULL;
     int count = 0;
     const bst_tle_options tle_options = {.skip_bad_sets = true};
-    BST_TRY(bst_tle_load(ctx, options->tle_file, &tle_options, &sets, &count));
+    const char *file = options->tle_file ? options->tle_file : "scenarios/catalogue_2022-06.tle";
+    BST_TRY(bst_tle_load(ctx, file, &tle_options, &sets, &count));
     bst_sgp4 **models = calloc(SATELLITES, sizeof *models);
     bst_status status = models && count > 0
                             ? BST_OK

@@ -35,7 +35,7 @@ static const scene scenes[] = {
     {"window", 2048, {896, 896, 256, 256}, 500, 1, 6, 0.5, 10, 0, 0, 0.1, true, 10, 100},
 };
 
-enum { FRAMES = 40, WARM_UP = 3, TONES = 24, SAMPLES_PER_S = 1000 };
+enum { MOST_TARGETS = 4, FRAMES = 40, WARM_UP = 3, TONES = 24, SAMPLES_PER_S = 1000 };
 
 static const double BRIGHTEST_E_PER_S = 1e6;
 
@@ -45,6 +45,7 @@ typedef struct scene_state {
     bst_window window;
     bst_source *sources;
     int count;
+    bst_source_path paths[MOST_TARGETS];
     double *time_s;
     bst_quat *q;
     int samples;
@@ -98,11 +99,7 @@ static void move(scene_state *st, uint64_t frame, double centre_px[2]) {
 
 static bst_source place(const bst_camera *camera, int kind, double x, double y, double rate) {
     bst_vec3 v = bst_camera_unproject(camera, x, y);
-    return (bst_source){.kind = kind,
-                        .apparent_start = v,
-                        .apparent_mid = v,
-                        .apparent_end = v,
-                        .electrons_per_s = rate};
+    return (bst_source){.kind = kind, .apparent_mid = v, .electrons_per_s = rate};
 }
 
 static void make_sources(scene_state *st) {
@@ -131,8 +128,10 @@ static void place_targets(scene_state *st, uint64_t frame) {
             0.5 * s->side + 200.0 * (bst_rng_uniform(key, frame, (uint64_t)(2 * i + 1)) - 0.5);
         bst_source *t = &st->sources[s->stars + i];
         *t = place(&st->camera, BST_SOURCE_OBJECT, x, y, 2000.0);
-        t->apparent_start = bst_camera_unproject(&st->camera, x + half, y + half);
-        t->apparent_end = bst_camera_unproject(&st->camera, x - half, y - half);
+        st->paths[i] = bst_source_path_through(
+            bst_camera_unproject(&st->camera, x + half, y + half), t->apparent_mid,
+            bst_camera_unproject(&st->camera, x - half, y - half));
+        t->path = &st->paths[i];
     }
 }
 

@@ -43,6 +43,10 @@ void bst_sgp4_free(bst_sgp4 *sgp4);
 bst_sgp4_error bst_sgp4_propagate(const bst_sgp4 *sgp4, double minutes, double position_teme_km[3],
                                   double velocity_teme_kmps[3]);
 
+/* Minutes between the steps in which a resonant orbit is integrated: at every multiple of this from
+ * the element epoch but 0 the position jumps a little, by up to metres. 0: no such orbit. */
+double bst_sgp4_step_minutes(const bst_sgp4 *sgp4);
+
 /* What an error code means, in words. */
 const char *bst_sgp4_error_text(bst_sgp4_error error);
 

@@ -330,6 +330,10 @@ static void integrate_resonance(const bst_sgp4 *s, double t, double *n_out, doub
     *lambda_out = lambda;
 }
 
+double bst_sgp4_step_minutes(const bst_sgp4 *s) {
+    return s->deep_space && s->deep.resonance != BST_SGP4_NOT_RESONANT ? STEP_MIN : 0.0;
+}
+
 void bst_sgp4_deep_secular(const bst_sgp4 *s, double t, bst_sgp4_mean *x) {
     const bst_sgp4_deep *d = &s->deep;
     x->e += d->e_rate * t;

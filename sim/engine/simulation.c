@@ -99,6 +99,7 @@ static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
     BST_TRY(bst_world_create(ctx, scenario->file, &scenario->world, &scenario->observers,
                              scenario->base_dir, scenario->epoch, &sim->world));
     BST_TRY(bst_world_check_spans(ctx, scenario->file, sim->world, scenario->duration_s));
+    BST_TRY(bst_world_prepare(ctx, sim->world, options->threads));
     BST_TRY(make_knowledge(ctx, scenario, sim));
     for (int m = 0; m < scenario->module_count && !sim->device; m++) {
         if (scenario->modules[m].desc->flags & BST_MODULE_NEEDS_DEVICE) {

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/world/world_internal.h"
+#include "sim/world/field_objects.h"
 
 /* Aberration at most, and some for the deflection of light: how far an apparent place lies from the
  * catalogue's. */
@@ -30,6 +30,9 @@ struct bst_field {
     bst_faint_stars *faint; /* NULL: none */
     bst_source *sources;
     int source_capacity;
+    bst_source_path *paths; /* [path_capacity], of the objects among the sources */
+    int path_capacity;
+    int *near; /* objects that may be in the field; room for all */
     bst_quat q_mid;
     double exposure_s;
     bst_quat sigma_q[SIGMA_POINTS];
@@ -48,7 +51,8 @@ bst_status bst_field_create(bst_ctx *ctx, const bst_world *world, int observer, 
     field->camera = bst_world_camera(world, observer, sensor);
     field->star_capacity = 4096;
     field->stars = malloc((size_t)field->star_capacity * sizeof *field->stars);
-    bst_status status = field->stars
+    field->near = malloc(((size_t)bst_world_object_count(world) + 1) * sizeof *field->near);
+    bst_status status = field->stars && field->near
                             ? bst_view_create(ctx, world, &field->view)
                             : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a field query");
     if (status == BST_OK && world->faint) {
@@ -70,6 +74,8 @@ void bst_field_free(bst_field *field) {
         free(field->q);
         free(field->stars);
         free(field->sources);
+        free(field->paths);
+        free(field->near);
         free(field);
     }
 }
@@ -252,21 +258,13 @@ static void summarise_track(bst_field *field, const bst_los_track *track, bst_qu
     *reach_px = reach;
 }
 
-static bst_vec3 apparent_at(const bst_source *s, double u) {
-    if (s->kind == BST_SOURCE_STAR) {
-        return s->apparent_mid;
-    }
-    double a = (2.0 * u - 1.0) * (u - 1.0), b = 4.0 * u * (1.0 - u), c = u * (2.0 * u - 1.0);
-    return bst_vec3_axpy(bst_vec3_axpy(bst_vec3_scale(s->apparent_start, a), b, s->apparent_mid), c,
-                         s->apparent_end);
-}
-
 bool bst_field_project(const bst_camera *camera, const bst_los_track *track, int k,
                        const bst_source *source, double *x_px, double *y_px) {
     double exposure = track->time_s[track->count - 1];
     double u = exposure > 0.0 ? track->time_s[k] / exposure : 0.5;
     return bst_camera_project(
-        camera, bst_quat_rotate(track->q_cam_from_gcrf[k], apparent_at(source, u)), x_px, y_px);
+        camera, bst_quat_rotate(track->q_cam_from_gcrf[k], bst_source_direction(source, u)), x_px,
+        y_px);
 }
 
 static bst_status reserve_stars(bst_ctx *ctx, bst_field *field, int count) {
@@ -318,6 +316,18 @@ static bst_status reserve_sources(bst_ctx *ctx, bst_field *field, int count) {
     return BST_OK;
 }
 
+static bst_status reserve_paths(bst_ctx *ctx, bst_field *field, int count) {
+    if (count > field->path_capacity) {
+        free(field->paths);
+        field->paths = malloc((size_t)count * sizeof *field->paths);
+        field->path_capacity = field->paths ? count : 0;
+        if (!field->paths) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d objects", count);
+        }
+    }
+    return BST_OK;
+}
+
 static bool near_window(const bst_field *field, bst_quat q, bst_vec3 direction, bst_window window,
                         double margin_px) {
     double x, y;
@@ -328,38 +338,6 @@ static bool near_window(const bst_field *field, bst_quat q, bst_vec3 direction, 
     return bst_camera_project(field->camera, v, &x, &y) && x >= window.x0 - margin_px &&
            y >= window.y0 - margin_px && x <= window.x0 + window.width - 1 + margin_px &&
            y <= window.y0 + window.height - 1 + margin_px;
-}
-
-static bst_status add_object(bst_ctx *ctx, bst_field *field, int object, double start_s,
-                             double end_s, bst_source *out, bool *visible_state) {
-    bst_sight sight[3];
-    const double times[3] = {start_s, 0.5 * (start_s + end_s), end_s};
-    *visible_state = true;
-    for (int i = 0; i < 3; i++) {
-        bst_status status =
-            bst_view_sight(ctx, field->view, field->observer, object, times[i], &sight[i]);
-        if (status == BST_ERR_NUMERIC) {
-            *visible_state = false; /* decayed: no longer there */
-            return BST_OK;
-        }
-        BST_TRY(status);
-    }
-    const bst_sight *mid = &sight[1];
-    *out = (bst_source){.kind = BST_SOURCE_OBJECT,
-                        .id = (uint32_t)object,
-                        .apparent_start = sight[0].apparent,
-                        .apparent_mid = mid->apparent,
-                        .apparent_end = sight[2].apparent,
-                        .v_mag = mid->v_mag,
-                        .sunlit_fraction = mid->sunlit_fraction,
-                        .phase_rad = mid->phase_rad,
-                        .range_m = mid->range_m,
-                        .occulted = mid->occulted};
-    out->electrons_per_s = mid->occulted || isinf(mid->v_mag)
-                               ? 0.0
-                               : bst_camera_electrons_per_s(field->camera, mid->v_mag);
-    bst_vec3_to_radec(mid->geometric, &out->ra_rad, &out->dec_rad);
-    return BST_OK;
 }
 
 bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *track,
@@ -419,8 +397,10 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     }
     BST_TRY(query_stars(ctx, field, centre, radius, options->v_limit, faint_limit,
                         2000.0 + (tt1 - 2451545.0 + tt2) / 365.25, &star_count));
-    int object_count = bst_world_object_count(field->world);
-    BST_TRY(reserve_sources(ctx, field, star_count + object_count));
+    int near_count;
+    BST_TRY(bst_view_near(ctx, field->view, field->observer, start_s, end_s, centre, radius,
+                          field->near, &near_count));
+    BST_TRY(reserve_sources(ctx, field, star_count + near_count));
     int n = 0;
     for (int i = 0; i < star_count; i++) {
         const bst_star *star = &field->stars[i];
@@ -432,9 +412,7 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
         *s =
             (bst_source){.kind = BST_SOURCE_STAR,
                          .id = star->id,
-                         .apparent_start = apparent,
                          .apparent_mid = apparent,
-                         .apparent_end = apparent,
                          .electrons_per_s = bst_camera_electrons_per_s(camera, (double)star->v_mag),
                          .v_mag = (double)star->v_mag,
                          .sunlit_fraction = NAN,
@@ -449,17 +427,15 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
         }
         bst_vec3_to_radec(star->icrs, &s->ra_rad, &s->dec_rad);
     }
-    for (int i = 0; i < object_count; i++) {
+    BST_TRY(reserve_paths(ctx, field, near_count));
+    const bst_object_query objects = {field->view,  camera, field->observer, start_s, end_s,
+                                      field->q_mid, window, margin_px,       centre,  radius};
+    for (int i = 0, used = 0; i < near_count; i++) {
         bool there;
-        BST_TRY(add_object(ctx, field, i, start_s, end_s, &field->sources[n], &there));
-        if (!there) {
-            continue;
-        }
-        const bst_source *s = &field->sources[n];
-        double own_px = (bst_vec3_angle(s->apparent_start, s->apparent_mid) +
-                         bst_vec3_angle(s->apparent_mid, s->apparent_end)) /
-                        bst_camera_scale_rad(camera) * bst_camera_stretch(camera);
-        n += near_window(field, field->q_mid, s->apparent_mid, window, margin_px + own_px);
+        BST_TRY(bst_field_object(ctx, &objects, field->near[i], &field->paths[used],
+                                 &field->sources[n], &there));
+        n += there;
+        used += there;
     }
     *sources = field->sources;
     *count = n;
@@ -489,7 +465,7 @@ static smear smear_of(const bst_field *field, const bst_source *source) {
     smear m = {0};
     double x[SIGMA_POINTS], y[SIGMA_POINTS];
     for (int p = 0; p < SIGMA_POINTS; p++) {
-        bst_vec3 d = apparent_at(source, field->sigma_time[p]);
+        bst_vec3 d = bst_source_direction(source, field->sigma_time[p]);
         x[p] = y[p] = NAN;
         (void)bst_camera_project(field->camera, bst_quat_rotate(field->sigma_q[p], d), &x[p],
                                  &y[p]);

@@ -6,18 +6,64 @@
 #include "sim/core/messages.h"
 #include "sim/world/world.h"
 
-/* A source that may put light on the window. Its apparent direction at time s in [0, 1] of the
- * exposure is the quadratic through three points. */
+/* Apparent motion of an object during an exposure, at equidistant times from its start to its end.
+ * A near object passes along an almost straight line at almost constant speed: its place is what a
+ * polynomial follows, its direction is not. What light time and aberration add in direction is
+ * first of all the relative velocity over c, which changes little. Any unit of length. */
+enum { BST_PATH_NODES = 5 };
+typedef struct bst_source_path {
+    bst_vec3 place[BST_PATH_NODES]; /* object minus observer at the same instant, GCRF axes */
+    bst_vec3 shift[3]; /* at start, middle and end: place + |place| shift has the apparent direction
+                        */
+} bst_source_path;
+
+/* A source that may put light on the window. */
 typedef struct bst_source {
     int32_t kind; /* bst_source_kind */
     uint32_t id;  /* star: Tycho-2 identity, or statistical (bit 31); object: index in the world */
-    bst_vec3 apparent_start, apparent_mid, apparent_end; /* GCRF axes, unit; equal for stars */
-    double electrons_per_s;                              /* detected, at mid exposure */
+    bst_vec3 apparent_mid;       /* at mid-exposure, GCRF axes, unit */
+    const bst_source_path *path; /* NULL: at rest; owned by who made the source */
+    double electrons_per_s;      /* detected, at mid exposure */
     double v_mag;
     double ra_rad, dec_rad; /* as in bst_truth_item */
     double sunlit_fraction, phase_rad, range_m;
-    bool occulted; /* objects: no light */
+    bool occulted; /* no light */
 } bst_source;
+
+/* Apparent direction (any length) at time u in [0, 1] of the exposure: the quartic through the five
+ * places. For orbits of radius r and angular rate w about the Earth it misses the path by
+ * 1e-3 r (w T / 2)^5: 1 um in LEO for an exposure T of 20 s. */
+static inline bst_vec3 bst_source_direction(const bst_source *s, double u) {
+    if (!s->path) {
+        return s->apparent_mid;
+    }
+    const bst_source_path *p = s->path;
+    double a = 4.0 * u, b = a - 1.0, c = a - 2.0, d = a - 3.0, e = a - 4.0;
+    const double w[BST_PATH_NODES] = {b * c * d * e / 24.0, -a * c * d * e / 6.0,
+                                      a * b * d * e / 4.0, -a * b * c * e / 6.0,
+                                      a * b * c * d / 24.0};
+    bst_vec3 place = bst_vec3_scale(p->place[0], w[0]);
+    for (int k = 1; k < BST_PATH_NODES; k++) {
+        place = bst_vec3_axpy(place, w[k], p->place[k]);
+    }
+    bst_vec3 shift = bst_vec3_scale(p->shift[0], 0.125 * c * e);
+    shift = bst_vec3_axpy(shift, -0.25 * a * e, p->shift[1]);
+    shift = bst_vec3_axpy(shift, 0.125 * a * c, p->shift[2]);
+    return bst_vec3_axpy(place, bst_vec3_norm(place), shift);
+}
+
+/* A path whose direction is the quadratic through three (in apparent_mid's unit), for scenes that
+ * are not made of orbits. */
+static inline bst_source_path bst_source_path_through(bst_vec3 start, bst_vec3 mid, bst_vec3 end) {
+    bst_source_path path = {.place = {{0}}};
+    bst_vec3 slope = bst_vec3_sub(end, start);
+    bst_vec3 bend = bst_vec3_sub(bst_vec3_add(start, end), bst_vec3_scale(mid, 2.0));
+    for (int k = 0; k < BST_PATH_NODES; k++) {
+        double h = (k - 2) / (BST_PATH_NODES - 1.0);
+        path.place[k] = bst_vec3_axpy(bst_vec3_axpy(mid, h, slope), 2.0 * h * h, bend);
+    }
+    return path;
+}
 
 /* The true attitude during an exposure, cut out of a los_history. */
 typedef struct bst_los_track {

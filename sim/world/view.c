@@ -1,11 +1,25 @@
 #include <stdlib.h>
 
-#include "sim/world/world_internal.h"
+#include "sim/world/ephemeris.h"
+#include "sim/world/field.h"
+
+/* An observer at an instant, as all objects in a frame need it. */
+typedef struct eye {
+    bool valid;
+    int observer;
+    double seconds;
+    bst_state state;
+    bst_sky sky;
+} eye;
 
 struct bst_view {
     const bst_world *world;
     bst_sky_clock *clock;
+    eye eyes[BST_PATH_NODES]; /* the last ones used, by place in the exposure */
 };
+
+/* Where a body comes from in a solution: both ends of a line of sight take the same way. */
+typedef enum from { FROM_EPHEMERIS, FROM_ORBIT } from;
 
 bst_status bst_view_create(bst_ctx *ctx, const bst_world *world, bst_view **out) {
     *out = NULL;
@@ -30,16 +44,49 @@ void bst_view_free(bst_view *view) {
     }
 }
 
+static const bst_orbit *orbit_of(const bst_world *world, int body) {
+    return body < world->object_count ? &world->objects[body].orbit
+                                      : &world->observers[body - world->object_count].orbit;
+}
+
+/* Position, and velocity to 0.1 m/s. */
+static bst_status place_of(bst_ctx *ctx, bst_view *view, int body, double seconds, from source,
+                           bst_vec3 *position_m, bst_vec3 *velocity_mps) {
+    const bst_world *world = view->world;
+    if (source == FROM_EPHEMERIS &&
+        bst_ephemeris_at(world->ephemeris, body, seconds, position_m, velocity_mps)) {
+        return BST_OK;
+    }
+    bst_state state;
+    BST_TRY(bst_orbit_state(ctx, orbit_of(world, body), view->clock, world->epoch, seconds, true,
+                            &state));
+    *position_m = state.position_m;
+    *velocity_mps = state.velocity_mps;
+    return BST_OK;
+}
+
+/* The velocity is the orbit's own, as where an orbit is evaluated directly: SGP4's differs from the
+ * derivative of its position by up to 0.1 m/s. */
+static bst_status state_of(bst_ctx *ctx, bst_view *view, int body, double seconds, from source,
+                           bst_state *out) {
+    const bst_world *world = view->world;
+    BST_TRY(
+        bst_orbit_state(ctx, orbit_of(world, body), view->clock, world->epoch, seconds, true, out));
+    bst_vec3 derivative;
+    if (source == FROM_EPHEMERIS) {
+        (void)bst_ephemeris_at(world->ephemeris, body, seconds, &out->position_m, &derivative);
+    }
+    return BST_OK;
+}
+
 bst_status bst_view_object_state(bst_ctx *ctx, bst_view *view, int object, double seconds,
                                  bst_state *out) {
-    return bst_orbit_state(ctx, &view->world->objects[object].orbit, view->clock,
-                           view->world->epoch, seconds, true, out);
+    return state_of(ctx, view, object, seconds, FROM_EPHEMERIS, out);
 }
 
 bst_status bst_view_observer_state(bst_ctx *ctx, bst_view *view, int observer, double seconds,
                                    bst_state *out) {
-    return bst_orbit_state(ctx, &view->world->observers[observer].orbit, view->clock,
-                           view->world->epoch, seconds, true, out);
+    return state_of(ctx, view, view->world->object_count + observer, seconds, FROM_EPHEMERIS, out);
 }
 
 bst_status bst_view_believed(bst_ctx *ctx, bst_view *view, int observer, int sensor, double seconds,
@@ -64,32 +111,150 @@ bst_status bst_view_bodies(bst_ctx *ctx, bst_view *view, double seconds, bst_bod
     return BST_OK;
 }
 
-bst_status bst_view_sight(bst_ctx *ctx, bst_view *view, int observer, int object, double seconds,
-                          bst_sight *out) {
-    const bst_world *world = view->world;
-    bst_sky sky;
-    BST_TRY(bst_sky_clock_at(ctx, view->clock, bst_world_time(world, seconds), &sky));
-    bst_state eye, target;
-    BST_TRY(bst_view_observer_state(ctx, view, observer, seconds, &eye));
-    bst_vec3 geometric;
-    double emission_s;
-    BST_TRY(bst_orbit_line_of_sight(ctx, &world->objects[object].orbit, &eye, view->clock,
-                                    world->epoch, &sky.bodies, seconds, true, &geometric, &target,
-                                    &emission_s));
-    bst_light light = bst_light_at(&sky.bodies, eye.position_m, eye.velocity_mps);
-    bst_vec3 to_eye = bst_vec3_sub(eye.position_m, target.position_m);
-    bst_vec3 to_sun = bst_vec3_sub(sky.bodies.sun_m, target.position_m);
+static bst_status eye_at(bst_ctx *ctx, bst_view *view, int observer, double seconds, from source,
+                         eye *out) {
+    *out = (eye){.observer = observer, .seconds = seconds};
+    BST_TRY(bst_sky_clock_at(ctx, view->clock, bst_world_time(view->world, seconds), &out->sky));
+    BST_TRY(
+        state_of(ctx, view, view->world->object_count + observer, seconds, source, &out->state));
+    out->valid = true;
+    return BST_OK;
+}
+
+/* The same out of the view's memory. */
+static bst_status known_eye(bst_ctx *ctx, bst_view *view, int observer, double seconds, int place,
+                            const eye **out) {
+    eye *e = &view->eyes[place];
+    if (!e->valid || e->observer != observer || e->seconds != seconds) {
+        BST_TRY(eye_at(ctx, view, observer, seconds, FROM_EPHEMERIS, e));
+    }
+    *out = e;
+    return BST_OK;
+}
+
+static double node_time(double start_s, double end_s, int i) {
+    return start_s + (end_s - start_s) * i / (BST_PATH_NODES - 1);
+}
+
+/* Light time and aberration. now_m: the object at the instant of the eye. *emitted_m: when the
+ * light left. See bst_orbit_line_of_sight. */
+static bst_status look(bst_ctx *ctx, bst_view *view, const eye *e, int object, from source,
+                       bst_vec3 now_m, bst_vec3 *emitted_m, bst_sight *out) {
+    double tau = 0.0;
+    bst_vec3 geometric = {0}, velocity;
+    *emitted_m = now_m;
+    for (int i = 0; i < 3; i++) {
+        if (i > 0) {
+            BST_TRY(place_of(ctx, view, object, e->seconds - tau, source, emitted_m, &velocity));
+        }
+        geometric = bst_light_path(&e->sky.bodies, *emitted_m, e->state.position_m, tau);
+        tau = bst_vec3_norm(geometric) / BST_LIGHT_SPEED_MPS;
+    }
+    bst_light light = bst_light_at(&e->sky.bodies, e->state.position_m, e->state.velocity_mps);
     out->geometric = bst_vec3_unit(geometric);
     out->apparent = bst_light_aberrate(&light, out->geometric);
-    out->range_m = bst_vec3_norm(to_eye);
-    out->light_time_s = seconds - emission_s;
+    out->range_m = bst_vec3_norm(bst_vec3_sub(e->state.position_m, *emitted_m));
+    out->light_time_s = tau;
+    return BST_OK;
+}
+
+/* How bright the object is, and whether the Earth hides it. */
+static void shine(const bst_view *view, const eye *e, int object, bst_vec3 emitted_m,
+                  bst_sight *out) {
+    bst_vec3 to_eye = bst_vec3_sub(e->state.position_m, emitted_m);
+    bst_vec3 to_sun = bst_vec3_sub(e->sky.bodies.sun_m, emitted_m);
     out->phase_rad = bst_vec3_angle(to_eye, to_sun);
-    out->sunlit_fraction = bst_sun_fraction(target.position_m, sky.bodies.sun_m);
-    const bst_object_info *info = &world->objects[object].info;
+    out->sunlit_fraction = bst_sun_fraction(emitted_m, e->sky.bodies.sun_m);
+    const bst_object_info *info = &view->world->objects[object].info;
     double full = bst_lambert_sphere_v_mag(info->area_m2, info->albedo, out->phase_rad,
                                            out->range_m, bst_vec3_norm(to_sun));
     out->v_mag = out->sunlit_fraction > 0.0 ? full - 2.5 * log10(out->sunlit_fraction) : INFINITY;
     out->occulted =
-        bst_earth_occults(eye.position_m, target.position_m, &sky.frames.itrf_from_gcrf);
+        bst_earth_occults(e->state.position_m, emitted_m, &e->sky.frames.itrf_from_gcrf);
+}
+
+static bool too_near(bst_vec3 a_m, bst_vec3 b_m) {
+    return bst_vec3_norm(bst_vec3_sub(a_m, b_m)) < BST_EPHEMERIS_NEAREST_M;
+}
+
+bst_status bst_view_sight(bst_ctx *ctx, bst_view *view, int observer, int object, double seconds,
+                          bst_sight *out) {
+    eye e;
+    bst_vec3 now, velocity, emitted;
+    from source = FROM_EPHEMERIS;
+    BST_TRY(eye_at(ctx, view, observer, seconds, source, &e));
+    BST_TRY(place_of(ctx, view, object, seconds, source, &now, &velocity));
+    if (too_near(now, e.state.position_m)) {
+        source = FROM_ORBIT;
+        BST_TRY(eye_at(ctx, view, observer, seconds, source, &e));
+        BST_TRY(place_of(ctx, view, object, seconds, source, &now, &velocity));
+    }
+    BST_TRY(look(ctx, view, &e, object, source, now, &emitted, out));
+    shine(view, &e, object, emitted, out);
+    return BST_OK;
+}
+
+static bst_status path_from(bst_ctx *ctx, bst_view *view, const eye *const eyes[BST_PATH_NODES],
+                            int object, from source, bst_source_path *path, bst_sight *mid) {
+    for (int i = 0; i < BST_PATH_NODES; i++) {
+        const eye *e = eyes[i];
+        bst_vec3 now, velocity, emitted;
+        BST_TRY(place_of(ctx, view, object, e->seconds, source, &now, &velocity));
+        path->place[i] = bst_vec3_sub(now, e->state.position_m);
+        if (i % 2 != 0) {
+            continue;
+        }
+        bst_sight sight = {0};
+        BST_TRY(look(ctx, view, e, object, source, now, &emitted, &sight));
+        bst_vec3 unit = bst_vec3_unit(path->place[i]);
+        bst_vec3 relative = bst_vec3_sub(e->state.velocity_mps, velocity);
+        bst_vec3 about = bst_vec3_axpy(unit, 1.0 / BST_LIGHT_SPEED_MPS, relative);
+        bst_vec3 apparent = bst_vec3_scale(sight.apparent, bst_vec3_dot(sight.apparent, about));
+        path->shift[i / 2] = bst_vec3_sub(apparent, unit);
+        if (i == BST_PATH_NODES / 2) {
+            shine(view, e, object, emitted, &sight);
+            *mid = sight;
+        }
+    }
+    return BST_OK;
+}
+
+bst_status bst_view_path(bst_ctx *ctx, bst_view *view, int observer, int object, double start_s,
+                         double end_s, bst_source_path *path, bst_sight *mid) {
+    const eye *eyes[BST_PATH_NODES];
+    for (int i = 0; i < BST_PATH_NODES; i++) {
+        BST_TRY(known_eye(ctx, view, observer, node_time(start_s, end_s, i), i, &eyes[i]));
+    }
+    BST_TRY(path_from(ctx, view, eyes, object, FROM_EPHEMERIS, path, mid));
+    double nearest = INFINITY;
+    for (int i = 0; i < BST_PATH_NODES; i++) {
+        nearest = fmin(nearest, bst_vec3_norm(path->place[i]));
+    }
+    if (nearest < BST_EPHEMERIS_NEAREST_M) {
+        eye direct[BST_PATH_NODES];
+        for (int i = 0; i < BST_PATH_NODES; i++) {
+            BST_TRY(eye_at(ctx, view, observer, eyes[i]->seconds, FROM_ORBIT, &direct[i]));
+            eyes[i] = &direct[i];
+        }
+        BST_TRY(path_from(ctx, view, eyes, object, FROM_ORBIT, path, mid));
+    }
+    return BST_OK;
+}
+
+bst_status bst_view_near(bst_ctx *ctx, bst_view *view, int observer, double start_s, double end_s,
+                         bst_vec3 axis, double half_angle_rad, int *indices, int *count) {
+    bst_ephemeris_cone cone = {
+        .axis = axis, .half_angle_rad = half_angle_rad, .half_span_s = 0.5 * (end_s - start_s)};
+    const eye *e;
+    const int middle = BST_PATH_NODES / 2;
+    BST_TRY(known_eye(ctx, view, observer, node_time(start_s, end_s, middle), middle, &e));
+    cone.apex_m = e->state.position_m;
+    for (int i = 0; i < BST_PATH_NODES; i++) {
+        BST_TRY(known_eye(ctx, view, observer, node_time(start_s, end_s, i), i, &e));
+        bst_vec3 way = bst_vec3_sub(e->state.position_m, cone.apex_m);
+        cone.apex_span_m = fmax(cone.apex_span_m, bst_vec3_norm(way));
+    }
+    *count = bst_ephemeris_near(view->world->ephemeris, node_time(start_s, end_s, middle), &cone,
+                                indices);
     return BST_OK;
 }

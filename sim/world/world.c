@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/world/ephemeris.h"
 #include "sim/world/world_build.h"
 
 static bst_status open_stars(const bst_world_builder *b, const char *name, const char *where,
@@ -76,7 +77,7 @@ static bst_status build(bst_world_builder *b, const bst_world_config *config,
             BST_TRY(bst_cue_resolve(b->ctx, b->scenario, world, i, k, b->clock));
         }
     }
-    return BST_OK;
+    return bst_ephemeris_create(b->ctx, world, &world->ephemeris);
 }
 
 bst_status bst_world_create(bst_ctx *ctx, const char *scenario, const bst_world_config *config,
@@ -103,6 +104,7 @@ void bst_world_free(bst_world *world) {
     if (!world) {
         return;
     }
+    bst_ephemeris_free(world->ephemeris);
     for (int i = 0; world->objects && i < world->object_count; i++) {
         bst_orbit_free(&world->objects[i].orbit);
     }
@@ -118,6 +120,10 @@ void bst_world_free(bst_world *world) {
     bst_stars_close(world->stars);
     bst_eop_free(world->eop);
     free(world);
+}
+
+bst_status bst_world_prepare(bst_ctx *ctx, bst_world *world, int threads) {
+    return bst_ephemeris_prepare(ctx, world->ephemeris, threads);
 }
 
 bst_time bst_world_time(const bst_world *world, double seconds) {

@@ -164,6 +164,11 @@ bst_status bst_world_check_spans(bst_ctx *ctx, const char *scenario, const struc
                                  double duration_s) BST_MUST_CHECK;
 void bst_world_free(struct bst_world *world);
 
+/* Before the first frame, and before the world is shared: lets the work on thousands of orbits be
+ * done by `threads` threads (0: one per processor) and does what can be done ahead. Optional;
+ * changes no value. */
+bst_status bst_world_prepare(bst_ctx *ctx, struct bst_world *world, int threads) BST_MUST_CHECK;
+
 /* The onboard knowledge of one sensor; equal to the truth where the scenario says nothing else. */
 bst_status bst_knowledge_create(bst_ctx *ctx, const struct bst_world *world, int observer,
                                 int sensor, struct bst_knowledge **out) BST_MUST_CHECK;

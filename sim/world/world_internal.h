@@ -84,6 +84,7 @@ struct bst_world {
     int file_count;
     world_observer *observers;
     int observer_count;
+    struct bst_ephemeris *ephemeris;
 };
 
 struct bst_knowledge {
@@ -121,6 +122,18 @@ bst_status bst_orbit_line_of_sight(bst_ctx *ctx, const bst_orbit *object, const 
                                    bst_sky_clock *clock, bst_time epoch, const bst_bodies *bodies,
                                    double seconds, bool with_burns, bst_vec3 *geometric_m,
                                    bst_state *object_state, double *emission_s) BST_MUST_CHECK;
+
+struct bst_source_path;
+/* The path of an object as an observer sees it from start_s to end_s, and the sight at the middle.
+ * BST_ERR_NUMERIC when either has no orbit at some time of it. */
+bst_status bst_view_path(bst_ctx *ctx, bst_view *view, int observer, int object, double start_s,
+                         double end_s, struct bst_source_path *path, bst_sight *mid) BST_MUST_CHECK;
+
+/* Indices (ascending) of the objects that may be seen in a cone of apparent directions at any time
+ * from start_s to end_s, and few others; room for all. */
+bst_status bst_view_near(bst_ctx *ctx, bst_view *view, int observer, double start_s, double end_s,
+                         bst_vec3 axis, double half_angle_rad, int *indices,
+                         int *count) BST_MUST_CHECK;
 
 /* Works out a sensor's cue: object index, error rotation, body attitude. `scenario` names the file
  * in messages. */

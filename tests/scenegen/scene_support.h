@@ -82,11 +82,8 @@ static inline void scene_track_free(scene_track *t) {
 static inline bst_source scene_star(const bst_camera *camera, double x, double y,
                                     double electrons_per_s) {
     bst_vec3 v = bst_camera_unproject(camera, x, y);
-    return (bst_source){.kind = BST_SOURCE_STAR,
-                        .apparent_start = v,
-                        .apparent_mid = v,
-                        .apparent_end = v,
-                        .electrons_per_s = electrons_per_s};
+    return (bst_source){
+        .kind = BST_SOURCE_STAR, .apparent_mid = v, .electrons_per_s = electrons_per_s};
 }
 
 /* `count` stars over the sensor and a rim of 40 px; fluxes over `magnitudes`, counts growing as

@@ -78,8 +78,10 @@ static void own_motion_and_camera_motion_cancel(void **state) {
     double cx = bst_camera_centre_x(&camera), cy = bst_camera_centre_y(&camera);
     bst_source object = scene_star(&camera, cx, cy, 500.0);
     object.kind = BST_SOURCE_OBJECT;
-    object.apparent_start = bst_camera_unproject(&camera, cx + 10.0, cy);
-    object.apparent_end = bst_camera_unproject(&camera, cx - 10.0, cy);
+    bst_source_path path =
+        bst_source_path_through(bst_camera_unproject(&camera, cx + 10.0, cy), object.apparent_mid,
+                                bst_camera_unproject(&camera, cx - 10.0, cy));
+    object.path = &path;
     render(&camera, &(scene_motion){.x_px = 20.0, .duration_s = 1.0, .samples = 2}, &object,
            moving);
     bst_source star = scene_star(&camera, cx, cy, 500.0);

@@ -119,9 +119,11 @@ static void distorted_images_agree_with_the_reference(void **state) {
         bst_source *object = &stars[STARS - 1];
         object->kind = BST_SOURCE_OBJECT;
         object->electrons_per_s = 3e5;
-        object->apparent_start = bst_camera_unproject(&camera, 30.0, 60.0);
         object->apparent_mid = bst_camera_unproject(&camera, 90.0, 75.0);
-        object->apparent_end = bst_camera_unproject(&camera, 140.0, 100.0);
+        bst_source_path path =
+            bst_source_path_through(bst_camera_unproject(&camera, 30.0, 60.0), object->apparent_mid,
+                                    bst_camera_unproject(&camera, 140.0, 100.0));
+        object->path = &path;
         bst_assert_close(error_sigma(f, &camera, &demo, stars, STARS, 1.0), 0.0, 0.05);
         scene_motion fast = {.x_px = 60.0,
                              .y_px = 35.0,
@@ -183,17 +185,39 @@ static void moving_objects_have_their_own_tracks(void **state) {
     double cx = bst_camera_centre_x(&camera), cy = bst_camera_centre_y(&camera);
     bst_source tracked = scene_star(&camera, cx, cy, 4e4);
     tracked.kind = BST_SOURCE_OBJECT;
-    tracked.apparent_start = bst_camera_unproject(&camera, cx + 3.75, cy + 1.25);
-    tracked.apparent_end = bst_camera_unproject(&camera, cx - 3.75, cy - 1.25);
+    bst_vec3 middle = tracked.apparent_mid;
+    bst_source_path path =
+        bst_source_path_through(bst_camera_unproject(&camera, cx + 3.75, cy + 1.25), middle,
+                                bst_camera_unproject(&camera, cx - 3.75, cy - 1.25));
+    tracked.path = &path;
     bst_assert_close(error_sigma(f, &camera, &demo, &tracked, 1, 1.0), 0.0, 0.05);
     bst_source crossing = tracked;
-    crossing.apparent_start = bst_camera_unproject(&camera, cx - 30.0, cy + 2.0);
-    crossing.apparent_end = bst_camera_unproject(&camera, cx + 30.0, cy + 5.0);
+    path = bst_source_path_through(bst_camera_unproject(&camera, cx - 30.0, cy + 2.0), middle,
+                                   bst_camera_unproject(&camera, cx + 30.0, cy + 5.0));
     scene_motion still = {.duration_s = 0.5, .samples = 2};
     bst_assert_close(error_sigma(f, &camera, &still, &crossing, 1, 1.0), 0.0, 0.05);
     still.jitter_px = 0.2;
     still.samples = 501;
     bst_assert_close(error_sigma(f, &camera, &still, &crossing, 1, 1.0), 0.0, 0.05);
+}
+
+/* An object that passes so near that most of its way is beside or behind the camera. */
+static void near_passes_are_drawn_where_they_cross(void **state) {
+    fixture *f = *state;
+    bst_camera camera = scene_camera(192, 160);
+    bst_source pass = scene_star(&camera, 0, 0, 1e8);
+    pass.kind = BST_SOURCE_OBJECT;
+    scene_motion still = {.duration_s = 0.5, .samples = 301, .jitter_px = 0.2};
+    /* straight at a distance of 1 at mid-exposure: beside, then slantwise from behind */
+    for (int c = 0; c < 2; c++) {
+        bst_vec3 mid = bst_camera_unproject(&camera, 90.0, 70.0);
+        bst_vec3 step = c == 0 ? (bst_vec3){0.15, 0.05, 0.0} : (bst_vec3){0.2, -0.3, 1.3};
+        bst_source_path path =
+            bst_source_path_through(bst_vec3_sub(mid, step), mid, bst_vec3_add(mid, step));
+        pass.path = &path;
+        double error = error_sigma(f, &camera, &still, &pass, 1, 1.0);
+        bst_assert_close(error, 0.0, 0.05);
+    }
 }
 
 /* The same pixels from any window, tile, group and number of threads. */
@@ -313,8 +337,7 @@ static void hard_cases(void **state) {
     bst_source none[4] = {star, star, star, star};
     none[0].occulted = true;
     none[1].electrons_per_s = 0.0;
-    none[2].apparent_start = none[2].apparent_mid = none[2].apparent_end =
-        (bst_vec3){0.0, 0.0, -1.0};
+    none[2].apparent_mid = (bst_vec3){0.0, 0.0, -1.0};
     none[3] = scene_star(&camera, 1e5, 0.0, 1e6);
     q.sources = none;
     q.count = 4;
@@ -431,6 +454,7 @@ int main(void) {
         cmocka_unit_test(distortion_keeps_the_light),
         cmocka_unit_test(wide_narrow_and_bright),
         cmocka_unit_test(moving_objects_have_their_own_tracks),
+        cmocka_unit_test(near_passes_are_drawn_where_they_cross),
         cmocka_unit_test(bytes_do_not_depend_on_how_they_are_made),
         cmocka_unit_test(hard_cases),
         cmocka_unit_test(a_hundred_thousand_stars),

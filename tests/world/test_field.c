@@ -116,12 +116,7 @@ static int dense_track(const scene *s, const bst_source *source, double *x, doub
             bst_quat q =
                 bst_quat_slerp(s->track.q_cam_from_gcrf[k], s->track.q_cam_from_gcrf[k + 1], f);
             double t = s->track.time_s[k] + f * (s->track.time_s[k + 1] - s->track.time_s[k]);
-            double u = t / total;
-            /* objects: the quadratic through three points, as the header says */
-            bst_vec3 d = bst_vec3_axpy(
-                bst_vec3_axpy(bst_vec3_scale(source->apparent_start, (1 - u) * (1 - 2 * u)),
-                              4 * u * (1 - u), source->apparent_mid),
-                u * (2 * u - 1), source->apparent_end);
+            bst_vec3 d = bst_source_direction(source, t / total);
             assert_true(n < MOST);
             assert_true(bst_camera_project(camera, bst_quat_rotate(q, d), &x[n], &y[n]));
             n++;
@@ -388,6 +383,51 @@ static void what_came_down_is_not_there(void **state) {
     free_scene(&s);
 }
 
+/* An object that passes the observer: the quartic against sights at many instants. */
+static void fast_passes_are_followed(void **state) {
+    (void)state;
+    const struct {
+        double radial_km, along_kmps, radial_kmps, exposure_s;
+        double tolerance_px; /* at 0.5 arcsec a pixel */
+    } cases[] = {
+        {500, 10, 0, 2, 1e-3},   {500, 15, 0, 20, 1e-3}, {50, 10, 0, 2, 1e-3},
+        {11, 15, 0, 2, 1e-3},    {11, 15, -5, 4, 1e-3},  {40, 0, 15, 2, 1e-3},
+        {2000, 10, 5, 40, 1e-3}, {11, 15, 0, 40, 0.02}, /* w T / 2 = 0.02: where it ends */
+    };
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        double duration = cases[c].exposure_s;
+        char text[600];
+        snprintf(text, sizeof text,
+                 GX5 ", {\"name\": \"near\", " TEST_NEOSSAT
+                     ", \"albedo\": 0}, {\"name\": \"pass\", \"orbit\": {\"source\": "
+                     "\"relative\", \"reference\": \"near\", \"at_s\": %g, \"offset_rtn_m\": "
+                     "[%g, 0, 3000], \"rate_rtn_mps\": [%g, %g, 100]}}",
+                 0.5 * duration, 1e3 * cases[c].radial_km, 1e3 * cases[c].radial_kmps,
+                 1e3 * cases[c].along_kmps);
+        scene s = make_scene(text);
+        bst_view *view;
+        bst_sight sight;
+        bst_assert_ok(&s.ctx, bst_view_create(&s.ctx, s.world, &view));
+        bst_assert_ok(&s.ctx, bst_view_sight(&s.ctx, view, 0, 2, 0.5 * duration, &sight));
+        s.target = bst_quat_look(sight.apparent, (bst_vec3){0, 0, 1});
+        int64_t end = (int64_t)(RATE * duration);
+        push(s.history, 0, s.target);
+        push(s.history, end, s.target);
+        query(&s, end, full);
+        const bst_source *source = &s.sources[s.count - 1];
+        assert_true(source->kind == BST_SOURCE_OBJECT && source->id == 2);
+        for (int i = 0; i <= 100; i++) {
+            double u = i / 100.0;
+            bst_assert_ok(&s.ctx, bst_view_sight(&s.ctx, view, 0, 2, u * duration, &sight));
+            double off =
+                test_distance(bst_vec3_unit(bst_source_direction(source, u)), sight.apparent);
+            bst_assert_close(off / (0.5 * BST_ARCSEC_RAD), 0, cases[c].tolerance_px);
+        }
+        bst_view_free(view);
+        free_scene(&s);
+    }
+}
+
 /* A ring of 100 samples that has been round several times gives the same as one that has not. */
 static void the_ring_may_have_wrapped(void **state) {
     (void)state;
@@ -454,6 +494,7 @@ int main(void) {
         cmocka_unit_test(the_target_is_where_the_sight_says),
         cmocka_unit_test(the_earth_hides_stars),
         cmocka_unit_test(what_came_down_is_not_there),
+        cmocka_unit_test(fast_passes_are_followed),
         cmocka_unit_test(the_ring_may_have_wrapped),
         cmocka_unit_test(an_exposure_outside_the_history_is_refused),
     };

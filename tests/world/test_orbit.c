@@ -46,10 +46,10 @@ static void a_relative_orbit_keeps_its_offset(void **state) {
         bst_state ref = object_at(view, 0, t), near = object_at(view, 1, t);
         bst_vec3 r, s, n, d = bst_vec3_sub(near.position_m, ref.position_m);
         rtn_of(ref, &r, &s, &n);
-        /* rounding of 4e7 m */
-        bst_assert_close(bst_vec3_dot(d, r), 1000 + (t - 100), 1e-7);
-        bst_assert_close(bst_vec3_dot(d, s), -2000 + 2 * (t - 100), 1e-7);
-        bst_assert_close(bst_vec3_dot(d, n), 3000 - 3 * (t - 100), 1e-7);
+        /* 1e-5: the reference is interpolated, the other is not */
+        bst_assert_close(bst_vec3_dot(d, r), 1000 + (t - 100), 1e-5);
+        bst_assert_close(bst_vec3_dot(d, s), -2000 + 2 * (t - 100), 1e-5);
+        bst_assert_close(bst_vec3_dot(d, n), 3000 - 3 * (t - 100), 1e-5);
         /* SGP4's velocity is not the derivative of its position to better than some 10 mm/s; the
          * difference of the two orbits' is */
         bst_vec3 v = bst_vec3_sub(velocity_by_difference(view, 1, t, 2.0),
@@ -81,16 +81,16 @@ static void a_burn_moves_the_object_as_theory_says(void **state) {
         snprintf(text, sizeof text, BURNT("{\"time_s\": 100, \"dv_rtn_mps\": [%s]}"), burns[axis]);
         bst_world *world = test_world_with(text, "");
         bst_view *view = view_of(world);
-        /* before: to the bit the catalogued orbit */
+        /* before: the catalogued orbit, of which one is interpolated */
         for (double t = -100; t < 100; t += 49.99) {
             assert_true(test_distance(object_at(view, 0, t).position_m,
-                                      object_at(view, 1, t).position_m) == 0);
+                                      object_at(view, 1, t).position_m) < 1e-5);
         }
         /* at the burn: same place, velocity changed by 10 m/s along that axis of the orbit */
         bst_state base = object_at(view, 0, 100), after = object_at(view, 1, 100);
         bst_vec3 rtn[3];
         rtn_of(base, &rtn[0], &rtn[1], &rtn[2]);
-        bst_assert_close(test_distance(base.position_m, after.position_m), 0, 1e-7);
+        bst_assert_close(test_distance(base.position_m, after.position_m), 0, 1e-5);
         bst_vec3 change = bst_vec3_sub(after.velocity_mps, base.velocity_mps);
         bst_assert_close(test_distance(change, bst_vec3_scale(rtn[axis], 10)), 0, 1e-10);
         const double n = sqrt(BST_EARTH_MU_M3PS2 / pow(bst_vec3_norm(base.position_m), 3));

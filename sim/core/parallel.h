@@ -1,0 +1,25 @@
+/* A few threads that share loops. */
+#ifndef BST_CORE_PARALLEL_H
+#define BST_CORE_PARALLEL_H
+
+#include "sim/core/status.h"
+
+typedef struct bst_parallel bst_parallel;
+
+/* Starts threads - 1 threads (the caller of a loop is the other one); 0: one per processor, 32 at
+ * most. They sleep between loops. When fewer can be started the loops run on those there are. */
+bst_status bst_parallel_create(bst_ctx *ctx, int threads, bst_parallel **out) BST_MUST_CHECK;
+/* NULL allowed; no loop may be running. */
+void bst_parallel_free(bst_parallel *pool);
+/* Threads that a loop runs on, the caller's included. */
+int bst_parallel_threads(const bst_parallel *pool);
+
+/* Part of a loop: indices begin <= i < end. Called from several threads at a time. */
+typedef void (*bst_parallel_fn)(void *user, int begin, int end);
+
+/* Calls fn for parts of at most `grain` >= 1 indices that together are 0 <= i < count, each once,
+ * and returns when all are done. pool NULL: on the caller's thread alone. A pool runs one loop at a
+ * time: callers on several threads take turns by a lock of their own. */
+void bst_parallel_for(bst_parallel *pool, int count, int grain, bst_parallel_fn fn, void *user);
+
+#endif
