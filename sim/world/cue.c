@@ -34,9 +34,16 @@ bst_status bst_cue_resolve(bst_ctx *ctx, const char *scenario, bst_world *world,
     }
     bst_vec3 nominal;
     bst_state eye;
-    BST_TRY(bst_orbit_state(ctx, &world->observers[observer].orbit, clock, world->epoch, 0.0, true,
-                            &eye));
-    BST_TRY(bst_cue_nominal_direction(ctx, world, observer, sensor, clock, 0.0, &eye, &nominal));
+    bst_status status = bst_orbit_state(ctx, &world->observers[observer].orbit, clock, world->epoch,
+                                        0.0, true, &eye);
+    if (status == BST_OK) {
+        status =
+            bst_cue_nominal_direction(ctx, world, observer, sensor, clock, 0.0, &eye, &nominal);
+    }
+    if (status != BST_OK) {
+        return bst_fail_prefix(ctx, status == BST_ERR_NUMERIC ? BST_ERR_CONFIG : status,
+                               "%s: /observers/%d/sensors/%d/cue", scenario, observer, sensor);
+    }
     /* The error is a rotation about the image axis at right angles to the one along which the cue
      * is wrong. */
     const double *x = s->config.x_axis_gcrf;

@@ -55,7 +55,7 @@ class Messages(unittest.TestCase):
         self.fails(2, "--duration long: give a number", "run", runs.TRACK, "--duration", "long")
         self.fails(2, "--out needs a value", "run", runs.TRACK, "--out")
         self.fails(2, '"x" is not expected here', "schema", "x")
-        self.fails(2, "--elements is missing", "propagate")
+        self.fails(2, "--start is missing", "propagate")
 
     def test_bad_values(self):
         self.bad_set("/world/object=3", ': /world/object: unknown key; did you mean "objects"')

@@ -136,6 +136,14 @@ static void an_oem_observer_sees_an_injected_target(void **state) {
     assert_string_equal(ctx.message,
                         "test: /observers/0/orbit/oem_file: nowhere.oem: cannot be opened: No such "
                         "file or directory; give an OEM file (CCSDS 502.0, KVN)");
+    snprintf(oem, sizeof oem, "%s", write_oem(&s, "late.oem", 60.0, 120.0));
+    assert_int_equal(make(&ctx, oem, states, "", &world), BST_ERR_CONFIG);
+    snprintf(message, sizeof message,
+             "test: /observers/0/sensors/0/cue: orbit of eye: %s: no state of \"EYE\" at "
+             "2022-06-16T22:10:00.000Z: the file covers 2022-06-16T22:11:00.000Z to "
+             "2022-06-16T22:12:00.000Z",
+             oem);
+    assert_string_equal(ctx.message, message);
     assert_int_equal(make(&ctx, "", states, "", &world), BST_ERR_CONFIG);
     assert_string_equal(ctx.message, "test: /observers/0/orbit: source \"oem\" needs \"oem_file\"");
     scratch_remove(&s);
