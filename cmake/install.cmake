@@ -40,6 +40,7 @@ if(NOT BORESIGHT_SANITIZE AND NOT BORESIGHT_FUZZ)
     PATTERN "*_internal.h" EXCLUDE
     PATTERN "sim/app" EXCLUDE
     PATTERN "sim/astro/eop_table.h" EXCLUDE
+    PATTERN "sim/world/world_build.h" EXCLUDE
     PATTERN "sim/*/data" EXCLUDE)
   foreach(header control/modules.h gimbal/modules.h imgproc/imgproc.h imgproc/motion.h
       scenegen/module.h sim/app/registry.h tracker/module.h)

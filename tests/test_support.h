@@ -11,7 +11,16 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+
+/* "$TMPDIR/<name>_XXXXXX" for mkstemp and mkdtemp; /tmp where the variable is not set. */
+#define BST_TEST_PATH 256
+static inline void bst_test_template(char path[BST_TEST_PATH], const char *name) {
+    const char *base = getenv("TMPDIR");
+    int n = snprintf(path, BST_TEST_PATH, "%s/%s_XXXXXX", base && *base ? base : "/tmp", name);
+    assert_true(n > 0 && n < BST_TEST_PATH);
+}
 
 /* Fails with both values when |actual - expected| > tolerance or actual is not a number.
  * Say at the call where the tolerance comes from. */

@@ -75,12 +75,12 @@ static bst_status on_message(void *user, const char *scope, const char *channel,
     while (strcmp(sensor->scope, scope) != 0) {
         sensor++; /* every scope of the engine is watched */
     }
-    if (strcmp(channel, BST_CHANNEL_LOS_HISTORY) == 0) {
-        return BST_OK; /* the plant's rate: nothing below reads it */
-    }
     if (bst_recorder_wants(run->recorder, channel)) {
         BST_TRY(bst_recorder_channel(run->ctx, run->recorder, sensor->recorder_index, channel,
                                      payload, tick));
+    }
+    if (strcmp(channel, BST_CHANNEL_LOS_HISTORY) == 0) {
+        return BST_OK; /* the plant's rate: nothing below reads it */
     }
     if (sensor == run->sensors) {
         BST_TRY(bst_run_pictures_message(run->ctx, run->pictures, channel, payload));

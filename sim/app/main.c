@@ -13,6 +13,7 @@ typedef struct command {
 static const command commands[] = {
     {"run", bst_cmd_run, "run a scenario"},
     {"info", bst_cmd_info, "what the folder of a run holds"},
+    {"export", bst_cmd_export, "frames, tables, orbits and observations of a run for others"},
     {"check", bst_cmd_check, "validate a scenario and print it with every default written out"},
     {"schema", bst_cmd_schema, "print the JSON Schema of scenarios"},
     {"stars", bst_cmd_stars, "get, import or describe the star catalogue"},

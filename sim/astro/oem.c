@@ -511,68 +511,6 @@ static bst_status read_lines(reader *r, const char *data, size_t bytes) {
     return finish_segment(r);
 }
 
-static int compare_objects(const bst_oem_segment_rows *a, const bst_oem_segment_rows *b) {
-    int order = strcmp(a->name, b->name);
-    return order ? order : strcmp(a->id, b->id);
-}
-
-static int by_object(const void *x, const void *y) {
-    const bst_oem_segment_rows *a = x, *b = y;
-    int order = compare_objects(a, b);
-    return order ? order : (a->line > b->line) - (a->line < b->line);
-}
-
-static int by_number(const void *x, const void *y) {
-    const bst_oem_segment_rows *a = x, *b = y;
-    return (a->object > b->object) - (a->object < b->object);
-}
-
-static int by_time(const void *x, const void *y) {
-    const bst_oem_segment_rows *a = x, *b = y;
-    if (a->object != b->object) {
-        return a->object < b->object ? -1 : 1;
-    }
-    double later_s = bst_time_diff(a->base, b->base) + (a->from_s - b->from_s);
-    return later_s > 0.0 ? 1 : later_s < 0.0 ? -1 : (a->line > b->line) - (a->line < b->line);
-}
-
-/* Numbers objects as they come first in the file, and puts their segments in the order of time. */
-static bst_status sort_segments(const reader *r) {
-    bst_oem *oem = r->oem;
-    int n = oem->segment_count, objects = 0;
-    bst_oem_segment_rows *s = oem->segments;
-    /* the line of an object's first segment stands for it until all are known */
-    qsort(s, (size_t)n, sizeof *s, by_object);
-    for (int i = 0; i < n; i++) {
-        s[i].object = i > 0 && compare_objects(&s[i - 1], &s[i]) == 0 ? s[i - 1].object : s[i].line;
-    }
-    qsort(s, (size_t)n, sizeof *s, by_number);
-    for (int i = 0, line = 0; i < n; i++) {
-        objects += i == 0 || s[i].object != line;
-        line = s[i].object;
-        s[i].object = objects - 1;
-    }
-    qsort(s, (size_t)n, sizeof *s, by_time);
-    oem->objects = calloc((size_t)objects, sizeof *oem->objects);
-    if (!oem->objects) {
-        return fail_memory(r);
-    }
-    oem->object_count = objects;
-    for (int i = 0; i < n; i++) {
-        bst_oem_object *o = &oem->objects[s[i].object];
-        if (o->count == 0) {
-            *o = (bst_oem_object){.name = s[i].name, .id = s[i].id, .first = i};
-        } else if (bst_time_diff(s[i].base, s[i - 1].base) + s[i].from_s - s[i - 1].to_s < -1e-6) {
-            return bst_fail(r->source.ctx, BST_ERR_FORMAT,
-                            "%.400s:%d: the usable span overlaps that of the segment of the same "
-                            "object at line %d; set USEABLE_START_TIME and USEABLE_STOP_TIME",
-                            r->source.name, s[i].line, s[i - 1].line);
-        }
-        o->count++;
-    }
-    return BST_OK;
-}
-
 bst_status bst_oem_read_buffer(bst_ctx *ctx, const char *name, const char *data, size_t bytes,
                                bst_oem **out) {
     *out = NULL;
@@ -584,7 +522,7 @@ bst_status bst_oem_read_buffer(bst_ctx *ctx, const char *name, const char *data,
     }
     bst_status status = r.oem && r.oem->name ? read_lines(&r, data, bytes) : fail_memory(&r);
     if (status == BST_OK) {
-        status = sort_segments(&r);
+        status = bst_oem_sort(ctx, r.oem);
     }
     if (status != BST_OK) {
         bst_oem_free(r.oem);

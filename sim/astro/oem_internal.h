@@ -34,4 +34,8 @@ struct bst_oem {
     int object_count;
 };
 
+/* Numbers objects as they come first in the file, and puts their segments in the order of time.
+ * BST_ERR_FORMAT when usable spans of one object overlap. */
+bst_status bst_oem_sort(bst_ctx *ctx, bst_oem *oem) BST_MUST_CHECK;
+
 #endif

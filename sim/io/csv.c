@@ -1,11 +1,10 @@
 #include "sim/io/csv.h"
 
-#include <errno.h>
 #include <inttypes.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
+
+#include "sim/io/draft_file.h"
 
 static void put_text(FILE *file, const char *text) {
     if (!strpbrk(text, ",\"\r\n") && *text) {
@@ -64,27 +63,17 @@ static bst_status write_rows(bst_ctx *ctx, bst_rows *rows, FILE *file, bst_csv_p
 
 bst_status bst_csv_write(bst_ctx *ctx, const bst_run_reader *reader, const char *sql,
                          const char *path, bst_csv_progress progress, void *user, int64_t *rows) {
-    char draft[4096];
+    bst_draft draft;
     int64_t count = 0;
     bst_rows *query;
     BST_TRY(bst_rows_open(ctx, reader, sql, 0, 0, &query));
-    int n = snprintf(draft, sizeof draft, "%s.tmp.%ld", path, (long)getpid());
-    FILE *file = n > 0 && (size_t)n < sizeof draft ? fopen(draft, "wbe") : NULL;
-    if (!file) {
-        bst_rows_close(query);
-        return bst_fail(ctx, BST_ERR_IO, "%s: cannot be made: %s", path, strerror(errno));
+    bst_status status = bst_draft_open(ctx, path, &draft);
+    if (status == BST_OK) {
+        status = write_rows(ctx, query, draft.stream, progress, user, &count);
+        status = bst_draft_close(ctx, &draft, status);
     }
-    errno = 0;
-    bst_status status = write_rows(ctx, query, file, progress, user, &count);
     bst_rows_close(query);
-    bool ok = fflush(file) == 0 && !ferror(file) && fsync(fileno(file)) == 0;
-    ok = fclose(file) == 0 && ok;
-    if (status == BST_OK && (!ok || rename(draft, path) != 0)) {
-        status = bst_fail(ctx, BST_ERR_IO, "%s: cannot be written: %s", path, strerror(errno));
-    }
-    if (status != BST_OK) {
-        unlink(draft);
-    } else if (rows) {
+    if (status == BST_OK && rows) {
         *rows = count;
     }
     return status;

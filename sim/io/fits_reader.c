@@ -73,10 +73,10 @@ static bst_status count_extensions(bst_ctx *ctx, bst_fits_reader *reader, LONGLO
         BST_TRY(check_size(ctx, reader, size));
         if (info->frames++ == 0) {
             reader->first_hdu = hdu;
-            info->width = (int)size[0];
-            info->height = (int)size[1];
             info->compressed = fits_is_compressed_image(reader->file, &code) != 0;
         }
+        info->width = size[0] > info->width ? (int)size[0] : info->width;
+        info->height = size[1] > info->height ? (int)size[1] : info->height;
     }
 }
 
@@ -181,10 +181,39 @@ static bst_status make_room(bst_ctx *ctx, bst_fits_reader *reader, size_t count)
     return reader->pixels ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a frame");
 }
 
+static bst_status check_index(bst_ctx *ctx, const bst_fits_reader *reader, int64_t index) {
+    if (index < 0 || index >= reader->info.frames) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: has no frame %lld; it has %lld", reader->path,
+                        (long long)index, (long long)reader->info.frames);
+    }
+    return BST_OK;
+}
+
+bst_status bst_fits_reader_id(bst_ctx *ctx, bst_fits_reader *reader, int64_t index,
+                              int64_t *exposure_id) {
+    BST_TRY(check_index(ctx, reader, index));
+    int code = 0, type, any;
+    LONGLONG id = -1;
+    if (!reader->info.cube) {
+        int missing = 0;
+        fits_movabs_hdu(reader->file, reader->first_hdu + (int)index, &type, &code);
+        if (code == 0 && fits_read_key_lnglng(reader->file, "FRAMEID", &id, NULL, &missing) != 0) {
+            id = -1;
+            fits_clear_errmsg();
+        }
+    } else if (reader->has_table) {
+        fits_movabs_hdu(reader->file, reader->table_hdu, &type, &code);
+        fits_read_col(reader->file, TLONGLONG, reader->id_column, (LONGLONG)index + 1, 1, 1, NULL,
+                      &id, &any, &code);
+    }
+    *exposure_id = (int64_t)id;
+    return code == 0 ? BST_OK : fail_cfitsio(ctx, reader, code);
+}
+
 static bst_status read_extension(bst_ctx *ctx, bst_fits_reader *reader, int64_t index,
                                  bst_fits_read_frame *out) {
-    int code = 0, type, any, missing = 0;
-    LONGLONG size[3] = {0, 0, 0}, id = -1;
+    int code = 0, type, any;
+    LONGLONG size[3] = {0, 0, 0};
     fits_movabs_hdu(reader->file, reader->first_hdu + (int)index, &type, &code);
     fits_get_img_sizell(reader->file, 2, size, &code);
     if (code != 0) {
@@ -192,15 +221,10 @@ static bst_status read_extension(bst_ctx *ctx, bst_fits_reader *reader, int64_t 
     }
     BST_TRY(check_size(ctx, reader, size));
     BST_TRY(make_room(ctx, reader, (size_t)(size[0] * size[1])));
-    fits_read_key_lnglng(reader->file, "FRAMEID", &id, NULL, &missing);
-    fits_clear_errmsg();
     fits_read_img(reader->file, TUSHORT, 1, size[0] * size[1], NULL, reader->pixels, &any, &code);
-    if (code != 0) {
-        return fail_cfitsio(ctx, reader, code);
-    }
-    *out = (bst_fits_read_frame){reader->pixels, (int)size[0], (int)size[1],
-                                 missing == 0 ? (int64_t)id : -1};
-    return BST_OK;
+    out->width = (int)size[0];
+    out->height = (int)size[1];
+    return code == 0 ? BST_OK : fail_cfitsio(ctx, reader, code);
 }
 
 static bst_status read_plane(bst_ctx *ctx, bst_fits_reader *reader, int64_t index,
@@ -210,28 +234,19 @@ static bst_status read_plane(bst_ctx *ctx, bst_fits_reader *reader, int64_t inde
     long first[3] = {1, 1, (long)index + 1};
     long last[3] = {info->width, info->height, (long)index + 1};
     long step[3] = {1, 1, 1};
-    LONGLONG id = -1;
     BST_TRY(make_room(ctx, reader, (size_t)info->width * (size_t)info->height));
     fits_movabs_hdu(reader->file, reader->first_hdu, &type, &code);
     fits_read_subset(reader->file, TUSHORT, first, last, step, NULL, reader->pixels, &any, &code);
-    if (code == 0 && reader->has_table) {
-        fits_movabs_hdu(reader->file, reader->table_hdu, &type, &code);
-        fits_read_col(reader->file, TLONGLONG, reader->id_column, (LONGLONG)index + 1, 1, 1, NULL,
-                      &id, &any, &code);
-    }
-    if (code != 0) {
-        return fail_cfitsio(ctx, reader, code);
-    }
-    *out = (bst_fits_read_frame){reader->pixels, info->width, info->height, (int64_t)id};
-    return BST_OK;
+    out->width = info->width;
+    out->height = info->height;
+    return code == 0 ? BST_OK : fail_cfitsio(ctx, reader, code);
 }
 
 bst_status bst_fits_reader_frame(bst_ctx *ctx, bst_fits_reader *reader, int64_t index,
                                  bst_fits_read_frame *out) {
-    if (index < 0 || index >= reader->info.frames) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: has no frame %lld; it has %lld", reader->path,
-                        (long long)index, (long long)reader->info.frames);
-    }
-    return reader->info.cube ? read_plane(ctx, reader, index, out)
-                             : read_extension(ctx, reader, index, out);
+    BST_TRY(bst_fits_reader_id(ctx, reader, index, &out->exposure_id));
+    BST_TRY(reader->info.cube ? read_plane(ctx, reader, index, out)
+                              : read_extension(ctx, reader, index, out));
+    out->pixels = reader->pixels;
+    return BST_OK;
 }

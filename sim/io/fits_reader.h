@@ -15,7 +15,7 @@ typedef struct bst_fits_file_info {
     bool cube;         /* one cube, else an image extension per frame */
     bool compressed;   /* tile-compressed (Rice) */
     bool cut_off;      /* the file ends inside what follows the last whole frame */
-    int width, height; /* of the first frame; 0 without frames */
+    int width, height; /* largest of all frames; 0 without frames */
 } bst_fits_file_info;
 
 /* Opens a file for reading only and counts its whole frames. BST_ERR_IO with cfitsio's reason;
@@ -32,6 +32,11 @@ typedef struct bst_fits_read_frame {
     int width, height;
     int64_t exposure_id; /* -1: the file does not say (the cube of a killed run) */
 } bst_fits_read_frame;
+
+/* Number of the exposure of frame `index`, -1 when the file does not say, without reading pixels.
+ */
+bst_status bst_fits_reader_id(bst_ctx *ctx, bst_fits_reader *reader, int64_t index,
+                              int64_t *exposure_id) BST_MUST_CHECK;
 
 /* Reads frame `index`, counted from 0 in the file's order. Memory is that of one frame. */
 bst_status bst_fits_reader_frame(bst_ctx *ctx, bst_fits_reader *reader, int64_t index,

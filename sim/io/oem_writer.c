@@ -2,7 +2,7 @@
 
 #include "sim/io/text_writer_internal.h"
 
-enum { DEFAULT_DEGREE = 7 };
+enum { LAGRANGE_DEGREE = 9 };
 
 bst_status bst_oem_write_head(bst_ctx *ctx, FILE *stream, const char *creation_utc,
                               const char *originator, const char *comment) {
@@ -22,7 +22,9 @@ static bst_status write_metadata(bst_ctx *ctx, FILE *stream, const bst_oem_segme
     BST_TRY(s->series.state(s->series.user, ctx, 0, first, &r, &v));
     bst_text_utc(*first, start);
     bst_text_utc(last, stop);
-    snprintf(degree, sizeof degree, "%d", s->hermite_degree ? s->hermite_degree : DEFAULT_DEGREE);
+    int64_t most = s->series.rows > 2 ? s->series.rows - 1 : 1;
+    int lagrange = most < LAGRANGE_DEGREE ? (int)most : LAGRANGE_DEGREE;
+    snprintf(degree, sizeof degree, "%d", s->hermite_degree > 0 ? s->hermite_degree : lagrange);
     fputs("\nMETA_START\n", stream);
     bst_kvn_write(stream, "OBJECT_NAME", s->object_name);
     bst_kvn_write(stream, "OBJECT_ID", s->object_id);
@@ -31,7 +33,7 @@ static bst_status write_metadata(bst_ctx *ctx, FILE *stream, const bst_oem_segme
     bst_kvn_write(stream, "TIME_SYSTEM", "UTC");
     bst_kvn_write(stream, "START_TIME", start);
     bst_kvn_write(stream, "STOP_TIME", stop);
-    bst_kvn_write(stream, "INTERPOLATION", "HERMITE");
+    bst_kvn_write(stream, "INTERPOLATION", s->hermite_degree > 0 ? "HERMITE" : "LAGRANGE");
     bst_kvn_write(stream, "INTERPOLATION_DEGREE", degree);
     fputs("META_STOP\n\n", stream);
     bst_kvn_comment(stream, s->comment);

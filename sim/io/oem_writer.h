@@ -14,8 +14,11 @@ typedef struct bst_oem_segment {
     const char *object_name, *object_id; /* "INMARSAT GX5", "2019-081A"; not empty */
     const char *ref_frame;               /* of the series, as OEM names it: "GCRF", "TEME" ... */
     const char *comment;                 /* one or more lines; NULL: none */
-    int hermite_degree;                  /* that readers shall interpolate with; 0: 7 */
-    bst_state_series series;             /* at least one row */
+    /* What readers shall interpolate with: HERMITE of this degree, or with 0 LAGRANGE of degree 9
+     * (less for fewer rows). Positions and velocities of SGP4 differ from one motion by several
+     * cm/s, which Hermite polynomials turn into 0.6 m between rows of a LEO 60 s apart. */
+    int hermite_degree;
+    bst_state_series series; /* at least one row */
 } bst_oem_segment;
 
 /* Starts the message. `creation_utc` is "YYYY-MM-DDThh:mm:ss"; `comment` may be NULL. The stream is
@@ -24,8 +27,8 @@ typedef struct bst_oem_segment {
 bst_status bst_oem_write_head(bst_ctx *ctx, FILE *stream, const char *creation_utc,
                               const char *originator, const char *comment) BST_MUST_CHECK;
 
-/* One object: metadata with the series' span, TIME_SYSTEM UTC and HERMITE interpolation, then a row
- * per state: UTC to 1 ns, km to 1e-9, km/s to 1e-12. Rows must rise in time (BST_ERR_ARGUMENT). */
+/* One object: metadata with the series' span, TIME_SYSTEM UTC and the interpolation, then a row per
+ * state: UTC to 1 ns, km to 1e-9, km/s to 1e-12. Rows must rise in time (BST_ERR_ARGUMENT). */
 bst_status bst_oem_write_segment(bst_ctx *ctx, FILE *stream,
                                  const bst_oem_segment *segment) BST_MUST_CHECK;
 

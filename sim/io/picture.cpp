@@ -241,6 +241,19 @@ extern "C" double bst_picture_text_width(double height, bool bold, const char *t
     }
 }
 
+extern "C" bst_status bst_picture_copy(bst_ctx *ctx, const bst_picture *picture,
+                                       uint8_t *bgr) noexcept {
+    try {
+        cv::Mat to(picture->image.rows / kOver, picture->image.cols / kOver, CV_8UC3, bgr);
+        cv::resize(picture->image, to, to.size(), 0, 0, cv::INTER_AREA);
+        return BST_OK;
+    } catch (const std::exception &e) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "cannot copy a picture: %s", e.what());
+    } catch (...) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "cannot copy a picture");
+    }
+}
+
 extern "C" bst_status bst_picture_save(bst_ctx *ctx, const bst_picture *picture,
                                        const char *path) noexcept {
     try {

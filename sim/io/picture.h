@@ -64,6 +64,10 @@ double bst_picture_text(bst_picture *picture, double x, double y, double height,
                         bool bold, const char *text) BST_NOEXCEPT;
 double bst_picture_text_width(double height, bool bold, const char *text) BST_NOEXCEPT;
 
+/* Copies the picture to `bgr`: height x width pixels of three bytes, blue first, no padding. */
+bst_status bst_picture_copy(bst_ctx *ctx, const bst_picture *picture,
+                            uint8_t *bgr) BST_NOEXCEPT BST_MUST_CHECK;
+
 /* Writes a PNG, whole or not at all. */
 bst_status bst_picture_save(bst_ctx *ctx, const bst_picture *picture,
                             const char *path) BST_NOEXCEPT BST_MUST_CHECK;

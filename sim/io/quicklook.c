@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdio.h>
 
-#include "sim/io/picture.h"
+#include "sim/io/marks_internal.h"
 
 #define PANEL 640 /* width and greatest height of a panel */
 #define MARGIN 20
@@ -13,10 +13,9 @@
 #define INSET 208   /* side of the inset */
 #define INSET_PX 48 /* pixels of the frame in it */
 
-static const bst_colour ground = {16, 20, 28}, white = {240, 243, 248}, soft = {150, 160, 176},
-                        target_colour = {255, 92, 92}, track_colour = {92, 220, 255},
-                        object_colour = {255, 214, 79}, star_colour = {110, 190, 120},
-                        cross_colour = {236, 128, 255};
+static const bst_colour ground = {16, 20, 28}, white = BST_WHITE, soft = BST_SOFT,
+                        target_colour = BST_TARGET_COLOUR, track_colour = BST_TRACK_COLOUR,
+                        object_colour = BST_OBJECT_COLOUR, star_colour = BST_STAR_COLOUR;
 
 /* How frame pixels come to picture pixels in one view. */
 typedef struct view {
@@ -32,21 +31,6 @@ static double view_y(const view *v, double y_px) {
     return v->box.y + (y_px - v->y0) * v->scale - 0.5;
 }
 
-static void cross(bst_picture *p, double x, double y, double gap, double arm) {
-    bst_picture_line(p, x - arm, y, x - gap, y, cross_colour, 1.3);
-    bst_picture_line(p, x + gap, y, x + arm, y, cross_colour, 1.3);
-    bst_picture_line(p, x, y - arm, x, y - gap, cross_colour, 1.3);
-    bst_picture_line(p, x, y + gap, x, y + arm, cross_colour, 1.3);
-}
-
-static void diamond(bst_picture *p, double x, double y, double r) {
-    const double dx[4] = {r, 0, -r, 0}, dy[4] = {0, r, 0, -r};
-    for (int i = 0; i < 4; i++) {
-        int j = (i + 1) % 4;
-        bst_picture_line(p, x + dx[i], y + dy[i], x + dx[j], y + dy[j], track_colour, 1.6);
-    }
-}
-
 /* `size` scales the marks: they are larger in the inset. */
 static void draw_marks(bst_picture *p, const bst_quicklook_frame *f, const view *v, double size) {
     bst_picture_clip(p, v->box);
@@ -56,14 +40,15 @@ static void draw_marks(bst_picture *p, const bst_quicklook_frame *f, const view 
         bst_picture_circle(p, view_x(v, m->x_px), view_y(v, m->y_px), r,
                            m->star ? star_colour : object_colour, m->star ? 1.0 : 1.5);
     }
-    cross(p, view_x(v, f->boresight_x_px), view_y(v, f->boresight_y_px), 7.0 * size, 16.0 * size);
+    bst_mark_cross(p, view_x(v, f->boresight_x_px), view_y(v, f->boresight_y_px), 7.0 * size,
+                   16.0 * size);
     if (f->has_target) {
         double r = 11.0 * size;
         bst_picture_rectangle(p, view_x(v, f->target_x_px) - r, view_y(v, f->target_y_px) - r,
                               2 * r, 2 * r, target_colour, 1.6);
     }
     if (f->has_track) {
-        diamond(p, view_x(v, f->track_x_px), view_y(v, f->track_y_px), 18.0 * size);
+        bst_mark_diamond(p, view_x(v, f->track_x_px), view_y(v, f->track_y_px), 18.0 * size);
     }
     bst_picture_unclip(p);
 }
@@ -198,13 +183,13 @@ static void draw_legend(bst_picture *p, double x, double y) {
     double mid = y - 4;
     bst_picture_rectangle(p, x, mid - 7, 14, 14, target_colour, 1.6);
     x += 22 + bst_picture_text(p, x + 22, y, h, soft, false, "target (truth)") + gap;
-    diamond(p, x + 8, mid, 9);
+    bst_mark_diamond(p, x + 8, mid, 9);
     x += 24 + bst_picture_text(p, x + 24, y, h, soft, false, "track") + gap;
     bst_picture_circle(p, x + 7, mid, 6.5, object_colour, 1.5);
     x += 22 + bst_picture_text(p, x + 22, y, h, soft, false, "detection") + gap;
     bst_picture_circle(p, x + 7, mid, 6.5, star_colour, 1.2);
     x += 22 + bst_picture_text(p, x + 22, y, h, soft, false, "identified star") + gap;
-    cross(p, x + 9, mid, 3, 9);
+    bst_mark_cross(p, x + 9, mid, 3, 9);
     bst_picture_text(p, x + 26, y, h, soft, false, "boresight");
 }
 

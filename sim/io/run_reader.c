@@ -22,6 +22,8 @@ struct bst_run_reader {
     bst_run_state state;
     bst_json *manifest, *scenario;
     sqlite3 *db;
+    bool has_epoch;
+    bst_time epoch;
     char problems[MAX_PROBLEMS][BST_MESSAGE_BYTES];
     int problem_count;
 };
@@ -88,6 +90,41 @@ static bst_json *load_json(bst_run_reader *reader, const char *name, const char 
         json = NULL;
     }
     return json;
+}
+
+/* SQL function utc(seconds): the instant so long after the run's epoch, ISO 8601, to 1e-6 s. */
+static void sql_utc(sqlite3_context *context, int count, sqlite3_value **values) {
+    const bst_run_reader *reader = sqlite3_user_data(context);
+    char text[40];
+    if (count == 1 && reader->has_epoch && sqlite3_value_type(values[0]) != SQLITE_NULL) {
+        bst_time_to_utc(bst_time_add(reader->epoch, sqlite3_value_double(values[0])), 6, text,
+                        sizeof text);
+        sqlite3_result_text(context, text, -1, SQLITE_TRANSIENT);
+    }
+}
+
+/* The epoch, from the table run, else from scenario.json. */
+static void find_epoch(bst_run_reader *reader) {
+    bst_ctx unheard = {0};
+    bst_rows *rows = NULL;
+    bool more = false;
+    if (bst_rows_open(&unheard, reader, "SELECT epoch_utc FROM run", 0, 0, &rows) == BST_OK &&
+        bst_rows_next(&unheard, rows, &more) == BST_OK && more) {
+        reader->has_epoch =
+            bst_time_from_utc(&unheard, bst_rows_text(rows, 0), &reader->epoch) == BST_OK;
+    }
+    bst_rows_close(rows);
+    const cJSON *text =
+        cJSON_GetObjectItemCaseSensitive(bst_run_reader_scenario(reader), "epoch_utc");
+    if (!reader->has_epoch && cJSON_IsString(text)) {
+        reader->has_epoch =
+            bst_time_from_utc(&unheard, text->valuestring, &reader->epoch) == BST_OK;
+    }
+}
+
+bool bst_run_reader_epoch(const bst_run_reader *reader, bst_time *epoch) {
+    *epoch = reader->epoch;
+    return reader->has_epoch;
 }
 
 /* Whether the file's header says that it has a journal of the kind WAL. */
@@ -238,6 +275,11 @@ bst_status bst_run_reader_open(bst_ctx *ctx, const char *path, bst_run_reader **
     reader->scenario =
         load_json(reader, "scenario.json", begun ? "scenario.json is missing" : NULL);
     open_database(reader);
+    find_epoch(reader);
+    if (reader->db) {
+        sqlite3_create_function(reader->db, "utc", 1, SQLITE_UTF8 | SQLITE_DETERMINISTIC, reader,
+                                sql_utc, NULL, NULL);
+    }
     *out = reader;
     return BST_OK;
 }

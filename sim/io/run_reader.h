@@ -6,7 +6,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "sim/core/status.h"
+#include "sim/astro/time.h"
 
 struct cJSON;
 
@@ -44,6 +44,9 @@ const struct cJSON *bst_run_reader_scenario(const bst_run_reader *reader);
 /* Whether there is a database that could be opened. */
 bool bst_run_reader_has_tables(const bst_run_reader *reader);
 
+/* The instant of tick 0; false when the run does not say. */
+bool bst_run_reader_epoch(const bst_run_reader *reader, bst_time *epoch);
+
 /* Path of a file in the folder. BST_ERR_ARGUMENT when it does not fit. */
 bst_status bst_run_reader_file(bst_ctx *ctx, const bst_run_reader *reader, const char *name,
                                char *buffer, size_t bytes) BST_MUST_CHECK;
@@ -51,7 +54,8 @@ bst_status bst_run_reader_file(bst_ctx *ctx, const bst_run_reader *reader, const
 /* A query on the run's tables, row by row. Memory does not grow with the rows. */
 typedef struct bst_rows bst_rows;
 
-/* Prepares one SELECT with up to two integer parameters (?1, ?2). BST_ERR_FORMAT, with SQLite's
+/* Prepares one SELECT with up to two integer parameters (?1, ?2). utc(seconds) in it is the instant
+ * so long after the epoch, ISO 8601 to 1e-6 s. BST_ERR_FORMAT, with SQLite's
  * reason, when the database has no such table or column, or is damaged; BST_ERR_NOT_FOUND when the
  * run has no database. */
 bst_status bst_rows_open(bst_ctx *ctx, const bst_run_reader *reader, const char *sql,

@@ -9,24 +9,20 @@ double bst_believed_seconds(const bst_world *world, int observer, int sensor, do
     return seconds + knowledge_of(world, observer, sensor)->clock_offset_s;
 }
 
-bst_status bst_believed_state(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
-                              bst_sky_clock *clock, double believed_s, bst_state *out) {
+void bst_believe(const bst_world *world, int observer, int sensor, double believed_s,
+                 bst_state *state) {
     const bst_orbit_error_config *error = &knowledge_of(world, observer, sensor)->orbit;
-    BST_TRY(bst_orbit_state(ctx, &world->observers[observer].orbit, clock, world->epoch, believed_s,
-                            true, out));
     const double *p = error->position_rtn_m, *v = error->velocity_rtn_mps;
     double along = p[1] + error->along_track_mps * believed_s;
     if (p[0] == 0.0 && along == 0.0 && p[2] == 0.0 && v[0] == 0.0 && v[1] == 0.0 && v[2] == 0.0) {
-        return BST_OK;
+        return;
     }
-    bst_vec3 r = bst_vec3_unit(out->position_m);
-    bst_vec3 n = bst_vec3_unit(bst_vec3_cross(out->position_m, out->velocity_mps));
-    bst_vec3 t = bst_vec3_cross(n, r);
-    const bst_vec3 axes[3] = {r, t, n};
+    bst_vec3 r = bst_vec3_unit(state->position_m);
+    bst_vec3 n = bst_vec3_unit(bst_vec3_cross(state->position_m, state->velocity_mps));
+    const bst_vec3 axes[3] = {r, bst_vec3_cross(n, r), n};
     const double position[3] = {p[0], along, p[2]};
     for (int i = 0; i < 3; i++) {
-        out->position_m = bst_vec3_axpy(out->position_m, position[i], axes[i]);
-        out->velocity_mps = bst_vec3_axpy(out->velocity_mps, v[i], axes[i]);
+        state->position_m = bst_vec3_axpy(state->position_m, position[i], axes[i]);
+        state->velocity_mps = bst_vec3_axpy(state->velocity_mps, v[i], axes[i]);
     }
-    return BST_OK;
 }

@@ -11,6 +11,7 @@
 typedef struct bst_child {
     pid_t pid;
     FILE *output; /* the child's standard output when asked for, else NULL */
+    FILE *input;  /* the child's standard input when asked for, else NULL */
 } bst_child;
 
 /* Starts argv[0] (searched in PATH) in `directory` (NULL: the current one) with the C locale. With
@@ -20,10 +21,15 @@ typedef struct bst_child {
 bst_status bst_child_start(bst_ctx *ctx, const char *const argv[], const char *directory,
                            bool want_output, const char *error_path, bst_child *out) BST_MUST_CHECK;
 
+/* The same in the current directory with child->input, which writes to the child's standard input;
+ * its standard output goes nowhere. Ignore SIGPIPE: the child may end early. */
+bst_status bst_child_start_fed(bst_ctx *ctx, const char *const argv[], const char *error_path,
+                               bst_child *out) BST_MUST_CHECK;
+
 /* True when the child has ended; *exit_code is then its exit status, or 128 + signal. */
 bool bst_child_poll(bst_child *child, int *exit_code);
 
-/* Closes the output and waits for the end; returns the exit status, or 128 + signal. */
+/* Closes input and output and waits for the end; returns the exit status, or 128 + signal. */
 int bst_child_wait(bst_child *child);
 
 #endif

@@ -122,7 +122,9 @@ bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double s
     for (int i = 0; i < 3; i++) {
         double t = bst_believed_seconds(k->world, k->observer, k->sensor, seconds + (i - 1) * h);
         bst_state eye;
-        BST_TRY(bst_believed_state(ctx, k->world, k->observer, k->sensor, view->clock, t, &eye));
+        BST_TRY(bst_orbit_state(ctx, &k->world->observers[k->observer].orbit, view->clock,
+                                k->world->epoch, t, true, &eye));
+        bst_believe(k->world, k->observer, k->sensor, t, &eye);
         BST_TRY(bst_cue_nominal_direction(ctx, k->world, k->observer, k->sensor, view->clock, t,
                                           &eye, &d[i]));
     }

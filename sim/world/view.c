@@ -49,7 +49,7 @@ static const bst_orbit *orbit_of(const bst_world *world, int body) {
                                       : &world->observers[body - world->object_count].orbit;
 }
 
-/* Position, and velocity to 0.1 m/s. */
+/* Position, and velocity: the derivative, or the orbit's own (see state_of). */
 static bst_status place_of(bst_ctx *ctx, bst_view *view, int body, double seconds, from source,
                            bst_vec3 *position_m, bst_vec3 *velocity_mps) {
     const bst_world *world = view->world;
@@ -66,7 +66,8 @@ static bst_status place_of(bst_ctx *ctx, bst_view *view, int body, double second
 }
 
 /* The velocity is the orbit's own, as where an orbit is evaluated directly: SGP4's differs from the
- * derivative of its position by up to 0.1 m/s. */
+ * derivative of its position by 0.1 m/s in low orbits, by more at a low perigee of eccentric ones.
+ */
 static bst_status state_of(bst_ctx *ctx, bst_view *view, int body, double seconds, from source,
                            bst_state *out) {
     const bst_world *world = view->world;
@@ -92,7 +93,8 @@ bst_status bst_view_observer_state(bst_ctx *ctx, bst_view *view, int observer, d
 bst_status bst_view_believed(bst_ctx *ctx, bst_view *view, int observer, int sensor, double seconds,
                              bst_state *state, bst_bodies *bodies) {
     double t = bst_believed_seconds(view->world, observer, sensor, seconds);
-    BST_TRY(bst_believed_state(ctx, view->world, observer, sensor, view->clock, t, state));
+    BST_TRY(bst_view_observer_state(ctx, view, observer, t, state));
+    bst_believe(view->world, observer, sensor, t, state);
     return bst_view_bodies(ctx, view, t, bodies);
 }
 

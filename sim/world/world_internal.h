@@ -149,10 +149,10 @@ bst_status bst_cue_nominal_direction(bst_ctx *ctx, const bst_world *world, int o
 /* Time after the epoch that the onboard clock shows `seconds` after the epoch. */
 double bst_believed_seconds(const bst_world *world, int observer, int sensor, double seconds);
 
-/* Where a sensor's onboard side believes its observer to be when its clock shows believed_s. */
-bst_status bst_believed_state(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
-                              bst_sky_clock *clock, double believed_s,
-                              bst_state *out) BST_MUST_CHECK;
+/* Adds to an observer's state, that of when the onboard clock shows believed_s, the error with which
+ * the onboard side of a sensor knows it. */
+void bst_believe(const bst_world *world, int observer, int sensor, double believed_s,
+                 bst_state *state);
 
 /* The same stars with errors: those of `stars` that are dropped are not found, the displaced ones
  * lie elsewhere. Shares the memory of `stars`, which must outlive *out. */

@@ -368,7 +368,8 @@ static void survives_damaged_files(void **state) {
 
 static void loads_from_disk(void **state) {
     (void)state;
-    char path[] = "/tmp/bst_tle_XXXXXX";
+    char path[BST_TEST_PATH];
+    bst_test_template(path, "bst_tle");
     int fd = mkstemp(path);
     assert_true(fd >= 0);
     FILE *file = fdopen(fd, "wb");

@@ -223,7 +223,8 @@ static void test_every_truncation_is_refused(void **state) {
 
 static void test_load(void **state) {
     (void)state;
-    char path[] = "/tmp/boresight_json_XXXXXX";
+    char path[BST_TEST_PATH];
+    bst_test_template(path, "boresight_json");
     FILE *file = fdopen(mkstemp(path), "w");
     assert_non_null(file);
     fputs("{\"a\": 3}\n", file);

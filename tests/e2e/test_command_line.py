@@ -66,7 +66,7 @@ class Messages(unittest.TestCase):
         self.bad_set(GIMBAL + "/type=three_axis", f": {GIMBAL}/type: there is no gimbal of type "
                      '"three_axis" .*"two_axis"')
         self.bad_set(GIMBAL + "/rate_hz=999", f": {GIMBAL}/rate_hz: .*857.142857 and 1000 Hz")
-        self.bad_set(GIMBAL + "/platform/history_s=0.4", "neossat/telescope/gimbal: platform/"
+        self.bad_set(GIMBAL + "/platform/history_s=0.4", ": neossat/telescope/gimbal: platform/"
                      r"history_s: 0\.4 s do not cover the sensor's exposure/exposure_s of 0\.5 s; "
                      "make history_s at least as long")
         self.bad_set("/record={\"frames\": \"cube\", \"compression\": \"rice\"}",

@@ -84,16 +84,18 @@ class Faults(unittest.TestCase):
     def out(self, name):
         return os.path.join(self.folder, name)
 
-    def call_limited(self, out, form, limit):
+    def call_limited(self, out, form, limit, duration=DURATION_S):
         """Runs the program; the limit holds from when its first frames are on their way, because
         OpenCL compiles to files until then."""
-        words = runs.command(runs.TRACK, out, *FORMS[form], duration=DURATION_S)
+        words = runs.command(runs.TRACK, out, *FORMS[form], duration=duration)
+        first = out + (".partial/run.sqlite" if form == "none" else ".partial/frames.fits")
         with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                               text=True) as process:
-            while not os.path.exists(out + ".partial/run.sqlite") and process.poll() is None:
+            while not os.path.exists(first) and process.poll() is None:
                 time.sleep(0.01)
-            time.sleep(0.5)
-            resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (limit, limit))
+            time.sleep(0.3 if form == "none" else 0.1)
+            if process.poll() is None:
+                resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (limit, limit))
             said = process.communicate(timeout=120)
             return subprocess.CompletedProcess(words, process.returncode, *said)
 
@@ -307,7 +309,7 @@ class Faults(unittest.TestCase):
 
     def test_manifest_tells_why(self):
         out = self.out("why")
-        result = self.call_limited(out, "extensions", 8 * FRAME_BYTES)
+        result = self.call_limited(out, "extensions", 8 * FRAME_BYTES, duration=3000)
         self.assertEqual(result.returncode, 1)
         manifest = runs.manifest(out + ".partial")
         self.assertEqual((manifest["complete"], manifest["ended"]), (False, "failed"))

@@ -156,7 +156,7 @@ class Oem(unittest.TestCase):
             "META_START", "OBJECT_NAME = NEOSSAT", "OBJECT_ID = 2013-009D",
             "CENTER_NAME = EARTH", "REF_FRAME = GCRF", "TIME_SYSTEM = UTC",
             "START_TIME = 2022-06-16T22:10:00.000", "STOP_TIME = 2022-06-16T22:12:00.000",
-            "INTERPOLATION = HERMITE", "INTERPOLATION_DEGREE = 7", "META_STOP"])
+            "INTERPOLATION = LAGRANGE", "INTERPOLATION_DEGREE = 2", "META_STOP"])
         rows = rows_of(run("--elements", CATALOGUE, "--start", START, "--stop", "2022-06-16T22:12:00Z",
                            "--step", "60", "--frame", "gcrf").stdout)
         data = [line.split() for line in lines if line.startswith("2022-06-16T")]

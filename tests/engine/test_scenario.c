@@ -273,7 +273,8 @@ static void paths_are_made_absolute(void **state) {
     bst_scenario_free(&s);
 
     /* deep down in the file system, so that the full path does not fit */
-    char top[] = "/tmp/boresight-test-XXXXXX", home[4096], name[201], message[6000];
+    char top[BST_TEST_PATH], home[4096], name[201], message[6000];
+    bst_test_template(top, "boresight-test");
     assert_non_null(mkdtemp(top));
     assert_non_null(getcwd(home, sizeof home));
     memset(name, 'd', 200);
@@ -290,10 +291,11 @@ static void paths_are_made_absolute(void **state) {
     fclose(file);
     assert_int_equal(read_named(&ctx, "x.json", SCENARIO(""), &s), BST_ERR_CONFIG);
     assert_non_null(realpath("catalogue_2022-06.tle", expected));
-    snprintf(message, sizeof message,
-             "x.json: /observers/0/orbit/elements_file: the full path of \"catalogue_2022-06.tle\" is "
-             "%zu bytes long (allowed: 511); move the file",
-             strlen(expected));
+    snprintf(
+        message, sizeof message,
+        "x.json: /observers/0/orbit/elements_file: the full path of \"catalogue_2022-06.tle\" is "
+        "%zu bytes long (allowed: 511); move the file",
+        strlen(expected));
     assert_string_equal(ctx.message, message);
     bst_scenario_free(&s);
     assert_int_equal(chdir(home), 0);

@@ -9,11 +9,12 @@
 #include "sim/world/star_fetch.h"
 
 typedef struct folder {
-    char root[64], parts[96];
+    char root[BST_TEST_PATH], parts[BST_TEST_PATH + 32];
 } folder;
 
 static folder make_folder(void) {
-    folder f = {"/tmp/bst_apt_XXXXXX", ""};
+    folder f = {"", ""};
+    bst_test_template(f.root, "bst_apt");
     assert_non_null(mkdtemp(f.root));
     snprintf(f.parts, sizeof f.parts, "%s/sources.list.d", f.root);
     assert_int_equal(mkdir(f.parts, 0700), 0);
@@ -21,7 +22,7 @@ static folder make_folder(void) {
 }
 
 static void put(const char *in, const char *name, const char *text) {
-    char path[256];
+    char path[512];
     snprintf(path, sizeof path, "%s/%s", in, name);
     FILE *f = fopen(path, "w");
     assert_non_null(f);
@@ -30,7 +31,7 @@ static void put(const char *in, const char *name, const char *text) {
 }
 
 static void drop(const char *in, const char *name) {
-    char path[256];
+    char path[512];
     snprintf(path, sizeof path, "%s/%s", in, name);
     assert_int_equal(remove(path), 0);
 }
@@ -139,7 +140,7 @@ static void test_verify(void **state) {
     (void)state;
     bst_ctx ctx = {0};
     folder f = make_folder();
-    char path[128], message[512];
+    char path[512], message[1024];
     put(f.root, "abc", "abc");
     snprintf(path, sizeof path, "%s/abc", f.root);
     /* FIPS 180-4, appendix of examples: SHA-256 of "abc". */

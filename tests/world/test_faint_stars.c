@@ -5,7 +5,6 @@
 #include <stdlib.h>
 
 #include "sim/world/faint_internal.h"
-#include "sim/world/field.h"
 #include "tests/world/world_support.h"
 
 #define DEG2 (1.0 / (BST_DEG_RAD * BST_DEG_RAD)) /* square degrees in a steradian */
@@ -510,76 +509,6 @@ static void join_to_the_full_catalogue_is_smooth(void **state) {
     close_sky(&s);
 }
 
-static bst_world *world_with_faint(const char *faint) {
-    char text[2000];
-    snprintf(text, sizeof text,
-             "{\"world\": {\"star_catalogue\": \"embedded\"%s}, \"observers\": [{\"name\": "
-             "\"neossat\", " TEST_NEOSSAT ", \"sensors\": [{" TEST_CAMERA
-             ", \"cue\": {\"direction_radec_deg\": [266.0, -10.0]}}]}]}",
-             faint);
-    return test_world(text);
-}
-
-/* Through the field query: single stars, background, and an onboard side that knows nothing. */
-static void field_query_has_them(void **state) {
-    (void)state;
-    enum { CASES = 4 };
-    const char *faint[CASES] = {"", ", \"faint_stars\": \"statistical\", \"faint_limit_v_mag\": 13",
-                                ", \"faint_stars\": \"statistical\", \"faint_limit_v_mag\": 15",
-                                ", \"faint_stars\": \"statistical\", \"faint_limit_v_mag\": 19"};
-    double background[CASES], light[CASES];
-    int drawn[CASES] = {0};
-    for (int i = 0; i < CASES; i++) {
-        bst_ctx ctx = {0};
-        bst_world *world = world_with_faint(faint[i]);
-        bst_field *field;
-        bst_assert_ok(&ctx, bst_field_create(&ctx, world, 0, 0, &field));
-        bst_los_history *history = calloc(1, sizeof *history + 4 * sizeof *history->items);
-        history->capacity = 4;
-        history->written = 2;
-        bst_quat q = bst_world_body_attitude(world, 0, 0);
-        history->items[0] = (bst_los_sample){0, q};
-        history->items[1] = (bst_los_sample){6000, q};
-        bst_los_track track;
-        bst_truth truth = {0};
-        const bst_source *sources;
-        int count;
-        /* the renderer's own limit is 16: what lies between goes to the background */
-        bst_field_options options = {.v_limit = 16, .margin_px = 0};
-        bst_assert_ok(&ctx, bst_field_track(&ctx, field, history, 0, 6000, 6000, &track));
-        bst_assert_ok(&ctx, bst_field_query(&ctx, field, &track, 0, 6000, 6000,
-                                            (bst_window){0, 0, 1024, 1024}, &options, &truth,
-                                            &sources, &count));
-        background[i] = truth.background_e;
-        light[i] = 0;
-        for (int k = 0; k < count; k++) {
-            if (sources[k].id & BST_FAINT_ID_BIT) {
-                drawn[i]++;
-                light[i] += sources[k].electrons_per_s;
-                assert_true(sources[k].v_mag > 9 && sources[k].v_mag <= 16);
-            }
-        }
-        bst_knowledge *knowledge;
-        bst_assert_ok(&ctx, bst_knowledge_create(&ctx, world, 0, 0, &knowledge));
-        assert_ptr_equal(bst_knowledge_stars(knowledge), bst_world_stars(world));
-        bst_knowledge_free(knowledge);
-        free(history);
-        bst_field_free(field);
-        bst_world_free(world);
-    }
-    assert_true(drawn[0] == 0 && drawn[1] > 50 && drawn[2] > 2 * drawn[1]);
-    assert_true(drawn[3] > drawn[2]);
-    for (int i = 1; i < CASES; i++) {
-        double per_px = light[i] / (1024.0 * 1024.0);
-        double all = light[1] / (1024.0 * 1024.0) + background[1] - background[0];
-        assert_true(background[i] > background[0]);
-        /* the same light in all; the brightest few stars vary, but they are in all three: what
-         * moves is fainter than V 13, of which the field has thousands */
-        bst_assert_close(per_px + background[i] - background[0], all, 0.06 * all);
-    }
-    assert_true(background[1] > background[2] && background[2] > background[3]);
-}
-
 static void bad_arguments_are_errors(void **state) {
     (void)state;
     sky s = open_sky("embedded", 1);
@@ -614,7 +543,6 @@ int main(void) {
         cmocka_unit_test(light_does_not_depend_on_the_limit),
         cmocka_unit_test(background_leaves_out_what_the_catalogue_has),
         cmocka_unit_test(join_to_the_full_catalogue_is_smooth),
-        cmocka_unit_test(field_query_has_them),
         cmocka_unit_test(bad_arguments_are_errors),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -14,7 +14,7 @@
 typedef struct file_bytes {
     unsigned char *data;
     size_t bytes;
-    char path[64];
+    char path[BST_TEST_PATH];
 } file_bytes;
 
 static int setup(void **state) {
@@ -28,7 +28,7 @@ static int setup(void **state) {
     f->data = malloc(f->bytes);
     size_t n = fread(f->data, 1, f->bytes, in);
     fclose(in);
-    strcpy(f->path, "/tmp/bst_file_XXXXXX");
+    bst_test_template(f->path, "bst_file");
     close(mkstemp(f->path));
     *state = f;
     return n == f->bytes ? 0 : -1;
@@ -184,9 +184,10 @@ static void keep_line(void *user, bst_log_level level, const char *message) {
 static void test_default(void **state) {
     file_bytes *f = *state;
     bst_ctx ctx;
-    char warning[512] = "", path[512], folder[96];
+    char warning[512] = "", path[512], folder[BST_TEST_PATH + 32];
     bst_ctx_init(&ctx, keep_line, warning, BST_LOG_WARNING);
-    char root[] = "/tmp/bst_data_XXXXXX";
+    char root[BST_TEST_PATH];
+    bst_test_template(root, "bst_data");
     assert_non_null(mkdtemp(root));
     assert_int_equal(setenv("XDG_DATA_HOME", root, 1), 0);
     snprintf(folder, sizeof folder, "%s/boresight", root);

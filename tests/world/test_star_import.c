@@ -44,7 +44,7 @@
     "0.122|11.171|0.121|999|T|       \n"
 
 typedef struct sample {
-    char path[64];
+    char path[BST_TEST_PATH];
     bst_ctx ctx;
     bst_stars *stars;
 } sample;
@@ -63,7 +63,7 @@ static bst_status import_text(bst_ctx *ctx, const char *text,
 
 static int setup(void **state) {
     sample *s = calloc(1, sizeof *s);
-    strcpy(s->path, "/tmp/bst_stars_XXXXXX");
+    bst_test_template(s->path, "bst_stars");
     int fd = mkstemp(s->path);
     close(fd);
     bst_star_import_options options = bst_star_import_all();
@@ -168,7 +168,9 @@ static void test_double_star_with_one_identity(void **state) {
 static void test_subset(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    char text[] = "/tmp/bst_subset_XXXXXX", path[] = "/tmp/bst_part_XXXXXX";
+    char text[BST_TEST_PATH], path[BST_TEST_PATH];
+    bst_test_template(text, "bst_subset");
+    bst_test_template(path, "bst_part");
     int fd = mkstemp(text);
     const char *content = "# a part\nsky 9\n\ncone 2.0 2.3 0.5 12.15 # one star\n";
     assert_int_equal(write(fd, content, strlen(content)), (ssize_t)strlen(content));
@@ -211,7 +213,8 @@ static void test_subset(void **state) {
 static void test_bad_rows(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    char path[] = "/tmp/bst_none_XXXXXX";
+    char path[BST_TEST_PATH];
+    bst_test_template(path, "bst_none");
     close(mkstemp(path));
     unlink(path);
     bst_star_import_options options = bst_star_import_all();
@@ -250,7 +253,8 @@ static void test_bad_rows(void **state) {
 static void test_tarball_that_is_none(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    char path[] = "/tmp/bst_tar_XXXXXX", message[512];
+    char path[BST_TEST_PATH], message[512];
+    bst_test_template(path, "bst_tar");
     close(mkstemp(path));
     bst_star_import_options options = bst_star_import_all();
     assert_int_equal(bst_star_import_tarball(&ctx, path, &options, "/tmp/bst_never", NULL),

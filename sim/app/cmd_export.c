@@ -1,0 +1,272 @@
+/* boresight export: frames, tables, orbits and observations of a run in formats that others read.
+ */
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "sim/app/app.h"
+#include "sim/app/export.h"
+#include "sim/app/options.h"
+
+static volatile sig_atomic_t stop_requested;
+
+static void on_signal(int number) {
+    (void)number;
+    stop_requested = 1;
+}
+
+static bool is_sensor(const char *wanted, const bst_export_sensor *sensor) {
+    size_t n = strlen(sensor->observer);
+    return !wanted || strcmp(wanted, sensor->name) == 0 ||
+           (strncmp(wanted, sensor->observer, n) == 0 && wanted[n] == '/' &&
+            strcmp(wanted + n + 1, sensor->name) == 0);
+}
+
+bst_status bst_export_sensors(bst_ctx *ctx, const bst_export *e,
+                              bst_export_sensor sensors[BST_EXPORT_SENSORS], int *count) {
+    bst_rows *rows;
+    bst_status status;
+    bool more;
+    char all[600] = "";
+    *count = 0;
+    if (!bst_run_reader_has_tables(e->run)) {
+        sensors[(*count)++] = (bst_export_sensor){.index = -1, .file = "frames.fits"};
+        return BST_OK;
+    }
+    BST_TRY(bst_rows_open(ctx, e->run,
+                          "SELECT sensor, observer, name, target, file FROM sensors"
+                          " ORDER BY sensor",
+                          0, 0, &rows));
+    while ((status = bst_rows_next(ctx, rows, &more)) == BST_OK && more &&
+           *count < BST_EXPORT_SENSORS) {
+        bst_export_sensor *s = &sensors[*count];
+        s->index = bst_rows_int(rows, 0);
+        snprintf(s->observer, sizeof s->observer, "%s", bst_rows_text(rows, 1));
+        snprintf(s->name, sizeof s->name, "%s", bst_rows_text(rows, 2));
+        snprintf(s->target, sizeof s->target, "%s", bst_rows_text(rows, 3));
+        /* a name from a damaged database is not to lead out of the folder */
+        const char *file = bst_rows_text(rows, 4);
+        snprintf(s->file, sizeof s->file, "%s", strchr(file, '/') ? "" : file);
+        size_t n = strlen(all);
+        snprintf(all + n, sizeof all - n, "%s%s/%s", n ? ", " : "", s->observer, s->name);
+        *count += is_sensor(e->sensor, s);
+    }
+    bst_rows_close(rows);
+    if (status == BST_OK && *count == 0) {
+        return bst_fail(ctx, BST_ERR_NOT_FOUND, "%s: has no sensor \"%s\"; it has %s",
+                        bst_run_reader_folder(e->run), e->sensor ? e->sensor : "",
+                        *all ? all : "none");
+    }
+    return status;
+}
+
+/* The folder for what is made: RUN.export beside the run when none is given. */
+static bst_status make_folder(bst_ctx *ctx, const char *given, const bst_run_reader *run, char *out,
+                              size_t bytes) {
+    const char *folder = bst_run_reader_folder(run);
+    int n = given ? snprintf(out, bytes, "%s", given) : snprintf(out, bytes, "%s.export", folder);
+    if (n < 0 || (size_t)n >= bytes) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", given ? given : folder);
+    }
+    for (char *slash = out; (slash = strchr(slash + 1, '/'));) {
+        *slash = '\0';
+        mkdir(out, 0777); /* what fails here fails again below */
+        *slash = '/';
+    }
+    struct stat info;
+    if (mkdir(out, 0777) != 0 && errno != EEXIST) {
+        return bst_fail(ctx, BST_ERR_IO, "%s: cannot make the folder: %s", out, strerror(errno));
+    }
+    if (stat(out, &info) != 0 || !S_ISDIR(info.st_mode)) {
+        return bst_fail(ctx, BST_ERR_IO, "%s: is not a folder; choose another --out", out);
+    }
+    struct stat source;
+    if (stat(folder, &source) == 0 && source.st_ino == info.st_ino &&
+        source.st_dev == info.st_dev) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "%s: is the run itself, which is not changed; choose another --out", out);
+    }
+    return BST_OK;
+}
+
+static const char help_text[] =
+    "usage: boresight export RUN [what] [options]\n"
+    "\n"
+    "Writes what a run recorded in formats that other programs read: frames as PNG pictures or a "
+    "film, tables as\n"
+    "CSV, the true orbits as CCSDS OEM or CZML, the measured angles as CCSDS TDM. Interrupted and "
+    "killed runs are\n"
+    "exported as far as they go. Files appear whole or not at all and replace earlier ones; the "
+    "run itself is not\n"
+    "changed.\n"
+    "\n"
+    "  boresight export runs/demo --frames png --annotate --every 10\n"
+    "  boresight export runs/demo --frames mp4 --annotate --size 800 --fps 25\n"
+    "  boresight export runs/demo --table csv --tables truth,tracks --out csv\n"
+    "  boresight export runs/demo --orbits oem --observations tdm\n"
+    "\n"
+    "what and options:\n";
+
+enum { NOT_ASKED = -1 };
+
+int bst_cmd_export(int argc, char **argv) {
+    bool help = false;
+    int frames = NOT_ASKED, table_format = NOT_ASKED, orbits = NOT_ASKED, observations = NOT_ASKED;
+    int stretch = 0;
+    const char *out = NULL, *tables = NULL;
+    bst_export e = {
+        .stop = &stop_requested, .last = INT64_C(9007199254740992), .every = 1, .frame_rate = 10.0};
+    const bst_option options[] = {
+        {.name = "frames",
+         .kind = BST_OPTION_CHOICE,
+         .target = &frames,
+         .argument = "png|mp4",
+         .doc = "pictures, or a film (needs the program ffmpeg)"},
+        {.name = "table",
+         .kind = BST_OPTION_CHOICE,
+         .target = &table_format,
+         .argument = "csv",
+         .doc = "the tables of run.sqlite, a file each"},
+        {.name = "orbits",
+         .kind = BST_OPTION_CHOICE,
+         .target = &orbits,
+         .argument = "oem|czml",
+         .doc = "true orbits of observers and objects, from the run's scenario.json"},
+        {.name = "observations",
+         .kind = BST_OPTION_CHOICE,
+         .target = &observations,
+         .argument = "tdm",
+         .doc = "angles and magnitudes of confirmed tracks"},
+        {.name = "out",
+         .kind = BST_OPTION_TEXT,
+         .target = &out,
+         .argument = "FOLDER",
+         .doc = "where it all goes (default RUN.export)"},
+        {.name = "sensor",
+         .kind = BST_OPTION_TEXT,
+         .target = &e.sensor,
+         .argument = "NAME",
+         .doc = "frames and observations of this sensor only: name or observer/name"},
+        {.name = "first",
+         .kind = BST_OPTION_INT,
+         .target = &e.first,
+         .argument = "N",
+         .doc = "first frame, by the number of its exposure (default 0)",
+         .minimum = 0,
+         .maximum = 9e15},
+        {.name = "last",
+         .kind = BST_OPTION_INT,
+         .target = &e.last,
+         .argument = "N",
+         .doc = "last frame (default the run's last)",
+         .minimum = 0,
+         .maximum = 9e15},
+        {.name = "every",
+         .kind = BST_OPTION_INT,
+         .target = &e.every,
+         .argument = "N",
+         .doc = "every N-th frame only, from the first on (default 1)",
+         .minimum = 1,
+         .maximum = 9e15},
+        {.name = "annotate",
+         .kind = BST_OPTION_FLAG,
+         .target = &e.annotate,
+         .doc = "draw true objects, detections, tracks, boresight, time and mode over the frames"},
+        {.name = "stretch",
+         .kind = BST_OPTION_CHOICE,
+         .target = &stretch,
+         .argument = "run|frame",
+         .doc = "grey levels: the same for all frames, or each frame's own (default run)"},
+        {.name = "size",
+         .kind = BST_OPTION_INT,
+         .target = &e.longest_side,
+         .argument = "PX",
+         .doc = "longest side of the pictures (default as the frames are; never enlarged)",
+         .minimum = 16,
+         .maximum = 16384},
+        {.name = "fps",
+         .kind = BST_OPTION_REAL,
+         .target = &e.frame_rate,
+         .argument = "HZ",
+         .doc = "frames per second of the film (default 10)",
+         .minimum = 0.1,
+         .maximum = 240},
+        {.name = "tables",
+         .kind = BST_OPTION_TEXT,
+         .target = &tables,
+         .argument = "A,B",
+         .doc = "these tables only (boresight info lists them)"},
+        {.name = "step",
+         .kind = BST_OPTION_REAL,
+         .target = &e.step_s,
+         .argument = "S",
+         .doc = "time between states of an orbit (default 60, or a twentieth of a short run)",
+         .minimum = 1e-3,
+         .maximum = 86400},
+        {.name = "help", .kind = BST_OPTION_FLAG, .target = &help, .doc = "print this"},
+        {.name = NULL},
+    };
+    bst_ctx ctx;
+    bst_ctx_init(&ctx, bst_app_log, NULL, BST_LOG_WARNING);
+    int arguments = 0;
+    if (bst_options_parse(&ctx, options, argc, argv, &arguments) != BST_OK) {
+        return bst_options_misuse(&ctx, "export");
+    }
+    if (help) {
+        fputs(help_text, stdout);
+        bst_options_print(stdout, options);
+        return BST_EXIT_OK;
+    }
+    if (arguments != 1) {
+        bst_fail(&ctx, BST_ERR_ARGUMENT, "one folder of a run is expected, %d were given",
+                 arguments);
+        return bst_options_misuse(&ctx, "export");
+    }
+    if (frames == NOT_ASKED && table_format == NOT_ASKED && orbits == NOT_ASKED &&
+        observations == NOT_ASKED) {
+        bst_fail(&ctx, BST_ERR_ARGUMENT,
+                 "nothing to export: add --frames, --table, --orbits or --observations");
+        return bst_options_misuse(&ctx, "export");
+    }
+    e.film = frames == 1;
+    e.czml = orbits == 1;
+    e.names_oem = orbits == 0;
+    e.each_stretch = stretch == 1;
+    stop_requested = 0;
+    struct sigaction action = {.sa_handler = on_signal}, ignore = {.sa_handler = SIG_IGN};
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+    sigaction(SIGPIPE, &ignore, NULL); /* ffmpeg may end early */
+    bst_run_reader *run = NULL;
+    char folder[4096];
+    bst_status status = bst_run_reader_open(&ctx, argv[1], &run);
+    if (status == BST_OK) {
+        e.run = run;
+        e.out = folder;
+        const char *problem;
+        for (int i = 0; (problem = bst_run_reader_problem(run, i)); i++) {
+            bst_log(&ctx, BST_LOG_WARNING, "%s", problem);
+        }
+        status = make_folder(&ctx, out, run, folder, sizeof folder);
+    }
+    if (status == BST_OK && table_format != NOT_ASKED) {
+        status = bst_export_tables(&ctx, &e, tables);
+    }
+    if (status == BST_OK && orbits != NOT_ASKED) {
+        status = bst_export_orbits(&ctx, &e);
+    }
+    if (status == BST_OK && observations != NOT_ASKED) {
+        status = bst_export_observations(&ctx, &e);
+    }
+    if (status == BST_OK && frames != NOT_ASKED) {
+        status = bst_export_frames(&ctx, &e);
+    }
+    bst_run_reader_close(run);
+    if (status != BST_OK) {
+        fprintf(stderr, "boresight: %s\n", ctx.message);
+    }
+    return status == BST_OK                ? BST_EXIT_OK
+           : status == BST_ERR_INTERRUPTED ? BST_EXIT_INTERRUPTED
+                                           : BST_EXIT_FAILED;
+}

@@ -1,0 +1,51 @@
+/* The parts of boresight export: each writes what it makes below a folder that is there. */
+#ifndef BST_APP_EXPORT_H
+#define BST_APP_EXPORT_H
+
+#include <signal.h>
+
+#include "sim/io/run_reader.h"
+
+/* A sensor of the run. */
+typedef struct bst_export_sensor {
+    int64_t index; /* row of the table sensors */
+    char observer[80], name[80];
+    char target[80]; /* "" for none */
+    char file[256];  /* FITS file of its frames; "" when none are kept */
+} bst_export_sensor;
+
+typedef struct bst_export {
+    const bst_run_reader *run;
+    const char *out;    /* folder */
+    const char *sensor; /* NULL: all; "name" or "observer/name" */
+    const volatile sig_atomic_t *stop;
+    /* frames */
+    bool film; /* one mp4, else a PNG per frame */
+    bool annotate, each_stretch;
+    int64_t first, last, every, longest_side; /* longest_side 0: as it is */
+    double frame_rate;
+    /* orbits */
+    bool czml, names_oem; /* names_oem: observations name the orbits' file */
+    double step_s;
+} bst_export;
+
+enum { BST_EXPORT_SENSORS = 64 };
+
+/* The sensors that are asked for. BST_ERR_NOT_FOUND when there is none of that name: the message
+ * lists what there is. A run without readable tables has one sensor, of the file frames.fits. */
+bst_status bst_export_sensors(bst_ctx *ctx, const bst_export *e,
+                              bst_export_sensor sensors[BST_EXPORT_SENSORS],
+                              int *count) BST_MUST_CHECK;
+
+bst_status bst_export_frames(bst_ctx *ctx, const bst_export *e) BST_MUST_CHECK;
+/* `tables` is a list "a,b"; NULL: all. */
+bst_status bst_export_tables(bst_ctx *ctx, const bst_export *e, const char *tables) BST_MUST_CHECK;
+bst_status bst_export_orbits(bst_ctx *ctx, const bst_export *e) BST_MUST_CHECK;
+bst_status bst_export_observations(bst_ctx *ctx, const bst_export *e) BST_MUST_CHECK;
+
+/* BST_ERR_INTERRUPTED when the user asked to stop. */
+static inline bst_status bst_export_check(bst_ctx *ctx, const bst_export *e) {
+    return *e->stop ? bst_fail(ctx, BST_ERR_INTERRUPTED, "interrupted") : BST_OK;
+}
+
+#endif

@@ -1,0 +1,316 @@
+/* True orbits of a run, made again from the run's own scenario.json; and its angles. */
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include <cjson/cJSON.h>
+
+#include "sim/app/export.h"
+#include "sim/app/progress.h"
+#include "sim/app/registry.h"
+#include "sim/io/czml_writer.h"
+#include "sim/io/draft_file.h"
+#include "sim/io/oem_writer.h"
+#include "sim/io/tdm_writer.h"
+#include "sim/world/world.h"
+
+static void creation_date(char text[32]) {
+    time_t now = time(NULL);
+    struct tm utc = {0};
+    gmtime_r(&now, &utc);
+    strftime(text, 32, "%Y-%m-%dT%H:%M:%S", &utc);
+}
+
+/* Simulated seconds that the run holds. */
+static double recorded_s(const bst_run_reader *run, const bst_scenario *scenario) {
+    if (bst_run_reader_state(run) == BST_RUN_COMPLETE) {
+        return scenario->duration_s;
+    }
+    int64_t tick = bst_run_reader_int(run, "SELECT max(end_tick) FROM frames", 0, 0);
+    int64_t control = bst_run_reader_int(run, "SELECT max(tick) FROM control", 0, 0);
+    return (double)(control > tick ? control : tick) / (double)scenario->tick_rate_hz;
+}
+
+/* ------------------------------------------------------------------ orbits */
+
+/* One orbit on a grid of times whose last is the end. */
+typedef struct track {
+    bst_view *view;
+    const bst_world *world;
+    int observer, object; /* one is -1 */
+    double step_s, span_s;
+} track;
+
+static bst_status state_of(const track *t, bst_ctx *ctx, double seconds, bst_state *out) {
+    return t->observer >= 0 ? bst_view_observer_state(ctx, t->view, t->observer, seconds, out)
+                            : bst_view_object_state(ctx, t->view, t->object, seconds, out);
+}
+
+static bst_status row_of(void *user, bst_ctx *ctx, int64_t row, bst_time *time,
+                         bst_vec3 *position_m, bst_vec3 *velocity_mps) {
+    const track *t = user;
+    bst_state state;
+    double seconds = fmin((double)row * t->step_s, t->span_s);
+    BST_TRY(state_of(t, ctx, seconds, &state));
+    *time = bst_world_time(t->world, seconds);
+    *position_m = state.position_m;
+    *velocity_mps = state.velocity_mps;
+    return BST_OK;
+}
+
+static bst_status write_one(bst_ctx *ctx, const bst_export *e, FILE *stream, track *t) {
+    const bst_object_info *info = t->object >= 0 ? bst_world_object(t->world, t->object) : NULL;
+    const char *name = info ? info->name : bst_world_observer_name(t->world, t->observer);
+    bst_state probe;
+    char id[96];
+    /* rows at 0, step, 2 step ... and at the end */
+    bst_state_series series = {
+        .rows = 1 + (int64_t)ceil(t->span_s / t->step_s - 1e-9), .state = row_of, .user = t};
+    if (state_of(t, ctx, 0.0, &probe) != BST_OK || state_of(t, ctx, t->span_s, &probe) != BST_OK) {
+        bst_log(ctx, BST_LOG_WARNING, "%s is left out: %s", name, ctx->message);
+        return BST_OK;
+    }
+    if (e->czml) {
+        snprintf(id, sizeof id, "%s/%s", info ? "object" : "observer", name);
+        bst_czml_object object = {.id = id,
+                                  .name = name,
+                                  .label = true,
+                                  .path_s = INFINITY,
+                                  .rgba = {255, info ? 214 : 120, info ? 79 : 255, 255},
+                                  .series = series};
+        return bst_czml_write_object(ctx, stream, &object);
+    }
+    if (info && info->norad > 0) {
+        snprintf(id, sizeof id, "NORAD-%d", info->norad);
+    } else {
+        snprintf(id, sizeof id, "%s", name);
+    }
+    bst_oem_segment segment = {
+        .object_name = name,
+        .object_id = id,
+        .ref_frame = "GCRF",
+        .comment = info ? "true orbit of an object" : "true orbit of an observer",
+        .series = series};
+    return bst_oem_write_segment(ctx, stream, &segment);
+}
+
+static bst_status write_orbits(bst_ctx *ctx, const bst_export *e, const bst_scenario *scenario,
+                               const bst_world *world, bst_view *view, FILE *stream) {
+    track t = {.view = view, .world = world, .span_s = recorded_s(e->run, scenario)};
+    t.step_s = e->step_s > 0.0 ? e->step_s : fmin(60.0, t.span_s / 20.0);
+    if (!(t.span_s > 0.0)) {
+        return bst_fail(ctx, BST_ERR_NOT_FOUND, "%s: holds no time span to write orbits for",
+                        bst_run_reader_folder(e->run));
+    }
+    if (e->czml) {
+        BST_TRY(bst_czml_write_head(ctx, stream, scenario->name, bst_world_time(world, 0.0),
+                                    bst_world_time(world, t.span_s), 1.0));
+    } else {
+        char created[32];
+        creation_date(created);
+        BST_TRY(bst_oem_write_head(ctx, stream, created, "BORESIGHT",
+                                   "true states of a simulated run"));
+    }
+    int observers = bst_world_observer_count(world), objects = bst_world_object_count(world);
+    bst_progress progress;
+    bst_progress_start(&progress, e->czml ? "orbits.czml" : "orbits.oem", "orbits",
+                       observers + objects);
+    bst_status status = BST_OK;
+    for (int i = 0; i < observers + objects && status == BST_OK; i++) {
+        t.observer = i < observers ? i : -1;
+        t.object = i < observers ? -1 : i - observers;
+        status = bst_export_check(ctx, e);
+        status = status == BST_OK ? write_one(ctx, e, stream, &t) : status;
+        bst_progress_update(&progress, i + 1);
+    }
+    bst_progress_end(&progress);
+    if (status == BST_OK && e->czml) {
+        status = bst_czml_write_tail(ctx, stream);
+    }
+    return status;
+}
+
+static bst_status orbits_of(bst_ctx *ctx, const bst_export *e, const bst_scenario *scenario) {
+    char path[4096];
+    bst_draft draft;
+    bst_world *world = NULL;
+    bst_view *view = NULL;
+    /* orbits need no stars */
+    bst_world_config config = scenario->world;
+    snprintf(config.star_catalogue, sizeof config.star_catalogue, "embedded");
+    int n = snprintf(path, sizeof path, "%s/orbits.%s", e->out, e->czml ? "czml" : "oem");
+    if (n < 0 || (size_t)n >= sizeof path) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", e->out);
+    }
+    BST_TRY(bst_world_create(ctx, scenario->file, &config, &scenario->observers, scenario->base_dir,
+                             scenario->epoch, &world));
+    bst_status status = bst_view_create(ctx, world, &view);
+    if (status == BST_OK) {
+        status = bst_draft_open(ctx, path, &draft);
+    }
+    if (status == BST_OK) {
+        status = write_orbits(ctx, e, scenario, world, view, draft.stream);
+        status = bst_draft_close(ctx, &draft, status);
+    }
+    if (status == BST_OK) {
+        printf("%s: %d orbits\n", path,
+               bst_world_observer_count(world) + bst_world_object_count(world));
+    }
+    bst_view_free(view);
+    bst_world_free(world);
+    return status;
+}
+
+bst_status bst_export_orbits(bst_ctx *ctx, const bst_export *e) {
+    char path[4096];
+    bst_json *json;
+    bst_scenario scenario;
+    BST_TRY(bst_run_reader_file(ctx, e->run, "scenario.json", path, sizeof path));
+    BST_TRY(bst_json_load(ctx, path, &json));
+    bst_status status = bst_scenario_read(ctx, json, bst_app_registry(), &scenario);
+    if (status == BST_OK) {
+        status = orbits_of(ctx, e, &scenario);
+    }
+    bst_scenario_free(&scenario);
+    bst_json_free(json);
+    return status;
+}
+
+/* ------------------------------------------------------------------ observations */
+
+/* The observations of one track, and where the file is. */
+typedef struct angles {
+    const bst_export *e;
+    const bst_export_sensor *sensor;
+    FILE *stream;
+    bst_time epoch;
+    int64_t tick_rate_hz, track_id, written, segments;
+    bool target;
+    double exposure_s;
+    bst_tdm_observation *items;
+    int64_t count, capacity;
+} angles;
+
+static bst_status add_observation(bst_ctx *ctx, angles *a, const bst_rows *rows) {
+    if (a->count == a->capacity) {
+        int64_t capacity = a->capacity ? 2 * a->capacity : 1024;
+        bst_tdm_observation *items = realloc(a->items, (size_t)capacity * sizeof *items);
+        if (!items) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a track's observations");
+        }
+        a->items = items;
+        a->capacity = capacity;
+    }
+    a->items[a->count++] = (bst_tdm_observation){
+        .time = bst_time_at_tick(a->epoch, bst_rows_int(rows, 1), a->tick_rate_hz),
+        .ra_rad = bst_rows_real(rows, 3) * BST_DEG_RAD,
+        .dec_rad = bst_rows_real(rows, 4) * BST_DEG_RAD,
+        .mag = bst_rows_real(rows, 5)};
+    a->target = a->target || bst_rows_int(rows, 2) != 0;
+    return BST_OK;
+}
+
+/* Writes what has been gathered of a track. */
+static bst_status write_track(bst_ctx *ctx, angles *a) {
+    if (a->count == 0) {
+        return BST_OK;
+    }
+    char object[96], comment[300];
+    bool named = a->target && a->sensor->target[0];
+    if (named) {
+        snprintf(object, sizeof object, "%s", a->sensor->target);
+    } else {
+        snprintf(object, sizeof object, "TRACK-%" PRId64, a->track_id);
+    }
+    snprintf(comment, sizeof comment,
+             "sensor %s, track %" PRId64
+             "%s\nstates of the onboard filter at mid exposure, in "
+             "frames with a detection",
+             a->sensor->name, a->track_id,
+             a->target ? ", which the tracker took for its target" : "");
+    bst_tdm_segment segment = {.observer = a->sensor->observer,
+                               .object = object,
+                               .observer_ephemeris = a->e->names_oem ? "orbits.oem" : NULL,
+                               .comment = comment,
+                               .integration_s = a->exposure_s,
+                               .aberration_removed = true,
+                               .light_time_removed = false,
+                               .aberration_yearly_deg = NAN,
+                               .aberration_orbital_deg = NAN,
+                               .observations = a->items,
+                               .count = a->count};
+    BST_TRY(bst_tdm_write_segment(ctx, a->stream, &segment));
+    a->written += a->count;
+    a->segments++;
+    a->count = 0;
+    a->target = false;
+    return BST_OK;
+}
+
+static bst_status write_sensor(bst_ctx *ctx, angles *a) {
+    bst_rows *rows;
+    bool more;
+    BST_TRY(bst_rows_open(ctx, a->e->run, "SELECT exposure_s FROM frames WHERE sensor = ?1 LIMIT 1",
+                          a->sensor->index, 0, &rows));
+    bst_status status = bst_rows_next(ctx, rows, &more);
+    a->exposure_s = status == BST_OK && more ? bst_rows_real(rows, 0) : 0.0;
+    bst_rows_close(rows);
+    BST_TRY(status);
+    BST_TRY(bst_rows_open(ctx, a->e->run,
+                          "SELECT track_id, tick, target_of_interest, ra_deg, dec_deg, v_mag"
+                          " FROM tracks WHERE sensor = ?1 AND misses_in_row = 0"
+                          " AND (status = 'confirmed' OR target_of_interest = 1)"
+                          " ORDER BY track_id, tick",
+                          a->sensor->index, 0, &rows));
+    while ((status = bst_rows_next(ctx, rows, &more)) == BST_OK && more) {
+        int64_t id = bst_rows_int(rows, 0);
+        if (id != a->track_id) {
+            status = write_track(ctx, a);
+            a->track_id = id;
+        }
+        status = status == BST_OK ? add_observation(ctx, a, rows) : status;
+        if (status != BST_OK) {
+            break;
+        }
+    }
+    bst_rows_close(rows);
+    return status == BST_OK ? write_track(ctx, a) : status;
+}
+
+bst_status bst_export_observations(bst_ctx *ctx, const bst_export *e) {
+    bst_export_sensor sensors[BST_EXPORT_SENSORS];
+    int count;
+    char path[4096], created[32];
+    bst_draft draft;
+    angles a = {.e = e,
+                .tick_rate_hz = bst_run_reader_int(e->run, "SELECT tick_rate_hz FROM run", 0, 0)};
+    if (!bst_run_reader_epoch(e->run, &a.epoch) || a.tick_rate_hz < 1) {
+        return bst_fail(ctx, BST_ERR_FORMAT, "%s: does not say when it began",
+                        bst_run_reader_folder(e->run));
+    }
+    BST_TRY(bst_export_sensors(ctx, e, sensors, &count));
+    int n = snprintf(path, sizeof path, "%s/observations.tdm", e->out);
+    if (n < 0 || (size_t)n >= sizeof path) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", e->out);
+    }
+    BST_TRY(bst_draft_open(ctx, path, &draft));
+    a.stream = draft.stream;
+    creation_date(created);
+    bst_status status =
+        bst_tdm_write_head(ctx, draft.stream, created, "BORESIGHT", "angles of a simulated run");
+    for (int i = 0; i < count && status == BST_OK; i++) {
+        a.sensor = &sensors[i];
+        status = write_sensor(ctx, &a);
+    }
+    free(a.items);
+    if (status == BST_OK && a.segments == 0) {
+        status = bst_fail(ctx, BST_ERR_NOT_FOUND, "%s: holds no confirmed track to write",
+                          bst_run_reader_folder(e->run));
+    }
+    BST_TRY(bst_draft_close(ctx, &draft, status));
+    printf("%s: %" PRId64 " observations of %" PRId64 " tracks\n", path, a.written, a.segments);
+    return BST_OK;
+}

@@ -1,0 +1,23 @@
+/* A line on the terminal that tells how far a long command is. */
+#ifndef BST_APP_PROGRESS_H
+#define BST_APP_PROGRESS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+typedef struct bst_progress {
+    const char *what; /* "frames.mp4" */
+    const char *unit; /* "frames" */
+    int64_t total;    /* 0: not known */
+    bool on;          /* the standard error is a terminal */
+    bool shown;
+    double started, newest; /* wall seconds */
+} bst_progress;
+
+/* Nothing is shown for commands shorter than two seconds, nor where no terminal is. */
+void bst_progress_start(bst_progress *progress, const char *what, const char *unit, int64_t total);
+void bst_progress_update(bst_progress *progress, int64_t done);
+/* Removes the line. */
+void bst_progress_end(bst_progress *progress);
+
+#endif

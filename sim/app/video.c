@@ -1,0 +1,151 @@
+#include "sim/app/video.h"
+
+#include <errno.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "sim/world/child.h"
+
+struct bst_video {
+    char path[4096], draft[4128], words[4128];
+    size_t bytes; /* of a frame */
+    bool refused; /* a frame was not taken: whatever is there is not whole */
+    bst_child child;
+};
+
+/* Whether this ffmpeg can encode H.264. */
+static bst_status has_x264(bst_ctx *ctx, bool *out) {
+    const char *const argv[] = {"ffmpeg", "-hide_banner", "-encoders", NULL};
+    bst_child child;
+    char line[512];
+    bst_status status = bst_child_start(ctx, argv, NULL, true, NULL, &child);
+    if (status != BST_OK) {
+        return bst_fail(ctx, status,
+                        "mp4 needs the program ffmpeg, which cannot be run; install it (Debian: "
+                        "apt-get install ffmpeg) or export png");
+    }
+    *out = false;
+    while (fgets(line, sizeof line, child.output)) {
+        *out = *out || strstr(line, " libx264 ");
+    }
+    bst_child_wait(&child);
+    return BST_OK;
+}
+
+bst_status bst_video_begin(bst_ctx *ctx, const char *path, int width, int height, double frame_rate,
+                           bst_video **out) {
+    *out = NULL;
+    bool x264 = false;
+    BST_TRY(has_x264(ctx, &x264));
+    bst_video *v = calloc(1, sizeof *v);
+    if (!v) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a film");
+    }
+    int n = snprintf(v->path, sizeof v->path, "%s", path);
+    if (n < 0 || (size_t)n >= sizeof v->path) {
+        free(v);
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", path);
+    }
+    /* a path is never taken for an option or a protocol */
+    const char *here = path[0] == '/' ? "" : "./";
+    snprintf(v->draft, sizeof v->draft, "%s%s.tmp.%ld", here, v->path, (long)getpid());
+    snprintf(v->words, sizeof v->words, "%s%s.log.%ld", here, v->path, (long)getpid());
+    v->bytes = 3 * (size_t)width * (size_t)height;
+    char size[32], rate[32], output[4160];
+    snprintf(size, sizeof size, "%dx%d", width, height);
+    snprintf(rate, sizeof rate, "%.6g", frame_rate);
+    snprintf(output, sizeof output, "file:%s", v->draft);
+    const char *const argv[] = {"ffmpeg",
+                                "-hide_banner",
+                                "-nostdin",
+                                "-loglevel",
+                                "error",
+                                "-y",
+                                "-f",
+                                "rawvideo",
+                                "-pixel_format",
+                                "bgr24",
+                                "-video_size",
+                                size,
+                                "-framerate",
+                                rate,
+                                "-i",
+                                "pipe:0",
+                                "-an",
+                                "-vf",
+                                "pad=ceil(iw/2)*2:ceil(ih/2)*2",
+                                "-pix_fmt",
+                                "yuv420p",
+                                "-c:v",
+                                x264 ? "libx264" : "mpeg4",
+                                x264 ? "-crf" : "-q:v",
+                                x264 ? "18" : "3",
+                                "-movflags",
+                                "+faststart",
+                                "-f",
+                                "mp4",
+                                output,
+                                NULL};
+    bst_status status = bst_child_start_fed(ctx, argv, v->words, &v->child);
+    if (status != BST_OK) {
+        free(v);
+        return status;
+    }
+    *out = v;
+    return BST_OK;
+}
+
+bst_status bst_video_add(bst_ctx *ctx, bst_video *video, const uint8_t *bgr) {
+    if (fwrite(bgr, 1, video->bytes, video->child.input) != video->bytes) {
+        video->refused = true;
+        return bst_fail(ctx, BST_ERR_IO, "%s: ffmpeg does not take frames any more: %s",
+                        video->path, strerror(errno));
+    }
+    return BST_OK;
+}
+
+/* The first line of what ffmpeg said. */
+static void read_words(const bst_video *video, char *text, size_t bytes) {
+    FILE *file = fopen(video->words, "re");
+    snprintf(text, bytes, "no reason given");
+    if (file) {
+        char line[400];
+        if (fgets(line, sizeof line, file)) {
+            line[strcspn(line, "\r\n")] = '\0';
+            snprintf(text, bytes, "%s", line);
+        }
+        fclose(file);
+    }
+}
+
+bst_status bst_video_end(bst_ctx *ctx, bst_video *video) {
+    bst_status status = BST_OK;
+    char words[400];
+    int code = bst_child_wait(&video->child);
+    if (code != 0 || video->refused) {
+        read_words(video, words, sizeof words);
+        status = bst_fail(ctx, BST_ERR_IO, "%s: ffmpeg failed (exit code %d): %s", video->path,
+                          code, words);
+    } else if (rename(video->draft, video->path) != 0) {
+        status =
+            bst_fail(ctx, BST_ERR_IO, "%s: cannot be written: %s", video->path, strerror(errno));
+    }
+    if (status != BST_OK) {
+        unlink(video->draft);
+    }
+    unlink(video->words);
+    free(video);
+    return status;
+}
+
+void bst_video_abandon(bst_video *video) {
+    if (video) {
+        bst_child_wait(&video->child);
+        unlink(video->draft);
+        unlink(video->words);
+        free(video);
+    }
+}

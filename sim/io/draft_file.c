@@ -1,0 +1,40 @@
+#include "sim/io/draft_file.h"
+
+#include <errno.h>
+#include <string.h>
+#include <unistd.h>
+
+bst_status bst_draft_open(bst_ctx *ctx, const char *path, bst_draft *out) {
+    int n = snprintf(out->path, sizeof out->path, "%s", path);
+    if (n < 0 || (size_t)n >= sizeof out->path) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", path);
+    }
+    snprintf(out->name, sizeof out->name, "%s.tmp.%ld", out->path, (long)getpid());
+    out->stream = fopen(out->name, "wbe");
+    if (!out->stream) {
+        return bst_fail(ctx, BST_ERR_IO, "%s: cannot be made: %s", path, strerror(errno));
+    }
+    return BST_OK;
+}
+
+bst_status bst_draft_close(bst_ctx *ctx, bst_draft *draft, bst_status status) {
+    int error = 0;
+    if (fflush(draft->stream) != 0 || fsync(fileno(draft->stream)) != 0) {
+        error = errno;
+    } else if (ferror(draft->stream)) {
+        error = EIO;
+    }
+    if (fclose(draft->stream) != 0 && !error) {
+        error = errno;
+    }
+    if (status == BST_OK && !error && rename(draft->name, draft->path) != 0) {
+        error = errno;
+    }
+    if (status == BST_OK && !error) {
+        return BST_OK;
+    }
+    unlink(draft->name);
+    return status != BST_OK ? status
+                            : bst_fail(ctx, BST_ERR_IO, "%s: cannot be written: %s", draft->path,
+                                       strerror(error));
+}

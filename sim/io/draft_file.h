@@ -1,0 +1,22 @@
+/* Files that are written row by row and appear whole or not at all. */
+#ifndef BST_IO_DRAFT_FILE_H
+#define BST_IO_DRAFT_FILE_H
+
+#include <stdio.h>
+
+#include "sim/core/status.h"
+
+typedef struct bst_draft {
+    FILE *stream;
+    char path[4096], name[4128]; /* final name; the name while it is written */
+} bst_draft;
+
+/* Opens a temporary file beside `path` for writing. BST_ERR_IO with path and reason. */
+bst_status bst_draft_open(bst_ctx *ctx, const char *path, bst_draft *out) BST_MUST_CHECK;
+
+/* With BST_OK: flushes it to disk and gives it its name, replacing what was there. With another
+ * status, or when that fails: removes it. Closes in every case; returns `status`, or BST_ERR_IO
+ * with path and reason. */
+bst_status bst_draft_close(bst_ctx *ctx, bst_draft *draft, bst_status status) BST_MUST_CHECK;
+
+#endif

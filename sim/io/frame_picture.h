@@ -1,0 +1,40 @@
+/* One frame as a picture: its pixels through a stretch, and what is known of it drawn over. */
+#ifndef BST_IO_FRAME_PICTURE_H
+#define BST_IO_FRAME_PICTURE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "sim/io/picture.h"
+
+typedef enum bst_overlay_kind {
+    BST_OVERLAY_TARGET,    /* true place of the target: red square */
+    BST_OVERLAY_OBJECT,    /* true place of another object: grey square */
+    BST_OVERLAY_STAR,      /* detection that was identified as a star: green circle */
+    BST_OVERLAY_DETECTION, /* any other detection: yellow circle */
+    BST_OVERLAY_TRACK,     /* a track: blue diamond */
+    BST_OVERLAY_BORESIGHT  /* violet cross */
+} bst_overlay_kind;
+
+/* A mark at a place of the frame, in pixels of the frame. */
+typedef struct bst_overlay_mark {
+    bst_overlay_kind kind;
+    double x_px, y_px;
+    double radius_px; /* detections: size of the circle; 0: a default */
+    char label[48];   /* "" for none */
+} bst_overlay_mark;
+
+typedef struct bst_overlay {
+    const bst_overlay_mark *marks;
+    int count;
+    const char *caption; /* one line, upper left; NULL for none */
+} bst_overlay;
+
+/* Makes a picture of width x height that holds a frame of columns x rows pixels as large as it
+ * fits, in the middle, and black around it. `overlay` may be NULL. A frame that has the picture's
+ * size is shown pixel for pixel. The caller frees. */
+bst_status bst_frame_picture(bst_ctx *ctx, const uint16_t *pixels, int columns, int rows,
+                             bst_stretch stretch, const bst_overlay *overlay, int width, int height,
+                             bst_picture **out) BST_MUST_CHECK;
+
+#endif

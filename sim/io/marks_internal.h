@@ -1,0 +1,27 @@
+/* Colours and marks that the pictures of frames share. */
+#ifndef BST_IO_MARKS_INTERNAL_H
+#define BST_IO_MARKS_INTERNAL_H
+
+#include "sim/io/picture.h"
+
+#define BST_WHITE \
+    { 240, 243, 248 }
+#define BST_SOFT \
+    { 150, 160, 176 }
+#define BST_TARGET_COLOUR \
+    { 255, 92, 92 }
+#define BST_TRACK_COLOUR \
+    { 92, 220, 255 }
+#define BST_OBJECT_COLOUR \
+    { 255, 214, 79 }
+#define BST_STAR_COLOUR \
+    { 110, 190, 120 }
+#define BST_CROSS_COLOUR \
+    { 236, 128, 255 }
+
+/* The boresight: four arms from `gap` to `arm` picture pixels off the centre. */
+void bst_mark_cross(bst_picture *picture, double x, double y, double gap, double arm);
+/* A track: a square on its corner, `r` picture pixels from centre to corner. */
+void bst_mark_diamond(bst_picture *picture, double x, double y, double r);
+
+#endif

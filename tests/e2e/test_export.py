@@ -1,0 +1,540 @@
+#!/usr/bin/env python3
+"""boresight export: what it writes, read back by small readers that share no code with it.
+
+Usage, from the repository root: /usr/bin/python3 tests/e2e/test_export.py BORESIGHT
+"""
+import csv
+import datetime
+import hashlib
+import json
+import os
+import shutil
+import signal
+import sqlite3
+import struct
+import subprocess
+import sys
+import unittest
+import zlib
+
+import runs
+
+UTC_COLUMNS = {"mid_s", "time_s", "start_s"}
+
+
+def call(*words, **options):
+    return subprocess.run([runs.BORESIGHT, *words], capture_output=True, text=True, timeout=120,
+                          **options)
+
+
+def export(*words, **options):
+    result = call("export", *words, **options)
+    if (result.returncode, result.stderr) != (0, ""):
+        raise AssertionError(f"exit code {result.returncode}: {result.stderr}")
+    return result.stdout
+
+
+def read_png(path):
+    """Width, height and rows of RGB or grey bytes of a PNG of 8 bits (ISO 15948)."""
+    with open(path, "rb") as file:
+        data = file.read()
+    assert data[:8] == b"\x89PNG\r\n\x1a\n"
+    at, body = 8, b""
+    while at < len(data):
+        size, kind = struct.unpack(">I4s", data[at:at + 8])
+        part = data[at + 8:at + 8 + size]
+        assert zlib.crc32(kind + part) == struct.unpack(">I", data[at + 8 + size:at + 12 + size])[0]
+        if kind == b"IHDR":
+            width, height, depth, colour = struct.unpack(">IIBB", part[:10])
+            assert (depth, colour) in ((8, 2), (8, 0)), (depth, colour)
+        body += part if kind == b"IDAT" else b""
+        at += 12 + size
+    assert kind == b"IEND"
+    return width, height, unfilter(zlib.decompress(body), width, height, 3 if colour == 2 else 1)
+
+
+def unfilter(data, width, height, channels):
+    rows, above = [], bytearray(width * channels)
+    stride = width * channels
+    for y in range(height):
+        how = data[y * (stride + 1)]
+        row = bytearray(data[y * (stride + 1) + 1:(y + 1) * (stride + 1)])
+        for i in range(stride if how else 0):
+            left = row[i - channels] if i >= channels else 0
+            corner = above[i - channels] if i >= channels else 0
+            guess = left + above[i] - corner
+            paeth = min((left, above[i], corner), key=lambda v: abs(guess - v))
+            row[i] = (row[i] + [0, left, above[i], (left + above[i]) // 2, paeth][how]) & 255
+        rows.append(row)
+        above = row
+    return rows
+
+
+def read_boxes(data):
+    """The boxes of an ISO base media file, one after another."""
+    at, out = 0, {}
+    while at < len(data):
+        size, kind = struct.unpack(">I4s", data[at:at + 8])
+        assert 8 <= size <= len(data) - at, (size, kind)
+        out[kind.decode()] = data[at + 8:at + size]
+        at += size
+    return out
+
+
+def read_oem(path):
+    """Segments of an OEM: (metadata, [(utc, [x y z vx vy vz] in km and km/s)])."""
+    segments, meta, inside = [], None, False
+    with open(path, encoding="ascii") as file:
+        lines = file.read().splitlines()
+    assert lines[0] == "CCSDS_OEM_VERS = 2.0"
+    for line in lines[1:]:
+        if line == "META_START":
+            meta, inside = {}, True
+            segments.append((meta, []))
+        elif line == "META_STOP":
+            inside = False
+        elif inside and "=" in line:
+            key, value = line.split("=", 1)
+            meta[key.strip()] = value.strip()
+        elif line and line[0].isdigit():
+            words = line.split()
+            segments[-1][1].append((words[0], [float(w) for w in words[1:]]))
+    return segments
+
+
+def read_tdm(path):
+    """Segments of a TDM: (metadata with its comments, {keyword: [(utc, value)]})."""
+    segments, place = [], None
+    with open(path, encoding="ascii") as file:
+        lines = file.read().splitlines()
+    assert lines[0] == "CCSDS_TDM_VERS = 2.0"
+    for line in lines[1:]:
+        if line in ("META_START", "DATA_START"):
+            place = line
+            if line == "META_START":
+                segments.append(({"COMMENT": []}, {}))
+        elif line in ("META_STOP", "DATA_STOP"):
+            place = None
+        elif place == "META_START" and line.startswith("COMMENT "):
+            segments[-1][0]["COMMENT"].append(line[8:])
+        elif place and "=" in line:
+            key, value = (part.strip() for part in line.split("=", 1))
+            if place == "META_START":
+                segments[-1][0][key] = value
+            else:
+                utc, number = value.split()
+                segments[-1][1].setdefault(key, []).append((utc, float(number)))
+    return segments
+
+
+def seconds(utc, epoch):
+    """Seconds from one UTC text to another; the runs here meet no leap second."""
+    parse = lambda text: datetime.datetime.fromisoformat(text.rstrip("Z")[:26])  # noqa: E731
+    return (parse(utc) - parse(epoch)).total_seconds()
+
+
+class Exported(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = runs.scratch()
+        cls.made = os.path.join(cls.folder, "run")
+        runs.run(runs.TRACK, cls.made, duration=28)
+        cls.database = runs.database(cls.made)
+        cls.epoch = cls.database.execute("SELECT epoch_utc FROM run").fetchone()[0]
+
+    def out(self):
+        return os.path.join(runs.scratch(), "out")
+
+    # -------------------------------------------------------------- tables
+
+    def check_csv(self, database, out, name):
+        columns = [c[1] for c in database.execute(f'PRAGMA table_info("{name}")')]
+        extra = (["utc"] if UTC_COLUMNS & set(columns) else []) + \
+            (["source"] if name == "truth" else [])
+        with open(f"{out}/{name}.csv", newline="", encoding="utf-8") as file:
+            text = file.read()
+        rows = list(csv.reader(text.splitlines(keepends=True), strict=True))
+        self.assertEqual(rows[0], extra + columns, name)
+        self.assertEqual(text.count("\r\n"), len(rows), name)
+        for found, row in zip(rows[1:], database.execute(f'SELECT * FROM "{name}"'), strict=True):
+            for cell, value in zip(found[len(extra):], row, strict=True):
+                if value is None:
+                    self.assertEqual(cell, "")
+                elif isinstance(value, float):
+                    # to the last bit
+                    self.assertEqual(struct.pack("d", float(cell)), struct.pack("d", value))
+                else:
+                    self.assertEqual(type(value)(cell), value)
+            if "utc" in extra:
+                named = dict(zip(columns, row, strict=True))
+                time = next(named[c] for c in ("mid_s", "time_s", "start_s") if c in named)
+                self.assertRegex(found[0], r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{6}Z$")
+                # microseconds are written
+                self.assertAlmostEqual(seconds(found[0], self.epoch), time, delta=1.1e-6)
+        return len(rows) - 1
+
+    def test_tables(self):
+        out = self.out()
+        said = export(self.made, "--table", "csv", "--out", out)
+        names = [row[0] for row in self.database.execute('SELECT "table" FROM tables')]
+        self.assertEqual(sorted(os.listdir(out)), sorted(f"{name}.csv" for name in names))
+        for name in names:
+            self.assertIn(f"{out}/{name}.csv: {self.check_csv(self.database, out, name)} rows\n",
+                          said)
+
+    def test_some_tables_and_hard_text(self):
+        made = os.path.join(runs.scratch(), "run")
+        shutil.copytree(self.made, made)
+        with sqlite3.connect(made + "/run.sqlite") as database:
+            for text in ('a "quoted" word, and more', "two\nlines", "two\r\nlines", "", "ünicode",
+                         None, " blank "):
+                database.execute("INSERT INTO events VALUES (1, 0.1, 'x', 'kind', ?)", (text,))
+            database.execute("INSERT INTO events VALUES (2, 5e-324, '', '1.5', '-0')")
+            database.execute("INSERT INTO events VALUES (9007199254740993, 1e308, 'x', 'y', 'z')")
+        database.row_factory = sqlite3.Row
+        out = self.out()
+        export(made, "--table", "csv", "--tables", "events,run", "--out", out)
+        self.assertEqual(sorted(os.listdir(out)), ["events.csv", "run.csv"])
+        with open(out + "/events.csv", newline="", encoding="utf-8") as file:
+            rows = list(csv.reader(file, strict=True))
+        expected = list(database.execute("SELECT * FROM events"))
+        self.assertEqual([row[3:6] for row in rows[1:]],
+                         [["" if v is None else v for v in tuple(row)[2:5]] for row in expected])
+        self.assertEqual([(int(row[1]), float(row[2])) for row in rows[1:]],
+                         [tuple(row)[:2] for row in expected])
+        # NULL and an empty text differ
+        with open(out + "/events.csv", newline="", encoding="utf-8") as file:
+            lines = file.read()
+        self.assertIn(',kind,""\r\n', lines)
+        self.assertIn(",kind,\r\n", lines)
+
+    def test_time_state_and_identity_columns(self):
+        # what Stone Soup's readers ask of a file: see the user guide
+        out = self.out()
+        export(self.made, "--table", "csv", "--tables", "truth,detections", "--out", out)
+        with open(out + "/truth.csv", newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+        sources = {row["source"] for row in rows}
+        self.assertIn("object-0", sources)
+        self.assertTrue(any(source.startswith("star-") for source in sources))
+        with open(out + "/detections.csv", newline="", encoding="utf-8") as file:
+            for row in csv.DictReader(file):
+                datetime.datetime.fromisoformat(row["utc"].rstrip("Z"))
+                float(row["x_px"]), float(row["y_px"])
+
+    # -------------------------------------------------------------- orbits
+
+    def test_oem_is_the_truth(self):
+        out = self.out()
+        export(self.made, "--orbits", "oem", "--step", "0.25", "--out", out)
+        segments = read_oem(out + "/orbits.oem")
+        self.assertEqual([meta["OBJECT_NAME"] for meta, _ in segments], ["neossat", "INMARSAT GX5"])
+        for meta, rows in segments:
+            self.assertEqual((meta["REF_FRAME"], meta["TIME_SYSTEM"], meta["CENTER_NAME"]),
+                             ("GCRF", "UTC", "EARTH"))
+            self.assertEqual(len(rows), 28 * 4 + 1)
+            self.assertEqual((seconds(rows[0][0], self.epoch), seconds(rows[-1][0], self.epoch)),
+                             (0, 28))
+        states = {round(seconds(utc, self.epoch) * 4): state for utc, state in segments[0][1]}
+        exposures = self.database.execute("SELECT * FROM exposures").fetchall()
+        self.assertEqual(len(exposures), 28)
+        for row in exposures:
+            state = states[round(row["mid_s"] * 4)]
+            for k, axis in enumerate("xyz"):
+                # two ways of one computation; 1e-9 km are written
+                self.assertAlmostEqual(state[k] * 1e3, row[f"observer_gcrf_{axis}_m"], delta=1e-3)
+                self.assertAlmostEqual(state[3 + k] * 1e3, row[f"observer_gcrf_{axis}_mps"],
+                                       delta=1e-6)
+        # the object's range is the truth's: light time moves it by less than 0.1 s of 3 km/s
+        target = {round(seconds(utc, self.epoch) * 4): state for utc, state in segments[1][1]}
+        rows = self.database.execute("SELECT mid_s, range_m FROM truth WHERE kind = 'object'")
+        for mid_s, range_m in rows:
+            a, b = states[round(mid_s * 4)], target[round(mid_s * 4)]
+            apart = sum((a[k] - b[k]) ** 2 for k in range(3)) ** 0.5 * 1e3
+            self.assertAlmostEqual(apart, range_m, delta=600)
+
+    def test_czml(self):
+        out = self.out()
+        export(self.made, "--orbits", "oem", "--step", "7", "--out", out)
+        export(self.made, "--orbits", "czml", "--step", "7", "--out", out)
+        with open(out + "/orbits.czml", encoding="utf-8") as file:
+            packets = json.load(file)
+        self.assertEqual((packets[0]["id"], packets[0]["version"]), ("document", "1.0"))
+        segments = read_oem(out + "/orbits.oem")
+        self.assertEqual([p["name"] for p in packets[1:]], ["neossat", "INMARSAT GX5"])
+        self.assertEqual(len({p["id"] for p in packets}), 3)
+        for packet, (_, rows) in zip(packets[1:], segments, strict=True):
+            position = packet["position"]
+            self.assertEqual(position["referenceFrame"], "INERTIAL")
+            numbers = position["cartesian"]
+            self.assertEqual(len(numbers), 4 * len(rows))
+            for i, (utc, state) in enumerate(rows):
+                time, *place = numbers[4 * i:4 * i + 4]
+                self.assertAlmostEqual(seconds(position["epoch"], self.epoch) + time,
+                                       seconds(utc, self.epoch), delta=1e-6)
+                for k in range(3):
+                    self.assertAlmostEqual(place[k], state[k] * 1e3, delta=1e-4)  # 0.1 mm written
+
+    def test_default_step(self):
+        out = self.out()
+        export(self.made, "--orbits", "oem", "--out", out)
+        self.assertEqual([len(rows) for _, rows in read_oem(out + "/orbits.oem")], [21, 21])
+
+    # -------------------------------------------------------------- observations
+
+    def test_tdm(self):
+        out = self.out()
+        export(self.made, "--observations", "tdm", "--orbits", "oem", "--out", out)
+        rows = self.database.execute(
+            "SELECT time_s, ra_deg, dec_deg, v_mag FROM tracks WHERE misses_in_row = 0 AND"
+            " target_of_interest = 1 ORDER BY tick").fetchall()
+        self.assertGreater(len(rows), 3)
+        segments = [s for s in read_tdm(out + "/observations.tdm")
+                    if s[0]["PARTICIPANT_2"] == "INMARSAT GX5"]
+        self.assertEqual(len(segments), 1)
+        meta, data = segments[0]
+        self.assertEqual((meta["PARTICIPANT_1"], meta["TIME_SYSTEM"], meta["ANGLE_TYPE"],
+                          meta["EPHEMERIS_NAME_1"]), ("neossat", "UTC", "RADEC", "orbits.oem"))
+        words = " ".join(meta["COMMENT"]).lower()
+        self.assertIn("aberration", words)
+        self.assertIn("light time contained", words)
+        for key in ("ANGLE_1", "ANGLE_2", "MAG"):
+            self.assertGreaterEqual(len(data[key]), len(rows))
+        found = {round(seconds(utc, self.epoch) * 1e6): i
+                 for i, (utc, _) in enumerate(data["ANGLE_1"])}
+        for time_s, ra, dec, mag in rows:
+            i = found[round(time_s * 1e6)]
+            # 1e-9 deg and 1e-4 mag are written
+            self.assertAlmostEqual(data["ANGLE_1"][i][1], ra % 360, delta=1e-9)
+            self.assertAlmostEqual(data["ANGLE_2"][i][1], dec, delta=1e-9)
+            self.assertAlmostEqual(data["MAG"][i][1], mag, delta=1e-4)
+        # and they are where the object truly is, as geometric directions with light time: an
+        # aberrated direction would be 25 arcsec off. The track is good to some arcsec.
+        truth = {round(row["mid_s"] * 1e6): row for row in self.database.execute(
+            "SELECT mid_s, ra_deg, dec_deg FROM truth WHERE kind = 'object'")}
+        time_s, ra, dec, _ = rows[-1]
+        row = truth[round(time_s * 1e6)]
+        self.assertAlmostEqual(dec, row["dec_deg"], delta=5 / 3600)
+        self.assertAlmostEqual(ra, row["ra_deg"], delta=5 / 3600)
+
+    # -------------------------------------------------------------- frames
+
+    def test_png(self):
+        out = self.out()
+        export(self.made, "--frames", "png", "--first", "3", "--last", "20", "--every", "8", "--out",
+               out)
+        self.assertEqual(sorted(os.listdir(out + "/frames")),
+                         ["frame_000003.png", "frame_000011.png", "frame_000019.png"])
+        width, height, rows = read_png(out + "/frames/frame_000011.png")
+        self.assertEqual((width, height), (1024, 1024))
+        # the brightest detection that is not cut off is bright in the picture, its row and column
+        # as they are; and the ground is dark
+        star = self.database.execute(
+            "SELECT x_px, y_px FROM detections WHERE exposure_id = 11 AND edge = 0"
+            " ORDER BY flux_e DESC LIMIT 1").fetchone()
+        step = len(rows[0]) // width
+        x, y = round(star[0]), round(star[1])
+        self.assertGreater(max(rows[v][u * step] for v in range(y - 2, y + 3)
+                               for u in range(x - 2, x + 3)), 200)
+        values = sorted(v for row in rows[::16] for v in row[::16 * step])
+        self.assertLess(values[len(values) // 2], 80)
+        # without marks there is no colour
+        if step == 3:
+            self.assertEqual(sum(row[0::3] != row[1::3] for row in rows), 0)
+
+    def test_annotate(self):
+        plain, marked = self.out(), self.out()
+        words = ("--frames", "png", "--first", "27", "--size", "512")
+        export(self.made, *words, "--out", plain)
+        export(self.made, *words, "--annotate", "--out", marked)
+        width, height, a = read_png(plain + "/frames/frame_000027.png")
+        _, _, b = read_png(marked + "/frames/frame_000027.png")
+        self.assertEqual((width, height), (512, 512))
+        pixel = lambda rows, x, y: tuple(rows[y][3 * x:3 * x + 3])  # noqa: E731
+        changed = [(x, y) for y in range(512) for x in range(512) if pixel(a, x, y) != pixel(b, x, y)]
+        self.assertGreater(len(changed), 1000)
+        # the red square around the true place of the target, 11 px away at half the scale
+        x, y = self.database.execute(
+            "SELECT x_mean_px, y_mean_px FROM truth WHERE kind = 'object' AND exposure_id = 27"
+            ).fetchone()
+        x, y = (x + 0.5) / 2 - 0.5, (y + 0.5) / 2 - 0.5
+        red = [(u, v) for u, v in changed if pixel(b, u, v)[0] > 200 and pixel(b, u, v)[1] < 130 and
+               pixel(b, u, v)[2] < 130]
+        near = [p for p in red if abs(p[0] - x) < 13 and abs(p[1] - y) < 13]
+        self.assertGreater(len(near), 20)
+        # its four sides lie even about it
+        self.assertAlmostEqual(min(p[0] for p in near) + max(p[0] for p in near), 2 * x, delta=2)
+        self.assertAlmostEqual(min(p[1] for p in near) + max(p[1] for p in near), 2 * y, delta=2)
+
+    def test_layouts_give_the_same_pictures(self):
+        folder = runs.scratch()
+        schema = json.loads(call("schema").stdout)
+        extensions = "/record/frames=extensions"
+        kinds = {"raw": (extensions,), "cube": ("/record/frames=cube",)}
+        if "compression" in schema["properties"]["record"]["properties"]:
+            kinds["rice"] = (extensions, "/record/compression=rice")
+        pictures = {}
+        for name, sets in kinds.items():
+            made = os.path.join(folder, name)
+            runs.run(runs.STARE, made, *sets, duration=3)
+            out = os.path.join(folder, name + ".out")
+            export(made, "--frames", "png", "--annotate", "--size", "256", "--out", out)
+            pictures[name] = {}
+            for file_name in sorted(os.listdir(out + "/frames")):
+                with open(f"{out}/frames/{file_name}", "rb") as file:
+                    pictures[name][file_name] = hashlib.sha256(file.read()).hexdigest()
+        self.assertEqual(len(pictures["raw"]), 3)
+        for name in kinds:
+            self.assertEqual(pictures[name], pictures["raw"], name)
+
+    FAKE = """#!{python}
+import os, sys
+words = sys.argv[1:]
+if "-encoders" in words:
+    print(" V....D {encoder}              some encoder")
+    sys.exit(0)
+if {broken}:
+    sys.stdin.buffer.read(1000)
+    sys.stderr.write("no room on the moon\\n")
+    sys.exit(1)
+data = sys.stdin.buffer.read()
+assert words[-1].startswith("file:"), words
+with open(words[-1][5:], "wb") as file:
+    file.write(repr((words, len(data), data[:3])).encode())
+"""
+
+    def with_fake(self, out, encoder="libx264", broken=False):
+        """Exports a film with a program in ffmpeg's place."""
+        folder = runs.scratch()
+        path = os.path.join(folder, "ffmpeg")
+        with open(path, "w", encoding="ascii") as file:
+            file.write(self.FAKE.format(python=sys.executable, encoder=encoder, broken=broken))
+        os.chmod(path, 0o755)
+        return call("export", self.made, "--frames", "mp4", "--size", "101", "--fps", "12.5",
+                    "--last", "6", "--out", out, env={**os.environ, "PATH": folder})
+
+    def test_film_is_fed_rightly(self):
+        for encoder, expected in (("libx264", "libx264"), ("libfoo", "mpeg4")):
+            out = self.out()
+            result = self.with_fake(out, encoder)
+            self.assertEqual((result.returncode, result.stderr), (0, ""))
+            self.assertEqual(os.listdir(out), ["frames.mp4"])
+            with open(out + "/frames.mp4", encoding="ascii") as file:
+                words, size, first = eval(file.read())  # what the program above wrote
+            self.assertEqual(size, 7 * 3 * 101 * 101)
+            self.assertEqual(len(set(first)), 1)  # grey
+            after = dict(zip(words, words[1:]))
+            self.assertEqual((after["-video_size"], after["-framerate"], after["-c:v"],
+                              after["-pixel_format"]), ("101x101", "12.5", expected, "bgr24"))
+
+    def test_film_that_fails(self):
+        out = self.out()
+        result = self.with_fake(out, broken=True)
+        self.assertEqual((result.returncode, result.stderr),
+                         (1, f"boresight: {out}/frames.mp4: ffmpeg failed (exit code 1): no room on "
+                             "the moon\n"))
+        self.assertEqual(os.listdir(out), [])
+
+    def test_no_ffmpeg(self):
+        out, empty = self.out(), runs.scratch()
+        result = call("export", self.made, "--frames", "mp4", "--out", out,
+                      env={**os.environ, "PATH": empty})
+        self.assertEqual((result.returncode, result.stderr),
+                         (1, "boresight: mp4 needs the program ffmpeg, which cannot be run; install "
+                             "it (Debian: apt-get install ffmpeg) or export png\n"))
+        self.assertEqual(os.listdir(out), [])
+
+    @unittest.skipUnless(shutil.which("ffmpeg"), "needs ffmpeg")
+    def test_film(self):
+        out = self.out()
+        export(self.made, "--frames", "mp4", "--size", "101", "--last", "6", "--out", out)
+        with open(out + "/frames.mp4", "rb") as file:
+            boxes = read_boxes(file.read())
+        self.assertEqual(list(boxes)[:2], ["ftyp", "moov"])  # plays while it loads
+        self.assertGreater(len(boxes["mdat"]), 1000)
+        moov = boxes["moov"]
+        at = moov.index(b"tkhd") + 4
+        width, height = struct.unpack(">II", moov[at + 76:at + 84])
+        self.assertEqual((width >> 16, height >> 16), (102, 102))  # made even
+        at = moov.index(b"stsz") + 4
+        self.assertEqual(struct.unpack(">I", moov[at + 8:at + 12])[0], 7)  # frames
+
+    # -------------------------------------------------------------- misuse and trouble
+
+    def fails(self, code, message, *words):
+        result = call("export", *words)
+        self.assertEqual((result.returncode, result.stdout), (code, ""))
+        self.assertIn(message, result.stderr)
+
+    def test_misuse(self):
+        self.fails(2, "one folder of a run is expected, 0 were given")
+        self.fails(2, "nothing to export: add --frames, --table, --orbits or --observations",
+                   self.made)
+        self.fails(2, "--frames gif: give one of png|mp4", self.made, "--frames", "gif")
+        self.fails(2, "--every 0: give an integer from 1", self.made, "--every", "0")
+        out = self.out()
+        names = ", ".join(row[0] for row in self.database.execute(
+            'SELECT "table" FROM tables ORDER BY rowid'))
+        self.fails(1, f'{self.made}: has no table "stars"; it has {names}\n', self.made, "--table",
+                   "csv", "--tables", "truth,stars", "--out", out)
+        self.fails(1, f'{self.made}: has no sensor "nose"; it has neossat/telescope\n', self.made,
+                   "--frames", "png", "--sensor", "nose", "--out", out)
+        self.fails(1, f"{self.made}: is the run itself, which is not changed", self.made, "--table",
+                   "csv", "--out", self.made)
+        self.assertEqual(os.listdir(out), [])
+        export(self.made, "--frames", "png", "--sensor", "neossat/telescope", "--last", "0", "--out",
+               out)
+        self.assertEqual(os.listdir(out + "/frames"), ["frame_000000.png"])
+
+    def test_out_that_is_a_file(self):
+        path = os.path.join(runs.scratch(), "file")
+        with open(path, "w", encoding="ascii"):
+            pass
+        self.fails(1, f"boresight: {path}: is not a folder; choose another --out\n", self.made,
+                   "--table", "csv", "--out", path)
+
+    @unittest.skipUnless(os.path.exists("/dev/full"), "needs /dev/full")
+    def test_nothing_half_written(self):
+        # a limit on the size of files stands for a full disk
+        out = self.out()
+        script = 'trap "" XFSZ; ulimit -f 64; exec "$0" "$@"'
+        result = subprocess.run(["sh", "-c", script, runs.BORESIGHT, "export", self.made, "--table",
+                                 "csv", "--tables", "detections", "--out", out],
+                                capture_output=True, text=True, timeout=60)
+        self.assertEqual((result.returncode, result.stderr),
+                         (1, f"boresight: {out}/detections.csv: cannot be written: File too large\n"))
+        self.assertEqual(os.listdir(out), [])
+
+    def test_interrupt(self):
+        out = self.out()
+        process = subprocess.Popen([runs.BORESIGHT, "export", self.made, "--frames", "png",
+                                    "--out", out], stdout=subprocess.DEVNULL,
+                                   stderr=subprocess.PIPE, text=True)
+        while not os.path.isdir(out + "/frames") or not os.listdir(out + "/frames"):
+            if process.poll() is not None:
+                break
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=60)
+        self.assertEqual((process.returncode, errors), (130, "boresight: interrupted\n"))
+        names = os.listdir(out + "/frames")
+        self.assertTrue(names)
+        for name in names:
+            self.assertRegex(name, r"^frame_\d{6}\.png$")
+            self.assertEqual(read_png(os.path.join(out, "frames", name))[:2], (1024, 1024))
+
+    def test_run_stays_as_it_is(self):
+        before = {name: os.stat(os.path.join(self.made, name)).st_mtime_ns
+                  for name in os.listdir(self.made)}
+        export(self.made, "--table", "csv", "--tables", "run", "--orbits", "czml")
+        self.assertEqual(sorted(os.listdir(self.made + ".export")), ["orbits.czml", "run.csv"])
+        after = {name: os.stat(os.path.join(self.made, name)).st_mtime_ns
+                 for name in os.listdir(self.made)}
+        self.assertEqual(after, before)
+
+
+def tearDownModule():
+    runs.clean()
+
+
+if __name__ == "__main__":
+    unittest.main()
