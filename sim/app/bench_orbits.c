@@ -31,8 +31,8 @@ bst_status bst_bench_numerical(bst_ctx *ctx, const bst_bench *self,
     bst_eop *eop = NULL;
     bst_bench_clock clock = {.count = 0};
     bst_vec3 places[STATES], finer[STATES];
-    bst_trajectory_options orbit = {.position_m = {7e6, 0.0, 0.0},
-                                    .velocity_mps = {0.0, -1050.0, 7470.0}};
+    bst_trajectory_options orbit = {.position_m = {0.0, 7e6, 0.0},
+                                    .velocity_mps = {1050.0, 0.0, 7470.0}};
     bst_status status =
         bst_gravity_builtin(ctx, BST_GRAVITY_BUILTIN_DEGREE, BST_GRAVITY_BUILTIN_DEGREE, &field);
     if (status == BST_OK) {
