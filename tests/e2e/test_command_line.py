@@ -108,7 +108,7 @@ class Messages(unittest.TestCase):
         self.bad_scenario(text + "{}", "after")
         self.bad_scenario(text.replace('"duration_s": 300', '"duration_s": 300, "duration_s": 30'),
                           "duration_s.*twice|duplicate")
-        self.bad_scenario(text.replace('"duration_s": 300', '"duration_s": 1e400'), "duration_s: the number is too large")
+        self.bad_scenario(text.replace('"duration_s": 300', '"duration_s": 1e400'), ":7:19: the number is too large")
         self.bad_scenario(text.replace('"duration_s": 300,', ""), "duration_s")
 
     def test_unknown_device(self):
