@@ -9,7 +9,7 @@
 
 #define SKY_DEG2 41252.96 /* the whole sphere */
 
-/* Allen's Astrophysical Quantities (ed. Cox, 4th edition, 2000), as EXOSIMS has it in
+/* Allen's Astrophysical Quantities, as EXOSIMS has its counts in
  * BackgroundSources/stellar_cnts.txt: log10 of the stars per square degree brighter than V. */
 enum { LATITUDES = 7, FIRST_V = 15, MAGNITUDES = 11 };
 static const double latitudes_deg[LATITUDES] = {0, 5, 10, 20, 30, 60, 90};
@@ -156,7 +156,7 @@ static void table_agrees_with_other_counts(void **state) {
         double ratio = mean_on_sky(11.25 + i) * SKY_DEG2 / gaia[i];
         assert_true(ratio > 0.72 && ratio < 1.05);
     }
-    /* Bahcall and Soneira's model of the pole without dust by another program, BSM (Hodder 1994;
+    /* Bahcall and Soneira's model of the pole by another program, BSM (Hodder 1994;
      * github.com/encodis/star-counts, src/bsm/test.bsm): stars brighter than V 15.5, 16.5 ... */
     const double bsm[8] = {159.8, 261.1, 403.9, 621.9, 963.9, 1462, 2118, 2916};
     for (int i = 0; i < 8; i++) {
