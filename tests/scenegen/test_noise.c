@@ -1,10 +1,10 @@
 /* Digital numbers of dark frames against the exact law: Poisson, plus normal, quantised. Argument
- * "slow": ten million draws per case instead of one. */
+ * "slow": a hundred million draws per case instead of ten. */
 #include "tests/scenegen/scene_support.h"
 #include "tests/test_support.h"
 
 enum { SIDE = 1000, OFFSET = 100, TOP = 65536 };
-static int frames_per_case = 1;
+static int frames_per_case = 10;
 static const double means[] = {0.0, 0.1, 1.0, 10.0, 100.0, 1e4, 6e4};
 static const double reads[] = {0.3, 1.0, 5.0};
 /* p = 1e-4: normal deviate, and Kolmogorov's limit sqrt(-ln(p / 2) / 2) */
@@ -150,7 +150,7 @@ static void pixels_and_frames_are_independent(void **state) {
 
 int main(int argc, char **argv) {
     if (argc > 1 && strcmp(argv[1], "slow") == 0) {
-        frames_per_case = 10;
+        frames_per_case = 100;
     }
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(draws_follow_the_exact_law),

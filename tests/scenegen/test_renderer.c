@@ -254,7 +254,7 @@ static void bytes_do_not_depend_on_how_they_are_made(void **state) {
     bst_renderer_free(r);
 
     q.window = (bst_window){0, 0, W, H};
-    const int tiles[][3] = {{32, 4, 16}, {64, 16, 2}, {512, 64, 1}};
+    const int tiles[][3] = {{64, 4, 16}, {64, 16, 2}, {512, 64, 1}};
     for (size_t i = 0; i < 3; i++) {
         bst_renderer_options options = bst_renderer_default_options();
         options.tile_width = tiles[i][0];
