@@ -7,6 +7,7 @@
 
 #include "bst_device_kernels.h"
 #include "bst_scenegen_kernels.h"
+#include "scenegen/detector.h"
 #include "scenegen/frame_pool.h"
 #include "scenegen/reference.h"
 #include "scenegen/smear.h"
@@ -101,15 +102,7 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
     int length = snprintf(options, sizeof options,
                           "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d",
                           r->options.tile_width, r->options.tile_height, r->options.group, r->taps);
-    double read = r->camera.read_noise_e;
-    length += snprintf(options + length, sizeof options - (size_t)length,
-                       " -DCF_ORDER=%d -DSINGLE_FROM=%s",
-                       read >= 5.0   ? 2
-                       : read >= 3.0 ? 3
-                                     : 4,
-                       read >= 2.0    ? "-1.0f"
-                       : read >= 0.75 ? "30.0f"
-                                      : "INFINITY");
+    length += bst_detector_options(&r->camera, options + length, sizeof options - (size_t)length);
     const bst_distortion *d = &r->camera.distortion;
     if (bst_camera_distorted(&r->camera)) {
         double a = bst_camera_scale_rad(&r->camera), a2 = a * a,
@@ -369,7 +362,7 @@ static bst_scene_params make_params(const bst_renderer *r, const bst_render_requ
         .background_e = (float)q->background_e,
         .read_noise_e = (float)c->read_noise_e,
         .full_well_e = (float)c->full_well_e,
-        .near_full_e = (float)(c->full_well_e - 8.0 * sqrt(c->full_well_e) - 20.0),
+        .near_full_e = (float)bst_detector_near_full_e(c->full_well_e),
         .dn_per_e = (float)(1.0 / c->gain_e_per_dn),
         .offset_dn = (float)c->offset_dn,
         .max_dn = (float)((1 << c->bits) - 1),

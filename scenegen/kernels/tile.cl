@@ -18,18 +18,22 @@ static tile_place place_tile(bst_scene_params p, int tile) {
     return t;
 }
 
-/* Digital numbers, plus one half, of 16 pixels to the window's columns; `full` is cleared in lanes
- * outside the window. */
-static void store_dn(bst_scene_params p, float16 dn, int column, global ushort *row, int16 *full) {
+/* 16 digital numbers at once at an odd address: vstore16 may become 16 stores. */
+typedef ushort16 __attribute__((aligned(2))) ushort16_anywhere;
+
+/* Digital numbers, plus one half, of 16 pixels to the window's row at `column`. Returns the pixels
+ * that are saturated (`brim`, or converter at its top) as -1; those outside the window are none. */
+INLINE int16 store_dn(bst_scene_params p, float16 dn, int16 brim, int column, global ushort *row) {
     ushort16 value = convert_ushort16(convert_int16(clamp(dn, 0.0f, p.max_dn)));
+    int16 full = brim | (dn >= p.max_dn);
     if (column >= 0 && column + 16 <= p.window_width) {
-        vstore16(value, 0, row + column);
-        return;
+        *(global ushort16_anywhere *)(row + column) = value;
+        return full;
     }
     ushort values[16];
     int flags[16];
     vstore16(value, 0, values);
-    vstore16(*full, 0, flags);
+    vstore16(full, 0, flags);
     for (int i = 0; i < 16; i++) {
         if (column + i >= 0 && column + i < p.window_width) {
             row[column + i] = values[i];
@@ -37,7 +41,7 @@ static void store_dn(bst_scene_params p, float16 dn, int column, global ushort *
             flags[i] = 0;
         }
     }
-    *full = vload16(0, flags);
+    return vload16(0, flags);
 }
 
 /* frame: [window_height][window_width] digital numbers. saturated: pixels per tile. */
@@ -45,7 +49,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     bst_scene_params p, global const bst_scene_source *sources, global const float *nodes,
     global const float4 *block_box, global const float *source_box, global const float *profiles,
     global ushort *frame, global int *saturated) {
-    local float sums[GROUP][TILE_H * STRIDE];
+    local float sums[GROUP][TILE_H * STRIDE] __attribute__((aligned(64)));
     int tile = (int)get_global_id(0);
     if (tile >= p.tiles_x * p.tiles_y) {
         return;
@@ -53,28 +57,25 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     local float *sum = sums[get_local_id(0)];
     tile_place t = place_tile(p, tile);
     splat_tile(sum, t.x, t.y, p.source_groups, sources, nodes, block_box, source_box, profiles);
-    dark_law dark = dark_law_of(p);
+    uint steps[MOST_STEPS];
+    dark_law dark = dark_law_of(p, steps);
     uint chunks_per_row = (uint)(p.sensor_width + 63) / 64u;
     int16 full_count = (int16)0;
     for (int y = 0; y < t.rows; y++) {
         uint counter = ((uint)(t.y + y) * chunks_per_row + (uint)t.x / 64u) * 16u;
         global ushort *row = frame + (size_t)(t.top + y) * p.window_width;
         for (int x = 0; x < t.columns; x += 64) {
-            chunk light, dn;
-            int16 brim[4], some = (int16)0;
-            for (int i = 0; i < 4; i++) {
-                light.v[i] = vload16(i, sum + y * STRIDE + PAD + x);
-                some |= light.v[i] > 0.0f;
-            }
-            detect_chunk(p, &dark, counter, &light, any16(some), &dn, brim);
-            for (int i = 0; i < 4; i++) {
-                int column = t.left + x + 16 * i;
-                if (column > -16 && column < p.window_width) {
-                    int16 full = brim[i] | (dn.v[i] >= p.max_dn);
-                    store_dn(p, dn.v[i], column, row, &full);
-                    full_count -= full;
-                }
-            }
+            local float16 *from = (local float16 *)(sum + y * STRIDE + PAD + x);
+            chunk light = {from[0], from[1], from[2], from[3]};
+            int lit =
+                any16((light.a > 0.0f) | (light.b > 0.0f) | (light.c > 0.0f) | (light.d > 0.0f));
+            chunk_flags brim;
+            chunk dn = detect_chunk(p, dark, steps, counter, light, lit, &brim);
+            int column = t.left + x;
+            full_count -= store_dn(p, dn.a, brim.a, column, row);
+            full_count -= store_dn(p, dn.b, brim.b, column + 16, row);
+            full_count -= store_dn(p, dn.c, brim.c, column + 32, row);
+            full_count -= store_dn(p, dn.d, brim.d, column + 48, row);
             counter += 16u;
         }
     }
