@@ -153,9 +153,8 @@ static void few_rows_lower_the_degree(void **state) {
     state_at(oem, NULL, utc("2022-06-16T00:00:00Z"), &r, &v);
     assert_vec(r, 7e6, 1e3, 2e3, 1e-8);
     assert_vec(v, 3e3, 4e3, 5e3, 1e-11);
-    bst_ctx ctx = {0};
-    assert_int_equal(bst_oem_state(&ctx, oem, 0, NULL, utc("2022-06-16T00:00:00.1Z"), &r, &v),
-                     BST_ERR_NUMERIC);
+    bst_time later = utc("2022-06-16T00:00:00.1Z");
+    assert_int_equal(bst_oem_state(NULL, oem, 0, NULL, later, &r, &v), BST_ERR_NUMERIC);
     bst_oem_free(oem);
 }
 
