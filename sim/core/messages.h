@@ -232,6 +232,7 @@ typedef struct bst_tracks {
     int64_t tick;
     bst_attitude_fix attitude;
     int64_t target_id; /* track of interest, 0 when none */
+    int32_t at_rest;   /* followed but not told: at rest among the stars, as a star is */
     int32_t count, lost;
     bst_track items[];
 } bst_tracks;

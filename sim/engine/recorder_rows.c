@@ -334,6 +334,7 @@ bst_status bst_recorder_track_rows(bst_ctx *ctx, bst_recorder *recorder, int sen
     put_int(&r, t->target_id);
     put_int(&r, t->count);
     put_int(&r, t->lost);
+    put_int(&r, t->at_rest);
     put_flag(&r, a->valid);
     put_int(&r, a->stars);
     put_quat(&r, a->valid ? a->q_cam_from_gcrf : no_quat);

@@ -166,6 +166,8 @@ static const bst_column track_frame_columns[] = {
     INT("target_id", "", "track of interest, 0 when none"),
     INT("tracks", "", "tracks kept"),
     INT("lost", "", "tracks that found no room"),
+    INT("at_rest", "",
+        "tracks not told: at rest among the stars, as stars that the catalogue lacks are"),
     INT("attitude_valid", "", "1: attitude found from stars"),
     INT("attitude_stars", "", "stars used"),
     QUATERNION("attitude_q_cam_from_gcrf", "attitude from stars"),
