@@ -77,8 +77,11 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
         .first_tick = pool->tick,
         .last_update_tick = mtt->now.tick,
         .last_update_s = mtt->now.seconds,
+        .first_direction = earlier->sky.direction,
+        .first_length_rad = earlier->length_rad,
         .at_rest = gate->rest,
     };
+    bst_mtt_note_place(track, later);
     mtt->rest_count += gate->rest;
     bst_sky_from_pair(&earlier->sky, &later->sky, dt, mtt->params.noise_rad2ps3, &track->state);
     bst_mtt_set_rest(mtt, track, bst_mtt_is_at_rest(mtt, frame, track));

@@ -199,6 +199,7 @@ static void hit(bst_mtt *m, int t) {
     track->last_chi2 = innovation.chi2;
     track->score += log(m->params.detection_probability / m->clutter_density) - log(2.0 * BST_PI) -
                     0.5 * innovation.log_det_s - 0.5 * innovation.chi2;
+    bst_mtt_note_place(track, detection);
     track->last_update_tick = m->now.tick;
     track->last_update_s = m->now.seconds;
     take_brightness(track, detection);

@@ -7,10 +7,11 @@
  * Frames in which a track lies outside the field count neither for nor against it.
  *
  * Stars that no catalogue has are told by their rate. A track is at rest while its rate is
- * compatible with none and it is not what the cue expects: it is not confirmed, and a pair of
- * detections at one place is taken for such a track before any other pairing. Once its rate is
- * known to be less than any object's it is a star: a fixed direction that keeps its detections
- * from everything else. What is at rest has room of its own. */
+ * compatible with none, or it has not yet moved by the length of its own image (blends and streaks
+ * cut short displace a centroid by so much), and it is not what the cue expects: it is not
+ * confirmed, and a pair of detections at one place is taken for such a track before any other
+ * pairing. Once its rate is known to be less than any object's it is a star: a fixed direction that
+ * keeps its detections from everything else. What is at rest has room of its own. */
 #ifndef BST_TRACKER_MULTITARGET_H
 #define BST_TRACKER_MULTITARGET_H
 
@@ -51,6 +52,7 @@ typedef struct bst_mtt_detection {
     double x_px, y_px;
     double v_mag, v_mag_sigma; /* sigma INFINITY: no brightness */
     double snr;
+    double length_rad; /* of its image, FWHM */
 } bst_mtt_detection;
 
 typedef struct bst_mtt_track {
@@ -66,6 +68,9 @@ typedef struct bst_mtt_track {
     double last_chi2; /* of the latest detection; negative when the latest frame brought none */
     int64_t first_tick, last_update_tick;
     double last_update_s;
+    bst_vec3 first_direction; /* of its first detection */
+    double first_length_rad;
+    bool moved;   /* the latest detection lies farther from the first than their images are long */
     bool at_rest; /* shows no motion and is not what the cue expects */
     bool star;    /* and is known to be slower than any object: its rate is zero, its status is not
                      tentative, its life is only ended by max_coast_s */

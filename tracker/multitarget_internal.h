@@ -60,11 +60,14 @@ void bst_mtt_associate(bst_mtt *mtt);
 /* Whether there is room for one more track, at rest or not, with `reserve` places left over. */
 bool bst_mtt_has_room(const bst_mtt *mtt, bool at_rest, int reserve);
 
-/* Is a track's rate compatible with none, and is it not what the cue expects? */
+/* Does a track show no motion, and is it not what the cue expects? */
 bool bst_mtt_is_at_rest(const bst_mtt *mtt, const bst_mtt_frame *frame, const bst_mtt_track *track);
 
 /* Is the rate of a track at rest known to be less than any object's? */
 bool bst_mtt_is_star(const bst_mtt *mtt, const bst_mtt_frame *frame, const bst_mtt_track *track);
+
+/* Notes whether a track's newest detection shows it to have moved. */
+void bst_mtt_note_place(bst_mtt_track *track, const bst_mtt_detection *detection);
 
 /* Moves a track to what is at rest or from there, if there is room for it. */
 void bst_mtt_set_rest(bst_mtt *mtt, bst_mtt_track *track, bool at_rest);

@@ -29,7 +29,7 @@ bool bst_mtt_is_at_rest(const bst_mtt *m, const bst_mtt_frame *frame, const bst_
            c = s->covariance[3][3] + seeming;
     double r1 = bst_vec3_dot(s->rate_radps, axes.e1), r2 = bst_vec3_dot(s->rate_radps, axes.e2);
     double chi2 = (c * r1 * r1 - 2.0 * b * r1 * r2 + a * r2 * r2) / (a * c - b * b);
-    return chi2 <= m->params.motion_chi2 &&
+    return (chi2 <= m->params.motion_chi2 || !track->moved) &&
            !(frame->expected && frame->expected(frame->user, track));
 }
 
@@ -38,6 +38,11 @@ bool bst_mtt_is_star(const bst_mtt *m, const bst_mtt_frame *frame, const bst_mtt
     double variance = fmax(s->covariance[2][2], s->covariance[3][3]) + seeming_variance(m, frame);
     return track->hits >= m->params.confirm_hits &&
            bst_vec3_norm(s->rate_radps) + RATE_SIGMAS * sqrt(variance) < m->params.star_rate_radps;
+}
+
+void bst_mtt_note_place(bst_mtt_track *track, const bst_mtt_detection *detection) {
+    track->moved = bst_vec3_norm(bst_vec3_sub(detection->sky.direction, track->first_direction)) >
+                   fmax(detection->length_rad, track->first_length_rad);
 }
 
 void bst_mtt_set_rest(bst_mtt *m, bst_mtt_track *track, bool at_rest) {

@@ -303,6 +303,7 @@ static bst_sky_measurement to_sky(const bst_tracker *t, const bst_detection *ite
 
 static int collect_objects(bst_tracker *t, const bst_detections *d, const frame_attitude *attitude,
                            const bst_light *light, int *lost) {
+    double scale = bst_camera_scale_rad(&t->camera);
     int count = 0;
     *lost = 0;
     for (int i = 0; i < d->count; i++) {
@@ -326,7 +327,8 @@ static int collect_objects(bst_tracker *t, const bst_detections *d, const frame_
                                                      .y_px = item->y_px,
                                                      .v_mag = bright ? item->v_mag : 0.0,
                                                      .v_mag_sigma = bright ? sigma : INFINITY,
-                                                     .snr = item->snr};
+                                                     .snr = item->snr,
+                                                     .length_rad = scale * item->length_px};
     }
     return count;
 }
@@ -395,6 +397,7 @@ static void write_track(const bst_mtt_track *track, int64_t target_id, bst_track
                        .rate_gcrf_radps = track->state.rate_radps,
                        .v_mag = track->v_mag,
                        .snr = track->snr,
+                       .score = track->score,
                        .hits = track->hits,
                        .misses_in_row = track->misses_in_row,
                        .first_tick = track->first_tick,

@@ -311,6 +311,7 @@ static bst_status track_row(bst_ctx *ctx, bst_recorder *recorder, int sensor, co
     put_real(&r, k->covariance[3][3]);
     put_real(&r, k->v_mag);
     put_real(&r, k->snr);
+    put_real(&r, k->score);
     put_int(&r, k->hits);
     put_int(&r, k->misses_in_row);
     put_int(&r, k->first_tick);

@@ -203,6 +203,7 @@ static const bst_column track_columns[] = {
     REAL("cov_r2_r2_rad2ps2", "rad^2/s^2", "covariance"),
     REAL("v_mag", "mag", "brightness"),
     REAL("snr", "", "of the latest detection"),
+    REAL("score", "", "log-likelihood ratio of an object against chance pairings"),
     INT("hits", "", "detections so far"),
     INT("misses_in_row", "", "frames without a detection"),
     INT("first_tick", "tick", "first detection"),

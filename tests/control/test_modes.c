@@ -85,7 +85,7 @@ static void put_track(rig *r, int64_t id, int hits, double off_px, double rate_o
     bst_cue cue;
     bst_assert_ok(&r->ctx, cue_at(&(bool){true}, &r->ctx, (double)mid_tick / TICKS, &cue));
     bst_track *t = &r->tracks->items[r->tracks->count++];
-    *t = (bst_track){.id = id, .hits = hits};
+    *t = (bst_track){.id = id, .hits = hits, .score = 20.0};
     t->direction_gcrf =
         bst_vec3_unit(bst_vec3_axpy(cue.direction_gcrf, off_px * PX, (bst_vec3){0, 0, 1}));
     t->rate_gcrf_radps =
