@@ -127,6 +127,13 @@ static bool cue_acceleration(const bst_mtt_frame *frame, double dt_s, bst_vec3 *
     return true;
 }
 
+/* What the observer's motion adds to a rate falls with the range, as the rate itself does: what is
+ * at rest, or nearly so beside the cue, is too far away to share the cue's acceleration. */
+static bool shares_acceleration(const bst_mtt_track *track, const bst_mtt_frame *frame) {
+    return !track->at_rest &&
+           bst_vec3_norm(track->state.rate_radps) > 0.1 * bst_vec3_norm(frame->cue_rate_radps);
+}
+
 static void predict(bst_mtt *m, const bst_mtt_frame *frame) {
     double dt = frame->seconds - m->seconds;
     bst_vec3 step = {0}, rate = {0};
@@ -140,9 +147,8 @@ static void predict(bst_mtt *m, const bst_mtt_frame *frame) {
             continue;
         }
         bst_sky_predict(state, dt, m->params.noise_rad2ps3);
-        /* what is at rest is too far away to share the acceleration of the cue */
-        if (forward && !m->tracks[t].at_rest &&
-            bst_vec3_dot(state->direction, frame->cue_direction) > near) {
+        if (forward && bst_vec3_dot(state->direction, frame->cue_direction) > near &&
+            shares_acceleration(&m->tracks[t], frame)) {
             bst_sky_shift(state, bst_tangent_carry(frame->cue_direction, state->direction, step),
                           bst_tangent_carry(frame->cue_direction, state->direction, rate));
         }
