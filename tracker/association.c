@@ -210,8 +210,8 @@ static int free_between(const bst_mtt *mtt, const bst_mtt_track *a, const bst_mt
     return best;
 }
 
-/* A missed confirmed track beside another one or a star may have melted into one detection with it:
- * both then take that detection, widened along the line between them. */
+/* A missed confirmed track beside another one, or beside a star that is seen, may have melted into
+ * one detection with it: both then take that detection, widened along the line between them. */
 static void share(bst_mtt *mtt) {
     double near2 = mtt->params.merge_rad * mtt->params.merge_rad;
     for (int t = 0; t < mtt->track_count; t++) {
@@ -223,7 +223,8 @@ static void share(bst_mtt *mtt) {
         int partner = -1;
         double nearest2 = near2;
         for (int u = 0; u < mtt->track_count; u++) {
-            if (u == t || mtt->tracks[u].status == BST_TRACK_TENTATIVE) {
+            if (u == t || mtt->tracks[u].status == BST_TRACK_TENTATIVE ||
+                (mtt->tracks[u].star && mtt->detection_of_track[u] < 0)) {
                 continue;
             }
             bst_vec3 apart = bst_vec3_sub(mtt->tracks[u].state.direction, missed->state.direction);

@@ -113,9 +113,12 @@ static void from_idle_to_track_and_back(void **state) {
     step(&r, t = 3500, true);
     assert_int_equal(r.status.search_step, 1);
 
-    /* a tentative track that stands still among the stars is no candidate, nor is a single hit */
+    /* a tentative track that stands still among the stars is no candidate, nor is a single hit, nor
+     * two that chance may have brought together */
     put_track(&r, 1, 5, 900.0, -50.0, 4100);
     put_track(&r, 2, 1, 900.0, 0.0, 4100);
+    put_track(&r, 3, 2, 900.0, 0.0, 4100);
+    r.tracks->items[2].score = 5.0;
     step(&r, t = 4500, true);
     assert_int_equal(r.status.mode, BST_MODE_SEARCH);
     r.tracks->count = 0;
