@@ -117,7 +117,7 @@ static void exact_messages(void **state) {
     refuse("/duration=60", "/duration: unknown key; did you mean \"duration_s\"?");
     refuse(
         "/zzz=60",
-        "/zzz: unknown key (allowed: boresight, name, epoch_utc, duration_s, tick_rate_hz, seed, "
+        "/zzz: unknown key (allowed: boresight, extends, set, name, epoch_utc, duration_s, tick_rate_hz, seed, "
         "run, world, observers, record)");
     refuse("/duration_s=NaN",
            "/duration_s: wrong type (found \"NaN\"; allowed: a number from 0 to 1000000000 s)");
