@@ -17,7 +17,8 @@ try:
 except ImportError:
     jsonschema = None
 
-SCENARIOS = sorted(set(glob.glob("scenarios/*.json")) - {"scenarios/boresight.schema.json"})
+SCENARIOS = sorted(set(glob.glob("scenarios/**/*.json", recursive=True)) -
+                   {"scenarios/boresight.schema.json"})
 GIMBAL = runs.SENSOR + "/modules/gimbal"
 
 
@@ -241,7 +242,9 @@ class Schema(unittest.TestCase):
     def test_scenarios_name_the_schema(self):
         for path in SCENARIOS:
             with open(path, encoding="utf-8") as file:
-                self.assertEqual(json.load(file)["$schema"], "boresight.schema.json", path)
+                schema = json.load(file)["$schema"]
+            self.assertEqual(os.path.normpath(os.path.join(os.path.dirname(path), schema)),
+                             "scenarios/boresight.schema.json", path)
 
 
 def tearDownModule():
