@@ -9,7 +9,7 @@
 
 static scratch place;
 
-/* Writes a file below the folder; returns its path, valid until the next call but one. */
+/* Writes a file below the folder; returns its path, valid until the next call. */
 static const char *put(const char *name, const char *text) {
     const char *path = scratch_path(&place, name);
     FILE *file = fopen(path, "w");
