@@ -7,6 +7,7 @@
 
 #include "sim/core/config.h"
 #include "sim/core/vec.h"
+#include "sim/world/detector_config.h"
 
 /* Lens distortion in the focal plane's tangent coordinates u = (x, y), r^2 = x^2 + y^2, in units of
  * the focal length (Brown 1971, Photogrammetric Engineering 37, 855; the sign and order of the
@@ -47,6 +48,7 @@ typedef struct bst_camera {
     double rotation_deg; /* of the focal plane about the boresight, from camera +x towards +y */
     double boresight_offset_px[2]; /* place of the boresight, from the sensor's centre */
     bst_distortion distortion;
+    bst_detector_config detector;
     bst_camera_geometry
         geometry; /* by bst_camera_prepare; all zero: neither turned nor distorted */
 } bst_camera;
@@ -152,5 +154,7 @@ double bst_camera_v_mag(const bst_camera *c, double electrons_per_s);
  * over the sensor, whatever solid angle gnomonic projection and distortion give a pixel there, as
  * after a flat field. */
 double bst_camera_background_e_per_s(const bst_camera *c);
+/* Mean dark current at the detector's temperature, e-/s, without hot pixels and maps. */
+double bst_camera_dark_e_per_s(const bst_camera *c);
 
 #endif
