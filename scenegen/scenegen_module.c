@@ -191,6 +191,10 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
                                        .binning = e->binning > 1 ? e->binning : 1,
                                        .bits = (int)s->camera->bits};
     }
+    bst_render_stats stats;
+    bst_renderer_get_stats(s->renderer, &stats);
+    truth->hits = stats.hits;
+    truth->hits_e = stats.hits_e;
     /* while the device renders */
     BST_TRY(write_items(ctx, s, &track, sources, count, e, truth, capacity));
     if (truth->lost > 0) {

@@ -87,7 +87,7 @@ static void frames_hold_the_hits_of_their_exposure(void **state) {
     bst_assert_ok(&ctx, bst_device_open(&ctx, "", 0, &device));
     bst_camera camera = scene_camera(W, H);
     camera.detector.hits = example;
-    camera.detector.hits.rate_per_cm2_s = 200.0;
+    camera.detector.hits.rate_per_cm2_s = 2000.0;
     bst_renderer *r;
     bst_assert_ok(&ctx, bst_renderer_create(&ctx, device, &camera, NULL, &r));
     double time_s[2] = {0.0, 1.0};
