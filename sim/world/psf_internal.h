@@ -6,7 +6,7 @@
 
 /* A real, circular OTF: values at f = limit (i / (BST_RADIAL_NODES - 1))^2, which follow a power of
  * the frequency at 0, as that of every PSF with wings has it. */
-enum { BST_RADIAL_NODES = 8192 };
+enum { BST_RADIAL_NODES = 16384 };
 typedef struct bst_radial_otf {
     double limit;  /* cycles/px; 0 beyond */
     double *value; /* [BST_RADIAL_NODES] */
