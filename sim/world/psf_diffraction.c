@@ -253,6 +253,13 @@ bst_status bst_psf_make_diffraction(bst_ctx *ctx, const bst_camera *camera,
         }
     }
     psf->cutoff = 1.0 / b.q_least;
+    /* far out the mean over a circle of radius r is Q / (pi^3 r^3 (1 - e)), from the length of the
+     * aperture's rims; the peak is pi / 4 (1 - e^2) / Q^2 */
+    double e = pupil.inner, q_most = 0.0;
+    for (int k = 0; k < b.count; k++) {
+        q_most = fmax(q_most, b.q[k]);
+    }
+    psf->reach_px = q_most * cbrt(4e9 / (pow(BST_PI, 4.0) * (1.0 - e) * (1.0 - e) * (1.0 + e)));
     BST_TRY(bst_radial_create(ctx, psf->cutoff, &psf->shared));
     for (int i = 0; i < BST_RADIAL_NODES; i++) {
         double f = bst_radial_frequency(psf->cutoff, i), sum = 0.0;

@@ -56,7 +56,7 @@ struct bst_psf {
     int columns, rows;
     double width_px, height_px;
     double diffusion_px, fill[2];
-    double cutoff;
+    double cutoff, reach_px;
     bst_radial_otf shared; /* diffraction: unaberrated annulus, the same at all nodes */
     bst_psf_node *nodes;   /* [rows][columns] */
 };
