@@ -14,14 +14,23 @@
  * sampling at pixel centres folds them. */
 enum { SPREAD = 16 };
 
-/* Gauss-Legendre on 8 points in [0, 1] (Abramowitz and Stegun, table 25.4). */
-enum { RULE = 8 };
-static const double rule_place[RULE] = {
-    0.019855071751231884, 0.10166676129318664, 0.2372337950418355, 0.4082826787521751,
-    0.5917173212478249,   0.7627662049581645,  0.8983332387068134, 0.9801449282487681};
-static const double rule_weight[RULE] = {
-    0.05061426814518813, 0.11119051722668724, 0.15685332293894363, 0.18134189168918100,
-    0.18134189168918100, 0.15685332293894363, 0.11119051722668724, 0.05061426814518813};
+/* Gauss-Legendre on [0, 1] (Abramowitz and Stegun, table 25.4): few points for the short stretches
+ * of a finely sampled track, more for the parts of one that is not. */
+enum { POINTS = 8 };
+typedef struct time_rule {
+    int count;
+    double place[POINTS], weight[POINTS];
+} time_rule;
+static const time_rule rules[2] = {
+    {4,
+     {0.06943184420297371, 0.33000947820757187, 0.66999052179242813, 0.93056815579702629},
+     {0.17392742256872693, 0.32607257743127307, 0.32607257743127307, 0.17392742256872693}},
+    {8,
+     {0.019855071751231884, 0.10166676129318664, 0.2372337950418355, 0.4082826787521751,
+      0.5917173212478249, 0.7627662049581645, 0.8983332387068134, 0.9801449282487681},
+     {0.05061426814518813, 0.11119051722668724, 0.15685332293894363, 0.18134189168918100,
+      0.18134189168918100, 0.15685332293894363, 0.11119051722668724, 0.05061426814518813}},
+};
 
 /* Directions of the frequencies at which the rule in time is tried. */
 enum { TRIALS = 6 };
@@ -70,13 +79,13 @@ static double bump(double beta, double z) {
 /* Transform of the bump at frequency index k: the substitution z = sin t makes the rule of
  * equidistant points converge geometrically. */
 static double bump_transform(const spectrum *s, int k) {
-    enum { POINTS = 400 };
+    enum { STEPS = 400 };
     double sum = 0.0, turn = BST_PI * SPREAD * k / s->fine;
-    for (int i = 0; i < POINTS; i++) {
-        double t = BST_PI * ((i + 0.5) / POINTS - 0.5), z = sin(t);
+    for (int i = 0; i < STEPS; i++) {
+        double t = BST_PI * ((i + 0.5) / STEPS - 0.5), z = sin(t);
         sum += cos(t) * exp(s->beta * (cos(t) - 1.0)) * cos(turn * z);
     }
-    return sum * BST_PI / POINTS * 0.5 * SPREAD;
+    return sum * BST_PI / STEPS * 0.5 * SPREAD;
 }
 
 static void spectrum_free(spectrum *s) {
@@ -159,78 +168,80 @@ static void spread_point(spectrum *s, const instant *p, double light) {
     }
 }
 
-static void place_rule(const spectrum *s, const bst_source *source, int k, double u0, double u1,
-                       instant p[RULE]) {
-    for (int i = 0; i < RULE; i++) {
-        double u = u0 + rule_place[i] * (u1 - u0);
+static void place_rule(const spectrum *s, const time_rule *rule, const bst_source *source, int k,
+                       double u0, double u1, instant p[POINTS]) {
+    for (int i = 0; i < rule->count; i++) {
+        double u = u0 + rule->place[i] * (u1 - u0);
         p[i] = (instant){0};
         p[i].there =
             bst_reference_place(s->camera, s->track, source, k, u, &p[i].x, &p[i].y, &p[i].light);
-        p[i].light *= rule_weight[i] * (u1 - u0);
+        p[i].light *= rule->weight[i] * (u1 - u0);
     }
 }
 
-/* Whether all of these lie beyond the same side of the margin, or behind the camera. */
-static bool far_away(const spectrum *s, const instant *p, int count, unsigned *sides) {
+/* Which sides of the margin (bits) all of these lie beyond; those behind the camera on any. */
+static unsigned sides_of(const spectrum *s, const instant *p, int count) {
     const bst_window *w = &s->window;
+    unsigned sides = 15U;
     for (int i = 0; i < count; i++) {
         if (p[i].there) {
-            *sides &= (p[i].x < w->x0 - s->margin ? 1U : 0U) |
-                      (p[i].x > w->x0 + w->width + s->margin ? 2U : 0U) |
-                      (p[i].y < w->y0 - s->margin ? 4U : 0U) |
-                      (p[i].y > w->y0 + w->height + s->margin ? 8U : 0U);
+            sides &= (p[i].x < w->x0 - s->margin ? 1U : 0U) |
+                     (p[i].x > w->x0 + w->width + s->margin ? 2U : 0U) |
+                     (p[i].y < w->y0 - s->margin ? 4U : 0U) |
+                     (p[i].y > w->y0 + w->height + s->margin ? 8U : 0U);
         }
     }
-    return *sides != 0;
+    return sides;
 }
 
 /* Adds the rule's sum at trial frequency `trial`. */
-static void try_rule(const spectrum *s, const instant p[RULE], int trial, double sign,
+static void try_rule(const spectrum *s, const instant *p, int count, int trial, double sign,
                      double sum[2]) {
     double angle = BST_PI * trial / TRIALS, c = s->cutoff * cos(angle), d = s->cutoff * sin(angle);
-    for (int i = 0; i < RULE; i++) {
+    for (int i = 0; i < count; i++) {
         double turn = 2.0 * BST_PI * (c * p[i].x + d * p[i].y);
         sum[0] += sign * p[i].light * cos(turn);
         sum[1] += sign * p[i].light * sin(turn);
     }
 }
 
-/* Adds the part [u0, u1] of a stretch; `whole` are its points. It is halved until two halves change
- * nothing. */
+/* Adds the part [u0, u1] of a stretch. It is halved until two halves change nothing. */
 static bst_status add_part(bst_ctx *ctx, spectrum *s, const bst_source *source, int k, double u0,
-                           double u1, const instant whole[RULE], double light, int depth) {
-    instant half[2][RULE];
+                           double u1, double light, int depth) {
+    const time_rule *rule = &rules[depth > 0];
+    instant whole[POINTS] = {{0}}, half[2][POINTS] = {{{0}}};
     double middle = 0.5 * (u0 + u1), all = 0.0, worst = 0.0;
-    place_rule(s, source, k, u0, middle, half[0]);
-    place_rule(s, source, k, middle, u1, half[1]);
-    unsigned sides = 15U;
-    if (far_away(s, whole, RULE, &sides) && far_away(s, half[0], 2 * RULE, &sides)) {
+    int n = rule->count;
+    place_rule(s, rule, source, k, u0, u1, whole);
+    place_rule(s, rule, source, k, u0, middle, half[0]);
+    place_rule(s, rule, source, k, middle, u1, half[1]);
+    if (sides_of(s, whole, n) & sides_of(s, half[0], n) & sides_of(s, half[1], n)) {
         return BST_OK;
     }
-    for (int i = 0; i < RULE; i++) {
+    for (int i = 0; i < n; i++) {
         all += whole[i].light;
     }
     for (int trial = 0; trial < TRIALS; trial++) {
         double sum[2] = {0.0, 0.0};
-        try_rule(s, whole, trial, 1.0, sum);
-        try_rule(s, half[0], trial, -1.0, sum);
-        try_rule(s, half[1], trial, -1.0, sum);
+        try_rule(s, whole, n, trial, 1.0, sum);
+        try_rule(s, half[0], n, trial, -1.0, sum);
+        try_rule(s, half[1], n, trial, -1.0, sum);
         worst = fmax(worst, hypot(sum[0], sum[1]));
     }
     /* places come from unit vectors and are no better than their rounding */
     double rounding = 32.0 * 2.2e-16 * BST_PI * s->cutoff / bst_camera_scale_rad(s->camera);
     if (worst <= fmax(s->tolerance, rounding) * all) {
-        for (int i = 0; i < 2 * RULE; i++) {
-            const instant *p = &half[i / RULE][i % RULE];
-            spread_point(s, p, light * p->light);
+        for (int i = 0; i < n; i++) {
+            spread_point(s, &half[0][i], light * half[0][i].light);
+            spread_point(s, &half[1][i], light * half[1][i].light);
         }
         return BST_OK;
     }
     if (depth >= DEEPEST) {
         return bst_fail(ctx, BST_ERR_NUMERIC, "the reference image of a source does not settle");
     }
-    BST_TRY(add_part(ctx, s, source, k, u0, middle, half[0], light, depth + 1));
-    return add_part(ctx, s, source, k, middle, u1, half[1], light, depth + 1);
+    BST_TRY(add_part(ctx, s, source, k, u0, middle, light, depth + 1));
+    return add_part(ctx, s, source, k, middle, u1, light, depth + 1);
 }
 
 static bst_status add_sources(bst_ctx *ctx, spectrum *s, const bst_source *sources, int count) {
@@ -239,9 +250,7 @@ static bst_status add_sources(bst_ctx *ctx, spectrum *s, const bst_source *sourc
         for (int k = 0; k + 1 < t->count; k++) {
             double light = sources[i].electrons_per_s * (t->time_s[k + 1] - t->time_s[k]);
             if (!sources[i].occulted && light > 0.0) {
-                instant whole[RULE];
-                place_rule(s, &sources[i], k, 0.0, 1.0, whole);
-                BST_TRY(add_part(ctx, s, &sources[i], k, 0.0, 1.0, whole, light, 0));
+                BST_TRY(add_part(ctx, s, &sources[i], k, 0.0, 1.0, light, 0));
             }
         }
     }
