@@ -78,7 +78,7 @@ static bst_status start(bst_ctx *ctx, bst_fits *fits, int width, int height) {
     bst_fits_memory_open(&fits->memory, false, &code);
     fitsfile *file = fits->memory.file;
     fits_create_img(file, USHORT_IMG, 3, size, &code);
-    bst_fits_put_sums(file, &code);
+    bst_fits_put_sums(fits, file, &code);
     bst_fits_put_run_keys(file, &fits->names, &code);
     fits_write_comment(
         file, "Third axis: frames. Row k of the table FRAMES has plane k's time and WCS.", &code);
@@ -88,7 +88,7 @@ static bst_status start(bst_ctx *ctx, bst_fits *fits, int width, int height) {
     if (status == BST_OK && memcmp(hdu + NAXIS3_OFFSET, "NAXIS3  =", 9) != 0) {
         status = bst_fail(ctx, BST_ERR_FORMAT, "%s: NAXIS3 is not where it belongs", fits->path);
     }
-    if (status == BST_OK && !blank_sums(cube, hdu)) {
+    if (status == BST_OK && fits->checksums && !blank_sums(cube, hdu)) {
         status = bst_fail(ctx, BST_ERR_FORMAT, "%s: no place for CHECKSUM", fits->path);
     }
     if (status == BST_OK) {
@@ -132,7 +132,9 @@ bst_status bst_fits_cube_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_fram
     bst_status status = ok ? BST_OK : bst_fits_fail_errno(ctx, fits, "cannot be written");
     if (ok) {
         cube->planes++;
-        bst_fits_sum_pixels(&cube->sum, pixels, count);
+        if (fits->checksums) {
+            bst_fits_sum_pixels(&cube->sum, pixels, count);
+        }
         fits->end = after + fill;
     }
     if (fits->file >= 0 && !bst_fits_close_tail(fits) && ok) {
@@ -167,7 +169,6 @@ static void make_table(fitsfile *file, LONGLONG rows, int *code) {
     fits_write_key_str(file, "CTYPE2", "DEC--TAN", "projection of the WCS in each row", code);
     fits_write_key_str(file, "ABERRAT", "absorbed", "stellar aberration is in the WCS", code);
     bst_fits_put_statements(file, code);
-    bst_fits_put_sums(file, code);
 }
 
 static void put_row(fitsfile *file, LONGLONG row, const bst_fits_frame *f, int *code) {
@@ -243,15 +244,15 @@ bst_status bst_fits_cube_finish(bst_ctx *ctx, bst_fits *fits) {
             }
         }
     }
+    bst_fits_put_sums(fits, fits->memory.file, &code);
     bst_fits_memory_hdu(&fits->memory, &hdu, &bytes, &code);
     if (status == BST_OK) {
         status = bst_fits_check(ctx, fits, code, "cannot be completed");
     }
-    if (status == BST_OK && !bst_fits_sign(hdu, (size_t)bytes, (bst_fits_sum){0})) {
-        status = bst_fail(ctx, BST_ERR_FORMAT, "%s: no place for CHECKSUM", fits->path);
-    }
-    if (status == BST_OK) {
-        status = sign(ctx, fits);
+    if (status == BST_OK && fits->checksums) {
+        status = bst_fits_sign(hdu, (size_t)bytes, (bst_fits_sum){0})
+                     ? sign(ctx, fits)
+                     : bst_fail(ctx, BST_ERR_FORMAT, "%s: no place for CHECKSUM", fits->path);
     }
     if (status == BST_OK) {
         status = bst_fits_append_hdu(ctx, fits, hdu, bytes);

@@ -33,6 +33,9 @@ static void copy_name(char to[BST_FITS_NAME_BYTES], const char *from) {
 static bst_status sign(bst_ctx *ctx, const bst_fits *fits, char *hdu, long long bytes,
                        const uint16_t *pixels, size_t count) {
     bst_fits_sum sum = {0};
+    if (!fits->checksums) {
+        return BST_OK;
+    }
     if (pixels) {
         bst_fits_sum_pixels(&sum, pixels, count);
     }
@@ -50,7 +53,7 @@ static bst_status write_primary(bst_ctx *ctx, bst_fits *fits) {
     bst_fits_memory_open(&fits->memory, true, &code);
     bst_fits_put_run_keys(fits->memory.file, &fits->names, &code);
     bst_fits_put_statements(fits->memory.file, &code);
-    bst_fits_put_sums(fits->memory.file, &code);
+    bst_fits_put_sums(fits, fits->memory.file, &code);
     bst_fits_memory_hdu(&fits->memory, &hdu, &bytes, &code);
     bst_status status = bst_fits_check(ctx, fits, code, "cannot be made");
     if (status == BST_OK) {
@@ -97,6 +100,7 @@ bst_status bst_fits_create(bst_ctx *ctx, const char *path, bst_fits_layout layou
     }
     fits->layout = layout;
     fits->compression = info->compression;
+    fits->checksums = info->checksums;
     copy_name(fits->names.observer, info->observer);
     copy_name(fits->names.instrument, info->instrument);
     copy_name(fits->names.object, info->object);
@@ -160,7 +164,7 @@ bst_status bst_fits_write_extension(bst_ctx *ctx, bst_fits *fits, const bst_fits
     fits_write_key_log(file, "INHERIT", 1, "keys of the primary header hold here", &code);
     bst_fits_put_frame_keys(file, &fits->names, frame, &code);
     bst_fits_put_statements(file, &code);
-    bst_fits_put_sums(file, &code);
+    bst_fits_put_sums(fits, file, &code);
     if (rice) {
         /* cfitsio's prototype lacks const; it does not write to the array */
         fits_write_img(file, TUSHORT, 1, (LONGLONG)count, (void *)(uintptr_t)pixels, &code);

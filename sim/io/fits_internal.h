@@ -49,6 +49,7 @@ struct bst_fits {
     char path[BST_FITS_PATH_BYTES];
     bst_fits_layout layout;
     bst_fits_compression compression;
+    bool checksums;
     bst_fits_names names;
     int file;      /* -1: not made yet */
     long long end; /* bytes of the HDUs that are complete */
@@ -80,8 +81,8 @@ bool bst_fits_write_pixels(bst_fits *fits, const uint16_t *pixels, size_t count,
 
 /* Adds pixels as they lie in the file. */
 void bst_fits_sum_pixels(bst_fits_sum *sum, const uint16_t *pixels, size_t count);
-/* Makes place in a header for what bst_fits_sign sets. */
-void bst_fits_put_sums(fitsfile *file, int *code);
+/* Makes place in a header for what bst_fits_sign sets, in a file that has checksums. */
+void bst_fits_put_sums(const bst_fits *fits, fitsfile *file, int *code);
 /* Sets DATASUM and CHECKSUM in the header at `hdu`, whose data are what follows it within the
  * `bytes` bytes and those that have been added to `data`; blocks filled. False when the header has
  * no place for them. */

@@ -52,9 +52,11 @@ static char *find_card(char *header, size_t bytes, const char *start) {
     return NULL;
 }
 
-void bst_fits_put_sums(fitsfile *file, int *code) {
-    fits_write_key_str(file, "CHECKSUM", "0000000000000000", "of the HDU", code);
-    fits_write_key_str(file, "DATASUM", "         0", "of the data", code);
+void bst_fits_put_sums(const bst_fits *fits, fitsfile *file, int *code) {
+    if (fits->checksums) {
+        fits_write_key_str(file, "CHECKSUM", "0000000000000000", "of the HDU", code);
+        fits_write_key_str(file, "DATASUM", "         0", "of the data", code);
+    }
 }
 
 bool bst_fits_sign(char *hdu, size_t bytes, bst_fits_sum data) {

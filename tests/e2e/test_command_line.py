@@ -67,8 +67,12 @@ class Messages(unittest.TestCase):
                      '"three_axis" .*"two_axis"')
         self.bad_set(GIMBAL + "/rate_hz=999", f": {GIMBAL}/rate_hz: .*857.142857 and 1000 Hz")
         self.bad_set(GIMBAL + "/platform/history_s=0.4", ": neossat/telescope/gimbal: platform/"
-                     r"history_s: 0\.4 s do not cover the sensor's exposure/exposure_s of 0\.5 s; "
-                     "make history_s at least as long")
+                     r"history_s: 0\.4 s do not cover the longest exposure_s of this sensor, 0\.5 s "
+                     r"\(its exposure's, or what control commands\); make history_s at least as "
+                     "long")
+        self.bad_set(GIMBAL.replace("gimbal", "control") + "/exposure_s=4.5",
+                     r": neossat/telescope/gimbal: platform/history_s: 4 s do not cover the longest "
+                     r"exposure_s of this sensor, 4\.5 s \(")
         self.bad_set("/record={\"frames\": \"cube\", \"compression\": \"rice\"}",
                      ': /record/compression: "rice" compresses frames in extensions only; ')
         self.bad_set(GIMBAL + "/platform/jitter_high_band_hz=[5]", r": .*/platform/jitter_high_band_hz: wrong type \(found \[5\]; "
