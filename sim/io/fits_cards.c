@@ -109,6 +109,11 @@ static bst_status read_card(scan *c, const char *card) {
     if (is_key(card, "TFIELDS")) {
         return set_int(c, card, 0, MAX_FIELDS, "an integer from 0 to 999", &h->tfields);
     }
+    if (is_key(card, "XTENSION")) {
+        char value[CARD];
+        card_value(card, value);
+        h->is_table = strcmp(value, "IMAGE") != 0;
+    }
     if (is_key(card, "ZIMAGE")) {
         char value[CARD];
         card_value(card, value);
@@ -131,6 +136,11 @@ static bst_status set_data_bytes(const scan *c) {
         return bst_fail(c->ctx, BST_ERR_FORMAT,
                         "%.400s: HDU %d: BITPIX, NAXIS or one of NAXISn is missing", c->name,
                         c->hdu);
+    }
+    /* without them cfitsio 4.2 takes what its memory holds */
+    if (h->is_table && (h->pcount == UNSET || h->gcount == UNSET || h->tfields == UNSET)) {
+        return bst_fail(c->ctx, BST_ERR_FORMAT,
+                        "%.400s: HDU %d: PCOUNT, GCOUNT or TFIELDS is missing", c->name, c->hdu);
     }
     count += h->pcount == UNSET ? 0 : (uint64_t)h->pcount;
     h->data_bytes = count * (uint64_t)(llabs(h->bitpix) / 8);
