@@ -117,7 +117,7 @@ static bst_status read_card(scan *c, const char *card) {
     if (is_key(card, "ZIMAGE")) {
         char value[CARD];
         card_value(card, value);
-        h->is_compressed = strcmp(value, "T") == 0;
+        h->is_compressed = strcmp(value, "F") != 0; /* cfitsio looks at the first letter */
     }
     return BST_OK;
 }

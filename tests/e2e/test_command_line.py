@@ -57,6 +57,21 @@ class Messages(unittest.TestCase):
         self.fails(2, '"x" is not expected here', "schema", "x")
         self.fails(2, "--start is missing", "propagate")
 
+    def test_distortion_beyond_the_wcs(self):
+        # a barrel of 900 (12.1 arcmin * sqrt 2)^2 = 10 % in the corners: 0.05 px (conventions.md)
+        out = runs.scratch() + "/run"
+        result = call(*runs.command(runs.TRACK, out, runs.SENSOR + '/camera/distortion={"k1": -900}',
+                                    duration=1)[1:])
+        self.assertEqual(result.returncode, 0, result.stderr)
+        found = re.findall(r"^boresight: warning: neossat/telescope: the WCS of its frames misfits the "
+                           r"camera's distortion by up to ([0-9.e-]+) px: ", result.stderr, re.M)
+        self.assertEqual(len(found), 1, result.stderr)
+        manifest = runs.manifest(out)
+        misfit = manifest["wcs_misfit_px"]["neossat/telescope"]
+        self.assertAlmostEqual(float(found[0]), misfit, delta=0.0005)  # two digits
+        self.assertTrue(0.02 < misfit < 0.1, misfit)  # the order of the documented figure
+        self.assertEqual(manifest["warnings"], 1)
+
     def test_bad_values(self):
         self.bad_set("/world/object=3", ': /world/object: unknown key; did you mean "objects"')
         self.bad_set("/duration_s=-1", r": /duration_s: out of range \(found -1; allowed: .*from 0")

@@ -225,8 +225,12 @@ class Hostile(unittest.TestCase):
         for name in os.listdir(run):
             os.chmod(f"{run}/{name}", 0)
         denied = "Permission denied"
-        self.ends(call("info", run, **options), run,
-                  f"RUN/scenario.json: cannot be opened: {denied}", "no rights to files")
+        result = call("info", run, **options)
+        self.assertEqual(result.returncode, 1)
+        self.assertEqual(result.stderr.splitlines(), [
+            f"boresight: {run}/manifest.json: cannot be opened: {denied}; give a JSON file",
+            f"boresight: {run}/scenario.json: cannot be opened: {denied}; give a JSON file",
+            f"boresight: {run}/run.sqlite: cannot be read: unable to open database file"])
         os.chmod(run, 0)
         for words in (("info", run), ("export", run, *TABLES, "--out", out)):
             self.ends(call(*words, **options), run, f"RUN: cannot be read: {denied}", "no rights")

@@ -77,14 +77,14 @@ class Rendezvous(unittest.TestCase):
         for burn in burns:
             begin = burn["time_s"] - 4.0
             asked = math.hypot(*burn["dv_rtn_mps"])
-            # What the gravity above leaves out is 1e-4 m/s^2 (the rest of the field, Sun, Moon and
-            # drag), 8 mm/s in 80 s. The burns turn with the orbit by 3.7 deg in 60 s, which makes
+            # What the gravity above leaves out is the anomalies of the field, up to 50 mGal =
+            # 5e-4 m/s^2 at this height, 0.04 m/s in 80 s. The burns turn with the orbit by 3.7 deg in 60 s, which makes
             # their sum shorter by 2e-4 of 10 m/s.
             self.assertAlmostEqual(own(max(begin, 0.0), begin + burn["duration_s"] + 8.0), asked,
-                                   delta=0.01)
+                                   delta=0.04)
         # and between them nothing: the same figure over 80 s
         for begin in (500.0, 2500.0, 4500.0):
-            self.assertLess(own(begin, begin + 80.0), 0.01)
+            self.assertLess(own(begin, begin + 80.0), 0.04)
 
     def test_custody(self):
         summary = self.manifest["summary"]
