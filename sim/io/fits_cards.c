@@ -114,10 +114,13 @@ static bst_status read_card(scan *c, const char *card) {
         card_value(card, value);
         h->is_table = strcmp(value, "IMAGE") != 0;
     }
-    if (is_key(card, "ZIMAGE")) {
+    /* cfitsio reads more spellings of the key than the standard has, and the value's first letter
+     */
+    if (strstr(card, "ZIMAGE")) {
         char value[CARD];
         card_value(card, value);
-        h->is_compressed = strcmp(value, "F") != 0; /* cfitsio looks at the first letter */
+        h->is_compressed =
+            h->is_compressed || (h->is_table && !(is_key(card, "ZIMAGE") && value[0] == 'F'));
     }
     return BST_OK;
 }

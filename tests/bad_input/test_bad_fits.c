@@ -217,13 +217,16 @@ static void wrong_tables(void **state) {
         const char *card, *message;
     } cases[] = {
         {"TFIELDS =                    0", ": HDU 2: PCOUNT, GCOUNT or TFIELDS is missing"},
+        {"HIERARCH ZIMAGE .= T",
+         ": HDU 2: is a compressed image (allowed: images that are not compressed); unpack the "
+         "file with funpack"},
         {"ZIMAGE  =                    T ? no comment",
          ": HDU 2: is a compressed image (allowed: images that are not compressed); unpack the "
          "file with funpack"},
     };
     static const char *const primary[] = {SIMPLE, "BITPIX  =                    8",
                                           "NAXIS   =                    0", "END", NULL};
-    for (int i = 0; i < 2; i++) {
+    for (int i = 0; i < 3; i++) {
         const char *const table[] = {"XTENSION= 'BINTABLE'",
                                      "BITPIX  =                    8",
                                      TWO_AXES,
