@@ -119,8 +119,8 @@ static bst_status read_card(scan *c, const char *card) {
     if (strstr(card, "ZIMAGE")) {
         char value[CARD];
         card_value(card, value);
-        h->is_compressed =
-            h->is_compressed || (h->is_table && !(is_key(card, "ZIMAGE") && value[0] == 'F'));
+        bool is_so = is_key(card, "ZIMAGE") ? value[0] != 'F' : h->is_table;
+        h->is_compressed = h->is_compressed || is_so;
     }
     return BST_OK;
 }

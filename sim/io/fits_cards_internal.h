@@ -17,7 +17,7 @@
 typedef struct bst_fits_cards {
     int64_t bitpix, naxis, axes[BST_FITS_AXES], pcount, gcount, tfields;
     bool is_table;       /* an extension that is no image: then none of the three above is unset */
-    bool is_compressed;  /* a table with ZIMAGE in a card, other than false */
+    bool is_compressed;  /* ZIMAGE, in any spelling, and not false */
     uint64_t bytes;      /* of the header, blocks filled */
     uint64_t data_bytes; /* of the data, without filling */
 } bst_fits_cards;
