@@ -149,8 +149,8 @@ bst_status bst_cue_nominal_direction(bst_ctx *ctx, const bst_world *world, int o
 /* Time after the epoch that the onboard clock shows `seconds` after the epoch. */
 double bst_believed_seconds(const bst_world *world, int observer, int sensor, double seconds);
 
-/* Adds to an observer's state, that of when the onboard clock shows believed_s, the error with which
- * the onboard side of a sensor knows it. */
+/* Adds to an observer's state, that of when the onboard clock shows believed_s, the error with
+ * which the onboard side of a sensor knows it. */
 void bst_believe(const bst_world *world, int observer, int sensor, double believed_s,
                  bst_state *state);
 
