@@ -515,6 +515,9 @@ int bst_cmd_run(int argc, char **argv) {
         .ctx = &ctx, .scenario = &scenario, .progress = !quiet && isatty(STDERR_FILENO)};
     bst_simulation *sim = NULL;
     bst_status status = bst_simulation_create(&ctx, &scenario, &sim_options, &sim);
+    if (status != BST_OK) {
+        bst_json_name_file(&ctx, json);
+    }
     if (status == BST_OK) {
         status = watch_sensors(&run, bst_simulation_world(sim));
     }

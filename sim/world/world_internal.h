@@ -48,6 +48,7 @@ typedef struct bst_orbit {
 typedef struct world_object {
     bst_object_info info;
     bst_orbit orbit;
+    bool catalogued; /* from a catalogue, not from the list */
 } world_object;
 
 typedef struct world_sensor {
@@ -59,6 +60,7 @@ typedef struct world_sensor {
 
 typedef struct world_observer {
     char name[64];
+    int norad; /* 0: none */
     bst_orbit orbit;
     world_sensor *sensors;
     int sensor_count;
