@@ -15,9 +15,14 @@ struct bst_knowledge_view {
  * noise-equivalent area in the middle of the field. */
 static void know_psf(bst_camera *c, double given_fwhm_px) {
     double sigma_px;
+    bool plain = (!c->psf && c->optics.psf == BST_PSF_GAUSSIAN) ||
+                 (c->psf && bst_psf_gaussian(c->psf, &sigma_px));
+    if (plain && !(given_fwhm_px > 0.0) && !(c->optics.diffusion_px > 0.0)) {
+        return;
+    }
     if (given_fwhm_px > 0.0) {
         c->psf_fwhm_px = given_fwhm_px;
-    } else if (c->psf && !(bst_psf_gaussian(c->psf, &sigma_px) && c->optics.diffusion_px == 0.0)) {
+    } else if (c->psf) {
         c->psf_fwhm_px = bst_psf_equivalent_fwhm_px(c->psf, 0.5 * (double)(c->width_px - 1),
                                                     0.5 * (double)(c->height_px - 1));
     }
