@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <fitsio.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
@@ -38,10 +39,14 @@ static bst_status find_image(bst_ctx *ctx, const char *path, fitsfile *file, int
             if (code == 0 &&
                 (size[0] < 1 || size[1] < 1 || size[2] < 1 || size[0] > LONGEST_SIDE ||
                  size[1] > LONGEST_SIDE || size[2] > MOST_PIXELS / (size[0] * size[1]))) {
+                char planes[32] = "";
+                if (axes > 2) {
+                    snprintf(planes, sizeof planes, " x %ld", size[2]);
+                }
                 return bst_fail(ctx, BST_ERR_FORMAT,
-                                "%.400s: an image of %ld x %ld x %ld pixels (allowed: sides of 1 "
-                                "to %d, at most %d pixels)",
-                                path, size[0], size[1], size[2], LONGEST_SIDE, MOST_PIXELS);
+                                "%.400s: an image of %ld x %ld%s pixels (allowed: sides of 1 to "
+                                "%d, at most %d pixels)",
+                                path, size[0], size[1], planes, LONGEST_SIDE, MOST_PIXELS);
             }
             return code == 0 ? BST_OK : fail_cfitsio(ctx, path, code);
         }
