@@ -1,0 +1,503 @@
+#include "scenegen/light_fft.h"
+
+#include <fftw3.h>
+#include <math.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "scenegen/light_wrap.h"
+
+enum {
+    COLUMNS = 16, /* columns of one block: as many lines as fit the cache together */
+    LINE = 16     /* floats of a cache line */
+};
+
+/* A block's working memory; as many as there are threads. */
+typedef struct bench {
+    atomic_flag taken;
+    float *in;  /* [COLUMNS][in_pitch] columns of the grid, complex */
+    float *out; /* [COLUMNS][out_pitch] columns of the image's spectrum */
+    float *line;
+} bench;
+
+struct bst_light_fft {
+    const bst_psf *psf;
+    bst_light_shape shape;
+    double cutoff;
+    bst_parallel *pool;
+    int rows, pitch;
+    int used;                    /* columns of the grid's spectrum within the cut-off */
+    int image_columns;           /* columns of the image's spectrum */
+    int *reach;                  /* [used]: rows -reach .. reach are within the cut-off */
+    size_t *first;               /* [used + 1]: complex numbers of the table before the column */
+    float **table;               /* [nodes]: OTF over the kernel's transform, complex */
+    double *kernel_x, *kernel_y; /* transforms by column and by row 0 .. samples / 2 */
+    size_t in_pitch, out_pitch;  /* floats */
+    fftwf_plan row_forward, row_inverse, column_forward, column_inverse;
+    bench *benches;
+    int bench_count;
+    float *sum; /* [image_columns][out_pitch], where there are several nodes */
+    bst_light_wrap *wrap;
+    int cell, cells_x, cells_y; /* samples per cell, per axis; cells */
+    float *cells;
+};
+
+/* What a loop's parts need to know. */
+typedef struct pass {
+    bst_light_fft *fft;
+    float *grid;
+    int node;
+    bool first, last;
+} pass;
+
+static size_t whole_lines(size_t floats) {
+    return (floats + LINE - 1) / LINE * LINE;
+}
+
+/* ------------------------------------------------------------------ set-up */
+
+static void fill_table(void *user, int begin, int end) {
+    const pass *p = user;
+    const bst_light_fft *f = p->fft;
+    const bst_light_axis *x = &f->shape.x, *y = &f->shape.y;
+    double area = 1.0 / ((double)x->pixels * y->pixels);
+    for (int c = begin; c < end; c++) {
+        float *t = f->table[p->node] + 2 * f->first[c];
+        for (int k = -f->reach[c]; k <= f->reach[c]; k++) {
+            double v[2], scale = area / (f->kernel_x[c] * f->kernel_y[abs(k)]);
+            bst_psf_otf(f->psf, p->node, (double)c / x->pixels, (double)k / y->pixels, v);
+            *t++ = (float)(v[0] * scale);
+            *t++ = (float)(v[1] * scale);
+        }
+    }
+}
+
+/* Which frequencies are within the cut-off. */
+static void find_band(bst_light_fft *f) {
+    const bst_light_axis *x = &f->shape.x, *y = &f->shape.y;
+    f->used = (int)fmin(floor(f->cutoff * x->pixels) + 1.0, 0.5 * x->samples);
+    for (int c = 0; c < f->used; c++) {
+        double fx = (double)c / x->pixels;
+        double fy = sqrt(fmax(f->cutoff * f->cutoff - fx * fx, 0.0));
+        f->reach[c] = (int)fmin(floor(fy * y->pixels), 0.5 * y->samples - 1.0);
+        f->first[c + 1] = f->first[c] + 2 * (size_t)f->reach[c] + 1;
+    }
+}
+
+static bst_status make_tables(bst_ctx *ctx, bst_light_fft *f) {
+    const bst_light_axis *x = &f->shape.x, *y = &f->shape.y;
+    size_t columns = (size_t)x->samples / 2 + 1, lines = (size_t)y->samples / 2 + 1;
+    int nodes = bst_psf_nodes(f->psf);
+    f->reach = malloc(columns * sizeof *f->reach);
+    f->first = calloc(columns + 1, sizeof *f->first);
+    f->kernel_x = malloc(columns * sizeof *f->kernel_x);
+    f->kernel_y = malloc(lines * sizeof *f->kernel_y);
+    f->table = calloc((size_t)nodes, sizeof *f->table);
+    if (!f->reach || !f->first || !f->kernel_x || !f->kernel_y || !f->table) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the transfer function");
+    }
+    find_band(f);
+    for (int c = 0; c < f->used; c++) {
+        f->kernel_x[c] = bst_spread_transform(&x->spread, (double)c / x->samples);
+    }
+    for (size_t k = 0; k < lines; k++) {
+        f->kernel_y[k] = bst_spread_transform(&y->spread, (double)k / y->samples);
+    }
+    for (int n = 0; n < nodes; n++) {
+        f->table[n] = fftwf_malloc(2 * sizeof(float) * f->first[f->used]);
+        if (!f->table[n]) {
+            return bst_fail(ctx, BST_ERR_MEMORY,
+                            "no memory for %d transfer functions of %zu numbers", nodes,
+                            f->first[f->used]);
+        }
+        pass p = {.fft = f, .node = n};
+        bst_parallel_for(f->pool, f->used, 16, fill_table, &p);
+    }
+    return BST_OK;
+}
+
+static bst_status make_benches(bst_ctx *ctx, bst_light_fft *f) {
+    f->bench_count = bst_parallel_threads(f->pool);
+    f->benches = calloc((size_t)f->bench_count, sizeof *f->benches);
+    bool ok = f->benches != NULL;
+    size_t line = f->in_pitch > f->out_pitch ? f->in_pitch : f->out_pitch;
+    for (int i = 0; ok && i < f->bench_count; i++) {
+        bench *b = &f->benches[i];
+        atomic_flag_clear(&b->taken);
+        b->in = fftwf_malloc(COLUMNS * f->in_pitch * sizeof *b->in);
+        b->out = fftwf_malloc(COLUMNS * f->out_pitch * sizeof *b->out);
+        b->line = fftwf_malloc(line * sizeof *b->line);
+        ok = b->in && b->out && b->line;
+    }
+    if (ok && bst_psf_nodes(f->psf) > 1) {
+        f->sum = fftwf_malloc((size_t)f->image_columns * f->out_pitch * sizeof *f->sum);
+        ok = f->sum != NULL;
+    }
+    return ok ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory for the light's transform");
+}
+
+/* Estimated plans: measured ones would differ from run to run, and the images in their last bits
+ * with them. */
+static bst_status make_plans(bst_ctx *ctx, bst_light_fft *f) {
+    float *row = fftwf_malloc((size_t)f->pitch * sizeof *row);
+    if (!row) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the light's transform");
+    }
+    fftwf_complex *in = (fftwf_complex *)f->benches[0].in,
+                  *out = (fftwf_complex *)f->benches[0].out,
+                  *line = (fftwf_complex *)f->benches[0].line;
+    f->row_forward =
+        fftwf_plan_dft_r2c_1d(f->shape.x.samples, row, (fftwf_complex *)row, FFTW_ESTIMATE);
+    f->row_inverse =
+        fftwf_plan_dft_c2r_1d(f->shape.x.pixels, (fftwf_complex *)row, row, FFTW_ESTIMATE);
+    f->column_forward =
+        fftwf_plan_dft_1d(f->shape.y.samples, in, line, FFTW_FORWARD, FFTW_ESTIMATE);
+    f->column_inverse =
+        fftwf_plan_dft_1d(f->shape.y.pixels, out, line, FFTW_BACKWARD, FFTW_ESTIMATE);
+    fftwf_free(row);
+    return f->row_forward && f->row_inverse && f->column_forward && f->column_inverse
+               ? BST_OK
+               : bst_fail(ctx, BST_ERR_MEMORY, "no plan for transforms of %d and %d",
+                          f->shape.x.samples, f->shape.y.samples);
+}
+
+static bst_status make_wrap(bst_ctx *ctx, bst_light_fft *f) {
+    const bst_light_axis *x = &f->shape.x, *y = &f->shape.y;
+    /* cells well below the distance from which wings wrap */
+    f->cell = x->samples > 14 * x->pixels / 10 ? 32 : 16;
+    f->cells_x = (x->samples + f->cell - 1) / f->cell;
+    f->cells_y = (y->samples + f->cell - 1) / f->cell;
+    f->cells = malloc((size_t)f->cells_x * (size_t)f->cells_y * sizeof *f->cells);
+    if (!f->cells) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the far wings");
+    }
+    bst_light_wrap_axis wx = {x->pixels, f->cells_x, (double)f->cell * x->pixels / x->samples,
+                              f->shape.width + f->shape.margin};
+    bst_light_wrap_axis wy = {y->pixels, f->cells_y, (double)f->cell * y->pixels / y->samples,
+                              f->shape.height + f->shape.margin};
+    return bst_light_wrap_create(ctx, f->psf, &wx, &wy, f->pool, &f->wrap);
+}
+
+bst_status bst_light_fft_create(bst_ctx *ctx, const bst_psf *psf, double cutoff,
+                                const bst_light_shape *shape, bst_parallel *pool,
+                                bst_light_fft **out) {
+    *out = NULL;
+    bst_light_fft *f = calloc(1, sizeof *f);
+    if (!f) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the light's transform");
+    }
+    const bst_light_axis *x = &shape->x, *y = &shape->y;
+    f->psf = psf;
+    f->shape = *shape;
+    f->cutoff = cutoff;
+    f->pool = pool;
+    f->rows = y->samples > shape->height ? y->samples : shape->height;
+    int longest = x->samples > x->pixels ? x->samples : x->pixels;
+    f->pitch = (int)whole_lines((size_t)longest + 2);
+    f->pitch += f->pitch % 1024 == 0 ? LINE : 0; /* rows a page apart would share cache sets */
+    f->image_columns = x->pixels / 2 + 1;
+    f->in_pitch = whole_lines(2 * (size_t)y->samples) + LINE;
+    f->out_pitch = whole_lines(2 * (size_t)y->pixels) + LINE;
+    bst_status status = make_tables(ctx, f);
+    if (status == BST_OK) {
+        status = make_benches(ctx, f);
+    }
+    if (status == BST_OK) {
+        status = make_plans(ctx, f);
+    }
+    if (status == BST_OK) {
+        status = make_wrap(ctx, f);
+    }
+    if (status != BST_OK) {
+        bst_light_fft_free(f);
+        return status;
+    }
+    *out = f;
+    return BST_OK;
+}
+
+void bst_light_fft_free(bst_light_fft *f) {
+    if (!f) {
+        return;
+    }
+    fftwf_plan plans[] = {f->row_forward, f->row_inverse, f->column_forward, f->column_inverse};
+    for (size_t i = 0; i < sizeof plans / sizeof *plans; i++) {
+        fftwf_destroy_plan(plans[i]);
+    }
+    for (int n = 0; f->table && n < bst_psf_nodes(f->psf); n++) {
+        fftwf_free(f->table[n]);
+    }
+    for (int i = 0; f->benches && i < f->bench_count; i++) {
+        fftwf_free(f->benches[i].in);
+        fftwf_free(f->benches[i].out);
+        fftwf_free(f->benches[i].line);
+    }
+    bst_light_wrap_free(f->wrap);
+    fftwf_free(f->sum);
+    free(f->benches);
+    free(f->cells);
+    free(f->table);
+    free(f->reach);
+    free(f->first);
+    free(f->kernel_x);
+    free(f->kernel_y);
+    free(f);
+}
+
+const bst_light_shape *bst_light_fft_shape(const bst_light_fft *f) {
+    return &f->shape;
+}
+
+int bst_light_fft_rows(const bst_light_fft *f) {
+    return f->rows;
+}
+
+int bst_light_fft_pitch(const bst_light_fft *f) {
+    return f->pitch;
+}
+
+/* ------------------------------------------------------------------ rows forward */
+
+/* Adds a row to its cells; returns whether there is light in it. */
+static bool add_cells(const bst_light_fft *f, const float *row, float *cells) {
+    float any = 0.0f;
+    for (int i = 0; i < f->cells_x; i++) {
+        int begin = i * f->cell, rest = f->shape.x.samples - begin;
+        float part[8] = {0};
+        for (int k = 0; k + 8 <= (rest < f->cell ? rest : f->cell); k += 8) {
+            for (int n = 0; n < 8; n++) {
+                part[n] += row[begin + k + n];
+            }
+        }
+        float sum = ((part[0] + part[1]) + (part[2] + part[3])) +
+                    ((part[4] + part[5]) + (part[6] + part[7]));
+        cells[i] += sum;
+        any += sum;
+    }
+    return any > 0.0f;
+}
+
+/* Rows of cells. */
+static void rows_forward(void *user, int begin, int end) {
+    const pass *p = user;
+    bst_light_fft *f = p->fft;
+    for (int j = begin; j < end; j++) {
+        float *cells = f->cells + (size_t)j * (size_t)f->cells_x;
+        if (p->first) {
+            memset(cells, 0, (size_t)f->cells_x * sizeof *cells);
+        }
+        for (int y = j * f->cell; y < (j + 1) * f->cell && y < f->shape.y.samples; y++) {
+            float *row = p->grid + (size_t)y * (size_t)f->pitch;
+            if (add_cells(f, row, cells)) {
+                fftwf_execute_dft_r2c(f->row_forward, row, (fftwf_complex *)row);
+            } else {
+                memset(row, 0, (size_t)f->pitch * sizeof *row);
+            }
+        }
+    }
+}
+
+/* ------------------------------------------------------------------ columns */
+
+/* out += line * table over n complex numbers. */
+static void multiply_add(float *restrict out, const float *restrict line,
+                         const float *restrict table, int n) {
+    for (int i = 0; i < 2 * n; i += 2) {
+        float a = line[i], b = line[i + 1], c = table[i], d = table[i + 1];
+        out[i] += a * c - b * d;
+        out[i + 1] += a * d + b * c;
+    }
+}
+
+/* The same conjugate and in falling order: out[-i] += conj(line[i] table[i]). */
+static void multiply_add_mirrored(float *restrict out, const float *restrict line,
+                                  const float *restrict table, int n) {
+    for (int i = 0; i < n; i++) {
+        float a = line[2 * i], b = line[2 * i + 1], c = table[2 * i], d = table[2 * i + 1];
+        out[-2 * i] += a * c - b * d;
+        out[-2 * i + 1] -= a * d + b * c;
+    }
+}
+
+/* Adds one transformed column of the grid, times its transfer function, to a column of the image's
+ * spectrum. */
+static void fold(const bst_light_fft *f, int node, int column, bool mirrored, const float *line,
+                 float *out) {
+    int samples = f->shape.y.samples, pixels = f->shape.y.pixels, reach = f->reach[column];
+    const float *table = f->table[node] + 2 * f->first[column];
+    for (int k = -reach; k <= reach;) {
+        /* a stretch in which neither index wraps */
+        int run = reach + 1 - k, from = k < 0 ? k + samples : k;
+        run = k < 0 && run > -k ? -k : run;
+        if (mirrored) {
+            int to = ((-k) % pixels + pixels) % pixels;
+            run = run > to + 1 ? to + 1 : run;
+            multiply_add_mirrored(out + 2 * to, line + 2 * from, table, run);
+        } else {
+            int to = (k % pixels + pixels) % pixels;
+            run = run > pixels - to ? pixels - to : run;
+            multiply_add(out + 2 * to, line + 2 * from, table, run);
+        }
+        k += run;
+        table += 2 * run;
+    }
+}
+
+/* Copies columns [first, first + count) of the rows' spectra into lines. */
+static void gather(const bst_light_fft *f, const float *grid, int first, int count, float *lines) {
+    int rows = f->shape.y.samples; /* a multiple of 8 */
+    size_t pitch = (size_t)f->pitch;
+    for (int r = 0; r < rows; r += 8) {
+        const float *from = grid + (size_t)r * pitch + 2 * (size_t)first;
+        float *to = lines + 2 * (size_t)r;
+        for (int c = 0; c < count; c++) {
+            for (int i = 0; i < 8; i++) {
+                memcpy(to + 2 * i, from + (size_t)i * pitch, 2 * sizeof *to);
+            }
+            to += f->in_pitch;
+            from += 2;
+        }
+    }
+}
+
+/* Writes the window's rows of inverse columns back. */
+static void scatter(const bst_light_fft *f, const float *lines, int first, int count, float *grid) {
+    size_t pitch = (size_t)f->pitch;
+    for (int r = 0; r < f->shape.height; r += 8) {
+        int rows = f->shape.height - r < 8 ? f->shape.height - r : 8;
+        float *to = grid + (size_t)r * pitch + 2 * (size_t)first;
+        const float *from = lines + 2 * (size_t)(r + f->shape.margin);
+        for (int c = 0; c < count; c++) {
+            for (int i = 0; i < rows; i++) {
+                memcpy(to + (size_t)i * pitch, from + 2 * i, 2 * sizeof *to);
+            }
+            from += f->out_pitch;
+            to += 2;
+        }
+    }
+}
+
+static bench *take_bench(bst_light_fft *f) {
+    for (int i = 0;; i = (i + 1) % f->bench_count) {
+        if (!atomic_flag_test_and_set(&f->benches[i].taken)) {
+            return &f->benches[i];
+        }
+    }
+}
+
+/* Adds the grid's columns that fold onto the image's columns [first, first + count). */
+static void add_aliases(const pass *p, const bench *b, int first, int count, float *out) {
+    const bst_light_fft *f = p->fft;
+    int period = f->shape.x.pixels;
+    for (int j = 0; j * period - first - count < f->used; j++) {
+        for (int mirrored = 0; mirrored <= (j > 0); mirrored++) {
+            int low = mirrored ? j * period - first - count + 1 : j * period + first;
+            int high = low + count;
+            int from = low < 0 ? 0 : low, to = high > f->used ? f->used : high;
+            if (from >= to) {
+                continue;
+            }
+            gather(f, p->grid, from, to - from, b->in);
+            for (int c = from; c < to; c++) {
+                float *in = b->in + (size_t)(c - from) * f->in_pitch;
+                fftwf_execute_dft(f->column_forward, (fftwf_complex *)in, (fftwf_complex *)b->line);
+                int i = mirrored ? high - 1 - c : c - low;
+                fold(f, p->node, c, mirrored, b->line, out + (size_t)i * f->out_pitch);
+            }
+        }
+    }
+}
+
+/* Blocks of the image's columns. */
+static void columns(void *user, int begin, int end) {
+    const pass *p = user;
+    bst_light_fft *f = p->fft;
+    bench *b = take_bench(f);
+    for (int n = begin; n < end; n++) {
+        int first = n * COLUMNS;
+        int count = f->image_columns - first < COLUMNS ? f->image_columns - first : COLUMNS;
+        float *out = f->sum ? f->sum + (size_t)first * f->out_pitch : b->out;
+        if (p->first) {
+            memset(out, 0, (size_t)count * f->out_pitch * sizeof *out);
+        }
+        add_aliases(p, b, first, count, out);
+        if (!p->last) {
+            continue;
+        }
+        for (int c = 0; c < count; c++) {
+            float *line = out + (size_t)c * f->out_pitch;
+            fftwf_execute_dft(f->column_inverse, (fftwf_complex *)line, (fftwf_complex *)b->line);
+            memcpy(line, b->line, 2 * (size_t)f->shape.y.pixels * sizeof *line);
+        }
+        scatter(f, out, first, count, p->grid);
+    }
+    atomic_flag_clear(&b->taken);
+}
+
+/* Blocks of the image's columns that the grid's band reaches; the others are zero. */
+static int blocks(const bst_light_fft *f) {
+    int reached = f->used < f->image_columns ? f->used : f->image_columns;
+    return (reached + COLUMNS - 1) / COLUMNS;
+}
+
+void bst_light_fft_add(bst_light_fft *f, int node, bool first, bool last, float *grid) {
+    pass p = {f, grid, node, first, last};
+    bst_parallel_for(f->pool, f->cells_y, 1, rows_forward, &p);
+    bst_parallel_for(f->pool, blocks(f), 1, columns, &p);
+}
+
+/* ------------------------------------------------------------------ rows inverse */
+
+/* Adds a row between the cells' centres, linearly. */
+static void add_wings(const bst_light_fft *f, int row, float *image) {
+    double down =
+        ((row + f->shape.margin) * (double)f->shape.y.samples / f->shape.y.pixels + 0.5) / f->cell -
+        0.5;
+    double across = (double)f->shape.x.samples / f->shape.x.pixels / f->cell;
+    double start = (f->shape.margin * across) + 0.5 / f->cell - 0.5;
+    int j = (int)fmin(fmax(floor(down), 0.0), f->cells_y - 2.0);
+    float v = (float)(down - j);
+    const float *a = f->cells + (size_t)j * (size_t)f->cells_x, *b = a + f->cells_x;
+    for (int x = 0; x < f->shape.width;) {
+        int i = (int)fmin(fmax(floor(start + x * across), 0.0), f->cells_x - 2.0);
+        int end = (int)ceil((i + 1 - start) / across);
+        end = end <= x ? x + 1 : end > f->shape.width ? f->shape.width : end;
+        float left = a[i] + v * (b[i] - a[i]), right = a[i + 1] + v * (b[i + 1] - a[i + 1]);
+        float slope = (right - left) * (float)across;
+        float base = left + slope * (float)((start + x * across - i) / across);
+        for (int k = 0; k < end - x; k++) {
+            image[x + k] += base + slope * (float)k;
+        }
+        x = end;
+    }
+}
+
+static void rows_inverse(void *user, int begin, int end) {
+    const pass *p = user;
+    const bst_light_fft *f = p->fft;
+    int written = blocks(f) * COLUMNS;
+    for (int y = begin; y < end; y++) {
+        float *row = p->grid + (size_t)y * (size_t)f->pitch;
+        if (written < f->image_columns) {
+            memset(row + 2 * written, 0, 2 * (size_t)(f->image_columns - written) * sizeof *row);
+        }
+        fftwf_execute_dft_c2r(f->row_inverse, (fftwf_complex *)row, row);
+        if (f->wrap) {
+            add_wings(f, y, row + f->shape.margin);
+        }
+    }
+}
+
+void bst_light_fft_finish(bst_light_fft *f, float *grid) {
+    if (f->wrap) {
+        float scale = (float)(1.0 / (f->kernel_x[0] * f->kernel_y[0]));
+        size_t count = (size_t)f->cells_x * (size_t)f->cells_y;
+        for (size_t i = 0; i < count; i++) {
+            f->cells[i] *= scale;
+        }
+        bst_light_wrap_run(f->wrap, f->cells);
+    }
+    pass p = {.fft = f, .grid = grid};
+    bst_parallel_for(f->pool, f->shape.height, 16, rows_inverse, &p);
+}
