@@ -30,7 +30,7 @@ const bst_config_desc bst_camera_config[] = {
              "silicon detector sees "
              "four to five times as many."),
     BST_REAL(bst_camera, psf_fwhm_px, "px", 0.3, 50, "2",
-             "Full width at half maximum of the Gaussian PSF."),
+             "Full width at half maximum of a Gaussian or Moffat PSF."),
     BST_REAL(bst_camera, background_mag_arcsec2, "mag/arcsec2", 5, 40, "22",
              "V surface brightness of the sky (zodiacal light and the like), uniform."),
     BST_REAL(bst_camera, dark_current_e_per_s, "e/s", 0, 1e6, "0", "Dark current per pixel."),
@@ -48,6 +48,8 @@ const bst_config_desc bst_camera_config[] = {
     BST_OBJECT(bst_camera, distortion, bst_distortion_config, "{}",
                "Lens distortion, in the focal plane's axes about the boresight. It must not fold "
                "the image inside the sensor."),
+    BST_OBJECT(bst_camera, optics, bst_optics_config_table, "{}",
+               "Point spread function beyond a plain Gaussian, and vignetting."),
     BST_CONFIG_END,
 };
 
