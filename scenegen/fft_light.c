@@ -9,7 +9,7 @@
 #include "scenegen/kernels/deposit_shared.h"
 #include "scenegen/light_fft.h"
 
-enum { SETUPS = 4, FIELD_STEP_PX = 16 };
+enum { SETUPS = 4, FIELD_STEP_PX = 16, WRAP_PX = 96 };
 
 /* What is ready for windows of one size. */
 typedef struct setup {
@@ -40,7 +40,7 @@ struct bst_fft_light {
 };
 
 bst_fft_light_options bst_fft_light_default_options(void) {
-    return (bst_fft_light_options){.taps = 8, .tolerance = 3e-4};
+    return (bst_fft_light_options){.taps = 8, .tolerance = 3e-5};
 }
 
 /* Tiles for the deposit, and threads for the transforms: as many as the device has, if it is the
@@ -229,9 +229,10 @@ static void tabulate(const bst_spread *spread, float *table) {
 static bst_status make_setup(bst_ctx *ctx, bst_fft_light *l, bst_window window, setup *s) {
     int taps = l->options.taps;
     bst_light_shape shape = {.width = window.width, .height = window.height, .margin = l->margin};
-    shape.x = bst_light_axis_choose(&l->band, 0, taps, window.width + 2 * l->margin, l->density[0]);
-    shape.y =
-        bst_light_axis_choose(&l->band, 1, taps, window.height + 2 * l->margin, l->density[1]);
+    /* the least distance from which wings wrap around; nearer ones are not smooth */
+    int pad = l->margin + (l->margin < WRAP_PX ? l->margin : WRAP_PX);
+    shape.x = bst_light_axis_choose(&l->band, 0, taps, window.width + pad, l->density[0]);
+    shape.y = bst_light_axis_choose(&l->band, 1, taps, window.height + pad, l->density[1]);
     BST_TRY(bst_light_fft_create(ctx, l->psf, l->band.cutoff, &shape, l->pool, &s->fft));
     s->width = window.width;
     s->height = window.height;

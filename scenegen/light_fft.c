@@ -8,17 +8,17 @@
 
 #include "scenegen/light_wrap.h"
 
-enum {
-    COLUMNS = 16, /* columns of one block: as many lines as fit the cache together */
-    LINE = 16     /* floats of a cache line */
-};
+/* The rows' spectra are kept in tiles of TILE x TILE complex numbers, [column block][row block]
+ * [column][row]: written by a block of rows and read by a block of columns, both in whole cache
+ * lines and few pages. */
+enum { TILE = 16, TILE_FLOATS = 2 * TILE * TILE, LINE = 16 /* floats of a cache line */ };
 
-/* A block's working memory; as many as there are threads. */
+/* Working memory of one part; as many as there are threads. */
 typedef struct bench {
     atomic_flag taken;
-    float *in;  /* [COLUMNS][in_pitch] columns of the grid, complex */
-    float *out; /* [COLUMNS][out_pitch] columns of the image's spectrum */
-    float *line;
+    float *rows; /* [TILE][pitch] */
+    float *sum;  /* [out_pitch] a column of the image's spectrum */
+    float *line[2];
 } bench;
 
 struct bst_light_fft {
@@ -27,8 +27,10 @@ struct bst_light_fft {
     double cutoff;
     bst_parallel *pool;
     int rows, pitch;
-    int used;                    /* columns of the grid's spectrum within the cut-off */
-    int image_columns;           /* columns of the image's spectrum */
+    int used;          /* columns of the grid's spectrum within the cut-off */
+    int image_columns; /* columns of the image's spectrum */
+    int row_blocks;
+    float *spectrum;             /* [column blocks of `used`][row_blocks] tiles */
     int *reach;                  /* [used]: rows -reach .. reach are within the cut-off */
     size_t *first;               /* [used + 1]: complex numbers of the table before the column */
     float **table;               /* [nodes]: OTF over the kernel's transform, complex */
@@ -120,15 +122,19 @@ static bst_status make_tables(bst_ctx *ctx, bst_light_fft *f) {
 static bst_status make_benches(bst_ctx *ctx, bst_light_fft *f) {
     f->bench_count = bst_parallel_threads(f->pool);
     f->benches = calloc((size_t)f->bench_count, sizeof *f->benches);
-    bool ok = f->benches != NULL;
+    int used_blocks = (f->used + TILE - 1) / TILE;
+    f->spectrum = fftwf_malloc((size_t)used_blocks * (size_t)f->row_blocks * TILE_FLOATS *
+                               sizeof *f->spectrum);
+    bool ok = f->benches && f->spectrum;
     size_t line = f->in_pitch > f->out_pitch ? f->in_pitch : f->out_pitch;
     for (int i = 0; ok && i < f->bench_count; i++) {
         bench *b = &f->benches[i];
         atomic_flag_clear(&b->taken);
-        b->in = fftwf_malloc(COLUMNS * f->in_pitch * sizeof *b->in);
-        b->out = fftwf_malloc(COLUMNS * f->out_pitch * sizeof *b->out);
-        b->line = fftwf_malloc(line * sizeof *b->line);
-        ok = b->in && b->out && b->line;
+        b->rows = fftwf_malloc((size_t)TILE * (size_t)f->pitch * sizeof *b->rows);
+        b->sum = fftwf_malloc(f->out_pitch * sizeof *b->sum);
+        b->line[0] = fftwf_malloc(line * sizeof *b->line[0]);
+        b->line[1] = fftwf_malloc(line * sizeof *b->line[1]);
+        ok = b->rows && b->sum && b->line[0] && b->line[1];
     }
     if (ok && bst_psf_nodes(f->psf) > 1) {
         f->sum = fftwf_malloc((size_t)f->image_columns * f->out_pitch * sizeof *f->sum);
@@ -140,22 +146,15 @@ static bst_status make_benches(bst_ctx *ctx, bst_light_fft *f) {
 /* Estimated plans: measured ones would differ from run to run, and the images in their last bits
  * with them. */
 static bst_status make_plans(bst_ctx *ctx, bst_light_fft *f) {
-    float *row = fftwf_malloc((size_t)f->pitch * sizeof *row);
-    if (!row) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the light's transform");
-    }
-    fftwf_complex *in = (fftwf_complex *)f->benches[0].in,
-                  *out = (fftwf_complex *)f->benches[0].out,
-                  *line = (fftwf_complex *)f->benches[0].line;
-    f->row_forward =
-        fftwf_plan_dft_r2c_1d(f->shape.x.samples, row, (fftwf_complex *)row, FFTW_ESTIMATE);
+    const bench *b = &f->benches[0];
+    float *row = b->rows, *image = b->rows + f->pitch;
+    fftwf_complex *in = (fftwf_complex *)b->line[0], *out = (fftwf_complex *)b->line[1];
+    f->row_forward = fftwf_plan_dft_r2c_1d(f->shape.x.samples, image, (fftwf_complex *)row,
+                                           FFTW_ESTIMATE | FFTW_PRESERVE_INPUT);
     f->row_inverse =
-        fftwf_plan_dft_c2r_1d(f->shape.x.pixels, (fftwf_complex *)row, row, FFTW_ESTIMATE);
-    f->column_forward =
-        fftwf_plan_dft_1d(f->shape.y.samples, in, line, FFTW_FORWARD, FFTW_ESTIMATE);
-    f->column_inverse =
-        fftwf_plan_dft_1d(f->shape.y.pixels, out, line, FFTW_BACKWARD, FFTW_ESTIMATE);
-    fftwf_free(row);
+        fftwf_plan_dft_c2r_1d(f->shape.x.pixels, (fftwf_complex *)row, image, FFTW_ESTIMATE);
+    f->column_forward = fftwf_plan_dft_1d(f->shape.y.samples, in, out, FFTW_FORWARD, FFTW_ESTIMATE);
+    f->column_inverse = fftwf_plan_dft_1d(f->shape.y.pixels, in, out, FFTW_BACKWARD, FFTW_ESTIMATE);
     return f->row_forward && f->row_inverse && f->column_forward && f->column_inverse
                ? BST_OK
                : bst_fail(ctx, BST_ERR_MEMORY, "no plan for transforms of %d and %d",
@@ -194,9 +193,10 @@ bst_status bst_light_fft_create(bst_ctx *ctx, const bst_psf *psf, double cutoff,
     f->pool = pool;
     f->rows = y->samples > shape->height ? y->samples : shape->height;
     int longest = x->samples > x->pixels ? x->samples : x->pixels;
-    f->pitch = (int)whole_lines((size_t)longest + 2);
+    f->pitch = (int)whole_lines((size_t)longest + 2 + 2 * TILE);
     f->pitch += f->pitch % 1024 == 0 ? LINE : 0; /* rows a page apart would share cache sets */
     f->image_columns = x->pixels / 2 + 1;
+    f->row_blocks = (f->rows + TILE - 1) / TILE;
     f->in_pitch = whole_lines(2 * (size_t)y->samples) + LINE;
     f->out_pitch = whole_lines(2 * (size_t)y->pixels) + LINE;
     bst_status status = make_tables(ctx, f);
@@ -229,12 +229,14 @@ void bst_light_fft_free(bst_light_fft *f) {
         fftwf_free(f->table[n]);
     }
     for (int i = 0; f->benches && i < f->bench_count; i++) {
-        fftwf_free(f->benches[i].in);
-        fftwf_free(f->benches[i].out);
-        fftwf_free(f->benches[i].line);
+        fftwf_free(f->benches[i].rows);
+        fftwf_free(f->benches[i].sum);
+        fftwf_free(f->benches[i].line[0]);
+        fftwf_free(f->benches[i].line[1]);
     }
     bst_light_wrap_free(f->wrap);
     fftwf_free(f->sum);
+    fftwf_free(f->spectrum);
     free(f->benches);
     free(f->cells);
     free(f->table);
@@ -278,24 +280,68 @@ static bool add_cells(const bst_light_fft *f, const float *row, float *cells) {
     return any > 0.0f;
 }
 
-/* Rows of cells. */
+static bench *take_bench(bst_light_fft *f) {
+    for (int i = 0;; i = (i + 1) % f->bench_count) {
+        if (!atomic_flag_test_and_set(&f->benches[i].taken)) {
+            return &f->benches[i];
+        }
+    }
+}
+
+/* The tile of a block of columns and a block of rows. */
+static float *tile_of(const bst_light_fft *f, int column, int row_block) {
+    return f->spectrum +
+           ((size_t)(column / TILE) * (size_t)f->row_blocks + (size_t)row_block) * TILE_FLOATS;
+}
+
+/* Copies between rows and tiles, complex numbers of a tile's side each way. */
+static void transpose(const float *from, size_t from_pitch, float *to, size_t to_pitch) {
+    for (int c = 0; c < TILE; c++) {
+        for (int r = 0; r < TILE; r++) {
+            memcpy(to + (size_t)c * to_pitch + 2 * r, from + (size_t)r * from_pitch + 2 * c,
+                   2 * sizeof *to);
+        }
+    }
+}
+
+/* Transforms a block of TILE rows of the grid. */
+static void row_block_forward(bst_light_fft *f, float *grid, int block, bench *b, float *cells) {
+    size_t pitch = (size_t)f->pitch;
+    bool any = false;
+    for (int r = 0; r < TILE; r++) {
+        float *from = grid + (size_t)(block * TILE + r) * pitch;
+        float *row = b->rows + (size_t)r * pitch;
+        if (add_cells(f, from, cells)) {
+            fftwf_execute_dft_r2c(f->row_forward, from, (fftwf_complex *)row);
+            any = true;
+        } else {
+            memset(row, 0, pitch * sizeof *row);
+        }
+    }
+    for (int c = 0; c < f->used; c += TILE) {
+        if (any) {
+            transpose(b->rows + 2 * c, pitch, tile_of(f, c, block), 2 * TILE);
+        } else {
+            memset(tile_of(f, c, block), 0, TILE_FLOATS * sizeof(float));
+        }
+    }
+}
+
+/* Rows of cells, which are one block of rows or two. */
 static void rows_forward(void *user, int begin, int end) {
     const pass *p = user;
     bst_light_fft *f = p->fft;
+    bench *b = take_bench(f);
     for (int j = begin; j < end; j++) {
         float *cells = f->cells + (size_t)j * (size_t)f->cells_x;
         if (p->first) {
             memset(cells, 0, (size_t)f->cells_x * sizeof *cells);
         }
-        for (int y = j * f->cell; y < (j + 1) * f->cell && y < f->shape.y.samples; y++) {
-            float *row = p->grid + (size_t)y * (size_t)f->pitch;
-            if (add_cells(f, row, cells)) {
-                fftwf_execute_dft_r2c(f->row_forward, row, (fftwf_complex *)row);
-            } else {
-                memset(row, 0, (size_t)f->pitch * sizeof *row);
-            }
+        for (int k = j * f->cell; k < (j + 1) * f->cell && k < f->shape.y.samples; k += TILE) {
+            row_block_forward(f, p->grid, k / TILE, b, cells);
         }
     }
+    atomic_flag_clear(&b->taken);
 }
 
 /* ------------------------------------------------------------------ columns */
@@ -344,107 +390,70 @@ static void fold(const bst_light_fft *f, int node, int column, bool mirrored, co
     }
 }
 
-/* Copies columns [first, first + count) of the rows' spectra into lines. */
-static void gather(const bst_light_fft *f, const float *grid, int first, int count, float *lines) {
-    int rows = f->shape.y.samples; /* a multiple of 8 */
-    size_t pitch = (size_t)f->pitch;
-    for (int r = 0; r < rows; r += 8) {
-        const float *from = grid + (size_t)r * pitch + 2 * (size_t)first;
-        float *to = lines + 2 * (size_t)r;
-        for (int c = 0; c < count; c++) {
-            for (int i = 0; i < 8; i++) {
-                memcpy(to + 2 * i, from + (size_t)i * pitch, 2 * sizeof *to);
-            }
-            to += f->in_pitch;
-            from += 2;
-        }
+/* Copies a column of the rows' spectra into a line. */
+static void gather(const bst_light_fft *f, int column, float *line) {
+    const float *from = tile_of(f, column, 0) + (size_t)(column % TILE) * 2 * TILE;
+    for (int r = 0; r < f->shape.y.samples; r += TILE) {
+        memcpy(line + 2 * r, from, 2 * TILE * sizeof *line);
+        from += TILE_FLOATS;
     }
 }
 
-/* Writes the window's rows of inverse columns back. */
-static void scatter(const bst_light_fft *f, const float *lines, int first, int count, float *grid) {
-    size_t pitch = (size_t)f->pitch;
-    for (int r = 0; r < f->shape.height; r += 8) {
-        int rows = f->shape.height - r < 8 ? f->shape.height - r : 8;
-        float *to = grid + (size_t)r * pitch + 2 * (size_t)first;
-        const float *from = lines + 2 * (size_t)(r + f->shape.margin);
-        for (int c = 0; c < count; c++) {
-            for (int i = 0; i < rows; i++) {
-                memcpy(to + (size_t)i * pitch, from + 2 * i, 2 * sizeof *to);
-            }
-            from += f->out_pitch;
-            to += 2;
-        }
+/* Puts the window's rows of an inverse column in its place, from row block 0 on. */
+static void scatter(const bst_light_fft *f, int column, const float *line) {
+    float *to = tile_of(f, column, 0) + (size_t)(column % TILE) * 2 * TILE;
+    const float *from = line + 2 * f->shape.margin;
+    for (int r = 0; r < f->shape.height; r += TILE) {
+        memcpy(to, from + 2 * r, 2 * TILE * sizeof *to);
+        to += TILE_FLOATS;
     }
 }
 
-static bench *take_bench(bst_light_fft *f) {
-    for (int i = 0;; i = (i + 1) % f->bench_count) {
-        if (!atomic_flag_test_and_set(&f->benches[i].taken)) {
-            return &f->benches[i];
-        }
-    }
-}
-
-/* Adds the grid's columns that fold onto the image's columns [first, first + count). */
-static void add_aliases(const pass *p, const bench *b, int first, int count, float *out) {
+/* Adds the grid's columns that fold onto the image's column `column`. */
+static void add_aliases(const pass *p, bench *b, int column, float *sum) {
     const bst_light_fft *f = p->fft;
-    int period = f->shape.x.pixels;
-    for (int j = 0; j * period - first - count < f->used; j++) {
+    for (int j = 0; j * f->shape.x.pixels - column < f->used; j++) {
         for (int mirrored = 0; mirrored <= (j > 0); mirrored++) {
-            int low = mirrored ? j * period - first - count + 1 : j * period + first;
-            int high = low + count;
-            int from = low < 0 ? 0 : low, to = high > f->used ? f->used : high;
-            if (from >= to) {
-                continue;
-            }
-            gather(f, p->grid, from, to - from, b->in);
-            for (int c = from; c < to; c++) {
-                float *in = b->in + (size_t)(c - from) * f->in_pitch;
-                fftwf_execute_dft(f->column_forward, (fftwf_complex *)in, (fftwf_complex *)b->line);
-                int i = mirrored ? high - 1 - c : c - low;
-                fold(f, p->node, c, mirrored, b->line, out + (size_t)i * f->out_pitch);
+            int c = j * f->shape.x.pixels + (mirrored ? -column : column);
+            if (c < f->used) {
+                gather(f, c, b->line[0]);
+                fftwf_execute_dft(f->column_forward, (fftwf_complex *)b->line[0],
+                                  (fftwf_complex *)b->line[1]);
+                fold(f, p->node, c, mirrored, b->line[1], sum);
             }
         }
     }
 }
 
-/* Blocks of the image's columns. */
+/* Columns of the image's spectrum. The inverse of a column is put where the column itself was: the
+ * others that fold onto it lie beyond the image's columns, so nobody else reads it. */
 static void columns(void *user, int begin, int end) {
     const pass *p = user;
     bst_light_fft *f = p->fft;
     bench *b = take_bench(f);
-    for (int n = begin; n < end; n++) {
-        int first = n * COLUMNS;
-        int count = f->image_columns - first < COLUMNS ? f->image_columns - first : COLUMNS;
-        float *out = f->sum ? f->sum + (size_t)first * f->out_pitch : b->out;
+    for (int c = begin; c < end; c++) {
+        float *sum = f->sum ? f->sum + (size_t)c * f->out_pitch : b->sum;
         if (p->first) {
-            memset(out, 0, (size_t)count * f->out_pitch * sizeof *out);
+            memset(sum, 0, f->out_pitch * sizeof *sum);
         }
-        add_aliases(p, b, first, count, out);
-        if (!p->last) {
-            continue;
+        add_aliases(p, b, c, sum);
+        if (p->last) {
+            fftwf_execute_dft(f->column_inverse, (fftwf_complex *)sum, (fftwf_complex *)b->line[1]);
+            scatter(f, c, b->line[1]);
         }
-        for (int c = 0; c < count; c++) {
-            float *line = out + (size_t)c * f->out_pitch;
-            fftwf_execute_dft(f->column_inverse, (fftwf_complex *)line, (fftwf_complex *)b->line);
-            memcpy(line, b->line, 2 * (size_t)f->shape.y.pixels * sizeof *line);
-        }
-        scatter(f, out, first, count, p->grid);
     }
     atomic_flag_clear(&b->taken);
 }
 
-/* Blocks of the image's columns that the grid's band reaches; the others are zero. */
-static int blocks(const bst_light_fft *f) {
-    int reached = f->used < f->image_columns ? f->used : f->image_columns;
-    return (reached + COLUMNS - 1) / COLUMNS;
+/* Columns of the image's spectrum that the grid's band reaches; the others are zero. */
+static int reached(const bst_light_fft *f) {
+    return f->used < f->image_columns ? f->used : f->image_columns;
 }
 
 void bst_light_fft_add(bst_light_fft *f, int node, bool first, bool last, float *grid) {
     pass p = {f, grid, node, first, last};
     bst_parallel_for(f->pool, f->cells_y, 1, rows_forward, &p);
-    bst_parallel_for(f->pool, blocks(f), 1, columns, &p);
+    bst_parallel_for(f->pool, reached(f), TILE, columns, &p);
 }
 
 /* ------------------------------------------------------------------ rows inverse */
@@ -473,20 +482,28 @@ static void add_wings(const bst_light_fft *f, int row, float *image) {
     }
 }
 
+/* Blocks of TILE rows of the window. */
 static void rows_inverse(void *user, int begin, int end) {
     const pass *p = user;
-    const bst_light_fft *f = p->fft;
-    int written = blocks(f) * COLUMNS;
-    for (int y = begin; y < end; y++) {
-        float *row = p->grid + (size_t)y * (size_t)f->pitch;
-        if (written < f->image_columns) {
-            memset(row + 2 * written, 0, 2 * (size_t)(f->image_columns - written) * sizeof *row);
+    bst_light_fft *f = p->fft;
+    bench *b = take_bench(f);
+    size_t pitch = (size_t)f->pitch;
+    int columns_used = reached(f), zero = f->image_columns - columns_used;
+    for (int block = begin; block < end; block++) {
+        for (int c = 0; c < columns_used; c += TILE) {
+            transpose(tile_of(f, c, block), 2 * TILE, b->rows + 2 * c, pitch);
         }
-        fftwf_execute_dft_c2r(f->row_inverse, (fftwf_complex *)row, row);
-        if (f->wrap) {
-            add_wings(f, y, row + f->shape.margin);
+        for (int y = block * TILE; y < (block + 1) * TILE && y < f->shape.height; y++) {
+            float *row = b->rows + (size_t)(y % TILE) * pitch;
+            float *image = p->grid + (size_t)y * pitch;
+            memset(row + 2 * columns_used, 0, 2 * (size_t)zero * sizeof *row);
+            fftwf_execute_dft_c2r(f->row_inverse, (fftwf_complex *)row, image);
+            if (f->wrap) {
+                add_wings(f, y, image + f->shape.margin);
+            }
         }
     }
+    atomic_flag_clear(&b->taken);
 }
 
 void bst_light_fft_finish(bst_light_fft *f, float *grid) {
@@ -499,5 +516,5 @@ void bst_light_fft_finish(bst_light_fft *f, float *grid) {
         bst_light_wrap_run(f->wrap, f->cells);
     }
     pass p = {.fft = f, .grid = grid};
-    bst_parallel_for(f->pool, f->shape.height, 16, rows_inverse, &p);
+    bst_parallel_for(f->pool, (f->shape.height + TILE - 1) / TILE, 1, rows_inverse, &p);
 }

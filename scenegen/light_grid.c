@@ -12,7 +12,7 @@ enum {
     DIRECTIONS = 8
 };
 
-static const double WIDE_CELL_PX = 4.0, REACH_SHARE = 1e-7, LEAST_DENSITY = 0.25,
+static const double WIDE_CELL_PX = 4.0, REACH_SHARE = 3e-7, LEAST_DENSITY = 0.25,
                     MOST_DENSITY = 5.0;
 
 static double modulus(const bst_psf *psf, int node, double fx, double fy) {
@@ -143,7 +143,7 @@ static bst_status measure_reach(bst_ctx *ctx, const bst_psf *psf, fftwf_complex 
             }
         }
     }
-    out->reach_px = (int)fmin(fmax(ceil(reach), 16.0), 256.0);
+    out->reach_px = (int)fmin(fmax(ceil(reach), 16.0), 160.0);
     return BST_OK;
 }
 

@@ -15,7 +15,7 @@ typedef struct bst_light_band {
     double node_sigma_px;  /* of the Gaussian that is as sensitive to coarse nodes: its fourth
                               derivative over its peak, 3 / sigma^4, is the PSF's largest */
     double share_sigma_px; /* of the Gaussian with the same peak */
-    int reach_px;          /* beyond, a pixel gets less than 1e-7 of a point's light (16 to 256) */
+    int reach_px;          /* beyond, a pixel gets less than 3e-7 of a point's light (16 to 160) */
     bst_spread_band axis[2];
 } bst_light_band;
 
