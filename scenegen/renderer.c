@@ -13,6 +13,8 @@
 #include "scenegen/smear.h"
 
 enum { MAX_TAPS = 512, BOX_FLOATS = 4 };
+/* Of a block of nodes: place and weight. */
+enum { NODE_BYTES = BST_BLOCK * BST_NODE_ROWS * (int)sizeof(float) };
 
 /* A device buffer that grows. */
 typedef struct growing {
@@ -23,7 +25,7 @@ typedef struct growing {
 struct bst_renderer {
     bst_camera camera;
     bst_renderer_options options;
-    int taps;
+    int taps, phases;
     cl_context context;
     cl_command_queue queue;
     cl_program program;
@@ -37,6 +39,7 @@ struct bst_renderer {
     bst_scene_source *list; /* drawn sources */
     double *peak_e;         /* of all sources of the request */
     int list_capacity, tiles;
+    uint64_t most_bytes; /* of one buffer on the device */
     bst_render_stats stats;
 };
 
@@ -67,9 +70,9 @@ static int taps_for(double sigma_px) {
 }
 
 static bst_status choose_tiles(bst_ctx *ctx, const bst_device *device,
-                               bst_renderer_options *options) {
+                               bst_renderer_options *options, uint64_t *most_bytes) {
     cl_device_type type = 0;
-    cl_ulong local_bytes = 0;
+    cl_ulong local_bytes = 0, most = 0;
     BST_TRY(bst_device_check(
         ctx, clGetDeviceInfo(bst_device_id(device), CL_DEVICE_TYPE, sizeof type, &type, NULL),
         "asking for the device's type"));
@@ -77,6 +80,11 @@ static bst_status choose_tiles(bst_ctx *ctx, const bst_device *device,
                              clGetDeviceInfo(bst_device_id(device), CL_DEVICE_LOCAL_MEM_SIZE,
                                              sizeof local_bytes, &local_bytes, NULL),
                              "asking for the device's local memory"));
+    BST_TRY(bst_device_check(ctx,
+                             clGetDeviceInfo(bst_device_id(device), CL_DEVICE_MAX_MEM_ALLOC_SIZE,
+                                             sizeof most, &most, NULL),
+                             "asking for the device's largest buffer"));
+    *most_bytes = most;
     if (options->tile_width == 0) {
         bool large = (type & CL_DEVICE_TYPE_CPU) && local_bytes >= 128 * 1024;
         options->tile_width = large ? 256 : 32;
@@ -102,9 +110,10 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
                                           &bst_kernel_light,        &bst_kernel_tile};
     char options[512];
     int length = snprintf(options, sizeof options,
-                          "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d%s",
+                          "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d "
+                          "-DPHASES=%d%s",
                           r->options.tile_width, r->options.tile_height, r->options.group, r->taps,
-                          r->fft_light ? " -DFFT_LIGHT" : "");
+                          r->phases, r->fft_light ? " -DFFT_LIGHT" : "");
     const bst_distortion *d = &r->camera.distortion;
     if (bst_camera_distorted(&r->camera)) {
         double a = bst_camera_scale_rad(&r->camera), a2 = a * a,
@@ -126,18 +135,33 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
     return BST_OK;
 }
 
-/* [BST_PHASES + 1][taps]: shares of a profile centred phase / BST_PHASES right of a pixel. */
+/* Phases between which the profile may be interpolated linearly: that misses
+ * 1 / (8 phases^2 sigma^2) of the peak, below 3e-6. */
+static int phases_for(double sigma_px) {
+    int phases = 8;
+    while (phases < 2048 && phases * sigma_px < 200.0) {
+        phases *= 2;
+    }
+    return phases;
+}
+
+/* [BST_WIDTHS + 1][phases + 1][taps]: shares of a profile centred phase / phases right of a pixel.
+ */
 static bst_status make_profiles(bst_ctx *ctx, bst_renderer *r) {
-    size_t bytes = (size_t)(BST_PHASES + 1) * (size_t)r->taps * sizeof(float);
+    size_t rows = (size_t)(BST_WIDTHS + 1) * (size_t)(r->phases + 1), taps = (size_t)r->taps;
+    size_t bytes = rows * taps * sizeof(float);
     float *table = malloc(bytes);
     if (!table) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the PSF table");
     }
-    double sigma = bst_camera_psf_sigma_px(&r->camera);
-    for (int p = 0; p <= BST_PHASES; p++) {
+    double psf = bst_camera_psf_sigma_px(&r->camera);
+    for (size_t row = 0; row < rows; row++) {
+        size_t width = row / (size_t)(r->phases + 1), phase = row % (size_t)(r->phases + 1);
+        double share = (double)width / BST_WIDTHS;
+        double sigma = psf * sqrt(1.0 + BST_WIDEST * share * share);
         for (int j = 0; j < r->taps; j++) {
-            table[p * r->taps + j] = (float)bst_reference_pixel_share((double)p / BST_PHASES, sigma,
-                                                                      j - (r->taps / 2 - 1));
+            table[row * taps + (size_t)j] = (float)bst_reference_pixel_share(
+                (double)phase / r->phases, sigma, j - (r->taps / 2 - 1));
         }
     }
     cl_int code;
@@ -157,6 +181,7 @@ static bst_status grow(bst_ctx *ctx, bst_renderer *r, growing *g, size_t bytes) 
         g->buffer = NULL;
     }
     size_t room = bytes > 2 * g->bytes ? bytes : 2 * g->bytes;
+    room = room > r->most_bytes ? bytes : room;
     room = room < 4096 ? 4096 : room;
     cl_int code;
     g->buffer =
@@ -206,13 +231,14 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     r->camera = *camera;
     r->options = options ? *options : bst_renderer_default_options();
     r->taps = taps_for(bst_camera_psf_sigma_px(camera));
+    r->phases = phases_for(bst_camera_psf_sigma_px(camera));
     r->context = bst_device_context(device);
     r->queue = bst_device_queue(device);
     clRetainContext(r->context);
     clRetainCommandQueue(r->queue);
     bst_smear_options smear = {
         .error_sigma = r->options.error_sigma, .cut_sigma = r->options.cut_sigma, .taps = r->taps};
-    bst_status status = choose_tiles(ctx, device, &r->options);
+    bst_status status = choose_tiles(ctx, device, &r->options, &r->most_bytes);
     if (status == BST_OK) {
         status = open_psf(ctx, device, r, &smear);
     }
@@ -307,11 +333,21 @@ static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *
     BST_TRY(bst_smear_begin(ctx, r->smear, q->track, q->background_e + read * read));
     r->stats = (bst_render_stats){0};
     *blocks = 0;
+    const uint64_t counted = (uint64_t)INT32_MAX * sizeof(float); /* by the kernels, in int */
+    uint64_t most = r->most_bytes < counted ? r->most_bytes : counted;
+    int most_blocks = (int)(most / NODE_BYTES);
     for (int i = 0; i < q->count; i++) {
         bst_scene_source *s = &r->list[r->stats.sources];
         bool visible;
         BST_TRY(bst_smear_source(ctx, r->smear, &q->sources[i], s, &visible));
         r->peak_e[i] = bst_smear_last_peak_e(r->smear);
+        if (visible && s->blocks > most_blocks - *blocks) {
+            return bst_fail(ctx, BST_ERR_RANGE,
+                            "the sources move too far in one exposure to be drawn: %d of %d need "
+                            "%.0f million points already; expose for a shorter time, turn more "
+                            "slowly, or draw fewer stars (v_limit)",
+                            r->stats.sources, q->count, 1e-6 * BST_BLOCK * *blocks);
+        }
         if (visible) {
             if (r->fft_light) {
                 bst_fft_light_stamp(r->fft_light, s);
@@ -344,7 +380,7 @@ static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, int blocks, int *
     size_t block_bytes = BST_BLOCK * sizeof(float);
     BST_TRY(upload(ctx, r, &r->table, table, (size_t)table_blocks * BST_TABLE_ROWS * block_bytes));
     BST_TRY(upload(ctx, r, &r->sources, r->list, (size_t)count * sizeof *r->list));
-    BST_TRY(grow(ctx, r, &r->nodes, (size_t)blocks * 3 * block_bytes));
+    BST_TRY(grow(ctx, r, &r->nodes, (size_t)blocks * NODE_BYTES));
     BST_TRY(grow(ctx, r, &r->block_box, (size_t)blocks * BOX_FLOATS * sizeof(float)));
     BST_TRY(grow(ctx, r, &r->source_box, (size_t)*groups * BOX_FLOATS * block_bytes));
     if (count == 0) {

@@ -138,7 +138,7 @@ __attribute__((reqd_work_group_size(DEPOSIT_GROUP, 1, 1))) kernel void bst_light
             for (int b = s.first_block; b < s.first_block + s.blocks; b++) {
                 float4 r = block_box[b];
                 if (r.x <= x1 && r.z >= x0 && r.y <= y1 && r.w >= y0) {
-                    deposit_block(p, sum, left, top, nodes + 3 * b, table, field);
+                    deposit_block(p, sum, left, top, nodes + BST_NODE_ROWS * b, table, field);
                 }
             }
         }

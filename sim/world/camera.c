@@ -53,6 +53,29 @@ const bst_config_desc bst_camera_config[] = {
     BST_CONFIG_END,
 };
 
+double bst_camera_illumination(const bst_camera *c, double x_px, double y_px) {
+    const bst_vignetting *v = &c->optics.vignetting;
+    if (v->model == BST_VIGNETTING_NONE && !(v->limit_px > 0.0)) {
+        return 1.0;
+    }
+    double dx = x_px - bst_camera_centre_x(c), dy = y_px - bst_camera_centre_y(c);
+    double r2 = dx * dx + dy * dy;
+    if (v->limit_px > 0.0 && r2 > v->limit_px * v->limit_px) {
+        return 0.0;
+    }
+    if (v->model == BST_VIGNETTING_COS4) {
+        double cosine = bst_camera_unproject(c, x_px, y_px).z;
+        return cosine * cosine * cosine * cosine;
+    }
+    if (v->model == BST_VIGNETTING_POLYNOMIAL) {
+        double width = (double)c->width_px, height = (double)c->height_px;
+        double s = r2 / (0.25 * (width * width + height * height));
+        return fmax(0.0, 1.0 + s * (v->coefficients[0] +
+                                    s * (v->coefficients[1] + s * v->coefficients[2])));
+    }
+    return 1.0;
+}
+
 double bst_camera_electrons_per_s(const bst_camera *c, double v_mag) {
     double area_m2 = 0.25 * BST_PI * c->aperture_m * c->aperture_m * (1.0 - c->obscuration);
     return c->photon_flux_v0_per_s_m2 * pow(10.0, -0.4 * v_mag) * area_m2 * c->throughput *

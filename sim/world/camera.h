@@ -145,6 +145,10 @@ static inline double bst_camera_shrink(const bst_camera *c) {
     return c->geometry.general ? c->geometry.shrink : 1.0;
 }
 
+/* Share of the light that reaches a pixel place past the vignetting, 0..1 (a polynomial may go
+ * beyond 1); 1 without. */
+double bst_camera_illumination(const bst_camera *c, double x_px, double y_px);
+
 /* Detected electrons per second of a source of magnitude v_mag:
  * photon_flux_v0 10^(-0.4 V) * pi/4 D^2 (1 - obscuration) * throughput * QE. */
 double bst_camera_electrons_per_s(const bst_camera *c, double v_mag);

@@ -3,7 +3,15 @@
 
     /usr/bin/python3 sim/world/make_star_counts.py tycho2.stars > sim/world/star_counts_table.h
 
-The shape is the Galaxy model of Bahcall and Soneira, integrated along each line of sight:
+From V 15 on the counts are those of Allen's Astrophysical Quantities by latitude, in
+data/star_counts_allen.csv beside this script: the mean over longitude is theirs. Up to V 11 the level is
+that of Tycho-2 (Hog et al. 2000, A&A 355, L27), counted between V 9.5 and 11, where it is complete: one
+factor per node of the table. Between V 11 and 15 the logarithm of the one correction goes over
+into that of the other, linearly in V. tycho2.stars is the file of `boresight stars fetch`.
+
+What is corrected, so what the two sources leave open (the course with longitude, with latitude
+between Allen's, with V below 15), is the Galaxy model of Bahcall and Soneira, integrated along
+each line of sight:
   ApJS 44, 73 (1980): disc n*=4.03e-3 /pc3/mag, M*=1.28, alpha=0.74, beta=0.04, 1/delta=3.40 (Tremaine,
       Ostriker and Spitzer 1975), -6 <= Mv <= 19, constant beyond 15; scale length 3.5 kpc, Sun at 8 kpc;
       scale heights 90 pc (Mv <= 2.3) rising linearly to 325 pc (Mv >= 5.1), giants 250 pc;
@@ -11,16 +19,15 @@ The shape is the Galaxy model of Bahcall and Soneira, integrated along each line
       spheroid: de Vaucouleurs' law in Young's form, effective radius 8/3 kpc, axis ratio 0.8, 1/500 of
       the disc at the Sun.
   Dust: an exponential disc of the stars' scale length and 100 pc height with 1.0 mag/kpc at the Sun.
-The level is that of Tycho-2 (Hog et al. 2000, A&A 355, L27) between V 9.5 and 11, where it is complete:
-one factor per node of the table, the same at all magnitudes. Both signs of latitude and longitude are
-averaged. tycho2.stars is the file of `boresight stars fetch`.
+Both signs of latitude and longitude are averaged.
 """
+import os
 import struct
 import sys
 
 import numpy as np
 
-B = np.array([0, 2, 4, 7, 10, 15, 20, 30, 40, 55, 70, 90.0])
+B = np.array([0, 2, 5, 7.5, 10, 15, 20, 30, 45, 60, 75, 90.0])
 L = np.arange(0, 181, 30.0)
 V = np.arange(6, 27.0)
 GALACTIC = np.array([[-0.0548755604162154, -0.8734370902348850, -0.4838350155487132],
@@ -112,9 +119,29 @@ def anchor(log_n, path):
     return log_c
 
 
+def allen(log_n):
+    """Corrections [b][V] that bring the table's mean over longitude to Allen's counts, at V >= 15."""
+    path = os.path.join(os.path.dirname(os.path.abspath(__file__)), "data", "star_counts_allen.csv")
+    lines = [line.split(",") for line in open(path) if line[0] != "#"]
+    v = np.array(lines[0][1:], float)
+    table = np.array(lines[1:], float)
+    b, counts = table[:, 0], table[:, 1:]
+    fine = np.linspace(0, 180, 1801)
+    fine = (fine[1:] + fine[:-1]) / 2
+    out = np.zeros((len(B), len(V)))
+    for k in range(len(V)):
+        j = np.clip(np.searchsorted(v, V[k]), 0, len(v) - 1)  # outside of Allen's range: its ends
+        at = np.where(V == v[j])[0][0]
+        mean = [np.mean(10 ** np.interp(fine, L, log_n[B == x, :, at][0])) for x in b]
+        out[:, k] = np.interp(B, b, counts[:, j] - np.log10(mean))
+    return out
+
+
 def main():
     log_n = np.log10(np.array([[model(l, b) for l in L] for b in B]))
-    log_n += anchor(log_n, sys.argv[1])[:, :, None]
+    faint = np.clip((V - 11) / 4, 0, 1)
+    log_n += ((1 - faint) * anchor(log_n, sys.argv[1])[:, :, None]
+              + (faint * allen(log_n))[:, None, :])
     print("/* Made by make_star_counts.py, which names the sources: 1000 log10 of the stars per square\n"
           " * degree brighter than V, at [|b|][|l|][V]. */\n#ifndef BST_WORLD_STAR_COUNTS_TABLE_H\n"
           "#define BST_WORLD_STAR_COUNTS_TABLE_H\n\n#include <stdint.h>\n\n"

@@ -9,6 +9,9 @@
 /* Gaussian OTF exp(-2 pi^2 sigma^2 f^2) falls below 1e-9 beyond this over sigma. */
 #define GAUSSIAN_CUTOFF 1.024617
 
+/* A Gaussian falls to 1e-9 of its peak at this times sigma. */
+#define GAUSSIAN_REACH 6.437899
+
 #define FWHM_PER_SIGMA 2.3548200450309493 /* 2 sqrt(2 ln 2) */
 
 static double sinc(double x) {
@@ -37,6 +40,10 @@ void bst_psf_otf(const bst_psf *psf, int node, double fx, double fy, double out[
 
 double bst_psf_cutoff(const bst_psf *psf) {
     return psf->cutoff;
+}
+
+double bst_psf_reach_px(const bst_psf *psf) {
+    return psf->reach_px;
 }
 
 int bst_psf_nodes(const bst_psf *psf) {
@@ -171,9 +178,12 @@ static bst_status make_profiles(bst_ctx *ctx, const bst_camera *camera, bst_psf 
         if (optics->psf == BST_PSF_GAUSSIAN) {
             psf->nodes[k].sigma_px = fwhm / FWHM_PER_SIGMA;
             psf->cutoff = fmax(psf->cutoff, GAUSSIAN_CUTOFF / psf->nodes[k].sigma_px);
+            psf->reach_px = fmax(psf->reach_px, GAUSSIAN_REACH * psf->nodes[k].sigma_px);
         } else {
             BST_TRY(make_moffat(ctx, &psf->nodes[k], fwhm, beta));
+            double alpha = 0.5 * fwhm / sqrt(exp2(1.0 / beta) - 1.0);
             psf->cutoff = fmax(psf->cutoff, psf->nodes[k].own_radial.limit);
+            psf->reach_px = fmax(psf->reach_px, alpha * pow(1e9, 0.5 / beta));
         }
     }
     return BST_OK;
@@ -195,6 +205,7 @@ static bst_status fill_in(bst_ctx *ctx, const bst_camera *camera, const bst_psf_
         /* both fall from 1: their product is below 1e-9 where either is */
         psf->cutoff = fmin(psf->cutoff, GAUSSIAN_CUTOFF / psf->diffusion_px);
     }
+    psf->reach_px += 1.0 + GAUSSIAN_REACH * psf->diffusion_px;
     return BST_OK;
 }
 

@@ -52,6 +52,10 @@ void bst_psf_otf(const bst_psf *psf, int node, double fx, double fy, double out[
 /* Frequency, cycles/px, beyond which the OTF without the pixel is below 1e-9. */
 double bst_psf_cutoff(const bst_psf *psf);
 
+/* Distance from its place, px, beyond which the light of a point per pixel, mean over the circle,
+ * is below 1e-9 of its peak. */
+double bst_psf_reach_px(const bst_psf *psf);
+
 /* Nodes of the field grid; 1: the same PSF all over. */
 int bst_psf_nodes(const bst_psf *psf);
 

@@ -10,16 +10,16 @@
 
 enum { MOST_WAVELENGTHS = 64 };
 
-/* Grid cells across the aperture at the longest wavelength: at least; with vanes; at most at the
- * shortest wavelength; and per wave of slope across the aperture. */
-enum { CELLS = 256, CELLS_VANES = 512, CELLS_MOST = 1024, CELLS_PER_WAVE = 16 };
+/* Grid cells across the aperture, counted at the shortest wavelength: at least; with vanes; at
+ * most; and per wave of slope across the aperture. */
+enum { CELLS = 384, CELLS_VANES = 512, CELLS_MOST = 1024, CELLS_PER_WAVE = 16 };
 
 /* The band as a sum. */
 typedef struct band {
     int count;
     double wavelength_m[MOST_WAVELENGTHS], weight[MOST_WAVELENGTHS];
     double q[MOST_WAVELENGTHS]; /* wavelength times focal ratio over pixel pitch */
-    double q_least, q_most;
+    double q_least;
 } band;
 
 /* Gauss-Legendre places and weights on [0, 1] (Abramowitz and Stegun 25.4.29): Newton's method on
@@ -98,7 +98,6 @@ static bst_status make_band(bst_ctx *ctx, const bst_camera *camera,
                             "least 0, and aperture_m and pixel_scale_arcsec (or optics/q) above 0");
         }
         b->q_least = fmin(b->q_least, b->q[k]);
-        b->q_most = fmax(b->q_most, b->q[k]);
         sum += b->weight[k];
     }
     if (!(sum > 0.0)) {
@@ -203,21 +202,20 @@ static bst_status make_tables(bst_ctx *ctx, const bst_camera *camera, const band
     if (!any) {
         return BST_OK;
     }
-    double longest_m = b->wavelength_m[0], ratio = b->q_most / b->q_least;
+    double shortest_m = b->wavelength_m[0];
     for (int k = 1; k < b->count; k++) {
-        longest_m = fmax(longest_m, b->wavelength_m[k]);
+        shortest_m = fmin(shortest_m, b->wavelength_m[k]);
     }
-    double waves = slope_m / longest_m, most = CELLS_MOST / ratio;
-    double cells = fmax(pupil.vanes > 0 ? CELLS_VANES : CELLS, ceil(CELLS_PER_WAVE * waves));
-    if (CELLS_PER_WAVE * waves > most) {
+    double waves = slope_m / shortest_m, most = (double)CELLS_MOST / CELLS_PER_WAVE;
+    if (waves > most) {
         return bst_fail(ctx, BST_ERR_CONFIG,
-                        "optics has aberrations with slopes of %.3g waves per aperture; at most "
-                        "%.3g can be sampled in this band: lower zernike_waves or defocus_um",
-                        waves, most / CELLS_PER_WAVE);
+                        "optics has aberrations with slopes of %.3g waves per aperture diameter; "
+                        "at most %g can be drawn: lower zernike_waves or defocus_um",
+                        waves, most);
     }
-    cells = fmin(cells, floor(most));
-    double step = 1.0 / (cells * b->q_most);
-    int reach = (int)ceil(cells * ratio) + 1;
+    double cells = fmax(pupil.vanes > 0 ? CELLS_VANES : CELLS, ceil(CELLS_PER_WAVE * waves));
+    double step = 1.0 / (cells * b->q_least);
+    int reach = (int)cells + 1;
     bst_pupil_work *work;
     BST_TRY(bst_pupil_work_create(ctx, reach, &work));
     bst_grid_otf base = {0};
@@ -255,6 +253,13 @@ bst_status bst_psf_make_diffraction(bst_ctx *ctx, const bst_camera *camera,
         }
     }
     psf->cutoff = 1.0 / b.q_least;
+    /* far out the mean over a circle of radius r is Q / (pi^3 r^3 (1 - e)), from the length of the
+     * aperture's rims; the peak is pi / 4 (1 - e^2) / Q^2 */
+    double e = pupil.inner, q_most = 0.0;
+    for (int k = 0; k < b.count; k++) {
+        q_most = fmax(q_most, b.q[k]);
+    }
+    psf->reach_px = q_most * cbrt(4e9 / (pow(BST_PI, 4.0) * (1.0 - e) * (1.0 - e) * (1.0 + e)));
     BST_TRY(bst_radial_create(ctx, psf->cutoff, &psf->shared));
     for (int i = 0; i < BST_RADIAL_NODES; i++) {
         double f = bst_radial_frequency(psf->cutoff, i), sum = 0.0;

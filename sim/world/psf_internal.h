@@ -6,7 +6,7 @@
 
 /* A real, circular OTF: values at f = limit (i / (BST_RADIAL_NODES - 1))^2, which follow a power of
  * the frequency at 0, as that of every PSF with wings has it. */
-enum { BST_RADIAL_NODES = 8192 };
+enum { BST_RADIAL_NODES = 16384 };
 typedef struct bst_radial_otf {
     double limit;  /* cycles/px; 0 beyond */
     double *value; /* [BST_RADIAL_NODES] */
@@ -56,7 +56,7 @@ struct bst_psf {
     int columns, rows;
     double width_px, height_px;
     double diffusion_px, fill[2];
-    double cutoff;
+    double cutoff, reach_px;
     bst_radial_otf shared; /* diffraction: unaberrated annulus, the same at all nodes */
     bst_psf_node *nodes;   /* [rows][columns] */
 };

@@ -151,6 +151,7 @@ bst_status bst_psf_make_sampled(bst_ctx *ctx, const bst_camera *camera,
                         "optics/field_columns and optics/field_rows",
                         samples->planes, nodes);
     }
+    psf->reach_px = hypot(samples->width, samples->height) / samples->oversampling;
     transform t = {0};
     bst_status status = transform_create(ctx, longest, &t);
     for (int k = 0; k < nodes && status == BST_OK; k++) {

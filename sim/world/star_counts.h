@@ -20,8 +20,10 @@ bst_vec3 bst_galactic_from_icrs(bst_vec3 icrs);
 bst_vec3 bst_icrs_from_galactic(bst_vec3 galactic);
 
 /* The counts towards `icrs` (unit): bilinear in |b| and |l| between the table's nodes.
- * Source: the Galaxy model of Bahcall and Soneira, ApJS 44, 73 (1980), with a disc of dust, brought
- * to the level of Tycho-2 at 9.5 < V <= 11; see make_star_counts.py. */
+ * From V 15 on the mean over longitude is the counts by latitude of Allen's Astrophysical
+ * Quantities (data/star_counts_allen.csv); up to V 11 the level is Tycho-2's. The course between
+ * and with longitude is that of the Galaxy model of Bahcall and Soneira, ApJS 44, 73 (1980), with a
+ * disc of dust; see make_star_counts.py. */
 void bst_star_counts_at(bst_vec3 icrs, bst_star_counts *out);
 
 /* Stars per square degree brighter than v. */

@@ -92,7 +92,8 @@ class BadInput(unittest.TestCase):
 
     def test_kernel_cache_that_cannot_be_written(self):
         result = self.call("run", runs.STARE, "--quiet", "--duration", "1", "--out",
-                           os.path.join(self.folder, "run"), POCL_CACHE_DIR="/dev/null/kcache")
+                           os.path.join(self.folder, "run"), "--set",
+                           "/world/star_catalogue=embedded", POCL_CACHE_DIR="/dev/null/kcache")
         if result.returncode == 0:
             self.skipTest("there is another OpenCL device than PoCL's")
         self.refused(result, "/dev/null/kcache")

@@ -129,22 +129,6 @@ static void light_is_the_integral_of_the_counts(void **state) {
     bst_assert_close(bst_star_counts_light(&counts, 15.2, 60) / all, 1.0, 1e-3); /* slope < 0.3 */
 }
 
-/* The published whole-sky mean, log10 N = -0.0003 V^3 + 0.0019 V^2 + 0.484 V - 3.82 per square
- * degree (a fit to Allen's Astrophysical Quantities, 4 <= V <= 25), and Tycho-2's own numbers. */
-static void table_agrees_with_other_counts(void **state) {
-    (void)state;
-    for (int v = 9; v <= 20; v++) {
-        range r = {NULL, -30, v};
-        double mean = over_cap((bst_vec3){0, 0, 1}, BST_PI, table_density, &r) / 41252.96;
-        double allen = pow(10, -0.0003 * v * v * v + 0.0019 * v * v + 0.484 * v - 3.82);
-        bst_assert_close(mean / allen, 1.0, 0.25); /* the two sources' own disagreement */
-        if (v == 10 || v == 11) {
-            /* the anchor makes it exact between 9.5 and 11 but for the table's steps */
-            bst_assert_close(mean * 41252.96 / (v == 10 ? 357173.0 : 946005.0), 1.0, 0.09);
-        }
-    }
-}
-
 /* Twelve fields of 100 square degrees: both galactic poles, both celestial poles, the plane, the
  * centre with its catalogue patch, the wrap of right ascension. */
 static void fields_have_the_tables_counts(void **state) {
@@ -533,7 +517,6 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(galactic_axes_are_erfas),
         cmocka_unit_test(light_is_the_integral_of_the_counts),
-        cmocka_unit_test(table_agrees_with_other_counts),
         cmocka_unit_test(fields_have_the_tables_counts),
         cmocka_unit_test(deep_fields_have_the_tables_counts),
         cmocka_unit_test(whole_sky_is_as_rich_as_tycho2),

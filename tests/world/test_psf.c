@@ -155,7 +155,7 @@ static void the_annulus_has_its_closed_form(void **state) {
             bst_psf_otf(psf, 0, fx, fy, h);
             worst = fmax(worst, fabs(h[0] - oneill(ratios[n], s) * sinc(fx) * sinc(fy)));
         }
-        assert_true(worst < 5e-7); /* as above, and the inner circle's own square roots */
+        assert_true(worst < 8e-7); /* as above, and the inner circle's own square roots */
         bst_psf_free(psf);
     }
 }
@@ -239,7 +239,7 @@ static void defocus_has_its_closed_form_on_the_axis(void **state) {
         camera.optics.band_nm[1] = 560.0;
         camera.optics.zernike_waves.waves[4 - 2] = a4;
         double w = sinc(2.0 * sqrt(3.0) * a4 * (1.0 - e2));
-        bst_assert_close(strehl(&camera), w * w, 2e-5); /* cells of 1/256 of the aperture */
+        bst_assert_close(strehl(&camera), w * w, 3e-5); /* cells of 1/384 of the aperture */
     }
 }
 
@@ -250,7 +250,7 @@ static void a_detector_out_of_focus_is_term_4(void **state) {
     camera.optics.defocus_um = 20.0;
     /* W020 = dz / (8 F^2) = 0.15625 um at 551 nm (middle of the default band) */
     double w = sinc(20e-6 / (8.0 * 16.0) / 551e-9);
-    bst_assert_close(strehl(&camera), w * w, 2e-5);
+    bst_assert_close(strehl(&camera), w * w, 3e-5); /* as above */
 }
 
 /* Marechal: 1 - (2 pi sigma)^2 to second order, whatever the terms. */
@@ -280,7 +280,7 @@ static void tilt_moves_the_image(void **state) {
         bst_psf_otf(psf, 0, fx, fy, h);
         bst_psf_otf(still, 0, fx, fy, s);
         /* 4 x 0.25 waves across the aperture are one lambda F: Q = 2 px towards +x */
-        bst_assert_close(h[0], s[0] * cos(4.0 * BST_PI * fx), 2e-5); /* cells of 1/256 */
+        bst_assert_close(h[0], s[0] * cos(4.0 * BST_PI * fx), 2e-5); /* cells of 1/384 */
         bst_assert_close(h[1], -s[0] * sin(4.0 * BST_PI * fx), 2e-5);
     }
     bst_psf_free(psf);
@@ -305,11 +305,11 @@ static void brute_otf(const bst_camera *camera, const double amounts[38], double
             double x = (i + 0.5) / N - 0.5, y = (j + 0.5) / N - 0.5, r2 = x * x + y * y;
             bool light = r2 < 0.25 && r2 > 0.25 * camera->obscuration;
             for (int k = 0; k < o->spiders.count; k++) {
-                double t = (o->spiders.angle_deg + 360.0 * k / (double)o->spiders.count) / 180.0 *
-                           BST_PI;
+                double t =
+                    (o->spiders.angle_deg + 360.0 * k / (double)o->spiders.count) / 180.0 * BST_PI;
                 double along = x * cos(t) + y * sin(t), across = y * cos(t) - x * sin(t);
-                light = light && !(along > 0.0 && fabs(across) <
-                                                      0.5 * o->spiders.width_m / camera->aperture_m);
+                light = light && !(along > 0.0 &&
+                                   fabs(across) < 0.5 * o->spiders.width_m / camera->aperture_m);
             }
             open[j][i] = light;
             phase[j][i] = 2.0 * BST_PI * bst_zernike_at(&z, 2.0 * x, 2.0 * y);
@@ -341,7 +341,7 @@ static void an_aberrated_spidered_aperture_is_its_autocorrelation(void **state) 
         camera.optics.zernike_waves.waves[j - 2] = amounts[j];
     }
     bst_psf *psf = psf_of(&camera);
-    const int shifts[][2] = {{70, 0},    {0, 210},  {-300, 140}, {433, 77}, {-11, -29},
+    const int shifts[][2] = {{70, 0},    {0, 210}, {-300, 140}, {433, 77}, {-11, -29},
                              {640, 640}, {28, -9}, {1000, 500}, {0, 0}};
     for (int k = 0; k < 9; k++) {
         double sx = shifts[k][0] / 1400.0, sy = shifts[k][1] / 1400.0, want[2], h[2];
