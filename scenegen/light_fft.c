@@ -13,6 +13,13 @@
  * lines and few pages. */
 enum { TILE = 16, TILE_FLOATS = 2 * TILE * TILE, LINE = 16 /* floats of a cache line */ };
 
+/* Pixels from `begin` on lie between the centres of `cell` and the next; the first one at `place`
+ * of the way. */
+typedef struct stretch {
+    int begin, cell;
+    float place;
+} stretch;
+
 /* Working memory of one part; as many as there are threads. */
 typedef struct bench {
     atomic_flag taken;
@@ -43,6 +50,8 @@ struct bst_light_fft {
     bst_light_wrap *wrap;
     int cell, cells_x, cells_y; /* samples per cell, per axis; cells */
     float *cells;
+    stretch *stretches;
+    int stretch_count;
 };
 
 /* What a loop's parts need to know. */
@@ -161,6 +170,33 @@ static bst_status make_plans(bst_ctx *ctx, bst_light_fft *f) {
                           f->shape.x.samples, f->shape.y.samples);
 }
 
+/* Place on one axis of the cells' centres: the lower cell and the share of the way to the next,
+ * which is below 0 or above 1 at the ends. */
+static double cell_place(const bst_light_fft *f, const bst_light_axis *axis, int cells, int pixel,
+                         int *lower) {
+    double sample = (pixel + f->shape.margin) * (double)axis->samples / axis->pixels;
+    double place = (sample + 0.5) / f->cell - 0.5;
+    *lower = (int)fmin(fmax(floor(place), 0.0), cells - 2.0);
+    return place - *lower;
+}
+
+/* Stretches of a row between the same two cells' centres. */
+static bst_status make_stretches(bst_ctx *ctx, bst_light_fft *f) {
+    f->stretches = malloc((size_t)f->cells_x * sizeof *f->stretches);
+    if (!f->stretches) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the far wings");
+    }
+    for (int x = 0, last = -1; x < f->shape.width; x++) {
+        int cell;
+        double u = cell_place(f, &f->shape.x, f->cells_x, x, &cell);
+        if (cell != last) {
+            f->stretches[f->stretch_count++] = (stretch){x, cell, (float)u};
+        }
+        last = cell;
+    }
+    return BST_OK;
+}
+
 static bst_status make_wrap(bst_ctx *ctx, bst_light_fft *f) {
     const bst_light_axis *x = &f->shape.x, *y = &f->shape.y;
     /* cells well below the distance from which wings wrap */
@@ -171,6 +207,7 @@ static bst_status make_wrap(bst_ctx *ctx, bst_light_fft *f) {
     if (!f->cells) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the far wings");
     }
+    BST_TRY(make_stretches(ctx, f));
     bst_light_wrap_axis wx = {x->pixels, f->cells_x, (double)f->cell * x->pixels / x->samples,
                               f->shape.width + f->shape.margin};
     bst_light_wrap_axis wy = {y->pixels, f->cells_y, (double)f->cell * y->pixels / y->samples,
@@ -239,6 +276,7 @@ void bst_light_fft_free(bst_light_fft *f) {
     fftwf_free(f->spectrum);
     free(f->benches);
     free(f->cells);
+    free(f->stretches);
     free(f->table);
     free(f->reach);
     free(f->first);
@@ -294,12 +332,16 @@ static float *tile_of(const bst_light_fft *f, int column, int row_block) {
            ((size_t)(column / TILE) * (size_t)f->row_blocks + (size_t)row_block) * TILE_FLOATS;
 }
 
-/* Copies between rows and tiles, complex numbers of a tile's side each way. */
+/* Copies between rows and tiles, complex numbers of a tile's side each way; two by two, so that
+ * whole vectors are written. */
 static void transpose(const float *from, size_t from_pitch, float *to, size_t to_pitch) {
-    for (int c = 0; c < TILE; c++) {
-        for (int r = 0; r < TILE; r++) {
-            memcpy(to + (size_t)c * to_pitch + 2 * r, from + (size_t)r * from_pitch + 2 * c,
-                   2 * sizeof *to);
+    for (int r = 0; r < TILE; r += 2) {
+        for (int c = 0; c < TILE; c += 2) {
+            const float *a = from + (size_t)r * from_pitch + 2 * c, *b = a + from_pitch;
+            float *x = to + (size_t)c * to_pitch + 2 * r;
+            float first[4] = {a[0], a[1], b[0], b[1]}, second[4] = {a[2], a[3], b[2], b[3]};
+            memcpy(x, first, sizeof first);
+            memcpy(x + to_pitch, second, sizeof second);
         }
     }
 }
@@ -458,27 +500,20 @@ void bst_light_fft_add(bst_light_fft *f, int node, bool first, bool last, float 
 
 /* ------------------------------------------------------------------ rows inverse */
 
-/* Adds a row between the cells' centres, linearly. */
+/* Adds the far wings of a row, linearly between the cells' centres. */
 static void add_wings(const bst_light_fft *f, int row, float *image) {
-    double down =
-        ((row + f->shape.margin) * (double)f->shape.y.samples / f->shape.y.pixels + 0.5) / f->cell -
-        0.5;
-    double across = (double)f->shape.x.samples / f->shape.x.pixels / f->cell;
-    double start = (f->shape.margin * across) + 0.5 / f->cell - 0.5;
-    int j = (int)fmin(fmax(floor(down), 0.0), f->cells_y - 2.0);
-    float v = (float)(down - j);
+    int j;
+    float v = (float)cell_place(f, &f->shape.y, f->cells_y, row, &j);
     const float *a = f->cells + (size_t)j * (size_t)f->cells_x, *b = a + f->cells_x;
-    for (int x = 0; x < f->shape.width;) {
-        int i = (int)fmin(fmax(floor(start + x * across), 0.0), f->cells_x - 2.0);
-        int end = (int)ceil((i + 1 - start) / across);
-        end = end <= x ? x + 1 : end > f->shape.width ? f->shape.width : end;
+    float step = (float)((double)f->shape.x.samples / f->shape.x.pixels / f->cell);
+    for (int n = 0; n < f->stretch_count; n++) {
+        const stretch *s = &f->stretches[n];
+        int i = s->cell, end = n + 1 < f->stretch_count ? s[1].begin : f->shape.width;
         float left = a[i] + v * (b[i] - a[i]), right = a[i + 1] + v * (b[i + 1] - a[i + 1]);
-        float slope = (right - left) * (float)across;
-        float base = left + slope * (float)((start + x * across - i) / across);
-        for (int k = 0; k < end - x; k++) {
-            image[x + k] += base + slope * (float)k;
+        float base = left + s->place * (right - left), slope = step * (right - left);
+        for (int k = 0; k < end - s->begin; k++) {
+            image[s->begin + k] += base + slope * (float)k;
         }
-        x = end;
     }
 }
 

@@ -66,8 +66,7 @@ static void exact_image(const bst_psf *psf, bst_window w, const spot *spots, int
             (*to)[1] += v[0] * otf[1] + v[1] * otf[0];
         }
     }
-    fftw_plan plan =
-        fftw_plan_dft_2d(period, period, folded, folded, FFTW_BACKWARD, FFTW_ESTIMATE);
+    fftw_plan plan = fftw_plan_dft_2d(period, period, folded, folded, FFTW_BACKWARD, FFTW_ESTIMATE);
     fftw_execute(plan);
     fftw_destroy_plan(plan);
     for (int y = 0; y < w.height; y++) {
@@ -135,10 +134,7 @@ static errors compare(const float *fast, const double *exact, size_t pixels) {
 
 /* A straight, uniform streak of `travel_px` along (1, 0.4) for every star. */
 static scene_track straight(const bst_camera *c, double travel_px) {
-    scene_motion m = {.x_px = travel_px,
-                      .y_px = 0.4 * travel_px,
-                      .duration_s = 1.0,
-                      .samples = 2};
+    scene_motion m = {.x_px = travel_px, .y_px = 0.4 * travel_px, .duration_s = 1.0, .samples = 2};
     return scene_track_make(c, &m);
 }
 
@@ -154,8 +150,7 @@ static errors run(fixture *f, const bst_camera *c, bst_window w, const bst_sourc
     bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, c, NULL, &r));
     bst_assert_ok(&f->ctx, bst_psf_create(&f->ctx, c, &psf));
     scene_track track = straight(c, travel_px);
-    bst_render_request q = {
-        .window = w, .track = &track.track, .sources = stars, .count = count};
+    bst_render_request q = {.window = w, .track = &track.track, .sources = stars, .count = count};
     size_t pixels = (size_t)w.width * (size_t)w.height;
     float *fast = malloc(pixels * sizeof *fast);
     double *exact = calloc(pixels, sizeof *exact);
