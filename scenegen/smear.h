@@ -14,6 +14,9 @@ typedef struct bst_smear_options {
     double error_sigma; /* aim: error of a source's image in any pixel, in that pixel's sigma */
     double cut_sigma;   /* light per pixel outside the stamp, in sigma of a dark pixel */
     int taps;           /* length of the profile table, px */
+    /* for a PSF that is no Gaussian, else 0: those that need nodes as fine, and that put as much of
+     * a point's light in one pixel */
+    double node_sigma_px, share_sigma_px;
 } bst_smear_options;
 
 bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
