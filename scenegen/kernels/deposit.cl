@@ -91,7 +91,9 @@ static void deposit_block(bst_deposit_params p, local float *sum, int tile_x, in
     vstore16(block[0], 0, px);
     vstore16(block[1], 0, py);
 #endif
-    for (int n = 0; n < 16; n++) {
+    for (int i = 0; i < 16; i++) {
+        /* neighbours write to the same samples: apart from each other they need not wait */
+        int n = 7 * i & 15;
         if (!hits[n]) {
             continue;
         }
