@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "bst_scenegen_kernels.h"
 #include "scenegen/kernels/deposit_shared.h"
@@ -16,7 +17,7 @@ typedef struct setup {
     int width, height;
     long long used; /* number of the call that used it last */
     bst_light_fft *fft;
-    cl_mem table; /* [2][BST_SPREAD_PHASES + 1][BST_SPREAD_ROW] */
+    cl_mem table; /* [2][BST_SPREAD_TABLE] */
     cl_mem grid;
 } setup;
 
@@ -27,6 +28,7 @@ struct bst_fft_light {
     bst_light_band band;
     double density[2];
     double error;
+    double widest; /* widening of nodes that the spreading kernel takes, of the node variance */
     int margin;
     bst_parallel *pool;
     cl_context context;
@@ -71,9 +73,8 @@ static bst_status build(bst_ctx *ctx, bst_device *device, bst_fft_light *l) {
                                           &bst_kernel_deposit};
     char options[256];
     snprintf(options, sizeof options,
-             "-cl-std=CL1.2 -DDEPOSIT_W=%d -DDEPOSIT_H=%d -DDEPOSIT_GROUP=%d -DSPREAD_TAPS=%d%s",
-             l->tile_width, l->tile_height, l->group, l->options.taps,
-             l->nodes > 1 ? " -DFIELD" : "");
+             "-cl-std=CL1.2 -DDEPOSIT_W=%d -DDEPOSIT_H=%d -DDEPOSIT_GROUP=%d%s", l->tile_width,
+             l->tile_height, l->group, l->nodes > 1 ? " -DFIELD" : "");
     BST_TRY(bst_device_build(ctx, device, sources, 3, options, &l->program));
     cl_int code;
     l->kernel = clCreateKernel(l->program, "bst_light_deposit", &code);
@@ -126,6 +127,7 @@ static bst_status prepare(bst_ctx *ctx, bst_device *device, bst_fft_light *l) {
         l->density[a] =
             bst_light_density(&l->band, a, l->options.taps, 0.45 * l->options.tolerance);
     }
+    l->widest = 1.0;
     l->margin = (l->band.reach_px + 15) / 16 * 16;
     return make_fields(ctx, l);
 }
@@ -209,19 +211,30 @@ int bst_fft_light_margin_px(const bst_fft_light *l) {
 void bst_fft_light_stamp(const bst_fft_light *l, bst_scene_source *source) {
     double least = fmin(l->density[0], l->density[1]);
     source->radius = (int)ceil(0.5 * l->options.taps / least) + 1;
-    source->chunks = (2 * source->radius + 2 + 15) / 16;
 }
 
 double bst_fft_light_error(const bst_fft_light *l) {
     return l->error;
 }
 
-/* Table of the spreading kernel for a point `phase` samples right of sample taps / 2 - 1. */
-static void tabulate(const bst_spread *spread, float *table) {
-    for (int p = 0; p <= BST_SPREAD_PHASES; p++) {
-        for (int j = 0; j < BST_SPREAD_ROW; j++) {
-            double t = j - (spread->taps / 2 - 1) - (double)p / BST_SPREAD_PHASES;
-            *table++ = j < spread->taps ? (float)bst_spread_value(spread, t) : 0.0f;
+/* Table of the spreading kernel for a point `phase` samples right of sample taps / 2 - 1, and of
+ * kernels for nodes that are wider by (n / BST_WIDTHS)^2 BST_WIDEST times `variance` px^2. */
+static void tabulate(const bst_fft_light *l, int a, const bst_light_axis *axis, float *table) {
+    double density = (double)axis->samples / axis->pixels;
+    int first = BST_SPREAD_TAPS / 2 - axis->spread.taps / 2;
+    memset(table, 0, BST_SPREAD_TABLE * sizeof *table);
+    for (int n = 0; n <= BST_WIDTHS; n++) {
+        double share = (double)n / BST_WIDTHS, sigma = share * l->band.node_sigma_px * density;
+        double variance = fmin(BST_WIDEST, l->widest) * sigma * sigma;
+        bst_spread_shape shape;
+        bst_spread_widen(&axis->spread, &l->band.axis[a], density, variance, &shape);
+        for (int p = 0; p <= BST_SPREAD_PHASES; p++) {
+            float *row =
+                table + (n * (BST_SPREAD_PHASES + 1) + p) * BST_SPREAD_ROW + BST_SPREAD_PAD;
+            for (int j = first; j < first + axis->spread.taps; j++) {
+                double t = j - (BST_SPREAD_TAPS / 2 - 1) - (double)p / BST_SPREAD_PHASES;
+                row[j] = (float)bst_spread_shape_value(&axis->spread, &shape, t);
+            }
         }
     }
 }
@@ -236,12 +249,17 @@ static bst_status make_setup(bst_ctx *ctx, bst_fft_light *l, bst_window window, 
     BST_TRY(bst_light_fft_create(ctx, l->psf, l->band.cutoff, &shape, l->pool, &s->fft));
     s->width = window.width;
     s->height = window.height;
-    float table[2 * (BST_SPREAD_PHASES + 1) * BST_SPREAD_ROW];
-    tabulate(&shape.x.spread, table);
-    tabulate(&shape.y.spread, table + (BST_SPREAD_PHASES + 1) * BST_SPREAD_ROW);
+    size_t table_bytes = 2 * BST_SPREAD_TABLE * sizeof(float);
+    float *table = malloc(table_bytes);
+    if (!table) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the spreading kernel's table");
+    }
+    tabulate(l, 0, &shape.x, table);
+    tabulate(l, 1, &shape.y, table + BST_SPREAD_TABLE);
     cl_int code;
-    s->table = clCreateBuffer(l->context, CL_MEM_READ_ONLY | CL_MEM_COPY_HOST_PTR, sizeof table,
+    s->table = clCreateBuffer(l->context, CL_MEM_READ_ONLY | CL_MEM_COPY_HOST_PTR, table_bytes,
                               table, &code);
+    free(table);
     BST_TRY(bst_device_check(ctx, code, "allocating the spreading kernel's table"));
     size_t bytes =
         (size_t)bst_light_fft_rows(s->fft) * (size_t)bst_light_fft_pitch(s->fft) * sizeof(float);

@@ -30,4 +30,16 @@ typedef struct bst_spread_band {
  * band. */
 double bst_spread_choose(bst_spread *spread, const bst_spread_band *band, double density);
 
+/* A kernel that also widens: phi(t) (c0 + c1 z^2 + c2 z^4), z = 2 t / taps. */
+typedef struct bst_spread_shape {
+    double c[3];
+} bst_spread_shape;
+
+/* The coefficients with which the grid shows, after division by phi's own transform, the PSF
+ * widened by a Gaussian of `variance` samples^2 (least squares over the band; the
+ * light is kept exactly). Returns the error relative to the PSF's peak. */
+double bst_spread_widen(const bst_spread *spread, const bst_spread_band *band, double density,
+                        double variance, bst_spread_shape *out);
+double bst_spread_shape_value(const bst_spread *spread, const bst_spread_shape *shape, double t);
+
 #endif

@@ -9,7 +9,7 @@ static void load_tile(local float *sum, bst_scene_params p, int left, int top,
          * vector */
         for (int x = 0; x < columns; x += 16) {
             vstore16(fmax(vload16(0, image + (size_t)y * p.light_pitch + x), 0.0f), 0,
-                     sum + y * STRIDE + PAD + x);
+                     sum + y * STRIDE + x);
         }
     }
 }
