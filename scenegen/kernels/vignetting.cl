@@ -15,7 +15,7 @@ static void shade_tile(local float *sum, int tile_x, int tile_y) {
             float16 share = fmax(1.0f + s * (V1 + s * (V2 + s * V3)), (float16)0.0f);
 #endif
             share = select(share, (float16)0.0f, s > LIMIT2);
-            local float *at = sum + y * STRIDE + PAD + x;
+            local float *at = sum + y * STRIDE + x;
             vstore16(share * vload16(0, at), 0, at);
         }
     }
