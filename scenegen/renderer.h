@@ -17,8 +17,9 @@ typedef struct bst_renderer bst_renderer;
 typedef struct bst_renderer_options {
     double tolerance_sigma; /* error of each source's image in any pixel that is allowed, in sigma
                                of that pixel (0.05) */
+    bst_rng_key pattern;    /* of the detector's fixed patterns */
     int pool_frames;        /* frames that may be alive at a time (4) */
-    int tile_width, tile_height, group; /* pixels per work-item (width a multiple of 16) and
+    int tile_width, tile_height, group; /* pixels per work-item (width a multiple of 64) and
                                            work-items per group; 0: chosen for the device */
 } bst_renderer_options;
 
@@ -38,7 +39,10 @@ typedef struct bst_render_request {
     const bst_los_track *track; /* its last time is the exposure's duration */
     const bst_source *sources;
     int count;
-    double background_e; /* expected electrons per pixel: sky and dark current */
+    double background_e; /* expected electrons per sensor pixel: sky and dark current */
+    double dark_e;       /* of them, dark current (a map of it, if there is one, takes its place) */
+    int binning; /* 2 or more: so many pixels per side are added before they are read, and the
+                    frame is smaller; window sides that are no multiple lose the rest */
     bst_rng_key key;
     int64_t exposure_id;
 } bst_render_request;
@@ -48,6 +52,8 @@ typedef struct bst_render_stats {
     int sources;            /* drawn */
     long long nodes;        /* all sources, filled blocks included */
     double predicted_sigma; /* largest predicted error of a source's image, sigma */
+    int hits;               /* radiation hits on the sensor */
+    double hits_e;          /* their charge */
 } bst_render_stats;
 
 /* Renders; does not wait. *out gets a frame with one reference. */

@@ -72,6 +72,11 @@ static void destroy(void *self) {
     }
 }
 
+/* The detector is the same in all runs of a study: its patterns come from its names alone. */
+static bst_rng_key pattern_key(const bst_module_env *env, const bst_camera *camera) {
+    return bst_rng_make_key(camera->detector.pattern_seed, 0, env->instance, "pattern");
+}
+
 static bst_status create(const bst_module_env *env, const void *config_object, void **self) {
     const scenegen_config *c = config_object;
     scenegen *s = calloc(1, sizeof *s);
@@ -85,6 +90,7 @@ static bst_status create(const bst_module_env *env, const void *config_object, v
     bst_renderer_options options = bst_renderer_default_options();
     options.tolerance_sigma = c->fidelity.tolerance_sigma;
     options.pool_frames = (int)c->pool_frames;
+    options.pattern = pattern_key(env, s->camera);
     bst_status status =
         bst_renderer_create(env->ctx, env->device, s->camera, &options, &s->renderer);
     if (status == BST_OK) {
@@ -162,12 +168,6 @@ static bst_status write_items(bst_ctx *ctx, scenegen *s, const bst_los_track *tr
 static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure *e,
                          const bst_los_history *history) {
     bst_ctx *ctx = bst_step_ctx(step);
-    if (e->binning > 1) {
-        return bst_fail(ctx, BST_ERR_CONFIG,
-                        "exposure %lld asks for binning %d; the renderer reads every pixel out by "
-                        "itself: use binning 1",
-                        (long long)e->id, e->binning);
-    }
     bst_los_track track;
     BST_TRY(bst_field_track(ctx, s->field, history, e->start_tick, e->end_tick, s->tick_rate_hz,
                             &track));
@@ -183,6 +183,8 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
                                   .sources = sources,
                                   .count = count,
                                   .background_e = truth->background_e + truth->dark_e,
+                                  .dark_e = truth->dark_e,
+                                  .binning = e->binning,
                                   .key = s->key,
                                   .exposure_id = e->id};
     if (e->dropped) {
@@ -196,9 +198,13 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
                                        .start_tick = e->start_tick,
                                        .end_tick = e->end_tick,
                                        .window = e->window,
-                                       .binning = 1,
+                                       .binning = e->binning > 1 ? e->binning : 1,
                                        .bits = (int)s->camera->bits};
     }
+    bst_render_stats stats;
+    bst_renderer_get_stats(s->renderer, &stats);
+    truth->hits = stats.hits;
+    truth->hits_e = stats.hits_e;
     /* while the device renders */
     BST_TRY(write_items(ctx, s, &track, sources, count, e, truth, capacity));
     if (truth->lost > 0) {

@@ -148,6 +148,8 @@ typedef struct bst_truth {
     bst_vec3 sun_m;                        /* observer to Sun, mid */
     double boresight_x_px, boresight_y_px; /* where the boresight meets the focal plane */
     double background_e, dark_e;           /* expected electrons per pixel */
+    double hits_e;                         /* charge of the radiation hits on the sensor, electrons */
+    int32_t hits;                          /* radiation hits */
     int32_t count, lost;                   /* items; sources that found no room */
     bst_truth_item items[];
 } bst_truth;

@@ -32,7 +32,7 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
     clock->tick_rate_hz = env->tick_rate_hz;
     clock->full = (bst_window){0, 0, (int)camera->width_px, (int)camera->height_px};
     clock->window = clock->full;
-    clock->binning = 1;
+    clock->binning = c->binning > 1 ? (int)c->binning : 1;
     clock->dropped_fraction = c->dropped_fraction;
     clock->drop_key = bst_env_rng(env, "dropped_frames");
     bst_status status =

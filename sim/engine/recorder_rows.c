@@ -150,6 +150,8 @@ static bst_status exposure_row(bst_ctx *ctx, bst_recorder *recorder, int sensor,
     put_real(&r, t->dark_e);
     put_int(&r, t->count);
     put_int(&r, t->lost);
+    put_int(&r, t->hits);
+    put_real(&r, t->hits_e);
     return append(ctx, recorder, BST_TABLE_EXPOSURES, &r);
 }
 

@@ -80,6 +80,8 @@ static const bst_column exposure_columns[] = {
     REAL("dark_e", "e-/px", "expected dark electrons"),
     INT("sources", "", "sources with a truth item"),
     INT("lost", "", "sources that found no room"),
+    INT("hits", "", "radiation hits on the sensor"),
+    REAL("hits_e", "e-", "their charge"),
 };
 static const bst_column truth_columns[] = {
     SENSOR,

@@ -68,7 +68,7 @@ void bst_fits_put_run_keys(fitsfile *file, const bst_fits_names *names, int *cod
     put_real(file, "PIXSCALE", c->pixel_scale_arcsec, "[arcsec/pixel] at the boresight, unbinned",
              code);
     put_real(file, "ZEROPNT", zero_point_mag(c), "[mag] V of a source of 1 detected e-/s", code);
-    put_real(file, "DARKCUR", c->dark_current_e_per_s, "[e-/s] dark current per pixel", code);
+    put_real(file, "DARKCUR", bst_camera_dark_e_per_s(c), "[e-/s] dark current per pixel", code);
     put_real(file, "APTDIA", c->aperture_m, "[m] diameter of the entrance pupil", code);
     bst_fits_put_lens(file, c, code);
     fits_write_key_str(file, "TIMESYS", "UTC", "time scale of the dates", code);

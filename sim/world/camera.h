@@ -8,6 +8,7 @@
 
 #include "sim/core/config.h"
 #include "sim/core/vec.h"
+#include "sim/world/detector_config.h"
 #include "sim/world/psf_config.h"
 
 /* Lens distortion in the focal plane's tangent coordinates u = (x, y), r^2 = x^2 + y^2, in units of
@@ -52,6 +53,7 @@ typedef struct bst_camera {
     bst_optics_config optics;  /* PSF (see psf.h) and vignetting */
     const struct bst_psf *psf; /* made of this camera, lent to its copies, or NULL; a copy whose
                                   optics, aperture or scale are changed must clear it */
+    bst_detector_config detector;
     bst_camera_geometry
         geometry; /* by bst_camera_prepare; all zero: neither turned nor distorted */
 } bst_camera;
@@ -165,5 +167,7 @@ double bst_camera_v_mag(const bst_camera *c, double electrons_per_s);
  * over the sensor, whatever solid angle gnomonic projection and distortion give a pixel there, as
  * after a flat field. */
 double bst_camera_background_e_per_s(const bst_camera *c);
+/* Mean dark current at the detector's temperature, e-/s, without hot pixels and maps. */
+double bst_camera_dark_e_per_s(const bst_camera *c);
 
 #endif

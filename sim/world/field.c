@@ -380,7 +380,7 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     truth->boresight_x_px = bst_camera_centre_x(camera);
     truth->boresight_y_px = bst_camera_centre_y(camera);
     truth->background_e = bst_camera_background_e_per_s(camera) * exposure;
-    truth->dark_e = camera->dark_current_e_per_s * exposure;
+    truth->dark_e = bst_camera_dark_e_per_s(camera) * exposure;
 
     double margin_px = options->margin_px + reach_px;
     bst_vec3 centre_cam = bst_camera_unproject(camera, window.x0 + 0.5 * (window.width - 1),

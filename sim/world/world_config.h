@@ -94,6 +94,7 @@ typedef struct bst_cue_config {
 typedef struct bst_exposure_config {
     double exposure_s, period_s, first_s;
     double dropped_fraction;
+    int64_t binning; /* sensor pixels per side of a pixel that is read */
 } bst_exposure_config;
 
 /* Errors of the onboard star catalogue; a star's fate follows from its identity and the seed. */
