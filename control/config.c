@@ -43,6 +43,8 @@ const bst_config_desc bst_control_config_table[] = {
             "Detections that make a tentative track with a plausible rate a candidate."),
     BST_REAL(C, candidate_rate_sigmas, "", 0.1, 1000, "4",
              "A candidate's rate is within this many sigma of the cue's."),
+    BST_REAL(C, candidate_score, "", 0, 1e3, "7",
+             "Least log-likelihood ratio of a candidate against chance pairings of detections."),
     BST_REAL(C, acquire_timeout_s, "s", 0.1, 1e6, "20",
              "A candidate that is not confirmed within this time is given up."),
     BST_REAL(C, track_entry_px, "px", 0.01, 10000, "3",

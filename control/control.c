@@ -226,7 +226,8 @@ static bst_status best_candidate(bst_ctx *ctx, const bst_control *c, const bst_t
     double widest = fmax(2.0 * own, bst_vec3_norm(rate));
     for (int i = 0; i < tracks->count; i++) {
         const bst_track *t = &tracks->items[i];
-        if (t->hits < c->config.candidate_hits || t->id <= c->rejected_id) {
+        if (t->hits < c->config.candidate_hits || t->score < c->config.candidate_score ||
+            t->id <= c->rejected_id) {
             continue;
         }
         double off = bst_vec3_norm(bst_vec3_sub(t->rate_gcrf_radps, rate));

@@ -29,7 +29,7 @@ typedef struct bst_control_config {
     int64_t dwell_frames;
     double dwell_timeout_s;
     int64_t candidate_hits;
-    double candidate_rate_sigmas;
+    double candidate_rate_sigmas, candidate_score;
     double acquire_timeout_s, track_entry_px;
     double reacquire_coast_s, reacquire_extent_deg;
 } bst_control_config;

@@ -12,6 +12,8 @@
 #include "scenegen/smear.h"
 
 enum { MAX_TAPS = 512, BOX_FLOATS = 4 };
+/* Of a block of nodes: place and weight. */
+enum { NODE_BYTES = BST_BLOCK * 3 * (int)sizeof(float) };
 
 /* A device buffer that grows. */
 typedef struct growing {
@@ -34,6 +36,7 @@ struct bst_renderer {
     bst_scene_source *list; /* drawn sources */
     double *peak_e;         /* of all sources of the request */
     int list_capacity, tiles;
+    uint64_t most_bytes; /* of one buffer on the device */
     bst_render_stats stats;
 };
 
@@ -64,9 +67,9 @@ static int taps_for(double sigma_px) {
 }
 
 static bst_status choose_tiles(bst_ctx *ctx, const bst_device *device,
-                               bst_renderer_options *options) {
+                               bst_renderer_options *options, uint64_t *most_bytes) {
     cl_device_type type = 0;
-    cl_ulong local_bytes = 0;
+    cl_ulong local_bytes = 0, most = 0;
     BST_TRY(bst_device_check(
         ctx, clGetDeviceInfo(bst_device_id(device), CL_DEVICE_TYPE, sizeof type, &type, NULL),
         "asking for the device's type"));
@@ -74,6 +77,11 @@ static bst_status choose_tiles(bst_ctx *ctx, const bst_device *device,
                              clGetDeviceInfo(bst_device_id(device), CL_DEVICE_LOCAL_MEM_SIZE,
                                              sizeof local_bytes, &local_bytes, NULL),
                              "asking for the device's local memory"));
+    BST_TRY(bst_device_check(ctx,
+                             clGetDeviceInfo(bst_device_id(device), CL_DEVICE_MAX_MEM_ALLOC_SIZE,
+                                             sizeof most, &most, NULL),
+                             "asking for the device's largest buffer"));
+    *most_bytes = most;
     if (options->tile_width == 0) {
         bool large = (type & CL_DEVICE_TYPE_CPU) && local_bytes >= 128 * 1024;
         options->tile_width = large ? 256 : 32;
@@ -153,6 +161,7 @@ static bst_status grow(bst_ctx *ctx, bst_renderer *r, growing *g, size_t bytes) 
         g->buffer = NULL;
     }
     size_t room = bytes > 2 * g->bytes ? bytes : 2 * g->bytes;
+    room = room > r->most_bytes ? bytes : room;
     room = room < 4096 ? 4096 : room;
     cl_int code;
     g->buffer =
@@ -193,7 +202,7 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     clRetainContext(r->context);
     clRetainCommandQueue(r->queue);
     bst_smear_options smear = {r->options.error_sigma, r->options.cut_sigma, r->taps};
-    bst_status status = choose_tiles(ctx, device, &r->options);
+    bst_status status = choose_tiles(ctx, device, &r->options, &r->most_bytes);
     if (status == BST_OK) {
         status = build(ctx, r, device);
     }
@@ -283,11 +292,21 @@ static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *
     BST_TRY(bst_smear_begin(ctx, r->smear, q->track, q->background_e + read * read));
     r->stats = (bst_render_stats){0};
     *blocks = 0;
+    const uint64_t counted = (uint64_t)INT32_MAX * sizeof(float); /* by the kernels, in int */
+    uint64_t most = r->most_bytes < counted ? r->most_bytes : counted;
+    int most_blocks = (int)(most / NODE_BYTES);
     for (int i = 0; i < q->count; i++) {
         bst_scene_source *s = &r->list[r->stats.sources];
         bool visible;
         BST_TRY(bst_smear_source(ctx, r->smear, &q->sources[i], s, &visible));
         r->peak_e[i] = bst_smear_last_peak_e(r->smear);
+        if (visible && s->blocks > most_blocks - *blocks) {
+            return bst_fail(ctx, BST_ERR_RANGE,
+                            "the sources move too far in one exposure to be drawn: %d of %d need "
+                            "%.0f million points already; expose for a shorter time, turn more "
+                            "slowly, or draw fewer stars (v_limit)",
+                            r->stats.sources, q->count, 1e-6 * BST_BLOCK * *blocks);
+        }
         if (visible) {
             s->first_block = *blocks;
             *blocks += s->blocks;
@@ -317,7 +336,7 @@ static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, int blocks, int *
     size_t block_bytes = BST_BLOCK * sizeof(float);
     BST_TRY(upload(ctx, r, &r->table, table, (size_t)table_blocks * BST_TABLE_ROWS * block_bytes));
     BST_TRY(upload(ctx, r, &r->sources, r->list, (size_t)count * sizeof *r->list));
-    BST_TRY(grow(ctx, r, &r->nodes, (size_t)blocks * 3 * block_bytes));
+    BST_TRY(grow(ctx, r, &r->nodes, (size_t)blocks * NODE_BYTES));
     BST_TRY(grow(ctx, r, &r->block_box, (size_t)blocks * BOX_FLOATS * sizeof(float)));
     BST_TRY(grow(ctx, r, &r->source_box, (size_t)*groups * BOX_FLOATS * block_bytes));
     if (count == 0) {

@@ -156,9 +156,10 @@ static void assign_group(bst_mtt *mtt, bool tentative, double detection_sigma) {
         mtt->rows[rows] = t;
         mtt->first[rows] = edges;
         mtt->miss_costs[rows] = -log(1.0 - mtt->params.detection_probability);
-        edges += collect(mtt, &mtt->tracks[t], detection_sigma, mtt->edge_columns + edges,
-                         mtt->edge_costs + edges);
-        rows++;
+        int found = collect(mtt, &mtt->tracks[t], detection_sigma, mtt->edge_columns + edges,
+                            mtt->edge_costs + edges);
+        edges += found;
+        rows += found > 0;
     }
     mtt->first[rows] = edges;
     bst_assignment_solve(mtt->assignment, rows, mtt->now.count, mtt->first, mtt->edge_columns,
@@ -209,20 +210,21 @@ static int free_between(const bst_mtt *mtt, const bst_mtt_track *a, const bst_mt
     return best;
 }
 
-/* A missed confirmed track beside another one may have melted into one detection with it: both
- * then take that detection, widened along the line between them. */
+/* A missed confirmed track beside another one, or beside a star that is seen, may have melted into
+ * one detection with it: both then take that detection, widened along the line between them. */
 static void share(bst_mtt *mtt) {
     double near2 = mtt->params.merge_rad * mtt->params.merge_rad;
     for (int t = 0; t < mtt->track_count; t++) {
         bst_mtt_track *missed = &mtt->tracks[t];
-        if (missed->status == BST_TRACK_TENTATIVE || !mtt->observable[t] ||
+        if (missed->status == BST_TRACK_TENTATIVE || missed->star || !mtt->observable[t] ||
             mtt->detection_of_track[t] >= 0) {
             continue;
         }
         int partner = -1;
         double nearest2 = near2;
         for (int u = 0; u < mtt->track_count; u++) {
-            if (u == t || mtt->tracks[u].status == BST_TRACK_TENTATIVE) {
+            if (u == t || mtt->tracks[u].status == BST_TRACK_TENTATIVE ||
+                (mtt->tracks[u].star && mtt->detection_of_track[u] < 0)) {
                 continue;
             }
             bst_vec3 apart = bst_vec3_sub(mtt->tracks[u].state.direction, missed->state.direction);

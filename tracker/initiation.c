@@ -9,6 +9,7 @@ typedef struct rate_gate {
     double gate_radps;
     int reserve; /* places of the table that such tracks leave free */
     int history; /* number of earlier frames to look at */
+    bool rest;   /* such tracks are at rest */
 } rate_gate;
 
 static double spread(const bst_mtt_detection *d) {
@@ -54,7 +55,8 @@ static bst_mtt_pool *find_partner(bst_mtt *mtt, const bst_mtt_detection *detecti
 }
 
 static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bst_mtt_pool *pool,
-                        const bst_mtt_detection *later, const rate_gate *gate) {
+                        const bst_mtt_detection *later, const rate_gate *gate,
+                        const bst_mtt_frame *frame) {
     double dt = mtt->now.seconds - pool->seconds;
     double reach = gate->gate_radps * dt + 3.0 * sqrt(spread(earlier) + spread(later));
     double variance = 0.04 + earlier->v_mag_sigma * earlier->v_mag_sigma;
@@ -75,8 +77,14 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
         .first_tick = pool->tick,
         .last_update_tick = mtt->now.tick,
         .last_update_s = mtt->now.seconds,
+        .first_direction = earlier->sky.direction,
+        .first_length_rad = earlier->length_rad,
+        .at_rest = gate->rest,
     };
+    bst_mtt_note_place(track, later);
+    mtt->rest_count += gate->rest;
     bst_sky_from_pair(&earlier->sky, &later->sky, dt, mtt->params.noise_rad2ps3, &track->state);
+    bst_mtt_set_rest(mtt, track, bst_mtt_is_at_rest(mtt, frame, track));
 }
 
 static void start_all(bst_mtt *mtt, rate_gate gate, const bst_mtt_frame *frame, bool from_cue) {
@@ -95,11 +103,11 @@ static void start_all(bst_mtt *mtt, rate_gate gate, const bst_mtt_frame *frame, 
         if (!pool) {
             continue;
         }
-        if (mtt->track_count + gate.reserve >= mtt->params.max_tracks) {
+        if (!bst_mtt_has_room(mtt, gate.rest, gate.reserve)) {
             mtt->lost++;
             continue;
         }
-        start_track(mtt, &pool->items[partner], pool, detection, &gate);
+        start_track(mtt, &pool->items[partner], pool, detection, &gate, frame);
         pool->used[partner] = true;
         mtt->now.used[i] = true;
     }
@@ -107,6 +115,12 @@ static void start_all(bst_mtt *mtt, rate_gate gate, const bst_mtt_frame *frame, 
 
 void bst_mtt_initiate(bst_mtt *mtt, const bst_mtt_frame *frame) {
     const bst_mtt_params *params = &mtt->params;
+    /* in a field of many unknown stars two detections at one place are one star, and two at the
+     * cue's rate may be two */
+    if (params->star_rate_radps > 0.0) {
+        rate_gate rest = {.history = BST_MTT_HISTORY, .rest = true};
+        start_all(mtt, rest, frame, false);
+    }
     if (frame->cue_valid) {
         rate_gate gate = {
             .gate_radps = 4.0 * frame->cue_rate_sigma_radps + params->cue_rate_margin_radps,

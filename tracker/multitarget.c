@@ -23,7 +23,7 @@ static void pool_free(bst_mtt_pool *pool) {
 
 static bst_status check(bst_ctx *ctx, const bst_mtt_params *p) {
     if (p->max_tracks < 1 || p->max_detections < 1 || p->confirm_hits < 2 ||
-        p->confirm_frames < p->confirm_hits || !(p->field_sr > 0.0) ||
+        p->confirm_frames < p->confirm_hits || p->max_stars < 0 || !(p->field_sr > 0.0) ||
         !(p->detection_probability > 0.0 && p->detection_probability < 1.0) ||
         !(p->false_alarms_per_frame > 0.0) || !(p->gate_chi2 > 0.0) || !(p->noise_rad2ps3 >= 0.0)) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
@@ -45,7 +45,8 @@ bst_status bst_mtt_create(bst_ctx *ctx, const bst_mtt_params *params, bst_mtt **
     m->next_id = 1;
     m->clutter = params->false_alarms_per_frame;
     m->clutter_density = params->false_alarms_per_frame / params->field_sr;
-    size_t nt = (size_t)params->max_tracks + 1, ne = nt * BST_MTT_CANDIDATES;
+    size_t nt = (size_t)params->max_tracks + (size_t)params->max_stars + 1,
+           ne = nt * BST_MTT_CANDIDATES;
     m->tracks = calloc(nt, sizeof *m->tracks);
     m->events = calloc(2 * nt, sizeof *m->events);
     m->rows = calloc(nt, sizeof *m->rows);
@@ -65,7 +66,8 @@ bst_status bst_mtt_create(bst_ctx *ctx, const bst_mtt_params *params, bst_mtt **
         ok = pool_create(&m->history[h], params->max_detections);
     }
     bst_status status =
-        ok ? bst_assignment_create(ctx, params->max_tracks, params->max_detections, &m->assignment)
+        ok ? bst_assignment_create(ctx, params->max_tracks + params->max_stars,
+                                   params->max_detections, &m->assignment)
            : bst_fail(ctx, BST_ERR_MEMORY, "tracker: out of memory for %d tracks, %d detections",
                       params->max_tracks, params->max_detections);
     if (status != BST_OK) {
@@ -125,6 +127,13 @@ static bool cue_acceleration(const bst_mtt_frame *frame, double dt_s, bst_vec3 *
     return true;
 }
 
+/* What the observer's motion adds to a rate falls with the range, as the rate itself does: what is
+ * at rest, or nearly so beside the cue, is too far away to share the cue's acceleration. */
+static bool shares_acceleration(const bst_mtt_track *track, const bst_mtt_frame *frame) {
+    return !track->at_rest &&
+           bst_vec3_norm(track->state.rate_radps) > 0.1 * bst_vec3_norm(frame->cue_rate_radps);
+}
+
 static void predict(bst_mtt *m, const bst_mtt_frame *frame) {
     double dt = frame->seconds - m->seconds;
     bst_vec3 step = {0}, rate = {0};
@@ -132,8 +141,14 @@ static void predict(bst_mtt *m, const bst_mtt_frame *frame) {
     double near = cos(m->params.feed_forward_rad);
     for (int t = 0; t < m->track_count; t++) {
         bst_sky_state *state = &m->tracks[t].state;
+        if (m->tracks[t].star) {
+            bst_mtt_predict_star(m, dt, &m->tracks[t]);
+            m->observable[t] = true;
+            continue;
+        }
         bst_sky_predict(state, dt, m->params.noise_rad2ps3);
-        if (forward && bst_vec3_dot(state->direction, frame->cue_direction) > near) {
+        if (forward && bst_vec3_dot(state->direction, frame->cue_direction) > near &&
+            shares_acceleration(&m->tracks[t], frame)) {
             bst_sky_shift(state, bst_tangent_carry(frame->cue_direction, state->direction, step),
                           bst_tangent_carry(frame->cue_direction, state->direction, rate));
         }
@@ -190,6 +205,7 @@ static void hit(bst_mtt *m, int t) {
     track->last_chi2 = innovation.chi2;
     track->score += log(m->params.detection_probability / m->clutter_density) - log(2.0 * BST_PI) -
                     0.5 * innovation.log_det_s - 0.5 * innovation.chi2;
+    bst_mtt_note_place(track, detection);
     track->last_update_tick = m->now.tick;
     track->last_update_s = m->now.seconds;
     take_brightness(track, detection);
@@ -203,14 +219,14 @@ static double chi2_limit(int dof) {
 
 static bool may_confirm(const bst_mtt *m, const bst_mtt_track *track) {
     int dof = 2 * (track->hits - 2);
-    if (track->hits < m->params.confirm_hits || track->score < m->params.confirm_score ||
-        (dof > 0 && track->chi2 > chi2_limit(dof))) {
+    if (track->at_rest || track->hits < m->params.confirm_hits ||
+        track->score < m->params.confirm_score || (dof > 0 && track->chi2 > chi2_limit(dof))) {
         return false;
     }
     /* a second copy of what is tracked already is no new object */
     for (int u = 0; u < m->track_count; u++) {
         const bst_mtt_track *other = &m->tracks[u];
-        if (other->status != BST_TRACK_TENTATIVE &&
+        if (other != track && other->status != BST_TRACK_TENTATIVE &&
             bst_vec3_dot(other->state.direction, track->state.direction) > 0.99999 &&
             bst_sky_distance2(&other->state, &track->state) < 13.3) { /* 99 %, 4 dof */
             return false;
@@ -228,6 +244,11 @@ static bool is_finished(const bst_mtt *m, const bst_mtt_track *track, bool obser
         track->status == BST_TRACK_TENTATIVE
             ? fmin(p->max_coast_s, p->initiation_gap_s * (p->confirm_frames - p->confirm_hits + 1))
             : p->max_coast_s;
+    if (track->at_rest && track->hits >= p->confirm_hits) {
+        return m->seconds - track->last_update_s > p->max_coast_s ||
+               !(variance < p->max_sigma_rad * p->max_sigma_rad) ||
+               (!track->star && track->misses_in_row > p->max_misses);
+    }
     if (!(variance < p->max_sigma_rad * p->max_sigma_rad) ||
         m->seconds - track->last_update_s > patience_s) {
         return true;
@@ -241,14 +262,36 @@ static bool is_finished(const bst_mtt *m, const bst_mtt_track *track, bool obser
            track->frames >= 3 * p->confirm_frames;
 }
 
-static void judge(bst_mtt *m) {
+static void become_star(bst_mtt *m, bst_mtt_track *track) {
+    bst_mtt_set_rest(m, track, true);
+    if (track->at_rest) {
+        if (track->status != BST_TRACK_TENTATIVE) {
+            record(m, BST_MTT_LOST, track);
+        }
+        bst_mtt_make_star(track);
+    }
+}
+
+static void judge(bst_mtt *m, const bst_mtt_frame *frame) {
     for (int t = 0; t < m->track_count; t++) {
         bst_mtt_track *track = &m->tracks[t];
+        if (track->star) {
+            continue;
+        }
         bool taken = m->detection_of_track[t] >= 0 && track->merged_in_row <= m->params.max_merged;
         track->frames += m->observable[t];
         if (m->observable[t] && !taken) {
             track->misses_in_row++;
             track->score += log(1.0 - m->params.detection_probability);
+        }
+        bool at_rest = taken && bst_mtt_is_at_rest(m, frame, track);
+        if (at_rest && bst_mtt_is_star(m, frame, track)) {
+            become_star(m, track);
+        } else if (taken && track->status == BST_TRACK_TENTATIVE) {
+            bst_mtt_set_rest(m, track, at_rest);
+        }
+        if (track->star) {
+            continue;
         }
         if (track->status != BST_TRACK_TENTATIVE) {
             track->status = taken ? BST_TRACK_CONFIRMED : BST_TRACK_COASTING;
@@ -258,11 +301,13 @@ static void judge(bst_mtt *m) {
         }
     }
     int kept = 0;
+    m->rest_count = 0;
     for (int t = 0; t < m->track_count; t++) {
         const bst_mtt_track *track = &m->tracks[t];
         if (!is_finished(m, track, m->observable[t])) {
+            m->rest_count += track->at_rest;
             m->tracks[kept++] = *track;
-        } else if (track->status != BST_TRACK_TENTATIVE) {
+        } else if (track->status != BST_TRACK_TENTATIVE && !track->star) {
             record(m, BST_MTT_LOST, track);
         }
     }
@@ -308,7 +353,7 @@ void bst_mtt_step(bst_mtt *m, const bst_mtt_frame *frame) {
         unused += !m->now.used[i];
     }
     m->clutter += 0.1 * (unused - m->clutter);
-    judge(m);
+    judge(m, frame);
     bst_mtt_initiate(m, frame);
     remember(m);
 }
@@ -321,7 +366,7 @@ void bst_mtt_skip(bst_mtt *m, const bst_mtt_frame *frame) {
         m->detection_of_track[t] = -1;
         m->tracks[t].last_chi2 = -1.0;
     }
-    judge(m);
+    judge(m, frame);
 }
 
 const bst_mtt_track *bst_mtt_tracks(const bst_mtt *m, int *count) {

@@ -4,10 +4,18 @@
  * A track that two detections start is tentative; it is confirmed when it has M hits in its first N
  * frames, its innovations fit their covariances, and its log-likelihood ratio against clutter
  * (Blackman and Popoli 1999, section 6.2) is high enough, so that dense clutter asks for more hits.
- * Frames in which a track lies outside the field count neither for nor against it. */
+ * Frames in which a track lies outside the field count neither for nor against it.
+ *
+ * Stars that no catalogue has are told by their rate. A track is at rest while its rate is
+ * compatible with none, or it has not yet moved by the length of its own image (blends and streaks
+ * cut short displace a centroid by so much), and it is not what the cue expects: it is not
+ * confirmed, and a pair of detections at one place is taken for such a track before any other
+ * pairing. Once its rate is known to be less than any object's it is a star: a fixed direction that
+ * keeps its detections from everything else. What is at rest has room of its own. */
 #ifndef BST_TRACKER_MULTITARGET_H
 #define BST_TRACKER_MULTITARGET_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "sim/core/messages.h"
@@ -33,6 +41,9 @@ typedef struct bst_mtt_params {
     double merge_floor_rad;  /* 1 sigma per axis added to a shared detection */
     int max_merged;          /* frames in a row that a track may live on shared detections */
     double feed_forward_rad; /* tracks this close to the cue follow the cue's acceleration */
+    double star_rate_radps;  /* the slowest object's; 0: nothing is taken for a star */
+    double motion_chi2;      /* of a rate against none that proves motion, 2 degrees of freedom */
+    int max_stars;           /* room for tracks at rest */
 } bst_mtt_params;
 
 /* One detection that is not a star, on the sky. */
@@ -41,7 +52,29 @@ typedef struct bst_mtt_detection {
     double x_px, y_px;
     double v_mag, v_mag_sigma; /* sigma INFINITY: no brightness */
     double snr;
+    double length_rad; /* of its image, FWHM */
 } bst_mtt_detection;
+
+typedef struct bst_mtt_track {
+    int64_t id;
+    bst_track_status status;
+    bst_sky_state state;
+    double v_mag, v_mag_variance;
+    double snr, x_px, y_px; /* latest detection */
+    int hits, misses_in_row, merged_in_row;
+    int frames;       /* observable frames since the first detection */
+    double score;     /* log-likelihood ratio against clutter */
+    double chi2;      /* sum over the hits after initiation, 2 degrees of freedom each */
+    double last_chi2; /* of the latest detection; negative when the latest frame brought none */
+    int64_t first_tick, last_update_tick;
+    double last_update_s;
+    bst_vec3 first_direction; /* of its first detection */
+    double first_length_rad;
+    bool moved;   /* the latest detection lies farther from the first than their images are long */
+    bool at_rest; /* shows no motion and is not what the cue expects */
+    bool star;    /* and is known to be slower than any object: its rate is zero, its status is not
+                     tentative, its life is only ended by max_coast_s */
+} bst_mtt_track;
 
 /* What one frame brings. */
 typedef struct bst_mtt_frame {
@@ -58,22 +91,11 @@ typedef struct bst_mtt_frame {
     bst_vec3 cue_direction, cue_rate_radps;
     bst_vec3 cue_before_direction, cue_before_rate_radps;
     double cue_rate_sigma_radps;
+    /* Is a track what the cue expects, so that its slowness says nothing? NULL: none is. */
+    bool (*expected)(const void *user, const bst_mtt_track *track);
+    /* 1 sigma per axis of an apparent rate that all of this frame's directions may share */
+    double common_rate_sigma_radps;
 } bst_mtt_frame;
-
-typedef struct bst_mtt_track {
-    int64_t id;
-    bst_track_status status;
-    bst_sky_state state;
-    double v_mag, v_mag_variance;
-    double snr, x_px, y_px; /* latest detection */
-    int hits, misses_in_row, merged_in_row;
-    int frames;       /* observable frames since the first detection */
-    double score;     /* log-likelihood ratio against clutter */
-    double chi2;      /* sum over the hits after initiation, 2 degrees of freedom each */
-    double last_chi2; /* of the latest detection; negative when the latest frame brought none */
-    int64_t first_tick, last_update_tick;
-    double last_update_s;
-} bst_mtt_track;
 
 typedef enum bst_mtt_event_kind { BST_MTT_CONFIRMED, BST_MTT_LOST } bst_mtt_event_kind;
 
@@ -95,7 +117,8 @@ void bst_mtt_step(bst_mtt *mtt, const bst_mtt_frame *frame);
 /* Moves the tracks to a frame that says nothing about them (no attitude): no misses are counted. */
 void bst_mtt_skip(bst_mtt *mtt, const bst_mtt_frame *frame);
 
-/* Tracks after the latest frame, by ascending id; lent until the next step. */
+/* Tracks after the latest frame, by ascending id, those at rest among them; lent until the next
+ * step. */
 const bst_mtt_track *bst_mtt_tracks(const bst_mtt *mtt, int *count);
 const bst_mtt_track *bst_mtt_find(const bst_mtt *mtt, int64_t id);
 /* What happened in the latest frame; lent until the next step. */

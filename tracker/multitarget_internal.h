@@ -26,6 +26,7 @@ struct bst_mtt {
     bst_mtt_params params;
     bst_mtt_track *tracks;
     int track_count;
+    int rest_count; /* of them at rest */
     int64_t next_id;
     double seconds; /* of the latest frame */
     bool started;
@@ -55,6 +56,27 @@ void bst_mtt_pool_range(const bst_mtt_pool *pool, bst_vec3 direction, double cho
 
 /* Fills detection_of_track, shared and extra for the tracks of this frame (already predicted). */
 void bst_mtt_associate(bst_mtt *mtt);
+
+/* Whether there is room for one more track, at rest or not, with `reserve` places left over. */
+bool bst_mtt_has_room(const bst_mtt *mtt, bool at_rest, int reserve);
+
+/* Does a track show no motion, and is it not what the cue expects? */
+bool bst_mtt_is_at_rest(const bst_mtt *mtt, const bst_mtt_frame *frame, const bst_mtt_track *track);
+
+/* Is the rate of a track at rest known to be less than any object's? */
+bool bst_mtt_is_star(const bst_mtt *mtt, const bst_mtt_frame *frame, const bst_mtt_track *track);
+
+/* Notes whether a track's newest detection shows it to have moved. */
+void bst_mtt_note_place(bst_mtt_track *track, const bst_mtt_detection *detection);
+
+/* Moves a track to what is at rest or from there, if there is room for it. */
+void bst_mtt_set_rest(bst_mtt *mtt, bst_mtt_track *track, bool at_rest);
+
+/* Makes a track at rest a star. */
+void bst_mtt_make_star(bst_mtt_track *track);
+
+/* Carries a star over dt_s. */
+void bst_mtt_predict_star(const bst_mtt *mtt, double dt_s, bst_mtt_track *track);
 
 /* Starts tentative tracks from unused detections of this frame and of earlier ones. */
 void bst_mtt_initiate(bst_mtt *mtt, const bst_mtt_frame *frame);

@@ -30,17 +30,11 @@ static void rate_difference(const bst_target_params *params, const bst_target_cu
     p[2] = s->covariance[3][3] + own;
 }
 
-bst_target_fit bst_target_misfit(const bst_target_params *params, const bst_target_cue *cue,
-                                 const bst_mtt_track *track) {
+/* Misfit of any track to a valid cue. */
+static bst_target_fit misfit(const bst_target_params *params, const bst_target_cue *cue,
+                             const bst_mtt_track *track) {
     const bst_sky_state *s = &track->state;
-    bst_target_fit fit = {.chi2 = INFINITY};
-    double limit2 = params->max_rate_sigma_radps * params->max_rate_sigma_radps;
-    int dof = 2 * (track->hits - 2);
-    if (!cue->valid || track->status == BST_TRACK_TENTATIVE || s->covariance[2][2] > limit2 ||
-        s->covariance[3][3] > limit2 || (dof > 0 && track->chi2 > params->max_chi2 * dof)) {
-        return fit;
-    }
-    fit.chi2 = 0.0;
+    bst_target_fit fit = {.chi2 = 0.0};
     double x[2], p[3];
     rate_difference(params, cue, track, x, p);
     add2(&fit, x, p[0], p[1], p[2], params->rate_chi2);
@@ -57,6 +51,19 @@ bst_target_fit bst_target_misfit(const bst_target_params *params, const bst_targ
         fit.log_det += log(v);
     }
     return fit;
+}
+
+bst_target_fit bst_target_misfit(const bst_target_params *params, const bst_target_cue *cue,
+                                 const bst_mtt_track *track) {
+    const bst_sky_state *s = &track->state;
+    double limit2 = params->max_rate_sigma_radps * params->max_rate_sigma_radps;
+    int dof = 2 * (track->hits - 2);
+    if (!cue->valid || track->at_rest || track->status == BST_TRACK_TENTATIVE ||
+        s->covariance[2][2] > limit2 || s->covariance[3][3] > limit2 ||
+        (dof > 0 && track->chi2 > params->max_chi2 * dof)) {
+        return (bst_target_fit){.chi2 = INFINITY};
+    }
+    return misfit(params, cue, track);
 }
 
 static const bst_mtt_track *find(const bst_mtt_track *tracks, int count, int64_t id) {
@@ -81,11 +88,20 @@ static bool is_released(const bst_target_params *params, const bst_target_cue *c
            params->release_chi2;
 }
 
+bool bst_target_is_expected(const bst_target_params *params, const bst_target_cue *cue,
+                            const bst_mtt_track *track, bool is_target) {
+    if (!cue->valid) {
+        return false;
+    }
+    return is_target ? !is_released(params, cue, track)
+                     : misfit(params, cue, track).chi2 < INFINITY;
+}
+
 void bst_target_step(bst_target *target, const bst_target_params *params, const bst_target_cue *cue,
                      double seconds, const bst_mtt_track *tracks, int count) {
     if (target->id != 0) {
         const bst_mtt_track *kept = find(tracks, count, target->id);
-        if (kept && !is_released(params, cue, kept)) {
+        if (kept && !kept->at_rest && !is_released(params, cue, kept)) {
             target->memory = kept->state;
             target->memory_seconds = seconds;
             return;

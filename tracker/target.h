@@ -49,6 +49,12 @@ typedef struct bst_target_fit {
 bst_target_fit bst_target_misfit(const bst_target_params *params, const bst_target_cue *cue,
                                  const bst_mtt_track *track);
 
+/* Does the cue's rate speak for the track, so that its slowness does not make it a star? For the
+ * target of interest by release_chi2, for others by direction, rate and brightness, each within its
+ * limit. */
+bool bst_target_is_expected(const bst_target_params *params, const bst_target_cue *cue,
+                            const bst_mtt_track *track, bool is_target);
+
 /* Keeps the target while its track lives; else chooses among the tracks by the cue and, after a
  * loss, by the lost target's extrapolation. Without a cue nothing new is chosen. */
 void bst_target_step(bst_target *target, const bst_target_params *params, const bst_target_cue *cue,

@@ -104,7 +104,10 @@ static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_par
         .merge_rad = c->merge_px * scale,
         .merge_floor_rad = c->merge_floor_px * scale,
         .max_merged = 30,
-        .feed_forward_rad = c->feed_forward_deg * BST_DEG_RAD};
+        .feed_forward_rad = c->feed_forward_deg * BST_DEG_RAD,
+        .star_rate_radps = arcsec(c->star_rate_arcsec_per_s),
+        .motion_chi2 = c->motion_chi2,
+        .max_stars = (int)c->max_stars};
 }
 
 bst_status bst_tracker_create(bst_ctx *ctx, const bst_tracker_config *config,
@@ -180,6 +183,7 @@ typedef struct frame_attitude {
     bst_attitude_fix fix;
     bst_quat q_cam_from_gcrf;
     double covariance_cam[3][3];
+    double rate_sigma_radps; /* of the attitude's own drift that no star of this frame shows */
     bool usable;
 } frame_attitude;
 
@@ -235,6 +239,8 @@ static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_lig
         bst_vec3 rate;
         bst_attitude_error_get(&t->error, &t->error_params, q_telemetry, &out->fix.error_cam_rad,
                                &rate, out->covariance_cam);
+        out->rate_sigma_radps =
+            sqrt(fmax(fmax(t->error.p[3][3], t->error.p[4][4]), t->error.p[5][5]));
         out->usable = true;
         out->q_cam_from_gcrf =
             bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(out->fix.error_cam_rad), q_telemetry));
@@ -297,6 +303,7 @@ static bst_sky_measurement to_sky(const bst_tracker *t, const bst_detection *ite
 
 static int collect_objects(bst_tracker *t, const bst_detections *d, const frame_attitude *attitude,
                            const bst_light *light, int *lost) {
+    double scale = bst_camera_scale_rad(&t->camera);
     int count = 0;
     *lost = 0;
     for (int i = 0; i < d->count; i++) {
@@ -320,25 +327,34 @@ static int collect_objects(bst_tracker *t, const bst_detections *d, const frame_
                                                      .y_px = item->y_px,
                                                      .v_mag = bright ? item->v_mag : 0.0,
                                                      .v_mag_sigma = bright ? sigma : INFINITY,
-                                                     .snr = item->snr};
+                                                     .snr = item->snr,
+                                                     .length_rad = scale * item->length_px};
     }
     return count;
 }
 
-typedef struct field_test {
+/* What is asked of one frame. */
+typedef struct frame_view {
     const bst_tracker *tracker;
     bst_quat q_cam_from_gcrf;
     bst_light light;
-} field_test;
+    bst_target_cue cue;
+} frame_view;
 
 static bool in_field(const void *user, bst_vec3 direction) {
-    const field_test *f = user;
+    const frame_view *f = user;
     const bst_camera *camera = &f->tracker->camera;
     double x, y, margin = f->tracker->edge_margin_px;
     bst_vec3 v = bst_quat_rotate(f->q_cam_from_gcrf, bst_light_aberrate(&f->light, direction));
     return bst_camera_project(camera, v, &x, &y) && x >= margin && y >= margin &&
            x <= (double)(camera->width_px - 1) - margin &&
            y <= (double)(camera->height_px - 1) - margin;
+}
+
+static bool is_expected(const void *user, const bst_mtt_track *track) {
+    const frame_view *f = user;
+    const bst_tracker *t = f->tracker;
+    return bst_target_is_expected(&t->target_params, &f->cue, track, track->id == t->target.id);
 }
 
 static void add_event(bst_tracker *t, bst_tracker_event_kind kind, const bst_mtt_track *track) {
@@ -352,7 +368,7 @@ static void add_event(bst_tracker *t, bst_tracker_event_kind kind, const bst_mtt
     }
 }
 
-static void choose_target(bst_tracker *t, const bst_tracker_cue *cue, double seconds) {
+static void choose_target(bst_tracker *t, const bst_target_cue *cue, double seconds) {
     int count;
     const bst_mtt_event *events = bst_mtt_events(t->mtt, &count);
     for (int i = 0; i < count; i++) {
@@ -363,14 +379,7 @@ static void choose_target(bst_tracker *t, const bst_tracker_cue *cue, double sec
     }
     int64_t before = t->target.id;
     const bst_mtt_track *tracks = bst_mtt_tracks(t->mtt, &count);
-    bst_target_cue c = {.valid = cue->valid,
-                        .direction = cue->direction_gcrf,
-                        .rate_radps = cue->rate_gcrf_radps,
-                        .sigma_rad = cue->sigma_rad,
-                        .rate_sigma_radps = cue->rate_sigma_radps,
-                        .v_mag = cue->v_mag,
-                        .v_mag_sigma = cue->v_mag_sigma};
-    bst_target_step(&t->target, &t->target_params, &c, seconds, tracks, count);
+    bst_target_step(&t->target, &t->target_params, cue, seconds, tracks, count);
     if (t->target.id != before && before != 0) {
         add_event(t, BST_TRACKER_TARGET_LOST, NULL);
         t->events[t->event_count - 1].track_id = before;
@@ -388,6 +397,7 @@ static void write_track(const bst_mtt_track *track, int64_t target_id, bst_track
                        .rate_gcrf_radps = track->state.rate_radps,
                        .v_mag = track->v_mag,
                        .snr = track->snr,
+                       .score = track->score,
                        .hits = track->hits,
                        .misses_in_row = track->misses_in_row,
                        .first_tick = track->first_tick,
@@ -397,8 +407,11 @@ static void write_track(const bst_mtt_track *track, int64_t target_id, bst_track
     memcpy(out->covariance, track->state.covariance, sizeof out->covariance);
 }
 
-/* 0 target, 1 confirmed, 2 tentative */
+/* 0 target, 1 confirmed, 2 tentative, 3 not told */
 static int rank(const bst_mtt_track *track, int64_t target_id) {
+    if (track->at_rest) {
+        return 3;
+    }
     return track->id == target_id ? 0 : track->status == BST_TRACK_TENTATIVE ? 2 : 1;
 }
 
@@ -421,6 +434,9 @@ static void write_outputs(bst_tracker *t, const bst_detections *d, const frame_a
         t->error.started && sqrt(fmax(p[0][0], p[1][1])) <= 10.0 * t->max_attitude_sigma_rad;
     int count;
     const bst_mtt_track *all = bst_mtt_tracks(t->mtt, &count);
+    for (int i = 0; i < count; i++) {
+        tracks->at_rest += all[i].at_rest;
+    }
     for (int r = 0; r < 3; r++) {
         for (int i = 0; i < count; i++) {
             if (rank(&all[i], t->target.id) != r) {
@@ -475,19 +491,31 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
     frame_attitude attitude;
     find_attitude(t, d, &light, tick, dt, &attitude);
     t->event_count = 0;
-    field_test field = {.tracker = t, .q_cam_from_gcrf = attitude.q_cam_from_gcrf, .light = light};
+    const bst_tracker_cue *cue = &input->cue;
+    frame_view view = {.tracker = t,
+                       .q_cam_from_gcrf = attitude.q_cam_from_gcrf,
+                       .light = light,
+                       .cue = {.valid = cue->valid,
+                               .direction = cue->direction_gcrf,
+                               .rate_radps = cue->rate_gcrf_radps,
+                               .sigma_rad = cue->sigma_rad,
+                               .rate_sigma_radps = cue->rate_sigma_radps,
+                               .v_mag = cue->v_mag,
+                               .v_mag_sigma = cue->v_mag_sigma}};
     bst_mtt_frame frame = {.tick = tick,
                            .seconds = seconds,
                            .detections = t->detections,
                            .in_field = in_field,
-                           .user = &field,
-                           .cue_valid = input->cue.valid,
+                           .expected = is_expected,
+                           .user = &view,
+                           .cue_valid = cue->valid,
                            .cue_before_valid = t->cue_before.valid,
-                           .cue_direction = input->cue.direction_gcrf,
-                           .cue_rate_radps = input->cue.rate_gcrf_radps,
+                           .cue_direction = cue->direction_gcrf,
+                           .cue_rate_radps = cue->rate_gcrf_radps,
                            .cue_before_direction = t->cue_before.direction_gcrf,
                            .cue_before_rate_radps = t->cue_before.rate_gcrf_radps,
-                           .cue_rate_sigma_radps = input->cue.rate_sigma_radps};
+                           .cue_rate_sigma_radps = cue->rate_sigma_radps,
+                           .common_rate_sigma_radps = attitude.rate_sigma_radps};
     int detections_lost = 0;
     if (attitude.usable) {
         frame.count = collect_objects(t, d, &attitude, &light, &detections_lost);
@@ -499,10 +527,10 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
         }
     }
     t->attitude_was_lost = !attitude.usable;
-    choose_target(t, &input->cue, seconds);
+    choose_target(t, &view.cue, seconds);
     write_outputs(t, d, &attitude, input->q_telemetry_now, detections_lost, tracks, track_capacity,
                   predictions, prediction_capacity);
-    t->cue_before = input->cue;
+    t->cue_before = *cue;
     t->started = true;
     t->last_exposure_id = d->exposure_id;
     t->last_tick = tick;

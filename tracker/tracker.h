@@ -23,7 +23,8 @@ typedef struct bst_tracker_config {
     double feed_forward_deg;
     double target_direction_chi2, target_rate_chi2, target_magnitude_chi2, target_release_chi2,
         target_rate_floor_arcsec_per_s, target_max_rate_sigma_arcsec_per_s, target_memory_s;
-    int64_t target_min_hits, max_tracks, max_detections;
+    double star_rate_arcsec_per_s, motion_chi2;
+    int64_t target_min_hits, max_tracks, max_stars, max_detections;
 } bst_tracker_config;
 
 extern const bst_config_desc bst_tracker_config_table[];
@@ -87,7 +88,8 @@ bst_tracker_outcome bst_tracker_check(const bst_tracker *tracker, const bst_dete
 
 /* Takes one frame and, unless it is a duplicate or late, fills `tracks` (room for track_capacity
  * items) and `predictions`. The target of interest comes first, then confirmed tracks, then
- * tentative ones, each by identity; what finds no room is counted in their `lost`. */
+ * tentative ones, each by identity; what finds no room is counted in their `lost`. What is at rest
+ * among the stars and not what the cue expects is only counted (`at_rest`). */
 bst_tracker_outcome bst_tracker_step(bst_tracker *tracker, const bst_tracker_input *input,
                                      bst_tracks *tracks, int track_capacity,
                                      bst_predictions *predictions, int prediction_capacity);

@@ -72,7 +72,14 @@ const bst_config_desc bst_tracker_config_table[] = {
              "A lost target's extrapolated place binds the next choice for this long."),
     BST_INT(C, target_min_hits, "", 2, 1000, "4",
             "Fewest hits of a new target; one more for every 2 of its chi-square against the cue."),
-    BST_INT(C, max_tracks, "", 1, 100000, "256", "Room for tracks."),
+    BST_REAL(C, star_rate_arcsec_per_s, "arcsec/s", 0, 1e4, "0.5",
+             "What is slower than this is taken for a star unless the cue expects it so slow; 0: "
+             "nothing is."),
+    BST_REAL(C, motion_chi2, "", 0, 1e6, "25",
+             "A track moves when its rate misfits rest by more, 2 degrees of freedom."),
+    BST_INT(C, max_tracks, "", 1, 100000, "256", "Room for tracks of what may move."),
+    BST_INT(C, max_stars, "", 0, 100000, "4096",
+            "Room for what is at rest: stars that the catalogue lacks."),
     BST_INT(C, max_detections, "", 1, 1000000, "8192",
             "Room for detections of one frame that are not stars."),
     BST_CONFIG_END};

@@ -42,6 +42,7 @@ typedef struct track {
     const bst_world *world;
     int observer, object; /* one is -1 */
     double step_s, span_s;
+    int64_t first; /* row of the grid that a series begins with */
 } track;
 
 static bst_status state_of(const track *t, bst_ctx *ctx, double seconds, bst_state *out) {
@@ -49,11 +50,16 @@ static bst_status state_of(const track *t, bst_ctx *ctx, double seconds, bst_sta
                             : bst_view_object_state(ctx, t->view, t->object, seconds, out);
 }
 
+/* Rows at 0, step, 2 step ... and at the end. */
+static double seconds_of(const track *t, int64_t row) {
+    return fmin((double)row * t->step_s, t->span_s);
+}
+
 static bst_status row_of(void *user, bst_ctx *ctx, int64_t row, bst_time *time,
                          bst_vec3 *position_m, bst_vec3 *velocity_mps) {
     const track *t = user;
     bst_state state;
-    double seconds = fmin((double)row * t->step_s, t->span_s);
+    double seconds = seconds_of(t, row + t->first);
     BST_TRY(state_of(t, ctx, seconds, &state));
     *time = bst_world_time(t->world, seconds);
     *position_m = state.position_m;
@@ -61,20 +67,18 @@ static bst_status row_of(void *user, bst_ctx *ctx, int64_t row, bst_time *time,
     return BST_OK;
 }
 
-static bst_status write_one(bst_ctx *ctx, const bst_export *e, FILE *stream, track *t) {
+/* Writes `rows` rows from t->first on, the `piece`th stretch in which there is an orbit. */
+static bst_status write_piece(bst_ctx *ctx, const bst_export *e, FILE *stream, track *t,
+                              int64_t rows, int piece) {
     const bst_object_info *info = t->object >= 0 ? bst_world_object(t->world, t->object) : NULL;
     const char *name = info ? info->name : bst_world_observer_name(t->world, t->observer);
-    bst_state probe;
-    char id[96];
-    /* rows at 0, step, 2 step ... and at the end */
-    bst_state_series series = {
-        .rows = 1 + (int64_t)ceil(t->span_s / t->step_s - 1e-9), .state = row_of, .user = t};
-    if (state_of(t, ctx, 0.0, &probe) != BST_OK || state_of(t, ctx, t->span_s, &probe) != BST_OK) {
-        bst_log(ctx, BST_LOG_WARNING, "%s is left out: %s", name, ctx->message);
-        return BST_OK;
-    }
+    char id[96], number[24] = "";
+    bst_state_series series = {.rows = rows, .state = row_of, .user = t};
     if (e->czml) {
-        snprintf(id, sizeof id, "%s/%s", info ? "object" : "observer", name);
+        if (piece > 1) {
+            snprintf(number, sizeof number, "/%d", piece);
+        }
+        snprintf(id, sizeof id, "%s/%s%s", info ? "object" : "observer", name, number);
         bst_czml_object object = {.id = id,
                                   .name = name,
                                   .label = true,
@@ -97,8 +101,39 @@ static bst_status write_one(bst_ctx *ctx, const bst_export *e, FILE *stream, tra
     return bst_oem_write_segment(ctx, stream, &segment);
 }
 
+/* Writes one orbit, in pieces where it is not there all the time (a decay, a file that ends). */
+static bst_status write_one(bst_ctx *ctx, const bst_export *e, FILE *stream, track *t,
+                            int *written) {
+    const int64_t rows = 1 + (int64_t)ceil(t->span_s / t->step_s - 1e-9);
+    int pieces = 0;
+    char why[sizeof ctx->message] = "";
+    for (int64_t row = 0; row < rows;) {
+        bst_state state;
+        t->first = row;
+        while (row < rows && state_of(t, ctx, seconds_of(t, row), &state) == BST_OK) {
+            row++;
+        }
+        if (row < rows && !*why) {
+            snprintf(why, sizeof why, "%s", ctx->message);
+        }
+        if (row > t->first) {
+            BST_TRY(write_piece(ctx, e, stream, t, row - t->first, ++pieces));
+        } else {
+            row++;
+        }
+    }
+    if (*why) {
+        const char *name = t->object >= 0 ? bst_world_object(t->world, t->object)->name
+                                          : bst_world_observer_name(t->world, t->observer);
+        bst_log(ctx, BST_LOG_WARNING, "%s is left out%s: %s", name,
+                pieces > 0 ? " where it has no orbit" : "", why);
+    }
+    *written += pieces > 0;
+    return BST_OK;
+}
+
 static bst_status write_orbits(bst_ctx *ctx, const bst_export *e, const bst_scenario *scenario,
-                               const bst_world *world, bst_view *view, FILE *stream) {
+                               const bst_world *world, bst_view *view, FILE *stream, int *written) {
     track t = {.view = view, .world = world, .span_s = recorded_s(e->run, scenario)};
     t.step_s = e->step_s > 0.0 ? e->step_s : fmin(60.0, t.span_s / 20.0);
     if (!(t.span_s > 0.0)) {
@@ -123,7 +158,7 @@ static bst_status write_orbits(bst_ctx *ctx, const bst_export *e, const bst_scen
         t.observer = i < observers ? i : -1;
         t.object = i < observers ? -1 : i - observers;
         status = bst_export_check(ctx, e);
-        status = status == BST_OK ? write_one(ctx, e, stream, &t) : status;
+        status = status == BST_OK ? write_one(ctx, e, stream, &t, written) : status;
         bst_progress_update(&progress, i + 1);
     }
     bst_progress_end(&progress);
@@ -138,6 +173,7 @@ static bst_status orbits_of(bst_ctx *ctx, const bst_export *e, const bst_scenari
     bst_draft draft;
     bst_world *world = NULL;
     bst_view *view = NULL;
+    int written = 0;
     /* orbits need no stars */
     bst_world_config config = scenario->world;
     snprintf(config.star_catalogue, sizeof config.star_catalogue, "embedded");
@@ -152,12 +188,11 @@ static bst_status orbits_of(bst_ctx *ctx, const bst_export *e, const bst_scenari
         status = bst_draft_open(ctx, path, &draft);
     }
     if (status == BST_OK) {
-        status = write_orbits(ctx, e, scenario, world, view, draft.stream);
+        status = write_orbits(ctx, e, scenario, world, view, draft.stream, &written);
         status = bst_draft_close(ctx, &draft, status);
     }
     if (status == BST_OK) {
-        printf("%s: %d orbits\n", path,
-               bst_world_observer_count(world) + bst_world_object_count(world));
+        printf("%s: %d orbits\n", path, written);
     }
     bst_view_free(view);
     bst_world_free(world);

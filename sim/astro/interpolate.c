@@ -16,6 +16,7 @@ int64_t bst_interpolate_find(const bst_table_state *rows, int64_t count, double 
 void bst_interpolate(const bst_table_state *rows, int64_t count, double t_s, int points,
                      bool hermite, bst_vec3 *position_m, bst_vec3 *velocity_mps) {
     enum { MOST = BST_INTERPOLATE_MAX_ROWS };
+    hermite = hermite || count == 1; /* else a single row would stand still */
     int most = hermite ? MOST / 2 : MOST;
     points = points < 1 ? 1 : points > most ? most : points;
     int64_t n = points < count ? points : count;

@@ -19,9 +19,10 @@ enum { BST_INTERPOLATE_MAX_ROWS = 32 };
 int64_t bst_interpolate_find(const bst_table_state *rows, int64_t count, double t_s);
 
 /* The polynomial through `points` (taken into 1 to BST_INTERPOLATE_MAX_ROWS, half of it with
- * velocities, and count) rows around t_s: through positions, and with `hermite` also through
- * velocities. Position and its derivative at t_s. The rows reach equally far to both sides of the
- * interval that holds t_s, shifted where the table ends. Extrapolates outside the table. */
+ * velocities, and count) rows around t_s: through positions, and with `hermite`, or where
+ * there is one row only, also through velocities. Position and its derivative at t_s. The rows
+ * reach equally far to both sides of the interval that holds t_s, shifted where the table ends.
+ * Extrapolates outside the table. */
 void bst_interpolate(const bst_table_state *rows, int64_t count, double t_s, int points,
                      bool hermite, bst_vec3 *position_m, bst_vec3 *velocity_mps);
 

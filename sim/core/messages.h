@@ -208,7 +208,8 @@ typedef struct bst_track {
      * hypot(d.x, d.y) < 1e-6), e2 = d x e1: order d1, d2, r1, r2; rad^2, rad^2/s, rad^2/s^2 */
     double covariance[4][4];
     double v_mag;
-    double snr; /* of the latest detection */
+    double snr;   /* of the latest detection */
+    double score; /* log-likelihood ratio of an object against chance pairings of detections */
     int32_t hits, misses_in_row;
     int64_t first_tick, last_update_tick;
     double x_px, y_px; /* latest detection, full-sensor coordinates */
@@ -232,6 +233,7 @@ typedef struct bst_tracks {
     int64_t tick;
     bst_attitude_fix attitude;
     int64_t target_id; /* track of interest, 0 when none */
+    int32_t at_rest;   /* followed but not told: at rest among the stars, as a star is */
     int32_t count, lost;
     bst_track items[];
 } bst_tracks;

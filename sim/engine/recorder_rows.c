@@ -311,6 +311,7 @@ static bst_status track_row(bst_ctx *ctx, bst_recorder *recorder, int sensor, co
     put_real(&r, k->covariance[3][3]);
     put_real(&r, k->v_mag);
     put_real(&r, k->snr);
+    put_real(&r, k->score);
     put_int(&r, k->hits);
     put_int(&r, k->misses_in_row);
     put_int(&r, k->first_tick);
@@ -334,6 +335,7 @@ bst_status bst_recorder_track_rows(bst_ctx *ctx, bst_recorder *recorder, int sen
     put_int(&r, t->target_id);
     put_int(&r, t->count);
     put_int(&r, t->lost);
+    put_int(&r, t->at_rest);
     put_flag(&r, a->valid);
     put_int(&r, a->stars);
     put_quat(&r, a->valid ? a->q_cam_from_gcrf : no_quat);

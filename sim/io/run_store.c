@@ -61,23 +61,22 @@ static bool remove_tree(int parent, const char *name) {
     return ok && unlinkat(parent, name, AT_REMOVEDIR) == 0;
 }
 
-/* Whether a folder may be taken for a run's: it is empty or holds one of a run's files. */
+/* Whether a folder may be taken for a run's and removed: it holds a run's tables, or nothing (but
+ * the lock of a run that died at once). Files such as manifest.json are other programs', too. */
 static bool looks_like_run(const char *folder) {
     DIR *dir = opendir(folder);
     if (!dir) {
         return false;
     }
-    bool empty = true, known = false;
+    bool empty = true, tables = false;
     for (struct dirent *entry; (entry = readdir(dir));) {
         if (!is_dots(entry->d_name)) {
-            empty = false;
-            known = known || strcmp(entry->d_name, "manifest.json") == 0 ||
-                    strcmp(entry->d_name, BST_RUN_DATABASE) == 0 ||
-                    strcmp(entry->d_name, LOCK_NAME) == 0;
+            empty = empty && strcmp(entry->d_name, LOCK_NAME) == 0;
+            tables = tables || strcmp(entry->d_name, BST_RUN_DATABASE) == 0;
         }
     }
     closedir(dir);
-    return empty || known;
+    return empty || tables;
 }
 
 static bst_status make_parents(bst_ctx *ctx, const char *path) {

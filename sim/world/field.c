@@ -340,6 +340,14 @@ static bool near_window(const bst_field *field, bst_quat q, bst_vec3 direction, 
            y <= window.y0 + window.height - 1 + margin_px;
 }
 
+/* Whether the object is the observer's own satellite as a catalogue has it: its orbit there need
+ * not be the observer's to the metre. */
+static bool is_self(const bst_field *field, int index) {
+    const world_object *object = &field->world->objects[index];
+    return object->catalogued && object->info.norad != 0 &&
+           object->info.norad == field->world->observers[field->observer].norad;
+}
+
 bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *track,
                            int64_t start_tick, int64_t end_tick, int64_t tick_rate_hz,
                            bst_window window, const bst_field_options *options, bst_truth *truth,
@@ -432,6 +440,9 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
                                       field->q_mid, window, margin_px,       centre,  radius};
     for (int i = 0, used = 0; i < near_count; i++) {
         bool there;
+        if (is_self(field, field->near[i])) {
+            continue;
+        }
         BST_TRY(bst_field_object(ctx, &objects, field->near[i], &field->paths[used],
                                  &field->sources[n], &there));
         n += there;

@@ -98,6 +98,7 @@ static bst_status build_candidates(const bst_world_builder *b, const candidate *
         }
         world->object_count++;
         BST_TRY(status);
+        object->catalogued = true;
         object->info.norad = list[i].set->norad;
         object->info.area_m2 = list[i].catalogue->area_m2;
         object->info.albedo = list[i].catalogue->albedo;

@@ -10,6 +10,9 @@
  * first exposure and a controller's look ahead need. Earth's oblateness makes 0.1 m of it at LEO.
  */
 #define MARGIN_S 5.0
+/* What of it injected states may leave out of a run at either end: their frames begin after the
+ * epoch and end before the run does. The rest is for light time and the look ahead. */
+#define IDLE_S 2.5
 
 /* The file as it was read for another object, or a new entry that is still empty. The entry's name
  * is `key` (a path, with what else the reading depends on); NULL when there is no memory. */
@@ -130,7 +133,7 @@ static bst_status check_span(bst_ctx *ctx, const char *scenario, const bst_world
     }
     bool covers = oem ? bst_oem_covers(orbit->oem, orbit->file_object, world->epoch,
                                        bst_time_add(world->epoch, duration_s))
-                      : orbit->from_s <= 1e-6 && orbit->to_s >= duration_s - 1e-6;
+                      : orbit->from_s <= IDLE_S && orbit->to_s >= duration_s - IDLE_S;
     if (covers) {
         return BST_OK;
     }

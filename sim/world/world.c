@@ -42,9 +42,8 @@ static bst_status make_observers(const bst_world_builder *b, const bst_config_li
         char path[64];
         snprintf(path, sizeof path, "/observers/%d/orbit", i);
         memcpy(observer->name, config->name, sizeof observer->name);
-        int norad = 0;
         BST_TRY(bst_orbit_build(b, &config->orbit, &config->burns, path, observer->name,
-                                &observer->orbit, &norad));
+                                &observer->orbit, &observer->norad));
         observer->sensor_count = config->sensors.count;
         observer->sensors = calloc((size_t)config->sensors.count + 1, sizeof *observer->sensors);
         if (!observer->sensors) {

@@ -48,6 +48,7 @@ typedef struct bst_orbit {
 typedef struct world_object {
     bst_object_info info;
     bst_orbit orbit;
+    bool catalogued; /* from a catalogue, not from the list */
 } world_object;
 
 typedef struct world_sensor {
@@ -59,6 +60,7 @@ typedef struct world_sensor {
 
 typedef struct world_observer {
     char name[64];
+    int norad; /* 0: none */
     bst_orbit orbit;
     world_sensor *sensors;
     int sensor_count;
@@ -149,8 +151,8 @@ bst_status bst_cue_nominal_direction(bst_ctx *ctx, const bst_world *world, int o
 /* Time after the epoch that the onboard clock shows `seconds` after the epoch. */
 double bst_believed_seconds(const bst_world *world, int observer, int sensor, double seconds);
 
-/* Adds to an observer's state, that of when the onboard clock shows believed_s, the error with which
- * the onboard side of a sensor knows it. */
+/* Adds to an observer's state, that of when the onboard clock shows believed_s, the error with
+ * which the onboard side of a sensor knows it. */
 void bst_believe(const bst_world *world, int observer, int sensor, double believed_s,
                  bst_state *state);
 

@@ -130,6 +130,7 @@ static void tracker_report(const tracker *k, bst_tracks *out) {
                          .direction_gcrf = k->direction,
                          .rate_gcrf_radps = k->rate,
                          .hits = k->hits,
+                         .score = 20.0,
                          .misses_in_row = k->misses};
         t->covariance[0][0] = t->covariance[1][1] = k->p_ee;
         t->covariance[2][2] = t->covariance[3][3] = k->p_rr;
@@ -225,7 +226,7 @@ static void measure(const scene *s, const exposure *x, tracker *k, int64_t frame
     if (o->clutter && frame % 9 < 4) {
         /* appears for four frames near the frame's centre, then is gone */
         bst_track *t2 = &out->items[out->count++];
-        *t2 = (bst_track){.id = 1000 + frame / 9, .hits = 1 + (int)(frame % 9)};
+        *t2 = (bst_track){.id = 1000 + frame / 9, .hits = 1 + (int)(frame % 9), .score = 20.0};
         t2->direction_gcrf = bst_quat_rotate(bst_quat_conj(x->q_tel_mid), (bst_vec3){2e-4, 0, 1});
         t2->rate_gcrf_radps = cue.rate_gcrf_radps;
     }

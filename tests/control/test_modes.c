@@ -85,7 +85,7 @@ static void put_track(rig *r, int64_t id, int hits, double off_px, double rate_o
     bst_cue cue;
     bst_assert_ok(&r->ctx, cue_at(&(bool){true}, &r->ctx, (double)mid_tick / TICKS, &cue));
     bst_track *t = &r->tracks->items[r->tracks->count++];
-    *t = (bst_track){.id = id, .hits = hits};
+    *t = (bst_track){.id = id, .hits = hits, .score = 20.0};
     t->direction_gcrf =
         bst_vec3_unit(bst_vec3_axpy(cue.direction_gcrf, off_px * PX, (bst_vec3){0, 0, 1}));
     t->rate_gcrf_radps =
@@ -113,9 +113,12 @@ static void from_idle_to_track_and_back(void **state) {
     step(&r, t = 3500, true);
     assert_int_equal(r.status.search_step, 1);
 
-    /* a tentative track that stands still among the stars is no candidate, nor is a single hit */
+    /* a tentative track that stands still among the stars is no candidate, nor is a single hit, nor
+     * two that chance may have brought together */
     put_track(&r, 1, 5, 900.0, -50.0, 4100);
     put_track(&r, 2, 1, 900.0, 0.0, 4100);
+    put_track(&r, 3, 2, 900.0, 0.0, 4100);
+    r.tracks->items[2].score = 5.0;
     step(&r, t = 4500, true);
     assert_int_equal(r.status.mode, BST_MODE_SEARCH);
     r.tracks->count = 0;

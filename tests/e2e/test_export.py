@@ -280,6 +280,46 @@ class Exported(unittest.TestCase):
         export(self.made, "--orbits", "oem", "--out", out)
         self.assertEqual([len(rows) for _, rows in read_oem(out + "/orbits.oem")], [21, 21])
 
+    def test_orbits_that_end(self):
+        """What decays, or comes from a file with a gap, is written where it has an orbit."""
+        folder = runs.scratch()
+        rows = {0: "", 10: "", 30: "", 40: ""}
+        for t in rows:
+            rows[t] = f"2022-06-16T22:10:{t:02d} 42164 {3.07 * t} 0 0 3.07 0\n"
+        head = ("META_START\nOBJECT_NAME = G\nOBJECT_ID = G\nCENTER_NAME = EARTH\nREF_FRAME = GCRF\n"
+                "TIME_SYSTEM = UTC\nSTART_TIME = 2022-06-16T22:10:{}\n"
+                "STOP_TIME = 2022-06-16T22:10:{}\nMETA_STOP\n")
+        with open(folder + "/gap.oem", "w", encoding="ascii") as file:
+            file.write("CCSDS_OEM_VERS = 2.0\n" + head.format("00", "10") + rows[0] + rows[10]
+                       + head.format("30", "40") + rows[30] + rows[40])
+        falling = {"name": "D", "orbit": {"source": "numerical", "state": {
+            "position_gcrf_m": [6459137, 0, 0], "velocity_gcrf_mps": [-300, 7500, 0]}}}
+        gone = {"name": "L", "orbit": {"source": "numerical", "state": {
+            "at_s": 100, "position_gcrf_m": [6459137, 0, 0], "velocity_gcrf_mps": [9000, 0, 0]}}}
+        gap = {"name": "G", "orbit": {"source": "oem", "oem_file": folder + "/gap.oem"}}
+        sets = "/world/objects=" + json.dumps([
+            {"name": "INMARSAT GX5", "orbit": {
+                "elements_file": os.path.abspath("scenarios/catalogue_2022-06.tle"),
+                "norad": 44801}}, falling, gap, gone])
+        runs.run(runs.TRACK, folder + "/run", runs.NO_FRAMES, sets, duration=40)
+        result = call("export", folder + "/run", "--orbits", "oem", "--step", "1", "--out",
+                      folder + "/out")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(result.stdout, folder + "/out/orbits.oem: 4 orbits\n")
+        self.assertIn("warning: D is left out where it has no orbit: ", result.stderr)
+        self.assertIn("warning: G is left out where it has no orbit: ", result.stderr)
+        self.assertIn("warning: L is left out: ", result.stderr)
+        # a file is continued by 5 s, but not into its gap
+        self.assertEqual([(meta["OBJECT_NAME"], states[0][0][17:19], states[-1][0][17:19])
+                          for meta, states in read_oem(folder + "/out/orbits.oem")],
+                         [("neossat", "00", "40"), ("INMARSAT GX5", "00", "40"),
+                          ("D", "00", "03"), ("G", "00", "10"), ("G", "30", "40")])
+        call("export", folder + "/run", "--orbits", "czml", "--step", "1", "--out", folder + "/out")
+        with open(folder + "/out/orbits.czml", encoding="utf-8") as file:
+            ids = [packet["id"] for packet in json.load(file)]
+        self.assertEqual(ids, ["document", "observer/neossat", "object/INMARSAT GX5", "object/D",
+                               "object/G", "object/G/2"])
+
     # -------------------------------------------------------------- observations
 
     def test_tdm(self):

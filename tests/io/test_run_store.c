@@ -160,7 +160,14 @@ static void test_refusals(void **state) {
     write_file(scratch_path(&s, "mine/thesis.tex"), "x");
     assert_int_equal(bst_run_create(&ctx, scratch_path(&s, "mine"), true, &run), BST_ERR_IO);
     assert_non_null(strstr(ctx.message, "not the folder of a run"));
+    /* ... whatever a run's files share names with */
+    write_file(scratch_path(&s, "mine/manifest.json"), "{}");
+    write_file(scratch_path(&s, "mine/lock"), "");
+    assert_int_equal(bst_run_create(&ctx, scratch_path(&s, "mine"), true, &run), BST_ERR_IO);
+    assert_non_null(strstr(ctx.message, "not the folder of a run"));
+    assert_true(scratch_has(scratch_path(&s, "mine/thesis.tex")));
     assert_int_equal(mkdir(scratch_path(&s, "yours.partial"), 0755), 0);
+    write_file(scratch_path(&s, "yours.partial/manifest.json"), "{}");
     write_file(scratch_path(&s, "yours.partial/thesis.tex"), "x");
     assert_int_equal(bst_run_create(&ctx, scratch_path(&s, "yours"), true, &run), BST_ERR_IO);
     assert_true(scratch_has(scratch_path(&s, "yours.partial/thesis.tex")));

@@ -423,6 +423,33 @@ static void frames_come_from_a_pool(void **state) {
     scene_track_free(&track);
 }
 
+static void streaks_without_end_are_refused(void **state) {
+    fixture *f = *state;
+    enum { N = 40000 };
+    bst_camera camera = scene_camera(64, 64);
+    bst_renderer *r = make(f, &camera, NULL);
+    /* 20,000 px take about as many nodes of 12 bytes, 9 GB in all: more than can be counted */
+    scene_track track = scene_track_make(
+        &camera, &(scene_motion){.x_px = 20000.0, .duration_s = 0.5, .samples = 51});
+    bst_source *stars = malloc(N * sizeof *stars);
+    for (int i = 0; i < N; i++) {
+        stars[i] = scene_star(&camera, 32.0, 64.0 * i / N, 1e9);
+    }
+    bst_render_request q = {
+        .window = {0, 0, 64, 64}, .track = &track.track, .sources = stars, .count = N};
+    bst_frame *frame;
+    assert_int_equal(bst_renderer_render(&f->ctx, r, &q, &frame), BST_ERR_RANGE);
+    assert_non_null(strstr(f->ctx.message, "the sources move too far in one exposure"));
+    assert_non_null(strstr(f->ctx.message, "of 40000 need"));
+    /* the renderer goes on */
+    q.count = 2;
+    bst_assert_ok(&f->ctx, bst_renderer_render(&f->ctx, r, &q, &frame));
+    bst_frame_release(frame);
+    bst_renderer_free(r);
+    scene_track_free(&track);
+    free(stars);
+}
+
 static void wrong_requests_and_cameras_are_refused(void **state) {
     fixture *f = *state;
     bst_camera camera = scene_camera(64, 64);
@@ -459,6 +486,7 @@ int main(void) {
         cmocka_unit_test(hard_cases),
         cmocka_unit_test(a_hundred_thousand_stars),
         cmocka_unit_test(frames_come_from_a_pool),
+        cmocka_unit_test(streaks_without_end_are_refused),
         cmocka_unit_test(wrong_requests_and_cameras_are_refused),
     };
     return cmocka_run_group_tests(tests, open_device, close_device);

@@ -83,7 +83,8 @@ static void see(bench *b, double x, double y, double sigma_px, double v_mag) {
         .y_px = y,
         .v_mag = v_mag + 0.05 * normal(b),
         .v_mag_sigma = 0.05,
-        .snr = 20};
+        .snr = 20,
+        .length_rad = 2 * PX};
 }
 
 static void clutter(bench *b, int n, double sigma_px) {
@@ -400,6 +401,166 @@ static void feeds_the_cue_forward(void **state) {
     assert_true(error[0] > 2.5); /* a t^2 / 2 = 3.3 px: the help is needed */
 }
 
+/* ---- what is at rest ---- */
+
+static bst_mtt_params with_stars(void) {
+    bst_mtt_params params = defaults();
+    params.star_rate_radps = 0.5 * AS;
+    params.motion_chi2 = 25;
+    params.max_stars = 1000;
+    return params;
+}
+
+static int rest_count(const bench *b) {
+    int n, c = 0;
+    const bst_mtt_track *tracks = bst_mtt_tracks(b->mtt, &n);
+    for (int i = 0; i < n; i++) {
+        c += tracks[i].at_rest;
+    }
+    return c;
+}
+
+static int events_of(const bench *b, bst_mtt_event_kind kind) {
+    int n, c = 0;
+    const bst_mtt_event *events = bst_mtt_events(b->mtt, &n);
+    for (int i = 0; i < n; i++) {
+        c += events[i].kind == kind;
+    }
+    return c;
+}
+
+/* 300 stars, each seen in 4 of 5 frames, and objects of 60, 6 and 1.2 arcsec/s. */
+static void unknown_stars_are_no_tracks(void **state) {
+    (void)state;
+    bst_mtt_params params = with_stars();
+    bench *b = start(21, &params);
+    static object stars[300];
+    for (int i = 0; i < 300; i++) {
+        stars[i] = (object){.x = 900 * (uniform(b) - 0.5), .y = 900 * (uniform(b) - 0.5)};
+    }
+    const double speed[3] = {20.0, 2.0, 0.4};
+    int confirmed = 0, since[3] = {0};
+    for (int k = 0; k < 40; k++) {
+        for (int i = 0; i < 300; i++) {
+            if (uniform(b) < 0.8) {
+                see(b, stars[i].x, stars[i].y, 0.15, 14);
+            }
+        }
+        for (int i = 0; i < 3; i++) {
+            see(b, -400 + speed[i] * k, 465 + 10 * i, 0.1, 13);
+        }
+        frame(b, k);
+        confirmed += events_of(b, BST_MTT_CONFIRMED);
+        for (int i = 0; i < 3; i++) {
+            bool there = track_at(b, -400 + speed[i] * k, 465 + 10 * i) != 0;
+            since[i] = there && since[i] == 0 ? k : since[i];
+        }
+    }
+    print_message("300 stars: %d at rest; objects confirmed after %d, %d, %d frames\n",
+                  rest_count(b), since[0], since[1], since[2]);
+    assert_int_equal(confirmed, 3);                          /* the objects and nothing else */
+    assert_int_equal(confirmed_count(b) - 3, rest_count(b)); /* a star's status is not tentative */
+    assert_true(rest_count(b) >= 297 && rest_count(b) <= 305); /* a blend or a copy of one or two */
+    assert_true(since[0] > 0 && since[0] <= 4);
+    assert_true(since[1] > 0 && since[1] <= 6);
+    /* its rate's error falls below a fifth of the rate within ten frames of 0.1 px */
+    assert_true(since[2] > 0 && since[2] <= 15);
+    bst_mtt_free(b->mtt);
+}
+
+/* A star unseen for a minute is the same one; without room stars are counted as lost, and what
+ * moves is followed all the same. */
+static void stars_are_kept_while_there_is_room(void **state) {
+    (void)state;
+    bst_mtt_params params = with_stars();
+    bench *b = start(22, &params);
+    for (int k = 0; k < 75; k++) {
+        if (k < 15 || k == 74) {
+            see(b, 100, 100, 0.1, 13);
+        }
+        frame(b, k);
+        assert_int_equal(events_of(b, BST_MTT_CONFIRMED), 0);
+    }
+    int n;
+    const bst_mtt_track *tracks = bst_mtt_tracks(b->mtt, &n);
+    assert_int_equal(n, 1);
+    assert_true(tracks[0].star);
+    assert_int_equal(tracks[0].hits, 16);
+    frame(b, 74 + 121); /* longer than max_coast_s */
+    bst_mtt_tracks(b->mtt, &n);
+    assert_int_equal(n, 0);
+    assert_int_equal(events_of(b, BST_MTT_LOST), 0);
+    bst_mtt_free(b->mtt);
+
+    params.max_stars = 10;
+    b = start(23, &params);
+    for (int k = 0; k < 10; k++) {
+        for (int i = 0; i < 50; i++) {
+            see(b, -400 + 15 * i, -300, 0.1, 13);
+        }
+        see(b, 5.0 * k, 0, 0.1, 13);
+        frame(b, k);
+    }
+    assert_int_equal(rest_count(b), 10);
+    assert_true(track_at(b, 45, 0) != 0);
+    bst_mtt_free(b->mtt);
+}
+
+static bool always(const void *user, const bst_mtt_track *track) {
+    (void)track;
+    return *(const bool *)user;
+}
+
+/* What the cue expects to stand still is confirmed; once the cue expects something else, it is a
+ * star. */
+static void the_cue_may_expect_rest(void **state) {
+    (void)state;
+    bst_mtt_params params = with_stars();
+    bench *b = start(24, &params);
+    for (int k = 0; k < 30; k++) {
+        bool expected = k < 20;
+        see(b, 10, 10, 0.1, 13);
+        bst_mtt_frame f = {.tick = k * 1000,
+                           .seconds = k,
+                           .detections = b->detections,
+                           .count = b->count,
+                           .expected = always,
+                           .user = &expected};
+        bst_mtt_step(b->mtt, &f);
+        b->count = 0;
+        assert_int_equal(events_of(b, BST_MTT_CONFIRMED), k == 2);
+        assert_int_equal(events_of(b, BST_MTT_LOST), k == 20);
+        assert_int_equal(rest_count(b), k >= 20);
+    }
+    bst_mtt_free(b->mtt);
+}
+
+/* A drift of 1 arcsec/s that all directions share makes satellites of stars unless it is known that
+ * there may be one. */
+static void a_common_rate_is_no_motion(void **state) {
+    (void)state;
+    for (int known = 0; known < 2; known++) {
+        bst_mtt_params params = with_stars();
+        bench *b = start(25, &params);
+        int confirmed = 0;
+        for (int k = 0; k < 20; k++) {
+            for (int i = 0; i < 20; i++) {
+                see(b, -400 + 40 * i + k / 3.0, 0, 0.1, 13);
+            }
+            bst_mtt_frame f = {.tick = k * 1000,
+                               .seconds = k,
+                               .detections = b->detections,
+                               .count = b->count,
+                               .common_rate_sigma_radps = known ? 0.5 * AS : 0.0};
+            bst_mtt_step(b->mtt, &f);
+            b->count = 0;
+            confirmed += events_of(b, BST_MTT_CONFIRMED);
+        }
+        assert_int_equal(confirmed, known ? 0 : 20);
+        bst_mtt_free(b->mtt);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(crossing_targets_keep_identity),
                                        cmocka_unit_test(false_tracks_are_rare),
@@ -407,6 +568,10 @@ int main(void) {
                                        cmocka_unit_test(heavy_clutter_overflows_gracefully),
                                        cmocka_unit_test(coasting_and_deletion),
                                        cmocka_unit_test(an_hour_without_frames),
-                                       cmocka_unit_test(feeds_the_cue_forward)};
+                                       cmocka_unit_test(feeds_the_cue_forward),
+                                       cmocka_unit_test(unknown_stars_are_no_tracks),
+                                       cmocka_unit_test(stars_are_kept_while_there_is_room),
+                                       cmocka_unit_test(the_cue_may_expect_rest),
+                                       cmocka_unit_test(a_common_rate_is_no_motion)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -167,9 +167,37 @@ static void keeps_and_lets_go(void **state) {
     assert_int_equal(target.id, 7);
 }
 
+/* Only the cue makes something slow a candidate; a kept target is given more. */
+static void expects_what_the_cue_says(void **state) {
+    (void)state;
+    bst_target_cue cue = make_cue();
+    bst_mtt_track t = make_track(1, 100, 0, 13);
+    assert_true(bst_target_is_expected(&params, &cue, &t, false));
+    t.state.rate_radps = (bst_vec3){0, 0, 0};
+    assert_false(bst_target_is_expected(&params, &cue, &t, false));
+    assert_false(bst_target_is_expected(&params, &cue, &t, true));
+    cue.rate_radps = (bst_vec3){0, 0, 0}; /* the target stands still */
+    assert_true(bst_target_is_expected(&params, &cue, &t, false));
+    bst_mtt_track far = make_track(2, 9000, 0, 13); /* but not 2.5 degrees from the cue, */
+    far.state.rate_radps = (bst_vec3){0, 0, 0};
+    assert_false(bst_target_is_expected(&params, &cue, &far, false));
+    assert_true(bst_target_is_expected(&params, &cue, &far, true)); /* unless it is the target */
+    cue.valid = false;
+    assert_false(bst_target_is_expected(&params, &cue, &t, true));
+    /* what became a star is no target, and says nothing about where the target is */
+    bst_target target = {.id = 1};
+    t = make_track(1, 100, 0, 13);
+    t.at_rest = t.star = true;
+    cue = make_cue();
+    bst_target_step(&target, &params, &cue, 0.0, &t, 1);
+    assert_int_equal(target.id, 0);
+    assert_false(target.remembered);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(misfit_is_chi_square), cmocka_unit_test(takes_the_likeliest),
-        cmocka_unit_test(takes_nothing_wrong), cmocka_unit_test(keeps_and_lets_go)};
+        cmocka_unit_test(takes_nothing_wrong), cmocka_unit_test(keeps_and_lets_go),
+        cmocka_unit_test(expects_what_the_cue_says)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,6 +3,7 @@
 
 #include <stdlib.h>
 
+#include "sim/world/world_internal.h"
 #include "tests/world/world_support.h"
 
 #define GX5 "{\"name\": \"GX5\", " TEST_GX5 "}"
@@ -383,6 +384,36 @@ static void what_came_down_is_not_there(void **state) {
     free_scene(&s);
 }
 
+static int count_objects(const scene *s) {
+    int n = 0;
+    for (int i = 0; i < s->count; i++) {
+        n += s->sources[i].kind == BST_SOURCE_OBJECT;
+    }
+    return n;
+}
+
+/* A catalogue has the observer, too: without its burns, 96 m ahead here and brighter than the Sun.
+ */
+static void nobody_sees_itself_in_a_catalogue(void **state) {
+    (void)state;
+    scene s = make_scene_in(
+        test_world("{\"world\": {\"star_catalogue\": \"embedded\", \"catalogues\": "
+                   "[{\"elements_file\": \"scenarios/catalogue_2022-06.tle\"}]}, \"observers\": "
+                   "[{\"name\": \"neossat\", " TEST_NEOSSAT
+                   ", \"burns\": [{\"time_s\": -100, \"dv_rtn_mps\": [0, 1, 0]}], \"sensors\": "
+                   "[{" TEST_CAMERA ", \"cue\": {\"object\": \"NEOSSAT\"}}]}]}"));
+    assert_int_equal(s.world->observers[0].norad, 39089);
+    fill(&s, 0, 0, 0, 0);
+    query(&s, 3000, full);
+    assert_int_equal(count_objects(&s), 0);
+    /* but others do */
+    s.world->observers[0].norad = 0;
+    query(&s, 3000, full);
+    assert_int_equal(count_objects(&s), 1);
+    assert_true(s.sources[s.count - 1].range_m > 50.0 && s.sources[s.count - 1].range_m < 200.0);
+    free_scene(&s);
+}
+
 /* An object that passes the observer: the quartic against sights at many instants. */
 static void fast_passes_are_followed(void **state) {
     (void)state;
@@ -494,6 +525,7 @@ int main(void) {
         cmocka_unit_test(the_target_is_where_the_sight_says),
         cmocka_unit_test(the_earth_hides_stars),
         cmocka_unit_test(what_came_down_is_not_there),
+        cmocka_unit_test(nobody_sees_itself_in_a_catalogue),
         cmocka_unit_test(fast_passes_are_followed),
         cmocka_unit_test(the_ring_may_have_wrapped),
         cmocka_unit_test(an_exposure_outside_the_history_is_refused),
