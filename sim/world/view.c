@@ -161,17 +161,29 @@ static bst_status look(bst_ctx *ctx, bst_view *view, const eye *e, int object, f
     return BST_OK;
 }
 
-/* How bright the object is, and whether the Earth hides it. */
+/* How bright an object is that the light left at `emitted_m` and is seen from `eye_m`. */
+static void shine_at(const bst_world *world, int object, bst_vec3 emitted_m, bst_vec3 eye_m,
+                     bst_vec3 sun_m, double seconds, bst_sight *out) {
+    const bst_object_info *info = &world->objects[object].info;
+    bst_vec3 to_eye = bst_vec3_sub(eye_m, emitted_m), to_sun = bst_vec3_sub(sun_m, emitted_m);
+    out->phase_rad = bst_vec3_angle(to_eye, to_sun);
+    out->sunlit_fraction = bst_sun_fraction(emitted_m, sun_m);
+    bst_lighting lighting = {.area_m2 = info->area_m2,
+                             .albedo = info->albedo,
+                             .object_m = emitted_m,
+                             .eye_m = eye_m,
+                             .sun_m = sun_m,
+                             .seconds = seconds,
+                             .sunlit_fraction = out->sunlit_fraction};
+    bst_brightness_at(info->brightness, &lighting, &out->glow);
+    out->v_mag = out->glow.v_mag;
+}
+
+/* The same of a sight, and whether the Earth hides it. */
 static void shine(const bst_view *view, const eye *e, int object, bst_vec3 emitted_m,
                   bst_sight *out) {
-    bst_vec3 to_eye = bst_vec3_sub(e->state.position_m, emitted_m);
-    bst_vec3 to_sun = bst_vec3_sub(e->sky.bodies.sun_m, emitted_m);
-    out->phase_rad = bst_vec3_angle(to_eye, to_sun);
-    out->sunlit_fraction = bst_sun_fraction(emitted_m, e->sky.bodies.sun_m);
-    const bst_object_info *info = &view->world->objects[object].info;
-    double full = bst_lambert_sphere_v_mag(info->area_m2, info->albedo, out->phase_rad,
-                                           out->range_m, bst_vec3_norm(to_sun));
-    out->v_mag = out->sunlit_fraction > 0.0 ? full - 2.5 * log10(out->sunlit_fraction) : INFINITY;
+    shine_at(view->world, object, emitted_m, e->state.position_m, e->sky.bodies.sun_m,
+             e->seconds - out->light_time_s, out);
     out->occulted =
         bst_earth_occults(e->state.position_m, emitted_m, &e->sky.frames.itrf_from_gcrf);
 }

@@ -129,6 +129,10 @@ void bst_world_free(bst_world *world) {
         }
         free(world->observers[i].sensors);
     }
+    for (int i = 0; i < world->brightness_count; i++) {
+        bst_brightness_free(world->brightness[i]);
+    }
+    free(world->brightness);
     bst_world_files_free(world);
     bst_name_index_free(world->object_names);
     free(world->objects);

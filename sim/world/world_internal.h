@@ -81,6 +81,8 @@ struct bst_world {
     double faint_limit_v_mag;
     world_object *objects;
     int object_count;
+    bst_brightness **brightness; /* of the listed objects, then of the catalogues */
+    int brightness_count;
     bst_name_index *object_names;
     bst_world_file *files;
     int file_count;
