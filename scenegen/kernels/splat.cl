@@ -1,5 +1,5 @@
 /* Light on one tile: sums the nodes' pixel-integrated profiles. Options: TILE_W, TILE_H (pixels),
- * TAPS (profile length, a multiple of 16).
+ * TAPS (profile length, a multiple of 16), PHASES (sub-pixel phases of the profile table).
  *
  * Every pixel receives its nodes in the order of sources, blocks and nodes, whatever the tile, so
  * the float sum is the same for every window and work-group size. */
@@ -16,10 +16,24 @@ static int any16(int16 v) {
     return (c.lo | c.hi) < 0;
 }
 
+/* Sixteen taps at `row`, between its phase and the next (t) and, when widened, between its width and
+ * the next (u). */
+static float16 profile16(global const float *row, float t, float u, int wide) {
+    float16 a = vload16(0, row), b = vload16(0, row + TAPS);
+    a = fma((float16)t, b - a, a);
+    if (wide) {
+        row += (PHASES + 1) * TAPS;
+        float16 c = vload16(0, row), d = vload16(0, row + TAPS);
+        c = fma((float16)t, d - c, c);
+        a = fma((float16)u, c - a, a);
+    }
+    return a;
+}
+
 /* Tap j of a profile whose centre is f pixels (0 <= f < 1) right of pixel n belongs to pixel
- * n + j - (HALF - 1). profiles: [BST_PHASES + 1][TAPS]. */
+ * n + j - (HALF - 1). profiles: [BST_WIDTHS + 1][PHASES + 1][TAPS]. */
 static void splat_node(local float *sum, int tile_x, int tile_y, float x, float y, float electrons,
-                       int radius, int chunks, global const float *profiles) {
+                       float width, int radius, int chunks, global const float *profiles) {
     float floor_x = floor(x), floor_y = floor(y);
     int ix = (int)floor_x - (HALF - 1) - tile_x; /* tile column of tap 0 */
     int iy = (int)floor_y - (HALF - 1) - tile_y;
@@ -28,23 +42,27 @@ static void splat_node(local float *sum, int tile_x, int tile_y, float x, float 
     if (first > last) {
         return;
     }
-    float phase_x = (x - floor_x) * BST_PHASES, phase_y = (y - floor_y) * BST_PHASES;
-    int px = min((int)phase_x, BST_PHASES - 1), py = min((int)phase_y, BST_PHASES - 1);
+    float phase_x = (x - floor_x) * PHASES, phase_y = (y - floor_y) * PHASES;
+    int px = min((int)phase_x, PHASES - 1), py = min((int)phase_y, PHASES - 1);
     float tx = phase_x - (float)px, ty = phase_y - (float)py;
-    global const float *row_x = profiles + px * TAPS;
-    global const float *row_y = profiles + py * TAPS;
+    int wide = width > 0.0f, level = min((int)width, BST_WIDTHS - 1);
+    float u = width - (float)level;
+    profiles += level * (PHASES + 1) * TAPS;
+    int start = HALF - 8 * chunks;
+    float heights[TAPS];
     for (int c = 0; c < chunks; c++) {
-        int tap = HALF - 8 * chunks + 16 * c;
-        int column = ix + tap;
+        vstore16(profile16(profiles + py * TAPS + start + 16 * c, ty, u, wide), c, heights);
+    }
+    for (int c = 0; c < chunks; c++) {
+        int column = ix + start + 16 * c;
         if (column <= -16 || column >= TILE_W) {
             continue;
         }
-        float16 a = vload16(0, row_x + tap), b = vload16(0, row_x + TAPS + tap);
-        float16 line = electrons * fma((float16)tx, b - a, a);
+        float16 line =
+            electrons * profile16(profiles + px * TAPS + start + 16 * c, tx, u, wide);
         local float *target = sum + (iy + first) * STRIDE + PAD + column;
-        for (int j = first; j <= last; j++) {
-            float height = row_y[j] + ty * (row_y[TAPS + j] - row_y[j]);
-            vstore16(fma((float16)height, line, vload16(0, target)), 0, target);
+        for (int j = first - start; j <= last - start; j++) {
+            vstore16(fma((float16)heights[j], line, vload16(0, target)), 0, target);
             target += STRIDE;
         }
     }
@@ -60,12 +78,12 @@ static void splat_source(local float *sum, int tile_x, int tile_y, bst_scene_sou
         if (box.x > x1 || box.z < x0 || box.y > y1 || box.w < y0) {
             continue;
         }
-        global const float *block = nodes + 3 * BST_BLOCK * b;
+        global const float *block = nodes + BST_NODE_ROWS * BST_BLOCK * b;
         for (int n = 0; n < BST_BLOCK; n++) {
             float electrons = block[2 * BST_BLOCK + n];
             if (electrons > 0.0f) {
-                splat_node(sum, tile_x, tile_y, block[n], block[BST_BLOCK + n], electrons, s.radius,
-                           s.chunks, profiles);
+                splat_node(sum, tile_x, tile_y, block[n], block[BST_BLOCK + n], electrons,
+                           block[3 * BST_BLOCK + n], s.radius, s.chunks, profiles);
             }
         }
     }

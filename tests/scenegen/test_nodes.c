@@ -35,7 +35,7 @@ static void a_group_keeps_its_moments(void **state) {
     const bst_path_point path[] = {
         {{5.0, 7.0, 1.0}, 0.0}, {{5.3, 7.0, 1.0}, 0.5}, {{5.3, 7.4, 0.8}, 1.0}};
     bst_node_list list = {0};
-    bst_assert_ok(&ctx, bst_nodes_from_path(&ctx, path, 3, sigma_px, 0.03, &list));
+    bst_assert_ok(&ctx, bst_nodes_from_path(&ctx, path, 3, sigma_px, 0.03, true, &list));
     double weight, mean[3], cov[3][3];
     moments_of(&list, &weight, mean, cov);
     /* midpoints (5.15, 7) and (5.3, 7.2): mean (5.225, 7.1, 0.95) */
@@ -51,7 +51,7 @@ static void a_group_keeps_its_moments(void **state) {
     /* a finer tolerance keeps every axis, so all moments are exact to rounding */
     const bst_path_point small[] = {
         {{0, 0, 0}, 0.0}, {{0.1, 0.0, 0.0}, 0.3}, {{0.1, 0.1, 0.0}, 0.6}, {{0, 0.1, 0.1}, 1.0}};
-    bst_assert_ok(&ctx, bst_nodes_from_path(&ctx, small, 4, sigma_px, 1e-4, &list));
+    bst_assert_ok(&ctx, bst_nodes_from_path(&ctx, small, 4, sigma_px, 1e-4, true, &list));
     moments_of(&list, &weight, mean, cov);
     double m[3] = {0}, s[3][3] = {{0}};
     enum { STEPS = 30000 };
@@ -85,7 +85,7 @@ static void a_straight_group_is_gauss_legendre(void **state) {
     bst_ctx ctx = {0};
     const bst_path_point path[] = {{{0, 0, 0}, 0.0}, {{1.2, 0, 0}, 1.0}};
     bst_node_list list = {0};
-    bst_assert_ok(&ctx, bst_nodes_from_path(&ctx, path, 2, sigma_px, 0.03, &list));
+    bst_assert_ok(&ctx, bst_nodes_from_path(&ctx, path, 2, sigma_px, 0.03, true, &list));
     assert_int_equal(list.count, 2);
     double a = 0.6 - 0.6 / sqrt(3.0), b = 0.6 + 0.6 / sqrt(3.0);
     bst_assert_close(fmin(list.items[0].p[0], list.items[1].p[0]), a, 1e-12); /* rounding */
@@ -101,7 +101,7 @@ static void long_segments_are_cut_and_finer_levels_have_more(void **state) {
     int previous = 0;
     for (double tolerance = 0.03; tolerance > 1e-6; tolerance *= 0.1) {
         bst_node_list list = {0};
-        bst_assert_ok(&ctx, bst_nodes_from_path(&ctx, path, 2, sigma_px, tolerance, &list));
+        bst_assert_ok(&ctx, bst_nodes_from_path(&ctx, path, 2, sigma_px, tolerance, true, &list));
         double weight = 0.0;
         for (int n = 0; n < list.count; n++) {
             weight += list.items[n].weight;
@@ -119,7 +119,7 @@ static void no_duration_is_one_node(void **state) {
     bst_ctx ctx = {0};
     const bst_path_point path[] = {{{3, 4, 5}, 0.5}, {{3, 4, 5}, 0.5}};
     bst_node_list list = {0};
-    bst_assert_ok(&ctx, bst_nodes_from_path(&ctx, path, 2, sigma_px, 0.03, &list));
+    bst_assert_ok(&ctx, bst_nodes_from_path(&ctx, path, 2, sigma_px, 0.03, true, &list));
     assert_int_equal(list.count, 1);
     bst_assert_close(list.items[0].weight, 1.0, 0.0);
     bst_assert_close(list.items[0].p[2], 5.0, 0.0);
@@ -136,7 +136,7 @@ static void peak_shares(void **state) {
     bst_assert_close(bst_nodes_peak_share(&point, 1, sigma_px), line * line, 1e-15);
     const bst_path_point path[] = {{{0, 0, 0}, 0.0}, {{50, 0, 0}, 1.0}};
     bst_node_list list = {0};
-    bst_assert_ok(&ctx, bst_nodes_from_path(&ctx, path, 2, sigma_px, 1e-3, &list));
+    bst_assert_ok(&ctx, bst_nodes_from_path(&ctx, path, 2, sigma_px, 1e-3, true, &list));
     double expected = line * line * sigma_px * sqrt(2.0 * 3.14159265358979) / 50.0;
     /* the sum over nodes stands for the integral: 1 % at this spacing */
     bst_assert_close(bst_nodes_peak_share(list.items, list.count, sigma_px), expected,
