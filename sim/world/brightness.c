@@ -206,6 +206,8 @@ static double ratio_of(double v_mag) {
 }
 
 void bst_brightness_at(const bst_brightness *b, const bst_lighting *l, bst_glow *out) {
+    static const bst_brightness plain = {.config = {.model = BST_BRIGHTNESS_SPHERE}};
+    b = b ? b : &plain;
     const bst_brightness_config *c = &b->config;
     bst_vec3 to_eye = bst_vec3_sub(l->eye_m, l->object_m);
     bst_vec3 to_sun = bst_vec3_sub(l->sun_m, l->object_m);

@@ -36,6 +36,7 @@ typedef struct bst_glow {
     bool resolved;             /* may be drawn as a disc */
 } bst_glow;
 
+/* `brightness` may be NULL: a diffuse sphere that does not glow and is never drawn as a disc. */
 void bst_brightness_at(const bst_brightness *brightness, const bst_lighting *lighting,
                        bst_glow *out);
 
