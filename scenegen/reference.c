@@ -149,7 +149,7 @@ static bst_status split_discs(bst_ctx *ctx, const bst_camera *camera, const bst_
                 status = bst_fail(ctx, BST_ERR_NUMERIC,
                                   "the disc of source %d is too large for a reference image", i);
             } else if (s->shape) {
-                status = bst_disc_make_points(ctx, s, panel, &points);
+                status = bst_disc_make_points(ctx, s, BST_DISC_ALL, panel, &points);
             }
             for (int p = 0; p < (s->shape ? points.count : 1) && status == BST_OK; p++, n++) {
                 if (pass == 0) {

@@ -5,9 +5,12 @@
 
 /* Discs up to this radius, in pixels (or standard deviations of a wider PSF), are made by
  * quadrature: there it needs fewer points. */
-#define SMALL_RADIUS 8.0
+#define SMALL_RADIUS 12.0
 /* Panels of quadrature, in standard deviations. */
 #define PANEL_SIGMAS 1.4
+
+/* Crescents narrower than this (px, or standard deviations) are made by quadrature as well. */
+#define THIN_WIDTH 6.0
 
 enum { GAUSS_MOST = 4, FINEST = 16 };
 
@@ -144,37 +147,69 @@ static bst_status scan_disc(bst_ctx *ctx, scan *s) {
     return BST_OK;
 }
 
+/* Appends the points of some lights by quadrature, those that are wanted. */
+static bst_status add_quadrature(bst_ctx *ctx, const bst_source *source, int lights,
+                                 const bst_shape_view *view, double x0, double y0,
+                                 bst_disc_points *points) {
+    int first = points->count, kept = first;
+    double a = view->scale_rad;
+    bst_vec3 z = bst_vec3_unit(source->apparent_mid);
+    BST_TRY(bst_disc_make_points(ctx, source, lights, PANEL_SIGMAS * view->sigma_px * a, points));
+    for (int i = first; i < points->count; i++) {
+        bst_vec3 d =
+            bst_quat_rotate(view->q_focal_from_gcrf, bst_vec3_add(z, points->items[i].offset));
+        double x = d.x / d.z / a, y = d.y / d.z / a;
+        if (x >= view->min_x_px && x <= view->max_x_px && y >= view->min_y_px &&
+            y <= view->max_y_px) {
+            points->items[kept++] = (bst_disc_point){{x - x0, y - y0, 0.0}, points->items[i].share};
+        }
+    }
+    points->count = kept;
+    return BST_OK;
+}
+
+/* Whether what a light makes of the disc is too thin a crescent to be scanned. */
+static bool thin(const bst_disc_aspect *aspect, double radius_px, double sigma_px) {
+    return radius_px * (1.0 + aspect->cosine) < THIN_WIDTH * fmax(1.0, sigma_px);
+}
+
 bst_status bst_shape_points(bst_ctx *ctx, const bst_source *source, const bst_shape_view *view,
                             bst_disc_points *points, double *peak) {
     points->count = 0;
     *peak = 1.0;
-    bst_vec3 z = bst_vec3_unit(source->apparent_mid);
-    bst_vec3 middle = bst_quat_rotate(view->q_focal_from_gcrf, z);
+    const bst_source_shape *shape = source->shape;
+    bst_vec3 middle = bst_quat_rotate(view->q_focal_from_gcrf, bst_vec3_unit(source->apparent_mid));
     if (!(middle.z > 0.0)) {
         return BST_OK;
     }
     double a = view->scale_rad, x0 = middle.x / middle.z / a, y0 = middle.y / middle.z / a;
-    double radius_px = tan(asin(source->shape->radius)) / a;
+    double radius_px = tan(asin(shape->radius)) / a;
     if (radius_px <= SMALL_RADIUS * fmax(1.0, view->sigma_px)) {
-        BST_TRY(bst_disc_make_points(ctx, source, PANEL_SIGMAS * view->sigma_px * a, points));
-        for (int i = 0; i < points->count; i++) {
-            bst_vec3 d =
-                bst_quat_rotate(view->q_focal_from_gcrf, bst_vec3_add(z, points->items[i].offset));
-            points->items[i].offset = (bst_vec3){d.x / d.z / a - x0, d.y / d.z / a - y0, 0.0};
-        }
-        return BST_OK;
+        return add_quadrature(ctx, source, BST_DISC_ALL, view, x0, y0, points);
     }
     scan s = {.view = view,
               .gcrf_from_focal = bst_quat_conj(view->q_focal_from_gcrf),
               .middle = middle,
-              .sine = source->shape->radius,
-              .cosine = sqrt(1.0 - source->shape->radius * source->shape->radius),
+              .sine = shape->radius,
+              .cosine = sqrt(1.0 - shape->radius * shape->radius),
               .x0 = x0,
               .y0 = y0,
               .cell = fmax(1.0, floor(view->sigma_px)),
               .out = points};
     bst_disc_begin(source, &s.disc);
-    s.order = (int)fmin(fmax(ceil(1.6 * s.cell / view->sigma_px), 2.0), GAUSS_MOST);
+    int apart = BST_DISC_SPECULAR;
+    double scanned = shape->thermal + shape->diffuse + shape->earthshine;
+    if (thin(&s.disc.sun, radius_px, view->sigma_px)) {
+        apart |= BST_DISC_SUN;
+        scanned -= shape->diffuse;
+        s.disc.sun.scale = 0.0;
+    }
+    if (thin(&s.disc.earth, radius_px, view->sigma_px)) {
+        apart |= BST_DISC_EARTH;
+        scanned -= shape->earthshine;
+        s.disc.earth.scale = 0.0;
+    }
+    s.order = (int)fmin(fmax(ceil(2.2 * s.cell / view->sigma_px), 2.0), GAUSS_MOST);
     double wide = fmin(2.0 * radius_px, view->max_x_px - view->min_x_px);
     double high = fmin(2.0 * radius_px, view->max_y_px - view->min_y_px);
     double squares = fmax(wide * high, 0.0);
@@ -184,22 +219,18 @@ bst_status bst_shape_points(bst_ctx *ctx, const bst_source *source, const bst_sh
     while (squares / (s.cell * s.cell) > view->most_points) {
         s.cell += 1.0;
     }
-    BST_TRY(scan_disc(ctx, &s));
-    bool complete = x0 - 1.1 * radius_px > view->min_x_px &&
-                    x0 + 1.1 * radius_px < view->max_x_px &&
-                    y0 - 1.1 * radius_px > view->min_y_px && y0 + 1.1 * radius_px < view->max_y_px;
-    for (int i = 0; i < points->count && complete; i++) {
-        points->items[i].share *= (1.0 - source->shape->specular) / s.total;
-    }
-    bst_vec3 point =
-        bst_quat_rotate(view->q_focal_from_gcrf, bst_vec3_add(z, bst_disc_specular(source)));
-    if (source->shape->specular > 0.0) {
-        BST_TRY(push(ctx, points, point.x / point.z / a - x0, point.y / point.z / a - y0,
-                     source->shape->specular));
-    }
-    /* brightest where the light falls steepest */
     double top = s.disc.thermal + s.disc.sun.scale + s.disc.earth.scale;
-    *peak = fmin(1.0, top * a * a + source->shape->specular);
+    if (top > 0.0) {
+        BST_TRY(scan_disc(ctx, &s));
+    }
+    double reach = 1.1 * radius_px;
+    bool complete = x0 - reach > view->min_x_px && x0 + reach < view->max_x_px &&
+                    y0 - reach > view->min_y_px && y0 + reach < view->max_y_px;
+    for (int i = 0; i < points->count && complete; i++) {
+        points->items[i].share *= scanned / s.total;
+    }
+    BST_TRY(add_quadrature(ctx, source, apart, view, x0, y0, points));
+    *peak = fmin(1.0, top * a * a + 1.0 - scanned);
     return BST_OK;
 }
 

