@@ -121,9 +121,12 @@ double bst_earthshine(double specular_fraction, double earth_albedo, bst_vec3 ob
     bst_vec3 sum = {0};
     for (int n = 0; n < 8 * PANELS; n++) {
         double weight, place = gauss8(n % 8, &weight);
-        double drop = cap * (n / 8 + 0.5 + 0.5 * place) / PANELS; /* 1 - cos of the angle */
+        /* 1 - cos of the angle, so that brightness is smooth at the Earth's limb */
+        double t = 0.5 * BST_PI * (n / 8 + 0.5 + 0.5 * place) / PANELS,
+               drop = cap * sin(t) * sin(t);
         double c = 1.0 - drop, s = sqrt(drop * (2.0 - drop));
-        double solid_angle = cap / PANELS * 0.5 * weight * 2.0 * BST_PI / AROUND;
+        double solid_angle =
+            cap * sin(2.0 * t) * 0.25 * BST_PI / PANELS * weight * 2.0 * BST_PI / AROUND;
         double half_chord2 = BST_EARTH_RADIUS_M * BST_EARTH_RADIUS_M - distance * distance * s * s;
         double way = distance * c - sqrt(fmax(half_chord2, 0.0));
         for (int m = 0; m < AROUND; m++) {
@@ -147,17 +150,25 @@ double bst_earthshine(double specular_fraction, double earth_albedo, bst_vec3 ob
 /* Light of a diffuse sphere over its disc as seen: radius q of its own (sine of the angle over that
  * of the limb), angle a from the direction of the Sun; q = sin t keeps the limb's slope finite. */
 static double disc_light(double ratio, double phi) {
-    enum { PANELS = 4, N = 8 * PANELS };
-    double sum = 0.0;
-    for (int i = 0; i < N; i++) {
-        double weight, place = gauss8(i % 8, &weight);
-        double t = 0.5 * BST_PI * (i / 8 + 0.5 + 0.5 * place) / PANELS, q = sin(t);
-        double gamma = t - asin(ratio * q); /* from the point below the eye */
-        double up = cos(gamma) * cos(phi), out = sin(gamma) * sin(phi);
-        /* integral of max(0, up + out cos a) over a full turn */
-        double k = out > 0.0 ? fmin(fmax(-up / out, -1.0), 1.0) : up > 0.0 ? -1.0 : 1.0;
-        double edge = acos(k), light = 2.0 * (up * edge + out * sin(edge));
-        sum += weight * light * q * cos(t) / sqrt(1.0 - ratio * ratio * q * q);
+    enum { PANELS = 3, N = 8 * PANELS };
+    /* rings are wholly lit on one side of this angle from the point below the eye, and cut by the
+     * terminator, or dark, on the other */
+    double border = fabs(0.5 * BST_PI - phi), t0 = border, sum = 0.0;
+    for (int i = 0; i < 60; i++) {
+        t0 = fmin(border + asin(ratio * sin(fmin(t0, 0.5 * BST_PI))), 0.5 * BST_PI);
+    }
+    for (int part = phi < 0.5 * BST_PI ? 0 : 1; part < 2; part++) {
+        double from = part == 0 ? 0.0 : t0, span = (part == 0 ? t0 : 0.5 * BST_PI) - from;
+        for (int i = 0; i < N; i++) {
+            double weight, place = gauss8(i % 8, &weight);
+            double t = from + span * (i / 8 + 0.5 + 0.5 * place) / PANELS, q = sin(t);
+            double gamma = t - asin(ratio * q); /* from the point below the eye */
+            double up = cos(gamma) * cos(phi), out = sin(gamma) * sin(phi);
+            /* integral of max(0, up + out cos a) over a full turn */
+            double k = out > 0.0 ? fmin(fmax(-up / out, -1.0), 1.0) : up > 0.0 ? -1.0 : 1.0;
+            double edge = acos(k), light = 2.0 * (up * edge + out * sin(edge));
+            sum += span * weight * light * q * cos(t) / sqrt(1.0 - ratio * ratio * q * q);
+        }
     }
     return sum;
 }

@@ -19,7 +19,7 @@ typedef struct bst_source_path {
 
 /* Brightness through an exposure, where it changes (the edge of the Earth's shadow, a light curve,
  * a near pass): straight between knots. */
-enum { BST_RATE_KNOTS = 65 };
+enum { BST_RATE_KNOTS = 129 };
 typedef struct bst_source_rate {
     int count;                    /* knots, >= 2 */
     double u[BST_RATE_KNOTS];     /* time as a fraction of the exposure, from 0 to 1, ascending */
