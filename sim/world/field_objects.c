@@ -153,7 +153,7 @@ static bool make_shape(const course *c, const bst_sight *mid, const bst_source *
     shape->thermal /= all;
     bst_vec3 object_m =
         bst_vec3_axpy(c->light->eye_m[BST_PATH_NODES / 2], mid->range_m, mid->geometric);
-    shape->sun = bst_vec3_unit(bst_vec3_sub(c->light->sun_m, object_m));
+    shape->sun = bst_vec3_unit(bst_vec3_sub(c->light->sun_m[BST_PATH_NODES / 2], object_m));
     shape->earth = mid->glow.earth_share > 0.0 ? mid->glow.earth : shape->sun;
     return true;
 }

@@ -22,7 +22,7 @@ typedef struct bst_path_light {
     bst_vec3 eye_m[BST_PATH_NODES]; /* the observer at the path's times, geocentric */
     bst_vec3 lag_m;                 /* at mid-exposure: the object when the light left, from the
                                        object when it arrives */
-    bst_vec3 sun_m;                 /* at mid-exposure, geocentric */
+    bst_vec3 sun_m[BST_PATH_NODES]; /* the Sun, likewise */
     double light_time_s;
 } bst_path_light;
 

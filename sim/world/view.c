@@ -218,6 +218,7 @@ static bst_status path_from(bst_ctx *ctx, bst_view *view, const eye *const eyes[
         BST_TRY(place_of(ctx, view, object, e->seconds, source, &now, &velocity));
         path->place[i] = bst_vec3_sub(now, e->state.position_m);
         light->eye_m[i] = e->state.position_m;
+        light->sun_m[i] = e->sky.bodies.sun_m;
         if (i % 2 != 0) {
             continue;
         }
@@ -232,7 +233,6 @@ static bst_status path_from(bst_ctx *ctx, bst_view *view, const eye *const eyes[
             shine(view, e, object, emitted, &sight);
             *mid = sight;
             light->lag_m = bst_vec3_sub(emitted, now);
-            light->sun_m = e->sky.bodies.sun_m;
             light->light_time_s = sight.light_time_s;
         }
     }
@@ -281,7 +281,7 @@ void bst_view_light(const bst_view *view, int object, const bst_source_path *pat
     bst_vec3 eye_m = quartic(light->eye_m, u);
     bst_vec3 emitted_m = bst_vec3_add(bst_vec3_add(eye_m, quartic(path->place, u)), light->lag_m);
     double seconds = start_s + u * (end_s - start_s) - light->light_time_s;
-    shine_at(view->world, object, emitted_m, eye_m, light->sun_m, seconds, out);
+    shine_at(view->world, object, emitted_m, eye_m, quartic(light->sun_m, u), seconds, out);
 }
 
 bst_status bst_view_near(bst_ctx *ctx, bst_view *view, int observer, double start_s, double end_s,
