@@ -5,6 +5,7 @@
 
 #include "scenegen/nodes.h"
 #include "scenegen/reference.h"
+#include "scenegen/shape.h"
 
 /* Shares of the tolerance: for nodes, and for the border of the stamp. */
 #define NODE_SHARE 0.8
@@ -12,6 +13,8 @@
 
 /* Fidelities: level n is right to about 0.08 * 2^-n of the smeared image's peak. */
 enum { LEVELS = 14, TABLE_FLOATS = BST_TABLE_ROWS * BST_BLOCK, MAX_TAPS = 512 };
+/* Stretches of the path of a source whose brightness changes. */
+enum { RATE_PARTS = 512 };
 
 typedef struct level {
     int first_block, blocks; /* blocks 0: not made in this frame */
@@ -21,7 +24,7 @@ typedef struct level {
 struct bst_smear {
     bst_camera camera;
     bst_smear_options options;
-    double sigma_px;
+    double sigma_px, share_sigma_px;
     double tail[MAX_TAPS / 2]; /* profile at r px from the centre, over the centre's */
     double kept[MAX_TAPS / 2]; /* light within the two nearest pixels and r more on each side */
     double tolerance[LEVELS];
@@ -37,7 +40,9 @@ struct bst_smear {
 
     bst_path_point *path, *own_path;
     int path_count, path_capacity, own_capacity;
-    bst_node_list nodes; /* scratch */
+    bst_node_list nodes;    /* scratch */
+    bst_disc_points points; /* scratch */
+    double disc_px;         /* radius of the present source's disc; 0: a point */
     float *table;
     int table_blocks, table_capacity;
 };
@@ -63,7 +68,9 @@ bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
     }
     s->camera = *camera;
     s->options = *options;
-    s->sigma_px = bst_camera_psf_sigma_px(camera);
+    s->sigma_px =
+        options->node_sigma_px > 0.0 ? options->node_sigma_px : bst_camera_psf_sigma_px(camera);
+    s->share_sigma_px = options->share_sigma_px > 0.0 ? options->share_sigma_px : s->sigma_px;
     double centre = bst_reference_pixel_share(0.0, s->sigma_px, 0);
     for (int r = 0; r < MAX_TAPS / 2; r++) {
         s->tail[r] = bst_reference_pixel_share(0.0, s->sigma_px, r) / centre;
@@ -86,6 +93,7 @@ void bst_smear_free(bst_smear *s) {
         free(s->path);
         free(s->own_path);
         free(s->nodes.items);
+        free(s->points.items);
         free(s->table);
         free(s);
     }
@@ -203,7 +211,7 @@ static double largest_share(bst_smear *s) {
         s->nodes.items[n].p[0] *= least;
         s->nodes.items[n].p[1] *= least;
     }
-    return bst_nodes_peak_share(s->nodes.items, s->nodes.count, s->sigma_px);
+    return bst_nodes_peak_share(s->nodes.items, s->nodes.count, s->share_sigma_px);
 }
 
 static bst_status make_level(bst_ctx *ctx, bst_smear *s, int n) {
@@ -288,7 +296,7 @@ static bool project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, doubl
  * PSF's table ends before. */
 static double far_px(const bst_smear *s) {
     return tan(bst_camera_half_diagonal_rad(&s->camera)) / bst_camera_scale_rad(&s->camera) +
-           MAX_TAPS / bst_camera_shrink(&s->camera);
+           MAX_TAPS / bst_camera_shrink(&s->camera) + s->disc_px;
 }
 
 /* How many chords the curved motion over the image wants: of a parabola they miss
@@ -333,6 +341,9 @@ static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_source *source,
                            double y0, int *count) {
     const bst_los_track *track = &s->track;
     int least = (int)chords_of(s, source) / (track->count - 1) + 1;
+    if (source->rate && least < RATE_PARTS / (track->count - 1) + 1) {
+        least = RATE_PARTS / (track->count - 1) + 1; /* between its points light is uniform */
+    }
     *count = 0;
     for (int k = 0; k + 1 < track->count; k++) {
         int parts = parts_of(s, k);
@@ -347,7 +358,8 @@ static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_source *source,
                 bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
             bool front = project(s, q, bst_source_direction(source, t), &x, &y);
             s->own_path[(*count)++] = (bst_path_point){
-                {front ? (x - x0) * s->stretch : NAN, front ? (y - y0) * s->stretch : NAN, 0.0}, t};
+                {front ? (x - x0) * s->stretch : NAN, front ? (y - y0) * s->stretch : NAN, 0.0},
+                bst_source_light(source, t)};
         }
     }
     return BST_OK;
@@ -380,11 +392,50 @@ static bst_status own_nodes(bst_ctx *ctx, bst_smear *s, int count, double x0, do
     return BST_OK;
 }
 
+/* Puts all the points of a disc on the scratch nodes, which are those of its middle about (x, y).
+ */
+static bst_status spread_shape(bst_ctx *ctx, bst_smear *s, const bst_source *source, double x,
+                               double y, double *peak) {
+    enum { MOST_NODES = 3000000 };
+    double x0 = x, y0 = y, low[2] = {0.0, 0.0}, high[2] = {0.0, 0.0};
+    (void)project(s, s->q_reference, source->apparent_mid, &x0, &y0);
+    for (int n = 0; n < s->nodes.count; n++) {
+        double way[2] = {s->nodes.items[n].p[0] / s->stretch + x - x0,
+                         s->nodes.items[n].p[1] / s->stretch + y - y0};
+        for (int i = 0; i < 2; i++) {
+            low[i] = n == 0 ? way[i] : fmin(low[i], way[i]);
+            high[i] = n == 0 ? way[i] : fmax(high[i], way[i]);
+        }
+    }
+    double cx = bst_camera_centre_x(&s->camera), cy = bst_camera_centre_y(&s->camera);
+    double margin = 0.5 * s->options.taps + 2.0, all = far_px(s) - s->disc_px;
+    bool general = s->camera.geometry.general;
+    double turn = general ? asin(s->camera.geometry.sin_rotation) : 0.0;
+    if (general && s->camera.geometry.cos_rotation < 0.0) {
+        turn = BST_PI - turn;
+    }
+    bst_quat focal = bst_quat_from_rotvec((bst_vec3){0.0, 0.0, turn});
+    bst_shape_view view = {
+        .q_focal_from_gcrf = general ? bst_quat_mul(focal, s->q_reference) : s->q_reference,
+        .scale_rad = bst_camera_scale_rad(&s->camera),
+        .edge_x_px = -cx - 0.5,
+        .edge_y_px = -cy - 0.5,
+        .sigma_px = s->sigma_px,
+        .min_x_px = (general ? -all : -cx - margin) - high[0],
+        .max_x_px = (general ? all : (double)s->camera.width_px - cx + margin) - low[0],
+        .min_y_px = (general ? -all : -cy - margin) - high[1],
+        .max_y_px = (general ? all : (double)s->camera.height_px - cy + margin) - low[1],
+        .most_points = MOST_NODES / (s->nodes.count > 0 ? s->nodes.count : 1)};
+    return bst_shape_spread(ctx, source, &view, s->stretch, &s->points, &s->nodes, peak);
+}
+
 bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source,
                             bst_scene_source *out, bool *visible) {
     double x, y, electrons = source->electrons_per_s * s->duration_s;
     s->last_peak_e = 0.0;
-    bool moving = source->path != NULL;
+    bool moving = source->path || source->rate || source->shape;
+    s->disc_px =
+        source->shape ? tan(asin(source->shape->radius)) / bst_camera_scale_rad(&s->camera) : 0.0;
     bool front = project(s, s->q_reference, source->apparent_mid, &x, &y);
     *visible = !source->occulted && electrons > 0.0 && electrons < 1e30 && (front || moving);
     if (!*visible) {
@@ -404,8 +455,21 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
             *visible = false;
             return BST_OK;
         }
-        s->last_peak_e = electrons * largest_share(s);
+        double share = largest_share(s), peak;
+        if (source->shape) {
+            BST_TRY(own_nodes(ctx, s, count, x, y, s->tolerance[0]));
+            BST_TRY(spread_shape(ctx, s, source, x, y, &peak));
+            share = fmin(share, peak);
+        }
+        s->last_peak_e = electrons * share;
         BST_TRY(own_nodes(ctx, s, count, x, y, s->tolerance[choose_level(s, s->last_peak_e)]));
+        if (source->shape) {
+            BST_TRY(spread_shape(ctx, s, source, x, y, &peak));
+        }
+        if (s->nodes.count == 0) {
+            *visible = false;
+            return BST_OK;
+        }
         BST_TRY(append_nodes(ctx, s, &s->nodes, shift_to_table, &own));
         used = &own;
     } else {

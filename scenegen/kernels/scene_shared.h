@@ -35,6 +35,7 @@ typedef struct bst_scene_params {
     float dn_per_e;
     float offset_dn;
     float max_dn;
+    int light_first, light_pitch; /* of the Fourier path's image, floats */
     int image_stride; /* of the image of expected electrons, floats */
     int light_y0, light_height,
         light_stride; /* of the image that is read out: sensor row, rows, floats */

@@ -3,10 +3,12 @@
 #ifndef BST_WORLD_CAMERA_H
 #define BST_WORLD_CAMERA_H
 
+#include <math.h>
 #include <stdbool.h>
 
 #include "sim/core/config.h"
 #include "sim/core/vec.h"
+#include "sim/world/band.h"
 #include "sim/world/detector_config.h"
 #include "sim/world/psf_config.h"
 
@@ -49,8 +51,13 @@ typedef struct bst_camera {
     double rotation_deg; /* of the focal plane about the boresight, from camera +x towards +y */
     double boresight_offset_px[2]; /* place of the boresight, from the sensor's centre */
     bst_distortion distortion;
-    bst_optics_config optics; /* PSF (see psf.h) and vignetting */
+    bst_optics_config optics;  /* PSF (see psf.h) and vignetting */
+    const struct bst_psf *psf; /* made of this camera, lent to its copies, or NULL; a copy whose
+                                  optics, aperture or scale are changed must clear it */
     bst_detector_config detector;
+    bst_band_config band;
+    const bst_band *spectrum; /* made from `band` and kept by the world; NULL: the V band of
+                                 photon_flux_v0_per_s_m2, the same for all colours */
     bst_camera_geometry
         geometry; /* by bst_camera_prepare; all zero: neither turned nor distorted */
 } bst_camera;
@@ -77,8 +84,10 @@ static inline double bst_camera_centre_y(const bst_camera *c) {
 static inline double bst_camera_scale_rad(const bst_camera *c) {
     return c->pixel_scale_arcsec * BST_ARCSEC_RAD;
 }
+/* Of the Gaussian profile with charge diffusion, before integration over the pixel. */
 static inline double bst_camera_psf_sigma_px(const bst_camera *c) {
-    return c->psf_fwhm_px / 2.3548200450309493; /* 2 sqrt(2 ln 2) */
+    double sigma = c->psf_fwhm_px / 2.3548200450309493; /* 2 sqrt(2 ln 2) */
+    return c->optics.diffusion_px > 0.0 ? hypot(sigma, c->optics.diffusion_px) : sigma;
 }
 /* Angle from the boresight to the sensor's farthest corner (outer edge of the pixel), rad. */
 double bst_camera_half_diagonal_rad(const bst_camera *c);
@@ -147,18 +156,32 @@ static inline double bst_camera_shrink(const bst_camera *c) {
     return c->geometry.general ? c->geometry.shrink : 1.0;
 }
 
-/* Share of the light that reaches a pixel place past the vignetting, 0..1 (a polynomial may go
- * beyond 1); 1 without. */
+/* Share of the light, of sources and of the sky, that vignetting leaves on a pixel: at least 0; 1
+ * without. r is the distance from the boresight: (1 + (r scale)^2)^-2 for the fourth power of the
+ * cosine, and the polynomial in half diagonals. As a flat field has it, the pixel counts, not the
+ * place of the source. */
 double bst_camera_illumination(const bst_camera *c, double x_px, double y_px);
 
-/* Detected electrons per second of a source of magnitude v_mag:
- * photon_flux_v0 10^(-0.4 V) * pi/4 D^2 (1 - obscuration) * throughput * QE. */
+/* Detected electrons per second of a source of magnitude v_mag, pi/4 D^2 (1 - obscuration) *
+ * throughput * QE times: photon_flux_v0 10^(-0.4 V); with a spectrum bst_band_sun 10^(-0.4 (V -
+ * BST_SUN_V_MAG)), that is of a source that reflects sunlight and is as bright as V says. */
 double bst_camera_electrons_per_s(const bst_camera *c, double v_mag);
 /* The inverse: V of a rate of detected electrons. */
 double bst_camera_v_mag(const bst_camera *c, double electrons_per_s);
-/* Sky electrons per second and pixel: those of the pixel at the boresight. They are the same all
- * over the sensor, whatever solid angle gnomonic projection and distortion give a pixel there, as
- * after a flat field. */
+/* The same of a star of colour B-V (NAN: unknown), as bst_band_star; without a spectrum the colour
+ * does not matter. */
+double bst_camera_star_electrons_per_s(const bst_camera *c, double v_mag, double b_minus_v);
+/* Of a black body of temperature_k that fills solid_angle_sr, times its emissivity; 0 without a
+ * spectrum. */
+double bst_camera_thermal_electrons_per_s(const bst_camera *c, double temperature_k,
+                                          double solid_angle_sr);
+/* The optics' own emission, electrons per second and pixel: emissivity * radiance * pupil * the
+ * pixel's solid angle * optics_beam_factor * QE (area times solid angle is the same at the detector
+ * as at the pupil); 0 without a spectrum. */
+double bst_camera_optics_e_per_s(const bst_camera *c);
+/* Electrons per second and pixel of the sky and the optics: those of the pixel at the boresight.
+ * They are the same all over the sensor, whatever solid angle gnomonic projection and distortion
+ * give a pixel there, as after a flat field. */
 double bst_camera_background_e_per_s(const bst_camera *c);
 /* Mean dark current at the detector's temperature, e-/s, without hot pixels and maps. */
 double bst_camera_dark_e_per_s(const bst_camera *c);

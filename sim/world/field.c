@@ -3,7 +3,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/world/field_image.h"
 #include "sim/world/field_objects.h"
+#include "sim/world/psf.h"
 
 /* Aberration at most, and some for the deflection of light: how far an apparent place lies from the
  * catalogue's. */
@@ -30,8 +32,8 @@ struct bst_field {
     bst_faint_stars *faint; /* NULL: none */
     bst_source *sources;
     int source_capacity;
-    bst_source_path *paths; /* [path_capacity], of the objects among the sources */
-    int path_capacity;
+    bst_object_parts *parts; /* [part_capacity], of the objects among the sources */
+    int part_capacity;
     int *near; /* objects that may be in the field; room for all */
     bst_quat q_mid;
     double exposure_s;
@@ -74,7 +76,7 @@ void bst_field_free(bst_field *field) {
         free(field->q);
         free(field->stars);
         free(field->sources);
-        free(field->paths);
+        free(field->parts);
         free(field->near);
         free(field);
     }
@@ -316,12 +318,12 @@ static bst_status reserve_sources(bst_ctx *ctx, bst_field *field, int count) {
     return BST_OK;
 }
 
-static bst_status reserve_paths(bst_ctx *ctx, bst_field *field, int count) {
-    if (count > field->path_capacity) {
-        free(field->paths);
-        field->paths = malloc((size_t)count * sizeof *field->paths);
-        field->path_capacity = field->paths ? count : 0;
-        if (!field->paths) {
+static bst_status reserve_parts(bst_ctx *ctx, bst_field *field, int count) {
+    if (count > field->part_capacity) {
+        free(field->parts);
+        field->parts = malloc((size_t)count * sizeof *field->parts);
+        field->part_capacity = field->parts ? count : 0;
+        if (!field->parts) {
             return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d objects", count);
         }
     }
@@ -417,15 +419,15 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
             continue;
         }
         bst_source *s = &field->sources[n++];
-        *s =
-            (bst_source){.kind = BST_SOURCE_STAR,
-                         .id = star->id,
-                         .apparent_mid = apparent,
-                         .electrons_per_s = bst_camera_electrons_per_s(camera, (double)star->v_mag),
-                         .v_mag = (double)star->v_mag,
-                         .sunlit_fraction = NAN,
-                         .phase_rad = NAN,
-                         .range_m = INFINITY};
+        *s = (bst_source){.kind = BST_SOURCE_STAR,
+                          .id = star->id,
+                          .apparent_mid = apparent,
+                          .electrons_per_s = bst_camera_star_electrons_per_s(
+                              camera, (double)star->v_mag, (double)star->b_minus_v),
+                          .v_mag = (double)star->v_mag,
+                          .sunlit_fraction = NAN,
+                          .phase_rad = NAN,
+                          .range_m = INFINITY};
         /* the Earth hides stars too: a point far along the line of sight stands for the star */
         s->occulted =
             bst_earth_occults(eye.position_m, bst_vec3_axpy(eye.position_m, 1e12, star->icrs),
@@ -435,7 +437,7 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
         }
         bst_vec3_to_radec(star->icrs, &s->ra_rad, &s->dec_rad);
     }
-    BST_TRY(reserve_paths(ctx, field, near_count));
+    BST_TRY(reserve_parts(ctx, field, near_count));
     const bst_object_query objects = {field->view,  camera, field->observer, start_s, end_s,
                                       field->q_mid, window, margin_px,       centre,  radius};
     for (int i = 0, used = 0; i < near_count; i++) {
@@ -443,7 +445,7 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
         if (is_self(field, field->near[i])) {
             continue;
         }
-        BST_TRY(bst_field_object(ctx, &objects, field->near[i], &field->paths[used],
+        BST_TRY(bst_field_object(ctx, &objects, field->near[i], &field->parts[used],
                                  &field->sources[n], &there));
         n += there;
         used += there;
@@ -466,14 +468,9 @@ static double squared_image(double along, double across, double length) {
     return line / (2.0 * root_pi * across);
 }
 
-/* Mean and covariance over the exposure of where a source's image is; NAN when it is behind the
- * camera. */
-typedef struct smear {
-    double x_mean, y_mean, xx, xy, yy;
-} smear;
-
-static smear smear_of(const bst_field *field, const bst_source *source) {
-    smear m = {0};
+/* Of the image of a point; NAN when it is behind the camera. */
+static bst_image_moments smear_of(const bst_field *field, const bst_source *source) {
+    bst_image_moments m = {0};
     double x[SIGMA_POINTS], y[SIGMA_POINTS];
     for (int p = 0; p < SIGMA_POINTS; p++) {
         bst_vec3 d = bst_source_direction(source, field->sigma_time[p]);
@@ -494,12 +491,16 @@ static smear smear_of(const bst_field *field, const bst_source *source) {
     return m;
 }
 
-/* The PSF with the pixel's own width, widened along and across the way from the first to the last
+/* The PSF (of one that is no Gaussian, the Gaussian with the same noise-equivalent area) with the
+ * pixel's own width, widened along and across the way from the first to the last
  * position by what the smear has beyond a uniform straight streak of that length (jitter, bends).
  */
-static void blur(const bst_camera *camera, const smear *m, double dx, double dy, double *along,
-                 double *across) {
-    double psf = bst_camera_psf_sigma_px(camera);
+static void blur(const bst_camera *camera, const bst_image_moments *m, double dx, double dy,
+                 double *along, double *across) {
+    double psf = bst_camera_psf_sigma_px(camera), sigma;
+    if (camera->psf && !bst_psf_gaussian(camera->psf, &sigma) && isfinite(m->x_mean)) {
+        psf = bst_psf_equivalent_fwhm_px(camera->psf, m->x_mean, m->y_mean) / 2.3548200450309493;
+    }
     double variance = psf * psf + 1.0 / 12.0, length = hypot(dx, dy);
     double c = length > 0.0 ? dx / length : 1.0, s = length > 0.0 ? dy / length : 0.0;
     double uu = m->xx * c * c + 2.0 * m->xy * c * s + m->yy * s * s;
@@ -536,9 +537,16 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
                             &out->y_end_px);
     (void)bst_camera_project(camera, bst_quat_rotate(field->q_mid, source->apparent_mid),
                              &out->x_mid_px, &out->y_mid_px);
-    smear image = smear_of(field, source);
+    bst_image_moments image =
+        source->rate ? bst_image_by_light(field->camera, track, source) : smear_of(field, source);
+    if (source->shape) {
+        bst_image_add_disc(field->camera, field->q_mid, source, &image);
+    }
     out->x_mean_px = image.x_mean;
     out->y_mean_px = image.y_mean;
+    if (isfinite(image.x_mean)) {
+        out->electrons *= bst_camera_illumination(camera, image.x_mean, image.y_mean);
+    }
     double variance =
         header->background_e + header->dark_e + camera->read_noise_e * camera->read_noise_e;
     double length = hypot(out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px);

@@ -42,12 +42,27 @@ static void gauss_legendre(int n, double *place, double *weight) {
     }
 }
 
-/* Photons per wavelength of a black body of the Sun's effective temperature, 5772 K (IAU 2015
- * resolution B3), at any scale: Planck's law over the photon's energy. */
-static double solar_photons(double wavelength_m) {
-    const double second_radiation_constant_m_k = 1.438776877e-2;
-    return pow(1e6 * wavelength_m, -4.0) /
-           expm1(second_radiation_constant_m_k / (wavelength_m * 5772.0));
+/* The Sun's effective temperature, K (IAU 2015 resolution B3). */
+#define SUN_K 5772.0
+
+/* Wavelengths, m, between which a camera's band has more than a thousandth of its largest response.
+ */
+static void find_range(const bst_band *spectrum, double *from_m, double *to_m) {
+    enum { STEPS = 2000 };
+    double ratio = pow(40e-6 / 0.1e-6, 1.0 / STEPS), most = 0.0;
+    for (int pass = 0; pass < 2; pass++) {
+        double wavelength_m = 0.1e-6;
+        *from_m = *to_m = 0.0;
+        for (int k = 0; k <= STEPS; k++, wavelength_m *= ratio) {
+            double response = bst_band_response(spectrum, wavelength_m);
+            if (pass == 0) {
+                most = fmax(most, response);
+            } else if (response > 1e-3 * most) {
+                *from_m = *from_m > 0.0 ? *from_m : wavelength_m / ratio;
+                *to_m = wavelength_m * ratio;
+            }
+        }
+    }
 }
 
 static bst_status make_band(bst_ctx *ctx, const bst_camera *camera,
@@ -56,6 +71,10 @@ static bst_status make_band(bst_ctx *ctx, const bst_camera *camera,
     bool given = o->band_nm[1] > 0.0;
     double from_m = 1e-9 * (given ? o->band_nm[0] : 507.0);
     double to_m = 1e-9 * (given ? o->band_nm[1] : 595.0), middle_m;
+    const bst_band *response = given ? NULL : camera->spectrum;
+    if (response) {
+        find_range(response, &from_m, &to_m);
+    }
     if (spectrum) {
         if (spectrum->count < 1 || spectrum->count > MOST_WAVELENGTHS) {
             return bst_fail(ctx, BST_ERR_CONFIG,
@@ -77,8 +96,11 @@ static bst_status make_band(bst_ctx *ctx, const bst_camera *camera,
         gauss_legendre(b->count, b->wavelength_m, b->weight);
         for (int k = 0; k < b->count; k++) {
             b->wavelength_m[k] = from_m + b->wavelength_m[k] * (to_m - from_m);
+            double photons = o->spectrum == BST_SPECTRUM_SOLAR
+                                 ? bst_planck_photons(b->wavelength_m[k], SUN_K)
+                                 : 1.0;
             b->weight[k] *=
-                o->spectrum == BST_SPECTRUM_SOLAR ? solar_photons(b->wavelength_m[k]) : 1.0;
+                photons * (response ? bst_band_response(response, b->wavelength_m[k]) : 1.0);
         }
         middle_m = 0.5 * (from_m + to_m);
     }
@@ -143,37 +165,39 @@ static bool aberrated(const bst_zernike_polynomial *w) {
     return false;
 }
 
-/* Adds `sign` times the band's OTF of an aperture to a table. */
-static void add_band(bst_pupil_work *work, const bst_pupil *pupil, const band *b, bool with_waves,
-                     float sign, bst_grid_otf *table) {
+/* Adds the band's OTF of an aperture to a table. */
+static bst_status add_band(bst_ctx *ctx, bst_pupil_work *work, const bst_pupil *pupil,
+                           const band *b, bool with_waves, bst_grid_otf *table) {
     for (int k = 0; k < b->count; k++) {
-        const double *h;
-        int stride, side;
         /* cells of one step of the table's frequency at this wavelength: no resampling */
-        bst_pupil_transfer(work, pupil, table->step * b->q[k],
-                           with_waves ? b->wavelength_m[k] : 0.0, &h, &stride, &side);
-        for (int ky = -table->reach; ky <= table->reach; ky++) {
-            const double *row = h + 2 * (size_t)((ky + side) % side) * (size_t)stride;
+        double cell = table->step * b->q[k], wavelength_m = with_waves ? b->wavelength_m[k] : 0.0;
+        int cells = (int)ceil(1.0 / cell), stride, side;
+        int reach = cells + 1 < table->reach ? cells + 1 : table->reach;
+        const float *h;
+        BST_TRY(bst_pupil_transfer(ctx, work, pupil, cell, wavelength_m, &h, &stride, &side));
+        for (int ky = -reach; ky <= reach; ky++) {
+            const float *row = h + 2 * (size_t)((ky + side) % side) * (size_t)stride;
             float *to = bst_grid_otf_node(table, 0, ky);
-            for (int i = 0; i < 2 * (table->reach + 1); i++) {
-                to[i] += sign * (float)(b->weight[k] * row[i]);
+            for (int i = 0; i < 2 * (reach + 1); i++) {
+                to[i] += (float)b->weight[k] * row[i];
             }
         }
     }
+    return BST_OK;
 }
 
 /* What a node's aperture adds to the annulus. base: table of the annulus, made when first needed.
  */
-static bst_status make_node(bst_ctx *ctx, const bst_pupil *pupil, const band *b,
-                            bst_pupil_work *work, bst_grid_otf *base, double step, int reach,
+static bst_status make_node(bst_ctx *ctx, bst_pupil_work *work, const bst_pupil *pupil,
+                            const band *b, bst_grid_otf *base, double step, int reach,
                             bst_grid_otf *out) {
     if (base->step == 0.0) {
         bst_pupil annulus = {.inner = pupil->inner};
         BST_TRY(bst_grid_otf_create(ctx, step, reach, base));
-        add_band(work, &annulus, b, false, 1.0F, base);
+        BST_TRY(add_band(ctx, work, &annulus, b, false, base));
     }
     BST_TRY(bst_grid_otf_create(ctx, step, reach, out));
-    add_band(work, pupil, b, true, 1.0F, out);
+    BST_TRY(add_band(ctx, work, pupil, b, true, out));
     for (int ky = -reach; ky <= reach; ky++) {
         const float *less = bst_grid_otf_node(base, 0, ky);
         float *node = bst_grid_otf_node(out, 0, ky);
@@ -223,7 +247,7 @@ static bst_status make_tables(bst_ctx *ctx, const bst_camera *camera, const band
     for (int k = 0; k < bst_psf_nodes(psf) && status == BST_OK; k++) {
         status = make_wavefront(ctx, o, field ? &field[k] : NULL, &pupil.wavefront);
         if (status == BST_OK && (pupil.vanes > 0 || aberrated(&pupil.wavefront))) {
-            status = make_node(ctx, &pupil, b, work, &base, step, reach, &psf->nodes[k].grid);
+            status = make_node(ctx, work, &pupil, b, &base, step, reach, &psf->nodes[k].grid);
         }
     }
     bst_grid_otf_free(&base);

@@ -60,8 +60,9 @@ static const bst_config_desc object_table[] = {
     BST_OBJECT(bst_object_config, orbit, orbit_table, NULL, "The object's orbit."),
     BST_REAL(bst_object_config, area_m2, "m2", 0, 1e6, "4",
              "Cross-section of the sphere that stands for it."),
-    BST_REAL(bst_object_config, albedo, "", 0, 1, "0.25",
-             "Diffuse albedo of the sphere; 0 makes it dark."),
+    BST_REAL(bst_object_config, albedo, "", 0, 1, "0.25", "Albedo of the sphere; 0 makes it dark."),
+    BST_OBJECT(bst_object_config, brightness, bst_brightness_config_table, "{}",
+               "How its light follows from where it is; left out: a diffuse sphere."),
     BST_LIST(bst_object_config, burns, bst_burn_config, burn_table, 0, 64, "[]",
              "Burns in the order of time. The cue does not know of them."),
     BST_CONFIG_END,
@@ -74,7 +75,9 @@ static const bst_config_desc catalogue_table[] = {
         "an object, but for those that the list of objects has by number."),
     BST_REAL(bst_catalogue_config, area_m2, "m2", 0, 1e6, "4",
              "Cross-section of the sphere that stands for each."),
-    BST_REAL(bst_catalogue_config, albedo, "", 0, 1, "0.25", "Diffuse albedo of the sphere."),
+    BST_REAL(bst_catalogue_config, albedo, "", 0, 1, "0.25", "Albedo of the sphere."),
+    BST_OBJECT(bst_catalogue_config, brightness, bst_brightness_config_table, "{}",
+               "How the light of each follows from where it is."),
     BST_CONFIG_END,
 };
 

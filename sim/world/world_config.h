@@ -4,6 +4,7 @@
 
 #include "sim/astro/time.h"
 #include "sim/core/config.h"
+#include "sim/world/brightness_config.h"
 #include "sim/world/camera.h"
 
 enum { BST_ORBIT_SGP4, BST_ORBIT_RELATIVE, BST_ORBIT_OEM, BST_ORBIT_INJECTED, BST_ORBIT_NUMERICAL };
@@ -62,12 +63,14 @@ typedef struct bst_object_config {
     char name[64];
     bst_orbit_config orbit;
     double area_m2, albedo;
+    bst_brightness_config brightness;
     bst_config_list burns; /* bst_burn_config, by time */
 } bst_object_config;
 
 typedef struct bst_catalogue_config {
     char elements_file[512]; /* path as above */
     double area_m2, albedo;  /* of every object */
+    bst_brightness_config brightness;
 } bst_catalogue_config;
 
 enum { BST_FAINT_NONE, BST_FAINT_STATISTICAL };
@@ -165,6 +168,13 @@ bst_status bst_world_create(bst_ctx *ctx, const char *scenario, const bst_world_
 bst_status bst_world_check_spans(bst_ctx *ctx, const char *scenario, const struct bst_world *world,
                                  double duration_s) BST_MUST_CHECK;
 void bst_world_free(struct bst_world *world);
+
+struct bst_psf_samples;
+
+/* Gives a sensor whose camera has the PSF of a file (optics.psf BST_PSF_FILE) that PSF's samples,
+ * before anything is made of the sensor. Errors of bst_psf_create_from. */
+bst_status bst_world_set_psf(bst_ctx *ctx, struct bst_world *world, int observer, int sensor,
+                             const struct bst_psf_samples *samples) BST_MUST_CHECK;
 
 /* Before the first frame, and before the world is shared: lets the work on thousands of orbits be
  * done by `threads` threads (0: one per processor) and does what can be done ahead. Optional;
