@@ -13,6 +13,7 @@
 #include "scenegen/readout.h"
 #include "scenegen/reference.h"
 #include "scenegen/smear.h"
+#include "scenegen/tiles.h"
 #include "scenegen/vignetting.h"
 
 enum { MAX_TAPS = 512, BOX_FLOATS = 4 };
@@ -72,41 +73,6 @@ static bst_status check_camera(bst_ctx *ctx, const bst_camera *c) {
 static int taps_for(double sigma_px) {
     int taps = 16 * (int)ceil((2.0 * 8.0 * sigma_px + 2.0) / 16.0);
     return taps > MAX_TAPS ? MAX_TAPS : taps;
-}
-
-static bst_status choose_tiles(bst_ctx *ctx, const bst_device *device,
-                               bst_renderer_options *options, uint64_t *most_bytes) {
-    cl_device_type type = 0;
-    cl_ulong local_bytes = 0, most = 0;
-    BST_TRY(bst_device_check(
-        ctx, clGetDeviceInfo(bst_device_id(device), CL_DEVICE_TYPE, sizeof type, &type, NULL),
-        "asking for the device's type"));
-    BST_TRY(bst_device_check(ctx,
-                             clGetDeviceInfo(bst_device_id(device), CL_DEVICE_LOCAL_MEM_SIZE,
-                                             sizeof local_bytes, &local_bytes, NULL),
-                             "asking for the device's local memory"));
-    BST_TRY(bst_device_check(ctx,
-                             clGetDeviceInfo(bst_device_id(device), CL_DEVICE_MAX_MEM_ALLOC_SIZE,
-                                             sizeof most, &most, NULL),
-                             "asking for the device's largest buffer"));
-    *most_bytes = most;
-    if (options->tile_width == 0) {
-        bool large = (type & CL_DEVICE_TYPE_CPU) && local_bytes >= 128 * 1024;
-        options->tile_width = large ? 256 : 64;
-        options->tile_height = large ? 64 : 2;
-        options->group = large ? 1 : 16;
-    }
-    size_t need = (size_t)(options->tile_width + 16) * (size_t)options->tile_height *
-                  sizeof(float) * (size_t)options->group;
-    if (options->tile_width < 64 || options->tile_width % 64 != 0 || options->tile_height < 1 ||
-        options->group < 1 || need > local_bytes) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT,
-                        "tiles of %d x %d pixels in groups of %d need %zu bytes of local memory "
-                        "(the device has %llu) and a width that is a multiple of 64",
-                        options->tile_width, options->tile_height, options->group, need,
-                        (unsigned long long)local_bytes);
-    }
-    return BST_OK;
 }
 
 static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
@@ -249,7 +215,7 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     clRetainContext(r->context);
     clRetainCommandQueue(r->queue);
     bst_smear_options smear = {.tolerance_sigma = r->options.tolerance_sigma, .taps = r->taps};
-    bst_status status = choose_tiles(ctx, device, &r->options, &r->most_bytes);
+    bst_status status = bst_tiles_choose(ctx, device, &r->options, &r->most_bytes);
     if (status == BST_OK) {
         status = open_psf(ctx, device, r, &smear);
     }
