@@ -111,6 +111,10 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
                           "-DPHASES=%d",
                           r->options.tile_width, r->options.tile_height, r->options.group, r->taps,
                           r->phases);
+    if (r->options.spatial_oversample > 0) {
+        length += snprintf(options + length, sizeof options - (size_t)length,
+                           " -DSPATIAL_OVERSAMPLE=%d", r->options.spatial_oversample);
+    }
     const bst_distortion *d = &r->camera.distortion;
     if (bst_camera_distorted(&r->camera)) {
         double a = bst_camera_scale_rad(&r->camera), a2 = a * a,
@@ -216,12 +220,17 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     r->camera = *camera;
     r->options = options ? *options : bst_renderer_default_options();
     r->taps = taps_for(bst_camera_psf_sigma_px(camera));
-    r->phases = phases_for(bst_camera_psf_sigma_px(camera));
+    r->phases = r->options.psf_phases > 0 ? r->options.psf_phases
+                                          : phases_for(bst_camera_psf_sigma_px(camera));
     r->context = bst_device_context(device);
     r->queue = bst_device_queue(device);
     clRetainContext(r->context);
     clRetainCommandQueue(r->queue);
-    bst_smear_options smear = {r->options.tolerance_sigma, r->taps};
+    bst_smear_options smear = {.tolerance_sigma = r->options.tolerance_sigma,
+                               .taps = r->taps,
+                               .motion = r->options.motion,
+                               .temporal_oversample = r->options.temporal_oversample,
+                               .stamp_radius_px = r->options.stamp_radius_px};
     bst_status status = choose_tiles(ctx, device, &r->options, &r->most_bytes);
     if (status == BST_OK) {
         status = build(ctx, r, device);
@@ -308,8 +317,11 @@ static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d sources", q->count);
         }
     }
-    double read = r->camera.read_noise_e;
-    BST_TRY(bst_smear_begin(ctx, r->smear, q->track, q->background_e + read * read));
+    double read = r->camera.read_noise_e, brightest = 0.0;
+    for (int i = 0; i < q->count; i++) {
+        brightest = q->sources[i].path ? brightest : fmax(brightest, q->sources[i].electrons_per_s);
+    }
+    BST_TRY(bst_smear_begin(ctx, r->smear, q->track, q->background_e + read * read, brightest));
     r->stats = (bst_render_stats){0};
     *blocks = 0;
     const uint64_t counted = (uint64_t)INT32_MAX * sizeof(float); /* by the kernels, in int */
@@ -336,6 +348,11 @@ static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *
         }
     }
     r->stats.nodes = (long long)*blocks * BST_BLOCK;
+    r->stats.single_kernel = bst_smear_single(r->smear);
+    if (r->options.temporal_oversample > 0 || r->options.spatial_oversample > 0 ||
+        r->options.psf_phases > 0) {
+        r->stats.predicted_sigma = NAN;
+    }
     return BST_OK;
 }
 
