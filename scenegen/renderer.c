@@ -136,11 +136,18 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
     return BST_OK;
 }
 
-/* Phases between which the profile may be interpolated linearly: that misses
- * 1 / (8 phases^2 sigma^2) of the peak, below 1.3e-5. */
-static int phases_for(double sigma_px) {
+/* Share of the peak that linear interpolation between the phases misses: 1 / (8 phases^2 sigma^2)
+ * on each axis. */
+static double table_error(double sigma_px, int phases) {
+    return 0.25 / (sigma_px * sigma_px * phases * phases);
+}
+
+/* Phases with which a source that nearly fills the pixels' wells is right to a third of the
+ * tolerance; for fainter ones it is less. */
+static int phases_for(double sigma_px, double tolerance_sigma, double full_well_e) {
     int phases = 8;
-    while (phases < 2048 && phases * sigma_px < 100.0) {
+    while (phases < 2048 &&
+           table_error(sigma_px, phases) * sqrt(full_well_e) > 0.33 * tolerance_sigma) {
         phases *= 2;
     }
     return phases;
@@ -220,14 +227,17 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     r->camera = *camera;
     r->options = options ? *options : bst_renderer_default_options();
     r->taps = taps_for(bst_camera_psf_sigma_px(camera));
-    r->phases = r->options.psf_phases > 0 ? r->options.psf_phases
-                                          : phases_for(bst_camera_psf_sigma_px(camera));
+    double sigma_px = bst_camera_psf_sigma_px(camera);
+    r->phases = r->options.psf_phases > 0
+                    ? r->options.psf_phases
+                    : phases_for(sigma_px, r->options.tolerance_sigma, camera->full_well_e);
     r->context = bst_device_context(device);
     r->queue = bst_device_queue(device);
     clRetainContext(r->context);
     clRetainCommandQueue(r->queue);
     bst_smear_options smear = {.tolerance_sigma = r->options.tolerance_sigma,
                                .taps = r->taps,
+                               .table_error = table_error(sigma_px, r->phases),
                                .motion = r->options.motion,
                                .temporal_oversample = r->options.temporal_oversample,
                                .stamp_radius_px = r->options.stamp_radius_px};
@@ -349,8 +359,7 @@ static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *
     }
     r->stats.nodes = (long long)*blocks * BST_BLOCK;
     r->stats.single_kernel = bst_smear_single(r->smear);
-    if (r->options.temporal_oversample > 0 || r->options.spatial_oversample > 0 ||
-        r->options.psf_phases > 0) {
+    if (r->options.temporal_oversample > 0 || r->options.spatial_oversample > 0) {
         r->stats.predicted_sigma = NAN;
     }
     return BST_OK;

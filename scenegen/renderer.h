@@ -54,7 +54,7 @@ typedef struct bst_render_stats {
     int sources;            /* drawn */
     long long nodes;        /* all sources, filled blocks included */
     double predicted_sigma; /* largest predicted error of a source's image, sigma; NAN with
-                               temporal_oversample, spatial_oversample or psf_phases */
+                               temporal_oversample or spatial_oversample */
     bool single_kernel;     /* the stars followed one track */
 } bst_render_stats;
 

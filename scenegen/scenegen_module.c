@@ -29,8 +29,7 @@ static const bst_config_desc fidelity_table[] = {
     BST_INT(fidelity_config, stamp_radius_px, "px", 0, 255, "0",
             "Reach of all stamps beyond the two nearest pixels; 0: as the tolerance needs."),
     BST_INT(fidelity_config, psf_phases, "", 0, 2048, "0",
-            "Sub-pixel phases of the PSF's table; 0: as exact as floats. The error is not "
-            "predicted then."),
+            "Sub-pixel phases of the PSF's table; 0: as the tolerance needs."),
     BST_CONFIG_END,
 };
 

@@ -148,6 +148,16 @@ static bst_path_point attitude_point(const bst_smear *s, bst_quat q, double time
     return (bst_path_point){{r.x * scale, r.y * scale, r.z * s->half_diagonal_px}, time};
 }
 
+/* What the profile table misses of the nodes' image, over its peak, by its phases and widths. */
+static double table_error(const bst_smear *s, const bst_node_list *list) {
+    double psf = s->sigma_px * s->stretch, worst = 0.0;
+    for (int n = 0; n < list->count; n++) {
+        double w = list->items[n].variance / (psf * psf), wide = 1.0 + w;
+        worst = fmax(worst, 0.75 * w / (wide * wide));
+    }
+    return s->options.table_error + worst / (BST_WIDTHS * BST_WIDTHS);
+}
+
 /* Appends nodes to the table in whole blocks; to_table fills one column of BST_TABLE_ROWS. */
 static bst_status append_nodes(bst_ctx *ctx, bst_smear *s, const bst_node_list *list,
                                void (*to_table)(const bst_smear *, const bst_node *, float *),
@@ -155,7 +165,7 @@ static bst_status append_nodes(bst_ctx *ctx, bst_smear *s, const bst_node_list *
     int blocks = (list->count + BST_BLOCK - 1) / BST_BLOCK;
     BST_TRY(reserve(ctx, (void **)&s->table, &s->table_capacity, s->table_blocks + blocks,
                     TABLE_FLOATS * sizeof(float)));
-    *out = (level){s->table_blocks, blocks, list->error};
+    *out = (level){s->table_blocks, blocks, list->error + table_error(s, list)};
     s->table_blocks += blocks;
     for (int n = 0; n < blocks * BST_BLOCK; n++) {
         float *block = s->table + (size_t)(out->first_block + n / BST_BLOCK) * TABLE_FLOATS;
@@ -302,7 +312,8 @@ static int choose_level(bst_smear *s, double peak_e) {
     if (s->options.temporal_oversample > 0) {
         return n;
     }
-    while (n + 1 < LEVELS && s->tolerance[n] * sigmas > NODE_SHARE * s->options.tolerance_sigma) {
+    while (n + 1 < LEVELS && (s->tolerance[n] + s->options.table_error) * sigmas >
+                                 NODE_SHARE * s->options.tolerance_sigma) {
         n++;
     }
     return n;
