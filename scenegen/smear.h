@@ -24,6 +24,9 @@ typedef struct bst_smear_options {
     bst_star_motion motion;
     int temporal_oversample; /* 0: by the tolerance; else so many equal parts of the exposure */
     int stamp_radius_px;     /* 0: by the tolerance; else of all stamps */
+    /* for a PSF that is no Gaussian, else 0: those that need nodes as fine, and that put as much of
+     * a point's light in one pixel */
+    double node_sigma_px, share_sigma_px;
 } bst_smear_options;
 
 bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,

@@ -153,7 +153,8 @@ static bst_status vary_faint_limit(bst_ctx *ctx, sweep *s, bst_curve *curve) {
 
 static bst_status vary_all(bst_ctx *ctx, sweep *s, bst_curve *curve) {
     static const int temporal[] = {15, 51, 151, 501, 1501, 0}, spatial[] = {1, 3, 5, 11, 33, 99, 0},
-                     stamp[] = {1, 2, 3, 4, 5, 6, 0}, phases[] = {2, 4, 8, 16, 32, 64, 0};
+                     stamp[] = {1, 2, 3, 4, 5, 6, 0}, phases[] = {2, 4, 8, 16, 32, 64, 0},
+                     taps[] = {4, 6, 8, 0};
     bool large = s->view.count > LARGE; /* its cheap knobs only */
     bool stamps = s->view.scene.q == 0.0;
     BST_TRY(vary_tolerance(ctx, s, curve));
@@ -170,7 +171,10 @@ static bst_status vary_all(bst_ctx *ctx, sweep *s, bst_curve *curve) {
         BST_TRY(vary_int(ctx, s, curve, "psf_phases", offsetof(bst_renderer_options, psf_phases),
                          phases));
     }
-    return stamps ? vary_faint_limit(ctx, s, curve) : BST_OK;
+    if (!stamps) {
+        return vary_int(ctx, s, curve, "fft_taps", offsetof(bst_renderer_options, fft_taps), taps);
+    }
+    return vary_faint_limit(ctx, s, curve);
 }
 
 typedef struct errand {

@@ -11,8 +11,8 @@
 
 static const bst_bench_scene scenes[] = {
     WORST("worst_case", 0.05, 0),
-    WORST("worst_case_diffraction_q1", 0.15, 1),
-    WORST("worst_case_diffraction_q2", 0.1, 2),
+    WORST("worst_case_diffraction_q1", 0.1, 1),
+    WORST("worst_case_diffraction_q2", 0.07, 2),
     {"acquisition", 2048, {0}, 500, 3, 6, 0.5, 3, 0, 0, 0.1, false, 10, 0.02, 100, 0},
     {"rate_track_slow", 2048, {0}, 500, 1, 6, 0.5, 10, 0, 0, 0.1, true, 10, 0.02, 100, 0},
     {"rate_track_medium", 2048, {0}, 500, 1, 6, 1.0, 60, 0, 0, 0.1, true, 20, 0.02, 100, 0},
