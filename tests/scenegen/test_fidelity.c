@@ -103,25 +103,25 @@ static void predicted_errors_hold(void **state) {
         int stars;
         double magnitudes, fwhm_px, tolerance_sigma;
     } cases[] = {
-        {"still", {.duration_s = 1, .samples = 101}, 20, 5, 2, 0.05},
-        {"still, tight", {.duration_s = 1, .samples = 101}, 20, 5, 2, 0.005},
-        {"still, narrow PSF", {.duration_s = 1, .samples = 101}, 20, 5, 0.8, 0.05},
-        {"slow", {.x_px = 3, .y_px = 1, .duration_s = .5, .samples = 501}, 20, 5, 2, 0.05},
-        {"slow, tight", {.x_px = 3, .y_px = 1, .duration_s = .5, .samples = 501}, 20, 5, 2, .005},
-        {"slow, wide PSF", {.x_px = 3, .y_px = 1, .duration_s = .5, .samples = 501}, 20, 5, 6, .05},
-        {"fast", {.x_px = 90, .y_px = 40, .duration_s = 1, .samples = 501}, 20, 5, 2, 0.05},
-        {"fast, loose", {.x_px = 90, .y_px = 40, .duration_s = 1, .samples = 501}, 20, 5, 2, 0.5},
-        {"fast, sparse", {.x_px = 60, .y_px = -20, .duration_s = 1, .samples = 2}, 20, 5, 2, 0.05},
-        {"fast, bent", {.x_px = 60, .bend_px = 9, .duration_s = 1, .samples = 501}, 20, 5, 2, .05},
-        {"jitter", {.jitter_px = .15, .duration_s = .5, .samples = 501}, 20, 5, 2, 0.05},
-        {"strong jitter", {.jitter_px = .6, .duration_s = .5, .samples = 501}, 20, 5, 2, 0.05},
+        {"still", {.duration_s = 1, .samples = 101}, 10, 5, 2, 0.05},
+        {"still, tight", {.duration_s = 1, .samples = 101}, 10, 5, 2, 0.005},
+        {"still, narrow PSF", {.duration_s = 1, .samples = 101}, 10, 5, 0.8, 0.05},
+        {"slow", {.x_px = 3, .y_px = 1, .duration_s = .5, .samples = 201}, 10, 5, 2, 0.05},
+        {"slow, tight", {.x_px = 3, .y_px = 1, .duration_s = .5, .samples = 201}, 10, 5, 2, .005},
+        {"slow, wide PSF", {.x_px = 3, .y_px = 1, .duration_s = .5, .samples = 201}, 10, 5, 6, .05},
+        {"fast", {.x_px = 90, .y_px = 40, .duration_s = 1, .samples = 201}, 10, 5, 2, 0.05},
+        {"fast, loose", {.x_px = 90, .y_px = 40, .duration_s = 1, .samples = 201}, 10, 5, 2, 0.5},
+        {"fast, sparse", {.x_px = 60, .y_px = -20, .duration_s = 1, .samples = 2}, 10, 5, 2, 0.05},
+        {"fast, bent", {.x_px = 60, .bend_px = 9, .duration_s = 1, .samples = 201}, 10, 5, 2, .05},
+        {"jitter", {.jitter_px = .15, .duration_s = .5, .samples = 201}, 10, 5, 2, 0.05},
+        {"strong jitter", {.jitter_px = .6, .duration_s = .5, .samples = 201}, 10, 5, 2, 0.05},
         {"drift and jitter",
-         {.x_px = 8, .y_px = 5, .jitter_px = .2, .duration_s = .5, .samples = 501},
-         20,
+         {.x_px = 8, .y_px = 5, .jitter_px = .2, .duration_s = .5, .samples = 201},
+         10,
          5,
          2,
          0.05},
-        {"rotation", {.roll_rad = 0.2, .duration_s = 1, .samples = 501}, 20, 5, 2, 0.05},
+        {"rotation", {.roll_rad = 0.2, .duration_s = 1, .samples = 201}, 10, 5, 2, 0.05},
         {"all",
          {.x_px = 80,
           .y_px = 30,
@@ -129,13 +129,13 @@ static void predicted_errors_hold(void **state) {
           .roll_rad = 0.03,
           .jitter_px = .15,
           .duration_s = 1,
-          .samples = 501},
-         20,
+          .samples = 201},
+         10,
          5,
          2,
          0.05},
-        {"crowded", {.x_px = 4, .y_px = 3, .duration_s = .5, .samples = 101}, 400, 8, 2, 0.05},
-        {"crowded, still", {.duration_s = .5, .samples = 11}, 400, 8, 2, 0.05},
+        {"crowded", {.x_px = 4, .y_px = 3, .duration_s = .5, .samples = 101}, 100, 8, 2, 0.05},
+        {"crowded, still", {.duration_s = .5, .samples = 11}, 100, 8, 2, 0.05},
         {"faint", {.x_px = 20, .duration_s = 1e-3, .samples = 101}, 40, 3, 2, 0.05},
     };
     enum { CASES = sizeof cases / sizeof *cases };
@@ -211,7 +211,7 @@ static void one_track_is_wrong_where_the_field_turns(void **state) {
  * L px its ends are wrong by a 1 / (24 parts^2) of L^2 of the profile's slope. */
 static void equal_parts_converge(void **state) {
     fixture *f = *state;
-    const scene_motion fast = {.x_px = 60, .y_px = 0, .duration_s = 1, .samples = 501};
+    const scene_motion fast = {.x_px = 60, .y_px = 0, .duration_s = 1, .samples = 201};
     scene s = open_scene(f, scene_camera(128, 64), &fast, 6, 3.0);
     bst_renderer_options options = bst_renderer_default_options();
     double before = INFINITY;
