@@ -314,7 +314,8 @@ static void try_rule(const maker *m, const moments *g, int n, bool widen, bool s
         for (int round = 0; widen && round < 8 && norm > 0.0; round++) {
             norm = second_norm(g, fmax(trace - bend2 / norm, 0.0) * per_trace);
         }
-        if (!(norm > 0.0)) {
+        /* where little of the line is left, its bend is a guess */
+        if (!(norm > 0.5 * second_norm(g, 0.0))) {
             return;
         }
         for (int i = 0; i < 3; i++) {
