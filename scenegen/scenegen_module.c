@@ -6,9 +6,11 @@
 
 typedef struct fidelity_config {
     double tolerance_sigma;
+    int64_t temporal_oversample, spatial_oversample, stamp_radius_px, psf_phases, fft_taps;
 } fidelity_config;
 
 typedef struct scenegen_config {
+    int renderer;
     double v_limit, margin_px;
     fidelity_config fidelity;
     int64_t truth_capacity, pool_frames;
@@ -18,14 +20,34 @@ static const bst_config_desc fidelity_table[] = {
     BST_REAL(fidelity_config, tolerance_sigma, "sigma", 1e-4, 1.0, "0.05",
              "Error of each source's image in any pixel that is allowed, in that pixel's noise. "
              "Nodes and stamps follow from it."),
+    BST_INT(fidelity_config, temporal_oversample, "", 0, 100000, "0",
+            "Equal parts of the exposure whose middles stand for it, for comparison with other "
+            "renderers; 0: as the tolerance needs. The error is not predicted then."),
+    BST_INT(fidelity_config, spatial_oversample, "", 0, 4096, "0",
+            "Parts of a pixel per axis to whose centres light is moved; 0: none. The error is not "
+            "predicted then."),
+    BST_INT(fidelity_config, stamp_radius_px, "px", 0, 255, "0",
+            "Reach of all stamps beyond the two nearest pixels; 0: as the tolerance needs."),
+    BST_INT(fidelity_config, psf_phases, "", 0, 2048, "0",
+            "Sub-pixel phases of the PSF's table; 0: as the tolerance needs."),
+    BST_INT(
+        fidelity_config, fft_taps, "", 0, 8, "0",
+        "Taps per axis with which light is spread on the grid of a PSF that is no Gaussian: 4, 6 "
+        "or 8; 0: 8."),
     BST_CONFIG_END,
 };
+
+static const char *const renderers[] = {"auto", "single_kernel", "multi_kernel", NULL};
 
 static const bst_config_desc config[] = {
     BST_REAL(scenegen_config, v_limit, "mag", -30.0, 30.0, "16",
              "Stars fainter than this are not drawn."),
     BST_REAL(scenegen_config, margin_px, "px", 0.0, 1e4, "0",
              "Sources this far outside the window are drawn too; at least what the PSF needs."),
+    BST_ENUM(scenegen_config, renderer, renderers, "\"auto\"",
+             "Whose track the stars follow: single_kernel (all that of the star at the boresight, "
+             "as a shift), multi_kernel (each its own) or auto (single_kernel where it meets the "
+             "tolerance)."),
     BST_OBJECT(scenegen_config, fidelity, fidelity_table, "{}", "How exact the image is."),
     BST_INT(
         scenegen_config, truth_capacity, "", 1, 1048576, "4096",
@@ -89,6 +111,12 @@ static bst_status create(const bst_module_env *env, const void *config_object, v
     s->key = bst_env_rng(env, "detector");
     bst_renderer_options options = bst_renderer_default_options();
     options.tolerance_sigma = c->fidelity.tolerance_sigma;
+    options.motion = (bst_star_motion)c->renderer;
+    options.temporal_oversample = (int)c->fidelity.temporal_oversample;
+    options.spatial_oversample = (int)c->fidelity.spatial_oversample;
+    options.stamp_radius_px = (int)c->fidelity.stamp_radius_px;
+    options.psf_phases = (int)c->fidelity.psf_phases;
+    options.fft_taps = (int)c->fidelity.fft_taps;
     options.pool_frames = (int)c->pool_frames;
     options.pattern = pattern_key(env, s->camera);
     bst_status status =
