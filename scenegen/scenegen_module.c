@@ -3,6 +3,7 @@
 
 #include "scenegen/module.h"
 #include "scenegen/renderer.h"
+#include "sim/world/frame_updates.h"
 
 typedef struct scenegen_config {
     double v_limit, margin_px, error_sigma, cut_sigma;
@@ -44,6 +45,10 @@ typedef struct pick {
 
 typedef struct scenegen {
     const bst_camera *camera;
+    bst_camera scaled; /* the camera at the pixel scale of the latest exposure, where it changes */
+    struct bst_device *device;
+    bst_renderer_options renderer_options;
+    double margin_px; /* that the scenario asks for */
     bst_field_options options;
     int64_t tick_rate_hz;
     bst_rng_key key;
@@ -77,6 +82,9 @@ static bst_status create(const bst_module_env *env, const void *config_object, v
     options.error_sigma = c->error_sigma;
     options.cut_sigma = c->cut_sigma;
     options.pool_frames = (int)c->pool_frames;
+    s->device = env->device;
+    s->renderer_options = options;
+    s->margin_px = c->margin_px;
     bst_status status =
         bst_renderer_create(env->ctx, env->device, s->camera, &options, &s->renderer);
     if (status == BST_OK) {
@@ -149,6 +157,22 @@ static bst_status write_items(bst_ctx *ctx, scenegen *s, const bst_los_track *tr
     return BST_OK;
 }
 
+/* Goes on with another pixel scale: everything that depends on the camera is made again. Frames
+ * that were rendered before stay as they are. */
+static bst_status rescale(bst_ctx *ctx, scenegen *s, double scale_arcsec) {
+    bst_camera camera;
+    BST_TRY(bst_camera_at_scale(ctx, s->camera, scale_arcsec, &camera));
+    bst_renderer *renderer;
+    BST_TRY(bst_renderer_create(ctx, s->device, &camera, &s->renderer_options, &renderer));
+    bst_renderer_free(s->renderer);
+    s->renderer = renderer;
+    s->scaled = camera;
+    s->camera = &s->scaled;
+    bst_field_set_camera(s->field, s->camera);
+    s->options.margin_px = fmax(s->margin_px, bst_renderer_margin_px(renderer));
+    return BST_OK;
+}
+
 static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure *e,
                          const bst_los_history *history) {
     bst_ctx *ctx = bst_step_ctx(step);
@@ -157,6 +181,9 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
                         "exposure %lld asks for binning %d; the renderer reads every pixel out by "
                         "itself: use binning 1",
                         (long long)e->id, e->binning);
+    }
+    if (e->pixel_scale_arcsec > 0.0 && e->pixel_scale_arcsec != s->camera->pixel_scale_arcsec) {
+        BST_TRY(rescale(ctx, s, e->pixel_scale_arcsec));
     }
     bst_los_track track;
     BST_TRY(bst_field_track(ctx, s->field, history, e->start_tick, e->end_tick, s->tick_rate_hz,

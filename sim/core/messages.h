@@ -51,6 +51,7 @@ typedef struct bst_exposure {
     int binning;
     bool dropped; /* the frame will be lost on its way: rendered truth is kept, no frame is
                      delivered */
+    double pixel_scale_arcsec; /* 0: the camera's */
 } bst_exposure;
 
 /* los_history (latest, written in place): ring of the true camera attitude at the plant rate.
@@ -148,6 +149,7 @@ typedef struct bst_truth {
     bst_vec3 sun_m;                        /* observer to Sun, mid */
     double boresight_x_px, boresight_y_px; /* where the boresight meets the focal plane */
     double background_e, dark_e;           /* expected electrons per pixel */
+    double pixel_scale_arcsec;             /* of this exposure */
     int32_t count, lost;                   /* items; sources that found no room */
     bst_truth_item items[];
 } bst_truth;

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "sim/engine/recorder_internal.h"
+#include "sim/world/frame_updates.h"
 
 static const char *const frame_choices[] = {"extensions", "cube", "none", NULL};
 
@@ -195,8 +196,15 @@ static bst_status open_fits(bst_ctx *ctx, bst_recorder *recorder, bst_recorder_s
 /* Fits the frame's WCS; a field too wide for one gets none, and is told of once. */
 static void solve_wcs(bst_ctx *ctx, bst_recorder_state *s, const bst_truth_head *head,
                       bst_fits_frame *frame) {
-    frame->has_wcs = bst_wcs_fit(ctx, &s->camera, head->q_cam_from_gcrf_mean, &head->light,
-                                 &frame->wcs) == BST_OK;
+    bst_camera camera = s->camera;
+    if (head->pixel_scale_arcsec > 0.0 &&
+        head->pixel_scale_arcsec != s->camera.pixel_scale_arcsec &&
+        bst_camera_at_scale(ctx, &s->camera, head->pixel_scale_arcsec, &camera) != BST_OK) {
+        camera = s->camera; /* cannot be: the frame was rendered so */
+    }
+    frame->pixel_scale_arcsec = camera.pixel_scale_arcsec;
+    frame->has_wcs =
+        bst_wcs_fit(ctx, &camera, head->q_cam_from_gcrf_mean, &head->light, &frame->wcs) == BST_OK;
     if (!frame->has_wcs && !s->wcs_warned) {
         bst_log(ctx, BST_LOG_WARNING, "%s/%s: frames get no WCS: %s", s->observer, s->sensor,
                 ctx ? ctx->message : "");
@@ -292,6 +300,7 @@ static bst_status take_truth(bst_ctx *ctx, bst_recorder *recorder, int sensor, c
                            .q_cam_from_gcrf_mean = t->q_cam_from_gcrf_mean,
                            .observer_gcrf_m = t->observer_gcrf_m,
                            .observer_gcrf_mps = t->observer_gcrf_mps,
+                           .pixel_scale_arcsec = t->pixel_scale_arcsec,
                            .light = {.velocity_mps = t->velocity_bary_mps, .sun_m = t->sun_m}};
     if (s->frame_waits && s->frame.exposure_id == t->exposure_id) {
         BST_TRY(write_waiting(ctx, recorder, sensor, &head));

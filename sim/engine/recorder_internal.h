@@ -32,6 +32,7 @@ typedef struct bst_truth_head {
     bst_quat q_cam_from_gcrf_mean;
     bst_vec3 observer_gcrf_m, observer_gcrf_mps;
     bst_light light;
+    double pixel_scale_arcsec;
 } bst_truth_head;
 
 /* Truth may run ahead of its frame by the readout delay: so many exposures at most. */

@@ -78,6 +78,7 @@ static const bst_column exposure_columns[] = {
     VECTOR("sun", "m", "m", "observer to Sun"),
     REAL("background_e", "e-/px", "expected sky electrons"),
     REAL("dark_e", "e-/px", "expected dark electrons"),
+    REAL("pixel_scale_arcsec", "arcsec/px", "at the boresight, in this exposure"),
     INT("sources", "", "sources with a truth item"),
     INT("lost", "", "sources that found no room"),
 };

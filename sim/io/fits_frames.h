@@ -32,6 +32,7 @@ typedef struct bst_fits_frame {
     bst_window window; /* full-sensor pixels */
     int binning;
     int bits;
+    double pixel_scale_arcsec; /* at the boresight, unbinned; 0: the camera's */
     bool has_wcs, has_observer;
     bst_wcs wcs; /* of the whole sensor: the writer shifts and scales it to the window */
     bst_vec3 observer_gcrf_m, observer_gcrf_mps; /* mid exposure, geocentric */

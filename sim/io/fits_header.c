@@ -149,8 +149,9 @@ void bst_fits_put_frame_keys(fitsfile *file, const bst_fits_names *names,
     put_text(file, "INSTRUME", names->instrument, "sensor", code);
     put_text(file, "OBSERVER", names->observer, "observing spacecraft", code);
     int binning = frame->binning > 1 ? frame->binning : 1;
-    put_real(file, "PIXSCALE", names->camera.pixel_scale_arcsec * binning,
-             "[arcsec/pixel] at the boresight", code);
+    double scale = frame->pixel_scale_arcsec > 0.0 ? frame->pixel_scale_arcsec
+                                                   : names->camera.pixel_scale_arcsec;
+    put_real(file, "PIXSCALE", scale * binning, "[arcsec/pixel] at the boresight", code);
     bst_fits_put_lens(file, &names->camera, code);
     put_int(file, "WINX0", frame->window.x0, "[pixel] window's corner on the sensor, from 0", code);
     put_int(file, "WINY0", frame->window.y0, "[pixel] window's corner on the sensor, from 0", code);
