@@ -2,6 +2,7 @@
 #include <stdlib.h>
 
 #include "scenegen/module.h"
+#include "scenegen/planes.h"
 #include "scenegen/renderer.h"
 #include "sim/world/frame_updates.h"
 
@@ -27,13 +28,14 @@ static const bst_config_desc config[] = {
     BST_CONFIG_END,
 };
 
-enum { PORT_EXPOSURE, PORT_LOS, PORT_FRAME, PORT_TRUTH, PORT_COUNT };
+enum { PORT_EXPOSURE, PORT_LOS, PORT_FRAME, PORT_TRUTH, PORT_PLANES, PORT_COUNT };
 
 static const bst_port ports[PORT_COUNT] = {
     [PORT_EXPOSURE] = {BST_CHANNEL_EXPOSURE, BST_PORT_IN, BST_PORT_TRIGGER, 0.0, 0},
     [PORT_LOS] = {BST_CHANNEL_LOS_HISTORY, BST_PORT_IN, 0, 0.0, 0},
     [PORT_FRAME] = {BST_CHANNEL_FRAME, BST_PORT_OUT, 0, 0.0, 0},
     [PORT_TRUTH] = {BST_CHANNEL_TRUTH, BST_PORT_OUT, 0, 0.0, 4096},
+    [PORT_PLANES] = {BST_CHANNEL_PLANES, BST_PORT_OUT, 0, 0.0, 0},
 };
 
 /* A source that asks for room in the truth. */
@@ -56,6 +58,8 @@ typedef struct scenegen {
     bst_renderer *renderer;
     pick *picks;
     int pick_capacity;
+    bst_plane_maker *planes; /* NULL: not asked for */
+    int *item_source;        /* source of each item of the truth, for the planes */
 } scenegen;
 
 static void destroy(void *self) {
@@ -63,6 +67,8 @@ static void destroy(void *self) {
     if (s) {
         bst_renderer_free(s->renderer);
         bst_field_free(s->field);
+        bst_plane_maker_free(s->planes);
+        free(s->item_source);
         free(s->picks);
         free(s);
     }
@@ -89,6 +95,15 @@ static bst_status create(const bst_module_env *env, const void *config_object, v
         bst_renderer_create(env->ctx, env->device, s->camera, &options, &s->renderer);
     if (status == BST_OK) {
         status = bst_field_create(env->ctx, env->world, env->observer, env->sensor, &s->field);
+    }
+    if (status == BST_OK && env->planes) {
+        status = bst_plane_maker_create(env->ctx, env->planes, (int)s->camera->width_px,
+                                        (int)s->camera->height_px, env->mask_threshold_sigma,
+                                        &s->planes);
+        s->item_source = malloc((size_t)c->truth_capacity * sizeof *s->item_source);
+        if (status == BST_OK && !s->item_source) {
+            status = bst_fail(env->ctx, BST_ERR_MEMORY, "no memory for %s", env->instance);
+        }
     }
     if (status != BST_OK) {
         destroy(s);
@@ -150,6 +165,9 @@ static bst_status write_items(bst_ctx *ctx, scenegen *s, const bst_los_track *tr
     for (int i = 0; i < truth->count; i++) {
         int k = truth->lost > 0 ? s->picks[i].index : i;
         bst_field_truth_item(s->field, track, &sources[k], e->window, truth, &truth->items[i]);
+        if (s->item_source) {
+            s->item_source[i] = k;
+        }
         if (bst_renderer_peak_e(s->renderer, k) >= limit_e) {
             truth->items[i].flags |= BST_TRUTH_SATURATED;
         }
@@ -226,6 +244,11 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
         BST_TRY(bst_renderer_saturated(ctx, s->renderer, &saturated));
         if (saturated > 0) {
             bst_step_count(step, "saturated");
+        }
+        if (s->planes) {
+            bst_planes *planes = bst_step_write(step, PORT_PLANES, NULL);
+            BST_TRY(bst_plane_maker_render(ctx, s->planes, s->renderer, s->camera, &request,
+                                           s->item_source, truth->count, planes));
         }
     }
     return BST_OK;

@@ -75,6 +75,21 @@ void bst_fits_put_run_keys(fitsfile *file, const bst_fits_names *names, int *cod
     fits_write_key_str(file, "RADESYS", "ICRS", "reference system of the WCS", code);
 }
 
+void bst_fits_put_content(fitsfile *file, bst_fits_content content, int *code) {
+    static const char *const keys[] = {"GAIN", "RDNOISE", "OFFSET", "SATURATE", "BITS"};
+    if (content == BST_FITS_COUNTS) {
+        return;
+    }
+    for (size_t i = 0; i < sizeof keys / sizeof *keys && *code == 0; i++) {
+        fits_delete_key(file, keys[i], code);
+    }
+    if (content == BST_FITS_ELECTRONS) {
+        fits_update_key_str(file, "BUNIT", "electron", "expected, before the detector", code);
+    } else {
+        fits_update_key_str(file, "BUNIT", "", "0, or item of the table truth", code);
+    }
+}
+
 void bst_fits_put_statements(fitsfile *file, int *code) {
     /* a COMMENT card holds 72 characters */
     static const char *const lines[] = {
