@@ -76,6 +76,13 @@ bst_status bst_fits_write_plane(bst_ctx *ctx, bst_fits *fits, const bst_fits_fra
                                 const char *name, const void *pixels, int width, int height,
                                 int64_t *index) BST_MUST_CHECK;
 
+/* Writes one frame as a file of its own, its pixels in the primary array, with the keys that
+ * bst_fits_write gives a frame; the file appears whole or not at all, and replaces an earlier one.
+ */
+bst_status bst_fits_write_single(bst_ctx *ctx, const char *path, const bst_fits_info *info,
+                                 const bst_fits_frame *frame, const uint16_t *pixels, int width,
+                                 int height) BST_MUST_CHECK;
+
 /* Waits until every frame given so far is with the operating system; reports what failed. NULL is
  * allowed. */
 bst_status bst_fits_flush(bst_ctx *ctx, bst_fits *fits) BST_MUST_CHECK;
