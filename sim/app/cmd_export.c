@@ -257,16 +257,16 @@ int bst_cmd_export(int argc, char **argv) {
                  arguments);
         return bst_options_misuse(&ctx, "export");
     }
-    if (frames == NOT_ASKED && table_format == NOT_ASKED && orbits == NOT_ASKED &&
-        observations == NOT_ASKED && !e.satnet) {
-        bst_fail(&ctx, BST_ERR_ARGUMENT,
-                 "nothing to export: add --frames, --table, --orbits, --observations or --satnet");
-        return bst_options_misuse(&ctx, "export");
-    }
     if (e.split && (!e.satnet || bst_export_split(&ctx, e.split, split) != BST_OK)) {
         if (!e.satnet) {
             bst_fail(&ctx, BST_ERR_ARGUMENT, "--split needs --satnet FOLDER");
         }
+        return bst_options_misuse(&ctx, "export");
+    }
+    if (frames == NOT_ASKED && table_format == NOT_ASKED && orbits == NOT_ASKED &&
+        observations == NOT_ASKED && !e.satnet) {
+        bst_fail(&ctx, BST_ERR_ARGUMENT,
+                 "nothing to export: add --frames, --table, --orbits, --observations or --satnet");
         return bst_options_misuse(&ctx, "export");
     }
     bool others = frames != NOT_ASKED || table_format != NOT_ASKED || orbits != NOT_ASKED ||
