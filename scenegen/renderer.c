@@ -7,13 +7,15 @@
 
 #include "bst_device_kernels.h"
 #include "bst_scenegen_kernels.h"
+#include "scenegen/fft_light.h"
 #include "scenegen/frame_pool.h"
 #include "scenegen/reference.h"
 #include "scenegen/smear.h"
+#include "scenegen/vignetting.h"
 
 enum { MAX_TAPS = 512, BOX_FLOATS = 4 };
 /* Of a block of nodes: place and weight. */
-enum { NODE_BYTES = BST_BLOCK * 3 * (int)sizeof(float) };
+enum { NODE_BYTES = BST_BLOCK * BST_NODE_ROWS * (int)sizeof(float) };
 
 /* A device buffer that grows. */
 typedef struct growing {
@@ -24,11 +26,13 @@ typedef struct growing {
 struct bst_renderer {
     bst_camera camera;
     bst_renderer_options options;
-    int taps;
+    int taps, phases;
     cl_context context;
     cl_command_queue queue;
     cl_program program;
     cl_kernel nodes_kernel, frame_kernel, expected_kernel;
+    bst_psf *psf;
+    bst_fft_light *fft_light; /* NULL: the PSF is a Gaussian, light comes from stamps */
     bst_smear *smear;
     bst_frame_pool *pool;
     cl_mem profiles;
@@ -41,7 +45,7 @@ struct bst_renderer {
 };
 
 bst_renderer_options bst_renderer_default_options(void) {
-    return (bst_renderer_options){.error_sigma = 0.02, .cut_sigma = 0.015, .pool_frames = 4};
+    return (bst_renderer_options){.tolerance_sigma = 0.05, .pool_frames = 4};
 }
 
 static bst_status check_camera(bst_ctx *ctx, const bst_camera *c) {
@@ -88,7 +92,7 @@ static bst_status choose_tiles(bst_ctx *ctx, const bst_device *device,
         options->tile_height = large ? 64 : 4;
         options->group = large ? 1 : 16;
     }
-    size_t need = (size_t)(options->tile_width + 32) * (size_t)options->tile_height *
+    size_t need = (size_t)(options->tile_width + 16) * (size_t)options->tile_height *
                   sizeof(float) * (size_t)options->group;
     if (options->tile_width < 16 || options->tile_width % 16 != 0 || options->tile_height < 1 ||
         options->group < 1 || need > local_bytes) {
@@ -102,13 +106,16 @@ static bst_status choose_tiles(bst_ctx *ctx, const bst_device *device,
 }
 
 static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
-    const bst_kernel_source *sources[] = {&bst_kernel_scene_shared, &bst_kernel_nodes,
-                                          &bst_kernel_splat, &bst_kernel_detector,
-                                          &bst_kernel_tile};
-    char options[512];
+    const bst_kernel_source *sources[] = {
+        &bst_kernel_scene_shared, &bst_kernel_nodes,      &bst_kernel_splat, &bst_kernel_detector,
+        &bst_kernel_light,        &bst_kernel_vignetting, &bst_kernel_tile};
+    char options[1024];
     int length = snprintf(options, sizeof options,
-                          "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d",
-                          r->options.tile_width, r->options.tile_height, r->options.group, r->taps);
+                          "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d "
+                          "-DPHASES=%d%s",
+                          r->options.tile_width, r->options.tile_height, r->options.group, r->taps,
+                          r->phases, r->fft_light ? " -DFFT_LIGHT" : "");
+    length += bst_vignetting_options(&r->camera, options + length, sizeof options - (size_t)length);
     const bst_distortion *d = &r->camera.distortion;
     if (bst_camera_distorted(&r->camera)) {
         double a = bst_camera_scale_rad(&r->camera), a2 = a * a,
@@ -118,7 +125,7 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
             " -DDISTORTED -DK1=%.9ef -DK2=%.9ef -DK3=%.9ef -DP1=%.9ef -DP2=%.9ef -DFOLD2=%.9ef",
             d->k1 * a2, d->k2 * a2 * a2, d->k3 * a2 * a2 * a2, d->p1 * a, d->p2 * a, out * out);
     }
-    BST_TRY(bst_device_build(ctx, device, sources, 5, options, &r->program));
+    BST_TRY(bst_device_build(ctx, device, sources, 7, options, &r->program));
     static const char *const names[3] = {"bst_scene_nodes", "bst_scene_frame",
                                          "bst_scene_expected"};
     cl_kernel *kernels[3] = {&r->nodes_kernel, &r->frame_kernel, &r->expected_kernel};
@@ -130,18 +137,35 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
     return BST_OK;
 }
 
-/* [BST_PHASES + 1][taps]: shares of a profile centred phase / BST_PHASES right of a pixel. */
+/* Phases between which the profile may be interpolated linearly: that misses
+ * 1 / (8 phases^2 sigma^2) of the peak, below 1.3e-5. */
+static int phases_for(double sigma_px) {
+    int phases = 8;
+    while (phases < 2048 && phases * sigma_px < 100.0) {
+        phases *= 2;
+    }
+    return phases;
+}
+
+/* [BST_WIDTHS + 1][phases + 1][taps]: shares of a profile centred phase / phases right of a pixel.
+ */
 static bst_status make_profiles(bst_ctx *ctx, bst_renderer *r) {
-    size_t bytes = (size_t)(BST_PHASES + 1) * (size_t)r->taps * sizeof(float);
-    float *table = malloc(bytes);
+    size_t rows = (size_t)(BST_WIDTHS + 1) * (size_t)(r->phases + 1),
+           row_floats = (size_t)r->taps + 2 * BST_PROFILE_PAD;
+    size_t bytes = rows * row_floats * sizeof(float);
+    float *table = calloc(rows, row_floats * sizeof(float));
     if (!table) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the PSF table");
     }
-    double sigma = bst_camera_psf_sigma_px(&r->camera);
-    for (int p = 0; p <= BST_PHASES; p++) {
+    double psf = bst_camera_psf_sigma_px(&r->camera);
+    for (size_t row = 0; row < rows; row++) {
+        size_t width = row / (size_t)(r->phases + 1), phase = row % (size_t)(r->phases + 1);
+        double share = (double)width / BST_WIDTHS;
+        double sigma = psf * sqrt(1.0 + BST_WIDEST * share * share);
         for (int j = 0; j < r->taps; j++) {
-            table[p * r->taps + j] = (float)bst_reference_pixel_share((double)p / BST_PHASES, sigma,
-                                                                      j - (r->taps / 2 - 1));
+            table[row * row_floats + BST_PROFILE_PAD + (size_t)j] =
+                (float)bst_reference_pixel_share((double)phase / r->phases, sigma,
+                                                 j - (r->taps / 2 - 1));
         }
     }
     cl_int code;
@@ -186,6 +210,20 @@ static bst_status upload(bst_ctx *ctx, bst_renderer *r, growing *g, const void *
                             "unmapping scene memory");
 }
 
+/* The PSF, and the Fourier path where it is no Gaussian. */
+static bst_status open_psf(bst_ctx *ctx, bst_device *device, bst_renderer *r,
+                           bst_smear_options *smear) {
+    double sigma_px;
+    BST_TRY(bst_psf_create(ctx, &r->camera, &r->psf));
+    if (bst_psf_gaussian(r->psf, &sigma_px)) {
+        return BST_OK;
+    }
+    BST_TRY(bst_fft_light_create(ctx, device, &r->camera, r->psf, NULL, &r->fft_light));
+    smear->node_sigma_px = bst_fft_light_band(r->fft_light)->node_sigma_px;
+    smear->share_sigma_px = bst_fft_light_band(r->fft_light)->share_sigma_px;
+    return BST_OK;
+}
+
 bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
                                const bst_renderer_options *options, bst_renderer **out) {
     *out = NULL;
@@ -197,12 +235,16 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     r->camera = *camera;
     r->options = options ? *options : bst_renderer_default_options();
     r->taps = taps_for(bst_camera_psf_sigma_px(camera));
+    r->phases = phases_for(bst_camera_psf_sigma_px(camera));
     r->context = bst_device_context(device);
     r->queue = bst_device_queue(device);
     clRetainContext(r->context);
     clRetainCommandQueue(r->queue);
-    bst_smear_options smear = {r->options.error_sigma, r->options.cut_sigma, r->taps};
+    bst_smear_options smear = {.tolerance_sigma = r->options.tolerance_sigma, .taps = r->taps};
     bst_status status = choose_tiles(ctx, device, &r->options, &r->most_bytes);
+    if (status == BST_OK) {
+        status = open_psf(ctx, device, r, &smear);
+    }
     if (status == BST_OK) {
         status = build(ctx, r, device);
     }
@@ -248,6 +290,8 @@ void bst_renderer_free(bst_renderer *r) {
     }
     bst_frame_pool_free(r->pool);
     bst_smear_free(r->smear);
+    bst_fft_light_free(r->fft_light);
+    bst_psf_free(r->psf);
     clReleaseCommandQueue(r->queue);
     clReleaseContext(r->context);
     free(r->list);
@@ -308,6 +352,9 @@ static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *
                             r->stats.sources, q->count, 1e-6 * BST_BLOCK * *blocks);
         }
         if (visible) {
+            if (r->fft_light) {
+                bst_fft_light_stamp(r->fft_light, s);
+            }
             s->first_block = *blocks;
             *blocks += s->blocks;
             r->stats.sources++;
@@ -383,6 +430,19 @@ static bst_scene_params make_params(const bst_renderer *r, const bst_render_requ
     };
 }
 
+/* The image that the tile kernel takes its light from, where the PSF is no Gaussian. */
+static bst_status make_light(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q, int groups,
+                             bst_scene_params *p, cl_mem *light) {
+    bst_fft_light_nodes nodes = {r->sources.buffer, r->nodes.buffer, r->block_box.buffer,
+                                 r->source_box.buffer, groups};
+    bst_fft_light_image image;
+    BST_TRY(bst_fft_light_render(ctx, r->fft_light, r->queue, q->window, &nodes, &image));
+    p->light_first = image.first;
+    p->light_pitch = image.pitch;
+    *light = image.buffer;
+    return BST_OK;
+}
+
 /* The common way of both kinds of image: the kernels' first six arguments are the same. */
 static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
                                 cl_kernel kernel, cl_mem out) {
@@ -393,12 +453,16 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
     r->tiles = p.tiles_x * p.tiles_y;
     size_t tiles = (size_t)r->tiles;
     BST_TRY(grow(ctx, r, &r->saturated, tiles * sizeof(cl_int)));
+    cl_mem light = r->profiles;
+    if (r->fft_light) {
+        BST_TRY(make_light(ctx, r, q, groups, &p, &light));
+    }
     const void *values[] = {&p,
                             &r->sources.buffer,
                             &r->nodes.buffer,
                             &r->block_box.buffer,
                             &r->source_box.buffer,
-                            &r->profiles,
+                            &light,
                             &out,
                             &r->saturated.buffer};
     const size_t m = sizeof(cl_mem), bytes[] = {sizeof p, m, m, m, m, m, m, m};
@@ -472,5 +536,5 @@ double bst_renderer_peak_e(const bst_renderer *r, int index) {
 }
 
 int bst_renderer_margin_px(const bst_renderer *r) {
-    return r->taps / 2 + 1;
+    return r->fft_light ? bst_fft_light_margin_px(r->fft_light) : r->taps / 2 + 1;
 }

@@ -3,10 +3,12 @@
 #ifndef BST_WORLD_CAMERA_H
 #define BST_WORLD_CAMERA_H
 
+#include <math.h>
 #include <stdbool.h>
 
 #include "sim/core/config.h"
 #include "sim/core/vec.h"
+#include "sim/world/psf_config.h"
 
 /* Lens distortion in the focal plane's tangent coordinates u = (x, y), r^2 = x^2 + y^2, in units of
  * the focal length (Brown 1971, Photogrammetric Engineering 37, 855; the sign and order of the
@@ -36,7 +38,7 @@ typedef struct bst_camera {
     double throughput;              /* optics, 0..1 */
     double quantum_efficiency;      /* band mean, 0..1 */
     double photon_flux_v0_per_s_m2; /* photons of a V = 0 star in the camera's band */
-    double psf_fwhm_px;             /* Gaussian */
+    double psf_fwhm_px;             /* Gaussian, Moffat */
     double background_mag_arcsec2;  /* uniform sky, V per square arcsecond */
     double dark_current_e_per_s;
     double read_noise_e;
@@ -47,6 +49,9 @@ typedef struct bst_camera {
     double rotation_deg; /* of the focal plane about the boresight, from camera +x towards +y */
     double boresight_offset_px[2]; /* place of the boresight, from the sensor's centre */
     bst_distortion distortion;
+    bst_optics_config optics;  /* PSF (see psf.h) and vignetting */
+    const struct bst_psf *psf; /* made of this camera, lent to its copies, or NULL; a copy whose
+                                  optics, aperture or scale are changed must clear it */
     bst_camera_geometry
         geometry; /* by bst_camera_prepare; all zero: neither turned nor distorted */
 } bst_camera;
@@ -73,8 +78,10 @@ static inline double bst_camera_centre_y(const bst_camera *c) {
 static inline double bst_camera_scale_rad(const bst_camera *c) {
     return c->pixel_scale_arcsec * BST_ARCSEC_RAD;
 }
+/* Of the Gaussian profile with charge diffusion, before integration over the pixel. */
 static inline double bst_camera_psf_sigma_px(const bst_camera *c) {
-    return c->psf_fwhm_px / 2.3548200450309493; /* 2 sqrt(2 ln 2) */
+    double sigma = c->psf_fwhm_px / 2.3548200450309493; /* 2 sqrt(2 ln 2) */
+    return c->optics.diffusion_px > 0.0 ? hypot(sigma, c->optics.diffusion_px) : sigma;
 }
 /* Angle from the boresight to the sensor's farthest corner (outer edge of the pixel), rad. */
 double bst_camera_half_diagonal_rad(const bst_camera *c);
@@ -142,6 +149,12 @@ static inline double bst_camera_stretch(const bst_camera *c) {
 static inline double bst_camera_shrink(const bst_camera *c) {
     return c->geometry.general ? c->geometry.shrink : 1.0;
 }
+
+/* Share of the light, of sources and of the sky, that vignetting leaves on a pixel: at least 0; 1
+ * without. r is the distance from the boresight: (1 + (r scale)^2)^-2 for the fourth power of the
+ * cosine, and the polynomial in half diagonals. As a flat field has it, the pixel counts, not the
+ * place of the source. */
+double bst_camera_illumination(const bst_camera *c, double x_px, double y_px);
 
 /* Detected electrons per second of a source of magnitude v_mag:
  * photon_flux_v0 10^(-0.4 V) * pi/4 D^2 (1 - obscuration) * throughput * QE. */
