@@ -59,7 +59,9 @@ def cell(text):
 def table(node):
     """Rows of an object's own keys, and the blocks below it."""
     rows, below = [], []
-    required = node.get("required", [])
+    # a scenario that extends another needs none of those that one on its own needs
+    required = node.get("required", [key for choice in node.get("anyOf", [])
+                                     for key in choice["required"] if key != "extends"])
     for key, child in node.get("properties", {}).items():
         if key in SKIPPED and child.get("type") == "string" and len(child) == 1:
             continue

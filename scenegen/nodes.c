@@ -14,6 +14,8 @@ typedef struct maker {
     double tolerance;
     bool widen;
     bst_node_list *list;
+    double most;  /* spread of the next group, px^2 */
+    double limit; /* of it */
 } maker;
 
 /* A group: the path from time `from` (in segment `first`) to `to`. */
@@ -150,23 +152,32 @@ static void second_moments(const maker *m, const group *g, moments *out) {
     }
 }
 
-/* Four-point Gauss-Legendre on [0, 1] (Abramowitz and Stegun, table 25.4): exact for the seventh
- * order. */
-static const double gauss_place[4] = {0.06943184420297371, 0.33000947820757187, 0.66999052179242813,
-                                      0.93056815579702629};
-static const double gauss_weight[4] = {0.17392742256872693, 0.32607257743127307,
-                                       0.32607257743127307, 0.17392742256872693};
+/* Four-point and two-point Gauss-Legendre on [0, 1] (Abramowitz and Stegun, table 25.4): the first
+ * exact for the seventh order, the second for the third. */
+static const double gauss_place[2][4] = {
+    {0.06943184420297371, 0.33000947820757187, 0.66999052179242813, 0.93056815579702629},
+    {0.21132486540518712, 0.78867513459481288}};
+static const double gauss_weight[2][4] = {
+    {0.17392742256872693, 0.32607257743127307, 0.32607257743127307, 0.17392742256872693},
+    {0.5, 0.5}};
+/* In a group of as many segments the second does: of the fourth moment 1 / segments^4 is missed. */
+enum { MANY_SEGMENTS = 6 };
 
 /* Fills the axis and the moments about it. */
 static void high_moments(const maker *m, const group *g, moments *out) {
     double a[3], b[3], weight = 0.0;
     main_axis(out->covariance, out->axis);
+    int segments = 0;
+    while (segments < MANY_SEGMENTS && reaches(m, g, g->first + segments)) {
+        segments++;
+    }
+    int coarse = segments == MANY_SEGMENTS, points = coarse ? 2 : 4;
     for (int k = g->first; reaches(m, g, k); k++) {
         double w = clip(m, g, k, a, b);
-        for (int n = 0; n < 4 && w > 0.0; n++) {
-            double d[3], x = 0.0, part = w * gauss_weight[n];
+        for (int n = 0; n < points && w > 0.0; n++) {
+            double d[3], x = 0.0, part = w * gauss_weight[coarse][n];
             for (int i = 0; i < 3; i++) {
-                d[i] = a[i] + gauss_place[n] * (b[i] - a[i]) - out->mean[i];
+                d[i] = a[i] + gauss_place[coarse][n] * (b[i] - a[i]) - out->mean[i];
                 x += d[i] * out->axis[i];
             }
             double power = part;
@@ -184,7 +195,7 @@ static void high_moments(const maker *m, const group *g, moments *out) {
                 out->lean[i] += part * d[i] * y2;
             }
             for (int i = 0; i < 3; i++) {
-                for (int j = 0; j < 3; j++) {
+                for (int j = 0; j <= i; j++) {
                     out->across[i][j] += part * d[i] * d[j];
                 }
             }
@@ -199,8 +210,9 @@ static void high_moments(const maker *m, const group *g, moments *out) {
     for (int i = 0; i < 3; i++) {
         out->bend[i] /= weight;
         out->lean[i] /= weight;
-        for (int j = 0; j < 3; j++) {
+        for (int j = 0; j <= i; j++) {
             out->across[i][j] /= weight;
+            out->across[j][i] = out->across[i][j];
         }
     }
 }
@@ -344,12 +356,15 @@ static void try_rule(const maker *m, const moments *g, int n, bool widen, bool s
     /* x^2 and y^2 together: a quarter of a derivative of at most the peak over sigma^4 */
     double across2 = g->across[0][0] + g->across[1][1] + g->across[2][2];
     error += 0.25 * fabs(g->mixed - g->along[2] * across2) / (var * var);
-    error += n == 1 ? 0.0 : missed / (factor[n] * pow(var, n));
     double wide = split
                       ? r->pair[0] * r->pair[0] + r->pair[1] * r->pair[1] + r->pair[2] * r->pair[2]
                       : r->widening;
     /* fourth cumulant of what became a Gaussian, or a pair, taken for uniform */
     error += 0.15 * wide * wide / (var * var);
+    /* Groups are shorter than the PSF is wide, so that what jitter leaves over in neighbours adds
+     * up; on straight paths it nearly cancels (factors measured on random paths) */
+    error *= 1.8;
+    error += n == 1 ? 0.0 : 1.08 * missed / (factor[n] * pow(var, n));
     r->error = error + covariance_error(d, r->widening, var);
 }
 
@@ -382,8 +397,15 @@ static bool single_stretch(const maker *m, const group *g) {
     return k + 2 >= m->count || m->path[k + 1].s >= g->to;
 }
 
+/* The next group's size from how this one's error compares with the tolerance, which goes as the
+ * third power of its spread where the path is straight. */
+static void adapt(maker *m, double error) {
+    double change = error > 0.0 ? cbrt(0.8 * m->tolerance / error) : 2.0;
+    m->most = fmin(m->most * fmin(fmax(change, 0.4), 1.6), m->limit);
+}
+
 /* Replaces a group by nodes, in halves of its time where no rule is good enough. */
-static bst_status close_group(bst_ctx *ctx, const maker *m, group g, int depth) {
+static bst_status close_group(bst_ctx *ctx, maker *m, group g, int depth) {
     moments t;
     rule best = {.error = INFINITY}, r;
     second_moments(m, &g, &t);
@@ -408,6 +430,9 @@ static bst_status close_group(bst_ctx *ctx, const maker *m, group g, int depth) 
         if (r.error < best.error) {
             best = r;
         }
+    }
+    if (depth == 0 && best.nodes == 3) {
+        adapt(m, best.error);
     }
     if (best.error > m->tolerance && depth < 40 &&
         !(single_stretch(m, &g) && spread < 1e-6 * m->variance)) {
@@ -447,13 +472,18 @@ static double spread_of(const extent *e) {
 bst_status bst_nodes_from_path(bst_ctx *ctx, const bst_path_point *path, int count,
                                double psf_sigma_px, double tolerance, bool widen,
                                bst_node_list *list) {
-    maker m = {path,  count, path[count - 1].s - path[0].s, psf_sigma_px * psf_sigma_px, tolerance,
-               widen, list};
+    maker m = {.path = path,
+               .count = count,
+               .total = path[count - 1].s - path[0].s,
+               .variance = psf_sigma_px * psf_sigma_px,
+               .tolerance = tolerance,
+               .widen = widen,
+               .list = list};
     if (!(m.total > 0.0)) {
         return push(ctx, list, path[0].p, 1.0, 0.0);
     }
     /* three nodes on a uniform stretch of variance v miss 0.617 v^3 of the sixth moment */
-    double most = 0.9 * m.variance * cbrt(tolerance * 48.0 / 0.617);
+    m.limit = m.most = 0.95 * m.variance * cbrt(tolerance * 48.0 / 0.617);
     group g = {0, path[0].s, path[0].s};
     extent e = {0};
     for (int k = 0; k + 1 < count; k++) {
@@ -470,7 +500,7 @@ bst_status bst_nodes_from_path(bst_ctx *ctx, const bst_path_point *path, int cou
         }
         extent more = e;
         extend(&more, a, b, q->s - p->s);
-        if (spread_of(&more) <= most) {
+        if (spread_of(&more) <= m.most) {
             e = more;
             g.to = q->s;
             continue;
@@ -478,7 +508,7 @@ bst_status bst_nodes_from_path(bst_ctx *ctx, const bst_path_point *path, int cou
         if (e.weight > 0.0) {
             BST_TRY(close_group(ctx, &m, g, 0));
         }
-        int pieces = (int)fmin(ceil(sqrt(length2 / (12.0 * most))), 1e6);
+        int pieces = (int)fmin(ceil(sqrt(length2 / (12.0 * m.most))), 1e6);
         pieces = pieces < 1 ? 1 : pieces;
         double step = (q->s - p->s) / pieces;
         for (int n = 0; n + 1 < pieces; n++) {

@@ -41,7 +41,7 @@ struct bst_renderer {
 };
 
 bst_renderer_options bst_renderer_default_options(void) {
-    return (bst_renderer_options){.error_sigma = 0.02, .cut_sigma = 0.015, .pool_frames = 4};
+    return (bst_renderer_options){.tolerance_sigma = 0.05, .pool_frames = 4};
 }
 
 static bst_status check_camera(bst_ctx *ctx, const bst_camera *c) {
@@ -88,7 +88,7 @@ static bst_status choose_tiles(bst_ctx *ctx, const bst_device *device,
         options->tile_height = large ? 64 : 4;
         options->group = large ? 1 : 16;
     }
-    size_t need = (size_t)(options->tile_width + 32) * (size_t)options->tile_height *
+    size_t need = (size_t)(options->tile_width + 16) * (size_t)options->tile_height *
                   sizeof(float) * (size_t)options->group;
     if (options->tile_width < 16 || options->tile_width % 16 != 0 || options->tile_height < 1 ||
         options->group < 1 || need > local_bytes) {
@@ -133,10 +133,10 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
 }
 
 /* Phases between which the profile may be interpolated linearly: that misses
- * 1 / (8 phases^2 sigma^2) of the peak, below 3e-6. */
+ * 1 / (8 phases^2 sigma^2) of the peak, below 1.3e-5. */
 static int phases_for(double sigma_px) {
     int phases = 8;
-    while (phases < 2048 && phases * sigma_px < 200.0) {
+    while (phases < 2048 && phases * sigma_px < 100.0) {
         phases *= 2;
     }
     return phases;
@@ -145,9 +145,10 @@ static int phases_for(double sigma_px) {
 /* [BST_WIDTHS + 1][phases + 1][taps]: shares of a profile centred phase / phases right of a pixel.
  */
 static bst_status make_profiles(bst_ctx *ctx, bst_renderer *r) {
-    size_t rows = (size_t)(BST_WIDTHS + 1) * (size_t)(r->phases + 1), taps = (size_t)r->taps;
-    size_t bytes = rows * taps * sizeof(float);
-    float *table = malloc(bytes);
+    size_t rows = (size_t)(BST_WIDTHS + 1) * (size_t)(r->phases + 1),
+           row_floats = (size_t)r->taps + 2 * BST_PROFILE_PAD;
+    size_t bytes = rows * row_floats * sizeof(float);
+    float *table = calloc(rows, row_floats * sizeof(float));
     if (!table) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the PSF table");
     }
@@ -157,8 +158,9 @@ static bst_status make_profiles(bst_ctx *ctx, bst_renderer *r) {
         double share = (double)width / BST_WIDTHS;
         double sigma = psf * sqrt(1.0 + BST_WIDEST * share * share);
         for (int j = 0; j < r->taps; j++) {
-            table[row * taps + (size_t)j] = (float)bst_reference_pixel_share(
-                (double)phase / r->phases, sigma, j - (r->taps / 2 - 1));
+            table[row * row_floats + BST_PROFILE_PAD + (size_t)j] =
+                (float)bst_reference_pixel_share((double)phase / r->phases, sigma,
+                                                 j - (r->taps / 2 - 1));
         }
     }
     cl_int code;
@@ -219,7 +221,7 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     r->queue = bst_device_queue(device);
     clRetainContext(r->context);
     clRetainCommandQueue(r->queue);
-    bst_smear_options smear = {r->options.error_sigma, r->options.cut_sigma, r->taps};
+    bst_smear_options smear = {r->options.tolerance_sigma, r->taps};
     bst_status status = choose_tiles(ctx, device, &r->options, &r->most_bytes);
     if (status == BST_OK) {
         status = build(ctx, r, device);

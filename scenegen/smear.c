@@ -7,11 +7,15 @@
 #include "scenegen/reference.h"
 #include "scenegen/shape.h"
 
-/* Fidelities: level n is right to about 0.08 * 2.5^-n of the smeared image's peak. */
 /* Stretches of the path of a source whose brightness changes. */
 enum { RATE_PARTS = 512 };
 
-enum { LEVELS = 11, TABLE_FLOATS = BST_TABLE_ROWS * BST_BLOCK, MAX_TAPS = 512 };
+/* Shares of the tolerance: for nodes, and for the border of the stamp. */
+#define NODE_SHARE 0.8
+#define CUT_SHARE 0.3
+
+/* Fidelities: level n is right to about 0.08 * 2^-n of the smeared image's peak. */
+enum { LEVELS = 14, TABLE_FLOATS = BST_TABLE_ROWS * BST_BLOCK, MAX_TAPS = 512 };
 
 typedef struct level {
     int first_block, blocks; /* blocks 0: not made in this frame */
@@ -23,6 +27,7 @@ struct bst_smear {
     bst_smear_options options;
     double sigma_px;
     double tail[MAX_TAPS / 2]; /* profile at r px from the centre, over the centre's */
+    double kept[MAX_TAPS / 2]; /* light within the two nearest pixels and r more on each side */
     double tolerance[LEVELS];
     double half_diagonal_px;
     double stretch; /* of the image by distortion where it is greatest */
@@ -43,6 +48,18 @@ struct bst_smear {
     int table_blocks, table_capacity;
 };
 
+/* Mean over the sub-pixel phases of a profile's light on its two nearest pixels and r more on each
+ * side. */
+static double kept_light(double sigma_px, int r) {
+    enum { PHASES = 16 };
+    double sum = 0.0, scale = 1.0 / (sigma_px * sqrt(2.0));
+    for (int k = 0; k < PHASES; k++) {
+        double f = (k + 0.5) / PHASES;
+        sum += 0.5 * (erf((r + 1.5 - f) * scale) + erf((r + 0.5 + f) * scale));
+    }
+    return sum / PHASES;
+}
+
 bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
                             const bst_smear_options *options, bst_smear **out) {
     bst_smear *s = calloc(1, sizeof *s);
@@ -56,9 +73,10 @@ bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
     double centre = bst_reference_pixel_share(0.0, s->sigma_px, 0);
     for (int r = 0; r < MAX_TAPS / 2; r++) {
         s->tail[r] = bst_reference_pixel_share(0.0, s->sigma_px, r) / centre;
+        s->kept[r] = kept_light(s->sigma_px, r);
     }
     for (int n = 0; n < LEVELS; n++) {
-        s->tolerance[n] = 0.08 * pow(2.5, -n);
+        s->tolerance[n] = 0.08 * pow(2.0, -n);
     }
     s->stretch = bst_camera_stretch(camera);
     s->half_diagonal_px =
@@ -238,7 +256,7 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_los_track *trac
 static int choose_level(bst_smear *s, double peak_e) {
     double sigmas = peak_e / sqrt(peak_e + s->dark_variance_e2);
     int n = 0;
-    while (n + 1 < LEVELS && s->tolerance[n] * sigmas > s->options.error_sigma) {
+    while (n + 1 < LEVELS && s->tolerance[n] * sigmas > NODE_SHARE * s->options.tolerance_sigma) {
         n++;
     }
     return n;
@@ -246,7 +264,7 @@ static int choose_level(bst_smear *s, double peak_e) {
 
 /* Rows beyond the two nearest pixels: what lies outside stays under the cut. */
 static int choose_radius(const bst_smear *s, double peak_e) {
-    double limit = s->options.cut_sigma * sqrt(s->dark_variance_e2);
+    double limit = CUT_SHARE * s->options.tolerance_sigma * sqrt(s->dark_variance_e2);
     int most = s->options.taps / 2 - 1, r = 1;
     while (r < most && peak_e * s->tail[r + 1] > limit) {
         r++;
@@ -373,11 +391,11 @@ static bst_status own_nodes(bst_ctx *ctx, bst_smear *s, int count, double x0, do
     return BST_OK;
 }
 
-/* Puts all the points of a disc on the scratch nodes, which are those of its middle about (x, y).
- */
-static bst_status spread_shape(bst_ctx *ctx, bst_smear *s, const bst_source *source, double x,
+/* Makes the points of a disc; the scratch nodes are those of its middle about (x, y). *peak: share
+ * of the light on one pixel at most, without the smear. */
+static bst_status shape_points(bst_ctx *ctx, bst_smear *s, const bst_source *source, double x,
                                double y, double *peak) {
-    enum { MOST_NODES = 3000000 };
+    enum { MOST_NODES = 2000000 };
     double x0 = x, y0 = y, low[2] = {0.0, 0.0}, high[2] = {0.0, 0.0};
     (void)project(s, s->q_reference, source->apparent_mid, &x0, &y0);
     for (int n = 0; n < s->nodes.count; n++) {
@@ -407,7 +425,7 @@ static bst_status spread_shape(bst_ctx *ctx, bst_smear *s, const bst_source *sou
         .min_y_px = (general ? -all : -cy - margin) - high[1],
         .max_y_px = (general ? all : (double)s->camera.height_px - cy + margin) - low[1],
         .most_points = MOST_NODES / (s->nodes.count > 0 ? s->nodes.count : 1)};
-    return bst_shape_spread(ctx, source, &view, s->stretch, &s->points, &s->nodes, peak);
+    return bst_shape_points(ctx, source, &view, &s->points, peak);
 }
 
 bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source,
@@ -439,13 +457,13 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
         double share = largest_share(s), peak;
         if (source->shape) {
             BST_TRY(own_nodes(ctx, s, count, x, y, s->tolerance[0]));
-            BST_TRY(spread_shape(ctx, s, source, x, y, &peak));
+            BST_TRY(shape_points(ctx, s, source, x, y, &peak));
             share = fmin(share, peak);
         }
         s->last_peak_e = electrons * share;
         BST_TRY(own_nodes(ctx, s, count, x, y, s->tolerance[choose_level(s, s->last_peak_e)]));
         if (source->shape) {
-            BST_TRY(spread_shape(ctx, s, source, x, y, &peak));
+            BST_TRY(bst_shape_spread(ctx, &s->points, s->stretch, &s->nodes));
         }
         if (s->nodes.count == 0) {
             *visible = false;
@@ -459,15 +477,20 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
         BST_TRY(make_level(ctx, s, n));
         used = &s->levels[n];
     }
-    s->last_error_sigma = used->error * s->last_peak_e / sqrt(s->last_peak_e + s->dark_variance_e2);
     int radius = choose_radius(s, s->last_peak_e);
+    double sigmas = s->last_peak_e / sqrt(s->last_peak_e + s->dark_variance_e2);
+    double lost = 1.0 - s->kept[radius] * s->kept[radius];
+    int border = radius + 1 < MAX_TAPS / 2 ? radius + 1 : radius;
+    s->last_error_sigma = fmax((used->error + lost) * sigmas,
+                               s->last_peak_e * s->tail[border] / sqrt(s->dark_variance_e2));
+    /* what the stamp leaves out is put on the stamp, so that no light is lost */
+    electrons /= s->kept[radius] * s->kept[radius];
     *out = (bst_scene_source){.x_px = (float)x,
                               .y_px = (float)y,
                               .electrons = (float)electrons,
                               .first_table = used->first_block,
                               .blocks = used->blocks,
-                              .radius = radius,
-                              .chunks = (2 * radius + 2 + 15) / 16};
+                              .radius = radius};
     return BST_OK;
 }
 

@@ -50,7 +50,7 @@ kernel void bst_scene_nodes(global const bst_scene_source *sources, int count,
     float x0 = 1e9f, y0 = 1e9f, x1 = -1e9f, y1 = -1e9f;
     if (i < count) {
         bst_scene_source s = sources[i];
-        float reach_x = (float)(8 * s.chunks), reach_y = (float)s.radius;
+        float reach = (float)s.radius;
         for (int b = 0; b < s.blocks; b++) {
             global const float16 *t = table + (s.first_table + b) * BST_TABLE_ROWS;
             float16 depth = t[6] * s.x_px + t[7] * s.y_px;
@@ -76,8 +76,8 @@ kernel void bst_scene_nodes(global const bst_scene_source *sources, int count,
             nodes[BST_NODE_ROWS * block + 1] = y;
             nodes[BST_NODE_ROWS * block + 2] = t[9] * s.electrons;
             nodes[BST_NODE_ROWS * block + 3] = place_of_width(widening);
-            float4 r = (float4)(floor(min_of(x)) - reach_x + 1.0f, floor(min_of(y)) - reach_y,
-                                floor(max_of(x)) + reach_x, floor(max_of(y)) + reach_y + 1.0f);
+            float4 r = (float4)(floor(min_of(x)) - reach, floor(min_of(y)) - reach,
+                                floor(max_of(x)) + reach + 1.0f, floor(max_of(y)) + reach + 1.0f);
             block_box[block] = r;
             x0 = fmin(x0, r.x);
             y0 = fmin(y0, r.y);

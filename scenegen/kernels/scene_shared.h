@@ -5,10 +5,12 @@
 /* Nodes travel in blocks of this many, one vector register. */
 #define BST_BLOCK 16
 /* The profile table holds the PSF widened by (n / BST_WIDTHS)^2 BST_WIDEST of its own variance, n from
- * 0 to BST_WIDTHS. Linear interpolation between them misses at most 1e-4 of the peak, and
+ * 0 to BST_WIDTHS. Linear interpolation between them misses at most 3e-4 of the peak, and
  * 0.4 widening / BST_WIDTHS^2 of it for little widening. */
-#define BST_WIDTHS 32
+#define BST_WIDTHS 16
 #define BST_WIDEST 1.0f
+/* Zeros on either side of a row of the profile table. */
+#define BST_PROFILE_PAD 16
 /* Floats per node of a node table: the homography from the reference attitude's tangent plane to
  * the node's, as nine coefficients, then the weight and the widening in PSF variances. */
 #define BST_TABLE_ROWS 11
@@ -37,8 +39,7 @@ typedef struct bst_scene_source {
     int first_table;  /* block of the node table */
     int first_block;  /* block of the frame's nodes */
     int blocks;
-    int radius; /* stamp rows reach this far beyond the two nearest pixels */
-    int chunks; /* stamp columns in vectors of 16 */
+    int radius; /* the stamp reaches this far beyond the two nearest pixels of a node */
 } bst_scene_source;
 
 #endif

@@ -69,6 +69,7 @@ int bst_cmd_check(int argc, char **argv) {
     const bst_simulation_options options = {NULL, 0};
     int code = BST_EXIT_OK;
     if (bst_simulation_create(&ctx, &scenario, &options, &sim) != BST_OK) {
+        bst_json_name_file(&ctx, json);
         fprintf(stderr, "boresight: %s\n", ctx.message);
         code = BST_EXIT_FAILED;
     } else if (!quiet) {

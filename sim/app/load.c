@@ -33,7 +33,7 @@ bst_status bst_load_check(bst_ctx *ctx, const bst_load_options *options) {
 
 bst_status bst_load_scenario(bst_ctx *ctx, const char *path, const bst_load_options *options,
                              bst_json **json, bst_scenario *out) {
-    BST_TRY(bst_json_load(ctx, path, json));
+    BST_TRY(bst_json_load_extended(ctx, path, json));
     bst_status status = apply(ctx, options, *json);
     if (status == BST_OK) {
         status = bst_scenario_read(ctx, *json, bst_app_registry(), out);

@@ -121,6 +121,18 @@ void bst_json_free(bst_json *json);
 struct cJSON *bst_json_root(const bst_json *json);
 const char *bst_json_name(const bst_json *json);
 
+/* Reads a file that may say "extends": FILE, relative to its own folder: then the values are those
+ * of FILE, read in the same way, with what this one has at its top level in their place, and after
+ * that with what its object "set" lists, {"/json/pointer": value}. Both keys are gone from the
+ * result, whose name is `path`. BST_ERR_CONFIG: one extends itself, by way of at most 16 files. */
+bst_status bst_json_load_extended(bst_ctx *ctx, const char *path, bst_json **out) BST_MUST_CHECK;
+/* The file that gave the value at a JSON pointer, or the latest that changed something in it; lent.
+ */
+const char *bst_json_file(const bst_json *json, const char *pointer);
+/* Makes the message in ctx, when it begins "NAME: /json/pointer:", name bst_json_file instead of
+ * the document. */
+void bst_json_name_file(bst_ctx *ctx, const bst_json *json);
+
 /* Whether an override has the form "/json/path=value"; BST_ERR_ARGUMENT when not. */
 bst_status bst_json_check_assignment(bst_ctx *ctx, const char *assignment) BST_MUST_CHECK;
 /* Applies one override "/json/path=value" (JSON pointer; value is JSON text, or a bare word taken

@@ -10,11 +10,6 @@
 
 static const uint64_t MAX_BYTES = 64 << 20;
 
-struct bst_json {
-    char *name;
-    cJSON *root;
-};
-
 /* Line and column (from 1) of a byte offset. */
 static void locate(const char *text, size_t offset, int *line, int *column) {
     *line = 1;
@@ -145,6 +140,11 @@ bst_status bst_json_load(bst_ctx *ctx, const char *path, bst_json **out) {
 
 void bst_json_free(bst_json *json) {
     if (json) {
+        for (int i = 0; i < json->origin_count; i++) {
+            free(json->origins[i].pointer);
+            free(json->origins[i].file);
+        }
+        free(json->origins);
         cJSON_Delete(json->root);
         free(json->name);
         free(json);
@@ -179,6 +179,51 @@ bst_status bst_json_check_assignment(bst_ctx *ctx, const char *assignment) {
     return BST_OK;
 }
 
+bst_status bst_json_assign(bst_ctx *ctx, bst_json *json, const char *pointer, cJSON *value) {
+    char *path = strdup(pointer);
+    if (!path || !value) {
+        cJSON_Delete(value);
+        free(path);
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
+    }
+    cJSON *node = json->root;
+    bst_status status = BST_OK;
+    char *save = NULL;
+    char *segment = strtok_r(path, "/", &save);
+    for (int depth = 1; segment && status == BST_OK; depth++) {
+        if (depth > BST_JSON_MAX_DEPTH) {
+            status = bst_fail(ctx, BST_ERR_ARGUMENT, "nested too deep");
+            break;
+        }
+        char *next = strtok_r(NULL, "/", &save);
+        cJSON *child = child_of(node, segment);
+        if (!next) {
+            if (cJSON_IsArray(node) && child) {
+                cJSON_ReplaceItemInArray(node, (int)strtol(segment, NULL, 10), value);
+            } else if (cJSON_IsObject(node) && child) {
+                cJSON_ReplaceItemInObjectCaseSensitive(node, segment, value);
+            } else if (cJSON_IsObject(node)) {
+                cJSON_AddItemToObject(node, segment, value);
+            } else {
+                status =
+                    bst_fail(ctx, BST_ERR_ARGUMENT, "there is no element \"%s\" to set", segment);
+                break;
+            }
+            value = NULL;
+        } else if (!child && cJSON_IsObject(node)) {
+            child = cJSON_AddObjectToObject(node, segment);
+        }
+        if (next && !child) {
+            status = bst_fail(ctx, BST_ERR_ARGUMENT, "there is no element \"%s\"", segment);
+        }
+        node = child;
+        segment = next;
+    }
+    cJSON_Delete(value);
+    free(path);
+    return status;
+}
+
 bst_status bst_json_set(bst_ctx *ctx, bst_json *json, const char *assignment) {
     BST_TRY(bst_json_check_assignment(ctx, assignment));
     const char *equals = strchr(assignment, '=');
@@ -196,49 +241,17 @@ bst_status bst_json_set(bst_ctx *ctx, bst_json *json, const char *assignment) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "--set %s: the value is neither JSON nor a plain word", assignment);
     }
-    size_t length = (size_t)(equals - assignment);
-    char *path = strndup(assignment, length);
-    if (!path || !value) {
+    char *pointer = strndup(assignment, (size_t)(equals - assignment));
+    bst_status status = BST_ERR_MEMORY;
+    if (pointer) {
+        status = bst_json_assign(ctx, json, pointer, value);
+    } else {
         cJSON_Delete(value);
-        free(path);
-        return bst_fail(ctx, BST_ERR_MEMORY, "--set %s: out of memory", assignment);
+        bst_fail(ctx, status, "out of memory");
     }
-    cJSON *node = json->root;
-    bst_status status = BST_OK;
-    char *save = NULL;
-    char *segment = strtok_r(path, "/", &save);
-    for (int depth = 1; segment && status == BST_OK; depth++) {
-        if (depth > BST_JSON_MAX_DEPTH) {
-            status = bst_fail(ctx, BST_ERR_ARGUMENT, "--set %.80s: nested too deep", assignment);
-            break;
-        }
-        char *next = strtok_r(NULL, "/", &save);
-        cJSON *child = child_of(node, segment);
-        if (!next) {
-            if (cJSON_IsArray(node) && child) {
-                cJSON_ReplaceItemInArray(node, (int)strtol(segment, NULL, 10), value);
-            } else if (cJSON_IsObject(node) && child) {
-                cJSON_ReplaceItemInObjectCaseSensitive(node, segment, value);
-            } else if (cJSON_IsObject(node)) {
-                cJSON_AddItemToObject(node, segment, value);
-            } else {
-                status =
-                    bst_fail(ctx, BST_ERR_ARGUMENT, "--set %s: there is no element \"%s\" to set",
-                             assignment, segment);
-                break;
-            }
-            value = NULL;
-        } else if (!child && cJSON_IsObject(node)) {
-            child = cJSON_AddObjectToObject(node, segment);
-        }
-        if (next && !child) {
-            status = bst_fail(ctx, BST_ERR_ARGUMENT, "--set %s: there is no element \"%s\"",
-                              assignment, segment);
-        }
-        node = child;
-        segment = next;
+    if (status == BST_OK && json->origins) {
+        status = bst_json_note_origin(ctx, json, pointer, json->name);
     }
-    cJSON_Delete(value);
-    free(path);
-    return status;
+    free(pointer);
+    return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "--set %.300s", assignment);
 }

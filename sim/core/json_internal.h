@@ -5,11 +5,34 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#include "sim/core/config.h"
+
 enum {
     BST_JSON_MAX_DEPTH = 64,
     /* cJSON takes about 80 bytes for each, so that any text stays below 1 GiB */
     BST_JSON_MAX_VALUES = 8000000,
 };
+
+/* Which file gave the value at a JSON pointer. */
+typedef struct bst_json_origin {
+    char *pointer, *file;
+} bst_json_origin;
+
+struct bst_json {
+    char *name;
+    struct cJSON *root;
+    bst_json_origin *origins; /* of a file that extends another: later ones win; else NULL */
+    int origin_count;
+};
+
+/* Puts `value`, which it takes, at a JSON pointer. Objects on the way are made when missing; array
+ * elements must exist. */
+bst_status bst_json_assign(bst_ctx *ctx, bst_json *json, const char *pointer,
+                           struct cJSON *value) BST_MUST_CHECK;
+
+/* Notes that what is at `pointer` comes from `file`. */
+bst_status bst_json_note_origin(bst_ctx *ctx, bst_json *json, const char *pointer,
+                                const char *file) BST_MUST_CHECK;
 
 /* Why and where a text is not the JSON that is read here. */
 typedef struct bst_json_fault {

@@ -19,6 +19,14 @@ const bst_config_desc bst_scenario_table[] = {
      .doc = "Version of the scenario format.",
      .offset = offsetof(bst_scenario, format),
      .size = sizeof(int64_t)},
+    {.key = "extends",
+     .type = BST_CONFIG_RAW,
+     .doc = "A scenario file, relative to this one's folder, whose values hold where this one says "
+            "nothing else: each key beside replaces that file's whole key."},
+    {.key = "set",
+     .type = BST_CONFIG_RAW,
+     .doc = "Only with extends: single values in place of that file's, by JSON pointer, as --set "
+            "takes them: {\"/observers/0/sensors/0/cue/offset_deg\": 0.1}."},
     BST_STRING(bst_scenario, name, "\"scenario\"", "Name of the scenario."),
     BST_STRING(bst_scenario, epoch_utc, NULL,
                "Start of the simulated time, UTC: YYYY-MM-DDThh:mm:ss[.f]Z."),
@@ -102,20 +110,38 @@ static void list_names(const bst_registry *registry, const char *role, char *buf
     }
 }
 
+/* The folder of a file: what relative paths in it start from. */
+static void folder_of(const char *file, char *folder, size_t bytes) {
+    const char *slash = strrchr(file, '/');
+    snprintf(folder, bytes, "%.*s", slash ? (int)(slash - file) : 1, slash ? file : ".");
+}
+
 /* Makes the path of a file that exists absolute, so that the resolved scenario can be run from any
- * folder. A file that does not exist is left to those who open it. */
-static bst_status resolve_path(bst_ctx *ctx, const bst_scenario *s, const char *where, char *path,
-                               size_t bytes) {
+ * folder. A file that does not exist is left to those who open it, from the folder of the scenario
+ * that names it; `must_exist`: it is an error, when the path is relative. */
+static bst_status resolve_path(bst_ctx *ctx, const bst_json *json, const bst_scenario *s,
+                               const char *where, bool must_exist, char *path, size_t bytes) {
     if (!*path) {
         return BST_OK;
     }
-    char joined[sizeof s->base_dir + 520];
+    char folder[sizeof s->base_dir], joined[sizeof folder + 520];
+    folder_of(bst_json_file(json, where), folder, sizeof folder);
     if (path[0] == '/') {
         snprintf(joined, sizeof joined, "%s", path);
     } else {
-        snprintf(joined, sizeof joined, "%s/%s", s->base_dir, path);
+        snprintf(joined, sizeof joined, "%s/%s", folder, path);
     }
     char *real = realpath(joined, NULL);
+    if (!real && path[0] != '/' && must_exist) {
+        return bst_fail(ctx, BST_ERR_CONFIG, "%s: %s: there is no file %s", s->file, where, joined);
+    }
+    if (!real && path[0] != '/' && strcmp(folder, s->base_dir) != 0) {
+        /* whoever opens it starts from base_dir */
+        real = realpath(folder, NULL);
+        snprintf(joined, sizeof joined, "%s/%s", real ? real : folder, path);
+        free(real);
+        real = strdup(joined);
+    }
     if (!real) {
         return BST_OK;
     }
@@ -145,27 +171,24 @@ static bool is_word(const bst_config_desc *desc, const char *path) {
 
 /* Makes the files that a table names absolute. `must_exist`: a file that is not there is an error,
  * outside of lists. */
-static bst_status resolve_paths(bst_ctx *ctx, const bst_scenario *s, const char *where,
-                                const bst_config_desc *table, void *object, bool must_exist) {
+static bst_status resolve_paths(bst_ctx *ctx, const bst_json *json, const bst_scenario *s,
+                                const char *where, const bst_config_desc *table, void *object,
+                                bool must_exist) {
     for (const bst_config_desc *d = table; d && d->key; d++) {
         char path[400];
         char *member = (char *)object + d->offset;
         snprintf(path, sizeof path, "%s/%s", where, d->key);
         if (d->type == BST_CONFIG_OBJECT) {
-            BST_TRY(resolve_paths(ctx, s, path, d->children, member, must_exist));
+            BST_TRY(resolve_paths(ctx, json, s, path, d->children, member, must_exist));
         } else if (d->type == BST_CONFIG_LIST) {
             const bst_config_list *list = (const void *)member;
             for (int i = 0; i < list->count; i++) {
                 snprintf(path, sizeof path, "%s/%s/%d", where, d->key, i);
-                BST_TRY(resolve_paths(ctx, s, path, d->children,
+                BST_TRY(resolve_paths(ctx, json, s, path, d->children,
                                       (char *)list->items + (size_t)i * d->item_bytes, false));
             }
         } else if (d->type == BST_CONFIG_PATH && *member && !is_word(d, member)) {
-            BST_TRY(resolve_path(ctx, s, path, member, d->size));
-            if (must_exist && member[0] != '/') {
-                return bst_fail(ctx, BST_ERR_CONFIG, "%s: %s: there is no file %s/%s", s->file,
-                                path, s->base_dir, member);
-            }
+            BST_TRY(resolve_path(ctx, json, s, path, must_exist, member, d->size));
         }
     }
     return BST_OK;
@@ -260,7 +283,8 @@ static bst_status read_module(bst_ctx *ctx, const bst_json *json, const bst_regi
                      : bst_fail(ctx, BST_ERR_MEMORY, "%s: out of memory", path);
     }
     if (status == BST_OK) {
-        status = resolve_paths(ctx, scenario, path, module->desc->config, module->config, true);
+        status =
+            resolve_paths(ctx, json, scenario, path, module->desc->config, module->config, true);
     }
     if (status == BST_OK) {
         module->rate_hz = common.rate_hz > 0.0 ? common.rate_hz : module->desc->default_rate_hz;
@@ -383,18 +407,27 @@ static bst_status check_names(bst_ctx *ctx, const bst_scenario *s) {
     return BST_OK;
 }
 
-bst_status bst_scenario_read(bst_ctx *ctx, const bst_json *json, const bst_registry *registry,
-                             bst_scenario *out) {
+static bst_status check_extended(bst_ctx *ctx, const bst_json *json) {
+    const cJSON *root = bst_json_root(json);
+    if (cJSON_GetObjectItemCaseSensitive(root, "extends")) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "%s: /extends: the file that it names has not been read; load the scenario "
+                        "with bst_json_load_extended",
+                        bst_json_name(json));
+    }
+    const cJSON *set = cJSON_GetObjectItemCaseSensitive(root, "set");
+    return !set ? BST_OK
+                : bst_config_fail(ctx, bst_json_name(json), "/set", set,
+                                  "there is nothing that it changes", "only beside \"extends\"");
+}
+
+static bst_status read_scenario(bst_ctx *ctx, const bst_json *json, const bst_registry *registry,
+                                bst_scenario *out) {
     memset(out, 0, sizeof *out);
+    BST_TRY(check_extended(ctx, json));
     BST_TRY(bst_config_read(ctx, json, bst_json_root(json), "", bst_scenario_table, out));
     snprintf(out->file, sizeof out->file, "%s", bst_json_name(json));
-    snprintf(out->base_dir, sizeof out->base_dir, "%s", out->file);
-    char *slash = strrchr(out->base_dir, '/');
-    if (slash) {
-        *slash = '\0';
-    } else {
-        snprintf(out->base_dir, sizeof out->base_dir, ".");
-    }
+    folder_of(out->file, out->base_dir, sizeof out->base_dir);
     if (bst_time_from_utc(ctx, out->epoch_utc, &out->epoch) != BST_OK) {
         return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: /epoch_utc", out->file);
     }
@@ -407,8 +440,17 @@ bst_status bst_scenario_read(bst_ctx *ctx, const bst_json *json, const bst_regis
     }
     BST_TRY(prepare_cameras(ctx, out));
     BST_TRY(check_names(ctx, out));
-    BST_TRY(resolve_paths(ctx, out, "", bst_scenario_table, out, false));
+    BST_TRY(resolve_paths(ctx, json, out, "", bst_scenario_table, out, false));
     return read_modules(ctx, json, registry, out);
+}
+
+bst_status bst_scenario_read(bst_ctx *ctx, const bst_json *json, const bst_registry *registry,
+                             bst_scenario *out) {
+    bst_status status = read_scenario(ctx, json, registry, out);
+    if (status != BST_OK) {
+        bst_json_name_file(ctx, json);
+    }
+    return status;
 }
 
 void bst_scenario_free(bst_scenario *s) {
@@ -502,6 +544,27 @@ static cJSON *module_schema(const bst_module_desc *m) {
     return node;
 }
 
+/* A scenario that extends another needs nothing else; only such a one has "set". */
+static void extended_schema(cJSON *root, cJSON *properties) {
+    cJSON *extends = cJSON_GetObjectItemCaseSensitive(properties, "extends");
+    cJSON *set = cJSON_GetObjectItemCaseSensitive(properties, "set");
+    cJSON_AddStringToObject(extends, "type", "string");
+    cJSON_AddStringToObject(set, "type", "object");
+    cJSON *names = cJSON_AddObjectToObject(set, "propertyNames");
+    cJSON_AddStringToObject(names, "pattern", "^/");
+    cJSON *needed = cJSON_CreateArray();
+    cJSON_AddItemToArray(needed, cJSON_CreateString("extends"));
+    cJSON *either = cJSON_AddArrayToObject(root, "anyOf");
+    for (int own = 0; own < 2; own++) {
+        cJSON *choice = cJSON_CreateObject();
+        cJSON_AddItemToObject(choice, "required",
+                              own ? cJSON_DetachItemFromObjectCaseSensitive(root, "required")
+                                  : cJSON_Duplicate(needed, 1));
+        cJSON_AddItemToArray(either, choice);
+    }
+    cJSON_AddItemToObject(cJSON_AddObjectToObject(root, "dependentRequired"), "set", needed);
+}
+
 cJSON *bst_scenario_schema(const bst_registry *registry) {
     cJSON *root = cJSON_CreateObject();
     cJSON_AddStringToObject(root, "$schema", "https://json-schema.org/draft/2020-12/schema");
@@ -514,6 +577,7 @@ cJSON *bst_scenario_schema(const bst_registry *registry) {
     cJSON_Delete(table);
     cJSON *properties = cJSON_GetObjectItemCaseSensitive(root, "properties");
     cJSON_AddStringToObject(cJSON_AddObjectToObject(properties, "$schema"), "type", "string");
+    extended_schema(root, properties);
     cJSON *node = cJSON_GetObjectItemCaseSensitive(properties, "observers");
     const char *const down[] = {"items", "properties", "sensors", "items", "properties", "modules"};
     for (size_t i = 0; i < sizeof down / sizeof *down; i++) {

@@ -32,13 +32,16 @@ bst_status bst_cue_resolve(bst_ctx *ctx, const char *scenario, bst_world *world,
             "%s: /observers/%d/sensors/%d/cue/object: there is no object \"%s\" in /world/objects",
             scenario, observer, sensor, cue->object);
     }
+    /* as the onboard side reckons it: with its clock, from where it believes to be */
     bst_vec3 nominal;
     bst_state eye;
+    double now_s = bst_believed_seconds(world, observer, sensor, 0.0);
     bst_status status = bst_orbit_state(ctx, &world->observers[observer].orbit, clock, world->epoch,
-                                        0.0, true, &eye);
+                                        now_s, true, &eye);
     if (status == BST_OK) {
+        bst_believe(world, observer, sensor, now_s, &eye);
         status =
-            bst_cue_nominal_direction(ctx, world, observer, sensor, clock, 0.0, &eye, &nominal);
+            bst_cue_nominal_direction(ctx, world, observer, sensor, clock, now_s, &eye, &nominal);
     }
     if (status != BST_OK) {
         return bst_fail_prefix(ctx, status == BST_ERR_NUMERIC ? BST_ERR_CONFIG : status,

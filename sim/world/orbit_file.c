@@ -121,9 +121,11 @@ bst_status bst_orbit_file_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_cl
     return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "orbit of %s", orbit->name);
 }
 
-/* Fails unless the file that the orbit, or what it is relative to, comes from covers the run. */
+/* Fails unless the file that the orbit, or what it is relative to, comes from covers the run, and
+ * the run as a clock shows it that is clock_offset_s ahead. */
 static bst_status check_span(bst_ctx *ctx, const char *scenario, const bst_world *world,
-                             const bst_orbit *orbit, double duration_s, const char *path) {
+                             const bst_orbit *orbit, double duration_s, double clock_offset_s,
+                             const char *path) {
     while (orbit->reference) {
         orbit = orbit->reference;
     }
@@ -131,18 +133,21 @@ static bst_status check_span(bst_ctx *ctx, const char *scenario, const bst_world
     if (!oem && orbit->source != BST_ORBIT_INJECTED) {
         return BST_OK;
     }
-    bool covers = oem ? bst_oem_covers(orbit->oem, orbit->file_object, world->epoch,
-                                       bst_time_add(world->epoch, duration_s))
-                      : orbit->from_s <= IDLE_S && orbit->to_s >= duration_s - IDLE_S;
+    double from_s = fmin(0.0, clock_offset_s), to_s = duration_s + fmax(0.0, clock_offset_s);
+    bool covers =
+        oem ? bst_oem_covers(orbit->oem, orbit->file_object, bst_time_add(world->epoch, from_s),
+                             bst_time_add(world->epoch, to_s))
+            : orbit->from_s <= from_s + IDLE_S && orbit->to_s >= to_s - IDLE_S;
     if (covers) {
         return BST_OK;
     }
-    bool gap = orbit->from_s <= 0.0 && orbit->to_s >= duration_s;
+    bool gap = orbit->from_s <= from_s && orbit->to_s >= to_s;
     return bst_fail(ctx, BST_ERR_CONFIG,
                     "%s: %s: the states of \"%s\" do not cover the run (found %.6g s to %.6g s "
-                    "after the epoch%s; needed: 0 s to %.6g s)",
+                    "after the epoch%s; needed: %.6g s to %.6g s%s)",
                     scenario, path, orbit->name, orbit->from_s, orbit->to_s,
-                    gap ? ", with a gap" : "", duration_s);
+                    gap ? ", with a gap" : "", from_s, to_s,
+                    clock_offset_s != 0.0 ? ", with the onboard clock's offset" : "");
 }
 
 bst_status bst_world_check_spans(bst_ctx *ctx, const char *scenario, const bst_world *world,
@@ -150,14 +155,15 @@ bst_status bst_world_check_spans(bst_ctx *ctx, const char *scenario, const bst_w
     char path[96];
     for (int i = 0; i < world->observer_count; i++) {
         const world_observer *observer = &world->observers[i];
-        snprintf(path, sizeof path, "/observers/%d/orbit", i);
-        BST_TRY(check_span(ctx, scenario, world, &observer->orbit, duration_s, path));
         for (int s = 0; s < observer->sensor_count; s++) {
             int cue = observer->sensors[s].cue_object;
+            double offset_s = observer->sensors[s].config.knowledge.clock_offset_s;
+            snprintf(path, sizeof path, "/observers/%d/orbit", i);
+            BST_TRY(check_span(ctx, scenario, world, &observer->orbit, duration_s, offset_s, path));
             snprintf(path, sizeof path, "/observers/%d/sensors/%d/cue/object", i, s);
             if (cue >= 0) {
-                BST_TRY(
-                    check_span(ctx, scenario, world, &world->objects[cue].orbit, duration_s, path));
+                BST_TRY(check_span(ctx, scenario, world, &world->objects[cue].orbit, duration_s,
+                                   offset_s, path));
             }
         }
     }

@@ -41,8 +41,8 @@ const char *bst_world_observer_name(const bst_world *world, int observer);
 /* The sensor's true camera. */
 const bst_camera *bst_world_camera(const bst_world *world, int observer, int sensor);
 
-/* Body attitude that the spacecraft starts in and holds: +z towards the (erroneous) cue at the
- * epoch, +x as near as can be to the sensor's x_axis_gcrf. The camera has these axes when both
+/* Body attitude that the spacecraft starts in and holds: +z towards the cue at the epoch as the
+ * onboard side reckons it, with all its errors, +x as near as can be to the sensor's x_axis_gcrf. The camera has these axes when both
  * gimbal angles are zero. */
 bst_quat bst_world_body_attitude(const bst_world *world, int observer, int sensor);
 

@@ -162,7 +162,8 @@ bst_status bst_world_create(bst_ctx *ctx, const char *scenario, const bst_world_
                             struct bst_world **out) BST_MUST_CHECK;
 /* Checks that the files of states that observers and cued objects come from cover a run from the
  * epoch on (given frame by frame: but for 2.5 s at either end). BST_ERR_CONFIG with file, JSON path
- * and both spans. Other objects may come and go: they are not there outside their files. */
+ * and both spans. Other objects may come and go: they are not there outside their files.
+ * A clock that is wrong shows other times: those are needed, too. */
 bst_status bst_world_check_spans(bst_ctx *ctx, const char *scenario, const struct bst_world *world,
                                  double duration_s) BST_MUST_CHECK;
 void bst_world_free(struct bst_world *world);

@@ -115,10 +115,10 @@ static void exact_messages(void **state) {
     refuse("/boresight=\"1\"", "/boresight: wrong type (found \"1\"; allowed: 1)");
     refuse("/boresight=null", "/boresight: wrong type (found null; allowed: 1)");
     refuse("/duration=60", "/duration: unknown key; did you mean \"duration_s\"?");
-    refuse(
-        "/zzz=60",
-        "/zzz: unknown key (allowed: boresight, name, epoch_utc, duration_s, tick_rate_hz, seed, "
-        "run, world, observers, record)");
+    refuse("/zzz=60",
+           "/zzz: unknown key (allowed: boresight, extends, set, name, epoch_utc, duration_s, "
+           "tick_rate_hz, seed, "
+           "run, world, observers, record)");
     refuse("/duration_s=NaN",
            "/duration_s: wrong type (found \"NaN\"; allowed: a number from 0 to 1000000000 s)");
     refuse("/duration_s=-1",

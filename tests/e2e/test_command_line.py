@@ -17,7 +17,8 @@ try:
 except ImportError:
     jsonschema = None
 
-SCENARIOS = sorted(set(glob.glob("scenarios/*.json")) - {"scenarios/boresight.schema.json"})
+SCENARIOS = sorted(set(glob.glob("scenarios/**/*.json", recursive=True)) -
+                   {"scenarios/boresight.schema.json"})
 GIMBAL = runs.SENSOR + "/modules/gimbal"
 
 
@@ -57,6 +58,21 @@ class Messages(unittest.TestCase):
         self.fails(2, '"x" is not expected here', "schema", "x")
         self.fails(2, "--start is missing", "propagate")
 
+    def test_distortion_beyond_the_wcs(self):
+        # a barrel of 900 (12.1 arcmin * sqrt 2)^2 = 10 % in the corners: 0.05 px (conventions.md)
+        out = runs.scratch() + "/run"
+        result = call(*runs.command(runs.TRACK, out, runs.SENSOR + '/camera/distortion={"k1": -900}',
+                                    duration=1)[1:])
+        self.assertEqual(result.returncode, 0, result.stderr)
+        found = re.findall(r"^boresight: warning: neossat/telescope: the WCS of its frames misfits the "
+                           r"camera's distortion by up to ([0-9.e-]+) px: ", result.stderr, re.M)
+        self.assertEqual(len(found), 1, result.stderr)
+        manifest = runs.manifest(out)
+        misfit = manifest["wcs_misfit_px"]["neossat/telescope"]
+        self.assertAlmostEqual(float(found[0]), misfit, delta=0.0005)  # two digits
+        self.assertTrue(0.02 < misfit < 0.1, misfit)  # the order of the documented figure
+        self.assertEqual(manifest["warnings"], 1)
+
     def test_bad_values(self):
         self.bad_set("/world/object=3", ': /world/object: unknown key; did you mean "objects"')
         self.bad_set("/duration_s=-1", r": /duration_s: out of range \(found -1; allowed: .*from 0")
@@ -67,8 +83,12 @@ class Messages(unittest.TestCase):
                      '"three_axis" .*"two_axis"')
         self.bad_set(GIMBAL + "/rate_hz=999", f": {GIMBAL}/rate_hz: .*857.142857 and 1000 Hz")
         self.bad_set(GIMBAL + "/platform/history_s=0.4", ": neossat/telescope/gimbal: platform/"
-                     r"history_s: 0\.4 s do not cover the sensor's exposure/exposure_s of 0\.5 s; "
-                     "make history_s at least as long")
+                     r"history_s: 0\.4 s do not cover the longest exposure_s of this sensor, 0\.5 s "
+                     r"\(its exposure's, or what control commands\); make history_s at least as "
+                     "long")
+        self.bad_set(GIMBAL.replace("gimbal", "control") + "/exposure_s=4.5",
+                     r": neossat/telescope/gimbal: platform/history_s: 4 s do not cover the longest "
+                     r"exposure_s of this sensor, 4\.5 s \(")
         self.bad_set("/record={\"frames\": \"cube\", \"compression\": \"rice\"}",
                      ': /record/compression: "rice" compresses frames in extensions only; ')
         self.bad_set(GIMBAL + "/platform/jitter_high_band_hz=[5]", r": .*/platform/jitter_high_band_hz: wrong type \(found \[5\]; "
@@ -241,7 +261,96 @@ class Schema(unittest.TestCase):
     def test_scenarios_name_the_schema(self):
         for path in SCENARIOS:
             with open(path, encoding="utf-8") as file:
-                self.assertEqual(json.load(file)["$schema"], "boresight.schema.json", path)
+                schema = json.load(file)["$schema"]
+            self.assertEqual(os.path.normpath(os.path.join(os.path.dirname(path), schema)),
+                             "scenarios/boresight.schema.json", path)
+
+
+class Extended(unittest.TestCase):
+    """A scenario that extends another is that one with some values changed."""
+
+    def setUp(self):
+        self.folder = runs.scratch()
+
+    def write(self, file_name, /, **values):
+        path = os.path.join(self.folder, file_name)
+        os.makedirs(os.path.dirname(path), exist_ok=True)
+        with open(path, "w", encoding="utf-8") as file:
+            json.dump(values, file)
+        return path
+
+    def test_it_is_the_other_with_values_changed(self):
+        shipped = json.loads(call("check", "scenarios/knowledge/clock.json").stdout)
+        by_hand = json.loads(call("check", runs.TRACK, "--duration", "120", "--set",
+                                  "/name=knowledge_clock", "--set", runs.SENSOR +
+                                  "/knowledge/clock_offset_s=1").stdout)
+        self.assertEqual(shipped, by_hand)
+        self.assertFalse({"extends", "set"} & set(shipped))
+
+    def test_the_resolved_one_stands_alone(self):
+        for scenario in ("scenarios/knowledge/psf.json", "scenarios/oem_orbits.json"):
+            alone = self.write("alone.json", **json.loads(call("check", scenario).stdout))
+            result = call("check", alone, cwd="/")
+            self.assertEqual((result.returncode, result.stderr), (0, ""))
+            with open(alone, encoding="utf-8") as file:
+                self.assertEqual(json.loads(result.stdout), json.load(file))
+
+    def test_paths_start_from_the_file_that_names_them(self):
+        track, elements = os.path.abspath(runs.TRACK), os.path.abspath("scenarios/catalogue_2022-06.tle")
+        orbit = "/observers/0/orbit/elements_file"
+        with open(elements, encoding="ascii") as file:
+            text = file.read()
+        for name in ("a/own.tle", "b/own.tle"):
+            self.write(name)
+            with open(os.path.join(self.folder, name), "w", encoding="ascii") as file:
+                file.write(text)
+        self.write("a/base.json", extends=track, set={orbit: "own.tle"})
+        path = self.write("b/top.json", extends="../a/base.json")
+        found = lambda *words: json.loads(call("check", path, *words).stdout)
+        self.assertEqual(found()["observers"][0]["orbit"]["elements_file"],
+                         os.path.realpath(os.path.join(self.folder, "a/own.tle")))
+        self.assertEqual(found()["world"]["objects"][0]["orbit"]["elements_file"], elements)
+        self.assertEqual(found("--set", orbit + "=own.tle")["observers"][0]["orbit"]["elements_file"],
+                         os.path.realpath(os.path.join(self.folder, "b/own.tle")))
+
+    def fails(self, path, message):
+        for words in (("check", path), ("run", path, "--out", os.path.join(self.folder, "run"))):
+            result = call(*words)
+            self.assertEqual((result.returncode, result.stdout), (1, ""))
+            self.assertIn(message, result.stderr)
+            self.assertFalse(os.path.exists(os.path.join(self.folder, "run")))
+
+    def test_messages_name_the_file_at_fault(self):
+        track = os.path.abspath(runs.TRACK)
+        scale, cue = runs.SENSOR + "/camera/pixel_scale_arcsec", runs.SENSOR + "/cue/object"
+        base = self.write("base.json", extends=track, set={scale: -1})
+        path = self.write("top.json", extends="base.json", duration_s=7)
+        self.fails(path, f"boresight: {base}: {scale}: out of range (found -1; ")
+        path = self.write("top.json", extends="base.json", set={scale: 3, "/duration_s": -2})
+        self.fails(path, f"boresight: {path}: /duration_s: out of range (found -2; ")
+        # what only the world finds
+        base = self.write("base.json", extends=track, set={cue: "nobody"})
+        path = self.write("top.json", extends="base.json", duration_s=7)
+        self.fails(path, f'boresight: {base}: {cue}: there is no object "nobody" ')
+        base = self.write("base.json", extends=track,
+                          set={"/world/objects/0/orbit/elements_file": "gone.tle"})
+        path = self.write("sub/top.json", extends="../base.json")
+        self.fails(path, f"{self.folder}/gone.tle: cannot be opened: No such file")
+        base = self.write("base.json", extends=track,
+                          set={runs.SENSOR + "/modules/imgproc/dark_file": "gone.fits"})
+        self.fails(path, f"{self.folder}/sub/../base.json: {runs.SENSOR}/modules/imgproc/dark_file: "
+                   f"there is no file {self.folder}/sub/../gone.fits")
+        self.fails(self.write("x.json", extends="x.json"), "x.json extends itself by way of 1 file")
+        whole = json.loads(call("check", runs.TRACK).stdout)
+        self.fails(self.write("x.json", set={"/duration_s": 3}, **whole),
+                   'x.json: /set: there is nothing that it changes (found {"/duration_s":3}; allowed: '
+                   'only beside "extends")')
+
+    def test_overrides_come_last(self):
+        result = call("check", "scenarios/knowledge/clock.json", "--set", runs.SENSOR +
+                      "/knowledge/clock_offset_s=-1e9")
+        self.assertIn(f"scenarios/knowledge/clock.json: {runs.SENSOR}/knowledge/clock_offset_s: out of "
+                      "range (found -1", result.stderr)
 
 
 def tearDownModule():

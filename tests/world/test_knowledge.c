@@ -118,6 +118,26 @@ static void a_clock_offset_shifts_the_cue_by_its_rate(void **state) {
     drop(&right);
 }
 
+/* The spacecraft starts with +z where the onboard side reckons the cue, its errors in it. */
+static void the_start_follows_what_is_believed(void **state) {
+    (void)state;
+    static const char *const blocks[] = {
+        "", "\"clock_offset_s\": 2", "\"orbit\": {\"position_rtn_m\": [0, 10000, 300]}",
+        "\"clock_offset_s\": -1, \"orbit\": {\"along_track_mps\": 5000}",
+        "\"orbit\": {\"velocity_rtn_mps\": [0, 1000, 0]}"};
+    const bool moves[] = {false, true, true, true, false};
+    bst_vec3 right = {0};
+    for (int i = 0; i < 5; i++) {
+        scene s = make(blocks[i]);
+        bst_quat q = bst_world_body_attitude(s.world, 0, 0);
+        bst_vec3 z = bst_quat_rotate(bst_quat_conj(q), (bst_vec3){0, 0, 1});
+        bst_assert_close(test_distance(z, cue_at(&s, 0).direction_gcrf), 0, 1e-14); /* rounding */
+        right = i == 0 ? z : right;
+        assert_true(moves[i] == (test_distance(z, right) > 1e-5));
+        drop(&s);
+    }
+}
+
 /* 1 km/s across the line of sight is 1000 / 299792458 rad = 0.688 arcsec of aberration. */
 static void a_velocity_error_is_aberration(void **state) {
     (void)state;
@@ -238,6 +258,7 @@ int main(void) {
         cmocka_unit_test(the_truth_by_default),
         cmocka_unit_test(an_orbit_error_moves_the_cue_by_the_parallax),
         cmocka_unit_test(a_clock_offset_shifts_the_cue_by_its_rate),
+        cmocka_unit_test(the_start_follows_what_is_believed),
         cmocka_unit_test(a_velocity_error_is_aberration),
         cmocka_unit_test(the_camera_may_be_known_wrongly),
         cmocka_unit_test(stars_are_dropped_and_displaced),

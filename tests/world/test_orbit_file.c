@@ -60,8 +60,8 @@ static const char *write_states(scratch *s, const char *name, double to_s) {
     return path;
 }
 
-static bst_status make(bst_ctx *ctx, const char *oem, const char *states, const char *more,
-                       bst_world **out) {
+static bst_status make_late(bst_ctx *ctx, const char *oem, const char *states, const char *more,
+                            double clock_offset_s, bst_world **out) {
     char text[6000];
     snprintf(text, sizeof text,
              "{\"world\": {\"star_catalogue\": \"embedded\", \"objects\": [{\"name\": \"target\", "
@@ -70,9 +70,16 @@ static bst_status make(bst_ctx *ctx, const char *oem, const char *states, const 
              "}, {\"name\": \"beside\", \"orbit\": {\"source\": "
              "\"relative\", \"reference\": \"target\", \"offset_rtn_m\": [0, 0, 1000]}}]}, "
              "\"observers\": [{\"name\": \"eye\", \"orbit\": {\"source\": \"oem\", \"oem_file\": "
-             "\"%s\"}, \"sensors\": [{" TEST_CAMERA ", \"cue\": {\"object\": \"beside\"}}]}]}",
-             states, more, oem);
+             "\"%s\"}, \"sensors\": [{" TEST_CAMERA
+             ", \"cue\": {\"object\": \"beside\"}, "
+             "\"knowledge\": {\"clock_offset_s\": %g}}]}]}",
+             states, more, oem, clock_offset_s);
     return test_world_try(ctx, TEST_EPOCH, text, out);
+}
+
+static bst_status make(bst_ctx *ctx, const char *oem, const char *states, const char *more,
+                       bst_world **out) {
+    return make_late(ctx, oem, states, more, 0.0, out);
 }
 
 static void an_oem_observer_sees_an_injected_target(void **state) {
@@ -121,6 +128,19 @@ static void an_oem_observer_sees_an_injected_target(void **state) {
     assert_string_equal(ctx.message,
                         "test: /observers/0/orbit: the states of \"eye\" do not cover the run "
                         "(found 0 s to 120 s after the epoch; needed: 0 s to 121 s)");
+    bst_world_free(world);
+    /* the onboard side evaluates the orbits by its own clock */
+    bst_assert_ok(&ctx, make_late(&ctx, oem, states, "", 30.0, &world));
+    bst_assert_ok(&ctx, bst_world_check_spans(&ctx, "test", world, 89.5));
+    assert_int_equal(bst_world_check_spans(&ctx, "test", world, 100.0), BST_ERR_CONFIG);
+    assert_string_equal(ctx.message,
+                        "test: /observers/0/orbit: the states of \"eye\" do not cover the run "
+                        "(found 0 s to 120 s after the epoch; needed: 0 s to 130 s, with the "
+                        "onboard clock's offset)");
+    bst_world_free(world);
+    bst_assert_ok(&ctx, make_late(&ctx, oem, states, "", -3.0, &world));
+    assert_int_equal(bst_world_check_spans(&ctx, "test", world, 10.0), BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "needed: -3 s to 10 s, with the onboard clock's offset)"));
     bst_world_free(world);
 
     assert_int_equal(make(&ctx, oem, states, ", \"states_object\": \"U\"", &world), BST_ERR_CONFIG);

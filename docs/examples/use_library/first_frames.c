@@ -65,7 +65,7 @@ static bst_status run(bst_ctx *ctx, const char *path, int64_t frames) {
     bst_json *json = NULL;
     bst_scenario scenario;
     bst_simulation *simulation = NULL;
-    BST_TRY(bst_json_load(ctx, path, &json));
+    BST_TRY(bst_json_load_extended(ctx, path, &json));
     bst_status status = bst_json_set(ctx, json, "/record/frames=none");
     if (status == BST_OK) {
         status = bst_scenario_read(ctx, json, bst_app_registry(), &scenario);

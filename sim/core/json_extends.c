@@ -1,0 +1,207 @@
+/* JSON files that are another one with some values changed. */
+#define _XOPEN_SOURCE 700 /* realpath */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cjson/cJSON.h>
+
+#include "sim/core/json_internal.h"
+
+enum { MAX_FILES = 16 };
+
+/* The files on the way, each extended by the one before. */
+typedef struct file_chain {
+    char *files[MAX_FILES]; /* full paths */
+    int count;
+} file_chain;
+
+/* Several slashes in a row are one, as where a pointer is followed. */
+static const char *last_slash(const char *p) {
+    return p[0] == '/' && p[1] == '/' ? last_slash(p + 1) : p;
+}
+
+/* Whether one of two pointers leads to the other's value or into it. */
+static bool one_way(const char *a, const char *b) {
+    for (; *a && *b; a++, b++) {
+        a = last_slash(a);
+        b = last_slash(b);
+        if (*a != *b) {
+            return false;
+        }
+    }
+    return (!*a && !*b) || *a == '/' || *b == '/';
+}
+
+const char *bst_json_file(const bst_json *json, const char *pointer) {
+    for (int i = json->origin_count - 1; i >= 0; i--) {
+        const char *own = json->origins[i].pointer;
+        if (!*own || one_way(own, pointer)) {
+            return json->origins[i].file;
+        }
+    }
+    return json->name;
+}
+
+void bst_json_name_file(bst_ctx *ctx, const bst_json *json) {
+    size_t length = strlen(json->name);
+    if (!json->origins || strncmp(ctx->message, json->name, length) != 0 ||
+        strncmp(ctx->message + length, ": /", 3) != 0) {
+        return;
+    }
+    char pointer[BST_MESSAGE_BYTES];
+    const char *from = ctx->message + length + 2, *end = strstr(from, ": ");
+    snprintf(pointer, sizeof pointer, "%.*s", end ? (int)(end - from) : (int)strlen(from), from);
+    bst_fail(ctx, BST_OK, "%s: %s", bst_json_file(json, pointer), from);
+}
+
+bst_status bst_json_note_origin(bst_ctx *ctx, bst_json *json, const char *pointer,
+                                const char *file) {
+    bst_json_origin *origins =
+        realloc(json->origins, ((size_t)json->origin_count + 1) * sizeof *origins);
+    if (!origins) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
+    }
+    json->origins = origins;
+    bst_json_origin *origin = &origins[json->origin_count];
+    *origin = (bst_json_origin){strdup(pointer), strdup(file)};
+    if (!origin->pointer || !origin->file) {
+        free(origin->pointer);
+        free(origin->file);
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
+    }
+    json->origin_count++;
+    return BST_OK;
+}
+
+/* Moves the values of `node`, by top-level key or by pointer, into `json`, whose name is that of
+ * the file they come from. */
+static bst_status move_values(bst_ctx *ctx, cJSON *node, bool by_pointer, bst_json *json) {
+    const char *file = json->name;
+    while (node->child) {
+        cJSON *value = cJSON_DetachItemViaPointer(node, node->child);
+        char pointer[512];
+        size_t length =
+            (size_t)snprintf(pointer, sizeof pointer, "%s%s", by_pointer ? "" : "/", value->string);
+        if (pointer[0] != '/' || length == strspn(pointer, "/") || length >= sizeof pointer ||
+            (!by_pointer && strchr(pointer + 1, '/'))) {
+            cJSON_Delete(value);
+            return by_pointer
+                       ? bst_fail(ctx, BST_ERR_CONFIG,
+                                  "%s: /set: \"%.60s\" is no JSON pointer (allowed: \"/\" and keys "
+                                  "or numbers of elements with \"/\" between them)",
+                                  file, pointer)
+                       : bst_fail(ctx, BST_ERR_CONFIG, "%s: %.60s: unknown key", file, pointer);
+        }
+        if (bst_json_assign(ctx, json, pointer, value) != BST_OK) {
+            return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: /set: %.200s", file, pointer);
+        }
+        BST_TRY(bst_json_note_origin(ctx, json, pointer, file));
+    }
+    return BST_OK;
+}
+
+/* Changes `base` as `own` says. */
+static bst_status apply(bst_ctx *ctx, bst_json *own, bst_json *base) {
+    if (!base->origins) {
+        BST_TRY(bst_json_note_origin(ctx, base, "", base->name));
+    }
+    char *name = base->name;
+    base->name = own->name;
+    own->name = name; /* each is freed with its document */
+    cJSON_DeleteItemFromObjectCaseSensitive(own->root, "extends");
+    cJSON *set = cJSON_DetachItemFromObjectCaseSensitive(own->root, "set");
+    bst_status status = BST_OK;
+    if (set && !cJSON_IsObject(set)) {
+        status = bst_config_fail(ctx, base->name, "/set", set, "wrong type",
+                                 "an object of values by JSON pointer");
+    }
+    if (status == BST_OK) {
+        status = move_values(ctx, own->root, false, base);
+    }
+    if (status == BST_OK && set) {
+        status = move_values(ctx, set, true, base);
+    }
+    cJSON_Delete(set);
+    return status;
+}
+
+static bst_status add_link(bst_ctx *ctx, const char *path, file_chain *chain) {
+    char *full = realpath(path, NULL);
+    if (!full) {
+        return BST_OK; /* who reads the file says why */
+    }
+    for (int i = 0; i < chain->count; i++) {
+        if (strcmp(chain->files[i], full) == 0) {
+            free(full);
+            return bst_fail(ctx, BST_ERR_CONFIG, "%.400s extends itself by way of %d file%s", path,
+                            chain->count - i, chain->count - i == 1 ? "" : "s");
+        }
+    }
+    if (chain->count == MAX_FILES) {
+        free(full);
+        return bst_fail(ctx, BST_ERR_CONFIG, "more than %d files extend each other", MAX_FILES);
+    }
+    chain->files[chain->count++] = full;
+    return BST_OK;
+}
+
+/* NULL when there is no memory. */
+static char *beside(const char *file, const char *given) {
+    const char *slash = strrchr(file, '/');
+    size_t folder = given[0] == '/' || !slash ? 0 : (size_t)(slash + 1 - file);
+    size_t bytes = folder + strlen(given) + 1;
+    char *path = malloc(bytes);
+    if (path) {
+        snprintf(path, bytes, "%.*s%s", (int)folder, file, given);
+    }
+    return path;
+}
+
+static bst_status load(bst_ctx *ctx, const char *path, file_chain *chain, bst_json **out) {
+    BST_TRY(add_link(ctx, path, chain));
+    BST_TRY(bst_json_load(ctx, path, out));
+    bst_json *own = *out;
+    const cJSON *extends = cJSON_GetObjectItemCaseSensitive(own->root, "extends");
+    if (!extends) {
+        return BST_OK;
+    }
+    *out = NULL;
+    bst_json *base = NULL;
+    bst_status status;
+    if (!cJSON_IsString(extends) || !extends->valuestring[0]) {
+        status = bst_config_fail(ctx, path, "/extends", extends, "wrong type",
+                                 "a string, the file that this one changes");
+    } else {
+        char *file = beside(path, extends->valuestring);
+        status =
+            file ? load(ctx, file, chain, &base) : bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
+        free(file);
+        if (status != BST_OK) {
+            bst_fail_prefix(ctx, status, "%.400s: /extends", path);
+        } else if (!cJSON_IsObject(base->root)) {
+            status = bst_config_fail(ctx, path, "/extends", extends, "its value is no object",
+                                     "a file whose value is one");
+        }
+    }
+    if (status == BST_OK) {
+        status = apply(ctx, own, base);
+    }
+    bst_json_free(own);
+    if (status != BST_OK) {
+        bst_json_free(base);
+        return status;
+    }
+    *out = base;
+    return BST_OK;
+}
+
+bst_status bst_json_load_extended(bst_ctx *ctx, const char *path, bst_json **out) {
+    *out = NULL;
+    file_chain chain = {.count = 0};
+    bst_status status = load(ctx, path, &chain, out);
+    for (int i = 0; i < chain.count; i++) {
+        free(chain.files[i]);
+    }
+    return status;
+}
