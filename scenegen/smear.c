@@ -458,11 +458,11 @@ static bst_status own_nodes(bst_ctx *ctx, bst_smear *s, int count, double x0, do
     return BST_OK;
 }
 
-/* Puts all the points of a disc on the scratch nodes, which are those of its middle about (x, y).
- */
-static bst_status spread_shape(bst_ctx *ctx, bst_smear *s, const bst_source *source, double x,
+/* Makes the points of a disc; the scratch nodes are those of its middle about (x, y). *peak: share
+ * of the light on one pixel at most, without the smear. */
+static bst_status shape_points(bst_ctx *ctx, bst_smear *s, const bst_source *source, double x,
                                double y, double *peak) {
-    enum { MOST_NODES = 3000000 };
+    enum { MOST_NODES = 2000000 };
     double x0 = x, y0 = y, low[2] = {0.0, 0.0}, high[2] = {0.0, 0.0};
     (void)project(s, s->q_reference, source->apparent_mid, &x0, &y0);
     for (int n = 0; n < s->nodes.count; n++) {
@@ -492,7 +492,7 @@ static bst_status spread_shape(bst_ctx *ctx, bst_smear *s, const bst_source *sou
         .min_y_px = (general ? -all : -cy - margin) - high[1],
         .max_y_px = (general ? all : (double)s->camera.height_px - cy + margin) - low[1],
         .most_points = MOST_NODES / (s->nodes.count > 0 ? s->nodes.count : 1)};
-    return bst_shape_spread(ctx, source, &view, s->stretch, &s->points, &s->nodes, peak);
+    return bst_shape_points(ctx, source, &view, &s->points, peak);
 }
 
 bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source,
@@ -524,13 +524,13 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
         double share = largest_share(s), peak;
         if (source->shape) {
             BST_TRY(own_nodes(ctx, s, count, x, y, s->tolerance[0]));
-            BST_TRY(spread_shape(ctx, s, source, x, y, &peak));
+            BST_TRY(shape_points(ctx, s, source, x, y, &peak));
             share = fmin(share, peak);
         }
         s->last_peak_e = electrons * share;
         BST_TRY(own_nodes(ctx, s, count, x, y, s->tolerance[choose_level(s, s->last_peak_e)]));
         if (source->shape) {
-            BST_TRY(spread_shape(ctx, s, source, x, y, &peak));
+            BST_TRY(bst_shape_spread(ctx, &s->points, s->stretch, &s->nodes));
         }
         if (s->nodes.count == 0) {
             *visible = false;
