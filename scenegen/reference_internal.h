@@ -9,13 +9,6 @@
 bool bst_reference_place(const bst_camera *camera, const bst_los_track *track, const bst_source *s,
                          int k, double u, double *x, double *y, double *light);
 
-/* The source's rate there, over its mean of the exposure. */
-static inline double bst_reference_rate(const bst_los_track *track, const bst_source *s, int k,
-                                        double u) {
-    double t = track->time_s[k] + u * (track->time_s[k + 1] - track->time_s[k]);
-    return bst_source_rate_at(s, t / track->time_s[track->count - 1]);
-}
-
 /* The image by any PSF, without vignetting; see bst_reference_render_psf. */
 bst_status bst_reference_spectrum(bst_ctx *ctx, const bst_camera *camera, const bst_psf *psf,
                                   bst_window window, const bst_los_track *track,
