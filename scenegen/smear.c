@@ -21,7 +21,7 @@ typedef struct level {
 struct bst_smear {
     bst_camera camera;
     bst_smear_options options;
-    double sigma_px, share_sigma_px;
+    double sigma_px, share_sigma_px, widest;
     double tail[MAX_TAPS / 2]; /* profile at r px from the centre, over the centre's */
     double kept[MAX_TAPS / 2]; /* light within the two nearest pixels and r more on each side */
     double tolerance[LEVELS];
@@ -65,6 +65,7 @@ bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
     s->options = *options;
     s->sigma_px =
         options->node_sigma_px > 0.0 ? options->node_sigma_px : bst_camera_psf_sigma_px(camera);
+    s->widest = options->widest > 0.0 ? options->widest : BST_NODE_WIDEST;
     s->share_sigma_px = options->share_sigma_px > 0.0 ? options->share_sigma_px : s->sigma_px;
     double centre = bst_reference_pixel_share(0.0, s->sigma_px, 0);
     for (int r = 0; r < MAX_TAPS / 2; r++) {
@@ -212,8 +213,8 @@ static bst_status make_level(bst_ctx *ctx, bst_smear *s, int n) {
     if (s->levels[n].blocks == 0) {
         s->nodes.count = 0;
         s->nodes.error = 0.0;
-        BST_TRY(bst_nodes_from_path(ctx, s->path, s->path_count, s->sigma_px, s->tolerance[n], true,
-                                    &s->nodes));
+        BST_TRY(bst_nodes_from_path(ctx, s->path, s->path_count, s->sigma_px, s->tolerance[n],
+                                    s->widest, &s->nodes));
         BST_TRY(append_nodes(ctx, s, &s->nodes, attitude_to_table, &s->levels[n]));
     }
     return BST_OK;
@@ -372,7 +373,7 @@ static bst_status own_nodes(bst_ctx *ctx, bst_smear *s, int count, double x0, do
         if (last > first) {
             int n = s->nodes.count;
             BST_TRY(bst_nodes_from_path(ctx, p + first, last - first + 1, s->sigma_px, tolerance,
-                                        true, &s->nodes));
+                                        s->widest, &s->nodes));
             for (double part = total > 0.0 ? (p[last].s - p[first].s) / total : 1.0;
                  n < s->nodes.count && part < 1.0; n++) {
                 s->nodes.items[n].weight *= part;
