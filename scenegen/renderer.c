@@ -11,6 +11,7 @@
 #include "scenegen/frame_pool.h"
 #include "scenegen/reference.h"
 #include "scenegen/smear.h"
+#include "scenegen/vignetting.h"
 
 enum { MAX_TAPS = 512, BOX_FLOATS = 4 };
 /* Of a block of nodes: place and weight. */
@@ -105,15 +106,16 @@ static bst_status choose_tiles(bst_ctx *ctx, const bst_device *device,
 }
 
 static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
-    const bst_kernel_source *sources[] = {&bst_kernel_scene_shared, &bst_kernel_nodes,
-                                          &bst_kernel_splat,        &bst_kernel_detector,
-                                          &bst_kernel_light,        &bst_kernel_tile};
-    char options[512];
+    const bst_kernel_source *sources[] = {
+        &bst_kernel_scene_shared, &bst_kernel_nodes,      &bst_kernel_splat, &bst_kernel_detector,
+        &bst_kernel_light,        &bst_kernel_vignetting, &bst_kernel_tile};
+    char options[1024];
     int length = snprintf(options, sizeof options,
                           "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d "
                           "-DPHASES=%d%s",
                           r->options.tile_width, r->options.tile_height, r->options.group, r->taps,
                           r->phases, r->fft_light ? " -DFFT_LIGHT" : "");
+    length += bst_vignetting_options(&r->camera, options + length, sizeof options - (size_t)length);
     const bst_distortion *d = &r->camera.distortion;
     if (bst_camera_distorted(&r->camera)) {
         double a = bst_camera_scale_rad(&r->camera), a2 = a * a,
@@ -123,7 +125,7 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
             " -DDISTORTED -DK1=%.9ef -DK2=%.9ef -DK3=%.9ef -DP1=%.9ef -DP2=%.9ef -DFOLD2=%.9ef",
             d->k1 * a2, d->k2 * a2 * a2, d->k3 * a2 * a2 * a2, d->p1 * a, d->p2 * a, out * out);
     }
-    BST_TRY(bst_device_build(ctx, device, sources, 6, options, &r->program));
+    BST_TRY(bst_device_build(ctx, device, sources, 7, options, &r->program));
     static const char *const names[3] = {"bst_scene_nodes", "bst_scene_frame",
                                          "bst_scene_expected"};
     cl_kernel *kernels[3] = {&r->nodes_kernel, &r->frame_kernel, &r->expected_kernel};

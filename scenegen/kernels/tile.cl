@@ -20,6 +20,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     splat_tile(sum, tile_x, tile_y, p.source_groups, sources, nodes, block_box, source_box,
                profiles);
 #endif
+    SHADE_TILE(sum, tile_x, tile_y);
     int16 full_count = (int16)0;
     int rows = min(TILE_H, p.window_height - top), columns = min(TILE_W, p.window_width - left);
     for (int y = 0; y < rows; y++) {
@@ -68,6 +69,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_expecte
     splat_tile(sum, p.window_x0 + left, p.window_y0 + top, p.source_groups, sources, nodes,
                block_box, source_box, profiles);
 #endif
+    SHADE_TILE(sum, p.window_x0 + left, p.window_y0 + top);
     int rows = min(TILE_H, p.window_height - top), columns = min(TILE_W, p.window_width - left);
     for (int y = 0; y < rows; y++) {
         global float *out = image + (size_t)(top + y) * p.window_width + left;
