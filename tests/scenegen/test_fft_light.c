@@ -48,7 +48,7 @@ static void exact_image(const bst_psf *psf, bst_window w, const spot *spots, int
             py[2 * k] = spots[s].e * cos(a * (spots[s].y - w.y0));
             py[2 * k + 1] = spots[s].e * sin(a * (spots[s].y - w.y0));
         }
-        for (int j = 0; j < n; j++) {
+        for (int j = last; j < n; j++) { /* the other half is its conjugate */
             double *row = sum + 2 * (size_t)j * (size_t)n, a = py[2 * j], b = py[2 * j + 1];
             for (int i = 0; i < n; i++) {
                 row[2 * i] += a * px[2 * i] - b * px[2 * i + 1];
@@ -56,16 +56,17 @@ static void exact_image(const bst_psf *psf, bst_window w, const spot *spots, int
             }
         }
     }
-    for (int j = 0; j < n; j++) {
+    for (int j = last; j < n; j++) {
         for (int i = 0; i < n; i++) {
-            double otf[2], fx = (double)(i - last) / period, fy = (double)(j - last) / period;
+            double twice = j > last ? 2.0 : 1.0, otf[2], fx = (double)(i - last) / period,
+                   fy = (double)(j - last) / period;
             bst_psf_otf(psf, 0, fx, fy, otf);
             const double *v = sum + 2 * ((size_t)j * (size_t)n + (size_t)i);
             int x = ((i - last) % period + period) % period;
             int y = ((j - last) % period + period) % period;
             fftw_complex *to = &folded[(size_t)y * (size_t)period + (size_t)x];
-            (*to)[0] += v[0] * otf[0] - v[1] * otf[1];
-            (*to)[1] += v[0] * otf[1] + v[1] * otf[0];
+            (*to)[0] += twice * (v[0] * otf[0] - v[1] * otf[1]);
+            (*to)[1] += twice * (v[0] * otf[1] + v[1] * otf[0]);
         }
     }
     fftw_plan plan = fftw_plan_dft_2d(period, period, folded, folded, FFTW_BACKWARD, FFTW_ESTIMATE);
@@ -203,11 +204,11 @@ static void static_stars_of_aberrated_optics(void **state) {
 
 static void streaks_of_aberrated_optics(void **state) {
     fixture *f = *state;
-    static const double qs[3] = {0.7, 1.0, 2.0};
-    for (int k = 0; k < 3; k++) {
+    static const double qs[2] = {1.0, 2.0};
+    for (int k = 0; k < 2; k++) {
         bst_camera c = diffraction(128, 96, qs[k]);
         bst_source stars[2] = {scene_star(&c, 60.3, 40.2, 1e6), scene_star(&c, 70.8, 60.1, 1e4)};
-        errors e = run(f, &c, whole(&c), stars, 2, 40.0, 512);
+        errors e = run(f, &c, whole(&c), stars, 2, 14.0, 512);
         assert_true(e.sigma < 0.1);
         assert_true(e.flux < 1e-4);
     }
