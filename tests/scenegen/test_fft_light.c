@@ -98,6 +98,7 @@ static bst_camera diffraction(int width, int height, double q) {
     c.optics.psf = BST_PSF_DIFFRACTION;
     c.optics.q = q;
     c.optics.central_obstruction = 0.35;
+    c.optics.wavelengths = 1;
     aberrate(&c);
     return c;
 }
