@@ -215,6 +215,16 @@ static void streaks_of_aberrated_optics(void **state) {
     }
 }
 
+/* The fewest nodes and no stamp: all of the light is there. */
+static void faint_streaks_keep_their_light(void **state) {
+    fixture *f = *state;
+    bst_camera c = moffat(96, 80, 2.0);
+    bst_source star = scene_star(&c, 47.3, 40.1, 1e3);
+    errors e = run(f, &c, whole(&c), &star, 1, 20.0, 256);
+    assert_true(e.sigma < 0.05);
+    assert_true(e.flux < 1e-4);
+}
+
 /* A Moffat PSF, whose wings are the widest; stars on the corner's edge and outside the frame. */
 static void stars_at_and_beyond_the_border(void **state) {
     fixture *f = *state;
@@ -401,6 +411,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(static_stars_of_aberrated_optics),
         cmocka_unit_test(streaks_of_aberrated_optics),
+        cmocka_unit_test(faint_streaks_keep_their_light),
         cmocka_unit_test(stars_at_and_beyond_the_border),
         cmocka_unit_test(wide_seeing),
         cmocka_unit_test(windows_show_the_same_light),
