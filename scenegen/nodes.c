@@ -14,8 +14,9 @@ typedef struct maker {
     double tolerance;
     bool widen;
     bst_node_list *list;
-    double most;  /* spread of the next group, px^2 */
-    double limit; /* of it */
+    double widest; /* px^2 */
+    double most;   /* spread of the next group, px^2 */
+    double limit;  /* of it */
 } maker;
 
 /* A group: the path from time `from` (in segment `first`) to `to`. */
@@ -327,7 +328,7 @@ static void try_rule(const maker *m, const moments *g, int n, bool widen, bool s
         trace = fmax(d[0][0] + d[1][1], 0.0);
     }
     if (widen) {
-        r->widening = fmin(trace * per_trace, BST_NODE_WIDEST * var);
+        r->widening = fmin(trace * per_trace, m->widest);
         if (n > 1) { /* along the axis the moments make room for it */
             for (int i = 0; i < 3; i++) {
                 for (int j = 0; j < 3; j++) {
@@ -487,15 +488,16 @@ static double spread_of(const extent *e) {
 }
 
 bst_status bst_nodes_from_path(bst_ctx *ctx, const bst_path_point *path, int count,
-                               double psf_sigma_px, double tolerance, bool widen,
+                               double psf_sigma_px, double tolerance, double widest,
                                bst_node_list *list) {
     maker m = {.path = path,
                .count = count,
                .total = path[count - 1].s - path[0].s,
                .variance = psf_sigma_px * psf_sigma_px,
                .tolerance = tolerance,
-               .widen = widen,
-               .list = list};
+               .widen = widest > 0.0,
+               .list = list,
+               .widest = widest * psf_sigma_px * psf_sigma_px};
     if (!(m.total > 0.0)) {
         return push(ctx, list, path[0].p, 1.0, 0.0);
     }

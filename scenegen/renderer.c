@@ -203,9 +203,14 @@ static bst_status open_psf(bst_ctx *ctx, bst_device *device, bst_renderer *r,
     if (bst_psf_gaussian(r->psf, &sigma_px)) {
         return BST_OK;
     }
+    /* a point that fills the well, next to dark pixels */
     bst_fft_light_options light = bst_fft_light_default_options();
+    double dark = fmax(r->camera.read_noise_e, 3.0);
+    light.tolerance = 10.0 * r->options.tolerance_sigma * dark / fmax(r->camera.full_well_e, 1.0);
+    light.tolerance = fmin(fmax(light.tolerance, 2e-6), 1e-3);
     light.taps = r->options.fft_taps > 0 ? r->options.fft_taps : light.taps;
     BST_TRY(bst_fft_light_create(ctx, device, &r->camera, r->psf, &light, &r->fft_light));
+    smear->widest = bst_fft_light_widest(r->fft_light);
     smear->table_error = 0.0;
     smear->node_sigma_px = bst_fft_light_band(r->fft_light)->node_sigma_px;
     smear->share_sigma_px = bst_fft_light_band(r->fft_light)->share_sigma_px;
@@ -367,8 +372,13 @@ static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *
             s->first_block = *blocks;
             *blocks += s->blocks;
             r->stats.sources++;
+            double grid = 0.0; /* error of the Fourier path's grid, on dark pixels */
+            if (r->fft_light) {
+                grid = bst_fft_light_error(r->fft_light) * r->peak_e[i] /
+                       sqrt(q->background_e + read * read);
+            }
             r->stats.predicted_sigma =
-                fmax(r->stats.predicted_sigma, bst_smear_last_error_sigma(r->smear));
+                fmax(r->stats.predicted_sigma, bst_smear_last_error_sigma(r->smear) + grid);
         }
     }
     r->stats.nodes = (long long)*blocks * BST_BLOCK;
