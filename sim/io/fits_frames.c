@@ -104,6 +104,7 @@ bst_status bst_fits_create(bst_ctx *ctx, const char *path, bst_fits_layout layou
     copy_name(fits->names.observer, info->observer);
     copy_name(fits->names.instrument, info->instrument);
     copy_name(fits->names.object, info->object);
+    copy_name(fits->names.image_type, info->image_type);
     copy_name(fits->names.program, info->program);
     fits->names.camera = *info->camera;
 
