@@ -13,6 +13,7 @@
 #include "scenegen/readout.h"
 #include "scenegen/reference.h"
 #include "scenegen/smear.h"
+#include "scenegen/tiles.h"
 #include "scenegen/vignetting.h"
 
 enum { MAX_TAPS = 512, BOX_FLOATS = 4 };
@@ -74,41 +75,6 @@ static int taps_for(double sigma_px) {
     return taps > MAX_TAPS ? MAX_TAPS : taps;
 }
 
-static bst_status choose_tiles(bst_ctx *ctx, const bst_device *device,
-                               bst_renderer_options *options, uint64_t *most_bytes) {
-    cl_device_type type = 0;
-    cl_ulong local_bytes = 0, most = 0;
-    BST_TRY(bst_device_check(
-        ctx, clGetDeviceInfo(bst_device_id(device), CL_DEVICE_TYPE, sizeof type, &type, NULL),
-        "asking for the device's type"));
-    BST_TRY(bst_device_check(ctx,
-                             clGetDeviceInfo(bst_device_id(device), CL_DEVICE_LOCAL_MEM_SIZE,
-                                             sizeof local_bytes, &local_bytes, NULL),
-                             "asking for the device's local memory"));
-    BST_TRY(bst_device_check(ctx,
-                             clGetDeviceInfo(bst_device_id(device), CL_DEVICE_MAX_MEM_ALLOC_SIZE,
-                                             sizeof most, &most, NULL),
-                             "asking for the device's largest buffer"));
-    *most_bytes = most;
-    if (options->tile_width == 0) {
-        bool large = (type & CL_DEVICE_TYPE_CPU) && local_bytes >= 128 * 1024;
-        options->tile_width = large ? 256 : 64;
-        options->tile_height = large ? 64 : 2;
-        options->group = large ? 1 : 16;
-    }
-    size_t need = (size_t)(options->tile_width + 16) * (size_t)options->tile_height *
-                  sizeof(float) * (size_t)options->group;
-    if (options->tile_width < 64 || options->tile_width % 64 != 0 || options->tile_height < 1 ||
-        options->group < 1 || need > local_bytes) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT,
-                        "tiles of %d x %d pixels in groups of %d need %zu bytes of local memory "
-                        "(the device has %llu) and a width that is a multiple of 64",
-                        options->tile_width, options->tile_height, options->group, need,
-                        (unsigned long long)local_bytes);
-    }
-    return BST_OK;
-}
-
 static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
     const bst_kernel_source *sources[] = {
         &bst_kernel_scene_shared, &bst_kernel_nodes,    &bst_kernel_splat,
@@ -122,6 +88,10 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
                           r->phases, r->fft_light ? " -DFFT_LIGHT" : "");
     length += bst_vignetting_options(&r->camera, options + length, sizeof options - (size_t)length);
     length += bst_detector_options(r->detector, options + length, sizeof options - (size_t)length);
+    if (r->options.spatial_oversample > 0) {
+        length += snprintf(options + length, sizeof options - (size_t)length,
+                           " -DSPATIAL_OVERSAMPLE=%d", r->options.spatial_oversample);
+    }
     const bst_distortion *d = &r->camera.distortion;
     if (bst_camera_distorted(&r->camera)) {
         double a = bst_camera_scale_rad(&r->camera), a2 = a * a,
@@ -145,11 +115,18 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
     return bst_readout_create(ctx, device, &r->camera, r->program, &r->readout);
 }
 
-/* Phases between which the profile may be interpolated linearly: that misses
- * 1 / (8 phases^2 sigma^2) of the peak, below 1.3e-5. */
-static int phases_for(double sigma_px) {
+/* Share of the peak that linear interpolation between the phases misses: 1 / (8 phases^2 sigma^2)
+ * on each axis. */
+static double table_error(double sigma_px, int phases) {
+    return 0.25 / (sigma_px * sigma_px * phases * phases);
+}
+
+/* Phases with which a source that nearly fills the pixels' wells is right to a third of the
+ * tolerance; for fainter ones it is less. */
+static int phases_for(double sigma_px, double tolerance_sigma, double full_well_e) {
     int phases = 8;
-    while (phases < 2048 && phases * sigma_px < 100.0) {
+    while (phases < 2048 &&
+           table_error(sigma_px, phases) * sqrt(full_well_e) > 0.33 * tolerance_sigma) {
         phases *= 2;
     }
     return phases;
@@ -226,7 +203,10 @@ static bst_status open_psf(bst_ctx *ctx, bst_device *device, bst_renderer *r,
     if (bst_psf_gaussian(r->psf, &sigma_px)) {
         return BST_OK;
     }
-    BST_TRY(bst_fft_light_create(ctx, device, &r->camera, r->psf, NULL, &r->fft_light));
+    bst_fft_light_options light = bst_fft_light_default_options();
+    light.taps = r->options.fft_taps > 0 ? r->options.fft_taps : light.taps;
+    BST_TRY(bst_fft_light_create(ctx, device, &r->camera, r->psf, &light, &r->fft_light));
+    smear->table_error = 0.0;
     smear->node_sigma_px = bst_fft_light_band(r->fft_light)->node_sigma_px;
     smear->share_sigma_px = bst_fft_light_band(r->fft_light)->share_sigma_px;
     return BST_OK;
@@ -243,13 +223,21 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     r->camera = *camera;
     r->options = options ? *options : bst_renderer_default_options();
     r->taps = taps_for(bst_camera_psf_sigma_px(camera));
-    r->phases = phases_for(bst_camera_psf_sigma_px(camera));
+    double sigma_px = bst_camera_psf_sigma_px(camera);
+    r->phases = r->options.psf_phases > 0
+                    ? r->options.psf_phases
+                    : phases_for(sigma_px, r->options.tolerance_sigma, camera->full_well_e);
     r->context = bst_device_context(device);
     r->queue = bst_device_queue(device);
     clRetainContext(r->context);
     clRetainCommandQueue(r->queue);
-    bst_smear_options smear = {.tolerance_sigma = r->options.tolerance_sigma, .taps = r->taps};
-    bst_status status = choose_tiles(ctx, device, &r->options, &r->most_bytes);
+    bst_smear_options smear = {.tolerance_sigma = r->options.tolerance_sigma,
+                               .taps = r->taps,
+                               .table_error = table_error(sigma_px, r->phases),
+                               .motion = r->options.motion,
+                               .temporal_oversample = r->options.temporal_oversample,
+                               .stamp_radius_px = r->options.stamp_radius_px};
+    bst_status status = bst_tiles_choose(ctx, device, &r->options, &r->most_bytes);
     if (status == BST_OK) {
         status = open_psf(ctx, device, r, &smear);
     }
@@ -350,8 +338,11 @@ static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d sources", q->count);
         }
     }
-    double read = r->camera.read_noise_e;
-    BST_TRY(bst_smear_begin(ctx, r->smear, q->track, q->background_e + read * read));
+    double read = r->camera.read_noise_e, brightest = 0.0;
+    for (int i = 0; i < q->count; i++) {
+        brightest = q->sources[i].path ? brightest : fmax(brightest, q->sources[i].electrons_per_s);
+    }
+    BST_TRY(bst_smear_begin(ctx, r->smear, q->track, q->background_e + read * read, brightest));
     r->stats = (bst_render_stats){0};
     *blocks = 0;
     const uint64_t counted = (uint64_t)INT32_MAX * sizeof(float); /* by the kernels, in int */
@@ -381,6 +372,10 @@ static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *
         }
     }
     r->stats.nodes = (long long)*blocks * BST_BLOCK;
+    r->stats.single_kernel = bst_smear_single(r->smear);
+    if (r->options.temporal_oversample > 0 || r->options.spatial_oversample > 0) {
+        r->stats.predicted_sigma = NAN;
+    }
     return BST_OK;
 }
 

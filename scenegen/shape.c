@@ -234,10 +234,8 @@ bst_status bst_shape_points(bst_ctx *ctx, const bst_source *source, const bst_sh
     return BST_OK;
 }
 
-bst_status bst_shape_spread(bst_ctx *ctx, const bst_source *source, const bst_shape_view *view,
-                            double stretch, bst_disc_points *points, bst_node_list *list,
-                            double *peak) {
-    BST_TRY(bst_shape_points(ctx, source, view, points, peak));
+bst_status bst_shape_spread(bst_ctx *ctx, const bst_disc_points *points, double stretch,
+                            bst_node_list *list) {
     long long need = (long long)list->count * points->count;
     if (need > INT32_MAX / 64) {
         return bst_fail(ctx, BST_ERR_MEMORY,

@@ -16,17 +16,16 @@ typedef struct bst_shape_view {
     int most_points;
 } bst_shape_view;
 
-/* Replaces a path's nodes by those of all the points of the source's disc that move along it:
- * places of `list` plus the points' offsets from the source's middle, times `stretch`. Small discs
- * are Gauss-Legendre quadrature of the lit part; large ones are scanned, pixel by pixel, with the
- * limb where it is. `points` is scratch. *peak: share of the light on the brightest pixel at most,
- * before the path's smear. BST_ERR_MEMORY. */
-bst_status bst_shape_spread(bst_ctx *ctx, const bst_source *source, const bst_shape_view *view,
-                            double stretch, bst_disc_points *points, bst_node_list *list,
-                            double *peak) BST_MUST_CHECK;
-
-/* The points alone: x and y of the offset in pixels of the undistorted focal plane, z unused. */
+/* Makes the points of the source's disc: x and y of the offset from its middle in pixels of the
+ * undistorted focal plane, z unused. Small discs and thin crescents are Gauss-Legendre quadrature
+ * of the lit part; large ones are scanned, pixel by pixel, with the limb where it is. *peak: share
+ * of the light on the brightest pixel at most. BST_ERR_MEMORY. */
 bst_status bst_shape_points(bst_ctx *ctx, const bst_source *source, const bst_shape_view *view,
                             bst_disc_points *points, double *peak) BST_MUST_CHECK;
+
+/* Replaces a path's nodes by those of all points that move along it: places of `list` plus the
+ * points' offsets times `stretch`. BST_ERR_MEMORY. */
+bst_status bst_shape_spread(bst_ctx *ctx, const bst_disc_points *points, double stretch,
+                            bst_node_list *list) BST_MUST_CHECK;
 
 #endif

@@ -5,9 +5,10 @@
 /* Nodes travel in blocks of this many, one vector register. */
 #define BST_BLOCK 16
 /* The profile table holds the PSF widened by (n / BST_WIDTHS)^2 BST_WIDEST of its own variance, n from
- * 0 to BST_WIDTHS. Linear interpolation between them misses at most 3e-4 of the peak, and
- * 0.4 widening / BST_WIDTHS^2 of it for little widening. */
-#define BST_WIDTHS 16
+ * 0 to BST_WIDTHS. Between widths it is interpolated linearly in the variance, between which a
+ * Gaussian's peak goes as the square root of its inverse: on each axis that misses
+ * 3/8 w / BST_WIDTHS^2 / (1 + w)^2 of the peak for a widening by w variances. */
+#define BST_WIDTHS 32
 #define BST_WIDEST 1.0f
 /* Zeros on either side of a row of the profile table. */
 #define BST_PROFILE_PAD 16

@@ -82,6 +82,10 @@ void bst_field_free(bst_field *field) {
     }
 }
 
+void bst_field_set_camera(bst_field *field, const bst_camera *camera) {
+    field->camera = camera;
+}
+
 static const bst_los_sample *ring_sample(const bst_los_history *history, int64_t number) {
     return &history->items[number % history->capacity];
 }
@@ -378,6 +382,7 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     truth->observer_gcrf_mps = eye.velocity_mps;
     truth->velocity_bary_mps = light.velocity_mps;
     truth->sun_m = light.sun_m;
+    truth->pixel_scale_arcsec = camera->pixel_scale_arcsec;
     truth->boresight_x_px = bst_camera_centre_x(camera);
     truth->boresight_y_px = bst_camera_centre_y(camera);
     truth->background_e = bst_camera_background_e_per_s(camera) * exposure;

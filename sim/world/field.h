@@ -138,6 +138,8 @@ typedef struct bst_field
 bst_status bst_field_create(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
                             bst_field **out) BST_MUST_CHECK;
 void bst_field_free(bst_field *field);
+/* From the next query on another camera than the sensor's; borrowed. */
+void bst_field_set_camera(bst_field *field, const bst_camera *camera);
 
 /* Cuts the samples from start_tick to end_tick out of the ring, interpolating at the ends; held in
  * `field` until the next call. BST_ERR_STATE when the ring no longer (or not yet) covers the

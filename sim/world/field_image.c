@@ -41,7 +41,7 @@ bst_image_moments bst_image_by_light(const bst_camera *camera, const bst_los_tra
 
 void bst_image_add_disc(const bst_camera *camera, bst_quat q_mid, const bst_source *source,
                         bst_image_moments *m) {
-    enum { TIMES = 12, AROUND = 24 };
+    enum { TIMES = 24, AROUND = 48 };
     bst_disc disc;
     bst_disc_begin(source, &disc);
     double x0, y0, sum = 0.0, ex = 0.0, ey = 0.0, xx = 0.0, xy = 0.0, yy = 0.0;

@@ -1,10 +1,9 @@
 /* The objects of a field query. */
 #include "sim/world/field_objects.h"
 
-/* Whether the object's path over the image comes near the window. */
-static bool path_touches(const bst_object_query *q, const bst_source *s) {
+/* Whether the object's path over the image comes near the window; disc: its angular radius, rad. */
+static bool path_touches(const bst_object_query *q, const bst_source *s, double disc) {
     enum { PIECES = 8 };
-    double disc = s->shape ? asin(s->shape->radius) : 0.0;
     double disc_px = tan(disc) / bst_camera_scale_rad(q->camera) * bst_camera_stretch(q->camera);
     bst_vec3 at[PIECES + 1];
     double x[PIECES + 1], y[PIECES + 1], bend = 0.0;
@@ -182,6 +181,11 @@ bst_status bst_field_object(bst_ctx *ctx, const bst_object_query *q, int object,
                         .range_m = mid.range_m,
                         .occulted = mid.occulted};
     bst_vec3_to_radec(mid.geometric, &out->ra_rad, &out->dec_rad);
+    double radius = sqrt(bst_view_object(q->view, object)->area_m2 / BST_PI) / mid.range_m;
+    *there = path_touches(q, out, mid.glow.resolved && radius < 1.0 ? asin(radius) : 0.0);
+    if (!*there) {
+        return BST_OK;
+    }
     course c = {q, object, &parts->path, &light};
     if (!mid.occulted && q->end_s > q->start_s &&
         bst_field_rate(course_at, &c, &parts->rate, &out->electrons_per_s)) {
@@ -193,6 +197,5 @@ bst_status bst_field_object(bst_ctx *ctx, const bst_object_query *q, int object,
     if (make_shape(&c, &mid, out, &parts->shape)) {
         out->shape = &parts->shape;
     }
-    *there = path_touches(q, out);
     return BST_OK;
 }

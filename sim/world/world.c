@@ -129,6 +129,7 @@ static bst_status build(bst_world_builder *b, const bst_world_config *config,
         BST_TRY(bst_faint_sky_create(b->ctx, world->stars, config->faint_seed, &world->faint));
     }
     BST_TRY(bst_sky_clock_create(b->ctx, world->eop, &b->clock));
+    BST_TRY(bst_world_load_updates(b, observers));
     BST_TRY(bst_world_build_objects(b, config));
     BST_TRY(make_observers(b, observers));
     for (int i = 0; i < world->observer_count; i++) {
@@ -183,6 +184,7 @@ void bst_world_free(bst_world *world) {
     }
     free(world->brightness);
     bst_world_files_free(world);
+    bst_world_updates_free(world);
     bst_name_index_free(world->object_names);
     free(world->objects);
     free(world->observers);
@@ -221,6 +223,10 @@ int bst_world_find_object(const bst_world *world, const char *name) {
 
 const bst_camera *bst_world_camera(const bst_world *world, int observer, int sensor) {
     return &world->observers[observer].sensors[sensor].config.camera;
+}
+
+const bst_exposure_config *bst_world_exposure(const bst_world *world, int observer, int sensor) {
+    return &world->observers[observer].sensors[sensor].config.exposure;
 }
 
 bst_quat bst_world_body_attitude(const bst_world *world, int observer, int sensor) {

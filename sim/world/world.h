@@ -41,6 +41,15 @@ const char *bst_world_observer_name(const bst_world *world, int observer);
 /* The sensor's true camera. */
 const bst_camera *bst_world_camera(const bst_world *world, int observer, int sensor);
 
+struct bst_frame_updates;
+/* The file that drives the sensor frame by frame (sim/world/frame_updates.h); NULL: none. */
+const struct bst_frame_updates *bst_world_frame_updates(const bst_world *world, int observer,
+                                                        int sensor);
+struct bst_exposure_config;
+/* The sensor's exposure settings as the scenario has them. */
+const struct bst_exposure_config *bst_world_exposure(const bst_world *world, int observer,
+                                                     int sensor);
+
 /* Body attitude that the spacecraft starts in and holds: +z towards the cue at the epoch as the
  * onboard side reckons it, with all its errors, +x as near as can be to the sensor's x_axis_gcrf. The camera has these axes when both
  * gimbal angles are zero. */

@@ -32,7 +32,7 @@ static const bst_config_desc orbit_table[] = {
                "oem: OBJECT_NAME or OBJECT_ID in that file; empty: its only object."),
     BST_PATH(bst_orbit_config, states_file, "\"\"",
              "injected: CSV file of states at the start and end of each frame, relative to the "
-             "scenario's folder."),
+             "scenario's folder; or a sensor's frame_updates_file (.json)."),
     BST_STRING(bst_orbit_config, states_object, "\"\"",
                "injected: the object in that file; empty: its only one."),
     BST_ENUM(bst_orbit_config, states_frame, states_frames, "\"gcrf\"",
@@ -196,6 +196,9 @@ static const bst_config_desc knowledge_table[] = {
 
 const bst_config_desc bst_sensor_config_table[] = {
     BST_STRING(bst_sensor_config, name, "\"camera\"", "Name, unique on its observer."),
+    BST_PATH(bst_sensor_config, frame_updates_file, "\"\"",
+             "JSON file that drives the sensor frame by frame (docs/interfaces.md, \"Frame "
+             "updates\"), relative to the scenario's folder; empty: none."),
     BST_OBJECT(bst_sensor_config, camera, bst_camera_config, NULL, "Optics and detector."),
     BST_REALS(
         bst_sensor_config, x_axis_gcrf, "", -1, 1, "[0, 0, 1]",

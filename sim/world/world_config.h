@@ -132,6 +132,7 @@ typedef struct bst_knowledge_config {
 
 typedef struct bst_sensor_config {
     char name[64];
+    char frame_updates_file[512]; /* path as above; "": none */
     bst_camera camera;
     double x_axis_gcrf[3];
     bst_exposure_config exposure;

@@ -73,6 +73,16 @@ typedef struct bst_world_file {
     bst_injected *injected;
 } bst_world_file;
 
+struct bst_frame_updates;
+
+/* The file that drives a sensor frame by frame. */
+typedef struct world_updates {
+    int observer, sensor;
+    bst_camera camera;
+    bst_exposure_config exposure;
+    struct bst_frame_updates *file;
+} world_updates;
+
 struct bst_world {
     bst_time epoch;
     bst_eop *eop;
@@ -86,6 +96,8 @@ struct bst_world {
     bst_name_index *object_names;
     bst_world_file *files;
     int file_count;
+    world_updates *updates;
+    int updates_count;
     world_observer *observers;
     int observer_count;
     struct bst_ephemeris *ephemeris;

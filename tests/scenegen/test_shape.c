@@ -70,7 +70,7 @@ static images render(fixture *f, const bst_camera *camera, const scene_motion *m
     size_t pixels = (size_t)camera->width_px * (size_t)camera->height_px;
     scene_track track = scene_track_make(camera, motion);
     images m = {malloc(pixels * sizeof *m.fast), calloc(pixels, sizeof *m.reference), 0, 0, 0};
-    if (camera->pixel_scale_arcsec != 3.0) {
+    if (camera->pixel_scale_arcsec != 3.0 || camera->optics.psf != BST_PSF_GAUSSIAN) {
         bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, camera, NULL, &r));
     }
     bst_render_request q = {.window = {0, 0, (int)camera->width_px, (int)camera->height_px},
@@ -268,11 +268,34 @@ static void switched_off_half_way(void **state) {
     release(&m);
 }
 
+/* The same through a PSF that is not Gaussian: a disc, and light that fades on its way. */
+static void another_psf(void **state) {
+    fixture *f = *state;
+    bst_camera camera = scene_camera(SIDE, SIDE);
+    camera.optics.psf = BST_PSF_MOFFAT;
+    camera.optics.moffat_beta = 4.0;
+    camera.psf_fwhm_px = 2.5;
+    bst_source s = source_at(&camera, 0.2, 0.1, 3e5, NULL);
+    bst_source_shape shape = shape_of(&camera, s.apparent_mid, 3.0, 1.0, 2.0);
+    s.shape = &shape;
+    images m = render(f, &camera, &still, &s, true);
+    bst_assert_close(worst_sigma(&camera, &m), 0, 0.05); /* the project's accuracy */
+    release(&m);
+    const scene_motion motion = {.x_px = 20.0, .duration_s = 1.0, .samples = 2};
+    bst_source_rate rate = {.count = 2, .u = {0, 1}, .rate = {2, 0}, .light = {0, 1}};
+    s.shape = NULL;
+    s.rate = &rate;
+    m = render(f, &camera, &motion, &s, true);
+    bst_assert_close(worst_sigma(&camera, &m), 0, 0.05);
+    release(&m);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(light_and_its_middle),  cmocka_unit_test(discs_agree_with_the_reference),
         cmocka_unit_test(moving_discs),          cmocka_unit_test(a_disc_larger_than_the_frame),
         cmocka_unit_test(fading_while_it_moves), cmocka_unit_test(switched_off_half_way),
+        cmocka_unit_test(another_psf),
     };
     return cmocka_run_group_tests(tests, open_device, close_device);
 }
