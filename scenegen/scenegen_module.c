@@ -1,6 +1,9 @@
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
+#include "scenegen/detector.h"
 #include "scenegen/module.h"
 #include "scenegen/planes.h"
 #include "scenegen/renderer.h"
@@ -105,9 +108,15 @@ static void destroy(void *self) {
     }
 }
 
-/* The detector is the same in all runs of a study: its patterns come from its names alone. */
+/* The patterns of this sensor: its name is the instance's without the module's. */
 static bst_rng_key pattern_key(const bst_module_env *env, const bst_camera *camera) {
-    return bst_rng_make_key(camera->detector.pattern_seed, 0, env->instance, "pattern");
+    char name[256];
+    snprintf(name, sizeof name, "%s", env->instance);
+    char *module = strrchr(name, '/');
+    if (module) {
+        *module = '\0';
+    }
+    return bst_detector_pattern_key(camera, name);
 }
 
 static bst_status create(const bst_module_env *env, const void *config_object, void **self) {
