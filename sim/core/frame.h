@@ -9,6 +9,9 @@
 
 typedef struct bst_frame bst_frame;
 
+/* Frames that may be under way behind the thread that steps the modules, besides those in queues. */
+enum { BST_OVERLAP_FRAMES = 4 };
+
 /* What a maker of frames supplies. All functions get the maker's own pointer. */
 typedef struct bst_frame_ops {
     /* Makes the pixels readable: row-major uint16 [height][width], in digital numbers. */
@@ -25,15 +28,15 @@ struct bst_frame {
     const bst_frame_ops *ops;
     void *owner;
     int width, height;
-    int references; /* single-threaded by the rule that one run is stepped by one thread */
-    int maps;
+    int references; /* atomic: who reads may be another thread than who makes */
+    int maps;       /* all readers of a frame are in one thread */
 };
 
 static inline void bst_frame_retain(bst_frame *frame) {
-    frame->references++;
+    __atomic_fetch_add(&frame->references, 1, __ATOMIC_RELAXED);
 }
 static inline void bst_frame_release(bst_frame *frame) {
-    if (frame && --frame->references == 0) {
+    if (frame && __atomic_sub_fetch(&frame->references, 1, __ATOMIC_ACQ_REL) == 0) {
         frame->ops->recycle(frame->owner);
     }
 }

@@ -8,10 +8,14 @@ static void release_frame(void *payload) {
     message->frame = NULL;
 }
 
+static void retain_frame(void *payload) {
+    bst_frame_retain(((bst_frame_message *)payload)->frame);
+}
+
 #define HEADER_ONLY(name, kind, header) \
-    { name, kind, sizeof(header), 0, false, NULL }
+    { name, kind, sizeof(header), 0, false, NULL, NULL }
 #define WITH_ITEMS(name, kind, header, item, in_place) \
-    { name, kind, sizeof(header), sizeof(item), in_place, NULL }
+    { name, kind, sizeof(header), sizeof(item), in_place, NULL, NULL }
 
 static const bst_channel_type types[] = {
     HEADER_ONLY(BST_CHANNEL_SENSOR_COMMAND, BST_CHANNEL_LATEST, bst_sensor_command),
@@ -21,7 +25,8 @@ static const bst_channel_type types[] = {
     WITH_ITEMS(BST_CHANNEL_POINTING_TELEMETRY, BST_CHANNEL_LATEST, bst_pointing_telemetry,
                bst_pointing_sample, true),
     HEADER_ONLY(BST_CHANNEL_NAV_TELEMETRY, BST_CHANNEL_LATEST, bst_nav_telemetry),
-    {BST_CHANNEL_FRAME, BST_CHANNEL_QUEUE, sizeof(bst_frame_message), 0, false, release_frame},
+    {BST_CHANNEL_FRAME, BST_CHANNEL_QUEUE, sizeof(bst_frame_message), 0, false, release_frame,
+     retain_frame},
     WITH_ITEMS(BST_CHANNEL_TRUTH, BST_CHANNEL_QUEUE, bst_truth, bst_truth_item, false),
     WITH_ITEMS(BST_CHANNEL_DETECTIONS, BST_CHANNEL_QUEUE, bst_detections, bst_detection, false),
     WITH_ITEMS(BST_CHANNEL_PREDICTIONS, BST_CHANNEL_LATEST, bst_predictions, bst_prediction, false),

@@ -291,6 +291,7 @@ typedef struct bst_channel_type {
     bool in_place;     /* a ring that its writer extends in place: cannot be read with a delay */
     void (*release)(
         void *payload); /* lets go of what a slot owns before it is written again; may be NULL */
+    void (*retain)(void *payload); /* makes a copy of the payload own the same; with release */
 } bst_channel_type;
 
 /* The type of a channel by its unscoped name; NULL when there is none. */
