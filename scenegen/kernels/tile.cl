@@ -5,7 +5,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     bst_scene_params p, global const bst_scene_source *sources, global const float *nodes,
     global const float4 *block_box, global const float *source_box, global const float *profiles,
     global ushort *frame, global int *saturated) {
-    local float sums[GROUP][TILE_H * STRIDE];
+    local float sums[GROUP][TILE_H * STRIDE] __attribute__((aligned(64)));
     int tile = (int)get_global_id(0);
     if (tile >= p.tiles_x * p.tiles_y) {
         return;
@@ -21,7 +21,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
         uint index = (uint)((tile_y + y) * p.sensor_width + tile_x);
         global ushort *out = frame + (size_t)(top + y) * p.window_width + left;
         for (int x = 0; x < columns; x += 16) {
-            float16 mean = vload16(0, sum + y * STRIDE + PAD + x) + p.background_e;
+            float16 mean = vload16(0, sum + y * STRIDE + x) + p.background_e;
             int16 full;
             ushort16 dn = detect16(p, index + (uint)x, mean, &full);
             if (x + 16 <= columns) {
@@ -50,7 +50,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_expecte
     bst_scene_params p, global const bst_scene_source *sources, global const float *nodes,
     global const float4 *block_box, global const float *source_box, global const float *profiles,
     global float *image) {
-    local float sums[GROUP][TILE_H * STRIDE];
+    local float sums[GROUP][TILE_H * STRIDE] __attribute__((aligned(64)));
     int tile = (int)get_global_id(0);
     if (tile >= p.tiles_x * p.tiles_y) {
         return;
@@ -63,7 +63,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_expecte
     for (int y = 0; y < rows; y++) {
         global float *out = image + (size_t)(top + y) * p.window_width + left;
         for (int x = 0; x < columns; x++) {
-            out[x] = sum[y * STRIDE + PAD + x] + p.background_e;
+            out[x] = sum[y * STRIDE + x] + p.background_e;
         }
     }
 }
