@@ -36,6 +36,8 @@ struct bst_renderer {
     bst_scene_source *list; /* drawn sources */
     double *peak_e;         /* of all sources of the request */
     int list_capacity, tiles;
+    bool uncounted; /* saturated pixels of the latest frame */
+    long long saturated_pixels, saturated_frames;
     uint64_t most_bytes; /* of one buffer on the device */
     bst_render_stats stats;
 };
@@ -403,11 +405,33 @@ static bst_scene_params make_params(const bst_renderer *r, const bst_render_requ
     };
 }
 
+/* Counts the saturated pixels of the latest frame, once. Waits for it. */
+static bst_status count_saturated(bst_ctx *ctx, bst_renderer *r) {
+    if (!r->uncounted) {
+        return BST_OK;
+    }
+    r->uncounted = false;
+    r->saturated_pixels = 0;
+    cl_int code;
+    size_t bytes = (size_t)r->tiles * sizeof(cl_int);
+    cl_int *p = clEnqueueMapBuffer(r->queue, r->saturated.buffer, CL_TRUE, CL_MAP_READ, 0, bytes, 0,
+                                   NULL, NULL, &code);
+    BST_TRY(bst_device_check(ctx, code, "mapping the count of saturated pixels"));
+    for (int i = 0; i < r->tiles; i++) {
+        r->saturated_pixels += p[i];
+    }
+    r->saturated_frames += r->saturated_pixels > 0;
+    return bst_device_check(
+        ctx, clEnqueueUnmapMemObject(r->queue, r->saturated.buffer, p, 0, NULL, NULL),
+        "unmapping the count of saturated pixels");
+}
+
 /* The common way of both kinds of image: the kernels' first six arguments are the same. */
 static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
                                 cl_kernel kernel, cl_mem out) {
     int blocks = 0, groups = 0;
     BST_TRY(plan(ctx, r, q, &blocks));
+    BST_TRY(count_saturated(ctx, r)); /* of the frame before, which was rendered meanwhile */
     BST_TRY(enqueue_nodes(ctx, r, blocks, &groups));
     bst_scene_params p = make_params(r, q, groups);
     r->tiles = p.tiles_x * p.tiles_y;
@@ -424,10 +448,9 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
     const size_t m = sizeof(cl_mem), bytes[] = {sizeof p, m, m, m, m, m, m, m};
     BST_TRY(set_args(ctx, kernel, values, bytes, kernel == r->frame_kernel ? 8 : 7));
     size_t group = (size_t)r->options.group, global = (tiles + group - 1) / group * group;
-    BST_TRY(bst_device_check(
+    return bst_device_check(
         ctx, clEnqueueNDRangeKernel(r->queue, kernel, 1, NULL, &global, &group, 0, NULL, NULL),
-        "rendering a frame"));
-    return bst_device_check(ctx, clFlush(r->queue), "starting the rendering");
+        "rendering a frame");
 }
 
 bst_status bst_renderer_plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *request) {
@@ -445,6 +468,13 @@ bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *r, const bst_render_r
     BST_TRY(bst_frame_pool_take(ctx, r->pool, request->window.width, request->window.height, &frame,
                                 &buffer));
     bst_status status = enqueue_tiles(ctx, r, request, r->frame_kernel, buffer);
+    if (status == BST_OK) {
+        r->uncounted = true;
+        status = bst_frame_pool_enqueued(ctx, frame);
+    }
+    if (status == BST_OK) {
+        status = bst_device_check(ctx, clFlush(r->queue), "starting the rendering");
+    }
     if (status != BST_OK) {
         bst_frame_release(frame);
         return status;
@@ -466,21 +496,13 @@ bst_status bst_renderer_render_noise_free(bst_ctx *ctx, bst_renderer *r,
 }
 
 bst_status bst_renderer_saturated(bst_ctx *ctx, bst_renderer *r, long long *pixels) {
-    *pixels = 0;
-    if (r->tiles == 0) {
-        return BST_OK;
-    }
-    cl_int code;
-    size_t bytes = (size_t)r->tiles * sizeof(cl_int);
-    cl_int *p = clEnqueueMapBuffer(r->queue, r->saturated.buffer, CL_TRUE, CL_MAP_READ, 0, bytes, 0,
-                                   NULL, NULL, &code);
-    BST_TRY(bst_device_check(ctx, code, "mapping the count of saturated pixels"));
-    for (int i = 0; i < r->tiles; i++) {
-        *pixels += p[i];
-    }
-    return bst_device_check(
-        ctx, clEnqueueUnmapMemObject(r->queue, r->saturated.buffer, p, 0, NULL, NULL),
-        "unmapping the count of saturated pixels");
+    BST_TRY(count_saturated(ctx, r));
+    *pixels = r->saturated_pixels;
+    return BST_OK;
+}
+
+long long bst_renderer_saturated_frames(const bst_renderer *r) {
+    return r->saturated_frames;
 }
 
 void bst_renderer_get_stats(const bst_renderer *r, bst_render_stats *out) {

@@ -60,6 +60,7 @@ typedef struct scenegen {
     bst_renderer *renderer;
     pick *picks;
     int pick_capacity;
+    long long saturated_told; /* frames */
 } scenegen;
 
 static void destroy(void *self) {
@@ -84,7 +85,7 @@ static bst_status create(const bst_module_env *env, const void *config_object, v
     s->key = bst_env_rng(env, "detector");
     bst_renderer_options options = bst_renderer_default_options();
     options.tolerance_sigma = c->fidelity.tolerance_sigma;
-    options.pool_frames = (int)c->pool_frames;
+    options.pool_frames = (int)c->pool_frames + BST_OVERLAP_FRAMES;
     bst_status status =
         bst_renderer_create(env->ctx, env->device, s->camera, &options, &s->renderer);
     if (status == BST_OK) {
@@ -157,6 +158,21 @@ static bst_status write_items(bst_ctx *ctx, scenegen *s, const bst_los_track *tr
     return BST_OK;
 }
 
+/* Counts the saturated frames among those that are done. */
+static void tell_saturated(scenegen *s, struct bst_step *step) {
+    for (; s->saturated_told < bst_renderer_saturated_frames(s->renderer); s->saturated_told++) {
+        bst_step_count(step, "saturated");
+    }
+}
+
+static bst_status finish(void *self, struct bst_step *step) {
+    scenegen *s = self;
+    long long pixels;
+    BST_TRY(bst_renderer_saturated(bst_step_ctx(step), s->renderer, &pixels));
+    tell_saturated(s, step);
+    return BST_OK;
+}
+
 static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure *e,
                          const bst_los_history *history) {
     bst_ctx *ctx = bst_step_ctx(step);
@@ -202,13 +218,7 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
     if (truth->lost > 0) {
         bst_step_count(step, "truth_overflow");
     }
-    if (!e->dropped) {
-        long long saturated;
-        BST_TRY(bst_renderer_saturated(ctx, s->renderer, &saturated));
-        if (saturated > 0) {
-            bst_step_count(step, "saturated");
-        }
-    }
+    tell_saturated(s, step);
     return BST_OK;
 }
 
@@ -239,4 +249,5 @@ const bst_module_desc bst_scenegen_module = {
     .create = create,
     .step = step_module,
     .destroy = destroy,
+    .finish = finish,
 };

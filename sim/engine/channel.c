@@ -6,9 +6,8 @@
 void bst_engine_count(bst_engine *engine, const char *what) {
     pthread_mutex_lock(&engine->counting);
     int i = 0, order = 1;
-    while (i < engine->counter_count &&
-           (order = strncmp(engine->counters[i].name, what, sizeof engine->counters->name - 1)) <
-               0) {
+    while (i < engine->counter_count && (order = strncmp(engine->counters[i].name, what,
+                                                         sizeof engine->counters->name - 1)) < 0) {
         i++;
     }
     counter *c = &engine->counters[i];
@@ -155,8 +154,8 @@ static bst_status publish(struct bst_step *step, int port_index) {
     return engine->overlap && !step->job
                ? bst_overlap_message(step->ctx, engine, ch, s->payload, step->tick)
                : bst_engine_heard(step->ctx, engine,
-                                  hooks->message(hooks->user, ch->scope, ch->type->name,
-                                                 s->payload, step->tick));
+                                  hooks->message(hooks->user, ch->scope, ch->type->name, s->payload,
+                                                 step->tick));
 }
 
 bst_status bst_engine_commit(struct bst_step *step) {
@@ -249,9 +248,9 @@ void bst_step_event(struct bst_step *step, const char *kind, const char *format,
     bst_status status =
         engine->overlap && !step->job
             ? bst_overlap_event(step->ctx, engine, step->tick, step->self->name, kind, text)
-            : bst_engine_heard(
-                  step->ctx, engine,
-                  engine->hooks.event(engine->hooks.user, step->tick, step->self->name, kind, text));
+            : bst_engine_heard(step->ctx, engine,
+                               engine->hooks.event(engine->hooks.user, step->tick, step->self->name,
+                                                   kind, text));
     if (step->hook_status == BST_OK) {
         step->hook_status = status;
     }

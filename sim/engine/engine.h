@@ -34,8 +34,8 @@ typedef struct bst_instance_spec {
 } bst_instance_spec;
 
 /* Sees what happens; any member may be NULL. `message` and `event` are called by one thread at a
- * time in the order in which things happen: the stepping one, or when overlapping the one behind it.
- * The others are called by the stepping thread. */
+ * time in the order in which things happen: the stepping one, or when overlapping the one behind
+ * it. The others are called by the stepping thread. */
 typedef struct bst_engine_hooks {
     void *user;
     /* A message was published (before any MODIFY port touches it). */
@@ -69,8 +69,8 @@ bst_status bst_engine_load(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
 /* Has bst_engine_run do in a second thread, in the order in which it would have been done, what
  * nothing else waits for: the hooks `message` and `event`, and the steps of modules that are
  * BST_MODULE_APART with no other reader than such modules. Messages that are needed there are
- * copied, as many as a bounded memory holds; then stepping waits. Results do not depend on it. After
- * bst_engine_load. */
+ * copied, as many as a bounded memory holds; then stepping waits. Results do not depend on it.
+ * After bst_engine_load. */
 bst_status bst_engine_overlap(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
 
 /* Steps everything that is due before `until_tick` (exclusive). All of it is done on return. */

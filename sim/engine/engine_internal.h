@@ -132,7 +132,8 @@ bst_status bst_engine_make_schedule(bst_ctx *ctx, bst_engine *engine) BST_MUST_C
 int64_t bst_engine_earliest(const bst_engine *engine, const instance *self);
 void bst_engine_set_due(bst_engine *engine, int instance, int64_t due);
 
-/* overlap.c: finds the instances that are apart and puts them last; before channels are allocated */
+/* overlap.c: finds the instances that are apart and puts them last; before channels are allocated
+ */
 void bst_engine_set_apart(bst_engine *engine);
 bst_status bst_overlap_start(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
 void bst_overlap_stop(bst_engine *engine);

@@ -1,6 +1,6 @@
 /* What one thread does behind the stepping one: hooks, and steps of instances that nothing else
- * waits for. The stepping thread puts copies of what is needed into a ring of bytes; the other takes
- * them out in the same order, so that everything happens in the order of a run without it. */
+ * waits for. The stepping thread puts copies of what is needed into a ring of bytes; the other
+ * takes them out in the same order, so that everything happens in the order of a run without it. */
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -24,7 +24,7 @@ typedef struct record {
 
 /* An input of a job, the payload behind it. */
 typedef struct job_input {
-    size_t bytes; /* with the payload */
+    size_t bytes;       /* with the payload */
     int instance, port; /* port -1: says that the instance is due */
     int64_t written_tick, sequence;
     bool taken;
@@ -163,8 +163,8 @@ static bst_status reserve(bst_ctx *ctx, bst_overlap *o, size_t content, bool hea
                         content);
     }
     pthread_mutex_lock(&o->lock);
-    while (o->status == BST_OK && ((heavy && o->heavy >= MOST_FRAMES) ||
-                                   (at = place(o, bytes)) == SIZE_MAX)) {
+    while (o->status == BST_OK &&
+           ((heavy && o->heavy >= MOST_FRAMES) || (at = place(o, bytes)) == SIZE_MAX)) {
         pthread_cond_wait(&o->changed, &o->lock);
     }
     if (o->status != BST_OK) {
@@ -218,7 +218,7 @@ bst_status bst_overlap_message(bst_ctx *ctx, bst_engine *engine, const channel *
     return BST_OK;
 }
 
-bst_status bst_overlap_event(bst_ctx *ctx, bst_engine *engine, int64_t tick, const char *instance,
+bst_status bst_overlap_event(bst_ctx *ctx, bst_engine *engine, int64_t tick, const char *source,
                              const char *kind, const char *text) {
     bst_overlap *o = engine->overlap;
     record *r;
@@ -226,7 +226,7 @@ bst_status bst_overlap_event(bst_ctx *ctx, bst_engine *engine, int64_t tick, con
     r->kind = EVENT;
     r->tick = tick;
     event_text *e = content_of(r);
-    snprintf(e->instance, sizeof e->instance, "%s", instance);
+    snprintf(e->instance, sizeof e->instance, "%s", source);
     snprintf(e->kind, sizeof e->kind, "%s", kind);
     snprintf(e->text, sizeof e->text, "%s", text);
     commit(o, r);
@@ -408,9 +408,9 @@ static bst_status work_off(bst_overlap *o, record *r) {
     } else if (r->kind == EVENT) {
         const event_text *e = content_of(r);
         if (status == BST_OK) {
-            status = bst_engine_heard(
-                &o->ctx, o->engine,
-                hooks->event(hooks->user, r->tick, e->instance, e->kind, e->text));
+            status =
+                bst_engine_heard(&o->ctx, o->engine,
+                                 hooks->event(hooks->user, r->tick, e->instance, e->kind, e->text));
         }
     } else {
         bst_overlap_job job = {content_of(r), r->bytes - RECORD_BYTES};
@@ -420,8 +420,7 @@ static bst_status work_off(bst_overlap *o, record *r) {
         for (job_input *i = next_input(&job, NULL); i; i = next_input(&job, i)) {
             if (i->port >= 0) {
                 const instance *self = o->engine->instances[i->instance];
-                let_go(&o->engine->channels[self->ports[i->port].channel],
-                       (char *)i + INPUT_BYTES);
+                let_go(&o->engine->channels[self->ports[i->port].channel], (char *)i + INPUT_BYTES);
             }
         }
     }

@@ -18,7 +18,7 @@ typedef enum bst_record_frames {
 typedef struct bst_record_config {
     int32_t frames;      /* bst_record_frames */
     int32_t compression; /* bst_fits_compression, of extensions */
-    bool checksums; /* of each HDU */
+    bool checksums;      /* of each HDU */
     bool truth;
     bool truth_stars;
     bool detections;
@@ -63,6 +63,12 @@ int bst_recorder_find(const bst_recorder *recorder, const char *observer, const 
 /* Whether messages of this channel (unscoped name) are recorded at all, so that the caller may
  * spare the call. */
 bool bst_recorder_wants(const bst_recorder *recorder, const char *channel);
+
+/* Whether a telemetry channel (los_history, pointing_telemetry, nav_telemetry) is recorded at this
+ * tick, the next of its grid after *last (-1 at first), which is updated; true for other channels
+ * that are wanted. */
+bool bst_recorder_due(const bst_recorder *recorder, const char *channel, int64_t tick,
+                      int64_t *last);
 
 /* Records a message that was written at `written_tick`. Frames are retained until their truth is
  * there, at most one per sensor. Channels that are not wanted are ignored. Telemetry written in
