@@ -9,6 +9,9 @@
 #define HALF (TAPS / 2)
 #define ROW (TAPS + 2 * BST_PROFILE_PAD)
 
+/* For vectors at any place: vstore16 becomes four stores on some devices. */
+typedef float16 loose16 __attribute__((aligned(4)));
+
 /* any(), by halves: some compilers test lane after lane. */
 static int any16(int16 v) {
     int8 a = v.lo | v.hi;
@@ -42,7 +45,7 @@ typedef struct splat_nodes {
     float share_x[BST_BLOCK], share_y[BST_BLOCK], share_width[BST_BLOCK];
     int wide[BST_BLOCK];
     float electrons[BST_BLOCK];
-} splat_nodes;
+} __attribute__((aligned(64))) splat_nodes;
 
 /* Tap j of a profile whose centre is f pixels (0 <= f < 1) right of pixel n belongs to pixel
  * n + j - (HALF - 1). profiles: [BST_WIDTHS + 1][PHASES + 1][ROW], zeros before and after the taps. */
@@ -50,20 +53,20 @@ static void place_nodes(global const float *block, int tile_x, int tile_y, int r
                         splat_nodes *out) {
     float16 x = vload16(0, block), y = vload16(1, block), width = vload16(3, block);
     float16 floor_x = floor(x), floor_y = floor(y);
-    vstore16(convert_int16(floor_x) - radius - tile_x, 0, out->left);
-    vstore16(convert_int16(floor_y) - radius - tile_y, 0, out->top);
+    *(int16 *)out->left = convert_int16(floor_x) - radius - tile_x;
+    *(int16 *)out->top = convert_int16(floor_y) - radius - tile_y;
     float16 phase_x = (x - floor_x) * PHASES, phase_y = (y - floor_y) * PHASES;
     int16 px = min(convert_int16(phase_x), PHASES - 1);
     int16 py = min(convert_int16(phase_y), PHASES - 1);
     int16 level = min(convert_int16(width), BST_WIDTHS - 1);
     int16 base = level * ((PHASES + 1) * ROW) + (BST_PROFILE_PAD + HALF - 1 - radius);
-    vstore16(base + px * ROW, 0, out->row_x);
-    vstore16(base + py * ROW, 0, out->row_y);
-    vstore16(phase_x - convert_float16(px), 0, out->share_x);
-    vstore16(phase_y - convert_float16(py), 0, out->share_y);
-    vstore16(width - convert_float16(level), 0, out->share_width);
-    vstore16(width > 0.0f, 0, out->wide);
-    vstore16(vload16(2, block), 0, out->electrons);
+    *(int16 *)out->row_x = base + px * ROW;
+    *(int16 *)out->row_y = base + py * ROW;
+    *(float16 *)out->share_x = phase_x - convert_float16(px);
+    *(float16 *)out->share_y = phase_y - convert_float16(py);
+    *(float16 *)out->share_width = width - convert_float16(level);
+    *(int16 *)out->wide = width > 0.0f;
+    *(float16 *)out->electrons = vload16(2, block);
 }
 
 /* The taps of node n along x on the vector of the tile that begins at `column`. */
@@ -96,10 +99,10 @@ static void splat_team(local float *sum, const splat_nodes *b, int n, int taps, 
             float16 h = profile16(profiles + b->row_y[n + k] + j, b->share_y[n + k],
                                   b->share_width[n + k], b->wide[n + k]);
             if (j + 16 <= taps) {
-                vstore16(h, 0, height + j);
+                *(loose16 *)(height + j) = h;
             } else { /* only the taps that count */
                 const int16 lanes = (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-                vstore16(select((float16)0.0f, h, lanes < taps - j), 0, height + j);
+                *(loose16 *)(height + j) = select((float16)0.0f, h, lanes < taps - j);
             }
         }
     }
