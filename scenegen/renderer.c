@@ -223,7 +223,7 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     r->queue = bst_device_queue(device);
     clRetainContext(r->context);
     clRetainCommandQueue(r->queue);
-    bst_smear_options smear = {r->options.tolerance_sigma, r->taps};
+    bst_smear_options smear = {r->options.tolerance_sigma, r->taps, r->phases};
     bst_status status = choose_tiles(ctx, device, &r->options, &r->most_bytes);
     if (status == BST_OK) {
         status = build(ctx, r, device);

@@ -386,6 +386,8 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
     s->last_peak_e = 0.0;
     bool moving = source->path != NULL;
     bool front = project(s, s->q_reference, source->apparent_mid, &x, &y);
+    /* a star that only a wide turn brings into the field is no small float from its place there */
+    moving = moving || !front || hypot(x, y) > 4.0 * far_px(s);
     *visible = !source->occulted && electrons > 0.0 && electrons < 1e30 && (front || moving);
     if (!*visible) {
         return BST_OK;
@@ -418,7 +420,15 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
     double sigmas = s->last_peak_e / sqrt(s->last_peak_e + s->dark_variance_e2);
     double lost = 1.0 - s->kept[radius] * s->kept[radius];
     int border = radius + 1 < MAX_TAPS / 2 ? radius + 1 : radius;
-    s->last_error_sigma = fmax((used->error + lost) * sigmas,
+    /* linear interpolation in the profile table, h^2 / 8 of the steepest edge's second derivative
+     * in the dimmer pixel of the edge; and places in float, rounded twice, at the edge's slope */
+    double h = 1.0 / s->options.phases,
+           extent = fmax((double)s->camera.width_px, (double)s->camera.height_px);
+    double table = 0.125 * h * h * 0.242 / (s->sigma_px * s->sigma_px) * s->last_peak_e /
+                   sqrt(0.16 * s->last_peak_e + s->dark_variance_e2);
+    double rounded = 1.5 * 0x1p-24 * extent * 0.4 / s->sigma_px * s->last_peak_e /
+                     sqrt(0.5 * s->last_peak_e + s->dark_variance_e2);
+    s->last_error_sigma = fmax((used->error + lost) * sigmas + table + rounded,
                                s->last_peak_e * s->tail[border] / sqrt(s->dark_variance_e2));
     /* what the stamp leaves out is put on the stamp, so that no light is lost */
     electrons /= s->kept[radius] * s->kept[radius];

@@ -13,6 +13,7 @@ typedef struct bst_smear bst_smear;
 typedef struct bst_smear_options {
     double tolerance_sigma; /* error of a source's image in any pixel, in that pixel's sigma */
     int taps;               /* length of the profile table, px */
+    int phases;             /* places per pixel of the profile table */
 } bst_smear_options;
 
 bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
