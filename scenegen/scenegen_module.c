@@ -151,7 +151,9 @@ static bst_status write_items(bst_ctx *ctx, scenegen *s, const bst_los_track *tr
     for (int i = 0; i < truth->count; i++) {
         int k = truth->lost > 0 ? s->picks[i].index : i;
         bst_field_truth_item(s->field, track, &sources[k], e->window, truth, &truth->items[i]);
-        if (bst_renderer_peak_e(s->renderer, k) >= limit_e) {
+        double x = truth->items[i].x_mean_px, y = truth->items[i].y_mean_px;
+        double light = isfinite(x) ? bst_camera_illumination(s->camera, x, y) : 1.0;
+        if (light * bst_renderer_peak_e(s->renderer, k) >= limit_e) {
             truth->items[i].flags |= BST_TRUTH_SATURATED;
         }
     }

@@ -30,6 +30,7 @@ typedef struct bst_scene_params {
     float dn_per_e;
     float offset_dn;
     float max_dn;
+    int light_first, light_pitch; /* of the Fourier path's image, floats */
 } bst_scene_params;
 
 /* One source on its way to its nodes. */

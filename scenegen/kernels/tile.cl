@@ -1,4 +1,5 @@
-/* One tile of the frame per work-item. Option: GROUP (work-items per work-group). */
+/* One tile of the frame per work-item. Options: GROUP (work-items per work-group), FFT_LIGHT (the
+ * light is an image, given as `profiles`). */
 
 /* frame: [window_height][window_width] digital numbers. saturated: pixels per tile. */
 __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
@@ -13,8 +14,13 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     local float *sum = sums[get_local_id(0)];
     int left = tile % p.tiles_x * TILE_W, top = tile / p.tiles_x * TILE_H;
     int tile_x = p.window_x0 + left, tile_y = p.window_y0 + top;
+#ifdef FFT_LIGHT
+    load_tile(sum, p, left, top, profiles);
+#else
     splat_tile(sum, tile_x, tile_y, p.source_groups, sources, nodes, block_box, source_box,
                profiles);
+#endif
+    SHADE_TILE(sum, tile_x, tile_y);
     int16 full_count = (int16)0;
     int rows = min(TILE_H, p.window_height - top), columns = min(TILE_W, p.window_width - left);
     for (int y = 0; y < rows; y++) {
@@ -57,8 +63,13 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_expecte
     }
     local float *sum = sums[get_local_id(0)];
     int left = tile % p.tiles_x * TILE_W, top = tile / p.tiles_x * TILE_H;
+#ifdef FFT_LIGHT
+    load_tile(sum, p, left, top, profiles);
+#else
     splat_tile(sum, p.window_x0 + left, p.window_y0 + top, p.source_groups, sources, nodes,
                block_box, source_box, profiles);
+#endif
+    SHADE_TILE(sum, p.window_x0 + left, p.window_y0 + top);
     int rows = min(TILE_H, p.window_height - top), columns = min(TILE_W, p.window_width - left);
     for (int y = 0; y < rows; y++) {
         global float *out = image + (size_t)(top + y) * p.window_width + left;
