@@ -323,7 +323,7 @@ static bst_status watch_sensors(run_state *run, const bst_world *world) {
             BST_TRY(bst_loop_summary_create(run->ctx, world, i, s, run->scenario->tick_rate_hz,
                                             target, &w->summary));
             if (run->sensor_count == 0) {
-                BST_TRY(bst_run_pictures_create(run->ctx, &sensors[s].camera,
+                BST_TRY(bst_run_pictures_create(run->ctx, bst_world_camera(world, i, s),
                                                 run->scenario->tick_rate_hz, run->scenario->epoch,
                                                 target, &run->pictures));
                 bst_loop_summary_on_frame(w->summary, on_judged, run->pictures);
@@ -347,7 +347,7 @@ static bool has_module(const bst_scenario *scenario, int observer, int sensor, c
     return false;
 }
 
-static bst_status open_recorder(run_state *run, bst_run *store) {
+static bst_status open_recorder(run_state *run, const bst_world *world, bst_run *store) {
     const bst_scenario *scenario = run->scenario;
     const bst_observer_config *observers = scenario->observers.items;
     bst_recorder_sensor *list = calloc((size_t)run->sensor_count, sizeof *list);
@@ -362,7 +362,7 @@ static bst_status open_recorder(run_state *run, bst_run *store) {
                 .observer = observers[i].name,
                 .sensor = sensors[s].name,
                 .target = *sensors[s].cue.object ? sensors[s].cue.object : NULL,
-                .camera = &sensors[s].camera,
+                .camera = bst_world_camera(world, i, s),
                 .has_truth = has_module(scenario, i, s, "scenegen")};
         }
     }
@@ -372,7 +372,8 @@ static bst_status open_recorder(run_state *run, bst_run *store) {
                               .tick_rate_hz = scenario->tick_rate_hz,
                               .program = program,
                               .sensors = list,
-                              .sensor_count = n};
+                              .sensor_count = n,
+                              .world = world};
     bst_status status =
         bst_recorder_create(run->ctx, store, &scenario->record, &info, &run->recorder);
     for (int i = 0; status == BST_OK && i < n; i++) {
@@ -423,21 +424,25 @@ static bst_status write_ending(run_state *run, bst_simulation *sim, bst_run *sto
 static void warn_of_space(const run_state *run, const char *out) {
     const bst_scenario *scenario = run->scenario;
     const bst_observer_config *observers = scenario->observers.items;
-    double bytes = 0.0;
+    const bst_record_config *record = &scenario->record;
+    /* Rice takes 8-bit noise to about half */
+    double bytes = 0.0, per_pixel = record->frames == BST_RECORD_NO_FRAMES ? 0.0
+                                    : record->compression                  ? 1.0
+                                                                           : 2.0;
+    for (uint32_t planes = record->planes; planes; planes &= planes - 1) {
+        per_pixel += 4.0;
+    }
     for (int i = 0; i < scenario->observers.count; i++) {
         const bst_sensor_config *sensors = observers[i].sensors.items;
         for (int s = 0; s < observers[i].sensors.count; s++) {
             const bst_exposure_config *e = &sensors[s].exposure;
             double frames = floor((scenario->duration_s - e->first_s) / e->period_s);
-            bytes += fmax(frames, 0.0) * 2.0 * (double)sensors[s].camera.width_px *
+            bytes += fmax(frames, 0.0) * per_pixel * (double)sensors[s].camera.width_px *
                      (double)sensors[s].camera.height_px;
         }
     }
-    /* Rice takes 8-bit noise to about half */
-    bytes *= scenario->record.compression ? 0.5 : 1.0;
     double free_bytes = (double)bst_run_free_bytes(out);
-    if (scenario->record.frames != BST_RECORD_NO_FRAMES && free_bytes >= 0.0 &&
-        bytes > free_bytes) {
+    if (free_bytes >= 0.0 && bytes > free_bytes) {
         bst_log(run->ctx, BST_LOG_WARNING,
                 "%s: the frames will take about %.1f GB and %.1f GB are free there; shorten the "
                 "run (--duration), set /record/compression=rice or /record/frames=none, or choose "
@@ -461,7 +466,7 @@ static bst_status execute(run_state *run, bst_simulation *sim, const char *out, 
                              : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the scenario");
     cJSON_Delete(echo);
     if (status == BST_OK) {
-        status = open_recorder(run, store);
+        status = open_recorder(run, bst_simulation_world(sim), store);
     }
     double wall = 0.0;
     bool stepped = false;

@@ -215,7 +215,7 @@ bst_status bst_overlap_message(bst_ctx *ctx, bst_engine *engine, const channel *
         ch->type->retain(content_of(r));
     }
     commit(o, r);
-    return BST_OK;
+    return ch->type->lends ? bst_overlap_drain(ctx, engine) : BST_OK;
 }
 
 bst_status bst_overlap_event(bst_ctx *ctx, bst_engine *engine, int64_t tick, const char *source,

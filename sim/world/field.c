@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/world/field_image.h"
 #include "sim/world/field_objects.h"
 #include "sim/world/psf.h"
 
@@ -31,8 +32,8 @@ struct bst_field {
     bst_faint_stars *faint; /* NULL: none */
     bst_source *sources;
     int source_capacity;
-    bst_source_path *paths; /* [path_capacity], of the objects among the sources */
-    int path_capacity;
+    bst_object_parts *parts; /* [part_capacity], of the objects among the sources */
+    int part_capacity;
     int *near; /* objects that may be in the field; room for all */
     bst_quat q_mid;
     double exposure_s;
@@ -75,10 +76,14 @@ void bst_field_free(bst_field *field) {
         free(field->q);
         free(field->stars);
         free(field->sources);
-        free(field->paths);
+        free(field->parts);
         free(field->near);
         free(field);
     }
+}
+
+void bst_field_set_camera(bst_field *field, const bst_camera *camera) {
+    field->camera = camera;
 }
 
 static const bst_los_sample *ring_sample(const bst_los_history *history, int64_t number) {
@@ -317,12 +322,12 @@ static bst_status reserve_sources(bst_ctx *ctx, bst_field *field, int count) {
     return BST_OK;
 }
 
-static bst_status reserve_paths(bst_ctx *ctx, bst_field *field, int count) {
-    if (count > field->path_capacity) {
-        free(field->paths);
-        field->paths = malloc((size_t)count * sizeof *field->paths);
-        field->path_capacity = field->paths ? count : 0;
-        if (!field->paths) {
+static bst_status reserve_parts(bst_ctx *ctx, bst_field *field, int count) {
+    if (count > field->part_capacity) {
+        free(field->parts);
+        field->parts = malloc((size_t)count * sizeof *field->parts);
+        field->part_capacity = field->parts ? count : 0;
+        if (!field->parts) {
             return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d objects", count);
         }
     }
@@ -377,10 +382,11 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     truth->observer_gcrf_mps = eye.velocity_mps;
     truth->velocity_bary_mps = light.velocity_mps;
     truth->sun_m = light.sun_m;
+    truth->pixel_scale_arcsec = camera->pixel_scale_arcsec;
     truth->boresight_x_px = bst_camera_centre_x(camera);
     truth->boresight_y_px = bst_camera_centre_y(camera);
     truth->background_e = bst_camera_background_e_per_s(camera) * exposure;
-    truth->dark_e = camera->dark_current_e_per_s * exposure;
+    truth->dark_e = bst_camera_dark_e_per_s(camera) * exposure;
 
     double margin_px = options->margin_px + reach_px;
     bst_vec3 centre_cam = bst_camera_unproject(camera, window.x0 + 0.5 * (window.width - 1),
@@ -418,15 +424,15 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
             continue;
         }
         bst_source *s = &field->sources[n++];
-        *s =
-            (bst_source){.kind = BST_SOURCE_STAR,
-                         .id = star->id,
-                         .apparent_mid = apparent,
-                         .electrons_per_s = bst_camera_electrons_per_s(camera, (double)star->v_mag),
-                         .v_mag = (double)star->v_mag,
-                         .sunlit_fraction = NAN,
-                         .phase_rad = NAN,
-                         .range_m = INFINITY};
+        *s = (bst_source){.kind = BST_SOURCE_STAR,
+                          .id = star->id,
+                          .apparent_mid = apparent,
+                          .electrons_per_s = bst_camera_star_electrons_per_s(
+                              camera, (double)star->v_mag, (double)star->b_minus_v),
+                          .v_mag = (double)star->v_mag,
+                          .sunlit_fraction = NAN,
+                          .phase_rad = NAN,
+                          .range_m = INFINITY};
         /* the Earth hides stars too: a point far along the line of sight stands for the star */
         s->occulted =
             bst_earth_occults(eye.position_m, bst_vec3_axpy(eye.position_m, 1e12, star->icrs),
@@ -436,7 +442,7 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
         }
         bst_vec3_to_radec(star->icrs, &s->ra_rad, &s->dec_rad);
     }
-    BST_TRY(reserve_paths(ctx, field, near_count));
+    BST_TRY(reserve_parts(ctx, field, near_count));
     const bst_object_query objects = {field->view,  camera, field->observer, start_s, end_s,
                                       field->q_mid, window, margin_px,       centre,  radius};
     for (int i = 0, used = 0; i < near_count; i++) {
@@ -444,7 +450,7 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
         if (is_self(field, field->near[i])) {
             continue;
         }
-        BST_TRY(bst_field_object(ctx, &objects, field->near[i], &field->paths[used],
+        BST_TRY(bst_field_object(ctx, &objects, field->near[i], &field->parts[used],
                                  &field->sources[n], &there));
         n += there;
         used += there;
@@ -467,14 +473,9 @@ static double squared_image(double along, double across, double length) {
     return line / (2.0 * root_pi * across);
 }
 
-/* Mean and covariance over the exposure of where a source's image is; NAN when it is behind the
- * camera. */
-typedef struct smear {
-    double x_mean, y_mean, xx, xy, yy;
-} smear;
-
-static smear smear_of(const bst_field *field, const bst_source *source) {
-    smear m = {0};
+/* Of the image of a point; NAN when it is behind the camera. */
+static bst_image_moments smear_of(const bst_field *field, const bst_source *source) {
+    bst_image_moments m = {0};
     double x[SIGMA_POINTS], y[SIGMA_POINTS];
     for (int p = 0; p < SIGMA_POINTS; p++) {
         bst_vec3 d = bst_source_direction(source, field->sigma_time[p]);
@@ -499,8 +500,8 @@ static smear smear_of(const bst_field *field, const bst_source *source) {
  * pixel's own width, widened along and across the way from the first to the last
  * position by what the smear has beyond a uniform straight streak of that length (jitter, bends).
  */
-static void blur(const bst_camera *camera, const smear *m, double dx, double dy, double *along,
-                 double *across) {
+static void blur(const bst_camera *camera, const bst_image_moments *m, double dx, double dy,
+                 double *along, double *across) {
     double psf = bst_camera_psf_sigma_px(camera), sigma;
     if (camera->psf && !bst_psf_gaussian(camera->psf, &sigma) && isfinite(m->x_mean)) {
         psf = bst_psf_equivalent_fwhm_px(camera->psf, m->x_mean, m->y_mean) / 2.3548200450309493;
@@ -541,7 +542,11 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
                             &out->y_end_px);
     (void)bst_camera_project(camera, bst_quat_rotate(field->q_mid, source->apparent_mid),
                              &out->x_mid_px, &out->y_mid_px);
-    smear image = smear_of(field, source);
+    bst_image_moments image =
+        source->rate ? bst_image_by_light(field->camera, track, source) : smear_of(field, source);
+    if (source->shape) {
+        bst_image_add_disc(field->camera, field->q_mid, source, &image);
+    }
     out->x_mean_px = image.x_mean;
     out->y_mean_px = image.y_mean;
     if (isfinite(image.x_mean)) {

@@ -1,0 +1,22 @@
+/* Where the light of a source falls; inside of sim/world. */
+#ifndef BST_WORLD_FIELD_IMAGE_H
+#define BST_WORLD_FIELD_IMAGE_H
+
+#include "sim/world/field.h"
+
+/* Mean and covariance over the exposure of where a source's image is, px; NAN when it is behind the
+ * camera. */
+typedef struct bst_image_moments {
+    double x_mean, y_mean, xx, xy, yy;
+} bst_image_moments;
+
+/* Of a source whose brightness changes, weighted by its light. */
+bst_image_moments bst_image_by_light(const bst_camera *camera, const bst_los_track *track,
+                                     const bst_source *source);
+
+/* Moves and widens the moments of a point by the places of the light on the source's disc, seen
+ * with attitude q_mid. */
+void bst_image_add_disc(const bst_camera *camera, bst_quat q_mid, const bst_source *source,
+                        bst_image_moments *m);
+
+#endif
