@@ -45,6 +45,8 @@ struct bst_renderer {
     bst_scene_source *list; /* drawn sources */
     double *peak_e;         /* of all sources of the request */
     int list_capacity, tiles;
+    bool uncounted; /* saturated pixels of the latest frame */
+    long long saturated_pixels, saturated_frames;
     uint64_t most_bytes; /* of one buffer on the device */
     bst_render_stats stats;
 };
@@ -460,6 +462,27 @@ static bst_scene_params make_params(const bst_renderer *r, const bst_render_requ
     };
 }
 
+/* Counts the saturated pixels of the latest frame, once. Waits for it. */
+static bst_status count_saturated(bst_ctx *ctx, bst_renderer *r) {
+    if (!r->uncounted) {
+        return BST_OK;
+    }
+    r->uncounted = false;
+    r->saturated_pixels = 0;
+    cl_int code;
+    size_t bytes = (size_t)r->tiles * sizeof(cl_int);
+    cl_int *p = clEnqueueMapBuffer(r->queue, r->saturated.buffer, CL_TRUE, CL_MAP_READ, 0, bytes, 0,
+                                   NULL, NULL, &code);
+    BST_TRY(bst_device_check(ctx, code, "mapping the count of saturated pixels"));
+    for (int i = 0; i < r->tiles; i++) {
+        r->saturated_pixels += p[i];
+    }
+    r->saturated_frames += r->saturated_pixels > 0;
+    return bst_device_check(
+        ctx, clEnqueueUnmapMemObject(r->queue, r->saturated.buffer, p, 0, NULL, NULL),
+        "unmapping the count of saturated pixels");
+}
+
 /* The image that the tile kernel takes its light from, where the PSF is no Gaussian. */
 static bst_status make_light(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q, int groups,
                              bst_scene_params *p, cl_mem *light) {
@@ -479,6 +502,7 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
                                 cl_kernel kernel, cl_mem out, int stride, bool light_only) {
     int blocks = 0, groups = 0;
     BST_TRY(plan(ctx, r, q, &blocks));
+    BST_TRY(count_saturated(ctx, r)); /* of the frame before, which was rendered meanwhile */
     BST_TRY(enqueue_nodes(ctx, r, blocks, &groups));
     bst_scene_params p = make_params(r, q, groups);
     p.image_stride = stride > 0 ? stride : p.image_stride;
@@ -508,10 +532,9 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
     const size_t m = sizeof(cl_mem), bytes[] = {sizeof p, m, m, m, m, m, m, m, m, m, m, m, m};
     BST_TRY(set_args(ctx, kernel, values, bytes, kernel == r->frame_kernel ? 13 : 7));
     size_t group = (size_t)r->options.group, global = (tiles + group - 1) / group * group;
-    BST_TRY(bst_device_check(
+    return bst_device_check(
         ctx, clEnqueueNDRangeKernel(r->queue, kernel, 1, NULL, &global, &group, 0, NULL, NULL),
-        "rendering a frame"));
-    return bst_device_check(ctx, clFlush(r->queue), "starting the rendering");
+        "rendering a frame");
 }
 
 bst_status bst_renderer_plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *request) {
@@ -554,7 +577,14 @@ bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *r, const bst_render_r
                      : enqueue_tiles(ctx, r, request, r->frame_kernel, buffer, 0, false);
     }
     if (status == BST_OK) {
+        r->uncounted = true;
+        status = bst_frame_pool_enqueued(ctx, frame);
+    }
+    if (status == BST_OK) {
         status = bst_detector_end(ctx, r->detector);
+    }
+    if (status == BST_OK) {
+        status = bst_device_check(ctx, clFlush(r->queue), "starting the rendering");
     }
     if (status != BST_OK) {
         bst_frame_release(frame);
@@ -580,21 +610,13 @@ bst_status bst_renderer_render_noise_free(bst_ctx *ctx, bst_renderer *r,
 }
 
 bst_status bst_renderer_saturated(bst_ctx *ctx, bst_renderer *r, long long *pixels) {
-    *pixels = 0;
-    if (r->tiles == 0) {
-        return BST_OK;
-    }
-    cl_int code;
-    size_t bytes = (size_t)r->tiles * sizeof(cl_int);
-    cl_int *p = clEnqueueMapBuffer(r->queue, r->saturated.buffer, CL_TRUE, CL_MAP_READ, 0, bytes, 0,
-                                   NULL, NULL, &code);
-    BST_TRY(bst_device_check(ctx, code, "mapping the count of saturated pixels"));
-    for (int i = 0; i < r->tiles; i++) {
-        *pixels += p[i];
-    }
-    return bst_device_check(
-        ctx, clEnqueueUnmapMemObject(r->queue, r->saturated.buffer, p, 0, NULL, NULL),
-        "unmapping the count of saturated pixels");
+    BST_TRY(count_saturated(ctx, r));
+    *pixels = r->saturated_pixels;
+    return BST_OK;
+}
+
+long long bst_renderer_saturated_frames(const bst_renderer *r) {
+    return r->saturated_frames;
 }
 
 void bst_renderer_get_stats(const bst_renderer *r, bst_render_stats *out) {

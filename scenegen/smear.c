@@ -508,6 +508,8 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
     s->disc_px =
         source->shape ? tan(asin(source->shape->radius)) / bst_camera_scale_rad(&s->camera) : 0.0;
     bool front = project(s, s->q_reference, source->apparent_mid, &x, &y);
+    /* a star that only a wide turn brings into the field is no small float from its place there */
+    moving = moving || !front || hypot(x, y) > 4.0 * far_px(s);
     *visible = !source->occulted && electrons > 0.0 && electrons < 1e30 && (front || moving);
     if (!*visible) {
         return BST_OK;
@@ -553,8 +555,12 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
     double sigmas = s->last_peak_e / sqrt(s->last_peak_e + s->dark_variance_e2);
     double lost = 1.0 - s->kept[radius] * s->kept[radius];
     int border = radius + 1 < MAX_TAPS / 2 ? radius + 1 : radius;
+    /* places in float, rounded twice, where the image is steepest */
+    double extent = fmax((double)s->camera.width_px, (double)s->camera.height_px);
+    double rounded = 1.5 * 0x1p-24 * extent * 0.4 / s->sigma_px * s->last_peak_e /
+                     sqrt(0.5 * s->last_peak_e + s->dark_variance_e2);
     double shared = s->single && !moving ? single_error(s, s->last_peak_e, hypot(x, y)) : 0.0;
-    s->last_error_sigma = fmax((used->error + lost) * sigmas + shared,
+    s->last_error_sigma = fmax((used->error + lost) * sigmas + shared + rounded,
                                s->last_peak_e * s->tail[border] / sqrt(s->dark_variance_e2));
     if (s->options.temporal_oversample > 0) {
         s->last_error_sigma = NAN;
