@@ -10,6 +10,7 @@
 #include "scenegen/detector.h"
 #include "scenegen/fft_light.h"
 #include "scenegen/frame_pool.h"
+#include "scenegen/profile_table.h"
 #include "scenegen/readout.h"
 #include "scenegen/reference.h"
 #include "scenegen/smear.h"
@@ -117,51 +118,6 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
     return bst_readout_create(ctx, device, &r->camera, r->program, &r->readout);
 }
 
-/* Share of the peak that linear interpolation between the phases misses: 1 / (8 phases^2 sigma^2)
- * on each axis. */
-static double table_error(double sigma_px, int phases) {
-    return 0.25 / (sigma_px * sigma_px * phases * phases);
-}
-
-/* Phases with which a source that nearly fills the pixels' wells is right to a third of the
- * tolerance; for fainter ones it is less. */
-static int phases_for(double sigma_px, double tolerance_sigma, double full_well_e) {
-    int phases = 8;
-    while (phases < 2048 &&
-           table_error(sigma_px, phases) * sqrt(full_well_e) > 0.33 * tolerance_sigma) {
-        phases *= 2;
-    }
-    return phases;
-}
-
-/* [BST_WIDTHS + 1][phases + 1][taps]: shares of a profile centred phase / phases right of a pixel.
- */
-static bst_status make_profiles(bst_ctx *ctx, bst_renderer *r) {
-    size_t rows = (size_t)(BST_WIDTHS + 1) * (size_t)(r->phases + 1),
-           row_floats = (size_t)r->taps + 2 * BST_PROFILE_PAD;
-    size_t bytes = rows * row_floats * sizeof(float);
-    float *table = calloc(rows, row_floats * sizeof(float));
-    if (!table) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the PSF table");
-    }
-    double psf = bst_camera_psf_sigma_px(&r->camera);
-    for (size_t row = 0; row < rows; row++) {
-        size_t width = row / (size_t)(r->phases + 1), phase = row % (size_t)(r->phases + 1);
-        double share = (double)width / BST_WIDTHS;
-        double sigma = psf * sqrt(1.0 + BST_WIDEST * share * share);
-        for (int j = 0; j < r->taps; j++) {
-            table[row * row_floats + BST_PROFILE_PAD + (size_t)j] =
-                (float)bst_reference_pixel_share((double)phase / r->phases, sigma,
-                                                 j - (r->taps / 2 - 1));
-        }
-    }
-    cl_int code;
-    r->profiles =
-        clCreateBuffer(r->context, CL_MEM_READ_ONLY | CL_MEM_COPY_HOST_PTR, bytes, table, &code);
-    free(table);
-    return bst_device_check(ctx, code, "allocating the PSF table");
-}
-
 /* Makes room for `bytes`; the content is lost when the buffer grows. */
 static bst_status grow(bst_ctx *ctx, bst_renderer *r, growing *g, size_t bytes) {
     if (g->bytes >= bytes && g->buffer) {
@@ -233,14 +189,14 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     double sigma_px = bst_camera_psf_sigma_px(camera);
     r->phases = r->options.psf_phases > 0
                     ? r->options.psf_phases
-                    : phases_for(sigma_px, r->options.tolerance_sigma, camera->full_well_e);
+                    : bst_profile_phases(sigma_px, r->options.tolerance_sigma, camera->full_well_e);
     r->context = bst_device_context(device);
     r->queue = bst_device_queue(device);
     clRetainContext(r->context);
     clRetainCommandQueue(r->queue);
     bst_smear_options smear = {.tolerance_sigma = r->options.tolerance_sigma,
                                .taps = r->taps,
-                               .table_error = table_error(sigma_px, r->phases),
+                               .table_error = bst_profile_error(sigma_px, r->phases),
                                .motion = r->options.motion,
                                .temporal_oversample = r->options.temporal_oversample,
                                .stamp_radius_px = r->options.stamp_radius_px};
@@ -255,7 +211,8 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
         status = build(ctx, r, device);
     }
     if (status == BST_OK) {
-        status = make_profiles(ctx, r);
+        status = bst_profile_table(ctx, r->context, bst_camera_psf_sigma_px(camera), r->taps,
+                                   r->phases, &r->profiles);
     }
     if (status == BST_OK) {
         status = bst_smear_create(ctx, camera, &smear, &r->smear);

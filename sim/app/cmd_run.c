@@ -1,7 +1,6 @@
 #include <errno.h>
 #include <math.h>
 #include <pthread.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,6 +12,7 @@
 #include "sim/app/json_number.h"
 #include "sim/app/load.h"
 #include "sim/app/run_pictures.h"
+#include "sim/app/stop_signals.h"
 #include "sim/core/version.h"
 #include "sim/core/wall_clock.h"
 #include "sim/device/device.h"
@@ -21,36 +21,6 @@
 #include "sim/eval/loop_summary.h"
 #include "sim/io/manifest.h"
 #include "sim/io/wcs.h"
-
-static volatile sig_atomic_t stop_requested;
-
-static const int stop_signals[] = {SIGINT, SIGTERM, SIGHUP};
-enum { STOP_SIGNALS = sizeof stop_signals / sizeof *stop_signals };
-
-/* The first one asks the run to end; the second one, of whatever kind, ends the process. */
-static void on_signal(int number) {
-    (void)number;
-    stop_requested = 1;
-    for (int i = 0; i < STOP_SIGNALS; i++) {
-        signal(stop_signals[i], SIG_DFL);
-    }
-}
-
-static void catch_signals(void) {
-    stop_requested = 0;
-    for (int i = 0; i < STOP_SIGNALS; i++) {
-        struct sigaction action = {.sa_handler = on_signal}, before;
-        /* nohup has the program ignore the end of the terminal */
-        if (stop_signals[i] != SIGHUP ||
-            (sigaction(SIGHUP, NULL, &before) == 0 && before.sa_handler != SIG_IGN)) {
-            sigaction(stop_signals[i], &action, NULL);
-        }
-    }
-    /* a limit on the size of files and a reader that went away are errors of a write, not the end
-     * of the process */
-    signal(SIGXFSZ, SIG_IGN);
-    signal(SIGPIPE, SIG_IGN);
-}
 
 /* One sensor as the run watches it. */
 typedef struct watched_sensor {
@@ -171,7 +141,7 @@ static void show_progress(run_state *run, int64_t tick, bool last) {
 
 static bool interrupted(void *user, int64_t tick) {
     show_progress(user, tick, false);
-    return stop_requested != 0;
+    return bst_stop_requested();
 }
 
 static cJSON *summary_json(const bst_loop_figures *f, double real_time_factor) {
@@ -456,7 +426,7 @@ static void warn_of_space(const run_state *run, const char *out) {
 static bst_status execute(run_state *run, bst_simulation *sim, const char *out, bool overwrite) {
     bst_ctx *ctx = run->ctx;
     bst_run *store = NULL;
-    if (stop_requested) {
+    if (bst_stop_requested()) {
         return bst_fail(ctx, BST_ERR_INTERRUPTED, "interrupted before the run began");
     }
     warn_of_space(run, out);
@@ -580,7 +550,7 @@ int bst_cmd_run(int argc, char **argv) {
     }
     char default_out[128];
     snprintf(default_out, sizeof default_out, "runs/%s", scenario.name);
-    catch_signals();
+    bst_stop_catch_signals();
     run_state run = {
         .ctx = &ctx, .scenario = &scenario, .progress = !quiet && isatty(STDERR_FILENO)};
     bst_ctx_init(&run.hooks, bst_app_log, NULL, BST_LOG_INFO);
