@@ -10,16 +10,19 @@
 #include "scenegen/detector.h"
 #include "scenegen/fft_light.h"
 #include "scenegen/frame_pool.h"
-#include "scenegen/profile_table.h"
+#include "scenegen/profile_law.h"
 #include "scenegen/readout.h"
 #include "scenegen/reference.h"
 #include "scenegen/smear.h"
 #include "scenegen/tiles.h"
 #include "scenegen/vignetting.h"
 
-enum { MAX_TAPS = 512, BOX_FLOATS = 4 };
-/* Of a block of nodes: place and weight. */
-enum { NODE_BYTES = BST_BLOCK * BST_NODE_ROWS * (int)sizeof(float) };
+enum { MAX_TAPS = 512 };
+/* Of a block of nodes: its box, and what the Fourier path takes of them. */
+enum {
+    BOX_BYTES = 4 * (int)sizeof(float),
+    NODE_BYTES = BST_BLOCK * BST_NODE_ROWS * (int)sizeof(float)
+};
 
 /* A device buffer that grows. */
 typedef struct growing {
@@ -30,7 +33,7 @@ typedef struct growing {
 struct bst_renderer {
     bst_camera camera;
     bst_renderer_options options;
-    int taps, phases;
+    int taps, law_degree; /* of the stamps' profiles */
     cl_context context;
     cl_command_queue queue;
     cl_program program;
@@ -41,8 +44,8 @@ struct bst_renderer {
     bst_detector *detector;
     bst_readout *readout;
     bst_frame_pool *pool;
-    cl_mem profiles;
-    growing table, sources, nodes, block_box, source_box, saturated, expected;
+    cl_mem law; /* of the stamps' profiles */
+    growing table, sources, nodes, block_box, source_box, group_box, saturated, expected;
     bst_scene_source *list; /* drawn sources */
     double *peak_e;         /* of all sources of the request */
     int list_capacity, tiles;
@@ -80,15 +83,21 @@ static int taps_for(double sigma_px) {
 
 static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
     const bst_kernel_source *sources[] = {
-        &bst_kernel_scene_shared, &bst_kernel_nodes,    &bst_kernel_splat,
-        &bst_kernel_random,       &bst_kernel_detector, &bst_kernel_light,
+        &bst_kernel_scene_shared, &bst_kernel_nodes,    &bst_kernel_random,
+        &bst_kernel_splat,        &bst_kernel_detector, &bst_kernel_light,
         &bst_kernel_vignetting,   &bst_kernel_tile,     &bst_kernel_readout};
     char options[2048];
+    double sigma_px = bst_camera_psf_sigma_px(&r->camera);
     int length = snprintf(options, sizeof options,
                           "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d "
-                          "-DPHASES=%d%s",
+                          "-DEDGE_SCALE=%.9ef%s",
                           r->options.tile_width, r->options.tile_height, r->options.group, r->taps,
-                          r->phases, r->fft_light ? " -DFFT_LIGHT" : "");
+                          1.0 / (sqrt(2.0) * sigma_px), r->fft_light ? " -DFFT_LIGHT" : "");
+    if (r->law_degree > 0) {
+        length += snprintf(options + length, sizeof options - (size_t)length,
+                           " -DDEGREE=%d -DBARELY_WIDER=%.9ef", r->law_degree,
+                           1.0 / sqrt(1.0 + bst_profile_law_widest(sigma_px, r->law_degree)));
+    }
     length += bst_vignetting_options(&r->camera, options + length, sizeof options - (size_t)length);
     length += bst_detector_options(r->detector, options + length, sizeof options - (size_t)length);
     if (r->options.spatial_oversample > 0) {
@@ -153,6 +162,26 @@ static bst_status upload(bst_ctx *ctx, bst_renderer *r, growing *g, const void *
                             "unmapping scene memory");
 }
 
+/* The polynomials of the stamps' profiles, where they serve. */
+static bst_status make_law(bst_ctx *ctx, bst_renderer *r) {
+    double sigma_px = bst_camera_psf_sigma_px(&r->camera);
+    int degree = r->fft_light ? 0 : bst_profile_law_degree(sigma_px), reach = r->taps / 2;
+    size_t count = degree > 0 ? (size_t)bst_profile_law_floats(degree, reach) : 1;
+    float *law = calloc(count, sizeof *law);
+    if (!law) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the PSF's profile");
+    }
+    if (degree > 0) {
+        bst_profile_law(sigma_px, degree, reach, law);
+    }
+    cl_int code;
+    r->law_degree = degree;
+    r->law = clCreateBuffer(r->context, CL_MEM_READ_ONLY | CL_MEM_COPY_HOST_PTR,
+                            count * sizeof *law, law, &code);
+    free(law);
+    return bst_device_check(ctx, code, "allocating the PSF's profile");
+}
+
 /* The PSF, and the Fourier path where it is no Gaussian. */
 static bst_status open_psf(bst_ctx *ctx, bst_device *device, bst_renderer *r,
                            bst_smear_options *smear) {
@@ -169,7 +198,6 @@ static bst_status open_psf(bst_ctx *ctx, bst_device *device, bst_renderer *r,
     light.taps = r->options.fft_taps > 0 ? r->options.fft_taps : light.taps;
     BST_TRY(bst_fft_light_create(ctx, device, &r->camera, r->psf, &light, &r->fft_light));
     smear->widest = bst_fft_light_widest(r->fft_light);
-    smear->table_error = 0.0;
     smear->node_sigma_px = bst_fft_light_band(r->fft_light)->node_sigma_px;
     smear->share_sigma_px = bst_fft_light_band(r->fft_light)->share_sigma_px;
     return BST_OK;
@@ -186,17 +214,12 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     r->camera = *camera;
     r->options = options ? *options : bst_renderer_default_options();
     r->taps = taps_for(bst_camera_psf_sigma_px(camera));
-    double sigma_px = bst_camera_psf_sigma_px(camera);
-    r->phases = r->options.psf_phases > 0
-                    ? r->options.psf_phases
-                    : bst_profile_phases(sigma_px, r->options.tolerance_sigma, camera->full_well_e);
     r->context = bst_device_context(device);
     r->queue = bst_device_queue(device);
     clRetainContext(r->context);
     clRetainCommandQueue(r->queue);
     bst_smear_options smear = {.tolerance_sigma = r->options.tolerance_sigma,
                                .taps = r->taps,
-                               .table_error = bst_profile_error(sigma_px, r->phases),
                                .motion = r->options.motion,
                                .temporal_oversample = r->options.temporal_oversample,
                                .stamp_radius_px = r->options.stamp_radius_px};
@@ -208,11 +231,10 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
         status = bst_detector_create(ctx, device, camera, r->options.pattern, &r->detector);
     }
     if (status == BST_OK) {
-        status = build(ctx, r, device);
+        status = make_law(ctx, r);
     }
     if (status == BST_OK) {
-        status = bst_profile_table(ctx, r->context, bst_camera_psf_sigma_px(camera), r->taps,
-                                   r->phases, &r->profiles);
+        status = build(ctx, r, device);
     }
     if (status == BST_OK) {
         status = bst_smear_create(ctx, camera, &smear, &r->smear);
@@ -234,9 +256,15 @@ void bst_renderer_free(bst_renderer *r) {
         return;
     }
     clFinish(r->queue);
-    cl_mem buffers[] = {r->profiles,         r->table.buffer,     r->sources.buffer,
-                        r->nodes.buffer,     r->block_box.buffer, r->source_box.buffer,
-                        r->saturated.buffer, r->expected.buffer};
+    cl_mem buffers[] = {r->law,
+                        r->table.buffer,
+                        r->sources.buffer,
+                        r->nodes.buffer,
+                        r->block_box.buffer,
+                        r->source_box.buffer,
+                        r->group_box.buffer,
+                        r->saturated.buffer,
+                        r->expected.buffer};
     for (size_t i = 0; i < sizeof buffers / sizeof *buffers; i++) {
         if (buffers[i]) {
             clReleaseMemObject(buffers[i]);
@@ -311,7 +339,7 @@ static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *
     *blocks = 0;
     const uint64_t counted = (uint64_t)INT32_MAX * sizeof(float); /* by the kernels, in int */
     uint64_t most = r->most_bytes < counted ? r->most_bytes : counted;
-    int most_blocks = (int)(most / NODE_BYTES);
+    int most_blocks = (int)(most / (r->fft_light ? NODE_BYTES : BOX_BYTES));
     for (int i = 0; i < q->count; i++) {
         bst_scene_source *s = &r->list[r->stats.sources];
         bool visible;
@@ -357,37 +385,42 @@ static bst_status set_args(bst_ctx *ctx, cl_kernel kernel, const void *const *va
     return BST_OK;
 }
 
-/* Uploads sources and tables and enqueues the nodes kernel. *groups: groups of 16 sources. */
-static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, int blocks, int *groups) {
+/* Uploads sources and tables and enqueues the nodes kernel. */
+static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, const bst_scene_params *p,
+                                int blocks) {
     int table_blocks, count = r->stats.sources;
     const float *table = bst_smear_table(r->smear, &table_blocks);
-    *groups = (count + BST_BLOCK - 1) / BST_BLOCK;
+    size_t groups = (size_t)p->source_groups, more = (groups + BST_BLOCK - 1) / BST_BLOCK;
     size_t block_bytes = BST_BLOCK * sizeof(float);
     BST_TRY(upload(ctx, r, &r->table, table, (size_t)table_blocks * BST_TABLE_ROWS * block_bytes));
     BST_TRY(upload(ctx, r, &r->sources, r->list, (size_t)count * sizeof *r->list));
-    BST_TRY(grow(ctx, r, &r->nodes, (size_t)blocks * NODE_BYTES));
-    BST_TRY(grow(ctx, r, &r->block_box, (size_t)blocks * BOX_FLOATS * sizeof(float)));
-    BST_TRY(grow(ctx, r, &r->source_box, (size_t)*groups * BOX_FLOATS * block_bytes));
+    BST_TRY(grow(ctx, r, &r->block_box, (size_t)blocks * BOX_BYTES));
+    BST_TRY(grow(ctx, r, &r->source_box, groups * BST_BLOCK * BOX_BYTES));
+    BST_TRY(grow(ctx, r, &r->group_box, more * BST_BLOCK * BOX_BYTES));
+    BST_TRY(grow(ctx, r, &r->nodes, r->fft_light ? (size_t)blocks * NODE_BYTES : 1));
     if (count == 0) {
         return BST_OK;
     }
-    float centre_x = (float)bst_camera_centre_x(&r->camera);
-    float centre_y = (float)bst_camera_centre_y(&r->camera);
-    const void *values[] = {
-        &r->sources.buffer, &count,           &r->table.buffer,     &centre_x,
-        &centre_y,          &r->nodes.buffer, &r->block_box.buffer, &r->source_box.buffer};
-    const size_t m = sizeof(cl_mem), f = sizeof(float);
-    const size_t bytes[] = {m, sizeof count, m, f, f, m, m, m};
+    const void *values[] = {p,
+                            &r->sources.buffer,
+                            &count,
+                            &r->table.buffer,
+                            &r->block_box.buffer,
+                            &r->source_box.buffer,
+                            &r->group_box.buffer,
+                            &r->nodes.buffer};
+    const size_t m = sizeof(cl_mem), bytes[] = {sizeof *p, m, sizeof count, m, m, m, m, m};
     BST_TRY(set_args(ctx, r->nodes_kernel, values, bytes, 8));
-    size_t global = (size_t)*groups * BST_BLOCK, local = BST_BLOCK;
+    size_t global = groups * BST_BLOCK, local = BST_BLOCK;
     return bst_device_check(
         ctx,
         clEnqueueNDRangeKernel(r->queue, r->nodes_kernel, 1, NULL, &global, &local, 0, NULL, NULL),
         "placing the scene's nodes");
 }
 
+/* sources: that are drawn. */
 static bst_scene_params make_params(const bst_renderer *r, const bst_render_request *q,
-                                    int groups) {
+                                    int sources) {
     const bst_camera *c = &r->camera;
     bst_window w = q->window;
     int x0 = w.x0 / 64 * 64;
@@ -400,7 +433,9 @@ static bst_scene_params make_params(const bst_renderer *r, const bst_render_requ
         .tiles_x0 = x0,
         .tiles_x = (w.x0 + w.width - x0 + r->options.tile_width - 1) / r->options.tile_width,
         .tiles_y = (w.height + r->options.tile_height - 1) / r->options.tile_height,
-        .source_groups = groups,
+        .source_groups = (sources + BST_BLOCK - 1) / BST_BLOCK,
+        .centre_x = (float)bst_camera_centre_x(c),
+        .centre_y = (float)bst_camera_centre_y(c),
         .key0 = q->key.k[0],
         .key1 = q->key.k[1],
         .exposure_low = (unsigned)((uint64_t)q->exposure_id & 0xFFFFFFFFu),
@@ -441,10 +476,10 @@ static bst_status count_saturated(bst_ctx *ctx, bst_renderer *r) {
 }
 
 /* The image that the tile kernel takes its light from, where the PSF is no Gaussian. */
-static bst_status make_light(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q, int groups,
+static bst_status make_light(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
                              bst_scene_params *p, cl_mem *light) {
     bst_fft_light_nodes nodes = {r->sources.buffer, r->nodes.buffer, r->block_box.buffer,
-                                 r->source_box.buffer, groups};
+                                 r->source_box.buffer, p->source_groups};
     bst_fft_light_image image;
     BST_TRY(bst_fft_light_render(ctx, r->fft_light, r->queue, q->window, &nodes, &image));
     p->light_first = image.first;
@@ -453,31 +488,32 @@ static bst_status make_light(bst_ctx *ctx, bst_renderer *r, const bst_render_req
     return BST_OK;
 }
 
-/* The common way of all kinds of image: the kernels' first six arguments are the same. stride:
+/* The common way of all kinds of image: the kernels' first eight arguments are the same. stride:
  * floats between the rows of `out`, 0: no gaps; light_only: without background. */
 static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
                                 cl_kernel kernel, cl_mem out, int stride, bool light_only) {
-    int blocks = 0, groups = 0;
+    int blocks = 0;
     BST_TRY(plan(ctx, r, q, &blocks));
     BST_TRY(count_saturated(ctx, r)); /* of the frame before, which was rendered meanwhile */
-    BST_TRY(enqueue_nodes(ctx, r, blocks, &groups));
-    bst_scene_params p = make_params(r, q, groups);
+    bst_scene_params p = make_params(r, q, r->stats.sources);
+    BST_TRY(enqueue_nodes(ctx, r, &p, blocks));
     p.image_stride = stride > 0 ? stride : p.image_stride;
     p.background_e = light_only ? 0.0f : p.background_e;
     r->tiles = p.tiles_x * p.tiles_y;
     size_t tiles = (size_t)r->tiles;
     BST_TRY(grow(ctx, r, &r->saturated, tiles * sizeof(cl_int)));
-    cl_mem light = r->profiles;
+    cl_mem light = r->law;
     if (r->fft_light) {
-        BST_TRY(make_light(ctx, r, q, groups, &p, &light));
+        BST_TRY(make_light(ctx, r, q, &p, &light));
     }
     cl_mem maps[5];
     bst_detector_buffers(r->detector, maps);
     const void *values[] = {&p,
                             &r->sources.buffer,
-                            &r->nodes.buffer,
+                            &r->table.buffer,
                             &r->block_box.buffer,
                             &r->source_box.buffer,
+                            &r->group_box.buffer,
                             &light,
                             &out,
                             &r->saturated.buffer,
@@ -486,8 +522,8 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
                             &maps[2],
                             &maps[3],
                             &maps[4]};
-    const size_t m = sizeof(cl_mem), bytes[] = {sizeof p, m, m, m, m, m, m, m, m, m, m, m, m};
-    BST_TRY(set_args(ctx, kernel, values, bytes, kernel == r->frame_kernel ? 13 : 7));
+    const size_t m = sizeof(cl_mem), bytes[] = {sizeof p, m, m, m, m, m, m, m, m, m, m, m, m, m};
+    BST_TRY(set_args(ctx, kernel, values, bytes, kernel == r->frame_kernel ? 14 : 8));
     size_t group = (size_t)r->options.group, global = (tiles + group - 1) / group * group;
     return bst_device_check(
         ctx, clEnqueueNDRangeKernel(r->queue, kernel, 1, NULL, &global, &group, 0, NULL, NULL),

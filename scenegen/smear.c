@@ -5,6 +5,7 @@
 
 #include "scenegen/motion.h"
 #include "scenegen/nodes.h"
+#include "scenegen/profile_law.h"
 #include "scenegen/reference.h"
 #include "scenegen/shape.h"
 
@@ -31,6 +32,7 @@ struct bst_smear {
     double tail[MAX_TAPS / 2]; /* profile at r px from the centre, over the centre's */
     double kept[MAX_TAPS / 2]; /* light within the two nearest pixels and r more on each side */
     double tolerance[LEVELS];
+    double profile_error; /* of stamps, over the image's peak */
     double half_diagonal_px;
     double stretch; /* of the image by distortion where it is greatest */
 
@@ -85,6 +87,11 @@ bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
             s->tail[r] = 0.0;
             s->kept[r] = 1.0;
         }
+    }
+    if (options->node_sigma_px <= 0.0) {
+        /* of the error function 2.3e-7 are missed on each axis, of nodes in reach of a pixel whose
+         * light there is a quarter of the centre's on average */
+        s->profile_error = 2.0 * fmax(4.0 * 2.3e-7 / centre, BST_LAW_ERROR);
     }
     for (int n = 0; n < LEVELS; n++) {
         s->tolerance[n] = 0.08 * pow(2.0, -n);
@@ -161,14 +168,17 @@ static bst_path_point attitude_point(const bst_smear *s, bst_quat q, double time
     return (bst_path_point){{r.x * scale, r.y * scale, r.z * s->half_diagonal_px}, time};
 }
 
-/* What the profile table misses of the nodes' image, over its peak, by its phases and widths. */
-static double table_error(const bst_smear *s, const bst_node_list *list) {
-    double psf = s->sigma_px * s->stretch, worst = 0.0;
+/* What the nodes' profiles miss of their image, over its peak. */
+static double profile_error(const bst_smear *s, const bst_node_list *list) {
+    if (s->options.node_sigma_px <= 0.0) {
+        return s->profile_error;
+    }
+    double psf = s->sigma_px * s->stretch, worst = 0.0; /* by the widths of the Fourier path */
     for (int n = 0; n < list->count; n++) {
         double w = list->items[n].variance / (psf * psf), wide = 1.0 + w;
         worst = fmax(worst, 0.75 * w / (wide * wide));
     }
-    return s->options.table_error + worst / (BST_WIDTHS * BST_WIDTHS);
+    return worst / (BST_WIDTHS * BST_WIDTHS);
 }
 
 /* Appends nodes to the table in whole blocks; to_table fills one column of BST_TABLE_ROWS. */
@@ -178,7 +188,7 @@ static bst_status append_nodes(bst_ctx *ctx, bst_smear *s, const bst_node_list *
     int blocks = (list->count + BST_BLOCK - 1) / BST_BLOCK;
     BST_TRY(reserve(ctx, (void **)&s->table, &s->table_capacity, s->table_blocks + blocks,
                     TABLE_FLOATS * sizeof(float)));
-    *out = (level){s->table_blocks, blocks, list->error + table_error(s, list)};
+    *out = (level){s->table_blocks, blocks, list->error + profile_error(s, list)};
     s->table_blocks += blocks;
     for (int n = 0; n < blocks * BST_BLOCK; n++) {
         float *block = s->table + (size_t)(out->first_block + n / BST_BLOCK) * TABLE_FLOATS;
@@ -325,7 +335,7 @@ static int choose_level(bst_smear *s, double peak_e) {
     if (s->options.temporal_oversample > 0) {
         return n;
     }
-    while (n + 1 < LEVELS && (s->tolerance[n] + s->options.table_error) * sigmas >
+    while (n + 1 < LEVELS && (s->tolerance[n] + s->profile_error) * sigmas >
                                  NODE_SHARE * s->options.tolerance_sigma) {
         n++;
     }
