@@ -49,6 +49,7 @@ struct bst_renderer {
     bst_scene_source *list; /* drawn sources */
     double *peak_e;         /* of all sources of the request */
     int list_capacity, tiles;
+    int boxes;      /* of the frame's blocks, by groups of BST_BLOCK */
     bool uncounted; /* saturated pixels of the latest frame */
     long long saturated_pixels, saturated_frames;
     uint64_t most_bytes; /* of one buffer on the device */
@@ -336,10 +337,11 @@ static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *
     }
     BST_TRY(bst_smear_begin(ctx, r->smear, q->track, q->background_e + read * read, brightest));
     r->stats = (bst_render_stats){0};
-    *blocks = 0;
+    *blocks = r->boxes = 0;
     const uint64_t counted = (uint64_t)INT32_MAX * sizeof(float); /* by the kernels, in int */
     uint64_t most = r->most_bytes < counted ? r->most_bytes : counted;
-    int most_blocks = (int)(most / (r->fft_light ? NODE_BYTES : BOX_BYTES));
+    /* two blocks have a whole group of boxes */
+    int most_blocks = (int)(most / (r->fft_light ? NODE_BYTES : BST_BLOCK / 2 * BOX_BYTES));
     for (int i = 0; i < q->count; i++) {
         bst_scene_source *s = &r->list[r->stats.sources];
         bool visible;
@@ -357,7 +359,9 @@ static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *
                 bst_fft_light_stamp(r->fft_light, s);
             }
             s->first_block = *blocks;
+            s->first_box = r->boxes;
             *blocks += s->blocks;
+            r->boxes += s->blocks > 1 ? (s->blocks + BST_BLOCK - 1) / BST_BLOCK : 0;
             r->stats.sources++;
             double grid = 0.0; /* error of the Fourier path's grid, on dark pixels */
             if (r->fft_light) {
@@ -394,7 +398,7 @@ static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, const bst_scene_p
     size_t block_bytes = BST_BLOCK * sizeof(float);
     BST_TRY(upload(ctx, r, &r->table, table, (size_t)table_blocks * BST_TABLE_ROWS * block_bytes));
     BST_TRY(upload(ctx, r, &r->sources, r->list, (size_t)count * sizeof *r->list));
-    BST_TRY(grow(ctx, r, &r->block_box, (size_t)blocks * BOX_BYTES));
+    BST_TRY(grow(ctx, r, &r->block_box, (size_t)r->boxes * BST_BLOCK * BOX_BYTES));
     BST_TRY(grow(ctx, r, &r->source_box, groups * BST_BLOCK * BOX_BYTES));
     BST_TRY(grow(ctx, r, &r->group_box, more * BST_BLOCK * BOX_BYTES));
     BST_TRY(grow(ctx, r, &r->nodes, r->fft_light ? (size_t)blocks * NODE_BYTES : 1));

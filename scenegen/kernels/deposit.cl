@@ -1,11 +1,12 @@
-/* Light of all nodes on a grid for the Fourier path: each node is spread over eight by eight samples.
- * Options: DEPOSIT_W, DEPOSIT_H (samples of a tile, a multiple of 16 wide), DEPOSIT_GROUP (work-items
- * per work-group), FIELD (weights by place).
+/* Light of all nodes on a grid for the Fourier path: each node is spread over eight by eight
+ * samples. Options: DEPOSIT_W, DEPOSIT_H (samples of a tile, a multiple of 16 wide), DEPOSIT_GROUP
+ * (work-items per work-group), FIELD (weights by place).
  *
- * One work-item owns a tile and adds its nodes in the order of sources, blocks and nodes: the sum is
- * the same for every tile and work-group size. */
+ * One work-item owns a tile and adds its nodes in the order of sources, blocks and nodes: the sum
+ * is the same for every tile and work-group size. */
 
-/* Rows of a tile are a vector apart, which keeps neighbouring rows out of one another's cache sets. */
+/* Rows of a tile are a vector apart, which keeps neighbouring rows out of one another's cache sets.
+ */
 #define DEPOSIT_STRIDE (DEPOSIT_W + 16)
 /* Nodes that share a pass over their rows, and how many rows they may span together. */
 #define DEPOSIT_TEAM 4
@@ -68,10 +69,11 @@ static float16 spread_line(const float *profile, int shift) {
     return vload16(0, profile + 16 + shift);
 }
 
-/* Adds nodes n to n + count - 1 (at most DEPOSIT_TEAM, the others are left out), which together span
- * at most DEPOSIT_SPAN rows from `top`. Each row is loaded and stored once for all of them; a sample
- * still receives them one after the other, and a zero from those that do not reach it. Vectors of
- * the tile are touched where they lie, so that what one team has stored the next can load at once.
+/* Adds nodes n to n + count - 1 (at most DEPOSIT_TEAM, the others are left out), which together
+ * span at most DEPOSIT_SPAN rows from `top`. Each row is loaded and stored once for all of them; a
+ * sample still receives them one after the other, and a zero from those that do not reach it.
+ * Vectors of the tile are touched where they lie, so that what one team has stored the next can
+ * load at once.
  */
 static void deposit_team(local float *sum, const deposit_nodes *b, int n, int count, int top,
                          int bottom, int left, int right, global const float *table,
@@ -124,7 +126,8 @@ static int place_nodes(bst_deposit_params p, int tile_x, int tile_y, global cons
     if (!any_of(hit)) {
         return 0;
     }
-    float16 phase_u = (u - floor_u) * BST_SPREAD_PHASES, phase_v = (v - floor_v) * BST_SPREAD_PHASES;
+    float16 phase_u = (u - floor_u) * BST_SPREAD_PHASES,
+            phase_v = (v - floor_v) * BST_SPREAD_PHASES;
     float16 step_u = fmin(floor(phase_u), BST_SPREAD_PHASES - 1.0f);
     float16 step_v = fmin(floor(phase_v), BST_SPREAD_PHASES - 1.0f);
     float16 level = fmin(floor(width), BST_WIDTHS - 1.0f);
@@ -183,7 +186,7 @@ static void deposit_block(bst_deposit_params p, local float *sum, int tile_x, in
  * boxes are those of the nodes kernel, which reach at least as far as the spreading kernel. */
 __attribute__((reqd_work_group_size(DEPOSIT_GROUP, 1, 1))) kernel void bst_light_deposit(
     bst_deposit_params p, global const bst_scene_source *sources, global const float16 *nodes,
-    global const float4 *block_box, global const float *source_box, global const float *table,
+    global const float *block_box, global const float *source_box, global const float *table,
     global const float *field, global float *grid) {
     local float16 sums[DEPOSIT_GROUP][DEPOSIT_H * DEPOSIT_STRIDE / 16];
     int tile = (int)get_global_id(0);
@@ -217,11 +220,13 @@ __attribute__((reqd_work_group_size(DEPOSIT_GROUP, 1, 1))) kernel void bst_light
                 continue;
             }
             bst_scene_source s = sources[g * BST_BLOCK + i];
-            for (int b = s.first_block; b < s.first_block + s.blocks; b++) {
-                float4 r = block_box[b];
-                if (r.x <= x1 && r.z >= x0 && r.y <= y1 && r.w >= y0) {
-                    deposit_block(p, sum, left, top, nodes + BST_NODE_ROWS * b, table, field,
-                                  &room);
+            for (int b = 0; b < s.blocks; b++) {
+                int lane = b % BST_BLOCK;
+                global const float *r = block_box + (s.first_box * BST_BLOCK + b - lane) * 4 + lane;
+                if (s.blocks == 1 || (r[0] <= x1 && r[2 * BST_BLOCK] >= x0 && r[BST_BLOCK] <= y1 &&
+                                      r[3 * BST_BLOCK] >= y0)) {
+                    deposit_block(p, sum, left, top, nodes + BST_NODE_ROWS * (s.first_block + b),
+                                  table, field, &room);
                 }
             }
         }

@@ -93,12 +93,13 @@ static node_block nodes_of(bst_scene_params p, bst_scene_source s, int b,
     return out;
 }
 
-/* block_box: x0, y0, x1, y1 (inclusive pixels). source_box: the same for sources, by groups of 16:
- * x0[16], y0[16], x1[16], y1[16]; group_box: for groups. nodes (with FFT_LIGHT): per block x[16],
- * y[16], electrons[16], width_of[16]. */
+/* Boxes of inclusive pixels, by groups of 16: x0[16], y0[16], x1[16], y1[16]. block_box: of the
+ * blocks of a source that has several, from its first_box on; source_box: of sources; group_box: of
+ * groups of sources. nodes (with FFT_LIGHT): per block x[16], y[16], electrons[16], width_of[16].
+ */
 __attribute__((reqd_work_group_size(BST_BLOCK, 1, 1))) kernel void bst_scene_nodes(
     bst_scene_params p, global const bst_scene_source *sources, int count,
-    global const float16 *table, global float4 *block_box, global float *source_box,
+    global const float16 *table, global float *block_box, global float *source_box,
     global float *group_box, global float16 *nodes) {
     int i = (int)get_global_id(0), g = i / BST_BLOCK;
     global float *box = source_box + g * 4 * BST_BLOCK + i % BST_BLOCK;
@@ -108,8 +109,8 @@ __attribute__((reqd_work_group_size(BST_BLOCK, 1, 1))) kernel void bst_scene_nod
         float reach = (float)s.radius;
         for (int b = 0; b < s.blocks; b++) {
             node_block n = nodes_of(p, s, b, table);
-            int block = s.first_block + b;
 #ifdef FFT_LIGHT
+            int block = s.first_block + b;
             nodes[BST_NODE_ROWS * block] = n.x;
             nodes[BST_NODE_ROWS * block + 1] = n.y;
             nodes[BST_NODE_ROWS * block + 2] = n.electrons;
@@ -118,7 +119,14 @@ __attribute__((reqd_work_group_size(BST_BLOCK, 1, 1))) kernel void bst_scene_nod
             float4 r =
                 (float4)(floor(min_of(n.x)) - reach, floor(min_of(n.y)) - reach,
                          floor(max_of(n.x)) + reach + 1.0f, floor(max_of(n.y)) + reach + 1.0f);
-            block_box[block] = r;
+            if (s.blocks > 1) {
+                int lane = b % BST_BLOCK;
+                global float *at = block_box + (s.first_box * BST_BLOCK + b - lane) * 4 + lane;
+                at[0] = r.x;
+                at[BST_BLOCK] = r.y;
+                at[2 * BST_BLOCK] = r.z;
+                at[3 * BST_BLOCK] = r.w;
+            }
             x0 = fmin(x0, r.x);
             y0 = fmin(y0, r.y);
             x1 = fmax(x1, r.z);

@@ -49,6 +49,7 @@ typedef struct bst_scene_source {
     int first_table;  /* block of the node table */
     int first_block;  /* block of the frame's nodes */
     int blocks;
+    int first_box; /* of the blocks' boxes, by groups of BST_BLOCK */
     int radius; /* the stamp reaches this far beyond the two nearest pixels of a node */
 } bst_scene_source;
 

@@ -14,8 +14,12 @@
 #define ROW (TAPS + 2 * PAD)
 /* Taps that are made at once. */
 #define OCTET 8
-/* Nodes that share a pass over their rows. */
+/* Nodes that share a pass over their rows, and the rows between their first ones at most. */
 #define TEAM 4
+#define SPREAD 12
+/* Rows that are added at once, and those below a tile that are written to no purpose. */
+#define RUN 4
+#define SPARE (RUN - 1)
 
 /* For vectors at any place: vstore16 becomes four stores on some devices. */
 typedef float16 loose16 __attribute__((aligned(4)));
@@ -30,11 +34,12 @@ static int any16(int16 v) {
 }
 
 /* A block of nodes against one tile: the taps of node n along x, which carry its electrons, and
- * along y follow PAD zeros in its row; the first belongs to column left[n] and row top[n]. */
+ * along y follow PAD zeros in its row; the first belongs to column left[n] and row top[n]. In every
+ * lane of a team: the bounds of its nodes' left and top, and whether it reaches the tile. */
 typedef struct splat_nodes {
     float x[BST_BLOCK][ROW], y[BST_BLOCK][ROW];
     int left[BST_BLOCK], top[BST_BLOCK];
-    float electrons[BST_BLOCK];
+    int left0[BST_BLOCK], left1[BST_BLOCK], top0[BST_BLOCK], top1[BST_BLOCK], near[BST_BLOCK];
     int taps; /* that may be other than zero */
 } __attribute__((aligned(64))) splat_nodes;
 
@@ -175,97 +180,96 @@ INLINE int16 whole(float16 v) {
     return n + (convert_float16(n) > v);
 }
 
+INLINE int16 team_min(int16 v) {
+    v = min(v, v.s1032547698badcfe);
+    return min(v, v.s23016745ab89efcd);
+}
+
+INLINE int16 team_max(int16 v) {
+    v = max(v, v.s1032547698badcfe);
+    return max(v, v.s23016745ab89efcd);
+}
+
 static void place_nodes(node_block nodes, int tile_x, int tile_y, int radius,
                         global const float *law, splat_nodes *b) {
     int16 x = whole(nodes.x), y = whole(nodes.y);
-    int taps = (2 * radius + 2 + OCTET - 1) / OCTET * OCTET;
-    for (; b->taps > taps; b->taps -= OCTET) {
+    int taps = 2 * radius + 2, octets = (taps + OCTET - 1) / OCTET * OCTET;
+    for (; b->taps > octets; b->taps -= OCTET) {
         for (int n = 0; n < BST_BLOCK; n++) {
             *(loose8 *)(b->x[n] + PAD + b->taps - OCTET) = (float8)0.0f;
             *(loose8 *)(b->y[n] + PAD + b->taps - OCTET) = (float8)0.0f;
         }
     }
-    b->taps = taps;
+    b->taps = octets;
     make_profiles(nodes.x - convert_float16(x), nodes.width, nodes.electrons, radius, law, b->x[0]);
     make_profiles(nodes.y - convert_float16(y), nodes.width, (float16)1.0f, radius, law, b->y[0]);
-    *(int16 *)b->left = x - (radius + tile_x);
-    *(int16 *)b->top = y - (radius + tile_y);
-    *(float16 *)b->electrons = nodes.electrons;
+    int16 left = x - (radius + tile_x), top = y - (radius + tile_y);
+    int16 left0 = team_min(left), left1 = team_max(left);
+    int16 top0 = team_min(top), top1 = team_max(top);
+    *(int16 *)b->left = left;
+    *(int16 *)b->top = top;
+    *(int16 *)b->left0 = left0;
+    *(int16 *)b->left1 = left1;
+    *(int16 *)b->top0 = top0;
+    *(int16 *)b->top1 = top1;
+    *(int16 *)b->near = (left1 > -taps) & (left0 < TILE_W) & (top1 > -taps) & (top0 < TILE_H) &
+                        (nodes.electrons > 0.0f);
 }
 
 /* Taps of node n along x on the vector of the tile that begins at `column`. */
 INLINE float16 line_of(const splat_nodes *b, int n, int column, int taps) {
-    int shift = column - b->left[n];
-    return shift > -16 && shift < taps ? *(const loose16 *)(b->x[n] + PAD + shift) : (float16)0.0f;
+    return *(const loose16 *)(b->x[n] + PAD + clamp(column - b->left[n], -PAD, taps));
 }
 
-/* Adds nodes n to n + TEAM - 1, which lie within PAD rows. Each row is loaded and stored once for
- * all of them; a pixel still receives them one after the other, and a zero from those that do not
- * reach it. */
-static void splat_team(local float *sum, const splat_nodes *b, int n, int taps, int top, int bottom,
-                       int left, int right) {
+/* Adds the nodes n to n + TEAM - 1, within SPREAD rows. Each row is loaded and stored once for all
+ * of them; a pixel still receives them one after the other, and a zero from those that do not reach
+ * it.
+ */
+static void splat_team(local float *sum, const splat_nodes *b, int n, int taps) {
     const float *h0 = b->y[n] + PAD - b->top[n], *h1 = b->y[n + 1] + PAD - b->top[n + 1];
     const float *h2 = b->y[n + 2] + PAD - b->top[n + 2], *h3 = b->y[n + 3] + PAD - b->top[n + 3];
-    int first = max(0, top), last = min(bottom, TILE_H), end = min(right, TILE_W);
-    for (int column = max(left & ~15, 0); column < end; column += 16) {
+    int first = max(0, b->top0[n]), last = min(b->top1[n] + taps, TILE_H);
+    int end = min(b->left1[n] + taps, TILE_W), column = max(b->left0[n] & ~15, 0);
+    for (; column + 16 < end; column += 32) {
+        float16 l0 = line_of(b, n, column, taps), r0 = line_of(b, n, column + 16, taps);
+        float16 l1 = line_of(b, n + 1, column, taps), r1 = line_of(b, n + 1, column + 16, taps);
+        float16 l2 = line_of(b, n + 2, column, taps), r2 = line_of(b, n + 2, column + 16, taps);
+        float16 l3 = line_of(b, n + 3, column, taps), r3 = line_of(b, n + 3, column + 16, taps);
+        local float16 *target = (local float16 *)(sum + first * STRIDE + column);
+        for (int j = first; j < last; j += RUN) {
+            for (int k = j; k < j + RUN; k++) {
+                float16 f0 = (float16)h0[k], f1 = (float16)h1[k];
+                float16 f2 = (float16)h2[k], f3 = (float16)h3[k];
+                target[0] = fma(f3, l3, fma(f2, l2, fma(f1, l1, fma(f0, l0, target[0]))));
+                target[1] = fma(f3, r3, fma(f2, r2, fma(f1, r1, fma(f0, r0, target[1]))));
+                target += STRIDE / 16;
+            }
+        }
+    }
+    if (column < end) {
         float16 l0 = line_of(b, n, column, taps), l1 = line_of(b, n + 1, column, taps);
         float16 l2 = line_of(b, n + 2, column, taps), l3 = line_of(b, n + 3, column, taps);
         local float16 *target = (local float16 *)(sum + first * STRIDE + column);
+        for (int j = first; j < last; j += RUN) {
+            for (int k = j; k < j + RUN; k++) {
+                float16 v = fma((float16)h1[k], l1, fma((float16)h0[k], l0, *target));
+                *target = fma((float16)h3[k], l3, fma((float16)h2[k], l2, v));
+                target += STRIDE / 16;
+            }
+        }
+    }
+}
+
+/* Adds one node, over its own rows. */
+static void splat_node(local float *sum, const splat_nodes *b, int n, int taps) {
+    const float *h = b->y[n] + PAD - b->top[n];
+    int first = max(0, b->top[n]), last = min(b->top[n] + taps, TILE_H);
+    int end = min(b->left[n] + taps, TILE_W);
+    for (int column = max(b->left[n] & ~15, 0); column < end; column += 16) {
+        float16 line = line_of(b, n, column, taps);
         for (int j = first; j < last; j++) {
-            float16 v = *target;
-            v = fma((float16)h0[j], l0, v);
-            v = fma((float16)h1[j], l1, v);
-            v = fma((float16)h2[j], l2, v);
-            *target = fma((float16)h3[j], l3, v);
-            target += STRIDE / 16;
-        }
-    }
-}
-
-static void splat_block(local float *sum, int tile_x, int tile_y, int radius, node_block nodes,
-                        global const float *law, splat_nodes *b) {
-    int taps = 2 * radius + 2;
-    place_nodes(nodes, tile_x, tile_y, radius, law, b);
-    for (int n = 0; n < BST_BLOCK && b->electrons[n] > 0.0f; n += TEAM) {
-        int top = b->top[n], bottom = top, left = b->left[n], right = left;
-        for (int k = 1; k < TEAM; k++) {
-            top = min(top, b->top[n + k]);
-            bottom = max(bottom, b->top[n + k]);
-            left = min(left, b->left[n + k]);
-            right = max(right, b->left[n + k]);
-        }
-        if (bottom - top <= PAD) {
-            bottom += taps;
-            right += taps;
-            if (bottom > 0 && top < TILE_H && right > 0 && left < TILE_W) {
-                splat_team(sum, b, n, taps, top, bottom, left, right);
-            }
-            continue;
-        }
-        for (int k = 0; k < TEAM; k++) { /* too far apart: one by one, over its own rows */
-            const float *h = b->y[n + k] + PAD - b->top[n + k];
-            int first = max(0, b->top[n + k]), last = min(b->top[n + k] + taps, TILE_H);
-            int end = min(b->left[n + k] + taps, TILE_W);
-            for (int column = max(b->left[n + k] & ~15, 0); column < end; column += 16) {
-                float16 line = line_of(b, n + k, column, taps);
-                for (int j = first; j < last; j++) {
-                    local float16 *target = (local float16 *)(sum + j * STRIDE + column);
-                    *target = fma((float16)h[j], line, *target);
-                }
-            }
-        }
-    }
-}
-
-static void splat_source(bst_scene_params p, local float *sum, int tile_x, int tile_y,
-                         bst_scene_source s, global const float16 *table,
-                         global const float4 *block_box, global const float *law, splat_nodes *b) {
-    float x0 = (float)tile_x, x1 = (float)(tile_x + TILE_W - 1);
-    float y0 = (float)tile_y, y1 = (float)(tile_y + TILE_H - 1);
-    for (int k = 0; k < s.blocks; k++) {
-        float4 box = block_box[s.first_block + k];
-        if (box.x <= x1 && box.z >= x0 && box.y <= y1 && box.w >= y0) {
-            splat_block(sum, tile_x, tile_y, s.radius, nodes_of(p, s, k, table), law, b);
+            local float16 *target = (local float16 *)(sum + j * STRIDE + column);
+            *target = fma((float16)h[j], line, *target);
         }
     }
 }
@@ -277,11 +281,38 @@ INLINE int16 boxes_hit(global const float *box, int tile_x, int tile_y) {
            (vload16(3, box) >= (float)tile_y);
 }
 
-/* sum: [TILE_H][STRIDE], the tile's light in electrons. tile_x, tile_y: its first pixel on the full
- * sensor. */
+static void splat_source(bst_scene_params p, local float *sum, int tile_x, int tile_y,
+                         bst_scene_source s, global const float16 *table,
+                         global const float *block_box, global const float *law, splat_nodes *b) {
+    int hits[BST_BLOCK] = {1}, taps = 2 * s.radius + 2;
+    for (int first = 0; first < s.blocks; first += BST_BLOCK) {
+        if (s.blocks > 1) { /* else the source's box is the block's */
+            global const float *box = block_box + (s.first_box * BST_BLOCK + first) * 4;
+            vstore16(boxes_hit(box, tile_x, tile_y), 0, hits);
+        }
+        for (int k = 0; k < min(BST_BLOCK, s.blocks - first); k++) {
+            if (!hits[k]) {
+                continue;
+            }
+            place_nodes(nodes_of(p, s, first + k, table), tile_x, tile_y, s.radius, law, b);
+            for (int n = 0; n < BST_BLOCK; n += TEAM) {
+                if (b->near[n] && b->top1[n] - b->top0[n] <= SPREAD) {
+                    splat_team(sum, b, n, taps);
+                } else if (b->near[n]) {
+                    for (int m = n; m < n + TEAM; m++) {
+                        splat_node(sum, b, m, taps);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/* sum: [TILE_H + SPARE][STRIDE], the tile's light in electrons. tile_x, tile_y: its first pixel on
+ * the full sensor. */
 static void splat_tile(bst_scene_params p, local float *sum, int tile_x, int tile_y,
                        global const bst_scene_source *sources, global const float16 *table,
-                       global const float4 *block_box, global const float *source_box,
+                       global const float *block_box, global const float *source_box,
                        global const float *group_box, global const float *law) {
     splat_nodes b;
     for (int i = 0; i < TILE_H * STRIDE; i += 16) {

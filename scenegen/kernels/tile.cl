@@ -57,11 +57,11 @@ INLINE int16 store_dn(bst_scene_params p, detector_maps maps, float16 dn, int16 
 /* frame: [window_height][window_width] digital numbers. saturated: pixels per tile. */
 __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     bst_scene_params p, global const bst_scene_source *sources, global const float16 *table,
-    global const float4 *block_box, global const float *source_box, global const float *group_box,
+    global const float *block_box, global const float *source_box, global const float *group_box,
     global const float *light, global ushort *frame, global int *saturated,
     global const float *gain, global const float *dark, global const float *overlay,
     global const float *offsets, global const ushort *codes) {
-    local float sums[GROUP][TILE_H * STRIDE] __attribute__((aligned(64)));
+    local float sums[GROUP][(TILE_H + SPARE) * STRIDE] __attribute__((aligned(64)));
     int tile = (int)get_global_id(0);
     if (tile >= p.tiles_x * p.tiles_y) {
         return;
@@ -107,9 +107,9 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
 /* image: [window_height][image_stride] expected electrons. */
 __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_expected(
     bst_scene_params p, global const bst_scene_source *sources, global const float16 *table,
-    global const float4 *block_box, global const float *source_box, global const float *group_box,
+    global const float *block_box, global const float *source_box, global const float *group_box,
     global const float *light, global float *image) {
-    local float sums[GROUP][TILE_H * STRIDE] __attribute__((aligned(64)));
+    local float sums[GROUP][(TILE_H + SPARE) * STRIDE] __attribute__((aligned(64)));
     int tile = (int)get_global_id(0);
     if (tile >= p.tiles_x * p.tiles_y) {
         return;
