@@ -14,6 +14,7 @@
 #include "scenegen/readout.h"
 #include "scenegen/reference.h"
 #include "scenegen/smear.h"
+#include "scenegen/source_order.h"
 #include "scenegen/tiles.h"
 #include "scenegen/vignetting.h"
 
@@ -46,7 +47,7 @@ struct bst_renderer {
     bst_frame_pool *pool;
     cl_mem law; /* of the stamps' profiles */
     growing table, sources, nodes, block_box, source_box, group_box, saturated, expected;
-    bst_scene_source *list; /* drawn sources */
+    bst_scene_source *list, *sorted; /* drawn sources */
     double *peak_e;         /* of all sources of the request */
     int list_capacity, tiles;
     int boxes;      /* of the frame's blocks, by groups of BST_BLOCK */
@@ -289,6 +290,7 @@ void bst_renderer_free(bst_renderer *r) {
     clReleaseCommandQueue(r->queue);
     clReleaseContext(r->context);
     free(r->list);
+    free(r->sorted);
     free(r->peak_e);
     free(r);
 }
@@ -323,10 +325,12 @@ static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *
     if (q->count > r->list_capacity) {
         int capacity = q->count > 2 * r->list_capacity ? q->count : 2 * r->list_capacity;
         free(r->list);
+        free(r->sorted);
         free(r->peak_e);
         r->list = malloc((size_t)capacity * sizeof *r->list);
+        r->sorted = malloc((size_t)capacity * sizeof *r->sorted);
         r->peak_e = malloc((size_t)capacity * sizeof *r->peak_e);
-        r->list_capacity = r->list && r->peak_e ? capacity : 0;
+        r->list_capacity = r->list && r->sorted && r->peak_e ? capacity : 0;
         if (r->list_capacity == 0) {
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d sources", q->count);
         }
@@ -358,10 +362,7 @@ static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *
             if (r->fft_light) {
                 bst_fft_light_stamp(r->fft_light, s);
             }
-            s->first_block = *blocks;
-            s->first_box = r->boxes;
             *blocks += s->blocks;
-            r->boxes += s->blocks > 1 ? (s->blocks + BST_BLOCK - 1) / BST_BLOCK : 0;
             r->stats.sources++;
             double grid = 0.0; /* error of the Fourier path's grid, on dark pixels */
             if (r->fft_light) {
@@ -371,6 +372,14 @@ static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *
             r->stats.predicted_sigma =
                 fmax(r->stats.predicted_sigma, bst_smear_last_error_sigma(r->smear) + grid);
         }
+    }
+    bst_source_order(&r->camera, r->list, r->stats.sources, r->sorted);
+    for (int i = 0, block = 0; i < r->stats.sources; i++) {
+        bst_scene_source *s = &r->sorted[i];
+        s->first_block = block;
+        s->first_box = r->boxes;
+        block += s->blocks;
+        r->boxes += s->blocks > 1 ? (s->blocks + BST_BLOCK - 1) / BST_BLOCK : 0;
     }
     r->stats.nodes = (long long)*blocks * BST_BLOCK;
     r->stats.single_kernel = bst_smear_single(r->smear);
@@ -397,7 +406,7 @@ static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, const bst_scene_p
     size_t groups = (size_t)p->source_groups, more = (groups + BST_BLOCK - 1) / BST_BLOCK;
     size_t block_bytes = BST_BLOCK * sizeof(float);
     BST_TRY(upload(ctx, r, &r->table, table, (size_t)table_blocks * BST_TABLE_ROWS * block_bytes));
-    BST_TRY(upload(ctx, r, &r->sources, r->list, (size_t)count * sizeof *r->list));
+    BST_TRY(upload(ctx, r, &r->sources, r->sorted, (size_t)count * sizeof *r->sorted));
     BST_TRY(grow(ctx, r, &r->block_box, (size_t)r->boxes * BST_BLOCK * BOX_BYTES));
     BST_TRY(grow(ctx, r, &r->source_box, groups * BST_BLOCK * BOX_BYTES));
     BST_TRY(grow(ctx, r, &r->group_box, more * BST_BLOCK * BOX_BYTES));
