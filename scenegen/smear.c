@@ -34,6 +34,7 @@ struct bst_smear {
     double tolerance[LEVELS];
     double profile_error; /* of stamps, over the image's peak */
     double half_diagonal_px;
+    double sensor_reach_px; /* light of a point further from the boresight stays off the sensor */
     double stretch; /* of the image by distortion where it is greatest */
 
     bst_los_track track;
@@ -97,6 +98,9 @@ bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
         s->tolerance[n] = 0.08 * pow(2.0, -n);
     }
     s->stretch = bst_camera_stretch(camera);
+    s->sensor_reach_px =
+        tan(bst_camera_half_diagonal_rad(camera)) / bst_camera_scale_rad(camera) +
+        MAX_TAPS / bst_camera_shrink(camera);
     s->half_diagonal_px =
         tan(bst_camera_half_diagonal_rad(camera)) / bst_camera_scale_rad(camera) * s->stretch;
     if (!camera->geometry.general) {
@@ -377,8 +381,7 @@ static bool project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, doubl
 /* Light further than this from the boresight (px, without distortion) stays off the sensor: the
  * PSF's table ends before. */
 static double far_px(const bst_smear *s) {
-    return tan(bst_camera_half_diagonal_rad(&s->camera)) / bst_camera_scale_rad(&s->camera) +
-           MAX_TAPS / bst_camera_shrink(&s->camera) + s->disc_px;
+    return s->sensor_reach_px + s->disc_px;
 }
 
 /* How many chords the curved motion over the image wants: of a parabola they miss
@@ -519,7 +522,8 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
         source->shape ? tan(asin(source->shape->radius)) / bst_camera_scale_rad(&s->camera) : 0.0;
     bool front = project(s, s->q_reference, source->apparent_mid, &x, &y);
     /* a star that only a wide turn brings into the field is no small float from its place there */
-    moving = moving || !front || hypot(x, y) > 4.0 * far_px(s);
+    double wide = 4.0 * far_px(s);
+    moving = moving || !front || x * x + y * y > wide * wide;
     *visible = !source->occulted && electrons > 0.0 && electrons < 1e30 && (front || moving);
     if (!*visible) {
         return BST_OK;
@@ -569,7 +573,7 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
     double extent = fmax((double)s->camera.width_px, (double)s->camera.height_px);
     double rounded = 1.5 * 0x1p-24 * extent * 0.4 / s->sigma_px * s->last_peak_e /
                      sqrt(0.5 * s->last_peak_e + s->dark_variance_e2);
-    double shared = s->single && !moving ? single_error(s, s->last_peak_e, hypot(x, y)) : 0.0;
+    double shared = s->single && !moving ? single_error(s, s->last_peak_e, sqrt(x * x + y * y)) : 0.0;
     s->last_error_sigma = fmax((used->error + lost) * sigmas + shared + rounded,
                                s->last_peak_e * s->tail[border] / sqrt(s->dark_variance_e2));
     if (s->options.temporal_oversample > 0) {

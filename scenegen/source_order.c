@@ -1,12 +1,10 @@
 #include "scenegen/source_order.h"
 
-#include <math.h>
-
 enum { SIDE = 64 }; /* cells along each axis */
 
-static int along(float from_centre, double centre, double pixels) {
+static int along(double from_centre, double centre, double pixels) {
     double cell = (from_centre + centre) * (SIDE / pixels);
-    return (int)fmin(fmax(cell, 0.0), SIDE - 1.0);
+    return cell > 0.0 ? (cell < SIDE - 1.0 ? (int)cell : SIDE - 1) : 0;
 }
 
 static int cell_of(const bst_camera *camera, const bst_scene_source *s) {
