@@ -76,9 +76,13 @@ static double law_error(double sigma_px, int degree, double widening) {
     return worst / share(sigma_px, 0.0, 0, 0);
 }
 
+double bst_profile_law_error(double sigma_px, int degree) {
+    return law_error(sigma_px, degree, 0.0);
+}
+
 int bst_profile_law_degree(double sigma_px) {
     for (int degree = 5; degree <= BST_LAW_MOST_DEGREE; degree += 2) {
-        if (law_error(sigma_px, degree, 0.0) < 0.1 * BST_LAW_ERROR) {
+        if (bst_profile_law_error(sigma_px, degree) < 0.1 * BST_LAW_ERROR) {
             return degree;
         }
     }

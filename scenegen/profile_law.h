@@ -6,6 +6,9 @@ enum { BST_LAW_MOST_DEGREE = 15 };
 /* What a law may miss, of the share of the pixel that a centred Gaussian lights most. */
 #define BST_LAW_ERROR 5e-6
 
+/* What a law of this degree misses, likewise, of nodes as wide as the PSF. */
+double bst_profile_law_error(double sigma_px, int degree);
+
 /* Least degree that a PSF of this sigma wants; 0: none up to BST_LAW_MOST_DEGREE is good enough. */
 int bst_profile_law_degree(double sigma_px);
 

@@ -167,7 +167,15 @@ static bst_status upload(bst_ctx *ctx, bst_renderer *r, growing *g, const void *
 /* The polynomials of the stamps' profiles, where they serve. */
 static bst_status make_law(bst_ctx *ctx, bst_renderer *r) {
     double sigma_px = bst_camera_psf_sigma_px(&r->camera);
-    int degree = r->fft_light ? 0 : bst_profile_law_degree(sigma_px), reach = r->taps / 2;
+    int degree = r->fft_light               ? 0
+                 : r->options.psf_degree > 0 ? r->options.psf_degree
+                                             : bst_profile_law_degree(sigma_px);
+    int reach = r->taps / 2;
+    if (degree > BST_LAW_MOST_DEGREE || (degree > 0 && degree % 2 == 0)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "psf_degree is %d: allowed are 0 and the odd numbers up to %d", degree,
+                        BST_LAW_MOST_DEGREE);
+    }
     size_t count = degree > 0 ? (size_t)bst_profile_law_floats(degree, reach) : 1;
     float *law = calloc(count, sizeof *law);
     if (!law) {
@@ -222,6 +230,7 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     clRetainCommandQueue(r->queue);
     bst_smear_options smear = {.tolerance_sigma = r->options.tolerance_sigma,
                                .taps = r->taps,
+                               .profile_error = BST_LAW_ERROR,
                                .motion = r->options.motion,
                                .temporal_oversample = r->options.temporal_oversample,
                                .stamp_radius_px = r->options.stamp_radius_px};
@@ -234,6 +243,10 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     }
     if (status == BST_OK) {
         status = make_law(ctx, r);
+    }
+    if (status == BST_OK && r->options.psf_degree > 0) {
+        double error = bst_profile_law_error(bst_camera_psf_sigma_px(camera), r->law_degree);
+        smear.profile_error = fmax(smear.profile_error, error);
     }
     if (status == BST_OK) {
         status = build(ctx, r, device);

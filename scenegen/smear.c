@@ -5,7 +5,6 @@
 
 #include "scenegen/motion.h"
 #include "scenegen/nodes.h"
-#include "scenegen/profile_law.h"
 #include "scenegen/reference.h"
 #include "scenegen/shape.h"
 
@@ -92,7 +91,7 @@ bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
     if (options->node_sigma_px <= 0.0) {
         /* of the error function 2.3e-7 are missed on each axis, of nodes in reach of a pixel whose
          * light there is a quarter of the centre's on average */
-        s->profile_error = 2.0 * fmax(4.0 * 2.3e-7 / centre, BST_LAW_ERROR);
+        s->profile_error = 2.0 * fmax(4.0 * 2.3e-7 / centre, options->profile_error);
     }
     for (int n = 0; n < LEVELS; n++) {
         s->tolerance[n] = 0.08 * pow(2.0, -n);

@@ -20,6 +20,7 @@ typedef enum bst_star_motion {
 typedef struct bst_smear_options {
     double tolerance_sigma; /* error of a source's image in any pixel, in that pixel's sigma */
     int taps;               /* length of the longest profile, px */
+    double profile_error;   /* of a node's image by the profile law, over its peak */
     bst_star_motion motion;
     int temporal_oversample; /* 0: by the tolerance; else so many equal parts of the exposure */
     int stamp_radius_px;     /* 0: by the tolerance; else of all stamps */

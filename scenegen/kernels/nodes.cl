@@ -14,7 +14,7 @@ static float min_of(float16 v) {
 }
 
 #ifdef FFT_LIGHT
-/* Row of the profile table, and the share of the way to the next. */
+/* Row of the Fourier path's table, and the share of the way to the next. */
 static float16 width_of(float16 widening) {
     float16 square = fmin(widening, BST_WIDEST) * (BST_WIDTHS * BST_WIDTHS / BST_WIDEST);
     float16 row = floor(sqrt(square));

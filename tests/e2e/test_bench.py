@@ -63,7 +63,7 @@ def check_curve(folder):
     with open(os.path.join(folder, "speed_error.md"), encoding="utf-8") as file:
         text = file.read()
     knobs = ["tolerance_sigma", "temporal_oversample", "renderer", "spatial_oversample",
-             "stamp_radius_px", "psf_phases", "faint_limit_mag"]
+             "stamp_radius_px", "psf_degree", "faint_limit_mag"]
     for knob in knobs:
         assert f"## `{knob}`" in text, knob
         image = os.path.join(folder, "images", f"speed_error_{knob}.png")
