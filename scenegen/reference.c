@@ -1,4 +1,4 @@
-#include "scenegen/reference.h"
+#include "scenegen/reference_internal.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -50,30 +50,39 @@ static void add_psf(bst_window w, double sigma, double x, double y, double elect
     }
 }
 
+bool bst_reference_place(const bst_camera *camera, const bst_los_track *track, const bst_source *s,
+                         int k, double u, double *x, double *y, double *light) {
+    double from_s = track->time_s[k], dt = track->time_s[k + 1] - from_s;
+    bst_quat q = bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
+    bst_vec3 v = bst_source_direction(s, (from_s + u * dt) / track->time_s[track->count - 1]);
+    if (!bst_camera_project(camera, bst_quat_rotate(q, v), x, y)) {
+        return false;
+    }
+    *light = bst_camera_illumination(camera, *x, *y);
+    return true;
+}
+
 /* One source with every stretch between LOS samples in `parts` parts. */
-static void render_source(const bst_camera *camera, bst_window w, const bst_los_track *track,
-                          const bst_source *s, int parts, double *line, double *image) {
-    double duration = track->time_s[track->count - 1];
-    double sigma = bst_camera_psf_sigma_px(camera);
+static void render_source(const bst_camera *camera, double sigma, bst_window w,
+                          const bst_los_track *track, const bst_source *s, int parts, double *line,
+                          double *image) {
     for (int k = 0; k + 1 < track->count; k++) {
         double dt = track->time_s[k + 1] - track->time_s[k];
         for (int n = 0; n < 4 * parts && dt > 0.0; n++) {
             double u = ((double)(n / 4) + gauss_place[n % 4]) / parts;
-            double x, y;
-            bst_quat q =
-                bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
-            bst_vec3 v = bst_source_direction(s, (track->time_s[k] + u * dt) / duration);
-            if (bst_camera_project(camera, bst_quat_rotate(q, v), &x, &y)) {
-                add_psf(w, sigma, x, y, s->electrons_per_s * dt * gauss_weight[n % 4] / parts, line,
-                        image);
+            double x, y, light;
+            if (bst_reference_place(camera, track, s, k, u, &x, &y, &light)) {
+                add_psf(w, sigma, x, y,
+                        light * s->electrons_per_s * dt * gauss_weight[n % 4] / parts, line, image);
             }
         }
     }
 }
 
-bst_status bst_reference_render(bst_ctx *ctx, const bst_camera *camera, bst_window window,
-                                const bst_los_track *track, const bst_source *sources, int count,
-                                double tolerance, double *image) {
+static bst_status render_gaussian(bst_ctx *ctx, const bst_camera *camera, double sigma,
+                                  bst_window window, const bst_los_track *track,
+                                  const bst_source *sources, int count, double tolerance,
+                                  double *image) {
     size_t pixels = (size_t)window.width * (size_t)window.height;
     double *coarse = malloc(pixels * sizeof *coarse), *fine = malloc(pixels * sizeof *fine);
     double *line = malloc((size_t)window.width * sizeof *line);
@@ -88,7 +97,7 @@ bst_status bst_reference_render(bst_ctx *ctx, const bst_camera *camera, bst_wind
             continue;
         }
         memset(fine, 0, pixels * sizeof *fine);
-        render_source(camera, window, track, &sources[i], 1, line, fine);
+        render_source(camera, sigma, window, track, &sources[i], 1, line, fine);
         double change = 1.0, peak = 0.0;
         for (int parts = 2; change > tolerance * peak; parts *= 2) {
             if (parts > 1 << 14) {
@@ -100,7 +109,7 @@ bst_status bst_reference_render(bst_ctx *ctx, const bst_camera *camera, bst_wind
             coarse = fine;
             fine = swap;
             memset(fine, 0, pixels * sizeof *fine);
-            render_source(camera, window, track, &sources[i], parts, line, fine);
+            render_source(camera, sigma, window, track, &sources[i], parts, line, fine);
             change = 0.0;
             /* a source that only grazes the window need not be right to 1e-9 of its faint tail */
             peak = 1e-9 * sources[i].electrons_per_s * track->time_s[track->count - 1];
@@ -117,5 +126,28 @@ exit:
     free(coarse);
     free(fine);
     free(line);
+    return status;
+}
+
+bst_status bst_reference_render_psf(bst_ctx *ctx, const bst_camera *camera, const bst_psf *psf,
+                                    bst_window window, const bst_los_track *track,
+                                    const bst_source *sources, int count, double tolerance,
+                                    double *image) {
+    double sigma;
+    if (bst_psf_gaussian(psf, &sigma)) {
+        return render_gaussian(ctx, camera, sigma, window, track, sources, count, tolerance, image);
+    }
+    return bst_reference_spectrum(ctx, camera, psf, window, track, sources, count, tolerance,
+                                  image);
+}
+
+bst_status bst_reference_render(bst_ctx *ctx, const bst_camera *camera, bst_window window,
+                                const bst_los_track *track, const bst_source *sources, int count,
+                                double tolerance, double *image) {
+    bst_psf *psf;
+    BST_TRY(bst_psf_create(ctx, camera, &psf));
+    bst_status status =
+        bst_reference_render_psf(ctx, camera, psf, window, track, sources, count, tolerance, image);
+    bst_psf_free(psf);
     return status;
 }

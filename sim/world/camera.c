@@ -30,7 +30,7 @@ const bst_config_desc bst_camera_config[] = {
              "silicon detector sees "
              "four to five times as many."),
     BST_REAL(bst_camera, psf_fwhm_px, "px", 0.3, 50, "2",
-             "Full width at half maximum of the Gaussian PSF."),
+             "Full width at half maximum of a Gaussian or Moffat PSF."),
     BST_REAL(bst_camera, background_mag_arcsec2, "mag/arcsec2", 5, 40, "22",
              "V surface brightness of the sky (zodiacal light and the like), uniform."),
     BST_REAL(bst_camera, dark_current_e_per_s, "e/s", 0, 1e6, "0", "Dark current per pixel."),
@@ -48,8 +48,33 @@ const bst_config_desc bst_camera_config[] = {
     BST_OBJECT(bst_camera, distortion, bst_distortion_config, "{}",
                "Lens distortion, in the focal plane's axes about the boresight. It must not fold "
                "the image inside the sensor."),
+    BST_OBJECT(bst_camera, optics, bst_optics_config_table, "{}",
+               "Point spread function beyond a plain Gaussian, and vignetting."),
     BST_CONFIG_END,
 };
+
+double bst_camera_illumination(const bst_camera *c, double x_px, double y_px) {
+    const bst_vignetting *v = &c->optics.vignetting;
+    if (v->model == BST_VIGNETTING_NONE && !(v->limit_px > 0.0)) {
+        return 1.0;
+    }
+    double dx = x_px - bst_camera_centre_x(c), dy = y_px - bst_camera_centre_y(c);
+    double r2 = dx * dx + dy * dy;
+    if (v->limit_px > 0.0 && r2 > v->limit_px * v->limit_px) {
+        return 0.0;
+    }
+    if (v->model == BST_VIGNETTING_COS4) {
+        double cosine = bst_camera_unproject(c, x_px, y_px).z;
+        return cosine * cosine * cosine * cosine;
+    }
+    if (v->model == BST_VIGNETTING_POLYNOMIAL) {
+        double width = (double)c->width_px, height = (double)c->height_px;
+        double s = r2 / (0.25 * (width * width + height * height));
+        return fmax(0.0, 1.0 + s * (v->coefficients[0] +
+                                    s * (v->coefficients[1] + s * v->coefficients[2])));
+    }
+    return 1.0;
+}
 
 double bst_camera_electrons_per_s(const bst_camera *c, double v_mag) {
     double area_m2 = 0.25 * BST_PI * c->aperture_m * c->aperture_m * (1.0 - c->obscuration);

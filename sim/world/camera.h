@@ -7,6 +7,7 @@
 
 #include "sim/core/config.h"
 #include "sim/core/vec.h"
+#include "sim/world/psf_config.h"
 
 /* Lens distortion in the focal plane's tangent coordinates u = (x, y), r^2 = x^2 + y^2, in units of
  * the focal length (Brown 1971, Photogrammetric Engineering 37, 855; the sign and order of the
@@ -36,7 +37,7 @@ typedef struct bst_camera {
     double throughput;              /* optics, 0..1 */
     double quantum_efficiency;      /* band mean, 0..1 */
     double photon_flux_v0_per_s_m2; /* photons of a V = 0 star in the camera's band */
-    double psf_fwhm_px;             /* Gaussian */
+    double psf_fwhm_px;             /* Gaussian, Moffat */
     double background_mag_arcsec2;  /* uniform sky, V per square arcsecond */
     double dark_current_e_per_s;
     double read_noise_e;
@@ -47,6 +48,7 @@ typedef struct bst_camera {
     double rotation_deg; /* of the focal plane about the boresight, from camera +x towards +y */
     double boresight_offset_px[2]; /* place of the boresight, from the sensor's centre */
     bst_distortion distortion;
+    bst_optics_config optics; /* PSF (see psf.h) and vignetting */
     bst_camera_geometry
         geometry; /* by bst_camera_prepare; all zero: neither turned nor distorted */
 } bst_camera;
@@ -142,6 +144,10 @@ static inline double bst_camera_stretch(const bst_camera *c) {
 static inline double bst_camera_shrink(const bst_camera *c) {
     return c->geometry.general ? c->geometry.shrink : 1.0;
 }
+
+/* Share of the light that reaches a pixel place past the vignetting, 0..1 (a polynomial may go
+ * beyond 1); 1 without. */
+double bst_camera_illumination(const bst_camera *c, double x_px, double y_px);
 
 /* Detected electrons per second of a source of magnitude v_mag:
  * photon_flux_v0 10^(-0.4 V) * pi/4 D^2 (1 - obscuration) * throughput * QE. */

@@ -1,0 +1,81 @@
+/* The point spread function of a camera as its optical transfer function (OTF): optics averaged
+ * over the band, defocus, charge diffusion and the pixel's own aperture in one complex number per
+ * spatial frequency. Made once from the camera, then read only: any number of threads may ask.
+ *
+ * Frequencies are in cycles per pixel along the image's x and y. The image of a point at the pixel
+ * place x0 is, per pixel at x,
+ *     image(x) = integral of OTF(f) exp(2 pi i f . (x - x0)) df   (real: OTF(-f) = conj OTF(f)),
+ * and sums to 1 over all pixels, as OTF(0) = 1. */
+#ifndef BST_WORLD_PSF_H
+#define BST_WORLD_PSF_H
+
+#include <stdbool.h>
+
+#include "sim/world/camera.h"
+
+typedef struct bst_psf bst_psf;
+
+/* Photons per wavelength, of what the camera sees through its band, at any scale. */
+typedef struct bst_psf_spectrum {
+    const double *wavelength_m; /* [count], ascending */
+    const double *weight;       /* [count], >= 0, not all zero */
+    int count;
+} bst_psf_spectrum;
+
+/* Samples of a PSF before integration over the pixel, at any scale: `planes` images
+ * [height][width], one for each node of the field grid, row by row. */
+typedef struct bst_psf_samples {
+    const float *samples;
+    int width, height, planes;
+    double oversampling; /* samples per pixel and axis */
+} bst_psf_samples;
+
+/* What a PSF may need beyond the camera's description; NULL members: nothing. */
+typedef struct bst_psf_inputs {
+    const bst_psf_samples *samples;   /* for BST_PSF_FILE; copied */
+    const bst_psf_spectrum *spectrum; /* for BST_PSF_DIFFRACTION, instead of optics.spectrum and
+                                         band_nm; each entry becomes a wavelength of the average */
+} bst_psf_inputs;
+
+/* Makes the PSF. BST_ERR_CONFIG, naming the key of `optics`, for what cannot be: defocus without a
+ * focal ratio, a field list of the wrong length, an obstruction without rest, aberrations of more
+ * than 64 waves per aperture diameter of slope, samples that are missing or empty; BST_ERR_MEMORY.
+ */
+bst_status bst_psf_create(bst_ctx *ctx, const bst_camera *camera, bst_psf **out) BST_MUST_CHECK;
+bst_status bst_psf_create_from(bst_ctx *ctx, const bst_camera *camera, const bst_psf_inputs *inputs,
+                               bst_psf **out) BST_MUST_CHECK;
+void bst_psf_free(bst_psf *psf);
+
+/* The OTF at (fx, fy) of a node of the field grid: out = {real, imaginary}. */
+void bst_psf_otf(const bst_psf *psf, int node, double fx, double fy, double out[2]);
+
+/* Frequency, cycles/px, beyond which the OTF without the pixel is below 1e-9. */
+double bst_psf_cutoff(const bst_psf *psf);
+
+/* Distance from its place, px, beyond which the light of a point per pixel, mean over the circle,
+ * is below 1e-9 of its peak. */
+double bst_psf_reach_px(const bst_psf *psf);
+
+/* Nodes of the field grid; 1: the same PSF all over. */
+int bst_psf_nodes(const bst_psf *psf);
+
+/* The nodes whose PSFs mix bilinearly at a pixel place, and their weights (sum 1). The grid's outer
+ * nodes sit on the centres of the sensor's corner pixels; beyond it the border holds. Returns how
+ * many there are, 1 to 4; none has weight 0. */
+int bst_psf_weights(const bst_psf *psf, double x_px, double y_px, int node[4], double weight[4]);
+
+/* Whether the PSF is one circular Gaussian all over the field, integrated over full pixels, and its
+ * standard deviation before that. Charge diffusion is in it. */
+bool bst_psf_gaussian(const bst_psf *psf, double *sigma_px);
+
+/* Noise-equivalent area of a node's image, px^2: 1 / integral |OTF|^2 df, the mean over places in
+ * the pixel of 1 / sum p^2 (King 1983, PASP 95, 163). The signal-to-noise ratio of E electrons on
+ * white noise of variance v per pixel is E / sqrt(v area). */
+double bst_psf_noise_area_px2(const bst_psf *psf, int node);
+
+/* Full width at half maximum of the Gaussian that has, integrated over full pixels, the same
+ * noise-equivalent area as the node at the field's centre: the width for a Gaussian filter. At
+ * least 0.1. */
+double bst_psf_equivalent_fwhm_px(const bst_psf *psf);
+
+#endif

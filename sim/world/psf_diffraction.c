@@ -1,0 +1,275 @@
+#include <math.h>
+#include <stdlib.h>
+
+#include "sim/world/psf_internal.h"
+#include "sim/world/pupil.h"
+
+/* The OTF of an aperture is its annulus's closed form, averaged over the band, plus what spiders
+ * and aberrations change. That difference is made on grids, where it is smooth: the annulus, whose
+ * OTF has a cone at 0 and square roots at its edges, is taken away on the same grids. */
+
+enum { MOST_WAVELENGTHS = 64 };
+
+/* Grid cells across the aperture, counted at the shortest wavelength: at least; with vanes; at
+ * most; and per wave of slope across the aperture. */
+enum { CELLS = 384, CELLS_VANES = 512, CELLS_MOST = 1024, CELLS_PER_WAVE = 16 };
+
+/* The band as a sum. */
+typedef struct band {
+    int count;
+    double wavelength_m[MOST_WAVELENGTHS], weight[MOST_WAVELENGTHS];
+    double q[MOST_WAVELENGTHS]; /* wavelength times focal ratio over pixel pitch */
+    double q_least;
+} band;
+
+/* Gauss-Legendre places and weights on [0, 1] (Abramowitz and Stegun 25.4.29): Newton's method on
+ * the Legendre polynomial. */
+static void gauss_legendre(int n, double *place, double *weight) {
+    for (int i = 0; i < n; i++) {
+        double x = cos(BST_PI * (i + 0.75) / (n + 0.5)), slope = 1.0;
+        for (int step = 0; step < 8; step++) {
+            double p = 1.0, before = 0.0;
+            for (int k = 1; k <= n; k++) {
+                double next = ((2.0 * k - 1.0) * x * p - (k - 1.0) * before) / k;
+                before = p;
+                p = next;
+            }
+            slope = n * (x * p - before) / (x * x - 1.0);
+            x -= p / slope;
+        }
+        place[i] = 0.5 * (1.0 - x);
+        weight[i] = 1.0 / ((1.0 - x * x) * slope * slope);
+    }
+}
+
+/* Photons per wavelength of a black body of the Sun's effective temperature, 5772 K (IAU 2015
+ * resolution B3), at any scale: Planck's law over the photon's energy. */
+static double solar_photons(double wavelength_m) {
+    const double second_radiation_constant_m_k = 1.438776877e-2;
+    return pow(1e6 * wavelength_m, -4.0) /
+           expm1(second_radiation_constant_m_k / (wavelength_m * 5772.0));
+}
+
+static bst_status make_band(bst_ctx *ctx, const bst_camera *camera,
+                            const bst_psf_spectrum *spectrum, band *b) {
+    const bst_optics_config *o = &camera->optics;
+    bool given = o->band_nm[1] > 0.0;
+    double from_m = 1e-9 * (given ? o->band_nm[0] : 507.0);
+    double to_m = 1e-9 * (given ? o->band_nm[1] : 595.0), middle_m;
+    if (spectrum) {
+        if (spectrum->count < 1 || spectrum->count > MOST_WAVELENGTHS) {
+            return bst_fail(ctx, BST_ERR_CONFIG,
+                            "the spectrum of a PSF has %d wavelengths; allowed are 1 to %d",
+                            spectrum->count, MOST_WAVELENGTHS);
+        }
+        b->count = spectrum->count;
+        for (int k = 0; k < b->count; k++) {
+            b->wavelength_m[k] = spectrum->wavelength_m[k];
+            b->weight[k] = spectrum->weight[k];
+        }
+        middle_m = 0.5 * (b->wavelength_m[0] + b->wavelength_m[b->count - 1]);
+    } else {
+        if (!(to_m > from_m)) {
+            return bst_fail(ctx, BST_ERR_CONFIG, "optics/band_nm must grow (found %g and %g)",
+                            1e9 * from_m, 1e9 * to_m);
+        }
+        b->count = o->wavelengths > 0 ? (int)o->wavelengths : 8;
+        gauss_legendre(b->count, b->wavelength_m, b->weight);
+        for (int k = 0; k < b->count; k++) {
+            b->wavelength_m[k] = from_m + b->wavelength_m[k] * (to_m - from_m);
+            b->weight[k] *=
+                o->spectrum == BST_SPECTRUM_SOLAR ? solar_photons(b->wavelength_m[k]) : 1.0;
+        }
+        middle_m = 0.5 * (from_m + to_m);
+    }
+    double per_m = 1.0 / (camera->aperture_m * bst_camera_scale_rad(camera));
+    if (o->q > 0.0) {
+        per_m = o->q / middle_m;
+    } else if (o->f_number > 0.0 && o->pixel_um > 0.0) {
+        per_m = o->f_number / (1e-6 * o->pixel_um);
+    }
+    double sum = 0.0;
+    b->q_least = INFINITY;
+    for (int k = 0; k < b->count; k++) {
+        b->q[k] = b->wavelength_m[k] * per_m;
+        if (!(b->weight[k] >= 0.0) || !(b->q[k] > 0.0) || !isfinite(b->q[k])) {
+            return bst_fail(ctx, BST_ERR_CONFIG,
+                            "a PSF by diffraction needs wavelengths above 0 with weights of at "
+                            "least 0, and aperture_m and pixel_scale_arcsec (or optics/q) above 0");
+        }
+        b->q_least = fmin(b->q_least, b->q[k]);
+        sum += b->weight[k];
+    }
+    if (!(sum > 0.0)) {
+        return bst_fail(ctx, BST_ERR_CONFIG, "the spectrum of a PSF has no light");
+    }
+    for (int k = 0; k < b->count; k++) {
+        b->weight[k] /= sum;
+    }
+    return BST_OK;
+}
+
+/* Aberrations of a node (NULL: those of the whole field alone), as a wavefront in m. */
+static bst_status make_wavefront(bst_ctx *ctx, const bst_optics_config *o,
+                                 const bst_psf_field_node *node, bst_zernike_polynomial *out) {
+    double wave_m = 1e-9 * (o->zernike_nm > 0.0 ? o->zernike_nm : 550.0);
+    double defocus_um = o->defocus_um + (node ? node->defocus_um : 0.0);
+    if (defocus_um != 0.0 && !(o->f_number > 0.0)) {
+        return bst_fail(ctx, BST_ERR_CONFIG, "optics/defocus_um needs optics/f_number");
+    }
+    *out = (bst_zernike_polynomial){0};
+    for (int k = 0; k < BST_ZERNIKE_TERMS; k++) {
+        double waves = o->zernike_waves.waves[k] + (node ? node->zernike_waves.waves[k] : 0.0);
+        if (waves != 0.0) {
+            bst_zernike_add(out, k + BST_ZERNIKE_FIRST, waves * wave_m);
+        }
+    }
+    if (defocus_um != 0.0) {
+        /* dz behind the focus is -dz / (8 F^2) r^2, and term 4 is sqrt(3) (2 r^2 - 1) */
+        bst_zernike_add(out, 4,
+                        -1e-6 * defocus_um / (16.0 * sqrt(3.0) * o->f_number * o->f_number));
+    }
+    return BST_OK;
+}
+
+static bool aberrated(const bst_zernike_polynomial *w) {
+    for (int p = 0; p <= BST_ZERNIKE_DEGREE; p++) {
+        for (int q = 0; q <= BST_ZERNIKE_DEGREE; q++) {
+            if (w->c[p][q] != 0.0) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+/* Adds `sign` times the band's OTF of an aperture to a table. */
+static void add_band(bst_pupil_work *work, const bst_pupil *pupil, const band *b, bool with_waves,
+                     float sign, bst_grid_otf *table) {
+    for (int k = 0; k < b->count; k++) {
+        const double *h;
+        int stride, side;
+        /* cells of one step of the table's frequency at this wavelength: no resampling */
+        bst_pupil_transfer(work, pupil, table->step * b->q[k],
+                           with_waves ? b->wavelength_m[k] : 0.0, &h, &stride, &side);
+        for (int ky = -table->reach; ky <= table->reach; ky++) {
+            const double *row = h + 2 * (size_t)((ky + side) % side) * (size_t)stride;
+            float *to = bst_grid_otf_node(table, 0, ky);
+            for (int i = 0; i < 2 * (table->reach + 1); i++) {
+                to[i] += sign * (float)(b->weight[k] * row[i]);
+            }
+        }
+    }
+}
+
+/* What a node's aperture adds to the annulus. base: table of the annulus, made when first needed.
+ */
+static bst_status make_node(bst_ctx *ctx, const bst_pupil *pupil, const band *b,
+                            bst_pupil_work *work, bst_grid_otf *base, double step, int reach,
+                            bst_grid_otf *out) {
+    if (base->step == 0.0) {
+        bst_pupil annulus = {.inner = pupil->inner};
+        BST_TRY(bst_grid_otf_create(ctx, step, reach, base));
+        add_band(work, &annulus, b, false, 1.0F, base);
+    }
+    BST_TRY(bst_grid_otf_create(ctx, step, reach, out));
+    add_band(work, pupil, b, true, 1.0F, out);
+    for (int ky = -reach; ky <= reach; ky++) {
+        const float *less = bst_grid_otf_node(base, 0, ky);
+        float *node = bst_grid_otf_node(out, 0, ky);
+        for (int i = 0; i < 2 * (reach + 1); i++) {
+            node[i] -= less[i];
+        }
+    }
+    /* cells that are half open lose light at no shift alone */
+    float *centre = bst_grid_otf_node(out, 0, 0);
+    centre[0] = centre[1] = 0.0F;
+    bst_grid_otf_mirror(out);
+    return BST_OK;
+}
+
+static bst_status make_tables(bst_ctx *ctx, const bst_camera *camera, const band *b,
+                              bst_pupil pupil, bst_psf *psf) {
+    const bst_optics_config *o = &camera->optics;
+    const bst_psf_field_node *field = o->field.count > 0 ? o->field.items : NULL;
+    double slope_m = 0.0;
+    bool any = pupil.vanes > 0;
+    for (int k = 0; k < bst_psf_nodes(psf); k++) {
+        BST_TRY(make_wavefront(ctx, o, field ? &field[k] : NULL, &pupil.wavefront));
+        slope_m = fmax(slope_m, bst_pupil_slope_m(&pupil));
+        any = any || aberrated(&pupil.wavefront);
+    }
+    if (!any) {
+        return BST_OK;
+    }
+    double shortest_m = b->wavelength_m[0];
+    for (int k = 1; k < b->count; k++) {
+        shortest_m = fmin(shortest_m, b->wavelength_m[k]);
+    }
+    double waves = slope_m / shortest_m, most = (double)CELLS_MOST / CELLS_PER_WAVE;
+    if (waves > most) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "optics has aberrations with slopes of %.3g waves per aperture diameter; "
+                        "at most %g can be drawn: lower zernike_waves or defocus_um",
+                        waves, most);
+    }
+    double cells = fmax(pupil.vanes > 0 ? CELLS_VANES : CELLS, ceil(CELLS_PER_WAVE * waves));
+    double step = 1.0 / (cells * b->q_least);
+    int reach = (int)cells + 1;
+    bst_pupil_work *work;
+    BST_TRY(bst_pupil_work_create(ctx, reach, &work));
+    bst_grid_otf base = {0};
+    bst_status status = BST_OK;
+    for (int k = 0; k < bst_psf_nodes(psf) && status == BST_OK; k++) {
+        status = make_wavefront(ctx, o, field ? &field[k] : NULL, &pupil.wavefront);
+        if (status == BST_OK && (pupil.vanes > 0 || aberrated(&pupil.wavefront))) {
+            status = make_node(ctx, &pupil, b, work, &base, step, reach, &psf->nodes[k].grid);
+        }
+    }
+    bst_grid_otf_free(&base);
+    bst_pupil_work_free(work);
+    return status;
+}
+
+bst_status bst_psf_make_diffraction(bst_ctx *ctx, const bst_camera *camera,
+                                    const bst_psf_spectrum *spectrum, bst_psf *psf) {
+    const bst_optics_config *o = &camera->optics;
+    band b = {0};
+    BST_TRY(make_band(ctx, camera, spectrum, &b));
+    bst_pupil pupil = {
+        .inner = o->central_obstruction > 0.0 ? o->central_obstruction : sqrt(camera->obscuration),
+        .vanes = o->spiders.width_m > 0.0 ? (int)o->spiders.count : 0,
+        .vane_rad = o->spiders.angle_deg * BST_DEG_RAD};
+    if (!(pupil.inner < 1.0)) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "optics/central_obstruction must be below 1 (found %g)", pupil.inner);
+    }
+    if (pupil.vanes > 0) {
+        pupil.vane_width = o->spiders.width_m / camera->aperture_m;
+        if (pupil.vanes > 32 || !(pupil.vanes * pupil.vane_width < 1.0)) {
+            return bst_fail(ctx, BST_ERR_CONFIG,
+                            "optics/spiders of %d vanes and %g m cover an aperture of %g m",
+                            pupil.vanes, o->spiders.width_m, camera->aperture_m);
+        }
+    }
+    psf->cutoff = 1.0 / b.q_least;
+    /* far out the mean over a circle of radius r is Q / (pi^3 r^3 (1 - e)), from the length of the
+     * aperture's rims; the peak is pi / 4 (1 - e^2) / Q^2 */
+    double e = pupil.inner, q_most = 0.0;
+    for (int k = 0; k < b.count; k++) {
+        q_most = fmax(q_most, b.q[k]);
+    }
+    psf->reach_px = q_most * cbrt(4e9 / (pow(BST_PI, 4.0) * (1.0 - e) * (1.0 - e) * (1.0 + e)));
+    BST_TRY(bst_radial_create(ctx, psf->cutoff, &psf->shared));
+    for (int i = 0; i < BST_RADIAL_NODES; i++) {
+        double f = bst_radial_frequency(psf->cutoff, i), sum = 0.0;
+        for (int k = 0; k < b.count; k++) {
+            sum += b.weight[k] * bst_annulus_otf(pupil.inner, f * b.q[k]);
+        }
+        psf->shared.value[i] = sum;
+    }
+    for (int k = 0; k < bst_psf_nodes(psf); k++) {
+        psf->nodes[k].radial = &psf->shared;
+    }
+    return make_tables(ctx, camera, &b, pupil, psf);
+}
