@@ -269,7 +269,7 @@ static bst_status watch_sensors(run_state *run, const bst_world *world) {
             BST_TRY(bst_loop_summary_create(run->ctx, world, i, s, run->scenario->tick_rate_hz,
                                             target, &w->summary));
             if (run->sensor_count == 0) {
-                BST_TRY(bst_run_pictures_create(run->ctx, &sensors[s].camera,
+                BST_TRY(bst_run_pictures_create(run->ctx, bst_world_camera(world, i, s),
                                                 run->scenario->tick_rate_hz, run->scenario->epoch,
                                                 target, &run->pictures));
                 bst_loop_summary_on_frame(w->summary, on_judged, run->pictures);
@@ -290,7 +290,7 @@ static bool has_module(const bst_scenario *scenario, int observer, int sensor, c
     return false;
 }
 
-static bst_status open_recorder(run_state *run, bst_run *store) {
+static bst_status open_recorder(run_state *run, const bst_world *world, bst_run *store) {
     const bst_scenario *scenario = run->scenario;
     const bst_observer_config *observers = scenario->observers.items;
     bst_recorder_sensor *list = calloc((size_t)run->sensor_count, sizeof *list);
@@ -305,7 +305,7 @@ static bst_status open_recorder(run_state *run, bst_run *store) {
                 .observer = observers[i].name,
                 .sensor = sensors[s].name,
                 .target = *sensors[s].cue.object ? sensors[s].cue.object : NULL,
-                .camera = &sensors[s].camera,
+                .camera = bst_world_camera(world, i, s),
                 .has_truth = has_module(scenario, i, s, "scenegen")};
         }
     }
@@ -403,7 +403,7 @@ static bst_status execute(run_state *run, bst_simulation *sim, const char *out, 
                              : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the scenario");
     cJSON_Delete(echo);
     if (status == BST_OK) {
-        status = open_recorder(run, store);
+        status = open_recorder(run, bst_simulation_world(sim), store);
     }
     double wall = 0.0;
     bool stepped = false;

@@ -34,9 +34,7 @@ double bst_fits_saturation_dn(const bst_camera *camera, int bits) {
 
 /* V magnitude of a source that gives one detected electron per second, in the camera's own band. */
 static double zero_point_mag(const bst_camera *c) {
-    double pupil_m2 = 0.25 * BST_PI * c->aperture_m * c->aperture_m * (1.0 - c->obscuration);
-    return 2.5 *
-           log10(c->photon_flux_v0_per_s_m2 * pupil_m2 * c->throughput * c->quantum_efficiency);
+    return 2.5 * log10(bst_camera_electrons_per_s(c, 0.0));
 }
 
 double bst_fits_date(const bst_fits_frame *frame, bst_fits_moment moment, char text[40]) {

@@ -50,6 +50,8 @@ const bst_config_desc bst_camera_config[] = {
                "the image inside the sensor."),
     BST_OBJECT(bst_camera, optics, bst_optics_config_table, "{}",
                "Point spread function beyond a plain Gaussian, and vignetting."),
+    BST_OBJECT(bst_camera, band, bst_band_config_table, "{}",
+               "What wavelengths the camera sees, and the warmth of its optics."),
     BST_CONFIG_END,
 };
 
@@ -76,7 +78,17 @@ double bst_camera_illumination(const bst_camera *c, double x_px, double y_px) {
     return 1.0;
 }
 
+/* Pupil area times throughput and quantum efficiency. */
+static double effective_m2(const bst_camera *c) {
+    double area_m2 = 0.25 * BST_PI * c->aperture_m * c->aperture_m * (1.0 - c->obscuration);
+    return area_m2 * c->throughput * c->quantum_efficiency;
+}
+
 double bst_camera_electrons_per_s(const bst_camera *c, double v_mag) {
+    if (c->spectrum) {
+        return bst_band_sun(c->spectrum) * pow(10.0, -0.4 * (v_mag - BST_SUN_V_MAG)) *
+               effective_m2(c);
+    }
     double area_m2 = 0.25 * BST_PI * c->aperture_m * c->aperture_m * (1.0 - c->obscuration);
     return c->photon_flux_v0_per_s_m2 * pow(10.0, -0.4 * v_mag) * area_m2 * c->throughput *
            c->quantum_efficiency;
@@ -86,7 +98,32 @@ double bst_camera_v_mag(const bst_camera *c, double electrons_per_s) {
     return -2.5 * log10(electrons_per_s / bst_camera_electrons_per_s(c, 0.0));
 }
 
+double bst_camera_star_electrons_per_s(const bst_camera *c, double v_mag, double b_minus_v) {
+    if (!c->spectrum) {
+        return bst_camera_electrons_per_s(c, v_mag);
+    }
+    return bst_band_star(c->spectrum, b_minus_v) * pow(10.0, -0.4 * v_mag) * effective_m2(c);
+}
+
+double bst_camera_thermal_electrons_per_s(const bst_camera *c, double temperature_k,
+                                          double solid_angle_sr) {
+    if (!c->spectrum || !(solid_angle_sr > 0.0)) {
+        return 0.0;
+    }
+    return bst_band_radiance(c->spectrum, temperature_k) * solid_angle_sr * effective_m2(c);
+}
+
+double bst_camera_optics_e_per_s(const bst_camera *c) {
+    if (!c->spectrum || !(c->throughput > 0.0)) {
+        return 0.0;
+    }
+    double pixel_sr = bst_camera_scale_rad(c) * bst_camera_scale_rad(c);
+    return bst_camera_thermal_electrons_per_s(c, c->band.optics_temperature_k, pixel_sr) *
+           c->band.optics_emissivity * c->band.optics_beam_factor / c->throughput;
+}
+
 double bst_camera_background_e_per_s(const bst_camera *c) {
     double pixel_arcsec2 = c->pixel_scale_arcsec * c->pixel_scale_arcsec;
-    return bst_camera_electrons_per_s(c, c->background_mag_arcsec2) * pixel_arcsec2;
+    return bst_camera_electrons_per_s(c, c->background_mag_arcsec2) * pixel_arcsec2 +
+           bst_camera_optics_e_per_s(c);
 }

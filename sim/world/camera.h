@@ -7,6 +7,7 @@
 
 #include "sim/core/config.h"
 #include "sim/core/vec.h"
+#include "sim/world/band.h"
 #include "sim/world/psf_config.h"
 
 /* Lens distortion in the focal plane's tangent coordinates u = (x, y), r^2 = x^2 + y^2, in units of
@@ -49,6 +50,9 @@ typedef struct bst_camera {
     double boresight_offset_px[2]; /* place of the boresight, from the sensor's centre */
     bst_distortion distortion;
     bst_optics_config optics; /* PSF (see psf.h) and vignetting */
+    bst_band_config band;
+    const bst_band *spectrum; /* made from `band` and kept by the world; NULL: the V band of
+                                 photon_flux_v0_per_s_m2, the same for all colours */
     bst_camera_geometry
         geometry; /* by bst_camera_prepare; all zero: neither turned nor distorted */
 } bst_camera;
@@ -149,14 +153,26 @@ static inline double bst_camera_shrink(const bst_camera *c) {
  * beyond 1); 1 without. */
 double bst_camera_illumination(const bst_camera *c, double x_px, double y_px);
 
-/* Detected electrons per second of a source of magnitude v_mag:
- * photon_flux_v0 10^(-0.4 V) * pi/4 D^2 (1 - obscuration) * throughput * QE. */
+/* Detected electrons per second of a source of magnitude v_mag, pi/4 D^2 (1 - obscuration) *
+ * throughput * QE times: photon_flux_v0 10^(-0.4 V); with a spectrum bst_band_sun 10^(-0.4 (V -
+ * BST_SUN_V_MAG)), that is of a source that reflects sunlight and is as bright as V says. */
 double bst_camera_electrons_per_s(const bst_camera *c, double v_mag);
 /* The inverse: V of a rate of detected electrons. */
 double bst_camera_v_mag(const bst_camera *c, double electrons_per_s);
-/* Sky electrons per second and pixel: those of the pixel at the boresight. They are the same all
- * over the sensor, whatever solid angle gnomonic projection and distortion give a pixel there, as
- * after a flat field. */
+/* The same of a star of colour B-V (NAN: unknown), as bst_band_star; without a spectrum the colour
+ * does not matter. */
+double bst_camera_star_electrons_per_s(const bst_camera *c, double v_mag, double b_minus_v);
+/* Of a black body of temperature_k that fills solid_angle_sr, times its emissivity; 0 without a
+ * spectrum. */
+double bst_camera_thermal_electrons_per_s(const bst_camera *c, double temperature_k,
+                                          double solid_angle_sr);
+/* The optics' own emission, electrons per second and pixel: emissivity * radiance * pupil * the
+ * pixel's solid angle * optics_beam_factor * QE (area times solid angle is the same at the detector
+ * as at the pupil); 0 without a spectrum. */
+double bst_camera_optics_e_per_s(const bst_camera *c);
+/* Electrons per second and pixel of the sky and the optics: those of the pixel at the boresight.
+ * They are the same all over the sensor, whatever solid angle gnomonic projection and distortion
+ * give a pixel there, as after a flat field. */
 double bst_camera_background_e_per_s(const bst_camera *c);
 
 #endif

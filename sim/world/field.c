@@ -417,15 +417,15 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
             continue;
         }
         bst_source *s = &field->sources[n++];
-        *s =
-            (bst_source){.kind = BST_SOURCE_STAR,
-                         .id = star->id,
-                         .apparent_mid = apparent,
-                         .electrons_per_s = bst_camera_electrons_per_s(camera, (double)star->v_mag),
-                         .v_mag = (double)star->v_mag,
-                         .sunlit_fraction = NAN,
-                         .phase_rad = NAN,
-                         .range_m = INFINITY};
+        *s = (bst_source){.kind = BST_SOURCE_STAR,
+                          .id = star->id,
+                          .apparent_mid = apparent,
+                          .electrons_per_s = bst_camera_star_electrons_per_s(
+                              camera, (double)star->v_mag, (double)star->b_minus_v),
+                          .v_mag = (double)star->v_mag,
+                          .sunlit_fraction = NAN,
+                          .phase_rad = NAN,
+                          .range_m = INFINITY};
         /* the Earth hides stars too: a point far along the line of sight stands for the star */
         s->occulted =
             bst_earth_occults(eye.position_m, bst_vec3_axpy(eye.position_m, 1e12, star->icrs),

@@ -1,9 +1,5 @@
 #include "sim/world/world.h"
 
-/* Apparent V magnitude of the Sun at 1 au (Willmer 2018 gives -26.76 in Vega V; -26.74 is the value
- * in common use). */
-#define SUN_V_MAG (-26.74)
-
 double bst_lambert_sphere_v_mag(double area_m2, double albedo, double phase_rad, double range_m,
                                 double sun_distance_m) {
     double phi = fabs(phase_rad);
@@ -11,5 +7,5 @@ double bst_lambert_sphere_v_mag(double area_m2, double albedo, double phase_rad,
     double au = sun_distance_m / BST_AU_M;
     double ratio =
         2.0 * albedo * area_m2 * phase / (3.0 * BST_PI * BST_PI * range_m * range_m * au * au);
-    return phi < BST_PI && ratio > 0.0 ? SUN_V_MAG - 2.5 * log10(ratio) : INFINITY;
+    return phi < BST_PI && ratio > 0.0 ? BST_SUN_V_MAG - 2.5 * log10(ratio) : INFINITY;
 }

@@ -14,6 +14,20 @@ static bst_status open_stars(const bst_world_builder *b, const char *name, const
                             : bst_fail_prefix(b->ctx, status, "%s: %s", b->scenario, where);
 }
 
+static bst_status make_spectrum(const bst_world_builder *b, bst_camera *camera, int observer,
+                                int sensor) {
+    bst_band *band;
+    bst_status status = bst_band_create(b->ctx, &camera->band, b->base_dir, &band);
+    if (status != BST_OK) {
+        return bst_fail_prefix(b->ctx, BST_ERR_CONFIG, "%s: /observers/%d/sensors/%d/camera/band",
+                               b->scenario, observer, sensor);
+    }
+    camera->spectrum = band;
+    /* the lists belong to the configuration */
+    camera->band.response = camera->band.transmission = (bst_config_list){0};
+    return BST_OK;
+}
+
 static bst_status make_observers(const bst_world_builder *b, const bst_config_list *list) {
     bst_world *world = b->world;
     world->observers = calloc((size_t)list->count + 1, sizeof *world->observers);
@@ -43,6 +57,7 @@ static bst_status make_observers(const bst_world_builder *b, const bst_config_li
                                        "%s: /observers/%d/sensors/%d/camera/distortion",
                                        b->scenario, i, s);
             }
+            BST_TRY(make_spectrum(b, &observer->sensors[s].config.camera, i, s));
         }
     }
     return BST_OK;
@@ -109,6 +124,9 @@ void bst_world_free(bst_world *world) {
     }
     for (int i = 0; world->observers && i < world->observer_count; i++) {
         bst_orbit_free(&world->observers[i].orbit);
+        for (int k = 0; world->observers[i].sensors && k < world->observers[i].sensor_count; k++) {
+            bst_band_free((bst_band *)world->observers[i].sensors[k].config.camera.spectrum);
+        }
         free(world->observers[i].sensors);
     }
     bst_world_files_free(world);
