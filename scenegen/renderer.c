@@ -7,6 +7,7 @@
 
 #include "bst_device_kernels.h"
 #include "bst_scenegen_kernels.h"
+#include "scenegen/detector.h"
 #include "scenegen/frame_pool.h"
 #include "scenegen/reference.h"
 #include "scenegen/smear.h"
@@ -84,17 +85,17 @@ static bst_status choose_tiles(bst_ctx *ctx, const bst_device *device,
     *most_bytes = most;
     if (options->tile_width == 0) {
         bool large = (type & CL_DEVICE_TYPE_CPU) && local_bytes >= 128 * 1024;
-        options->tile_width = large ? 256 : 32;
-        options->tile_height = large ? 64 : 4;
+        options->tile_width = large ? 256 : 64;
+        options->tile_height = large ? 64 : 2;
         options->group = large ? 1 : 16;
     }
     size_t need = (size_t)(options->tile_width + 32) * (size_t)options->tile_height *
                   sizeof(float) * (size_t)options->group;
-    if (options->tile_width < 16 || options->tile_width % 16 != 0 || options->tile_height < 1 ||
+    if (options->tile_width < 64 || options->tile_width % 64 != 0 || options->tile_height < 1 ||
         options->group < 1 || need > local_bytes) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "tiles of %d x %d pixels in groups of %d need %zu bytes of local memory "
-                        "(the device has %llu) and a width that is a multiple of 16",
+                        "(the device has %llu) and a width that is a multiple of 64",
                         options->tile_width, options->tile_height, options->group, need,
                         (unsigned long long)local_bytes);
     }
@@ -103,12 +104,13 @@ static bst_status choose_tiles(bst_ctx *ctx, const bst_device *device,
 
 static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
     const bst_kernel_source *sources[] = {&bst_kernel_scene_shared, &bst_kernel_nodes,
-                                          &bst_kernel_splat, &bst_kernel_detector,
-                                          &bst_kernel_tile};
+                                          &bst_kernel_splat,        &bst_kernel_random,
+                                          &bst_kernel_detector,     &bst_kernel_tile};
     char options[512];
     int length = snprintf(options, sizeof options,
                           "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d",
                           r->options.tile_width, r->options.tile_height, r->options.group, r->taps);
+    length += bst_detector_options(&r->camera, options + length, sizeof options - (size_t)length);
     const bst_distortion *d = &r->camera.distortion;
     if (bst_camera_distorted(&r->camera)) {
         double a = bst_camera_scale_rad(&r->camera), a2 = a * a,
@@ -118,7 +120,7 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
             " -DDISTORTED -DK1=%.9ef -DK2=%.9ef -DK3=%.9ef -DP1=%.9ef -DP2=%.9ef -DFOLD2=%.9ef",
             d->k1 * a2, d->k2 * a2 * a2, d->k3 * a2 * a2 * a2, d->p1 * a, d->p2 * a, out * out);
     }
-    BST_TRY(bst_device_build(ctx, device, sources, 5, options, &r->program));
+    BST_TRY(bst_device_build(ctx, device, sources, 6, options, &r->program));
     static const char *const names[3] = {"bst_scene_nodes", "bst_scene_frame",
                                          "bst_scene_expected"};
     cl_kernel *kernels[3] = {&r->nodes_kernel, &r->frame_kernel, &r->expected_kernel};
@@ -361,13 +363,15 @@ static bst_scene_params make_params(const bst_renderer *r, const bst_render_requ
                                     int groups) {
     const bst_camera *c = &r->camera;
     bst_window w = q->window;
+    int x0 = w.x0 / 64 * 64;
     return (bst_scene_params){
         .window_x0 = w.x0,
         .window_y0 = w.y0,
         .window_width = w.width,
         .window_height = w.height,
         .sensor_width = (int)c->width_px,
-        .tiles_x = (w.width + r->options.tile_width - 1) / r->options.tile_width,
+        .tiles_x0 = x0,
+        .tiles_x = (w.x0 + w.width - x0 + r->options.tile_width - 1) / r->options.tile_width,
         .tiles_y = (w.height + r->options.tile_height - 1) / r->options.tile_height,
         .source_groups = groups,
         .key0 = q->key.k[0],
@@ -377,6 +381,7 @@ static bst_scene_params make_params(const bst_renderer *r, const bst_render_requ
         .background_e = (float)q->background_e,
         .read_noise_e = (float)c->read_noise_e,
         .full_well_e = (float)c->full_well_e,
+        .near_full_e = (float)bst_detector_near_full_e(c->full_well_e),
         .dn_per_e = (float)(1.0 / c->gain_e_per_dn),
         .offset_dn = (float)c->offset_dn,
         .max_dn = (float)((1 << c->bits) - 1),

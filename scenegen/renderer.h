@@ -21,7 +21,7 @@ typedef struct bst_renderer_options {
         cut_sigma;   /* light per pixel that a stamp may leave out, in sigma of a dark pixel (0.015)
                       */
     int pool_frames; /* frames that may be alive at a time (4) */
-    int tile_width, tile_height, group; /* pixels per work-item (width a multiple of 16) and
+    int tile_width, tile_height, group; /* pixels per work-item (width a multiple of 64) and
                                            work-items per group; 0: chosen for the device */
 } bst_renderer_options;
 

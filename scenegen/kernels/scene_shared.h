@@ -14,12 +14,14 @@
 typedef struct bst_scene_params {
     int window_x0, window_y0, window_width, window_height;
     int sensor_width;
+    int tiles_x0; /* sensor column of the first tile: a multiple of 64 */
     int tiles_x, tiles_y;
     int source_groups; /* sources / BST_BLOCK, rounded up */
     unsigned key0, key1, exposure_low, exposure_high;
     float background_e; /* expected, per pixel */
     float read_noise_e;
     float full_well_e;
+    float near_full_e; /* means above may fill the well */
     float dn_per_e;
     float offset_dn;
     float max_dn;

@@ -1,42 +1,82 @@
 /* One tile of the frame per work-item. Option: GROUP (work-items per work-group). */
 
+/* Where a tile lies: its first pixel on the full sensor and in the window, and its size. Tiles
+ * start at columns that are multiples of 64, so the first and the last may reach beyond the window.
+ */
+typedef struct tile_place {
+    int x, y, left, top, rows, columns;
+} tile_place;
+
+static tile_place place_tile(bst_scene_params p, int tile) {
+    tile_place t;
+    t.x = p.tiles_x0 + tile % p.tiles_x * TILE_W;
+    t.left = t.x - p.window_x0;
+    t.top = tile / p.tiles_x * TILE_H;
+    t.y = p.window_y0 + t.top;
+    t.rows = min(TILE_H, p.window_height - t.top);
+    t.columns = min(TILE_W, p.window_width - t.left);
+    return t;
+}
+
+/* 16 digital numbers at once at an odd address: vstore16 may become 16 stores. */
+typedef ushort16 __attribute__((aligned(2))) ushort16_anywhere;
+
+/* Digital numbers, plus one half, of 16 pixels to the window's row at `column`. Returns the pixels
+ * that are saturated (`brim`, or converter at its top) as -1; those outside the window are none. */
+INLINE int16 store_dn(bst_scene_params p, float16 dn, int16 brim, int column, global ushort *row) {
+    ushort16 value = convert_ushort16(convert_int16(clamp(dn, 0.0f, p.max_dn)));
+    int16 full = brim | (dn >= p.max_dn);
+    if (column >= 0 && column + 16 <= p.window_width) {
+        *(global ushort16_anywhere *)(row + column) = value;
+        return full;
+    }
+    ushort values[16];
+    int flags[16];
+    vstore16(value, 0, values);
+    vstore16(full, 0, flags);
+    for (int i = 0; i < 16; i++) {
+        if (column + i >= 0 && column + i < p.window_width) {
+            row[column + i] = values[i];
+        } else {
+            flags[i] = 0;
+        }
+    }
+    return vload16(0, flags);
+}
+
 /* frame: [window_height][window_width] digital numbers. saturated: pixels per tile. */
 __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     bst_scene_params p, global const bst_scene_source *sources, global const float *nodes,
     global const float4 *block_box, global const float *source_box, global const float *profiles,
     global ushort *frame, global int *saturated) {
-    local float sums[GROUP][TILE_H * STRIDE];
+    local float sums[GROUP][TILE_H * STRIDE] __attribute__((aligned(64)));
     int tile = (int)get_global_id(0);
     if (tile >= p.tiles_x * p.tiles_y) {
         return;
     }
     local float *sum = sums[get_local_id(0)];
-    int left = tile % p.tiles_x * TILE_W, top = tile / p.tiles_x * TILE_H;
-    int tile_x = p.window_x0 + left, tile_y = p.window_y0 + top;
-    splat_tile(sum, tile_x, tile_y, p.source_groups, sources, nodes, block_box, source_box,
-               profiles);
+    tile_place t = place_tile(p, tile);
+    splat_tile(sum, t.x, t.y, p.source_groups, sources, nodes, block_box, source_box, profiles);
+    uint steps[MOST_STEPS];
+    dark_law dark = dark_law_of(p, steps);
+    uint chunks_per_row = (uint)(p.sensor_width + 63) / 64u;
     int16 full_count = (int16)0;
-    int rows = min(TILE_H, p.window_height - top), columns = min(TILE_W, p.window_width - left);
-    for (int y = 0; y < rows; y++) {
-        uint index = (uint)((tile_y + y) * p.sensor_width + tile_x);
-        global ushort *out = frame + (size_t)(top + y) * p.window_width + left;
-        for (int x = 0; x < columns; x += 16) {
-            float16 mean = vload16(0, sum + y * STRIDE + PAD + x) + p.background_e;
-            int16 full;
-            ushort16 dn = detect16(p, index + (uint)x, mean, &full);
-            if (x + 16 <= columns) {
-                vstore16(dn, 0, out + x);
-                full_count -= full;
-            } else {
-                ushort last[16];
-                int flags[16];
-                vstore16(dn, 0, last);
-                vstore16(full, 0, flags);
-                for (int i = 0; x + i < columns; i++) {
-                    out[x + i] = last[i];
-                    full_count.s0 -= flags[i];
-                }
-            }
+    for (int y = 0; y < t.rows; y++) {
+        uint counter = ((uint)(t.y + y) * chunks_per_row + (uint)t.x / 64u) * 16u;
+        global ushort *row = frame + (size_t)(t.top + y) * p.window_width;
+        for (int x = 0; x < t.columns; x += 64) {
+            local float16 *from = (local float16 *)(sum + y * STRIDE + PAD + x);
+            chunk light = {from[0], from[1], from[2], from[3]};
+            int lit =
+                any16((light.a > 0.0f) | (light.b > 0.0f) | (light.c > 0.0f) | (light.d > 0.0f));
+            chunk_flags brim;
+            chunk dn = detect_chunk(p, dark, steps, counter, light, lit, &brim);
+            int column = t.left + x;
+            full_count -= store_dn(p, dn.a, brim.a, column, row);
+            full_count -= store_dn(p, dn.b, brim.b, column + 16, row);
+            full_count -= store_dn(p, dn.c, brim.c, column + 32, row);
+            full_count -= store_dn(p, dn.d, brim.d, column + 48, row);
+            counter += 16u;
         }
     }
     int8 a = full_count.lo + full_count.hi;
@@ -56,14 +96,12 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_expecte
         return;
     }
     local float *sum = sums[get_local_id(0)];
-    int left = tile % p.tiles_x * TILE_W, top = tile / p.tiles_x * TILE_H;
-    splat_tile(sum, p.window_x0 + left, p.window_y0 + top, p.source_groups, sources, nodes,
-               block_box, source_box, profiles);
-    int rows = min(TILE_H, p.window_height - top), columns = min(TILE_W, p.window_width - left);
-    for (int y = 0; y < rows; y++) {
-        global float *out = image + (size_t)(top + y) * p.window_width + left;
-        for (int x = 0; x < columns; x++) {
-            out[x] = sum[y * STRIDE + PAD + x] + p.background_e;
+    tile_place t = place_tile(p, tile);
+    splat_tile(sum, t.x, t.y, p.source_groups, sources, nodes, block_box, source_box, profiles);
+    for (int y = 0; y < t.rows; y++) {
+        global float *out = image + (size_t)(t.top + y) * p.window_width;
+        for (int x = max(0, -t.left); x < t.columns; x++) {
+            out[t.left + x] = sum[y * STRIDE + PAD + x] + p.background_e;
         }
     }
 }

@@ -1,30 +1,75 @@
 /* Digital numbers of dark frames against the exact law: Poisson, plus normal, quantised. Argument
- * "slow": ten million draws per case instead of one. */
+ * "slow": a hundred million draws per case instead of ten. */
 #include "tests/scenegen/scene_support.h"
 #include "tests/test_support.h"
 
 enum { SIDE = 1000, OFFSET = 100, TOP = 65536 };
-static int frames_per_case = 1;
+static int frames_per_case = 10;
 static const double means[] = {0.0, 0.1, 1.0, 10.0, 100.0, 1e4, 6e4};
 static const double reads[] = {0.3, 1.0, 5.0};
 /* p = 1e-4: normal deviate, and Kolmogorov's limit sqrt(-ln(p / 2) / 2) */
 static const double normal_limit = 3.719, kolmogorov_limit = 2.225;
 
-/* Probability of each digital number at gain 1: sum over electrons of Poisson times normal. */
-static void exact_law(double mean, double read, double *law) {
-    memset(law, 0, TOP * sizeof *law);
+enum { SPREAD = 64 };
+
+/* Probability that a charge reads d - SPREAD above itself, at gain 1. */
+static void read_law(double read, double *shift) {
+    for (int d = -SPREAD; d <= SPREAD; d++) {
+        double a = (d - 0.5) / read / sqrt(2.0), b = (d + 0.5) / read / sqrt(2.0);
+        shift[d + SPREAD] = 0.5 * (erfc(-b) - erfc(-a));
+    }
+}
+
+/* Adds the law of digital numbers at gain 1: sum over electrons of Poisson times normal. */
+static void add_exact_law(double mean, const double *shift, double *law) {
     double reach = 9.0 * sqrt(mean) + 60.0;
     int first = (int)fmax(0.0, mean - reach), last = (int)(mean + reach);
-    int spread = (int)(8.0 * read) + 2;
     for (int n = first; n <= last; n++) {
         double p = mean > 0.0 ? exp(n * log(mean) - mean - lgamma(n + 1.0)) : n == 0 ? 1.0 : 0.0;
-        for (int d = n - spread; d <= n + spread; d++) {
-            double a = (d - 0.5 - n) / read, b = (d + 0.5 - n) / read;
-            int dn = d + OFFSET;
-            if (dn >= 0 && dn < TOP) {
-                law[dn] += p * 0.5 * (erfc(-b / sqrt(2.0)) - erfc(-a / sqrt(2.0)));
+        if (p > 1e-16) {
+            for (int d = -SPREAD; d <= SPREAD; d++) {
+                int dn = n + d + OFFSET;
+                if (dn >= 0 && dn < TOP) {
+                    law[dn] += p * shift[d + SPREAD];
+                }
             }
         }
+    }
+}
+
+/* Chi-square and Kolmogorov-Smirnov of the seen numbers against `law`, which adds up to `total`; n
+ * draws. */
+static void check_law(const char *what, double read, const double *law, double total,
+                      const long long *seen, double n) {
+    double chi2 = 0.0, worst = 0.0, cdf = 0.0, ecdf = 0.0, want = 0.0, got = 0.0;
+    double last_want = 0.0, last_got = 0.0;
+    int bins = 0;
+    for (int d = 0; d < TOP; d++) {
+        double share = law[d] / total;
+        cdf += share;
+        ecdf += (double)seen[d] / n;
+        worst = fmax(worst, fabs(cdf - ecdf));
+        want += share * n;
+        got += (double)seen[d];
+        if (want >= 10.0) { /* bins of at least ten expected draws; the rest joins the last */
+            chi2 += (got - want) * (got - want) / want;
+            last_want = want;
+            last_got = got;
+            bins++;
+            want = got = 0.0;
+        }
+    }
+    bst_assert_close(cdf, 1.0, 1e-9); /* the law is complete */
+    chi2 -= (last_got - last_want) * (last_got - last_want) / last_want;
+    last_want += want;
+    last_got += got;
+    chi2 += (last_got - last_want) * (last_got - last_want) / last_want;
+    double k = bins - 1.0;
+    /* Wilson and Hilferty 1931: the cube root of chi-square / k is nearly normal */
+    double z = k > 0.0 ? (cbrt(chi2 / k) - (1.0 - 2.0 / (9.0 * k))) / sqrt(2.0 / (9.0 * k)) : 0.0;
+    if (!(z < normal_limit) || !(worst * sqrt(n) < kolmogorov_limit)) {
+        fail_msg("%s, read noise %g: chi-square %g of %g degrees (z %.2f), KS %.2f", what, read,
+                 chi2, k, z, worst * sqrt(n));
     }
 }
 
@@ -32,6 +77,7 @@ static void check_case(bst_ctx *ctx, bst_renderer *r, double mean, double read, 
     static double law[TOP];
     static long long seen[TOP];
     memset(seen, 0, sizeof seen);
+    memset(law, 0, sizeof law);
     double time_s[2] = {0.0, 0.5};
     bst_quat q[2] = {BST_QUAT_IDENTITY, BST_QUAT_IDENTITY};
     bst_los_track track = {2, time_s, q};
@@ -51,37 +97,12 @@ static void check_case(bst_ctx *ctx, bst_renderer *r, double mean, double read, 
         bst_frame_unmap(frame);
         bst_frame_release(frame);
     }
-    exact_law(mean, read, law);
-    double n = (double)SIDE * SIDE * frames_per_case;
-    double chi2 = 0.0, worst = 0.0, cdf = 0.0, ecdf = 0.0, want = 0.0, got = 0.0;
-    double last_want = 0.0, last_got = 0.0;
-    int bins = 0;
-    for (int d = 0; d < TOP; d++) {
-        cdf += law[d];
-        ecdf += (double)seen[d] / n;
-        worst = fmax(worst, fabs(cdf - ecdf));
-        want += law[d] * n;
-        got += (double)seen[d];
-        if (want >= 10.0) { /* bins of at least ten expected draws; the rest joins the last */
-            chi2 += (got - want) * (got - want) / want;
-            last_want = want;
-            last_got = got;
-            bins++;
-            want = got = 0.0;
-        }
-    }
-    bst_assert_close(cdf, 1.0, 1e-9); /* the law is complete */
-    chi2 -= (last_got - last_want) * (last_got - last_want) / last_want;
-    last_want += want;
-    last_got += got;
-    chi2 += (last_got - last_want) * (last_got - last_want) / last_want;
-    double k = bins - 1.0;
-    /* Wilson and Hilferty 1931: the cube root of chi-square / k is nearly normal */
-    double z = k > 0.0 ? (cbrt(chi2 / k) - (1.0 - 2.0 / (9.0 * k))) / sqrt(2.0 / (9.0 * k)) : 0.0;
-    if (!(z < normal_limit) || !(worst * sqrt(n) < kolmogorov_limit)) {
-        fail_msg("mean %g read noise %g: chi-square %g of %g degrees (z %.2f), KS %.2f", mean, read,
-                 chi2, k, z, worst * sqrt(n));
-    }
+    double shift[2 * SPREAD + 1];
+    read_law(read, shift);
+    add_exact_law(mean, shift, law);
+    char what[64];
+    snprintf(what, sizeof what, "mean %g", mean);
+    check_law(what, read, law, 1.0, seen, (double)SIDE * SIDE * frames_per_case);
 }
 
 static void draws_follow_the_exact_law(void **state) {
@@ -99,6 +120,76 @@ static void draws_follow_the_exact_law(void **state) {
         for (size_t j = 0; j < sizeof means / sizeof *means; j++) {
             check_case(&ctx, r, means[j], reads[i],
                        bst_rng_make_key(11, i, "noise", j % 2 ? "odd" : "even"));
+        }
+        bst_renderer_free(r);
+    }
+    bst_device_close(device);
+}
+
+/* Means that differ from pixel to pixel, by the light of a wide star: grouped by mean, the numbers
+ * follow the mixture of the pixels' laws. Read noises on both sides of each change of method. */
+static void draws_follow_the_law_where_light_varies(void **state) {
+    (void)state;
+    enum { N = 128, GROUPS = 6 };
+    static const double edges[GROUPS + 1] = {0.0, 1.0, 5.0, 20.0, 30.0, 60.0, 1e9};
+    static const double read_noises[] = {0.5, 0.75, 1.0, 2.0, 3.0, 5.0};
+    static double laws[GROUPS][TOP];
+    static long long seen[GROUPS][TOP];
+    static float image[N * N];
+    bst_ctx ctx = {0};
+    bst_device *device;
+    bst_assert_ok(&ctx, bst_device_open(&ctx, "", 0, &device));
+    double time_s[2] = {0.0, 1.0};
+    bst_quat q[2] = {BST_QUAT_IDENTITY, BST_QUAT_IDENTITY};
+    bst_los_track track = {2, time_s, q};
+    for (size_t c = 0; c < sizeof read_noises / sizeof *read_noises; c++) {
+        bst_camera camera = scene_camera(N, N);
+        camera.read_noise_e = read_noises[c];
+        camera.psf_fwhm_px = 60.0;
+        camera.full_well_e = 1e6;
+        camera.offset_dn = OFFSET;
+        bst_renderer *r;
+        bst_assert_ok(&ctx, bst_renderer_create(&ctx, device, &camera, NULL, &r));
+        bst_source star = scene_star(&camera, 40.3, 52.8, 4e5);
+        bst_render_request request = {.window = {0, 0, N, N},
+                                      .track = &track,
+                                      .sources = &star,
+                                      .count = 1,
+                                      .background_e = 0.2,
+                                      .key = {{31, (unsigned)c}}};
+        bst_assert_ok(&ctx, bst_renderer_render_noise_free(&ctx, r, &request, image));
+        memset(laws, 0, sizeof laws);
+        memset(seen, 0, sizeof seen);
+        double shift[2 * SPREAD + 1], pixels_of[GROUPS] = {0.0};
+        unsigned char group[N * N];
+        read_law(read_noises[c], shift);
+        for (int i = 0; i < N * N; i++) {
+            int g = 0;
+            while (image[i] >= edges[g + 1]) {
+                g++;
+            }
+            group[i] = (unsigned char)g;
+            pixels_of[g] += 1.0;
+            add_exact_law(image[i], shift, laws[g]);
+        }
+        int frames = 8 * frames_per_case;
+        for (int f = 0; f < frames; f++) {
+            bst_frame *frame;
+            const uint16_t *pixels;
+            request.exposure_id = f;
+            bst_assert_ok(&ctx, bst_renderer_render(&ctx, r, &request, &frame));
+            bst_assert_ok(&ctx, bst_frame_map(frame, &ctx, &pixels));
+            for (int i = 0; i < N * N; i++) {
+                seen[group[i]][pixels[i]]++;
+            }
+            bst_frame_unmap(frame);
+            bst_frame_release(frame);
+        }
+        for (int g = 0; g < GROUPS; g++) {
+            char what[64];
+            snprintf(what, sizeof what, "means %g to %g", edges[g], edges[g + 1]);
+            assert_true(pixels_of[g] > 100.0);
+            check_law(what, read_noises[c], laws[g], pixels_of[g], seen[g], pixels_of[g] * frames);
         }
         bst_renderer_free(r);
     }
@@ -150,10 +241,11 @@ static void pixels_and_frames_are_independent(void **state) {
 
 int main(int argc, char **argv) {
     if (argc > 1 && strcmp(argv[1], "slow") == 0) {
-        frames_per_case = 10;
+        frames_per_case = 100;
     }
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(draws_follow_the_exact_law),
+        cmocka_unit_test(draws_follow_the_law_where_light_varies),
         cmocka_unit_test(pixels_and_frames_are_independent),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
