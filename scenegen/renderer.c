@@ -11,6 +11,7 @@
 #include "scenegen/frame_pool.h"
 #include "scenegen/reference.h"
 #include "scenegen/smear.h"
+#include "sim/world/skylight.h"
 
 enum { MAX_TAPS = 512, BOX_FLOATS = 4 };
 /* Of a block of nodes: place and weight. */
@@ -33,10 +34,11 @@ struct bst_renderer {
     bst_smear *smear;
     bst_frame_pool *pool;
     cl_mem profiles;
-    growing table, sources, nodes, block_box, source_box, saturated, expected;
+    growing table, sources, nodes, block_box, source_box, saturated, expected, background;
     bst_scene_source *list; /* drawn sources */
     double *peak_e;         /* of all sources of the request */
     int list_capacity, tiles;
+    bool map;            /* the background differs from pixel to pixel */
     uint64_t most_bytes; /* of one buffer on the device */
     bst_render_stats stats;
 };
@@ -103,13 +105,14 @@ static bst_status choose_tiles(bst_ctx *ctx, const bst_device *device,
 }
 
 static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
-    const bst_kernel_source *sources[] = {&bst_kernel_scene_shared, &bst_kernel_nodes,
-                                          &bst_kernel_splat,        &bst_kernel_random,
-                                          &bst_kernel_detector,     &bst_kernel_tile};
+    const bst_kernel_source *sources[] = {
+        &bst_kernel_scene_shared, &bst_kernel_nodes,      &bst_kernel_splat, &bst_kernel_random,
+        &bst_kernel_detector,     &bst_kernel_background, &bst_kernel_tile};
     char options[512];
     int length = snprintf(options, sizeof options,
-                          "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d",
-                          r->options.tile_width, r->options.tile_height, r->options.group, r->taps);
+                          "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d%s",
+                          r->options.tile_width, r->options.tile_height, r->options.group, r->taps,
+                          r->map ? " -DBACKGROUND" : "");
     length += bst_detector_options(&r->camera, options + length, sizeof options - (size_t)length);
     const bst_distortion *d = &r->camera.distortion;
     if (bst_camera_distorted(&r->camera)) {
@@ -120,7 +123,7 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
             " -DDISTORTED -DK1=%.9ef -DK2=%.9ef -DK3=%.9ef -DP1=%.9ef -DP2=%.9ef -DFOLD2=%.9ef",
             d->k1 * a2, d->k2 * a2 * a2, d->k3 * a2 * a2 * a2, d->p1 * a, d->p2 * a, out * out);
     }
-    BST_TRY(bst_device_build(ctx, device, sources, 6, options, &r->program));
+    BST_TRY(bst_device_build(ctx, device, sources, 7, options, &r->program));
     static const char *const names[3] = {"bst_scene_nodes", "bst_scene_frame",
                                          "bst_scene_expected"};
     cl_kernel *kernels[3] = {&r->nodes_kernel, &r->frame_kernel, &r->expected_kernel};
@@ -199,6 +202,7 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     r->camera = *camera;
     r->options = options ? *options : bst_renderer_default_options();
     r->taps = taps_for(bst_camera_psf_sigma_px(camera));
+    r->map = bst_skylight_varies(camera);
     r->context = bst_device_context(device);
     r->queue = bst_device_queue(device);
     clRetainContext(r->context);
@@ -233,7 +237,7 @@ void bst_renderer_free(bst_renderer *r) {
     clFinish(r->queue);
     cl_mem buffers[] = {r->profiles,         r->table.buffer,     r->sources.buffer,
                         r->nodes.buffer,     r->block_box.buffer, r->source_box.buffer,
-                        r->saturated.buffer, r->expected.buffer};
+                        r->saturated.buffer, r->expected.buffer,  r->background.buffer};
     for (size_t i = 0; i < sizeof buffers / sizeof *buffers; i++) {
         if (buffers[i]) {
             clReleaseMemObject(buffers[i]);
@@ -274,6 +278,12 @@ static bst_status check_request(bst_ctx *ctx, const bst_renderer *r, const bst_r
                         "and two samples of the line of sight (there are %d)",
                         q->background_e, q->track->count);
     }
+    if (r->map != (q->background != NULL)) {
+        return bst_fail(
+            ctx, BST_ERR_ARGUMENT,
+            "a request has a map of the background where the camera's differs from pixel "
+            "to pixel (bst_skylight_varies), and only there");
+    }
     return BST_OK;
 }
 
@@ -291,7 +301,8 @@ static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *
         }
     }
     double read = r->camera.read_noise_e;
-    BST_TRY(bst_smear_begin(ctx, r->smear, q->track, q->background_e + read * read));
+    double least_e = q->background_e + (q->background ? q->background->least_e : 0.0);
+    BST_TRY(bst_smear_begin(ctx, r->smear, q->track, least_e + read * read));
     r->stats = (bst_render_stats){0};
     *blocks = 0;
     const uint64_t counted = (uint64_t)INT32_MAX * sizeof(float); /* by the kernels, in int */
@@ -385,6 +396,11 @@ static bst_scene_params make_params(const bst_renderer *r, const bst_render_requ
         .dn_per_e = (float)(1.0 / c->gain_e_per_dn),
         .offset_dn = (float)c->offset_dn,
         .max_dn = (float)((1 << c->bits) - 1),
+        .map_step = q->background ? q->background->step_px : 0,
+        .map_x0 = q->background ? q->background->x0_px : 0,
+        .map_y0 = q->background ? q->background->y0_px : 0,
+        .map_columns = q->background ? q->background->columns : 0,
+        .map_rows = q->background ? q->background->rows : 0,
     };
 }
 
@@ -407,7 +423,15 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
                             &out,
                             &r->saturated.buffer};
     const size_t m = sizeof(cl_mem), bytes[] = {sizeof p, m, m, m, m, m, m, m};
-    BST_TRY(set_args(ctx, kernel, values, bytes, kernel == r->frame_kernel ? 8 : 7));
+    cl_uint count = kernel == r->frame_kernel ? 8 : 7;
+    BST_TRY(set_args(ctx, kernel, values, bytes, (int)count));
+    if (q->background) {
+        const bst_skylight_map *map = q->background;
+        size_t size = (size_t)map->columns * (size_t)map->rows * sizeof *map->e;
+        BST_TRY(upload(ctx, r, &r->background, map->e, size));
+        BST_TRY(bst_device_check(ctx, clSetKernelArg(kernel, count, m, &r->background.buffer),
+                                 "setting a kernel argument"));
+    }
     size_t group = (size_t)r->options.group, global = (tiles + group - 1) / group * group;
     BST_TRY(bst_device_check(
         ctx, clEnqueueNDRangeKernel(r->queue, kernel, 1, NULL, &global, &group, 0, NULL, NULL),

@@ -42,6 +42,8 @@ typedef struct bst_render_request {
     const bst_source *sources;
     int count;
     double background_e; /* expected electrons per pixel: sky and dark current */
+    const struct bst_skylight_map *background; /* added to it, of the same window; NULL: none.
+                                                    See bst_skylight_varies */
     bst_rng_key key;
     int64_t exposure_id;
 } bst_render_request;

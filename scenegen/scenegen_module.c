@@ -138,11 +138,13 @@ static bst_status write_items(bst_ctx *ctx, scenegen *s, const bst_los_track *tr
     }
     double top_e =
         ((double)((1 << s->camera->bits) - 1) - s->camera->offset_dn) * s->camera->gain_e_per_dn;
-    double limit_e = fmin(s->camera->full_well_e, top_e) - truth->background_e - truth->dark_e;
+    double limit_e = fmin(s->camera->full_well_e, top_e) - truth->dark_e;
     for (int i = 0; i < truth->count; i++) {
         int k = truth->lost > 0 ? s->picks[i].index : i;
         bst_field_truth_item(s->field, track, &sources[k], e->window, truth, &truth->items[i]);
-        if (bst_renderer_peak_e(s->renderer, k) >= limit_e) {
+        double sky_e = bst_field_background_e(s->field, truth, truth->items[i].x_mean_px,
+                                              truth->items[i].y_mean_px);
+        if (bst_renderer_peak_e(s->renderer, k) >= limit_e - sky_e) {
             truth->items[i].flags |= BST_TRUTH_SATURATED;
         }
     }
@@ -168,11 +170,13 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
     truth->dropped = e->dropped;
     BST_TRY(bst_field_query(ctx, s->field, &track, e->start_tick, e->end_tick, s->tick_rate_hz,
                             e->window, &s->options, truth, &sources, &count));
+    const struct bst_skylight_map *map = bst_field_background(s->field);
     bst_render_request request = {.window = e->window,
                                   .track = &track,
                                   .sources = sources,
                                   .count = count,
-                                  .background_e = truth->background_e + truth->dark_e,
+                                  .background_e = (map ? 0.0 : truth->background_e) + truth->dark_e,
+                                  .background = map,
                                   .key = s->key,
                                   .exposure_id = e->id};
     if (e->dropped) {

@@ -25,6 +25,7 @@ typedef struct bst_scene_params {
     float dn_per_e;
     float offset_dn;
     float max_dn;
+    int map_step, map_x0, map_y0, map_columns, map_rows; /* of the background, if it varies */
 } bst_scene_params;
 
 /* One source on its way to its nodes. */

@@ -48,7 +48,7 @@ INLINE int16 store_dn(bst_scene_params p, float16 dn, int16 brim, int column, gl
 __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     bst_scene_params p, global const bst_scene_source *sources, global const float *nodes,
     global const float4 *block_box, global const float *source_box, global const float *profiles,
-    global ushort *frame, global int *saturated) {
+    global ushort *frame, global int *saturated BACKGROUND_ARGUMENT) {
     local float sums[GROUP][TILE_H * STRIDE] __attribute__((aligned(64)));
     int tile = (int)get_global_id(0);
     if (tile >= p.tiles_x * p.tiles_y) {
@@ -57,6 +57,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     local float *sum = sums[get_local_id(0)];
     tile_place t = place_tile(p, tile);
     splat_tile(sum, t.x, t.y, p.source_groups, sources, nodes, block_box, source_box, profiles);
+    ADD_BACKGROUND(sum, p, t);
     uint steps[MOST_STEPS];
     dark_law dark = dark_law_of(p, steps);
     uint chunks_per_row = (uint)(p.sensor_width + 63) / 64u;
@@ -89,7 +90,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
 __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_expected(
     bst_scene_params p, global const bst_scene_source *sources, global const float *nodes,
     global const float4 *block_box, global const float *source_box, global const float *profiles,
-    global float *image) {
+    global float *image BACKGROUND_ARGUMENT) {
     local float sums[GROUP][TILE_H * STRIDE];
     int tile = (int)get_global_id(0);
     if (tile >= p.tiles_x * p.tiles_y) {
@@ -98,6 +99,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_expecte
     local float *sum = sums[get_local_id(0)];
     tile_place t = place_tile(p, tile);
     splat_tile(sum, t.x, t.y, p.source_groups, sources, nodes, block_box, source_box, profiles);
+    ADD_BACKGROUND(sum, p, t);
     for (int y = 0; y < t.rows; y++) {
         global float *out = image + (size_t)(t.top + y) * p.window_width;
         for (int x = max(0, -t.left); x < t.columns; x++) {

@@ -52,6 +52,8 @@ const bst_config_desc bst_camera_config[] = {
                "Point spread function beyond a plain Gaussian, and vignetting."),
     BST_OBJECT(bst_camera, band, bst_band_config_table, "{}",
                "What wavelengths the camera sees, and the warmth of its optics."),
+    BST_OBJECT(bst_camera, background, bst_background_config_table, "{}",
+               "Light between the sources: sky, bright bodies, stray light, gradients."),
     BST_CONFIG_END,
 };
 

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "sim/world/field_objects.h"
+#include "sim/world/skylight.h"
 
 /* Aberration at most, and some for the deflection of light: how far an apparent place lies from the
  * catalogue's. */
@@ -27,7 +28,9 @@ struct bst_field {
     int track_capacity;
     bst_star *stars;
     int star_capacity;
-    bst_faint_stars *faint; /* NULL: none */
+    bst_faint_stars *faint;      /* NULL: none */
+    bst_skylight *skylight;      /* NULL: the same all over the sensor */
+    const bst_skylight_map *map; /* of the latest query */
     bst_source *sources;
     int source_capacity;
     bst_source_path *paths; /* [path_capacity], of the objects among the sources */
@@ -55,7 +58,10 @@ bst_status bst_field_create(bst_ctx *ctx, const bst_world *world, int observer, 
     bst_status status = field->stars && field->near
                             ? bst_view_create(ctx, world, &field->view)
                             : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a field query");
-    if (status == BST_OK && world->faint) {
+    if (status == BST_OK && bst_skylight_varies(field->camera)) {
+        status = bst_skylight_create(ctx, world, field->camera, &field->skylight);
+    }
+    if (status == BST_OK && world->faint && isfinite(world->faint_limit_v_mag)) {
         status = bst_faint_stars_create(ctx, world->faint, FAINT_CACHE_STARS, &field->faint);
     }
     if (status != BST_OK) {
@@ -70,6 +76,7 @@ void bst_field_free(bst_field *field) {
     if (field) {
         bst_view_free(field->view);
         bst_faint_stars_free(field->faint);
+        bst_skylight_free(field->skylight);
         free(field->time_s);
         free(field->q);
         free(field->stars);
@@ -398,10 +405,26 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     bst_time_tt(bst_world_time(field->world, mid_s), &tt1, &tt2);
     int star_count;
     double faint_limit = fmin(options->v_limit, field->world->faint_limit_v_mag);
-    if (field->faint) {
+    if (field->skylight) {
+        bst_surroundings around = {.eye_m = eye.position_m,
+                                   .eye_mps = eye.velocity_mps,
+                                   .bodies = bodies,
+                                   .itrf_from_gcrf = frames.itrf_from_gcrf,
+                                   .light = light,
+                                   .exposure_s = exposure,
+                                   .v_limit = options->v_limit,
+                                   .faint_limit = faint_limit};
+        for (int k = 0; k <= BST_DISC_PARTS; k++) {
+            around.q[k] = attitude_at(track, exposure * k / BST_DISC_PARTS);
+        }
+        BST_TRY(bst_skylight_make(ctx, field->skylight, &around, window, &field->map));
+        truth->background_e = bst_skylight_at(field->map, window.x0 + 0.5 * (window.width - 1),
+                                              window.y0 + 0.5 * (window.height - 1));
+    } else if (field->faint) {
         double pixel_sr = bst_camera_scale_rad(camera) * bst_camera_scale_rad(camera);
-        truth->background_e += bst_faint_sky_unresolved(field->world->faint, centre, faint_limit) *
-                               pixel_sr * bst_camera_electrons_per_s(camera, 0.0) * exposure;
+        truth->background_e +=
+            bst_faint_sky_undrawn(field->world->faint, centre, options->v_limit, faint_limit) *
+            pixel_sr * bst_camera_electrons_per_s(camera, 0.0) * exposure;
     }
     BST_TRY(query_stars(ctx, field, centre, radius, options->v_limit, faint_limit,
                         2000.0 + (tt1 - 2451545.0 + tt2) / 365.25, &star_count));
@@ -507,6 +530,16 @@ static void blur(const bst_camera *camera, const smear *m, double dx, double dy,
     *across = sqrt(variance + fmax(m->xx + m->yy - uu, 0.0));
 }
 
+const bst_skylight_map *bst_field_background(const bst_field *field) {
+    return field->map;
+}
+
+double bst_field_background_e(const bst_field *field, const bst_truth *header, double x_px,
+                              double y_px) {
+    return field->map && isfinite(x_px) && isfinite(y_px) ? bst_skylight_at(field->map, x_px, y_px)
+                                                          : header->background_e;
+}
+
 void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
                           const bst_source *source, bst_window window, const bst_truth *header,
                           bst_truth_item *out) {
@@ -539,8 +572,9 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
     smear image = smear_of(field, source);
     out->x_mean_px = image.x_mean;
     out->y_mean_px = image.y_mean;
-    double variance =
-        header->background_e + header->dark_e + camera->read_noise_e * camera->read_noise_e;
+    double dark =
+        bst_field_background_e(field, header, image.x_mean, image.y_mean) + header->dark_e;
+    double variance = dark + camera->read_noise_e * camera->read_noise_e;
     double length = hypot(out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px);
     double along, across;
     blur(camera, &image, out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px, &along,
@@ -559,7 +593,7 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
      * length) */
     double peak =
         out->electrons / (2.0 * BST_PI * across * hypot(along, length / sqrt(2.0 * BST_PI)));
-    if (peak + header->background_e + header->dark_e > camera->full_well_e) {
+    if (peak + dark > camera->full_well_e) {
         out->flags |= BST_TRUTH_SATURATED;
     }
 }

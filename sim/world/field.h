@@ -100,6 +100,13 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
                            bst_window window, const bst_field_options *options, bst_truth *truth,
                            const bst_source **sources, int *count) BST_MUST_CHECK;
 
+/* The background of the latest query as a map of expected electrons without dark current, held in
+ * `field` until the next one; NULL where it is truth->background_e all over the sensor. */
+const struct bst_skylight_map *bst_field_background(const bst_field *field);
+/* Background without dark current at a place of the latest query's window. */
+double bst_field_background_e(const bst_field *field, const bst_truth *header, double x_px,
+                              double y_px);
+
 /* Pixel position of a source at sample k of the track. false when behind the camera. */
 bool bst_field_project(const bst_camera *camera, const bst_los_track *track, int k,
                        const bst_source *source, double *x_px, double *y_px);
