@@ -19,6 +19,7 @@
 #include "sim/engine/simulation.h"
 #include "sim/eval/loop_summary.h"
 #include "sim/io/manifest.h"
+#include "sim/io/wcs.h"
 
 static volatile sig_atomic_t stop_requested;
 
@@ -158,6 +159,28 @@ static cJSON *summary_json(const bst_loop_figures *f, double real_time_factor) {
     return node;
 }
 
+/* How far the WCS of frames misfits the distortion of those cameras that have any. */
+static void add_misfits(cJSON *root, const bst_scenario *scenario) {
+    const bst_observer_config *observers = scenario->observers.items;
+    cJSON *node = cJSON_CreateObject();
+    for (int i = 0; i < scenario->observers.count; i++) {
+        const bst_sensor_config *sensors = observers[i].sensors.items;
+        for (int s = 0; s < observers[i].sensors.count; s++) {
+            char scope[160];
+            snprintf(scope, sizeof scope, "%s/%s", observers[i].name, sensors[s].name);
+            double misfit_px = bst_wcs_distortion_misfit_px(&sensors[s].camera);
+            if (misfit_px > 0.0) {
+                bst_json_add_number(node, scope, misfit_px);
+            }
+        }
+    }
+    if (node && node->child) {
+        cJSON_AddItemToObject(root, "wcs_misfit_px", node);
+    } else {
+        cJSON_Delete(node);
+    }
+}
+
 /* `why`: the message of a run that failed, else NULL. */
 static bst_status write_manifest(const run_state *run, bst_simulation *sim, const bst_run *store,
                                  double wall, bst_status ended, const char *why) {
@@ -196,6 +219,7 @@ static bst_status write_manifest(const run_state *run, bst_simulation *sim, cons
     cJSON_AddNumberToObject(root, "last_tick", (double)bst_engine_tick(bst_simulation_engine(sim)));
     cJSON_AddNumberToObject(root, "wall_time_s", wall);
     cJSON_AddNumberToObject(root, "warnings", run->ctx->warnings);
+    add_misfits(root, scenario);
     cJSON *counters = cJSON_AddObjectToObject(root, "counters");
     const char *name;
     int64_t count;

@@ -50,7 +50,8 @@ typedef struct bst_module_env {
     const struct bst_knowledge *knowledge; /* of this sensor */
     struct bst_device *device;             /* NULL unless the descriptor asks for it */
     int observer, sensor;                  /* indices in the world */
-    double exposure_s;                     /* of this sensor, as the scenario sets it */
+    double exposure_s;                     /* the longest of this sensor that the scenario sets: its
+                                              own, or exposure_s of a module that commands it */
     void *engine_private;
 } bst_module_env;
 

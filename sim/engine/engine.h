@@ -29,7 +29,7 @@ typedef struct bst_instance_spec {
     const struct bst_knowledge *knowledge;
     struct bst_device *device;
     int observer, sensor;
-    double exposure_s; /* of the sensor, as the scenario sets it */
+    double exposure_s; /* the longest of the sensor that the scenario sets */
     uint64_t seed, run;
 } bst_instance_spec;
 

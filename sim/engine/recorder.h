@@ -18,6 +18,7 @@ typedef enum bst_record_frames {
 typedef struct bst_record_config {
     int32_t frames;      /* bst_record_frames */
     int32_t compression; /* bst_fits_compression, of extensions */
+    bool checksums; /* of each HDU */
     bool truth;
     bool truth_stars;
     bool detections;

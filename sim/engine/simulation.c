@@ -1,10 +1,14 @@
 #include "sim/engine/simulation.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "sim/device/device.h"
 #include "sim/engine/exposure_clock.h"
+#include "sim/engine/recorder.h"
+#include "sim/io/wcs.h"
 #include "sim/world/knowledge.h"
 
 struct bst_simulation {
@@ -38,6 +42,33 @@ static bst_status make_knowledge(bst_ctx *ctx, const bst_scenario *scenario, bst
     return BST_OK;
 }
 
+/* The longest exposure of a sensor that the scenario sets: its own, or exposure_s of a module that
+ * commands it. */
+static double longest_exposure_s(const bst_scenario *scenario, int observer, int sensor) {
+    const bst_observer_config *observers = scenario->observers.items;
+    const bst_sensor_config *sensors = observers[observer].sensors.items;
+    double longest = sensors[sensor].exposure.exposure_s;
+    for (int m = 0; m < scenario->module_count; m++) {
+        const bst_module_config *module = &scenario->modules[m];
+        bool commands = false;
+        for (int p = 0; p < module->desc->port_count; p++) {
+            const bst_port *port = &module->desc->ports[p];
+            commands = commands || (port->direction == BST_PORT_OUT &&
+                                    strcmp(port->channel, BST_CHANNEL_SENSOR_COMMAND) == 0);
+        }
+        for (const bst_config_desc *d = module->desc->config;
+             commands && module->observer == observer && module->sensor == sensor && d && d->key;
+             d++) {
+            if (d->type == BST_CONFIG_REAL && strcmp(d->key, "exposure_s") == 0) {
+                double value;
+                memcpy(&value, (const char *)module->config + d->offset, sizeof value);
+                longest = fmax(longest, value);
+            }
+        }
+    }
+    return longest;
+}
+
 /* The part of a spec that does not depend on the module. */
 static bst_instance_spec sensor_spec(const bst_scenario *scenario, const bst_simulation *sim,
                                      int observer, int sensor, const char *scope) {
@@ -46,17 +77,15 @@ static bst_instance_spec sensor_spec(const bst_scenario *scenario, const bst_sim
     for (int i = 0; i < observer; i++) {
         index += observers[i].sensors.count;
     }
-    return (bst_instance_spec){
-        .scope = scope,
-        .world = sim->world,
-        .knowledge = sim->knowledge[index],
-        .device = sim->device,
-        .observer = observer,
-        .sensor = sensor,
-        .exposure_s = ((const bst_sensor_config *)observers[observer].sensors.items)[sensor]
-                          .exposure.exposure_s,
-        .seed = scenario->seed,
-        .run = (uint64_t)scenario->run};
+    return (bst_instance_spec){.scope = scope,
+                               .world = sim->world,
+                               .knowledge = sim->knowledge[index],
+                               .device = sim->device,
+                               .observer = observer,
+                               .sensor = sensor,
+                               .exposure_s = longest_exposure_s(scenario, observer, sensor),
+                               .seed = scenario->seed,
+                               .run = (uint64_t)scenario->run};
 }
 
 static bst_status add_modules(bst_ctx *ctx, const bst_scenario *scenario, bst_simulation *sim) {
@@ -94,6 +123,26 @@ static bst_status add_modules(bst_ctx *ctx, const bst_scenario *scenario, bst_si
     return BST_OK;
 }
 
+/* Says which frames will have a WCS that is wrong by more than a star's place is measured to. */
+static void warn_of_misfits(bst_ctx *ctx, const bst_scenario *scenario) {
+    const double allowed_px = 1e-3;
+    const bst_observer_config *observers = scenario->observers.items;
+    for (int i = 0; i < scenario->observers.count; i++) {
+        const bst_sensor_config *sensors = observers[i].sensors.items;
+        for (int s = 0; s < observers[i].sensors.count; s++) {
+            double misfit_px = bst_wcs_distortion_misfit_px(&sensors[s].camera);
+            if (misfit_px > allowed_px && isfinite(misfit_px)) {
+                bst_log(
+                    ctx, BST_LOG_WARNING,
+                    "%s/%s: the WCS of its frames misfits the camera's distortion by up to %.2g "
+                    "px: SIP polynomials end at order %d; places by pixel are exact in truth "
+                    "and tables",
+                    observers[i].name, sensors[s].name, misfit_px, BST_SIP_ORDER);
+            }
+        }
+    }
+}
+
 static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
                         const bst_simulation_options *options, bst_simulation *sim) {
     BST_TRY(bst_world_create(ctx, scenario->file, &scenario->world, &scenario->observers,
@@ -126,6 +175,9 @@ bst_status bst_simulation_create(bst_ctx *ctx, const bst_scenario *scenario,
     if (status != BST_OK) {
         bst_simulation_free(sim);
         return status;
+    }
+    if (scenario->record.frames != BST_RECORD_NO_FRAMES) {
+        warn_of_misfits(ctx, scenario);
     }
     *out = sim;
     return BST_OK;

@@ -13,6 +13,8 @@
 
 /* SIMPLE, BITPIX, NAXIS, NAXIS1, NAXIS2, NAXIS3 in this order: FITS 4.0, section 4.4.1.1 */
 #define NAXIS3_OFFSET (5 * 80)
+#define SUM_CARDS (2 * BST_FITS_CARD)
+#define ONE_PAGE 4096
 
 bst_status bst_fits_cube_open(bst_ctx *ctx, bst_fits *fits) {
     bst_fits_cube *cube = &fits->cube;
@@ -26,6 +28,45 @@ bst_status bst_fits_cube_open(bst_ctx *ctx, bst_fits *fits) {
     return BST_OK;
 }
 
+/* The cards of the sums stay blank until the end, since every plane changes them. They come first,
+ * so that each lies within one memory page and is written whole or not at all. */
+static bool blank_sums(bst_fits_cube *cube, char *hdu) {
+    for (cube->sums_at = 0; cube->sums_at + SUM_CARDS <= ONE_PAGE; cube->sums_at += BST_FITS_CARD) {
+        char *cards = hdu + cube->sums_at;
+        if (memcmp(cards, "CHECKSUM= '", 11) == 0) {
+            memcpy(cube->sum_cards, cards, SUM_CARDS);
+            memset(cards, ' ', SUM_CARDS);
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Sets the sums of the cube, whose header and planes do not change any more. */
+static bst_status sign(bst_ctx *ctx, bst_fits *fits) {
+    bst_fits_cube *cube = &fits->cube;
+    size_t bytes = (size_t)cube->data_start;
+    char *header = malloc(bytes);
+    if (!header) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "%s: out of memory for its header", fits->path);
+    }
+    bst_status status = BST_OK;
+    if (pread(fits->file, header, bytes, 0) != (ssize_t)bytes) {
+        status = bst_fits_fail_errno(ctx, fits, "cannot be read again");
+    } else {
+        char *cards = header + cube->sums_at;
+        memcpy(cards, cube->sum_cards, SUM_CARDS);
+        bool ok = bst_fits_sign(header, bytes, cube->sum);
+        /* a DATASUM alone is right too; a CHECKSUM is not */
+        ok = ok && bst_fits_write_at(fits->file, cards + BST_FITS_CARD, BST_FITS_CARD,
+                                     cube->sums_at + BST_FITS_CARD);
+        ok = ok && bst_fits_write_at(fits->file, cards, BST_FITS_CARD, cube->sums_at);
+        status = ok ? BST_OK : bst_fits_fail_errno(ctx, fits, "cannot be completed");
+    }
+    free(header);
+    return status;
+}
+
 /* The header of a cube without planes. */
 static bst_status start(bst_ctx *ctx, bst_fits *fits, int width, int height) {
     bst_fits_cube *cube = &fits->cube;
@@ -37,6 +78,7 @@ static bst_status start(bst_ctx *ctx, bst_fits *fits, int width, int height) {
     bst_fits_memory_open(&fits->memory, false, &code);
     fitsfile *file = fits->memory.file;
     fits_create_img(file, USHORT_IMG, 3, size, &code);
+    bst_fits_put_sums(fits, file, &code);
     bst_fits_put_run_keys(file, &fits->names, &code);
     fits_write_comment(
         file, "Third axis: frames. Row k of the table FRAMES has plane k's time and WCS.", &code);
@@ -45,6 +87,9 @@ static bst_status start(bst_ctx *ctx, bst_fits *fits, int width, int height) {
     bst_status status = bst_fits_check(ctx, fits, code, "cannot be made");
     if (status == BST_OK && memcmp(hdu + NAXIS3_OFFSET, "NAXIS3  =", 9) != 0) {
         status = bst_fail(ctx, BST_ERR_FORMAT, "%s: NAXIS3 is not where it belongs", fits->path);
+    }
+    if (status == BST_OK && fits->checksums && !blank_sums(cube, hdu)) {
+        status = bst_fail(ctx, BST_ERR_FORMAT, "%s: no place for CHECKSUM", fits->path);
     }
     if (status == BST_OK) {
         status = bst_fits_start_file(ctx, fits, hdu, bytes);
@@ -87,6 +132,9 @@ bst_status bst_fits_cube_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_fram
     bst_status status = ok ? BST_OK : bst_fits_fail_errno(ctx, fits, "cannot be written");
     if (ok) {
         cube->planes++;
+        if (fits->checksums) {
+            bst_fits_sum_pixels(&cube->sum, pixels, count);
+        }
         fits->end = after + fill;
     }
     if (fits->file >= 0 && !bst_fits_close_tail(fits) && ok) {
@@ -196,9 +244,15 @@ bst_status bst_fits_cube_finish(bst_ctx *ctx, bst_fits *fits) {
             }
         }
     }
+    bst_fits_put_sums(fits, fits->memory.file, &code);
     bst_fits_memory_hdu(&fits->memory, &hdu, &bytes, &code);
     if (status == BST_OK) {
         status = bst_fits_check(ctx, fits, code, "cannot be completed");
+    }
+    if (status == BST_OK && fits->checksums) {
+        status = bst_fits_sign(hdu, (size_t)bytes, (bst_fits_sum){0})
+                     ? sign(ctx, fits)
+                     : bst_fail(ctx, BST_ERR_FORMAT, "%s: no place for CHECKSUM", fits->path);
     }
     if (status == BST_OK) {
         status = bst_fits_append_hdu(ctx, fits, hdu, bytes);

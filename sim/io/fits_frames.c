@@ -29,6 +29,21 @@ static void copy_name(char to[BST_FITS_NAME_BYTES], const char *from) {
     snprintf(to, BST_FITS_NAME_BYTES, "%s", from ? from : "");
 }
 
+/* Sets the sums of an HDU with the pixels behind it (NULL: none). */
+static bst_status sign(bst_ctx *ctx, const bst_fits *fits, char *hdu, long long bytes,
+                       const uint16_t *pixels, size_t count) {
+    bst_fits_sum sum = {0};
+    if (!fits->checksums) {
+        return BST_OK;
+    }
+    if (pixels) {
+        bst_fits_sum_pixels(&sum, pixels, count);
+    }
+    return bst_fits_sign(hdu, (size_t)bytes, sum)
+               ? BST_OK
+               : bst_fail(ctx, BST_ERR_FORMAT, "%s: no place for CHECKSUM", fits->path);
+}
+
 /* The primary HDU of a file of extensions, or of a cube without planes. */
 static bst_status write_primary(bst_ctx *ctx, bst_fits *fits) {
     char *hdu = NULL;
@@ -38,8 +53,12 @@ static bst_status write_primary(bst_ctx *ctx, bst_fits *fits) {
     bst_fits_memory_open(&fits->memory, true, &code);
     bst_fits_put_run_keys(fits->memory.file, &fits->names, &code);
     bst_fits_put_statements(fits->memory.file, &code);
+    bst_fits_put_sums(fits, fits->memory.file, &code);
     bst_fits_memory_hdu(&fits->memory, &hdu, &bytes, &code);
     bst_status status = bst_fits_check(ctx, fits, code, "cannot be made");
+    if (status == BST_OK) {
+        status = sign(ctx, fits, hdu, bytes, NULL, 0);
+    }
     if (status == BST_OK) {
         status = bst_fits_start_file(ctx, fits, hdu, bytes);
     }
@@ -81,6 +100,7 @@ bst_status bst_fits_create(bst_ctx *ctx, const char *path, bst_fits_layout layou
     }
     fits->layout = layout;
     fits->compression = info->compression;
+    fits->checksums = info->checksums;
     copy_name(fits->names.observer, info->observer);
     copy_name(fits->names.instrument, info->instrument);
     copy_name(fits->names.object, info->object);
@@ -144,19 +164,23 @@ bst_status bst_fits_write_extension(bst_ctx *ctx, bst_fits *fits, const bst_fits
     fits_write_key_log(file, "INHERIT", 1, "keys of the primary header hold here", &code);
     bst_fits_put_frame_keys(file, &fits->names, frame, &code);
     bst_fits_put_statements(file, &code);
+    bst_fits_put_sums(fits, file, &code);
     if (rice) {
         /* cfitsio's prototype lacks const; it does not write to the array */
         fits_write_img(file, TUSHORT, 1, (LONGLONG)count, (void *)(uintptr_t)pixels, &code);
     }
     bst_fits_memory_hdu(&fits->memory, &hdu, &bytes, &code);
     bst_status status = bst_fits_check(ctx, fits, code, "cannot be written");
-    if (status == BST_OK && rice) {
-        status = bst_fits_append_hdu(ctx, fits, hdu, bytes);
-    } else if (status == BST_OK) {
-        status =
-            set_size(hdu, width, height)
-                ? bst_fits_append_image(ctx, fits, hdu, bytes, pixels, count)
-                : bst_fail(ctx, BST_ERR_FORMAT, "%s: NAXIS1 is not where it belongs", fits->path);
+    if (status == BST_OK && !rice && !set_size(hdu, width, height)) {
+        status = bst_fail(ctx, BST_ERR_FORMAT, "%s: NAXIS1 is not where it belongs", fits->path);
+    }
+    const uint16_t *behind = rice ? NULL : pixels;
+    count = rice ? 0 : count;
+    if (status == BST_OK) {
+        status = sign(ctx, fits, hdu, bytes, behind, count);
+    }
+    if (status == BST_OK) {
+        status = bst_fits_append_image(ctx, fits, hdu, bytes, behind, count);
     }
     bst_fits_memory_close(&fits->memory, &code);
     return status;

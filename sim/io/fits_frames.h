@@ -22,6 +22,7 @@ typedef struct bst_fits_info {
     const char *program;      /* CREATOR: "boresight 0.1.0"; may be NULL */
     const bst_camera *camera; /* the true camera */
     bst_fits_compression compression;
+    bool checksums; /* CHECKSUM and DATASUM in every HDU; of a cube they come at its end */
 } bst_fits_info;
 
 /* What holds for one frame. */

@@ -31,6 +31,13 @@ static bst_status find_image(bst_ctx *ctx, const char *path, fitsfile *file, lon
         if (code == 0 && type == IMAGE_HDU) {
             fits_get_img_dim(file, &axes, &code);
         }
+        /* cfitsio knows the key in more spellings than the standard does */
+        if (code == 0 && fits_is_compressed_image(file, &code)) {
+            return bst_fail(ctx, BST_ERR_FORMAT,
+                            "%.400s: HDU %d: is a compressed image (allowed: images that are not "
+                            "compressed); unpack the file with funpack",
+                            path, hdu);
+        }
         if (code == 0 && axes == 2) {
             fits_get_img_size(file, 2, size, &code);
             if (code == 0 && (size[0] < 1 || size[1] < 1 || size[0] > LONGEST_SIDE ||

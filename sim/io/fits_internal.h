@@ -4,9 +4,9 @@
 
 #include <fitsio.h>
 
+#include "sim/io/fits_cards_internal.h"
 #include "sim/io/fits_frames.h"
 
-#define BST_FITS_BLOCK 2880
 #define BST_FITS_PATH_BYTES 4096
 #define BST_FITS_NAME_BYTES 69
 
@@ -24,12 +24,21 @@ typedef struct bst_fits_memory {
     size_t size;
 } bst_fits_memory;
 
+/* Ones' complement sum of 32-bit big-endian words, in halves. */
+typedef struct bst_fits_sum {
+    uint64_t high, low;
+    bool is_odd; /* the last word has its upper half only */
+} bst_fits_sum;
+
 /* A datacube that is being written. */
 typedef struct bst_fits_cube {
     int rows; /* unlinked file of bst_fits_frame, the future table; -1 without one */
     int width, height;
     long long data_start;
     int64_t planes;
+    bst_fits_sum sum;  /* of the planes */
+    long long sums_at; /* where the cards of the sums belong */
+    char sum_cards[2 * BST_FITS_CARD];
 } bst_fits_cube;
 
 #define BST_FITS_BUFFER_PIXELS 65536
@@ -40,6 +49,7 @@ struct bst_fits {
     char path[BST_FITS_PATH_BYTES];
     bst_fits_layout layout;
     bst_fits_compression compression;
+    bool checksums;
     bst_fits_names names;
     int file;      /* -1: not made yet */
     long long end; /* bytes of the HDUs that are complete */
@@ -68,6 +78,15 @@ bool bst_fits_write_at(int fd, const void *data, size_t bytes, long long offset)
 /* Writes pixels as FITS wants them, and zeros up to the end of the block. */
 bool bst_fits_write_pixels(bst_fits *fits, const uint16_t *pixels, size_t count, long long offset,
                            long long fill);
+
+/* Adds pixels as they lie in the file. */
+void bst_fits_sum_pixels(bst_fits_sum *sum, const uint16_t *pixels, size_t count);
+/* Makes place in a header for what bst_fits_sign sets, in a file that has checksums. */
+void bst_fits_put_sums(const bst_fits *fits, fitsfile *file, int *code);
+/* Sets DATASUM and CHECKSUM in the header at `hdu`, whose data are what follows it within the
+ * `bytes` bytes and those that have been added to `data`; blocks filled. False when the header has
+ * no place for them. */
+bool bst_fits_sign(char *hdu, size_t bytes, bst_fits_sum data);
 
 /* Makes the file with one HDU in it: it appears whole or not at all. */
 bst_status bst_fits_start_file(bst_ctx *ctx, bst_fits *fits, const char *hdu,

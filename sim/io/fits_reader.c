@@ -1,151 +1,392 @@
 #include "sim/io/fits_reader.h"
 
-#include <fitsio.h>
+#include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
-enum { LONGEST_SIDE = 32768 };
+#include "sim/io/fits_cards_internal.h"
+#include "sim/io/fits_rice.h"
+
+enum {
+    LONGEST_SIDE = 32768,
+    READ_BLOCKS = 4,      /* of a header at a time; ours have 3 or 4 */
+    MOST_BLOCKS = 1000,   /* of a header */
+    MOST_RICE_BLOCK = 64, /* pixels */
+    /* no 16-bit row takes more: its pixels verbatim, a code for each block, the first pixel */
+    MOST_ROW_BYTES = LONGEST_SIDE * 2 + LONGEST_SIDE / 2 + 16
+};
+
+/* How a tile-compressed image lies in its table. */
+typedef struct packed {
+    bool wide; /* descriptors of 64-bit numbers */
+    int block;
+    int64_t row_bytes; /* of the table */
+    uint64_t heap_at, heap_bytes;
+} packed;
+
+/* An HDU as its header tells. */
+typedef struct hdu {
+    int number; /* from 1 */
+    uint64_t at, data_at, end;
+    int64_t axes, size[3]; /* of the image, compressed or not; axes is 0 without one */
+    bool compressed;
+    packed p;
+} hdu;
+
+/* Where a frame's HDU is. */
+typedef struct frame_place {
+    uint64_t at;
+    int number;
+} frame_place;
 
 struct bst_fits_reader {
     char path[4096];
-    fitsfile *file;
+    int fd; /* -1: the file is in memory */
+    const char *data;
+    uint64_t bytes; /* of the file */
     bst_fits_file_info info;
-    int first_hdu; /* of the first frame */
-    bool has_table;
-    int id_column, table_hdu;
+    frame_place *frames; /* of a file with an extension each */
+    size_t frame_room;
+    hdu cube;
+    uint64_t ids_at; /* where the cube's table begins; 0 without one */
+    int64_t id_step, id_count;
+    char *header;
+    size_t header_bytes, header_room;
+    uint8_t *row; /* MOST_ROW_BYTES of a compressed one */
     uint16_t *pixels;
     size_t capacity;
 };
 
-static bst_status fail_cfitsio(bst_ctx *ctx, const bst_fits_reader *reader, int code) {
-    char reason[FLEN_STATUS];
-    fits_get_errstatus(code, reason);
-    fits_clear_errmsg();
-    return bst_fail(ctx, BST_ERR_IO, "%s: cannot be read: %s", reader->path, reason);
+/* Reads `bytes` at `at`, all of which lie within the file as it was when it was opened. */
+static bst_status read_at(bst_ctx *ctx, const bst_fits_reader *reader, void *out, uint64_t bytes,
+                          uint64_t at) {
+    if (at > reader->bytes || bytes > reader->bytes - at) {
+        return bst_fail(ctx, BST_ERR_FORMAT, "%.400s: is cut short", reader->path);
+    }
+    if (reader->fd < 0) {
+        memcpy(out, reader->data + at, bytes);
+        return BST_OK;
+    }
+    for (uint64_t done = 0; done < bytes;) {
+        ssize_t n = pread(reader->fd, (char *)out + done, bytes - done, (off_t)(at + done));
+        if (n == 0) {
+            return bst_fail(ctx, BST_ERR_IO, "%.400s: became shorter while it was read",
+                            reader->path);
+        }
+        if (n < 0 && errno != EINTR) {
+            return bst_fail(ctx, BST_ERR_IO, "%.400s: cannot be read: %s", reader->path,
+                            strerror(errno));
+        }
+        done += n > 0 ? (uint64_t)n : 0;
+    }
+    return BST_OK;
 }
 
-static bst_status check_size(bst_ctx *ctx, const bst_fits_reader *reader, const LONGLONG *size) {
-    if (size[0] < 1 || size[1] < 1 || size[0] > LONGEST_SIDE || size[1] > LONGEST_SIDE) {
+static bool has_end(const char *cards, size_t bytes) {
+    for (size_t at = 0; at < bytes; at += BST_FITS_CARD) {
+        if (memcmp(cards + at, "END     ", 8) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Reads a header into memory, up to the block with END. */
+static bst_status load_header(bst_ctx *ctx, bst_fits_reader *reader, const hdu *h,
+                              bst_fits_cards *cards) {
+    reader->header_bytes = 0;
+    uint64_t left = reader->bytes - h->at;
+    for (bool ended = false; !ended && reader->header_bytes < left;) {
+        uint64_t more = READ_BLOCKS * BST_FITS_BLOCK;
+        more = more < left - reader->header_bytes ? more : left - reader->header_bytes;
+        more -= more % BST_FITS_BLOCK;
+        size_t bytes = reader->header_bytes + (size_t)more;
+        if (more == 0 || bytes > (size_t)MOST_BLOCKS * BST_FITS_BLOCK) {
+            break;
+        }
+        if (bytes > reader->header_room) {
+            char *header = realloc(reader->header, bytes * 2);
+            if (!header) {
+                return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a FITS header");
+            }
+            reader->header = header;
+            reader->header_room = bytes * 2;
+        }
+        char *start = reader->header + reader->header_bytes;
+        BST_TRY(read_at(ctx, reader, start, more, h->at + reader->header_bytes));
+        reader->header_bytes = bytes;
+        /* what begins otherwise has no END worth looking for */
+        ended = has_end(start, (size_t)more) || (memcmp(reader->header, "SIMPLE", 6) != 0 &&
+                                                 memcmp(reader->header, "XTENSION", 8) != 0);
+    }
+    return bst_fits_read_cards(ctx, reader->path, h->number, reader->header, reader->header_bytes,
+                               cards);
+}
+
+static int64_t int_of(const bst_fits_reader *reader, const char *key, int64_t fallback) {
+    int64_t value;
+    return bst_fits_card_int(reader->header, reader->header_bytes, key, &value) ? value : fallback;
+}
+
+static bool is_text(const bst_fits_reader *reader, const char *key, const char *expected) {
+    char value[BST_FITS_CARD];
+    return bst_fits_card_text(reader->header, reader->header_bytes, key, value) &&
+           strncmp(value, expected, strlen(expected)) == 0;
+}
+
+/* Whether pixels are 16-bit unsigned; "32768" and "32768." are both written. */
+static bool is_unsigned16(const bst_fits_reader *reader, int64_t bitpix) {
+    char value[BST_FITS_CARD] = "", *end;
+    double zero = 0.0, scale = 1.0;
+    if (bst_fits_card_text(reader->header, reader->header_bytes, "BZERO", value)) {
+        zero = strtod(value, &end);
+    }
+    if (bst_fits_card_text(reader->header, reader->header_bytes, "BSCALE", value)) {
+        scale = strtod(value, &end);
+    }
+    return bitpix == 16 && zero == 32768.0 && scale == 1.0;
+}
+
+static bst_status not_a_frame(bst_ctx *ctx, const bst_fits_reader *reader, const hdu *h,
+                              const char *what) {
+    return bst_fail(ctx, BST_ERR_FORMAT,
+                    "%.400s: HDU %d: %s (allowed: 16-bit unsigned images, as they are or "
+                    "compressed by RICE_1, a row to a tile)",
+                    reader->path, h->number, what);
+}
+
+/* Takes what the header says of a compressed image. */
+static bst_status look_packed(bst_ctx *ctx, const bst_fits_reader *reader,
+                              const bst_fits_cards *cards, hdu *h) {
+    static const char *const sizes[] = {"ZNAXIS1", "ZNAXIS2", "ZNAXIS3"};
+    static const char *const tiles[] = {"ZTILE1", "ZTILE2", "ZTILE3"};
+    h->compressed = true;
+    h->axes = int_of(reader, "ZNAXIS", 0);
+    if (h->axes != 2 && h->axes != 3) {
+        h->axes = 0;
+        return BST_OK;
+    }
+    int64_t rows = 1;
+    bool row_tiles = true;
+    for (int i = 0; i < h->axes; i++) {
+        h->size[i] = int_of(reader, sizes[i], -1);
+        row_tiles = row_tiles &&
+                    int_of(reader, tiles[i], i == 0 ? h->size[0] : 1) == (i == 0 ? h->size[0] : 1);
+        rows *= i > 0 && h->size[i] <= INT32_MAX ? h->size[i] : 1;
+    }
+    h->p.block = (int)int_of(reader, "ZVAL1", 32);
+    h->p.wide = is_text(reader, "TFORM1", "1Q") || is_text(reader, "TFORM1", "Q");
+    h->p.row_bytes = cards->axes[0];
+    if (!is_text(reader, "ZCMPTYPE", "RICE_1") || !row_tiles) {
+        return not_a_frame(ctx, reader, h, "is compressed in another way");
+    }
+    if (!is_unsigned16(reader, int_of(reader, "ZBITPIX", 0)) || int_of(reader, "ZVAL2", 4) != 2) {
+        return not_a_frame(ctx, reader, h, "has pixels of another kind");
+    }
+    bool known = is_text(reader, "TTYPE1", "COMPRESSED_DATA") &&
+                 (h->p.wide || is_text(reader, "TFORM1", "1P") || is_text(reader, "TFORM1", "P")) &&
+                 is_text(reader, "ZNAME1", "BLOCKSIZE") && is_text(reader, "ZNAME2", "BYTEPIX") &&
+                 h->p.block >= 1 && h->p.block <= MOST_RICE_BLOCK && cards->naxis == 2 &&
+                 cards->bitpix == 8 && h->p.row_bytes >= (h->p.wide ? 16 : 8) &&
+                 cards->axes[1] == rows;
+    uint64_t table = known ? (uint64_t)h->p.row_bytes * (uint64_t)cards->axes[1] : 0;
+    uint64_t heap = (uint64_t)int_of(reader, "THEAP", (int64_t)table);
+    if (!known || heap < table || heap > cards->data_bytes) {
         return bst_fail(ctx, BST_ERR_FORMAT,
-                        "%s: an image of %lld x %lld pixels (allowed: sides of 1 to %d)",
-                        reader->path, (long long)size[0], (long long)size[1], LONGEST_SIDE);
+                        "%.400s: HDU %d: its table is not that of the compressed image it claims "
+                        "to be",
+                        reader->path, h->number);
+    }
+    h->p.heap_at = h->data_at + heap;
+    h->p.heap_bytes = cards->data_bytes - heap;
+    return BST_OK;
+}
+
+/* Takes what the header in memory says. *whole is false when its data end behind the file's end. */
+static bst_status interpret(bst_ctx *ctx, const bst_fits_reader *reader,
+                            const bst_fits_cards *cards, hdu *h, bool *whole) {
+    uint64_t blocks = (cards->data_bytes + BST_FITS_BLOCK - 1) / BST_FITS_BLOCK;
+    h->data_at = h->at + cards->bytes;
+    h->end = h->data_at + blocks * BST_FITS_BLOCK;
+    *whole = h->end <= reader->bytes;
+    h->axes = 0;
+    h->compressed = false;
+    h->size[0] = h->size[1] = h->size[2] = 1;
+    if (cards->is_compressed) {
+        BST_TRY(look_packed(ctx, reader, cards, h));
+    } else if ((h->number == 1 || is_text(reader, "XTENSION", "IMAGE")) &&
+               (cards->naxis == 2 || cards->naxis == 3)) {
+        h->axes = cards->naxis;
+        for (int i = 0; i < h->axes; i++) {
+            h->size[i] = cards->axes[i];
+        }
+        if (!is_unsigned16(reader, cards->bitpix)) {
+            return not_a_frame(ctx, reader, h, "has pixels of another kind");
+        }
+    }
+    for (int i = 0; i < 2 && h->axes > 0; i++) {
+        if (h->size[i] < 1 || h->size[i] > LONGEST_SIDE) {
+            return bst_fail(ctx, BST_ERR_FORMAT,
+                            "%.400s: HDU %d: an image of %lld x %lld pixels (allowed: sides of 1 "
+                            "to %d)",
+                            reader->path, h->number, (long long)h->size[0], (long long)h->size[1],
+                            LONGEST_SIDE);
+        }
     }
     return BST_OK;
 }
 
-/* Type, axes and end of the current HDU's data. */
-static void look(fitsfile *file, int *type, int *axes, LONGLONG size[3], LONGLONG *end, int *code) {
-    LONGLONG head, data;
-    size[0] = size[1] = size[2] = 0;
-    *axes = 0;
-    fits_get_hdu_type(file, type, code);
-    if (*code == 0 && *type == IMAGE_HDU) {
-        fits_get_img_dim(file, axes, code);
-        fits_get_img_sizell(file, 3, size, code);
-    }
-    fits_get_hduaddrll(file, &head, &data, end, code);
+static bst_status look(bst_ctx *ctx, bst_fits_reader *reader, hdu *h, bool *whole) {
+    bst_fits_cards cards;
+    BST_TRY(load_header(ctx, reader, h, &cards));
+    return interpret(ctx, reader, &cards, h, whole);
 }
 
-/* Counts the frames of a file with an extension each. */
-static bst_status count_extensions(bst_ctx *ctx, bst_fits_reader *reader, LONGLONG file_bytes) {
+static bst_status add_frame(bst_ctx *ctx, bst_fits_reader *reader, const hdu *h) {
     bst_fits_file_info *info = &reader->info;
-    int code = 0, type, axes;
-    LONGLONG size[3], end;
-    for (int hdu = 2;; hdu++) {
-        fits_movabs_hdu(reader->file, hdu, &type, &code);
-        if (code != 0) {
-            /* the end, or a header that was being written when the run was killed */
-            info->cut_off = info->cut_off || code != END_OF_FILE;
-            fits_clear_errmsg();
+    if ((size_t)info->frames == reader->frame_room) {
+        size_t room = reader->frame_room ? 2 * reader->frame_room : 64;
+        frame_place *frames = realloc(reader->frames, room * sizeof *frames);
+        if (!frames) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the places of %zu frames",
+                            room);
+        }
+        reader->frames = frames;
+        reader->frame_room = room;
+    }
+    reader->frames[info->frames++] = (frame_place){h->at, h->number};
+    info->compressed = info->compressed || h->compressed;
+    info->width = h->size[0] > info->width ? (int)h->size[0] : info->width;
+    info->height = h->size[1] > info->height ? (int)h->size[1] : info->height;
+    return BST_OK;
+}
+
+/* Counts the frames of a file with an extension each, from the HDU behind `h` on. */
+static bst_status count_extensions(bst_ctx *ctx, bst_fits_reader *reader, hdu h) {
+    bool whole = true;
+    bst_ctx unheard = {0};
+    for (;;) {
+        h.at = h.end;
+        h.number++;
+        if (h.at >= reader->bytes) {
             return BST_OK;
         }
-        look(reader->file, &type, &axes, size, &end, &code);
-        if (code != 0 || end > file_bytes) {
-            info->cut_off = true;
-            fits_clear_errmsg();
+        bst_fits_cards cards;
+        bst_status status = load_header(&unheard, reader, &h, &cards);
+        if (status == BST_ERR_FORMAT) { /* no header, or not yet */
+            reader->info.cut_off = true;
             return BST_OK;
         }
-        if (axes != 2) {
-            continue;
+        if (status != BST_OK) {
+            return bst_fail(ctx, status, "%s", unheard.message);
         }
-        BST_TRY(check_size(ctx, reader, size));
-        if (info->frames++ == 0) {
-            reader->first_hdu = hdu;
-            info->compressed = fits_is_compressed_image(reader->file, &code) != 0;
+        BST_TRY(interpret(ctx, reader, &cards, &h, &whole));
+        if (!whole) {
+            reader->info.cut_off = true;
+            return BST_OK;
         }
-        info->width = size[0] > info->width ? (int)size[0] : info->width;
-        info->height = size[1] > info->height ? (int)size[1] : info->height;
+        if (h.axes == 2) {
+            BST_TRY(add_frame(ctx, reader, &h));
+        }
     }
 }
 
-/* Whether the current HDU is the cube, and how much of it there is. */
-static bst_status read_cube(bst_ctx *ctx, bst_fits_reader *reader, int hdu, const LONGLONG size[3],
-                            LONGLONG file_bytes) {
+/* The table behind a cube: FRAMEID is its first column. */
+static void find_ids(bst_fits_reader *reader, const hdu *cube) {
+    bst_ctx unheard = {0};
+    bst_fits_cards cards;
+    hdu h = {.number = cube->number + 1, .at = cube->end};
+    if (h.at >= reader->bytes || load_header(&unheard, reader, &h, &cards) != BST_OK ||
+        !is_text(reader, "XTENSION", "BINTABLE") || !is_text(reader, "TTYPE1", "FRAMEID") ||
+        !is_text(reader, "TFORM1", "1K") || cards.naxis != 2 || cards.axes[0] < 8 ||
+        cards.data_bytes > reader->bytes - h.at - cards.bytes) {
+        return;
+    }
+    reader->ids_at = h.at + cards.bytes;
+    reader->id_step = cards.axes[0];
+    reader->id_count = cards.axes[1];
+}
+
+static bst_status take_cube(bst_ctx *ctx, bst_fits_reader *reader, const hdu *h, bool whole) {
     bst_fits_file_info *info = &reader->info;
-    int code = 0, type;
-    LONGLONG head, data, end, plane = size[0] * size[1] * 2;
-    BST_TRY(check_size(ctx, reader, size));
+    uint64_t plane = (uint64_t)h->size[0] * (uint64_t)h->size[1] * 2;
     info->cube = true;
-    info->width = (int)size[0];
-    info->height = (int)size[1];
-    info->frames = size[2];
-    info->compressed = fits_is_compressed_image(reader->file, &code) != 0;
-    reader->first_hdu = hdu;
-    fits_get_hduaddrll(reader->file, &head, &data, &end, &code);
-    if (code != 0) {
-        return fail_cfitsio(ctx, reader, code);
-    }
-    if (!info->compressed && data + size[2] * plane > file_bytes) {
-        info->frames = file_bytes > data ? (file_bytes - data) / plane : 0;
+    info->compressed = h->compressed;
+    info->width = (int)h->size[0];
+    info->height = (int)h->size[1];
+    info->frames = h->size[2];
+    reader->cube = *h;
+    if (!whole) {
+        uint64_t there = reader->bytes > h->data_at ? reader->bytes - h->data_at : 0;
+        info->frames = h->compressed ? 0 : (int64_t)(there / plane);
+        info->frames = info->frames < h->size[2] ? info->frames : h->size[2];
         info->cut_off = true;
+        return BST_OK;
     }
-    fits_movabs_hdu(reader->file, hdu + 1, &type, &code);
-    if (code == 0 && type == BINARY_TBL) {
-        char name[] = "FRAMEID";
-        fits_get_colnum(reader->file, CASEINSEN, name, &reader->id_column, &code);
-        reader->table_hdu = hdu + 1;
-        reader->has_table = code == 0;
-    }
-    fits_clear_errmsg();
-    return BST_OK;
+    find_ids(reader, h);
+    return h->size[2] < 0 ? bst_fail(ctx, BST_ERR_FORMAT, "%.400s: HDU %d: ZNAXIS3 is wrong",
+                                     reader->path, h->number)
+                          : BST_OK;
 }
 
 static bst_status count_frames(bst_ctx *ctx, bst_fits_reader *reader) {
-    struct stat file;
-    LONGLONG file_bytes = stat(reader->path, &file) == 0 ? (LONGLONG)file.st_size : 0;
-    int code = 0, type, axes, count = 0;
-    LONGLONG size[3], end;
-    /* a compressed cube is in the first extension, below an empty primary array */
-    for (int hdu = 1; hdu <= 2; hdu++) {
-        fits_movabs_hdu(reader->file, hdu, &type, &code);
-        if (code != 0) {
-            break;
-        }
-        look(reader->file, &type, &axes, size, &end, &code);
-        if (code == 0 && axes == 3) {
-            return read_cube(ctx, reader, hdu, size, file_bytes);
-        }
-        count++;
+    hdu h = {.number = 1};
+    bool whole = true;
+    BST_TRY(look(ctx, reader, &h, &whole));
+    if (h.axes == 3) {
+        return take_cube(ctx, reader, &h, whole);
     }
-    fits_clear_errmsg();
-    return count > 0 ? count_extensions(ctx, reader, file_bytes) : fail_cfitsio(ctx, reader, code);
+    /* a compressed cube is in the first extension, below an empty primary array */
+    hdu second = {.number = 2, .at = h.end};
+    bst_ctx unheard = {0};
+    if (whole && second.at < reader->bytes && look(&unheard, reader, &second, &whole) == BST_OK &&
+        second.axes == 3) {
+        return take_cube(ctx, reader, &second, whole);
+    }
+    if (h.end > reader->bytes) {
+        reader->info.cut_off = true;
+        return BST_OK;
+    }
+    return count_extensions(ctx, reader, h);
 }
 
-bst_status bst_fits_reader_open(bst_ctx *ctx, const char *path, bst_fits_reader **out) {
+static bst_status open_file(bst_ctx *ctx, bst_fits_reader *reader) {
+    /* a pipe in the place of the file would wait for ever */
+    reader->fd = open(reader->path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+    struct stat file;
+    if (reader->fd < 0 || fstat(reader->fd, &file) != 0) {
+        return bst_fail(ctx, errno == ENOENT ? BST_ERR_NOT_FOUND : BST_ERR_IO,
+                        "%.400s: cannot be opened: %s", reader->path, strerror(errno));
+    }
+    if (!S_ISREG(file.st_mode)) {
+        return bst_fail(ctx, BST_ERR_IO, "%.400s: is not a file", reader->path);
+    }
+    reader->bytes = (uint64_t)file.st_size;
+    return BST_OK;
+}
+
+static bst_status open_reader(bst_ctx *ctx, const char *path, const void *data, uint64_t bytes,
+                              bst_fits_reader **out) {
     *out = NULL;
     bst_fits_reader *reader = calloc(1, sizeof *reader);
     if (!reader) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
     }
+    reader->fd = -1;
+    reader->data = data;
+    reader->bytes = bytes;
     bst_status status = BST_OK;
-    int n = snprintf(reader->path, sizeof reader->path, "%s", path), code = 0;
+    int n = snprintf(reader->path, sizeof reader->path, "%s", path);
     if (n < 0 || (size_t)n >= sizeof reader->path) {
         status = bst_fail(ctx, BST_ERR_ARGUMENT, "%.80s...: the path is too long", path);
-    } else if (fits_open_diskfile(&reader->file, path, READONLY, &code) != 0) {
-        status = fail_cfitsio(ctx, reader, code);
-    } else {
+    } else if (!data) {
+        status = open_file(ctx, reader);
+    }
+    if (status == BST_OK) {
         status = count_frames(ctx, reader);
     }
     if (status != BST_OK) {
@@ -156,13 +397,23 @@ bst_status bst_fits_reader_open(bst_ctx *ctx, const char *path, bst_fits_reader 
     return BST_OK;
 }
 
+bst_status bst_fits_reader_open(bst_ctx *ctx, const char *path, bst_fits_reader **out) {
+    return open_reader(ctx, path, NULL, 0, out);
+}
+
+bst_status bst_fits_reader_open_buffer(bst_ctx *ctx, const char *name, const void *data,
+                                       uint64_t bytes, bst_fits_reader **out) {
+    return open_reader(ctx, name, data ? data : "", data ? bytes : 0, out);
+}
+
 void bst_fits_reader_close(bst_fits_reader *reader) {
     if (reader) {
-        int ignored = 0;
-        if (reader->file) {
-            fits_close_file(reader->file, &ignored);
-            fits_clear_errmsg();
+        if (reader->fd >= 0) {
+            close(reader->fd);
         }
+        free(reader->frames);
+        free(reader->header);
+        free(reader->row);
         free(reader->pixels);
         free(reader);
     }
@@ -170,6 +421,55 @@ void bst_fits_reader_close(bst_fits_reader *reader) {
 
 const bst_fits_file_info *bst_fits_reader_info(const bst_fits_reader *reader) {
     return &reader->info;
+}
+
+static uint64_t big_endian(const uint8_t *bytes, int count) {
+    uint64_t value = 0;
+    for (int i = 0; i < count; i++) {
+        value = value << 8 | bytes[i];
+    }
+    return value;
+}
+
+/* The HDU of a frame, with its header in memory unless it is the cube. */
+static bst_status find_frame(bst_ctx *ctx, bst_fits_reader *reader, int64_t index, hdu *h) {
+    if (index < 0 || index >= reader->info.frames) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "%.400s: has no frame %lld; it has %lld",
+                        reader->path, (long long)index, (long long)reader->info.frames);
+    }
+    if (reader->info.cube) {
+        *h = reader->cube;
+        return BST_OK;
+    }
+    bool whole;
+    *h = (hdu){.number = reader->frames[index].number, .at = reader->frames[index].at};
+    BST_TRY(look(ctx, reader, h, &whole));
+    if (!whole || h->axes != 2) {
+        return bst_fail(ctx, BST_ERR_IO, "%.400s: HDU %d: changed while it was read", reader->path,
+                        h->number);
+    }
+    return BST_OK;
+}
+
+static bst_status read_id(bst_ctx *ctx, const bst_fits_reader *reader, int64_t index,
+                          int64_t *exposure_id) {
+    *exposure_id = -1;
+    if (!reader->info.cube) {
+        *exposure_id = int_of(reader, "FRAMEID", -1);
+    } else if (reader->ids_at > 0 && index < reader->id_count) {
+        uint8_t bytes[8];
+        BST_TRY(read_at(ctx, reader, bytes, 8,
+                        reader->ids_at + (uint64_t)index * (uint64_t)reader->id_step));
+        *exposure_id = (int64_t)big_endian(bytes, 8);
+    }
+    return BST_OK;
+}
+
+bst_status bst_fits_reader_id(bst_ctx *ctx, bst_fits_reader *reader, int64_t index,
+                              int64_t *exposure_id) {
+    hdu h;
+    BST_TRY(find_frame(ctx, reader, index, &h));
+    return read_id(ctx, reader, index, exposure_id);
 }
 
 static bst_status make_room(bst_ctx *ctx, bst_fits_reader *reader, size_t count) {
@@ -181,72 +481,67 @@ static bst_status make_room(bst_ctx *ctx, bst_fits_reader *reader, size_t count)
     return reader->pixels ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a frame");
 }
 
-static bst_status check_index(bst_ctx *ctx, const bst_fits_reader *reader, int64_t index) {
-    if (index < 0 || index >= reader->info.frames) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: has no frame %lld; it has %lld", reader->path,
-                        (long long)index, (long long)reader->info.frames);
+/* BZERO 32768: the pixels lie there less 2^15, which flips the top bit. */
+static void from_fits(uint16_t *pixels, size_t count) {
+    for (size_t i = 0; i < count; i++) {
+        uint8_t *b = (uint8_t *)&pixels[i];
+        pixels[i] = (uint16_t)(((unsigned)b[0] << 8 | b[1]) ^ 0x8000u);
+    }
+}
+
+/* Decodes a row, which is row `row` of the table. */
+static bst_status read_row(bst_ctx *ctx, bst_fits_reader *reader, const hdu *h, int64_t row,
+                           uint16_t *out) {
+    uint8_t place[16];
+    int width = h->p.wide ? 8 : 4;
+    size_t count = (size_t)h->size[0];
+    BST_TRY(read_at(ctx, reader, place, 2 * (uint64_t)width,
+                    h->data_at + (uint64_t)row * (uint64_t)h->p.row_bytes));
+    uint64_t bytes = big_endian(place, width), offset = big_endian(place + width, width);
+    bool ok =
+        bytes <= MOST_ROW_BYTES && offset <= h->p.heap_bytes && bytes <= h->p.heap_bytes - offset;
+    if (ok) {
+        BST_TRY(read_at(ctx, reader, reader->row, bytes, h->p.heap_at + offset));
+        ok = bst_fits_rice_decode(reader->row, (size_t)bytes, h->p.block, out, count);
+    }
+    if (!ok) {
+        return bst_fail(ctx, BST_ERR_FORMAT,
+                        "%.400s: HDU %d: row %lld of the compressed pixels is damaged",
+                        reader->path, h->number, (long long)row);
+    }
+    for (size_t i = 0; i < count; i++) {
+        out[i] ^= 0x8000u;
     }
     return BST_OK;
 }
 
-bst_status bst_fits_reader_id(bst_ctx *ctx, bst_fits_reader *reader, int64_t index,
-                              int64_t *exposure_id) {
-    BST_TRY(check_index(ctx, reader, index));
-    int code = 0, type, any;
-    LONGLONG id = -1;
-    if (!reader->info.cube) {
-        int missing = 0;
-        fits_movabs_hdu(reader->file, reader->first_hdu + (int)index, &type, &code);
-        if (code == 0 && fits_read_key_lnglng(reader->file, "FRAMEID", &id, NULL, &missing) != 0) {
-            id = -1;
-            fits_clear_errmsg();
-        }
-    } else if (reader->has_table) {
-        fits_movabs_hdu(reader->file, reader->table_hdu, &type, &code);
-        fits_read_col(reader->file, TLONGLONG, reader->id_column, (LONGLONG)index + 1, 1, 1, NULL,
-                      &id, &any, &code);
-    }
-    *exposure_id = (int64_t)id;
-    return code == 0 ? BST_OK : fail_cfitsio(ctx, reader, code);
-}
-
-static bst_status read_extension(bst_ctx *ctx, bst_fits_reader *reader, int64_t index,
-                                 bst_fits_read_frame *out) {
-    int code = 0, type, any;
-    LONGLONG size[3] = {0, 0, 0};
-    fits_movabs_hdu(reader->file, reader->first_hdu + (int)index, &type, &code);
-    fits_get_img_sizell(reader->file, 2, size, &code);
-    if (code != 0) {
-        return fail_cfitsio(ctx, reader, code);
-    }
-    BST_TRY(check_size(ctx, reader, size));
-    BST_TRY(make_room(ctx, reader, (size_t)(size[0] * size[1])));
-    fits_read_img(reader->file, TUSHORT, 1, size[0] * size[1], NULL, reader->pixels, &any, &code);
-    out->width = (int)size[0];
-    out->height = (int)size[1];
-    return code == 0 ? BST_OK : fail_cfitsio(ctx, reader, code);
-}
-
-static bst_status read_plane(bst_ctx *ctx, bst_fits_reader *reader, int64_t index,
-                             bst_fits_read_frame *out) {
-    const bst_fits_file_info *info = &reader->info;
-    int code = 0, type, any;
-    long first[3] = {1, 1, (long)index + 1};
-    long last[3] = {info->width, info->height, (long)index + 1};
-    long step[3] = {1, 1, 1};
-    BST_TRY(make_room(ctx, reader, (size_t)info->width * (size_t)info->height));
-    fits_movabs_hdu(reader->file, reader->first_hdu, &type, &code);
-    fits_read_subset(reader->file, TUSHORT, first, last, step, NULL, reader->pixels, &any, &code);
-    out->width = info->width;
-    out->height = info->height;
-    return code == 0 ? BST_OK : fail_cfitsio(ctx, reader, code);
-}
-
 bst_status bst_fits_reader_frame(bst_ctx *ctx, bst_fits_reader *reader, int64_t index,
                                  bst_fits_read_frame *out) {
-    BST_TRY(bst_fits_reader_id(ctx, reader, index, &out->exposure_id));
-    BST_TRY(reader->info.cube ? read_plane(ctx, reader, index, out)
-                              : read_extension(ctx, reader, index, out));
-    out->pixels = reader->pixels;
+    hdu h;
+    BST_TRY(find_frame(ctx, reader, index, &h));
+    BST_TRY(read_id(ctx, reader, index, &out->exposure_id));
+    int64_t plane = reader->info.cube ? index : 0, height = h.size[1];
+    size_t count = (size_t)h.size[0] * (size_t)height;
+    if (h.compressed && !reader->row) {
+        reader->row = malloc(MOST_ROW_BYTES);
+        if (!reader->row) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a row");
+        }
+    }
+    BST_TRY(make_room(ctx, reader, count));
+    if (h.compressed) {
+        for (int64_t y = 0; y < height; y++) {
+            BST_TRY(read_row(ctx, reader, &h, plane * height + y,
+                             reader->pixels + (size_t)y * (size_t)h.size[0]));
+        }
+    } else {
+        BST_TRY(read_at(ctx, reader, reader->pixels, count * 2,
+                        h.data_at + (uint64_t)plane * count * 2));
+        from_fits(reader->pixels, count);
+    }
+    *out = (bst_fits_read_frame){.pixels = reader->pixels,
+                                 .width = (int)h.size[0],
+                                 .height = (int)height,
+                                 .exposure_id = out->exposure_id};
     return BST_OK;
 }

@@ -1,5 +1,6 @@
 /* Frames back from a FITS file of a run: image extensions or a datacube, raw or tile-compressed,
- * finished or left over from a killed run. */
+ * finished or left over from a killed run. All of it is checked: a damaged file gives an error,
+ * never a read beyond memory. cfitsio is not asked, since it believes what headers say of sizes. */
 #ifndef BST_IO_FITS_READER_H
 #define BST_IO_FITS_READER_H
 
@@ -18,10 +19,17 @@ typedef struct bst_fits_file_info {
     int width, height; /* largest of all frames; 0 without frames */
 } bst_fits_file_info;
 
-/* Opens a file for reading only and counts its whole frames. BST_ERR_IO with cfitsio's reason;
- * BST_ERR_FORMAT when its images are not frames. */
+/* Opens a file for reading only and counts its whole frames. Frames are images of 16-bit unsigned
+ * numbers (BITPIX 16, BZERO 32768), each in an extension, or planes of a cube in the first or
+ * second HDU; or the same tile-compressed by RICE_1, a row to a tile, as boresight and fpack do.
+ * Memory: 16 bytes a frame. BST_ERR_NOT_FOUND, BST_ERR_IO: it cannot be opened or read, with the
+ * system's reason; BST_ERR_FORMAT: it is no FITS file, or its images are not frames. What follows
+ * the last HDU that is whole is no error but cut_off. */
 bst_status bst_fits_reader_open(bst_ctx *ctx, const char *path,
                                 bst_fits_reader **out) BST_MUST_CHECK;
+/* The same of a file in memory, which is borrowed; `name` stands for the path in messages. */
+bst_status bst_fits_reader_open_buffer(bst_ctx *ctx, const char *name, const void *data,
+                                       uint64_t bytes, bst_fits_reader **out) BST_MUST_CHECK;
 /* NULL is allowed. */
 void bst_fits_reader_close(bst_fits_reader *reader);
 const bst_fits_file_info *bst_fits_reader_info(const bst_fits_reader *reader);
@@ -38,7 +46,8 @@ typedef struct bst_fits_read_frame {
 bst_status bst_fits_reader_id(bst_ctx *ctx, bst_fits_reader *reader, int64_t index,
                               int64_t *exposure_id) BST_MUST_CHECK;
 
-/* Reads frame `index`, counted from 0 in the file's order. Memory is that of one frame. */
+/* Reads frame `index`, counted from 0 in the file's order. Memory is that of one frame.
+ * BST_ERR_FORMAT when its compressed pixels are damaged. */
 bst_status bst_fits_reader_frame(bst_ctx *ctx, bst_fits_reader *reader, int64_t index,
                                  bst_fits_read_frame *out) BST_MUST_CHECK;
 

@@ -92,7 +92,8 @@ static void draw_overlay(bst_picture *p, const bst_overlay *overlay, int width, 
         if (m->label[0]) {
             /* a track's above, an object's below: they are often at one place */
             double base = m->kind == BST_OVERLAY_TRACK ? y - 0.5 * r : y + 0.5 * r + 0.8 * h;
-            bst_picture_text(p, x + fmax(r, 18.0) + 6.0, base, 0.8 * h, colours[m->kind], false, m->label);
+            bst_picture_text(p, x + fmax(r, 18.0) + 6.0, base, 0.8 * h, colours[m->kind], false,
+                             m->label);
         }
     }
     bst_picture_unclip(p);

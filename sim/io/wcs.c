@@ -113,6 +113,18 @@ bst_status bst_wcs_fit(bst_ctx *ctx, const bst_camera *camera, bst_quat q_cam_fr
     return BST_OK;
 }
 
+double bst_wcs_distortion_misfit_px(const bst_camera *camera) {
+    /* the Sun behind the camera, which looks along z, so that it deflects nothing */
+    const bst_light at_rest = {.sun_m = {0.0, 0.0, -BST_AU_M}};
+    const bst_quat q = {0.0, 0.0, 0.0, 1.0};
+    double crval[2], cd[2][2], misfit;
+    bst_sip sip;
+    if (!bst_camera_distorted(camera)) {
+        return 0.0;
+    }
+    return bst_sip_fit(camera, q, &at_rest, crval, cd, &sip, &misfit) ? misfit : INFINITY;
+}
+
 bst_wcs bst_wcs_window(const bst_wcs *wcs, bst_window window, int binning) {
     bst_wcs w = *wcs;
     double b = binning > 1 ? binning : 1;

@@ -27,6 +27,11 @@ typedef struct bst_wcs {
 bst_status bst_wcs_fit(bst_ctx *ctx, const bst_camera *camera, bst_quat q_cam_from_gcrf,
                        const bst_light *light, bst_wcs *out) BST_MUST_CHECK;
 
+/* How far (px) the polynomials of a frame's solution miss the distortion of the camera, at worst
+ * over the sensor, for an observer at rest: WCSRESID without aberration. 0 for a camera without
+ * distortion, INFINITY when the field is too wide for a solution. */
+double bst_wcs_distortion_misfit_px(const bst_camera *camera);
+
 /* The same solution for the pixels of a read-out window, binned `binning` times. */
 bst_wcs bst_wcs_window(const bst_wcs *wcs, bst_window window, int binning);
 

@@ -210,6 +210,44 @@ static void wrong_contents(void **state) {
     bad_text(&reader, "PK\3\4", BST_ERR_FORMAT, START);                          /* zip */
 }
 
+/* Tables about which cfitsio 4.2 believes what is not there; the fuzzer found them. */
+static void wrong_tables(void **state) {
+    (void)state;
+    static const struct {
+        const char *card, *message;
+    } cases[] = {
+        {"TFIELDS =                    0", ": HDU 2: PCOUNT, GCOUNT or TFIELDS is missing"},
+        {"HIERARCH ZIMAGE .= T",
+         ": HDU 2: is a compressed image (allowed: images that are not compressed); unpack the "
+         "file with funpack"},
+        {"ZIMAGE  =                    T ? no comment",
+         ": HDU 2: is a compressed image (allowed: images that are not compressed); unpack the "
+         "file with funpack"},
+    };
+    static const char *const primary[] = {SIMPLE, "BITPIX  =                    8",
+                                          "NAXIS   =                    0", "END", NULL};
+    for (int i = 0; i < 3; i++) {
+        const char *const table[] = {"XTENSION= 'BINTABLE'",
+                                     "BITPIX  =                    8",
+                                     TWO_AXES,
+                                     "NAXIS1  =                    8",
+                                     "NAXIS2  =                    0",
+                                     cases[i].card,
+                                     i == 0 ? "" : "PCOUNT  =                    0",
+                                     i == 0 ? "" : "GCOUNT  =                    1",
+                                     i == 0 ? "" : "TFIELDS =                    0",
+                                     "END"};
+        size_t bytes;
+        char *file = make(primary, BLOCK, &bytes);
+        memset(file + BLOCK, ' ', BLOCK);
+        for (size_t k = 0; k < sizeof table / sizeof *table; k++) {
+            memcpy(file + BLOCK + k * CARD, table[k], strlen(table[k]));
+        }
+        bad_bytes(&reader, file, bytes, BST_ERR_FORMAT, cases[i].message);
+        free(file);
+    }
+}
+
 static void every_truncation(void **state) {
     (void)state;
     static const char *const cards[] = {SIMPLE,
@@ -243,6 +281,7 @@ int main(void) {
         cmocka_unit_test(paths),
         cmocka_unit_test(names_are_names),
         cmocka_unit_test(wrong_contents),
+        cmocka_unit_test(wrong_tables),
         cmocka_unit_test(every_truncation),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

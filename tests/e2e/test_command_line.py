@@ -58,6 +58,21 @@ class Messages(unittest.TestCase):
         self.fails(2, '"x" is not expected here', "schema", "x")
         self.fails(2, "--start is missing", "propagate")
 
+    def test_distortion_beyond_the_wcs(self):
+        # a barrel of 900 (12.1 arcmin * sqrt 2)^2 = 10 % in the corners: 0.05 px (conventions.md)
+        out = runs.scratch() + "/run"
+        result = call(*runs.command(runs.TRACK, out, runs.SENSOR + '/camera/distortion={"k1": -900}',
+                                    duration=1)[1:])
+        self.assertEqual(result.returncode, 0, result.stderr)
+        found = re.findall(r"^boresight: warning: neossat/telescope: the WCS of its frames misfits the "
+                           r"camera's distortion by up to ([0-9.e-]+) px: ", result.stderr, re.M)
+        self.assertEqual(len(found), 1, result.stderr)
+        manifest = runs.manifest(out)
+        misfit = manifest["wcs_misfit_px"]["neossat/telescope"]
+        self.assertAlmostEqual(float(found[0]), misfit, delta=0.0005)  # two digits
+        self.assertTrue(0.02 < misfit < 0.1, misfit)  # the order of the documented figure
+        self.assertEqual(manifest["warnings"], 1)
+
     def test_bad_values(self):
         self.bad_set("/world/object=3", ': /world/object: unknown key; did you mean "objects"')
         self.bad_set("/duration_s=-1", r": /duration_s: out of range \(found -1; allowed: .*from 0")
@@ -68,8 +83,12 @@ class Messages(unittest.TestCase):
                      '"three_axis" .*"two_axis"')
         self.bad_set(GIMBAL + "/rate_hz=999", f": {GIMBAL}/rate_hz: .*857.142857 and 1000 Hz")
         self.bad_set(GIMBAL + "/platform/history_s=0.4", ": neossat/telescope/gimbal: platform/"
-                     r"history_s: 0\.4 s do not cover the sensor's exposure/exposure_s of 0\.5 s; "
-                     "make history_s at least as long")
+                     r"history_s: 0\.4 s do not cover the longest exposure_s of this sensor, 0\.5 s "
+                     r"\(its exposure's, or what control commands\); make history_s at least as "
+                     "long")
+        self.bad_set(GIMBAL.replace("gimbal", "control") + "/exposure_s=4.5",
+                     r": neossat/telescope/gimbal: platform/history_s: 4 s do not cover the longest "
+                     r"exposure_s of this sensor, 4\.5 s \(")
         self.bad_set("/record={\"frames\": \"cube\", \"compression\": \"rice\"}",
                      ': /record/compression: "rice" compresses frames in extensions only; ')
         self.bad_set(GIMBAL + "/platform/jitter_high_band_hz=[5]", r": .*/platform/jitter_high_band_hz: wrong type \(found \[5\]; "

@@ -143,8 +143,7 @@ class Complete(unittest.TestCase):
         run = self.copy()
         with open(run + "/frames.fits", "wb") as file:
             file.write(b"no FITS at all. " * 360)
-        self.damaged(run, f"{run}/frames.fits: cannot be read: 1st key not SIMPLE or "
-                     "XTENSION")
+        self.damaged(run, f"{run}/frames.fits: HDU 1: does not begin with SIMPLE")
         run = self.copy()
         with open(run + "/manifest.json", "w", encoding="ascii") as file:
             file.write('{"complete": true')

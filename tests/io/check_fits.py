@@ -4,6 +4,7 @@ Usage: check_fits.py FOLDER        all that test_astropy_reads wrote
        check_fits.py FOLDER full   a.fits, that a full disk ended
 """
 
+import io
 import os
 import sys
 import warnings
@@ -117,6 +118,27 @@ def check_killed(folder, places):
                 assert (f[0].data[i] == pixels(i)).all()
 
 
+def check_sums(path, all_hdus=True):
+    """CHECKSUM and DATASUM of every HDU by astropy, which finds a changed byte by them."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with fits.open(path, checksum=True, disable_image_compression=True) as f:
+            for hdu in f[0 if all_hdus else 1:]:
+                assert "CHECKSUM" in hdu.header and "DATASUM" in hdu.header, hdu.name
+                assert hdu.verify_checksum() == 1 and hdu.verify_datasum() == 1, hdu.name
+            data = f[-1].fileinfo()["datLoc"]
+        with fits.open(path, checksum=True) as f:
+            assert sum(hdu.size for hdu in f) > 0
+    with open(path, "rb") as f:
+        damaged = bytearray(f.read())
+    damaged[data] ^= 1
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        with fits.open(io.BytesIO(bytes(damaged)), checksum=True) as f:
+            assert len(f) > 1
+    assert any("Datasum verification failed" in str(one.message) for one in said), path
+
+
 def check_packed(folder):
     """Compressed frames hold the same pixels and keys, and the same bytes each time."""
     with open(os.path.join(folder, "rice.fits"), "rb") as one, \
@@ -197,6 +219,8 @@ def main():
     places = np.loadtxt(os.path.join(folder, "places.txt"))
     check_extensions(os.path.join(folder, "ext[1].fits"), places)
     check_cube(os.path.join(folder, "cube.fits"), places)
+    for name in ("ext[1].fits", "cube.fits", "rice.fits", "killed_ext.fits", "killed_rice.fits"):
+        check_sums(os.path.join(folder, name))
     check_killed(folder, places)
     check_cut(folder)
     check_extensions(os.path.join(folder, "rice.fits"), places)

@@ -37,6 +37,7 @@ static bst_fits_info make_info(const bst_camera *camera) {
                            .instrument = "telescope",
                            .object = "O'Target",
                            .program = "boresight test",
+                           .checksums = true,
                            .camera = camera};
 }
 

@@ -1,0 +1,201 @@
+/* The cards of a FITS header that sizes hang on, and any other by its key. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/io/fits_cards_internal.h"
+
+enum { CARD = BST_FITS_CARD, MAX_FIELDS = 999 };
+
+/* A header on its way. */
+typedef struct scan {
+    bst_ctx *ctx;
+    const char *name;
+    int hdu;
+    bst_fits_cards *cards;
+} scan;
+
+static const int64_t UNSET = BST_FITS_UNSET;
+
+/* The value field of a card, without quotes, comment and blanks around it. */
+static void card_value(const char *card, char out[CARD]) {
+    const char *value = card + 10, *end = card + CARD;
+    while (value < end && *value == ' ') {
+        value++;
+    }
+    const char *stop;
+    if (value < end && *value == '\'') {
+        value++;
+        stop = memchr(value, '\'', (size_t)(end - value));
+    } else {
+        stop = memchr(value, '/', (size_t)(end - value));
+    }
+    stop = stop ? stop : end;
+    while (stop > value && stop[-1] == ' ') {
+        stop--;
+    }
+    snprintf(out, CARD, "%.*s", (int)(stop - value), value);
+}
+
+static bst_status wrong(const scan *c, const char *card, const char *allowed) {
+    char value[CARD];
+    card_value(card, value);
+    return bst_fail(c->ctx, BST_ERR_FORMAT, "%.400s: HDU %d: %.*s is wrong (found %s; allowed: %s)",
+                    c->name, c->hdu, (int)strcspn(card, " ="), card, *value ? value : "nothing",
+                    allowed);
+}
+
+/* Whether a card's key is `stem` followed by a number from 1 to `count`; *index is that less 1. */
+static bool is_indexed(const char *card, const char *stem, int count, int *index) {
+    size_t length = strlen(stem);
+    char digit = card[length];
+    if (strncmp(card, stem, length) != 0 || digit < '1' || digit > '0' + count) {
+        return false;
+    }
+    *index = digit - '1';
+    return strspn(card + length + 1, " ") == 8 - length - 1;
+}
+
+static bool is_key(const char *card, const char *key) {
+    size_t length = strlen(key);
+    return strncmp(card, key, length) == 0 && strspn(card + length, " ") >= 8 - length;
+}
+
+static bst_status set_int(const scan *c, const char *card, int64_t low, int64_t high,
+                          const char *allowed, int64_t *out) {
+    char value[CARD], *end;
+    card_value(card, value);
+    bool is_plain = strspn(value, "+-0123456789") == strlen(value) && strlen(value) < 19;
+    int64_t number = is_plain ? strtoll(value, &end, 10) : 0;
+    if (!is_plain || end == value || *end || number < low || number > high) {
+        return wrong(c, card, allowed);
+    }
+    if (*out != UNSET) {
+        return bst_fail(c->ctx, BST_ERR_FORMAT, "%.400s: HDU %d: %.*s is given twice", c->name,
+                        c->hdu, (int)strcspn(card, " ="), card);
+    }
+    *out = number;
+    return BST_OK;
+}
+
+static bst_status set_bitpix(const scan *c, const char *card, int64_t *out) {
+    const char *allowed = "8, 16, 32, 64, -32, -64";
+    BST_TRY(set_int(c, card, -64, 64, allowed, out));
+    bool known = *out == 8 || *out == 16 || *out == 32 || *out == 64 || *out == -32 || *out == -64;
+    return known ? BST_OK : wrong(c, card, allowed);
+}
+
+/* Takes what matters of one card. */
+static bst_status read_card(scan *c, const char *card) {
+    const char *size = "an integer from 0 to 1000000000000";
+    const int64_t most = 1000000000000;
+    bst_fits_cards *h = c->cards;
+    int i;
+    if (is_key(card, "BITPIX")) {
+        return set_bitpix(c, card, &h->bitpix);
+    }
+    if (is_key(card, "NAXIS")) {
+        return set_int(c, card, 0, BST_FITS_AXES, "an integer from 0 to 9", &h->naxis);
+    }
+    if (is_indexed(card, "NAXIS", BST_FITS_AXES, &i)) {
+        return set_int(c, card, 0, most, size, &h->axes[i]);
+    }
+    if (is_key(card, "PCOUNT")) {
+        return set_int(c, card, 0, most, size, &h->pcount);
+    }
+    if (is_key(card, "GCOUNT")) {
+        return set_int(c, card, 1, 1, "1", &h->gcount);
+    }
+    if (is_key(card, "TFIELDS")) {
+        return set_int(c, card, 0, MAX_FIELDS, "an integer from 0 to 999", &h->tfields);
+    }
+    if (is_key(card, "XTENSION")) {
+        char value[CARD];
+        card_value(card, value);
+        h->is_table = strcmp(value, "IMAGE") != 0;
+    }
+    /* cfitsio reads more spellings of the key than the standard has, and the value's first letter
+     */
+    if (strstr(card, "ZIMAGE")) {
+        char value[CARD];
+        card_value(card, value);
+        bool is_so = is_key(card, "ZIMAGE") ? value[0] != 'F' : h->is_table;
+        h->is_compressed = h->is_compressed || is_so;
+    }
+    return BST_OK;
+}
+
+/* Bytes of the data by the keys, or more than any file has. */
+static bst_status set_data_bytes(const scan *c) {
+    bst_fits_cards *h = c->cards;
+    uint64_t count = h->naxis > 0;
+    bool ok = h->bitpix != UNSET && h->naxis != UNSET;
+    for (int64_t i = 0; ok && i < h->naxis; i++) {
+        ok = h->axes[i] != UNSET;
+        bool overflows = ok && h->axes[i] > 0 && count > (UINT64_MAX >> 8) / (uint64_t)h->axes[i];
+        count = overflows ? UINT64_MAX >> 8 : count * (uint64_t)(ok ? h->axes[i] : 0);
+    }
+    if (!ok) {
+        return bst_fail(c->ctx, BST_ERR_FORMAT,
+                        "%.400s: HDU %d: BITPIX, NAXIS or one of NAXISn is missing", c->name,
+                        c->hdu);
+    }
+    /* without them cfitsio 4.2 takes what its memory holds */
+    if (h->is_table && (h->pcount == UNSET || h->gcount == UNSET || h->tfields == UNSET)) {
+        return bst_fail(c->ctx, BST_ERR_FORMAT,
+                        "%.400s: HDU %d: PCOUNT, GCOUNT or TFIELDS is missing", c->name, c->hdu);
+    }
+    count += h->pcount == UNSET ? 0 : (uint64_t)h->pcount;
+    h->data_bytes = count * (uint64_t)(llabs(h->bitpix) / 8);
+    return BST_OK;
+}
+
+bst_status bst_fits_read_cards(bst_ctx *ctx, const char *name, int hdu, const void *data,
+                               uint64_t bytes, bst_fits_cards *out) {
+    scan c = {.ctx = ctx, .name = name, .hdu = hdu, .cards = out};
+    *out = (bst_fits_cards){
+        .bitpix = UNSET, .naxis = UNSET, .pcount = UNSET, .gcount = UNSET, .tfields = UNSET};
+    for (int i = 0; i < BST_FITS_AXES; i++) {
+        out->axes[i] = UNSET;
+    }
+    for (uint64_t at = 0; bytes - at >= CARD; at += CARD) {
+        char card[CARD + 1] = "";
+        memcpy(card, (const char *)data + at, CARD);
+        if (at == 0 && !is_key(card, hdu == 1 ? "SIMPLE" : "XTENSION")) {
+            return bst_fail(ctx, BST_ERR_FORMAT, "%.400s: HDU %d: does not begin with %s", name,
+                            hdu, hdu == 1 ? "SIMPLE" : "XTENSION");
+        }
+        if (is_key(card, "END")) {
+            out->bytes = (at + CARD + BST_FITS_BLOCK - 1) / BST_FITS_BLOCK * BST_FITS_BLOCK;
+            return set_data_bytes(&c);
+        }
+        BST_TRY(read_card(&c, card));
+    }
+    return bst_fail(ctx, BST_ERR_FORMAT, "%.400s: HDU %d: the header has no END", name, hdu);
+}
+
+bool bst_fits_card_text(const void *header, uint64_t bytes, const char *key, char value[CARD]) {
+    const char *cards = header;
+    for (uint64_t at = 0; bytes - at >= CARD; at += CARD) {
+        char card[CARD + 1] = "";
+        memcpy(card, cards + at, CARD);
+        if (is_key(card, key)) {
+            card_value(card, value);
+            return true;
+        }
+        if (is_key(card, "END")) {
+            break;
+        }
+    }
+    return false;
+}
+
+bool bst_fits_card_int(const void *header, uint64_t bytes, const char *key, int64_t *value) {
+    char text[CARD], *end;
+    if (!bst_fits_card_text(header, bytes, key, text) || !*text || strlen(text) > 18 ||
+        strspn(text, "+-0123456789") != strlen(text)) {
+        return false;
+    }
+    *value = strtoll(text, &end, 10);
+    return *end == '\0';
+}

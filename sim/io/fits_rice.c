@@ -1,0 +1,86 @@
+#include "sim/io/fits_rice.h"
+
+/* Of 16-bit pixels: bits of a block's code, and the code of a block that holds differences as they
+ * are. */
+enum { CODE_BITS = 4, VERBATIM = 15, PIXEL_BITS = 16 };
+
+/* Bits, most significant first. Behind the end come zeros, and `missing` counts them. */
+typedef struct bit_reader {
+    const uint8_t *next, *end;
+    uint64_t bits; /* the next ones, at the top */
+    int count;
+    size_t missing;
+} bit_reader;
+
+static void refill(bit_reader *r) {
+    for (; r->count <= 56; r->count += 8) {
+        uint64_t byte = 0;
+        if (r->next < r->end) {
+            byte = *r->next++;
+        } else {
+            r->missing += 8;
+        }
+        r->bits |= byte << (56 - r->count);
+    }
+}
+
+static uint32_t take(bit_reader *r, int n) {
+    if (r->count < n) {
+        refill(r);
+    }
+    uint32_t value = n > 0 ? (uint32_t)(r->bits >> (64 - n)) : 0;
+    r->bits <<= n;
+    r->count -= n;
+    return value;
+}
+
+/* Whether bits behind the end have been taken. */
+static bool is_exhausted(const bit_reader *r) {
+    return r->missing > (size_t)r->count;
+}
+
+/* Zeros before the next one, which is taken too; false for more zeros than any code has. */
+static bool take_unary(bit_reader *r, uint32_t most, uint32_t *zeros) {
+    for (*zeros = 0; *zeros <= most;) {
+        if (r->bits != 0) {
+            int n = __builtin_clzll(r->bits);
+            *zeros += (uint32_t)n;
+            r->bits = r->bits << n << 1;
+            r->count -= n + 1;
+            return *zeros <= most;
+        }
+        *zeros += (uint32_t)r->count;
+        r->count = 0;
+        refill(r);
+    }
+    return false;
+}
+
+bool bst_fits_rice_decode(const uint8_t *data, size_t bytes, int block, uint16_t *out,
+                          size_t count) {
+    bit_reader r = {.next = data, .end = data + bytes};
+    uint32_t last = take(&r, PIXEL_BITS);
+    for (size_t at = 0; at < count; at += (size_t)block) {
+        size_t stop = count - at < (size_t)block ? count : at + (size_t)block;
+        int code = (int)take(&r, CODE_BITS);
+        for (size_t i = at; i < stop; i++) {
+            uint32_t high = 0, mapped = 0;
+            if (code == VERBATIM) {
+                mapped = take(&r, PIXEL_BITS);
+            } else if (code > 0) {
+                int low_bits = code - 1;
+                if (!take_unary(&r, UINT16_MAX >> low_bits, &high)) {
+                    return false;
+                }
+                mapped = high << low_bits | take(&r, low_bits);
+            }
+            /* 0, 1, 2, 3, ... stand for 0, -1, 1, -2, ... */
+            last += mapped & 1 ? ~(mapped >> 1) : mapped >> 1;
+            out[i] = (uint16_t)last;
+        }
+        if (is_exhausted(&r)) {
+            return false;
+        }
+    }
+    return true;
+}
