@@ -1,70 +1,54 @@
 #include "scenegen/nodes.h"
 
 #include <math.h>
-#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* Moments of a stretch of path: duration, first and second moments about `origin`. */
+#include "sim/core/vec.h"
+
+typedef struct maker {
+    const bst_path_point *path;
+    int count;
+    double total;    /* duration */
+    double variance; /* of the PSF, px^2 */
+    double tolerance;
+    bool widen;
+    bst_node_list *list;
+    double most;  /* spread of the next group, px^2 */
+    double limit; /* of it */
+} maker;
+
+/* A group: the path from time `from` (in segment `first`) to `to`. */
+typedef struct group {
+    int first;
+    double from, to;
+} group;
+
+/* A group's moments about its mean: along the axis to the sixth order, and what lies across. */
 typedef struct moments {
-    double weight, first[3], second[3][3];
+    double mean[3], axis[3];
+    double covariance[3][3];
+    double along[7];     /* E[x^k] */
+    double bend[3];      /* E[y x^2], y the part across the axis */
+    double drift;        /* E[x y^2] */
+    double mixed;        /* E[x^2 y^2] */
+    double lean[3];      /* E[y y^2] */
+    double across[3][3]; /* E[y y^T] */
 } moments;
 
-/* Adds the straight, uniform stretch from a to b (relative to the origin) of duration w. */
-static void add_segment(moments *m, const double a[3], const double b[3], double w) {
-    m->weight += w;
-    for (int i = 0; i < 3; i++) {
-        m->first[i] += w * 0.5 * (a[i] + b[i]);
-        for (int j = 0; j <= i; j++) {
-            m->second[i][j] +=
-                w * ((a[i] * a[j] + b[i] * b[j]) / 3.0 + (a[i] * b[j] + b[i] * a[j]) / 6.0);
-        }
-    }
-}
+/* A way to stand for a group. */
+typedef struct rule {
+    int nodes;       /* 1 to 3 along the axis */
+    double widening; /* px^2 */
+    double pair[3];  /* half the distance of the pair that each node is split into */
+    double node[3], weight[3];
+    double bend[3];  /* shift across the axis per unit of `curve` */
+    double curve[3]; /* second orthogonal polynomial at the nodes */
+    double error;
+} rule;
 
-static double spread(const moments *m) {
-    double total = 0.0;
-    for (int i = 0; i < 3; i++) {
-        double mean = m->first[i] / m->weight;
-        total += m->second[i][i] / m->weight - mean * mean;
-    }
-    return total;
-}
-
-/* Eigenvectors (columns of v) and eigenvalues (diagonal of a) of a symmetric matrix: cyclic Jacobi
- * (Golub and Van Loan, Matrix Computations, 8.5). */
-static void eigen3(double a[3][3], double v[3][3]) {
-    static const int pairs[3][2] = {{0, 1}, {0, 2}, {1, 2}};
-    memset(v, 0, 9 * sizeof(double));
-    v[0][0] = v[1][1] = v[2][2] = 1.0;
-    for (int sweep = 0; sweep < 12; sweep++) {
-        for (int k = 0; k < 3; k++) {
-            int p = pairs[k][0], q = pairs[k][1];
-            if (fabs(a[p][q]) <= 1e-18 * (fabs(a[p][p]) + fabs(a[q][q]))) {
-                continue;
-            }
-            double theta = 0.5 * (a[q][q] - a[p][p]) / a[p][q];
-            double t = copysign(1.0, theta) / (fabs(theta) + sqrt(theta * theta + 1.0));
-            double c = 1.0 / sqrt(t * t + 1.0), s = t * c;
-            for (int i = 0; i < 3; i++) {
-                double x = a[i][p], y = a[i][q];
-                a[i][p] = c * x - s * y;
-                a[i][q] = s * x + c * y;
-            }
-            for (int i = 0; i < 3; i++) {
-                double x = a[p][i], y = a[q][i];
-                a[p][i] = c * x - s * y;
-                a[q][i] = s * x + c * y;
-                x = v[i][p];
-                y = v[i][q];
-                v[i][p] = c * x - s * y;
-                v[i][q] = s * x + c * y;
-            }
-        }
-    }
-}
-
-static bst_status push(bst_ctx *ctx, bst_node_list *list, const double p[3], double weight) {
+static bst_status push(bst_ctx *ctx, bst_node_list *list, const double p[3], double weight,
+                       double variance) {
     if (list->count == list->capacity) {
         int capacity = list->capacity ? 2 * list->capacity : 256;
         bst_node *items = realloc(list->items, (size_t)capacity * sizeof *items);
@@ -74,106 +58,472 @@ static bst_status push(bst_ctx *ctx, bst_node_list *list, const double p[3], dou
         list->items = items;
         list->capacity = capacity;
     }
-    list->items[list->count++] = (bst_node){{p[0], p[1], p[2]}, weight};
+    list->items[list->count++] = (bst_node){{p[0], p[1], p[2]}, weight, variance};
     return BST_OK;
 }
 
-/* Replaces a group by its nodes. Axes with less than `least` px^2 of variance are left out. */
-static bst_status close_group(bst_ctx *ctx, const moments *m, const double origin[3], double least,
-                              bst_node_list *list) {
-    double mean[3], offset[3], covariance[3][3], axes[3][3];
-    for (int i = 0; i < 3; i++) {
-        offset[i] = m->first[i] / m->weight;
-        mean[i] = origin[i] + offset[i];
-    }
-    for (int i = 0; i < 3; i++) {
-        for (int j = 0; j <= i; j++) {
-            covariance[i][j] = covariance[j][i] =
-                m->second[i][j] / m->weight - offset[i] * offset[j];
-        }
-    }
-    eigen3(covariance, axes);
-    int active = 0;
-    for (int k = 0; k < 3; k++) {
-        active += covariance[k][k] > least;
-    }
-    if (active == 0) {
-        return push(ctx, list, mean, m->weight);
-    }
-    for (int k = 0; k < 3; k++) {
-        if (!(covariance[k][k] > least)) {
-            continue;
-        }
-        double reach = sqrt(active * covariance[k][k]), plus[3], minus[3];
+/* Direction of the largest eigenvalue of a symmetric matrix that is not negative: by squaring it
+ * over and over, until one column is left. A tie gives some direction between. */
+static void main_axis(double a[3][3], double axis[3]) {
+    double p[3][3];
+    memcpy(p, a, sizeof p);
+    for (int round = 0; round < 6; round++) {
+        double q[3][3], trace = p[0][0] + p[1][1] + p[2][2];
         for (int i = 0; i < 3; i++) {
-            plus[i] = mean[i] + reach * axes[i][k];
-            minus[i] = mean[i] - reach * axes[i][k];
+            for (int j = 0; j < 3; j++) {
+                q[i][j] =
+                    (p[i][0] * p[0][j] + p[i][1] * p[1][j] + p[i][2] * p[2][j]) / (trace * trace);
+            }
         }
-        double w = m->weight / (2.0 * active);
-        BST_TRY(push(ctx, list, minus, w));
-        BST_TRY(push(ctx, list, plus, w));
+        memcpy(p, q, sizeof p);
     }
-    return BST_OK;
+    int most = p[1][1] > p[0][0] ? 1 : 0;
+    most = p[2][2] > p[most][most] ? 2 : most;
+    double length = 0.0;
+    for (int i = 0; i < 3; i++) {
+        axis[i] = p[i][most];
+        length += axis[i] * axis[i];
+    }
+    for (int i = 0; i < 3; i++) {
+        axis[i] /= sqrt(length);
+    }
 }
 
-bst_status bst_nodes_from_path(bst_ctx *ctx, const bst_path_point *path, int count,
-                               double psf_sigma_px, double tolerance, bst_node_list *list) {
-    double total = path[count - 1].s - path[0].s;
-    if (!(total > 0.0)) {
-        return push(ctx, list, path[0].p, 1.0);
+/* The part of segment k inside the group, as its two ends; its duration. */
+static double clip(const maker *m, const group *g, int k, double a[3], double b[3]) {
+    const bst_path_point *p = &m->path[k], *q = p + 1;
+    double length = q->s - p->s;
+    double from = fmax(p->s, g->from), to = fmin(q->s, g->to);
+    if (!(to > from)) {
+        return 0.0;
     }
-    /* A pair on a uniform stretch of variance v misses 0.8 v^2 of the fourth moment, the image thus
-     * 0.8 v^2 / 24 times the PSF's fourth derivative, 3 / sigma^4 of its peak: 0.1 v^2 / sigma^4.
-     */
-    double var = psf_sigma_px * psf_sigma_px;
-    double most = var * sqrt(tolerance / 0.1);
-    /* Jitter makes a group of several stretches skew: a third moment of v^(3/2) that is missed
-     * changes the image by up to 0.23 (v / sigma^2)^(3/2), of which a fifth is left over after the
-     * signs of neighbouring groups have cancelled (measured). */
-    double most_bent = fmin(most, var * pow(tolerance / 0.05, 2.0 / 3.0));
-    /* a left-out variance v changes the peak by v / (2 sigma^2) */
-    double least = 0.5 * tolerance * var;
-    moments group = {0};
-    double origin[3] = {0};
-    for (int k = 0; k + 1 < count; k++) {
-        const bst_path_point *a = &path[k], *b = &path[k + 1];
-        double w = (b->s - a->s) / total;
+    for (int i = 0; i < 3; i++) {
+        double slope = (q->p[i] - p->p[i]) / length;
+        a[i] = p->p[i] + slope * (from - p->s);
+        b[i] = p->p[i] + slope * (to - p->s);
+    }
+    return to - from;
+}
+
+static double norm3(const double v[3]) {
+    return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
+static bool reaches(const maker *m, const group *g, int k) {
+    return k + 1 < m->count && m->path[k].s < g->to;
+}
+
+/* Mean and covariance of the group, exactly. */
+static void second_moments(const maker *m, const group *g, moments *out) {
+    double weight = 0.0, a[3], b[3], origin[3] = {0}, first[3] = {0};
+    bool begun = false;
+    memset(out, 0, sizeof *out);
+    for (int k = g->first; reaches(m, g, k); k++) {
+        double w = clip(m, g, k, a, b);
         if (!(w > 0.0)) {
             continue;
         }
-        double from[3], to[3], length2 = 0.0;
+        if (!begun) {
+            memcpy(origin, a, sizeof origin);
+            begun = true;
+        }
+        weight += w;
         for (int i = 0; i < 3; i++) {
-            from[i] = a->p[i] - origin[i];
-            to[i] = b->p[i] - origin[i];
-            length2 += (to[i] - from[i]) * (to[i] - from[i]);
+            a[i] -= origin[i];
+            b[i] -= origin[i];
+            first[i] += w * 0.5 * (a[i] + b[i]);
         }
-        if (group.weight > 0.0) {
-            moments more = group;
-            add_segment(&more, from, to, w);
-            if (spread(&more) <= most_bent) {
-                group = more;
-                continue;
+        for (int i = 0; i < 3; i++) {
+            for (int j = 0; j <= i; j++) {
+                out->covariance[i][j] +=
+                    w * ((a[i] * a[j] + b[i] * b[j]) / 3.0 + (a[i] * b[j] + b[i] * a[j]) / 6.0);
             }
-            BST_TRY(close_group(ctx, &group, origin, least, list));
-        }
-        /* a new group that starts with this segment, cut when it is too long alone */
-        int pieces = (int)fmin(ceil(sqrt(length2 / (12.0 * most))), 1e6);
-        pieces = pieces < 1 ? 1 : pieces;
-        for (int n = 0; n < pieces; n++) {
-            if (n > 0) {
-                BST_TRY(close_group(ctx, &group, origin, least, list));
-            }
-            double u = (double)n / pieces, v = (double)(n + 1) / pieces;
-            double zero[3] = {0}, step[3];
-            for (int i = 0; i < 3; i++) {
-                origin[i] = a->p[i] + u * (b->p[i] - a->p[i]);
-                step[i] = (v - u) * (b->p[i] - a->p[i]);
-            }
-            memset(&group, 0, sizeof group);
-            add_segment(&group, zero, step, w / pieces);
         }
     }
-    return close_group(ctx, &group, origin, least, list);
+    for (int i = 0; i < 3; i++) {
+        first[i] /= weight;
+        out->mean[i] = origin[i] + first[i];
+    }
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j <= i; j++) {
+            out->covariance[i][j] = out->covariance[i][j] / weight - first[i] * first[j];
+            out->covariance[j][i] = out->covariance[i][j];
+        }
+    }
+}
+
+/* Four-point and two-point Gauss-Legendre on [0, 1] (Abramowitz and Stegun, table 25.4): the first
+ * exact for the seventh order, the second for the third. */
+static const double gauss_place[2][4] = {
+    {0.06943184420297371, 0.33000947820757187, 0.66999052179242813, 0.93056815579702629},
+    {0.21132486540518712, 0.78867513459481288}};
+static const double gauss_weight[2][4] = {
+    {0.17392742256872693, 0.32607257743127307, 0.32607257743127307, 0.17392742256872693},
+    {0.5, 0.5}};
+/* In a group of as many segments the second does: of the fourth moment 1 / segments^4 is missed. */
+enum { MANY_SEGMENTS = 6 };
+
+/* Fills the axis and the moments about it. */
+static void high_moments(const maker *m, const group *g, moments *out) {
+    double a[3], b[3], weight = 0.0;
+    main_axis(out->covariance, out->axis);
+    int segments = 0;
+    while (segments < MANY_SEGMENTS && reaches(m, g, g->first + segments)) {
+        segments++;
+    }
+    int coarse = segments == MANY_SEGMENTS, points = coarse ? 2 : 4;
+    for (int k = g->first; reaches(m, g, k); k++) {
+        double w = clip(m, g, k, a, b);
+        for (int n = 0; n < points && w > 0.0; n++) {
+            double d[3], x = 0.0, part = w * gauss_weight[coarse][n];
+            for (int i = 0; i < 3; i++) {
+                d[i] = a[i] + gauss_place[coarse][n] * (b[i] - a[i]) - out->mean[i];
+                x += d[i] * out->axis[i];
+            }
+            double power = part;
+            for (int o = 0; o <= 6; o++, power *= x) {
+                out->along[o] += power;
+            }
+            for (int i = 0; i < 3; i++) {
+                d[i] -= x * out->axis[i];
+                out->bend[i] += part * x * x * d[i];
+            }
+            double y2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+            out->drift += part * x * y2;
+            out->mixed += part * x * x * y2;
+            for (int i = 0; i < 3; i++) {
+                out->lean[i] += part * d[i] * y2;
+            }
+            for (int i = 0; i < 3; i++) {
+                for (int j = 0; j <= i; j++) {
+                    out->across[i][j] += part * d[i] * d[j];
+                }
+            }
+            weight += part;
+        }
+    }
+    for (int o = 0; o <= 6; o++) {
+        out->along[o] /= weight;
+    }
+    out->drift /= weight;
+    out->mixed /= weight;
+    for (int i = 0; i < 3; i++) {
+        out->bend[i] /= weight;
+        out->lean[i] /= weight;
+        for (int j = 0; j <= i; j++) {
+            out->across[i][j] /= weight;
+            out->across[j][i] = out->across[i][j];
+        }
+    }
+}
+
+/* Gaussian quadrature of n nodes for moments e[0..2n - 1] about the mean; returns the squared norm
+ * of the next orthogonal polynomial, which is what the rule misses of moment 2n; negative when the
+ * moments are those of no distribution. curve: second polynomial at the nodes, *norm2 its squared
+ * norm. */
+static double quadrature(int n, const double e[7], rule *r, double *norm2) {
+    double v = e[2];
+    if (n == 1) {
+        r->node[0] = 0.0;
+        r->weight[0] = 1.0;
+        return fabs(v);
+    }
+    double skew = e[3] / v, norm = e[4] - skew * e[3] - v * v;
+    *norm2 = norm;
+    if (!(v > 0.0) || n == 2) {
+        if (!(v > 0.0)) {
+            return -1.0;
+        }
+        double root = sqrt(0.25 * skew * skew + v);
+        r->node[0] = 0.5 * skew - root;
+        r->node[1] = 0.5 * skew + root;
+        r->weight[0] = r->node[1] / (2.0 * root);
+        r->weight[1] = -r->node[0] / (2.0 * root);
+        return fabs(norm);
+    }
+    if (!(norm > 1e-9 * v * v)) {
+        return -1.0;
+    }
+    /* x^2 - skew x - v is the second polynomial */
+    double centre2 =
+        (e[5] - 2.0 * skew * e[4] + (skew * skew - 2.0 * v) * e[3] + 2.0 * skew * v * v) / norm;
+    /* third polynomial: (x - centre2)(x^2 - skew x - v) - (norm / v) x; its roots by cosines */
+    double c2 = -skew - centre2, c1 = centre2 * skew - v - norm / v, c0 = centre2 * v;
+    double p = (c2 * c2 - 3.0 * c1) / 9.0, q = (c2 * (2.0 * c2 * c2 - 9.0 * c1) + 27.0 * c0) / 54.0;
+    if (!(p > 0.0)) {
+        return -1.0;
+    }
+    double root = sqrt(p), angle = acos(fmax(-1.0, fmin(1.0, q / (p * root)))) / 3.0;
+    for (int i = 0; i < 3; i++) {
+        double x = -2.0 * root * cos(angle + i * (2.0 * BST_PI / 3.0)) - c2 / 3.0;
+        double second = x * x - skew * x - v;
+        r->node[i] = x;
+        r->weight[i] = 1.0 / (1.0 + x * x / v + second * second / norm);
+        r->curve[i] = second;
+    }
+    return fabs(e[6] + c2 * e[5] + c1 * e[4] + c0 * e[3]);
+}
+
+/* Largest share of the peak by which the image changes for a source at the boresight or in a corner
+ * when the covariance d of tilts and roll is left out and `widening` put in its place: half the
+ * covariance's contraction with the PSF's second derivatives, which are at most 1 / variance on the
+ * diagonal and exp(-1) / variance off it. */
+static double covariance_error(double d[3][3], double widening, double variance) {
+    static const double place[5][2] = {{0, 0},
+                                       {0.70710678118654752, 0.70710678118654752},
+                                       {-0.70710678118654752, 0.70710678118654752},
+                                       {-0.70710678118654752, -0.70710678118654752},
+                                       {0.70710678118654752, -0.70710678118654752}};
+    double worst = 0.0;
+    for (int k = 0; k < 5; k++) {
+        double x = place[k][0], y = place[k][1];
+        double xx = d[1][1] - 2.0 * y * d[1][2] + y * y * d[2][2] - widening;
+        double yy = d[0][0] - 2.0 * x * d[0][2] + x * x * d[2][2] - widening;
+        double xy = -d[0][1] + x * d[1][2] + y * d[0][2] - x * y * d[2][2];
+        worst = fmax(worst, 0.5 * (fabs(xx) + fabs(yy)) + 0.37 * fabs(xy));
+    }
+    return worst / variance;
+}
+
+/* Fills the rule and its error: what it misses of the image, over the peak. */
+static void try_rule(const maker *m, const moments *g, int n, bool widen, bool split, rule *r) {
+    double var = m->variance, d[3][3], norm2 = 0.0;
+    memset(r, 0, sizeof *r);
+    r->nodes = n;
+    r->error = INFINITY;
+    memcpy(d, g->covariance, sizeof d);
+    for (int i = 0; i < 3 && n > 1; i++) {
+        for (int j = 0; j < 3; j++) {
+            d[i][j] -= g->along[2] * g->axis[i] * g->axis[j];
+        }
+    }
+    double tilt = g->axis[0] * g->axis[0] + g->axis[1] * g->axis[1];
+    if (n == 3) {
+        double skew = g->along[3] / g->along[2];
+        double norm = g->along[4] - skew * g->along[3] - g->along[2] * g->along[2];
+        for (int i = 0; i < 3 && norm > 0.0; i++) {
+            r->bend[i] = g->bend[i] / norm;
+            for (int j = 0; j < 3; j++) {
+                d[i][j] -= g->bend[i] * g->bend[j] / norm;
+            }
+        }
+    }
+    if (widen) {
+        double trace = fmax(d[0][0] + d[1][1], 0.0);
+        r->widening = fmin(trace / (n == 1 ? 2.0 : 2.0 - tilt), BST_NODE_WIDEST * var);
+        if (n > 1) { /* along the axis the moments make room for it */
+            for (int i = 0; i < 3; i++) {
+                for (int j = 0; j < 3; j++) {
+                    d[i][j] += r->widening * g->axis[i] * g->axis[j];
+                }
+            }
+        }
+    }
+    if (split) {
+        double axis[3], length2 = 0.0;
+        main_axis(d, axis);
+        for (int i = 0; i < 3; i++) {
+            for (int j = 0; j < 3; j++) {
+                length2 += axis[i] * d[i][j] * axis[j];
+            }
+        }
+        for (int i = 0; i < 3; i++) {
+            r->pair[i] = sqrt(fmax(length2, 0.0)) * axis[i];
+        }
+        for (int i = 0; i < 3; i++) {
+            for (int j = 0; j < 3; j++) {
+                d[i][j] -= r->pair[i] * r->pair[j];
+            }
+        }
+    }
+    double e[7], u = n == 1 ? 0.0 : r->widening;
+    memcpy(e, g->along, sizeof e);
+    e[2] -= u;
+    e[4] -= u * (6.0 * e[2] + 3.0 * u);
+    e[5] -= 10.0 * u * e[3];
+    e[6] -= u * (15.0 * e[4] + u * (45.0 * e[2] + 15.0 * u));
+    double missed = quadrature(n, e, r, &norm2);
+    if (missed < 0.0) {
+        return;
+    }
+    static const double factor[4] = {0, 0, 8.0, 48.0}; /* 2^n n! */
+    /* third moments that are missed: a sixth, or half for mixed ones, times the greatest third
+     * derivative, 1.38 or 0.61 of the peak over sigma^3 */
+    double third = 0.3 * fabs(g->drift) + 0.23 * norm3(g->lean);
+    third += n == 1 ? 0.23 * fabs(g->along[3]) : 0.0;
+    third += n < 3 ? 0.3 * norm3(g->bend) : 0.0;
+    double error = third / (var * sqrt(var));
+    /* x^2 and y^2 together: a quarter of a derivative of at most the peak over sigma^4 */
+    double across2 = g->across[0][0] + g->across[1][1] + g->across[2][2];
+    error += 0.25 * fabs(g->mixed - g->along[2] * across2) / (var * var);
+    double wide = split
+                      ? r->pair[0] * r->pair[0] + r->pair[1] * r->pair[1] + r->pair[2] * r->pair[2]
+                      : r->widening;
+    /* fourth cumulant of what became a Gaussian, or a pair, taken for uniform */
+    error += 0.15 * wide * wide / (var * var);
+    /* Groups are shorter than the PSF is wide, so that what jitter leaves over in neighbours adds
+     * up; on straight paths it nearly cancels (factors measured on random paths) */
+    error *= 1.8;
+    error += n == 1 ? 0.0 : 1.08 * missed / (factor[n] * pow(var, n));
+    r->error = error + covariance_error(d, r->widening, var);
+}
+
+static bst_status emit(bst_ctx *ctx, const maker *m, const moments *g, const rule *r,
+                       double weight) {
+    bool split = r->pair[0] != 0.0 || r->pair[1] != 0.0 || r->pair[2] != 0.0;
+    m->list->error = fmax(m->list->error, r->error);
+    for (int n = 0; n < r->nodes; n++) {
+        for (int side = -1; side <= 1; side += 2) {
+            double p[3];
+            for (int i = 0; i < 3; i++) {
+                p[i] = g->mean[i] + r->node[n] * g->axis[i] + r->curve[n] * r->bend[i] +
+                       (split ? side * r->pair[i] : 0.0);
+            }
+            BST_TRY(
+                push(ctx, m->list, p, weight * r->weight[n] * (split ? 0.5 : 1.0), r->widening));
+            if (!split) {
+                break;
+            }
+        }
+    }
+    return BST_OK;
+}
+
+static bool single_stretch(const maker *m, const group *g) {
+    int k = g->first;
+    while (k + 2 < m->count && m->path[k + 1].s <= g->from) {
+        k++;
+    }
+    return k + 2 >= m->count || m->path[k + 1].s >= g->to;
+}
+
+/* The next group's size from how this one's error compares with the tolerance, which goes as the
+ * third power of its spread where the path is straight. */
+static void adapt(maker *m, double error) {
+    double change = error > 0.0 ? cbrt(0.8 * m->tolerance / error) : 2.0;
+    m->most = fmin(m->most * fmin(fmax(change, 0.4), 1.6), m->limit);
+}
+
+/* Replaces a group by nodes, in halves of its time where no rule is good enough. */
+static bst_status close_group(bst_ctx *ctx, maker *m, group g, int depth) {
+    moments t;
+    rule best = {.error = INFINITY}, r;
+    second_moments(m, &g, &t);
+    double spread = t.covariance[0][0] + t.covariance[1][1] + t.covariance[2][2];
+    double weight = (g.to - g.from) / m->total;
+    if (!(spread > 1e-12 * m->variance)) {
+        return push(ctx, m->list, t.mean, weight, 0.0);
+    }
+    high_moments(m, &g, &t);
+    for (int n = 1; n <= 3 && best.error > m->tolerance; n++) {
+        for (int widen = 0; widen <= m->widen && best.error > m->tolerance; widen++) {
+            try_rule(m, &t, n, widen, false, &r);
+            if (r.error < best.error) {
+                best = r;
+            }
+        }
+    }
+    /* a blob rather than a line does not get thinner by halves */
+    double off = t.across[0][0] + t.across[1][1] + t.across[2][2];
+    if (best.error > m->tolerance && !m->widen && off > 0.2 * t.along[2]) {
+        try_rule(m, &t, 2, false, true, &r);
+        if (r.error < best.error) {
+            best = r;
+        }
+    }
+    if (depth == 0 && best.nodes == 3) {
+        adapt(m, best.error);
+    }
+    if (best.error > m->tolerance && depth < 40 &&
+        !(single_stretch(m, &g) && spread < 1e-6 * m->variance)) {
+        double middle = 0.5 * (g.from + g.to);
+        group late = {g.first, middle, g.to};
+        while (m->path[late.first + 1].s <= middle) {
+            late.first++;
+        }
+        g.to = middle;
+        BST_TRY(close_group(ctx, m, g, depth + 1));
+        return close_group(ctx, m, late, depth + 1);
+    }
+    return emit(ctx, m, &t, &best, weight);
+}
+
+/* Moments of a stretch of path about an origin, for the greedy cut. */
+typedef struct extent {
+    double weight, first[3], second;
+} extent;
+
+static void extend(extent *e, const double a[3], const double b[3], double w) {
+    e->weight += w;
+    for (int i = 0; i < 3; i++) {
+        e->first[i] += w * 0.5 * (a[i] + b[i]);
+        e->second += w * (a[i] * a[i] + a[i] * b[i] + b[i] * b[i]) / 3.0;
+    }
+}
+
+static double spread_of(const extent *e) {
+    double total = e->second / e->weight;
+    for (int i = 0; i < 3; i++) {
+        total -= e->first[i] * e->first[i] / (e->weight * e->weight);
+    }
+    return total;
+}
+
+bst_status bst_nodes_from_path(bst_ctx *ctx, const bst_path_point *path, int count,
+                               double psf_sigma_px, double tolerance, bool widen,
+                               bst_node_list *list) {
+    maker m = {.path = path,
+               .count = count,
+               .total = path[count - 1].s - path[0].s,
+               .variance = psf_sigma_px * psf_sigma_px,
+               .tolerance = tolerance,
+               .widen = widen,
+               .list = list};
+    if (!(m.total > 0.0)) {
+        return push(ctx, list, path[0].p, 1.0, 0.0);
+    }
+    /* three nodes on a uniform stretch of variance v miss 0.617 v^3 of the sixth moment */
+    m.limit = m.most = 0.95 * m.variance * cbrt(tolerance * 48.0 / 0.617);
+    group g = {0, path[0].s, path[0].s};
+    extent e = {0};
+    for (int k = 0; k + 1 < count; k++) {
+        const bst_path_point *p = &path[k], *q = p + 1;
+        if (!(q->s > p->s)) {
+            continue;
+        }
+        double a[3], b[3], length2 = 0.0;
+        const double *origin = path[g.first].p;
+        for (int i = 0; i < 3; i++) {
+            a[i] = p->p[i] - origin[i];
+            b[i] = q->p[i] - origin[i];
+            length2 += (b[i] - a[i]) * (b[i] - a[i]);
+        }
+        extent more = e;
+        extend(&more, a, b, q->s - p->s);
+        if (spread_of(&more) <= m.most) {
+            e = more;
+            g.to = q->s;
+            continue;
+        }
+        if (e.weight > 0.0) {
+            BST_TRY(close_group(ctx, &m, g, 0));
+        }
+        int pieces = (int)fmin(ceil(sqrt(length2 / (12.0 * m.most))), 1e6);
+        pieces = pieces < 1 ? 1 : pieces;
+        double step = (q->s - p->s) / pieces;
+        for (int n = 0; n + 1 < pieces; n++) {
+            BST_TRY(close_group(ctx, &m, (group){k, p->s + n * step, p->s + (n + 1) * step}, 0));
+        }
+        /* the last piece begins the next group */
+        g = (group){k, p->s + (pieces - 1) * step, q->s};
+        e = (extent){0};
+        for (int i = 0; i < 3; i++) {
+            a[i] = (q->p[i] - p->p[i]) * (pieces - 1) / pieces;
+            b[i] = q->p[i] - p->p[i];
+        }
+        extend(&e, a, b, step);
+    }
+    return close_group(ctx, &m, g, 0);
 }
 
 double bst_nodes_peak_share(const bst_node *nodes, int count, double psf_sigma_px) {

@@ -15,7 +15,7 @@
 
 enum { MAX_TAPS = 512, BOX_FLOATS = 4 };
 /* Of a block of nodes: place and weight. */
-enum { NODE_BYTES = BST_BLOCK * 3 * (int)sizeof(float) };
+enum { NODE_BYTES = BST_BLOCK * BST_NODE_ROWS * (int)sizeof(float) };
 
 /* A device buffer that grows. */
 typedef struct growing {
@@ -26,7 +26,7 @@ typedef struct growing {
 struct bst_renderer {
     bst_camera camera;
     bst_renderer_options options;
-    int taps;
+    int taps, phases;
     cl_context context;
     cl_command_queue queue;
     cl_program program;
@@ -44,7 +44,7 @@ struct bst_renderer {
 };
 
 bst_renderer_options bst_renderer_default_options(void) {
-    return (bst_renderer_options){.error_sigma = 0.02, .cut_sigma = 0.015, .pool_frames = 4};
+    return (bst_renderer_options){.tolerance_sigma = 0.05, .pool_frames = 4};
 }
 
 static bst_status check_camera(bst_ctx *ctx, const bst_camera *c) {
@@ -91,7 +91,7 @@ static bst_status choose_tiles(bst_ctx *ctx, const bst_device *device,
         options->tile_height = large ? 64 : 2;
         options->group = large ? 1 : 16;
     }
-    size_t need = (size_t)(options->tile_width + 32) * (size_t)options->tile_height *
+    size_t need = (size_t)(options->tile_width + 16) * (size_t)options->tile_height *
                   sizeof(float) * (size_t)options->group;
     if (options->tile_width < 64 || options->tile_width % 64 != 0 || options->tile_height < 1 ||
         options->group < 1 || need > local_bytes) {
@@ -110,9 +110,10 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
         &bst_kernel_detector,     &bst_kernel_background, &bst_kernel_tile};
     char options[512];
     int length = snprintf(options, sizeof options,
-                          "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d%s",
+                          "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d "
+                          "-DPHASES=%d%s",
                           r->options.tile_width, r->options.tile_height, r->options.group, r->taps,
-                          r->map ? " -DBACKGROUND" : "");
+                          r->phases, r->map ? " -DBACKGROUND" : "");
     length += bst_detector_options(&r->camera, options + length, sizeof options - (size_t)length);
     const bst_distortion *d = &r->camera.distortion;
     if (bst_camera_distorted(&r->camera)) {
@@ -135,18 +136,35 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
     return BST_OK;
 }
 
-/* [BST_PHASES + 1][taps]: shares of a profile centred phase / BST_PHASES right of a pixel. */
+/* Phases between which the profile may be interpolated linearly: that misses
+ * 1 / (8 phases^2 sigma^2) of the peak, below 1.3e-5. */
+static int phases_for(double sigma_px) {
+    int phases = 8;
+    while (phases < 2048 && phases * sigma_px < 100.0) {
+        phases *= 2;
+    }
+    return phases;
+}
+
+/* [BST_WIDTHS + 1][phases + 1][taps]: shares of a profile centred phase / phases right of a pixel.
+ */
 static bst_status make_profiles(bst_ctx *ctx, bst_renderer *r) {
-    size_t bytes = (size_t)(BST_PHASES + 1) * (size_t)r->taps * sizeof(float);
-    float *table = malloc(bytes);
+    size_t rows = (size_t)(BST_WIDTHS + 1) * (size_t)(r->phases + 1),
+           row_floats = (size_t)r->taps + 2 * BST_PROFILE_PAD;
+    size_t bytes = rows * row_floats * sizeof(float);
+    float *table = calloc(rows, row_floats * sizeof(float));
     if (!table) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the PSF table");
     }
-    double sigma = bst_camera_psf_sigma_px(&r->camera);
-    for (int p = 0; p <= BST_PHASES; p++) {
+    double psf = bst_camera_psf_sigma_px(&r->camera);
+    for (size_t row = 0; row < rows; row++) {
+        size_t width = row / (size_t)(r->phases + 1), phase = row % (size_t)(r->phases + 1);
+        double share = (double)width / BST_WIDTHS;
+        double sigma = psf * sqrt(1.0 + BST_WIDEST * share * share);
         for (int j = 0; j < r->taps; j++) {
-            table[p * r->taps + j] = (float)bst_reference_pixel_share((double)p / BST_PHASES, sigma,
-                                                                      j - (r->taps / 2 - 1));
+            table[row * row_floats + BST_PROFILE_PAD + (size_t)j] =
+                (float)bst_reference_pixel_share((double)phase / r->phases, sigma,
+                                                 j - (r->taps / 2 - 1));
         }
     }
     cl_int code;
@@ -203,11 +221,12 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     r->options = options ? *options : bst_renderer_default_options();
     r->taps = taps_for(bst_camera_psf_sigma_px(camera));
     r->map = bst_skylight_varies(camera);
+    r->phases = phases_for(bst_camera_psf_sigma_px(camera));
     r->context = bst_device_context(device);
     r->queue = bst_device_queue(device);
     clRetainContext(r->context);
     clRetainCommandQueue(r->queue);
-    bst_smear_options smear = {r->options.error_sigma, r->options.cut_sigma, r->taps};
+    bst_smear_options smear = {r->options.tolerance_sigma, r->taps};
     bst_status status = choose_tiles(ctx, device, &r->options, &r->most_bytes);
     if (status == BST_OK) {
         status = build(ctx, r, device);

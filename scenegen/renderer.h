@@ -15,12 +15,9 @@
 typedef struct bst_renderer bst_renderer;
 
 typedef struct bst_renderer_options {
-    double error_sigma; /* aim for the error of each source's image in any pixel, in sigma of that
-                           pixel (default 0.02) */
-    double
-        cut_sigma;   /* light per pixel that a stamp may leave out, in sigma of a dark pixel (0.015)
-                      */
-    int pool_frames; /* frames that may be alive at a time (4) */
+    double tolerance_sigma; /* error of each source's image in any pixel that is allowed, in sigma
+                               of that pixel (0.05) */
+    int pool_frames;        /* frames that may be alive at a time (4) */
     int tile_width, tile_height, group; /* pixels per work-item (width a multiple of 64) and
                                            work-items per group; 0: chosen for the device */
 } bst_renderer_options;

@@ -4,20 +4,29 @@
 #include "scenegen/module.h"
 #include "scenegen/renderer.h"
 
+typedef struct fidelity_config {
+    double tolerance_sigma;
+} fidelity_config;
+
 typedef struct scenegen_config {
-    double v_limit, margin_px, error_sigma, cut_sigma;
+    double v_limit, margin_px;
+    fidelity_config fidelity;
     int64_t truth_capacity, pool_frames;
 } scenegen_config;
+
+static const bst_config_desc fidelity_table[] = {
+    BST_REAL(fidelity_config, tolerance_sigma, "sigma", 1e-4, 1.0, "0.05",
+             "Error of each source's image in any pixel that is allowed, in that pixel's noise. "
+             "Nodes and stamps follow from it."),
+    BST_CONFIG_END,
+};
 
 static const bst_config_desc config[] = {
     BST_REAL(scenegen_config, v_limit, "mag", -30.0, 30.0, "16",
              "Stars fainter than this are not drawn."),
     BST_REAL(scenegen_config, margin_px, "px", 0.0, 1e4, "0",
              "Sources this far outside the window are drawn too; at least what the PSF needs."),
-    BST_REAL(scenegen_config, error_sigma, "sigma", 1e-4, 1.0, "0.02",
-             "Aim for the rendering error of a source in any pixel, in that pixel's noise."),
-    BST_REAL(scenegen_config, cut_sigma, "sigma", 1e-6, 1.0, "0.015",
-             "Light per pixel that a source's stamp may leave out, in a dark pixel's noise."),
+    BST_OBJECT(scenegen_config, fidelity, fidelity_table, "{}", "How exact the image is."),
     BST_INT(
         scenegen_config, truth_capacity, "", 1, 1048576, "4096",
         "Sources that the truth of one exposure has room for: objects, then the brightest stars."),
@@ -74,8 +83,7 @@ static bst_status create(const bst_module_env *env, const void *config_object, v
     s->tick_rate_hz = env->tick_rate_hz;
     s->key = bst_env_rng(env, "detector");
     bst_renderer_options options = bst_renderer_default_options();
-    options.error_sigma = c->error_sigma;
-    options.cut_sigma = c->cut_sigma;
+    options.tolerance_sigma = c->fidelity.tolerance_sigma;
     options.pool_frames = (int)c->pool_frames;
     bst_status status =
         bst_renderer_create(env->ctx, env->device, s->camera, &options, &s->renderer);

@@ -6,11 +6,16 @@
 #include "scenegen/nodes.h"
 #include "scenegen/reference.h"
 
-/* Fidelities: level n is right to about 0.03 * 10^(-n/2) of the smeared image's peak. */
-enum { LEVELS = 10, TABLE_FLOATS = BST_TABLE_ROWS * BST_BLOCK, MAX_TAPS = 512 };
+/* Shares of the tolerance: for nodes, and for the border of the stamp. */
+#define NODE_SHARE 0.8
+#define CUT_SHARE 0.3
+
+/* Fidelities: level n is right to about 0.08 * 2^-n of the smeared image's peak. */
+enum { LEVELS = 14, TABLE_FLOATS = BST_TABLE_ROWS * BST_BLOCK, MAX_TAPS = 512 };
 
 typedef struct level {
     int first_block, blocks; /* blocks 0: not made in this frame */
+    double error;            /* expected, of the smeared image's peak */
 } level;
 
 struct bst_smear {
@@ -18,6 +23,7 @@ struct bst_smear {
     bst_smear_options options;
     double sigma_px;
     double tail[MAX_TAPS / 2]; /* profile at r px from the centre, over the centre's */
+    double kept[MAX_TAPS / 2]; /* light within the two nearest pixels and r more on each side */
     double tolerance[LEVELS];
     double half_diagonal_px;
     double stretch; /* of the image by distortion where it is greatest */
@@ -36,6 +42,18 @@ struct bst_smear {
     int table_blocks, table_capacity;
 };
 
+/* Mean over the sub-pixel phases of a profile's light on its two nearest pixels and r more on each
+ * side. */
+static double kept_light(double sigma_px, int r) {
+    enum { PHASES = 16 };
+    double sum = 0.0, scale = 1.0 / (sigma_px * sqrt(2.0));
+    for (int k = 0; k < PHASES; k++) {
+        double f = (k + 0.5) / PHASES;
+        sum += 0.5 * (erf((r + 1.5 - f) * scale) + erf((r + 0.5 + f) * scale));
+    }
+    return sum / PHASES;
+}
+
 bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
                             const bst_smear_options *options, bst_smear **out) {
     bst_smear *s = calloc(1, sizeof *s);
@@ -49,9 +67,10 @@ bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
     double centre = bst_reference_pixel_share(0.0, s->sigma_px, 0);
     for (int r = 0; r < MAX_TAPS / 2; r++) {
         s->tail[r] = bst_reference_pixel_share(0.0, s->sigma_px, r) / centre;
+        s->kept[r] = kept_light(s->sigma_px, r);
     }
     for (int n = 0; n < LEVELS; n++) {
-        s->tolerance[n] = 0.03 * pow(10.0, -0.5 * n);
+        s->tolerance[n] = 0.08 * pow(2.0, -n);
     }
     s->stretch = bst_camera_stretch(camera);
     s->half_diagonal_px =
@@ -131,7 +150,7 @@ static bst_status append_nodes(bst_ctx *ctx, bst_smear *s, const bst_node_list *
     int blocks = (list->count + BST_BLOCK - 1) / BST_BLOCK;
     BST_TRY(reserve(ctx, (void **)&s->table, &s->table_capacity, s->table_blocks + blocks,
                     TABLE_FLOATS * sizeof(float)));
-    *out = (level){s->table_blocks, blocks};
+    *out = (level){s->table_blocks, blocks, list->error};
     s->table_blocks += blocks;
     for (int n = 0; n < blocks * BST_BLOCK; n++) {
         float *block = s->table + (size_t)(out->first_block + n / BST_BLOCK) * TABLE_FLOATS;
@@ -144,6 +163,12 @@ static bst_status append_nodes(bst_ctx *ctx, bst_smear *s, const bst_node_list *
     return BST_OK;
 }
 
+/* A node's widening in PSF variances, before the distortion stretches it. */
+static double widening(const bst_smear *s, const bst_node *node) {
+    double psf = s->sigma_px * s->stretch;
+    return node->variance / (psf * psf);
+}
+
 /* Node of the camera's turn: v_node = M v_reference as a map of the undistorted tangent plane, in
  * pixels and the focal plane's axes,
  * x' - x = ((m00 - m22) x + m01 y + m02 / a - x d) / (d + m22), d = a (m20 x + m21 y). */
@@ -154,7 +179,8 @@ static void attitude_to_table(const bst_smear *s, const bst_node *node, float *t
     bst_mat3 m = bst_quat_to_mat3(q);
     double rows[BST_TABLE_ROWS] = {
         m.m[0][0] - m.m[2][2], m.m[0][1],     m.m[0][2] / a, m.m[1][0], m.m[1][1] - m.m[2][2],
-        m.m[1][2] / a,         m.m[2][0] * a, m.m[2][1] * a, m.m[2][2], node->weight};
+        m.m[1][2] / a,         m.m[2][0] * a, m.m[2][1] * a, m.m[2][2], node->weight,
+        widening(s, node)};
     for (int i = 0; i < BST_TABLE_ROWS; i++) {
         t[i * BST_BLOCK] = (float)rows[i];
     }
@@ -163,7 +189,7 @@ static void attitude_to_table(const bst_smear *s, const bst_node *node, float *t
 /* Node of an own path: a shift of the image. */
 static void shift_to_table(const bst_smear *s, const bst_node *node, float *t) {
     double x = node->p[0] / s->stretch, y = node->p[1] / s->stretch;
-    double rows[BST_TABLE_ROWS] = {0, 0, x, 0, 0, y, 0, 0, 1.0, node->weight};
+    double rows[BST_TABLE_ROWS] = {0, 0, x, 0, 0, y, 0, 0, 1.0, node->weight, widening(s, node)};
     for (int i = 0; i < BST_TABLE_ROWS; i++) {
         t[i * BST_BLOCK] = (float)rows[i];
     }
@@ -183,7 +209,8 @@ static double largest_share(bst_smear *s) {
 static bst_status make_level(bst_ctx *ctx, bst_smear *s, int n) {
     if (s->levels[n].blocks == 0) {
         s->nodes.count = 0;
-        BST_TRY(bst_nodes_from_path(ctx, s->path, s->path_count, s->sigma_px, s->tolerance[n],
+        s->nodes.error = 0.0;
+        BST_TRY(bst_nodes_from_path(ctx, s->path, s->path_count, s->sigma_px, s->tolerance[n], true,
                                     &s->nodes));
         BST_TRY(append_nodes(ctx, s, &s->nodes, attitude_to_table, &s->levels[n]));
     }
@@ -222,16 +249,15 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_los_track *trac
 static int choose_level(bst_smear *s, double peak_e) {
     double sigmas = peak_e / sqrt(peak_e + s->dark_variance_e2);
     int n = 0;
-    while (n + 1 < LEVELS && s->tolerance[n] * sigmas > s->options.error_sigma) {
+    while (n + 1 < LEVELS && s->tolerance[n] * sigmas > NODE_SHARE * s->options.tolerance_sigma) {
         n++;
     }
-    s->last_error_sigma = s->tolerance[n] * sigmas;
     return n;
 }
 
 /* Rows beyond the two nearest pixels: what lies outside stays under the cut. */
 static int choose_radius(const bst_smear *s, double peak_e) {
-    double limit = s->options.cut_sigma * sqrt(s->dark_variance_e2);
+    double limit = CUT_SHARE * s->options.tolerance_sigma * sqrt(s->dark_variance_e2);
     int most = s->options.taps / 2 - 1, r = 1;
     while (r < most && peak_e * s->tail[r + 1] > limit) {
         r++;
@@ -334,6 +360,7 @@ static bst_status own_nodes(bst_ctx *ctx, bst_smear *s, int count, double x0, do
     const bst_path_point *p = s->own_path;
     double far = far_px(s), total = p[count - 1].s - p[0].s;
     s->nodes.count = 0;
+    s->nodes.error = 0.0;
     for (int first = 0, last; first + 1 < count; first = last > first ? last : first + 1) {
         last = first;
         while (last + 1 < count && !isnan(p[last].p[0]) && !isnan(p[last + 1].p[0]) &&
@@ -343,7 +370,7 @@ static bst_status own_nodes(bst_ctx *ctx, bst_smear *s, int count, double x0, do
         if (last > first) {
             int n = s->nodes.count;
             BST_TRY(bst_nodes_from_path(ctx, p + first, last - first + 1, s->sigma_px, tolerance,
-                                        &s->nodes));
+                                        true, &s->nodes));
             for (double part = total > 0.0 ? (p[last].s - p[first].s) / total : 1.0;
                  n < s->nodes.count && part < 1.0; n++) {
                 s->nodes.items[n].weight *= part;
@@ -388,13 +415,19 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
         used = &s->levels[n];
     }
     int radius = choose_radius(s, s->last_peak_e);
+    double sigmas = s->last_peak_e / sqrt(s->last_peak_e + s->dark_variance_e2);
+    double lost = 1.0 - s->kept[radius] * s->kept[radius];
+    int border = radius + 1 < MAX_TAPS / 2 ? radius + 1 : radius;
+    s->last_error_sigma = fmax((used->error + lost) * sigmas,
+                               s->last_peak_e * s->tail[border] / sqrt(s->dark_variance_e2));
+    /* what the stamp leaves out is put on the stamp, so that no light is lost */
+    electrons /= s->kept[radius] * s->kept[radius];
     *out = (bst_scene_source){.x_px = (float)x,
                               .y_px = (float)y,
                               .electrons = (float)electrons,
                               .first_table = used->first_block,
                               .blocks = used->blocks,
-                              .radius = radius,
-                              .chunks = (2 * radius + 2 + 15) / 16};
+                              .radius = radius};
     return BST_OK;
 }
 

@@ -11,9 +11,8 @@
 typedef struct bst_smear bst_smear;
 
 typedef struct bst_smear_options {
-    double error_sigma; /* aim: error of a source's image in any pixel, in that pixel's sigma */
-    double cut_sigma;   /* light per pixel outside the stamp, in sigma of a dark pixel */
-    int taps;           /* length of the profile table, px */
+    double tolerance_sigma; /* error of a source's image in any pixel, in that pixel's sigma */
+    int taps;               /* length of the profile table, px */
 } bst_smear_options;
 
 bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
@@ -33,7 +32,8 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *smear, const bst_source *so
 /* Largest expected electrons in one pixel of the source given last. */
 double bst_smear_last_peak_e(const bst_smear *smear);
 
-/* Predicted error of the image of the source given last, in sigma of its worst pixel. */
+/* Predicted error of the image of the source given last, in sigma of its worst pixel: at most
+ * tolerance_sigma, unless the brightest level of detail does not reach it. */
 double bst_smear_last_error_sigma(const bst_smear *smear);
 
 /* The frame's node table so far: *blocks blocks of BST_TABLE_ROWS x BST_BLOCK floats. */

@@ -31,7 +31,7 @@ static void add_nodes(local float *sum, bst_scene_params p, int tile_x, int tile
                 }
                 s -= 1.0f;
             }
-            local float *at = sum + y * STRIDE + PAD + x;
+            local float *at = sum + y * STRIDE + x;
             vstore16(vload16(0, at) + value, 0, at);
         }
     }
@@ -44,7 +44,7 @@ static void add_pixels(local float *sum, bst_scene_params p, int tile_x, int til
     for (int y = 0; y < rows; y++) {
         global const float *row =
             background + (size_t)(tile_y + y - p.map_y0) * p.map_columns + tile_x - p.map_x0;
-        local float *out = sum + y * STRIDE + PAD;
+        local float *out = sum + y * STRIDE;
         for (int x = first; x < last; x++) {
             out[x] += row[x];
         }

@@ -12,21 +12,34 @@ static float min_of(float16 v) {
     return -max_of(-v);
 }
 
+/* Row of the profile table, and the share of the way to the next. */
+static float16 place_of_width(float16 widening) {
+    float16 square = fmin(widening, BST_WIDEST) * (BST_WIDTHS * BST_WIDTHS / BST_WIDEST);
+    float16 row = floor(sqrt(square));
+    return row + (square - row * row) / (2.0f * row + 1.0f);
+}
+
 #ifdef DISTORTED
 /* Distortion (sim/world/camera.h); k1, k2, k3, p1, p2 in pixels instead of tangents. What lies
  * beyond the fold gives no light on the sensor. */
-static void add_distortion(float16 *x, float16 *y) {
+static void add_distortion(float16 *x, float16 *y, float16 *stretch2) {
     float16 s = *x * *x + *y * *y;
     float16 l = s * (K1 + s * (K2 + s * K3));
     float16 xy = 2.0f * *x * *y;
     float16 dx = *x * l + P1 * xy + P2 * (s + 2.0f * *x * *x);
     float16 dy = *y * l + P1 * (s + 2.0f * *y * *y) + P2 * xy;
+    /* mean square scale of the map there: half the sum of the squared derivatives */
+    float16 r = 2.0f * (K1 + s * (2.0f * K2 + s * 3.0f * K3));
+    float16 xx = 1.0f + l + *x * *x * r + 2.0f * P1 * *y + 6.0f * P2 * *x;
+    float16 yy = 1.0f + l + *y * *y * r + 6.0f * P1 * *y + 2.0f * P2 * *x;
+    float16 off = *x * *y * r + 2.0f * P1 * *x + 2.0f * P2 * *y;
+    *stretch2 = 0.5f * (xx * xx + yy * yy) + off * off;
     *x = select(*x + dx, (float16)(1e6f), s > FOLD2);
     *y = select(*y + dy, (float16)(1e6f), s > FOLD2);
 }
 #endif
 
-/* nodes: per block x[16], y[16], electrons[16], px and e-. block_box: x0, y0, x1, y1 (inclusive
+/* nodes: per block x[16], y[16], electrons[16], widths[16], px and e-. block_box: x0, y0, x1, y1 (inclusive
  * pixels). source_box: the same for sources, by groups of 16: x0[16], y0[16], x1[16], y1[16]. */
 kernel void bst_scene_nodes(global const bst_scene_source *sources, int count,
                             global const float16 *table, float centre_x, float centre_y,
@@ -37,7 +50,7 @@ kernel void bst_scene_nodes(global const bst_scene_source *sources, int count,
     float x0 = 1e9f, y0 = 1e9f, x1 = -1e9f, y1 = -1e9f;
     if (i < count) {
         bst_scene_source s = sources[i];
-        float reach_x = (float)(8 * s.chunks), reach_y = (float)s.radius;
+        float reach = (float)s.radius;
         for (int b = 0; b < s.blocks; b++) {
             global const float16 *t = table + (s.first_table + b) * BST_TABLE_ROWS;
             float16 depth = t[6] * s.x_px + t[7] * s.y_px;
@@ -48,19 +61,23 @@ kernel void bst_scene_nodes(global const bst_scene_source *sources, int count,
 #ifdef DISTORTED
             dx += s.x_px;
             dy += s.y_px;
-            add_distortion(&dx, &dy);
+            float16 stretch2;
+            add_distortion(&dx, &dy, &stretch2);
+            float16 widening = t[10] * stretch2;
             float16 x = clamp(centre_x + dx, -1e6f, 1e6f);
             float16 y = clamp(centre_y + dy, -1e6f, 1e6f);
 #else
+            float16 widening = t[10];
             float16 x = clamp(centre_x + s.x_px + dx, -1e6f, 1e6f);
             float16 y = clamp(centre_y + s.y_px + dy, -1e6f, 1e6f);
 #endif
             int block = s.first_block + b;
-            nodes[3 * block] = x;
-            nodes[3 * block + 1] = y;
-            nodes[3 * block + 2] = t[9] * s.electrons;
-            float4 r = (float4)(floor(min_of(x)) - reach_x + 1.0f, floor(min_of(y)) - reach_y,
-                                floor(max_of(x)) + reach_x, floor(max_of(y)) + reach_y + 1.0f);
+            nodes[BST_NODE_ROWS * block] = x;
+            nodes[BST_NODE_ROWS * block + 1] = y;
+            nodes[BST_NODE_ROWS * block + 2] = t[9] * s.electrons;
+            nodes[BST_NODE_ROWS * block + 3] = place_of_width(widening);
+            float4 r = (float4)(floor(min_of(x)) - reach, floor(min_of(y)) - reach,
+                                floor(max_of(x)) + reach + 1.0f, floor(max_of(y)) + reach + 1.0f);
             block_box[block] = r;
             x0 = fmin(x0, r.x);
             y0 = fmin(y0, r.y);

@@ -4,11 +4,18 @@
 
 /* Nodes travel in blocks of this many, one vector register. */
 #define BST_BLOCK 16
-/* Sub-pixel phases of the profile table; one more row closes the interval. */
-#define BST_PHASES 256
+/* The profile table holds the PSF widened by (n / BST_WIDTHS)^2 BST_WIDEST of its own variance, n from
+ * 0 to BST_WIDTHS. Linear interpolation between them misses at most 3e-4 of the peak, and
+ * 0.4 widening / BST_WIDTHS^2 of it for little widening. */
+#define BST_WIDTHS 16
+#define BST_WIDEST 1.0f
+/* Zeros on either side of a row of the profile table. */
+#define BST_PROFILE_PAD 16
 /* Floats per node of a node table: the homography from the reference attitude's tangent plane to
- * the node's, as nine coefficients, then the weight. */
-#define BST_TABLE_ROWS 10
+ * the node's, as nine coefficients, then the weight and the widening in PSF variances. */
+#define BST_TABLE_ROWS 11
+/* Vectors per block of the frame's nodes: x, y, electrons, place in the table's widths. */
+#define BST_NODE_ROWS 4
 
 /* 32-bit members only, so that both languages lay it out alike. */
 typedef struct bst_scene_params {
@@ -35,8 +42,7 @@ typedef struct bst_scene_source {
     int first_table;  /* block of the node table */
     int first_block;  /* block of the frame's nodes */
     int blocks;
-    int radius; /* stamp rows reach this far beyond the two nearest pixels */
-    int chunks; /* stamp columns in vectors of 16 */
+    int radius; /* the stamp reaches this far beyond the two nearest pixels of a node */
 } bst_scene_source;
 
 #endif

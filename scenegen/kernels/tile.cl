@@ -66,7 +66,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
         uint counter = ((uint)(t.y + y) * chunks_per_row + (uint)t.x / 64u) * 16u;
         global ushort *row = frame + (size_t)(t.top + y) * p.window_width;
         for (int x = 0; x < t.columns; x += 64) {
-            local float16 *from = (local float16 *)(sum + y * STRIDE + PAD + x);
+            local float16 *from = (local float16 *)(sum + y * STRIDE + x);
             chunk light = {from[0], from[1], from[2], from[3]};
             int lit =
                 any16((light.a > 0.0f) | (light.b > 0.0f) | (light.c > 0.0f) | (light.d > 0.0f));
@@ -91,7 +91,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_expecte
     bst_scene_params p, global const bst_scene_source *sources, global const float *nodes,
     global const float4 *block_box, global const float *source_box, global const float *profiles,
     global float *image BACKGROUND_ARGUMENT) {
-    local float sums[GROUP][TILE_H * STRIDE];
+    local float sums[GROUP][TILE_H * STRIDE] __attribute__((aligned(64)));
     int tile = (int)get_global_id(0);
     if (tile >= p.tiles_x * p.tiles_y) {
         return;
@@ -103,7 +103,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_expecte
     for (int y = 0; y < t.rows; y++) {
         global float *out = image + (size_t)(t.top + y) * p.window_width;
         for (int x = max(0, -t.left); x < t.columns; x++) {
-            out[t.left + x] = sum[y * STRIDE + PAD + x] + p.background_e;
+            out[t.left + x] = sum[y * STRIDE + x] + p.background_e;
         }
     }
 }

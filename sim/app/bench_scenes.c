@@ -21,18 +21,19 @@ typedef struct scene {
     double jitter_px; /* RMS per axis, 5 to 200 Hz */
     bool target_at_rest;
     double background_e;
+    double tolerance_sigma;
     int error_sources; /* sources whose error is measured, evenly chosen; the reference takes its
                           time */
 } scene;
 
 static const scene scenes[] = {
-    {"worst_case", 2048, {0}, 3220, 0, 6, 2.0, 300, 4, 0.0349, 0.15, false, 40, 60},
-    {"acquisition", 2048, {0}, 500, 3, 6, 0.5, 3, 0, 0, 0.1, false, 10, 100},
-    {"rate_track_slow", 2048, {0}, 500, 1, 6, 0.5, 10, 0, 0, 0.1, true, 10, 100},
-    {"rate_track_medium", 2048, {0}, 500, 1, 6, 1.0, 60, 0, 0, 0.1, true, 20, 100},
-    {"rate_track_fast", 2048, {0}, 500, 1, 6, 2.0, 200, 0, 0, 0.1, true, 40, 60},
-    {"galactic_core", 2048, {0}, 100000, 0, 8, 0.5, 5, 0, 0, 0, false, 10, 200},
-    {"window", 2048, {896, 896, 256, 256}, 500, 1, 6, 0.5, 10, 0, 0, 0.1, true, 10, 100},
+    {"worst_case", 2048, {0}, 3220, 0, 6, 2.0, 300, 4, 0.0349, 0.15, false, 40, 0.05, 60},
+    {"acquisition", 2048, {0}, 500, 3, 6, 0.5, 3, 0, 0, 0.1, false, 10, 0.02, 100},
+    {"rate_track_slow", 2048, {0}, 500, 1, 6, 0.5, 10, 0, 0, 0.1, true, 10, 0.02, 100},
+    {"rate_track_medium", 2048, {0}, 500, 1, 6, 1.0, 60, 0, 0, 0.1, true, 20, 0.02, 100},
+    {"rate_track_fast", 2048, {0}, 500, 1, 6, 2.0, 200, 0, 0, 0.1, true, 40, 0.02, 60},
+    {"galactic_core", 2048, {0}, 100000, 0, 8, 0.5, 5, 0, 0, 0, false, 10, 0.05, 200},
+    {"window", 2048, {896, 896, 256, 256}, 500, 1, 6, 0.5, 10, 0, 0, 0.1, true, 10, 0.02, 100},
 };
 
 enum { MOST_TARGETS = 4, FRAMES = 40, WARM_UP = 3, TONES = 24, SAMPLES_PER_S = 1000 };
@@ -247,7 +248,9 @@ bst_status bst_bench_scene(bst_ctx *ctx, const bst_bench *self, const bst_bench_
         status = open_scene(ctx, s, &st);
     }
     if (status == BST_OK) {
-        status = bst_renderer_create(ctx, device, &st.camera, NULL, &renderer);
+        bst_renderer_options fidelity = bst_renderer_default_options();
+        fidelity.tolerance_sigma = s->tolerance_sigma;
+        status = bst_renderer_create(ctx, device, &st.camera, &fidelity, &renderer);
     }
     if (status == BST_OK) {
         status = render_frames(ctx, renderer, &st, out);
