@@ -374,6 +374,7 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     bst_earth_frames frames;
     BST_TRY(bst_view_earth_frames(ctx, field->view, mid_s, &frames));
     bst_light light = bst_light_at(&bodies, eye.position_m, eye.velocity_mps);
+    bst_light geocentric = bst_light_at(&bodies, eye.position_m, (bst_vec3){0, 0, 0});
 
     truth->start_tick = start_tick;
     truth->end_tick = end_tick;
@@ -449,10 +450,11 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
                           .sunlit_fraction = NAN,
                           .phase_rad = NAN,
                           .range_m = INFINITY};
-        /* the Earth hides stars too: a point far along the line of sight stands for the star */
-        s->occulted =
-            bst_earth_occults(eye.position_m, bst_vec3_axpy(eye.position_m, 1e12, star->icrs),
-                              &frames.itrf_from_gcrf);
+        /* the Earth hides stars too: a point far along the line of sight, as it is in axes that
+         * move with the Earth, stands for the star */
+        bst_vec3 ray = bst_light_apparent_star(&geocentric, star->icrs);
+        s->occulted = bst_earth_occults(eye.position_m, bst_vec3_axpy(eye.position_m, 1e12, ray),
+                                        &frames.itrf_from_gcrf);
         if (s->occulted) {
             s->electrons_per_s = 0.0;
         }

@@ -198,6 +198,40 @@ static void the_limb_is_where_geometry_has_it(void **state) {
     }
 }
 
+/* Stars vanish where the disc is drawn, aberration by Earth and observer included. */
+static void stars_set_at_the_limb(void **state) {
+    (void)state;
+    bst_camera camera = test_camera(3);
+    bst_vec3 eye = {7.2e6, 0, 0};
+    bst_surroundings around = look_down(eye, 0);
+    around.exposure_s = 1e-3;
+    around.eye_mps = (bst_vec3){0, 5e3, 5.5e3};
+    around.bodies.earth_bary_mps = (bst_vec3){0, 2e4, -2.2e4};
+    around.light = bst_light_at(&around.bodies, eye, around.eye_mps);
+    bst_light geocentric = bst_light_at(&around.bodies, eye, (bst_vec3){0, 0, 0});
+    double to = asin(BST_EARTH_RADIUS_M / 7.2e6), scale = bst_camera_scale_rad(&camera);
+    for (int k = 0; k <= BST_DISC_PARTS; k++) {
+        around.q[k] = bst_quat_mul(bst_quat_from_rotvec((bst_vec3){0, -to, 0}), around.q[k]);
+    }
+    bst_discs discs;
+    bst_discs_make(&camera, &around, &discs);
+    int hidden = 0, seen = 0;
+    for (int i = 0; i < 400; i++) {
+        bst_vec3 d =
+            bst_vec3_unit((bst_vec3){(i % 40 - 20) * 0.25 * scale, (i / 40 - 5) * 25 * scale, 1});
+        double share = bst_discs_light(&discs, d).earth;
+        bst_vec3 star =
+            bst_light_catalogue_star(&around.light, bst_quat_rotate(bst_quat_conj(around.q[0]), d));
+        bst_vec3 far = bst_vec3_axpy(eye, 1e12, bst_light_apparent_star(&geocentric, star));
+        bool occulted = bst_earth_occults(eye, far, &around.itrf_from_gcrf);
+        hidden += occulted;
+        seen += !occulted;
+        /* 0.05 px of an edge that the PSF softens to 0.9 px */
+        assert_true(occulted ? share > 0.48 : share < 0.52);
+    }
+    assert_true(hidden > 50 && seen > 50);
+}
+
 /* Light of a whole disc, summed over pixels much smaller than it. */
 static double disc_flux(const bst_camera *camera, const bst_discs *discs) {
     double sum = 0, scale = bst_camera_scale_rad(camera);
@@ -405,6 +439,7 @@ int main(void) {
         cmocka_unit_test(transmittance_is_log_linear),
         cmocka_unit_test(stray_light_by_hand),
         cmocka_unit_test(the_limb_is_where_geometry_has_it),
+        cmocka_unit_test(stars_set_at_the_limb),
         cmocka_unit_test(discs_hold_their_light),
         cmocka_unit_test(moving_edges_are_the_mean_of_their_places),
         cmocka_unit_test(gradients_are_polynomials),
