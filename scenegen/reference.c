@@ -51,15 +51,11 @@ static void add_psf(bst_window w, double sigma, double x, double y, double elect
 }
 
 bool bst_reference_place(const bst_camera *camera, const bst_los_track *track, const bst_source *s,
-                         int k, double u, double *x, double *y, double *light) {
+                         int k, double u, double *x, double *y) {
     double from_s = track->time_s[k], dt = track->time_s[k + 1] - from_s;
     bst_quat q = bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
     bst_vec3 v = bst_source_direction(s, (from_s + u * dt) / track->time_s[track->count - 1]);
-    if (!bst_camera_project(camera, bst_quat_rotate(q, v), x, y)) {
-        return false;
-    }
-    *light = bst_camera_illumination(camera, *x, *y);
-    return true;
+    return bst_camera_project(camera, bst_quat_rotate(q, v), x, y);
 }
 
 /* One source with every stretch between LOS samples in `parts` parts. */
@@ -70,10 +66,10 @@ static void render_source(const bst_camera *camera, double sigma, bst_window w,
         double dt = track->time_s[k + 1] - track->time_s[k];
         for (int n = 0; n < 4 * parts && dt > 0.0; n++) {
             double u = ((double)(n / 4) + gauss_place[n % 4]) / parts;
-            double x, y, light;
-            if (bst_reference_place(camera, track, s, k, u, &x, &y, &light)) {
-                add_psf(w, sigma, x, y,
-                        light * s->electrons_per_s * dt * gauss_weight[n % 4] / parts, line, image);
+            double x, y;
+            if (bst_reference_place(camera, track, s, k, u, &x, &y)) {
+                add_psf(w, sigma, x, y, s->electrons_per_s * dt * gauss_weight[n % 4] / parts, line,
+                        image);
             }
         }
     }
@@ -133,12 +129,23 @@ bst_status bst_reference_render_psf(bst_ctx *ctx, const bst_camera *camera, cons
                                     bst_window window, const bst_los_track *track,
                                     const bst_source *sources, int count, double tolerance,
                                     double *image) {
-    double sigma;
-    if (bst_psf_gaussian(psf, &sigma)) {
-        return render_gaussian(ctx, camera, sigma, window, track, sources, count, tolerance, image);
+    size_t width = (size_t)window.width, height = (size_t)window.height;
+    double sigma, *light = calloc(width * height, sizeof *light);
+    if (!light) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a reference image of %d x %d pixels",
+                        window.width, window.height);
     }
-    return bst_reference_spectrum(ctx, camera, psf, window, track, sources, count, tolerance,
-                                  image);
+    bst_status status =
+        bst_psf_gaussian(psf, &sigma)
+            ? render_gaussian(ctx, camera, sigma, window, track, sources, count, tolerance, light)
+            : bst_reference_spectrum(ctx, camera, psf, window, track, sources, count, tolerance,
+                                     light);
+    for (size_t p = 0; p < width * height && status == BST_OK; p++) {
+        double x = window.x0 + (double)(p % width), y = window.y0 + (double)(p / width);
+        image[p] += bst_camera_illumination(camera, x, y) * light[p];
+    }
+    free(light);
+    return status;
 }
 
 bst_status bst_reference_render(bst_ctx *ctx, const bst_camera *camera, bst_window window,

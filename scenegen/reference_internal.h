@@ -4,12 +4,12 @@
 
 #include "scenegen/reference.h"
 
-/* Where a source is at the share u of the stretch from sample k of the track to the next, and the
- * illumination there. false behind the camera. */
+/* Where a source is at the share u of the stretch from sample k of the track to the next. false
+ * behind the camera. */
 bool bst_reference_place(const bst_camera *camera, const bst_los_track *track, const bst_source *s,
-                         int k, double u, double *x, double *y, double *light);
+                         int k, double u, double *x, double *y);
 
-/* The image by any PSF; see bst_reference_render_psf. */
+/* The image by any PSF, without vignetting; see bst_reference_render_psf. */
 bst_status bst_reference_spectrum(bst_ctx *ctx, const bst_camera *camera, const bst_psf *psf,
                                   bst_window window, const bst_los_track *track,
                                   const bst_source *sources, int count, double tolerance,

@@ -173,9 +173,8 @@ static void place_rule(const spectrum *s, const time_rule *rule, const bst_sourc
     for (int i = 0; i < rule->count; i++) {
         double u = u0 + rule->place[i] * (u1 - u0);
         p[i] = (instant){0};
-        p[i].there =
-            bst_reference_place(s->camera, s->track, source, k, u, &p[i].x, &p[i].y, &p[i].light);
-        p[i].light *= rule->weight[i] * (u1 - u0);
+        p[i].there = bst_reference_place(s->camera, s->track, source, k, u, &p[i].x, &p[i].y);
+        p[i].light = p[i].there ? rule->weight[i] * (u1 - u0) : 0.0;
     }
 }
 

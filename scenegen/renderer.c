@@ -8,9 +8,11 @@
 #include "bst_device_kernels.h"
 #include "bst_scenegen_kernels.h"
 #include "scenegen/detector.h"
+#include "scenegen/fft_light.h"
 #include "scenegen/frame_pool.h"
 #include "scenegen/reference.h"
 #include "scenegen/smear.h"
+#include "scenegen/vignetting.h"
 #include "sim/world/skylight.h"
 
 enum { MAX_TAPS = 512, BOX_FLOATS = 4 };
@@ -31,6 +33,8 @@ struct bst_renderer {
     cl_command_queue queue;
     cl_program program;
     cl_kernel nodes_kernel, frame_kernel, expected_kernel;
+    bst_psf *psf;
+    bst_fft_light *fft_light; /* NULL: the PSF is a Gaussian, light comes from stamps */
     bst_smear *smear;
     bst_frame_pool *pool;
     cl_mem profiles;
@@ -106,15 +110,18 @@ static bst_status choose_tiles(bst_ctx *ctx, const bst_device *device,
 
 static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
     const bst_kernel_source *sources[] = {
-        &bst_kernel_scene_shared, &bst_kernel_nodes,      &bst_kernel_splat, &bst_kernel_random,
-        &bst_kernel_detector,     &bst_kernel_background, &bst_kernel_tile};
-    char options[512];
-    int length = snprintf(options, sizeof options,
-                          "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d "
-                          "-DPHASES=%d%s",
-                          r->options.tile_width, r->options.tile_height, r->options.group, r->taps,
-                          r->phases, r->map ? " -DBACKGROUND" : "");
+        &bst_kernel_scene_shared, &bst_kernel_nodes,      &bst_kernel_splat,
+        &bst_kernel_random,       &bst_kernel_detector,   &bst_kernel_light,
+        &bst_kernel_vignetting,   &bst_kernel_background, &bst_kernel_tile};
+    char options[1024];
+    int length =
+        snprintf(options, sizeof options,
+                 "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d "
+                 "-DPHASES=%d%s%s",
+                 r->options.tile_width, r->options.tile_height, r->options.group, r->taps,
+                 r->phases, r->fft_light ? " -DFFT_LIGHT" : "", r->map ? " -DBACKGROUND" : "");
     length += bst_detector_options(&r->camera, options + length, sizeof options - (size_t)length);
+    length += bst_vignetting_options(&r->camera, options + length, sizeof options - (size_t)length);
     const bst_distortion *d = &r->camera.distortion;
     if (bst_camera_distorted(&r->camera)) {
         double a = bst_camera_scale_rad(&r->camera), a2 = a * a,
@@ -124,7 +131,7 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
             " -DDISTORTED -DK1=%.9ef -DK2=%.9ef -DK3=%.9ef -DP1=%.9ef -DP2=%.9ef -DFOLD2=%.9ef",
             d->k1 * a2, d->k2 * a2 * a2, d->k3 * a2 * a2 * a2, d->p1 * a, d->p2 * a, out * out);
     }
-    BST_TRY(bst_device_build(ctx, device, sources, 7, options, &r->program));
+    BST_TRY(bst_device_build(ctx, device, sources, 9, options, &r->program));
     static const char *const names[3] = {"bst_scene_nodes", "bst_scene_frame",
                                          "bst_scene_expected"};
     cl_kernel *kernels[3] = {&r->nodes_kernel, &r->frame_kernel, &r->expected_kernel};
@@ -209,6 +216,20 @@ static bst_status upload(bst_ctx *ctx, bst_renderer *r, growing *g, const void *
                             "unmapping scene memory");
 }
 
+/* The PSF, and the Fourier path where it is no Gaussian. */
+static bst_status open_psf(bst_ctx *ctx, bst_device *device, bst_renderer *r,
+                           bst_smear_options *smear) {
+    double sigma_px;
+    BST_TRY(bst_psf_create(ctx, &r->camera, &r->psf));
+    if (bst_psf_gaussian(r->psf, &sigma_px)) {
+        return BST_OK;
+    }
+    BST_TRY(bst_fft_light_create(ctx, device, &r->camera, r->psf, NULL, &r->fft_light));
+    smear->node_sigma_px = bst_fft_light_band(r->fft_light)->node_sigma_px;
+    smear->share_sigma_px = bst_fft_light_band(r->fft_light)->share_sigma_px;
+    return BST_OK;
+}
+
 bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
                                const bst_renderer_options *options, bst_renderer **out) {
     *out = NULL;
@@ -226,8 +247,11 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     r->queue = bst_device_queue(device);
     clRetainContext(r->context);
     clRetainCommandQueue(r->queue);
-    bst_smear_options smear = {r->options.tolerance_sigma, r->taps};
+    bst_smear_options smear = {.tolerance_sigma = r->options.tolerance_sigma, .taps = r->taps};
     bst_status status = choose_tiles(ctx, device, &r->options, &r->most_bytes);
+    if (status == BST_OK) {
+        status = open_psf(ctx, device, r, &smear);
+    }
     if (status == BST_OK) {
         status = build(ctx, r, device);
     }
@@ -273,6 +297,8 @@ void bst_renderer_free(bst_renderer *r) {
     }
     bst_frame_pool_free(r->pool);
     bst_smear_free(r->smear);
+    bst_fft_light_free(r->fft_light);
+    bst_psf_free(r->psf);
     clReleaseCommandQueue(r->queue);
     clReleaseContext(r->context);
     free(r->list);
@@ -297,11 +323,10 @@ static bst_status check_request(bst_ctx *ctx, const bst_renderer *r, const bst_r
                         "and two samples of the line of sight (there are %d)",
                         q->background_e, q->track->count);
     }
-    if (r->map != (q->background != NULL)) {
-        return bst_fail(
-            ctx, BST_ERR_ARGUMENT,
-            "a request has a map of the background where the camera's differs from pixel "
-            "to pixel (bst_skylight_varies), and only there");
+    if (q->background && !r->map) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "a request has a map of the background, but the camera's background is the "
+                        "same all over the sensor (bst_skylight_varies)");
     }
     return BST_OK;
 }
@@ -340,6 +365,9 @@ static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *
                             r->stats.sources, q->count, 1e-6 * BST_BLOCK * *blocks);
         }
         if (visible) {
+            if (r->fft_light) {
+                bst_fft_light_stamp(r->fft_light, s);
+            }
             s->first_block = *blocks;
             *blocks += s->blocks;
             r->stats.sources++;
@@ -389,9 +417,18 @@ static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, int blocks, int *
         "placing the scene's nodes");
 }
 
+/* What a request without a map adds where the kernels expect one. */
+static const float nothing[4];
+static const bst_skylight_map no_background = {1 << 16, 0, 0, 2, 2, nothing, 0.0};
+
+static const bst_skylight_map *background_of(const bst_render_request *q) {
+    return q->background ? q->background : &no_background;
+}
+
 static bst_scene_params make_params(const bst_renderer *r, const bst_render_request *q,
                                     int groups) {
     const bst_camera *c = &r->camera;
+    const bst_skylight_map *map = background_of(q);
     bst_window w = q->window;
     int x0 = w.x0 / 64 * 64;
     return (bst_scene_params){
@@ -415,12 +452,25 @@ static bst_scene_params make_params(const bst_renderer *r, const bst_render_requ
         .dn_per_e = (float)(1.0 / c->gain_e_per_dn),
         .offset_dn = (float)c->offset_dn,
         .max_dn = (float)((1 << c->bits) - 1),
-        .map_step = q->background ? q->background->step_px : 0,
-        .map_x0 = q->background ? q->background->x0_px : 0,
-        .map_y0 = q->background ? q->background->y0_px : 0,
-        .map_columns = q->background ? q->background->columns : 0,
-        .map_rows = q->background ? q->background->rows : 0,
+        .map_step = map->step_px,
+        .map_x0 = map->x0_px,
+        .map_y0 = map->y0_px,
+        .map_columns = map->columns,
+        .map_rows = map->rows,
     };
+}
+
+/* The image that the tile kernel takes its light from, where the PSF is no Gaussian. */
+static bst_status make_light(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q, int groups,
+                             bst_scene_params *p, cl_mem *light) {
+    bst_fft_light_nodes nodes = {r->sources.buffer, r->nodes.buffer, r->block_box.buffer,
+                                 r->source_box.buffer, groups};
+    bst_fft_light_image image;
+    BST_TRY(bst_fft_light_render(ctx, r->fft_light, r->queue, q->window, &nodes, &image));
+    p->light_first = image.first;
+    p->light_pitch = image.pitch;
+    *light = image.buffer;
+    return BST_OK;
 }
 
 /* The common way of both kinds of image: the kernels' first six arguments are the same. */
@@ -433,19 +483,23 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
     r->tiles = p.tiles_x * p.tiles_y;
     size_t tiles = (size_t)r->tiles;
     BST_TRY(grow(ctx, r, &r->saturated, tiles * sizeof(cl_int)));
+    cl_mem light = r->profiles;
+    if (r->fft_light) {
+        BST_TRY(make_light(ctx, r, q, groups, &p, &light));
+    }
     const void *values[] = {&p,
                             &r->sources.buffer,
                             &r->nodes.buffer,
                             &r->block_box.buffer,
                             &r->source_box.buffer,
-                            &r->profiles,
+                            &light,
                             &out,
                             &r->saturated.buffer};
     const size_t m = sizeof(cl_mem), bytes[] = {sizeof p, m, m, m, m, m, m, m};
     cl_uint count = kernel == r->frame_kernel ? 8 : 7;
     BST_TRY(set_args(ctx, kernel, values, bytes, (int)count));
-    if (q->background) {
-        const bst_skylight_map *map = q->background;
+    if (r->map) {
+        const bst_skylight_map *map = background_of(q);
         size_t size = (size_t)map->columns * (size_t)map->rows * sizeof *map->e;
         BST_TRY(upload(ctx, r, &r->background, map->e, size));
         BST_TRY(bst_device_check(ctx, clSetKernelArg(kernel, count, m, &r->background.buffer),
@@ -520,5 +574,5 @@ double bst_renderer_peak_e(const bst_renderer *r, int index) {
 }
 
 int bst_renderer_margin_px(const bst_renderer *r) {
-    return r->taps / 2 + 1;
+    return r->fft_light ? bst_fft_light_margin_px(r->fft_light) : r->taps / 2 + 1;
 }

@@ -40,7 +40,7 @@ typedef struct bst_render_request {
     int count;
     double background_e; /* expected electrons per pixel: sky and dark current */
     const struct bst_skylight_map *background; /* added to it, of the same window; NULL: none.
-                                                    See bst_skylight_varies */
+                                                    Only where bst_skylight_varies */
     bst_rng_key key;
     int64_t exposure_id;
 } bst_render_request;

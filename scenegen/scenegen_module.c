@@ -150,9 +150,10 @@ static bst_status write_items(bst_ctx *ctx, scenegen *s, const bst_los_track *tr
     for (int i = 0; i < truth->count; i++) {
         int k = truth->lost > 0 ? s->picks[i].index : i;
         bst_field_truth_item(s->field, track, &sources[k], e->window, truth, &truth->items[i]);
-        double sky_e = bst_field_background_e(s->field, truth, truth->items[i].x_mean_px,
-                                              truth->items[i].y_mean_px);
-        if (bst_renderer_peak_e(s->renderer, k) >= limit_e - sky_e) {
+        double x = truth->items[i].x_mean_px, y = truth->items[i].y_mean_px;
+        double light = isfinite(x) ? bst_camera_illumination(s->camera, x, y) : 1.0;
+        double sky_e = bst_field_background_e(s->field, truth, x, y);
+        if (light * bst_renderer_peak_e(s->renderer, k) >= limit_e - sky_e) {
             truth->items[i].flags |= BST_TRUTH_SATURATED;
         }
     }

@@ -21,7 +21,7 @@ typedef struct level {
 struct bst_smear {
     bst_camera camera;
     bst_smear_options options;
-    double sigma_px;
+    double sigma_px, share_sigma_px;
     double tail[MAX_TAPS / 2]; /* profile at r px from the centre, over the centre's */
     double kept[MAX_TAPS / 2]; /* light within the two nearest pixels and r more on each side */
     double tolerance[LEVELS];
@@ -63,7 +63,9 @@ bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
     }
     s->camera = *camera;
     s->options = *options;
-    s->sigma_px = bst_camera_psf_sigma_px(camera);
+    s->sigma_px =
+        options->node_sigma_px > 0.0 ? options->node_sigma_px : bst_camera_psf_sigma_px(camera);
+    s->share_sigma_px = options->share_sigma_px > 0.0 ? options->share_sigma_px : s->sigma_px;
     double centre = bst_reference_pixel_share(0.0, s->sigma_px, 0);
     for (int r = 0; r < MAX_TAPS / 2; r++) {
         s->tail[r] = bst_reference_pixel_share(0.0, s->sigma_px, r) / centre;
@@ -203,7 +205,7 @@ static double largest_share(bst_smear *s) {
         s->nodes.items[n].p[0] *= least;
         s->nodes.items[n].p[1] *= least;
     }
-    return bst_nodes_peak_share(s->nodes.items, s->nodes.count, s->sigma_px);
+    return bst_nodes_peak_share(s->nodes.items, s->nodes.count, s->share_sigma_px);
 }
 
 static bst_status make_level(bst_ctx *ctx, bst_smear *s, int n) {

@@ -13,6 +13,9 @@ typedef struct bst_smear bst_smear;
 typedef struct bst_smear_options {
     double tolerance_sigma; /* error of a source's image in any pixel, in that pixel's sigma */
     int taps;               /* length of the profile table, px */
+    /* for a PSF that is no Gaussian, else 0: those that need nodes as fine, and that put as much of
+     * a point's light in one pixel */
+    double node_sigma_px, share_sigma_px;
 } bst_smear_options;
 
 bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,

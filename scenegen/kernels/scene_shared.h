@@ -32,6 +32,7 @@ typedef struct bst_scene_params {
     float dn_per_e;
     float offset_dn;
     float max_dn;
+    int light_first, light_pitch; /* of the Fourier path's image, floats */
     int map_step, map_x0, map_y0, map_columns, map_rows; /* of the background, if it varies */
 } bst_scene_params;
 

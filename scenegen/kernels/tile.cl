@@ -1,4 +1,5 @@
-/* One tile of the frame per work-item. Option: GROUP (work-items per work-group). */
+/* One tile of the frame per work-item. Options: GROUP (work-items per work-group), FFT_LIGHT (the
+ * light is an image, given as `profiles`). */
 
 /* Where a tile lies: its first pixel on the full sensor and in the window, and its size. Tiles
  * start at columns that are multiples of 64, so the first and the last may reach beyond the window.
@@ -56,7 +57,12 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     }
     local float *sum = sums[get_local_id(0)];
     tile_place t = place_tile(p, tile);
+#ifdef FFT_LIGHT
+    load_tile(sum, p, t.left, t.top, profiles);
+#else
     splat_tile(sum, t.x, t.y, p.source_groups, sources, nodes, block_box, source_box, profiles);
+#endif
+    SHADE_TILE(sum, t.x, t.y);
     ADD_BACKGROUND(sum, p, t);
     uint steps[MOST_STEPS];
     dark_law dark = dark_law_of(p, steps);
@@ -98,7 +104,12 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_expecte
     }
     local float *sum = sums[get_local_id(0)];
     tile_place t = place_tile(p, tile);
+#ifdef FFT_LIGHT
+    load_tile(sum, p, t.left, t.top, profiles);
+#else
     splat_tile(sum, t.x, t.y, p.source_groups, sources, nodes, block_box, source_box, profiles);
+#endif
+    SHADE_TILE(sum, t.x, t.y);
     ADD_BACKGROUND(sum, p, t);
     for (int y = 0; y < t.rows; y++) {
         global float *out = image + (size_t)(t.top + y) * p.window_width;

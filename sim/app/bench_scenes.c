@@ -24,16 +24,22 @@ typedef struct scene {
     double tolerance_sigma;
     int error_sources; /* sources whose error is measured, evenly chosen; the reference takes its
                           time */
+    double q;          /* wavelength x focal ratio / pixel of a diffraction PSF; 0: the Gaussian */
 } scene;
 
+#define WORST(name, tolerance, q) \
+    { name, 2048, {0}, 3220, 0, 6, 2.0, 300, 4, 0.0349, 0.15, false, 40, tolerance, 60, q }
+
 static const scene scenes[] = {
-    {"worst_case", 2048, {0}, 3220, 0, 6, 2.0, 300, 4, 0.0349, 0.15, false, 40, 0.05, 60},
-    {"acquisition", 2048, {0}, 500, 3, 6, 0.5, 3, 0, 0, 0.1, false, 10, 0.02, 100},
-    {"rate_track_slow", 2048, {0}, 500, 1, 6, 0.5, 10, 0, 0, 0.1, true, 10, 0.02, 100},
-    {"rate_track_medium", 2048, {0}, 500, 1, 6, 1.0, 60, 0, 0, 0.1, true, 20, 0.02, 100},
-    {"rate_track_fast", 2048, {0}, 500, 1, 6, 2.0, 200, 0, 0, 0.1, true, 40, 0.02, 60},
-    {"galactic_core", 2048, {0}, 100000, 0, 8, 0.5, 5, 0, 0, 0, false, 10, 0.05, 200},
-    {"window", 2048, {896, 896, 256, 256}, 500, 1, 6, 0.5, 10, 0, 0, 0.1, true, 10, 0.02, 100},
+    WORST("worst_case", 0.05, 0),
+    WORST("worst_case_diffraction_q1", 0.1, 1),
+    WORST("worst_case_diffraction_q2", 0.07, 2),
+    {"acquisition", 2048, {0}, 500, 3, 6, 0.5, 3, 0, 0, 0.1, false, 10, 0.02, 100, 0},
+    {"rate_track_slow", 2048, {0}, 500, 1, 6, 0.5, 10, 0, 0, 0.1, true, 10, 0.02, 100, 0},
+    {"rate_track_medium", 2048, {0}, 500, 1, 6, 1.0, 60, 0, 0, 0.1, true, 20, 0.02, 100, 0},
+    {"rate_track_fast", 2048, {0}, 500, 1, 6, 2.0, 200, 0, 0, 0.1, true, 40, 0.02, 60, 0},
+    {"galactic_core", 2048, {0}, 100000, 0, 8, 0.5, 5, 0, 0, 0, false, 10, 0.05, 200, 0},
+    {"window", 2048, {896, 896, 256, 256}, 500, 1, 6, 0.5, 10, 0, 0, 0.1, true, 10, 0.02, 100, 0},
 };
 
 enum { MOST_TARGETS = 4, FRAMES = 40, WARM_UP = 3, TONES = 24, SAMPLES_PER_S = 1000 };
@@ -67,6 +73,18 @@ static bst_camera bench_camera(int side) {
                         .gain_e_per_dn = 1.6,
                         .offset_dn = 500.0,
                         .bits = 16};
+}
+
+/* An aperture of which 35 % of the diameter is obstructed, with defocus, astigmatism, coma and
+ * trefoil that together are 0.07 waves RMS at 550 nm, over the visual band. */
+static void set_diffraction(bst_camera *camera, double q) {
+    static const double sign[6] = {1, -1, 1, 1, -1, 1};
+    camera->optics.psf = BST_PSF_DIFFRACTION;
+    camera->optics.q = q;
+    camera->optics.central_obstruction = 0.35;
+    for (int j = 0; j < 6; j++) { /* Noll 4 to 9 */
+        camera->optics.zernike_waves.waves[j + 2] = sign[j] * 0.07 / sqrt(6.0);
+    }
 }
 
 static double jitter(const scene *s, uint64_t frame, int axis, double t) {
@@ -138,6 +156,9 @@ static void place_targets(scene_state *st, uint64_t frame) {
 
 static bst_status open_scene(bst_ctx *ctx, const scene *s, scene_state *st) {
     *st = (scene_state){.scene = s, .camera = bench_camera(s->side)};
+    if (s->q > 0.0) {
+        set_diffraction(&st->camera, s->q);
+    }
     st->window = s->window.width > 0 ? s->window : (bst_window){0, 0, s->side, s->side};
     st->samples = (int)(s->exposure_s * SAMPLES_PER_S) + 1;
     st->time_s = malloc((size_t)st->samples * sizeof *st->time_s);

@@ -8,6 +8,7 @@
 #include "sim/device/device.h"
 #include "sim/engine/exposure_clock.h"
 #include "sim/engine/recorder.h"
+#include "sim/io/psf_fits.h"
 #include "sim/io/wcs.h"
 #include "sim/world/knowledge.h"
 
@@ -123,6 +124,32 @@ static bst_status add_modules(bst_ctx *ctx, const bst_scenario *scenario, bst_si
     return BST_OK;
 }
 
+/* The PSFs that come from files. */
+static bst_status read_psfs(bst_ctx *ctx, const bst_scenario *scenario, bst_world *world) {
+    const bst_observer_config *observers = scenario->observers.items;
+    for (int o = 0; o < scenario->observers.count; o++) {
+        for (int s = 0; s < observers[o].sensors.count; s++) {
+            const bst_optics_config *optics = &bst_world_camera(world, o, s)->optics;
+            if (optics->psf != BST_PSF_FILE) {
+                continue;
+            }
+            bst_psf_samples samples;
+            bst_status status =
+                bst_psf_fits_samples(ctx, optics->psf_file, optics->psf_oversampling, &samples);
+            if (status == BST_OK) {
+                status = bst_world_set_psf(ctx, world, o, s, &samples);
+                free((float *)samples.samples);
+            }
+            if (status != BST_OK) {
+                return bst_fail_prefix(ctx, status,
+                                       "%s: /observers/%d/sensors/%d/camera/optics/psf_file",
+                                       scenario->file, o, s);
+            }
+        }
+    }
+    return BST_OK;
+}
+
 /* Says which frames will have a WCS that is wrong by more than a star's place is measured to. */
 static void warn_of_misfits(bst_ctx *ctx, const bst_scenario *scenario) {
     const double allowed_px = 1e-3;
@@ -147,6 +174,7 @@ static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
                         const bst_simulation_options *options, bst_simulation *sim) {
     BST_TRY(bst_world_create(ctx, scenario->file, &scenario->world, &scenario->observers,
                              scenario->base_dir, scenario->epoch, &sim->world));
+    BST_TRY(read_psfs(ctx, scenario, sim->world));
     BST_TRY(bst_world_check_spans(ctx, scenario->file, sim->world, scenario->duration_s));
     BST_TRY(bst_world_prepare(ctx, sim->world, options->threads));
     BST_TRY(make_knowledge(ctx, scenario, sim));

@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <fitsio.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
@@ -21,8 +22,9 @@ static bst_status fail_cfitsio(bst_ctx *ctx, const char *path, int code) {
     return bst_fail(ctx, BST_ERR_IO, "%.400s: cannot be read: %s", path, reason);
 }
 
-/* Goes to the first image of two axes. */
-static bst_status find_image(bst_ctx *ctx, const char *path, fitsfile *file, long size[2]) {
+/* Goes to the first image of two axes, or of `most_axes`; size[2] is 1 where there are two. */
+static bst_status find_image(bst_ctx *ctx, const char *path, fitsfile *file, int most_axes,
+                             long size[3]) {
     int code = 0, count = 0;
     fits_get_num_hdus(file, &count, &code);
     for (int hdu = 1; hdu <= count && code == 0; hdu++) {
@@ -38,29 +40,35 @@ static bst_status find_image(bst_ctx *ctx, const char *path, fitsfile *file, lon
                             "compressed); unpack the file with funpack",
                             path, hdu);
         }
-        if (code == 0 && axes == 2) {
-            fits_get_img_size(file, 2, size, &code);
-            if (code == 0 && (size[0] < 1 || size[1] < 1 || size[0] > LONGEST_SIDE ||
-                              size[1] > LONGEST_SIDE || size[0] * size[1] > MOST_PIXELS)) {
+        if (code == 0 && axes >= 2 && axes <= most_axes) {
+            size[2] = 1;
+            fits_get_img_size(file, axes, size, &code);
+            if (code == 0 &&
+                (size[0] < 1 || size[1] < 1 || size[2] < 1 || size[0] > LONGEST_SIDE ||
+                 size[1] > LONGEST_SIDE || size[2] > MOST_PIXELS / (size[0] * size[1]))) {
+                char planes[32] = "";
+                if (axes > 2) {
+                    snprintf(planes, sizeof planes, " x %ld", size[2]);
+                }
                 return bst_fail(ctx, BST_ERR_FORMAT,
-                                "%.400s: an image of %ld x %ld pixels (allowed: sides of 1 to %d, "
-                                "at most %d pixels)",
-                                path, size[0], size[1], LONGEST_SIDE, MOST_PIXELS);
+                                "%.400s: an image of %ld x %ld%s pixels (allowed: sides of 1 to "
+                                "%d, at most %d pixels)",
+                                path, size[0], size[1], planes, LONGEST_SIDE, MOST_PIXELS);
             }
             return code == 0 ? BST_OK : fail_cfitsio(ctx, path, code);
         }
     }
-    return code == 0 ? bst_fail(ctx, BST_ERR_FORMAT, "%.400s: has no image of two axes", path)
+    return code == 0 ? bst_fail(ctx, BST_ERR_FORMAT, "%.400s: has no image of two %saxes", path,
+                                most_axes > 2 ? "or three " : "")
                      : fail_cfitsio(ctx, path, code);
 }
 
-static bst_status read_pixels(bst_ctx *ctx, const char *path, fitsfile *file, const long size[2],
+static bst_status read_pixels(bst_ctx *ctx, const char *path, fitsfile *file, const long size[3],
                               float **pixels) {
-    size_t count = (size_t)size[0] * (size_t)size[1];
+    size_t count = (size_t)size[0] * (size_t)size[1] * (size_t)size[2];
     float *values = malloc(count * sizeof *values);
     if (!values) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "%.400s: no memory for %ld x %ld pixels", path,
-                        size[0], size[1]);
+        return bst_fail(ctx, BST_ERR_MEMORY, "%.400s: no memory for %zu pixels", path, count);
     }
     int code = 0, any_blank;
     float blank = NAN;
@@ -73,16 +81,20 @@ static bst_status read_pixels(bst_ctx *ctx, const char *path, fitsfile *file, co
     return BST_OK;
 }
 
+/* planes NULL: of two axes only. Closes the file. */
 static bst_status read_image(bst_ctx *ctx, const char *path, fitsfile *file, int *width,
-                             int *height, float **pixels) {
-    long size[2] = {0, 0};
-    bst_status status = find_image(ctx, path, file, size);
+                             int *height, int *planes, float **pixels) {
+    long size[3] = {0, 0, 1};
+    bst_status status = find_image(ctx, path, file, planes ? 3 : 2, size);
     if (status == BST_OK) {
         status = read_pixels(ctx, path, file, size, pixels);
     }
     if (status == BST_OK) {
         *width = (int)size[0];
         *height = (int)size[1];
+        if (planes) {
+            *planes = (int)size[2];
+        }
     }
     int ignored = 0;
     fits_close_file(file, &ignored);
@@ -119,8 +131,8 @@ static bst_status check_file(bst_ctx *ctx, const char *path) {
     return status;
 }
 
-bst_status bst_fits_read_image(bst_ctx *ctx, const char *path, int *width, int *height,
-                               float **pixels) {
+static bst_status read_file(bst_ctx *ctx, const char *path, int *width, int *height, int *planes,
+                            float **pixels) {
     *pixels = NULL;
     *width = *height = 0;
     BST_TRY(check_file(ctx, path));
@@ -130,7 +142,18 @@ bst_status bst_fits_read_image(bst_ctx *ctx, const char *path, int *width, int *
     if (fits_open_diskfile(&file, path, READONLY, &code) != 0) {
         return fail_cfitsio(ctx, path, code);
     }
-    return read_image(ctx, path, file, width, height, pixels);
+    return read_image(ctx, path, file, width, height, planes, pixels);
+}
+
+bst_status bst_fits_read_image(bst_ctx *ctx, const char *path, int *width, int *height,
+                               float **pixels) {
+    return read_file(ctx, path, width, height, NULL, pixels);
+}
+
+bst_status bst_fits_read_planes(bst_ctx *ctx, const char *path, int *width, int *height,
+                                int *planes, float **pixels) {
+    *planes = 0;
+    return read_file(ctx, path, width, height, planes, pixels);
 }
 
 bst_status bst_fits_read_image_buffer(bst_ctx *ctx, const char *name, const void *data,
@@ -149,7 +172,7 @@ bst_status bst_fits_read_image_buffer(bst_ctx *ctx, const char *name, const void
     int code = 0;
     bst_status status =
         fits_open_memfile(&file, "memory", READONLY, &copy, &copy_bytes, 0, NULL, &code) == 0
-            ? read_image(ctx, name, file, width, height, pixels)
+            ? read_image(ctx, name, file, width, height, NULL, pixels)
             : fail_cfitsio(ctx, name, code);
     free(copy);
     return status;

@@ -16,7 +16,11 @@
 bst_status bst_fits_read_image(bst_ctx *ctx, const char *path, int *width, int *height,
                                float **pixels) BST_MUST_CHECK;
 
-/* The same from memory; `name` stands for the path in messages. */
+/* The same for the first image of two or three axes: *pixels is [*planes][*height][*width]. */
+bst_status bst_fits_read_planes(bst_ctx *ctx, const char *path, int *width, int *height,
+                                int *planes, float **pixels) BST_MUST_CHECK;
+
+/* bst_fits_read_image from memory; `name` stands for the path in messages. */
 bst_status bst_fits_read_image_buffer(bst_ctx *ctx, const char *name, const void *data,
                                       size_t bytes, int *width, int *height,
                                       float **pixels) BST_MUST_CHECK;

@@ -8,14 +8,14 @@
 #include "sim/core/vec.h"
 #include "sim/io/fits_image.h"
 
-/* OVERSAMP of the first image of two axes; 0: there is none. */
-static bst_status read_keyword(bst_ctx *ctx, const char *path, double *out) {
+/* OVERSAMP of the first image of two to `most_axes` axes; 0: there is none. */
+static bst_status read_keyword(bst_ctx *ctx, const char *path, int most_axes, double *out) {
     fitsfile *file = NULL;
     int code = 0, count = 0, axes = 0;
     *out = 0.0;
     fits_open_diskfile(&file, path, READONLY, &code);
     fits_get_num_hdus(file, &count, &code);
-    for (int hdu = 1; hdu <= count && code == 0 && axes != 2; hdu++) {
+    for (int hdu = 1; hdu <= count && code == 0 && !(axes >= 2 && axes <= most_axes); hdu++) {
         int type = 0;
         axes = 0;
         fits_movabs_hdu(file, hdu, &type, &code);
@@ -44,12 +44,13 @@ static bst_status read_keyword(bst_ctx *ctx, const char *path, double *out) {
     return wrong ? bst_fail(ctx, BST_ERR_FORMAT, "%.400s: OVERSAMP is not a number", path) : BST_OK;
 }
 
-static bst_status find_oversampling(bst_ctx *ctx, const char *path, double given, double *out) {
+static bst_status find_oversampling(bst_ctx *ctx, const char *path, int most_axes, double given,
+                                    double *out) {
     *out = given;
     if (given > 0.0) {
         return BST_OK;
     }
-    BST_TRY(read_keyword(ctx, path, out));
+    BST_TRY(read_keyword(ctx, path, most_axes, out));
     if (*out == 0.0) {
         return bst_fail(ctx, BST_ERR_FORMAT,
                         "%.400s: has no keyword OVERSAMP (samples per detector pixel); add it, or "
@@ -106,12 +107,28 @@ bst_status bst_psf_fits_read(bst_ctx *ctx, const char *path, double oversampling
     free(pixels);
     BST_TRY(status);
     double samples;
-    BST_TRY(find_oversampling(ctx, path, oversampling, &samples));
+    BST_TRY(find_oversampling(ctx, path, 2, oversampling, &samples));
     double area = sum * sum / sum2 / (samples * samples);
     *out = (bst_psf_summary){.width = width,
                              .height = height,
                              .oversampling = samples,
                              .noise_equivalent_px = area,
                              .fwhm_px = 2.3548200450309493 * sqrt(area / (4.0 * BST_PI))};
+    return BST_OK;
+}
+
+bst_status bst_psf_fits_samples(bst_ctx *ctx, const char *path, double oversampling,
+                                bst_psf_samples *out) {
+    *out = (bst_psf_samples){0};
+    double samples;
+    int width, height, planes;
+    float *pixels;
+    BST_TRY(bst_fits_read_planes(ctx, path, &width, &height, &planes, &pixels));
+    bst_status status = find_oversampling(ctx, path, 3, oversampling, &samples);
+    if (status != BST_OK) {
+        free(pixels);
+        return status;
+    }
+    *out = (bst_psf_samples){pixels, width, height, planes, samples};
     return BST_OK;
 }

@@ -1,8 +1,10 @@
-/* A point spread function from a FITS image, as what the onboard side knows of it: one width. */
+/* Point spread functions from FITS images: as what the onboard side knows of one, a width, and as
+ * samples for rendering. */
 #ifndef BST_IO_PSF_FITS_H
 #define BST_IO_PSF_FITS_H
 
 #include "sim/core/status.h"
+#include "sim/world/psf.h"
 
 /* Longest side of the image. */
 #define BST_PSF_LONGEST_SIDE 4096
@@ -27,5 +29,12 @@ typedef struct bst_psf_summary {
  * bst_fits_read_image refuses. */
 bst_status bst_psf_fits_read(bst_ctx *ctx, const char *path, double oversampling,
                              bst_psf_summary *out) BST_MUST_CHECK;
+
+/* Reads the file's first image of two axes, or cube of three (one plane for each node of the field
+ * grid), as samples of the PSF before integration over the pixel, on any scale. Samples per pixel
+ * as above. out->samples is the caller's to free. BST_ERR_FORMAT for no or a wrong OVERSAMP, and
+ * all that bst_fits_read_image refuses. */
+bst_status bst_psf_fits_samples(bst_ctx *ctx, const char *path, double oversampling,
+                                bst_psf_samples *out) BST_MUST_CHECK;
 
 #endif

@@ -68,8 +68,8 @@ double bst_camera_illumination(const bst_camera *c, double x_px, double y_px) {
         return 0.0;
     }
     if (v->model == BST_VIGNETTING_COS4) {
-        double cosine = bst_camera_unproject(c, x_px, y_px).z;
-        return cosine * cosine * cosine * cosine;
+        double scale = bst_camera_scale_rad(c), secant2 = 1.0 + r2 * scale * scale;
+        return 1.0 / (secant2 * secant2);
     }
     if (v->model == BST_VIGNETTING_POLYNOMIAL) {
         double width = (double)c->width_px, height = (double)c->height_px;

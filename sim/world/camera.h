@@ -3,6 +3,7 @@
 #ifndef BST_WORLD_CAMERA_H
 #define BST_WORLD_CAMERA_H
 
+#include <math.h>
 #include <stdbool.h>
 
 #include "sim/core/config.h"
@@ -50,7 +51,9 @@ typedef struct bst_camera {
     double rotation_deg; /* of the focal plane about the boresight, from camera +x towards +y */
     double boresight_offset_px[2]; /* place of the boresight, from the sensor's centre */
     bst_distortion distortion;
-    bst_optics_config optics; /* PSF (see psf.h) and vignetting */
+    bst_optics_config optics;  /* PSF (see psf.h) and vignetting */
+    const struct bst_psf *psf; /* made of this camera, lent to its copies, or NULL; a copy whose
+                                  optics, aperture or scale are changed must clear it */
     bst_band_config band;
     const bst_band *spectrum; /* made from `band` and kept by the world; NULL: the V band of
                                  photon_flux_v0_per_s_m2, the same for all colours */
@@ -82,8 +85,10 @@ static inline double bst_camera_centre_y(const bst_camera *c) {
 static inline double bst_camera_scale_rad(const bst_camera *c) {
     return c->pixel_scale_arcsec * BST_ARCSEC_RAD;
 }
+/* Of the Gaussian profile with charge diffusion, before integration over the pixel. */
 static inline double bst_camera_psf_sigma_px(const bst_camera *c) {
-    return c->psf_fwhm_px / 2.3548200450309493; /* 2 sqrt(2 ln 2) */
+    double sigma = c->psf_fwhm_px / 2.3548200450309493; /* 2 sqrt(2 ln 2) */
+    return c->optics.diffusion_px > 0.0 ? hypot(sigma, c->optics.diffusion_px) : sigma;
 }
 /* Angle from the boresight to the sensor's farthest corner (outer edge of the pixel), rad. */
 double bst_camera_half_diagonal_rad(const bst_camera *c);
@@ -152,8 +157,10 @@ static inline double bst_camera_shrink(const bst_camera *c) {
     return c->geometry.general ? c->geometry.shrink : 1.0;
 }
 
-/* Share of the light that reaches a pixel place past the vignetting, 0..1 (a polynomial may go
- * beyond 1); 1 without. */
+/* Share of the light, of sources and of the sky, that vignetting leaves on a pixel: at least 0; 1
+ * without. r is the distance from the boresight: (1 + (r scale)^2)^-2 for the fourth power of the
+ * cosine, and the polynomial in half diagonals. As a flat field has it, the pixel counts, not the
+ * place of the source. */
 double bst_camera_illumination(const bst_camera *c, double x_px, double y_px);
 
 /* Detected electrons per second of a source of magnitude v_mag, pi/4 D^2 (1 - obscuration) *

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "sim/world/field_objects.h"
+#include "sim/world/psf.h"
 #include "sim/world/skylight.h"
 
 /* Aberration at most, and some for the deflection of light: how far an apparent place lies from the
@@ -519,12 +520,16 @@ static smear smear_of(const bst_field *field, const bst_source *source) {
     return m;
 }
 
-/* The PSF with the pixel's own width, widened along and across the way from the first to the last
+/* The PSF (of one that is no Gaussian, the Gaussian with the same noise-equivalent area) with the
+ * pixel's own width, widened along and across the way from the first to the last
  * position by what the smear has beyond a uniform straight streak of that length (jitter, bends).
  */
 static void blur(const bst_camera *camera, const smear *m, double dx, double dy, double *along,
                  double *across) {
-    double psf = bst_camera_psf_sigma_px(camera);
+    double psf = bst_camera_psf_sigma_px(camera), sigma;
+    if (camera->psf && !bst_psf_gaussian(camera->psf, &sigma) && isfinite(m->x_mean)) {
+        psf = bst_psf_equivalent_fwhm_px(camera->psf, m->x_mean, m->y_mean) / 2.3548200450309493;
+    }
     double variance = psf * psf + 1.0 / 12.0, length = hypot(dx, dy);
     double c = length > 0.0 ? dx / length : 1.0, s = length > 0.0 ? dy / length : 0.0;
     double uu = m->xx * c * c + 2.0 * m->xy * c * s + m->yy * s * s;
@@ -574,6 +579,9 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
     smear image = smear_of(field, source);
     out->x_mean_px = image.x_mean;
     out->y_mean_px = image.y_mean;
+    if (isfinite(image.x_mean)) {
+        out->electrons *= bst_camera_illumination(camera, image.x_mean, image.y_mean);
+    }
     double dark =
         bst_field_background_e(field, header, image.x_mean, image.y_mean) + header->dark_e;
     double variance = dark + camera->read_noise_e * camera->read_noise_e;

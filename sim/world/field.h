@@ -111,8 +111,11 @@ double bst_field_background_e(const bst_field *field, const bst_truth *header, d
 bool bst_field_project(const bst_camera *camera, const bst_los_track *track, int k,
                        const bst_source *source, double *x_px, double *y_px);
 
-/* Makes the truth item of a source (positions, magnitude, electrons; SNR for a Gaussian PSF that is
- * smeared along the source's own track, sigma from background, dark and read noise). */
+/* Makes the truth item of a source (positions, magnitude, electrons after vignetting at its mean
+ * place; SNR for a Gaussian PSF that is smeared along the source's own track, sigma from
+ * background, dark and read noise; of a PSF that is no Gaussian, the one with the same
+ * noise-equivalent area).
+ */
 void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
                           const bst_source *source, bst_window window, const bst_truth *header,
                           bst_truth_item *out);

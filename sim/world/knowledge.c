@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/world/psf.h"
 #include "sim/world/world_internal.h"
 
 struct bst_knowledge_view {
@@ -10,13 +11,32 @@ struct bst_knowledge_view {
     bst_sky_clock *clock;
 };
 
+/* The onboard PSF is one Gaussian: of the width given, or else that with the true one's
+ * noise-equivalent area in the middle of the field. */
+static void know_psf(bst_camera *c, double given_fwhm_px) {
+    double sigma_px;
+    bool plain = (!c->psf && c->optics.psf == BST_PSF_GAUSSIAN) ||
+                 (c->psf && bst_psf_gaussian(c->psf, &sigma_px));
+    if (plain && !(given_fwhm_px > 0.0) && !(c->optics.diffusion_px > 0.0)) {
+        return;
+    }
+    if (given_fwhm_px > 0.0) {
+        c->psf_fwhm_px = given_fwhm_px;
+    } else if (c->psf) {
+        c->psf_fwhm_px = bst_psf_equivalent_fwhm_px(c->psf, 0.5 * (double)(c->width_px - 1),
+                                                    0.5 * (double)(c->height_px - 1));
+    }
+    c->psf = NULL;
+    c->optics = (bst_optics_config){.vignetting = c->optics.vignetting};
+}
+
 static bst_status alter_camera(bst_ctx *ctx, const bst_camera_errors_config *errors,
                                bst_knowledge *k) {
     bst_camera *c = &k->camera;
     c->pixel_scale_arcsec *= 1.0 + 1e-6 * errors->scale_error_ppm;
     c->rotation_deg += errors->rotation_error_deg;
     c->distortion = errors->own_distortion ? errors->distortion : c->distortion;
-    c->psf_fwhm_px = errors->psf_fwhm_px > 0.0 ? errors->psf_fwhm_px : c->psf_fwhm_px;
+    know_psf(c, errors->psf_fwhm_px);
     bst_status status = bst_camera_prepare(ctx, c);
     return status == BST_OK
                ? status

@@ -7,6 +7,8 @@
 
 typedef struct bst_knowledge bst_knowledge;
 
+/* Its PSF is a plain Gaussian: where the true one is not, that with the same noise-equivalent area.
+ */
 const bst_camera *bst_knowledge_camera(const bst_knowledge *knowledge);
 /* The FITS image of the PSF that is known on board ("": none, the camera's psf_fwhm_px holds), and
  * its samples per pixel (0: the file says). */

@@ -82,8 +82,8 @@ bool bst_psf_gaussian(const bst_psf *psf, double *sigma_px) {
     if (psf->model != BST_PSF_GAUSSIAN || psf->fill[0] != 1.0 || psf->fill[1] != 1.0) {
         return false;
     }
-    for (int k = 1; k < bst_psf_nodes(psf); k++) {
-        if (psf->nodes[k].sigma_px != s) {
+    for (int k = 0; k < bst_psf_nodes(psf); k++) {
+        if (psf->nodes[k].sigma_px != psf->fwhm_px / FWHM_PER_SIGMA) {
             return false;
         }
     }
@@ -111,13 +111,8 @@ static double squared_shares(double sigma) {
     return erf(1.0 / (s * sqrt(2.0))) + 2.0 * s / sqrt(2.0 * BST_PI) * expm1(-0.5 / (s * s));
 }
 
-double bst_psf_equivalent_fwhm_px(const bst_psf *psf) {
-    double sigma;
-    if (bst_psf_gaussian(psf, &sigma)) {
-        return FWHM_PER_SIGMA * sigma;
-    }
-    int centre = psf->rows / 2 * psf->columns + psf->columns / 2;
-    double want = 1.0 / sqrt(bst_psf_noise_area_px2(psf, centre));
+static double equivalent_fwhm(const bst_psf *psf, int node) {
+    double want = 1.0 / sqrt(bst_psf_noise_area_px2(psf, node));
     double low = 0.1 / FWHM_PER_SIGMA, high = 1e3;
     for (int k = 0; k < 60; k++) {
         double middle = sqrt(low * high);
@@ -126,8 +121,18 @@ double bst_psf_equivalent_fwhm_px(const bst_psf *psf) {
     return FWHM_PER_SIGMA * sqrt(low * high);
 }
 
+double bst_psf_equivalent_fwhm_px(const bst_psf *psf, double x_px, double y_px) {
+    int node[4];
+    double weight[4], sum = 0.0;
+    int nodes = bst_psf_weights(psf, x_px, y_px, node, weight);
+    for (int k = 0; k < nodes; k++) {
+        sum += weight[k] * psf->nodes[node[k]].equivalent_fwhm_px;
+    }
+    return sum;
+}
+
 void bst_psf_free(bst_psf *psf) {
-    if (!psf) {
+    if (!psf || atomic_fetch_sub(&psf->owners, 1) > 1) {
         return;
     }
     for (int k = 0; psf->nodes && k < bst_psf_nodes(psf); k++) {
@@ -206,13 +211,24 @@ static bst_status fill_in(bst_ctx *ctx, const bst_camera *camera, const bst_psf_
         psf->cutoff = fmin(psf->cutoff, GAUSSIAN_CUTOFF / psf->diffusion_px);
     }
     psf->reach_px += 1.0 + GAUSSIAN_REACH * psf->diffusion_px;
+    double sigma;
+    bool gaussian = bst_psf_gaussian(psf, &sigma);
+    for (int k = 0; k < bst_psf_nodes(psf); k++) {
+        psf->nodes[k].equivalent_fwhm_px =
+            gaussian ? FWHM_PER_SIGMA * sigma : equivalent_fwhm(psf, k);
+    }
     return BST_OK;
 }
 
 bst_status bst_psf_create_from(bst_ctx *ctx, const bst_camera *camera, const bst_psf_inputs *inputs,
                                bst_psf **out) {
-    *out = NULL;
     const bst_optics_config *optics = &camera->optics;
+    *out = NULL;
+    if (camera->psf && !inputs->samples && !inputs->spectrum) {
+        *out = (bst_psf *)camera->psf;
+        atomic_fetch_add(&(*out)->owners, 1);
+        return BST_OK;
+    }
     int columns = optics->field_columns > 1 ? (int)optics->field_columns : 1;
     int rows = optics->field_rows > 1 ? (int)optics->field_rows : 1;
     if (optics->field.count > 0 && optics->field.count != columns * rows) {
@@ -227,7 +243,9 @@ bst_status bst_psf_create_from(bst_ctx *ctx, const bst_camera *camera, const bst
         free(nodes);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a PSF");
     }
-    *psf = (bst_psf){.model = optics->psf,
+    *psf = (bst_psf){.owners = 1,
+                     .model = optics->psf,
+                     .fwhm_px = camera->psf_fwhm_px,
                      .columns = columns,
                      .rows = rows,
                      .width_px = (double)camera->width_px,

@@ -37,9 +37,11 @@ typedef struct bst_psf_inputs {
                                          band_nm; each entry becomes a wavelength of the average */
 } bst_psf_inputs;
 
-/* Makes the PSF. BST_ERR_CONFIG, naming the key of `optics`, for what cannot be: defocus without a
- * focal ratio, a field list of the wrong length, an obstruction without rest, aberrations of more
- * than 64 waves per aperture diameter of slope, samples that are missing or empty; BST_ERR_MEMORY.
+/* Makes the PSF, or gives the one that the camera carries (camera->psf) once more: a PSF is freed
+ * by as many calls as gave it. BST_ERR_CONFIG, naming the key of `optics`, for what cannot be:
+ * defocus without a focal ratio, a field list of the wrong length, an obstruction without rest,
+ * aberrations of more than 64 waves per aperture diameter of slope, samples that are missing or
+ * empty; BST_ERR_MEMORY.
  */
 bst_status bst_psf_create(bst_ctx *ctx, const bst_camera *camera, bst_psf **out) BST_MUST_CHECK;
 bst_status bst_psf_create_from(bst_ctx *ctx, const bst_camera *camera, const bst_psf_inputs *inputs,
@@ -74,8 +76,8 @@ bool bst_psf_gaussian(const bst_psf *psf, double *sigma_px);
 double bst_psf_noise_area_px2(const bst_psf *psf, int node);
 
 /* Full width at half maximum of the Gaussian that has, integrated over full pixels, the same
- * noise-equivalent area as the node at the field's centre: the width for a Gaussian filter. At
- * least 0.1. */
-double bst_psf_equivalent_fwhm_px(const bst_psf *psf);
+ * noise-equivalent area as the PSF at a pixel place (mean of the nodes that mix there): the width
+ * for a Gaussian filter, and for the signal-to-noise ratio of a smeared image. At least 0.1. */
+double bst_psf_equivalent_fwhm_px(const bst_psf *psf, double x_px, double y_px);
 
 #endif

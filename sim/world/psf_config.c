@@ -100,7 +100,7 @@ const bst_config_desc bst_optics_config_table[] = {
     BST_PATH(bst_optics_config, psf_file, "\"\"",
              "file: FITS image of the PSF before integration over the pixel, or a cube with one "
              "plane for each node of the field grid; relative to the scenario's folder."),
-    BST_REAL(bst_optics_config, oversampling, "", 0, 1000, "0",
+    BST_REAL(bst_optics_config, psf_oversampling, "", 0, 1000, "0",
              "file: samples per pixel and axis; 0: its keyword OVERSAMP."),
     BST_ENUM(bst_optics_config, file_centre, file_centres, "\"centroid\"",
              "file: what sits on the source's place: the centre of the light, or that of the "

@@ -55,13 +55,13 @@ typedef struct bst_optics_config {
     bst_spiders spiders;
     double zernike_nm; /* wavelength of the waves; 0: 550 */
     bst_zernike_waves zernike_waves;
-    double defocus_um;     /* detector behind the focus */
-    double diffusion_px;   /* charge diffusion, standard deviation of a Gaussian */
-    double pixel_fill[2];  /* light-sensitive part of the pitch, along x and y; 0: 1 */
-    char psf_file[512];    /* FITS, for BST_PSF_FILE */
-    double oversampling;   /* of psf_file, samples per pixel; 0: its keyword OVERSAMP */
-    int32_t file_centre;   /* BST_PSF_CENTROID, BST_PSF_ARRAY */
-    int64_t field_columns; /* of the field grid; 0: 1 */
+    double defocus_um;       /* detector behind the focus */
+    double diffusion_px;     /* charge diffusion, standard deviation of a Gaussian */
+    double pixel_fill[2];    /* light-sensitive part of the pitch, along x and y; 0: 1 */
+    char psf_file[512];      /* FITS, for BST_PSF_FILE */
+    double psf_oversampling; /* of psf_file, samples per pixel; 0: its keyword OVERSAMP */
+    int32_t file_centre;     /* BST_PSF_CENTROID, BST_PSF_ARRAY */
+    int64_t field_columns;   /* of the field grid; 0: 1 */
     int64_t field_rows;
     bst_config_list field; /* bst_psf_field_node, row by row; empty: the same all over */
     bst_vignetting vignetting;

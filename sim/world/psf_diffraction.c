@@ -143,37 +143,39 @@ static bool aberrated(const bst_zernike_polynomial *w) {
     return false;
 }
 
-/* Adds `sign` times the band's OTF of an aperture to a table. */
-static void add_band(bst_pupil_work *work, const bst_pupil *pupil, const band *b, bool with_waves,
-                     float sign, bst_grid_otf *table) {
+/* Adds the band's OTF of an aperture to a table. */
+static bst_status add_band(bst_ctx *ctx, bst_pupil_work *work, const bst_pupil *pupil,
+                           const band *b, bool with_waves, bst_grid_otf *table) {
     for (int k = 0; k < b->count; k++) {
-        const double *h;
-        int stride, side;
         /* cells of one step of the table's frequency at this wavelength: no resampling */
-        bst_pupil_transfer(work, pupil, table->step * b->q[k],
-                           with_waves ? b->wavelength_m[k] : 0.0, &h, &stride, &side);
-        for (int ky = -table->reach; ky <= table->reach; ky++) {
-            const double *row = h + 2 * (size_t)((ky + side) % side) * (size_t)stride;
+        double cell = table->step * b->q[k], wavelength_m = with_waves ? b->wavelength_m[k] : 0.0;
+        int cells = (int)ceil(1.0 / cell), stride, side;
+        int reach = cells + 1 < table->reach ? cells + 1 : table->reach;
+        const float *h;
+        BST_TRY(bst_pupil_transfer(ctx, work, pupil, cell, wavelength_m, &h, &stride, &side));
+        for (int ky = -reach; ky <= reach; ky++) {
+            const float *row = h + 2 * (size_t)((ky + side) % side) * (size_t)stride;
             float *to = bst_grid_otf_node(table, 0, ky);
-            for (int i = 0; i < 2 * (table->reach + 1); i++) {
-                to[i] += sign * (float)(b->weight[k] * row[i]);
+            for (int i = 0; i < 2 * (reach + 1); i++) {
+                to[i] += (float)b->weight[k] * row[i];
             }
         }
     }
+    return BST_OK;
 }
 
 /* What a node's aperture adds to the annulus. base: table of the annulus, made when first needed.
  */
-static bst_status make_node(bst_ctx *ctx, const bst_pupil *pupil, const band *b,
-                            bst_pupil_work *work, bst_grid_otf *base, double step, int reach,
+static bst_status make_node(bst_ctx *ctx, bst_pupil_work *work, const bst_pupil *pupil,
+                            const band *b, bst_grid_otf *base, double step, int reach,
                             bst_grid_otf *out) {
     if (base->step == 0.0) {
         bst_pupil annulus = {.inner = pupil->inner};
         BST_TRY(bst_grid_otf_create(ctx, step, reach, base));
-        add_band(work, &annulus, b, false, 1.0F, base);
+        BST_TRY(add_band(ctx, work, &annulus, b, false, base));
     }
     BST_TRY(bst_grid_otf_create(ctx, step, reach, out));
-    add_band(work, pupil, b, true, 1.0F, out);
+    BST_TRY(add_band(ctx, work, pupil, b, true, out));
     for (int ky = -reach; ky <= reach; ky++) {
         const float *less = bst_grid_otf_node(base, 0, ky);
         float *node = bst_grid_otf_node(out, 0, ky);
@@ -223,7 +225,7 @@ static bst_status make_tables(bst_ctx *ctx, const bst_camera *camera, const band
     for (int k = 0; k < bst_psf_nodes(psf) && status == BST_OK; k++) {
         status = make_wavefront(ctx, o, field ? &field[k] : NULL, &pupil.wavefront);
         if (status == BST_OK && (pupil.vanes > 0 || aberrated(&pupil.wavefront))) {
-            status = make_node(ctx, &pupil, b, work, &base, step, reach, &psf->nodes[k].grid);
+            status = make_node(ctx, work, &pupil, b, &base, step, reach, &psf->nodes[k].grid);
         }
     }
     bst_grid_otf_free(&base);

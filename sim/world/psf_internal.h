@@ -2,6 +2,8 @@
 #ifndef BST_WORLD_PSF_INTERNAL_H
 #define BST_WORLD_PSF_INTERNAL_H
 
+#include <stdatomic.h>
+
 #include "sim/world/psf.h"
 
 /* A real, circular OTF: values at f = limit (i / (BST_RADIAL_NODES - 1))^2, which follow a power of
@@ -45,6 +47,7 @@ void bst_grid_otf_add(const bst_grid_otf *table, double fx, double fy, double ou
 
 /* One node of the field grid. */
 typedef struct bst_psf_node {
+    double equivalent_fwhm_px;
     double sigma_px;              /* Gaussian part: the profile itself, or 0 */
     const bst_radial_otf *radial; /* NULL: none; lent by the PSF */
     bst_radial_otf own_radial;    /* where nodes differ in it */
@@ -52,8 +55,10 @@ typedef struct bst_psf_node {
 } bst_psf_node;
 
 struct bst_psf {
+    atomic_int owners;
     int32_t model;
     int columns, rows;
+    double fwhm_px; /* the camera's */
     double width_px, height_px;
     double diffusion_px, fill[2];
     double cutoff, reach_px;

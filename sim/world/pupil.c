@@ -19,11 +19,11 @@ typedef struct stretches {
 
 struct bst_pupil_work {
     int side;
-    double *open;           /* [side][side] */
-    fftw_complex *field;    /* [side][side] */
-    double *power;          /* [side][side] */
-    fftw_complex *transfer; /* [side][side / 2 + 1] */
-    fftw_plan forward, back;
+    double *open;            /* [side][side] */
+    fftwf_complex *field;    /* [side][side] */
+    float *power;            /* [side][side] */
+    fftwf_complex *transfer; /* [side][side / 2 + 1] */
+    fftwf_plan forward, back;
 };
 
 /* The next even number of the form 2^a 3^b 5^c. */
@@ -41,47 +41,66 @@ static int quick_size(int least) {
     }
 }
 
-void bst_pupil_work_free(bst_pupil_work *w) {
-    if (w) {
-        if (w->forward) {
-            fftw_destroy_plan(w->forward);
-        }
-        if (w->back) {
-            fftw_destroy_plan(w->back);
-        }
-        free(w->open);
-        fftw_free(w->field);
-        fftw_free(w->power);
-        fftw_free(w->transfer);
-        free(w);
-    }
+/* Side of the grid: shifts of up to a whole aperture must not wrap around. */
+static int side_for(int cells) {
+    return quick_size(2 * cells + 6);
 }
 
 bst_status bst_pupil_work_create(bst_ctx *ctx, int cells, bst_pupil_work **out) {
     /* FFTW's planner is shared by the whole process */
-    fftw_make_planner_thread_safe();
+    fftwf_make_planner_thread_safe();
     bst_pupil_work *w = calloc(1, sizeof *w);
     *out = NULL;
     if (w) {
-        /* shifts of up to a whole aperture must not wrap around */
-        w->side = quick_size(2 * cells + 6);
-        size_t n = (size_t)w->side * (size_t)w->side;
+        size_t side = (size_t)side_for(cells), n = side * side;
         w->open = malloc(n * sizeof *w->open);
-        w->field = fftw_alloc_complex(n);
-        w->power = fftw_alloc_real(n);
-        w->transfer = fftw_alloc_complex((size_t)w->side * (size_t)(w->side / 2 + 1));
-        if (w->open && w->field && w->power && w->transfer) {
-            w->forward =
-                fftw_plan_dft_2d(w->side, w->side, w->field, w->field, FFTW_FORWARD, FFTW_ESTIMATE);
-            w->back = fftw_plan_dft_r2c_2d(w->side, w->side, w->power, w->transfer, FFTW_ESTIMATE);
-        }
+        w->field = fftwf_alloc_complex(n);
+        w->power = fftwf_alloc_real(n);
+        w->transfer = fftwf_alloc_complex(side * (side / 2 + 1));
     }
-    if (!w || !w->forward || !w->back) {
+    if (!w || !w->open || !w->field || !w->power || !w->transfer) {
         bst_pupil_work_free(w);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for an aperture of %d cells", cells);
     }
     *out = w;
     return BST_OK;
+}
+
+static void drop_plans(bst_pupil_work *w) {
+    if (w->forward) {
+        fftwf_destroy_plan(w->forward);
+    }
+    if (w->back) {
+        fftwf_destroy_plan(w->back);
+    }
+    w->forward = w->back = NULL;
+    w->side = 0;
+}
+
+/* Plans for apertures of `cells` cells. */
+static bst_status plan(bst_ctx *ctx, bst_pupil_work *w, int cells) {
+    int side = side_for(cells);
+    if (side != w->side) {
+        drop_plans(w);
+        w->forward = fftwf_plan_dft_2d(side, side, w->field, w->field, FFTW_FORWARD, FFTW_ESTIMATE);
+        w->back = fftwf_plan_dft_r2c_2d(side, side, w->power, w->transfer, FFTW_ESTIMATE);
+        if (!w->forward || !w->back) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for an aperture of %d cells", cells);
+        }
+        w->side = side;
+    }
+    return BST_OK;
+}
+
+void bst_pupil_work_free(bst_pupil_work *w) {
+    if (w) {
+        drop_plans(w);
+        free(w->open);
+        fftwf_free(w->field);
+        fftwf_free(w->power);
+        fftwf_free(w->transfer);
+        free(w);
+    }
 }
 
 /* Takes (from, to) out of the open stretches. */
@@ -172,8 +191,9 @@ void bst_pupil_mask(const bst_pupil *pupil, double cell, int side, double *open)
     }
 }
 
-void bst_pupil_transfer(bst_pupil_work *w, const bst_pupil *pupil, double cell, double wavelength_m,
-                        const double **out, int *stride, int *side) {
+bst_status bst_pupil_transfer(bst_ctx *ctx, bst_pupil_work *w, const bst_pupil *pupil, double cell,
+                              double wavelength_m, const float **out, int *stride, int *side) {
+    BST_TRY(plan(ctx, w, (int)ceil(1.0 / cell)));
     int n = w->side;
     bst_pupil_mask(pupil, cell, n, w->open);
     double area = 0.0;
@@ -187,29 +207,32 @@ void bst_pupil_transfer(bst_pupil_work *w, const bst_pupil *pupil, double cell, 
         }
         for (int i = 0; i < n; i++) {
             size_t at = (size_t)j * (size_t)n + (size_t)i;
-            double open = w->open[at], phase = 0.0;
+            double open = w->open[at];
+            w->field[at][0] = (float)open;
+            w->field[at][1] = 0.0F;
             if (open > 0.0 && wavelength_m > 0.0) {
-                double x = 2.0 * (i - n / 2) * cell;
+                double x = 2.0 * (i - n / 2) * cell, phase = 0.0;
                 for (int p = BST_ZERNIKE_DEGREE; p >= 0; p--) {
                     phase = phase * x + along_x[p];
                 }
                 phase *= 2.0 * BST_PI / wavelength_m;
+                w->field[at][0] = (float)(open * cos(phase));
+                w->field[at][1] = (float)(open * sin(phase));
             }
-            w->field[at][0] = open > 0.0 ? open * cos(phase) : 0.0;
-            w->field[at][1] = open > 0.0 ? open * sin(phase) : 0.0;
             area += open;
         }
     }
-    fftw_execute(w->forward);
-    double scale = 1.0 / (area * (double)n * (double)n);
+    fftwf_execute(w->forward);
+    float scale = (float)(1.0 / (area * (double)n * (double)n));
     for (size_t at = 0; at < (size_t)n * (size_t)n; at++) {
-        const double *a = w->field[at];
+        const float *a = w->field[at];
         w->power[at] = scale * (a[0] * a[0] + a[1] * a[1]);
     }
-    fftw_execute(w->back);
+    fftwf_execute(w->back);
     *out = &w->transfer[0][0];
     *stride = n / 2 + 1;
     *side = n;
+    return BST_OK;
 }
 
 double bst_pupil_slope_m(const bst_pupil *pupil) {

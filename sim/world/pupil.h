@@ -17,7 +17,8 @@ typedef struct bst_pupil {
 
 typedef struct bst_pupil_work bst_pupil_work;
 
-/* Work space for apertures of at most `cells` grid cells across. */
+/* Work space for apertures of at most `cells` grid cells across; single precision, as the tables.
+ */
 bst_status bst_pupil_work_create(bst_ctx *ctx, int cells, bst_pupil_work **out) BST_MUST_CHECK;
 void bst_pupil_work_free(bst_pupil_work *work);
 
@@ -29,9 +30,10 @@ void bst_pupil_mask(const bst_pupil *pupil, double cell, int side, double *open)
  * area: *out lends, until the next call, rows of (*stride) complex pairs; the shift of (kx, ky)
  * cells with kx >= 0 is at row (ky modulo *side), column kx. Conjugated so that it is the transfer
  * function of the image in which a wavefront that grows towards +x moves light to +x.
- * wavelength_m 0: as if there were no aberration. */
-void bst_pupil_transfer(bst_pupil_work *work, const bst_pupil *pupil, double cell,
-                        double wavelength_m, const double **out, int *stride, int *side);
+ * wavelength_m 0: as if there were no aberration. BST_ERR_MEMORY. */
+bst_status bst_pupil_transfer(bst_ctx *ctx, bst_pupil_work *work, const bst_pupil *pupil,
+                              double cell, double wavelength_m, const float **out, int *stride,
+                              int *side) BST_MUST_CHECK;
 
 /* Largest slope of the wavefront on the aperture, m per diameter. */
 double bst_pupil_slope_m(const bst_pupil *pupil);

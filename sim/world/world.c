@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "sim/world/ephemeris.h"
+#include "sim/world/psf.h"
 #include "sim/world/stray.h"
 #include "sim/world/world_build.h"
 
@@ -44,6 +45,44 @@ static bst_status make_pst(const bst_world_builder *b, bst_camera *camera, int o
     return BST_OK;
 }
 
+/* The PSF of a sensor's camera, and a copy of its own of the list that describes the field. That of
+ * a file is made once the file's samples are there. */
+static bst_status make_psf(const bst_world_builder *b, bst_camera *camera, int observer,
+                           int sensor) {
+    bst_config_list *field = &camera->optics.field;
+    const void *given = field->items;
+    field->items = NULL;
+    if (field->count > 0) {
+        size_t bytes = (size_t)field->count * sizeof(bst_psf_field_node);
+        field->items = malloc(bytes);
+        if (!field->items) {
+            return bst_fail(b->ctx, BST_ERR_MEMORY, "out of memory for a camera's field");
+        }
+        memcpy(field->items, given, bytes);
+    }
+    camera->psf = NULL;
+    if (camera->optics.psf == BST_PSF_FILE) {
+        return BST_OK;
+    }
+    bst_psf *psf;
+    bst_status status = bst_psf_create(b->ctx, camera, &psf);
+    camera->psf = psf;
+    return status == BST_OK ? BST_OK
+                            : bst_fail_prefix(b->ctx, status, "%s: /observers/%d/sensors/%d/camera",
+                                              b->scenario, observer, sensor);
+}
+
+bst_status bst_world_set_psf(bst_ctx *ctx, bst_world *world, int observer, int sensor,
+                             const bst_psf_samples *samples) {
+    bst_camera *camera = &world->observers[observer].sensors[sensor].config.camera;
+    const bst_psf_inputs inputs = {.samples = samples};
+    bst_psf *psf;
+    BST_TRY(bst_psf_create_from(ctx, camera, &inputs, &psf));
+    bst_psf_free((bst_psf *)camera->psf);
+    camera->psf = psf;
+    return BST_OK;
+}
+
 static bst_status make_observers(const bst_world_builder *b, const bst_config_list *list) {
     bst_world *world = b->world;
     world->observers = calloc((size_t)list->count + 1, sizeof *world->observers);
@@ -67,6 +106,7 @@ static bst_status make_observers(const bst_world_builder *b, const bst_config_li
         }
         for (int s = 0; s < config->sensors.count; s++) {
             observer->sensors[s].config = ((const bst_sensor_config *)config->sensors.items)[s];
+            BST_TRY(make_psf(b, &observer->sensors[s].config.camera, i, s));
             bst_status status = bst_camera_prepare(b->ctx, &observer->sensors[s].config.camera);
             if (status != BST_OK) {
                 return bst_fail_prefix(b->ctx, status,
@@ -156,12 +196,16 @@ void bst_world_free(bst_world *world) {
         bst_orbit_free(&world->objects[i].orbit);
     }
     for (int i = 0; world->observers && i < world->observer_count; i++) {
-        bst_orbit_free(&world->observers[i].orbit);
-        for (int k = 0; world->observers[i].sensors && k < world->observers[i].sensor_count; k++) {
-            bst_band_free((bst_band *)world->observers[i].sensors[k].config.camera.spectrum);
-            bst_pst_free((bst_pst *)world->observers[i].sensors[k].config.camera.pst);
+        world_observer *observer = &world->observers[i];
+        bst_orbit_free(&observer->orbit);
+        for (int k = 0; observer->sensors && k < observer->sensor_count; k++) {
+            bst_camera *camera = &observer->sensors[k].config.camera;
+            bst_psf_free((bst_psf *)camera->psf);
+            bst_band_free((bst_band *)camera->spectrum);
+            bst_pst_free((bst_pst *)camera->pst);
+            free(camera->optics.field.items);
         }
-        free(world->observers[i].sensors);
+        free(observer->sensors);
     }
     bst_world_files_free(world);
     bst_name_index_free(world->object_names);

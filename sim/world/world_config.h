@@ -165,6 +165,13 @@ bst_status bst_world_check_spans(bst_ctx *ctx, const char *scenario, const struc
                                  double duration_s) BST_MUST_CHECK;
 void bst_world_free(struct bst_world *world);
 
+struct bst_psf_samples;
+
+/* Gives a sensor whose camera has the PSF of a file (optics.psf BST_PSF_FILE) that PSF's samples,
+ * before anything is made of the sensor. Errors of bst_psf_create_from. */
+bst_status bst_world_set_psf(bst_ctx *ctx, struct bst_world *world, int observer, int sensor,
+                             const struct bst_psf_samples *samples) BST_MUST_CHECK;
+
 /* Before the first frame, and before the world is shared: lets the work on thousands of orbits be
  * done by `threads` threads (0: one per processor) and does what can be done ahead. Optional;
  * changes no value. */

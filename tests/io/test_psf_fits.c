@@ -4,6 +4,7 @@
 #include <fitsio.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 #include <unistd.h>
 
 #include "sim/core/vec.h"
@@ -71,6 +72,40 @@ static void widths_by_closed_forms(void **state) {
     scratch_remove(&s);
 }
 
+static void samples_of_images_and_cubes(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    scratch s;
+    scratch_make(&s);
+    bst_psf_samples samples;
+    for (int i = 0; i < 2 * 30 * 20; i++) {
+        image[i] = (float)i - 3.0f;
+    }
+    for (int axes = 2; axes <= 3; axes++) {
+        const char *path = scratch_path(&s, axes == 2 ? "a.fits" : "b.fits");
+        long size[3] = {30, 20, 2};
+        fitsfile *file;
+        int code = 0;
+        fits_create_diskfile(&file, path, &code);
+        fits_create_img(file, FLOAT_IMG, axes, size, &code);
+        fits_write_key_dbl(file, "OVERSAMP", 4.0, 10, "", &code);
+        fits_write_img(file, TFLOAT, 1, 30 * 20 * (axes - 1), image, &code);
+        fits_close_file(file, &code);
+        assert_int_equal(code, 0);
+        bst_assert_ok(&ctx, bst_psf_fits_samples(&ctx, path, axes == 2 ? 0.0 : 7.0, &samples));
+        assert_int_equal(samples.width, 30);
+        assert_int_equal(samples.height, 20);
+        assert_int_equal(samples.planes, axes - 1);
+        bst_assert_close(samples.oversampling, axes == 2 ? 4.0 : 7.0, 0); /* as given */
+        assert_memory_equal(samples.samples, image, (size_t)(30 * 20 * (axes - 1)) * sizeof *image);
+        free((float *)samples.samples);
+    }
+    const char *path = put(&s, "no.fits", 2, 16, 16, 0, NULL);
+    assert_int_equal(bst_psf_fits_samples(&ctx, path, 0, &samples), BST_ERR_FORMAT);
+    assert_non_null(strstr(ctx.message, "has no keyword OVERSAMP"));
+    scratch_remove(&s);
+}
+
 static void expect_refusal(const char *path, double oversampling, const char *tail) {
     bst_ctx ctx = {0};
     bst_psf_summary psf;
@@ -119,6 +154,7 @@ static void bad_files_are_explained(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(widths_by_closed_forms),
+        cmocka_unit_test(samples_of_images_and_cubes),
         cmocka_unit_test(bad_files_are_explained),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

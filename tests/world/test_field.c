@@ -1,5 +1,6 @@
 /* The field query against brute force. */
 #include "sim/world/field.h"
+#include "sim/world/psf.h"
 
 #include <stdlib.h>
 
@@ -221,6 +222,42 @@ static void snr_is_that_of_the_smeared_image(void **state) {
             bst_assert_close(item.snr / (item.electrons * sqrt(squared / variance)), 1, 0.02);
         }
     }
+    free_scene(&s);
+}
+
+/* A Moffat PSF that widens over the field, and vignetting: what the truth says of the light. */
+static void truth_follows_the_optics(void **state) {
+    (void)state;
+    scene s = make_scene_in(test_world(
+        "{\"world\": {\"star_catalogue\": \"embedded\", \"objects\": [" GX5
+        "]}, \"observers\": [{\"name\": \"neossat\", " TEST_NEOSSAT
+        ", \"sensors\": [{\"cue\": {\"object\": \"GX5\"}, \"camera\": {\"pixel_scale_arcsec\": 3, "
+        "\"aperture_m\": 0.15, \"optics\": {\"psf\": \"moffat\", \"field_columns\": 2, "
+        "\"field\": [{\"psf_fwhm_px\": 2}, {\"psf_fwhm_px\": 4}], \"vignetting\": "
+        "{\"model\": \"polynomial\", \"coefficients\": [-0.4, 0, 0]}}}}]}]}"));
+    const bst_camera *camera = bst_world_camera(s.world, 0, 0);
+    fill(&s, 0, 0, 0, 0);
+    query(&s, 3000, full);
+    assert_true(s.count > 20);
+    double variance = s.truth.background_e + s.truth.dark_e + 64, least = 1.0, most = 0.0;
+    for (int i = 0; i < s.count; i++) {
+        bst_truth_item item;
+        bst_field_truth_item(s.field, &s.track, &s.sources[i], full, &s.truth, &item);
+        double dx = item.x_mean_px - bst_camera_centre_x(camera),
+               dy = item.y_mean_px - bst_camera_centre_y(camera);
+        double share = 1.0 - 0.4 * (dx * dx + dy * dy) / (2.0 * 512.0 * 512.0);
+        bst_assert_close(item.electrons, share * s.sources[i].electrons_per_s * 0.5, 1e-9);
+        double u = fmin(fmax(item.x_mean_px / 1023.0, 0.0), 1.0);
+        double area = (1.0 - u) * bst_psf_noise_area_px2(camera->psf, 0) +
+                      u * bst_psf_noise_area_px2(camera->psf, 1);
+        if (s.sources[i].kind == BST_SOURCE_STAR) { /* at rest */
+            /* the mean of the widths is not that of the areas: 6 % of the area half-way */
+            bst_assert_close(item.snr / (item.electrons / sqrt(variance * area)), 1, 0.06);
+        }
+        least = fmin(least, u);
+        most = fmax(most, u);
+    }
+    assert_true(least < 0.2 && most > 0.8);
     free_scene(&s);
 }
 
@@ -520,6 +557,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(mean_places_are_those_of_the_light),
         cmocka_unit_test(snr_is_that_of_the_smeared_image),
+        cmocka_unit_test(truth_follows_the_optics),
         cmocka_unit_test(no_star_is_missed),
         cmocka_unit_test(an_exposure_of_no_length),
         cmocka_unit_test(the_target_is_where_the_sight_says),

@@ -1,6 +1,7 @@
 /* What the onboard side knows otherwise than it is, against its effect by theory. */
 #include "sim/world/knowledge.h"
 
+#include "sim/world/psf.h"
 #include "tests/world/world_support.h"
 
 #define GX5 "{\"name\": \"GX5\", " TEST_GX5 "}"
@@ -157,6 +158,34 @@ static void a_velocity_error_is_aberration(void **state) {
     drop(&s);
 }
 
+/* A PSF that is no Gaussian is known as the Gaussian of its noise-equivalent area. */
+static void the_onboard_psf_is_a_gaussian(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_world *world = test_world(
+        "{\"world\": {\"star_catalogue\": \"embedded\", \"objects\": [" GX5
+        "]}, \"observers\": [{\"name\": \"neossat\", " TEST_NEOSSAT
+        ", \"sensors\": [{\"cue\": {\"object\": \"GX5\"}, \"camera\": {\"pixel_scale_arcsec\": 3, "
+        "\"aperture_m\": 0.15, \"optics\": {\"psf\": \"diffraction\", \"q\": 2}}}, "
+        "{\"name\": \"b\", \"cue\": {\"object\": \"GX5\"}, \"camera\": {\"pixel_scale_arcsec\": 3, "
+        "\"aperture_m\": 0.15, \"optics\": {\"diffusion_px\": 0.5}}, "
+        "\"knowledge\": {\"camera\": {\"psf_fwhm_px\": 3}}}]}]}");
+    for (int sensor = 0; sensor < 2; sensor++) {
+        bst_knowledge *knowledge;
+        bst_assert_ok(&ctx, bst_knowledge_create(&ctx, world, 0, sensor, &knowledge));
+        const bst_camera *known = bst_knowledge_camera(knowledge);
+        assert_int_equal(known->optics.psf, BST_PSF_GAUSSIAN);
+        assert_true(known->optics.diffusion_px == 0.0 && !known->psf);
+        double want =
+            sensor ? 3.0
+                   : bst_psf_equivalent_fwhm_px(bst_world_camera(world, 0, 0)->psf, 511.5, 511.5);
+        bst_assert_close(known->psf_fwhm_px, want, 1e-12);
+        assert_true(sensor || (want > 2.0 && want < 2.6)); /* 1.03 Q at half maximum, and wings */
+        bst_knowledge_free(knowledge);
+    }
+    bst_world_free(world);
+}
+
 static void the_camera_may_be_known_wrongly(void **state) {
     (void)state;
     scene s = make(
@@ -260,6 +289,7 @@ int main(void) {
         cmocka_unit_test(a_clock_offset_shifts_the_cue_by_its_rate),
         cmocka_unit_test(the_start_follows_what_is_believed),
         cmocka_unit_test(a_velocity_error_is_aberration),
+        cmocka_unit_test(the_onboard_psf_is_a_gaussian),
         cmocka_unit_test(the_camera_may_be_known_wrongly),
         cmocka_unit_test(stars_are_dropped_and_displaced),
     };

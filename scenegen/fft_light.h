@@ -1,0 +1,60 @@
+/* Light through a general PSF: aberrated, not separable, its wings not cut.
+ *
+ * The frame's nodes are spread on a grid of the density that the PSF's band asks for, on the
+ * device; the grid is convolved by FFT on the host's threads (a CPU device's memory is used in
+ * place), and the image goes to the tile kernel. The cost depends on the window and the number of
+ * nodes, hardly on the PSF; a field-dependent PSF costs one grid per field node. */
+#ifndef BST_SCENEGEN_FFT_LIGHT_H
+#define BST_SCENEGEN_FFT_LIGHT_H
+
+#include "scenegen/kernels/scene_shared.h"
+#include "scenegen/light_grid.h"
+#include "sim/core/messages.h"
+#include "sim/device/device.h"
+
+typedef struct bst_fft_light bst_fft_light;
+
+typedef struct bst_fft_light_options {
+    int taps;         /* of the spreading kernel: 4, 6 or 8 */
+    double tolerance; /* error of the grid in any pixel, over the PSF's peak */
+} bst_fft_light_options;
+
+bst_fft_light_options bst_fft_light_default_options(void);
+
+/* Measures the PSF and builds the kernel. The PSF is borrowed. `options` may be NULL. */
+bst_status bst_fft_light_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
+                                const bst_psf *psf, const bst_fft_light_options *options,
+                                bst_fft_light **out) BST_MUST_CHECK;
+void bst_fft_light_free(bst_fft_light *light);
+
+const bst_light_band *bst_fft_light_band(const bst_fft_light *light);
+
+/* Pixels outside the window from which a source's light is still drawn. */
+int bst_fft_light_margin_px(const bst_fft_light *light);
+
+/* Sets the part of a source's record that says how far its nodes reach. */
+void bst_fft_light_stamp(const bst_fft_light *light, bst_scene_source *source);
+
+/* Bound of the latest image's error by grid and cut-off, over a source's peak. */
+double bst_fft_light_error(const bst_fft_light *light);
+
+/* The frame's nodes on the device, as the nodes kernel leaves them. */
+typedef struct bst_fft_light_nodes {
+    cl_mem sources, nodes, block_box, source_box;
+    int source_groups;
+} bst_fft_light_nodes;
+
+/* Expected electrons of the window's pixels: pixel (i, j) at buffer[first + j * pitch + i]. Valid
+ * until the next call. */
+typedef struct bst_fft_light_image {
+    cl_mem buffer;
+    int first, pitch;
+} bst_fft_light_image;
+
+/* Makes the image of a window. Waits for the nodes on `queue`. Prepares for a window of a new size
+ * first, which takes longer than the image itself; the latest few sizes are kept. */
+bst_status bst_fft_light_render(bst_ctx *ctx, bst_fft_light *light, cl_command_queue queue,
+                                bst_window window, const bst_fft_light_nodes *nodes,
+                                bst_fft_light_image *out) BST_MUST_CHECK;
+
+#endif

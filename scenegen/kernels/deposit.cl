@@ -1,0 +1,248 @@
+/* Light of all nodes on a grid for the Fourier path: each node is spread over eight by eight samples.
+ * Options: DEPOSIT_W, DEPOSIT_H (samples of a tile, a multiple of 16 wide), DEPOSIT_GROUP (work-items
+ * per work-group), FIELD (weights by place).
+ *
+ * One work-item owns a tile and adds its nodes in the order of sources, blocks and nodes: the sum is
+ * the same for every tile and work-group size. */
+
+/* Rows of a tile are a vector apart, which keeps neighbouring rows out of one another's cache sets. */
+#define DEPOSIT_STRIDE (DEPOSIT_W + 16)
+/* Nodes that share a pass over their rows, and how many rows they may span together. */
+#define DEPOSIT_TEAM 4
+#define DEPOSIT_SPAN 24
+
+static int any_of(int16 v) {
+    int8 a = v.lo | v.hi;
+    int4 b = a.lo | a.hi;
+    int2 c = b.lo | b.hi;
+    return (c.lo | c.hi) < 0;
+}
+
+#ifdef FIELD
+/* Bilinear weight of the field node at a place. */
+static float field_weight(bst_deposit_params p, global const float *field, float x, float y) {
+    float u = clamp(x * p.field_per_px_x, 0.0f, (float)(p.field_x - 1));
+    float v = clamp(y * p.field_per_px_y, 0.0f, (float)(p.field_y - 1));
+    int i = min((int)u, p.field_x - 2), j = min((int)v, p.field_y - 2);
+    global const float *a = field + j * p.field_x + i;
+    float low = mix(a[0], a[1], u - (float)i);
+    float high = mix(a[p.field_x], a[p.field_x + 1], u - (float)i);
+    return mix(low, high, v - (float)j);
+}
+#endif
+
+/* The nodes of a block that reach a tile, filled up to whole teams with dark ones. */
+typedef struct deposit_nodes {
+    int left[BST_BLOCK], top[BST_BLOCK];    /* first tap, from the tile's corner */
+    int row_x[BST_BLOCK], row_y[BST_BLOCK]; /* places in the table */
+    float share_x[BST_BLOCK], share_y[BST_BLOCK], share_width[BST_BLOCK];
+    float electrons[BST_BLOCK];
+} deposit_nodes;
+
+/* Sixteen floats of the table from `row`, between its phase and the next (t) and, when widened,
+ * between its width and the next (u). */
+static float16 spread16(global const float *row, float t, float u) {
+    float16 a = vload16(0, row), b = vload16(0, row + BST_SPREAD_ROW);
+    a = fma((float16)t, b - a, a);
+    if (u >= 0.0f) {
+        row += (BST_SPREAD_PHASES + 1) * BST_SPREAD_ROW;
+        float16 c = vload16(0, row), d = vload16(0, row + BST_SPREAD_ROW);
+        c = fma((float16)t, d - c, c);
+        a = fma((float16)u, c - a, a);
+    }
+    return a;
+}
+
+/* The taps of node n along x on the vector of the tile that begins at `column`. */
+static float16 spread_line(const deposit_nodes *b, int n, int column, global const float *table) {
+    int shift = column - b->left[n];
+    if (shift <= -16 || shift >= BST_SPREAD_TAPS) {
+        return (float16)0.0f;
+    }
+    return b->electrons[n] * spread16(table + b->row_x[n] + BST_SPREAD_PAD + shift, b->share_x[n],
+                                      b->share_width[n]);
+}
+
+/* Adds nodes n to n + DEPOSIT_TEAM - 1, which together span at most DEPOSIT_SPAN rows from `top`.
+ * Each row is loaded and stored once for all of them; a sample still receives them one after the
+ * other, and a zero from those that do not reach it. Vectors of the tile are touched where they lie,
+ * so that what one team has stored the next can load at once. */
+static void deposit_team(local float *sum, const deposit_nodes *b, int n, int top, int bottom,
+                         int left, int right, global const float *table) {
+    float heights[DEPOSIT_TEAM][DEPOSIT_SPAN + 16];
+    for (int k = 0; k < DEPOSIT_TEAM; k++) {
+        for (int j = 0; j < DEPOSIT_SPAN; j += 8) {
+            vstore8((float8)0.0f, 0, heights[k] + j);
+        }
+    }
+    for (int k = 0; k < DEPOSIT_TEAM; k++) {
+        float16 h = spread16(table + BST_SPREAD_TABLE + b->row_y[n + k] + BST_SPREAD_PAD,
+                             b->share_y[n + k], b->share_width[n + k]);
+        vstore8(h.lo, 0, heights[k] + (b->top[n + k] - top));
+    }
+    const float *h0 = heights[0], *h1 = heights[1], *h2 = heights[2], *h3 = heights[3];
+    int first = max(0, -top), last = min(bottom, DEPOSIT_H) - top, end = min(right, DEPOSIT_W);
+    for (int column = max(left & ~15, 0); column < end; column += 16) {
+        float16 l0 = spread_line(b, n, column, table);
+        float16 l1 = spread_line(b, n + 1, column, table);
+        float16 l2 = spread_line(b, n + 2, column, table);
+        float16 l3 = spread_line(b, n + 3, column, table);
+        local float16 *target = (local float16 *)(sum + (top + first) * DEPOSIT_STRIDE + column);
+        for (int j = first; j < last; j++) {
+            float16 v = *target;
+            v = fma((float16)h0[j], l0, v);
+            v = fma((float16)h1[j], l1, v);
+            v = fma((float16)h2[j], l2, v);
+            *target = fma((float16)h3[j], l3, v);
+            target += DEPOSIT_STRIDE / 16;
+        }
+    }
+}
+
+/* The nodes of one block that reach the tile; returns how many. */
+static int find_nodes(bst_deposit_params p, int tile_x, int tile_y, global const float16 *block,
+                      global const float *field, deposit_nodes *out) {
+    float16 u = (block[0] - p.x0) * p.density_x, v = (block[1] - p.y0) * p.density_y;
+    float16 floor_u = floor(u), floor_v = floor(v), width = block[3];
+    float16 phase_u = (u - floor_u) * BST_SPREAD_PHASES, phase_v = (v - floor_v) * BST_SPREAD_PHASES;
+    float16 step_u = fmin(floor(phase_u), BST_SPREAD_PHASES - 1.0f);
+    float16 step_v = fmin(floor(phase_v), BST_SPREAD_PHASES - 1.0f);
+    float16 level = fmin(floor(width), BST_WIDTHS - 1.0f);
+    const float before = BST_SPREAD_TAPS / 2 - 1, after = BST_SPREAD_TAPS / 2;
+    float16 column = floor_u - (before + (float)tile_x), row = floor_v - (before + (float)tile_y);
+    int16 hit = (block[2] > 0.0f) & (column > (float)-BST_SPREAD_TAPS) & (column < (float)DEPOSIT_W) &
+                (row > (float)-BST_SPREAD_TAPS) & (row < (float)DEPOSIT_H) &
+                /* what lies outside the grid would come in on its other side */
+                (floor_u >= before) & (floor_v >= before) & (floor_u < (float)p.samples_x - after) &
+                (floor_v < (float)p.samples_y - after);
+    if (!any_of(hit)) {
+        return 0;
+    }
+    float16 base = level * (float)((BST_SPREAD_PHASES + 1) * BST_SPREAD_ROW);
+    int hits[16], left[16], top[16], row_x[16], row_y[16];
+    float share_x[16], share_y[16], share_width[16], electrons[16];
+    vstore16(hit, 0, hits);
+    vstore16(convert_int16(column), 0, left);
+    vstore16(convert_int16(row), 0, top);
+    vstore16(convert_int16(base + step_u * (float)BST_SPREAD_ROW), 0, row_x);
+    vstore16(convert_int16(base + step_v * (float)BST_SPREAD_ROW), 0, row_y);
+    vstore16(phase_u - step_u, 0, share_x);
+    vstore16(phase_v - step_v, 0, share_y);
+    vstore16(select((float16)-1.0f, width - level, width > 0.0f), 0, share_width);
+    vstore16(block[2], 0, electrons);
+#ifdef FIELD
+    float px[16], py[16];
+    vstore16(block[0], 0, px);
+    vstore16(block[1], 0, py);
+#endif
+    int count = 0;
+    for (int n = 0; n < BST_BLOCK; n++) {
+        if (hits[n]) {
+            out->left[count] = left[n];
+            out->top[count] = top[n];
+            out->row_x[count] = row_x[n];
+            out->row_y[count] = row_y[n];
+            out->share_x[count] = share_x[n];
+            out->share_y[count] = share_y[n];
+            out->share_width[count] = share_width[n];
+            out->electrons[count] = electrons[n];
+#ifdef FIELD
+            out->electrons[count] *= field_weight(p, field, px[n], py[n]);
+#endif
+            count++;
+        }
+    }
+    for (int n = count; n & (DEPOSIT_TEAM - 1); n++) {
+        out->left[n] = out->left[count - 1];
+        out->top[n] = out->top[count - 1];
+        out->row_x[n] = out->row_x[count - 1];
+        out->row_y[n] = out->row_y[count - 1];
+        out->share_x[n] = out->share_y[n] = 0.0f;
+        out->share_width[n] = -1.0f;
+        out->electrons[n] = 0.0f;
+    }
+    return count;
+}
+
+static void deposit_block(bst_deposit_params p, local float *sum, int tile_x, int tile_y,
+                          global const float16 *block, global const float *table,
+                          global const float *field) {
+    deposit_nodes b;
+    int count = find_nodes(p, tile_x, tile_y, block, field, &b);
+    for (int n = 0; n < count; n += DEPOSIT_TEAM) {
+        const int *t = b.top + n, *l = b.left + n;
+        int top = min(min(t[0], t[1]), min(t[2], t[3]));
+        int bottom = max(max(t[0], t[1]), max(t[2], t[3])) + BST_SPREAD_TAPS;
+        int left = min(min(l[0], l[1]), min(l[2], l[3]));
+        int right = max(max(l[0], l[1]), max(l[2], l[3])) + BST_SPREAD_TAPS;
+        if (bottom - top <= DEPOSIT_SPAN) {
+            deposit_team(sum, &b, n, top, bottom, left, right, table);
+            continue;
+        }
+        for (int k = n; k < n + DEPOSIT_TEAM && k < count; k++) { /* far apart: one by one */
+            deposit_nodes one;
+            for (int i = 0; i < DEPOSIT_TEAM; i++) {
+                one.left[i] = b.left[k];
+                one.top[i] = b.top[k];
+                one.row_x[i] = b.row_x[k];
+                one.row_y[i] = b.row_y[k];
+                one.share_x[i] = b.share_x[k];
+                one.share_y[i] = b.share_y[k];
+                one.share_width[i] = b.share_width[k];
+                one.electrons[i] = i == 0 ? b.electrons[k] : 0.0f;
+            }
+            deposit_team(sum, &one, 0, b.top[k], b.top[k] + BST_SPREAD_TAPS, b.left[k],
+                         b.left[k] + BST_SPREAD_TAPS, table);
+        }
+    }
+}
+
+/* grid: [samples_y][pitch]. table: [2][BST_SPREAD_TABLE], along x and y. The
+ * boxes are those of the nodes kernel, which reach at least as far as the spreading kernel. */
+__attribute__((reqd_work_group_size(DEPOSIT_GROUP, 1, 1))) kernel void bst_light_deposit(
+    bst_deposit_params p, global const bst_scene_source *sources, global const float16 *nodes,
+    global const float4 *block_box, global const float *source_box, global const float *table,
+    global const float *field, global float *grid) {
+    local float16 sums[DEPOSIT_GROUP][DEPOSIT_H * DEPOSIT_STRIDE / 16];
+    int tile = (int)get_global_id(0);
+    if (tile >= p.tiles_x * p.tiles_y) {
+        return;
+    }
+    local float *sum = (local float *)sums[get_local_id(0)];
+    int left = tile % p.tiles_x * DEPOSIT_W, top = tile / p.tiles_x * DEPOSIT_H;
+    float x0 = p.x0 + (float)left / p.density_x, x1 = x0 + (float)DEPOSIT_W / p.density_x;
+    float y0 = p.y0 + (float)top / p.density_y, y1 = y0 + (float)DEPOSIT_H / p.density_y;
+    for (int i = 0; i < DEPOSIT_H * DEPOSIT_STRIDE; i += 16) {
+        vstore16((float16)0.0f, 0, sum + i);
+    }
+    for (int g = 0; g < p.source_groups; g++) {
+        global const float *box = source_box + g * 4 * BST_BLOCK;
+        int16 hit = (vload16(0, box) <= x1) & (vload16(1, box) <= y1) & (vload16(2, box) >= x0) &
+                    (vload16(3, box) >= y0);
+        if (!any_of(hit)) {
+            continue;
+        }
+        int hits[BST_BLOCK];
+        vstore16(hit, 0, hits);
+        for (int i = 0; i < BST_BLOCK; i++) {
+            if (!hits[i]) {
+                continue;
+            }
+            bst_scene_source s = sources[g * BST_BLOCK + i];
+            for (int b = s.first_block; b < s.first_block + s.blocks; b++) {
+                float4 r = block_box[b];
+                if (r.x <= x1 && r.z >= x0 && r.y <= y1 && r.w >= y0) {
+                    deposit_block(p, sum, left, top, nodes + BST_NODE_ROWS * b, table, field);
+                }
+            }
+        }
+    }
+    int rows = min(DEPOSIT_H, p.samples_y - top), columns = min(DEPOSIT_W, p.samples_x - left);
+    for (int y = 0; y < rows; y++) {
+        global float *out = grid + (size_t)(top + y) * p.pitch + left;
+        local const float *in = sum + y * DEPOSIT_STRIDE;
+        for (int x = 0; x < columns; x += 16) { /* samples_x is a multiple of 16 */
+            vstore16(vload16(0, in + x), 0, out + x);
+        }
+    }
+}

@@ -1,0 +1,19 @@
+/* Light on one tile from the Fourier path's image, in place of the nodes' stamps. The image starts
+ * with the window's first pixel; its rows are p.light_pitch floats apart. */
+static void load_tile(local float *sum, bst_scene_params p, int left, int top,
+                      global const float *image) {
+    int rows = min(TILE_H, p.window_height - top), columns = min(TILE_W, p.window_width - left);
+    int first = max(0, -left); /* the tile may start before the window */
+    image += p.light_first + (size_t)top * p.light_pitch + left;
+    for (int y = 0; y < rows; y++) {
+        /* rounding leaves the darkest pixels a little below zero; rows are padded for the last
+         * vector */
+        for (int x = 0; x < first; x++) {
+            sum[y * STRIDE + x] = 0.0f;
+        }
+        for (int x = first; x < columns; x += 16) {
+            vstore16(fmax(vload16(0, image + (size_t)y * p.light_pitch + x), 0.0f), 0,
+                     sum + y * STRIDE + x);
+        }
+    }
+}

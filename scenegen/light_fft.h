@@ -1,0 +1,45 @@
+/* Convolution of a grid of deposited light with a PSF given as OTF, on the host's threads.
+ *
+ * The grid has `samples` samples over a period of `pixels` px per axis; the image has one value per
+ * px. Three passes over memory: rows forward; per block of columns forward, times OTF over the
+ * spreading kernel's transform, folded to the image's band, inverse; rows inverse. Lines without
+ * light, frequencies beyond the cut-off and rows outside the window are left out. The result does
+ * not depend on the number of threads. */
+#ifndef BST_SCENEGEN_LIGHT_FFT_H
+#define BST_SCENEGEN_LIGHT_FFT_H
+
+#include <stdbool.h>
+
+#include "scenegen/light_grid.h"
+#include "sim/core/parallel.h"
+
+typedef struct bst_light_fft bst_light_fft;
+
+/* A window of width x height px that starts `margin` px into the period, a multiple of 16. */
+typedef struct bst_light_shape {
+    bst_light_axis x, y;
+    int width, height, margin;
+} bst_light_shape;
+
+/* Plans, tabulates the OTF of all field nodes and prepares the far wings. The pool is borrowed.
+ * BST_ERR_MEMORY. */
+bst_status bst_light_fft_create(bst_ctx *ctx, const bst_psf *psf, double cutoff,
+                                const bst_light_shape *shape, bst_parallel *pool,
+                                bst_light_fft **out) BST_MUST_CHECK;
+void bst_light_fft_free(bst_light_fft *fft);
+
+const bst_light_shape *bst_light_fft_shape(const bst_light_fft *fft);
+
+/* Rows of the grid's memory and floats from one to the next; 64-byte aligned memory. */
+int bst_light_fft_rows(const bst_light_fft *fft);
+int bst_light_fft_pitch(const bst_light_fft *fft);
+
+/* Takes the grid that holds the light of field node `node`; its content is spent. The image is the
+ * sum over the nodes from the one that is `first` to the one that is `last`. */
+void bst_light_fft_add(bst_light_fft *fft, int node, bool first, bool last, float *grid);
+
+/* After the last node: makes the image in the same memory, pixel (i, j) of the window at
+ * grid[j * pitch + margin + i]. */
+void bst_light_fft_finish(bst_light_fft *fft, float *grid);
+
+#endif

@@ -1,0 +1,226 @@
+#include "scenegen/light_grid.h"
+
+#include <fftw3.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+    LATTICE = 128, /* frequencies per axis over the kept band */
+    IMAGE = 256,   /* PSF samples per axis from it: four per period of the highest frequency */
+    WIDE = 256,    /* coarse image of the wings */
+    DIRECTIONS = 8
+};
+
+static const double WIDE_CELL_PX = 4.0, REACH_SHARE = 3e-7, LEAST_DENSITY = 0.25,
+                    MOST_DENSITY = 5.0;
+
+static double modulus(const bst_psf *psf, int node, double fx, double fy) {
+    double v[2];
+    bst_psf_otf(psf, node, fx, fy, v);
+    return hypot(v[0], v[1]);
+}
+
+/* The band is cut where what lies beyond is a `tolerance` of the peak's bound. The pixel's own sinc
+ * keeps this finite for optics that pass far more than the pixels resolve. */
+static void find_cutoff(const bst_psf *psf, double tolerance, bst_light_band *out) {
+    enum { RINGS = 256, SECTORS = 24 };
+    double most = bst_psf_cutoff(psf), step = most / RINGS, ring[RINGS], total = 0.0;
+    for (int i = 0; i < RINGS; i++) {
+        double f = (i + 0.5) * step, largest = 0.0;
+        for (int n = 0; n < bst_psf_nodes(psf); n++) {
+            double sum = 0.0;
+            for (int k = 0; k < SECTORS; k++) {
+                double a = BST_PI * (k + 0.5) / SECTORS;
+                sum += modulus(psf, n, f * cos(a), f * sin(a)) / SECTORS;
+            }
+            largest = fmax(largest, sum);
+        }
+        ring[i] = 2.0 * BST_PI * f * step * largest;
+        total += ring[i];
+    }
+    int keep = RINGS;
+    double lost = 0.0;
+    while (keep > 1 && lost + ring[keep - 1] <= tolerance * total) {
+        lost += ring[--keep];
+    }
+    out->cutoff = keep * step;
+    out->lost = lost; /* over the peak below */
+}
+
+/* Inverse transform in place of a Hermitian lattice [n][n] given in natural wrap-around order. */
+static bst_status invert(bst_ctx *ctx, fftwf_complex *data, int n) {
+    fftwf_plan plan = fftwf_plan_dft_2d(n, n, data, data, FFTW_BACKWARD, FFTW_ESTIMATE);
+    if (!plan) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the transform of a PSF");
+    }
+    fftwf_execute(plan);
+    fftwf_destroy_plan(plan);
+    return BST_OK;
+}
+
+/* Peak, sensitivity to coarse nodes and the strength of frequencies along x and y. */
+static bst_status measure_core(bst_ctx *ctx, const bst_psf *psf, fftwf_complex *room,
+                               bst_light_band *out) {
+    double step = 2.0 * out->cutoff / LATTICE, area = step * step, fourth = 0.0, peak = 0.0;
+    for (int a = 0; a < 2; a++) {
+        out->axis[a].step = out->cutoff / BST_SPREAD_BINS;
+        memset(out->axis[a].weight, 0, sizeof out->axis[a].weight);
+    }
+    for (int n = 0; n < bst_psf_nodes(psf); n++) {
+        double along[DIRECTIONS] = {0};
+        memset(room, 0, sizeof(fftwf_complex) * IMAGE * IMAGE);
+        for (int j = -LATTICE / 2; j < LATTICE / 2; j++) {
+            for (int i = -LATTICE / 2; i < LATTICE / 2; i++) {
+                double fx = i * step, fy = j * step, v[2];
+                bst_psf_otf(psf, n, fx, fy, v);
+                fftwf_complex *z = &room[((j + IMAGE) % IMAGE) * IMAGE + (i + IMAGE) % IMAGE];
+                (*z)[0] = (float)(v[0] * area);
+                (*z)[1] = (float)(v[1] * area);
+                double m = hypot(v[0], v[1]) * area, f[2] = {fabs(fx), fabs(fy)};
+                for (int a = 0; a < 2; a++) {
+                    int bin = (int)(f[a] / out->axis[a].step);
+                    out->axis[a].weight[bin < BST_SPREAD_BINS ? bin : BST_SPREAD_BINS - 1] += m;
+                }
+                for (int d = 0; d < DIRECTIONS; d++) {
+                    double angle = BST_PI * d / DIRECTIONS;
+                    double w = 2.0 * BST_PI * (fx * cos(angle) + fy * sin(angle));
+                    along[d] += w * w * w * w * m;
+                }
+            }
+        }
+        BST_TRY(invert(ctx, room, IMAGE));
+        double top = 0.0;
+        for (int i = 0; i < IMAGE * IMAGE; i++) {
+            top = fmax(top, room[i][0]);
+        }
+        peak = fmax(peak, top);
+        for (int d = 0; d < DIRECTIONS; d++) {
+            fourth = fmax(fourth, along[d] / top);
+        }
+    }
+    out->peak = peak;
+    out->lost /= peak;
+    out->node_sigma_px = pow(3.0 / fourth, 0.25);
+    for (int a = 0; a < 2; a++) {
+        for (int i = 0; i < BST_SPREAD_BINS; i++) {
+            out->axis[a].weight[i] /= peak * bst_psf_nodes(psf);
+        }
+    }
+    double low = 0.01, high = 100.0;
+    for (int k = 0; k < 60; k++) {
+        double mid = sqrt(low * high), line = erf(0.5 / (mid * sqrt(2.0)));
+        *(line * line > peak ? &low : &high) = mid;
+    }
+    out->share_sigma_px = low;
+    return BST_OK;
+}
+
+/* The smallest distance beyond which the wings, smoothed over a few px, stay below REACH_SHARE. */
+static bst_status measure_reach(bst_ctx *ctx, const bst_psf *psf, fftwf_complex *room,
+                                bst_light_band *out) {
+    double step = 1.0 / (WIDE * WIDE_CELL_PX), area = step * step, reach = 0.0;
+    for (int n = 0; n < bst_psf_nodes(psf); n++) {
+        for (int j = -WIDE / 2; j < WIDE / 2; j++) {
+            for (int i = -WIDE / 2; i < WIDE / 2; i++) {
+                double fx = i * step, fy = j * step, v[2];
+                /* smoothed by a Gaussian of one cell, so that the band's end leaves no ripples */
+                double s = 2.0 * BST_PI * BST_PI * WIDE_CELL_PX * WIDE_CELL_PX,
+                       smooth = exp(-s * (fx * fx + fy * fy));
+                bst_psf_otf(psf, n, fx, fy, v);
+                fftwf_complex *z = &room[((j + WIDE) % WIDE) * WIDE + (i + WIDE) % WIDE];
+                (*z)[0] = (float)(v[0] * smooth * area);
+                (*z)[1] = (float)(v[1] * smooth * area);
+            }
+        }
+        BST_TRY(invert(ctx, room, WIDE));
+        for (int j = -WIDE / 2; j < WIDE / 2; j++) {
+            for (int i = -WIDE / 2; i < WIDE / 2; i++) {
+                float p = room[((j + WIDE) % WIDE) * WIDE + (i + WIDE) % WIDE][0];
+                if (fabs((double)p) > REACH_SHARE) {
+                    reach = fmax(reach, WIDE_CELL_PX * hypot(i, j));
+                }
+            }
+        }
+    }
+    out->reach_px = (int)fmin(fmax(ceil(reach), 16.0), 160.0);
+    return BST_OK;
+}
+
+bst_status bst_light_band_measure(bst_ctx *ctx, const bst_psf *psf, double tolerance,
+                                  bst_light_band *out) {
+    fftwf_complex *room = fftwf_malloc(sizeof *room * IMAGE * IMAGE);
+    if (!room) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the band of a PSF");
+    }
+    find_cutoff(psf, tolerance, out);
+    bst_status status = measure_core(ctx, psf, room, out);
+    if (status == BST_OK) {
+        status = measure_reach(ctx, psf, room, out);
+    }
+    fftwf_free(room);
+    return status;
+}
+
+double bst_light_density(const bst_light_band *band, int axis, int taps, double tolerance) {
+    bst_spread spread = {taps, 0.0};
+    double low = fmax(0.5 * band->cutoff, LEAST_DENSITY), high = MOST_DENSITY;
+    if (bst_spread_choose(&spread, &band->axis[axis], high) > tolerance) {
+        return high;
+    }
+    for (int k = 0; k < 10; k++) {
+        double mid = 0.5 * (low + high);
+        *(bst_spread_choose(&spread, &band->axis[axis], mid) > tolerance ? &low : &high) = mid;
+    }
+    return high;
+}
+
+/* Time of one line's transform by its length: measured with FFTW's estimated plans, which are quick
+ * for powers of two and five times those. INFINITY for lengths that are not used. */
+static double cost(int axis, int n) {
+    int rest = n, two = 0, other = 0;
+    while (rest % 2 == 0) {
+        rest /= 2;
+        two++;
+    }
+    static const int primes[3] = {3, 5, 7};
+    for (int i = 0; i < 3; i++) {
+        while (rest % primes[i] == 0) {
+            rest /= primes[i];
+            other = other * 10 + primes[i];
+        }
+    }
+    if (rest > 1 || two < 4) {
+        return INFINITY;
+    }
+    double quick = other == 0 || other == 5 ? 1.0 : other == 3 || other == 35 ? 1.2 : 1.5;
+    /* rows are transformed as real numbers, which levels the lengths */
+    quick = axis == 0 ? 0.8 + 0.2 * quick : quick;
+    return n * log2(n) * (quick + 0.5);
+}
+
+bst_light_axis bst_light_axis_choose(const bst_light_band *band, int axis, int taps, int least,
+                                     double density) {
+    bst_light_axis best = {0};
+    double lowest = INFINITY;
+    int most = 32 + least + least / 3;
+    for (int pixels = (least + 15) / 16 * 16; pixels <= most; pixels += 16) {
+        double inverse = cost(axis, pixels);
+        if (isinf(inverse)) {
+            continue;
+        }
+        int first = 16 * (int)ceil(fmax(density * pixels, 64.0) / 16.0 - 1e-9);
+        for (int samples = first; samples <= 32 + first + first / 3; samples += 16) {
+            double sum = inverse + cost(axis, samples);
+            if (sum < lowest) {
+                lowest = sum;
+                best.pixels = pixels;
+                best.samples = samples;
+            }
+        }
+    }
+    best.spread.taps = taps;
+    best.error =
+        bst_spread_choose(&best.spread, &band->axis[axis], (double)best.samples / best.pixels);
+    return best;
+}
