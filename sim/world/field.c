@@ -6,6 +6,7 @@
 #include "sim/world/field_objects.h"
 #include "sim/world/psf.h"
 #include "sim/world/skylight.h"
+#include "sim/world/streak.h"
 
 /* Aberration at most, and some for the deflection of light: how far an apparent place lies from the
  * catalogue's. */
@@ -479,19 +480,6 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     return BST_OK;
 }
 
-/* Integral of the squared image (per px^2) of a unit source: a straight streak of length L, blurred
- * by a Gaussian of standard deviation `along` in its direction and `across` at right angles.
- * 1 / (4 pi along across) for L = 0; else (1 / (2 sqrt(pi) across)) times the line integral of the
- * autocorrelation of a uniform segment. */
-static double squared_image(double along, double across, double length) {
-    const double root_pi = sqrt(BST_PI);
-    double a = length / (2.0 * along);
-    double line = a < 1e-3 ? 1.0 / (2.0 * root_pi * along) * (1.0 - a * a / 6.0)
-                           : erf(a) / length -
-                                 (2.0 * along / (length * length * root_pi)) * (1.0 - exp(-a * a));
-    return line / (2.0 * root_pi * across);
-}
-
 /* Mean and covariance over the exposure of where a source's image is; NAN when it is behind the
  * camera. */
 typedef struct smear {
@@ -590,7 +578,7 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
     blur(camera, &image, out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px, &along,
          &across);
     if (isfinite(length) && variance > 0.0) {
-        out->snr = out->electrons * sqrt(squared_image(along, across, length) / variance);
+        out->snr = out->electrons * sqrt(bst_streak_squared(along, across, length) / variance);
     }
     if (source->occulted) {
         out->flags |= BST_TRUTH_OCCULTED;
