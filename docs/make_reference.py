@@ -19,6 +19,8 @@ def kind_of(node):
         return "hexadecimal string"
     if kind == "array" and node["items"].get("type") == "object":
         return "list of objects"
+    if kind == "array" and "enum" in node["items"]:
+        return "list of " + ", ".join(f"`{choice}`" for choice in node["items"]["enum"])
     if kind == "array":
         return f"{node['minItems']} numbers"
     return kind

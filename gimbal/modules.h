@@ -6,5 +6,6 @@
 
 extern const bst_module_desc bst_gimbal_two_axis_module; /* role "gimbal", type "two_axis" */
 extern const bst_module_desc bst_gimbal_ideal_module;    /* role "gimbal", type "ideal" */
+extern const bst_module_desc bst_gimbal_scripted_module; /* role "gimbal", type "scripted" */
 
 #endif

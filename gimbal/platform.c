@@ -82,10 +82,20 @@ bst_status bst_platform_init(bst_ctx *ctx, bst_platform *platform,
 
 bst_quat bst_platform_true_camera(bst_platform *platform, int64_t n, double seconds,
                                   bst_quat q_cam_from_body) {
+    return bst_platform_true_camera_between(platform, n, 0.0, seconds, q_cam_from_body);
+}
+
+bst_quat bst_platform_true_camera_between(bst_platform *platform, int64_t n, double fraction,
+                                          double seconds, bst_quat q_cam_from_body) {
     bst_quat body =
         turned(platform->q_nominal_from_gcrf, bst_vec3_scale(platform->drift_radps, seconds));
-    double shake[2];
+    double shake[2], next[2];
     bst_jitter_at(&platform->jitter, n, shake);
+    if (fraction > 0.0) {
+        bst_jitter_at(&platform->jitter, n + 1, next);
+        shake[0] += fraction * (next[0] - shake[0]);
+        shake[1] += fraction * (next[1] - shake[1]);
+    }
     return bst_quat_unit(
         turned(bst_quat_mul(q_cam_from_body, body), (bst_vec3){shake[0], shake[1], 0.0}));
 }

@@ -45,6 +45,10 @@ bst_status bst_platform_init(bst_ctx *ctx, bst_platform *platform,
 bst_quat bst_platform_true_camera(bst_platform *platform, int64_t n, double seconds,
                                   bst_quat q_cam_from_body);
 
+/* The same `fraction` (0 to 1) of a step later: the jitter on the straight way to the next step. */
+bst_quat bst_platform_true_camera_between(bst_platform *platform, int64_t n, double fraction,
+                                          double seconds, bst_quat q_cam_from_body);
+
 /* The body attitude as the attitude sensors report it at plant step n: believed, plus white noise
  * of attitude_noise_arcsec about each axis. */
 bst_quat bst_platform_measured_body(const bst_platform *platform, int64_t n);

@@ -1,10 +1,23 @@
-/* The detector stage of the renderer (kernels/detector.cl): how it is built for a camera. */
+/* The detector stage of the renderer (kernels/detector.cl): its maps and tables, and what happens
+ * to it in one exposure. */
 #ifndef BST_SCENEGEN_DETECTOR_H
 #define BST_SCENEGEN_DETECTOR_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
+#include "scenegen/hits.h"
+#include "sim/core/rng.h"
+#include "sim/device/device.h"
 #include "sim/world/camera.h"
+
+typedef struct bst_detector bst_detector;
+
+/* Makes the fixed patterns and tables of a camera on the device. `pattern` keys the patterns.
+ * BST_ERR_CONFIG for a map or a table of codes that cannot be used, naming the key. */
+bst_status bst_detector_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
+                               bst_rng_key pattern, bst_detector **out) BST_MUST_CHECK;
+void bst_detector_free(bst_detector *detector);
 
 /* Kernel options of the detector, each with a space before it, as snprintf would write them.
  *
@@ -17,7 +30,26 @@
  *   read noise >= 2 e-   all means, to 1/sigma^4
  *   read noise >= 0.75 e-   means from 30 e- on, to 1/sigma^4
  *   below   never: single electrons show */
-int bst_detector_options(const bst_camera *camera, char *text, size_t bytes);
+int bst_detector_options(const bst_detector *detector, char *text, size_t bytes);
+
+/* Whether frames need whole columns (blooming, frame transfer), and so the light of them all. */
+bool bst_detector_whole_columns(const bst_detector *detector);
+
+/* Makes the fixed patterns known to the program's kernels that the detector itself starts. */
+bst_status bst_detector_set_program(bst_ctx *ctx, bst_detector *detector,
+                                    cl_program program) BST_MUST_CHECK;
+
+/* What an exposure brings of its own: radiation hits and the rows' offsets. */
+bst_status bst_detector_begin(bst_ctx *ctx, bst_detector *detector, bst_rng_key key,
+                              int64_t exposure_id, double exposure_s) BST_MUST_CHECK;
+/* Takes the exposure's hits off again; after the frame's kernels were enqueued. */
+bst_status bst_detector_end(bst_ctx *ctx, bst_detector *detector) BST_MUST_CHECK;
+
+/* Hits of the latest exposure. */
+bst_hits_summary bst_detector_hits(const bst_detector *detector);
+
+/* Buffers for the kernels, NULL where the effect is off: gain, dark, overlay, offsets, codes. */
+void bst_detector_buffers(const bst_detector *detector, cl_mem out[5]);
 
 /* Means above this may fill the well: there the charge is drawn by itself, cut, and read. */
 double bst_detector_near_full_e(double full_well_e);

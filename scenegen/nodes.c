@@ -285,6 +285,13 @@ static double covariance_error(double d[3][3], double widening, double variance)
     return worst / variance;
 }
 
+/* Squared norm of the second orthogonal polynomial of the moments along the axis that, convolved
+ * with a Gaussian of variance u, give the group's; not positive when there are none. */
+static double second_norm(const moments *g, double u) {
+    double v = g->along[2] - u, third = g->along[3];
+    return v > 0.0 ? g->along[4] - u * (6.0 * v + 3.0 * u) - third * third / v - v * v : 0.0;
+}
+
 /* Fills the rule and its error: what it misses of the image, over the peak. */
 static void try_rule(const maker *m, const moments *g, int n, bool widen, bool split, rule *r) {
     double var = m->variance, d[3][3], norm2 = 0.0;
@@ -298,19 +305,29 @@ static void try_rule(const maker *m, const moments *g, int n, bool widen, bool s
         }
     }
     double tilt = g->axis[0] * g->axis[0] + g->axis[1] * g->axis[1];
+    double per_trace = 1.0 / (n == 1 ? 2.0 : 2.0 - tilt), trace = fmax(d[0][0] + d[1][1], 0.0);
     if (n == 3) {
-        double skew = g->along[3] / g->along[2];
-        double norm = g->along[4] - skew * g->along[3] - g->along[2] * g->along[2];
-        for (int i = 0; i < 3 && norm > 0.0; i++) {
+        double bend2 = g->bend[0] * g->bend[0] + g->bend[1] * g->bend[1];
+        double norm = second_norm(g, 0.0);
+        /* the polynomial is that of the moments without the widening, which is what the bend leaves
+         * over: each in turn */
+        for (int round = 0; widen && round < 8 && norm > 0.0; round++) {
+            norm = second_norm(g, fmax(trace - bend2 / norm, 0.0) * per_trace);
+        }
+        /* where little of the line is left, its bend is a guess */
+        if (!(norm > 0.5 * second_norm(g, 0.0))) {
+            return;
+        }
+        for (int i = 0; i < 3; i++) {
             r->bend[i] = g->bend[i] / norm;
             for (int j = 0; j < 3; j++) {
                 d[i][j] -= g->bend[i] * g->bend[j] / norm;
             }
         }
+        trace = fmax(d[0][0] + d[1][1], 0.0);
     }
     if (widen) {
-        double trace = fmax(d[0][0] + d[1][1], 0.0);
-        r->widening = fmin(trace / (n == 1 ? 2.0 : 2.0 - tilt), BST_NODE_WIDEST * var);
+        r->widening = fmin(trace * per_trace, BST_NODE_WIDEST * var);
         if (n > 1) { /* along the axis the moments make room for it */
             for (int i = 0; i < 3; i++) {
                 for (int j = 0; j < 3; j++) {

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/world/disc.h"
+
 /* Beyond this many standard deviations a Gaussian's tail is under 1e-21. */
 #define REACH_SIGMAS 9.5
 
@@ -51,11 +53,15 @@ static void add_psf(bst_window w, double sigma, double x, double y, double elect
 }
 
 bool bst_reference_place(const bst_camera *camera, const bst_los_track *track, const bst_source *s,
-                         int k, double u, double *x, double *y) {
+                         int k, double u, double *x, double *y, double *light) {
     double from_s = track->time_s[k], dt = track->time_s[k + 1] - from_s;
     bst_quat q = bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
     bst_vec3 v = bst_source_direction(s, (from_s + u * dt) / track->time_s[track->count - 1]);
-    return bst_camera_project(camera, bst_quat_rotate(q, v), x, y);
+    if (!bst_camera_project(camera, bst_quat_rotate(q, v), x, y)) {
+        return false;
+    }
+    *light = bst_source_rate_at(s, (from_s + u * dt) / track->time_s[track->count - 1]);
+    return true;
 }
 
 /* One source with every stretch between LOS samples in `parts` parts. */
@@ -66,10 +72,10 @@ static void render_source(const bst_camera *camera, double sigma, bst_window w,
         double dt = track->time_s[k + 1] - track->time_s[k];
         for (int n = 0; n < 4 * parts && dt > 0.0; n++) {
             double u = ((double)(n / 4) + gauss_place[n % 4]) / parts;
-            double x, y;
-            if (bst_reference_place(camera, track, s, k, u, &x, &y)) {
-                add_psf(w, sigma, x, y, s->electrons_per_s * dt * gauss_weight[n % 4] / parts, line,
-                        image);
+            double x, y, light;
+            if (bst_reference_place(camera, track, s, k, u, &x, &y, &light)) {
+                add_psf(w, sigma, x, y,
+                        light * s->electrons_per_s * dt * gauss_weight[n % 4] / parts, line, image);
             }
         }
     }
@@ -125,6 +131,63 @@ exit:
     return status;
 }
 
+/* Makes a point source of every point of the discs among the sources. *out and *paths are the
+ * caller's to free. */
+static bst_status split_discs(bst_ctx *ctx, const bst_camera *camera, const bst_source *sources,
+                              int count, bst_source **out, bst_source_path **paths, int *made) {
+    bst_disc_points points = {0};
+    bst_status status = BST_OK;
+    double panel = fmin(bst_camera_psf_sigma_px(camera), 1.0) * bst_camera_scale_rad(camera);
+    *made = 0;
+    for (int pass = 0; pass < 2; pass++) {
+        int n = 0, moving = 0;
+        for (int i = 0; i < count && status == BST_OK; i++) {
+            const bst_source *s = &sources[i];
+            points.count = 0;
+            if (s->shape && 2.0 * asin(s->shape->radius) > 400.0 * panel) {
+                status = bst_fail(ctx, BST_ERR_NUMERIC,
+                                  "the disc of source %d is too large for a reference image", i);
+            } else if (s->shape) {
+                status = bst_disc_make_points(ctx, s, BST_DISC_ALL, panel, &points);
+            }
+            for (int p = 0; p < (s->shape ? points.count : 1) && status == BST_OK; p++, n++) {
+                if (pass == 0) {
+                    continue;
+                }
+                bst_source *part = &(*out)[n];
+                *part = *s;
+                if (!s->shape) {
+                    continue;
+                }
+                bst_vec3 offset = points.items[p].offset;
+                part->shape = NULL;
+                part->electrons_per_s *= points.items[p].share;
+                part->apparent_mid =
+                    bst_vec3_unit(bst_vec3_add(bst_vec3_unit(s->apparent_mid), offset));
+                if (s->path) {
+                    bst_source_path *path = &(*paths)[moving++];
+                    double range = bst_vec3_norm(s->path->place[BST_PATH_NODES / 2]);
+                    *path = *s->path;
+                    for (int k = 0; k < BST_PATH_NODES; k++) {
+                        path->place[k] = bst_vec3_axpy(path->place[k], range, offset);
+                    }
+                    part->path = path;
+                }
+            }
+        }
+        if (pass == 0 && status == BST_OK) {
+            *out = malloc(((size_t)n + 1) * sizeof **out);
+            *paths = malloc(((size_t)n + 1) * sizeof **paths);
+            if (!*out || !*paths) {
+                status = bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d points of discs", n);
+            }
+        }
+        *made = n;
+    }
+    free(points.items);
+    return status;
+}
+
 bst_status bst_reference_render_psf(bst_ctx *ctx, const bst_camera *camera, const bst_psf *psf,
                                     bst_window window, const bst_los_track *track,
                                     const bst_source *sources, int count, double tolerance,
@@ -135,16 +198,24 @@ bst_status bst_reference_render_psf(bst_ctx *ctx, const bst_camera *camera, cons
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a reference image of %d x %d pixels",
                         window.width, window.height);
     }
-    bst_status status =
-        bst_psf_gaussian(psf, &sigma)
-            ? render_gaussian(ctx, camera, sigma, window, track, sources, count, tolerance, light)
-            : bst_reference_spectrum(ctx, camera, psf, window, track, sources, count, tolerance,
-                                     light);
+    bst_source *parts = NULL;
+    bst_source_path *paths = NULL;
+    int made = 0;
+    bst_status status = split_discs(ctx, camera, sources, count, &parts, &paths, &made);
+    if (status == BST_OK) {
+        status =
+            bst_psf_gaussian(psf, &sigma)
+                ? render_gaussian(ctx, camera, sigma, window, track, parts, made, tolerance, light)
+                : bst_reference_spectrum(ctx, camera, psf, window, track, parts, made, tolerance,
+                                         light);
+    }
     for (size_t p = 0; p < width * height && status == BST_OK; p++) {
         double x = window.x0 + (double)(p % width), y = window.y0 + (double)(p / width);
         image[p] += bst_camera_illumination(camera, x, y) * light[p];
     }
     free(light);
+    free(parts);
+    free(paths);
     return status;
 }
 

@@ -36,7 +36,7 @@ static const time_rule rules[2] = {
 enum { TRIALS = 6 };
 
 /* Halvings of a stretch between two samples. */
-enum { DEEPEST = 30 };
+enum { DEEPEST = 50 };
 
 typedef struct spectrum {
     const bst_camera *camera;
@@ -173,8 +173,9 @@ static void place_rule(const spectrum *s, const time_rule *rule, const bst_sourc
     for (int i = 0; i < rule->count; i++) {
         double u = u0 + rule->place[i] * (u1 - u0);
         p[i] = (instant){0};
-        p[i].there = bst_reference_place(s->camera, s->track, source, k, u, &p[i].x, &p[i].y);
-        p[i].light = p[i].there ? rule->weight[i] * (u1 - u0) : 0.0;
+        p[i].there =
+            bst_reference_place(s->camera, s->track, source, k, u, &p[i].x, &p[i].y, &p[i].light);
+        p[i].light *= rule->weight[i] * (u1 - u0);
     }
 }
 
@@ -204,7 +205,9 @@ static void try_rule(const spectrum *s, const instant *p, int count, int trial, 
     }
 }
 
-/* Adds the part [u0, u1] of a stretch. It is halved until two halves change nothing. */
+/* Adds the part [u0, u1] of a stretch with `light` electrons at mean brightness. It is halved until
+ * two halves change nothing, or no more than a thousandth of that of the stretch: brightness may
+ * have kinks. */
 static bst_status add_part(bst_ctx *ctx, spectrum *s, const bst_source *source, int k, double u0,
                            double u1, double light, int depth) {
     const time_rule *rule = &rules[depth > 0];
@@ -229,7 +232,7 @@ static bst_status add_part(bst_ctx *ctx, spectrum *s, const bst_source *source, 
     }
     /* places come from unit vectors and are no better than their rounding */
     double rounding = 32.0 * 2.2e-16 * BST_PI * s->cutoff / bst_camera_scale_rad(s->camera);
-    if (worst <= fmax(s->tolerance, rounding) * all) {
+    if (worst <= fmax(s->tolerance, rounding) * fmax(all, 1e-3)) {
         for (int i = 0; i < n; i++) {
             spread_point(s, &half[0][i], light * half[0][i].light);
             spread_point(s, &half[1][i], light * half[1][i].light);

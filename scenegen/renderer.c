@@ -10,8 +10,10 @@
 #include "scenegen/detector.h"
 #include "scenegen/fft_light.h"
 #include "scenegen/frame_pool.h"
+#include "scenegen/readout.h"
 #include "scenegen/reference.h"
 #include "scenegen/smear.h"
+#include "scenegen/tiles.h"
 #include "scenegen/vignetting.h"
 #include "sim/world/skylight.h"
 
@@ -36,6 +38,8 @@ struct bst_renderer {
     bst_psf *psf;
     bst_fft_light *fft_light; /* NULL: the PSF is a Gaussian, light comes from stamps */
     bst_smear *smear;
+    bst_detector *detector;
+    bst_readout *readout;
     bst_frame_pool *pool;
     cl_mem profiles;
     growing table, sources, nodes, block_box, source_box, saturated, expected, background;
@@ -73,55 +77,25 @@ static int taps_for(double sigma_px) {
     return taps > MAX_TAPS ? MAX_TAPS : taps;
 }
 
-static bst_status choose_tiles(bst_ctx *ctx, const bst_device *device,
-                               bst_renderer_options *options, uint64_t *most_bytes) {
-    cl_device_type type = 0;
-    cl_ulong local_bytes = 0, most = 0;
-    BST_TRY(bst_device_check(
-        ctx, clGetDeviceInfo(bst_device_id(device), CL_DEVICE_TYPE, sizeof type, &type, NULL),
-        "asking for the device's type"));
-    BST_TRY(bst_device_check(ctx,
-                             clGetDeviceInfo(bst_device_id(device), CL_DEVICE_LOCAL_MEM_SIZE,
-                                             sizeof local_bytes, &local_bytes, NULL),
-                             "asking for the device's local memory"));
-    BST_TRY(bst_device_check(ctx,
-                             clGetDeviceInfo(bst_device_id(device), CL_DEVICE_MAX_MEM_ALLOC_SIZE,
-                                             sizeof most, &most, NULL),
-                             "asking for the device's largest buffer"));
-    *most_bytes = most;
-    if (options->tile_width == 0) {
-        bool large = (type & CL_DEVICE_TYPE_CPU) && local_bytes >= 128 * 1024;
-        options->tile_width = large ? 256 : 64;
-        options->tile_height = large ? 64 : 2;
-        options->group = large ? 1 : 16;
-    }
-    size_t need = (size_t)(options->tile_width + 16) * (size_t)options->tile_height *
-                  sizeof(float) * (size_t)options->group;
-    if (options->tile_width < 64 || options->tile_width % 64 != 0 || options->tile_height < 1 ||
-        options->group < 1 || need > local_bytes) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT,
-                        "tiles of %d x %d pixels in groups of %d need %zu bytes of local memory "
-                        "(the device has %llu) and a width that is a multiple of 64",
-                        options->tile_width, options->tile_height, options->group, need,
-                        (unsigned long long)local_bytes);
-    }
-    return BST_OK;
-}
-
 static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
-    const bst_kernel_source *sources[] = {
-        &bst_kernel_scene_shared, &bst_kernel_nodes,      &bst_kernel_splat,
-        &bst_kernel_random,       &bst_kernel_detector,   &bst_kernel_light,
-        &bst_kernel_vignetting,   &bst_kernel_background, &bst_kernel_tile};
-    char options[1024];
+    const bst_kernel_source *sources[] = {&bst_kernel_scene_shared, &bst_kernel_nodes,
+                                          &bst_kernel_splat,        &bst_kernel_random,
+                                          &bst_kernel_detector,     &bst_kernel_light,
+                                          &bst_kernel_vignetting,   &bst_kernel_background,
+                                          &bst_kernel_tile,         &bst_kernel_readout};
+    char options[2048];
     int length =
         snprintf(options, sizeof options,
                  "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d "
                  "-DPHASES=%d%s%s",
                  r->options.tile_width, r->options.tile_height, r->options.group, r->taps,
                  r->phases, r->fft_light ? " -DFFT_LIGHT" : "", r->map ? " -DBACKGROUND" : "");
-    length += bst_detector_options(&r->camera, options + length, sizeof options - (size_t)length);
     length += bst_vignetting_options(&r->camera, options + length, sizeof options - (size_t)length);
+    length += bst_detector_options(r->detector, options + length, sizeof options - (size_t)length);
+    if (r->options.spatial_oversample > 0) {
+        length += snprintf(options + length, sizeof options - (size_t)length,
+                           " -DSPATIAL_OVERSAMPLE=%d", r->options.spatial_oversample);
+    }
     const bst_distortion *d = &r->camera.distortion;
     if (bst_camera_distorted(&r->camera)) {
         double a = bst_camera_scale_rad(&r->camera), a2 = a * a,
@@ -131,7 +105,8 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
             " -DDISTORTED -DK1=%.9ef -DK2=%.9ef -DK3=%.9ef -DP1=%.9ef -DP2=%.9ef -DFOLD2=%.9ef",
             d->k1 * a2, d->k2 * a2 * a2, d->k3 * a2 * a2 * a2, d->p1 * a, d->p2 * a, out * out);
     }
-    BST_TRY(bst_device_build(ctx, device, sources, 9, options, &r->program));
+    BST_TRY(bst_device_build(ctx, device, sources, sizeof sources / sizeof *sources, options,
+                             &r->program));
     static const char *const names[3] = {"bst_scene_nodes", "bst_scene_frame",
                                          "bst_scene_expected"};
     cl_kernel *kernels[3] = {&r->nodes_kernel, &r->frame_kernel, &r->expected_kernel};
@@ -140,14 +115,22 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
         *kernels[i] = clCreateKernel(r->program, names[i], &code);
         BST_TRY(bst_device_check(ctx, code, names[i]));
     }
-    return BST_OK;
+    BST_TRY(bst_detector_set_program(ctx, r->detector, r->program));
+    return bst_readout_create(ctx, device, &r->camera, r->program, &r->readout);
 }
 
-/* Phases between which the profile may be interpolated linearly: that misses
- * 1 / (8 phases^2 sigma^2) of the peak, below 1.3e-5. */
-static int phases_for(double sigma_px) {
+/* Share of the peak that linear interpolation between the phases misses: 1 / (8 phases^2 sigma^2)
+ * on each axis. */
+static double table_error(double sigma_px, int phases) {
+    return 0.25 / (sigma_px * sigma_px * phases * phases);
+}
+
+/* Phases with which a source that nearly fills the pixels' wells is right to a third of the
+ * tolerance; for fainter ones it is less. */
+static int phases_for(double sigma_px, double tolerance_sigma, double full_well_e) {
     int phases = 8;
-    while (phases < 2048 && phases * sigma_px < 100.0) {
+    while (phases < 2048 &&
+           table_error(sigma_px, phases) * sqrt(full_well_e) > 0.33 * tolerance_sigma) {
         phases *= 2;
     }
     return phases;
@@ -224,7 +207,10 @@ static bst_status open_psf(bst_ctx *ctx, bst_device *device, bst_renderer *r,
     if (bst_psf_gaussian(r->psf, &sigma_px)) {
         return BST_OK;
     }
-    BST_TRY(bst_fft_light_create(ctx, device, &r->camera, r->psf, NULL, &r->fft_light));
+    bst_fft_light_options light = bst_fft_light_default_options();
+    light.taps = r->options.fft_taps > 0 ? r->options.fft_taps : light.taps;
+    BST_TRY(bst_fft_light_create(ctx, device, &r->camera, r->psf, &light, &r->fft_light));
+    smear->table_error = 0.0;
     smear->node_sigma_px = bst_fft_light_band(r->fft_light)->node_sigma_px;
     smear->share_sigma_px = bst_fft_light_band(r->fft_light)->share_sigma_px;
     return BST_OK;
@@ -242,15 +228,26 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     r->options = options ? *options : bst_renderer_default_options();
     r->taps = taps_for(bst_camera_psf_sigma_px(camera));
     r->map = bst_skylight_varies(camera);
-    r->phases = phases_for(bst_camera_psf_sigma_px(camera));
+    double sigma_px = bst_camera_psf_sigma_px(camera);
+    r->phases = r->options.psf_phases > 0
+                    ? r->options.psf_phases
+                    : phases_for(sigma_px, r->options.tolerance_sigma, camera->full_well_e);
     r->context = bst_device_context(device);
     r->queue = bst_device_queue(device);
     clRetainContext(r->context);
     clRetainCommandQueue(r->queue);
-    bst_smear_options smear = {.tolerance_sigma = r->options.tolerance_sigma, .taps = r->taps};
-    bst_status status = choose_tiles(ctx, device, &r->options, &r->most_bytes);
+    bst_smear_options smear = {.tolerance_sigma = r->options.tolerance_sigma,
+                               .taps = r->taps,
+                               .table_error = table_error(sigma_px, r->phases),
+                               .motion = r->options.motion,
+                               .temporal_oversample = r->options.temporal_oversample,
+                               .stamp_radius_px = r->options.stamp_radius_px};
+    bst_status status = bst_tiles_choose(ctx, device, &r->options, &r->most_bytes);
     if (status == BST_OK) {
         status = open_psf(ctx, device, r, &smear);
+    }
+    if (status == BST_OK) {
+        status = bst_detector_create(ctx, device, camera, r->options.pattern, &r->detector);
     }
     if (status == BST_OK) {
         status = build(ctx, r, device);
@@ -299,11 +296,28 @@ void bst_renderer_free(bst_renderer *r) {
     bst_smear_free(r->smear);
     bst_fft_light_free(r->fft_light);
     bst_psf_free(r->psf);
+    bst_readout_free(r->readout);
+    bst_detector_free(r->detector);
     clReleaseCommandQueue(r->queue);
     clReleaseContext(r->context);
     free(r->list);
     free(r->peak_e);
     free(r);
+}
+
+/* The pixels whose light a frame of a window takes. */
+static bst_window columns_of(const bst_renderer *r, bst_window w) {
+    if (bst_detector_whole_columns(r->detector)) {
+        w.y0 = 0;
+        w.height = (int)r->camera.height_px;
+    }
+    return w;
+}
+
+static bool covers(const bst_skylight_map *map, bst_window w) {
+    return w.x0 >= map->x0_px && w.y0 >= map->y0_px &&
+           w.x0 + w.width - 1 <= map->x0_px + (map->columns - 1) * map->step_px &&
+           w.y0 + w.height - 1 <= map->y0_px + (map->rows - 1) * map->step_px;
 }
 
 static bst_status check_request(bst_ctx *ctx, const bst_renderer *r, const bst_render_request *q) {
@@ -317,6 +331,11 @@ static bst_status check_request(bst_ctx *ctx, const bst_renderer *r, const bst_r
                         w.width, w.height, w.x0, w.y0, (long long)r->camera.width_px,
                         (long long)r->camera.height_px);
     }
+    int binning = q->binning > 1 ? q->binning : 1;
+    if (binning > w.width || binning > w.height) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "binning %d does not fit a window of %d x %d pixels",
+                        binning, w.width, w.height);
+    }
     if (!(q->background_e >= 0.0) || !isfinite(q->background_e) || q->track->count < 2) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "a request needs a background that is finite and not negative (it is %g) "
@@ -327,6 +346,11 @@ static bst_status check_request(bst_ctx *ctx, const bst_renderer *r, const bst_r
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "a request has a map of the background, but the camera's background is the "
                         "same all over the sensor (bst_skylight_varies)");
+    }
+    if (q->background && !covers(q->background, columns_of(r, w))) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "a request's map of the background does not cover its window, or that "
+                        "window's whole columns where charge runs along them");
     }
     return BST_OK;
 }
@@ -344,9 +368,12 @@ static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d sources", q->count);
         }
     }
-    double read = r->camera.read_noise_e;
+    double read = r->camera.read_noise_e, brightest = 0.0;
+    for (int i = 0; i < q->count; i++) {
+        brightest = q->sources[i].path ? brightest : fmax(brightest, q->sources[i].electrons_per_s);
+    }
     double least_e = q->background_e + (q->background ? q->background->least_e : 0.0);
-    BST_TRY(bst_smear_begin(ctx, r->smear, q->track, least_e + read * read));
+    BST_TRY(bst_smear_begin(ctx, r->smear, q->track, least_e + read * read, brightest));
     r->stats = (bst_render_stats){0};
     *blocks = 0;
     const uint64_t counted = (uint64_t)INT32_MAX * sizeof(float); /* by the kernels, in int */
@@ -376,6 +403,10 @@ static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *
         }
     }
     r->stats.nodes = (long long)*blocks * BST_BLOCK;
+    r->stats.single_kernel = bst_smear_single(r->smear);
+    if (r->options.temporal_oversample > 0 || r->options.spatial_oversample > 0) {
+        r->stats.predicted_sigma = NAN;
+    }
     return BST_OK;
 }
 
@@ -446,12 +477,16 @@ static bst_scene_params make_params(const bst_renderer *r, const bst_render_requ
         .exposure_low = (unsigned)((uint64_t)q->exposure_id & 0xFFFFFFFFu),
         .exposure_high = (unsigned)((uint64_t)q->exposure_id >> 32),
         .background_e = (float)q->background_e,
+        .dark_e = (float)q->dark_e,
+        .exposure_s = (float)q->track->time_s[q->track->count - 1],
         .read_noise_e = (float)c->read_noise_e,
         .full_well_e = (float)c->full_well_e,
+        .per_full_well = (float)(1.0 / c->full_well_e),
         .near_full_e = (float)bst_detector_near_full_e(c->full_well_e),
         .dn_per_e = (float)(1.0 / c->gain_e_per_dn),
         .offset_dn = (float)c->offset_dn,
         .max_dn = (float)((1 << c->bits) - 1),
+        .image_stride = w.width,
         .map_step = map->step_px,
         .map_x0 = map->x0_px,
         .map_y0 = map->y0_px,
@@ -473,13 +508,16 @@ static bst_status make_light(bst_ctx *ctx, bst_renderer *r, const bst_render_req
     return BST_OK;
 }
 
-/* The common way of both kinds of image: the kernels' first six arguments are the same. */
+/* The common way of all kinds of image: the kernels' first six arguments are the same. stride:
+ * floats between the rows of `out`, 0: no gaps; light_only: without background. */
 static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
-                                cl_kernel kernel, cl_mem out) {
+                                cl_kernel kernel, cl_mem out, int stride, bool light_only) {
     int blocks = 0, groups = 0;
     BST_TRY(plan(ctx, r, q, &blocks));
     BST_TRY(enqueue_nodes(ctx, r, blocks, &groups));
     bst_scene_params p = make_params(r, q, groups);
+    p.image_stride = stride > 0 ? stride : p.image_stride;
+    p.background_e = light_only ? 0.0f : p.background_e;
     r->tiles = p.tiles_x * p.tiles_y;
     size_t tiles = (size_t)r->tiles;
     BST_TRY(grow(ctx, r, &r->saturated, tiles * sizeof(cl_int)));
@@ -487,6 +525,8 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
     if (r->fft_light) {
         BST_TRY(make_light(ctx, r, q, groups, &p, &light));
     }
+    cl_mem maps[5];
+    bst_detector_buffers(r->detector, maps);
     const void *values[] = {&p,
                             &r->sources.buffer,
                             &r->nodes.buffer,
@@ -494,15 +534,21 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
                             &r->source_box.buffer,
                             &light,
                             &out,
-                            &r->saturated.buffer};
-    const size_t m = sizeof(cl_mem), bytes[] = {sizeof p, m, m, m, m, m, m, m};
-    cl_uint count = kernel == r->frame_kernel ? 8 : 7;
-    BST_TRY(set_args(ctx, kernel, values, bytes, (int)count));
+                            &r->saturated.buffer,
+                            &maps[0],
+                            &maps[1],
+                            &maps[2],
+                            &maps[3],
+                            &maps[4]};
+    const size_t m = sizeof(cl_mem), bytes[] = {sizeof p, m, m, m, m, m, m, m, m, m, m, m, m};
+    int count = kernel == r->frame_kernel ? 13 : 7;
+    BST_TRY(set_args(ctx, kernel, values, bytes, count));
     if (r->map) {
         const bst_skylight_map *map = background_of(q);
         size_t size = (size_t)map->columns * (size_t)map->rows * sizeof *map->e;
         BST_TRY(upload(ctx, r, &r->background, map->e, size));
-        BST_TRY(bst_device_check(ctx, clSetKernelArg(kernel, count, m, &r->background.buffer),
+        BST_TRY(bst_device_check(ctx,
+                                 clSetKernelArg(kernel, (cl_uint)count, m, &r->background.buffer),
                                  "setting a kernel argument"));
     }
     size_t group = (size_t)r->options.group, global = (tiles + group - 1) / group * group;
@@ -518,19 +564,49 @@ bst_status bst_renderer_plan(bst_ctx *ctx, bst_renderer *r, const bst_render_req
     return plan(ctx, r, request, &blocks);
 }
 
+/* Light first, then what columns and binned pixels make of it. */
+static bst_status render_in_stages(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
+                                   int binning, cl_mem frame) {
+    bst_render_request light = *q;
+    cl_mem image;
+    int stride;
+    light.window = bst_readout_light_window(r->readout, q->window);
+    BST_TRY(bst_readout_image(ctx, r->readout, light.window, &image, &stride));
+    BST_TRY(enqueue_tiles(ctx, r, &light, r->expected_kernel, image, stride, true));
+    r->tiles = q->window.height / binning;
+    BST_TRY(grow(ctx, r, &r->saturated, (size_t)r->tiles * sizeof(cl_int)));
+    bst_scene_params p = make_params(r, q, 0);
+    return bst_readout_run(ctx, r->readout, r->detector, &p, q->window, binning, frame,
+                           r->saturated.buffer);
+}
+
 bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *r, const bst_render_request *request,
                                bst_frame **out) {
     *out = NULL;
     BST_TRY(check_request(ctx, r, request));
     bst_frame *frame;
     cl_mem buffer;
-    BST_TRY(bst_frame_pool_take(ctx, r->pool, request->window.width, request->window.height, &frame,
-                                &buffer));
-    bst_status status = enqueue_tiles(ctx, r, request, r->frame_kernel, buffer);
+    int binning = request->binning > 1 ? request->binning : 1;
+    BST_TRY(bst_frame_pool_take(ctx, r->pool, request->window.width / binning,
+                                request->window.height / binning, &frame, &buffer));
+    double exposure_s = request->track->time_s[request->track->count - 1];
+    bst_status status =
+        bst_detector_begin(ctx, r->detector, request->key, request->exposure_id, exposure_s);
+    if (status == BST_OK) {
+        status = binning > 1 || bst_detector_whole_columns(r->detector)
+                     ? render_in_stages(ctx, r, request, binning, buffer)
+                     : enqueue_tiles(ctx, r, request, r->frame_kernel, buffer, 0, false);
+    }
+    if (status == BST_OK) {
+        status = bst_detector_end(ctx, r->detector);
+    }
     if (status != BST_OK) {
         bst_frame_release(frame);
         return status;
     }
+    bst_hits_summary hits = bst_detector_hits(r->detector);
+    r->stats.hits = hits.tracks;
+    r->stats.hits_e = hits.electrons;
     *out = frame;
     return BST_OK;
 }
@@ -540,7 +616,7 @@ bst_status bst_renderer_render_noise_free(bst_ctx *ctx, bst_renderer *r,
     BST_TRY(check_request(ctx, r, request));
     size_t bytes = (size_t)request->window.width * (size_t)request->window.height * sizeof(float);
     BST_TRY(grow(ctx, r, &r->expected, bytes));
-    BST_TRY(enqueue_tiles(ctx, r, request, r->expected_kernel, r->expected.buffer));
+    BST_TRY(enqueue_tiles(ctx, r, request, r->expected_kernel, r->expected.buffer, 0, false));
     return bst_device_check(
         ctx,
         clEnqueueReadBuffer(r->queue, r->expected.buffer, CL_TRUE, 0, bytes, image, 0, NULL, NULL),

@@ -8,6 +8,7 @@
 #ifndef BST_SCENEGEN_RENDERER_H
 #define BST_SCENEGEN_RENDERER_H
 
+#include "scenegen/smear.h"
 #include "sim/core/rng.h"
 #include "sim/device/device.h"
 #include "sim/world/field.h"
@@ -17,7 +18,14 @@ typedef struct bst_renderer bst_renderer;
 typedef struct bst_renderer_options {
     double tolerance_sigma; /* error of each source's image in any pixel that is allowed, in sigma
                                of that pixel (0.05) */
-    int pool_frames;        /* frames that may be alive at a time (4) */
+    bst_rng_key pattern;    /* of the detector's fixed patterns */
+    bst_star_motion motion; /* whose track the stars follow (BST_STAR_MOTION_AUTO) */
+    /* Knobs that the tolerance chooses when they are 0. Equal parts of the exposure per star; parts
+     * of a pixel per axis to whose centres nodes are moved; px that stamps reach beyond a node's
+     * two nearest pixels; sub-pixel phases of the PSF's table; taps of the Fourier path's spreading
+     * (4, 6 or 8). */
+    int temporal_oversample, spatial_oversample, stamp_radius_px, psf_phases, fft_taps;
+    int pool_frames;                    /* frames that may be alive at a time (4) */
     int tile_width, tile_height, group; /* pixels per work-item (width a multiple of 64) and
                                            work-items per group; 0: chosen for the device */
 } bst_renderer_options;
@@ -38,9 +46,14 @@ typedef struct bst_render_request {
     const bst_los_track *track; /* its last time is the exposure's duration */
     const bst_source *sources;
     int count;
-    double background_e; /* expected electrons per pixel: sky and dark current */
-    const struct bst_skylight_map *background; /* added to it, of the same window; NULL: none.
-                                                    Only where bst_skylight_varies */
+    double background_e; /* expected electrons per sensor pixel: sky and dark current */
+    double dark_e;       /* of them, dark current (a map of it, if there is one, takes its place) */
+    const struct bst_skylight_map *background; /* added to background_e, per sensor pixel; NULL:
+                    none. Only where bst_skylight_varies. It covers the window, and its whole
+                    columns where charge or light runs along them
+                    (bst_detector_config_whole_columns) */
+    int binning; /* 2 or more: so many pixels per side are added before they are read, and the
+                    frame is smaller; window sides that are no multiple lose the rest */
     bst_rng_key key;
     int64_t exposure_id;
 } bst_render_request;
@@ -49,7 +62,11 @@ typedef struct bst_render_request {
 typedef struct bst_render_stats {
     int sources;            /* drawn */
     long long nodes;        /* all sources, filled blocks included */
-    double predicted_sigma; /* largest predicted error of a source's image, sigma */
+    double predicted_sigma; /* largest predicted error of a source's image, sigma; NAN with
+                               temporal_oversample or spatial_oversample */
+    bool single_kernel;     /* the stars followed one track */
+    int hits;               /* radiation hits on the sensor */
+    double hits_e;          /* their charge */
 } bst_render_stats;
 
 /* Renders; does not wait. *out gets a frame with one reference. */

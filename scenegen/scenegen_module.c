@@ -2,13 +2,17 @@
 #include <stdlib.h>
 
 #include "scenegen/module.h"
+#include "scenegen/planes.h"
 #include "scenegen/renderer.h"
+#include "sim/world/frame_updates.h"
 
 typedef struct fidelity_config {
     double tolerance_sigma;
+    int64_t temporal_oversample, spatial_oversample, stamp_radius_px, psf_phases, fft_taps;
 } fidelity_config;
 
 typedef struct scenegen_config {
+    int renderer;
     double v_limit, margin_px;
     fidelity_config fidelity;
     int64_t truth_capacity, pool_frames;
@@ -18,14 +22,34 @@ static const bst_config_desc fidelity_table[] = {
     BST_REAL(fidelity_config, tolerance_sigma, "sigma", 1e-4, 1.0, "0.05",
              "Error of each source's image in any pixel that is allowed, in that pixel's noise. "
              "Nodes and stamps follow from it."),
+    BST_INT(fidelity_config, temporal_oversample, "", 0, 100000, "0",
+            "Equal parts of the exposure whose middles stand for it, for comparison with other "
+            "renderers; 0: as the tolerance needs. The error is not predicted then."),
+    BST_INT(fidelity_config, spatial_oversample, "", 0, 4096, "0",
+            "Parts of a pixel per axis to whose centres light is moved; 0: none. The error is not "
+            "predicted then."),
+    BST_INT(fidelity_config, stamp_radius_px, "px", 0, 255, "0",
+            "Reach of all stamps beyond the two nearest pixels; 0: as the tolerance needs."),
+    BST_INT(fidelity_config, psf_phases, "", 0, 2048, "0",
+            "Sub-pixel phases of the PSF's table; 0: as the tolerance needs."),
+    BST_INT(
+        fidelity_config, fft_taps, "", 0, 8, "0",
+        "Taps per axis with which light is spread on the grid of a PSF that is no Gaussian: 4, 6 "
+        "or 8; 0: 8."),
     BST_CONFIG_END,
 };
+
+static const char *const renderers[] = {"auto", "single_kernel", "multi_kernel", NULL};
 
 static const bst_config_desc config[] = {
     BST_REAL(scenegen_config, v_limit, "mag", -30.0, 30.0, "16",
              "Stars fainter than this are not drawn."),
     BST_REAL(scenegen_config, margin_px, "px", 0.0, 1e4, "0",
              "Sources this far outside the window are drawn too; at least what the PSF needs."),
+    BST_ENUM(scenegen_config, renderer, renderers, "\"auto\"",
+             "Whose track the stars follow: single_kernel (all that of the star at the boresight, "
+             "as a shift), multi_kernel (each its own) or auto (single_kernel where it meets the "
+             "tolerance)."),
     BST_OBJECT(scenegen_config, fidelity, fidelity_table, "{}", "How exact the image is."),
     BST_INT(
         scenegen_config, truth_capacity, "", 1, 1048576, "4096",
@@ -35,13 +59,14 @@ static const bst_config_desc config[] = {
     BST_CONFIG_END,
 };
 
-enum { PORT_EXPOSURE, PORT_LOS, PORT_FRAME, PORT_TRUTH, PORT_COUNT };
+enum { PORT_EXPOSURE, PORT_LOS, PORT_FRAME, PORT_TRUTH, PORT_PLANES, PORT_COUNT };
 
 static const bst_port ports[PORT_COUNT] = {
     [PORT_EXPOSURE] = {BST_CHANNEL_EXPOSURE, BST_PORT_IN, BST_PORT_TRIGGER, 0.0, 0},
     [PORT_LOS] = {BST_CHANNEL_LOS_HISTORY, BST_PORT_IN, 0, 0.0, 0},
     [PORT_FRAME] = {BST_CHANNEL_FRAME, BST_PORT_OUT, 0, 0.0, 0},
     [PORT_TRUTH] = {BST_CHANNEL_TRUTH, BST_PORT_OUT, 0, 0.0, 4096},
+    [PORT_PLANES] = {BST_CHANNEL_PLANES, BST_PORT_OUT, 0, 0.0, 0},
 };
 
 /* A source that asks for room in the truth. */
@@ -53,6 +78,10 @@ typedef struct pick {
 
 typedef struct scenegen {
     const bst_camera *camera;
+    bst_camera scaled; /* the camera at the pixel scale of the latest exposure, where it changes */
+    struct bst_device *device;
+    bst_renderer_options renderer_options;
+    double margin_px; /* that the scenario asks for */
     bst_field_options options;
     int64_t tick_rate_hz;
     bst_rng_key key;
@@ -60,6 +89,8 @@ typedef struct scenegen {
     bst_renderer *renderer;
     pick *picks;
     int pick_capacity;
+    bst_plane_maker *planes; /* NULL: not asked for */
+    int *item_source;        /* source of each item of the truth, for the planes */
 } scenegen;
 
 static void destroy(void *self) {
@@ -67,9 +98,16 @@ static void destroy(void *self) {
     if (s) {
         bst_renderer_free(s->renderer);
         bst_field_free(s->field);
+        bst_plane_maker_free(s->planes);
+        free(s->item_source);
         free(s->picks);
         free(s);
     }
+}
+
+/* The detector is the same in all runs of a study: its patterns come from its names alone. */
+static bst_rng_key pattern_key(const bst_module_env *env, const bst_camera *camera) {
+    return bst_rng_make_key(camera->detector.pattern_seed, 0, env->instance, "pattern");
 }
 
 static bst_status create(const bst_module_env *env, const void *config_object, void **self) {
@@ -84,11 +122,30 @@ static bst_status create(const bst_module_env *env, const void *config_object, v
     s->key = bst_env_rng(env, "detector");
     bst_renderer_options options = bst_renderer_default_options();
     options.tolerance_sigma = c->fidelity.tolerance_sigma;
+    options.motion = (bst_star_motion)c->renderer;
+    options.temporal_oversample = (int)c->fidelity.temporal_oversample;
+    options.spatial_oversample = (int)c->fidelity.spatial_oversample;
+    options.stamp_radius_px = (int)c->fidelity.stamp_radius_px;
+    options.psf_phases = (int)c->fidelity.psf_phases;
+    options.fft_taps = (int)c->fidelity.fft_taps;
     options.pool_frames = (int)c->pool_frames;
+    options.pattern = pattern_key(env, s->camera);
+    s->device = env->device;
+    s->renderer_options = options;
+    s->margin_px = c->margin_px;
     bst_status status =
         bst_renderer_create(env->ctx, env->device, s->camera, &options, &s->renderer);
     if (status == BST_OK) {
         status = bst_field_create(env->ctx, env->world, env->observer, env->sensor, &s->field);
+    }
+    if (status == BST_OK && env->planes) {
+        status = bst_plane_maker_create(env->ctx, env->planes, (int)s->camera->width_px,
+                                        (int)s->camera->height_px, env->mask_threshold_sigma,
+                                        &s->planes);
+        s->item_source = malloc((size_t)c->truth_capacity * sizeof *s->item_source);
+        if (status == BST_OK && !s->item_source) {
+            status = bst_fail(env->ctx, BST_ERR_MEMORY, "no memory for %s", env->instance);
+        }
     }
     if (status != BST_OK) {
         destroy(s);
@@ -150,6 +207,9 @@ static bst_status write_items(bst_ctx *ctx, scenegen *s, const bst_los_track *tr
     for (int i = 0; i < truth->count; i++) {
         int k = truth->lost > 0 ? s->picks[i].index : i;
         bst_field_truth_item(s->field, track, &sources[k], e->window, truth, &truth->items[i]);
+        if (s->item_source) {
+            s->item_source[i] = k;
+        }
         double x = truth->items[i].x_mean_px, y = truth->items[i].y_mean_px;
         double light = isfinite(x) ? bst_camera_illumination(s->camera, x, y) : 1.0;
         double sky_e = bst_field_background_e(s->field, truth, x, y);
@@ -160,14 +220,27 @@ static bst_status write_items(bst_ctx *ctx, scenegen *s, const bst_los_track *tr
     return BST_OK;
 }
 
+/* Goes on with another pixel scale: everything that depends on the camera is made again. Frames
+ * that were rendered before stay as they are. */
+static bst_status rescale(bst_ctx *ctx, scenegen *s, double scale_arcsec) {
+    bst_camera camera;
+    BST_TRY(bst_camera_at_scale(ctx, s->camera, scale_arcsec, &camera));
+    bst_renderer *renderer;
+    BST_TRY(bst_renderer_create(ctx, s->device, &camera, &s->renderer_options, &renderer));
+    bst_renderer_free(s->renderer);
+    s->renderer = renderer;
+    s->scaled = camera;
+    s->camera = &s->scaled;
+    bst_field_set_camera(s->field, s->camera);
+    s->options.margin_px = fmax(s->margin_px, bst_renderer_margin_px(renderer));
+    return BST_OK;
+}
+
 static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure *e,
                          const bst_los_history *history) {
     bst_ctx *ctx = bst_step_ctx(step);
-    if (e->binning > 1) {
-        return bst_fail(ctx, BST_ERR_CONFIG,
-                        "exposure %lld asks for binning %d; the renderer reads every pixel out by "
-                        "itself: use binning 1",
-                        (long long)e->id, e->binning);
+    if (e->pixel_scale_arcsec > 0.0 && e->pixel_scale_arcsec != s->camera->pixel_scale_arcsec) {
+        BST_TRY(rescale(ctx, s, e->pixel_scale_arcsec));
     }
     bst_los_track track;
     BST_TRY(bst_field_track(ctx, s->field, history, e->start_tick, e->end_tick, s->tick_rate_hz,
@@ -186,6 +259,8 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
                                   .count = count,
                                   .background_e = (map ? 0.0 : truth->background_e) + truth->dark_e,
                                   .background = map,
+                                  .dark_e = truth->dark_e,
+                                  .binning = e->binning,
                                   .key = s->key,
                                   .exposure_id = e->id};
     if (e->dropped) {
@@ -199,9 +274,13 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
                                        .start_tick = e->start_tick,
                                        .end_tick = e->end_tick,
                                        .window = e->window,
-                                       .binning = 1,
+                                       .binning = e->binning > 1 ? e->binning : 1,
                                        .bits = (int)s->camera->bits};
     }
+    bst_render_stats stats;
+    bst_renderer_get_stats(s->renderer, &stats);
+    truth->hits = stats.hits;
+    truth->hits_e = stats.hits_e;
     /* while the device renders */
     BST_TRY(write_items(ctx, s, &track, sources, count, e, truth, capacity));
     if (truth->lost > 0) {
@@ -212,6 +291,11 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
         BST_TRY(bst_renderer_saturated(ctx, s->renderer, &saturated));
         if (saturated > 0) {
             bst_step_count(step, "saturated");
+        }
+        if (s->planes) {
+            bst_planes *planes = bst_step_write(step, PORT_PLANES, NULL);
+            BST_TRY(bst_plane_maker_render(ctx, s->planes, s->renderer, s->camera, &request,
+                                           s->item_source, truth->count, planes));
         }
     }
     return BST_OK;

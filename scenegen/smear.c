@@ -3,15 +3,21 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "scenegen/motion.h"
 #include "scenegen/nodes.h"
 #include "scenegen/reference.h"
+#include "scenegen/shape.h"
 
-/* Shares of the tolerance: for nodes, and for the border of the stamp. */
+/* Shares of the tolerance: for nodes, for the border of the stamp, and for a track that stars
+ * share. */
 #define NODE_SHARE 0.8
 #define CUT_SHARE 0.3
+#define SINGLE_SHARE 0.1
 
 /* Fidelities: level n is right to about 0.08 * 2^-n of the smeared image's peak. */
 enum { LEVELS = 14, TABLE_FLOATS = BST_TABLE_ROWS * BST_BLOCK, MAX_TAPS = 512 };
+/* Stretches of the path of a source whose brightness changes. */
+enum { RATE_PARTS = 512 };
 
 typedef struct level {
     int first_block, blocks; /* blocks 0: not made in this frame */
@@ -32,12 +38,16 @@ struct bst_smear {
     double dark_variance_e2, duration_s;
     bst_quat q_reference;
     double star_share; /* largest share of a star's light on one pixel */
+    bool single;       /* stars share one track */
+    double spread_px;  /* by which stars in the corners move otherwise */
     double last_peak_e, last_error_sigma;
     level levels[LEVELS];
 
     bst_path_point *path, *own_path;
     int path_count, path_capacity, own_capacity;
-    bst_node_list nodes; /* scratch */
+    bst_node_list nodes;    /* scratch */
+    bst_disc_points points; /* scratch */
+    double disc_px;         /* radius of the present source's disc; 0: a point */
     float *table;
     int table_blocks, table_capacity;
 };
@@ -88,6 +98,7 @@ void bst_smear_free(bst_smear *s) {
         free(s->path);
         free(s->own_path);
         free(s->nodes.items);
+        free(s->points.items);
         free(s->table);
         free(s);
     }
@@ -145,6 +156,16 @@ static bst_path_point attitude_point(const bst_smear *s, bst_quat q, double time
     return (bst_path_point){{r.x * scale, r.y * scale, r.z * s->half_diagonal_px}, time};
 }
 
+/* What the profile table misses of the nodes' image, over its peak, by its phases and widths. */
+static double table_error(const bst_smear *s, const bst_node_list *list) {
+    double psf = s->sigma_px * s->stretch, worst = 0.0;
+    for (int n = 0; n < list->count; n++) {
+        double w = list->items[n].variance / (psf * psf), wide = 1.0 + w;
+        worst = fmax(worst, 0.75 * w / (wide * wide));
+    }
+    return s->options.table_error + worst / (BST_WIDTHS * BST_WIDTHS);
+}
+
 /* Appends nodes to the table in whole blocks; to_table fills one column of BST_TABLE_ROWS. */
 static bst_status append_nodes(bst_ctx *ctx, bst_smear *s, const bst_node_list *list,
                                void (*to_table)(const bst_smear *, const bst_node *, float *),
@@ -152,7 +173,7 @@ static bst_status append_nodes(bst_ctx *ctx, bst_smear *s, const bst_node_list *
     int blocks = (list->count + BST_BLOCK - 1) / BST_BLOCK;
     BST_TRY(reserve(ctx, (void **)&s->table, &s->table_capacity, s->table_blocks + blocks,
                     TABLE_FLOATS * sizeof(float)));
-    *out = (level){s->table_blocks, blocks, list->error};
+    *out = (level){s->table_blocks, blocks, list->error + table_error(s, list)};
     s->table_blocks += blocks;
     for (int n = 0; n < blocks * BST_BLOCK; n++) {
         float *block = s->table + (size_t)(out->first_block + n / BST_BLOCK) * TABLE_FLOATS;
@@ -208,19 +229,63 @@ static double largest_share(bst_smear *s) {
     return bst_nodes_peak_share(s->nodes.items, s->nodes.count, s->share_sigma_px);
 }
 
+/* Adds nodes of a path that takes `part` of the exposure. */
+static bst_status path_nodes(bst_ctx *ctx, bst_smear *s, const bst_path_point *path, int count,
+                             double part, double tolerance) {
+    double parts = ceil(part * s->options.temporal_oversample - 1e-9);
+    if (parts > 0.0) {
+        return bst_motion_midpoints(ctx, path, count, (int)parts, &s->nodes);
+    }
+    return bst_nodes_from_path(ctx, path, count, s->sigma_px, tolerance, true, &s->nodes);
+}
+
 static bst_status make_level(bst_ctx *ctx, bst_smear *s, int n) {
     if (s->levels[n].blocks == 0) {
         s->nodes.count = 0;
         s->nodes.error = 0.0;
-        BST_TRY(bst_nodes_from_path(ctx, s->path, s->path_count, s->sigma_px, s->tolerance[n], true,
-                                    &s->nodes));
-        BST_TRY(append_nodes(ctx, s, &s->nodes, attitude_to_table, &s->levels[n]));
+        BST_TRY(path_nodes(ctx, s, s->path, s->path_count, 1.0, s->tolerance[n]));
+        BST_TRY(append_nodes(ctx, s, &s->nodes, s->single ? shift_to_table : attitude_to_table,
+                             &s->levels[n]));
     }
     return BST_OK;
 }
 
+/* Error of a star `from_boresight_px` away that follows the boresight's track, in sigma of its
+ * worst pixel: a Gaussian of amplitude A on dark noise d changes by at most 0.86 / sigma of A /
+ * sqrt(A + d^2) per px of shift, and by all of its light when it lies elsewhere. */
+static double single_error(const bst_smear *s, double peak_e, double from_boresight_px) {
+    double part = s->half_diagonal_px > 0.0 ? from_boresight_px / s->half_diagonal_px : 0.0;
+    double moved = s->spread_px * part * fmax(part, 1.0) * s->stretch;
+    return fmin(0.86 * moved / s->sigma_px * peak_e / sqrt(peak_e + s->dark_variance_e2),
+                peak_e / sqrt(s->dark_variance_e2));
+}
+
+/* Lets the stars share one track where that is asked for, or good enough for the brightest. */
+static void choose_motion(bst_smear *s, double brightest_e_per_s) {
+    double scale = bst_camera_scale_rad(&s->camera), roll_px = s->half_diagonal_px;
+    double half_turn_px = 1.0 / scale;
+    bool small = true;
+    s->single = false;
+    if (s->options.motion == BST_STAR_MOTION_MULTI) {
+        return;
+    }
+    s->spread_px =
+        bst_motion_spread_px(s->path, s->path_count, scale, s->stretch, roll_px, roll_px);
+    for (int k = 0; k < s->path_count; k++) {
+        small &= hypot(s->path[k].p[0], s->path[k].p[1]) < half_turn_px;
+    }
+    double line = bst_reference_pixel_share(0.0, s->share_sigma_px, 0);
+    double peak_e = brightest_e_per_s * s->duration_s * line * line;
+    s->single = s->options.motion == BST_STAR_MOTION_SINGLE ||
+                (small && single_error(s, peak_e, s->half_diagonal_px) <=
+                              SINGLE_SHARE * s->options.tolerance_sigma);
+    for (int k = 0; s->single && k < s->path_count; k++) {
+        bst_motion_to_shift(&s->path[k], scale, s->stretch, roll_px);
+    }
+}
+
 bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_los_track *track,
-                           double dark_variance_e2) {
+                           double dark_variance_e2, double brightest_e_per_s) {
     s->track = *track;
     s->dark_variance_e2 = fmax(dark_variance_e2, 1e-2);
     s->duration_s = track->time_s[track->count - 1];
@@ -242,6 +307,7 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_los_track *trac
             s->path[s->path_count++] = attitude_point(s, q, t * inverse);
         }
     }
+    choose_motion(s, brightest_e_per_s);
     BST_TRY(make_level(ctx, s, 0));
     s->star_share = largest_share(s);
     return BST_OK;
@@ -251,7 +317,11 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_los_track *trac
 static int choose_level(bst_smear *s, double peak_e) {
     double sigmas = peak_e / sqrt(peak_e + s->dark_variance_e2);
     int n = 0;
-    while (n + 1 < LEVELS && s->tolerance[n] * sigmas > NODE_SHARE * s->options.tolerance_sigma) {
+    if (s->options.temporal_oversample > 0) {
+        return n;
+    }
+    while (n + 1 < LEVELS && (s->tolerance[n] + s->options.table_error) * sigmas >
+                                 NODE_SHARE * s->options.tolerance_sigma) {
         n++;
     }
     return n;
@@ -261,6 +331,9 @@ static int choose_level(bst_smear *s, double peak_e) {
 static int choose_radius(const bst_smear *s, double peak_e) {
     double limit = CUT_SHARE * s->options.tolerance_sigma * sqrt(s->dark_variance_e2);
     int most = s->options.taps / 2 - 1, r = 1;
+    if (s->options.stamp_radius_px > 0) {
+        return s->options.stamp_radius_px < most ? s->options.stamp_radius_px : most;
+    }
     while (r < most && peak_e * s->tail[r + 1] > limit) {
         r++;
     }
@@ -290,7 +363,7 @@ static bool project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, doubl
  * PSF's table ends before. */
 static double far_px(const bst_smear *s) {
     return tan(bst_camera_half_diagonal_rad(&s->camera)) / bst_camera_scale_rad(&s->camera) +
-           MAX_TAPS / bst_camera_shrink(&s->camera);
+           MAX_TAPS / bst_camera_shrink(&s->camera) + s->disc_px;
 }
 
 /* How many chords the curved motion over the image wants: of a parabola they miss
@@ -335,6 +408,9 @@ static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_source *source,
                            double y0, int *count) {
     const bst_los_track *track = &s->track;
     int least = (int)chords_of(s, source) / (track->count - 1) + 1;
+    if (source->rate && least < RATE_PARTS / (track->count - 1) + 1) {
+        least = RATE_PARTS / (track->count - 1) + 1; /* between its points light is uniform */
+    }
     *count = 0;
     for (int k = 0; k + 1 < track->count; k++) {
         int parts = parts_of(s, k);
@@ -349,7 +425,8 @@ static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_source *source,
                 bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
             bool front = project(s, q, bst_source_direction(source, t), &x, &y);
             s->own_path[(*count)++] = (bst_path_point){
-                {front ? (x - x0) * s->stretch : NAN, front ? (y - y0) * s->stretch : NAN, 0.0}, t};
+                {front ? (x - x0) * s->stretch : NAN, front ? (y - y0) * s->stretch : NAN, 0.0},
+                bst_source_light(source, t)};
         }
     }
     return BST_OK;
@@ -371,10 +448,9 @@ static bst_status own_nodes(bst_ctx *ctx, bst_smear *s, int count, double x0, do
         }
         if (last > first) {
             int n = s->nodes.count;
-            BST_TRY(bst_nodes_from_path(ctx, p + first, last - first + 1, s->sigma_px, tolerance,
-                                        true, &s->nodes));
-            for (double part = total > 0.0 ? (p[last].s - p[first].s) / total : 1.0;
-                 n < s->nodes.count && part < 1.0; n++) {
+            double part = total > 0.0 ? (p[last].s - p[first].s) / total : 1.0;
+            BST_TRY(path_nodes(ctx, s, p + first, last - first + 1, part, tolerance));
+            for (; n < s->nodes.count && part < 1.0; n++) {
                 s->nodes.items[n].weight *= part;
             }
         }
@@ -382,11 +458,50 @@ static bst_status own_nodes(bst_ctx *ctx, bst_smear *s, int count, double x0, do
     return BST_OK;
 }
 
+/* Makes the points of a disc; the scratch nodes are those of its middle about (x, y). *peak: share
+ * of the light on one pixel at most, without the smear. */
+static bst_status shape_points(bst_ctx *ctx, bst_smear *s, const bst_source *source, double x,
+                               double y, double *peak) {
+    enum { MOST_NODES = 2000000 };
+    double x0 = x, y0 = y, low[2] = {0.0, 0.0}, high[2] = {0.0, 0.0};
+    (void)project(s, s->q_reference, source->apparent_mid, &x0, &y0);
+    for (int n = 0; n < s->nodes.count; n++) {
+        double way[2] = {s->nodes.items[n].p[0] / s->stretch + x - x0,
+                         s->nodes.items[n].p[1] / s->stretch + y - y0};
+        for (int i = 0; i < 2; i++) {
+            low[i] = n == 0 ? way[i] : fmin(low[i], way[i]);
+            high[i] = n == 0 ? way[i] : fmax(high[i], way[i]);
+        }
+    }
+    double cx = bst_camera_centre_x(&s->camera), cy = bst_camera_centre_y(&s->camera);
+    double margin = 0.5 * s->options.taps + 2.0, all = far_px(s) - s->disc_px;
+    bool general = s->camera.geometry.general;
+    double turn = general ? asin(s->camera.geometry.sin_rotation) : 0.0;
+    if (general && s->camera.geometry.cos_rotation < 0.0) {
+        turn = BST_PI - turn;
+    }
+    bst_quat focal = bst_quat_from_rotvec((bst_vec3){0.0, 0.0, turn});
+    bst_shape_view view = {
+        .q_focal_from_gcrf = general ? bst_quat_mul(focal, s->q_reference) : s->q_reference,
+        .scale_rad = bst_camera_scale_rad(&s->camera),
+        .edge_x_px = -cx - 0.5,
+        .edge_y_px = -cy - 0.5,
+        .sigma_px = s->sigma_px,
+        .min_x_px = (general ? -all : -cx - margin) - high[0],
+        .max_x_px = (general ? all : (double)s->camera.width_px - cx + margin) - low[0],
+        .min_y_px = (general ? -all : -cy - margin) - high[1],
+        .max_y_px = (general ? all : (double)s->camera.height_px - cy + margin) - low[1],
+        .most_points = MOST_NODES / (s->nodes.count > 0 ? s->nodes.count : 1)};
+    return bst_shape_points(ctx, source, &view, &s->points, peak);
+}
+
 bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source,
                             bst_scene_source *out, bool *visible) {
     double x, y, electrons = source->electrons_per_s * s->duration_s;
     s->last_peak_e = 0.0;
-    bool moving = source->path != NULL;
+    bool moving = source->path || source->rate || source->shape;
+    s->disc_px =
+        source->shape ? tan(asin(source->shape->radius)) / bst_camera_scale_rad(&s->camera) : 0.0;
     bool front = project(s, s->q_reference, source->apparent_mid, &x, &y);
     *visible = !source->occulted && electrons > 0.0 && electrons < 1e30 && (front || moving);
     if (!*visible) {
@@ -406,8 +521,21 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
             *visible = false;
             return BST_OK;
         }
-        s->last_peak_e = electrons * largest_share(s);
+        double share = largest_share(s), peak;
+        if (source->shape) {
+            BST_TRY(own_nodes(ctx, s, count, x, y, s->tolerance[0]));
+            BST_TRY(shape_points(ctx, s, source, x, y, &peak));
+            share = fmin(share, peak);
+        }
+        s->last_peak_e = electrons * share;
         BST_TRY(own_nodes(ctx, s, count, x, y, s->tolerance[choose_level(s, s->last_peak_e)]));
+        if (source->shape) {
+            BST_TRY(bst_shape_spread(ctx, &s->points, s->stretch, &s->nodes));
+        }
+        if (s->nodes.count == 0) {
+            *visible = false;
+            return BST_OK;
+        }
         BST_TRY(append_nodes(ctx, s, &s->nodes, shift_to_table, &own));
         used = &own;
     } else {
@@ -420,8 +548,12 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
     double sigmas = s->last_peak_e / sqrt(s->last_peak_e + s->dark_variance_e2);
     double lost = 1.0 - s->kept[radius] * s->kept[radius];
     int border = radius + 1 < MAX_TAPS / 2 ? radius + 1 : radius;
-    s->last_error_sigma = fmax((used->error + lost) * sigmas,
+    double shared = s->single && !moving ? single_error(s, s->last_peak_e, hypot(x, y)) : 0.0;
+    s->last_error_sigma = fmax((used->error + lost) * sigmas + shared,
                                s->last_peak_e * s->tail[border] / sqrt(s->dark_variance_e2));
+    if (s->options.temporal_oversample > 0) {
+        s->last_error_sigma = NAN;
+    }
     /* what the stamp leaves out is put on the stamp, so that no light is lost */
     electrons /= s->kept[radius] * s->kept[radius];
     *out = (bst_scene_source){.x_px = (float)x,
@@ -431,6 +563,10 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
                               .blocks = used->blocks,
                               .radius = radius};
     return BST_OK;
+}
+
+bool bst_smear_single(const bst_smear *s) {
+    return s->single;
 }
 
 double bst_smear_last_peak_e(const bst_smear *s) {

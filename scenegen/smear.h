@@ -10,9 +10,20 @@
 
 typedef struct bst_smear bst_smear;
 
+/* Whose track the stars follow. */
+typedef enum bst_star_motion {
+    BST_STAR_MOTION_AUTO,   /* the cheapest that meets the tolerance */
+    BST_STAR_MOTION_SINGLE, /* all that of the star at the boresight, as a shift of the image */
+    BST_STAR_MOTION_MULTI   /* each its own */
+} bst_star_motion;
+
 typedef struct bst_smear_options {
     double tolerance_sigma; /* error of a source's image in any pixel, in that pixel's sigma */
     int taps;               /* length of the profile table, px */
+    double table_error;     /* of a node's image by the table, over its peak */
+    bst_star_motion motion;
+    int temporal_oversample; /* 0: by the tolerance; else so many equal parts of the exposure */
+    int stamp_radius_px;     /* 0: by the tolerance; else of all stamps */
     /* for a PSF that is no Gaussian, else 0: those that need nodes as fine, and that put as much of
      * a point's light in one pixel */
     double node_sigma_px, share_sigma_px;
@@ -22,10 +33,14 @@ bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
                             const bst_smear_options *options, bst_smear **out) BST_MUST_CHECK;
 void bst_smear_free(bst_smear *smear);
 
-/* Starts a frame: takes the line-of-sight track (needed until the frame's last source) and the
- * noise variance of a dark pixel (background, dark and read noise), e-^2. */
+/* Starts a frame: takes the line-of-sight track (needed until the frame's last source), the noise
+ * variance of a dark pixel (background, dark and read noise), e-^2, and the rate of the brightest
+ * star, e-/s. */
 bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *smear, const bst_los_track *track,
-                           double dark_variance_e2) BST_MUST_CHECK;
+                           double dark_variance_e2, double brightest_e_per_s) BST_MUST_CHECK;
+
+/* The frame's stars follow one track as a shift. */
+bool bst_smear_single(const bst_smear *smear);
 
 /* Chooses a source's nodes and stamp. *visible is false for one that gives no light (occulted, not
  * in front of the camera); *out is then untouched. first_block is left 0. */
@@ -36,7 +51,8 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *smear, const bst_source *so
 double bst_smear_last_peak_e(const bst_smear *smear);
 
 /* Predicted error of the image of the source given last, in sigma of its worst pixel: at most
- * tolerance_sigma, unless the brightest level of detail does not reach it. */
+ * tolerance_sigma, unless the brightest level of detail does not reach it or a knob other than the
+ * tolerance forbids it; NAN with temporal_oversample, whose error is not foreseen. */
 double bst_smear_last_error_sigma(const bst_smear *smear);
 
 /* The frame's node table so far: *blocks blocks of BST_TABLE_ROWS x BST_BLOCK floats. */

@@ -1,9 +1,19 @@
 /* The detector: from expected electrons to digital numbers. Options: CF_ORDER (terms of the noise
  * law), SINGLE_FROM (means from here on take one deviate for shot and read noise together), SEARCH
- * (some means do not).
+ * (some means do not); GAIN_MAP, DARK_MAP (response and dark current of each pixel), OVERLAY
+ * (charge that is there besides the light's), NONLINEAR (with C1, C2, C3), TAIL (with
+ * TAIL_FRACTION, TAIL_RMS), OFFSETS (of columns and rows), CODES (a table from digital numbers to
+ * the frame's).
  *
  * Pixels are drawn in chunks of 64 columns of the full sensor, each from one Philox call per lane:
  * word v of lane l belongs to column 16 v + l. */
+
+/* gain, dark (e/s), overlay (e): [sensor rows][MAP_STRIDE], a multiple of 64. offsets (DN): columns
+ * [MAP_STRIDE], then rows. */
+typedef struct detector_maps {
+    global const float *gain, *dark, *overlay, *offsets;
+    global const ushort *codes;
+} detector_maps;
 
 /* Means from here on take the expansion of the Poisson quantile, below it the exact search. At 30
  * the two laws differ by a total variation of 1.4e-5, which falls as the mean to the power -1.5. */
@@ -13,6 +23,8 @@
 #define STREAM_NOISE 0u
 #define STREAM_POISSON 1u
 #define STREAM_POISSON_NORMAL 2u
+#define STREAM_TAIL 3u
+#define STREAM_TAIL_NORMAL 4u
 
 /* Four vectors: one chunk of 64 pixels. Loops over them would not be unrolled by every compiler,
  * and would go through memory. */
@@ -28,7 +40,7 @@ typedef struct chunk_flags {
     int16 a, b, c, d;
 } chunk_flags;
 
-/* Coefficients of digital numbers as a polynomial of a normal deviate. */
+/* Coefficients of electrons, shot and read noise, as a polynomial of a normal deviate. */
 typedef struct noise_law {
     float16 c0, c1, c2, c3;
 #if CF_ORDER >= 3
@@ -39,7 +51,7 @@ typedef struct noise_law {
 #endif
 } noise_law;
 
-/* Quantile of Poisson(mean) + normal(0, read noise), in digital numbers plus one half, as a
+/* Quantile of Poisson(mean) + normal(0, read noise), as a
  * polynomial of the normal quantile z: the Cornish-Fisher expansion (Abramowitz and Stegun 26.2.49)
  * to order CF_ORDER of 1 / sigma. All cumulants beyond the variance are the mean, so with
  * a = 1 / sigma, b = mean / sigma^2 the standardised ones are b a, b a^2, b a^3, b a^4. */
@@ -72,16 +84,16 @@ INLINE noise_law noise_law_of(bst_scene_params p, float16 mean) {
         fma(b4, (float16)(-227.0f / 7776), fma(b3, (float16)(8.0f / 288), b2 * (-2.0f / 384)));
     c1 = fma(a3, fma(h5, (float16)15.0f, fma(h3, (float16)-3.0f, h1)), c1);
     c3 = fma(a3, fma(h5, (float16)-10.0f, h3), c3);
-    law.c5 = a3 * h5 * p.dn_per_e;
+    law.c5 = a3 * h5;
 #endif
-    law.c0 = fma(c0, (float16)p.dn_per_e, (float16)(p.offset_dn + 0.5f));
-    law.c1 = c1 * p.dn_per_e;
-    law.c2 = c2 * p.dn_per_e;
-    law.c3 = c3 * p.dn_per_e;
+    law.c0 = c0;
+    law.c1 = c1;
+    law.c2 = c2;
+    law.c3 = c3;
     return law;
 }
 
-/* Digital numbers plus one half. */
+/* Electrons with shot and read noise. */
 INLINE float16 draw_single(noise_law law, float16 z) {
     float16 dn = law.c3;
 #if CF_ORDER >= 4
@@ -140,6 +152,127 @@ INLINE int16 needs_two(bst_scene_params p, float16 mean) {
     return (mean < SINGLE_FROM) | (mean > p.near_full_e);
 }
 
+/* What the amplifier makes of a charge. */
+INLINE float16 respond(bst_scene_params p, float16 e) {
+#ifdef NONLINEAR
+    float16 u = e * p.per_full_well;
+    e = fma(e, u * fma(u, fma(u, (float16)C3, (float16)C2), (float16)C1), e);
+#endif
+    return e;
+}
+
+INLINE float16 read_out(bst_scene_params p, float16 charge, float16 z) {
+    return fma((float16)p.read_noise_e, z, respond(p, charge));
+}
+
+/* Charge from two words: a uniform one, and one that made the normal deviate w. */
+INLINE float16 draw_charge(float16 mean, uint16 word, float16 w, int16 wanted) {
+    int16 small = mean < POISSON_SWITCH;
+    float16 electrons = poisson_expand16(mean, w);
+    int16 search = wanted & small;
+    if (any16(search)) {
+        electrons = select(electrons, poisson_search16(mean, word, search), small);
+    }
+    return electrons;
+}
+
+INLINE chunk_words chunk_random(bst_scene_params p, uint counter, uint stream) {
+    chunk_words w;
+    philox16(p, counter, stream, &w.a, &w.b, &w.c, &w.d);
+    return w;
+}
+
+INLINE chunk chunk_normal(chunk_words w) {
+    chunk z;
+    normal16(w.a, w.b, &z.a, &z.b);
+    normal16(w.c, w.d, &z.c, &z.d);
+    return z;
+}
+
+INLINE chunk load_chunk(global const float *from) {
+    global const float16 *v = (global const float16 *)from;
+    chunk c = {v[0], v[1], v[2], v[3]};
+    return c;
+}
+
+/* Expected electrons of one chunk from its light; map: of its first pixel. */
+INLINE chunk expected_chunk(bst_scene_params p, detector_maps maps, size_t map, chunk light) {
+    float sky = p.background_e - p.dark_e;
+    chunk m;
+#ifdef GAIN_MAP
+    chunk gain = load_chunk(maps.gain + map);
+    m.a = (light.a + sky) * gain.a;
+    m.b = (light.b + sky) * gain.b;
+    m.c = (light.c + sky) * gain.c;
+    m.d = (light.d + sky) * gain.d;
+#else
+    m.a = light.a + sky;
+    m.b = light.b + sky;
+    m.c = light.c + sky;
+    m.d = light.d + sky;
+#endif
+    return m;
+}
+
+INLINE chunk add_dark(bst_scene_params p, detector_maps maps, size_t map, chunk m) {
+#ifdef DARK_MAP
+    chunk dark = load_chunk(maps.dark + map);
+    m.a = fma(dark.a, (float16)p.exposure_s, m.a);
+    m.b = fma(dark.b, (float16)p.exposure_s, m.b);
+    m.c = fma(dark.c, (float16)p.exposure_s, m.c);
+    m.d = fma(dark.d, (float16)p.exposure_s, m.d);
+#else
+    m.a += p.dark_e;
+    m.b += p.dark_e;
+    m.c += p.dark_e;
+    m.d += p.dark_e;
+#endif
+    return m;
+}
+
+#ifdef TAIL
+/* Adds the excess noise of the reads in the tail. */
+INLINE chunk add_tail(bst_scene_params p, uint counter, chunk e) {
+    const uint below = (uint)(TAIL_FRACTION * 4294967295.0);
+    chunk_words w = chunk_random(p, counter, STREAM_TAIL);
+    int16 a = w.a <= below, b = w.b <= below, c = w.c <= below, d = w.d <= below;
+    if (any16((a | b) | (c | d))) {
+        chunk z = chunk_normal(chunk_random(p, counter, STREAM_TAIL_NORMAL));
+        e.a += select((float16)0.0f, z.a * TAIL_RMS, a);
+        e.b += select((float16)0.0f, z.b * TAIL_RMS, b);
+        e.c += select((float16)0.0f, z.c * TAIL_RMS, c);
+        e.d += select((float16)0.0f, z.d * TAIL_RMS, d);
+    }
+    return e;
+}
+#endif
+
+/* Electrons to digital numbers plus one half, not yet cut to the converter's range. row, column: of
+ * the first pixel on the sensor. */
+INLINE chunk convert_chunk(bst_scene_params p, detector_maps maps, uint counter, int row,
+                           int column, chunk e) {
+#ifdef TAIL
+    e = add_tail(p, counter, e);
+#endif
+    float16 g = (float16)p.dn_per_e;
+    chunk dn;
+#ifdef OFFSETS
+    float16 offset = (float16)(p.offset_dn + 0.5f + maps.offsets[MAP_STRIDE + row]);
+    chunk o = load_chunk(maps.offsets + column);
+    dn.a = fma(e.a, g, offset + o.a);
+    dn.b = fma(e.b, g, offset + o.b);
+    dn.c = fma(e.c, g, offset + o.c);
+    dn.d = fma(e.d, g, offset + o.d);
+#else
+    float16 offset = (float16)(p.offset_dn + 0.5f);
+    dn.a = fma(e.a, g, offset);
+    dn.b = fma(e.b, g, offset);
+    dn.c = fma(e.c, g, offset);
+    dn.d = fma(e.d, g, offset);
+#endif
+    return dn;
+}
+
 /* What all pixels share that no source lights. */
 typedef struct dark_law {
     noise_law law;
@@ -150,21 +283,25 @@ typedef struct dark_law {
 
 #define MOST_STEPS 128
 
+#if !defined(GAIN_MAP) && !defined(DARK_MAP)
+#define SHARED_MEAN
+#endif
+
 /* steps: the search's cumulated chances. poisson_search16 ends where these do. */
 INLINE dark_law dark_law_of(bst_scene_params p, uint *steps) {
     dark_law dark;
-    float16 mean = (float16)p.background_e;
+    dark.mean = (p.background_e - p.dark_e) + p.dark_e; /* as the sum of the two below */
+    float16 mean = (float16)dark.mean;
     dark.law = noise_law_of(p, mean);
     dark.single = !any16(needs_two(p, mean));
     dark.steps = 0;
-    dark.mean = p.background_e;
-#ifdef SEARCH
-    if (p.background_e < POISSON_SWITCH && p.background_e <= p.near_full_e) {
+#if defined(SEARCH) && defined(SHARED_MEAN)
+    if (dark.mean < POISSON_SWITCH && dark.mean <= p.near_full_e) {
         float16 chance = first_chance(mean);
         uint sum = 0u;
         for (int k = 0; k < MOST_STEPS; k++) {
             uint part = convert_uint(chance.s0);
-            if (part == 0u && p.background_e < (float)k) {
+            if (part == 0u && dark.mean < (float)k) {
                 break;
             }
             sum = add_sat(sum, part);
@@ -199,84 +336,83 @@ INLINE chunk dark_electrons(dark_law dark, const uint *steps, chunk_words w) {
 }
 #endif
 
-/* Digital numbers plus one half of `electrons` with read noise z. */
-INLINE float16 read_out(bst_scene_params p, float16 electrons, float16 z) {
-    return fma(fma((float16)p.read_noise_e, z, electrons), (float16)p.dn_per_e,
-               (float16)(p.offset_dn + 0.5f));
-}
-
-/* Charge first, then read noise z: replaces dn in the lanes `two`; full: those with a full well. */
-INLINE float16 draw_two(bst_scene_params p, float16 mean, float16 z, uint16 word, float16 w,
-                        int16 two, float16 dn, int16 *full) {
-    int16 small = mean < POISSON_SWITCH;
-    float16 electrons = poisson_expand16(mean, w);
-    int16 search = two & small;
-    if (any16(search)) {
-        electrons = select(electrons, poisson_search16(mean, word, search), small);
-    }
-    *full = two & (electrons >= p.full_well_e);
-    electrons = fmin(electrons, p.full_well_e);
-    return select(dn, read_out(p, electrons, z), two);
-}
-
-INLINE chunk_words chunk_random(bst_scene_params p, uint counter, uint stream) {
-    chunk_words w;
-    philox16(p, counter, stream, &w.a, &w.b, &w.c, &w.d);
-    return w;
-}
-
-INLINE chunk chunk_normal(chunk_words w) {
-    chunk z;
-    normal16(w.a, w.b, &z.a, &z.b);
-    normal16(w.c, w.d, &z.c, &z.d);
-    return z;
+/* Electrons of 16 pixels, where `two` charge first, then read noise. full: lanes with a full well.
+ */
+INLINE float16 draw_pixels(bst_scene_params p, float16 single, float16 charge, float16 z, int16 two,
+                           int16 *full) {
+    *full = two & (charge >= p.full_well_e);
+    return select(single, read_out(p, fmin(charge, p.full_well_e), z), two);
 }
 
 /* Digital numbers plus one half, not yet cut to the converter's range, of one chunk. counter: of
- * its first lane. light: electrons of the sources, some of them where `lit`. brim: lanes with a
- * full well. */
-INLINE chunk detect_chunk(bst_scene_params p, dark_law dark, const uint *steps, uint counter,
-                          chunk light, int lit, chunk_flags *brim) {
-    chunk dn, z = chunk_normal(chunk_random(p, counter, STREAM_NOISE));
+ * its first lane. row, column: of its first pixel on the sensor. light: electrons of the sources,
+ * some of them where `lit`. brim: lanes with a full well. */
+INLINE chunk detect_chunk(bst_scene_params p, detector_maps maps, dark_law dark, const uint *steps,
+                          uint counter, int row, int column, chunk light, int lit,
+                          chunk_flags *brim) {
+    chunk e, z = chunk_normal(chunk_random(p, counter, STREAM_NOISE));
     brim->a = brim->b = brim->c = brim->d = (int16)0;
+#ifdef OVERLAY
+    chunk over = load_chunk(maps.overlay + (size_t)row * MAP_STRIDE + column);
+    lit |= any16((over.a != 0.0f) | (over.b != 0.0f) | (over.c != 0.0f) | (over.d != 0.0f));
+#endif
+#ifdef SHARED_MEAN
     if (!lit && dark.single) {
-        dn.a = draw_single(dark.law, z.a);
-        dn.b = draw_single(dark.law, z.b);
-        dn.c = draw_single(dark.law, z.c);
-        dn.d = draw_single(dark.law, z.d);
-        return dn;
+        e.a = respond(p, draw_single(dark.law, z.a));
+        e.b = respond(p, draw_single(dark.law, z.b));
+        e.c = respond(p, draw_single(dark.law, z.c));
+        e.d = respond(p, draw_single(dark.law, z.d));
+        return convert_chunk(p, maps, counter, row, column, e);
     }
 #ifdef SEARCH
     if (!lit && dark.steps > 0) {
-        chunk e = dark_electrons(dark, steps, chunk_random(p, counter, STREAM_POISSON));
-        dn.a = read_out(p, e.a, z.a);
-        dn.b = read_out(p, e.b, z.b);
-        dn.c = read_out(p, e.c, z.c);
-        dn.d = read_out(p, e.d, z.d);
-        return dn;
+        chunk q = dark_electrons(dark, steps, chunk_random(p, counter, STREAM_POISSON));
+        e.a = read_out(p, q.a, z.a);
+        e.b = read_out(p, q.b, z.b);
+        e.c = read_out(p, q.c, z.c);
+        e.d = read_out(p, q.d, z.d);
+        return convert_chunk(p, maps, counter, row, column, e);
     }
 #endif
-    chunk m;
-    m.a = light.a + p.background_e;
-    m.b = light.b + p.background_e;
-    m.c = light.c + p.background_e;
-    m.d = light.d + p.background_e;
-    dn.a = draw_single(noise_law_of(p, m.a), z.a);
-    dn.b = draw_single(noise_law_of(p, m.b), z.b);
-    dn.c = draw_single(noise_law_of(p, m.c), z.c);
-    dn.d = draw_single(noise_law_of(p, m.d), z.d);
-    chunk_flags two;
-    two.a = needs_two(p, m.a);
-    two.b = needs_two(p, m.b);
-    two.c = needs_two(p, m.c);
-    two.d = needs_two(p, m.d);
+#endif
+    size_t map = (size_t)row * MAP_STRIDE + column;
+    chunk m = add_dark(p, maps, map, expected_chunk(p, maps, map, light));
+    e.a = draw_single(noise_law_of(p, m.a), z.a);
+    e.b = draw_single(noise_law_of(p, m.b), z.b);
+    e.c = draw_single(noise_law_of(p, m.c), z.c);
+    e.d = draw_single(noise_law_of(p, m.d), z.d);
+    chunk_flags two = {needs_two(p, m.a), needs_two(p, m.b), needs_two(p, m.c), needs_two(p, m.d)};
+#ifdef OVERLAY
+    e.a += over.a;
+    e.b += over.b;
+    e.c += over.c;
+    e.d += over.d;
+    two.a |= m.a + over.a > p.near_full_e;
+    two.b |= m.b + over.b > p.near_full_e;
+    two.c |= m.c + over.c > p.near_full_e;
+    two.d |= m.d + over.d > p.near_full_e;
+#endif
+    e.a = respond(p, e.a);
+    e.b = respond(p, e.b);
+    e.c = respond(p, e.c);
+    e.d = respond(p, e.d);
     if (any16((two.a | two.b) | (two.c | two.d))) {
         chunk_words w = chunk_random(p, counter, STREAM_POISSON);
-        chunk n = chunk_normal(chunk_random(p, counter, STREAM_POISSON_NORMAL));
-        dn.a = draw_two(p, m.a, z.a, w.a, n.a, two.a, dn.a, &brim->a);
-        dn.b = draw_two(p, m.b, z.b, w.b, n.b, two.b, dn.b, &brim->b);
-        dn.c = draw_two(p, m.c, z.c, w.c, n.c, two.c, dn.c, &brim->c);
-        dn.d = draw_two(p, m.d, z.d, w.d, n.d, two.d, dn.d, &brim->d);
+        chunk q, n = chunk_normal(chunk_random(p, counter, STREAM_POISSON_NORMAL));
+        q.a = draw_charge(m.a, w.a, n.a, two.a);
+        q.b = draw_charge(m.b, w.b, n.b, two.b);
+        q.c = draw_charge(m.c, w.c, n.c, two.c);
+        q.d = draw_charge(m.d, w.d, n.d, two.d);
+#ifdef OVERLAY
+        q.a += over.a;
+        q.b += over.b;
+        q.c += over.c;
+        q.d += over.d;
+#endif
+        e.a = draw_pixels(p, e.a, q.a, z.a, two.a, &brim->a);
+        e.b = draw_pixels(p, e.b, q.b, z.b, two.b, &brim->b);
+        e.c = draw_pixels(p, e.c, q.c, z.c, two.c, &brim->c);
+        e.d = draw_pixels(p, e.d, q.d, z.d, two.d, &brim->d);
     }
-    return dn;
+    return convert_chunk(p, maps, counter, row, column, e);
 }

@@ -8,10 +8,14 @@ static void load_tile(local float *sum, bst_scene_params p, int left, int top,
     for (int y = 0; y < rows; y++) {
         /* rounding leaves the darkest pixels a little below zero; rows are padded for the last
          * vector */
-        for (int x = 0; x < first; x++) {
-            sum[y * STRIDE + x] = 0.0f;
-        }
-        for (int x = first; x < columns; x += 16) {
+        for (int x = 0; x < columns; x += 16) {
+            if (left + x < 0) { /* the window begins inside the vector or after it */
+                for (int i = x; i < x + 16; i++) {
+                    sum[y * STRIDE + i] =
+                        left + i < 0 ? 0.0f : fmax(image[(size_t)y * p.light_pitch + i], 0.0f);
+                }
+                continue;
+            }
             vstore16(fmax(vload16(0, image + (size_t)y * p.light_pitch + x), 0.0f), 0,
                      sum + y * STRIDE + x);
         }

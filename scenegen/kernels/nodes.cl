@@ -39,6 +39,15 @@ static void add_distortion(float16 *x, float16 *y, float16 *stretch2) {
 }
 #endif
 
+#ifdef SPATIAL_OVERSAMPLE
+/* Of the parts into which a pixel is cut along each axis. */
+static float16 centre_of_part(float16 v) {
+    float16 pixel = floor(v + 0.5f);
+    float16 part = floor((v + 0.5f - pixel) * SPATIAL_OVERSAMPLE) + 0.5f;
+    return pixel + part * (1.0f / SPATIAL_OVERSAMPLE) - 0.5f;
+}
+#endif
+
 /* nodes: per block x[16], y[16], electrons[16], widths[16], px and e-. block_box: x0, y0, x1, y1 (inclusive
  * pixels). source_box: the same for sources, by groups of 16: x0[16], y0[16], x1[16], y1[16]. */
 kernel void bst_scene_nodes(global const bst_scene_source *sources, int count,
@@ -70,6 +79,10 @@ kernel void bst_scene_nodes(global const bst_scene_source *sources, int count,
             float16 widening = t[10];
             float16 x = clamp(centre_x + s.x_px + dx, -1e6f, 1e6f);
             float16 y = clamp(centre_y + s.y_px + dy, -1e6f, 1e6f);
+#endif
+#ifdef SPATIAL_OVERSAMPLE
+            x = centre_of_part(x);
+            y = centre_of_part(y);
 #endif
             int block = s.first_block + b;
             nodes[BST_NODE_ROWS * block] = x;

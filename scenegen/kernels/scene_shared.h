@@ -4,10 +4,11 @@
 
 /* Nodes travel in blocks of this many, one vector register. */
 #define BST_BLOCK 16
-/* The profile table holds the PSF widened by (n / BST_WIDTHS)^2 BST_WIDEST of its own variance, n from
- * 0 to BST_WIDTHS. Linear interpolation between them misses at most 3e-4 of the peak, and
- * 0.4 widening / BST_WIDTHS^2 of it for little widening. */
-#define BST_WIDTHS 16
+/* The profile table holds the PSF widened by (n / BST_WIDTHS)^2 BST_WIDEST of its own variance, n
+ * from 0 to BST_WIDTHS. Between widths it is interpolated linearly in the variance, between which a
+ * Gaussian's peak goes as the square root of its inverse: on each axis that misses
+ * 3/8 w / BST_WIDTHS^2 / (1 + w)^2 of the peak for a widening by w variances. */
+#define BST_WIDTHS 32
 #define BST_WIDEST 1.0f
 /* Zeros on either side of a row of the profile table. */
 #define BST_PROFILE_PAD 16
@@ -25,14 +26,21 @@ typedef struct bst_scene_params {
     int tiles_x, tiles_y;
     int source_groups; /* sources / BST_BLOCK, rounded up */
     unsigned key0, key1, exposure_low, exposure_high;
-    float background_e; /* expected, per pixel */
+    float background_e; /* expected, per pixel: sky and dark current */
+    float dark_e;       /* of it, dark current */
+    float exposure_s;
     float read_noise_e;
     float full_well_e;
-    float near_full_e; /* means above may fill the well */
+    float per_full_well; /* 1 / full_well_e */
+    float near_full_e;   /* means above may fill the well */
     float dn_per_e;
     float offset_dn;
     float max_dn;
     int light_first, light_pitch; /* of the Fourier path's image, floats */
+    int image_stride;             /* of the image of expected electrons, floats */
+    int light_y0, light_height,
+        light_stride; /* of the image that is read out: sensor row, rows, floats */
+    int binning;
     int map_step, map_x0, map_y0, map_columns, map_rows; /* of the background, if it varies */
 } bst_scene_params;
 

@@ -24,8 +24,17 @@ typedef ushort16 __attribute__((aligned(2))) ushort16_anywhere;
 
 /* Digital numbers, plus one half, of 16 pixels to the window's row at `column`. Returns the pixels
  * that are saturated (`brim`, or converter at its top) as -1; those outside the window are none. */
-INLINE int16 store_dn(bst_scene_params p, float16 dn, int16 brim, int column, global ushort *row) {
+INLINE int16 store_dn(bst_scene_params p, detector_maps maps, float16 dn, int16 brim, int column,
+                      global ushort *row) {
     ushort16 value = convert_ushort16(convert_int16(clamp(dn, 0.0f, p.max_dn)));
+#ifdef CODES
+    ushort numbers[16];
+    vstore16(value, 0, numbers);
+    for (int i = 0; i < 16; i++) {
+        numbers[i] = maps.codes[numbers[i]];
+    }
+    value = vload16(0, numbers);
+#endif
     int16 full = brim | (dn >= p.max_dn);
     if (column >= 0 && column + 16 <= p.window_width) {
         *(global ushort16_anywhere *)(row + column) = value;
@@ -49,7 +58,9 @@ INLINE int16 store_dn(bst_scene_params p, float16 dn, int16 brim, int column, gl
 __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     bst_scene_params p, global const bst_scene_source *sources, global const float *nodes,
     global const float4 *block_box, global const float *source_box, global const float *profiles,
-    global ushort *frame, global int *saturated BACKGROUND_ARGUMENT) {
+    global ushort *frame, global int *saturated, global const float *gain, global const float *dark,
+    global const float *overlay, global const float *offsets,
+    global const ushort *codes BACKGROUND_ARGUMENT) {
     local float sums[GROUP][TILE_H * STRIDE] __attribute__((aligned(64)));
     int tile = (int)get_global_id(0);
     if (tile >= p.tiles_x * p.tiles_y) {
@@ -65,7 +76,8 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     SHADE_TILE(sum, t.x, t.y);
     ADD_BACKGROUND(sum, p, t);
     uint steps[MOST_STEPS];
-    dark_law dark = dark_law_of(p, steps);
+    dark_law unlit = dark_law_of(p, steps);
+    detector_maps maps = {gain, dark, overlay, offsets, codes};
     uint chunks_per_row = (uint)(p.sensor_width + 63) / 64u;
     int16 full_count = (int16)0;
     for (int y = 0; y < t.rows; y++) {
@@ -77,12 +89,13 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
             int lit =
                 any16((light.a > 0.0f) | (light.b > 0.0f) | (light.c > 0.0f) | (light.d > 0.0f));
             chunk_flags brim;
-            chunk dn = detect_chunk(p, dark, steps, counter, light, lit, &brim);
+            chunk dn =
+                detect_chunk(p, maps, unlit, steps, counter, t.y + y, t.x + x, light, lit, &brim);
             int column = t.left + x;
-            full_count -= store_dn(p, dn.a, brim.a, column, row);
-            full_count -= store_dn(p, dn.b, brim.b, column + 16, row);
-            full_count -= store_dn(p, dn.c, brim.c, column + 32, row);
-            full_count -= store_dn(p, dn.d, brim.d, column + 48, row);
+            full_count -= store_dn(p, maps, dn.a, brim.a, column, row);
+            full_count -= store_dn(p, maps, dn.b, brim.b, column + 16, row);
+            full_count -= store_dn(p, maps, dn.c, brim.c, column + 32, row);
+            full_count -= store_dn(p, maps, dn.d, brim.d, column + 48, row);
             counter += 16u;
         }
     }
@@ -92,7 +105,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     saturated[tile] = c.lo + c.hi;
 }
 
-/* image: [window_height][window_width] expected electrons. */
+/* image: [window_height][image_stride] expected electrons. */
 __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_expected(
     bst_scene_params p, global const bst_scene_source *sources, global const float *nodes,
     global const float4 *block_box, global const float *source_box, global const float *profiles,
@@ -112,7 +125,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_expecte
     SHADE_TILE(sum, t.x, t.y);
     ADD_BACKGROUND(sum, p, t);
     for (int y = 0; y < t.rows; y++) {
-        global float *out = image + (size_t)(t.top + y) * p.window_width;
+        global float *out = image + (size_t)(t.top + y) * p.image_stride;
         for (int x = max(0, -t.left); x < t.columns; x++) {
             out[t.left + x] = sum[y * STRIDE + x] + p.background_e;
         }

@@ -1,36 +1,15 @@
+#include "sim/app/bench_scenes.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "scenegen/reference.h"
-#include "scenegen/renderer.h"
-#include "sim/app/bench.h"
 #include "sim/device/device.h"
-
-/* A rendering scene of the benchmark: what the camera sees and how it moves during the exposure. */
-typedef struct scene {
-    const char *name;
-    int side;          /* of the sensor, px */
-    bst_window window; /* width 0: all of it */
-    int stars, targets;
-    double magnitudes; /* star brightnesses span this, counts growing as 10^(0.4 m) */
-    double exposure_s;
-    double travel_px; /* of the stars along the diagonal */
-    double bend_px;   /* acceleration: the quadratic part */
-    double roll_rad;
-    double jitter_px; /* RMS per axis, 5 to 200 Hz */
-    bool target_at_rest;
-    double background_e;
-    double tolerance_sigma;
-    int error_sources; /* sources whose error is measured, evenly chosen; the reference takes its
-                          time */
-    double q;          /* wavelength x focal ratio / pixel of a diffraction PSF; 0: the Gaussian */
-} scene;
 
 #define WORST(name, tolerance, q) \
     { name, 2048, {0}, 3220, 0, 6, 2.0, 300, 4, 0.0349, 0.15, false, 40, tolerance, 60, q }
 
-static const scene scenes[] = {
+static const bst_bench_scene scenes[] = {
     WORST("worst_case", 0.05, 0),
     WORST("worst_case_diffraction_q1", 0.1, 1),
     WORST("worst_case_diffraction_q2", 0.07, 2),
@@ -40,23 +19,22 @@ static const scene scenes[] = {
     {"rate_track_fast", 2048, {0}, 500, 1, 6, 2.0, 200, 0, 0, 0.1, true, 40, 0.02, 60, 0},
     {"galactic_core", 2048, {0}, 100000, 0, 8, 0.5, 5, 0, 0, 0, false, 10, 0.05, 200, 0},
     {"window", 2048, {896, 896, 256, 256}, 500, 1, 6, 0.5, 10, 0, 0, 0.1, true, 10, 0.02, 100, 0},
+    {"small", 256, {0}, 30, 1, 4, 0.1, 20, 1, 0.01, 0.1, true, 10, 0.05, 10, 0},
 };
+enum { SCENES = sizeof scenes / sizeof *scenes };
 
-enum { MOST_TARGETS = 4, FRAMES = 40, WARM_UP = 3, TONES = 24, SAMPLES_PER_S = 1000 };
+enum { WARM_UP = 3, FRAMES = 40, TONES = 24, SAMPLES_PER_S = 1000 };
 
 static const double BRIGHTEST_E_PER_S = 1e6;
 
-typedef struct scene_state {
-    const scene *scene;
-    bst_camera camera;
-    bst_window window;
-    bst_source *sources;
-    int count;
-    bst_source_path paths[MOST_TARGETS];
-    double *time_s;
-    bst_quat *q;
-    int samples;
-} scene_state;
+const bst_bench_scene *bst_bench_find_scene(const char *name) {
+    for (int i = 0; i < SCENES; i++) {
+        if (strcmp(scenes[i].name, name) == 0) {
+            return &scenes[i];
+        }
+    }
+    return NULL;
+}
 
 static bst_camera bench_camera(int side) {
     return (bst_camera){.width_px = side,
@@ -87,32 +65,46 @@ static void set_diffraction(bst_camera *camera, double q) {
     }
 }
 
-static double jitter(const scene *s, uint64_t frame, int axis, double t) {
-    bst_rng_key key = bst_rng_make_key(1, frame, "bench", "jitter");
-    double sum = 0.0;
-    for (int i = 0; i < TONES && s->jitter_px > 0.0; i++) {
-        double f = 5.0 * pow(40.0, (i + 0.5) / TONES);
-        double phase = 2.0 * BST_PI * bst_rng_uniform(key, (uint64_t)axis, (uint64_t)i);
-        sum += sin(2.0 * BST_PI * f * t + phase);
+typedef struct tones {
+    double rate_radps[TONES], phase[2][TONES], amplitude_px;
+} tones;
+
+static tones tones_of(const bst_bench_scene *s, int frame) {
+    bst_rng_key key = bst_rng_make_key(1, (uint64_t)frame, "bench", "jitter");
+    tones out = {.amplitude_px = s->jitter_px * sqrt(2.0 / TONES)};
+    for (int i = 0; i < TONES; i++) {
+        out.rate_radps[i] = 2.0 * BST_PI * 5.0 * pow(40.0, (i + 0.5) / TONES);
+        for (int a = 0; a < 2; a++) {
+            out.phase[a][i] = 2.0 * BST_PI * bst_rng_uniform(key, (uint64_t)a, (uint64_t)i);
+        }
     }
-    return s->jitter_px * sum * sqrt(2.0 / TONES);
+    return out;
+}
+
+static double jitter(const tones *t, int axis, double time_s) {
+    double sum = 0.0;
+    for (int i = 0; i < TONES && t->amplitude_px > 0.0; i++) {
+        sum += sin(t->rate_radps[i] * time_s + t->phase[axis][i]);
+    }
+    return t->amplitude_px * sum;
 }
 
 /* Attitudes of one frame: the pointing of each frame differs by up to a pixel. */
-static void move(scene_state *st, uint64_t frame, double centre_px[2]) {
-    const scene *s = st->scene;
-    double scale = bst_camera_scale_rad(&st->camera), diagonal = s->travel_px / sqrt(2.0);
+static void move(bst_bench_view *v, int frame) {
+    const bst_bench_scene *s = &v->scene;
+    double scale = bst_camera_scale_rad(&v->camera), diagonal = s->travel_px / sqrt(2.0), start[2];
     bst_rng_key key = bst_rng_make_key(1, 0, "bench", "pointing");
+    tones t = tones_of(s, frame);
     for (int a = 0; a < 2; a++) {
-        centre_px[a] = bst_rng_uniform(key, frame, (uint64_t)a) - 0.5;
+        start[a] = bst_rng_uniform(key, (uint64_t)frame, (uint64_t)a) - 0.5;
     }
-    for (int k = 0; k < st->samples; k++) {
-        double u = (double)k / (st->samples - 1), t = u * s->exposure_s,
+    for (int k = 0; k < v->track.count; k++) {
+        double u = (double)k / (v->track.count - 1), time_s = u * s->exposure_s,
                bend = s->bend_px * 4.0 * (u - 0.5) * (u - 0.5);
-        double x = centre_px[0] + diagonal * (u - 0.5) + jitter(s, frame, 0, t);
-        double y = centre_px[1] + diagonal * (u - 0.5) + bend + jitter(s, frame, 1, t);
-        st->time_s[k] = t;
-        st->q[k] = bst_quat_from_rotvec((bst_vec3){-y * scale, x * scale, s->roll_rad * (u - 0.5)});
+        double x = start[0] + diagonal * (u - 0.5) + jitter(&t, 0, time_s);
+        double y = start[1] + diagonal * (u - 0.5) + bend + jitter(&t, 1, time_s);
+        v->time_s[k] = time_s;
+        v->q[k] = bst_quat_from_rotvec((bst_vec3){-y * scale, x * scale, s->roll_rad * (u - 0.5)});
     }
 }
 
@@ -121,8 +113,8 @@ static bst_source place(const bst_camera *camera, int kind, double x, double y, 
     return (bst_source){.kind = kind, .apparent_mid = v, .electrons_per_s = rate};
 }
 
-static void make_sources(scene_state *st) {
-    const scene *s = st->scene;
+static void make_stars(bst_bench_view *v) {
+    const bst_bench_scene *s = &v->scene;
     bst_rng_key key = bst_rng_make_key(1, 0, "bench", "stars");
     double top = pow(10.0, 0.4 * s->magnitudes);
     for (int i = 0; i < s->stars; i++) {
@@ -130,154 +122,129 @@ static void make_sources(scene_state *st) {
                y = bst_rng_uniform(key, (uint64_t)i, 1) * s->side;
         double flux =
             BRIGHTEST_E_PER_S / (1.0 + bst_rng_uniform(key, (uint64_t)i, 2) * (top - 1.0));
-        st->sources[i] = place(&st->camera, BST_SOURCE_STAR, x, y, flux);
+        v->sources[i] = place(&v->camera, BST_SOURCE_STAR, x, y, flux);
     }
-    st->count = s->stars + s->targets;
 }
 
 /* Targets are elsewhere in every frame; those at rest move against the stars so that they stay in
  * their pixel. */
-static void place_targets(scene_state *st, uint64_t frame) {
-    const scene *s = st->scene;
+static void place_targets(bst_bench_view *v, int frame) {
+    const bst_bench_scene *s = &v->scene;
     bst_rng_key key = bst_rng_make_key(1, 0, "bench", "targets");
     double half = s->target_at_rest ? 0.5 * s->travel_px / sqrt(2.0) : 0.0;
+    double field = fmin(200.0, 0.5 * s->side), n = (double)frame;
     for (int i = 0; i < s->targets; i++) {
-        double x = 0.5 * s->side + 200.0 * (bst_rng_uniform(key, frame, (uint64_t)(2 * i)) - 0.5);
-        double y =
-            0.5 * s->side + 200.0 * (bst_rng_uniform(key, frame, (uint64_t)(2 * i + 1)) - 0.5);
-        bst_source *t = &st->sources[s->stars + i];
-        *t = place(&st->camera, BST_SOURCE_OBJECT, x, y, 2000.0);
-        st->paths[i] = bst_source_path_through(
-            bst_camera_unproject(&st->camera, x + half, y + half), t->apparent_mid,
-            bst_camera_unproject(&st->camera, x - half, y - half));
-        t->path = &st->paths[i];
+        double xy[2];
+        for (int a = 0; a < 2; a++) {
+            xy[a] = 0.5 * s->side +
+                    field * (bst_rng_uniform(key, (uint64_t)n, (uint64_t)(2 * i + a)) - 0.5);
+        }
+        bst_source *t = &v->sources[s->stars + i];
+        *t = place(&v->camera, BST_SOURCE_OBJECT, xy[0], xy[1], 2000.0);
+        v->paths[i] = bst_source_path_through(
+            bst_camera_unproject(&v->camera, xy[0] + half, xy[1] + half), t->apparent_mid,
+            bst_camera_unproject(&v->camera, xy[0] - half, xy[1] - half));
+        t->path = &v->paths[i];
     }
 }
 
-static bst_status open_scene(bst_ctx *ctx, const scene *s, scene_state *st) {
-    *st = (scene_state){.scene = s, .camera = bench_camera(s->side)};
+bst_status bst_bench_view_open(bst_ctx *ctx, const bst_bench_scene *s, bst_bench_view *v) {
+    int samples = (int)(s->exposure_s * SAMPLES_PER_S) + 1;
+    samples = samples < 2 ? 2 : samples;
+    *v = (bst_bench_view){.scene = *s, .camera = bench_camera(s->side)};
     if (s->q > 0.0) {
-        set_diffraction(&st->camera, s->q);
+        set_diffraction(&v->camera, s->q);
     }
-    st->window = s->window.width > 0 ? s->window : (bst_window){0, 0, s->side, s->side};
-    st->samples = (int)(s->exposure_s * SAMPLES_PER_S) + 1;
-    st->time_s = malloc((size_t)st->samples * sizeof *st->time_s);
-    st->q = malloc((size_t)st->samples * sizeof *st->q);
-    st->sources = malloc((size_t)(s->stars + s->targets) * sizeof *st->sources);
-    if (!st->time_s || !st->q || !st->sources) {
+    v->window = s->window.width > 0 ? s->window : (bst_window){0, 0, s->side, s->side};
+    v->time_s = malloc((size_t)samples * sizeof *v->time_s);
+    v->q = malloc((size_t)samples * sizeof *v->q);
+    v->count = s->stars + s->targets;
+    v->sources = malloc((size_t)v->count * sizeof *v->sources);
+    if (!v->time_s || !v->q || !v->sources) {
+        bst_bench_view_close(v);
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the scene %s", s->name);
     }
-    make_sources(st);
+    v->track = (bst_los_track){samples, v->time_s, v->q};
+    make_stars(v);
     return BST_OK;
 }
 
-static void close_scene(scene_state *st) {
-    free(st->time_s);
-    free(st->q);
-    free(st->sources);
+void bst_bench_view_close(bst_bench_view *v) {
+    free(v->time_s);
+    free(v->q);
+    free(v->sources);
+    *v = (bst_bench_view){.count = 0};
 }
 
-/* Error of an even choice of the scene's sources against the double-precision reference, by the
- * very renderer that was timed. */
-static bst_status measure_error(bst_ctx *ctx, bst_renderer *renderer, scene_state *st,
-                                const bst_render_request *timed, bst_bench_result *out) {
-    size_t pixels = (size_t)st->window.width * (size_t)st->window.height;
-    float *fast = malloc(pixels * sizeof *fast);
-    double *reference = calloc(pixels, sizeof *reference);
-    bst_source *chosen = malloc((size_t)st->count * sizeof *chosen);
-    bst_status status = fast && reference && chosen
-                            ? BST_OK
-                            : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the error's images");
-    int n = 0, stride = (st->count + st->scene->error_sources - 1) / st->scene->error_sources;
-    for (int i = 0; status == BST_OK && i < st->count; i += stride) {
-        chosen[n++] = st->sources[i];
-    }
-    bst_render_request request = *timed;
-    request.sources = chosen;
-    request.count = n;
-    if (status == BST_OK) {
-        status = bst_renderer_render_noise_free(ctx, renderer, &request, fast);
-    }
-    if (status == BST_OK) {
-        status = bst_reference_render(ctx, &st->camera, st->window, request.track, chosen, n, 1e-9,
-                                      reference);
-    }
-    double sum2 = 0.0, sum_fast = 0.0, sum_reference = 0.0, worst = 0.0;
-    for (size_t i = 0; status == BST_OK && i < pixels; i++) {
-        double read = st->camera.read_noise_e;
-        double error = (double)fast[i] - request.background_e - reference[i];
-        double in_sigma = fabs(error) / sqrt(reference[i] + request.background_e + read * read);
-        worst = fmax(worst, in_sigma);
-        sum2 += in_sigma * in_sigma;
-        sum_fast += (double)fast[i] - request.background_e;
-        sum_reference += reference[i];
-    }
-    out->error_sources = n;
-    out->error_sigma_max = worst;
-    out->error_sigma_rms = sqrt(sum2 / (double)pixels);
-    out->flux_error_rel = sum_reference > 0.0 ? fabs(sum_fast / sum_reference - 1.0) : NAN;
-    free(fast);
-    free(reference);
-    free(chosen);
-    return status;
+void bst_bench_view_set(bst_bench_view *v, int frame) {
+    move(v, frame);
+    place_targets(v, frame);
+    v->request = (bst_render_request){.window = v->window,
+                                      .track = &v->track,
+                                      .sources = v->sources,
+                                      .count = v->count,
+                                      .background_e = v->scene.background_e,
+                                      .key = bst_rng_make_key(1, 0, "bench", "noise"),
+                                      .exposure_id = frame};
 }
 
-static bst_status render_frames(bst_ctx *ctx, bst_renderer *renderer, scene_state *st,
-                                bst_bench_result *out) {
+bst_status bst_bench_view_time(bst_ctx *ctx, bst_renderer *renderer, bst_bench_view *v, int frames,
+                               bst_bench_result *out) {
     bst_bench_clock clock = {.count = 0};
-    bst_los_track track = {st->samples, st->time_s, st->q};
-    bst_render_request request = {.window = st->window,
-                                  .track = &track,
-                                  .sources = st->sources,
-                                  .count = st->count,
-                                  .background_e = st->scene->background_e,
-                                  .key = bst_rng_make_key(1, 0, "bench", "noise")};
-    for (int f = 0; f < FRAMES + WARM_UP; f++) {
-        double centre_px[2];
-        move(st, (uint64_t)f, centre_px);
-        place_targets(st, (uint64_t)f);
-        request.exposure_id = f;
+    for (int f = 0; f < frames + WARM_UP; f++) {
+        bst_bench_view_set(v, f);
         bst_frame *frame = NULL;
         const uint16_t *pixels;
         bst_bench_start(&clock);
-        BST_TRY(bst_renderer_render(ctx, renderer, &request, &frame));
-        BST_TRY(bst_frame_map(frame, ctx, &pixels));
+        BST_TRY(bst_renderer_render(ctx, renderer, &v->request, &frame));
+        bst_status status = bst_frame_map(frame, ctx, &pixels);
         bst_bench_stop(&clock, 1);
-        bst_frame_unmap(frame);
+        if (status == BST_OK) {
+            bst_frame_unmap(frame);
+        }
         bst_frame_release(frame);
+        BST_TRY(status);
         if (f + 1 == WARM_UP) {
             clock.count = 0;
             clock.cpu_total_ms = 0.0;
         }
     }
     bst_bench_summarise(&clock, out);
-    return measure_error(ctx, renderer, st, &request, out);
+    return BST_OK;
 }
 
-bst_status bst_bench_scene(bst_ctx *ctx, const bst_bench *self, const bst_bench_options *options,
-                           bst_bench_result *out) {
-    const scene *s = scenes;
-    while (strcmp(s->name, self->name) != 0) {
-        s++; /* the table of benchmarks names only scenes of this table */
-    }
-    scene_state st = {0};
+bst_status bst_bench_scene_run(bst_ctx *ctx, const bst_bench *self,
+                               const bst_bench_options *options, bst_bench_result *out) {
+    const bst_bench_scene *s = bst_bench_find_scene(self->name);
+    bst_bench_view view = {.count = 0};
+    bst_bench_truth truth = {.count = 0};
     bst_device *device = NULL;
     bst_renderer *renderer = NULL;
     bst_status status =
-        bst_device_open(ctx, options->device ? options->device : "", options->threads, &device);
+        s ? bst_device_open(ctx, options->device ? options->device : "", options->threads, &device)
+          : bst_fail(ctx, BST_ERR_ARGUMENT, "there is no scene \"%s\"", self->name);
     if (status == BST_OK) {
-        status = open_scene(ctx, s, &st);
+        status = bst_bench_view_open(ctx, s, &view);
     }
     if (status == BST_OK) {
         bst_renderer_options fidelity = bst_renderer_default_options();
         fidelity.tolerance_sigma = s->tolerance_sigma;
-        status = bst_renderer_create(ctx, device, &st.camera, &fidelity, &renderer);
+        status = bst_renderer_create(ctx, device, &view.camera, &fidelity, &renderer);
     }
     if (status == BST_OK) {
-        status = render_frames(ctx, renderer, &st, out);
+        status = bst_bench_view_time(ctx, renderer, &view, FRAMES, out);
+    }
+    if (status == BST_OK) {
+        /* before the reference takes its memory */
+        out->peak_rss_mib = bst_bench_peak_rss_mib();
+        status = bst_bench_truth_make(ctx, &view, &truth);
+    }
+    if (status == BST_OK) {
+        status = bst_bench_truth_compare(ctx, renderer, &truth, 0.0, out);
     }
     bst_renderer_free(renderer);
-    close_scene(&st);
+    bst_bench_truth_free(&truth);
+    bst_bench_view_close(&view);
     bst_device_close(device);
     return status;
 }

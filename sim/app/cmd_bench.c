@@ -2,19 +2,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/resource.h>
-#include <sys/utsname.h>
-#include <time.h>
-#include <unistd.h>
-
-#include <cjson/cJSON.h>
 
 #include "sim/app/app.h"
 #include "sim/app/bench.h"
-#include "sim/app/json_number.h"
 #include "sim/app/load.h"
-#include "sim/core/version.h"
-#include "sim/device/device.h"
 #include "sim/io/manifest.h"
 
 static const bst_bench benches[] = {
@@ -26,136 +17,77 @@ static const bst_bench benches[] = {
      bst_bench_ephemeris},
     {"ephemeris_30000", "the same with 30,000 objects", bst_bench_ephemeris},
     {"worst_case", "2048x2048, 3220 stars, 300 px streaks, rotation, acceleration, jitter",
-     bst_bench_scene},
-    {"worst_case_diffraction_q1", "the same, aberrated diffraction PSF, lambda F / pixel = 1",
-     bst_bench_scene},
-    {"worst_case_diffraction_q2", "the same, aberrated diffraction PSF, lambda F / pixel = 2",
-     bst_bench_scene},
-    {"acquisition", "2048x2048, 500 stars, 3 px of motion, 3 targets", bst_bench_scene},
-    {"rate_track_slow", "2048x2048, target at rest, stars 10 px", bst_bench_scene},
-    {"rate_track_medium", "2048x2048, target at rest, stars 60 px", bst_bench_scene},
-    {"rate_track_fast", "2048x2048, target at rest, stars 200 px", bst_bench_scene},
-    {"galactic_core", "2048x2048, 100,000 stars, 5 px of motion", bst_bench_scene},
-    {"window", "256x256 read-out window on a tracked target", bst_bench_scene},
+     bst_bench_scene_run},
+    {"worst_case_diffraction_q1", "the same, PSF by diffraction of an aberrated aperture, Q = 1",
+     bst_bench_scene_run},
+    {"worst_case_diffraction_q2", "the same, Q = 2", bst_bench_scene_run},
+    {"acquisition", "2048x2048, 500 stars, 3 px of motion, 3 targets", bst_bench_scene_run},
+    {"rate_track_slow", "2048x2048, target at rest, stars 10 px", bst_bench_scene_run},
+    {"rate_track_medium", "2048x2048, target at rest, stars 60 px", bst_bench_scene_run},
+    {"rate_track_fast", "2048x2048, target at rest, stars 200 px", bst_bench_scene_run},
+    {"galactic_core", "2048x2048, 100,000 stars, 5 px of motion", bst_bench_scene_run},
+    {"window", "256x256 read-out window on a tracked target", bst_bench_scene_run},
     {"loop_full", "closed loop of the main scenario, per frame", bst_bench_loop},
+    {"cold_start", "first frame of a fresh process, kernels in the cache", bst_bench_cold_start},
+    {"small", "256x256, 30 stars, 20 px streaks: a quick trial (only when named)",
+     bst_bench_scene_run},
 };
 enum { BENCHES = sizeof benches / sizeof *benches };
 
-static double clock_ms(clockid_t id) {
-    struct timespec now;
-    clock_gettime(id, &now);
-    return 1e3 * (double)now.tv_sec + 1e-6 * (double)now.tv_nsec;
-}
-
-void bst_bench_start(bst_bench_clock *clock) {
-    clock->cpu_started_ms = clock_ms(CLOCK_PROCESS_CPUTIME_ID);
-    clock->started_ms = clock_ms(CLOCK_MONOTONIC);
-}
-
-void bst_bench_stop(bst_bench_clock *clock, int calls) {
-    double ms = clock_ms(CLOCK_MONOTONIC) - clock->started_ms;
-    clock->cpu_total_ms += (clock_ms(CLOCK_PROCESS_CPUTIME_ID) - clock->cpu_started_ms) / calls;
-    if (clock->count < BST_BENCH_TIMES) {
-        clock->ms[clock->count++] = ms / calls;
-    }
-}
-
-static int ascending(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-void bst_bench_summarise(bst_bench_clock *clock, bst_bench_result *out) {
-    if (clock->count == 0) {
-        return;
-    }
-    qsort(clock->ms, (size_t)clock->count, sizeof *clock->ms, ascending);
-    out->ms_min = clock->ms[0];
-    out->ms_median = 0.5 * (clock->ms[(clock->count - 1) / 2] + clock->ms[clock->count / 2]);
-    out->frames_per_s = 1e3 / out->ms_median;
-    out->cpu_ms = clock->cpu_total_ms / clock->count;
-}
-
-static double peak_rss_mib(void) {
-    struct rusage usage;
-    getrusage(RUSAGE_SELF, &usage);
-    return (double)usage.ru_maxrss / 1024.0;
-}
-
-static void add_result(cJSON *list, const bst_bench_result *r, const char *device, int threads) {
-    cJSON *node = cJSON_CreateObject();
-    cJSON_AddStringToObject(node, "name", r->name);
-    bst_json_add_number(node, "frames_per_s", r->frames_per_s);
-    bst_json_add_number(node, "ms_median", r->ms_median);
-    bst_json_add_number(node, "ms_min", r->ms_min);
-    bst_json_add_number(node, "cpu_ms", r->cpu_ms);
-    bst_json_add_number(node, "error_sigma_max", r->error_sigma_max);
-    bst_json_add_number(node, "error_sigma_rms", r->error_sigma_rms);
-    bst_json_add_number(node, "flux_error_rel", r->flux_error_rel);
-    cJSON_AddNumberToObject(node, "error_sources", r->error_sources);
-    bst_json_add_number(node, "peak_rss_mib", r->peak_rss_mib);
-    bst_json_add_number(node, "setup_s", r->setup_s);
-    bst_json_add_number(node, "ms_max", r->ms_max);
-    bst_json_add_number(node, "error_px", r->error_px);
-    bst_json_add_number(node, "error_m", r->error_m);
-    cJSON_AddStringToObject(node, "device", device);
-    cJSON_AddNumberToObject(node, "threads", threads);
-    cJSON_AddItemToArray(list, node);
-}
-
-static cJSON *machine(void) {
-    cJSON *node = cJSON_CreateObject();
-    struct utsname system;
-    if (uname(&system) == 0) {
-        char text[200];
-        snprintf(text, sizeof text, "%.60s %.60s %.60s", system.sysname, system.release,
-                 system.machine);
-        cJSON_AddStringToObject(node, "system", text);
-    }
-    char line[256], model[256] = "unknown";
-    FILE *info = fopen("/proc/cpuinfo", "r");
-    while (info && fgets(line, sizeof line, info)) {
-        if (strncmp(line, "model name", 10) == 0 && strchr(line, ':')) {
-            snprintf(model, sizeof model, "%s", strchr(line, ':') + 2);
-            model[strcspn(model, "\n")] = '\0';
-            break;
-        }
-    }
-    if (info) {
-        fclose(info);
-    }
-    cJSON_AddStringToObject(node, "processor", model);
-    cJSON_AddNumberToObject(node, "processors", (double)sysconf(_SC_NPROCESSORS_ONLN));
-    cJSON_AddStringToObject(node, "version", bst_version());
-    cJSON_AddStringToObject(node, "git_revision", bst_git_revision());
-    return node;
-}
-
-static void print_cell(double value, const char *format) {
+static void print_cell(double value, const char *format, bool markdown) {
     char text[32] = "-";
     if (isfinite(value)) {
         snprintf(text, sizeof text, format, value);
     }
-    printf(" %12s", text);
+    printf(markdown ? " %s |" : " %11s", text);
 }
 
-static void print_result(const bst_bench_result *r) {
-    printf("%-18s", r->name);
-    print_cell(r->frames_per_s, "%.4g");
-    print_cell(r->ms_median, "%.4g");
-    print_cell(r->ms_min, "%.4g");
-    print_cell(r->cpu_ms, "%.4g");
-    print_cell(r->error_sigma_max, "%.4f");
-    print_cell(r->error_sigma_rms, "%.5f");
-    print_cell(r->flux_error_rel, "%.1e");
-    print_cell(r->peak_rss_mib, "%.0f");
+static const struct column {
+    const char *title, *format;
+    size_t offset;
+} columns[] = {
+    {"per s", "%.4g", offsetof(bst_bench_result, frames_per_s)},
+    {"ms median", "%.4g", offsetof(bst_bench_result, ms_median)},
+    {"ms min", "%.4g", offsetof(bst_bench_result, ms_min)},
+    {"cpu ms", "%.4g", offsetof(bst_bench_result, cpu_ms)},
+    {"max err/sig", "%.4f", offsetof(bst_bench_result, error_sigma_max)},
+    {"predicted", "%.4f", offsetof(bst_bench_result, predicted_error_sigma)},
+    {"rms err/sig", "%.5f", offsetof(bst_bench_result, error_sigma_rms)},
+    {"flux error", "%.1e", offsetof(bst_bench_result, flux_error_rel)},
+    {"centroid px", "%.1e", offsetof(bst_bench_result, centroid_error_px)},
+    {"peak MiB", "%.0f", offsetof(bst_bench_result, peak_rss_mib)},
+};
+enum { COLUMNS = sizeof columns / sizeof *columns, NAME_WIDTH = 25 };
+
+static void print_head(bool markdown) {
+    printf(markdown ? "| name |" : "%-25s", "name");
+    for (int i = 0; i < COLUMNS; i++) {
+        printf(markdown ? " %s |" : " %11s", columns[i].title);
+    }
     printf("\n");
-    if (isfinite(r->setup_s)) {
-        printf("%-18s set-up %.3f s, at most %.3f ms, error at most %.1e px at 10 km\n", "",
+    for (int i = 0; markdown && i <= COLUMNS; i++) {
+        printf(i == 0 ? "|---|" : i < COLUMNS ? "---|" : "---|\n");
+    }
+}
+
+static void print_result(const bst_bench_result *r, bool markdown) {
+    printf(markdown ? "| `%s` |" : "%-25s", r->name);
+    for (int i = 0; i < COLUMNS; i++) {
+        double value;
+        memcpy(&value, (const char *)r + columns[i].offset, sizeof value);
+        print_cell(value, columns[i].format, markdown);
+    }
+    printf("\n");
+    if (!markdown && isfinite(r->setup_s)) {
+        printf("%-25s set-up %.3f s, at most %.3f ms, error at most %.1e px at 10 km\n", "",
                r->setup_s, r->ms_max, r->error_px);
     }
-    if (isfinite(r->error_m)) {
-        printf("%-18s error at most %.1e m\n", "", r->error_m);
+    if (!markdown && isfinite(r->error_m)) {
+        printf("%-25s error at most %.1e m\n", "", r->error_m);
+    }
+    for (int i = 0; !markdown && i < r->phase_count; i++) {
+        printf("%s%s %.0f ms%s", i == 0 ? "                          " : "", r->phases[i].name,
+               r->phases[i].ms, i + 1 < r->phase_count ? ", " : "\n");
     }
     fflush(stdout);
 }
@@ -166,7 +98,7 @@ static bool wanted(const bst_bench *bench, int count, char **names) {
             return true;
         }
     }
-    return count == 0;
+    return count == 0 && strcmp(bench->name, "small") != 0;
 }
 
 static bst_status check_names(bst_ctx *ctx, int count, char **names) {
@@ -183,26 +115,34 @@ static bst_status check_names(bst_ctx *ctx, int count, char **names) {
     return BST_OK;
 }
 
-static bst_status run_all(bst_ctx *ctx, const bst_bench_options *options, int count, char **names,
-                          cJSON *results) {
-    bst_device *device = NULL;
-    char description[256];
-    BST_TRY(
-        bst_device_open(ctx, options->device ? options->device : "", options->threads, &device));
-    snprintf(description, sizeof description, "%s", bst_device_description(device));
-    bst_device_close(device);
-    printf("%s\n%-18s %12s %12s %12s %12s %12s %12s %12s %12s\n", description, "name", "per s",
-           "ms median", "ms min", "cpu ms", "err max/sig", "err rms/sig", "flux error", "peak MiB");
+typedef struct errand {
+    const bst_bench *bench;
+    const bst_bench_options *options;
+} errand;
+
+static bst_status run_bench(bst_ctx *ctx, void *user, void *out) {
+    const errand *e = user;
+    bst_bench_result *result = out;
+    BST_TRY(e->bench->run(ctx, e->bench, e->options, result));
+    if (isnan(result->peak_rss_mib)) {
+        result->peak_rss_mib = bst_bench_peak_rss_mib();
+    }
+    return BST_OK;
+}
+
+/* Each in a process of its own: its memory is its own, and nothing is warm that others warmed. */
+static bst_status run_all(bst_ctx *ctx, const bst_bench_options *options, bool markdown, int count,
+                          char **names, const bst_bench_device *device, cJSON *results) {
+    print_head(markdown);
     for (int b = 0; b < BENCHES; b++) {
         if (!wanted(&benches[b], count, names)) {
             continue;
         }
-        bst_bench_result result = {
-            benches[b].name, NAN, NAN, NAN, NAN, NAN, NAN, NAN, 0, NAN, NAN, NAN, NAN, NAN};
-        BST_TRY(benches[b].run(ctx, &benches[b], options, &result));
-        result.peak_rss_mib = peak_rss_mib();
-        print_result(&result);
-        add_result(results, &result, description, options->threads);
+        bst_bench_result result = bst_bench_nothing(benches[b].name);
+        errand e = {&benches[b], options};
+        BST_TRY(bst_bench_apart(ctx, run_bench, &e, &result, sizeof result));
+        print_result(&result, markdown);
+        cJSON_AddItemToArray(results, bst_bench_result_json(&result, device));
     }
     return BST_OK;
 }
@@ -215,18 +155,50 @@ static void print_help(const bst_option *table) {
         "(errors in sigma of the pixel, on an even choice of the sources). Timings of a busy "
         "machine are noisy:\n"
         "compare two versions in alternation and look at the minimum.\n\n"
-        "  boresight bench worst_case loop_full --json bench.json\n\nbenchmarks (all when none is "
+        "  boresight bench worst_case loop_full --json bench.json\n"
+        "  boresight bench --curve\n\nbenchmarks (all when none is "
         "named):\n");
     for (int b = 0; b < BENCHES; b++) {
-        printf("  %-18s %s\n", benches[b].name, benches[b].doc);
+        printf("  %-25s %s\n", benches[b].name, benches[b].doc);
     }
     printf("\noptions:\n");
     bst_options_print(stdout, table);
 }
 
+static void print_machine(const cJSON *machine) {
+    const cJSON *item;
+    cJSON_ArrayForEach(item, machine) {
+        printf("%s%s", item->prev && item->prev->next ? ", " : "",
+               cJSON_IsString(item) ? item->valuestring : item->string);
+        if (cJSON_IsNumber(item)) {
+            printf(" %g", item->valuedouble);
+        }
+    }
+    printf("\n\n");
+}
+
+static bst_status bench(bst_ctx *ctx, const bst_bench_options *options, const char *json,
+                        bool markdown, int count, char **names) {
+    bst_bench_device device;
+    BST_TRY(bst_bench_describe_device(ctx, options, &device));
+    cJSON *root = cJSON_CreateObject(), *machine = bst_bench_machine(&device);
+    cJSON_AddItemToObject(root, "machine", machine);
+    cJSON *results = cJSON_AddArrayToObject(root, "results");
+    print_machine(machine);
+    bst_status status = run_all(ctx, options, markdown, count, names, &device, results);
+    if (status == BST_OK && json) {
+        char *text = cJSON_Print(root);
+        status = text ? bst_write_file_atomic(ctx, json, text, strlen(text))
+                      : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the results");
+        free(text);
+    }
+    cJSON_Delete(root);
+    return status;
+}
+
 int bst_cmd_bench(int argc, char **argv) {
-    bool help = false;
-    const char *json = NULL;
+    bool help = false, markdown = false, curve = false, first_frame = false;
+    const char *json = NULL, *report = "docs";
     int64_t threads = 0;
     bst_bench_options options = {.scenario = "scenarios/neossat_geo_track.json"};
     const bst_option table[] = {
@@ -234,7 +206,21 @@ int bst_cmd_bench(int argc, char **argv) {
          .kind = BST_OPTION_TEXT,
          .target = &json,
          .argument = "FILE",
-         .doc = "write the results there"},
+         .doc = "write the results there, with the machine they were measured on"},
+        {.name = "markdown",
+         .kind = BST_OPTION_FLAG,
+         .target = &markdown,
+         .doc = "print a Markdown table"},
+        {.name = "curve",
+         .kind = BST_OPTION_FLAG,
+         .target = &curve,
+         .doc = "vary each knob of fidelity, and the size of the scene, and write the report "
+                "(a scene's NAME: its curve alone)"},
+        {.name = "report",
+         .kind = BST_OPTION_TEXT,
+         .target = &report,
+         .argument = "FOLDER",
+         .doc = "where --curve writes speed_error.md and its images (default docs)"},
         BST_DEVICE_OPTIONS(options.device, threads),
         {.name = "tle",
          .kind = BST_OPTION_TEXT,
@@ -247,6 +233,11 @@ int bst_cmd_bench(int argc, char **argv) {
          .target = &options.scenario,
          .argument = "FILE",
          .doc = "scenario of loop_full (default scenarios/neossat_geo_track.json)"},
+        {.name = "first-frame",
+         .kind = BST_OPTION_FLAG,
+         .target = &first_frame,
+         .doc = "render one frame and print when each step of it was done, in seconds of the "
+                "monotonic clock: what cold_start starts"},
         {.name = "help", .kind = BST_OPTION_FLAG, .target = &help, .doc = "print this"},
         {.name = NULL},
     };
@@ -264,17 +255,10 @@ int bst_cmd_bench(int argc, char **argv) {
         return bst_options_misuse(&ctx, "bench");
     }
     options.threads = (int)threads;
-    cJSON *root = cJSON_CreateObject();
-    cJSON_AddItemToObject(root, "machine", machine());
-    cJSON *results = cJSON_AddArrayToObject(root, "results");
-    bst_status status = run_all(&ctx, &options, arguments, argv + 1, results);
-    if (status == BST_OK && json) {
-        char *text = cJSON_Print(root);
-        status = text ? bst_write_file_atomic(&ctx, json, text, strlen(text))
-                      : bst_fail(&ctx, BST_ERR_MEMORY, "out of memory for the results");
-        free(text);
-    }
-    cJSON_Delete(root);
+    bst_status status =
+        first_frame ? bst_bench_first_frame(&ctx, &options)
+        : curve     ? bst_bench_curve(&ctx, &options, arguments > 0 ? argv[1] : NULL, report)
+                    : bench(&ctx, &options, json, markdown, arguments, argv + 1);
     if (status != BST_OK) {
         fprintf(stderr, "boresight: %s\n", ctx.message);
         return BST_EXIT_FAILED;

@@ -95,9 +95,10 @@ static const char help_text[] =
     "\n"
     "Writes what a run recorded in formats that other programs read: frames as PNG pictures or a "
     "film, tables as\n"
-    "CSV, the true orbits as CCSDS OEM or CZML, the measured angles as CCSDS TDM. Interrupted and "
-    "killed runs are\n"
-    "exported as far as they go. Files appear whole or not at all and replace earlier ones; the "
+    "CSV, the true orbits as CCSDS OEM or CZML (with the fields of view), the measured angles as "
+    "CCSDS TDM, frames\n"
+    "with annotations as SatNet has them. Interrupted and killed runs are exported as far as they "
+    "go. Files appear whole or not at all and replace earlier ones; the "
     "run itself is not\n"
     "changed.\n"
     "\n"
@@ -105,6 +106,7 @@ static const char help_text[] =
     "  boresight export runs/demo --frames mp4 --annotate --size 800 --fps 25\n"
     "  boresight export runs/demo --table csv --tables truth,tracks --out csv\n"
     "  boresight export runs/demo --orbits oem --observations tdm\n"
+    "  boresight export runs/demo --satnet training --split 80,10,10\n"
     "\n"
     "what and options:\n";
 
@@ -112,11 +114,16 @@ enum { NOT_ASKED = -1 };
 
 int bst_cmd_export(int argc, char **argv) {
     bool help = false;
+    double split[3];
     int frames = NOT_ASKED, table_format = NOT_ASKED, orbits = NOT_ASKED, observations = NOT_ASKED;
     int stretch = 0;
     const char *out = NULL, *tables = NULL;
-    bst_export e = {
-        .stop = &stop_requested, .last = INT64_C(9007199254740992), .every = 1, .frame_rate = 10.0};
+    bst_export e = {.stop = &stop_requested,
+                    .last = INT64_C(9007199254740992),
+                    .every = 1,
+                    .frame_rate = 10.0,
+                    .box_px = 20.0,
+                    .star_limit = 10.0};
     const bst_option options[] = {
         {.name = "frames",
          .kind = BST_OPTION_CHOICE,
@@ -138,6 +145,13 @@ int bst_cmd_export(int argc, char **argv) {
          .target = &observations,
          .argument = "tdm",
          .doc = "angles and magnitudes of confirmed tracks"},
+        {.name = "satnet",
+         .kind = BST_OPTION_TEXT,
+         .target = &e.satnet,
+         .argument = "FOLDER",
+         .doc =
+             "a FITS file and a JSON annotation per frame, for training networks: ImageFiles/ and "
+             "Annotations/ in FOLDER"},
         {.name = "out",
          .kind = BST_OPTION_TEXT,
          .target = &out,
@@ -204,6 +218,26 @@ int bst_cmd_export(int argc, char **argv) {
          .doc = "time between states of an orbit (default 60, or a twentieth of a short run)",
          .minimum = 1e-3,
          .maximum = 86400},
+        {.name = "split",
+         .kind = BST_OPTION_TEXT,
+         .target = &e.split,
+         .argument = "A,B,C",
+         .doc = "satnet: shares of train.txt, val.txt and test.txt, each frame's part following "
+                "from its name, such as 80,10,10"},
+        {.name = "box",
+         .kind = BST_OPTION_REAL,
+         .target = &e.box_px,
+         .argument = "PX",
+         .doc = "satnet: side of the boxes (default 20); 0: the extent of each track",
+         .minimum = 0,
+         .maximum = 65536},
+        {.name = "star-limit",
+         .kind = BST_OPTION_REAL,
+         .target = &e.star_limit,
+         .argument = "MAG",
+         .doc = "satnet: faintest V of the stars that are labelled (default 10)",
+         .minimum = -30,
+         .maximum = 40},
         {.name = "help", .kind = BST_OPTION_FLAG, .target = &help, .doc = "print this"},
         {.name = NULL},
     };
@@ -223,12 +257,20 @@ int bst_cmd_export(int argc, char **argv) {
                  arguments);
         return bst_options_misuse(&ctx, "export");
     }
-    if (frames == NOT_ASKED && table_format == NOT_ASKED && orbits == NOT_ASKED &&
-        observations == NOT_ASKED) {
-        bst_fail(&ctx, BST_ERR_ARGUMENT,
-                 "nothing to export: add --frames, --table, --orbits or --observations");
+    if (e.split && (!e.satnet || bst_export_split(&ctx, e.split, split) != BST_OK)) {
+        if (!e.satnet) {
+            bst_fail(&ctx, BST_ERR_ARGUMENT, "--split needs --satnet FOLDER");
+        }
         return bst_options_misuse(&ctx, "export");
     }
+    if (frames == NOT_ASKED && table_format == NOT_ASKED && orbits == NOT_ASKED &&
+        observations == NOT_ASKED && !e.satnet) {
+        bst_fail(&ctx, BST_ERR_ARGUMENT,
+                 "nothing to export: add --frames, --table, --orbits, --observations or --satnet");
+        return bst_options_misuse(&ctx, "export");
+    }
+    bool others = frames != NOT_ASKED || table_format != NOT_ASKED || orbits != NOT_ASKED ||
+                  observations != NOT_ASKED;
     e.film = frames == 1;
     e.czml = orbits == 1;
     e.names_oem = orbits == 0;
@@ -248,7 +290,15 @@ int bst_cmd_export(int argc, char **argv) {
         for (int i = 0; (problem = bst_run_reader_problem(run, i)); i++) {
             bst_log(&ctx, BST_LOG_WARNING, "%s", problem);
         }
-        status = make_folder(&ctx, out, run, folder, sizeof folder);
+        status = others ? make_folder(&ctx, out, run, folder, sizeof folder) : BST_OK;
+    }
+    char satnet[4096];
+    if (status == BST_OK && e.satnet) {
+        status = make_folder(&ctx, e.satnet, run, satnet, sizeof satnet);
+        e.satnet = satnet;
+        for (size_t n = strlen(satnet); n > 1 && satnet[n - 1] == '/';) {
+            satnet[--n] = '\0';
+        }
     }
     if (status == BST_OK && table_format != NOT_ASKED) {
         status = bst_export_tables(&ctx, &e, tables);
@@ -261,6 +311,9 @@ int bst_cmd_export(int argc, char **argv) {
     }
     if (status == BST_OK && frames != NOT_ASKED) {
         status = bst_export_frames(&ctx, &e);
+    }
+    if (status == BST_OK && e.satnet) {
+        status = bst_export_satnet(&ctx, &e);
     }
     bst_run_reader_close(run);
     if (status != BST_OK) {

@@ -339,7 +339,8 @@ static bst_status open_recorder(run_state *run, const bst_world *world, bst_run 
                               .tick_rate_hz = scenario->tick_rate_hz,
                               .program = program,
                               .sensors = list,
-                              .sensor_count = n};
+                              .sensor_count = n,
+                              .world = world};
     bst_status status =
         bst_recorder_create(run->ctx, store, &scenario->record, &info, &run->recorder);
     for (int i = 0; status == BST_OK && i < n; i++) {
@@ -389,21 +390,25 @@ static bst_status write_ending(run_state *run, bst_simulation *sim, bst_run *sto
 static void warn_of_space(const run_state *run, const char *out) {
     const bst_scenario *scenario = run->scenario;
     const bst_observer_config *observers = scenario->observers.items;
-    double bytes = 0.0;
+    const bst_record_config *record = &scenario->record;
+    /* Rice takes 8-bit noise to about half */
+    double bytes = 0.0, per_pixel = record->frames == BST_RECORD_NO_FRAMES ? 0.0
+                                    : record->compression                  ? 1.0
+                                                                           : 2.0;
+    for (uint32_t planes = record->planes; planes; planes &= planes - 1) {
+        per_pixel += 4.0;
+    }
     for (int i = 0; i < scenario->observers.count; i++) {
         const bst_sensor_config *sensors = observers[i].sensors.items;
         for (int s = 0; s < observers[i].sensors.count; s++) {
             const bst_exposure_config *e = &sensors[s].exposure;
             double frames = floor((scenario->duration_s - e->first_s) / e->period_s);
-            bytes += fmax(frames, 0.0) * 2.0 * (double)sensors[s].camera.width_px *
+            bytes += fmax(frames, 0.0) * per_pixel * (double)sensors[s].camera.width_px *
                      (double)sensors[s].camera.height_px;
         }
     }
-    /* Rice takes 8-bit noise to about half */
-    bytes *= scenario->record.compression ? 0.5 : 1.0;
     double free_bytes = (double)bst_run_free_bytes(out);
-    if (scenario->record.frames != BST_RECORD_NO_FRAMES && free_bytes >= 0.0 &&
-        bytes > free_bytes) {
+    if (free_bytes >= 0.0 && bytes > free_bytes) {
         bst_log(run->ctx, BST_LOG_WARNING,
                 "%s: the frames will take about %.1f GB and %.1f GB are free there; shorten the "
                 "run (--duration), set /record/compression=rice or /record/frames=none, or choose "

@@ -4,7 +4,11 @@
 
 #include <signal.h>
 
+#include <stdio.h>
+
+#include "sim/engine/scenario.h"
 #include "sim/io/run_reader.h"
+#include "sim/world/world.h"
 
 /* A sensor of the run. */
 typedef struct bst_export_sensor {
@@ -27,6 +31,11 @@ typedef struct bst_export {
     /* orbits */
     bool czml, names_oem; /* names_oem: observations name the orbits' file */
     double step_s;
+    /* SatNet */
+    const char *satnet; /* folder */
+    double box_px;      /* side of a box; 0: the extent of the track */
+    double star_limit;  /* faintest V of the stars that are labelled */
+    const char *split;  /* "80,10,10": shares of training, validation and test; NULL: none */
 } bst_export;
 
 enum { BST_EXPORT_SENSORS = 64 };
@@ -41,6 +50,14 @@ bst_status bst_export_frames(bst_ctx *ctx, const bst_export *e) BST_MUST_CHECK;
 /* `tables` is a list "a,b"; NULL: all. */
 bst_status bst_export_tables(bst_ctx *ctx, const bst_export *e, const char *tables) BST_MUST_CHECK;
 bst_status bst_export_orbits(bst_ctx *ctx, const bst_export *e) BST_MUST_CHECK;
+/* The sensors' fields of view, as packets of a CZML document that holds their observers. */
+bst_status bst_export_views(bst_ctx *ctx, const bst_export *e, const bst_scenario *scenario,
+                            const bst_world *world, bst_view *view, FILE *stream) BST_MUST_CHECK;
+/* Shares of training, validation and test, made to add up to 1. BST_ERR_ARGUMENT for a text that is
+ * not three numbers of 0 or more, or all 0. */
+bst_status bst_export_split(bst_ctx *ctx, const char *text, double shares[3]) BST_MUST_CHECK;
+/* Images and annotations as SatNet has them, below e->satnet. */
+bst_status bst_export_satnet(bst_ctx *ctx, const bst_export *e) BST_MUST_CHECK;
 bst_status bst_export_observations(bst_ctx *ctx, const bst_export *e) BST_MUST_CHECK;
 
 /* BST_ERR_INTERRUPTED when the user asked to stop. */

@@ -36,13 +36,19 @@ static double recorded_s(const bst_run_reader *run, const bst_scenario *scenario
 
 /* ------------------------------------------------------------------ orbits */
 
-/* One orbit on a grid of times whose last is the end. */
+enum { MOST_BREAKS = 4096 };
+
+/* One orbit, a stretch of it without a burn inside, on a grid of times. */
 typedef struct track {
     bst_view *view;
     const bst_world *world;
     int observer, object; /* one is -1 */
     double step_s, span_s;
-    int64_t first; /* row of the grid that a series begins with */
+    double breaks[MOST_BREAKS + 2]; /* 0, where burns begin and end, the end */
+    int break_count;
+    double from_s, to_s; /* of the stretch */
+    int64_t inner;       /* first row of the grid after from_s */
+    int64_t first;       /* row of the stretch that a series begins with */
 } track;
 
 static bst_status state_of(const track *t, bst_ctx *ctx, double seconds, bst_state *out) {
@@ -50,9 +56,26 @@ static bst_status state_of(const track *t, bst_ctx *ctx, double seconds, bst_sta
                             : bst_view_object_state(ctx, t->view, t->object, seconds, out);
 }
 
-/* Rows at 0, step, 2 step ... and at the end. */
+/* Rows of a stretch: its ends, and step, 2 step ... between them. */
+static int64_t rows_of(track *t) {
+    t->inner = (int64_t)floor(t->from_s / t->step_s + 1e-9) + 1;
+    int64_t last = (int64_t)ceil(t->to_s / t->step_s - 1e-9) - 1;
+    return 2 + (last >= t->inner ? last - t->inner + 1 : 0);
+}
+
 static double seconds_of(const track *t, int64_t row) {
-    return fmin((double)row * t->step_s, t->span_s);
+    return row == 0 ? t->from_s : fmin((double)(t->inner + row - 1) * t->step_s, t->to_s);
+}
+
+/* State of a row; at a stretch's end that of before a burn there. */
+static bst_status row_state(const track *t, bst_ctx *ctx, double seconds, bst_state *out) {
+    if (seconds < t->to_s || t->to_s >= t->span_s) {
+        return state_of(t, ctx, seconds, out);
+    }
+    const double before_s = 1e-6;
+    BST_TRY(state_of(t, ctx, seconds - before_s, out));
+    out->position_m = bst_vec3_axpy(out->position_m, before_s, out->velocity_mps);
+    return BST_OK;
 }
 
 static bst_status row_of(void *user, bst_ctx *ctx, int64_t row, bst_time *time,
@@ -60,11 +83,63 @@ static bst_status row_of(void *user, bst_ctx *ctx, int64_t row, bst_time *time,
     const track *t = user;
     bst_state state;
     double seconds = seconds_of(t, row + t->first);
-    BST_TRY(state_of(t, ctx, seconds, &state));
+    BST_TRY(row_state(t, ctx, seconds, &state));
     *time = bst_world_time(t->world, seconds);
     *position_m = state.position_m;
     *velocity_mps = state.velocity_mps;
     return BST_OK;
+}
+
+static int ascending(const void *a, const void *b) {
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static void add_break(track *t, double seconds) {
+    if (seconds > 0.0 && seconds < t->span_s && t->break_count < MOST_BREAKS) {
+        t->breaks[t->break_count++] = seconds;
+    }
+}
+
+/* The object of the scenario's list with this name; NULL when there is none. */
+static const bst_object_config *find_object(const bst_scenario *scenario, const char *name) {
+    const bst_object_config *objects = scenario->world.objects.items;
+    for (int i = 0; i < scenario->world.objects.count; i++) {
+        if (strcmp(objects[i].name, name) == 0) {
+            return &objects[i];
+        }
+    }
+    return NULL;
+}
+
+/* Where the motion of the track's orbit breaks: its own burns, and those of what it is relative to.
+ */
+static void find_breaks(const bst_scenario *scenario, bool czml, track *t) {
+    const bst_observer_config *observers = scenario->observers.items;
+    const bst_object_config *object =
+        t->object >= 0 ? find_object(scenario, bst_world_object(t->world, t->object)->name) : NULL;
+    const bst_orbit_config *orbit = t->observer >= 0 ? &observers[t->observer].orbit
+                                    : object         ? &object->orbit
+                                                     : NULL;
+    const bst_config_list *burns = t->observer >= 0 ? &observers[t->observer].burns
+                                   : object         ? &object->burns
+                                                    : NULL;
+    t->break_count = 0;
+    t->breaks[t->break_count++] = 0.0;
+    /* positions, all that CZML holds, go on over a burn */
+    for (int depth = 0; orbit && !czml && depth <= scenario->world.objects.count; depth++) {
+        const bst_burn_config *list = burns->items;
+        for (int k = 0; k < burns->count; k++) {
+            add_break(t, list[k].time_s);
+            add_break(t, list[k].time_s + list[k].duration_s);
+        }
+        object =
+            orbit->source == BST_ORBIT_RELATIVE ? find_object(scenario, orbit->reference) : NULL;
+        orbit = object ? &object->orbit : NULL;
+        burns = object ? &object->burns : NULL;
+    }
+    qsort(t->breaks, (size_t)t->break_count, sizeof *t->breaks, ascending);
+    t->breaks[t->break_count++] = t->span_s;
 }
 
 /* Writes `rows` rows from t->first on, the `piece`th stretch in which there is an orbit. */
@@ -101,25 +176,34 @@ static bst_status write_piece(bst_ctx *ctx, const bst_export *e, FILE *stream, t
     return bst_oem_write_segment(ctx, stream, &segment);
 }
 
-/* Writes one orbit, in pieces where it is not there all the time (a decay, a file that ends). */
-static bst_status write_one(bst_ctx *ctx, const bst_export *e, FILE *stream, track *t,
-                            int *written) {
-    const int64_t rows = 1 + (int64_t)ceil(t->span_s / t->step_s - 1e-9);
+/* Writes one orbit, in pieces: at burns, and where it is not there all the time (a decay, a file
+ * that ends). */
+static bst_status write_one(bst_ctx *ctx, const bst_export *e, const bst_scenario *scenario,
+                            FILE *stream, track *t, int *written) {
     int pieces = 0;
     char why[sizeof ctx->message] = "";
-    for (int64_t row = 0; row < rows;) {
-        bst_state state;
-        t->first = row;
-        while (row < rows && state_of(t, ctx, seconds_of(t, row), &state) == BST_OK) {
-            row++;
+    find_breaks(scenario, e->czml, t);
+    for (int k = 0; k + 1 < t->break_count; k++) {
+        t->from_s = t->breaks[k];
+        t->to_s = t->breaks[k + 1];
+        if (!(t->to_s > t->from_s)) {
+            continue; /* two burns at one time */
         }
-        if (row < rows && !*why) {
-            snprintf(why, sizeof why, "%s", ctx->message);
-        }
-        if (row > t->first) {
-            BST_TRY(write_piece(ctx, e, stream, t, row - t->first, ++pieces));
-        } else {
-            row++;
+        const int64_t rows = rows_of(t);
+        for (int64_t row = 0; row < rows;) {
+            bst_state state;
+            t->first = row;
+            while (row < rows && row_state(t, ctx, seconds_of(t, row), &state) == BST_OK) {
+                row++;
+            }
+            if (row < rows && !*why) {
+                snprintf(why, sizeof why, "%s", ctx->message);
+            }
+            if (row > t->first) {
+                BST_TRY(write_piece(ctx, e, stream, t, row - t->first, ++pieces));
+            } else {
+                row++;
+            }
         }
     }
     if (*why) {
@@ -158,10 +242,13 @@ static bst_status write_orbits(bst_ctx *ctx, const bst_export *e, const bst_scen
         t.observer = i < observers ? i : -1;
         t.object = i < observers ? -1 : i - observers;
         status = bst_export_check(ctx, e);
-        status = status == BST_OK ? write_one(ctx, e, stream, &t, written) : status;
+        status = status == BST_OK ? write_one(ctx, e, scenario, stream, &t, written) : status;
         bst_progress_update(&progress, i + 1);
     }
     bst_progress_end(&progress);
+    if (status == BST_OK && e->czml) {
+        status = bst_export_views(ctx, e, scenario, world, view, stream);
+    }
     if (status == BST_OK && e->czml) {
         status = bst_czml_write_tail(ctx, stream);
     }
@@ -176,6 +263,7 @@ static bst_status orbits_of(bst_ctx *ctx, const bst_export *e, const bst_scenari
     int written = 0;
     /* orbits need no stars */
     bst_world_config config = scenario->world;
+    config.faint_stars = BST_FAINT_NONE;
     snprintf(config.star_catalogue, sizeof config.star_catalogue, "embedded");
     int n = snprintf(path, sizeof path, "%s/orbits.%s", e->out, e->czml ? "czml" : "oem");
     if (n < 0 || (size_t)n >= sizeof path) {

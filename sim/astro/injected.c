@@ -297,6 +297,35 @@ bst_status bst_injected_read_buffer(bst_ctx *ctx, const char *name, const char *
     return BST_OK;
 }
 
+bst_status bst_injected_create(bst_ctx *ctx, const char *name, const bst_injected_frame *frames,
+                               int64_t count, bst_injected **out) {
+    *out = NULL;
+    reader r = {.source = {ctx, name}, .frames = NULL};
+    bst_injected *injected = calloc(1, sizeof *injected);
+    bst_status status = injected && (injected->name = strdup(name)) ? BST_OK : fail_memory(&r);
+    if (status == BST_OK && count < 1) {
+        status = bst_fail(ctx, BST_ERR_FORMAT, "%.400s: holds no states of objects", name);
+    }
+    for (int64_t i = 0; status == BST_OK && i < count; i++) {
+        const bst_injected_frame *from = &frames[i];
+        frame f = {.name = {from->object, strlen(from->object)},
+                   .line = (int)from->number,
+                   .start = {from->start_s, from->start_position_m, from->start_velocity_mps},
+                   .end = {from->end_s, from->end_position_m, from->end_velocity_mps}};
+        status = append(&r, &f);
+    }
+    if (status == BST_OK) {
+        status = build(&r, injected);
+    }
+    free(r.frames);
+    if (status != BST_OK) {
+        bst_injected_free(injected);
+        return status;
+    }
+    *out = injected;
+    return BST_OK;
+}
+
 bst_status bst_injected_load(bst_ctx *ctx, const char *path, bst_time epoch, bst_injected **out) {
     *out = NULL;
     char *data;

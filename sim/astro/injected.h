@@ -24,6 +24,19 @@ bst_status bst_injected_load(bst_ctx *ctx, const char *path, bst_time epoch,
 bst_status bst_injected_read_buffer(bst_ctx *ctx, const char *name, const char *data, size_t bytes,
                                     bst_time epoch, bst_injected **out) BST_MUST_CHECK;
 
+/* An object's states in one frame, seconds after the epoch. */
+typedef struct bst_injected_frame {
+    const char *object; /* borrowed for the call; at most 63 bytes */
+    int64_t number;     /* ascends; for messages */
+    double start_s, end_s;
+    bst_vec3 start_position_m, start_velocity_mps, end_position_m, end_velocity_mps;
+} bst_injected_frame;
+
+/* The same from states already read. BST_ERR_FORMAT when there are none, or an object's frames
+ * overlap or do not follow each other in time. */
+bst_status bst_injected_create(bst_ctx *ctx, const char *name, const bst_injected_frame *frames,
+                               int64_t count, bst_injected **out) BST_MUST_CHECK;
+
 void bst_injected_free(bst_injected *injected); /* NULL allowed */
 
 int bst_injected_object_count(const bst_injected *injected);

@@ -177,6 +177,26 @@ static bst_status read_enum(const reader *r, const cJSON *value, const char *pat
     return wrong(r, path, value, cJSON_IsString(value) ? "unknown choice" : "wrong type", allowed);
 }
 
+static bst_status read_choices(const reader *r, const cJSON *value, const char *path,
+                               const bst_config_desc *d, uint32_t *out) {
+    *out = 0;
+    if (!cJSON_IsArray(value)) {
+        return wrong(r, path, value, "wrong type", "an array of names");
+    }
+    int i = 0;
+    for (const cJSON *item = value->child; item; item = item->next, i++) {
+        char item_path[512];
+        int32_t bit;
+        snprintf(item_path, sizeof item_path, "%s/%d", path, i);
+        BST_TRY(read_enum(r, item, item_path, d, &bit));
+        if (*out & UINT32_C(1) << bit) {
+            return wrong(r, item_path, item, "given twice", "each name once");
+        }
+        *out |= UINT32_C(1) << bit;
+    }
+    return BST_OK;
+}
+
 static bst_status read_value(const reader *r, const cJSON *value, const char *path,
                              const bst_config_desc *d, void *object) {
     char *member = (char *)object + d->offset;
@@ -210,6 +230,8 @@ static bst_status read_value(const reader *r, const cJSON *value, const char *pa
             return BST_OK;
         case BST_CONFIG_ENUM:
             return read_enum(r, value, path, d, (int32_t *)(void *)member);
+        case BST_CONFIG_CHOICES:
+            return read_choices(r, value, path, d, (uint32_t *)(void *)member);
         case BST_CONFIG_SEED:
             return read_seed(r, value, path, (uint64_t *)(void *)member);
         case BST_CONFIG_REALS: {
@@ -354,6 +376,15 @@ static cJSON *echo_value(const bst_config_desc *d, const void *object) {
             return cJSON_CreateString(member);
         case BST_CONFIG_ENUM:
             return cJSON_CreateString(d->choices[*(const int32_t *)(const void *)member]);
+        case BST_CONFIG_CHOICES: {
+            cJSON *array = cJSON_CreateArray();
+            for (int i = 0; d->choices[i] && array; i++) {
+                if (*(const uint32_t *)(const void *)member & UINT32_C(1) << i) {
+                    cJSON_AddItemToArray(array, cJSON_CreateString(d->choices[i]));
+                }
+            }
+            return array;
+        }
         case BST_CONFIG_SEED: {
             char text[24];
             snprintf(text, sizeof text, "0x%" PRIX64, *(const uint64_t *)(const void *)member);

@@ -10,17 +10,18 @@
 #include "sim/core/status.h"
 
 typedef enum bst_config_type {
-    BST_CONFIG_BOOL,   /* bool */
-    BST_CONFIG_INT,    /* int64_t */
-    BST_CONFIG_REAL,   /* double */
-    BST_CONFIG_STRING, /* char[size], size in the descriptor */
-    BST_CONFIG_PATH,   /* the same: a file; a scenario's are made absolute when it is read */
-    BST_CONFIG_ENUM,   /* int32_t, index into choices */
-    BST_CONFIG_SEED,   /* uint64_t, hex string "0x..." */
-    BST_CONFIG_REALS,  /* double[size / sizeof(double)], a fixed-length array */
-    BST_CONFIG_OBJECT, /* nested struct, children */
-    BST_CONFIG_LIST,   /* bst_config_list of structs, children, item_bytes */
-    BST_CONFIG_RAW,    /* not stored: checked elsewhere (module blocks) */
+    BST_CONFIG_BOOL,    /* bool */
+    BST_CONFIG_INT,     /* int64_t */
+    BST_CONFIG_REAL,    /* double */
+    BST_CONFIG_STRING,  /* char[size], size in the descriptor */
+    BST_CONFIG_PATH,    /* the same: a file; a scenario's are made absolute when it is read */
+    BST_CONFIG_ENUM,    /* int32_t, index into choices */
+    BST_CONFIG_CHOICES, /* uint32_t, bit k for choices[k]; in JSON a list of names */
+    BST_CONFIG_SEED,    /* uint64_t, hex string "0x..." */
+    BST_CONFIG_REALS,   /* double[size / sizeof(double)], a fixed-length array */
+    BST_CONFIG_OBJECT,  /* nested struct, children */
+    BST_CONFIG_LIST,    /* bst_config_list of structs, children, item_bytes */
+    BST_CONFIG_RAW,     /* not stored: checked elsewhere (module blocks) */
 } bst_config_type;
 
 /* Where a LIST lands: `items` is one allocation of count * item_bytes, owned by the config object.
@@ -87,6 +88,11 @@ typedef struct bst_config_desc {
     {                                                                                  \
         .key = #m, .type = BST_CONFIG_ENUM, .unit = "", .fallback = def_, .doc = doc_, \
         .choices = choices_, BST_FIELD_(s, m)                                          \
+    }
+#define BST_CHOICES(s, m, choices_, def_, doc_)                                           \
+    {                                                                                     \
+        .key = #m, .type = BST_CONFIG_CHOICES, .unit = "", .fallback = def_, .doc = doc_, \
+        .choices = choices_, BST_FIELD_(s, m)                                             \
     }
 #define BST_REALS(s, m, unit_, min_, max_, def_, doc_)                                        \
     {                                                                                         \

@@ -40,6 +40,15 @@ static cJSON *value_schema(const bst_config_desc *d) {
             }
             break;
         }
+        case BST_CONFIG_CHOICES: {
+            cJSON_AddStringToObject(node, "type", "array");
+            cJSON_AddBoolToObject(node, "uniqueItems", 1);
+            cJSON *choices = cJSON_AddArrayToObject(cJSON_AddObjectToObject(node, "items"), "enum");
+            for (int i = 0; d->choices[i]; i++) {
+                cJSON_AddItemToArray(choices, cJSON_CreateString(d->choices[i]));
+            }
+            break;
+        }
         case BST_CONFIG_SEED:
             cJSON_AddStringToObject(node, "type", "string");
             cJSON_AddStringToObject(node, "pattern", "^0x[0-9a-fA-F]{1,16}$");

@@ -24,6 +24,7 @@
 #define BST_CHANNEL_NAV_TELEMETRY "nav_telemetry"
 #define BST_CHANNEL_FRAME "frame"
 #define BST_CHANNEL_TRUTH "truth"
+#define BST_CHANNEL_PLANES "planes"
 #define BST_CHANNEL_DETECTIONS "detections"
 #define BST_CHANNEL_PREDICTIONS "predictions"
 #define BST_CHANNEL_TRACKS "tracks"
@@ -51,6 +52,7 @@ typedef struct bst_exposure {
     int binning;
     bool dropped; /* the frame will be lost on its way: rendered truth is kept, no frame is
                      delivered */
+    double pixel_scale_arcsec; /* 0: the camera's */
 } bst_exposure;
 
 /* los_history (latest, written in place): ring of the true camera attitude at the plant rate.
@@ -148,9 +150,33 @@ typedef struct bst_truth {
     bst_vec3 sun_m;                        /* observer to Sun, mid */
     double boresight_x_px, boresight_y_px; /* where the boresight meets the focal plane */
     double background_e, dark_e;           /* expected electrons per pixel */
+    double hits_e;                         /* charge of the radiation hits on the sensor, electrons */
+    int32_t hits;                          /* radiation hits */
+    double pixel_scale_arcsec;             /* of this exposure */
     int32_t count, lost;                   /* items; sources that found no room */
     bst_truth_item items[];
 } bst_truth;
+
+/* Images of a frame that no detector took. */
+typedef enum bst_plane {
+    BST_PLANE_STARS = 0,
+    BST_PLANE_TARGETS,
+    BST_PLANE_BACKGROUND,
+    BST_PLANE_SEGMENTATION,
+    BST_PLANE_COUNT
+} bst_plane;
+
+/* planes (latest): expected electrons per pixel of the frame written in the same step, from stars,
+ * from objects, and from sky and dark current; and who each pixel belongs to. Only for hooks of the
+ * engine: the images are their writer's, and are written over in its next step. */
+typedef struct bst_planes {
+    int64_t exposure_id;
+    bst_window window;
+    const float *electrons[BST_PLANE_SEGMENTATION]; /* [height][width] by bst_plane; NULL: not
+                                                       asked for */
+    const int32_t *segmentation; /* [height][width]: 0, or 1 + number of the item of `truth` that
+                                    gives most light there; NULL: not asked for */
+} bst_planes;
 
 typedef enum bst_label {
     BST_LABEL_UNKNOWN = 0,

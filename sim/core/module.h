@@ -52,6 +52,8 @@ typedef struct bst_module_env {
     int observer, sensor;                  /* indices in the world */
     double exposure_s;                     /* the longest of this sensor that the scenario sets: its
                                               own, or exposure_s of a module that commands it */
+    uint32_t planes;                       /* bit k: the bst_plane k is recorded */
+    double mask_threshold_sigma;           /* least light of a pixel of the segmentation mask */
     void *engine_private;
 } bst_module_env;
 

@@ -130,6 +130,8 @@ bst_status bst_engine_load(bst_ctx *ctx, bst_engine *engine) {
                               .observer = spec->observer,
                               .sensor = spec->sensor,
                               .exposure_s = spec->exposure_s,
+                              .planes = spec->planes,
+                              .mask_threshold_sigma = spec->mask_threshold_sigma,
                               .engine_private = self};
         bst_status status = spec->desc->create(&env, spec->config, &self->self);
         if (status != BST_OK) {

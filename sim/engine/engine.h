@@ -30,6 +30,8 @@ typedef struct bst_instance_spec {
     struct bst_device *device;
     int observer, sensor;
     double exposure_s; /* the longest of the sensor that the scenario sets */
+    uint32_t planes;   /* bit k: the bst_plane k is recorded */
+    double mask_threshold_sigma;
     uint64_t seed, run;
 } bst_instance_spec;
 

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include "sim/engine/engine.h"
+#include "sim/world/frame_updates.h"
 #include "sim/world/world.h"
 #include "sim/world/world_config.h"
 
@@ -14,6 +15,8 @@ typedef struct exposure_clock {
     int64_t exposure_ticks, period_ticks;
     bst_window full, window;
     int binning;
+    bst_frame_cursor
+        updates; /* what drives the sensor frame by frame; none: updates.updates NULL */
     double dropped_fraction;
     bst_rng_key drop_key;
     int64_t id;
@@ -21,6 +24,26 @@ typedef struct exposure_clock {
     int64_t next_start_tick;
     bool open;
 } exposure_clock;
+
+/* Every exposure and period of a file is whole ticks. */
+static bst_status check_updates(const bst_module_env *env, const bst_frame_updates *updates) {
+    for (int i = 0; i < bst_frame_updates_count(updates); i++) {
+        const bst_frame_update *u = bst_frame_updates_item(updates, i);
+        int64_t ticks;
+        const char *key = "exposure_s";
+        bst_status status = bst_seconds_to_ticks(env->ctx, env->tick_rate_hz,
+                                                 u->exposure_s > 0.0 ? u->exposure_s : 0.0, &ticks);
+        if (status == BST_OK) {
+            key = "period_s";
+            status = bst_seconds_to_ticks(env->ctx, env->tick_rate_hz, u->period_s, &ticks);
+        }
+        if (status != BST_OK) {
+            return bst_fail_prefix(env->ctx, status, "%s: /frames/%d (frame %lld)/%s",
+                                   bst_frame_updates_name(updates), i, (long long)u->frame, key);
+        }
+    }
+    return BST_OK;
+}
 
 static bst_status create(const bst_module_env *env, const void *config, void **self) {
     const bst_exposure_config *c = config;
@@ -32,7 +55,7 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
     clock->tick_rate_hz = env->tick_rate_hz;
     clock->full = (bst_window){0, 0, (int)camera->width_px, (int)camera->height_px};
     clock->window = clock->full;
-    clock->binning = 1;
+    clock->binning = c->binning > 1 ? (int)c->binning : 1;
     clock->dropped_fraction = c->dropped_fraction;
     clock->drop_key = bst_env_rng(env, "dropped_frames");
     bst_status status =
@@ -44,13 +67,23 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
     if (status == BST_OK) {
         status = bst_seconds_to_ticks(env->ctx, env->tick_rate_hz, c->first_s, &clock->start_tick);
     }
+    const bst_frame_updates *updates =
+        bst_world_frame_updates(env->world, env->observer, env->sensor);
+    if (status == BST_OK && updates) {
+        status = check_updates(env, updates);
+    }
     if (status != BST_OK) {
         free(clock);
         return status;
     }
     int64_t cycle =
         clock->exposure_ticks > clock->period_ticks ? clock->exposure_ticks : clock->period_ticks;
-    bst_env_set_rate(env, (double)env->tick_rate_hz / (double)cycle);
+    double cycle_s = (double)cycle / (double)env->tick_rate_hz, longest_s;
+    if (updates) {
+        clock->updates = bst_frame_cursor_begin(updates, camera, c, (double)env->tick_rate_hz);
+        bst_frame_updates_limits(updates, camera, c, &longest_s, &cycle_s);
+    }
+    bst_env_set_rate(env, 1.0 / cycle_s);
     *self = clock;
     return BST_OK;
 }
@@ -90,7 +123,11 @@ static void latch(exposure_clock *clock, const bst_sensor_command *command) {
 }
 
 static void open_exposure(exposure_clock *clock, bst_sample command) {
-    if (command.payload && !command.stale) {
+    if (clock->updates.updates) { /* the file alone decides: what is commanded is not heard */
+        clock->exposure_ticks = clock->updates.exposure_ticks;
+        clock->period_ticks = clock->updates.period_ticks;
+        clock->window = clock->updates.window;
+    } else if (command.payload && !command.stale) {
         latch(clock, command.payload);
     }
     int64_t cycle =
@@ -105,9 +142,13 @@ static void close_exposure(exposure_clock *clock, bst_exposure *out) {
                           .end_tick = clock->start_tick + clock->exposure_ticks,
                           .window = clock->window,
                           .binning = clock->binning,
+                          .pixel_scale_arcsec = clock->updates.pixel_scale_arcsec,
                           .dropped = clock->dropped_fraction > 0.0 &&
                                      bst_rng_uniform(clock->drop_key, (uint64_t)clock->id, 0) <
                                          clock->dropped_fraction};
+    if (clock->updates.updates) {
+        bst_frame_cursor_next(&clock->updates);
+    }
     clock->id++;
     clock->open = false;
     clock->start_tick = clock->next_start_tick;

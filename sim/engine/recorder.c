@@ -6,10 +6,15 @@
 #include <string.h>
 
 #include "sim/engine/recorder_internal.h"
+#include "sim/world/frame_updates.h"
 
 static const char *const frame_choices[] = {"extensions", "cube", "none", NULL};
 
 static const char *const compression_choices[] = {"none", "rice", NULL};
+
+/* in the order of bst_plane; also the names of their files */
+static const char *const plane_choices[] = {"stars", "targets", "background", "segmentation", NULL};
+static const char *const plane_names[] = {"STARS", "TARGETS", "BACKGROUND", "SEGMENTATION"};
 
 const bst_config_desc bst_record_config_table[] = {
     BST_ENUM(bst_record_config, frames, frame_choices, "\"extensions\"",
@@ -20,6 +25,13 @@ const bst_config_desc bst_record_config_table[] = {
              "the simulation by a thread of its own."),
     BST_BOOL(bst_record_config, checksums, "true",
              "CHECKSUM and DATASUM in each HDU; they take about 0.1 ms per million pixels."),
+    BST_CHOICES(bst_record_config, planes, plane_choices, "[]",
+                "Noise-free images beside each frame, a FITS file each: expected electrons of the "
+                "stars, of the targets, of sky and dark current; and the mask of who each pixel "
+                "belongs to."),
+    BST_REAL(bst_record_config, mask_threshold_sigma, "sigma", 1e-3, 1e6, "1",
+             "planes segmentation: least light of a source in a pixel of its own, in the noise of "
+             "a pixel without sources."),
     BST_BOOL(bst_record_config, truth, "true", "True exposures and sources."),
     BST_BOOL(bst_record_config, truth_stars, "true", "Stars among the true sources."),
     BST_BOOL(bst_record_config, detections, "true", "What image processing found."),
@@ -54,9 +66,13 @@ static bst_status take_frame(bst_ctx *ctx, bst_recorder *recorder, int sensor, c
 static bst_status take_truth(bst_ctx *ctx, bst_recorder *recorder, int sensor, const void *payload,
                              int64_t written_tick);
 
+static bst_status take_planes(bst_ctx *ctx, bst_recorder *recorder, int sensor, const void *payload,
+                              int64_t written_tick);
+
 static const channel_rows channels[] = {
     {BST_CHANNEL_FRAME, BST_TABLE_FRAMES, take_frame},
     {BST_CHANNEL_TRUTH, BST_TABLE_FRAMES, take_truth},
+    {BST_CHANNEL_PLANES, BST_TABLE_FRAMES, take_planes},
     {BST_CHANNEL_LOS_HISTORY, BST_TABLE_LOS_TRUTH, bst_recorder_los_rows},
     {BST_CHANNEL_DETECTIONS, BST_TABLE_DETECTIONS, bst_recorder_detection_rows},
     {BST_CHANNEL_TRACKS, BST_TABLE_TRACKS, bst_recorder_track_rows},
@@ -99,14 +115,14 @@ static bst_status copy_name(bst_ctx *ctx, char *to, size_t bytes, const char *fr
     return BST_OK;
 }
 
-/* "frames.fits", or one file per sensor. */
-static void frames_file(const bst_recorder *recorder, const bst_recorder_state *s, char *name,
-                        size_t bytes) {
+/* "frames.fits", or one file per sensor; `what` is "frames" or a plane. */
+static void frames_file(const bst_recorder *recorder, const bst_recorder_state *s, const char *what,
+                        char *name, size_t bytes) {
     if (recorder->sensor_count == 1) {
-        snprintf(name, bytes, "frames.fits");
+        snprintf(name, bytes, "%s.fits", what);
         return;
     }
-    snprintf(name, bytes, "frames_%s_%s.fits", s->observer, s->sensor);
+    snprintf(name, bytes, "%s_%s_%s.fits", what, s->observer, s->sensor);
     for (char *c = name; *c; c++) {
         if (!isalnum((unsigned char)*c) && !strchr("._-", *c)) {
             *c = '_';
@@ -126,13 +142,14 @@ static bst_status fill(bst_ctx *ctx, bst_recorder *recorder, const bst_recorder_
         s->has_truth = from->has_truth;
         s->last_los = s->last_pointing = s->last_nav = s->last_control = -1;
         s->last_mode = -1;
+        s->shown.id = -1;
         s->last_target = -1;
     }
     BST_TRY(bst_recorder_make_tables(ctx, recorder));
     BST_TRY(bst_recorder_run_row(ctx, recorder));
     for (int i = 0; i < recorder->sensor_count; i++) {
         char name[256];
-        frames_file(recorder, &recorder->sensors[i], name, sizeof name);
+        frames_file(recorder, &recorder->sensors[i], "frames", name, sizeof name);
         bool kept = recorder->config.frames != BST_RECORD_NO_FRAMES;
         BST_TRY(bst_recorder_sensor_row(ctx, recorder, i, kept ? name : NULL));
     }
@@ -164,11 +181,20 @@ bst_status bst_recorder_create(bst_ctx *ctx, bst_run *run, const bst_record_conf
     recorder->epoch = info->epoch;
     recorder->tick_rate_hz = info->tick_rate_hz;
     recorder->sensor_count = info->sensor_count;
+    recorder->world = info->world;
     bst_status status = bst_record_config_check(ctx, config);
+    if (info->world) {
+        recorder->object_seen =
+            calloc((size_t)bst_world_object_count(info->world) + 1, sizeof *recorder->object_seen);
+        if (!recorder->object_seen) {
+            status = bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
+        }
+    }
     if (status == BST_OK) {
         status = fill(ctx, recorder, info);
     }
     if (status != BST_OK) {
+        free(recorder->object_seen);
         free(recorder);
         return status;
     }
@@ -177,29 +203,39 @@ bst_status bst_recorder_create(bst_ctx *ctx, bst_run *run, const bst_record_conf
     return BST_OK;
 }
 
-static bst_status open_fits(bst_ctx *ctx, bst_recorder *recorder, bst_recorder_state *s) {
+static bst_status open_file(bst_ctx *ctx, bst_recorder *recorder, bst_recorder_state *s,
+                            const char *what, bst_fits_content content, bst_fits **out) {
     char name[256], path[4096];
-    frames_file(recorder, s, name, sizeof name);
+    frames_file(recorder, s, what, name, sizeof name);
     BST_TRY(bst_run_file(ctx, recorder->run, name, path, sizeof path));
+    bool frames = content == BST_FITS_COUNTS;
     bst_fits_info info = {.observer = s->observer,
                           .instrument = s->sensor,
                           .object = s->target,
                           .program = recorder->program,
                           .camera = &s->camera,
                           .checksums = recorder->config.checksums,
-                          .compression = recorder->config.compression == BST_FITS_RICE
+                          .compression = frames && recorder->config.compression == BST_FITS_RICE
                                              ? BST_FITS_RICE
-                                             : BST_FITS_RAW};
+                                             : BST_FITS_RAW,
+                          .content = content};
     bst_fits_layout layout =
-        recorder->config.frames == BST_RECORD_CUBE ? BST_FITS_CUBE : BST_FITS_EXTENSIONS;
-    return bst_fits_create(ctx, path, layout, &info, &s->fits);
+        frames && recorder->config.frames == BST_RECORD_CUBE ? BST_FITS_CUBE : BST_FITS_EXTENSIONS;
+    return bst_fits_create(ctx, path, layout, &info, out);
 }
 
 /* Fits the frame's WCS; a field too wide for one gets none, and is told of once. */
 static void solve_wcs(bst_ctx *ctx, bst_recorder_state *s, const bst_truth_head *head,
                       bst_fits_frame *frame) {
-    frame->has_wcs = bst_wcs_fit(ctx, &s->camera, head->q_cam_from_gcrf_mean, &head->light,
-                                 &frame->wcs) == BST_OK;
+    bst_camera camera = s->camera;
+    if (head->pixel_scale_arcsec > 0.0 &&
+        head->pixel_scale_arcsec != s->camera.pixel_scale_arcsec &&
+        bst_camera_at_scale(ctx, &s->camera, head->pixel_scale_arcsec, &camera) != BST_OK) {
+        camera = s->camera; /* cannot be: the frame was rendered so */
+    }
+    frame->pixel_scale_arcsec = camera.pixel_scale_arcsec;
+    frame->has_wcs =
+        bst_wcs_fit(ctx, &camera, head->q_cam_from_gcrf_mean, &head->light, &frame->wcs) == BST_OK;
     if (!frame->has_wcs && !s->wcs_warned) {
         bst_log(ctx, BST_LOG_WARNING, "%s/%s: frames get no WCS: %s", s->observer, s->sensor,
                 ctx ? ctx->message : "");
@@ -227,7 +263,7 @@ static bst_status write_frame(bst_ctx *ctx, bst_recorder *recorder, int sensor,
     int64_t index = -1;
     if (recorder->config.frames != BST_RECORD_NO_FRAMES) {
         if (!s->fits) {
-            BST_TRY(open_fits(ctx, recorder, s));
+            BST_TRY(open_file(ctx, recorder, s, "frames", BST_FITS_COUNTS, &s->fits));
         }
         const uint16_t *pixels;
         BST_TRY(bst_frame_map(m->frame, ctx, &pixels));
@@ -236,6 +272,7 @@ static bst_status write_frame(bst_ctx *ctx, bst_recorder *recorder, int sensor,
         bst_frame_unmap(m->frame);
         BST_TRY(status);
     }
+    s->shown = frame;
     return bst_recorder_frame_row(ctx, recorder, sensor, m, frame.has_wcs ? &frame.wcs : NULL,
                                   index);
 }
@@ -251,6 +288,32 @@ static bst_status write_waiting(bst_ctx *ctx, bst_recorder *recorder, int sensor
     bst_status status = write_frame(ctx, recorder, sensor, &s->frame, head);
     bst_frame_release(s->frame.frame);
     return status;
+}
+
+/* Planes come right after their frame, and have its keys. */
+static bst_status take_planes(bst_ctx *ctx, bst_recorder *recorder, int sensor, const void *payload,
+                              int64_t written_tick) {
+    (void)written_tick;
+    const bst_planes *p = payload;
+    bst_recorder_state *s = &recorder->sensors[sensor];
+    if (s->shown.id != p->exposure_id) {
+        return bst_fail(ctx, BST_ERR_STATE, "%s/%s: planes of exposure %lld without its frame",
+                        s->observer, s->sensor, (long long)p->exposure_id);
+    }
+    for (int k = 0; k < BST_PLANE_COUNT; k++) {
+        bool mask = k == BST_PLANE_SEGMENTATION;
+        const void *pixels = mask ? (const void *)p->segmentation : (const void *)p->electrons[k];
+        if (!pixels) {
+            continue;
+        }
+        if (!s->planes[k]) {
+            BST_TRY(open_file(ctx, recorder, s, plane_choices[k],
+                              mask ? BST_FITS_ITEMS : BST_FITS_ELECTRONS, &s->planes[k]));
+        }
+        BST_TRY(bst_fits_write_plane(ctx, s->planes[k], &s->shown, plane_names[k], pixels,
+                                     p->window.width, p->window.height, NULL));
+    }
+    return BST_OK;
 }
 
 static bst_truth_head *find_head(bst_recorder_state *s, int64_t exposure_id) {
@@ -295,6 +358,7 @@ static bst_status take_truth(bst_ctx *ctx, bst_recorder *recorder, int sensor, c
                            .q_cam_from_gcrf_mean = t->q_cam_from_gcrf_mean,
                            .observer_gcrf_m = t->observer_gcrf_m,
                            .observer_gcrf_mps = t->observer_gcrf_mps,
+                           .pixel_scale_arcsec = t->pixel_scale_arcsec,
                            .light = {.velocity_mps = t->velocity_bary_mps, .sun_m = t->sun_m}};
     if (s->frame_waits && s->frame.exposure_id == t->exposure_id) {
         BST_TRY(write_waiting(ctx, recorder, sensor, &head));
@@ -344,7 +408,12 @@ bst_status bst_recorder_close(bst_ctx *ctx, bst_recorder *recorder) {
         bst_status closed =
             bst_fits_close(status == BST_OK ? ctx : NULL, recorder->sensors[i].fits);
         status = status == BST_OK ? closed : status;
+        for (int k = 0; k < BST_PLANE_COUNT; k++) {
+            closed = bst_fits_close(status == BST_OK ? ctx : NULL, recorder->sensors[i].planes[k]);
+            status = status == BST_OK ? closed : status;
+        }
     }
+    free(recorder->object_seen);
     free(recorder);
     return status;
 }

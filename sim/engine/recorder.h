@@ -18,7 +18,9 @@ typedef enum bst_record_frames {
 typedef struct bst_record_config {
     int32_t frames;      /* bst_record_frames */
     int32_t compression; /* bst_fits_compression, of extensions */
-    bool checksums; /* of each HDU */
+    bool checksums;      /* of each HDU */
+    uint32_t planes;     /* bit k: the bst_plane k */
+    double mask_threshold_sigma;
     bool truth;
     bool truth_stars;
     bool detections;
@@ -48,6 +50,7 @@ typedef struct bst_recorder_info {
     const char *program; /* "boresight 0.1.0" */
     const bst_recorder_sensor *sensors;
     int sensor_count;
+    const struct bst_world *world; /* names of the objects; outlives the recorder; may be NULL */
 } bst_recorder_info;
 
 typedef struct bst_recorder bst_recorder;

@@ -4,6 +4,7 @@
 
 #include "sim/engine/recorder.h"
 #include "sim/io/fits_frames.h"
+#include "sim/world/world.h"
 
 typedef enum bst_record_table {
     BST_TABLE_RUN,
@@ -11,6 +12,7 @@ typedef enum bst_record_table {
     BST_TABLE_FRAMES,
     BST_TABLE_EXPOSURES,
     BST_TABLE_TRUTH,
+    BST_TABLE_OBJECTS,
     BST_TABLE_LOS_TRUTH,
     BST_TABLE_DETECTION_FRAMES,
     BST_TABLE_DETECTIONS,
@@ -32,6 +34,7 @@ typedef struct bst_truth_head {
     bst_quat q_cam_from_gcrf_mean;
     bst_vec3 observer_gcrf_m, observer_gcrf_mps;
     bst_light light;
+    double pixel_scale_arcsec;
 } bst_truth_head;
 
 /* Truth may run ahead of its frame by the readout delay: so many exposures at most. */
@@ -42,6 +45,8 @@ typedef struct bst_recorder_state {
     bst_camera camera;
     bool has_truth;
     bst_fits *fits; /* made with the first frame */
+    bst_fits *planes[BST_PLANE_COUNT];
+    bst_fits_frame shown; /* what was last written of a frame */
     bool wcs_warned;
     bool frame_waits;
     bst_frame_message frame; /* one reference held while frame_waits */
@@ -59,6 +64,8 @@ struct bst_recorder {
     bst_time epoch;
     int64_t tick_rate_hz;
     char program[64];
+    const struct bst_world *world;      /* NULL: objects have no names */
+    bool *object_seen;                  /* [objects of the world] */
     bst_table *tables[BST_TABLE_COUNT]; /* NULL: not wanted */
     int sensor_count;
     bst_recorder_state sensors[];

@@ -148,9 +148,28 @@ static bst_status exposure_row(bst_ctx *ctx, bst_recorder *recorder, int sensor,
     put_vector(&r, t->sun_m);
     put_real(&r, t->background_e);
     put_real(&r, t->dark_e);
+    put_real(&r, t->pixel_scale_arcsec);
     put_int(&r, t->count);
     put_int(&r, t->lost);
+    put_int(&r, t->hits);
+    put_real(&r, t->hits_e);
     return append(ctx, recorder, BST_TABLE_EXPOSURES, &r);
+}
+
+/* The row of an object, once. */
+static bst_status object_row(bst_ctx *ctx, bst_recorder *recorder, uint32_t id) {
+    if (!recorder->object_seen || recorder->object_seen[id]) {
+        return BST_OK;
+    }
+    recorder->object_seen[id] = true;
+    const bst_object_info *info = bst_world_object(recorder->world, (int)id);
+    row r = {.count = 0};
+    put_int(&r, id);
+    put_text(&r, info->name);
+    put_int(&r, info->norad);
+    put_real(&r, info->area_m2);
+    put_real(&r, info->albedo);
+    return append(ctx, recorder, BST_TABLE_OBJECTS, &r);
 }
 
 bst_status bst_recorder_truth_rows(bst_ctx *ctx, bst_recorder *recorder, int sensor,
@@ -165,10 +184,14 @@ bst_status bst_recorder_truth_rows(bst_ctx *ctx, bst_recorder *recorder, int sen
         if (star && !recorder->config.truth_stars) {
             continue;
         }
+        if (!star) {
+            BST_TRY(object_row(ctx, recorder, item->id));
+        }
         row r = {.count = 0};
         put_int(&r, sensor);
         put_int(&r, t->exposure_id);
         put_real(&r, mid_s);
+        put_int(&r, i + 1);
         put_text(&r, star ? "star" : "object");
         put_int(&r, item->id);
         put_int(&r, item->norad);

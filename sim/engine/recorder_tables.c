@@ -78,13 +78,18 @@ static const bst_column exposure_columns[] = {
     VECTOR("sun", "m", "m", "observer to Sun"),
     REAL("background_e", "e-/px", "expected sky electrons"),
     REAL("dark_e", "e-/px", "expected dark electrons"),
+    REAL("pixel_scale_arcsec", "arcsec/px", "at the boresight, in this exposure"),
     INT("sources", "", "sources with a truth item"),
     INT("lost", "", "sources that found no room"),
+    INT("hits", "", "radiation hits on the sensor"),
+    REAL("hits_e", "e-", "their charge"),
 };
 static const bst_column truth_columns[] = {
     SENSOR,
     EXPOSURE,
     MID,
+    INT("item", "",
+        "number of the source in its exposure, from 1: its pixels in segmentation.fits"),
     TEXT("kind", "star or object"),
     INT("id", "",
         "star: Tycho-2 identity, from 2147483648 on statistical; object: index in the scenario"),
@@ -108,6 +113,13 @@ static const bst_column truth_columns[] = {
     REAL("sunlit_fraction", "", "object: of the Sun's disc"),
     REAL("phase_deg", "deg", "object: Sun - object - observer"),
     REAL("range_m", "m", "object: from the observer"),
+};
+static const bst_column object_columns[] = {
+    INT("id", "", "index in the scenario: id in truth"),
+    TEXT("name", "name"),
+    INT("norad", "", "catalogue number, 0: none"),
+    REAL("area_m2", "m^2", "cross-section of the sphere"),
+    REAL("albedo", "", "of the sphere"),
 };
 static const bst_column los_truth_columns[] = {
     SENSOR,
@@ -284,6 +296,8 @@ static const table_spec specs[BST_TABLE_COUNT] = {
     [BST_TABLE_EXPOSURES] =
         SPEC("exposures", exposure_columns, "True state of the sensor in each exposure."),
     [BST_TABLE_TRUTH] = SPEC("truth", truth_columns, "True sources in each exposure."),
+    [BST_TABLE_OBJECTS] =
+        SPEC("objects", object_columns, "The objects that came to be in truth, once each."),
     [BST_TABLE_LOS_TRUTH] =
         SPEC("los_truth", los_truth_columns, "True line of sight, at the telemetry's rate."),
     [BST_TABLE_DETECTION_FRAMES] =
@@ -306,6 +320,7 @@ static bool wanted(const bst_record_config *config, bst_record_table table) {
     switch (table) {
         case BST_TABLE_EXPOSURES:
         case BST_TABLE_TRUTH:
+        case BST_TABLE_OBJECTS:
             return config->truth;
         case BST_TABLE_LOS_TRUTH:
             return config->truth && config->telemetry_hz > 0.0;

@@ -85,6 +85,8 @@ static bst_instance_spec sensor_spec(const bst_scenario *scenario, const bst_sim
                                .observer = observer,
                                .sensor = sensor,
                                .exposure_s = longest_exposure_s(scenario, observer, sensor),
+                               .planes = scenario->record.planes,
+                               .mask_threshold_sigma = scenario->record.mask_threshold_sigma,
                                .seed = scenario->seed,
                                .run = (uint64_t)scenario->run};
 }

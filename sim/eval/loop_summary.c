@@ -157,7 +157,7 @@ static bst_status look_at_target(bst_ctx *ctx, bst_loop_summary *s, const bst_tr
     BST_TRY(status);
     w->known = true;
     w->direction = sight.geometric;
-    f->visible = !sight.occulted && isfinite(sight.v_mag);
+    f->visible = !sight.occulted && bst_glow_electrons_per_s(&s->camera, &sight.glow, NULL) > 0.0;
     bst_vec3 cam = bst_quat_rotate(truth->q_cam_from_gcrf_mid, sight.apparent);
     if (bst_camera_project(&s->camera, cam, &f->target_x_px, &f->target_y_px)) {
         f->error_x_px = f->target_x_px - truth->boresight_x_px;

@@ -75,10 +75,12 @@ static void write_color(FILE *stream, const bst_czml_object *o) {
 }
 
 static void write_looks(FILE *stream, const bst_czml_object *o, double span_s) {
-    fprintf(stream,
-            ",\n\"point\":{\"pixelSize\":%.9g,\"color\":", o->point_px > 0.0 ? o->point_px : 6.0);
-    write_color(stream, o);
-    fputs("}", stream);
+    if (o->point_px >= 0.0) {
+        fprintf(stream, ",\n\"point\":{\"pixelSize\":%.9g,\"color\":",
+                o->point_px > 0.0 ? o->point_px : 6.0);
+        write_color(stream, o);
+        fputs("}", stream);
+    }
     if (o->label) {
         fputs(",\n\"label\":{\"text\":", stream);
         write_string(stream, o->name ? o->name : o->id);
@@ -129,9 +131,9 @@ bst_status bst_czml_write_object(bst_ctx *ctx, FILE *stream, const bst_czml_obje
     write_interval(stream, first, last);
     write_looks(stream, o, bst_time_diff(last, first));
     fprintf(stream,
-            ",\n\"position\":{\"interpolationAlgorithm\":\"LAGRANGE\",\"interpolationDegree\":%d,"
+            ",\n\"position\":{\"interpolationAlgorithm\":\"%s\",\"interpolationDegree\":%d,"
             "\"referenceFrame\":\"INERTIAL\",\"epoch\":\"%sZ\",\"cartesian\":[",
-            LAGRANGE_DEGREE, epoch);
+            o->linear ? "LINEAR" : "LAGRANGE", o->linear ? 1 : LAGRANGE_DEGREE, epoch);
     for (int64_t row = 0; row < o->series.rows; row++) {
         bst_time t;
         BST_TRY(o->series.state(o->series.user, ctx, row, &t, &r, &v));
@@ -144,6 +146,29 @@ bst_status bst_czml_write_object(bst_ctx *ctx, FILE *stream, const bst_czml_obje
         BST_TRY(bst_text_stream_ok(ctx, stream));
     }
     fputs("]}}", stream);
+    return bst_text_stream_ok(ctx, stream);
+}
+
+bst_status bst_czml_write_line(bst_ctx *ctx, FILE *stream, const char *id, const char *name,
+                               const char *const *ids, int count, const unsigned char rgba[4],
+                               bst_time start, bst_time stop) {
+    fputs(",\n{\"id\":", stream);
+    write_string(stream, id);
+    fputs(",\"name\":", stream);
+    write_string(stream, name);
+    fputs(",\n\"availability\":", stream);
+    write_interval(stream, start, stop);
+    fprintf(stream,
+            ",\n\"polyline\":{\"arcType\":\"NONE\",\"width\":1,\"material\":{\"solidColor\":{"
+            "\"color\":{\"rgba\":[%d,%d,%d,%d]}}},\n\"positions\":{\"references\":[",
+            rgba[0], rgba[1], rgba[2], rgba[3]);
+    for (int i = 0; i < count; i++) {
+        char reference[300];
+        snprintf(reference, sizeof reference, "%.280s#position", ids[i]);
+        fputs(i ? "," : "", stream);
+        write_string(stream, reference);
+    }
+    fputs("]}}}", stream);
     return bst_text_stream_ok(ctx, stream);
 }
 

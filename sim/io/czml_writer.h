@@ -18,7 +18,8 @@ typedef struct bst_czml_object {
     bool label;              /* the name beside the point */
     double path_s;           /* length of the trail, s; 0: no path, INFINITY: all of it */
     unsigned char rgba[4];   /* of point, label and path; all zero: white */
-    double point_px;         /* diameter of the point; 0: 6 */
+    double point_px;         /* diameter of the point; 0: 6; < 0: not shown */
+    bool linear;             /* straight between rows, not Lagrange */
     bst_state_series series; /* GCRF; velocities are not used; at least one row */
 } bst_czml_object;
 
@@ -35,6 +36,11 @@ bst_status bst_czml_write_head(bst_ctx *ctx, FILE *stream, const char *name, bst
  * from the first row to the last. */
 bst_status bst_czml_write_object(bst_ctx *ctx, FILE *stream,
                                  const bst_czml_object *object) BST_MUST_CHECK;
+
+/* A line through the positions of packets with these ids, in their order. */
+bst_status bst_czml_write_line(bst_ctx *ctx, FILE *stream, const char *id, const char *name,
+                               const char *const *ids, int count, const unsigned char rgba[4],
+                               bst_time start, bst_time stop) BST_MUST_CHECK;
 
 /* Ends the document. */
 bst_status bst_czml_write_tail(bst_ctx *ctx, FILE *stream) BST_MUST_CHECK;

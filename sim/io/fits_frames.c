@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "sim/io/fits_internal.h"
+#include "sim/io/manifest.h"
 
 bst_status bst_fits_check(bst_ctx *ctx, const bst_fits *fits, int code, const char *what) {
     if (code == 0) {
@@ -27,6 +28,14 @@ bst_status bst_fits_fail_errno(bst_ctx *ctx, const bst_fits *fits, const char *w
 
 static void copy_name(char to[BST_FITS_NAME_BYTES], const char *from) {
     snprintf(to, BST_FITS_NAME_BYTES, "%s", from ? from : "");
+}
+
+static void copy_names(bst_fits *fits, const bst_fits_info *info) {
+    copy_name(fits->names.observer, info->observer);
+    copy_name(fits->names.instrument, info->instrument);
+    copy_name(fits->names.object, info->object);
+    copy_name(fits->names.program, info->program);
+    fits->names.camera = *info->camera;
 }
 
 /* Sets the sums of an HDU with the pixels behind it (NULL: none). */
@@ -52,6 +61,7 @@ static bst_status write_primary(bst_ctx *ctx, bst_fits *fits) {
     errno = 0;
     bst_fits_memory_open(&fits->memory, true, &code);
     bst_fits_put_run_keys(fits->memory.file, &fits->names, &code);
+    bst_fits_put_content(fits->memory.file, fits->content, &code);
     bst_fits_put_statements(fits->memory.file, &code);
     bst_fits_put_sums(fits, fits->memory.file, &code);
     bst_fits_memory_hdu(&fits->memory, &hdu, &bytes, &code);
@@ -83,6 +93,10 @@ bst_status bst_fits_create(bst_ctx *ctx, const char *path, bst_fits_layout layou
     if (layout == BST_FITS_CUBE && info->compression != BST_FITS_RAW) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: a cube is not compressed", path);
     }
+    if (info->content != BST_FITS_COUNTS &&
+        (layout == BST_FITS_CUBE || info->compression != BST_FITS_RAW)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: planes are extensions, not compressed", path);
+    }
     bst_fits *fits = calloc(1, sizeof *fits);
     if (!fits) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
@@ -100,13 +114,9 @@ bst_status bst_fits_create(bst_ctx *ctx, const char *path, bst_fits_layout layou
     }
     fits->layout = layout;
     fits->compression = info->compression;
+    fits->content = info->content;
     fits->checksums = info->checksums;
-    copy_name(fits->names.observer, info->observer);
-    copy_name(fits->names.instrument, info->instrument);
-    copy_name(fits->names.object, info->object);
-    copy_name(fits->names.program, info->program);
-    fits->names.camera = *info->camera;
-
+    copy_names(fits, info);
     bst_status status = BST_OK;
     struct stat there;
     if (lstat(fits->path, &there) == 0) {
@@ -205,6 +215,84 @@ bst_status bst_fits_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *fr
         *index = fits->layout == BST_FITS_CUBE ? fits->frames - 1 : fits->frames;
     }
     return BST_OK;
+}
+
+bst_status bst_fits_write_plane(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,
+                                const char *name, const void *pixels, int width, int height,
+                                int64_t *index) {
+    if (width < 1 || height < 1 || fits->content == BST_FITS_COUNTS) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: no plane of %d x %d pixels", fits->path, width,
+                        height);
+    }
+    bool items = fits->content == BST_FITS_ITEMS;
+    long size[2] = {width, height};
+    char *hdu = NULL;
+    long long bytes = 0;
+    int code = 0;
+    errno = 0;
+    bst_fits_memory_open(&fits->memory, true, &code);
+    fitsfile *file = fits->memory.file;
+    fits_create_img(file, items ? LONG_IMG : FLOAT_IMG, 2, size, &code);
+    fits_write_key_str(file, "EXTNAME", name, "", &code);
+    fits_write_key_lng(file, "EXTVER", fits->frames + 1, "counted from 1", &code);
+    fits_write_key_log(file, "INHERIT", 1, "keys of the primary header hold here", &code);
+    bst_fits_put_frame_keys(file, &fits->names, frame, &code);
+    bst_fits_put_content(file, fits->content, &code);
+    bst_fits_put_statements(file, &code);
+    bst_fits_put_sums(fits, file, &code);
+    /* cfitsio's prototype lacks const; it does not write to the array */
+    fits_write_img(file, items ? TINT : TFLOAT, 1, (LONGLONG)width * height,
+                   (void *)(uintptr_t)pixels, &code);
+    bst_fits_memory_hdu(&fits->memory, &hdu, &bytes, &code);
+    bst_status status = bst_fits_check(ctx, fits, code, "cannot be written");
+    if (status == BST_OK) {
+        status = sign(ctx, fits, hdu, bytes, NULL, 0);
+    }
+    if (status == BST_OK) {
+        status = bst_fits_append_hdu(ctx, fits, hdu, bytes);
+    }
+    bst_fits_memory_close(&fits->memory, &code);
+    if (status == BST_OK) {
+        fits->frames++;
+        if (index) {
+            *index = fits->frames;
+        }
+    }
+    return status;
+}
+
+bst_status bst_fits_write_single(bst_ctx *ctx, const char *path, const bst_fits_info *info,
+                                 const bst_fits_frame *frame, const uint16_t *pixels, int width,
+                                 int height) {
+    bst_fits *fits = calloc(1, sizeof *fits);
+    if (!fits) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
+    }
+    fits->file = fits->cube.rows = -1;
+    snprintf(fits->path, sizeof fits->path, "%s", path);
+    copy_names(fits, info);
+    long size[2] = {width, height};
+    char *hdu = NULL;
+    long long bytes = 0;
+    int code = 0;
+    errno = 0;
+    bst_fits_memory_open(&fits->memory, false, &code);
+    fitsfile *file = fits->memory.file;
+    fits_create_img(file, USHORT_IMG, 2, size, &code);
+    fits_write_key_str(file, "CREATOR", fits->names.program, "program that made this file", &code);
+    fits_write_key_str(file, "TELESCOP", fits->names.observer, "observing spacecraft", &code);
+    bst_fits_put_frame_keys(file, &fits->names, frame, &code);
+    bst_fits_put_statements(file, &code);
+    /* cfitsio's prototype lacks const; it does not write to the array */
+    fits_write_img(file, TUSHORT, 1, (LONGLONG)width * height, (void *)(uintptr_t)pixels, &code);
+    bst_fits_memory_hdu(&fits->memory, &hdu, &bytes, &code);
+    bst_status status = bst_fits_check(ctx, fits, code, "cannot be made");
+    if (status == BST_OK) {
+        status = bst_write_file_atomic(ctx, path, hdu, (size_t)bytes);
+    }
+    bst_fits_memory_close(&fits->memory, &code);
+    free_fits(fits);
+    return status;
 }
 
 bst_status bst_fits_flush(bst_ctx *ctx, bst_fits *fits) {

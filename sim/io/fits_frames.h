@@ -14,6 +14,14 @@ typedef enum bst_fits_layout { BST_FITS_EXTENSIONS, BST_FITS_CUBE } bst_fits_lay
 /* Rice: FITS tile compression (FITS 4.0, section 10), lossless, a tile a row; extensions only. */
 typedef enum bst_fits_compression { BST_FITS_RAW, BST_FITS_RICE } bst_fits_compression;
 
+/* What pixels are: counts of the converter (uint16), expected electrons (float), or numbers of
+ * items of the truth (int32). */
+typedef enum bst_fits_content {
+    BST_FITS_COUNTS,
+    BST_FITS_ELECTRONS,
+    BST_FITS_ITEMS
+} bst_fits_content;
+
 /* What holds for the whole file; read in create only. */
 typedef struct bst_fits_info {
     const char *observer;     /* OBSERVER: spacecraft */
@@ -22,6 +30,8 @@ typedef struct bst_fits_info {
     const char *program;      /* CREATOR: "boresight 0.1.0"; may be NULL */
     const bst_camera *camera; /* the true camera */
     bst_fits_compression compression;
+    bst_fits_content
+        content;    /* others than counts: extensions, not compressed, by bst_fits_write_plane */
     bool checksums; /* CHECKSUM and DATASUM in every HDU; of a cube they come at its end */
 } bst_fits_info;
 
@@ -33,6 +43,7 @@ typedef struct bst_fits_frame {
     bst_window window; /* full-sensor pixels */
     int binning;
     int bits;
+    double pixel_scale_arcsec; /* at the boresight, unbinned; 0: the camera's */
     bool has_wcs, has_observer;
     bst_wcs wcs; /* of the whole sensor: the writer shifts and scales it to the window */
     bst_vec3 observer_gcrf_m, observer_gcrf_mps; /* mid exposure, geocentric */
@@ -58,6 +69,19 @@ bst_status bst_fits_create(bst_ctx *ctx, const char *path, bst_fits_layout layou
 bst_status bst_fits_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,
                           const uint16_t *pixels, int width, int height,
                           int64_t *index) BST_MUST_CHECK;
+
+/* Writes a plane of a file of electrons (float) or of items (int32) as bst_fits_write does a frame;
+ * `name` is its EXTNAME. */
+bst_status bst_fits_write_plane(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,
+                                const char *name, const void *pixels, int width, int height,
+                                int64_t *index) BST_MUST_CHECK;
+
+/* Writes one frame as a file of its own, its pixels in the primary array, with the keys that
+ * bst_fits_write gives a frame; the file appears whole or not at all, and replaces an earlier one.
+ */
+bst_status bst_fits_write_single(bst_ctx *ctx, const char *path, const bst_fits_info *info,
+                                 const bst_fits_frame *frame, const uint16_t *pixels, int width,
+                                 int height) BST_MUST_CHECK;
 
 /* Waits until every frame given so far is with the operating system; reports what failed. NULL is
  * allowed. */

@@ -66,11 +66,26 @@ void bst_fits_put_run_keys(fitsfile *file, const bst_fits_names *names, int *cod
     put_real(file, "PIXSCALE", c->pixel_scale_arcsec, "[arcsec/pixel] at the boresight, unbinned",
              code);
     put_real(file, "ZEROPNT", zero_point_mag(c), "[mag] V of a source of 1 detected e-/s", code);
-    put_real(file, "DARKCUR", c->dark_current_e_per_s, "[e-/s] dark current per pixel", code);
+    put_real(file, "DARKCUR", bst_camera_dark_e_per_s(c), "[e-/s] dark current per pixel", code);
     put_real(file, "APTDIA", c->aperture_m, "[m] diameter of the entrance pupil", code);
     bst_fits_put_lens(file, c, code);
     fits_write_key_str(file, "TIMESYS", "UTC", "time scale of the dates", code);
     fits_write_key_str(file, "RADESYS", "ICRS", "reference system of the WCS", code);
+}
+
+void bst_fits_put_content(fitsfile *file, bst_fits_content content, int *code) {
+    static const char *const keys[] = {"GAIN", "RDNOISE", "OFFSET", "SATURATE", "BITS"};
+    if (content == BST_FITS_COUNTS) {
+        return;
+    }
+    for (size_t i = 0; i < sizeof keys / sizeof *keys && *code == 0; i++) {
+        fits_delete_key(file, keys[i], code);
+    }
+    if (content == BST_FITS_ELECTRONS) {
+        fits_update_key_str(file, "BUNIT", "electron", "expected, before the detector", code);
+    } else {
+        fits_update_key_str(file, "BUNIT", "", "0, or item of the table truth", code);
+    }
 }
 
 void bst_fits_put_statements(fitsfile *file, int *code) {
@@ -147,8 +162,9 @@ void bst_fits_put_frame_keys(fitsfile *file, const bst_fits_names *names,
     put_text(file, "INSTRUME", names->instrument, "sensor", code);
     put_text(file, "OBSERVER", names->observer, "observing spacecraft", code);
     int binning = frame->binning > 1 ? frame->binning : 1;
-    put_real(file, "PIXSCALE", names->camera.pixel_scale_arcsec * binning,
-             "[arcsec/pixel] at the boresight", code);
+    double scale = frame->pixel_scale_arcsec > 0.0 ? frame->pixel_scale_arcsec
+                                                   : names->camera.pixel_scale_arcsec;
+    put_real(file, "PIXSCALE", scale * binning, "[arcsec/pixel] at the boresight", code);
     bst_fits_put_lens(file, &names->camera, code);
     put_int(file, "WINX0", frame->window.x0, "[pixel] window's corner on the sensor, from 0", code);
     put_int(file, "WINY0", frame->window.y0, "[pixel] window's corner on the sensor, from 0", code);

@@ -49,6 +49,7 @@ struct bst_fits {
     char path[BST_FITS_PATH_BYTES];
     bst_fits_layout layout;
     bst_fits_compression compression;
+    bst_fits_content content;
     bool checksums;
     bst_fits_names names;
     int file;      /* -1: not made yet */
@@ -120,6 +121,8 @@ void bst_fits_queue_free(bst_fits *fits);
 
 /* Keys of the whole file. As all of cfitsio: nothing is done when *code is not 0. */
 void bst_fits_put_run_keys(fitsfile *file, const bst_fits_names *names, int *code);
+/* Takes what speaks of the converter's counts out of keys, and says what the pixels are instead. */
+void bst_fits_put_content(fitsfile *file, bst_fits_content content, int *code);
 /* The statements about time scale, light time and aberration. */
 void bst_fits_put_statements(fitsfile *file, int *code);
 /* Keys of one frame. */

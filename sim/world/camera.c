@@ -50,6 +50,8 @@ const bst_config_desc bst_camera_config[] = {
                "the image inside the sensor."),
     BST_OBJECT(bst_camera, optics, bst_optics_config_table, "{}",
                "Point spread function beyond a plain Gaussian, and vignetting."),
+    BST_OBJECT(bst_camera, detector, bst_detector_table, "{}",
+               "Effects of the detector beyond the numbers above; all are off by default."),
     BST_OBJECT(bst_camera, band, bst_band_config_table, "{}",
                "What wavelengths the camera sees, and the warmth of its optics."),
     BST_OBJECT(bst_camera, background, bst_background_config_table, "{}",
@@ -128,4 +130,8 @@ double bst_camera_background_e_per_s(const bst_camera *c) {
     double pixel_arcsec2 = c->pixel_scale_arcsec * c->pixel_scale_arcsec;
     return bst_camera_electrons_per_s(c, c->background_mag_arcsec2) * pixel_arcsec2 +
            bst_camera_optics_e_per_s(c);
+}
+
+double bst_camera_dark_e_per_s(const bst_camera *c) {
+    return c->dark_current_e_per_s * bst_detector_dark_factor(&c->detector);
 }

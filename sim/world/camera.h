@@ -10,6 +10,7 @@
 #include "sim/core/vec.h"
 #include "sim/world/background_config.h"
 #include "sim/world/band.h"
+#include "sim/world/detector_config.h"
 #include "sim/world/psf_config.h"
 
 /* Lens distortion in the focal plane's tangent coordinates u = (x, y), r^2 = x^2 + y^2, in units of
@@ -54,6 +55,7 @@ typedef struct bst_camera {
     bst_optics_config optics;  /* PSF (see psf.h) and vignetting */
     const struct bst_psf *psf; /* made of this camera, lent to its copies, or NULL; a copy whose
                                   optics, aperture or scale are changed must clear it */
+    bst_detector_config detector;
     bst_band_config band;
     const bst_band *spectrum; /* made from `band` and kept by the world; NULL: the V band of
                                  photon_flux_v0_per_s_m2, the same for all colours */
@@ -184,5 +186,7 @@ double bst_camera_optics_e_per_s(const bst_camera *c);
  * They are the same all over the sensor, whatever solid angle gnomonic projection and distortion
  * give a pixel there, as after a flat field. */
 double bst_camera_background_e_per_s(const bst_camera *c);
+/* Mean dark current at the detector's temperature, e-/s, without hot pixels and maps. */
+double bst_camera_dark_e_per_s(const bst_camera *c);
 
 #endif

@@ -34,7 +34,7 @@ static bst_mat3 columns(bst_vec3 x, bst_vec3 y, bst_vec3 z) {
 /* Angle of the direction from the edge of the Earth, positive outside, in the coordinates in which
  * it is a sphere. near: the point of the ray that is nearest to the centre, or where it meets the
  * surface; unit. height: of the nearest point above the surface, Earth radii. */
-static double earth_edge(const bst_disc *d, int k, bst_vec3 direction, bst_vec3 *near,
+static double earth_edge(const bst_body_disc *d, int k, bst_vec3 direction, bst_vec3 *near,
                          double *height) {
     bst_vec3 way = bst_vec3_unit(bst_mat3_mul_vec(&d->frame[k], direction));
     double along = -bst_vec3_dot(d->eye[k], way), distance = bst_vec3_norm(d->eye[k]);
@@ -50,16 +50,16 @@ static double earth_edge(const bst_disc *d, int k, bst_vec3 direction, bst_vec3 
     return atan2(depth, along) - asin(1.0 / distance);
 }
 
-static double edge_at(const bst_disc *d, int body, int k, bst_vec3 direction) {
+static double edge_at(const bst_body_disc *d, int body, int k, bst_vec3 direction) {
     bst_vec3 near;
     double height;
-    return body == BST_DISC_EARTH ? earth_edge(d, k, direction, &near, &height)
+    return body == BST_BODY_EARTH ? earth_edge(d, k, direction, &near, &height)
                                   : bst_vec3_angle(direction, d->centre[k]) - d->radius_rad;
 }
 
 /* How far the disc moves across the camera, and how many stretches follow from that. */
-static void choose_parts(bst_disc *d, int body, double scale_rad, double sensor_px) {
-    double moved = 0.0, size = body == BST_DISC_EARTH
+static void choose_parts(bst_body_disc *d, int body, double scale_rad, double sensor_px) {
+    double moved = 0.0, size = body == BST_BODY_EARTH
                                    ? asin(fmin(1.0, 1.0 / bst_vec3_norm(d->eye[4])))
                                    : d->radius_rad;
     bst_vec3 z = {0, 0, 1};
@@ -77,7 +77,7 @@ static void choose_parts(bst_disc *d, int body, double scale_rad, double sensor_
 }
 
 static void make_earth(const bst_camera *camera, const bst_surroundings *a, bst_discs *out) {
-    bst_disc *d = &out->body[BST_DISC_EARTH];
+    bst_body_disc *d = &out->body[BST_BODY_EARTH];
     d->present = camera->background.earth;
     d->radiance = camera->background.earth_albedo / BST_PI *
                   sun_radiance_scale(bst_vec3_norm(a->bodies.sun_m));
@@ -112,8 +112,8 @@ static void make_earth(const bst_camera *camera, const bst_surroundings *a, bst_
 
 static void make_round(const bst_camera *camera, const bst_surroundings *a, int body,
                        bst_discs *out) {
-    bool moon = body == BST_DISC_MOON;
-    bst_disc *d = &out->body[body];
+    bool moon = body == BST_BODY_MOON;
+    bst_body_disc *d = &out->body[body];
     bst_vec3 place = moon ? a->bodies.moon_m : a->bodies.sun_m;
     double radius = moon ? BST_MOON_RADIUS_M : BST_SUN_RADIUS_M;
     d->present = moon ? camera->background.moon : camera->background.sun;
@@ -143,18 +143,18 @@ void bst_discs_make(const bst_camera *camera, const bst_surroundings *around, bs
     double sigma = bst_camera_psf_sigma_px(camera);
     out->sigma_px = sqrt(sigma * sigma + 1.0 / 12.0);
     make_earth(camera, around, out);
-    make_round(camera, around, BST_DISC_MOON, out);
-    make_round(camera, around, BST_DISC_SUN, out);
+    make_round(camera, around, BST_BODY_MOON, out);
+    make_round(camera, around, BST_BODY_SUN, out);
     double half = bst_camera_half_diagonal_rad(camera);
     double sensor_px = hypot((double)camera->width_px, (double)camera->height_px);
-    for (int i = 0; i < BST_DISC_COUNT; i++) {
-        bst_disc *d = &out->body[i];
+    for (int i = 0; i < BST_BODY_COUNT; i++) {
+        bst_body_disc *d = &out->body[i];
         double nearest = INFINITY;
         for (int k = 0; k <= BST_DISC_PARTS; k++) {
             nearest = fmin(nearest, edge_at(d, i, k, (bst_vec3){0, 0, 1}));
         }
         choose_parts(d, i, out->scale_rad, sensor_px);
-        double beyond = i == BST_DISC_EARTH
+        double beyond = i == BST_BODY_EARTH
                             ? LIMB_HEIGHTS * out->limb_scale /
                                   sqrt(fmax(bst_vec3_dot(d->eye[4], d->eye[4]) - 1.0, 1e-4))
                             : 0.0;
@@ -168,8 +168,8 @@ bool bst_discs_any(const bst_discs *discs) {
 
 double bst_discs_edge_px(const bst_discs *discs, bst_vec3 direction) {
     double nearest = INFINITY;
-    for (int i = 0; i < BST_DISC_COUNT; i++) {
-        const bst_disc *d = &discs->body[i];
+    for (int i = 0; i < BST_BODY_COUNT; i++) {
+        const bst_body_disc *d = &discs->body[i];
         if (!d->present) {
             continue;
         }
@@ -203,7 +203,7 @@ static double inside(double from, double to, double sigma) {
 /* Light of the Earth's disc, or of its limb above it, at the middle of a stretch. */
 static double earth_radiance(const bst_discs *discs, int k, bst_vec3 direction, double share,
                              double *sunlight) {
-    const bst_disc *d = &discs->body[BST_DISC_EARTH];
+    const bst_body_disc *d = &discs->body[BST_BODY_EARTH];
     bst_vec3 near;
     double height;
     (void)earth_edge(d, k, direction, &near, &height);
@@ -216,7 +216,7 @@ static double earth_radiance(const bst_discs *discs, int k, bst_vec3 direction, 
     return share;
 }
 
-static double moon_radiance(const bst_disc *d, int k, bst_vec3 direction) {
+static double moon_radiance(const bst_body_disc *d, int k, bst_vec3 direction) {
     /* place on the disc, in radii */
     bst_vec3 across =
         bst_vec3_axpy(direction, -bst_vec3_dot(direction, d->centre[k]), d->centre[k]);
@@ -233,8 +233,8 @@ static double moon_radiance(const bst_disc *d, int k, bst_vec3 direction) {
 bst_disc_light bst_discs_light(const bst_discs *discs, bst_vec3 direction) {
     bst_disc_light light = {0};
     double beyond = 0.0; /* Sun and Moon, which the Earth hides */
-    for (int i = BST_DISC_COUNT - 1; i >= 0; i--) {
-        const bst_disc *d = &discs->body[i];
+    for (int i = BST_BODY_COUNT - 1; i >= 0; i--) {
+        const bst_body_disc *d = &discs->body[i];
         if (!d->present) {
             continue;
         }
@@ -245,9 +245,9 @@ bst_disc_light bst_discs_light(const bst_discs *discs, bst_vec3 direction) {
             double share = inside(from, to, discs->sigma_px) / d->parts;
             int k = p * stride + stride / 2;
             from = to;
-            if (i == BST_DISC_SUN) {
+            if (i == BST_BODY_SUN) {
                 beyond += share * d->radiance;
-            } else if (i == BST_DISC_MOON) {
+            } else if (i == BST_BODY_MOON) {
                 beyond += share > 0.0 ? share * moon_radiance(d, k, direction) : 0.0;
             } else {
                 double sunlight = 0.0;

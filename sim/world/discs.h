@@ -20,10 +20,10 @@ typedef struct bst_surroundings {
         faint_limit; /* stars fainter are not drawn: of the catalogue, statistical ones */
 } bst_surroundings;
 
-enum { BST_DISC_EARTH, BST_DISC_MOON, BST_DISC_SUN, BST_DISC_COUNT };
+enum { BST_BODY_EARTH, BST_BODY_MOON, BST_BODY_SUN, BST_BODY_COUNT };
 
 /* One body as the camera sees it during the exposure. */
-typedef struct bst_disc {
+typedef struct bst_body_disc {
     bool present;      /* may touch the sensor */
     double radius_rad; /* of the Moon and the Sun */
     double radiance;   /* of full sunlight falling straight on it, or of the Sun itself; stars of
@@ -35,10 +35,10 @@ typedef struct bst_disc {
     bst_vec3 eye[BST_DISC_PARTS + 1];    /* Earth: observer, in coordinates in which it is a sphere
                                             of radius 1 */
     bst_mat3 frame[BST_DISC_PARTS + 1];  /* Earth: those coordinates from camera axes */
-} bst_disc;
+} bst_body_disc;
 
 typedef struct bst_discs {
-    bst_disc body[BST_DISC_COUNT];
+    bst_body_disc body[BST_BODY_COUNT];
     double scale_rad;  /* per px */
     double sigma_px;   /* by which the PSF and the pixel soften an edge */
     double limb_scale; /* Earth radii */

@@ -3,10 +3,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/world/field_image.h"
 #include "sim/world/field_objects.h"
 #include "sim/world/psf.h"
 #include "sim/world/skylight.h"
-#include "sim/world/streak.h"
 
 /* Aberration at most, and some for the deflection of light: how far an apparent place lies from the
  * catalogue's. */
@@ -35,8 +35,8 @@ struct bst_field {
     const bst_skylight_map *map; /* of the latest query */
     bst_source *sources;
     int source_capacity;
-    bst_source_path *paths; /* [path_capacity], of the objects among the sources */
-    int path_capacity;
+    bst_object_parts *parts; /* [part_capacity], of the objects among the sources */
+    int part_capacity;
     int *near; /* objects that may be in the field; room for all */
     bst_quat q_mid;
     double exposure_s;
@@ -83,9 +83,16 @@ void bst_field_free(bst_field *field) {
         free(field->q);
         free(field->stars);
         free(field->sources);
-        free(field->paths);
+        free(field->parts);
         free(field->near);
         free(field);
+    }
+}
+
+void bst_field_set_camera(bst_field *field, const bst_camera *camera) {
+    field->camera = camera;
+    if (field->skylight) {
+        bst_skylight_set_camera(field->skylight, camera);
     }
 }
 
@@ -325,12 +332,12 @@ static bst_status reserve_sources(bst_ctx *ctx, bst_field *field, int count) {
     return BST_OK;
 }
 
-static bst_status reserve_paths(bst_ctx *ctx, bst_field *field, int count) {
-    if (count > field->path_capacity) {
-        free(field->paths);
-        field->paths = malloc((size_t)count * sizeof *field->paths);
-        field->path_capacity = field->paths ? count : 0;
-        if (!field->paths) {
+static bst_status reserve_parts(bst_ctx *ctx, bst_field *field, int count) {
+    if (count > field->part_capacity) {
+        free(field->parts);
+        field->parts = malloc((size_t)count * sizeof *field->parts);
+        field->part_capacity = field->parts ? count : 0;
+        if (!field->parts) {
             return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d objects", count);
         }
     }
@@ -386,10 +393,11 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     truth->observer_gcrf_mps = eye.velocity_mps;
     truth->velocity_bary_mps = light.velocity_mps;
     truth->sun_m = light.sun_m;
+    truth->pixel_scale_arcsec = camera->pixel_scale_arcsec;
     truth->boresight_x_px = bst_camera_centre_x(camera);
     truth->boresight_y_px = bst_camera_centre_y(camera);
     truth->background_e = bst_camera_background_e_per_s(camera) * exposure;
-    truth->dark_e = camera->dark_current_e_per_s * exposure;
+    truth->dark_e = bst_camera_dark_e_per_s(camera) * exposure;
 
     double margin_px = options->margin_px + reach_px;
     bst_vec3 centre_cam = bst_camera_unproject(camera, window.x0 + 0.5 * (window.width - 1),
@@ -420,7 +428,12 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
         for (int k = 0; k <= BST_DISC_PARTS; k++) {
             around.q[k] = attitude_at(track, exposure * k / BST_DISC_PARTS);
         }
-        BST_TRY(bst_skylight_make(ctx, field->skylight, &around, window, &field->map));
+        bst_window lit = window;
+        if (bst_detector_config_whole_columns(&camera->detector)) {
+            lit.y0 = 0;
+            lit.height = (int)camera->height_px;
+        }
+        BST_TRY(bst_skylight_make(ctx, field->skylight, &around, lit, &field->map));
         truth->background_e = bst_skylight_at(field->map, window.x0 + 0.5 * (window.width - 1),
                                               window.y0 + 0.5 * (window.height - 1));
     } else if (field->faint) {
@@ -462,7 +475,7 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
         }
         bst_vec3_to_radec(star->icrs, &s->ra_rad, &s->dec_rad);
     }
-    BST_TRY(reserve_paths(ctx, field, near_count));
+    BST_TRY(reserve_parts(ctx, field, near_count));
     const bst_object_query objects = {field->view,  camera, field->observer, start_s, end_s,
                                       field->q_mid, window, margin_px,       centre,  radius};
     for (int i = 0, used = 0; i < near_count; i++) {
@@ -470,7 +483,7 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
         if (is_self(field, field->near[i])) {
             continue;
         }
-        BST_TRY(bst_field_object(ctx, &objects, field->near[i], &field->paths[used],
+        BST_TRY(bst_field_object(ctx, &objects, field->near[i], &field->parts[used],
                                  &field->sources[n], &there));
         n += there;
         used += there;
@@ -480,14 +493,9 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     return BST_OK;
 }
 
-/* Mean and covariance over the exposure of where a source's image is; NAN when it is behind the
- * camera. */
-typedef struct smear {
-    double x_mean, y_mean, xx, xy, yy;
-} smear;
-
-static smear smear_of(const bst_field *field, const bst_source *source) {
-    smear m = {0};
+/* Of the image of a point; NAN when it is behind the camera. */
+static bst_image_moments smear_of(const bst_field *field, const bst_source *source) {
+    bst_image_moments m = {0};
     double x[SIGMA_POINTS], y[SIGMA_POINTS];
     for (int p = 0; p < SIGMA_POINTS; p++) {
         bst_vec3 d = bst_source_direction(source, field->sigma_time[p]);
@@ -512,8 +520,8 @@ static smear smear_of(const bst_field *field, const bst_source *source) {
  * pixel's own width, widened along and across the way from the first to the last
  * position by what the smear has beyond a uniform straight streak of that length (jitter, bends).
  */
-static void blur(const bst_camera *camera, const smear *m, double dx, double dy, double *along,
-                 double *across) {
+static void blur(const bst_camera *camera, const bst_image_moments *m, double dx, double dy,
+                 double *along, double *across) {
     double psf = bst_camera_psf_sigma_px(camera), sigma;
     if (camera->psf && !bst_psf_gaussian(camera->psf, &sigma) && isfinite(m->x_mean)) {
         psf = bst_psf_equivalent_fwhm_px(camera->psf, m->x_mean, m->y_mean) / 2.3548200450309493;
@@ -564,7 +572,11 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
                             &out->y_end_px);
     (void)bst_camera_project(camera, bst_quat_rotate(field->q_mid, source->apparent_mid),
                              &out->x_mid_px, &out->y_mid_px);
-    smear image = smear_of(field, source);
+    bst_image_moments image =
+        source->rate ? bst_image_by_light(field->camera, track, source) : smear_of(field, source);
+    if (source->shape) {
+        bst_image_add_disc(field->camera, field->q_mid, source, &image);
+    }
     out->x_mean_px = image.x_mean;
     out->y_mean_px = image.y_mean;
     if (isfinite(image.x_mean)) {
@@ -578,7 +590,7 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
     blur(camera, &image, out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px, &along,
          &across);
     if (isfinite(length) && variance > 0.0) {
-        out->snr = out->electrons * sqrt(bst_streak_squared(along, across, length) / variance);
+        out->snr = out->electrons * sqrt(bst_image_squared(along, across, length) / variance);
     }
     if (source->occulted) {
         out->flags |= BST_TRUTH_OCCULTED;

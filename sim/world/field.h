@@ -17,13 +17,36 @@ typedef struct bst_source_path {
                         */
 } bst_source_path;
 
+/* Brightness through an exposure, where it changes (the edge of the Earth's shadow, a light curve,
+ * a near pass): straight between knots. */
+enum { BST_RATE_KNOTS = 129 };
+typedef struct bst_source_rate {
+    int count;                    /* knots, >= 2 */
+    double u[BST_RATE_KNOTS];     /* time as a fraction of the exposure, from 0 to 1, ascending */
+    double rate[BST_RATE_KNOTS];  /* over the mean of the exposure */
+    double light[BST_RATE_KNOTS]; /* share of the exposure's light until then, from 0 to 1 */
+} bst_source_rate;
+
+/* A sphere that is large enough to be drawn as what it is, a disc with a terminator. Its parts are
+ * shares of the light, together 1. */
+typedef struct bst_source_shape {
+    double radius;       /* of the sphere, over its distance at mid-exposure; below 1 */
+    bst_vec3 sun, earth; /* where light comes from: unit, from the sphere, GCRF */
+    double diffuse;      /* sunlight, Lambert's law */
+    double specular;     /* sunlight, mirror ball: a point on the disc */
+    double earthshine;   /* Lambert's law, as if it all came from its middle */
+    double thermal;      /* the same from all of the disc */
+} bst_source_shape;
+
 /* A source that may put light on the window. */
 typedef struct bst_source {
     int32_t kind; /* bst_source_kind */
     uint32_t id;  /* star: Tycho-2 identity, or statistical (bit 31); object: index in the world */
-    bst_vec3 apparent_mid;       /* at mid-exposure, GCRF axes, unit */
-    const bst_source_path *path; /* NULL: at rest; owned by who made the source */
-    double electrons_per_s;      /* detected, at mid exposure */
+    bst_vec3 apparent_mid;         /* at mid-exposure, GCRF axes, unit */
+    const bst_source_path *path;   /* NULL: at rest; owned by who made the source */
+    const bst_source_rate *rate;   /* NULL: constant; owned likewise */
+    const bst_source_shape *shape; /* NULL: a point; owned likewise */
+    double electrons_per_s;        /* detected, mean of the exposure */
     double v_mag;
     double ra_rad, dec_rad; /* as in bst_truth_item */
     double sunlit_fraction, phase_rad, range_m;
@@ -50,6 +73,37 @@ static inline bst_vec3 bst_source_direction(const bst_source *s, double u) {
     shift = bst_vec3_axpy(shift, -0.25 * a * e, p->shift[1]);
     shift = bst_vec3_axpy(shift, 0.125 * a * c, p->shift[2]);
     return bst_vec3_axpy(place, bst_vec3_norm(place), shift);
+}
+
+/* Share of the exposure's light that comes until time u in [0, 1]: what weighs the places of a
+ * source in its image. */
+static inline double bst_source_light(const bst_source *s, double u) {
+    const bst_source_rate *r = s->rate;
+    if (!r) {
+        return u;
+    }
+    int low = 0, high = r->count - 1;
+    while (high - low > 1) {
+        int middle = (low + high) / 2;
+        *(r->u[middle] <= u ? &low : &high) = middle;
+    }
+    double h = r->u[high] - r->u[low], d = u - r->u[low];
+    double slope = h > 0.0 ? (r->rate[high] - r->rate[low]) / h : 0.0;
+    return r->light[low] + d * (r->rate[low] + 0.5 * slope * d);
+}
+
+/* Rate at time u over the mean of the exposure. */
+static inline double bst_source_rate_at(const bst_source *s, double u) {
+    const bst_source_rate *r = s->rate;
+    if (!r) {
+        return 1.0;
+    }
+    int k = 0;
+    while (k + 2 < r->count && r->u[k + 1] < u) {
+        k++;
+    }
+    double h = r->u[k + 1] - r->u[k];
+    return r->rate[k] + (h > 0.0 ? (u - r->u[k]) / h : 0.0) * (r->rate[k + 1] - r->rate[k]);
 }
 
 /* A path whose direction is the quadratic through three (in apparent_mid's unit), for scenes that
@@ -84,6 +138,8 @@ typedef struct bst_field
 bst_status bst_field_create(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
                             bst_field **out) BST_MUST_CHECK;
 void bst_field_free(bst_field *field);
+/* From the next query on another camera than the sensor's; borrowed. */
+void bst_field_set_camera(bst_field *field, const bst_camera *camera);
 
 /* Cuts the samples from start_tick to end_tick out of the ring, interpolating at the ends; held in
  * `field` until the next call. BST_ERR_STATE when the ring no longer (or not yet) covers the

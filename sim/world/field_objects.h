@@ -17,9 +17,39 @@ typedef struct bst_object_query {
     double radius;    /* and half angle, rad */
 } bst_object_query;
 
-/* Makes the source of an object, which keeps `path`. *there false (and nothing to be used) when it
+/* What the light of an object through an exposure follows from. */
+typedef struct bst_path_light {
+    bst_vec3 eye_m[BST_PATH_NODES]; /* the observer at the path's times, geocentric */
+    bst_vec3 lag_m;                 /* at mid-exposure: the object when the light left, from the
+                                       object when it arrives */
+    bst_vec3 sun_m[BST_PATH_NODES]; /* the Sun, likewise */
+    double light_time_s;
+} bst_path_light;
+
+/* How bright the object is at time u in [0, 1] of an exposure from start_s to end_s: fills phase,
+ * sunlit fraction and light of *out. */
+void bst_view_light(const bst_view *view, int object, const bst_source_path *path,
+                    const bst_path_light *light, double start_s, double end_s, double u,
+                    bst_sight *out);
+
+const bst_object_info *bst_view_object(const bst_view *view, int object);
+
+/* Memory of a source for what belongs to it. */
+typedef struct bst_object_parts {
+    bst_source_path path;
+    bst_source_rate rate;
+    bst_source_shape shape;
+} bst_object_parts;
+
+/* Makes the source of an object, which keeps `parts`. *there false (and nothing to be used) when it
  * does not touch the window, has no orbit then, or is the observer itself. */
 bst_status bst_field_object(bst_ctx *ctx, const bst_object_query *query, int object,
-                            bst_source_path *path, bst_source *out, bool *there) BST_MUST_CHECK;
+                            bst_object_parts *parts, bst_source *out, bool *there) BST_MUST_CHECK;
+
+/* Fills a rate by what `at(user, u)` gives, so that straight lines between the knots follow it to
+ * 1e-5 of its maximum where the knots suffice. *mean: mean over the exposure. false, and *mean the
+ * value at the middle, when it hardly changes (by less than 1e-3) or is 0 throughout. */
+bool bst_field_rate(double (*at)(void *user, double u), void *user, bst_source_rate *out,
+                    double *mean);
 
 #endif

@@ -43,6 +43,20 @@ static bst_status reserve(const bst_world_builder *b, int capacity) {
     return bst_name_index_create(b->ctx, capacity, &world->object_names);
 }
 
+/* Owned by the world from then on. */
+static bst_status make_brightness(const bst_world_builder *b, const bst_brightness_config *config,
+                                  const char *list, int index, const bst_brightness **out) {
+    bst_world *world = b->world;
+    bst_brightness *made;
+    bst_status status = bst_brightness_create(b->ctx, config, b->base_dir, &made);
+    if (status != BST_OK) {
+        return bst_fail_prefix(b->ctx, status, "%s: /world/%s/%d/brightness", b->scenario, list,
+                               index);
+    }
+    *out = world->brightness[world->brightness_count++] = made;
+    return BST_OK;
+}
+
 static bst_status build_listed(const bst_world_builder *b, const bst_config_list *list) {
     bst_world *world = b->world;
     const bst_object_config *configs = list->items;
@@ -59,6 +73,7 @@ static bst_status build_listed(const bst_world_builder *b, const bst_config_list
         memcpy(object->info.name, config->name, sizeof object->info.name);
         object->info.area_m2 = config->area_m2;
         object->info.albedo = config->albedo;
+        BST_TRY(make_brightness(b, &config->brightness, "objects", i, &object->info.brightness));
         char path[64];
         snprintf(path, sizeof path, "/world/objects/%d/orbit", i);
         world->object_count = i + 1;
@@ -79,7 +94,8 @@ static void name_object(const bst_world *world, const bst_elements *set, bst_obj
 }
 
 /* Sets that SGP4 cannot start from are left out and counted: a catalogue of thousands has some. */
-static bst_status build_candidates(const bst_world_builder *b, const candidate *list, int count) {
+static bst_status build_candidates(const bst_world_builder *b, const candidate *list, int count,
+                                   int first_brightness) {
     bst_world *world = b->world;
     int unusable = 0, example = 0;
     for (int i = 0; i < count; i++) {
@@ -102,6 +118,7 @@ static bst_status build_candidates(const bst_world_builder *b, const candidate *
         object->info.norad = list[i].set->norad;
         object->info.area_m2 = list[i].catalogue->area_m2;
         object->info.albedo = list[i].catalogue->albedo;
+        object->info.brightness = world->brightness[first_brightness + list[i].catalogue_index];
         bst_name_index_add(world->object_names, object->info.name, world->object_count - 1);
     }
     if (unusable > 0) {
@@ -175,14 +192,27 @@ static bst_status list_candidates(const bst_world_builder *b, const bst_config_l
 static bst_status build_all(const bst_world_builder *b, const bst_world_config *config,
                             const catalogue_sets *loaded, candidate *list, int *listed) {
     BST_TRY(reserve(b, config->objects.count + loaded->total));
+    b->world->brightness =
+        calloc((size_t)config->objects.count + (size_t)config->catalogues.count + 1,
+               sizeof(bst_brightness *));
+    if (!b->world->brightness) {
+        return bst_fail(b->ctx, BST_ERR_MEMORY, "out of memory for %d objects",
+                        config->objects.count);
+    }
     BST_TRY(build_listed(b, &config->objects));
+    int first_brightness = b->world->brightness_count;
+    const bst_catalogue_config *catalogues = config->catalogues.items;
+    for (int i = 0; i < config->catalogues.count; i++) {
+        const bst_brightness *made;
+        BST_TRY(make_brightness(b, &catalogues[i].brightness, "catalogues", i, &made));
+    }
     for (int i = 0; i < b->world->object_count; i++) {
         listed[i] = b->world->objects[i].info.norad;
     }
     qsort(listed, (size_t)b->world->object_count, sizeof *listed, compare_numbers);
     BST_TRY(list_candidates(b, &config->catalogues, loaded, list));
     int count = choose(list, loaded->total, listed, b->world->object_count);
-    return build_candidates(b, list, count);
+    return build_candidates(b, list, count, first_brightness);
 }
 
 bst_status bst_world_build_objects(const bst_world_builder *b, const bst_world_config *config) {

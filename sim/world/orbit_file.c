@@ -52,8 +52,11 @@ static bst_status open_oem(const bst_world_builder *b, const char *object, bst_w
 
 static bst_status open_injected(const bst_world_builder *b, const char *object,
                                 bst_world_file *file, const char *path, bst_orbit *orbit) {
+    size_t length = strlen(path);
+    bool json = length > 5 && strcmp(path + length - 5, ".json") == 0;
     if (!file->injected) {
-        BST_TRY(bst_injected_load(b->ctx, path, b->world->epoch, &file->injected));
+        BST_TRY(json ? bst_world_updates_injected(b, path, &file->injected)
+                     : bst_injected_load(b->ctx, path, b->world->epoch, &file->injected));
     }
     orbit->injected = file->injected;
     BST_TRY(bst_injected_find(b->ctx, orbit->injected, object, &orbit->file_object));

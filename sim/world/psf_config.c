@@ -71,11 +71,13 @@ const bst_config_desc bst_optics_config_table[] = {
              "diffraction: focal ratio, for defocus, and for q where that is 0."),
     BST_REAL(bst_optics_config, pixel_um, "um", 0, 1000, "0",
              "diffraction: pixel pitch, for q where that is 0."),
-    BST_REALS(bst_optics_config, band_nm, "nm", 1, 1e6, "[507, 595]",
-              "diffraction: ends of the band that the PSF is averaged over."),
-    BST_ENUM(bst_optics_config, spectrum, spectra, "\"flat\"",
-             "diffraction: photons per wavelength in the band: equal, or those of a black body of "
-             "5772 K."),
+    BST_REALS(bst_optics_config, band_nm, "nm", 0, 1e6, "[0, 0]",
+              "diffraction: ends of the band that the PSF is averaged over, evenly; both 0: the "
+              "response of camera.band, or 507 to 595 where that has no spectrum."),
+    BST_ENUM(
+        bst_optics_config, spectrum, spectra, "\"flat\"",
+        "diffraction: photons per wavelength in the band, before its response: equal, or those "
+        "of a black body of 5772 K."),
     BST_INT(bst_optics_config, wavelengths, "", 0, 64, "8",
             "diffraction: wavelengths of the average (Gauss-Legendre); 1: the middle of the band "
             "alone."),

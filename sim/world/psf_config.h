@@ -48,7 +48,7 @@ typedef struct bst_optics_config {
     double moffat_beta;         /* 0: 2.5 */
     double q, f_number;         /* 0: from the aperture and the pixel scale */
     double pixel_um;            /* pitch */
-    double band_nm[2];          /* both 0: 507 and 595 */
+    double band_nm[2];          /* both 0: the camera's spectrum, else 507 and 595 */
     int32_t spectrum;           /* BST_SPECTRUM_... */
     int64_t wavelengths;        /* of the band's quadrature; 0: 8 */
     double central_obstruction; /* diameter over that of the aperture; 0: sqrt(obscuration) */

@@ -42,12 +42,27 @@ static void gauss_legendre(int n, double *place, double *weight) {
     }
 }
 
-/* Photons per wavelength of a black body of the Sun's effective temperature, 5772 K (IAU 2015
- * resolution B3), at any scale: Planck's law over the photon's energy. */
-static double solar_photons(double wavelength_m) {
-    const double second_radiation_constant_m_k = 1.438776877e-2;
-    return pow(1e6 * wavelength_m, -4.0) /
-           expm1(second_radiation_constant_m_k / (wavelength_m * 5772.0));
+/* The Sun's effective temperature, K (IAU 2015 resolution B3). */
+#define SUN_K 5772.0
+
+/* Wavelengths, m, between which a camera's band has more than a thousandth of its largest response.
+ */
+static void find_range(const bst_band *spectrum, double *from_m, double *to_m) {
+    enum { STEPS = 2000 };
+    double ratio = pow(40e-6 / 0.1e-6, 1.0 / STEPS), most = 0.0;
+    for (int pass = 0; pass < 2; pass++) {
+        double wavelength_m = 0.1e-6;
+        *from_m = *to_m = 0.0;
+        for (int k = 0; k <= STEPS; k++, wavelength_m *= ratio) {
+            double response = bst_band_response(spectrum, wavelength_m);
+            if (pass == 0) {
+                most = fmax(most, response);
+            } else if (response > 1e-3 * most) {
+                *from_m = *from_m > 0.0 ? *from_m : wavelength_m / ratio;
+                *to_m = wavelength_m * ratio;
+            }
+        }
+    }
 }
 
 static bst_status make_band(bst_ctx *ctx, const bst_camera *camera,
@@ -56,6 +71,10 @@ static bst_status make_band(bst_ctx *ctx, const bst_camera *camera,
     bool given = o->band_nm[1] > 0.0;
     double from_m = 1e-9 * (given ? o->band_nm[0] : 507.0);
     double to_m = 1e-9 * (given ? o->band_nm[1] : 595.0), middle_m;
+    const bst_band *response = given ? NULL : camera->spectrum;
+    if (response) {
+        find_range(response, &from_m, &to_m);
+    }
     if (spectrum) {
         if (spectrum->count < 1 || spectrum->count > MOST_WAVELENGTHS) {
             return bst_fail(ctx, BST_ERR_CONFIG,
@@ -77,8 +96,11 @@ static bst_status make_band(bst_ctx *ctx, const bst_camera *camera,
         gauss_legendre(b->count, b->wavelength_m, b->weight);
         for (int k = 0; k < b->count; k++) {
             b->wavelength_m[k] = from_m + b->wavelength_m[k] * (to_m - from_m);
+            double photons = o->spectrum == BST_SPECTRUM_SOLAR
+                                 ? bst_planck_photons(b->wavelength_m[k], SUN_K)
+                                 : 1.0;
             b->weight[k] *=
-                o->spectrum == BST_SPECTRUM_SOLAR ? solar_photons(b->wavelength_m[k]) : 1.0;
+                photons * (response ? bst_band_response(response, b->wavelength_m[k]) : 1.0);
         }
         middle_m = 0.5 * (from_m + to_m);
     }

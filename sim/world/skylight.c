@@ -87,13 +87,17 @@ bst_status bst_skylight_create(bst_ctx *ctx, const bst_world *world, const bst_c
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the background");
     }
     b->world = world;
+    bst_skylight_set_camera(b, camera);
+    *out = b;
+    return BST_OK;
+}
+
+void bst_skylight_set_camera(bst_skylight *b, const bst_camera *camera) {
     b->camera = camera;
     b->step = MOST_STEP_PX;
     while (b->step > 1 && b->step * bst_camera_scale_rad(camera) > MOST_STEP_RAD) {
         b->step /= 2;
     }
-    *out = b;
-    return BST_OK;
 }
 
 void bst_skylight_free(bst_skylight *b) {

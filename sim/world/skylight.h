@@ -32,6 +32,8 @@ typedef struct bst_skylight bst_skylight;
 bst_status bst_skylight_create(bst_ctx *ctx, const bst_world *world, const bst_camera *camera,
                                bst_skylight **out) BST_MUST_CHECK;
 void bst_skylight_free(bst_skylight *skylight); /* NULL allowed */
+/* From the next map on another camera with the same background, at another scale; borrowed. */
+void bst_skylight_set_camera(bst_skylight *skylight, const bst_camera *camera);
 
 /* Makes the map of one exposure for a window. The nodes are 32 px apart, closer where that is more
  * than 0.3 degrees, and 1 px where the edge of a disc or of the vignetting is anywhere on the

@@ -1,7 +1,7 @@
 #include <stdlib.h>
 
 #include "sim/world/ephemeris.h"
-#include "sim/world/field.h"
+#include "sim/world/field_objects.h"
 
 /* An observer at an instant, as all objects in a frame need it. */
 typedef struct eye {
@@ -161,17 +161,29 @@ static bst_status look(bst_ctx *ctx, bst_view *view, const eye *e, int object, f
     return BST_OK;
 }
 
-/* How bright the object is, and whether the Earth hides it. */
+/* How bright an object is that the light left at `emitted_m` and is seen from `eye_m`. */
+static void shine_at(const bst_world *world, int object, bst_vec3 emitted_m, bst_vec3 eye_m,
+                     bst_vec3 sun_m, double seconds, bst_sight *out) {
+    const bst_object_info *info = &world->objects[object].info;
+    bst_vec3 to_eye = bst_vec3_sub(eye_m, emitted_m), to_sun = bst_vec3_sub(sun_m, emitted_m);
+    out->phase_rad = bst_vec3_angle(to_eye, to_sun);
+    out->sunlit_fraction = bst_sun_fraction(emitted_m, sun_m);
+    bst_lighting lighting = {.area_m2 = info->area_m2,
+                             .albedo = info->albedo,
+                             .object_m = emitted_m,
+                             .eye_m = eye_m,
+                             .sun_m = sun_m,
+                             .seconds = seconds,
+                             .sunlit_fraction = out->sunlit_fraction};
+    bst_brightness_at(info->brightness, &lighting, &out->glow);
+    out->v_mag = out->glow.v_mag;
+}
+
+/* The same of a sight, and whether the Earth hides it. */
 static void shine(const bst_view *view, const eye *e, int object, bst_vec3 emitted_m,
                   bst_sight *out) {
-    bst_vec3 to_eye = bst_vec3_sub(e->state.position_m, emitted_m);
-    bst_vec3 to_sun = bst_vec3_sub(e->sky.bodies.sun_m, emitted_m);
-    out->phase_rad = bst_vec3_angle(to_eye, to_sun);
-    out->sunlit_fraction = bst_sun_fraction(emitted_m, e->sky.bodies.sun_m);
-    const bst_object_info *info = &view->world->objects[object].info;
-    double full = bst_lambert_sphere_v_mag(info->area_m2, info->albedo, out->phase_rad,
-                                           out->range_m, bst_vec3_norm(to_sun));
-    out->v_mag = out->sunlit_fraction > 0.0 ? full - 2.5 * log10(out->sunlit_fraction) : INFINITY;
+    shine_at(view->world, object, emitted_m, e->state.position_m, e->sky.bodies.sun_m,
+             e->seconds - out->light_time_s, out);
     out->occulted =
         bst_earth_occults(e->state.position_m, emitted_m, &e->sky.frames.itrf_from_gcrf);
 }
@@ -198,12 +210,15 @@ bst_status bst_view_sight(bst_ctx *ctx, bst_view *view, int observer, int object
 }
 
 static bst_status path_from(bst_ctx *ctx, bst_view *view, const eye *const eyes[BST_PATH_NODES],
-                            int object, from source, bst_source_path *path, bst_sight *mid) {
+                            int object, from source, bst_source_path *path, bst_path_light *light,
+                            bst_sight *mid) {
     for (int i = 0; i < BST_PATH_NODES; i++) {
         const eye *e = eyes[i];
         bst_vec3 now, velocity, emitted;
         BST_TRY(place_of(ctx, view, object, e->seconds, source, &now, &velocity));
         path->place[i] = bst_vec3_sub(now, e->state.position_m);
+        light->eye_m[i] = e->state.position_m;
+        light->sun_m[i] = e->sky.bodies.sun_m;
         if (i % 2 != 0) {
             continue;
         }
@@ -217,18 +232,21 @@ static bst_status path_from(bst_ctx *ctx, bst_view *view, const eye *const eyes[
         if (i == BST_PATH_NODES / 2) {
             shine(view, e, object, emitted, &sight);
             *mid = sight;
+            light->lag_m = bst_vec3_sub(emitted, now);
+            light->light_time_s = sight.light_time_s;
         }
     }
     return BST_OK;
 }
 
 bst_status bst_view_path(bst_ctx *ctx, bst_view *view, int observer, int object, double start_s,
-                         double end_s, bst_source_path *path, bst_sight *mid) {
+                         double end_s, bst_source_path *path, bst_path_light *light,
+                         bst_sight *mid) {
     const eye *eyes[BST_PATH_NODES];
     for (int i = 0; i < BST_PATH_NODES; i++) {
         BST_TRY(known_eye(ctx, view, observer, node_time(start_s, end_s, i), i, &eyes[i]));
     }
-    BST_TRY(path_from(ctx, view, eyes, object, FROM_EPHEMERIS, path, mid));
+    BST_TRY(path_from(ctx, view, eyes, object, FROM_EPHEMERIS, path, light, mid));
     double nearest = INFINITY;
     for (int i = 0; i < BST_PATH_NODES; i++) {
         nearest = fmin(nearest, bst_vec3_norm(path->place[i]));
@@ -239,9 +257,31 @@ bst_status bst_view_path(bst_ctx *ctx, bst_view *view, int observer, int object,
             BST_TRY(eye_at(ctx, view, observer, eyes[i]->seconds, FROM_ORBIT, &direct[i]));
             eyes[i] = &direct[i];
         }
-        BST_TRY(path_from(ctx, view, eyes, object, FROM_ORBIT, path, mid));
+        BST_TRY(path_from(ctx, view, eyes, object, FROM_ORBIT, path, light, mid));
     }
     return BST_OK;
+}
+
+/* The quartic through five places. */
+static bst_vec3 quartic(const bst_vec3 place[BST_PATH_NODES], double u) {
+    bst_vec3 sum = {0};
+    for (int k = 0; k < BST_PATH_NODES; k++) {
+        double w = 1.0;
+        for (int m = 0; m < BST_PATH_NODES; m++) {
+            w *= m == k ? 1.0 : (u * (BST_PATH_NODES - 1) - m) / (k - m);
+        }
+        sum = bst_vec3_axpy(sum, w, place[k]);
+    }
+    return sum;
+}
+
+void bst_view_light(const bst_view *view, int object, const bst_source_path *path,
+                    const bst_path_light *light, double start_s, double end_s, double u,
+                    bst_sight *out) {
+    bst_vec3 eye_m = quartic(light->eye_m, u);
+    bst_vec3 emitted_m = bst_vec3_add(bst_vec3_add(eye_m, quartic(path->place, u)), light->lag_m);
+    double seconds = start_s + u * (end_s - start_s) - light->light_time_s;
+    shine_at(view->world, object, emitted_m, eye_m, quartic(light->sun_m, u), seconds, out);
 }
 
 bst_status bst_view_near(bst_ctx *ctx, bst_view *view, int observer, double start_s, double end_s,
@@ -260,4 +300,8 @@ bst_status bst_view_near(bst_ctx *ctx, bst_view *view, int observer, double star
     *count = bst_ephemeris_near(view->world->ephemeris, node_time(start_s, end_s, middle), &cone,
                                 indices);
     return BST_OK;
+}
+
+const bst_object_info *bst_view_object(const bst_view *view, int object) {
+    return bst_world_object(view->world, object);
 }

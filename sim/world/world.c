@@ -16,6 +16,48 @@ static bst_status open_stars(const bst_world_builder *b, const char *name, const
                             : bst_fail_prefix(b->ctx, status, "%s: %s", b->scenario, where);
 }
 
+/* A copy of its own of the list that describes the camera's field. */
+static bst_status copy_field(const bst_world_builder *b, bst_camera *camera) {
+    bst_config_list *field = &camera->optics.field;
+    const void *given = field->items;
+    field->items = NULL;
+    if (field->count > 0) {
+        size_t bytes = (size_t)field->count * sizeof(bst_psf_field_node);
+        field->items = malloc(bytes);
+        if (!field->items) {
+            return bst_fail(b->ctx, BST_ERR_MEMORY, "out of memory for a camera's field");
+        }
+        memcpy(field->items, given, bytes);
+    }
+    return BST_OK;
+}
+
+/* The PSF of a sensor's camera; that of a file is made once the file's samples are there. */
+static bst_status make_psf(const bst_world_builder *b, bst_camera *camera, int observer,
+                           int sensor) {
+    camera->psf = NULL;
+    if (camera->optics.psf == BST_PSF_FILE) {
+        return BST_OK;
+    }
+    bst_psf *psf;
+    bst_status status = bst_psf_create(b->ctx, camera, &psf);
+    camera->psf = psf;
+    return status == BST_OK ? BST_OK
+                            : bst_fail_prefix(b->ctx, status, "%s: /observers/%d/sensors/%d/camera",
+                                              b->scenario, observer, sensor);
+}
+
+bst_status bst_world_set_psf(bst_ctx *ctx, bst_world *world, int observer, int sensor,
+                             const bst_psf_samples *samples) {
+    bst_camera *camera = &world->observers[observer].sensors[sensor].config.camera;
+    const bst_psf_inputs inputs = {.samples = samples};
+    bst_psf *psf;
+    BST_TRY(bst_psf_create_from(ctx, camera, &inputs, &psf));
+    bst_psf_free((bst_psf *)camera->psf);
+    camera->psf = psf;
+    return BST_OK;
+}
+
 static bst_status make_spectrum(const bst_world_builder *b, bst_camera *camera, int observer,
                                 int sensor) {
     bst_band *band;
@@ -45,44 +87,6 @@ static bst_status make_pst(const bst_world_builder *b, bst_camera *camera, int o
     return BST_OK;
 }
 
-/* The PSF of a sensor's camera, and a copy of its own of the list that describes the field. That of
- * a file is made once the file's samples are there. */
-static bst_status make_psf(const bst_world_builder *b, bst_camera *camera, int observer,
-                           int sensor) {
-    bst_config_list *field = &camera->optics.field;
-    const void *given = field->items;
-    field->items = NULL;
-    if (field->count > 0) {
-        size_t bytes = (size_t)field->count * sizeof(bst_psf_field_node);
-        field->items = malloc(bytes);
-        if (!field->items) {
-            return bst_fail(b->ctx, BST_ERR_MEMORY, "out of memory for a camera's field");
-        }
-        memcpy(field->items, given, bytes);
-    }
-    camera->psf = NULL;
-    if (camera->optics.psf == BST_PSF_FILE) {
-        return BST_OK;
-    }
-    bst_psf *psf;
-    bst_status status = bst_psf_create(b->ctx, camera, &psf);
-    camera->psf = psf;
-    return status == BST_OK ? BST_OK
-                            : bst_fail_prefix(b->ctx, status, "%s: /observers/%d/sensors/%d/camera",
-                                              b->scenario, observer, sensor);
-}
-
-bst_status bst_world_set_psf(bst_ctx *ctx, bst_world *world, int observer, int sensor,
-                             const bst_psf_samples *samples) {
-    bst_camera *camera = &world->observers[observer].sensors[sensor].config.camera;
-    const bst_psf_inputs inputs = {.samples = samples};
-    bst_psf *psf;
-    BST_TRY(bst_psf_create_from(ctx, camera, &inputs, &psf));
-    bst_psf_free((bst_psf *)camera->psf);
-    camera->psf = psf;
-    return BST_OK;
-}
-
 static bst_status make_observers(const bst_world_builder *b, const bst_config_list *list) {
     bst_world *world = b->world;
     world->observers = calloc((size_t)list->count + 1, sizeof *world->observers);
@@ -106,7 +110,7 @@ static bst_status make_observers(const bst_world_builder *b, const bst_config_li
         }
         for (int s = 0; s < config->sensors.count; s++) {
             observer->sensors[s].config = ((const bst_sensor_config *)config->sensors.items)[s];
-            BST_TRY(make_psf(b, &observer->sensors[s].config.camera, i, s));
+            BST_TRY(copy_field(b, &observer->sensors[s].config.camera));
             bst_status status = bst_camera_prepare(b->ctx, &observer->sensors[s].config.camera);
             if (status != BST_OK) {
                 return bst_fail_prefix(b->ctx, status,
@@ -115,6 +119,7 @@ static bst_status make_observers(const bst_world_builder *b, const bst_config_li
             }
             BST_TRY(make_spectrum(b, &observer->sensors[s].config.camera, i, s));
             BST_TRY(make_pst(b, &observer->sensors[s].config.camera, i, s));
+            BST_TRY(make_psf(b, &observer->sensors[s].config.camera, i, s));
         }
     }
     return BST_OK;
@@ -157,6 +162,7 @@ static bst_status build(bst_world_builder *b, const bst_world_config *config,
         BST_TRY(bst_faint_sky_create(b->ctx, world->stars, config->faint_seed, &world->faint));
     }
     BST_TRY(bst_sky_clock_create(b->ctx, world->eop, &b->clock));
+    BST_TRY(bst_world_load_updates(b, observers));
     BST_TRY(bst_world_build_objects(b, config));
     BST_TRY(make_observers(b, observers));
     for (int i = 0; i < world->observer_count; i++) {
@@ -207,7 +213,12 @@ void bst_world_free(bst_world *world) {
         }
         free(observer->sensors);
     }
+    for (int i = 0; i < world->brightness_count; i++) {
+        bst_brightness_free(world->brightness[i]);
+    }
+    free(world->brightness);
     bst_world_files_free(world);
+    bst_world_updates_free(world);
     bst_name_index_free(world->object_names);
     free(world->objects);
     free(world->observers);
@@ -246,6 +257,10 @@ int bst_world_find_object(const bst_world *world, const char *name) {
 
 const bst_camera *bst_world_camera(const bst_world *world, int observer, int sensor) {
     return &world->observers[observer].sensors[sensor].config.camera;
+}
+
+const bst_exposure_config *bst_world_exposure(const bst_world *world, int observer, int sensor) {
+    return &world->observers[observer].sensors[sensor].config.exposure;
 }
 
 bst_quat bst_world_body_attitude(const bst_world *world, int observer, int sensor) {

@@ -5,6 +5,7 @@
 
 #include "sim/astro/bodies.h"
 #include "sim/core/config.h"
+#include "sim/world/brightness.h"
 #include "sim/world/camera.h"
 #include "sim/world/stars.h"
 
@@ -18,7 +19,8 @@ typedef struct bst_object_info {
     char name[64];
     int norad;      /* 0: none */
     double area_m2; /* cross-section of the sphere */
-    double albedo;  /* diffuse (Lambertian) */
+    double albedo;  /* of the sphere */
+    const bst_brightness *brightness;
 } bst_object_info;
 
 /* Geocentric state in GCRF. */
@@ -39,9 +41,18 @@ const char *bst_world_observer_name(const bst_world *world, int observer);
 /* The sensor's true camera. */
 const bst_camera *bst_world_camera(const bst_world *world, int observer, int sensor);
 
+struct bst_frame_updates;
+/* The file that drives the sensor frame by frame (sim/world/frame_updates.h); NULL: none. */
+const struct bst_frame_updates *bst_world_frame_updates(const bst_world *world, int observer,
+                                                        int sensor);
+struct bst_exposure_config;
+/* The sensor's exposure settings as the scenario has them. */
+const struct bst_exposure_config *bst_world_exposure(const bst_world *world, int observer,
+                                                     int sensor);
+
 /* Body attitude that the spacecraft starts in and holds: +z towards the cue at the epoch as the
- * onboard side reckons it, with all its errors, +x as near as can be to the sensor's x_axis_gcrf. The camera has these axes when both
- * gimbal angles are zero. */
+ * onboard side reckons it, with all its errors, +x as near as can be to the sensor's x_axis_gcrf.
+ * The camera has these axes when both gimbal angles are zero. */
 bst_quat bst_world_body_attitude(const bst_world *world, int observer, int sensor);
 
 bst_status bst_view_create(bst_ctx *ctx, const bst_world *world, bst_view **out) BST_MUST_CHECK;
@@ -72,7 +83,8 @@ typedef struct bst_sight {
     double light_time_s;    /* barycentric: length of the light's path over c */
     double phase_rad;       /* Sun - object - observer */
     double sunlit_fraction; /* of the Sun's disc, 0..1 */
-    double v_mag;           /* Lambertian sphere times sunlit fraction; +INFINITY when dark */
+    double v_mag;           /* of reflected light; +INFINITY when dark */
+    bst_glow glow;          /* all its light */
     bool occulted;          /* behind the Earth */
 } bst_sight;
 bst_status bst_view_sight(bst_ctx *ctx, bst_view *view, int observer, int object, double seconds,

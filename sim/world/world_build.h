@@ -35,6 +35,15 @@ bst_status bst_orbit_build_sgp4(const bst_world_builder *b, const bst_elements *
 bst_status bst_orbit_build_file(const bst_world_builder *b, const bst_orbit_config *config,
                                 const char *path, bst_orbit *orbit) BST_MUST_CHECK;
 
+/* Reads the files that drive sensors frame by frame. */
+bst_status bst_world_load_updates(const bst_world_builder *b,
+                                  const bst_config_list *observers) BST_MUST_CHECK;
+void bst_world_updates_free(bst_world *world);
+/* The objects of a frame_updates_file as injected states, at the times of the frames of the first
+ * sensor that the file drives. */
+bst_status bst_world_updates_injected(const bst_world_builder *b, const char *path,
+                                      bst_injected **out) BST_MUST_CHECK;
+
 /* Closes the files that orbits came from. */
 void bst_world_files_free(bst_world *world);
 /* Makes a numerical orbit; called by bst_orbit_build, arguments as there. */

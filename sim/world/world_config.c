@@ -32,7 +32,7 @@ static const bst_config_desc orbit_table[] = {
                "oem: OBJECT_NAME or OBJECT_ID in that file; empty: its only object."),
     BST_PATH(bst_orbit_config, states_file, "\"\"",
              "injected: CSV file of states at the start and end of each frame, relative to the "
-             "scenario's folder."),
+             "scenario's folder; or a sensor's frame_updates_file (.json)."),
     BST_STRING(bst_orbit_config, states_object, "\"\"",
                "injected: the object in that file; empty: its only one."),
     BST_ENUM(bst_orbit_config, states_frame, states_frames, "\"gcrf\"",
@@ -60,8 +60,9 @@ static const bst_config_desc object_table[] = {
     BST_OBJECT(bst_object_config, orbit, orbit_table, NULL, "The object's orbit."),
     BST_REAL(bst_object_config, area_m2, "m2", 0, 1e6, "4",
              "Cross-section of the sphere that stands for it."),
-    BST_REAL(bst_object_config, albedo, "", 0, 1, "0.25",
-             "Diffuse albedo of the sphere; 0 makes it dark."),
+    BST_REAL(bst_object_config, albedo, "", 0, 1, "0.25", "Albedo of the sphere; 0 makes it dark."),
+    BST_OBJECT(bst_object_config, brightness, bst_brightness_config_table, "{}",
+               "How its light follows from where it is; left out: a diffuse sphere."),
     BST_LIST(bst_object_config, burns, bst_burn_config, burn_table, 0, 64, "[]",
              "Burns in the order of time. The cue does not know of them."),
     BST_CONFIG_END,
@@ -74,7 +75,9 @@ static const bst_config_desc catalogue_table[] = {
         "an object, but for those that the list of objects has by number."),
     BST_REAL(bst_catalogue_config, area_m2, "m2", 0, 1e6, "4",
              "Cross-section of the sphere that stands for each."),
-    BST_REAL(bst_catalogue_config, albedo, "", 0, 1, "0.25", "Diffuse albedo of the sphere."),
+    BST_REAL(bst_catalogue_config, albedo, "", 0, 1, "0.25", "Albedo of the sphere."),
+    BST_OBJECT(bst_catalogue_config, brightness, bst_brightness_config_table, "{}",
+               "How the light of each follows from where it is."),
     BST_CONFIG_END,
 };
 
@@ -110,6 +113,9 @@ static const bst_config_desc exposure_table[] = {
     BST_REAL(bst_exposure_config, first_s, "s", 0, 1e9, "0", "Start of the first exposure."),
     BST_REAL(bst_exposure_config, dropped_fraction, "", 0, 1, "0",
              "Fraction of the frames that are lost between sensor and processing, at random."),
+    BST_INT(bst_exposure_config, binning, "px", 1, 8, "1",
+            "Sensor pixels per side of a frame's pixel, added before they are read; control may ask "
+            "for another."),
     BST_CONFIG_END,
 };
 
@@ -190,6 +196,9 @@ static const bst_config_desc knowledge_table[] = {
 
 const bst_config_desc bst_sensor_config_table[] = {
     BST_STRING(bst_sensor_config, name, "\"camera\"", "Name, unique on its observer."),
+    BST_PATH(bst_sensor_config, frame_updates_file, "\"\"",
+             "JSON file that drives the sensor frame by frame (docs/interfaces.md, \"Frame "
+             "updates\"), relative to the scenario's folder; empty: none."),
     BST_OBJECT(bst_sensor_config, camera, bst_camera_config, NULL, "Optics and detector."),
     BST_REALS(
         bst_sensor_config, x_axis_gcrf, "", -1, 1, "[0, 0, 1]",

@@ -4,6 +4,7 @@
 
 #include "sim/astro/time.h"
 #include "sim/core/config.h"
+#include "sim/world/brightness_config.h"
 #include "sim/world/camera.h"
 
 enum { BST_ORBIT_SGP4, BST_ORBIT_RELATIVE, BST_ORBIT_OEM, BST_ORBIT_INJECTED, BST_ORBIT_NUMERICAL };
@@ -62,12 +63,14 @@ typedef struct bst_object_config {
     char name[64];
     bst_orbit_config orbit;
     double area_m2, albedo;
+    bst_brightness_config brightness;
     bst_config_list burns; /* bst_burn_config, by time */
 } bst_object_config;
 
 typedef struct bst_catalogue_config {
     char elements_file[512]; /* path as above */
     double area_m2, albedo;  /* of every object */
+    bst_brightness_config brightness;
 } bst_catalogue_config;
 
 enum { BST_FAINT_NONE, BST_FAINT_STATISTICAL };
@@ -94,6 +97,7 @@ typedef struct bst_cue_config {
 typedef struct bst_exposure_config {
     double exposure_s, period_s, first_s;
     double dropped_fraction;
+    int64_t binning; /* sensor pixels per side of a pixel that is read */
 } bst_exposure_config;
 
 /* Errors of the onboard star catalogue; a star's fate follows from its identity and the seed. */
@@ -128,6 +132,7 @@ typedef struct bst_knowledge_config {
 
 typedef struct bst_sensor_config {
     char name[64];
+    char frame_updates_file[512]; /* path as above; "": none */
     bst_camera camera;
     double x_axis_gcrf[3];
     bst_exposure_config exposure;

@@ -73,6 +73,16 @@ typedef struct bst_world_file {
     bst_injected *injected;
 } bst_world_file;
 
+struct bst_frame_updates;
+
+/* The file that drives a sensor frame by frame. */
+typedef struct world_updates {
+    int observer, sensor;
+    bst_camera camera;
+    bst_exposure_config exposure;
+    struct bst_frame_updates *file;
+} world_updates;
+
 struct bst_world {
     bst_time epoch;
     bst_eop *eop;
@@ -81,9 +91,13 @@ struct bst_world {
     double faint_limit_v_mag; /* single statistical stars down to this; -INFINITY: none */
     world_object *objects;
     int object_count;
+    bst_brightness **brightness; /* of the listed objects, then of the catalogues */
+    int brightness_count;
     bst_name_index *object_names;
     bst_world_file *files;
     int file_count;
+    world_updates *updates;
+    int updates_count;
     world_observer *observers;
     int observer_count;
     struct bst_ephemeris *ephemeris;
@@ -126,10 +140,13 @@ bst_status bst_orbit_line_of_sight(bst_ctx *ctx, const bst_orbit *object, const 
                                    bst_state *object_state, double *emission_s) BST_MUST_CHECK;
 
 struct bst_source_path;
-/* The path of an object as an observer sees it from start_s to end_s, and the sight at the middle.
+struct bst_path_light;
+/* The path of an object as an observer sees it from start_s to end_s, the sight at the middle, and
+ * what its light follows from.
  * BST_ERR_NUMERIC when either has no orbit at some time of it. */
 bst_status bst_view_path(bst_ctx *ctx, bst_view *view, int observer, int object, double start_s,
-                         double end_s, struct bst_source_path *path, bst_sight *mid) BST_MUST_CHECK;
+                         double end_s, struct bst_source_path *path, struct bst_path_light *light,
+                         bst_sight *mid) BST_MUST_CHECK;
 
 /* Indices (ascending) of the objects that may be seen in a cone of apparent directions at any time
  * from start_s to end_s, and few others; room for all. */

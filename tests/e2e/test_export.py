@@ -7,6 +7,7 @@ import csv
 import datetime
 import hashlib
 import json
+import math
 import os
 import shutil
 import signal
@@ -15,9 +16,9 @@ import struct
 import subprocess
 import sys
 import unittest
-import zlib
 
 import runs
+from readers import read_boxes, read_oem, read_png, read_tdm, seconds
 
 UTC_COLUMNS = {"mid_s", "time_s", "start_s"}
 
@@ -32,105 +33,6 @@ def export(*words, **options):
     if (result.returncode, result.stderr) != (0, ""):
         raise AssertionError(f"exit code {result.returncode}: {result.stderr}")
     return result.stdout
-
-
-def read_png(path):
-    """Width, height and rows of RGB or grey bytes of a PNG of 8 bits (ISO 15948)."""
-    with open(path, "rb") as file:
-        data = file.read()
-    assert data[:8] == b"\x89PNG\r\n\x1a\n"
-    at, body = 8, b""
-    while at < len(data):
-        size, kind = struct.unpack(">I4s", data[at:at + 8])
-        part = data[at + 8:at + 8 + size]
-        assert zlib.crc32(kind + part) == struct.unpack(">I", data[at + 8 + size:at + 12 + size])[0]
-        if kind == b"IHDR":
-            width, height, depth, colour = struct.unpack(">IIBB", part[:10])
-            assert (depth, colour) in ((8, 2), (8, 0)), (depth, colour)
-        body += part if kind == b"IDAT" else b""
-        at += 12 + size
-    assert kind == b"IEND"
-    return width, height, unfilter(zlib.decompress(body), width, height, 3 if colour == 2 else 1)
-
-
-def unfilter(data, width, height, channels):
-    rows, above = [], bytearray(width * channels)
-    stride = width * channels
-    for y in range(height):
-        how = data[y * (stride + 1)]
-        row = bytearray(data[y * (stride + 1) + 1:(y + 1) * (stride + 1)])
-        for i in range(stride if how else 0):
-            left = row[i - channels] if i >= channels else 0
-            corner = above[i - channels] if i >= channels else 0
-            guess = left + above[i] - corner
-            paeth = min((left, above[i], corner), key=lambda v: abs(guess - v))
-            row[i] = (row[i] + [0, left, above[i], (left + above[i]) // 2, paeth][how]) & 255
-        rows.append(row)
-        above = row
-    return rows
-
-
-def read_boxes(data):
-    """The boxes of an ISO base media file, one after another."""
-    at, out = 0, {}
-    while at < len(data):
-        size, kind = struct.unpack(">I4s", data[at:at + 8])
-        assert 8 <= size <= len(data) - at, (size, kind)
-        out[kind.decode()] = data[at + 8:at + size]
-        at += size
-    return out
-
-
-def read_oem(path):
-    """Segments of an OEM: (metadata, [(utc, [x y z vx vy vz] in km and km/s)])."""
-    segments, meta, inside = [], None, False
-    with open(path, encoding="ascii") as file:
-        lines = file.read().splitlines()
-    assert lines[0] == "CCSDS_OEM_VERS = 2.0"
-    for line in lines[1:]:
-        if line == "META_START":
-            meta, inside = {}, True
-            segments.append((meta, []))
-        elif line == "META_STOP":
-            inside = False
-        elif inside and "=" in line:
-            key, value = line.split("=", 1)
-            meta[key.strip()] = value.strip()
-        elif line and line[0].isdigit():
-            words = line.split()
-            segments[-1][1].append((words[0], [float(w) for w in words[1:]]))
-    return segments
-
-
-def read_tdm(path):
-    """Segments of a TDM: (metadata with its comments, {keyword: [(utc, value)]})."""
-    segments, place = [], None
-    with open(path, encoding="ascii") as file:
-        lines = file.read().splitlines()
-    assert lines[0] == "CCSDS_TDM_VERS = 2.0"
-    for line in lines[1:]:
-        if line in ("META_START", "DATA_START"):
-            place = line
-            if line == "META_START":
-                segments.append(({"COMMENT": []}, {}))
-        elif line in ("META_STOP", "DATA_STOP"):
-            place = None
-        elif place == "META_START" and line.startswith("COMMENT "):
-            segments[-1][0]["COMMENT"].append(line[8:])
-        elif place and "=" in line:
-            key, value = (part.strip() for part in line.split("=", 1))
-            if place == "META_START":
-                segments[-1][0][key] = value
-            else:
-                utc, number = value.split()
-                segments[-1][1].setdefault(key, []).append((utc, float(number)))
-    return segments
-
-
-def seconds(utc, epoch):
-    """Seconds from one UTC text to another; the runs here meet no leap second."""
-    parse = lambda text: datetime.datetime.fromisoformat(text.rstrip("Z")[:26])  # noqa: E731
-    return (parse(utc) - parse(epoch)).total_seconds()
 
 
 class Exported(unittest.TestCase):
@@ -261,9 +163,10 @@ class Exported(unittest.TestCase):
             packets = json.load(file)
         self.assertEqual((packets[0]["id"], packets[0]["version"]), ("document", "1.0"))
         segments = read_oem(out + "/orbits.oem")
-        self.assertEqual([p["name"] for p in packets[1:]], ["neossat", "INMARSAT GX5"])
-        self.assertEqual(len({p["id"] for p in packets}), 3)
-        for packet, (_, rows) in zip(packets[1:], segments, strict=True):
+        self.assertEqual([p["name"] for p in packets[1:3]], ["neossat", "INMARSAT GX5"])
+        self.assertEqual(len({p["id"] for p in packets}), len(packets))
+        self.check_view({p["id"]: p for p in packets[3:]})
+        for packet, (_, rows) in zip(packets[1:3], segments, strict=True):
             position = packet["position"]
             self.assertEqual(position["referenceFrame"], "INERTIAL")
             numbers = position["cartesian"]
@@ -274,6 +177,63 @@ class Exported(unittest.TestCase):
                                        seconds(utc, self.epoch), delta=1e-6)
                 for k in range(3):
                     self.assertAlmostEqual(place[k], state[k] * 1e3, delta=1e-4)  # 0.1 mm written
+
+    def check_view(self, packets):
+        """The frustum's lines meet the corners of the field, in the attitudes of the exposures."""
+        name = "view/neossat/telescope"
+        points = {}
+        for key in ("eye", "1", "2", "3", "4"):
+            numbers = packets[f"{name}/{key}"]["position"]["cartesian"]
+            points[key] = [numbers[i + 1:i + 4] for i in range(0, len(numbers), 4)]
+        self.assertEqual(set(packets), {name} | {f"{name}/{key}" for key in points})
+        ends = packets[name]["polyline"]["positions"]["references"]
+        self.assertEqual({end.split("#")[0] for end in ends}, set(packets) - {name})
+        rows = self.database.execute("SELECT * FROM exposures ORDER BY exposure_id").fetchall()
+        self.assertEqual(len(rows), len(points["eye"]))
+        for i, row in enumerate(rows):
+            rays = []
+            for key in "1234":
+                ray = [a - b for a, b in zip(points[key][i], points["eye"][i], strict=True)]
+                length = math.hypot(*ray)
+                rays.append([r / length for r in ray])
+            middle = [sum(r[k] for r in rays) for k in range(3)]
+            middle = [m / math.hypot(*middle) for m in middle]
+            x, y, z, w = (row[f"q_cam_from_gcrf_mid_{c}"] for c in "xyzw")
+            look = [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]
+            # places are written to 0.1 mm of 1000 km or more
+            self.assertLess(math.dist(middle, look), 1e-9)
+            # across the corners: 1024 px of 3 arcsec, tangent plane
+            half = 512 * math.radians(3 / 3600) * math.sqrt(2)
+            self.assertAlmostEqual(math.dist(rays[0], rays[2]) / 2, math.sin(math.atan(half)),
+                                   delta=1e-7)
+
+    def test_segments_meet_at_burns(self):
+        """An OEM's reader must not interpolate over a jump of velocity."""
+        folder = runs.scratch()
+        made = os.path.join(folder, "burnt")
+        runs.run(runs.TRACK, made, runs.NO_FRAMES, "/world/faint_stars=statistical",
+                 '/world/objects/0/burns=[{"time_s": 10.5, "dv_rtn_mps": [0, 3, 4]}]',
+                 f"{runs.SENSOR}/modules=" + json.dumps(
+                     {"gimbal": {"type": "ideal", "object": "INMARSAT GX5"}}), duration=20)
+        out = self.out()
+        export(made, "--orbits", "oem", "--step", "4", "--out", out)
+        segments = read_oem(out + "/orbits.oem")
+        self.assertEqual([meta["OBJECT_NAME"] for meta, _ in segments],
+                         ["neossat", "INMARSAT GX5", "INMARSAT GX5"])
+        epoch = runs.database(made).execute("SELECT epoch_utc FROM run").fetchone()[0]
+        before, after = segments[1][1], segments[2][1]
+        self.assertEqual([seconds(utc, epoch) for utc, _ in before], [0, 4, 8, 10.5])
+        self.assertEqual([seconds(utc, epoch) for utc, _ in after], [10.5, 12, 16, 20])
+        a, b = before[-1][1], after[0][1]
+        # written to 1e-9 km and 1e-12 km/s; the state before is that of 1 us earlier, moved on
+        self.assertLess(math.dist(a[:3], b[:3]), 2e-8)
+        self.assertAlmostEqual(math.dist(a[3:], b[3:]), 5e-3, delta=1e-8)
+        # and it moves as its velocity says on both sides; SGP4's is off by 0.06 m/s at most
+        for rows in (before[-2:], after[:2]):
+            (t0, s0), (t1, s1) = ((seconds(utc, epoch), state) for utc, state in rows)
+            for k in range(3):
+                mean = 0.5 * (s0[3 + k] + s1[3 + k])
+                self.assertAlmostEqual((s1[k] - s0[k]) / (t1 - t0), mean, delta=1e-4)
 
     def test_default_step(self):
         out = self.out()
@@ -318,7 +278,9 @@ class Exported(unittest.TestCase):
         with open(folder + "/out/orbits.czml", encoding="utf-8") as file:
             ids = [packet["id"] for packet in json.load(file)]
         self.assertEqual(ids, ["document", "observer/neossat", "object/INMARSAT GX5", "object/D",
-                               "object/G", "object/G/2"])
+                               "object/G", "object/G/2"] + [
+                                   "view/neossat/telescope" + tail
+                                   for tail in ("/eye", "/1", "/2", "/3", "/4", "")])
 
     # -------------------------------------------------------------- observations
 
@@ -508,8 +470,8 @@ with open(words[-1][5:], "wb") as file:
 
     def test_misuse(self):
         self.fails(2, "one folder of a run is expected, 0 were given")
-        self.fails(2, "nothing to export: add --frames, --table, --orbits or --observations",
-                   self.made)
+        self.fails(2, "nothing to export: add --frames, --table, --orbits, --observations or "
+                      "--satnet", self.made)
         self.fails(2, "--frames gif: give one of png|mp4", self.made, "--frames", "gif")
         self.fails(2, "--every 0: give an integer from 1", self.made, "--every", "0")
         out = self.out()

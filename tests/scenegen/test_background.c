@@ -164,10 +164,79 @@ static void maps_go_with_cameras_that_have_them(void **state) {
     }
 }
 
+/* Sums over the quarters of a frame are those of the map's place for place, whatever way the
+ * detector takes: pixel by pixel, with blooming, frame transfer or binning, under a response of
+ * its own in each pixel. */
+static void all_detectors_add_it_once(void **state) {
+    fixture *f = *state;
+    static float nodes[W * H], part[W * H], light[W * H];
+    const bst_window w = {37, 51, 202, 104};
+    for (int way = 0; way < 8; way++) {
+        int kind = way % 4, step = way < 4 ? 16 : 1, b = kind == 3 ? 2 : 1;
+        bst_camera camera = uneven_camera();
+        camera.detector.prnu_rms = 0.02;
+        camera.detector.full_well = kind == 1 ? BST_WELL_BLOOM : BST_WELL_CLIP;
+        camera.detector.frame_transfer_s = kind == 2 ? 1e-9 : 0.0; /* no light falls in it */
+        scene_track track = scene_track_make(&camera, &demo);
+        bst_renderer *r;
+        bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, &camera, NULL, &r));
+        bst_skylight_map map = make_map(step, nodes);
+        bst_window lit = {w.x0, 0, w.width, H};
+        bst_skylight_map cut = cut_map(&map, kind == 1 || kind == 2 ? lit : w, part);
+        bst_render_request q = {.window = w,
+                                .track = &track.track,
+                                .background_e = 5.0,
+                                .dark_e = 3.0,
+                                .background = &cut,
+                                .binning = b,
+                                .key = {{17, 23}},
+                                .exposure_id = 5};
+        bst_frame *frame;
+        const uint16_t *pixels;
+        bst_assert_ok(&f->ctx, bst_renderer_render(&f->ctx, r, &q, &frame));
+        bst_assert_ok(&f->ctx, bst_frame_map(frame, &f->ctx, &pixels));
+        int width = w.width / b, height = w.height / b;
+        double got[4] = {0}, want[4] = {0}, squares[4] = {0};
+        for (int i = 0; i < width * height; i++) {
+            int quarter = (i % width >= width / 2) + 2 * (i / width >= height / 2);
+            got[quarter] += (pixels[i] - camera.offset_dn) * camera.gain_e_per_dn;
+        }
+        bst_frame_unmap(frame);
+        bst_frame_release(frame);
+        for (int y = 0; y < height * b; y++) {
+            for (int x = 0; x < width * b; x++) {
+                int quarter = (x >= width / 2 * b) + 2 * (y >= height / 2 * b);
+                double e = bst_skylight_at(&map, w.x0 + x, w.y0 + y);
+                want[quarter] += 5.0 + e;
+                squares[quarter] += (2.0 + e) * (2.0 + e);
+            }
+        }
+        for (int k = 0; k < 4; k++) { /* shot, read noise and rounding, response */
+            double reads = 0.25 * width * height;
+            double read = camera.read_noise_e * camera.read_noise_e +
+                          camera.gain_e_per_dn * camera.gain_e_per_dn / 12.0;
+            double variance = want[k] + reads * read + 0.02 * 0.02 * squares[k];
+            bst_assert_close(got[k], want[k], 4.5 * sqrt(variance));
+        }
+        bst_assert_ok(&f->ctx, bst_renderer_render_noise_free(&f->ctx, r, &q, light));
+        for (int i = 0; i < w.width * w.height; i++) { /* a few roundings of a float near 100 */
+            double e = bst_skylight_at(&map, w.x0 + i % w.width, w.y0 + i / w.width);
+            bst_assert_close((double)light[i], 5.0 + e, 3e-5);
+        }
+        if (kind == 1) { /* a map of the window alone does not do here */
+            cut = cut_map(&map, w, part);
+            assert_int_equal(bst_renderer_render(&f->ctx, r, &q, &frame), BST_ERR_ARGUMENT);
+        }
+        bst_renderer_free(r);
+        scene_track_free(&track);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(maps_are_interpolated),
         cmocka_unit_test(windows_have_the_same_bytes),
+        cmocka_unit_test(all_detectors_add_it_once),
         cmocka_unit_test(maps_go_with_cameras_that_have_them),
     };
     return cmocka_run_group_tests(tests, open_device, close_device);

@@ -7,7 +7,7 @@
 #include <unistd.h>
 
 #include "sim/core/rng.h"
-#include "sim/world/field.h"
+#include "sim/world/field_objects.h"
 #include "tests/world/world_support.h"
 
 #define GX5 "{\"name\": \"GX5\", " TEST_GX5 "}"
@@ -297,8 +297,9 @@ static const bst_window full = {0, 0, 1024, 1024};
 static bool seen(bst_ctx *ctx, const bst_world *world, bst_view *view, int object, bst_quat q,
                  double start, double end) {
     bst_source_path path;
+    bst_path_light light;
     bst_sight mid;
-    if (bst_view_path(ctx, view, 0, object, start, end, &path, &mid) != BST_OK) {
+    if (bst_view_path(ctx, view, 0, object, start, end, &path, &light, &mid) != BST_OK) {
         return false;
     }
     bst_source s = {.kind = BST_SOURCE_OBJECT, .path = &path};

@@ -138,6 +138,34 @@ static void a_band_is_the_mean_of_its_wavelengths(void **state) {
     }
 }
 
+/* Without band_nm the response of the camera's own band counts. */
+static void the_cameras_band_is_the_psfs(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_camera camera = camera_of(BST_PSF_DIFFRACTION);
+    camera.optics.q = 0.0;
+    bst_response_point points[4] = {{0.7, 0.0}, {0.701, 1.0}, {0.799, 1.0}, {0.8, 0.0}};
+    camera.band.response = (bst_config_list){points, 4};
+    bst_band *band;
+    bst_assert_ok(&ctx, bst_band_create(&ctx, &camera.band, "", &band));
+    camera.spectrum = band;
+    bst_psf *own, *same;
+    bst_assert_ok(&ctx, bst_psf_create(&ctx, &camera, &own));
+    camera.spectrum = NULL;
+    camera.optics.band_nm[0] = 700.0;
+    camera.optics.band_nm[1] = 800.0;
+    bst_assert_ok(&ctx, bst_psf_create(&ctx, &camera, &same));
+    for (double f = 0.0; f < 1.4; f += 0.01) {
+        double a[2], b[2];
+        bst_psf_otf(own, 0, 0.0, f, a);
+        bst_psf_otf(same, 0, 0.0, f, b);
+        bst_assert_close(a[0], b[0], 2e-3); /* the search for the ends takes steps of 0.3 % */
+    }
+    bst_psf_free(own);
+    bst_psf_free(same);
+    bst_band_free(band);
+}
+
 static void more_wavelengths_change_little(void **state) {
     (void)state;
     bst_camera camera = camera_of(BST_PSF_DIFFRACTION);
@@ -270,6 +298,7 @@ int main(void) {
         cmocka_unit_test(a_sampled_psf_has_its_own_otf),
         cmocka_unit_test(what_cannot_be_is_said),
         cmocka_unit_test(a_band_is_the_mean_of_its_wavelengths),
+        cmocka_unit_test(the_cameras_band_is_the_psfs),
         cmocka_unit_test(more_wavelengths_change_little),
         cmocka_unit_test(field_nodes_mix_bilinearly),
         cmocka_unit_test(noise_areas_have_closed_forms),

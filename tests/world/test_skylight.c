@@ -177,7 +177,7 @@ static void the_limb_is_where_geometry_has_it(void **state) {
             }
             bst_discs discs;
             bst_discs_make(&camera, &around, &discs);
-            assert_true(discs.body[BST_DISC_EARTH].present);
+            assert_true(discs.body[BST_BODY_EARTH].present);
             /* the side on which the limb is */
             double found = NAN;
             for (int sign = -1; sign <= 1; sign += 2) {
@@ -258,7 +258,7 @@ static void discs_hold_their_light(void **state) {
         around.light.sun_m = around.bodies.sun_m;
         bst_discs discs;
         bst_discs_make(&camera, &around, &discs);
-        assert_true(discs.body[BST_DISC_MOON].present && !discs.body[BST_DISC_SUN].present);
+        assert_true(discs.body[BST_BODY_MOON].present && !discs.body[BST_BODY_SUN].present);
         double expected =
             pow(10, -0.4 * bst_moon_v_mag(around.bodies.moon_m,
                                           bst_vec3_sub(around.bodies.sun_m, around.bodies.moon_m)));
@@ -270,7 +270,7 @@ static void discs_hold_their_light(void **state) {
     around.light.sun_m = around.bodies.sun_m;
     bst_discs discs;
     bst_discs_make(&camera, &around, &discs);
-    assert_true(discs.body[BST_DISC_SUN].present);
+    assert_true(discs.body[BST_BODY_SUN].present);
     bst_assert_close(disc_flux(&camera, &discs), FULL_SUN, 0.005 * FULL_SUN);
     /* mean radiance over a disc of 959.63 arcsec: finite */
     bst_vec3 z = {0, 0, 1};

@@ -1,0 +1,176 @@
+#include <math.h>
+#include <stdlib.h>
+
+#include "gimbal/modules.h"
+#include "gimbal/nav.h"
+#include "gimbal/platform.h"
+#include "gimbal/scripted.h"
+
+enum { PORT_HISTORY, PORT_POINTING, PORT_NAV, PORT_COUNT };
+
+static const bst_port ports[PORT_COUNT] = {
+    [PORT_HISTORY] = {.channel = BST_CHANNEL_LOS_HISTORY,
+                      .direction = BST_PORT_OUT,
+                      .capacity = 4000},
+    [PORT_POINTING] = {.channel = BST_CHANNEL_POINTING_TELEMETRY,
+                       .direction = BST_PORT_OUT,
+                       .capacity = 800},
+    [PORT_NAV] = {.channel = BST_CHANNEL_NAV_TELEMETRY, .direction = BST_PORT_OUT},
+};
+
+static const char *const missing_names[] = {"error", "hold", NULL};
+
+typedef struct config {
+    int32_t missing_frames; /* bst_scripted_missing */
+    bst_platform_config platform;
+} config;
+
+static const bst_config_desc config_table[] = {
+    BST_ENUM(config, missing_frames, missing_names, "\"error\"",
+             "What frames without a pointing before the file's last one mean: an error, or that "
+             "the line of sight stays where the frame before ended."),
+    BST_OBJECT(config, platform, bst_platform_config_table, "{}",
+               "The spacecraft: drift and jitter on top of the file's pointing, telemetry."),
+    BST_CONFIG_END};
+
+typedef struct module {
+    bst_platform platform;
+    bst_scripted *scripted;
+    bst_frame_cursor frame; /* the first that has not ended */
+    bst_view *view;
+    int observer, sensor;
+    int64_t period_ticks, tick_rate_hz;
+    int64_t origin_tick; /* of the first step; -1: it is to come */
+    int64_t telemetry_steps, nav_steps;
+} module;
+
+static void destroy(void *self) {
+    module *m = self;
+    if (m) {
+        bst_scripted_free(m->scripted);
+        bst_view_free(m->view);
+        free(m);
+    }
+}
+
+static bst_status prepare(const bst_module_env *env, const config *c, module *m) {
+    const bst_platform_config *platform = &c->platform;
+    const bst_camera *camera = bst_world_camera(env->world, env->observer, env->sensor);
+    const bst_exposure_config *exposure =
+        bst_world_exposure(env->world, env->observer, env->sensor);
+    const bst_frame_updates *updates =
+        bst_world_frame_updates(env->world, env->observer, env->sensor);
+    if (!updates) {
+        return bst_fail(env->ctx, BST_ERR_CONFIG,
+                        "the gimbal \"scripted\" needs its sensor's frame_updates_file");
+    }
+    double rate_hz = (double)env->tick_rate_hz / (double)env->period_ticks, longest_s, cycle_s;
+    bst_frame_updates_limits(updates, camera, exposure, &longest_s, &cycle_s);
+    BST_TRY(bst_platform_init(env->ctx, &m->platform, platform,
+                              bst_world_body_attitude(env->world, env->observer, env->sensor),
+                              bst_camera_scale_rad(camera), 1.0 / rate_hz,
+                              bst_env_rng(env, "jitter"), bst_env_rng(env, "attitude")));
+    if (bst_platform_check_history(env->ctx, platform, longest_s) != BST_OK) {
+        return bst_fail_prefix(env->ctx, BST_ERR_CONFIG, "with the exposures of %s",
+                               bst_frame_updates_name(updates));
+    }
+    BST_TRY(bst_platform_divider(env->ctx, "telemetry_rate_hz", rate_hz,
+                                 platform->telemetry_rate_hz, &m->telemetry_steps));
+    BST_TRY(bst_platform_divider(env->ctx, "nav_rate_hz", rate_hz, platform->nav_rate_hz,
+                                 &m->nav_steps));
+    BST_TRY(bst_scripted_create(env->ctx, updates, camera, exposure, env->tick_rate_hz,
+                                (bst_scripted_missing)c->missing_frames, &m->scripted));
+    BST_TRY(bst_view_create(env->ctx, env->world, &m->view));
+    m->frame = bst_frame_cursor_begin(updates, camera, exposure, (double)env->tick_rate_hz);
+    /* besides the plant's steps there are two samples for each frame, and up to two for each
+     * attitude of the file */
+    int crowd = bst_scripted_crowd(m->scripted, platform->history_s * (double)env->tick_rate_hz);
+    double frames = 2.0 * platform->history_s / cycle_s + 4.0;
+    bst_env_set_capacity(
+        env, PORT_HISTORY,
+        bst_platform_ring(platform->history_s, rate_hz) + 2 * crowd + (int)fmin(frames, 1e7));
+    bst_env_set_capacity(
+        env, PORT_POINTING,
+        bst_platform_ring(platform->telemetry_history_s, platform->telemetry_rate_hz));
+    return BST_OK;
+}
+
+static bst_status create(const bst_module_env *env, const void *config_in, void **self) {
+    if (env->period_ticks <= 0) {
+        return bst_fail(env->ctx, BST_ERR_CONFIG, "a gimbal needs a rate: give rate_hz above zero");
+    }
+    module *m = calloc(1, sizeof *m);
+    if (!m) {
+        return bst_fail(env->ctx, BST_ERR_MEMORY, "out of memory for a gimbal");
+    }
+    m->observer = env->observer;
+    m->sensor = env->sensor;
+    m->period_ticks = env->period_ticks;
+    m->tick_rate_hz = env->tick_rate_hz;
+    m->origin_tick = -1;
+    bst_status status = prepare(env, config_in, m);
+    if (status != BST_OK) {
+        destroy(m);
+        return status;
+    }
+    *self = m;
+    return BST_OK;
+}
+
+static bst_status step(void *self, struct bst_step *s) {
+    module *m = self;
+    int64_t tick = bst_step_tick(s);
+    double seconds = bst_step_seconds(s);
+    m->origin_tick = m->origin_tick < 0 ? tick : m->origin_tick;
+    int64_t n = (tick - m->origin_tick) / m->period_ticks;
+    int64_t past = (tick - m->origin_tick) % m->period_ticks;
+    bst_quat q_cam_from_body = bst_quat_mul(bst_scripted_at(m->scripted, tick),
+                                            bst_quat_conj(m->platform.q_nominal_from_gcrf));
+    int capacity;
+    bst_los_history *history = bst_step_write(s, PORT_HISTORY, &capacity);
+    bst_platform_append_los(
+        history, capacity, tick,
+        bst_platform_true_camera_between(&m->platform, n, (double)past / (double)m->period_ticks,
+                                         seconds, q_cam_from_body));
+    /* a sample of its own where the rate changes and at the ends of each exposure, so that the way
+     * between samples is the file's */
+    int64_t next = bst_scripted_next(m->scripted, tick);
+    while (m->frame.start_tick + m->frame.exposure_ticks <= tick) {
+        bst_frame_cursor_next(&m->frame);
+    }
+    int64_t edge = m->frame.start_tick > tick ? m->frame.start_tick
+                                              : m->frame.start_tick + m->frame.exposure_ticks;
+    bst_step_wake_at(s, next < edge ? next : edge);
+    if (past == 0 && n % m->telemetry_steps == 0) {
+        static const double no_angles[2] = {0.0, 0.0};
+        bst_quat body = bst_platform_measured_body(&m->platform, n);
+        bst_pointing_telemetry *telemetry = bst_step_write(s, PORT_POINTING, &capacity);
+        bst_platform_append_pointing(telemetry, capacity, tick,
+                                     bst_quat_unit(bst_quat_mul(q_cam_from_body, body)), no_angles,
+                                     body, true, false);
+    }
+    if (past == 0 && n % m->nav_steps == 0) {
+        bst_nav_telemetry *nav = bst_step_write(s, PORT_NAV, NULL);
+        BST_TRY(
+            bst_gimbal_nav(bst_step_ctx(s), m->view, m->observer, m->sensor, tick, seconds, nav));
+    }
+    return BST_OK;
+}
+
+const bst_module_desc bst_gimbal_scripted_module = {
+    .abi = BST_MODULE_ABI,
+    .role = "gimbal",
+    .type = "scripted",
+    .doc =
+        "Keeps the camera in the attitudes that the sensor's frame_updates_file gives frame by "
+        "frame; drift and jitter, where configured, come on top.",
+    .flags = BST_MODULE_READS_TRUTH,
+    .config = config_table,
+    .config_bytes = sizeof(config),
+    .default_rate_hz = 1000.0,
+    .ports = ports,
+    .port_count = PORT_COUNT,
+    .create = create,
+    .step = step,
+    .destroy = destroy,
+};

@@ -1,0 +1,187 @@
+/* The detector in stages, for what one pixel cannot know alone: charge that flows along columns,
+ * frame transfer under light, binning. The light of all rows lies in an image; charge takes its
+ * place, and is read out from there. One work-item per row, or per 64 columns. Options: BLOOM,
+ * TRANSFER_ROW_S (time of the transfer by one row), and those of detector.cl. */
+
+/* image: [light_height][light_stride] floats, from column p.tiles_x0 and row p.light_y0 of the
+ * sensor. */
+
+INLINE uint counter_of(int row, int column, int width) {
+    return ((uint)row * ((uint)(width + 63) / 64u) + (uint)column / 64u) * 16u;
+}
+
+INLINE void store_chunk(global float *to, chunk c) {
+    global float16 *v = (global float16 *)to;
+    v[0] = c.a;
+    v[1] = c.b;
+    v[2] = c.c;
+    v[3] = c.d;
+}
+
+#ifdef TRANSFER_ROW_S
+/* From the sources' light to expected electrons of light: sky and response, and what each pixel
+ * collects while its charge runs through all other rows of its column. One work-item per 64
+ * columns.
+ */
+kernel void bst_detector_transfer(bst_scene_params p, global float *image,
+                                  global const float *gain) {
+    detector_maps maps = {gain, 0, 0, 0, 0};
+    int x = (int)get_global_id(0) * 64;
+    chunk sum = {(float16)0.0f, (float16)0.0f, (float16)0.0f, (float16)0.0f};
+    for (int y = 0; y < p.light_height; y++) {
+        global float *at = image + (size_t)y * p.light_stride + x;
+        size_t map = (size_t)(p.light_y0 + y) * MAP_STRIDE + p.tiles_x0 + x;
+        chunk c = expected_chunk(p, maps, map, load_chunk(at));
+        sum.a += c.a;
+        sum.b += c.b;
+        sum.c += c.c;
+        sum.d += c.d;
+        store_chunk(at, c);
+    }
+    float share = p.exposure_s > 0.0f ? TRANSFER_ROW_S / p.exposure_s : 0.0f;
+    for (int y = 0; y < p.light_height; y++) {
+        global float *at = image + (size_t)y * p.light_stride + x;
+        chunk c = load_chunk(at);
+        c.a = fma((float16)share, sum.a - c.a, c.a);
+        c.b = fma((float16)share, sum.b - c.b, c.b);
+        c.c = fma((float16)share, sum.c - c.c, c.c);
+        c.d = fma((float16)share, sum.d - c.d, c.d);
+        store_chunk(at, c);
+    }
+}
+#endif
+
+/* Charge of every pixel in place of its light. One work-item per row. */
+kernel void bst_detector_charge(bst_scene_params p, global float *image, global const float *gain,
+                                global const float *dark, global const float *overlay) {
+    detector_maps maps = {gain, dark, overlay, 0, 0};
+    int row = p.light_y0 + (int)get_global_id(0);
+    global float *line = image + get_global_id(0) * (size_t)p.light_stride;
+    for (int x = 0; x < p.light_stride; x += 64) {
+        int column = p.tiles_x0 + x;
+        size_t map = (size_t)row * MAP_STRIDE + column;
+        uint counter = counter_of(row, column, p.sensor_width);
+        chunk m = load_chunk(line + x);
+#ifndef TRANSFER_ROW_S
+        m = expected_chunk(p, maps, map, m);
+#endif
+        m = add_dark(p, maps, map, m);
+        chunk_words w = chunk_random(p, counter, STREAM_POISSON);
+        chunk q, n = chunk_normal(chunk_random(p, counter, STREAM_POISSON_NORMAL));
+        int16 all = (int16)-1;
+        q.a = draw_charge(m.a, w.a, n.a, all);
+        q.b = draw_charge(m.b, w.b, n.b, all);
+        q.c = draw_charge(m.c, w.c, n.c, all);
+        q.d = draw_charge(m.d, w.d, n.d, all);
+#ifdef OVERLAY
+        chunk over = load_chunk(overlay + map);
+        q.a += over.a;
+        q.b += over.b;
+        q.c += over.c;
+        q.d += over.d;
+#endif
+#ifndef BLOOM
+        q.a = fmin(q.a, p.full_well_e);
+        q.b = fmin(q.b, p.full_well_e);
+        q.c = fmin(q.c, p.full_well_e);
+        q.d = fmin(q.d, p.full_well_e);
+#endif
+        store_chunk(line + x, q);
+    }
+}
+
+#ifdef BLOOM
+/* Charge above the full well leaves its pixel by halves up and down its column and fills the pixels
+ * it meets; what reaches the column's end is lost. `over`: a column of the halves on their way. One
+ * work-item per 16 columns. */
+kernel void bst_detector_bloom(bst_scene_params p, global float *image, global float *over) {
+    int x = (int)get_global_id(0) * 16;
+    float16 carry = (float16)0.0f, full = (float16)p.full_well_e;
+    for (int y = 0; y < p.light_height; y++) { /* upwards in y */
+        global float16 *at = (global float16 *)(image + (size_t)y * p.light_stride + x);
+        global float16 *half_at = (global float16 *)(over + (size_t)y * p.light_stride + x);
+        float16 q = *at, excess = 0.5f * fmax(q - full, 0.0f);
+        q = fmin(q, full);
+        float16 take = fmin(full - q, carry);
+        *at = q + take;
+        *half_at = excess;
+        carry = carry - take + excess;
+    }
+    carry = (float16)0.0f;
+    for (int y = p.light_height - 1; y >= 0; y--) {
+        global float16 *at = (global float16 *)(image + (size_t)y * p.light_stride + x);
+        global float16 *half_at = (global float16 *)(over + (size_t)y * p.light_stride + x);
+        float16 q = *at, take = fmin(full - q, carry);
+        *at = q + take;
+        carry = carry - take + *half_at;
+    }
+}
+#endif
+
+/* Digital numbers from charge: p.binning x p.binning pixels are added before they are read. frame:
+ * [window_height][window_width], both after binning. saturated: pixels per row. One work-item per
+ * row of the frame. */
+kernel void bst_detector_read(bst_scene_params p, global const float *image, global ushort *frame,
+                              global int *saturated, global const float *offsets,
+                              global const ushort *codes) {
+    detector_maps maps = {0, 0, 0, offsets, codes};
+    int y = (int)get_global_id(0), b = p.binning;
+    int row = p.window_y0 + y * b;
+    global const float *line = image + (size_t)(row - p.light_y0) * p.light_stride;
+    global ushort *out = frame + (size_t)y * p.window_width;
+    /* binned pixels lie on a grid that starts with the window's first pixel */
+    int first = p.window_x0 / b / 64 * 64, skip = p.window_x0 / b - first;
+    int16 full_count = (int16)0;
+    for (int x = 0; x < skip + p.window_width; x += 64) {
+        float sums[64];
+        int brims[64];
+        for (int i = 0; i < 64; i++) {
+            int column = x + i - skip;
+            float sum = 0.0f;
+            int brim = 0;
+            if (column >= 0 && column < p.window_width) {
+                global const float *at = line + p.window_x0 - p.tiles_x0 + column * b;
+                for (int v = 0; v < b; v++) {
+                    for (int u = 0; u < b; u++) {
+                        float q = at[(size_t)v * p.light_stride + u];
+                        sum += q;
+                        brim |= q >= p.full_well_e;
+                    }
+                }
+            }
+            sums[i] = sum;
+            brims[i] = -brim;
+        }
+        uint counter = counter_of(row / b, first + x, p.sensor_width / b);
+        chunk q = {vload16(0, sums), vload16(1, sums), vload16(2, sums), vload16(3, sums)};
+        chunk_flags brim = {vload16(0, brims), vload16(1, brims), vload16(2, brims),
+                            vload16(3, brims)};
+        chunk e, z = chunk_normal(chunk_random(p, counter, STREAM_NOISE));
+        e.a = read_out(p, q.a, z.a);
+        e.b = read_out(p, q.b, z.b);
+        e.c = read_out(p, q.c, z.c);
+        e.d = read_out(p, q.d, z.d);
+        chunk dn = convert_chunk(p, maps, counter, row, first + x, e);
+        int to = x - skip;
+        full_count -= store_dn(p, maps, dn.a, brim.a, to, out);
+        full_count -= store_dn(p, maps, dn.b, brim.b, to + 16, out);
+        full_count -= store_dn(p, maps, dn.c, brim.c, to + 32, out);
+        full_count -= store_dn(p, maps, dn.d, brim.d, to + 48, out);
+    }
+    int8 s8 = full_count.lo + full_count.hi;
+    int4 s4 = s8.lo + s8.hi;
+    int2 s2 = s4.lo + s4.hi;
+    saturated[y] = s2.lo + s2.hi;
+}
+
+/* A pixel's charge in the overlay. deposits: index and charge. */
+typedef struct deposit_pixel {
+    int index;
+    float electrons;
+} deposit_pixel;
+
+kernel void bst_detector_deposit(global const deposit_pixel *deposits, float sign,
+                                 global float *overlay) {
+    deposit_pixel d = deposits[get_global_id(0)];
+    overlay[d.index] = sign * d.electrons;
+}

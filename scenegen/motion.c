@@ -1,0 +1,57 @@
+#include "scenegen/motion.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "sim/core/vec.h"
+
+double bst_motion_spread_px(const bst_path_point *path, int count, double scale_rad, double stretch,
+                            double roll_px, double corner_px) {
+    double corner = corner_px * scale_rad, worst = 0.0;
+    for (int k = 0; k < count; k++) {
+        double tilt = hypot(path[k].p[0], path[k].p[1]) * scale_rad / stretch;
+        double roll = fabs(path[k].p[2]) / roll_px;
+        /* first order, then what is left of products of turns */
+        double moved = roll * corner + tilt * corner * (corner + tilt);
+        moved += 0.5 * roll * (roll * corner + tilt) + tilt * roll * corner * (1.0 + corner);
+        worst = fmax(worst, moved);
+    }
+    return worst / scale_rad;
+}
+
+void bst_motion_to_shift(bst_path_point *point, double scale_rad, double stretch, double roll_px) {
+    double tilt = scale_rad / stretch;
+    bst_quat q = bst_quat_from_rotvec(
+        (bst_vec3){point->p[0] * tilt, point->p[1] * tilt, point->p[2] / roll_px});
+    bst_vec3 v = bst_quat_rotate(q, (bst_vec3){0.0, 0.0, 1.0});
+    double f = v.z > 1e-6 ? 1.0 / (v.z * tilt) : 1e6 / tilt;
+    *point = (bst_path_point){{v.x * f, v.y * f, 0.0}, point->s};
+}
+
+bst_status bst_motion_midpoints(bst_ctx *ctx, const bst_path_point *path, int count, int parts,
+                                bst_node_list *list) {
+    if (list->count + parts > list->capacity) {
+        int capacity = list->count + parts;
+        bst_node *items = realloc(list->items, (size_t)capacity * sizeof *items);
+        if (!items) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d nodes of a smear", capacity);
+        }
+        list->items = items;
+        list->capacity = capacity;
+    }
+    double from = path[0].s, total = path[count - 1].s - from;
+    for (int n = 0, k = 0; n < parts; n++) {
+        double s = from + total * (n + 0.5) / parts;
+        while (k + 2 < count && path[k + 1].s < s) {
+            k++;
+        }
+        double length = path[k + 1].s - path[k].s;
+        double u = length > 0.0 ? (s - path[k].s) / length : 0.0;
+        bst_node *node = &list->items[list->count++];
+        *node = (bst_node){.weight = 1.0 / parts};
+        for (int i = 0; i < 3; i++) {
+            node->p[i] = path[k].p[i] + u * (path[k + 1].p[i] - path[k].p[i]);
+        }
+    }
+    return BST_OK;
+}

@@ -1,0 +1,25 @@
+/* The camera's motion in other ways than each star's own track: one shift that all stars share, and
+ * the classic cut of the exposure into equal parts. */
+#ifndef BST_SCENEGEN_MOTION_H
+#define BST_SCENEGEN_MOTION_H
+
+#include "scenegen/nodes.h"
+#include "sim/core/vec.h"
+
+/* How far, at most, a star at the sensor's corner (corner_px from the boresight, undistorted) moves
+ * otherwise than the star at the boresight does, px: by roll, and by the tangent plane's stretch,
+ * X^2 T in tangents for a tilt T. path[count]: turns from the reference attitude, two tilts in px
+ * (times `stretch`) and roll in px at roll_px from the boresight; scale_rad per px. */
+double bst_motion_spread_px(const bst_path_point *path, int count, double scale_rad, double stretch,
+                            double roll_px, double corner_px);
+
+/* Puts in place of such a turn the shift of the star at the boresight, x and y in px (times
+ * `stretch`). */
+void bst_motion_to_shift(bst_path_point *point, double scale_rad, double stretch, double roll_px);
+
+/* Appends `parts` >= 1 nodes of equal weight at the midpoints of equal parts of the path's time;
+ * count >= 2. BST_ERR_MEMORY. */
+bst_status bst_motion_midpoints(bst_ctx *ctx, const bst_path_point *path, int count, int parts,
+                                bst_node_list *list) BST_MUST_CHECK;
+
+#endif

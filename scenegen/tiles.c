@@ -1,0 +1,38 @@
+#include "scenegen/tiles.h"
+
+#include <stdbool.h>
+
+bst_status bst_tiles_choose(bst_ctx *ctx, const bst_device *device, bst_renderer_options *options,
+                            uint64_t *most_bytes) {
+    cl_device_type type = 0;
+    cl_ulong local_bytes = 0, most = 0;
+    BST_TRY(bst_device_check(
+        ctx, clGetDeviceInfo(bst_device_id(device), CL_DEVICE_TYPE, sizeof type, &type, NULL),
+        "asking for the device's type"));
+    BST_TRY(bst_device_check(ctx,
+                             clGetDeviceInfo(bst_device_id(device), CL_DEVICE_LOCAL_MEM_SIZE,
+                                             sizeof local_bytes, &local_bytes, NULL),
+                             "asking for the device's local memory"));
+    BST_TRY(bst_device_check(ctx,
+                             clGetDeviceInfo(bst_device_id(device), CL_DEVICE_MAX_MEM_ALLOC_SIZE,
+                                             sizeof most, &most, NULL),
+                             "asking for the device's largest buffer"));
+    *most_bytes = most;
+    if (options->tile_width == 0) {
+        bool large = (type & CL_DEVICE_TYPE_CPU) && local_bytes >= 128 * 1024;
+        options->tile_width = large ? 256 : 64;
+        options->tile_height = large ? 64 : 2;
+        options->group = large ? 1 : 16;
+    }
+    size_t need = (size_t)(options->tile_width + 16) * (size_t)options->tile_height *
+                  sizeof(float) * (size_t)options->group;
+    if (options->tile_width < 64 || options->tile_width % 64 != 0 || options->tile_height < 1 ||
+        options->group < 1 || need > local_bytes) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "tiles of %d x %d pixels in groups of %d need %zu bytes of local memory "
+                        "(the device has %llu) and a width that is a multiple of 64",
+                        options->tile_width, options->tile_height, options->group, need,
+                        (unsigned long long)local_bytes);
+    }
+    return BST_OK;
+}

@@ -1,0 +1,95 @@
+#include "sim/world/field_image.h"
+
+#include "sim/world/disc.h"
+
+bst_image_moments bst_image_by_light(const bst_camera *camera, const bst_los_track *track,
+                                     const bst_source *source) {
+    bst_image_moments m = {0};
+    double duration = track->time_s[track->count - 1];
+    int sample = 0;
+    int count = 2 * track->count < 128 ? 128 : 2 * track->count < 2048 ? 2 * track->count : 2048;
+    double xx = 0.0, xy = 0.0, yy = 0.0;
+    for (int n = 0; n < count; n++) {
+        double u = (n + 0.5) / count, x = NAN, y = NAN;
+        double weight = bst_source_light(source, (n + 1.0) / count) -
+                        bst_source_light(source, (double)n / count);
+        while (sample + 2 < track->count && track->time_s[sample + 1] < u * duration) {
+            sample++;
+        }
+        double step = track->time_s[sample + 1] - track->time_s[sample];
+        bst_quat q =
+            bst_quat_slerp(track->q_cam_from_gcrf[sample], track->q_cam_from_gcrf[sample + 1],
+                           step > 0.0 ? (u * duration - track->time_s[sample]) / step : 0.0);
+        (void)bst_camera_project(camera, bst_quat_rotate(q, bst_source_direction(source, u)), &x,
+                                 &y);
+        double dx = x - m.x_mean, dy = y - m.y_mean;
+        if (n == 0) { /* moments about the first place */
+            m.x_mean = x;
+            m.y_mean = y;
+            dx = dy = 0.0;
+        }
+        m.xx += weight * dx;
+        m.xy += weight * dy;
+        xx += weight * dx * dx;
+        xy += weight * dx * dy;
+        yy += weight * dy * dy;
+    }
+    double ex = m.xx, ey = m.xy;
+    return (bst_image_moments){m.x_mean + ex, m.y_mean + ey, xx - ex * ex, xy - ex * ey,
+                               yy - ey * ey};
+}
+
+void bst_image_add_disc(const bst_camera *camera, bst_quat q_mid, const bst_source *source,
+                        bst_image_moments *m) {
+    enum { TIMES = 24, AROUND = 48 };
+    bst_disc disc;
+    bst_disc_begin(source, &disc);
+    double x0, y0, sum = 0.0, ex = 0.0, ey = 0.0, xx = 0.0, xy = 0.0, yy = 0.0;
+    bst_vec3 z = bst_vec3_unit(source->apparent_mid), e1, e2;
+    if (!bst_camera_project(camera, bst_quat_rotate(q_mid, z), &x0, &y0)) {
+        return;
+    }
+    e1 = bst_vec3_unit(
+        bst_vec3_cross(fabs(z.z) < 0.9 ? (bst_vec3){0, 0, 1} : (bst_vec3){1, 0, 0}, z));
+    e2 = bst_vec3_cross(z, e1);
+    for (int n = 0; n <= TIMES * AROUND; n++) {
+        /* rings of equal area, and the specular point */
+        double s = source->shape->radius * sqrt((n / AROUND + 0.5) / TIMES);
+        double a = 2.0 * BST_PI * (n % AROUND + 0.5 * (n / AROUND % 2)) / AROUND, x, y;
+        bst_vec3 d = bst_vec3_axpy(bst_vec3_axpy(z, s * cos(a), e1), s * sin(a), e2), ray = d;
+        double share = 0.0;
+        if (n == TIMES * AROUND) {
+            ray = bst_vec3_add(z, bst_disc_specular(source));
+            share = source->shape->specular;
+        } else {
+            share = bst_disc_radiance(&disc, bst_vec3_unit(d)) * BST_PI * source->shape->radius *
+                    source->shape->radius / (TIMES * AROUND);
+        }
+        if (share > 0.0 && bst_camera_project(camera, bst_quat_rotate(q_mid, ray), &x, &y)) {
+            x -= x0;
+            y -= y0;
+            sum += share;
+            ex += share * x;
+            ey += share * y;
+            xx += share * x * x;
+            xy += share * x * y;
+            yy += share * y * y;
+        }
+    }
+    if (sum > 0.0) {
+        m->x_mean += ex / sum;
+        m->y_mean += ey / sum;
+        m->xx += xx / sum - ex * ex / (sum * sum);
+        m->xy += xy / sum - ex * ey / (sum * sum);
+        m->yy += yy / sum - ey * ey / (sum * sum);
+    }
+}
+
+double bst_image_squared(double along, double across, double length) {
+    const double root_pi = sqrt(BST_PI);
+    double a = length / (2.0 * along);
+    double line = a < 1e-3 ? 1.0 / (2.0 * root_pi * along) * (1.0 - a * a / 6.0)
+                           : erf(a) / length -
+                                 (2.0 * along / (length * length * root_pi)) * (1.0 - exp(-a * a));
+    return line / (2.0 * root_pi * across);
+}

@@ -1,0 +1,103 @@
+/* The files that drive sensors frame by frame, as a world holds them. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/world/frame_updates.h"
+#include "sim/world/world_build.h"
+
+static bst_status load_one(const bst_world_builder *b, int observer, int sensor,
+                           const bst_sensor_config *config, world_updates *out) {
+    bst_world_path path = bst_world_path_join(b, config->frame_updates_file);
+    *out = (world_updates){.observer = observer,
+                           .sensor = sensor,
+                           .camera = config->camera,
+                           .exposure = config->exposure};
+    bst_status status =
+        bst_frame_updates_load(b->ctx, path.text, &out->camera, &out->exposure, &out->file);
+    return status == BST_OK
+               ? BST_OK
+               : bst_fail_prefix(b->ctx, status == BST_ERR_MEMORY ? status : BST_ERR_CONFIG,
+                                 "%s: /observers/%d/sensors/%d/frame_updates_file", b->scenario,
+                                 observer, sensor);
+}
+
+bst_status bst_world_load_updates(const bst_world_builder *b, const bst_config_list *observers) {
+    bst_world *world = b->world;
+    const bst_observer_config *configs = observers->items;
+    int total = 0;
+    for (int i = 0; i < observers->count; i++) {
+        total += configs[i].sensors.count;
+    }
+    world->updates = calloc((size_t)total + 1, sizeof *world->updates);
+    if (!world->updates) {
+        return bst_fail(b->ctx, BST_ERR_MEMORY, "out of memory for sensors");
+    }
+    for (int i = 0; i < observers->count; i++) {
+        const bst_sensor_config *sensors = configs[i].sensors.items;
+        for (int k = 0; k < configs[i].sensors.count; k++) {
+            if (*sensors[k].frame_updates_file) {
+                BST_TRY(load_one(b, i, k, &sensors[k], &world->updates[world->updates_count]));
+                world->updates_count++;
+            }
+        }
+    }
+    return BST_OK;
+}
+
+void bst_world_updates_free(bst_world *world) {
+    for (int i = 0; i < world->updates_count; i++) {
+        bst_frame_updates_free(world->updates[i].file);
+    }
+    free(world->updates);
+}
+
+const bst_frame_updates *bst_world_frame_updates(const bst_world *world, int observer, int sensor) {
+    for (int i = 0; i < world->updates_count; i++) {
+        if (world->updates[i].observer == observer && world->updates[i].sensor == sensor) {
+            return world->updates[i].file;
+        }
+    }
+    return NULL;
+}
+
+bst_status bst_world_updates_injected(const bst_world_builder *b, const char *path,
+                                      bst_injected **out) {
+    const world_updates *from = NULL;
+    for (int i = 0; i < b->world->updates_count && !from; i++) {
+        if (strcmp(bst_frame_updates_name(b->world->updates[i].file), path) == 0) {
+            from = &b->world->updates[i];
+        }
+    }
+    if (!from) {
+        return bst_fail(b->ctx, BST_ERR_CONFIG,
+                        "%s: is no sensor's frame_updates_file, so that its frames have no times "
+                        "(allowed: a .csv file of states, or the frame_updates_file of a sensor)",
+                        path);
+    }
+    int64_t total = 0, n = 0;
+    for (int i = 0; i < bst_frame_updates_count(from->file); i++) {
+        total += bst_frame_updates_item(from->file, i)->object_count;
+    }
+    bst_injected_frame *frames = calloc((size_t)total + 1, sizeof *frames);
+    if (!frames) {
+        return bst_fail(b->ctx, BST_ERR_MEMORY, "%s: no memory for its states", path);
+    }
+    bst_frame_cursor c = bst_frame_cursor_begin(from->file, &from->camera, &from->exposure, 0.0);
+    for (; n < total; bst_frame_cursor_next(&c)) {
+        for (int k = 0; c.update && k < c.update->object_count; k++) {
+            const bst_frame_object *o = &c.update->objects[k];
+            frames[n++] = (bst_injected_frame){.object = o->name,
+                                               .number = c.frame,
+                                               .start_s = c.start_s,
+                                               .end_s = c.start_s + c.exposure_s,
+                                               .start_position_m = o->start_position_m,
+                                               .start_velocity_mps = o->start_velocity_mps,
+                                               .end_position_m = o->end_position_m,
+                                               .end_velocity_mps = o->end_velocity_mps};
+        }
+    }
+    bst_status status = bst_injected_create(b->ctx, path, frames, total, out);
+    free(frames);
+    return status;
+}

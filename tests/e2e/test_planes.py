@@ -1,0 +1,126 @@
+#!/usr/bin/env python3
+"""Noise-free planes and the segmentation mask as a user reads them, with astropy: frames are planes
+plus noise, header by header, and each pixel of the mask belongs to the source that its light is of.
+
+Usage, from the repository root: /usr/bin/python3 tests/e2e/test_planes.py BORESIGHT
+"""
+import os
+import unittest
+
+import numpy as np
+from astropy.io import fits
+
+import runs
+
+SCENARIO = "scenarios/frame_by_frame.json"
+NAMES = ("stars", "targets", "background", "segmentation")
+ALL = '/record/planes=["stars", "targets", "background", "segmentation"]'
+
+
+def tearDownModule():
+    runs.clean()
+
+
+def images(out, name):
+    with fits.open(os.path.join(out, f"{name}.fits")) as hdus:
+        return [(hdu.header, hdu.data.astype(float)) for hdu in hdus[1:]]
+
+
+class Planes(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        folder = runs.scratch()
+        cls.out, cls.plain = (os.path.join(folder, name) for name in ("planes", "plain"))
+        runs.run(SCENARIO, cls.out, ALL, "/record/checksums=true")
+        runs.run(SCENARIO, cls.plain)
+        cls.frames = images(cls.out, "frames")
+        cls.planes = {name: images(cls.out, name) for name in NAMES}
+
+    def test_off_means_none_and_changes_nothing(self):
+        self.assertFalse([n for n in os.listdir(self.plain) if n.split(".")[0] in NAMES])
+        for (_, with_planes), (_, without) in zip(self.frames, images(self.plain, "frames")):
+            np.testing.assert_array_equal(with_planes, without)
+
+    def test_headers_are_the_frames(self):
+        for name, planes in self.planes.items():
+            self.assertEqual(len(planes), len(self.frames))
+            for (header, data), (frame, pixels) in zip(planes, self.frames):
+                self.assertEqual(data.shape, pixels.shape)
+                for key in ("FRAMEID", "DATE-OBS", "EXPTIME", "EXTVER", "CRPIX1", "CRPIX2",
+                            "CRVAL1", "CRVAL2", "CD1_1", "CD2_1", "WINX0", "PIXSCALE"):
+                    self.assertEqual(header[key], frame[key], (name, key))
+                self.assertEqual(header["EXTNAME"], name.upper())
+                self.assertEqual(header["BITPIX"], 32 if name == "segmentation" else -32)
+                self.assertEqual(header["BUNIT"], "" if name == "segmentation" else "electron")
+                self.assertNotIn("GAIN", header)
+            with fits.open(os.path.join(self.out, f"{name}.fits"), checksum=True) as hdus:
+                self.assertIn("DATASUM", hdus[1].header)
+
+    def test_frames_are_planes_plus_noise(self):
+        with fits.open(os.path.join(self.out, "frames.fits")) as hdus:
+            keys = hdus[0].header
+        gain, offset, read = keys["GAIN"], keys["OFFSET"], keys["RDNOISE"]
+        for k, (_, counts) in enumerate(self.frames):
+            mean = sum(self.planes[name][k][1] for name in NAMES[:3])
+            sigma = np.sqrt(mean + read ** 2 + gain ** 2 / 12)
+            z = (((counts - offset) * gain - mean) / sigma).ravel()
+            n = len(z)
+            # 5 sigma of the mean and of the standard deviation
+            self.assertAlmostEqual(z.mean(), 0.0, delta=5 / np.sqrt(n))
+            self.assertAlmostEqual(z.std(), 1.0, delta=5 / np.sqrt(2 * n))
+            bright = mean > 2 * np.median(mean)
+            lit = z.reshape(mean.shape)[bright]
+            self.assertAlmostEqual(lit.mean(), 0.0, delta=5 / np.sqrt(len(lit)))
+            self.assertAlmostEqual(lit.std(), 1.0, delta=5 / np.sqrt(2 * len(lit)))
+
+    def test_the_light_is_where_and_as_much_as_truth_says(self):
+        rows = runs.database(self.out).execute(
+            "SELECT * FROM truth WHERE kind = 'object' ORDER BY exposure_id").fetchall()
+        for row, (header, data) in zip(rows, self.planes["targets"]):
+            # stamps leave out what is below the tolerance of the noise
+            self.assertAlmostEqual(data.sum() / row["electrons"], 1.0, delta=1e-3)
+            y, x = np.indices(data.shape)
+            self.assertAlmostEqual((data * x).sum() / data.sum() + header["WINX0"],
+                                   row["x_mean_px"], delta=0.01)
+            self.assertAlmostEqual((data * y).sum() / data.sum() + header["WINY0"],
+                                   row["y_mean_px"], delta=0.01)
+
+    def test_the_mask(self):
+        with fits.open(os.path.join(self.out, "frames.fits")) as hdus:
+            read = hdus[0].header["RDNOISE"]
+        tables = runs.database(self.out)
+        names = dict(tables.execute("SELECT id, name FROM objects").fetchall())
+        self.assertEqual(list(names.values()), ["visitor"])
+        for k, (header, mask) in enumerate(self.planes["segmentation"]):
+            light = self.planes["stars"][k][1] + self.planes["targets"][k][1]
+            level = np.sqrt(self.planes["background"][k][1] + read ** 2)
+            # whoever is above the level is so with the others' light too
+            self.assertTrue(np.all(light[mask > 0] > level[mask > 0] * (1 - 1e-4)))
+            # what is above it without an owner is the sum of several that are not
+            self.assertLess(np.count_nonzero((mask == 0) & (light > 1.5 * level)), 5)
+            items = {row["item"]: row for row in tables.execute(
+                "SELECT * FROM truth WHERE exposure_id = ?", (header["FRAMEID"],))}
+            found = set(np.unique(mask).astype(int)) - {0}
+            self.assertLessEqual(found, set(items))
+            target = [i for i, row in items.items() if row["kind"] == "object"][0]
+            own = self.planes["targets"][k][1]
+            stars = self.planes["stars"][k][1]
+            alone = (own > level) & (own > 2 * stars)
+            self.assertTrue(np.all(mask[alone] == target))
+            self.assertGreater(np.count_nonzero(alone), 20)
+            for i in found:
+                y, x = np.nonzero(mask == i)
+                row = items[i]
+                near = np.hypot(x + header["WINX0"] - row["x_mean_px"],
+                                y + header["WINY0"] - row["y_mean_px"])
+                self.assertLess(near.min(), 4.0)
+
+    def test_misuse(self):
+        for value, words in (('["star"]', "\"stars\", \"targets\""), ('["stars", "stars"]', "twice"),
+                             ('"stars"', "array of names")):
+            with self.assertRaisesRegex(AssertionError, f"/record/planes.*{words}"):
+                runs.run(SCENARIO, os.path.join(runs.scratch(), "run"), f"/record/planes={value}")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,175 @@
+#!/usr/bin/env python3
+"""boresight export --satnet: images and labels as SatNet's readers take them, checked with astropy.
+
+Usage, from the repository root: /usr/bin/python3 tests/e2e/test_satnet.py BORESIGHT
+"""
+import glob
+import json
+import os
+import subprocess
+import unittest
+
+import numpy as np
+from astropy.io import fits
+from astropy.wcs import WCS
+
+import runs
+
+SCENARIO = "scenarios/frame_by_frame.json"
+# keys of satsim/io/satnet.py, github.com/ssc-ai/satsim
+OBJECT_KEYS = {
+    "class_name", "class_id", "y_min", "x_min", "y_max", "x_max", "y_center", "x_center",
+    "bbox_height", "bbox_width", "source", "magnitude", "pe_per_sec", "y_start", "x_start", "y_mid",
+    "x_mid", "y_end", "x_end", "seg_id", "object_name", "object_id", "pixels", "snr",
+    "snr_aperture", "ra", "dec"}
+
+
+def tearDownModule():
+    runs.clean()
+
+
+def export(*words):
+    return subprocess.run([runs.BORESIGHT, "export", *words], capture_output=True, text=True,
+                          timeout=120, check=False)
+
+
+def annotations(folder):
+    out = []
+    for path in sorted(glob.glob(folder + "/Annotations/*.json")):
+        with open(path, encoding="utf-8") as file:
+            out.append(json.load(file)["data"])
+    return out
+
+
+class SatNet(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        folder = runs.scratch()
+        cls.made, cls.out = os.path.join(folder, "fly"), os.path.join(folder, "set")
+        runs.run(SCENARIO, cls.made, '/record/planes=["segmentation"]',
+                 "/world/faint_stars=statistical")
+        result = export(cls.made, "--satnet", cls.out, "--star-limit", "13", "--split", "80,10,10")
+        assert (result.returncode, result.stderr) == (0, ""), result.stderr
+
+    def test_tree(self):
+        self.assertEqual(sorted(os.listdir(self.out)),
+                         ["Annotations", "ImageFiles", "test.txt", "train.txt", "val.txt"])
+        self.assertEqual(sorted(os.listdir(self.out + "/ImageFiles")),
+                         [f"fly.{k:04d}.fits" for k in range(8)])
+        self.assertEqual(sorted(os.listdir(self.out + "/Annotations")),
+                         [f"fly.{k:04d}.json" for k in range(8)])
+        self.assertFalse(os.path.exists(self.made + ".export"))
+
+    def test_images_are_the_frames(self):
+        with fits.open(self.made + "/frames.fits") as hdus:
+            for k, hdu in enumerate(hdus[1:]):
+                with fits.open(f"{self.out}/ImageFiles/fly.{k:04d}.fits") as single:
+                    single.verify("exception")
+                    self.assertEqual(len(single), 1)
+                    self.assertEqual(single[0].data.dtype, np.uint16)
+                    np.testing.assert_array_equal(single[0].data, hdu.data)
+                    for key in ("DATE-OBS", "EXPTIME", "GAIN", "WINX0", "FRAMEID", "PIXSCALE",
+                                "OBSPOSX"):
+                        self.assertEqual(single[0].header[key], hdu.header[key])
+                    for key in ("CRVAL1", "CRVAL2", "CRPIX1", "CD1_1", "CD1_2"):
+                        # the same solution from what the tables hold
+                        self.assertAlmostEqual(single[0].header[key], hdu.header[key], delta=1e-12)
+
+    def test_labels(self):
+        rows = runs.database(self.made)
+        for k, data in enumerate(annotations(self.out)):
+            with fits.open(f"{self.out}/ImageFiles/{data['file']['filename']}") as hdus:
+                image, keys = hdus[0].data, hdus[0].header
+            height, width = image.shape
+            self.assertEqual((data["file"]["dirname"], data["file"]["sequence_id"]), ("set", k))
+            self.assertEqual((data["sensor"]["height"], data["sensor"]["width"]), (height, width))
+            self.assertAlmostEqual(data["sensor"]["iFOVx"], keys["PIXSCALE"] / 3600, delta=1e-15)
+            self.assertEqual(data["stats"]["num_obs"], 1)
+            wcs, stars = WCS(keys), 0
+            for o in data["objects"]:
+                self.assertEqual(set(o), OBJECT_KEYS)
+                row = rows.execute("SELECT * FROM truth WHERE exposure_id = ? AND item = ?",
+                                   (k, o["seg_id"])).fetchone()
+                self.assertEqual(o["class_name"], "Star" if row["kind"] == "star" else "Satellite")
+                self.assertEqual(o["class_id"], 2 if row["kind"] == "star" else 1)
+                for when in ("start", "mid", "end"):
+                    self.assertAlmostEqual(o[f"x_{when}"] * width - 0.5 + keys["WINX0"],
+                                           row[f"x_{when}_px"], delta=1e-9)
+                    self.assertAlmostEqual(o[f"y_{when}"] * height - 0.5 + keys["WINY0"],
+                                           row[f"y_{when}_px"], delta=1e-9)
+                self.assertAlmostEqual(o["bbox_width"] * width, 20, delta=1e-9)
+                self.assertAlmostEqual(o["x_center"], (o["x_min"] + o["x_max"]) / 2, delta=1e-15)
+                self.assertAlmostEqual(o["magnitude"], row["v_mag"], delta=1e-12)
+                self.assertAlmostEqual(o["snr_aperture"] / row["snr"], 1.0, delta=1e-14)
+                self.assertAlmostEqual(o["pe_per_sec"] * keys["EXPTIME"], row["electrons"],
+                                       delta=1e-9 * row["electrons"])
+                if row["kind"] == "star":
+                    stars += 1
+                    self.assertLessEqual(o["magnitude"], 13)
+                    x, y = wcs.all_world2pix(o["ra"], o["dec"], 0)
+                    # WCS of the mean attitude against the middle of a shaken exposure
+                    self.assertAlmostEqual(float(x), o["x_mid"] * width - 0.5, delta=1.5)
+                    self.assertAlmostEqual(float(y), o["y_mid"] * height - 0.5, delta=1.5)
+                else:
+                    self.assertEqual(o["object_name"], "visitor")
+                    x, y = round(o["x_mid"] * width - 0.5), round(o["y_mid"] * height - 0.5)
+                    self.assertGreater(image[y - 1:y + 2, x - 1:x + 2].max(),
+                                       np.median(image) + 1000)
+            self.assertGreater(stars, 0)
+
+    def test_split_follows_names(self):
+        def parts(folder):
+            out = {}
+            for part in ("train", "val", "test"):
+                with open(f"{folder}/{part}.txt", encoding="utf-8") as file:
+                    for line in file:
+                        image, label = line.split()
+                        self.assertTrue(os.path.exists(f"{folder}/{image}"))
+                        self.assertTrue(os.path.exists(f"{folder}/{label}"))
+                        self.assertNotIn(image, out)
+                        out[image] = part
+            return out
+
+        whole = parts(self.out)
+        self.assertEqual(len(whole), 8)
+        some = os.path.join(runs.scratch(), "some")
+        self.assertEqual(export(self.made, "--satnet", some, "--split", "80,10,10", "--first", "1",
+                                "--every", "3").returncode, 0)
+        self.assertEqual(parts(some), {k: whole[k] for k in parts(some)})
+        self.assertEqual(len(parts(some)), 3)
+        self.assertEqual(export(self.made, "--satnet", some, "--split", "0,0,1").returncode, 0)
+        self.assertEqual(set(parts(some).values()), {"test"})
+
+    def test_cube_of_a_window_and_boxes(self):
+        folder = runs.scratch()
+        made, out = os.path.join(folder, "cube"), os.path.join(folder, "set")
+        runs.run(runs.STARE, made, "/record/frames=cube", f"{runs.SENSOR}/modules=" + json.dumps(
+            {"gimbal": {"type": "ideal", "object": "INMARSAT GX5"},
+             "scenegen": {"type": "opencl"}}), duration=3)
+        self.assertEqual(export(made, "--satnet", out, "--box", "0").returncode, 0)
+        found = annotations(out)
+        with fits.open(made + "/frames.fits") as hdus:
+            self.assertEqual(len(found), len(hdus[0].data))
+            for k, plane in enumerate(hdus[0].data):
+                np.testing.assert_array_equal(
+                    fits.getdata(f"{out}/ImageFiles/cube.{k:04d}.fits"), plane)
+        for o in found[0]["objects"]:
+            self.assertEqual(o["seg_id"], -1)
+            self.assertAlmostEqual(o["bbox_width"], o["x_max"] - o["x_min"], delta=1e-15)
+
+    def test_misuse(self):
+        for words in (("--split", "80,10,10"), ("--satnet", "x", "--split", "80,10"),
+                      ("--satnet", "x", "--split", "0,0,0"), ("--satnet", "x", "--split", "-1,1,1"),
+                      ("--satnet", "x", "--box", "-1")):
+            result = export(self.made, *words)
+            self.assertEqual(result.returncode, 2, words)
+            self.assertIn(words[-2], result.stderr)
+        blind = os.path.join(runs.scratch(), "blind")
+        runs.run(SCENARIO, blind, "/record/truth=false", duration=1)
+        result = export(blind, "--satnet", blind + ".set")
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("/record/truth=true", result.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
