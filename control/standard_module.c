@@ -53,6 +53,10 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
                                        .cue_user = m->view};
         status = bst_control_init(env->ctx, &m->control, config, &control_env);
     }
+    const bst_control_config *c = config;
+    if (c->strategy != BST_CONTROL_TRACK && !c->compensate_attitude) {
+        bst_env_ignore(env, PORT_TRACKS); /* the loop is open */
+    }
     if (status != BST_OK) {
         destroy(m);
         return status;

@@ -162,3 +162,13 @@ void bst_platform_append_pointing(bst_pointing_telemetry *telemetry, int capacit
     sample->axis_rad[1] = axis_rad[1];
     telemetry->written++;
 }
+
+void bst_platform_append_exact(const bst_platform *platform, int64_t n,
+                               bst_pointing_telemetry *telemetry, int capacity, int64_t tick,
+                               bst_quat q_cam_from_body) {
+    static const double no_angles[2] = {0.0, 0.0};
+    bst_quat body = bst_platform_measured_body(platform, n);
+    bst_platform_append_pointing(telemetry, capacity, tick,
+                                 bst_quat_unit(bst_quat_mul(q_cam_from_body, body)), no_angles,
+                                 body, true, false);
+}

@@ -75,5 +75,9 @@ void bst_platform_append_los(bst_los_history *history, int capacity, int64_t tic
 void bst_platform_append_pointing(bst_pointing_telemetry *telemetry, int capacity, int64_t tick,
                                   bst_quat q_cam_from_gcrf, const double axis_rad[2],
                                   bst_quat q_body_from_gcrf, bool settled, bool limited);
+/* The same of a mount without axes that follows exactly, at plant step n: the body as measured. */
+void bst_platform_append_exact(const bst_platform *platform, int64_t n,
+                               bst_pointing_telemetry *telemetry, int capacity, int64_t tick,
+                               bst_quat q_cam_from_body);
 
 #endif

@@ -142,12 +142,8 @@ static bst_status step(void *self, struct bst_step *s) {
                                               : m->frame.start_tick + m->frame.exposure_ticks;
     bst_step_wake_at(s, next < edge ? next : edge);
     if (past == 0 && n % m->telemetry_steps == 0) {
-        static const double no_angles[2] = {0.0, 0.0};
-        bst_quat body = bst_platform_measured_body(&m->platform, n);
         bst_pointing_telemetry *telemetry = bst_step_write(s, PORT_POINTING, &capacity);
-        bst_platform_append_pointing(telemetry, capacity, tick,
-                                     bst_quat_unit(bst_quat_mul(q_cam_from_body, body)), no_angles,
-                                     body, true, false);
+        bst_platform_append_exact(&m->platform, n, telemetry, capacity, tick, q_cam_from_body);
     }
     if (past == 0 && n % m->nav_steps == 0) {
         bst_nav_telemetry *nav = bst_step_write(s, PORT_NAV, NULL);

@@ -269,6 +269,7 @@ const bst_module_desc bst_imgproc_module = {
     .abi = BST_MODULE_ABI,
     .role = "imgproc",
     .type = "standard",
+    .flags = BST_MODULE_APART,
     .doc = "Calibrates frames, detects and locates sources with matched filters, identifies stars.",
     .config = bst_imgproc_config_table,
     .config_bytes = sizeof(bst_imgproc_config),

@@ -25,6 +25,10 @@ double bst_detector_near_full_e(double full_well_e) {
     return full_well_e - 8.0 * sqrt(full_well_e) - 20.0;
 }
 
+bst_rng_key bst_detector_pattern_key(const bst_camera *camera, const char *name) {
+    return bst_rng_make_key(camera->detector.pattern_seed, 0, name, "pattern");
+}
+
 bool bst_detector_whole_columns(const bst_detector *detector) {
     return bst_detector_config_whole_columns(&detector->camera.detector);
 }

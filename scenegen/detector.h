@@ -19,6 +19,9 @@ bst_status bst_detector_create(bst_ctx *ctx, bst_device *device, const bst_camer
                                bst_rng_key pattern, bst_detector **out) BST_MUST_CHECK;
 void bst_detector_free(bst_detector *detector);
 
+/* Key of a sensor's fixed patterns; `name`: "observer/sensor". The same in all runs of a study. */
+bst_rng_key bst_detector_pattern_key(const bst_camera *camera, const char *name);
+
 /* Kernel options of the detector, each with a space before it, as snprintf would write them.
  *
  * Shot and read noise of a pixel come from one normal deviate by a Cornish-Fisher expansion where

@@ -12,6 +12,9 @@
 
 enum { SETUPS = 4, FIELD_STEP_PX = 16, WRAP_PX = 96 };
 
+/* Error of a widened node's image that is allowed, over its peak. */
+static const double WIDEN_ERROR = 1e-3;
+
 /* What is ready for windows of one size. */
 typedef struct setup {
     int width, height;
@@ -127,7 +130,18 @@ static bst_status prepare(bst_ctx *ctx, bst_device *device, bst_fft_light *l) {
         l->density[a] =
             bst_light_density(&l->band, a, l->options.taps, 0.45 * l->options.tolerance);
     }
-    l->widest = 1.0;
+    l->error = l->band.lost;
+    l->widest = BST_WIDEST;
+    for (int a = 0; a < 2; a++) {
+        bst_spread spread = {.taps = l->options.taps};
+        bst_spread_shape shape;
+        l->error += bst_spread_choose(&spread, &l->band.axis[a], l->density[a]);
+        double sigma = l->band.node_sigma_px * l->density[a];
+        while (bst_spread_widen(&spread, &l->band.axis[a], l->density[a], l->widest * sigma * sigma,
+                                &shape) > WIDEN_ERROR) {
+            l->widest *= 0.8;
+        }
+    }
     l->margin = (l->band.reach_px + 15) / 16 * 16;
     return make_fields(ctx, l);
 }
@@ -213,24 +227,27 @@ void bst_fft_light_stamp(const bst_fft_light *l, bst_scene_source *source) {
     source->radius = (int)ceil(0.5 * l->options.taps / least) + 1;
 }
 
+double bst_fft_light_widest(const bst_fft_light *l) {
+    return l->widest;
+}
+
 double bst_fft_light_error(const bst_fft_light *l) {
     return l->error;
 }
 
 /* Table of the spreading kernel for a point `phase` samples right of sample taps / 2 - 1, and of
- * kernels for nodes that are wider by (n / BST_WIDTHS)^2 BST_WIDEST times `variance` px^2. */
+ * kernels for nodes that are wider by (n / BST_WIDTHS)^2 BST_WIDEST of the node variance. */
 static void tabulate(const bst_fft_light *l, int a, const bst_light_axis *axis, float *table) {
     double density = (double)axis->samples / axis->pixels;
     int first = BST_SPREAD_TAPS / 2 - axis->spread.taps / 2;
     memset(table, 0, BST_SPREAD_TABLE * sizeof *table);
     for (int n = 0; n <= BST_WIDTHS; n++) {
         double share = (double)n / BST_WIDTHS, sigma = share * l->band.node_sigma_px * density;
-        double variance = fmin(BST_WIDEST, l->widest) * sigma * sigma;
+        double variance = BST_WIDEST * sigma * sigma;
         bst_spread_shape shape;
         bst_spread_widen(&axis->spread, &l->band.axis[a], density, variance, &shape);
         for (int p = 0; p <= BST_SPREAD_PHASES; p++) {
-            float *row =
-                table + (n * (BST_SPREAD_PHASES + 1) + p) * BST_SPREAD_ROW + BST_SPREAD_PAD;
+            float *row = table + (n * (BST_SPREAD_PHASES + 1) + p) * BST_SPREAD_TAPS;
             for (int j = first; j < first + axis->spread.taps; j++) {
                 double t = j - (BST_SPREAD_TAPS / 2 - 1) - (double)p / BST_SPREAD_PHASES;
                 row[j] = (float)bst_spread_shape_value(&axis->spread, &shape, t);
@@ -332,7 +349,6 @@ bst_status bst_fft_light_render(bst_ctx *ctx, bst_fft_light *l, cl_command_queue
     setup *s;
     BST_TRY(find_setup(ctx, l, window, &s));
     const bst_light_shape *shape = bst_light_fft_shape(s->fft);
-    l->error = shape->x.error + shape->y.error + l->band.lost;
     size_t bytes =
         (size_t)bst_light_fft_rows(s->fft) * (size_t)bst_light_fft_pitch(s->fft) * sizeof(float);
     for (int n = 0; n < l->nodes; n++) {

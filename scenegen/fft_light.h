@@ -35,7 +35,10 @@ int bst_fft_light_margin_px(const bst_fft_light *light);
 /* Sets the part of a source's record that says how far its nodes reach. */
 void bst_fft_light_stamp(const bst_fft_light *light, bst_scene_source *source);
 
-/* Bound of the latest image's error by grid and cut-off, over a source's peak. */
+/* By how many node variances (bst_light_band) a node may be widened. */
+double bst_fft_light_widest(const bst_fft_light *light);
+
+/* Bound of an image's error by grid and cut-off, over a source's peak. */
 double bst_fft_light_error(const bst_fft_light *light);
 
 /* The frame's nodes on the device, as the nodes kernel leaves them. */

@@ -1,5 +1,6 @@
 #include "scenegen/frame_pool.h"
 
+#include <pthread.h>
 #include <stdbool.h>
 #include <stdlib.h>
 
@@ -8,12 +9,16 @@ typedef struct pooled_frame {
     bst_frame_pool *pool;
     cl_mem buffer;
     void *mapped;
+    cl_event ready; /* of the mapping; NULL: it is there */
     bool lent;
 } pooled_frame;
 
 struct bst_frame_pool {
     cl_command_queue queue;
-    int count, lent;
+    int count;
+    pthread_mutex_t waiting; /* over the frames' ready */
+    pthread_mutex_t lock;    /* over lent and closed */
+    int lent;
     bool closed; /* by its maker: goes with the last frame */
     pooled_frame frames[];
 };
@@ -27,29 +32,39 @@ static void destroy(bst_frame_pool *pool) {
     if (pool->queue) {
         clReleaseCommandQueue(pool->queue);
     }
+    pthread_mutex_destroy(&pool->lock);
+    pthread_mutex_destroy(&pool->waiting);
     free(pool);
+}
+
+bst_status bst_frame_pool_enqueued(bst_ctx *ctx, bst_frame *frame) {
+    pooled_frame *f = frame->owner;
+    cl_int code;
+    size_t bytes = (size_t)frame->width * (size_t)frame->height * sizeof(uint16_t);
+    void *p = clEnqueueMapBuffer(f->pool->queue, f->buffer, CL_FALSE, CL_MAP_READ, 0, bytes, 0,
+                                 NULL, &f->ready, &code);
+    BST_TRY(bst_device_check(ctx, code, "mapping a frame"));
+    f->mapped = p;
+    return BST_OK;
 }
 
 static bst_status map(void *owner, bst_ctx *ctx, const uint16_t **pixels) {
     pooled_frame *f = owner;
-    if (!f->mapped) {
-        cl_int code;
-        size_t bytes = (size_t)f->frame.width * (size_t)f->frame.height * sizeof(uint16_t);
-        void *p = clEnqueueMapBuffer(f->pool->queue, f->buffer, CL_TRUE, CL_MAP_READ, 0, bytes, 0,
-                                     NULL, NULL, &code);
-        BST_TRY(bst_device_check(ctx, code, "mapping a frame"));
-        f->mapped = p;
+    cl_int code = CL_SUCCESS;
+    pthread_mutex_lock(&f->pool->waiting);
+    if (f->ready) {
+        code = clWaitForEvents(1, &f->ready);
+        clReleaseEvent(f->ready);
+        f->ready = NULL;
     }
+    pthread_mutex_unlock(&f->pool->waiting);
     *pixels = f->mapped;
-    return BST_OK;
+    return bst_device_check(ctx, code, "rendering a frame");
 }
 
+/* The mapping stays for the next reader. */
 static void unmap(void *owner) {
-    pooled_frame *f = owner;
-    if (f->mapped) {
-        clEnqueueUnmapMemObject(f->pool->queue, f->buffer, f->mapped, 0, NULL, NULL);
-        f->mapped = NULL;
-    }
+    (void)owner;
 }
 
 static void *device_buffer(void *owner) {
@@ -59,10 +74,20 @@ static void *device_buffer(void *owner) {
 static void recycle(void *owner) {
     pooled_frame *f = owner;
     bst_frame_pool *pool = f->pool;
-    unmap(f);
+    if (f->ready) {
+        clReleaseEvent(f->ready);
+        f->ready = NULL;
+    }
+    if (f->mapped) {
+        clEnqueueUnmapMemObject(pool->queue, f->buffer, f->mapped, 0, NULL, NULL);
+        f->mapped = NULL;
+    }
+    pthread_mutex_lock(&pool->lock);
     f->lent = false;
     pool->lent--;
-    if (pool->closed && pool->lent == 0) {
+    bool last = pool->closed && pool->lent == 0;
+    pthread_mutex_unlock(&pool->lock);
+    if (last) {
         clFinish(pool->queue);
         destroy(pool);
     }
@@ -77,6 +102,8 @@ bst_status bst_frame_pool_create(bst_ctx *ctx, bst_device *device, int width, in
     if (!pool) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a pool of %d frames", count);
     }
+    pthread_mutex_init(&pool->lock, NULL);
+    pthread_mutex_init(&pool->waiting, NULL);
     pool->queue = bst_device_queue(device);
     clRetainCommandQueue(pool->queue);
     pool->count = count;
@@ -101,29 +128,36 @@ void bst_frame_pool_free(bst_frame_pool *pool) {
     if (!pool) {
         return;
     }
-    if (pool->lent > 0) {
-        pool->closed = true;
-    } else {
+    pthread_mutex_lock(&pool->lock);
+    pool->closed = true;
+    bool unused = pool->lent == 0;
+    pthread_mutex_unlock(&pool->lock);
+    if (unused) {
         destroy(pool);
     }
 }
 
 bst_status bst_frame_pool_take(bst_ctx *ctx, bst_frame_pool *pool, int width, int height,
                                bst_frame **out, cl_mem *buffer) {
-    for (int i = 0; i < pool->count; i++) {
-        pooled_frame *f = &pool->frames[i];
-        if (!f->lent) {
-            f->frame = (bst_frame){
-                .ops = &ops, .owner = f, .width = width, .height = height, .references = 1};
-            f->lent = true;
-            pool->lent++;
-            *out = &f->frame;
-            *buffer = f->buffer;
-            return BST_OK;
-        }
+    pooled_frame *f = NULL;
+    pthread_mutex_lock(&pool->lock);
+    for (int i = 0; i < pool->count && !f; i++) {
+        f = pool->frames[i].lent ? NULL : &pool->frames[i];
     }
-    return bst_fail(ctx, BST_ERR_STATE,
-                    "all %d frames are in use: raise scenegen's pool_frames above the number of "
-                    "frames that queues hold",
-                    pool->count);
+    if (f) {
+        f->lent = true;
+        pool->lent++;
+    }
+    pthread_mutex_unlock(&pool->lock);
+    if (!f) {
+        return bst_fail(ctx, BST_ERR_STATE,
+                        "all %d frames are in use: raise scenegen's pool_frames above the number "
+                        "of frames that queues hold",
+                        pool->count);
+    }
+    f->frame =
+        (bst_frame){.ops = &ops, .owner = f, .width = width, .height = height, .references = 1};
+    *out = &f->frame;
+    *buffer = f->buffer;
+    return BST_OK;
 }

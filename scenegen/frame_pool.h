@@ -1,4 +1,5 @@
-/* A fixed number of frames on the device, lent and taken back without allocation. */
+/* A fixed number of frames on the device, lent and taken back without allocation. Frames may be
+ * read and released by another thread than the one that renders. */
 #ifndef BST_SCENEGEN_FRAME_POOL_H
 #define BST_SCENEGEN_FRAME_POOL_H
 
@@ -17,5 +18,9 @@ void bst_frame_pool_free(bst_frame_pool *pool);
  * BST_ERR_STATE when all are lent. */
 bst_status bst_frame_pool_take(bst_ctx *ctx, bst_frame_pool *pool, int width, int height,
                                bst_frame **out, cl_mem *buffer) BST_MUST_CHECK;
+
+/* What renders into the frame has been put on the queue: mapping the frame waits for that alone,
+ * not for what is put on the queue later. */
+bst_status bst_frame_pool_enqueued(bst_ctx *ctx, bst_frame *frame) BST_MUST_CHECK;
 
 #endif

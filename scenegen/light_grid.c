@@ -62,13 +62,15 @@ static bst_status invert(bst_ctx *ctx, fftwf_complex *data, int n) {
 /* Peak, sensitivity to coarse nodes and the strength of frequencies along x and y. */
 static bst_status measure_core(bst_ctx *ctx, const bst_psf *psf, fftwf_complex *room,
                                bst_light_band *out) {
-    double step = 2.0 * out->cutoff / LATTICE, area = step * step, fourth = 0.0, peak = 0.0;
+    double step = 2.0 * out->cutoff / LATTICE, area = step * step, peak = 0.0;
+    static const double gaussian[3] = {1.0, 3.0, 15.0}; /* derivatives 2, 4, 6 at sigma 1 */
+    out->node_sigma_px = INFINITY;
     for (int a = 0; a < 2; a++) {
         out->axis[a].step = out->cutoff / BST_SPREAD_BINS;
         memset(out->axis[a].weight, 0, sizeof out->axis[a].weight);
     }
     for (int n = 0; n < bst_psf_nodes(psf); n++) {
-        double along[DIRECTIONS] = {0};
+        double along[DIRECTIONS][3] = {{0}};
         memset(room, 0, sizeof(fftwf_complex) * IMAGE * IMAGE);
         for (int j = -LATTICE / 2; j < LATTICE / 2; j++) {
             for (int i = -LATTICE / 2; i < LATTICE / 2; i++) {
@@ -85,7 +87,9 @@ static bst_status measure_core(bst_ctx *ctx, const bst_psf *psf, fftwf_complex *
                 for (int d = 0; d < DIRECTIONS; d++) {
                     double angle = BST_PI * d / DIRECTIONS;
                     double w = 2.0 * BST_PI * (fx * cos(angle) + fy * sin(angle));
-                    along[d] += w * w * w * w * m;
+                    along[d][0] += w * w * m;
+                    along[d][1] += w * w * w * w * m;
+                    along[d][2] += w * w * w * w * w * w * m;
                 }
             }
         }
@@ -96,12 +100,14 @@ static bst_status measure_core(bst_ctx *ctx, const bst_psf *psf, fftwf_complex *
         }
         peak = fmax(peak, top);
         for (int d = 0; d < DIRECTIONS; d++) {
-            fourth = fmax(fourth, along[d] / top);
+            for (int k = 0; k < 3; k++) {
+                double sigma = pow(gaussian[k] * top / along[d][k], 0.5 / (k + 1));
+                out->node_sigma_px = fmin(out->node_sigma_px, sigma);
+            }
         }
     }
     out->peak = peak;
     out->lost /= peak;
-    out->node_sigma_px = pow(3.0 / fourth, 0.25);
     for (int a = 0; a < 2; a++) {
         for (int i = 0; i < BST_SPREAD_BINS; i++) {
             out->axis[a].weight[i] /= peak * bst_psf_nodes(psf);

@@ -12,8 +12,9 @@ typedef struct bst_light_band {
     double cutoff;         /* cycles/px that are kept */
     double lost;           /* bound of the error of those that are not, over the PSF's peak */
     double peak;           /* largest share of a point's light in one pixel */
-    double node_sigma_px;  /* of the Gaussian that is as sensitive to coarse nodes: its fourth
-                              derivative over its peak, 3 / sigma^4, is the PSF's largest */
+    double node_sigma_px;  /* of the Gaussian that is as sensitive to coarse nodes: its derivatives
+                              over its peak, of order 2, 4 and 6 (1, 3 and 15 over sigma to that
+                              order), are at least the PSF's anywhere */
     double share_sigma_px; /* of the Gaussian with the same peak */
     int reach_px;          /* beyond, a pixel gets less than 3e-7 of a point's light (16 to 160) */
     bst_spread_band axis[2];

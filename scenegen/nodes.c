@@ -14,8 +14,9 @@ typedef struct maker {
     double tolerance;
     bool widen;
     bst_node_list *list;
-    double most;  /* spread of the next group, px^2 */
-    double limit; /* of it */
+    double widest; /* px^2 */
+    double most;   /* spread of the next group, px^2 */
+    double limit;  /* of it */
 } maker;
 
 /* A group: the path from time `from` (in segment `first`) to `to`. */
@@ -28,12 +29,12 @@ typedef struct group {
 typedef struct moments {
     double mean[3], axis[3];
     double covariance[3][3];
-    double along[7];     /* E[x^k] */
-    double bend[3];      /* E[y x^2], y the part across the axis */
-    double drift;        /* E[x y^2] */
-    double mixed;        /* E[x^2 y^2] */
-    double lean[3];      /* E[y y^2] */
-    double across[3][3]; /* E[y y^T] */
+    double along[7]; /* E[x^k] */
+    double bend[3];  /* E[y x^2], y the part across the axis */
+    double drift;    /* E[x y^2] */
+    double mixed;    /* E[x^2 y^2] */
+    double lean[3];  /* E[y y^2] */
+    double across;   /* E[y^2] */
 } moments;
 
 /* A way to stand for a group. */
@@ -194,11 +195,7 @@ static void high_moments(const maker *m, const group *g, moments *out) {
             for (int i = 0; i < 3; i++) {
                 out->lean[i] += part * d[i] * y2;
             }
-            for (int i = 0; i < 3; i++) {
-                for (int j = 0; j <= i; j++) {
-                    out->across[i][j] += part * d[i] * d[j];
-                }
-            }
+            out->across += part * y2;
             weight += part;
         }
     }
@@ -207,33 +204,28 @@ static void high_moments(const maker *m, const group *g, moments *out) {
     }
     out->drift /= weight;
     out->mixed /= weight;
+    out->across /= weight;
     for (int i = 0; i < 3; i++) {
         out->bend[i] /= weight;
         out->lean[i] /= weight;
-        for (int j = 0; j <= i; j++) {
-            out->across[i][j] /= weight;
-            out->across[j][i] = out->across[i][j];
-        }
     }
 }
 
 /* Gaussian quadrature of n nodes for moments e[0..2n - 1] about the mean; returns the squared norm
  * of the next orthogonal polynomial, which is what the rule misses of moment 2n; negative when the
- * moments are those of no distribution. curve: second polynomial at the nodes, *norm2 its squared
- * norm. */
-static double quadrature(int n, const double e[7], rule *r, double *norm2) {
+ * moments are those of no distribution. curve: second polynomial at the nodes. */
+static double quadrature(int n, const double e[7], rule *r) {
     double v = e[2];
     if (n == 1) {
         r->node[0] = 0.0;
         r->weight[0] = 1.0;
         return fabs(v);
     }
+    if (!(v > 0.0)) {
+        return -1.0;
+    }
     double skew = e[3] / v, norm = e[4] - skew * e[3] - v * v;
-    *norm2 = norm;
-    if (!(v > 0.0) || n == 2) {
-        if (!(v > 0.0)) {
-            return -1.0;
-        }
+    if (n == 2) {
         double root = sqrt(0.25 * skew * skew + v);
         r->node[0] = 0.5 * skew - root;
         r->node[1] = 0.5 * skew + root;
@@ -294,7 +286,7 @@ static double second_norm(const moments *g, double u) {
 
 /* Fills the rule and its error: what it misses of the image, over the peak. */
 static void try_rule(const maker *m, const moments *g, int n, bool widen, bool split, rule *r) {
-    double var = m->variance, d[3][3], norm2 = 0.0;
+    double var = m->variance, d[3][3];
     memset(r, 0, sizeof *r);
     r->nodes = n;
     r->error = INFINITY;
@@ -327,7 +319,7 @@ static void try_rule(const maker *m, const moments *g, int n, bool widen, bool s
         trace = fmax(d[0][0] + d[1][1], 0.0);
     }
     if (widen) {
-        r->widening = fmin(trace * per_trace, BST_NODE_WIDEST * var);
+        r->widening = fmin(trace * per_trace, m->widest);
         if (n > 1) { /* along the axis the moments make room for it */
             for (int i = 0; i < 3; i++) {
                 for (int j = 0; j < 3; j++) {
@@ -359,7 +351,7 @@ static void try_rule(const maker *m, const moments *g, int n, bool widen, bool s
     e[4] -= u * (6.0 * e[2] + 3.0 * u);
     e[5] -= 10.0 * u * e[3];
     e[6] -= u * (15.0 * e[4] + u * (45.0 * e[2] + 15.0 * u));
-    double missed = quadrature(n, e, r, &norm2);
+    double missed = quadrature(n, e, r);
     if (missed < 0.0) {
         return;
     }
@@ -371,8 +363,7 @@ static void try_rule(const maker *m, const moments *g, int n, bool widen, bool s
     third += n < 3 ? 0.3 * norm3(g->bend) : 0.0;
     double error = third / (var * sqrt(var));
     /* x^2 and y^2 together: a quarter of a derivative of at most the peak over sigma^4 */
-    double across2 = g->across[0][0] + g->across[1][1] + g->across[2][2];
-    error += 0.25 * fabs(g->mixed - g->along[2] * across2) / (var * var);
+    error += 0.25 * fabs(g->mixed - g->along[2] * g->across) / (var * var);
     double wide = split
                       ? r->pair[0] * r->pair[0] + r->pair[1] * r->pair[1] + r->pair[2] * r->pair[2]
                       : r->widening;
@@ -441,8 +432,7 @@ static bst_status close_group(bst_ctx *ctx, maker *m, group g, int depth) {
         }
     }
     /* a blob rather than a line does not get thinner by halves */
-    double off = t.across[0][0] + t.across[1][1] + t.across[2][2];
-    if (best.error > m->tolerance && !m->widen && off > 0.2 * t.along[2]) {
+    if (best.error > m->tolerance && !m->widen && t.across > 0.2 * t.along[2]) {
         try_rule(m, &t, 2, false, true, &r);
         if (r.error < best.error) {
             best = r;
@@ -487,15 +477,16 @@ static double spread_of(const extent *e) {
 }
 
 bst_status bst_nodes_from_path(bst_ctx *ctx, const bst_path_point *path, int count,
-                               double psf_sigma_px, double tolerance, bool widen,
+                               double psf_sigma_px, double tolerance, double widest,
                                bst_node_list *list) {
     maker m = {.path = path,
                .count = count,
                .total = path[count - 1].s - path[0].s,
                .variance = psf_sigma_px * psf_sigma_px,
                .tolerance = tolerance,
-               .widen = widen,
-               .list = list};
+               .widen = widest > 0.0,
+               .list = list,
+               .widest = widest * psf_sigma_px * psf_sigma_px};
     if (!(m.total > 0.0)) {
         return push(ctx, list, path[0].p, 1.0, 0.0);
     }

@@ -40,10 +40,11 @@ typedef struct bst_node_list {
 
 /* Appends the nodes of a path of `count` >= 2 points (two points at one time: a single node), for a
  * PSF whose standard deviation is psf_sigma_px, so that the image is right to about `tolerance` of
- * the smeared image's peak. Without `widen`, variances are 0 and jitter is followed by nodes.
+ * the smeared image's peak. Nodes are widened by at most `widest` <= BST_NODE_WIDEST PSF variances;
+ * with 0, jitter is followed by nodes.
  * Raises list->error. BST_ERR_MEMORY. */
 bst_status bst_nodes_from_path(bst_ctx *ctx, const bst_path_point *path, int count,
-                               double psf_sigma_px, double tolerance, bool widen,
+                               double psf_sigma_px, double tolerance, double widest,
                                bst_node_list *list) BST_MUST_CHECK;
 
 /* Largest share of a source's light that falls on one pixel when smeared over nodes[count], PSF

@@ -10,8 +10,10 @@
 #include "scenegen/detector.h"
 #include "scenegen/fft_light.h"
 #include "scenegen/frame_pool.h"
+#include "scenegen/profile_table.h"
 #include "scenegen/readout.h"
 #include "scenegen/reference.h"
+#include "scenegen/render_request.h"
 #include "scenegen/smear.h"
 #include "scenegen/tiles.h"
 #include "scenegen/vignetting.h"
@@ -46,29 +48,15 @@ struct bst_renderer {
     bst_scene_source *list; /* drawn sources */
     double *peak_e;         /* of all sources of the request */
     int list_capacity, tiles;
-    bool map;            /* the background differs from pixel to pixel */
+    bool map;       /* the background differs from pixel to pixel */
+    bool uncounted; /* saturated pixels of the latest frame */
+    long long saturated_pixels, saturated_frames;
     uint64_t most_bytes; /* of one buffer on the device */
     bst_render_stats stats;
 };
 
 bst_renderer_options bst_renderer_default_options(void) {
     return (bst_renderer_options){.tolerance_sigma = 0.05, .pool_frames = 4};
-}
-
-static bst_status check_camera(bst_ctx *ctx, const bst_camera *c) {
-    if (c->width_px < 1 || c->height_px < 1 || c->width_px > 65536 || c->height_px > 65536 ||
-        c->bits < 8 || c->bits > 16) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT,
-                        "cannot render %lld x %lld pixels of %lld bits: allowed are 1 to 65536 "
-                        "pixels and 8 to 16 bits",
-                        (long long)c->width_px, (long long)c->height_px, (long long)c->bits);
-    }
-    if (!(c->psf_fwhm_px > 0.0) || c->psf_fwhm_px > 70.0) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT,
-                        "cannot render a PSF of psf_fwhm_px %g: allowed are 0 to 70 pixels",
-                        c->psf_fwhm_px);
-    }
-    return BST_OK;
 }
 
 /* Stamps up to 8 standard deviations on each side: beyond, less than 1e-15 of the light is left. */
@@ -119,51 +107,6 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
     return bst_readout_create(ctx, device, &r->camera, r->program, &r->readout);
 }
 
-/* Share of the peak that linear interpolation between the phases misses: 1 / (8 phases^2 sigma^2)
- * on each axis. */
-static double table_error(double sigma_px, int phases) {
-    return 0.25 / (sigma_px * sigma_px * phases * phases);
-}
-
-/* Phases with which a source that nearly fills the pixels' wells is right to a third of the
- * tolerance; for fainter ones it is less. */
-static int phases_for(double sigma_px, double tolerance_sigma, double full_well_e) {
-    int phases = 8;
-    while (phases < 2048 &&
-           table_error(sigma_px, phases) * sqrt(full_well_e) > 0.33 * tolerance_sigma) {
-        phases *= 2;
-    }
-    return phases;
-}
-
-/* [BST_WIDTHS + 1][phases + 1][taps]: shares of a profile centred phase / phases right of a pixel.
- */
-static bst_status make_profiles(bst_ctx *ctx, bst_renderer *r) {
-    size_t rows = (size_t)(BST_WIDTHS + 1) * (size_t)(r->phases + 1),
-           row_floats = (size_t)r->taps + 2 * BST_PROFILE_PAD;
-    size_t bytes = rows * row_floats * sizeof(float);
-    float *table = calloc(rows, row_floats * sizeof(float));
-    if (!table) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the PSF table");
-    }
-    double psf = bst_camera_psf_sigma_px(&r->camera);
-    for (size_t row = 0; row < rows; row++) {
-        size_t width = row / (size_t)(r->phases + 1), phase = row % (size_t)(r->phases + 1);
-        double share = (double)width / BST_WIDTHS;
-        double sigma = psf * sqrt(1.0 + BST_WIDEST * share * share);
-        for (int j = 0; j < r->taps; j++) {
-            table[row * row_floats + BST_PROFILE_PAD + (size_t)j] =
-                (float)bst_reference_pixel_share((double)phase / r->phases, sigma,
-                                                 j - (r->taps / 2 - 1));
-        }
-    }
-    cl_int code;
-    r->profiles =
-        clCreateBuffer(r->context, CL_MEM_READ_ONLY | CL_MEM_COPY_HOST_PTR, bytes, table, &code);
-    free(table);
-    return bst_device_check(ctx, code, "allocating the PSF table");
-}
-
 /* Makes room for `bytes`; the content is lost when the buffer grows. */
 static bst_status grow(bst_ctx *ctx, bst_renderer *r, growing *g, size_t bytes) {
     if (g->bytes >= bytes && g->buffer) {
@@ -207,9 +150,14 @@ static bst_status open_psf(bst_ctx *ctx, bst_device *device, bst_renderer *r,
     if (bst_psf_gaussian(r->psf, &sigma_px)) {
         return BST_OK;
     }
+    /* a point that fills the well, next to dark pixels */
     bst_fft_light_options light = bst_fft_light_default_options();
+    double dark = fmax(r->camera.read_noise_e, 3.0);
+    light.tolerance = 10.0 * r->options.tolerance_sigma * dark / fmax(r->camera.full_well_e, 1.0);
+    light.tolerance = fmin(fmax(light.tolerance, 2e-6), 1e-3);
     light.taps = r->options.fft_taps > 0 ? r->options.fft_taps : light.taps;
     BST_TRY(bst_fft_light_create(ctx, device, &r->camera, r->psf, &light, &r->fft_light));
+    smear->widest = bst_fft_light_widest(r->fft_light);
     smear->table_error = 0.0;
     smear->node_sigma_px = bst_fft_light_band(r->fft_light)->node_sigma_px;
     smear->share_sigma_px = bst_fft_light_band(r->fft_light)->share_sigma_px;
@@ -219,7 +167,7 @@ static bst_status open_psf(bst_ctx *ctx, bst_device *device, bst_renderer *r,
 bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
                                const bst_renderer_options *options, bst_renderer **out) {
     *out = NULL;
-    BST_TRY(check_camera(ctx, camera));
+    BST_TRY(bst_render_camera_check(ctx, camera));
     bst_renderer *r = calloc(1, sizeof *r);
     if (!r) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the renderer");
@@ -231,14 +179,14 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     double sigma_px = bst_camera_psf_sigma_px(camera);
     r->phases = r->options.psf_phases > 0
                     ? r->options.psf_phases
-                    : phases_for(sigma_px, r->options.tolerance_sigma, camera->full_well_e);
+                    : bst_profile_phases(sigma_px, r->options.tolerance_sigma, camera->full_well_e);
     r->context = bst_device_context(device);
     r->queue = bst_device_queue(device);
     clRetainContext(r->context);
     clRetainCommandQueue(r->queue);
     bst_smear_options smear = {.tolerance_sigma = r->options.tolerance_sigma,
                                .taps = r->taps,
-                               .table_error = table_error(sigma_px, r->phases),
+                               .table_error = bst_profile_error(sigma_px, r->phases),
                                .motion = r->options.motion,
                                .temporal_oversample = r->options.temporal_oversample,
                                .stamp_radius_px = r->options.stamp_radius_px};
@@ -253,7 +201,8 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
         status = build(ctx, r, device);
     }
     if (status == BST_OK) {
-        status = make_profiles(ctx, r);
+        status = bst_profile_table(ctx, r->context, bst_camera_psf_sigma_px(camera), r->taps,
+                                   r->phases, &r->profiles);
     }
     if (status == BST_OK) {
         status = bst_smear_create(ctx, camera, &smear, &r->smear);
@@ -305,56 +254,6 @@ void bst_renderer_free(bst_renderer *r) {
     free(r);
 }
 
-/* The pixels whose light a frame of a window takes. */
-static bst_window columns_of(const bst_renderer *r, bst_window w) {
-    if (bst_detector_whole_columns(r->detector)) {
-        w.y0 = 0;
-        w.height = (int)r->camera.height_px;
-    }
-    return w;
-}
-
-static bool covers(const bst_skylight_map *map, bst_window w) {
-    return w.x0 >= map->x0_px && w.y0 >= map->y0_px &&
-           w.x0 + w.width - 1 <= map->x0_px + (map->columns - 1) * map->step_px &&
-           w.y0 + w.height - 1 <= map->y0_px + (map->rows - 1) * map->step_px;
-}
-
-static bst_status check_request(bst_ctx *ctx, const bst_renderer *r, const bst_render_request *q) {
-    bst_window w = q->window;
-    if (w.x0 < 0 || w.y0 < 0 || w.width < 1 || w.height < 1 ||
-        w.x0 + (int64_t)w.width > r->camera.width_px ||
-        w.y0 + (int64_t)w.height > r->camera.height_px) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT,
-                        "the window of %d x %d pixels at (%d, %d) is not inside the sensor of "
-                        "%lld x %lld",
-                        w.width, w.height, w.x0, w.y0, (long long)r->camera.width_px,
-                        (long long)r->camera.height_px);
-    }
-    int binning = q->binning > 1 ? q->binning : 1;
-    if (binning > w.width || binning > w.height) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT, "binning %d does not fit a window of %d x %d pixels",
-                        binning, w.width, w.height);
-    }
-    if (!(q->background_e >= 0.0) || !isfinite(q->background_e) || q->track->count < 2) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT,
-                        "a request needs a background that is finite and not negative (it is %g) "
-                        "and two samples of the line of sight (there are %d)",
-                        q->background_e, q->track->count);
-    }
-    if (q->background && !r->map) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT,
-                        "a request has a map of the background, but the camera's background is the "
-                        "same all over the sensor (bst_skylight_varies)");
-    }
-    if (q->background && !covers(q->background, columns_of(r, w))) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT,
-                        "a request's map of the background does not cover its window, or that "
-                        "window's whole columns where charge runs along them");
-    }
-    return BST_OK;
-}
-
 /* Chooses nodes and stamps of all sources: fills list and stats. */
 static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q, int *blocks) {
     if (q->count > r->list_capacity) {
@@ -398,8 +297,13 @@ static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *
             s->first_block = *blocks;
             *blocks += s->blocks;
             r->stats.sources++;
+            double grid = 0.0; /* error of the Fourier path's grid, on dark pixels */
+            if (r->fft_light) {
+                grid = bst_fft_light_error(r->fft_light) * r->peak_e[i] /
+                       sqrt(q->background_e + read * read);
+            }
             r->stats.predicted_sigma =
-                fmax(r->stats.predicted_sigma, bst_smear_last_error_sigma(r->smear));
+                fmax(r->stats.predicted_sigma, bst_smear_last_error_sigma(r->smear) + grid);
         }
     }
     r->stats.nodes = (long long)*blocks * BST_BLOCK;
@@ -495,6 +399,27 @@ static bst_scene_params make_params(const bst_renderer *r, const bst_render_requ
     };
 }
 
+/* Counts the saturated pixels of the latest frame, once. Waits for it. */
+static bst_status count_saturated(bst_ctx *ctx, bst_renderer *r) {
+    if (!r->uncounted) {
+        return BST_OK;
+    }
+    r->uncounted = false;
+    r->saturated_pixels = 0;
+    cl_int code;
+    size_t bytes = (size_t)r->tiles * sizeof(cl_int);
+    cl_int *p = clEnqueueMapBuffer(r->queue, r->saturated.buffer, CL_TRUE, CL_MAP_READ, 0, bytes, 0,
+                                   NULL, NULL, &code);
+    BST_TRY(bst_device_check(ctx, code, "mapping the count of saturated pixels"));
+    for (int i = 0; i < r->tiles; i++) {
+        r->saturated_pixels += p[i];
+    }
+    r->saturated_frames += r->saturated_pixels > 0;
+    return bst_device_check(
+        ctx, clEnqueueUnmapMemObject(r->queue, r->saturated.buffer, p, 0, NULL, NULL),
+        "unmapping the count of saturated pixels");
+}
+
 /* The image that the tile kernel takes its light from, where the PSF is no Gaussian. */
 static bst_status make_light(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q, int groups,
                              bst_scene_params *p, cl_mem *light) {
@@ -514,6 +439,7 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
                                 cl_kernel kernel, cl_mem out, int stride, bool light_only) {
     int blocks = 0, groups = 0;
     BST_TRY(plan(ctx, r, q, &blocks));
+    BST_TRY(count_saturated(ctx, r)); /* of the frame before, which was rendered meanwhile */
     BST_TRY(enqueue_nodes(ctx, r, blocks, &groups));
     bst_scene_params p = make_params(r, q, groups);
     p.image_stride = stride > 0 ? stride : p.image_stride;
@@ -552,15 +478,14 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
                                  "setting a kernel argument"));
     }
     size_t group = (size_t)r->options.group, global = (tiles + group - 1) / group * group;
-    BST_TRY(bst_device_check(
+    return bst_device_check(
         ctx, clEnqueueNDRangeKernel(r->queue, kernel, 1, NULL, &global, &group, 0, NULL, NULL),
-        "rendering a frame"));
-    return bst_device_check(ctx, clFlush(r->queue), "starting the rendering");
+        "rendering a frame");
 }
 
 bst_status bst_renderer_plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *request) {
     int blocks;
-    BST_TRY(check_request(ctx, r, request));
+    BST_TRY(bst_render_request_check(ctx, &r->camera, request));
     return plan(ctx, r, request, &blocks);
 }
 
@@ -583,7 +508,7 @@ static bst_status render_in_stages(bst_ctx *ctx, bst_renderer *r, const bst_rend
 bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *r, const bst_render_request *request,
                                bst_frame **out) {
     *out = NULL;
-    BST_TRY(check_request(ctx, r, request));
+    BST_TRY(bst_render_request_check(ctx, &r->camera, request));
     bst_frame *frame;
     cl_mem buffer;
     int binning = request->binning > 1 ? request->binning : 1;
@@ -598,7 +523,14 @@ bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *r, const bst_render_r
                      : enqueue_tiles(ctx, r, request, r->frame_kernel, buffer, 0, false);
     }
     if (status == BST_OK) {
+        r->uncounted = true;
+        status = bst_frame_pool_enqueued(ctx, frame);
+    }
+    if (status == BST_OK) {
         status = bst_detector_end(ctx, r->detector);
+    }
+    if (status == BST_OK) {
+        status = bst_device_check(ctx, clFlush(r->queue), "starting the rendering");
     }
     if (status != BST_OK) {
         bst_frame_release(frame);
@@ -613,7 +545,7 @@ bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *r, const bst_render_r
 
 bst_status bst_renderer_render_noise_free(bst_ctx *ctx, bst_renderer *r,
                                           const bst_render_request *request, float *image) {
-    BST_TRY(check_request(ctx, r, request));
+    BST_TRY(bst_render_request_check(ctx, &r->camera, request));
     size_t bytes = (size_t)request->window.width * (size_t)request->window.height * sizeof(float);
     BST_TRY(grow(ctx, r, &r->expected, bytes));
     BST_TRY(enqueue_tiles(ctx, r, request, r->expected_kernel, r->expected.buffer, 0, false));
@@ -624,21 +556,13 @@ bst_status bst_renderer_render_noise_free(bst_ctx *ctx, bst_renderer *r,
 }
 
 bst_status bst_renderer_saturated(bst_ctx *ctx, bst_renderer *r, long long *pixels) {
-    *pixels = 0;
-    if (r->tiles == 0) {
-        return BST_OK;
-    }
-    cl_int code;
-    size_t bytes = (size_t)r->tiles * sizeof(cl_int);
-    cl_int *p = clEnqueueMapBuffer(r->queue, r->saturated.buffer, CL_TRUE, CL_MAP_READ, 0, bytes, 0,
-                                   NULL, NULL, &code);
-    BST_TRY(bst_device_check(ctx, code, "mapping the count of saturated pixels"));
-    for (int i = 0; i < r->tiles; i++) {
-        *pixels += p[i];
-    }
-    return bst_device_check(
-        ctx, clEnqueueUnmapMemObject(r->queue, r->saturated.buffer, p, 0, NULL, NULL),
-        "unmapping the count of saturated pixels");
+    BST_TRY(count_saturated(ctx, r));
+    *pixels = r->saturated_pixels;
+    return BST_OK;
+}
+
+long long bst_renderer_saturated_frames(const bst_renderer *r) {
+    return r->saturated_frames;
 }
 
 void bst_renderer_get_stats(const bst_renderer *r, bst_render_stats *out) {

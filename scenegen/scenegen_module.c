@@ -1,6 +1,9 @@
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
+#include "scenegen/detector.h"
 #include "scenegen/module.h"
 #include "scenegen/planes.h"
 #include "scenegen/renderer.h"
@@ -89,8 +92,9 @@ typedef struct scenegen {
     bst_renderer *renderer;
     pick *picks;
     int pick_capacity;
-    bst_plane_maker *planes; /* NULL: not asked for */
-    int *item_source;        /* source of each item of the truth, for the planes */
+    long long saturated_told, saturated_before; /* frames; those of earlier renderers */
+    bst_plane_maker *planes;                    /* NULL: not asked for */
+    int *item_source; /* source of each item of the truth, for the planes */
 } scenegen;
 
 static void destroy(void *self) {
@@ -105,9 +109,15 @@ static void destroy(void *self) {
     }
 }
 
-/* The detector is the same in all runs of a study: its patterns come from its names alone. */
+/* The patterns of this sensor: its name is the instance's without the module's. */
 static bst_rng_key pattern_key(const bst_module_env *env, const bst_camera *camera) {
-    return bst_rng_make_key(camera->detector.pattern_seed, 0, env->instance, "pattern");
+    char name[256];
+    snprintf(name, sizeof name, "%s", env->instance);
+    char *module = strrchr(name, '/');
+    if (module) {
+        *module = '\0';
+    }
+    return bst_detector_pattern_key(camera, name);
 }
 
 static bst_status create(const bst_module_env *env, const void *config_object, void **self) {
@@ -128,7 +138,7 @@ static bst_status create(const bst_module_env *env, const void *config_object, v
     options.stamp_radius_px = (int)c->fidelity.stamp_radius_px;
     options.psf_phases = (int)c->fidelity.psf_phases;
     options.fft_taps = (int)c->fidelity.fft_taps;
-    options.pool_frames = (int)c->pool_frames;
+    options.pool_frames = (int)c->pool_frames + BST_OVERLAP_FRAMES;
     options.pattern = pattern_key(env, s->camera);
     s->device = env->device;
     s->renderer_options = options;
@@ -220,15 +230,35 @@ static bst_status write_items(bst_ctx *ctx, scenegen *s, const bst_los_track *tr
     return BST_OK;
 }
 
+/* Counts the saturated frames among those that are done. */
+static void tell_saturated(scenegen *s, struct bst_step *step) {
+    long long frames = s->saturated_before + bst_renderer_saturated_frames(s->renderer);
+    for (; s->saturated_told < frames; s->saturated_told++) {
+        bst_step_count(step, "saturated");
+    }
+}
+
+static bst_status finish(void *self, struct bst_step *step) {
+    scenegen *s = self;
+    long long pixels;
+    BST_TRY(bst_renderer_saturated(bst_step_ctx(step), s->renderer, &pixels));
+    tell_saturated(s, step);
+    return BST_OK;
+}
+
 /* Goes on with another pixel scale: everything that depends on the camera is made again. Frames
  * that were rendered before stay as they are. */
 static bst_status rescale(bst_ctx *ctx, scenegen *s, double scale_arcsec) {
     bst_camera camera;
+    long long pixels;
     BST_TRY(bst_camera_at_scale(ctx, s->camera, scale_arcsec, &camera));
     bst_renderer *renderer;
     BST_TRY(bst_renderer_create(ctx, s->device, &camera, &s->renderer_options, &renderer));
+    bst_status counted = bst_renderer_saturated(ctx, s->renderer, &pixels);
+    s->saturated_before += bst_renderer_saturated_frames(s->renderer);
     bst_renderer_free(s->renderer);
     s->renderer = renderer;
+    BST_TRY(counted);
     s->scaled = camera;
     s->camera = &s->scaled;
     bst_field_set_camera(s->field, s->camera);
@@ -286,18 +316,12 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
     if (truth->lost > 0) {
         bst_step_count(step, "truth_overflow");
     }
-    if (!e->dropped) {
-        long long saturated;
-        BST_TRY(bst_renderer_saturated(ctx, s->renderer, &saturated));
-        if (saturated > 0) {
-            bst_step_count(step, "saturated");
-        }
-        if (s->planes) {
-            bst_planes *planes = bst_step_write(step, PORT_PLANES, NULL);
-            BST_TRY(bst_plane_maker_render(ctx, s->planes, s->renderer, s->camera, &request,
-                                           s->item_source, truth->count, planes));
-        }
+    if (!e->dropped && s->planes) {
+        bst_planes *planes = bst_step_write(step, PORT_PLANES, NULL);
+        BST_TRY(bst_plane_maker_render(ctx, s->planes, s->renderer, s->camera, &request,
+                                       s->item_source, truth->count, planes));
     }
+    tell_saturated(s, step);
     return BST_OK;
 }
 
@@ -328,4 +352,5 @@ const bst_module_desc bst_scenegen_module = {
     .create = create,
     .step = step_module,
     .destroy = destroy,
+    .finish = finish,
 };

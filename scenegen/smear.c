@@ -27,7 +27,7 @@ typedef struct level {
 struct bst_smear {
     bst_camera camera;
     bst_smear_options options;
-    double sigma_px, share_sigma_px;
+    double sigma_px, share_sigma_px, widest;
     double tail[MAX_TAPS / 2]; /* profile at r px from the centre, over the centre's */
     double kept[MAX_TAPS / 2]; /* light within the two nearest pixels and r more on each side */
     double tolerance[LEVELS];
@@ -75,11 +75,16 @@ bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
     s->options = *options;
     s->sigma_px =
         options->node_sigma_px > 0.0 ? options->node_sigma_px : bst_camera_psf_sigma_px(camera);
+    s->widest = options->widest > 0.0 ? options->widest : BST_NODE_WIDEST;
     s->share_sigma_px = options->share_sigma_px > 0.0 ? options->share_sigma_px : s->sigma_px;
     double centre = bst_reference_pixel_share(0.0, s->sigma_px, 0);
     for (int r = 0; r < MAX_TAPS / 2; r++) {
         s->tail[r] = bst_reference_pixel_share(0.0, s->sigma_px, r) / centre;
         s->kept[r] = kept_light(s->sigma_px, r);
+        if (options->node_sigma_px > 0.0) { /* no stamp leaves light out */
+            s->tail[r] = 0.0;
+            s->kept[r] = 1.0;
+        }
     }
     for (int n = 0; n < LEVELS; n++) {
         s->tolerance[n] = 0.08 * pow(2.0, -n);
@@ -236,7 +241,7 @@ static bst_status path_nodes(bst_ctx *ctx, bst_smear *s, const bst_path_point *p
     if (parts > 0.0) {
         return bst_motion_midpoints(ctx, path, count, (int)parts, &s->nodes);
     }
-    return bst_nodes_from_path(ctx, path, count, s->sigma_px, tolerance, true, &s->nodes);
+    return bst_nodes_from_path(ctx, path, count, s->sigma_px, tolerance, s->widest, &s->nodes);
 }
 
 static bst_status make_level(bst_ctx *ctx, bst_smear *s, int n) {
@@ -503,6 +508,8 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
     s->disc_px =
         source->shape ? tan(asin(source->shape->radius)) / bst_camera_scale_rad(&s->camera) : 0.0;
     bool front = project(s, s->q_reference, source->apparent_mid, &x, &y);
+    /* a star that only a wide turn brings into the field is no small float from its place there */
+    moving = moving || !front || hypot(x, y) > 4.0 * far_px(s);
     *visible = !source->occulted && electrons > 0.0 && electrons < 1e30 && (front || moving);
     if (!*visible) {
         return BST_OK;
@@ -548,8 +555,12 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
     double sigmas = s->last_peak_e / sqrt(s->last_peak_e + s->dark_variance_e2);
     double lost = 1.0 - s->kept[radius] * s->kept[radius];
     int border = radius + 1 < MAX_TAPS / 2 ? radius + 1 : radius;
+    /* places in float, rounded twice, where the image is steepest */
+    double extent = fmax((double)s->camera.width_px, (double)s->camera.height_px);
+    double rounded = 1.5 * 0x1p-24 * extent * 0.4 / s->sigma_px * s->last_peak_e /
+                     sqrt(0.5 * s->last_peak_e + s->dark_variance_e2);
     double shared = s->single && !moving ? single_error(s, s->last_peak_e, hypot(x, y)) : 0.0;
-    s->last_error_sigma = fmax((used->error + lost) * sigmas + shared,
+    s->last_error_sigma = fmax((used->error + lost) * sigmas + shared + rounded,
                                s->last_peak_e * s->tail[border] / sqrt(s->dark_variance_e2));
     if (s->options.temporal_oversample > 0) {
         s->last_error_sigma = NAN;

@@ -27,6 +27,7 @@ typedef struct bst_smear_options {
     /* for a PSF that is no Gaussian, else 0: those that need nodes as fine, and that put as much of
      * a point's light in one pixel */
     double node_sigma_px, share_sigma_px;
+    double widest; /* widening of nodes, PSF variances; 0: as much as nodes may be */
 } bst_smear_options;
 
 bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,

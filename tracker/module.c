@@ -147,6 +147,7 @@ const bst_module_desc bst_tracker_module = {
     .abi = BST_MODULE_ABI,
     .role = "tracker",
     .type = "ekf",
+    .flags = BST_MODULE_APART,
     .doc = "Attitude from stars, extended Kalman filters, nearest-neighbour association.",
     .config = bst_tracker_config_table,
     .config_bytes = sizeof(bst_tracker_config),

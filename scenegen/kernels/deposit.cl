@@ -10,6 +10,7 @@
 /* Nodes that share a pass over their rows, and how many rows they may span together. */
 #define DEPOSIT_TEAM 4
 #define DEPOSIT_SPAN 24
+#define DEPOSIT_ROOM 40
 
 static int any_of(int16 v) {
     int8 a = v.lo | v.hi;
@@ -31,62 +32,69 @@ static float field_weight(bst_deposit_params p, global const float *field, float
 }
 #endif
 
-/* The nodes of a block that reach a tile, filled up to whole teams with dark ones. */
+/* A block of nodes against one tile. */
 typedef struct deposit_nodes {
+    int hit[BST_BLOCK];
     int left[BST_BLOCK], top[BST_BLOCK];    /* first tap, from the tile's corner */
     int row_x[BST_BLOCK], row_y[BST_BLOCK]; /* places in the table */
     float share_x[BST_BLOCK], share_y[BST_BLOCK], share_width[BST_BLOCK];
     float electrons[BST_BLOCK];
 } deposit_nodes;
 
-/* Sixteen floats of the table from `row`, between its phase and the next (t) and, when widened,
- * between its width and the next (u). */
-static float16 spread16(global const float *row, float t, float u) {
-    float16 a = vload16(0, row), b = vload16(0, row + BST_SPREAD_ROW);
-    a = fma((float16)t, b - a, a);
+/* The profiles of a team, between zeros: taps from 16 on. */
+typedef struct deposit_profiles {
+    float x[DEPOSIT_TEAM][DEPOSIT_ROOM], y[DEPOSIT_TEAM][DEPOSIT_ROOM];
+} deposit_profiles;
+
+/* Taps at `row` of the table, between its phase and the next (t) and, when widened, between its
+ * width and the next (u). */
+static float8 spread8(global const float *row, float t, float u) {
+    float8 a = vload8(0, row), b = vload8(1, row);
+    a = fma((float8)t, b - a, a);
     if (u >= 0.0f) {
-        row += (BST_SPREAD_PHASES + 1) * BST_SPREAD_ROW;
-        float16 c = vload16(0, row), d = vload16(0, row + BST_SPREAD_ROW);
-        c = fma((float16)t, d - c, c);
-        a = fma((float16)u, c - a, a);
+        row += (BST_SPREAD_PHASES + 1) * BST_SPREAD_TAPS;
+        float8 c = vload8(0, row), d = vload8(1, row);
+        c = fma((float8)t, d - c, c);
+        a = fma((float8)u, c - a, a);
     }
     return a;
 }
 
-/* The taps of node n along x on the vector of the tile that begins at `column`. */
-static float16 spread_line(const deposit_nodes *b, int n, int column, global const float *table) {
-    int shift = column - b->left[n];
+/* The taps of one node along x on the vector of the tile that begins `shift` after its first. */
+static float16 spread_line(const float *profile, int shift) {
     if (shift <= -16 || shift >= BST_SPREAD_TAPS) {
         return (float16)0.0f;
     }
-    return b->electrons[n] * spread16(table + b->row_x[n] + BST_SPREAD_PAD + shift, b->share_x[n],
-                                      b->share_width[n]);
+    return vload16(0, profile + 16 + shift);
 }
 
-/* Adds nodes n to n + DEPOSIT_TEAM - 1, which together span at most DEPOSIT_SPAN rows from `top`.
- * Each row is loaded and stored once for all of them; a sample still receives them one after the
- * other, and a zero from those that do not reach it. Vectors of the tile are touched where they lie,
- * so that what one team has stored the next can load at once. */
-static void deposit_team(local float *sum, const deposit_nodes *b, int n, int top, int bottom,
-                         int left, int right, global const float *table) {
-    float heights[DEPOSIT_TEAM][DEPOSIT_SPAN + 16];
+/* Adds nodes n to n + count - 1 (at most DEPOSIT_TEAM, the others are left out), which together span
+ * at most DEPOSIT_SPAN rows from `top`. Each row is loaded and stored once for all of them; a sample
+ * still receives them one after the other, and a zero from those that do not reach it. Vectors of
+ * the tile are touched where they lie, so that what one team has stored the next can load at once.
+ */
+static void deposit_team(local float *sum, const deposit_nodes *b, int n, int count, int top,
+                         int bottom, int left, int right, global const float *table,
+                         deposit_profiles *room) {
+    int shift[DEPOSIT_TEAM], down[DEPOSIT_TEAM];
     for (int k = 0; k < DEPOSIT_TEAM; k++) {
-        for (int j = 0; j < DEPOSIT_SPAN; j += 8) {
-            vstore8((float8)0.0f, 0, heights[k] + j);
-        }
+        int i = n + min(k, count - 1);
+        float electrons = k < count ? b->electrons[i] : 0.0f;
+        float u = b->share_width[i];
+        vstore8(electrons * spread8(table + b->row_x[i], b->share_x[i], u), 0, room->x[k] + 16);
+        vstore8(spread8(table + BST_SPREAD_TABLE + b->row_y[i], b->share_y[i], u), 0,
+                room->y[k] + 16);
+        shift[k] = b->left[i];
+        down[k] = 16 - (b->top[i] - top);
     }
-    for (int k = 0; k < DEPOSIT_TEAM; k++) {
-        float16 h = spread16(table + BST_SPREAD_TABLE + b->row_y[n + k] + BST_SPREAD_PAD,
-                             b->share_y[n + k], b->share_width[n + k]);
-        vstore8(h.lo, 0, heights[k] + (b->top[n + k] - top));
-    }
-    const float *h0 = heights[0], *h1 = heights[1], *h2 = heights[2], *h3 = heights[3];
+    const float *h0 = room->y[0] + down[0], *h1 = room->y[1] + down[1];
+    const float *h2 = room->y[2] + down[2], *h3 = room->y[3] + down[3];
     int first = max(0, -top), last = min(bottom, DEPOSIT_H) - top, end = min(right, DEPOSIT_W);
     for (int column = max(left & ~15, 0); column < end; column += 16) {
-        float16 l0 = spread_line(b, n, column, table);
-        float16 l1 = spread_line(b, n + 1, column, table);
-        float16 l2 = spread_line(b, n + 2, column, table);
-        float16 l3 = spread_line(b, n + 3, column, table);
+        float16 l0 = spread_line(room->x[0], column - shift[0]);
+        float16 l1 = spread_line(room->x[1], column - shift[1]);
+        float16 l2 = spread_line(room->x[2], column - shift[2]);
+        float16 l3 = spread_line(room->x[3], column - shift[3]);
         local float16 *target = (local float16 *)(sum + (top + first) * DEPOSIT_STRIDE + column);
         for (int j = first; j < last; j++) {
             float16 v = *target;
@@ -99,100 +107,74 @@ static void deposit_team(local float *sum, const deposit_nodes *b, int n, int to
     }
 }
 
-/* The nodes of one block that reach the tile; returns how many. */
-static int find_nodes(bst_deposit_params p, int tile_x, int tile_y, global const float16 *block,
-                      global const float *field, deposit_nodes *out) {
+/* Places one block's nodes; returns whether any of them reaches the tile. */
+static int place_nodes(bst_deposit_params p, int tile_x, int tile_y, global const float16 *block,
+                       global const float *field, deposit_nodes *out) {
     float16 u = (block[0] - p.x0) * p.density_x, v = (block[1] - p.y0) * p.density_y;
-    float16 floor_u = floor(u), floor_v = floor(v), width = block[3];
-    float16 phase_u = (u - floor_u) * BST_SPREAD_PHASES, phase_v = (v - floor_v) * BST_SPREAD_PHASES;
-    float16 step_u = fmin(floor(phase_u), BST_SPREAD_PHASES - 1.0f);
-    float16 step_v = fmin(floor(phase_v), BST_SPREAD_PHASES - 1.0f);
-    float16 level = fmin(floor(width), BST_WIDTHS - 1.0f);
+    float16 floor_u = floor(u), floor_v = floor(v);
     const float before = BST_SPREAD_TAPS / 2 - 1, after = BST_SPREAD_TAPS / 2;
     float16 column = floor_u - (before + (float)tile_x), row = floor_v - (before + (float)tile_y);
-    int16 hit = (block[2] > 0.0f) & (column > (float)-BST_SPREAD_TAPS) & (column < (float)DEPOSIT_W) &
-                (row > (float)-BST_SPREAD_TAPS) & (row < (float)DEPOSIT_H) &
+    float16 electrons = block[2], width = block[3];
+    int16 hit = (electrons > 0.0f) & (column > (float)-BST_SPREAD_TAPS) &
+                (column < (float)DEPOSIT_W) & (row > (float)-BST_SPREAD_TAPS) &
+                (row < (float)DEPOSIT_H) &
                 /* what lies outside the grid would come in on its other side */
                 (floor_u >= before) & (floor_v >= before) & (floor_u < (float)p.samples_x - after) &
                 (floor_v < (float)p.samples_y - after);
     if (!any_of(hit)) {
         return 0;
     }
-    float16 base = level * (float)((BST_SPREAD_PHASES + 1) * BST_SPREAD_ROW);
-    int hits[16], left[16], top[16], row_x[16], row_y[16];
-    float share_x[16], share_y[16], share_width[16], electrons[16];
-    vstore16(hit, 0, hits);
-    vstore16(convert_int16(column), 0, left);
-    vstore16(convert_int16(row), 0, top);
-    vstore16(convert_int16(base + step_u * (float)BST_SPREAD_ROW), 0, row_x);
-    vstore16(convert_int16(base + step_v * (float)BST_SPREAD_ROW), 0, row_y);
-    vstore16(phase_u - step_u, 0, share_x);
-    vstore16(phase_v - step_v, 0, share_y);
-    vstore16(select((float16)-1.0f, width - level, width > 0.0f), 0, share_width);
-    vstore16(block[2], 0, electrons);
+    float16 phase_u = (u - floor_u) * BST_SPREAD_PHASES, phase_v = (v - floor_v) * BST_SPREAD_PHASES;
+    float16 step_u = fmin(floor(phase_u), BST_SPREAD_PHASES - 1.0f);
+    float16 step_v = fmin(floor(phase_v), BST_SPREAD_PHASES - 1.0f);
+    float16 level = fmin(floor(width), BST_WIDTHS - 1.0f);
+    float16 base = level * (float)(BST_SPREAD_PHASES + 1);
 #ifdef FIELD
-    float px[16], py[16];
+    float px[16], py[16], e[16];
     vstore16(block[0], 0, px);
     vstore16(block[1], 0, py);
-#endif
-    int count = 0;
     for (int n = 0; n < BST_BLOCK; n++) {
-        if (hits[n]) {
-            out->left[count] = left[n];
-            out->top[count] = top[n];
-            out->row_x[count] = row_x[n];
-            out->row_y[count] = row_y[n];
-            out->share_x[count] = share_x[n];
-            out->share_y[count] = share_y[n];
-            out->share_width[count] = share_width[n];
-            out->electrons[count] = electrons[n];
-#ifdef FIELD
-            out->electrons[count] *= field_weight(p, field, px[n], py[n]);
+        e[n] = field_weight(p, field, px[n], py[n]);
+    }
+    electrons *= vload16(0, e);
 #endif
-            count++;
-        }
-    }
-    for (int n = count; n & (DEPOSIT_TEAM - 1); n++) {
-        out->left[n] = out->left[count - 1];
-        out->top[n] = out->top[count - 1];
-        out->row_x[n] = out->row_x[count - 1];
-        out->row_y[n] = out->row_y[count - 1];
-        out->share_x[n] = out->share_y[n] = 0.0f;
-        out->share_width[n] = -1.0f;
-        out->electrons[n] = 0.0f;
-    }
-    return count;
+    vstore16(hit, 0, out->hit);
+    vstore16(convert_int16(column), 0, out->left);
+    vstore16(convert_int16(row), 0, out->top);
+    vstore16(convert_int16(base + step_u) * BST_SPREAD_TAPS, 0, out->row_x);
+    vstore16(convert_int16(base + step_v) * BST_SPREAD_TAPS, 0, out->row_y);
+    vstore16(phase_u - step_u, 0, out->share_x);
+    vstore16(phase_v - step_v, 0, out->share_y);
+    vstore16(select((float16)-1.0f, width - level, width > 0.0f), 0, out->share_width);
+    vstore16(select((float16)0.0f, electrons, hit), 0, out->electrons);
+    return 1;
 }
 
 static void deposit_block(bst_deposit_params p, local float *sum, int tile_x, int tile_y,
                           global const float16 *block, global const float *table,
-                          global const float *field) {
+                          global const float *field, deposit_profiles *room) {
     deposit_nodes b;
-    int count = find_nodes(p, tile_x, tile_y, block, field, &b);
-    for (int n = 0; n < count; n += DEPOSIT_TEAM) {
-        const int *t = b.top + n, *l = b.left + n;
+    if (!place_nodes(p, tile_x, tile_y, block, field, &b)) {
+        return;
+    }
+    for (int n = 0; n < BST_BLOCK; n += DEPOSIT_TEAM) {
+        const int *t = b.top + n, *l = b.left + n, *h = b.hit + n;
+        if (!(h[0] | h[1] | h[2] | h[3])) {
+            continue;
+        }
         int top = min(min(t[0], t[1]), min(t[2], t[3]));
         int bottom = max(max(t[0], t[1]), max(t[2], t[3])) + BST_SPREAD_TAPS;
         int left = min(min(l[0], l[1]), min(l[2], l[3]));
         int right = max(max(l[0], l[1]), max(l[2], l[3])) + BST_SPREAD_TAPS;
         if (bottom - top <= DEPOSIT_SPAN) {
-            deposit_team(sum, &b, n, top, bottom, left, right, table);
+            deposit_team(sum, &b, n, DEPOSIT_TEAM, top, bottom, left, right, table, room);
             continue;
         }
-        for (int k = n; k < n + DEPOSIT_TEAM && k < count; k++) { /* far apart: one by one */
-            deposit_nodes one;
-            for (int i = 0; i < DEPOSIT_TEAM; i++) {
-                one.left[i] = b.left[k];
-                one.top[i] = b.top[k];
-                one.row_x[i] = b.row_x[k];
-                one.row_y[i] = b.row_y[k];
-                one.share_x[i] = b.share_x[k];
-                one.share_y[i] = b.share_y[k];
-                one.share_width[i] = b.share_width[k];
-                one.electrons[i] = i == 0 ? b.electrons[k] : 0.0f;
+        for (int k = 0; k < DEPOSIT_TEAM; k++) { /* far apart: one by one */
+            if (h[k]) {
+                deposit_team(sum, &b, n + k, 1, t[k], t[k] + BST_SPREAD_TAPS, l[k],
+                             l[k] + BST_SPREAD_TAPS, table, room);
             }
-            deposit_team(sum, &one, 0, b.top[k], b.top[k] + BST_SPREAD_TAPS, b.left[k],
-                         b.left[k] + BST_SPREAD_TAPS, table);
         }
     }
 }
@@ -215,6 +197,12 @@ __attribute__((reqd_work_group_size(DEPOSIT_GROUP, 1, 1))) kernel void bst_light
     for (int i = 0; i < DEPOSIT_H * DEPOSIT_STRIDE; i += 16) {
         vstore16((float16)0.0f, 0, sum + i);
     }
+    deposit_profiles room;
+    for (int k = 0; k < DEPOSIT_TEAM; k++) {
+        for (int j = 0; j < DEPOSIT_ROOM; j++) {
+            room.x[k][j] = room.y[k][j] = 0.0f;
+        }
+    }
     for (int g = 0; g < p.source_groups; g++) {
         global const float *box = source_box + g * 4 * BST_BLOCK;
         int16 hit = (vload16(0, box) <= x1) & (vload16(1, box) <= y1) & (vload16(2, box) >= x0) &
@@ -232,7 +220,8 @@ __attribute__((reqd_work_group_size(DEPOSIT_GROUP, 1, 1))) kernel void bst_light
             for (int b = s.first_block; b < s.first_block + s.blocks; b++) {
                 float4 r = block_box[b];
                 if (r.x <= x1 && r.z >= x0 && r.y <= y1 && r.w >= y0) {
-                    deposit_block(p, sum, left, top, nodes + BST_NODE_ROWS * b, table, field);
+                    deposit_block(p, sum, left, top, nodes + BST_NODE_ROWS * b, table, field,
+                                  &room);
                 }
             }
         }

@@ -5,12 +5,10 @@
 
 /* Sub-sample phases of the spreading kernel's table; one more row closes the interval. */
 #define BST_SPREAD_PHASES 128
-/* A row of that table: zeros, eight taps, zeros. */
+/* A row of that table: one vector. */
 #define BST_SPREAD_TAPS 8
-#define BST_SPREAD_PAD 16
-#define BST_SPREAD_ROW (BST_SPREAD_TAPS + 2 * BST_SPREAD_PAD)
-/* Floats of the table for one axis: [BST_WIDTHS + 1][BST_SPREAD_PHASES + 1][BST_SPREAD_ROW]. */
-#define BST_SPREAD_TABLE ((BST_WIDTHS + 1) * (BST_SPREAD_PHASES + 1) * BST_SPREAD_ROW)
+/* Floats of the table for one axis: [BST_WIDTHS + 1][BST_SPREAD_PHASES + 1][BST_SPREAD_TAPS]. */
+#define BST_SPREAD_TABLE ((BST_WIDTHS + 1) * (BST_SPREAD_PHASES + 1) * BST_SPREAD_TAPS)
 
 /* 32-bit members only, so that both languages lay it out alike. */
 typedef struct bst_deposit_params {

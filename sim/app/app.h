@@ -15,6 +15,7 @@ int bst_cmd_check(int argc, char **argv);
 int bst_cmd_schema(int argc, char **argv);
 int bst_cmd_stars(int argc, char **argv);
 int bst_cmd_propagate(int argc, char **argv);
+int bst_cmd_calframes(int argc, char **argv);
 int bst_cmd_bench(int argc, char **argv);
 
 /* Log sink that writes to standard error: "boresight: warning: ...". */

@@ -98,7 +98,7 @@ bst_status bst_bench_loop(bst_ctx *ctx, const bst_bench *self, const bst_bench_o
     bst_scenario scenario;
     BST_TRY(bst_load_scenario(ctx, options->scenario, &load, &json, &scenario));
     bst_simulation *sim = NULL;
-    const bst_simulation_options sim_options = {options->device, options->threads};
+    const bst_simulation_options sim_options = {options->device, options->threads, false};
     bst_status status = bst_simulation_create(ctx, &scenario, &sim_options, &sim);
     bst_bench_clock clock = {.count = 0};
     int seconds = (int)scenario.duration_s;

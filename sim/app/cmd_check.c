@@ -66,7 +66,7 @@ int bst_cmd_check(int argc, char **argv) {
         return BST_EXIT_FAILED;
     }
     bst_simulation *sim = NULL;
-    const bst_simulation_options options = {NULL, 0};
+    const bst_simulation_options options = {0};
     int code = BST_EXIT_OK;
     if (bst_simulation_create(&ctx, &scenario, &options, &sim) != BST_OK) {
         bst_json_name_file(&ctx, json);

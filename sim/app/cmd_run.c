@@ -1,6 +1,6 @@
 #include <errno.h>
 #include <math.h>
-#include <signal.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,6 +12,7 @@
 #include "sim/app/json_number.h"
 #include "sim/app/load.h"
 #include "sim/app/run_pictures.h"
+#include "sim/app/stop_signals.h"
 #include "sim/core/version.h"
 #include "sim/core/wall_clock.h"
 #include "sim/device/device.h"
@@ -21,45 +22,18 @@
 #include "sim/io/manifest.h"
 #include "sim/io/wcs.h"
 
-static volatile sig_atomic_t stop_requested;
-
-static const int stop_signals[] = {SIGINT, SIGTERM, SIGHUP};
-enum { STOP_SIGNALS = sizeof stop_signals / sizeof *stop_signals };
-
-/* The first one asks the run to end; the second one, of whatever kind, ends the process. */
-static void on_signal(int number) {
-    (void)number;
-    stop_requested = 1;
-    for (int i = 0; i < STOP_SIGNALS; i++) {
-        signal(stop_signals[i], SIG_DFL);
-    }
-}
-
-static void catch_signals(void) {
-    stop_requested = 0;
-    for (int i = 0; i < STOP_SIGNALS; i++) {
-        struct sigaction action = {.sa_handler = on_signal}, before;
-        /* nohup has the program ignore the end of the terminal */
-        if (stop_signals[i] != SIGHUP ||
-            (sigaction(SIGHUP, NULL, &before) == 0 && before.sa_handler != SIG_IGN)) {
-            sigaction(stop_signals[i], &action, NULL);
-        }
-    }
-    /* a limit on the size of files and a reader that went away are errors of a write, not the end
-     * of the process */
-    signal(SIGXFSZ, SIG_IGN);
-    signal(SIGPIPE, SIG_IGN);
-}
-
 /* One sensor as the run watches it. */
 typedef struct watched_sensor {
     char scope[160];
     int recorder_index;
+    int64_t recorded[3]; /* latest telemetry by channel, on the recorder's grid */
     bst_loop_summary *summary;
 } watched_sensor;
 
 typedef struct run_state {
     bst_ctx *ctx;
+    bst_ctx hooks;           /* of on_message and on_event, which may be called by another thread */
+    pthread_mutex_t summing; /* over the summaries while the run goes */
     const bst_scenario *scenario;
     bst_recorder *recorder;
     watched_sensor *sensors;
@@ -69,25 +43,32 @@ typedef struct run_state {
     double started, shown; /* wall seconds */
 } run_state;
 
-static bst_status on_message(void *user, const char *scope, const char *channel,
-                             const void *payload, int64_t tick) {
-    run_state *run = user;
+static watched_sensor *find_sensor(run_state *run, const char *scope) {
     watched_sensor *sensor = run->sensors;
     while (strcmp(sensor->scope, scope) != 0) {
         sensor++; /* every scope of the engine is watched */
     }
-    if (bst_recorder_wants(run->recorder, channel)) {
-        BST_TRY(bst_recorder_channel(run->ctx, run->recorder, sensor->recorder_index, channel,
-                                     payload, tick));
+    return sensor;
+}
+
+/* Spares the telemetry that nobody below looks at: it comes at the plant's rate. */
+static bool wants(void *user, const char *scope, const char *channel, int64_t tick) {
+    static const char *const telemetry[3] = {
+        BST_CHANNEL_LOS_HISTORY, BST_CHANNEL_POINTING_TELEMETRY, BST_CHANNEL_NAV_TELEMETRY};
+    run_state *run = user;
+    for (int i = 0; i < 3; i++) {
+        if (strcmp(channel, telemetry[i]) == 0) {
+            return bst_recorder_due(run->recorder, channel, tick,
+                                    &find_sensor(run, scope)->recorded[i]);
+        }
     }
-    if (strcmp(channel, BST_CHANNEL_LOS_HISTORY) == 0) {
-        return BST_OK; /* the plant's rate: nothing below reads it */
-    }
-    if (sensor == run->sensors) {
-        BST_TRY(bst_run_pictures_message(run->ctx, run->pictures, channel, payload));
-    }
+    return true;
+}
+
+static bst_status judge(run_state *run, watched_sensor *sensor, const char *channel,
+                        const void *payload, int64_t tick) {
     if (strcmp(channel, BST_CHANNEL_TRUTH) == 0) {
-        return bst_loop_summary_truth(run->ctx, sensor->summary, payload);
+        return bst_loop_summary_truth(&run->hooks, sensor->summary, payload);
     }
     if (strcmp(channel, BST_CHANNEL_TRACKS) == 0) {
         bst_loop_summary_tracks(sensor->summary, payload, tick);
@@ -97,10 +78,27 @@ static bst_status on_message(void *user, const char *scope, const char *channel,
     return BST_OK;
 }
 
+static bst_status on_message(void *user, const char *scope, const char *channel,
+                             const void *payload, int64_t tick) {
+    run_state *run = user;
+    watched_sensor *sensor = find_sensor(run, scope);
+    if (bst_recorder_wants(run->recorder, channel)) {
+        BST_TRY(bst_recorder_channel(&run->hooks, run->recorder, sensor->recorder_index, channel,
+                                     payload, tick));
+    }
+    if (sensor == run->sensors) {
+        BST_TRY(bst_run_pictures_message(&run->hooks, run->pictures, channel, payload));
+    }
+    pthread_mutex_lock(&run->summing);
+    bst_status status = judge(run, sensor, channel, payload, tick);
+    pthread_mutex_unlock(&run->summing);
+    return status;
+}
+
 static bst_status on_event(void *user, int64_t tick, const char *instance, const char *kind,
                            const char *text) {
     run_state *run = user;
-    return bst_recorder_event(run->ctx, run->recorder, tick, instance, kind, text);
+    return bst_recorder_event(&run->hooks, run->recorder, tick, instance, kind, text);
 }
 
 static void on_judged(void *user, const bst_loop_frame *frame) {
@@ -119,8 +117,10 @@ static void show_progress(run_state *run, int64_t tick, bool last) {
     double left = factor > 0.0 ? (total - simulated) / factor : 0.0;
     bst_loop_figures figures;
     bst_loop_frame newest;
+    pthread_mutex_lock(&run->summing);
     bst_loop_summary_figures(run->sensors[0].summary, &figures);
     bst_loop_summary_newest(run->sensors[0].summary, &newest);
+    pthread_mutex_unlock(&run->summing);
     char error[32] = "-", snr[32] = "-";
     if (newest.error_px < 1e5) {
         snprintf(error, sizeof error, "%.2f px", newest.error_px);
@@ -141,7 +141,7 @@ static void show_progress(run_state *run, int64_t tick, bool last) {
 
 static bool interrupted(void *user, int64_t tick) {
     show_progress(user, tick, false);
-    return stop_requested != 0;
+    return bst_stop_requested();
 }
 
 static cJSON *summary_json(const bst_loop_figures *f, double real_time_factor) {
@@ -298,6 +298,9 @@ static bst_status watch_sensors(run_state *run, const bst_world *world) {
                                                 target, &run->pictures));
                 bst_loop_summary_on_frame(w->summary, on_judged, run->pictures);
             }
+            for (int k = 0; k < 3; k++) {
+                w->recorded[k] = -1;
+            }
             run->sensor_count++;
         }
     }
@@ -357,6 +360,7 @@ static void free_run(run_state *run) {
     }
     free(run->sensors);
     bst_run_pictures_free(run->pictures);
+    pthread_mutex_destroy(&run->summing);
 }
 
 /* What a run leaves behind its frames and tables, and last of all the manifest, once everything
@@ -422,7 +426,7 @@ static void warn_of_space(const run_state *run, const char *out) {
 static bst_status execute(run_state *run, bst_simulation *sim, const char *out, bool overwrite) {
     bst_ctx *ctx = run->ctx;
     bst_run *store = NULL;
-    if (stop_requested) {
+    if (bst_stop_requested()) {
         return bst_fail(ctx, BST_ERR_INTERRUPTED, "interrupted before the run began");
     }
     warn_of_space(run, out);
@@ -437,12 +441,13 @@ static bst_status execute(run_state *run, bst_simulation *sim, const char *out, 
     double wall = 0.0;
     bool stepped = false;
     if (status == BST_OK) {
-        const bst_engine_hooks hooks = {run, on_message, on_event, interrupted};
+        const bst_engine_hooks hooks = {run, on_message, on_event, interrupted, wants, &run->hooks};
         bst_engine_set_hooks(bst_simulation_engine(sim), &hooks);
         run->started = bst_wall_seconds();
         status = bst_engine_run(ctx, bst_simulation_engine(sim), run->scenario->duration_ticks);
         wall = bst_wall_seconds() - run->started;
         stepped = true;
+        ctx->warnings += run->hooks.warnings;
         for (int i = 0; i < run->sensor_count; i++) {
             bst_loop_summary_finish(run->sensors[i].summary);
         }
@@ -493,7 +498,8 @@ static const char help_text[] =
 int bst_cmd_run(int argc, char **argv) {
     bool help = false, overwrite = false, quiet = false;
     const char *out = NULL;
-    bst_simulation_options sim_options = {NULL, 0};
+    bool serial = false;
+    bst_simulation_options sim_options = {0};
     int64_t threads = 0;
     bst_load_options load = BST_LOAD_DEFAULTS;
     const bst_option table[] = {
@@ -508,6 +514,10 @@ int bst_cmd_run(int argc, char **argv) {
          .doc = "replace an earlier run there"},
         BST_LOAD_OPTIONS(load),
         BST_DEVICE_OPTIONS(sim_options.device, threads),
+        {.name = "serial",
+         .kind = BST_OPTION_FLAG,
+         .target = &serial,
+         .doc = "do not process and record beside the simulation; the results are the same"},
         {.name = "quiet", .kind = BST_OPTION_FLAG, .target = &quiet, .doc = "no progress line"},
         {.name = "help", .kind = BST_OPTION_FLAG, .target = &help, .doc = "print this"},
         {.name = NULL},
@@ -528,6 +538,7 @@ int bst_cmd_run(int argc, char **argv) {
         return bst_options_misuse(&ctx, "run");
     }
     sim_options.threads = (int)threads;
+    sim_options.overlap = !serial;
     if (bst_load_check(&ctx, &load) != BST_OK) {
         return bst_options_misuse(&ctx, "run");
     }
@@ -539,9 +550,11 @@ int bst_cmd_run(int argc, char **argv) {
     }
     char default_out[128];
     snprintf(default_out, sizeof default_out, "runs/%s", scenario.name);
-    catch_signals();
+    bst_stop_catch_signals();
     run_state run = {
         .ctx = &ctx, .scenario = &scenario, .progress = !quiet && isatty(STDERR_FILENO)};
+    bst_ctx_init(&run.hooks, bst_app_log, NULL, BST_LOG_INFO);
+    pthread_mutex_init(&run.summing, NULL);
     bst_simulation *sim = NULL;
     bst_status status = bst_simulation_create(&ctx, &scenario, &sim_options, &sim);
     if (status != BST_OK) {

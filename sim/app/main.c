@@ -18,6 +18,7 @@ static const command commands[] = {
     {"schema", bst_cmd_schema, "print the JSON Schema of scenarios"},
     {"stars", bst_cmd_stars, "get, import or describe the star catalogue"},
     {"propagate", bst_cmd_propagate, "positions and velocities from two-line element sets"},
+    {"calframes", bst_cmd_calframes, "bias, dark and flat frames of a scenario's sensors"},
     {"bench", bst_cmd_bench, "measure speed and error"},
 };
 

@@ -9,9 +9,14 @@
 
 typedef struct bst_frame bst_frame;
 
+/* Frames that may be under way behind the thread that steps the modules, besides those in queues.
+ */
+enum { BST_OVERLAP_FRAMES = 4 };
+
 /* What a maker of frames supplies. All functions get the maker's own pointer. */
 typedef struct bst_frame_ops {
-    /* Makes the pixels readable: row-major uint16 [height][width], in digital numbers. */
+    /* Called from any thread. Makes the pixels readable: row-major uint16 [height][width], in
+     * digital numbers. */
     bst_status (*map)(void *owner, bst_ctx *ctx, const uint16_t **pixels);
     void (*unmap)(void *owner);
     /* The device buffer (cl_mem) that holds the same pixels, or NULL. */
@@ -25,15 +30,14 @@ struct bst_frame {
     const bst_frame_ops *ops;
     void *owner;
     int width, height;
-    int references; /* single-threaded by the rule that one run is stepped by one thread */
-    int maps;
+    int references, maps; /* atomic: readers may be in other threads than the maker */
 };
 
 static inline void bst_frame_retain(bst_frame *frame) {
-    frame->references++;
+    __atomic_fetch_add(&frame->references, 1, __ATOMIC_RELAXED);
 }
 static inline void bst_frame_release(bst_frame *frame) {
-    if (frame && --frame->references == 0) {
+    if (frame && __atomic_sub_fetch(&frame->references, 1, __ATOMIC_ACQ_REL) == 0) {
         frame->ops->recycle(frame->owner);
     }
 }
@@ -41,12 +45,12 @@ static inline void bst_frame_release(bst_frame *frame) {
 static inline bst_status bst_frame_map(bst_frame *frame, bst_ctx *ctx, const uint16_t **pixels) {
     bst_status status = frame->ops->map(frame->owner, ctx, pixels);
     if (status == BST_OK) {
-        frame->maps++;
+        __atomic_fetch_add(&frame->maps, 1, __ATOMIC_RELAXED);
     }
     return status;
 }
 static inline void bst_frame_unmap(bst_frame *frame) {
-    if (--frame->maps == 0) {
+    if (__atomic_sub_fetch(&frame->maps, 1, __ATOMIC_ACQ_REL) == 0) {
         frame->ops->unmap(frame->owner);
     }
 }

@@ -8,10 +8,14 @@ static void release_frame(void *payload) {
     message->frame = NULL;
 }
 
+static void retain_frame(void *payload) {
+    bst_frame_retain(((bst_frame_message *)payload)->frame);
+}
+
 #define HEADER_ONLY(name, kind, header) \
-    { name, kind, sizeof(header), 0, false, NULL }
+    { name, kind, sizeof(header), 0, false, NULL, NULL, false }
 #define WITH_ITEMS(name, kind, header, item, in_place) \
-    { name, kind, sizeof(header), sizeof(item), in_place, NULL }
+    { name, kind, sizeof(header), sizeof(item), in_place, NULL, NULL, false }
 
 static const bst_channel_type types[] = {
     HEADER_ONLY(BST_CHANNEL_SENSOR_COMMAND, BST_CHANNEL_LATEST, bst_sensor_command),
@@ -21,9 +25,10 @@ static const bst_channel_type types[] = {
     WITH_ITEMS(BST_CHANNEL_POINTING_TELEMETRY, BST_CHANNEL_LATEST, bst_pointing_telemetry,
                bst_pointing_sample, true),
     HEADER_ONLY(BST_CHANNEL_NAV_TELEMETRY, BST_CHANNEL_LATEST, bst_nav_telemetry),
-    {BST_CHANNEL_FRAME, BST_CHANNEL_QUEUE, sizeof(bst_frame_message), 0, false, release_frame},
+    {BST_CHANNEL_FRAME, BST_CHANNEL_QUEUE, sizeof(bst_frame_message), 0, false, release_frame,
+     retain_frame, false},
     WITH_ITEMS(BST_CHANNEL_TRUTH, BST_CHANNEL_QUEUE, bst_truth, bst_truth_item, false),
-    HEADER_ONLY(BST_CHANNEL_PLANES, BST_CHANNEL_LATEST, bst_planes),
+    {BST_CHANNEL_PLANES, BST_CHANNEL_LATEST, sizeof(bst_planes), 0, false, NULL, NULL, true},
     WITH_ITEMS(BST_CHANNEL_DETECTIONS, BST_CHANNEL_QUEUE, bst_detections, bst_detection, false),
     WITH_ITEMS(BST_CHANNEL_PREDICTIONS, BST_CHANNEL_LATEST, bst_predictions, bst_prediction, false),
     WITH_ITEMS(BST_CHANNEL_TRACKS, BST_CHANNEL_QUEUE, bst_tracks, bst_track, false),

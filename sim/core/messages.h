@@ -150,10 +150,10 @@ typedef struct bst_truth {
     bst_vec3 sun_m;                        /* observer to Sun, mid */
     double boresight_x_px, boresight_y_px; /* where the boresight meets the focal plane */
     double background_e, dark_e;           /* expected electrons per pixel */
-    double hits_e;                         /* charge of the radiation hits on the sensor, electrons */
-    int32_t hits;                          /* radiation hits */
-    double pixel_scale_arcsec;             /* of this exposure */
-    int32_t count, lost;                   /* items; sources that found no room */
+    double hits_e;             /* charge of the radiation hits on the sensor, electrons */
+    int32_t hits;              /* radiation hits */
+    double pixel_scale_arcsec; /* of this exposure */
+    int32_t count, lost;       /* items; sources that found no room */
     bst_truth_item items[];
 } bst_truth;
 
@@ -317,6 +317,8 @@ typedef struct bst_channel_type {
     bool in_place;     /* a ring that its writer extends in place: cannot be read with a delay */
     void (*release)(
         void *payload); /* lets go of what a slot owns before it is written again; may be NULL */
+    void (*retain)(void *payload); /* makes a copy of the payload own the same; with release */
+    bool lends; /* the payload points to memory of its writer that the next message overwrites */
 } bst_channel_type;
 
 /* The type of a channel by its unscoped name; NULL when there is none. */

@@ -37,6 +37,9 @@ typedef struct bst_port {
 enum {
     BST_MODULE_READS_TRUTH = 1u << 0, /* gets env->world; onboard modules do not */
     BST_MODULE_NEEDS_DEVICE = 1u << 1,
+    BST_MODULE_APART = 1u << 2, /* may step in another thread than modules that do not read it:
+                                   shares with them only what is constant or locked, has no period
+                                   and never asks to be woken */
 };
 
 /* What create gets. Pointers outlive the module. */
@@ -72,6 +75,8 @@ typedef struct bst_module_desc {
     bst_status (*create)(const bst_module_env *env, const void *config, void **self);
     bst_status (*step)(void *self, struct bst_step *step);
     void (*destroy)(void *self);
+    /* May be NULL. At the end of a run: counts what was still under way; publishes nothing. */
+    bst_status (*finish)(void *self, struct bst_step *step);
 } bst_module_desc;
 
 /* In create: number of items that an output's payload shall hold. `port` indexes desc->ports. */
@@ -79,6 +84,8 @@ void bst_env_set_capacity(const bst_module_env *env, int port, int items);
 /* In create of a module that wakes itself (bst_step_wake_at): about how often it will step at most.
  * Queues behind it are sized by that. */
 void bst_env_set_rate(const bst_module_env *env, double rate_hz);
+/* In create: this input will not be read, so that nothing waits for who writes it. */
+void bst_env_ignore(const bst_module_env *env, int port);
 /* In create: a key of a random stream of this instance. */
 static inline bst_rng_key bst_env_rng(const bst_module_env *env, const char *stream) {
     return bst_rng_make_key(env->seed, env->run, env->instance, stream);

@@ -4,17 +4,22 @@
 #include "sim/engine/engine_internal.h"
 
 void bst_engine_count(bst_engine *engine, const char *what) {
-    for (int i = 0; i < engine->counter_count; i++) {
-        if (strcmp(engine->counters[i].name, what) == 0) {
-            engine->counters[i].count++;
-            return;
-        }
+    pthread_mutex_lock(&engine->counting);
+    int i = 0, order = 1;
+    while (i < engine->counter_count && (order = strncmp(engine->counters[i].name, what,
+                                                         sizeof engine->counters->name - 1)) < 0) {
+        i++;
     }
-    if (engine->counter_count < MAX_COUNTERS) {
-        counter *c = &engine->counters[engine->counter_count++];
+    counter *c = &engine->counters[i];
+    if (i < engine->counter_count && order == 0) {
+        c->count++;
+    } else if (engine->counter_count < MAX_COUNTERS) {
+        memmove(c + 1, c, (size_t)(engine->counter_count - i) * sizeof *c);
         snprintf(c->name, sizeof c->name, "%s", what);
         c->count = 1;
+        engine->counter_count++;
     }
+    pthread_mutex_unlock(&engine->counting);
 }
 
 bst_ctx *bst_step_ctx(struct bst_step *step) {
@@ -27,50 +32,90 @@ double bst_step_seconds(const struct bst_step *step) {
     return (double)step->tick / (double)step->engine->tick_rate_hz;
 }
 
-static bst_sample sample_at(const struct bst_step *step, const channel *ch, const port_state *port,
-                            int64_t sequence) {
-    const slot *s = bst_engine_slot(ch, sequence);
-    bst_sample sample = {s->payload, s->written_tick, sequence, false};
-    if (port->max_age_ticks > 0 && step->tick - s->written_tick > port->max_age_ticks) {
+bst_sample bst_engine_sample(struct bst_step *step, const port_state *port, const void *payload,
+                             int64_t written_tick, int64_t sequence) {
+    bst_sample sample = {payload, written_tick, sequence, false};
+    if (port->max_age_ticks > 0 && step->tick - written_tick > port->max_age_ticks) {
         sample.stale = true;
         bst_engine_count(step->engine, "stale_input");
     }
     return sample;
 }
 
-bst_sample bst_step_latest(struct bst_step *step, int port_index) {
+static bst_sample sample_at(struct bst_step *step, const channel *ch, const port_state *port,
+                            int64_t sequence) {
     const bst_sample none = {NULL, 0, -1, true};
-    port_state *port = &step->self->ports[port_index];
-    if (port->channel < 0) {
+    if (sequence < 0) {
         return none;
     }
-    const channel *ch = &step->engine->channels[port->channel];
-    int64_t oldest = ch->written > ch->depth ? ch->written - ch->depth : 0;
-    for (int64_t sequence = ch->written - 1; sequence >= oldest; sequence--) {
-        if (bst_engine_slot(ch, sequence)->written_tick + port->delay_ticks <= step->tick) {
-            return sample_at(step, ch, port, sequence);
-        }
-    }
-    return none;
+    const slot *s = bst_engine_slot(ch, sequence);
+    return bst_engine_sample(step, port, s->payload, s->written_tick, sequence);
 }
 
-bst_sample bst_step_next(struct bst_step *step, int port_index) {
-    const bst_sample none = {NULL, 0, -1, true};
-    port_state *port = &step->self->ports[port_index];
-    if (port->channel < 0) {
-        return none;
+int64_t bst_engine_newest(const channel *ch, const port_state *port, int64_t tick) {
+    int64_t oldest = ch->written > ch->depth ? ch->written - ch->depth : 0;
+    for (int64_t sequence = ch->written - 1; sequence >= oldest; sequence--) {
+        if (bst_engine_slot(ch, sequence)->written_tick + port->delay_ticks <= tick) {
+            return sequence;
+        }
     }
-    const channel *ch = &step->engine->channels[port->channel];
+    return -1;
+}
+
+int64_t bst_engine_unread(bst_engine *engine, const channel *ch, port_state *port, int64_t tick) {
     int64_t oldest = ch->written > ch->depth ? ch->written - ch->depth : 0;
     while (port->cursor < oldest) {
         port->cursor++;
-        bst_engine_count(step->engine, "queue_overflow");
+        bst_engine_count(engine, "queue_overflow");
     }
-    if (port->cursor >= ch->written ||
-        bst_engine_slot(ch, port->cursor)->written_tick + port->delay_ticks > step->tick) {
-        return none;
+    return port->cursor < ch->written &&
+                   bst_engine_slot(ch, port->cursor)->written_tick + port->delay_ticks <= tick
+               ? port->cursor
+               : -1;
+}
+
+bool bst_engine_pass_trigger(const channel *ch, port_state *port, int64_t tick) {
+    int64_t before = port->trigger_cursor;
+    if (port->trigger_cursor < ch->written - ch->depth) {
+        port->trigger_cursor = ch->written - ch->depth;
     }
-    return sample_at(step, ch, port, port->cursor++);
+    while (port->trigger_cursor < ch->written &&
+           bst_engine_slot(ch, port->trigger_cursor)->written_tick + port->delay_ticks <= tick) {
+        port->trigger_cursor++;
+    }
+    return port->trigger_cursor > before;
+}
+
+bst_sample bst_step_latest(struct bst_step *step, int port_index) {
+    port_state *port = &step->self->ports[port_index];
+    if (port->channel < 0) {
+        return (bst_sample){NULL, 0, -1, true};
+    }
+    const channel *ch = &step->engine->channels[port->channel];
+    if (step->job && !ch->apart) {
+        return bst_overlap_latest(step, port_index);
+    }
+    return sample_at(step, ch, port, bst_engine_newest(ch, port, step->tick));
+}
+
+bst_sample bst_step_next(struct bst_step *step, int port_index) {
+    port_state *port = &step->self->ports[port_index];
+    if (port->channel < 0) {
+        return (bst_sample){NULL, 0, -1, true};
+    }
+    const channel *ch = &step->engine->channels[port->channel];
+    if (step->job && !ch->apart) {
+        return bst_overlap_next(step, port_index);
+    }
+    int64_t sequence = bst_engine_unread(step->engine, ch, port, step->tick);
+    port->cursor += sequence >= 0;
+    return sample_at(step, ch, port, sequence);
+}
+
+bst_status bst_engine_heard(bst_ctx *ctx, const bst_engine *engine, bst_status status) {
+    const bst_ctx *own = engine->hooks.ctx;
+    return status == BST_OK || !own || own == ctx ? status
+                                                  : bst_fail(ctx, status, "%s", own->message);
 }
 
 /* Lets go of what a slot owns. */
@@ -93,18 +138,24 @@ static bst_status publish(struct bst_step *step, int port_index) {
     for (int r = 0; r < ch->reader_count; r++) {
         int index = ch->readers[r].instance, p = ch->readers[r].port;
         const instance *other = engine->instances[index];
-        if (other->spec.desc->ports[p].flags & BST_PORT_TRIGGER) {
+        /* a step behind the stepping thread sees to its own readers */
+        if (!step->job && (other->spec.desc->ports[p].flags & BST_PORT_TRIGGER)) {
             int64_t visible = step->tick + other->ports[p].delay_ticks;
             if (visible < engine->due[index]) {
                 bst_engine_set_due(engine, index, visible);
             }
         }
     }
-    if (engine->hooks.message) {
-        return engine->hooks.message(engine->hooks.user, ch->scope, ch->type->name, s->payload,
-                                     step->tick);
+    const bst_engine_hooks *hooks = &engine->hooks;
+    if (!hooks->message ||
+        (hooks->wants && !hooks->wants(hooks->user, ch->scope, ch->type->name, step->tick))) {
+        return BST_OK;
     }
-    return BST_OK;
+    return engine->overlap && !step->job
+               ? bst_overlap_message(step->ctx, engine, ch, s->payload, step->tick)
+               : bst_engine_heard(step->ctx, engine,
+                                  hooks->message(hooks->user, ch->scope, ch->type->name, s->payload,
+                                                 step->tick));
 }
 
 bst_status bst_engine_commit(struct bst_step *step) {
@@ -195,7 +246,11 @@ void bst_step_event(struct bst_step *step, const char *kind, const char *format,
     vsnprintf(text, sizeof text, format, args);
     va_end(args);
     bst_status status =
-        engine->hooks.event(engine->hooks.user, step->tick, step->self->name, kind, text);
+        engine->overlap && !step->job
+            ? bst_overlap_event(step->ctx, engine, step->tick, step->self->name, kind, text)
+            : bst_engine_heard(step->ctx, engine,
+                               engine->hooks.event(engine->hooks.user, step->tick, step->self->name,
+                                                   kind, text));
     if (step->hook_status == BST_OK) {
         step->hook_status = status;
     }
@@ -208,6 +263,18 @@ void bst_step_count(struct bst_step *step, const char *what) {
 void bst_env_set_capacity(const bst_module_env *env, int port, int items) {
     instance *self = env->engine_private;
     self->ports[port].capacity = items;
+}
+
+void bst_env_ignore(const bst_module_env *env, int port) {
+    instance *self = env->engine_private;
+    self->ports[port].channel = -1;
+    int kept = 0;
+    for (int t = 0; t < self->trigger_count; t++) {
+        if (self->triggers[t] != port) {
+            self->triggers[kept++] = self->triggers[t];
+        }
+    }
+    self->trigger_count = kept;
 }
 
 void bst_env_set_rate(const bst_module_env *env, double rate_hz) {

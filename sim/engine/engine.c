@@ -19,6 +19,7 @@ bst_status bst_engine_create(bst_ctx *ctx, int64_t tick_rate_hz, bst_engine **ou
     }
     engine->tick_rate_hz = tick_rate_hz;
     engine->tick = -1;
+    pthread_mutex_init(&engine->counting, NULL);
     *out = engine;
     return BST_OK;
 }
@@ -27,6 +28,7 @@ void bst_engine_free(bst_engine *engine) {
     if (!engine) {
         return;
     }
+    bst_overlap_stop(engine);
     /* what the channels own goes back to its makers before they are destroyed */
     for (int c = 0; c < engine->channel_count; c++) {
         channel *ch = &engine->channels[c];
@@ -54,6 +56,7 @@ void bst_engine_free(bst_engine *engine) {
         free(self);
     }
     free(engine->instances);
+    pthread_mutex_destroy(&engine->counting);
     free(engine);
 }
 
@@ -143,12 +146,16 @@ bst_status bst_engine_load(bst_ctx *ctx, bst_engine *engine) {
             self->wake = spec->offset_ticks;
         }
     }
+    bst_engine_set_apart(engine);
     BST_TRY(bst_engine_allocate_channels(ctx, engine));
     return bst_engine_make_schedule(ctx, engine);
 }
 
 static bst_status step_instance(bst_ctx *ctx, bst_engine *engine, int index, int64_t tick) {
     instance *self = engine->instances[index];
+    if (engine->overlap && self->apart) {
+        return bst_overlap_step(ctx, engine, index, tick);
+    }
     if (self->next_period <= tick) {
         self->next_period += self->spec.period_ticks;
     }
@@ -157,17 +164,9 @@ static bst_status step_instance(bst_ctx *ctx, bst_engine *engine, int index, int
     }
     for (int t = 0; t < self->trigger_count; t++) {
         port_state *port = &self->ports[self->triggers[t]];
-        const channel *ch = &engine->channels[port->channel];
-        if (port->trigger_cursor < ch->written - ch->depth) {
-            port->trigger_cursor = ch->written - ch->depth;
-        }
-        while (port->trigger_cursor < ch->written &&
-               bst_engine_slot(ch, port->trigger_cursor)->written_tick + port->delay_ticks <=
-                   tick) {
-            port->trigger_cursor++;
-        }
+        (void)bst_engine_pass_trigger(&engine->channels[port->channel], port, tick);
     }
-    struct bst_step step = {engine, self, ctx, tick, 0, BST_OK};
+    struct bst_step step = {engine, self, ctx, tick, 0, BST_OK, NULL};
     self->steps++;
     bst_status status = self->spec.desc->step(self->self, &step);
     if (status != BST_OK) {
@@ -179,10 +178,7 @@ static bst_status step_instance(bst_ctx *ctx, bst_engine *engine, int index, int
     return BST_OK;
 }
 
-bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) {
-    if (!engine->loaded) {
-        return bst_fail(ctx, BST_ERR_STATE, "the engine is not loaded");
-    }
+static bst_status run_until(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) {
     double asked = bst_wall_seconds();
     int since_clock = 0;
     while (engine->instance_count > 0) {
@@ -211,6 +207,52 @@ bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) 
         }
     }
     return BST_OK;
+}
+
+static bst_status finish_instances(bst_ctx *ctx, bst_engine *engine) {
+    for (int i = 0; i < engine->instance_count; i++) {
+        instance *self = engine->instances[i];
+        if (self->spec.desc->finish) {
+            struct bst_step step = {engine, self, ctx, engine->tick, 0, BST_OK, NULL};
+            bst_status status = self->spec.desc->finish(self->self, &step);
+            if (status != BST_OK) {
+                return bst_fail_prefix(ctx, status, "%s", self->name);
+            }
+        }
+    }
+    return BST_OK;
+}
+
+bst_status bst_engine_overlap(bst_ctx *ctx, bst_engine *engine) {
+    if (!engine->loaded || engine->overlap) {
+        return bst_fail(ctx, BST_ERR_STATE, "an engine overlaps once, after loading");
+    }
+    return bst_overlap_start(ctx, engine);
+}
+
+bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) {
+    if (!engine->loaded) {
+        return bst_fail(ctx, BST_ERR_STATE, "the engine is not loaded");
+    }
+    bst_status status = run_until(ctx, engine, until_tick);
+    if (engine->overlap) {
+        /* what failed behind the stepping thread came before what failed in it */
+        bst_ctx before = *ctx;
+        bst_status behind = bst_overlap_drain(ctx, engine);
+        if (behind != BST_OK) {
+            return behind;
+        }
+        memcpy(ctx->message, before.message, sizeof ctx->message);
+    }
+    if (status == BST_OK || status == BST_ERR_INTERRUPTED) {
+        bst_ctx counting = *ctx;
+        bst_status counted = finish_instances(&counting, engine);
+        if (counted != BST_OK) {
+            *ctx = counting;
+            return counted;
+        }
+    }
+    return status;
 }
 
 int64_t bst_engine_tick(const bst_engine *engine) {

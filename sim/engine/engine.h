@@ -35,7 +35,9 @@ typedef struct bst_instance_spec {
     uint64_t seed, run;
 } bst_instance_spec;
 
-/* Sees what happens; any member may be NULL. Called from the stepping thread. */
+/* Sees what happens; any member may be NULL. `message` and `event` are called by one thread at a
+ * time in the order in which things happen: the stepping one, or when overlapping the one behind
+ * it. The others are called by the stepping thread. */
 typedef struct bst_engine_hooks {
     void *user;
     /* A message was published (before any MODIFY port touches it). */
@@ -45,6 +47,11 @@ typedef struct bst_engine_hooks {
                         const char *text);
     /* Asked about every 20 ms of wall time; true ends the run with BST_ERR_INTERRUPTED. */
     bool (*interrupted)(void *user, int64_t tick);
+    /* False spares `message` one that it would ignore. */
+    bool (*wants)(void *user, const char *scope, const char *channel, int64_t tick);
+    /* Where `message` and `event` leave why they failed. NULL: in the context of the run; when
+     * overlapping, give them one of their own. */
+    bst_ctx *ctx;
 } bst_engine_hooks;
 
 bst_status bst_engine_create(bst_ctx *ctx, int64_t tick_rate_hz, bst_engine **out) BST_MUST_CHECK;
@@ -61,7 +68,14 @@ bst_status bst_engine_add(bst_ctx *ctx, bst_engine *engine,
  * of one name. */
 bst_status bst_engine_load(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
 
-/* Steps everything that is due before `until_tick` (exclusive). */
+/* Has bst_engine_run do in a second thread, in the order in which it would have been done, what
+ * nothing else waits for: the hooks `message` and `event`, and the steps of modules that are
+ * BST_MODULE_APART with no other reader than such modules. Messages that are needed there are
+ * copied, as many as a bounded memory holds; then stepping waits. Results do not depend on it.
+ * After bst_engine_load. */
+bst_status bst_engine_overlap(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
+
+/* Steps everything that is due before `until_tick` (exclusive). All of it is done on return. */
 bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) BST_MUST_CHECK;
 
 /* Tick of the last step, -1 before the first. */

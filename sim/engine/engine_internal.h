@@ -2,6 +2,8 @@
 #ifndef BST_ENGINE_ENGINE_INTERNAL_H
 #define BST_ENGINE_ENGINE_INTERNAL_H
 
+#include <pthread.h>
+
 #include "sim/engine/engine.h"
 
 typedef struct slot {
@@ -29,6 +31,7 @@ typedef struct channel {
     int capacity;            /* items */
     double rate_hz;          /* about how often it is written */
     int64_t released;        /* sequences below have been let go */
+    bool apart;              /* its writer is */
     channel_reader *readers; /* BST_PORT_IN and BST_PORT_MODIFY ports, part of engine->readers */
     int reader_count;
 } channel;
@@ -50,6 +53,8 @@ typedef struct instance {
     char *scope, *name;
     void *self;
     bool created;
+    bool apart; /* no other instance waits for what it writes: steps last in a tick, and beside the
+                   others when overlapping */
     port_state ports[MAX_PORTS];
     int triggers[MAX_PORTS]; /* ports whose messages make it step */
     int trigger_count;
@@ -65,6 +70,10 @@ typedef struct counter {
 } counter;
 
 enum { MAX_COUNTERS = 64 };
+
+/* overlap.c: what one thread does behind the stepping one */
+typedef struct bst_overlap bst_overlap;
+typedef struct bst_overlap_job bst_overlap_job;
 
 struct bst_engine {
     int64_t tick_rate_hz;
@@ -82,8 +91,10 @@ struct bst_engine {
     bst_engine_hooks hooks;
     int64_t tick;
     bool loaded;
-    counter counters[MAX_COUNTERS];
+    pthread_mutex_t counting;
+    counter counters[MAX_COUNTERS]; /* by name */
     int counter_count;
+    bst_overlap *overlap; /* NULL: everything is done by the stepping thread */
 };
 
 /* What a module's step sees. */
@@ -94,6 +105,7 @@ struct bst_step {
     int64_t tick;
     unsigned writing; /* bit of each port whose payload was handed out and not yet published */
     bst_status hook_status; /* first failure of a hook during this step */
+    bst_overlap_job *job;   /* inputs of a step behind the stepping thread, else NULL */
 };
 
 /* wiring.c */
@@ -103,11 +115,42 @@ bst_status bst_engine_allocate_channels(bst_ctx *ctx, bst_engine *engine) BST_MU
 bst_status bst_engine_commit(struct bst_step *step) BST_MUST_CHECK;
 void bst_engine_release_read(bst_engine *engine);
 void bst_engine_count(bst_engine *engine, const char *what);
+/* Passes a hook's status on, with its message in ctx. */
+bst_status bst_engine_heard(bst_ctx *ctx, const bst_engine *engine,
+                            bst_status status) BST_MUST_CHECK;
+/* Newest visible sequence of a port, -1 when there is none. */
+int64_t bst_engine_newest(const channel *ch, const port_state *port, int64_t tick);
+/* Next unread visible sequence, -1 when there is none; counts those that were overwritten. */
+int64_t bst_engine_unread(bst_engine *engine, const channel *ch, port_state *port, int64_t tick);
+/* Whether a message of the trigger has become visible; passes over it. */
+bool bst_engine_pass_trigger(const channel *ch, port_state *port, int64_t tick);
+bst_sample bst_engine_sample(struct bst_step *step, const port_state *port, const void *payload,
+                             int64_t written_tick, int64_t sequence);
 /* schedule.c */
 bst_status bst_engine_make_schedule(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
 /* Earliest tick at which an instance wants to be stepped. */
 int64_t bst_engine_earliest(const bst_engine *engine, const instance *self);
 void bst_engine_set_due(bst_engine *engine, int instance, int64_t due);
+
+/* overlap.c: finds the instances that are apart and puts them last; before channels are allocated
+ */
+void bst_engine_set_apart(bst_engine *engine);
+bst_status bst_overlap_start(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
+void bst_overlap_stop(bst_engine *engine);
+/* The following are called by the stepping thread; they fail with what failed behind it. */
+bst_status bst_overlap_message(bst_ctx *ctx, bst_engine *engine, const channel *ch,
+                               const void *payload, int64_t tick) BST_MUST_CHECK;
+bst_status bst_overlap_event(bst_ctx *ctx, bst_engine *engine, int64_t tick, const char *instance,
+                             const char *kind, const char *text) BST_MUST_CHECK;
+/* Steps the instances that are apart in the scope of this one, with their inputs as they are now.
+ */
+bst_status bst_overlap_step(bst_ctx *ctx, bst_engine *engine, int index,
+                            int64_t tick) BST_MUST_CHECK;
+/* Waits until all is done. */
+bst_status bst_overlap_drain(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
+/* In a step behind: reads from what was put aside. */
+bst_sample bst_overlap_latest(struct bst_step *step, int port);
+bst_sample bst_overlap_next(struct bst_step *step, int port);
 
 /* The slot of a message among the last `depth`, or of the next one (sequence == written). */
 static inline slot *bst_engine_slot(const channel *ch, int64_t sequence) {

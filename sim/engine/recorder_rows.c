@@ -1,5 +1,6 @@
 /* Messages to rows. */
 #include <math.h>
+#include <string.h>
 
 #include "sim/engine/recorder_internal.h"
 
@@ -62,6 +63,18 @@ static bool is_due(const bst_recorder *recorder, int64_t tick, int64_t *last) {
     }
     *last = now;
     return true;
+}
+
+bool bst_recorder_due(const bst_recorder *recorder, const char *channel, int64_t tick,
+                      int64_t *last) {
+    static const char *const decimated[] = {BST_CHANNEL_LOS_HISTORY, BST_CHANNEL_POINTING_TELEMETRY,
+                                            BST_CHANNEL_NAV_TELEMETRY};
+    for (size_t i = 0; i < sizeof decimated / sizeof *decimated; i++) {
+        if (strcmp(channel, decimated[i]) == 0) {
+            return bst_recorder_wants(recorder, channel) && is_due(recorder, tick, last);
+        }
+    }
+    return bst_recorder_wants(recorder, channel);
 }
 
 static bst_status append(bst_ctx *ctx, bst_recorder *recorder, bst_record_table table,

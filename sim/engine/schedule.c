@@ -28,6 +28,9 @@ int64_t bst_engine_earliest(const bst_engine *engine, const instance *self) {
     for (int t = 0; t < self->trigger_count; t++) {
         const port_state *port = &self->ports[self->triggers[t]];
         const channel *ch = &engine->channels[port->channel];
+        if (engine->overlap && ch->apart) {
+            continue; /* seen to behind the stepping thread */
+        }
         if (port->trigger_cursor < ch->written) {
             int64_t oldest = ch->written - ch->depth;
             int64_t next = port->trigger_cursor > oldest ? port->trigger_cursor : oldest;

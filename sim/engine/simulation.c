@@ -191,6 +191,9 @@ static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
     if (status == BST_OK) {
         status = bst_engine_load(ctx, sim->engine);
     }
+    if (status == BST_OK && options->overlap) {
+        status = bst_engine_overlap(ctx, sim->engine);
+    }
     return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "%s", scenario->file);
 }
 

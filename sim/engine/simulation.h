@@ -9,6 +9,7 @@ typedef struct bst_simulation bst_simulation;
 typedef struct bst_simulation_options {
     const char *device; /* selector as in bst_device_open; NULL: default */
     int threads;        /* 0: all */
+    bool overlap;       /* as bst_engine_overlap: hooks are called by a second thread */
 } bst_simulation_options;
 
 /* Opens what the scenario names (catalogue, orbits, the OpenCL device if a module needs one), makes

@@ -34,6 +34,7 @@ static void copy_names(bst_fits *fits, const bst_fits_info *info) {
     copy_name(fits->names.observer, info->observer);
     copy_name(fits->names.instrument, info->instrument);
     copy_name(fits->names.object, info->object);
+    copy_name(fits->names.image_type, info->image_type);
     copy_name(fits->names.program, info->program);
     fits->names.camera = *info->camera;
 }

@@ -27,6 +27,7 @@ typedef struct bst_fits_info {
     const char *observer;     /* OBSERVER: spacecraft */
     const char *instrument;   /* INSTRUME: sensor */
     const char *object;       /* OBJECT: what is looked for; may be NULL */
+    const char *image_type;   /* IMAGETYP: "BIAS", "DARK" ...; may be NULL */
     const char *program;      /* CREATOR: "boresight 0.1.0"; may be NULL */
     const bst_camera *camera; /* the true camera */
     bst_fits_compression compression;

@@ -56,6 +56,7 @@ void bst_fits_put_run_keys(fitsfile *file, const bst_fits_names *names, int *cod
     put_text(file, "OBSERVER", names->observer, "observing spacecraft", code);
     put_text(file, "INSTRUME", names->instrument, "sensor", code);
     put_text(file, "OBJECT", names->object, "target of interest", code);
+    put_text(file, "IMAGETYP", names->image_type, "kind of frame", code);
     fits_write_key_str(file, "BUNIT", "adu", "unit of the pixel values", code);
     put_real(file, "GAIN", c->gain_e_per_dn, "[e-/adu] electrons per count", code);
     put_real(file, "RDNOISE", c->read_noise_e, "[e-] read noise, 1 sigma", code);
@@ -138,6 +139,7 @@ void bst_fits_put_frame_keys(fitsfile *file, const bst_fits_names *names,
                                           "end of the exposure"};
     char date[40];
     put_int(file, "FRAMEID", frame->id, "number of the exposure", code);
+    put_text(file, "IMAGETYP", names->image_type, "kind of frame", code);
     double mjd = bst_fits_date(frame, BST_FITS_BEGIN, date);
     fits_write_key_str(file, "DATE-OBS", date, "start of the exposure, UTC", code);
     fits_write_key_dbl(file, "MJD-OBS", mjd, MJD_DIGITS, "[d] start of the exposure, UTC", code);

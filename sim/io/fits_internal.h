@@ -13,7 +13,7 @@
 /* bst_fits_info with its own memory. */
 typedef struct bst_fits_names {
     char observer[BST_FITS_NAME_BYTES], instrument[BST_FITS_NAME_BYTES],
-        object[BST_FITS_NAME_BYTES], program[BST_FITS_NAME_BYTES];
+        object[BST_FITS_NAME_BYTES], image_type[BST_FITS_NAME_BYTES], program[BST_FITS_NAME_BYTES];
     bst_camera camera;
 } bst_fits_names;
 

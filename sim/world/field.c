@@ -5,6 +5,7 @@
 
 #include "sim/world/field_image.h"
 #include "sim/world/field_objects.h"
+#include "sim/world/los_track.h"
 #include "sim/world/psf.h"
 #include "sim/world/skylight.h"
 
@@ -25,9 +26,7 @@ struct bst_field {
     bst_view *view;
     const bst_camera *camera;
     int observer;
-    double *time_s;
-    bst_quat *q;
-    int track_capacity;
+    bst_track_store track;
     bst_star *stars;
     int star_capacity;
     bst_faint_stars *faint;      /* NULL: none */
@@ -79,8 +78,7 @@ void bst_field_free(bst_field *field) {
         bst_view_free(field->view);
         bst_faint_stars_free(field->faint);
         bst_skylight_free(field->skylight);
-        free(field->time_s);
-        free(field->q);
+        bst_track_store_free(&field->track);
         free(field->stars);
         free(field->sources);
         free(field->parts);
@@ -96,103 +94,15 @@ void bst_field_set_camera(bst_field *field, const bst_camera *camera) {
     }
 }
 
-static const bst_los_sample *ring_sample(const bst_los_history *history, int64_t number) {
-    return &history->items[number % history->capacity];
-}
-
-static bst_quat same_sign(bst_quat q, bst_quat as) {
-    double dot = q.x * as.x + q.y * as.y + q.z * as.z + q.w * as.w;
-    return dot < 0.0 ? (bst_quat){-q.x, -q.y, -q.z, -q.w} : q;
-}
-
-/* Attitude at `tick` between samples number and number + 1. */
-static bst_quat between(const bst_los_history *history, int64_t number, int64_t tick) {
-    const bst_los_sample *a = ring_sample(history, number);
-    if (a->tick >= tick) {
-        return a->q_cam_from_gcrf;
-    }
-    const bst_los_sample *b = ring_sample(history, number + 1);
-    double s = (double)(tick - a->tick) / (double)(b->tick - a->tick);
-    return bst_quat_slerp(a->q_cam_from_gcrf, b->q_cam_from_gcrf, s);
-}
-
-static bst_status reserve_track(bst_ctx *ctx, bst_field *field, int count) {
-    if (count <= field->track_capacity) {
-        return BST_OK;
-    }
-    double *time_s = realloc(field->time_s, (size_t)count * sizeof *time_s);
-    field->time_s = time_s ? time_s : field->time_s;
-    bst_quat *q = realloc(field->q, (size_t)count * sizeof *q);
-    field->q = q ? q : field->q;
-    if (!time_s || !q) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d line-of-sight samples", count);
-    }
-    field->track_capacity = count;
-    return BST_OK;
-}
-
 bst_status bst_field_track(bst_ctx *ctx, bst_field *field, const bst_los_history *history,
                            int64_t start_tick, int64_t end_tick, int64_t tick_rate_hz,
                            bst_los_track *out) {
-    int64_t newest = history->written - 1;
-    int64_t oldest =
-        history->written > history->capacity ? history->written - history->capacity : 0;
-    if (newest < 0 || ring_sample(history, oldest)->tick > start_tick ||
-        ring_sample(history, newest)->tick < end_tick) {
-        return bst_fail(ctx, BST_ERR_STATE,
-                        "the line-of-sight history (ticks %lld to %lld) does not cover the "
-                        "exposure (%lld to %lld): "
-                        "give the gimbal a longer history_s or a rate that divides the exposure",
-                        newest < 0 ? 0LL : (long long)ring_sample(history, oldest)->tick,
-                        newest < 0 ? -1LL : (long long)ring_sample(history, newest)->tick,
-                        (long long)start_tick, (long long)end_tick);
-    }
-    /* last sample not after the start, by bisection: ticks ascend */
-    int64_t low = oldest, high = newest;
-    while (low < high) {
-        int64_t middle = low + (high - low + 1) / 2;
-        if (ring_sample(history, middle)->tick <= start_tick) {
-            low = middle;
-        } else {
-            high = middle - 1;
-        }
-    }
-    int64_t last = low;
-    while (last < newest && ring_sample(history, last)->tick < end_tick) {
-        last++;
-    }
-    int inner = (int)(last - low > 0 ? last - low - 1 : 0);
-    BST_TRY(reserve_track(ctx, field, inner + 2));
-    double rate = (double)tick_rate_hz;
-    field->time_s[0] = 0.0;
-    field->q[0] = between(history, low, start_tick);
-    int count = 1;
-    for (int64_t n = low + 1; n < last; n++) {
-        const bst_los_sample *sample = ring_sample(history, n);
-        field->time_s[count] = (double)(sample->tick - start_tick) / rate;
-        field->q[count] = same_sign(sample->q_cam_from_gcrf, field->q[count - 1]);
-        count++;
-    }
-    field->time_s[count] = (double)(end_tick - start_tick) / rate;
-    field->q[count] =
-        same_sign(between(history, last > low ? last - 1 : low, end_tick), field->q[count - 1]);
-    *out = (bst_los_track){count + 1, field->time_s, field->q};
-    return BST_OK;
+    return bst_track_cut(ctx, &field->track, history, start_tick, end_tick, tick_rate_hz, out);
 }
 
 /* Rotation vector from attitude `from` to `to`, camera axes. */
 static bst_vec3 deviation(bst_quat from, bst_quat to) {
     return bst_quat_to_rotvec(bst_quat_mul(to, bst_quat_conj(from)));
-}
-
-static bst_quat attitude_at(const bst_los_track *track, double time_s) {
-    int k = 0;
-    while (k + 2 < track->count && track->time_s[k + 1] < time_s) {
-        k++;
-    }
-    double span = track->time_s[k + 1] - track->time_s[k];
-    double s = span > 0.0 ? (time_s - track->time_s[k]) / span : 0.0;
-    return bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], s);
 }
 
 /* The attitude that shows a star near the boresight at the mean of its places in the exposure. The
@@ -220,7 +130,7 @@ static void summarise_track(bst_field *field, const bst_los_track *track, bst_qu
     enum { D = SIGMA_DIMENSIONS };
     double exposure = track->time_s[track->count - 1];
     field->exposure_s = exposure;
-    field->q_mid = attitude_at(track, 0.5 * exposure);
+    field->q_mid = bst_track_attitude(track, 0.5 * exposure);
     double first[D] = {0}, second[D][D] = {{0}}, total = 0.0, reach = 0.0;
     double half_px = 0.5 * hypot((double)field->camera->width_px, (double)field->camera->height_px);
     double scale = bst_camera_scale_rad(field->camera);
@@ -426,7 +336,7 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
                                    .v_limit = options->v_limit,
                                    .faint_limit = faint_limit};
         for (int k = 0; k <= BST_DISC_PARTS; k++) {
-            around.q[k] = attitude_at(track, exposure * k / BST_DISC_PARTS);
+            around.q[k] = bst_track_attitude(track, exposure * k / BST_DISC_PARTS);
         }
         bst_window lit = window;
         if (bst_detector_config_whole_columns(&camera->detector)) {

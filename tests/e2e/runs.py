@@ -36,7 +36,7 @@ def clean():
         shutil.rmtree(_folders.pop(), ignore_errors=True)
 
 
-def command(scenario, out, *sets, seed=None, duration=None, threads=1):
+def command(scenario, out, *sets, seed=None, duration=None, threads=1, serial=False):
     """Arguments of `boresight run`; `sets` are overrides "/path=value"."""
     words = [BORESIGHT, "run", scenario, "--quiet", "--out", out, "--threads", str(threads),
              "--set", "/world/star_catalogue=embedded"]
@@ -44,6 +44,8 @@ def command(scenario, out, *sets, seed=None, duration=None, threads=1):
         words += ["--seed", hex(seed)]
     if duration is not None:
         words += ["--duration", str(duration)]
+    if serial:
+        words.append("--serial")
     for one in sets:
         words += ["--set", one]
     return words

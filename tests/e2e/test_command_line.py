@@ -18,7 +18,7 @@ except ImportError:
     jsonschema = None
 
 SCENARIOS = sorted(set(glob.glob("scenarios/**/*.json", recursive=True)) -
-                   {"scenarios/boresight.schema.json"})
+                   set(glob.glob("scenarios/updates/*.json")) - {"scenarios/boresight.schema.json"})
 GIMBAL = runs.SENSOR + "/modules/gimbal"
 
 

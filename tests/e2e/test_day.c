@@ -98,7 +98,7 @@ static void test_long_run(void **state) {
         bst_assert_ok(&ctx, bst_json_set(&ctx, json, set));
     }
     bst_assert_ok(&ctx, bst_scenario_read(&ctx, json, bst_app_registry(), &scenario));
-    const bst_simulation_options options = {NULL, 1};
+    const bst_simulation_options options = {.threads = 1};
     bst_simulation *sim = NULL;
     bst_assert_ok(&ctx, bst_simulation_create(&ctx, &scenario, &options, &sim));
     bst_run *store = NULL;
@@ -106,7 +106,7 @@ static void test_long_run(void **state) {
     observed seen = {.ctx = &ctx};
     open_recorder(&seen, store, &scenario);
     bst_engine *engine = bst_simulation_engine(sim);
-    const bst_engine_hooks hooks = {&seen, on_message, NULL, NULL};
+    const bst_engine_hooks hooks = {.user = &seen, .message = on_message};
     bst_engine_set_hooks(engine, &hooks);
 
     int64_t rate = scenario.tick_rate_hz;

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""The same scenario and seed give the same run, whatever the number of threads; another seed gives
-another one.
+"""The same scenario and seed give the same run, whatever the number of threads and whether processing
+and recording overlap with the simulation; another seed gives another one.
 
 Usage, from the repository root: /usr/bin/python3 tests/e2e/test_repeat.py BORESIGHT
 """
@@ -14,10 +14,11 @@ import runs
 
 JOBS = {  # name: scenario, record, seed, threads, seconds
     "first": (runs.TRACK, "extensions", 1, 1, 35),
-    "again": (runs.TRACK, "extensions", 1, 1, 35),
+    "serial": (runs.TRACK, "extensions", 1, 1, 35),
     "threads": (runs.TRACK, "extensions", 1, 2, 35),
     "cube": (runs.RATE_OPEN, "cube", 7, 1, 12),
     "cube threads": (runs.RATE_OPEN, "cube", 7, 2, 12),
+    "cube serial": (runs.RATE_OPEN, "cube", 7, 2, 12),
     "other seed": (runs.TRACK, "extensions", 2, 1, 12),
 }
 
@@ -38,7 +39,8 @@ class Repeat(unittest.TestCase):
         def one(name):
             scenario, form, seed, threads, duration = JOBS[name]
             return runs.run(scenario, os.path.join(cls.folder, name), f"/record/frames={form}",
-                            seed=seed, threads=threads, duration=duration)
+                            seed=seed, threads=threads, duration=duration,
+                            serial=name.endswith("serial"))
         cls.manifests = dict(zip(JOBS, runs.parallel(one, JOBS)))
 
     def path(self, name, file="frames.fits"):
@@ -68,8 +70,11 @@ class Repeat(unittest.TestCase):
             with open(self.path(a, picture), "rb") as one, open(self.path(b, picture), "rb") as two:
                 self.assertEqual(one.read(), two.read())
 
-    def test_twice(self):
-        self.assert_same("first", "again")
+    def test_serial(self):
+        self.assert_same("first", "serial")
+        self.assert_same("cube", "cube serial")
+        for name in ("counters", "warnings", "last_tick"):
+            self.assertEqual(self.manifests["cube"][name], self.manifests["cube serial"][name])
 
     def test_threads(self):
         self.assert_same("first", "threads")

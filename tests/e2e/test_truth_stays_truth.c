@@ -194,10 +194,10 @@ static record run_with(const char *saboteur) {
         bst_assert_ok(&ctx, bst_json_set(&ctx, json, set));
     }
     bst_assert_ok(&ctx, bst_scenario_read(&ctx, json, &registry, &scenario));
-    const bst_simulation_options options = {NULL, 1};
+    const bst_simulation_options options = {.threads = 1};
     bst_assert_ok(&ctx, bst_simulation_create(&ctx, &scenario, &options, &sim));
     bst_engine *engine = bst_simulation_engine(sim);
-    const bst_engine_hooks hooks = {&r, on_message, NULL, NULL};
+    const bst_engine_hooks hooks = {.user = &r, .message = on_message};
     bst_engine_set_hooks(engine, &hooks);
     bst_assert_ok(&ctx, bst_engine_run(&ctx, engine, scenario.duration_ticks));
     const char *name;

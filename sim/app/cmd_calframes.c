@@ -1,0 +1,258 @@
+/* boresight calframes: bias, dark and flat frames of a scenario's sensors. */
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "scenegen/detector.h"
+#include "scenegen/renderer.h"
+#include "sim/app/app.h"
+#include "sim/app/load.h"
+#include "sim/core/version.h"
+#include "sim/io/fits_frames.h"
+
+typedef struct calframes_request {
+    bst_load_options load;
+    const char *out, *sensor, *device;
+    int64_t threads, bias, dark, flat;
+    double exposure_s, level_e;
+    bool help;
+} calframes_request;
+
+/* One kind of frames. */
+typedef struct series {
+    const char *name, *type; /* file name, IMAGETYP */
+    int64_t count;
+    double exposure_s, level_e; /* light: electrons per pixel of mean response */
+} series;
+
+/* One sensor on its way through the series. */
+typedef struct job {
+    const calframes_request *request;
+    const bst_scenario *scenario;
+    const bst_observer_config *observer;
+    const bst_sensor_config *sensor;
+    bst_device *device;
+    bst_renderer *renderer;
+    char name[160]; /* observer/sensor */
+} job;
+
+static bst_status write_frame(bst_ctx *ctx, const job *j, const series *s, int64_t i,
+                              bst_fits *fits) {
+    const bst_camera *camera = &j->sensor->camera;
+    double time_s[2] = {0.0, s->exposure_s};
+    bst_quat q[2] = {BST_QUAT_IDENTITY, BST_QUAT_IDENTITY};
+    bst_los_track track = {2, time_s, q};
+    double dark_e = bst_camera_dark_e_per_s(camera) * s->exposure_s;
+    bst_render_request request = {
+        .window = {0, 0, (int)camera->width_px, (int)camera->height_px},
+        .track = &track,
+        .background_e = s->level_e + dark_e,
+        .dark_e = dark_e,
+        .key = bst_rng_make_key(j->scenario->seed, (uint64_t)j->scenario->run, j->name, s->type),
+        .exposure_id = i};
+    bst_frame *frame;
+    const uint16_t *pixels;
+    BST_TRY(bst_renderer_render(ctx, j->renderer, &request, &frame));
+    bst_status status = bst_frame_map(frame, ctx, &pixels);
+    if (status == BST_OK) {
+        bst_fits_frame head = {
+            .id = i,
+            .start = bst_time_add(j->scenario->epoch, (double)i * (s->exposure_s + 1.0)),
+            .exposure_s = s->exposure_s,
+            .window = request.window,
+            .binning = 1,
+            .bits = (int)camera->bits};
+        status = bst_fits_write(ctx, fits, &head, pixels, frame->width, frame->height, NULL);
+        bst_frame_unmap(frame);
+    }
+    bst_frame_release(frame);
+    return status;
+}
+
+static bst_status write_series(bst_ctx *ctx, const job *j, const series *s) {
+    if (s->count == 0) {
+        return BST_OK;
+    }
+    char path[4096], program[64];
+    snprintf(program, sizeof program, "boresight %s", bst_version());
+    snprintf(path, sizeof path, "%s/%s_%s_%s.fits", j->request->out, j->observer->name,
+             j->sensor->name, s->name);
+    bst_fits_info info = {.observer = j->observer->name,
+                          .instrument = j->sensor->name,
+                          .object = s->type,
+                          .image_type = s->type,
+                          .program = program,
+                          .camera = &j->sensor->camera};
+    bst_fits *fits;
+    BST_TRY(bst_fits_create(ctx, path, BST_FITS_EXTENSIONS, &info, &fits));
+    bst_status status = BST_OK;
+    for (int64_t i = 0; status == BST_OK && i < s->count; i++) {
+        status = write_frame(ctx, j, s, i, fits);
+    }
+    bst_status closed = bst_fits_close(ctx, fits);
+    status = status == BST_OK ? closed : status;
+    if (status == BST_OK) {
+        printf("%s: %lld frames of %g s\n", path, (long long)s->count, s->exposure_s);
+    }
+    return status;
+}
+
+/* Half of what the pixel or the converter holds, whichever is less. */
+static double half_level_e(const bst_camera *c) {
+    double top_e = ((double)((1 << c->bits) - 1) - c->offset_dn) * c->gain_e_per_dn;
+    return 0.5 * fmin(c->full_well_e, top_e);
+}
+
+static bst_status do_sensor(bst_ctx *ctx, job *j) {
+    const calframes_request *r = j->request;
+    const bst_sensor_config *s = j->sensor;
+    snprintf(j->name, sizeof j->name, "%s/%s", j->observer->name, s->name);
+    bst_renderer_options options = bst_renderer_default_options();
+    options.pattern = bst_detector_pattern_key(&s->camera, j->name);
+    options.pool_frames = 2;
+    BST_TRY(bst_renderer_create(ctx, j->device, &s->camera, &options, &j->renderer));
+    double exposure_s = r->exposure_s > 0.0 ? r->exposure_s : s->exposure.exposure_s;
+    double level_e = r->level_e > 0.0 ? r->level_e : half_level_e(&s->camera);
+    const series all[] = {{"bias", "BIAS", r->bias, 0.0, 0.0},
+                          {"dark", "DARK", r->dark, exposure_s, 0.0},
+                          {"flat", "FLAT", r->flat, exposure_s, level_e}};
+    bst_status status = BST_OK;
+    for (size_t i = 0; status == BST_OK && i < sizeof all / sizeof *all; i++) {
+        status = write_series(ctx, j, &all[i]);
+    }
+    bst_renderer_free(j->renderer);
+    return status;
+}
+
+static bst_status do_all(bst_ctx *ctx, const calframes_request *r, bst_scenario *scenario) {
+    bst_device *device;
+    if (mkdir(r->out, 0777) != 0 && errno != EEXIST) {
+        return bst_fail(ctx, BST_ERR_IO, "%s: cannot be made: %s", r->out, strerror(errno));
+    }
+    BST_TRY(bst_device_open(ctx, r->device ? r->device : "", (int)r->threads, &device));
+    bst_status status = BST_OK;
+    int done = 0;
+    bst_observer_config *observers = scenario->observers.items;
+    for (int o = 0; status == BST_OK && o < scenario->observers.count; o++) {
+        bst_sensor_config *sensors = observers[o].sensors.items;
+        for (int s = 0; status == BST_OK && s < observers[o].sensors.count; s++) {
+            job j = {.request = r,
+                     .scenario = scenario,
+                     .observer = &observers[o],
+                     .sensor = &sensors[s],
+                     .device = device};
+            char name[160];
+            snprintf(name, sizeof name, "%s/%s", observers[o].name, sensors[s].name);
+            if (r->sensor && strcmp(r->sensor, name) != 0) {
+                continue;
+            }
+            status = bst_camera_prepare(ctx, &sensors[s].camera);
+            status = status == BST_OK ? do_sensor(ctx, &j) : status;
+            done++;
+        }
+    }
+    bst_device_close(device);
+    if (status == BST_OK && done == 0) {
+        return bst_fail(ctx, BST_ERR_NOT_FOUND,
+                        "the scenario has no sensor %s: give OBSERVER/SENSOR",
+                        r->sensor ? r->sensor : "");
+    }
+    return status;
+}
+
+int bst_cmd_calframes(int argc, char **argv) {
+    calframes_request r = {.load = BST_LOAD_DEFAULTS, .bias = 10, .dark = 10, .flat = 10};
+    const bst_option table[] = {
+        {.name = "out",
+         .kind = BST_OPTION_TEXT,
+         .target = &r.out,
+         .argument = "FOLDER",
+         .doc = "where the files go; it is made when missing",
+         .required = true},
+        {.name = "bias",
+         .kind = BST_OPTION_INT,
+         .target = &r.bias,
+         .argument = "N",
+         .doc = "frames without light and exposure (default 10; 0: none)",
+         .minimum = 0,
+         .maximum = 1e6},
+        {.name = "dark",
+         .kind = BST_OPTION_INT,
+         .target = &r.dark,
+         .argument = "N",
+         .doc = "frames without light (default 10)",
+         .minimum = 0,
+         .maximum = 1e6},
+        {.name = "flat",
+         .kind = BST_OPTION_INT,
+         .target = &r.flat,
+         .argument = "N",
+         .doc = "frames in even light (default 10)",
+         .minimum = 0,
+         .maximum = 1e6},
+        {.name = "exposure",
+         .kind = BST_OPTION_REAL,
+         .target = &r.exposure_s,
+         .argument = "S",
+         .doc = "exposure time of darks and flats (default: the scenario's)",
+         .minimum = 1e-6,
+         .maximum = 1e6},
+        {.name = "level",
+         .kind = BST_OPTION_REAL,
+         .target = &r.level_e,
+         .argument = "E",
+         .doc = "electrons of light per pixel in flats (default: half of what fits)",
+         .minimum = 1e-3,
+         .maximum = 1e9},
+        {.name = "sensor",
+         .kind = BST_OPTION_TEXT,
+         .target = &r.sensor,
+         .argument = "OBSERVER/SENSOR",
+         .doc = "only this one (default all)"},
+        BST_LOAD_OPTIONS(r.load),
+        BST_DEVICE_OPTIONS(r.device, r.threads),
+        {.name = "help", .kind = BST_OPTION_FLAG, .target = &r.help, .doc = "print this"},
+        {.name = NULL},
+    };
+    bst_ctx ctx;
+    bst_ctx_init(&ctx, bst_app_log, NULL, BST_LOG_ERROR);
+    int arguments = 0;
+    if (bst_options_parse(&ctx, table, argc, argv, &arguments) != BST_OK) {
+        return bst_options_misuse(&ctx, "calframes");
+    }
+    if (r.help) {
+        printf(
+            "usage: boresight calframes SCENARIO.json --out FOLDER [options]\n\n"
+            "Makes bias, dark and flat frames of a scenario's sensors: FITS files\n"
+            "OBSERVER_SENSOR_bias.fits, _dark.fits and _flat.fits with one extension per frame.\n"
+            "Fixed patterns are those of the scenario's runs.\n\n"
+            "  boresight calframes scenarios/neossat_geo_track.json --out cal --dark 50\n\n"
+            "options:\n");
+        bst_options_print(stdout, table);
+        return BST_EXIT_OK;
+    }
+    if (arguments != 1) {
+        bst_fail(&ctx, BST_ERR_ARGUMENT, "one scenario file is expected, %d were given", arguments);
+        return bst_options_misuse(&ctx, "calframes");
+    }
+    if (bst_load_check(&ctx, &r.load) != BST_OK) {
+        return bst_options_misuse(&ctx, "calframes");
+    }
+    bst_json *json = NULL;
+    bst_scenario scenario;
+    if (bst_load_scenario(&ctx, argv[1], &r.load, &json, &scenario) != BST_OK) {
+        fprintf(stderr, "boresight: %s\n", ctx.message);
+        return BST_EXIT_FAILED;
+    }
+    int code = BST_EXIT_OK;
+    if (do_all(&ctx, &r, &scenario) != BST_OK) {
+        fprintf(stderr, "boresight: %s\n", ctx.message);
+        code = BST_EXIT_FAILED;
+    }
+    bst_scenario_free(&scenario);
+    bst_json_free(json);
+    return code;
+}

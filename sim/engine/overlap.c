@@ -1,0 +1,527 @@
+/* What one thread does behind the stepping one: hooks, and steps of instances that nothing else
+ * waits for. The stepping thread puts copies of what is needed into a ring of bytes; the other
+ * takes them out in the same order, so that everything happens in the order of a run without it. */
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/engine/engine_internal.h"
+
+enum { ALIGN = 16, MOST_FRAMES = BST_OVERLAP_FRAMES, KIND_BYTES = 48, NAME_BYTES = 256 };
+
+typedef enum record_kind { SKIP, MESSAGE, EVENT, JOB } record_kind;
+
+/* What lies in the ring, its content behind it. */
+typedef struct record {
+    size_t bytes; /* with the content */
+    record_kind kind;
+    bool heavy; /* holds a frame */
+    int64_t tick;
+    const channel *ch; /* MESSAGE */
+    const char *scope; /* JOB; borrowed from an instance */
+} record;
+
+/* An input of a job, the payload behind it. */
+typedef struct job_input {
+    size_t bytes;       /* with the payload */
+    int instance, port; /* port -1: says that the instance is due */
+    int64_t written_tick, sequence;
+    bool taken;
+} job_input;
+
+struct bst_overlap_job {
+    char *inputs;
+    size_t bytes;
+};
+
+typedef struct event_text {
+    char instance[NAME_BYTES], kind[KIND_BYTES], text[400];
+} event_text;
+
+struct bst_overlap {
+    bst_engine *engine;
+    pthread_t thread;
+    pthread_mutex_t lock; /* over what follows */
+    pthread_cond_t changed;
+    size_t head, tail, used; /* of the ring: next byte to fill, to read; bytes in use */
+    int records, heavy;
+    bool stop;
+    bst_status status; /* the first failure; ctx has its message */
+    bst_ctx ctx;       /* of the thread */
+    size_t capacity;
+    _Alignas(ALIGN) char ring[];
+};
+
+static size_t aligned(size_t bytes) {
+    return (bytes + ALIGN - 1) / ALIGN * ALIGN;
+}
+
+enum {
+    RECORD_BYTES = (sizeof(record) + ALIGN - 1) / ALIGN * ALIGN,
+    INPUT_BYTES = (sizeof(job_input) + ALIGN - 1) / ALIGN * ALIGN
+};
+
+/* ---- which instances are apart ---- */
+
+static bool may_be_apart(const bst_engine *engine, const instance *self) {
+    if (!(self->spec.desc->flags & BST_MODULE_APART) || self->spec.period_ticks > 0 ||
+        self->trigger_count == 0) {
+        return false;
+    }
+    for (int p = 0; p < self->spec.desc->port_count; p++) {
+        const bst_port *port = &self->spec.desc->ports[p];
+        const port_state *state = &self->ports[p];
+        if (state->channel < 0) {
+            continue;
+        }
+        const channel *ch = &engine->channels[state->channel];
+        const instance *writer = engine->instances[ch->writer];
+        bool trigger = port->flags & BST_PORT_TRIGGER;
+        if (port->direction == BST_PORT_MODIFY ||
+            (port->direction == BST_PORT_OUT && ch->type->release)) {
+            return false;
+        }
+        /* behind, a trigger of their own is looked at only in the tick of what set it off */
+        if (port->direction == BST_PORT_IN &&
+            (writer->apart ? trigger && state->delay_ticks > 0
+                           : ch->type->kind == BST_CHANNEL_QUEUE && !trigger)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Whether an instance that is not apart reads what this one writes. */
+static bool awaited(const bst_engine *engine, int index) {
+    for (int i = 0; i < engine->instance_count; i++) {
+        const instance *other = engine->instances[i];
+        for (int p = 0; !other->apart && p < other->spec.desc->port_count; p++) {
+            int c = other->ports[p].channel;
+            if (c >= 0 && engine->channels[c].writer == index) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+static void put_last(bst_engine *engine) {
+    for (int i = 1; i < engine->instance_count; i++) {
+        for (int k = i; k > 0 && engine->instances[k - 1]->apart && !engine->instances[k]->apart;
+             k--) {
+            instance *swap = engine->instances[k];
+            engine->instances[k] = engine->instances[k - 1];
+            engine->instances[k - 1] = swap;
+            for (int c = 0; c < engine->channel_count; c++) {
+                int *writer = &engine->channels[c].writer;
+                *writer = *writer == k ? k - 1 : *writer == k - 1 ? k : *writer;
+            }
+        }
+    }
+}
+
+void bst_engine_set_apart(bst_engine *engine) {
+    for (int i = 0; i < engine->instance_count; i++) {
+        engine->instances[i]->apart = engine->instances[i]->spec.desc->flags & BST_MODULE_APART;
+    }
+    for (bool changed = true; changed;) {
+        changed = false;
+        for (int i = 0; i < engine->instance_count; i++) {
+            instance *self = engine->instances[i];
+            if (self->apart && (!may_be_apart(engine, self) || awaited(engine, i))) {
+                self->apart = false;
+                changed = true;
+            }
+        }
+    }
+    put_last(engine);
+    for (int c = 0; c < engine->channel_count; c++) {
+        engine->channels[c].apart = engine->instances[engine->channels[c].writer]->apart;
+    }
+}
+
+/* ---- the ring ---- */
+
+/* Where `bytes` fit in one piece, SIZE_MAX: nowhere yet. */
+static size_t place(const bst_overlap *o, size_t bytes) {
+    if (o->used == 0) {
+        return bytes <= o->capacity ? 0 : SIZE_MAX;
+    }
+    if (o->head > o->tail) {
+        return o->capacity - o->head >= bytes ? o->head : o->tail >= bytes ? 0 : SIZE_MAX;
+    }
+    return o->tail - o->head >= bytes ? o->head : SIZE_MAX;
+}
+
+/* Waits for room and returns it, *out NULL after a failure behind. The ring is not locked. */
+static bst_status reserve(bst_ctx *ctx, bst_overlap *o, size_t content, bool heavy, record **out) {
+    size_t bytes = RECORD_BYTES + aligned(content), at;
+    *out = NULL;
+    if (bytes > o->capacity) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "a message of %zu bytes is too long to overlap",
+                        content);
+    }
+    pthread_mutex_lock(&o->lock);
+    while (o->status == BST_OK &&
+           ((heavy && o->heavy >= MOST_FRAMES) || (at = place(o, bytes)) == SIZE_MAX)) {
+        pthread_cond_wait(&o->changed, &o->lock);
+    }
+    if (o->status != BST_OK) {
+        bst_status status = bst_fail(ctx, o->status, "%s", o->ctx.message);
+        pthread_mutex_unlock(&o->lock);
+        return status;
+    }
+    if (o->used == 0) {
+        o->head = o->tail = 0;
+    } else if (at < o->head && o->head < o->capacity) {
+        /* the end is too short; every size is a multiple of ALIGN */
+        if (o->capacity - o->head >= RECORD_BYTES) {
+            *(record *)(void *)&o->ring[o->head] = (record){.kind = SKIP};
+        }
+        o->used += o->capacity - o->head;
+    }
+    o->head = at;
+    pthread_mutex_unlock(&o->lock);
+    *out = (record *)(void *)&o->ring[at];
+    **out = (record){.bytes = bytes, .heavy = heavy};
+    return BST_OK;
+}
+
+static void commit(bst_overlap *o, const record *r) {
+    pthread_mutex_lock(&o->lock);
+    o->head += r->bytes;
+    o->used += r->bytes;
+    o->heavy += r->heavy;
+    o->records++;
+    pthread_cond_broadcast(&o->changed);
+    pthread_mutex_unlock(&o->lock);
+}
+
+static void *content_of(record *r) {
+    return (char *)r + RECORD_BYTES;
+}
+
+bst_status bst_overlap_message(bst_ctx *ctx, bst_engine *engine, const channel *ch,
+                               const void *payload, int64_t tick) {
+    bst_overlap *o = engine->overlap;
+    record *r;
+    BST_TRY(reserve(ctx, o, ch->payload_bytes, ch->type->release != NULL, &r));
+    r->kind = MESSAGE;
+    r->tick = tick;
+    r->ch = ch;
+    memcpy(content_of(r), payload, ch->payload_bytes);
+    if (ch->type->retain) {
+        ch->type->retain(content_of(r));
+    }
+    commit(o, r);
+    return ch->type->lends ? bst_overlap_drain(ctx, engine) : BST_OK;
+}
+
+bst_status bst_overlap_event(bst_ctx *ctx, bst_engine *engine, int64_t tick, const char *source,
+                             const char *kind, const char *text) {
+    bst_overlap *o = engine->overlap;
+    record *r;
+    BST_TRY(reserve(ctx, o, sizeof(event_text), false, &r));
+    r->kind = EVENT;
+    r->tick = tick;
+    event_text *e = content_of(r);
+    snprintf(e->instance, sizeof e->instance, "%s", source);
+    snprintf(e->kind, sizeof e->kind, "%s", kind);
+    snprintf(e->text, sizeof e->text, "%s", text);
+    commit(o, r);
+    return BST_OK;
+}
+
+/* ---- steps behind ---- */
+
+/* Appends an input; `to` NULL: only its size. */
+static size_t add_input(char *to, int index, int port, const channel *ch, int64_t sequence) {
+    const slot *s = ch ? bst_engine_slot(ch, sequence) : NULL;
+    size_t payload = s ? ch->payload_bytes : 0, bytes = INPUT_BYTES + aligned(payload);
+    if (to) {
+        *(job_input *)(void *)to = (job_input){.bytes = bytes,
+                                               .instance = index,
+                                               .port = port,
+                                               .written_tick = s ? s->written_tick : 0,
+                                               .sequence = sequence};
+        if (s) {
+            memcpy(to + INPUT_BYTES, s->payload, payload);
+            if (ch->type->retain) {
+                ch->type->retain(to + INPUT_BYTES);
+            }
+        }
+    }
+    return bytes;
+}
+
+/* Puts aside what an instance would read now; `to` NULL: only how many bytes that takes. */
+static size_t put_aside(bst_engine *engine, int index, int64_t tick, char *to) {
+    instance *self = engine->instances[index];
+    size_t bytes = 0;
+    bool due = false;
+    for (int p = 0; p < self->spec.desc->port_count; p++) {
+        port_state *port = &self->ports[p];
+        if (self->spec.desc->ports[p].direction != BST_PORT_IN || port->channel < 0 ||
+            engine->channels[port->channel].apart) {
+            continue;
+        }
+        const channel *ch = &engine->channels[port->channel];
+        int64_t sequence;
+        if (ch->type->kind == BST_CHANNEL_LATEST) {
+            if ((sequence = bst_engine_newest(ch, port, tick)) >= 0) {
+                bytes += add_input(to ? to + bytes : NULL, index, p, ch, sequence);
+            }
+            continue;
+        }
+        sequence = bst_engine_unread(engine, ch, port, tick);
+        int64_t first = port->cursor;
+        for (; sequence >= 0; sequence = bst_engine_unread(engine, ch, port, tick)) {
+            bytes += add_input(to ? to + bytes : NULL, index, p, ch, sequence);
+            port->cursor++;
+        }
+        port->cursor = to ? port->cursor : first;
+    }
+    for (int t = 0; t < self->trigger_count; t++) {
+        port_state *port = &self->ports[self->triggers[t]];
+        const channel *ch = &engine->channels[port->channel];
+        if (!ch->apart) {
+            int64_t cursor = port->trigger_cursor;
+            due = bst_engine_pass_trigger(ch, port, tick) || due;
+            port->trigger_cursor = to ? port->trigger_cursor : cursor;
+        }
+    }
+    return due ? bytes + add_input(to ? to + bytes : NULL, index, -1, NULL, 0) : bytes;
+}
+
+bst_status bst_overlap_step(bst_ctx *ctx, bst_engine *engine, int index, int64_t tick) {
+    const char *scope = engine->instances[index]->scope;
+    size_t bytes = 0, filled = 0;
+    for (int i = index; i < engine->instance_count; i++) {
+        if (strcmp(engine->instances[i]->scope, scope) == 0) {
+            bytes += put_aside(engine, i, tick, NULL);
+        }
+    }
+    record *r;
+    BST_TRY(reserve(ctx, engine->overlap, bytes, true, &r));
+    r->kind = JOB;
+    r->tick = tick;
+    r->scope = scope;
+    char *to = content_of(r);
+    for (int i = index; i < engine->instance_count; i++) {
+        if (strcmp(engine->instances[i]->scope, scope) == 0) {
+            filled += put_aside(engine, i, tick, to + filled);
+            bst_engine_set_due(engine, i, bst_engine_earliest(engine, engine->instances[i]));
+        }
+    }
+    commit(engine->overlap, r);
+    return BST_OK;
+}
+
+static job_input *next_input(const bst_overlap_job *job, const job_input *input) {
+    size_t at = input ? (size_t)((const char *)input - job->inputs) + input->bytes : 0;
+    return at < job->bytes ? (job_input *)(void *)&job->inputs[at] : NULL;
+}
+
+static bst_sample give(struct bst_step *step, job_input *input, int port) {
+    if (!input) {
+        return (bst_sample){NULL, 0, -1, true};
+    }
+    return bst_engine_sample(step, &step->self->ports[port], (char *)input + INPUT_BYTES,
+                             input->written_tick, input->sequence);
+}
+
+static bool is_for(const struct bst_step *step, const job_input *input, int port) {
+    return step->engine->instances[input->instance] == step->self && input->port == port;
+}
+
+bst_sample bst_overlap_latest(struct bst_step *step, int port) {
+    job_input *found = NULL;
+    for (job_input *i = next_input(step->job, NULL); i; i = next_input(step->job, i)) {
+        found = is_for(step, i, port) ? i : found;
+    }
+    return give(step, found, port);
+}
+
+bst_sample bst_overlap_next(struct bst_step *step, int port) {
+    job_input *i = next_input(step->job, NULL);
+    while (i && (i->taken || !is_for(step, i, port))) {
+        i = next_input(step->job, i);
+    }
+    if (i) {
+        i->taken = true;
+    }
+    return give(step, i, port);
+}
+
+static bool is_due(bst_engine *engine, int index, int64_t tick, const bst_overlap_job *job) {
+    instance *self = engine->instances[index];
+    bool due = false;
+    for (const job_input *i = next_input(job, NULL); i; i = next_input(job, i)) {
+        due = due || (i->instance == index && i->port < 0);
+    }
+    for (int t = 0; t < self->trigger_count; t++) {
+        port_state *port = &self->ports[self->triggers[t]];
+        const channel *ch = &engine->channels[port->channel];
+        due = (ch->apart && bst_engine_pass_trigger(ch, port, tick)) || due;
+    }
+    return due;
+}
+
+static bst_status run_job(bst_overlap *o, const record *r, bst_overlap_job *job) {
+    bst_engine *engine = o->engine;
+    for (int i = 0; i < engine->instance_count; i++) {
+        instance *self = engine->instances[i];
+        if (!self->apart || strcmp(self->scope, r->scope) != 0 ||
+            !is_due(engine, i, r->tick, job)) {
+            continue;
+        }
+        struct bst_step step = {engine, self, &o->ctx, r->tick, 0, BST_OK, job};
+        self->steps++;
+        bst_status status = self->spec.desc->step(self->self, &step);
+        if (status != BST_OK) {
+            return bst_fail_prefix(&o->ctx, status, "%s at %.6f s", self->name,
+                                   (double)r->tick / (double)engine->tick_rate_hz);
+        }
+        BST_TRY(bst_engine_commit(&step));
+    }
+    return BST_OK;
+}
+
+static void let_go(const channel *ch, void *payload) {
+    if (ch->type->release) {
+        ch->type->release(payload);
+    }
+}
+
+/* Does what a record asks for, unless something failed before; lets go of what it holds. */
+static bst_status work_off(bst_overlap *o, record *r) {
+    const bst_engine_hooks *hooks = &o->engine->hooks;
+    bst_status status = o->status;
+    if (r->kind == MESSAGE) {
+        if (status == BST_OK) {
+            status = bst_engine_heard(&o->ctx, o->engine,
+                                      hooks->message(hooks->user, r->ch->scope, r->ch->type->name,
+                                                     content_of(r), r->tick));
+        }
+        let_go(r->ch, content_of(r));
+    } else if (r->kind == EVENT) {
+        const event_text *e = content_of(r);
+        if (status == BST_OK) {
+            status =
+                bst_engine_heard(&o->ctx, o->engine,
+                                 hooks->event(hooks->user, r->tick, e->instance, e->kind, e->text));
+        }
+    } else {
+        bst_overlap_job job = {content_of(r), r->bytes - RECORD_BYTES};
+        if (status == BST_OK) {
+            status = run_job(o, r, &job);
+        }
+        for (job_input *i = next_input(&job, NULL); i; i = next_input(&job, i)) {
+            if (i->port >= 0) {
+                const instance *self = o->engine->instances[i->instance];
+                let_go(&o->engine->channels[self->ports[i->port].channel], (char *)i + INPUT_BYTES);
+            }
+        }
+    }
+    return status;
+}
+
+static void *work(void *user) {
+    bst_overlap *o = user;
+    pthread_mutex_lock(&o->lock);
+    for (;;) {
+        while (o->records == 0 && !o->stop) {
+            pthread_cond_wait(&o->changed, &o->lock);
+        }
+        if (o->records == 0) {
+            break;
+        }
+        record *r = (record *)(void *)&o->ring[o->tail];
+        if (o->capacity - o->tail < RECORD_BYTES || r->kind == SKIP) {
+            o->used -= o->capacity - o->tail;
+            o->tail = 0;
+            r = (record *)(void *)o->ring;
+        }
+        pthread_mutex_unlock(&o->lock);
+        bst_status status = work_off(o, r);
+        pthread_mutex_lock(&o->lock);
+        o->status = status;
+        o->tail += r->bytes;
+        o->used -= r->bytes;
+        o->heavy -= r->heavy;
+        o->records--;
+        pthread_cond_broadcast(&o->changed);
+    }
+    pthread_mutex_unlock(&o->lock);
+    return NULL;
+}
+
+bst_status bst_overlap_drain(bst_ctx *ctx, bst_engine *engine) {
+    bst_overlap *o = engine->overlap;
+    pthread_mutex_lock(&o->lock);
+    while (o->records > 0) {
+        pthread_cond_wait(&o->changed, &o->lock);
+    }
+    ctx->warnings += o->ctx.warnings;
+    o->ctx.warnings = 0;
+    bst_status status =
+        o->status == BST_OK ? BST_OK : bst_fail(ctx, o->status, "%s", o->ctx.message);
+    pthread_mutex_unlock(&o->lock);
+    return status;
+}
+
+bst_status bst_overlap_start(bst_ctx *ctx, bst_engine *engine) {
+    /* room for a few frames with all that goes with them */
+    size_t most = 4096;
+    for (int c = 0; c < engine->channel_count; c++) {
+        most += RECORD_BYTES + 2 * (INPUT_BYTES + aligned(engine->channels[c].payload_bytes));
+    }
+    for (int i = 0; i < engine->instance_count; i++) {
+        for (int p = 0; p < engine->instances[i]->spec.desc->port_count; p++) {
+            int c = engine->instances[i]->ports[p].channel;
+            most += c >= 0 ? INPUT_BYTES + aligned(engine->channels[c].payload_bytes) : 0;
+        }
+    }
+    size_t capacity = aligned(4 * most);
+    bst_overlap *o = aligned_alloc(ALIGN, aligned(sizeof *o + capacity));
+    if (!o) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for overlapping");
+    }
+    memset(o, 0, sizeof *o);
+    o->engine = engine;
+    o->capacity = capacity;
+    bst_ctx_init(&o->ctx, ctx->log, ctx->log_user, ctx->log_level);
+    pthread_mutex_init(&o->lock, NULL);
+    pthread_cond_init(&o->changed, NULL);
+    /* signals are the main thread's */
+    sigset_t all, before;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before);
+    int error = pthread_create(&o->thread, NULL, work, o);
+    pthread_sigmask(SIG_SETMASK, &before, NULL);
+    if (error) {
+        pthread_cond_destroy(&o->changed);
+        pthread_mutex_destroy(&o->lock);
+        free(o);
+        return bst_fail(ctx, BST_ERR_MEMORY, "cannot start a thread: %s", strerror(error));
+    }
+    engine->overlap = o;
+    return BST_OK;
+}
+
+void bst_overlap_stop(bst_engine *engine) {
+    bst_overlap *o = engine->overlap;
+    if (!o) {
+        return;
+    }
+    pthread_mutex_lock(&o->lock);
+    o->stop = true;
+    pthread_cond_broadcast(&o->changed);
+    pthread_mutex_unlock(&o->lock);
+    pthread_join(o->thread, NULL);
+    pthread_cond_destroy(&o->changed);
+    pthread_mutex_destroy(&o->lock);
+    free(o);
+    engine->overlap = NULL;
+}

@@ -1,0 +1,204 @@
+/* What is done behind the stepping thread: the same messages in the same order. */
+#include <pthread.h>
+#include <time.h>
+
+#include "tests/engine/fake_module.h"
+
+static const bst_port exposing_ports[] = {
+    {.channel = BST_CHANNEL_EXPOSURE, .direction = BST_PORT_OUT}};
+static const bst_port steering_ports[] = {
+    {.channel = BST_CHANNEL_NAV_TELEMETRY, .direction = BST_PORT_OUT}};
+enum { IN_EXPOSURE, IN_NAV, IN_PREDICTIONS, OUT_DETECTIONS };
+static const bst_port seeing_ports[] = {
+    {.channel = BST_CHANNEL_EXPOSURE, .direction = BST_PORT_IN, .flags = BST_PORT_TRIGGER},
+    {.channel = BST_CHANNEL_NAV_TELEMETRY, .direction = BST_PORT_IN, .max_age_s = 1e-9},
+    {.channel = BST_CHANNEL_PREDICTIONS, .direction = BST_PORT_IN, .flags = BST_PORT_FEEDBACK},
+    {.channel = BST_CHANNEL_DETECTIONS, .direction = BST_PORT_OUT, .capacity = 1}};
+enum { IN_DETECTIONS, IN_NAV_TOO, OUT_TRACKS, OUT_PREDICTIONS };
+static const bst_port following_ports[] = {
+    {.channel = BST_CHANNEL_DETECTIONS, .direction = BST_PORT_IN, .flags = BST_PORT_TRIGGER},
+    {.channel = BST_CHANNEL_NAV_TELEMETRY, .direction = BST_PORT_IN},
+    {.channel = BST_CHANNEL_TRACKS, .direction = BST_PORT_OUT, .capacity = 1},
+    {.channel = BST_CHANNEL_PREDICTIONS, .direction = BST_PORT_OUT, .capacity = 1}};
+static const bst_port waiting_ports[] = {
+    {.channel = BST_CHANNEL_TRACKS, .direction = BST_PORT_IN, .flags = BST_PORT_OPTIONAL}};
+
+static const bst_module_desc exposing = FAKE_DESC(exposing_ports);
+static const bst_module_desc steering = FAKE_DESC(steering_ports);
+static const bst_module_desc waiting = FAKE_DESC(waiting_ports);
+
+typedef struct scene {
+    char log[1 << 16];
+    size_t used;
+    pthread_t stepping;
+    bool behind;     /* a step was made by another thread */
+    int64_t fail_at; /* tick of the follower's failure */
+    int64_t full_at; /* tick from which the hook fails */
+    bst_ctx hooks;
+} scene;
+
+static bst_status expose(fake *self, struct bst_step *step) {
+    bst_exposure *e = bst_step_write(step, 0, NULL);
+    *e = (bst_exposure){.id = self->steps, .end_tick = bst_step_tick(step)};
+    return BST_OK;
+}
+
+static bst_status steer(fake *self, struct bst_step *step) {
+    (void)self;
+    bst_nav_telemetry *nav = bst_step_write(step, 0, NULL);
+    nav->tick = bst_step_tick(step);
+    return BST_OK;
+}
+
+/* Slow, so that the others run ahead. */
+static bst_status see(fake *self, struct bst_step *step) {
+    scene *s = self->other;
+    s->behind = s->behind || !pthread_equal(pthread_self(), s->stepping);
+    nanosleep(&(struct timespec){.tv_nsec = 300000}, NULL);
+    for (bst_sample e; (e = bst_step_next(step, IN_EXPOSURE)).payload;) {
+        bst_sample nav = bst_step_latest(step, IN_NAV);
+        bst_sample guess = bst_step_latest(step, IN_PREDICTIONS);
+        bst_detections *d = bst_step_write(step, OUT_DETECTIONS, NULL);
+        d->exposure_id = ((const bst_exposure *)e.payload)->id;
+        d->start_tick = nav.payload ? ((const bst_nav_telemetry *)nav.payload)->tick : -1;
+        d->end_tick = guess.payload ? ((const bst_predictions *)guess.payload)->tick : -1;
+        d->stars_identified = nav.stale;
+    }
+    return BST_OK;
+}
+
+static bst_status follow(fake *self, struct bst_step *step) {
+    scene *s = self->other;
+    for (bst_sample d; (d = bst_step_next(step, IN_DETECTIONS)).payload;) {
+        if (bst_step_tick(step) == s->fail_at) {
+            return bst_fail(bst_step_ctx(step), BST_ERR_NUMERIC, "lost");
+        }
+        bst_sample nav = bst_step_latest(step, IN_NAV_TOO);
+        bst_tracks *t = bst_step_write(step, OUT_TRACKS, NULL);
+        t->exposure_id = ((const bst_detections *)d.payload)->exposure_id;
+        t->tick = ((const bst_nav_telemetry *)nav.payload)->tick;
+        ((bst_predictions *)bst_step_write(step, OUT_PREDICTIONS, NULL))->tick = 1000 + t->tick;
+        bst_step_event(step, "seen", "%lld", (long long)t->exposure_id);
+        bst_step_count(step, "followed");
+    }
+    return BST_OK;
+}
+
+static void note(scene *s, const char *what, long long a, long long b, long long c, long long d) {
+    s->used += (size_t)snprintf(s->log + s->used, sizeof s->log - s->used,
+                                "%s %lld %lld %lld %lld\n", what, a, b, c, d);
+    assert_true(s->used < sizeof s->log);
+}
+
+static bst_status keep(void *user, const char *scope, const char *channel, const void *payload,
+                       int64_t tick) {
+    scene *s = user;
+    (void)scope;
+    if (tick >= s->full_at) {
+        return bst_fail(&s->hooks, BST_ERR_IO, "disk full");
+    }
+    if (strcmp(channel, BST_CHANNEL_DETECTIONS) == 0) {
+        const bst_detections *d = payload;
+        note(s, channel, tick, d->exposure_id, d->start_tick,
+             10 * d->end_tick + d->stars_identified);
+    } else if (strcmp(channel, BST_CHANNEL_TRACKS) == 0) {
+        note(s, channel, tick, ((const bst_tracks *)payload)->exposure_id,
+             ((const bst_tracks *)payload)->tick, 0);
+    } else if (strcmp(channel, BST_CHANNEL_NAV_TELEMETRY) == 0) {
+        note(s, channel, tick, ((const bst_nav_telemetry *)payload)->tick, 0, 0);
+    } else {
+        note(s, channel, tick, 0, 0, 0);
+    }
+    return BST_OK;
+}
+
+static bst_status hear(void *user, int64_t tick, const char *instance, const char *kind,
+                       const char *text) {
+    note(user, instance, tick, kind[0], atoll(text), 0);
+    return BST_OK;
+}
+
+/* Runs 2000 ticks; `awaited` adds a module that reads the tracks. */
+static bst_status run(scene *s, bst_ctx *ctx, bool overlap, bool awaited) {
+    bst_module_desc seeing = FAKE_DESC(seeing_ports), following = FAKE_DESC(following_ports);
+    seeing.flags = following.flags = BST_MODULE_APART;
+    s->stepping = pthread_self();
+    bst_engine *engine = fake_engine(ctx, 1000);
+    fake x = {.on_step = expose}, n = {.on_step = steer}, v = {.on_step = see, .other = s},
+         f = {.on_step = follow, .other = s}, w = {0};
+    fake *px = &x, *pn = &n, *pv = &v, *pf = &f, *pw = &w;
+    fake_add(ctx, engine, FAKE_SPEC(following, "a_follow", pf, 0));
+    bst_instance_spec seer = FAKE_SPEC(seeing, "b_see", pv, 0);
+    seer.delays[0] = (bst_input_delay){IN_EXPOSURE, 7};
+    seer.delay_count = 1;
+    fake_add(ctx, engine, seer);
+    fake_add(ctx, engine, FAKE_SPEC(steering, "n", pn, 3));
+    fake_add(ctx, engine, FAKE_SPEC(exposing, "x", px, 20));
+    if (awaited) {
+        fake_add(ctx, engine, FAKE_SPEC(waiting, "w", pw, 100));
+    }
+    bst_assert_ok(ctx, bst_engine_load(ctx, engine));
+    bst_engine_set_hooks(
+        engine, &(bst_engine_hooks){.user = s, .message = keep, .event = hear, .ctx = &s->hooks});
+    if (overlap) {
+        bst_assert_ok(ctx, bst_engine_overlap(ctx, engine));
+    }
+    bst_status status = bst_engine_run(ctx, engine, 1000);
+    if (status == BST_OK) {
+        status = bst_engine_run(ctx, engine, 2000);
+    }
+    note(s, "counted", fake_counter(engine, "followed"), fake_counter(engine, "stale_input"),
+         v.steps, f.steps);
+    bst_engine_free(engine);
+    return status;
+}
+
+static void nothing_but_the_thread_changes(void **state) {
+    (void)state;
+    static scene serial, overlapped;
+    serial = overlapped = (scene){.fail_at = -1, .full_at = INT64_MAX};
+    bst_ctx ctx = {0};
+    bst_assert_ok(&ctx, run(&serial, &ctx, false, false));
+    bst_assert_ok(&ctx, run(&overlapped, &ctx, true, false));
+    assert_false(serial.behind);
+    assert_true(overlapped.behind);
+    assert_string_equal(overlapped.log, serial.log);
+    /* 100 exposures, the last one seen at 1987; telemetry of every third tick, as of tick 27 */
+    assert_non_null(strstr(serial.log, "detections 27 2 27 "));
+    assert_non_null(strstr(serial.log, "counted 100 "));
+}
+
+static void what_is_awaited_stays_with_the_stepping_thread(void **state) {
+    (void)state;
+    static scene s;
+    s = (scene){.fail_at = -1, .full_at = INT64_MAX};
+    bst_ctx ctx = {0};
+    bst_assert_ok(&ctx, run(&s, &ctx, true, true));
+    assert_false(s.behind);
+}
+
+static void failures_are_those_of_a_serial_run(void **state) {
+    (void)state;
+    for (int k = 0; k < 2; k++) {
+        static scene serial, overlapped;
+        serial = overlapped = (scene){.fail_at = k ? -1 : 1007, .full_at = k ? 1234 : INT64_MAX};
+        bst_ctx a = {0}, b = {0};
+        bst_status expected = run(&serial, &a, false, false);
+        assert_int_equal(expected, k ? BST_ERR_IO : BST_ERR_NUMERIC);
+        assert_int_equal(run(&overlapped, &b, true, false), expected);
+        assert_string_equal(b.message, a.message);
+        assert_string_equal(a.message, k ? "disk full" : "a_follow at 1.007000 s: lost");
+        /* the same was told before; counts may be of more steps ahead */
+        *strstr(serial.log, "counted") = *strstr(overlapped.log, "counted") = '\0';
+        assert_string_equal(overlapped.log, serial.log);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(nothing_but_the_thread_changes),
+        cmocka_unit_test(what_is_awaited_stays_with_the_stepping_thread),
+        cmocka_unit_test(failures_are_those_of_a_serial_run),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
