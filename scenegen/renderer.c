@@ -14,9 +14,10 @@
 #include "scenegen/readout.h"
 #include "scenegen/reference.h"
 #include "scenegen/render_request.h"
+#include "scenegen/rolling.h"
+#include "scenegen/scene_options.h"
 #include "scenegen/smear.h"
 #include "scenegen/tiles.h"
-#include "scenegen/vignetting.h"
 #include "sim/world/skylight.h"
 
 enum { MAX_TAPS = 512, BOX_FLOATS = 4 };
@@ -42,11 +43,13 @@ struct bst_renderer {
     bst_smear *smear;
     bst_detector *detector;
     bst_readout *readout;
+    bst_rolling *rolling; /* NULL: all rows are exposed at once */
     bst_frame_pool *pool;
     cl_mem profiles;
     growing table, sources, nodes, block_box, source_box, saturated, expected, background;
     bst_scene_source *list; /* drawn sources */
-    double *peak_e;         /* of all sources of the request */
+    double *peak_e;         /* of all sources of the request, or of its latest band */
+    double *rolled_peak_e;  /* of all, while the bands of a rolling shutter are drawn */
     int list_capacity, tiles;
     bool map;       /* the background differs from pixel to pixel */
     bool uncounted; /* saturated pixels of the latest frame */
@@ -72,27 +75,8 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
                                           &bst_kernel_vignetting,   &bst_kernel_background,
                                           &bst_kernel_tile,         &bst_kernel_readout};
     char options[2048];
-    int length =
-        snprintf(options, sizeof options,
-                 "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d "
-                 "-DPHASES=%d%s%s",
-                 r->options.tile_width, r->options.tile_height, r->options.group, r->taps,
-                 r->phases, r->fft_light ? " -DFFT_LIGHT" : "", r->map ? " -DBACKGROUND" : "");
-    length += bst_vignetting_options(&r->camera, options + length, sizeof options - (size_t)length);
-    length += bst_detector_options(r->detector, options + length, sizeof options - (size_t)length);
-    if (r->options.spatial_oversample > 0) {
-        length += snprintf(options + length, sizeof options - (size_t)length,
-                           " -DSPATIAL_OVERSAMPLE=%d", r->options.spatial_oversample);
-    }
-    const bst_distortion *d = &r->camera.distortion;
-    if (bst_camera_distorted(&r->camera)) {
-        double a = bst_camera_scale_rad(&r->camera), a2 = a * a,
-               out = r->camera.geometry.domain / a;
-        snprintf(
-            options + length, sizeof options - (size_t)length,
-            " -DDISTORTED -DK1=%.9ef -DK2=%.9ef -DK3=%.9ef -DP1=%.9ef -DP2=%.9ef -DFOLD2=%.9ef",
-            d->k1 * a2, d->k2 * a2 * a2, d->k3 * a2 * a2 * a2, d->p1 * a, d->p2 * a, out * out);
-    }
+    bst_scene_build_options(&r->camera, &r->options, r->taps, r->phases, r->fft_light != NULL,
+                            r->detector, options, sizeof options);
     BST_TRY(bst_device_build(ctx, device, sources, sizeof sources / sizeof *sources, options,
                              &r->program));
     static const char *const names[3] = {"bst_scene_nodes", "bst_scene_frame",
@@ -184,12 +168,15 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     r->queue = bst_device_queue(device);
     clRetainContext(r->context);
     clRetainCommandQueue(r->queue);
-    bst_smear_options smear = {.tolerance_sigma = r->options.tolerance_sigma,
-                               .taps = r->taps,
-                               .table_error = bst_profile_error(sigma_px, r->phases),
-                               .motion = r->options.motion,
-                               .temporal_oversample = r->options.temporal_oversample,
-                               .stamp_radius_px = r->options.stamp_radius_px};
+    bool rolling = camera->detector.row_time_s != 0.0;
+    /* half of it is for a rolling shutter's bands */
+    bst_smear_options smear = {
+        .tolerance_sigma = r->options.tolerance_sigma * (rolling ? 0.5 : 1.0),
+        .taps = r->taps,
+        .table_error = bst_profile_error(sigma_px, r->phases),
+        .motion = r->options.motion,
+        .temporal_oversample = r->options.temporal_oversample,
+        .stamp_radius_px = r->options.stamp_radius_px};
     bst_status status = bst_tiles_choose(ctx, device, &r->options, &r->most_bytes);
     if (status == BST_OK) {
         status = open_psf(ctx, device, r, &smear);
@@ -206,6 +193,11 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     }
     if (status == BST_OK) {
         status = bst_smear_create(ctx, camera, &smear, &r->smear);
+    }
+    if (status == BST_OK && rolling) {
+        double peak_px = r->fft_light ? bst_fft_light_band(r->fft_light)->share_sigma_px : sigma_px;
+        status = bst_rolling_create(ctx, camera, smear.tolerance_sigma, peak_px, !r->fft_light,
+                                    &r->rolling);
     }
     if (status == BST_OK) {
         status = bst_frame_pool_create(ctx, device, (int)camera->width_px, (int)camera->height_px,
@@ -246,27 +238,36 @@ void bst_renderer_free(bst_renderer *r) {
     bst_fft_light_free(r->fft_light);
     bst_psf_free(r->psf);
     bst_readout_free(r->readout);
+    bst_rolling_free(r->rolling);
     bst_detector_free(r->detector);
     clReleaseCommandQueue(r->queue);
     clReleaseContext(r->context);
     free(r->list);
     free(r->peak_e);
+    free(r->rolled_peak_e);
     free(r);
+}
+
+static bst_status reserve_sources(bst_ctx *ctx, bst_renderer *r, int count) {
+    if (count > r->list_capacity) {
+        int capacity = count > 2 * r->list_capacity ? count : 2 * r->list_capacity;
+        free(r->list);
+        free(r->peak_e);
+        free(r->rolled_peak_e);
+        r->list = malloc((size_t)capacity * sizeof *r->list);
+        r->peak_e = malloc((size_t)capacity * sizeof *r->peak_e);
+        r->rolled_peak_e = malloc((size_t)capacity * sizeof *r->rolled_peak_e);
+        r->list_capacity = r->list && r->peak_e && r->rolled_peak_e ? capacity : 0;
+        if (r->list_capacity == 0) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d sources", count);
+        }
+    }
+    return BST_OK;
 }
 
 /* Chooses nodes and stamps of all sources: fills list and stats. */
 static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q, int *blocks) {
-    if (q->count > r->list_capacity) {
-        int capacity = q->count > 2 * r->list_capacity ? q->count : 2 * r->list_capacity;
-        free(r->list);
-        free(r->peak_e);
-        r->list = malloc((size_t)capacity * sizeof *r->list);
-        r->peak_e = malloc((size_t)capacity * sizeof *r->peak_e);
-        r->list_capacity = r->list && r->peak_e ? capacity : 0;
-        if (r->list_capacity == 0) {
-            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d sources", q->count);
-        }
-    }
+    BST_TRY(reserve_sources(ctx, r, q->count));
     double read = r->camera.read_noise_e, brightest = 0.0;
     for (int i = 0; i < q->count; i++) {
         brightest = q->sources[i].path ? brightest : fmax(brightest, q->sources[i].electrons_per_s);
@@ -352,53 +353,6 @@ static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, int blocks, int *
         "placing the scene's nodes");
 }
 
-/* What a request without a map adds where the kernels expect one. */
-static const float nothing[4];
-static const bst_skylight_map no_background = {1 << 16, 0, 0, 2, 2, nothing, 0.0};
-
-static const bst_skylight_map *background_of(const bst_render_request *q) {
-    return q->background ? q->background : &no_background;
-}
-
-static bst_scene_params make_params(const bst_renderer *r, const bst_render_request *q,
-                                    int groups) {
-    const bst_camera *c = &r->camera;
-    const bst_skylight_map *map = background_of(q);
-    bst_window w = q->window;
-    int x0 = w.x0 / 64 * 64;
-    return (bst_scene_params){
-        .window_x0 = w.x0,
-        .window_y0 = w.y0,
-        .window_width = w.width,
-        .window_height = w.height,
-        .sensor_width = (int)c->width_px,
-        .tiles_x0 = x0,
-        .tiles_x = (w.x0 + w.width - x0 + r->options.tile_width - 1) / r->options.tile_width,
-        .tiles_y = (w.height + r->options.tile_height - 1) / r->options.tile_height,
-        .source_groups = groups,
-        .key0 = q->key.k[0],
-        .key1 = q->key.k[1],
-        .exposure_low = (unsigned)((uint64_t)q->exposure_id & 0xFFFFFFFFu),
-        .exposure_high = (unsigned)((uint64_t)q->exposure_id >> 32),
-        .background_e = (float)q->background_e,
-        .dark_e = (float)q->dark_e,
-        .exposure_s = (float)q->track->time_s[q->track->count - 1],
-        .read_noise_e = (float)c->read_noise_e,
-        .full_well_e = (float)c->full_well_e,
-        .per_full_well = (float)(1.0 / c->full_well_e),
-        .near_full_e = (float)bst_detector_near_full_e(c->full_well_e),
-        .dn_per_e = (float)(1.0 / c->gain_e_per_dn),
-        .offset_dn = (float)c->offset_dn,
-        .max_dn = (float)((1 << c->bits) - 1),
-        .image_stride = w.width,
-        .map_step = map->step_px,
-        .map_x0 = map->x0_px,
-        .map_y0 = map->y0_px,
-        .map_columns = map->columns,
-        .map_rows = map->rows,
-    };
-}
-
 /* Counts the saturated pixels of the latest frame, once. Waits for it. */
 static bst_status count_saturated(bst_ctx *ctx, bst_renderer *r) {
     if (!r->uncounted) {
@@ -433,33 +387,47 @@ static bst_status make_light(bst_ctx *ctx, bst_renderer *r, const bst_render_req
     return BST_OK;
 }
 
-/* The common way of all kinds of image: the kernels' first six arguments are the same. stride:
- * floats between the rows of `out`, 0: no gaps; light_only: without background. */
+/* Where an image goes. */
+typedef struct target {
+    cl_kernel kernel; /* NULL: sources are only planned */
+    cl_mem out;
+    int stride;                /* floats between the rows of `out`, 0: no gaps */
+    bool light_only;           /* without background */
+    int first_row, first_tile; /* of a band */
+} target;
+
+/* The common way of all kinds of image: the kernels' first six arguments are the same. */
 static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
-                                cl_kernel kernel, cl_mem out, int stride, bool light_only) {
+                                const target *to) {
     int blocks = 0, groups = 0;
     BST_TRY(plan(ctx, r, q, &blocks));
+    if (!to->kernel) {
+        return BST_OK;
+    }
     BST_TRY(count_saturated(ctx, r)); /* of the frame before, which was rendered meanwhile */
     BST_TRY(enqueue_nodes(ctx, r, blocks, &groups));
-    bst_scene_params p = make_params(r, q, groups);
-    p.image_stride = stride > 0 ? stride : p.image_stride;
-    p.background_e = light_only ? 0.0f : p.background_e;
-    r->tiles = p.tiles_x * p.tiles_y;
-    size_t tiles = (size_t)r->tiles;
-    BST_TRY(grow(ctx, r, &r->saturated, tiles * sizeof(cl_int)));
+    bst_scene_params p = bst_render_params(&r->camera, &r->options, q, groups);
+    p.image_stride = to->stride > 0 ? to->stride : p.image_stride;
+    p.background_e = to->light_only ? 0.0f : p.background_e;
+    p.first_row = to->first_row;
+    p.first_tile = to->first_tile;
+    size_t tiles = (size_t)p.tiles_x * (size_t)p.tiles_y;
+    r->tiles = to->first_tile + (int)tiles;
+    BST_TRY(grow(ctx, r, &r->saturated, (size_t)r->tiles * sizeof(cl_int)));
     cl_mem light = r->profiles;
     if (r->fft_light) {
         BST_TRY(make_light(ctx, r, q, groups, &p, &light));
     }
     cl_mem maps[5];
     bst_detector_buffers(r->detector, maps);
+    cl_kernel kernel = to->kernel;
     const void *values[] = {&p,
                             &r->sources.buffer,
                             &r->nodes.buffer,
                             &r->block_box.buffer,
                             &r->source_box.buffer,
                             &light,
-                            &out,
+                            &to->out,
                             &r->saturated.buffer,
                             &maps[0],
                             &maps[1],
@@ -470,7 +438,7 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
     int count = kernel == r->frame_kernel ? 13 : 7;
     BST_TRY(set_args(ctx, kernel, values, bytes, count));
     if (r->map) {
-        const bst_skylight_map *map = background_of(q);
+        const bst_skylight_map *map = bst_render_background(q);
         size_t size = (size_t)map->columns * (size_t)map->rows * sizeof *map->e;
         BST_TRY(upload(ctx, r, &r->background, map->e, size));
         BST_TRY(bst_device_check(ctx,
@@ -483,10 +451,53 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
         "rendering a frame");
 }
 
+/* All rows at once, or band by band. */
+static bst_status enqueue_image(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
+                                target to) {
+    if (q->row_time_s == 0.0) {
+        return enqueue_tiles(ctx, r, q, &to);
+    }
+    BST_TRY(reserve_sources(ctx, r, q->count));
+    for (int i = 0; i < q->count; i++) {
+        r->rolled_peak_e[i] = 0.0;
+    }
+    if (to.kernel) {
+        /* room for the tiles of all bands, which must not move while they are written */
+        size_t across = (size_t)q->window.width / (size_t)r->options.tile_width + 2;
+        BST_TRY(count_saturated(ctx, r));
+        BST_TRY(grow(ctx, r, &r->saturated, across * (size_t)q->window.height * sizeof(cl_int)));
+    }
+    bst_render_stats all = {.single_kernel = true};
+    bool more;
+    BST_TRY(bst_rolling_begin(ctx, r->rolling, q, bst_renderer_margin_px(r)));
+    for (bst_render_request band;; all.nodes += r->stats.nodes) {
+        BST_TRY(bst_rolling_next(ctx, r->rolling, &band, &more));
+        if (!more) {
+            break;
+        }
+        to.first_row = band.window.y0 - q->window.y0;
+        BST_TRY(enqueue_tiles(ctx, r, &band, &to));
+        to.first_tile = r->tiles;
+        all.single_kernel = all.single_kernel && r->stats.single_kernel;
+        all.predicted_sigma = fmax(all.predicted_sigma,
+                                   r->stats.predicted_sigma + bst_rolling_error_sigma(r->rolling));
+        for (int i = 0; i < band.count; i++) {
+            double *peak_e = &r->rolled_peak_e[bst_rolling_source(r->rolling, i)];
+            all.sources += *peak_e == 0.0 && r->peak_e[i] > 0.0;
+            *peak_e = fmax(*peak_e, r->peak_e[i]);
+        }
+    }
+    memcpy(r->peak_e, r->rolled_peak_e, (size_t)q->count * sizeof *r->peak_e);
+    if (isnan(r->stats.predicted_sigma)) {
+        all.predicted_sigma = NAN;
+    }
+    r->stats = all;
+    return BST_OK;
+}
+
 bst_status bst_renderer_plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *request) {
-    int blocks;
     BST_TRY(bst_render_request_check(ctx, &r->camera, request));
-    return plan(ctx, r, request, &blocks);
+    return enqueue_image(ctx, r, request, (target){.kernel = NULL});
 }
 
 /* Light first, then what columns and binned pixels make of it. */
@@ -497,10 +508,13 @@ static bst_status render_in_stages(bst_ctx *ctx, bst_renderer *r, const bst_rend
     int stride;
     light.window = bst_readout_light_window(r->readout, q->window);
     BST_TRY(bst_readout_image(ctx, r->readout, light.window, &image, &stride));
-    BST_TRY(enqueue_tiles(ctx, r, &light, r->expected_kernel, image, stride, true));
+    BST_TRY(enqueue_image(
+        ctx, r, &light,
+        (target){
+            .kernel = r->expected_kernel, .out = image, .stride = stride, .light_only = true}));
     r->tiles = q->window.height / binning;
     BST_TRY(grow(ctx, r, &r->saturated, (size_t)r->tiles * sizeof(cl_int)));
-    bst_scene_params p = make_params(r, q, 0);
+    bst_scene_params p = bst_render_params(&r->camera, &r->options, q, 0);
     return bst_readout_run(ctx, r->readout, r->detector, &p, q->window, binning, frame,
                            r->saturated.buffer);
 }
@@ -514,13 +528,14 @@ bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *r, const bst_render_r
     int binning = request->binning > 1 ? request->binning : 1;
     BST_TRY(bst_frame_pool_take(ctx, r->pool, request->window.width / binning,
                                 request->window.height / binning, &frame, &buffer));
-    double exposure_s = request->track->time_s[request->track->count - 1];
+    double exposure_s = bst_render_exposure_s(request);
     bst_status status =
         bst_detector_begin(ctx, r->detector, request->key, request->exposure_id, exposure_s);
     if (status == BST_OK) {
         status = binning > 1 || bst_detector_whole_columns(r->detector)
                      ? render_in_stages(ctx, r, request, binning, buffer)
-                     : enqueue_tiles(ctx, r, request, r->frame_kernel, buffer, 0, false);
+                     : enqueue_image(ctx, r, request,
+                                     (target){.kernel = r->frame_kernel, .out = buffer});
     }
     if (status == BST_OK) {
         r->uncounted = true;
@@ -548,7 +563,8 @@ bst_status bst_renderer_render_noise_free(bst_ctx *ctx, bst_renderer *r,
     BST_TRY(bst_render_request_check(ctx, &r->camera, request));
     size_t bytes = (size_t)request->window.width * (size_t)request->window.height * sizeof(float);
     BST_TRY(grow(ctx, r, &r->expected, bytes));
-    BST_TRY(enqueue_tiles(ctx, r, request, r->expected_kernel, r->expected.buffer, 0, false));
+    BST_TRY(enqueue_image(ctx, r, request,
+                          (target){.kernel = r->expected_kernel, .out = r->expected.buffer}));
     return bst_device_check(
         ctx,
         clEnqueueReadBuffer(r->queue, r->expected.buffer, CL_TRUE, 0, bytes, image, 0, NULL, NULL),

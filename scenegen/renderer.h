@@ -43,7 +43,10 @@ void bst_renderer_free(bst_renderer *renderer);
 /* One exposure. Pointers are borrowed for the call. */
 typedef struct bst_render_request {
     bst_window window;          /* inside the sensor */
-    const bst_los_track *track; /* its last time is the exposure's duration */
+    const bst_los_track *track; /* its last time is the exposure's duration, unless: */
+    double row_time_s; /* rolling shutter, where not 0: each row is exposed so much later than the
+                          row before, for exposure_s, the middle row in the middle of the track */
+    double exposure_s; /* with row_time_s */
     const bst_source *sources;
     int count;
     double background_e; /* expected electrons per sensor pixel: sky and dark current */

@@ -273,8 +273,17 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
         BST_TRY(rescale(ctx, s, e->pixel_scale_arcsec));
     }
     bst_los_track track;
-    BST_TRY(bst_field_track(ctx, s->field, history, e->start_tick, e->end_tick, s->tick_rate_hz,
-                            &track));
+    int64_t lead =
+        bst_detector_lead_ticks(&s->camera->detector, e->window.height, (double)s->tick_rate_hz);
+    s->options.lead_s = (double)lead / (double)s->tick_rate_hz;
+    bst_status status = bst_field_track(ctx, s->field, history, e->start_tick - lead,
+                                        e->end_tick + lead, s->tick_rate_hz, &track);
+    if (status != BST_OK) {
+        return lead == 0 ? status
+                         : bst_fail_prefix(ctx, status,
+                                           "from the start of the first row to the end of the last "
+                                           "one (the detector's row_time_s)");
+    }
     int capacity, count;
     const bst_source *sources;
     bst_truth *truth = bst_step_write(step, PORT_TRUTH, &capacity);
@@ -283,16 +292,19 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
     BST_TRY(bst_field_query(ctx, s->field, &track, e->start_tick, e->end_tick, s->tick_rate_hz,
                             e->window, &s->options, truth, &sources, &count));
     const struct bst_skylight_map *map = bst_field_background(s->field);
-    bst_render_request request = {.window = e->window,
-                                  .track = &track,
-                                  .sources = sources,
-                                  .count = count,
-                                  .background_e = (map ? 0.0 : truth->background_e) + truth->dark_e,
-                                  .background = map,
-                                  .dark_e = truth->dark_e,
-                                  .binning = e->binning,
-                                  .key = s->key,
-                                  .exposure_id = e->id};
+    bst_render_request request = {
+        .window = e->window,
+        .track = &track,
+        .sources = sources,
+        .count = count,
+        .background_e = (map ? 0.0 : truth->background_e) + truth->dark_e,
+        .background = map,
+        .dark_e = truth->dark_e,
+        .row_time_s = s->camera->detector.row_time_s,
+        .exposure_s = (double)(e->end_tick - e->start_tick) / (double)s->tick_rate_hz,
+        .binning = e->binning,
+        .key = s->key,
+        .exposure_id = e->id};
     if (e->dropped) {
         BST_TRY(bst_renderer_plan(ctx, s->renderer, &request));
     } else {

@@ -82,7 +82,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     int16 full_count = (int16)0;
     for (int y = 0; y < t.rows; y++) {
         uint counter = ((uint)(t.y + y) * chunks_per_row + (uint)t.x / 64u) * 16u;
-        global ushort *row = frame + (size_t)(t.top + y) * p.window_width;
+        global ushort *row = frame + (size_t)(p.first_row + t.top + y) * p.window_width;
         for (int x = 0; x < t.columns; x += 64) {
             local float16 *from = (local float16 *)(sum + y * STRIDE + x);
             chunk light = {from[0], from[1], from[2], from[3]};
@@ -102,7 +102,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     int8 a = full_count.lo + full_count.hi;
     int4 b = a.lo + a.hi;
     int2 c = b.lo + b.hi;
-    saturated[tile] = c.lo + c.hi;
+    saturated[p.first_tile + tile] = c.lo + c.hi;
 }
 
 /* image: [window_height][image_stride] expected electrons. */
@@ -125,7 +125,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_expecte
     SHADE_TILE(sum, t.x, t.y);
     ADD_BACKGROUND(sum, p, t);
     for (int y = 0; y < t.rows; y++) {
-        global float *out = image + (size_t)(t.top + y) * p.image_stride;
+        global float *out = image + (size_t)(p.first_row + t.top + y) * p.image_stride;
         for (int x = max(0, -t.left); x < t.columns; x++) {
             out[t.left + x] = sum[y * STRIDE + x] + p.background_e;
         }

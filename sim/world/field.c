@@ -7,6 +7,7 @@
 #include "sim/world/field_objects.h"
 #include "sim/world/los_track.h"
 #include "sim/world/psf.h"
+#include "sim/world/row_exposure.h"
 #include "sim/world/skylight.h"
 
 /* Aberration at most, and some for the deflection of light: how far an apparent place lies from the
@@ -26,7 +27,7 @@ struct bst_field {
     bst_view *view;
     const bst_camera *camera;
     int observer;
-    bst_track_store track;
+    bst_track_store track, middle; /* middle: of a rolling shutter's middle row */
     bst_star *stars;
     int star_capacity;
     bst_faint_stars *faint;      /* NULL: none */
@@ -79,6 +80,7 @@ void bst_field_free(bst_field *field) {
         bst_faint_stars_free(field->faint);
         bst_skylight_free(field->skylight);
         bst_track_store_free(&field->track);
+        bst_track_store_free(&field->middle);
         free(field->stars);
         free(field->sources);
         free(field->parts);
@@ -132,16 +134,12 @@ static void summarise_track(bst_field *field, const bst_los_track *track, bst_qu
     field->exposure_s = exposure;
     field->q_mid = bst_track_attitude(track, 0.5 * exposure);
     double first[D] = {0}, second[D][D] = {{0}}, total = 0.0, reach = 0.0;
-    double half_px = 0.5 * hypot((double)field->camera->width_px, (double)field->camera->height_px);
-    double scale = bst_camera_scale_rad(field->camera);
-    /* a tilt moves points at the corner further than at the centre */
-    double stretch = (1.0 + half_px * half_px * scale * scale) * bst_camera_stretch(field->camera);
-    half_px *= bst_camera_stretch(field->camera);
     double previous[D] = {0};
     for (int k = 0; k < track->count; k++) {
         bst_vec3 d = deviation(field->q_mid, track->q_cam_from_gcrf[k]);
         double now[D] = {d.x, d.y, d.z, exposure > 0.0 ? track->time_s[k] / exposure : 0.5};
-        reach = fmax(reach, hypot(d.x, d.y) / scale * stretch + fabs(d.z) * half_px);
+        reach =
+            fmax(reach, bst_track_moved_px(field->camera, field->q_mid, track->q_cam_from_gcrf[k]));
         /* moments of the piecewise linear path between the samples */
         double w = k > 0 ? (exposure > 0.0 ? track->time_s[k] - track->time_s[k - 1] : 1.0) : 0.0;
         for (int i = 0; i < D; i++) {
@@ -284,7 +282,18 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     double mid_s = 0.5 * (start_s + end_s), exposure = end_s - start_s;
     double reach_px;
     bst_quat mean;
-    summarise_track(field, track, &mean, &reach_px);
+    bst_los_track own = *track; /* of the exposure itself */
+    if (options->lead_s > 0.0) {
+        BST_TRY(bst_track_part(ctx, &field->middle, track, options->lead_s,
+                               options->lead_s + exposure, &own));
+    }
+    summarise_track(field, &own, &mean, &reach_px);
+    for (int k = 0; options->lead_s > 0.0 && k < track->count; k++) {
+        reach_px =
+            fmax(reach_px, bst_track_moved_px(camera, field->q_mid, track->q_cam_from_gcrf[k]));
+    }
+    start_s -= options->lead_s;
+    end_s += options->lead_s;
 
     bst_state eye;
     bst_bodies bodies;
@@ -336,7 +345,7 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
                                    .v_limit = options->v_limit,
                                    .faint_limit = faint_limit};
         for (int k = 0; k <= BST_DISC_PARTS; k++) {
-            around.q[k] = bst_track_attitude(track, exposure * k / BST_DISC_PARTS);
+            around.q[k] = bst_track_attitude(&own, exposure * k / BST_DISC_PARTS);
         }
         bst_window lit = window;
         if (bst_detector_config_whole_columns(&camera->detector)) {
@@ -453,6 +462,29 @@ double bst_field_background_e(const bst_field *field, const bst_truth *header, d
                                                           : header->background_e;
 }
 
+/* What a rolling shutter sees of a source: it is exposed while the row where it is. */
+static bst_image_moments place_in_rows(const bst_field *field, const bst_los_track *track,
+                                       const bst_source *source, bst_window window, bst_quat *q_mid,
+                                       bst_truth_item *out) {
+    const bst_row_times rows = {field->camera->detector.row_time_s, field->exposure_s, window};
+    double u[2], duration = track->time_s[track->count - 1];
+    bst_row_source_times(field->camera, &rows, track, source, u);
+    double middle = 0.5 * (u[0] + u[1]);
+    const double when[3] = {u[0], middle, u[1]};
+    double *const x[3] = {&out->x_start_px, &out->x_mid_px, &out->x_end_px};
+    double *const y[3] = {&out->y_start_px, &out->y_mid_px, &out->y_end_px};
+    *q_mid = bst_track_attitude(track, middle * duration);
+    for (int k = 0; k < 3; k++) {
+        bst_quat q = bst_track_attitude(track, when[k] * duration);
+        (void)bst_camera_project(
+            field->camera, bst_quat_rotate(q, bst_source_direction(source, when[k])), x[k], y[k]);
+    }
+    out->delay_s = (middle - 0.5) * duration;
+    out->electrons = source->electrons_per_s * duration *
+                     (bst_source_light(source, u[1]) - bst_source_light(source, u[0]));
+    return bst_image_by_light(field->camera, track, source, u[0], u[1]);
+}
+
 void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
                           const bst_source *source, bst_window window, const bst_truth *header,
                           bst_truth_item *out) {
@@ -477,15 +509,21 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
                             .y_end_px = NAN,
                             .x_mean_px = NAN,
                             .y_mean_px = NAN};
-    (void)bst_field_project(camera, track, 0, source, &out->x_start_px, &out->y_start_px);
-    (void)bst_field_project(camera, track, track->count - 1, source, &out->x_end_px,
-                            &out->y_end_px);
-    (void)bst_camera_project(camera, bst_quat_rotate(field->q_mid, source->apparent_mid),
-                             &out->x_mid_px, &out->y_mid_px);
-    bst_image_moments image =
-        source->rate ? bst_image_by_light(field->camera, track, source) : smear_of(field, source);
+    bst_image_moments image;
+    bst_quat q_mid = field->q_mid;
+    if (camera->detector.row_time_s != 0.0 && track->time_s[track->count - 1] > 0.0) {
+        image = place_in_rows(field, track, source, window, &q_mid, out);
+    } else {
+        (void)bst_field_project(camera, track, 0, source, &out->x_start_px, &out->y_start_px);
+        (void)bst_field_project(camera, track, track->count - 1, source, &out->x_end_px,
+                                &out->y_end_px);
+        (void)bst_camera_project(camera, bst_quat_rotate(field->q_mid, source->apparent_mid),
+                                 &out->x_mid_px, &out->y_mid_px);
+        image = source->rate ? bst_image_by_light(field->camera, track, source, 0.0, 1.0)
+                             : smear_of(field, source);
+    }
     if (source->shape) {
-        bst_image_add_disc(field->camera, field->q_mid, source, &image);
+        bst_image_add_disc(field->camera, q_mid, source, &image);
     }
     out->x_mean_px = image.x_mean;
     out->y_mean_px = image.y_mean;

@@ -10,9 +10,10 @@ typedef struct bst_image_moments {
     double x_mean, y_mean, xx, xy, yy;
 } bst_image_moments;
 
-/* Of a source whose brightness changes, weighted by its light. */
+/* Of a source whose brightness changes, weighted by its light, from time u0 to u1 of the track (0
+ * to 1: all of it). */
 bst_image_moments bst_image_by_light(const bst_camera *camera, const bst_los_track *track,
-                                     const bst_source *source);
+                                     const bst_source *source, double u0, double u1);
 
 /* Moves and widens the moments of a point by the places of the light on the source's disc, seen
  * with attitude q_mid. */

@@ -87,13 +87,46 @@ bst_status bst_track_cut(bst_ctx *ctx, bst_track_store *store, const bst_los_his
 }
 
 bst_quat bst_track_attitude(const bst_los_track *track, double time_s) {
-    int k = 0;
-    while (k + 2 < track->count && track->time_s[k + 1] < time_s) {
-        k++;
+    int k = 0, high = track->count - 2; /* the first stretch that ends at time_s or later */
+    while (k < high) {
+        int middle = (k + high) / 2;
+        if (track->time_s[middle + 1] < time_s) {
+            k = middle + 1;
+        } else {
+            high = middle;
+        }
     }
     double span = track->time_s[k + 1] - track->time_s[k];
     double s = span > 0.0 ? (time_s - track->time_s[k]) / span : 0.0;
     return bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], s);
+}
+
+bst_status bst_track_part(bst_ctx *ctx, bst_track_store *store, const bst_los_track *track,
+                          double from_s, double to_s, bst_los_track *out) {
+    BST_TRY(reserve(ctx, store, track->count + 2));
+    int count = 0;
+    store->time_s[count] = 0.0;
+    store->q[count++] = bst_track_attitude(track, from_s);
+    for (int k = 0; k < track->count; k++) {
+        if (track->time_s[k] > from_s && track->time_s[k] < to_s) {
+            store->time_s[count] = track->time_s[k] - from_s;
+            store->q[count++] = track->q_cam_from_gcrf[k];
+        }
+    }
+    store->time_s[count] = to_s - from_s;
+    store->q[count] = bst_track_attitude(track, to_s);
+    *out = (bst_los_track){count + 1, store->time_s, store->q};
+    return BST_OK;
+}
+
+double bst_track_moved_px(const bst_camera *camera, bst_quat from, bst_quat to) {
+    double half_px = 0.5 * hypot((double)camera->width_px, (double)camera->height_px);
+    double scale = bst_camera_scale_rad(camera), stretch = bst_camera_stretch(camera);
+    bst_vec3 d = bst_quat_to_rotvec(bst_quat_mul(to, bst_quat_conj(from)));
+    /* a tilt moves points at the corner further than at the centre */
+    double tilt = (1.0 + half_px * half_px * scale * scale) * stretch;
+    half_px *= stretch;
+    return hypot(d.x, d.y) / scale * tilt + fabs(d.z) * half_px;
 }
 
 void bst_track_store_free(bst_track_store *store) {
