@@ -30,8 +30,7 @@ bst_rng_key bst_detector_pattern_key(const bst_camera *camera, const char *name)
 }
 
 bool bst_detector_whole_columns(const bst_detector *detector) {
-    const bst_detector_config *d = &detector->camera.detector;
-    return d->full_well == BST_WELL_BLOOM || d->frame_transfer_s > 0.0;
+    return bst_detector_config_whole_columns(&detector->camera.detector);
 }
 
 static bool has_offsets(const bst_detector_config *d) {

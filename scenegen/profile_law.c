@@ -1,6 +1,7 @@
 #include "scenegen/profile_law.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 #include "scenegen/reference.h"
 #include "sim/core/vec.h"
@@ -112,4 +113,26 @@ void bst_profile_law(double sigma_px, int degree, int reach, float *law) {
             }
         }
     }
+}
+
+bst_status bst_profile_law_buffer(bst_ctx *ctx, cl_context context, double sigma_px, int degree,
+                                  int reach, cl_mem *out) {
+    if (degree > BST_LAW_MOST_DEGREE || (degree > 0 && degree % 2 == 0)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "psf_degree is %d: allowed are 0 and the odd numbers up to %d", degree,
+                        BST_LAW_MOST_DEGREE);
+    }
+    size_t count = degree > 0 ? (size_t)bst_profile_law_floats(degree, reach) : 1;
+    float *law = calloc(count, sizeof *law);
+    if (!law) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the PSF's profile");
+    }
+    if (degree > 0) {
+        bst_profile_law(sigma_px, degree, reach, law);
+    }
+    cl_int code;
+    *out = clCreateBuffer(context, CL_MEM_READ_ONLY | CL_MEM_COPY_HOST_PTR, count * sizeof *law,
+                          law, &code);
+    free(law);
+    return bst_device_check(ctx, code, "allocating the PSF's profile");
 }

@@ -2,6 +2,8 @@
 #ifndef BST_SCENEGEN_PROFILE_LAW_H
 #define BST_SCENEGEN_PROFILE_LAW_H
 
+#include "sim/device/device.h"
+
 enum { BST_LAW_MOST_DEGREE = 15 };
 /* What a law may miss, of the share of the pixel that a centred Gaussian lights most. */
 #define BST_LAW_ERROR 5e-6
@@ -24,5 +26,10 @@ int bst_profile_law_floats(int degree, int reach);
  * half the second derivative (4). Pixel 1 - d has the mirror image, g -> -g. The share is erf((d -
  * f + 1/2) / (sqrt(2) sigma)) / 2 - erf((d - f - 1/2) / (sqrt(2) sigma)) / 2. */
 void bst_profile_law(double sigma_px, int degree, int reach, float *law);
+
+/* The same on a device; of degree 0: something that is no law. Release it with clReleaseMemObject.
+ */
+bst_status bst_profile_law_buffer(bst_ctx *ctx, cl_context context, double sigma_px, int degree,
+                                  int reach, cl_mem *out) BST_MUST_CHECK;
 
 #endif

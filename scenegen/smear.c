@@ -34,7 +34,7 @@ struct bst_smear {
     double profile_error; /* of stamps, over the image's peak */
     double half_diagonal_px;
     double sensor_reach_px; /* light of a point further from the boresight stays off the sensor */
-    double stretch; /* of the image by distortion where it is greatest */
+    double stretch;         /* of the image by distortion where it is greatest */
 
     bst_los_track track;
     double dark_variance_e2, duration_s;
@@ -97,9 +97,8 @@ bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
         s->tolerance[n] = 0.08 * pow(2.0, -n);
     }
     s->stretch = bst_camera_stretch(camera);
-    s->sensor_reach_px =
-        tan(bst_camera_half_diagonal_rad(camera)) / bst_camera_scale_rad(camera) +
-        MAX_TAPS / bst_camera_shrink(camera);
+    s->sensor_reach_px = tan(bst_camera_half_diagonal_rad(camera)) / bst_camera_scale_rad(camera) +
+                         MAX_TAPS / bst_camera_shrink(camera);
     s->half_diagonal_px =
         tan(bst_camera_half_diagonal_rad(camera)) / bst_camera_scale_rad(camera) * s->stretch;
     if (!camera->geometry.general) {
@@ -572,7 +571,8 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
     double extent = fmax((double)s->camera.width_px, (double)s->camera.height_px);
     double rounded = 1.5 * 0x1p-24 * extent * 0.4 / s->sigma_px * s->last_peak_e /
                      sqrt(0.5 * s->last_peak_e + s->dark_variance_e2);
-    double shared = s->single && !moving ? single_error(s, s->last_peak_e, sqrt(x * x + y * y)) : 0.0;
+    double shared =
+        s->single && !moving ? single_error(s, s->last_peak_e, sqrt(x * x + y * y)) : 0.0;
     s->last_error_sigma = fmax((used->error + lost) * sigmas + shared + rounded,
                                s->last_peak_e * s->tail[border] / sqrt(s->dark_variance_e2));
     if (s->options.temporal_oversample > 0) {

@@ -22,6 +22,7 @@ typedef struct bst_scene_params {
     int sensor_width;
     int tiles_x0; /* sensor column of the first tile: a multiple of 64 */
     int tiles_x, tiles_y;
+    int first_row, first_tile; /* of the frame: where the window is one of its bands */
     int source_groups; /* sources / BST_BLOCK, rounded up */
     float centre_x, centre_y; /* of the camera, sensor px */
     unsigned key0, key1, exposure_low, exposure_high;
@@ -36,10 +37,11 @@ typedef struct bst_scene_params {
     float offset_dn;
     float max_dn;
     int light_first, light_pitch; /* of the Fourier path's image, floats */
-    int image_stride; /* of the image of expected electrons, floats */
+    int image_stride;             /* of the image of expected electrons, floats */
     int light_y0, light_height,
         light_stride; /* of the image that is read out: sensor row, rows, floats */
     int binning;
+    int map_step, map_x0, map_y0, map_columns, map_rows; /* of the background, if it varies */
 } bst_scene_params;
 
 /* One source on its way to its nodes. */

@@ -60,7 +60,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     global const float *block_box, global const float *source_box, global const float *group_box,
     global const float *light, global ushort *frame, global int *saturated,
     global const float *gain, global const float *dark, global const float *overlay,
-    global const float *offsets, global const ushort *codes) {
+    global const float *offsets, global const ushort *codes BACKGROUND_ARGUMENT) {
     local float sums[GROUP][(TILE_H + SPARE) * STRIDE] __attribute__((aligned(64)));
     int tile = (int)get_global_id(0);
     if (tile >= p.tiles_x * p.tiles_y) {
@@ -74,6 +74,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     splat_tile(p, sum, t.x, t.y, sources, table, block_box, source_box, group_box, light);
 #endif
     SHADE_TILE(sum, t.x, t.y);
+    ADD_BACKGROUND(sum, p, t);
     uint steps[MOST_STEPS];
     dark_law unlit = dark_law_of(p, steps);
     detector_maps maps = {gain, dark, overlay, offsets, codes};
@@ -81,7 +82,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     int16 full_count = (int16)0;
     for (int y = 0; y < t.rows; y++) {
         uint counter = ((uint)(t.y + y) * chunks_per_row + (uint)t.x / 64u) * 16u;
-        global ushort *row = frame + (size_t)(t.top + y) * p.window_width;
+        global ushort *row = frame + (size_t)(p.first_row + t.top + y) * p.window_width;
         for (int x = 0; x < t.columns; x += 64) {
             local float16 *from = (local float16 *)(sum + y * STRIDE + x);
             chunk lights = {from[0], from[1], from[2], from[3]};
@@ -101,14 +102,14 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     int8 a = full_count.lo + full_count.hi;
     int4 b = a.lo + a.hi;
     int2 c = b.lo + b.hi;
-    saturated[tile] = c.lo + c.hi;
+    saturated[p.first_tile + tile] = c.lo + c.hi;
 }
 
 /* image: [window_height][image_stride] expected electrons. */
 __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_expected(
     bst_scene_params p, global const bst_scene_source *sources, global const float16 *table,
     global const float *block_box, global const float *source_box, global const float *group_box,
-    global const float *light, global float *image) {
+    global const float *light, global float *image BACKGROUND_ARGUMENT) {
     local float sums[GROUP][(TILE_H + SPARE) * STRIDE] __attribute__((aligned(64)));
     int tile = (int)get_global_id(0);
     if (tile >= p.tiles_x * p.tiles_y) {
@@ -122,8 +123,9 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_expecte
     splat_tile(p, sum, t.x, t.y, sources, table, block_box, source_box, group_box, light);
 #endif
     SHADE_TILE(sum, t.x, t.y);
+    ADD_BACKGROUND(sum, p, t);
     for (int y = 0; y < t.rows; y++) {
-        global float *out = image + (size_t)(t.top + y) * p.image_stride;
+        global float *out = image + (size_t)(p.first_row + t.top + y) * p.image_stride;
         for (int x = max(0, -t.left); x < t.columns; x++) {
             out[t.left + x] = sum[y * STRIDE + x] + p.background_e;
         }

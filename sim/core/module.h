@@ -54,9 +54,11 @@ typedef struct bst_module_env {
     struct bst_device *device;             /* NULL unless the descriptor asks for it */
     int observer, sensor;                  /* indices in the world */
     double exposure_s;                     /* the longest of this sensor that the scenario sets: its
-                                              own, or exposure_s of a module that commands it */
-    uint32_t planes;                       /* bit k: the bst_plane k is recorded */
-    double mask_threshold_sigma;           /* least light of a pixel of the segmentation mask */
+                                              own, or exposure_s of a module that commands it; from
+                                              the first to the last row of a rolling shutter */
+    int64_t los_period_ticks, los_offset_ticks; /* when this sensor's los_history is written */
+    uint32_t planes;                            /* bit k: the bst_plane k is recorded */
+    double mask_threshold_sigma; /* least light of a pixel of the segmentation mask */
     void *engine_private;
 } bst_module_env;
 

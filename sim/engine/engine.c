@@ -133,6 +133,8 @@ bst_status bst_engine_load(bst_ctx *ctx, bst_engine *engine) {
                               .observer = spec->observer,
                               .sensor = spec->sensor,
                               .exposure_s = spec->exposure_s,
+                              .los_period_ticks = spec->los_period_ticks,
+                              .los_offset_ticks = spec->los_offset_ticks,
                               .planes = spec->planes,
                               .mask_threshold_sigma = spec->mask_threshold_sigma,
                               .engine_private = self};
