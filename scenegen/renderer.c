@@ -306,7 +306,9 @@ static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *
     for (int i = 0; i < q->count; i++) {
         brightest = q->sources[i].path ? brightest : fmax(brightest, q->sources[i].electrons_per_s);
     }
-    BST_TRY(bst_smear_begin(ctx, r->smear, q->track, q->background_e + read * read, brightest));
+    bst_smear_frame frame = {q->track, q->window, bst_renderer_margin_px(r),
+                             q->background_e + read * read, brightest};
+    BST_TRY(bst_smear_begin(ctx, r->smear, &frame));
     r->stats = (bst_render_stats){0};
     *blocks = 0;
     const uint64_t counted = (uint64_t)INT32_MAX * sizeof(float); /* by the kernels, in int */
