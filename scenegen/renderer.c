@@ -14,6 +14,7 @@
 #include "scenegen/readout.h"
 #include "scenegen/reference.h"
 #include "scenegen/smear.h"
+#include "scenegen/stage.h"
 #include "scenegen/tiles.h"
 #include "scenegen/vignetting.h"
 
@@ -42,11 +43,13 @@ struct bst_renderer {
     bst_readout *readout;
     bst_frame_pool *pool;
     cl_mem profiles;
-    growing table, sources, nodes, block_box, source_box, saturated, expected;
+    bst_stage *stage;
+    cl_mem sources; /* of the present frame; borrowed */
+    growing nodes, block_box, source_box, expected;
     bst_scene_source *list; /* drawn sources */
     double *peak_e;         /* of all sources of the request */
-    int list_capacity, tiles;
-    bool uncounted; /* saturated pixels of the latest frame */
+    int list_capacity, set;
+    int tiles[BST_STAGE_SETS]; /* whose saturated pixels are not counted yet */
     long long saturated_pixels, saturated_frames;
     uint64_t most_bytes; /* of one buffer on the device */
     bst_render_stats stats;
@@ -137,22 +140,6 @@ static bst_status grow(bst_ctx *ctx, bst_renderer *r, growing *g, size_t bytes) 
     return bst_device_check(ctx, code, "allocating scene memory");
 }
 
-/* Copies through a mapping, which PoCL serves without a copy of its own. */
-static bst_status upload(bst_ctx *ctx, bst_renderer *r, growing *g, const void *data,
-                         size_t bytes) {
-    BST_TRY(grow(ctx, r, g, bytes));
-    if (bytes == 0) {
-        return BST_OK;
-    }
-    cl_int code;
-    void *p = clEnqueueMapBuffer(r->queue, g->buffer, CL_TRUE, CL_MAP_WRITE_INVALIDATE_REGION, 0,
-                                 bytes, 0, NULL, NULL, &code);
-    BST_TRY(bst_device_check(ctx, code, "mapping scene memory"));
-    memcpy(p, data, bytes);
-    return bst_device_check(ctx, clEnqueueUnmapMemObject(r->queue, g->buffer, p, 0, NULL, NULL),
-                            "unmapping scene memory");
-}
-
 /* The PSF, and the Fourier path where it is no Gaussian. */
 static bst_status open_psf(bst_ctx *ctx, bst_device *device, bst_renderer *r,
                            bst_smear_options *smear) {
@@ -218,6 +205,9 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
         status = bst_smear_create(ctx, camera, &smear, &r->smear);
     }
     if (status == BST_OK) {
+        status = bst_stage_create(ctx, device, &r->stage);
+    }
+    if (status == BST_OK) {
         status = bst_frame_pool_create(ctx, device, (int)camera->width_px, (int)camera->height_px,
                                        r->options.pool_frames, &r->pool);
     }
@@ -234,9 +224,8 @@ void bst_renderer_free(bst_renderer *r) {
         return;
     }
     clFinish(r->queue);
-    cl_mem buffers[] = {r->profiles,         r->table.buffer,     r->sources.buffer,
-                        r->nodes.buffer,     r->block_box.buffer, r->source_box.buffer,
-                        r->saturated.buffer, r->expected.buffer};
+    cl_mem buffers[] = {r->profiles, r->nodes.buffer, r->block_box.buffer, r->source_box.buffer,
+                        r->expected.buffer};
     for (size_t i = 0; i < sizeof buffers / sizeof *buffers; i++) {
         if (buffers[i]) {
             clReleaseMemObject(buffers[i]);
@@ -251,6 +240,7 @@ void bst_renderer_free(bst_renderer *r) {
     if (r->program) {
         clReleaseProgram(r->program);
     }
+    bst_stage_free(r->stage);
     bst_frame_pool_free(r->pool);
     bst_smear_free(r->smear);
     bst_fft_light_free(r->fft_light);
@@ -365,8 +355,11 @@ static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, int blocks, int *
     const float *table = bst_smear_table(r->smear, &table_blocks);
     *groups = (count + BST_BLOCK - 1) / BST_BLOCK;
     size_t block_bytes = BST_BLOCK * sizeof(float);
-    BST_TRY(upload(ctx, r, &r->table, table, (size_t)table_blocks * BST_TABLE_ROWS * block_bytes));
-    BST_TRY(upload(ctx, r, &r->sources, r->list, (size_t)count * sizeof *r->list));
+    cl_mem table_buffer;
+    BST_TRY(bst_stage_put(ctx, r->stage, BST_STAGE_TABLE, table,
+                          (size_t)table_blocks * BST_TABLE_ROWS * block_bytes, &table_buffer));
+    BST_TRY(bst_stage_put(ctx, r->stage, BST_STAGE_SOURCES, r->list,
+                          (size_t)count * sizeof *r->list, &r->sources));
     BST_TRY(grow(ctx, r, &r->nodes, (size_t)blocks * NODE_BYTES));
     BST_TRY(grow(ctx, r, &r->block_box, (size_t)blocks * BOX_FLOATS * sizeof(float)));
     BST_TRY(grow(ctx, r, &r->source_box, (size_t)*groups * BOX_FLOATS * block_bytes));
@@ -376,8 +369,8 @@ static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, int blocks, int *
     float centre_x = (float)bst_camera_centre_x(&r->camera);
     float centre_y = (float)bst_camera_centre_y(&r->camera);
     const void *values[] = {
-        &r->sources.buffer, &count,           &r->table.buffer,     &centre_x,
-        &centre_y,          &r->nodes.buffer, &r->block_box.buffer, &r->source_box.buffer};
+        &r->sources, &count,           &table_buffer,        &centre_x,
+        &centre_y,   &r->nodes.buffer, &r->block_box.buffer, &r->source_box.buffer};
     const size_t m = sizeof(cl_mem), f = sizeof(float);
     const size_t bytes[] = {m, sizeof count, m, f, f, m, m, m};
     BST_TRY(set_args(ctx, r->nodes_kernel, values, bytes, 8));
@@ -421,31 +414,27 @@ static bst_scene_params make_params(const bst_renderer *r, const bst_render_requ
     };
 }
 
-/* Counts the saturated pixels of the latest frame, once. Waits for it. */
-static bst_status count_saturated(bst_ctx *ctx, bst_renderer *r) {
-    if (!r->uncounted) {
+/* Counts the saturated pixels of the frame that used a set, once. Waits for it. */
+static bst_status count_saturated(bst_ctx *ctx, bst_renderer *r, int set) {
+    int tiles = r->tiles[set];
+    const void *counts;
+    if (tiles == 0) {
         return BST_OK;
     }
-    r->uncounted = false;
+    r->tiles[set] = 0;
     r->saturated_pixels = 0;
-    cl_int code;
-    size_t bytes = (size_t)r->tiles * sizeof(cl_int);
-    cl_int *p = clEnqueueMapBuffer(r->queue, r->saturated.buffer, CL_TRUE, CL_MAP_READ, 0, bytes, 0,
-                                   NULL, NULL, &code);
-    BST_TRY(bst_device_check(ctx, code, "mapping the count of saturated pixels"));
-    for (int i = 0; i < r->tiles; i++) {
-        r->saturated_pixels += p[i];
+    BST_TRY(bst_stage_result(ctx, r->stage, set, BST_STAGE_SATURATED, &counts));
+    for (int i = 0; i < tiles; i++) {
+        r->saturated_pixels += ((const cl_int *)counts)[i];
     }
     r->saturated_frames += r->saturated_pixels > 0;
-    return bst_device_check(
-        ctx, clEnqueueUnmapMemObject(r->queue, r->saturated.buffer, p, 0, NULL, NULL),
-        "unmapping the count of saturated pixels");
+    return BST_OK;
 }
 
 /* The image that the tile kernel takes its light from, where the PSF is no Gaussian. */
 static bst_status make_light(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q, int groups,
                              bst_scene_params *p, cl_mem *light) {
-    bst_fft_light_nodes nodes = {r->sources.buffer, r->nodes.buffer, r->block_box.buffer,
+    bst_fft_light_nodes nodes = {r->sources, r->nodes.buffer, r->block_box.buffer,
                                  r->source_box.buffer, groups};
     bst_fft_light_image image;
     BST_TRY(bst_fft_light_render(ctx, r->fft_light, r->queue, q->window, &nodes, &image));
@@ -455,20 +444,35 @@ static bst_status make_light(bst_ctx *ctx, bst_renderer *r, const bst_render_req
     return BST_OK;
 }
 
+/* Room for the frame's counts. */
+static bst_status saturated_counts(bst_ctx *ctx, bst_renderer *r, int tiles, cl_mem *out) {
+    BST_TRY(
+        bst_stage_room(ctx, r->stage, BST_STAGE_SATURATED, (size_t)tiles * sizeof(cl_int), out));
+    r->tiles[r->set] = tiles;
+    return BST_OK;
+}
+
+/* Takes the next set of what goes with a frame; another frame may be under way. */
+static bst_status begin_set(bst_ctx *ctx, bst_renderer *r) {
+    r->set = bst_stage_begin(r->stage);
+    return count_saturated(ctx, r, r->set);
+}
+
 /* The common way of all kinds of image: the kernels' first six arguments are the same. stride:
  * floats between the rows of `out`, 0: no gaps; light_only: without background. */
 static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
                                 cl_kernel kernel, cl_mem out, int stride, bool light_only) {
     int blocks = 0, groups = 0;
     BST_TRY(plan(ctx, r, q, &blocks));
-    BST_TRY(count_saturated(ctx, r)); /* of the frame before, which was rendered meanwhile */
     BST_TRY(enqueue_nodes(ctx, r, blocks, &groups));
     bst_scene_params p = make_params(r, q, groups);
     p.image_stride = stride > 0 ? stride : p.image_stride;
     p.background_e = light_only ? 0.0f : p.background_e;
-    r->tiles = p.tiles_x * p.tiles_y;
-    size_t tiles = (size_t)r->tiles;
-    BST_TRY(grow(ctx, r, &r->saturated, tiles * sizeof(cl_int)));
+    size_t tiles = (size_t)p.tiles_x * (size_t)p.tiles_y;
+    cl_mem saturated = NULL;
+    if (kernel == r->frame_kernel) {
+        BST_TRY(saturated_counts(ctx, r, (int)tiles, &saturated));
+    }
     cl_mem light = r->profiles;
     if (r->fft_light) {
         BST_TRY(make_light(ctx, r, q, groups, &p, &light));
@@ -476,13 +480,13 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
     cl_mem maps[5];
     bst_detector_buffers(r->detector, maps);
     const void *values[] = {&p,
-                            &r->sources.buffer,
+                            &r->sources,
                             &r->nodes.buffer,
                             &r->block_box.buffer,
                             &r->source_box.buffer,
                             &light,
                             &out,
-                            &r->saturated.buffer,
+                            &saturated,
                             &maps[0],
                             &maps[1],
                             &maps[2],
@@ -511,11 +515,10 @@ static bst_status render_in_stages(bst_ctx *ctx, bst_renderer *r, const bst_rend
     light.window = bst_readout_light_window(r->readout, q->window);
     BST_TRY(bst_readout_image(ctx, r->readout, light.window, &image, &stride));
     BST_TRY(enqueue_tiles(ctx, r, &light, r->expected_kernel, image, stride, true));
-    r->tiles = q->window.height / binning;
-    BST_TRY(grow(ctx, r, &r->saturated, (size_t)r->tiles * sizeof(cl_int)));
+    cl_mem saturated;
+    BST_TRY(saturated_counts(ctx, r, q->window.height / binning, &saturated));
     bst_scene_params p = make_params(r, q, 0);
-    return bst_readout_run(ctx, r->readout, r->detector, &p, q->window, binning, frame,
-                           r->saturated.buffer);
+    return bst_readout_run(ctx, r->readout, r->detector, &p, q->window, binning, frame, saturated);
 }
 
 bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *r, const bst_render_request *request,
@@ -528,24 +531,30 @@ bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *r, const bst_render_r
     BST_TRY(bst_frame_pool_take(ctx, r->pool, request->window.width / binning,
                                 request->window.height / binning, &frame, &buffer));
     double exposure_s = request->track->time_s[request->track->count - 1];
-    bst_status status =
-        bst_detector_begin(ctx, r->detector, request->key, request->exposure_id, exposure_s);
+    bst_status status = begin_set(ctx, r);
+    if (status == BST_OK) {
+        status = bst_detector_begin(ctx, r->detector, r->stage, request->key, request->exposure_id,
+                                    exposure_s);
+    }
     if (status == BST_OK) {
         status = binning > 1 || bst_detector_whole_columns(r->detector)
                      ? render_in_stages(ctx, r, request, binning, buffer)
                      : enqueue_tiles(ctx, r, request, r->frame_kernel, buffer, 0, false);
     }
     if (status == BST_OK) {
-        r->uncounted = true;
         status = bst_frame_pool_enqueued(ctx, frame);
     }
     if (status == BST_OK) {
         status = bst_detector_end(ctx, r->detector);
     }
     if (status == BST_OK) {
+        status = bst_stage_end(ctx, r->stage);
+    }
+    if (status == BST_OK) {
         status = bst_device_check(ctx, clFlush(r->queue), "starting the rendering");
     }
     if (status != BST_OK) {
+        r->tiles[r->set] = 0;
         bst_frame_release(frame);
         return status;
     }
@@ -561,7 +570,9 @@ bst_status bst_renderer_render_noise_free(bst_ctx *ctx, bst_renderer *r,
     BST_TRY(check_request(ctx, r, request));
     size_t bytes = (size_t)request->window.width * (size_t)request->window.height * sizeof(float);
     BST_TRY(grow(ctx, r, &r->expected, bytes));
+    BST_TRY(begin_set(ctx, r));
     BST_TRY(enqueue_tiles(ctx, r, request, r->expected_kernel, r->expected.buffer, 0, false));
+    BST_TRY(bst_stage_end(ctx, r->stage));
     return bst_device_check(
         ctx,
         clEnqueueReadBuffer(r->queue, r->expected.buffer, CL_TRUE, 0, bytes, image, 0, NULL, NULL),
@@ -569,7 +580,9 @@ bst_status bst_renderer_render_noise_free(bst_ctx *ctx, bst_renderer *r,
 }
 
 bst_status bst_renderer_saturated(bst_ctx *ctx, bst_renderer *r, long long *pixels) {
-    BST_TRY(count_saturated(ctx, r));
+    for (int i = 1; i <= BST_STAGE_SETS; i++) { /* the latest last */
+        BST_TRY(count_saturated(ctx, r, (r->set + i) % BST_STAGE_SETS));
+    }
     *pixels = r->saturated_pixels;
     return BST_OK;
 }

@@ -32,6 +32,7 @@ struct bst_smear {
     double kept[MAX_TAPS / 2]; /* light within the two nearest pixels and r more on each side */
     double tolerance[LEVELS];
     double half_diagonal_px;
+    double near_px; /* light further from the boresight, without distortion, stays off the sensor */
     double stretch; /* of the image by distortion where it is greatest */
 
     bst_los_track track;
@@ -95,8 +96,9 @@ bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
         s->tolerance[n] = 0.08 * pow(2.0, -n);
     }
     s->stretch = bst_camera_stretch(camera);
-    s->half_diagonal_px =
-        tan(bst_camera_half_diagonal_rad(camera)) / bst_camera_scale_rad(camera) * s->stretch;
+    double corner_px = tan(bst_camera_half_diagonal_rad(camera)) / bst_camera_scale_rad(camera);
+    s->near_px = corner_px + MAX_TAPS / bst_camera_shrink(camera); /* the PSF's table ends before */
+    s->half_diagonal_px = corner_px * s->stretch;
     if (!camera->geometry.general) {
         s->half_diagonal_px = 0.5 * hypot((double)camera->width_px, (double)camera->height_px);
     }
@@ -134,7 +136,11 @@ static bst_status reserve(bst_ctx *ctx, void **items, int *capacity, int need, s
  * axis, the image of it bends. */
 static int parts_of(const bst_smear *s, int k) {
     const bst_quat *q = s->track.q_cam_from_gcrf;
-    bst_vec3 r = bst_quat_to_rotvec(bst_quat_mul(q[k + 1], bst_quat_conj(q[k])));
+    bst_quat d = bst_quat_mul(q[k + 1], bst_quat_conj(q[k]));
+    if (d.x * d.x + d.y * d.y + d.z * d.z < 2.4e-7 * d.w * d.w) { /* less than 0.98e-3 */
+        return 1;
+    }
+    bst_vec3 r = bst_quat_to_rotvec(d);
     double n = ceil(bst_vec3_norm(r) / 1e-3);
     return n > 64.0 ? 64 : n < 1.0 ? 1 : (int)n;
 }
@@ -310,7 +316,7 @@ static void measure_turn(bst_smear *s) {
 /* Whether a star at (x, y) px from the boresight stays too far from the window to light it. Asked
  * where a turn moves places by little more than to first order. */
 static bool stays_beside(const bst_smear *s, double x, double y) {
-    double scale = bst_camera_scale_rad(&s->camera), r = hypot(x, y) * scale;
+    double scale = bst_camera_scale_rad(&s->camera), r = sqrt(x * x + y * y) * scale;
     if (s->camera.geometry.general || s->tilt_rad + s->roll_rad > 0.05 || r > 2.0) {
         return false;
     }
@@ -342,8 +348,8 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *fr
         BST_TRY(reserve(ctx, (void **)&s->turn, &s->turn_capacity, points, sizeof *s->turn));
         for (int n = 0; n < parts + (k + 2 == track->count); n++) {
             double u = (double)n / parts;
-            bst_quat q =
-                bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
+            const bst_quat *ends = &track->q_cam_from_gcrf[k];
+            bst_quat q = n == 0 ? bst_quat_unit(ends[0]) : bst_quat_slerp(ends[0], ends[1], u);
             double t = track->time_s[k] + u * (track->time_s[k + 1] - track->time_s[k]);
             s->turn[s->path_count] = q;
             s->path[s->path_count++] = attitude_point(s, q, t * inverse);
@@ -402,11 +408,9 @@ static bool project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, doubl
     return fabs(*x) < 1e6 && fabs(*y) < 1e6;
 }
 
-/* Light further than this from the boresight (px, without distortion) stays off the sensor: the
- * PSF's table ends before. */
+/* Places further than this from the boresight (px, without distortion) give the sensor no light. */
 static double far_px(const bst_smear *s) {
-    return tan(bst_camera_half_diagonal_rad(&s->camera)) / bst_camera_scale_rad(&s->camera) +
-           MAX_TAPS / bst_camera_shrink(&s->camera) + s->disc_px;
+    return s->near_px + s->disc_px;
 }
 
 /* How many chords the curved motion over the image wants: of a parabola they miss
