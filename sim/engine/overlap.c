@@ -396,7 +396,10 @@ static record *next_ahead(const bst_overlap *o) {
     return NULL;
 }
 
+/* Called, and returns, with the lock held. */
 static void look_at(bst_overlap *o, record *r) {
+    r->looked = LOOKING;
+    pthread_mutex_unlock(&o->lock);
     instance *self = o->engine->instances[r->ahead];
     bst_overlap_job job = job_of(r);
     bst_ctx ctx;
@@ -411,6 +414,9 @@ static void look_at(bst_overlap *o, record *r) {
     for (job_input *i = next_input(&job, NULL); i; i = next_input(&job, i)) {
         i->taken = false;
     }
+    pthread_mutex_lock(&o->lock);
+    r->looked = SEEN;
+    pthread_cond_broadcast(&o->changed);
 }
 
 static void *look_ahead(void *user) {
@@ -418,27 +424,28 @@ static void *look_ahead(void *user) {
     pthread_mutex_lock(&o->lock);
     while (!o->stop) {
         record *r = next_ahead(o);
-        if (!r) {
+        if (r) {
+            look_at(o, r);
+        } else {
             pthread_cond_wait(&o->changed, &o->lock);
-            continue;
         }
-        r->looked = LOOKING;
-        pthread_mutex_unlock(&o->lock);
-        look_at(o, r);
-        pthread_mutex_lock(&o->lock);
-        r->looked = SEEN;
-        pthread_cond_broadcast(&o->changed);
     }
     pthread_mutex_unlock(&o->lock);
     return NULL;
 }
 
-/* Takes the first job for its step: nobody looks at it from here on. */
+/* Takes the first job for its step: nobody looks at it from here on. While somebody does, there may
+ * be another to be looked at. */
 static void begin_job(bst_overlap *o, record *r) {
     o->waiting_count--;
     memmove(o->waiting, o->waiting + 1, (size_t)o->waiting_count * sizeof o->waiting[0]);
     while (r->looked == LOOKING) {
-        pthread_cond_wait(&o->changed, &o->lock);
+        record *other = next_ahead(o);
+        if (other) {
+            look_at(o, other);
+        } else {
+            pthread_cond_wait(&o->changed, &o->lock);
+        }
     }
     r->looked = SEEN;
 }
