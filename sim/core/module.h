@@ -77,11 +77,11 @@ typedef struct bst_module_desc {
     void (*destroy)(void *self);
     /* May be NULL. At the end of a run: counts what was still under way; publishes nothing. */
     bst_status (*finish)(void *self, struct bst_step *step);
-    /* May be NULL; of a BST_MODULE_APART one. May be called before a step, on another thread and
-     * while earlier steps are made, to do what depends on nothing but that step's inputs from
-     * modules that are not apart. It reads those alone, publishes and counts nothing, and keeps
-     * what it made by bst_step_lane for the step, which does it itself where nothing is kept: what
-     * fails here fails there again. */
+    /* May be NULL; of a BST_MODULE_APART one. May be called before a step, on another thread, while
+     * earlier steps or their `ahead` are under way, to do what depends on nothing but that step's
+     * inputs from modules that are not apart. It reads those alone, publishes and counts nothing,
+     * and keeps what it made by bst_step_lane for the step, which does it itself where nothing is
+     * kept: what fails here fails there again. */
     bst_status (*ahead)(void *self, struct bst_step *step);
 } bst_module_desc;
 

@@ -36,7 +36,7 @@ typedef struct scene {
     int looked, used_looks;
     int busy[BST_STEP_LANES]; /* exposures under way */
     int64_t kept[BST_STEP_LANES], kept_nav[BST_STEP_LANES];
-    pthread_mutex_t lanes; /* over busy */
+    pthread_mutex_t lanes; /* over busy and looked */
     int64_t fail_at;       /* tick of the follower's failure */
     int64_t full_at;       /* tick from which the hook fails */
     bst_ctx hooks;
