@@ -75,9 +75,11 @@ static bst_status look(void *module, struct bst_step *step) {
     bst_sample e = bst_step_next(step, IN_EXPOSURE), nav = bst_step_latest(step, IN_NAV);
     s->kept[lane] = ((const bst_exposure *)e.payload)->id;
     s->kept_nav[lane] = nav.payload ? ((const bst_nav_telemetry *)nav.payload)->tick : -1;
-    s->looked++;
+    pthread_mutex_lock(&s->lanes);
+    int looked = ++s->looked;
+    pthread_mutex_unlock(&s->lanes);
     bst_status status =
-        s->looked % 7 == 3 ? bst_fail(bst_step_ctx(step), BST_ERR_NUMERIC, "not yet") : BST_OK;
+        looked % 7 == 3 ? bst_fail(bst_step_ctx(step), BST_ERR_NUMERIC, "not yet") : BST_OK;
     s->kept[lane] = status == BST_OK ? s->kept[lane] : -1;
     occupy(s, lane, -1);
     return status;
