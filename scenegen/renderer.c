@@ -18,6 +18,7 @@
 #include "scenegen/scene_options.h"
 #include "scenegen/scene_plan.h"
 #include "scenegen/smear.h"
+#include "scenegen/stage.h"
 #include "scenegen/tiles.h"
 #include "sim/world/skylight.h"
 
@@ -44,14 +45,15 @@ struct bst_renderer {
     bst_rolling *rolling; /* NULL: all rows are exposed at once */
     bst_frame_pool *pool;
     cl_mem law; /* of the stamps' profiles */
-    growing table, sources, nodes, block_box, source_box, group_box;
-    growing saturated, expected, background;
+    bst_stage *stage;
+    cl_mem sources, table; /* of the present frame; borrowed */
+    growing nodes, block_box, source_box, group_box, expected;
     bst_scene_plan plan;   /* of the latest request, or of its latest band */
     double *rolled_peak_e; /* of all sources, with the bands of a rolling shutter */
-    int rolled_capacity, tiles;
-    bool rolled;    /* the latest request */
-    bool map;       /* the background differs from pixel to pixel */
-    bool uncounted; /* saturated pixels of the latest frame */
+    int rolled_capacity, set;
+    int tiles[BST_STAGE_SETS]; /* whose saturated pixels are not counted yet */
+    bool rolled;               /* the latest request */
+    bool map;                  /* the background differs from pixel to pixel */
     long long saturated_pixels, saturated_frames;
     uint64_t most_bytes; /* of one buffer on the device */
     bst_render_stats stats;
@@ -107,22 +109,6 @@ static bst_status grow(bst_ctx *ctx, bst_renderer *r, growing *g, size_t bytes) 
         clCreateBuffer(r->context, CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR, room, NULL, &code);
     g->bytes = room;
     return bst_device_check(ctx, code, "allocating scene memory");
-}
-
-/* Copies through a mapping, which PoCL serves without a copy of its own. */
-static bst_status upload(bst_ctx *ctx, bst_renderer *r, growing *g, const void *data,
-                         size_t bytes) {
-    BST_TRY(grow(ctx, r, g, bytes));
-    if (bytes == 0) {
-        return BST_OK;
-    }
-    cl_int code;
-    void *p = clEnqueueMapBuffer(r->queue, g->buffer, CL_TRUE, CL_MAP_WRITE_INVALIDATE_REGION, 0,
-                                 bytes, 0, NULL, NULL, &code);
-    BST_TRY(bst_device_check(ctx, code, "mapping scene memory"));
-    memcpy(p, data, bytes);
-    return bst_device_check(ctx, clEnqueueUnmapMemObject(r->queue, g->buffer, p, 0, NULL, NULL),
-                            "unmapping scene memory");
 }
 
 /* The PSF, and the Fourier path where it is no Gaussian. */
@@ -196,6 +182,9 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     if (status == BST_OK) {
         status = bst_smear_create(ctx, camera, &smear, &r->smear);
     }
+    if (status == BST_OK) {
+        status = bst_stage_create(ctx, device, &r->stage);
+    }
     if (status == BST_OK && rolling) {
         double peak_px = r->fft_light ? bst_fft_light_band(r->fft_light)->share_sigma_px : sigma_px;
         status = bst_rolling_create(ctx, camera, smear.tolerance_sigma, peak_px, !r->fft_light,
@@ -219,15 +208,11 @@ void bst_renderer_free(bst_renderer *r) {
     }
     clFinish(r->queue);
     cl_mem buffers[] = {r->law,
-                        r->group_box.buffer,
-                        r->table.buffer,
-                        r->sources.buffer,
                         r->nodes.buffer,
                         r->block_box.buffer,
                         r->source_box.buffer,
-                        r->saturated.buffer,
-                        r->expected.buffer,
-                        r->background.buffer};
+                        r->group_box.buffer,
+                        r->expected.buffer};
     for (size_t i = 0; i < sizeof buffers / sizeof *buffers; i++) {
         if (buffers[i]) {
             clReleaseMemObject(buffers[i]);
@@ -242,6 +227,7 @@ void bst_renderer_free(bst_renderer *r) {
     if (r->program) {
         clReleaseProgram(r->program);
     }
+    bst_stage_free(r->stage);
     bst_frame_pool_free(r->pool);
     bst_smear_free(r->smear);
     bst_fft_light_free(r->fft_light);
@@ -258,8 +244,8 @@ void bst_renderer_free(bst_renderer *r) {
 
 /* Chooses nodes and stamps of all sources: fills plan and stats. */
 static bst_status make_plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q) {
-    BST_TRY(
-        bst_scene_plan_make(ctx, &r->plan, &r->camera, r->smear, r->fft_light, r->most_bytes, q));
+    BST_TRY(bst_scene_plan_make(ctx, &r->plan, &r->camera, r->smear, r->fft_light, r->most_bytes,
+                                bst_renderer_margin_px(r), q));
     r->stats = (bst_render_stats){.sources = r->plan.count,
                                   .nodes = (long long)r->plan.blocks * BST_BLOCK,
                                   .predicted_sigma = r->plan.predicted_sigma,
@@ -286,8 +272,10 @@ static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, const bst_scene_p
     const float *table = bst_smear_table(r->smear, &table_blocks);
     size_t groups = (size_t)p->source_groups, more = (groups + BST_BLOCK - 1) / BST_BLOCK;
     size_t block_bytes = BST_BLOCK * sizeof(float);
-    BST_TRY(upload(ctx, r, &r->table, table, (size_t)table_blocks * BST_TABLE_ROWS * block_bytes));
-    BST_TRY(upload(ctx, r, &r->sources, plan->sources, (size_t)count * sizeof *plan->sources));
+    BST_TRY(bst_stage_put(ctx, r->stage, BST_STAGE_TABLE, table,
+                          (size_t)table_blocks * BST_TABLE_ROWS * block_bytes, &r->table));
+    BST_TRY(bst_stage_put(ctx, r->stage, BST_STAGE_SOURCES, plan->sources,
+                          (size_t)count * sizeof *plan->sources, &r->sources));
     BST_TRY(grow(ctx, r, &r->block_box, (size_t)plan->boxes * BST_BLOCK * BST_BOX_BYTES));
     BST_TRY(grow(ctx, r, &r->source_box, groups * BST_BLOCK * BST_BOX_BYTES));
     BST_TRY(grow(ctx, r, &r->group_box, more * BST_BLOCK * BST_BOX_BYTES));
@@ -296,9 +284,9 @@ static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, const bst_scene_p
         return BST_OK;
     }
     const void *values[] = {p,
-                            &r->sources.buffer,
+                            &r->sources,
                             &count,
-                            &r->table.buffer,
+                            &r->table,
                             &r->block_box.buffer,
                             &r->source_box.buffer,
                             &r->group_box.buffer,
@@ -312,31 +300,38 @@ static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, const bst_scene_p
         "placing the scene's nodes");
 }
 
-/* Counts the saturated pixels of the latest frame, once. Waits for it. */
-static bst_status count_saturated(bst_ctx *ctx, bst_renderer *r) {
-    if (!r->uncounted) {
+/* Counts the saturated pixels of the frame that used a set, once. Waits for it. */
+static bst_status count_saturated(bst_ctx *ctx, bst_renderer *r, int set) {
+    int tiles = r->tiles[set];
+    const void *counts;
+    if (tiles == 0) {
         return BST_OK;
     }
-    r->uncounted = false;
+    r->tiles[set] = 0;
     r->saturated_pixels = 0;
-    cl_int code;
-    size_t bytes = (size_t)r->tiles * sizeof(cl_int);
-    cl_int *p = clEnqueueMapBuffer(r->queue, r->saturated.buffer, CL_TRUE, CL_MAP_READ, 0, bytes, 0,
-                                   NULL, NULL, &code);
-    BST_TRY(bst_device_check(ctx, code, "mapping the count of saturated pixels"));
-    for (int i = 0; i < r->tiles; i++) {
-        r->saturated_pixels += p[i];
+    BST_TRY(bst_stage_result(ctx, r->stage, set, BST_STAGE_SATURATED, &counts));
+    for (int i = 0; i < tiles; i++) {
+        r->saturated_pixels += ((const cl_int *)counts)[i];
     }
     r->saturated_frames += r->saturated_pixels > 0;
-    return bst_device_check(
-        ctx, clEnqueueUnmapMemObject(r->queue, r->saturated.buffer, p, 0, NULL, NULL),
-        "unmapping the count of saturated pixels");
+    return BST_OK;
+}
+
+/* Room for the frame's counts. */
+static bst_status saturated_room(bst_ctx *ctx, bst_renderer *r, size_t tiles, cl_mem *out) {
+    return bst_stage_room(ctx, r->stage, BST_STAGE_SATURATED, tiles * sizeof(cl_int), out);
+}
+
+/* Takes the next set of what goes with a frame; another frame may be under way. */
+static bst_status begin_set(bst_ctx *ctx, bst_renderer *r) {
+    r->set = bst_stage_begin(r->stage);
+    return count_saturated(ctx, r, r->set);
 }
 
 /* The image that the tile kernel takes its light from, where the PSF is no Gaussian. */
 static bst_status make_light(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
                              bst_scene_params *p, cl_mem *light) {
-    bst_fft_light_nodes nodes = {r->sources.buffer, r->nodes.buffer, r->block_box.buffer,
+    bst_fft_light_nodes nodes = {r->sources, r->nodes.buffer, r->block_box.buffer,
                                  r->source_box.buffer, p->source_groups};
     bst_fft_light_image image;
     BST_TRY(bst_fft_light_render(ctx, r->fft_light, r->queue, q->window, &nodes, &image));
@@ -348,8 +343,8 @@ static bst_status make_light(bst_ctx *ctx, bst_renderer *r, const bst_render_req
 
 /* Where an image goes. */
 typedef struct target {
-    cl_kernel kernel; /* NULL: sources are only planned */
-    cl_mem out;
+    cl_kernel kernel;          /* NULL: sources are only planned */
+    cl_mem out, saturated;     /* the second NULL: of an image of expected electrons */
     int stride;                /* floats between the rows of `out`, 0: no gaps */
     bool light_only;           /* without background */
     int first_row, first_tile; /* of a band */
@@ -362,7 +357,6 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
     if (!to->kernel) {
         return BST_OK;
     }
-    BST_TRY(count_saturated(ctx, r)); /* of the frame before, which was rendered meanwhile */
     bst_scene_params p = bst_render_params(&r->camera, &r->options, q, r->plan.count);
     BST_TRY(enqueue_nodes(ctx, r, &p));
     p.image_stride = to->stride > 0 ? to->stride : p.image_stride;
@@ -370,8 +364,9 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
     p.first_row = to->first_row;
     p.first_tile = to->first_tile;
     size_t tiles = (size_t)p.tiles_x * (size_t)p.tiles_y;
-    r->tiles = to->first_tile + (int)tiles;
-    BST_TRY(grow(ctx, r, &r->saturated, (size_t)r->tiles * sizeof(cl_int)));
+    if (to->saturated) {
+        r->tiles[r->set] = to->first_tile + (int)tiles;
+    }
     cl_mem light = r->law;
     if (r->fft_light) {
         BST_TRY(make_light(ctx, r, q, &p, &light));
@@ -380,14 +375,14 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
     bst_detector_buffers(r->detector, maps);
     cl_kernel kernel = to->kernel;
     const void *values[] = {&p,
-                            &r->sources.buffer,
-                            &r->table.buffer,
+                            &r->sources,
+                            &r->table,
                             &r->block_box.buffer,
                             &r->source_box.buffer,
                             &r->group_box.buffer,
                             &light,
                             &to->out,
-                            &r->saturated.buffer,
+                            &to->saturated,
                             &maps[0],
                             &maps[1],
                             &maps[2],
@@ -399,9 +394,9 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
     if (r->map) {
         const bst_skylight_map *map = bst_render_background(q);
         size_t size = (size_t)map->columns * (size_t)map->rows * sizeof *map->e;
-        BST_TRY(upload(ctx, r, &r->background, map->e, size));
-        BST_TRY(bst_device_check(ctx,
-                                 clSetKernelArg(kernel, (cl_uint)count, m, &r->background.buffer),
+        cl_mem nodes;
+        BST_TRY(bst_stage_put(ctx, r->stage, BST_STAGE_BACKGROUND, map->e, size, &nodes));
+        BST_TRY(bst_device_check(ctx, clSetKernelArg(kernel, (cl_uint)count, m, &nodes),
                                  "setting a kernel argument"));
     }
     size_t group = (size_t)r->options.group, global = (tiles + group - 1) / group * group;
@@ -414,6 +409,12 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
 static bst_status enqueue_image(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
                                 target to) {
     r->rolled = q->row_time_s != 0.0;
+    if (to.kernel == r->frame_kernel) { /* room for the tiles of all bands */
+        size_t across = (size_t)q->window.width / (size_t)r->options.tile_width + 2;
+        size_t rows = (size_t)(r->rolled ? 1 : r->options.tile_height);
+        size_t down = ((size_t)q->window.height + rows - 1) / rows;
+        BST_TRY(saturated_room(ctx, r, across * down, &to.saturated));
+    }
     if (!r->rolled) {
         return enqueue_tiles(ctx, r, q, &to);
     }
@@ -428,12 +429,6 @@ static bst_status enqueue_image(bst_ctx *ctx, bst_renderer *r, const bst_render_
     for (int i = 0; i < q->count; i++) {
         r->rolled_peak_e[i] = 0.0;
     }
-    if (to.kernel) {
-        /* room for the tiles of all bands, which must not move while they are written */
-        size_t across = (size_t)q->window.width / (size_t)r->options.tile_width + 2;
-        BST_TRY(count_saturated(ctx, r));
-        BST_TRY(grow(ctx, r, &r->saturated, across * (size_t)q->window.height * sizeof(cl_int)));
-    }
     bst_render_stats all = {.single_kernel = true};
     bool more;
     BST_TRY(bst_rolling_begin(ctx, r->rolling, q, bst_renderer_margin_px(r)));
@@ -444,7 +439,7 @@ static bst_status enqueue_image(bst_ctx *ctx, bst_renderer *r, const bst_render_
         }
         to.first_row = band.window.y0 - q->window.y0;
         BST_TRY(enqueue_tiles(ctx, r, &band, &to));
-        to.first_tile = r->tiles;
+        to.first_tile = to.saturated ? r->tiles[r->set] : 0;
         all.single_kernel = all.single_kernel && r->stats.single_kernel;
         all.predicted_sigma = fmax(all.predicted_sigma,
                                    r->stats.predicted_sigma + bst_rolling_error_sigma(r->rolling));
@@ -478,11 +473,12 @@ static bst_status render_in_stages(bst_ctx *ctx, bst_renderer *r, const bst_rend
         ctx, r, &light,
         (target){
             .kernel = r->expected_kernel, .out = image, .stride = stride, .light_only = true}));
-    r->tiles = q->window.height / binning;
-    BST_TRY(grow(ctx, r, &r->saturated, (size_t)r->tiles * sizeof(cl_int)));
+    int rows = q->window.height / binning;
+    cl_mem saturated;
+    BST_TRY(saturated_room(ctx, r, (size_t)rows, &saturated));
+    r->tiles[r->set] = rows;
     bst_scene_params p = bst_render_params(&r->camera, &r->options, q, 0);
-    return bst_readout_run(ctx, r->readout, r->detector, &p, q->window, binning, frame,
-                           r->saturated.buffer);
+    return bst_readout_run(ctx, r->readout, r->detector, &p, q->window, binning, frame, saturated);
 }
 
 bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *r, const bst_render_request *request,
@@ -495,8 +491,11 @@ bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *r, const bst_render_r
     BST_TRY(bst_frame_pool_take(ctx, r->pool, request->window.width / binning,
                                 request->window.height / binning, &frame, &buffer));
     double exposure_s = bst_render_exposure_s(request);
-    bst_status status =
-        bst_detector_begin(ctx, r->detector, request->key, request->exposure_id, exposure_s);
+    bst_status status = begin_set(ctx, r);
+    if (status == BST_OK) {
+        status = bst_detector_begin(ctx, r->detector, r->stage, request->key, request->exposure_id,
+                                    exposure_s);
+    }
     if (status == BST_OK) {
         status = binning > 1 || bst_detector_whole_columns(r->detector)
                      ? render_in_stages(ctx, r, request, binning, buffer)
@@ -504,16 +503,19 @@ bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *r, const bst_render_r
                                      (target){.kernel = r->frame_kernel, .out = buffer});
     }
     if (status == BST_OK) {
-        r->uncounted = true;
         status = bst_frame_pool_enqueued(ctx, frame);
     }
     if (status == BST_OK) {
         status = bst_detector_end(ctx, r->detector);
     }
     if (status == BST_OK) {
+        status = bst_stage_end(ctx, r->stage);
+    }
+    if (status == BST_OK) {
         status = bst_device_check(ctx, clFlush(r->queue), "starting the rendering");
     }
     if (status != BST_OK) {
+        r->tiles[r->set] = 0;
         bst_frame_release(frame);
         return status;
     }
@@ -529,8 +531,10 @@ bst_status bst_renderer_render_noise_free(bst_ctx *ctx, bst_renderer *r,
     BST_TRY(bst_render_request_check(ctx, &r->camera, request));
     size_t bytes = (size_t)request->window.width * (size_t)request->window.height * sizeof(float);
     BST_TRY(grow(ctx, r, &r->expected, bytes));
+    BST_TRY(begin_set(ctx, r));
     BST_TRY(enqueue_image(ctx, r, request,
                           (target){.kernel = r->expected_kernel, .out = r->expected.buffer}));
+    BST_TRY(bst_stage_end(ctx, r->stage));
     return bst_device_check(
         ctx,
         clEnqueueReadBuffer(r->queue, r->expected.buffer, CL_TRUE, 0, bytes, image, 0, NULL, NULL),
@@ -538,7 +542,9 @@ bst_status bst_renderer_render_noise_free(bst_ctx *ctx, bst_renderer *r,
 }
 
 bst_status bst_renderer_saturated(bst_ctx *ctx, bst_renderer *r, long long *pixels) {
-    BST_TRY(count_saturated(ctx, r));
+    for (int i = 1; i <= BST_STAGE_SETS; i++) { /* the latest last */
+        BST_TRY(count_saturated(ctx, r, (r->set + i) % BST_STAGE_SETS));
+    }
     *pixels = r->saturated_pixels;
     return BST_OK;
 }

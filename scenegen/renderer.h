@@ -90,8 +90,8 @@ bst_status bst_renderer_render_noise_free(bst_ctx *ctx, bst_renderer *renderer,
 /* Pixels of the latest frame with a full well or the highest digital number. Waits for it. */
 bst_status bst_renderer_saturated(bst_ctx *ctx, bst_renderer *renderer,
                                   long long *pixels) BST_MUST_CHECK;
-/* Frames with such a pixel so far, without the latest unless bst_renderer_saturated has been asked.
- * Does not wait. */
+/* Frames with such a pixel so far, without the latest two (BST_STAGE_SETS) unless
+ * bst_renderer_saturated has been asked. Does not wait. */
 long long bst_renderer_saturated_frames(const bst_renderer *renderer);
 
 void bst_renderer_get_stats(const bst_renderer *renderer, bst_render_stats *out);

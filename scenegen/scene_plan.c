@@ -44,7 +44,7 @@ static void put_in_order(bst_scene_plan *p, const bst_camera *camera) {
 
 bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera *camera,
                                bst_smear *smear, const bst_fft_light *fft_light,
-                               uint64_t most_bytes, const bst_render_request *q) {
+                               uint64_t most_bytes, double margin_px, const bst_render_request *q) {
     double read = camera->read_noise_e, brightest = 0.0;
     BST_TRY(reserve(ctx, p, q->count));
     for (int i = 0; i < q->count; i++) {
@@ -52,7 +52,8 @@ bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera
     }
     double least_e = q->background_e + (q->background ? q->background->least_e : 0.0);
     double dark_sigma_e = sqrt(q->background_e + read * read);
-    BST_TRY(bst_smear_begin(ctx, smear, q->track, least_e + read * read, brightest));
+    bst_smear_frame frame = {q->track, q->window, margin_px, least_e + read * read, brightest};
+    BST_TRY(bst_smear_begin(ctx, smear, &frame));
     const uint64_t counted = (uint64_t)INT32_MAX * sizeof(float); /* by the kernels, in int */
     uint64_t most = most_bytes < counted ? most_bytes : counted;
     /* two blocks have a whole group of boxes */

@@ -19,10 +19,10 @@ typedef struct bst_scene_plan {
 
 /* Plans a request with a smear, which is begun for it. fft_light: the Fourier path, or NULL where
  * stamps are drawn. most_bytes: of one buffer on the device; BST_ERR_RANGE when the nodes would
- * need more. */
+ * need more. margin_px: reach of the light of a source. */
 bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *plan, const bst_camera *camera,
                                bst_smear *smear, const bst_fft_light *fft_light,
-                               uint64_t most_bytes,
+                               uint64_t most_bytes, double margin_px,
                                const bst_render_request *request) BST_MUST_CHECK;
 
 /* Frees what the plan holds. */

@@ -52,8 +52,8 @@ static bst_status measure(bst_ctx *ctx, sweep *s, const bst_renderer_options *op
     bst_renderer *renderer;
     *out = bst_bench_nothing(s->name);
     BST_TRY(bst_renderer_create(ctx, s->device, &s->view.camera, options, &renderer));
-    bst_status status =
-        bst_bench_view_time(ctx, renderer, &s->timed, s->view.count > LARGE ? 3 : FRAMES, out);
+    bst_status status = bst_bench_view_time(ctx, renderer, &s->timed,
+                                            s->view.count > LARGE ? 3 : FRAMES, false, out);
     if (status == BST_OK) {
         status = bst_bench_truth_compare(ctx, renderer, &s->truth, faintest_e_per_s, out);
     }
