@@ -10,6 +10,7 @@
 #include "scenegen/detector.h"
 #include "scenegen/fft_light.h"
 #include "scenegen/frame_pool.h"
+#include "scenegen/place.h"
 #include "scenegen/profile_table.h"
 #include "scenegen/readout.h"
 #include "scenegen/reference.h"
@@ -17,7 +18,7 @@
 #include "scenegen/tiles.h"
 #include "scenegen/vignetting.h"
 
-enum { MAX_TAPS = 512, BOX_FLOATS = 4 };
+enum { MAX_TAPS = BST_PLACE_TAPS, BOX_FLOATS = 4 };
 /* Of a block of nodes: place and weight. */
 enum { NODE_BYTES = BST_BLOCK * BST_NODE_ROWS * (int)sizeof(float) };
 
@@ -84,11 +85,12 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
         &bst_kernel_random,       &bst_kernel_detector, &bst_kernel_light,
         &bst_kernel_vignetting,   &bst_kernel_tile,     &bst_kernel_readout};
     char options[2048];
-    int length = snprintf(options, sizeof options,
-                          "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d "
-                          "-DPHASES=%d%s",
-                          r->options.tile_width, r->options.tile_height, r->options.group, r->taps,
-                          r->phases, r->fft_light ? " -DFFT_LIGHT" : "");
+    int length =
+        snprintf(options, sizeof options,
+                 "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d "
+                 "-DPHASES=%d -DPLACE_BITS=%d%s",
+                 r->options.tile_width, r->options.tile_height, r->options.group, r->taps,
+                 r->phases, bst_place_bits(&r->camera), r->fft_light ? " -DFFT_LIGHT" : "");
     length += bst_vignetting_options(&r->camera, options + length, sizeof options - (size_t)length);
     length += bst_detector_options(r->detector, options + length, sizeof options - (size_t)length);
     if (r->options.spatial_oversample > 0) {
@@ -371,14 +373,11 @@ static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, int blocks, int *
     if (count == 0) {
         return BST_OK;
     }
-    float centre_x = (float)bst_camera_centre_x(&r->camera);
-    float centre_y = (float)bst_camera_centre_y(&r->camera);
-    const void *values[] = {
-        &r->sources.buffer, &count,           &r->table.buffer,     &centre_x,
-        &centre_y,          &r->nodes.buffer, &r->block_box.buffer, &r->source_box.buffer};
-    const size_t m = sizeof(cl_mem), f = sizeof(float);
-    const size_t bytes[] = {m, sizeof count, m, f, f, m, m, m};
-    BST_TRY(set_args(ctx, r->nodes_kernel, values, bytes, 8));
+    const void *values[] = {&r->sources.buffer,   &count,
+                            &r->table.buffer,     &r->nodes.buffer,
+                            &r->block_box.buffer, &r->source_box.buffer};
+    const size_t m = sizeof(cl_mem), bytes[] = {m, sizeof count, m, m, m, m};
+    BST_TRY(set_args(ctx, r->nodes_kernel, values, bytes, 6));
     size_t global = (size_t)*groups * BST_BLOCK, local = BST_BLOCK;
     return bst_device_check(
         ctx,

@@ -5,6 +5,7 @@
 
 #include "scenegen/motion.h"
 #include "scenegen/nodes.h"
+#include "scenegen/place.h"
 #include "scenegen/reference.h"
 #include "scenegen/shape.h"
 
@@ -15,7 +16,7 @@
 #define SINGLE_SHARE 0.1
 
 /* Fidelities: level n is right to about 0.08 * 2^-n of the smeared image's peak. */
-enum { LEVELS = 14, TABLE_FLOATS = BST_TABLE_ROWS * BST_BLOCK, MAX_TAPS = 512 };
+enum { LEVELS = 14, TABLE_FLOATS = BST_TABLE_ROWS * BST_BLOCK, MAX_TAPS = BST_PLACE_TAPS };
 /* Stretches of the path of a source whose brightness changes. */
 enum { RATE_PARTS = 512 };
 
@@ -32,12 +33,14 @@ struct bst_smear {
     double kept[MAX_TAPS / 2]; /* light within the two nearest pixels and r more on each side */
     double tolerance[LEVELS];
     double half_diagonal_px;
-    double stretch; /* of the image by distortion where it is greatest */
+    double stretch;             /* of the image by distortion where it is greatest */
+    double far_px, place_parts; /* see place.h */
 
     bst_los_track track;
     double dark_variance_e2, duration_s;
     bst_quat q_reference;
     double star_share; /* largest share of a star's light on one pixel */
+    double travel_px;  /* largest distance of a node from its source's place */
     bool single;       /* stars share one track */
     double spread_px;  /* by which stars in the corners move otherwise */
     double last_peak_e, last_error_sigma;
@@ -90,6 +93,8 @@ bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
         s->tolerance[n] = 0.08 * pow(2.0, -n);
     }
     s->stretch = bst_camera_stretch(camera);
+    s->far_px = bst_place_far_px(camera);
+    s->place_parts = ldexp(1.0, bst_place_bits(camera));
     s->half_diagonal_px =
         tan(bst_camera_half_diagonal_rad(camera)) / bst_camera_scale_rad(camera) * s->stretch;
     if (!camera->geometry.general) {
@@ -296,6 +301,7 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_los_track *trac
     s->duration_s = track->time_s[track->count - 1];
     s->q_reference = attitude_at(track, 0.5 * s->duration_s);
     s->table_blocks = s->path_count = 0;
+    s->travel_px = 0.0;
     for (int n = 0; n < LEVELS; n++) {
         s->levels[n].blocks = 0;
     }
@@ -309,7 +315,9 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_los_track *trac
             bst_quat q =
                 bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
             double t = track->time_s[k] + u * (track->time_s[k + 1] - track->time_s[k]);
-            s->path[s->path_count++] = attitude_point(s, q, t * inverse);
+            bst_path_point *p = &s->path[s->path_count++];
+            *p = attitude_point(s, q, t * inverse);
+            s->travel_px = fmax(s->travel_px, fabs(p->p[0]) + fabs(p->p[1]) + fabs(p->p[2]));
         }
     }
     choose_motion(s, brightest_e_per_s);
@@ -367,8 +375,7 @@ static bool project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, doubl
 /* Light further than this from the boresight (px, without distortion) stays off the sensor: the
  * PSF's table ends before. */
 static double far_px(const bst_smear *s) {
-    return tan(bst_camera_half_diagonal_rad(&s->camera)) / bst_camera_scale_rad(&s->camera) +
-           MAX_TAPS / bst_camera_shrink(&s->camera) + s->disc_px;
+    return s->far_px + s->disc_px;
 }
 
 /* How many chords the curved motion over the image wants: of a parabola they miss
@@ -516,9 +523,10 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
     }
     level own;
     const level *used;
+    double travel_px = s->travel_px;
     if (moving) {
         /* nodes are kept as small floats relative to a place on the sensor */
-        double far = far_px(s);
+        double far = s->far_px;
         x = front ? fmin(fmax(x, -far), far) : 0.0;
         y = front ? fmin(fmax(y, -far), far) : 0.0;
         int count;
@@ -543,6 +551,11 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
             *visible = false;
             return BST_OK;
         }
+        travel_px = 0.0;
+        for (int n = 0; n < s->nodes.count; n++) {
+            const double *p = s->nodes.items[n].p;
+            travel_px = fmax(travel_px, fabs(p[0]) + fabs(p[1]));
+        }
         BST_TRY(append_nodes(ctx, s, &s->nodes, shift_to_table, &own));
         used = &own;
     } else {
@@ -555,10 +568,9 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
     double sigmas = s->last_peak_e / sqrt(s->last_peak_e + s->dark_variance_e2);
     double lost = 1.0 - s->kept[radius] * s->kept[radius];
     int border = radius + 1 < MAX_TAPS / 2 ? radius + 1 : radius;
-    /* places in float, rounded twice, where the image is steepest */
-    double extent = fmax((double)s->camera.width_px, (double)s->camera.height_px);
-    double rounded = 1.5 * 0x1p-24 * extent * 0.4 / s->sigma_px * s->last_peak_e /
-                     sqrt(0.5 * s->last_peak_e + s->dark_variance_e2);
+    /* places in parts of a pixel, the way to the node in float, and some additions of light */
+    double parts = s->place_parts;
+    double rounded = (0.86 / s->sigma_px * (1.0 / parts + 0x1p-24 * travel_px) + 0x1p-22) * sigmas;
     double shared = s->single && !moving ? single_error(s, s->last_peak_e, hypot(x, y)) : 0.0;
     s->last_error_sigma = fmax((used->error + lost) * sigmas + shared + rounded,
                                s->last_peak_e * s->tail[border] / sqrt(s->dark_variance_e2));
@@ -569,6 +581,8 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
     electrons /= s->kept[radius] * s->kept[radius];
     *out = (bst_scene_source){.x_px = (float)x,
                               .y_px = (float)y,
+                              .place_x = (int)lrint((x + bst_camera_centre_x(&s->camera)) * parts),
+                              .place_y = (int)lrint((y + bst_camera_centre_y(&s->camera)) * parts),
                               .electrons = (float)electrons,
                               .first_table = used->first_block,
                               .blocks = used->blocks,

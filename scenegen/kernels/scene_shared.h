@@ -4,8 +4,8 @@
 
 /* Nodes travel in blocks of this many, one vector register. */
 #define BST_BLOCK 16
-/* The profile table holds the PSF widened by (n / BST_WIDTHS)^2 BST_WIDEST of its own variance, n from
- * 0 to BST_WIDTHS. Between widths it is interpolated linearly in the variance, between which a
+/* The profile table holds the PSF widened by (n / BST_WIDTHS)^2 BST_WIDEST of its own variance, n
+ * from 0 to BST_WIDTHS. Between widths it is interpolated linearly in the variance, between which a
  * Gaussian's peak goes as the square root of its inverse: on each axis that misses
  * 3/8 w / BST_WIDTHS^2 / (1 + w)^2 of the peak for a widening by w variances. */
 #define BST_WIDTHS 32
@@ -15,8 +15,12 @@
 /* Floats per node of a node table: the homography from the reference attitude's tangent plane to
  * the node's, as nine coefficients, then the weight and the widening in PSF variances. */
 #define BST_TABLE_ROWS 11
-/* Vectors per block of the frame's nodes: x, y, electrons, place in the table's widths. */
+/* Vectors per block of the frame's nodes: x, y, electrons, place in the table's widths. x and y are
+ * integers, sensor pixels times 2^PLACE_BITS: floats would be rounded by up to 1e-4 px. */
 #define BST_NODE_ROWS 4
+/* Places from the boresight stay below this many parts of a pixel, so that sums of two fit an int.
+ */
+#define BST_PLACE_LIMIT (1 << 29)
 
 /* 32-bit members only, so that both languages lay it out alike. */
 typedef struct bst_scene_params {
@@ -37,7 +41,7 @@ typedef struct bst_scene_params {
     float offset_dn;
     float max_dn;
     int light_first, light_pitch; /* of the Fourier path's image, floats */
-    int image_stride; /* of the image of expected electrons, floats */
+    int image_stride;             /* of the image of expected electrons, floats */
     int light_y0, light_height,
         light_stride; /* of the image that is read out: sensor row, rows, floats */
     int binning;
@@ -45,10 +49,11 @@ typedef struct bst_scene_params {
 
 /* One source on its way to its nodes. */
 typedef struct bst_scene_source {
-    float x_px, y_px; /* at the reference attitude, from the boresight, without distortion */
-    float electrons;  /* in the exposure */
-    int first_table;  /* block of the node table */
-    int first_block;  /* block of the frame's nodes */
+    float x_px, y_px;     /* at the reference attitude, from the boresight, without distortion */
+    int place_x, place_y; /* the same on the sensor, px times 2^PLACE_BITS */
+    float electrons;      /* in the exposure */
+    int first_table;      /* block of the node table */
+    int first_block;      /* block of the frame's nodes */
     int blocks;
     int radius; /* the stamp reaches this far beyond the two nearest pixels of a node */
 } bst_scene_source;

@@ -51,11 +51,14 @@ typedef struct splat_nodes {
  * n + j - (HALF - 1). profiles: [BST_WIDTHS + 1][PHASES + 1][ROW], zeros before and after the taps. */
 static void place_nodes(global const float *block, int tile_x, int tile_y, int radius,
                         splat_nodes *out) {
-    float16 x = vload16(0, block), y = vload16(1, block), width = vload16(3, block);
-    float16 floor_x = floor(x), floor_y = floor(y);
-    *(int16 *)out->left = convert_int16(floor_x) - radius - tile_x;
-    *(int16 *)out->top = convert_int16(floor_y) - radius - tile_y;
-    float16 phase_x = (x - floor_x) * PHASES, phase_y = (y - floor_y) * PHASES;
+    const int rest = (1 << PLACE_BITS) - 1;
+    const float phases = (float)PHASES / (float)(1 << PLACE_BITS);
+    int16 x = as_int16(vload16(0, block)), y = as_int16(vload16(1, block));
+    float16 width = vload16(3, block);
+    *(int16 *)out->left = (x >> PLACE_BITS) - radius - tile_x;
+    *(int16 *)out->top = (y >> PLACE_BITS) - radius - tile_y;
+    float16 phase_x = convert_float16(x & rest) * phases;
+    float16 phase_y = convert_float16(y & rest) * phases;
     int16 px = min(convert_int16(phase_x), PHASES - 1);
     int16 py = min(convert_int16(phase_y), PHASES - 1);
     int16 level = min(convert_int16(width), BST_WIDTHS - 1);

@@ -267,6 +267,41 @@ static void stamps_and_tables_as_asked(void **state) {
     close_scene(&s);
 }
 
+/* A star in the corner of a large sensor lies where it should to 2^-17 px and what float sums of a
+ * stamp's pixels add, 1e-6 px; as floats, places there would be up to 1.2e-4 px off. */
+static void places_far_from_the_origin(void **state) {
+    fixture *f = *state;
+    const scene_motion still = {.duration_s = 1, .samples = 2};
+    bst_camera camera = scene_camera(2048, 2048);
+    camera.psf_fwhm_px = 3.0;
+    bst_renderer_options options = bst_renderer_default_options();
+    options.psf_phases = 1024;
+    bst_renderer *r;
+    bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, &camera, &options, &r));
+    scene_track track = scene_track_make(&camera, &still);
+    enum { SIDE = 40, STARS = 40 };
+    for (int i = 0; i < STARS; i++) {
+        double x = 2020.0 + 0.0137 * i, y = 2017.5 + 0.0211 * i;
+        bst_source star = scene_star(&camera, x, y, 1e6);
+        bst_render_request q = {.window = {2000, 1998, SIDE, SIDE},
+                                .track = &track.track,
+                                .sources = &star,
+                                .count = 1};
+        float image[SIDE * SIDE];
+        bst_assert_ok(&f->ctx, bst_renderer_render_noise_free(&f->ctx, r, &q, image));
+        double sum = 0.0, mx = 0.0, my = 0.0;
+        for (int k = 0; k < SIDE * SIDE; k++) {
+            sum += image[k];
+            mx += image[k] * (2000 + k % SIDE - x);
+            my += image[k] * (1998 + k / SIDE - y);
+        }
+        bst_assert_close(mx / sum, 0.0, 1e-5);
+        bst_assert_close(my / sum, 0.0, 1e-5);
+    }
+    scene_track_free(&track);
+    bst_renderer_free(r);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(predicted_errors_hold),
@@ -275,6 +310,7 @@ int main(void) {
         cmocka_unit_test(equal_parts_converge),
         cmocka_unit_test(parts_of_a_pixel_converge),
         cmocka_unit_test(stamps_and_tables_as_asked),
+        cmocka_unit_test(places_far_from_the_origin),
     };
     return cmocka_run_group_tests(tests, open_device, close_device);
 }
