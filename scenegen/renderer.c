@@ -39,6 +39,7 @@ struct bst_renderer {
     bst_psf *psf;
     bst_fft_light *fft_light; /* NULL: the PSF is a Gaussian, light comes from stamps */
     bst_smear *smear;
+    bst_crowd *crowd;
     bst_detector *detector;
     bst_readout *readout;
     bst_frame_pool *pool;
@@ -220,6 +221,9 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
         status = bst_smear_create(ctx, camera, &smear, &r->smear);
     }
     if (status == BST_OK) {
+        status = bst_crowd_create(ctx, &r->crowd);
+    }
+    if (status == BST_OK) {
         status = bst_frame_pool_create(ctx, device, (int)camera->width_px, (int)camera->height_px,
                                        r->options.pool_frames, &r->pool);
     }
@@ -255,6 +259,7 @@ void bst_renderer_free(bst_renderer *r) {
     }
     bst_frame_pool_free(r->pool);
     bst_smear_free(r->smear);
+    bst_crowd_free(r->crowd);
     bst_fft_light_free(r->fft_light);
     bst_psf_free(r->psf);
     bst_readout_free(r->readout);
@@ -308,7 +313,10 @@ static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *
     for (int i = 0; i < q->count; i++) {
         brightest = q->sources[i].path ? brightest : fmax(brightest, q->sources[i].electrons_per_s);
     }
-    BST_TRY(bst_smear_begin(ctx, r->smear, q->track, q->background_e + read * read, brightest));
+    double dark_e2 = fmax(q->background_e + read * read, 1e-2);
+    BST_TRY(bst_smear_begin(ctx, r->smear, q->track, dark_e2, brightest));
+    bst_crowd_motion motion = bst_smear_motion(r->smear);
+    bst_crowd_begin(r->crowd, &motion);
     r->stats = (bst_render_stats){0};
     *blocks = 0;
     const uint64_t counted = (uint64_t)INT32_MAX * sizeof(float); /* by the kernels, in int */
@@ -333,20 +341,16 @@ static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *
             s->first_block = *blocks;
             *blocks += s->blocks;
             r->stats.sources++;
-            double grid = 0.0; /* error of the Fourier path's grid, on dark pixels */
-            if (r->fft_light) {
-                grid = bst_fft_light_error(r->fft_light) * r->peak_e[i] /
-                       sqrt(q->background_e + read * read);
+            bst_crowd_source error = *bst_smear_last_error(r->smear);
+            if (r->fft_light) { /* of its grid, on dark pixels too */
+                double grid_e = bst_fft_light_error(r->fft_light) * r->peak_e[i];
+                error.excess_e += (float)(grid_e * sqrt(1.0 + r->peak_e[i] / dark_e2));
             }
-            r->stats.predicted_sigma =
-                fmax(r->stats.predicted_sigma, bst_smear_last_error_sigma(r->smear) + grid);
+            BST_TRY(bst_crowd_add(ctx, r->crowd, &error));
         }
     }
     r->stats.nodes = (long long)*blocks * BST_BLOCK;
     r->stats.single_kernel = bst_smear_single(r->smear);
-    if (r->options.temporal_oversample > 0 || r->options.spatial_oversample > 0) {
-        r->stats.predicted_sigma = NAN;
-    }
     return BST_OK;
 }
 
@@ -576,7 +580,9 @@ long long bst_renderer_saturated_frames(const bst_renderer *r) {
 }
 
 void bst_renderer_get_stats(const bst_renderer *r, bst_render_stats *out) {
+    bool foreseen = r->options.temporal_oversample <= 0 && r->options.spatial_oversample <= 0;
     *out = r->stats;
+    out->predicted_sigma = foreseen ? bst_crowd_error_sigma(r->crowd) : NAN;
 }
 
 double bst_renderer_peak_e(const bst_renderer *r, int index) {

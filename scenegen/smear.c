@@ -8,6 +8,7 @@
 #include "scenegen/place.h"
 #include "scenegen/reference.h"
 #include "scenegen/shape.h"
+#include "scenegen/stamp.h"
 
 /* Shares of the tolerance: for nodes, for the border of the stamp, and for a track that stars
  * share. */
@@ -29,8 +30,7 @@ struct bst_smear {
     bst_camera camera;
     bst_smear_options options;
     double sigma_px, share_sigma_px, widest;
-    double tail[MAX_TAPS / 2]; /* profile at r px from the centre, over the centre's */
-    double kept[MAX_TAPS / 2]; /* light within the two nearest pixels and r more on each side */
+    bst_stamp stamp;
     double tolerance[LEVELS];
     double half_diagonal_px;
     double stretch;             /* of the image by distortion where it is greatest */
@@ -43,7 +43,8 @@ struct bst_smear {
     double travel_px;  /* largest distance of a node from its source's place */
     bool single;       /* stars share one track */
     double spread_px;  /* by which stars in the corners move otherwise */
-    double last_peak_e, last_error_sigma;
+    double last_peak_e;
+    bst_crowd_source last_error;
     level levels[LEVELS];
 
     bst_path_point *path, *own_path;
@@ -54,18 +55,6 @@ struct bst_smear {
     float *table;
     int table_blocks, table_capacity;
 };
-
-/* Mean over the sub-pixel phases of a profile's light on its two nearest pixels and r more on each
- * side. */
-static double kept_light(double sigma_px, int r) {
-    enum { PHASES = 16 };
-    double sum = 0.0, scale = 1.0 / (sigma_px * sqrt(2.0));
-    for (int k = 0; k < PHASES; k++) {
-        double f = (k + 0.5) / PHASES;
-        sum += 0.5 * (erf((r + 1.5 - f) * scale) + erf((r + 0.5 + f) * scale));
-    }
-    return sum / PHASES;
-}
 
 bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
                             const bst_smear_options *options, bst_smear **out) {
@@ -80,15 +69,7 @@ bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
         options->node_sigma_px > 0.0 ? options->node_sigma_px : bst_camera_psf_sigma_px(camera);
     s->widest = options->widest > 0.0 ? options->widest : BST_NODE_WIDEST;
     s->share_sigma_px = options->share_sigma_px > 0.0 ? options->share_sigma_px : s->sigma_px;
-    double centre = bst_reference_pixel_share(0.0, s->sigma_px, 0);
-    for (int r = 0; r < MAX_TAPS / 2; r++) {
-        s->tail[r] = bst_reference_pixel_share(0.0, s->sigma_px, r) / centre;
-        s->kept[r] = kept_light(s->sigma_px, r);
-        if (options->node_sigma_px > 0.0) { /* no stamp leaves light out */
-            s->tail[r] = 0.0;
-            s->kept[r] = 1.0;
-        }
-    }
+    bst_stamp_init(&s->stamp, s->sigma_px, options->node_sigma_px > 0.0);
     for (int n = 0; n < LEVELS; n++) {
         s->tolerance[n] = 0.08 * pow(2.0, -n);
     }
@@ -340,17 +321,11 @@ static int choose_level(bst_smear *s, double peak_e) {
     return n;
 }
 
-/* Rows beyond the two nearest pixels: what lies outside stays under the cut. */
 static int choose_radius(const bst_smear *s, double peak_e) {
     double limit = CUT_SHARE * s->options.tolerance_sigma * sqrt(s->dark_variance_e2);
-    int most = s->options.taps / 2 - 1, r = 1;
-    if (s->options.stamp_radius_px > 0) {
-        return s->options.stamp_radius_px < most ? s->options.stamp_radius_px : most;
-    }
-    while (r < most && peak_e * s->tail[r + 1] > limit) {
-        r++;
-    }
-    return r;
+    int most = s->options.taps / 2 - 1, asked = s->options.stamp_radius_px;
+    return asked > 0 ? (asked < most ? asked : most)
+                     : bst_stamp_radius(&s->stamp, peak_e, limit, most);
 }
 
 /* Place on the focal plane from the boresight, px, without the distortion, which the kernel adds;
@@ -565,20 +540,23 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
         used = &s->levels[n];
     }
     int radius = choose_radius(s, s->last_peak_e);
-    double sigmas = s->last_peak_e / sqrt(s->last_peak_e + s->dark_variance_e2);
-    double lost = 1.0 - s->kept[radius] * s->kept[radius];
+    double lost = bst_stamp_excess(&s->stamp, radius);
     int border = radius + 1 < MAX_TAPS / 2 ? radius + 1 : radius;
     /* places in parts of a pixel, the way to the node in float, and some additions of light */
     double parts = s->place_parts;
-    double rounded = (0.86 / s->sigma_px * (1.0 / parts + 0x1p-24 * travel_px) + 0x1p-22) * sigmas;
+    double rounded = 0.86 / s->sigma_px * (1.0 / parts + 0x1p-24 * travel_px) + 0x1p-22;
     double shared = s->single && !moving ? single_error(s, s->last_peak_e, hypot(x, y)) : 0.0;
-    s->last_error_sigma = fmax((used->error + lost) * sigmas + shared + rounded,
-                               s->last_peak_e * s->tail[border] / sqrt(s->dark_variance_e2));
-    if (s->options.temporal_oversample > 0) {
-        s->last_error_sigma = NAN;
-    }
+    double sigma_e = sqrt(s->last_peak_e + s->dark_variance_e2);
+    s->last_error = (bst_crowd_source){.x_px = (float)x,
+                                       .y_px = (float)y,
+                                       .peak_e = (float)s->last_peak_e,
+                                       .nodes_e = (float)((used->error + rounded) * s->last_peak_e),
+                                       .shared_e = (float)(shared * sigma_e),
+                                       .excess_e = (float)(lost * s->last_peak_e),
+                                       .border_e = (float)(s->last_peak_e * s->stamp.tail[border]),
+                                       .apart = moving && travel_px > s->travel_px};
     /* what the stamp leaves out is put on the stamp, so that no light is lost */
-    electrons /= s->kept[radius] * s->kept[radius];
+    electrons /= s->stamp.kept[radius] * s->stamp.kept[radius];
     *out = (bst_scene_source){.x_px = (float)x,
                               .y_px = (float)y,
                               .place_x = (int)lrint((x + bst_camera_centre_x(&s->camera)) * parts),
@@ -598,8 +576,15 @@ double bst_smear_last_peak_e(const bst_smear *s) {
     return s->last_peak_e;
 }
 
-double bst_smear_last_error_sigma(const bst_smear *s) {
-    return s->last_error_sigma;
+const bst_crowd_source *bst_smear_last_error(const bst_smear *s) {
+    return &s->last_error;
+}
+
+bst_crowd_motion bst_smear_motion(const bst_smear *s) {
+    bst_crowd_motion motion = bst_crowd_motion_of(s->path, s->path_count, s->single);
+    motion.sigma_px = s->sigma_px;
+    motion.dark_variance_e2 = s->dark_variance_e2;
+    return motion;
 }
 
 const float *bst_smear_table(const bst_smear *s, int *blocks) {

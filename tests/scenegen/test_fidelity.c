@@ -160,6 +160,74 @@ static void predicted_errors_hold(void **state) {
     assert_true(ratio[CASES / 2] <= 5.0);
 }
 
+/* Stars that lie on one another, spread over the field or in clusters down to a pixel, of PSFs from
+ * narrow to wider than the field: the prediction holds and stays near. */
+static void predicted_errors_of_crowds_hold(void **state) {
+    fixture *f = *state;
+    static const double fwhm_px[] = {0.8, 2, 2, 4, 10, 40}, reach_px[] = {0, 0, 20, 5, 1};
+    static const double tolerances[] = {0.01, 0.05, 0.2};
+    static const int counts[] = {2, 8, 30, 100, 300};
+    static const scene_motion motions[] = {
+        {.duration_s = 1, .samples = 2},
+        {.x_px = 4, .y_px = 2, .duration_s = 1, .samples = 41},
+        {.x_px = 25, .y_px = 18, .duration_s = 1, .samples = 41},
+        {.jitter_px = 0.3, .duration_s = 1, .samples = 41},
+        {.x_px = 20,
+         .y_px = -10,
+         .roll_rad = 0.03,
+         .jitter_px = .15,
+         .duration_s = 1,
+         .samples = 41},
+    };
+    enum { CASES = 40, WIDTH = 96, HEIGHT = 80 };
+    double ratio[CASES];
+    for (int i = 0; i < CASES; i++) {
+        bst_rng_key key = bst_rng_make_key((uint64_t)i, 0, "test", "crowd");
+        double draw[8];
+        for (int k = 0; k < 8; k++) {
+            draw[k] = bst_rng_uniform(key, (uint64_t)k, 0);
+        }
+        bst_camera camera = scene_camera(WIDTH, HEIGHT);
+        camera.psf_fwhm_px = fwhm_px[(int)(6 * draw[0])];
+        scene_motion motion = motions[i % 5];
+        int count = counts[(int)(5 * draw[1])];
+        double brightest = pow(10.0, 3.0 + 4.0 * draw[2]), magnitudes = 8.0 * draw[3];
+        scene s = open_scene(f, camera, &motion, 0, 0.0);
+        double reach = reach_px[(int)(5 * draw[4])], top = pow(10.0, 0.4 * magnitudes);
+        s.stars = realloc(s.stars, (size_t)count * sizeof *s.stars);
+        s.count = count;
+        for (int n = 0; n < count; n++) {
+            double u[3];
+            for (int k = 0; k < 3; k++) {
+                u[k] = bst_rng_uniform(key, (uint64_t)(10 + n), (uint64_t)k);
+            }
+            double x = reach > 0.0 ? 48.0 * (0.5 + draw[5]) + reach * (2.0 * u[0] - 1.0)
+                                   : -10.0 + u[0] * (WIDTH + 20.0);
+            double y = reach > 0.0 ? 40.0 * (0.5 + draw[6]) + reach * (2.0 * u[1] - 1.0)
+                                   : -10.0 + u[1] * (HEIGHT + 20.0);
+            s.stars[n] = scene_star(&camera, x, y, brightest / (1.0 + u[2] * (top - 1.0)));
+        }
+        bst_assert_ok(
+            &f->ctx, bst_reference_render(&f->ctx, &camera, whole(&camera), &s.track.track, s.stars,
+                                          count, 1e-8, s.reference));
+        bst_renderer_options options = bst_renderer_default_options();
+        options.tolerance_sigma = tolerances[(int)(3 * draw[7])];
+        outcome o = render(f, &s, &options);
+        ratio[i] = o.stats.predicted_sigma / o.sigma;
+        print_message(
+            "%3d stars of %2.0e e-/s, %3.1f mag, within %2.0f px, FWHM %4.1f, tolerance "
+            "%5.3f: measured %8.5f predicted %8.5f ratio %6.2f\n",
+            count, brightest, magnitudes, reach, camera.psf_fwhm_px, options.tolerance_sigma,
+            o.sigma, o.stats.predicted_sigma, ratio[i]);
+        close_scene(&s);
+    }
+    qsort(ratio, CASES, sizeof *ratio, ascending);
+    print_message("ratios: least %.2f, median %.2f, largest %.2f\n", ratio[0], ratio[CASES / 2],
+                  ratio[CASES - 1]);
+    assert_true(ratio[0] >= 1.0);
+    assert_true(ratio[CASES / 2] <= 5.0); /* measures.md */
+}
+
 /* A pure slew of a narrow field moves all stars alike; of a wide one, or with roll, it does not. */
 static void auto_takes_the_cheaper_motion(void **state) {
     fixture *f = *state;
@@ -305,6 +373,7 @@ static void places_far_from_the_origin(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(predicted_errors_hold),
+        cmocka_unit_test(predicted_errors_of_crowds_hold),
         cmocka_unit_test(auto_takes_the_cheaper_motion),
         cmocka_unit_test(one_track_is_wrong_where_the_field_turns),
         cmocka_unit_test(equal_parts_converge),
