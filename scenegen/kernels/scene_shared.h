@@ -18,6 +18,11 @@
 /* Vectors per block of the frame's nodes: x, y, electrons, place in the table's widths. */
 #define BST_NODE_ROWS 4
 
+/* Why a pixel is saturated: the well (of a binned pixel, one of them) is full, the converter is at
+ * its top. The bits of bst_planes.saturation. */
+#define BST_FLAG_FULL_WELL 1
+#define BST_FLAG_CONVERTER 2
+
 /* 32-bit members only, so that both languages lay it out alike. */
 typedef struct bst_scene_params {
     int window_x0, window_y0, window_width, window_height;
