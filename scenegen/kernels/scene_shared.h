@@ -30,7 +30,7 @@ typedef struct bst_scene_params {
     int tiles_x0; /* sensor column of the first tile: a multiple of 64 */
     int tiles_x, tiles_y;
     int first_row, first_tile; /* of the frame: where the window is one of its bands */
-    int source_groups; /* sources / BST_BLOCK, rounded up */
+    int source_groups;         /* sources / BST_BLOCK, rounded up */
     unsigned key0, key1, exposure_low, exposure_high;
     float background_e; /* expected, per pixel: sky and dark current */
     float dark_e;       /* of it, dark current */
