@@ -90,7 +90,7 @@ double bst_render_exposure_s(const bst_render_request *q) {
 }
 
 bst_scene_params bst_render_params(const bst_camera *c, const bst_renderer_options *options,
-                                   const bst_render_request *q, int groups) {
+                                   const bst_render_request *q, int sources) {
     const bst_skylight_map *map = bst_render_background(q);
     bst_window w = q->window;
     int x0 = w.x0 / 64 * 64;
@@ -103,7 +103,9 @@ bst_scene_params bst_render_params(const bst_camera *c, const bst_renderer_optio
         .tiles_x0 = x0,
         .tiles_x = (w.x0 + w.width - x0 + options->tile_width - 1) / options->tile_width,
         .tiles_y = (w.height + options->tile_height - 1) / options->tile_height,
-        .source_groups = groups,
+        .source_groups = (sources + BST_BLOCK - 1) / BST_BLOCK,
+        .centre_x = (float)bst_camera_centre_x(c),
+        .centre_y = (float)bst_camera_centre_y(c),
         .key0 = q->key.k[0],
         .key1 = q->key.k[1],
         .exposure_low = (unsigned)((uint64_t)q->exposure_id & 0xFFFFFFFFu),

@@ -19,8 +19,8 @@ bst_status bst_render_request_check(bst_ctx *ctx, const bst_camera *camera,
 double bst_render_exposure_s(const bst_render_request *request);
 /* The request's map of the background, or one that adds nothing. */
 const bst_skylight_map *bst_render_background(const bst_render_request *request);
-/* groups: of BST_BLOCK sources that are drawn. */
+/* sources: that are drawn. */
 bst_scene_params bst_render_params(const bst_camera *camera, const bst_renderer_options *options,
-                                   const bst_render_request *request, int groups);
+                                   const bst_render_request *request, int sources);
 
 #endif

@@ -22,9 +22,9 @@ typedef struct bst_renderer_options {
     bst_star_motion motion; /* whose track the stars follow (BST_STAR_MOTION_AUTO) */
     /* Knobs that the tolerance chooses when they are 0. Equal parts of the exposure per star; parts
      * of a pixel per axis to whose centres nodes are moved; px that stamps reach beyond a node's
-     * two nearest pixels; sub-pixel phases of the PSF's table; taps of the Fourier path's spreading
-     * (4, 6 or 8). */
-    int temporal_oversample, spatial_oversample, stamp_radius_px, psf_phases, fft_taps;
+     * two nearest pixels; odd degree of the PSF's profile (scenegen/profile_law.h); taps of the
+     * Fourier path's spreading (4, 6 or 8). */
+    int temporal_oversample, spatial_oversample, stamp_radius_px, psf_degree, fft_taps;
     bool saturation_flags;              /* kept of the latest frame, for bst_renderer_flags */
     int pool_frames;                    /* frames that may be alive at a time (4) */
     int tile_width, tile_height, group; /* pixels per work-item (width a multiple of 64) and
@@ -95,8 +95,8 @@ bst_status bst_renderer_saturated(bst_ctx *ctx, bst_renderer *renderer,
  * frame's own size. With saturation_flags; waits for the frame. */
 bst_status bst_renderer_flags(bst_ctx *ctx, bst_renderer *renderer, size_t pixels,
                               uint8_t *out) BST_MUST_CHECK;
-/* Frames with such a pixel so far, without the latest unless bst_renderer_saturated has been asked.
- * Does not wait. */
+/* Frames with such a pixel so far, without the latest two (BST_STAGE_SETS) unless
+ * bst_renderer_saturated has been asked. Does not wait. */
 long long bst_renderer_saturated_frames(const bst_renderer *renderer);
 
 void bst_renderer_get_stats(const bst_renderer *renderer, bst_render_stats *out);

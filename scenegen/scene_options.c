@@ -1,19 +1,27 @@
 #include "scenegen/scene_options.h"
 
+#include <math.h>
 #include <stdio.h>
 
+#include "scenegen/profile_law.h"
 #include "scenegen/vignetting.h"
 #include "sim/world/skylight.h"
 
 void bst_scene_build_options(const bst_camera *camera, const bst_renderer_options *settings,
-                             int taps, int phases, bool fft_light, const bst_detector *detector,
+                             int taps, int law_degree, bool fft_light, const bst_detector *detector,
                              char *text, size_t bytes) {
+    double sigma_px = bst_camera_psf_sigma_px(camera);
     int length = snprintf(text, bytes,
                           "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d "
-                          "-DPHASES=%d%s%s",
+                          "-DEDGE_SCALE=%.9ef%s%s",
                           settings->tile_width, settings->tile_height, settings->group, taps,
-                          phases, fft_light ? " -DFFT_LIGHT" : "",
+                          1.0 / (sqrt(2.0) * sigma_px), fft_light ? " -DFFT_LIGHT" : "",
                           bst_skylight_varies(camera) ? " -DBACKGROUND" : "");
+    if (law_degree > 0) {
+        length +=
+            snprintf(text + length, bytes - (size_t)length, " -DDEGREE=%d -DBARELY_WIDER=%.9ef",
+                     law_degree, 1.0 / sqrt(1.0 + bst_profile_law_widest(sigma_px, law_degree)));
+    }
     length += bst_vignetting_options(camera, text + length, bytes - (size_t)length);
     length += bst_detector_options(detector, text + length, bytes - (size_t)length);
     if (settings->spatial_oversample > 0) {

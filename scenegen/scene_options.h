@@ -6,10 +6,10 @@
 #include "scenegen/detector.h"
 #include "scenegen/renderer.h"
 
-/* Writes them to text[bytes]; 2048 bytes do. taps, phases: of the profile table; fft_light: light
- * comes from the Fourier path. */
+/* Writes them to text[bytes]; 2048 bytes do. taps: of the longest stamp; law_degree: of the
+ * stamps' profile law (0: none); fft_light: light comes from the Fourier path. */
 void bst_scene_build_options(const bst_camera *camera, const bst_renderer_options *settings,
-                             int taps, int phases, bool fft_light, const bst_detector *detector,
+                             int taps, int law_degree, bool fft_light, const bst_detector *detector,
                              char *text, size_t bytes);
 
 #endif

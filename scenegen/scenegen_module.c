@@ -11,7 +11,7 @@
 
 typedef struct fidelity_config {
     double tolerance_sigma;
-    int64_t temporal_oversample, spatial_oversample, stamp_radius_px, psf_phases, fft_taps;
+    int64_t temporal_oversample, spatial_oversample, stamp_radius_px, psf_degree, fft_taps;
 } fidelity_config;
 
 typedef struct scenegen_config {
@@ -33,8 +33,10 @@ static const bst_config_desc fidelity_table[] = {
             "predicted then."),
     BST_INT(fidelity_config, stamp_radius_px, "px", 0, 255, "0",
             "Reach of all stamps beyond the two nearest pixels; 0: as the tolerance needs."),
-    BST_INT(fidelity_config, psf_phases, "", 0, 2048, "0",
-            "Sub-pixel phases of the PSF's table; 0: as the tolerance needs."),
+    BST_INT(
+        fidelity_config, psf_degree, "", 0, 15, "0",
+        "Odd degree of the polynomials that give a Gaussian PSF's light on a pixel by the place "
+        "within it; 0: as exact as floats are."),
     BST_INT(
         fidelity_config, fft_taps, "", 0, 8, "0",
         "Taps per axis with which light is spread on the grid of a PSF that is no Gaussian: 4, 6 "
@@ -136,7 +138,7 @@ static bst_status create(const bst_module_env *env, const void *config_object, v
     options.temporal_oversample = (int)c->fidelity.temporal_oversample;
     options.spatial_oversample = (int)c->fidelity.spatial_oversample;
     options.stamp_radius_px = (int)c->fidelity.stamp_radius_px;
-    options.psf_phases = (int)c->fidelity.psf_phases;
+    options.psf_degree = (int)c->fidelity.psf_degree;
     options.fft_taps = (int)c->fidelity.fft_taps;
     options.pool_frames = (int)c->pool_frames + BST_OVERLAP_FRAMES;
     options.saturation_flags = env->planes & UINT32_C(1) << BST_PLANE_SATURATION;

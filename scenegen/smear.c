@@ -31,15 +31,22 @@ struct bst_smear {
     double tail[MAX_TAPS / 2]; /* profile at r px from the centre, over the centre's */
     double kept[MAX_TAPS / 2]; /* light within the two nearest pixels and r more on each side */
     double tolerance[LEVELS];
+    double profile_error; /* of stamps, over the image's peak */
     double half_diagonal_px;
+    double near_px; /* light further from the boresight, without distortion, stays off the sensor */
     double stretch; /* of the image by distortion where it is greatest */
 
     bst_los_track track;
-    double dark_variance_e2, duration_s;
+    bst_window window;
+    double margin_px, dark_variance_e2, duration_s;
     bst_quat q_reference;
-    double star_share; /* largest share of a star's light on one pixel */
-    bool single;       /* stars share one track */
-    double spread_px;  /* by which stars in the corners move otherwise */
+    bst_quat *turn; /* attitude at each point of the path */
+    int *parts;     /* straight parts of the path from each sample of the track */
+    int turn_capacity, parts_capacity;
+    double tilt_rad, roll_rad; /* most of the camera's turn from the reference attitude */
+    double star_share;         /* largest share of a star's light on one pixel */
+    bool single;               /* stars share one track */
+    double spread_px;          /* by which stars in the corners move otherwise */
     double last_peak_e, last_error_sigma;
     level levels[LEVELS];
 
@@ -86,12 +93,18 @@ bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
             s->kept[r] = 1.0;
         }
     }
+    if (options->node_sigma_px <= 0.0) {
+        /* of the error function 2.3e-7 are missed on each axis, of nodes in reach of a pixel whose
+         * light there is a quarter of the centre's on average */
+        s->profile_error = 2.0 * fmax(4.0 * 2.3e-7 / centre, options->profile_error);
+    }
     for (int n = 0; n < LEVELS; n++) {
         s->tolerance[n] = 0.08 * pow(2.0, -n);
     }
     s->stretch = bst_camera_stretch(camera);
-    s->half_diagonal_px =
-        tan(bst_camera_half_diagonal_rad(camera)) / bst_camera_scale_rad(camera) * s->stretch;
+    double corner_px = tan(bst_camera_half_diagonal_rad(camera)) / bst_camera_scale_rad(camera);
+    s->near_px = corner_px + MAX_TAPS / bst_camera_shrink(camera); /* the PSF's table ends before */
+    s->half_diagonal_px = corner_px * s->stretch;
     if (!camera->geometry.general) {
         s->half_diagonal_px = 0.5 * hypot((double)camera->width_px, (double)camera->height_px);
     }
@@ -102,6 +115,8 @@ void bst_smear_free(bst_smear *s) {
     if (s) {
         free(s->path);
         free(s->own_path);
+        free(s->turn);
+        free(s->parts);
         free(s->nodes.items);
         free(s->points.items);
         free(s->table);
@@ -127,7 +142,11 @@ static bst_status reserve(bst_ctx *ctx, void **items, int *capacity, int need, s
  * axis, the image of it bends. */
 static int parts_of(const bst_smear *s, int k) {
     const bst_quat *q = s->track.q_cam_from_gcrf;
-    bst_vec3 r = bst_quat_to_rotvec(bst_quat_mul(q[k + 1], bst_quat_conj(q[k])));
+    bst_quat d = bst_quat_mul(q[k + 1], bst_quat_conj(q[k]));
+    if (d.x * d.x + d.y * d.y + d.z * d.z < 2.4e-7 * d.w * d.w) { /* less than 0.98e-3 */
+        return 1;
+    }
+    bst_vec3 r = bst_quat_to_rotvec(d);
     double n = ceil(bst_vec3_norm(r) / 1e-3);
     return n > 64.0 ? 64 : n < 1.0 ? 1 : (int)n;
 }
@@ -161,14 +180,17 @@ static bst_path_point attitude_point(const bst_smear *s, bst_quat q, double time
     return (bst_path_point){{r.x * scale, r.y * scale, r.z * s->half_diagonal_px}, time};
 }
 
-/* What the profile table misses of the nodes' image, over its peak, by its phases and widths. */
-static double table_error(const bst_smear *s, const bst_node_list *list) {
-    double psf = s->sigma_px * s->stretch, worst = 0.0;
+/* What the nodes' profiles miss of their image, over its peak. */
+static double profile_error(const bst_smear *s, const bst_node_list *list) {
+    if (s->options.node_sigma_px <= 0.0) {
+        return s->profile_error;
+    }
+    double psf = s->sigma_px * s->stretch, worst = 0.0; /* by the widths of the Fourier path */
     for (int n = 0; n < list->count; n++) {
         double w = list->items[n].variance / (psf * psf), wide = 1.0 + w;
         worst = fmax(worst, 0.75 * w / (wide * wide));
     }
-    return s->options.table_error + worst / (BST_WIDTHS * BST_WIDTHS);
+    return worst / (BST_WIDTHS * BST_WIDTHS);
 }
 
 /* Appends nodes to the table in whole blocks; to_table fills one column of BST_TABLE_ROWS. */
@@ -178,7 +200,7 @@ static bst_status append_nodes(bst_ctx *ctx, bst_smear *s, const bst_node_list *
     int blocks = (list->count + BST_BLOCK - 1) / BST_BLOCK;
     BST_TRY(reserve(ctx, (void **)&s->table, &s->table_capacity, s->table_blocks + blocks,
                     TABLE_FLOATS * sizeof(float)));
-    *out = (level){s->table_blocks, blocks, list->error + table_error(s, list)};
+    *out = (level){s->table_blocks, blocks, list->error + profile_error(s, list)};
     s->table_blocks += blocks;
     for (int n = 0; n < blocks * BST_BLOCK; n++) {
         float *block = s->table + (size_t)(out->first_block + n / BST_BLOCK) * TABLE_FLOATS;
@@ -289,10 +311,37 @@ static void choose_motion(bst_smear *s, double brightest_e_per_s) {
     }
 }
 
-bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_los_track *track,
-                           double dark_variance_e2, double brightest_e_per_s) {
+static void measure_turn(bst_smear *s) {
+    double tilt2 = 0.0, roll = 0.0;
+    for (int k = 0; k < s->path_count; k++) {
+        const double *p = s->path[k].p;
+        tilt2 = fmax(tilt2, p[0] * p[0] + p[1] * p[1]);
+        roll = fmax(roll, fabs(p[2]));
+    }
+    s->tilt_rad = sqrt(tilt2) * bst_camera_scale_rad(&s->camera) / s->stretch;
+    s->roll_rad = s->half_diagonal_px > 0.0 ? roll / s->half_diagonal_px : 0.0;
+}
+
+/* Whether a star at (x, y) px from the boresight stays too far from the window to light it. Asked
+ * where a turn moves places by little more than to first order. */
+static bool stays_beside(const bst_smear *s, double x, double y) {
+    double scale = bst_camera_scale_rad(&s->camera), r = sqrt(x * x + y * y) * scale;
+    if (s->camera.geometry.general || s->tilt_rad + s->roll_rad > 0.05 || r > 2.0) {
+        return false;
+    }
+    double moved = 1.2 * (s->tilt_rad * (1.0 + r * r) + s->roll_rad * r) / scale;
+    double far = moved + s->margin_px + 2.0;
+    x += bst_camera_centre_x(&s->camera) - s->window.x0;
+    y += bst_camera_centre_y(&s->camera) - s->window.y0;
+    return x < -far || y < -far || x > s->window.width + far || y > s->window.height + far;
+}
+
+bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *frame) {
+    const bst_los_track *track = frame->track;
     s->track = *track;
-    s->dark_variance_e2 = fmax(dark_variance_e2, 1e-2);
+    s->window = frame->window;
+    s->margin_px = frame->margin_px;
+    s->dark_variance_e2 = fmax(frame->dark_variance_e2, 1e-2);
     s->duration_s = track->time_s[track->count - 1];
     s->q_reference = attitude_at(track, 0.5 * s->duration_s);
     s->table_blocks = s->path_count = 0;
@@ -300,19 +349,23 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_los_track *trac
         s->levels[n].blocks = 0;
     }
     double inverse = s->duration_s > 0.0 ? 1.0 / s->duration_s : 0.0;
+    BST_TRY(reserve(ctx, (void **)&s->parts, &s->parts_capacity, track->count, sizeof *s->parts));
     for (int k = 0; k + 1 < track->count; k++) {
-        int parts = parts_of(s, k);
-        BST_TRY(reserve(ctx, (void **)&s->path, &s->path_capacity, s->path_count + parts + 1,
-                        sizeof *s->path));
+        int parts = s->parts[k] = parts_of(s, k);
+        int points = s->path_count + parts + 1;
+        BST_TRY(reserve(ctx, (void **)&s->path, &s->path_capacity, points, sizeof *s->path));
+        BST_TRY(reserve(ctx, (void **)&s->turn, &s->turn_capacity, points, sizeof *s->turn));
         for (int n = 0; n < parts + (k + 2 == track->count); n++) {
             double u = (double)n / parts;
-            bst_quat q =
-                bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
+            const bst_quat *ends = &track->q_cam_from_gcrf[k];
+            bst_quat q = n == 0 ? bst_quat_unit(ends[0]) : bst_quat_slerp(ends[0], ends[1], u);
             double t = track->time_s[k] + u * (track->time_s[k + 1] - track->time_s[k]);
+            s->turn[s->path_count] = q;
             s->path[s->path_count++] = attitude_point(s, q, t * inverse);
         }
     }
-    choose_motion(s, brightest_e_per_s);
+    measure_turn(s);
+    choose_motion(s, frame->brightest_e_per_s);
     BST_TRY(make_level(ctx, s, 0));
     s->star_share = largest_share(s);
     return BST_OK;
@@ -325,7 +378,7 @@ static int choose_level(bst_smear *s, double peak_e) {
     if (s->options.temporal_oversample > 0) {
         return n;
     }
-    while (n + 1 < LEVELS && (s->tolerance[n] + s->options.table_error) * sigmas >
+    while (n + 1 < LEVELS && (s->tolerance[n] + s->profile_error) * sigmas >
                                  NODE_SHARE * s->options.tolerance_sigma) {
         n++;
     }
@@ -364,11 +417,9 @@ static bool project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, doubl
     return fabs(*x) < 1e6 && fabs(*y) < 1e6;
 }
 
-/* Light further than this from the boresight (px, without distortion) stays off the sensor: the
- * PSF's table ends before. */
+/* Places further than this from the boresight (px, without distortion) give the sensor no light. */
 static double far_px(const bst_smear *s) {
-    return tan(bst_camera_half_diagonal_rad(&s->camera)) / bst_camera_scale_rad(&s->camera) +
-           MAX_TAPS / bst_camera_shrink(&s->camera) + s->disc_px;
+    return s->near_px + s->disc_px;
 }
 
 /* How many chords the curved motion over the image wants: of a parabola they miss
@@ -417,17 +468,18 @@ static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_source *source,
         least = RATE_PARTS / (track->count - 1) + 1; /* between its points light is uniform */
     }
     *count = 0;
-    for (int k = 0; k + 1 < track->count; k++) {
-        int parts = parts_of(s, k);
-        parts = parts < least ? least : parts;
+    const bst_quat *turn = s->turn;
+    for (int k = 0; k + 1 < track->count; turn += s->parts[k++]) {
+        int parts = s->parts[k] < least ? least : s->parts[k];
         BST_TRY(reserve(ctx, (void **)&s->own_path, &s->own_capacity, *count + parts + 1,
                         sizeof *s->own_path));
         for (int n = 0; n < parts + (k + 2 == track->count); n++) {
             double u = (double)n / parts, x, y;
             double t = track->time_s[k] + u * (track->time_s[k + 1] - track->time_s[k]);
             t = s->duration_s > 0.0 ? t / s->duration_s : 0.0;
-            bst_quat q =
-                bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
+            bst_quat q = parts == s->parts[k] ? turn[n]
+                                              : bst_quat_slerp(track->q_cam_from_gcrf[k],
+                                                               track->q_cam_from_gcrf[k + 1], u);
             bool front = project(s, q, bst_source_direction(source, t), &x, &y);
             s->own_path[(*count)++] = (bst_path_point){
                 {front ? (x - x0) * s->stretch : NAN, front ? (y - y0) * s->stretch : NAN, 0.0},
@@ -509,10 +561,18 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
         source->shape ? tan(asin(source->shape->radius)) / bst_camera_scale_rad(&s->camera) : 0.0;
     bool front = project(s, s->q_reference, source->apparent_mid, &x, &y);
     /* a star that only a wide turn brings into the field is no small float from its place there */
-    moving = moving || !front || hypot(x, y) > 4.0 * far_px(s);
+    double wide = 4.0 * far_px(s);
+    moving = moving || !front || x * x + y * y > wide * wide;
     *visible = !source->occulted && electrons > 0.0 && electrons < 1e30 && (front || moving);
     if (!*visible) {
         return BST_OK;
+    }
+    if (!moving) {
+        s->last_peak_e = electrons * s->star_share;
+        *visible = !stays_beside(s, x, y);
+        if (!*visible) {
+            return BST_OK;
+        }
     }
     level own;
     const level *used;
@@ -546,7 +606,6 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
         BST_TRY(append_nodes(ctx, s, &s->nodes, shift_to_table, &own));
         used = &own;
     } else {
-        s->last_peak_e = electrons * s->star_share;
         int n = choose_level(s, s->last_peak_e);
         BST_TRY(make_level(ctx, s, n));
         used = &s->levels[n];
@@ -559,7 +618,8 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
     double extent = fmax((double)s->camera.width_px, (double)s->camera.height_px);
     double rounded = 1.5 * 0x1p-24 * extent * 0.4 / s->sigma_px * s->last_peak_e /
                      sqrt(0.5 * s->last_peak_e + s->dark_variance_e2);
-    double shared = s->single && !moving ? single_error(s, s->last_peak_e, hypot(x, y)) : 0.0;
+    double shared =
+        s->single && !moving ? single_error(s, s->last_peak_e, sqrt(x * x + y * y)) : 0.0;
     s->last_error_sigma = fmax((used->error + lost) * sigmas + shared + rounded,
                                s->last_peak_e * s->tail[border] / sqrt(s->dark_variance_e2));
     if (s->options.temporal_oversample > 0) {

@@ -4,18 +4,16 @@
 
 /* Nodes travel in blocks of this many, one vector register. */
 #define BST_BLOCK 16
-/* The profile table holds the PSF widened by (n / BST_WIDTHS)^2 BST_WIDEST of its own variance, n
- * from 0 to BST_WIDTHS. Between widths it is interpolated linearly in the variance, between which a
- * Gaussian's peak goes as the square root of its inverse: on each axis that misses
+/* The Fourier path's table holds nodes widened by (n / BST_WIDTHS)^2 BST_WIDEST of the PSF's
+ * variance, n from 0 to BST_WIDTHS. Between widths it is interpolated linearly in the variance,
+ * between which a Gaussian's peak goes as the square root of its inverse: on each axis that misses
  * 3/8 w / BST_WIDTHS^2 / (1 + w)^2 of the peak for a widening by w variances. */
 #define BST_WIDTHS 32
 #define BST_WIDEST 1.0f
-/* Zeros on either side of a row of the profile table. */
-#define BST_PROFILE_PAD 16
 /* Floats per node of a node table: the homography from the reference attitude's tangent plane to
  * the node's, as nine coefficients, then the weight and the widening in PSF variances. */
 #define BST_TABLE_ROWS 11
-/* Vectors per block of the frame's nodes: x, y, electrons, place in the table's widths. */
+/* Vectors per block of the Fourier path's nodes: x, y, electrons, place in the table's widths. */
 #define BST_NODE_ROWS 4
 
 /* Why a pixel is saturated: the well (of a binned pixel, one of them) is full, the converter is at
@@ -31,6 +29,7 @@ typedef struct bst_scene_params {
     int tiles_x, tiles_y;
     int first_row, first_tile; /* of the frame: where the window is one of its bands */
     int source_groups;         /* sources / BST_BLOCK, rounded up */
+    float centre_x, centre_y;  /* of the camera, sensor px */
     unsigned key0, key1, exposure_low, exposure_high;
     float background_e; /* expected, per pixel: sky and dark current */
     float dark_e;       /* of it, dark current */
@@ -57,7 +56,8 @@ typedef struct bst_scene_source {
     int first_table;  /* block of the node table */
     int first_block;  /* block of the frame's nodes */
     int blocks;
-    int radius; /* the stamp reaches this far beyond the two nearest pixels of a node */
+    int first_box; /* of the blocks' boxes, by groups of BST_BLOCK */
+    int radius;    /* the stamp reaches this far beyond the two nearest pixels of a node */
 } bst_scene_source;
 
 #endif
