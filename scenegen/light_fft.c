@@ -329,6 +329,15 @@ static bench *take_bench(bst_light_fft *f) {
     }
 }
 
+/* A block of memory far from what was used last, which is soon written; it may lie beyond the end.
+ */
+BST_LANES_INLINE void fetch_block(const bst_batch *to) {
+    for (int l = 0; l < BLOCK; l++) {
+        __builtin_prefetch(&to[l].re, 1);
+        __builtin_prefetch(&to[l].im, 1);
+    }
+}
+
 /* ------------------------------------------------------------------ rows forward */
 
 /* Loads two blocks of rows (the second may be NULL) as real and imaginary parts and adds them to
@@ -367,6 +376,8 @@ static void store_strip(const bst_light_fft *f, const strip *s, const bst_batch 
     const int *order = bst_batch_fft_order(f->row_forward);
     int samples = f->shape.x.samples;
     bst_lanes part[4][BLOCK];
+    fetch_block(a + f->strip_pitch);
+    fetch_block((b ? b : a) + f->strip_pitch);
     for (int l = 0; l < BLOCK; l++) {
         int k = s->k0 + l;
         if (abs(k) >= f->used) {
@@ -449,6 +460,7 @@ static void store_image(const bst_light_fft *f, int block, const bst_batch *line
     for (int j = 0; j < f->image_blocks; j++, order += BLOCK) {
         bst_batch *to = f->image + (size_t)j * f->image_pitch + (size_t)block * BLOCK;
         bst_lanes re[BLOCK], im[BLOCK];
+        fetch_block(to + f->image_pitch);
         for (int r = 0; r < BLOCK; r++) {
             re[r] = line[order[r]].im;
             im[r] = line[order[r]].re;
@@ -461,20 +473,35 @@ static void store_image(const bst_light_fft *f, int block, const bst_batch *line
     }
 }
 
-/* Blocks of the image's columns. */
+/* Far wings of all nodes' light, in place of it. */
+static void run_wrap(bst_light_fft *f) {
+    float scale = (float)(1.0 / (f->kernel_x[0] * f->kernel_y[0]));
+    size_t count = (size_t)f->cells_x * (size_t)f->cells_y;
+    for (size_t i = 0; i < count; i++) {
+        f->cells[i] *= scale;
+    }
+    bst_light_wrap_run(f->wrap, f->cells);
+}
+
+/* Blocks of the image's columns; before them, with the last node, the far wings. */
 static void columns(void *user, int begin, int end) {
     const pass *p = user;
     bst_light_fft *f = p->fft;
     bench *w = take_bench(f);
     size_t pixels = (size_t)f->shape.y.pixels;
-    for (int c = begin; c < end; c++) {
+    for (int i = begin; i < end; i++) {
+        int c = i - (p->last && f->wrap);
+        if (c < 0) {
+            run_wrap(f);
+            continue;
+        }
         bst_batch *sum = f->sum ? f->sum + (size_t)c * pixels : w->line;
         if (p->first) {
             memset(sum, 0, pixels * sizeof *sum);
         }
-        for (int i = f->first_strip[c]; i < f->first_strip[c + 1]; i++) {
-            const strip *s = &f->strips[i];
-            bst_batch *line = f->spectrum + (size_t)i * f->strip_pitch;
+        for (const strip *s = f->strips + f->first_strip[c]; s < f->strips + f->first_strip[c + 1];
+             s++) {
+            bst_batch *line = f->spectrum + (size_t)(s - f->strips) * f->strip_pitch;
             bst_batch_fft_run(f->column_forward, line);
             fold(f, s, f->table[p->node] + s->first, line, sum);
         }
@@ -489,7 +516,7 @@ static void columns(void *user, int begin, int end) {
 void bst_light_fft_add(bst_light_fft *f, int node, bool first, bool last, const float *grid) {
     pass p = {.fft = f, .grid = grid, .node = node, .first = first, .last = last};
     bst_parallel_for(f->pool, (f->row_blocks + 1) / 2, 1, rows_forward, &p);
-    bst_parallel_for(f->pool, f->column_blocks, 1, columns, &p);
+    bst_parallel_for(f->pool, f->column_blocks + (last && f->wrap), 1, columns, &p);
 }
 
 /* ------------------------------------------------------------------ rows inverse */
@@ -570,14 +597,6 @@ static void rows_inverse(void *user, int begin, int end) {
 }
 
 void bst_light_fft_finish(bst_light_fft *f, float *image) {
-    if (f->wrap) {
-        float scale = (float)(1.0 / (f->kernel_x[0] * f->kernel_y[0]));
-        size_t count = (size_t)f->cells_x * (size_t)f->cells_y;
-        for (size_t i = 0; i < count; i++) {
-            f->cells[i] *= scale;
-        }
-        bst_light_wrap_run(f->wrap, f->cells);
-    }
     pass p = {.fft = f, .image = image};
     bst_parallel_for(f->pool, (f->image_blocks + 1) / 2, 1, rows_inverse, &p);
 }
