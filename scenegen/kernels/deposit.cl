@@ -1,7 +1,7 @@
 /* Light of all nodes on a grid for the Fourier path: each node is spread over eight by eight samples.
  * Options: DEPOSIT_W, DEPOSIT_H (samples of a tile, a multiple of 16 high), DEPOSIT_GROUP (work-items
- * per work-group), FIELD (weights by place), NEAR_CACHE (memory has one address space; what lies in
- * it can be fetched ahead, and written past the caches).
+ * per work-group), those of the nodes kernel, FIELD (weights by place), NEAR_CACHE (memory has one
+ * address space; what lies in it can be fetched ahead, and written past the caches).
  *
  * One work-item owns a tile and adds its nodes in the order of sources, blocks and nodes: the sum is
  * the same for every tile and work-group size. Vectors run along y, as in the grid's blocks of
@@ -124,7 +124,10 @@ static void deposit_team(local float *sum, const deposit_nodes *b, int n, int co
 /* Places one block's nodes; returns whether any of them reaches the tile. */
 static int place_nodes(bst_deposit_params p, int tile_x, int tile_y, global const float16 *block,
                        global const float *field, deposit_nodes *out) {
-    float16 u = (block[0] - p.x0) * p.density_x, v = (block[1] - p.y0) * p.density_y;
+    const float px = 1.0f / (float)(1 << PLACE_BITS);
+    float16 x = convert_float16(as_int16(block[0])) * px;
+    float16 y = convert_float16(as_int16(block[1])) * px;
+    float16 u = (x - p.x0) * p.density_x, v = (y - p.y0) * p.density_y;
     float16 floor_u = floor(u), floor_v = floor(v);
     const float before = BST_SPREAD_TAPS / 2 - 1, after = BST_SPREAD_TAPS / 2;
     float16 column = floor_u - (before + (float)tile_x), row = floor_v - (before + (float)tile_y);
@@ -144,11 +147,11 @@ static int place_nodes(bst_deposit_params p, int tile_x, int tile_y, global cons
     float16 level = fmin(floor(width), BST_WIDTHS - 1.0f);
     float16 base = level * (float)(BST_SPREAD_PHASES + 1);
 #ifdef FIELD
-    float px[16], py[16], e[16];
-    vstore16(block[0], 0, px);
-    vstore16(block[1], 0, py);
+    float at_x[16], at_y[16], e[16];
+    vstore16(x, 0, at_x);
+    vstore16(y, 0, at_y);
     for (int n = 0; n < BST_BLOCK; n++) {
-        e[n] = field_weight(p, field, px[n], py[n]);
+        e[n] = field_weight(p, field, at_x[n], at_y[n]);
     }
     electrons *= vload16(0, e);
 #endif
@@ -208,7 +211,7 @@ static void deposit_list(bst_deposit_params p, local float *sum, int tile_x, int
  * those of the nodes kernel, which reach at least as far as the spreading kernel. */
 __attribute__((reqd_work_group_size(DEPOSIT_GROUP, 1, 1))) kernel void bst_light_deposit(
     bst_deposit_params p, global const bst_scene_source *sources, global const float16 *nodes,
-    global const float4 *block_box, global const float *source_box, global const float *table,
+    global const float *block_box, global const float *source_box, global const float *table,
     global const float *field, global float16 *grid) {
     local float16 sums[DEPOSIT_GROUP][DEPOSIT_W * DEPOSIT_STRIDE / 16];
     int tile = (int)get_global_id(0);
@@ -251,9 +254,11 @@ __attribute__((reqd_work_group_size(DEPOSIT_GROUP, 1, 1))) kernel void bst_light
                 continue;
             }
             bst_scene_source s = sources[g * BST_BLOCK + i];
-            for (int b = s.first_block; b < s.first_block + s.blocks; b++) {
-                float4 r = block_box[b];
-                if (r.x <= x1 && r.z >= x0 && r.y <= y1 && r.w >= y0) {
+            for (int n = 0; n < s.blocks; n++) {
+                int b = s.first_block + n, lane = n % BST_BLOCK;
+                global const float *r = block_box + (s.first_box * BST_BLOCK + n - lane) * 4 + lane;
+                if (s.blocks == 1 || (r[0] <= x1 && r[2 * BST_BLOCK] >= x0 && r[BST_BLOCK] <= y1 &&
+                                      r[3 * BST_BLOCK] >= y0)) {
                     for (int k = 0; k < BST_NODE_ROWS; k++) {
                         FETCH(nodes + BST_NODE_ROWS * b + k);
                     }

@@ -1,97 +1,141 @@
 /* From sources and node tables to the frame's nodes: place and electrons of every node, and the
- * boxes of pixels that blocks and sources touch. One work-item per source. */
+ * boxes of pixels that blocks, sources and groups of sources touch. One work-item per source. */
 
+/* By comparisons: fmax() has more to do where one side is no number. */
 static float max_of(float16 v) {
-    float8 a = fmax(v.lo, v.hi);
-    float4 b = fmax(a.lo, a.hi);
-    float2 c = fmax(b.lo, b.hi);
-    return fmax(c.lo, c.hi);
+    float8 a = v.lo > v.hi ? v.lo : v.hi;
+    float4 b = a.lo > a.hi ? a.lo : a.hi;
+    float2 c = b.lo > b.hi ? b.lo : b.hi;
+    return c.lo > c.hi ? c.lo : c.hi;
 }
 
 static float min_of(float16 v) {
     return -max_of(-v);
 }
 
-/* Row of the profile table, and the share of the way to the next. */
-static float16 place_of_width(float16 widening) {
+static int most_of(int16 v) {
+    int8 a = max(v.lo, v.hi);
+    int4 b = max(a.lo, a.hi);
+    int2 c = max(b.lo, b.hi);
+    return max(c.lo, c.hi);
+}
+
+static int least_of(int16 v) {
+    return -most_of(-v);
+}
+
+#ifdef FFT_LIGHT
+/* Row of the Fourier path's table, and the share of the way to the next. */
+static float16 width_of(float16 widening) {
     float16 square = fmin(widening, BST_WIDEST) * (BST_WIDTHS * BST_WIDTHS / BST_WIDEST);
     float16 row = floor(sqrt(square));
     return row + (square - row * row) / (2.0f * row + 1.0f);
 }
+#else
+/* Sigma of the PSF over that of the node. */
+static float16 width_of(float16 widening) {
+    return rsqrt(1.0f + widening);
+}
+#endif
 
 #ifdef DISTORTED
 /* Distortion (sim/world/camera.h); k1, k2, k3, p1, p2 in pixels instead of tangents. What lies
  * beyond the fold gives no light on the sensor. */
-static void add_distortion(float16 *x, float16 *y, float16 *stretch2) {
-    float16 s = *x * *x + *y * *y;
+static void add_distortion(float16 x, float16 y, float16 *dx, float16 *dy, float16 *stretch2) {
+    float16 s = x * x + y * y;
     float16 l = s * (K1 + s * (K2 + s * K3));
-    float16 xy = 2.0f * *x * *y;
-    float16 dx = *x * l + P1 * xy + P2 * (s + 2.0f * *x * *x);
-    float16 dy = *y * l + P1 * (s + 2.0f * *y * *y) + P2 * xy;
+    float16 xy = 2.0f * x * y;
+    *dx += x * l + P1 * xy + P2 * (s + 2.0f * x * x);
+    *dy += y * l + P1 * (s + 2.0f * y * y) + P2 * xy;
     /* mean square scale of the map there: half the sum of the squared derivatives */
     float16 r = 2.0f * (K1 + s * (2.0f * K2 + s * 3.0f * K3));
-    float16 xx = 1.0f + l + *x * *x * r + 2.0f * P1 * *y + 6.0f * P2 * *x;
-    float16 yy = 1.0f + l + *y * *y * r + 6.0f * P1 * *y + 2.0f * P2 * *x;
-    float16 off = *x * *y * r + 2.0f * P1 * *x + 2.0f * P2 * *y;
+    float16 xx = 1.0f + l + x * x * r + 2.0f * P1 * y + 6.0f * P2 * x;
+    float16 yy = 1.0f + l + y * y * r + 6.0f * P1 * y + 2.0f * P2 * x;
+    float16 off = x * y * r + 2.0f * P1 * x + 2.0f * P2 * y;
     *stretch2 = 0.5f * (xx * xx + yy * yy) + off * off;
-    *x = select(*x + dx, (float16)(1e6f), s > FOLD2);
-    *y = select(*y + dy, (float16)(1e6f), s > FOLD2);
+    *dx = select(*dx, (float16)(1e9f), s > FOLD2);
+    *dy = select(*dy, (float16)(1e9f), s > FOLD2);
 }
 #endif
 
-#ifdef SPATIAL_OVERSAMPLE
-/* Of the parts into which a pixel is cut along each axis. */
-static float16 centre_of_part(float16 v) {
-    float16 pixel = floor(v + 0.5f);
-    float16 part = floor((v + 0.5f - pixel) * SPATIAL_OVERSAMPLE) + 0.5f;
-    return pixel + part * (1.0f / SPATIAL_OVERSAMPLE) - 0.5f;
-}
+/* `from` pixels and `way` more from the boresight, the first also as `place` on the sensor: on the
+ * sensor, in parts of a pixel. Far outside any sensor all places are alike, and so are those that
+ * are no numbers. */
+static int16 place_on_sensor(int place, float from, float16 way) {
+    const float parts = (float)(1 << PLACE_BITS), limit = (float)BST_PLACE_LIMIT;
+    float16 moved = clamp(way * parts, -2.0f * limit, 2.0f * limit);
+    int16 at = place + convert_int16(floor(moved + 0.5f));
+    at = select((int16)(BST_PLACE_LIMIT), at, fabs(from + way) * parts <= limit);
+#ifdef SPATIAL_OVERSAMPLE /* the centre of one of the parts into which a pixel is cut */
+    int16 whole = (at + (1 << (PLACE_BITS - 1))) >> PLACE_BITS;
+    float16 rest = convert_float16(at - (whole << PLACE_BITS)) * (1.0f / parts) + 0.5f;
+    float16 part = (floor(rest * SPATIAL_OVERSAMPLE) + 0.5f) * (1.0f / SPATIAL_OVERSAMPLE);
+    at = (whole << PLACE_BITS) + convert_int16(floor((part - 0.5f) * parts + 0.5f));
 #endif
+    return at;
+}
 
-/* nodes: per block x[16], y[16], electrons[16], widths[16], px and e-. block_box: x0, y0, x1, y1 (inclusive
- * pixels). source_box: the same for sources, by groups of 16: x0[16], y0[16], x1[16], y1[16]. */
-kernel void bst_scene_nodes(global const bst_scene_source *sources, int count,
-                            global const float16 *table, float centre_x, float centre_y,
-                            global float16 *nodes, global float4 *block_box,
-                            global float *source_box) {
-    int i = (int)get_global_id(0);
-    global float *box = source_box + (i / BST_BLOCK) * 4 * BST_BLOCK + i % BST_BLOCK;
+/* A block of nodes: place on the sensor in parts of a pixel, electrons, width_of. */
+typedef struct node_block {
+    int16 x, y;
+    float16 electrons, width;
+} node_block;
+
+/* Block b of a source. */
+static node_block nodes_of(bst_scene_source s, int b, global const float16 *table) {
+    global const float16 *t = table + (s.first_table + b) * BST_TABLE_ROWS;
+    node_block out;
+    float16 depth = t[6] * s.x_px + t[7] * s.y_px;
+    float16 scale = 1.0f / (depth + t[8]);
+    float16 dx = (t[0] * s.x_px + t[1] * s.y_px + t[2] - depth * s.x_px) * scale;
+    float16 dy = (t[3] * s.x_px + t[4] * s.y_px + t[5] - depth * s.y_px) * scale;
+    float16 widening = t[10];
+#ifdef DISTORTED
+    float16 stretch2;
+    add_distortion(s.x_px + dx, s.y_px + dy, &dx, &dy, &stretch2);
+    widening *= stretch2;
+#endif
+    out.x = place_on_sensor(s.place_x, s.x_px, dx);
+    out.y = place_on_sensor(s.place_y, s.y_px, dy);
+    out.electrons = t[9] * s.electrons;
+    out.width = width_of(widening);
+    return out;
+}
+
+/* Boxes of inclusive pixels, by groups of 16: x0[16], y0[16], x1[16], y1[16]. block_box: of the
+ * blocks of a source that has several, from its first_box on; source_box: of sources; group_box: of
+ * groups of sources. nodes (with FFT_LIGHT): per block x[16], y[16], electrons[16], width_of[16].
+ */
+__attribute__((reqd_work_group_size(BST_BLOCK, 1, 1))) kernel void bst_scene_nodes(
+    global const bst_scene_source *sources, int count, global const float16 *table,
+    global float *block_box, global float *source_box,
+    global float *group_box, global float16 *nodes) {
+    int i = (int)get_global_id(0), g = i / BST_BLOCK;
+    global float *box = source_box + g * 4 * BST_BLOCK + i % BST_BLOCK;
     float x0 = 1e9f, y0 = 1e9f, x1 = -1e9f, y1 = -1e9f;
     if (i < count) {
         bst_scene_source s = sources[i];
         float reach = (float)s.radius;
         for (int b = 0; b < s.blocks; b++) {
-            global const float16 *t = table + (s.first_table + b) * BST_TABLE_ROWS;
-            float16 depth = t[6] * s.x_px + t[7] * s.y_px;
-            float16 scale = 1.0f / (depth + t[8]);
-            float16 dx = (t[0] * s.x_px + t[1] * s.y_px + t[2] - depth * s.x_px) * scale;
-            float16 dy = (t[3] * s.x_px + t[4] * s.y_px + t[5] - depth * s.y_px) * scale;
-            /* far outside any sensor all places are alike; keeps the integer maths in range */
-#ifdef DISTORTED
-            dx += s.x_px;
-            dy += s.y_px;
-            float16 stretch2;
-            add_distortion(&dx, &dy, &stretch2);
-            float16 widening = t[10] * stretch2;
-            float16 x = clamp(centre_x + dx, -1e6f, 1e6f);
-            float16 y = clamp(centre_y + dy, -1e6f, 1e6f);
-#else
-            float16 widening = t[10];
-            float16 x = clamp(centre_x + s.x_px + dx, -1e6f, 1e6f);
-            float16 y = clamp(centre_y + s.y_px + dy, -1e6f, 1e6f);
-#endif
-#ifdef SPATIAL_OVERSAMPLE
-            x = centre_of_part(x);
-            y = centre_of_part(y);
-#endif
+            node_block n = nodes_of(s, b, table);
+#ifdef FFT_LIGHT
             int block = s.first_block + b;
-            nodes[BST_NODE_ROWS * block] = x;
-            nodes[BST_NODE_ROWS * block + 1] = y;
-            nodes[BST_NODE_ROWS * block + 2] = t[9] * s.electrons;
-            nodes[BST_NODE_ROWS * block + 3] = place_of_width(widening);
-            float4 r = (float4)(floor(min_of(x)) - reach, floor(min_of(y)) - reach,
-                                floor(max_of(x)) + reach + 1.0f, floor(max_of(y)) + reach + 1.0f);
-            block_box[block] = r;
+            nodes[BST_NODE_ROWS * block] = as_float16(n.x);
+            nodes[BST_NODE_ROWS * block + 1] = as_float16(n.y);
+            nodes[BST_NODE_ROWS * block + 2] = n.electrons;
+            nodes[BST_NODE_ROWS * block + 3] = n.width;
+#endif
+            int16 x = n.x >> PLACE_BITS, y = n.y >> PLACE_BITS;
+            float4 r = (float4)((float)least_of(x) - reach, (float)least_of(y) - reach,
+                                (float)most_of(x) + reach + 1.0f, (float)most_of(y) + reach + 1.0f);
+            if (s.blocks > 1) {
+                int lane = b % BST_BLOCK;
+                global float *at = block_box + (s.first_box * BST_BLOCK + b - lane) * 4 + lane;
+                at[0] = r.x;
+                at[BST_BLOCK] = r.y;
+                at[2 * BST_BLOCK] = r.z;
+                at[3 * BST_BLOCK] = r.w;
+            }
             x0 = fmin(x0, r.x);
             y0 = fmin(y0, r.y);
             x1 = fmax(x1, r.z);
@@ -102,4 +146,12 @@ kernel void bst_scene_nodes(global const bst_scene_source *sources, int count,
     box[BST_BLOCK] = y0;
     box[2 * BST_BLOCK] = x1;
     box[3 * BST_BLOCK] = y1;
+    barrier(CLK_GLOBAL_MEM_FENCE);
+    if (i % BST_BLOCK == 0) {
+        global float *group = group_box + g / BST_BLOCK * 4 * BST_BLOCK + g % BST_BLOCK;
+        group[0] = min_of(vload16(0, box));
+        group[BST_BLOCK] = min_of(vload16(1, box));
+        group[2 * BST_BLOCK] = max_of(vload16(2, box));
+        group[3 * BST_BLOCK] = max_of(vload16(3, box));
+    }
 }

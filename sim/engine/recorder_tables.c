@@ -83,11 +83,15 @@ static const bst_column exposure_columns[] = {
     INT("lost", "", "sources that found no room"),
     INT("hits", "", "radiation hits on the sensor"),
     REAL("hits_e", "e-", "their charge"),
+    REAL("error_sigma", "", "largest rendering error expected in any pixel, in its noise"),
+    INT("nodes", "", "points that the sources' tracks became"),
+    INT("one_track", "", "1: the stars shared one track"),
 };
 static const bst_column truth_columns[] = {
     SENSOR,
     EXPOSURE,
-    MID,
+    REAL("mid_s", "s",
+         "middle of the exposure, with a rolling shutter of the source's own row, since the epoch"),
     INT("item", "",
         "number of the source in its exposure, from 1: its pixels in segmentation.fits"),
     TEXT("kind", "star or object"),
