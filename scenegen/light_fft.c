@@ -21,17 +21,20 @@ typedef struct strip {
     size_t first; /* of the strip's numbers in the table */
 } strip;
 
-/* Pixels from `begin` on lie between the centres of `cell` and the next; the first one at `place`
- * of the way. */
-typedef struct stretch {
-    int begin, cell;
-    float place;
-} stretch;
+/* How a block of a row's pixels lies between the centres of cells, linearly: the shares of `cell`
+ * and those that follow. A block spans 16 px of at most 5 samples, a cell 16 samples or, beyond 1.4
+ * per px, 32. */
+enum { SHARES = 5 };
+typedef struct cell_shares {
+    int cell;
+    bst_lanes share[SHARES];
+} cell_shares;
 
 /* Working memory of one part; as many as there are threads. */
 typedef struct bench {
     atomic_flag taken;
     bst_batch *line; /* a block of rows or columns */
+    float *wings;    /* [BLOCK][cells_x + SHARES] far wings of rows at the cells' centres */
 } bench;
 
 struct bst_light_fft {
@@ -56,8 +59,7 @@ struct bst_light_fft {
     bst_light_wrap *wrap;
     int cell, cells_x, cells_y; /* samples per cell, per axis; cells */
     float *cells;
-    stretch *stretches;
-    int stretch_count;
+    cell_shares *shares; /* per block of a row's pixels */
 };
 
 /* What a loop's parts need to know. */
@@ -209,19 +211,29 @@ static double cell_place(const bst_light_fft *f, const bst_light_axis *axis, int
     return place - *lower;
 }
 
-/* Stretches of a row between the same two cells' centres. */
-static bst_status make_stretches(bst_ctx *ctx, bst_light_fft *f) {
-    f->stretches = malloc((size_t)f->cells_x * sizeof *f->stretches);
-    if (!f->stretches) {
+/* What the far wings need in the inverse of rows. */
+static bst_status make_shares(bst_ctx *ctx, bst_light_fft *f) {
+    int blocks = (f->shape.width + BLOCK - 1) / BLOCK;
+    size_t wings = (size_t)BLOCK * (size_t)(f->cells_x + SHARES);
+    f->shares = aligned_alloc(sizeof(bst_lanes), (size_t)blocks * sizeof *f->shares);
+    bool ok = f->shares;
+    for (int i = 0; ok && i < f->bench_count; i++) {
+        f->benches[i].wings = calloc(wings, sizeof(float));
+        ok = f->benches[i].wings;
+    }
+    if (!ok) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the far wings");
     }
-    for (int x = 0, last = -1; x < f->shape.width; x++) {
-        int cell;
-        double u = cell_place(f, &f->shape.x, f->cells_x, x, &cell);
-        if (cell != last) {
-            f->stretches[f->stretch_count++] = (stretch){x, cell, (float)u};
+    for (int i = 0; i < blocks; i++) {
+        cell_shares *s = &f->shares[i];
+        memset(s, 0, sizeof *s);
+        for (int l = 0; l < BLOCK; l++) {
+            int cell;
+            float u = (float)cell_place(f, &f->shape.x, f->cells_x, i * BLOCK + l, &cell);
+            s->cell = l == 0 ? cell : s->cell;
+            s->share[cell - s->cell][l] = 1.0f - u;
+            s->share[cell - s->cell + 1][l] = u;
         }
-        last = cell;
     }
     return BST_OK;
 }
@@ -236,7 +248,7 @@ static bst_status make_wrap(bst_ctx *ctx, bst_light_fft *f) {
     if (!f->cells) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the far wings");
     }
-    BST_TRY(make_stretches(ctx, f));
+    BST_TRY(make_shares(ctx, f));
     bst_light_wrap_axis wx = {x->pixels, f->cells_x, (double)f->cell * x->pixels / x->samples,
                               f->shape.width + f->shape.margin};
     bst_light_wrap_axis wy = {y->pixels, f->cells_y, (double)f->cell * y->pixels / y->samples,
@@ -291,6 +303,7 @@ void bst_light_fft_free(bst_light_fft *f) {
     }
     for (int i = 0; f->benches && i < f->bench_count; i++) {
         free(f->benches[i].line);
+        free(f->benches[i].wings);
     }
     bst_light_wrap_free(f->wrap);
     free(f->sum);
@@ -300,7 +313,7 @@ void bst_light_fft_free(bst_light_fft *f) {
     free(f->first_strip);
     free(f->benches);
     free(f->cells);
-    free(f->stretches);
+    free(f->shares);
     free(f->table);
     free(f->kernel_x);
     free(f->kernel_y);
@@ -326,6 +339,15 @@ static bench *take_bench(bst_light_fft *f) {
         if (!atomic_flag_test_and_set(&f->benches[i].taken)) {
             return &f->benches[i];
         }
+    }
+}
+
+/* A block of memory far from what was used last, which is soon written; it may lie beyond the end.
+ */
+BST_LANES_INLINE void fetch_block(const bst_batch *to) {
+    for (int l = 0; l < BLOCK; l++) {
+        __builtin_prefetch(&to[l].re, 1);
+        __builtin_prefetch(&to[l].im, 1);
     }
 }
 
@@ -367,6 +389,8 @@ static void store_strip(const bst_light_fft *f, const strip *s, const bst_batch 
     const int *order = bst_batch_fft_order(f->row_forward);
     int samples = f->shape.x.samples;
     bst_lanes part[4][BLOCK];
+    fetch_block(a + f->strip_pitch);
+    fetch_block((b ? b : a) + f->strip_pitch);
     for (int l = 0; l < BLOCK; l++) {
         int k = s->k0 + l;
         if (abs(k) >= f->used) {
@@ -449,6 +473,7 @@ static void store_image(const bst_light_fft *f, int block, const bst_batch *line
     for (int j = 0; j < f->image_blocks; j++, order += BLOCK) {
         bst_batch *to = f->image + (size_t)j * f->image_pitch + (size_t)block * BLOCK;
         bst_lanes re[BLOCK], im[BLOCK];
+        fetch_block(to + f->image_pitch);
         for (int r = 0; r < BLOCK; r++) {
             re[r] = line[order[r]].im;
             im[r] = line[order[r]].re;
@@ -461,20 +486,35 @@ static void store_image(const bst_light_fft *f, int block, const bst_batch *line
     }
 }
 
-/* Blocks of the image's columns. */
+/* Far wings of all nodes' light, in place of it. */
+static void run_wrap(bst_light_fft *f) {
+    float scale = (float)(1.0 / (f->kernel_x[0] * f->kernel_y[0]));
+    size_t count = (size_t)f->cells_x * (size_t)f->cells_y;
+    for (size_t i = 0; i < count; i++) {
+        f->cells[i] *= scale;
+    }
+    bst_light_wrap_run(f->wrap, f->cells);
+}
+
+/* Blocks of the image's columns; before them, with the last node, the far wings. */
 static void columns(void *user, int begin, int end) {
     const pass *p = user;
     bst_light_fft *f = p->fft;
     bench *w = take_bench(f);
     size_t pixels = (size_t)f->shape.y.pixels;
-    for (int c = begin; c < end; c++) {
+    for (int i = begin; i < end; i++) {
+        int c = i - (p->last && f->wrap);
+        if (c < 0) {
+            run_wrap(f);
+            continue;
+        }
         bst_batch *sum = f->sum ? f->sum + (size_t)c * pixels : w->line;
         if (p->first) {
             memset(sum, 0, pixels * sizeof *sum);
         }
-        for (int i = f->first_strip[c]; i < f->first_strip[c + 1]; i++) {
-            const strip *s = &f->strips[i];
-            bst_batch *line = f->spectrum + (size_t)i * f->strip_pitch;
+        for (const strip *s = f->strips + f->first_strip[c]; s < f->strips + f->first_strip[c + 1];
+             s++) {
+            bst_batch *line = f->spectrum + (size_t)(s - f->strips) * f->strip_pitch;
             bst_batch_fft_run(f->column_forward, line);
             fold(f, s, f->table[p->node] + s->first, line, sum);
         }
@@ -489,26 +529,19 @@ static void columns(void *user, int begin, int end) {
 void bst_light_fft_add(bst_light_fft *f, int node, bool first, bool last, const float *grid) {
     pass p = {.fft = f, .grid = grid, .node = node, .first = first, .last = last};
     bst_parallel_for(f->pool, (f->row_blocks + 1) / 2, 1, rows_forward, &p);
-    bst_parallel_for(f->pool, f->column_blocks, 1, columns, &p);
+    bst_parallel_for(f->pool, f->column_blocks + (last && f->wrap), 1, columns, &p);
 }
 
 /* ------------------------------------------------------------------ rows inverse */
 
-/* Adds the far wings of a row, linearly between the cells' centres. */
+/* Far wings of a row at the cells' centres. */
 BST_LANES_FUNCTION
-static void add_wings(const bst_light_fft *f, int row, float *image) {
+static void row_of_wings(const bst_light_fft *f, int row, float *out) {
     int j;
     float v = (float)cell_place(f, &f->shape.y, f->cells_y, row, &j);
     const float *a = f->cells + (size_t)j * (size_t)f->cells_x, *b = a + f->cells_x;
-    float step = (float)((double)f->shape.x.samples / f->shape.x.pixels / f->cell);
-    for (int n = 0; n < f->stretch_count; n++) {
-        const stretch *s = &f->stretches[n];
-        int i = s->cell, end = n + 1 < f->stretch_count ? s[1].begin : f->shape.width;
-        float left = a[i] + v * (b[i] - a[i]), right = a[i + 1] + v * (b[i + 1] - a[i + 1]);
-        float base = left + s->place * (right - left), slope = step * (right - left);
-        for (int k = 0; k < end - s->begin; k++) {
-            image[s->begin + k] += base + slope * (float)k;
-        }
+    for (int i = 0; i < f->cells_x; i++) {
+        out[i] = a[i] + v * (b[i] - a[i]);
     }
 }
 
@@ -529,10 +562,11 @@ static void join_rows(const bst_light_fft *f, const bst_batch *a, const bst_batc
     }
 }
 
-/* One block of rows of the image from a part of the joined rows. */
+/* One block of rows of the image from a part of the joined rows, with the far wings of those rows
+ * (NULL: there are none). */
 BST_LANES_FUNCTION
 static void store_rows(const bst_light_fft *f, const bst_batch *line, bool imaginary, int rows,
-                       float *image) {
+                       const float *wings, float *image) {
     const int *order = bst_batch_fft_order(f->row_inverse) + f->shape.margin;
     for (int x = 0; x < f->shape.width; x += BLOCK) {
         bst_lanes v[BLOCK];
@@ -540,7 +574,13 @@ static void store_rows(const bst_light_fft *f, const bst_batch *line, bool imagi
             v[l] = imaginary ? line[order[x + l]].re : line[order[x + l]].im;
         }
         bst_lanes_transpose(v);
+        const cell_shares *s = &f->shares[x / BLOCK];
+        const float *w = wings ? wings + s->cell : NULL;
         for (int r = 0; r < rows; r++) {
+            for (int k = 0; w && k < SHARES; k++) {
+                v[r] += w[k] * s->share[k];
+            }
+            w += w ? f->cells_x + SHARES : 0;
             *(bst_lanes *)(image + (size_t)r * (size_t)f->pitch + x) = v[r];
         }
     }
@@ -560,24 +600,16 @@ static void rows_inverse(void *user, int begin, int end) {
             int top = k * BLOCK, rows = f->shape.height - top;
             rows = rows < BLOCK ? rows : BLOCK;
             float *image = p->image + (size_t)top * (size_t)f->pitch;
-            store_rows(f, w->line, k > a, rows, image);
             for (int r = 0; f->wrap && r < rows; r++) {
-                add_wings(f, top + r, image + (size_t)r * (size_t)f->pitch);
+                row_of_wings(f, top + r, w->wings + (size_t)r * (size_t)(f->cells_x + SHARES));
             }
+            store_rows(f, w->line, k > a, rows, f->wrap ? w->wings : NULL, image);
         }
     }
     atomic_flag_clear(&w->taken);
 }
 
 void bst_light_fft_finish(bst_light_fft *f, float *image) {
-    if (f->wrap) {
-        float scale = (float)(1.0 / (f->kernel_x[0] * f->kernel_y[0]));
-        size_t count = (size_t)f->cells_x * (size_t)f->cells_y;
-        for (size_t i = 0; i < count; i++) {
-            f->cells[i] *= scale;
-        }
-        bst_light_wrap_run(f->wrap, f->cells);
-    }
     pass p = {.fft = f, .image = image};
     bst_parallel_for(f->pool, (f->image_blocks + 1) / 2, 1, rows_inverse, &p);
 }
