@@ -9,6 +9,7 @@
 #include "bst_scenegen_kernels.h"
 #include "scenegen/kernels/deposit_shared.h"
 #include "scenegen/light_fft.h"
+#include "scenegen/place.h"
 
 enum { SETUPS = 4, FIELD_STEP_PX = 16, WRAP_PX = 96 };
 
@@ -76,9 +77,9 @@ static bst_status build(bst_ctx *ctx, bst_device *device, bst_fft_light *l) {
                                           &bst_kernel_deposit};
     char options[256];
     snprintf(options, sizeof options,
-             "-cl-std=CL1.2 -DDEPOSIT_W=%d -DDEPOSIT_H=%d -DDEPOSIT_GROUP=%d%s%s", l->tile_width,
-             l->tile_height, l->group, l->nodes > 1 ? " -DFIELD" : "",
-             l->group == 1 ? " -DNEAR_CACHE" : "");
+             "-cl-std=CL1.2 -DDEPOSIT_W=%d -DDEPOSIT_H=%d -DDEPOSIT_GROUP=%d -DPLACE_BITS=%d%s%s",
+             l->tile_width, l->tile_height, l->group, bst_place_bits(&l->camera),
+             l->nodes > 1 ? " -DFIELD" : "", l->group == 1 ? " -DNEAR_CACHE" : "");
     BST_TRY(bst_device_build(ctx, device, sources, 3, options, &l->program));
     cl_int code;
     l->kernel = clCreateKernel(l->program, "bst_light_deposit", &code);

@@ -289,6 +289,27 @@ static double second_norm(const moments *g, double u) {
     return v > 0.0 ? g->along[4] - u * (6.0 * v + 3.0 * u) - third * third / v - v * v : 0.0;
 }
 
+/* The norm of the second polynomial of the moments without the widening, which is what the bend
+ * leaves over of `trace`: one follows from the other. false when little of the line is left, where
+ * its bend would be a guess. *norm: before, without widening; after, with. */
+static bool widened_norm(const moments *g, double trace, double bend2, double per_trace,
+                         double *norm) {
+    double low = 0.5 * *norm, high = *norm;
+    for (int round = 0; round < 32 && high > 0.0; round++) {
+        double middle = round == 0 ? low : 0.5 * (low + high);
+        double found = second_norm(g, fmax(trace - bend2 / middle, 0.0) * per_trace);
+        if (found > middle) {
+            low = middle;
+        } else if (round == 0) {
+            return false;
+        } else {
+            high = middle;
+        }
+    }
+    *norm = low;
+    return low > 0.0;
+}
+
 /* Fills the rule and its error: what it misses of the image, over the peak. */
 static void try_rule(const maker *m, const moments *g, int n, bool widen, bool split, rule *r) {
     double var = m->variance, d[3][3];
@@ -306,13 +327,10 @@ static void try_rule(const maker *m, const moments *g, int n, bool widen, bool s
     if (n == 3) {
         double bend2 = g->bend[0] * g->bend[0] + g->bend[1] * g->bend[1];
         double norm = second_norm(g, 0.0);
-        /* the polynomial is that of the moments without the widening, which is what the bend leaves
-         * over: each in turn */
-        for (int round = 0; widen && round < 8 && norm > 0.0; round++) {
-            norm = second_norm(g, fmax(trace - bend2 / norm, 0.0) * per_trace);
+        if (widen && !widened_norm(g, trace, bend2, per_trace, &norm)) {
+            return;
         }
-        /* where little of the line is left, its bend is a guess */
-        if (!(norm > 0.5 * second_norm(g, 0.0))) {
+        if (!(norm > 0.0)) {
             return;
         }
         for (int i = 0; i < 3; i++) {

@@ -104,8 +104,6 @@ bst_scene_params bst_render_params(const bst_camera *c, const bst_renderer_optio
         .tiles_x = (w.x0 + w.width - x0 + options->tile_width - 1) / options->tile_width,
         .tiles_y = (w.height + options->tile_height - 1) / options->tile_height,
         .source_groups = (sources + BST_BLOCK - 1) / BST_BLOCK,
-        .centre_x = (float)bst_camera_centre_x(c),
-        .centre_y = (float)bst_camera_centre_y(c),
         .key0 = q->key.k[0],
         .key1 = q->key.k[1],
         .exposure_low = (unsigned)((uint64_t)q->exposure_id & 0xFFFFFFFFu),

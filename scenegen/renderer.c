@@ -10,6 +10,7 @@
 #include "scenegen/detector.h"
 #include "scenegen/fft_light.h"
 #include "scenegen/frame_pool.h"
+#include "scenegen/place.h"
 #include "scenegen/profile_law.h"
 #include "scenegen/readout.h"
 #include "scenegen/reference.h"
@@ -22,7 +23,8 @@
 #include "scenegen/tiles.h"
 #include "sim/world/skylight.h"
 
-enum { MAX_TAPS = 512 };
+enum { MAX_TAPS = BST_PLACE_TAPS };
+
 /* A device buffer that grows. */
 typedef struct growing {
     cl_mem buffer;
@@ -40,6 +42,7 @@ struct bst_renderer {
     bst_psf *psf;
     bst_fft_light *fft_light; /* NULL: the PSF is a Gaussian, light comes from stamps */
     bst_smear *smear;
+    bst_crowd *crowd;
     bst_detector *detector;
     bst_readout *readout;
     bst_rolling *rolling; /* NULL: all rows are exposed at once */
@@ -155,7 +158,6 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     bst_smear_options smear = {
         .tolerance_sigma = r->options.tolerance_sigma * (rolling ? 0.5 : 1.0),
         .taps = r->taps,
-        .profile_error = BST_LAW_ERROR,
         .motion = r->options.motion,
         .temporal_oversample = r->options.temporal_oversample,
         .stamp_radius_px = r->options.stamp_radius_px};
@@ -174,13 +176,17 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
             bst_profile_law_buffer(ctx, r->context, sigma_px, r->law_degree, r->taps / 2, &r->law);
     }
     if (status == BST_OK && r->law_degree > 0) {
-        smear.profile_error = fmax(BST_LAW_ERROR, bst_profile_law_error(sigma_px, r->law_degree));
+        smear.law_error = bst_profile_law_error(sigma_px, r->law_degree);
+        smear.law_widest = bst_profile_law_widest(sigma_px, r->law_degree);
     }
     if (status == BST_OK) {
         status = build(ctx, r, device);
     }
     if (status == BST_OK) {
         status = bst_smear_create(ctx, camera, &smear, &r->smear);
+    }
+    if (status == BST_OK) {
+        status = bst_crowd_create(ctx, &r->crowd);
     }
     if (status == BST_OK) {
         status = bst_stage_create(ctx, device, &r->stage);
@@ -230,6 +236,7 @@ void bst_renderer_free(bst_renderer *r) {
     bst_stage_free(r->stage);
     bst_frame_pool_free(r->pool);
     bst_smear_free(r->smear);
+    bst_crowd_free(r->crowd);
     bst_fft_light_free(r->fft_light);
     bst_psf_free(r->psf);
     bst_readout_free(r->readout);
@@ -244,15 +251,11 @@ void bst_renderer_free(bst_renderer *r) {
 
 /* Chooses nodes and stamps of all sources: fills plan and stats. */
 static bst_status make_plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q) {
-    BST_TRY(bst_scene_plan_make(ctx, &r->plan, &r->camera, r->smear, r->fft_light, r->most_bytes,
-                                bst_renderer_margin_px(r), q));
+    BST_TRY(bst_scene_plan_make(ctx, &r->plan, &r->camera, r->smear, r->crowd, r->fft_light,
+                                r->most_bytes, bst_renderer_margin_px(r), q));
     r->stats = (bst_render_stats){.sources = r->plan.count,
                                   .nodes = (long long)r->plan.blocks * BST_BLOCK,
-                                  .predicted_sigma = r->plan.predicted_sigma,
                                   .single_kernel = bst_smear_single(r->smear)};
-    if (r->options.temporal_oversample > 0 || r->options.spatial_oversample > 0) {
-        r->stats.predicted_sigma = NAN;
-    }
     return BST_OK;
 }
 
@@ -283,16 +286,15 @@ static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, const bst_scene_p
     if (count == 0) {
         return BST_OK;
     }
-    const void *values[] = {p,
-                            &r->sources,
+    const void *values[] = {&r->sources,
                             &count,
                             &r->table,
                             &r->block_box.buffer,
                             &r->source_box.buffer,
                             &r->group_box.buffer,
                             &r->nodes.buffer};
-    const size_t m = sizeof(cl_mem), bytes[] = {sizeof *p, m, sizeof count, m, m, m, m, m};
-    BST_TRY(set_args(ctx, r->nodes_kernel, values, bytes, 8));
+    const size_t m = sizeof(cl_mem), bytes[] = {m, sizeof count, m, m, m, m, m};
+    BST_TRY(set_args(ctx, r->nodes_kernel, values, bytes, 7));
     size_t global = groups * BST_BLOCK, local = BST_BLOCK;
     return bst_device_check(
         ctx,
@@ -441,16 +443,13 @@ static bst_status enqueue_image(bst_ctx *ctx, bst_renderer *r, const bst_render_
         BST_TRY(enqueue_tiles(ctx, r, &band, &to));
         to.first_tile = to.saturated ? r->tiles[r->set] : 0;
         all.single_kernel = all.single_kernel && r->stats.single_kernel;
-        all.predicted_sigma = fmax(all.predicted_sigma,
-                                   r->stats.predicted_sigma + bst_rolling_error_sigma(r->rolling));
+        all.predicted_sigma = fmax(all.predicted_sigma, bst_crowd_error_sigma(r->crowd) +
+                                                            bst_rolling_error_sigma(r->rolling));
         for (int i = 0; i < band.count; i++) {
             double *peak_e = &r->rolled_peak_e[bst_rolling_source(r->rolling, i)];
             all.sources += *peak_e == 0.0 && r->plan.peak_e[i] > 0.0;
             *peak_e = fmax(*peak_e, r->plan.peak_e[i]);
         }
-    }
-    if (isnan(r->stats.predicted_sigma)) {
-        all.predicted_sigma = NAN;
     }
     r->stats = all;
     return BST_OK;
@@ -554,7 +553,12 @@ long long bst_renderer_saturated_frames(const bst_renderer *r) {
 }
 
 void bst_renderer_get_stats(const bst_renderer *r, bst_render_stats *out) {
+    bool foreseen = r->options.temporal_oversample <= 0 && r->options.spatial_oversample <= 0;
     *out = r->stats;
+    if (!r->rolled) {
+        out->predicted_sigma = bst_crowd_error_sigma(r->crowd);
+    }
+    out->predicted_sigma = foreseen ? out->predicted_sigma : NAN;
 }
 
 double bst_renderer_peak_e(const bst_renderer *r, int index) {

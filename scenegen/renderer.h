@@ -63,13 +63,14 @@ typedef struct bst_render_request {
 
 /* What the latest rendering took and did. */
 typedef struct bst_render_stats {
-    int sources;            /* drawn */
-    long long nodes;        /* all sources, filled blocks included */
-    double predicted_sigma; /* largest predicted error of a source's image, sigma; NAN with
-                               temporal_oversample or spatial_oversample */
-    bool single_kernel;     /* the stars followed one track */
-    int hits;               /* radiation hits on the sensor */
-    double hits_e;          /* their charge */
+    int sources;     /* drawn */
+    long long nodes; /* all sources, filled blocks included */
+    double
+        predicted_sigma; /* largest error of the image that is expected in any pixel, in its sigma
+                            (crowd.h); NAN with temporal_oversample or spatial_oversample */
+    bool single_kernel;  /* the stars followed one track */
+    int hits;            /* radiation hits on the sensor */
+    double hits_e;       /* their charge */
 } bst_render_stats;
 
 /* Renders; does not wait. *out gets a frame with one reference. */
@@ -94,6 +95,7 @@ bst_status bst_renderer_saturated(bst_ctx *ctx, bst_renderer *renderer,
  * bst_renderer_saturated has been asked. Does not wait. */
 long long bst_renderer_saturated_frames(const bst_renderer *renderer);
 
+/* The first call after a request takes 0.1 us per source for the predicted error. */
 void bst_renderer_get_stats(const bst_renderer *renderer, bst_render_stats *out);
 
 /* Expected electrons of source `index` (of the latest request) in its brightest pixel, without

@@ -43,7 +43,7 @@ static void put_in_order(bst_scene_plan *p, const bst_camera *camera) {
 }
 
 bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera *camera,
-                               bst_smear *smear, const bst_fft_light *fft_light,
+                               bst_smear *smear, bst_crowd *crowd, const bst_fft_light *fft_light,
                                uint64_t most_bytes, double margin_px, const bst_render_request *q) {
     double read = camera->read_noise_e, brightest = 0.0;
     BST_TRY(reserve(ctx, p, q->count));
@@ -51,15 +51,16 @@ bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera
         brightest = q->sources[i].path ? brightest : fmax(brightest, q->sources[i].electrons_per_s);
     }
     double least_e = q->background_e + (q->background ? q->background->least_e : 0.0);
-    double dark_sigma_e = sqrt(q->background_e + read * read);
-    bst_smear_frame frame = {q->track, q->window, margin_px, least_e + read * read, brightest};
+    double dark_e2 = fmax(least_e + read * read, 1e-2);
+    bst_smear_frame frame = {q->track, q->window, margin_px, dark_e2, brightest};
     BST_TRY(bst_smear_begin(ctx, smear, &frame));
+    bst_crowd_motion motion = bst_smear_motion(smear);
+    bst_crowd_begin(crowd, &motion);
     const uint64_t counted = (uint64_t)INT32_MAX * sizeof(float); /* by the kernels, in int */
     uint64_t most = most_bytes < counted ? most_bytes : counted;
     /* two blocks have a whole group of boxes */
     int most_blocks = (int)(most / (fft_light ? BST_NODE_BYTES : BST_BLOCK / 2 * BST_BOX_BYTES));
     p->count = 0;
-    p->predicted_sigma = 0.0;
     for (int i = 0, blocks = 0; i < q->count; i++) {
         bst_scene_source *s = &p->list[p->count];
         bool visible;
@@ -77,13 +78,13 @@ bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera
         }
         blocks += s->blocks;
         p->count++;
-        double error = bst_smear_last_error_sigma(smear);
-        if (fft_light) {
+        bst_crowd_source error = *bst_smear_last_error(smear);
+        if (fft_light) { /* of its grid, on dark pixels too */
+            double grid_e = bst_fft_light_error(fft_light) * p->peak_e[i];
+            error.excess_e += (float)(grid_e * sqrt(1.0 + p->peak_e[i] / dark_e2));
             bst_fft_light_stamp(fft_light, s);
-            /* of the grid, on dark pixels */
-            error += bst_fft_light_error(fft_light) * p->peak_e[i] / dark_sigma_e;
         }
-        p->predicted_sigma = fmax(p->predicted_sigma, error);
+        BST_TRY(bst_crowd_add(ctx, crowd, &error));
     }
     put_in_order(p, camera);
     return BST_OK;

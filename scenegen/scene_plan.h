@@ -2,6 +2,7 @@
 #ifndef BST_SCENEGEN_SCENE_PLAN_H
 #define BST_SCENEGEN_SCENE_PLAN_H
 
+#include "scenegen/crowd.h"
 #include "scenegen/fft_light.h"
 #include "scenegen/renderer.h"
 #include "scenegen/smear.h"
@@ -12,16 +13,15 @@ typedef struct bst_scene_plan {
     int blocks;     /* of their nodes */
     int boxes;      /* of the blocks, by groups of BST_BLOCK */
     double *peak_e; /* of all sources of the request: most expected electrons on one pixel */
-    double predicted_sigma; /* largest predicted error of a source's image, sigma */
     bst_scene_source *list; /* scratch */
     int capacity;
 } bst_scene_plan;
 
-/* Plans a request with a smear, which is begun for it. fft_light: the Fourier path, or NULL where
- * stamps are drawn. most_bytes: of one buffer on the device; BST_ERR_RANGE when the nodes would
- * need more. margin_px: reach of the light of a source. */
+/* Plans a request with a smear and a crowd, which are begun for it. fft_light: the Fourier path, or
+ * NULL where stamps are drawn. most_bytes: of one buffer on the device; BST_ERR_RANGE when the
+ * nodes would need more. margin_px: reach of the light of a source. */
 bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *plan, const bst_camera *camera,
-                               bst_smear *smear, const bst_fft_light *fft_light,
+                               bst_smear *smear, bst_crowd *crowd, const bst_fft_light *fft_light,
                                uint64_t most_bytes, double margin_px,
                                const bst_render_request *request) BST_MUST_CHECK;
 

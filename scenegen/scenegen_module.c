@@ -325,6 +325,9 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
     bst_renderer_get_stats(s->renderer, &stats);
     truth->hits = stats.hits;
     truth->hits_e = stats.hits_e;
+    truth->error_sigma = stats.predicted_sigma;
+    truth->nodes = stats.nodes;
+    truth->one_track = stats.single_kernel;
     /* while the device renders */
     BST_TRY(write_items(ctx, s, &track, sources, count, e, truth, capacity));
     if (truth->lost > 0) {

@@ -5,6 +5,7 @@
 
 #include <stdbool.h>
 
+#include "scenegen/crowd.h"
 #include "scenegen/kernels/scene_shared.h"
 #include "sim/world/field.h"
 
@@ -20,7 +21,9 @@ typedef enum bst_star_motion {
 typedef struct bst_smear_options {
     double tolerance_sigma; /* error of a source's image in any pixel, in that pixel's sigma */
     int taps;               /* length of the longest profile, px */
-    double profile_error;   /* of a node's image by the profile law, over its peak */
+    /* of stamps: what the profile law misses of nodes as wide as the PSF, over the peak, and the
+     * widening up to which it serves, PSF variances (scenegen/profile_law.h); 0: there is none */
+    double law_error, law_widest;
     bst_star_motion motion;
     int temporal_oversample; /* 0: by the tolerance; else so many equal parts of the exposure */
     int stamp_radius_px;     /* 0: by the tolerance; else of all stamps */
@@ -58,10 +61,13 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *smear, const bst_source *so
 /* Largest expected electrons in one pixel of the source given last. */
 double bst_smear_last_peak_e(const bst_smear *smear);
 
-/* Predicted error of the image of the source given last, in sigma of its worst pixel: at most
- * tolerance_sigma, unless the brightest level of detail does not reach it or a knob other than the
- * tolerance forbids it; NAN with temporal_oversample, whose error is not foreseen. */
-double bst_smear_last_error_sigma(const bst_smear *smear);
+/* Predicted error of the image of the source given last: in its worst pixel at most tolerance_sigma
+ * of that pixel's sigma, unless the brightest level of detail does not reach it or a knob other
+ * than the tolerance forbids it. With temporal_oversample errors are not foreseen. */
+const bst_crowd_source *bst_smear_last_error(const bst_smear *smear);
+
+/* How the frame's stars move. */
+bst_crowd_motion bst_smear_motion(const bst_smear *smear);
 
 /* The frame's node table so far: *blocks blocks of BST_TABLE_ROWS x BST_BLOCK floats. */
 const float *bst_smear_table(const bst_smear *smear, int *blocks);

@@ -1,6 +1,6 @@
 /* Light of all nodes on a grid for the Fourier path: each node is spread over eight by eight samples.
  * Options: DEPOSIT_W, DEPOSIT_H (samples of a tile, a multiple of 16 high), DEPOSIT_GROUP (work-items
- * per work-group), FIELD (weights by place), NEAR_CACHE (memory has one address space, and what lies
+ * per work-group), PLACE_BITS (of the nodes' places), FIELD (weights by place), NEAR_CACHE (memory has one address space, and what lies
  * in it can be fetched ahead).
  *
  * One work-item owns a tile and adds its nodes in the order of sources, blocks and nodes: the sum is
@@ -121,7 +121,10 @@ static void deposit_team(local float *sum, const deposit_nodes *b, int n, int co
 /* Places one block's nodes; returns whether any of them reaches the tile. */
 static int place_nodes(bst_deposit_params p, int tile_x, int tile_y, global const float16 *block,
                        global const float *field, deposit_nodes *out) {
-    float16 u = (block[0] - p.x0) * p.density_x, v = (block[1] - p.y0) * p.density_y;
+    const float px = 1.0f / (float)(1 << PLACE_BITS);
+    float16 x = convert_float16(as_int16(block[0])) * px;
+    float16 y = convert_float16(as_int16(block[1])) * px;
+    float16 u = (x - p.x0) * p.density_x, v = (y - p.y0) * p.density_y;
     float16 floor_u = floor(u), floor_v = floor(v);
     const float before = BST_SPREAD_TAPS / 2 - 1, after = BST_SPREAD_TAPS / 2;
     float16 column = floor_u - (before + (float)tile_x), row = floor_v - (before + (float)tile_y);
@@ -141,11 +144,11 @@ static int place_nodes(bst_deposit_params p, int tile_x, int tile_y, global cons
     float16 level = fmin(floor(width), BST_WIDTHS - 1.0f);
     float16 base = level * (float)(BST_SPREAD_PHASES + 1);
 #ifdef FIELD
-    float px[16], py[16], e[16];
-    vstore16(block[0], 0, px);
-    vstore16(block[1], 0, py);
+    float at_x[16], at_y[16], e[16];
+    vstore16(x, 0, at_x);
+    vstore16(y, 0, at_y);
     for (int n = 0; n < BST_BLOCK; n++) {
-        e[n] = field_weight(p, field, px[n], py[n]);
+        e[n] = field_weight(p, field, at_x[n], at_y[n]);
     }
     electrons *= vload16(0, e);
 #endif

@@ -13,6 +13,17 @@ static float min_of(float16 v) {
     return -max_of(-v);
 }
 
+static int most_of(int16 v) {
+    int8 a = max(v.lo, v.hi);
+    int4 b = max(a.lo, a.hi);
+    int2 c = max(b.lo, b.hi);
+    return max(c.lo, c.hi);
+}
+
+static int least_of(int16 v) {
+    return -most_of(-v);
+}
+
 #ifdef FFT_LIGHT
 /* Row of the Fourier path's table, and the share of the way to the next. */
 static float16 width_of(float16 widening) {
@@ -30,64 +41,62 @@ static float16 width_of(float16 widening) {
 #ifdef DISTORTED
 /* Distortion (sim/world/camera.h); k1, k2, k3, p1, p2 in pixels instead of tangents. What lies
  * beyond the fold gives no light on the sensor. */
-static void add_distortion(float16 *x, float16 *y, float16 *stretch2) {
-    float16 s = *x * *x + *y * *y;
+static void add_distortion(float16 x, float16 y, float16 *dx, float16 *dy, float16 *stretch2) {
+    float16 s = x * x + y * y;
     float16 l = s * (K1 + s * (K2 + s * K3));
-    float16 xy = 2.0f * *x * *y;
-    float16 dx = *x * l + P1 * xy + P2 * (s + 2.0f * *x * *x);
-    float16 dy = *y * l + P1 * (s + 2.0f * *y * *y) + P2 * xy;
+    float16 xy = 2.0f * x * y;
+    *dx += x * l + P1 * xy + P2 * (s + 2.0f * x * x);
+    *dy += y * l + P1 * (s + 2.0f * y * y) + P2 * xy;
     /* mean square scale of the map there: half the sum of the squared derivatives */
     float16 r = 2.0f * (K1 + s * (2.0f * K2 + s * 3.0f * K3));
-    float16 xx = 1.0f + l + *x * *x * r + 2.0f * P1 * *y + 6.0f * P2 * *x;
-    float16 yy = 1.0f + l + *y * *y * r + 6.0f * P1 * *y + 2.0f * P2 * *x;
-    float16 off = *x * *y * r + 2.0f * P1 * *x + 2.0f * P2 * *y;
+    float16 xx = 1.0f + l + x * x * r + 2.0f * P1 * y + 6.0f * P2 * x;
+    float16 yy = 1.0f + l + y * y * r + 6.0f * P1 * y + 2.0f * P2 * x;
+    float16 off = x * y * r + 2.0f * P1 * x + 2.0f * P2 * y;
     *stretch2 = 0.5f * (xx * xx + yy * yy) + off * off;
-    *x = select(*x + dx, (float16)(1e6f), s > FOLD2);
-    *y = select(*y + dy, (float16)(1e6f), s > FOLD2);
+    *dx = select(*dx, (float16)(1e9f), s > FOLD2);
+    *dy = select(*dy, (float16)(1e9f), s > FOLD2);
 }
 #endif
 
-#ifdef SPATIAL_OVERSAMPLE
-/* Of the parts into which a pixel is cut along each axis. */
-static float16 centre_of_part(float16 v) {
-    float16 pixel = floor(v + 0.5f);
-    float16 part = floor((v + 0.5f - pixel) * SPATIAL_OVERSAMPLE) + 0.5f;
-    return pixel + part * (1.0f / SPATIAL_OVERSAMPLE) - 0.5f;
-}
+/* `from` pixels and `way` more from the boresight, the first also as `place` on the sensor: on the
+ * sensor, in parts of a pixel. Far outside any sensor all places are alike, and so are those that
+ * are no numbers. */
+static int16 place_on_sensor(int place, float from, float16 way) {
+    const float parts = (float)(1 << PLACE_BITS), limit = (float)BST_PLACE_LIMIT;
+    float16 moved = clamp(way * parts, -2.0f * limit, 2.0f * limit);
+    int16 at = place + convert_int16(floor(moved + 0.5f));
+    at = select((int16)(BST_PLACE_LIMIT), at, fabs(from + way) * parts <= limit);
+#ifdef SPATIAL_OVERSAMPLE /* the centre of one of the parts into which a pixel is cut */
+    int16 whole = (at + (1 << (PLACE_BITS - 1))) >> PLACE_BITS;
+    float16 rest = convert_float16(at - (whole << PLACE_BITS)) * (1.0f / parts) + 0.5f;
+    float16 part = (floor(rest * SPATIAL_OVERSAMPLE) + 0.5f) * (1.0f / SPATIAL_OVERSAMPLE);
+    at = (whole << PLACE_BITS) + convert_int16(floor((part - 0.5f) * parts + 0.5f));
 #endif
+    return at;
+}
 
-/* A block of nodes on the sensor: x, y in px, electrons, width_of. */
+/* A block of nodes: place on the sensor in parts of a pixel, electrons, width_of. */
 typedef struct node_block {
-    float16 x, y, electrons, width;
+    int16 x, y;
+    float16 electrons, width;
 } node_block;
 
-/* Block b of a source. Far outside any sensor all places are alike, which keeps the integer maths
- * in range. */
-static node_block nodes_of(bst_scene_params p, bst_scene_source s, int b,
-                           global const float16 *table) {
+/* Block b of a source. */
+static node_block nodes_of(bst_scene_source s, int b, global const float16 *table) {
     global const float16 *t = table + (s.first_table + b) * BST_TABLE_ROWS;
     node_block out;
     float16 depth = t[6] * s.x_px + t[7] * s.y_px;
     float16 scale = 1.0f / (depth + t[8]);
     float16 dx = (t[0] * s.x_px + t[1] * s.y_px + t[2] - depth * s.x_px) * scale;
     float16 dy = (t[3] * s.x_px + t[4] * s.y_px + t[5] - depth * s.y_px) * scale;
-#ifdef DISTORTED
-    dx += s.x_px;
-    dy += s.y_px;
-    float16 stretch2;
-    add_distortion(&dx, &dy, &stretch2);
-    float16 widening = t[10] * stretch2;
-    out.x = clamp(p.centre_x + dx, -1e6f, 1e6f);
-    out.y = clamp(p.centre_y + dy, -1e6f, 1e6f);
-#else
     float16 widening = t[10];
-    out.x = clamp(p.centre_x + s.x_px + dx, -1e6f, 1e6f);
-    out.y = clamp(p.centre_y + s.y_px + dy, -1e6f, 1e6f);
+#ifdef DISTORTED
+    float16 stretch2;
+    add_distortion(s.x_px + dx, s.y_px + dy, &dx, &dy, &stretch2);
+    widening *= stretch2;
 #endif
-#ifdef SPATIAL_OVERSAMPLE
-    out.x = centre_of_part(out.x);
-    out.y = centre_of_part(out.y);
-#endif
+    out.x = place_on_sensor(s.place_x, s.x_px, dx);
+    out.y = place_on_sensor(s.place_y, s.y_px, dy);
     out.electrons = t[9] * s.electrons;
     out.width = width_of(widening);
     return out;
@@ -98,8 +107,8 @@ static node_block nodes_of(bst_scene_params p, bst_scene_source s, int b,
  * groups of sources. nodes (with FFT_LIGHT): per block x[16], y[16], electrons[16], width_of[16].
  */
 __attribute__((reqd_work_group_size(BST_BLOCK, 1, 1))) kernel void bst_scene_nodes(
-    bst_scene_params p, global const bst_scene_source *sources, int count,
-    global const float16 *table, global float *block_box, global float *source_box,
+    global const bst_scene_source *sources, int count, global const float16 *table,
+    global float *block_box, global float *source_box,
     global float *group_box, global float16 *nodes) {
     int i = (int)get_global_id(0), g = i / BST_BLOCK;
     global float *box = source_box + g * 4 * BST_BLOCK + i % BST_BLOCK;
@@ -108,17 +117,17 @@ __attribute__((reqd_work_group_size(BST_BLOCK, 1, 1))) kernel void bst_scene_nod
         bst_scene_source s = sources[i];
         float reach = (float)s.radius;
         for (int b = 0; b < s.blocks; b++) {
-            node_block n = nodes_of(p, s, b, table);
+            node_block n = nodes_of(s, b, table);
 #ifdef FFT_LIGHT
             int block = s.first_block + b;
-            nodes[BST_NODE_ROWS * block] = n.x;
-            nodes[BST_NODE_ROWS * block + 1] = n.y;
+            nodes[BST_NODE_ROWS * block] = as_float16(n.x);
+            nodes[BST_NODE_ROWS * block + 1] = as_float16(n.y);
             nodes[BST_NODE_ROWS * block + 2] = n.electrons;
             nodes[BST_NODE_ROWS * block + 3] = n.width;
 #endif
-            float4 r =
-                (float4)(floor(min_of(n.x)) - reach, floor(min_of(n.y)) - reach,
-                         floor(max_of(n.x)) + reach + 1.0f, floor(max_of(n.y)) + reach + 1.0f);
+            int16 x = n.x >> PLACE_BITS, y = n.y >> PLACE_BITS;
+            float4 r = (float4)((float)least_of(x) - reach, (float)least_of(y) - reach,
+                                (float)most_of(x) + reach + 1.0f, (float)most_of(y) + reach + 1.0f);
             if (s.blocks > 1) {
                 int lane = b % BST_BLOCK;
                 global float *at = block_box + (s.first_box * BST_BLOCK + b - lane) * 4 + lane;

@@ -13,8 +13,12 @@
 /* Floats per node of a node table: the homography from the reference attitude's tangent plane to
  * the node's, as nine coefficients, then the weight and the widening in PSF variances. */
 #define BST_TABLE_ROWS 11
-/* Vectors per block of the Fourier path's nodes: x, y, electrons, place in the table's widths. */
+/* Vectors per block of the Fourier path's nodes: x, y, electrons, place in the table's widths. x and
+ * y are integers, sensor pixels times 2^PLACE_BITS: floats would be rounded by up to 1e-4 px. */
 #define BST_NODE_ROWS 4
+/* Places from the boresight stay below this many parts of a pixel, so that sums of two fit an int.
+ */
+#define BST_PLACE_LIMIT (1 << 29)
 
 /* 32-bit members only, so that both languages lay it out alike. */
 typedef struct bst_scene_params {
@@ -24,7 +28,6 @@ typedef struct bst_scene_params {
     int tiles_x, tiles_y;
     int first_row, first_tile; /* of the frame: where the window is one of its bands */
     int source_groups; /* sources / BST_BLOCK, rounded up */
-    float centre_x, centre_y; /* of the camera, sensor px */
     unsigned key0, key1, exposure_low, exposure_high;
     float background_e; /* expected, per pixel: sky and dark current */
     float dark_e;       /* of it, dark current */
@@ -46,7 +49,8 @@ typedef struct bst_scene_params {
 
 /* One source on its way to its nodes. */
 typedef struct bst_scene_source {
-    float x_px, y_px; /* at the reference attitude, from the boresight, without distortion */
+    float x_px, y_px;     /* at the reference attitude, from the boresight, without distortion */
+    int place_x, place_y; /* the same on the sensor, px times 2^PLACE_BITS */
     float electrons;  /* in the exposure */
     int first_table;  /* block of the node table */
     int first_block;  /* block of the frame's nodes */

@@ -174,12 +174,6 @@ static void make_profiles(float16 within, float16 width, float16 height, int rad
     }
 }
 
-/* floor(v), |v| < 2^31 */
-INLINE int16 whole(float16 v) {
-    int16 n = convert_int16(v);
-    return n + (convert_float16(n) > v);
-}
-
 INLINE int16 team_min(int16 v) {
     v = min(v, v.s1032547698badcfe);
     return min(v, v.s23016745ab89efcd);
@@ -192,7 +186,11 @@ INLINE int16 team_max(int16 v) {
 
 static void place_nodes(node_block nodes, int tile_x, int tile_y, int radius,
                         global const float *law, splat_nodes *b) {
-    int16 x = whole(nodes.x), y = whole(nodes.y);
+    const int rest = (1 << PLACE_BITS) - 1;
+    const float px = 1.0f / (float)(1 << PLACE_BITS);
+    int16 x = nodes.x >> PLACE_BITS, y = nodes.y >> PLACE_BITS;
+    float16 within_x = convert_float16(nodes.x & rest) * px;
+    float16 within_y = convert_float16(nodes.y & rest) * px;
     int taps = 2 * radius + 2, octets = (taps + OCTET - 1) / OCTET * OCTET;
     for (; b->taps > octets; b->taps -= OCTET) {
         for (int n = 0; n < BST_BLOCK; n++) {
@@ -201,8 +199,8 @@ static void place_nodes(node_block nodes, int tile_x, int tile_y, int radius,
         }
     }
     b->taps = octets;
-    make_profiles(nodes.x - convert_float16(x), nodes.width, nodes.electrons, radius, law, b->x[0]);
-    make_profiles(nodes.y - convert_float16(y), nodes.width, (float16)1.0f, radius, law, b->y[0]);
+    make_profiles(within_x, nodes.width, nodes.electrons, radius, law, b->x[0]);
+    make_profiles(within_y, nodes.width, (float16)1.0f, radius, law, b->y[0]);
     int16 left = x - (radius + tile_x), top = y - (radius + tile_y);
     int16 left0 = team_min(left), left1 = team_max(left);
     int16 top0 = team_min(top), top1 = team_max(top);
@@ -281,7 +279,7 @@ INLINE int16 boxes_hit(global const float *box, int tile_x, int tile_y) {
            (vload16(3, box) >= (float)tile_y);
 }
 
-static void splat_source(bst_scene_params p, local float *sum, int tile_x, int tile_y,
+static void splat_source(local float *sum, int tile_x, int tile_y,
                          bst_scene_source s, global const float16 *table,
                          global const float *block_box, global const float *law, splat_nodes *b) {
     int hits[BST_BLOCK] = {1}, taps = 2 * s.radius + 2;
@@ -294,7 +292,7 @@ static void splat_source(bst_scene_params p, local float *sum, int tile_x, int t
             if (!hits[k]) {
                 continue;
             }
-            place_nodes(nodes_of(p, s, first + k, table), tile_x, tile_y, s.radius, law, b);
+            place_nodes(nodes_of(s, first + k, table), tile_x, tile_y, s.radius, law, b);
             for (int n = 0; n < BST_BLOCK; n += TEAM) {
                 if (b->near[n] && b->top1[n] - b->top0[n] <= SPREAD) {
                     splat_team(sum, b, n, taps);
@@ -339,7 +337,7 @@ static void splat_tile(bst_scene_params p, local float *sum, int tile_x, int til
             vstore16(boxes_hit(source_box + g * 4 * BST_BLOCK, tile_x, tile_y), 0, hits);
             for (int i = 0; i < BST_BLOCK; i++) {
                 if (hits[i]) {
-                    splat_source(p, sum, tile_x, tile_y, sources[g * BST_BLOCK + i], table,
+                    splat_source(sum, tile_x, tile_y, sources[g * BST_BLOCK + i], table,
                                  block_box, law, &b);
                 }
             }

@@ -152,8 +152,12 @@ typedef struct bst_truth {
     bst_vec3 sun_m;                        /* observer to Sun, mid */
     double boresight_x_px, boresight_y_px; /* where the boresight meets the focal plane */
     double background_e, dark_e;           /* expected electrons per pixel */
-    double hits_e;             /* charge of the radiation hits on the sensor, electrons */
-    int32_t hits;              /* radiation hits */
+    double hits_e;      /* charge of the radiation hits on the sensor, electrons */
+    int32_t hits;       /* radiation hits */
+    double error_sigma; /* largest error of the image expected in any pixel, in its noise; NAN: not
+                           foreseen */
+    int64_t nodes;      /* points that the sources' tracks became */
+    bool one_track;     /* the stars followed one track */
     double pixel_scale_arcsec; /* of this exposure */
     int32_t count, lost;       /* items; sources that found no room */
     bst_truth_item items[];

@@ -166,6 +166,9 @@ static bst_status exposure_row(bst_ctx *ctx, bst_recorder *recorder, int sensor,
     put_int(&r, t->lost);
     put_int(&r, t->hits);
     put_real(&r, t->hits_e);
+    put_real(&r, t->error_sigma);
+    put_int(&r, t->nodes);
+    put_int(&r, t->one_track);
     return append(ctx, recorder, BST_TABLE_EXPOSURES, &r);
 }
 

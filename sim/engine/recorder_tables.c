@@ -83,6 +83,9 @@ static const bst_column exposure_columns[] = {
     INT("lost", "", "sources that found no room"),
     INT("hits", "", "radiation hits on the sensor"),
     REAL("hits_e", "e-", "their charge"),
+    REAL("error_sigma", "", "largest rendering error expected in any pixel, in its noise"),
+    INT("nodes", "", "points that the sources' tracks became"),
+    INT("one_track", "", "1: the stars shared one track"),
 };
 static const bst_column truth_columns[] = {
     SENSOR,

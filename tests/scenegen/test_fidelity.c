@@ -160,6 +160,74 @@ static void predicted_errors_hold(void **state) {
     assert_true(ratio[CASES / 2] <= 5.0);
 }
 
+/* Stars that lie on one another, spread over the field or in clusters down to a pixel, of PSFs from
+ * narrow to wider than the field: the prediction holds and stays near. */
+static void predicted_errors_of_crowds_hold(void **state) {
+    fixture *f = *state;
+    static const double fwhm_px[] = {0.8, 2, 2, 4, 10, 40}, reach_px[] = {0, 0, 20, 5, 1};
+    static const double tolerances[] = {0.01, 0.05, 0.2};
+    static const int counts[] = {2, 8, 30, 100, 300};
+    static const scene_motion motions[] = {
+        {.duration_s = 1, .samples = 2},
+        {.x_px = 4, .y_px = 2, .duration_s = 1, .samples = 41},
+        {.x_px = 25, .y_px = 18, .duration_s = 1, .samples = 41},
+        {.jitter_px = 0.3, .duration_s = 1, .samples = 41},
+        {.x_px = 20,
+         .y_px = -10,
+         .roll_rad = 0.03,
+         .jitter_px = .15,
+         .duration_s = 1,
+         .samples = 41},
+    };
+    enum { CASES = 40, WIDTH = 96, HEIGHT = 80 };
+    double ratio[CASES];
+    for (int i = 0; i < CASES; i++) {
+        bst_rng_key key = bst_rng_make_key((uint64_t)i, 0, "test", "crowd");
+        double draw[8];
+        for (int k = 0; k < 8; k++) {
+            draw[k] = bst_rng_uniform(key, (uint64_t)k, 0);
+        }
+        bst_camera camera = scene_camera(WIDTH, HEIGHT);
+        camera.psf_fwhm_px = fwhm_px[(int)(6 * draw[0])];
+        scene_motion motion = motions[i % 5];
+        int count = counts[(int)(5 * draw[1])];
+        double brightest = pow(10.0, 3.0 + 4.0 * draw[2]), magnitudes = 8.0 * draw[3];
+        scene s = open_scene(f, camera, &motion, 0, 0.0);
+        double reach = reach_px[(int)(5 * draw[4])], top = pow(10.0, 0.4 * magnitudes);
+        s.stars = realloc(s.stars, (size_t)count * sizeof *s.stars);
+        s.count = count;
+        for (int n = 0; n < count; n++) {
+            double u[3];
+            for (int k = 0; k < 3; k++) {
+                u[k] = bst_rng_uniform(key, (uint64_t)(10 + n), (uint64_t)k);
+            }
+            double x = reach > 0.0 ? 48.0 * (0.5 + draw[5]) + reach * (2.0 * u[0] - 1.0)
+                                   : -10.0 + u[0] * (WIDTH + 20.0);
+            double y = reach > 0.0 ? 40.0 * (0.5 + draw[6]) + reach * (2.0 * u[1] - 1.0)
+                                   : -10.0 + u[1] * (HEIGHT + 20.0);
+            s.stars[n] = scene_star(&camera, x, y, brightest / (1.0 + u[2] * (top - 1.0)));
+        }
+        bst_assert_ok(
+            &f->ctx, bst_reference_render(&f->ctx, &camera, whole(&camera), &s.track.track, s.stars,
+                                          count, 1e-8, s.reference));
+        bst_renderer_options options = bst_renderer_default_options();
+        options.tolerance_sigma = tolerances[(int)(3 * draw[7])];
+        outcome o = render(f, &s, &options);
+        ratio[i] = o.stats.predicted_sigma / o.sigma;
+        print_message(
+            "%3d stars of %2.0e e-/s, %3.1f mag, within %2.0f px, FWHM %4.1f, tolerance "
+            "%5.3f: measured %8.5f predicted %8.5f ratio %6.2f\n",
+            count, brightest, magnitudes, reach, camera.psf_fwhm_px, options.tolerance_sigma,
+            o.sigma, o.stats.predicted_sigma, ratio[i]);
+        close_scene(&s);
+    }
+    qsort(ratio, CASES, sizeof *ratio, ascending);
+    print_message("ratios: least %.2f, median %.2f, largest %.2f\n", ratio[0], ratio[CASES / 2],
+                  ratio[CASES - 1]);
+    assert_true(ratio[0] >= 1.0);
+    assert_true(ratio[CASES / 2] <= 5.0); /* measures.md */
+}
+
 /* A pure slew of a narrow field moves all stars alike; of a wide one, or with roll, it does not. */
 static void auto_takes_the_cheaper_motion(void **state) {
     fixture *f = *state;
@@ -269,14 +337,50 @@ static void stamps_and_profiles_as_asked(void **state) {
     close_scene(&s);
 }
 
+/* A star in the corner of a large sensor lies where it should to 2^-17 px and what float sums of a
+ * stamp's pixels add, 1e-6 px; as floats, places there would be up to 1.2e-4 px off. */
+static void places_far_from_the_origin(void **state) {
+    fixture *f = *state;
+    const scene_motion still = {.duration_s = 1, .samples = 2};
+    bst_camera camera = scene_camera(2048, 2048);
+    camera.psf_fwhm_px = 3.0;
+    bst_renderer_options options = bst_renderer_default_options();
+    bst_renderer *r;
+    bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, &camera, &options, &r));
+    scene_track track = scene_track_make(&camera, &still);
+    enum { SIDE = 40, STARS = 40 };
+    for (int i = 0; i < STARS; i++) {
+        double x = 2020.0 + 0.0137 * i, y = 2017.5 + 0.0211 * i;
+        bst_source star = scene_star(&camera, x, y, 1e6);
+        bst_render_request q = {.window = {2000, 1998, SIDE, SIDE},
+                                .track = &track.track,
+                                .sources = &star,
+                                .count = 1};
+        float image[SIDE * SIDE];
+        bst_assert_ok(&f->ctx, bst_renderer_render_noise_free(&f->ctx, r, &q, image));
+        double sum = 0.0, mx = 0.0, my = 0.0;
+        for (int k = 0; k < SIDE * SIDE; k++) {
+            sum += image[k];
+            mx += image[k] * (2000 + k % SIDE - x);
+            my += image[k] * (1998 + k / SIDE - y);
+        }
+        bst_assert_close(mx / sum, 0.0, 1e-5);
+        bst_assert_close(my / sum, 0.0, 1e-5);
+    }
+    scene_track_free(&track);
+    bst_renderer_free(r);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(predicted_errors_hold),
+        cmocka_unit_test(predicted_errors_of_crowds_hold),
         cmocka_unit_test(auto_takes_the_cheaper_motion),
         cmocka_unit_test(one_track_is_wrong_where_the_field_turns),
         cmocka_unit_test(equal_parts_converge),
         cmocka_unit_test(parts_of_a_pixel_converge),
         cmocka_unit_test(stamps_and_profiles_as_asked),
+        cmocka_unit_test(places_far_from_the_origin),
     };
     return cmocka_run_group_tests(tests, open_device, close_device);
 }
