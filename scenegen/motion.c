@@ -55,3 +55,26 @@ bst_status bst_motion_midpoints(bst_ctx *ctx, const bst_path_point *path, int co
     }
     return BST_OK;
 }
+
+/* Light is uniform between the points of a path: where it changes they are so many in an exposure,
+ * and as close as it changes by this share of the mean. */
+enum { RATE_PARTS = 512 };
+#define RATE_STEP 0.02
+
+double bst_motion_stretch(const bst_source *source, double u, double end, int *parts) {
+    const bst_source_rate *r = source->rate;
+    *parts = 1;
+    if (!r) {
+        return end;
+    }
+    for (int n = 0; n < r->count; n++) {
+        if (r->u[n] > u + 1e-12) {
+            end = fmin(end, r->u[n]);
+            break;
+        }
+    }
+    double change = fabs(bst_source_rate_at(source, end) - bst_source_rate_at(source, u));
+    double wanted = fmin(fmax(change / RATE_STEP, (end - u) * RATE_PARTS), 1000.0);
+    *parts = wanted > 1.0 ? (int)ceil(wanted) : 1;
+    return end;
+}

@@ -5,6 +5,7 @@
 
 #include "scenegen/nodes.h"
 #include "sim/core/vec.h"
+#include "sim/world/field.h"
 
 /* How far, at most, a star at the sensor's corner (corner_px from the boresight, undistorted) moves
  * otherwise than the star at the boresight does, px: by roll, and by the tangent plane's stretch,
@@ -21,5 +22,9 @@ void bst_motion_to_shift(bst_path_point *point, double scale_rad, double stretch
  * count >= 2. BST_ERR_MEMORY. */
 bst_status bst_motion_midpoints(bst_ctx *ctx, const bst_path_point *path, int count, int parts,
                                 bst_node_list *list) BST_MUST_CHECK;
+
+/* End of the stretch of a source's path that begins at time u (0 to 1) and goes no further than
+ * `end`: its next knot of brightness. *parts: as many as it takes to follow its light, >= 1. */
+double bst_motion_stretch(const bst_source *source, double u, double end, int *parts);
 
 #endif

@@ -69,9 +69,9 @@ static bst_status check_camera(bst_ctx *ctx, const bst_camera *c) {
     double fwhm_px = 2.3548200450309493 * bst_camera_psf_sigma_px(c);
     if (!(c->psf_fwhm_px > 0.0) || fwhm_px > 70.0) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
-                        "cannot render a PSF of %g pixels, charge diffusion and fast jitter "
-                        "included: allowed are 0 to 70 pixels",
-                        fwhm_px);
+                        "cannot render a PSF of psf_fwhm_px %g, with charge diffusion and fast "
+                        "jitter %g: allowed are 0 to 70 pixels",
+                        c->psf_fwhm_px, fwhm_px);
     }
     return BST_OK;
 }

@@ -18,8 +18,6 @@
 
 /* Fidelities: level n is right to about 0.08 * 2^-n of the smeared image's peak. */
 enum { LEVELS = 14, TABLE_FLOATS = BST_TABLE_ROWS * BST_BLOCK, MAX_TAPS = BST_PLACE_TAPS };
-/* Stretches of the path of a source whose brightness changes. */
-enum { RATE_PARTS = 512 };
 
 typedef struct level {
     int first_block, blocks; /* blocks 0: not made in this frame */
@@ -394,26 +392,35 @@ static bool passes_by(const bst_smear *s, const bst_path_point *a, const bst_pat
 static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_source *source, double x0,
                            double y0, int *count) {
     const bst_los_track *track = &s->track;
-    int least = (int)chords_of(s, source) / (track->count - 1) + 1;
-    if (source->rate && least < RATE_PARTS / (track->count - 1) + 1) {
-        least = RATE_PARTS / (track->count - 1) + 1; /* between its points light is uniform */
-    }
+    double per_s = s->duration_s > 0.0 ? 1.0 / s->duration_s : 0.0;
+    int chords = (int)chords_of(s, source) / (track->count - 1) + 1;
     *count = 0;
     for (int k = 0; k + 1 < track->count; k++) {
-        int parts = parts_of(s, k);
-        parts = parts < least ? least : parts;
-        BST_TRY(reserve(ctx, (void **)&s->own_path, &s->own_capacity, *count + parts + 1,
-                        sizeof *s->own_path));
-        for (int n = 0; n < parts + (k + 2 == track->count); n++) {
-            double u = (double)n / parts, x, y;
-            double t = track->time_s[k] + u * (track->time_s[k + 1] - track->time_s[k]);
-            t = s->duration_s > 0.0 ? t / s->duration_s : 0.0;
-            bst_quat q =
-                bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
-            bool front = project(s, q, bst_source_direction(source, t), &x, &y);
-            s->own_path[(*count)++] = (bst_path_point){
-                {front ? (x - x0) * s->stretch : NAN, front ? (y - y0) * s->stretch : NAN, 0.0},
-                bst_source_light(source, t)};
+        double begin = track->time_s[k] * per_s, end = track->time_s[k + 1] * per_s, to;
+        int all = parts_of(s, k);
+        all = all < chords ? chords : all;
+        for (double from = begin; from < end || from == begin; from = to) {
+            int parts;
+            to = bst_motion_stretch(source, from, end, &parts);
+            double share = end > begin ? (to - from) / (end - begin) : 1.0;
+            int least = (int)ceil(all * share - 1e-9);
+            parts = parts < least ? least : parts;
+            bool last = k + 2 == track->count && !(to < end);
+            BST_TRY(reserve(ctx, (void **)&s->own_path, &s->own_capacity, *count + parts + 1,
+                            sizeof *s->own_path));
+            for (int n = 0; n < parts + last; n++) {
+                double x, y, t = from + (to - from) * n / parts;
+                double u = end > begin ? (t - begin) / (end - begin) : (double)n / parts;
+                bst_quat q =
+                    bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
+                bool front = project(s, q, bst_source_direction(source, t), &x, &y);
+                s->own_path[(*count)++] = (bst_path_point){
+                    {front ? (x - x0) * s->stretch : NAN, front ? (y - y0) * s->stretch : NAN, 0.0},
+                    bst_source_light(source, t)};
+            }
+            if (!(to > from)) {
+                break; /* no time */
+            }
         }
     }
     return BST_OK;
