@@ -1,11 +1,10 @@
-# The three OpenCV libraries that the project uses, found one by one: the all-in development package
-# would pull in more than a hundred others. Targets: bst_opencv_core, bst_opencv_imgproc,
-# bst_opencv_imgcodecs.
+# The two OpenCV libraries that the project uses, found one by one: the all-in development package
+# would pull in more than a hundred others. Targets: bst_opencv_core, bst_opencv_imgproc.
 include_guard(GLOBAL)
 
 find_path(OPENCV_INCLUDE_DIR opencv2/core.hpp PATH_SUFFIXES opencv4 REQUIRED)
 mark_as_advanced(OPENCV_INCLUDE_DIR)
-foreach(part core imgproc imgcodecs)
+foreach(part core imgproc)
   find_library(OPENCV_${part}_LIBRARY opencv_${part} REQUIRED)
   mark_as_advanced(OPENCV_${part}_LIBRARY)
   add_library(bst_opencv_${part} INTERFACE IMPORTED GLOBAL)
@@ -13,4 +12,3 @@ foreach(part core imgproc imgcodecs)
   target_link_libraries(bst_opencv_${part} INTERFACE ${OPENCV_${part}_LIBRARY})
 endforeach()
 target_link_libraries(bst_opencv_imgproc INTERFACE bst_opencv_core)
-target_link_libraries(bst_opencv_imgcodecs INTERFACE bst_opencv_imgproc)

@@ -104,8 +104,9 @@ bst_status bst_platform_check_history(bst_ctx *ctx, const bst_platform_config *c
     if (config->history_s < exposure_s) {
         return bst_fail(ctx, BST_ERR_CONFIG,
                         "platform/history_s: %g s do not cover the longest exposure_s of this "
-                        "sensor, %g s (its exposure's, or what control commands); make history_s "
-                        "at least as long",
+                        "sensor, %g s (its exposure's, or what control commands; with row_time_s "
+                        "from the first row's start to the last row's end); make history_s at "
+                        "least as long",
                         config->history_s, exposure_s);
     }
     return BST_OK;

@@ -1,5 +1,6 @@
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "imgproc/calibration.h"
 #include "imgproc/imgproc.h"
@@ -62,12 +63,20 @@ static const double LOCKED_RADIUS_PX = 10.0;
 /* Shift beyond which a distorted field is matched twice. */
 static const double RESHIFT_PX = 2.0;
 
+/* Work space for the frame of one step, and what was found in it ahead of the step. */
+typedef struct lane {
+    bst_imgproc *ip;      /* NULL: not made yet */
+    bst_detections *made; /* room for config->capacity; NULL in lane 0 until it is made ahead */
+    bool ready;           /* made is of the frame below */
+    int64_t exposure_id;
+} lane;
+
 typedef struct imgproc_module {
     const bst_imgproc_config *config;
     bst_camera camera;
     int64_t tick_rate_hz;
     bst_imgproc_maps maps;
-    bst_imgproc *ip;
+    lane lanes[BST_STEP_LANES];
     bst_starid *starid;
     bst_sky sky;
 } imgproc_module;
@@ -77,11 +86,20 @@ static void destroy(void *self) {
     if (!m) {
         return;
     }
-    bst_imgproc_free(m->ip);
+    for (int i = 0; i < BST_STEP_LANES; i++) {
+        bst_imgproc_free(m->lanes[i].ip);
+        free(m->lanes[i].made);
+    }
     bst_calibration_free(&m->maps);
     bst_starid_free(m->starid);
     bst_sky_free(&m->sky);
     free(m);
+}
+
+static bst_status open_lane(bst_ctx *ctx, imgproc_module *m, lane *l) {
+    return l->ip ? BST_OK
+                 : bst_imgproc_create(ctx, &m->camera, bst_camera_electrons_per_s(&m->camera, 0.0),
+                                      m->config, &m->maps, &l->ip);
 }
 
 static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
@@ -100,8 +118,7 @@ static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
         m->camera.psf_fwhm_px = psf.fwhm_px;
     }
     BST_TRY(bst_calibration_load(env->ctx, m->config, &m->camera, &m->maps));
-    BST_TRY(bst_imgproc_create(env->ctx, &m->camera, bst_camera_electrons_per_s(&m->camera, 0.0),
-                               m->config, &m->maps, &m->ip));
+    BST_TRY(open_lane(env->ctx, m, &m->lanes[0]));
     BST_TRY(bst_sky_create(env->ctx, &m->camera, bst_knowledge_stars(env->knowledge),
                            bst_knowledge_julian_year(env->knowledge), CATALOGUE_CAPACITY, &m->sky));
     BST_TRY(bst_starid_create(env->ctx, CATALOGUE_CAPACITY, (int)m->config->capacity,
@@ -154,10 +171,11 @@ static double shift_px(const bst_starid_result *r) {
     return hypot(r->shift_x_px, r->shift_y_px);
 }
 
-static bst_status identify(imgproc_module *m, bst_ctx *ctx, const bst_nav_telemetry *nav,
-                           bst_window window, bool locked, bst_detections *out) {
+static bst_status identify(imgproc_module *m, const lane *l, bst_ctx *ctx,
+                           const bst_nav_telemetry *nav, bst_window window, bool locked,
+                           bst_detections *out) {
     bst_light light = {nav->velocity_bary_mps, nav->sun_m};
-    double v_limit = bst_imgproc_v_limit(m->ip, SNR_SHARE_EXPECTED * out->threshold_snr);
+    double v_limit = bst_imgproc_v_limit(l->ip, SNR_SHARE_EXPECTED * out->threshold_snr);
     int expected = 0;
     BST_TRY(bst_sky_expect(ctx, &m->sky, out->q_cam_from_gcrf, &light, window,
                            m->config->search_radius_px, v_limit, &expected));
@@ -201,10 +219,84 @@ static bst_status identify(imgproc_module *m, bst_ctx *ctx, const bst_nav_teleme
     return BST_OK;
 }
 
-static bst_status process(imgproc_module *m, struct bst_step *step,
-                          const bst_frame_message *message, const uint16_t *pixels) {
-    bst_ctx *ctx = bst_step_ctx(step);
+/* The camera's motion as telemetry tells it; false: not known. */
+static bool motion_of(struct bst_step *step, const bst_frame_message *message, bst_motion *motion) {
     bst_sample pointing = bst_step_latest(step, PORT_POINTING);
+    *motion = (bst_motion){BST_QUAT_IDENTITY, {0, 0, 0}, {0, 0, 0}};
+    return pointing.payload && !pointing.stale &&
+           bst_motion_from_telemetry(pointing.payload, message->start_tick, message->end_tick,
+                                     motion);
+}
+
+/* What is in a frame. It depends on how the camera turned, not on where it looked. */
+static bst_status detect(bst_ctx *ctx, const imgproc_module *m, const lane *l,
+                         const bst_frame_message *message, const bst_motion *motion,
+                         bst_detections *out, int capacity) {
+    const uint16_t *pixels;
+    BST_TRY(bst_frame_map(message->frame, ctx, &pixels));
+    bst_imgproc_frame frame = {
+        .pixels = pixels,
+        .window = message->window,
+        .binning = message->binning,
+        .bits = message->bits,
+        .exposure_s = (double)(message->end_tick - message->start_tick) / (double)m->tick_rate_hz};
+    bst_status status = bst_imgproc_detect(ctx, l->ip, &frame, motion, out, capacity);
+    bst_frame_unmap(message->frame);
+    return status;
+}
+
+static bst_status ahead(void *self, struct bst_step *step) {
+    imgproc_module *m = self;
+    lane *l = &m->lanes[bst_step_lane(step)];
+    bst_ctx *ctx = bst_step_ctx(step);
+    l->ready = false;
+    bst_sample sample = bst_step_next(step, PORT_FRAME);
+    if (!sample.payload) {
+        return BST_OK;
+    }
+    BST_TRY(open_lane(ctx, m, l));
+    int capacity = (int)m->config->capacity;
+    if (!l->made) {
+        l->made = malloc(sizeof *l->made + (size_t)capacity * sizeof l->made->items[0]);
+        if (!l->made) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d detections", capacity);
+        }
+    }
+    const bst_frame_message *message = sample.payload;
+    bst_motion motion;
+    bool oriented = motion_of(step, message, &motion);
+    BST_TRY(detect(ctx, m, l, message, oriented ? &motion : NULL, l->made, capacity));
+    l->exposure_id = message->exposure_id;
+    l->ready = true;
+    return BST_OK;
+}
+
+/* What was made ahead for this frame, or else made now. */
+static bst_status detections_of(bst_ctx *ctx, imgproc_module *m, lane *l,
+                                const bst_frame_message *message, const bst_motion *motion,
+                                bst_detections *out, int capacity) {
+    bool made = l->ready && l->exposure_id == message->exposure_id;
+    l->ready = false;
+    if (!made) {
+        BST_TRY(open_lane(ctx, m, l));
+        return detect(ctx, m, l, message, motion, out, capacity);
+    }
+    out->background_e = l->made->background_e;
+    out->noise_e = l->made->noise_e;
+    out->threshold_snr = l->made->threshold_snr;
+    out->stars_identified = l->made->stars_identified;
+    out->count = l->made->count;
+    out->lost = l->made->lost;
+    memcpy(out->items, l->made->items, (size_t)out->count * sizeof out->items[0]);
+    return BST_OK;
+}
+
+static bst_status process(imgproc_module *m, struct bst_step *step,
+                          const bst_frame_message *message) {
+    bst_ctx *ctx = bst_step_ctx(step);
+    lane *l = &m->lanes[bst_step_lane(step)];
+    bst_motion motion;
+    bool oriented = motion_of(step, message, &motion);
     bst_sample nav = bst_step_latest(step, PORT_NAV);
     bst_sample predicted = bst_step_latest(step, PORT_PREDICTIONS);
     int capacity = 0;
@@ -212,34 +304,22 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
     out->exposure_id = message->exposure_id;
     out->start_tick = message->start_tick;
     out->end_tick = message->end_tick;
-
-    bst_motion motion = {BST_QUAT_IDENTITY, {0, 0, 0}, {0, 0, 0}};
-    bool oriented = pointing.payload && !pointing.stale &&
-                    bst_motion_from_telemetry(pointing.payload, message->start_tick,
-                                              message->end_tick, &motion);
-    out->q_telemetry_from_gcrf = motion.q_cam_from_gcrf;
+    out->q_cam_from_gcrf = out->q_telemetry_from_gcrf = motion.q_cam_from_gcrf;
     const bst_predictions *predictions = predicted.stale ? NULL : predicted.payload;
     bool locked = oriented && predictions && predictions->attitude_valid;
     if (locked) {
         double middle = 0.5 * ((double)message->start_tick + (double)message->end_tick);
-        motion.q_cam_from_gcrf =
+        out->q_cam_from_gcrf =
             bst_quat_unit(bst_quat_mul(correction(m, predictions, middle), motion.q_cam_from_gcrf));
     }
-    out->q_cam_from_gcrf = motion.q_cam_from_gcrf;
 
-    bst_imgproc_frame frame = {
-        .pixels = pixels,
-        .window = message->window,
-        .binning = message->binning,
-        .bits = message->bits,
-        .exposure_s = (double)(message->end_tick - message->start_tick) / (double)m->tick_rate_hz};
-    BST_TRY(bst_imgproc_detect(ctx, m->ip, &frame, oriented ? &motion : NULL, out, capacity));
-    bool smeared = bst_imgproc_smeared(m->ip);
+    BST_TRY(detections_of(ctx, m, l, message, oriented ? &motion : NULL, out, capacity));
+    bool smeared = bst_imgproc_smeared(l->ip);
     if (oriented && nav.payload && !nav.stale && !smeared) {
-        BST_TRY(identify(m, ctx, nav.payload, message->window, locked, out));
+        BST_TRY(identify(m, l, ctx, nav.payload, message->window, locked, out));
     }
     if (!smeared) {
-        label(out, out->stars_identified > 0, bst_imgproc_streak_px(m->ip));
+        label(out, out->stars_identified > 0, bst_imgproc_streak_px(l->ip));
     }
     if (out->stars_identified == 0) {
         bst_step_count(step, "frame_without_stars");
@@ -251,18 +331,11 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
 }
 
 static bst_status step_module(void *self, struct bst_step *step) {
-    for (;;) {
-        bst_sample sample = bst_step_next(step, PORT_FRAME);
-        if (!sample.payload) {
-            return BST_OK;
-        }
-        const bst_frame_message *message = sample.payload;
-        const uint16_t *pixels;
-        BST_TRY(bst_frame_map(message->frame, bst_step_ctx(step), &pixels));
-        bst_status status = process(self, step, message, pixels);
-        bst_frame_unmap(message->frame);
-        BST_TRY(status);
+    bst_sample sample;
+    while ((sample = bst_step_next(step, PORT_FRAME)).payload) {
+        BST_TRY(process(self, step, sample.payload));
     }
+    return BST_OK;
 }
 
 const bst_module_desc bst_imgproc_module = {
@@ -278,4 +351,5 @@ const bst_module_desc bst_imgproc_module = {
     .create = create,
     .step = step_module,
     .destroy = destroy,
+    .ahead = ahead,
 };

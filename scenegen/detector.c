@@ -13,8 +13,8 @@ struct bst_detector {
     int stride; /* of the maps: the sensor's width, rounded up to chunks */
     cl_context context;
     cl_command_queue queue;
-    cl_mem gain, dark, overlay, offsets, codes, deposits;
-    size_t deposit_capacity;
+    cl_mem gain, dark, overlay, offsets, codes;
+    cl_mem deposits; /* of the present frame; borrowed */
     cl_kernel deposit_kernel;
     bst_hits *hits;
     bst_hits_summary summary;
@@ -30,8 +30,7 @@ bst_rng_key bst_detector_pattern_key(const bst_camera *camera, const char *name)
 }
 
 bool bst_detector_whole_columns(const bst_detector *detector) {
-    const bst_detector_config *d = &detector->camera.detector;
-    return d->full_well == BST_WELL_BLOOM || d->frame_transfer_s > 0.0;
+    return bst_detector_config_whole_columns(&detector->camera.detector);
 }
 
 static bool has_offsets(const bst_detector_config *d) {
@@ -180,7 +179,7 @@ void bst_detector_free(bst_detector *d) {
     if (!d) {
         return;
     }
-    cl_mem buffers[] = {d->gain, d->dark, d->overlay, d->offsets, d->codes, d->deposits};
+    cl_mem buffers[] = {d->gain, d->dark, d->overlay, d->offsets, d->codes};
     for (size_t i = 0; i < sizeof buffers / sizeof *buffers; i++) {
         if (buffers[i]) {
             clReleaseMemObject(buffers[i]);
@@ -231,53 +230,44 @@ static bst_status deposit(bst_ctx *ctx, bst_detector *d, float sign) {
         "placing radiation hits");
 }
 
-static bst_status begin_hits(bst_ctx *ctx, bst_detector *d, bst_rng_key key, int64_t exposure_id,
-                             double collect_s) {
+static bst_status begin_hits(bst_ctx *ctx, bst_detector *d, bst_stage *stage, bst_rng_key key,
+                             int64_t exposure_id, double collect_s) {
     const bst_hit_pixel *pixels;
     BST_TRY(bst_hits_draw(ctx, d->hits, key, exposure_id, collect_s, &pixels, &d->summary));
     size_t bytes = (size_t)d->summary.pixels * sizeof *pixels;
-    if (bytes > d->deposit_capacity) {
-        if (d->deposits) {
-            clReleaseMemObject(d->deposits);
-            d->deposits = NULL;
-        }
-        d->deposit_capacity = 2 * bytes;
-        BST_TRY(make_buffer(ctx, d, d->deposit_capacity, NULL, &d->deposits));
-    }
-    if (bytes > 0) {
-        BST_TRY(bst_device_check(
-            ctx,
-            clEnqueueWriteBuffer(d->queue, d->deposits, CL_TRUE, 0, bytes, pixels, 0, NULL, NULL),
-            "sending radiation hits"));
-    }
+    BST_TRY(bst_stage_put(ctx, stage, BST_STAGE_HITS, pixels, bytes, &d->deposits));
     return deposit(ctx, d, 1.0f);
 }
 
-static bst_status begin_rows(bst_ctx *ctx, bst_detector *d, bst_rng_key key, int64_t exposure_id) {
-    size_t height = (size_t)d->camera.height_px;
+static bst_status begin_rows(bst_ctx *ctx, bst_detector *d, bst_stage *stage, bst_rng_key key,
+                             int64_t exposure_id) {
+    size_t height = (size_t)d->camera.height_px, bytes = height * sizeof(float);
     float *sum = d->rows + height;
     double rms = d->camera.detector.row_noise_e / d->camera.gain_e_per_dn;
     for (size_t y = 0; y < height; y++) {
         sum[y] = d->rows[y] + (float)(rms * bst_rng_normal(key, (uint64_t)exposure_id, y));
     }
+    cl_mem sent;
+    BST_TRY(bst_stage_put(ctx, stage, BST_STAGE_ROWS, sum, bytes, &sent));
     return bst_device_check(
         ctx,
-        clEnqueueWriteBuffer(d->queue, d->offsets, CL_TRUE, (size_t)d->stride * sizeof *sum,
-                             height * sizeof *sum, sum, 0, NULL, NULL),
+        clEnqueueCopyBuffer(d->queue, sent, d->offsets, 0, (size_t)d->stride * sizeof(float), bytes,
+                            0, NULL, NULL),
         "sending the rows' offsets");
 }
 
-bst_status bst_detector_begin(bst_ctx *ctx, bst_detector *d, bst_rng_key key, int64_t exposure_id,
-                              double exposure_s) {
+bst_status bst_detector_begin(bst_ctx *ctx, bst_detector *d, bst_stage *stage, bst_rng_key key,
+                              int64_t exposure_id, double exposure_s) {
     const bst_detector_config *c = &d->camera.detector;
     uint64_t run = ((uint64_t)key.k[1] << 32) | key.k[0];
     d->summary = (bst_hits_summary){0};
     if (d->hits) {
-        BST_TRY(begin_hits(ctx, d, bst_rng_make_key(run, 0, "detector", "hits"), exposure_id,
+        BST_TRY(begin_hits(ctx, d, stage, bst_rng_make_key(run, 0, "detector", "hits"), exposure_id,
                            exposure_s + c->hits.frame_s));
     }
     if (c->row_noise_e > 0.0) {
-        BST_TRY(begin_rows(ctx, d, bst_rng_make_key(run, 0, "detector", "row_noise"), exposure_id));
+        BST_TRY(begin_rows(ctx, d, stage, bst_rng_make_key(run, 0, "detector", "row_noise"),
+                           exposure_id));
     }
     return BST_OK;
 }

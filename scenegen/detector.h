@@ -7,6 +7,7 @@
 #include <stddef.h>
 
 #include "scenegen/hits.h"
+#include "scenegen/stage.h"
 #include "sim/core/rng.h"
 #include "sim/device/device.h"
 #include "sim/world/camera.h"
@@ -43,8 +44,9 @@ bst_status bst_detector_set_program(bst_ctx *ctx, bst_detector *detector,
                                     cl_program program) BST_MUST_CHECK;
 
 /* What an exposure brings of its own: radiation hits and the rows' offsets. */
-bst_status bst_detector_begin(bst_ctx *ctx, bst_detector *detector, bst_rng_key key,
-                              int64_t exposure_id, double exposure_s) BST_MUST_CHECK;
+bst_status bst_detector_begin(bst_ctx *ctx, bst_detector *detector, bst_stage *stage,
+                              bst_rng_key key, int64_t exposure_id,
+                              double exposure_s) BST_MUST_CHECK;
 /* Takes the exposure's hits off again; after the frame's kernels were enqueued. */
 bst_status bst_detector_end(bst_ctx *ctx, bst_detector *detector) BST_MUST_CHECK;
 

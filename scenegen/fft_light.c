@@ -65,8 +65,8 @@ static bst_status choose_tiles(bst_ctx *ctx, bst_device *device, bst_fft_light *
         ctx, clGetDeviceInfo(id, CL_DEVICE_MAX_COMPUTE_UNITS, sizeof units, &units, NULL),
         "asking for the device's compute units"));
     bool cpu = (type & CL_DEVICE_TYPE_CPU) != 0, large = cpu && local_bytes >= 128 * 1024;
-    l->tile_width = large ? 256 : 32;
-    l->tile_height = large ? 64 : 16;
+    l->tile_width = large ? 64 : 16;
+    l->tile_height = large ? 256 : 32;
     l->group = large ? 1 : 4;
     *threads = cpu ? (int)units : 0;
     return BST_OK;
@@ -77,9 +77,9 @@ static bst_status build(bst_ctx *ctx, bst_device *device, bst_fft_light *l) {
                                           &bst_kernel_deposit};
     char options[256];
     snprintf(options, sizeof options,
-             "-cl-std=CL1.2 -DDEPOSIT_W=%d -DDEPOSIT_H=%d -DDEPOSIT_GROUP=%d -DPLACE_BITS=%d%s",
+             "-cl-std=CL1.2 -DDEPOSIT_W=%d -DDEPOSIT_H=%d -DDEPOSIT_GROUP=%d -DPLACE_BITS=%d%s%s",
              l->tile_width, l->tile_height, l->group, bst_place_bits(&l->camera),
-             l->nodes > 1 ? " -DFIELD" : "");
+             l->nodes > 1 ? " -DFIELD" : "", l->group == 1 ? " -DNEAR_CACHE" : "");
     BST_TRY(bst_device_build(ctx, device, sources, 3, options, &l->program));
     cl_int code;
     l->kernel = clCreateKernel(l->program, "bst_light_deposit", &code);
@@ -280,8 +280,7 @@ static bst_status make_setup(bst_ctx *ctx, bst_fft_light *l, bst_window window, 
                               table, &code);
     free(table);
     BST_TRY(bst_device_check(ctx, code, "allocating the spreading kernel's table"));
-    size_t bytes =
-        (size_t)bst_light_fft_rows(s->fft) * (size_t)bst_light_fft_pitch(s->fft) * sizeof(float);
+    size_t bytes = bst_light_fft_floats(s->fft) * sizeof(float);
     s->grid =
         clCreateBuffer(l->context, CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR, bytes, NULL, &code);
     return bst_device_check(ctx, code, "allocating the light's grid");
@@ -321,7 +320,6 @@ static bst_status deposit(bst_ctx *ctx, bst_fft_light *l, cl_command_queue queue
         .density_y = (float)((double)shape->y.samples / shape->y.pixels),
         .samples_x = shape->x.samples,
         .samples_y = shape->y.samples,
-        .pitch = bst_light_fft_pitch(s->fft),
         .tiles_x = (shape->x.samples + l->tile_width - 1) / l->tile_width,
         .tiles_y = (shape->y.samples + l->tile_height - 1) / l->tile_height,
         .source_groups = nodes->source_groups,
@@ -350,9 +348,7 @@ bst_status bst_fft_light_render(bst_ctx *ctx, bst_fft_light *l, cl_command_queue
                                 bst_fft_light_image *out) {
     setup *s;
     BST_TRY(find_setup(ctx, l, window, &s));
-    const bst_light_shape *shape = bst_light_fft_shape(s->fft);
-    size_t bytes =
-        (size_t)bst_light_fft_rows(s->fft) * (size_t)bst_light_fft_pitch(s->fft) * sizeof(float);
+    size_t bytes = bst_light_fft_floats(s->fft) * sizeof(float);
     for (int n = 0; n < l->nodes; n++) {
         BST_TRY(deposit(ctx, l, queue, window, nodes, s, n));
         cl_int code;
@@ -366,6 +362,6 @@ bst_status bst_fft_light_render(bst_ctx *ctx, bst_fft_light *l, cl_command_queue
         BST_TRY(bst_device_check(ctx, clEnqueueUnmapMemObject(queue, s->grid, grid, 0, NULL, NULL),
                                  "unmapping the light's grid"));
     }
-    *out = (bst_fft_light_image){s->grid, shape->margin, bst_light_fft_pitch(s->fft)};
+    *out = (bst_fft_light_image){s->grid, 0, bst_light_fft_pitch(s->fft)};
     return BST_OK;
 }

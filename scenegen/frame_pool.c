@@ -52,12 +52,21 @@ static bst_status map(void *owner, bst_ctx *ctx, const uint16_t **pixels) {
     pooled_frame *f = owner;
     cl_int code = CL_SUCCESS;
     pthread_mutex_lock(&f->pool->waiting);
-    if (f->ready) {
-        code = clWaitForEvents(1, &f->ready);
-        clReleaseEvent(f->ready);
-        f->ready = NULL;
+    cl_event ready = f->ready;
+    if (ready) {
+        clRetainEvent(ready);
     }
     pthread_mutex_unlock(&f->pool->waiting);
+    if (ready) { /* others may map frames that are done */
+        code = clWaitForEvents(1, &ready);
+        pthread_mutex_lock(&f->pool->waiting);
+        if (f->ready) {
+            clReleaseEvent(f->ready);
+            f->ready = NULL;
+        }
+        pthread_mutex_unlock(&f->pool->waiting);
+        clReleaseEvent(ready);
+    }
     *pixels = f->mapped;
     return bst_device_check(ctx, code, "rendering a frame");
 }

@@ -1,17 +1,25 @@
 #include "scenegen/light_fft.h"
 
-#include <fftw3.h>
 #include <math.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "scenegen/batch_fft.h"
 #include "scenegen/light_wrap.h"
 
-/* The rows' spectra are kept in tiles of TILE x TILE complex numbers, [column block][row block]
- * [column][row]: written by a block of rows and read by a block of columns, both in whole cache
- * lines and few pages. */
-enum { TILE = 16, TILE_FLOATS = 2 * TILE * TILE, LINE = 16 /* floats of a cache line */ };
+/* Rows and columns are worked on in blocks of as many as a vector has lanes. */
+enum { BLOCK = BST_LANES };
+
+/* A block of columns of the grid's spectrum, in frequencies k0 to k0 + 15 per period, which may be
+ * negative. It folds onto the block of the image's columns that is a whole number of image bands
+ * away. */
+typedef struct strip {
+    int k0;
+    int block;    /* of the image's columns */
+    int reach;    /* rows -reach .. reach are within the cut-off */
+    size_t first; /* of the strip's numbers in the table */
+} strip;
 
 /* Pixels from `begin` on lie between the centres of `cell` and the next; the first one at `place`
  * of the way. */
@@ -23,9 +31,7 @@ typedef struct stretch {
 /* Working memory of one part; as many as there are threads. */
 typedef struct bench {
     atomic_flag taken;
-    float *rows; /* [TILE][pitch] */
-    float *sum;  /* [out_pitch] a column of the image's spectrum */
-    float *line[2];
+    bst_batch *line; /* a block of rows or columns */
 } bench;
 
 struct bst_light_fft {
@@ -33,20 +39,20 @@ struct bst_light_fft {
     bst_light_shape shape;
     double cutoff;
     bst_parallel *pool;
-    int rows, pitch;
-    int used;          /* columns of the grid's spectrum within the cut-off */
-    int image_columns; /* columns of the image's spectrum */
-    int row_blocks;
-    float *spectrum;             /* [column blocks of `used`][row_blocks] tiles */
-    int *reach;                  /* [used]: rows -reach .. reach are within the cut-off */
-    size_t *first;               /* [used + 1]: complex numbers of the table before the column */
-    float **table;               /* [nodes]: OTF over the kernel's transform, complex */
+    int pitch, row_blocks, image_blocks; /* blocks of the grid's rows, of the window's rows */
+    int used;                            /* columns 1 - used to used - 1 are within the cut-off */
+    strip *strips;                       /* those of one block of the image follow each other */
+    int strip_count, column_blocks;      /* blocks of the image's columns that the strips reach */
+    int *first_strip;                    /* [column_blocks + 1] */
+    size_t strip_pitch, image_pitch;     /* elements */
+    bst_batch *spectrum;                 /* [strips][strip_pitch]: row by row */
+    bst_batch *image;            /* [image_blocks][image_pitch]: column by column, lanes are rows */
+    bst_batch **table;           /* [nodes]: OTF over the kernel's transform */
+    bst_batch *sum;              /* [column_blocks][y.pixels], where there are several nodes */
     double *kernel_x, *kernel_y; /* transforms by column and by row 0 .. samples / 2 */
-    size_t in_pitch, out_pitch;  /* floats */
-    fftwf_plan row_forward, row_inverse, column_forward, column_inverse;
+    bst_batch_fft *row_forward, *row_inverse, *column_forward, *column_inverse;
     bench *benches;
     int bench_count;
-    float *sum; /* [image_columns][out_pitch], where there are several nodes */
     bst_light_wrap *wrap;
     int cell, cells_x, cells_y; /* samples per cell, per axis; cells */
     float *cells;
@@ -57,117 +63,140 @@ struct bst_light_fft {
 /* What a loop's parts need to know. */
 typedef struct pass {
     bst_light_fft *fft;
-    float *grid;
+    const float *grid;
+    float *image;
     int node;
     bool first, last;
 } pass;
 
-static size_t whole_lines(size_t floats) {
-    return (floats + LINE - 1) / LINE * LINE;
+static bst_batch *allocate(size_t elements) {
+    return aligned_alloc(sizeof(bst_lanes), elements * sizeof(bst_batch));
 }
 
 /* ------------------------------------------------------------------ set-up */
 
+/* The transfer functions of some strips. Both kinds of rows come as the sum or the difference of
+ * two numbers, hence the half. */
 static void fill_table(void *user, int begin, int end) {
     const pass *p = user;
     const bst_light_fft *f = p->fft;
     const bst_light_axis *x = &f->shape.x, *y = &f->shape.y;
-    double area = 1.0 / ((double)x->pixels * y->pixels);
-    for (int c = begin; c < end; c++) {
-        float *t = f->table[p->node] + 2 * f->first[c];
-        for (int k = -f->reach[c]; k <= f->reach[c]; k++) {
-            double v[2], scale = area / (f->kernel_x[c] * f->kernel_y[abs(k)]);
-            bst_psf_otf(f->psf, p->node, (double)c / x->pixels, (double)k / y->pixels, v);
-            *t++ = (float)(v[0] * scale);
-            *t++ = (float)(v[1] * scale);
+    double area = 0.5 / ((double)x->pixels * y->pixels);
+    for (int i = begin; i < end; i++) {
+        const strip *s = &f->strips[i];
+        bst_batch *t = f->table[p->node] + s->first;
+        for (int k = -s->reach; k <= s->reach; k++, t++) {
+            *t = (bst_batch){{0}, {0}};
+            for (int l = 0; l < BLOCK; l++) {
+                int c = s->k0 + l;
+                double v[2], fx = (double)c / x->pixels, fy = (double)k / y->pixels;
+                if (abs(c) >= f->used || fx * fx + fy * fy > f->cutoff * f->cutoff) {
+                    continue;
+                }
+                double scale = area / (f->kernel_x[abs(c)] * f->kernel_y[abs(k)]);
+                bst_psf_otf(f->psf, p->node, fx, fy, v);
+                t->re[l] = (float)(v[0] * scale);
+                t->im[l] = (float)(v[1] * scale);
+            }
         }
     }
 }
 
 /* Which frequencies are within the cut-off. */
-static void find_band(bst_light_fft *f) {
+static bst_status find_strips(bst_ctx *ctx, bst_light_fft *f) {
     const bst_light_axis *x = &f->shape.x, *y = &f->shape.y;
     f->used = (int)fmin(floor(f->cutoff * x->pixels) + 1.0, 0.5 * x->samples);
-    for (int c = 0; c < f->used; c++) {
-        double fx = (double)c / x->pixels;
-        double fy = sqrt(fmax(f->cutoff * f->cutoff - fx * fx, 0.0));
-        f->reach[c] = (int)fmin(floor(fy * y->pixels), 0.5 * y->samples - 1.0);
-        f->first[c + 1] = f->first[c] + 2 * (size_t)f->reach[c] + 1;
+    int blocks = (x->pixels / 2 + BLOCK) / BLOCK, folds = f->used / x->pixels + 1;
+    size_t most = (size_t)blocks * (2 * (size_t)folds + 1);
+    f->strips = malloc(most * sizeof *f->strips);
+    f->first_strip = malloc(((size_t)blocks + 1) * sizeof *f->first_strip);
+    if (!f->strips || !f->first_strip) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the light's transform");
     }
+    size_t numbers = 0;
+    for (int b = 0; b < blocks; b++) {
+        f->first_strip[b] = f->strip_count;
+        for (int fold = -folds; fold <= folds; fold++) {
+            int k0 = b * BLOCK + fold * x->pixels;
+            int nearest = k0 > 0 ? k0 : k0 + BLOCK > 0 ? 0 : 1 - BLOCK - k0;
+            if (nearest >= f->used) {
+                continue;
+            }
+            double fx = (double)nearest / x->pixels;
+            double fy = sqrt(fmax(f->cutoff * f->cutoff - fx * fx, 0.0));
+            int reach = (int)fmin(floor(fy * y->pixels), 0.5 * y->samples - 1.0);
+            f->strips[f->strip_count++] = (strip){k0, b, reach, numbers};
+            numbers += 2 * (size_t)reach + 1;
+            f->column_blocks = b + 1;
+        }
+    }
+    f->first_strip[f->column_blocks] = f->strip_count;
+    int nodes = bst_psf_nodes(f->psf);
+    f->table = calloc((size_t)nodes, sizeof *f->table);
+    for (int n = 0; n < nodes; n++) {
+        if (!f->table || !(f->table[n] = allocate(numbers))) {
+            return bst_fail(ctx, BST_ERR_MEMORY,
+                            "no memory for %d transfer functions of %zu numbers", nodes,
+                            numbers * BLOCK);
+        }
+    }
+    return BST_OK;
 }
 
 static bst_status make_tables(bst_ctx *ctx, bst_light_fft *f) {
     const bst_light_axis *x = &f->shape.x, *y = &f->shape.y;
-    size_t columns = (size_t)x->samples / 2 + 1, lines = (size_t)y->samples / 2 + 1;
-    int nodes = bst_psf_nodes(f->psf);
-    f->reach = malloc(columns * sizeof *f->reach);
-    f->first = calloc(columns + 1, sizeof *f->first);
-    f->kernel_x = malloc(columns * sizeof *f->kernel_x);
+    size_t lines = (size_t)y->samples / 2 + 1;
+    BST_TRY(find_strips(ctx, f));
+    f->kernel_x = malloc((size_t)f->used * sizeof *f->kernel_x);
     f->kernel_y = malloc(lines * sizeof *f->kernel_y);
-    f->table = calloc((size_t)nodes, sizeof *f->table);
-    if (!f->reach || !f->first || !f->kernel_x || !f->kernel_y || !f->table) {
+    if (!f->kernel_x || !f->kernel_y) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the transfer function");
     }
-    find_band(f);
     for (int c = 0; c < f->used; c++) {
         f->kernel_x[c] = bst_spread_transform(&x->spread, (double)c / x->samples);
     }
     for (size_t k = 0; k < lines; k++) {
         f->kernel_y[k] = bst_spread_transform(&y->spread, (double)k / y->samples);
     }
-    for (int n = 0; n < nodes; n++) {
-        f->table[n] = fftwf_malloc(2 * sizeof(float) * f->first[f->used]);
-        if (!f->table[n]) {
-            return bst_fail(ctx, BST_ERR_MEMORY,
-                            "no memory for %d transfer functions of %zu numbers", nodes,
-                            f->first[f->used]);
-        }
+    for (int n = 0; n < bst_psf_nodes(f->psf); n++) {
         pass p = {.fft = f, .node = n};
-        bst_parallel_for(f->pool, f->used, 16, fill_table, &p);
+        bst_parallel_for(f->pool, f->strip_count, 1, fill_table, &p);
     }
     return BST_OK;
 }
 
+static int longest_line(const bst_light_shape *s) {
+    int x = s->x.samples > s->x.pixels ? s->x.samples : s->x.pixels;
+    return x > s->y.pixels ? x : s->y.pixels;
+}
+
 static bst_status make_benches(bst_ctx *ctx, bst_light_fft *f) {
+    size_t rows = (size_t)f->row_blocks * BLOCK;
+    /* odd multiples of a block: strips a page's multiple apart would share cache sets */
+    f->strip_pitch = rows + (f->row_blocks % 2 == 0 ? BLOCK : 0);
+    f->image_pitch = ((size_t)f->column_blocks | 1) * BLOCK;
     f->bench_count = bst_parallel_threads(f->pool);
     f->benches = calloc((size_t)f->bench_count, sizeof *f->benches);
-    int used_blocks = (f->used + TILE - 1) / TILE;
-    f->spectrum = fftwf_malloc((size_t)used_blocks * (size_t)f->row_blocks * TILE_FLOATS *
-                               sizeof *f->spectrum);
-    bool ok = f->benches && f->spectrum;
-    size_t line = f->in_pitch > f->out_pitch ? f->in_pitch : f->out_pitch;
+    f->spectrum = allocate((size_t)f->strip_count * f->strip_pitch);
+    f->image = allocate((size_t)f->image_blocks * f->image_pitch);
+    bool ok = f->benches && f->spectrum && f->image;
     for (int i = 0; ok && i < f->bench_count; i++) {
-        bench *b = &f->benches[i];
-        atomic_flag_clear(&b->taken);
-        b->rows = fftwf_malloc((size_t)TILE * (size_t)f->pitch * sizeof *b->rows);
-        b->sum = fftwf_malloc(f->out_pitch * sizeof *b->sum);
-        b->line[0] = fftwf_malloc(line * sizeof *b->line[0]);
-        b->line[1] = fftwf_malloc(line * sizeof *b->line[1]);
-        ok = b->rows && b->sum && b->line[0] && b->line[1];
+        atomic_flag_clear(&f->benches[i].taken);
+        f->benches[i].line = allocate((size_t)longest_line(&f->shape));
+        ok = f->benches[i].line != NULL;
     }
     if (ok && bst_psf_nodes(f->psf) > 1) {
-        f->sum = fftwf_malloc((size_t)f->image_columns * f->out_pitch * sizeof *f->sum);
+        f->sum = allocate((size_t)f->column_blocks * (size_t)f->shape.y.pixels);
         ok = f->sum != NULL;
     }
     return ok ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory for the light's transform");
 }
 
-/* Estimated plans: measured ones would differ from run to run, and the images in their last bits
- * with them. */
 static bst_status make_plans(bst_ctx *ctx, bst_light_fft *f) {
-    const bench *b = &f->benches[0];
-    float *row = b->rows, *image = b->rows + f->pitch;
-    fftwf_complex *in = (fftwf_complex *)b->line[0], *out = (fftwf_complex *)b->line[1];
-    f->row_forward = fftwf_plan_dft_r2c_1d(f->shape.x.samples, image, (fftwf_complex *)row,
-                                           FFTW_ESTIMATE | FFTW_PRESERVE_INPUT);
-    f->row_inverse =
-        fftwf_plan_dft_c2r_1d(f->shape.x.pixels, (fftwf_complex *)row, image, FFTW_ESTIMATE);
-    f->column_forward = fftwf_plan_dft_1d(f->shape.y.samples, in, out, FFTW_FORWARD, FFTW_ESTIMATE);
-    f->column_inverse = fftwf_plan_dft_1d(f->shape.y.pixels, in, out, FFTW_BACKWARD, FFTW_ESTIMATE);
-    return f->row_forward && f->row_inverse && f->column_forward && f->column_inverse
-               ? BST_OK
-               : bst_fail(ctx, BST_ERR_MEMORY, "no plan for transforms of %d and %d",
-                          f->shape.x.samples, f->shape.y.samples);
+    BST_TRY(bst_batch_fft_create(ctx, f->shape.x.samples, &f->row_forward));
+    BST_TRY(bst_batch_fft_create(ctx, f->shape.x.pixels, &f->row_inverse));
+    BST_TRY(bst_batch_fft_create(ctx, f->shape.y.samples, &f->column_forward));
+    return bst_batch_fft_create(ctx, f->shape.y.pixels, &f->column_inverse);
 }
 
 /* Place on one axis of the cells' centres: the lower cell and the share of the way to the next,
@@ -223,19 +252,14 @@ bst_status bst_light_fft_create(bst_ctx *ctx, const bst_psf *psf, double cutoff,
     if (!f) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the light's transform");
     }
-    const bst_light_axis *x = &shape->x, *y = &shape->y;
     f->psf = psf;
     f->shape = *shape;
     f->cutoff = cutoff;
     f->pool = pool;
-    f->rows = y->samples > shape->height ? y->samples : shape->height;
-    int longest = x->samples > x->pixels ? x->samples : x->pixels;
-    f->pitch = (int)whole_lines((size_t)longest + 2 + 2 * TILE);
-    f->pitch += f->pitch % 1024 == 0 ? LINE : 0; /* rows a page apart would share cache sets */
-    f->image_columns = x->pixels / 2 + 1;
-    f->row_blocks = (f->rows + TILE - 1) / TILE;
-    f->in_pitch = whole_lines(2 * (size_t)y->samples) + LINE;
-    f->out_pitch = whole_lines(2 * (size_t)y->pixels) + LINE;
+    /* an odd number of lines: rows a page apart would share cache sets */
+    f->pitch = ((shape->width + BLOCK - 1) / BLOCK | 1) * BLOCK;
+    f->row_blocks = shape->y.samples / BLOCK;
+    f->image_blocks = (shape->height + BLOCK - 1) / BLOCK;
     bst_status status = make_tables(ctx, f);
     if (status == BST_OK) {
         status = make_benches(ctx, f);
@@ -258,28 +282,26 @@ void bst_light_fft_free(bst_light_fft *f) {
     if (!f) {
         return;
     }
-    fftwf_plan plans[] = {f->row_forward, f->row_inverse, f->column_forward, f->column_inverse};
-    for (size_t i = 0; i < sizeof plans / sizeof *plans; i++) {
-        fftwf_destroy_plan(plans[i]);
-    }
+    bst_batch_fft_free(f->row_forward);
+    bst_batch_fft_free(f->row_inverse);
+    bst_batch_fft_free(f->column_forward);
+    bst_batch_fft_free(f->column_inverse);
     for (int n = 0; f->table && n < bst_psf_nodes(f->psf); n++) {
-        fftwf_free(f->table[n]);
+        free(f->table[n]);
     }
     for (int i = 0; f->benches && i < f->bench_count; i++) {
-        fftwf_free(f->benches[i].rows);
-        fftwf_free(f->benches[i].sum);
-        fftwf_free(f->benches[i].line[0]);
-        fftwf_free(f->benches[i].line[1]);
+        free(f->benches[i].line);
     }
     bst_light_wrap_free(f->wrap);
-    fftwf_free(f->sum);
-    fftwf_free(f->spectrum);
+    free(f->sum);
+    free(f->image);
+    free(f->spectrum);
+    free(f->strips);
+    free(f->first_strip);
     free(f->benches);
     free(f->cells);
     free(f->stretches);
     free(f->table);
-    free(f->reach);
-    free(f->first);
     free(f->kernel_x);
     free(f->kernel_y);
     free(f);
@@ -289,33 +311,14 @@ const bst_light_shape *bst_light_fft_shape(const bst_light_fft *f) {
     return &f->shape;
 }
 
-int bst_light_fft_rows(const bst_light_fft *f) {
-    return f->rows;
+size_t bst_light_fft_floats(const bst_light_fft *f) {
+    size_t grid = (size_t)f->shape.x.samples * (size_t)f->shape.y.samples;
+    size_t image = (size_t)f->pitch * (size_t)f->shape.height;
+    return grid > image ? grid : image;
 }
 
 int bst_light_fft_pitch(const bst_light_fft *f) {
     return f->pitch;
-}
-
-/* ------------------------------------------------------------------ rows forward */
-
-/* Adds a row to its cells; returns whether there is light in it. */
-static bool add_cells(const bst_light_fft *f, const float *row, float *cells) {
-    float any = 0.0f;
-    for (int i = 0; i < f->cells_x; i++) {
-        int begin = i * f->cell, rest = f->shape.x.samples - begin;
-        float part[8] = {0};
-        for (int k = 0; k + 8 <= (rest < f->cell ? rest : f->cell); k += 8) {
-            for (int n = 0; n < 8; n++) {
-                part[n] += row[begin + k + n];
-            }
-        }
-        float sum = ((part[0] + part[1]) + (part[2] + part[3])) +
-                    ((part[4] + part[5]) + (part[6] + part[7]));
-        cells[i] += sum;
-        any += sum;
-    }
-    return any > 0.0f;
 }
 
 static bench *take_bench(bst_light_fft *f) {
@@ -326,181 +329,173 @@ static bench *take_bench(bst_light_fft *f) {
     }
 }
 
-/* The tile of a block of columns and a block of rows. */
-static float *tile_of(const bst_light_fft *f, int column, int row_block) {
-    return f->spectrum +
-           ((size_t)(column / TILE) * (size_t)f->row_blocks + (size_t)row_block) * TILE_FLOATS;
+/* ------------------------------------------------------------------ rows forward */
+
+/* Loads two blocks of rows (the second may be NULL) as real and imaginary parts and adds them to
+ * their rows of cells. Returns whether there is light. */
+BST_LANES_FUNCTION
+static bool load_rows(const bst_light_fft *f, const bst_lanes *a, const bst_lanes *b,
+                      bst_batch *line, float *cells_a, float *cells_b) {
+    float any = 0.0f;
+    for (int i = 0, x = 0; i < f->cells_x; i++) {
+        int end = x + f->cell < f->shape.x.samples ? x + f->cell : f->shape.x.samples;
+        bst_lanes sum_a = {0}, sum_b = {0};
+        for (; x < end; x++) {
+            line[x] = (bst_batch){a[x], b ? b[x] : (bst_lanes){0}};
+            sum_a += line[x].re;
+            sum_b += line[x].im;
+        }
+        float total_a = 0.0f, total_b = 0.0f;
+        for (int l = 0; l < BLOCK; l++) {
+            total_a += sum_a[l];
+            total_b += sum_b[l];
+        }
+        cells_a[i] += total_a;
+        any += total_a + total_b;
+        if (b) {
+            cells_b[i] += total_b;
+        }
+    }
+    return any > 0.0f;
 }
 
-/* Copies between rows and tiles, complex numbers of a tile's side each way; two by two, so that
- * whole vectors are written. */
-static void transpose(const float *from, size_t from_pitch, float *to, size_t to_pitch) {
-    for (int r = 0; r < TILE; r += 2) {
-        for (int c = 0; c < TILE; c += 2) {
-            const float *a = from + (size_t)r * from_pitch + 2 * c, *b = a + from_pitch;
-            float *x = to + (size_t)c * to_pitch + 2 * r;
-            float first[4] = {a[0], a[1], b[0], b[1]}, second[4] = {a[2], a[3], b[2], b[3]};
-            memcpy(x, first, sizeof first);
-            memcpy(x + to_pitch, second, sizeof second);
+/* The spectra of two blocks of rows for one strip, from the transform of both as one complex
+ * number: twice them. The columns become lanes. */
+BST_LANES_FUNCTION
+static void store_strip(const bst_light_fft *f, const strip *s, const bst_batch *line, bst_batch *a,
+                        bst_batch *b) {
+    const int *order = bst_batch_fft_order(f->row_forward);
+    int samples = f->shape.x.samples;
+    bst_lanes part[4][BLOCK];
+    for (int l = 0; l < BLOCK; l++) {
+        int k = s->k0 + l;
+        if (abs(k) >= f->used) {
+            part[0][l] = part[1][l] = part[2][l] = part[3][l] = (bst_lanes){0};
+            continue;
         }
+        const bst_batch *p = &line[order[k < 0 ? k + samples : k]];
+        const bst_batch *q = &line[order[k > 0 ? samples - k : -k]];
+        part[0][l] = p->re + q->re;
+        part[1][l] = p->im - q->im;
+        part[2][l] = p->im + q->im;
+        part[3][l] = q->re - p->re;
+    }
+    for (int i = 0; i < (b ? 4 : 2); i++) {
+        bst_lanes_transpose(part[i]);
+    }
+    for (int r = 0; r < BLOCK; r++) {
+        a[r] = (bst_batch){part[0][r], part[1][r]};
+    }
+    for (int r = 0; b && r < BLOCK; r++) {
+        b[r] = (bst_batch){part[2][r], part[3][r]};
     }
 }
 
-/* Transforms a block of TILE rows of the grid. */
-static void row_block_forward(bst_light_fft *f, float *grid, int block, bench *b, float *cells) {
-    size_t pitch = (size_t)f->pitch;
-    bool any = false;
-    for (int r = 0; r < TILE; r++) {
-        float *from = grid + (size_t)(block * TILE + r) * pitch;
-        float *row = b->rows + (size_t)r * pitch;
-        if (add_cells(f, from, cells)) {
-            fftwf_execute_dft_r2c(f->row_forward, from, (fftwf_complex *)row);
-            any = true;
-        } else {
-            memset(row, 0, pitch * sizeof *row);
-        }
-    }
-    for (int c = 0; c < f->used; c += TILE) {
-        if (any) {
-            transpose(b->rows + 2 * c, pitch, tile_of(f, c, block), 2 * TILE);
-        } else {
-            memset(tile_of(f, c, block), 0, TILE_FLOATS * sizeof(float));
-        }
-    }
-}
-
-/* Rows of cells, which are one block of rows or two. */
+/* Pairs of blocks of rows, which fill whole rows of cells. */
 static void rows_forward(void *user, int begin, int end) {
     const pass *p = user;
     bst_light_fft *f = p->fft;
-    bench *b = take_bench(f);
+    bench *w = take_bench(f);
+    int per_cell = f->cell / BLOCK;
     for (int j = begin; j < end; j++) {
-        float *cells = f->cells + (size_t)j * (size_t)f->cells_x;
+        int a = 2 * j, b = a + 1 < f->row_blocks ? a + 1 : -1;
+        float *cells_a = f->cells + (size_t)(a / per_cell) * (size_t)f->cells_x;
+        float *cells_b = f->cells + (size_t)((b < 0 ? a : b) / per_cell) * (size_t)f->cells_x;
+        size_t block = (size_t)f->shape.x.samples, bytes = (size_t)f->cells_x * sizeof *cells_a;
+        const bst_lanes *grid = (const bst_lanes *)p->grid;
         if (p->first) {
-            memset(cells, 0, (size_t)f->cells_x * sizeof *cells);
+            memset(cells_a, 0, bytes);
+            memset(cells_b, 0, bytes);
         }
-        for (int k = j * f->cell; k < (j + 1) * f->cell && k < f->shape.y.samples; k += TILE) {
-            row_block_forward(f, p->grid, k / TILE, b, cells);
+        bool any = load_rows(f, grid + (size_t)a * block, b < 0 ? NULL : grid + (size_t)b * block,
+                             w->line, cells_a, cells_b);
+        if (any) {
+            bst_batch_fft_run(f->row_forward, w->line);
+        }
+        for (int i = 0; i < f->strip_count; i++) {
+            bst_batch *to = f->spectrum + (size_t)i * f->strip_pitch + (size_t)a * BLOCK;
+            if (any) {
+                store_strip(f, &f->strips[i], w->line, to, b < 0 ? NULL : to + BLOCK);
+            } else {
+                memset(to, 0, (b < 0 ? 1U : 2U) * BLOCK * sizeof *to);
+            }
         }
     }
-    atomic_flag_clear(&b->taken);
+    atomic_flag_clear(&w->taken);
 }
 
 /* ------------------------------------------------------------------ columns */
 
-/* out += line * table over n complex numbers. */
-static void multiply_add(float *restrict out, const float *restrict line,
-                         const float *restrict table, int n) {
-    for (int i = 0; i < 2 * n; i += 2) {
-        float a = line[i], b = line[i + 1], c = table[i], d = table[i + 1];
-        out[i] += a * c - b * d;
-        out[i + 1] += a * d + b * c;
+/* Adds a strip's spectrum times its transfer function to a block of the image's, with real and
+ * imaginary parts swapped for the inverse. */
+BST_LANES_FUNCTION
+static void fold(const bst_light_fft *f, const strip *s, const bst_batch *table,
+                 const bst_batch *line, bst_batch *sum) {
+    const int *order = bst_batch_fft_order(f->column_forward);
+    int samples = f->shape.y.samples, pixels = f->shape.y.pixels;
+    int to = (pixels - s->reach % pixels) % pixels;
+    for (int k = -s->reach; k <= s->reach; k++, table++) {
+        const bst_batch *v = &line[order[k < 0 ? k + samples : k]];
+        sum[to].im += v->re * table->re - v->im * table->im;
+        sum[to].re += v->re * table->im + v->im * table->re;
+        to = to + 1 < pixels ? to + 1 : 0;
     }
 }
 
-/* The same conjugate and in falling order: out[-i] += conj(line[i] table[i]). */
-static void multiply_add_mirrored(float *restrict out, const float *restrict line,
-                                  const float *restrict table, int n) {
-    for (int i = 0; i < n; i++) {
-        float a = line[2 * i], b = line[2 * i + 1], c = table[2 * i], d = table[2 * i + 1];
-        out[-2 * i] += a * c - b * d;
-        out[-2 * i + 1] -= a * d + b * c;
-    }
-}
-
-/* Adds one transformed column of the grid, times its transfer function, to a column of the image's
- * spectrum. */
-static void fold(const bst_light_fft *f, int node, int column, bool mirrored, const float *line,
-                 float *out) {
-    int samples = f->shape.y.samples, pixels = f->shape.y.pixels, reach = f->reach[column];
-    const float *table = f->table[node] + 2 * f->first[column];
-    for (int k = -reach; k <= reach;) {
-        /* a stretch in which neither index wraps */
-        int run = reach + 1 - k, from = k < 0 ? k + samples : k;
-        run = k < 0 && run > -k ? -k : run;
-        if (mirrored) {
-            int to = ((-k) % pixels + pixels) % pixels;
-            run = run > to + 1 ? to + 1 : run;
-            multiply_add_mirrored(out + 2 * to, line + 2 * from, table, run);
-        } else {
-            int to = (k % pixels + pixels) % pixels;
-            run = run > pixels - to ? pixels - to : run;
-            multiply_add(out + 2 * to, line + 2 * from, table, run);
+/* The window's rows of a block of columns; the rows become lanes. */
+BST_LANES_FUNCTION
+static void store_image(const bst_light_fft *f, int block, const bst_batch *line) {
+    const int *order = bst_batch_fft_order(f->column_inverse) + f->shape.margin;
+    for (int j = 0; j < f->image_blocks; j++, order += BLOCK) {
+        bst_batch *to = f->image + (size_t)j * f->image_pitch + (size_t)block * BLOCK;
+        bst_lanes re[BLOCK], im[BLOCK];
+        for (int r = 0; r < BLOCK; r++) {
+            re[r] = line[order[r]].im;
+            im[r] = line[order[r]].re;
         }
-        k += run;
-        table += 2 * run;
-    }
-}
-
-/* Copies a column of the rows' spectra into a line. */
-static void gather(const bst_light_fft *f, int column, float *line) {
-    const float *from = tile_of(f, column, 0) + (size_t)(column % TILE) * 2 * TILE;
-    for (int r = 0; r < f->shape.y.samples; r += TILE) {
-        memcpy(line + 2 * r, from, 2 * TILE * sizeof *line);
-        from += TILE_FLOATS;
-    }
-}
-
-/* Puts the window's rows of an inverse column in its place, from row block 0 on. */
-static void scatter(const bst_light_fft *f, int column, const float *line) {
-    float *to = tile_of(f, column, 0) + (size_t)(column % TILE) * 2 * TILE;
-    const float *from = line + 2 * f->shape.margin;
-    for (int r = 0; r < f->shape.height; r += TILE) {
-        memcpy(to, from + 2 * r, 2 * TILE * sizeof *to);
-        to += TILE_FLOATS;
-    }
-}
-
-/* Adds the grid's columns that fold onto the image's column `column`. */
-static void add_aliases(const pass *p, bench *b, int column, float *sum) {
-    const bst_light_fft *f = p->fft;
-    for (int j = 0; j * f->shape.x.pixels - column < f->used; j++) {
-        for (int mirrored = 0; mirrored <= (j > 0); mirrored++) {
-            int c = j * f->shape.x.pixels + (mirrored ? -column : column);
-            if (c < f->used) {
-                gather(f, c, b->line[0]);
-                fftwf_execute_dft(f->column_forward, (fftwf_complex *)b->line[0],
-                                  (fftwf_complex *)b->line[1]);
-                fold(f, p->node, c, mirrored, b->line[1], sum);
-            }
+        bst_lanes_transpose(re);
+        bst_lanes_transpose(im);
+        for (int l = 0; l < BLOCK; l++) {
+            to[l] = (bst_batch){re[l], im[l]};
         }
     }
 }
 
-/* Columns of the image's spectrum. The inverse of a column is put where the column itself was: the
- * others that fold onto it lie beyond the image's columns, so nobody else reads it. */
+/* Blocks of the image's columns. */
 static void columns(void *user, int begin, int end) {
     const pass *p = user;
     bst_light_fft *f = p->fft;
-    bench *b = take_bench(f);
+    bench *w = take_bench(f);
+    size_t pixels = (size_t)f->shape.y.pixels;
     for (int c = begin; c < end; c++) {
-        float *sum = f->sum ? f->sum + (size_t)c * f->out_pitch : b->sum;
+        bst_batch *sum = f->sum ? f->sum + (size_t)c * pixels : w->line;
         if (p->first) {
-            memset(sum, 0, f->out_pitch * sizeof *sum);
+            memset(sum, 0, pixels * sizeof *sum);
         }
-        add_aliases(p, b, c, sum);
+        for (int i = f->first_strip[c]; i < f->first_strip[c + 1]; i++) {
+            const strip *s = &f->strips[i];
+            bst_batch *line = f->spectrum + (size_t)i * f->strip_pitch;
+            bst_batch_fft_run(f->column_forward, line);
+            fold(f, s, f->table[p->node] + s->first, line, sum);
+        }
         if (p->last) {
-            fftwf_execute_dft(f->column_inverse, (fftwf_complex *)sum, (fftwf_complex *)b->line[1]);
-            scatter(f, c, b->line[1]);
+            bst_batch_fft_run(f->column_inverse, sum);
+            store_image(f, c, sum);
         }
     }
-    atomic_flag_clear(&b->taken);
+    atomic_flag_clear(&w->taken);
 }
 
-/* Columns of the image's spectrum that the grid's band reaches; the others are zero. */
-static int reached(const bst_light_fft *f) {
-    return f->used < f->image_columns ? f->used : f->image_columns;
-}
-
-void bst_light_fft_add(bst_light_fft *f, int node, bool first, bool last, float *grid) {
-    pass p = {f, grid, node, first, last};
-    bst_parallel_for(f->pool, f->cells_y, 1, rows_forward, &p);
-    bst_parallel_for(f->pool, reached(f), TILE, columns, &p);
+void bst_light_fft_add(bst_light_fft *f, int node, bool first, bool last, const float *grid) {
+    pass p = {.fft = f, .grid = grid, .node = node, .first = first, .last = last};
+    bst_parallel_for(f->pool, (f->row_blocks + 1) / 2, 1, rows_forward, &p);
+    bst_parallel_for(f->pool, f->column_blocks, 1, columns, &p);
 }
 
 /* ------------------------------------------------------------------ rows inverse */
 
 /* Adds the far wings of a row, linearly between the cells' centres. */
+BST_LANES_FUNCTION
 static void add_wings(const bst_light_fft *f, int row, float *image) {
     int j;
     float v = (float)cell_place(f, &f->shape.y, f->cells_y, row, &j);
@@ -517,31 +512,64 @@ static void add_wings(const bst_light_fft *f, int row, float *image) {
     }
 }
 
-/* Blocks of TILE rows of the window. */
+/* The spectra of two blocks of rows as that of one complex sequence, real and imaginary parts
+ * swapped. */
+BST_LANES_FUNCTION
+static void join_rows(const bst_light_fft *f, const bst_batch *a, const bst_batch *b,
+                      bst_batch *line) {
+    int pixels = f->shape.x.pixels, half = pixels / 2, last = f->column_blocks * BLOCK - 1;
+    last = last < half ? last : half;
+    for (int k = 0; k <= last; k++) {
+        bst_batch *up = &line[k], *down = &line[k > 0 ? pixels - k : 0];
+        *down = (bst_batch){b[k].re - a[k].im, a[k].re + b[k].im};
+        *up = (bst_batch){a[k].im + b[k].re, a[k].re - b[k].im};
+    }
+    for (int k = last + 1; k < pixels - last; k++) {
+        line[k] = (bst_batch){{0}, {0}};
+    }
+}
+
+/* One block of rows of the image from a part of the joined rows. */
+BST_LANES_FUNCTION
+static void store_rows(const bst_light_fft *f, const bst_batch *line, bool imaginary, int rows,
+                       float *image) {
+    const int *order = bst_batch_fft_order(f->row_inverse) + f->shape.margin;
+    for (int x = 0; x < f->shape.width; x += BLOCK) {
+        bst_lanes v[BLOCK];
+        for (int l = 0; l < BLOCK; l++) {
+            v[l] = imaginary ? line[order[x + l]].re : line[order[x + l]].im;
+        }
+        bst_lanes_transpose(v);
+        for (int r = 0; r < rows; r++) {
+            *(bst_lanes *)(image + (size_t)r * (size_t)f->pitch + x) = v[r];
+        }
+    }
+}
+
+/* Pairs of blocks of rows of the window. */
 static void rows_inverse(void *user, int begin, int end) {
     const pass *p = user;
     bst_light_fft *f = p->fft;
-    bench *b = take_bench(f);
-    size_t pitch = (size_t)f->pitch;
-    int columns_used = reached(f), zero = f->image_columns - columns_used;
-    for (int block = begin; block < end; block++) {
-        for (int c = 0; c < columns_used; c += TILE) {
-            transpose(tile_of(f, c, block), 2 * TILE, b->rows + 2 * c, pitch);
-        }
-        for (int y = block * TILE; y < (block + 1) * TILE && y < f->shape.height; y++) {
-            float *row = b->rows + (size_t)(y % TILE) * pitch;
-            float *image = p->grid + (size_t)y * pitch;
-            memset(row + 2 * columns_used, 0, 2 * (size_t)zero * sizeof *row);
-            fftwf_execute_dft_c2r(f->row_inverse, (fftwf_complex *)row, image);
-            if (f->wrap) {
-                add_wings(f, y, image + f->shape.margin);
+    bench *w = take_bench(f);
+    for (int j = begin; j < end; j++) {
+        int a = 2 * j, b = a + 1 < f->image_blocks ? a + 1 : a;
+        join_rows(f, f->image + (size_t)a * f->image_pitch, f->image + (size_t)b * f->image_pitch,
+                  w->line);
+        bst_batch_fft_run(f->row_inverse, w->line);
+        for (int k = a; k <= b; k++) {
+            int top = k * BLOCK, rows = f->shape.height - top;
+            rows = rows < BLOCK ? rows : BLOCK;
+            float *image = p->image + (size_t)top * (size_t)f->pitch;
+            store_rows(f, w->line, k > a, rows, image);
+            for (int r = 0; f->wrap && r < rows; r++) {
+                add_wings(f, top + r, image + (size_t)r * (size_t)f->pitch);
             }
         }
     }
-    atomic_flag_clear(&b->taken);
+    atomic_flag_clear(&w->taken);
 }
 
-void bst_light_fft_finish(bst_light_fft *f, float *grid) {
+void bst_light_fft_finish(bst_light_fft *f, float *image) {
     if (f->wrap) {
         float scale = (float)(1.0 / (f->kernel_x[0] * f->kernel_y[0]));
         size_t count = (size_t)f->cells_x * (size_t)f->cells_y;
@@ -550,6 +578,6 @@ void bst_light_fft_finish(bst_light_fft *f, float *grid) {
         }
         bst_light_wrap_run(f->wrap, f->cells);
     }
-    pass p = {.fft = f, .grid = grid};
-    bst_parallel_for(f->pool, (f->shape.height + TILE - 1) / TILE, 1, rows_inverse, &p);
+    pass p = {.fft = f, .image = image};
+    bst_parallel_for(f->pool, (f->image_blocks + 1) / 2, 1, rows_inverse, &p);
 }

@@ -1,14 +1,15 @@
 /* Convolution of a grid of deposited light with a PSF given as OTF, on the host's threads.
  *
  * The grid has `samples` samples over a period of `pixels` px per axis; the image has one value per
- * px. Three passes over memory: rows forward; per block of columns forward, times OTF over the
- * spreading kernel's transform, folded to the image's band, inverse; rows inverse. Lines without
- * light, frequencies beyond the cut-off and rows outside the window are left out. The result does
- * not depend on the number of threads. */
+ * px. Three passes over memory, each on sixteen rows or columns side by side: rows forward; columns
+ * forward, times OTF over the spreading kernel's transform, folded to the image's band, inverse;
+ * rows inverse. Rows without light, frequencies beyond the cut-off and rows outside the window are
+ * left out. The result does not depend on the number of threads. */
 #ifndef BST_SCENEGEN_LIGHT_FFT_H
 #define BST_SCENEGEN_LIGHT_FFT_H
 
 #include <stdbool.h>
+#include <stddef.h>
 
 #include "scenegen/light_grid.h"
 #include "sim/core/parallel.h"
@@ -30,16 +31,18 @@ void bst_light_fft_free(bst_light_fft *fft);
 
 const bst_light_shape *bst_light_fft_shape(const bst_light_fft *fft);
 
-/* Rows of the grid's memory and floats from one to the next; 64-byte aligned memory. */
-int bst_light_fft_rows(const bst_light_fft *fft);
+/* Floats of the memory that holds the grid and then the image, 64-byte aligned. */
+size_t bst_light_fft_floats(const bst_light_fft *fft);
+/* Floats from one row of the image to the next. */
 int bst_light_fft_pitch(const bst_light_fft *fft);
 
-/* Takes the grid that holds the light of field node `node`; its content is spent. The image is the
- * sum over the nodes from the one that is `first` to the one that is `last`. */
-void bst_light_fft_add(bst_light_fft *fft, int node, bool first, bool last, float *grid);
+/* Takes the grid that holds the light of field node `node`: sample (i, j) at
+ * grid[(j / 16 * x.samples + i) * 16 + j % 16]. The image is the sum over the nodes from the one
+ * that is `first` to the one that is `last`. */
+void bst_light_fft_add(bst_light_fft *fft, int node, bool first, bool last, const float *grid);
 
-/* After the last node: makes the image in the same memory, pixel (i, j) of the window at
- * grid[j * pitch + margin + i]. */
-void bst_light_fft_finish(bst_light_fft *fft, float *grid);
+/* After the last node: the image, pixel (i, j) of the window at image[j * pitch + i]; rows are
+ * filled to a multiple of 16 with the pixels beyond the window. */
+void bst_light_fft_finish(bst_light_fft *fft, float *image);
 
 #endif

@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "scenegen/batch_fft.h"
+
 enum {
     LATTICE = 128, /* frequencies per axis over the kept band */
     IMAGE = 256,   /* PSF samples per axis from it: four per period of the highest frequency */
@@ -181,43 +183,19 @@ double bst_light_density(const bst_light_band *band, int axis, int taps, double 
     return high;
 }
 
-/* Time of one line's transform by its length: measured with FFTW's estimated plans, which are quick
- * for powers of two and five times those. INFINITY for lengths that are not used. */
-static double cost(int axis, int n) {
-    int rest = n, two = 0, other = 0;
-    while (rest % 2 == 0) {
-        rest /= 2;
-        two++;
-    }
-    static const int primes[3] = {3, 5, 7};
-    for (int i = 0; i < 3; i++) {
-        while (rest % primes[i] == 0) {
-            rest /= primes[i];
-            other = other * 10 + primes[i];
-        }
-    }
-    if (rest > 1 || two < 4) {
-        return INFINITY;
-    }
-    double quick = other == 0 || other == 5 ? 1.0 : other == 3 || other == 35 ? 1.2 : 1.5;
-    /* rows are transformed as real numbers, which levels the lengths */
-    quick = axis == 0 ? 0.8 + 0.2 * quick : quick;
-    return n * log2(n) * (quick + 0.5);
-}
-
 bst_light_axis bst_light_axis_choose(const bst_light_band *band, int axis, int taps, int least,
                                      double density) {
     bst_light_axis best = {0};
     double lowest = INFINITY;
     int most = 32 + least + least / 3;
     for (int pixels = (least + 15) / 16 * 16; pixels <= most; pixels += 16) {
-        double inverse = cost(axis, pixels);
+        double inverse = bst_batch_fft_cost(pixels);
         if (isinf(inverse)) {
             continue;
         }
         int first = 16 * (int)ceil(fmax(density * pixels, 64.0) / 16.0 - 1e-9);
         for (int samples = first; samples <= 32 + first + first / 3; samples += 16) {
-            double sum = inverse + cost(axis, samples);
+            double sum = inverse + bst_batch_fft_cost(samples);
             if (sum < lowest) {
                 lowest = sum;
                 best.pixels = pixels;

@@ -23,8 +23,11 @@ void bst_motion_to_shift(bst_path_point *point, double scale_rad, double stretch
 bst_status bst_motion_midpoints(bst_ctx *ctx, const bst_path_point *path, int count, int parts,
                                 bst_node_list *list) BST_MUST_CHECK;
 
-/* End of the stretch of a source's path that begins at time u (0 to 1) and goes no further than
- * `end`: its next knot of brightness. *parts: as many as it takes to follow its light, >= 1. */
-double bst_motion_stretch(const bst_source *source, double u, double end, int *parts);
+/* Of the way between two samples of the track, which begins at begin_s of duration_s and takes
+ * length_s: the stretch that begins at the share `from` and ends at the share that is returned, 1
+ * or that of the source's next knot of brightness. *parts: as many as it takes to follow its light.
+ */
+double bst_motion_stretch(const bst_source *source, double begin_s, double length_s,
+                          double duration_s, double from, int *parts);
 
 #endif

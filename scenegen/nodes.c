@@ -98,6 +98,11 @@ static double clip(const maker *m, const group *g, int k, double a[3], double b[
     if (!(to > from)) {
         return 0.0;
     }
+    if (to - from == length) {
+        memcpy(a, p->p, sizeof p->p);
+        memcpy(b, q->p, sizeof q->p);
+        return length;
+    }
     for (int i = 0; i < 3; i++) {
         double slope = (q->p[i] - p->p[i]) / length;
         a[i] = p->p[i] + slope * (from - p->s);

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/world/skylight.h"
+
 enum {
     CELL_PX = 16, /* boxes are kept apart on a grid this coarse */
     LAYERS = 64,  /* in one round: the bits of a cell */
@@ -21,6 +23,9 @@ typedef struct shape {
 struct bst_plane_maker {
     uint32_t planes;
     double threshold_sigma;
+    double read_noise_e;
+    float level; /* of the mask, electrons: of all pixels, or of the darkest */
+    bool uneven; /* the background differs from pixel to pixel, and the level with it */
     size_t pixels;
     float *electrons[BST_PLANE_SEGMENTATION];
     float *image; /* what the renderer gives */
@@ -167,30 +172,41 @@ static void choose_layer(bst_plane_maker *m, shape *s) {
     }
 }
 
+/* Whether the image is above the mask's level in a pixel. */
+static bool above(const bst_plane_maker *m, size_t pixel) {
+    if (!m->uneven) {
+        return m->image[pixel] > m->level;
+    }
+    double variance =
+        (double)m->electrons[BST_PLANE_BACKGROUND][pixel] + m->read_noise_e * m->read_noise_e;
+    return (double)m->image[pixel] > m->threshold_sigma * sqrt(variance);
+}
+
 /* Whether a source's light is above the level at the border of its box, where the window goes on.
  */
-static bool is_cut(const bst_plane_maker *m, bst_window w, const shape *s, float level) {
+static bool is_cut(const bst_plane_maker *m, bst_window w, const shape *s) {
     for (int y = s->y0; y < s->y1; y++) {
-        const float *row = m->image + (size_t)y * (size_t)w.width;
+        size_t row = (size_t)y * (size_t)w.width;
         bool edge = (y == s->y0 && s->y0 > 0) || (y == s->y1 - 1 && s->y1 < w.height);
         for (int x = s->x0; edge && x < s->x1; x++) {
-            if (row[x] > level) {
+            if (above(m, row + (size_t)x)) {
                 return true;
             }
         }
-        if ((s->x0 > 0 && row[s->x0] > level) || (s->x1 < w.width && row[s->x1 - 1] > level)) {
+        if ((s->x0 > 0 && above(m, row + (size_t)s->x0)) ||
+            (s->x1 < w.width && above(m, row + (size_t)s->x1 - 1))) {
             return true;
         }
     }
     return false;
 }
 
-static void paint(bst_plane_maker *m, bst_window w, const shape *s, float level) {
+static void paint(bst_plane_maker *m, bst_window w, const shape *s) {
     for (int y = s->y0; y < s->y1; y++) {
         size_t row = (size_t)y * (size_t)w.width;
         for (int x = s->x0; x < s->x1; x++) {
             size_t i = row + (size_t)x;
-            if (m->image[i] > level && m->image[i] > m->best[i]) {
+            if (m->image[i] > m->best[i] && above(m, i)) {
                 m->best[i] = m->image[i];
                 m->mask[i] = s->item + 1;
             }
@@ -202,7 +218,7 @@ static void paint(bst_plane_maker *m, bst_window w, const shape *s, float level)
  * and come again. */
 static bst_status paint_layer(bst_ctx *ctx, bst_plane_maker *m, bst_renderer *renderer,
                               const bst_camera *camera, const bst_render_request *q, int count,
-                              int layer, float level, int *left) {
+                              int layer, int *left) {
     int n = 0;
     for (int i = 0; i < count; i++) {
         if (!m->shapes[i].done && m->shapes[i].layer == layer) {
@@ -218,11 +234,11 @@ static bst_status paint_layer(bst_ctx *ctx, bst_plane_maker *m, bst_renderer *re
         if (s->done || s->layer != layer) {
             continue;
         }
-        if (is_cut(m, q->window, s, level)) {
+        if (is_cut(m, q->window, s)) {
             s->margin *= 2;
             make_box(camera, q, s);
         } else {
-            paint(m, q->window, s, level);
+            paint(m, q->window, s);
             s->done = true;
             --*left;
         }
@@ -259,8 +275,7 @@ static bst_status list_shapes(bst_ctx *ctx, bst_plane_maker *m, const bst_render
 }
 
 static bst_status make_mask(bst_ctx *ctx, bst_plane_maker *m, bst_renderer *renderer,
-                            const bst_camera *camera, const bst_render_request *q, int count,
-                            float level) {
+                            const bst_camera *camera, const bst_render_request *q, int count) {
     bst_window w = q->window;
     size_t pixels = (size_t)w.width * (size_t)w.height;
     memset(m->mask, 0, pixels * sizeof *m->mask);
@@ -276,7 +291,7 @@ static bst_status make_mask(bst_ctx *ctx, bst_plane_maker *m, bst_renderer *rend
             }
         }
         for (int layer = 0; layer < layers; layer++) {
-            BST_TRY(paint_layer(ctx, m, renderer, camera, q, count, layer, level, &left));
+            BST_TRY(paint_layer(ctx, m, renderer, camera, q, count, layer, &left));
         }
     }
     return BST_OK;
@@ -285,12 +300,15 @@ static bst_status make_mask(bst_ctx *ctx, bst_plane_maker *m, bst_renderer *rend
 bst_status bst_plane_maker_render(bst_ctx *ctx, bst_plane_maker *m, bst_renderer *renderer,
                                   const bst_camera *camera, const bst_render_request *request,
                                   const int *item_source, int item_count, bst_planes *out) {
-    float level = (float)(m->threshold_sigma * sqrt(request->background_e +
-                                                    camera->read_noise_e * camera->read_noise_e));
+    double least_e =
+        request->background_e + (request->background ? request->background->least_e : 0.0);
+    m->read_noise_e = camera->read_noise_e;
+    m->uneven = request->background != NULL;
+    m->level = (float)(m->threshold_sigma * sqrt(least_e + m->read_noise_e * m->read_noise_e));
     int shapes = 0, stars = 0;
     if (wants(m, BST_PLANE_SEGMENTATION)) { /* first: it asks for the peaks of the whole request */
         BST_TRY(list_shapes(ctx, m, renderer, camera, request, item_source, item_count,
-                            (double)level, &shapes));
+                            (double)m->level, &shapes));
     }
     while (stars < request->count && request->sources[stars].kind == BST_SOURCE_STAR) {
         stars++;
@@ -308,7 +326,7 @@ bst_status bst_plane_maker_render(bst_ctx *ctx, bst_plane_maker *m, bst_renderer
                                request->count - stars, m->electrons[BST_PLANE_TARGETS]));
     }
     if (wants(m, BST_PLANE_SEGMENTATION)) {
-        BST_TRY(make_mask(ctx, m, renderer, camera, request, shapes, level));
+        BST_TRY(make_mask(ctx, m, renderer, camera, request, shapes));
     }
     out->exposure_id = request->exposure_id;
     out->window = request->window;

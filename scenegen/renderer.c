@@ -11,16 +11,19 @@
 #include "scenegen/fft_light.h"
 #include "scenegen/frame_pool.h"
 #include "scenegen/place.h"
-#include "scenegen/profile_table.h"
+#include "scenegen/profile_law.h"
 #include "scenegen/readout.h"
 #include "scenegen/reference.h"
+#include "scenegen/render_request.h"
+#include "scenegen/rolling.h"
+#include "scenegen/scene_options.h"
+#include "scenegen/scene_plan.h"
 #include "scenegen/smear.h"
+#include "scenegen/stage.h"
 #include "scenegen/tiles.h"
-#include "scenegen/vignetting.h"
+#include "sim/world/skylight.h"
 
-enum { MAX_TAPS = BST_PLACE_TAPS, BOX_FLOATS = 4 };
-/* Of a block of nodes: place and weight. */
-enum { NODE_BYTES = BST_BLOCK * BST_NODE_ROWS * (int)sizeof(float) };
+enum { MAX_TAPS = BST_PLACE_TAPS };
 
 /* A device buffer that grows. */
 typedef struct growing {
@@ -31,7 +34,7 @@ typedef struct growing {
 struct bst_renderer {
     bst_camera camera;
     bst_renderer_options options;
-    int taps, phases;
+    int taps, law_degree; /* of the stamps */
     cl_context context;
     cl_command_queue queue;
     cl_program program;
@@ -42,13 +45,18 @@ struct bst_renderer {
     bst_crowd *crowd;
     bst_detector *detector;
     bst_readout *readout;
+    bst_rolling *rolling; /* NULL: all rows are exposed at once */
     bst_frame_pool *pool;
-    cl_mem profiles;
-    growing table, sources, nodes, block_box, source_box, saturated, expected;
-    bst_scene_source *list; /* drawn sources */
-    double *peak_e;         /* of all sources of the request */
-    int list_capacity, tiles;
-    bool uncounted; /* saturated pixels of the latest frame */
+    cl_mem law; /* of the stamps' profiles */
+    bst_stage *stage;
+    cl_mem sources, table; /* of the present frame; borrowed */
+    growing nodes, block_box, source_box, group_box, expected;
+    bst_scene_plan plan;   /* of the latest request, or of its latest band */
+    double *rolled_peak_e; /* of all sources, with the bands of a rolling shutter */
+    int rolled_capacity, set;
+    int tiles[BST_STAGE_SETS]; /* whose saturated pixels are not counted yet */
+    bool rolled;               /* the latest request */
+    bool map;                  /* the background differs from pixel to pixel */
     long long saturated_pixels, saturated_frames;
     uint64_t most_bytes; /* of one buffer on the device */
     bst_render_stats stats;
@@ -58,24 +66,6 @@ bst_renderer_options bst_renderer_default_options(void) {
     return (bst_renderer_options){.tolerance_sigma = 0.05, .pool_frames = 4};
 }
 
-static bst_status check_camera(bst_ctx *ctx, const bst_camera *c) {
-    if (c->width_px < 1 || c->height_px < 1 || c->width_px > 65536 || c->height_px > 65536 ||
-        c->bits < 8 || c->bits > 16) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT,
-                        "cannot render %lld x %lld pixels of %lld bits: allowed are 1 to 65536 "
-                        "pixels and 8 to 16 bits",
-                        (long long)c->width_px, (long long)c->height_px, (long long)c->bits);
-    }
-    double fwhm_px = 2.3548200450309493 * bst_camera_psf_sigma_px(c);
-    if (!(c->psf_fwhm_px > 0.0) || fwhm_px > 70.0) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT,
-                        "cannot render a PSF of psf_fwhm_px %g, with charge diffusion and fast "
-                        "jitter %g: allowed are 0 to 70 pixels",
-                        c->psf_fwhm_px, fwhm_px);
-    }
-    return BST_OK;
-}
-
 /* Stamps up to 8 standard deviations on each side: beyond, less than 1e-15 of the light is left. */
 static int taps_for(double sigma_px) {
     int taps = 16 * (int)ceil((2.0 * 8.0 * sigma_px + 2.0) / 16.0);
@@ -83,32 +73,14 @@ static int taps_for(double sigma_px) {
 }
 
 static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
-    const bst_kernel_source *sources[] = {
-        &bst_kernel_scene_shared, &bst_kernel_nodes,    &bst_kernel_splat,
-        &bst_kernel_random,       &bst_kernel_detector, &bst_kernel_light,
-        &bst_kernel_vignetting,   &bst_kernel_tile,     &bst_kernel_readout};
+    const bst_kernel_source *sources[] = {&bst_kernel_scene_shared, &bst_kernel_nodes,
+                                          &bst_kernel_random,       &bst_kernel_splat,
+                                          &bst_kernel_detector,     &bst_kernel_light,
+                                          &bst_kernel_vignetting,   &bst_kernel_background,
+                                          &bst_kernel_tile,         &bst_kernel_readout};
     char options[2048];
-    int length =
-        snprintf(options, sizeof options,
-                 "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d "
-                 "-DPHASES=%d -DPLACE_BITS=%d%s",
-                 r->options.tile_width, r->options.tile_height, r->options.group, r->taps,
-                 r->phases, bst_place_bits(&r->camera), r->fft_light ? " -DFFT_LIGHT" : "");
-    length += bst_vignetting_options(&r->camera, options + length, sizeof options - (size_t)length);
-    length += bst_detector_options(r->detector, options + length, sizeof options - (size_t)length);
-    if (r->options.spatial_oversample > 0) {
-        length += snprintf(options + length, sizeof options - (size_t)length,
-                           " -DSPATIAL_OVERSAMPLE=%d", r->options.spatial_oversample);
-    }
-    const bst_distortion *d = &r->camera.distortion;
-    if (bst_camera_distorted(&r->camera)) {
-        double a = bst_camera_scale_rad(&r->camera), a2 = a * a,
-               out = r->camera.geometry.domain / a;
-        snprintf(
-            options + length, sizeof options - (size_t)length,
-            " -DDISTORTED -DK1=%.9ef -DK2=%.9ef -DK3=%.9ef -DP1=%.9ef -DP2=%.9ef -DFOLD2=%.9ef",
-            d->k1 * a2, d->k2 * a2 * a2, d->k3 * a2 * a2 * a2, d->p1 * a, d->p2 * a, out * out);
-    }
+    bst_scene_build_options(&r->camera, &r->options, r->taps, r->law_degree, r->fft_light != NULL,
+                            r->detector, options, sizeof options);
     BST_TRY(bst_device_build(ctx, device, sources, sizeof sources / sizeof *sources, options,
                              &r->program));
     static const char *const names[3] = {"bst_scene_nodes", "bst_scene_frame",
@@ -142,22 +114,6 @@ static bst_status grow(bst_ctx *ctx, bst_renderer *r, growing *g, size_t bytes) 
     return bst_device_check(ctx, code, "allocating scene memory");
 }
 
-/* Copies through a mapping, which PoCL serves without a copy of its own. */
-static bst_status upload(bst_ctx *ctx, bst_renderer *r, growing *g, const void *data,
-                         size_t bytes) {
-    BST_TRY(grow(ctx, r, g, bytes));
-    if (bytes == 0) {
-        return BST_OK;
-    }
-    cl_int code;
-    void *p = clEnqueueMapBuffer(r->queue, g->buffer, CL_TRUE, CL_MAP_WRITE_INVALIDATE_REGION, 0,
-                                 bytes, 0, NULL, NULL, &code);
-    BST_TRY(bst_device_check(ctx, code, "mapping scene memory"));
-    memcpy(p, data, bytes);
-    return bst_device_check(ctx, clEnqueueUnmapMemObject(r->queue, g->buffer, p, 0, NULL, NULL),
-                            "unmapping scene memory");
-}
-
 /* The PSF, and the Fourier path where it is no Gaussian. */
 static bst_status open_psf(bst_ctx *ctx, bst_device *device, bst_renderer *r,
                            bst_smear_options *smear) {
@@ -174,7 +130,6 @@ static bst_status open_psf(bst_ctx *ctx, bst_device *device, bst_renderer *r,
     light.taps = r->options.fft_taps > 0 ? r->options.fft_taps : light.taps;
     BST_TRY(bst_fft_light_create(ctx, device, &r->camera, r->psf, &light, &r->fft_light));
     smear->widest = bst_fft_light_widest(r->fft_light);
-    smear->table_error = 0.0;
     smear->node_sigma_px = bst_fft_light_band(r->fft_light)->node_sigma_px;
     smear->share_sigma_px = bst_fft_light_band(r->fft_light)->share_sigma_px;
     return BST_OK;
@@ -183,7 +138,7 @@ static bst_status open_psf(bst_ctx *ctx, bst_device *device, bst_renderer *r,
 bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
                                const bst_renderer_options *options, bst_renderer **out) {
     *out = NULL;
-    BST_TRY(check_camera(ctx, camera));
+    BST_TRY(bst_render_camera_check(ctx, camera));
     bst_renderer *r = calloc(1, sizeof *r);
     if (!r) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the renderer");
@@ -191,20 +146,21 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     r->camera = *camera;
     r->options = options ? *options : bst_renderer_default_options();
     r->taps = taps_for(bst_camera_psf_sigma_px(camera));
+    r->map = bst_skylight_varies(camera);
     double sigma_px = bst_camera_psf_sigma_px(camera);
-    r->phases = r->options.psf_phases > 0
-                    ? r->options.psf_phases
-                    : bst_profile_phases(sigma_px, r->options.tolerance_sigma, camera->full_well_e);
+    r->law_degree = r->options.psf_degree;
     r->context = bst_device_context(device);
     r->queue = bst_device_queue(device);
     clRetainContext(r->context);
     clRetainCommandQueue(r->queue);
-    bst_smear_options smear = {.tolerance_sigma = r->options.tolerance_sigma,
-                               .taps = r->taps,
-                               .table_error = bst_profile_error(sigma_px, r->phases),
-                               .motion = r->options.motion,
-                               .temporal_oversample = r->options.temporal_oversample,
-                               .stamp_radius_px = r->options.stamp_radius_px};
+    bool rolling = camera->detector.row_time_s != 0.0;
+    /* half of it is for a rolling shutter's bands */
+    bst_smear_options smear = {
+        .tolerance_sigma = r->options.tolerance_sigma * (rolling ? 0.5 : 1.0),
+        .taps = r->taps,
+        .motion = r->options.motion,
+        .temporal_oversample = r->options.temporal_oversample,
+        .stamp_radius_px = r->options.stamp_radius_px};
     bst_status status = bst_tiles_choose(ctx, device, &r->options, &r->most_bytes);
     if (status == BST_OK) {
         status = open_psf(ctx, device, r, &smear);
@@ -213,17 +169,32 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
         status = bst_detector_create(ctx, device, camera, r->options.pattern, &r->detector);
     }
     if (status == BST_OK) {
-        status = build(ctx, r, device);
+        r->law_degree = r->fft_light        ? 0
+                        : r->law_degree > 0 ? r->law_degree
+                                            : bst_profile_law_degree(sigma_px);
+        status =
+            bst_profile_law_buffer(ctx, r->context, sigma_px, r->law_degree, r->taps / 2, &r->law);
+    }
+    if (status == BST_OK && r->law_degree > 0) {
+        smear.law_error = bst_profile_law_error(sigma_px, r->law_degree);
+        smear.law_widest = bst_profile_law_widest(sigma_px, r->law_degree);
     }
     if (status == BST_OK) {
-        status = bst_profile_table(ctx, r->context, bst_camera_psf_sigma_px(camera), r->taps,
-                                   r->phases, &r->profiles);
+        status = build(ctx, r, device);
     }
     if (status == BST_OK) {
         status = bst_smear_create(ctx, camera, &smear, &r->smear);
     }
     if (status == BST_OK) {
         status = bst_crowd_create(ctx, &r->crowd);
+    }
+    if (status == BST_OK) {
+        status = bst_stage_create(ctx, device, &r->stage);
+    }
+    if (status == BST_OK && rolling) {
+        double peak_px = r->fft_light ? bst_fft_light_band(r->fft_light)->share_sigma_px : sigma_px;
+        status = bst_rolling_create(ctx, camera, smear.tolerance_sigma, peak_px, !r->fft_light,
+                                    &r->rolling);
     }
     if (status == BST_OK) {
         status = bst_frame_pool_create(ctx, device, (int)camera->width_px, (int)camera->height_px,
@@ -242,9 +213,12 @@ void bst_renderer_free(bst_renderer *r) {
         return;
     }
     clFinish(r->queue);
-    cl_mem buffers[] = {r->profiles,         r->table.buffer,     r->sources.buffer,
-                        r->nodes.buffer,     r->block_box.buffer, r->source_box.buffer,
-                        r->saturated.buffer, r->expected.buffer};
+    cl_mem buffers[] = {r->law,
+                        r->nodes.buffer,
+                        r->block_box.buffer,
+                        r->source_box.buffer,
+                        r->group_box.buffer,
+                        r->expected.buffer};
     for (size_t i = 0; i < sizeof buffers / sizeof *buffers; i++) {
         if (buffers[i]) {
             clReleaseMemObject(buffers[i]);
@@ -259,100 +233,29 @@ void bst_renderer_free(bst_renderer *r) {
     if (r->program) {
         clReleaseProgram(r->program);
     }
+    bst_stage_free(r->stage);
     bst_frame_pool_free(r->pool);
     bst_smear_free(r->smear);
     bst_crowd_free(r->crowd);
     bst_fft_light_free(r->fft_light);
     bst_psf_free(r->psf);
     bst_readout_free(r->readout);
+    bst_rolling_free(r->rolling);
     bst_detector_free(r->detector);
     clReleaseCommandQueue(r->queue);
     clReleaseContext(r->context);
-    free(r->list);
-    free(r->peak_e);
+    bst_scene_plan_clear(&r->plan);
+    free(r->rolled_peak_e);
     free(r);
 }
 
-static bst_status check_request(bst_ctx *ctx, const bst_renderer *r, const bst_render_request *q) {
-    bst_window w = q->window;
-    if (w.x0 < 0 || w.y0 < 0 || w.width < 1 || w.height < 1 ||
-        w.x0 + (int64_t)w.width > r->camera.width_px ||
-        w.y0 + (int64_t)w.height > r->camera.height_px) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT,
-                        "the window of %d x %d pixels at (%d, %d) is not inside the sensor of "
-                        "%lld x %lld",
-                        w.width, w.height, w.x0, w.y0, (long long)r->camera.width_px,
-                        (long long)r->camera.height_px);
-    }
-    int binning = q->binning > 1 ? q->binning : 1;
-    if (binning > w.width || binning > w.height) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT, "binning %d does not fit a window of %d x %d pixels",
-                        binning, w.width, w.height);
-    }
-    if (!(q->background_e >= 0.0) || !isfinite(q->background_e) || q->track->count < 2) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT,
-                        "a request needs a background that is finite and not negative (it is %g) "
-                        "and two samples of the line of sight (there are %d)",
-                        q->background_e, q->track->count);
-    }
-    return BST_OK;
-}
-
-/* Chooses nodes and stamps of all sources: fills list and stats. */
-static bst_status plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q, int *blocks) {
-    if (q->count > r->list_capacity) {
-        int capacity = q->count > 2 * r->list_capacity ? q->count : 2 * r->list_capacity;
-        free(r->list);
-        free(r->peak_e);
-        r->list = malloc((size_t)capacity * sizeof *r->list);
-        r->peak_e = malloc((size_t)capacity * sizeof *r->peak_e);
-        r->list_capacity = r->list && r->peak_e ? capacity : 0;
-        if (r->list_capacity == 0) {
-            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d sources", q->count);
-        }
-    }
-    double read = r->camera.read_noise_e, brightest = 0.0;
-    for (int i = 0; i < q->count; i++) {
-        brightest = q->sources[i].path ? brightest : fmax(brightest, q->sources[i].electrons_per_s);
-    }
-    double dark_e2 = fmax(q->background_e + read * read, 1e-2);
-    BST_TRY(bst_smear_begin(ctx, r->smear, q->track, dark_e2, brightest));
-    bst_crowd_motion motion = bst_smear_motion(r->smear);
-    bst_crowd_begin(r->crowd, &motion);
-    r->stats = (bst_render_stats){0};
-    *blocks = 0;
-    const uint64_t counted = (uint64_t)INT32_MAX * sizeof(float); /* by the kernels, in int */
-    uint64_t most = r->most_bytes < counted ? r->most_bytes : counted;
-    int most_blocks = (int)(most / NODE_BYTES);
-    for (int i = 0; i < q->count; i++) {
-        bst_scene_source *s = &r->list[r->stats.sources];
-        bool visible;
-        BST_TRY(bst_smear_source(ctx, r->smear, &q->sources[i], s, &visible));
-        r->peak_e[i] = bst_smear_last_peak_e(r->smear);
-        if (visible && s->blocks > most_blocks - *blocks) {
-            return bst_fail(ctx, BST_ERR_RANGE,
-                            "the sources move too far in one exposure to be drawn: %d of %d need "
-                            "%.0f million points already; expose for a shorter time, turn more "
-                            "slowly, or draw fewer stars (v_limit)",
-                            r->stats.sources, q->count, 1e-6 * BST_BLOCK * *blocks);
-        }
-        if (visible) {
-            if (r->fft_light) {
-                bst_fft_light_stamp(r->fft_light, s);
-            }
-            s->first_block = *blocks;
-            *blocks += s->blocks;
-            r->stats.sources++;
-            bst_crowd_source error = *bst_smear_last_error(r->smear);
-            if (r->fft_light) { /* of its grid, on dark pixels too */
-                double grid_e = bst_fft_light_error(r->fft_light) * r->peak_e[i];
-                error.excess_e += (float)(grid_e * sqrt(1.0 + r->peak_e[i] / dark_e2));
-            }
-            BST_TRY(bst_crowd_add(ctx, r->crowd, &error));
-        }
-    }
-    r->stats.nodes = (long long)*blocks * BST_BLOCK;
-    r->stats.single_kernel = bst_smear_single(r->smear);
+/* Chooses nodes and stamps of all sources: fills plan and stats. */
+static bst_status make_plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q) {
+    BST_TRY(bst_scene_plan_make(ctx, &r->plan, &r->camera, r->smear, r->crowd, r->fft_light,
+                                r->most_bytes, bst_renderer_margin_px(r), q));
+    r->stats = (bst_render_stats){.sources = r->plan.count,
+                                  .nodes = (long long)r->plan.blocks * BST_BLOCK,
+                                  .single_kernel = bst_smear_single(r->smear)};
     return BST_OK;
 }
 
@@ -365,91 +268,73 @@ static bst_status set_args(bst_ctx *ctx, cl_kernel kernel, const void *const *va
     return BST_OK;
 }
 
-/* Uploads sources and tables and enqueues the nodes kernel. *groups: groups of 16 sources. */
-static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, int blocks, int *groups) {
-    int table_blocks, count = r->stats.sources;
+/* Uploads sources and tables and enqueues the nodes kernel. */
+static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, const bst_scene_params *p) {
+    const bst_scene_plan *plan = &r->plan;
+    int table_blocks, count = plan->count;
     const float *table = bst_smear_table(r->smear, &table_blocks);
-    *groups = (count + BST_BLOCK - 1) / BST_BLOCK;
+    size_t groups = (size_t)p->source_groups, more = (groups + BST_BLOCK - 1) / BST_BLOCK;
     size_t block_bytes = BST_BLOCK * sizeof(float);
-    BST_TRY(upload(ctx, r, &r->table, table, (size_t)table_blocks * BST_TABLE_ROWS * block_bytes));
-    BST_TRY(upload(ctx, r, &r->sources, r->list, (size_t)count * sizeof *r->list));
-    BST_TRY(grow(ctx, r, &r->nodes, (size_t)blocks * NODE_BYTES));
-    BST_TRY(grow(ctx, r, &r->block_box, (size_t)blocks * BOX_FLOATS * sizeof(float)));
-    BST_TRY(grow(ctx, r, &r->source_box, (size_t)*groups * BOX_FLOATS * block_bytes));
+    BST_TRY(bst_stage_put(ctx, r->stage, BST_STAGE_TABLE, table,
+                          (size_t)table_blocks * BST_TABLE_ROWS * block_bytes, &r->table));
+    BST_TRY(bst_stage_put(ctx, r->stage, BST_STAGE_SOURCES, plan->sources,
+                          (size_t)count * sizeof *plan->sources, &r->sources));
+    BST_TRY(grow(ctx, r, &r->block_box, (size_t)plan->boxes * BST_BLOCK * BST_BOX_BYTES));
+    BST_TRY(grow(ctx, r, &r->source_box, groups * BST_BLOCK * BST_BOX_BYTES));
+    BST_TRY(grow(ctx, r, &r->group_box, more * BST_BLOCK * BST_BOX_BYTES));
+    BST_TRY(grow(ctx, r, &r->nodes, r->fft_light ? (size_t)plan->blocks * BST_NODE_BYTES : 1));
     if (count == 0) {
         return BST_OK;
     }
-    const void *values[] = {&r->sources.buffer,   &count,
-                            &r->table.buffer,     &r->nodes.buffer,
-                            &r->block_box.buffer, &r->source_box.buffer};
-    const size_t m = sizeof(cl_mem), bytes[] = {m, sizeof count, m, m, m, m};
-    BST_TRY(set_args(ctx, r->nodes_kernel, values, bytes, 6));
-    size_t global = (size_t)*groups * BST_BLOCK, local = BST_BLOCK;
+    const void *values[] = {&r->sources,
+                            &count,
+                            &r->table,
+                            &r->block_box.buffer,
+                            &r->source_box.buffer,
+                            &r->group_box.buffer,
+                            &r->nodes.buffer};
+    const size_t m = sizeof(cl_mem), bytes[] = {m, sizeof count, m, m, m, m, m};
+    BST_TRY(set_args(ctx, r->nodes_kernel, values, bytes, 7));
+    size_t global = groups * BST_BLOCK, local = BST_BLOCK;
     return bst_device_check(
         ctx,
         clEnqueueNDRangeKernel(r->queue, r->nodes_kernel, 1, NULL, &global, &local, 0, NULL, NULL),
         "placing the scene's nodes");
 }
 
-static bst_scene_params make_params(const bst_renderer *r, const bst_render_request *q,
-                                    int groups) {
-    const bst_camera *c = &r->camera;
-    bst_window w = q->window;
-    int x0 = w.x0 / 64 * 64;
-    return (bst_scene_params){
-        .window_x0 = w.x0,
-        .window_y0 = w.y0,
-        .window_width = w.width,
-        .window_height = w.height,
-        .sensor_width = (int)c->width_px,
-        .tiles_x0 = x0,
-        .tiles_x = (w.x0 + w.width - x0 + r->options.tile_width - 1) / r->options.tile_width,
-        .tiles_y = (w.height + r->options.tile_height - 1) / r->options.tile_height,
-        .source_groups = groups,
-        .key0 = q->key.k[0],
-        .key1 = q->key.k[1],
-        .exposure_low = (unsigned)((uint64_t)q->exposure_id & 0xFFFFFFFFu),
-        .exposure_high = (unsigned)((uint64_t)q->exposure_id >> 32),
-        .background_e = (float)q->background_e,
-        .dark_e = (float)q->dark_e,
-        .exposure_s = (float)q->track->time_s[q->track->count - 1],
-        .read_noise_e = (float)c->read_noise_e,
-        .full_well_e = (float)c->full_well_e,
-        .per_full_well = (float)(1.0 / c->full_well_e),
-        .near_full_e = (float)bst_detector_near_full_e(c->full_well_e),
-        .dn_per_e = (float)(1.0 / c->gain_e_per_dn),
-        .offset_dn = (float)c->offset_dn,
-        .max_dn = (float)((1 << c->bits) - 1),
-        .image_stride = w.width,
-    };
-}
-
-/* Counts the saturated pixels of the latest frame, once. Waits for it. */
-static bst_status count_saturated(bst_ctx *ctx, bst_renderer *r) {
-    if (!r->uncounted) {
+/* Counts the saturated pixels of the frame that used a set, once. Waits for it. */
+static bst_status count_saturated(bst_ctx *ctx, bst_renderer *r, int set) {
+    int tiles = r->tiles[set];
+    const void *counts;
+    if (tiles == 0) {
         return BST_OK;
     }
-    r->uncounted = false;
+    r->tiles[set] = 0;
     r->saturated_pixels = 0;
-    cl_int code;
-    size_t bytes = (size_t)r->tiles * sizeof(cl_int);
-    cl_int *p = clEnqueueMapBuffer(r->queue, r->saturated.buffer, CL_TRUE, CL_MAP_READ, 0, bytes, 0,
-                                   NULL, NULL, &code);
-    BST_TRY(bst_device_check(ctx, code, "mapping the count of saturated pixels"));
-    for (int i = 0; i < r->tiles; i++) {
-        r->saturated_pixels += p[i];
+    BST_TRY(bst_stage_result(ctx, r->stage, set, BST_STAGE_SATURATED, &counts));
+    for (int i = 0; i < tiles; i++) {
+        r->saturated_pixels += ((const cl_int *)counts)[i];
     }
     r->saturated_frames += r->saturated_pixels > 0;
-    return bst_device_check(
-        ctx, clEnqueueUnmapMemObject(r->queue, r->saturated.buffer, p, 0, NULL, NULL),
-        "unmapping the count of saturated pixels");
+    return BST_OK;
+}
+
+/* Room for the frame's counts. */
+static bst_status saturated_room(bst_ctx *ctx, bst_renderer *r, size_t tiles, cl_mem *out) {
+    return bst_stage_room(ctx, r->stage, BST_STAGE_SATURATED, tiles * sizeof(cl_int), out);
+}
+
+/* Takes the next set of what goes with a frame; another frame may be under way. */
+static bst_status begin_set(bst_ctx *ctx, bst_renderer *r) {
+    r->set = bst_stage_begin(r->stage);
+    return count_saturated(ctx, r, r->set);
 }
 
 /* The image that the tile kernel takes its light from, where the PSF is no Gaussian. */
-static bst_status make_light(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q, int groups,
+static bst_status make_light(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
                              bst_scene_params *p, cl_mem *light) {
-    bst_fft_light_nodes nodes = {r->sources.buffer, r->nodes.buffer, r->block_box.buffer,
-                                 r->source_box.buffer, groups};
+    bst_fft_light_nodes nodes = {r->sources, r->nodes.buffer, r->block_box.buffer,
+                                 r->source_box.buffer, p->source_groups};
     bst_fft_light_image image;
     BST_TRY(bst_fft_light_render(ctx, r->fft_light, r->queue, q->window, &nodes, &image));
     p->light_first = image.first;
@@ -458,51 +343,121 @@ static bst_status make_light(bst_ctx *ctx, bst_renderer *r, const bst_render_req
     return BST_OK;
 }
 
-/* The common way of all kinds of image: the kernels' first six arguments are the same. stride:
- * floats between the rows of `out`, 0: no gaps; light_only: without background. */
+/* Where an image goes. */
+typedef struct target {
+    cl_kernel kernel;          /* NULL: sources are only planned */
+    cl_mem out, saturated;     /* the second NULL: of an image of expected electrons */
+    int stride;                /* floats between the rows of `out`, 0: no gaps */
+    bool light_only;           /* without background */
+    int first_row, first_tile; /* of a band */
+} target;
+
+/* The common way of all kinds of image: the kernels' first eight arguments are the same. */
 static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
-                                cl_kernel kernel, cl_mem out, int stride, bool light_only) {
-    int blocks = 0, groups = 0;
-    BST_TRY(plan(ctx, r, q, &blocks));
-    BST_TRY(count_saturated(ctx, r)); /* of the frame before, which was rendered meanwhile */
-    BST_TRY(enqueue_nodes(ctx, r, blocks, &groups));
-    bst_scene_params p = make_params(r, q, groups);
-    p.image_stride = stride > 0 ? stride : p.image_stride;
-    p.background_e = light_only ? 0.0f : p.background_e;
-    r->tiles = p.tiles_x * p.tiles_y;
-    size_t tiles = (size_t)r->tiles;
-    BST_TRY(grow(ctx, r, &r->saturated, tiles * sizeof(cl_int)));
-    cl_mem light = r->profiles;
+                                const target *to) {
+    BST_TRY(make_plan(ctx, r, q));
+    if (!to->kernel) {
+        return BST_OK;
+    }
+    bst_scene_params p = bst_render_params(&r->camera, &r->options, q, r->plan.count);
+    BST_TRY(enqueue_nodes(ctx, r, &p));
+    p.image_stride = to->stride > 0 ? to->stride : p.image_stride;
+    p.background_e = to->light_only ? 0.0f : p.background_e;
+    p.first_row = to->first_row;
+    p.first_tile = to->first_tile;
+    size_t tiles = (size_t)p.tiles_x * (size_t)p.tiles_y;
+    if (to->saturated) {
+        r->tiles[r->set] = to->first_tile + (int)tiles;
+    }
+    cl_mem light = r->law;
     if (r->fft_light) {
-        BST_TRY(make_light(ctx, r, q, groups, &p, &light));
+        BST_TRY(make_light(ctx, r, q, &p, &light));
     }
     cl_mem maps[5];
     bst_detector_buffers(r->detector, maps);
+    cl_kernel kernel = to->kernel;
     const void *values[] = {&p,
-                            &r->sources.buffer,
-                            &r->nodes.buffer,
+                            &r->sources,
+                            &r->table,
                             &r->block_box.buffer,
                             &r->source_box.buffer,
+                            &r->group_box.buffer,
                             &light,
-                            &out,
-                            &r->saturated.buffer,
+                            &to->out,
+                            &to->saturated,
                             &maps[0],
                             &maps[1],
                             &maps[2],
                             &maps[3],
                             &maps[4]};
-    const size_t m = sizeof(cl_mem), bytes[] = {sizeof p, m, m, m, m, m, m, m, m, m, m, m, m};
-    BST_TRY(set_args(ctx, kernel, values, bytes, kernel == r->frame_kernel ? 13 : 7));
+    const size_t m = sizeof(cl_mem), bytes[] = {sizeof p, m, m, m, m, m, m, m, m, m, m, m, m, m};
+    int count = kernel == r->frame_kernel ? 14 : 8;
+    BST_TRY(set_args(ctx, kernel, values, bytes, count));
+    if (r->map) {
+        const bst_skylight_map *map = bst_render_background(q);
+        size_t size = (size_t)map->columns * (size_t)map->rows * sizeof *map->e;
+        cl_mem nodes;
+        BST_TRY(bst_stage_put(ctx, r->stage, BST_STAGE_BACKGROUND, map->e, size, &nodes));
+        BST_TRY(bst_device_check(ctx, clSetKernelArg(kernel, (cl_uint)count, m, &nodes),
+                                 "setting a kernel argument"));
+    }
     size_t group = (size_t)r->options.group, global = (tiles + group - 1) / group * group;
     return bst_device_check(
         ctx, clEnqueueNDRangeKernel(r->queue, kernel, 1, NULL, &global, &group, 0, NULL, NULL),
         "rendering a frame");
 }
 
+/* All rows at once, or band by band. */
+static bst_status enqueue_image(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
+                                target to) {
+    r->rolled = q->row_time_s != 0.0;
+    if (to.kernel == r->frame_kernel) { /* room for the tiles of all bands */
+        size_t across = (size_t)q->window.width / (size_t)r->options.tile_width + 2;
+        size_t rows = (size_t)(r->rolled ? 1 : r->options.tile_height);
+        size_t down = ((size_t)q->window.height + rows - 1) / rows;
+        BST_TRY(saturated_room(ctx, r, across * down, &to.saturated));
+    }
+    if (!r->rolled) {
+        return enqueue_tiles(ctx, r, q, &to);
+    }
+    if (q->count > r->rolled_capacity) {
+        free(r->rolled_peak_e);
+        r->rolled_peak_e = malloc((size_t)q->count * sizeof *r->rolled_peak_e);
+        r->rolled_capacity = r->rolled_peak_e ? q->count : 0;
+        if (!r->rolled_peak_e) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d sources", q->count);
+        }
+    }
+    for (int i = 0; i < q->count; i++) {
+        r->rolled_peak_e[i] = 0.0;
+    }
+    bst_render_stats all = {.single_kernel = true};
+    bool more;
+    BST_TRY(bst_rolling_begin(ctx, r->rolling, q, bst_renderer_margin_px(r)));
+    for (bst_render_request band;; all.nodes += r->stats.nodes) {
+        BST_TRY(bst_rolling_next(ctx, r->rolling, &band, &more));
+        if (!more) {
+            break;
+        }
+        to.first_row = band.window.y0 - q->window.y0;
+        BST_TRY(enqueue_tiles(ctx, r, &band, &to));
+        to.first_tile = to.saturated ? r->tiles[r->set] : 0;
+        all.single_kernel = all.single_kernel && r->stats.single_kernel;
+        all.predicted_sigma = fmax(all.predicted_sigma, bst_crowd_error_sigma(r->crowd) +
+                                                            bst_rolling_error_sigma(r->rolling));
+        for (int i = 0; i < band.count; i++) {
+            double *peak_e = &r->rolled_peak_e[bst_rolling_source(r->rolling, i)];
+            all.sources += *peak_e == 0.0 && r->plan.peak_e[i] > 0.0;
+            *peak_e = fmax(*peak_e, r->plan.peak_e[i]);
+        }
+    }
+    r->stats = all;
+    return BST_OK;
+}
+
 bst_status bst_renderer_plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *request) {
-    int blocks;
-    BST_TRY(check_request(ctx, r, request));
-    return plan(ctx, r, request, &blocks);
+    BST_TRY(bst_render_request_check(ctx, &r->camera, request));
+    return enqueue_image(ctx, r, request, (target){.kernel = NULL});
 }
 
 /* Light first, then what columns and binned pixels make of it. */
@@ -513,42 +468,53 @@ static bst_status render_in_stages(bst_ctx *ctx, bst_renderer *r, const bst_rend
     int stride;
     light.window = bst_readout_light_window(r->readout, q->window);
     BST_TRY(bst_readout_image(ctx, r->readout, light.window, &image, &stride));
-    BST_TRY(enqueue_tiles(ctx, r, &light, r->expected_kernel, image, stride, true));
-    r->tiles = q->window.height / binning;
-    BST_TRY(grow(ctx, r, &r->saturated, (size_t)r->tiles * sizeof(cl_int)));
-    bst_scene_params p = make_params(r, q, 0);
-    return bst_readout_run(ctx, r->readout, r->detector, &p, q->window, binning, frame,
-                           r->saturated.buffer);
+    BST_TRY(enqueue_image(
+        ctx, r, &light,
+        (target){
+            .kernel = r->expected_kernel, .out = image, .stride = stride, .light_only = true}));
+    int rows = q->window.height / binning;
+    cl_mem saturated;
+    BST_TRY(saturated_room(ctx, r, (size_t)rows, &saturated));
+    r->tiles[r->set] = rows;
+    bst_scene_params p = bst_render_params(&r->camera, &r->options, q, 0);
+    return bst_readout_run(ctx, r->readout, r->detector, &p, q->window, binning, frame, saturated);
 }
 
 bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *r, const bst_render_request *request,
                                bst_frame **out) {
     *out = NULL;
-    BST_TRY(check_request(ctx, r, request));
+    BST_TRY(bst_render_request_check(ctx, &r->camera, request));
     bst_frame *frame;
     cl_mem buffer;
     int binning = request->binning > 1 ? request->binning : 1;
     BST_TRY(bst_frame_pool_take(ctx, r->pool, request->window.width / binning,
                                 request->window.height / binning, &frame, &buffer));
-    double exposure_s = request->track->time_s[request->track->count - 1];
-    bst_status status =
-        bst_detector_begin(ctx, r->detector, request->key, request->exposure_id, exposure_s);
+    double exposure_s = bst_render_exposure_s(request);
+    bst_status status = begin_set(ctx, r);
+    if (status == BST_OK) {
+        status = bst_detector_begin(ctx, r->detector, r->stage, request->key, request->exposure_id,
+                                    exposure_s);
+    }
     if (status == BST_OK) {
         status = binning > 1 || bst_detector_whole_columns(r->detector)
                      ? render_in_stages(ctx, r, request, binning, buffer)
-                     : enqueue_tiles(ctx, r, request, r->frame_kernel, buffer, 0, false);
+                     : enqueue_image(ctx, r, request,
+                                     (target){.kernel = r->frame_kernel, .out = buffer});
     }
     if (status == BST_OK) {
-        r->uncounted = true;
         status = bst_frame_pool_enqueued(ctx, frame);
     }
     if (status == BST_OK) {
         status = bst_detector_end(ctx, r->detector);
     }
     if (status == BST_OK) {
+        status = bst_stage_end(ctx, r->stage);
+    }
+    if (status == BST_OK) {
         status = bst_device_check(ctx, clFlush(r->queue), "starting the rendering");
     }
     if (status != BST_OK) {
+        r->tiles[r->set] = 0;
         bst_frame_release(frame);
         return status;
     }
@@ -561,10 +527,13 @@ bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *r, const bst_render_r
 
 bst_status bst_renderer_render_noise_free(bst_ctx *ctx, bst_renderer *r,
                                           const bst_render_request *request, float *image) {
-    BST_TRY(check_request(ctx, r, request));
+    BST_TRY(bst_render_request_check(ctx, &r->camera, request));
     size_t bytes = (size_t)request->window.width * (size_t)request->window.height * sizeof(float);
     BST_TRY(grow(ctx, r, &r->expected, bytes));
-    BST_TRY(enqueue_tiles(ctx, r, request, r->expected_kernel, r->expected.buffer, 0, false));
+    BST_TRY(begin_set(ctx, r));
+    BST_TRY(enqueue_image(ctx, r, request,
+                          (target){.kernel = r->expected_kernel, .out = r->expected.buffer}));
+    BST_TRY(bst_stage_end(ctx, r->stage));
     return bst_device_check(
         ctx,
         clEnqueueReadBuffer(r->queue, r->expected.buffer, CL_TRUE, 0, bytes, image, 0, NULL, NULL),
@@ -572,7 +541,9 @@ bst_status bst_renderer_render_noise_free(bst_ctx *ctx, bst_renderer *r,
 }
 
 bst_status bst_renderer_saturated(bst_ctx *ctx, bst_renderer *r, long long *pixels) {
-    BST_TRY(count_saturated(ctx, r));
+    for (int i = 1; i <= BST_STAGE_SETS; i++) { /* the latest last */
+        BST_TRY(count_saturated(ctx, r, (r->set + i) % BST_STAGE_SETS));
+    }
     *pixels = r->saturated_pixels;
     return BST_OK;
 }
@@ -584,11 +555,14 @@ long long bst_renderer_saturated_frames(const bst_renderer *r) {
 void bst_renderer_get_stats(const bst_renderer *r, bst_render_stats *out) {
     bool foreseen = r->options.temporal_oversample <= 0 && r->options.spatial_oversample <= 0;
     *out = r->stats;
-    out->predicted_sigma = foreseen ? bst_crowd_error_sigma(r->crowd) : NAN;
+    if (!r->rolled) {
+        out->predicted_sigma = bst_crowd_error_sigma(r->crowd);
+    }
+    out->predicted_sigma = foreseen ? out->predicted_sigma : NAN;
 }
 
 double bst_renderer_peak_e(const bst_renderer *r, int index) {
-    return r->peak_e[index];
+    return r->rolled ? r->rolled_peak_e[index] : r->plan.peak_e[index];
 }
 
 int bst_renderer_margin_px(const bst_renderer *r) {

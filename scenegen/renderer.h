@@ -22,9 +22,9 @@ typedef struct bst_renderer_options {
     bst_star_motion motion; /* whose track the stars follow (BST_STAR_MOTION_AUTO) */
     /* Knobs that the tolerance chooses when they are 0. Equal parts of the exposure per star; parts
      * of a pixel per axis to whose centres nodes are moved; px that stamps reach beyond a node's
-     * two nearest pixels; sub-pixel phases of the PSF's table; taps of the Fourier path's spreading
-     * (4, 6 or 8). */
-    int temporal_oversample, spatial_oversample, stamp_radius_px, psf_phases, fft_taps;
+     * two nearest pixels; odd degree of the PSF's profile (scenegen/profile_law.h); taps of the
+     * Fourier path's spreading (4, 6 or 8). */
+    int temporal_oversample, spatial_oversample, stamp_radius_px, psf_degree, fft_taps;
     int pool_frames;                    /* frames that may be alive at a time (4) */
     int tile_width, tile_height, group; /* pixels per work-item (width a multiple of 64) and
                                            work-items per group; 0: chosen for the device */
@@ -43,11 +43,18 @@ void bst_renderer_free(bst_renderer *renderer);
 /* One exposure. Pointers are borrowed for the call. */
 typedef struct bst_render_request {
     bst_window window;          /* inside the sensor */
-    const bst_los_track *track; /* its last time is the exposure's duration */
+    const bst_los_track *track; /* its last time is the exposure's duration, unless: */
+    double row_time_s; /* rolling shutter, where not 0: each row is exposed so much later than the
+                          row before, for exposure_s, the middle row in the middle of the track */
+    double exposure_s; /* with row_time_s */
     const bst_source *sources;
     int count;
     double background_e; /* expected electrons per sensor pixel: sky and dark current */
     double dark_e;       /* of them, dark current (a map of it, if there is one, takes its place) */
+    const struct bst_skylight_map *background; /* added to background_e, per sensor pixel; NULL:
+                    none. Only where bst_skylight_varies. It covers the window, and its whole
+                    columns where charge or light runs along them
+                    (bst_detector_config_whole_columns) */
     int binning; /* 2 or more: so many pixels per side are added before they are read, and the
                     frame is smaller; window sides that are no multiple lose the rest */
     bst_rng_key key;
@@ -84,8 +91,8 @@ bst_status bst_renderer_render_noise_free(bst_ctx *ctx, bst_renderer *renderer,
 /* Pixels of the latest frame with a full well or the highest digital number. Waits for it. */
 bst_status bst_renderer_saturated(bst_ctx *ctx, bst_renderer *renderer,
                                   long long *pixels) BST_MUST_CHECK;
-/* Frames with such a pixel so far, without the latest unless bst_renderer_saturated has been asked.
- * Does not wait. */
+/* Frames with such a pixel so far, without the latest two (BST_STAGE_SETS) unless
+ * bst_renderer_saturated has been asked. Does not wait. */
 long long bst_renderer_saturated_frames(const bst_renderer *renderer);
 
 /* The first call after a request takes 0.1 us per source for the predicted error. */

@@ -12,7 +12,7 @@
 
 typedef struct fidelity_config {
     double tolerance_sigma;
-    int64_t temporal_oversample, spatial_oversample, stamp_radius_px, psf_phases, fft_taps;
+    int64_t temporal_oversample, spatial_oversample, stamp_radius_px, psf_degree, fft_taps;
 } fidelity_config;
 
 typedef struct scenegen_config {
@@ -34,8 +34,10 @@ static const bst_config_desc fidelity_table[] = {
             "predicted then."),
     BST_INT(fidelity_config, stamp_radius_px, "px", 0, 255, "0",
             "Reach of all stamps beyond the two nearest pixels; 0: as the tolerance needs."),
-    BST_INT(fidelity_config, psf_phases, "", 0, 2048, "0",
-            "Sub-pixel phases of the PSF's table; 0: as the tolerance needs."),
+    BST_INT(
+        fidelity_config, psf_degree, "", 0, 15, "0",
+        "Odd degree of the polynomials that give a Gaussian PSF's light on a pixel by the place "
+        "within it; 0: as exact as floats are."),
     BST_INT(
         fidelity_config, fft_taps, "", 0, 8, "0",
         "Taps per axis with which light is spread on the grid of a PSF that is no Gaussian: 4, 6 "
@@ -140,7 +142,7 @@ static bst_status create(const bst_module_env *env, const void *config_object, v
     options.temporal_oversample = (int)c->fidelity.temporal_oversample;
     options.spatial_oversample = (int)c->fidelity.spatial_oversample;
     options.stamp_radius_px = (int)c->fidelity.stamp_radius_px;
-    options.psf_phases = (int)c->fidelity.psf_phases;
+    options.psf_degree = (int)c->fidelity.psf_degree;
     options.fft_taps = (int)c->fidelity.fft_taps;
     options.pool_frames = (int)c->pool_frames + BST_OVERLAP_FRAMES;
     options.pattern = pattern_key(env, s->camera);
@@ -217,7 +219,7 @@ static bst_status write_items(bst_ctx *ctx, scenegen *s, const bst_los_track *tr
     }
     double top_e =
         ((double)((1 << s->camera->bits) - 1) - s->camera->offset_dn) * s->camera->gain_e_per_dn;
-    double limit_e = fmin(s->camera->full_well_e, top_e) - truth->background_e - truth->dark_e;
+    double limit_e = fmin(s->camera->full_well_e, top_e) - truth->dark_e;
     for (int i = 0; i < truth->count; i++) {
         int k = truth->lost > 0 ? s->picks[i].index : i;
         bst_field_truth_item(s->field, track, &sources[k], e->window, truth, &truth->items[i]);
@@ -226,7 +228,8 @@ static bst_status write_items(bst_ctx *ctx, scenegen *s, const bst_los_track *tr
         }
         double x = truth->items[i].x_mean_px, y = truth->items[i].y_mean_px;
         double light = isfinite(x) ? bst_camera_illumination(s->camera, x, y) : 1.0;
-        if (light * bst_renderer_peak_e(s->renderer, k) >= limit_e) {
+        double sky_e = bst_field_background_e(s->field, truth, x, y);
+        if (light * bst_renderer_peak_e(s->renderer, k) >= limit_e - sky_e) {
             truth->items[i].flags |= BST_TRUTH_SATURATED;
         }
     }
@@ -302,8 +305,17 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
         BST_TRY(change_camera(ctx, s, scale_arcsec, history->jitter_rad2));
     }
     bst_los_track track;
-    BST_TRY(bst_field_track(ctx, s->field, history, e->start_tick, e->end_tick, s->tick_rate_hz,
-                            &track));
+    int64_t lead =
+        bst_detector_lead_ticks(&s->camera->detector, e->window.height, (double)s->tick_rate_hz);
+    s->options.lead_s = (double)lead / (double)s->tick_rate_hz;
+    bst_status status = bst_field_track(ctx, s->field, history, e->start_tick - lead,
+                                        e->end_tick + lead, s->tick_rate_hz, &track);
+    if (status != BST_OK) {
+        return lead == 0 ? status
+                         : bst_fail_prefix(ctx, status,
+                                           "from the start of the first row to the end of the last "
+                                           "one (the detector's row_time_s)");
+    }
     int capacity, count;
     const bst_source *sources;
     bst_truth *truth = bst_step_write(step, PORT_TRUTH, &capacity);
@@ -311,15 +323,20 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
     truth->dropped = e->dropped;
     BST_TRY(bst_field_query(ctx, s->field, &track, e->start_tick, e->end_tick, s->tick_rate_hz,
                             e->window, &s->options, truth, &sources, &count));
-    bst_render_request request = {.window = e->window,
-                                  .track = &track,
-                                  .sources = sources,
-                                  .count = count,
-                                  .background_e = truth->background_e + truth->dark_e,
-                                  .dark_e = truth->dark_e,
-                                  .binning = e->binning,
-                                  .key = s->key,
-                                  .exposure_id = e->id};
+    const struct bst_skylight_map *map = bst_field_background(s->field);
+    bst_render_request request = {
+        .window = e->window,
+        .track = &track,
+        .sources = sources,
+        .count = count,
+        .background_e = (map ? 0.0 : truth->background_e) + truth->dark_e,
+        .background = map,
+        .dark_e = truth->dark_e,
+        .row_time_s = s->camera->detector.row_time_s,
+        .exposure_s = (double)(e->end_tick - e->start_tick) / (double)s->tick_rate_hz,
+        .binning = e->binning,
+        .key = s->key,
+        .exposure_id = e->id};
     if (e->dropped) {
         BST_TRY(bst_renderer_plan(ctx, s->renderer, &request));
     } else {

@@ -4,11 +4,10 @@
 #include <stdlib.h>
 
 #include "scenegen/motion.h"
-#include "scenegen/nodes.h"
 #include "scenegen/place.h"
+#include "scenegen/profile_law.h"
 #include "scenegen/reference.h"
-#include "scenegen/shape.h"
-#include "scenegen/stamp.h"
+#include "scenegen/smear_internal.h"
 
 /* Shares of the tolerance: for nodes, for the border of the stamp, and for a track that stars
  * share. */
@@ -16,43 +15,7 @@
 #define CUT_SHARE 0.3
 #define SINGLE_SHARE 0.1
 
-/* Fidelities: level n is right to about 0.08 * 2^-n of the smeared image's peak. */
-enum { LEVELS = 14, TABLE_FLOATS = BST_TABLE_ROWS * BST_BLOCK, MAX_TAPS = BST_PLACE_TAPS };
-
-typedef struct level {
-    int first_block, blocks; /* blocks 0: not made in this frame */
-    double error;            /* expected, of the smeared image's peak */
-} level;
-
-struct bst_smear {
-    bst_camera camera;
-    bst_smear_options options;
-    double sigma_px, share_sigma_px, widest;
-    bst_stamp stamp;
-    double tolerance[LEVELS];
-    double half_diagonal_px;
-    double stretch;             /* of the image by distortion where it is greatest */
-    double far_px, place_parts; /* see place.h */
-
-    bst_los_track track;
-    double dark_variance_e2, duration_s;
-    bst_quat q_reference;
-    double star_share; /* largest share of a star's light on one pixel */
-    double travel_px;  /* largest distance of a node from its source's place */
-    bool single;       /* stars share one track */
-    double spread_px;  /* by which stars in the corners move otherwise */
-    double last_peak_e;
-    bst_crowd_source last_error;
-    level levels[LEVELS];
-
-    bst_path_point *path, *own_path;
-    int path_count, path_capacity, own_capacity;
-    bst_node_list nodes;    /* scratch */
-    bst_disc_points points; /* scratch */
-    double disc_px;         /* radius of the present source's disc; 0: a point */
-    float *table;
-    int table_blocks, table_capacity;
-};
+enum { TABLE_FLOATS = BST_TABLE_ROWS * BST_BLOCK, MAX_TAPS = BST_PLACE_TAPS };
 
 bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
                             const bst_smear_options *options, bst_smear **out) {
@@ -68,7 +31,12 @@ bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
     s->widest = options->widest > 0.0 ? options->widest : BST_NODE_WIDEST;
     s->share_sigma_px = options->share_sigma_px > 0.0 ? options->share_sigma_px : s->sigma_px;
     bst_stamp_init(&s->stamp, s->sigma_px, options->node_sigma_px > 0.0);
-    for (int n = 0; n < LEVELS; n++) {
+    /* of the error function 2.3e-7 are missed on each axis, of nodes in reach of a pixel whose
+     * light there is a quarter of the centre's on average */
+    s->edge_error = 2.0 * 4.0 * 2.3e-7 / bst_reference_pixel_share(0.0, s->sigma_px, 0);
+    s->edge_error = options->node_sigma_px > 0.0 ? 0.0 : s->edge_error;
+    s->point_error = options->law_widest > 0.0 ? 2.0 * options->law_error : s->edge_error;
+    for (int n = 0; n < BST_SMEAR_LEVELS; n++) {
         s->tolerance[n] = 0.08 * pow(2.0, -n);
     }
     s->stretch = bst_camera_stretch(camera);
@@ -86,6 +54,8 @@ void bst_smear_free(bst_smear *s) {
     if (s) {
         free(s->path);
         free(s->own_path);
+        free(s->turn);
+        free(s->parts);
         free(s->nodes.items);
         free(s->points.items);
         free(s->table);
@@ -93,7 +63,7 @@ void bst_smear_free(bst_smear *s) {
     }
 }
 
-static bst_status reserve(bst_ctx *ctx, void **items, int *capacity, int need, size_t bytes) {
+bst_status bst_smear_reserve(bst_ctx *ctx, void **items, int *capacity, int need, size_t bytes) {
     if (need <= *capacity) {
         return BST_OK;
     }
@@ -111,7 +81,11 @@ static bst_status reserve(bst_ctx *ctx, void **items, int *capacity, int need, s
  * axis, the image of it bends. */
 static int parts_of(const bst_smear *s, int k) {
     const bst_quat *q = s->track.q_cam_from_gcrf;
-    bst_vec3 r = bst_quat_to_rotvec(bst_quat_mul(q[k + 1], bst_quat_conj(q[k])));
+    bst_quat d = bst_quat_mul(q[k + 1], bst_quat_conj(q[k]));
+    if (d.x * d.x + d.y * d.y + d.z * d.z < 2.4e-7 * d.w * d.w) { /* less than 0.98e-3 */
+        return 1;
+    }
+    bst_vec3 r = bst_quat_to_rotvec(d);
     double n = ceil(bst_vec3_norm(r) / 1e-3);
     return n > 64.0 ? 64 : n < 1.0 ? 1 : (int)n;
 }
@@ -145,24 +119,31 @@ static bst_path_point attitude_point(const bst_smear *s, bst_quat q, double time
     return (bst_path_point){{r.x * scale, r.y * scale, r.z * s->half_diagonal_px}, time};
 }
 
-/* What the profile table misses of the nodes' image, over its peak, by its phases and widths. */
-static double table_error(const bst_smear *s, const bst_node_list *list) {
-    double psf = s->sigma_px * s->stretch, worst = 0.0;
+/* What the nodes' profiles miss of their image, over its peak. */
+static double profile_error(const bst_smear *s, const bst_node_list *list) {
+    double psf = s->sigma_px * s->stretch, widest = 0.0, table = 0.0;
     for (int n = 0; n < list->count; n++) {
         double w = list->items[n].variance / (psf * psf), wide = 1.0 + w;
-        worst = fmax(worst, 0.75 * w / (wide * wide));
+        widest = fmax(widest, w);
+        table = fmax(table, 0.75 * w / (wide * wide));
     }
-    return s->options.table_error + worst / (BST_WIDTHS * BST_WIDTHS);
+    if (s->options.node_sigma_px > 0.0) {
+        return table / (BST_WIDTHS * BST_WIDTHS); /* by the widths of the Fourier path */
+    }
+    if (widest > s->options.law_widest) {
+        return fmax(s->edge_error, s->point_error);
+    }
+    return widest > 0.0 ? fmax(2.0 * BST_LAW_ERROR, s->point_error) : s->point_error;
 }
 
 /* Appends nodes to the table in whole blocks; to_table fills one column of BST_TABLE_ROWS. */
 static bst_status append_nodes(bst_ctx *ctx, bst_smear *s, const bst_node_list *list,
                                void (*to_table)(const bst_smear *, const bst_node *, float *),
-                               level *out) {
+                               bst_smear_level *out) {
     int blocks = (list->count + BST_BLOCK - 1) / BST_BLOCK;
-    BST_TRY(reserve(ctx, (void **)&s->table, &s->table_capacity, s->table_blocks + blocks,
-                    TABLE_FLOATS * sizeof(float)));
-    *out = (level){s->table_blocks, blocks, list->error + table_error(s, list)};
+    BST_TRY(bst_smear_reserve(ctx, (void **)&s->table, &s->table_capacity, s->table_blocks + blocks,
+                              TABLE_FLOATS * sizeof(float)));
+    *out = (bst_smear_level){s->table_blocks, blocks, list->error + profile_error(s, list)};
     s->table_blocks += blocks;
     for (int n = 0; n < blocks * BST_BLOCK; n++) {
         float *block = s->table + (size_t)(out->first_block + n / BST_BLOCK) * TABLE_FLOATS;
@@ -207,9 +188,7 @@ static void shift_to_table(const bst_smear *s, const bst_node *node, float *t) {
     }
 }
 
-/* Largest share of light on one pixel over the scratch nodes, where the distortion stretches the
- * image least. Spoils their places. */
-static double largest_share(bst_smear *s) {
+double bst_smear_largest_share(bst_smear *s) {
     double least = bst_camera_shrink(&s->camera) / s->stretch;
     for (int n = 0; n < s->nodes.count && least < 1.0; n++) {
         s->nodes.items[n].p[0] *= least;
@@ -218,9 +197,8 @@ static double largest_share(bst_smear *s) {
     return bst_nodes_peak_share(s->nodes.items, s->nodes.count, s->share_sigma_px);
 }
 
-/* Adds nodes of a path that takes `part` of the exposure. */
-static bst_status path_nodes(bst_ctx *ctx, bst_smear *s, const bst_path_point *path, int count,
-                             double part, double tolerance) {
+bst_status bst_smear_path_nodes(bst_ctx *ctx, bst_smear *s, const bst_path_point *path, int count,
+                                double part, double tolerance) {
     double parts = ceil(part * s->options.temporal_oversample - 1e-9);
     if (parts > 0.0) {
         return bst_motion_midpoints(ctx, path, count, (int)parts, &s->nodes);
@@ -232,7 +210,7 @@ static bst_status make_level(bst_ctx *ctx, bst_smear *s, int n) {
     if (s->levels[n].blocks == 0) {
         s->nodes.count = 0;
         s->nodes.error = 0.0;
-        BST_TRY(path_nodes(ctx, s, s->path, s->path_count, 1.0, s->tolerance[n]));
+        BST_TRY(bst_smear_path_nodes(ctx, s, s->path, s->path_count, 1.0, s->tolerance[n]));
         BST_TRY(append_nodes(ctx, s, &s->nodes, s->single ? shift_to_table : attitude_to_table,
                              &s->levels[n]));
     }
@@ -273,47 +251,80 @@ static void choose_motion(bst_smear *s, double brightest_e_per_s) {
     }
 }
 
-bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_los_track *track,
-                           double dark_variance_e2, double brightest_e_per_s) {
+static void measure_turn(bst_smear *s) {
+    double tilt2 = 0.0, roll = 0.0;
+    for (int k = 0; k < s->path_count; k++) {
+        const double *p = s->path[k].p;
+        tilt2 = fmax(tilt2, p[0] * p[0] + p[1] * p[1]);
+        roll = fmax(roll, fabs(p[2]));
+    }
+    s->tilt_rad = sqrt(tilt2) * bst_camera_scale_rad(&s->camera) / s->stretch;
+    s->roll_rad = s->half_diagonal_px > 0.0 ? roll / s->half_diagonal_px : 0.0;
+}
+
+/* Whether a star at (x, y) px from the boresight stays too far from the window to light it. Asked
+ * where a turn moves places by little more than to first order. */
+static bool stays_beside(const bst_smear *s, double x, double y) {
+    double scale = bst_camera_scale_rad(&s->camera), r = sqrt(x * x + y * y) * scale;
+    if (s->camera.geometry.general || s->tilt_rad + s->roll_rad > 0.05 || r > 2.0) {
+        return false;
+    }
+    double moved = 1.2 * (s->tilt_rad * (1.0 + r * r) + s->roll_rad * r) / scale;
+    double far = moved + s->margin_px + 2.0;
+    x += bst_camera_centre_x(&s->camera) - s->window.x0;
+    y += bst_camera_centre_y(&s->camera) - s->window.y0;
+    return x < -far || y < -far || x > s->window.width + far || y > s->window.height + far;
+}
+
+bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *frame) {
+    const bst_los_track *track = frame->track;
     s->track = *track;
-    s->dark_variance_e2 = fmax(dark_variance_e2, 1e-2);
+    s->window = frame->window;
+    s->margin_px = frame->margin_px;
+    s->dark_variance_e2 = fmax(frame->dark_variance_e2, 1e-2);
     s->duration_s = track->time_s[track->count - 1];
     s->q_reference = attitude_at(track, 0.5 * s->duration_s);
     s->table_blocks = s->path_count = 0;
     s->travel_px = 0.0;
-    for (int n = 0; n < LEVELS; n++) {
+    for (int n = 0; n < BST_SMEAR_LEVELS; n++) {
         s->levels[n].blocks = 0;
     }
     double inverse = s->duration_s > 0.0 ? 1.0 / s->duration_s : 0.0;
+    BST_TRY(bst_smear_reserve(ctx, (void **)&s->parts, &s->parts_capacity, track->count,
+                              sizeof *s->parts));
     for (int k = 0; k + 1 < track->count; k++) {
-        int parts = parts_of(s, k);
-        BST_TRY(reserve(ctx, (void **)&s->path, &s->path_capacity, s->path_count + parts + 1,
-                        sizeof *s->path));
+        int parts = s->parts[k] = parts_of(s, k);
+        int points = s->path_count + parts + 1;
+        BST_TRY(
+            bst_smear_reserve(ctx, (void **)&s->path, &s->path_capacity, points, sizeof *s->path));
+        BST_TRY(
+            bst_smear_reserve(ctx, (void **)&s->turn, &s->turn_capacity, points, sizeof *s->turn));
         for (int n = 0; n < parts + (k + 2 == track->count); n++) {
             double u = (double)n / parts;
-            bst_quat q =
-                bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
+            const bst_quat *ends = &track->q_cam_from_gcrf[k];
+            bst_quat q = n == 0 ? bst_quat_unit(ends[0]) : bst_quat_slerp(ends[0], ends[1], u);
             double t = track->time_s[k] + u * (track->time_s[k + 1] - track->time_s[k]);
+            s->turn[s->path_count] = q;
             bst_path_point *p = &s->path[s->path_count++];
             *p = attitude_point(s, q, t * inverse);
             s->travel_px = fmax(s->travel_px, fabs(p->p[0]) + fabs(p->p[1]) + fabs(p->p[2]));
         }
     }
-    choose_motion(s, brightest_e_per_s);
+    measure_turn(s);
+    choose_motion(s, frame->brightest_e_per_s);
     BST_TRY(make_level(ctx, s, 0));
-    s->star_share = largest_share(s);
+    s->star_share = bst_smear_largest_share(s);
     return BST_OK;
 }
 
-/* The coarsest level whose predicted error is within the aim. */
-static int choose_level(bst_smear *s, double peak_e) {
+int bst_smear_choose_level(const bst_smear *s, double peak_e) {
     double sigmas = peak_e / sqrt(peak_e + s->dark_variance_e2);
     int n = 0;
     if (s->options.temporal_oversample > 0) {
         return n;
     }
-    while (n + 1 < LEVELS && (s->tolerance[n] + s->options.table_error) * sigmas >
-                                 NODE_SHARE * s->options.tolerance_sigma) {
+    while (n + 1 < BST_SMEAR_LEVELS &&
+           (s->tolerance[n] + s->point_error) * sigmas > NODE_SHARE * s->options.tolerance_sigma) {
         n++;
     }
     return n;
@@ -326,9 +337,7 @@ static int choose_radius(const bst_smear *s, double peak_e) {
                      : bst_stamp_radius(&s->stamp, peak_e, limit, most);
 }
 
-/* Place on the focal plane from the boresight, px, without the distortion, which the kernel adds;
- * false when it is not in front of the camera or far away. */
-static bool project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, double *y) {
+bool bst_smear_project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, double *y) {
     bst_vec3 c = bst_quat_rotate(q, v);
     if (s->camera.geometry.general) {
         c = turned(s, c, 1.0);
@@ -345,150 +354,6 @@ static bool project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, doubl
     return fabs(*x) < 1e6 && fabs(*y) < 1e6;
 }
 
-/* Light further than this from the boresight (px, without distortion) stays off the sensor: the
- * PSF's table ends before. */
-static double far_px(const bst_smear *s) {
-    return s->far_px + s->disc_px;
-}
-
-/* How many chords the curved motion over the image wants: of a parabola they miss
- * (its bend) / chords^2. Seen at 17 instants; those that are off the sensor do not count, but a
- * chord must not step over it. */
-static double chords_of(const bst_smear *s, const bst_source *source) {
-    enum { N = 16 };
-    double x[N + 1], y[N + 1], far = far_px(s), chords = 0.0;
-    bool front[N + 1];
-    for (int k = 0; k <= N; k++) {
-        front[k] =
-            project(s, s->q_reference, bst_source_direction(source, (double)k / N), &x[k], &y[k]);
-    }
-    for (int k = 0; k < N; k++) {
-        if (!front[k] || !front[k + 1]) {
-            continue;
-        }
-        bool near = fmin(hypot(x[k], y[k]), hypot(x[k + 1], y[k + 1])) < far ||
-                    x[k] * x[k + 1] < 0.0 || y[k] * y[k + 1] < 0.0;
-        double step = hypot(x[k + 1] - x[k], y[k + 1] - y[k]);
-        chords = fmax(chords, near ? N * step / far : 0.0);
-        if (near && k > 0 && front[k - 1]) {
-            double bend = hypot(x[k - 1] - 2.0 * x[k] + x[k + 1], y[k - 1] - 2.0 * y[k] + y[k + 1]);
-            chords = fmax(chords, N * sqrt(0.125 * bend * s->stretch / 0.002));
-        }
-    }
-    return fmin(chords, 1e4);
-}
-
-/* Neither end nor anything between is near the sensor. */
-static bool passes_by(const bst_smear *s, const bst_path_point *a, const bst_path_point *b,
-                      double x0, double y0, double far) {
-    double f = 1.0 / s->stretch;
-    double ax = a->p[0] * f + x0, ay = a->p[1] * f + y0, bx = b->p[0] * f + x0,
-           by = b->p[1] * f + y0;
-    return fmin(ax, bx) > far || fmax(ax, bx) < -far || fmin(ay, by) > far || fmax(ay, by) < -far;
-}
-
-/* A moving source's path over the image, relative to (x0, y0); NAN where the source is not in front
- * of the camera. */
-static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_source *source, double x0,
-                           double y0, int *count) {
-    const bst_los_track *track = &s->track;
-    double per_s = s->duration_s > 0.0 ? 1.0 / s->duration_s : 0.0;
-    int chords = (int)chords_of(s, source) / (track->count - 1) + 1;
-    *count = 0;
-    for (int k = 0; k + 1 < track->count; k++) {
-        double begin = track->time_s[k] * per_s, end = track->time_s[k + 1] * per_s, to;
-        int all = parts_of(s, k);
-        all = all < chords ? chords : all;
-        for (double from = begin; from < end || from == begin; from = to) {
-            int parts;
-            to = bst_motion_stretch(source, from, end, &parts);
-            double share = end > begin ? (to - from) / (end - begin) : 1.0;
-            int least = (int)ceil(all * share - 1e-9);
-            parts = parts < least ? least : parts;
-            bool last = k + 2 == track->count && !(to < end);
-            BST_TRY(reserve(ctx, (void **)&s->own_path, &s->own_capacity, *count + parts + 1,
-                            sizeof *s->own_path));
-            for (int n = 0; n < parts + last; n++) {
-                double x, y, t = from + (to - from) * n / parts;
-                double u = end > begin ? (t - begin) / (end - begin) : (double)n / parts;
-                bst_quat q =
-                    bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
-                bool front = project(s, q, bst_source_direction(source, t), &x, &y);
-                s->own_path[(*count)++] = (bst_path_point){
-                    {front ? (x - x0) * s->stretch : NAN, front ? (y - y0) * s->stretch : NAN, 0.0},
-                    bst_source_light(source, t)};
-            }
-            if (!(to > from)) {
-                break; /* no time */
-            }
-        }
-    }
-    return BST_OK;
-}
-
-/* Nodes of the stretches of own_path[count] that may put light on the sensor; their weights are
- * shares of the whole exposure. */
-static bst_status own_nodes(bst_ctx *ctx, bst_smear *s, int count, double x0, double y0,
-                            double tolerance) {
-    const bst_path_point *p = s->own_path;
-    double far = far_px(s), total = p[count - 1].s - p[0].s;
-    s->nodes.count = 0;
-    s->nodes.error = 0.0;
-    for (int first = 0, last; first + 1 < count; first = last > first ? last : first + 1) {
-        last = first;
-        while (last + 1 < count && !isnan(p[last].p[0]) && !isnan(p[last + 1].p[0]) &&
-               !passes_by(s, &p[last], &p[last + 1], x0, y0, far)) {
-            last++;
-        }
-        if (last > first) {
-            int n = s->nodes.count;
-            double part = total > 0.0 ? (p[last].s - p[first].s) / total : 1.0;
-            BST_TRY(path_nodes(ctx, s, p + first, last - first + 1, part, tolerance));
-            for (; n < s->nodes.count && part < 1.0; n++) {
-                s->nodes.items[n].weight *= part;
-            }
-        }
-    }
-    return BST_OK;
-}
-
-/* Makes the points of a disc; the scratch nodes are those of its middle about (x, y). *peak: share
- * of the light on one pixel at most, without the smear. */
-static bst_status shape_points(bst_ctx *ctx, bst_smear *s, const bst_source *source, double x,
-                               double y, double *peak) {
-    enum { MOST_NODES = 2000000 };
-    double x0 = x, y0 = y, low[2] = {0.0, 0.0}, high[2] = {0.0, 0.0};
-    (void)project(s, s->q_reference, source->apparent_mid, &x0, &y0);
-    for (int n = 0; n < s->nodes.count; n++) {
-        double way[2] = {s->nodes.items[n].p[0] / s->stretch + x - x0,
-                         s->nodes.items[n].p[1] / s->stretch + y - y0};
-        for (int i = 0; i < 2; i++) {
-            low[i] = n == 0 ? way[i] : fmin(low[i], way[i]);
-            high[i] = n == 0 ? way[i] : fmax(high[i], way[i]);
-        }
-    }
-    double cx = bst_camera_centre_x(&s->camera), cy = bst_camera_centre_y(&s->camera);
-    double margin = 0.5 * s->options.taps + 2.0, all = far_px(s) - s->disc_px;
-    bool general = s->camera.geometry.general;
-    double turn = general ? asin(s->camera.geometry.sin_rotation) : 0.0;
-    if (general && s->camera.geometry.cos_rotation < 0.0) {
-        turn = BST_PI - turn;
-    }
-    bst_quat focal = bst_quat_from_rotvec((bst_vec3){0.0, 0.0, turn});
-    bst_shape_view view = {
-        .q_focal_from_gcrf = general ? bst_quat_mul(focal, s->q_reference) : s->q_reference,
-        .scale_rad = bst_camera_scale_rad(&s->camera),
-        .edge_x_px = -cx - 0.5,
-        .edge_y_px = -cy - 0.5,
-        .sigma_px = s->sigma_px,
-        .min_x_px = (general ? -all : -cx - margin) - high[0],
-        .max_x_px = (general ? all : (double)s->camera.width_px - cx + margin) - low[0],
-        .min_y_px = (general ? -all : -cy - margin) - high[1],
-        .max_y_px = (general ? all : (double)s->camera.height_px - cy + margin) - low[1],
-        .most_points = MOST_NODES / (s->nodes.count > 0 ? s->nodes.count : 1)};
-    return bst_shape_points(ctx, source, &view, &s->points, peak);
-}
-
 bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source,
                             bst_scene_source *out, bool *visible) {
     double x, y, electrons = source->electrons_per_s * s->duration_s;
@@ -496,39 +361,30 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
     bool moving = source->path || source->rate || source->shape;
     s->disc_px =
         source->shape ? tan(asin(source->shape->radius)) / bst_camera_scale_rad(&s->camera) : 0.0;
-    bool front = project(s, s->q_reference, source->apparent_mid, &x, &y);
+    bool front = bst_smear_project(s, s->q_reference, source->apparent_mid, &x, &y);
     /* a star that only a wide turn brings into the field is no small float from its place there */
-    moving = moving || !front || hypot(x, y) > 4.0 * far_px(s);
+    double wide = 4.0 * (s->far_px + s->disc_px);
+    moving = moving || !front || x * x + y * y > wide * wide;
     *visible = !source->occulted && electrons > 0.0 && electrons < 1e30 && (front || moving);
     if (!*visible) {
         return BST_OK;
     }
-    level own;
-    const level *used;
+    if (!moving) {
+        s->last_peak_e = electrons * s->star_share;
+        *visible = !stays_beside(s, x, y);
+        if (!*visible) {
+            return BST_OK;
+        }
+    }
+    bst_smear_level own;
+    const bst_smear_level *used;
     double travel_px = s->travel_px;
     if (moving) {
         /* nodes are kept as small floats relative to a place on the sensor */
         double far = s->far_px;
         x = front ? fmin(fmax(x, -far), far) : 0.0;
         y = front ? fmin(fmax(y, -far), far) : 0.0;
-        int count;
-        BST_TRY(own_path(ctx, s, source, x, y, &count));
-        BST_TRY(own_nodes(ctx, s, count, x, y, s->tolerance[0]));
-        if (s->nodes.count == 0) {
-            *visible = false;
-            return BST_OK;
-        }
-        double share = largest_share(s), peak;
-        if (source->shape) {
-            BST_TRY(own_nodes(ctx, s, count, x, y, s->tolerance[0]));
-            BST_TRY(shape_points(ctx, s, source, x, y, &peak));
-            share = fmin(share, peak);
-        }
-        s->last_peak_e = electrons * share;
-        BST_TRY(own_nodes(ctx, s, count, x, y, s->tolerance[choose_level(s, s->last_peak_e)]));
-        if (source->shape) {
-            BST_TRY(bst_shape_spread(ctx, &s->points, s->stretch, &s->nodes));
-        }
+        BST_TRY(bst_smear_moving_nodes(ctx, s, source, electrons, x, y));
         if (s->nodes.count == 0) {
             *visible = false;
             return BST_OK;
@@ -541,8 +397,7 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
         BST_TRY(append_nodes(ctx, s, &s->nodes, shift_to_table, &own));
         used = &own;
     } else {
-        s->last_peak_e = electrons * s->star_share;
-        int n = choose_level(s, s->last_peak_e);
+        int n = bst_smear_choose_level(s, s->last_peak_e);
         BST_TRY(make_level(ctx, s, n));
         used = &s->levels[n];
     }
@@ -552,7 +407,8 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
     /* places in parts of a pixel, the way to the node in float, and some additions of light */
     double parts = s->place_parts;
     double rounded = 0.86 / s->sigma_px * (1.0 / parts + 0x1p-24 * travel_px) + 0x1p-22;
-    double shared = s->single && !moving ? single_error(s, s->last_peak_e, hypot(x, y)) : 0.0;
+    double shared =
+        s->single && !moving ? single_error(s, s->last_peak_e, sqrt(x * x + y * y)) : 0.0;
     double sigma_e = sqrt(s->last_peak_e + s->dark_variance_e2);
     s->last_error = (bst_crowd_source){.x_px = (float)x,
                                        .y_px = (float)y,

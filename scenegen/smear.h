@@ -20,8 +20,10 @@ typedef enum bst_star_motion {
 
 typedef struct bst_smear_options {
     double tolerance_sigma; /* error of a source's image in any pixel, in that pixel's sigma */
-    int taps;               /* length of the profile table, px */
-    double table_error;     /* of a node's image by the table, over its peak */
+    int taps;               /* length of the longest profile, px */
+    /* of stamps: what the profile law misses of nodes as wide as the PSF, over the peak, and the
+     * widening up to which it serves, PSF variances (scenegen/profile_law.h); 0: there is none */
+    double law_error, law_widest;
     bst_star_motion motion;
     int temporal_oversample; /* 0: by the tolerance; else so many equal parts of the exposure */
     int stamp_radius_px;     /* 0: by the tolerance; else of all stamps */
@@ -35,17 +37,24 @@ bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
                             const bst_smear_options *options, bst_smear **out) BST_MUST_CHECK;
 void bst_smear_free(bst_smear *smear);
 
-/* Starts a frame: takes the line-of-sight track (needed until the frame's last source), the noise
- * variance of a dark pixel (background, dark and read noise), e-^2, and the rate of the brightest
- * star, e-/s. */
-bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *smear, const bst_los_track *track,
-                           double dark_variance_e2, double brightest_e_per_s) BST_MUST_CHECK;
+/* What sources are drawn for. */
+typedef struct bst_smear_frame {
+    const bst_los_track *track; /* needed until the frame's last source */
+    bst_window window;          /* of the sensor */
+    double margin_px;           /* from which a source outside the window can still light it */
+    double dark_variance_e2;    /* noise of a dark pixel: background, dark and read noise */
+    double brightest_e_per_s;   /* of the stars */
+} bst_smear_frame;
+
+bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *smear,
+                           const bst_smear_frame *frame) BST_MUST_CHECK;
 
 /* The frame's stars follow one track as a shift. */
 bool bst_smear_single(const bst_smear *smear);
 
-/* Chooses a source's nodes and stamp. *visible is false for one that gives no light (occulted, not
- * in front of the camera); *out is then untouched. first_block is left 0. */
+/* Chooses a source's nodes and stamp. *visible is false for one that gives the window no light
+ * (occulted, not in front of the camera, a star too far off); *out is then untouched. first_block
+ * is left 0. */
 bst_status bst_smear_source(bst_ctx *ctx, bst_smear *smear, const bst_source *source,
                             bst_scene_source *out, bool *visible) BST_MUST_CHECK;
 

@@ -1,16 +1,27 @@
 /* Light of all nodes on a grid for the Fourier path: each node is spread over eight by eight samples.
- * Options: DEPOSIT_W, DEPOSIT_H (samples of a tile, a multiple of 16 wide), DEPOSIT_GROUP (work-items
- * per work-group), PLACE_BITS (of the nodes' places), FIELD (weights by place).
+ * Options: DEPOSIT_W, DEPOSIT_H (samples of a tile, a multiple of 16 high), DEPOSIT_GROUP (work-items
+ * per work-group), PLACE_BITS (of the nodes' places), FIELD (weights by place), NEAR_CACHE (memory has one address space, and what lies
+ * in it can be fetched ahead).
  *
  * One work-item owns a tile and adds its nodes in the order of sources, blocks and nodes: the sum is
- * the same for every tile and work-group size. */
+ * the same for every tile and work-group size. Vectors run along y, as in the grid's blocks of
+ * sixteen rows. */
 
-/* Rows of a tile are a vector apart, which keeps neighbouring rows out of one another's cache sets. */
-#define DEPOSIT_STRIDE (DEPOSIT_W + 16)
-/* Nodes that share a pass over their rows, and how many rows they may span together. */
+/* Columns of a tile are a vector apart, which keeps neighbouring ones out of one another's cache
+ * sets. */
+#define DEPOSIT_STRIDE (DEPOSIT_H + 16)
+/* Nodes that share a pass over their columns, and how many columns they may span together. */
 #define DEPOSIT_TEAM 4
 #define DEPOSIT_SPAN 24
 #define DEPOSIT_ROOM 40
+/* Blocks that are found before they are added. */
+#define DEPOSIT_LIST 64
+
+#ifdef NEAR_CACHE
+#define FETCH(p) __builtin_prefetch((const private void *)(uintptr_t)(p))
+#else
+#define FETCH(p)
+#endif
 
 static int any_of(int16 v) {
     int8 a = v.lo | v.hi;
@@ -60,7 +71,7 @@ static float8 spread8(global const float *row, float t, float u) {
     return a;
 }
 
-/* The taps of one node along x on the vector of the tile that begins `shift` after its first. */
+/* The taps of one node along y on the vector of the tile that begins `shift` after its first. */
 static float16 spread_line(const float *profile, int shift) {
     if (shift <= -16 || shift >= BST_SPREAD_TAPS) {
         return (float16)0.0f;
@@ -69,33 +80,33 @@ static float16 spread_line(const float *profile, int shift) {
 }
 
 /* Adds nodes n to n + count - 1 (at most DEPOSIT_TEAM, the others are left out), which together span
- * at most DEPOSIT_SPAN rows from `top`. Each row is loaded and stored once for all of them; a sample
- * still receives them one after the other, and a zero from those that do not reach it. Vectors of
- * the tile are touched where they lie, so that what one team has stored the next can load at once.
- */
+ * at most DEPOSIT_SPAN columns from `left`. Each vector is loaded and stored once for all of them; a
+ * sample still receives them one after the other, and a zero from those that do not reach it.
+ * Vectors of the tile are touched where they lie, so that what one team has stored the next can load
+ * at once. */
 static void deposit_team(local float *sum, const deposit_nodes *b, int n, int count, int top,
                          int bottom, int left, int right, global const float *table,
                          deposit_profiles *room) {
-    int shift[DEPOSIT_TEAM], down[DEPOSIT_TEAM];
+    int shift[DEPOSIT_TEAM], over[DEPOSIT_TEAM];
     for (int k = 0; k < DEPOSIT_TEAM; k++) {
         int i = n + min(k, count - 1);
         float electrons = k < count ? b->electrons[i] : 0.0f;
         float u = b->share_width[i];
-        vstore8(electrons * spread8(table + b->row_x[i], b->share_x[i], u), 0, room->x[k] + 16);
-        vstore8(spread8(table + BST_SPREAD_TABLE + b->row_y[i], b->share_y[i], u), 0,
+        vstore8(spread8(table + b->row_x[i], b->share_x[i], u), 0, room->x[k] + 16);
+        vstore8(electrons * spread8(table + BST_SPREAD_TABLE + b->row_y[i], b->share_y[i], u), 0,
                 room->y[k] + 16);
-        shift[k] = b->left[i];
-        down[k] = 16 - (b->top[i] - top);
+        shift[k] = b->top[i];
+        over[k] = 16 - (b->left[i] - left);
     }
-    const float *h0 = room->y[0] + down[0], *h1 = room->y[1] + down[1];
-    const float *h2 = room->y[2] + down[2], *h3 = room->y[3] + down[3];
-    int first = max(0, -top), last = min(bottom, DEPOSIT_H) - top, end = min(right, DEPOSIT_W);
-    for (int column = max(left & ~15, 0); column < end; column += 16) {
-        float16 l0 = spread_line(room->x[0], column - shift[0]);
-        float16 l1 = spread_line(room->x[1], column - shift[1]);
-        float16 l2 = spread_line(room->x[2], column - shift[2]);
-        float16 l3 = spread_line(room->x[3], column - shift[3]);
-        local float16 *target = (local float16 *)(sum + (top + first) * DEPOSIT_STRIDE + column);
+    const float *h0 = room->x[0] + over[0], *h1 = room->x[1] + over[1];
+    const float *h2 = room->x[2] + over[2], *h3 = room->x[3] + over[3];
+    int first = max(0, -left), last = min(right, DEPOSIT_W) - left, end = min(bottom, DEPOSIT_H);
+    for (int row = max(top & ~15, 0); row < end; row += 16) {
+        float16 l0 = spread_line(room->y[0], row - shift[0]);
+        float16 l1 = spread_line(room->y[1], row - shift[1]);
+        float16 l2 = spread_line(room->y[2], row - shift[2]);
+        float16 l3 = spread_line(room->y[3], row - shift[3]);
+        local float16 *target = (local float16 *)(sum + (left + first) * DEPOSIT_STRIDE + row);
         for (int j = first; j < last; j++) {
             float16 v = *target;
             v = fma((float16)h0[j], l0, v);
@@ -169,7 +180,7 @@ static void deposit_block(bst_deposit_params p, local float *sum, int tile_x, in
         int bottom = max(max(t[0], t[1]), max(t[2], t[3])) + BST_SPREAD_TAPS;
         int left = min(min(l[0], l[1]), min(l[2], l[3]));
         int right = max(max(l[0], l[1]), max(l[2], l[3])) + BST_SPREAD_TAPS;
-        if (bottom - top <= DEPOSIT_SPAN) {
+        if (right - left <= DEPOSIT_SPAN) {
             deposit_team(sum, &b, n, DEPOSIT_TEAM, top, bottom, left, right, table, room);
             continue;
         }
@@ -182,13 +193,23 @@ static void deposit_block(bst_deposit_params p, local float *sum, int tile_x, in
     }
 }
 
-/* grid: [samples_y][pitch]. table: [2][BST_SPREAD_TABLE], along x and y. The
- * boxes are those of the nodes kernel, which reach at least as far as the spreading kernel. */
+/* Adds the blocks of a list. */
+static void deposit_list(bst_deposit_params p, local float *sum, int tile_x, int tile_y,
+                         const int *list, int count, global const float16 *nodes,
+                         global const float *table, global const float *field,
+                         deposit_profiles *room) {
+    for (int k = 0; k < count; k++) {
+        deposit_block(p, sum, tile_x, tile_y, nodes + BST_NODE_ROWS * list[k], table, field, room);
+    }
+}
+
+/* grid: [samples_y / 16][samples_x][16]. table: [2][BST_SPREAD_TABLE], along x and y. The boxes are
+ * those of the nodes kernel, which reach at least as far as the spreading kernel. */
 __attribute__((reqd_work_group_size(DEPOSIT_GROUP, 1, 1))) kernel void bst_light_deposit(
     bst_deposit_params p, global const bst_scene_source *sources, global const float16 *nodes,
-    global const float4 *block_box, global const float *source_box, global const float *table,
-    global const float *field, global float *grid) {
-    local float16 sums[DEPOSIT_GROUP][DEPOSIT_H * DEPOSIT_STRIDE / 16];
+    global const float *block_box, global const float *source_box, global const float *table,
+    global const float *field, global float16 *grid) {
+    local float16 sums[DEPOSIT_GROUP][DEPOSIT_W * DEPOSIT_STRIDE / 16];
     int tile = (int)get_global_id(0);
     if (tile >= p.tiles_x * p.tiles_y) {
         return;
@@ -197,8 +218,8 @@ __attribute__((reqd_work_group_size(DEPOSIT_GROUP, 1, 1))) kernel void bst_light
     int left = tile % p.tiles_x * DEPOSIT_W, top = tile / p.tiles_x * DEPOSIT_H;
     float x0 = p.x0 + (float)left / p.density_x, x1 = x0 + (float)DEPOSIT_W / p.density_x;
     float y0 = p.y0 + (float)top / p.density_y, y1 = y0 + (float)DEPOSIT_H / p.density_y;
-    for (int i = 0; i < DEPOSIT_H * DEPOSIT_STRIDE; i += 16) {
-        vstore16((float16)0.0f, 0, sum + i);
+    for (int i = 0; i < DEPOSIT_W * DEPOSIT_STRIDE / 16; i++) {
+        sums[get_local_id(0)][i] = (float16)0.0f;
     }
     deposit_profiles room;
     for (int k = 0; k < DEPOSIT_TEAM; k++) {
@@ -206,6 +227,7 @@ __attribute__((reqd_work_group_size(DEPOSIT_GROUP, 1, 1))) kernel void bst_light
             room.x[k][j] = room.y[k][j] = 0.0f;
         }
     }
+    int list[DEPOSIT_LIST], listed = 0;
     for (int g = 0; g < p.source_groups; g++) {
         global const float *box = source_box + g * 4 * BST_BLOCK;
         int16 hit = (vload16(0, box) <= x1) & (vload16(1, box) <= y1) & (vload16(2, box) >= x0) &
@@ -216,25 +238,43 @@ __attribute__((reqd_work_group_size(DEPOSIT_GROUP, 1, 1))) kernel void bst_light
         int hits[BST_BLOCK];
         vstore16(hit, 0, hits);
         for (int i = 0; i < BST_BLOCK; i++) {
+            if (hits[i]) {
+                bst_scene_source s = sources[g * BST_BLOCK + i];
+                for (int b = 0; b < s.blocks; b += 4) {
+                    FETCH(block_box + s.first_block + b);
+                }
+            }
+        }
+        for (int i = 0; i < BST_BLOCK; i++) {
             if (!hits[i]) {
                 continue;
             }
             bst_scene_source s = sources[g * BST_BLOCK + i];
-            for (int b = s.first_block; b < s.first_block + s.blocks; b++) {
-                float4 r = block_box[b];
-                if (r.x <= x1 && r.z >= x0 && r.y <= y1 && r.w >= y0) {
-                    deposit_block(p, sum, left, top, nodes + BST_NODE_ROWS * b, table, field,
-                                  &room);
+            for (int n = 0; n < s.blocks; n++) {
+                int b = s.first_block + n, lane = n % BST_BLOCK;
+                global const float *r = block_box + (s.first_box * BST_BLOCK + n - lane) * 4 + lane;
+                if (s.blocks == 1 || (r[0] <= x1 && r[2 * BST_BLOCK] >= x0 && r[BST_BLOCK] <= y1 &&
+                                      r[3 * BST_BLOCK] >= y0)) {
+                    for (int k = 0; k < BST_NODE_ROWS; k++) {
+                        FETCH(nodes + BST_NODE_ROWS * b + k);
+                    }
+                    list[listed++] = b;
+                }
+                if (listed == DEPOSIT_LIST) {
+                    deposit_list(p, sum, left, top, list, listed, nodes, table, field, &room);
+                    listed = 0;
                 }
             }
         }
     }
-    int rows = min(DEPOSIT_H, p.samples_y - top), columns = min(DEPOSIT_W, p.samples_x - left);
-    for (int y = 0; y < rows; y++) {
-        global float *out = grid + (size_t)(top + y) * p.pitch + left;
-        local const float *in = sum + y * DEPOSIT_STRIDE;
-        for (int x = 0; x < columns; x += 16) { /* samples_x is a multiple of 16 */
-            vstore16(vload16(0, in + x), 0, out + x);
+    deposit_list(p, sum, left, top, list, listed, nodes, table, field, &room);
+    int columns = min(DEPOSIT_W, p.samples_x - left);
+    int rows = min(DEPOSIT_H, p.samples_y - top); /* samples_y is a multiple of 16 */
+    for (int y = 0; y < rows; y += 16) {
+        global float16 *out = grid + (size_t)((top + y) / 16) * p.samples_x + left;
+        local const float16 *in = (local const float16 *)(sum + y);
+        for (int x = 0; x < columns; x++) {
+            out[x] = in[x * (DEPOSIT_STRIDE / 16)];
         }
     }
 }

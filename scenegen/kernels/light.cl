@@ -3,6 +3,7 @@
 static void load_tile(local float *sum, bst_scene_params p, int left, int top,
                       global const float *image) {
     int rows = min(TILE_H, p.window_height - top), columns = min(TILE_W, p.window_width - left);
+    int first = max(0, -left); /* the tile may start before the window */
     image += p.light_first + (size_t)top * p.light_pitch + left;
     for (int y = 0; y < rows; y++) {
         /* rounding leaves the darkest pixels a little below zero; rows are padded for the last

@@ -1,23 +1,42 @@
 /* From sources and node tables to the frame's nodes: place and electrons of every node, and the
- * boxes of pixels that blocks and sources touch. One work-item per source. */
+ * boxes of pixels that blocks, sources and groups of sources touch. One work-item per source. */
 
+/* By comparisons: fmax() has more to do where one side is no number. */
 static float max_of(float16 v) {
-    float8 a = fmax(v.lo, v.hi);
-    float4 b = fmax(a.lo, a.hi);
-    float2 c = fmax(b.lo, b.hi);
-    return fmax(c.lo, c.hi);
+    float8 a = v.lo > v.hi ? v.lo : v.hi;
+    float4 b = a.lo > a.hi ? a.lo : a.hi;
+    float2 c = b.lo > b.hi ? b.lo : b.hi;
+    return c.lo > c.hi ? c.lo : c.hi;
 }
 
 static float min_of(float16 v) {
     return -max_of(-v);
 }
 
-/* Row of the profile table, and the share of the way to the next. */
-static float16 place_of_width(float16 widening) {
+static int most_of(int16 v) {
+    int8 a = max(v.lo, v.hi);
+    int4 b = max(a.lo, a.hi);
+    int2 c = max(b.lo, b.hi);
+    return max(c.lo, c.hi);
+}
+
+static int least_of(int16 v) {
+    return -most_of(-v);
+}
+
+#ifdef FFT_LIGHT
+/* Row of the Fourier path's table, and the share of the way to the next. */
+static float16 width_of(float16 widening) {
     float16 square = fmin(widening, BST_WIDEST) * (BST_WIDTHS * BST_WIDTHS / BST_WIDEST);
     float16 row = floor(sqrt(square));
     return row + (square - row * row) / (2.0f * row + 1.0f);
 }
+#else
+/* Sigma of the PSF over that of the node. */
+static float16 width_of(float16 widening) {
+    return rsqrt(1.0f + widening);
+}
+#endif
 
 #ifdef DISTORTED
 /* Distortion (sim/world/camera.h); k1, k2, k3, p1, p2 in pixels instead of tangents. What lies
@@ -56,41 +75,67 @@ static int16 place_on_sensor(int place, float from, float16 way) {
     return at;
 }
 
-/* nodes: per block x[16], y[16], electrons[16], widths[16]. block_box: x0, y0, x1, y1 (inclusive
- * pixels). source_box: the same for sources, by groups of 16: x0[16], y0[16], x1[16], y1[16]. */
-kernel void bst_scene_nodes(global const bst_scene_source *sources, int count,
-                            global const float16 *table, global float16 *nodes,
-                            global float4 *block_box, global float *source_box) {
-    int i = (int)get_global_id(0);
-    global float *box = source_box + (i / BST_BLOCK) * 4 * BST_BLOCK + i % BST_BLOCK;
+/* A block of nodes: place on the sensor in parts of a pixel, electrons, width_of. */
+typedef struct node_block {
+    int16 x, y;
+    float16 electrons, width;
+} node_block;
+
+/* Block b of a source. */
+static node_block nodes_of(bst_scene_source s, int b, global const float16 *table) {
+    global const float16 *t = table + (s.first_table + b) * BST_TABLE_ROWS;
+    node_block out;
+    float16 depth = t[6] * s.x_px + t[7] * s.y_px;
+    float16 scale = 1.0f / (depth + t[8]);
+    float16 dx = (t[0] * s.x_px + t[1] * s.y_px + t[2] - depth * s.x_px) * scale;
+    float16 dy = (t[3] * s.x_px + t[4] * s.y_px + t[5] - depth * s.y_px) * scale;
+    float16 widening = t[10];
+#ifdef DISTORTED
+    float16 stretch2;
+    add_distortion(s.x_px + dx, s.y_px + dy, &dx, &dy, &stretch2);
+    widening *= stretch2;
+#endif
+    out.x = place_on_sensor(s.place_x, s.x_px, dx);
+    out.y = place_on_sensor(s.place_y, s.y_px, dy);
+    out.electrons = t[9] * s.electrons;
+    out.width = width_of(widening);
+    return out;
+}
+
+/* Boxes of inclusive pixels, by groups of 16: x0[16], y0[16], x1[16], y1[16]. block_box: of the
+ * blocks of a source that has several, from its first_box on; source_box: of sources; group_box: of
+ * groups of sources. nodes (with FFT_LIGHT): per block x[16], y[16], electrons[16], width_of[16].
+ */
+__attribute__((reqd_work_group_size(BST_BLOCK, 1, 1))) kernel void bst_scene_nodes(
+    global const bst_scene_source *sources, int count, global const float16 *table,
+    global float *block_box, global float *source_box,
+    global float *group_box, global float16 *nodes) {
+    int i = (int)get_global_id(0), g = i / BST_BLOCK;
+    global float *box = source_box + g * 4 * BST_BLOCK + i % BST_BLOCK;
     float x0 = 1e9f, y0 = 1e9f, x1 = -1e9f, y1 = -1e9f;
     if (i < count) {
         bst_scene_source s = sources[i];
         float reach = (float)s.radius;
         for (int b = 0; b < s.blocks; b++) {
-            global const float16 *t = table + (s.first_table + b) * BST_TABLE_ROWS;
-            float16 depth = t[6] * s.x_px + t[7] * s.y_px;
-            float16 scale = 1.0f / (depth + t[8]);
-            float16 dx = (t[0] * s.x_px + t[1] * s.y_px + t[2] - depth * s.x_px) * scale;
-            float16 dy = (t[3] * s.x_px + t[4] * s.y_px + t[5] - depth * s.y_px) * scale;
-            float16 widening = t[10];
-#ifdef DISTORTED
-            float16 stretch2;
-            add_distortion(s.x_px + dx, s.y_px + dy, &dx, &dy, &stretch2);
-            widening *= stretch2;
-#endif
-            int16 place_x = place_on_sensor(s.place_x, s.x_px, dx);
-            int16 place_y = place_on_sensor(s.place_y, s.y_px, dy);
-            float16 x = convert_float16(place_x >> PLACE_BITS);
-            float16 y = convert_float16(place_y >> PLACE_BITS);
+            node_block n = nodes_of(s, b, table);
+#ifdef FFT_LIGHT
             int block = s.first_block + b;
-            nodes[BST_NODE_ROWS * block] = as_float16(place_x);
-            nodes[BST_NODE_ROWS * block + 1] = as_float16(place_y);
-            nodes[BST_NODE_ROWS * block + 2] = t[9] * s.electrons;
-            nodes[BST_NODE_ROWS * block + 3] = place_of_width(widening);
-            float4 r = (float4)(min_of(x) - reach, min_of(y) - reach, max_of(x) + reach + 1.0f,
-                                max_of(y) + reach + 1.0f);
-            block_box[block] = r;
+            nodes[BST_NODE_ROWS * block] = as_float16(n.x);
+            nodes[BST_NODE_ROWS * block + 1] = as_float16(n.y);
+            nodes[BST_NODE_ROWS * block + 2] = n.electrons;
+            nodes[BST_NODE_ROWS * block + 3] = n.width;
+#endif
+            int16 x = n.x >> PLACE_BITS, y = n.y >> PLACE_BITS;
+            float4 r = (float4)((float)least_of(x) - reach, (float)least_of(y) - reach,
+                                (float)most_of(x) + reach + 1.0f, (float)most_of(y) + reach + 1.0f);
+            if (s.blocks > 1) {
+                int lane = b % BST_BLOCK;
+                global float *at = block_box + (s.first_box * BST_BLOCK + b - lane) * 4 + lane;
+                at[0] = r.x;
+                at[BST_BLOCK] = r.y;
+                at[2 * BST_BLOCK] = r.z;
+                at[3 * BST_BLOCK] = r.w;
+            }
             x0 = fmin(x0, r.x);
             y0 = fmin(y0, r.y);
             x1 = fmax(x1, r.z);
@@ -101,4 +146,12 @@ kernel void bst_scene_nodes(global const bst_scene_source *sources, int count,
     box[BST_BLOCK] = y0;
     box[2 * BST_BLOCK] = x1;
     box[3 * BST_BLOCK] = y1;
+    barrier(CLK_GLOBAL_MEM_FENCE);
+    if (i % BST_BLOCK == 0) {
+        global float *group = group_box + g / BST_BLOCK * 4 * BST_BLOCK + g % BST_BLOCK;
+        group[0] = min_of(vload16(0, box));
+        group[BST_BLOCK] = min_of(vload16(1, box));
+        group[2 * BST_BLOCK] = max_of(vload16(2, box));
+        group[3 * BST_BLOCK] = max_of(vload16(3, box));
+    }
 }

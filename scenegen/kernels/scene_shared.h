@@ -4,19 +4,17 @@
 
 /* Nodes travel in blocks of this many, one vector register. */
 #define BST_BLOCK 16
-/* The profile table holds the PSF widened by (n / BST_WIDTHS)^2 BST_WIDEST of its own variance, n
- * from 0 to BST_WIDTHS. Between widths it is interpolated linearly in the variance, between which a
+/* The Fourier path's table holds nodes widened by (n / BST_WIDTHS)^2 BST_WIDEST of the PSF's variance,
+ * n from 0 to BST_WIDTHS. Between widths it is interpolated linearly in the variance, between which a
  * Gaussian's peak goes as the square root of its inverse: on each axis that misses
  * 3/8 w / BST_WIDTHS^2 / (1 + w)^2 of the peak for a widening by w variances. */
 #define BST_WIDTHS 32
 #define BST_WIDEST 1.0f
-/* Zeros on either side of a row of the profile table. */
-#define BST_PROFILE_PAD 16
 /* Floats per node of a node table: the homography from the reference attitude's tangent plane to
  * the node's, as nine coefficients, then the weight and the widening in PSF variances. */
 #define BST_TABLE_ROWS 11
-/* Vectors per block of the frame's nodes: x, y, electrons, place in the table's widths. x and y are
- * integers, sensor pixels times 2^PLACE_BITS: floats would be rounded by up to 1e-4 px. */
+/* Vectors per block of the Fourier path's nodes: x, y, electrons, place in the table's widths. x and
+ * y are integers, sensor pixels times 2^PLACE_BITS: floats would be rounded by up to 1e-4 px. */
 #define BST_NODE_ROWS 4
 /* Places from the boresight stay below this many parts of a pixel, so that sums of two fit an int.
  */
@@ -28,6 +26,7 @@ typedef struct bst_scene_params {
     int sensor_width;
     int tiles_x0; /* sensor column of the first tile: a multiple of 64 */
     int tiles_x, tiles_y;
+    int first_row, first_tile; /* of the frame: where the window is one of its bands */
     int source_groups; /* sources / BST_BLOCK, rounded up */
     unsigned key0, key1, exposure_low, exposure_high;
     float background_e; /* expected, per pixel: sky and dark current */
@@ -45,16 +44,18 @@ typedef struct bst_scene_params {
     int light_y0, light_height,
         light_stride; /* of the image that is read out: sensor row, rows, floats */
     int binning;
+    int map_step, map_x0, map_y0, map_columns, map_rows; /* of the background, if it varies */
 } bst_scene_params;
 
 /* One source on its way to its nodes. */
 typedef struct bst_scene_source {
     float x_px, y_px;     /* at the reference attitude, from the boresight, without distortion */
     int place_x, place_y; /* the same on the sensor, px times 2^PLACE_BITS */
-    float electrons;      /* in the exposure */
-    int first_table;      /* block of the node table */
-    int first_block;      /* block of the frame's nodes */
+    float electrons;  /* in the exposure */
+    int first_table;  /* block of the node table */
+    int first_block;  /* block of the frame's nodes */
     int blocks;
+    int first_box; /* of the blocks' boxes, by groups of BST_BLOCK */
     int radius; /* the stamp reaches this far beyond the two nearest pixels of a node */
 } bst_scene_source;
 

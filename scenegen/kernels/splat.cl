@@ -1,16 +1,29 @@
 /* Light on one tile: sums the nodes' pixel-integrated profiles. Options: TILE_W, TILE_H (pixels),
- * TAPS (profile length, a multiple of 16), PHASES (sub-pixel phases of the profile table).
+ * TAPS (of the longest profile, a multiple of 16), EDGE_SCALE (1 / (sqrt(2) sigma of the PSF),
+ * 1/px), DEGREE and BARELY_WIDER (of the profile law, scenegen/profile_law.h; without them there is
+ * none).
  *
  * Every pixel receives its nodes in the order of sources, blocks and nodes, whatever the tile, so
  * the float sum is the same for every window and work-group size. */
 
-/* Rows of a tile are a vector apart, which keeps neighbouring rows out of one another's cache sets. */
+/* Rows of a tile are a vector apart, which keeps neighbouring rows out of one another's cache sets.
+ */
 #define STRIDE (TILE_W + 16)
-#define HALF (TAPS / 2)
-#define ROW (TAPS + 2 * BST_PROFILE_PAD)
+/* Zeros on either side of a profile: a vector of it may begin anywhere near. */
+#define PAD 16
+#define ROW (TAPS + 2 * PAD)
+/* Taps that are made at once. */
+#define OCTET 8
+/* Nodes that share a pass over their rows, and the rows between their first ones at most. */
+#define TEAM 4
+#define SPREAD 12
+/* Rows that are added at once, and those below a tile that are written to no purpose. */
+#define RUN 4
+#define SPARE (RUN - 1)
 
 /* For vectors at any place: vstore16 becomes four stores on some devices. */
 typedef float16 loose16 __attribute__((aligned(4)));
+typedef float8 loose8 __attribute__((aligned(4)));
 
 /* any(), by halves: some compilers test lane after lane. */
 static int any16(int16 v) {
@@ -20,190 +33,313 @@ static int any16(int16 v) {
     return (c.lo | c.hi) < 0;
 }
 
-/* Sixteen taps at `row`, between its phase and the next (t) and, when widened, between its width and
- * the next (u). */
-static float16 profile16(global const float *row, float t, float u, int wide) {
-    float16 a = vload16(0, row), b = vload16(0, row + ROW);
-    a = fma((float16)t, b - a, a);
-    if (wide) {
-        row += (PHASES + 1) * ROW;
-        float16 c = vload16(0, row), d = vload16(0, row + ROW);
-        c = fma((float16)t, d - c, c);
-        a = fma((float16)u, c - a, a);
-    }
-    return a;
-}
-
-/* Nodes that share a pass over their rows, and how many rows they may span together. */
-#define TEAM 4
-#define SPAN (TAPS + 16)
-
-/* A block of nodes against one tile. */
+/* A block of nodes against one tile: the taps of node n along x, which carry its electrons, and
+ * along y follow PAD zeros in its row; the first belongs to column left[n] and row top[n]. In every
+ * lane of a team: the bounds of its nodes' left and top, and whether it reaches the tile. */
 typedef struct splat_nodes {
-    int left[BST_BLOCK], top[BST_BLOCK]; /* first tap that counts, tile pixels */
-    int row_x[BST_BLOCK], row_y[BST_BLOCK];
-    float share_x[BST_BLOCK], share_y[BST_BLOCK], share_width[BST_BLOCK];
-    int wide[BST_BLOCK];
-    float electrons[BST_BLOCK];
+    float x[BST_BLOCK][ROW], y[BST_BLOCK][ROW];
+    int left[BST_BLOCK], top[BST_BLOCK];
+    int left0[BST_BLOCK], left1[BST_BLOCK], top0[BST_BLOCK], top1[BST_BLOCK], near[BST_BLOCK];
+    int taps; /* that may be other than zero */
 } __attribute__((aligned(64))) splat_nodes;
 
-/* Tap j of a profile whose centre is f pixels (0 <= f < 1) right of pixel n belongs to pixel
- * n + j - (HALF - 1). profiles: [BST_WIDTHS + 1][PHASES + 1][ROW], zeros before and after the taps. */
-static void place_nodes(global const float *block, int tile_x, int tile_y, int radius,
-                        splat_nodes *out) {
+/* erf(u) to 2.3e-7: inside +-3.6 a polynomial in u^2 (minimax over that range), beyond it 1, where
+ * 4e-7 are left. */
+INLINE float16 error_function(float16 u) {
+    u = clamp(u, -3.6f, 3.6f);
+    float16 z = fma(u * u, (float16)(2.0f / (3.6f * 3.6f)), (float16)-1.0f);
+    float16 p = fma((float16)-0.000965762343f, z, (float16)0.00263147576f);
+    p = fma(p, z, (float16)-0.00284357269f);
+    p = fma(p, z, (float16)0.00457201151f);
+    p = fma(p, z, (float16)-0.0116267578f);
+    p = fma(p, z, (float16)0.0212467886f);
+    p = fma(p, z, (float16)-0.0325502623f);
+    p = fma(p, z, (float16)0.0482928275f);
+    p = fma(p, z, (float16)-0.0680295662f);
+    p = fma(p, z, (float16)0.0898119023f);
+    p = fma(p, z, (float16)-0.113793967f);
+    p = fma(p, z, (float16)0.143810923f);
+    p = fma(p, z, (float16)-0.195490509f);
+    p = fma(p, z, (float16)0.392712124f);
+    return p * u;
+}
+
+INLINE float16 zip_low(float16 a, float16 b) {
+    return (float16)(a.s0, b.s0, a.s1, b.s1, a.s2, b.s2, a.s3, b.s3, a.s4, b.s4, a.s5, b.s5, a.s6,
+                     b.s6, a.s7, b.s7);
+}
+
+INLINE float16 zip_high(float16 a, float16 b) {
+    return (float16)(a.s8, b.s8, a.s9, b.s9, a.sa, b.sa, a.sb, b.sb, a.sc, b.sc, a.sd, b.sd, a.se,
+                     b.se, a.sf, b.sf);
+}
+
+#ifdef DEGREE
+#define LAW_FLOATS (DEGREE + 1 + 6 + 4)
+
+/* Sum of the even (first 0) or odd (first 1) powers in c[count], without the odd ones' last factor.
+ */
+INLINE float16 powers(global const float *c, int count, int first, float16 g2) {
+    float16 v = (float16)c[count - 2 + first];
+#pragma unroll
+    for (int q = count - 4; q >= 0; q -= 2) {
+        v = fma(v, g2, (float16)c[q + first]);
+    }
+    return v;
+}
+
+/* taps of nodes that are not, or barely (`wide`, by `more` variances of the PSF), wider than the
+ * PSF. Those at d and 1 - d pixels from the node's own are mirror images. */
+INLINE void taps_by_law(float16 within, float16 more, int wide, float16 height, int radius,
+                        global const float *law, float16 *taps) {
+    float16 g = fma((float16)2.0f, within, (float16)-1.0f), g2 = g * g;
+    for (int d = 1; d <= radius + 1; d++, law += LAW_FLOATS) {
+        float16 even = powers(law, DEGREE + 1, 0, g2), odd = powers(law, DEGREE + 1, 1, g2);
+        if (wide) {
+            global const float *first = law + DEGREE + 1, *second = first + 6;
+            even = fma(more, fma(more, powers(second, 4, 0, g2), powers(first, 6, 0, g2)), even);
+            odd = fma(more, fma(more, powers(second, 4, 1, g2), powers(first, 6, 1, g2)), odd);
+        }
+        odd *= g;
+        taps[radius + d] = (even + odd) * height;
+        taps[radius + 1 - d] = (even - odd) * height;
+    }
+}
+#endif
+
+/* taps between the pixels' edges, for any width; scale: 1 / (sqrt(2) sigma), 1/px. */
+INLINE void taps_by_edges(float16 within, float16 scale, float16 height, int radius,
+                          float16 *taps) {
+    height *= 0.5f;
+    float16 before = error_function((-0.5f - (float)radius - within) * scale) * height;
+    for (int k = 0; k < 2 * radius + 2; k++) {
+        float16 edge = (float)(k - radius) + 0.5f - within;
+        float16 after = error_function(edge * scale) * height;
+        taps[k] = after - before;
+        before = after;
+    }
+}
+
+/* Two nodes' taps. */
+INLINE void store_pair(float16 taps, float *first) {
+    *(loose8 *)first = taps.lo;
+    *(loose8 *)(first + ROW) = taps.hi;
+}
+
+/* Eight taps [tap][node], as rows of [node][ROW]. */
+INLINE void store_octet(const float16 *t, float *row) {
+    float16 a = zip_low(t[0], t[4]), b = zip_low(t[1], t[5]);
+    float16 c = zip_low(t[2], t[6]), d = zip_low(t[3], t[7]);
+    float16 even = zip_low(a, c), odd = zip_low(b, d);
+    store_pair(zip_low(even, odd), row);
+    store_pair(zip_high(even, odd), row + 2 * ROW);
+    even = zip_high(a, c);
+    odd = zip_high(b, d);
+    store_pair(zip_low(even, odd), row + 4 * ROW);
+    store_pair(zip_high(even, odd), row + 6 * ROW);
+    a = zip_high(t[0], t[4]);
+    b = zip_high(t[1], t[5]);
+    c = zip_high(t[2], t[6]);
+    d = zip_high(t[3], t[7]);
+    even = zip_low(a, c);
+    odd = zip_low(b, d);
+    store_pair(zip_low(even, odd), row + 8 * ROW);
+    store_pair(zip_high(even, odd), row + 10 * ROW);
+    even = zip_high(a, c);
+    odd = zip_high(b, d);
+    store_pair(zip_low(even, odd), row + 12 * ROW);
+    store_pair(zip_high(even, odd), row + 14 * ROW);
+}
+
+/* Profiles of a block's nodes along one axis, to rows[node][ROW]. within: of the way from the
+ * node's pixel to the next; width: sigma of the PSF over that of the node; height: total. */
+static void make_profiles(float16 within, float16 width, float16 height, int radius,
+                          global const float *law, float *rows) {
+    float16 taps[TAPS];
+    int count = 2 * radius + 2;
+#ifdef DEGREE
+    if (!any16(width < BARELY_WIDER)) {
+        float16 more = 1.0f / (width * width) - 1.0f;
+        taps_by_law(within, more, any16(width < 1.0f), height, radius, law, taps);
+    } else
+#endif
+    {
+        taps_by_edges(within, width * EDGE_SCALE, height, radius, taps);
+    }
+    for (; count % OCTET; count++) {
+        taps[count] = (float16)0.0f;
+    }
+    for (int k = 0; k < count; k += OCTET) {
+        store_octet(taps + k, rows + PAD + k);
+    }
+}
+
+INLINE int16 team_min(int16 v) {
+    v = min(v, v.s1032547698badcfe);
+    return min(v, v.s23016745ab89efcd);
+}
+
+INLINE int16 team_max(int16 v) {
+    v = max(v, v.s1032547698badcfe);
+    return max(v, v.s23016745ab89efcd);
+}
+
+static void place_nodes(node_block nodes, int tile_x, int tile_y, int radius,
+                        global const float *law, splat_nodes *b) {
     const int rest = (1 << PLACE_BITS) - 1;
-    const float phases = (float)PHASES / (float)(1 << PLACE_BITS);
-    int16 x = as_int16(vload16(0, block)), y = as_int16(vload16(1, block));
-    float16 width = vload16(3, block);
-    *(int16 *)out->left = (x >> PLACE_BITS) - radius - tile_x;
-    *(int16 *)out->top = (y >> PLACE_BITS) - radius - tile_y;
-    float16 phase_x = convert_float16(x & rest) * phases;
-    float16 phase_y = convert_float16(y & rest) * phases;
-    int16 px = min(convert_int16(phase_x), PHASES - 1);
-    int16 py = min(convert_int16(phase_y), PHASES - 1);
-    int16 level = min(convert_int16(width), BST_WIDTHS - 1);
-    int16 base = level * ((PHASES + 1) * ROW) + (BST_PROFILE_PAD + HALF - 1 - radius);
-    *(int16 *)out->row_x = base + px * ROW;
-    *(int16 *)out->row_y = base + py * ROW;
-    *(float16 *)out->share_x = phase_x - convert_float16(px);
-    *(float16 *)out->share_y = phase_y - convert_float16(py);
-    *(float16 *)out->share_width = width - convert_float16(level);
-    *(int16 *)out->wide = width > 0.0f;
-    *(float16 *)out->electrons = vload16(2, block);
-}
-
-/* The taps of node n along x on the vector of the tile that begins at `column`. */
-static float16 line_of(const splat_nodes *b, int n, int column, int taps,
-                       global const float *profiles) {
-    const int16 lanes = (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-    int shift = column - b->left[n];
-    if (shift <= -16 || shift >= taps) {
-        return (float16)0.0f;
-    }
-    int16 tap = shift + lanes;
-    float16 line =
-        profile16(profiles + b->row_x[n] + shift, b->share_x[n], b->share_width[n], b->wide[n]);
-    return select((float16)0.0f, b->electrons[n] * line, (tap >= 0) & (tap < taps));
-}
-
-/* Adds nodes n to n + TEAM - 1. Each row is loaded and stored once for all of them; a pixel still
- * receives them one after the other, and a zero from those that do not reach it. Vectors of the tile
- * are touched where they lie, so that what one team has stored the next can load at once; taps are
- * shifted to meet them. */
-static void splat_team(local float *sum, const splat_nodes *b, int n, int taps, int top, int bottom,
-                       int left, int right, global const float *profiles) {
-    float16 vectors[TEAM][SPAN / 16 + 1];
-    for (int k = 0; k < TEAM; k++) {
-        for (int j = 0; j < SPAN / 16 + 1; j++) {
-            vectors[k][j] = (float16)0.0f;
+    const float px = 1.0f / (float)(1 << PLACE_BITS);
+    int16 x = nodes.x >> PLACE_BITS, y = nodes.y >> PLACE_BITS;
+    float16 within_x = convert_float16(nodes.x & rest) * px;
+    float16 within_y = convert_float16(nodes.y & rest) * px;
+    int taps = 2 * radius + 2, octets = (taps + OCTET - 1) / OCTET * OCTET;
+    for (; b->taps > octets; b->taps -= OCTET) {
+        for (int n = 0; n < BST_BLOCK; n++) {
+            *(loose8 *)(b->x[n] + PAD + b->taps - OCTET) = (float8)0.0f;
+            *(loose8 *)(b->y[n] + PAD + b->taps - OCTET) = (float8)0.0f;
         }
-        float *height = (float *)vectors[k] + (b->top[n + k] - top);
-        for (int j = 0; j < taps; j += 16) {
-            float16 h = profile16(profiles + b->row_y[n + k] + j, b->share_y[n + k],
-                                  b->share_width[n + k], b->wide[n + k]);
-            if (j + 16 <= taps) {
-                *(loose16 *)(height + j) = h;
-            } else { /* only the taps that count */
-                const int16 lanes = (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-                *(loose16 *)(height + j) = select((float16)0.0f, h, lanes < taps - j);
+    }
+    b->taps = octets;
+    make_profiles(within_x, nodes.width, nodes.electrons, radius, law, b->x[0]);
+    make_profiles(within_y, nodes.width, (float16)1.0f, radius, law, b->y[0]);
+    int16 left = x - (radius + tile_x), top = y - (radius + tile_y);
+    int16 left0 = team_min(left), left1 = team_max(left);
+    int16 top0 = team_min(top), top1 = team_max(top);
+    *(int16 *)b->left = left;
+    *(int16 *)b->top = top;
+    *(int16 *)b->left0 = left0;
+    *(int16 *)b->left1 = left1;
+    *(int16 *)b->top0 = top0;
+    *(int16 *)b->top1 = top1;
+    *(int16 *)b->near = (left1 > -taps) & (left0 < TILE_W) & (top1 > -taps) & (top0 < TILE_H) &
+                        (nodes.electrons > 0.0f);
+}
+
+/* Taps of node n along x on the vector of the tile that begins at `column`. */
+INLINE float16 line_of(const splat_nodes *b, int n, int column, int taps) {
+    return *(const loose16 *)(b->x[n] + PAD + clamp(column - b->left[n], -PAD, taps));
+}
+
+/* Adds the nodes n to n + TEAM - 1, within SPREAD rows. Each row is loaded and stored once for all
+ * of them; a pixel still receives them one after the other, and a zero from those that do not reach
+ * it.
+ */
+static void splat_team(local float *sum, const splat_nodes *b, int n, int taps) {
+    const float *h0 = b->y[n] + PAD - b->top[n], *h1 = b->y[n + 1] + PAD - b->top[n + 1];
+    const float *h2 = b->y[n + 2] + PAD - b->top[n + 2], *h3 = b->y[n + 3] + PAD - b->top[n + 3];
+    int first = max(0, b->top0[n]), last = min(b->top1[n] + taps, TILE_H);
+    int end = min(b->left1[n] + taps, TILE_W), column = max(b->left0[n] & ~15, 0);
+    for (; column + 16 < end; column += 32) {
+        float16 l0 = line_of(b, n, column, taps), r0 = line_of(b, n, column + 16, taps);
+        float16 l1 = line_of(b, n + 1, column, taps), r1 = line_of(b, n + 1, column + 16, taps);
+        float16 l2 = line_of(b, n + 2, column, taps), r2 = line_of(b, n + 2, column + 16, taps);
+        float16 l3 = line_of(b, n + 3, column, taps), r3 = line_of(b, n + 3, column + 16, taps);
+        local float16 *target = (local float16 *)(sum + first * STRIDE + column);
+        for (int j = first; j < last; j += RUN) {
+            for (int k = j; k < j + RUN; k++) {
+                float16 f0 = (float16)h0[k], f1 = (float16)h1[k];
+                float16 f2 = (float16)h2[k], f3 = (float16)h3[k];
+                target[0] = fma(f3, l3, fma(f2, l2, fma(f1, l1, fma(f0, l0, target[0]))));
+                target[1] = fma(f3, r3, fma(f2, r2, fma(f1, r1, fma(f0, r0, target[1]))));
+                target += STRIDE / 16;
             }
         }
     }
-    const float *h0 = (const float *)vectors[0], *h1 = (const float *)vectors[1];
-    const float *h2 = (const float *)vectors[2], *h3 = (const float *)vectors[3];
-    int first = max(0, -top), last = min(bottom, TILE_H) - top, end = min(right, TILE_W);
-    for (int column = max(left & ~15, 0); column < end; column += 16) {
-        float16 l0 = line_of(b, n, column, taps, profiles);
-        float16 l1 = line_of(b, n + 1, column, taps, profiles);
-        float16 l2 = line_of(b, n + 2, column, taps, profiles);
-        float16 l3 = line_of(b, n + 3, column, taps, profiles);
-        local float16 *target = (local float16 *)(sum + (top + first) * STRIDE + column);
+    if (column < end) {
+        float16 l0 = line_of(b, n, column, taps), l1 = line_of(b, n + 1, column, taps);
+        float16 l2 = line_of(b, n + 2, column, taps), l3 = line_of(b, n + 3, column, taps);
+        local float16 *target = (local float16 *)(sum + first * STRIDE + column);
+        for (int j = first; j < last; j += RUN) {
+            for (int k = j; k < j + RUN; k++) {
+                float16 v = fma((float16)h1[k], l1, fma((float16)h0[k], l0, *target));
+                *target = fma((float16)h3[k], l3, fma((float16)h2[k], l2, v));
+                target += STRIDE / 16;
+            }
+        }
+    }
+}
+
+/* Adds one node, over its own rows. */
+static void splat_node(local float *sum, const splat_nodes *b, int n, int taps) {
+    const float *h = b->y[n] + PAD - b->top[n];
+    int first = max(0, b->top[n]), last = min(b->top[n] + taps, TILE_H);
+    int end = min(b->left[n] + taps, TILE_W);
+    for (int column = max(b->left[n] & ~15, 0); column < end; column += 16) {
+        float16 line = line_of(b, n, column, taps);
         for (int j = first; j < last; j++) {
-            float16 v = *target;
-            v = fma((float16)h0[j], l0, v);
-            v = fma((float16)h1[j], l1, v);
-            v = fma((float16)h2[j], l2, v);
-            *target = fma((float16)h3[j], l3, v);
-            target += STRIDE / 16;
+            local float16 *target = (local float16 *)(sum + j * STRIDE + column);
+            *target = fma((float16)h[j], line, *target);
         }
     }
 }
 
-static void splat_block(local float *sum, int tile_x, int tile_y, int radius,
-                        global const float *block, global const float *profiles) {
+/* Which of 16 boxes touch the tile: x0[16], y0[16], x1[16], y1[16]. */
+INLINE int16 boxes_hit(global const float *box, int tile_x, int tile_y) {
+    return (vload16(0, box) <= (float)(tile_x + TILE_W - 1)) &
+           (vload16(1, box) <= (float)(tile_y + TILE_H - 1)) & (vload16(2, box) >= (float)tile_x) &
+           (vload16(3, box) >= (float)tile_y);
+}
+
+static void splat_source(local float *sum, int tile_x, int tile_y,
+                         bst_scene_source s, global const float16 *table,
+                         global const float *block_box, global const float *law, splat_nodes *b) {
+    int hits[BST_BLOCK] = {1}, taps = 2 * s.radius + 2;
+    for (int first = 0; first < s.blocks; first += BST_BLOCK) {
+        if (s.blocks > 1) { /* else the source's box is the block's */
+            global const float *box = block_box + (s.first_box * BST_BLOCK + first) * 4;
+            vstore16(boxes_hit(box, tile_x, tile_y), 0, hits);
+        }
+        for (int k = 0; k < min(BST_BLOCK, s.blocks - first); k++) {
+            if (!hits[k]) {
+                continue;
+            }
+            place_nodes(nodes_of(s, first + k, table), tile_x, tile_y, s.radius, law, b);
+            for (int n = 0; n < BST_BLOCK; n += TEAM) {
+                if (b->near[n] && b->top1[n] - b->top0[n] <= SPREAD) {
+                    splat_team(sum, b, n, taps);
+                } else if (b->near[n]) {
+                    for (int m = n; m < n + TEAM; m++) {
+                        splat_node(sum, b, m, taps);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/* sum: [TILE_H + SPARE][STRIDE], the tile's light in electrons. tile_x, tile_y: its first pixel on
+ * the full sensor. */
+static void splat_tile(bst_scene_params p, local float *sum, int tile_x, int tile_y,
+                       global const bst_scene_source *sources, global const float16 *table,
+                       global const float *block_box, global const float *source_box,
+                       global const float *group_box, global const float *law) {
     splat_nodes b;
-    int taps = 2 * radius + 2;
-    place_nodes(block, tile_x, tile_y, radius, &b);
-    for (int n = 0; n < BST_BLOCK && b.electrons[n] > 0.0f; n += TEAM) {
-        int top = b.top[n], bottom = top, left = b.left[n], right = left;
-        for (int k = 1; k < TEAM; k++) {
-            top = min(top, b.top[n + k]);
-            bottom = max(bottom, b.top[n + k]);
-            left = min(left, b.left[n + k]);
-            right = max(right, b.left[n + k]);
-        }
-        if (bottom - top <= SPAN - TAPS) {
-            bottom += taps;
-            right += taps;
-            if (bottom > 0 && top < TILE_H && right > 0 && left < TILE_W) {
-                splat_team(sum, &b, n, taps, top, bottom, left, right, profiles);
-            }
-            continue;
-        }
-        for (int k = 0; k < TEAM; k++) { /* too far apart: one by one, the others dark */
-            splat_nodes one = b;
-            for (int m = 0; m < TEAM; m++) {
-                one.top[n + m] = b.top[n + k];
-                one.left[n + m] = b.left[n + k];
-                one.electrons[n + m] = m == k ? b.electrons[n + k] : 0.0f;
-            }
-            top = b.top[n + k];
-            left = b.left[n + k];
-            if (top + taps > 0 && top < TILE_H && left + taps > 0 && left < TILE_W) {
-                splat_team(sum, &one, n, taps, top, top + taps, left, left + taps, profiles);
-            }
-        }
-    }
-}
-
-static void splat_source(local float *sum, int tile_x, int tile_y, bst_scene_source s,
-                         global const float *nodes, global const float4 *block_box,
-                         global const float *profiles) {
-    float x0 = (float)tile_x, x1 = (float)(tile_x + TILE_W - 1);
-    float y0 = (float)tile_y, y1 = (float)(tile_y + TILE_H - 1);
-    for (int b = s.first_block; b < s.first_block + s.blocks; b++) {
-        float4 box = block_box[b];
-        if (box.x <= x1 && box.z >= x0 && box.y <= y1 && box.w >= y0) {
-            splat_block(sum, tile_x, tile_y, s.radius, nodes + BST_NODE_ROWS * BST_BLOCK * b,
-                        profiles);
-        }
-    }
-}
-
-/* sum: [TILE_H][STRIDE], the tile's light in electrons. tile_x, tile_y: its first pixel on the full
- * sensor. */
-static void splat_tile(local float *sum, int tile_x, int tile_y, int source_groups,
-                       global const bst_scene_source *sources, global const float *nodes,
-                       global const float4 *block_box, global const float *source_box,
-                       global const float *profiles) {
     for (int i = 0; i < TILE_H * STRIDE; i += 16) {
         vstore16((float16)0.0f, 0, sum + i);
     }
-    float x0 = (float)tile_x, x1 = (float)(tile_x + TILE_W - 1);
-    float y0 = (float)tile_y, y1 = (float)(tile_y + TILE_H - 1);
-    for (int g = 0; g < source_groups; g++) {
-        global const float *box = source_box + g * 4 * BST_BLOCK;
-        int16 hit = (vload16(0, box) <= x1) & (vload16(1, box) <= y1) & (vload16(2, box) >= x0) &
-                    (vload16(3, box) >= y0);
-        if (!any16(hit)) {
+    for (int n = 0; n < BST_BLOCK; n++) {
+        for (int i = 0; i < ROW; i += 16) {
+            *(float16 *)(b.x[n] + i) = (float16)0.0f;
+            *(float16 *)(b.y[n] + i) = (float16)0.0f;
+        }
+    }
+    b.taps = 0;
+    for (int first = 0; first < p.source_groups; first += BST_BLOCK) {
+        int groups[BST_BLOCK], hits[BST_BLOCK];
+        int16 near = boxes_hit(group_box + first * 4, tile_x, tile_y);
+        if (!any16(near)) {
             continue;
         }
-        int hits[BST_BLOCK];
-        vstore16(hit, 0, hits);
-        for (int i = 0; i < BST_BLOCK; i++) {
-            if (hits[i]) {
-                splat_source(sum, tile_x, tile_y, sources[g * BST_BLOCK + i], nodes, block_box,
-                             profiles);
+        vstore16(near, 0, groups);
+        for (int g = first; g < min(first + BST_BLOCK, p.source_groups); g++) {
+            if (!groups[g - first]) {
+                continue;
+            }
+            vstore16(boxes_hit(source_box + g * 4 * BST_BLOCK, tile_x, tile_y), 0, hits);
+            for (int i = 0; i < BST_BLOCK; i++) {
+                if (hits[i]) {
+                    splat_source(sum, tile_x, tile_y, sources[g * BST_BLOCK + i], table,
+                                 block_box, law, &b);
+                }
             }
         }
     }

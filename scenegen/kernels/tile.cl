@@ -1,5 +1,5 @@
 /* One tile of the frame per work-item. Options: GROUP (work-items per work-group), FFT_LIGHT (the
- * light is an image, given as `profiles`). */
+ * light is an image, else it comes from nodes; `light` is the image or the profiles' law). */
 
 /* Where a tile lies: its first pixel on the full sensor and in the window, and its size. Tiles
  * start at columns that are multiples of 64, so the first and the last may reach beyond the window.
@@ -56,11 +56,12 @@ INLINE int16 store_dn(bst_scene_params p, detector_maps maps, float16 dn, int16 
 
 /* frame: [window_height][window_width] digital numbers. saturated: pixels per tile. */
 __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
-    bst_scene_params p, global const bst_scene_source *sources, global const float *nodes,
-    global const float4 *block_box, global const float *source_box, global const float *profiles,
-    global ushort *frame, global int *saturated, global const float *gain, global const float *dark,
-    global const float *overlay, global const float *offsets, global const ushort *codes) {
-    local float sums[GROUP][TILE_H * STRIDE] __attribute__((aligned(64)));
+    bst_scene_params p, global const bst_scene_source *sources, global const float16 *table,
+    global const float *block_box, global const float *source_box, global const float *group_box,
+    global const float *light, global ushort *frame, global int *saturated,
+    global const float *gain, global const float *dark, global const float *overlay,
+    global const float *offsets, global const ushort *codes BACKGROUND_ARGUMENT) {
+    local float sums[GROUP][(TILE_H + SPARE) * STRIDE] __attribute__((aligned(64)));
     int tile = (int)get_global_id(0);
     if (tile >= p.tiles_x * p.tiles_y) {
         return;
@@ -68,11 +69,12 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     local float *sum = sums[get_local_id(0)];
     tile_place t = place_tile(p, tile);
 #ifdef FFT_LIGHT
-    load_tile(sum, p, t.left, t.top, profiles);
+    load_tile(sum, p, t.left, t.top, light);
 #else
-    splat_tile(sum, t.x, t.y, p.source_groups, sources, nodes, block_box, source_box, profiles);
+    splat_tile(p, sum, t.x, t.y, sources, table, block_box, source_box, group_box, light);
 #endif
     SHADE_TILE(sum, t.x, t.y);
+    ADD_BACKGROUND(sum, p, t);
     uint steps[MOST_STEPS];
     dark_law unlit = dark_law_of(p, steps);
     detector_maps maps = {gain, dark, overlay, offsets, codes};
@@ -80,15 +82,15 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     int16 full_count = (int16)0;
     for (int y = 0; y < t.rows; y++) {
         uint counter = ((uint)(t.y + y) * chunks_per_row + (uint)t.x / 64u) * 16u;
-        global ushort *row = frame + (size_t)(t.top + y) * p.window_width;
+        global ushort *row = frame + (size_t)(p.first_row + t.top + y) * p.window_width;
         for (int x = 0; x < t.columns; x += 64) {
             local float16 *from = (local float16 *)(sum + y * STRIDE + x);
-            chunk light = {from[0], from[1], from[2], from[3]};
-            int lit =
-                any16((light.a > 0.0f) | (light.b > 0.0f) | (light.c > 0.0f) | (light.d > 0.0f));
+            chunk lights = {from[0], from[1], from[2], from[3]};
+            int lit = any16((lights.a > 0.0f) | (lights.b > 0.0f) | (lights.c > 0.0f) |
+                            (lights.d > 0.0f));
             chunk_flags brim;
             chunk dn =
-                detect_chunk(p, maps, unlit, steps, counter, t.y + y, t.x + x, light, lit, &brim);
+                detect_chunk(p, maps, unlit, steps, counter, t.y + y, t.x + x, lights, lit, &brim);
             int column = t.left + x;
             full_count -= store_dn(p, maps, dn.a, brim.a, column, row);
             full_count -= store_dn(p, maps, dn.b, brim.b, column + 16, row);
@@ -100,15 +102,15 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     int8 a = full_count.lo + full_count.hi;
     int4 b = a.lo + a.hi;
     int2 c = b.lo + b.hi;
-    saturated[tile] = c.lo + c.hi;
+    saturated[p.first_tile + tile] = c.lo + c.hi;
 }
 
 /* image: [window_height][image_stride] expected electrons. */
 __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_expected(
-    bst_scene_params p, global const bst_scene_source *sources, global const float *nodes,
-    global const float4 *block_box, global const float *source_box, global const float *profiles,
-    global float *image) {
-    local float sums[GROUP][TILE_H * STRIDE] __attribute__((aligned(64)));
+    bst_scene_params p, global const bst_scene_source *sources, global const float16 *table,
+    global const float *block_box, global const float *source_box, global const float *group_box,
+    global const float *light, global float *image BACKGROUND_ARGUMENT) {
+    local float sums[GROUP][(TILE_H + SPARE) * STRIDE] __attribute__((aligned(64)));
     int tile = (int)get_global_id(0);
     if (tile >= p.tiles_x * p.tiles_y) {
         return;
@@ -116,13 +118,14 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_expecte
     local float *sum = sums[get_local_id(0)];
     tile_place t = place_tile(p, tile);
 #ifdef FFT_LIGHT
-    load_tile(sum, p, t.left, t.top, profiles);
+    load_tile(sum, p, t.left, t.top, light);
 #else
-    splat_tile(sum, t.x, t.y, p.source_groups, sources, nodes, block_box, source_box, profiles);
+    splat_tile(p, sum, t.x, t.y, sources, table, block_box, source_box, group_box, light);
 #endif
     SHADE_TILE(sum, t.x, t.y);
+    ADD_BACKGROUND(sum, p, t);
     for (int y = 0; y < t.rows; y++) {
-        global float *out = image + (size_t)(t.top + y) * p.image_stride;
+        global float *out = image + (size_t)(p.first_row + t.top + y) * p.image_stride;
         for (int x = max(0, -t.left); x < t.columns; x++) {
             out[t.left + x] = sum[y * STRIDE + x] + p.background_e;
         }

@@ -13,6 +13,7 @@ typedef struct bst_bench_result {
     const char *name;
     double frames_per_s;              /* or calls per second */
     double ms_median, ms_min, cpu_ms; /* per frame (or call) */
+    double latency_ms;                /* median time from asking for a frame until it is there */
     double error_sigma_max, error_sigma_rms, error_peak_max, flux_error_rel, centroid_error_px;
     double predicted_error_sigma; /* the renderer's own */
     int error_sources; /* how many sources the error was measured on, 0: does not apply */
@@ -83,7 +84,9 @@ typedef struct bst_bench_clock {
 void bst_bench_start(bst_bench_clock *clock);
 /* Ends what bst_bench_start began; the time is divided by `calls`. */
 void bst_bench_stop(bst_bench_clock *clock, int calls);
-/* Fills the time members of a result. */
+/* Median of times[count], which it sorts. */
+double bst_bench_median(double *times, int count);
+/* Fills the time members of a result but latency_ms. */
 void bst_bench_summarise(bst_bench_clock *clock, bst_bench_result *out);
 double bst_bench_wall_s(void); /* monotonic */
 

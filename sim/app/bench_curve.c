@@ -52,8 +52,8 @@ static bst_status measure(bst_ctx *ctx, sweep *s, const bst_renderer_options *op
     bst_renderer *renderer;
     *out = bst_bench_nothing(s->name);
     BST_TRY(bst_renderer_create(ctx, s->device, &s->view.camera, options, &renderer));
-    bst_status status =
-        bst_bench_view_time(ctx, renderer, &s->timed, s->view.count > LARGE ? 3 : FRAMES, out);
+    bst_status status = bst_bench_view_time(ctx, renderer, &s->timed,
+                                            s->view.count > LARGE ? 3 : FRAMES, false, out);
     if (status == BST_OK) {
         status = bst_bench_truth_compare(ctx, renderer, &s->truth, faintest_e_per_s, out);
     }
@@ -153,7 +153,7 @@ static bst_status vary_faint_limit(bst_ctx *ctx, sweep *s, bst_curve *curve) {
 
 static bst_status vary_all(bst_ctx *ctx, sweep *s, bst_curve *curve) {
     static const int temporal[] = {15, 51, 151, 501, 1501, 0}, spatial[] = {1, 3, 5, 11, 33, 99, 0},
-                     stamp[] = {1, 2, 3, 4, 5, 6, 0}, phases[] = {2, 4, 8, 16, 32, 64, 0},
+                     stamp[] = {1, 2, 3, 4, 5, 6, 0}, degree[] = {1, 3, 5, 7, 9, 0},
                      taps[] = {4, 6, 8, 0};
     bool large = s->view.count > LARGE; /* its cheap knobs only */
     bool stamps = s->view.scene.q == 0.0;
@@ -168,8 +168,8 @@ static bst_status vary_all(bst_ctx *ctx, sweep *s, bst_curve *curve) {
                          offsetof(bst_renderer_options, spatial_oversample), spatial));
         BST_TRY(vary_int(ctx, s, curve, "stamp_radius_px",
                          offsetof(bst_renderer_options, stamp_radius_px), stamp));
-        BST_TRY(vary_int(ctx, s, curve, "psf_phases", offsetof(bst_renderer_options, psf_phases),
-                         phases));
+        BST_TRY(vary_int(ctx, s, curve, "psf_degree", offsetof(bst_renderer_options, psf_degree),
+                         degree));
     }
     if (!stamps) {
         return vary_int(ctx, s, curve, "fft_taps", offsetof(bst_renderer_options, fft_taps), taps);

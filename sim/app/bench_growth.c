@@ -36,7 +36,7 @@ static bst_status time_scene(bst_ctx *ctx, void *user, void *out) {
         status = bst_renderer_create(ctx, device, &view.camera, &fidelity, &renderer);
     }
     if (status == BST_OK) {
-        status = bst_bench_view_time(ctx, renderer, &view, FRAMES, result);
+        status = bst_bench_view_time(ctx, renderer, &view, FRAMES, false, result);
         result->peak_rss_mib = bst_bench_peak_rss_mib();
     }
     bst_renderer_free(renderer);

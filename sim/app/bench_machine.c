@@ -101,6 +101,7 @@ cJSON *bst_bench_result_json(const bst_bench_result *r, const bst_bench_device *
     bst_json_add_number(node, "ms_median", r->ms_median);
     bst_json_add_number(node, "ms_min", r->ms_min);
     bst_json_add_number(node, "cpu_ms", r->cpu_ms);
+    bst_json_add_number(node, "latency_ms", r->latency_ms);
     bst_json_add_number(node, "error_sigma_max", r->error_sigma_max);
     bst_json_add_number(node, "error_sigma_rms", r->error_sigma_rms);
     bst_json_add_number(node, "error_peak_max", r->error_peak_max);

@@ -18,6 +18,7 @@ bst_bench_result bst_bench_nothing(const char *name) {
                               .ms_median = NAN,
                               .ms_min = NAN,
                               .cpu_ms = NAN,
+                              .latency_ms = NAN,
                               .error_sigma_max = NAN,
                               .error_sigma_rms = NAN,
                               .error_peak_max = NAN,
@@ -59,13 +60,17 @@ static int ascending(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
+double bst_bench_median(double *times, int count) {
+    qsort(times, (size_t)count, sizeof *times, ascending);
+    return 0.5 * (times[(count - 1) / 2] + times[count / 2]);
+}
+
 void bst_bench_summarise(bst_bench_clock *clock, bst_bench_result *out) {
     if (clock->count == 0) {
         return;
     }
-    qsort(clock->ms, (size_t)clock->count, sizeof *clock->ms, ascending);
+    out->ms_median = bst_bench_median(clock->ms, clock->count);
     out->ms_min = clock->ms[0];
-    out->ms_median = 0.5 * (clock->ms[(clock->count - 1) / 2] + clock->ms[clock->count / 2]);
     out->frames_per_s = 1e3 / out->ms_median;
     out->cpu_ms = clock->cpu_total_ms / clock->count;
 }

@@ -19,7 +19,7 @@ static const struct knob {
     {"renderer", "Whose track the stars follow."},
     {"spatial_oversample", "Parts of a pixel to whose centres light is moved."},
     {"stamp_radius_px", "Reach of all stamps beyond the two nearest pixels."},
-    {"psf_phases", "Sub-pixel phases of the PSF's table."},
+    {"psf_degree", "Degree of the polynomials of the PSF's profile."},
     {"fft_taps", "Taps per axis of the spreading on the grid, for a PSF that is no Gaussian."},
     {"faint_limit_mag", "Stars fainter than the brightest by more than this are not drawn."},
 };

@@ -23,7 +23,9 @@ static const bst_bench_scene scenes[] = {
 };
 enum { SCENES = sizeof scenes / sizeof *scenes };
 
-enum { WARM_UP = 3, FRAMES = 40, TONES = 24, SAMPLES_PER_S = 1000 };
+enum { WARM_UP = 3, FRAMES = 40, SMALL_FRAMES = 400, TONES = 24, SAMPLES_PER_S = 1000 };
+/* Frames of up to so many pixels are quick: more of them are timed. */
+enum { SMALL_PX = 512 * 512 };
 
 static const double BRIGHTEST_E_PER_S = 1e6;
 
@@ -188,29 +190,109 @@ void bst_bench_view_set(bst_bench_view *v, int frame) {
                                       .exposure_id = frame};
 }
 
-bst_status bst_bench_view_time(bst_ctx *ctx, bst_renderer *renderer, bst_bench_view *v, int frames,
-                               bst_bench_result *out) {
+/* What differs between the frames of a view, made before the clock runs. */
+typedef struct pose {
+    bst_quat *q;
+    bst_source targets[BST_BENCH_TARGETS];
+    bst_source_path paths[BST_BENCH_TARGETS];
+    bst_render_request request;
+} pose;
+
+static void keep_pose(const bst_bench_view *v, pose *p) {
+    const bst_bench_scene *s = &v->scene;
+    memcpy(p->q, v->q, (size_t)v->track.count * sizeof *p->q);
+    for (int i = 0; i < s->targets; i++) {
+        p->targets[i] = v->sources[s->stars + i];
+        p->paths[i] = v->paths[i];
+        p->targets[i].path = &p->paths[i];
+    }
+    p->request = v->request;
+}
+
+static void take_pose(bst_bench_view *v, const pose *p) {
+    v->track.q_cam_from_gcrf = p->q;
+    if (v->scene.targets > 0) {
+        memcpy(&v->sources[v->scene.stars], p->targets,
+               (size_t)v->scene.targets * sizeof *p->targets);
+    }
+    v->request = p->request;
+}
+
+static bst_status map_and_release(bst_ctx *ctx, bst_frame *frame) {
+    const uint16_t *pixels;
+    bst_status status = bst_frame_map(frame, ctx, &pixels);
+    if (status == BST_OK) {
+        bst_frame_unmap(frame);
+    }
+    bst_frame_release(frame);
+    return status;
+}
+
+/* Times from one mapped frame to the next vary with who is scheduled when: means over so many. */
+enum { TOGETHER = 4 };
+
+static bst_status time_poses(bst_ctx *ctx, bst_renderer *renderer, bst_bench_view *v,
+                             const pose *poses, int count, bool ahead, bst_bench_result *out) {
     bst_bench_clock clock = {.count = 0};
-    for (int f = 0; f < frames + WARM_UP; f++) {
-        bst_bench_view_set(v, f);
-        bst_frame *frame = NULL;
-        const uint16_t *pixels;
-        bst_bench_start(&clock);
-        BST_TRY(bst_renderer_render(ctx, renderer, &v->request, &frame));
-        bst_status status = bst_frame_map(frame, ctx, &pixels);
-        bst_bench_stop(&clock, 1);
-        if (status == BST_OK) {
-            bst_frame_unmap(frame);
+    bst_frame *frames[2] = {NULL, NULL};
+    double asked_s[2], latency_ms[BST_BENCH_TIMES];
+    int together = ahead ? TOGETHER : 1, latencies = 0;
+    bst_status status = BST_OK;
+    for (int f = 0; f < count && status == BST_OK; f++) {
+        int n = ahead ? f - 1 : f; /* the frame that is waited for */
+        take_pose(v, &poses[f]);
+        asked_s[f % 2] = bst_bench_wall_s();
+        status = bst_renderer_render(ctx, renderer, &v->request, &frames[f % 2]);
+        if (n < 0 || status != BST_OK) {
+            continue;
         }
-        bst_frame_release(frame);
-        BST_TRY(status);
-        if (f + 1 == WARM_UP) {
-            clock.count = 0;
-            clock.cpu_total_ms = 0.0;
+        status = map_and_release(ctx, frames[n % 2]);
+        frames[n % 2] = NULL;
+        if (n >= WARM_UP && latencies < BST_BENCH_TIMES) {
+            latency_ms[latencies++] = 1e3 * (bst_bench_wall_s() - asked_s[n % 2]);
+        }
+        if (n >= WARM_UP && (n - WARM_UP + 1) % together == 0) {
+            bst_bench_stop(&clock, together);
+        }
+        if (n + 1 >= WARM_UP && (n - WARM_UP + 1) % together == 0) {
+            bst_bench_start(&clock);
         }
     }
-    bst_bench_summarise(&clock, out);
-    return BST_OK;
+    for (int i = 0; i < 2; i++) {
+        if (frames[i]) {
+            bst_frame_release(frames[i]);
+        }
+    }
+    if (status == BST_OK && latencies > 0) {
+        out->latency_ms = bst_bench_median(latency_ms, latencies);
+        bst_bench_summarise(&clock, out);
+    }
+    return status;
+}
+
+bst_status bst_bench_view_time(bst_ctx *ctx, bst_renderer *renderer, bst_bench_view *v, int frames,
+                               bool ahead, bst_bench_result *out) {
+    int count = frames + WARM_UP + ahead;
+    size_t samples = (size_t)v->track.count;
+    const bst_quat *own = v->track.q_cam_from_gcrf;
+    pose *poses = malloc((size_t)count * sizeof *poses);
+    bst_quat *turns = malloc((size_t)count * samples * sizeof *turns);
+    bst_status status = BST_OK;
+    if (poses && turns) {
+        for (int f = 0; f < count; f++) {
+            bst_bench_view_set(v, f);
+            poses[f].q = turns + (size_t)f * samples;
+            keep_pose(v, &poses[f]);
+        }
+        status = time_poses(ctx, renderer, v, poses, count, ahead, out);
+        v->track.q_cam_from_gcrf = own;
+        bst_bench_view_set(v, count - 1);
+    } else {
+        status = bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the frames of a scene");
+    }
+    free(poses);
+    free(turns);
+    return status;
 }
 
 bst_status bst_bench_scene_run(bst_ctx *ctx, const bst_bench *self,
@@ -232,7 +314,9 @@ bst_status bst_bench_scene_run(bst_ctx *ctx, const bst_bench *self,
         status = bst_renderer_create(ctx, device, &view.camera, &fidelity, &renderer);
     }
     if (status == BST_OK) {
-        status = bst_bench_view_time(ctx, renderer, &view, FRAMES, out);
+        bool small = view.window.width * view.window.height <= SMALL_PX;
+        status =
+            bst_bench_view_time(ctx, renderer, &view, small ? SMALL_FRAMES : FRAMES, true, out);
     }
     if (status == BST_OK) {
         /* before the reference takes its memory */

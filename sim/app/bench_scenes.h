@@ -48,10 +48,12 @@ bst_status bst_bench_view_open(bst_ctx *ctx, const bst_bench_scene *scene,
 void bst_bench_view_close(bst_bench_view *view);
 /* Pointing, jitter, targets and noise of frame n; fills `request`. */
 void bst_bench_view_set(bst_bench_view *view, int frame);
-/* Renders `frames` frames one after the other (after warm-up, with pointing of their own each) and
- * fills the times. */
+/* Renders `frames` frames (after warm-up, each with pointing, targets and noise of its own) and
+ * fills the times. ahead: a frame is asked for before the one before is mapped, so that it is
+ * planned while the device renders that one, and times are from one mapped frame to the next, means
+ * over four of them; else each is mapped before the next is asked for. */
 bst_status bst_bench_view_time(bst_ctx *ctx, bst_renderer *renderer, bst_bench_view *view,
-                               int frames, bst_bench_result *out) BST_MUST_CHECK;
+                               int frames, bool ahead, bst_bench_result *out) BST_MUST_CHECK;
 
 /* The reference image of a choice of a view's sources in its frame, made once for many
  * comparisons. */

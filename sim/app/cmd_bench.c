@@ -50,6 +50,7 @@ static const struct column {
     {"ms median", "%.4g", offsetof(bst_bench_result, ms_median)},
     {"ms min", "%.4g", offsetof(bst_bench_result, ms_min)},
     {"cpu ms", "%.4g", offsetof(bst_bench_result, cpu_ms)},
+    {"latency ms", "%.4g", offsetof(bst_bench_result, latency_ms)},
     {"max err/sig", "%.4f", offsetof(bst_bench_result, error_sigma_max)},
     {"predicted", "%.4f", offsetof(bst_bench_result, predicted_error_sigma)},
     {"rms err/sig", "%.5f", offsetof(bst_bench_result, error_sigma_rms)},
@@ -152,8 +153,12 @@ static void print_help(const bst_option *table) {
         "usage: boresight bench [NAME...] [options]\n\n"
         "Measures speed together with the error of the same configuration against the "
         "double-precision reference\n"
-        "(errors in sigma of the pixel, on an even choice of the sources). Timings of a busy "
-        "machine are noisy:\n"
+        "(errors in sigma of the pixel, on an even choice of the sources). The next frame is "
+        "planned "
+        "while one is\n"
+        "rendered: ms are from one mapped frame to the next, latency from asking for a frame until "
+        "it is mapped.\n"
+        "Timings of a busy machine are noisy: "
         "compare two versions in alternation and look at the minimum.\n\n"
         "  boresight bench worst_case loop_full --json bench.json\n"
         "  boresight bench --curve\n\nbenchmarks (all when none is "

@@ -46,8 +46,8 @@ typedef struct bst_sensor_command {
 
 /* exposure (queue): published at the tick at which the exposure ends. */
 typedef struct bst_exposure {
-    int64_t id; /* 0, 1, 2, ... */
-    int64_t start_tick, end_tick;
+    int64_t id;                   /* 0, 1, 2, ... */
+    int64_t start_tick, end_tick; /* rolling shutter: of the window's middle row */
     bst_window window;
     int binning;
     bool dropped; /* the frame will be lost on its way: rendered truth is kept, no frame is
@@ -129,6 +129,8 @@ typedef struct bst_truth_item {
     uint32_t flags;
     double x_start_px, y_start_px, x_mid_px, y_mid_px, x_end_px, y_end_px;
     double x_mean_px, y_mean_px; /* mean over the exposure: where the light's centroid is */
+    double delay_s; /* rolling shutter: the exposure of the source's own row, whose these places
+                       are, has its middle so much later than the header's ticks; else 0 */
     double ra_rad,
         dec_rad; /* ICRS; star: catalogue place at epoch; object: geometric with light time, mid */
     double v_mag;

@@ -54,9 +54,11 @@ typedef struct bst_module_env {
     struct bst_device *device;             /* NULL unless the descriptor asks for it */
     int observer, sensor;                  /* indices in the world */
     double exposure_s;                     /* the longest of this sensor that the scenario sets: its
-                                              own, or exposure_s of a module that commands it */
-    uint32_t planes;                       /* bit k: the bst_plane k is recorded */
-    double mask_threshold_sigma;           /* least light of a pixel of the segmentation mask */
+                                              own, or exposure_s of a module that commands it; from
+                                              the first to the last row of a rolling shutter */
+    int64_t los_period_ticks, los_offset_ticks; /* when this sensor's los_history is written */
+    uint32_t planes;                            /* bit k: the bst_plane k is recorded */
+    double mask_threshold_sigma; /* least light of a pixel of the segmentation mask */
     void *engine_private;
 } bst_module_env;
 
@@ -77,6 +79,12 @@ typedef struct bst_module_desc {
     void (*destroy)(void *self);
     /* May be NULL. At the end of a run: counts what was still under way; publishes nothing. */
     bst_status (*finish)(void *self, struct bst_step *step);
+    /* May be NULL; of a BST_MODULE_APART one. May be called before a step, on another thread, while
+     * earlier steps or their `ahead` are under way, to do what depends on nothing but that step's
+     * inputs from modules that are not apart. It reads those alone, publishes and counts nothing,
+     * and keeps what it made by bst_step_lane for the step, which does it itself where nothing is
+     * kept: what fails here fails there again. */
+    bst_status (*ahead)(void *self, struct bst_step *step);
 } bst_module_desc;
 
 /* In create: number of items that an output's payload shall hold. `port` indexes desc->ports. */
@@ -104,6 +112,10 @@ typedef struct bst_sample {
 bst_ctx *bst_step_ctx(struct bst_step *step);
 int64_t bst_step_tick(const struct bst_step *step);
 double bst_step_seconds(const struct bst_step *step); /* tick / rate, since the scenario's epoch */
+/* Steps of an instance whose `ahead` may have been called take turns in BST_STEP_LANES lanes, 0 the
+ * first: no two with one lane are under way. 0 for all others. */
+enum { BST_STEP_LANES = 2 };
+int bst_step_lane(const struct bst_step *step);
 /* The newest visible message of an input. Queue messages stay unread. */
 bst_sample bst_step_latest(struct bst_step *step, int port);
 /* The next unread visible message of a queue input; payload NULL when there is none. */

@@ -32,12 +32,18 @@ double bst_step_seconds(const struct bst_step *step) {
     return (double)step->tick / (double)step->engine->tick_rate_hz;
 }
 
+int bst_step_lane(const struct bst_step *step) {
+    return step->job ? bst_overlap_lane(step->job) : 0;
+}
+
 bst_sample bst_engine_sample(struct bst_step *step, const port_state *port, const void *payload,
                              int64_t written_tick, int64_t sequence) {
     bst_sample sample = {payload, written_tick, sequence, false};
     if (port->max_age_ticks > 0 && step->tick - written_tick > port->max_age_ticks) {
         sample.stale = true;
-        bst_engine_count(step->engine, "stale_input");
+        if (!step->ahead) {
+            bst_engine_count(step->engine, "stale_input");
+        }
     }
     return sample;
 }

@@ -133,6 +133,8 @@ bst_status bst_engine_load(bst_ctx *ctx, bst_engine *engine) {
                               .observer = spec->observer,
                               .sensor = spec->sensor,
                               .exposure_s = spec->exposure_s,
+                              .los_period_ticks = spec->los_period_ticks,
+                              .los_offset_ticks = spec->los_offset_ticks,
                               .planes = spec->planes,
                               .mask_threshold_sigma = spec->mask_threshold_sigma,
                               .engine_private = self};
@@ -166,7 +168,7 @@ static bst_status step_instance(bst_ctx *ctx, bst_engine *engine, int index, int
         port_state *port = &self->ports[self->triggers[t]];
         (void)bst_engine_pass_trigger(&engine->channels[port->channel], port, tick);
     }
-    struct bst_step step = {engine, self, ctx, tick, 0, BST_OK, NULL};
+    struct bst_step step = {.engine = engine, .self = self, .ctx = ctx, .tick = tick};
     self->steps++;
     bst_status status = self->spec.desc->step(self->self, &step);
     if (status != BST_OK) {
@@ -213,7 +215,8 @@ static bst_status finish_instances(bst_ctx *ctx, bst_engine *engine) {
     for (int i = 0; i < engine->instance_count; i++) {
         instance *self = engine->instances[i];
         if (self->spec.desc->finish) {
-            struct bst_step step = {engine, self, ctx, engine->tick, 0, BST_OK, NULL};
+            struct bst_step step = {
+                .engine = engine, .self = self, .ctx = ctx, .tick = engine->tick};
             bst_status status = self->spec.desc->finish(self->self, &step);
             if (status != BST_OK) {
                 return bst_fail_prefix(ctx, status, "%s", self->name);

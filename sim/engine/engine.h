@@ -30,7 +30,8 @@ typedef struct bst_instance_spec {
     struct bst_device *device;
     int observer, sensor;
     double exposure_s; /* the longest of the sensor that the scenario sets */
-    uint32_t planes;   /* bit k: the bst_plane k is recorded */
+    int64_t los_period_ticks, los_offset_ticks; /* of its gimbal; 0: there is none with a period */
+    uint32_t planes;                            /* bit k: the bst_plane k is recorded */
     double mask_threshold_sigma;
     uint64_t seed, run;
 } bst_instance_spec;

@@ -60,7 +60,8 @@ typedef struct instance {
     int trigger_count;
     int64_t next_period, wake; /* INT64_MAX: none */
     int64_t steps;
-    double own_rate_hz; /* set by bst_env_set_rate */
+    int64_t jobs, jobs_done; /* put aside and made behind the stepping thread */
+    double own_rate_hz;      /* set by bst_env_set_rate */
     double rate_hz;
 } instance;
 
@@ -106,6 +107,7 @@ struct bst_step {
     unsigned writing; /* bit of each port whose payload was handed out and not yet published */
     bst_status hook_status; /* first failure of a hook during this step */
     bst_overlap_job *job;   /* inputs of a step behind the stepping thread, else NULL */
+    bool ahead;             /* of that step, and none itself */
 };
 
 /* wiring.c */
@@ -132,9 +134,10 @@ bst_status bst_engine_make_schedule(bst_ctx *ctx, bst_engine *engine) BST_MUST_C
 int64_t bst_engine_earliest(const bst_engine *engine, const instance *self);
 void bst_engine_set_due(bst_engine *engine, int instance, int64_t due);
 
-/* overlap.c: finds the instances that are apart and puts them last; before channels are allocated
+/* apart.c: finds the instances that are apart and puts them last; before channels are allocated
  */
 void bst_engine_set_apart(bst_engine *engine);
+/* overlap.c */
 bst_status bst_overlap_start(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
 void bst_overlap_stop(bst_engine *engine);
 /* The following are called by the stepping thread; they fail with what failed behind it. */
@@ -151,6 +154,7 @@ bst_status bst_overlap_drain(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
 /* In a step behind: reads from what was put aside. */
 bst_sample bst_overlap_latest(struct bst_step *step, int port);
 bst_sample bst_overlap_next(struct bst_step *step, int port);
+int bst_overlap_lane(const bst_overlap_job *job);
 
 /* The slot of a message among the last `depth`, or of the next one (sequence == written). */
 static inline slot *bst_engine_slot(const channel *ch, int64_t sequence) {

@@ -23,7 +23,17 @@ typedef struct exposure_clock {
     int64_t start_tick; /* of the running or the next exposure */
     int64_t next_start_tick;
     bool open;
+    /* rolling shutter: an exposure opens lead_ticks before start_tick, which is that of its middle
+     * row, and is told when its last row's is over and the line of sight is known until then */
+    double row_time_s;
+    int64_t lead_ticks, los_period_ticks, los_offset_ticks;
 } exposure_clock;
+
+/* From one exposure's start to the next one's. */
+static int64_t cycle_of(const exposure_clock *clock) {
+    int64_t busy = clock->exposure_ticks + 2 * clock->lead_ticks;
+    return busy > clock->period_ticks ? busy : clock->period_ticks;
+}
 
 /* Every exposure and period of a file is whole ticks. */
 static bst_status check_updates(const bst_module_env *env, const bst_frame_updates *updates) {
@@ -40,6 +50,35 @@ static bst_status check_updates(const bst_module_env *env, const bst_frame_updat
         if (status != BST_OK) {
             return bst_fail_prefix(env->ctx, status, "%s: /frames/%d (frame %lld)/%s",
                                    bst_frame_updates_name(updates), i, (long long)u->frame, key);
+        }
+    }
+    return BST_OK;
+}
+
+/* A rolling shutter opens before the exposure's ticks, and closes after them. */
+static bst_status check_rows(const bst_module_env *env, const exposure_clock *clock) {
+    double rate = (double)env->tick_rate_hz, lead_s = (double)clock->lead_ticks / rate;
+    if (clock->start_tick < clock->lead_ticks) {
+        return bst_fail(env->ctx, BST_ERR_CONFIG,
+                        "first_s: with the detector's row_time_s the first row is exposed %.9g s "
+                        "before the middle one, whose times are the exposure's: give %.9g or more "
+                        "(found %.9g)",
+                        lead_s, lead_s, (double)clock->start_tick / rate);
+    }
+    bst_frame_cursor c = clock->updates;
+    if (!c.updates || bst_frame_updates_count(c.updates) == 0) {
+        return BST_OK;
+    }
+    const bst_frame_update *last =
+        bst_frame_updates_item(c.updates, bst_frame_updates_count(c.updates) - 1);
+    for (; c.frame <= last->frame; bst_frame_cursor_next(&c)) {
+        if (c.exposure_ticks + 2 * clock->lead_ticks > c.period_ticks) {
+            return bst_fail(env->ctx, BST_ERR_CONFIG,
+                            "%s: frame %lld: a period_s of %.9g is too short (allowed: at least "
+                            "%.9g, from the start of the first row to the end of the last one with "
+                            "the detector's row_time_s)",
+                            bst_frame_updates_name(c.updates), (long long)c.frame, c.period_s,
+                            c.exposure_s + 2.0 * lead_s);
         }
     }
     return BST_OK;
@@ -71,21 +110,38 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
         bst_world_frame_updates(env->world, env->observer, env->sensor);
     if (status == BST_OK && updates) {
         status = check_updates(env, updates);
+        clock->updates = bst_frame_cursor_begin(updates, camera, c, (double)env->tick_rate_hz);
+    }
+    if (status == BST_OK && camera->detector.row_time_s != 0.0) {
+        clock->row_time_s = camera->detector.row_time_s;
+        clock->lead_ticks = bst_detector_lead_ticks(&camera->detector, (int)camera->height_px,
+                                                    (double)env->tick_rate_hz);
+        clock->los_period_ticks = env->los_period_ticks;
+        clock->los_offset_ticks = env->los_offset_ticks;
+        status = check_rows(env, clock);
     }
     if (status != BST_OK) {
         free(clock);
         return status;
     }
-    int64_t cycle =
-        clock->exposure_ticks > clock->period_ticks ? clock->exposure_ticks : clock->period_ticks;
-    double cycle_s = (double)cycle / (double)env->tick_rate_hz, longest_s;
+    double cycle_s = (double)cycle_of(clock) / (double)env->tick_rate_hz, longest_s;
     if (updates) {
-        clock->updates = bst_frame_cursor_begin(updates, camera, c, (double)env->tick_rate_hz);
         bst_frame_updates_limits(updates, camera, c, &longest_s, &cycle_s);
     }
     bst_env_set_rate(env, 1.0 / cycle_s);
     *self = clock;
     return BST_OK;
+}
+
+/* Tick at which all of the open exposure is over and known. */
+static int64_t told_tick(const exposure_clock *clock) {
+    int64_t tick = clock->start_tick + clock->exposure_ticks;
+    if (clock->row_time_s != 0.0) {
+        tick += clock->lead_ticks;
+        int64_t period = clock->los_period_ticks, past = tick - clock->los_offset_ticks;
+        tick += period > 0 && past % period > 0 ? period - past % period : 0;
+    }
+    return tick;
 }
 
 /* Whole ticks of a commanded time; no exposure or period is longer than a day. */
@@ -130,9 +186,7 @@ static void open_exposure(exposure_clock *clock, bst_sample command) {
     } else if (command.payload && !command.stale) {
         latch(clock, command.payload);
     }
-    int64_t cycle =
-        clock->exposure_ticks > clock->period_ticks ? clock->exposure_ticks : clock->period_ticks;
-    clock->next_start_tick = clock->start_tick + cycle;
+    clock->next_start_tick = clock->start_tick + cycle_of(clock);
     clock->open = true;
 }
 
@@ -159,12 +213,12 @@ static bst_status step(void *self, struct bst_step *step) {
     int64_t tick = bst_step_tick(step);
     /* in one tick an exposure may end and the next one begin, and end too when it has no length */
     for (;;) {
-        if (!clock->open && clock->start_tick <= tick) {
+        int64_t open_tick = clock->start_tick - clock->lead_ticks;
+        if (!clock->open && open_tick <= tick) {
             open_exposure(clock, bst_step_latest(step, PORT_COMMAND));
         }
-        int64_t end_tick = clock->start_tick + clock->exposure_ticks;
-        if (!clock->open || end_tick > tick) {
-            bst_step_wake_at(step, clock->open ? end_tick : clock->start_tick);
+        if (!clock->open || told_tick(clock) > tick) {
+            bst_step_wake_at(step, clock->open ? told_tick(clock) : open_tick);
             return BST_OK;
         }
         close_exposure(clock, bst_step_write(step, PORT_EXPOSURE, NULL));

@@ -1,6 +1,7 @@
 /* What one thread does behind the stepping one: hooks, and steps of instances that nothing else
  * waits for. The stepping thread puts copies of what is needed into a ring of bytes; the other
- * takes them out in the same order, so that everything happens in the order of a run without it. */
+ * takes them out in the same order, so that everything happens in the order of a run without it. A
+ * third one looks ahead of it, at steps whose modules can do part of them out of turn. */
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,6 +13,9 @@ enum { ALIGN = 16, MOST_FRAMES = BST_OVERLAP_FRAMES, KIND_BYTES = 48, NAME_BYTES
 
 typedef enum record_kind { SKIP, MESSAGE, EVENT, JOB } record_kind;
 
+/* What the module's `ahead` has done for a job. */
+typedef enum look { UNSEEN, LOOKING, SEEN } look;
+
 /* What lies in the ring, its content behind it. */
 typedef struct record {
     size_t bytes; /* with the content */
@@ -19,7 +23,11 @@ typedef struct record {
     bool heavy; /* holds a frame */
     int64_t tick;
     const channel *ch; /* MESSAGE */
-    const char *scope; /* JOB; borrowed from an instance */
+    /* JOB */
+    const char *scope; /* borrowed from an instance */
+    int ahead;         /* instance that may look ahead, -1: none */
+    int64_t number;    /* of that instance's jobs */
+    look looked;
 } record;
 
 /* An input of a job, the payload behind it. */
@@ -33,6 +41,7 @@ typedef struct job_input {
 struct bst_overlap_job {
     char *inputs;
     size_t bytes;
+    int lane;
 };
 
 typedef struct event_text {
@@ -41,11 +50,14 @@ typedef struct event_text {
 
 struct bst_overlap {
     bst_engine *engine;
-    pthread_t thread;
-    pthread_mutex_t lock; /* over what follows */
+    pthread_t thread, looker;
+    bool looks;           /* there is a looker */
+    pthread_mutex_t lock; /* over what follows, and the records' looked */
     pthread_cond_t changed;
     size_t head, tail, used; /* of the ring: next byte to fill, to read; bytes in use */
     int records, heavy;
+    record *waiting[MOST_FRAMES]; /* jobs that are not begun, in order */
+    int waiting_count;
     bool stop;
     bst_status status; /* the first failure; ctx has its message */
     bst_ctx ctx;       /* of the thread */
@@ -61,85 +73,6 @@ enum {
     RECORD_BYTES = (sizeof(record) + ALIGN - 1) / ALIGN * ALIGN,
     INPUT_BYTES = (sizeof(job_input) + ALIGN - 1) / ALIGN * ALIGN
 };
-
-/* ---- which instances are apart ---- */
-
-static bool may_be_apart(const bst_engine *engine, const instance *self) {
-    if (!(self->spec.desc->flags & BST_MODULE_APART) || self->spec.period_ticks > 0 ||
-        self->trigger_count == 0) {
-        return false;
-    }
-    for (int p = 0; p < self->spec.desc->port_count; p++) {
-        const bst_port *port = &self->spec.desc->ports[p];
-        const port_state *state = &self->ports[p];
-        if (state->channel < 0) {
-            continue;
-        }
-        const channel *ch = &engine->channels[state->channel];
-        const instance *writer = engine->instances[ch->writer];
-        bool trigger = port->flags & BST_PORT_TRIGGER;
-        if (port->direction == BST_PORT_MODIFY ||
-            (port->direction == BST_PORT_OUT && ch->type->release)) {
-            return false;
-        }
-        /* behind, a trigger of their own is looked at only in the tick of what set it off */
-        if (port->direction == BST_PORT_IN &&
-            (writer->apart ? trigger && state->delay_ticks > 0
-                           : ch->type->kind == BST_CHANNEL_QUEUE && !trigger)) {
-            return false;
-        }
-    }
-    return true;
-}
-
-/* Whether an instance that is not apart reads what this one writes. */
-static bool awaited(const bst_engine *engine, int index) {
-    for (int i = 0; i < engine->instance_count; i++) {
-        const instance *other = engine->instances[i];
-        for (int p = 0; !other->apart && p < other->spec.desc->port_count; p++) {
-            int c = other->ports[p].channel;
-            if (c >= 0 && engine->channels[c].writer == index) {
-                return true;
-            }
-        }
-    }
-    return false;
-}
-
-static void put_last(bst_engine *engine) {
-    for (int i = 1; i < engine->instance_count; i++) {
-        for (int k = i; k > 0 && engine->instances[k - 1]->apart && !engine->instances[k]->apart;
-             k--) {
-            instance *swap = engine->instances[k];
-            engine->instances[k] = engine->instances[k - 1];
-            engine->instances[k - 1] = swap;
-            for (int c = 0; c < engine->channel_count; c++) {
-                int *writer = &engine->channels[c].writer;
-                *writer = *writer == k ? k - 1 : *writer == k - 1 ? k : *writer;
-            }
-        }
-    }
-}
-
-void bst_engine_set_apart(bst_engine *engine) {
-    for (int i = 0; i < engine->instance_count; i++) {
-        engine->instances[i]->apart = engine->instances[i]->spec.desc->flags & BST_MODULE_APART;
-    }
-    for (bool changed = true; changed;) {
-        changed = false;
-        for (int i = 0; i < engine->instance_count; i++) {
-            instance *self = engine->instances[i];
-            if (self->apart && (!may_be_apart(engine, self) || awaited(engine, i))) {
-                self->apart = false;
-                changed = true;
-            }
-        }
-    }
-    put_last(engine);
-    for (int c = 0; c < engine->channel_count; c++) {
-        engine->channels[c].apart = engine->instances[engine->channels[c].writer]->apart;
-    }
-}
 
 /* ---- the ring ---- */
 
@@ -188,12 +121,15 @@ static bst_status reserve(bst_ctx *ctx, bst_overlap *o, size_t content, bool hea
     return BST_OK;
 }
 
-static void commit(bst_overlap *o, const record *r) {
+static void commit(bst_overlap *o, record *r) {
     pthread_mutex_lock(&o->lock);
     o->head += r->bytes;
     o->used += r->bytes;
     o->heavy += r->heavy;
     o->records++;
+    if (r->kind == JOB) {
+        o->waiting[o->waiting_count++] = r;
+    }
     pthread_cond_broadcast(&o->changed);
     pthread_mutex_unlock(&o->lock);
 }
@@ -294,6 +230,20 @@ static size_t put_aside(bst_engine *engine, int index, int64_t tick, char *to) {
     return due ? bytes + add_input(to ? to + bytes : NULL, index, -1, NULL, 0) : bytes;
 }
 
+static bst_overlap_job job_of(record *r) {
+    int lane = r->ahead >= 0 ? (int)(r->number % BST_STEP_LANES) : 0;
+    return (bst_overlap_job){content_of(r), r->bytes - RECORD_BYTES, lane};
+}
+
+int bst_overlap_lane(const bst_overlap_job *job) {
+    return job->lane;
+}
+
+static job_input *next_input(const bst_overlap_job *job, const job_input *input) {
+    size_t at = input ? (size_t)((const char *)input - job->inputs) + input->bytes : 0;
+    return at < job->bytes ? (job_input *)(void *)&job->inputs[at] : NULL;
+}
+
 bst_status bst_overlap_step(bst_ctx *ctx, bst_engine *engine, int index, int64_t tick) {
     const char *scope = engine->instances[index]->scope;
     size_t bytes = 0, filled = 0;
@@ -314,13 +264,17 @@ bst_status bst_overlap_step(bst_ctx *ctx, bst_engine *engine, int index, int64_t
             bst_engine_set_due(engine, i, bst_engine_earliest(engine, engine->instances[i]));
         }
     }
+    bst_overlap_job job = job_of(r);
+    r->ahead = -1;
+    for (const job_input *i = next_input(&job, NULL); i && r->ahead < 0; i = next_input(&job, i)) {
+        instance *self = engine->instances[i->instance];
+        if (i->port < 0 && self->spec.desc->ahead) {
+            r->ahead = i->instance;
+            r->number = self->jobs++;
+        }
+    }
     commit(engine->overlap, r);
     return BST_OK;
-}
-
-static job_input *next_input(const bst_overlap_job *job, const job_input *input) {
-    size_t at = input ? (size_t)((const char *)input - job->inputs) + input->bytes : 0;
-    return at < job->bytes ? (job_input *)(void *)&job->inputs[at] : NULL;
 }
 
 static bst_sample give(struct bst_step *step, job_input *input, int port) {
@@ -376,7 +330,8 @@ static bst_status run_job(bst_overlap *o, const record *r, bst_overlap_job *job)
             !is_due(engine, i, r->tick, job)) {
             continue;
         }
-        struct bst_step step = {engine, self, &o->ctx, r->tick, 0, BST_OK, job};
+        struct bst_step step = {
+            .engine = engine, .self = self, .ctx = &o->ctx, .tick = r->tick, .job = job};
         self->steps++;
         bst_status status = self->spec.desc->step(self->self, &step);
         if (status != BST_OK) {
@@ -413,7 +368,7 @@ static bst_status work_off(bst_overlap *o, record *r) {
                                  hooks->event(hooks->user, r->tick, e->instance, e->kind, e->text));
         }
     } else {
-        bst_overlap_job job = {content_of(r), r->bytes - RECORD_BYTES};
+        bst_overlap_job job = job_of(r);
         if (status == BST_OK) {
             status = run_job(o, r, &job);
         }
@@ -425,6 +380,74 @@ static bst_status work_off(bst_overlap *o, record *r) {
         }
     }
     return status;
+}
+
+/* ---- ahead ---- */
+
+/* The first job that may be looked at: in its lane nothing else is under way. */
+static record *next_ahead(const bst_overlap *o) {
+    for (int i = 0; i < o->waiting_count && o->status == BST_OK; i++) {
+        record *r = o->waiting[i];
+        if (r->ahead >= 0 && r->looked == UNSEEN &&
+            r->number < o->engine->instances[r->ahead]->jobs_done + BST_STEP_LANES) {
+            return r;
+        }
+    }
+    return NULL;
+}
+
+/* Called, and returns, with the lock held. */
+static void look_at(bst_overlap *o, record *r) {
+    r->looked = LOOKING;
+    pthread_mutex_unlock(&o->lock);
+    instance *self = o->engine->instances[r->ahead];
+    bst_overlap_job job = job_of(r);
+    bst_ctx ctx;
+    bst_ctx_init(&ctx, NULL, NULL, BST_LOG_ERROR);
+    struct bst_step step = {.engine = o->engine,
+                            .self = self,
+                            .ctx = &ctx,
+                            .tick = r->tick,
+                            .job = &job,
+                            .ahead = true};
+    (void)self->spec.desc->ahead(self->self, &step); /* the step will tell what fails */
+    for (job_input *i = next_input(&job, NULL); i; i = next_input(&job, i)) {
+        i->taken = false;
+    }
+    pthread_mutex_lock(&o->lock);
+    r->looked = SEEN;
+    pthread_cond_broadcast(&o->changed);
+}
+
+static void *look_ahead(void *user) {
+    bst_overlap *o = user;
+    pthread_mutex_lock(&o->lock);
+    while (!o->stop) {
+        record *r = next_ahead(o);
+        if (r) {
+            look_at(o, r);
+        } else {
+            pthread_cond_wait(&o->changed, &o->lock);
+        }
+    }
+    pthread_mutex_unlock(&o->lock);
+    return NULL;
+}
+
+/* Takes the first job for its step: nobody looks at it from here on. While somebody does, there may
+ * be another to be looked at. */
+static void begin_job(bst_overlap *o, record *r) {
+    o->waiting_count--;
+    memmove(o->waiting, o->waiting + 1, (size_t)o->waiting_count * sizeof o->waiting[0]);
+    while (r->looked == LOOKING) {
+        record *other = next_ahead(o);
+        if (other) {
+            look_at(o, other);
+        } else {
+            pthread_cond_wait(&o->changed, &o->lock);
+        }
+    }
+    r->looked = SEEN;
 }
 
 static void *work(void *user) {
@@ -443,10 +466,16 @@ static void *work(void *user) {
             o->tail = 0;
             r = (record *)(void *)o->ring;
         }
+        if (r->kind == JOB) {
+            begin_job(o, r);
+        }
         pthread_mutex_unlock(&o->lock);
         bst_status status = work_off(o, r);
         pthread_mutex_lock(&o->lock);
         o->status = status;
+        if (r->kind == JOB && r->ahead >= 0) {
+            o->engine->instances[r->ahead]->jobs_done++;
+        }
         o->tail += r->bytes;
         o->used -= r->bytes;
         o->heavy -= r->heavy;
@@ -469,6 +498,14 @@ bst_status bst_overlap_drain(bst_ctx *ctx, bst_engine *engine) {
         o->status == BST_OK ? BST_OK : bst_fail(ctx, o->status, "%s", o->ctx.message);
     pthread_mutex_unlock(&o->lock);
     return status;
+}
+
+static bool has_ahead(const bst_engine *engine) {
+    bool any = false;
+    for (int i = 0; i < engine->instance_count; i++) {
+        any |= engine->instances[i]->apart && engine->instances[i]->spec.desc->ahead;
+    }
+    return any;
 }
 
 bst_status bst_overlap_start(bst_ctx *ctx, bst_engine *engine) {
@@ -499,6 +536,8 @@ bst_status bst_overlap_start(bst_ctx *ctx, bst_engine *engine) {
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
     int error = pthread_create(&o->thread, NULL, work, o);
+    /* without it all is done by the other */
+    o->looks = !error && has_ahead(engine) && pthread_create(&o->looker, NULL, look_ahead, o) == 0;
     pthread_sigmask(SIG_SETMASK, &before, NULL);
     if (error) {
         pthread_cond_destroy(&o->changed);
@@ -520,6 +559,9 @@ void bst_overlap_stop(bst_engine *engine) {
     pthread_cond_broadcast(&o->changed);
     pthread_mutex_unlock(&o->lock);
     pthread_join(o->thread, NULL);
+    if (o->looks) {
+        pthread_join(o->looker, NULL);
+    }
     pthread_cond_destroy(&o->changed);
     pthread_mutex_destroy(&o->lock);
     free(o);

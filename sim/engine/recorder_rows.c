@@ -206,7 +206,7 @@ bst_status bst_recorder_truth_rows(bst_ctx *ctx, bst_recorder *recorder, int sen
         row r = {.count = 0};
         put_int(&r, sensor);
         put_int(&r, t->exposure_id);
-        put_real(&r, mid_s);
+        put_real(&r, mid_s + item->delay_s);
         put_int(&r, i + 1);
         put_text(&r, star ? "star" : "object");
         put_int(&r, item->id);

@@ -90,7 +90,8 @@ static const bst_column exposure_columns[] = {
 static const bst_column truth_columns[] = {
     SENSOR,
     EXPOSURE,
-    MID,
+    REAL("mid_s", "s",
+         "middle of the exposure, with a rolling shutter of the source's own row, since the epoch"),
     INT("item", "",
         "number of the source in its exposure, from 1: its pixels in segmentation.fits"),
     TEXT("kind", "star or object"),

@@ -67,7 +67,24 @@ static double longest_exposure_s(const bst_scenario *scenario, int observer, int
             }
         }
     }
-    return longest;
+    return longest + 2.0 * bst_detector_lead_s(&sensors[sensor].camera.detector,
+                                               (int)sensors[sensor].camera.height_px);
+}
+
+/* When the sensor's line of sight is written. */
+static void los_ticks(const bst_scenario *scenario, bst_instance_spec *spec) {
+    for (int m = 0; m < scenario->module_count; m++) {
+        const bst_module_config *module = &scenario->modules[m];
+        for (int p = 0; p < module->desc->port_count; p++) {
+            const bst_port *port = &module->desc->ports[p];
+            if (module->observer == spec->observer && module->sensor == spec->sensor &&
+                port->direction == BST_PORT_OUT &&
+                strcmp(port->channel, BST_CHANNEL_LOS_HISTORY) == 0) {
+                spec->los_period_ticks = module->period_ticks;
+                spec->los_offset_ticks = module->offset_ticks;
+            }
+        }
+    }
 }
 
 /* The part of a spec that does not depend on the module. */
@@ -102,6 +119,7 @@ static bst_status add_modules(bst_ctx *ctx, const bst_scenario *scenario, bst_si
             snprintf(name, sizeof name, "%s/exposure", scope);
             spec.instance = name;
             spec.desc = &bst_exposure_clock_module;
+            los_ticks(scenario, &spec);
             spec.config = &sensors[s].exposure;
             BST_TRY(bst_engine_add(ctx, sim->engine, &spec));
             for (int m = 0; m < scenario->module_count; m++) {

@@ -1,11 +1,11 @@
 #include "sim/io/picture.h"
 
+#include <png.h>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <new>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
 #include <vector>
@@ -260,11 +260,19 @@ extern "C" bst_status bst_picture_save(bst_ctx *ctx, const bst_picture *picture,
         cv::Mat final_size;
         cv::resize(picture->image, final_size, cv::Size(), 1.0 / kOver, 1.0 / kOver,
                    cv::INTER_AREA);
-        std::vector<uchar> bytes;
-        if (!cv::imencode(".png", final_size, bytes)) {
-            return bst_fail(ctx, BST_ERR_IO, "%s: OpenCV cannot make a PNG", path);
+        png_image png = {};
+        png.version = PNG_IMAGE_VERSION;
+        png.width = static_cast<png_uint_32>(final_size.cols);
+        png.height = static_cast<png_uint_32>(final_size.rows);
+        png.format = PNG_FORMAT_BGR;
+        png.flags = PNG_IMAGE_FLAG_FAST;
+        png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(png);
+        std::vector<uchar> bytes(size);
+        if (!png_image_write_to_memory(&png, bytes.data(), &size, 0, final_size.data,
+                                       static_cast<png_int_32>(final_size.step[0]), nullptr)) {
+            return bst_fail(ctx, BST_ERR_IO, "%s: no PNG can be made: %s", path, png.message);
         }
-        return bst_write_file_atomic(ctx, path, bytes.data(), bytes.size());
+        return bst_write_file_atomic(ctx, path, bytes.data(), size);
     } catch (const std::exception &e) {
         return bst_fail(ctx, BST_ERR_MEMORY, "%s: %s", path, e.what());
     } catch (...) {

@@ -1,4 +1,4 @@
-/* Drawing on 8-bit RGB pictures, and PNG. A shim over OpenCV's core, imgproc and imgcodecs. */
+/* Drawing on 8-bit RGB pictures, and PNG: a shim over OpenCV's core and imgproc, and libpng. */
 #ifndef BST_IO_PICTURE_H
 #define BST_IO_PICTURE_H
 

@@ -54,6 +54,8 @@ const bst_config_desc bst_camera_config[] = {
                "Effects of the detector beyond the numbers above; all are off by default."),
     BST_OBJECT(bst_camera, band, bst_band_config_table, "{}",
                "What wavelengths the camera sees, and the warmth of its optics."),
+    BST_OBJECT(bst_camera, background, bst_background_config_table, "{}",
+               "Light between the sources: sky, bright bodies, stray light, gradients."),
     BST_CONFIG_END,
 };
 

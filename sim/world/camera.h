@@ -8,6 +8,7 @@
 
 #include "sim/core/config.h"
 #include "sim/core/vec.h"
+#include "sim/world/background_config.h"
 #include "sim/world/band.h"
 #include "sim/world/detector_config.h"
 #include "sim/world/psf_config.h"
@@ -58,6 +59,8 @@ typedef struct bst_camera {
     bst_band_config band;
     const bst_band *spectrum; /* made from `band` and kept by the world; NULL: the V band of
                                  photon_flux_v0_per_s_m2, the same for all colours */
+    bst_background_config background;
+    const struct bst_pst *pst; /* made from `background` and kept by the world; NULL: none */
     bst_camera_geometry
         geometry; /* by bst_camera_prepare; all zero: neither turned nor distorted */
 } bst_camera;

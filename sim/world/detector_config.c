@@ -81,6 +81,11 @@ const bst_config_desc bst_detector_table[] = {
              "Charge above the full well is lost (clip) or flows along its column (bloom)."),
     BST_REAL(bst_detector_config, frame_transfer_s, "s", 0, 100, "0",
              "Time of the transfer of a whole frame under light; 0: none."),
+    BST_REAL(
+        bst_detector_config, row_time_s, "s", -1, 1, "0",
+        "Rolling shutter: each row of the window is exposed so much later than the row before; "
+        "below 0: from the last row on. The exposure's times are those of the window's middle "
+        "row. 0: all rows at once."),
     BST_OBJECT(bst_detector_config, hits, hits_table, "{}", "Radiation hits."),
     BST_OBJECT(bst_detector_config, quantisation, quantisation_table, "{}",
                "From the converter's digital numbers to the frame's."),
@@ -92,4 +97,17 @@ double bst_detector_dark_factor(const bst_detector_config *d) {
         return 1.0;
     }
     return exp2((d->temperature_c - d->reference_temperature_c) / d->dark_doubling_k);
+}
+
+bool bst_detector_config_whole_columns(const bst_detector_config *d) {
+    return d->full_well == BST_WELL_BLOOM || d->frame_transfer_s > 0.0;
+}
+
+double bst_detector_lead_s(const bst_detector_config *d, int rows) {
+    return 0.5 * fabs(d->row_time_s) * (rows - 1);
+}
+
+int64_t bst_detector_lead_ticks(const bst_detector_config *d, int rows, double tick_rate_hz) {
+    /* a sum of times that is whole but for its rounding is not one tick more */
+    return (int64_t)ceil(bst_detector_lead_s(d, rows) * tick_rate_hz - 1e-6);
 }

@@ -42,6 +42,7 @@ typedef struct bst_detector_config {
     double nonlinearity[3];
     int32_t full_well; /* BST_WELL_... */
     double frame_transfer_s;
+    double row_time_s; /* rolling shutter */
     bst_hits_config hits;
     bst_quantisation_config quantisation;
 } bst_detector_config;
@@ -51,5 +52,15 @@ extern const bst_config_desc bst_detector_table[];
 /* Factor of the dark current at `temperature_c` over that at the reference temperature: it doubles
  * with every dark_doubling_k; 1 for a block of zeros. */
 double bst_detector_dark_factor(const bst_detector_config *d);
+
+/* Whether frames need whole columns (blooming, frame transfer), and so the light of them all. */
+bool bst_detector_config_whole_columns(const bst_detector_config *d);
+
+/* Rolling shutter: time from the middle row of a window of `rows` rows to its first or last one.
+ * Row n of the window (0, 1, ...) is exposed (n - (rows - 1) / 2) row_time_s later than the
+ * exposure's ticks say. */
+double bst_detector_lead_s(const bst_detector_config *d, int rows);
+/* The same in ticks, rounded up. */
+int64_t bst_detector_lead_ticks(const bst_detector_config *d, int rows, double tick_rate_hz);
 
 #endif

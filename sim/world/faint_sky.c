@@ -223,20 +223,32 @@ void bst_faint_sky_free(bst_faint_sky *sky) {
     }
 }
 
-double bst_faint_sky_unresolved(const bst_faint_sky *sky, bst_vec3 icrs, double v_limit) {
+double bst_faint_sky_undrawn(const bst_faint_sky *sky, bst_vec3 icrs, double v_limit,
+                             double faint_limit) {
     bst_star_counts counts;
     bst_star_counts_at(icrs, &counts);
     double complete_to_v;
     int patch = bst_faint_patch(sky, icrs, &complete_to_v);
     const float *kept = sky->kept[patch < 0 ? bst_faint_zone(icrs) : FAINT_ZONES + patch];
-    double from = fmax(v_limit, complete_to_v);
-    double sum = bst_star_counts_light(&counts, fmax(from, BST_FAINT_LIMIT_V), INFINITY);
+    double from = fmax(faint_limit, complete_to_v);
+    /* the catalogue's own: all there are where it is complete, its share beyond */
+    double sum =
+        v_limit < complete_to_v ? bst_star_counts_light(&counts, v_limit, complete_to_v) : 0.0;
+    sum += bst_star_counts_light(&counts, fmax(from, BST_FAINT_LIMIT_V), INFINITY);
     for (int q = 0; q < FAINT_QUARTERS; q++) {
         double high = BST_COUNT_FIRST_V + 0.25 * (q + 1);
         double low = fmax(high - 0.25, from);
+        double low_known = fmax(high - 0.25, fmax(v_limit, complete_to_v));
         if (low < high && kept[q] > 0.0f) {
             sum += (double)kept[q] * bst_star_counts_light(&counts, low, high);
         }
+        if (low_known < high && kept[q] < 1.0f) {
+            sum += (1.0 - (double)kept[q]) * bst_star_counts_light(&counts, low_known, high);
+        }
     }
     return sum * DEG2_PER_SR;
+}
+
+double bst_faint_sky_unresolved(const bst_faint_sky *sky, bst_vec3 icrs, double v_limit) {
+    return bst_faint_sky_undrawn(sky, icrs, INFINITY, v_limit);
 }

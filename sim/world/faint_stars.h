@@ -41,6 +41,12 @@ void bst_faint_sky_free(bst_faint_sky *sky);
  * of V = 0 per steradian. */
 double bst_faint_sky_unresolved(const bst_faint_sky *sky, bst_vec3 icrs, double v_limit);
 
+/* Light of all stars that are not drawn towards `icrs`: the statistical ones fainter than
+ * faint_limit (-INFINITY: all) and those of the catalogue fainter than v_limit, by the table of
+ * star counts; units as above. */
+double bst_faint_sky_undrawn(const bst_faint_sky *sky, bst_vec3 icrs, double v_limit,
+                             double faint_limit);
+
 /* `sky` must outlive the window. The cache holds up to cache_stars stars (40 bytes each), and more
  * only where a single query needs more. */
 bst_status bst_faint_stars_create(bst_ctx *ctx, const bst_faint_sky *sky, int cache_stars,

@@ -5,7 +5,10 @@
 
 #include "sim/world/field_image.h"
 #include "sim/world/field_objects.h"
+#include "sim/world/los_track.h"
 #include "sim/world/psf.h"
+#include "sim/world/row_exposure.h"
+#include "sim/world/skylight.h"
 
 /* Aberration at most, and some for the deflection of light: how far an apparent place lies from the
  * catalogue's. */
@@ -24,12 +27,12 @@ struct bst_field {
     bst_view *view;
     const bst_camera *camera;
     int observer;
-    double *time_s;
-    bst_quat *q;
-    int track_capacity;
+    bst_track_store track, middle; /* middle: of a rolling shutter's middle row */
     bst_star *stars;
     int star_capacity;
-    bst_faint_stars *faint; /* NULL: none */
+    bst_faint_stars *faint;      /* NULL: none */
+    bst_skylight *skylight;      /* NULL: the same all over the sensor */
+    const bst_skylight_map *map; /* of the latest query */
     bst_source *sources;
     int source_capacity;
     bst_object_parts *parts; /* [part_capacity], of the objects among the sources */
@@ -57,7 +60,10 @@ bst_status bst_field_create(bst_ctx *ctx, const bst_world *world, int observer, 
     bst_status status = field->stars && field->near
                             ? bst_view_create(ctx, world, &field->view)
                             : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a field query");
-    if (status == BST_OK && world->faint) {
+    if (status == BST_OK && bst_skylight_varies(field->camera)) {
+        status = bst_skylight_create(ctx, world, field->camera, &field->skylight);
+    }
+    if (status == BST_OK && world->faint && isfinite(world->faint_limit_v_mag)) {
         status = bst_faint_stars_create(ctx, world->faint, FAINT_CACHE_STARS, &field->faint);
     }
     if (status != BST_OK) {
@@ -72,8 +78,9 @@ void bst_field_free(bst_field *field) {
     if (field) {
         bst_view_free(field->view);
         bst_faint_stars_free(field->faint);
-        free(field->time_s);
-        free(field->q);
+        bst_skylight_free(field->skylight);
+        bst_track_store_free(&field->track);
+        bst_track_store_free(&field->middle);
         free(field->stars);
         free(field->sources);
         free(field->parts);
@@ -84,105 +91,20 @@ void bst_field_free(bst_field *field) {
 
 void bst_field_set_camera(bst_field *field, const bst_camera *camera) {
     field->camera = camera;
-}
-
-static const bst_los_sample *ring_sample(const bst_los_history *history, int64_t number) {
-    return &history->items[number % history->capacity];
-}
-
-static bst_quat same_sign(bst_quat q, bst_quat as) {
-    double dot = q.x * as.x + q.y * as.y + q.z * as.z + q.w * as.w;
-    return dot < 0.0 ? (bst_quat){-q.x, -q.y, -q.z, -q.w} : q;
-}
-
-/* Attitude at `tick` between samples number and number + 1. */
-static bst_quat between(const bst_los_history *history, int64_t number, int64_t tick) {
-    const bst_los_sample *a = ring_sample(history, number);
-    if (a->tick >= tick) {
-        return a->q_cam_from_gcrf;
+    if (field->skylight) {
+        bst_skylight_set_camera(field->skylight, camera);
     }
-    const bst_los_sample *b = ring_sample(history, number + 1);
-    double s = (double)(tick - a->tick) / (double)(b->tick - a->tick);
-    return bst_quat_slerp(a->q_cam_from_gcrf, b->q_cam_from_gcrf, s);
-}
-
-static bst_status reserve_track(bst_ctx *ctx, bst_field *field, int count) {
-    if (count <= field->track_capacity) {
-        return BST_OK;
-    }
-    double *time_s = realloc(field->time_s, (size_t)count * sizeof *time_s);
-    field->time_s = time_s ? time_s : field->time_s;
-    bst_quat *q = realloc(field->q, (size_t)count * sizeof *q);
-    field->q = q ? q : field->q;
-    if (!time_s || !q) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d line-of-sight samples", count);
-    }
-    field->track_capacity = count;
-    return BST_OK;
 }
 
 bst_status bst_field_track(bst_ctx *ctx, bst_field *field, const bst_los_history *history,
                            int64_t start_tick, int64_t end_tick, int64_t tick_rate_hz,
                            bst_los_track *out) {
-    int64_t newest = history->written - 1;
-    int64_t oldest =
-        history->written > history->capacity ? history->written - history->capacity : 0;
-    if (newest < 0 || ring_sample(history, oldest)->tick > start_tick ||
-        ring_sample(history, newest)->tick < end_tick) {
-        return bst_fail(ctx, BST_ERR_STATE,
-                        "the line-of-sight history (ticks %lld to %lld) does not cover the "
-                        "exposure (%lld to %lld): "
-                        "give the gimbal a longer history_s or a rate that divides the exposure",
-                        newest < 0 ? 0LL : (long long)ring_sample(history, oldest)->tick,
-                        newest < 0 ? -1LL : (long long)ring_sample(history, newest)->tick,
-                        (long long)start_tick, (long long)end_tick);
-    }
-    /* last sample not after the start, by bisection: ticks ascend */
-    int64_t low = oldest, high = newest;
-    while (low < high) {
-        int64_t middle = low + (high - low + 1) / 2;
-        if (ring_sample(history, middle)->tick <= start_tick) {
-            low = middle;
-        } else {
-            high = middle - 1;
-        }
-    }
-    int64_t last = low;
-    while (last < newest && ring_sample(history, last)->tick < end_tick) {
-        last++;
-    }
-    int inner = (int)(last - low > 0 ? last - low - 1 : 0);
-    BST_TRY(reserve_track(ctx, field, inner + 2));
-    double rate = (double)tick_rate_hz;
-    field->time_s[0] = 0.0;
-    field->q[0] = between(history, low, start_tick);
-    int count = 1;
-    for (int64_t n = low + 1; n < last; n++) {
-        const bst_los_sample *sample = ring_sample(history, n);
-        field->time_s[count] = (double)(sample->tick - start_tick) / rate;
-        field->q[count] = same_sign(sample->q_cam_from_gcrf, field->q[count - 1]);
-        count++;
-    }
-    field->time_s[count] = (double)(end_tick - start_tick) / rate;
-    field->q[count] =
-        same_sign(between(history, last > low ? last - 1 : low, end_tick), field->q[count - 1]);
-    *out = (bst_los_track){count + 1, field->time_s, field->q};
-    return BST_OK;
+    return bst_track_cut(ctx, &field->track, history, start_tick, end_tick, tick_rate_hz, out);
 }
 
 /* Rotation vector from attitude `from` to `to`, camera axes. */
 static bst_vec3 deviation(bst_quat from, bst_quat to) {
     return bst_quat_to_rotvec(bst_quat_mul(to, bst_quat_conj(from)));
-}
-
-static bst_quat attitude_at(const bst_los_track *track, double time_s) {
-    int k = 0;
-    while (k + 2 < track->count && track->time_s[k + 1] < time_s) {
-        k++;
-    }
-    double span = track->time_s[k + 1] - track->time_s[k];
-    double s = span > 0.0 ? (time_s - track->time_s[k]) / span : 0.0;
-    return bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], s);
 }
 
 /* The attitude that shows a star near the boresight at the mean of its places in the exposure. The
@@ -210,18 +132,14 @@ static void summarise_track(bst_field *field, const bst_los_track *track, bst_qu
     enum { D = SIGMA_DIMENSIONS };
     double exposure = track->time_s[track->count - 1];
     field->exposure_s = exposure;
-    field->q_mid = attitude_at(track, 0.5 * exposure);
+    field->q_mid = bst_track_attitude(track, 0.5 * exposure);
     double first[D] = {0}, second[D][D] = {{0}}, total = 0.0, reach = 0.0;
-    double half_px = 0.5 * hypot((double)field->camera->width_px, (double)field->camera->height_px);
-    double scale = bst_camera_scale_rad(field->camera);
-    /* a tilt moves points at the corner further than at the centre */
-    double stretch = (1.0 + half_px * half_px * scale * scale) * bst_camera_stretch(field->camera);
-    half_px *= bst_camera_stretch(field->camera);
     double previous[D] = {0};
     for (int k = 0; k < track->count; k++) {
         bst_vec3 d = deviation(field->q_mid, track->q_cam_from_gcrf[k]);
         double now[D] = {d.x, d.y, d.z, exposure > 0.0 ? track->time_s[k] / exposure : 0.5};
-        reach = fmax(reach, hypot(d.x, d.y) / scale * stretch + fabs(d.z) * half_px);
+        reach =
+            fmax(reach, bst_track_moved_px(field->camera, field->q_mid, track->q_cam_from_gcrf[k]));
         /* moments of the piecewise linear path between the samples */
         double w = k > 0 ? (exposure > 0.0 ? track->time_s[k] - track->time_s[k - 1] : 1.0) : 0.0;
         for (int i = 0; i < D; i++) {
@@ -364,7 +282,18 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     double mid_s = 0.5 * (start_s + end_s), exposure = end_s - start_s;
     double reach_px;
     bst_quat mean;
-    summarise_track(field, track, &mean, &reach_px);
+    bst_los_track own = *track; /* of the exposure itself */
+    if (options->lead_s > 0.0) {
+        BST_TRY(bst_track_part(ctx, &field->middle, track, options->lead_s,
+                               options->lead_s + exposure, &own));
+    }
+    summarise_track(field, &own, &mean, &reach_px);
+    for (int k = 0; options->lead_s > 0.0 && k < track->count; k++) {
+        reach_px =
+            fmax(reach_px, bst_track_moved_px(camera, field->q_mid, track->q_cam_from_gcrf[k]));
+    }
+    start_s -= options->lead_s;
+    end_s += options->lead_s;
 
     bst_state eye;
     bst_bodies bodies;
@@ -373,6 +302,7 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     bst_earth_frames frames;
     BST_TRY(bst_view_earth_frames(ctx, field->view, mid_s, &frames));
     bst_light light = bst_light_at(&bodies, eye.position_m, eye.velocity_mps);
+    bst_light geocentric = bst_light_at(&bodies, eye.position_m, (bst_vec3){0, 0, 0});
 
     truth->start_tick = start_tick;
     truth->end_tick = end_tick;
@@ -405,10 +335,31 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     bst_time_tt(bst_world_time(field->world, mid_s), &tt1, &tt2);
     int star_count;
     double faint_limit = fmin(options->v_limit, field->world->faint_limit_v_mag);
-    if (field->faint) {
+    if (field->skylight) {
+        bst_surroundings around = {.eye_m = eye.position_m,
+                                   .eye_mps = eye.velocity_mps,
+                                   .bodies = bodies,
+                                   .itrf_from_gcrf = frames.itrf_from_gcrf,
+                                   .light = light,
+                                   .exposure_s = exposure,
+                                   .v_limit = options->v_limit,
+                                   .faint_limit = faint_limit};
+        for (int k = 0; k <= BST_DISC_PARTS; k++) {
+            around.q[k] = bst_track_attitude(&own, exposure * k / BST_DISC_PARTS);
+        }
+        bst_window lit = window;
+        if (bst_detector_config_whole_columns(&camera->detector)) {
+            lit.y0 = 0;
+            lit.height = (int)camera->height_px;
+        }
+        BST_TRY(bst_skylight_make(ctx, field->skylight, &around, lit, &field->map));
+        truth->background_e = bst_skylight_at(field->map, window.x0 + 0.5 * (window.width - 1),
+                                              window.y0 + 0.5 * (window.height - 1));
+    } else if (field->faint) {
         double pixel_sr = bst_camera_scale_rad(camera) * bst_camera_scale_rad(camera);
-        truth->background_e += bst_faint_sky_unresolved(field->world->faint, centre, faint_limit) *
-                               pixel_sr * bst_camera_electrons_per_s(camera, 0.0) * exposure;
+        truth->background_e +=
+            bst_faint_sky_undrawn(field->world->faint, centre, options->v_limit, faint_limit) *
+            pixel_sr * bst_camera_electrons_per_s(camera, 0.0) * exposure;
     }
     BST_TRY(query_stars(ctx, field, centre, radius, options->v_limit, faint_limit,
                         2000.0 + (tt1 - 2451545.0 + tt2) / 365.25, &star_count));
@@ -433,10 +384,11 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
                           .sunlit_fraction = NAN,
                           .phase_rad = NAN,
                           .range_m = INFINITY};
-        /* the Earth hides stars too: a point far along the line of sight stands for the star */
-        s->occulted =
-            bst_earth_occults(eye.position_m, bst_vec3_axpy(eye.position_m, 1e12, star->icrs),
-                              &frames.itrf_from_gcrf);
+        /* the Earth hides stars too: a point far along the line of sight, as it is in axes that
+         * move with the Earth, stands for the star */
+        bst_vec3 ray = bst_light_apparent_star(&geocentric, star->icrs);
+        s->occulted = bst_earth_occults(eye.position_m, bst_vec3_axpy(eye.position_m, 1e12, ray),
+                                        &frames.itrf_from_gcrf);
         if (s->occulted) {
             s->electrons_per_s = 0.0;
         }
@@ -458,19 +410,6 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     *sources = field->sources;
     *count = n;
     return BST_OK;
-}
-
-/* Integral of the squared image (per px^2) of a unit source: a straight streak of length L, blurred
- * by a Gaussian of standard deviation `along` in its direction and `across` at right angles.
- * 1 / (4 pi along across) for L = 0; else (1 / (2 sqrt(pi) across)) times the line integral of the
- * autocorrelation of a uniform segment. */
-static double squared_image(double along, double across, double length) {
-    const double root_pi = sqrt(BST_PI);
-    double a = length / (2.0 * along);
-    double line = a < 1e-3 ? 1.0 / (2.0 * root_pi * along) * (1.0 - a * a / 6.0)
-                           : erf(a) / length -
-                                 (2.0 * along / (length * length * root_pi)) * (1.0 - exp(-a * a));
-    return line / (2.0 * root_pi * across);
 }
 
 /* Of the image of a point; NAN when it is behind the camera. */
@@ -513,6 +452,39 @@ static void blur(const bst_camera *camera, const bst_image_moments *m, double dx
     *across = sqrt(variance + fmax(m->xx + m->yy - uu, 0.0));
 }
 
+const bst_skylight_map *bst_field_background(const bst_field *field) {
+    return field->map;
+}
+
+double bst_field_background_e(const bst_field *field, const bst_truth *header, double x_px,
+                              double y_px) {
+    return field->map && isfinite(x_px) && isfinite(y_px) ? bst_skylight_at(field->map, x_px, y_px)
+                                                          : header->background_e;
+}
+
+/* What a rolling shutter sees of a source: it is exposed while the row where it is. */
+static bst_image_moments place_in_rows(const bst_field *field, const bst_los_track *track,
+                                       const bst_source *source, bst_window window, bst_quat *q_mid,
+                                       bst_truth_item *out) {
+    const bst_row_times rows = {field->camera->detector.row_time_s, field->exposure_s, window};
+    double u[2], duration = track->time_s[track->count - 1];
+    bst_row_source_times(field->camera, &rows, track, source, u);
+    double middle = 0.5 * (u[0] + u[1]);
+    const double when[3] = {u[0], middle, u[1]};
+    double *const x[3] = {&out->x_start_px, &out->x_mid_px, &out->x_end_px};
+    double *const y[3] = {&out->y_start_px, &out->y_mid_px, &out->y_end_px};
+    *q_mid = bst_track_attitude(track, middle * duration);
+    for (int k = 0; k < 3; k++) {
+        bst_quat q = bst_track_attitude(track, when[k] * duration);
+        (void)bst_camera_project(
+            field->camera, bst_quat_rotate(q, bst_source_direction(source, when[k])), x[k], y[k]);
+    }
+    out->delay_s = (middle - 0.5) * duration;
+    out->electrons = source->electrons_per_s * duration *
+                     (bst_source_light(source, u[1]) - bst_source_light(source, u[0]));
+    return bst_image_by_light(field->camera, track, source, u[0], u[1]);
+}
+
 void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
                           const bst_source *source, bst_window window, const bst_truth *header,
                           bst_truth_item *out) {
@@ -537,29 +509,36 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
                             .y_end_px = NAN,
                             .x_mean_px = NAN,
                             .y_mean_px = NAN};
-    (void)bst_field_project(camera, track, 0, source, &out->x_start_px, &out->y_start_px);
-    (void)bst_field_project(camera, track, track->count - 1, source, &out->x_end_px,
-                            &out->y_end_px);
-    (void)bst_camera_project(camera, bst_quat_rotate(field->q_mid, source->apparent_mid),
-                             &out->x_mid_px, &out->y_mid_px);
-    bst_image_moments image =
-        source->rate ? bst_image_by_light(field->camera, track, source) : smear_of(field, source);
+    bst_image_moments image;
+    bst_quat q_mid = field->q_mid;
+    if (camera->detector.row_time_s != 0.0 && track->time_s[track->count - 1] > 0.0) {
+        image = place_in_rows(field, track, source, window, &q_mid, out);
+    } else {
+        (void)bst_field_project(camera, track, 0, source, &out->x_start_px, &out->y_start_px);
+        (void)bst_field_project(camera, track, track->count - 1, source, &out->x_end_px,
+                                &out->y_end_px);
+        (void)bst_camera_project(camera, bst_quat_rotate(field->q_mid, source->apparent_mid),
+                                 &out->x_mid_px, &out->y_mid_px);
+        image = source->rate ? bst_image_by_light(field->camera, track, source, 0.0, 1.0)
+                             : smear_of(field, source);
+    }
     if (source->shape) {
-        bst_image_add_disc(field->camera, field->q_mid, source, &image);
+        bst_image_add_disc(field->camera, q_mid, source, &image);
     }
     out->x_mean_px = image.x_mean;
     out->y_mean_px = image.y_mean;
     if (isfinite(image.x_mean)) {
         out->electrons *= bst_camera_illumination(camera, image.x_mean, image.y_mean);
     }
-    double variance =
-        header->background_e + header->dark_e + camera->read_noise_e * camera->read_noise_e;
+    double dark =
+        bst_field_background_e(field, header, image.x_mean, image.y_mean) + header->dark_e;
+    double variance = dark + camera->read_noise_e * camera->read_noise_e;
     double length = hypot(out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px);
     double along, across;
     blur(camera, &image, out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px, &along,
          &across);
     if (isfinite(length) && variance > 0.0) {
-        out->snr = out->electrons * sqrt(squared_image(along, across, length) / variance);
+        out->snr = out->electrons * sqrt(bst_image_squared(along, across, length) / variance);
     }
     if (source->occulted) {
         out->flags |= BST_TRUTH_OCCULTED;
@@ -572,7 +551,7 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
      * length) */
     double peak =
         out->electrons / (2.0 * BST_PI * across * hypot(along, length / sqrt(2.0 * BST_PI)));
-    if (peak + header->background_e + header->dark_e > camera->full_well_e) {
+    if (peak + dark > camera->full_well_e) {
         out->flags |= BST_TRUTH_SATURATED;
     }
 }

@@ -53,14 +53,10 @@ typedef struct bst_source {
     bool occulted; /* no light */
 } bst_source;
 
-/* Apparent direction (any length) at time u in [0, 1] of the exposure: the quartic through the five
- * places. For orbits of radius r and angular rate w about the Earth it misses the path by
- * 1e-3 r (w T / 2)^5: 1 um in LEO for an exposure T of 20 s. */
-static inline bst_vec3 bst_source_direction(const bst_source *s, double u) {
-    if (!s->path) {
-        return s->apparent_mid;
-    }
-    const bst_source_path *p = s->path;
+/* Place at time u in [0, 1] of the exposure: the quartic through the five. For orbits of radius r
+ * and angular rate w about the Earth it misses the path by 1e-3 r (w T / 2)^5: 1 um in LEO for an
+ * exposure T of 20 s. */
+static inline bst_vec3 bst_source_place(const bst_source_path *p, double u) {
     double a = 4.0 * u, b = a - 1.0, c = a - 2.0, d = a - 3.0, e = a - 4.0;
     const double w[BST_PATH_NODES] = {b * c * d * e / 24.0, -a * c * d * e / 6.0,
                                       a * b * d * e / 4.0, -a * b * c * e / 6.0,
@@ -69,10 +65,24 @@ static inline bst_vec3 bst_source_direction(const bst_source *s, double u) {
     for (int k = 1; k < BST_PATH_NODES; k++) {
         place = bst_vec3_axpy(place, w[k], p->place[k]);
     }
+    return place;
+}
+
+/* The quadratic through the three shifts. */
+static inline bst_vec3 bst_source_shift(const bst_source_path *p, double u) {
+    double a = 4.0 * u, c = a - 2.0, e = a - 4.0;
     bst_vec3 shift = bst_vec3_scale(p->shift[0], 0.125 * c * e);
     shift = bst_vec3_axpy(shift, -0.25 * a * e, p->shift[1]);
-    shift = bst_vec3_axpy(shift, 0.125 * a * c, p->shift[2]);
-    return bst_vec3_axpy(place, bst_vec3_norm(place), shift);
+    return bst_vec3_axpy(shift, 0.125 * a * c, p->shift[2]);
+}
+
+/* Apparent direction (any length) at time u in [0, 1] of the exposure. */
+static inline bst_vec3 bst_source_direction(const bst_source *s, double u) {
+    if (!s->path) {
+        return s->apparent_mid;
+    }
+    bst_vec3 place = bst_source_place(s->path, u);
+    return bst_vec3_axpy(place, bst_vec3_norm(place), bst_source_shift(s->path, u));
 }
 
 /* Share of the exposure's light that comes until time u in [0, 1]: what weighs the places of a
@@ -130,6 +140,8 @@ typedef struct bst_los_track {
 typedef struct bst_field_options {
     double v_limit;   /* stars fainter than this are left out */
     double margin_px; /* sources this far outside the window still count (PSF wings) */
+    double lead_s;    /* rolling shutter: the track begins so long before the exposure (of the
+                         window's middle row) and ends as long after it */
 } bst_field_options;
 
 typedef struct bst_field
@@ -150,11 +162,18 @@ bst_status bst_field_track(bst_ctx *ctx, bst_field *field, const bst_los_history
 
 /* Fills the header of `truth` (attitudes, observer, light, background) and returns the sources that
  * touch `window`: stars by cell then brightness, then objects by index. *sources is held in `field`
- * until the next query. */
+ * until the next query; their paths and rates are those of the whole track. */
 bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *track,
                            int64_t start_tick, int64_t end_tick, int64_t tick_rate_hz,
                            bst_window window, const bst_field_options *options, bst_truth *truth,
                            const bst_source **sources, int *count) BST_MUST_CHECK;
+
+/* The background of the latest query as a map of expected electrons without dark current, held in
+ * `field` until the next one; NULL where it is truth->background_e all over the sensor. */
+const struct bst_skylight_map *bst_field_background(const bst_field *field);
+/* Background without dark current at a place of the latest query's window. */
+double bst_field_background_e(const bst_field *field, const bst_truth *header, double x_px,
+                              double y_px);
 
 /* Pixel position of a source at sample k of the track. false when behind the camera. */
 bool bst_field_project(const bst_camera *camera, const bst_los_track *track, int k,
@@ -163,7 +182,8 @@ bool bst_field_project(const bst_camera *camera, const bst_los_track *track, int
 /* Makes the truth item of a source (positions, magnitude, electrons after vignetting at its mean
  * place; SNR for a Gaussian PSF that is smeared along the source's own track, sigma from
  * background, dark and read noise; of a PSF that is no Gaussian, the one with the same
- * noise-equivalent area).
+ * noise-equivalent area). With a rolling shutter all of it is that of the row where the source is
+ * at the time: start and end are where the exposure of its own row starts and ends.
  */
 void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
                           const bst_source *source, bst_window window, const bst_truth *header,

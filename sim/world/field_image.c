@@ -3,16 +3,19 @@
 #include "sim/world/disc.h"
 
 bst_image_moments bst_image_by_light(const bst_camera *camera, const bst_los_track *track,
-                                     const bst_source *source) {
+                                     const bst_source *source, double u0, double u1) {
     bst_image_moments m = {0};
+    double total = bst_source_light(source, u1) - bst_source_light(source, u0);
+    double whole = u0 > 0.0 || u1 < 1.0 ? (total > 0.0 ? total : 1.0) : 1.0;
     double duration = track->time_s[track->count - 1];
     int sample = 0;
     int count = 2 * track->count < 128 ? 128 : 2 * track->count < 2048 ? 2 * track->count : 2048;
     double xx = 0.0, xy = 0.0, yy = 0.0;
     for (int n = 0; n < count; n++) {
-        double u = (n + 0.5) / count, x = NAN, y = NAN;
-        double weight = bst_source_light(source, (n + 1.0) / count) -
-                        bst_source_light(source, (double)n / count);
+        double u = u0 + (u1 - u0) * ((n + 0.5) / count), x = NAN, y = NAN;
+        double weight = (bst_source_light(source, u0 + (u1 - u0) * ((n + 1.0) / count)) -
+                         bst_source_light(source, u0 + (u1 - u0) * ((double)n / count))) /
+                        whole;
         while (sample + 2 < track->count && track->time_s[sample + 1] < u * duration) {
             sample++;
         }
@@ -83,4 +86,13 @@ void bst_image_add_disc(const bst_camera *camera, bst_quat q_mid, const bst_sour
         m->xy += xy / sum - ex * ey / (sum * sum);
         m->yy += yy / sum - ey * ey / (sum * sum);
     }
+}
+
+double bst_image_squared(double along, double across, double length) {
+    const double root_pi = sqrt(BST_PI);
+    double a = length / (2.0 * along);
+    double line = a < 1e-3 ? 1.0 / (2.0 * root_pi * along) * (1.0 - a * a / 6.0)
+                           : erf(a) / length -
+                                 (2.0 * along / (length * length * root_pi)) * (1.0 - exp(-a * a));
+    return line / (2.0 * root_pi * across);
 }

@@ -10,13 +10,20 @@ typedef struct bst_image_moments {
     double x_mean, y_mean, xx, xy, yy;
 } bst_image_moments;
 
-/* Of a source whose brightness changes, weighted by its light. */
+/* Of a source whose brightness changes, weighted by its light, from time u0 to u1 of the track (0
+ * to 1: all of it). */
 bst_image_moments bst_image_by_light(const bst_camera *camera, const bst_los_track *track,
-                                     const bst_source *source);
+                                     const bst_source *source, double u0, double u1);
 
 /* Moves and widens the moments of a point by the places of the light on the source's disc, seen
  * with attitude q_mid. */
 void bst_image_add_disc(const bst_camera *camera, bst_quat q_mid, const bst_source *source,
                         bst_image_moments *m);
+
+/* Integral of the squared image (per px^2) of a unit source: a straight streak of length L, blurred
+ * by a Gaussian of standard deviation `along` in its direction and `across` at right angles.
+ * 1 / (4 pi along across) for L = 0; else (1 / (2 sqrt(pi) across)) times the line integral of the
+ * autocorrelation of a uniform segment. */
+double bst_image_squared(double along, double across, double length);
 
 #endif

@@ -434,9 +434,10 @@ void bst_frame_updates_limits(const bst_frame_updates *updates, const bst_camera
         *longest_exposure_s = fmax(*longest_exposure_s, c.exposure_s);
         *shortest_cycle_s = fmin(*shortest_cycle_s, fmax(c.exposure_s, c.period_s));
         if (c.frame >= last) {
-            return;
+            break;
         }
     }
+    *longest_exposure_s += 2.0 * bst_detector_lead_s(&camera->detector, (int)camera->height_px);
 }
 
 bst_status bst_camera_at_scale(bst_ctx *ctx, const bst_camera *camera, double pixel_scale_arcsec,

@@ -75,7 +75,7 @@ bst_frame_cursor bst_frame_cursor_begin(const bst_frame_updates *updates, const 
  * later. */
 void bst_frame_cursor_next(bst_frame_cursor *cursor);
 
-/* Longest exposure and shortest time between two starts that a file leads to. */
+/* Longest exposure (from the first to the last row of a rolling shutter) and shortest time between two starts that a file leads to. */
 void bst_frame_updates_limits(const bst_frame_updates *updates, const bst_camera *camera,
                               const bst_exposure_config *exposure, double *longest_exposure_s,
                               double *shortest_cycle_s);

@@ -4,6 +4,7 @@
 
 #include "sim/world/ephemeris.h"
 #include "sim/world/psf.h"
+#include "sim/world/stray.h"
 #include "sim/world/world_build.h"
 
 static bst_status open_stars(const bst_world_builder *b, const char *name, const char *where,
@@ -71,6 +72,21 @@ static bst_status make_spectrum(const bst_world_builder *b, bst_camera *camera, 
     return BST_OK;
 }
 
+static bst_status make_pst(const bst_world_builder *b, bst_camera *camera, int observer,
+                           int sensor) {
+    bst_pst *pst;
+    bst_status status =
+        bst_pst_create(b->ctx, &camera->background, camera->optics.pixel_um, b->base_dir, &pst);
+    if (status != BST_OK) {
+        return bst_fail_prefix(b->ctx, BST_ERR_CONFIG,
+                               "%s: /observers/%d/sensors/%d/camera/background", b->scenario,
+                               observer, sensor);
+    }
+    camera->pst = pst;
+    camera->background.pst = (bst_config_list){0}; /* as above */
+    return BST_OK;
+}
+
 static bst_status make_observers(const bst_world_builder *b, const bst_config_list *list) {
     bst_world *world = b->world;
     world->observers = calloc((size_t)list->count + 1, sizeof *world->observers);
@@ -102,10 +118,26 @@ static bst_status make_observers(const bst_world_builder *b, const bst_config_li
                                        b->scenario, i, s);
             }
             BST_TRY(make_spectrum(b, &observer->sensors[s].config.camera, i, s));
+            BST_TRY(make_pst(b, &observer->sensors[s].config.camera, i, s));
             BST_TRY(make_psf(b, &observer->sensors[s].config.camera, i, s));
         }
     }
     return BST_OK;
+}
+
+/* Whether a camera's background has the light of stars that are not drawn. */
+static bool needs_starlight(const bst_config_list *observers) {
+    const bst_observer_config *configs = observers->items;
+    for (int i = 0; i < observers->count; i++) {
+        const bst_sensor_config *sensors = configs[i].sensors.items;
+        for (int s = 0; s < configs[i].sensors.count; s++) {
+            const bst_background_config *c = &sensors[s].camera.background;
+            if (c->model == BST_BACKGROUND_SKY && c->starlight) {
+                return true;
+            }
+        }
+    }
+    return false;
 }
 
 static bst_status build(bst_world_builder *b, const bst_world_config *config,
@@ -124,8 +156,9 @@ static bst_status build(bst_world_builder *b, const bst_world_config *config,
         return bst_fail_prefix(b->ctx, status, "%s: /epoch_utc", b->scenario);
     }
     BST_TRY(open_stars(b, config->star_catalogue, "/world/star_catalogue", &world->stars));
-    if (config->faint_stars == BST_FAINT_STATISTICAL) {
-        world->faint_limit_v_mag = config->faint_limit_v_mag;
+    world->faint_limit_v_mag =
+        config->faint_stars == BST_FAINT_STATISTICAL ? config->faint_limit_v_mag : -INFINITY;
+    if (config->faint_stars == BST_FAINT_STATISTICAL || needs_starlight(observers)) {
         BST_TRY(bst_faint_sky_create(b->ctx, world->stars, config->faint_seed, &world->faint));
     }
     BST_TRY(bst_sky_clock_create(b->ctx, world->eop, &b->clock));
@@ -175,6 +208,7 @@ void bst_world_free(bst_world *world) {
             bst_camera *camera = &observer->sensors[k].config.camera;
             bst_psf_free((bst_psf *)camera->psf);
             bst_band_free((bst_band *)camera->spectrum);
+            bst_pst_free((bst_pst *)camera->pst);
             free(camera->optics.field.items);
         }
         free(observer->sensors);

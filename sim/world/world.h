@@ -51,8 +51,8 @@ const struct bst_exposure_config *bst_world_exposure(const bst_world *world, int
                                                      int sensor);
 
 /* Body attitude that the spacecraft starts in and holds: +z towards the cue at the epoch as the
- * onboard side reckons it, with all its errors, +x as near as can be to the sensor's x_axis_gcrf. The camera has these axes when both
- * gimbal angles are zero. */
+ * onboard side reckons it, with all its errors, +x as near as can be to the sensor's x_axis_gcrf.
+ * The camera has these axes when both gimbal angles are zero. */
 bst_quat bst_world_body_attitude(const bst_world *world, int observer, int sensor);
 
 bst_status bst_view_create(bst_ctx *ctx, const bst_world *world, bst_view **out) BST_MUST_CHECK;

@@ -87,8 +87,8 @@ struct bst_world {
     bst_time epoch;
     bst_eop *eop;
     bst_stars *stars;
-    bst_faint_sky *faint; /* NULL: no statistical stars */
-    double faint_limit_v_mag;
+    bst_faint_sky *faint;     /* NULL: neither statistical stars nor their light */
+    double faint_limit_v_mag; /* single statistical stars down to this; -INFINITY: none */
     world_object *objects;
     int object_count;
     bst_brightness **brightness; /* of the listed objects, then of the catalogues */

@@ -8,9 +8,9 @@ import tempfile
 
 PROGRAM = sys.argv[1]
 
-RESULT_KEYS = ["name", "frames_per_s", "ms_median", "ms_min", "cpu_ms", "error_sigma_max",
-               "error_sigma_rms", "error_peak_max", "predicted_error_sigma", "flux_error_rel",
-               "centroid_error_px", "peak_rss_mib", "device", "threads"]
+RESULT_KEYS = ["name", "frames_per_s", "ms_median", "ms_min", "cpu_ms", "latency_ms",
+               "error_sigma_max", "error_sigma_rms", "error_peak_max", "predicted_error_sigma",
+               "flux_error_rel", "centroid_error_px", "peak_rss_mib", "device", "threads"]
 MACHINE_KEYS = ["cpu", "cores", "memory_mib", "os", "kernel", "compiler", "device", "driver",
                 "version", "git_revision", "date"]
 
@@ -37,6 +37,7 @@ def check_results(folder):
         assert result["cpu_ms"] > 0 and result["threads"] == 1
         assert 10 < result["peak_rss_mib"] < 1536
     small = by_name["small"]
+    assert small["latency_ms"] > small["ms_min"]  # two frames are under way
     assert 0 < small["error_sigma_max"] <= small["predicted_error_sigma"]
     assert small["error_sigma_rms"] < small["error_sigma_max"]
     # the scene's tolerance; light and places follow from it
@@ -63,7 +64,7 @@ def check_curve(folder):
     with open(os.path.join(folder, "speed_error.md"), encoding="utf-8") as file:
         text = file.read()
     knobs = ["tolerance_sigma", "temporal_oversample", "renderer", "spatial_oversample",
-             "stamp_radius_px", "psf_phases", "faint_limit_mag"]
+             "stamp_radius_px", "psf_degree", "faint_limit_mag"]
     for knob in knobs:
         assert f"## `{knob}`" in text, knob
         image = os.path.join(folder, "images", f"speed_error_{knob}.png")

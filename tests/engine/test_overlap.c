@@ -31,9 +31,14 @@ typedef struct scene {
     char log[1 << 16];
     size_t used;
     pthread_t stepping;
-    bool behind;     /* a step was made by another thread */
-    int64_t fail_at; /* tick of the follower's failure */
-    int64_t full_at; /* tick from which the hook fails */
+    bool behind; /* a step was made by another thread */
+    bool looks;  /* the module that sees looks ahead */
+    int looked, used_looks;
+    int busy[BST_STEP_LANES]; /* exposures under way */
+    int64_t kept[BST_STEP_LANES], kept_nav[BST_STEP_LANES];
+    pthread_mutex_t lanes; /* over busy and looked */
+    int64_t fail_at;       /* tick of the follower's failure */
+    int64_t full_at;       /* tick from which the hook fails */
     bst_ctx hooks;
 } scene;
 
@@ -50,10 +55,42 @@ static bst_status steer(fake *self, struct bst_step *step) {
     return BST_OK;
 }
 
+/* One more or less in a lane; never two. */
+static void occupy(scene *s, int lane, int more) {
+    pthread_mutex_lock(&s->lanes);
+    s->busy[lane] += more;
+    assert_in_range(s->busy[lane], 0, 1);
+    pthread_mutex_unlock(&s->lanes);
+}
+
+/* Notes which exposure it has seen with which telemetry; fails now and then, which the step makes
+ * good. */
+static bst_status look(void *module, struct bst_step *step) {
+    fake *self = module;
+    scene *s = self->other;
+    int lane = bst_step_lane(step);
+    assert_false(pthread_equal(pthread_self(), s->stepping));
+    occupy(s, lane, 1);
+    nanosleep(&(struct timespec){.tv_nsec = 300000}, NULL);
+    bst_sample e = bst_step_next(step, IN_EXPOSURE), nav = bst_step_latest(step, IN_NAV);
+    s->kept[lane] = ((const bst_exposure *)e.payload)->id;
+    s->kept_nav[lane] = nav.payload ? ((const bst_nav_telemetry *)nav.payload)->tick : -1;
+    pthread_mutex_lock(&s->lanes);
+    int looked = ++s->looked;
+    pthread_mutex_unlock(&s->lanes);
+    bst_status status =
+        looked % 7 == 3 ? bst_fail(bst_step_ctx(step), BST_ERR_NUMERIC, "not yet") : BST_OK;
+    s->kept[lane] = status == BST_OK ? s->kept[lane] : -1;
+    occupy(s, lane, -1);
+    return status;
+}
+
 /* Slow, so that the others run ahead. */
 static bst_status see(fake *self, struct bst_step *step) {
     scene *s = self->other;
     s->behind = s->behind || !pthread_equal(pthread_self(), s->stepping);
+    int lane = bst_step_lane(step);
+    occupy(s, lane, 1);
     nanosleep(&(struct timespec){.tv_nsec = 300000}, NULL);
     for (bst_sample e; (e = bst_step_next(step, IN_EXPOSURE)).payload;) {
         bst_sample nav = bst_step_latest(step, IN_NAV);
@@ -63,7 +100,13 @@ static bst_status see(fake *self, struct bst_step *step) {
         d->start_tick = nav.payload ? ((const bst_nav_telemetry *)nav.payload)->tick : -1;
         d->end_tick = guess.payload ? ((const bst_predictions *)guess.payload)->tick : -1;
         d->stars_identified = nav.stale;
+        if (s->kept[lane] == d->exposure_id) {
+            s->used_looks++;
+            assert_int_equal(s->kept_nav[lane], d->start_tick);
+        }
     }
+    s->kept[lane] = -1;
+    occupy(s, lane, -1);
     return BST_OK;
 }
 
@@ -122,7 +165,10 @@ static bst_status hear(void *user, int64_t tick, const char *instance, const cha
 static bst_status run(scene *s, bst_ctx *ctx, bool overlap, bool awaited) {
     bst_module_desc seeing = FAKE_DESC(seeing_ports), following = FAKE_DESC(following_ports);
     seeing.flags = following.flags = BST_MODULE_APART;
+    seeing.ahead = s->looks ? look : NULL;
     s->stepping = pthread_self();
+    s->kept[0] = s->kept[1] = -1;
+    pthread_mutex_init(&s->lanes, NULL);
     bst_engine *engine = fake_engine(ctx, 1000);
     fake x = {.on_step = expose}, n = {.on_step = steer}, v = {.on_step = see, .other = s},
          f = {.on_step = follow, .other = s}, w = {0};
@@ -150,6 +196,7 @@ static bst_status run(scene *s, bst_ctx *ctx, bool overlap, bool awaited) {
     note(s, "counted", fake_counter(engine, "followed"), fake_counter(engine, "stale_input"),
          v.steps, f.steps);
     bst_engine_free(engine);
+    pthread_mutex_destroy(&s->lanes);
     return status;
 }
 
@@ -168,6 +215,19 @@ static void nothing_but_the_thread_changes(void **state) {
     assert_non_null(strstr(serial.log, "counted 100 "));
 }
 
+static void what_is_seen_ahead_is_used(void **state) {
+    (void)state;
+    static scene serial, ahead;
+    serial = ahead = (scene){.looks = true, .fail_at = -1, .full_at = INT64_MAX};
+    bst_ctx ctx = {0};
+    bst_assert_ok(&ctx, run(&serial, &ctx, false, false));
+    bst_assert_ok(&ctx, run(&ahead, &ctx, true, false));
+    assert_int_equal(serial.looked, 0);
+    /* how many is up to the threads' scheduling; the exposures wait for their steps */
+    assert_true(ahead.looked > 0 && ahead.used_looks > 0);
+    assert_string_equal(ahead.log, serial.log);
+}
+
 static void what_is_awaited_stays_with_the_stepping_thread(void **state) {
     (void)state;
     static scene s;
@@ -181,7 +241,8 @@ static void failures_are_those_of_a_serial_run(void **state) {
     (void)state;
     for (int k = 0; k < 2; k++) {
         static scene serial, overlapped;
-        serial = overlapped = (scene){.fail_at = k ? -1 : 1007, .full_at = k ? 1234 : INT64_MAX};
+        serial = overlapped =
+            (scene){.looks = true, .fail_at = k ? -1 : 1007, .full_at = k ? 1234 : INT64_MAX};
         bst_ctx a = {0}, b = {0};
         bst_status expected = run(&serial, &a, false, false);
         assert_int_equal(expected, k ? BST_ERR_IO : BST_ERR_NUMERIC);
@@ -197,6 +258,7 @@ static void failures_are_those_of_a_serial_run(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(nothing_but_the_thread_changes),
+        cmocka_unit_test(what_is_seen_ahead_is_used),
         cmocka_unit_test(what_is_awaited_stays_with_the_stepping_thread),
         cmocka_unit_test(failures_are_those_of_a_serial_run),
     };

@@ -316,9 +316,10 @@ static void parts_of_a_pixel_converge(void **state) {
     close_scene(&s);
 }
 
-/* A stamp that is too small leaves the wings out, and says so; a coarse table is off by what linear
- * interpolation misses, 1 / (8 phases^2 sigma^2) per axis. */
-static void stamps_and_tables_as_asked(void **state) {
+/* A stamp that is too small leaves the wings out, and says so; a profile of straight lines is off by
+ * what linear interpolation through Chebyshev's two points misses, 1 / (16 sigma^2) of the peak per
+ * axis. */
+static void stamps_and_profiles_as_asked(void **state) {
     fixture *f = *state;
     const scene_motion still = {.duration_s = 1, .samples = 2};
     scene s = open_scene(f, scene_camera(96, 96), &still, 12, 0.5);
@@ -328,10 +329,11 @@ static void stamps_and_tables_as_asked(void **state) {
     assert_true(o.sigma > 1.0);
     assert_true(o.stats.predicted_sigma >= o.sigma);
     options = bst_renderer_default_options();
-    options.psf_phases = 4;
+    options.psf_degree = 1;
     o = render(f, &s, &options);
-    double sigma = bst_camera_psf_sigma_px(&s.camera), most = 2.0 / (8.0 * 16.0 * sigma * sigma);
+    double sigma = bst_camera_psf_sigma_px(&s.camera), most = 2.0 / (16.0 * sigma * sigma);
     assert_true(o.peak <= 1.1 * most && o.peak >= 0.1 * most);
+    assert_true(o.stats.predicted_sigma >= o.sigma);
     close_scene(&s);
 }
 
@@ -343,7 +345,6 @@ static void places_far_from_the_origin(void **state) {
     bst_camera camera = scene_camera(2048, 2048);
     camera.psf_fwhm_px = 3.0;
     bst_renderer_options options = bst_renderer_default_options();
-    options.psf_phases = 1024;
     bst_renderer *r;
     bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, &camera, &options, &r));
     scene_track track = scene_track_make(&camera, &still);
@@ -378,7 +379,7 @@ int main(void) {
         cmocka_unit_test(one_track_is_wrong_where_the_field_turns),
         cmocka_unit_test(equal_parts_converge),
         cmocka_unit_test(parts_of_a_pixel_converge),
-        cmocka_unit_test(stamps_and_tables_as_asked),
+        cmocka_unit_test(stamps_and_profiles_as_asked),
         cmocka_unit_test(places_far_from_the_origin),
     };
     return cmocka_run_group_tests(tests, open_device, close_device);

@@ -297,6 +297,65 @@ static void bytes_do_not_depend_on_how_they_are_made(void **state) {
     bytes_do_not_depend_on(*state, 3.0, 100.0);
 }
 
+/* Frames that wait for their reader while others are begun are the same; what goes with them grows
+ * meanwhile. */
+static void frames_under_way(void **state) {
+    fixture *f = *state;
+    enum { W = 192, H = 160, FRAMES = 6, ALIVE = 3, STARS = 600 };
+    static uint16_t alone[FRAMES][W * H];
+    bst_camera camera = scene_camera(W, H);
+    camera.detector.row_noise_e = 20.0;
+    camera.detector.hits = (bst_hits_config){.rate_per_cm2_s = 200.0,
+                                             .pixel_pitch_um = 15.0,
+                                             .depth_um = 10.0,
+                                             .e_per_um = 80.0,
+                                             .straggling = 0.2};
+    bst_source *stars = scene_stars(&camera, STARS, 2e6, 6.0, 4);
+    scene_track track = scene_track_make(&camera, &demo);
+    bst_render_request q[FRAMES];
+    for (int i = 0; i < FRAMES; i++) {
+        q[i] = (bst_render_request){.window = {0, 0, W - 9 * i, H},
+                                    .track = &track.track,
+                                    .sources = stars,
+                                    .count = i * STARS / (FRAMES - 1),
+                                    .background_e = i == 1 || i == 4 ? 1e6 : 3.0,
+                                    .key = {{17, 23}},
+                                    .exposure_id = i};
+    }
+    bst_renderer *r = make(f, &camera, NULL);
+    long long saturated[FRAMES], pixels;
+    for (int i = 0; i < FRAMES; i++) {
+        frame_of(f, r, &q[i], alone[i]);
+        bst_assert_ok(&f->ctx, bst_renderer_saturated(&f->ctx, r, &saturated[i]));
+    }
+    assert_int_equal(saturated[1], (W - 9) * H);
+    long long frames = bst_renderer_saturated_frames(r);
+    assert_true(frames >= 2);
+    bst_renderer_free(r);
+
+    r = make(f, &camera, NULL);
+    bst_frame *alive[FRAMES];
+    for (int i = 0; i < FRAMES + ALIVE; i++) {
+        if (i < FRAMES) {
+            bst_assert_ok(&f->ctx, bst_renderer_render(&f->ctx, r, &q[i], &alive[i]));
+        }
+        if (i >= ALIVE) {
+            const uint16_t *dn;
+            int n = i - ALIVE;
+            bst_assert_ok(&f->ctx, bst_frame_map(alive[n], &f->ctx, &dn));
+            assert_memory_equal(dn, alone[n], (size_t)(W - 9 * n) * H * sizeof *dn);
+            bst_frame_unmap(alive[n]);
+            bst_frame_release(alive[n]);
+        }
+    }
+    bst_assert_ok(&f->ctx, bst_renderer_saturated(&f->ctx, r, &pixels));
+    assert_int_equal(pixels, saturated[FRAMES - 1]);
+    assert_int_equal(bst_renderer_saturated_frames(r), frames);
+    bst_renderer_free(r);
+    scene_track_free(&track);
+    free(stars);
+}
+
 static void hard_cases(void **state) {
     fixture *f = *state;
     enum { W = 128, H = 96 };
@@ -492,6 +551,7 @@ int main(void) {
         cmocka_unit_test(moving_objects_have_their_own_tracks),
         cmocka_unit_test(near_passes_are_drawn_where_they_cross),
         cmocka_unit_test(bytes_do_not_depend_on_how_they_are_made),
+        cmocka_unit_test(frames_under_way),
         cmocka_unit_test(hard_cases),
         cmocka_unit_test(a_hundred_thousand_stars),
         cmocka_unit_test(frames_come_from_a_pool),

@@ -1,0 +1,130 @@
+#include "scenegen/render_request.h"
+
+#include <math.h>
+
+#include "scenegen/detector.h"
+#include "sim/world/skylight.h"
+
+bst_status bst_render_camera_check(bst_ctx *ctx, const bst_camera *c) {
+    if (c->width_px < 1 || c->height_px < 1 || c->width_px > 65536 || c->height_px > 65536 ||
+        c->bits < 8 || c->bits > 16) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "cannot render %lld x %lld pixels of %lld bits: allowed are 1 to 65536 "
+                        "pixels and 8 to 16 bits",
+                        (long long)c->width_px, (long long)c->height_px, (long long)c->bits);
+    }
+    double fwhm_px = 2.3548200450309493 * bst_camera_psf_sigma_px(c);
+    if (!(c->psf_fwhm_px > 0.0) || fwhm_px > 70.0) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "cannot render a PSF of psf_fwhm_px %g, with charge diffusion and fast "
+                        "jitter %g: allowed are 0 to 70 pixels",
+                        c->psf_fwhm_px, fwhm_px);
+    }
+    return BST_OK;
+}
+
+/* The pixels whose light a frame of a window takes. */
+static bst_window columns_of(const bst_camera *camera, bst_window w) {
+    if (bst_detector_config_whole_columns(&camera->detector)) {
+        w.y0 = 0;
+        w.height = (int)camera->height_px;
+    }
+    return w;
+}
+
+static bool covers(const bst_skylight_map *map, bst_window w) {
+    return w.x0 >= map->x0_px && w.y0 >= map->y0_px &&
+           w.x0 + w.width - 1 <= map->x0_px + (map->columns - 1) * map->step_px &&
+           w.y0 + w.height - 1 <= map->y0_px + (map->rows - 1) * map->step_px;
+}
+
+bst_status bst_render_request_check(bst_ctx *ctx, const bst_camera *camera,
+                                    const bst_render_request *q) {
+    bst_window w = q->window;
+    if (w.x0 < 0 || w.y0 < 0 || w.width < 1 || w.height < 1 ||
+        w.x0 + (int64_t)w.width > camera->width_px ||
+        w.y0 + (int64_t)w.height > camera->height_px) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "the window of %d x %d pixels at (%d, %d) is not inside the sensor of "
+                        "%lld x %lld",
+                        w.width, w.height, w.x0, w.y0, (long long)camera->width_px,
+                        (long long)camera->height_px);
+    }
+    int binning = q->binning > 1 ? q->binning : 1;
+    if (binning > w.width || binning > w.height) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "binning %d does not fit a window of %d x %d pixels",
+                        binning, w.width, w.height);
+    }
+    if (!(q->background_e >= 0.0) || !isfinite(q->background_e) || q->track->count < 2) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "a request needs a background that is finite and not negative (it is %g) "
+                        "and two samples of the line of sight (there are %d)",
+                        q->background_e, q->track->count);
+    }
+    if (q->row_time_s != 0.0 && camera->detector.row_time_s == 0.0) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "a request has row_time_s %g, but the camera's rows are exposed at once",
+                        q->row_time_s);
+    }
+    if (q->background && !bst_skylight_varies(camera)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "a request has a map of the background, but the camera's background is the "
+                        "same all over the sensor (bst_skylight_varies)");
+    }
+    if (q->background && !covers(q->background, columns_of(camera, w))) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "a request's map of the background does not cover its window, or that "
+                        "window's whole columns where charge runs along them");
+    }
+    return BST_OK;
+}
+
+/* What a request without a map adds where the kernels expect one. */
+static const float nothing[4];
+static const bst_skylight_map no_background = {1 << 16, 0, 0, 2, 2, nothing, 0.0};
+
+const bst_skylight_map *bst_render_background(const bst_render_request *q) {
+    return q->background ? q->background : &no_background;
+}
+
+double bst_render_exposure_s(const bst_render_request *q) {
+    return q->row_time_s != 0.0 ? q->exposure_s : q->track->time_s[q->track->count - 1];
+}
+
+bst_scene_params bst_render_params(const bst_camera *c, const bst_renderer_options *options,
+                                   const bst_render_request *q, int sources) {
+    const bst_skylight_map *map = bst_render_background(q);
+    bst_window w = q->window;
+    int x0 = w.x0 / 64 * 64;
+    return (bst_scene_params){
+        .window_x0 = w.x0,
+        .window_y0 = w.y0,
+        .window_width = w.width,
+        .window_height = w.height,
+        .sensor_width = (int)c->width_px,
+        .tiles_x0 = x0,
+        .tiles_x = (w.x0 + w.width - x0 + options->tile_width - 1) / options->tile_width,
+        .tiles_y = (w.height + options->tile_height - 1) / options->tile_height,
+        .source_groups = (sources + BST_BLOCK - 1) / BST_BLOCK,
+        .key0 = q->key.k[0],
+        .key1 = q->key.k[1],
+        .exposure_low = (unsigned)((uint64_t)q->exposure_id & 0xFFFFFFFFu),
+        .exposure_high = (unsigned)((uint64_t)q->exposure_id >> 32),
+        .background_e = (float)q->background_e,
+        .dark_e = (float)q->dark_e,
+        .exposure_s = (float)bst_render_exposure_s(q),
+        .read_noise_e = (float)c->read_noise_e,
+        .full_well_e = (float)c->full_well_e,
+        .per_full_well = (float)(1.0 / c->full_well_e),
+        .near_full_e = (float)bst_detector_near_full_e(c->full_well_e),
+        .dn_per_e = (float)(1.0 / c->gain_e_per_dn),
+        .offset_dn = (float)c->offset_dn,
+        .max_dn = (float)((1 << c->bits) - 1),
+        .image_stride = w.width,
+        .map_step = map->step_px,
+        .map_x0 = map->x0_px,
+        .map_y0 = map->y0_px,
+        .map_columns = map->columns,
+        .map_rows = map->rows,
+    };
+}

@@ -1,0 +1,41 @@
+#include "scenegen/scene_options.h"
+
+#include <math.h>
+#include <stdio.h>
+
+#include "scenegen/place.h"
+#include "scenegen/profile_law.h"
+#include "scenegen/vignetting.h"
+#include "sim/world/skylight.h"
+
+void bst_scene_build_options(const bst_camera *camera, const bst_renderer_options *settings,
+                             int taps, int law_degree, bool fft_light, const bst_detector *detector,
+                             char *text, size_t bytes) {
+    double sigma_px = bst_camera_psf_sigma_px(camera);
+    int length = snprintf(text, bytes,
+                          "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d "
+                          "-DEDGE_SCALE=%.9ef -DPLACE_BITS=%d%s%s",
+                          settings->tile_width, settings->tile_height, settings->group, taps,
+                          1.0 / (sqrt(2.0) * sigma_px), bst_place_bits(camera),
+                          fft_light ? " -DFFT_LIGHT" : "",
+                          bst_skylight_varies(camera) ? " -DBACKGROUND" : "");
+    if (law_degree > 0) {
+        length +=
+            snprintf(text + length, bytes - (size_t)length, " -DDEGREE=%d -DBARELY_WIDER=%.9ef",
+                     law_degree, 1.0 / sqrt(1.0 + bst_profile_law_widest(sigma_px, law_degree)));
+    }
+    length += bst_vignetting_options(camera, text + length, bytes - (size_t)length);
+    length += bst_detector_options(detector, text + length, bytes - (size_t)length);
+    if (settings->spatial_oversample > 0) {
+        length += snprintf(text + length, bytes - (size_t)length, " -DSPATIAL_OVERSAMPLE=%d",
+                           settings->spatial_oversample);
+    }
+    const bst_distortion *d = &camera->distortion;
+    if (bst_camera_distorted(camera)) {
+        double a = bst_camera_scale_rad(camera), a2 = a * a, out = camera->geometry.domain / a;
+        snprintf(
+            text + length, bytes - (size_t)length,
+            " -DDISTORTED -DK1=%.9ef -DK2=%.9ef -DK3=%.9ef -DP1=%.9ef -DP2=%.9ef -DFOLD2=%.9ef",
+            d->k1 * a2, d->k2 * a2 * a2, d->k3 * a2 * a2 * a2, d->p1 * a, d->p2 * a, out * out);
+    }
+}

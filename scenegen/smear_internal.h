@@ -1,0 +1,80 @@
+/* What smear.c and smear_moving.c share. */
+#ifndef BST_SCENEGEN_SMEAR_INTERNAL_H
+#define BST_SCENEGEN_SMEAR_INTERNAL_H
+
+#include "scenegen/nodes.h"
+#include "scenegen/shape.h"
+#include "scenegen/smear.h"
+#include "scenegen/stamp.h"
+
+/* Fidelities: level n is right to about 0.08 * 2^-n of the smeared image's peak. */
+enum { BST_SMEAR_LEVELS = 14 };
+
+typedef struct bst_smear_level {
+    int first_block, blocks; /* blocks 0: not made in this frame */
+    double error;            /* expected, of the smeared image's peak */
+} bst_smear_level;
+
+struct bst_smear {
+    bst_camera camera;
+    bst_smear_options options;
+    double sigma_px, share_sigma_px, widest;
+    bst_stamp stamp;
+    double tolerance[BST_SMEAR_LEVELS];
+    double point_error,
+        edge_error; /* of stamps by the profile law, and without it, over the peak */
+    double half_diagonal_px;
+    double stretch;             /* of the image by distortion where it is greatest */
+    double far_px, place_parts; /* see place.h */
+
+    bst_los_track track;
+    bst_window window;
+    double margin_px, dark_variance_e2, duration_s;
+    bst_quat q_reference;
+    bst_quat *turn; /* attitude at each point of the path */
+    int *parts;     /* straight parts of the path from each sample of the track */
+    int turn_capacity, parts_capacity;
+    double tilt_rad, roll_rad; /* most of the camera's turn from the reference attitude */
+    double star_share;         /* largest share of a star's light on one pixel */
+    bool single;               /* stars share one track */
+    double spread_px;          /* by which stars in the corners move otherwise */
+    double travel_px;          /* largest distance of a node from its source's place */
+    double last_peak_e;
+    bst_crowd_source last_error;
+    bst_smear_level levels[BST_SMEAR_LEVELS];
+
+    bst_path_point *path, *own_path;
+    int path_count, path_capacity, own_capacity;
+    bst_node_list nodes;    /* scratch */
+    bst_disc_points points; /* scratch */
+    double disc_px;         /* radius of the present source's disc; 0: a point */
+    float *table;
+    int table_blocks, table_capacity;
+};
+
+/* Makes room for `need` items of so many bytes. */
+bst_status bst_smear_reserve(bst_ctx *ctx, void **items, int *capacity, int need,
+                             size_t bytes) BST_MUST_CHECK;
+
+/* Place on the focal plane from the boresight, px, without the distortion, which the kernel adds;
+ * false when it is not in front of the camera or far away. */
+bool bst_smear_project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, double *y);
+
+/* Adds to the scratch nodes those of a path that takes `part` of the exposure. */
+bst_status bst_smear_path_nodes(bst_ctx *ctx, bst_smear *s, const bst_path_point *path, int count,
+                                double part, double tolerance) BST_MUST_CHECK;
+
+/* Largest share of light on one pixel over the scratch nodes, where the distortion stretches the
+ * image least. Spoils their places. */
+double bst_smear_largest_share(bst_smear *s);
+
+/* The coarsest level whose predicted error is within the aim. */
+int bst_smear_choose_level(const bst_smear *s, double peak_e);
+
+/* Makes the scratch nodes of a source that moves by itself, changes or is a disc, relative to the
+ * place (x, y), and last_peak_e; none when it gives the sensor no light. electrons: in the
+ * exposure. */
+bst_status bst_smear_moving_nodes(bst_ctx *ctx, bst_smear *s, const bst_source *source,
+                                  double electrons, double x, double y) BST_MUST_CHECK;
+
+#endif

@@ -1,0 +1,213 @@
+/* A rolling shutter's times: closed forms, and the truth that follows from them. */
+#include "sim/world/row_exposure.h"
+
+#include <stdlib.h>
+
+#include "sim/core/rng.h"
+#include "sim/world/field.h"
+#include "sim/world/los_track.h"
+#include "tests/world/world_support.h"
+
+/* A part of a source's time is the same motion and the same light. */
+static void parts_are_the_same_polynomials(void **state) {
+    (void)state;
+    bst_rng_key key = bst_rng_make_key(1, 0, "test", "part");
+    bst_source_path path;
+    bst_source_rate rate = {.count = 7};
+    uint64_t n = 0;
+    for (int k = 0; k < BST_PATH_NODES; k++) {
+        path.place[k] = (bst_vec3){4e7 + 1e5 * k + 3e3 * bst_rng_uniform(key, 0, n++),
+                                   1e6 * bst_rng_uniform(key, 0, n++), 2e5 * k * k};
+    }
+    for (int k = 0; k < 3; k++) {
+        path.shift[k] = (bst_vec3){1e-5 * k, 1e-5 * bst_rng_uniform(key, 0, n++), 1e-6 * k * k};
+    }
+    /* knots with their integral, mean 1 */
+    double sum = 0.0;
+    for (int k = 0; k < rate.count; k++) {
+        rate.u[k] = k == 6 ? 1.0 : (k + 0.4 * (k % 2)) / 6.0;
+        rate.rate[k] = bst_rng_uniform(key, 1, (uint64_t)k);
+        sum += k > 0 ? 0.5 * (rate.u[k] - rate.u[k - 1]) * (rate.rate[k] + rate.rate[k - 1]) : 0.0;
+    }
+    for (int k = 0; k < rate.count; k++) {
+        rate.rate[k] /= sum;
+        rate.light[k] = k > 0 ? rate.light[k - 1] + 0.5 * (rate.u[k] - rate.u[k - 1]) *
+                                                        (rate.rate[k] + rate.rate[k - 1])
+                              : 0.0;
+    }
+    bst_source whole = {.path = &path, .rate = &rate, .electrons_per_s = 1000.0};
+    whole.apparent_mid = bst_vec3_unit(bst_source_direction(&whole, 0.5));
+    static const double spans[][2] = {{0, 1}, {0, 0.3}, {0.21, 0.22}, {0.4, 1}, {0.1, 0.95}};
+    for (size_t i = 0; i < sizeof spans / sizeof *spans; i++) {
+        bst_source_part part;
+        bst_source own;
+        double a = spans[i][0], b = spans[i][1];
+        bst_source_during(&whole, a, b, &part, &own);
+        for (int k = 0; k <= 20; k++) {
+            double v = k / 20.0, u = a + (b - a) * v;
+            bst_vec3 d = bst_source_direction(&whole, u), e = bst_source_direction(&own, v);
+            /* rounding of polynomials of 4e7 m */
+            bst_assert_close(test_distance(d, e), 0.0, 1e-6);
+            /* the light until then, per second of the whole */
+            double light =
+                whole.electrons_per_s * (bst_source_light(&whole, u) - bst_source_light(&whole, a));
+            bst_assert_close(own.electrons_per_s * (b - a) * bst_source_light(&own, v), light,
+                             1e-9);
+            bst_assert_close(own.electrons_per_s * bst_source_rate_at(&own, v),
+                             whole.electrons_per_s * bst_source_rate_at(&whole, u), 1e-9);
+        }
+        assert_true(bst_vec3_angle(own.apparent_mid, bst_source_direction(&own, 0.5)) < 1e-9);
+    }
+    /* no light in the part: none is left, and nothing divides by it */
+    rate = (bst_source_rate){.count = 3, .u = {0, 0.5, 1}, .rate = {4, 0, 0}, .light = {0, 1, 1}};
+    bst_source_part part;
+    bst_source dark;
+    bst_source_during(&whole, 0.6, 0.8, &part, &dark);
+    assert_true(dark.electrons_per_s == 0.0 && !dark.rate);
+}
+
+/* An image that runs down with v px/s under rows that start t seconds apart: its row is exposed for
+ * T / (1 - v t), from (y0 - middle) t / (1 - v t) on. */
+static void a_running_image_is_exposed_longer(void **state) {
+    (void)state;
+    bst_camera camera = {.width_px = 400, .height_px = 300, .pixel_scale_arcsec = 3};
+    double scale = bst_camera_scale_rad(&camera), duration = 1.2, exposure = 0.2;
+    static const double speeds[] = {0, 40, -40, 150}, steps[] = {1e-3, -1e-3, 3e-3};
+    for (int i = 0; i < 4; i++) {
+        for (int k = 0; k < 3; k++) {
+            double v = speeds[i], t = steps[k];
+            double time_s[2] = {0, duration};
+            /* the star is at y = 149.5 + 20 in the middle of the track */
+            bst_quat q[2];
+            for (int n = 0; n < 2; n++) {
+                double y = v * (time_s[n] - 0.5 * duration);
+                q[n] = bst_quat_from_rotvec((bst_vec3){-y * scale, 0, 0});
+            }
+            bst_los_track track = {2, time_s, q};
+            bst_source star = {.apparent_mid = bst_camera_unproject(&camera, 100, 169.5),
+                               .electrons_per_s = 1};
+            bst_row_times rows = {t, exposure, {0, 0, 400, 300}};
+            double u[2], stretch = 1.0 / (1.0 - v * t);
+            bst_row_source_times(&camera, &rows, &track, &star, u);
+            /* measured from the middle of the track; its place then is 20 px below the middle row;
+             * the row there starts at -exposure / 2 + (20 + v t') t */
+            double start = (-0.5 * exposure + 20 * t) * stretch;
+            double end = start + exposure * stretch;
+            /* tangent plane: 1e-7 of the motion */
+            bst_assert_close(u[0] * duration - 0.5 * duration, start, 1e-5);
+            bst_assert_close(u[1] * duration - 0.5 * duration, end, 1e-5);
+        }
+    }
+    /* outside of the window its nearest row counts */
+    bst_quat still[2] = {{0, 0, 0, 1}, {0, 0, 0, 1}};
+    double time_s[2] = {0, duration}, u[2];
+    bst_los_track track = {2, time_s, still};
+    bst_row_times rows = {1e-3, exposure, {0, 100, 400, 101}};
+    bst_source star = {.apparent_mid = bst_camera_unproject(&camera, 100, 20)};
+    bst_row_source_times(&camera, &rows, &track, &star, u);
+    bst_assert_close(u[0] * duration, 0.5 * (duration - exposure) - 50e-3, 1e-12);
+    bst_assert_close((u[1] - u[0]) * duration, exposure, 1e-12);
+}
+
+/* Through the field query. */
+static void truth_is_that_of_each_row(void **state) {
+    (void)state;
+    enum { RATE = 6000, SAMPLES = 1001 };
+    const double row_s = 5e-5, vx = 30, vy = -60;
+    char text[2000];
+    snprintf(text, sizeof text,
+             "{\"world\": {\"star_catalogue\": \"embedded\", \"faint_stars\": \"statistical\", "
+             "\"faint_limit_v_mag\": 13}, \"observers\": [{\"name\": \"a\", " TEST_NEOSSAT
+             ", \"sensors\": [{\"cue\": {\"direction_radec_deg\": [266.0, -10.0]}, "
+             "\"camera\": {\"pixel_scale_arcsec\": 3, \"aperture_m\": 0.15, \"detector\": "
+             "{\"row_time_s\": %g}}}]}]}",
+             row_s);
+    bst_ctx ctx = {0};
+    bst_world *world = test_world(text);
+    const bst_camera *camera = bst_world_camera(world, 0, 0);
+    bst_field *field;
+    bst_assert_ok(&ctx, bst_field_create(&ctx, world, 0, 0, &field));
+    bst_los_history *h = calloc(1, sizeof *h + SAMPLES * sizeof *h->items);
+    h->capacity = SAMPLES;
+    h->written = SAMPLES;
+    double scale = bst_camera_scale_rad(camera);
+    for (int32_t k = 0; k < SAMPLES; k++) {
+        double t = (6.0 * k - 3000) / RATE;
+        bst_vec3 turn = {-vy * t * scale, vx * t * scale, 0};
+        h->items[k] = (bst_los_sample){
+            6 * k, bst_quat_mul(bst_quat_from_rotvec(turn), bst_world_body_attitude(world, 0, 0))};
+    }
+    const bst_window full = {0, 0, 1024, 1024};
+    int64_t start = 2400, end = 3600;
+    int64_t lead = bst_detector_lead_ticks(&camera->detector, 1024, RATE);
+    assert_int_equal(lead, 154); /* 511.5 rows of 50 us: 153.45 ticks */
+    bst_los_track track;
+    bst_truth truth = {0};
+    const bst_source *sources;
+    int count, seen = 0;
+    bst_field_options options = {.v_limit = 16, .lead_s = (double)lead / RATE};
+    bst_assert_ok(&ctx, bst_field_track(&ctx, field, h, start - lead, end + lead, RATE, &track));
+    bst_assert_ok(&ctx, bst_field_query(&ctx, field, &track, start, end, RATE, full, &options,
+                                        &truth, &sources, &count));
+    /* the header is the middle row's */
+    assert_int_equal(truth.start_tick, start);
+    bst_quat middle = bst_quat_mul(truth.q_cam_from_gcrf_mid,
+                                   bst_quat_conj(bst_world_body_attitude(world, 0, 0)));
+    assert_true(bst_vec3_norm(bst_quat_to_rotvec(middle)) < 1e-9);
+    double exposure = 0.2, stretch = 1.0 / (1.0 - vy * row_s);
+    for (int i = 0; i < count; i++) {
+        bst_truth_item item;
+        bst_field_truth_item(field, &track, &sources[i], full, &truth, &item);
+        if (!(item.flags & BST_TRUTH_IN_FIELD) || fabs(item.y_mid_px - 511.5) > 490 ||
+            item.flags & BST_TRUTH_OCCULTED) {
+            continue;
+        }
+        seen++;
+        double x, y;
+        bst_vec3 v = bst_quat_rotate(truth.q_cam_from_gcrf_mid, sources[i].apparent_mid);
+        assert_true(bst_camera_project(camera, v, &x, &y));
+        /* the row's own middle, while the image moved on; 1e-4 of the motion off the axis */
+        double delay = (y - 511.5) * row_s * stretch;
+        bst_assert_close(item.delay_s, delay, 1e-6);
+        bst_assert_close(item.x_mid_px, x + vx * delay, 2e-3);
+        bst_assert_close(item.y_mid_px, y + vy * delay, 2e-3);
+        bst_assert_close(item.x_end_px - item.x_start_px, vx * exposure * stretch, 2e-3);
+        bst_assert_close(item.y_end_px - item.y_start_px, vy * exposure * stretch, 2e-3);
+        bst_assert_close(item.x_mean_px, item.x_mid_px, 2e-3);
+        bst_assert_close(item.y_mean_px, item.y_mid_px, 2e-3);
+        double e = sources[i].electrons_per_s * exposure * stretch;
+        bst_assert_close(item.electrons, e, 1e-4 * e);
+    }
+    assert_true(seen > 50);
+    /* the history ends before the last row does */
+    assert_int_equal(bst_field_track(&ctx, field, h, start - lead, 6000 + lead, RATE, &track),
+                     BST_ERR_STATE);
+    assert_non_null(strstr(ctx.message, "history_s"));
+    free(h);
+    bst_field_free(field);
+    bst_world_free(world);
+}
+
+static void contradictions_are_refused(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_camera camera = {.width_px = 10, .height_px = 10, .pixel_scale_arcsec = 3};
+    camera.detector.row_time_s = 1e-5;
+    bst_assert_ok(&ctx, bst_camera_prepare(&ctx, &camera));
+    camera.detector.frame_transfer_s = 1e-3;
+    assert_int_equal(bst_camera_prepare(&ctx, &camera), BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "row_time_s"));
+    camera.detector.frame_transfer_s = 0;
+    camera.detector.full_well = BST_WELL_BLOOM;
+    assert_int_equal(bst_camera_prepare(&ctx, &camera), BST_ERR_CONFIG);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(parts_are_the_same_polynomials),
+        cmocka_unit_test(a_running_image_is_exposed_longer),
+        cmocka_unit_test(truth_is_that_of_each_row),
+        cmocka_unit_test(contradictions_are_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

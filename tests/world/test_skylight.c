@@ -1,0 +1,450 @@
+/* Background of the sky against published numbers and closed forms. */
+#include "sim/world/skylight.h"
+
+#include "sim/world/stray.h"
+#include "sim/world/zodiacal.h"
+#include "tests/world/world_support.h"
+
+#define FULL_SUN pow(10.0, 0.4 * 26.74)
+
+/* Leinert et al. 1998, table 16, and section 8.3 for the pole. */
+static void zodiacal_light_is_the_published_table(void **state) {
+    (void)state;
+    static const double rows[][3] = {{15, 0, 9000}, {90, 0, 202},  {60, 30, 143}, {0, 20, 1260},
+                                     {180, 0, 180}, {135, 5, 139}, {120, 60, 60}, {45, 45, 130},
+                                     {0, 90, 60},   {77, 90, 60},  {0, 15, 2450}, {165, 75, 56}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        for (int s = 0; s < 4; s++) { /* both hemispheres, both sides of the Sun */
+            double l = (s & 1 ? -1 : 1) * rows[i][0] * BST_DEG_RAD;
+            double b = (s & 2 ? -1 : 1) * rows[i][1] * BST_DEG_RAD;
+            /* log and exp of a double */
+            bst_assert_close(bst_zodiacal_s10(l, b), rows[i][2], 1e-9 * rows[i][2]);
+            bst_assert_close(bst_zodiacal_s10(l + 2 * BST_PI, b), rows[i][2], 1e-9 * rows[i][2]);
+        }
+    }
+    /* the pole in magnitudes per square arcsecond; 23.33 is often rounded to 23.3 */
+    bst_assert_close(10 - 2.5 * log10(60.0) + 5 * log10(3600.0), 23.336, 1e-3);
+    /* continued inwards it meets the table's own value in the empty corner */
+    bst_assert_close(bst_zodiacal_s10(10 * BST_DEG_RAD, 10 * BST_DEG_RAD), 3700, 20);
+    /* no jump on the border, brighter towards the Sun, finite at its centre */
+    double before = 0;
+    for (double d = 40; d >= 0.5; d -= 0.01) {
+        double now = bst_zodiacal_s10(0.7 * d * BST_DEG_RAD, 0.6 * d * BST_DEG_RAD);
+        assert_true(now >= before && (d > 39.99 || now < (1 + 0.03 / d) * before));
+        before = now;
+    }
+    assert_true(isfinite(bst_zodiacal_s10(0, 0)) && bst_zodiacal_s10(0, 0) > before);
+}
+
+static void the_ecliptic_is_where_it_is(void **state) {
+    (void)state;
+    double e = 84381.406 * BST_ARCSEC_RAD;
+    bst_vec3 pole = {0, -sin(e), cos(e)}, sun = {-3e10, cos(e) * 1e11, sin(e) * 1e11};
+    bst_assert_close(bst_zodiacal_towards(pole, sun), 60, 1e-6);
+    bst_assert_close(bst_zodiacal_towards(bst_vec3_unit(bst_vec3_scale(sun, -1)), sun), 180, 1e-6);
+    bst_vec3 quarter = bst_vec3_unit(bst_vec3_cross(pole, sun));
+    bst_assert_close(bst_zodiacal_towards(quarter, sun), 202, 1e-6);
+    bst_assert_close(bst_zodiacal_towards(bst_vec3_scale(quarter, -1), sun), 202, 1e-6);
+}
+
+/* Krisciunas and Schaefer 1991. */
+static void the_moon_has_its_phases(void **state) {
+    (void)state;
+    bst_vec3 moon = {3.844e8, 0, 0};
+    /* phase angles of 0, 90 and 180 degrees: 0.026 * 90 + 4e-9 * 90^4 = 2.6024 */
+    bst_assert_close(bst_moon_v_mag(moon, (bst_vec3){-BST_AU_M, 0, 0}), -12.73, 1e-9);
+    bst_assert_close(bst_moon_v_mag(moon, (bst_vec3){0, BST_AU_M, 0}), -12.73 + 2.60244, 1e-9);
+    bst_assert_close(bst_moon_v_mag(moon, (bst_vec3){BST_AU_M, 0, 0}), -12.73 + 8.87904, 1e-9);
+    /* twice as far: 5 log10 2 */
+    bst_assert_close(bst_moon_v_mag(bst_vec3_scale(moon, 2), (bst_vec3){-BST_AU_M, 0, 0}),
+                     -12.73 + 1.50515, 1e-5);
+}
+
+static bst_pst *make_pst(const bst_pst_point *points, int count) {
+    bst_ctx ctx = {0};
+    bst_background_config c = {.pst = {(void *)points, count}, .pixel_um = 10};
+    bst_pst *pst;
+    bst_assert_ok(&ctx, bst_pst_create(&ctx, &c, 0, "", &pst));
+    return pst;
+}
+
+static void transmittance_is_log_linear(void **state) {
+    (void)state;
+    bst_pst *pst = make_pst((bst_pst_point[]){{20, 1e-3}, {40, 1e-5}, {60, 0}}, 3);
+    bst_assert_close(bst_pst_at(pst, 30 * BST_DEG_RAD), 1e-4, 1e-15); /* geometric mean */
+    bst_assert_close(bst_pst_at(pst, 50 * BST_DEG_RAD), 5e-6, 1e-17); /* next to a zero */
+    bst_assert_close(bst_pst_at(pst, 0), 1e-3, 0);
+    bst_assert_close(bst_pst_at(pst, 3), 0, 0);
+    bst_pst_free(pst);
+    bst_ctx ctx = {0};
+    bst_pst_point wrong[] = {{20, 1e-3}, {20, 1e-5}};
+    bst_background_config c = {.pst = {wrong, 2}, .pixel_um = 10};
+    assert_int_equal(bst_pst_create(&ctx, &c, 0, "", &pst), BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "pst/1/angle_deg"));
+    c.pst.count = 1;
+    c.pixel_um = 0;
+    assert_int_equal(bst_pst_create(&ctx, &c, 0, "", &pst), BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "pixel_um"));
+}
+
+static void stray_light_by_hand(void **state) {
+    (void)state;
+    bst_pst *flat = make_pst((bst_pst_point[]){{0, 1}}, 1);
+    bst_vec3 x = {1, 0, 0};
+    bst_bodies bodies = {.sun_m = {BST_AU_M, 0, 0}, .moon_m = {0, 3.844e8, 0}};
+    bst_background_config sun = {.sun = true}, moon = {.moon = true},
+                          earth = {.earth = true, .earth_albedo = 0.3};
+    bst_vec3 day = {4e7, 0, 0}, night = {-4e7, 0, 0};
+    double au = (BST_AU_M - 4e7) / BST_AU_M;
+    bst_assert_close(bst_stray_irradiance(flat, &sun, day, &bodies, x), FULL_SUN / (au * au),
+                     1e-9 * FULL_SUN);
+    /* inside the Earth's shadow */
+    assert_true(bst_stray_irradiance(flat, &sun, night, &bodies, x) == 0);
+    /* a quarter Moon, seen from the Earth's centre's distance; hidden behind the Earth */
+    double v =
+        bst_moon_v_mag(bst_vec3_sub(bodies.moon_m, day), bst_vec3_sub(bodies.sun_m, bodies.moon_m));
+    bst_assert_close(bst_stray_irradiance(flat, &moon, day, &bodies, x), pow(10, -0.4 * v),
+                     1e-6 * pow(10, -0.4 * v));
+    assert_true(bst_stray_irradiance(flat, &moon, (bst_vec3){0, -7e6, 0}, &bodies, x) == 0);
+    /* from afar the Earth is a Lambertian sphere: 2/3 albedo (R / r)^2 at full phase, 1/pi of that
+     * at half; the midpoint rule's 512 cells are good to 1 % */
+    for (int half = 0; half < 2; half++) {
+        bst_vec3 eye = half ? (bst_vec3){0, 0, 1e9} : (bst_vec3){1e9, 0, 0};
+        double ratio = BST_EARTH_RADIUS_M / 1e9;
+        double expected = FULL_SUN * 2.0 / 3.0 * 0.3 * ratio * ratio * (half ? 1 / BST_PI : 1);
+        bst_assert_close(bst_stray_irradiance(flat, &earth, eye, &bodies, x), expected,
+                         0.01 * expected);
+    }
+    /* the night side sends nothing; the Sun's place decides, not the Earth's */
+    assert_true(bst_stray_irradiance(flat, &earth, (bst_vec3){-1e9, 0, 0}, &bodies, x) <
+                1e-6 * FULL_SUN * 1e-5);
+    bst_pst_free(flat);
+    bst_pst *steep = make_pst((bst_pst_point[]){{30, 1e-2}, {90, 1e-8}}, 2);
+    double near = bst_stray_irradiance(steep, &sun, day, &bodies, bst_vec3_from_radec(0.6, 0));
+    double far = bst_stray_irradiance(steep, &sun, day, &bodies, bst_vec3_from_radec(1.2, 0));
+    /* 0.6 rad further out: 34.377 degrees of 0.1 decade each */
+    bst_assert_close(log10(near / far), 0.1 * 0.6 / BST_DEG_RAD, 1e-9);
+    bst_pst_free(steep);
+}
+
+/* A camera that looks along -x, columns along y, from `eye`. */
+static bst_surroundings look_down(bst_vec3 eye, double y_rad) {
+    bst_surroundings a = {.eye_m = eye,
+                          .bodies = {.sun_m = {BST_AU_M, 0, 0}, .moon_m = {0, 0, 3.844e8}},
+                          .itrf_from_gcrf = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
+                          .exposure_s = 1};
+    a.light.sun_m = bst_vec3_sub(a.bodies.sun_m, eye);
+    /* rows of the rotation: camera axes in GCRF */
+    double c = cos(y_rad), s = sin(y_rad);
+    bst_vec3 z = {-c, s, 0}, xx = {s, c, 0}, yy = bst_vec3_cross(z, xx);
+    bst_mat3 m = {{{xx.x, xx.y, xx.z}, {yy.x, yy.y, yy.z}, {z.x, z.y, z.z}}};
+    for (int k = 0; k <= BST_DISC_PARTS; k++) {
+        a.q[k] = bst_quat_from_mat3(&m);
+    }
+    return a;
+}
+
+static bst_camera test_camera(double scale_arcsec) {
+    return (bst_camera){.width_px = 256,
+                        .height_px = 256,
+                        .pixel_scale_arcsec = scale_arcsec,
+                        .psf_fwhm_px = 2,
+                        .background = {.model = BST_BACKGROUND_SKY,
+                                       .earth = true,
+                                       .moon = true,
+                                       .sun = true,
+                                       .earth_albedo = 0.3}};
+}
+
+/* From (r, 0) the tangent to the ellipse x^2 / a^2 + z^2 / b^2 = 1 has the slope b / sqrt(r^2 -
+ * a^2); in the equator's plane the limb is at asin(a / r). */
+static void the_limb_is_where_geometry_has_it(void **state) {
+    (void)state;
+    static const double radii[] = {6.7e6, 7.2e6, 4.2164e7, 3.8e8};
+    bst_camera camera = test_camera(3);
+    for (int i = 0; i < 4; i++) {
+        double r = radii[i], a = BST_EARTH_RADIUS_M, b = a * (1 - BST_EARTH_FLATTENING);
+        double angle[2] = {asin(a / r), atan(b / sqrt(r * r - a * a))};
+        for (int polar = 0; polar < 2; polar++) {
+            bst_surroundings around = look_down((bst_vec3){r, 0, 0}, 0);
+            around.exposure_s = 1e-3; /* the observer falls by less than a micrometre */
+            /* turned so that the boresight is 20 px inside of the limb */
+            double scale = bst_camera_scale_rad(&camera), to = angle[polar] - 20 * scale;
+            bst_quat turn =
+                bst_quat_from_rotvec(polar ? (bst_vec3){to, 0, 0} : (bst_vec3){0, -to, 0});
+            for (int k = 0; k <= BST_DISC_PARTS; k++) {
+                around.q[k] = bst_quat_mul(turn, around.q[k]);
+            }
+            bst_discs discs;
+            bst_discs_make(&camera, &around, &discs);
+            assert_true(discs.body[BST_BODY_EARTH].present);
+            /* the side on which the limb is */
+            double found = NAN;
+            for (int sign = -1; sign <= 1; sign += 2) {
+                double low = 0, high = 200;
+                for (int n = 0; n < 60; n++) {
+                    double px = 0.5 * (low + high), t = sign * px * scale;
+                    bst_vec3 d = bst_vec3_unit((bst_vec3){polar ? 0 : t, polar ? t : 0, 1});
+                    if (bst_discs_light(&discs, d).earth > 0.5) {
+                        low = px;
+                    } else {
+                        high = px;
+                    }
+                }
+                found = low < 199 ? low : found;
+            }
+            bst_assert_close(found, tan(20 * scale) / scale, 1e-5); /* px; bisection and rounding */
+        }
+    }
+}
+
+/* Stars vanish where the disc is drawn, aberration by Earth and observer included. */
+static void stars_set_at_the_limb(void **state) {
+    (void)state;
+    bst_camera camera = test_camera(3);
+    bst_vec3 eye = {7.2e6, 0, 0};
+    bst_surroundings around = look_down(eye, 0);
+    around.exposure_s = 1e-3;
+    around.eye_mps = (bst_vec3){0, 5e3, 5.5e3};
+    around.bodies.earth_bary_mps = (bst_vec3){0, 2e4, -2.2e4};
+    around.light = bst_light_at(&around.bodies, eye, around.eye_mps);
+    bst_light geocentric = bst_light_at(&around.bodies, eye, (bst_vec3){0, 0, 0});
+    double to = asin(BST_EARTH_RADIUS_M / 7.2e6), scale = bst_camera_scale_rad(&camera);
+    for (int k = 0; k <= BST_DISC_PARTS; k++) {
+        around.q[k] = bst_quat_mul(bst_quat_from_rotvec((bst_vec3){0, -to, 0}), around.q[k]);
+    }
+    bst_discs discs;
+    bst_discs_make(&camera, &around, &discs);
+    int hidden = 0, seen = 0;
+    for (int i = 0; i < 400; i++) {
+        bst_vec3 d =
+            bst_vec3_unit((bst_vec3){(i % 40 - 20) * 0.25 * scale, (i / 40 - 5) * 25 * scale, 1});
+        double share = bst_discs_light(&discs, d).earth;
+        bst_vec3 star =
+            bst_light_catalogue_star(&around.light, bst_quat_rotate(bst_quat_conj(around.q[0]), d));
+        bst_vec3 far = bst_vec3_axpy(eye, 1e12, bst_light_apparent_star(&geocentric, star));
+        bool occulted = bst_earth_occults(eye, far, &around.itrf_from_gcrf);
+        hidden += occulted;
+        seen += !occulted;
+        /* 0.05 px of an edge that the PSF softens to 0.9 px */
+        assert_true(occulted ? share > 0.48 : share < 0.52);
+    }
+    assert_true(hidden > 50 && seen > 50);
+}
+
+/* Light of a whole disc, summed over pixels much smaller than it. */
+static double disc_flux(const bst_camera *camera, const bst_discs *discs) {
+    double sum = 0, scale = bst_camera_scale_rad(camera);
+    for (int y = 0; y < camera->height_px; y++) {
+        for (int x = 0; x < camera->width_px; x++) {
+            sum += bst_discs_light(discs, bst_camera_unproject(camera, x, y)).sunlight;
+        }
+    }
+    return sum * scale * scale;
+}
+
+static void discs_hold_their_light(void **state) {
+    (void)state;
+    bst_camera camera = test_camera(10);
+    camera.background.earth = false;
+    bst_vec3 eye = {0, 0, 0};
+    for (int degrees = 0; degrees < 180; degrees += 30) {
+        bst_surroundings around = look_down(eye, 0);
+        double phase = degrees * BST_DEG_RAD;
+        /* straight ahead, the Sun `phase` from opposition */
+        around.bodies.moon_m = (bst_vec3){-3.844e8, 0, 0};
+        around.bodies.sun_m = bst_vec3_add(
+            around.bodies.moon_m, (bst_vec3){BST_AU_M * cos(phase), BST_AU_M * sin(phase), 0});
+        around.light.sun_m = around.bodies.sun_m;
+        bst_discs discs;
+        bst_discs_make(&camera, &around, &discs);
+        assert_true(discs.body[BST_BODY_MOON].present && !discs.body[BST_BODY_SUN].present);
+        double expected =
+            pow(10, -0.4 * bst_moon_v_mag(around.bodies.moon_m,
+                                          bst_vec3_sub(around.bodies.sun_m, around.bodies.moon_m)));
+        /* pixels of 1/93 of the radius, the edge softened as if it were straight: 2 % */
+        bst_assert_close(disc_flux(&camera, &discs), expected, 0.02 * expected);
+    }
+    bst_surroundings around = look_down(eye, 0);
+    around.bodies.sun_m = (bst_vec3){-BST_AU_M, 0, 0};
+    around.light.sun_m = around.bodies.sun_m;
+    bst_discs discs;
+    bst_discs_make(&camera, &around, &discs);
+    assert_true(discs.body[BST_BODY_SUN].present);
+    bst_assert_close(disc_flux(&camera, &discs), FULL_SUN, 0.005 * FULL_SUN);
+    /* mean radiance over a disc of 959.63 arcsec: finite */
+    bst_vec3 z = {0, 0, 1};
+    double radius = asin(BST_SUN_RADIUS_M / BST_AU_M);
+    bst_assert_close(bst_discs_light(&discs, z).sunlight, FULL_SUN / (BST_PI * radius * radius),
+                     1e-6 * FULL_SUN / (BST_PI * radius * radius));
+}
+
+/* A disc that moves during the exposure against the mean of many that stand still. */
+static void moving_edges_are_the_mean_of_their_places(void **state) {
+    (void)state;
+    bst_camera camera = test_camera(20);
+    bst_surroundings around = look_down((bst_vec3){4.2164e7, 0, 0}, 0);
+    double to = asin(BST_EARTH_RADIUS_M / 4.2164e7), scale = bst_camera_scale_rad(&camera);
+    bst_quat q0 = around.q[0];
+    const double move_px = 60;
+    for (int k = 0; k <= BST_DISC_PARTS; k++) {
+        double t = to + move_px * scale * ((double)k / BST_DISC_PARTS - 0.5);
+        around.q[k] = bst_quat_mul(bst_quat_from_rotvec((bst_vec3){0, -t, 0}), q0);
+    }
+    bst_discs moving;
+    bst_discs_make(&camera, &around, &moving);
+    enum { STILLS = 200 };
+    double share[11] = {0}, light[11] = {0};
+    for (int n = 0; n < STILLS; n++) {
+        double t = to + move_px * scale * ((n + 0.5) / STILLS - 0.5);
+        bst_surroundings still = around;
+        for (int k = 0; k <= BST_DISC_PARTS; k++) {
+            still.q[k] = bst_quat_mul(bst_quat_from_rotvec((bst_vec3){0, -t, 0}), q0);
+        }
+        bst_discs discs;
+        bst_discs_make(&camera, &still, &discs);
+        for (int i = 0; i < 11; i++) {
+            bst_disc_light l =
+                bst_discs_light(&discs, bst_vec3_unit((bst_vec3){(i - 5) * 8 * scale, 0, 1}));
+            share[i] += l.earth / STILLS;
+            light[i] += l.sunlight / STILLS;
+        }
+    }
+    double most = 0.3 / BST_PI * FULL_SUN;
+    for (int i = 0; i < 11; i++) {
+        bst_disc_light l =
+            bst_discs_light(&moving, bst_vec3_unit((bst_vec3){(i - 5) * 8 * scale, 0, 1}));
+        bst_assert_close(l.earth, share[i], 2e-3); /* 200 steps of 0.3 px; edge taken as straight */
+        /* the surface's light is that of the middle of each of a few stretches */
+        bst_assert_close(l.sunlight, light[i], 0.02 * most);
+    }
+}
+
+#define SKY_WORLD(size, background)                                                    \
+    "{\"world\": {\"star_catalogue\": \"embedded\"}, \"observers\": [{\"name\": "      \
+    "\"neossat\", " TEST_NEOSSAT                                                       \
+    ", \"sensors\": [{\"camera\": {\"pixel_scale_arcsec\": 20, \"aperture_m\": 0.15, " \
+    "\"width_px\": " size ", \"height_px\": " size                                     \
+    ", \"background_mag_arcsec2\": 21, \"background\": {" background "}}}]}]}"
+
+static const bst_skylight_map *make(bst_world *world, const bst_surroundings *around,
+                                    bst_window window, bst_skylight **skylight) {
+    bst_ctx ctx = {0};
+    const bst_skylight_map *map;
+    bst_assert_ok(&ctx, bst_skylight_create(&ctx, world, bst_world_camera(world, 0, 0), skylight));
+    bst_assert_ok(&ctx, bst_skylight_make(&ctx, *skylight, around, window, &map));
+    return map;
+}
+
+static void gradients_are_polynomials(void **state) {
+    (void)state;
+    bst_world *world = test_world(SKY_WORLD("300",
+                                            "\"stray_e_per_s\": 5, \"gradient_e_per_s\": [2, -1], "
+                                            "\"curvature_e_per_s\": [1, -0.5, 0.25]"));
+    const bst_camera *camera = bst_world_camera(world, 0, 0);
+    assert_true(bst_skylight_varies(camera));
+    bst_surroundings around = look_down((bst_vec3){7e6, 0, 0}, 2);
+    around.exposure_s = 3;
+    bst_skylight *s;
+    const bst_skylight_map *map = make(world, &around, (bst_window){0, 0, 300, 300}, &s);
+    assert_int_equal(map->step_px, 32);
+    double sky = bst_camera_background_e_per_s(camera);
+    for (int i = 0; i < 300; i += 13) {
+        int j = (i * 7) % 300;
+        double u = (2.0 * i + 1) / 300 - 1, v = (2.0 * j + 1) / 300 - 1;
+        double e = sky + 5 + 2 * u - v + u * u - 0.5 * u * v + 0.25 * v * v;
+        /* a cell's curvature: (32 / 150)^2 / 4 at most for u^2, a quarter of that for v^2; floats
+         */
+        bst_assert_close(bst_skylight_at(map, i, j), 3 * e, 3 * 1.25 * 0.0455 / 4 + 1e-5 * e);
+    }
+    bst_skylight_free(s);
+    bst_world_free(world);
+}
+
+/* The same place has the same bits in every window, and between nodes the sky is met to 2e-3. */
+static void windows_and_interpolation(void **state) {
+    (void)state;
+    bst_world *world =
+        test_world(SKY_WORLD("1000",
+                             "\"model\": \"sky\", \"starlight\": false, \"earth\": false, "
+                             "\"moon\": false, \"sun\": false"));
+    const bst_camera *camera = bst_world_camera(world, 0, 0);
+    bst_surroundings around = look_down((bst_vec3){7e6, 0, 0}, BST_PI - 0.5);
+    bst_skylight *a, *b;
+    const bst_skylight_map *whole = make(world, &around, (bst_window){0, 0, 1000, 1000}, &a);
+    const bst_skylight_map *part = make(world, &around, (bst_window){437, 611, 130, 7}, &b);
+    double pixel_sr = bst_camera_scale_rad(camera) * bst_camera_scale_rad(camera), worst = 0;
+    bst_mat3 back = bst_quat_to_mat3(bst_quat_conj(around.q[0]));
+    for (int y = 611; y < 618; y++) {
+        for (int x = 437; x < 567; x++) {
+            assert_true(bst_skylight_at(whole, x, y) == bst_skylight_at(part, x, y));
+        }
+    }
+    for (int y = 3; y < 1000; y += 17) {
+        for (int x = 5; x < 1000; x += 19) {
+            bst_vec3 d = bst_mat3_mul_vec(&back, bst_camera_unproject(camera, x, y));
+            double e = bst_camera_electrons_per_s(camera, 10) * pixel_sr /
+                       (BST_DEG_RAD * BST_DEG_RAD) *
+                       bst_zodiacal_towards(d, bst_vec3_sub(around.bodies.sun_m, around.eye_m));
+            worst = fmax(worst, fabs(bst_skylight_at(whole, x, y) / e - 1));
+        }
+    }
+    assert_true(worst > 0 && worst < 2e-3);
+    bst_skylight_free(a);
+    bst_skylight_free(b);
+    bst_world_free(world);
+}
+
+/* With an edge on the sensor the map is drawn pixel by pixel, the same in every window. */
+static void edges_are_drawn_pixel_by_pixel(void **state) {
+    (void)state;
+    bst_world *world = test_world(SKY_WORLD("300", "\"model\": \"sky\""));
+    const bst_camera *camera = bst_world_camera(world, 0, 0);
+    bst_surroundings around = look_down((bst_vec3){4.2164e7, 0, 0}, 0);
+    double to = asin(BST_EARTH_RADIUS_M / 4.2164e7);
+    for (int k = 0; k <= BST_DISC_PARTS; k++) {
+        around.q[k] = bst_quat_mul(bst_quat_from_rotvec((bst_vec3){0, -to, 0}), around.q[k]);
+    }
+    bst_skylight *a, *b;
+    const bst_skylight_map *whole = make(world, &around, (bst_window){0, 0, 300, 300}, &a);
+    const bst_skylight_map *part = make(world, &around, (bst_window){2, 100, 31, 12}, &b);
+    assert_true(whole->step_px == 1 && part->step_px == 1 && whole->columns == 300);
+    for (int y = 100; y < 112; y++) {
+        for (int x = 2; x < 33; x++) {
+            assert_true(bst_skylight_at(whole, x, y) == bst_skylight_at(part, x, y));
+        }
+    }
+    /* full daylight on one side, with the limb's glancing light; the dark sky on the other */
+    double scale = bst_camera_scale_rad(camera);
+    double day = bst_camera_electrons_per_s(camera, 0) * scale * scale * 0.3 / BST_PI * FULL_SUN;
+    double left = bst_skylight_at(whole, 0, 150), right = bst_skylight_at(whole, 299, 150);
+    double bright = fmax(left, right), dark = fmin(left, right);
+    /* 150 px of 20 arcsec inside the limb, seen at an angle from the normal of asin(sine), which is
+     * the Sun's less the direction's own; 1 % for the tangent plane and the flattening */
+    double from_nadir = to - 150 * scale;
+    double sine = sin(from_nadir) * 4.2164e7 / BST_EARTH_RADIUS_M;
+    double sunward = cos(asin(sine) - from_nadir);
+    bst_assert_close(bright, day * sunward, 0.01 * day * sunward);
+    assert_true(dark < 1e-3 * bright && dark > 0);
+    bst_skylight_free(a);
+    bst_skylight_free(b);
+    bst_world_free(world);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(zodiacal_light_is_the_published_table),
+        cmocka_unit_test(the_ecliptic_is_where_it_is),
+        cmocka_unit_test(the_moon_has_its_phases),
+        cmocka_unit_test(transmittance_is_log_linear),
+        cmocka_unit_test(stray_light_by_hand),
+        cmocka_unit_test(the_limb_is_where_geometry_has_it),
+        cmocka_unit_test(stars_set_at_the_limb),
+        cmocka_unit_test(discs_hold_their_light),
+        cmocka_unit_test(moving_edges_are_the_mean_of_their_places),
+        cmocka_unit_test(gradients_are_polynomials),
+        cmocka_unit_test(windows_and_interpolation),
+        cmocka_unit_test(edges_are_drawn_pixel_by_pixel),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
