@@ -160,7 +160,8 @@ static bst_status make_shares(bst_ctx *ctx, bst_light_fft *f) {
         memset(s, 0, sizeof *s);
         for (int l = 0; l < BLOCK; l++) {
             int cell;
-            float u = (float)cell_place(f, &f->shape.x, f->cells_x, i * BLOCK + l, &cell);
+            float u =
+                (float)bst_light_fft_cell_place(f, &f->shape.x, f->cells_x, i * BLOCK + l, &cell);
             s->cell = l == 0 ? cell : s->cell;
             s->share[cell - s->cell][l] = 1.0f - u;
             s->share[cell - s->cell + 1][l] = u;
