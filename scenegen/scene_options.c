@@ -22,7 +22,7 @@ void bst_scene_build_options(const bst_camera *camera, const bst_renderer_option
     if (law_degree > 0) {
         length +=
             snprintf(text + length, bytes - (size_t)length, " -DDEGREE=%d -DBARELY_WIDER=%.9ef",
-                     law_degree, 1.0 / sqrt(1.0 + bst_profile_law_widest(sigma_px, law_degree)));
+                     law_degree, bst_profile_law_widest(sigma_px, law_degree));
     }
     length += bst_vignetting_options(camera, text + length, bytes - (size_t)length);
     length += bst_detector_options(detector, text + length, bytes - (size_t)length);

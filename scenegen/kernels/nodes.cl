@@ -13,15 +13,13 @@ static float min_of(float16 v) {
     return -max_of(-v);
 }
 
-static int most_of(int16 v) {
-    int8 a = max(v.lo, v.hi);
-    int4 b = max(a.lo, a.hi);
-    int2 c = max(b.lo, b.hi);
-    return max(c.lo, c.hi);
-}
-
-static int least_of(int16 v) {
-    return -most_of(-v);
+/* Least x, least -x, least y, least -y: all four at once, by halves. */
+static int4 bounds_of(int16 x, int16 y) {
+    int16 u = (int16)(min(x.lo, x.hi), -max(x.lo, x.hi));
+    int16 v = (int16)(min(y.lo, y.hi), -max(y.lo, y.hi));
+    int16 w = (int16)(min(u.even, u.odd), min(v.even, v.odd));
+    int8 z = min(w.even, w.odd);
+    return min(z.even, z.odd);
 }
 
 #ifdef FFT_LIGHT
@@ -32,9 +30,9 @@ static float16 width_of(float16 widening) {
     return row + (square - row * row) / (2.0f * row + 1.0f);
 }
 #else
-/* Sigma of the PSF over that of the node. */
+/* Of stamps: PSF variances by which a node is wider than the PSF. */
 static float16 width_of(float16 widening) {
-    return rsqrt(1.0f + widening);
+    return widening;
 }
 #endif
 
@@ -64,7 +62,9 @@ static void add_distortion(float16 x, float16 y, float16 *dx, float16 *dy, float
 static int16 place_on_sensor(int place, float from, float16 way) {
     const float parts = (float)(1 << PLACE_BITS), limit = (float)BST_PLACE_LIMIT;
     float16 moved = clamp(way * parts, -2.0f * limit, 2.0f * limit);
-    int16 at = place + convert_int16(floor(moved + 0.5f));
+    /* to the nearest, by truncation, away from zero */
+    float16 half_way = as_float16((as_int16(moved) & (int)0x80000000) | 0x3F000000);
+    int16 at = place + convert_int16(moved + half_way);
     at = select((int16)(BST_PLACE_LIMIT), at, fabs(from + way) * parts <= limit);
 #ifdef SPATIAL_OVERSAMPLE /* the centre of one of the parts into which a pixel is cut */
     int16 whole = (at + (1 << (PLACE_BITS - 1))) >> PLACE_BITS;
@@ -125,9 +125,9 @@ __attribute__((reqd_work_group_size(BST_BLOCK, 1, 1))) kernel void bst_scene_nod
             nodes[BST_NODE_ROWS * block + 2] = n.electrons;
             nodes[BST_NODE_ROWS * block + 3] = n.width;
 #endif
-            int16 x = n.x >> PLACE_BITS, y = n.y >> PLACE_BITS;
-            float4 r = (float4)((float)least_of(x) - reach, (float)least_of(y) - reach,
-                                (float)most_of(x) + reach + 1.0f, (float)most_of(y) + reach + 1.0f);
+            int4 bounds = bounds_of(n.x >> PLACE_BITS, n.y >> PLACE_BITS);
+            float4 r = (float4)((float)bounds.x - reach, (float)bounds.z - reach,
+                                reach + 1.0f - (float)bounds.y, reach + 1.0f - (float)bounds.w);
             if (s.blocks > 1) {
                 int lane = b % BST_BLOCK;
                 global float *at = block_box + (s.first_box * BST_BLOCK + b - lane) * 4 + lane;

@@ -152,19 +152,18 @@ INLINE void store_octet(const float16 *t, float *row) {
 }
 
 /* Profiles of a block's nodes along one axis, to rows[node][ROW]. within: of the way from the
- * node's pixel to the next; width: sigma of the PSF over that of the node; height: total. */
-static void make_profiles(float16 within, float16 width, float16 height, int radius,
+ * node's pixel to the next; more: variances of the PSF by which it is wider; height: total. */
+static void make_profiles(float16 within, float16 more, float16 height, int radius,
                           global const float *law, float *rows) {
     float16 taps[TAPS];
     int count = 2 * radius + 2;
 #ifdef DEGREE
-    if (!any16(width < BARELY_WIDER)) {
-        float16 more = 1.0f / (width * width) - 1.0f;
-        taps_by_law(within, more, any16(width < 1.0f), height, radius, law, taps);
+    if (!any16(more > BARELY_WIDER)) {
+        taps_by_law(within, more, any16(more > 0.0f), height, radius, law, taps);
     } else
 #endif
     {
-        taps_by_edges(within, width * EDGE_SCALE, height, radius, taps);
+        taps_by_edges(within, rsqrt(1.0f + more) * EDGE_SCALE, height, radius, taps);
     }
     for (; count % OCTET; count++) {
         taps[count] = (float16)0.0f;
