@@ -373,6 +373,11 @@ static bst_status prepare_cameras(bst_ctx *ctx, bst_scenario *s) {
                                        "%s: /observers/%d/sensors/%d/camera/distortion", s->file, i,
                                        k);
             }
+            if (bst_detector_config_check(ctx, &sensors[k].camera.detector) != BST_OK) {
+                return bst_fail_prefix(ctx, BST_ERR_CONFIG,
+                                       "%s: /observers/%d/sensors/%d/camera/detector", s->file, i,
+                                       k);
+            }
         }
     }
     return BST_OK;
