@@ -209,6 +209,22 @@ static bst_status pick_sources(bst_ctx *ctx, scenegen *s, const bst_source *sour
     return BST_OK;
 }
 
+/* Light of a source's brightest binned pixel over that of its brightest sensor pixel: of a streak
+ * that is taken for a Gaussian of its own spread. */
+static double binned_share(const bst_camera *camera, int binning, const bst_truth_item *item) {
+    if (binning < 2) {
+        return 1.0;
+    }
+    double psf = bst_camera_psf_sigma_px(camera), share = 1.0;
+    const double way[2] = {item->x_end_px - item->x_start_px, item->y_end_px - item->y_start_px};
+    for (int i = 0; i < 2; i++) {
+        double spread = isfinite(way[i]) ? way[i] * way[i] / 12.0 : 0.0;
+        double half = 0.5 / sqrt(2.0 * (psf * psf + spread));
+        share *= erf(binning * half) / erf(half);
+    }
+    return share;
+}
+
 /* Fills the truth's items; whatever finds no room is counted in `lost`. */
 static bst_status write_items(bst_ctx *ctx, scenegen *s, const bst_los_track *track,
                               const bst_source *sources, int count, const bst_exposure *e,
@@ -220,7 +236,7 @@ static bst_status write_items(bst_ctx *ctx, scenegen *s, const bst_los_track *tr
     }
     double top_e =
         ((double)((1 << s->camera->bits) - 1) - s->camera->offset_dn) * s->camera->gain_e_per_dn;
-    double limit_e = fmin(s->camera->full_well_e, top_e) - truth->dark_e;
+    int binning = e->binning > 1 ? e->binning : 1, added = binning * binning;
     for (int i = 0; i < truth->count; i++) {
         int k = truth->lost > 0 ? s->picks[i].index : i;
         bst_field_truth_item(s->field, track, &sources[k], e->window, truth, &truth->items[i]);
@@ -230,7 +246,10 @@ static bst_status write_items(bst_ctx *ctx, scenegen *s, const bst_los_track *tr
         double x = truth->items[i].x_mean_px, y = truth->items[i].y_mean_px;
         double light = isfinite(x) ? bst_camera_illumination(s->camera, x, y) : 1.0;
         double sky_e = bst_field_background_e(s->field, truth, x, y);
-        if (light * bst_renderer_peak_e(s->renderer, k) >= limit_e - sky_e) {
+        double peak_e = light * bst_renderer_peak_e(s->renderer, k), dark_e = truth->dark_e + sky_e;
+        /* the wells fill before pixels are added, the converter after */
+        if (peak_e >= s->camera->full_well_e - dark_e ||
+            peak_e * binned_share(s->camera, binning, &truth->items[i]) >= top_e - added * dark_e) {
             truth->items[i].flags |= BST_TRUTH_SATURATED;
         }
     }

@@ -366,12 +366,13 @@ static bst_status check_name(bst_ctx *ctx, const bst_scenario *s, const char *pa
 static bst_status prepare_cameras(bst_ctx *ctx, bst_scenario *s) {
     const bst_observer_config *observers = s->observers.items;
     for (int i = 0; i < s->observers.count; i++) {
-        bst_sensor_config *sensors = observers[i].sensors.items;
         for (int k = 0; k < observers[i].sensors.count; k++) {
-            if (bst_camera_prepare(ctx, &sensors[k].camera) != BST_OK) {
+            bst_camera *camera = &((bst_sensor_config *)observers[i].sensors.items)[k].camera;
+            bool image = bst_camera_prepare(ctx, camera) == BST_OK;
+            if (!image || bst_detector_config_check(ctx, &camera->detector) != BST_OK) {
                 return bst_fail_prefix(ctx, BST_ERR_CONFIG,
-                                       "%s: /observers/%d/sensors/%d/camera/distortion", s->file, i,
-                                       k);
+                                       "%s: /observers/%d/sensors/%d/camera/%s", s->file, i, k,
+                                       image ? "detector" : "distortion");
             }
         }
     }

@@ -103,6 +103,17 @@ bool bst_detector_config_whole_columns(const bst_detector_config *d) {
     return d->full_well == BST_WELL_BLOOM || d->frame_transfer_s > 0.0;
 }
 
+bst_status bst_detector_config_check(bst_ctx *ctx, const bst_detector_config *d) {
+    if (d->row_time_s != 0.0 && bst_detector_config_whole_columns(d)) {
+        return bst_fail(
+            ctx, BST_ERR_CONFIG,
+            "row_time_s: a rolling shutter goes neither with frame_transfer_s nor with "
+            "the full_well \"bloom\": charge that runs along columns belongs to sensors "
+            "that expose all rows at once; set one of them to its default");
+    }
+    return BST_OK;
+}
+
 double bst_detector_lead_s(const bst_detector_config *d, int rows) {
     return 0.5 * fabs(d->row_time_s) * (rows - 1);
 }

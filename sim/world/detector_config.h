@@ -56,6 +56,9 @@ double bst_detector_dark_factor(const bst_detector_config *d);
 /* Whether frames need whole columns (blooming, frame transfer), and so the light of them all. */
 bool bst_detector_config_whole_columns(const bst_detector_config *d);
 
+/* BST_ERR_CONFIG, with the key, for effects that exclude each other. */
+bst_status bst_detector_config_check(bst_ctx *ctx, const bst_detector_config *d) BST_MUST_CHECK;
+
 /* Rolling shutter: time from the middle row of a window of `rows` rows to its first or last one.
  * Row n of the window (0, 1, ...) is exposed (n - (rows - 1) / 2) row_time_s later than the
  * exposure's ticks say. */

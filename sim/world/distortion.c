@@ -276,12 +276,6 @@ bst_status bst_camera_prepare(bst_ctx *ctx, bst_camera *c) {
     const bst_distortion *d = &c->distortion;
     bst_camera_geometry *g = &c->geometry;
     memset(g, 0, sizeof *g);
-    if (c->detector.row_time_s != 0.0 && bst_detector_config_whole_columns(&c->detector)) {
-        return bst_fail(ctx, BST_ERR_CONFIG,
-                        "detector/row_time_s: a rolling shutter goes neither with frame_transfer_s "
-                        "nor with the full_well \"bloom\": charge that runs along columns belongs "
-                        "to sensors that expose all rows at once; set one of them to its default");
-    }
     double q = hypot(d->p1, d->p2);
     bool distorted = bst_camera_distorted(c);
     if (!distorted && c->rotation_deg == 0.0) {

@@ -140,7 +140,7 @@ class Planes(unittest.TestCase):
                 margin = 6 * keys["RDNOISE"] / keys["GAIN"] + 1
                 self.assertTrue(np.all(np.abs(counts[flags > 0] - full) < margin))
                 self.assertTrue(np.all(counts[flags == 0] < full + margin))
-            # where there are flags there is a source that says so, and the other way round
+            # where there are flags there is a source that says so
             mask = self.planes["segmentation"][k][1]
             saturated = {row["item"] for row in tables.execute(
                 "SELECT item FROM truth WHERE exposure_id = ? AND saturated",
@@ -158,6 +158,35 @@ class Planes(unittest.TestCase):
 class BinnedPlanes(Planes):
     """The same in pixels that are read together."""
     binning = 2
+
+    def test_a_full_converter(self):
+        """The sum of four pixels fills it, none of them its well."""
+        out = os.path.join(runs.scratch(), "run")
+        runs.run(SCENARIO, out, ALL, runs.SENSOR + "/exposure/binning=2",
+                 runs.SENSOR + "/camera/full_well_e=1e6", runs.SENSOR + "/camera/bits=13")
+        tables = runs.database(out)
+        frames, flags = images(out, "frames"), images(out, "saturation")
+        light = [sum(planes) for planes in zip(*(
+            [data for _, data in images(out, name)] for name in NAMES[:3]))]
+        with fits.open(os.path.join(out, "frames.fits")) as hdus:
+            keys = hdus[0].header
+        top = (8191 - keys["OFFSET"]) * keys["GAIN"]
+        seen = 0
+        for k, (header, flagged) in enumerate(flags):
+            self.assertLessEqual(set(np.unique(flagged)), {0, 2})
+            np.testing.assert_array_equal(flagged > 0, frames[k][1] == 8191)
+            # sources whose light alone is well above or below the top, by the planes
+            for row in tables.execute("SELECT * FROM truth WHERE exposure_id = ? AND in_field",
+                                      (header["FRAMEID"],)):
+                x, y = ((row[f"{c}_mean_px"] - header[f"WIN{c.upper()}0"] + 0.5) / 2 - 0.5
+                        for c in "xy")
+                box = light[k][max(int(y) - 2, 0):int(y) + 4, max(int(x) - 2, 0):int(x) + 4]
+                if box.max() < 0.6 * top:
+                    self.assertFalse(row["saturated"])
+                elif box.max() > 1.3 * top and row["kind"] == "object":
+                    self.assertTrue(row["saturated"])
+                    seen += 1
+        self.assertGreater(seen, 2)
 
 
 if __name__ == "__main__":

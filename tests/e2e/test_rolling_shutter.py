@@ -80,7 +80,7 @@ class RollingShutter(unittest.TestCase):
                 ([SHUTTER, COMMON[0], COMMON[1], COMMON[2].replace("=4", "=1")],
                  ["history_s", "row_time_s"]),
                 ([SHUTTER, *COMMON, CAMERA + "detector/frame_transfer_s=0.01"],
-                 ["row_time_s", "frame_transfer_s"])):
+                 ["/camera/detector: row_time_s", "frame_transfer_s"])):
             words_of_run = runs.command(runs.RATE_OPEN, os.path.join(folder, "x"), *wrong,
                                         duration=5)
             result = subprocess.run(words_of_run, capture_output=True, text=True, timeout=300)

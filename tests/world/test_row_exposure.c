@@ -191,15 +191,14 @@ static void truth_is_that_of_each_row(void **state) {
 static void contradictions_are_refused(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    bst_camera camera = {.width_px = 10, .height_px = 10, .pixel_scale_arcsec = 3};
-    camera.detector.row_time_s = 1e-5;
-    bst_assert_ok(&ctx, bst_camera_prepare(&ctx, &camera));
-    camera.detector.frame_transfer_s = 1e-3;
-    assert_int_equal(bst_camera_prepare(&ctx, &camera), BST_ERR_CONFIG);
+    bst_detector_config d = {.row_time_s = 1e-5};
+    bst_assert_ok(&ctx, bst_detector_config_check(&ctx, &d));
+    d.frame_transfer_s = 1e-3;
+    assert_int_equal(bst_detector_config_check(&ctx, &d), BST_ERR_CONFIG);
     assert_non_null(strstr(ctx.message, "row_time_s"));
-    camera.detector.frame_transfer_s = 0;
-    camera.detector.full_well = BST_WELL_BLOOM;
-    assert_int_equal(bst_camera_prepare(&ctx, &camera), BST_ERR_CONFIG);
+    d.frame_transfer_s = 0;
+    d.full_well = BST_WELL_BLOOM;
+    assert_int_equal(bst_detector_config_check(&ctx, &d), BST_ERR_CONFIG);
 }
 
 int main(void) {
