@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "scenegen/batch_fft.h"
+#include "scenegen/light_cells.h"
 #include "scenegen/light_wrap.h"
 
 /* Rows and columns are worked on in blocks of as many as a vector has lanes. */
@@ -21,20 +22,11 @@ typedef struct strip {
     size_t first; /* of the strip's numbers in the table */
 } strip;
 
-/* How a block of a row's pixels lies between the centres of cells, linearly: the shares of `cell`
- * and those that follow. A block spans 16 px of at most 5 samples, a cell 16 samples or, beyond 1.4
- * per px, 32. */
-enum { SHARES = 5 };
-typedef struct cell_shares {
-    int cell;
-    bst_lanes share[SHARES];
-} cell_shares;
-
 /* Working memory of one part; as many as there are threads. */
 typedef struct bench {
     atomic_flag taken;
     bst_batch *line; /* a block of rows or columns */
-    float *wings;    /* [BLOCK][cells_x + SHARES] far wings of rows at the cells' centres */
+    float *wings;    /* [BLOCK][bst_light_cells_row_floats] far wings of rows */
 } bench;
 
 struct bst_light_fft {
@@ -57,9 +49,7 @@ struct bst_light_fft {
     bench *benches;
     int bench_count;
     bst_light_wrap *wrap;
-    int cell, cells_x, cells_y; /* samples per cell, per axis; cells */
-    float *cells;
-    cell_shares *shares; /* per block of a row's pixels */
+    bst_light_cells cells;
 };
 
 /* What a loop's parts need to know. */
@@ -201,58 +191,21 @@ static bst_status make_plans(bst_ctx *ctx, bst_light_fft *f) {
     return bst_batch_fft_create(ctx, f->shape.y.pixels, &f->column_inverse);
 }
 
-/* Place on one axis of the cells' centres: the lower cell and the share of the way to the next,
- * which is below 0 or above 1 at the ends. */
-static double cell_place(const bst_light_fft *f, const bst_light_axis *axis, int cells, int pixel,
-                         int *lower) {
-    double sample = (pixel + f->shape.margin) * (double)axis->samples / axis->pixels;
-    double place = (sample + 0.5) / f->cell - 0.5;
-    *lower = (int)fmin(fmax(floor(place), 0.0), cells - 2.0);
-    return place - *lower;
-}
-
-/* What the far wings need in the inverse of rows. */
-static bst_status make_shares(bst_ctx *ctx, bst_light_fft *f) {
-    int blocks = (f->shape.width + BLOCK - 1) / BLOCK;
-    size_t wings = (size_t)BLOCK * (size_t)(f->cells_x + SHARES);
-    f->shares = aligned_alloc(sizeof(bst_lanes), (size_t)blocks * sizeof *f->shares);
-    bool ok = f->shares;
-    for (int i = 0; ok && i < f->bench_count; i++) {
-        f->benches[i].wings = calloc(wings, sizeof(float));
-        ok = f->benches[i].wings;
-    }
-    if (!ok) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the far wings");
-    }
-    for (int i = 0; i < blocks; i++) {
-        cell_shares *s = &f->shares[i];
-        memset(s, 0, sizeof *s);
-        for (int l = 0; l < BLOCK; l++) {
-            int cell;
-            float u = (float)cell_place(f, &f->shape.x, f->cells_x, i * BLOCK + l, &cell);
-            s->cell = l == 0 ? cell : s->cell;
-            s->share[cell - s->cell][l] = 1.0f - u;
-            s->share[cell - s->cell + 1][l] = u;
+static bst_status make_wrap(bst_ctx *ctx, bst_light_fft *f) {
+    const bst_light_shape *s = &f->shape;
+    bst_light_cells *c = &f->cells;
+    BST_TRY(bst_light_cells_create(ctx, &s->x, &s->y, s->width, s->margin, c));
+    for (int i = 0; i < f->bench_count; i++) {
+        f->benches[i].wings = calloc((size_t)BLOCK * (size_t)bst_light_cells_row_floats(c),
+                                     sizeof *f->benches[i].wings);
+        if (!f->benches[i].wings) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the far wings");
         }
     }
-    return BST_OK;
-}
-
-static bst_status make_wrap(bst_ctx *ctx, bst_light_fft *f) {
-    const bst_light_axis *x = &f->shape.x, *y = &f->shape.y;
-    /* cells well below the distance from which wings wrap */
-    f->cell = x->samples > 14 * x->pixels / 10 ? 32 : 16;
-    f->cells_x = (x->samples + f->cell - 1) / f->cell;
-    f->cells_y = (y->samples + f->cell - 1) / f->cell;
-    f->cells = malloc((size_t)f->cells_x * (size_t)f->cells_y * sizeof *f->cells);
-    if (!f->cells) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the far wings");
-    }
-    BST_TRY(make_shares(ctx, f));
-    bst_light_wrap_axis wx = {x->pixels, f->cells_x, (double)f->cell * x->pixels / x->samples,
-                              f->shape.width + f->shape.margin};
-    bst_light_wrap_axis wy = {y->pixels, f->cells_y, (double)f->cell * y->pixels / y->samples,
-                              f->shape.height + f->shape.margin};
+    bst_light_wrap_axis wx = {s->x.pixels, c->columns, (double)c->side * s->x.pixels / s->x.samples,
+                              s->width + s->margin};
+    bst_light_wrap_axis wy = {s->y.pixels, c->rows, (double)c->side * s->y.pixels / s->y.samples,
+                              s->height + s->margin};
     return bst_light_wrap_create(ctx, f->psf, &wx, &wy, f->pool, &f->wrap);
 }
 
@@ -312,8 +265,7 @@ void bst_light_fft_free(bst_light_fft *f) {
     free(f->strips);
     free(f->first_strip);
     free(f->benches);
-    free(f->cells);
-    free(f->shares);
+    bst_light_cells_clear(&f->cells);
     free(f->table);
     free(f->kernel_x);
     free(f->kernel_y);
@@ -359,8 +311,8 @@ BST_LANES_FUNCTION
 static bool load_rows(const bst_light_fft *f, const bst_lanes *a, const bst_lanes *b,
                       bst_batch *line, float *cells_a, float *cells_b) {
     float any = 0.0f;
-    for (int i = 0, x = 0; i < f->cells_x; i++) {
-        int end = x + f->cell < f->shape.x.samples ? x + f->cell : f->shape.x.samples;
+    for (int i = 0, x = 0; i < f->cells.columns; i++) {
+        int rest = f->shape.x.samples - x, end = x + (f->cells.side < rest ? f->cells.side : rest);
         bst_lanes sum_a = {0}, sum_b = {0};
         for (; x < end; x++) {
             line[x] = (bst_batch){a[x], b ? b[x] : (bst_lanes){0}};
@@ -420,12 +372,12 @@ static void rows_forward(void *user, int begin, int end) {
     const pass *p = user;
     bst_light_fft *f = p->fft;
     bench *w = take_bench(f);
-    int per_cell = f->cell / BLOCK;
+    int per_cell = f->cells.side / BLOCK, cells = f->cells.columns;
     for (int j = begin; j < end; j++) {
         int a = 2 * j, b = a + 1 < f->row_blocks ? a + 1 : -1;
-        float *cells_a = f->cells + (size_t)(a / per_cell) * (size_t)f->cells_x;
-        float *cells_b = f->cells + (size_t)((b < 0 ? a : b) / per_cell) * (size_t)f->cells_x;
-        size_t block = (size_t)f->shape.x.samples, bytes = (size_t)f->cells_x * sizeof *cells_a;
+        float *cells_a = f->cells.light + (size_t)(a / per_cell) * (size_t)cells;
+        float *cells_b = f->cells.light + (size_t)((b < 0 ? a : b) / per_cell) * (size_t)cells;
+        size_t block = (size_t)f->shape.x.samples, bytes = (size_t)cells * sizeof *cells_a;
         const bst_lanes *grid = (const bst_lanes *)p->grid;
         if (p->first) {
             memset(cells_a, 0, bytes);
@@ -489,11 +441,11 @@ static void store_image(const bst_light_fft *f, int block, const bst_batch *line
 /* Far wings of all nodes' light, in place of it. */
 static void run_wrap(bst_light_fft *f) {
     float scale = (float)(1.0 / (f->kernel_x[0] * f->kernel_y[0]));
-    size_t count = (size_t)f->cells_x * (size_t)f->cells_y;
+    size_t count = (size_t)f->cells.columns * (size_t)f->cells.rows;
     for (size_t i = 0; i < count; i++) {
-        f->cells[i] *= scale;
+        f->cells.light[i] *= scale;
     }
-    bst_light_wrap_run(f->wrap, f->cells);
+    bst_light_wrap_run(f->wrap, f->cells.light);
 }
 
 /* Blocks of the image's columns; before them, with the last node, the far wings. */
@@ -534,17 +486,6 @@ void bst_light_fft_add(bst_light_fft *f, int node, bool first, bool last, const 
 
 /* ------------------------------------------------------------------ rows inverse */
 
-/* Far wings of a row at the cells' centres. */
-BST_LANES_FUNCTION
-static void row_of_wings(const bst_light_fft *f, int row, float *out) {
-    int j;
-    float v = (float)cell_place(f, &f->shape.y, f->cells_y, row, &j);
-    const float *a = f->cells + (size_t)j * (size_t)f->cells_x, *b = a + f->cells_x;
-    for (int i = 0; i < f->cells_x; i++) {
-        out[i] = a[i] + v * (b[i] - a[i]);
-    }
-}
-
 /* The spectra of two blocks of rows as that of one complex sequence, real and imaginary parts
  * swapped. */
 BST_LANES_FUNCTION
@@ -574,13 +515,13 @@ static void store_rows(const bst_light_fft *f, const bst_batch *line, bool imagi
             v[l] = imaginary ? line[order[x + l]].re : line[order[x + l]].im;
         }
         bst_lanes_transpose(v);
-        const cell_shares *s = &f->shares[x / BLOCK];
+        const bst_cell_shares *s = &f->cells.shares[x / BLOCK];
         const float *w = wings ? wings + s->cell : NULL;
         for (int r = 0; r < rows; r++) {
-            for (int k = 0; w && k < SHARES; k++) {
+            for (int k = 0; w && k < BST_CELL_SHARES; k++) {
                 v[r] += w[k] * s->share[k];
             }
-            w += w ? f->cells_x + SHARES : 0;
+            w += w ? bst_light_cells_row_floats(&f->cells) : 0;
             *(bst_lanes *)(image + (size_t)r * (size_t)f->pitch + x) = v[r];
         }
     }
@@ -601,7 +542,9 @@ static void rows_inverse(void *user, int begin, int end) {
             rows = rows < BLOCK ? rows : BLOCK;
             float *image = p->image + (size_t)top * (size_t)f->pitch;
             for (int r = 0; f->wrap && r < rows; r++) {
-                row_of_wings(f, top + r, w->wings + (size_t)r * (size_t)(f->cells_x + SHARES));
+                bst_light_cells_row(
+                    &f->cells, top + r,
+                    w->wings + (size_t)r * (size_t)bst_light_cells_row_floats(&f->cells));
             }
             store_rows(f, w->line, k > a, rows, f->wrap ? w->wings : NULL, image);
         }
