@@ -9,7 +9,7 @@
 #include "bst_scenegen_kernels.h"
 #include "scenegen/kernels/deposit_shared.h"
 #include "scenegen/light_fft.h"
-#include "scenegen/place.h"
+#include "scenegen/scene_options.h"
 
 enum { SETUPS = 4, FIELD_STEP_PX = 16, WRAP_PX = 96 };
 
@@ -74,14 +74,17 @@ static bst_status choose_tiles(bst_ctx *ctx, bst_device *device, bst_fft_light *
 }
 
 static bst_status build(bst_ctx *ctx, bst_device *device, bst_fft_light *l) {
-    const bst_kernel_source *sources[] = {&bst_kernel_scene_shared, &bst_kernel_deposit_shared,
-                                          &bst_kernel_deposit};
-    char options[256];
-    snprintf(options, sizeof options,
-             "-cl-std=CL1.2 -DDEPOSIT_W=%d -DDEPOSIT_H=%d -DDEPOSIT_GROUP=%d -DPLACE_BITS=%d%s%s",
-             l->tile_width, l->tile_height, l->group, bst_place_bits(&l->camera),
-             l->nodes > 1 ? " -DFIELD" : "", l->group == 1 ? " -DNEAR_CACHE" : "");
-    BST_TRY(bst_device_build(ctx, device, sources, 3, options, &l->program));
+    const bst_kernel_source *sources[] = {&bst_kernel_scene_shared, &bst_kernel_nodes,
+                                          &bst_kernel_deposit_shared, &bst_kernel_deposit};
+    char options[1024];
+    int length = snprintf(options, sizeof options,
+                          "-cl-std=CL1.2 -DFFT_LIGHT -DDEPOSIT_W=%d -DDEPOSIT_H=%d "
+                          "-DDEPOSIT_GROUP=%d%s%s",
+                          l->tile_width, l->tile_height, l->group, l->nodes > 1 ? " -DFIELD" : "",
+                          l->group == 1 ? " -DNEAR_CACHE" : "");
+    bst_scene_node_options(&l->camera, l->options.spatial_oversample, options + length,
+                           sizeof options - (size_t)length);
+    BST_TRY(bst_device_build(ctx, device, sources, 4, options, &l->program));
     cl_int code;
     l->kernel = clCreateKernel(l->program, "bst_light_deposit", &code);
     return bst_device_check(ctx, code, "bst_light_deposit");
@@ -330,7 +333,7 @@ static bst_status deposit(bst_ctx *ctx, bst_fft_light *l, cl_command_queue queue
         .field_per_px_y = (float)((l->field_y - 1) / fmax((double)l->camera.height_px - 1.0, 1.0)),
     };
     const void *values[] = {
-        &p,        &nodes->sources,   &nodes->nodes, &nodes->block_box, &nodes->source_box,
+        &p,        &nodes->sources,   &nodes->table, &nodes->block_box, &nodes->source_box,
         &s->table, &l->fields[field], &s->grid};
     for (cl_uint i = 0; i < sizeof values / sizeof *values; i++) {
         size_t bytes = i == 0 ? sizeof p : sizeof(cl_mem);

@@ -15,8 +15,9 @@
 typedef struct bst_fft_light bst_fft_light;
 
 typedef struct bst_fft_light_options {
-    int taps;         /* of the spreading kernel: 4, 6 or 8 */
-    double tolerance; /* error of the grid in any pixel, over the PSF's peak */
+    int taps;               /* of the spreading kernel: 4, 6 or 8 */
+    double tolerance;       /* error of the grid in any pixel, over the PSF's peak */
+    int spatial_oversample; /* as the renderer's */
 } bst_fft_light_options;
 
 bst_fft_light_options bst_fft_light_default_options(void);
@@ -41,9 +42,9 @@ double bst_fft_light_widest(const bst_fft_light *light);
 /* Bound of an image's error by grid and cut-off, over a source's peak. */
 double bst_fft_light_error(const bst_fft_light *light);
 
-/* The frame's nodes on the device, as the nodes kernel leaves them. */
+/* The frame's sources and node table on the device, and the boxes that the nodes kernel made. */
 typedef struct bst_fft_light_nodes {
-    cl_mem sources, nodes, block_box, source_box;
+    cl_mem sources, table, block_box, source_box;
     int source_groups;
 } bst_fft_light_nodes;
 

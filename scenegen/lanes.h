@@ -18,6 +18,26 @@ typedef float bst_lanes __attribute__((vector_size(4 * BST_LANES)));
 /* Their helpers. */
 #define BST_LANES_INLINE static inline __attribute__((always_inline))
 
+/* Stores past the caches what is read only after much else; bst_lanes_streamed() before other
+ * threads read it. */
+BST_LANES_INLINE void bst_lanes_stream(bst_lanes *to, const bst_lanes *from) {
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+    typedef float quarter __attribute__((vector_size(BST_LANES)));
+    const quarter *q = (const quarter *)from;
+    for (int i = 0; i < 4; i++) {
+        __builtin_ia32_movntps((float *)to + 4 * i, q[i]);
+    }
+#else
+    *to = *from;
+#endif
+}
+
+BST_LANES_INLINE void bst_lanes_streamed(void) {
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+    __builtin_ia32_sfence();
+#endif
+}
+
 /* Turns the square of 16 vectors of 16 numbers about its diagonal: vectors 8, 4, 2 and 1 apart
  * exchange their halves, quarters, eighths and sixteenths. */
 BST_LANES_INLINE void bst_lanes_transpose(bst_lanes v[BST_LANES]) {

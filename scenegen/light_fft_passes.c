@@ -12,15 +12,6 @@ static bench *take_bench(bst_light_fft *f) {
     }
 }
 
-/* A block of memory far from what was used last, which is soon written; it may lie beyond the end.
- */
-BST_LANES_INLINE void fetch_block(const bst_batch *to) {
-    for (int l = 0; l < BLOCK; l++) {
-        __builtin_prefetch(&to[l].re, 1);
-        __builtin_prefetch(&to[l].im, 1);
-    }
-}
-
 /* ------------------------------------------------------------------ rows forward */
 
 /* Loads two blocks of rows (the second may be NULL) as real and imaginary parts and adds them to
@@ -59,8 +50,6 @@ static void store_strip(const bst_light_fft *f, const strip *s, const bst_batch 
     const int *order = bst_batch_fft_order(f->row_forward);
     int samples = f->shape.x.samples;
     bst_lanes part[4][BLOCK];
-    fetch_block(a + f->strip_pitch);
-    fetch_block((b ? b : a) + f->strip_pitch);
     for (int l = 0; l < BLOCK; l++) {
         int k = s->k0 + l;
         if (abs(k) >= f->used) {
@@ -78,10 +67,12 @@ static void store_strip(const bst_light_fft *f, const strip *s, const bst_batch 
         bst_lanes_transpose(part[i]);
     }
     for (int r = 0; r < BLOCK; r++) {
-        a[r] = (bst_batch){part[0][r], part[1][r]};
+        bst_lanes_stream(&a[r].re, &part[0][r]);
+        bst_lanes_stream(&a[r].im, &part[1][r]);
     }
     for (int r = 0; b && r < BLOCK; r++) {
-        b[r] = (bst_batch){part[2][r], part[3][r]};
+        bst_lanes_stream(&b[r].re, &part[2][r]);
+        bst_lanes_stream(&b[r].im, &part[3][r]);
     }
 }
 
@@ -115,6 +106,7 @@ static void rows_forward(void *user, int begin, int end) {
             }
         }
     }
+    bst_lanes_streamed();
     atomic_flag_clear(&w->taken);
 }
 
@@ -143,7 +135,6 @@ static void store_image(const bst_light_fft *f, int block, const bst_batch *line
     for (int j = 0; j < f->image_blocks; j++, order += BLOCK) {
         bst_batch *to = f->image + (size_t)j * f->image_pitch + (size_t)block * BLOCK;
         bst_lanes re[BLOCK], im[BLOCK];
-        fetch_block(to + f->image_pitch);
         for (int r = 0; r < BLOCK; r++) {
             re[r] = line[order[r]].im;
             im[r] = line[order[r]].re;
@@ -151,7 +142,8 @@ static void store_image(const bst_light_fft *f, int block, const bst_batch *line
         bst_lanes_transpose(re);
         bst_lanes_transpose(im);
         for (int l = 0; l < BLOCK; l++) {
-            to[l] = (bst_batch){re[l], im[l]};
+            bst_lanes_stream(&to[l].re, &re[l]);
+            bst_lanes_stream(&to[l].im, &im[l]);
         }
     }
 }
@@ -193,6 +185,7 @@ static void columns(void *user, int begin, int end) {
             store_image(f, c, sum);
         }
     }
+    bst_lanes_streamed();
     atomic_flag_clear(&w->taken);
 }
 
@@ -251,7 +244,7 @@ static void store_rows(const bst_light_fft *f, const bst_batch *line, bool imagi
                 v[r] += w[k] * s->share[k];
             }
             w += w ? f->cells_x + SHARES : 0;
-            *(bst_lanes *)(image + (size_t)r * (size_t)f->pitch + x) = v[r];
+            bst_lanes_stream((bst_lanes *)(image + (size_t)r * (size_t)f->pitch + x), &v[r]);
         }
     }
 }
@@ -276,6 +269,7 @@ static void rows_inverse(void *user, int begin, int end) {
             store_rows(f, w->line, k > a, rows, f->wrap ? w->wings : NULL, image);
         }
     }
+    bst_lanes_streamed();
     atomic_flag_clear(&w->taken);
 }
 

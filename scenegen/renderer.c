@@ -46,7 +46,7 @@ struct bst_renderer {
     cl_mem law; /* of the stamps' profiles */
     bst_stage *stage;
     cl_mem sources, table; /* of the present frame; borrowed */
-    growing nodes, block_box, source_box, group_box, expected;
+    growing block_box, source_box, group_box, expected;
     bst_scene_plan plan;   /* of the latest request, or of its latest band */
     double *rolled_peak_e; /* of all sources, with the bands of a rolling shutter */
     int rolled_capacity, set;
@@ -109,6 +109,7 @@ static bst_status open_psf(bst_ctx *ctx, bst_device *device, bst_renderer *r,
     light.tolerance = 10.0 * r->options.tolerance_sigma * dark / fmax(r->camera.full_well_e, 1.0);
     light.tolerance = fmin(fmax(light.tolerance, 2e-6), 1e-3);
     light.taps = r->options.fft_taps > 0 ? r->options.fft_taps : light.taps;
+    light.spatial_oversample = r->options.spatial_oversample;
     BST_TRY(bst_fft_light_create(ctx, device, &r->camera, r->psf, &light, &r->fft_light));
     smear->widest = bst_fft_light_widest(r->fft_light);
     smear->node_sigma_px = bst_fft_light_band(r->fft_light)->node_sigma_px;
@@ -197,11 +198,7 @@ void bst_renderer_free(bst_renderer *r) {
         return;
     }
     clFinish(r->queue);
-    cl_mem buffers[] = {r->law,
-                        r->nodes.buffer,
-                        r->block_box.buffer,
-                        r->source_box.buffer,
-                        r->group_box.buffer,
+    cl_mem buffers[] = {r->law, r->block_box.buffer, r->source_box.buffer, r->group_box.buffer,
                         r->expected.buffer};
     for (size_t i = 0; i < sizeof buffers / sizeof *buffers; i++) {
         if (buffers[i]) {
@@ -266,19 +263,14 @@ static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, const bst_scene_p
     BST_TRY(grow(ctx, r, &r->block_box, (size_t)plan->boxes * BST_BLOCK * BST_BOX_BYTES));
     BST_TRY(grow(ctx, r, &r->source_box, groups * BST_BLOCK * BST_BOX_BYTES));
     BST_TRY(grow(ctx, r, &r->group_box, more * BST_BLOCK * BST_BOX_BYTES));
-    BST_TRY(grow(ctx, r, &r->nodes, r->fft_light ? (size_t)plan->blocks * BST_NODE_BYTES : 1));
     if (count == 0) {
         return BST_OK;
     }
-    const void *values[] = {&r->sources,
-                            &count,
-                            &r->table,
-                            &r->block_box.buffer,
-                            &r->source_box.buffer,
-                            &r->group_box.buffer,
-                            &r->nodes.buffer};
-    const size_t m = sizeof(cl_mem), bytes[] = {m, sizeof count, m, m, m, m, m};
-    BST_TRY(set_args(ctx, r->nodes_kernel, values, bytes, 7));
+    const void *values[] = {
+        &r->sources,         &count, &r->table, &r->block_box.buffer, &r->source_box.buffer,
+        &r->group_box.buffer};
+    const size_t m = sizeof(cl_mem), bytes[] = {m, sizeof count, m, m, m, m};
+    BST_TRY(set_args(ctx, r->nodes_kernel, values, bytes, 6));
     size_t global = groups * BST_BLOCK, local = BST_BLOCK;
     return bst_device_check(
         ctx,
@@ -317,8 +309,8 @@ static bst_status begin_set(bst_ctx *ctx, bst_renderer *r) {
 /* The image that the tile kernel takes its light from, where the PSF is no Gaussian. */
 static bst_status make_light(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
                              bst_scene_params *p, cl_mem *light) {
-    bst_fft_light_nodes nodes = {r->sources, r->nodes.buffer, r->block_box.buffer,
-                                 r->source_box.buffer, p->source_groups};
+    bst_fft_light_nodes nodes = {r->sources, r->table, r->block_box.buffer, r->source_box.buffer,
+                                 p->source_groups};
     bst_fft_light_image image;
     BST_TRY(bst_fft_light_render(ctx, r->fft_light, r->queue, q->window, &nodes, &image));
     p->light_first = image.first;

@@ -14,10 +14,9 @@ void bst_scene_build_options(const bst_camera *camera, const bst_renderer_option
     double sigma_px = bst_camera_psf_sigma_px(camera);
     int length = snprintf(text, bytes,
                           "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d "
-                          "-DEDGE_SCALE=%.9ef -DPLACE_BITS=%d%s%s",
+                          "-DEDGE_SCALE=%.9ef%s%s",
                           settings->tile_width, settings->tile_height, settings->group, taps,
-                          1.0 / (sqrt(2.0) * sigma_px), bst_place_bits(camera),
-                          fft_light ? " -DFFT_LIGHT" : "",
+                          1.0 / (sqrt(2.0) * sigma_px), fft_light ? " -DFFT_LIGHT" : "",
                           bst_skylight_varies(camera) ? " -DBACKGROUND" : "");
     if (law_degree > 0) {
         length +=
@@ -26,9 +25,16 @@ void bst_scene_build_options(const bst_camera *camera, const bst_renderer_option
     }
     length += bst_vignetting_options(camera, text + length, bytes - (size_t)length);
     length += bst_detector_options(detector, text + length, bytes - (size_t)length);
-    if (settings->spatial_oversample > 0) {
+    bst_scene_node_options(camera, settings->spatial_oversample, text + length,
+                           bytes - (size_t)length);
+}
+
+void bst_scene_node_options(const bst_camera *camera, int spatial_oversample, char *text,
+                            size_t bytes) {
+    int length = snprintf(text, bytes, " -DPLACE_BITS=%d", bst_place_bits(camera));
+    if (spatial_oversample > 0) {
         length += snprintf(text + length, bytes - (size_t)length, " -DSPATIAL_OVERSAMPLE=%d",
-                           settings->spatial_oversample);
+                           spatial_oversample);
     }
     const bst_distortion *d = &camera->distortion;
     if (bst_camera_distorted(camera)) {

@@ -12,4 +12,8 @@ void bst_scene_build_options(const bst_camera *camera, const bst_renderer_option
                              int taps, int law_degree, bool fft_light, const bst_detector *detector,
                              char *text, size_t bytes);
 
+/* Those of them that kernels/nodes.cl takes, with a blank before. */
+void bst_scene_node_options(const bst_camera *camera, int spatial_oversample, char *text,
+                            size_t bytes);
+
 #endif

@@ -35,7 +35,6 @@ static void put_in_order(bst_scene_plan *p, const bst_camera *camera) {
     p->blocks = p->boxes = 0;
     for (int i = 0; i < p->count; i++) {
         bst_scene_source *s = &p->sources[i];
-        s->first_block = p->blocks;
         s->first_box = p->boxes;
         p->blocks += s->blocks;
         p->boxes += s->blocks > 1 ? (s->blocks + BST_BLOCK - 1) / BST_BLOCK : 0;
@@ -59,7 +58,7 @@ bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera
     const uint64_t counted = (uint64_t)INT32_MAX * sizeof(float); /* by the kernels, in int */
     uint64_t most = most_bytes < counted ? most_bytes : counted;
     /* two blocks have a whole group of boxes */
-    int most_blocks = (int)(most / (fft_light ? BST_NODE_BYTES : BST_BLOCK / 2 * BST_BOX_BYTES));
+    int most_blocks = (int)(most / (BST_BLOCK / 2 * BST_BOX_BYTES));
     p->count = 0;
     for (int i = 0, blocks = 0; i < q->count; i++) {
         bst_scene_source *s = &p->list[p->count];

@@ -28,10 +28,7 @@ bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *plan, const bst_cam
 /* Frees what the plan holds. */
 void bst_scene_plan_clear(bst_scene_plan *plan);
 
-/* Bytes on the device of a block's box, and of what the Fourier path takes of a block. */
-enum {
-    BST_BOX_BYTES = 4 * (int)sizeof(float),
-    BST_NODE_BYTES = BST_BLOCK * BST_NODE_ROWS * (int)sizeof(float)
-};
+/* Bytes on the device of a block's box. */
+enum { BST_BOX_BYTES = 4 * (int)sizeof(float) };
 
 #endif

@@ -14,8 +14,6 @@
 #define DEPOSIT_TEAM 4
 #define DEPOSIT_SPAN 24
 #define DEPOSIT_ROOM 40
-/* Blocks that are found before they are added. */
-#define DEPOSIT_LIST 64
 
 #ifdef NEAR_CACHE
 #define FETCH(p) __builtin_prefetch((const private void *)(uintptr_t)(p))
@@ -122,16 +120,15 @@ static void deposit_team(local float *sum, const deposit_nodes *b, int n, int co
 }
 
 /* Places one block's nodes; returns whether any of them reaches the tile. */
-static int place_nodes(bst_deposit_params p, int tile_x, int tile_y, global const float16 *block,
+static int place_nodes(bst_deposit_params p, int tile_x, int tile_y, node_block nodes,
                        global const float *field, deposit_nodes *out) {
     const float px = 1.0f / (float)(1 << PLACE_BITS);
-    float16 x = convert_float16(as_int16(block[0])) * px;
-    float16 y = convert_float16(as_int16(block[1])) * px;
+    float16 x = convert_float16(nodes.x) * px, y = convert_float16(nodes.y) * px;
     float16 u = (x - p.x0) * p.density_x, v = (y - p.y0) * p.density_y;
     float16 floor_u = floor(u), floor_v = floor(v);
     const float before = BST_SPREAD_TAPS / 2 - 1, after = BST_SPREAD_TAPS / 2;
     float16 column = floor_u - (before + (float)tile_x), row = floor_v - (before + (float)tile_y);
-    float16 electrons = block[2], width = block[3];
+    float16 electrons = nodes.electrons, width = nodes.width;
     int16 hit = (electrons > 0.0f) & (column > (float)-BST_SPREAD_TAPS) &
                 (column < (float)DEPOSIT_W) & (row > (float)-BST_SPREAD_TAPS) &
                 (row < (float)DEPOSIT_H) &
@@ -169,10 +166,10 @@ static int place_nodes(bst_deposit_params p, int tile_x, int tile_y, global cons
 }
 
 static void deposit_block(bst_deposit_params p, local float *sum, int tile_x, int tile_y,
-                          global const float16 *block, global const float *table,
-                          global const float *field, deposit_profiles *room) {
+                          node_block nodes, global const float *table, global const float *field,
+                          deposit_profiles *room) {
     deposit_nodes b;
-    if (!place_nodes(p, tile_x, tile_y, block, field, &b)) {
+    if (!place_nodes(p, tile_x, tile_y, nodes, field, &b)) {
         return;
     }
     for (int n = 0; n < BST_BLOCK; n += DEPOSIT_TEAM) {
@@ -197,18 +194,15 @@ static void deposit_block(bst_deposit_params p, local float *sum, int tile_x, in
     }
 }
 
-/* Adds the blocks of a list. */
-static void deposit_list(bst_deposit_params p, local float *sum, int tile_x, int tile_y,
-                         const int *list, int count, global const float16 *nodes,
-                         global const float *table, global const float *field,
-                         deposit_profiles *room) {
-    for (int k = 0; k < count; k++) {
-        deposit_block(p, sum, tile_x, tile_y, nodes + BST_NODE_ROWS * list[k], table, field, room);
-    }
+/* Which of 16 boxes (x0[16], y0[16], x1[16], y1[16]) touch the tile, a box in px. */
+static int16 boxes_hit(global const float *box, float4 tile) {
+    return (vload16(0, box) <= tile.z) & (vload16(1, box) <= tile.w) &
+           (vload16(2, box) >= tile.x) & (vload16(3, box) >= tile.y);
 }
 
-/* grid: [samples_y / 16][samples_x][16]. table: [2][BST_SPREAD_TABLE], along x and y. The boxes are
- * those of the nodes kernel, which reach at least as far as the spreading kernel. */
+/* nodes: table of nodes. grid: [samples_y / 16][samples_x][16]. table: [2][BST_SPREAD_TABLE], along x
+ * and y. The boxes are those of the nodes kernel, which reach at least as far as the spreading kernel.
+ */
 __attribute__((reqd_work_group_size(DEPOSIT_GROUP, 1, 1))) kernel void bst_light_deposit(
     bst_deposit_params p, global const bst_scene_source *sources, global const float16 *nodes,
     global const float *block_box, global const float *source_box, global const float *table,
@@ -220,8 +214,9 @@ __attribute__((reqd_work_group_size(DEPOSIT_GROUP, 1, 1))) kernel void bst_light
     }
     local float *sum = (local float *)sums[get_local_id(0)];
     int left = tile % p.tiles_x * DEPOSIT_W, top = tile / p.tiles_x * DEPOSIT_H;
-    float x0 = p.x0 + (float)left / p.density_x, x1 = x0 + (float)DEPOSIT_W / p.density_x;
-    float y0 = p.y0 + (float)top / p.density_y, y1 = y0 + (float)DEPOSIT_H / p.density_y;
+    float x0 = p.x0 + (float)left / p.density_x, y0 = p.y0 + (float)top / p.density_y;
+    float4 place = (float4)(x0, y0, x0 + (float)DEPOSIT_W / p.density_x,
+                            y0 + (float)DEPOSIT_H / p.density_y);
     for (int i = 0; i < DEPOSIT_W * DEPOSIT_STRIDE / 16; i++) {
         sums[get_local_id(0)][i] = (float16)0.0f;
     }
@@ -231,47 +226,33 @@ __attribute__((reqd_work_group_size(DEPOSIT_GROUP, 1, 1))) kernel void bst_light
             room.x[k][j] = room.y[k][j] = 0.0f;
         }
     }
-    int list[DEPOSIT_LIST], listed = 0;
     for (int g = 0; g < p.source_groups; g++) {
-        global const float *box = source_box + g * 4 * BST_BLOCK;
-        int16 hit = (vload16(0, box) <= x1) & (vload16(1, box) <= y1) & (vload16(2, box) >= x0) &
-                    (vload16(3, box) >= y0);
+        int16 hit = boxes_hit(source_box + g * 4 * BST_BLOCK, place);
         if (!any_of(hit)) {
             continue;
         }
-        int hits[BST_BLOCK];
+        int hits[BST_BLOCK], blocks[BST_BLOCK];
         vstore16(hit, 0, hits);
-        for (int i = 0; i < BST_BLOCK; i++) {
-            if (hits[i]) {
-                bst_scene_source s = sources[g * BST_BLOCK + i];
-                for (int b = 0; b < s.blocks; b += 4) {
-                    FETCH(block_box + s.first_block + b);
-                }
-            }
-        }
         for (int i = 0; i < BST_BLOCK; i++) {
             if (!hits[i]) {
                 continue;
             }
             bst_scene_source s = sources[g * BST_BLOCK + i];
-            for (int n = 0; n < s.blocks; n++) {
-                int b = s.first_block + n, lane = n % BST_BLOCK;
-                global const float *r = block_box + (s.first_box * BST_BLOCK + n - lane) * 4 + lane;
-                if (s.blocks == 1 || (r[0] <= x1 && r[2 * BST_BLOCK] >= x0 && r[BST_BLOCK] <= y1 &&
-                                      r[3 * BST_BLOCK] >= y0)) {
-                    for (int k = 0; k < BST_NODE_ROWS; k++) {
-                        FETCH(nodes + BST_NODE_ROWS * b + k);
-                    }
-                    list[listed++] = b;
+            blocks[0] = 1;
+            for (int first = 0; first < s.blocks; first += BST_BLOCK) {
+                if (s.blocks > 1) { /* else the source's box is the block's */
+                    global const float *box = block_box + (s.first_box * BST_BLOCK + first) * 4;
+                    vstore16(boxes_hit(box, place), 0, blocks);
                 }
-                if (listed == DEPOSIT_LIST) {
-                    deposit_list(p, sum, left, top, list, listed, nodes, table, field, &room);
-                    listed = 0;
+                for (int k = 0; k < min(BST_BLOCK, s.blocks - first); k++) {
+                    if (blocks[k]) {
+                        deposit_block(p, sum, left, top, nodes_of(s, first + k, nodes), table,
+                                      field, &room);
+                    }
                 }
             }
         }
     }
-    deposit_list(p, sum, left, top, list, listed, nodes, table, field, &room);
     int columns = min(DEPOSIT_W, p.samples_x - left);
     int rows = min(DEPOSIT_H, p.samples_y - top); /* samples_y is a multiple of 16 */
     for (int y = 0; y < rows; y += 16) {

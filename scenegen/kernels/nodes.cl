@@ -104,12 +104,10 @@ static node_block nodes_of(bst_scene_source s, int b, global const float16 *tabl
 
 /* Boxes of inclusive pixels, by groups of 16: x0[16], y0[16], x1[16], y1[16]. block_box: of the
  * blocks of a source that has several, from its first_box on; source_box: of sources; group_box: of
- * groups of sources. nodes (with FFT_LIGHT): per block x[16], y[16], electrons[16], width_of[16].
- */
+ * groups of sources. */
 __attribute__((reqd_work_group_size(BST_BLOCK, 1, 1))) kernel void bst_scene_nodes(
     global const bst_scene_source *sources, int count, global const float16 *table,
-    global float *block_box, global float *source_box,
-    global float *group_box, global float16 *nodes) {
+    global float *block_box, global float *source_box, global float *group_box) {
     int i = (int)get_global_id(0), g = i / BST_BLOCK;
     global float *box = source_box + g * 4 * BST_BLOCK + i % BST_BLOCK;
     float x0 = 1e9f, y0 = 1e9f, x1 = -1e9f, y1 = -1e9f;
@@ -118,13 +116,6 @@ __attribute__((reqd_work_group_size(BST_BLOCK, 1, 1))) kernel void bst_scene_nod
         float reach = (float)s.radius;
         for (int b = 0; b < s.blocks; b++) {
             node_block n = nodes_of(s, b, table);
-#ifdef FFT_LIGHT
-            int block = s.first_block + b;
-            nodes[BST_NODE_ROWS * block] = as_float16(n.x);
-            nodes[BST_NODE_ROWS * block + 1] = as_float16(n.y);
-            nodes[BST_NODE_ROWS * block + 2] = n.electrons;
-            nodes[BST_NODE_ROWS * block + 3] = n.width;
-#endif
             int4 bounds = bounds_of(n.x >> PLACE_BITS, n.y >> PLACE_BITS);
             float4 r = (float4)((float)bounds.x - reach, (float)bounds.z - reach,
                                 reach + 1.0f - (float)bounds.y, reach + 1.0f - (float)bounds.w);

@@ -13,9 +13,6 @@
 /* Floats per node of a node table: the homography from the reference attitude's tangent plane to
  * the node's, as nine coefficients, then the weight and the widening in PSF variances. */
 #define BST_TABLE_ROWS 11
-/* Vectors per block of the Fourier path's nodes: x, y, electrons, place in the table's widths. x and
- * y are integers, sensor pixels times 2^PLACE_BITS: floats would be rounded by up to 1e-4 px. */
-#define BST_NODE_ROWS 4
 /* Places from the boresight stay below this many parts of a pixel, so that sums of two fit an int.
  */
 #define BST_PLACE_LIMIT (1 << 29)
@@ -58,7 +55,6 @@ typedef struct bst_scene_source {
     int place_x, place_y; /* the same on the sensor, px times 2^PLACE_BITS */
     float electrons;  /* in the exposure */
     int first_table;  /* block of the node table */
-    int first_block;  /* block of the frame's nodes */
     int blocks;
     int first_box; /* of the blocks' boxes, by groups of BST_BLOCK */
     int radius;    /* the stamp reaches this far beyond the two nearest pixels of a node */
