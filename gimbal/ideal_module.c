@@ -161,6 +161,7 @@ static bst_status step(void *self, struct bst_step *s) {
 
     int capacity;
     bst_los_history *history = bst_step_write(s, PORT_HISTORY, &capacity);
+    history->jitter_rad2 = m->platform.unresolved_rad2;
     bst_platform_append_los(history, capacity, tick,
                             bst_platform_true_camera(&m->platform, n, seconds, q_cam_from_body));
     if (n % m->telemetry_steps == 0) {

@@ -23,6 +23,47 @@ static void draw_band(bst_jitter_axis *axis, int first, int lines, double rms_ax
     }
 }
 
+static bool has_band(double rms_rad, double min_hz, double max_hz) {
+    return rms_rad > 0.0 && max_hz > min_hz;
+}
+
+static void cut_band(double *rms_rad, double min_hz, double *max_hz, double top_hz) {
+    if (has_band(*rms_rad, min_hz, *max_hz) && *max_hz > top_hz) {
+        double cut = fmax(top_hz, min_hz);
+        *rms_rad *= sqrt((cut - min_hz) / (*max_hz - min_hz));
+        *max_hz = cut;
+    }
+}
+
+bst_jitter_spec bst_jitter_resolved(const bst_jitter_spec *spec, double dt_s) {
+    bst_jitter_spec out = *spec;
+    double top_hz = BST_JITTER_RESOLVED / dt_s;
+    cut_band(&out.low_rms_rad, 0.0, &out.low_cutoff_hz, top_hz);
+    cut_band(&out.high_rms_rad, out.high_min_hz, &out.high_max_hz, top_hz);
+    return out;
+}
+
+/* Share of a flat band that straight lines lack: (1 - cos(2 pi f dt)) / 3, in the mean, up to the
+ * highest resolved frequency, all beyond. */
+static double lacking(double min_hz, double max_hz, double dt_s) {
+    double top_hz = fmin(fmax(BST_JITTER_RESOLVED / dt_s, min_hz), max_hz);
+    double w = 2.0 * BST_PI * dt_s, width = top_hz - min_hz, mean = 0.5 * (top_hz + min_hz);
+    /* mean of the cosine: cos(w mean) sin(w width / 2) / (w width / 2) */
+    double half = 0.5 * w * width, sinc = half > 1e-4 ? sin(half) / half : 1.0 - half * half / 6.0;
+    return (width * (1.0 - cos(w * mean) * sinc) / 3.0 + max_hz - top_hz) / (max_hz - min_hz);
+}
+
+double bst_jitter_unresolved_rad2(const bst_jitter_spec *s, double dt_s) {
+    double sum = 0.0;
+    if (has_band(s->low_rms_rad, 0.0, s->low_cutoff_hz)) {
+        sum += s->low_rms_rad * s->low_rms_rad * lacking(0.0, s->low_cutoff_hz, dt_s);
+    }
+    if (has_band(s->high_rms_rad, s->high_min_hz, s->high_max_hz)) {
+        sum += s->high_rms_rad * s->high_rms_rad * lacking(s->high_min_hz, s->high_max_hz, dt_s);
+    }
+    return 0.5 * sum;
+}
+
 void bst_jitter_init(bst_jitter *jitter, const bst_jitter_spec *spec, double dt_s,
                      bst_rng_key key) {
     *jitter = (bst_jitter){.dt_s = dt_s, .index = -1};

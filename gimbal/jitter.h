@@ -32,6 +32,18 @@ typedef struct bst_jitter {
     bst_jitter_axis axis[2];
 } bst_jitter;
 
+/* Steps of dt_s follow jitter up to this times 1 / dt_s. */
+#define BST_JITTER_RESOLVED 0.4
+
+/* What steps of dt_s can follow: the bands up to BST_JITTER_RESOLVED / dt_s, with their share of
+ * the variance. */
+bst_jitter_spec bst_jitter_resolved(const bst_jitter_spec *spec, double dt_s);
+
+/* Variance, rad^2 per axis, that straight lines between samples dt_s apart of bst_jitter_resolved
+ * lack: of a sinusoid of frequency f they have (2 + cos(2 pi f dt_s)) / 3 on average over its
+ * phases. */
+double bst_jitter_unresolved_rad2(const bst_jitter_spec *spec, double dt_s);
+
 /* Draws the lines. Each band is cut into equal slots with one line of equal amplitude at a uniform
  * place in each, so that the spectrum is flat at the slots' resolution and the RMS is exact over
  * long times (a line of amplitude a has the mean square a^2 / 2). dt_s is the step of

@@ -29,11 +29,11 @@ typedef struct bst_platform {
     double attitude_noise_rad;
     bst_rng_key attitude_key;
     bst_jitter jitter;
+    double unresolved_rad2; /* variance of the jitter per axis that is not between the samples */
 } bst_platform;
 
 /* Prepares a platform. pixel_rad: angle of a sensor pixel (jitter is configured in pixels); dt_s:
- * plant step. BST_ERR_CONFIG when a plant of this step cannot follow the high jitter band, or the
- * band is empty. */
+ * plant step. BST_ERR_CONFIG when the high jitter band is empty. */
 bst_status bst_platform_init(bst_ctx *ctx, bst_platform *platform,
                              const bst_platform_config *config, bst_quat q_nominal_from_gcrf,
                              double pixel_rad, double dt_s, bst_rng_key jitter_key,

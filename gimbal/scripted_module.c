@@ -128,6 +128,7 @@ static bst_status step(void *self, struct bst_step *s) {
                                             bst_quat_conj(m->platform.q_nominal_from_gcrf));
     int capacity;
     bst_los_history *history = bst_step_write(s, PORT_HISTORY, &capacity);
+    history->jitter_rad2 = m->platform.unresolved_rad2;
     bst_platform_append_los(
         history, capacity, tick,
         bst_platform_true_camera_between(&m->platform, n, (double)past / (double)m->period_ticks,

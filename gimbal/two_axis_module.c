@@ -91,6 +91,7 @@ static bst_status step(void *self, struct bst_step *s) {
 
     int capacity;
     bst_los_history *history = bst_step_write(s, PORT_HISTORY, &capacity);
+    history->jitter_rad2 = m->plant.platform.unresolved_rad2;
     bst_platform_append_los(history, capacity, tick, m->plant.q_cam_from_gcrf);
     if (measure) {
         bst_pointing_telemetry *telemetry = bst_step_write(s, PORT_POINTING, &capacity);

@@ -55,3 +55,31 @@ bst_status bst_motion_midpoints(bst_ctx *ctx, const bst_path_point *path, int co
     }
     return BST_OK;
 }
+
+/* Light is uniform between the points of a path: where it changes they are so many in an exposure,
+ * and as close as it changes by this share of the mean. */
+enum { RATE_PARTS = 512 };
+#define RATE_STEP 0.02
+
+double bst_motion_stretch(const bst_source *source, double begin_s, double length_s,
+                          double duration_s, double from, int *parts) {
+    const bst_source_rate *r = source->rate;
+    *parts = 1;
+    if (!r || !(length_s > 0.0) || !(duration_s > 0.0)) {
+        return 1.0;
+    }
+    double start = (begin_s + from * length_s) / duration_s, per = length_s / duration_s;
+    double to = 1.0;
+    for (int n = 0; n < r->count; n++) {
+        if (r->u[n] > start + 1e-9 * per) {
+            to = fmin(1.0, from + (r->u[n] - start) / per);
+            break;
+        }
+    }
+    to = to > 1.0 - 1e-9 ? 1.0 : to;
+    double end = start + (to - from) * per;
+    double change = fabs(bst_source_rate_at(source, end) - bst_source_rate_at(source, start));
+    double wanted = fmin(fmax(change / RATE_STEP, (end - start) * RATE_PARTS), 1000.0);
+    *parts = wanted > 1.0 ? (int)ceil(wanted) : 1;
+    return to;
+}

@@ -5,6 +5,7 @@
 
 #include "scenegen/nodes.h"
 #include "sim/core/vec.h"
+#include "sim/world/field.h"
 
 /* How far, at most, a star at the sensor's corner (corner_px from the boresight, undistorted) moves
  * otherwise than the star at the boresight does, px: by roll, and by the tangent plane's stretch,
@@ -21,5 +22,12 @@ void bst_motion_to_shift(bst_path_point *point, double scale_rad, double stretch
  * count >= 2. BST_ERR_MEMORY. */
 bst_status bst_motion_midpoints(bst_ctx *ctx, const bst_path_point *path, int count, int parts,
                                 bst_node_list *list) BST_MUST_CHECK;
+
+/* Of the way between two samples of the track, which begins at begin_s of duration_s and takes
+ * length_s: the stretch that begins at the share `from` and ends at the share that is returned, 1
+ * or that of the source's next knot of brightness. *parts: as many as it takes to follow its light.
+ */
+double bst_motion_stretch(const bst_source *source, double begin_s, double length_s,
+                          double duration_s, double from, int *parts);
 
 #endif

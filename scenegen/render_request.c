@@ -13,10 +13,12 @@ bst_status bst_render_camera_check(bst_ctx *ctx, const bst_camera *c) {
                         "pixels and 8 to 16 bits",
                         (long long)c->width_px, (long long)c->height_px, (long long)c->bits);
     }
-    if (!(c->psf_fwhm_px > 0.0) || c->psf_fwhm_px > 70.0) {
+    double fwhm_px = 2.3548200450309493 * bst_camera_psf_sigma_px(c);
+    if (!(c->psf_fwhm_px > 0.0) || fwhm_px > 70.0) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
-                        "cannot render a PSF of psf_fwhm_px %g: allowed are 0 to 70 pixels",
-                        c->psf_fwhm_px);
+                        "cannot render a PSF of psf_fwhm_px %g, with charge diffusion and fast "
+                        "jitter %g: allowed are 0 to 70 pixels",
+                        c->psf_fwhm_px, fwhm_px);
     }
     return BST_OK;
 }

@@ -8,6 +8,7 @@
 #include "scenegen/planes.h"
 #include "scenegen/renderer.h"
 #include "sim/world/frame_updates.h"
+#include "sim/world/psf.h"
 
 typedef struct fidelity_config {
     double tolerance_sigma;
@@ -82,8 +83,10 @@ typedef struct pick {
 } pick;
 
 typedef struct scenegen {
-    const bst_camera *camera;
-    bst_camera scaled; /* the camera at the pixel scale of the latest exposure, where it changes */
+    const bst_camera *camera, *world_camera;
+    bst_camera changed; /* the camera at the pixel scale and jitter of the latest exposure */
+    bst_psf *psf;       /* of it, if it is wider than the world's */
+    double jitter_rad2;
     struct bst_device *device;
     bst_renderer_options renderer_options;
     double margin_px; /* that the scenario asks for */
@@ -105,6 +108,7 @@ static void destroy(void *self) {
         bst_renderer_free(s->renderer);
         bst_field_free(s->field);
         bst_plane_maker_free(s->planes);
+        bst_psf_free(s->psf);
         free(s->item_source);
         free(s->picks);
         free(s);
@@ -129,7 +133,7 @@ static bst_status create(const bst_module_env *env, const void *config_object, v
     if (!s) {
         return bst_fail(env->ctx, BST_ERR_MEMORY, "no memory for %s", env->instance);
     }
-    s->camera = bst_world_camera(env->world, env->observer, env->sensor);
+    s->camera = s->world_camera = bst_world_camera(env->world, env->observer, env->sensor);
     s->tick_rate_hz = env->tick_rate_hz;
     s->key = bst_env_rng(env, "detector");
     bst_renderer_options options = bst_renderer_default_options();
@@ -268,31 +272,57 @@ static bst_status finish(void *self, struct bst_step *step) {
     return BST_OK;
 }
 
-/* Goes on with another pixel scale: everything that depends on the camera is made again. Frames
- * that were rendered before stay as they are. */
-static bst_status rescale(bst_ctx *ctx, scenegen *s, double scale_arcsec) {
+/* The world's camera at another pixel scale, its PSF widened by the jitter. */
+static bst_status changed_camera(bst_ctx *ctx, const scenegen *s, double scale_arcsec,
+                                 double jitter_rad2, bst_camera *out, bst_psf **psf) {
+    bst_camera scaled;
+    *psf = NULL;
+    BST_TRY(bst_camera_at_scale(ctx, s->world_camera, scale_arcsec, &scaled));
+    *out = scaled;
+    if (jitter_rad2 > 0.0) {
+        double sigma_px = sqrt(jitter_rad2) / bst_camera_scale_rad(&scaled);
+        BST_TRY(bst_camera_blurred(ctx, &scaled, sigma_px, out));
+        *psf = (bst_psf *)out->psf;
+    }
+    return BST_OK;
+}
+
+/* Goes on with another pixel scale or jitter: everything that depends on the camera is made again.
+ * Frames that were rendered before stay as they are. */
+static bst_status change_camera(bst_ctx *ctx, scenegen *s, double scale_arcsec,
+                                double jitter_rad2) {
     bst_camera camera;
+    bst_psf *psf;
     long long pixels;
-    BST_TRY(bst_camera_at_scale(ctx, s->camera, scale_arcsec, &camera));
+    BST_TRY(changed_camera(ctx, s, scale_arcsec, jitter_rad2, &camera, &psf));
     bst_renderer *renderer;
-    BST_TRY(bst_renderer_create(ctx, s->device, &camera, &s->renderer_options, &renderer));
+    bst_status status =
+        bst_renderer_create(ctx, s->device, &camera, &s->renderer_options, &renderer);
+    if (status != BST_OK) {
+        bst_psf_free(psf);
+        return status;
+    }
     bst_status counted = bst_renderer_saturated(ctx, s->renderer, &pixels);
     s->saturated_before += bst_renderer_saturated_frames(s->renderer);
     bst_renderer_free(s->renderer);
+    bst_psf_free(s->psf);
     s->renderer = renderer;
-    BST_TRY(counted);
-    s->scaled = camera;
-    s->camera = &s->scaled;
+    s->psf = psf;
+    s->jitter_rad2 = jitter_rad2;
+    s->changed = camera;
+    s->camera = &s->changed;
     bst_field_set_camera(s->field, s->camera);
     s->options.margin_px = fmax(s->margin_px, bst_renderer_margin_px(renderer));
-    return BST_OK;
+    return counted;
 }
 
 static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure *e,
                          const bst_los_history *history) {
     bst_ctx *ctx = bst_step_ctx(step);
-    if (e->pixel_scale_arcsec > 0.0 && e->pixel_scale_arcsec != s->camera->pixel_scale_arcsec) {
-        BST_TRY(rescale(ctx, s, e->pixel_scale_arcsec));
+    double scale_arcsec =
+        e->pixel_scale_arcsec > 0.0 ? e->pixel_scale_arcsec : s->camera->pixel_scale_arcsec;
+    if (scale_arcsec != s->camera->pixel_scale_arcsec || history->jitter_rad2 != s->jitter_rad2) {
+        BST_TRY(change_camera(ctx, s, scale_arcsec, history->jitter_rad2));
     }
     bst_los_track track;
     int64_t lead =

@@ -1,10 +1,8 @@
 #include <math.h>
 
+#include "scenegen/motion.h"
 #include "scenegen/place.h"
 #include "scenegen/smear_internal.h"
-
-/* Stretches of the path of a source whose brightness changes. */
-enum { RATE_PARTS = 512 };
 
 /* Places further than this from the boresight (px, without distortion) give the sensor no light. */
 static double far_px(const bst_smear *s) {
@@ -52,27 +50,33 @@ static bool passes_by(const bst_smear *s, const bst_path_point *a, const bst_pat
 static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_source *source, double x0,
                            double y0, int *count) {
     const bst_los_track *track = &s->track;
-    int least = (int)chords_of(s, source) / (track->count - 1) + 1;
-    if (source->rate && least < RATE_PARTS / (track->count - 1) + 1) {
-        least = RATE_PARTS / (track->count - 1) + 1; /* between its points light is uniform */
-    }
-    *count = 0;
+    int chords = (int)chords_of(s, source) / (track->count - 1) + 1;
     const bst_quat *turn = s->turn;
+    *count = 0;
     for (int k = 0; k + 1 < track->count; turn += s->parts[k++]) {
-        int parts = s->parts[k] < least ? least : s->parts[k];
-        BST_TRY(bst_smear_reserve(ctx, (void **)&s->own_path, &s->own_capacity, *count + parts + 1,
-                                  sizeof *s->own_path));
-        for (int n = 0; n < parts + (k + 2 == track->count); n++) {
-            double u = (double)n / parts, x, y;
-            double t = track->time_s[k] + u * (track->time_s[k + 1] - track->time_s[k]);
-            t = s->duration_s > 0.0 ? t / s->duration_s : 0.0;
-            bst_quat q = parts == s->parts[k] ? turn[n]
-                                              : bst_quat_slerp(track->q_cam_from_gcrf[k],
-                                                               track->q_cam_from_gcrf[k + 1], u);
-            bool front = bst_smear_project(s, q, bst_source_direction(source, t), &x, &y);
-            s->own_path[(*count)++] = (bst_path_point){
-                {front ? (x - x0) * s->stretch : NAN, front ? (y - y0) * s->stretch : NAN, 0.0},
-                bst_source_light(source, t)};
+        double begin_s = track->time_s[k], length_s = track->time_s[k + 1] - begin_s;
+        int all = s->parts[k] < chords ? chords : s->parts[k];
+        for (double from = 0.0, to; from < 1.0; from = to) { /* shares of the way between samples */
+            int parts;
+            to = bst_motion_stretch(source, begin_s, length_s, s->duration_s, from, &parts);
+            int least = (int)ceil(all * (to - from) - 1e-9);
+            parts = parts < least ? least : parts;
+            bool last = k + 2 == track->count && !(to < 1.0);
+            BST_TRY(bst_smear_reserve(ctx, (void **)&s->own_path, &s->own_capacity,
+                                      *count + parts + 1, sizeof *s->own_path));
+            for (int n = 0; n < parts + last; n++) {
+                double u = from + (to - from) * n / parts, x, y;
+                double t = begin_s + u * length_s;
+                t = s->duration_s > 0.0 ? t / s->duration_s : 0.0;
+                bool known = parts == s->parts[k] && to - from == 1.0;
+                bst_quat q = known ? turn[n]
+                                   : bst_quat_slerp(track->q_cam_from_gcrf[k],
+                                                    track->q_cam_from_gcrf[k + 1], u);
+                bool front = bst_smear_project(s, q, bst_source_direction(source, t), &x, &y);
+                s->own_path[(*count)++] = (bst_path_point){
+                    {front ? (x - x0) * s->stretch : NAN, front ? (y - y0) * s->stretch : NAN, 0.0},
+                    bst_source_light(source, t)};
+            }
         }
     }
     return BST_OK;

@@ -8,13 +8,7 @@
 #include "sim/app/app.h"
 #include "sim/app/export.h"
 #include "sim/app/options.h"
-
-static volatile sig_atomic_t stop_requested;
-
-static void on_signal(int number) {
-    (void)number;
-    stop_requested = 1;
-}
+#include "sim/app/stop_signals.h"
 
 static bool is_sensor(const char *wanted, const bst_export_sensor *sensor) {
     size_t n = strlen(sensor->observer);
@@ -118,8 +112,7 @@ int bst_cmd_export(int argc, char **argv) {
     int frames = NOT_ASKED, table_format = NOT_ASKED, orbits = NOT_ASKED, observations = NOT_ASKED;
     int stretch = 0;
     const char *out = NULL, *tables = NULL;
-    bst_export e = {.stop = &stop_requested,
-                    .last = INT64_C(9007199254740992),
+    bst_export e = {.last = INT64_C(9007199254740992),
                     .every = 1,
                     .frame_rate = 10.0,
                     .box_px = 20.0,
@@ -275,11 +268,7 @@ int bst_cmd_export(int argc, char **argv) {
     e.czml = orbits == 1;
     e.names_oem = orbits == 0;
     e.each_stretch = stretch == 1;
-    stop_requested = 0;
-    struct sigaction action = {.sa_handler = on_signal}, ignore = {.sa_handler = SIG_IGN};
-    sigaction(SIGINT, &action, NULL);
-    sigaction(SIGTERM, &action, NULL);
-    sigaction(SIGPIPE, &ignore, NULL); /* ffmpeg may end early */
+    bst_stop_catch_signals();
     bst_run_reader *run = NULL;
     char folder[4096];
     bst_status status = bst_run_reader_open(&ctx, argv[1], &run);

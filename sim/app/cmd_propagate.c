@@ -10,6 +10,7 @@
 #include "sim/astro/frames.h"
 #include "sim/astro/sgp4.h"
 #include "sim/astro/sky_clock.h"
+#include "sim/astro/tle.h"
 #include "sim/io/czml_writer.h"
 #include "sim/io/oem_writer.h"
 
@@ -50,7 +51,8 @@ static const int64_t TICKS_PER_SECOND = 1000000;
 
 typedef struct request {
     const char *elements, *start_text, *stop_text, *output, *eop_path;
-    int64_t norad;
+    const char *norad_text;
+    int norad; /* 0: all */
     double step_s;
     int frame, format, gravity, mode;
     bool help;
@@ -75,6 +77,25 @@ typedef struct satellite {
 static bst_status read_time(bst_ctx *ctx, const char *option, const char *text, bst_time *out) {
     bst_status status = bst_time_from_utc(ctx, text, out);
     return status == BST_OK ? status : bst_fail_prefix(ctx, status, "--%s", option);
+}
+
+/* A number, or five characters of which the first is a letter. */
+static bst_status read_norad(bst_ctx *ctx, request *q) {
+    const char *text = q->norad_text;
+    if (!text) {
+        return BST_OK;
+    }
+    size_t length = strlen(text), digits = strspn(text, "0123456789");
+    bool number = length > 0 && digits == length && length <= 9;
+    q->norad = number ? (int)strtol(text, NULL, 10) : 0;
+    if (length == 5 && digits == 0 && !bst_tle_decode_number(text, &q->norad)) {
+        q->norad = 0;
+    }
+    return q->norad > 0 ? BST_OK
+                        : bst_fail(ctx, BST_ERR_ARGUMENT,
+                                   "--norad %s: give an integer from 1 to %d, or Alpha-5: a letter "
+                                   "other than I and O and 4 digits",
+                                   text, BST_NORAD_MAX);
 }
 
 /* The grid of times from the texts. */
@@ -321,7 +342,7 @@ static bst_status propagate(bst_ctx *ctx, const request *q, bool *complete) {
     int count = 0;
     bst_eop *eop = NULL;
     states s = {.request = q, .stream = stdout};
-    const bst_elements_options only = {.norad = (int)q->norad};
+    const bst_elements_options only = {.norad = q->norad};
     const char *name = q->output ? q->output : "standard output";
     bst_status status = bst_elements_load(ctx, q->elements, &only, &sets, &count);
     if (status == BST_OK && q->frame == FRAME_GCRF) {
@@ -374,12 +395,10 @@ int bst_cmd_propagate(int argc, char **argv) {
          .argument = "FILE",
          .doc = "the same"},
         {.name = "norad",
-         .kind = BST_OPTION_INT,
-         .target = &q.norad,
+         .kind = BST_OPTION_TEXT,
+         .target = &q.norad_text,
          .argument = "N",
-         .doc = "only the satellite with this catalogue number",
-         .minimum = 1,
-         .maximum = BST_NORAD_MAX},
+         .doc = "only the satellite with this catalogue number, also as Alpha-5"},
         {.name = "start",
          .kind = BST_OPTION_TEXT,
          .target = &q.start_text,
@@ -448,7 +467,7 @@ int bst_cmd_propagate(int argc, char **argv) {
         return bst_options_misuse(&ctx, "propagate");
     }
     q.frame = q.format == FORMAT_CZML ? FRAME_GCRF : q.frame;
-    if (read_times(&ctx, &q) != BST_OK) {
+    if (read_norad(&ctx, &q) != BST_OK || read_times(&ctx, &q) != BST_OK) {
         return bst_options_misuse(&ctx, "propagate");
     }
     bool complete = true;

@@ -2,10 +2,9 @@
 #ifndef BST_APP_EXPORT_H
 #define BST_APP_EXPORT_H
 
-#include <signal.h>
-
 #include <stdio.h>
 
+#include "sim/app/stop_signals.h"
 #include "sim/engine/scenario.h"
 #include "sim/io/run_reader.h"
 #include "sim/world/world.h"
@@ -22,7 +21,6 @@ typedef struct bst_export {
     const bst_run_reader *run;
     const char *out;    /* folder */
     const char *sensor; /* NULL: all; "name" or "observer/name" */
-    const volatile sig_atomic_t *stop;
     /* frames */
     bool film; /* one mp4, else a PNG per frame */
     bool annotate, each_stretch;
@@ -61,8 +59,8 @@ bst_status bst_export_satnet(bst_ctx *ctx, const bst_export *e) BST_MUST_CHECK;
 bst_status bst_export_observations(bst_ctx *ctx, const bst_export *e) BST_MUST_CHECK;
 
 /* BST_ERR_INTERRUPTED when the user asked to stop. */
-static inline bst_status bst_export_check(bst_ctx *ctx, const bst_export *e) {
-    return *e->stop ? bst_fail(ctx, BST_ERR_INTERRUPTED, "interrupted") : BST_OK;
+static inline bst_status bst_export_check(bst_ctx *ctx) {
+    return bst_stop_requested() ? bst_fail(ctx, BST_ERR_INTERRUPTED, "interrupted") : BST_OK;
 }
 
 #endif

@@ -141,7 +141,7 @@ static bst_status write_frames(bst_ctx *ctx, job *j) {
     bst_progress_start(&progress, j->stem, "frames", j->count);
     bst_status status = BST_OK;
     for (int64_t k = 0; k < j->count && status == BST_OK; k++) {
-        status = bst_export_check(ctx, j->e);
+        status = bst_export_check(ctx);
         status = status == BST_OK ? write_frame(ctx, j, k) : status;
         bst_progress_update(&progress, k + 1);
     }

@@ -241,7 +241,7 @@ static bst_status write_orbits(bst_ctx *ctx, const bst_export *e, const bst_scen
     for (int i = 0; i < observers + objects && status == BST_OK; i++) {
         t.observer = i < observers ? i : -1;
         t.object = i < observers ? -1 : i - observers;
-        status = bst_export_check(ctx, e);
+        status = bst_export_check(ctx);
         status = status == BST_OK ? write_one(ctx, e, scenario, stream, &t, written) : status;
         bst_progress_update(&progress, i + 1);
     }

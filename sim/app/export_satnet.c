@@ -307,7 +307,7 @@ static bst_status write_frames(bst_ctx *ctx, job *j) {
         if (id < j->e->first || id > j->e->last || (id - j->e->first) % j->e->every != 0) {
             continue;
         }
-        status = bst_export_check(ctx, j->e);
+        status = bst_export_check(ctx);
         status = status == BST_OK ? read_frame_row(ctx, j, rows, &row) : status;
         status = status == BST_OK ? write_frame(ctx, j, &row) : status;
         if (status != BST_OK) {

@@ -75,7 +75,7 @@ static bst_status export_table(bst_ctx *ctx, const bst_export *e, int64_t number
     char sql[400], path[4096];
     bst_progress progress;
     int64_t rows;
-    BST_TRY(bst_export_check(ctx, e));
+    BST_TRY(bst_export_check(ctx));
     BST_TRY(make_sql(ctx, e, number, name, sql, sizeof sql));
     int n = snprintf(path, sizeof path, "%s/%s.csv", e->out, name);
     if (n < 0 || (size_t)n >= sizeof path) {

@@ -59,6 +59,10 @@ bst_status bst_elements_finish(bst_elements_reader *r, bst_status status, bool e
             status = bst_fail(ctx, BST_ERR_NOT_FOUND,
                               "%.400s: no element set of satellite %d, only %d of others",
                               r->source.name, r->options.norad, r->others);
+        } else if (r->skipped == 0) {
+            status = bst_fail(ctx, BST_ERR_FORMAT,
+                              "%.400s:1: the file holds no element set (expected %s)",
+                              r->source.name, expected);
         } else {
             status = bst_fail(ctx, BST_ERR_FORMAT,
                               "%.400s:1: the file holds no element set that can be used (%d bad "

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "sim/astro/eop_table.h"
-#include "sim/astro/frames.h"
+#include "sim/astro/frames_internal.h"
 #include "sim/core/file.h"
 
 #define MAX_FILE_BYTES ((uint64_t)64 << 20)
@@ -228,5 +228,15 @@ bst_status bst_eop_at(bst_ctx *ctx, const bst_eop *eop, bst_time t, bst_eop_valu
     out->ut1_minus_utc_s = last ? b->ut1_minus_utc_s : a->ut1_minus_utc_s + f * step;
     out->xp_rad = a->xp_rad + f * (b->xp_rad - a->xp_rad);
     out->yp_rad = a->yp_rad + f * (b->yp_rad - a->yp_rad);
+    return BST_OK;
+}
+
+bst_status bst_eop_nearest(bst_ctx *ctx, const bst_eop *eop, bst_time t, bst_time *out) {
+    bst_time first, last;
+    BST_TRY(bst_time_from_utc_jd(ctx, ERFA_DJM0, eop->first_mjd, &first));
+    BST_TRY(bst_time_from_utc_jd(ctx, ERFA_DJM0, eop->first_mjd + eop->count - 1, &last));
+    first = bst_time_add(first, 1.0);
+    last = bst_time_add(last, -1.0);
+    *out = bst_time_diff(t, first) < 0.0 ? first : bst_time_diff(t, last) > 0.0 ? last : t;
     return BST_OK;
 }

@@ -104,8 +104,8 @@ static const node *bodies_at(bst_forces *f, int64_t index) {
 static bst_status earth_at(bst_ctx *ctx, bst_forces *f, int64_t index, const node **out) {
     node *n = slot(f, index);
     if (!n->has_earth) {
-        BST_TRY(bst_earth_parts_at(ctx, f->model.eop,
-                                   bst_time_add(f->epoch, NODE_STEP_S * (double)index), &n->parts));
+        bst_time t = bst_time_add(f->epoch, NODE_STEP_S * (double)index);
+        BST_TRY(bst_earth_parts_at(ctx, f->model.eop, t, t, &n->parts));
         n->has_earth = true;
     }
     *out = n;

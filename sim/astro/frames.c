@@ -34,11 +34,12 @@ static bst_status ut1_minus_tai(bst_ctx *ctx, bst_time t, const bst_eop_values *
     return BST_OK;
 }
 
-bst_status bst_earth_parts_at(bst_ctx *ctx, const bst_eop *eop, bst_time t, bst_earth_parts *out) {
+bst_status bst_earth_parts_at(bst_ctx *ctx, const bst_eop *eop, bst_time t, bst_time read_at,
+                              bst_earth_parts *out) {
     bst_eop_values values;
     double tt1, tt2, ut1_minus_tai_s = 0.0, m[3][3];
-    BST_TRY(bst_eop_at(ctx, eop, t, &values));
-    BST_TRY(ut1_minus_tai(ctx, t, &values, &ut1_minus_tai_s));
+    BST_TRY(bst_eop_at(ctx, eop, read_at, &values));
+    BST_TRY(ut1_minus_tai(ctx, read_at, &values, &ut1_minus_tai_s));
     double ut1 = t.jd1, ut2 = t.jd2 + ut1_minus_tai_s / ERFA_DAYSEC;
     bst_time_tt(t, &tt1, &tt2);
     double tio_rad = eraSp00(tt1, tt2);
@@ -63,7 +64,7 @@ bst_earth_frames bst_earth_frames_from_parts(const bst_earth_parts *parts) {
 bst_status bst_earth_frames_at(bst_ctx *ctx, const bst_eop *eop, bst_time t,
                                bst_earth_frames *out) {
     bst_earth_parts parts;
-    BST_TRY(bst_earth_parts_at(ctx, eop, t, &parts));
+    BST_TRY(bst_earth_parts_at(ctx, eop, t, t, &parts));
     *out = bst_earth_frames_from_parts(&parts);
     return BST_OK;
 }

@@ -1,5 +1,5 @@
-/* Made by make_gravity_table.py from EGM2008 (Pavlis, Holmes, Kenyon and Factor, J. Geophys. Res. 117,
- * B04406, 2012; National Geospatial-Intelligence Agency, public domain), tide-free, fully
+/* Made by make_gravity_table.py from EGM2008 (Pavlis, Holmes, Kenyon and Factor, J. Geophys. Res.
+ * 117, B04406, 2012; National Geospatial-Intelligence Agency, public domain), tide-free, fully
  * normalised: C and S by degree, then order. Do not edit. */
 #include "sim/astro/gravity_internal.h"
 

@@ -12,6 +12,7 @@
 typedef struct node {
     int64_t index;
     bool valid;
+    bool beyond; /* the Earth-orientation table */
     bst_earth_parts parts;
     bst_bodies bodies;
 } node;
@@ -35,14 +36,22 @@ void bst_sky_clock_free(bst_sky_clock *clock) {
     free(clock);
 }
 
-/* The grid value of an index, from its slot or worked out anew. */
+/* The grid value of an index, from its slot or worked out anew. Beyond the Earth-orientation table
+ * it has the values of its end, for instants just before. */
 static bst_status node_at(bst_ctx *ctx, bst_sky_clock *clock, int64_t index, const node **out) {
     node *n = &clock->nodes[index % NODES];
     if (!n->valid || n->index != index) {
         int64_t day = index / STEPS_PER_DAY, step = index % STEPS_PER_DAY;
         bst_time t = {(double)day + 0.5, (double)step / STEPS_PER_DAY};
         n->valid = false;
-        BST_TRY(bst_earth_parts_at(ctx, clock->eop, t, &n->parts));
+        bst_status status = bst_earth_parts_at(ctx, clock->eop, t, t, &n->parts);
+        n->beyond = status == BST_ERR_RANGE;
+        if (n->beyond) {
+            bst_time read_at;
+            BST_TRY(bst_eop_nearest(ctx, clock->eop, t, &read_at));
+            status = bst_earth_parts_at(ctx, clock->eop, t, read_at, &n->parts);
+        }
+        BST_TRY(status);
         bst_bodies_at(t, &n->bodies);
         n->index = index;
         n->valid = true;
@@ -101,6 +110,10 @@ bst_status bst_sky_clock_at(bst_ctx *ctx, bst_sky_clock *clock, bst_time t, bst_
     const node *a, *b;
     BST_TRY(node_at(ctx, clock, index, &a));
     BST_TRY(node_at(ctx, clock, index + 1, &b));
+    if (a->beyond || b->beyond) {
+        bst_eop_values covered;
+        BST_TRY(bst_eop_at(ctx, clock->eop, t, &covered));
+    }
     bst_earth_parts parts = bst_earth_parts_between(&a->parts, &b->parts, f);
     out->frames = bst_earth_frames_from_parts(&parts);
     out->bodies.sun_m = lerp(a->bodies.sun_m, b->bodies.sun_m, f);

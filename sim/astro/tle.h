@@ -15,6 +15,10 @@
 bst_status bst_tle_parse(bst_ctx *ctx, const char *line1, const char *line2,
                          bst_elements *out) BST_MUST_CHECK;
 
+/* Five digits, or Alpha-5: a letter for the two leading digits 10 to 33, without I and O. Reads
+ * five characters at text; false when they are no number. */
+bool bst_tle_decode_number(const char *text, int *out);
+
 typedef bst_elements_options bst_tle_options;
 
 /* Reads a file of 2LE or 3LE sets (mixed; blank lines and # comments allowed; CRLF and a UTF-8 byte

@@ -19,7 +19,12 @@ bst_status bst_orbit_build_sgp4(const bst_world_builder *b, const bst_elements *
     BST_TRY(bst_time_from_utc_jd(b->ctx, set->epoch_utc_jd1, set->epoch_utc_jd2, &epoch));
     orbit->source = BST_ORBIT_SGP4;
     orbit->name = name;
-    orbit->epoch_offset_s = bst_time_diff(b->world->epoch, epoch);
+    /* days of UTC count as uniform, as the theory does: leap seconds since the elements' epoch do
+     * not count */
+    double jd1, jd2, seconds = bst_time_diff(b->world->epoch, epoch);
+    bst_time_utc(b->world->epoch, &jd1, &jd2);
+    double uniform = (jd1 - set->epoch_utc_jd1 + (jd2 - set->epoch_utc_jd2)) * 86400.0;
+    orbit->epoch_offset_s = seconds - round(seconds - uniform);
     return bst_sgp4_create(b->ctx, set, BST_SGP4_WGS72, BST_SGP4_IMPROVED, &orbit->sgp4);
 }
 

@@ -135,11 +135,14 @@ void bst_psf_free(bst_psf *psf) {
     if (!psf || atomic_fetch_sub(&psf->owners, 1) > 1) {
         return;
     }
-    for (int k = 0; psf->nodes && k < bst_psf_nodes(psf); k++) {
+    for (int k = 0; !psf->base && psf->nodes && k < bst_psf_nodes(psf); k++) {
         free(psf->nodes[k].own_radial.value);
         bst_grid_otf_free(&psf->nodes[k].grid);
     }
-    free(psf->shared.value);
+    if (!psf->base) {
+        free(psf->shared.value);
+    }
+    bst_psf_free(psf->base);
     free(psf->nodes);
     free(psf);
 }
@@ -194,6 +197,21 @@ static bst_status make_profiles(bst_ctx *ctx, const bst_camera *camera, bst_psf 
     return BST_OK;
 }
 
+/* Bounds and widths of a PSF that sigma_px more of diffusion widens. */
+static void widen(bst_psf *psf, double sigma_px) {
+    if (psf->diffusion_px > 0.0) {
+        /* both fall from 1: their product is below 1e-9 where either is */
+        psf->cutoff = fmin(psf->cutoff, GAUSSIAN_CUTOFF / psf->diffusion_px);
+    }
+    psf->reach_px += GAUSSIAN_REACH * sigma_px;
+    double sigma;
+    bool gaussian = bst_psf_gaussian(psf, &sigma);
+    for (int k = 0; k < bst_psf_nodes(psf); k++) {
+        psf->nodes[k].equivalent_fwhm_px =
+            gaussian ? FWHM_PER_SIGMA * sigma : equivalent_fwhm(psf, k);
+    }
+}
+
 static bst_status fill_in(bst_ctx *ctx, const bst_camera *camera, const bst_psf_inputs *inputs,
                           bst_psf *psf) {
     switch (camera->optics.psf) {
@@ -206,17 +224,8 @@ static bst_status fill_in(bst_ctx *ctx, const bst_camera *camera, const bst_psf_
         default:
             BST_TRY(make_profiles(ctx, camera, psf));
     }
-    if (psf->diffusion_px > 0.0) {
-        /* both fall from 1: their product is below 1e-9 where either is */
-        psf->cutoff = fmin(psf->cutoff, GAUSSIAN_CUTOFF / psf->diffusion_px);
-    }
-    psf->reach_px += 1.0 + GAUSSIAN_REACH * psf->diffusion_px;
-    double sigma;
-    bool gaussian = bst_psf_gaussian(psf, &sigma);
-    for (int k = 0; k < bst_psf_nodes(psf); k++) {
-        psf->nodes[k].equivalent_fwhm_px =
-            gaussian ? FWHM_PER_SIGMA * sigma : equivalent_fwhm(psf, k);
-    }
+    psf->reach_px += 1.0;
+    widen(psf, psf->diffusion_px);
     return BST_OK;
 }
 
@@ -267,4 +276,31 @@ bst_status bst_psf_create_from(bst_ctx *ctx, const bst_camera *camera, const bst
 bst_status bst_psf_create(bst_ctx *ctx, const bst_camera *camera, bst_psf **out) {
     const bst_psf_inputs none = {0};
     return bst_psf_create_from(ctx, camera, &none, out);
+}
+
+bst_status bst_camera_blurred(bst_ctx *ctx, const bst_camera *camera, double sigma_px,
+                              bst_camera *out) {
+    bst_psf *base;
+    *out = *camera;
+    out->psf = NULL;
+    BST_TRY(bst_psf_create(ctx, camera, &base));
+    bst_psf *psf = calloc(1, sizeof *psf);
+    size_t bytes = (size_t)bst_psf_nodes(base) * sizeof *base->nodes;
+    bst_psf_node *nodes = malloc(bytes);
+    if (!psf || !nodes) {
+        free(psf);
+        free(nodes);
+        bst_psf_free(base);
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a PSF");
+    }
+    memcpy(nodes, base->nodes, bytes);
+    *psf = *base;
+    atomic_init(&psf->owners, 1);
+    psf->base = base;
+    psf->nodes = nodes;
+    psf->diffusion_px = hypot(base->diffusion_px, sigma_px);
+    widen(psf, sigma_px);
+    out->optics.diffusion_px = hypot(camera->optics.diffusion_px, sigma_px);
+    out->psf = psf;
+    return BST_OK;
 }

@@ -48,6 +48,12 @@ bst_status bst_psf_create_from(bst_ctx *ctx, const bst_camera *camera, const bst
                                bst_psf **out) BST_MUST_CHECK;
 void bst_psf_free(bst_psf *psf);
 
+/* A copy of the camera whose PSF is widened by line-of-sight motion that is fast against the
+ * exposure: every OTF times exp(-2 pi^2 sigma^2 f^2), as charge diffusion does. out->psf is new and
+ * the caller's to free. */
+bst_status bst_camera_blurred(bst_ctx *ctx, const bst_camera *camera, double sigma_px,
+                              bst_camera *out) BST_MUST_CHECK;
+
 /* The OTF at (fx, fy) of a node of the field grid: out = {real, imaginary}. */
 void bst_psf_otf(const bst_psf *psf, int node, double fx, double fy, double out[2]);
 

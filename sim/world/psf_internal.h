@@ -62,6 +62,7 @@ struct bst_psf {
     double width_px, height_px;
     double diffusion_px, fill[2];
     double cutoff, reach_px;
+    bst_psf *base;         /* NULL, or the PSF that lends its tables to this wider one */
     bst_radial_otf shared; /* diffraction: unaberrated annulus, the same at all nodes */
     bst_psf_node *nodes;   /* [rows][columns] */
 };

@@ -97,6 +97,14 @@ static bst_los_history *make_history(void) {
     return h;
 }
 
+/* Integral of the squared image of a straight streak, see docs/equations.md. */
+static double peak_term(double sigma, double length) {
+    double a = 0.5 * length / sigma;
+    return (erf(a) / length -
+            2.0 * sigma * (1.0 - exp(-a * a)) / (sqrt(BST_PI) * length * length)) /
+           (2.0 * sqrt(BST_PI) * sigma);
+}
+
 /* Centroid of the light about (x, y), background taken off. */
 static void centroid(const uint16_t *p, double x, double y, double background, double *cx,
                      double *cy, double *sum) {
@@ -183,6 +191,23 @@ static void frames_show_what_truth_says(void **state) {
     assert_true(step.truth_written && !step.frame_written && step.truth->dropped);
     assert_int_equal(step.truth->count, count);
     assert_memory_equal(step.truth->items, items, (size_t)count * sizeof *items);
+
+    /* jitter too fast for the samples: the same places and light, less SNR, as of a wider streak */
+    step.history->jitter_rad2 = pow(1.5 * 12.0 * BST_ARCSEC_RAD, 2);
+    step.exposure = &exposure;
+    bst_assert_ok(&ctx, d->step(self, &step));
+    assert_int_equal(step.truth->count, count);
+    double psf = bst_camera_psf_sigma_px(camera);
+    double sharp = peak_term(sqrt(psf * psf + 1.0 / 12.0), 10.0);
+    double blurred = peak_term(sqrt(psf * psf + 1.5 * 1.5 + 1.0 / 12.0), 10.0);
+    for (int i = 0; i < count; i++) {
+        assert_true(step.truth->items[i].electrons == items[i].electrons);
+        assert_true(step.truth->items[i].x_mean_px == items[i].x_mean_px);
+        if (items[i].snr > 0.0) { /* the streak is 10 px within 1 %, its bend some 1e-3 px */
+            bst_assert_close(step.truth->items[i].snr / items[i].snr, sqrt(blurred / sharp), 2e-3);
+        }
+    }
+    step.history->jitter_rad2 = 0.0;
 
     /* with less room, the brightest are kept, in the same order, and the rest is counted */
     enum { ROOM = 25 };

@@ -1,4 +1,6 @@
 /* Where things are: catalogued orbits, relative orbits, burns. */
+#include "sim/astro/sgp4.h"
+#include "sim/astro/tle.h"
 #include "tests/world/world_support.h"
 
 #define GX5 "{\"name\": \"GX5\", " TEST_GX5 "}"
@@ -58,6 +60,42 @@ static void a_relative_orbit_keeps_its_offset(void **state) {
         /* that same inconsistency turns the axes by 2.5e-10 rad/s, at 2e4 m */
         bst_assert_close(test_distance(v, dv), 0, 3e-5);
     }
+    bst_view_free(view);
+    bst_world_free(world);
+}
+
+/* Elements from before a leap second: as SGP4 is run elsewhere, days of UTC count as uniform. */
+static void leap_seconds_since_the_elements_do_not_count(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    const char file[] = "tests/world/data/before_leap.tle";
+    bst_world *world = test_world_with(
+        "{\"name\": \"old\", \"orbit\": {\"elements_file\": "
+        "\"tests/world/data/before_leap.tle\", \"norad\": 39089}}",
+        "");
+    bst_view *view = view_of(world);
+    bst_elements *sets;
+    int count;
+    bst_sgp4 *sgp4;
+    bst_eop *eop;
+    bst_earth_frames frames;
+    bst_time epoch;
+    double jd1, jd2, r[3], v[3];
+    bst_assert_ok(&ctx, bst_elements_load(&ctx, file, NULL, &sets, &count));
+    bst_assert_ok(&ctx, bst_sgp4_create(&ctx, sets, BST_SGP4_WGS72, BST_SGP4_IMPROVED, &sgp4));
+    bst_assert_ok(&ctx, bst_time_from_utc(&ctx, TEST_EPOCH, &epoch));
+    bst_time_utc(epoch, &jd1, &jd2);
+    double minutes = (jd1 - sets->epoch_utc_jd1) * 1440.0 + (jd2 - sets->epoch_utc_jd2) * 1440.0;
+    assert_int_equal(bst_sgp4_propagate(sgp4, minutes, r, v), BST_SGP4_OK);
+    bst_assert_ok(&ctx, bst_eop_builtin(&ctx, &eop));
+    bst_assert_ok(&ctx, bst_earth_frames_at(&ctx, eop, epoch, &frames));
+    bst_vec3 place =
+        bst_mat3_mul_vec(&frames.gcrf_from_teme, (bst_vec3){1e3 * r[0], 1e3 * r[1], 1e3 * r[2]});
+    /* a second is 7.5 km; the world interpolates to 1e-5 m, of minutes in double 1e-6 s is left */
+    bst_assert_close(test_distance(object_at(view, 0, 0.0).position_m, place), 0.0, 0.05);
+    bst_eop_free(eop);
+    bst_sgp4_free(sgp4);
+    free(sets);
     bst_view_free(view);
     bst_world_free(world);
 }
@@ -225,6 +263,7 @@ static void wrong_worlds_are_refused(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_relative_orbit_keeps_its_offset),
+        cmocka_unit_test(leap_seconds_since_the_elements_do_not_count),
         cmocka_unit_test(a_burn_moves_the_object_as_theory_says),
         cmocka_unit_test(a_burnt_orbit_has_the_period_of_its_energy),
         cmocka_unit_test(burns_add_up),

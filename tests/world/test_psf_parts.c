@@ -293,6 +293,52 @@ static void no_light_is_lost(void **state) {
     }
 }
 
+/* Fast motion multiplies every OTF by its own, and the widened PSF outlives nothing but its base.
+ */
+static void jitter_widens_any_psf(void **state) {
+    (void)state;
+    bst_ctx ctx;
+    const int32_t models[] = {BST_PSF_GAUSSIAN, BST_PSF_MOFFAT, BST_PSF_DIFFRACTION};
+    for (int i = 0; i < 3; i++) {
+        bst_camera camera = camera_of(models[i]), blurred;
+        bst_psf *psf;
+        camera.optics.diffusion_px = 0.3;
+        bst_assert_ok(&ctx, bst_psf_create(&ctx, &camera, &psf));
+        camera.psf = psf;
+        bst_assert_ok(&ctx, bst_camera_blurred(&ctx, &camera, 0.4, &blurred));
+        bst_psf_free(psf); /* the copy holds what it needs */
+        bst_psf *wide = (bst_psf *)blurred.psf, *again;
+        /* rounding of a sum of squares */
+        bst_assert_close(blurred.optics.diffusion_px, 0.5, 1e-15);
+        camera.psf = NULL;
+        bst_assert_ok(&ctx, bst_psf_create(&ctx, &camera, &psf));
+        for (double f = 0.0; f < 0.6; f += 0.07) {
+            double a[2], b[2], factor = exp(-2.0 * BST_PI * BST_PI * 0.16 * f * f);
+            bst_psf_otf(psf, 0, f, -0.5 * f, a);
+            bst_psf_otf(wide, 0, f, -0.5 * f, b);
+            factor *= exp(-2.0 * BST_PI * BST_PI * 0.16 * 0.25 * f * f);
+            bst_assert_close(b[0], a[0] * factor, 1e-14);
+            bst_assert_close(b[1], a[1] * factor, 1e-14);
+        }
+        assert_true(bst_psf_cutoff(wide) <= bst_psf_cutoff(psf));
+        assert_true(bst_psf_reach_px(wide) > bst_psf_reach_px(psf));
+        assert_true(bst_psf_equivalent_fwhm_px(wide, 50, 25) >
+                    bst_psf_equivalent_fwhm_px(psf, 50, 25));
+        double sigma_px, before_px;
+        assert_int_equal(bst_psf_gaussian(wide, &sigma_px), i == 0);
+        if (i == 0) {
+            assert_true(bst_psf_gaussian(psf, &before_px));
+            bst_assert_close(sigma_px, hypot(before_px, 0.4), 1e-15);
+            bst_assert_close(bst_camera_psf_sigma_px(&blurred), sigma_px, 1e-15);
+        }
+        bst_assert_ok(&ctx, bst_psf_create(&ctx, &blurred, &again));
+        assert_ptr_equal(again, wide);
+        bst_psf_free(wide);
+        bst_psf_free(again);
+        bst_psf_free(psf);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_sampled_psf_has_its_own_otf),
@@ -304,6 +350,7 @@ int main(void) {
         cmocka_unit_test(noise_areas_have_closed_forms),
         cmocka_unit_test(a_camera_lends_its_psf),
         cmocka_unit_test(no_light_is_lost),
+        cmocka_unit_test(jitter_widens_any_psf),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
