@@ -84,8 +84,8 @@ class Messages(unittest.TestCase):
         self.bad_set(GIMBAL + "/rate_hz=999", f": {GIMBAL}/rate_hz: .*857.142857 and 1000 Hz")
         self.bad_set(GIMBAL + "/platform/history_s=0.4", ": neossat/telescope/gimbal: platform/"
                      r"history_s: 0\.4 s do not cover the longest exposure_s of this sensor, 0\.5 s "
-                     r"\(its exposure's, or what control commands; with row_time_s from the first "
-                     r"row's start to the last row's end\); make history_s at least as long")
+                     r"\(its exposure's, or what control commands; .*\); make history_s at least as "
+                     "long")
         self.bad_set(GIMBAL.replace("gimbal", "control") + "/exposure_s=4.5",
                      r": neossat/telescope/gimbal: platform/history_s: 4 s do not cover the longest "
                      r"exposure_s of this sensor, 4\.5 s \(")
