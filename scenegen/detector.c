@@ -13,7 +13,7 @@ struct bst_detector {
     int stride; /* of the maps: the sensor's width, rounded up to chunks */
     cl_context context;
     cl_command_queue queue;
-    cl_mem gain, dark, overlay, offsets, codes;
+    cl_mem gain, dark, overlay, offsets, codes, flags;
     cl_mem deposits; /* of the present frame; borrowed */
     cl_kernel deposit_kernel;
     bst_hits *hits;
@@ -67,11 +67,12 @@ int bst_detector_options(const bst_detector *detector, char *text, size_t bytes)
                  d->frame_transfer_s / (double)c->height_px);
     }
     return snprintf(text, bytes,
-                    " -DCF_ORDER=%d -DSINGLE_FROM=%s -DMAP_STRIDE=%d%s%s%s%s%s%s%s%s%s", order,
+                    " -DCF_ORDER=%d -DSINGLE_FROM=%s -DMAP_STRIDE=%d%s%s%s%s%s%s%s%s%s%s", order,
                     from, detector->stride, detector->gain ? " -DGAIN_MAP" : "",
                     detector->dark ? " -DDARK_MAP" : "", detector->overlay ? " -DOVERLAY" : "",
                     detector->offsets ? " -DOFFSETS" : "", detector->codes ? " -DCODES" : "", bend,
-                    tail, transfer, d->full_well == BST_WELL_BLOOM ? " -DBLOOM" : "");
+                    tail, transfer, d->full_well == BST_WELL_BLOOM ? " -DBLOOM" : "",
+                    detector->flags ? " -DFLAGS" : "");
 }
 
 static bst_status make_buffer(bst_ctx *ctx, bst_detector *d, size_t bytes, void *data,
@@ -179,7 +180,7 @@ void bst_detector_free(bst_detector *d) {
     if (!d) {
         return;
     }
-    cl_mem buffers[] = {d->gain, d->dark, d->overlay, d->offsets, d->codes};
+    cl_mem buffers[] = {d->gain, d->dark, d->overlay, d->offsets, d->codes, d->flags};
     for (size_t i = 0; i < sizeof buffers / sizeof *buffers; i++) {
         if (buffers[i]) {
             clReleaseMemObject(buffers[i]);
@@ -203,12 +204,24 @@ bst_status bst_detector_set_program(bst_ctx *ctx, bst_detector *d, cl_program pr
     return bst_device_check(ctx, code, "bst_detector_deposit");
 }
 
-void bst_detector_buffers(const bst_detector *d, cl_mem out[5]) {
+bst_status bst_detector_keep_flags(bst_ctx *ctx, bst_detector *d) {
+    return make_buffer(ctx, d, (size_t)d->camera.width_px * (size_t)d->camera.height_px, NULL,
+                       &d->flags);
+}
+
+bst_status bst_detector_flags(bst_ctx *ctx, const bst_detector *d, size_t count, uint8_t *out) {
+    return bst_device_check(
+        ctx, clEnqueueReadBuffer(d->queue, d->flags, CL_TRUE, 0, count, out, 0, NULL, NULL),
+        "reading the flags of saturated pixels");
+}
+
+void bst_detector_buffers(const bst_detector *d, cl_mem out[BST_DETECTOR_BUFFERS]) {
     out[0] = d->gain;
     out[1] = d->dark;
     out[2] = d->overlay;
     out[3] = d->offsets;
     out[4] = d->codes;
+    out[5] = d->flags;
 }
 
 /* Adds the exposure's deposits to the overlay (sign 1), or sets their pixels to 0 again (sign 0).

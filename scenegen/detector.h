@@ -12,6 +12,8 @@
 #include "sim/device/device.h"
 #include "sim/world/camera.h"
 
+enum { BST_DETECTOR_BUFFERS = 6 };
+
 typedef struct bst_detector bst_detector;
 
 /* Makes the fixed patterns and tables of a camera on the device. `pattern` keys the patterns.
@@ -53,8 +55,15 @@ bst_status bst_detector_end(bst_ctx *ctx, bst_detector *detector) BST_MUST_CHECK
 /* Hits of the latest exposure. */
 bst_hits_summary bst_detector_hits(const bst_detector *detector);
 
-/* Buffers for the kernels, NULL where the effect is off: gain, dark, overlay, offsets, codes. */
-void bst_detector_buffers(const bst_detector *detector, cl_mem out[5]);
+/* Buffers for the kernels, NULL where the effect is off: gain, dark, overlay, offsets, codes, flags
+ * of the frame's pixels. */
+void bst_detector_buffers(const bst_detector *detector, cl_mem out[BST_DETECTOR_BUFFERS]);
+
+/* From now on the program and its kernels keep flags: before bst_detector_options. */
+bst_status bst_detector_keep_flags(bst_ctx *ctx, bst_detector *detector) BST_MUST_CHECK;
+/* BST_FLAG_... of the latest frame's `count` pixels. Waits for it. */
+bst_status bst_detector_flags(bst_ctx *ctx, const bst_detector *detector, size_t count,
+                              uint8_t *out) BST_MUST_CHECK;
 
 /* Means above this may fill the well: there the charge is drawn by itself, cut, and read. */
 double bst_detector_near_full_e(double full_well_e);

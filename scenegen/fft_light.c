@@ -65,7 +65,8 @@ static bst_status choose_tiles(bst_ctx *ctx, bst_device *device, bst_fft_light *
         ctx, clGetDeviceInfo(id, CL_DEVICE_MAX_COMPUTE_UNITS, sizeof units, &units, NULL),
         "asking for the device's compute units"));
     bool cpu = (type & CL_DEVICE_TYPE_CPU) != 0, large = cpu && local_bytes >= 128 * 1024;
-    l->tile_width = large ? 64 : 16;
+    /* of a core's second cache rather than the first: fewer blocks lie on two tiles */
+    l->tile_width = large ? local_bytes >= 512 * 1024 ? 256 : 64 : 16;
     l->tile_height = large ? 256 : 32;
     l->group = large ? 1 : 4;
     *threads = cpu ? (int)units : 0;

@@ -1,73 +1,8 @@
-#include "scenegen/light_fft.h"
+#include "scenegen/light_fft_internal.h"
 
 #include <math.h>
-#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include "scenegen/batch_fft.h"
-#include "scenegen/light_wrap.h"
-
-/* Rows and columns are worked on in blocks of as many as a vector has lanes. */
-enum { BLOCK = BST_LANES };
-
-/* A block of columns of the grid's spectrum, in frequencies k0 to k0 + 15 per period, which may be
- * negative. It folds onto the block of the image's columns that is a whole number of image bands
- * away. */
-typedef struct strip {
-    int k0;
-    int block;    /* of the image's columns */
-    int reach;    /* rows -reach .. reach are within the cut-off */
-    size_t first; /* of the strip's numbers in the table */
-} strip;
-
-/* Pixels from `begin` on lie between the centres of `cell` and the next; the first one at `place`
- * of the way. */
-typedef struct stretch {
-    int begin, cell;
-    float place;
-} stretch;
-
-/* Working memory of one part; as many as there are threads. */
-typedef struct bench {
-    atomic_flag taken;
-    bst_batch *line; /* a block of rows or columns */
-} bench;
-
-struct bst_light_fft {
-    const bst_psf *psf;
-    bst_light_shape shape;
-    double cutoff;
-    bst_parallel *pool;
-    int pitch, row_blocks, image_blocks; /* blocks of the grid's rows, of the window's rows */
-    int used;                            /* columns 1 - used to used - 1 are within the cut-off */
-    strip *strips;                       /* those of one block of the image follow each other */
-    int strip_count, column_blocks;      /* blocks of the image's columns that the strips reach */
-    int *first_strip;                    /* [column_blocks + 1] */
-    size_t strip_pitch, image_pitch;     /* elements */
-    bst_batch *spectrum;                 /* [strips][strip_pitch]: row by row */
-    bst_batch *image;            /* [image_blocks][image_pitch]: column by column, lanes are rows */
-    bst_batch **table;           /* [nodes]: OTF over the kernel's transform */
-    bst_batch *sum;              /* [column_blocks][y.pixels], where there are several nodes */
-    double *kernel_x, *kernel_y; /* transforms by column and by row 0 .. samples / 2 */
-    bst_batch_fft *row_forward, *row_inverse, *column_forward, *column_inverse;
-    bench *benches;
-    int bench_count;
-    bst_light_wrap *wrap;
-    int cell, cells_x, cells_y; /* samples per cell, per axis; cells */
-    float *cells;
-    stretch *stretches;
-    int stretch_count;
-};
-
-/* What a loop's parts need to know. */
-typedef struct pass {
-    bst_light_fft *fft;
-    const float *grid;
-    float *image;
-    int node;
-    bool first, last;
-} pass;
 
 static bst_batch *allocate(size_t elements) {
     return aligned_alloc(sizeof(bst_lanes), elements * sizeof(bst_batch));
@@ -199,29 +134,38 @@ static bst_status make_plans(bst_ctx *ctx, bst_light_fft *f) {
     return bst_batch_fft_create(ctx, f->shape.y.pixels, &f->column_inverse);
 }
 
-/* Place on one axis of the cells' centres: the lower cell and the share of the way to the next,
- * which is below 0 or above 1 at the ends. */
-static double cell_place(const bst_light_fft *f, const bst_light_axis *axis, int cells, int pixel,
-                         int *lower) {
+double bst_light_fft_cell_place(const bst_light_fft *f, const bst_light_axis *axis, int cells,
+                                int pixel, int *lower) {
     double sample = (pixel + f->shape.margin) * (double)axis->samples / axis->pixels;
     double place = (sample + 0.5) / f->cell - 0.5;
     *lower = (int)fmin(fmax(floor(place), 0.0), cells - 2.0);
     return place - *lower;
 }
 
-/* Stretches of a row between the same two cells' centres. */
-static bst_status make_stretches(bst_ctx *ctx, bst_light_fft *f) {
-    f->stretches = malloc((size_t)f->cells_x * sizeof *f->stretches);
-    if (!f->stretches) {
+/* What the far wings need in the inverse of rows. */
+static bst_status make_shares(bst_ctx *ctx, bst_light_fft *f) {
+    int blocks = (f->shape.width + BLOCK - 1) / BLOCK;
+    size_t wings = (size_t)BLOCK * (size_t)(f->cells_x + SHARES);
+    f->shares = aligned_alloc(sizeof(bst_lanes), (size_t)blocks * sizeof *f->shares);
+    bool ok = f->shares;
+    for (int i = 0; ok && i < f->bench_count; i++) {
+        f->benches[i].wings = calloc(wings, sizeof(float));
+        ok = f->benches[i].wings;
+    }
+    if (!ok) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the far wings");
     }
-    for (int x = 0, last = -1; x < f->shape.width; x++) {
-        int cell;
-        double u = cell_place(f, &f->shape.x, f->cells_x, x, &cell);
-        if (cell != last) {
-            f->stretches[f->stretch_count++] = (stretch){x, cell, (float)u};
+    for (int i = 0; i < blocks; i++) {
+        cell_shares *s = &f->shares[i];
+        memset(s, 0, sizeof *s);
+        for (int l = 0; l < BLOCK; l++) {
+            int cell;
+            float u =
+                (float)bst_light_fft_cell_place(f, &f->shape.x, f->cells_x, i * BLOCK + l, &cell);
+            s->cell = l == 0 ? cell : s->cell;
+            s->share[cell - s->cell][l] = 1.0f - u;
+            s->share[cell - s->cell + 1][l] = u;
         }
-        last = cell;
     }
     return BST_OK;
 }
@@ -236,7 +180,7 @@ static bst_status make_wrap(bst_ctx *ctx, bst_light_fft *f) {
     if (!f->cells) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the far wings");
     }
-    BST_TRY(make_stretches(ctx, f));
+    BST_TRY(make_shares(ctx, f));
     bst_light_wrap_axis wx = {x->pixels, f->cells_x, (double)f->cell * x->pixels / x->samples,
                               f->shape.width + f->shape.margin};
     bst_light_wrap_axis wy = {y->pixels, f->cells_y, (double)f->cell * y->pixels / y->samples,
@@ -291,6 +235,7 @@ void bst_light_fft_free(bst_light_fft *f) {
     }
     for (int i = 0; f->benches && i < f->bench_count; i++) {
         free(f->benches[i].line);
+        free(f->benches[i].wings);
     }
     bst_light_wrap_free(f->wrap);
     free(f->sum);
@@ -300,7 +245,7 @@ void bst_light_fft_free(bst_light_fft *f) {
     free(f->first_strip);
     free(f->benches);
     free(f->cells);
-    free(f->stretches);
+    free(f->shares);
     free(f->table);
     free(f->kernel_x);
     free(f->kernel_y);
@@ -319,265 +264,4 @@ size_t bst_light_fft_floats(const bst_light_fft *f) {
 
 int bst_light_fft_pitch(const bst_light_fft *f) {
     return f->pitch;
-}
-
-static bench *take_bench(bst_light_fft *f) {
-    for (int i = 0;; i = (i + 1) % f->bench_count) {
-        if (!atomic_flag_test_and_set(&f->benches[i].taken)) {
-            return &f->benches[i];
-        }
-    }
-}
-
-/* ------------------------------------------------------------------ rows forward */
-
-/* Loads two blocks of rows (the second may be NULL) as real and imaginary parts and adds them to
- * their rows of cells. Returns whether there is light. */
-BST_LANES_FUNCTION
-static bool load_rows(const bst_light_fft *f, const bst_lanes *a, const bst_lanes *b,
-                      bst_batch *line, float *cells_a, float *cells_b) {
-    float any = 0.0f;
-    for (int i = 0, x = 0; i < f->cells_x; i++) {
-        int end = x + f->cell < f->shape.x.samples ? x + f->cell : f->shape.x.samples;
-        bst_lanes sum_a = {0}, sum_b = {0};
-        for (; x < end; x++) {
-            line[x] = (bst_batch){a[x], b ? b[x] : (bst_lanes){0}};
-            sum_a += line[x].re;
-            sum_b += line[x].im;
-        }
-        float total_a = 0.0f, total_b = 0.0f;
-        for (int l = 0; l < BLOCK; l++) {
-            total_a += sum_a[l];
-            total_b += sum_b[l];
-        }
-        cells_a[i] += total_a;
-        any += total_a + total_b;
-        if (b) {
-            cells_b[i] += total_b;
-        }
-    }
-    return any > 0.0f;
-}
-
-/* The spectra of two blocks of rows for one strip, from the transform of both as one complex
- * number: twice them. The columns become lanes. */
-BST_LANES_FUNCTION
-static void store_strip(const bst_light_fft *f, const strip *s, const bst_batch *line, bst_batch *a,
-                        bst_batch *b) {
-    const int *order = bst_batch_fft_order(f->row_forward);
-    int samples = f->shape.x.samples;
-    bst_lanes part[4][BLOCK];
-    for (int l = 0; l < BLOCK; l++) {
-        int k = s->k0 + l;
-        if (abs(k) >= f->used) {
-            part[0][l] = part[1][l] = part[2][l] = part[3][l] = (bst_lanes){0};
-            continue;
-        }
-        const bst_batch *p = &line[order[k < 0 ? k + samples : k]];
-        const bst_batch *q = &line[order[k > 0 ? samples - k : -k]];
-        part[0][l] = p->re + q->re;
-        part[1][l] = p->im - q->im;
-        part[2][l] = p->im + q->im;
-        part[3][l] = q->re - p->re;
-    }
-    for (int i = 0; i < (b ? 4 : 2); i++) {
-        bst_lanes_transpose(part[i]);
-    }
-    for (int r = 0; r < BLOCK; r++) {
-        a[r] = (bst_batch){part[0][r], part[1][r]};
-    }
-    for (int r = 0; b && r < BLOCK; r++) {
-        b[r] = (bst_batch){part[2][r], part[3][r]};
-    }
-}
-
-/* Pairs of blocks of rows, which fill whole rows of cells. */
-static void rows_forward(void *user, int begin, int end) {
-    const pass *p = user;
-    bst_light_fft *f = p->fft;
-    bench *w = take_bench(f);
-    int per_cell = f->cell / BLOCK;
-    for (int j = begin; j < end; j++) {
-        int a = 2 * j, b = a + 1 < f->row_blocks ? a + 1 : -1;
-        float *cells_a = f->cells + (size_t)(a / per_cell) * (size_t)f->cells_x;
-        float *cells_b = f->cells + (size_t)((b < 0 ? a : b) / per_cell) * (size_t)f->cells_x;
-        size_t block = (size_t)f->shape.x.samples, bytes = (size_t)f->cells_x * sizeof *cells_a;
-        const bst_lanes *grid = (const bst_lanes *)p->grid;
-        if (p->first) {
-            memset(cells_a, 0, bytes);
-            memset(cells_b, 0, bytes);
-        }
-        bool any = load_rows(f, grid + (size_t)a * block, b < 0 ? NULL : grid + (size_t)b * block,
-                             w->line, cells_a, cells_b);
-        if (any) {
-            bst_batch_fft_run(f->row_forward, w->line);
-        }
-        for (int i = 0; i < f->strip_count; i++) {
-            bst_batch *to = f->spectrum + (size_t)i * f->strip_pitch + (size_t)a * BLOCK;
-            if (any) {
-                store_strip(f, &f->strips[i], w->line, to, b < 0 ? NULL : to + BLOCK);
-            } else {
-                memset(to, 0, (b < 0 ? 1U : 2U) * BLOCK * sizeof *to);
-            }
-        }
-    }
-    atomic_flag_clear(&w->taken);
-}
-
-/* ------------------------------------------------------------------ columns */
-
-/* Adds a strip's spectrum times its transfer function to a block of the image's, with real and
- * imaginary parts swapped for the inverse. */
-BST_LANES_FUNCTION
-static void fold(const bst_light_fft *f, const strip *s, const bst_batch *table,
-                 const bst_batch *line, bst_batch *sum) {
-    const int *order = bst_batch_fft_order(f->column_forward);
-    int samples = f->shape.y.samples, pixels = f->shape.y.pixels;
-    int to = (pixels - s->reach % pixels) % pixels;
-    for (int k = -s->reach; k <= s->reach; k++, table++) {
-        const bst_batch *v = &line[order[k < 0 ? k + samples : k]];
-        sum[to].im += v->re * table->re - v->im * table->im;
-        sum[to].re += v->re * table->im + v->im * table->re;
-        to = to + 1 < pixels ? to + 1 : 0;
-    }
-}
-
-/* The window's rows of a block of columns; the rows become lanes. */
-BST_LANES_FUNCTION
-static void store_image(const bst_light_fft *f, int block, const bst_batch *line) {
-    const int *order = bst_batch_fft_order(f->column_inverse) + f->shape.margin;
-    for (int j = 0; j < f->image_blocks; j++, order += BLOCK) {
-        bst_batch *to = f->image + (size_t)j * f->image_pitch + (size_t)block * BLOCK;
-        bst_lanes re[BLOCK], im[BLOCK];
-        for (int r = 0; r < BLOCK; r++) {
-            re[r] = line[order[r]].im;
-            im[r] = line[order[r]].re;
-        }
-        bst_lanes_transpose(re);
-        bst_lanes_transpose(im);
-        for (int l = 0; l < BLOCK; l++) {
-            to[l] = (bst_batch){re[l], im[l]};
-        }
-    }
-}
-
-/* Blocks of the image's columns. */
-static void columns(void *user, int begin, int end) {
-    const pass *p = user;
-    bst_light_fft *f = p->fft;
-    bench *w = take_bench(f);
-    size_t pixels = (size_t)f->shape.y.pixels;
-    for (int c = begin; c < end; c++) {
-        bst_batch *sum = f->sum ? f->sum + (size_t)c * pixels : w->line;
-        if (p->first) {
-            memset(sum, 0, pixels * sizeof *sum);
-        }
-        for (int i = f->first_strip[c]; i < f->first_strip[c + 1]; i++) {
-            const strip *s = &f->strips[i];
-            bst_batch *line = f->spectrum + (size_t)i * f->strip_pitch;
-            bst_batch_fft_run(f->column_forward, line);
-            fold(f, s, f->table[p->node] + s->first, line, sum);
-        }
-        if (p->last) {
-            bst_batch_fft_run(f->column_inverse, sum);
-            store_image(f, c, sum);
-        }
-    }
-    atomic_flag_clear(&w->taken);
-}
-
-void bst_light_fft_add(bst_light_fft *f, int node, bool first, bool last, const float *grid) {
-    pass p = {.fft = f, .grid = grid, .node = node, .first = first, .last = last};
-    bst_parallel_for(f->pool, (f->row_blocks + 1) / 2, 1, rows_forward, &p);
-    bst_parallel_for(f->pool, f->column_blocks, 1, columns, &p);
-}
-
-/* ------------------------------------------------------------------ rows inverse */
-
-/* Adds the far wings of a row, linearly between the cells' centres. */
-BST_LANES_FUNCTION
-static void add_wings(const bst_light_fft *f, int row, float *image) {
-    int j;
-    float v = (float)cell_place(f, &f->shape.y, f->cells_y, row, &j);
-    const float *a = f->cells + (size_t)j * (size_t)f->cells_x, *b = a + f->cells_x;
-    float step = (float)((double)f->shape.x.samples / f->shape.x.pixels / f->cell);
-    for (int n = 0; n < f->stretch_count; n++) {
-        const stretch *s = &f->stretches[n];
-        int i = s->cell, end = n + 1 < f->stretch_count ? s[1].begin : f->shape.width;
-        float left = a[i] + v * (b[i] - a[i]), right = a[i + 1] + v * (b[i + 1] - a[i + 1]);
-        float base = left + s->place * (right - left), slope = step * (right - left);
-        for (int k = 0; k < end - s->begin; k++) {
-            image[s->begin + k] += base + slope * (float)k;
-        }
-    }
-}
-
-/* The spectra of two blocks of rows as that of one complex sequence, real and imaginary parts
- * swapped. */
-BST_LANES_FUNCTION
-static void join_rows(const bst_light_fft *f, const bst_batch *a, const bst_batch *b,
-                      bst_batch *line) {
-    int pixels = f->shape.x.pixels, half = pixels / 2, last = f->column_blocks * BLOCK - 1;
-    last = last < half ? last : half;
-    for (int k = 0; k <= last; k++) {
-        bst_batch *up = &line[k], *down = &line[k > 0 ? pixels - k : 0];
-        *down = (bst_batch){b[k].re - a[k].im, a[k].re + b[k].im};
-        *up = (bst_batch){a[k].im + b[k].re, a[k].re - b[k].im};
-    }
-    for (int k = last + 1; k < pixels - last; k++) {
-        line[k] = (bst_batch){{0}, {0}};
-    }
-}
-
-/* One block of rows of the image from a part of the joined rows. */
-BST_LANES_FUNCTION
-static void store_rows(const bst_light_fft *f, const bst_batch *line, bool imaginary, int rows,
-                       float *image) {
-    const int *order = bst_batch_fft_order(f->row_inverse) + f->shape.margin;
-    for (int x = 0; x < f->shape.width; x += BLOCK) {
-        bst_lanes v[BLOCK];
-        for (int l = 0; l < BLOCK; l++) {
-            v[l] = imaginary ? line[order[x + l]].re : line[order[x + l]].im;
-        }
-        bst_lanes_transpose(v);
-        for (int r = 0; r < rows; r++) {
-            *(bst_lanes *)(image + (size_t)r * (size_t)f->pitch + x) = v[r];
-        }
-    }
-}
-
-/* Pairs of blocks of rows of the window. */
-static void rows_inverse(void *user, int begin, int end) {
-    const pass *p = user;
-    bst_light_fft *f = p->fft;
-    bench *w = take_bench(f);
-    for (int j = begin; j < end; j++) {
-        int a = 2 * j, b = a + 1 < f->image_blocks ? a + 1 : a;
-        join_rows(f, f->image + (size_t)a * f->image_pitch, f->image + (size_t)b * f->image_pitch,
-                  w->line);
-        bst_batch_fft_run(f->row_inverse, w->line);
-        for (int k = a; k <= b; k++) {
-            int top = k * BLOCK, rows = f->shape.height - top;
-            rows = rows < BLOCK ? rows : BLOCK;
-            float *image = p->image + (size_t)top * (size_t)f->pitch;
-            store_rows(f, w->line, k > a, rows, image);
-            for (int r = 0; f->wrap && r < rows; r++) {
-                add_wings(f, top + r, image + (size_t)r * (size_t)f->pitch);
-            }
-        }
-    }
-    atomic_flag_clear(&w->taken);
-}
-
-void bst_light_fft_finish(bst_light_fft *f, float *image) {
-    if (f->wrap) {
-        float scale = (float)(1.0 / (f->kernel_x[0] * f->kernel_y[0]));
-        size_t count = (size_t)f->cells_x * (size_t)f->cells_y;
-        for (size_t i = 0; i < count; i++) {
-            f->cells[i] *= scale;
-        }
-        bst_light_wrap_run(f->wrap, f->cells);
-    }
-    pass p = {.fft = f, .image = image};
-    bst_parallel_for(f->pool, (f->image_blocks + 1) / 2, 1, rows_inverse, &p);
 }

@@ -14,7 +14,7 @@ enum {
 /* A source on its way into the mask. */
 typedef struct shape {
     int item, source;
-    int x0, y0, x1, y1; /* box in the window, x1 and y1 beyond it; empty: nothing there */
+    int x0, y0, x1, y1; /* box in the frame, x1 and y1 beyond it; empty: nothing there */
     int margin;         /* of it, beyond the source's track */
     int layer;          /* -1: none in this round */
     bool done;
@@ -24,12 +24,15 @@ struct bst_plane_maker {
     uint32_t planes;
     double threshold_sigma;
     double read_noise_e;
-    float level; /* of the mask, electrons: of all pixels, or of the darkest */
-    bool uneven; /* the background differs from pixel to pixel, and the level with it */
-    size_t pixels;
+    float level;   /* of the mask, electrons: of all pixels, or of the darkest */
+    bool uneven;   /* the background differs from pixel to pixel, and the level with it */
+    size_t pixels; /* room, of a whole sensor */
+    int width, height, binning; /* of the frame */
     float *electrons[BST_PLANE_SEGMENTATION];
-    float *image; /* what the renderer gives */
-    float *best;  /* light of the source that a pixel belongs to */
+    float *image;  /* of some sources */
+    float *sensor; /* what the renderer gives, before binning; NULL: not needed so far */
+    uint8_t *saturation;
+    float *best; /* light of the source that a pixel belongs to */
     int32_t *mask;
     uint64_t *cells;
     int cells_x;
@@ -66,6 +69,9 @@ bst_status bst_plane_maker_create(bst_ctx *ctx, uint32_t planes, int width, int 
         m->cells = malloc((size_t)m->cells_x * (size_t)(height / CELL_PX + 1) * sizeof *m->cells);
         enough = m->best && m->mask && m->cells;
     }
+    if (enough && wants(m, BST_PLANE_SATURATION)) {
+        enough = (m->saturation = malloc(m->pixels)) != NULL;
+    }
     if (!enough) {
         bst_plane_maker_free(m);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for noise-free planes of %d x %d pixels",
@@ -81,6 +87,8 @@ void bst_plane_maker_free(bst_plane_maker *m) {
             free(m->electrons[k]);
         }
         free(m->image);
+        free(m->sensor);
+        free(m->saturation);
         free(m->best);
         free(m->mask);
         free(m->cells);
@@ -88,6 +96,30 @@ void bst_plane_maker_free(bst_plane_maker *m) {
         free(m->sources);
         free(m);
     }
+}
+
+/* Expected electrons in the frame's own pixels. */
+static bst_status render(bst_ctx *ctx, bst_plane_maker *m, bst_renderer *renderer,
+                         const bst_render_request *request, float *out) {
+    int b = m->binning, width = request->window.width;
+    if (b == 1) {
+        return bst_renderer_render_noise_free(ctx, renderer, request, out);
+    }
+    if (!m->sensor && !(m->sensor = malloc(m->pixels * sizeof *m->sensor))) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for noise-free planes before binning");
+    }
+    BST_TRY(bst_renderer_render_noise_free(ctx, renderer, request, m->sensor));
+    for (int y = 0; y < m->height; y++) {
+        for (int x = 0; x < m->width; x++) {
+            const float *from = m->sensor + (size_t)(y * b) * (size_t)width + (size_t)(x * b);
+            double sum = 0.0;
+            for (int k = 0; k < b * b; k++) {
+                sum += (double)from[(size_t)(k / b) * (size_t)width + (size_t)(k % b)];
+            }
+            out[(size_t)y * (size_t)m->width + (size_t)x] = (float)sum;
+        }
+    }
+    return BST_OK;
 }
 
 /* Expected electrons of some sources alone. */
@@ -98,9 +130,9 @@ static bst_status render_sources(bst_ctx *ctx, bst_plane_maker *m, bst_renderer 
     part.sources = sources;
     part.count = count;
     /* with the background, so that the renderer takes the same care as in the frame */
-    BST_TRY(bst_renderer_render_noise_free(ctx, renderer, &part, out));
+    BST_TRY(render(ctx, m, renderer, &part, out));
     const float *background = m->electrons[BST_PLANE_BACKGROUND];
-    size_t pixels = (size_t)request->window.width * (size_t)request->window.height;
+    size_t pixels = (size_t)m->width * (size_t)m->height;
     for (size_t i = 0; i < pixels; i++) {
         out[i] -= background[i];
     }
@@ -110,8 +142,8 @@ static bst_status render_sources(bst_ctx *ctx, bst_plane_maker *m, bst_renderer 
 /* ------------------------------------------------------------------ the mask */
 
 /* Pixels around the track within which a Gaussian of this peak is above `level`; at least 2. */
-static int gaussian_margin(const bst_camera *camera, double peak, double level) {
-    double sigma = hypot(bst_camera_psf_sigma_px(camera), 0.3);
+static int gaussian_margin(const bst_camera *camera, int binning, double peak, double level) {
+    double sigma = hypot(bst_camera_psf_sigma_px(camera), 0.3 * binning) / binning;
     double ratio = fmax(peak / level, 1.0);
     return 2 + (int)ceil(sigma * sqrt(2.0 * log(ratio)));
 }
@@ -120,13 +152,16 @@ static int clip(double value, int limit) {
     return value < 0.0 ? 0 : value > limit ? limit : (int)value;
 }
 
-/* The box of a source's track in the window, with its margin. */
-static void make_box(const bst_camera *camera, const bst_render_request *q, shape *s) {
+/* The box of a source's track in the frame, with its margin. */
+static void make_box(const bst_plane_maker *m, const bst_camera *camera,
+                     const bst_render_request *q, shape *s) {
     const bst_los_track *track = q->track;
     double x0 = INFINITY, y0 = INFINITY, x1 = -INFINITY, y1 = -INFINITY;
     for (int k = 0; k < track->count; k++) {
         double x, y;
         if (bst_field_project(camera, track, k, &q->sources[s->source], &x, &y)) {
+            x = (x - q->window.x0 + 0.5) / m->binning - 0.5;
+            y = (y - q->window.y0 + 0.5) / m->binning - 0.5;
             x0 = fmin(x0, x);
             y0 = fmin(y0, y);
             x1 = fmax(x1, x);
@@ -137,10 +172,10 @@ static void make_box(const bst_camera *camera, const bst_render_request *q, shap
         s->x0 = s->x1 = s->y0 = s->y1 = 0;
         return;
     }
-    s->x0 = clip(floor(x0) - s->margin - q->window.x0, q->window.width);
-    s->y0 = clip(floor(y0) - s->margin - q->window.y0, q->window.height);
-    s->x1 = clip(ceil(x1) + s->margin + 1 - q->window.x0, q->window.width);
-    s->y1 = clip(ceil(y1) + s->margin + 1 - q->window.y0, q->window.height);
+    s->x0 = clip(floor(x0) - s->margin, m->width);
+    s->y0 = clip(floor(y0) - s->margin, m->height);
+    s->x1 = clip(ceil(x1) + s->margin + 1, m->width);
+    s->y1 = clip(ceil(y1) + s->margin + 1, m->height);
 }
 
 static bool is_empty(const shape *s) {
@@ -182,28 +217,27 @@ static bool above(const bst_plane_maker *m, size_t pixel) {
     return (double)m->image[pixel] > m->threshold_sigma * sqrt(variance);
 }
 
-/* Whether a source's light is above the level at the border of its box, where the window goes on.
- */
-static bool is_cut(const bst_plane_maker *m, bst_window w, const shape *s) {
+/* Whether a source's light is above the level at the border of its box, where the frame goes on. */
+static bool is_cut(const bst_plane_maker *m, const shape *s) {
     for (int y = s->y0; y < s->y1; y++) {
-        size_t row = (size_t)y * (size_t)w.width;
-        bool edge = (y == s->y0 && s->y0 > 0) || (y == s->y1 - 1 && s->y1 < w.height);
+        size_t row = (size_t)y * (size_t)m->width;
+        bool edge = (y == s->y0 && s->y0 > 0) || (y == s->y1 - 1 && s->y1 < m->height);
         for (int x = s->x0; edge && x < s->x1; x++) {
             if (above(m, row + (size_t)x)) {
                 return true;
             }
         }
         if ((s->x0 > 0 && above(m, row + (size_t)s->x0)) ||
-            (s->x1 < w.width && above(m, row + (size_t)s->x1 - 1))) {
+            (s->x1 < m->width && above(m, row + (size_t)s->x1 - 1))) {
             return true;
         }
     }
     return false;
 }
 
-static void paint(bst_plane_maker *m, bst_window w, const shape *s) {
+static void paint(bst_plane_maker *m, const shape *s) {
     for (int y = s->y0; y < s->y1; y++) {
-        size_t row = (size_t)y * (size_t)w.width;
+        size_t row = (size_t)y * (size_t)m->width;
         for (int x = s->x0; x < s->x1; x++) {
             size_t i = row + (size_t)x;
             if (m->image[i] > m->best[i] && above(m, i)) {
@@ -234,11 +268,11 @@ static bst_status paint_layer(bst_ctx *ctx, bst_plane_maker *m, bst_renderer *re
         if (s->done || s->layer != layer) {
             continue;
         }
-        if (is_cut(m, q->window, s)) {
+        if (is_cut(m, s)) {
             s->margin *= 2;
-            make_box(camera, q, s);
+            make_box(m, camera, q, s);
         } else {
-            paint(m, q->window, s);
+            paint(m, s);
             s->done = true;
             --*left;
         }
@@ -262,12 +296,13 @@ static bst_status list_shapes(bst_ctx *ctx, bst_plane_maker *m, const bst_render
     }
     *count = 0;
     for (int i = 0; i < item_count; i++) {
-        double peak = bst_renderer_peak_e(renderer, item_source[i]);
+        double peak = bst_renderer_peak_e(renderer, item_source[i]) * m->binning * m->binning;
         shape *s = &m->shapes[*count];
-        *s = (shape){
-            .item = i, .source = item_source[i], .margin = gaussian_margin(camera, peak, level)};
+        *s = (shape){.item = i,
+                     .source = item_source[i],
+                     .margin = gaussian_margin(camera, m->binning, peak, level)};
         if (peak > 0.5 * level) { /* it is an estimate */
-            make_box(camera, q, s);
+            make_box(m, camera, q, s);
             *count += !is_empty(s);
         }
     }
@@ -276,13 +311,12 @@ static bst_status list_shapes(bst_ctx *ctx, bst_plane_maker *m, const bst_render
 
 static bst_status make_mask(bst_ctx *ctx, bst_plane_maker *m, bst_renderer *renderer,
                             const bst_camera *camera, const bst_render_request *q, int count) {
-    bst_window w = q->window;
-    size_t pixels = (size_t)w.width * (size_t)w.height;
+    size_t pixels = (size_t)m->width * (size_t)m->height;
     memset(m->mask, 0, pixels * sizeof *m->mask);
     memset(m->best, 0, pixels * sizeof *m->best);
     for (int left = count; left > 0;) {
         memset(m->cells, 0,
-               (size_t)m->cells_x * (size_t)(w.height / CELL_PX + 1) * sizeof *m->cells);
+               (size_t)m->cells_x * (size_t)(m->height / CELL_PX + 1) * sizeof *m->cells);
         int layers = 0;
         for (int i = 0; i < count; i++) {
             if (!m->shapes[i].done) {
@@ -300,8 +334,16 @@ static bst_status make_mask(bst_ctx *ctx, bst_plane_maker *m, bst_renderer *rend
 bst_status bst_plane_maker_render(bst_ctx *ctx, bst_plane_maker *m, bst_renderer *renderer,
                                   const bst_camera *camera, const bst_render_request *request,
                                   const int *item_source, int item_count, bst_planes *out) {
+    int b = m->binning = request->binning > 1 ? request->binning : 1;
+    m->width = request->window.width / b;
+    m->height = request->window.height / b;
     double least_e =
-        request->background_e + (request->background ? request->background->least_e : 0.0);
+        b * b *
+        (request->background_e + (request->background ? request->background->least_e : 0.0));
+    if (wants(m, BST_PLANE_SATURATION)) { /* of the frame, which is the renderer's latest */
+        BST_TRY(
+            bst_renderer_flags(ctx, renderer, (size_t)m->width * (size_t)m->height, m->saturation));
+    }
     m->read_noise_e = camera->read_noise_e;
     m->uneven = request->background != NULL;
     m->level = (float)(m->threshold_sigma * sqrt(least_e + m->read_noise_e * m->read_noise_e));
@@ -315,8 +357,9 @@ bst_status bst_plane_maker_render(bst_ctx *ctx, bst_plane_maker *m, bst_renderer
     }
     bst_render_request empty = *request;
     empty.count = 0;
-    BST_TRY(
-        bst_renderer_render_noise_free(ctx, renderer, &empty, m->electrons[BST_PLANE_BACKGROUND]));
+    if (m->planes & ~(UINT32_C(1) << BST_PLANE_SATURATION)) {
+        BST_TRY(render(ctx, m, renderer, &empty, m->electrons[BST_PLANE_BACKGROUND]));
+    }
     if (wants(m, BST_PLANE_STARS)) {
         BST_TRY(render_sources(ctx, m, renderer, request, request->sources, stars,
                                m->electrons[BST_PLANE_STARS]));
@@ -329,10 +372,12 @@ bst_status bst_plane_maker_render(bst_ctx *ctx, bst_plane_maker *m, bst_renderer
         BST_TRY(make_mask(ctx, m, renderer, camera, request, shapes));
     }
     out->exposure_id = request->exposure_id;
-    out->window = request->window;
+    out->width = m->width;
+    out->height = m->height;
     for (int k = 0; k < BST_PLANE_SEGMENTATION; k++) {
         out->electrons[k] = wants(m, (bst_plane)k) ? m->electrons[k] : NULL;
     }
     out->segmentation = wants(m, BST_PLANE_SEGMENTATION) ? m->mask : NULL;
+    out->saturation = m->saturation;
     return BST_OK;
 }

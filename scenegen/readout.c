@@ -122,7 +122,7 @@ bst_status bst_readout_run(bst_ctx *ctx, bst_readout *r, const bst_detector *det
                            cl_mem frame, cl_mem saturated) {
     bst_window light = bst_readout_light_window(r, window);
     bst_scene_params p = *params;
-    cl_mem maps[5];
+    cl_mem maps[BST_DETECTOR_BUFFERS];
     bst_detector_buffers(detector, maps);
     p.tiles_x0 = light.x0;
     p.light_y0 = light.y0;
@@ -143,6 +143,6 @@ bst_status bst_readout_run(bst_ctx *ctx, bst_readout *r, const bst_detector *det
         BST_TRY(start(ctx, r, BLOOM, &p, b, 2, columns / 16));
     }
     p.per_full_well /= (float)(binning * binning);
-    cl_mem read[] = {r->image, frame, saturated, maps[3], maps[4]};
-    return start(ctx, r, READ, &p, read, 5, (size_t)p.window_height);
+    cl_mem read[] = {r->image, frame, saturated, maps[3], maps[4], maps[5]};
+    return start(ctx, r, READ, &p, read, 6, (size_t)p.window_height);
 }

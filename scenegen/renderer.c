@@ -10,6 +10,7 @@
 #include "scenegen/detector.h"
 #include "scenegen/fft_light.h"
 #include "scenegen/frame_pool.h"
+#include "scenegen/growing.h"
 #include "scenegen/place.h"
 #include "scenegen/profile_law.h"
 #include "scenegen/readout.h"
@@ -24,12 +25,7 @@
 #include "sim/world/skylight.h"
 
 enum { MAX_TAPS = BST_PLACE_TAPS };
-
-/* A device buffer that grows. */
-typedef struct growing {
-    cl_mem buffer;
-    size_t bytes;
-} growing;
+typedef bst_growing growing;
 
 struct bst_renderer {
     bst_camera camera;
@@ -95,23 +91,8 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
     return bst_readout_create(ctx, device, &r->camera, r->program, &r->readout);
 }
 
-/* Makes room for `bytes`; the content is lost when the buffer grows. */
 static bst_status grow(bst_ctx *ctx, bst_renderer *r, growing *g, size_t bytes) {
-    if (g->bytes >= bytes && g->buffer) {
-        return BST_OK;
-    }
-    if (g->buffer) {
-        clReleaseMemObject(g->buffer);
-        g->buffer = NULL;
-    }
-    size_t room = bytes > 2 * g->bytes ? bytes : 2 * g->bytes;
-    room = room > r->most_bytes ? bytes : room;
-    room = room < 4096 ? 4096 : room;
-    cl_int code;
-    g->buffer =
-        clCreateBuffer(r->context, CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR, room, NULL, &code);
-    g->bytes = room;
-    return bst_device_check(ctx, code, "allocating scene memory");
+    return bst_growing_reserve(ctx, r->context, r->most_bytes, g, bytes);
 }
 
 /* The PSF, and the Fourier path where it is no Gaussian. */
@@ -167,6 +148,9 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     }
     if (status == BST_OK) {
         status = bst_detector_create(ctx, device, camera, r->options.pattern, &r->detector);
+    }
+    if (status == BST_OK && r->options.saturation_flags) {
+        status = bst_detector_keep_flags(ctx, r->detector);
     }
     if (status == BST_OK) {
         r->law_degree = r->fft_light        ? 0
@@ -373,25 +357,26 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
     if (r->fft_light) {
         BST_TRY(make_light(ctx, r, q, &p, &light));
     }
-    cl_mem maps[5];
+    cl_mem maps[BST_DETECTOR_BUFFERS];
     bst_detector_buffers(r->detector, maps);
     cl_kernel kernel = to->kernel;
-    const void *values[] = {&p,
-                            &r->sources,
-                            &r->table,
-                            &r->block_box.buffer,
-                            &r->source_box.buffer,
-                            &r->group_box.buffer,
-                            &light,
-                            &to->out,
-                            &to->saturated,
-                            &maps[0],
-                            &maps[1],
-                            &maps[2],
-                            &maps[3],
-                            &maps[4]};
-    const size_t m = sizeof(cl_mem), bytes[] = {sizeof p, m, m, m, m, m, m, m, m, m, m, m, m, m};
-    int count = kernel == r->frame_kernel ? 14 : 8;
+    enum { COMMON = 8, ALL = COMMON + 1 + BST_DETECTOR_BUFFERS };
+    const void *values[ALL] = {&p,
+                               &r->sources,
+                               &r->table,
+                               &r->block_box.buffer,
+                               &r->source_box.buffer,
+                               &r->group_box.buffer,
+                               &light,
+                               &to->out,
+                               &to->saturated};
+    const size_t m = sizeof(cl_mem);
+    size_t bytes[ALL] = {sizeof p, m, m, m, m, m, m, m, m};
+    for (int i = 0; i < BST_DETECTOR_BUFFERS; i++) {
+        values[COMMON + 1 + i] = &maps[i];
+        bytes[COMMON + 1 + i] = m;
+    }
+    int count = kernel == r->frame_kernel ? ALL : COMMON;
     BST_TRY(set_args(ctx, kernel, values, bytes, count));
     if (r->map) {
         const bst_skylight_map *map = bst_render_background(q);
@@ -546,6 +531,10 @@ bst_status bst_renderer_saturated(bst_ctx *ctx, bst_renderer *r, long long *pixe
     }
     *pixels = r->saturated_pixels;
     return BST_OK;
+}
+
+bst_status bst_renderer_flags(bst_ctx *ctx, bst_renderer *r, size_t pixels, uint8_t *out) {
+    return bst_detector_flags(ctx, r->detector, pixels, out);
 }
 
 long long bst_renderer_saturated_frames(const bst_renderer *r) {

@@ -25,6 +25,7 @@ typedef struct bst_renderer_options {
      * two nearest pixels; odd degree of the PSF's profile (scenegen/profile_law.h); taps of the
      * Fourier path's spreading (4, 6 or 8). */
     int temporal_oversample, spatial_oversample, stamp_radius_px, psf_degree, fft_taps;
+    bool saturation_flags;              /* kept of the latest frame, for bst_renderer_flags */
     int pool_frames;                    /* frames that may be alive at a time (4) */
     int tile_width, tile_height, group; /* pixels per work-item (width a multiple of 64) and
                                            work-items per group; 0: chosen for the device */
@@ -91,6 +92,10 @@ bst_status bst_renderer_render_noise_free(bst_ctx *ctx, bst_renderer *renderer,
 /* Pixels of the latest frame with a full well or the highest digital number. Waits for it. */
 bst_status bst_renderer_saturated(bst_ctx *ctx, bst_renderer *renderer,
                                   long long *pixels) BST_MUST_CHECK;
+/* Why which pixel of the latest frame is saturated: BST_FLAG_... (kernels/scene_shared.h), in the
+ * frame's own size. With saturation_flags; waits for the frame. */
+bst_status bst_renderer_flags(bst_ctx *ctx, bst_renderer *renderer, size_t pixels,
+                              uint8_t *out) BST_MUST_CHECK;
 /* Frames with such a pixel so far, without the latest two (BST_STAGE_SETS) unless
  * bst_renderer_saturated has been asked. Does not wait. */
 long long bst_renderer_saturated_frames(const bst_renderer *renderer);

@@ -145,6 +145,7 @@ static bst_status create(const bst_module_env *env, const void *config_object, v
     options.psf_degree = (int)c->fidelity.psf_degree;
     options.fft_taps = (int)c->fidelity.fft_taps;
     options.pool_frames = (int)c->pool_frames + BST_OVERLAP_FRAMES;
+    options.saturation_flags = env->planes & UINT32_C(1) << BST_PLANE_SATURATION;
     options.pattern = pattern_key(env, s->camera);
     s->device = env->device;
     s->renderer_options = options;

@@ -1,7 +1,7 @@
 /* Light of all nodes on a grid for the Fourier path: each node is spread over eight by eight samples.
  * Options: DEPOSIT_W, DEPOSIT_H (samples of a tile, a multiple of 16 high), DEPOSIT_GROUP (work-items
- * per work-group), PLACE_BITS (of the nodes' places), FIELD (weights by place), NEAR_CACHE (memory has one address space, and what lies
- * in it can be fetched ahead).
+ * per work-group), those of the nodes kernel, FIELD (weights by place), NEAR_CACHE (memory has one
+ * address space; what lies in it can be fetched ahead, and written past the caches).
  *
  * One work-item owns a tile and adds its nodes in the order of sources, blocks and nodes: the sum is
  * the same for every tile and work-group size. Vectors run along y, as in the grid's blocks of
@@ -19,8 +19,10 @@
 
 #ifdef NEAR_CACHE
 #define FETCH(p) __builtin_prefetch((const private void *)(uintptr_t)(p))
+#define STREAM(value, p) __builtin_nontemporal_store(value, p)
 #else
 #define FETCH(p)
+#define STREAM(value, p) (*(p) = (value))
 #endif
 
 static int any_of(int16 v) {
@@ -50,6 +52,7 @@ typedef struct deposit_nodes {
     int row_x[BST_BLOCK], row_y[BST_BLOCK]; /* places in the table */
     float share_x[BST_BLOCK], share_y[BST_BLOCK], share_width[BST_BLOCK];
     float electrons[BST_BLOCK];
+    int wide; /* some are widened */
 } deposit_nodes;
 
 /* The profiles of a team, between zeros: taps from 16 on. */
@@ -57,12 +60,12 @@ typedef struct deposit_profiles {
     float x[DEPOSIT_TEAM][DEPOSIT_ROOM], y[DEPOSIT_TEAM][DEPOSIT_ROOM];
 } deposit_profiles;
 
-/* Taps at `row` of the table, between its phase and the next (t) and, when widened, between its
- * width and the next (u). */
-static float8 spread8(global const float *row, float t, float u) {
+/* Taps at `row` of the table, between its phase and the next (t) and, when nodes of the block are
+ * widened, between its width and the next (u). */
+static float8 spread8(global const float *row, float t, float u, int wide) {
     float8 a = vload8(0, row), b = vload8(1, row);
     a = fma((float8)t, b - a, a);
-    if (u >= 0.0f) {
+    if (wide) {
         row += (BST_SPREAD_PHASES + 1) * BST_SPREAD_TAPS;
         float8 c = vload8(0, row), d = vload8(1, row);
         c = fma((float8)t, d - c, c);
@@ -92,8 +95,8 @@ static void deposit_team(local float *sum, const deposit_nodes *b, int n, int co
         int i = n + min(k, count - 1);
         float electrons = k < count ? b->electrons[i] : 0.0f;
         float u = b->share_width[i];
-        vstore8(spread8(table + b->row_x[i], b->share_x[i], u), 0, room->x[k] + 16);
-        vstore8(electrons * spread8(table + BST_SPREAD_TABLE + b->row_y[i], b->share_y[i], u), 0,
+        vstore8(spread8(table + b->row_x[i], b->share_x[i], u, b->wide), 0, room->x[k] + 16);
+        vstore8(electrons * spread8(table + BST_SPREAD_TABLE + b->row_y[i], b->share_y[i], u, b->wide), 0,
                 room->y[k] + 16);
         shift[k] = b->top[i];
         over[k] = 16 - (b->left[i] - left);
@@ -159,7 +162,8 @@ static int place_nodes(bst_deposit_params p, int tile_x, int tile_y, global cons
     vstore16(convert_int16(base + step_v) * BST_SPREAD_TAPS, 0, out->row_y);
     vstore16(phase_u - step_u, 0, out->share_x);
     vstore16(phase_v - step_v, 0, out->share_y);
-    vstore16(select((float16)-1.0f, width - level, width > 0.0f), 0, out->share_width);
+    vstore16(width - level, 0, out->share_width);
+    out->wide = any_of(width > 0.0f);
     vstore16(select((float16)0.0f, electrons, hit), 0, out->electrons);
     return 1;
 }
@@ -274,7 +278,7 @@ __attribute__((reqd_work_group_size(DEPOSIT_GROUP, 1, 1))) kernel void bst_light
         global float16 *out = grid + (size_t)((top + y) / 16) * p.samples_x + left;
         local const float16 *in = (local const float16 *)(sum + y);
         for (int x = 0; x < columns; x++) {
-            out[x] = in[x * (DEPOSIT_STRIDE / 16)];
+            STREAM(in[x * (DEPOSIT_STRIDE / 16)], out + x);
         }
     }
 }

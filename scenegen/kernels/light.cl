@@ -16,8 +16,8 @@ static void load_tile(local float *sum, bst_scene_params p, int left, int top,
                 }
                 continue;
             }
-            vstore16(fmax(vload16(0, image + (size_t)y * p.light_pitch + x), 0.0f), 0,
-                     sum + y * STRIDE + x);
+            *(local float16 *)(sum + y * STRIDE + x) =
+                fmax(vload16(0, image + (size_t)y * p.light_pitch + x), 0.0f);
         }
     }
 }

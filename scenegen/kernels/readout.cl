@@ -123,12 +123,13 @@ kernel void bst_detector_bloom(bst_scene_params p, global float *image, global f
  * row of the frame. */
 kernel void bst_detector_read(bst_scene_params p, global const float *image, global ushort *frame,
                               global int *saturated, global const float *offsets,
-                              global const ushort *codes) {
+                              global const ushort *codes, global uchar *flags) {
     detector_maps maps = {0, 0, 0, offsets, codes};
     int y = (int)get_global_id(0), b = p.binning;
     int row = p.window_y0 + y * b;
     global const float *line = image + (size_t)(row - p.light_y0) * p.light_stride;
     global ushort *out = frame + (size_t)y * p.window_width;
+    global uchar *marks = FLAGS_AT(flags, (size_t)y * p.window_width);
     /* binned pixels lie on a grid that starts with the window's first pixel */
     int first = p.window_x0 / b / 64 * 64, skip = p.window_x0 / b - first;
     int16 full_count = (int16)0;
@@ -163,10 +164,10 @@ kernel void bst_detector_read(bst_scene_params p, global const float *image, glo
         e.d = read_out(p, q.d, z.d);
         chunk dn = convert_chunk(p, maps, counter, row, first + x, e);
         int to = x - skip;
-        full_count -= store_dn(p, maps, dn.a, brim.a, to, out);
-        full_count -= store_dn(p, maps, dn.b, brim.b, to + 16, out);
-        full_count -= store_dn(p, maps, dn.c, brim.c, to + 32, out);
-        full_count -= store_dn(p, maps, dn.d, brim.d, to + 48, out);
+        full_count -= store_dn(p, maps, dn.a, brim.a, to, out, marks);
+        full_count -= store_dn(p, maps, dn.b, brim.b, to + 16, out, marks);
+        full_count -= store_dn(p, maps, dn.c, brim.c, to + 32, out, marks);
+        full_count -= store_dn(p, maps, dn.d, brim.d, to + 48, out, marks);
     }
     int8 s8 = full_count.lo + full_count.hi;
     int4 s4 = s8.lo + s8.hi;

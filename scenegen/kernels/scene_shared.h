@@ -4,9 +4,9 @@
 
 /* Nodes travel in blocks of this many, one vector register. */
 #define BST_BLOCK 16
-/* The Fourier path's table holds nodes widened by (n / BST_WIDTHS)^2 BST_WIDEST of the PSF's variance,
- * n from 0 to BST_WIDTHS. Between widths it is interpolated linearly in the variance, between which a
- * Gaussian's peak goes as the square root of its inverse: on each axis that misses
+/* The Fourier path's table holds nodes widened by (n / BST_WIDTHS)^2 BST_WIDEST of the PSF's
+ * variance, n from 0 to BST_WIDTHS. Between widths it is interpolated linearly in the variance,
+ * between which a Gaussian's peak goes as the square root of its inverse: on each axis that misses
  * 3/8 w / BST_WIDTHS^2 / (1 + w)^2 of the peak for a widening by w variances. */
 #define BST_WIDTHS 32
 #define BST_WIDEST 1.0f
@@ -20,6 +20,11 @@
  */
 #define BST_PLACE_LIMIT (1 << 29)
 
+/* Why a pixel is saturated: the well (of a binned pixel, one of them) is full, the converter is at
+ * its top. The bits of bst_planes.saturation. */
+#define BST_FLAG_FULL_WELL 1
+#define BST_FLAG_CONVERTER 2
+
 /* 32-bit members only, so that both languages lay it out alike. */
 typedef struct bst_scene_params {
     int window_x0, window_y0, window_width, window_height;
@@ -27,7 +32,7 @@ typedef struct bst_scene_params {
     int tiles_x0; /* sensor column of the first tile: a multiple of 64 */
     int tiles_x, tiles_y;
     int first_row, first_tile; /* of the frame: where the window is one of its bands */
-    int source_groups; /* sources / BST_BLOCK, rounded up */
+    int source_groups;         /* sources / BST_BLOCK, rounded up */
     unsigned key0, key1, exposure_low, exposure_high;
     float background_e; /* expected, per pixel: sky and dark current */
     float dark_e;       /* of it, dark current */
@@ -56,7 +61,7 @@ typedef struct bst_scene_source {
     int first_block;  /* block of the frame's nodes */
     int blocks;
     int first_box; /* of the blocks' boxes, by groups of BST_BLOCK */
-    int radius; /* the stamp reaches this far beyond the two nearest pixels of a node */
+    int radius;    /* the stamp reaches this far beyond the two nearest pixels of a node */
 } bst_scene_source;
 
 #endif

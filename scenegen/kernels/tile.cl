@@ -22,10 +22,17 @@ static tile_place place_tile(bst_scene_params p, int tile) {
 /* 16 digital numbers at once at an odd address: vstore16 may become 16 stores. */
 typedef ushort16 __attribute__((aligned(2))) ushort16_anywhere;
 
+#ifdef FLAGS
+#define FLAGS_AT(flags, i) ((flags) + (i))
+#else
+#define FLAGS_AT(flags, i) 0
+#endif
+
 /* Digital numbers, plus one half, of 16 pixels to the window's row at `column`. Returns the pixels
- * that are saturated (`brim`, or converter at its top) as -1; those outside the window are none. */
+ * that are saturated (`brim`, or converter at its top) as -1; those outside the window are none.
+ * marks: the row of flags, with the option FLAGS. */
 INLINE int16 store_dn(bst_scene_params p, detector_maps maps, float16 dn, int16 brim, int column,
-                      global ushort *row) {
+                      global ushort *row, global uchar *marks) {
     ushort16 value = convert_ushort16(convert_int16(clamp(dn, 0.0f, p.max_dn)));
 #ifdef CODES
     ushort numbers[16];
@@ -36,6 +43,14 @@ INLINE int16 store_dn(bst_scene_params p, detector_maps maps, float16 dn, int16 
     value = vload16(0, numbers);
 #endif
     int16 full = brim | (dn >= p.max_dn);
+#ifdef FLAGS
+    int16 kinds = (brim & BST_FLAG_FULL_WELL) | ((dn >= p.max_dn) & BST_FLAG_CONVERTER);
+    for (int i = 0; i < 16; i++) {
+        if (column + i >= 0 && column + i < p.window_width) {
+            marks[column + i] = (uchar)((int *)&kinds)[i];
+        }
+    }
+#endif
     if (column >= 0 && column + 16 <= p.window_width) {
         *(global ushort16_anywhere *)(row + column) = value;
         return full;
@@ -54,13 +69,15 @@ INLINE int16 store_dn(bst_scene_params p, detector_maps maps, float16 dn, int16 
     return vload16(0, flags);
 }
 
-/* frame: [window_height][window_width] digital numbers. saturated: pixels per tile. */
+/* frame: [window_height][window_width] digital numbers. saturated: pixels per tile. flags: as the
+ * frame, BST_FLAG_...; with the option FLAGS. */
 __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     bst_scene_params p, global const bst_scene_source *sources, global const float16 *table,
     global const float *block_box, global const float *source_box, global const float *group_box,
     global const float *light, global ushort *frame, global int *saturated,
     global const float *gain, global const float *dark, global const float *overlay,
-    global const float *offsets, global const ushort *codes BACKGROUND_ARGUMENT) {
+    global const float *offsets, global const ushort *codes,
+    global uchar *flags BACKGROUND_ARGUMENT) {
     local float sums[GROUP][(TILE_H + SPARE) * STRIDE] __attribute__((aligned(64)));
     int tile = (int)get_global_id(0);
     if (tile >= p.tiles_x * p.tiles_y) {
@@ -82,7 +99,9 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     int16 full_count = (int16)0;
     for (int y = 0; y < t.rows; y++) {
         uint counter = ((uint)(t.y + y) * chunks_per_row + (uint)t.x / 64u) * 16u;
-        global ushort *row = frame + (size_t)(p.first_row + t.top + y) * p.window_width;
+        size_t first = (size_t)(p.first_row + t.top + y) * p.window_width;
+        global ushort *row = frame + first;
+        global uchar *marks = FLAGS_AT(flags, first);
         for (int x = 0; x < t.columns; x += 64) {
             local float16 *from = (local float16 *)(sum + y * STRIDE + x);
             chunk lights = {from[0], from[1], from[2], from[3]};
@@ -92,10 +111,10 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
             chunk dn =
                 detect_chunk(p, maps, unlit, steps, counter, t.y + y, t.x + x, lights, lit, &brim);
             int column = t.left + x;
-            full_count -= store_dn(p, maps, dn.a, brim.a, column, row);
-            full_count -= store_dn(p, maps, dn.b, brim.b, column + 16, row);
-            full_count -= store_dn(p, maps, dn.c, brim.c, column + 32, row);
-            full_count -= store_dn(p, maps, dn.d, brim.d, column + 48, row);
+            full_count -= store_dn(p, maps, dn.a, brim.a, column, row, marks);
+            full_count -= store_dn(p, maps, dn.b, brim.b, column + 16, row, marks);
+            full_count -= store_dn(p, maps, dn.c, brim.c, column + 32, row, marks);
+            full_count -= store_dn(p, maps, dn.d, brim.d, column + 48, row, marks);
             counter += 16u;
         }
     }

@@ -73,6 +73,12 @@ bst_status bst_bench_first_frame(bst_ctx *ctx, const bst_bench_options *options)
 bst_status bst_bench_loop(bst_ctx *ctx, const bst_bench *self, const bst_bench_options *options,
                           bst_bench_result *out) BST_MUST_CHECK;
 
+/* Whole runs of an open-loop scenario, frames recorded, with and without --serial, in processes of
+ * their own: per frame, start and end taken off (bench_open_loop.c). */
+bst_status bst_bench_open_loop(bst_ctx *ctx, const bst_bench *self,
+                               const bst_bench_options *options,
+                               bst_bench_result *out) BST_MUST_CHECK;
+
 /* Times of repeated calls. */
 enum { BST_BENCH_TIMES = 4096 };
 typedef struct bst_bench_clock {

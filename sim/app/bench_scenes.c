@@ -55,6 +55,34 @@ static bst_camera bench_camera(int side) {
                         .bits = 16};
 }
 
+/* Every effect that a detector of this kind has beside the others; what only other kinds have is off:
+ * blooming, frame transfer, a rolling shutter, codes. */
+static void set_detector(bst_camera *camera) {
+    camera->detector = (bst_detector_config){.temperature_c = -10.0,
+                                             .reference_temperature_c = 20.0,
+                                             .dark_doubling_k = 6.5,
+                                             .prnu_rms = 0.01,
+                                             .dsnu_rms = 0.2,
+                                             .hot_fraction = 1e-4,
+                                             .hot_median_e_per_s = 200.0,
+                                             .hot_spread_dex = 0.5,
+                                             .dead_fraction = 1e-4,
+                                             .bad_columns = 2,
+                                             .pattern_seed = 1,
+                                             .column_offset_rms_e = 1.0,
+                                             .row_offset_rms_e = 1.0,
+                                             .row_noise_e = 0.5,
+                                             .read_tail_fraction = 0.01,
+                                             .read_tail_rms_e = 12.0,
+                                             .nonlinearity = {-0.005, 0.001, 0.0},
+                                             .hits = {.rate_per_cm2_s = 5.0,
+                                                      .pixel_pitch_um = 10.0,
+                                                      .depth_um = 20.0,
+                                                      .e_per_um = 80.0,
+                                                      .straggling = 0.2}};
+    camera->dark_current_e_per_s = 0.05;
+}
+
 /* An aperture of which 35 % of the diameter is obstructed, with defocus, astigmatism, coma and
  * trefoil that together are 0.07 waves RMS at 550 nm, over the visual band. */
 static void set_diffraction(bst_camera *camera, double q) {
@@ -154,6 +182,7 @@ bst_status bst_bench_view_open(bst_ctx *ctx, const bst_bench_scene *s, bst_bench
     int samples = (int)(s->exposure_s * SAMPLES_PER_S) + 1;
     samples = samples < 2 ? 2 : samples;
     *v = (bst_bench_view){.scene = *s, .camera = bench_camera(s->side)};
+    set_detector(&v->camera);
     if (s->q > 0.0) {
         set_diffraction(&v->camera, s->q);
     }

@@ -28,6 +28,8 @@ static const bst_bench benches[] = {
     {"galactic_core", "2048x2048, 100,000 stars, 5 px of motion", bst_bench_scene_run},
     {"window", "256x256 read-out window on a tracked target", bst_bench_scene_run},
     {"loop_full", "closed loop of the main scenario, per frame", bst_bench_loop},
+    {"open_loop", "run of an open-loop scenario with recording, per frame, and with --serial",
+     bst_bench_open_loop},
     {"cold_start", "first frame of a fresh process, kernels in the cache", bst_bench_cold_start},
     {"small", "256x256, 30 stars, 20 px streaks: a quick trial (only when named)",
      bst_bench_scene_run},
@@ -87,8 +89,9 @@ static void print_result(const bst_bench_result *r, bool markdown) {
         printf("%-25s error at most %.1e m\n", "", r->error_m);
     }
     for (int i = 0; !markdown && i < r->phase_count; i++) {
-        printf("%s%s %.0f ms%s", i == 0 ? "                          " : "", r->phases[i].name,
-               r->phases[i].ms, i + 1 < r->phase_count ? ", " : "\n");
+        printf(r->phases[i].ms < 20.0 ? "%s%s %.1f ms%s" : "%s%s %.0f ms%s",
+               i == 0 ? "                          " : "", r->phases[i].name, r->phases[i].ms,
+               i + 1 < r->phase_count ? ", " : "\n");
     }
     fflush(stdout);
 }

@@ -400,7 +400,7 @@ static void warn_of_space(const run_state *run, const char *out) {
                                     : record->compression                  ? 1.0
                                                                            : 2.0;
     for (uint32_t planes = record->planes; planes; planes &= planes - 1) {
-        per_pixel += 4.0;
+        per_pixel += planes == UINT32_C(1) << BST_PLANE_SATURATION ? 1.0 : 4.0;
     }
     for (int i = 0; i < scenario->observers.count; i++) {
         const bst_sensor_config *sensors = observers[i].sensors.items;

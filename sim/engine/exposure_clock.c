@@ -176,6 +176,9 @@ static void latch(exposure_clock *clock, const bst_sensor_command *command) {
             clock->window = (bst_window){x0, y0, x1 - x0, y1 - y0};
         }
     }
+    int side =
+        clock->window.width < clock->window.height ? clock->window.width : clock->window.height;
+    clock->binning = clock->binning < side ? clock->binning : side;
 }
 
 static void open_exposure(exposure_clock *clock, bst_sample command) {
@@ -183,6 +186,7 @@ static void open_exposure(exposure_clock *clock, bst_sample command) {
         clock->exposure_ticks = clock->updates.exposure_ticks;
         clock->period_ticks = clock->updates.period_ticks;
         clock->window = clock->updates.window;
+        clock->binning = clock->updates.binning;
     } else if (command.payload && !command.stale) {
         latch(clock, command.payload);
     }

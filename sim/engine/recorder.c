@@ -13,8 +13,12 @@ static const char *const frame_choices[] = {"extensions", "cube", "none", NULL};
 static const char *const compression_choices[] = {"none", "rice", NULL};
 
 /* in the order of bst_plane; also the names of their files */
-static const char *const plane_choices[] = {"stars", "targets", "background", "segmentation", NULL};
-static const char *const plane_names[] = {"STARS", "TARGETS", "BACKGROUND", "SEGMENTATION"};
+static const char *const plane_choices[] = {"stars",        "targets",    "background",
+                                            "segmentation", "saturation", NULL};
+static const char *const plane_names[] = {"STARS", "TARGETS", "BACKGROUND", "SEGMENTATION",
+                                          "SATURATION"};
+static const bst_fits_content plane_contents[] = {
+    BST_FITS_ELECTRONS, BST_FITS_ELECTRONS, BST_FITS_ELECTRONS, BST_FITS_ITEMS, BST_FITS_FLAGS};
 
 const bst_config_desc bst_record_config_table[] = {
     BST_ENUM(bst_record_config, frames, frame_choices, "\"extensions\"",
@@ -25,10 +29,11 @@ const bst_config_desc bst_record_config_table[] = {
              "the simulation by a thread of its own."),
     BST_BOOL(bst_record_config, checksums, "true",
              "CHECKSUM and DATASUM in each HDU; they take about 0.1 ms per million pixels."),
-    BST_CHOICES(bst_record_config, planes, plane_choices, "[]",
-                "Noise-free images beside each frame, a FITS file each: expected electrons of the "
-                "stars, of the targets, of sky and dark current; and the mask of who each pixel "
-                "belongs to."),
+    BST_CHOICES(
+        bst_record_config, planes, plane_choices, "[]",
+        "Noise-free images beside each frame, a FITS file each: expected electrons of the "
+        "stars, of the targets, of sky and dark current; the mask of who each pixel belongs "
+        "to; and which of the frame's own pixels are saturated."),
     BST_REAL(bst_record_config, mask_threshold_sigma, "sigma", 1e-3, 1e6, "1",
              "planes segmentation: least light of a source in a pixel of its own, in the noise of "
              "a pixel without sources."),
@@ -301,17 +306,18 @@ static bst_status take_planes(bst_ctx *ctx, bst_recorder *recorder, int sensor, 
                         s->observer, s->sensor, (long long)p->exposure_id);
     }
     for (int k = 0; k < BST_PLANE_COUNT; k++) {
-        bool mask = k == BST_PLANE_SEGMENTATION;
-        const void *pixels = mask ? (const void *)p->segmentation : (const void *)p->electrons[k];
+        const void *pixels = k == BST_PLANE_SEGMENTATION ? (const void *)p->segmentation
+                             : k == BST_PLANE_SATURATION ? (const void *)p->saturation
+                                                         : (const void *)p->electrons[k];
         if (!pixels) {
             continue;
         }
         if (!s->planes[k]) {
-            BST_TRY(open_file(ctx, recorder, s, plane_choices[k],
-                              mask ? BST_FITS_ITEMS : BST_FITS_ELECTRONS, &s->planes[k]));
+            BST_TRY(
+                open_file(ctx, recorder, s, plane_choices[k], plane_contents[k], &s->planes[k]));
         }
-        BST_TRY(bst_fits_write_plane(ctx, s->planes[k], &s->shown, plane_names[k], pixels,
-                                     p->window.width, p->window.height, NULL));
+        BST_TRY(bst_fits_write_plane(ctx, s->planes[k], &s->shown, plane_names[k], pixels, p->width,
+                                     p->height, NULL));
     }
     return BST_OK;
 }

@@ -225,7 +225,12 @@ bst_status bst_fits_write_plane(bst_ctx *ctx, bst_fits *fits, const bst_fits_fra
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: no plane of %d x %d pixels", fits->path, width,
                         height);
     }
-    bool items = fits->content == BST_FITS_ITEMS;
+    static const int
+        images[] = {[BST_FITS_ELECTRONS] = FLOAT_IMG,
+                    [BST_FITS_ITEMS] = LONG_IMG,
+                    [BST_FITS_FLAGS] = BYTE_IMG},
+        types[] = {
+            [BST_FITS_ELECTRONS] = TFLOAT, [BST_FITS_ITEMS] = TINT, [BST_FITS_FLAGS] = TBYTE};
     long size[2] = {width, height};
     char *hdu = NULL;
     long long bytes = 0;
@@ -233,7 +238,7 @@ bst_status bst_fits_write_plane(bst_ctx *ctx, bst_fits *fits, const bst_fits_fra
     errno = 0;
     bst_fits_memory_open(&fits->memory, true, &code);
     fitsfile *file = fits->memory.file;
-    fits_create_img(file, items ? LONG_IMG : FLOAT_IMG, 2, size, &code);
+    fits_create_img(file, images[fits->content], 2, size, &code);
     fits_write_key_str(file, "EXTNAME", name, "", &code);
     fits_write_key_lng(file, "EXTVER", fits->frames + 1, "counted from 1", &code);
     fits_write_key_log(file, "INHERIT", 1, "keys of the primary header hold here", &code);
@@ -242,7 +247,7 @@ bst_status bst_fits_write_plane(bst_ctx *ctx, bst_fits *fits, const bst_fits_fra
     bst_fits_put_statements(file, &code);
     bst_fits_put_sums(fits, file, &code);
     /* cfitsio's prototype lacks const; it does not write to the array */
-    fits_write_img(file, items ? TINT : TFLOAT, 1, (LONGLONG)width * height,
+    fits_write_img(file, types[fits->content], 1, (LONGLONG)width * height,
                    (void *)(uintptr_t)pixels, &code);
     bst_fits_memory_hdu(&fits->memory, &hdu, &bytes, &code);
     bst_status status = bst_fits_check(ctx, fits, code, "cannot be written");

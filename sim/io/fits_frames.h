@@ -14,12 +14,13 @@ typedef enum bst_fits_layout { BST_FITS_EXTENSIONS, BST_FITS_CUBE } bst_fits_lay
 /* Rice: FITS tile compression (FITS 4.0, section 10), lossless, a tile a row; extensions only. */
 typedef enum bst_fits_compression { BST_FITS_RAW, BST_FITS_RICE } bst_fits_compression;
 
-/* What pixels are: counts of the converter (uint16), expected electrons (float), or numbers of
- * items of the truth (int32). */
+/* What pixels are: counts of the converter (uint16), expected electrons (float), numbers of items
+ * of the truth (int32), or flags of saturated pixels (uint8). */
 typedef enum bst_fits_content {
     BST_FITS_COUNTS,
     BST_FITS_ELECTRONS,
-    BST_FITS_ITEMS
+    BST_FITS_ITEMS,
+    BST_FITS_FLAGS
 } bst_fits_content;
 
 /* What holds for the whole file; read in create only. */
@@ -71,7 +72,8 @@ bst_status bst_fits_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *fr
                           const uint16_t *pixels, int width, int height,
                           int64_t *index) BST_MUST_CHECK;
 
-/* Writes a plane of a file of electrons (float) or of items (int32) as bst_fits_write does a frame;
+/* Writes a plane of a file of electrons (float), items (int32) or flags (uint8) as bst_fits_write
+ * does a frame;
  * `name` is its EXTNAME. */
 bst_status bst_fits_write_plane(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,
                                 const char *name, const void *pixels, int width, int height,

@@ -64,6 +64,7 @@ typedef struct frame_config {
     bst_config_list pointing; /* node_config */
     double exposure_s, period_s, pixel_scale_arcsec;
     double window_px[4];
+    int64_t binning;
     bst_config_list objects; /* object_config */
 } frame_config;
 
@@ -80,6 +81,7 @@ static const bst_config_desc frame_table[] = {
     BST_REAL(frame_config, period_s, "s", 1e-3, 1e5, "1", "Time to the next exposure's start."),
     BST_REAL(frame_config, pixel_scale_arcsec, "arcsec/px", 1e-3, 600, "1", "Field of view."),
     BST_REALS(frame_config, window_px, "px", 0, 65536, "[0, 0, 0, 0]", "Window."),
+    BST_INT(frame_config, binning, "px", 1, 8, "1", "Sensor pixels per side of a frame's pixel."),
     BST_LIST(frame_config, objects, object_config, object_table, 0, 10000, "[]", "Objects."),
     BST_CONFIG_END};
 
@@ -89,7 +91,9 @@ typedef struct reader {
     const bst_json *json;
     bst_frame_updates *out;
     const bst_camera *camera;
-    double exposure_s; /* that holds now */
+    double exposure_s; /* that holds now, as the next two */
+    bst_window window;
+    int binning;
     const cJSON *node; /* of the frame being read */
     char path[80];     /* "/frames/3 (frame 7)" */
 } reader;
@@ -243,6 +247,18 @@ static bst_status take_frame(reader *r, const frame_config *c, bst_frame_update 
     }
     if (has(r, "window_px")) {
         BST_TRY(read_window(r, c->window_px, &update->window));
+        r->window = update->window;
+    }
+    if (has(r, "binning")) {
+        update->binning = r->binning = (int)c->binning;
+    }
+    if (r->binning > r->window.width || r->binning > r->window.height) {
+        char allowed[120];
+        snprintf(allowed, sizeof allowed,
+                 "a binning that fits the window of %d x %d pixels; it is %d here", r->window.width,
+                 r->window.height, r->binning);
+        return fail_key(r, has(r, "binning") ? "binning" : "window_px", "no pixel is left",
+                        allowed);
     }
     if (has(r, "pixel_scale_arcsec")) {
         bst_camera camera;
@@ -328,7 +344,9 @@ static bst_status make(bst_ctx *ctx, const bst_json *json, const bst_camera *cam
                 .json = json,
                 .out = calloc(1, sizeof *r.out),
                 .camera = camera,
-                .exposure_s = exposure->exposure_s};
+                .exposure_s = exposure->exposure_s,
+                .window = {0, 0, (int)camera->width_px, (int)camera->height_px},
+                .binning = exposure->binning > 1 ? (int)exposure->binning : 1};
     bst_status status =
         r.out ? read_json(&r) : bst_fail(ctx, BST_ERR_MEMORY, "no memory for frame updates");
     if (status != BST_OK) {
@@ -395,6 +413,7 @@ static void apply(bst_frame_cursor *c) {
         c->exposure_s = update->exposure_s >= 0.0 ? update->exposure_s : c->exposure_s;
         c->period_s = update->period_s > 0.0 ? update->period_s : c->period_s;
         c->window = update->window.width > 0 ? update->window : c->window;
+        c->binning = update->binning > 0 ? update->binning : c->binning;
         c->pixel_scale_arcsec =
             update->pixel_scale_arcsec > 0.0 ? update->pixel_scale_arcsec : c->pixel_scale_arcsec;
     }
@@ -410,6 +429,7 @@ bst_frame_cursor bst_frame_cursor_begin(const bst_frame_updates *updates, const 
                           .exposure_s = exposure->exposure_s,
                           .period_s = exposure->period_s,
                           .window = {0, 0, (int)camera->width_px, (int)camera->height_px},
+                          .binning = exposure->binning > 1 ? (int)exposure->binning : 1,
                           .pixel_scale_arcsec = camera->pixel_scale_arcsec};
     c.start_tick = ticks(&c, c.start_s);
     apply(&c);

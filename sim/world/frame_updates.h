@@ -1,5 +1,6 @@
 /* A file that drives a sensor frame by frame: pointing, states of objects, and changes of exposure,
- * period, window and field of view while the run goes on. docs/interfaces.md, "Frame updates". */
+ * period, window, binning and field of view while the run goes on. docs/interfaces.md, "Frame
+ * updates". */
 #ifndef BST_WORLD_FRAME_UPDATES_H
 #define BST_WORLD_FRAME_UPDATES_H
 
@@ -29,6 +30,7 @@ typedef struct bst_frame_update {
     double period_s;                /* <= 0: as before */
     double pixel_scale_arcsec;      /* 0: as before */
     bst_window window;              /* width 0: as before */
+    int binning;                    /* 0: as before */
     const bst_pointing_node *nodes; /* [node_count], times ascending: the first 0, the last the
                                        exposure */
     int node_count;                 /* 0: the file gives no pointing for this frame */
@@ -65,6 +67,7 @@ typedef struct bst_frame_cursor {
     double start_s, exposure_s, period_s;
     int64_t start_tick, exposure_ticks, period_ticks; /* rounded to the nearest */
     bst_window window;
+    int binning;
     double pixel_scale_arcsec;
 } bst_frame_cursor;
 
@@ -75,7 +78,8 @@ bst_frame_cursor bst_frame_cursor_begin(const bst_frame_updates *updates, const 
  * later. */
 void bst_frame_cursor_next(bst_frame_cursor *cursor);
 
-/* Longest exposure (from the first to the last row of a rolling shutter) and shortest time between two starts that a file leads to. */
+/* Longest exposure (from the first to the last row of a rolling shutter) and shortest time between
+ * two starts that a file leads to. */
 void bst_frame_updates_limits(const bst_frame_updates *updates, const bst_camera *camera,
                               const bst_exposure_config *exposure, double *longest_exposure_s,
                               double *shortest_cycle_s);

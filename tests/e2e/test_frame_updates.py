@@ -99,6 +99,35 @@ class FrameByFrame(unittest.TestCase):
                 # V 6.4: 8e4 electrons over a PSF of 2 px, noise of some 10 counts
                 self.assertGreater(core.max(), np.median(hdu.data) + 1000)
 
+    def test_binning_changes_on_the_way(self):
+        folder = runs.scratch()
+        with open(UPDATES, encoding="utf-8") as file:
+            updates = json.load(file)
+        for frame, binning in ((2, 2), (4, 3), (6, 1)):
+            updates["frames"][frame]["binning"] = binning
+        path, out = os.path.join(folder, "updates.json"), os.path.join(folder, "run")
+        with open(path, "w", encoding="utf-8") as file:
+            json.dump(updates, file)
+        runs.run(SCENARIO, out, f"{KEY}={path}", f"/observers/0/orbit/states_file={path}",
+                 f"/world/objects/0/orbit/states_file={path}")
+        with fits.open(os.path.join(out, "frames.fits")) as hdus:
+            sides = [h.header["NAXIS1"] for h in hdus[1:]]
+            scales = [3600 * np.hypot(h.header["CD1_1"], h.header["CD2_1"]) for h in hdus[1:]]
+            pixels = [hdus[i].data.astype(float) for i in (1, 3)]
+            offset = hdus[0].header["OFFSET"]
+        self.assertEqual(sides, [512, 512, 256, 256, 85, 85, 512, 512])
+        np.testing.assert_allclose(scales, [6, 6, 12, 12, 18, 18, 12, 12], rtol=1e-3)
+        # the sky of four pixels, to its noise in 65536 of them
+        sky = []
+        for image in pixels:
+            middle, spread = np.median(image), 1.4826 * np.median(np.abs(image - np.median(image)))
+            dark = image[np.abs(image - middle) < 4 * spread + 1]
+            sky.append(dark.mean() - offset)
+        self.assertAlmostEqual(sky[1] / sky[0], 4, delta=0.3)
+        bins = [row[0] for row in runs.database(out).execute(
+            "SELECT binning FROM frames ORDER BY exposure_id")]
+        self.assertEqual(bins, [1, 1, 2, 2, 3, 3, 1, 1])
+
     def test_faults_end_before_anything_is_written(self):
         folder = runs.scratch()
         with open(UPDATES, encoding="utf-8") as file:

@@ -13,8 +13,9 @@ from astropy.io import fits
 import runs
 
 SCENARIO = "scenarios/frame_by_frame.json"
-NAMES = ("stars", "targets", "background", "segmentation")
-ALL = '/record/planes=["stars", "targets", "background", "segmentation"]'
+NAMES = ("stars", "targets", "background", "segmentation", "saturation")
+ALL = '/record/planes=["stars", "targets", "background", "segmentation", "saturation"]'
+BITPIX = dict(zip(NAMES, (-32, -32, -32, 32, 8)))
 
 
 def tearDownModule():
@@ -27,14 +28,23 @@ def images(out, name):
 
 
 class Planes(unittest.TestCase):
+    binning = 1
+
     @classmethod
     def setUpClass(cls):
         folder = runs.scratch()
+        sets = [f"{runs.SENSOR}/exposure/binning={cls.binning}",
+                f"{runs.SENSOR}/camera/full_well_e=3000"]  # some pixels are full
         cls.out, cls.plain = (os.path.join(folder, name) for name in ("planes", "plain"))
-        runs.run(SCENARIO, cls.out, ALL, "/record/checksums=true")
-        runs.run(SCENARIO, cls.plain)
+        runs.run(SCENARIO, cls.out, ALL, "/record/checksums=true", *sets)
+        runs.run(SCENARIO, cls.plain, *sets)
         cls.frames = images(cls.out, "frames")
         cls.planes = {name: images(cls.out, name) for name in NAMES}
+
+    @classmethod
+    def on_sensor(cls, pixel):
+        """Sensor pixels from a window's first one, of the frame's pixels."""
+        return cls.binning * (pixel + 0.5) - 0.5
 
     def test_off_means_none_and_changes_nothing(self):
         self.assertFalse([n for n in os.listdir(self.plain) if n.split(".")[0] in NAMES])
@@ -50,8 +60,8 @@ class Planes(unittest.TestCase):
                             "CRVAL1", "CRVAL2", "CD1_1", "CD2_1", "WINX0", "PIXSCALE"):
                     self.assertEqual(header[key], frame[key], (name, key))
                 self.assertEqual(header["EXTNAME"], name.upper())
-                self.assertEqual(header["BITPIX"], 32 if name == "segmentation" else -32)
-                self.assertEqual(header["BUNIT"], "" if name == "segmentation" else "electron")
+                self.assertEqual(header["BITPIX"], BITPIX[name])
+                self.assertEqual(header["BUNIT"], "electron" if BITPIX[name] < 0 else "")
                 self.assertNotIn("GAIN", header)
             with fits.open(os.path.join(self.out, f"{name}.fits"), checksum=True) as hdus:
                 self.assertIn("DATASUM", hdus[1].header)
@@ -63,13 +73,13 @@ class Planes(unittest.TestCase):
         for k, (_, counts) in enumerate(self.frames):
             mean = sum(self.planes[name][k][1] for name in NAMES[:3])
             sigma = np.sqrt(mean + read ** 2 + gain ** 2 / 12)
-            z = (((counts - offset) * gain - mean) / sigma).ravel()
+            free = self.planes["saturation"][k][1] == 0
+            z = (((counts - offset) * gain - mean) / sigma)[free]
             n = len(z)
             # 5 sigma of the mean and of the standard deviation
             self.assertAlmostEqual(z.mean(), 0.0, delta=5 / np.sqrt(n))
             self.assertAlmostEqual(z.std(), 1.0, delta=5 / np.sqrt(2 * n))
-            bright = mean > 2 * np.median(mean)
-            lit = z.reshape(mean.shape)[bright]
+            lit = z[(mean > 2 * np.median(mean))[free]]
             self.assertAlmostEqual(lit.mean(), 0.0, delta=5 / np.sqrt(len(lit)))
             self.assertAlmostEqual(lit.std(), 1.0, delta=5 / np.sqrt(2 * len(lit)))
 
@@ -80,6 +90,7 @@ class Planes(unittest.TestCase):
             # stamps leave out what is below the tolerance of the noise
             self.assertAlmostEqual(data.sum() / row["electrons"], 1.0, delta=1e-3)
             y, x = np.indices(data.shape)
+            x, y = (self.on_sensor(c) for c in (x, y))
             self.assertAlmostEqual((data * x).sum() / data.sum() + header["WINX0"],
                                    row["x_mean_px"], delta=0.01)
             self.assertAlmostEqual((data * y).sum() / data.sum() + header["WINY0"],
@@ -107,19 +118,46 @@ class Planes(unittest.TestCase):
             stars = self.planes["stars"][k][1]
             alone = (own > level) & (own > 2 * stars)
             self.assertTrue(np.all(mask[alone] == target))
-            self.assertGreater(np.count_nonzero(alone), 20)
+            self.assertGreater(np.count_nonzero(alone), 20 / self.binning ** 2)
             for i in found:
                 y, x = np.nonzero(mask == i)
                 row = items[i]
-                near = np.hypot(x + header["WINX0"] - row["x_mean_px"],
-                                y + header["WINY0"] - row["y_mean_px"])
+                near = np.hypot(self.on_sensor(x) + header["WINX0"] - row["x_mean_px"],
+                                self.on_sensor(y) + header["WINY0"] - row["y_mean_px"])
                 self.assertLess(near.min(), 4.0)
+
+    def test_saturated_pixels(self):
+        tables = runs.database(self.out)
+        with fits.open(os.path.join(self.out, "frames.fits")) as hdus:
+            keys = hdus[0].header
+        full = keys["OFFSET"] + 3000 / keys["GAIN"]
+        seen = 0
+        for k, (header, flags) in enumerate(self.planes["saturation"]):
+            counts = self.frames[k][1]
+            self.assertLessEqual(set(np.unique(flags)), {0, 1})
+            seen += np.count_nonzero(flags)
+            if self.binning == 1:  # within 6 sigma of the read noise
+                margin = 6 * keys["RDNOISE"] / keys["GAIN"] + 1
+                self.assertTrue(np.all(np.abs(counts[flags > 0] - full) < margin))
+                self.assertTrue(np.all(counts[flags == 0] < full + margin))
+            # where there are flags there is a source that says so, and the other way round
+            mask = self.planes["segmentation"][k][1]
+            saturated = {row["item"] for row in tables.execute(
+                "SELECT item FROM truth WHERE exposure_id = ? AND saturated",
+                (header["FRAMEID"],))}
+            self.assertLessEqual(set(np.unique(mask[flags > 0]).astype(int)) - {0}, saturated)
+        self.assertGreater(seen, 3)
 
     def test_misuse(self):
         for value, words in (('["star"]', "\"stars\", \"targets\""), ('["stars", "stars"]', "twice"),
                              ('"stars"', "array of names")):
             with self.assertRaisesRegex(AssertionError, f"/record/planes.*{words}"):
                 runs.run(SCENARIO, os.path.join(runs.scratch(), "run"), f"/record/planes={value}")
+
+
+class BinnedPlanes(Planes):
+    """The same in pixels that are read together."""
+    binning = 2
 
 
 if __name__ == "__main__":

@@ -82,18 +82,20 @@ static bst_status keep(void *user, const char *scope, const char *channel, const
     return BST_OK;
 }
 
-/* Runs a scenario whose sensor has these "exposure" and "modules" blocks. */
-static void run(const char *exposure, const char *module_block, const char *extra,
-                int64_t until_tick, train *out) {
+/* Runs a scenario whose sensor has these "exposure" and "modules" blocks, and more keys of its
+ * camera. */
+static void run_camera(const char *camera, const char *exposure, const char *module_block,
+                       const char *extra, int64_t until_tick, train *out) {
     static const char format[] =
         "{\"boresight\": 1, \"epoch_utc\": \"2022-06-16T22:10:00Z\", \"duration_s\": 300, %s"
         "\"world\": {\"star_catalogue\": \"embedded\"}, \"observers\": [{\"name\": \"sat\","
         "\"orbit\": {\"elements_file\": \"catalogue_2022-06.tle\", \"norad\": 39089},"
         "\"sensors\": [{\"name\": \"cam\", \"camera\": {\"width_px\": 640, \"height_px\": 480,"
-        "\"pixel_scale_arcsec\": 3, \"aperture_m\": 0.15}, \"exposure\": {%s}, \"modules\": {%s}}]"
+        "\"pixel_scale_arcsec\": 3, \"aperture_m\": 0.15%s}, \"exposure\": {%s}, \"modules\": "
+        "{%s}}]"
         "}]}";
     char text[2000];
-    snprintf(text, sizeof text, format, extra, exposure, module_block);
+    snprintf(text, sizeof text, format, extra, camera, exposure, module_block);
     bst_ctx ctx = {0};
     bst_json *json = NULL;
     bst_assert_ok(&ctx, bst_json_parse(&ctx, "scenarios/x.json", text, strlen(text), &json));
@@ -110,6 +112,11 @@ static void run(const char *exposure, const char *module_block, const char *extr
     bst_simulation_free(sim);
     bst_scenario_free(&scenario);
     bst_json_free(json);
+}
+
+static void run(const char *exposure, const char *module_block, const char *extra,
+                int64_t until_tick, train *out) {
+    run_camera("", exposure, module_block, extra, until_tick, out);
 }
 
 static void expect_train(const train *l, int count, int64_t first, int64_t exposure,
@@ -208,6 +215,12 @@ static void odd_commands_do_no_harm(void **state) {
         "\"height\": 100}",
         "", 20000, &l);
     assert_int_equal(l.items[2].window.width, 640);
+    /* a binning that leaves no pixel of the window */
+    run("\"exposure_s\": 0.5, \"period_s\": 1",
+        "\"control\": {\"type\": \"commander\", \"x0\": 600, \"y0\": 0, \"width\": 100, "
+        "\"height\": 9, \"binning\": 16}",
+        "", 20000, &l);
+    assert_int_equal(l.items[2].binning, 9);
     /* an exposure and period shorter than half a tick, straight after another: one a tick */
     run("\"exposure_s\": 0.5, \"period_s\": 0.5",
         "\"control\": {\"type\": \"commander\", \"exposure_s\": 1e-9, \"period_s\": 1e-9, "
@@ -222,6 +235,34 @@ static void odd_commands_do_no_harm(void **state) {
         "\"control\": {\"type\": \"commander\", \"exposure_s\": 1e300, \"period_s\": 1e300}", "",
         1800000, &l);
     assert_int_equal(l.count, 1);
+}
+
+/* Exposures are those of the middle row; they are told when the last row's is over, and the next
+ * one's first row waits for that. */
+static void rolling_shutters_take_their_time(void **state) {
+    (void)state;
+    static const char rolling[] = ", \"detector\": {\"row_time_s\": 1e-4}",
+                      backwards[] = ", \"detector\": {\"row_time_s\": -1e-4}";
+    const int64_t lead = 144; /* 239.5 rows of 0.1 ms: 143.7 ticks */
+    for (int way = 0; way < 2; way++) {
+        const char *camera = way ? backwards : rolling;
+        train l;
+        run_camera(camera, "\"exposure_s\": 0.5, \"period_s\": 1, \"first_s\": 0.024", "", "",
+                   60001, &l);
+        assert_int_equal(l.count, 10);
+        for (int i = 0; i < l.count; i++) {
+            assert_int_equal(l.items[i].start_tick, lead + i * 6000);
+            assert_int_equal(l.items[i].end_tick, l.items[i].start_tick + 3000);
+            assert_int_equal(l.ticks[i], l.items[i].end_tick + lead);
+        }
+        /* as long as its period: the rows' time comes on top */
+        run_camera(camera, "\"exposure_s\": 1, \"period_s\": 1, \"first_s\": 0.1", "", "", 60001,
+                   &l);
+        for (int i = 0; i < l.count; i++) {
+            assert_int_equal(l.items[i].start_tick, 600 + i * (6000 + 2 * lead));
+        }
+        assert_int_equal(l.count, 9);
+    }
 }
 
 static int dropped(const train *l) {
@@ -263,6 +304,7 @@ int main(void) {
         cmocka_unit_test(the_last_frame_ends_before_the_run),
         cmocka_unit_test(commands_are_latched_at_the_start),
         cmocka_unit_test(odd_commands_do_no_harm),
+        cmocka_unit_test(rolling_shutters_take_their_time),
         cmocka_unit_test(dropped_frames_follow_the_seed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -19,6 +19,7 @@ static void everything(void **state) {
         "{\"frame\": 0, \"q_cam_from_gcrf_start\": [0, 0, 0, 1], "
         "\"q_cam_from_gcrf_end\": [0.6, 0, 0, 0.8]},"
         "{\"frame\": 2, \"exposure_s\": 2, \"period_s\": 0.25, \"window_px\": [1, 2, 30, 40], "
+        "\"binning\": 3, "
         "\"pointing\": [{\"time_s\": 0, \"q_cam_from_gcrf\": [0, 0, 0, 1]}, {\"time_s\": 0.7, "
         "\"q_cam_from_gcrf\": [0, 1, 0, 0]}, {\"time_s\": 2, \"q_cam_from_gcrf\": [1, 0, 0, 0]}]},"
         "{\"frame\": 3, \"pixel_scale_arcsec\": 6, \"objects\": [{\"object\": \"A\", "
@@ -30,12 +31,12 @@ static void everything(void **state) {
     assert_int_equal(bst_frame_updates_count(u), 3);
     assert_string_equal(bst_frame_updates_name(u), "u.json");
     bst_frame_cursor c = bst_frame_cursor_begin(u, &camera, &exposure, 100.0);
-    /* frame: start and exposure in ticks, window, scale */
-    static const int64_t expected[5][5] = {{200, 50, 640, 3, 2},
-                                           {300, 50, 640, 3, 0},
-                                           {400, 200, 30, 3, 3},
-                                           {600, 200, 30, 6, 0},
-                                           {800, 200, 30, 6, 0}};
+    /* frame: start and exposure in ticks, window, scale, attitudes, binning */
+    static const int64_t expected[5][6] = {{200, 50, 640, 3, 2, 1},
+                                           {300, 50, 640, 3, 0, 1},
+                                           {400, 200, 30, 3, 3, 3},
+                                           {600, 200, 30, 6, 0, 3},
+                                           {800, 200, 30, 6, 0, 3}};
     for (int k = 0; k < 5; k++, bst_frame_cursor_next(&c)) {
         assert_int_equal(c.frame, k);
         assert_int_equal(c.start_tick, expected[k][0]);
@@ -43,6 +44,7 @@ static void everything(void **state) {
         assert_int_equal(c.window.width, expected[k][2]);
         assert_int_equal((int)c.pixel_scale_arcsec, expected[k][3]);
         assert_int_equal(c.update ? c.update->node_count : 0, expected[k][4]);
+        assert_int_equal(c.binning, expected[k][5]);
         bst_assert_close(c.start_s, (double)c.start_tick / 100.0, 1e-12); /* sums of doubles */
     }
     const bst_frame_update *last = bst_frame_updates_item(u, 2);
@@ -101,6 +103,11 @@ static const struct {
     {FILE_OF("{\"frame\": 4, \"window_px\": [0.5, 0, 41, 10]}"),
      {"(frame 4)/window_px", "not whole pixels", "", ""}},
     {FILE_OF("{\"frame\": 4, \"window_px\": [0, 0, 0, 10]}"), {"(frame 4)/window_px", "", "", ""}},
+    {FILE_OF("{\"frame\": 4, \"binning\": 9}"), {"(frame 4)/binning", "9", "8", ""}},
+    {FILE_OF("{\"frame\": 1, \"binning\": 4}, {\"frame\": 4, \"window_px\": [0, 0, 9, 3]}"),
+     {"(frame 4)/window_px", "no pixel is left", "9 x 3", ""}},
+    {FILE_OF("{\"frame\": 4, \"window_px\": [0, 0, 9, 3], \"binning\": 4}"),
+     {"(frame 4)/binning", "no pixel is left", "9 x 3", ""}},
     {FILE_OF("{\"frame\": 4, \"pixel_scale_arcsec\": 0}"),
      {"(frame 4)/pixel_scale_arcsec", "out of range", "", ""}},
     {FILE_OF("{\"frame\": 4, \"objects\": [{\"object\": \"A\"}]}"),
