@@ -4,10 +4,10 @@
 #include <stdint.h>
 #include <stdlib.h>
 
-/* Parts of the others' errors that meet where the worst source's error is greatest: RMS over their
- * images of an error that is told by its greatest value, times three; and of a border's length that
- * passes within its own thickness of a place. */
-#define REST 0.5f
+/* Parts of the others' errors that meet where the worst source's error is greatest: of an error that
+ * is told by its greatest value, and of a border's length that passes within its own thickness of a
+ * place. */
+#define REST 0.4f
 #define BORDERS 0.1f
 
 /* Cells as far as two stamps' radii, four standard deviations of the PSF each and more, go; and up

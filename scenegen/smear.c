@@ -11,9 +11,12 @@
 
 /* Shares of the tolerance: for nodes, for the border of the stamp, and for a track that stars
  * share. */
-#define NODE_SHARE 0.8
+#define NODE_SHARE 0.85
 #define CUT_SHARE 0.3
 #define SINGLE_SHARE 0.1
+/* Errors of nodes are greatest beside the middle, where a bright source's own noise is less: those
+ * of third order where the light is this share of the peak. */
+#define FLANK 0.76
 
 enum { TABLE_FLOATS = BST_TABLE_ROWS * BST_BLOCK, MAX_TAPS = BST_PLACE_TAPS };
 
@@ -318,7 +321,7 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *fr
 }
 
 int bst_smear_choose_level(const bst_smear *s, double peak_e) {
-    double sigmas = peak_e / sqrt(peak_e + s->dark_variance_e2);
+    double sigmas = peak_e / sqrt(FLANK * peak_e + s->dark_variance_e2);
     int n = 0;
     if (s->options.temporal_oversample > 0) {
         return n;
@@ -410,14 +413,16 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
     double shared =
         s->single && !moving ? single_error(s, s->last_peak_e, sqrt(x * x + y * y)) : 0.0;
     double sigma_e = sqrt(s->last_peak_e + s->dark_variance_e2);
-    s->last_error = (bst_crowd_source){.x_px = (float)x,
-                                       .y_px = (float)y,
-                                       .peak_e = (float)s->last_peak_e,
-                                       .nodes_e = (float)((used->error + rounded) * s->last_peak_e),
-                                       .shared_e = (float)(shared * sigma_e),
-                                       .excess_e = (float)(lost * s->last_peak_e),
-                                       .border_e = (float)(s->last_peak_e * s->stamp.tail[border]),
-                                       .apart = moving && travel_px > s->travel_px};
+    double flank = sigma_e / sqrt(FLANK * s->last_peak_e + s->dark_variance_e2);
+    s->last_error =
+        (bst_crowd_source){.x_px = (float)x,
+                           .y_px = (float)y,
+                           .peak_e = (float)s->last_peak_e,
+                           .nodes_e = (float)((flank * used->error + rounded) * s->last_peak_e),
+                           .shared_e = (float)(shared * sigma_e),
+                           .excess_e = (float)(lost * s->last_peak_e),
+                           .border_e = (float)(s->last_peak_e * s->stamp.tail[border]),
+                           .apart = moving && travel_px > s->travel_px};
     /* what the stamp leaves out is put on the stamp, so that no light is lost */
     electrons /= s->stamp.kept[radius] * s->stamp.kept[radius];
     *out = (bst_scene_source){.x_px = (float)x,
