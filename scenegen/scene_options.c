@@ -14,9 +14,10 @@ void bst_scene_build_options(const bst_camera *camera, const bst_renderer_option
     double sigma_px = bst_camera_psf_sigma_px(camera);
     int length = snprintf(text, bytes,
                           "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d "
-                          "-DEDGE_SCALE=%.9ef%s%s",
+                          "-DEDGE_SCALE=%.9ef%s%s%s",
                           settings->tile_width, settings->tile_height, settings->group, taps,
                           1.0 / (sqrt(2.0) * sigma_px), fft_light ? " -DFFT_LIGHT" : "",
+                          settings->group == 1 ? " -DNEAR_CACHE" : "",
                           bst_skylight_varies(camera) ? " -DBACKGROUND" : "");
     if (law_degree > 0) {
         length +=

@@ -1,4 +1,5 @@
-/* One tile of the frame per work-item. Options: GROUP (work-items per work-group), FFT_LIGHT (the
+/* One tile of the frame per work-item. Options: GROUP (work-items per work-group), NEAR_CACHE (memory has
+ * one address space, and what lies in it can be fetched ahead), FFT_LIGHT (the
  * light is an image, else it comes from nodes; `light` is the image or the profiles' law). */
 
 /* Where a tile lies: its first pixel on the full sensor and in the window, and its size. Tiles
@@ -18,6 +19,9 @@ static tile_place place_tile(bst_scene_params p, int tile) {
     t.columns = min(TILE_W, p.window_width - t.left);
     return t;
 }
+
+/* Rows ahead of the present one that maps are fetched. */
+#define AHEAD 2
 
 /* 16 digital numbers at once at an odd address: vstore16 may become 16 stores. */
 typedef ushort16 __attribute__((aligned(2))) ushort16_anywhere;
@@ -69,6 +73,37 @@ INLINE int16 store_dn(bst_scene_params p, detector_maps maps, float16 dn, int16 
     return vload16(0, flags);
 }
 
+#ifdef NEAR_CACHE
+#define FETCH_LINE(map, at) __builtin_prefetch((const private void *)(uintptr_t)((map) + (at)))
+#else
+#define FETCH_LINE(map, at)
+#endif
+#ifdef GAIN_MAP
+#define FETCH_GAIN(maps, at) FETCH_LINE((maps).gain, at)
+#else
+#define FETCH_GAIN(maps, at)
+#endif
+#ifdef DARK_MAP
+#define FETCH_DARK(maps, at) FETCH_LINE((maps).dark, at)
+#else
+#define FETCH_DARK(maps, at)
+#endif
+#ifdef OVERLAY
+#define FETCH_OVERLAY(maps, at) FETCH_LINE((maps).overlay, at)
+#else
+#define FETCH_OVERLAY(maps, at)
+#endif
+
+/* Asks for a row of the maps, which are too far apart from row to row for the hardware to foresee. */
+INLINE void fetch_maps(detector_maps maps, int row, int column, int columns) {
+    size_t first = (size_t)row * MAP_STRIDE + column;
+    for (int x = 0; x < columns; x += 16) {
+        FETCH_GAIN(maps, first + x);
+        FETCH_DARK(maps, first + x);
+        FETCH_OVERLAY(maps, first + x);
+    }
+}
+
 /* frame: [window_height][window_width] digital numbers. saturated: pixels per tile. flags: as the
  * frame, BST_FLAG_...; with the option FLAGS. */
 __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
@@ -99,6 +134,9 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     int16 full_count = (int16)0;
     for (int y = 0; y < t.rows; y++) {
         uint counter = ((uint)(t.y + y) * chunks_per_row + (uint)t.x / 64u) * 16u;
+        if (y + AHEAD < t.rows) {
+            fetch_maps(maps, t.y + y + AHEAD, t.x, t.columns);
+        }
         size_t first = (size_t)(p.first_row + t.top + y) * p.window_width;
         global ushort *row = frame + first;
         global uchar *marks = FLAGS_AT(flags, first);
