@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "scenegen/kernels/scene_shared.h"
 #include "scenegen/pattern.h"
 
 struct bst_detector {
@@ -230,7 +231,9 @@ static bst_status deposit(bst_ctx *ctx, bst_detector *d, float sign) {
     if (d->summary.pixels == 0) {
         return BST_OK;
     }
-    size_t global = (size_t)d->summary.pixels;
+    /* a size of work-groups of its own for each count would have the kernel built for each */
+    size_t local = BST_HIT_GROUP, global = ((size_t)d->summary.pixels + local - 1) / local * local;
+    cl_int count = d->summary.pixels;
     cl_kernel k = d->deposit_kernel;
     BST_TRY(bst_device_check(ctx, clSetKernelArg(k, 0, sizeof(cl_mem), &d->deposits),
                              "setting a kernel argument"));
@@ -238,8 +241,10 @@ static bst_status deposit(bst_ctx *ctx, bst_detector *d, float sign) {
                              "setting a kernel argument"));
     BST_TRY(bst_device_check(ctx, clSetKernelArg(k, 2, sizeof(cl_mem), &d->overlay),
                              "setting a kernel argument"));
+    BST_TRY(bst_device_check(ctx, clSetKernelArg(k, 3, sizeof count, &count),
+                             "setting a kernel argument"));
     return bst_device_check(
-        ctx, clEnqueueNDRangeKernel(d->queue, k, 1, NULL, &global, NULL, 0, NULL, NULL),
+        ctx, clEnqueueNDRangeKernel(d->queue, k, 1, NULL, &global, &local, 0, NULL, NULL),
         "placing radiation hits");
 }
 

@@ -107,13 +107,17 @@ bst_status bst_readout_image(bst_ctx *ctx, bst_readout *r, bst_window light, cl_
 static bst_status start(bst_ctx *ctx, bst_readout *r, int kernel, const bst_scene_params *p,
                         const cl_mem *buffers, cl_uint count, size_t items) {
     cl_kernel k = r->kernels[kernel];
+    size_t local = 64; /* left open, a driver may build the kernel anew for each number of items */
+    while (items % local > 0) {
+        local /= 2;
+    }
     BST_TRY(bst_device_check(ctx, clSetKernelArg(k, 0, sizeof *p, p), "setting a kernel argument"));
     for (cl_uint i = 0; i < count; i++) {
         BST_TRY(bst_device_check(ctx, clSetKernelArg(k, i + 1, sizeof(cl_mem), &buffers[i]),
                                  "setting a kernel argument"));
     }
     return bst_device_check(
-        ctx, clEnqueueNDRangeKernel(r->queue, k, 1, NULL, &items, NULL, 0, NULL, NULL),
+        ctx, clEnqueueNDRangeKernel(r->queue, k, 1, NULL, &items, &local, 0, NULL, NULL),
         "reading a frame out");
 }
 

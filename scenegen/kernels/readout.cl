@@ -181,8 +181,10 @@ typedef struct deposit_pixel {
     float electrons;
 } deposit_pixel;
 
-kernel void bst_detector_deposit(global const deposit_pixel *deposits, float sign,
-                                 global float *overlay) {
-    deposit_pixel d = deposits[get_global_id(0)];
-    overlay[d.index] = sign * d.electrons;
+__attribute__((reqd_work_group_size(BST_HIT_GROUP, 1, 1))) kernel void bst_detector_deposit(
+    global const deposit_pixel *deposits, float sign, global float *overlay, int count) {
+    int i = (int)get_global_id(0);
+    if (i < count) {
+        overlay[deposits[i].index] = sign * deposits[i].electrons;
+    }
 }

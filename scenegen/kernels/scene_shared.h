@@ -4,6 +4,8 @@
 
 /* Nodes travel in blocks of this many, one vector register. */
 #define BST_BLOCK 16
+/* Pixels with radiation hits that a work-group places. */
+#define BST_HIT_GROUP 64
 /* The Fourier path's table holds nodes widened by (n / BST_WIDTHS)^2 BST_WIDEST of the PSF's
  * variance, n from 0 to BST_WIDTHS. Between widths it is interpolated linearly in the variance,
  * between which a Gaussian's peak goes as the square root of its inverse: on each axis that misses

@@ -90,6 +90,8 @@ static bst_status measure(bst_ctx *ctx, const bst_bench_options *options, const 
                           bst_bench_result *out) {
     const double frames = LONG_S - SHORT_S;
     double ms[2][ROUNDS], cpu_ms[2][ROUNDS], ends_ms = INFINITY;
+    run_time first; /* may have to build the kernels */
+    BST_TRY(one_run(ctx, options, run, false, SHORT_S, &first));
     for (int n = 0; n < ROUNDS; n++) {
         for (int serial = 0; serial < 2; serial++) {
             run_time brief, full;
