@@ -1,4 +1,5 @@
-/* What host and kernels agree on: sizes and the parameters of one frame. C17 and OpenCL C. */
+/* What host and kernels agree on: sizes, the parameters of one frame, its sources. C17 and OpenCL C.
+ */
 #ifndef BST_SCENEGEN_SCENE_SHARED_H
 #define BST_SCENEGEN_SCENE_SHARED_H
 
