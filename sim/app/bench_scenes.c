@@ -6,20 +6,40 @@
 
 #include "sim/device/device.h"
 
-#define WORST(name, tolerance, q) \
-    { name, 2048, {0}, 3220, 0, 6, 2.0, 300, 4, 0.0349, 0.15, false, 40, tolerance, 60, q }
+#define WORST(name, tolerance, q, plain) \
+    { name, 2048, {0}, 3220, 0, 6, 2.0, 300, 4, 0.0349, 0.15, false, 40, tolerance, 60, q, plain }
+#define ACQUISITION(name, plain) \
+    { name, 2048, {0}, 500, 3, 6, 0.5, 3, 0, 0, 0.1, false, 10, 0.02, 100, 0, plain }
 
 static const bst_bench_scene scenes[] = {
-    WORST("worst_case", 0.05, 0),
-    WORST("worst_case_diffraction_q1", 0.1, 1),
-    WORST("worst_case_diffraction_q2", 0.07, 2),
-    {"acquisition", 2048, {0}, 500, 3, 6, 0.5, 3, 0, 0, 0.1, false, 10, 0.02, 100, 0},
-    {"rate_track_slow", 2048, {0}, 500, 1, 6, 0.5, 10, 0, 0, 0.1, true, 10, 0.02, 100, 0},
-    {"rate_track_medium", 2048, {0}, 500, 1, 6, 1.0, 60, 0, 0, 0.1, true, 20, 0.02, 100, 0},
-    {"rate_track_fast", 2048, {0}, 500, 1, 6, 2.0, 200, 0, 0, 0.1, true, 40, 0.02, 60, 0},
-    {"galactic_core", 2048, {0}, 100000, 0, 8, 0.5, 5, 0, 0, 0, false, 10, 0.05, 200, 0},
-    {"window", 2048, {896, 896, 256, 256}, 500, 1, 6, 0.5, 10, 0, 0, 0.1, true, 10, 0.02, 100, 0},
-    {"small", 256, {0}, 30, 1, 4, 0.1, 20, 1, 0.01, 0.1, true, 10, 0.05, 10, 0},
+    WORST("worst_case", 0.05, 0, false),
+    WORST("worst_case_plain", 0.05, 0, true),
+    WORST("worst_case_diffraction_q1", 0.1, 1, false),
+    WORST("worst_case_diffraction_q2", 0.07, 2, false),
+    ACQUISITION("acquisition", false),
+    ACQUISITION("acquisition_plain", true),
+    {"rate_track_slow", 2048, {0}, 500, 1, 6, 0.5, 10, 0, 0, 0.1, true, 10, 0.02, 100, 0, false},
+    {"rate_track_medium", 2048, {0}, 500, 1, 6, 1.0, 60, 0, 0, 0.1, true, 20, 0.02, 100, 0, false},
+    {"rate_track_fast", 2048, {0}, 500, 1, 6, 2.0, 200, 0, 0, 0.1, true, 40, 0.02, 60, 0, false},
+    {"galactic_core", 2048, {0}, 100000, 0, 8, 0.5, 5, 0, 0, 0, false, 10, 0.05, 200, 0, false},
+    {"window",
+     2048,
+     {896, 896, 256, 256},
+     500,
+     1,
+     6,
+     0.5,
+     10,
+     0,
+     0,
+     0.1,
+     true,
+     10,
+     0.02,
+     100,
+     0,
+     false},
+    {"small", 256, {0}, 30, 1, 4, 0.1, 20, 1, 0.01, 0.1, true, 10, 0.05, 10, 0, false},
 };
 enum { SCENES = sizeof scenes / sizeof *scenes };
 
@@ -55,8 +75,8 @@ static bst_camera bench_camera(int side) {
                         .bits = 16};
 }
 
-/* Every effect that a detector of this kind has beside the others; what only other kinds have is off:
- * blooming, frame transfer, a rolling shutter, codes. */
+/* Every effect that a detector of this kind has beside the others; what only other kinds have is
+ * off: blooming, frame transfer, a rolling shutter, codes. */
 static void set_detector(bst_camera *camera) {
     camera->detector = (bst_detector_config){.temperature_c = -10.0,
                                              .reference_temperature_c = 20.0,
@@ -182,7 +202,9 @@ bst_status bst_bench_view_open(bst_ctx *ctx, const bst_bench_scene *s, bst_bench
     int samples = (int)(s->exposure_s * SAMPLES_PER_S) + 1;
     samples = samples < 2 ? 2 : samples;
     *v = (bst_bench_view){.scene = *s, .camera = bench_camera(s->side)};
-    set_detector(&v->camera);
+    if (!s->plain) {
+        set_detector(&v->camera);
+    }
     if (s->q > 0.0) {
         set_diffraction(&v->camera, s->q);
     }

@@ -22,6 +22,7 @@ typedef struct bst_bench_scene {
     int error_sources; /* sources whose error is measured, the brightest and an even choice of the
                           others; the reference takes its time */
     double q;          /* wavelength x focal ratio / pixel of a diffraction PSF; 0: the Gaussian */
+    bool plain;        /* shot and read noise, full well and converter; else all effects */
 } bst_bench_scene;
 
 /* NULL: there is none of that name. */
