@@ -4,9 +4,9 @@
 #include <stdint.h>
 #include <stdlib.h>
 
-/* Parts of the others' errors that meet where the worst source's error is greatest: of an error that
- * is told by its greatest value, and of a border's length that passes within its own thickness of a
- * place. */
+/* Parts of the others' errors that meet where the worst source's error is greatest: of an error
+ * that is told by its greatest value, and of a border's length that passes within its own thickness
+ * of a place. */
 #define REST 0.4f
 #define BORDERS 0.1f
 

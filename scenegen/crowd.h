@@ -31,7 +31,7 @@ bst_crowd_motion bst_crowd_motion_of(const bst_path_point *path, int count, bool
 typedef struct bst_crowd_source {
     float x_px, y_px; /* anywhere on its way, the same instant for all */
     float peak_e;     /* largest light in one pixel */
-    float nodes_e;    /* error by nodes, table and rounding where it is greatest, e- */
+    float nodes_e;    /* error by nodes, profiles and rounding where it is greatest, e- */
     float shared_e;   /* by a track that is not its own */
     float excess_e;   /* light from beyond the stamp, on it */
     float border_e;   /* missing next to the stamp */

@@ -1,10 +1,11 @@
 /* The renderer: from a line-of-sight track and sources to a frame of digital numbers, on OpenCL.
  *
- * Every source has its own track through the exposure. Its light is a sum of weighted nodes, each
- * the product of two pixel-integrated Gaussian profiles; nodes are as many as the source's
- * brightness needs. Then shot noise, full well, read noise, gain, offset and quantisation. Noise is
- * keyed by (key, exposure, pixel of the full sensor): the same bytes come from any number of
- * threads, work-group size and window. */
+ * Every source has its own track through the exposure. Its light is a sum of weighted nodes, as
+ * many as the source's brightness needs. A node is the product of two pixel-integrated Gaussian
+ * profiles (kernels/splat.cl) or, for any other PSF, a point on a grid that is convolved with it
+ * (fft_light.h). Then background, shot noise, full well, read noise, gain, offset and quantisation
+ * (detector.h). Noise is keyed by (key, exposure, pixel of the full sensor). The same bytes come
+ * from any number of threads and work-group size and, with a Gaussian PSF, window. */
 #ifndef BST_SCENEGEN_RENDERER_H
 #define BST_SCENEGEN_RENDERER_H
 
@@ -74,7 +75,8 @@ typedef struct bst_render_stats {
     double hits_e;       /* their charge */
 } bst_render_stats;
 
-/* Renders; does not wait. *out gets a frame with one reference. */
+/* Renders; *out gets a frame with one reference. Does not wait for it, but for the frame
+ * BST_STAGE_SETS before it and, where the PSF is no Gaussian, for the light. */
 bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *renderer,
                                const bst_render_request *request, bst_frame **out) BST_MUST_CHECK;
 

@@ -20,7 +20,7 @@ typedef enum bst_star_motion {
 
 typedef struct bst_smear_options {
     double tolerance_sigma; /* error of a source's image in any pixel, in that pixel's sigma */
-    int taps;               /* length of the longest profile, px */
+    int taps;               /* length of the longest stamp, px */
     /* of stamps: what the profile law misses of nodes as wide as the PSF, over the peak, and the
      * widening up to which it serves, PSF variances (scenegen/profile_law.h); 0: there is none */
     double law_error, law_widest;

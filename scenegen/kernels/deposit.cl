@@ -1,6 +1,6 @@
 /* Light of all nodes on a grid for the Fourier path: each node is spread over eight by eight samples.
  * Options: DEPOSIT_W, DEPOSIT_H (samples of a tile, a multiple of 16 high), DEPOSIT_GROUP (work-items
- * per work-group), those of the nodes kernel, FIELD (weights by place), NEAR_CACHE (memory has one
+ * per work-group), those of nodes.cl, FIELD (weights by place), NEAR_CACHE (memory has one
  * address space; what lies in it can be fetched ahead, and written past the caches).
  *
  * One work-item owns a tile and adds its nodes in the order of sources, blocks and nodes: the sum is

@@ -14,7 +14,7 @@
 typedef struct bst_deposit_params {
     float x0, y0;               /* px of the full sensor at the grid's first sample */
     float density_x, density_y; /* samples per px */
-    int samples_x, samples_y; /* multiples of 16 */
+    int samples_x, samples_y;   /* multiples of 16 */
     int tiles_x, tiles_y;
     int source_groups;
     /* weights of one field node, a lattice over the sensor: [field_y][field_x] from px 0 */

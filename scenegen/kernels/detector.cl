@@ -51,9 +51,8 @@ typedef struct noise_law {
 #endif
 } noise_law;
 
-/* Quantile of Poisson(mean) + normal(0, read noise), as a
- * polynomial of the normal quantile z: the Cornish-Fisher expansion (Abramowitz and Stegun 26.2.49)
- * to order CF_ORDER of 1 / sigma. All cumulants beyond the variance are the mean, so with
+/* Quantile of Poisson(mean) + normal(0, read noise), as a polynomial of the normal quantile z: the
+ * Cornish-Fisher expansion (Abramowitz and Stegun 26.2.49) to order CF_ORDER of 1 / sigma. All cumulants beyond the variance are the mean, so with
  * a = 1 / sigma, b = mean / sigma^2 the standardised ones are b a, b a^2, b a^3, b a^4. */
 INLINE noise_law noise_law_of(bst_scene_params p, float16 mean) {
     noise_law law;

@@ -1,5 +1,8 @@
-/* From sources and node tables to the frame's nodes: place and electrons of every node, and the
- * boxes of pixels that blocks, sources and groups of sources touch. One work-item per source. */
+/* A source's nodes, from its place and the node table: nodes_of, which makes a block of them where
+ * they are drawn (splat.cl, deposit.cl), and a kernel that finds the boxes of pixels that blocks,
+ * sources and groups of sources touch, one work-item per source. Options: PLACE_BITS
+ * (scenegen/place.h), SPATIAL_OVERSAMPLE (parts of a pixel per axis), DISTORTED (with K1, K2, K3,
+ * P1, P2 and FOLD2), FFT_LIGHT (nodes are spread on a grid, else they get stamps). */
 
 /* By comparisons: fmax() has more to do where one side is no number. */
 static float max_of(float16 v) {

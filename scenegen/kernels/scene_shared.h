@@ -1,4 +1,4 @@
-/* What host and kernels agree on: sizes and the parameters of one frame. C17 and OpenCL C. */
+/* What host and kernels agree on: sizes, parameters of a frame, its sources. C17 and OpenCL C. */
 #ifndef BST_SCENEGEN_SCENE_SHARED_H
 #define BST_SCENEGEN_SCENE_SHARED_H
 
@@ -55,8 +55,8 @@ typedef struct bst_scene_params {
 typedef struct bst_scene_source {
     float x_px, y_px;     /* at the reference attitude, from the boresight, without distortion */
     int place_x, place_y; /* the same on the sensor, px times 2^PLACE_BITS */
-    float electrons;  /* in the exposure */
-    int first_table;  /* block of the node table */
+    float electrons;      /* in the exposure */
+    int first_table;      /* block of the node table */
     int blocks;
     int first_box; /* of the blocks' boxes, by groups of BST_BLOCK */
     int radius;    /* the stamp reaches this far beyond the two nearest pixels of a node */

@@ -1,6 +1,7 @@
-/* One tile of the frame per work-item. Options: GROUP (work-items per work-group), NEAR_CACHE (memory has
- * one address space, and what lies in it can be fetched ahead), FFT_LIGHT (the
- * light is an image, else it comes from nodes; `light` is the image or the profiles' law). */
+/* One tile of the frame per work-item: light, vignetting, background and, for a frame, the
+ * detector. Options: GROUP (work-items per work-group), NEAR_CACHE (memory has one address space,
+ * and what lies in it can be fetched ahead), FFT_LIGHT (the light is an image, else it comes from
+ * nodes; `light` is the image or the profiles' law), FLAGS (those of saturated pixels are kept). */
 
 /* Where a tile lies: its first pixel on the full sensor and in the window, and its size. Tiles
  * start at columns that are multiples of 64, so the first and the last may reach beyond the window.
