@@ -47,9 +47,9 @@ typedef struct bst_scenario {
 
 extern const bst_config_desc bst_scenario_table[];
 
-/* Reads and checks a scenario (bst_json_load_extended); nothing is opened or written but the JSON. Paths of files that exist
- * are made absolute; a file that a module's table names (BST_CONFIG_PATH, outside of lists) has to.
- * Free with bst_scenario_free, also after an error. */
+/* Reads and checks a scenario (bst_json_load_extended); nothing is opened or written but the JSON.
+ * Paths of files that exist are made absolute; a file that a module's table names (BST_CONFIG_PATH,
+ * outside of lists) has to. Free with bst_scenario_free, also after an error. */
 bst_status bst_scenario_read(bst_ctx *ctx, const bst_json *json, const bst_registry *registry,
                              bst_scenario *out) BST_MUST_CHECK;
 void bst_scenario_free(bst_scenario *scenario);

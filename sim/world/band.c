@@ -284,10 +284,9 @@ static bst_status take_table(bst_ctx *ctx, const bst_config_list *list, const ch
     for (int i = 0; i < *count && status == BST_OK; i++) {
         (*points)[i] = *file ? (bst_response_point){curve.x[i], curve.y[i]} : given[i];
         if (i > 0 && !((*points)[i].wavelength_um > (*points)[i - 1].wavelength_um)) {
-            status =
-                bst_fail(ctx, BST_ERR_CONFIG,
-                         "%s/%d/wavelength_um: wavelengths have to ascend (found %g after %g)",
-                         key, i, (*points)[i].wavelength_um, (*points)[i - 1].wavelength_um);
+            status = bst_fail(ctx, BST_ERR_CONFIG,
+                              "%s/%d/wavelength_um: wavelengths have to ascend (found %g after %g)",
+                              key, i, (*points)[i].wavelength_um, (*points)[i - 1].wavelength_um);
         }
     }
     if (status == BST_OK && *count == 1) {

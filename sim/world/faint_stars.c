@@ -24,7 +24,7 @@ struct bst_faint_stars {
     const bst_faint_sky *sky;
     slot *slots;
     int slot_count, slot_capacity;
-    int empty_slots; /* slots without a cell */
+    int empty_slots;       /* slots without a cell */
     int32_t *slot_of_cell; /* -1: not in the cache */
     int64_t query;
     int64_t stars_held, stars_limit;

@@ -113,9 +113,10 @@ static const bst_config_desc exposure_table[] = {
     BST_REAL(bst_exposure_config, first_s, "s", 0, 1e9, "0", "Start of the first exposure."),
     BST_REAL(bst_exposure_config, dropped_fraction, "", 0, 1, "0",
              "Fraction of the frames that are lost between sensor and processing, at random."),
-    BST_INT(bst_exposure_config, binning, "px", 1, 8, "1",
-            "Sensor pixels per side of a frame's pixel, added before they are read; control may ask "
-            "for another."),
+    BST_INT(
+        bst_exposure_config, binning, "px", 1, 8, "1",
+        "Sensor pixels per side of a frame's pixel, added before they are read; control may ask "
+        "for another."),
     BST_CONFIG_END,
 };
 

@@ -2,7 +2,6 @@
 #include "tests/astro/astropy_reference.h"
 #include "tests/test_support.h"
 
-
 static bst_time utc(const char *text) {
     bst_ctx ctx = {0};
     bst_time t = {0};

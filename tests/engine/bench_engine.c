@@ -87,7 +87,8 @@ static double measure(bool loop) {
     }
     bst_assert_ok(&ctx, bst_engine_load(&ctx, engine));
     int64_t last = 0;
-    bst_engine_set_hooks(engine, &(bst_engine_hooks){.user = &last, .message = no_hook, .interrupted = go_on});
+    bst_engine_set_hooks(
+        engine, &(bst_engine_hooks){.user = &last, .message = no_hook, .interrupted = go_on});
     double best = 1e9;
     for (int round = 1; round <= 10; round++) {
         struct timespec a, b;

@@ -11,11 +11,11 @@
 static const bst_module_desc *const modules[] = {&bst_gimbal_ideal_module};
 static const bst_registry registry = {modules, 1};
 
-#define SCENARIO(gimbal_)                                                                       \
-    "{\"boresight\": 1, \"epoch_utc\": \"2022-06-16T22:10:00Z\", \"duration_s\": 2, "           \
-    "\"world\": {\"star_catalogue\": \"embedded\"}, \"observers\": [{\"name\": \"sat\", "       \
-    "\"orbit\": {\"elements_file\": \"catalogue_2022-06.tle\", \"norad\": 39089}, \"sensors\": [{"   \
-    "\"camera\": {\"pixel_scale_arcsec\": 3, \"aperture_m\": 0.15}, \"modules\": {\"gimbal\": " \
+#define SCENARIO(gimbal_)                                                                          \
+    "{\"boresight\": 1, \"epoch_utc\": \"2022-06-16T22:10:00Z\", \"duration_s\": 2, "              \
+    "\"world\": {\"star_catalogue\": \"embedded\"}, \"observers\": [{\"name\": \"sat\", "          \
+    "\"orbit\": {\"elements_file\": \"catalogue_2022-06.tle\", \"norad\": 39089}, \"sensors\": [{" \
+    "\"camera\": {\"pixel_scale_arcsec\": 3, \"aperture_m\": 0.15}, \"modules\": {\"gimbal\": "    \
     "{\"type\": \"ideal\", \"rate_hz\": 100, " gimbal_ "}}}]}]}"
 
 typedef struct fixture {

@@ -316,9 +316,9 @@ static void parts_of_a_pixel_converge(void **state) {
     close_scene(&s);
 }
 
-/* A stamp that is too small leaves the wings out, and says so; a profile of straight lines is off by
- * what linear interpolation through Chebyshev's two points misses, 1 / (16 sigma^2) of the peak per
- * axis. */
+/* A stamp that is too small leaves the wings out, and says so; a profile of straight lines is off
+ * by what linear interpolation through Chebyshev's two points misses, 1 / (16 sigma^2) of the peak
+ * per axis. */
 static void stamps_and_profiles_as_asked(void **state) {
     fixture *f = *state;
     const scene_motion still = {.duration_s = 1, .samples = 2};
