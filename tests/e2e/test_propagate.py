@@ -110,7 +110,7 @@ class Numbers(unittest.TestCase):
                 teme[3:] * u.km / u.s)), obstime=t).transform_to(GCRS(obstime=t))
             expected = gcrs.cartesian.xyz.to_value(u.km)
             velocity = gcrs.velocity.d_xyz.to_value(u.km / u.s)
-            # the issue asks for 1 m; the tables of Earth orientation on both sides differ by less
+            # 1 m: the tables of Earth orientation on both sides differ by less
             self.assertLess(np.linalg.norm(state(row)[:3] - expected), 1e-3, row)
             # turning of TEME against GCRF: 8e-12 rad/s, 0.4 mm/s at 45,000 km; with the
             # numerical differences that astropy takes, 1 mm/s

@@ -127,7 +127,7 @@ static double lambert_middle(double phi) {
 }
 
 /* All light is there and its middle is where it belongs, for discs from a tenth of a pixel to half
- * the frame, at all phases and places between pixels. 1e-4 is what the issue asks of the flux. */
+ * the frame, at all phases and places between pixels. the flux is right to 1e-4. */
 static void light_and_its_middle(void **state) {
     fixture *f = *state;
     bst_camera camera = scene_camera(SIDE, SIDE);
