@@ -534,7 +534,9 @@ long long bst_renderer_saturated_frames(const bst_renderer *r) {
 }
 
 void bst_renderer_get_stats(const bst_renderer *r, bst_render_stats *out) {
-    bool foreseen = r->options.temporal_oversample <= 0 && r->options.spatial_oversample <= 0;
+    const bst_renderer_options *o = &r->options;
+    bool foreseen = o->temporal_oversample <= 0 && o->spatial_oversample <= 0 &&
+                    !(r->fft_light && o->fft_taps == 4);
     *out = r->stats;
     if (!r->rolled) {
         out->predicted_sigma = bst_crowd_error_sigma(r->crowd);

@@ -40,8 +40,8 @@ static const bst_config_desc fidelity_table[] = {
         "within it; 0: as exact as floats are."),
     BST_INT(
         fidelity_config, fft_taps, "", 0, 8, "0",
-        "Taps per axis with which light is spread on the grid of a PSF that is no Gaussian: 4, 6 "
-        "or 8; 0: 8."),
+        "Taps per axis with which light is spread on the grid of a PSF that is no Gaussian: 4 (the "
+        "error is not predicted then), 6 or 8; 0: 8."),
     BST_CONFIG_END,
 };
 
