@@ -60,20 +60,22 @@ int bst_detector_options(const bst_detector *detector, char *text, size_t bytes)
                  n[2]);
     }
     if (d->read_tail_fraction > 0.0 && d->read_tail_rms_e > 0.0) {
-        snprintf(tail, sizeof tail, " -DTAIL -DTAIL_FRACTION=%.9e -DTAIL_RMS=%.9ef",
-                 d->read_tail_fraction, d->read_tail_rms_e);
+        double coarse = ceil(256.0 * d->read_tail_fraction);
+        snprintf(tail, sizeof tail, " -DTAIL -DTAIL_COARSE=%.0fu -DTAIL_FINE=%.9e -DTAIL_RMS=%.9ef",
+                 coarse, 256.0 * d->read_tail_fraction / coarse, d->read_tail_rms_e);
     }
     if (d->frame_transfer_s > 0.0) {
         snprintf(transfer, sizeof transfer, " -DTRANSFER_ROW_S=%.9ef",
                  d->frame_transfer_s / (double)c->height_px);
     }
-    return snprintf(text, bytes,
-                    " -DCF_ORDER=%d -DSINGLE_FROM=%s -DMAP_STRIDE=%d%s%s%s%s%s%s%s%s%s%s", order,
-                    from, detector->stride, detector->gain ? " -DGAIN_MAP" : "",
-                    detector->dark ? " -DDARK_MAP" : "", detector->overlay ? " -DOVERLAY" : "",
-                    detector->offsets ? " -DOFFSETS" : "", detector->codes ? " -DCODES" : "", bend,
-                    tail, transfer, d->full_well == BST_WELL_BLOOM ? " -DBLOOM" : "",
-                    detector->flags ? " -DFLAGS" : "");
+    return snprintf(
+        text, bytes,
+        " -DCF_ORDER=%d -DSINGLE_FROM=%s -DMAP_STRIDE=%d -DMAP_CELLS=%lld%s%s%s%s%s%s%s%s%s%s",
+        order, from, detector->stride, (long long)detector->stride * c->height_px,
+        detector->gain ? " -DGAIN_MAP" : "", detector->dark ? " -DDARK_MAP" : "",
+        detector->overlay ? " -DOVERLAY" : "", detector->offsets ? " -DOFFSETS" : "",
+        detector->codes ? " -DCODES" : "", bend, tail, transfer,
+        d->full_well == BST_WELL_BLOOM ? " -DBLOOM" : "", detector->flags ? " -DFLAGS" : "");
 }
 
 static bst_status make_buffer(bst_ctx *ctx, bst_detector *d, size_t bytes, void *data,
@@ -90,6 +92,7 @@ static bst_status make_map(bst_ctx *ctx, bst_detector *d,
                                               float *),
                            cl_mem *out) {
     size_t count = (size_t)d->stride * (size_t)d->camera.height_px;
+    count += make ? 0 : count / 64; /* the overlay's marks */
     float *map = calloc(count, sizeof *map);
     if (!map) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a map of the detector");

@@ -65,14 +65,14 @@ typedef struct bst_render_request {
 
 /* What the latest rendering took and did. */
 typedef struct bst_render_stats {
-    int sources;     /* drawn */
-    long long nodes; /* all sources, filled blocks included */
-    double
-        predicted_sigma; /* largest error of the image that is expected in any pixel, in its sigma
-                            (crowd.h); NAN with temporal_oversample or spatial_oversample */
-    bool single_kernel;  /* the stars followed one track */
-    int hits;            /* radiation hits on the sensor */
-    double hits_e;       /* their charge */
+    int sources;            /* drawn */
+    long long nodes;        /* all sources, filled blocks included */
+    double predicted_sigma; /* largest error of the image that is expected in any pixel, in its
+                               sigma (crowd.h); NAN with temporal_oversample, spatial_oversample or
+                               four fft_taps */
+    bool single_kernel;     /* the stars followed one track */
+    int hits;               /* radiation hits on the sensor */
+    double hits_e;          /* their charge */
 } bst_render_stats;
 
 /* Renders; *out gets a frame with one reference. Does not wait for it, but for the frame

@@ -2,14 +2,15 @@
  * law), SINGLE_FROM (means from here on take one deviate for shot and read noise together), SEARCH
  * (some means do not); GAIN_MAP, DARK_MAP (response and dark current of each pixel), OVERLAY
  * (charge that is there besides the light's), NONLINEAR (with C1, C2, C3), TAIL (with
- * TAIL_FRACTION, TAIL_RMS), OFFSETS (of columns and rows), CODES (a table from digital numbers to
+ * TAIL_COARSE, TAIL_FINE, TAIL_RMS), OFFSETS (of columns and rows), CODES (a table from digital numbers to
  * the frame's).
  *
  * Pixels are drawn in chunks of 64 columns of the full sensor, each from one Philox call per lane:
  * word v of lane l belongs to column 16 v + l. */
 
-/* gain, dark (e/s), overlay (e): [sensor rows][MAP_STRIDE], a multiple of 64. offsets (DN): columns
- * [MAP_STRIDE], then rows. */
+/* gain, dark (e/s), overlay (e): [sensor rows][MAP_STRIDE], a multiple of 64. The overlay's
+ * MAP_CELLS pixels are followed by a mark for each chunk of 64, not 0 where one of them is struck.
+ * offsets (DN): columns [MAP_STRIDE], then rows. */
 typedef struct detector_maps {
     global const float *gain, *dark, *overlay, *offsets;
     global const ushort *codes;
@@ -230,11 +231,21 @@ INLINE chunk add_dark(bst_scene_params p, detector_maps maps, size_t map, chunk 
 }
 
 #ifdef TAIL
-/* Adds the excess noise of the reads in the tail. */
-INLINE chunk add_tail(bst_scene_params p, uint counter, chunk e) {
-    const uint below = (uint)(TAIL_FRACTION * 4294967295.0);
+/* Adds the excess noise of the reads in the tail. Of 256 reads TAIL_COARSE are chosen by the low bits
+ * of the words that made the read noise, which the deviates, as floats, are too coarse to feel; of
+ * those the share TAIL_FINE by words of their own. */
+INLINE chunk add_tail(bst_scene_params p, uint counter, chunk_words noise, chunk e) {
+    const uint below = (uint)(TAIL_FINE * 4294967295.0);
+    int16 a = (noise.a & 255u) < TAIL_COARSE, b = (noise.b & 255u) < TAIL_COARSE;
+    int16 c = (noise.c & 255u) < TAIL_COARSE, d = (noise.d & 255u) < TAIL_COARSE;
+    if (!any16((a | b) | (c | d))) {
+        return e;
+    }
     chunk_words w = chunk_random(p, counter, STREAM_TAIL);
-    int16 a = w.a <= below, b = w.b <= below, c = w.c <= below, d = w.d <= below;
+    a &= w.a <= below;
+    b &= w.b <= below;
+    c &= w.c <= below;
+    d &= w.d <= below;
     if (any16((a | b) | (c | d))) {
         chunk z = chunk_normal(chunk_random(p, counter, STREAM_TAIL_NORMAL));
         e.a += select((float16)0.0f, z.a * TAIL_RMS, a);
@@ -247,11 +258,11 @@ INLINE chunk add_tail(bst_scene_params p, uint counter, chunk e) {
 #endif
 
 /* Electrons to digital numbers plus one half, not yet cut to the converter's range. row, column: of
- * the first pixel on the sensor. */
+ * the first pixel on the sensor; noise: the words that made the read noise. */
 INLINE chunk convert_chunk(bst_scene_params p, detector_maps maps, uint counter, int row,
-                           int column, chunk e) {
+                           int column, chunk_words noise, chunk e) {
 #ifdef TAIL
-    e = add_tail(p, counter, e);
+    e = add_tail(p, counter, noise, e);
 #endif
     float16 g = (float16)p.dn_per_e;
     chunk dn;
@@ -349,11 +360,18 @@ INLINE float16 draw_pixels(bst_scene_params p, float16 single, float16 charge, f
 INLINE chunk detect_chunk(bst_scene_params p, detector_maps maps, dark_law dark, const uint *steps,
                           uint counter, int row, int column, chunk light, int lit,
                           chunk_flags *brim) {
-    chunk e, z = chunk_normal(chunk_random(p, counter, STREAM_NOISE));
+    chunk_words noise = chunk_random(p, counter, STREAM_NOISE);
+    chunk e, z = chunk_normal(noise);
     brim->a = brim->b = brim->c = brim->d = (int16)0;
 #ifdef OVERLAY
-    chunk over = load_chunk(maps.overlay + (size_t)row * MAP_STRIDE + column);
-    lit |= any16((over.a != 0.0f) | (over.b != 0.0f) | (over.c != 0.0f) | (over.d != 0.0f));
+    size_t place = (size_t)row * MAP_STRIDE + column;
+    chunk over;
+    over.a = over.b = over.c = over.d = (float16)0.0f;
+    int struck = maps.overlay[MAP_CELLS + place / 64] != 0.0f;
+    if (struck) {
+        over = load_chunk(maps.overlay + place);
+        lit = 1;
+    }
 #endif
 #ifdef SHARED_MEAN
     if (!lit && dark.single) {
@@ -361,7 +379,7 @@ INLINE chunk detect_chunk(bst_scene_params p, detector_maps maps, dark_law dark,
         e.b = respond(p, draw_single(dark.law, z.b));
         e.c = respond(p, draw_single(dark.law, z.c));
         e.d = respond(p, draw_single(dark.law, z.d));
-        return convert_chunk(p, maps, counter, row, column, e);
+        return convert_chunk(p, maps, counter, row, column, noise, e);
     }
 #ifdef SEARCH
     if (!lit && dark.steps > 0) {
@@ -370,7 +388,7 @@ INLINE chunk detect_chunk(bst_scene_params p, detector_maps maps, dark_law dark,
         e.b = read_out(p, q.b, z.b);
         e.c = read_out(p, q.c, z.c);
         e.d = read_out(p, q.d, z.d);
-        return convert_chunk(p, maps, counter, row, column, e);
+        return convert_chunk(p, maps, counter, row, column, noise, e);
     }
 #endif
 #endif
@@ -382,14 +400,16 @@ INLINE chunk detect_chunk(bst_scene_params p, detector_maps maps, dark_law dark,
     e.d = draw_single(noise_law_of(p, m.d), z.d);
     chunk_flags two = {needs_two(p, m.a), needs_two(p, m.b), needs_two(p, m.c), needs_two(p, m.d)};
 #ifdef OVERLAY
-    e.a += over.a;
-    e.b += over.b;
-    e.c += over.c;
-    e.d += over.d;
-    two.a |= m.a + over.a > p.near_full_e;
-    two.b |= m.b + over.b > p.near_full_e;
-    two.c |= m.c + over.c > p.near_full_e;
-    two.d |= m.d + over.d > p.near_full_e;
+    if (struck) {
+        e.a += over.a;
+        e.b += over.b;
+        e.c += over.c;
+        e.d += over.d;
+        two.a |= m.a + over.a > p.near_full_e;
+        two.b |= m.b + over.b > p.near_full_e;
+        two.c |= m.c + over.c > p.near_full_e;
+        two.d |= m.d + over.d > p.near_full_e;
+    }
 #endif
     e.a = respond(p, e.a);
     e.b = respond(p, e.b);
@@ -413,5 +433,5 @@ INLINE chunk detect_chunk(bst_scene_params p, detector_maps maps, dark_law dark,
         e.c = draw_pixels(p, e.c, q.c, z.c, two.c, &brim->c);
         e.d = draw_pixels(p, e.d, q.d, z.d, two.d, &brim->d);
     }
-    return convert_chunk(p, maps, counter, row, column, e);
+    return convert_chunk(p, maps, counter, row, column, noise, e);
 }

@@ -157,12 +157,13 @@ kernel void bst_detector_read(bst_scene_params p, global const float *image, glo
         chunk q = {vload16(0, sums), vload16(1, sums), vload16(2, sums), vload16(3, sums)};
         chunk_flags brim = {vload16(0, brims), vload16(1, brims), vload16(2, brims),
                             vload16(3, brims)};
-        chunk e, z = chunk_normal(chunk_random(p, counter, STREAM_NOISE));
+        chunk_words noise = chunk_random(p, counter, STREAM_NOISE);
+        chunk e, z = chunk_normal(noise);
         e.a = read_out(p, q.a, z.a);
         e.b = read_out(p, q.b, z.b);
         e.c = read_out(p, q.c, z.c);
         e.d = read_out(p, q.d, z.d);
-        chunk dn = convert_chunk(p, maps, counter, row, first + x, e);
+        chunk dn = convert_chunk(p, maps, counter, row, first + x, noise, e);
         int to = x - skip;
         full_count -= store_dn(p, maps, dn.a, brim.a, to, out, marks);
         full_count -= store_dn(p, maps, dn.b, brim.b, to + 16, out, marks);
@@ -186,5 +187,6 @@ __attribute__((reqd_work_group_size(BST_HIT_GROUP, 1, 1))) kernel void bst_detec
     int i = (int)get_global_id(0);
     if (i < count) {
         overlay[deposits[i].index] = sign * deposits[i].electrons;
+        overlay[MAP_CELLS + deposits[i].index / 64] = sign;
     }
 }

@@ -89,11 +89,6 @@ INLINE int16 store_dn(bst_scene_params p, detector_maps maps, float16 dn, int16 
 #else
 #define FETCH_DARK(maps, at)
 #endif
-#ifdef OVERLAY
-#define FETCH_OVERLAY(maps, at) FETCH_LINE((maps).overlay, at)
-#else
-#define FETCH_OVERLAY(maps, at)
-#endif
 
 /* Asks for a row of the maps, which are too far apart from row to row for the hardware to foresee. */
 INLINE void fetch_maps(detector_maps maps, int row, int column, int columns) {
@@ -101,7 +96,6 @@ INLINE void fetch_maps(detector_maps maps, int row, int column, int columns) {
     for (int x = 0; x < columns; x += 16) {
         FETCH_GAIN(maps, first + x);
         FETCH_DARK(maps, first + x);
-        FETCH_OVERLAY(maps, first + x);
     }
 }
 
