@@ -1,26 +1,11 @@
 /* A background that differs from pixel to pixel, on its way through the kernels. */
 #include "scenegen/renderer.h"
 #include "sim/world/skylight.h"
+#include "tests/scenegen/device_fixture.h"
 #include "tests/scenegen/scene_support.h"
 #include "tests/test_support.h"
 
 enum { W = 300, H = 200 };
-
-typedef struct fixture {
-    bst_ctx ctx;
-    bst_device *device;
-} fixture;
-
-static int open_device(void **state) {
-    static fixture f;
-    *state = &f;
-    return bst_device_open(&f.ctx, "", 0, &f.device) == BST_OK ? 0 : -1;
-}
-
-static int close_device(void **state) {
-    bst_device_close(((fixture *)*state)->device);
-    return 0;
-}
 
 static const scene_motion demo = {
     .x_px = 7.5, .y_px = 2.5, .jitter_px = 0.2, .duration_s = 0.5, .samples = 101, .seed = 3};

@@ -1,26 +1,11 @@
 /* Flags of saturated pixels: those that are, and no others, on every path of the detector. */
 #include "scenegen/kernels/scene_shared.h"
 #include "scenegen/renderer.h"
+#include "tests/scenegen/device_fixture.h"
 #include "tests/scenegen/scene_support.h"
 #include "tests/test_support.h"
 
 enum { W = 150, H = 90 };
-
-typedef struct fixture {
-    bst_ctx ctx;
-    bst_device *device;
-} fixture;
-
-static int open_device(void **state) {
-    static fixture f;
-    *state = &f;
-    return bst_device_open(&f.ctx, "", 0, &f.device) == BST_OK ? 0 : -1;
-}
-
-static int close_device(void **state) {
-    bst_device_close(((fixture *)*state)->device);
-    return 0;
-}
 
 static const scene_motion still = {
     .x_px = 3, .y_px = 1, .duration_s = 0.5, .samples = 11, .seed = 3};

@@ -8,24 +8,9 @@
 
 #include "scenegen/reference.h"
 #include "scenegen/renderer.h"
+#include "tests/scenegen/device_fixture.h"
 #include "tests/scenegen/scene_support.h"
 #include "tests/test_support.h"
-
-typedef struct fixture {
-    bst_ctx ctx;
-    bst_device *device;
-} fixture;
-
-static int open_device(void **state) {
-    static fixture f;
-    *state = &f;
-    return bst_device_open(&f.ctx, "", 0, &f.device) == BST_OK ? 0 : -1;
-}
-
-static int close_device(void **state) {
-    bst_device_close(((fixture *)*state)->device);
-    return 0;
-}
 
 typedef struct hard_case {
     bst_camera camera;

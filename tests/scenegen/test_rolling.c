@@ -2,26 +2,11 @@
 #include "scenegen/reference.h"
 #include "scenegen/renderer.h"
 #include "sim/world/skylight.h"
+#include "tests/scenegen/device_fixture.h"
 #include "tests/scenegen/scene_support.h"
 #include "tests/test_support.h"
 
 enum { W = 96, H = 80, STARS = 7, TARGETS = 2, SOURCES = STARS + TARGETS };
-
-typedef struct fixture {
-    bst_ctx ctx;
-    bst_device *device;
-} fixture;
-
-static int open_device(void **state) {
-    static fixture f;
-    *state = &f;
-    return bst_device_open(&f.ctx, "", 0, &f.device) == BST_OK ? 0 : -1;
-}
-
-static int close_device(void **state) {
-    bst_device_close(((fixture *)*state)->device);
-    return 0;
-}
 
 /* A scene whose track spans the exposure of all rows. */
 typedef struct scene {
