@@ -24,7 +24,7 @@ bst_status bst_tiles_choose(bst_ctx *ctx, const bst_device *device, bst_renderer
         options->tile_height = large ? 64 : 2;
         options->group = large ? 1 : 16;
     }
-    size_t need = (size_t)(options->tile_width + 16) * (size_t)(options->tile_height + 3) *
+    size_t need = (size_t)(options->tile_width + 16) * (size_t)(options->tile_height + 1) *
                   sizeof(float) * (size_t)options->group;
     if (options->tile_width < 64 || options->tile_width % 64 != 0 || options->tile_height < 1 ||
         options->group < 1 || need > local_bytes) {

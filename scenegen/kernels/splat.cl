@@ -18,7 +18,7 @@
 #define TEAM 4
 #define SPREAD 12
 /* Rows that are added at once, and those below a tile that are written to no purpose. */
-#define RUN 4
+#define RUN 2
 #define SPARE (RUN - 1)
 
 /* For vectors at any place: vstore16 becomes four stores on some devices. */
