@@ -136,10 +136,3 @@ bst_status bst_trajectory_state(bst_ctx *ctx, const bst_trajectory *t, double se
     (void)mtx_unlock(&c->mutex);
     return status;
 }
-
-bst_trajectory_cost bst_trajectory_spent(const bst_trajectory *t) {
-    (void)mtx_lock(&t->core->mutex);
-    bst_trajectory_cost cost = t->core->context.cost;
-    (void)mtx_unlock(&t->core->mutex);
-    return cost;
-}

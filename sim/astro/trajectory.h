@@ -52,10 +52,4 @@ void bst_trajectory_free(bst_trajectory *trajectory); /* NULL allowed */
 bst_status bst_trajectory_state(bst_ctx *ctx, const bst_trajectory *trajectory, double seconds,
                                 bst_vec3 *position_m, bst_vec3 *velocity_mps) BST_MUST_CHECK;
 
-/* What the integration has cost so far, for benchmarks. */
-typedef struct bst_trajectory_cost {
-    long long steps, rejected, evaluations;
-} bst_trajectory_cost;
-bst_trajectory_cost bst_trajectory_spent(const bst_trajectory *trajectory);
-
 #endif

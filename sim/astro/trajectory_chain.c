@@ -120,7 +120,6 @@ typedef struct step_forces {
 
 static bst_status force(void *user, double offset_s, bst_vec3 r, bst_vec3 v, bst_vec3 *a) {
     step_forces *f = user;
-    f->context->cost.evaluations++;
     BST_TRY(
         bst_forces_at(f->ctx, f->context->forces, f->time_s + (f->time_low_s + offset_s), r, v, a));
     const bst_vec3 *t = &f->thrust_rtn;
@@ -242,7 +241,6 @@ static bst_status work_step(bst_ctx *ctx, bst_chain *chain, bst_chain_context *c
                             : pow(context->tolerance / fmax(error, 1e-300), 1.0 / 7.0);
         change = fmin(change, LARGEST_CHANGE);
         if (!(change > 1.0 / LARGEST_CHANGE)) {
-            context->cost.rejected++;
             h *= 1.0 / LARGEST_CHANGE;
             h_natural = 0.0;
             edge_found = false;
@@ -255,7 +253,6 @@ static bst_status work_step(bst_ctx *ctx, bst_chain *chain, bst_chain_context *c
         }
         double s = edge_found ? 1.0 : shadow_edge(&f, step);
         if (s < 1.0) {
-            context->cost.rejected++;
             h_natural = fmax(change, 1.0) * h;
             h *= s;
             edge_found = true;
@@ -303,7 +300,6 @@ static void extend(bst_ctx *ctx, bst_chain *chain, bst_chain_context *context) {
     bst_radau_advance(&p->motion, &motion);
     p->h_s = next_h_s;
     p->step++;
-    context->cost.steps++;
     if (floor_s <= 1.0) {
         char text[160];
         double end = kept->time_s + (kept->time_low_s + floor_s * motion.h_s);

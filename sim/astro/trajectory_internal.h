@@ -61,7 +61,6 @@ typedef struct bst_chain_context {
     const bst_radau *radau;
     const bst_edges *edges;
     double tolerance;
-    bst_trajectory_cost cost;
 } bst_chain_context;
 
 void bst_chain_start(bst_chain *chain, const bst_chain_context *context, double direction,

@@ -368,10 +368,6 @@ double bst_band_radiance(const bst_band *band, double temperature_k) {
     return sum;
 }
 
-double bst_band_wavelength_m(const bst_band *band) {
-    return band->mean_m;
-}
-
 bool bst_band_is_thermal(const bst_band *band) {
     return band->mean_m > 3e-6;
 }

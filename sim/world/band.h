@@ -37,9 +37,6 @@ double bst_band_sun(const bst_band *band);
 /* A black body's radiance, 1/s/m2/sr; 0 for a temperature that is not above 0. */
 double bst_band_radiance(const bst_band *band, double temperature_k);
 
-/* Mean wavelength of the response, m. */
-double bst_band_wavelength_m(const bst_band *band);
-
 /* Response at a wavelength. */
 double bst_band_response(const bst_band *band, double wavelength_m);
 
