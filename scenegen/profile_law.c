@@ -3,10 +3,9 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "scenegen/kernels/scene_shared.h"
 #include "scenegen/reference.h"
 #include "sim/core/vec.h"
-
-enum { FIRST = 6, SECOND = 4 };
 
 /* Share of pixel d and its derivatives by the widening: the heat equation makes them derivatives by
  * place, which are those of the Gaussian at the pixel's edges. order 0 to 2, over order!. */
@@ -58,7 +57,7 @@ static double value_of(const double *power, int count, double g) {
 
 /* What the law misses of pixels near the centre when the PSF is wider, over the centre's share. */
 static double law_error(double sigma_px, int degree, double widening) {
-    const int counts[3] = {degree + 1, FIRST, SECOND};
+    const int counts[3] = {degree + 1, BST_LAW_FIRST, BST_LAW_SECOND};
     double worst = 0.0;
     for (int d = 1; d <= 4; d++) {
         double power[3][BST_LAW_MOST_DEGREE + 1];
@@ -99,11 +98,11 @@ double bst_profile_law_widest(double sigma_px, int degree) {
 }
 
 int bst_profile_law_floats(int degree, int reach) {
-    return reach * (degree + 1 + FIRST + SECOND);
+    return reach * (degree + 1 + BST_LAW_FIRST + BST_LAW_SECOND);
 }
 
 void bst_profile_law(double sigma_px, int degree, int reach, float *law) {
-    const int counts[3] = {degree + 1, FIRST, SECOND};
+    const int counts[3] = {degree + 1, BST_LAW_FIRST, BST_LAW_SECOND};
     for (int d = 1; d <= reach; d++) {
         for (int order = 0; order < 3; order++) {
             double power[BST_LAW_MOST_DEGREE + 1];

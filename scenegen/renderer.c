@@ -68,15 +68,15 @@ static int taps_for(double sigma_px) {
     return taps > MAX_TAPS ? MAX_TAPS : taps;
 }
 
-static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
+static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device, double law_widest) {
     const bst_kernel_source *sources[] = {&bst_kernel_scene_shared, &bst_kernel_nodes,
                                           &bst_kernel_random,       &bst_kernel_splat,
                                           &bst_kernel_detector,     &bst_kernel_light,
                                           &bst_kernel_vignetting,   &bst_kernel_background,
                                           &bst_kernel_tile,         &bst_kernel_readout};
     char options[2048];
-    bst_scene_build_options(&r->camera, &r->options, r->taps, r->law_degree, r->fft_light != NULL,
-                            r->detector, options, sizeof options);
+    bst_scene_build_options(&r->camera, &r->options, r->taps, r->law_degree, law_widest,
+                            r->fft_light != NULL, r->detector, options, sizeof options);
     BST_TRY(bst_device_build(ctx, device, sources, sizeof sources / sizeof *sources, options,
                              &r->program));
     static const char *const names[3] = {"bst_scene_nodes", "bst_scene_frame",
@@ -165,7 +165,7 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
         smear.law_widest = bst_profile_law_widest(sigma_px, r->law_degree);
     }
     if (status == BST_OK) {
-        status = build(ctx, r, device);
+        status = build(ctx, r, device, smear.law_widest);
     }
     if (status == BST_OK) {
         status = bst_smear_create(ctx, camera, &smear, &r->smear);

@@ -4,13 +4,12 @@
 #include <stdio.h>
 
 #include "scenegen/place.h"
-#include "scenegen/profile_law.h"
 #include "scenegen/vignetting.h"
 #include "sim/world/skylight.h"
 
 void bst_scene_build_options(const bst_camera *camera, const bst_renderer_options *settings,
-                             int taps, int law_degree, bool fft_light, const bst_detector *detector,
-                             char *text, size_t bytes) {
+                             int taps, int law_degree, double law_widest, bool fft_light,
+                             const bst_detector *detector, char *text, size_t bytes) {
     double sigma_px = bst_camera_psf_sigma_px(camera);
     int length = snprintf(text, bytes,
                           "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d "
@@ -20,9 +19,8 @@ void bst_scene_build_options(const bst_camera *camera, const bst_renderer_option
                           settings->group == 1 ? " -DNEAR_CACHE" : "",
                           bst_skylight_varies(camera) ? " -DBACKGROUND" : "");
     if (law_degree > 0) {
-        length +=
-            snprintf(text + length, bytes - (size_t)length, " -DDEGREE=%d -DBARELY_WIDER=%.9ef",
-                     law_degree, bst_profile_law_widest(sigma_px, law_degree));
+        length += snprintf(text + length, bytes - (size_t)length,
+                           " -DDEGREE=%d -DBARELY_WIDER=%.9ef", law_degree, law_widest);
     }
     length += bst_vignetting_options(camera, text + length, bytes - (size_t)length);
     length += bst_detector_options(detector, text + length, bytes - (size_t)length);

@@ -2,6 +2,8 @@
 
 #include <stdbool.h>
 
+#include "scenegen/kernels/scene_shared.h"
+
 bst_status bst_tiles_choose(bst_ctx *ctx, const bst_device *device, bst_renderer_options *options,
                             uint64_t *most_bytes) {
     cl_device_type type = 0;
@@ -24,8 +26,9 @@ bst_status bst_tiles_choose(bst_ctx *ctx, const bst_device *device, bst_renderer
         options->tile_height = large ? 64 : 2;
         options->group = large ? 1 : 16;
     }
-    size_t need = (size_t)(options->tile_width + 16) * (size_t)(options->tile_height + 1) *
-                  sizeof(float) * (size_t)options->group;
+    size_t need = (size_t)(options->tile_width + 16) *
+                  (size_t)(options->tile_height + BST_SPARE_ROWS) * sizeof(float) *
+                  (size_t)options->group;
     if (options->tile_width < 64 || options->tile_width % 64 != 0 || options->tile_height < 1 ||
         options->group < 1 || need > local_bytes) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,

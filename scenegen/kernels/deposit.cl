@@ -23,13 +23,6 @@
 #define STREAM(value, p) (*(p) = (value))
 #endif
 
-static int any_of(int16 v) {
-    int8 a = v.lo | v.hi;
-    int4 b = a.lo | a.hi;
-    int2 c = b.lo | b.hi;
-    return (c.lo | c.hi) < 0;
-}
-
 #ifdef FIELD
 /* Bilinear weight of the field node at a place. */
 static float field_weight(bst_deposit_params p, global const float *field, float x, float y) {
@@ -135,7 +128,7 @@ static int place_nodes(bst_deposit_params p, int tile_x, int tile_y, node_block 
                 /* what lies outside the grid would come in on its other side */
                 (floor_u >= before) & (floor_v >= before) & (floor_u < (float)p.samples_x - after) &
                 (floor_v < (float)p.samples_y - after);
-    if (!any_of(hit)) {
+    if (!any16(hit)) {
         return 0;
     }
     float16 phase_u = (u - floor_u) * BST_SPREAD_PHASES, phase_v = (v - floor_v) * BST_SPREAD_PHASES;
@@ -160,7 +153,7 @@ static int place_nodes(bst_deposit_params p, int tile_x, int tile_y, node_block 
     vstore16(phase_u - step_u, 0, out->share_x);
     vstore16(phase_v - step_v, 0, out->share_y);
     vstore16(width - level, 0, out->share_width);
-    out->wide = any_of(width > 0.0f);
+    out->wide = any16(width > 0.0f);
     vstore16(select((float16)0.0f, electrons, hit), 0, out->electrons);
     return 1;
 }
@@ -228,7 +221,7 @@ __attribute__((reqd_work_group_size(DEPOSIT_GROUP, 1, 1))) kernel void bst_light
     }
     for (int g = 0; g < p.source_groups; g++) {
         int16 hit = boxes_hit(source_box + g * 4 * BST_BLOCK, place);
-        if (!any_of(hit)) {
+        if (!any16(hit)) {
             continue;
         }
         int hits[BST_BLOCK], blocks[BST_BLOCK];

@@ -4,6 +4,14 @@
  * (scenegen/place.h), SPATIAL_OVERSAMPLE (parts of a pixel per axis), DISTORTED (with K1, K2, K3,
  * P1, P2 and FOLD2), FFT_LIGHT (nodes are spread on a grid, else they get stamps). */
 
+/* any(), by halves: some compilers test lane after lane. */
+static int any16(int16 v) {
+    int8 a = v.lo | v.hi;
+    int4 b = a.lo | a.hi;
+    int2 c = b.lo | b.hi;
+    return (c.lo | c.hi) < 0;
+}
+
 /* By comparisons: fmax() has more to do where one side is no number. */
 static float max_of(float16 v) {
     float8 a = v.lo > v.hi ? v.lo : v.hi;

@@ -4,6 +4,13 @@
 
 /* Nodes travel in blocks of this many, one vector register. */
 #define BST_BLOCK 16
+/* Rows of a stamp that are added at once, and those below a tile that are then written to no
+ * purpose. */
+#define BST_STAMP_RUN 2
+#define BST_SPARE_ROWS (BST_STAMP_RUN - 1)
+/* Coefficients of the profile law's first two derivatives by the widening (profile_law.h). */
+#define BST_LAW_FIRST 6
+#define BST_LAW_SECOND 4
 /* Pixels with radiation hits that a work-group places. */
 #define BST_HIT_GROUP 64
 /* The Fourier path's table holds nodes widened by (n / BST_WIDTHS)^2 BST_WIDEST of the PSF's

@@ -17,21 +17,10 @@
 /* Nodes that share a pass over their rows, and the rows between their first ones at most. */
 #define TEAM 4
 #define SPREAD 12
-/* Rows that are added at once, and those below a tile that are written to no purpose. */
-#define RUN 2
-#define SPARE (RUN - 1)
 
 /* For vectors at any place: vstore16 becomes four stores on some devices. */
 typedef float16 loose16 __attribute__((aligned(4)));
 typedef float8 loose8 __attribute__((aligned(4)));
-
-/* any(), by halves: some compilers test lane after lane. */
-static int any16(int16 v) {
-    int8 a = v.lo | v.hi;
-    int4 b = a.lo | a.hi;
-    int2 c = b.lo | b.hi;
-    return (c.lo | c.hi) < 0;
-}
 
 /* A block of nodes against one tile: the taps of node n along x, which carry its electrons, and
  * along y follow PAD zeros in its row; the first belongs to column left[n] and row top[n]. In every
@@ -75,7 +64,7 @@ INLINE float16 zip_high(float16 a, float16 b) {
 }
 
 #ifdef DEGREE
-#define LAW_FLOATS (DEGREE + 1 + 6 + 4)
+#define LAW_FLOATS (DEGREE + 1 + BST_LAW_FIRST + BST_LAW_SECOND)
 
 /* Sum of the even (first 0) or odd (first 1) powers in c[count], without the odd ones' last factor.
  */
@@ -96,9 +85,15 @@ INLINE void taps_by_law(float16 within, float16 more, int wide, float16 height, 
     for (int d = 1; d <= radius + 1; d++, law += LAW_FLOATS) {
         float16 even = powers(law, DEGREE + 1, 0, g2), odd = powers(law, DEGREE + 1, 1, g2);
         if (wide) {
-            global const float *first = law + DEGREE + 1, *second = first + 6;
-            even = fma(more, fma(more, powers(second, 4, 0, g2), powers(first, 6, 0, g2)), even);
-            odd = fma(more, fma(more, powers(second, 4, 1, g2), powers(first, 6, 1, g2)), odd);
+            global const float *first = law + DEGREE + 1, *second = first + BST_LAW_FIRST;
+            even = fma(more,
+                       fma(more, powers(second, BST_LAW_SECOND, 0, g2),
+                           powers(first, BST_LAW_FIRST, 0, g2)),
+                       even);
+            odd = fma(more,
+                      fma(more, powers(second, BST_LAW_SECOND, 1, g2),
+                          powers(first, BST_LAW_FIRST, 1, g2)),
+                      odd);
         }
         odd *= g;
         taps[radius + d] = (even + odd) * height;
@@ -233,8 +228,8 @@ static void splat_team(local float *sum, const splat_nodes *b, int n, int taps) 
         float16 l2 = line_of(b, n + 2, column, taps), r2 = line_of(b, n + 2, column + 16, taps);
         float16 l3 = line_of(b, n + 3, column, taps), r3 = line_of(b, n + 3, column + 16, taps);
         local float16 *target = (local float16 *)(sum + first * STRIDE + column);
-        for (int j = first; j < last; j += RUN) {
-            for (int k = j; k < j + RUN; k++) {
+        for (int j = first; j < last; j += BST_STAMP_RUN) {
+            for (int k = j; k < j + BST_STAMP_RUN; k++) {
                 float16 f0 = (float16)h0[k], f1 = (float16)h1[k];
                 float16 f2 = (float16)h2[k], f3 = (float16)h3[k];
                 target[0] = fma(f3, l3, fma(f2, l2, fma(f1, l1, fma(f0, l0, target[0]))));
@@ -247,8 +242,8 @@ static void splat_team(local float *sum, const splat_nodes *b, int n, int taps) 
         float16 l0 = line_of(b, n, column, taps), l1 = line_of(b, n + 1, column, taps);
         float16 l2 = line_of(b, n + 2, column, taps), l3 = line_of(b, n + 3, column, taps);
         local float16 *target = (local float16 *)(sum + first * STRIDE + column);
-        for (int j = first; j < last; j += RUN) {
-            for (int k = j; k < j + RUN; k++) {
+        for (int j = first; j < last; j += BST_STAMP_RUN) {
+            for (int k = j; k < j + BST_STAMP_RUN; k++) {
                 float16 v = fma((float16)h1[k], l1, fma((float16)h0[k], l0, *target));
                 *target = fma((float16)h3[k], l3, fma((float16)h2[k], l2, v));
                 target += STRIDE / 16;
@@ -278,9 +273,9 @@ INLINE int16 boxes_hit(global const float *box, int tile_x, int tile_y) {
            (vload16(3, box) >= (float)tile_y);
 }
 
-static void splat_source(local float *sum, int tile_x, int tile_y,
-                         bst_scene_source s, global const float16 *table,
-                         global const float *block_box, global const float *law, splat_nodes *b) {
+static void splat_source(local float *sum, int tile_x, int tile_y, bst_scene_source s,
+                         global const float16 *table, global const float *block_box,
+                         global const float *law, splat_nodes *b) {
     int hits[BST_BLOCK] = {1}, taps = 2 * s.radius + 2;
     for (int first = 0; first < s.blocks; first += BST_BLOCK) {
         if (s.blocks > 1) { /* else the source's box is the block's */
@@ -305,8 +300,8 @@ static void splat_source(local float *sum, int tile_x, int tile_y,
     }
 }
 
-/* sum: [TILE_H + SPARE][STRIDE], the tile's light in electrons. tile_x, tile_y: its first pixel on
- * the full sensor. */
+/* sum: [TILE_H + BST_SPARE_ROWS][STRIDE], the tile's light in electrons. tile_x, tile_y: its first
+ * pixel on the full sensor. */
 static void splat_tile(bst_scene_params p, local float *sum, int tile_x, int tile_y,
                        global const bst_scene_source *sources, global const float16 *table,
                        global const float *block_box, global const float *source_box,
@@ -336,8 +331,8 @@ static void splat_tile(bst_scene_params p, local float *sum, int tile_x, int til
             vstore16(boxes_hit(source_box + g * 4 * BST_BLOCK, tile_x, tile_y), 0, hits);
             for (int i = 0; i < BST_BLOCK; i++) {
                 if (hits[i]) {
-                    splat_source(sum, tile_x, tile_y, sources[g * BST_BLOCK + i], table,
-                                 block_box, law, &b);
+                    splat_source(sum, tile_x, tile_y, sources[g * BST_BLOCK + i], table, block_box,
+                                 law, &b);
                 }
             }
         }

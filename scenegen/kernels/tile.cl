@@ -90,7 +90,8 @@ INLINE int16 store_dn(bst_scene_params p, detector_maps maps, float16 dn, int16 
 #define FETCH_DARK(maps, at)
 #endif
 
-/* Asks for a row of the maps, which are too far apart from row to row for the hardware to foresee. */
+/* Asks for a row of the maps, which are too far apart from row to row for the hardware to foresee.
+ */
 INLINE void fetch_maps(detector_maps maps, int row, int column, int columns) {
     size_t first = (size_t)row * MAP_STRIDE + column;
     for (int x = 0; x < columns; x += 16) {
@@ -108,7 +109,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     global const float *gain, global const float *dark, global const float *overlay,
     global const float *offsets, global const ushort *codes,
     global uchar *flags BACKGROUND_ARGUMENT) {
-    local float sums[GROUP][(TILE_H + SPARE) * STRIDE] __attribute__((aligned(64)));
+    local float sums[GROUP][(TILE_H + BST_SPARE_ROWS) * STRIDE] __attribute__((aligned(64)));
     int tile = (int)get_global_id(0);
     if (tile >= p.tiles_x * p.tiles_y) {
         return;
@@ -162,7 +163,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_expecte
     bst_scene_params p, global const bst_scene_source *sources, global const float16 *table,
     global const float *block_box, global const float *source_box, global const float *group_box,
     global const float *light, global float *image BACKGROUND_ARGUMENT) {
-    local float sums[GROUP][(TILE_H + SPARE) * STRIDE] __attribute__((aligned(64)));
+    local float sums[GROUP][(TILE_H + BST_SPARE_ROWS) * STRIDE] __attribute__((aligned(64)));
     int tile = (int)get_global_id(0);
     if (tile >= p.tiles_x * p.tiles_y) {
         return;
