@@ -60,9 +60,8 @@ int bst_detector_options(const bst_detector *detector, char *text, size_t bytes)
                  n[2]);
     }
     if (d->read_tail_fraction > 0.0 && d->read_tail_rms_e > 0.0) {
-        double coarse = ceil(256.0 * d->read_tail_fraction);
-        snprintf(tail, sizeof tail, " -DTAIL -DTAIL_COARSE=%.0fu -DTAIL_FINE=%.9e -DTAIL_RMS=%.9ef",
-                 coarse, 256.0 * d->read_tail_fraction / coarse, d->read_tail_rms_e);
+        snprintf(tail, sizeof tail, " -DTAIL -DTAIL_GAP=%.9ef -DTAIL_RMS=%.9ef",
+                 -0.5 / log1p(-d->read_tail_fraction), d->read_tail_rms_e);
     }
     if (d->frame_transfer_s > 0.0) {
         snprintf(transfer, sizeof transfer, " -DTRANSFER_ROW_S=%.9ef",

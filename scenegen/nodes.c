@@ -69,11 +69,10 @@ static void main_axis(double a[3][3], double axis[3]) {
     double p[3][3];
     memcpy(p, a, sizeof p);
     for (int round = 0; round < 6; round++) {
-        double q[3][3], trace = p[0][0] + p[1][1] + p[2][2];
+        double q[3][3], trace = p[0][0] + p[1][1] + p[2][2], scale = 1.0 / (trace * trace);
         for (int i = 0; i < 3; i++) {
             for (int j = 0; j < 3; j++) {
-                q[i][j] =
-                    (p[i][0] * p[0][j] + p[i][1] * p[1][j] + p[i][2] * p[2][j]) / (trace * trace);
+                q[i][j] = (p[i][0] * p[0][j] + p[i][1] * p[1][j] + p[i][2] * p[2][j]) * scale;
             }
         }
         memcpy(p, q, sizeof p);
@@ -264,20 +263,21 @@ static double quadrature(int n, const double e[7], rule *r) {
 /* Largest share of the peak by which the image changes for a source at the boresight or in a corner
  * when the covariance d of tilts and roll is left out and `widening` put in its place: half the
  * covariance's contraction with the PSF's second derivatives, which are at most 1 / variance on the
- * diagonal and exp(-1) / variance off it. */
-static double covariance_error(double d[3][3], double widening, double variance) {
+ * diagonal and exp(-1) / variance off it. More than `limit` may be less than it is. */
+static double covariance_error(double d[3][3], double widening, double variance, double limit) {
     static const double place[5][2] = {{0, 0},
                                        {0.70710678118654752, 0.70710678118654752},
                                        {-0.70710678118654752, 0.70710678118654752},
                                        {-0.70710678118654752, -0.70710678118654752},
                                        {0.70710678118654752, -0.70710678118654752}};
     double worst = 0.0;
-    for (int k = 0; k < 5; k++) {
+    for (int k = 0; k < 5 && worst <= limit * variance; k++) {
         double x = place[k][0], y = place[k][1];
         double xx = d[1][1] - 2.0 * y * d[1][2] + y * y * d[2][2] - widening;
         double yy = d[0][0] - 2.0 * x * d[0][2] + x * x * d[2][2] - widening;
         double xy = -d[0][1] + x * d[1][2] + y * d[0][2] - x * y * d[2][2];
-        worst = fmax(worst, 0.5 * (fabs(xx) + fabs(yy)) + 0.37 * fabs(xy));
+        double error = 0.5 * (fabs(xx) + fabs(yy)) + 0.37 * fabs(xy);
+        worst = error > worst ? error : worst;
     }
     return worst / variance;
 }
@@ -295,9 +295,10 @@ static double second_norm(const moments *g, double u) {
 static bool widened_norm(const moments *g, double trace, double bend2, double per_trace,
                          double *norm) {
     double low = 0.5 * *norm, high = *norm;
-    for (int round = 0; round < 32 && high > 0.0; round++) {
+    for (int round = 0; round < 14 && high > 0.0; round++) {
         double middle = round == 0 ? low : 0.5 * (low + high);
-        double found = second_norm(g, fmax(trace - bend2 / middle, 0.0) * per_trace);
+        double rest = trace - bend2 / middle;
+        double found = second_norm(g, rest > 0.0 ? rest * per_trace : 0.0);
         if (found > middle) {
             low = middle;
         } else if (round == 0) {
@@ -310,8 +311,10 @@ static bool widened_norm(const moments *g, double trace, double bend2, double pe
     return low > 0.0;
 }
 
-/* Fills the rule and its error: what it misses of the image, over the peak. */
-static void try_rule(const maker *m, const moments *g, int n, bool widen, bool split, rule *r) {
+/* Fills the rule and its error: what it misses of the image, over the peak. Infinite where there is
+ * no such rule, or where its error is more than `limit`. */
+static void try_rule(const maker *m, const moments *g, int n, bool widen, bool split, double limit,
+                     rule *r) {
     double var = m->variance, d[3][3];
     memset(r, 0, sizeof *r);
     r->nodes = n;
@@ -368,17 +371,6 @@ static void try_rule(const maker *m, const moments *g, int n, bool widen, bool s
             }
         }
     }
-    double e[7], u = n == 1 ? 0.0 : r->widening;
-    memcpy(e, g->along, sizeof e);
-    e[2] -= u;
-    e[4] -= u * (6.0 * e[2] + 3.0 * u);
-    e[5] -= 10.0 * u * e[3];
-    e[6] -= u * (15.0 * e[4] + u * (45.0 * e[2] + 15.0 * u));
-    double missed = quadrature(n, e, r);
-    if (missed < 0.0) {
-        return;
-    }
-    static const double factor[4] = {0, 0, 8.0, 48.0}; /* 2^n n! */
     /* third moments that are missed: a sixth, or half for mixed ones, times the greatest third
      * derivative, 1.38 or 0.61 of the peak over sigma^3 */
     double third = 0.3 * fabs(g->drift) + 0.23 * norm3(g->lean);
@@ -395,8 +387,26 @@ static void try_rule(const maker *m, const moments *g, int n, bool widen, bool s
     /* Groups are shorter than the PSF is wide, so that what jitter leaves over in neighbours adds
      * up; on straight paths it nearly cancels (factors measured on random paths) */
     error *= 1.8;
-    error += n == 1 ? 0.0 : 1.08 * missed / (factor[n] * pow(var, n));
-    r->error = error + covariance_error(d, r->widening, var);
+    if (!(error <= limit)) {
+        return;
+    }
+    error += covariance_error(d, r->widening, var, limit - error);
+    if (!(error <= limit)) {
+        return;
+    }
+    double e[7], u = n == 1 ? 0.0 : r->widening;
+    memcpy(e, g->along, sizeof e);
+    e[2] -= u;
+    e[4] -= u * (6.0 * e[2] + 3.0 * u);
+    e[5] -= 10.0 * u * e[3];
+    e[6] -= u * (15.0 * e[4] + u * (45.0 * e[2] + 15.0 * u));
+    double missed = quadrature(n, e, r);
+    if (missed < 0.0) {
+        return;
+    }
+    static const double factor[4] = {0, 0, 8.0 / 1.08, 48.0 / 1.08}; /* 2^n n!, margin */
+    double power = n == 3 ? var * var * var : var * var;
+    r->error = n == 1 ? error : error + missed / (factor[n] * power);
 }
 
 static bst_status emit(bst_ctx *ctx, const maker *m, const moments *g, const rule *r,
@@ -435,6 +445,20 @@ static void adapt(maker *m, double error) {
     m->most = fmin(m->most * fmin(fmax(change, 0.4), 1.6), m->limit);
 }
 
+/* The rule with the fewest nodes that is good enough, else the best of those of three, and of those
+ * whose error is not beyond `limit`. */
+static void choose_rule(const maker *m, const moments *g, double limit, rule *best) {
+    rule r;
+    for (int n = 1; n <= 3 && best->error > m->tolerance; n++) {
+        for (int widen = 0; widen <= m->widen && best->error > m->tolerance; widen++) {
+            try_rule(m, g, n, widen, false, n == 3 ? INFINITY : limit, &r);
+            if (r.error < best->error) {
+                *best = r;
+            }
+        }
+    }
+}
+
 /* Replaces a group by nodes, in halves of its time where no rule is good enough. */
 static bst_status close_group(bst_ctx *ctx, maker *m, group g, int depth) {
     moments t;
@@ -446,17 +470,10 @@ static bst_status close_group(bst_ctx *ctx, maker *m, group g, int depth) {
         return push(ctx, m->list, t.mean, weight, 0.0);
     }
     high_moments(m, &g, &t);
-    for (int n = 1; n <= 3 && best.error > m->tolerance; n++) {
-        for (int widen = 0; widen <= m->widen && best.error > m->tolerance; widen++) {
-            try_rule(m, &t, n, widen, false, &r);
-            if (r.error < best.error) {
-                best = r;
-            }
-        }
-    }
+    choose_rule(m, &t, m->tolerance, &best);
     /* a blob rather than a line does not get thinner by halves */
     if (best.error > m->tolerance && !m->widen && t.across > 0.2 * t.along[2]) {
-        try_rule(m, &t, 2, false, true, &r);
+        try_rule(m, &t, 2, false, true, INFINITY, &r);
         if (r.error < best.error) {
             best = r;
         }
@@ -474,6 +491,9 @@ static bst_status close_group(bst_ctx *ctx, maker *m, group g, int depth) {
         g.to = middle;
         BST_TRY(close_group(ctx, m, g, depth + 1));
         return close_group(ctx, m, late, depth + 1);
+    }
+    if (best.error > m->tolerance) {
+        choose_rule(m, &t, INFINITY, &best);
     }
     return emit(ctx, m, &t, &best, weight);
 }

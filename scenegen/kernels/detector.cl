@@ -1,12 +1,8 @@
 /* The detector: from expected electrons to digital numbers. Options: CF_ORDER (terms of the noise
  * law), SINGLE_FROM (means from here on take one deviate for shot and read noise together), SEARCH
  * (some means do not); GAIN_MAP, DARK_MAP (response and dark current of each pixel), OVERLAY
- * (charge that is there besides the light's), NONLINEAR (with C1, C2, C3), TAIL (with
- * TAIL_COARSE, TAIL_FINE, TAIL_RMS), OFFSETS (of columns and rows), CODES (a table from digital numbers to
- * the frame's).
- *
- * Pixels are drawn in chunks of 64 columns of the full sensor, each from one Philox call per lane:
- * word v of lane l belongs to column 16 v + l. */
+ * (charge that is there besides the light's), NONLINEAR (with C1, C2, C3), OFFSETS (of columns and
+ * rows), CODES (a table from digital numbers to the frame's). */
 
 /* gain, dark (e/s), overlay (e): [sensor rows][MAP_STRIDE], a multiple of 64. The overlay's
  * MAP_CELLS pixels are followed by a mark for each chunk of 64, not 0 where one of them is struck.
@@ -19,90 +15,6 @@ typedef struct detector_maps {
 /* Means from here on take the expansion of the Poisson quantile, below it the exact search. At 30
  * the two laws differ by a total variation of 1.4e-5, which falls as the mean to the power -1.5. */
 #define POISSON_SWITCH 30.0f
-
-/* Philox streams (second counter word) of a pixel's noise. */
-#define STREAM_NOISE 0u
-#define STREAM_POISSON 1u
-#define STREAM_POISSON_NORMAL 2u
-#define STREAM_TAIL 3u
-#define STREAM_TAIL_NORMAL 4u
-
-/* Four vectors: one chunk of 64 pixels. Loops over them would not be unrolled by every compiler,
- * and would go through memory. */
-typedef struct chunk {
-    float16 a, b, c, d;
-} chunk;
-
-typedef struct chunk_words {
-    uint16 a, b, c, d;
-} chunk_words;
-
-typedef struct chunk_flags {
-    int16 a, b, c, d;
-} chunk_flags;
-
-/* Coefficients of electrons, shot and read noise, as a polynomial of a normal deviate. */
-typedef struct noise_law {
-    float16 c0, c1, c2, c3;
-#if CF_ORDER >= 3
-    float16 c4;
-#endif
-#if CF_ORDER >= 4
-    float16 c5;
-#endif
-} noise_law;
-
-/* Quantile of Poisson(mean) + normal(0, read noise), as a polynomial of the normal quantile z: the
- * Cornish-Fisher expansion (Abramowitz and Stegun 26.2.49) to order CF_ORDER of 1 / sigma. All cumulants beyond the variance are the mean, so with
- * a = 1 / sigma, b = mean / sigma^2 the standardised ones are b a, b a^2, b a^3, b a^4. */
-INLINE noise_law noise_law_of(bst_scene_params p, float16 mean) {
-    noise_law law;
-    float16 variance = fma((float16)p.read_noise_e, (float16)p.read_noise_e, mean);
-    float16 a = rsqrt16(variance), a2 = a * a, b = mean * a2, b2 = b * b;
-    float16 c0 = fma(b, (float16)(-1.0f / 6), mean);
-    float16 c1 = fma(a, fma(b2, (float16)(5.0f / 36), b * (-1.0f / 8)), variance * a);
-    float16 c2 = b * (1.0f / 6);
-    float16 c3 = a * fma(b2, (float16)(-1.0f / 18), b * (1.0f / 24));
-#if CF_ORDER >= 3
-    float16 b3 = b2 * b;
-    c0 = fma(a2, fma(b3, (float16)(17.0f / 324), fma(b2, (float16)(-1.0f / 12), b * (1.0f / 40))),
-             c0);
-    c2 = fma(a2, fma(b3, (float16)(-53.0f / 324), fma(b2, (float16)(5.0f / 24), b * (-1.0f / 20))),
-             c2);
-    law.c4 = a2 * fma(b3, (float16)(1.0f / 27), fma(b2, (float16)(-1.0f / 24), b * (1.0f / 120))) *
-             p.dn_per_e;
-#endif
-#if CF_ORDER >= 4
-    /* He5, He3, He1 of the fourth order, gathered by powers of z */
-    float16 a3 = a2 * a, b4 = b2 * b2;
-    float16 h5 = fma(b4, (float16)(-252.0f / 7776),
-                     fma(b3, (float16)(14.0f / 288),
-                         fma(b2, (float16)(-3.0f / 384 - 2.0f / 180), b * (1.0f / 720))));
-    float16 h3 = fma(b4, (float16)(-832.0f / 7776),
-                     fma(b3, (float16)(37.0f / 288), b2 * (-6.0f / 384 - 3.0f / 180)));
-    float16 h1 =
-        fma(b4, (float16)(-227.0f / 7776), fma(b3, (float16)(8.0f / 288), b2 * (-2.0f / 384)));
-    c1 = fma(a3, fma(h5, (float16)15.0f, fma(h3, (float16)-3.0f, h1)), c1);
-    c3 = fma(a3, fma(h5, (float16)-10.0f, h3), c3);
-    law.c5 = a3 * h5;
-#endif
-    law.c0 = c0;
-    law.c1 = c1;
-    law.c2 = c2;
-    law.c3 = c3;
-    return law;
-}
-
-/* Electrons with shot and read noise. */
-INLINE float16 draw_single(noise_law law, float16 z) {
-    float16 dn = law.c3;
-#if CF_ORDER >= 4
-    dn = fma(fma(law.c5, z, law.c4), z, dn);
-#elif CF_ORDER >= 3
-    dn = fma(law.c4, z, dn);
-#endif
-    return fma(fma(fma(dn, z, law.c2), z, law.c1), z, law.c0);
-}
 
 /* The chance of no event in units of 2^-32, where the search below begins.
  * The chances are made smaller by 5e-7 of themselves, so that they never add up to more than one.
@@ -149,7 +61,11 @@ INLINE float16 poisson_expand16(float16 mean, float16 w) {
 /* Lanes for which one deviate does not do: small means with little read noise, and those near the
  * full well, where the charge is cut before the read noise comes. */
 INLINE int16 needs_two(bst_scene_params p, float16 mean) {
+#ifdef SEARCH
     return (mean < SINGLE_FROM) | (mean > p.near_full_e);
+#else
+    return mean > p.near_full_e;
+#endif
 }
 
 /* What the amplifier makes of a charge. */
@@ -174,25 +90,6 @@ INLINE float16 draw_charge(float16 mean, uint16 word, float16 w, int16 wanted) {
         electrons = select(electrons, poisson_search16(mean, word, search), small);
     }
     return electrons;
-}
-
-INLINE chunk_words chunk_random(bst_scene_params p, uint counter, uint stream) {
-    chunk_words w;
-    philox16(p, counter, stream, &w.a, &w.b, &w.c, &w.d);
-    return w;
-}
-
-INLINE chunk chunk_normal(chunk_words w) {
-    chunk z;
-    normal16(w.a, w.b, &z.a, &z.b);
-    normal16(w.c, w.d, &z.c, &z.d);
-    return z;
-}
-
-INLINE chunk load_chunk(global const float *from) {
-    global const float16 *v = (global const float16 *)from;
-    chunk c = {v[0], v[1], v[2], v[3]};
-    return c;
 }
 
 /* Expected electrons of one chunk from its light; map: of its first pixel. */
@@ -230,40 +127,9 @@ INLINE chunk add_dark(bst_scene_params p, detector_maps maps, size_t map, chunk 
     return m;
 }
 
-#ifdef TAIL
-/* Adds the excess noise of the reads in the tail. Of 256 reads TAIL_COARSE are chosen by the low bits
- * of the words that made the read noise, which the deviates, as floats, are too coarse to feel; of
- * those the share TAIL_FINE by words of their own. */
-INLINE chunk add_tail(bst_scene_params p, uint counter, chunk_words noise, chunk e) {
-    const uint below = (uint)(TAIL_FINE * 4294967295.0);
-    int16 a = (noise.a & 255u) < TAIL_COARSE, b = (noise.b & 255u) < TAIL_COARSE;
-    int16 c = (noise.c & 255u) < TAIL_COARSE, d = (noise.d & 255u) < TAIL_COARSE;
-    if (!any16((a | b) | (c | d))) {
-        return e;
-    }
-    chunk_words w = chunk_random(p, counter, STREAM_TAIL);
-    a &= w.a <= below;
-    b &= w.b <= below;
-    c &= w.c <= below;
-    d &= w.d <= below;
-    if (any16((a | b) | (c | d))) {
-        chunk z = chunk_normal(chunk_random(p, counter, STREAM_TAIL_NORMAL));
-        e.a += select((float16)0.0f, z.a * TAIL_RMS, a);
-        e.b += select((float16)0.0f, z.b * TAIL_RMS, b);
-        e.c += select((float16)0.0f, z.c * TAIL_RMS, c);
-        e.d += select((float16)0.0f, z.d * TAIL_RMS, d);
-    }
-    return e;
-}
-#endif
-
 /* Electrons to digital numbers plus one half, not yet cut to the converter's range. row, column: of
- * the first pixel on the sensor; noise: the words that made the read noise. */
-INLINE chunk convert_chunk(bst_scene_params p, detector_maps maps, uint counter, int row,
-                           int column, chunk_words noise, chunk e) {
-#ifdef TAIL
-    e = add_tail(p, counter, noise, e);
-#endif
+ * the first pixel on the sensor. */
+INLINE chunk convert_chunk(bst_scene_params p, detector_maps maps, int row, int column, chunk e) {
     float16 g = (float16)p.dn_per_e;
     chunk dn;
 #ifdef OFFSETS
@@ -357,17 +223,17 @@ INLINE float16 draw_pixels(bst_scene_params p, float16 single, float16 charge, f
 /* Digital numbers plus one half, not yet cut to the converter's range, of one chunk. counter: of
  * its first lane. row, column: of its first pixel on the sensor. light: electrons of the sources,
  * some of them where `lit`. brim: lanes with a full well. */
-INLINE chunk detect_chunk(bst_scene_params p, detector_maps maps, dark_law dark, const uint *steps,
-                          uint counter, int row, int column, chunk light, int lit,
-                          chunk_flags *brim) {
-    chunk_words noise = chunk_random(p, counter, STREAM_NOISE);
-    chunk e, z = chunk_normal(noise);
+INLINE chunk detect_chunk(bst_scene_params p, detector_maps maps, dark_law dark, near_law near,
+                          const uint *steps, const tail_block *tail, uint counter, int row,
+                          int column, chunk light, int lit, chunk_flags *brim) {
+    chunk e, z = chunk_normal(chunk_random(p, counter, STREAM_NOISE));
     brim->a = brim->b = brim->c = brim->d = (int16)0;
+    int struck = 0;
 #ifdef OVERLAY
     size_t place = (size_t)row * MAP_STRIDE + column;
     chunk over;
     over.a = over.b = over.c = over.d = (float16)0.0f;
-    int struck = maps.overlay[MAP_CELLS + place / 64] != 0.0f;
+    struck = maps.overlay[MAP_CELLS + place / 64] != 0.0f;
     if (struck) {
         over = load_chunk(maps.overlay + place);
         lit = 1;
@@ -379,7 +245,7 @@ INLINE chunk detect_chunk(bst_scene_params p, detector_maps maps, dark_law dark,
         e.b = respond(p, draw_single(dark.law, z.b));
         e.c = respond(p, draw_single(dark.law, z.c));
         e.d = respond(p, draw_single(dark.law, z.d));
-        return convert_chunk(p, maps, counter, row, column, noise, e);
+        return convert_chunk(p, maps, row, column, ADD_TAIL(tail, row, e));
     }
 #ifdef SEARCH
     if (!lit && dark.steps > 0) {
@@ -388,16 +254,41 @@ INLINE chunk detect_chunk(bst_scene_params p, detector_maps maps, dark_law dark,
         e.b = read_out(p, q.b, z.b);
         e.c = read_out(p, q.c, z.c);
         e.d = read_out(p, q.d, z.d);
-        return convert_chunk(p, maps, counter, row, column, noise, e);
+        return convert_chunk(p, maps, row, column, ADD_TAIL(tail, row, e));
     }
 #endif
 #endif
     size_t map = (size_t)row * MAP_STRIDE + column;
     chunk m = add_dark(p, maps, map, expected_chunk(p, maps, map, light));
-    e.a = draw_single(noise_law_of(p, m.a), z.a);
-    e.b = draw_single(noise_law_of(p, m.b), z.b);
-    e.c = draw_single(noise_law_of(p, m.c), z.c);
-    e.d = draw_single(noise_law_of(p, m.d), z.d);
+    /* lane by lane, so that no pixel depends on its neighbours, which a window may not have */
+    chunk_flags far = {(int16)-1, (int16)-1, (int16)-1, (int16)-1};
+    if (near.serves) {
+        chunk x;
+        x.a = (m.a - near.mean) * near.per_reach;
+        x.b = (m.b - near.mean) * near.per_reach;
+        x.c = (m.c - near.mean) * near.per_reach;
+        x.d = (m.d - near.mean) * near.per_reach;
+        e.a = draw_single(law_near(near, x.a), z.a);
+        e.b = draw_single(law_near(near, x.b), z.b);
+        e.c = draw_single(law_near(near, x.c), z.c);
+        e.d = draw_single(law_near(near, x.d), z.d);
+        far.a = fabs(x.a) > 1.0f;
+        far.b = fabs(x.b) > 1.0f;
+        far.c = fabs(x.c) > 1.0f;
+        far.d = fabs(x.d) > 1.0f;
+    }
+    int all_near = !any16((far.a | far.b) | (far.c | far.d));
+    if (all_near && !struck) {
+        e.a = respond(p, e.a);
+        e.b = respond(p, e.b);
+        e.c = respond(p, e.c);
+        e.d = respond(p, e.d);
+        return convert_chunk(p, maps, row, column, ADD_TAIL(tail, row, e));
+    }
+    e.a = any16(far.a) ? select(e.a, draw_single(noise_law_of(p, m.a), z.a), far.a) : e.a;
+    e.b = any16(far.b) ? select(e.b, draw_single(noise_law_of(p, m.b), z.b), far.b) : e.b;
+    e.c = any16(far.c) ? select(e.c, draw_single(noise_law_of(p, m.c), z.c), far.c) : e.c;
+    e.d = any16(far.d) ? select(e.d, draw_single(noise_law_of(p, m.d), z.d), far.d) : e.d;
     chunk_flags two = {needs_two(p, m.a), needs_two(p, m.b), needs_two(p, m.c), needs_two(p, m.d)};
 #ifdef OVERLAY
     if (struck) {
@@ -433,5 +324,5 @@ INLINE chunk detect_chunk(bst_scene_params p, detector_maps maps, dark_law dark,
         e.c = draw_pixels(p, e.c, q.c, z.c, two.c, &brim->c);
         e.d = draw_pixels(p, e.d, q.d, z.d, two.d, &brim->d);
     }
-    return convert_chunk(p, maps, counter, row, column, noise, e);
+    return convert_chunk(p, maps, row, column, ADD_TAIL(tail, row, e));
 }

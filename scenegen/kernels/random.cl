@@ -1,7 +1,11 @@
-/* Random numbers, 16 lanes at a time: Philox4x32-10, normal deviates, elementary functions. */
+/* Random numbers, 16 lanes at a time: Philox4x32, normal deviates, elementary functions. */
 
 /* Without it compilers may keep a function apart, and outside the kernel they use short vectors. */
 #define INLINE static inline __attribute__((always_inline))
+
+/* As few as its authors found to pass TestU01's BigCrush; three more are theirs for safety, which
+ * host streams keep (philox_shared.h). */
+#define PHILOX_ROUNDS 7
 
 /* A round of Philox for 8 counters, a word in the low half of each lane; the high halves are of no
  * account. (c0, c1, c2, c3) becomes (high(M1 c2) ^ c1 ^ key0, low(M1 c2), high(M0 c0) ^ c3 ^ key1,
@@ -23,7 +27,7 @@ INLINE uint16 low_words(ulong8 even, ulong8 odd) {
                     o.sc, e.se, o.se);
 }
 
-/* bst_philox4x32 (philox_shared.h) for the counters (first + lane, stream, exposure_low,
+/* Philox4x32 (Salmon, Moraes, Dror and Shaw 2011) for the counters (first + lane, stream, exposure_low,
  * exposure_high): even lanes and odd lanes apart, since a product fills 64 bits. */
 INLINE void philox16(bst_scene_params p, uint first, uint stream, uint16 *w0, uint16 *w1,
                      uint16 *w2, uint16 *w3) {
@@ -33,7 +37,7 @@ INLINE void philox16(bst_scene_params p, uint first, uint stream, uint16 *w0, ui
     ulong8 a3 = (ulong8)p.exposure_high, b3 = a3;
     uint k0 = p.key0, k1 = p.key1;
 #pragma unroll
-    for (int round = 0; round < 10; round++) {
+    for (int round = 0; round < PHILOX_ROUNDS; round++) {
         PHILOX_ROUND(a0, a1, a2, a3, k0, k1);
         PHILOX_ROUND(b0, b1, b2, b3, k0, k1);
         k0 += 0x9E3779B9u;
@@ -45,12 +49,11 @@ INLINE void philox16(bst_scene_params p, uint first, uint stream, uint16 *w0, ui
     *w3 = low_words(a3, b3);
 }
 
-/* 1 / sqrt(v), v > 0: Newton's iteration from the exponent's half; exact to a few units of the last
- * place, and several times faster than the divider. */
+/* 1 / sqrt(v), v > 0, to 5e-6: Newton's iteration from the exponent's half, several times faster
+ * than the divider. */
 INLINE float16 rsqrt16(float16 v) {
     float16 y = as_float16((int16)0x5F375A86 - (as_int16(v) >> 1));
     float16 h = -0.5f * v;
-    y *= fma(h * y, y, (float16)1.5f);
     y *= fma(h * y, y, (float16)1.5f);
     y *= fma(h * y, y, (float16)1.5f);
     return y;

@@ -133,6 +133,7 @@ kernel void bst_detector_read(bst_scene_params p, global const float *image, glo
     /* binned pixels lie on a grid that starts with the window's first pixel */
     int first = p.window_x0 / b / 64 * 64, skip = p.window_x0 / b - first;
     int16 full_count = (int16)0;
+    tail_block tail;
     for (int x = 0; x < skip + p.window_width; x += 64) {
         float sums[64];
         int brims[64];
@@ -157,13 +158,14 @@ kernel void bst_detector_read(bst_scene_params p, global const float *image, glo
         chunk q = {vload16(0, sums), vload16(1, sums), vload16(2, sums), vload16(3, sums)};
         chunk_flags brim = {vload16(0, brims), vload16(1, brims), vload16(2, brims),
                             vload16(3, brims)};
-        chunk_words noise = chunk_random(p, counter, STREAM_NOISE);
-        chunk e, z = chunk_normal(noise);
+        chunk e, z = chunk_normal(chunk_random(p, counter, STREAM_NOISE));
         e.a = read_out(p, q.a, z.a);
         e.b = read_out(p, q.b, z.b);
         e.c = read_out(p, q.c, z.c);
         e.d = read_out(p, q.d, z.d);
-        chunk dn = convert_chunk(p, maps, counter, row, first + x, noise, e);
+        DRAW_TAIL(p, row / b, first + x, p.sensor_width / b, &tail);
+        e = ADD_TAIL(&tail, row / b, e);
+        chunk dn = convert_chunk(p, maps, row, first + x, e);
         int to = x - skip;
         full_count -= store_dn(p, maps, dn.a, brim.a, to, out, marks);
         full_count -= store_dn(p, maps, dn.b, brim.b, to + 16, out, marks);

@@ -221,32 +221,35 @@ static void splat_team(local float *sum, const splat_nodes *b, int n, int taps) 
     const float *h0 = b->y[n] + PAD - b->top[n], *h1 = b->y[n + 1] + PAD - b->top[n + 1];
     const float *h2 = b->y[n + 2] + PAD - b->top[n + 2], *h3 = b->y[n + 3] + PAD - b->top[n + 3];
     int first = max(0, b->top0[n]), last = min(b->top1[n] + taps, TILE_H);
-    int end = min(b->left1[n] + taps, TILE_W), column = max(b->left0[n] & ~15, 0);
+    int end = min(b->left1[n] + taps, TILE_W), column = max(b->left0[n], 0);
     for (; column + 16 < end; column += 32) {
         float16 l0 = line_of(b, n, column, taps), r0 = line_of(b, n, column + 16, taps);
         float16 l1 = line_of(b, n + 1, column, taps), r1 = line_of(b, n + 1, column + 16, taps);
         float16 l2 = line_of(b, n + 2, column, taps), r2 = line_of(b, n + 2, column + 16, taps);
         float16 l3 = line_of(b, n + 3, column, taps), r3 = line_of(b, n + 3, column + 16, taps);
-        local float16 *target = (local float16 *)(sum + first * STRIDE + column);
+        local float *target = sum + first * STRIDE + column;
         for (int j = first; j < last; j += BST_STAMP_RUN) {
             for (int k = j; k < j + BST_STAMP_RUN; k++) {
                 float16 f0 = (float16)h0[k], f1 = (float16)h1[k];
                 float16 f2 = (float16)h2[k], f3 = (float16)h3[k];
-                target[0] = fma(f3, l3, fma(f2, l2, fma(f1, l1, fma(f0, l0, target[0]))));
-                target[1] = fma(f3, r3, fma(f2, r2, fma(f1, r1, fma(f0, r0, target[1]))));
-                target += STRIDE / 16;
+                float16 t = *(local loose16 *)target, u = *(local loose16 *)(target + 16);
+                *(local loose16 *)target = fma(f3, l3, fma(f2, l2, fma(f1, l1, fma(f0, l0, t))));
+                *(local loose16 *)(target + 16) =
+                    fma(f3, r3, fma(f2, r2, fma(f1, r1, fma(f0, r0, u))));
+                target += STRIDE;
             }
         }
     }
     if (column < end) {
         float16 l0 = line_of(b, n, column, taps), l1 = line_of(b, n + 1, column, taps);
         float16 l2 = line_of(b, n + 2, column, taps), l3 = line_of(b, n + 3, column, taps);
-        local float16 *target = (local float16 *)(sum + first * STRIDE + column);
+        local float *target = sum + first * STRIDE + column;
         for (int j = first; j < last; j += BST_STAMP_RUN) {
             for (int k = j; k < j + BST_STAMP_RUN; k++) {
-                float16 v = fma((float16)h1[k], l1, fma((float16)h0[k], l0, *target));
-                *target = fma((float16)h3[k], l3, fma((float16)h2[k], l2, v));
-                target += STRIDE / 16;
+                float16 v =
+                    fma((float16)h1[k], l1, fma((float16)h0[k], l0, *(local loose16 *)target));
+                *(local loose16 *)target = fma((float16)h3[k], l3, fma((float16)h2[k], l2, v));
+                target += STRIDE;
             }
         }
     }

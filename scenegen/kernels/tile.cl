@@ -125,11 +125,18 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     ADD_BACKGROUND(sum, p, t);
     uint steps[MOST_STEPS];
     dark_law unlit = dark_law_of(p, steps);
+    near_law near = near_law_of(p);
+    tail_block tails[TILE_W / 64];
     detector_maps maps = {gain, dark, overlay, offsets, codes};
     uint chunks_per_row = (uint)(p.sensor_width + 63) / 64u;
     int16 full_count = (int16)0;
     for (int y = 0; y < t.rows; y++) {
         uint counter = ((uint)(t.y + y) * chunks_per_row + (uint)t.x / 64u) * 16u;
+        if (y == 0 || (t.y + y) % TAIL_ROWS == 0) {
+            for (int x = 0; x < t.columns; x += 64) {
+                DRAW_TAIL(p, t.y + y, t.x + x, p.sensor_width, &tails[x / 64]);
+            }
+        }
         if (y + AHEAD < t.rows) {
             fetch_maps(maps, t.y + y + AHEAD, t.x, t.columns);
         }
@@ -142,8 +149,8 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
             int lit = any16((lights.a > 0.0f) | (lights.b > 0.0f) | (lights.c > 0.0f) |
                             (lights.d > 0.0f));
             chunk_flags brim;
-            chunk dn =
-                detect_chunk(p, maps, unlit, steps, counter, t.y + y, t.x + x, lights, lit, &brim);
+            chunk dn = detect_chunk(p, maps, unlit, near, steps, &tails[x / 64], counter, t.y + y,
+                                    t.x + x, lights, lit, &brim);
             int column = t.left + x;
             full_count -= store_dn(p, maps, dn.a, brim.a, column, row, marks);
             full_count -= store_dn(p, maps, dn.b, brim.b, column + 16, row, marks);

@@ -330,6 +330,59 @@ static void read_noise_has_a_tail(void **state) {
     bst_assert_close(m.kurtosis, kurtosis, 0.4);
 }
 
+/* Chi-square that `degrees` of freedom exceed once in 10,000 times (Wilson and Hilferty 1931). */
+static double rare_chi2(double degrees) {
+    double v = 2.0 / (9.0 * degrees);
+    return degrees * pow(1.0 - v + 3.72 * sqrt(v), 3.0);
+}
+
+/* Reads whose error only the tail can give: as many as there should be, in no place more than in
+ * another, and none because of its neighbour. */
+static void reads_of_the_tail_are_independent(void **state) {
+    static float frame[PIXELS];
+    static bool struck[PIXELS];
+    const double shares[2] = {0.02, 0.6};
+    for (int s = 0; s < 2; s++) {
+        fixture *f = open_with(state, 0.0, 0.0);
+        f->camera.offset_dn = 30000.0;
+        f->camera.detector.read_tail_fraction = shares[s];
+        f->camera.detector.read_tail_rms_e = 3000.0;
+        make(f);
+        /* beyond 60 e: 7.5 standard deviations of the other reads */
+        double p = shares[s] * erfc(60.0 / sqrt(2.0 * (3000.0 * 3000.0 + 64.0)));
+        double total = 0.0, right = 0.0, above = 0.0, rows[16] = {0}, columns[64] = {0};
+        enum { FRAMES = 8 };
+        for (int k = 0; k < FRAMES; k++) {
+            expose(f, k, frame);
+            for (int i = 0; i < PIXELS; i++) {
+                struck[i] = fabsf(frame[i]) > 60.0f;
+            }
+            for (int i = 0; i < PIXELS; i++) {
+                total += struck[i];
+                rows[i / SIDE % 16] += struck[i];
+                columns[i % 64] += struck[i];
+                right += i % SIDE > 0 && struck[i] && struck[i - 1];
+                above += i >= SIDE && struck[i] && struck[i - SIDE];
+            }
+        }
+        double n = (double)FRAMES * PIXELS, pairs = n * (SIDE - 1.0) / SIDE;
+        bst_assert_close(total, n * p, 4.0 * sqrt(n * p * (1.0 - p)));
+        /* variance of the number of pairs in a chain of independent reads */
+        double var = pairs * (p * p - pow(p, 4.0) + 2.0 * (p * p * p - pow(p, 4.0)));
+        bst_assert_close(right, pairs * p * p, 4.0 * sqrt(var));
+        bst_assert_close(above, pairs * p * p, 4.0 * sqrt(var));
+        double by_row = 0.0, by_column = 0.0;
+        for (int i = 0; i < 16; i++) {
+            by_row += pow(rows[i] - n * p / 16.0, 2.0) / (n * p * (1.0 - p) / 16.0);
+        }
+        for (int i = 0; i < 64; i++) {
+            by_column += pow(columns[i] - n * p / 64.0, 2.0) / (n * p * (1.0 - p) / 64.0);
+        }
+        assert_true(by_row < rare_chi2(16.0));
+        assert_true(by_column < rare_chi2(64.0));
+    }
+}
+
 static void response_bends(void **state) {
     const double c[3] = {-0.05, 0.02, -0.01};
     const double read_noises[2] = {1.0, 8.0};
@@ -531,6 +584,7 @@ int main(void) {
         cmocka_unit_test(maps_come_from_files),
         cmocka_unit_test(offsets_of_columns_and_rows),
         cmocka_unit_test(read_noise_has_a_tail),
+        cmocka_unit_test(reads_of_the_tail_are_independent),
         cmocka_unit_test(response_bends),
         cmocka_unit_test(full_wells_bloom),
         cmocka_unit_test(frame_transfer_smears),

@@ -1,0 +1,139 @@
+/* Electrons with shot and read noise from one normal deviate. Options: CF_ORDER (terms of the law),
+ * SINGLE_FROM (means from here on take one deviate for shot and read noise together). */
+
+/* Coefficients of electrons, shot and read noise, as a polynomial of a normal deviate. */
+typedef struct noise_law {
+    float16 c0, c1, c2, c3;
+#if CF_ORDER >= 3
+    float16 c4;
+#endif
+#if CF_ORDER >= 4
+    float16 c5;
+#endif
+} noise_law;
+
+/* Quantile of Poisson(mean) + normal(0, read noise), as a polynomial of the normal quantile z: the
+ * Cornish-Fisher expansion (Abramowitz and Stegun 26.2.49) to order CF_ORDER of 1 / sigma. All
+ * cumulants beyond the variance are the mean, so with a = 1 / sigma, b = mean / sigma^2 the
+ * standardised ones are b a, b a^2, b a^3, b a^4. */
+INLINE noise_law noise_law_of(bst_scene_params p, float16 mean) {
+    noise_law law;
+    float16 variance = fma((float16)p.read_noise_e, (float16)p.read_noise_e, mean);
+    float16 a = rsqrt16(variance), a2 = a * a, b = mean * a2, b2 = b * b;
+    float16 c0 = fma(b, (float16)(-1.0f / 6), mean);
+    float16 c1 = fma(a, fma(b2, (float16)(5.0f / 36), b * (-1.0f / 8)), variance * a);
+    float16 c2 = b * (1.0f / 6);
+    float16 c3 = a * fma(b2, (float16)(-1.0f / 18), b * (1.0f / 24));
+#if CF_ORDER >= 3
+    float16 b3 = b2 * b;
+    c0 = fma(a2, fma(b3, (float16)(17.0f / 324), fma(b2, (float16)(-1.0f / 12), b * (1.0f / 40))),
+             c0);
+    c2 = fma(a2, fma(b3, (float16)(-53.0f / 324), fma(b2, (float16)(5.0f / 24), b * (-1.0f / 20))),
+             c2);
+    law.c4 = a2 * fma(b3, (float16)(1.0f / 27), fma(b2, (float16)(-1.0f / 24), b * (1.0f / 120))) *
+             p.dn_per_e;
+#endif
+#if CF_ORDER >= 4
+    /* He5, He3, He1 of the fourth order, gathered by powers of z */
+    float16 a3 = a2 * a, b4 = b2 * b2;
+    float16 h5 = fma(b4, (float16)(-252.0f / 7776),
+                     fma(b3, (float16)(14.0f / 288),
+                         fma(b2, (float16)(-3.0f / 384 - 2.0f / 180), b * (1.0f / 720))));
+    float16 h3 = fma(b4, (float16)(-832.0f / 7776),
+                     fma(b3, (float16)(37.0f / 288), b2 * (-6.0f / 384 - 3.0f / 180)));
+    float16 h1 =
+        fma(b4, (float16)(-227.0f / 7776), fma(b3, (float16)(8.0f / 288), b2 * (-2.0f / 384)));
+    c1 = fma(a3, fma(h5, (float16)15.0f, fma(h3, (float16)-3.0f, h1)), c1);
+    c3 = fma(a3, fma(h5, (float16)-10.0f, h3), c3);
+    law.c5 = a3 * h5;
+#endif
+    law.c0 = c0;
+    law.c1 = c1;
+    law.c2 = c2;
+    law.c3 = c3;
+    return law;
+}
+
+/* Electrons with shot and read noise. */
+INLINE float16 draw_single(noise_law law, float16 z) {
+    float16 dn = law.c3;
+#if CF_ORDER >= 4
+    dn = fma(fma(law.c5, z, law.c4), z, dn);
+#elif CF_ORDER >= 3
+    dn = fma(law.c4, z, dn);
+#endif
+    return fma(fma(fma(dn, z, law.c2), z, law.c1), z, law.c0);
+}
+
+/* The noise law of means about one, by cubics: its coefficients at mean + x / per_reach, |x| <= 1,
+ * a quarter of the variance to either side, where the cubic of the standard deviation misses 2e-5
+ * of it. */
+typedef struct near_law {
+    float4 c0, c1, c2, c3;
+#if CF_ORDER >= 3
+    float4 c4;
+#endif
+#if CF_ORDER >= 4
+    float4 c5;
+#endif
+    float mean, per_reach;
+    int serves; /* one deviate does for all of them */
+} near_law;
+
+/* Chebyshev's four places. */
+#define NEAR_A 0.923879533f
+#define NEAR_B 0.382683432f
+
+/* The cubic through f at A, -A, B, -B: rising powers. */
+INLINE float4 cubic_through(float16 f) {
+    const float spread = NEAR_A * NEAR_A - NEAR_B * NEAR_B;
+    float even_a = 0.5f * (f.s0 + f.s1), odd_a = (0.5f / NEAR_A) * (f.s0 - f.s1);
+    float even_b = 0.5f * (f.s2 + f.s3), odd_b = (0.5f / NEAR_B) * (f.s2 - f.s3);
+    float square = (even_a - even_b) / spread, cube = (odd_a - odd_b) / spread;
+    return (float4)(even_b - square * NEAR_B * NEAR_B, odd_b - cube * NEAR_B * NEAR_B, square,
+                    cube);
+}
+
+/* For pixels with little or no light of sources: from a tenth of the dark pixels' variance below
+ * their mean to half of it above. */
+static near_law near_law_of(bst_scene_params p) {
+    float dark = p.background_e, read = p.read_noise_e * p.read_noise_e;
+    near_law near;
+    near.mean = fma(0.2f, dark + read, dark);
+    float reach = 0.25f * (near.mean + read);
+    const float16 places = {NEAR_A, -NEAR_A, NEAR_B, -NEAR_B, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+    noise_law law = noise_law_of(p, fma(places, (float16)reach, (float16)near.mean));
+    near.c0 = cubic_through(law.c0);
+    near.c1 = cubic_through(law.c1);
+    near.c2 = cubic_through(law.c2);
+    near.c3 = cubic_through(law.c3);
+#if CF_ORDER >= 3
+    near.c4 = cubic_through(law.c4);
+#endif
+#if CF_ORDER >= 4
+    near.c5 = cubic_through(law.c5);
+#endif
+    near.per_reach = 1.0f / reach;
+    near.serves = reach > 0.0f && max(near.mean - reach, 0.0f) >= SINGLE_FROM &&
+                  near.mean + reach <= p.near_full_e;
+    return near;
+}
+
+INLINE float16 cubic(float4 c, float16 x) {
+    return fma(fma(fma((float16)c.s3, x, (float16)c.s2), x, (float16)c.s1), x, (float16)c.s0);
+}
+
+INLINE noise_law law_near(near_law near, float16 x) {
+    noise_law law;
+    law.c0 = cubic(near.c0, x);
+    law.c1 = cubic(near.c1, x);
+    law.c2 = cubic(near.c2, x);
+    law.c3 = cubic(near.c3, x);
+#if CF_ORDER >= 3
+    law.c4 = cubic(near.c4, x);
+#endif
+#if CF_ORDER >= 4
+    law.c5 = cubic(near.c5, x);
+#endif
+    return law;
+}

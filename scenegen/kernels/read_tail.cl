@@ -1,0 +1,79 @@
+/* The tail of the read noise: excess noise of few reads. Options: TAIL (with TAIL_GAP, which is
+ * -1 / (2 ln(1 - share of the reads)), and TAIL_RMS, electrons).
+ *
+ * The reads come by blocks of TAIL_ROWS rows and 64 columns of what is read: few of a chunk's reads
+ * are of the tail, so that drawing chunk by chunk would mostly draw for nothing. Within a block the
+ * way from one to the next is geometric. */
+#define TAIL_ROWS 16
+#define TAIL_READS (TAIL_ROWS * 64)
+/* Calls of the generator that a block may need at most, a power of two. */
+#define TAIL_CALLS 64u
+
+typedef struct tail_block {
+    float excess[TAIL_ROWS][64]; /* electrons */
+    uint rows;                   /* bit: that row is not all zero */
+} __attribute__((aligned(64))) tail_block;
+
+#ifdef TAIL
+/* Running sums of the lanes. */
+INLINE int16 sum_up(int16 v) {
+    v += (int16)(0, v.s0, v.s12, v.s3456, v.s789a, v.sbc, v.sde);
+    v += (int16)(0, 0, v.s01, v.s2345, v.s6789, v.sab, v.scd);
+    v += (int16)((int4)(0), v.s0123, v.s4567, v.s89ab);
+    v += (int16)((int8)(0), v.s01234567);
+    return v;
+}
+
+/* Reads from one in the tail to the next. */
+INLINE int16 tail_gaps(uint16 words) {
+    return 1 + convert_int16(fmin(log_radius2(words) * TAIL_GAP, (float)TAIL_READS));
+}
+
+/* The block that holds a read; width: of what is read. */
+static void draw_tail(bst_scene_params p, int row, int column, int width, tail_block *tail) {
+    uint block = (uint)(row / TAIL_ROWS) * ((uint)(width + 63) / 64u) + (uint)column / 64u;
+    for (int y = 0; y < TAIL_ROWS; y++) {
+        for (int x = 0; x < 64; x += 16) {
+            *(float16 *)(tail->excess[y] + x) = (float16)0.0f;
+        }
+    }
+    tail->rows = 0u;
+    int last = -1;
+    for (uint call = 0u; last < TAIL_READS; call++) {
+        chunk_words w = chunk_random(p, (block * TAIL_CALLS + call) * 16u, STREAM_TAIL);
+        float16 za, zb;
+        normal16(w.c, w.d, &za, &zb);
+        int16 at = last + sum_up(tail_gaps(w.a));
+        int read[32] __attribute__((aligned(64)));
+        float z[32] __attribute__((aligned(64)));
+        *(int16 *)read = at;
+        *(int16 *)(read + 16) = at.sf + sum_up(tail_gaps(w.b));
+        *(float16 *)z = za;
+        *(float16 *)(z + 16) = zb;
+        for (int k = 0; k < 32 && read[k] < TAIL_READS; k++) {
+            tail->excess[read[k] / 64][read[k] % 64] = z[k] * TAIL_RMS;
+            tail->rows |= 1u << (read[k] / 64);
+        }
+        last = read[31];
+    }
+}
+
+/* The tail of a row of a chunk. */
+INLINE chunk add_tail(const tail_block *tail, int row, chunk e) {
+    row %= TAIL_ROWS;
+    if (tail->rows >> row & 1u) {
+        const float16 *excess = (const float16 *)tail->excess[row];
+        e.a += excess[0];
+        e.b += excess[1];
+        e.c += excess[2];
+        e.d += excess[3];
+    }
+    return e;
+}
+
+#define DRAW_TAIL(p, row, column, width, tail) draw_tail(p, row, column, width, tail)
+#define ADD_TAIL(tail, row, e) add_tail(tail, row, e)
+#else
+#define DRAW_TAIL(p, row, column, width, tail)
+#define ADD_TAIL(tail, row, e) (e)
+#endif
