@@ -22,11 +22,12 @@
 typedef float16 loose16 __attribute__((aligned(4)));
 typedef float8 loose8 __attribute__((aligned(4)));
 
-/* A block of nodes against one tile: the taps of node n along x, which carry its electrons, and
- * along y follow PAD zeros in its row; the first belongs to column left[n] and row top[n]. In every
- * lane of a team: the bounds of its nodes' left and top, and whether it reaches the tile. */
+/* A block of nodes against one tile: the taps of node n along x, which carry its electrons, follow
+ * PAD zeros in row n, those along y in column n; the first belongs to column left[n] and row
+ * top[n]. In every lane of a team: the bounds of its nodes' left and top, and whether it reaches
+ * the tile. */
 typedef struct splat_nodes {
-    float x[BST_BLOCK][ROW], y[BST_BLOCK][ROW];
+    float x[BST_BLOCK][ROW], y[ROW][BST_BLOCK];
     int left[BST_BLOCK], top[BST_BLOCK];
     int left0[BST_BLOCK], left1[BST_BLOCK], top0[BST_BLOCK], top1[BST_BLOCK], near[BST_BLOCK];
     int taps; /* that may be other than zero */
@@ -146,12 +147,11 @@ INLINE void store_octet(const float16 *t, float *row) {
     store_pair(zip_high(even, odd), row + 14 * ROW);
 }
 
-/* Profiles of a block's nodes along one axis, to rows[node][ROW]. within: of the way from the
- * node's pixel to the next; more: variances of the PSF by which it is wider; height: total. */
-static void make_profiles(float16 within, float16 more, float16 height, int radius,
-                          global const float *law, float *rows) {
-    float16 taps[TAPS];
-    int count = 2 * radius + 2;
+/* Profiles of a block's nodes along one axis: 2 radius + 2 taps, and zeros up to `octets`. within:
+ * of the way from the node's pixel to the next; more: variances of the PSF by which it is wider;
+ * height: total. */
+INLINE void make_profiles(float16 within, float16 more, float16 height, int radius, int octets,
+                          global const float *law, float16 *taps) {
 #ifdef DEGREE
     if (!any16(more > BARELY_WIDER)) {
         taps_by_law(within, more, any16(more > 0.0f), height, radius, law, taps);
@@ -160,12 +160,23 @@ static void make_profiles(float16 within, float16 more, float16 height, int radi
     {
         taps_by_edges(within, rsqrt(1.0f + more) * EDGE_SCALE, height, radius, taps);
     }
-    for (; count % OCTET; count++) {
-        taps[count] = (float16)0.0f;
+    for (int k = 2 * radius + 2; k < octets; k++) {
+        taps[k] = (float16)0.0f;
     }
-    for (int k = 0; k < count; k += OCTET) {
+}
+
+static void profiles_x(float16 within, float16 more, float16 height, int radius, int octets,
+                       global const float *law, float *rows) {
+    float16 taps[TAPS];
+    make_profiles(within, more, height, radius, octets, law, taps);
+    for (int k = 0; k < octets; k += OCTET) {
         store_octet(taps + k, rows + PAD + k);
     }
+}
+
+static void profiles_y(float16 within, float16 more, int radius, int octets,
+                       global const float *law, float *columns) {
+    make_profiles(within, more, (float16)1.0f, radius, octets, law, (float16 *)columns + PAD);
 }
 
 INLINE int16 team_min(int16 v) {
@@ -189,12 +200,14 @@ static void place_nodes(node_block nodes, int tile_x, int tile_y, int radius,
     for (; b->taps > octets; b->taps -= OCTET) {
         for (int n = 0; n < BST_BLOCK; n++) {
             *(loose8 *)(b->x[n] + PAD + b->taps - OCTET) = (float8)0.0f;
-            *(loose8 *)(b->y[n] + PAD + b->taps - OCTET) = (float8)0.0f;
+        }
+        for (int k = b->taps - OCTET; k < b->taps; k++) {
+            *(float16 *)b->y[PAD + k] = (float16)0.0f;
         }
     }
     b->taps = octets;
-    make_profiles(within_x, nodes.width, nodes.electrons, radius, law, b->x[0]);
-    make_profiles(within_y, nodes.width, (float16)1.0f, radius, law, b->y[0]);
+    profiles_x(within_x, nodes.width, nodes.electrons, radius, octets, law, b->x[0]);
+    profiles_y(within_y, nodes.width, radius, octets, law, b->y[0]);
     int16 left = x - (radius + tile_x), top = y - (radius + tile_y);
     int16 left0 = team_min(left), left1 = team_max(left);
     int16 top0 = team_min(top), top1 = team_max(top);
@@ -213,13 +226,18 @@ INLINE float16 line_of(const splat_nodes *b, int n, int column, int taps) {
     return *(const loose16 *)(b->x[n] + PAD + clamp(column - b->left[n], -PAD, taps));
 }
 
+/* Taps of node n along y: that on row j of the tile at [j BST_BLOCK]. */
+INLINE const float *column_of(const splat_nodes *b, int n) {
+    return b->y[0] + (PAD - b->top[n]) * BST_BLOCK + n;
+}
+
 /* Adds the nodes n to n + TEAM - 1, within SPREAD rows. Each row is loaded and stored once for all
  * of them; a pixel still receives them one after the other, and a zero from those that do not reach
  * it.
  */
 static void splat_team(local float *sum, const splat_nodes *b, int n, int taps) {
-    const float *h0 = b->y[n] + PAD - b->top[n], *h1 = b->y[n + 1] + PAD - b->top[n + 1];
-    const float *h2 = b->y[n + 2] + PAD - b->top[n + 2], *h3 = b->y[n + 3] + PAD - b->top[n + 3];
+    const float *h0 = column_of(b, n), *h1 = column_of(b, n + 1);
+    const float *h2 = column_of(b, n + 2), *h3 = column_of(b, n + 3);
     int first = max(0, b->top0[n]), last = min(b->top1[n] + taps, TILE_H);
     int end = min(b->left1[n] + taps, TILE_W), column = max(b->left0[n], 0);
     for (; column + 16 < end; column += 32) {
@@ -230,8 +248,8 @@ static void splat_team(local float *sum, const splat_nodes *b, int n, int taps) 
         local float *target = sum + first * STRIDE + column;
         for (int j = first; j < last; j += BST_STAMP_RUN) {
             for (int k = j; k < j + BST_STAMP_RUN; k++) {
-                float16 f0 = (float16)h0[k], f1 = (float16)h1[k];
-                float16 f2 = (float16)h2[k], f3 = (float16)h3[k];
+                float16 f0 = (float16)h0[k * BST_BLOCK], f1 = (float16)h1[k * BST_BLOCK];
+                float16 f2 = (float16)h2[k * BST_BLOCK], f3 = (float16)h3[k * BST_BLOCK];
                 float16 t = *(local loose16 *)target, u = *(local loose16 *)(target + 16);
                 *(local loose16 *)target = fma(f3, l3, fma(f2, l2, fma(f1, l1, fma(f0, l0, t))));
                 *(local loose16 *)(target + 16) =
@@ -246,9 +264,10 @@ static void splat_team(local float *sum, const splat_nodes *b, int n, int taps) 
         local float *target = sum + first * STRIDE + column;
         for (int j = first; j < last; j += BST_STAMP_RUN) {
             for (int k = j; k < j + BST_STAMP_RUN; k++) {
-                float16 v =
-                    fma((float16)h1[k], l1, fma((float16)h0[k], l0, *(local loose16 *)target));
-                *(local loose16 *)target = fma((float16)h3[k], l3, fma((float16)h2[k], l2, v));
+                float16 v = fma((float16)h1[k * BST_BLOCK], l1,
+                                fma((float16)h0[k * BST_BLOCK], l0, *(local loose16 *)target));
+                *(local loose16 *)target =
+                    fma((float16)h3[k * BST_BLOCK], l3, fma((float16)h2[k * BST_BLOCK], l2, v));
                 target += STRIDE;
             }
         }
@@ -257,14 +276,14 @@ static void splat_team(local float *sum, const splat_nodes *b, int n, int taps) 
 
 /* Adds one node, over its own rows. */
 static void splat_node(local float *sum, const splat_nodes *b, int n, int taps) {
-    const float *h = b->y[n] + PAD - b->top[n];
+    const float *h = column_of(b, n);
     int first = max(0, b->top[n]), last = min(b->top[n] + taps, TILE_H);
     int end = min(b->left[n] + taps, TILE_W);
     for (int column = max(b->left[n] & ~15, 0); column < end; column += 16) {
         float16 line = line_of(b, n, column, taps);
         for (int j = first; j < last; j++) {
             local float16 *target = (local float16 *)(sum + j * STRIDE + column);
-            *target = fma((float16)h[j], line, *target);
+            *target = fma((float16)h[j * BST_BLOCK], line, *target);
         }
     }
 }
@@ -316,8 +335,10 @@ static void splat_tile(bst_scene_params p, local float *sum, int tile_x, int til
     for (int n = 0; n < BST_BLOCK; n++) {
         for (int i = 0; i < ROW; i += 16) {
             *(float16 *)(b.x[n] + i) = (float16)0.0f;
-            *(float16 *)(b.y[n] + i) = (float16)0.0f;
         }
+    }
+    for (int k = 0; k < ROW; k++) {
+        *(float16 *)b.y[k] = (float16)0.0f;
     }
     b.taps = 0;
     for (int first = 0; first < p.source_groups; first += BST_BLOCK) {
