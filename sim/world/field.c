@@ -368,6 +368,7 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
                           field->near, &near_count));
     BST_TRY(reserve_sources(ctx, field, star_count + near_count));
     int n = 0;
+    bool coloured = camera->psf && bst_psf_spectra(camera->psf) > 1;
     for (int i = 0; i < star_count; i++) {
         const bst_star *star = &field->stars[i];
         bst_vec3 apparent = bst_light_apparent_star(&light, star->icrs);
@@ -384,6 +385,9 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
                           .sunlit_fraction = NAN,
                           .phase_rad = NAN,
                           .range_m = INFINITY};
+        if (coloured && !isnan(star->b_minus_v)) {
+            bst_psf_colour(camera->psf, bst_star_spectrum_k((double)star->b_minus_v), s->colour);
+        }
         /* the Earth hides stars too: a point far along the line of sight, as it is in axes that
          * move with the Earth, stands for the star */
         bst_vec3 ray = bst_light_apparent_star(&geocentric, star->icrs);

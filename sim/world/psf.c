@@ -47,7 +47,15 @@ double bst_psf_reach_px(const bst_psf *psf) {
 }
 
 int bst_psf_nodes(const bst_psf *psf) {
-    return psf->columns * psf->rows;
+    return psf->columns * psf->rows * psf->spectra;
+}
+
+int bst_psf_spectra(const bst_psf *psf) {
+    return psf->spectra;
+}
+
+double bst_psf_mixing_error(const bst_psf *psf) {
+    return psf->mixing_error;
 }
 
 /* Place along one axis of the grid: the lower node and the weight of the upper one. */
@@ -139,8 +147,11 @@ void bst_psf_free(bst_psf *psf) {
         free(psf->nodes[k].own_radial.value);
         bst_grid_otf_free(&psf->nodes[k].grid);
     }
+    for (int s = 0; !psf->base && s < psf->spectra; s++) {
+        free(psf->shared[s].value);
+    }
     if (!psf->base) {
-        free(psf->shared.value);
+        free(psf->colours);
     }
     bst_psf_free(psf->base);
     free(psf->nodes);
@@ -245,8 +256,11 @@ bst_status bst_psf_create_from(bst_ctx *ctx, const bst_camera *camera, const bst
                         "optics/field has %d nodes where field_columns times field_rows are %d",
                         optics->field.count, columns * rows);
     }
+    bool coloured = optics->psf == BST_PSF_DIFFRACTION &&
+                    optics->spectrum == BST_SPECTRUM_SOURCES && !inputs->spectrum;
+    int spectra = coloured ? BST_PSF_SPECTRA : 1;
     bst_psf *psf = calloc(1, sizeof *psf);
-    bst_psf_node *nodes = calloc((size_t)(columns * rows), sizeof *nodes);
+    bst_psf_node *nodes = calloc((size_t)(columns * rows * spectra), sizeof *nodes);
     if (!psf || !nodes) {
         free(psf);
         free(nodes);
@@ -257,6 +271,7 @@ bst_status bst_psf_create_from(bst_ctx *ctx, const bst_camera *camera, const bst
                      .fwhm_px = camera->psf_fwhm_px,
                      .columns = columns,
                      .rows = rows,
+                     .spectra = spectra,
                      .width_px = (double)camera->width_px,
                      .height_px = (double)camera->height_px,
                      .diffusion_px = optics->diffusion_px,
