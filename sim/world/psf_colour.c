@@ -16,7 +16,7 @@ static const double anchor_k[2][BST_PSF_SPECTRA] = {{5772.0, 2800.0, 3900.0, 160
                                                     {5772.0, 200.0, 300.0, 500.0}};
 /* Bounds of what a source's spectrum can be, K, and of the temperatures that stars have or that
  * things have in a thermal band. */
-static const double coldest_k[2] = {2000.0, 150.0}, hottest_k = 50000.0;
+static const double coldest_k[2] = {2400.0, 150.0}, hottest_k = 50000.0;
 static const double usual_k[2][2] = {{2700.0, 22000.0}, {200.0, 22000.0}};
 
 enum { STEPS = 1024, C = BST_PSF_COLOURS };
