@@ -1,7 +1,7 @@
 /* Light of all nodes on a grid for the Fourier path: each node is spread over eight by eight samples.
  * Options: DEPOSIT_W, DEPOSIT_H (samples of a tile, a multiple of 16 high), DEPOSIT_GROUP (work-items
- * per work-group), those of nodes.cl, FIELD (weights by place), SPECTRA (weights by source, which may be negative), NEAR_CACHE (memory has one
- * address space; what lies in it can be fetched ahead, and written past the caches).
+ * per work-group), those of nodes.cl, FIELD (weights by place), SPECTRA (weights by source, which may
+ * be negative), NEAR_CACHE (memory has one address space; it can be written past the caches).
  *
  * One work-item owns a tile and adds its nodes in the order of sources, blocks and nodes: the sum is
  * the same for every tile and work-group size. Vectors run along y, as in the grid's blocks of
@@ -16,10 +16,8 @@
 #define DEPOSIT_ROOM 40
 
 #ifdef NEAR_CACHE
-#define FETCH(p) __builtin_prefetch((const private void *)(uintptr_t)(p))
 #define STREAM(value, p) __builtin_nontemporal_store(value, p)
 #else
-#define FETCH(p)
 #define STREAM(value, p) (*(p) = (value))
 #endif
 

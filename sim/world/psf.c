@@ -54,10 +54,6 @@ int bst_psf_spectra(const bst_psf *psf) {
     return psf->spectra;
 }
 
-double bst_psf_mixing_error(const bst_psf *psf) {
-    return psf->mixing_error;
-}
-
 /* Place along one axis of the grid: the lower node and the weight of the upper one. */
 static int grid_place(double at_px, double last_px, int nodes, double *upper) {
     if (nodes < 2 || !(last_px > 0.0)) {

@@ -74,8 +74,9 @@ int bst_psf_spectra(const bst_psf *psf);
 
 /* The shares of the spectra after the first for a black body: that keep the photons' mean, mean
  * square and mean cube of the wavelength in the band. May be negative; of a mix of light they mix
- * as the photons do. All 0 with one spectrum, and for the Sun. Temperatures are held above 2400 K,
- * in a thermal band (bst_band_is_thermal, or a middle beyond 3 um) above 150 K. */
+ * as the photons do. All 0 with one spectrum, and within 2e-5 of it for the Sun. Temperatures are
+ * held above 2400 K, in a thermal band (bst_band_is_thermal, or a middle beyond 3 um) above 150 K.
+ */
 void bst_psf_colour(const bst_psf *psf, double temperature_k, float colour[BST_PSF_COLOURS]);
 
 /* Share of one of the spectra in light of a colour. */

@@ -19,11 +19,12 @@ static const double anchor_k[2][BST_PSF_SPECTRA] = {{5772.0, 2800.0, 3900.0, 160
 static const double coldest_k[2] = {2400.0, 150.0}, hottest_k = 50000.0;
 static const double usual_k[2][2] = {{2700.0, 22000.0}, {200.0, 22000.0}};
 
-enum { STEPS = 1024, C = BST_PSF_COLOURS };
+enum { STEPS = 1024, RINGS = 200, C = BST_PSF_COLOURS };
 
 struct bst_psf_colours {
     double least, per_step;    /* 1 / temperature: of the hottest, and between entries */
     float share[STEPS + 1][C]; /* spectra 1, 2, 3 */
+    double error;
 };
 
 double bst_psf_anchor_k(bool thermal, int spectrum) {
@@ -105,57 +106,25 @@ static void make_anchors(const bst_psf_rule *rule, anchors *a) {
     }
 }
 
-bst_status bst_psf_colours_create(bst_ctx *ctx, const bst_psf_rule *rule, bst_psf_colours **out) {
-    *out = malloc(sizeof **out);
-    if (!*out) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the colours of a PSF");
-    }
-    anchors a;
-    make_anchors(rule, &a);
-    (*out)->least = 1.0 / hottest_k;
-    (*out)->per_step = (1.0 / coldest_k[rule->thermal] - (*out)->least) / STEPS;
-    for (int i = 0; i <= STEPS; i++) {
-        double photons[BST_PSF_WAVELENGTHS], moments[C], share[C];
-        photons_of(rule, 1.0 / ((*out)->least + i * (*out)->per_step), photons);
-        moments_of(rule, photons, moments);
-        shares_of(&a, moments, share);
-        for (int s = 0; s < C; s++) {
-            (*out)->share[i][s] = (float)share[s];
-        }
-    }
-    return BST_OK;
-}
-
-void bst_psf_colour(const bst_psf *psf, double temperature_k, float colour[BST_PSF_COLOURS]) {
-    const bst_psf_colours *c = psf->colours;
-    double at = c ? (1.0 / temperature_k - c->least) / c->per_step : 0.0;
-    at = at > 0.0 ? fmin(at, STEPS) : 0.0;
-    int i = (int)fmin(at, STEPS - 1.0);
-    for (int s = 0; s < BST_PSF_COLOURS; s++) {
-        double from = c ? (double)c->share[i][s] : 0.0, to = c ? (double)c->share[i + 1][s] : 0.0;
-        colour[s] = (float)(from + (at - i) * (to - from));
-    }
-}
-
-double bst_psf_colours_error(const bst_psf_rule *rule, const double *q, double inner) {
-    enum { RINGS = 200, COLOURS = 48 };
-    double *h = malloc(RINGS * BST_PSF_WAVELENGTHS * sizeof *h);
-    double photons[BST_PSF_SPECTRA][BST_PSF_WAVELENGTHS], worst = 0.0, least_q = INFINITY;
-    if (!h) {
-        return 0.0;
-    }
+/* Rings of the frequency plane, the pixel's own transfer function with them: frequency times OTF.
+ */
+static void fill_rings(const bst_psf_rule *rule, const double *q, double inner, double *h) {
+    double least_q = INFINITY;
     for (int k = 0; k < rule->count; k++) {
         least_q = fmin(least_q, q[k]);
     }
-    /* rings of the frequency plane, the pixel's own transfer function with them */
     for (int i = 0; i < RINGS; i++) {
         double f = (i + 0.5) / (RINGS * least_q), x = BST_PI * f * sqrt(0.5), pixel = sin(x) / x;
         for (int k = 0; k < rule->count; k++) {
             h[i * rule->count + k] = f * pixel * pixel * bst_annulus_otf(inner, f * q[k]);
         }
     }
-    anchors a;
-    make_anchors(rule, &a);
+}
+
+/* bst_psf_mixing_error. h: [RINGS][wavelengths], frequency times OTF. */
+static double mixing_error(const bst_psf_rule *rule, const anchors *a, const double *h) {
+    enum { COLOURS = 48 };
+    double photons[BST_PSF_SPECTRA][BST_PSF_WAVELENGTHS], worst = 0.0;
     for (int s = 0; s < BST_PSF_SPECTRA; s++) {
         photons_of(rule, anchor_k[rule->thermal][s], photons[s]);
     }
@@ -165,7 +134,7 @@ double bst_psf_colours_error(const bst_psf_rule *rule, const double *q, double i
         double u = (double)n / COLOURS;
         photons_of(rule, 1.0 / ((1.0 - u) / usual[0] + u / usual[1]), own);
         moments_of(rule, own, moments);
-        shares_of(&a, moments, share);
+        shares_of(a, moments, share);
         for (int i = 0; i < RINGS; i++) {
             double miss = 0.0, whole = 0.0;
             for (int k = 0; k < rule->count; k++) {
@@ -181,6 +150,48 @@ double bst_psf_colours_error(const bst_psf_rule *rule, const double *q, double i
         }
         worst = fmax(worst, missed / peak);
     }
-    free(h);
     return worst;
+}
+
+bst_status bst_psf_colours_create(bst_ctx *ctx, const bst_psf_rule *rule, const double *q,
+                                  double inner, bst_psf_colours **out) {
+    bst_psf_colours *c = malloc(sizeof *c);
+    double *rings = malloc((size_t)(RINGS * rule->count) * sizeof *rings);
+    *out = c;
+    if (!c || !rings) {
+        free(rings);
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the colours of a PSF");
+    }
+    anchors a;
+    make_anchors(rule, &a);
+    c->least = 1.0 / hottest_k;
+    c->per_step = (1.0 / coldest_k[rule->thermal] - c->least) / STEPS;
+    for (int i = 0; i <= STEPS; i++) {
+        double photons[BST_PSF_WAVELENGTHS], moments[C], share[C];
+        photons_of(rule, 1.0 / (c->least + i * c->per_step), photons);
+        moments_of(rule, photons, moments);
+        shares_of(&a, moments, share);
+        for (int s = 0; s < C; s++) {
+            c->share[i][s] = (float)share[s];
+        }
+    }
+    fill_rings(rule, q, inner, rings);
+    c->error = mixing_error(rule, &a, rings);
+    free(rings);
+    return BST_OK;
+}
+
+void bst_psf_colour(const bst_psf *psf, double temperature_k, float colour[BST_PSF_COLOURS]) {
+    const bst_psf_colours *c = psf->colours;
+    double at = c ? (1.0 / temperature_k - c->least) / c->per_step : 0.0;
+    at = at > 0.0 ? fmin(at, STEPS) : 0.0;
+    int i = (int)fmin(at, STEPS - 1.0);
+    for (int s = 0; s < BST_PSF_COLOURS; s++) {
+        double from = c ? (double)c->share[i][s] : 0.0, to = c ? (double)c->share[i + 1][s] : 0.0;
+        colour[s] = (float)(from + (at - i) * (to - from));
+    }
+}
+
+double bst_psf_mixing_error(const bst_psf *psf) {
+    return psf->colours ? psf->colours->error : 0.0;
 }

@@ -78,7 +78,8 @@ const bst_config_desc bst_optics_config_table[] = {
         bst_optics_config, spectrum, spectra, "\"flat\"",
         "diffraction: photons per wavelength in the band, before its response: equal, those of a "
         "black body of 5772 K, or each source's own: sunlight as before, a star by its colour "
-        "B-V, emission by its temperature. `sources` takes four times the transforms."),
+        "B-V, emission by its temperature. `sources` takes four transforms of the frame instead of "
+        "one."),
     BST_INT(bst_optics_config, wavelengths, "", 0, 64, "8",
             "diffraction: wavelengths of the average (Gauss-Legendre); 1: the middle of the band "
             "alone."),

@@ -342,8 +342,7 @@ bst_status bst_psf_make_diffraction(bst_ctx *ctx, const bst_camera *camera,
         }
     }
     if (b.spectra > 1) {
-        BST_TRY(bst_psf_colours_create(ctx, &b.rule, &psf->colours));
-        psf->mixing_error = bst_psf_colours_error(&b.rule, b.q, pupil.inner);
+        BST_TRY(bst_psf_colours_create(ctx, &b.rule, b.q, pupil.inner, &psf->colours));
     }
     return make_tables(ctx, camera, &b, pupil, psf);
 }

@@ -64,15 +64,14 @@ typedef struct bst_psf_rule {
     bool thermal;
 } bst_psf_rule;
 
-/* Shares of the spectra by temperature. */
+/* Shares of the spectra by temperature, and the error of mixing for an obstruction of diameter
+ * `inner`. q: wavelength times focal ratio over pixel pitch at each wavelength. */
 typedef struct bst_psf_colours bst_psf_colours;
-bst_status bst_psf_colours_create(bst_ctx *ctx, const bst_psf_rule *rule,
+bst_status bst_psf_colours_create(bst_ctx *ctx, const bst_psf_rule *rule, const double *q,
+                                  double inner,
                                   bst_psf_colours **out) BST_MUST_CHECK; /* free() it */
 /* Temperature of the black body of a spectrum. */
 double bst_psf_anchor_k(bool thermal, int spectrum);
-/* bst_psf_mixing_error for an obstruction of diameter `inner`; q: wavelength times focal ratio over
- * pixel pitch at each wavelength. */
-double bst_psf_colours_error(const bst_psf_rule *rule, const double *q, double inner);
 
 struct bst_psf {
     atomic_int owners;
@@ -86,8 +85,7 @@ struct bst_psf {
     bst_radial_otf shared[BST_PSF_SPECTRA]; /* diffraction: unaberrated annulus, the same at all
                                                nodes of a spectrum */
     bst_psf_colours *colours;               /* NULL: one spectrum */
-    double mixing_error;
-    bst_psf_node *nodes; /* [spectra][rows][columns] */
+    bst_psf_node *nodes;                    /* [spectra][rows][columns] */
 };
 
 /* What fills psf->nodes and psf->cutoff for the models that need more than a formula. */
