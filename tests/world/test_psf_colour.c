@@ -129,19 +129,18 @@ static errors worst_of(const bst_psf *psf, const bst_camera *camera, const doubl
 }
 
 /* Against an average over 64 wavelengths by another rule. Each wavelength's OTF ends at a frequency
- * of its own, which leaves 7e-5 between the rules where they end, whatever the spectrum (a flat one
- * has as much); mixing itself misses 1e-5 of the OTF between 2700 and 22000 K and 3e-5 beyond. */
+ * of its own, which leaves 7e-5 between the rules near those, at the Sun's temperature too, where
+ * nothing is mixed; mixing itself misses 4e-5 of the OTF at most. */
 static void a_mix_is_the_psf_of_the_spectrum(void **state) {
     (void)state;
-    static const double temperature_k[] = {2500, 2725, 3000, 3300,  3700,  4300,  5000,
-                                           6500, 8000, 10e3, 12500, 16000, 21700, 30000};
+    static const double temperature_k[] = {2500, 2725, 3300, 4300, 7000, 10e3, 21700, 30000};
     bst_ctx ctx = {0};
     bst_psf *psf;
     bst_camera camera = camera_of(0.0);
     bst_assert_ok(&ctx, bst_psf_create(&ctx, &camera, &psf));
     assert_int_equal(bst_psf_spectra(psf), BST_PSF_SPECTRA);
     assert_int_equal(bst_psf_nodes(psf), BST_PSF_SPECTRA);
-    errors e = worst_of(psf, &camera, temperature_k, 14, 64);
+    errors e = worst_of(psf, &camera, temperature_k, 8, 64);
     assert_true(e.otf < 1.2e-4);
     assert_true(e.peak < 6e-5);
     bst_psf_free(psf);
@@ -151,18 +150,16 @@ static void a_mix_is_the_psf_of_the_spectrum(void **state) {
  * the wavelength. */
 static void aberrations_mix_too(void **state) {
     (void)state;
-    static const double temperature_k[] = {2500, 3200, 7500, 30000};
-    const struct {
-        double waves, otf, peak;
-    } cases[3] = {{0.0, 6e-5, 6e-5}, {0.07, 1e-4, 6e-5}, {0.15, 1.5e-4, 6e-5}};
-    for (int w = 0; w < 3; w++) {
+    static const double temperature_k[] = {2500, 3200, 30000};
+    const struct { double waves, otf, peak; } cases[2] = {{0.07, 1e-4, 6e-5}, {0.15, 1.5e-4, 6e-5}};
+    for (int w = 0; w < 2; w++) {
         bst_ctx ctx = {0};
         bst_psf *psf;
         bst_camera camera = camera_of(cases[w].waves);
         bst_assert_ok(&ctx, bst_psf_create(&ctx, &camera, &psf));
         double place[WAVELENGTHS], weight[WAVELENGTHS];
         errors worst = {0};
-        for (int t = 0; t < 4; t++) {
+        for (int t = 0; t < 3; t++) {
             float colour[BST_PSF_COLOURS];
             for (int k = 0; k < WAVELENGTHS; k++) {
                 place[k] = 1e-9 * (650.0 + 250.0 * legendre_16[k]);
@@ -189,7 +186,7 @@ static void aberrations_mix_too(void **state) {
 /* In thermal bands: emission from 180 to 1000 K, and stars. */
 static void thermal_bands(void **state) {
     (void)state;
-    static const double temperature_k[] = {180, 220, 260, 300, 350, 420, 600, 1000, 3000, 20000};
+    static const double temperature_k[] = {180, 230, 270, 350, 1000, 20000};
     static const double band_nm[2][2] = {{3300, 5100}, {7800, 12200}};
     for (int k = 0; k < 2; k++) {
         bst_ctx ctx = {0};
@@ -198,7 +195,7 @@ static void thermal_bands(void **state) {
         camera.optics.band_nm[0] = band_nm[k][0];
         camera.optics.band_nm[1] = band_nm[k][1];
         bst_assert_ok(&ctx, bst_psf_create(&ctx, &camera, &psf));
-        errors e = worst_of(psf, &camera, temperature_k, 10, 64);
+        errors e = worst_of(psf, &camera, temperature_k, 6, 64);
         assert_true(e.otf < 1.2e-4);
         bst_psf_free(psf);
     }
