@@ -125,14 +125,23 @@ static double equivalent_fwhm(const bst_psf *psf, int node) {
     return FWHM_PER_SIGMA * sqrt(low * high);
 }
 
-double bst_psf_equivalent_fwhm_px(const bst_psf *psf, double x_px, double y_px) {
-    int node[4];
+double bst_psf_coloured_fwhm_px(const bst_psf *psf, const float colour[BST_PSF_COLOURS],
+                                double x_px, double y_px) {
+    int node[4], fields = psf->columns * psf->rows;
     double weight[4], sum = 0.0;
     int nodes = bst_psf_weights(psf, x_px, y_px, node, weight);
     for (int k = 0; k < nodes; k++) {
-        sum += weight[k] * psf->nodes[node[k]].equivalent_fwhm_px;
+        for (int s = 0; s < psf->spectra; s++) {
+            double share = psf->spectra > 1 ? bst_psf_share(colour, s) : 1.0;
+            sum += weight[k] * share * psf->nodes[s * fields + node[k]].equivalent_fwhm_px;
+        }
     }
-    return sum;
+    return fmax(sum, 0.1);
+}
+
+double bst_psf_equivalent_fwhm_px(const bst_psf *psf, double x_px, double y_px) {
+    const float sun[BST_PSF_COLOURS] = {0.0F};
+    return bst_psf_coloured_fwhm_px(psf, sun, x_px, y_px);
 }
 
 void bst_psf_free(bst_psf *psf) {

@@ -113,5 +113,9 @@ double bst_psf_noise_area_px2(const bst_psf *psf, int node);
  * noise-equivalent area as the PSF at a pixel place (mean of the nodes that mix there): the width
  * for a Gaussian filter, and for the signal-to-noise ratio of a smeared image. At least 0.1. */
 double bst_psf_equivalent_fwhm_px(const bst_psf *psf, double x_px, double y_px);
+/* The same of light of a colour: widths mix with the shares, as does all that is smooth in the
+ * wavelength. */
+double bst_psf_coloured_fwhm_px(const bst_psf *psf, const float colour[BST_PSF_COLOURS],
+                                double x_px, double y_px);
 
 #endif
