@@ -6,6 +6,8 @@
 #include "scenegen/source_order.h"
 #include "sim/world/skylight.h"
 
+_Static_assert(BST_SPECTRA == (int)BST_PSF_SPECTRA, "the deposit kernel's shares are the PSF's");
+
 void bst_scene_plan_clear(bst_scene_plan *p) {
     free(p->sources);
     free(p->list);
