@@ -295,9 +295,7 @@ static bst_status make_setup(bst_ctx *ctx, bst_fft_light *l, bst_window window, 
     free(table);
     BST_TRY(bst_device_check(ctx, code, "allocating the spreading kernel's table"));
     size_t bytes = bst_light_fft_floats(s->fft) * sizeof(float);
-    s->grid =
-        clCreateBuffer(l->context, CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR, bytes, NULL, &code);
-    return bst_device_check(ctx, code, "allocating the light's grid");
+    return bst_device_buffer(ctx, l->context, bytes, NULL, "allocating the light's grid", &s->grid);
 }
 
 /* The setup for a window's size; an old one makes room for a new one. */

@@ -4,8 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/core/pages.h"
+
 static bst_batch *allocate(size_t elements) {
-    return aligned_alloc(sizeof(bst_lanes), elements * sizeof(bst_batch));
+    return bst_pages_alloc(elements * sizeof(bst_batch));
 }
 
 /* ------------------------------------------------------------------ set-up */
