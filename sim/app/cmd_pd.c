@@ -5,17 +5,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "imgproc/calibration.h"
 #include "sim/app/app.h"
 #include "sim/app/load.h"
 #include "sim/app/pd.h"
 #include "sim/app/stop_signals.h"
 #include "sim/io/manifest.h"
-#include "sim/io/psf_fits.h"
-#include "sim/world/knowledge.h"
-
-/* Fewest false alarms that a mean is worth naming of. */
-enum { ROOM_PER_TARGET = 4 };
 
 typedef struct pd_request {
     bst_load_options load;
@@ -71,48 +65,6 @@ static bst_status check(bst_ctx *ctx, pd_request *r) {
     return bst_load_check(ctx, &r->load);
 }
 
-/* Image processing as the scenario's module sets it up, with room for all targets. */
-typedef struct standard {
-    bst_imgproc_config config;
-    bst_imgproc_maps maps;
-    bst_imgproc *ip;
-} standard;
-
-static bst_status detect(bst_ctx *ctx, void *self, const bst_imgproc_frame *frame,
-                         const bst_motion *motion, bst_detections *out, int capacity) {
-    standard *d = self;
-    return bst_imgproc_detect(ctx, d->ip, frame, motion, out, capacity);
-}
-
-static bst_status open_standard(bst_ctx *ctx, bst_pd_scene *s, standard *d) {
-    if (s->imgproc->desc != &bst_imgproc_module) {
-        return bst_fail(ctx, BST_ERR_CONFIG,
-                        "%s has image processing of the type \"%s\"; pd drives \"%s\" alone",
-                        s->name, s->imgproc->desc->type, bst_imgproc_module.type);
-    }
-    d->config = *(const bst_imgproc_config *)s->imgproc->config;
-    if (s->options.false_alarms > 0.0) {
-        d->config.false_alarms_per_frame = s->options.false_alarms;
-    }
-    s->options.false_alarms = d->config.false_alarms_per_frame;
-    double room = ROOM_PER_TARGET * (double)bst_pd_scene_room(s) +
-                  20.0 * d->config.false_alarms_per_frame + 1000.0;
-    if ((double)d->config.capacity < room) {
-        d->config.capacity = (int64_t)fmin(room, 65536.0);
-    }
-    bst_camera camera = *bst_knowledge_camera(s->knowledge);
-    double oversampling;
-    const char *psf_file = bst_knowledge_psf_file(s->knowledge, &oversampling);
-    if (*psf_file) {
-        bst_psf_summary psf;
-        BST_TRY(bst_psf_fits_read(ctx, psf_file, oversampling, &psf));
-        camera.psf_fwhm_px = psf.fwhm_px;
-    }
-    BST_TRY(bst_calibration_load(ctx, &d->config, &camera, &d->maps));
-    return bst_imgproc_create(ctx, &camera, bst_camera_electrons_per_s(&camera, 0.0), &d->config,
-                              &d->maps, &d->ip);
-}
-
 static bst_status write_results(bst_ctx *ctx, const pd_request *r, const bst_pd_scene *scene,
                                 const bst_pd_result *result) {
     bst_pd_figures figures;
@@ -133,21 +85,19 @@ static bst_status write_results(bst_ctx *ctx, const pd_request *r, const bst_pd_
 static bst_status measure(bst_ctx *ctx, const pd_request *r, const bst_scenario *scenario) {
     bst_pd_scene *scene = calloc(1, sizeof *scene);
     bst_pd_result *result = calloc(1, sizeof *result);
-    standard d = {.ip = NULL};
+    bst_pd_detector *detector = NULL;
     bst_status status = scene && result
                             ? bst_pd_scene_open(ctx, scenario, &r->options, scene)
                             : bst_fail(ctx, BST_ERR_MEMORY, "no memory for the measurement");
     if (status == BST_OK) {
-        status = open_standard(ctx, scene, &d);
+        status = bst_pd_detector_open(ctx, scene, &detector);
         if (status == BST_OK) {
-            bst_pd_detector detector = {detect, &d};
-            status = bst_pd_run(ctx, scene, &detector, result);
+            status = bst_pd_run(ctx, scene, detector, result);
         }
         if (status == BST_OK) {
             status = write_results(ctx, r, scene, result);
         }
-        bst_imgproc_free(d.ip);
-        bst_calibration_free(&d.maps);
+        bst_pd_detector_close(detector);
         bst_pd_scene_close(scene);
     }
     free(scene);
@@ -262,6 +212,11 @@ int bst_cmd_pd(int argc, char **argv) {
          .doc = "one target in each square of this side (default: 40 more than they are apart)",
          .minimum = 3,
          .maximum = 32768},
+        {.name = "module",
+         .kind = BST_OPTION_FLAG,
+         .target = &o->by_module,
+         .doc = "step the scenario's imgproc module as a run does; always so of one that does not "
+                "come with Boresight"},
         {.name = "sensor",
          .kind = BST_OPTION_TEXT,
          .target = &o->sensor,

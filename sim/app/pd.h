@@ -23,6 +23,7 @@ typedef struct bst_pd_options {
     double jitter_px;     /* blur per axis; < 0: what image processing is set to */
     double apart_px;      /* least distance between targets beyond their own length */
     double cell_px;       /* of the grid of targets; 0: apart_px + length + 40 */
+    bool by_module;       /* step the scenario's module also where a function would do */
     const char *sensor;   /* "observer/sensor"; NULL: the first */
     const char *device;
     int threads;
@@ -64,6 +65,7 @@ typedef struct bst_pd_scene {
     double exposure_s, sky_e, dark_e;
     double noise_e;    /* of a pixel without the source's own light, at the boresight */
     double fwhm_px;    /* of the PSF: how near a detection must be */
+    double own_light;  /* as bst_matched_filter_pd has it, mean of places and directions */
     double sigma_px;   /* of the Gaussian with the PSF's noise-equivalent area */
     bool gaussian;     /* the PSF is that Gaussian */
     double *sharpness; /* of a streak, by its angle from an axis; NULL: targets are at rest */
@@ -116,15 +118,20 @@ typedef struct bst_pd_result {
     double wall_s, process_s;           /* process_s: of the frames without targets, mean */
 } bst_pd_result;
 
-/* A detector: finds what is in a frame. */
-typedef struct bst_pd_detector {
-    bst_status (*detect)(bst_ctx *ctx, void *self, const bst_imgproc_frame *frame,
-                         const bst_motion *motion, bst_detections *out, int capacity);
-    void *self;
-} bst_pd_detector;
+/* What finds the targets: image processing that comes with Boresight, as the scenario configures it
+ * and with room for all targets; another module of the role "imgproc" (or that one, with by_module)
+ * is stepped as in a run. */
+typedef struct bst_pd_detector bst_pd_detector;
+bst_status bst_pd_detector_open(bst_ctx *ctx, bst_pd_scene *scene,
+                                bst_pd_detector **out) BST_MUST_CHECK;
+void bst_pd_detector_close(bst_pd_detector *detector);
+/* What it finds in one frame, at most `capacity`. */
+bst_status bst_pd_detect(bst_ctx *ctx, bst_pd_detector *detector, const bst_pd_scene *scene,
+                         bst_frame *frame, const bst_pd_frame *targets, bst_detections *out,
+                         int capacity) BST_MUST_CHECK;
 
 /* Renders, processes and counts. BST_ERR_INTERRUPTED when the user asks to stop. */
-bst_status bst_pd_run(bst_ctx *ctx, bst_pd_scene *scene, const bst_pd_detector *detector,
+bst_status bst_pd_run(bst_ctx *ctx, bst_pd_scene *scene, bst_pd_detector *detector,
                       bst_pd_result *out) BST_MUST_CHECK;
 
 /* Figures of a result. */
@@ -132,6 +139,8 @@ typedef struct bst_pd_figures {
     double false_alarms_per_frame, false_alarms_low, false_alarms_high, pfa, chance;
     bst_pd_needed pd50, pd90;
     double loss_db_pd50, loss_db_pd90, loss_db_sigma_pd50, loss_db_sigma_pd90;
+    /* against a matched filter, whose output has the target's own photon noise too */
+    double own_light_db_pd50, own_light_db_pd90;
 } bst_pd_figures;
 void bst_pd_figures_of(const bst_pd_scene *scene, const bst_pd_result *result, bst_pd_figures *out);
 

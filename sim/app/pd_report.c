@@ -9,7 +9,7 @@
 
 /* One SNR's figures. */
 typedef struct row {
-    double pd, low, high, ideal;
+    double pd, low, high, ideal, matched_filter;
     double over_bound[2], over_bound_both; /* RMS error over the bound: along (x), across (y) */
     double rms_px[2], bias_px[2];
     double flux_over_bound, flux_bias, chi_square;
@@ -29,6 +29,8 @@ static row row_of(const bst_pd_scene *s, const bst_pd_result *r, const bst_pd_fi
                .low = bst_pd_without_chance(w.low, f->chance),
                .high = bst_pd_without_chance(w.high, f->chance),
                .ideal = f->pfa > 0.0 ? bst_ideal_pd(f->pfa, s->snr[i]) : NAN,
+               .matched_filter =
+                   f->pfa > 0.0 ? bst_matched_filter_pd(f->pfa, s->snr[i], s->own_light) : NAN,
                .over_bound_both = ratio(t->error_square[0] + t->error_square[1], n,
                                         t->bound_square[0] + t->bound_square[1], bounds),
                .flux_over_bound = ratio(t->flux_square, n, t->flux_bound_square, bounds),
@@ -52,10 +54,13 @@ static row row_of(const bst_pd_scene *s, const bst_pd_result *r, const bst_pd_fi
 }
 
 static void print_loss(const char *name, bst_pd_needed needed, double ideal, double loss,
-                       double sigma) {
+                       double sigma, double over_matched) {
     if (isfinite(loss)) {
-        printf("  Pd %s at SNR %.3f, ideal %.3f: loss %.2f dB (95 %%: %.2f to %.2f)\n", name,
-               needed.snr, ideal, loss, loss - 1.96 * sigma, loss + 1.96 * sigma);
+        printf(
+            "  Pd %s at SNR %.3f, ideal %.3f: loss %.2f dB (95 %%: %.2f to %.2f), %.2f dB over the "
+            "matched filter\n",
+            name, needed.snr, ideal, loss, loss - BST_NORMAL_95 * sigma,
+            loss + BST_NORMAL_95 * sigma, over_matched);
     } else if (isfinite(needed.snr)) {
         printf(
             "  Pd %s at SNR %.3f; no loss without a false alarm: give more --empty-frames or "
@@ -66,14 +71,13 @@ static void print_loss(const char *name, bst_pd_needed needed, double ideal, dou
     }
 }
 
-void bst_pd_print(const bst_pd_scene *s, const bst_pd_result *r, const bst_pd_figures *f) {
-    bool streak = s->sharpness;
+static void print_head(const bst_pd_scene *s, const bst_pd_result *r) {
     printf("%s: %lld x %lld px, FWHM %.3g px, noise %.3g e- per pixel, %.3g s; ", s->name,
            (long long)s->camera.width_px, (long long)s->camera.height_px, s->fwhm_px, s->noise_e,
            s->exposure_s);
-    if (streak) {
-        printf("streaks of %g px, %s\n", s->options.streak_px,
-               s->options.known_rate ? "rate and direction known" : "rate and direction unknown");
+    if (s->sharpness) {
+        printf("streaks of %g px, rate and direction %s\n", s->options.streak_px,
+               s->options.known_rate ? "known" : "unknown");
     } else {
         printf("points\n");
     }
@@ -82,25 +86,36 @@ void bst_pd_print(const bst_pd_scene *s, const bst_pd_result *r, const bst_pd_fi
         "all\n\n",
         (long long)r->frames, bst_pd_scene_room(s), (long long)r->empty_frames, 1e3 * r->process_s,
         r->wall_s);
-    printf("%7s %7s %8s %7s  %-15s %7s  %17s %8s %6s %8s %8s\n", "SNR", "V", "trials", "Pd", "95 %",
-           "ideal", streak ? "rms/bound along, ac." : "rms/bound x, y", "flux", "chi2", "flux off",
-           streak ? "" : "bias px");
+    const char *const axes[2] = {s->sharpness ? "along" : "x", s->sharpness ? "across" : "y"};
+    printf("%56s RMS error over bound\n%7s %7s %8s %7s  %-16s %6s %7s  %7s %7s %7s %6s %9s", "",
+           "SNR", "V", "trials", "Pd", "95 %", "ideal", "matched", axes[0], axes[1], "flux", "chi2",
+           "flux off");
+    printf(s->sharpness ? "\n" : " %8s\n", "bias px");
+}
+
+void bst_pd_print(const bst_pd_scene *s, const bst_pd_result *r, const bst_pd_figures *f) {
+    print_head(s, r);
     for (int i = 0; i < s->points; i++) {
         row p = row_of(s, r, f, i);
-        printf("%7.3f %7.2f %8lld %7.4f  %.4f to %.4f %7.4f  %8.3f %8.3f %8.3f %6.2f %+8.4f",
+        printf("%7.3f %7.2f %8lld %7.4f  %.4f to %.4f %6.4f %7.4f  %7.3f %7.3f %7.3f %6.2f %+9.4f",
                s->snr[i], s->v_mag[i], (long long)r->tallies[i].trials, p.pd, p.low, p.high,
-               p.ideal, p.over_bound[0], p.over_bound[1], p.flux_over_bound, p.chi_square,
-               p.flux_bias);
-        if (!streak) {
+               p.ideal, p.matched_filter, p.over_bound[0], p.over_bound[1], p.flux_over_bound,
+               p.chi_square, p.flux_bias);
+        if (!s->sharpness) {
             printf(" %8.4f", p.phase_bias_px);
         }
         printf("\n");
     }
     printf("\n  false alarms per frame %.4g (95 %%: %.4g to %.4g)", f->false_alarms_per_frame,
            f->false_alarms_low, f->false_alarms_high);
-    printf(s->options.false_alarms > 0.0 ? ", %g requested\n" : "\n", s->options.false_alarms);
-    print_loss("0.5", f->pd50, bst_ideal_snr(f->pfa, 0.5), f->loss_db_pd50, f->loss_db_sigma_pd50);
-    print_loss("0.9", f->pd90, bst_ideal_snr(f->pfa, 0.9), f->loss_db_pd90, f->loss_db_sigma_pd90);
+    if (s->options.false_alarms > 0.0) {
+        printf(", %g requested", s->options.false_alarms);
+    }
+    printf("\n");
+    print_loss("0.5", f->pd50, bst_ideal_snr(f->pfa, 0.5), f->loss_db_pd50, f->loss_db_sigma_pd50,
+               f->own_light_db_pd50);
+    print_loss("0.9", f->pd90, bst_ideal_snr(f->pfa, 0.9), f->loss_db_pd90, f->loss_db_sigma_pd90,
+               f->own_light_db_pd90);
     if (r->lost > 0) {
         printf("  %lld detections found no room and are missing\n", (long long)r->lost);
     }
@@ -119,6 +134,7 @@ static cJSON *point_json(const bst_pd_scene *s, const bst_pd_result *r, const bs
     bst_json_add_number(node, "pd_low", p.low);
     bst_json_add_number(node, "pd_high", p.high);
     bst_json_add_number(node, "ideal_pd", p.ideal);
+    bst_json_add_number(node, "matched_filter_pd", p.matched_filter);
     bst_json_add_number(node, "centroid_rms_over_bound", p.over_bound_both);
     const char *const axes[2] = {s->sharpness ? "along" : "x", s->sharpness ? "across" : "y"};
     for (int a = 0; a < 2; a++) {
@@ -174,6 +190,8 @@ cJSON *bst_pd_json(const bst_pd_scene *s, const bst_pd_result *r, const bst_pd_f
     bst_json_add_number(root, "loss_db_pd90", f->loss_db_pd90);
     bst_json_add_number(root, "loss_db_pd50_sigma", f->loss_db_sigma_pd50);
     bst_json_add_number(root, "loss_db_pd90_sigma", f->loss_db_sigma_pd90);
+    bst_json_add_number(root, "loss_over_matched_filter_db_pd50", f->own_light_db_pd50);
+    bst_json_add_number(root, "loss_over_matched_filter_db_pd90", f->own_light_db_pd90);
     bst_json_add_number(root, "process_ms", 1e3 * r->process_s);
     bst_json_add_number(root, "wall_s", r->wall_s);
     cJSON *points = cJSON_AddArrayToObject(root, "points");
@@ -198,9 +216,10 @@ static void put_points(FILE *o, const bst_pd_scene *s, const bst_pd_result *r,
     fputs("$ideal << BST_END\n", o);
     for (int i = 0; i <= 200 && f->pfa > 0.0; i++) {
         double snr = low + (high - low) * i / 200.0;
-        fprintf(o, "%.9g %.9g\n", snr, bst_ideal_pd(f->pfa, snr));
+        fprintf(o, "%.9g %.9g %.9g\n", snr, bst_ideal_pd(f->pfa, snr),
+                bst_matched_filter_pd(f->pfa, snr, s->own_light));
     }
-    fputs("0 nan\nBST_END\n", o);
+    fputs("0 nan nan\nBST_END\n", o);
     fprintf(o, "set xrange [%.9g:%.9g]\n", low - 0.02 * (high - low), high + 0.02 * (high - low));
 }
 
@@ -232,6 +251,8 @@ bst_status bst_pd_plot(bst_ctx *ctx, const char *path, const bst_pd_scene *s,
         "\" font ',12' noenhanced\n"
         "plot $ideal using 1:2 with lines linecolor rgb '#c0392b' linewidth 1.6 "
         "title 'ideal, place and shape known', "
+        "$ideal using 1:3 with lines linecolor rgb '#c0392b' linewidth 1.2 dashtype 2 "
+        "title \"with the target's own photon noise\", "
         "$points using 1:2:3:4 with yerrorbars pointtype 7 pointsize 0.7 "
         "linecolor rgb '#1f4e9c' title 'measured, 95 %'\n"
         "unset title\nset origin 0,0\nset size 1,0.42\nset tmargin 0.8\nset bmargin 3.4\n"

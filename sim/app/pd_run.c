@@ -18,7 +18,7 @@ static const int64_t FEWEST_EMPTY = 50, MOST_EMPTY = 400;
 
 typedef struct runner {
     bst_pd_scene *scene;
-    const bst_pd_detector *detector;
+    bst_pd_detector *detector;
     bst_detections *detections;
     int capacity;
     int *of_target, *of_detection; /* [room], [capacity] */
@@ -111,17 +111,11 @@ static void count_chance(runner *r, const bst_pd_frame *f) {
 
 static bst_status process(bst_ctx *ctx, runner *r, bst_frame *frame, const bst_pd_frame *f,
                           bool targets) {
-    const bst_pd_scene *s = r->scene;
     const uint16_t *pixels;
-    BST_TRY(bst_frame_map(frame, ctx, &pixels));
-    bst_imgproc_frame view = {.pixels = pixels,
-                              .window = f->request.window,
-                              .binning = 1,
-                              .bits = (int)s->camera.bits,
-                              .exposure_s = s->exposure_s};
+    BST_TRY(bst_frame_map(frame, ctx, &pixels)); /* waits for it, before the clock runs */
     double started = bst_wall_seconds();
     bst_status status =
-        r->detector->detect(ctx, r->detector->self, &view, &f->motion, r->detections, r->capacity);
+        bst_pd_detect(ctx, r->detector, r->scene, frame, f, r->detections, r->capacity);
     r->result->process_s += targets ? 0.0 : bst_wall_seconds() - started;
     bst_frame_unmap(frame);
     BST_TRY(status);
@@ -172,7 +166,7 @@ static int64_t empty_frames(const bst_pd_options *o, double requested) {
     return (int64_t)fmin(fmax(wanted, (double)FEWEST_EMPTY), (double)MOST_EMPTY);
 }
 
-bst_status bst_pd_run(bst_ctx *ctx, bst_pd_scene *s, const bst_pd_detector *detector,
+bst_status bst_pd_run(bst_ctx *ctx, bst_pd_scene *s, bst_pd_detector *detector,
                       bst_pd_result *out) {
     int room = bst_pd_scene_room(s);
     runner r = {.scene = s, .detector = detector, .capacity = 4 * room + 65536, .result = out};
@@ -230,6 +224,10 @@ void bst_pd_figures_of(const bst_pd_scene *s, const bst_pd_result *r, bst_pd_fig
     out->pd90 = bst_pd_snr_at(points, s->points, out->chance, 0.9);
     out->loss_db_pd50 = bst_pd_loss_db(out->pd50.snr, out->pfa, 0.5);
     out->loss_db_pd90 = bst_pd_loss_db(out->pd90.snr, out->pfa, 0.9);
+    out->own_light_db_pd50 =
+        20.0 * log10(out->pd50.snr / bst_matched_filter_snr(out->pfa, 0.5, s->own_light));
+    out->own_light_db_pd90 =
+        20.0 * log10(out->pd90.snr / bst_matched_filter_snr(out->pfa, 0.9, s->own_light));
     out->loss_db_sigma_pd50 = loss_sigma(out->pd50, out->pfa, r->false_alarms, 0.5);
     out->loss_db_sigma_pd90 = loss_sigma(out->pd90, out->pfa, r->false_alarms, 0.9);
 }

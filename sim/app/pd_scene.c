@@ -127,9 +127,9 @@ static bst_status make_sharpness(bst_ctx *ctx, bst_pd_scene *s) {
                                        .dy_px = s->options.streak_px * sin(angle),
                                        .sigma_px = s->sigma_px,
                                        .flux_e = 1.0};
-            double one;
-            BST_TRY(bst_gaussian_sharpness(ctx, &source, &one));
-            s->sharpness[a] += 0.25 * one;
+            double powers[2];
+            BST_TRY(bst_gaussian_powers(ctx, &source, powers));
+            s->sharpness[a] += 0.25 * powers[0];
         }
     }
     return BST_OK;
@@ -164,6 +164,22 @@ double bst_pd_sharpness(const bst_pd_scene *s, const bst_match_target *place) {
                axis_sharpness(0.125 + 0.5 * (p / 2), s->sigma_px);
     }
     return sum;
+}
+
+/* What the targets' own light adds to the noise of a matched filter's output. */
+static bst_status set_own_light(bst_ctx *ctx, bst_pd_scene *s) {
+    for (int p = 0; p < 4; p++) {
+        bst_bound_source source = {.x_px = 0.125 + 0.5 * (p % 2),
+                                   .y_px = 0.125 + 0.5 * (p / 2),
+                                   .dx_px = 0.8 * s->options.streak_px,
+                                   .dy_px = 0.6 * s->options.streak_px,
+                                   .sigma_px = s->sigma_px,
+                                   .flux_e = 1.0};
+        double powers[2];
+        BST_TRY(bst_gaussian_powers(ctx, &source, powers));
+        s->own_light += 0.25 * powers[1] / pow(powers[0], 1.5) / s->noise_e;
+    }
+    return BST_OK;
 }
 
 static bst_status make_grid(bst_ctx *ctx, bst_pd_scene *s) {
@@ -234,6 +250,7 @@ static bst_status open_scene(bst_ctx *ctx, bst_pd_scene *s) {
     if (s->options.streak_px > 0.0) {
         BST_TRY(make_sharpness(ctx, s));
     }
+    BST_TRY(set_own_light(ctx, s));
     set_points(s);
     BST_TRY(bst_device_open(ctx, s->options.device ? s->options.device : "", s->options.threads,
                             &s->device));

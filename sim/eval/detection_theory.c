@@ -81,6 +81,17 @@ double bst_ideal_snr(double pfa, double pd) {
     return bst_normal_tail_inverse(pfa) - bst_normal_tail_inverse(pd);
 }
 
+double bst_matched_filter_pd(double pfa, double snr, double own_light) {
+    return bst_normal_tail((bst_normal_tail_inverse(pfa) - snr) / sqrt(1.0 + own_light * snr));
+}
+
+double bst_matched_filter_snr(double pfa, double pd, double own_light) {
+    /* (snr - t)^2 = z^2 (1 + own_light snr), the root on the side of z */
+    double t = bst_normal_tail_inverse(pfa), z = -bst_normal_tail_inverse(pd);
+    double half = 0.5 * own_light * z;
+    return t + z * (half + sqrt(half * half + 1.0 + own_light * t));
+}
+
 bst_interval bst_wilson_interval(int64_t hits, int64_t trials, double z) {
     if (trials <= 0) {
         return (bst_interval){0.0, 1.0};

@@ -23,6 +23,14 @@ double bst_ideal_pd(double pfa, double snr);
 /* The SNR at which bst_ideal_pd is pd: Q^-1(pfa) - Q^-1(pd). */
 double bst_ideal_snr(double pfa, double pd);
 
+/* The same of a filter matched to the shape when the signal brings photon noise of its own: the
+ * variance of its output grows by own_light times the SNR (of the background's noise),
+ * own_light = sum p^3 / (sum p^2)^1.5 / noise_e for shares p of the light and noise_e electrons of
+ * noise per pixel. pd = Q((Q^-1(pfa) - snr) / sqrt(1 + own_light snr)). */
+double bst_matched_filter_pd(double pfa, double snr, double own_light);
+/* The SNR at which that is pd. */
+double bst_matched_filter_snr(double pfa, double pd, double own_light);
+
 typedef struct bst_interval {
     double low, high;
 } bst_interval;

@@ -196,13 +196,15 @@ bst_status bst_location_bound_gaussian(bst_ctx *ctx, const bst_bound_source *sou
     return status;
 }
 
-bst_status bst_gaussian_sharpness(bst_ctx *ctx, const bst_bound_source *source, double *out) {
+bst_status bst_gaussian_powers(bst_ctx *ctx, const bst_bound_source *source, double out[2]) {
     image m = {.pixels = 0};
     BST_TRY(open_image(ctx, source, 8.3 * source->sigma_px + 1.0, &m));
     draw(&m, source);
-    *out = 0.0;
+    out[0] = out[1] = 0.0;
     for (int p = 0; p < m.pixels; p++) {
-        *out += m.share[p] * m.share[p];
+        double square = m.share[p] * m.share[p];
+        out[0] += square;
+        out[1] += square * m.share[p];
     }
     free(m.memory);
     return BST_OK;

@@ -58,9 +58,9 @@ bst_status bst_location_bound_gaussian(bst_ctx *ctx, const bst_bound_source *sou
  * Length 0 stands for the x axis. */
 void bst_location_bound_along(const bst_location_bound *bound, double dx, double dy, double out[2]);
 
-/* sum share^2 over all pixels of such a Gaussian of unit flux: its SNR is flux times the root of
- * this over noise_e. */
-bst_status bst_gaussian_sharpness(bst_ctx *ctx, const bst_bound_source *source,
-                                  double *out) BST_MUST_CHECK;
+/* Sums of share^2 and of share^3 over all pixels of such a Gaussian of unit flux: its SNR is flux
+ * times the root of the first over noise_e. */
+bst_status bst_gaussian_powers(bst_ctx *ctx, const bst_bound_source *source,
+                               double out[2]) BST_MUST_CHECK;
 
 #endif

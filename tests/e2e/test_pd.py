@@ -48,6 +48,8 @@ class Measured(unittest.TestCase):
             centre = (raw + z * z / 600) / (1 + z * z / 300)
             self.assertAlmostEqual((p["pd_low"] + p["pd_high"]) / 2, centre,
                                    delta=2 * self.out["chance"] + 1e-12)
+            self.assertTrue(min(p["ideal_pd"], 0.5) - 0.03 < p["matched_filter_pd"]
+                            < max(p["ideal_pd"], 0.5) + 0.03)
             self.assertAlmostEqual(p["ideal_pd"], 1 - NORMAL.cdf(threshold - p["snr"]), delta=1e-9)
 
     def test_light_is_what_the_snr_says(self):
@@ -86,6 +88,24 @@ class Measured(unittest.TestCase):
         self.assertEqual(out["points"], self.out["points"])
         self.assertEqual(out["false_alarms_per_frame"], self.out["false_alarms_per_frame"])
 
+    def test_a_module_is_stepped_to_the_same_end(self):
+        """The path of detectors that users plug in, taken with the one whose function was called."""
+        words = ["--snr", "5:7:1", "--trials", "60", "--empty-frames", "4", "--streak", "5",
+                 "--known-rate"]
+        out = []
+        for extra in ([], ["--module"]):
+            path = os.path.join(self.folder, "module.json")
+            result = pd(*words, "--json", path, *extra)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            with open(path) as file:
+                out.append(json.load(file))
+        self.assertEqual(out[0]["false_alarms_per_frame"], out[1]["false_alarms_per_frame"])
+        for a, b in zip(out[0]["points"], out[1]["points"]):
+            self.assertEqual(a["detected"], b["detected"])
+            # the camera's motion by telemetry differs in the last places
+            self.assertAlmostEqual(a["centroid_rms_across_px"], b["centroid_rms_across_px"],
+                                   delta=1e-6)
+
     def test_streaks_of_known_rate(self):
         path = os.path.join(self.folder, "streak.json")
         result = pd("--snr", "10:30:20", "--trials", "40", "--empty-frames", "2", "--streak", "20",
@@ -108,6 +128,7 @@ class WrongCalls(unittest.TestCase):
                                   (["--known-rate"], 2, "--streak"),
                                   (["--trials", "0"], 2, "trials"),
                                   (["--sensor", "nobody"], 1, "OBSERVER/SENSOR"),
+                                  (["--module", "--false-alarms", "2"], 1, "--set"),
                                   (["--cell", "10"], 1, "--cell"),
                                   (["--streak", "990"], 1, "no room")):
             result = pd(*words)

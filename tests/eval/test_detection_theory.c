@@ -80,6 +80,23 @@ static void ideal_detector_is_neyman_pearsons(void **state) {
     bst_assert_close(bst_ideal_pd(1e-5, bst_ideal_snr(1e-5, 0.73)), 0.73, 1e-14);
 }
 
+/* Without own light it is the ideal detector; with it the two functions are inverses, and at a half
+ * nothing changes. */
+static void own_light_flattens_the_curve(void **state) {
+    (void)state;
+    bst_assert_close(bst_matched_filter_pd(1e-6, 6.0, 0.0), bst_ideal_pd(1e-6, 6.0), 1e-15);
+    bst_assert_close(bst_matched_filter_snr(1e-6, 0.5, 0.05), bst_ideal_snr(1e-6, 0.5), 1e-14);
+    /* (6.5 - 5) / sqrt(1 + 0.2 * 6.5) = 0.98907 */
+    bst_assert_close(bst_matched_filter_pd(bst_normal_tail(5.0), 6.5, 0.2),
+                     bst_normal_tail(-1.5 / sqrt(2.3)), 1e-14);
+    for (double pd = 0.05; pd < 1.0; pd += 0.1) {
+        for (double own = 0.0; own < 2.0; own += 0.3) {
+            double snr = bst_matched_filter_snr(1e-7, pd, own);
+            bst_assert_close(bst_matched_filter_pd(1e-7, snr, own), pd, 1e-13);
+        }
+    }
+}
+
 /* Newcombe 1998, Statistics in Medicine 17, 857, table I, method 3: four decimals. */
 static void wilson_interval_is_the_published_one(void **state) {
     (void)state;
@@ -138,6 +155,7 @@ int main(void) {
         cmocka_unit_test(tail_is_right_to_the_last_places),
         cmocka_unit_test(inverse_is_right_to_the_last_places),
         cmocka_unit_test(ideal_detector_is_neyman_pearsons),
+        cmocka_unit_test(own_light_flattens_the_curve),
         cmocka_unit_test(wilson_interval_is_the_published_one),
         cmocka_unit_test(poisson_interval_is_exact),
     };
