@@ -20,6 +20,7 @@ static const command commands[] = {
     {"propagate", bst_cmd_propagate, "positions and velocities from two-line element sets"},
     {"calframes", bst_cmd_calframes, "bias, dark and flat frames of a scenario's sensors"},
     {"bench", bst_cmd_bench, "measure speed and error"},
+    {"pd", bst_cmd_pd, "measure detection, false alarms and location against theory"},
 };
 
 void bst_app_log(void *user, bst_log_level level, const char *message) {
