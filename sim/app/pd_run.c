@@ -28,7 +28,8 @@ typedef struct runner {
 static bst_status add_bound(bst_ctx *ctx, const runner *r, const bst_match_target *place,
                             const bst_pd_target *target, bst_pd_tally *tally) {
     const bst_pd_scene *s = r->scene;
-    if (tally->bounds >= (s->sharpness ? BOUNDS_OF_STREAKS : BOUNDS_AT_REST)) {
+    if (tally->bounds >= (s->sharpness ? BOUNDS_OF_STREAKS : BOUNDS_AT_REST) ||
+        (s->options.known_rate && tally->bounds > r->result->frames)) { /* one direction a frame */
         return BST_OK;
     }
     bst_bound_source source = {.x_px = place->x_px,
