@@ -61,6 +61,14 @@ static bst_status check(bst_ctx *ctx, pd_request *r) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "--known-rate is of streaks: give their length with --streak PX");
     }
+    if (o->known_rate && o->star_streak_px > 0.0) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "with --known-rate stars streak as targets do: leave out --star-streak");
+    }
+    if (o->stars && o->background_e >= 0.0) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "--stars keeps the scenario's sky, --background sets another: give one");
+    }
     o->threads = (int)r->threads;
     return bst_load_check(ctx, &r->load);
 }
@@ -212,6 +220,19 @@ int bst_cmd_pd(int argc, char **argv) {
          .doc = "one target in each square of this side (default: 40 more than they are apart)",
          .minimum = 3,
          .maximum = 32768},
+        {.name = "stars",
+         .kind = BST_OPTION_FLAG,
+         .target = &o->stars,
+         .doc = "keep the scenario's stars and sky, the camera rolled from frame to frame; what "
+                "may be a star of SNR 1 or more is no false alarm"},
+        {.name = "star-streak",
+         .kind = BST_OPTION_REAL,
+         .target = &o->star_streak_px,
+         .argument = "PX",
+         .doc = "the camera turns with the targets, each frame in a direction of its own, so that "
+                "stars streak by this; image processing is told (default 0)",
+         .minimum = 0,
+         .maximum = 1000},
         {.name = "module",
          .kind = BST_OPTION_FLAG,
          .target = &o->by_module,

@@ -4,6 +4,7 @@
 
 #include "imgproc/imgproc.h"
 #include "scenegen/renderer.h"
+#include "sim/app/pd_sky.h"
 #include "sim/engine/scenario.h"
 #include "sim/eval/pd_curve.h"
 #include "sim/eval/target_match.h"
@@ -14,25 +15,27 @@ enum { BST_PD_POINTS = 200, BST_PD_PHASES = 10 };
 typedef struct bst_pd_options {
     double low, high, step; /* SNR; with by_magnitude V */
     bool by_magnitude;
-    int64_t trials;       /* per point */
-    int64_t empty_frames; /* without targets; 0: for 400 false alarms, 50 to 400 */
-    double streak_px;     /* 0: targets at rest in the frame */
-    bool known_rate;      /* the camera turns and image processing is told how */
-    double false_alarms;  /* per frame; <= 0: as the scenario says */
-    double background_e;  /* sky per pixel and exposure; < 0: the scenario's */
-    double jitter_px;     /* blur per axis; < 0: what image processing is set to */
-    double apart_px;      /* least distance between targets beyond their own length */
-    double cell_px;       /* of the grid of targets; 0: apart_px + length + 40 */
-    bool by_module;       /* step the scenario's module also where a function would do */
-    const char *sensor;   /* "observer/sensor"; NULL: the first */
+    int64_t trials;        /* per point */
+    int64_t empty_frames;  /* without targets; 0: for 400 false alarms, 50 to 400 */
+    double streak_px;      /* 0: targets at rest in the frame */
+    bool known_rate;       /* the camera turns and image processing is told how */
+    double false_alarms;   /* per frame; <= 0: as the scenario says */
+    double background_e;   /* sky per pixel and exposure; < 0: the scenario's */
+    double jitter_px;      /* blur per axis; < 0: what image processing is set to */
+    double apart_px;       /* least distance between targets beyond their own length */
+    double cell_px;        /* of the grid of targets; 0: apart_px + length + 40 */
+    bool stars;            /* the scenario's stars and sky behind the targets */
+    double star_streak_px; /* the camera turns, so that stars streak and targets do not */
+    bool by_module;        /* step the scenario's module also where a function would do */
+    const char *sensor;    /* "observer/sensor"; NULL: the first */
     const char *device;
     int threads;
 } bst_pd_options;
 
 /* One target of a frame. */
 typedef struct bst_pd_target {
-    int point; /* index of its SNR */
-    double flux_e;
+    int point;              /* index of its SNR */
+    double flux_e, noise_e; /* noise of a pixel without the target's light, at its place */
 } bst_pd_target;
 
 /* One frame: its targets and what is needed to render and process it. */
@@ -40,7 +43,9 @@ typedef struct bst_pd_frame {
     int count;
     bst_match_target *places; /* [count] */
     bst_pd_target *targets;
-    bst_source *sources;
+    bst_source *sources; /* targets, then the stars */
+    int source_room;
+    bst_pd_stars stars; /* that may be found */
     bst_source_path *paths;
     bst_motion motion; /* the camera's, as told to image processing */
     double time_s[2];
@@ -62,6 +67,7 @@ typedef struct bst_pd_scene {
     struct bst_psf *psf; /* of the widened camera; NULL: it was not widened */
     bst_device *device;
     bst_renderer *renderer;
+    bst_pd_sky *sky; /* NULL: no stars, and one level of sky all over */
     double exposure_s, sky_e, dark_e;
     double noise_e;    /* of a pixel without the source's own light, at the boresight */
     double fwhm_px;    /* of the PSF: how near a detection must be */
@@ -86,9 +92,8 @@ void bst_pd_scene_close(bst_pd_scene *scene);
 int bst_pd_scene_room(const bst_pd_scene *scene);
 /* Frame `number` (0, 1, ...) into `frame`: places, light and noise follow from the scenario's seed
  * and the number alone. Without targets: its noise is another. */
-void bst_pd_scene_set(bst_pd_scene *scene, int64_t number, bool targets, bst_pd_frame *frame);
-/* Background noise and the share of light that vignetting leaves, at a place. */
-double bst_pd_noise_e(const bst_pd_scene *scene, double x_px, double y_px);
+bst_status bst_pd_scene_set(bst_ctx *ctx, bst_pd_scene *scene, int64_t number, bool targets,
+                            bst_pd_frame *frame) BST_MUST_CHECK;
 /* sum p^2 of a target of unit flux. */
 double bst_pd_sharpness(const bst_pd_scene *scene, const bst_match_target *place);
 
@@ -109,6 +114,7 @@ typedef struct bst_pd_result {
     bst_pd_tally tallies[BST_PD_POINTS];
     int64_t frames, empty_frames;
     int64_t false_alarms;      /* in the frames without targets */
+    int64_t stars;             /* detections in them that may be stars: no false alarms */
     int64_t unmatched, second; /* in those with: detections that are no target's; a target's
                                   beyond its first */
     int64_t chance_trials, chance_hits; /* targets that are not there */

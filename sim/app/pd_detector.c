@@ -12,7 +12,7 @@
 #include "sim/io/psf_fits.h"
 #include "sim/world/knowledge.h"
 
-enum { ROOM_PER_TARGET = 4, SAMPLES = 5, RING = 64 };
+enum { ROOM_PER_TARGET = 4, MOST_DETECTIONS = 65536, SAMPLES = 5, RING = 64 };
 
 /* What the feeding module publishes in its next step. */
 typedef struct feed {
@@ -176,8 +176,9 @@ static bst_status open_function(bst_ctx *ctx, bst_pd_scene *s, bst_pd_detector *
     s->options.false_alarms = d->config.false_alarms_per_frame;
     double room = ROOM_PER_TARGET * (double)bst_pd_scene_room(s) +
                   20.0 * d->config.false_alarms_per_frame + 1000.0;
+    room = s->options.stars ? MOST_DETECTIONS : fmin(room, MOST_DETECTIONS);
     if ((double)d->config.capacity < room) {
-        d->config.capacity = (int64_t)fmin(room, 65536.0);
+        d->config.capacity = (int64_t)room;
     }
     bst_camera camera = *bst_knowledge_camera(s->knowledge);
     double oversampling;

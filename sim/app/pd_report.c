@@ -106,6 +106,10 @@ void bst_pd_print(const bst_pd_scene *s, const bst_pd_result *r, const bst_pd_fi
         }
         printf("\n");
     }
+    if (s->sky) {
+        printf("\n  detections per frame without targets that may be stars: %.4g",
+               (double)r->stars / fmax((double)r->empty_frames, 1.0));
+    }
     printf("\n  false alarms per frame %.4g (95 %%: %.4g to %.4g)", f->false_alarms_per_frame,
            f->false_alarms_low, f->false_alarms_high);
     if (s->options.false_alarms > 0.0) {
@@ -170,6 +174,8 @@ cJSON *bst_pd_json(const bst_pd_scene *s, const bst_pd_result *r, const bst_pd_f
     bst_json_add_number(root, "exposure_s", s->exposure_s);
     bst_json_add_number(root, "streak_px", s->options.streak_px);
     cJSON_AddBoolToObject(root, "known_rate", s->options.known_rate);
+    cJSON_AddBoolToObject(root, "stars", s->options.stars);
+    bst_json_add_number(root, "star_streak_px", s->options.star_streak_px);
     bst_json_add_number(root, "targets_per_frame", bst_pd_scene_room(s));
     bst_json_add_number(root, "frames", (double)r->frames);
     bst_json_add_number(root, "empty_frames", (double)r->empty_frames);
@@ -179,9 +185,11 @@ cJSON *bst_pd_json(const bst_pd_scene *s, const bst_pd_result *r, const bst_pd_f
     bst_json_add_number(root, "false_alarms_per_frame", f->false_alarms_per_frame);
     bst_json_add_number(root, "false_alarms_low", f->false_alarms_low);
     bst_json_add_number(root, "false_alarms_high", f->false_alarms_high);
+    bst_json_add_number(root, "star_detections_per_frame",
+                        (double)r->stars / fmax((double)r->empty_frames, 1.0));
     bst_json_add_number(root, "unmatched_per_frame_with_targets",
                         (double)r->unmatched / fmax((double)r->frames, 1.0));
-    bst_json_add_number(root, "seconds_per_frame_with_targets",
+    bst_json_add_number(root, "further_per_frame_with_targets",
                         (double)r->second / fmax((double)r->frames, 1.0));
     bst_json_add_number(root, "chance", f->chance);
     bst_json_add_number(root, "snr_pd50", f->pd50.snr);

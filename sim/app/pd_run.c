@@ -28,7 +28,8 @@ typedef struct runner {
 static bst_status add_bound(bst_ctx *ctx, const runner *r, const bst_match_target *place,
                             const bst_pd_target *target, bst_pd_tally *tally) {
     const bst_pd_scene *s = r->scene;
-    if (tally->bounds >= (s->sharpness ? BOUNDS_OF_STREAKS : BOUNDS_AT_REST)) {
+    if (tally->bounds >= (s->sharpness ? BOUNDS_OF_STREAKS : BOUNDS_AT_REST) ||
+        (s->options.known_rate && tally->bounds > r->result->frames)) { /* one direction a frame */
         return BST_OK;
     }
     bst_bound_source source = {.x_px = place->x_px,
@@ -37,7 +38,7 @@ static bst_status add_bound(bst_ctx *ctx, const runner *r, const bst_match_targe
                                .dy_px = place->dy_px,
                                .sigma_px = s->sigma_px,
                                .flux_e = target->flux_e};
-    bst_bound_noise noise = {bst_pd_noise_e(s, place->x_px, place->y_px), true};
+    bst_bound_noise noise = {target->noise_e, true};
     bst_location_bound bound;
     double along[2];
     BST_TRY(bst_location_bound_gaussian(ctx, &source, &noise, BOUND_MARGIN_PX, &bound));
@@ -105,7 +106,11 @@ static void count_chance(runner *r, const bst_pd_frame *f) {
     out->chance_hits += bst_match_targets(f->places, f->count, r->scene->fwhm_px, r->detections,
                                           r->of_target, r->of_detection);
     out->chance_trials += f->count;
-    out->false_alarms += r->detections->count;
+    for (int i = 0; i < r->detections->count; i++) {
+        bool star = bst_pd_is_star(&f->stars, r->scene->fwhm_px, &r->detections->items[i]);
+        out->stars += star;
+        out->false_alarms += !star;
+    }
     out->empty_frames++;
 }
 
@@ -140,7 +145,10 @@ static bst_status do_frames(bst_ctx *ctx, runner *r, int64_t count, bool targets
             break;
         }
         if (n < count) {
-            bst_pd_scene_set(s, n, targets, &s->frames[n % 2]);
+            bst_pd_frame *f = &s->frames[n % 2];
+            status = bst_pd_scene_set(ctx, s, n, targets, f);
+        }
+        if (n < count && status == BST_OK) {
             status =
                 bst_renderer_render(ctx, s->renderer, &s->frames[n % 2].request, &frames[n % 2]);
         }

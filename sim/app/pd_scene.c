@@ -63,6 +63,27 @@ static bst_status read_psf(bst_ctx *ctx, bst_pd_scene *s) {
     return status;
 }
 
+/* Noise of a pixel that has no source. */
+static double noise_at(const bst_pd_scene *s, double x_px, double y_px) {
+    double sky_e = s->sky ? bst_pd_sky_e(s->sky, x_px, y_px) : s->sky_e;
+    return sqrt(sky_e + s->dark_e + s->camera.read_noise_e * s->camera.read_noise_e);
+}
+
+/* The scenario's sky, looked at once for its level at the boresight. */
+static bst_status open_sky(bst_ctx *ctx, bst_pd_scene *s) {
+    BST_TRY(bst_pd_sky_open(ctx, s, &s->sky));
+    const double time_s[2] = {0.0, s->exposure_s};
+    bst_quat q = bst_pd_sky_attitude(s->sky, 0.0);
+    const bst_quat both[2] = {q, q};
+    bst_los_track track = {2, time_s, both};
+    const bst_source *stars;
+    int count;
+    BST_TRY(bst_pd_sky_look(ctx, s->sky, &track, &stars, &count));
+    s->sky_e =
+        bst_pd_sky_e(s->sky, bst_camera_centre_x(&s->camera), bst_camera_centre_y(&s->camera));
+    return BST_OK;
+}
+
 /* Camera, its PSF and the noise of a pixel. */
 static bst_status set_camera(bst_ctx *ctx, bst_pd_scene *s) {
     const bst_sensor_config *config = sensor_config(s->scenario, s->observer, s->sensor);
@@ -85,17 +106,20 @@ static bst_status set_camera(bst_ctx *ctx, bst_pd_scene *s) {
         return bst_fail(ctx, BST_ERR_CONFIG, "%s exposes for %g s: there is no light to measure",
                         s->name, s->exposure_s);
     }
-    if (s->options.background_e < 0.0 && bst_skylight_varies(c)) {
+    if (!s->options.stars && s->options.background_e < 0.0 && bst_skylight_varies(c)) {
         return bst_fail(ctx, BST_ERR_CONFIG,
                         "the sky of %s differs from pixel to pixel (camera.background): give one "
-                        "level for all with --background",
+                        "level for all with --background, or keep the sky with --stars",
                         s->name);
     }
     s->sky_e = s->options.background_e >= 0.0 ? s->options.background_e
                                               : bst_camera_background_e_per_s(c) * s->exposure_s;
     s->dark_e = bst_camera_dark_e_per_s(c) * s->exposure_s;
+    if (s->options.stars) {
+        BST_TRY(open_sky(ctx, s));
+    }
     double centre_x = bst_camera_centre_x(c), centre_y = bst_camera_centre_y(c);
-    s->noise_e = bst_pd_noise_e(s, centre_x, centre_y);
+    s->noise_e = noise_at(s, centre_x, centre_y);
     bst_psf *psf;
     BST_TRY(bst_psf_create(ctx, c, &psf));
     s->fwhm_px = bst_psf_equivalent_fwhm_px(psf, centre_x, centre_y);
@@ -105,11 +129,6 @@ static bst_status set_camera(bst_ctx *ctx, bst_pd_scene *s) {
     }
     bst_psf_free(psf);
     return BST_OK;
-}
-
-double bst_pd_noise_e(const bst_pd_scene *s, double x_px, double y_px) {
-    double light = bst_camera_illumination(&s->camera, x_px, y_px);
-    return sqrt(s->sky_e * light + s->dark_e + s->camera.read_noise_e * s->camera.read_noise_e);
 }
 
 /* The mean over places in the pixel, which differ little for a streak. */
@@ -206,6 +225,7 @@ static bst_status make_grid(bst_ctx *ctx, bst_pd_scene *s) {
         f->places = calloc(room, sizeof *f->places);
         f->targets = calloc(room, sizeof *f->targets);
         f->sources = calloc(room, sizeof *f->sources);
+        f->source_room = (int)room;
         f->paths = calloc(room, sizeof *f->paths);
         if (!f->places || !f->targets || !f->sources || !f->paths) {
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu targets a frame", room);
@@ -273,6 +293,7 @@ void bst_pd_scene_close(bst_pd_scene *s) {
     bst_renderer_free(s->renderer);
     bst_device_close(s->device);
     bst_psf_free(s->psf);
+    bst_pd_sky_close(s->sky);
     bst_knowledge_free(s->knowledge);
     bst_world_free(s->world);
     free(s->sharpness);
@@ -281,6 +302,7 @@ void bst_pd_scene_close(bst_pd_scene *s) {
         free(s->frames[i].targets);
         free(s->frames[i].sources);
         free(s->frames[i].paths);
+        bst_pd_stars_free(&s->frames[i].stars);
     }
     *s = (bst_pd_scene){.points = 0};
 }
@@ -289,15 +311,15 @@ int bst_pd_scene_room(const bst_pd_scene *s) {
     return s->columns * s->rows;
 }
 
-/* Place in the middle of the exposure of a source that is at (x, y) in an unmoved camera, after the
- * camera's turn. */
-static bst_vec3 turned(bst_vec3 v, bst_vec3 turn, double share) {
-    return bst_quat_rotate(bst_quat_from_rotvec(bst_vec3_scale(turn, share)), v);
+/* Direction among the stars of a place on the focal plane in the attitude q. */
+static bst_vec3 direction(const bst_camera *c, bst_quat q, double x, double y) {
+    return bst_quat_rotate(bst_quat_conj(q), bst_camera_unproject(c, x, y));
 }
 
-/* Direction whose image is so far from that of v. */
-static bst_vec3 moved(const bst_camera *c, double x, double y, double dx, double dy) {
-    return bst_camera_unproject(c, x + dx, y + dy);
+/* Where a direction among the stars is seen at the start (0) or end (1) of the exposure. */
+static bool seen(const bst_camera *c, const bst_pd_frame *f, int end, bst_vec3 v, double *x,
+                 double *y) {
+    return bst_camera_project(c, bst_quat_rotate(f->q[end], v), x, y);
 }
 
 static void add_target(bst_pd_scene *s, bst_pd_frame *f, double x, double y, int point,
@@ -308,30 +330,29 @@ static void add_target(bst_pd_scene *s, bst_pd_frame *f, double x, double y, int
     bst_source *source = &f->sources[i];
     *source = (bst_source){.kind = BST_SOURCE_STAR,
                            .id = (uint32_t)i + 1,
-                           .apparent_mid = bst_camera_unproject(c, x, y)};
+                           .apparent_mid = direction(c, f->motion.q_cam_from_gcrf, x, y)};
     if (length > 0.0 && s->options.known_rate) {
         double x0, y0, x1, y1;
-        bst_vec3 v = source->apparent_mid;
-        if (bst_camera_project(c, turned(v, f->motion.turn_cam_rad, -0.5), &x0, &y0) &&
-            bst_camera_project(c, turned(v, f->motion.turn_cam_rad, 0.5), &x1, &y1)) {
+        if (seen(c, f, 0, source->apparent_mid, &x0, &y0) &&
+            seen(c, f, 1, source->apparent_mid, &x1, &y1)) {
             dx = x1 - x0;
             dy = y1 - y0;
         }
-    } else if (length > 0.0) {
+    } else if (length > 0.0 || s->options.star_streak_px > 0.0) {
         source->kind = BST_SOURCE_OBJECT;
-        f->paths[i] =
-            bst_source_path_through(moved(c, x, y, -0.5 * dx, -0.5 * dy), source->apparent_mid,
-                                    moved(c, x, y, 0.5 * dx, 0.5 * dy));
+        f->paths[i] = bst_source_path_through(direction(c, f->q[0], x - 0.5 * dx, y - 0.5 * dy),
+                                              source->apparent_mid,
+                                              direction(c, f->q[1], x + 0.5 * dx, y + 0.5 * dy));
         source->path = &f->paths[i];
     }
     f->places[i] = (bst_match_target){x, y, dx, dy};
-    double flux = s->flux_e[point];
+    double flux = s->flux_e[point], noise_e = noise_at(s, x, y);
     if (!s->options.by_magnitude) { /* the SNR is that of its own place */
-        flux = s->snr[point] * bst_pd_noise_e(s, x, y) / sqrt(bst_pd_sharpness(s, &f->places[i]));
+        flux = s->snr[point] * noise_e / sqrt(bst_pd_sharpness(s, &f->places[i]));
     }
     double light = bst_camera_illumination(c, x, y);
     source->electrons_per_s = flux / s->exposure_s / (s->options.by_magnitude ? 1.0 : light);
-    f->targets[i] = (bst_pd_target){point, s->options.by_magnitude ? flux * light : flux};
+    f->targets[i] = (bst_pd_target){point, s->options.by_magnitude ? flux * light : flux, noise_e};
 }
 
 /* A turn of the camera that moves the middle of the image along (dx, dy). */
@@ -341,51 +362,94 @@ static bst_vec3 turn_for(const bst_camera *c, double dx, double dy) {
                           bst_camera_unproject(c, x + 0.5 * dx, y + 0.5 * dy));
 }
 
-void bst_pd_scene_set(bst_pd_scene *s, int64_t number, bool targets, bst_pd_frame *f) {
+/* The camera's attitude through the exposure. */
+static void set_motion(bst_pd_scene *s, bst_pd_frame *f, double heading, double roll) {
     const bst_pd_options *o = &s->options;
-    bst_rng_key key =
-        bst_rng_make_key(s->scenario->seed, (uint64_t)s->scenario->run, s->name, "pd targets");
-    uint64_t n = (uint64_t)number, draw = 0;
-    double heading = 2.0 * BST_PI * bst_rng_uniform(key, n, draw++);
-    f->motion = (bst_motion){.q_cam_from_gcrf = BST_QUAT_IDENTITY};
-    if (o->known_rate) {
-        f->motion.turn_cam_rad =
-            turn_for(&s->camera, o->streak_px * cos(heading), o->streak_px * sin(heading));
-    }
-    f->count = 0;
-    int room = bst_pd_scene_room(s);
-    int64_t first = number * room, last = s->points * o->trials;
-    double origin_x = 0.5 * ((double)s->camera.width_px - s->columns * s->cell_px) - 0.5;
-    double origin_y = 0.5 * ((double)s->camera.height_px - s->rows * s->cell_px) - 0.5;
-    double span = s->cell_px - s->apart_px;
-    for (int i = 0; i < room; i++) {
-        double x = bst_rng_uniform(key, n, draw++), y = bst_rng_uniform(key, n, draw++);
-        double angle = bst_rng_uniform(key, n, draw++);
-        /* as many of each SNR, each in every part of the frame in turn; frames beyond the last
-         * trial serve for chance */
-        int64_t trial = first + i;
-        if (trial >= last && first < last) {
-            break;
-        }
-        int64_t shift = room % s->points == 0 ? number : 0;
-        add_target(s, f, origin_x + (i % s->columns) * s->cell_px + 0.5 * s->apart_px + x * span,
-                   origin_y + (i / s->columns) * s->cell_px + 0.5 * s->apart_px + y * span,
-                   (int)((trial + shift) % s->points),
-                   o->known_rate ? heading : 2.0 * BST_PI * angle);
+    f->motion = (bst_motion){.q_cam_from_gcrf =
+                                 s->sky ? bst_pd_sky_attitude(s->sky, roll) : BST_QUAT_IDENTITY};
+    double length = o->known_rate ? o->streak_px : o->star_streak_px;
+    if (length > 0.0) {
+        f->motion.turn_cam_rad = turn_for(&s->camera, length * cos(heading), length * sin(heading));
     }
     f->time_s[0] = 0.0;
     f->time_s[1] = s->exposure_s;
-    f->q[0] = bst_quat_from_rotvec(bst_vec3_scale(f->motion.turn_cam_rad, -0.5));
-    f->q[1] = bst_quat_from_rotvec(bst_vec3_scale(f->motion.turn_cam_rad, 0.5));
+    for (int end = 0; end < 2; end++) {
+        bst_quat turn = bst_quat_from_rotvec(bst_vec3_scale(f->motion.turn_cam_rad, end - 0.5));
+        f->q[end] = bst_quat_mul(turn, f->motion.q_cam_from_gcrf);
+    }
     f->track = (bst_los_track){2, f->time_s, f->q};
+}
+
+/* As many targets of each SNR, each in every part of the frame in turn; frames beyond the last
+ * trial serve for chance. */
+static void place_targets(bst_pd_scene *s, int64_t number, double heading, bst_rng_key key,
+                          bst_pd_frame *f) {
+    int room = bst_pd_scene_room(s);
+    int64_t first = number * room, last = s->points * s->options.trials;
+    int64_t shift = room % s->points == 0 ? number : 0;
+    double origin_x = 0.5 * ((double)s->camera.width_px - s->columns * s->cell_px) - 0.5;
+    double origin_y = 0.5 * ((double)s->camera.height_px - s->rows * s->cell_px) - 0.5;
+    double span = s->cell_px - s->apart_px;
+    f->count = 0;
+    for (int i = 0; i < room && (first + i < last || first >= last); i++) {
+        uint64_t draw = 3 * (uint64_t)i;
+        double u[3];
+        for (uint64_t k = 0; k < 3; k++) {
+            u[k] = bst_rng_uniform(key, (uint64_t)number, draw + k);
+        }
+        add_target(s, f, origin_x + (i % s->columns) * s->cell_px + 0.5 * s->apart_px + u[0] * span,
+                   origin_y + (i / s->columns) * s->cell_px + 0.5 * s->apart_px + u[1] * span,
+                   (int)((first + i + shift) % s->points),
+                   s->options.known_rate ? heading : 2.0 * BST_PI * u[2]);
+    }
+}
+
+/* Stars beside the targets: copied, for a request has one list. */
+static bst_status add_stars(bst_ctx *ctx, bst_pd_scene *s, const bst_source *stars, int count,
+                            int targets, bst_pd_frame *f) {
+    int wanted = f->count + count;
+    if (wanted > f->source_room) {
+        bst_source *more = realloc(f->sources, (size_t)wanted * sizeof *more);
+        if (!more) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d sources", wanted);
+        }
+        f->sources = more;
+        f->source_room = wanted;
+    }
+    memcpy(f->sources + targets, stars, (size_t)count * sizeof *stars);
+    return bst_pd_sky_stars(ctx, s->sky, &f->track, stars, count, &f->stars);
+}
+
+bst_status bst_pd_scene_set(bst_ctx *ctx, bst_pd_scene *s, int64_t number, bool targets,
+                            bst_pd_frame *f) {
+    uint64_t seed = s->scenario->seed, run = (uint64_t)s->scenario->run, n = (uint64_t)number;
+    bst_rng_key camera = bst_rng_make_key(seed, run, s->name, "pd camera");
+    bst_rng_key key = bst_rng_make_key(seed, run, s->name, "pd targets");
+    double heading = 2.0 * BST_PI * bst_rng_uniform(camera, n, 0);
+    double roll = 2.0 * BST_PI * bst_rng_uniform(camera, n, 1);
+    const bst_source *stars = NULL;
+    int count = 0;
+    set_motion(s, f, heading, roll);
+    if (s->sky) {
+        BST_TRY(bst_pd_sky_look(ctx, s->sky, &f->track, &stars, &count));
+    }
+    place_targets(s, number, heading, key, f);
+    int drawn = targets ? f->count : 0;
+    if (s->sky) {
+        BST_TRY(add_stars(ctx, s, stars, count, drawn, f));
+    }
+    const struct bst_skylight_map *map = s->sky ? bst_pd_sky_map(s->sky) : NULL;
+    double sky_e = map ? 0.0 : s->sky ? bst_pd_sky_e(s->sky, 0.0, 0.0) : s->sky_e;
     f->request = (bst_render_request){
         .window = {0, 0, (int)s->camera.width_px, (int)s->camera.height_px},
         .track = &f->track,
         .sources = f->sources,
-        .count = targets ? f->count : 0,
-        .background_e = s->sky_e + s->dark_e,
+        .count = drawn + count,
+        .background_e = sky_e + s->dark_e,
+        .background = map,
         .dark_e = s->dark_e,
-        .key = bst_rng_make_key(s->scenario->seed, (uint64_t)s->scenario->run, s->name,
-                                targets ? "pd noise" : "pd noise without targets"),
+        .key =
+            bst_rng_make_key(seed, run, s->name, targets ? "pd noise" : "pd noise without targets"),
         .exposure_id = number};
+    return BST_OK;
 }

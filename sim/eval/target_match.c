@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-static bool belongs(const bst_match_target *t, double reach, const bst_detection *d) {
+bool bst_match_belongs(const bst_match_target *t, double reach, const bst_detection *d) {
     double x = d->x_px - t->x_px, y = d->y_px - t->y_px, length = hypot(t->dx_px, t->dy_px);
     if (0.5 * length <= reach) {
         return hypot(x, y) <= reach;
@@ -29,7 +29,8 @@ int bst_match_targets(const bst_match_target *targets, int count, double reach_p
         int nearest = -1;
         for (int t = 0; t < count; t++) {
             if (fabs(d->y_px - targets[t].y_px) > widest ||
-                fabs(d->x_px - targets[t].x_px) > widest || !belongs(&targets[t], reach_px, d)) {
+                fabs(d->x_px - targets[t].x_px) > widest ||
+                !bst_match_belongs(&targets[t], reach_px, d)) {
                 continue;
             }
             if (nearest < 0 || distance(&targets[t], d) < distance(&targets[nearest], d)) {

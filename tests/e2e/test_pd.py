@@ -106,6 +106,19 @@ class Measured(unittest.TestCase):
             self.assertAlmostEqual(a["centroid_rms_across_px"], b["centroid_rms_across_px"],
                                    delta=1e-6)
 
+    def test_stars_are_no_false_alarms(self):
+        path = os.path.join(self.folder, "stars.json")
+        for extra in ([], ["--star-streak", "12"]):
+            result = pd("--snr", "5:20:15", "--trials", "60", "--empty-frames", "15", "--stars",
+                        "--json", path, *extra)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            with open(path) as file:
+                out = json.load(file)
+            # V 16 in 0.73 square degrees of which the embedded catalogue has those to V 12
+            self.assertGreater(out["star_detections_per_frame"], 5)
+            self.assertLess(out["false_alarms_per_frame"], 3)  # 1 is asked for; 15: 0.26, 1 sigma
+            self.assertGreater(out["points"][1]["pd"], 0.9)
+
     def test_streaks_of_known_rate(self):
         path = os.path.join(self.folder, "streak.json")
         result = pd("--snr", "10:30:20", "--trials", "40", "--empty-frames", "2", "--streak", "20",
@@ -128,6 +141,9 @@ class WrongCalls(unittest.TestCase):
                                   (["--known-rate"], 2, "--streak"),
                                   (["--trials", "0"], 2, "trials"),
                                   (["--sensor", "nobody"], 1, "OBSERVER/SENSOR"),
+                                  (["--stars", "--background", "9"], 2, "give one"),
+                                  (["--star-streak", "9", "--streak", "9", "--known-rate"], 2,
+                                   "leave out --star-streak"),
                                   (["--module", "--false-alarms", "2"], 1, "--set"),
                                   (["--cell", "10"], 1, "--cell"),
                                   (["--streak", "990"], 1, "no room")):
