@@ -7,6 +7,9 @@
 
 enum { PARAMETERS = 6, MAX_ITERATIONS = 60, MAX_ROUNDS = 6 };
 
+/* Of the range's logarithm: beyond that the range is not known. */
+static const double MOST_LOG_SIGMA = 0.5;
+
 /* The state as the observer in the middle of the arc has it: r = R + range q, v = V + range (u q +
  * w), with R and V the observer's state. Steps in it are (direction along two axes, rate times span
  * along the same axes, ln range, u times span): all of them angles. */
@@ -237,6 +240,24 @@ static bst_status fail_range(const work *w) {
         w->count, w->items[w->count - 1].observer.time_s - w->items[0].observer.time_s);
 }
 
+/* The reason why an iteration did not end: where the range is not determined there is no minimum to
+ * find. */
+static bst_status fail_minimise(const work *w, const double n[PARAMETERS][PARAMETERS]) {
+    double l[PARAMETERS][PARAMETERS], size[PARAMETERS], x[PARAMETERS];
+    const double range[PARAMETERS] = {[4] = 1.0};
+    if (!factor(n, 0.0, 1e-15, l, size)) {
+        return fail_range(w);
+    }
+    solve(l, size, range, x);
+    if (!(x[4] < MOST_LOG_SIGMA * MOST_LOG_SIGMA)) {
+        return fail_range(w);
+    }
+    return bst_fail(w->ctx, BST_ERR_NUMERIC,
+                    "the fit of an orbit does not converge in %d iterations; use a longer arc or "
+                    "leave out wrong observations",
+                    MAX_ITERATIONS);
+}
+
 /* Iterates to the least sum of squares of the observations in use. */
 static bst_status minimise(work *w, chart *c, double n[PARAMETERS][PARAMETERS], int *iterations) {
     bst_od_state state = state_of(c);
@@ -281,18 +302,13 @@ static bst_status minimise(work *w, chart *c, double n[PARAMETERS][PARAMETERS], 
             return BST_OK;
         }
         if (!better) {
-            return bst_fail(w->ctx, BST_ERR_NUMERIC,
-                            "the fit of an orbit does not converge from this first orbit; use a "
-                            "longer arc or leave out wrong observations");
+            return fail_minimise(w, (const double(*)[PARAMETERS])n);
         }
         if (!(c->range_m > 1.0 && c->range_m < 1e10)) {
             return fail_range(w);
         }
     }
-    return bst_fail(w->ctx, BST_ERR_NUMERIC,
-                    "the fit of an orbit does not converge in %d iterations; use a longer arc or "
-                    "leave out wrong observations",
-                    MAX_ITERATIONS);
+    return fail_minimise(w, (const double(*)[PARAMETERS])n);
 }
 
 /* ------------------------------------------------------------------ the whole fit */
@@ -397,7 +413,7 @@ static bst_status finish(work *w, const chart *c, const double n[PARAMETERS][PAR
     out->range_rate_sigma_mps =
         c->range_m *
         sqrt(out->widened * fmax(0.0, u * u * p[4][4] + 2.0 * u / t * p[4][5] + p[5][5] / (t * t)));
-    return isfinite(log_sigma) && log_sigma < 0.5 ? BST_OK : fail_range(w);
+    return isfinite(log_sigma) && log_sigma < MOST_LOG_SIGMA ? BST_OK : fail_range(w);
 }
 
 static bst_status fit(work *w, const bst_od_state *first, double *scratch, bst_od_solution *out) {

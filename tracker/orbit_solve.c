@@ -160,11 +160,10 @@ static bst_status grow(bst_ctx *ctx, const bst_od_observation *o, int count, par
     return bst_od_fit(ctx, o, count, options, &state, residual_chi2, out);
 }
 
-static bst_status solve(bst_ctx *ctx, const bst_od_observation *o, int count,
-                        const bst_od_options *options, bst_od_observation *room,
-                        double *residual_chi2, bst_od_solution *out, bst_od_report *report) {
-    double span_s;
-    part p = first_part(o, count, &span_s);
+/* From a first part of the arc. */
+static bst_status solve_from(bst_ctx *ctx, const bst_od_observation *o, int count, part p,
+                             double span_s, const bst_od_options *options, bst_od_observation *room,
+                             double *residual_chi2, bst_od_solution *out, bst_od_report *report) {
     started starts[BST_OD_CANDIDATES];
     int found, used = thin(o, p, FIRST_SAMPLES, room);
     BST_TRY(start(ctx, room, used, starts, &found, &report->candidates));
@@ -218,6 +217,23 @@ static bst_status solve(bst_ctx *ctx, const bst_od_observation *o, int count,
         return bst_od_fit(ctx, o, count, options, &chosen, residual_chi2, out);
     }
     return BST_OK;
+}
+
+static bst_status solve(bst_ctx *ctx, const bst_od_observation *o, int count,
+                        const bst_od_options *options, bst_od_observation *room,
+                        double *residual_chi2, bst_od_solution *out, bst_od_report *report) {
+    double span_s, whole = time_of(o, count - 1) - time_of(o, 0);
+    part p = first_part(o, count, &span_s);
+    for (;;) {
+        bst_status status =
+            solve_from(ctx, o, count, p, span_s, options, room, residual_chi2, out, report);
+        if (status != BST_ERR_NUMERIC || span_s >= whole) {
+            return status;
+        }
+        /* what a part does not tell, a longer one may */
+        span_s *= 2.0;
+        p = fullest(o, count, span_s);
+    }
 }
 
 bst_status bst_od_determine(bst_ctx *ctx, const bst_od_observation *observations, int count,
