@@ -253,8 +253,9 @@ static bst_status fail_minimise(const work *w, const double n[PARAMETERS][PARAME
         return fail_range(w);
     }
     return bst_fail(w->ctx, BST_ERR_NUMERIC,
-                    "the fit of an orbit does not converge in %d iterations; use a longer arc or "
-                    "leave out wrong observations",
+                    "the fit of an orbit does not converge in %d iterations: the arc is too short "
+                    "for its errors, the object moves beside the observer, or observations are of "
+                    "another object; use a longer arc or leave out wrong observations",
                     MAX_ITERATIONS);
 }
 

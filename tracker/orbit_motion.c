@@ -213,9 +213,16 @@ void bst_od_from_track(const bst_od_observer *observer, bst_vec3 direction, bst_
                                     -range_m * bst_vec3_dot(rate_radps, e[k]), direction);
         velocity[2 + k] = position[k];
     }
-    position[4] = direction;
+    const double c = BST_LIGHT_SPEED_MPS;
+    position[4] = bst_vec3_axpy(direction, 1.0 / c, observer->earth_bary_mps);
     velocity[4] = rate_radps;
-    velocity[5] = direction;
+    velocity[5] = bst_vec3_axpy(bst_vec3_axpy(direction, 1.0 / c, observer->earth_bary_mps),
+                                1.0 / c, out->velocity_mps);
+    /* the body goes on while the light is under way, for the longer the farther it is */
+    position[4] = bst_vec3_axpy(position[4], 1.0 / c, out->velocity_mps);
+    for (int k = 0; k < 6; k++) {
+        position[k] = bst_vec3_axpy(position[k], tau, velocity[k]);
+    }
     double p[6][6] = {{0}};
     for (int i = 0; i < 4; i++) {
         memcpy(p[i], sky_covariance[i], sizeof sky_covariance[i]);

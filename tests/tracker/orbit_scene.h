@@ -26,14 +26,12 @@ static inline bst_od_state from_elements(double a_m, double e, double i_deg, dou
     double p = a_m * (1.0 - e * e), nu = anomaly_deg * d, r = p / (1.0 + e * cos(nu));
     double u = perigee_deg * d + nu, h = sqrt(mu / p);
     double cn = cos(node_deg * d), sn = sin(node_deg * d), ci = cos(i_deg * d), si = sin(i_deg * d);
-    bst_vec3 radial = {cn * cos(u) - sn * sin(u) * ci, sn * cos(u) + cn * sin(u) * ci,
-                       sin(u) * si};
+    bst_vec3 radial = {cn * cos(u) - sn * sin(u) * ci, sn * cos(u) + cn * sin(u) * ci, sin(u) * si};
     bst_vec3 across = {-cn * sin(u) - sn * cos(u) * ci, -sn * sin(u) + cn * cos(u) * ci,
                        cos(u) * si};
-    return (bst_od_state){
-        .position_m = bst_vec3_scale(radial, r),
-        .velocity_mps = bst_vec3_axpy(bst_vec3_scale(radial, h * e * sin(nu)),
-                                      h * (1.0 + e * cos(nu)), across)};
+    return (bst_od_state){.position_m = bst_vec3_scale(radial, r),
+                          .velocity_mps = bst_vec3_axpy(bst_vec3_scale(radial, h * e * sin(nu)),
+                                                        h * (1.0 + e * cos(nu)), across)};
 }
 
 /* Fills `out` (count items). run < 0: no noise. */
@@ -50,8 +48,8 @@ static inline void observe(const scene *s, int run, bst_od_observation *out) {
         bst_assert_ok(&ctx, bst_od_path_state(&ctx, eye, t, &here));
         for (int k = 0; k < 5; k++) {
             bst_assert_ok(&ctx, bst_od_path_state(&ctx, body, t - tau, &there));
-            line = bst_vec3_axpy(bst_vec3_sub(there.position_m, here.position_m), -tau,
-                                 s->earth_mps);
+            line =
+                bst_vec3_axpy(bst_vec3_sub(there.position_m, here.position_m), -tau, s->earth_mps);
             tau = bst_vec3_norm(line) / BST_LIGHT_SPEED_MPS;
         }
         bst_vec3 d = bst_vec3_unit(line);
@@ -60,8 +58,8 @@ static inline void observe(const scene *s, int run, bst_od_observation *out) {
             bst_rng_normal2(key, (uint64_t)i, 0, noise);
         }
         bst_tangent axes = bst_tangent_at(d);
-        d = bst_tangent_exp(d, bst_tangent_vector(&axes, s->sigma_rad * noise[0],
-                                                  s->sigma_rad * noise[1]));
+        d = bst_tangent_exp(
+            d, bst_tangent_vector(&axes, s->sigma_rad * noise[0], s->sigma_rad * noise[1]));
         double variance = s->sigma_rad * s->sigma_rad;
         out[i] = (bst_od_observation){.observer = {.time_s = t,
                                                    .position_m = here.position_m,
