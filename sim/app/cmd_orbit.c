@@ -1,15 +1,17 @@
-/* boresight orbit: an orbit from the directions that a run measured. */
+/* boresight orbit: an orbit from the directions that a run measured, or a TDM holds. */
 #include <errno.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include <cjson/cJSON.h>
 
 #include "sim/app/app.h"
 #include "sim/app/json_number.h"
 #include "sim/app/options.h"
+#include "sim/app/tdm_observations.h"
 #include "sim/app/track_files.h"
 #include "sim/astro/bodies.h"
 #include "sim/astro/sgp4_fit.h"
@@ -22,6 +24,7 @@
 
 static const char help_text[] =
     "usage: boresight orbit RUN [options]\n"
+    "       boresight orbit FILE.tdm --observer FILE.oem [options]\n"
     "\n"
     "Finds the orbit of a track from its measured directions alone: a first orbit (Gauss's method, "
     "the admissible\n"
@@ -33,6 +36,7 @@ static const char help_text[] =
     "  boresight orbit runs/first\n"
     "  boresight orbit runs/first --oem target.oem --omm target.json --predict 86400\n"
     "  boresight orbit runs/first --track 3 --tdm angles.tdm --report orbit.json\n"
+    "  boresight orbit angles.tdm --observer eye.oem --sigma 0.5 --oem target.oem\n"
     "\n"
     "Without --track it is the track of interest with the most observations, else the track with "
     "the most.\n"
@@ -43,16 +47,21 @@ enum { FORCES_FULL, FORCES_J2, FORCES_TWO_BODY };
 
 typedef struct request {
     const char *sensor, *oem, *omm, *tdm, *json, *report;
+    bst_tdm_request angles; /* for a TDM */
     int64_t track;
-    double predict_s, step_s, reject_chi2;
-    int forces;
+    double sigma_arcsec, predict_s, step_s, reject_chi2;
+    int forces, aberration;
 } request;
+
+enum { ABERRATION_REMOVED, ABERRATION_CONTAINED };
 
 /* The track that is chosen, copied. */
 typedef struct chosen {
     bst_run_track track;
     bst_run_observation *items;
     bst_export_sensor sensor;
+    bst_time epoch; /* of the observations' seconds */
+    int norad;      /* 0: not known */
 } chosen;
 
 static bst_status consider(void *user, bst_ctx *ctx, const bst_run_track *track) {
@@ -97,11 +106,46 @@ static bst_status choose(bst_ctx *ctx, const request *q, bst_run_scene *scene, c
                                  bst_run_reader_folder(scene->run));
 }
 
+static bst_status choose_in_run(bst_ctx *ctx, const request *q, const char *path, chosen *out) {
+    bst_run_reader *run = NULL;
+    bst_run_scene scene;
+    BST_TRY(bst_run_reader_open(ctx, path, &run));
+    bst_status status = bst_run_scene_open(ctx, run, &scene);
+    status = status == BST_OK ? choose(ctx, q, &scene, out) : status;
+    if (status == BST_OK) {
+        char object[96];
+        bst_track_object(&out->track, object, sizeof object);
+        int index = bst_world_find_object(scene.world, object);
+        out->norad = index >= 0 ? bst_world_object(scene.world, index)->norad : 0;
+        out->epoch = scene.scenario.epoch;
+    }
+    bst_run_scene_close(&scene);
+    bst_run_reader_close(run);
+    return status;
+}
+
+static bst_status choose_in_tdm(bst_ctx *ctx, const request *q, const char *path, chosen *out) {
+    bst_tdm_request of = q->angles;
+    of.path = path;
+    of.sigma_rad = q->sigma_arcsec * BST_ARCSEC_RAD;
+    of.aberrated = q->aberration == ABERRATION_CONTAINED;
+    int64_t count;
+    BST_TRY(bst_tdm_observations(ctx, &of, &out->sensor, &out->items, &count));
+    out->epoch = out->items[0].time;
+    out->track = (bst_run_track){.sensor = &out->sensor,
+                                 .target = true,
+                                 .exposure_s = NAN,
+                                 .items = out->items,
+                                 .count = count};
+    return BST_OK;
+}
+
 /* ------------------------------------------------------------------ the orbit */
 
 typedef struct orbit {
     const request *request;
-    bst_run_scene *scene;
+    bst_time epoch;
+    int norad;
     const bst_run_track *track;
     bst_od_observation *items;
     double *chi2;
@@ -119,7 +163,7 @@ typedef struct orbit {
 
 static bst_status open_forces(bst_ctx *ctx, orbit *o) {
     int kind = o->request->forces;
-    o->options.motion.epoch = o->scene->scenario.epoch;
+    o->options.motion.epoch = o->epoch;
     BST_TRY(bst_eop_builtin(ctx, &o->eop));
     if (kind == FORCES_TWO_BODY) {
         return BST_OK;
@@ -155,7 +199,7 @@ static bst_status solve(bst_ctx *ctx, orbit *o) {
 }
 
 static bst_time time_at(const orbit *o, double seconds) {
-    return bst_time_add(o->scene->scenario.epoch, seconds);
+    return bst_time_add(o->epoch, seconds);
 }
 
 /* Mean elements through a revolution about the epoch of the solution, or the arc where it is
@@ -272,10 +316,8 @@ static bst_status write_tdm(bst_ctx *ctx, const orbit *o, FILE *stream) {
 }
 
 static bst_status write_json(bst_ctx *ctx, const orbit *o, FILE *stream) {
-    int index = bst_world_find_object(o->scene->world, o->object);
-    int norad = index >= 0 ? bst_world_object(o->scene->world, index)->norad : 0;
     fputc('[', stream);
-    BST_TRY(bst_track_write_json(ctx, stream, o->track, norad, true));
+    BST_TRY(bst_track_write_json(ctx, stream, o->track, o->norad, true));
     fputs("\n]\n", stream);
     return BST_OK;
 }
@@ -413,12 +455,14 @@ static bst_status determine(bst_ctx *ctx, const request *q, orbit *o) {
     return write_file(ctx, o, q->report, write_report);
 }
 
-static bst_status orbit_of(bst_ctx *ctx, const request *q, const bst_run_reader *run) {
-    bst_run_scene scene;
+static bst_status orbit_of(bst_ctx *ctx, const request *q, const char *path) {
+    struct stat info;
     chosen c = {.items = NULL};
-    orbit o = {.request = q, .scene = &scene, .track = &c.track};
-    bst_status status = bst_run_scene_open(ctx, run, &scene);
-    status = status == BST_OK ? choose(ctx, q, &scene, &c) : status;
+    orbit o = {.request = q, .track = &c.track};
+    bool file = stat(path, &info) == 0 && S_ISREG(info.st_mode);
+    bst_status status = (file ? choose_in_tdm : choose_in_run)(ctx, q, path, &c);
+    o.epoch = c.epoch;
+    o.norad = c.norad;
     status = status == BST_OK ? determine(ctx, q, &o) : status;
     bst_od_path_free(o.path);
     bst_gravity_free(o.gravity);
@@ -426,13 +470,12 @@ static bst_status orbit_of(bst_ctx *ctx, const request *q, const bst_run_reader 
     free(o.items);
     free(o.chi2);
     free(c.items);
-    bst_run_scene_close(&scene);
     return status;
 }
 
 int bst_cmd_orbit(int argc, char **argv) {
     bool help = false;
-    request q = {.reject_chi2 = 30.0};
+    request q = {.reject_chi2 = 30.0, .sigma_arcsec = 1.0};
     const bst_option options[] = {
         {.name = "track",
          .kind = BST_OPTION_INT,
@@ -446,6 +489,34 @@ int bst_cmd_orbit(int argc, char **argv) {
          .target = &q.sensor,
          .argument = "NAME",
          .doc = "tracks of this sensor only: name or observer/name"},
+        {.name = "observer",
+         .kind = BST_OPTION_TEXT,
+         .target = &q.angles.observer,
+         .argument = "FILE",
+         .doc = "TDM: the observer's states, as CCSDS OEM"},
+        {.name = "observer-name",
+         .kind = BST_OPTION_TEXT,
+         .target = &q.angles.observer_name,
+         .argument = "NAME",
+         .doc = "TDM: its object in that file (default the participant's name, or the only one)"},
+        {.name = "object",
+         .kind = BST_OPTION_TEXT,
+         .target = &q.angles.object,
+         .argument = "NAME",
+         .doc = "TDM: angles of this participant (default the one with the most)"},
+        {.name = "sigma",
+         .kind = BST_OPTION_REAL,
+         .target = &q.sigma_arcsec,
+         .argument = "ARCSEC",
+         .doc = "TDM: standard deviation of the angles, per axis (default 1)",
+         .minimum = 1e-6,
+         .maximum = 36000},
+        {.name = "aberration",
+         .kind = BST_OPTION_CHOICE,
+         .target = &q.aberration,
+         .argument = "removed|contained",
+         .doc = "TDM: whether the observer's stellar aberration is still in the angles (default "
+                "removed)"},
         {.name = "forces",
          .kind = BST_OPTION_CHOICE,
          .target = &q.forces,
@@ -514,14 +585,11 @@ int bst_cmd_orbit(int argc, char **argv) {
         return BST_EXIT_OK;
     }
     if (arguments != 1) {
-        bst_fail(&ctx, BST_ERR_ARGUMENT, "one folder of a run is expected, %d were given",
-                 arguments);
+        bst_fail(&ctx, BST_ERR_ARGUMENT,
+                 "one folder of a run, or a TDM, is expected, %d were given", arguments);
         return bst_options_misuse(&ctx, "orbit");
     }
-    bst_run_reader *run = NULL;
-    bst_status status = bst_run_reader_open(&ctx, argv[1], &run);
-    status = status == BST_OK ? orbit_of(&ctx, &q, run) : status;
-    bst_run_reader_close(run);
+    bst_status status = orbit_of(&ctx, &q, argv[1]);
     if (status != BST_OK) {
         fprintf(stderr, "boresight orbit: %s\n", ctx.message);
         return BST_EXIT_FAILED;

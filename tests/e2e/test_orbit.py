@@ -122,11 +122,39 @@ class Orbit(unittest.TestCase):
             worst = max(worst, off / math.hypot(item["raUnc"], item["declinationUnc"]))
         self.assertLess(worst, 5)  # of hundreds
 
+    def test_from_a_tdm(self):
+        """What is exported and read again gives the same orbit."""
+        out = os.path.join(self.folder, "out")
+        self.assertEqual(call("export", self.made, "--observations", "tdm", "--out",
+                              out).returncode, 0)
+        report = os.path.join(self.folder, "again.json")
+        words = [out + "/observations.tdm", "--observer", out + "/observers.oem"]
+        result = call("orbit", *words, "--sigma", "0.16", "--report", report)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with open(report, encoding="utf-8") as file:
+            again = json.load(file)
+        self.assertEqual((again["object"], again["observer"]), ("INMARSAT GX5", "neossat"))
+        self.assertEqual(again["used"], self.report["used"])
+        # other weights, the same angles: well within what they leave open
+        self.assertLess(math.dist(again["position_gcrf_m"], self.report["position_gcrf_m"]),
+                        0.5 * self.report["range_sigma_m"])
+        # aberration that was not there is 20 arcsec, the same for all: the target's own apparent
+        # place, which no orbit shows; but the range goes wrong where it changes
+        wrong = call("orbit", *words, "--aberration", "contained")
+        self.assertNotEqual(wrong.stdout.splitlines()[6:8], result.stdout.splitlines()[6:8])
+        for extra, message in (((words[0],), "add --observer FILE.oem"),
+                               ((*words, "--object", "X"), 'has no angles of "X"'),
+                               ((*words, "--observer-name", "X"), "observers.oem"),
+                               ((words[2], "--observer", words[2]), "does not begin as a TDM")):
+            result = call("orbit", *extra)
+            self.assertEqual(result.returncode, 1)
+            self.assertIn(message, result.stderr)
+
     def test_mistakes(self):
         for words, code, message in (
                 ((self.made, "--track", "77"), 1, "holds no confirmed track 77"),
                 ((self.made, "--sensor", "x"), 1, 'has no sensor "x"; it has neossat/telescope'),
-                ((), 2, "one folder of a run is expected"),
+                ((), 2, "one folder of a run, or a TDM, is expected"),
                 ((self.folder + "/none",), 1, "none"),
                 ((self.made, "--track", "0"), 2, "--track"),
                 ((self.made, "--oem", self.folder), 1, self.folder)):
