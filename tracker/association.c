@@ -8,7 +8,7 @@
 #define NOBODY (-1)
 #define SEVERAL (-2)
 /* Share of a frame in the smoothed number of false alarms, once there are enough frames. */
-#define ALARM_GAIN 0.05
+#define ALARM_GAIN 0.1
 
 static double component(bst_vec3 v, int axis) {
     return axis == 0 ? v.x : axis == 1 ? v.y : v.z;
@@ -142,7 +142,7 @@ static int collect(const bst_mtt *mtt, int t, double detection_sigma, int *colum
         if ((mtt->owner[column] != NOBODY && mtt->owner[column] != t) ||
             bst_vec3_norm(bst_vec3_sub(detection->sky.direction, track->state.direction)) >
                 radius ||
-            !bst_filter_evaluate(&track->state, &track->models, &candidate, &fit) ||
+            !bst_filter_evaluate(&mtt->filter, &track->state, &track->models, &candidate, &fit) ||
             fit.chi2 > params->gate_chi2) {
             continue;
         }

@@ -2,57 +2,8 @@
 
 #include <string.h>
 
-/* Components of state b's mean in the tangent axes at a: direction, then rate. */
-static void difference(const bst_sky_state *a, const bst_sky_state *b, double out[4]) {
-    bst_tangent axes = bst_tangent_at(a->direction);
-    bst_vec3 step = bst_tangent_log(a->direction, b->direction);
-    bst_vec3 rate =
-        bst_vec3_sub(bst_tangent_carry(b->direction, a->direction, b->rate_radps), a->rate_radps);
-    out[0] = bst_vec3_dot(step, axes.e1);
-    out[1] = bst_vec3_dot(step, axes.e2);
-    out[2] = bst_vec3_dot(rate, axes.e1);
-    out[3] = bst_vec3_dot(rate, axes.e2);
-}
-
-static void shift_by(bst_sky_state *state, const double x[4]) {
-    bst_tangent axes = bst_tangent_at(state->direction);
-    bst_sky_shift(state, bst_tangent_vector(&axes, x[0], x[1]),
-                  bst_tangent_vector(&axes, x[2], x[3]));
-}
-
-void bst_sky_mix(const bst_sky_state *states, const double *weights, int count,
-                 bst_sky_state *out) {
-    int heaviest = 0;
-    double sum = 0.0;
-    for (int i = 0; i < count; i++) {
-        sum += weights[i];
-        heaviest = weights[i] > weights[heaviest] ? i : heaviest;
-    }
-    bst_sky_state base = states[heaviest];
-    double mean[4] = {0}, p[4][4] = {{0}};
-    for (int i = 0; i < count; i++) {
-        double w = weights[i] / sum;
-        if (!(w > 0.0)) {
-            continue;
-        }
-        double x[4], own[4][4];
-        difference(&base, &states[i], x);
-        bst_sky_turn_covariance(&states[i], base.direction, own);
-        for (int a = 0; a < 4; a++) {
-            mean[a] += w * x[a];
-            for (int b = 0; b < 4; b++) {
-                p[a][b] += w * (own[a][b] + x[a] * x[b]);
-            }
-        }
-    }
-    for (int a = 0; a < 4; a++) {
-        for (int b = 0; b < 4; b++) {
-            base.covariance[a][b] = p[a][b] - mean[a] * mean[b];
-        }
-    }
-    shift_by(&base, mean);
-    *out = base;
-}
+/* Models of an IMM. */
+#define MODELS 2
 
 /* Lower Cholesky factor; columns without variance of their own are zero. */
 static void factor(const double p[4][4], double l[4][4]) {
@@ -87,7 +38,7 @@ void bst_sky_predict_unscented(bst_sky_state *state, double dt_s, double noise_r
             x[i] = sign * l[i][k % 4];
         }
         points[k] = start;
-        shift_by(&points[k], x);
+        bst_sky_shift_by(&points[k], x);
         bst_sky_predict(&points[k], dt_s, 0.0);
         weights[k] = 0.125;
     }
@@ -110,8 +61,8 @@ void bst_filter_start(const bst_filter_params *params, const bst_sky_state *stat
     if (params->kind != BST_FILTER_IMM) {
         return;
     }
-    models->count = BST_FILTER_MODELS;
-    for (int m = 0; m < BST_FILTER_MODELS; m++) {
+    models->count = MODELS;
+    for (int m = 0; m < MODELS; m++) {
         models->state[m] = *state;
     }
     models->probability[1] = params->manoeuvre_s / (params->quiet_s + params->manoeuvre_s);
@@ -127,32 +78,42 @@ static void mix_models(const bst_filter_params *params, double dt_s, bst_filter_
     double settled = -expm1(-both * dt_s) / both;
     double change[2] = {start * settled, end * settled}; /* away from model 0, from model 1 */
     bst_filter_models before = *models;
-    for (int to = 0; to < BST_FILTER_MODELS; to++) {
-        double weights[BST_FILTER_MODELS];
-        for (int from = 0; from < BST_FILTER_MODELS; from++) {
+    for (int to = 0; to < MODELS; to++) {
+        double weights[MODELS];
+        for (int from = 0; from < MODELS; from++) {
             weights[from] =
                 before.probability[from] * (from == to ? 1.0 - change[from] : change[from]);
         }
         models->probability[to] = weights[0] + weights[1];
         if (models->probability[to] > 0.0) {
-            bst_sky_mix(before.state, weights, BST_FILTER_MODELS, &models->state[to]);
+            bst_sky_mix(before.state, weights, MODELS, &models->state[to]);
         }
+    }
+}
+
+static void predict_one(const bst_filter_params *params, double dt_s, bst_sky_state *state) {
+    if (params->kind == BST_FILTER_UKF) {
+        bst_sky_predict_unscented(state, dt_s, params->noise_rad2ps3);
+    } else {
+        bst_sky_predict(state, dt_s, params->noise_rad2ps3);
     }
 }
 
 void bst_filter_predict(const bst_filter_params *params, double dt_s, bst_sky_state *state,
                         bst_filter_models *models) {
     if (models->count == 0) {
-        if (params->kind == BST_FILTER_UKF) {
-            bst_sky_predict_unscented(state, dt_s, params->noise_rad2ps3);
-        } else {
-            bst_sky_predict(state, dt_s, params->noise_rad2ps3);
-        }
+        predict_one(params, dt_s, state);
         return;
     }
-    mix_models(params, dt_s, models);
-    bst_sky_predict(&models->state[0], dt_s, params->noise_rad2ps3);
-    bst_sky_predict(&models->state[1], dt_s, params->manoeuvre_noise_rad2ps3);
+    if (params->kind == BST_FILTER_IMM) {
+        mix_models(params, dt_s, models);
+        bst_sky_predict(&models->state[0], dt_s, params->noise_rad2ps3);
+        bst_sky_predict(&models->state[1], dt_s, params->manoeuvre_noise_rad2ps3);
+    } else {
+        for (int m = 0; m < models->count; m++) {
+            predict_one(params, dt_s, &models->state[m]);
+        }
+    }
     combine(models, state);
 }
 
@@ -171,10 +132,12 @@ static double log_density(const bst_sky_innovation *innovation) {
     return -0.5 * innovation->chi2 - 0.5 * innovation->log_det_s - log(2.0 * BST_PI);
 }
 
-bool bst_filter_evaluate(const bst_sky_state *state, const bst_filter_models *models,
-                         const bst_filter_candidate *candidate, bst_filter_fit *out) {
-    const bst_sky_state *first = models->count ? &models->state[0] : state;
-    if (!bst_sky_innovate(first, candidate->measurement, candidate->extra, &out->innovation)) {
+bool bst_filter_evaluate(const bst_filter_params *params, const bst_sky_state *state,
+                         const bst_filter_models *models, const bst_filter_candidate *candidate,
+                         bst_filter_fit *out) {
+    bool imm = params->kind == BST_FILTER_IMM && models->count > 0;
+    if (!bst_sky_innovate(imm ? &models->state[0] : state, candidate->measurement, candidate->extra,
+                          &out->innovation)) {
         return false;
     }
     out->chi2 = out->innovation.chi2;
@@ -182,74 +145,127 @@ bool bst_filter_evaluate(const bst_sky_state *state, const bst_filter_models *mo
     if (models->count == 0) {
         return true;
     }
-    bst_sky_innovation other;
-    if (!bst_sky_innovate(&models->state[1], candidate->measurement, candidate->extra, &other)) {
-        return false;
+    double sum = 0.0, high = -INFINITY, logs[BST_FILTER_COMPONENTS];
+    out->chi2 = INFINITY;
+    for (int m = 0; m < models->count; m++) {
+        bst_sky_innovation own;
+        if (!bst_sky_innovate(&models->state[m], candidate->measurement, candidate->extra, &own)) {
+            return false;
+        }
+        logs[m] = log(models->probability[m]) + log_density(&own);
+        high = fmax(high, logs[m]);
+        out->chi2 = fmin(out->chi2, own.chi2);
     }
-    double a = log(models->probability[0]) + out->log_likelihood;
-    double b = log(models->probability[1]) + log_density(&other);
-    double high = fmax(a, b);
-    out->chi2 = fmin(out->chi2, other.chi2);
-    out->log_likelihood = high > -INFINITY ? high + log(exp(a - high) + exp(b - high)) : high;
+    for (int m = 0; m < models->count; m++) {
+        sum += exp(logs[m] - high);
+    }
+    out->log_likelihood = high > -INFINITY ? high + log(sum) : high;
     return true;
 }
 
-/* Updates one Gaussian; returns ln of the hypotheses' total weight. */
-static double update_one(bst_sky_state *state, const bst_filter_candidate *candidates, int count,
-                         double miss_weight, double hit_weight) {
-    bst_sky_state hypotheses[BST_FILTER_CANDIDATES + 1];
-    double logs[BST_FILTER_CANDIDATES + 1], weights[BST_FILTER_CANDIDATES + 1];
-    int n = 0;
+/* Appends the hypotheses of one Gaussian of weight exp(log_weight); returns the new count. */
+static int spread(const bst_sky_state *state, double log_weight,
+                  const bst_filter_candidate *candidates, int count, double miss_weight,
+                  double hit_weight, bst_sky_state *hypotheses, double *logs, int n) {
     if (miss_weight > 0.0) {
         hypotheses[n] = *state;
-        logs[n++] = log(miss_weight);
+        logs[n++] = log_weight + log(miss_weight);
     }
-    for (int i = 0; i < count && i < BST_FILTER_CANDIDATES; i++) {
+    for (int i = 0; i < count; i++) {
         bst_sky_innovation innovation;
         if (bst_sky_innovate(state, candidates[i].measurement, candidates[i].extra, &innovation)) {
             hypotheses[n] = *state;
             bst_sky_update(&hypotheses[n], &innovation);
-            logs[n++] = log(hit_weight) + log_density(&innovation);
+            logs[n++] = log_weight + log(hit_weight) + log_density(&innovation);
         }
     }
-    if (n == 0) {
-        return 0.0;
-    }
-    double high = logs[0], sum = 0.0;
-    for (int i = 1; i < n; i++) {
+    return n;
+}
+
+/* Logarithms to weights whose largest is 1; returns ln of their total before that. */
+static double to_weights(double *logs, int n) {
+    double high = -INFINITY, sum = 0.0;
+    for (int i = 0; i < n; i++) {
         high = fmax(high, logs[i]);
     }
     for (int i = 0; i < n; i++) {
-        weights[i] = exp(logs[i] - high);
-        sum += weights[i];
+        logs[i] = exp(logs[i] - high);
+        sum += logs[i];
     }
+    return high + log(sum);
+}
+
+/* Updates one Gaussian; returns ln of its hypotheses' total weight. */
+static double update_one(bst_sky_state *state, const bst_filter_candidate *candidates, int count,
+                         double miss_weight, double hit_weight) {
+    bst_sky_state hypotheses[BST_FILTER_CANDIDATES + 1];
+    double weights[BST_FILTER_CANDIDATES + 1];
+    int n = spread(state, 0.0, candidates, count, miss_weight, hit_weight, hypotheses, weights, 0);
+    if (n == 0) {
+        return 0.0;
+    }
+    double total = to_weights(weights, n);
     if (n == 1) {
         *state = hypotheses[0];
     } else {
         bst_sky_mix(hypotheses, weights, n, state);
     }
-    return high + log(sum);
+    return total;
 }
 
-void bst_filter_update(bst_sky_state *state, bst_filter_models *models,
-                       const bst_filter_candidate *candidates, int count, double miss_weight,
-                       double hit_weight) {
-    if (models->count == 0) {
-        (void)update_one(state, candidates, count, miss_weight, hit_weight);
-        return;
-    }
-    double logs[BST_FILTER_MODELS], high = -INFINITY, sum = 0.0;
+static void update_models(bst_filter_models *models, const bst_filter_candidate *candidates,
+                          int count, double miss_weight, double hit_weight) {
+    double sum = 0.0;
     for (int m = 0; m < models->count; m++) {
-        logs[m] = log(models->probability[m]) +
-                  update_one(&models->state[m], candidates, count, miss_weight, hit_weight);
-        high = fmax(high, logs[m]);
+        models->probability[m] =
+            log(models->probability[m]) +
+            update_one(&models->state[m], candidates, count, miss_weight, hit_weight);
     }
+    (void)to_weights(models->probability, models->count);
     for (int m = 0; m < models->count; m++) {
-        models->probability[m] = exp(logs[m] - high);
         sum += models->probability[m];
     }
     for (int m = 0; m < models->count; m++) {
         models->probability[m] /= sum;
     }
-    combine(models, state);
+}
+
+static void update_mixture(const bst_sky_state *state, bst_filter_models *models,
+                           const bst_filter_candidate *candidates, int count, double miss_weight,
+                           double hit_weight, int components) {
+    enum { MOST = BST_FILTER_COMPONENTS * (BST_FILTER_CANDIDATES + 1) };
+    bst_sky_state hypotheses[MOST];
+    double weights[MOST];
+    int n = 0;
+    for (int m = 0; m < models->count; m++) {
+        n = spread(&models->state[m], log(models->probability[m]), candidates, count, miss_weight,
+                   hit_weight, hypotheses, weights, n);
+    }
+    if (models->count == 0) {
+        n = spread(state, 0.0, candidates, count, miss_weight, hit_weight, hypotheses, weights, 0);
+    }
+    if (n == 0) {
+        return;
+    }
+    (void)to_weights(weights, n);
+    n = bst_sky_reduce(hypotheses, weights, n, components);
+    models->count = n;
+    memcpy(models->state, hypotheses, (size_t)n * sizeof *hypotheses);
+    memcpy(models->probability, weights, (size_t)n * sizeof *weights);
+}
+
+void bst_filter_update(const bst_filter_params *params, bst_sky_state *state,
+                       bst_filter_models *models, const bst_filter_candidate *candidates, int count,
+                       double miss_weight, double hit_weight, int components) {
+    if (params->kind == BST_FILTER_IMM && models->count > 0) {
+        update_models(models, candidates, count, miss_weight, hit_weight);
+        combine(models, state);
+    } else if (models->count > 0 || components > 1) {
+        update_mixture(state, models, candidates, count, miss_weight, hit_weight, components);
+        if (models->count > 0) {
+            combine(models, state);
+        }
+    } else {
+        (void)update_one(state, candidates, count, miss_weight, hit_weight);
+    }
 }

@@ -4,7 +4,7 @@
 #ifndef BST_TRACKER_FILTER_H
 #define BST_TRACKER_FILTER_H
 
-#include "tracker/sky_filter.h"
+#include "tracker/mixture.h"
 
 typedef enum bst_filter_kind {
     BST_FILTER_EKF = 0,
@@ -21,20 +21,22 @@ typedef struct bst_filter_params {
                                     a manoeuvre; > 0 */
 } bst_filter_params;
 
-#define BST_FILTER_MODELS 2
+/* Most components of a mixture that a filter keeps. */
+#define BST_FILTER_COMPONENTS 8
 
-/* The models of an IMM filter: 0 quiet, 1 manoeuvring. */
+/* A filter that is more than one Gaussian: the two models of an IMM (0 quiet, 1 manoeuvring), or
+ * what several earlier choices of detections have led to. The state is its mean and covariance. */
 typedef struct bst_filter_models {
-    int count; /* BST_FILTER_MODELS, or 0: the state is all there is */
-    bst_sky_state state[BST_FILTER_MODELS];
-    double probability[BST_FILTER_MODELS];
+    int count; /* 0: the state is all there is */
+    bst_sky_state state[BST_FILTER_COMPONENTS];
+    double probability[BST_FILTER_COMPONENTS];
 } bst_filter_models;
 
 /* A detection as a predicted filter sees it. */
 typedef struct bst_filter_fit {
-    double chi2;                   /* the least of the models' */
+    double chi2;                   /* the least of the components' */
     double log_likelihood;         /* ln of the density of the detection, rad^-2 */
-    bst_sky_innovation innovation; /* of the state, or of the quiet model */
+    bst_sky_innovation innovation; /* of the state; IMM: of the quiet model */
 } bst_filter_fit;
 
 /* One detection that may be the object's. */
@@ -59,25 +61,22 @@ void bst_filter_shift(bst_sky_state *state, bst_filter_models *models, bst_vec3 
                       bst_vec3 rate_radps);
 
 /* False when an innovation's covariance is not positive definite. */
-bool bst_filter_evaluate(const bst_sky_state *state, const bst_filter_models *models,
-                         const bst_filter_candidate *candidate, bst_filter_fit *out);
+bool bst_filter_evaluate(const bst_filter_params *params, const bst_sky_state *state,
+                         const bst_filter_models *models, const bst_filter_candidate *candidate,
+                         bst_filter_fit *out);
 
-/* Update by `count` detections of which one or none is the object's. A hypothesis weighs
- * miss_weight for none, hit_weight times the likelihood of the innovation for a detection:
- * (1, PD / clutter density) give probabilistic data association (Bar-Shalom and Tse 1975;
- * Kirubarajan and Bar-Shalom 2004 with miss_weight = 1 - PD PG), (0, 1) with one detection the
- * plain Kalman filter. Each model becomes the mixture of its hypotheses, the models' probabilities
- * follow their total likelihoods, the state becomes the mixture of the models. At most
- * BST_FILTER_CANDIDATES detections. */
+/* Update by `count` detections (at most BST_FILTER_CANDIDATES) of which one or none is the
+ * object's. A hypothesis weighs miss_weight for none, hit_weight times the likelihood of the
+ * innovation for a detection: (0, 1) with one detection is the plain Kalman filter, (1 - PD PG, PD
+ * / clutter density) gives the posterior of probabilistic data association (Bar-Shalom and Tse
+ * 1975) as a mixture. components = 1: the mixture becomes one Gaussian of the same mean and
+ * covariance (for an IMM one per model, whose probability follows the model's total likelihood).
+ * More, not with an IMM: up to so many components (at most BST_FILTER_COMPONENTS) live on, so that
+ * later detections decide between earlier hypotheses (Salmond 1990). */
 #define BST_FILTER_CANDIDATES 16
-void bst_filter_update(bst_sky_state *state, bst_filter_models *models,
-                       const bst_filter_candidate *candidates, int count, double miss_weight,
-                       double hit_weight);
-
-/* The state with mean and covariance of a mixture of `count` states with weights (>= 0, any sum
- * > 0). States must lie within a radian or so of the heaviest one, in whose tangent plane the
- * moments are taken. */
-void bst_sky_mix(const bst_sky_state *states, const double *weights, int count, bst_sky_state *out);
+void bst_filter_update(const bst_filter_params *params, bst_sky_state *state,
+                       bst_filter_models *models, const bst_filter_candidate *candidates, int count,
+                       double miss_weight, double hit_weight, int components);
 
 /* bst_sky_predict with the covariance, and the mean's shift, from eight sigma points: the unscented
  * transform (Julier and Uhlmann 1997) with kappa = 0, whose weights are all positive, in the

@@ -36,25 +36,6 @@ void bst_mtt_remember(bst_mtt *m, const bst_mtt_track *track) {
     m->memory[m->memory_count++] = *track;
 }
 
-/* ln det of a covariance by elimination; INFINITY when it is not positive definite. */
-static double log_det(const double p[4][4]) {
-    double a[4][4], sum = 0.0;
-    memcpy(a, p, sizeof a);
-    for (int k = 0; k < 4; k++) {
-        if (!(a[k][k] > 0.0)) {
-            return INFINITY;
-        }
-        sum += log(a[k][k]);
-        for (int i = k + 1; i < 4; i++) {
-            double f = a[i][k] / a[k][k];
-            for (int j = k; j < 4; j++) {
-                a[i][j] -= f * a[k][j];
-            }
-        }
-    }
-    return sum;
-}
-
 bool bst_mtt_resume(bst_mtt *m, bst_mtt_track *track) {
     int best = -1;
     double lowest = INFINITY, second = INFINITY;
@@ -63,7 +44,7 @@ bool bst_mtt_resume(bst_mtt *m, bst_mtt_track *track) {
         if (!(chi2 <= m->params.memory_chi2)) {
             continue;
         }
-        double misfit = chi2 + log_det(m->memory[i].state.covariance);
+        double misfit = chi2 + bst_log_det4(m->memory[i].state.covariance);
         if (misfit < lowest) {
             second = lowest;
             lowest = misfit;

@@ -44,6 +44,11 @@ static bst_status check(bst_ctx *ctx, const bst_mtt_params *p) {
 bst_status bst_mtt_create(bst_ctx *ctx, const bst_mtt_params *params, bst_mtt **out) {
     *out = NULL;
     BST_TRY(check(ctx, params));
+    if (params->filter == BST_FILTER_IMM && params->association == BST_MTT_MIXTURE) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "tracker: association \"mixture\" does not go with type \"imm\"; use "
+                        "\"pda\"");
+    }
     bst_mtt *m = calloc(1, sizeof *m);
     if (!m) {
         return bst_fail(ctx, BST_ERR_MEMORY, "tracker: out of memory");
@@ -231,13 +236,15 @@ static void take_brightness(bst_mtt *m, bst_mtt_track *track, const bst_mtt_dete
 static void update_filter(bst_mtt *m, int t) {
     bst_mtt_track *track = &m->tracks[t];
     int given = m->detection_of_track[t];
+    bool weighs = m->params.association == BST_MTT_PDA || m->params.association == BST_MTT_MIXTURE;
+    int components = m->params.association == BST_MTT_MIXTURE ? BST_FILTER_COMPONENTS : 1;
     bst_filter_candidate candidates[BST_MTT_CANDIDATES];
-    if (m->params.association != BST_MTT_PDA || track->status == BST_TRACK_TENTATIVE ||
-        track->star || m->shared[t]) {
+    if (!weighs || track->status == BST_TRACK_TENTATIVE || track->star || m->shared[t]) {
         if (given >= 0) {
             candidates[0] = (bst_filter_candidate){.measurement = &m->now.items[given].sky,
                                                    .extra = m->shared[t] ? m->extra[t] : NULL};
-            bst_filter_update(&track->state, &track->models, candidates, 1, 0.0, 1.0);
+            bst_filter_update(&m->filter, &track->state, &track->models, candidates, 1, 0.0, 1.0,
+                              components);
         }
         return;
     }
@@ -248,8 +255,8 @@ static void update_filter(bst_mtt *m, int t) {
     }
     if (count > 0) {
         double pd = m->params.detection_probability, pg = -expm1(-0.5 * m->params.gate_chi2);
-        bst_filter_update(&track->state, &track->models, candidates, count, 1.0 - pd * pg,
-                          pd / m->alarm_density);
+        bst_filter_update(&m->filter, &track->state, &track->models, candidates, count,
+                          1.0 - pd * pg, pd / m->alarm_density, components);
     }
 }
 
@@ -262,7 +269,8 @@ static void hit(bst_mtt *m, int t) {
     if (detection) {
         candidate.measurement = &detection->sky;
     }
-    bool taken = detection && bst_filter_evaluate(&track->state, &track->models, &candidate, &fit);
+    bool taken = detection &&
+                 bst_filter_evaluate(&m->filter, &track->state, &track->models, &candidate, &fit);
     if (taken || !detection) {
         update_filter(m, t);
     }
@@ -389,7 +397,10 @@ static void judge(bst_mtt *m, const bst_mtt_frame *frame) {
         const bst_mtt_track *track = &m->tracks[t];
         if (!is_finished(m, track, m->observable[t])) {
             m->rest_count += track->at_rest;
-            m->tracks[kept++] = *track;
+            if (kept != t) {
+                m->tracks[kept] = *track;
+            }
+            kept++;
         } else if (track->status != BST_TRACK_TENTATIVE && !track->star) {
             record(m, BST_MTT_LOST, track, 0.0);
             bst_mtt_remember(m, track);

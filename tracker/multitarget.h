@@ -27,6 +27,8 @@ typedef enum bst_mtt_association {
     BST_MTT_NEAREST, /* the cheapest pair first, then the cheapest of the rest */
     BST_MTT_PDA, /* as GNN, but a confirmed track's filter weighs every detection in its gate that
                     no other confirmed track has */
+    BST_MTT_MIXTURE, /* as PDA, and the filter keeps the likeliest choices apart, so that later
+                        detections decide; not with BST_FILTER_IMM */
 } bst_mtt_association;
 
 typedef struct bst_mtt_params {

@@ -3,7 +3,7 @@
 #define C bst_tracker_config
 
 /* in the order of bst_mtt_association */
-static const char *const associations[] = {"gnn", "nearest", "pda", NULL};
+static const char *const associations[] = {"gnn", "nearest", "pda", "mixture", NULL};
 
 const bst_config_desc bst_tracker_config_table[] = {
     BST_REAL(C, star_floor_px, "px", 0, 10, "0.03",
@@ -89,7 +89,8 @@ const bst_config_desc bst_tracker_config_table[] = {
         C, association, associations, "\"gnn\"",
         "gnn: the assignment of least total cost. nearest: the cheapest pair first. pda: as gnn, "
         "but the filter of a confirmed track weighs every detection in its gate by its "
-        "probability (for dense clutter)."),
+        "probability. mixture: as pda, and the likeliest choices live on apart until later "
+        "detections decide (for dense clutter; not with type imm)."),
     BST_REAL(C, manoeuvre_noise_arcsec_per_s15, "arcsec/s^1.5", 0, 1e5, "3",
              "Type imm: the same as process_noise_arcsec_per_s15 while an object manoeuvres."),
     BST_REAL(C, quiet_s, "s", 1e-3, 1e9, "3600",

@@ -15,8 +15,8 @@ typedef struct bst_consistency {
     int runs, steps;
     int steps_judged;     /* with a value in at least one run */
     double mean_over_dof; /* of all values; 1 when the covariances are true */
-    double inside;        /* share of the judged steps whose mean over the runs lies within bounds */
-    double below, above;  /* shares on either side */
+    double inside;       /* share of the judged steps whose mean over the runs lies within bounds */
+    double below, above; /* shares on either side */
 } bst_consistency;
 
 /* Judges runs x steps values (values[run * steps + step]; NAN where a run has none at a step), each

@@ -1,6 +1,6 @@
 /* Generalised optimal sub-pattern assignment metric between a set of true objects and a set of
- * tracks (Rahmathullah, Garcia-Fernandez and Svensson, 20th Int. Conf. on Information Fusion, 2017),
- * alpha = 2: the form that splits into localisation, missed and false. */
+ * tracks (Rahmathullah, Garcia-Fernandez and Svensson, 20th Int. Conf. on Information Fusion,
+ * 2017), alpha = 2: the form that splits into localisation, missed and false. */
 #ifndef BST_EVAL_GOSPA_H
 #define BST_EVAL_GOSPA_H
 
@@ -8,8 +8,8 @@
 
 typedef struct bst_gospa_result {
     double gospa;
-    /* parts of gospa^p: sum of distances^p of the pairs; cutoff^p / 2 per missed object and per false
-     * track */
+    /* parts of gospa^p: sum of distances^p of the pairs; cutoff^p / 2 per missed object and per
+     * false track */
     double localisation, missed, false_tracks;
     int pairs, missed_count, false_count;
 } bst_gospa_result;

@@ -57,8 +57,7 @@ bool bst_track_bound_start(bst_track_bound *bound, const double r1[3], const dou
             double a = r1[i + j], b = r2[i + j];
             p[i][j] = b;
             p[i][j + 2] = p[j + 2][i] = b / dt_s;
-            p[i + 2][j + 2] =
-                (a + b) / (dt_s * dt_s) + (i == j ? noise_rad2ps3 * dt_s / 3.0 : 0.0);
+            p[i + 2][j + 2] = (a + b) / (dt_s * dt_s) + (i == j ? noise_rad2ps3 * dt_s / 3.0 : 0.0);
         }
     }
     return invert(p, bound->information);

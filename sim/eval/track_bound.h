@@ -16,11 +16,12 @@ typedef struct bst_track_bound {
 bool bst_track_bound_start(bst_track_bound *bound, const double r1[3], const double r2[3],
                            double dt_s, double noise_rad2ps3);
 
-/* One step of the recursion of Tichavsky, Muravchik and Nehorai (IEEE Trans. SP 46, 1998), which for
- * linear motion with noise is J' = (Q + F J^-1 F^T)^-1 + factor H^T R^-1 H: dt_s onward along a great
- * circle at rate_radps, then a measurement of covariance r (as above). factor is the share of a
- * measurement's information that is left on average: bst_information_factor, or 1 with and 0 without
- * a detection for the bound given who was detected when. False when it cannot be inverted. */
+/* One step of the recursion of Tichavsky, Muravchik and Nehorai (IEEE Trans. SP 46, 1998), which
+ * for linear motion with noise is J' = (Q + F J^-1 F^T)^-1 + factor H^T R^-1 H: dt_s onward along a
+ * great circle at rate_radps, then a measurement of covariance r (as above). factor is the share of
+ * a measurement's information that is left on average: bst_information_factor, or 1 with and 0
+ * without a detection for the bound given who was detected when. False when it cannot be inverted.
+ */
 bool bst_track_bound_step(bst_track_bound *bound, double dt_s, double rate_radps,
                           double noise_rad2ps3, const double r[3], double factor);
 
@@ -28,12 +29,12 @@ bool bst_track_bound_step(bst_track_bound *bound, double dt_s, double rate_radps
 bool bst_track_bound_covariance(const bst_track_bound *bound, double covariance[4][4]);
 
 /* The information reduction factor of a two-dimensional normal measurement that is missed with
- * probability 1 - pd and comes among Poisson false alarms of `density` per unit area, the unit being
- * sqrt(det R), so that density = (false alarms per steradian) * sqrt(det R) (Zhang and Willett, IEEE
- * Trans. AES 37, 2001; Niu, Willett and Bar-Shalom, same volume): the variance of the score of the
- * likelihood
- * (1 - pd) + pd / density * sum of phi(z_i). pd without false alarms. 0 < pd <= 1, density >= 0.
- * By 2e5 pseudo-random draws, always the same: relative error about 0.003. */
+ * probability 1 - pd and comes among Poisson false alarms of `density` per unit area, the unit
+ * being sqrt(det R), so that density = (false alarms per steradian) * sqrt(det R) (Zhang and
+ * Willett, IEEE Trans. AES 37, 2001; Niu, Willett and Bar-Shalom, same volume): the variance of the
+ * score of the likelihood (1 - pd) + pd / density * sum of phi(z_i). pd without false alarms. 0 <
+ * pd <= 1, density >= 0. By 2e5 pseudo-random draws, always the same: relative error about 0.003.
+ */
 double bst_information_factor(double pd, double density);
 
 #endif
