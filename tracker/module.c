@@ -98,6 +98,10 @@ static void report(struct bst_step *step, const bst_tracker *tracker) {
         const bst_tracker_event *e = &events[i];
         if (e->kind == BST_TRACKER_ATTITUDE_LOST) {
             bst_step_event(step, kinds[e->kind], "no attitude from stars that is good enough");
+        } else if (e->kind == BST_TRACKER_MANOEUVRE || e->kind == BST_TRACKER_BRIGHTNESS_CHANGE) {
+            bst_step_event(step, kinds[e->kind], "track %lld, chi-square %.1f of %d, V %.2f",
+                           (long long)e->track_id, e->statistic,
+                           e->kind == BST_TRACKER_MANOEUVRE ? 2 : 1, e->v_mag);
         } else if (e->kind == BST_TRACKER_TARGET_LOST) {
             bst_step_event(step, kinds[e->kind], "track %lld", (long long)e->track_id);
         } else {

@@ -412,21 +412,26 @@ static void choose_target(bst_tracker *t, const bst_target_cue *cue, double seco
     }
 }
 
-static void write_track(const bst_mtt_track *track, int64_t target_id, bst_track *out) {
-    *out = (bst_track){.id = track->id,
-                       .status = (int32_t)track->status,
-                       .target_of_interest = track->id == target_id,
-                       .direction_gcrf = track->state.direction,
-                       .rate_gcrf_radps = track->state.rate_radps,
-                       .v_mag = track->v_mag,
-                       .snr = track->snr,
-                       .score = track->score,
-                       .hits = track->hits,
-                       .misses_in_row = track->misses_in_row,
-                       .first_tick = track->first_tick,
-                       .last_update_tick = track->last_update_tick,
-                       .x_px = track->x_px,
-                       .y_px = track->y_px};
+static void write_track(const bst_tracker *t, const bst_target_cue *cue, const bst_mtt_track *track,
+                        bst_track *out) {
+    bool is_target = track->id == t->target.id;
+    *out =
+        (bst_track){.id = track->id,
+                    .status = (int32_t)track->status,
+                    .target_of_interest = is_target,
+                    .direction_gcrf = track->state.direction,
+                    .rate_gcrf_radps = track->state.rate_radps,
+                    .v_mag = track->v_mag,
+                    .snr = track->snr,
+                    .score = track->score,
+                    .hits = track->hits,
+                    .misses_in_row = track->misses_in_row,
+                    .first_tick = track->first_tick,
+                    .last_update_tick = track->last_update_tick,
+                    .x_px = track->x_px,
+                    .y_px = track->y_px,
+                    .uncorrelated = !is_target && track->status != BST_TRACK_TENTATIVE &&
+                                    !bst_target_is_expected(&t->target_params, cue, track, false)};
     memcpy(out->covariance, track->state.covariance, sizeof out->covariance);
 }
 
@@ -439,8 +444,8 @@ static int rank(const bst_mtt_track *track, int64_t target_id) {
 }
 
 static void write_outputs(bst_tracker *t, const bst_detections *d, const frame_attitude *attitude,
-                          const bst_quat *q_now, int detections_lost, bst_tracks *tracks,
-                          int track_capacity, bst_predictions *predictions,
+                          const bst_target_cue *cue, const bst_quat *q_now, int detections_lost,
+                          bst_tracks *tracks, int track_capacity, bst_predictions *predictions,
                           int prediction_capacity) {
     int64_t tick = attitude->fix.tick;
     bst_quat q = q_now ? *q_now : bst_quat_unit(d->q_telemetry_from_gcrf);
@@ -466,7 +471,7 @@ static void write_outputs(bst_tracker *t, const bst_detections *d, const frame_a
                 continue;
             }
             if (tracks->count < track_capacity) {
-                write_track(&all[i], t->target.id, &tracks->items[tracks->count++]);
+                write_track(t, cue, &all[i], &tracks->items[tracks->count++]);
             } else {
                 tracks->lost++;
             }
@@ -551,8 +556,8 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
     }
     t->attitude_was_lost = !attitude.usable;
     choose_target(t, &view.cue, seconds);
-    write_outputs(t, d, &attitude, input->q_telemetry_now, detections_lost, tracks, track_capacity,
-                  predictions, prediction_capacity);
+    write_outputs(t, d, &attitude, &view.cue, input->q_telemetry_now, detections_lost, tracks,
+                  track_capacity, predictions, prediction_capacity);
     t->cue_before = *cue;
     t->started = true;
     t->last_exposure_id = d->exposure_id;

@@ -193,7 +193,7 @@ static double exhaustive(const double *d, int n, int m, double c, double p, int 
     if (i == n) {
         int free_tracks = m;
         for (int j = 0; j < m; j++) {
-            free_tracks -= taken >> j & 1u;
+            free_tracks -= (int)(taken >> j & 1u);
         }
         return 0.5 * pow(c, p) * free_tracks;
     }
