@@ -252,6 +252,7 @@ typedef struct bst_track {
     int32_t hits, misses_in_row;
     int64_t first_tick, last_update_tick;
     double x_px, y_px; /* latest detection, full-sensor coordinates */
+    bool uncorrelated; /* confirmed, and neither the target nor what the cue expects */
 } bst_track;
 
 /* Attitude from stars, and the telemetry's error that follows from it. */

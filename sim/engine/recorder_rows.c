@@ -357,6 +357,7 @@ static bst_status track_row(bst_ctx *ctx, bst_recorder *recorder, int sensor, co
     put_int(&r, k->last_update_tick);
     put_real(&r, k->x_px);
     put_real(&r, k->y_px);
+    put_flag(&r, k->uncorrelated);
     return append(ctx, recorder, BST_TABLE_TRACKS, &r);
 }
 

@@ -226,6 +226,7 @@ static const bst_column track_columns[] = {
     INT("last_update_tick", "tick", "latest detection"),
     REAL("x_px", "px", "latest detection, whole sensor"),
     REAL("y_px", "px", "latest detection, whole sensor"),
+    INT("uncorrelated", "", "1: confirmed, and neither the target nor what the cue expects"),
 };
 static const bst_column los_command_columns[] = {
     SENSOR,
