@@ -2,6 +2,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "imgproc/heapsort.h"
 
@@ -11,37 +12,33 @@ bst_status bst_candidates_create(bst_ctx *ctx, int max_width, int max_height, bs
     size_t pixels = (size_t)max_width * (size_t)max_height;
     /* maxima of an 8-connected neighbourhood cannot be denser than one in four */
     *out = (bst_candidates){.capacity = ((max_width + 1) / 2) * ((max_height + 1) / 2)};
-    out->pixel = calloc(pixels, sizeof *out->pixel);
     out->owner = calloc(pixels, sizeof *out->owner);
+    out->hit = calloc(pixels, sizeof *out->hit);
+    out->hit_swap = calloc(pixels, sizeof *out->hit_swap);
+    out->key = calloc(pixels, sizeof *out->key);
+    out->key_swap = calloc(pixels, sizeof *out->key_swap);
     out->items = calloc((size_t)out->capacity, sizeof *out->items);
     out->order = calloc((size_t)out->capacity, sizeof *out->order);
     out->parent = calloc((size_t)out->capacity, sizeof *out->parent);
-    bst_status status = BST_OK;
-    if (!out->pixel || !out->owner || !out->items || !out->order || !out->parent) {
-        status = bst_fail(ctx, BST_ERR_MEMORY, "no memory for the candidates of a %d x %d frame",
-                          max_width, max_height);
-    } else {
-        status = bst_cv_components_create(ctx, max_width, max_height, &out->components);
-    }
-    if (status != BST_OK) {
+    if (!out->owner || !out->hit || !out->hit_swap || !out->key || !out->key_swap || !out->items ||
+        !out->order || !out->parent) {
         bst_candidates_free(out);
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the candidates of a %d x %d frame",
+                        max_width, max_height);
     }
-    return status;
+    return BST_OK;
 }
 
 void bst_candidates_free(bst_candidates *c) {
-    bst_cv_components_free(c->components);
-    free(c->pixel);
     free(c->owner);
+    free(c->hit);
+    free(c->hit_swap);
+    free(c->key);
+    free(c->key_swap);
     free(c->items);
     free(c->order);
     free(c->parent);
     *c = (bst_candidates){0};
-}
-
-static bool brighter_pixel(const void *context, int a, int b) {
-    const float *map = context;
-    return map[a] > map[b] || (map[a] == map[b] && a < b);
 }
 
 static bool brighter_candidate(const bst_candidate *a, const bst_candidate *b) {
@@ -59,60 +56,84 @@ static int32_t root_of(bst_candidates *c, int32_t i) {
     return i;
 }
 
-/* Floods the component from its brightest pixel down; `first` is its first candidate. */
-static void split_component(bst_candidates *c, const bst_filter *f, int pixels, int first) {
-    int width = f->width, height = f->height;
-    for (int k = 0; k < pixels; k++) {
-        int p = c->pixel[k], x = p % width, y = p / width;
-        float value = f->best[p];
-        int32_t owner = -1;
-        for (int dy = -1; dy <= 1; dy++) {
-            for (int dx = -1; dx <= 1; dx++) {
-                int nx = x + dx, ny = y + dy;
-                if (nx < 0 || ny < 0 || nx >= width || ny >= height) {
-                    continue;
-                }
-                int32_t other = c->owner[ny * width + nx] - 1;
-                if (other < 0) {
-                    continue;
-                }
-                other = root_of(c, other);
-                if (owner < 0 || owner == other) {
-                    owner = other;
-                    continue;
-                }
-                int32_t high = owner, low = other;
-                if (brighter_candidate(&c->items[low], &c->items[high])) {
-                    high = other;
-                    low = owner;
-                }
-                float peak = c->items[low].snr;
-                if (peak - value < fmaxf(SADDLE_SIGMA, SADDLE_SHARE * peak)) {
-                    c->parent[low] = high;
-                    c->items[high].pixels += c->items[low].pixels;
-                }
-                owner = high;
+/* Hits by falling SNR, then rising pixel number: a stable radix sort. The bits of positive floats
+ * sort as the floats do. */
+static int sorted_hits(bst_candidates *c, const bst_filter *f) {
+    enum { BITS = 11, BINS = 1 << BITS, PASSES = 3 };
+    int count = 0, bins[PASSES][BINS] = {{0}};
+    for (int y = 0; y < f->height; y++) {
+        size_t at = (size_t)y * (size_t)f->max_width;
+        for (int h = 0; h < f->hits[y]; h++) {
+            uint32_t bits;
+            memcpy(&bits, &f->hit_snr[at + (size_t)h], sizeof bits);
+            bits = ~bits;
+            c->key[count] = bits;
+            c->hit[count++] = y * f->width + f->hit_x[at + (size_t)h];
+            for (int pass = 0; pass < PASSES; pass++) {
+                bins[pass][bits >> (pass * BITS) & (BINS - 1)]++;
             }
         }
-        if (owner < 0) {
-            owner = c->count++;
-            c->items[owner] = (bst_candidate){x, y, value, 0};
-            c->parent[owner] = owner;
+    }
+    for (int pass = 0; pass < PASSES; pass++) {
+        int sum = 0;
+        for (int b = 0; b < BINS; b++) {
+            int n = bins[pass][b];
+            bins[pass][b] = sum;
+            sum += n;
         }
-        c->items[owner].pixels++;
-        c->owner[p] = owner + 1;
+        for (int i = 0; i < count; i++) {
+            int to = bins[pass][c->key[i] >> (pass * BITS) & (BINS - 1)]++;
+            c->key_swap[to] = c->key[i];
+            c->hit_swap[to] = c->hit[i];
+        }
+        uint32_t *key = c->key;
+        int *hit = c->hit;
+        c->key = c->key_swap;
+        c->hit = c->hit_swap;
+        c->key_swap = key;
+        c->hit_swap = hit;
     }
-    for (int k = 0; k < pixels; k++) {
-        c->owner[c->pixel[k]] = 0;
+    return count;
+}
+
+/* Joins two candidates that meet at a pixel of this value; returns the brighter. */
+static int32_t meet(bst_candidates *c, int32_t a, int32_t b, float value) {
+    int32_t high = a, low = b;
+    if (brighter_candidate(&c->items[low], &c->items[high])) {
+        high = b;
+        low = a;
     }
-    /* keep the roots */
-    int kept = first;
-    for (int i = first; i < c->count; i++) {
-        if (c->parent[i] == i) {
-            c->items[kept++] = c->items[i];
+    float peak = c->items[low].snr;
+    if (peak - value < fmaxf(SADDLE_SIGMA, SADDLE_SHARE * peak)) {
+        c->parent[low] = high;
+        c->items[high].pixels += c->items[low].pixels;
+    }
+    return high;
+}
+
+/* Takes the pixel in: to its neighbours' owner, or as a new maximum. */
+static void flood(bst_candidates *c, const bst_filter *f, int p, float value, bool counts) {
+    int width = f->width, x = p % width, y = p / width;
+    int left = x > 0 ? -1 : 0, right = x + 1 < width ? 1 : 0;
+    int32_t owner = -1;
+    for (int dy = y > 0 ? -1 : 0; dy <= (y + 1 < f->height ? 1 : 0); dy++) {
+        const int32_t *row = c->owner + p + dy * width;
+        for (int dx = left; dx <= right; dx++) {
+            if (row[dx] == 0) {
+                continue;
+            }
+            int32_t other = root_of(c, row[dx] - 1);
+            owner = owner < 0 || owner == other || !counts ? other
+                                                          : meet(c, owner, other, value);
         }
     }
-    c->count = kept;
+    if (owner < 0) {
+        owner = c->count++;
+        c->items[owner] = (bst_candidate){x, y, value, 0};
+        c->parent[owner] = owner;
+    }
+    c->items[owner].pixels += counts;
+    c->owner[p] = owner + 1;
 }
 
 static bool before_candidate(const void *context, int a, int b) {
@@ -120,33 +141,29 @@ static bool before_candidate(const void *context, int a, int b) {
     return brighter_candidate(&items[a], &items[b]);
 }
 
-bst_status bst_candidates_find(bst_ctx *ctx, bst_candidates *c, const bst_filter *f) {
+void bst_candidates_find(bst_candidates *c, const bst_filter *f, float threshold, float certain,
+                         bst_candidate_fn accept, const void *user) {
     c->count = 0;
-    if (f->last_row < f->first_row) {
-        return BST_OK;
+    int hits = sorted_hits(c, f);
+    for (int i = 0; i < hits; i++) {
+        uint32_t bits = ~c->key[i];
+        float value;
+        memcpy(&value, &bits, sizeof value);
+        flood(c, f, c->hit[i], value, value > threshold);
     }
-    const int32_t *labels;
-    int stride, count, width = f->width;
-    BST_TRY(bst_cv_components_label(ctx, c->components,
-                                    f->mask + (size_t)f->first_row * (size_t)width, width,
-                                    f->last_row - f->first_row + 1, &labels, &stride, &count));
-    for (int label = 1; label < count; label++) {
-        bst_cv_box box = bst_cv_components_box(c->components, label);
-        int pixels = 0;
-        for (int y = box.y; y < box.y + box.height; y++) {
-            const int32_t *row = labels + (size_t)y * (size_t)stride;
-            for (int x = box.x; x < box.x + box.width; x++) {
-                if (row[x] == label) {
-                    c->pixel[pixels++] = (y + f->first_row) * width + x;
-                }
-            }
+    for (int i = 0; i < hits; i++) {
+        c->owner[c->hit[i]] = 0;
+    }
+    /* keep the roots */
+    int kept = 0;
+    for (int i = 0; i < c->count; i++) {
+        if (c->parent[i] == i && (c->items[i].snr > certain || accept(user, &c->items[i]))) {
+            c->items[kept++] = c->items[i];
         }
-        bst_heapsort_indices(c->pixel, pixels, brighter_pixel, f->best);
-        split_component(c, f, pixels, c->count);
     }
+    c->count = kept;
     for (int i = 0; i < c->count; i++) {
         c->order[i] = i;
     }
     bst_heapsort_indices(c->order, c->count, before_candidate, c->items);
-    return BST_OK;
 }

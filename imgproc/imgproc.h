@@ -22,6 +22,7 @@ typedef struct bst_imgproc_config {
     double jitter_px;              /* RMS per axis by which the PSF is expected to be widened */
     double streak_min_px, streak_max_px;
     double search_radius_px, match_tolerance_px;
+    int64_t threads; /* 0: one per processor */
     bst_config_list bad_pixels; /* of bst_bad_pixel */
     /* FITS images of the maps; "": none. bst_imgproc_create leaves them to the caller. */
     char dark_file[512], flat_file[512], bad_pixel_file[512];
