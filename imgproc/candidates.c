@@ -4,24 +4,22 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "imgproc/heapsort.h"
-
 static const float SADDLE_SIGMA = 3.0f, SADDLE_SHARE = 0.15f;
 
 bst_status bst_candidates_create(bst_ctx *ctx, int max_width, int max_height, bst_candidates *out) {
-    size_t pixels = (size_t)max_width * (size_t)max_height;
     /* maxima of an 8-connected neighbourhood cannot be denser than one in four */
     *out = (bst_candidates){.capacity = ((max_width + 1) / 2) * ((max_height + 1) / 2)};
-    out->owner = calloc(pixels, sizeof *out->owner);
-    out->hit = calloc(pixels, sizeof *out->hit);
-    out->hit_swap = calloc(pixels, sizeof *out->hit_swap);
-    out->key = calloc(pixels, sizeof *out->key);
-    out->key_swap = calloc(pixels, sizeof *out->key_swap);
-    out->items = calloc((size_t)out->capacity, sizeof *out->items);
-    out->order = calloc((size_t)out->capacity, sizeof *out->order);
-    out->parent = calloc((size_t)out->capacity, sizeof *out->parent);
-    if (!out->owner || !out->hit || !out->hit_swap || !out->key || !out->key_swap || !out->items ||
-        !out->order || !out->parent) {
+    size_t n = (size_t)out->capacity;
+    out->items = calloc(n, sizeof *out->items);
+    out->order = calloc(n, sizeof *out->order);
+    out->maxima = calloc(n, sizeof *out->maxima);
+    out->row = calloc((size_t)max_height + 1, sizeof *out->row);
+    out->stands = calloc(n, sizeof *out->stands);
+    out->order_swap = calloc(n, sizeof *out->order_swap);
+    out->key = calloc(n, sizeof *out->key);
+    out->key_swap = calloc(n, sizeof *out->key_swap);
+    if (!out->items || !out->order || !out->maxima || !out->row || !out->stands ||
+        !out->order_swap || !out->key || !out->key_swap) {
         bst_candidates_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the candidates of a %d x %d frame",
                         max_width, max_height);
@@ -30,140 +28,135 @@ bst_status bst_candidates_create(bst_ctx *ctx, int max_width, int max_height, bs
 }
 
 void bst_candidates_free(bst_candidates *c) {
-    free(c->owner);
-    free(c->hit);
-    free(c->hit_swap);
-    free(c->key);
-    free(c->key_swap);
     free(c->items);
     free(c->order);
-    free(c->parent);
+    free(c->maxima);
+    free(c->row);
+    free(c->stands);
+    free(c->order_swap);
+    free(c->key);
+    free(c->key_swap);
     *c = (bst_candidates){0};
 }
 
-static bool brighter_candidate(const bst_candidate *a, const bst_candidate *b) {
+/* Whether the SNR stays above `least` on the pixels nearest to the straight way between two. */
+static bool is_ridge(const bst_filter *f, const bst_candidate *a, const bst_candidate *b,
+                     float least) {
+    int dx = b->x - a->x, dy = b->y - a->y;
+    int steps = abs(dx) > abs(dy) ? abs(dx) : abs(dy);
+    for (int i = 1; i < steps; i++) {
+        float t = (float)i / (float)steps;
+        int x = a->x + (int)lroundf(t * (float)dx), y = a->y + (int)lroundf(t * (float)dy);
+        if (!(bst_filter_best_at(f, x, y) > least)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static bool higher(const bst_candidate *a, const bst_candidate *b) {
     if (a->snr != b->snr) {
         return a->snr > b->snr;
     }
     return a->y != b->y ? a->y < b->y : a->x < b->x;
 }
 
-static int32_t root_of(bst_candidates *c, int32_t i) {
-    while (c->parent[i] != i) {
-        c->parent[i] = c->parent[c->parent[i]];
-        i = c->parent[i];
+typedef struct search {
+    bst_candidates *c;
+    const bst_filter *f;
+    int reach;
+    float floor, certain;
+    bst_candidate_fn accept;
+    const void *user;
+} search;
+
+static bool stands_alone(const search *s, const bst_candidate *m) {
+    const bst_candidates *c = s->c;
+    float least = fmaxf(m->snr - fmaxf(SADDLE_SIGMA, SADDLE_SHARE * m->snr), s->floor);
+    int top = m->y - s->reach > 0 ? m->y - s->reach : 0;
+    int bottom = m->y + s->reach < s->f->height ? m->y + s->reach : s->f->height - 1;
+    for (int y = top; y <= bottom; y++) {
+        int lo = c->row[y], hi = c->row[y + 1], end = hi;
+        while (lo < hi) { /* the first within reach */
+            int middle = lo + (hi - lo) / 2;
+            if (c->maxima[middle].x < m->x - s->reach) {
+                lo = middle + 1;
+            } else {
+                hi = middle;
+            }
+        }
+        for (; lo < end && c->maxima[lo].x <= m->x + s->reach; lo++) {
+            const bst_candidate *other = &c->maxima[lo];
+            if (other != m && higher(other, m) && is_ridge(s->f, m, other, least)) {
+                return false;
+            }
+        }
     }
-    return i;
+    return true;
 }
 
-/* Hits by falling SNR, then rising pixel number: a stable radix sort. The bits of positive floats
+static void decide(void *user, int begin, int end) {
+    const search *s = user;
+    for (int i = begin; i < end; i++) {
+        const bst_candidate *m = &s->c->maxima[i];
+        s->c->stands[i] =
+            stands_alone(s, m) && (m->snr > s->certain || s->accept(s->user, m)) ? 1 : 0;
+    }
+}
+
+/* order: by falling SNR, of equals as they are: a stable radix sort. The bits of positive floats
  * sort as the floats do. */
-static int sorted_hits(bst_candidates *c, const bst_filter *f) {
+static void sort_items(bst_candidates *c) {
     enum { BITS = 11, BINS = 1 << BITS, PASSES = 3 };
-    int count = 0, bins[PASSES][BINS] = {{0}};
-    for (int y = 0; y < f->height; y++) {
-        size_t at = (size_t)y * (size_t)f->max_width;
-        for (int h = 0; h < f->hits[y]; h++) {
-            uint32_t bits;
-            memcpy(&bits, &f->hit_snr[at + (size_t)h], sizeof bits);
-            bits = ~bits;
-            c->key[count] = bits;
-            c->hit[count++] = y * f->width + f->hit_x[at + (size_t)h];
-            for (int pass = 0; pass < PASSES; pass++) {
-                bins[pass][bits >> (pass * BITS) & (BINS - 1)]++;
-            }
-        }
-    }
-    for (int pass = 0; pass < PASSES; pass++) {
-        int sum = 0;
-        for (int b = 0; b < BINS; b++) {
-            int n = bins[pass][b];
-            bins[pass][b] = sum;
-            sum += n;
-        }
-        for (int i = 0; i < count; i++) {
-            int to = bins[pass][c->key[i] >> (pass * BITS) & (BINS - 1)]++;
-            c->key_swap[to] = c->key[i];
-            c->hit_swap[to] = c->hit[i];
-        }
-        uint32_t *key = c->key;
-        int *hit = c->hit;
-        c->key = c->key_swap;
-        c->hit = c->hit_swap;
-        c->key_swap = key;
-        c->hit_swap = hit;
-    }
-    return count;
-}
-
-/* Joins two candidates that meet at a pixel of this value; returns the brighter. */
-static int32_t meet(bst_candidates *c, int32_t a, int32_t b, float value) {
-    int32_t high = a, low = b;
-    if (brighter_candidate(&c->items[low], &c->items[high])) {
-        high = b;
-        low = a;
-    }
-    float peak = c->items[low].snr;
-    if (peak - value < fmaxf(SADDLE_SIGMA, SADDLE_SHARE * peak)) {
-        c->parent[low] = high;
-        c->items[high].pixels += c->items[low].pixels;
-    }
-    return high;
-}
-
-/* Takes the pixel in: to its neighbours' owner, or as a new maximum. */
-static void flood(bst_candidates *c, const bst_filter *f, int p, float value, bool counts) {
-    int width = f->width, x = p % width, y = p / width;
-    int left = x > 0 ? -1 : 0, right = x + 1 < width ? 1 : 0;
-    int32_t owner = -1;
-    for (int dy = y > 0 ? -1 : 0; dy <= (y + 1 < f->height ? 1 : 0); dy++) {
-        const int32_t *row = c->owner + p + dy * width;
-        for (int dx = left; dx <= right; dx++) {
-            if (row[dx] == 0) {
-                continue;
-            }
-            int32_t other = root_of(c, row[dx] - 1);
-            owner = owner < 0 || owner == other || !counts ? other
-                                                          : meet(c, owner, other, value);
-        }
-    }
-    if (owner < 0) {
-        owner = c->count++;
-        c->items[owner] = (bst_candidate){x, y, value, 0};
-        c->parent[owner] = owner;
-    }
-    c->items[owner].pixels += counts;
-    c->owner[p] = owner + 1;
-}
-
-static bool before_candidate(const void *context, int a, int b) {
-    const bst_candidate *items = context;
-    return brighter_candidate(&items[a], &items[b]);
-}
-
-void bst_candidates_find(bst_candidates *c, const bst_filter *f, float threshold, float certain,
-                         bst_candidate_fn accept, const void *user) {
-    c->count = 0;
-    int hits = sorted_hits(c, f);
-    for (int i = 0; i < hits; i++) {
-        uint32_t bits = ~c->key[i];
-        float value;
-        memcpy(&value, &bits, sizeof value);
-        flood(c, f, c->hit[i], value, value > threshold);
-    }
-    for (int i = 0; i < hits; i++) {
-        c->owner[c->hit[i]] = 0;
-    }
-    /* keep the roots */
-    int kept = 0;
     for (int i = 0; i < c->count; i++) {
-        if (c->parent[i] == i && (c->items[i].snr > certain || accept(user, &c->items[i]))) {
-            c->items[kept++] = c->items[i];
-        }
-    }
-    c->count = kept;
-    for (int i = 0; i < c->count; i++) {
+        uint32_t bits;
+        memcpy(&bits, &c->items[i].snr, sizeof bits);
+        c->key[i] = ~bits;
         c->order[i] = i;
     }
-    bst_heapsort_indices(c->order, c->count, before_candidate, c->items);
+    for (int pass = 0; pass < PASSES; pass++) {
+        int bins[BINS] = {0}, sum = 0;
+        for (int i = 0; i < c->count; i++) {
+            bins[c->key[i] >> (pass * BITS) & (BINS - 1)]++;
+        }
+        for (int b = 0; b < BINS; b++) {
+            int n = bins[b];
+            bins[b] = sum;
+            sum += n;
+        }
+        for (int i = 0; i < c->count; i++) {
+            int to = bins[c->key[i] >> (pass * BITS) & (BINS - 1)]++;
+            c->key_swap[to] = c->key[i];
+            c->order_swap[to] = c->order[i];
+        }
+        uint32_t *key = c->key;
+        int *order = c->order;
+        c->key = c->key_swap;
+        c->order = c->order_swap;
+        c->key_swap = key;
+        c->order_swap = order;
+    }
+}
+
+void bst_candidates_find(bst_candidates *c, bst_parallel *pool, const bst_filter *f, int reach_px,
+                         float floor, float certain, bst_candidate_fn accept, const void *user) {
+    int maxima = 0;
+    for (int y = 0; y < f->height; y++) {
+        size_t at = (size_t)y * (size_t)f->max_width;
+        c->row[y] = maxima;
+        for (int i = 0; i < f->maxima[y]; i++) {
+            c->maxima[maxima++] =
+                (bst_candidate){f->maximum_x[at + (size_t)i], y, f->maximum_snr[at + (size_t)i]};
+        }
+    }
+    c->row[f->height] = maxima;
+    search s = {c, f, reach_px, floor, certain, accept, user};
+    bst_parallel_for(pool, maxima, 256, decide, &s);
+    c->count = 0;
+    for (int i = 0; i < maxima; i++) {
+        if (c->stands[i]) {
+            c->items[c->count++] = c->maxima[i];
+        }
+    }
+    sort_items(c);
 }

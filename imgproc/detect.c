@@ -309,13 +309,14 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
     bst_filter_set(&ip->filter, sigma, dx, dy);
     double threshold = bst_filter_threshold(&ip->filter, ip->config.false_alarms_per_frame,
                                             (double)width * (double)height);
+    double look = ip->smeared ? threshold : LOOK_SHARE * threshold;
     bst_filter_run(&ip->filter, ip->pool, &ip->background, read_electrons, &read, frame->pixels,
-                   ip->electrons, width, height, saturation_dn(ip, frame),
-                   (float)(LOOK_SHARE * threshold));
+                   ip->electrons, width, height, saturation_dn(ip, frame), (float)look);
     double gain = ip->camera.gain_e_per_dn, read_noise = ip->camera.read_noise_e;
     judge noise = {ip, threshold, read_noise * read_noise + gain * gain / 12.0};
-    bst_candidates_find(&ip->candidates, &ip->filter, (float)threshold,
-                        (float)(threshold + CERTAIN_ABOVE), stands_out, &noise);
+    double certain = ip->smeared ? threshold : threshold + CERTAIN_ABOVE;
+    bst_candidates_find(&ip->candidates, ip->pool, &ip->filter, (int)ceil(6.0 * sigma) + 2,
+                        (float)look, (float)certain, stands_out, &noise);
     bst_locate_frame view = {.signal = ip->electrons,
                              .width = width,
                              .height = height,
@@ -327,7 +328,11 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
                              .binning = frame->binning};
     view.origin_x_px = frame->window.x0 + 0.5 * (frame->binning - 1);
     view.origin_y_px = frame->window.y0 + 0.5 * (frame->binning - 1);
-    bst_locate(&ip->locator, &view, &ip->candidates);
+    if (ip->smeared) {
+        bst_locate_roughly(&ip->locator, &view, &ip->candidates);
+    } else {
+        bst_locate(&ip->locator, &view, &ip->candidates);
+    }
 
     int kept = 0, room = capacity < ip->locator.capacity ? capacity : ip->locator.capacity;
     int lost = ip->candidates.count - ip->locator.count;

@@ -19,15 +19,16 @@ bst_status bst_filter_create(bst_ctx *ctx, int max_width, int max_height, double
     out->most_parts = (int)(pixels / PART_PX) + 2;
     out->line_floats = line * (2 * BST_FILTER_MAX_RADIUS + 1 + 4);
     out->point = calloc(line * (size_t)(max_height + 2 * pad), sizeof(float));
-    out->hits = calloc((size_t)max_height, sizeof *out->hits);
-    out->hit_x = calloc(pixels, sizeof *out->hit_x);
-    out->hit_snr = calloc(pixels, sizeof *out->hit_snr);
+    out->best = calloc(pixels, sizeof(float));
+    out->maxima = calloc((size_t)max_height, sizeof *out->maxima);
+    out->maximum_x = calloc(pixels, sizeof *out->maximum_x);
+    out->maximum_snr = calloc(pixels, sizeof *out->maximum_snr);
     out->lines = calloc(out->line_floats * (size_t)out->most_parts, sizeof(float));
     out->mesh_rows = calloc(2 * (size_t)max_width * (size_t)out->most_parts, sizeof(float));
     out->edge_x = calloc((size_t)max_width, sizeof(float));
     out->edge_y = calloc((size_t)max_height, sizeof(float));
-    if (!out->point || !out->hits || !out->hit_x || !out->hit_snr || !out->lines ||
-        !out->mesh_rows || !out->edge_x || !out->edge_y) {
+    if (!out->point || !out->best || !out->maxima || !out->maximum_x || !out->maximum_snr ||
+        !out->lines || !out->mesh_rows || !out->edge_x || !out->edge_y) {
         bst_filter_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the filters of a %d x %d frame",
                         max_width, max_height);
@@ -37,9 +38,10 @@ bst_status bst_filter_create(bst_ctx *ctx, int max_width, int max_height, double
 
 void bst_filter_free(bst_filter *f) {
     free(f->point);
-    free(f->hits);
-    free(f->hit_x);
-    free(f->hit_snr);
+    free(f->best);
+    free(f->maxima);
+    free(f->maximum_x);
+    free(f->maximum_snr);
     free(f->lines);
     free(f->mesh_rows);
     free(f->edge_x);
@@ -281,9 +283,18 @@ typedef struct pass {
     float threshold;
 } pass;
 
-static void find_hits(bst_filter *f, int y, const float *row, float threshold) {
+static const float *best_row(const bst_filter *f, int y) {
+    return f->streak ? f->best + (size_t)y * (size_t)f->width
+                     : f->point + (size_t)(y + f->pad) * (size_t)f->stride + (size_t)f->pad;
+}
+
+/* Needs the rows above and below. */
+static void find_maxima(bst_filter *f, int y, float threshold) {
     size_t at = (size_t)y * (size_t)f->max_width;
-    f->hits[y] = bst_row_above(row, f->width, threshold, f->hit_x + at, f->hit_snr + at);
+    const float *row = best_row(f, y);
+    f->maxima[y] = bst_row_maxima(y > 0 ? best_row(f, y - 1) : NULL, row,
+                                  y + 1 < f->height ? best_row(f, y + 1) : NULL, f->width,
+                                  threshold, f->maximum_x + at, f->maximum_snr + at);
 }
 
 /* Rows begin to end of the point map, with the rows of signal that are theirs. */
@@ -328,8 +339,8 @@ static void filter_points(void *user, int begin, int end) {
         float *out = f->point + (size_t)(centre + f->pad) * line + (size_t)f->pad;
         bst_row_combine(out, width, in, f->kernel, padded);
         bst_row_scale(out, f->edge_x, f->edge_y[centre], width);
-        if (!f->streak) {
-            find_hits(f, centre, out, p->threshold);
+        if (!f->streak && centre - 2 >= begin) {
+            find_maxima(f, centre - 1, p->threshold);
         }
     }
 }
@@ -338,16 +349,18 @@ static void filter_streaks(void *user, int begin, int end) {
     const pass *p = user;
     bst_filter *f = p->f;
     size_t line = (size_t)f->stride;
-    float *row = f->lines + f->line_floats * (size_t)(begin / p->part_rows);
     const float *in[BST_FILTER_MAX_TAPS];
     for (int y = begin; y < end; y++) {
         const float *point = f->point + (size_t)(y + f->pad) * line + (size_t)f->pad;
         for (int t = 0; t < f->taps; t++) {
             in[t] = point + (long)f->tap_y[t] * (long)line + f->tap_x[t];
         }
+        float *row = f->best + (size_t)y * (size_t)f->width;
         bst_row_combine(row, f->width, in, f->tap_weight, f->taps);
         bst_row_greater(row, point, f->width);
-        find_hits(f, y, row, p->threshold);
+        if (y - 2 >= begin) {
+            find_maxima(f, y - 1, p->threshold);
+        }
     }
 }
 
@@ -369,6 +382,11 @@ void bst_filter_run(bst_filter *f, bst_parallel *pool, const bst_background *bac
     bst_parallel_for(pool, height, rows, filter_points, &p);
     if (f->streak) {
         bst_parallel_for(pool, height, rows, filter_streaks, &p);
+    }
+    for (int y = 0; y < height; y++) {
+        if (y % rows == 0 || y % rows == rows - 1 || y == height - 1) {
+            find_maxima(f, y, threshold);
+        }
     }
 }
 

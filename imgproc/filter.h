@@ -17,11 +17,12 @@ typedef struct bst_filter {
     int max_width, max_height, pad, stride; /* of the padded map */
     int width, height;                      /* of the latest frame */
     float *point;                           /* padded map: SNR for a point */
-    /* pixels where the greater of both outputs is above the threshold: those of row y from index
+    float *best;                            /* [height][width]: the greater SNR, if streak */
+    /* pixels above the threshold whose neighbours have a lower SNR: those of row y from index
      * y * max_width on, ascending */
-    int *hits; /* [height] */
-    int32_t *hit_x;
-    float *hit_snr;
+    int *maxima; /* [height] */
+    int32_t *maximum_x;
+    float *maximum_snr;
     float *lines; /* work space of each part of the passes */
     size_t line_floats; /* of one part */
     int most_parts;
@@ -66,7 +67,7 @@ void bst_filter_set(bst_filter *filter, double sigma_px, double dx_px, double dy
 double bst_filter_threshold(const bst_filter *filter, double false_alarms, double pixels);
 
 /* One pass over a frame of pixels as `read` gives them: `signal` [height][width] becomes electrons
- * above the background (BST_PIXEL_SATURATED where raw >= saturated_dn), then maps and hits are made.
+ * above the background (BST_PIXEL_SATURATED where raw >= saturated_dn), then maps and maxima are made.
  * Memory outside the frame counts as noise-free background. */
 void bst_filter_run(bst_filter *filter, bst_parallel *pool, const bst_background *background,
                     bst_pixel_fn read, const void *user, const uint16_t *raw, float *signal,
@@ -81,6 +82,10 @@ double bst_filter_peak(const bst_filter *filter, const float *signal, double noi
 
 static inline float bst_filter_point_at(const bst_filter *f, int x, int y) {
     return f->point[(long)(y + f->pad) * f->stride + x + f->pad];
+}
+/* The greater output. */
+static inline float bst_filter_best_at(const bst_filter *f, int x, int y) {
+    return f->streak ? f->best[(long)y * f->width + x] : bst_filter_point_at(f, x, y);
 }
 /* The streak output at a pixel of the latest frame; only when filter->streak. */
 float bst_filter_streak_at(const bst_filter *filter, int x, int y);

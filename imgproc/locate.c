@@ -427,3 +427,15 @@ void bst_locate(bst_locator *l, const bst_locate_frame *f, const bst_candidates 
         }
     }
 }
+
+void bst_locate_roughly(bst_locator *l, const bst_locate_frame *f,
+                        const bst_candidates *candidates) {
+    l->count = candidates->count < l->capacity ? candidates->count : l->capacity;
+    for (int i = 0; i < l->count; i++) {
+        bst_found *found = &l->found[i];
+        start(f, &candidates->items[candidates->order[i]], found);
+        use_maximum(f, found);
+        found->snr = (double)found->peak_snr;
+        found->length_px = found->width_px = FWHM_PER_SIGMA * f->sigma_px;
+    }
+}

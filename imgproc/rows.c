@@ -134,11 +134,25 @@ void bst_row_greater(float *restrict a, const float *restrict b, int count) {
     }
 }
 
+static bool is_maximum(const float *above, const float *row, const float *below, int count, int x) {
+    float v = row[x];
+    int lo = x > 0 ? x - 1 : 0, hi = x + 1 < count ? x + 1 : x;
+    if ((x > 0 && row[x - 1] >= v) || row[hi] > v) {
+        return false;
+    }
+    for (int i = lo; i <= hi; i++) {
+        if ((above && above[i] >= v) || (below && below[i] > v)) {
+            return false;
+        }
+    }
+    return true;
+}
+
 ROW_FUNCTION
-int bst_row_above(const float *restrict row, int count, float threshold, int32_t *restrict x,
-                  float *restrict value) {
-    int found = 0, at = 0;
-    for (; at < count; at += BST_ROW_LANES) {
+int bst_row_maxima(const float *above, const float *row, const float *below, int count,
+                   float threshold, int32_t *x, float *value) {
+    int found = 0;
+    for (int at = 0; at < count; at += BST_ROW_LANES) {
         int end = at + BST_ROW_LANES < count ? at + BST_ROW_LANES : count, any = 0;
         if (end - at == BST_ROW_LANES) {
             for (int j = 0; j < BST_ROW_LANES; j++) {
@@ -149,7 +163,7 @@ int bst_row_above(const float *restrict row, int count, float threshold, int32_t
             }
         }
         for (int i = at; i < end; i++) {
-            if (row[i] > threshold) {
+            if (row[i] > threshold && is_maximum(above, row, below, count, i)) {
                 x[found] = i;
                 value[found++] = row[i];
             }

@@ -34,8 +34,11 @@ void bst_row_combine(float *out, int count, const float *const *in, const float 
 /* a = max(a, b) */
 void bst_row_greater(float *a, const float *b, int count);
 
-/* Writes the places and values of the elements above the threshold; returns how many. */
-int bst_row_above(const float *row, int count, float threshold, int32_t *x, float *value);
+/* Writes the places and values of the elements above the threshold that exceed their eight
+ * neighbours (of equals the first in row-major order); returns how many. above and below may be
+ * NULL. */
+int bst_row_maxima(const float *above, const float *row, const float *below, int count,
+                   float threshold, int32_t *x, float *value);
 
 /* out *= by */
 void bst_row_scale(float *out, const float *by, float factor, int count);

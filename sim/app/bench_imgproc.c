@@ -6,7 +6,7 @@
 #include "sim/app/bench_scenes.h"
 #include "sim/device/device.h"
 
-enum { KEPT = 4, WARM_UP = 4, CALLS = 60, SMALL_CALLS = 2000, SMALL_PX = 512 * 512 };
+enum { KEPT = 4, WARM_UP = 4, CALLS = 24, SMALL_CALLS = 2000, SMALL_PX = 512 * 512 };
 
 static const char PREFIX[] = "imgproc_";
 
