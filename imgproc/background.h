@@ -33,14 +33,17 @@ bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int m
 void bst_background_free(bst_background *background);
 
 /* Estimates level and noise in each mesh of a frame: median and median absolute deviation of a
- * sample, then mean and standard deviation within 3 sigma, four times, the deviation corrected for
- * the clipping. step_e (> 0) is a digital number's worth of electrons; no pixel is better known
- * than it. A mesh without usable pixels takes the frame's medians. Then each mesh takes the mean
- * with those pairs of opposite neighbours whose mean agrees with it to four standard errors: a
- * slope stays what it is, and where the sky is even the error falls to a third. */
+ * sample, then mean and standard deviation within 3 sigma, four times. Both are corrected for the
+ * clipping, which takes more off the long tail of counted electrons (variance beyond
+ * read_variance_e2) than off the other; the deviation also for the slope of the level. step_e (> 0)
+ * is a digital number's worth of electrons; no pixel is better known than it. A mesh without usable
+ * pixels takes the frame's medians. Then each mesh takes the mean with those pairs of opposite
+ * neighbours whose mean agrees with it to four standard errors: a slope stays what it is, and where
+ * the sky is even the error falls to a third. */
 void bst_background_read(bst_background *background, bst_parallel *pool, bst_pixel_fn pixels,
-                         const void *user, int width, int height, float step_e);
-/* The same of image [height][width]. */
+                         const void *user, int width, int height, float step_e,
+                         double read_variance_e2);
+/* The same of image [height][width] whose noise is normal. */
 void bst_background_estimate(bst_background *background, const float *image, int width, int height,
                              float step_e);
 

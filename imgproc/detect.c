@@ -8,8 +8,8 @@
 #include "imgproc/rows.h"
 #include "imgproc/tail.h"
 
-/* Maxima of this share of the threshold at a pixel are looked at in between the pixels. */
-static const double LOOK_SHARE = 0.85;
+/* Maxima are looked at in between the pixels from this share of the threshold on at the least. */
+static const double LOOK_SHARE = 0.65;
 /* Above the threshold by this no skewness of noise matters. */
 static const double CERTAIN_ABOVE = 1.5;
 
@@ -169,8 +169,8 @@ typedef struct judge {
     double read_variance; /* of a pixel's noise that is normal, e-^2 */
 } judge;
 
-/* A maximum counts when the output between the pixels exceeds what noise of this skewness exceeds as
- * rarely as normal noise the threshold. */
+/* A maximum counts when the output between the pixels exceeds what noise of this skewness exceeds
+ * as rarely as normal noise the threshold. */
 static bool stands_out(const void *user, const bst_candidate *c) {
     const judge *g = user;
     const bst_filter *f = &g->ip->filter;
@@ -182,10 +182,9 @@ static bool stands_out(const void *user, const bst_candidate *c) {
         bst_tail_quantile(g->threshold, skewness * f->point_cubes, excess * f->point_fourths)) {
         return true;
     }
-    return f->streak &&
-           bst_filter_peak(f, g->ip->electrons, noise, true, c->x, c->y) >
-               bst_tail_quantile(g->threshold, skewness * f->streak_cubes,
-                                 excess * f->streak_fourths);
+    return f->streak && bst_filter_peak(f, g->ip->electrons, noise, true, c->x, c->y) >
+                            bst_tail_quantile(g->threshold, skewness * f->streak_cubes,
+                                              excess * f->streak_fourths);
 }
 
 /* The digital number from which a pixel no longer measures: the converter's end or the full well.
@@ -301,22 +300,24 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
     ip->binning = frame->binning;
 
     reader read = {ip, frame, width};
+    double gain = ip->camera.gain_e_per_dn, read_noise = ip->camera.read_noise_e;
+    double read_variance = read_noise * read_noise + gain * gain / 12.0;
     bst_background_read(&ip->background, ip->pool, read_electrons, &read, width, height,
-                        (float)ip->camera.gain_e_per_dn);
+                        (float)ip->camera.gain_e_per_dn, read_variance);
     double dx, dy;
     filter_path(ip, frame, motion, &dx, &dy);
     ip->streak_px = hypot(dx, dy) * frame->binning;
     bst_filter_set(&ip->filter, sigma, dx, dy);
     double threshold = bst_filter_threshold(&ip->filter, ip->config.false_alarms_per_frame,
                                             (double)width * (double)height);
-    double look = ip->smeared ? threshold : LOOK_SHARE * threshold;
+    double look = ip->smeared ? threshold : fmax(0.93 * ip->filter.corner, LOOK_SHARE) * threshold;
     bst_filter_run(&ip->filter, ip->pool, &ip->background, read_electrons, &read, frame->pixels,
                    ip->electrons, width, height, saturation_dn(ip, frame), (float)look);
-    double gain = ip->camera.gain_e_per_dn, read_noise = ip->camera.read_noise_e;
-    judge noise = {ip, threshold, read_noise * read_noise + gain * gain / 12.0};
+    judge noise = {ip, threshold, read_variance};
     double certain = ip->smeared ? threshold : threshold + CERTAIN_ABOVE;
-    bst_candidates_find(&ip->candidates, ip->pool, &ip->filter, (int)ceil(6.0 * sigma) + 2,
-                        (float)look, (float)certain, stands_out, &noise);
+    bst_candidates_find(&ip->candidates, ip->pool, &ip->filter,
+                        (int)ceil(6.0 * sigma + hypot(dx, dy)) + 2, (float)look, (float)certain,
+                        stands_out, &noise);
     bst_locate_frame view = {.signal = ip->electrons,
                              .width = width,
                              .height = height,

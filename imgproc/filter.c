@@ -120,14 +120,18 @@ static void describe_point(bst_filter *f, double sigma_px) {
         double weight = p == 0 || p == BST_FILTER_PHASES - 1 ? 0.5 : 1.0;
         roughness += weight * metric / (BST_FILTER_PHASES - 1);
     }
+    double half = 0.0;
+    for (int i = 0; i < n; i++) {
+        half += (double)f->phase[BST_FILTER_PHASES / 2][i] * (double)f->phase[0][i];
+    }
+    f->corner = half * half;
     f->point_density = roughness; /* sqrt of the product over both axes, which are alike */
     f->point_cubes = cubes * cubes;
     f->point_fourths = fourths * fourths;
 }
 
-/* The same for the streak, from its kernel on the pixels: the gradient's covariance by Fourier
- * derivative needs none, as the kernel is smooth across and its roughness along comes from the two
- * ends, both resolved by the pixel-integrated PSF: spectral sums over lags. */
+/* The same for the streak: the gradient's covariance from its correlations at lags of a pixel,
+ * whose logarithm is quadratic near 0, cubes and fourth powers from its kernel's values. */
 static void describe_streak(bst_filter *f) {
     double r[3][3];
     for (int j = -1; j <= 1; j++) {
@@ -135,7 +139,6 @@ static void describe_streak(bst_filter *f) {
             r[j + 1][i + 1] = streak_covariance(f, i, j) / streak_covariance(f, 0, 0);
         }
     }
-    /* -ln of the correlation is quadratic in the lag near 0 for a Gaussian shape */
     double lxx = -2.0 * log(fmax(r[1][2], 1e-6)), lyy = -2.0 * log(fmax(r[2][1], 1e-6));
     double lxy = -0.5 * (log(fmax(r[2][2], 1e-6)) - log(fmax(r[2][0], 1e-6)));
     f->streak_density = sqrt(fmax(lxx * lyy - lxy * lxy, 1e-8));
@@ -243,8 +246,7 @@ double bst_filter_threshold(const bst_filter *f, double false_alarms, double pix
         double u = 0.5 * (lo + hi);
         double rate = bst_tail_maxima(u, f->point_density);
         if (f->streak) {
-            rate += bst_tail_maxima(u, f->streak_density) *
-                    (1.0 - bst_tail_both(u, u, f->overlap));
+            rate += bst_tail_maxima(u, f->streak_density) * (1.0 - bst_tail_both(u, u, f->overlap));
         }
         if (rate * pixels > false_alarms) {
             lo = u;

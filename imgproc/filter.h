@@ -23,7 +23,7 @@ typedef struct bst_filter {
     int *maxima; /* [height] */
     int32_t *maximum_x;
     float *maximum_snr;
-    float *lines; /* work space of each part of the passes */
+    float *lines;       /* work space of each part of the passes */
     size_t line_floats; /* of one part */
     int most_parts;
     float *mesh_rows; /* the same, for rows of the background */
@@ -45,6 +45,7 @@ typedef struct bst_filter {
      * maxima (see bst_filter_threshold) */
     double point_cubes, point_fourths, point_density;
     double streak_cubes, streak_fourths, streak_density;
+    double corner; /* output for a point between four pixels at one of them, over its greatest */
     double made_sigma, made_dx, made_dy; /* what the kernels were made for */
     float phase[BST_FILTER_PHASES][2 * BST_FILTER_MAX_RADIUS + 3]; /* one axis, shifted */
 } bst_filter;
@@ -67,16 +68,16 @@ void bst_filter_set(bst_filter *filter, double sigma_px, double dx_px, double dy
 double bst_filter_threshold(const bst_filter *filter, double false_alarms, double pixels);
 
 /* One pass over a frame of pixels as `read` gives them: `signal` [height][width] becomes electrons
- * above the background (BST_PIXEL_SATURATED where raw >= saturated_dn), then maps and maxima are made.
- * Memory outside the frame counts as noise-free background. */
+ * above the background (BST_PIXEL_SATURATED where raw >= saturated_dn), then maps and maxima are
+ * made. Memory outside the frame counts as noise-free background. */
 void bst_filter_run(bst_filter *filter, bst_parallel *pool, const bst_background *background,
                     bst_pixel_fn read, const void *user, const uint16_t *raw, float *signal,
                     int width, int height, int saturated_dn, float threshold);
 
 /* The greatest output within about half a pixel of (x, y) in between the pixels: for a point
- * by kernels shifted in steps of 1/4 px and a parabola through the best, on signal with the noise at
- * that place; for the streak by a quadratic through the logarithms of 3 x 3 outputs. Not below the
- * output at (x, y). */
+ * by kernels shifted in steps of 1/4 px and a parabola through the best, on signal with the noise
+ * at that place; for the streak by a quadratic through the logarithms of 3 x 3 outputs. Not below
+ * the output at (x, y). */
 double bst_filter_peak(const bst_filter *filter, const float *signal, double noise_e, bool streak,
                        int x, int y);
 

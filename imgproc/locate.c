@@ -154,6 +154,16 @@ static bool fit_one(bst_locator *l, const bst_locate_frame *f, int i, const bst_
     double limit = 1.5 + f->sigma_px + 0.4 * path;
     bool ok = bst_fit_run(&l->fit, &data, stamp, free_sources, c.free_count, c.fixed, c.fixed_count,
                           free_width && c.free_count == 1, limit);
+    if (!ok && c.free_count > 1) {
+        /* the pixels do not determine a neighbour, as at the stamp's edge: it stays as it is */
+        int fixed_count = c.fixed_count;
+        for (int k = 1; k < c.free_count && fixed_count < MAX_FIXED; k++) {
+            c.fixed[fixed_count++] = c.free[k];
+        }
+        copies[0] = *c.free[0];
+        ok =
+            bst_fit_run(&l->fit, &data, stamp, free_sources, 1, c.fixed, fixed_count, false, limit);
+    }
     if (ok) {
         l->found[i].source = copies[0];
     }
