@@ -247,7 +247,8 @@ static bst_detection report(const bst_imgproc *ip, const bst_locate_frame *f,
     d.v_mag = -2.5 * log10(rate / ip->electrons_per_s_v0);
     d.flags = found->flags;
     widen_by_bend(ip, f, &s->shape, &d);
-    d.label = found->artefact ? BST_LABEL_ARTEFACT : BST_LABEL_UNKNOWN;
+    d.label = found->label;
+    d.label_probability = found->label_probability;
     return d;
 }
 
