@@ -15,6 +15,7 @@ static const double SAME_SIGMAS = 4.0;
 static const double SAME_MAG = 0.75;
 static const double MAX_GATE_PX = 3.0;
 static const double STREAK_PX = 3.0; /* stars that move further are told from points */
+static const double FAINT_SNR = 8.0; /* below, a hot pixel may look like light */
 static const double STAR_REDETECTED = 0.6;
 
 /* A source of earlier frames. */
@@ -125,7 +126,8 @@ static bool key_less(const void *context, int a, int b) {
     return keys[a] != keys[b] ? keys[a] < keys[b] : a < b;
 }
 
-static bool was_charged(const bst_discriminator *d, int64_t pixel) {
+/* In how many frames a pixel held charge. */
+static int times_charged(const bst_discriminator *d, int64_t pixel) {
     int lo = 0, hi = d->charge_count;
     while (lo < hi) {
         int mid = lo + (hi - lo) / 2;
@@ -135,17 +137,18 @@ static bool was_charged(const bst_discriminator *d, int64_t pixel) {
             hi = mid;
         }
     }
-    return lo < d->charge_count && d->charge[lo].pixel == pixel;
+    return lo < d->charge_count && d->charge[lo].pixel == pixel ? d->charge[lo].seen : 0;
 }
 
 static void label_charge(const bst_discriminator *d, bst_detection *item) {
     int64_t pixel = pixel_of(d, item);
-    bool again = was_charged(d, pixel);
+    bool again = times_charged(d, pixel) > 0;
     if (item->label == BST_LABEL_HIT && !again) {
         /* the centroid of several pixels may round to another */
-        again = was_charged(d, pixel - 1) || was_charged(d, pixel + 1) ||
-                was_charged(d, pixel - d->camera.width_px) ||
-                was_charged(d, pixel + d->camera.width_px);
+        const int64_t row = d->camera.width_px;
+        again = times_charged(d, pixel - 1) + times_charged(d, pixel + 1) +
+                    times_charged(d, pixel - row) + times_charged(d, pixel + row) >
+                0;
     }
     bool looked = d->charge_covered && in_window(&d->charge_window, item->x_px, item->y_px, 0.0);
     double charge = item->label_probability; /* that it is no light */
@@ -396,6 +399,9 @@ void bst_discriminator_label(bst_discriminator *d, const bst_frame_knowledge *f,
         bst_detection *item = &out->items[i];
         if (is_charge(item)) {
             label_charge(d, item);
+        } else if (item->label == BST_LABEL_UNKNOWN && item->snr < FAINT_SNR &&
+                   times_charged(d, pixel_of(d, item)) > 1) {
+            say(item, BST_LABEL_HOT_PIXEL, 0.8);
         }
         unlisted += item->label == BST_LABEL_UNKNOWN;
     }

@@ -30,7 +30,8 @@ void bst_discriminator_free(bst_discriminator *discriminator);
  *
  * Given: label STAR with star_id (identified), HOT_PIXEL or HIT (charge, by shape), ARTEFACT,
  * UNKNOWN. Charge is a HOT_PIXEL where the same sensor pixel held charge in an earlier frame, a HIT
- * where it did not although an earlier frame covered it. Of the rest, in this order: cut by the
+ * where it did not although an earlier frame covered it; a source below SNR 8 on a pixel that held
+ * charge in two frames is a HOT_PIXEL too. Of the rest, in this order: cut by the
  * edge, an ARTEFACT; at a moving track's predicted place, an OBJECT; drawn as the stars are in a
  * frame that follows something else, a STAR, and a point there an OBJECT; where earlier frames had
  * a source of its brightness at the same place of the sky, a STAR without star_id, or an OBJECT

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { BAND = 16, MAX_FIXED = 12, MAX_CHARGE = 64 };
+enum { CELL_PX = 16, MAX_FIXED = 12, MAX_CHARGE = 64 };
 
 static const double WIDTH_FIT_SNR = 20.0; /* from here the widening is measured */
 static const double MOMENTS_SNR = 10.0;   /* below, extents are the model's own */
@@ -11,16 +11,18 @@ static const double CLOSE_SHARE = 0.8; /* filter outputs closer than this: both 
 static const double LIGHT_SNR = 4.0;   /* beside charge, from here there is a source as well */
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
 
-bst_status bst_locator_create(bst_ctx *ctx, int capacity, int max_height, int max_side,
-                              bst_locator *out) {
-    *out =
-        (bst_locator){.max_side = max_side, .capacity = capacity, .buckets = max_height / BAND + 1};
+bst_status bst_locator_create(bst_ctx *ctx, int capacity, int max_width, int max_height,
+                              int max_side, bst_locator *out) {
+    *out = (bst_locator){.max_side = max_side,
+                         .capacity = capacity,
+                         .columns = max_width / CELL_PX + 1,
+                         .rows = max_height / CELL_PX + 1};
     bst_psf_init(&out->psf);
     out->found = calloc((size_t)capacity, sizeof *out->found);
-    out->bucket = calloc((size_t)out->buckets, sizeof *out->bucket);
+    out->cell = calloc((size_t)out->columns * (size_t)out->rows, sizeof *out->cell);
     out->charged_capacity = 16 * capacity;
     out->charged = calloc((size_t)out->charged_capacity, sizeof *out->charged);
-    if (!out->found || !out->bucket || !out->charged) {
+    if (!out->found || !out->cell || !out->charged) {
         bst_locator_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d detections", capacity);
     }
@@ -33,7 +35,7 @@ bst_status bst_locator_create(bst_ctx *ctx, int capacity, int max_height, int ma
 
 void bst_locator_free(bst_locator *l) {
     free(l->found);
-    free(l->bucket);
+    free(l->cell);
     free(l->charged);
     bst_fit_free(&l->fit);
     *l = (bst_locator){0};
@@ -58,6 +60,11 @@ static double reach(const bst_locate_frame *f) {
     return fmax(3.0, ceil(3.6 * f->sigma_px));
 }
 
+/* How far a fit may move a source from its maximum, px. */
+static double fit_limit(const bst_locate_frame *f, double path_px) {
+    return 1.5 + f->sigma_px + 0.4 * path_px;
+}
+
 /* Starts a source at its candidate. */
 static void start(const bst_locate_frame *f, const bst_candidate *c, bst_found *out) {
     *out = (bst_found){.peak_snr = c->snr, .peak_x = c->x, .peak_y = c->y};
@@ -71,19 +78,32 @@ static void start(const bst_locate_frame *f, const bst_candidate *c, bst_found *
     s->flux_e = (double)c->snr * out->noise_e / shape_norm(f, out->streak);
 }
 
-static void index_rows(bst_locator *l) {
-    for (int i = 0; i < l->buckets; i++) {
-        l->bucket[i] = -1;
+static void index_cells(bst_locator *l) {
+    for (int i = 0; i < l->columns * l->rows; i++) {
+        l->cell[i] = -1;
     }
     for (int i = l->count - 1; i >= 0; i--) {
-        int band = l->found[i].peak_y / BAND;
-        l->found[i].next = l->bucket[band];
-        l->bucket[band] = i;
+        int *cell =
+            &l->cell[l->found[i].peak_y / CELL_PX * l->columns + l->found[i].peak_x / CELL_PX];
+        l->found[i].next = *cell;
+        *cell = i;
     }
+}
+
+/* Cells, first and last, that hold all maxima within margin_px of a range of pixels. */
+static void cell_range(double from, double to, double margin_px, int cells, int *first, int *last) {
+    double lo = floor((from - margin_px) / CELL_PX), hi = floor((to + margin_px) / CELL_PX);
+    *first = lo < 0.0 ? 0 : lo > cells - 1 ? cells - 1 : (int)lo;
+    *last = hi < 0.0 ? 0 : hi > cells - 1 ? cells - 1 : (int)hi;
 }
 
 static bool is_charge(const bst_found *found) {
     return found->label == BST_LABEL_HOT_PIXEL || found->label == BST_LABEL_HIT;
+}
+
+static void note_length(bst_locator *l, const bst_shape *s) {
+    l->longest_px = fmax(l->longest_px, fmax(0.5 * fabs(s->dx_px) + fabs(s->bend_x_px),
+                                             0.5 * fabs(s->dy_px) + fabs(s->bend_y_px)));
 }
 
 typedef struct company {
@@ -100,13 +120,16 @@ static void gather(bst_locator *l, const bst_locate_frame *f, int i, const bst_s
     out->free[0] = &l->found[i].source;
     out->free_count = 1;
     out->fixed_count = 0;
-    int margin = (int)reach(f) + l->max_side / 2;
-    int lo = (stamp->y0 - margin) / BAND, hi = (stamp->y0 + stamp->height + margin) / BAND;
-    lo = lo > 0 ? lo : 0;
-    hi = hi < l->buckets - 1 ? hi : l->buckets - 1;
-    int near[MAX_FIXED + BST_FIT_MAX_FREE], count = 0;
-    for (int band = lo; band <= hi; band++) {
-        for (int k = l->bucket[band]; k >= 0; k = l->found[k].next) {
+    /* a fit moves a source from its maximum by its limit at most */
+    double margin = reach(f) + 1.8 * l->longest_px + fit_limit(f, 0.0) + 1.0;
+    int first_column, last_column, first_row, last_row;
+    cell_range(stamp->x0, stamp->x0 + stamp->width, margin, l->columns, &first_column,
+               &last_column);
+    cell_range(stamp->y0, stamp->y0 + stamp->height, margin, l->rows, &first_row, &last_row);
+    int near[MAX_FIXED + BST_FIT_MAX_FREE], count = 0, across = last_column - first_column + 1;
+    for (int c = 0; c < across * (last_row - first_row + 1); c++) {
+        int cell = (first_row + c / across) * l->columns + first_column + c % across;
+        for (int k = l->cell[cell]; k >= 0; k = l->found[k].next) {
             if (k == i || l->found[k].dropped || is_charge(&l->found[k])) {
                 continue;
             }
@@ -158,8 +181,7 @@ static bool fit_one(bst_locator *l, const bst_locate_frame *f, int i, const bst_
         free_sources[k] = &copies[k];
     }
     bst_fit_data data = {f->signal, f->width, f->height, l->found[i].noise_e};
-    double path = hypot(copies[0].shape.dx_px, copies[0].shape.dy_px);
-    double limit = 1.5 + f->sigma_px + 0.4 * path;
+    double limit = fit_limit(f, hypot(copies[0].shape.dx_px, copies[0].shape.dy_px));
     bool ok = bst_fit_run(&l->fit, &data, stamp, free_sources, c.free_count, c.fixed, c.fixed_count,
                           free_width && c.free_count == 1, limit);
     if (ok) {
@@ -221,6 +243,7 @@ static void locate_one(bst_locator *l, const bst_locate_frame *f, int i) {
         bool point_ok = fit_one(l, f, i, &stamp, false);
         found->streak = streak_ok && (!point_ok || streak.chi_square < found->source.chi_square);
         found->source = found->streak ? streak : found->source;
+        note_length(l, &found->source.shape);
     }
     bst_stamp stamp = stamp_of(l, f, &found->source);
     bool bright = (double)found->peak_snr > WIDTH_FIT_SNR;
@@ -370,6 +393,22 @@ static bool is_charge_alone(const bst_found *found) {
            excess > 5.0 * sqrt(2.0 * s->pixels) + 0.1 * snr2;
 }
 
+/* Whether charge was taken off about a candidate: the filters answer to it besides its own place.
+ */
+static bool is_charge_near(const bst_locator *l, const bst_locate_frame *f,
+                           const bst_found *found) {
+    bst_source s = found->source;
+    s.shape.x_px = found->peak_x;
+    s.shape.y_px = found->peak_y;
+    bst_stamp stamp = bst_fit_stamp(&s, reach(f), l->max_side, f->width, f->height);
+    bool near = false;
+    for (int k = 0; k < l->charged_count && !near; k++) {
+        int x = l->charged[k] % f->width - stamp.x0, y = l->charged[k] / f->width - stamp.y0;
+        near = x >= 0 && y >= 0 && x < stamp.width && y < stamp.height;
+    }
+    return near;
+}
+
 /* Principal axes of the measured or modelled second moments. */
 static bool measure_extent(bst_locator *l, const bst_locate_frame *f, int i, double wider) {
     bst_found *found = &l->found[i];
@@ -460,6 +499,7 @@ static void fit_own_streak(bst_locator *l, const bst_locate_frame *f, int i) {
             return;
         }
         found->streak = true;
+        note_length(l, &found->source.shape);
         found->snr = found->source.flux_e * bst_fit_norm(&l->fit, &stamp) / found->noise_e;
     }
 }
@@ -501,16 +541,20 @@ static void use_maximum(const bst_locate_frame *f, bst_found *found) {
 
 static void drop_doubles(bst_locator *l, const bst_locate_frame *f) {
     double radius = 0.6 * FWHM_PER_SIGMA * f->sigma_px;
+    double margin = radius + 1.8 * l->longest_px + 2.0 * fit_limit(f, 0.0);
     for (int i = 0; i < l->count; i++) {
         const bst_shape *a = &l->found[i].source.shape;
-        int band = l->found[i].peak_y / BAND;
-        for (int b = band > 0 ? band - 1 : 0; b <= band + 1 && b < l->buckets; b++) {
-            for (int k = l->bucket[b]; k >= 0; k = l->found[k].next) {
-                const bst_shape *c = &l->found[k].source.shape;
+        int x0, x1, y0, y1;
+        cell_range(a->x_px, a->x_px, margin, l->columns, &x0, &x1);
+        cell_range(a->y_px, a->y_px, margin, l->rows, &y0, &y1);
+        for (int c = 0; c < (x1 - x0 + 1) * (y1 - y0 + 1); c++) {
+            int cell = (y0 + c / (x1 - x0 + 1)) * l->columns + x0 + c % (x1 - x0 + 1);
+            for (int k = l->cell[cell]; k >= 0; k = l->found[k].next) {
+                const bst_shape *b = &l->found[k].source.shape;
                 /* numbers are by brightness: the fainter goes */
                 if (k < i && !l->found[k].dropped &&
                     is_charge(&l->found[k]) == is_charge(&l->found[i]) &&
-                    hypot(a->x_px - c->x_px, a->y_px - c->y_px) < radius) {
+                    hypot(a->x_px - b->x_px, a->y_px - b->y_px) < radius) {
                     l->found[i].dropped = true;
                 }
             }
@@ -520,10 +564,12 @@ static void drop_doubles(bst_locator *l, const bst_locate_frame *f) {
 
 void bst_locate(bst_locator *l, const bst_locate_frame *f, const bst_candidates *candidates) {
     l->count = candidates->count < l->capacity ? candidates->count : l->capacity;
+    l->longest_px = 0.0;
     for (int i = 0; i < l->count; i++) {
         start(f, &candidates->items[candidates->order[i]], &l->found[i]);
+        note_length(l, &l->found[i].source.shape);
     }
-    index_rows(l);
+    index_cells(l);
     double variance = f->sigma_px * f->sigma_px;
     l->widening_sum = 0.0;
     l->widening_weight = 1.0 / (0.0025 * variance * variance); /* no widening, to 5 % */
@@ -559,6 +605,10 @@ void bst_locate(bst_locator *l, const bst_locate_frame *f, const bst_candidates 
             use_maximum(f, found);
         }
         found->snr = found->source.flux_e * shape_norm(f, found->streak) / found->noise_e;
+        if (found->snr < LIGHT_SNR && is_charge_near(l, f, found)) {
+            found->dropped = true;
+            continue;
+        }
         judge(f, found);
         bool alone = !(found->flags & (BST_DETECTION_BLEND | BST_DETECTION_EDGE));
         if (alone && !found->streak && found->label == BST_LABEL_UNKNOWN &&

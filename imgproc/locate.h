@@ -29,7 +29,7 @@ typedef struct bst_found {
     bst_charge charge;
     float peak_snr;
     int peak_x, peak_y;
-    int next; /* in the bucket of its row */
+    int next; /* in its cell of the frame */
 } bst_found;
 
 typedef struct bst_locator {
@@ -39,8 +39,9 @@ typedef struct bst_locator {
     int max_side, capacity;
     bst_found *found;
     int count;
-    int *bucket; /* first found in each band of rows */
-    int buckets;
+    int *cell; /* first found in each square of the frame, by its maximum */
+    int columns, rows;
+    double longest_px; /* half of the longest path of a source of this frame, along an axis */
     double widening_sum, widening_weight;
     int *charged; /* pixels of the latest frame that hold charge */
     int charged_count, charged_capacity;
@@ -58,8 +59,8 @@ typedef struct bst_locate_frame {
     double origin_x_px, origin_y_px, binning; /* full-sensor = origin + binning * frame pixel */
 } bst_locate_frame;
 
-bst_status bst_locator_create(bst_ctx *ctx, int capacity, int max_height, int max_side,
-                              bst_locator *out) BST_MUST_CHECK;
+bst_status bst_locator_create(bst_ctx *ctx, int capacity, int max_width, int max_height,
+                              int max_side, bst_locator *out) BST_MUST_CHECK;
 void bst_locator_free(bst_locator *locator);
 
 /* Fits the brightest `capacity` candidates, brightest first. Each is taken for a point or for a

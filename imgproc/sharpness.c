@@ -5,7 +5,7 @@
 
 #include "imgproc/background.h"
 
-static const double MODEL_SHARE = 0.1;
+static const double MODEL_SHARE = 0.09;
 
 typedef struct neighbour {
     int dx, dy;

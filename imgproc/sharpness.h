@@ -7,7 +7,7 @@
  * below s c on average, s = min(1, its least ratio to c over places of a point in the pixel). Five
  * groups are asked: all eight neighbours, and the two opposite ones in each of four directions,
  * because a track of charge is sharp across itself only. The least of the five deviations, in
- * standard deviations (noise, the light's own, and 10 % of c for an imperfectly known PSF), is the
+ * standard deviations (noise, the light's own, and 9 % of c for an imperfectly known PSF), is the
  * pixel's. */
 #ifndef BST_IMGPROC_SHARPNESS_H
 #define BST_IMGPROC_SHARPNESS_H
@@ -25,7 +25,7 @@ typedef struct bst_sharpness {
 } bst_sharpness;
 
 /* Deviation from which a pixel is taken for charge: one star in several thousand reaches it. */
-#define BST_SHARP_DEVIATION 4.5
+#define BST_SHARP_DEVIATION 4.0
 
 /* Prepares the ratios for a PSF of sigma_px; at once when they are already there. */
 void bst_sharpness_set(bst_sharpness *sharpness, const bst_psf *psf, double sigma_px);
