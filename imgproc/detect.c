@@ -73,7 +73,7 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     BST_TRY(bst_background_create(ctx, (int)ip->config.mesh_px, width, height, &ip->background));
     BST_TRY(bst_filter_create(ctx, width, height, streak, &ip->filter));
     BST_TRY(bst_candidates_create(ctx, width, height, &ip->candidates));
-    return bst_locator_create(ctx, capacity, height, side, &ip->locator);
+    return bst_locator_create(ctx, capacity, width, height, side, &ip->locator);
 }
 
 bst_status bst_imgproc_create(bst_ctx *ctx, const bst_camera *camera, double electrons_per_s_v0,
@@ -285,7 +285,8 @@ static bst_detection report(const bst_imgproc *ip, const bst_locate_frame *f,
     d.v_mag = -2.5 * log10(rate / ip->electrons_per_s_v0);
     d.flags = found->flags;
     widen_by_bend(ip, f, &s->shape, &d);
-    d.label = found->artefact ? BST_LABEL_ARTEFACT : BST_LABEL_UNKNOWN;
+    d.label = found->label;
+    d.label_probability = found->label_probability;
     return d;
 }
 
