@@ -22,6 +22,7 @@ typedef struct bst_imgproc_config {
     double jitter_px;              /* RMS per axis by which the PSF is expected to be widened */
     double streak_min_px, streak_max_px;
     double search_radius_px, match_tolerance_px;
+    int64_t threads;            /* 0: one per processor */
     bst_config_list bad_pixels; /* of bst_bad_pixel */
     /* FITS images of the maps; "": none. bst_imgproc_create leaves them to the caller. */
     char dark_file[512], flat_file[512], bad_pixel_file[512];
@@ -61,11 +62,13 @@ void bst_imgproc_free(bst_imgproc *ip);
  *
  * Steps: artefact correction; electrons; background and noise by mesh (clipped mean and standard
  * deviation); two matched filters, for points and for the streak that stars draw when the camera
- * moves by `motion` (NULL: at rest), both normalised to unit noise; threshold on the greater of the
- * two; connected components, split at saddles; weighted least-squares fit of the pixel-integrated
- * Gaussian or streak, close neighbours together. The greater of two matched-filter outputs is the
- * generalised likelihood ratio test between both shapes (Kay, Fundamentals of Statistical Signal
- * Processing II, 1998, ch. 7).
+ * moves by `motion` (NULL: at rest), both normalised to unit noise; maxima of the greater of the
+ * two, looked for between the pixels, against a threshold that counts with the noise's skewness;
+ * of maxima that no saddle parts the highest; weighted least-squares fit of the pixel-integrated
+ * Gaussian or streak, close neighbours together (none when bst_imgproc_smeared). The greater of two
+ * matched-filter outputs is the generalised likelihood ratio test between both shapes (Kay,
+ * Fundamentals of Statistical Signal Processing II, 1998, ch. 7). The passes run on
+ * config->threads threads; the result does not depend on them.
  *
  * Fills background_e, noise_e, threshold_snr, count, lost and items of *out (room for `capacity`),
  * sorted by y, then x; label is UNKNOWN or ARTEFACT, star_id 0. When there is no room the brightest

@@ -328,8 +328,10 @@ static int collect_objects(bst_tracker *t, const bst_detections *d, const frame_
             item->cov_xx > 0.0 && item->cov_xx * item->cov_yy > item->cov_xy * item->cov_xy;
         /* places as uncertain as an attitude that is not used would only feed false tracks */
         bool sharp = item->cov_xx <= t->max_variance_px2 && item->cov_yy <= t->max_variance_px2;
-        if ((item->label != BST_LABEL_OBJECT && item->label != BST_LABEL_UNKNOWN) || !positive ||
-            !sharp || !isfinite(item->x_px) || !isfinite(item->y_px)) {
+        /* a star that no catalogue has is told from a slow object by its track */
+        bool may_move = item->label == BST_LABEL_OBJECT || item->label == BST_LABEL_UNKNOWN ||
+                        (item->label == BST_LABEL_STAR && item->star_id == 0);
+        if (!may_move || !positive || !sharp || !isfinite(item->x_px) || !isfinite(item->y_px)) {
             continue;
         }
         if (count == t->max_detections) {

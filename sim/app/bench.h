@@ -20,6 +20,7 @@ typedef struct bst_bench_result {
     double peak_rss_mib;
     double setup_s, ms_max, error_px;
     double error_m; /* of a place */
+    double detections, detections_lost; /* per frame: reported; more than there was room for */
     struct bst_bench_phase {
         char name[24];
         double ms;
@@ -62,6 +63,9 @@ bst_status bst_bench_numerical(bst_ctx *ctx, const bst_bench *self,
 bst_status bst_bench_scene_run(bst_ctx *ctx, const bst_bench *self,
                                const bst_bench_options *options,
                                bst_bench_result *out) BST_MUST_CHECK;
+/* Image processing on the frames of the scene whose name follows "imgproc_" (bench_imgproc.c). */
+bst_status bst_bench_imgproc(bst_ctx *ctx, const bst_bench *self, const bst_bench_options *options,
+                             bst_bench_result *out) BST_MUST_CHECK;
 /* First frame of fresh processes, from their start until its pixels are mapped, kernels in the
  * cache (bench_cold_start.c). */
 bst_status bst_bench_cold_start(bst_ctx *ctx, const bst_bench *self,
