@@ -4,7 +4,7 @@
 
 #include "imgproc/candidates.h"
 #include "imgproc/fit.h"
-#include "imgproc/motion.h"
+#include "sim/world/motion.h"
 
 typedef struct bst_found {
     bst_source source;

@@ -8,6 +8,8 @@
 
 #include <cjson/cJSON.h>
 
+#include "sim/engine/stand_in.h"
+
 enum { FORMAT_VERSION = 1 };
 
 const bst_config_desc bst_scenario_table[] = {
@@ -328,7 +330,7 @@ static bst_status read_modules(bst_ctx *ctx, const bst_json *json, const bst_reg
                     return bst_config_fail(ctx, out->file, path, block, "wrong type", "an object");
                 }
                 if (pass == 0) {
-                    total += cJSON_GetArraySize(block);
+                    total += cJSON_GetArraySize(block) + 1; /* one may be made */
                     continue;
                 }
                 for (const cJSON *node = block ? block->child : NULL; node; node = node->next) {
@@ -339,6 +341,7 @@ static bst_status read_modules(bst_ctx *ctx, const bst_json *json, const bst_reg
                     snprintf(module_path, sizeof module_path, "%s/%.60s", path, node->string);
                     BST_TRY(read_module(ctx, json, registry, out, node, module_path, module));
                 }
+                BST_TRY(bst_stand_in(ctx, registry, block, i, s, out));
             }
         }
         if (pass == 0) {
@@ -485,7 +488,11 @@ static cJSON *echo_module(const bst_scenario *s, const bst_module_config *module
         module->desc->config ? bst_config_echo(module->desc->config, module->config) : NULL;
     while (own && own->child) {
         cJSON *item = cJSON_DetachItemViaPointer(own, own->child);
-        cJSON_AddItemToObject(node, item->string, item);
+        if (bst_stand_in_taken(s, module, item->string)) {
+            cJSON_Delete(item); /* said where it comes from */
+        } else {
+            cJSON_AddItemToObject(node, item->string, item);
+        }
     }
     cJSON_Delete(own);
     return node;
