@@ -71,6 +71,14 @@ static void add(const profile *x, const profile *y, double ratio, double sums[3]
     }
 }
 
+static double total_square(const profile *p) {
+    double sum = 0.0;
+    for (int i = 0; i < p->count; i++) {
+        sum += p->share[i] * p->share[i];
+    }
+    return sum;
+}
+
 void bst_bound_init(bst_bound *b, double sigma_px) {
     profile x, y;
     b->sigma_px = sigma_px = fmax(sigma_px, 0.2);
@@ -79,30 +87,24 @@ void bst_bound_init(bst_bound *b, double sigma_px) {
          * that of its straight part, which is all across the path and none along it */
         double length = length_of(n, sigma_px), most = MAX_PIXELS - 2.0 * (6.0 * sigma_px + 2.0);
         double shown = fmin(length, most), share = length > 0.0 ? shown / length : 1.0;
-        for (int r = 0; r < BST_BOUND_RATIOS; r++) {
-            double ratio = pow(10.0, FIRST_RATIO + r / PER_DECADE), sums[3] = {0, 0, 0};
-            for (int phase = 0; phase < PHASES * PHASES; phase++) {
-                double cx = (phase % PHASES + 0.5) / PHASES - 0.5;
-                double cy = (double)(phase / PHASES + 0.5) / PHASES - 0.5;
-                make_profile(&x, cx, sigma_px, shown);
-                make_profile(&y, cy, sigma_px, 0.0);
-                add(&x, &y, ratio * share, sums);
+        double sums[BST_BOUND_RATIOS][3] = {{0}}, squared = 0.0;
+        for (int phase = 0; phase < PHASES * PHASES; phase++) {
+            double cx = (phase % PHASES + 0.5) / PHASES - 0.5;
+            double cy = (double)(phase / PHASES + 0.5) / PHASES - 0.5;
+            make_profile(&x, cx, sigma_px, shown);
+            make_profile(&y, cy, sigma_px, 0.0);
+            for (int r = 0; r < BST_BOUND_RATIOS; r++) {
+                add(&x, &y, share * pow(10.0, FIRST_RATIO + r / PER_DECADE), sums[r]);
             }
-            double mean = 1.0 / (PHASES * PHASES);
-            b->along[n][r] = (float)log(sums[0] * mean * share * share);
-            b->across[n][r] = (float)log(sums[1] * mean * share);
-            b->flux[n][r] = (float)log(sums[2] * mean * share);
-            if (r == 0) {
-                double squared = 0.0;
-                for (int j = 0; j < y.count; j++) {
-                    for (int i = 0; i < x.count; i++) {
-                        double p = x.share[i] * y.share[j];
-                        squared += p * p;
-                    }
-                }
-                b->squared[n] = (float)log(squared * share);
-            }
+            squared += total_square(&x) * total_square(&y);
         }
+        double mean = share / (PHASES * PHASES);
+        for (int r = 0; r < BST_BOUND_RATIOS; r++) {
+            b->along[n][r] = (float)log(sums[r][0] * mean * share);
+            b->across[n][r] = (float)log(sums[r][1] * mean);
+            b->flux[n][r] = (float)log(sums[r][2] * mean);
+        }
+        b->squared[n] = (float)log(squared * mean);
     }
 }
 

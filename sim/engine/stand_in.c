@@ -53,6 +53,17 @@ bool bst_stand_in_taken(const bst_scenario *s, const bst_module_config *module, 
     return own && giver(s, module, own, &theirs) != NULL;
 }
 
+bool bst_stand_in_delayed(const bst_scenario *s, const bst_module_config *module) {
+    for (int m = 0; m < s->module_count; m++) {
+        const bst_module_config *other = &s->modules[m];
+        if (other->observer == module->observer && other->sensor == module->sensor &&
+            stands_for(module->desc, other->desc->role)) {
+            return true;
+        }
+    }
+    return false;
+}
+
 static bst_status take_settings(bst_ctx *ctx, const cJSON *node, const bst_scenario *s,
                                 bst_module_config *module) {
     for (const bst_config_desc *d = module->desc->config; d && d->key; d++) {
@@ -122,6 +133,16 @@ static bst_status add_delay(bst_ctx *ctx, bst_module_config *module, int port, i
 static bst_status take_delays(bst_ctx *ctx, const bst_scenario *s, bst_module_config *module) {
     const bst_module_desc *own = module->desc;
     int last = -1;
+    if (!bst_stand_in_delayed(s, module)) {
+        return BST_OK;
+    }
+    if (module->delay_count > 0) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "%s: /observers/%d/sensors/%d/modules/%s/delay_s: said twice (allowed: "
+                        "nothing here: delays are those of the modules for which this one stands "
+                        "in)",
+                        s->file, module->observer, module->sensor, module->name);
+    }
     for (int p = 0; p < own->port_count; p++) {
         last = own->ports[p].flags & BST_PORT_TRIGGER ? p : last;
     }

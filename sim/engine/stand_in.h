@@ -18,5 +18,7 @@ bst_status bst_stand_in(bst_ctx *ctx, const bst_registry *registry, const struct
 /* Whether a key of a module's table has its value from a module that it stands for. */
 bool bst_stand_in_taken(const bst_scenario *scenario, const bst_module_config *module,
                         const char *key);
+/* Whether the delays of its inputs come from modules that it stands for. */
+bool bst_stand_in_delayed(const bst_scenario *scenario, const bst_module_config *module);
 
 #endif
