@@ -33,7 +33,6 @@ bst_status bst_generator_create(bst_ctx *ctx, const bst_camera *camera, const bs
     g->settings = *settings;
     g->calibration = *calibration;
     g->key = key;
-    g->threshold_for.window.width = -1;
     g->items = calloc((size_t)settings->capacity, sizeof *g->items);
     if (!g->items) {
         bst_generator_free(g);
@@ -209,22 +208,23 @@ static void add_crowding(bst_generator *g, double threshold) {
     }
 }
 
-/* The threshold, kept while the frame and the filter stay the same. Streaks count in steps of half
- * a pixel, as the filters do. */
+/* The threshold, kept by streak length. Streaks count in steps of half a pixel, as the filters do.
+ */
 static void set_threshold(bst_generator *g) {
-    double step = floor(2.0 * g->streak + 0.5);
-    struct generator_threshold *t = &g->threshold_for;
-    if (t->window.width != g->width || t->window.height != g->height || t->step != step ||
-        t->sigma != g->total_sigma) {
-        t->window = (bst_window){0, 0, g->width, g->height};
-        t->step = step;
-        t->sigma = g->total_sigma;
-        t->threshold =
-            bst_matched_threshold(g->total_sigma, 0.5 * step, g->settings.false_alarms_per_frame,
-                                  (double)g->width * g->height, &t->streak_share);
+    struct generator_thresholds *t = &g->thresholds;
+    if (t->width != g->width || t->height != g->height || t->sigma != g->total_sigma) {
+        *t = (struct generator_thresholds){
+            .width = g->width, .height = g->height, .sigma = g->total_sigma};
     }
-    g->threshold = fmax(t->threshold + g->calibration.threshold_offset, 1.0);
-    g->streak_share = t->streak_share;
+    int step = (int)floor(2.0 * g->streak + 0.5);
+    step = step < GENERATOR_STEPS ? step : GENERATOR_STEPS - 1;
+    if (!(t->threshold[step] > 0.0)) {
+        t->threshold[step] =
+            bst_matched_threshold(g->total_sigma, 0.5 * step, g->settings.false_alarms_per_frame,
+                                  (double)g->width * g->height, &t->streak_share[step]);
+    }
+    g->threshold = fmax(t->threshold[step] + g->calibration.threshold_offset, 1.0);
+    g->streak_share = t->streak_share[step];
 }
 
 static void set_frame(bst_generator *g, const bst_generator_frame *f) {

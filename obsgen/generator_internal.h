@@ -22,6 +22,9 @@ typedef struct generator_rank {
     int index;
 } generator_rank;
 
+/* Half pixels of the longest streak that is filtered for. */
+enum { GENERATOR_STEPS = 258 };
+
 struct bst_generator {
     const bst_camera *camera;
     double electrons_per_s_v0; /* onboard zero point */
@@ -38,10 +41,10 @@ struct bst_generator {
     double streak; /* 0: not filtered for */
     bool smeared;
     double background_e, noise_e, threshold, streak_share;
-    struct generator_threshold {
-        bst_window window;
-        double step, sigma, threshold, streak_share;
-    } threshold_for;
+    struct generator_thresholds {
+        int width, height;
+        double sigma, threshold[GENERATOR_STEPS], streak_share[GENERATOR_STEPS]; /* 0: not made */
+    } thresholds;
     generator_source *sources; /* by row */
     generator_rank *ranks;
     int source_count, source_capacity;

@@ -8,7 +8,7 @@
 #include "sim/world/world_internal.h"
 
 /* The cue's direction is kept at whole seconds and interpolated by six of them. */
-enum { KNOTS = 16, STENCIL = 6 };
+enum { KNOTS = 16, STENCIL = 6, REMEMBERED = 256 };
 /* Fifth difference, rad, up to which the interpolation is used: what it misses is 200 times less.
  */
 static const double SMOOTH_RAD = 1e-11;
@@ -23,7 +23,12 @@ struct bst_knowledge_view {
     const bst_knowledge *knowledge;
     bst_sky_clock *clock;
     cue_knot knots[KNOTS];
-    int64_t checked; /* second whose stencil was looked at last */
+    struct {
+        bool made;
+        double seconds;
+        bst_cue cue;
+    } remembered[REMEMBERED]; /* by time: control asks for the same instants again and again */
+    int64_t checked;          /* second whose stencil was looked at last */
     bool any_checked, smooth;
 };
 
@@ -212,8 +217,7 @@ static bst_status direction_at(bst_ctx *ctx, bst_knowledge_view *view, double se
     return BST_OK;
 }
 
-bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
-                                bst_cue *out) {
+static bst_status make_cue(bst_ctx *ctx, bst_knowledge_view *view, double seconds, bst_cue *out) {
     const bst_knowledge *k = view->knowledge;
     /* central difference: the third derivative of a LEO-to-GEO direction leaves < 1e-11 rad/s */
     const double h = 0.5;
@@ -232,5 +236,21 @@ bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double s
     out->rate_sigma_radps = cue->rate_sigma_arcsec_per_s * BST_ARCSEC_RAD;
     out->v_mag = cue->v_mag;
     out->v_mag_sigma = cue->v_mag_sigma;
+    return BST_OK;
+}
+
+bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
+                                bst_cue *out) {
+    uint64_t bits;
+    memcpy(&bits, &seconds, sizeof bits);
+    /* Fibonacci hashing: the upper bits of the product */
+    unsigned place = (unsigned)((bits * UINT64_C(0x9E3779B97F4A7C15)) >> 56) % REMEMBERED;
+    if (!view->remembered[place].made || view->remembered[place].seconds != seconds) {
+        view->remembered[place].made = false;
+        BST_TRY(make_cue(ctx, view, seconds, &view->remembered[place].cue));
+        view->remembered[place].seconds = seconds;
+        view->remembered[place].made = true;
+    }
+    *out = view->remembered[place].cue;
     return BST_OK;
 }
