@@ -72,6 +72,17 @@ static double inside(double at, double low, double high, double sigma) {
     return 0.5 * (erf((high - at) / s) - erf((low - at) / s));
 }
 
+/* SNR of a source of the truth over that of its light with the PSF alone on the frame's mean
+ * background: jitter and bends of its path widen it, and the background may differ at its place. */
+static double sharpness(const bst_generator *g, const bst_generator_frame *f,
+                        const bst_truth_item *item, double length) {
+    double v = f->truth->background_e + f->truth->dark_e +
+               g->camera->read_noise_e * g->camera->read_noise_e;
+    double plain = item->electrons * bst_bound_norm(&g->bound, length) / sqrt(fmax(v, 1e-6));
+    bool known = g->binning == 1 && item->snr > 0.0 && plain > 0.0;
+    return known ? fmin(fmax(item->snr / plain, 0.2), 2.0) : 1.0;
+}
+
 /* A source's path cut to the frame: its length, middle and light on it. */
 static bool place_source(const bst_generator *g, const bst_generator_frame *f,
                          const bst_truth_item *item, generator_source *s) {
@@ -86,6 +97,7 @@ static bool place_source(const bst_generator *g, const bst_generator_frame *f,
     s->x = (item->x_mean_px - x0) / b;
     s->y = (item->y_mean_px - y0) / b;
     s->length = hypot(s->path.dx, s->path.dy);
+    s->sharp = sharpness(g, f, item, s->length);
     if (s->length > 1.0) {
         double low = -0.5, high = 0.5; /* of the path, from its middle */
         const double at[2] = {s->x, s->y}, way[2] = {s->path.dx, s->path.dy};
@@ -130,7 +142,7 @@ static void respond(const bst_generator *g, generator_source *s) {
     const bst_path_px point = {0.0, 0.0};
     double gain = bst_obsgen_between(bst_obsgen_lengths_px, g->calibration.gain, BST_OBSGEN_LENGTHS,
                                      s->length);
-    double ideal = s->flux_e * bst_bound_norm(&g->bound, s->length) / g->noise_e;
+    double ideal = s->sharp * s->flux_e * bst_bound_norm(&g->bound, s->length) / g->noise_e;
     double efficiency = 1.0;
     s->as_streak = false;
     if (s->star) {
@@ -416,7 +428,7 @@ static void measure_place(const bst_generator *g, const generator_source *s, con
                      : across;
     double error[2];
     bst_rng_normal2(g->key, (uint64_t)g->exposure_id, s->name * DRAWS + DRAW_PLACE, error);
-    double worse = s->saturated ? 4.0 : 1.0;
+    double worse = (s->saturated ? 4.0 : 1.0) / fmin(s->sharp, 1.0);
     error[0] *= along * worse * sqrt(truth->var_along_px2 * b->widen);
     error[1] *= across * worse * sqrt(truth->var_across_px2 * b->widen);
     double c = s->length > 0.0 ? s->path.dx / s->length : 1.0;

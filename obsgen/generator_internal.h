@@ -9,6 +9,7 @@ typedef struct generator_source {
     double x, y; /* middle of what of its path is on the frame */
     bst_path_px path;
     double length, flux_e;
+    double sharp;     /* of its amplitude: 1 for the PSF alone */
     double amplitude; /* SNR at the filter's output, without noise */
     double peak;      /* the same with the light of neighbours */
     double noise;     /* drawn for the peak */
