@@ -6,7 +6,7 @@
 #ifndef BST_IMGPROC_IMGPROC_H
 #define BST_IMGPROC_IMGPROC_H
 
-#include "imgproc/motion.h"
+#include "sim/world/motion.h"
 #include "sim/core/messages.h"
 #include "sim/core/module.h"
 #include "sim/world/camera.h"

@@ -4,8 +4,8 @@
 
 #include "imgproc/candidates.h"
 #include "imgproc/fit.h"
-#include "imgproc/motion.h"
 #include "imgproc/sharpness.h"
+#include "sim/world/motion.h"
 
 /* Charge that is not light, in pixels of the frame. */
 typedef struct bst_charge {

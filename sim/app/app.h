@@ -19,6 +19,7 @@ int bst_cmd_propagate(int argc, char **argv);
 int bst_cmd_calframes(int argc, char **argv);
 int bst_cmd_bench(int argc, char **argv);
 int bst_cmd_pd(int argc, char **argv);
+int bst_cmd_calibrate_obsgen(int argc, char **argv);
 
 /* Log sink that writes to standard error: "boresight: warning: ...". */
 void bst_app_log(void *user, bst_log_level level, const char *message);

@@ -76,6 +76,11 @@ bst_status bst_bench_first_frame(bst_ctx *ctx, const bst_bench_options *options)
 /* The closed loop (bench_foundations.c). */
 bst_status bst_bench_loop(bst_ctx *ctx, const bst_bench *self, const bst_bench_options *options,
                           bst_bench_result *out) BST_MUST_CHECK;
+/* A day of it with the observation generator, hour by hour: a frame every 2 s, plant and control at
+ * 100 Hz (scenarios/day_generator.json). */
+bst_status bst_bench_loop_obsgen(bst_ctx *ctx, const bst_bench *self,
+                                 const bst_bench_options *options,
+                                 bst_bench_result *out) BST_MUST_CHECK;
 
 /* Whole runs of an open-loop scenario, frames recorded, with and without --serial, in processes of
  * their own: per frame, start and end taken off (bench_open_loop.c). */

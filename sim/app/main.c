@@ -20,6 +20,8 @@ static const command commands[] = {
     {"stars", bst_cmd_stars, "get, import or describe the star catalogue"},
     {"propagate", bst_cmd_propagate, "positions and velocities from two-line element sets"},
     {"calframes", bst_cmd_calframes, "bias, dark and flat frames of a scenario's sensors"},
+    {"calibrate-obsgen", bst_cmd_calibrate_obsgen,
+     "fit the observation generator to the image path, or compare them"},
     {"bench", bst_cmd_bench, "measure speed and error"},
     {"pd", bst_cmd_pd, "measure detection, false alarms and location against theory"},
 };
@@ -42,7 +44,7 @@ static void usage(FILE *stream) {
             "\n"
             "commands:\n");
     for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {
-        fprintf(stream, "  %-10s %s\n", commands[i].name, commands[i].doc);
+        fprintf(stream, "  %-16s %s\n", commands[i].name, commands[i].doc);
     }
     fprintf(
         stream,
