@@ -356,6 +356,7 @@ static bst_status write_report(bst_ctx *ctx, const orbit *o, FILE *stream) {
     for (int i = 0; i < 6; i++) {
         cJSON_AddItemToArray(matrix, cJSON_CreateDoubleArray(s->covariance[i], 6));
     }
+    bst_json_add_number(node, "bend", s->bend);
     bst_json_add_number(node, "range_m", s->range_m);
     bst_json_add_number(node, "range_sigma_m", s->range_sigma_m);
     cJSON *elements = cJSON_AddObjectToObject(node, "osculating");
@@ -429,6 +430,9 @@ static void print_orbit(const orbit *o) {
     printf("  range           %12.3f km, +- %.3f km\n", s->range_m * 1e-3, s->range_sigma_m * 1e-3);
     printf("  a, e, i         %.3f km, %.6f, %.4f deg\n", k.semi_major_axis_m * 1e-3,
            k.eccentricity, k.inclination_rad / BST_DEG_RAD);
+    if (s->bend > 0.5) {
+        printf("  note: the arc is short for its errors, which may be larger than stated\n");
+    }
     if (o->report.other_chi2 < o->report.first_chi2 + 25.0) {
         printf("  note: another orbit explains the first part of the arc nearly as well\n");
     }
