@@ -417,6 +417,34 @@ static bst_status finish(work *w, const chart *c, const double n[PARAMETERS][PAR
     return isfinite(log_sigma) && log_sigma < MOST_LOG_SIGMA ? BST_OK : fail_range(w);
 }
 
+/* How far the sum of squares is from what the covariance foresees, two standard deviations of the
+ * range away along the valley: 0 where the problem is linear. */
+static double bend_of(work *w, const chart *c, const double n[PARAMETERS][PARAMETERS],
+                      const bst_od_solution *s) {
+    double l[PARAMETERS][PARAMETERS], size[PARAMETERS], column[PARAMETERS], worst = 0.0;
+    const double range[PARAMETERS] = {[4] = 1.0};
+    if (!factor(n, 0.0, 1e-15, l, size)) {
+        return INFINITY;
+    }
+    solve(l, size, range, column);
+    for (int side = -2; side <= 2; side += 4) {
+        double x[PARAMETERS];
+        for (int i = 0; i < PARAMETERS; i++) {
+            x[i] = side * column[i] / sqrt(column[4]);
+        }
+        chart there = moved(c, x);
+        bst_od_state state = state_of(&there);
+        bst_ctx *ctx = w->ctx;
+        bst_ctx quiet = {0};
+        w->ctx = &quiet;
+        bst_status status = residuals(w, &state, w->side[0]);
+        w->ctx = ctx;
+        double excess = status == BST_OK ? (total(w, w->side[0]) - s->chi2) / 4.0 - 1.0 : INFINITY;
+        worst = fmax(worst, fabs(excess));
+    }
+    return worst;
+}
+
 static bst_status fit(work *w, const bst_od_state *first, double *scratch, bst_od_solution *out) {
     const bst_od_observer *middle = &w->items[w->middle].observer;
     double start = w->items[0].observer.time_s, end = w->items[w->count - 1].observer.time_s;
@@ -442,7 +470,9 @@ static bst_status fit(work *w, const bst_od_state *first, double *scratch, bst_o
                             BST_OD_LEAST);
         }
     }
-    return finish(w, &c, (const double(*)[PARAMETERS])n, out);
+    BST_TRY(finish(w, &c, (const double(*)[PARAMETERS])n, out));
+    out->bend = bend_of(w, &c, (const double(*)[PARAMETERS])n, out);
+    return BST_OK;
 }
 
 bst_status bst_od_fit(bst_ctx *ctx, const bst_od_observation *observations, int count,

@@ -30,6 +30,9 @@ typedef struct bst_od_solution {
     double rms_rad;                /* of the residuals used, per axis */
     double range_m, range_sigma_m; /* at state.time_s */
     double range_rate_sigma_mps;   /* likewise */
+    double bend; /* how far the problem is from linear two standard deviations of the range away:
+                    the sum of squares' rise over 4, less 1, in size. Well below 1: the covariance
+                    is true; above: errors may be larger than it says */
     int iterations;
 } bst_od_solution;
 

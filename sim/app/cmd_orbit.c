@@ -356,6 +356,7 @@ static bst_status write_report(bst_ctx *ctx, const orbit *o, FILE *stream) {
     for (int i = 0; i < 6; i++) {
         cJSON_AddItemToArray(matrix, cJSON_CreateDoubleArray(s->covariance[i], 6));
     }
+    bst_json_add_number(node, "bend", s->bend);
     bst_json_add_number(node, "range_m", s->range_m);
     bst_json_add_number(node, "range_sigma_m", s->range_sigma_m);
     cJSON *elements = cJSON_AddObjectToObject(node, "osculating");
@@ -403,11 +404,8 @@ static void print_orbit(const orbit *o) {
     const bst_vec3 r = s->state.position_m, v = s->state.velocity_mps;
     bst_kepler_elements k = bst_kepler_elements_of(bst_od_gm(&o->options.motion), r, v);
     char utc[40];
-    double p = 0.0, w = 0.0;
-    for (int i = 0; i < 3; i++) {
-        p += s->covariance[i][i];
-        w += s->covariance[i + 3][i + 3];
-    }
+    const double(*c)[6] = s->covariance;
+    double p = c[0][0] + c[1][1] + c[2][2], w = c[3][3] + c[4][4] + c[5][5];
     bst_time_to_utc(time_at(o, s->state.time_s), 3, utc, sizeof utc);
     printf("%s/%s, track %" PRId64 " (%s)\n", o->track->sensor->observer, o->track->sensor->name,
            o->track->id, o->object);
@@ -429,6 +427,9 @@ static void print_orbit(const orbit *o) {
     printf("  range           %12.3f km, +- %.3f km\n", s->range_m * 1e-3, s->range_sigma_m * 1e-3);
     printf("  a, e, i         %.3f km, %.6f, %.4f deg\n", k.semi_major_axis_m * 1e-3,
            k.eccentricity, k.inclination_rad / BST_DEG_RAD);
+    if (s->bend > 0.5) {
+        printf("  note: the arc is short for its errors, which may be larger than stated\n");
+    }
     if (o->report.other_chi2 < o->report.first_chi2 + 25.0) {
         printf("  note: another orbit explains the first part of the arc nearly as well\n");
     }
@@ -592,7 +593,6 @@ int bst_cmd_orbit(int argc, char **argv) {
     bst_status status = orbit_of(&ctx, &q, argv[1]);
     if (status != BST_OK) {
         fprintf(stderr, "boresight orbit: %s\n", ctx.message);
-        return BST_EXIT_FAILED;
     }
-    return BST_EXIT_OK;
+    return status == BST_OK ? BST_EXIT_OK : BST_EXIT_FAILED;
 }
