@@ -4,6 +4,7 @@
 #include "sim/eval/consistency.h"
 #include "sim/eval/gospa.h"
 #include "sim/eval/track_bound.h"
+#include "sim/eval/track_metrics.h"
 #include "tests/test_support.h"
 
 static void quantiles_of_the_tables(void **state) {
@@ -245,12 +246,72 @@ static void gospa_is_the_least_and_a_metric(void **state) {
     }
 }
 
+/* Two objects over 11 frames of 360 s by hand: the first has track 1, then 3 after a gap of one
+ * frame; the second is visible from frame 2 on and has track 2 from frame 4 on, which strays to the
+ * first in the last frame; track 9 is nobody's for 5 frames. */
+static void track_metrics_by_hand(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_track_metrics *m;
+    const double cutoff = 1e-4;
+    bst_assert_ok(&ctx, bst_track_metrics_create(&ctx, 2, 4, 3, cutoff, &m));
+    const bst_vec3 a = bst_vec3_from_radec(0.0, 0.0), b = bst_vec3_from_radec(0.1, 0.0),
+                   far = bst_vec3_from_radec(0.2, 0.3), near_a = bst_vec3_from_radec(3e-5, 0.0);
+    const bst_vec3 truth[2] = {a, b};
+    double gospa2 = 0.0;
+    for (int k = 0; k < 11; k++) {
+        const bool visible[2] = {true, k >= 2};
+        int64_t ids[3];
+        bst_vec3 d[3];
+        int n = 0, missed = 0;
+        if (k != 5 && k != 10) {
+            ids[n] = k < 5 ? 1 : 3;
+            d[n++] = near_a;
+        }
+        missed += k == 5;
+        if (k >= 4) {
+            ids[n] = 2;
+            d[n++] = k == 10 ? near_a : b;
+        }
+        missed += (k >= 2 && k < 4) || k == 10;
+        if (k < 5) {
+            ids[n] = 9;
+            d[n++] = far;
+        }
+        gospa2 += (k == 5 ? 0.0 : 9e-10) + 0.5 * cutoff * cutoff * (missed + (k < 5));
+        bst_assert_ok(&ctx, bst_track_metrics_frame(&ctx, m, 360.0 * k, truth, visible, ids, d, n));
+    }
+    bst_track_figures f;
+    bst_track_metrics_figures(m, &f);
+    assert_int_equal(f.frames, 11);
+    bst_assert_close(f.hours, 1.0, 1e-12);
+    bst_assert_close(f.gospa_rms / sqrt(gospa2 / 11.0), 1.0, 1e-9); /* angles of 1e-5 hold 1e-11 */
+    bst_assert_close(f.coverage, 16.0 / 20.0, 1e-15);               /* 10 of 11, 6 of 9 */
+    bst_assert_close(f.time_to_confirm_s, 0.5 * (0.0 + 720.0), 1e-9);
+    assert_int_equal(f.objects_seen, 2);
+    assert_int_equal(f.objects_tracked, 2);
+    assert_int_equal(f.breaks, 2);                  /* 1 to 3, 3 to 2 */
+    bst_assert_close(f.purity, 15.0 / 16.0, 1e-15); /* track 2 was with the other one once */
+    assert_int_equal(f.tracks, 4);
+    assert_int_equal(f.false_tracks, 1);
+    bst_assert_close(f.false_tracks_per_hour, 1.0, 1e-12);
+    const bool visible[2] = {true, true};
+    const int64_t id = 77, many[4] = {1, 2, 3, 9};
+    const bst_vec3 four[4] = {a, a, b, b};
+    assert_int_equal(bst_track_metrics_frame(&ctx, m, 9e3, truth, visible, &id, &far, 1),
+                     BST_ERR_ARGUMENT);
+    assert_int_equal(bst_track_metrics_frame(&ctx, m, 9e3, truth, visible, many, four, 4),
+                     BST_ERR_ARGUMENT);
+    bst_track_metrics_free(m);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(quantiles_of_the_tables),
                                        cmocka_unit_test(true_covariances_are_inside),
                                        cmocka_unit_test(bound_of_a_straight_line),
                                        cmocka_unit_test(information_left_in_clutter),
                                        cmocka_unit_test(gospa_by_hand),
-                                       cmocka_unit_test(gospa_is_the_least_and_a_metric)};
+                                       cmocka_unit_test(gospa_is_the_least_and_a_metric),
+                                       cmocka_unit_test(track_metrics_by_hand)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

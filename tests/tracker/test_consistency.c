@@ -11,7 +11,7 @@
 #define MAX_DETECTIONS 200
 
 /* frames without clutter, in which the track starts; with clutter but not judged; judged */
-enum { RUNS = 200, CLEAN = 14, SETTLE = 6, START = CLEAN + SETTLE, STEPS = 200 };
+enum { RUNS = 200, CLEAN = 14, SETTLE = 6, START = CLEAN + SETTLE, STEPS = 200, FEW = 60 };
 
 typedef struct setup {
     const char *name;
@@ -21,6 +21,7 @@ typedef struct setup {
     double alarms_per_gate;      /* in the gate of a settled filter */
     double dec_deg, rate_arcsec; /* where and how fast */
     bool manoeuvres;             /* as the IMM's own models have it */
+    int steps;                   /* judged, at most STEPS */
 } setup;
 
 typedef struct figures {
@@ -132,7 +133,7 @@ static void monte_carlo(const setup *s, figures *out) {
                                               s->rate_arcsec * AS * sin((double)run));
         bst_track_bound bound;
         bool unconfirmed = false, gone = false, turning = false;
-        for (int k = 0; k < START + STEPS; k++) {
+        for (int k = 0; k < START + s->steps; k++) {
             uint64_t u = 0;
             double n[2];
             if (s->manoeuvres) {
@@ -157,7 +158,7 @@ static void monte_carlo(const setup *s, figures *out) {
                 list[count++] = see(truth.direction, x, y);
             }
             const bst_mtt_track *track = confirmed(mtt);
-            int at = (int)run * STEPS + k - START;
+            int at = (int)run * s->steps + k - START;
             if (k >= START) {
                 nis[at] = nees[at] = NAN;
             }
@@ -221,8 +222,8 @@ static void monte_carlo(const setup *s, figures *out) {
         out->lost += gone;
         bst_mtt_free(mtt);
     }
-    bst_consistency_check(nees, RUNS, STEPS, 4, 0.95, &out->nees);
-    bst_consistency_check(nis, RUNS, STEPS, 2, 0.95, &out->nis);
+    bst_consistency_check(nees, RUNS, s->steps, 4, 0.95, &out->nees);
+    bst_consistency_check(nis, RUNS, s->steps, 2, 0.95, &out->nis);
     out->angle = sqrt(angle2 / bound_angle2);
     out->rate = sqrt(rate2 / bound_rate2);
     out->alarms = (double)in_gate / gates;
@@ -252,9 +253,10 @@ static void check_efficient(const figures *f) {
 
 static void filters_without_clutter(void **state) {
     (void)state;
-    const setup cases[] = {{"ekf", BST_FILTER_EKF, BST_MTT_GNN, 0.9, 0.0, 20, 50, false},
-                           {"ukf", BST_FILTER_UKF, BST_MTT_GNN, 0.9, 0.0, 89.999, 50, false},
-                           {"fast", BST_FILTER_EKF, BST_MTT_NEAREST, 1.0, 0.0, 60, 18000, false}};
+    const setup cases[] = {
+        {"ekf", BST_FILTER_EKF, BST_MTT_GNN, 0.9, 0.0, 20, 50, false, STEPS},
+        {"ukf", BST_FILTER_UKF, BST_MTT_GNN, 0.9, 0.0, 89.999, 50, false, STEPS},
+        {"fast", BST_FILTER_EKF, BST_MTT_NEAREST, 1.0, 0.0, 60, 18000, false, STEPS}};
     for (int i = 0; i < 3; i++) {
         figures f;
         monte_carlo(&cases[i], &f);
@@ -268,8 +270,8 @@ static void filters_without_clutter(void **state) {
  * average though no Gaussian itself. */
 static void imm_through_manoeuvres(void **state) {
     (void)state;
-    const setup imm = {"imm", BST_FILTER_IMM, BST_MTT_GNN, 0.95, 0.0, 20, 50, true};
-    const setup ekf = {"imm", BST_FILTER_EKF, BST_MTT_GNN, 0.95, 0.0, 20, 50, true};
+    const setup imm = {"imm", BST_FILTER_IMM, BST_MTT_GNN, 0.95, 0.0, 20, 50, true, FEW};
+    const setup ekf = {"imm", BST_FILTER_EKF, BST_MTT_GNN, 0.95, 0.0, 20, 50, true, FEW};
     figures with, without;
     monte_carlo(&imm, &with);
     monte_carlo(&ekf, &without);
@@ -284,8 +286,8 @@ static void imm_through_manoeuvres(void **state) {
 static void single_target_in_clutter(void **state) {
     (void)state;
     const setup cases[] = {
-        {"mixture", BST_FILTER_EKF, BST_MTT_MIXTURE, 0.9, 0.5, 20, 50, false},
-        {"mixture ukf", BST_FILTER_UKF, BST_MTT_MIXTURE, 0.95, 0.5, -89.999, 50, false}};
+        {"mixture", BST_FILTER_EKF, BST_MTT_MIXTURE, 0.9, 0.5, 20, 50, false, STEPS},
+        {"mixture ukf", BST_FILTER_UKF, BST_MTT_MIXTURE, 0.95, 0.5, -89.999, 50, false, STEPS}};
     for (int i = 0; i < 2; i++) {
         figures f;
         monte_carlo(&cases[i], &f);
@@ -300,8 +302,8 @@ static void single_target_in_clutter(void **state) {
  * Gaussian is right until a track in a hundred is led away. */
 static void other_associations_in_clutter(void **state) {
     (void)state;
-    const setup gnn = {"gnn", BST_FILTER_EKF, BST_MTT_GNN, 0.9, 0.5, 20, 50, false};
-    const setup pda = {"pda", BST_FILTER_EKF, BST_MTT_PDA, 0.9, 0.5, 20, 50, false};
+    const setup gnn = {"gnn", BST_FILTER_EKF, BST_MTT_GNN, 0.9, 0.5, 20, 50, false, FEW};
+    const setup pda = {"pda", BST_FILTER_EKF, BST_MTT_PDA, 0.9, 0.5, 20, 50, false, FEW};
     figures f;
     monte_carlo(&gnn, &f);
     assert_true(f.nees.mean_over_dof > 1.5);
