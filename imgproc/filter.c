@@ -49,14 +49,19 @@ void bst_filter_free(bst_filter *f) {
     *f = (bst_filter){0};
 }
 
-/* Autocorrelation of the one-axis kernel (unit norm) at an integer lag. */
-static double axis_correlation(const bst_filter *f, int lag) {
-    lag = abs(lag);
-    double sum = 0.0;
-    for (int i = 0; i + lag <= 2 * f->radius; i++) {
-        sum += (double)f->kernel[i] * (double)f->kernel[i + lag];
+/* Autocorrelation of the one-axis kernel (unit norm) at integer lags. */
+static void correlate(bst_filter *f) {
+    for (int lag = 0; lag <= 2 * f->radius; lag++) {
+        double sum = 0.0;
+        for (int i = 0; i + lag <= 2 * f->radius; i++) {
+            sum += (double)f->kernel[i] * (double)f->kernel[i + lag];
+        }
+        f->correlation[lag] = sum;
     }
-    return sum;
+}
+
+static double axis_correlation(const bst_filter *f, int lag) {
+    return abs(lag) <= 2 * f->radius ? f->correlation[abs(lag)] : 0.0;
 }
 
 /* Covariance of the streak output at places a lag apart, with the weights as they are. */
@@ -234,13 +239,18 @@ void bst_filter_set(bst_filter *f, double sigma_px, double dx_px, double dy_px) 
     f->dy_px = dy_px;
     f->overlap = 0.0;
     f->taps = 0;
+    f->threshold = 0.0;
+    correlate(f);
     describe_point(f, sigma_px);
     if (f->streak) {
         set_streak(f, dx_px, dy_px);
     }
 }
 
-double bst_filter_threshold(const bst_filter *f, double false_alarms, double pixels) {
+double bst_filter_threshold(bst_filter *f, double false_alarms, double pixels) {
+    if (f->threshold > 0.0 && f->threshold_density == false_alarms / pixels) {
+        return f->threshold;
+    }
     double lo = 2.5, hi = 9.0;
     for (int i = 0; i < 24; i++) {
         double u = 0.5 * (lo + hi);
@@ -254,7 +264,9 @@ double bst_filter_threshold(const bst_filter *f, double false_alarms, double pix
             hi = u;
         }
     }
-    return 0.5 * (lo + hi);
+    f->threshold = 0.5 * (lo + hi);
+    f->threshold_density = false_alarms / pixels;
+    return f->threshold;
 }
 
 /* 1 / norm of the part of the kernel that lies on pixels 0..count-1, for each centre. */

@@ -33,6 +33,7 @@ typedef struct bst_filter {
     int radius;
     float kernel[2 * BST_FILTER_MAX_RADIUS + 4];
     double norm; /* sqrt(sum p^2) of the two-dimensional PSF of unit flux */
+    double correlation[2 * BST_FILTER_MAX_RADIUS + 1]; /* of the kernel with itself, by lag */
     /* the streak: a sum over shifted point maps */
     bool streak;
     double dx_px, dy_px;
@@ -46,6 +47,7 @@ typedef struct bst_filter {
     double point_cubes, point_fourths, point_density;
     double streak_cubes, streak_fourths, streak_density;
     double corner; /* output for a point between four pixels at one of them, over its greatest */
+    double threshold, threshold_density; /* the latest, and the false alarms per pixel of it */
     double made_sigma, made_dx, made_dy; /* what the kernels were made for */
     float phase[BST_FILTER_PHASES][2 * BST_FILTER_MAX_RADIUS + 3]; /* one axis, shifted */
 } bst_filter;
@@ -65,7 +67,7 @@ void bst_filter_set(bst_filter *filter, double sigma_px, double dx_px, double dy
  * high u per pixel, L the covariance of its gradient (Adler, The Geometry of Random Fields, 1981,
  * ch. 5; Siegmund and Worsley, Annals of Statistics 23, 1995). Both filters add up, less what they
  * share. At least 2.5. */
-double bst_filter_threshold(const bst_filter *filter, double false_alarms, double pixels);
+double bst_filter_threshold(bst_filter *filter, double false_alarms, double pixels);
 
 /* One pass over a frame of pixels as `read` gives them: `signal` [height][width] becomes electrons
  * above the background (BST_PIXEL_SATURATED where raw >= saturated_dn), then maps and maxima are
