@@ -14,9 +14,8 @@ static double uniform(const bst_generator *g, uint64_t draw) {
     return bst_rng_uniform(g->key, (uint64_t)g->exposure_id, draw);
 }
 
-/* A source of this SNR and shape at (x, y) px of the frame. */
-static bst_detection point_at(const bst_generator *g, double x, double y, double snr,
-                              double length) {
+bst_detection bst_generator_point(const bst_generator *g, double x, double y, double snr,
+                                  double length) {
     bst_detection d = {0};
     double norm = bst_bound_norm(&g->bound, length), b = g->binning;
     d.flux_e = snr * g->noise_e / norm;
@@ -60,7 +59,8 @@ void bst_generator_false_alarms(bst_generator *g) {
         double energy = -2.0 * log(uniform(g, draw + 3)) / g->calibration.false_alarm_tail;
         double snr = sqrt(g->threshold * g->threshold + energy);
         bool streak = g->streak > 0.0 && uniform(g, draw + 4) < g->streak_share;
-        bst_generated item = {point_at(g, x, y, snr, streak ? g->streak : 0.0), -1, false};
+        bst_generated item = {bst_generator_point(g, x, y, snr, streak ? g->streak : 0.0), -1,
+                              false};
         bst_generator_keep(g, &item);
     }
 }
@@ -100,7 +100,7 @@ void bst_generator_hits(bst_generator *g) {
             y > g->height - 0.5) {
             continue;
         }
-        bst_generated item = {point_at(g, x, y, peak, 0.0), -1, true};
+        bst_generated item = {bst_generator_point(g, x, y, peak, 0.0), -1, true};
         bst_detection *d = &item.detection;
         double hottest = charge / fmax(length, 1.0) / g->noise_e;
         bool stands_out = hottest > HOT_SHARE * peak + HOT_SIGMA;

@@ -4,6 +4,10 @@
 
 #include "obsgen/generator.h"
 
+/* A detection of this SNR at (x, y) px of the frame: a point, or a star's streak of this length. */
+bst_detection bst_generator_point(const bst_generator *generator, double x, double y, double snr,
+                                  double length);
+
 /* Noise above the threshold: a Poisson number, anywhere on the frame, with the upper tail of the
  * filter's output. */
 void bst_generator_false_alarms(bst_generator *generator);

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "obsgen/clutter.h"
+#include "obsgen/fragments.h"
 #include "obsgen/generator_internal.h"
 
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
@@ -372,6 +373,10 @@ static void decide(bst_generator *g) {
         if (merged) {
             continue;
         }
+        if (s->length > g->settings.streak_max_px) {
+            s->broken = true;
+            continue;
+        }
         s->noise = draw(g, s, DRAW_PEAK);
         s->found = g->calibration.slope * (peak - g->threshold) + s->noise > 0.0;
         s->peak = peak;
@@ -539,7 +544,9 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
     }
     decide(g);
     for (int i = 0; i < g->source_count; i++) {
-        if (g->sources[i].found) {
+        if (g->sources[i].broken) {
+            bst_generator_fragments(g, &g->sources[i]);
+        } else if (g->sources[i].found) {
             bst_generated item = {measure(g, i), g->sources[i].item, false};
             bst_generator_keep(g, &item);
         }

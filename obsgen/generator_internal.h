@@ -16,6 +16,7 @@ typedef struct generator_source {
     uint64_t name;    /* of its draws */
     int item, head;   /* head: seen in one with this source; -1: not */
     bool star, as_streak, found, saturated;
+    bool broken; /* longer than is filtered for: seen in parts */
 } generator_source;
 
 typedef struct generator_rank {

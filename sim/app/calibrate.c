@@ -328,7 +328,8 @@ static void fit_detection(const bst_calibrator *c, bst_obsgen_calibration *out) 
         double total = 0.0, gain[BST_OBSGEN_LENGTHS] = {0};
         for (int n = 0; n < BST_OBSGEN_LENGTHS; n++) {
             double value = 0.0;
-            if (count[n] >= LEAST_SOURCES) {
+            /* a length that only few frames had would be told by their oddities */
+            if (count[n] >= LEAST_SOURCES && count[n] >= c->trial_count / 50) {
                 gain[n] = best_gain(c, n, slope, &value);
             }
             total += value;

@@ -356,6 +356,42 @@ static void the_edge_cuts(void **state) {
     close_scene(&s);
 }
 
+/* A streak longer than is filtered for is seen in parts: on its path, above the threshold, more of
+ * them where the light is near the threshold than where it is far above. */
+static void long_streaks_are_seen_in_parts(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    start(&s);
+    int parts[2] = {0, 0};
+    for (int bright = 0; bright < 2; bright++) {
+        for (int f = 0; f < 20; f++) {
+            s.truth->count = 0;
+            bst_truth_item *item =
+                add_source(&s, 1, 500.0, 500.0, electrons_of(&s, bright ? 8000.0 : 500.0));
+            item->x_start_px = 420.0;
+            item->x_end_px = 580.0;
+            item->y_start_px = 440.0;
+            item->y_end_px = 560.0;
+            s.frame.streak_dx_px = 160.0;
+            s.frame.streak_dy_px = 120.0;
+            bst_generator_result r = run(&s, f);
+            assert_true(r.smeared);
+            for (int i = 0; i < r.count; i++) {
+                const bst_detection *d = &r.items[i].detection;
+                double along = 0.8 * (d->x_px - 500.0) + 0.6 * (d->y_px - 500.0);
+                double across = 0.8 * (d->y_px - 500.0) - 0.6 * (d->x_px - 500.0);
+                /* half of 200 px and the PSF; six standard deviations of a place at SNR 5 */
+                assert_true(fabs(along) < 105.0 && fabs(across) < 1.5);
+                assert_true(d->snr > r.threshold_snr);
+            }
+            parts[bright] += r.count;
+        }
+    }
+    assert_true(parts[1] >= 20 && parts[0] > parts[1]);
+    close_scene(&s);
+}
+
 static void room_is_for_the_brightest(void **state) {
     (void)state;
     scene s;
@@ -413,6 +449,7 @@ int main(void) {
         cmocka_unit_test(draws_depend_on_names_alone),
         cmocka_unit_test(close_sources_are_one),
         cmocka_unit_test(the_edge_cuts),
+        cmocka_unit_test(long_streaks_are_seen_in_parts),
         cmocka_unit_test(room_is_for_the_brightest),
         cmocka_unit_test(hits_come_at_the_detectors_rate),
     };
