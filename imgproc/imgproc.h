@@ -6,10 +6,10 @@
 #ifndef BST_IMGPROC_IMGPROC_H
 #define BST_IMGPROC_IMGPROC_H
 
-#include "sim/world/motion.h"
 #include "sim/core/messages.h"
 #include "sim/core/module.h"
 #include "sim/world/camera.h"
+#include "sim/world/motion.h"
 
 typedef struct bst_bad_pixel {
     int64_t x, y; /* full-sensor coordinates */
