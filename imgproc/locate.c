@@ -3,12 +3,13 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { CELL_PX = 16, MAX_FIXED = 12, MAX_CHARGE = 64 };
+#include "imgproc/charge.h"
+
+enum { CELL_PX = 16, MAX_FIXED = 12 };
 
 static const double WIDTH_FIT_SNR = 20.0; /* from here the widening is measured */
 static const double MOMENTS_SNR = 10.0;   /* below, extents are the model's own */
 static const double CLOSE_SHARE = 0.8; /* filter outputs closer than this: both shapes are tried */
-static const double LIGHT_SNR = 4.0;   /* beside charge, from here there is a source as well */
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
 
 bst_status bst_locator_create(bst_ctx *ctx, int capacity, int max_width, int max_height,
@@ -97,10 +98,6 @@ static void cell_range(double from, double to, double margin_px, int cells, int 
     *last = hi < 0.0 ? 0 : hi > cells - 1 ? cells - 1 : (int)hi;
 }
 
-static bool is_charge(const bst_found *found) {
-    return found->label == BST_LABEL_HOT_PIXEL || found->label == BST_LABEL_HIT;
-}
-
 static void note_length(bst_locator *l, const bst_shape *s) {
     l->longest_px = fmax(l->longest_px, fmax(0.5 * fabs(s->dx_px) + fabs(s->bend_x_px),
                                              0.5 * fabs(s->dy_px) + fabs(s->bend_y_px)));
@@ -130,7 +127,7 @@ static void gather(bst_locator *l, const bst_locate_frame *f, int i, const bst_s
     for (int c = 0; c < across * (last_row - first_row + 1); c++) {
         int cell = (first_row + c / across) * l->columns + first_column + c % across;
         for (int k = l->cell[cell]; k >= 0; k = l->found[k].next) {
-            if (k == i || l->found[k].dropped || is_charge(&l->found[k])) {
+            if (k == i || l->found[k].dropped || bst_charge_is(&l->found[k])) {
                 continue;
             }
             bst_stamp other =
@@ -257,140 +254,6 @@ static void locate_one(bst_locator *l, const bst_locate_frame *f, int i) {
         l->widening_sum += weight * found->source.widening_px2;
         l->widening_weight += weight;
     }
-}
-
-/* The pixels that are sharper than light about a candidate's maximum, and those that they join. */
-static int find_charge(const bst_locator *l, const bst_locate_frame *f, const bst_found *found,
-                       int at[MAX_CHARGE], double *sharpest) {
-    int reach_px = 1 + (int)f->sigma_px, count = 0;
-    *sharpest = 0.0;
-    for (int round = -1; round < count; round++) {
-        int x = round < 0 ? found->peak_x : at[round] % f->width;
-        int y = round < 0 ? found->peak_y : at[round] / f->width;
-        int r = round < 0 ? reach_px : 1;
-        for (int v = y - r; v <= y + r; v++) {
-            for (int u = x - r; u <= x + r && count < MAX_CHARGE; u++) {
-                double sharp = bst_sharpness_at(&l->sharpness, f->signal, f->width, f->height,
-                                                found->noise_e, u, v);
-                bool known = false;
-                for (int k = 0; k < count && sharp > BST_SHARP_DEVIATION; k++) {
-                    known = known || at[k] == v * f->width + u;
-                }
-                if (sharp > BST_SHARP_DEVIATION && !known) {
-                    at[count++] = v * f->width + u;
-                    *sharpest = fmax(*sharpest, sharp);
-                }
-            }
-        }
-    }
-    return count;
-}
-
-/* What a candidate is when its charge is all there is: centroid and extent of the charge. */
-static void describe_charge(const bst_locate_frame *f, const int *at, int count, double sharpest,
-                            bst_found *found) {
-    double sum = 0.0, square = 0.0, mx = 0.0, my = 0.0, mxx = 0.0, mxy = 0.0, myy = 0.0;
-    for (int k = 0; k < count; k++) {
-        double v = (double)f->signal[at[k]], x = at[k] % f->width - found->peak_x,
-               y = at[k] / f->width - found->peak_y;
-        sum += v;
-        square += v * v;
-        mx += v * x;
-        my += v * y;
-        mxx += v * x * x;
-        mxy += v * x * y;
-        myy += v * y * y;
-    }
-    mx /= sum;
-    my /= sum;
-    mxx = fmax(mxx / sum - mx * mx, 0.0) + 1.0 / 12.0;
-    myy = fmax(myy / sum - my * my, 0.0) + 1.0 / 12.0;
-    mxy = mxy / sum - mx * my;
-    double mean = 0.5 * (mxx + myy), half = hypot(0.5 * (mxx - myy), mxy);
-    found->charge = (bst_charge){.pixels = count,
-                                 .sharpness = sharpest,
-                                 .x_px = found->peak_x + mx,
-                                 .y_px = found->peak_y + my,
-                                 .electrons = sum,
-                                 .snr = sqrt(square) / found->noise_e,
-                                 .length_px = FWHM_PER_SIGMA * sqrt(mean + half),
-                                 .width_px = FWHM_PER_SIGMA * sqrt(fmax(mean - half, 0.0)),
-                                 .angle_rad = half > 1e-9 ? 0.5 * atan2(2.0 * mxy, mxx - myy) : 0};
-}
-
-/* Charge about every candidate, and then off all pixels that hold it: one candidate's must not hide
- * from another. */
-static void remove_charge(bst_locator *l, const bst_locate_frame *f) {
-    l->charged_count = 0;
-    for (int i = 0; i < l->count; i++) {
-        int at[MAX_CHARGE];
-        double sharpest;
-        int count = find_charge(l, f, &l->found[i], at, &sharpest);
-        if (count == 0) {
-            continue;
-        }
-        describe_charge(f, at, count, sharpest, &l->found[i]);
-        for (int k = 0; k < count && l->charged_count < l->charged_capacity; k++) {
-            l->charged[l->charged_count++] = at[k];
-        }
-    }
-    for (int k = 0; k < l->charged_count; k++) {
-        f->signal[l->charged[k]] = BST_PIXEL_BAD;
-    }
-}
-
-/* SNR of what the pixels without charge show of a point (or streak, locally) there. */
-static double light_beside_charge(const bst_locate_frame *f, const bst_found *found) {
-    int r = 1 + (int)ceil(1.5 * f->sigma_px);
-    double sum = 0.0, norm = 0.0, scale = -0.5 / (f->sigma_px * f->sigma_px + 1.0 / 12.0);
-    for (int y = found->peak_y - r; y <= found->peak_y + r; y++) {
-        for (int x = found->peak_x - r; x <= found->peak_x + r; x++) {
-            if (x < 0 || y < 0 || x >= f->width || y >= f->height) {
-                continue;
-            }
-            float v = f->signal[(size_t)y * (size_t)f->width + (size_t)x];
-            if (v > BST_PIXEL_NONE) {
-                double dx = x - found->charge.x_px, dy = y - found->charge.y_px;
-                double w = exp(scale * (dx * dx + dy * dy));
-                sum += w * (double)v;
-                norm += w * w;
-            }
-        }
-    }
-    return norm > 0.0 ? sum / (sqrt(norm) * found->noise_e) : 0.0;
-}
-
-/* Says that a candidate is charge and nothing else. */
-static void take_for_charge(bst_found *found) {
-    const bst_charge *c = &found->charge;
-    found->label = c->pixels == 1 ? BST_LABEL_HOT_PIXEL : BST_LABEL_HIT;
-    /* chance of light: its tail there, against one candidate in a thousand that is charge */
-    double odds = exp(fmin(0.5 * c->sharpness * c->sharpness, 300.0) - 7.0);
-    found->label_probability = odds / (1.0 + odds);
-    found->streak = false;
-    found->flags = 0;
-    found->source.shape.x_px = c->x_px;
-    found->source.shape.y_px = c->y_px;
-    found->source.shape.dx_px = found->source.shape.dy_px = 0.0;
-    found->source.shape.bend_x_px = found->source.shape.bend_y_px = 0.0;
-    found->source.flux_e = c->electrons;
-    found->source.flux_variance = c->pixels * found->noise_e * found->noise_e + c->electrons;
-    found->source.cov_xx = found->source.cov_yy = 1.0 / 12.0;
-    found->source.cov_xy = 0.0;
-    found->snr = c->snr;
-    found->length_px = c->length_px;
-    found->width_px = c->width_px;
-    found->angle_rad = c->angle_rad;
-}
-
-/* Whether the fit to the pixels without charge shows no source: too little light, or light that the
- * PSF does not explain. */
-static bool is_charge_alone(const bst_found *found) {
-    const bst_source *s = &found->source;
-    double snr2 = s->flux_e * s->flux_e / fmax(s->flux_variance, 1e-30);
-    double excess = s->chi_square - s->pixels;
-    return !s->fitted || snr2 < LIGHT_SNR * LIGHT_SNR ||
-           excess > 5.0 * sqrt(2.0 * s->pixels) + 0.1 * snr2;
 }
 
 /* Whether charge was taken off about a candidate: the filters answer to it besides its own place.
@@ -553,7 +416,7 @@ static void drop_doubles(bst_locator *l, const bst_locate_frame *f) {
                 const bst_shape *b = &l->found[k].source.shape;
                 /* numbers are by brightness: the fainter goes */
                 if (k < i && !l->found[k].dropped &&
-                    is_charge(&l->found[k]) == is_charge(&l->found[i]) &&
+                    bst_charge_is(&l->found[k]) == bst_charge_is(&l->found[i]) &&
                     hypot(a->x_px - b->x_px, a->y_px - b->y_px) < radius) {
                     l->found[i].dropped = true;
                 }
@@ -574,16 +437,16 @@ void bst_locate(bst_locator *l, const bst_locate_frame *f, const bst_candidates 
     l->widening_sum = 0.0;
     l->widening_weight = 1.0 / (0.0025 * variance * variance); /* no widening, to 5 % */
     bst_sharpness_set(&l->sharpness, &l->psf, f->sigma_px);
-    remove_charge(l, f);
+    bst_charge_remove(l, f);
     for (int i = 0; i < l->count; i++) {
         bst_found *found = &l->found[i];
-        if (found->charge.pixels > 0 && light_beside_charge(f, found) < LIGHT_SNR) {
-            take_for_charge(found);
+        if (found->charge.pixels > 0 && bst_charge_light_beside(f, found) < BST_CHARGE_LIGHT_SNR) {
+            bst_charge_take(found);
             continue;
         }
         locate_one(l, f, i);
-        if (found->charge.pixels > 0 && is_charge_alone(found)) {
-            take_for_charge(found);
+        if (found->charge.pixels > 0 && bst_charge_is_alone(found)) {
+            bst_charge_take(found);
         }
     }
     drop_doubles(l, f);
@@ -598,14 +461,14 @@ void bst_locate(bst_locator *l, const bst_locate_frame *f, const bst_candidates 
     }
     for (int i = 0; i < l->count; i++) {
         bst_found *found = &l->found[i];
-        if (found->dropped || is_charge(found)) {
+        if (found->dropped || bst_charge_is(found)) {
             continue;
         }
         if (!found->source.fitted) {
             use_maximum(f, found);
         }
         found->snr = found->source.flux_e * shape_norm(f, found->streak) / found->noise_e;
-        if (found->snr < LIGHT_SNR && is_charge_near(l, f, found)) {
+        if (found->snr < BST_CHARGE_LIGHT_SNR && is_charge_near(l, f, found)) {
             found->dropped = true;
             continue;
         }
