@@ -105,7 +105,7 @@ void bst_generator_hits(bst_generator *g) {
         double hottest = charge / fmax(length, 1.0) / g->noise_e;
         bool stands_out = hottest > HOT_SHARE * peak + HOT_SIGMA;
         if (stands_out && uniform(g, draw + 7) < g->calibration.hit_told_probability) {
-            d->label = BST_LABEL_ARTEFACT;
+            d->label = BST_LABEL_HIT;
         }
         if (length > 1.5 * d->width_px / g->binning) {
             d->length_px = g->binning * length;

@@ -111,7 +111,7 @@ bst_status bst_obsgen_identify(bst_ctx *ctx, const bst_identify_options *o,
             BST_TRY(off_px(ctx, o, t, &t->items[generated[i].item], &off));
         }
         double tolerance = fmin(o->match_tolerance_px, 4.0 * sqrt(d->cov_xx + d->cov_yy + 0.0625));
-        if (off < tolerance && d->label != BST_LABEL_ARTEFACT &&
+        if (off < tolerance && d->label == BST_LABEL_UNKNOWN &&
             consistent(d, t->items[generated[i].item].v_mag)) {
             d->star_id = t->items[generated[i].item].id;
             d->label = BST_LABEL_STAR;
@@ -139,14 +139,13 @@ bst_status bst_obsgen_identify(bst_ctx *ctx, const bst_identify_options *o,
 void bst_obsgen_label(bst_detection *items, int count, bool found_stars, double streak_px) {
     for (int i = 0; i < count; i++) {
         bst_detection *d = &items[i];
-        if (d->label != BST_LABEL_UNKNOWN) {
-            continue;
-        }
+        bool unknown = d->label == BST_LABEL_UNKNOWN;
         bool moved_as_stars = streak_px >= 3.0 && (d->flags & BST_DETECTION_STREAK);
-        if (d->flags & BST_DETECTION_EDGE) {
+        if (unknown && (d->flags & BST_DETECTION_EDGE)) {
             d->label = BST_LABEL_ARTEFACT;
-        } else if (!moved_as_stars && (found_stars || streak_px >= 3.0)) {
+        } else if (unknown && !moved_as_stars && (found_stars || streak_px >= 3.0)) {
             d->label = BST_LABEL_OBJECT;
         }
+        d->label_probability = d->label == BST_LABEL_UNKNOWN ? 0.0 : 1.0;
     }
 }

@@ -26,7 +26,7 @@ bst_status bst_obsgen_identify(bst_ctx *ctx, const bst_identify_options *options
                                bst_detection *items, int count, int *identified) BST_MUST_CHECK;
 
 /* Labels the rest: cut by the frame's edge: artefact; what is no star, where stars were found or
- * streak, object, unless it moved as stars do. */
+ * streak, object, unless it moved as stars do. Every label is told as certain. */
 void bst_obsgen_label(bst_detection *items, int count, bool found_stars, double streak_px);
 
 #endif

@@ -185,7 +185,7 @@ static bst_status add_alarms(bst_ctx *ctx, bst_calibrator *c, const bst_truth *t
         double T = detections->threshold_snr;
         if (truth->hits > 0 && d->snr > 1.5 * T) {
             c->hits++;
-            c->hits_told += d->label == BST_LABEL_ARTEFACT;
+            c->hits_told += d->label == BST_LABEL_HIT || d->label == BST_LABEL_HOT_PIXEL;
             continue;
         }
         BST_TRY(grow(ctx, (void **)&c->alarm_energy, c->alarm_count, &c->alarm_room,

@@ -427,7 +427,7 @@ static void hits_come_at_the_detectors_rate(void **state) {
         bst_generator_result r = run(&s, f);
         for (int i = 0; i < r.count; i++) {
             assert_true(r.items[i].hit && r.items[i].item == -1);
-            told += r.items[i].detection.label == BST_LABEL_ARTEFACT;
+            told += r.items[i].detection.label == BST_LABEL_HIT;
         }
         seen += r.count;
     }
