@@ -1,0 +1,154 @@
+#include "imgproc/streak_search.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "imgproc/heapsort.h"
+#include "sim/core/vec.h"
+
+/* Lines of the bank this much below the threshold are followed up: what the bank's steps cost. */
+static const double MARGIN_SNR = 0.8;
+/* By which a streak's squared SNR is to exceed that of the best point on it. */
+static const double NOT_A_POINT = 8.0;
+
+bst_status bst_streak_search_create(bst_ctx *ctx, int max_width, int max_height, double max_px,
+                                    int threads, bst_streak_search *out) {
+    *out = (bst_streak_search){.max_px = max_px};
+    bst_status status = bst_parallel_create(ctx, threads, &out->pool);
+    if (status == BST_OK) {
+        status = bst_streak_map_create(ctx, max_width, max_height, &out->map);
+    }
+    if (status == BST_OK) {
+        status = bst_streak_bank_create(ctx, max_width, max_height, max_px,
+                                        bst_parallel_threads(out->pool), &out->bank);
+    }
+    if (status == BST_OK) {
+        out->order = calloc((size_t)bst_streak_bank_capacity(&out->bank), sizeof *out->order);
+        out->chosen = calloc(BST_STREAK_MAX_CANDIDATES, sizeof *out->chosen);
+        out->lines = calloc(BST_STREAK_MAX_CANDIDATES, sizeof *out->lines);
+        if (!out->order || !out->chosen || !out->lines) {
+            status = bst_fail(ctx, BST_ERR_MEMORY, "no memory for the candidates of streaks");
+        }
+    }
+    if (status != BST_OK) {
+        bst_streak_search_free(out);
+    }
+    return status;
+}
+
+void bst_streak_search_free(bst_streak_search *s) {
+    bst_parallel_free(s->pool);
+    bst_streak_map_free(&s->map);
+    bst_streak_bank_free(&s->bank);
+    free(s->order);
+    free(s->chosen);
+    free(s->lines);
+    *s = (bst_streak_search){0};
+}
+
+double bst_streak_threshold(double false_alarms, double pixels, double sigma_px, double max_px) {
+    double sigma2 = sigma_px * sigma_px + 1.0 / 12.0;
+    double density = BST_PI * max_px / (4.0 * sqrt(12.0 * BST_PI) * sigma2 * sqrt(sigma2));
+    double lo = 3.0, hi = 12.0;
+    for (int i = 0; i < 40; i++) {
+        double u = 0.5 * (lo + hi);
+        double rate = density * u * u * u * exp(-0.5 * u * u) / pow(2.0 * BST_PI, 2.5);
+        if (rate * pixels > false_alarms) {
+            lo = u;
+        } else {
+            hi = u;
+        }
+    }
+    return 0.5 * (lo + hi);
+}
+
+static bool stronger_hit(const void *context, int a, int b) {
+    const bst_streak_hit *h = context;
+    return h[a].snr > h[b].snr || (h[a].snr == h[b].snr && a < b);
+}
+
+static bool stronger_line(const void *context, int a, int b) {
+    const bst_streak_line *l = context;
+    return l[a].snr > l[b].snr || (l[a].snr == l[b].snr && a < b);
+}
+
+/* Whether hit b says of the same light what the stronger hit a says. */
+static bool same(const bst_streak_hit *a, const bst_streak_hit *b) {
+    float ax = a->x1 - a->x0, ay = a->y1 - a->y0, length = sqrtf(ax * ax + ay * ay);
+    float mx = 0.5f * (b->x0 + b->x1 - a->x0 - a->x1), my = 0.5f * (b->y0 + b->y1 - a->y0 - a->y1);
+    float along = (mx * ax + my * ay) / length, across = (my * ax - mx * ay) / length;
+    if (fabsf(across) > 3.0f || fabsf(along) > 0.5f * length + 2.0f) {
+        return false;
+    }
+    float bx = b->x1 - b->x0, by = b->y1 - b->y0, other = sqrtf(bx * bx + by * by);
+    float turn = fabsf(ax * by - ay * bx) / (length * other);
+    return turn * 0.5f * fminf(length, other) < 3.0f;
+}
+
+static void refine_all(void *user, int begin, int end) {
+    const bst_streak_search *s = user;
+    for (int i = begin; i < end; i++) {
+        bst_streak_refine(&s->map, &s->chosen[i], s->max_px, &s->lines[i]);
+    }
+}
+
+/* One of each group of hits; in order of falling SNR. */
+static int choose(bst_streak_search *s, int hits) {
+    for (int i = 0; i < hits; i++) {
+        s->order[i] = i;
+    }
+    bst_heapsort_indices(s->order, hits, stronger_hit, s->bank.hits);
+    int count = 0;
+    for (int i = 0; i < hits && count < BST_STREAK_MAX_CANDIDATES; i++) {
+        const bst_streak_hit *hit = &s->bank.hits[s->order[i]];
+        bool known = false;
+        for (int k = 0; k < count && !known; k++) {
+            known = same(&s->chosen[k], hit);
+        }
+        if (!known) {
+            s->chosen[count++] = *hit;
+        }
+    }
+    return count;
+}
+
+static bool counts(const bst_streak_search *s, const bst_streak_line *l) {
+    return l->snr > s->threshold_snr && l->snr * l->snr > l->point_snr * l->point_snr + NOT_A_POINT;
+}
+
+int bst_streak_search_run(bst_streak_search *s, const float *signal, int width, int height,
+                          const bst_background *background, double sigma_px,
+                          const bst_streak_disc *discs, int disc_count, double false_alarms) {
+    s->threshold_snr =
+        bst_streak_threshold(false_alarms, (double)width * (double)height, sigma_px, s->max_px);
+    bst_streak_map_fill(&s->map, s->pool, signal, width, height, background, sigma_px);
+    for (int i = 0; i < disc_count; i++) {
+        bst_streak_map_blank_disc(&s->map, discs[i].x_px, discs[i].y_px, discs[i].radius_px);
+    }
+    bst_streak_map_turn(&s->map, s->pool);
+    int hits = bst_streak_bank_run(&s->bank, s->pool, &s->map, s->threshold_snr - MARGIN_SNR);
+    s->candidates = choose(s, hits);
+    bst_parallel_for(s->pool, s->candidates, 4, refine_all, s);
+    int kept = 0;
+    for (int i = 0; i < s->candidates; i++) {
+        if (counts(s, &s->lines[i])) {
+            s->order[kept++] = i;
+        }
+    }
+    bst_heapsort_indices(s->order, kept, stronger_line, s->lines);
+    int found = 0;
+    for (int i = 0; i < kept && found < BST_STREAK_MAX_FOUND; i++) {
+        bst_streak_line *line = &s->lines[s->order[i]];
+        if (found > 0) {
+            /* without the light that is taken already */
+            bst_streak_refine(&s->map, &s->chosen[s->order[i]], s->max_px, line);
+            if (!counts(s, line)) {
+                continue;
+            }
+        }
+        s->found[found++] = *line;
+        double wide = 3.5 * hypot(s->map.sigma_px, s->map.sigma_px);
+        bst_streak_map_blank_line(&s->map, line->x0, line->y0, line->x1, line->y1, wide);
+    }
+    return found;
+}
