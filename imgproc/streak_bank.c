@@ -214,6 +214,7 @@ static bool best_window(int16_t *restrict out, int count, const int16_t *const *
 typedef struct run_job {
     bst_streak_bank *bank;
     const bst_streak_map *map;
+    int first_octave;
     double threshold;
     int tiles[2], columns[2]; /* of each plane */
     atomic_int next;
@@ -386,7 +387,7 @@ static void run_tiles(void *user, int begin, int end) {
             t.hits = bank->hits + (size_t)n * TILE_HITS;
             t.count = &bank->hit_count[n];
             *t.count = 0;
-            for (int o = 0; o < bank->octaves; o++) {
+            for (int o = job->first_octave; o < bank->octaves; o++) {
                 run_octave(&t, o);
             }
         }
@@ -394,11 +395,11 @@ static void run_tiles(void *user, int begin, int end) {
 }
 
 int bst_streak_bank_run(bst_streak_bank *bank, bst_parallel *pool, const bst_streak_map *map,
-                        double threshold) {
+                        int first_octave, double threshold) {
     if (map->sigma_px != bank->sigma_px) {
         set_scales(bank, map);
     }
-    run_job job = {.bank = bank, .map = map, .threshold = threshold};
+    run_job job = {.bank = bank, .map = map, .first_octave = first_octave, .threshold = threshold};
     for (int plane = 0; plane < 2; plane++) {
         int width = plane ? map->height : map->width, height = plane ? map->width : map->height;
         job.columns[plane] = (width + TILE_COLUMNS - 1) / TILE_COLUMNS;

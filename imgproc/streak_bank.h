@@ -34,7 +34,8 @@ void bst_streak_bank_free(bst_streak_bank *bank);
 /* The most hits that a frame can give. */
 int bst_streak_bank_capacity(const bst_streak_bank *bank);
 
-/* Sums the map along lines and keeps those whose SNR exceeds `threshold`.
+/* Sums the map along lines of the octaves from first_octave on and keeps those whose SNR exceeds
+ * `threshold`.
  *
  * Rows are summed by the partial sums of the fast Radon transform (Brady, SIAM J. Comput. 27, 107,
  * 1998; Nir, Zackay and Ofek, Astron. J. 156, 229, 2018): short pieces of a line serve all the
@@ -44,6 +45,6 @@ int bst_streak_bank_capacity(const bst_streak_bank *bank);
  * Returns the number of hits and packs them into bank->hits, in an order that does not depend on
  * the threads. */
 int bst_streak_bank_run(bst_streak_bank *bank, bst_parallel *pool, const bst_streak_map *map,
-                        double threshold);
+                        int first_octave, double threshold);
 
 #endif

@@ -38,11 +38,9 @@ void bst_streak_map_free(bst_streak_map *map);
  * background.h): what holds no measurement counts as background. sigma_px: of the PSF. */
 void bst_streak_map_fill(bst_streak_map *map, bst_parallel *pool, const float *signal, int width,
                          int height, const bst_background *background, double sigma_px);
-/* Sets a disc of the first plane to zero. */
-void bst_streak_map_blank_disc(bst_streak_map *map, double x_px, double y_px, double radius_px);
-/* The same along a line, in both planes. */
-void bst_streak_map_blank_line(bst_streak_map *map, double x0, double y0, double x1, double y1,
-                               double radius_px);
+/* Sets the first plane to zero within radius_px of a segment. */
+void bst_streak_map_blank(bst_streak_map *map, double x0, double y0, double x1, double y1,
+                          double radius_px);
 /* Makes the second plane from the first. */
 void bst_streak_map_turn(bst_streak_map *map, bst_parallel *pool);
 

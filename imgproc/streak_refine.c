@@ -7,6 +7,7 @@ enum { MOST = BST_STREAK_MAX_ROWS + 96, MOST_LAGS = 2 * 24 };
 
 /* Standard deviations by which a sample may exceed the path's mean. */
 static const double CLIP_SIGMA = 2.5;
+static const double LIT_SHARE = 0.35;
 
 /* A straight path in a plane: column s0 at row t0, s1 at row t1 (centres of rows). */
 typedef struct path {
@@ -135,7 +136,32 @@ static bool improve(const bst_streak_map *map, int plane, double step, int steps
     return better;
 }
 
-/* SNR with outstanding samples cut down, and the greatest pixel nearby. */
+/* SNR of the two brightest points on the path that are apart. */
+static void two_points(const bst_streak_map *map, int plane, const path *p, double out[2]) {
+    const int16_t *pixels = bst_streak_map_plane(map, plane);
+    double slope = p->t1 > p->t0 ? (p->s1 - p->s0) / (p->t1 - p->t0) : 0.0;
+    int row_best[MOST] = {0}, count = p->e1 - p->e0 + 1, first = 0;
+    for (int i = 0; i < count; i++) {
+        const int16_t *row = pixels + (long)(p->e0 + i) * map->stride[plane];
+        int s = (int)floor(p->s0 + slope * (p->e0 + i - p->t0) + 0.5);
+        row_best[i] = 0;
+        for (int x = s - 1; x <= s + 1; x++) {
+            row_best[i] = row[x] > row_best[i] ? row[x] : row_best[i];
+        }
+        first = row_best[i] > row_best[first] ? i : first;
+    }
+    double apart = 3.5 * map->sigma_px / sqrt(1.0 + slope * slope);
+    int second = 0;
+    for (int i = 0; i < count; i++) {
+        if (fabs((double)(i - first)) >= apart && row_best[i] > second) {
+            second = row_best[i];
+        }
+    }
+    out[0] = (double)row_best[first] / BST_STREAK_QUANTA;
+    out[1] = (double)second / BST_STREAK_QUANTA;
+}
+
+/* SNR with outstanding samples cut down, and how evenly the path is lit. */
 static void judge(const bst_streak_map *map, int plane, const path *p, profile *work,
                   bst_streak_line *out) {
     int n = p->e1 - p->e0 + 1;
@@ -145,17 +171,12 @@ static void judge(const bst_streak_map *map, int plane, const path *p, profile *
         sum += fmin((double)work->value[i], top);
     }
     out->snr = sum * (double)work->scale[n];
-    const int16_t *pixels = bst_streak_map_plane(map, plane);
-    int greatest = 0;
-    double slope = p->t1 > p->t0 ? (p->s1 - p->s0) / (p->t1 - p->t0) : 0.0;
-    for (int t = p->e0; t <= p->e1; t++) {
-        const int16_t *row = pixels + (long)t * map->stride[plane];
-        int s = (int)floor(p->s0 + slope * (t - p->t0) + 0.5);
-        for (int x = s - 1; x <= s + 1; x++) {
-            greatest = row[x] > greatest ? row[x] : greatest;
-        }
+    two_points(map, plane, p, out->point_snr);
+    int lit = 0;
+    for (int i = 0; i < n; i++) {
+        lit += (double)work->value[i] > LIT_SHARE * sum / n;
     }
-    out->point_snr = (double)greatest / BST_STREAK_QUANTA;
+    out->filled = (double)lit / n;
 }
 
 void bst_streak_refine(const bst_streak_map *map, const bst_streak_hit *hit, double max_px,

@@ -8,7 +8,8 @@ typedef struct bst_streak_line {
     double x0, y0, x1, y1; /* ends of the path, frame px */
     double snr;            /* of the sum along it; single bright pixels count only as what the rest
                               of the path leads to expect */
-    double point_snr;      /* the map's greatest value on it */
+    double point_snr[2];   /* of the two brightest points on it */
+    double filled;         /* share of its rows that are brighter than 0.35 of their mean */
 } bst_streak_line;
 
 /* Moves the ends across and along until the SNR of the sum between them is greatest: steps of 1/4

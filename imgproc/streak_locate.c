@@ -1,0 +1,293 @@
+#include "imgproc/streak_locate.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/core/messages.h"
+#include "sim/core/vec.h"
+
+static const double FWHM_PER_SIGMA = 2.3548200450309493;
+/* A point this many times brighter than the streak under it is a source of its own. */
+enum { MOST_PIECES = 64 };
+/* From here a source is a point unless it covers that much more than a point's pixels. */
+static const double BRIGHT_POINT_SNR = 12.0, AREA_SHARE = 1.6, AREA_PIXELS = 10.0;
+static const double OWN_LIGHT = 3.0, OWN_LIGHT_SNR = 6.0, LOST_SNR = 1.5;
+
+bst_status bst_streak_locator_create(bst_ctx *ctx, const bst_psf *psf, int max_width,
+                                     int max_height, double fwhm_px, double max_px,
+                                     bst_streak_locator *out) {
+    *out = (bst_streak_locator){0};
+    int side = (int)ceil(1.25 * max_px + 6.0 * fwhm_px) + 14;
+    side = side < BST_PSF_MAX_SIDE ? side : BST_PSF_MAX_SIDE;
+    bst_status status =
+        bst_streak_search_create(ctx, max_width, max_height, max_px, 0, &out->search);
+    if (status == BST_OK) {
+        status = bst_streak_fit_create(ctx, psf, side, &out->fit);
+    }
+    if (status == BST_OK) {
+        out->excluded = calloc((size_t)side * (size_t)side, 1);
+        out->pieces = calloc(MOST_PIECES, sizeof *out->pieces);
+        if (!out->excluded || !out->pieces) {
+            status = bst_fail(ctx, BST_ERR_MEMORY, "no memory for a stamp of %d px", side);
+        }
+    }
+    if (status != BST_OK) {
+        bst_streak_locator_free(out);
+    }
+    return status;
+}
+
+void bst_streak_locator_free(bst_streak_locator *l) {
+    bst_streak_search_free(&l->search);
+    bst_streak_fit_free(&l->fit);
+    free(l->excluded);
+    free(l->pieces);
+    *l = (bst_streak_locator){0};
+}
+
+/* Where the filtered image of a point of this SNR falls below half a standard deviation, and a
+ * little more for a PSF that is not quite the one known. */
+static double disc_radius(double snr, double sigma_px) {
+    return 2.3 * sigma_px * sqrt(log(2.0 * fmax(snr, 2.0))) + 0.5;
+}
+
+/* Distance from the line and place along it, 0 to 1. */
+static double across(const bst_streak_line *line, double x, double y, double *along) {
+    double ux = line->x1 - line->x0, uy = line->y1 - line->y0;
+    double length = fmax(hypot(ux, uy), 1e-6);
+    double px = x - line->x0, py = y - line->y0;
+    *along = (px * ux + py * uy) / (length * length);
+    return fabs(px * uy - py * ux) / length;
+}
+
+/* Drops the points that are pieces of the line, each of SNR piece_snr at most but for chance;
+ * returns how many, and marks them by `pieces`. */
+static int drop_pieces(bst_streak_locator *l, bst_locator *found, int count,
+                       const bst_streak_line *line, double sigma_px, double piece_snr) {
+    double length = hypot(line->x1 - line->x0, line->y1 - line->y0);
+    int pieces = 0;
+    for (int i = 0; i < count && pieces < MOST_PIECES; i++) {
+        bst_found *f = &found->found[i];
+        double along, distance = across(line, f->source.shape.x_px, f->source.shape.y_px, &along);
+        double beyond = fmax(-along, along - 1.0) * length;
+        bool inside = distance < 3.0 * sigma_px + 0.5 && beyond < 3.0 * sigma_px;
+        bool own = !f->streak && f->snr > OWN_LIGHT * piece_snr + OWN_LIGHT_SNR;
+        if (inside && !own && !f->dropped) {
+            f->dropped = true;
+            l->pieces[pieces++] = i;
+        }
+    }
+    return pieces;
+}
+
+/* Leaves out pixels with the light of other sources. */
+static void exclude(bst_streak_locator *l, const bst_locate_frame *f, const bst_locator *found,
+                    int count, const bst_stamp *stamp) {
+    memset(l->excluded, 0, (size_t)stamp->width * (size_t)stamp->height);
+    for (int i = 0; i < count; i++) {
+        const bst_found *o = &found->found[i];
+        double x = o->source.shape.x_px - stamp->x0, y = o->source.shape.y_px - stamp->y0;
+        double radius = disc_radius(o->snr, f->sigma_px);
+        if (o->dropped || x < -radius || y < -radius || x > stamp->width + radius ||
+            y > stamp->height + radius) {
+            continue;
+        }
+        int top = (int)fmax(ceil(y - radius), 0.0);
+        int bottom = (int)fmin(floor(y + radius), stamp->height - 1.0);
+        int left = (int)fmax(ceil(x - radius), 0.0);
+        int right = (int)fmin(floor(x + radius), stamp->width - 1.0);
+        for (int v = top; v <= bottom; v++) {
+            for (int u = left; u <= right; u++) {
+                if (hypot(u - x, v - y) <= radius) {
+                    l->excluded[v * stamp->width + u] = 1;
+                }
+            }
+        }
+    }
+}
+
+static bool at_edge(const bst_locate_frame *f, const bst_shape *s) {
+    double x = 0.5 * fabs(s->dx_px) + 2.0 * f->sigma_px;
+    double y = 0.5 * fabs(s->dy_px) + 2.0 * f->sigma_px;
+    return s->x_px - x < -0.5 || s->y_px - y < -0.5 || s->x_px + x > f->width - 0.5 ||
+           s->y_px + y > f->height - 0.5;
+}
+
+/* What a line whose fit fails is worth: across it as a point of its SNR, along it a third of its
+ * length. */
+static void claim_line(const bst_locate_frame *f, const bst_streak_line *line, bst_found *out) {
+    bst_source *s = &out->source;
+    double length = hypot(s->shape.dx_px, s->shape.dy_px);
+    double c = s->shape.dx_px / length, d = s->shape.dy_px / length;
+    double across2 = 2.0 * f->sigma_px * f->sigma_px / (line->snr * line->snr) + 0.04;
+    double along2 = length * length / 9.0;
+    s->cov_xx = along2 * c * c + across2 * d * d;
+    s->cov_xy = (along2 - across2) * c * d;
+    s->cov_yy = along2 * d * d + across2 * c * c;
+    s->flux_variance = s->flux_e * s->flux_e / (line->snr * line->snr);
+}
+
+/* The source that a line tells of; false when the fit fails and the line itself is all there is. */
+static bool measure(bst_streak_locator *l, const bst_locate_frame *f, const bst_locator *found,
+                    int count, const bst_streak_line *line, bst_found *out, bst_stamp *stamp) {
+    *out = (bst_found){.peak_snr = (float)line->snr, .streak = true};
+    bst_source *s = &out->source;
+    s->shape = (bst_shape){.x_px = 0.5 * (line->x0 + line->x1),
+                           .y_px = 0.5 * (line->y0 + line->y1),
+                           .dx_px = line->x1 - line->x0,
+                           .dy_px = line->y1 - line->y0,
+                           .sigma_px = f->sigma_px};
+    s->widening_px2 =
+        found->widening_weight > 0.0 ? found->widening_sum / found->widening_weight : 0.0;
+    out->noise_e = bst_background_noise_at(f->background, s->shape.x_px, s->shape.y_px);
+    double length = hypot(s->shape.dx_px, s->shape.dy_px);
+    /* norm of a streak that is long against the PSF: 1 / sqrt(2 sqrt(pi) sigma length) */
+    double norm = 1.0 / sqrt(2.0 * sqrt(BST_PI) * f->sigma_px * (length + 2.0));
+    s->flux_e = line->snr * out->noise_e / norm;
+    double reach = fmax(3.0, ceil(3.6 * f->sigma_px)) + 0.1 * length;
+    *stamp = bst_fit_stamp(s, reach, l->fit.max_side, f->width, f->height);
+    bst_fit_data data = {f->signal, f->width, f->height, out->noise_e};
+    exclude(l, f, found, count, stamp);
+    bool fitted = bst_streak_fit_run(&l->fit, &data, stamp, l->excluded, s, &norm);
+    if (!fitted) {
+        claim_line(f, line, out);
+    }
+    out->peak_x = (int)floor(s->shape.x_px + 0.5);
+    out->peak_y = (int)floor(s->shape.y_px + 0.5);
+    out->snr = s->flux_e * norm / out->noise_e;
+    double path = hypot(s->shape.dx_px, s->shape.dy_px);
+    double variance = f->sigma_px * f->sigma_px;
+    out->length_px = FWHM_PER_SIGMA * sqrt(path * path / 12.0 + variance);
+    out->width_px = FWHM_PER_SIGMA * f->sigma_px;
+    double angle = atan2(s->shape.dy_px, s->shape.dx_px);
+    out->angle_rad = angle > 0.5 * BST_PI     ? angle - BST_PI
+                     : angle <= -0.5 * BST_PI ? angle + BST_PI
+                                              : angle;
+    out->flags = BST_DETECTION_STREAK;
+    if (at_edge(f, &s->shape)) {
+        out->flags |= BST_DETECTION_EDGE;
+    }
+    return fitted;
+}
+
+/* Chi-square of the dropped pieces as sources of their own, on the stamp of the latest fit. */
+static double chi_of_pieces(bst_streak_locator *l, const bst_locate_frame *f,
+                            const bst_locator *found, int pieces, const bst_stamp *stamp,
+                            double noise) {
+    size_t n = (size_t)stamp->width * (size_t)stamp->height;
+    double *total = l->fit.image, *share = total + n, chi = 0.0;
+    memset(total, 0, n * sizeof(double));
+    for (int i = 0; i < pieces; i++) {
+        const bst_source *s = &found->found[l->pieces[i]].source;
+        bst_psf_render(l->fit.psf, &s->shape, stamp, share, share + n, share + 2 * n,
+                       share + 3 * n);
+        for (size_t k = 0; k < n; k++) {
+            total[k] += s->flux_e * (share[k] + s->widening_px2 * share[k + 3 * n]);
+        }
+    }
+    for (int j = 0; j < stamp->height; j++) {
+        const float *row =
+            f->signal + (size_t)(stamp->y0 + j) * (size_t)f->width + (size_t)stamp->x0;
+        for (int i = 0; i < stamp->width; i++) {
+            size_t k = (size_t)j * (size_t)stamp->width + (size_t)i;
+            if (!l->excluded[k] && row[i] > BST_PIXEL_NONE) {
+                double r = (double)row[i] - total[k];
+                chi += r * r / (noise * noise + fmax(total[k], 0.0));
+            }
+        }
+    }
+    return chi;
+}
+
+/* SNR of the two brightest points on the line together; in the map they are cut down. */
+static double snr_of_points(const bst_streak_locator *l, const bst_locator *found, int pieces,
+                            const bst_streak_line *line) {
+    double first = line->point_snr[0], second = line->point_snr[1];
+    for (int i = 0; i < pieces; i++) {
+        const bst_found *f = &found->found[l->pieces[i]];
+        double snr = f->streak ? 0.0 : f->snr;
+        if (snr > first) {
+            second = i > 0 ? first : second;
+            first = snr;
+        } else if (snr > second) {
+            second = snr;
+        }
+    }
+    return hypot(first, second);
+}
+
+static void add(bst_streak_locator *l, const bst_locate_frame *f, bst_locator *found, int points,
+                int lines) {
+    for (int i = 0; i < lines && found->count < found->capacity; i++) {
+        const bst_streak_line *line = &l->search.found[i];
+        double length = hypot(line->x1 - line->x0, line->y1 - line->y0);
+        double piece = line->snr * sqrt(3.5 * f->sigma_px / (length + 3.5 * f->sigma_px));
+        int pieces = drop_pieces(l, found, points, line, f->sigma_px, piece);
+        bst_found streak;
+        bst_stamp stamp;
+        bool good = measure(l, f, found, points, line, &streak, &stamp);
+        bool fitted = good;
+        /* a line that owes its SNR to light of others keeps little of it without that */
+        good = fitted ? streak.snr > line->snr - LOST_SNR : pieces == 0;
+        if (good && pieces > 0) {
+            /* points have three parameters, streaks five */
+            int parameters = 0;
+            for (int k = 0; k < pieces; k++) {
+                parameters += found->found[l->pieces[k]].streak ? 5 : 3;
+            }
+            double chi = chi_of_pieces(l, f, found, pieces, &stamp, streak.noise_e);
+            good = streak.snr > snr_of_points(l, found, pieces, line) &&
+                   streak.source.chi_square + 5.0 <= chi + parameters;
+        }
+        for (int k = 0; k < pieces; k++) {
+            found->found[l->pieces[k]].dropped = good;
+        }
+        if (good) {
+            found->found[found->count++] = streak;
+        }
+    }
+}
+
+static void blank_point(bst_streak_locator *l, double x, double y, double snr, double sigma,
+                        double widen) {
+    bst_streak_map_blank(&l->search.map, x, y, x, y, widen * disc_radius(snr, sigma));
+}
+
+/* Whether a source is too bright for a piece of a streak of that many pixels: filtered, a point is
+ * above a threshold t on 4 pi sigma^2 ln(snr / t) pixels. */
+static bool is_bright_point(const bst_found *o, const bst_candidate *c, double threshold,
+                            double sigma_px) {
+    double snr = (double)o->peak_snr;
+    double area = 4.0 * BST_PI * sigma_px * sigma_px * log(fmax(snr / threshold, 1.0));
+    return !o->streak && !(o->flags & BST_DETECTION_BLEND) && snr > BRIGHT_POINT_SNR &&
+           c->pixels < AREA_SHARE * area + AREA_PIXELS;
+}
+
+void bst_streak_locate(bst_streak_locator *l, const bst_locate_frame *f,
+                       const bst_candidates *candidates, double false_alarms, bst_locator *found) {
+    int points = found->count;
+    bst_streak_search_fill(&l->search, f->signal, f->width, f->height, f->background, f->sigma_px);
+    double least = points > 0 ? (double)found->found[points - 1].peak_snr : 0.0;
+    for (int i = 0; i < points; i++) {
+        const bst_found *o = &found->found[i];
+        bool saturated = o->flags & BST_DETECTION_SATURATED;
+        if (saturated ||
+            is_bright_point(o, &candidates->items[candidates->order[i]], least, f->sigma_px)) {
+            blank_point(l, o->source.shape.x_px, o->source.shape.y_px, o->snr, f->sigma_px,
+                        saturated ? 1.5 : 1.0);
+        }
+    }
+    add(l, f, found, points, bst_streak_search_bright(&l->search));
+    for (int i = 0; i < points; i++) {
+        const bst_found *o = &found->found[i];
+        if (!o->dropped) {
+            blank_point(l, o->source.shape.x_px, o->source.shape.y_px, o->snr, f->sigma_px, 1.0);
+        }
+    }
+    for (int i = points; i < candidates->count; i++) {
+        const bst_candidate *c = &candidates->items[candidates->order[i]];
+        blank_point(l, c->x, c->y, (double)c->snr, f->sigma_px, 1.0);
+    }
+    add(l, f, found, points, bst_streak_search_faint(&l->search, false_alarms));
+}
