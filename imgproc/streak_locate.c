@@ -61,17 +61,18 @@ static double across(const bst_streak_line *line, double x, double y, double *al
     return fabs(px * uy - py * ux) / length;
 }
 
-/* Drops the points that are pieces of the line, each of SNR piece_snr at most but for chance;
- * returns how many, and marks them by `pieces`. */
+/* Drops the points that are pieces of the line, each of SNR piece_snr at most but for chance, up to
+ * beyond_px past its ends; returns how many, and marks them by `pieces`. */
 static int drop_pieces(bst_streak_locator *l, bst_locator *found, int count,
-                       const bst_streak_line *line, double sigma_px, double piece_snr) {
+                       const bst_streak_line *line, double sigma_px, double piece_snr,
+                       double beyond_px) {
     double length = hypot(line->x1 - line->x0, line->y1 - line->y0);
     int pieces = 0;
     for (int i = 0; i < count && pieces < MOST_PIECES; i++) {
         bst_found *f = &found->found[i];
         double along, distance = across(line, f->source.shape.x_px, f->source.shape.y_px, &along);
         double beyond = fmax(-along, along - 1.0) * length;
-        bool inside = distance < 3.0 * sigma_px + 0.5 && beyond < 3.0 * sigma_px;
+        bool inside = distance < 3.0 * sigma_px + 0.5 && beyond < beyond_px;
         bool own = !f->streak && f->snr > OWN_LIGHT * piece_snr + OWN_LIGHT_SNR;
         if (inside && !own && !f->dropped) {
             f->dropped = true;
@@ -130,7 +131,8 @@ static void claim_line(const bst_locate_frame *f, const bst_streak_line *line, b
 
 /* The source that a line tells of; false when the fit fails and the line itself is all there is. */
 static bool measure(bst_streak_locator *l, const bst_locate_frame *f, const bst_locator *found,
-                    int count, const bst_streak_line *line, bst_found *out, bst_stamp *stamp) {
+                    int count, const bst_streak_line *line, double beyond_px, bst_found *out,
+                    bst_stamp *stamp) {
     *out = (bst_found){.peak_snr = (float)line->snr, .streak = true};
     bst_source *s = &out->source;
     s->shape = (bst_shape){.x_px = 0.5 * (line->x0 + line->x1),
@@ -145,7 +147,7 @@ static bool measure(bst_streak_locator *l, const bst_locate_frame *f, const bst_
     /* norm of a streak that is long against the PSF: 1 / sqrt(2 sqrt(pi) sigma length) */
     double norm = 1.0 / sqrt(2.0 * sqrt(BST_PI) * f->sigma_px * (length + 2.0));
     s->flux_e = line->snr * out->noise_e / norm;
-    double reach = fmax(3.0, ceil(3.6 * f->sigma_px)) + 0.1 * length;
+    double reach = fmax(3.0, ceil(3.6 * f->sigma_px)) + 0.1 * length + beyond_px;
     *stamp = bst_fit_stamp(s, reach, l->fit.max_side, f->width, f->height);
     bst_fit_data data = {f->signal, f->width, f->height, out->noise_e};
     exclude(l, f, found, count, stamp);
@@ -217,34 +219,69 @@ static double snr_of_points(const bst_streak_locator *l, const bst_locator *foun
     return hypot(first, second);
 }
 
+/* Whether the fit went to a streak that is there already. */
+static bool is_known(const bst_locate_frame *f, const bst_locator *found, int points,
+                     const bst_found *streak) {
+    for (int i = points; i < found->count; i++) {
+        const bst_shape *s = &found->found[i].source.shape;
+        bst_streak_line line = {.x0 = s->x_px - 0.5 * s->dx_px,
+                                .y0 = s->y_px - 0.5 * s->dy_px,
+                                .x1 = s->x_px + 0.5 * s->dx_px,
+                                .y1 = s->y_px + 0.5 * s->dy_px};
+        const bst_shape *n = &streak->source.shape;
+        double along, distance = across(&line, n->x_px, n->y_px, &along);
+        double turn =
+            fabs(s->dx_px * n->dy_px - s->dy_px * n->dx_px) / fmax(hypot(s->dx_px, s->dy_px), 1.0);
+        if (distance < 3.0 * f->sigma_px && along > -0.1 && along < 1.1 &&
+            turn < 8.0 * f->sigma_px) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Takes a line for a streak with the points up to beyond_px past its ends as its pieces, unless
+ * `bare`, then those that are not too bright for it; false, and all as it was, when they are better
+ * explained as points. */
+static bool add_line(bst_streak_locator *l, const bst_locate_frame *f, bst_locator *found,
+                     int points, const bst_streak_line *line, double beyond_px, bool bare) {
+    double length = hypot(line->x1 - line->x0, line->y1 - line->y0);
+    double piece =
+        bare ? line->snr * sqrt(3.5 * f->sigma_px / (length + 3.5 * f->sigma_px)) : INFINITY;
+    int pieces = drop_pieces(l, found, points, line, f->sigma_px, piece, beyond_px);
+    bst_found streak;
+    bst_stamp stamp;
+    bool fitted = measure(l, f, found, points, line, beyond_px, &streak, &stamp);
+    /* a line that owes its SNR to light of others keeps little of it without that */
+    bool good = fitted ? streak.snr > line->snr - LOST_SNR : bare && pieces == 0;
+    good = good && !is_known(f, found, points, &streak);
+    if (good && pieces > 0) {
+        /* points have three parameters, streaks five */
+        int parameters = 0;
+        for (int k = 0; k < pieces; k++) {
+            parameters += found->found[l->pieces[k]].streak ? 5 : 3;
+        }
+        double chi = chi_of_pieces(l, f, found, pieces, &stamp, streak.noise_e);
+        good = streak.snr > snr_of_points(l, found, pieces, line) &&
+               streak.source.chi_square + 5.0 <= chi + parameters;
+    }
+    for (int k = 0; k < pieces; k++) {
+        found->found[l->pieces[k]].dropped = good;
+    }
+    if (good) {
+        found->found[found->count++] = streak;
+    }
+    return good;
+}
+
 static void add(bst_streak_locator *l, const bst_locate_frame *f, bst_locator *found, int points,
                 int lines) {
     for (int i = 0; i < lines && found->count < found->capacity; i++) {
         const bst_streak_line *line = &l->search.found[i];
-        double length = hypot(line->x1 - line->x0, line->y1 - line->y0);
-        double piece = line->snr * sqrt(3.5 * f->sigma_px / (length + 3.5 * f->sigma_px));
-        int pieces = drop_pieces(l, found, points, line, f->sigma_px, piece);
-        bst_found streak;
-        bst_stamp stamp;
-        bool good = measure(l, f, found, points, line, &streak, &stamp);
-        bool fitted = good;
-        /* a line that owes its SNR to light of others keeps little of it without that */
-        good = fitted ? streak.snr > line->snr - LOST_SNR : pieces == 0;
-        if (good && pieces > 0) {
-            /* points have three parameters, streaks five */
-            int parameters = 0;
-            for (int k = 0; k < pieces; k++) {
-                parameters += found->found[l->pieces[k]].streak ? 5 : 3;
-            }
-            double chi = chi_of_pieces(l, f, found, pieces, &stamp, streak.noise_e);
-            good = streak.snr > snr_of_points(l, found, pieces, line) &&
-                   streak.source.chi_square + 5.0 <= chi + parameters;
-        }
-        for (int k = 0; k < pieces; k++) {
-            found->found[l->pieces[k]].dropped = good;
-        }
-        if (good) {
-            found->found[found->count++] = streak;
+        /* a point may be all that shows of the streak there, or a star on it or beside it */
+        double hidden = 2.0 * disc_radius(line->snr, f->sigma_px);
+        if (!add_line(l, f, found, points, line, hidden, false)) {
+            add_line(l, f, found, points, line, 3.0 * f->sigma_px, true);
         }
     }
 }

@@ -121,44 +121,6 @@ static void fill_bands(void *user, int begin, int end) {
     }
 }
 
-void bst_streak_map_fill(bst_streak_map *map, bst_parallel *pool, const float *signal, int width,
-                         int height, const bst_background *background, double sigma_px) {
-    if (map->width != width || map->height != height) {
-        map->width = width;
-        map->height = height;
-        map->stride[0] = width + 2 * BST_STREAK_PAD;
-        map->stride[1] = height + 2 * BST_STREAK_PAD;
-        memset(map->memory[0], 0, plane_size(width, height) * sizeof(int16_t));
-        memset(map->memory[1], 0, plane_size(width, height) * sizeof(int16_t));
-    }
-    map->clamp = CLAMP_SIGMA * BST_STREAK_QUANTA;
-    set_kernel(map, sigma_px);
-    fill_job job = {map, signal, background};
-    bst_parallel_for(pool, (height + BAND - 1) / BAND, 1, fill_bands, &job);
-}
-
-void bst_streak_map_blank(bst_streak_map *map, double x0, double y0, double x1, double y1,
-                          double radius_px) {
-    double ux = x1 - x0, uy = y1 - y0, square = ux * ux + uy * uy;
-    int top = (int)fmax(ceil(fmin(y0, y1) - radius_px), 0.0);
-    int bottom = (int)fmin(floor(fmax(y0, y1) + radius_px), map->height - 1.0);
-    int left = (int)fmax(ceil(fmin(x0, x1) - radius_px), 0.0);
-    int right = (int)fmin(floor(fmax(x0, x1) + radius_px), map->width - 1.0);
-    for (int y = top; y <= bottom; y++) {
-        int16_t *row =
-            map->memory[0] + (long)(y + BST_STREAK_PAD) * map->stride[0] + BST_STREAK_PAD;
-        for (int x = left; x <= right; x++) {
-            double px = x - x0, py = y - y0;
-            double t = square > 0.0 ? (px * ux + py * uy) / square : 0.0;
-            t = fmax(0.0, fmin(t, 1.0));
-            double dx = px - t * ux, dy = py - t * uy;
-            if (dx * dx + dy * dy <= radius_px * radius_px) {
-                row[x] = 0;
-            }
-        }
-    }
-}
-
 /* Rows of the second plane, in squares that fit the cache. */
 static void turn_band(void *user, int begin, int end) {
     bst_streak_map *map = user;
@@ -178,6 +140,48 @@ static void turn_band(void *user, int begin, int end) {
     }
 }
 
-void bst_streak_map_turn(bst_streak_map *map, bst_parallel *pool) {
-    bst_parallel_for(pool, (map->width + TURN - 1) / TURN, 1, turn_band, map);
+void bst_streak_map_fill(bst_streak_map *map, bst_parallel *pool, const float *signal, int width,
+                         int height, const bst_background *background, double sigma_px) {
+    if (map->width != width || map->height != height) {
+        map->width = width;
+        map->height = height;
+        map->stride[0] = width + 2 * BST_STREAK_PAD;
+        map->stride[1] = height + 2 * BST_STREAK_PAD;
+        memset(map->memory[0], 0, plane_size(width, height) * sizeof(int16_t));
+        memset(map->memory[1], 0, plane_size(width, height) * sizeof(int16_t));
+    }
+    map->clamp = CLAMP_SIGMA * BST_STREAK_QUANTA;
+    set_kernel(map, sigma_px);
+    fill_job job = {map, signal, background};
+    bst_parallel_for(pool, (height + BAND - 1) / BAND, 1, fill_bands, &job);
+    bst_parallel_for(pool, (width + TURN - 1) / TURN, 1, turn_band, map);
+}
+
+static void blank(bst_streak_map *map, int plane, double x0, double y0, double x1, double y1,
+                  double radius) {
+    int width = plane ? map->height : map->width, height = plane ? map->width : map->height;
+    double ux = x1 - x0, uy = y1 - y0, square = ux * ux + uy * uy;
+    int top = (int)fmax(ceil(fmin(y0, y1) - radius), 0.0);
+    int bottom = (int)fmin(floor(fmax(y0, y1) + radius), height - 1.0);
+    int left = (int)fmax(ceil(fmin(x0, x1) - radius), 0.0);
+    int right = (int)fmin(floor(fmax(x0, x1) + radius), width - 1.0);
+    for (int y = top; y <= bottom; y++) {
+        int16_t *row =
+            map->memory[plane] + (long)(y + BST_STREAK_PAD) * map->stride[plane] + BST_STREAK_PAD;
+        for (int x = left; x <= right; x++) {
+            double px = x - x0, py = y - y0;
+            double t = square > 0.0 ? (px * ux + py * uy) / square : 0.0;
+            t = fmax(0.0, fmin(t, 1.0));
+            double dx = px - t * ux, dy = py - t * uy;
+            if (dx * dx + dy * dy <= radius * radius) {
+                row[x] = 0;
+            }
+        }
+    }
+}
+
+void bst_streak_map_blank(bst_streak_map *map, double x0, double y0, double x1, double y1,
+                          double radius_px) {
+    blank(map, 0, x0, y0, x1, y1, radius_px);
+    blank(map, 1, y0, x0, y1, x1, radius_px);
 }

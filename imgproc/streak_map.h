@@ -34,16 +34,13 @@ bst_status bst_streak_map_create(bst_ctx *ctx, int max_width, int max_height,
                                  bst_streak_map *out) BST_MUST_CHECK;
 void bst_streak_map_free(bst_streak_map *map);
 
-/* Makes the first plane from signal [height][width] (electrons above the background, see
+/* Makes both planes from signal [height][width] (electrons above the background, see
  * background.h): what holds no measurement counts as background. sigma_px: of the PSF. */
 void bst_streak_map_fill(bst_streak_map *map, bst_parallel *pool, const float *signal, int width,
                          int height, const bst_background *background, double sigma_px);
-/* Sets the first plane to zero within radius_px of a segment. */
+/* Sets both planes to zero within radius_px of a segment. */
 void bst_streak_map_blank(bst_streak_map *map, double x0, double y0, double x1, double y1,
                           double radius_px);
-/* Makes the second plane from the first. */
-void bst_streak_map_turn(bst_streak_map *map, bst_parallel *pool);
-
 /* Pixel (0, 0) of a plane. */
 static inline const int16_t *bst_streak_map_plane(const bst_streak_map *map, int plane) {
     return map->memory[plane] + (long)BST_STREAK_PAD * map->stride[plane] + BST_STREAK_PAD;

@@ -128,7 +128,6 @@ void bst_streak_search_fill(bst_streak_search *s, const float *signal, int width
 static int run(bst_streak_search *s, int first_octave, double margin, double threshold,
                double filled, double least_px) {
     s->threshold_snr = threshold;
-    bst_streak_map_turn(&s->map, s->pool);
     int hits = bst_streak_bank_run(&s->bank, s->pool, &s->map, first_octave, threshold - margin);
     s->candidates = choose(s, hits);
     bst_parallel_for(s->pool, s->candidates, 4, refine_all, s);
