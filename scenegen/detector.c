@@ -77,13 +77,9 @@ int bst_detector_options(const bst_detector *detector, char *text, size_t bytes)
         d->full_well == BST_WELL_BLOOM ? " -DBLOOM" : "", detector->flags ? " -DFLAGS" : "");
 }
 
-static bst_status make_buffer(bst_ctx *ctx, bst_detector *d, size_t bytes, void *data,
+static bst_status make_buffer(bst_ctx *ctx, bst_detector *d, size_t bytes, const void *data,
                               cl_mem *out) {
-    cl_int code;
-    *out = clCreateBuffer(d->context,
-                          data ? CL_MEM_READ_WRITE | CL_MEM_COPY_HOST_PTR : CL_MEM_READ_WRITE,
-                          bytes, data, &code);
-    return bst_device_check(ctx, code, "allocating a map of the detector");
+    return bst_device_buffer(ctx, d->context, bytes, data, "allocating a map of the detector", out);
 }
 
 static bst_status make_map(bst_ctx *ctx, bst_detector *d,

@@ -41,8 +41,8 @@ struct bst_fft_light {
     int tile_width, tile_height, group;
     setup setups[SETUPS];
     long long calls;
-    int nodes, field_x, field_y; /* of the PSF's field; lattice of its weights */
-    cl_mem *fields;              /* [nodes] */
+    int nodes, field_nodes, field_x, field_y; /* of the PSF; of its field; lattice of weights */
+    cl_mem *fields;                           /* [field_nodes] */
 };
 
 bst_fft_light_options bst_fft_light_default_options(void) {
@@ -77,11 +77,12 @@ static bst_status build(bst_ctx *ctx, bst_device *device, bst_fft_light *l) {
     const bst_kernel_source *sources[] = {&bst_kernel_scene_shared, &bst_kernel_nodes,
                                           &bst_kernel_deposit_shared, &bst_kernel_deposit};
     char options[1024];
-    int length = snprintf(options, sizeof options,
-                          "-cl-std=CL1.2 -DFFT_LIGHT -DDEPOSIT_W=%d -DDEPOSIT_H=%d "
-                          "-DDEPOSIT_GROUP=%d%s%s",
-                          l->tile_width, l->tile_height, l->group, l->nodes > 1 ? " -DFIELD" : "",
-                          l->group == 1 ? " -DNEAR_CACHE" : "");
+    int length = snprintf(
+        options, sizeof options,
+        "-cl-std=CL1.2 -DFFT_LIGHT -DDEPOSIT_W=%d -DDEPOSIT_H=%d "
+        "-DDEPOSIT_GROUP=%d%s%s%s",
+        l->tile_width, l->tile_height, l->group, l->field_nodes > 1 ? " -DFIELD" : "",
+        l->nodes > l->field_nodes ? " -DSPECTRA" : "", l->group == 1 ? " -DNEAR_CACHE" : "");
     bst_scene_node_options(&l->camera, l->options.spatial_oversample, options + length,
                            sizeof options - (size_t)length);
     BST_TRY(bst_device_build(ctx, device, sources, 4, options, &l->program));
@@ -95,8 +96,8 @@ static bst_status make_fields(bst_ctx *ctx, bst_fft_light *l) {
     l->field_x = (int)l->camera.width_px / FIELD_STEP_PX + 2;
     l->field_y = (int)l->camera.height_px / FIELD_STEP_PX + 2;
     size_t places = (size_t)l->field_x * (size_t)l->field_y;
-    float *weights = calloc(places * (size_t)l->nodes, sizeof *weights);
-    l->fields = calloc((size_t)l->nodes, sizeof *l->fields);
+    float *weights = calloc(places * (size_t)l->field_nodes, sizeof *weights);
+    l->fields = calloc((size_t)l->field_nodes, sizeof *l->fields);
     if (!weights || !l->fields) {
         free(weights);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the weights of the PSF's field");
@@ -115,7 +116,7 @@ static bst_status make_fields(bst_ctx *ctx, bst_fft_light *l) {
         }
     }
     bst_status status = BST_OK;
-    for (int n = 0; n < l->nodes && status == BST_OK; n++) {
+    for (int n = 0; n < l->field_nodes && status == BST_OK; n++) {
         cl_int code;
         l->fields[n] =
             clCreateBuffer(l->context, CL_MEM_READ_ONLY | CL_MEM_COPY_HOST_PTR,
@@ -173,6 +174,7 @@ bst_status bst_fft_light_create(bst_ctx *ctx, bst_device *device, const bst_came
     l->psf = psf;
     l->options = o;
     l->nodes = bst_psf_nodes(psf);
+    l->field_nodes = l->nodes / bst_psf_spectra(psf);
     l->context = bst_device_context(device);
     clRetainContext(l->context);
     bst_status status = prepare(ctx, device, l);
@@ -205,7 +207,7 @@ void bst_fft_light_free(bst_fft_light *l) {
     for (int i = 0; i < SETUPS; i++) {
         free_setup(&l->setups[i]);
     }
-    for (int n = 0; l->fields && n < l->nodes; n++) {
+    for (int n = 0; l->fields && n < l->field_nodes; n++) {
         release(&l->fields[n]);
     }
     if (l->kernel) {
@@ -237,8 +239,16 @@ double bst_fft_light_widest(const bst_fft_light *l) {
     return l->widest;
 }
 
+int bst_fft_light_spectra(const bst_fft_light *l) {
+    return l->nodes / l->field_nodes;
+}
+
 double bst_fft_light_error(const bst_fft_light *l) {
     return l->error;
+}
+
+double bst_fft_light_mixing_error(const bst_fft_light *l) {
+    return bst_psf_mixing_error(l->psf);
 }
 
 /* Table of the spreading kernel for a point `phase` samples right of sample taps / 2 - 1, and of
@@ -285,9 +295,7 @@ static bst_status make_setup(bst_ctx *ctx, bst_fft_light *l, bst_window window, 
     free(table);
     BST_TRY(bst_device_check(ctx, code, "allocating the spreading kernel's table"));
     size_t bytes = bst_light_fft_floats(s->fft) * sizeof(float);
-    s->grid =
-        clCreateBuffer(l->context, CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR, bytes, NULL, &code);
-    return bst_device_check(ctx, code, "allocating the light's grid");
+    return bst_device_buffer(ctx, l->context, bytes, NULL, "allocating the light's grid", &s->grid);
 }
 
 /* The setup for a window's size; an old one makes room for a new one. */
@@ -315,7 +323,7 @@ static bst_status find_setup(bst_ctx *ctx, bst_fft_light *l, bst_window window, 
 }
 
 static bst_status deposit(bst_ctx *ctx, bst_fft_light *l, cl_command_queue queue, bst_window window,
-                          const bst_fft_light_nodes *nodes, const setup *s, int field) {
+                          const bst_fft_light_nodes *nodes, const setup *s, int node) {
     const bst_light_shape *shape = bst_light_fft_shape(s->fft);
     bst_deposit_params p = {
         .x0 = (float)(window.x0 - shape->margin),
@@ -327,15 +335,23 @@ static bst_status deposit(bst_ctx *ctx, bst_fft_light *l, cl_command_queue queue
         .tiles_x = (shape->x.samples + l->tile_width - 1) / l->tile_width,
         .tiles_y = (shape->y.samples + l->tile_height - 1) / l->tile_height,
         .source_groups = nodes->source_groups,
+        .spectrum = node / l->field_nodes,
         .field_x = l->field_x,
         .field_y = l->field_y,
         .field_per_px_x = (float)((l->field_x - 1) / fmax((double)l->camera.width_px - 1.0, 1.0)),
         .field_per_px_y = (float)((l->field_y - 1) / fmax((double)l->camera.height_px - 1.0, 1.0)),
     };
-    const void *values[] = {
-        &p,        &nodes->sources,   &nodes->table, &nodes->block_box, &nodes->source_box,
-        &s->table, &l->fields[field], &s->grid};
-    for (cl_uint i = 0; i < sizeof values / sizeof *values; i++) {
+    const void *values[] = {&p,
+                            &nodes->sources,
+                            &nodes->table,
+                            &nodes->block_box,
+                            &nodes->source_box,
+                            &s->table,
+                            &l->fields[node % l->field_nodes],
+                            &s->grid,
+                            &nodes->shares};
+    cl_uint count = (cl_uint)(sizeof values / sizeof *values) - (l->nodes == l->field_nodes);
+    for (cl_uint i = 0; i < count; i++) {
         size_t bytes = i == 0 ? sizeof p : sizeof(cl_mem);
         BST_TRY(bst_device_check(ctx, clSetKernelArg(l->kernel, i, bytes, values[i]),
                                  "setting a kernel argument"));

@@ -3,10 +3,12 @@
  * The frame's nodes are spread on a grid of the density that the PSF's band asks for, on the
  * device; the grid is convolved by FFT on the host's threads (a CPU device's memory is used in
  * place), and the image goes to the tile kernel. The cost depends on the window and the number of
- * nodes, hardly on the PSF; a field-dependent PSF costs one grid per field node. */
+ * nodes, hardly on the PSF; a field-dependent PSF costs one grid per field node, and one with
+ * several spectra that many of each. */
 #ifndef BST_SCENEGEN_FFT_LIGHT_H
 #define BST_SCENEGEN_FFT_LIGHT_H
 
+#include "scenegen/kernels/deposit_shared.h"
 #include "scenegen/kernels/scene_shared.h"
 #include "scenegen/light_grid.h"
 #include "sim/core/messages.h"
@@ -39,12 +41,19 @@ void bst_fft_light_stamp(const bst_fft_light *light, bst_scene_source *source);
 /* By how many node variances (bst_light_band) a node may be widened. */
 double bst_fft_light_widest(const bst_fft_light *light);
 
+/* Spectra of the PSF (bst_psf_spectra). */
+int bst_fft_light_spectra(const bst_fft_light *light);
+
 /* Bound of an image's error by grid and cut-off, over a source's peak. */
 double bst_fft_light_error(const bst_fft_light *light);
+
+/* The same by mixing spectra (bst_psf_mixing_error), of a source that has one of its own. */
+double bst_fft_light_mixing_error(const bst_fft_light *light);
 
 /* The frame's sources and node table on the device, and the boxes that the nodes kernel made. */
 typedef struct bst_fft_light_nodes {
     cl_mem sources, table, block_box, source_box;
+    cl_mem shares; /* float [sources][BST_SPECTRA], where the PSF has several spectra */
     int source_groups;
 } bst_fft_light_nodes;
 

@@ -117,13 +117,10 @@ bst_status bst_frame_pool_create(bst_ctx *ctx, bst_device *device, int width, in
     clRetainCommandQueue(pool->queue);
     pool->count = count;
     for (int i = 0; i < count; i++) {
-        cl_int code;
         size_t bytes = (size_t)width * (size_t)height * sizeof(uint16_t);
         pool->frames[i].pool = pool;
-        pool->frames[i].buffer =
-            clCreateBuffer(bst_device_context(device), CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR,
-                           bytes, NULL, &code);
-        bst_status status = bst_device_check(ctx, code, "allocating a frame");
+        bst_status status = bst_device_buffer(ctx, bst_device_context(device), bytes, NULL,
+                                              "allocating a frame", &pool->frames[i].buffer);
         if (status != BST_OK) {
             destroy(pool);
             return status;

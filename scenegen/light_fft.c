@@ -4,8 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/core/pages.h"
+
 static bst_batch *allocate(size_t elements) {
-    return aligned_alloc(sizeof(bst_lanes), elements * sizeof(bst_batch));
+    return bst_pages_alloc(elements * sizeof(bst_batch));
 }
 
 /* ------------------------------------------------------------------ set-up */
@@ -176,7 +178,9 @@ static bst_status make_wrap(bst_ctx *ctx, bst_light_fft *f) {
     f->cell = x->samples > 14 * x->pixels / 10 ? 32 : 16;
     f->cells_x = (x->samples + f->cell - 1) / f->cell;
     f->cells_y = (y->samples + f->cell - 1) / f->cell;
-    f->cells = malloc((size_t)f->cells_x * (size_t)f->cells_y * sizeof *f->cells);
+    f->spectra = bst_psf_spectra(f->psf);
+    size_t cells = (size_t)f->cells_x * (size_t)f->cells_y;
+    f->cells = malloc((size_t)f->spectra * cells * sizeof *f->cells);
     if (!f->cells) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the far wings");
     }
@@ -185,7 +189,11 @@ static bst_status make_wrap(bst_ctx *ctx, bst_light_fft *f) {
                               f->shape.width + f->shape.margin};
     bst_light_wrap_axis wy = {y->pixels, f->cells_y, (double)f->cell * y->pixels / y->samples,
                               f->shape.height + f->shape.margin};
-    return bst_light_wrap_create(ctx, f->psf, &wx, &wy, f->pool, &f->wrap);
+    for (int s = 0; s < f->spectra; s++) {
+        BST_TRY(bst_light_wrap_create(ctx, f->psf, s, &wx, &wy, f->pool, &f->wrap[s]));
+        f->wraps = f->wraps || f->wrap[s];
+    }
+    return BST_OK;
 }
 
 bst_status bst_light_fft_create(bst_ctx *ctx, const bst_psf *psf, double cutoff,
@@ -237,7 +245,9 @@ void bst_light_fft_free(bst_light_fft *f) {
         free(f->benches[i].line);
         free(f->benches[i].wings);
     }
-    bst_light_wrap_free(f->wrap);
+    for (int s = 0; s < f->spectra; s++) {
+        bst_light_wrap_free(f->wrap[s]);
+    }
     free(f->sum);
     free(f->image);
     free(f->spectrum);

@@ -22,8 +22,8 @@ typedef struct bst_light_shape {
     int width, height, margin;
 } bst_light_shape;
 
-/* Plans, tabulates the OTF of all field nodes and prepares the far wings. The pool is borrowed.
- * BST_ERR_MEMORY. */
+/* Plans, tabulates the OTF of all nodes of the PSF and prepares the far wings. The pool is
+ * borrowed. BST_ERR_MEMORY. */
 bst_status bst_light_fft_create(bst_ctx *ctx, const bst_psf *psf, double cutoff,
                                 const bst_light_shape *shape, bst_parallel *pool,
                                 bst_light_fft **out) BST_MUST_CHECK;
@@ -36,7 +36,7 @@ size_t bst_light_fft_floats(const bst_light_fft *fft);
 /* Floats from one row of the image to the next. */
 int bst_light_fft_pitch(const bst_light_fft *fft);
 
-/* Takes the grid that holds the light of field node `node`: sample (i, j) at
+/* Takes the grid that holds the light of the PSF's node `node`: sample (i, j) at
  * grid[(j / 16 * x.samples + i) * 16 + j % 16]. The image is the sum over the nodes from the one
  * that is `first` to the one that is `last`. */
 void bst_light_fft_add(bst_light_fft *fft, int node, bool first, bool last, const float *grid);

@@ -56,9 +56,11 @@ struct bst_light_fft {
     bst_batch_fft *row_forward, *row_inverse, *column_forward, *column_inverse;
     bench *benches;
     int bench_count;
-    bst_light_wrap *wrap;
-    int cell, cells_x, cells_y; /* samples per cell, per axis; cells */
-    float *cells;
+    bst_light_wrap *wrap[BST_PSF_SPECTRA]; /* NULL: of such a spectrum, no light to speak of */
+    bool wraps;                            /* any does */
+    int cell, cells_x, cells_y;            /* samples per cell, per axis; cells */
+    int spectra;
+    float *cells;        /* [spectra][cells_y][cells_x] */
     cell_shares *shares; /* per block of a row's pixels */
 };
 

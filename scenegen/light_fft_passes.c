@@ -19,7 +19,7 @@ static bench *take_bench(bst_light_fft *f) {
 BST_LANES_FUNCTION
 static bool load_rows(const bst_light_fft *f, const bst_lanes *a, const bst_lanes *b,
                       bst_batch *line, float *cells_a, float *cells_b) {
-    float any = 0.0f;
+    bool any = false;
     for (int i = 0, x = 0; i < f->cells_x; i++) {
         int end = x + f->cell < f->shape.x.samples ? x + f->cell : f->shape.x.samples;
         bst_lanes sum_a = {0}, sum_b = {0};
@@ -34,12 +34,12 @@ static bool load_rows(const bst_light_fft *f, const bst_lanes *a, const bst_lane
             total_b += sum_b[l];
         }
         cells_a[i] += total_a;
-        any += total_a + total_b;
+        any = any || total_a != 0.0f || total_b != 0.0f; /* light of a spectrum may be negative */
         if (b) {
             cells_b[i] += total_b;
         }
     }
-    return any > 0.0f;
+    return any;
 }
 
 /* The spectra of two blocks of rows for one strip, from the transform of both as one complex
@@ -81,14 +81,16 @@ static void rows_forward(void *user, int begin, int end) {
     const pass *p = user;
     bst_light_fft *f = p->fft;
     bench *w = take_bench(f);
-    int per_cell = f->cell / BLOCK;
+    int per_cell = f->cell / BLOCK, fields = bst_psf_nodes(f->psf) / f->spectra;
+    size_t spectrum = (size_t)(p->node / fields) * (size_t)f->cells_y;
     for (int j = begin; j < end; j++) {
         int a = 2 * j, b = a + 1 < f->row_blocks ? a + 1 : -1;
-        float *cells_a = f->cells + (size_t)(a / per_cell) * (size_t)f->cells_x;
-        float *cells_b = f->cells + (size_t)((b < 0 ? a : b) / per_cell) * (size_t)f->cells_x;
+        size_t row_a = (size_t)(a / per_cell), row_b = (size_t)((b < 0 ? a : b) / per_cell);
+        float *cells_a = f->cells + (spectrum + row_a) * (size_t)f->cells_x;
+        float *cells_b = f->cells + (spectrum + row_b) * (size_t)f->cells_x;
         size_t block = (size_t)f->shape.x.samples, bytes = (size_t)f->cells_x * sizeof *cells_a;
         const bst_lanes *grid = (const bst_lanes *)p->grid;
-        if (p->first) {
+        if (p->node % fields == 0) {
             memset(cells_a, 0, bytes);
             memset(cells_b, 0, bytes);
         }
@@ -152,10 +154,18 @@ static void store_image(const bst_light_fft *f, int block, const bst_batch *line
 static void run_wrap(bst_light_fft *f) {
     float scale = (float)(1.0 / (f->kernel_x[0] * f->kernel_y[0]));
     size_t count = (size_t)f->cells_x * (size_t)f->cells_y;
-    for (size_t i = 0; i < count; i++) {
-        f->cells[i] *= scale;
+    for (int s = 0; s < f->spectra; s++) {
+        float *cells = f->cells + (size_t)s * count;
+        for (size_t i = 0; i < count; i++) {
+            cells[i] *= f->wrap[s] ? scale : 0.0f;
+        }
+        if (f->wrap[s]) {
+            bst_light_wrap_run(f->wrap[s], cells);
+        }
+        for (size_t i = 0; s > 0 && i < count; i++) {
+            f->cells[i] += cells[i];
+        }
     }
-    bst_light_wrap_run(f->wrap, f->cells);
 }
 
 /* Blocks of the image's columns; before them, with the last node, the far wings. */
@@ -165,7 +175,7 @@ static void columns(void *user, int begin, int end) {
     bench *w = take_bench(f);
     size_t pixels = (size_t)f->shape.y.pixels;
     for (int i = begin; i < end; i++) {
-        int c = i - (p->last && f->wrap);
+        int c = i - (p->last && f->wraps);
         if (c < 0) {
             run_wrap(f);
             continue;
@@ -192,7 +202,7 @@ static void columns(void *user, int begin, int end) {
 void bst_light_fft_add(bst_light_fft *f, int node, bool first, bool last, const float *grid) {
     pass p = {.fft = f, .grid = grid, .node = node, .first = first, .last = last};
     bst_parallel_for(f->pool, (f->row_blocks + 1) / 2, 1, rows_forward, &p);
-    bst_parallel_for(f->pool, f->column_blocks + (last && f->wrap), 1, columns, &p);
+    bst_parallel_for(f->pool, f->column_blocks + (last && f->wraps), 1, columns, &p);
 }
 
 /* ------------------------------------------------------------------ rows inverse */
@@ -263,10 +273,10 @@ static void rows_inverse(void *user, int begin, int end) {
             int top = k * BLOCK, rows = f->shape.height - top;
             rows = rows < BLOCK ? rows : BLOCK;
             float *image = p->image + (size_t)top * (size_t)f->pitch;
-            for (int r = 0; f->wrap && r < rows; r++) {
+            for (int r = 0; f->wraps && r < rows; r++) {
                 row_of_wings(f, top + r, w->wings + (size_t)r * (size_t)(f->cells_x + SHARES));
             }
-            store_rows(f, w->line, k > a, rows, f->wrap ? w->wings : NULL, image);
+            store_rows(f, w->line, k > a, rows, f->wraps ? w->wings : NULL, image);
         }
     }
     bst_lanes_streamed();

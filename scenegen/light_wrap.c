@@ -37,6 +37,7 @@ static int good_size(int least) {
 /* The fine lattice of displacements: half a cell, over PERIODS periods. */
 typedef struct lattice {
     const bst_psf *psf;
+    int spectrum;
     const bst_light_wrap_axis *axis[2];
     int n[2];
     fftwf_complex *data; /* [n y][n x / 2 + 1] */
@@ -44,7 +45,7 @@ typedef struct lattice {
 
 static void fill_rows(void *user, int begin, int end) {
     const lattice *l = user;
-    int nodes = bst_psf_nodes(l->psf), half = l->n[0] / 2 + 1;
+    int nodes = bst_psf_nodes(l->psf) / bst_psf_spectra(l->psf), half = l->n[0] / 2 + 1;
     double long_x = (double)PERIODS * l->axis[0]->pixels,
            long_y = (double)PERIODS * l->axis[1]->pixels;
     double whole = 1.0 / (long_x * long_y), part = whole * PERIODS * PERIODS;
@@ -57,7 +58,7 @@ static void fill_rows(void *user, int begin, int end) {
                                          fy * fy * l->axis[1]->cell_px * l->axis[1]->cell_px));
             for (int n = 0; n < nodes && smooth > 1e-9; n++) {
                 double v[2];
-                bst_psf_otf(l->psf, n, fx, fy, v);
+                bst_psf_otf(l->psf, l->spectrum * nodes + n, fx, fy, v);
                 sum[0] += v[0] / nodes;
                 sum[1] += v[1] / nodes;
             }
@@ -113,12 +114,12 @@ static bst_status make_kernel(bst_ctx *ctx, bst_light_wrap *w, lattice *l, bst_p
     return BST_OK;
 }
 
-bst_status bst_light_wrap_create(bst_ctx *ctx, const bst_psf *psf, const bst_light_wrap_axis *x,
-                                 const bst_light_wrap_axis *y, bst_parallel *pool,
-                                 bst_light_wrap **out) {
+bst_status bst_light_wrap_create(bst_ctx *ctx, const bst_psf *psf, int spectrum,
+                                 const bst_light_wrap_axis *x, const bst_light_wrap_axis *y,
+                                 bst_parallel *pool, bst_light_wrap **out) {
     *out = NULL;
     bst_light_wrap *w = calloc(1, sizeof *w);
-    lattice l = {psf, {x, y}, {0, 0}, NULL};
+    lattice l = {psf, spectrum, {x, y}, {0, 0}, NULL};
     if (!w) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the far wings");
     }

@@ -22,11 +22,11 @@ typedef struct bst_light_wrap_axis {
     double used_px;
 } bst_light_wrap_axis;
 
-/* The field's nodes are taken together. *out is NULL where so little light wraps that a frame's sum
- * stays right to 1e-7. */
-bst_status bst_light_wrap_create(bst_ctx *ctx, const bst_psf *psf, const bst_light_wrap_axis *x,
-                                 const bst_light_wrap_axis *y, bst_parallel *pool,
-                                 bst_light_wrap **out) BST_MUST_CHECK;
+/* The field's nodes are taken together, of one of the PSF's spectra. *out is NULL where so little
+ * light wraps that a frame's sum stays right to 1e-7. */
+bst_status bst_light_wrap_create(bst_ctx *ctx, const bst_psf *psf, int spectrum,
+                                 const bst_light_wrap_axis *x, const bst_light_wrap_axis *y,
+                                 bst_parallel *pool, bst_light_wrap **out) BST_MUST_CHECK;
 void bst_light_wrap_free(bst_light_wrap *wrap);
 
 /* light: electrons per cell, [y cells][x cells]; replaced by what is to be added to a pixel at each

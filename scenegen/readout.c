@@ -93,9 +93,9 @@ bst_status bst_readout_image(bst_ctx *ctx, bst_readout *r, bst_window light, cl_
             if (*buffers[i]) {
                 clReleaseMemObject(*buffers[i]);
             }
-            cl_int code;
-            *buffers[i] = clCreateBuffer(r->context, CL_MEM_READ_WRITE, bytes, NULL, &code);
-            BST_TRY(bst_device_check(ctx, code, "allocating an image of charge"));
+            *buffers[i] = NULL;
+            BST_TRY(bst_device_buffer(ctx, r->context, bytes, NULL, "allocating an image of charge",
+                                      buffers[i]));
         }
         r->bytes = bytes;
     }

@@ -52,7 +52,7 @@ typedef struct spectrum {
     fftw_complex *sum;    /* [side][side], frequencies as FFTW orders them */
     double *shape;        /* [side / 2 + 1] transform of the spreading function */
     fftw_plan forward, back;
-    int node;     /* of the field grid, at work */
+    int node;     /* of the PSF, at work */
     int shift[2]; /* of the frequencies, cycles/px */
 } spectrum;
 
@@ -142,8 +142,9 @@ static void spread_point(spectrum *s, const instant *p, double light) {
           y <= s->window.height + s->margin)) {
         return;
     }
+    int fields = bst_psf_nodes(s->psf) / bst_psf_spectra(s->psf);
     for (int k = 0; k < nodes; k++) {
-        share += node[k] == s->node ? weight[k] : 0.0;
+        share += node[k] == s->node % fields ? weight[k] : 0.0;
     }
     if (share == 0.0) {
         return;
@@ -248,10 +249,12 @@ static bst_status add_part(bst_ctx *ctx, spectrum *s, const bst_source *source, 
 
 static bst_status add_sources(bst_ctx *ctx, spectrum *s, const bst_source *sources, int count) {
     const bst_los_track *t = s->track;
+    int spectra = bst_psf_spectra(s->psf), of = s->node * spectra / bst_psf_nodes(s->psf);
     for (int i = 0; i < count; i++) {
+        double share = spectra > 1 ? bst_psf_share(sources[i].colour, of) : 1.0;
         for (int k = 0; k + 1 < t->count; k++) {
-            double light = sources[i].electrons_per_s * (t->time_s[k + 1] - t->time_s[k]);
-            if (!sources[i].occulted && light > 0.0) {
+            double light = share * sources[i].electrons_per_s * (t->time_s[k + 1] - t->time_s[k]);
+            if (!sources[i].occulted && light != 0.0) {
                 BST_TRY(add_part(ctx, s, &sources[i], k, 0.0, 1.0, light, 0));
             }
         }

@@ -45,7 +45,7 @@ struct bst_renderer {
     bst_frame_pool *pool;
     cl_mem law; /* of the stamps' profiles */
     bst_stage *stage;
-    cl_mem sources, table; /* of the present frame; borrowed */
+    cl_mem sources, shares, table; /* of the present frame; borrowed */
     growing block_box, source_box, group_box, expected;
     bst_scene_plan plan;   /* of the latest request, or of its latest band */
     double *rolled_peak_e; /* of all sources, with the bands of a rolling shutter */
@@ -261,6 +261,10 @@ static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, const bst_scene_p
                           (size_t)table_blocks * BST_TABLE_ROWS * block_bytes, &r->table));
     BST_TRY(bst_stage_put(ctx, r->stage, BST_STAGE_SOURCES, plan->sources,
                           (size_t)count * sizeof *plan->sources, &r->sources));
+    if (plan->shares) {
+        BST_TRY(bst_stage_put(ctx, r->stage, BST_STAGE_SHARES, plan->shares,
+                              (size_t)count * sizeof *plan->shares, &r->shares));
+    }
     BST_TRY(grow(ctx, r, &r->block_box, (size_t)plan->boxes * BST_BLOCK * BST_BOX_BYTES));
     BST_TRY(grow(ctx, r, &r->source_box, groups * BST_BLOCK * BST_BOX_BYTES));
     BST_TRY(grow(ctx, r, &r->group_box, more * BST_BLOCK * BST_BOX_BYTES));
@@ -310,8 +314,8 @@ static bst_status begin_set(bst_ctx *ctx, bst_renderer *r) {
 /* The image that the tile kernel takes its light from, where the PSF is no Gaussian. */
 static bst_status make_light(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
                              bst_scene_params *p, cl_mem *light) {
-    bst_fft_light_nodes nodes = {r->sources, r->table, r->block_box.buffer, r->source_box.buffer,
-                                 p->source_groups};
+    bst_fft_light_nodes nodes = {r->sources,           r->table,  r->block_box.buffer,
+                                 r->source_box.buffer, r->shares, p->source_groups};
     bst_fft_light_image image;
     BST_TRY(bst_fft_light_render(ctx, r->fft_light, r->queue, q->window, &nodes, &image));
     p->light_first = image.first;

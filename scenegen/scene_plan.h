@@ -8,7 +8,8 @@
 #include "scenegen/smear.h"
 
 typedef struct bst_scene_plan {
-    bst_scene_source *sources; /* [count] that are drawn, in the order of bst_source_order */
+    bst_scene_source *sources;    /* [count] that are drawn, in the order of bst_source_order */
+    float (*shares)[BST_SPECTRA]; /* [count] of the PSF's spectra; NULL: there is one */
     int count;
     int blocks;     /* of their nodes */
     int boxes;      /* of the blocks, by groups of BST_BLOCK */

@@ -106,10 +106,8 @@ static bst_status grow(bst_ctx *ctx, bst_stage *s, staged *p, size_t bytes) {
     size_t room = bytes + bytes / 2;
     room = room > s->most_bytes ? bytes : room;
     p->bytes = room < 4096 ? 4096 : room;
-    cl_int code;
-    p->buffer = clCreateBuffer(s->context, CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR, p->bytes,
-                               NULL, &code);
-    return bst_device_check(ctx, code, "allocating scene memory");
+    return bst_device_buffer(ctx, s->context, p->bytes, NULL, "allocating scene memory",
+                             &p->buffer);
 }
 
 bst_status bst_stage_put(bst_ctx *ctx, bst_stage *s, bst_stage_part part, const void *data,

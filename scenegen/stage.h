@@ -16,6 +16,7 @@ enum { BST_STAGE_SETS = 2 };
 typedef enum bst_stage_part {
     BST_STAGE_TABLE,      /* of nodes */
     BST_STAGE_SOURCES,    /* that are drawn */
+    BST_STAGE_SHARES,     /* of the sources' spectra */
     BST_STAGE_BACKGROUND, /* on its coarse grid */
     BST_STAGE_HITS,       /* of radiation */
     BST_STAGE_ROWS,       /* offsets of the sensor's rows */

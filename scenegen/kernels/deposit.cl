@@ -1,7 +1,7 @@
 /* Light of all nodes on a grid for the Fourier path: each node is spread over eight by eight samples.
  * Options: DEPOSIT_W, DEPOSIT_H (samples of a tile, a multiple of 16 high), DEPOSIT_GROUP (work-items
- * per work-group), those of nodes.cl, FIELD (weights by place), NEAR_CACHE (memory has one
- * address space; what lies in it can be fetched ahead, and written past the caches).
+ * per work-group), those of nodes.cl, FIELD (weights by place), SPECTRA (weights by source, which may
+ * be negative), NEAR_CACHE (memory has one address space; it can be written past the caches).
  *
  * One work-item owns a tile and adds its nodes in the order of sources, blocks and nodes: the sum is
  * the same for every tile and work-group size. Vectors run along y, as in the grid's blocks of
@@ -16,10 +16,8 @@
 #define DEPOSIT_ROOM 40
 
 #ifdef NEAR_CACHE
-#define FETCH(p) __builtin_prefetch((const private void *)(uintptr_t)(p))
 #define STREAM(value, p) __builtin_nontemporal_store(value, p)
 #else
-#define FETCH(p)
 #define STREAM(value, p) (*(p) = (value))
 #endif
 
@@ -122,7 +120,12 @@ static int place_nodes(bst_deposit_params p, int tile_x, int tile_y, node_block 
     const float before = BST_SPREAD_TAPS / 2 - 1, after = BST_SPREAD_TAPS / 2;
     float16 column = floor_u - (before + (float)tile_x), row = floor_v - (before + (float)tile_y);
     float16 electrons = nodes.electrons, width = nodes.width;
-    int16 hit = (electrons > 0.0f) & (column > (float)-BST_SPREAD_TAPS) &
+#ifdef SPECTRA
+    int16 lit = electrons != 0.0f;
+#else
+    int16 lit = electrons > 0.0f;
+#endif
+    int16 hit = lit & (column > (float)-BST_SPREAD_TAPS) &
                 (column < (float)DEPOSIT_W) & (row > (float)-BST_SPREAD_TAPS) &
                 (row < (float)DEPOSIT_H) &
                 /* what lies outside the grid would come in on its other side */
@@ -194,12 +197,16 @@ static int16 boxes_hit(global const float *box, float4 tile) {
 }
 
 /* nodes: table of nodes. grid: [samples_y / 16][samples_x][16]. table: [2][BST_SPREAD_TABLE], along x
- * and y. The boxes are those of the nodes kernel, which reach at least as far as the spreading kernel.
+ * and y. shares: of the spectra, by source. The boxes are those of the nodes kernel, which reach at least as far as the spreading kernel.
  */
 __attribute__((reqd_work_group_size(DEPOSIT_GROUP, 1, 1))) kernel void bst_light_deposit(
     bst_deposit_params p, global const bst_scene_source *sources, global const float16 *nodes,
     global const float *block_box, global const float *source_box, global const float *table,
-    global const float *field, global float16 *grid) {
+    global const float *field, global float16 *grid
+#ifdef SPECTRA
+    , global const float *shares /* [sources][BST_SPECTRA] */
+#endif
+) {
     local float16 sums[DEPOSIT_GROUP][DEPOSIT_W * DEPOSIT_STRIDE / 16];
     int tile = (int)get_global_id(0);
     if (tile >= p.tiles_x * p.tiles_y) {
@@ -231,6 +238,12 @@ __attribute__((reqd_work_group_size(DEPOSIT_GROUP, 1, 1))) kernel void bst_light
                 continue;
             }
             bst_scene_source s = sources[g * BST_BLOCK + i];
+#ifdef SPECTRA
+            s.electrons *= shares[(g * BST_BLOCK + i) * BST_SPECTRA + p.spectrum];
+            if (s.electrons == 0.0f) {
+                continue;
+            }
+#endif
             blocks[0] = 1;
             for (int first = 0; first < s.blocks; first += BST_BLOCK) {
                 if (s.blocks > 1) { /* else the source's box is the block's */

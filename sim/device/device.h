@@ -23,6 +23,12 @@ cl_device_id bst_device_id(const bst_device *device);
 /* "PoCL 3.1: cpu-..., 2 compute units" for the manifest. */
 const char *bst_device_description(const bst_device *device);
 
+/* A buffer for device and host, which share it without a copy, on large pages (sim/core/pages.h),
+ * where the device is a CPU. data: its content at first; NULL: none. `what` begins the message of
+ * an error. Released with clReleaseMemObject. */
+bst_status bst_device_buffer(bst_ctx *ctx, cl_context context, size_t bytes, const void *data,
+                             const char *what, cl_mem *out) BST_MUST_CHECK;
+
 /* A kernel source that was embedded at build time (see cmake/embed.cmake). */
 typedef struct bst_kernel_source {
     const char *name; /* file name, for messages */

@@ -139,6 +139,12 @@ double bst_star_temperature_k(double b_minus_v) {
     return 4600.0 * (1.0 / (x + 1.7) + 1.0 / (x + 0.62));
 }
 
+double bst_star_spectrum_k(double b_minus_v) {
+    double colour = isnan(b_minus_v) ? BST_SUN_B_MINUS_V : b_minus_v;
+    return bst_star_temperature_k(
+        fmin(fmax(colour, COLOUR_FIRST), COLOUR_FIRST + (COLOURS - 1) * COLOUR_STEP));
+}
+
 static bst_status add_panel(bst_ctx *ctx, quadrature *q, double from_m, double to_m) {
     int pieces = (int)ceil((to_m - from_m) / (PANEL_SHARE * from_m));
     for (int p = 0; p < pieces; p++) {

@@ -55,5 +55,8 @@ double bst_sun_irradiance(double wavelength_m);
 
 /* Temperature of a star of colour B-V, K: Ballesteros 2012, equation 14. */
 double bst_star_temperature_k(double b_minus_v);
+/* Temperature of the black body that bst_band_star takes a star of colour B-V (NAN: the Sun's) for,
+ * K: 2725 to 21707. */
+double bst_star_spectrum_k(double b_minus_v);
 
 #endif

@@ -368,6 +368,7 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
                           field->near, &near_count));
     BST_TRY(reserve_sources(ctx, field, star_count + near_count));
     int n = 0;
+    bool coloured = camera->psf && bst_psf_spectra(camera->psf) > 1;
     for (int i = 0; i < star_count; i++) {
         const bst_star *star = &field->stars[i];
         bst_vec3 apparent = bst_light_apparent_star(&light, star->icrs);
@@ -384,6 +385,9 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
                           .sunlit_fraction = NAN,
                           .phase_rad = NAN,
                           .range_m = INFINITY};
+        if (coloured && !isnan(star->b_minus_v)) {
+            bst_psf_colour(camera->psf, bst_star_spectrum_k((double)star->b_minus_v), s->colour);
+        }
         /* the Earth hides stars too: a point far along the line of sight, as it is in axes that
          * move with the Earth, stands for the star */
         bst_vec3 ray = bst_light_apparent_star(&geocentric, star->icrs);
@@ -439,11 +443,12 @@ static bst_image_moments smear_of(const bst_field *field, const bst_source *sour
  * pixel's own width, widened along and across the way from the first to the last
  * position by what the smear has beyond a uniform straight streak of that length (jitter, bends).
  */
-static void blur(const bst_camera *camera, const bst_image_moments *m, double dx, double dy,
-                 double *along, double *across) {
+static void blur(const bst_camera *camera, const bst_source *source, const bst_image_moments *m,
+                 double dx, double dy, double *along, double *across) {
     double psf = bst_camera_psf_sigma_px(camera), sigma;
     if (camera->psf && !bst_psf_gaussian(camera->psf, &sigma) && isfinite(m->x_mean)) {
-        psf = bst_psf_equivalent_fwhm_px(camera->psf, m->x_mean, m->y_mean) / 2.3548200450309493;
+        psf = bst_psf_coloured_fwhm_px(camera->psf, source->colour, m->x_mean, m->y_mean) /
+              2.3548200450309493;
     }
     double variance = psf * psf + 1.0 / 12.0, length = hypot(dx, dy);
     double c = length > 0.0 ? dx / length : 1.0, s = length > 0.0 ? dy / length : 0.0;
@@ -535,8 +540,8 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
     double variance = dark + camera->read_noise_e * camera->read_noise_e;
     double length = hypot(out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px);
     double along, across;
-    blur(camera, &image, out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px, &along,
-         &across);
+    blur(camera, source, &image, out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px,
+         &along, &across);
     if (isfinite(length) && variance > 0.0) {
         out->snr = out->electrons * sqrt(bst_image_squared(along, across, length) / variance);
     }

@@ -47,6 +47,7 @@ typedef struct bst_source {
     const bst_source_rate *rate;   /* NULL: constant; owned likewise */
     const bst_source_shape *shape; /* NULL: a point; owned likewise */
     double electrons_per_s;        /* detected, mean of the exposure */
+    float colour[BST_PSF_COLOURS]; /* of its light (bst_psf_colour); all 0: the Sun's */
     double v_mag;
     double ra_rad, dec_rad; /* as in bst_truth_item */
     double sunlit_fraction, phase_rad, range_m;

@@ -1,6 +1,11 @@
 /* The objects of a field query. */
 #include "sim/world/field_objects.h"
 
+#include "sim/world/psf.h"
+
+/* Instants of the exposure over which what light is made of is averaged. */
+enum { TIMES = 16 };
+
 /* Whether the object's path over the image comes near the window; disc: its angular radius, rad. */
 static bool path_touches(const bst_object_query *q, const bst_source *s, double disc) {
     enum { PIECES = 8 };
@@ -121,6 +126,35 @@ static void add_parts(const bst_camera *camera, const bst_glow *glow, double wei
     shape->thermal += weight * (all - reflected);
 }
 
+/* What is seen at instant k of TIMES, or at mid-exposure where brightness is constant. */
+static bst_sight sight_at(const course *c, const bst_sight *mid, const bst_source *source, int k) {
+    bst_sight sight = *mid;
+    if (source->rate) {
+        bst_view_light(c->query->view, c->object, c->path, c->light, c->query->start_s,
+                       c->query->end_s, (k + 0.5) / TIMES, &sight);
+    }
+    return sight;
+}
+
+/* Sunlight and emission, by their shares of the exposure's light. */
+static void make_colour(const course *c, const bst_sight *mid, bst_source *source) {
+    const bst_camera *camera = c->query->camera;
+    double sum[BST_PSF_COLOURS] = {0}, total = 0.0;
+    for (int k = 0; k < (source->rate ? TIMES : 1); k++) {
+        bst_sight sight = sight_at(c, mid, source, k);
+        double reflected, all = bst_glow_electrons_per_s(camera, &sight.glow, &reflected);
+        float warm[BST_PSF_COLOURS];
+        bst_psf_colour(camera->psf, sight.glow.temperature_k, warm);
+        total += all;
+        for (int s = 0; s < BST_PSF_COLOURS; s++) {
+            sum[s] += (all - reflected) * (double)warm[s];
+        }
+    }
+    for (int s = 0; s < BST_PSF_COLOURS && total > 0.0; s++) {
+        source->colour[s] = (float)(sum[s] / total);
+    }
+}
+
 /* The sphere as a disc, where it spans more than a fifth of a pixel. Its parts are those of the
  * whole exposure. */
 static bool make_shape(const course *c, const bst_sight *mid, const bst_source *source,
@@ -133,13 +167,8 @@ static bool make_shape(const course *c, const bst_sight *mid, const bst_source *
         return false;
     }
     *shape = (bst_source_shape){.radius = radius};
-    enum { TIMES = 16 };
     for (int k = 0; k < (source->rate ? TIMES : 1); k++) {
-        bst_sight sight = *mid;
-        if (source->rate) {
-            bst_view_light(c->query->view, c->object, c->path, c->light, c->query->start_s,
-                           c->query->end_s, (k + 0.5) / TIMES, &sight);
-        }
+        bst_sight sight = sight_at(c, mid, source, k);
         add_parts(camera, &sight.glow, 1.0, shape);
     }
     double all = shape->diffuse + shape->specular + shape->earthshine + shape->thermal;
@@ -193,6 +222,9 @@ bst_status bst_field_object(bst_ctx *ctx, const bst_object_query *q, int object,
     } else {
         out->electrons_per_s =
             mid.occulted ? 0.0 : bst_glow_electrons_per_s(q->camera, &mid.glow, NULL);
+    }
+    if (q->camera->psf && bst_psf_spectra(q->camera->psf) > 1) {
+        make_colour(&c, &mid, out);
     }
     if (make_shape(&c, &mid, out, &parts->shape)) {
         out->shape = &parts->shape;

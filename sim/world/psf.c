@@ -47,7 +47,11 @@ double bst_psf_reach_px(const bst_psf *psf) {
 }
 
 int bst_psf_nodes(const bst_psf *psf) {
-    return psf->columns * psf->rows;
+    return psf->columns * psf->rows * psf->spectra;
+}
+
+int bst_psf_spectra(const bst_psf *psf) {
+    return psf->spectra;
 }
 
 /* Place along one axis of the grid: the lower node and the weight of the upper one. */
@@ -121,14 +125,23 @@ static double equivalent_fwhm(const bst_psf *psf, int node) {
     return FWHM_PER_SIGMA * sqrt(low * high);
 }
 
-double bst_psf_equivalent_fwhm_px(const bst_psf *psf, double x_px, double y_px) {
-    int node[4];
+double bst_psf_coloured_fwhm_px(const bst_psf *psf, const float colour[BST_PSF_COLOURS],
+                                double x_px, double y_px) {
+    int node[4], fields = psf->columns * psf->rows;
     double weight[4], sum = 0.0;
     int nodes = bst_psf_weights(psf, x_px, y_px, node, weight);
     for (int k = 0; k < nodes; k++) {
-        sum += weight[k] * psf->nodes[node[k]].equivalent_fwhm_px;
+        for (int s = 0; s < psf->spectra; s++) {
+            double share = psf->spectra > 1 ? bst_psf_share(colour, s) : 1.0;
+            sum += weight[k] * share * psf->nodes[s * fields + node[k]].equivalent_fwhm_px;
+        }
     }
-    return sum;
+    return fmax(sum, 0.1);
+}
+
+double bst_psf_equivalent_fwhm_px(const bst_psf *psf, double x_px, double y_px) {
+    const float sun[BST_PSF_COLOURS] = {0.0F};
+    return bst_psf_coloured_fwhm_px(psf, sun, x_px, y_px);
 }
 
 void bst_psf_free(bst_psf *psf) {
@@ -139,8 +152,11 @@ void bst_psf_free(bst_psf *psf) {
         free(psf->nodes[k].own_radial.value);
         bst_grid_otf_free(&psf->nodes[k].grid);
     }
+    for (int s = 0; !psf->base && s < psf->spectra; s++) {
+        free(psf->shared[s].value);
+    }
     if (!psf->base) {
-        free(psf->shared.value);
+        free(psf->colours);
     }
     bst_psf_free(psf->base);
     free(psf->nodes);
@@ -245,8 +261,11 @@ bst_status bst_psf_create_from(bst_ctx *ctx, const bst_camera *camera, const bst
                         "optics/field has %d nodes where field_columns times field_rows are %d",
                         optics->field.count, columns * rows);
     }
+    bool coloured = optics->psf == BST_PSF_DIFFRACTION &&
+                    optics->spectrum == BST_SPECTRUM_SOURCES && !inputs->spectrum;
+    int spectra = coloured ? BST_PSF_SPECTRA : 1;
     bst_psf *psf = calloc(1, sizeof *psf);
-    bst_psf_node *nodes = calloc((size_t)(columns * rows), sizeof *nodes);
+    bst_psf_node *nodes = calloc((size_t)(columns * rows * spectra), sizeof *nodes);
     if (!psf || !nodes) {
         free(psf);
         free(nodes);
@@ -257,6 +276,7 @@ bst_status bst_psf_create_from(bst_ctx *ctx, const bst_camera *camera, const bst
                      .fwhm_px = camera->psf_fwhm_px,
                      .columns = columns,
                      .rows = rows,
+                     .spectra = spectra,
                      .width_px = (double)camera->width_px,
                      .height_px = (double)camera->height_px,
                      .diffusion_px = optics->diffusion_px,

@@ -54,7 +54,7 @@ void bst_psf_free(bst_psf *psf);
 bst_status bst_camera_blurred(bst_ctx *ctx, const bst_camera *camera, double sigma_px,
                               bst_camera *out) BST_MUST_CHECK;
 
-/* The OTF at (fx, fy) of a node of the field grid: out = {real, imaginary}. */
+/* The OTF at (fx, fy) of a node: out = {real, imaginary}. */
 void bst_psf_otf(const bst_psf *psf, int node, double fx, double fy, double out[2]);
 
 /* Frequency, cycles/px, beyond which the OTF without the pixel is below 1e-9. */
@@ -64,12 +64,40 @@ double bst_psf_cutoff(const bst_psf *psf);
  * is below 1e-9 of its peak. */
 double bst_psf_reach_px(const bst_psf *psf);
 
-/* Nodes of the field grid; 1: the same PSF all over. */
+/* Nodes: those of the field grid (1: the same PSF all over) for each of the spectra, one spectrum
+ * after the other. */
 int bst_psf_nodes(const bst_psf *psf);
 
-/* The nodes whose PSFs mix bilinearly at a pixel place, and their weights (sum 1). The grid's outer
- * nodes sit on the centres of the sensor's corner pixels; beyond it the border holds. Returns how
- * many there are, 1 to 4; none has weight 0. */
+/* 1, or BST_PSF_SPECTRA where each source has the PSF of its own spectrum: that of the Sun, which
+ * is the first, and of other black bodies mixed with shares that sum to 1. */
+int bst_psf_spectra(const bst_psf *psf);
+
+/* The shares of the spectra after the first for a black body: that keep the photons' mean, mean
+ * square and mean cube of the wavelength in the band. May be negative; of a mix of light they mix
+ * as the photons do. All 0 with one spectrum, and within 2e-5 of it for the Sun. Temperatures are
+ * held above 2400 K, in a thermal band (bst_band_is_thermal, or a middle beyond 3 um) above 150 K.
+ */
+void bst_psf_colour(const bst_psf *psf, double temperature_k, float colour[BST_PSF_COLOURS]);
+
+/* Share of one of the spectra in light of a colour. */
+static inline double bst_psf_share(const float colour[BST_PSF_COLOURS], int spectrum) {
+    double rest = 1.0;
+    for (int s = 0; s < BST_PSF_COLOURS; s++) {
+        if (s + 1 == spectrum) {
+            return (double)colour[s];
+        }
+        rest -= (double)colour[s];
+    }
+    return rest;
+}
+
+/* Bound of the error of a pixel by mixing, over the peak, for the aperture without aberrations and
+ * the colours that stars have (in a thermal band: from 200 K on); 0 with one spectrum. */
+double bst_psf_mixing_error(const bst_psf *psf);
+
+/* The nodes of the first spectrum whose PSFs mix bilinearly at a pixel place, and their weights
+ * (sum 1). The grid's outer nodes sit on the centres of the sensor's corner pixels; beyond it the
+ * border holds. Returns how many there are, 1 to 4; none has weight 0. */
 int bst_psf_weights(const bst_psf *psf, double x_px, double y_px, int node[4], double weight[4]);
 
 /* Whether the PSF is one circular Gaussian all over the field, integrated over full pixels, and its
@@ -85,5 +113,9 @@ double bst_psf_noise_area_px2(const bst_psf *psf, int node);
  * noise-equivalent area as the PSF at a pixel place (mean of the nodes that mix there): the width
  * for a Gaussian filter, and for the signal-to-noise ratio of a smeared image. At least 0.1. */
 double bst_psf_equivalent_fwhm_px(const bst_psf *psf, double x_px, double y_px);
+/* The same of light of a colour: widths mix with the shares, as does all that is smooth in the
+ * wavelength. */
+double bst_psf_coloured_fwhm_px(const bst_psf *psf, const float colour[BST_PSF_COLOURS],
+                                double x_px, double y_px);
 
 #endif

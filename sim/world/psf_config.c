@@ -1,7 +1,7 @@
 #include "sim/world/psf_config.h"
 
 static const char *const psf_models[] = {"gaussian", "moffat", "diffraction", "file", NULL};
-static const char *const spectra[] = {"flat", "solar", NULL};
+static const char *const spectra[] = {"flat", "solar", "sources", NULL};
 static const char *const file_centres[] = {"centroid", "array", NULL};
 static const char *const vignetting_models[] = {"none", "cos4", "polynomial", NULL};
 
@@ -76,8 +76,10 @@ const bst_config_desc bst_optics_config_table[] = {
               "response of camera.band, or 507 to 595 where that has no spectrum."),
     BST_ENUM(
         bst_optics_config, spectrum, spectra, "\"flat\"",
-        "diffraction: photons per wavelength in the band, before its response: equal, or those "
-        "of a black body of 5772 K."),
+        "diffraction: photons per wavelength in the band, before its response: equal, those of a "
+        "black body of 5772 K, or each source's own: sunlight as before, a star by its colour "
+        "B-V, emission by its temperature. `sources` takes four transforms of the frame instead of "
+        "one."),
     BST_INT(bst_optics_config, wavelengths, "", 0, 64, "8",
             "diffraction: wavelengths of the average (Gauss-Legendre); 1: the middle of the band "
             "alone."),

@@ -7,7 +7,11 @@
 
 enum { BST_PSF_GAUSSIAN, BST_PSF_MOFFAT, BST_PSF_DIFFRACTION, BST_PSF_FILE };
 
-enum { BST_SPECTRUM_FLAT, BST_SPECTRUM_SOLAR };
+enum { BST_SPECTRUM_FLAT, BST_SPECTRUM_SOLAR, BST_SPECTRUM_SOURCES };
+
+/* Spectra whose PSFs mix to that of a source with BST_SPECTRUM_SOURCES, and the shares that say
+ * how: those of all but the first, the Sun's, which has the rest. */
+enum { BST_PSF_SPECTRA = 4, BST_PSF_COLOURS = BST_PSF_SPECTRA - 1 };
 
 enum { BST_PSF_CENTROID, BST_PSF_ARRAY };
 

@@ -54,17 +54,38 @@ typedef struct bst_psf_node {
     bst_grid_otf grid;
 } bst_psf_node;
 
+/* Wavelengths of a band's average at most. */
+enum { BST_PSF_WAVELENGTHS = 64 };
+/* The average as a sum: the integral of f is that of weight * f(wavelength). */
+typedef struct bst_psf_rule {
+    int count;
+    double wavelength_m[BST_PSF_WAVELENGTHS], weight[BST_PSF_WAVELENGTHS];
+    double response[BST_PSF_WAVELENGTHS]; /* of the band */
+    bool thermal;
+} bst_psf_rule;
+
+/* Shares of the spectra by temperature, and the error of mixing for an obstruction of diameter
+ * `inner`. q: wavelength times focal ratio over pixel pitch at each wavelength. */
+typedef struct bst_psf_colours bst_psf_colours;
+bst_status bst_psf_colours_create(bst_ctx *ctx, const bst_psf_rule *rule, const double *q,
+                                  double inner,
+                                  bst_psf_colours **out) BST_MUST_CHECK; /* free() it */
+/* Temperature of the black body of a spectrum. */
+double bst_psf_anchor_k(bool thermal, int spectrum);
+
 struct bst_psf {
     atomic_int owners;
     int32_t model;
-    int columns, rows;
+    int columns, rows, spectra;
     double fwhm_px; /* the camera's */
     double width_px, height_px;
     double diffusion_px, fill[2];
     double cutoff, reach_px;
-    bst_psf *base;         /* NULL, or the PSF that lends its tables to this wider one */
-    bst_radial_otf shared; /* diffraction: unaberrated annulus, the same at all nodes */
-    bst_psf_node *nodes;   /* [rows][columns] */
+    bst_psf *base; /* NULL, or the PSF that lends its tables to this wider one */
+    bst_radial_otf shared[BST_PSF_SPECTRA]; /* diffraction: unaberrated annulus, the same at all
+                                               nodes of a spectrum */
+    bst_psf_colours *colours;               /* NULL: one spectrum */
+    bst_psf_node *nodes;                    /* [spectra][rows][columns] */
 };
 
 /* What fills psf->nodes and psf->cutoff for the models that need more than a formula. */

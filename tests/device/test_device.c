@@ -112,6 +112,47 @@ static void philox_is_the_same_on_the_device(void **state) {
     bst_device_close(device);
 }
 
+/* Small and large, with content and without: what is written is read back, and nothing leaks. */
+static void buffers_hold_their_content(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_device *device;
+    bst_assert_ok(&ctx, bst_device_open(&ctx, "", 0, &device));
+    const size_t sizes[] = {4096, 9000000};
+    for (size_t i = 0; i < 2; i++) {
+        unsigned char *data = malloc(sizes[i]), *back = malloc(sizes[i]);
+        for (size_t k = 0; k < sizes[i]; k++) {
+            data[k] = (unsigned char)(k * 2654435761u >> 13);
+        }
+        for (int given = 0; given < 2; given++) {
+            cl_mem buffer;
+            bst_assert_ok(&ctx, bst_device_buffer(&ctx, bst_device_context(device), sizes[i],
+                                                  given ? data : NULL, "a buffer", &buffer));
+            cl_command_queue queue = bst_device_queue(device);
+            if (!given) {
+                assert_int_equal(
+                    clEnqueueWriteBuffer(queue, buffer, CL_TRUE, 0, sizes[i], data, 0, NULL, NULL),
+                    CL_SUCCESS);
+            }
+            memset(back, 0, sizes[i]);
+            assert_int_equal(
+                clEnqueueReadBuffer(queue, buffer, CL_TRUE, 0, sizes[i], back, 0, NULL, NULL),
+                CL_SUCCESS);
+            assert_memory_equal(data, back, sizes[i]);
+            clReleaseMemObject(buffer);
+        }
+        free(data);
+        free(back);
+    }
+    cl_mem none;
+    assert_int_equal(
+        bst_device_buffer(&ctx, bst_device_context(device), 0, NULL, "an empty buffer", &none),
+        BST_ERR_DEVICE);
+    assert_null(none);
+    assert_non_null(strstr(ctx.message, "an empty buffer"));
+    bst_device_close(device);
+}
+
 static void hashes_are_fnv1a_of_the_text(void **state) {
     (void)state;
     unsigned long long hash = 0xCBF29CE484222325u;
@@ -140,6 +181,7 @@ int main(void) {
         cmocka_unit_test(threads_limit_a_cpu_device),
         cmocka_unit_test(build_errors_name_the_file),
         cmocka_unit_test(philox_is_the_same_on_the_device),
+        cmocka_unit_test(buffers_hold_their_content),
         cmocka_unit_test(hashes_are_fnv1a_of_the_text),
         cmocka_unit_test(check_names_the_code),
     };
