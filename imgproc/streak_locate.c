@@ -10,6 +10,8 @@
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
 /* A point this many times brighter than the streak under it is a source of its own. */
 enum { MOST_PIECES = 64 };
+/* Points per pixel from which bright streaks are no longer looked for among them. */
+static const double CROWD_PER_PX = 0.0015;
 /* From here a source is a point unless it covers that much more than a point's pixels. */
 static const double BRIGHT_POINT_SNR = 12.0, AREA_SHARE = 1.6, AREA_PIXELS = 10.0;
 static const double OWN_LIGHT = 3.0, OWN_LIGHT_SNR = 6.0, LOST_SNR = 1.5;
@@ -315,7 +317,10 @@ void bst_streak_locate(bst_streak_locator *l, const bst_locate_frame *f,
                         saturated ? 1.5 : 1.0);
         }
     }
-    add(l, f, found, points, bst_streak_search_bright(&l->search));
+    /* among so many points chains of them are everywhere */
+    if (candidates->count < CROWD_PER_PX * (double)f->width * (double)f->height) {
+        add(l, f, found, points, bst_streak_search_bright(&l->search));
+    }
     for (int i = 0; i < points; i++) {
         const bst_found *o = &found->found[i];
         if (!o->dropped) {
