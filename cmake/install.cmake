@@ -10,7 +10,7 @@ include(CMakePackageConfigHelpers)
 if(NOT BORESIGHT_SANITIZE AND NOT BORESIGHT_FUZZ)
   set(BST_VISIBLE ${PROJECT_SOURCE_DIR}/cmake/libboresight.map)
   set(parts bst_core bst_astro bst_device bst_world bst_io bst_engine bst_eval bst_scenegen
-    bst_gimbal bst_imgproc bst_tracker bst_control bst_registry)
+    bst_gimbal bst_imgproc bst_tracker bst_control bst_obsgen bst_registry)
   # all objects of each part, not only what others call; the archives then add nothing but what the
   # parts themselves link
   list(TRANSFORM parts REPLACE ".+" "$<TARGET_OBJECTS:\\0>" OUTPUT_VARIABLE objects)
@@ -51,7 +51,7 @@ if(NOT BORESIGHT_SANITIZE AND NOT BORESIGHT_FUZZ)
     PATTERN "sim/astro/eop_table.h" EXCLUDE
     PATTERN "sim/*/data" EXCLUDE
     ${inner})
-  foreach(header control/modules.h gimbal/modules.h imgproc/imgproc.h imgproc/motion.h
+  foreach(header control/modules.h gimbal/modules.h imgproc/imgproc.h obsgen/obsgen.h
       scenegen/module.h sim/app/registry.h tracker/module.h)
     get_filename_component(folder ${header} DIRECTORY)
     install(FILES ${header} DESTINATION ${headers}/${folder})

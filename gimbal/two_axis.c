@@ -116,8 +116,9 @@ void bst_two_axis_step(bst_two_axis *plant, const bst_los_command *command, doub
     double off_o = (outer->angle_rad - angle[0]) * cross, off_i = inner->angle_rad - angle[1];
     double rate_o = (outer->rate_radps - rate[0]) * cross, rate_i = inner->rate_radps - rate[1];
     double settle_rate = plant->settle_tolerance_rad * outer->spec.natural_frequency_radps;
-    plant->settled = command && hypot(off_o, off_i) <= plant->settle_tolerance_rad &&
-                     hypot(rate_o, rate_i) <= settle_rate;
+    double tolerance = plant->settle_tolerance_rad;
+    plant->settled = command && off_o * off_o + off_i * off_i <= tolerance * tolerance &&
+                     rate_o * rate_o + rate_i * rate_i <= settle_rate * settle_rate;
     plant->limited = at_stop || outer->limited || inner->limited;
 
     if (fabs(outer->reference_rad) > BST_PI) {

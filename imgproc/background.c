@@ -9,7 +9,10 @@
 /* no pixel is better known than its step: 1 / sqrt(12) */
 static const float QUANTISATION = 0.28867513f;
 
-enum { SAMPLE = 256, CLIP_PASSES = 2, ENOUGH_PIXELS = 2048 };
+enum { SAMPLE = 100, CLIP_PASSES = 4 };
+
+/* agreement asked of opposite neighbours, standard errors */
+static const float AGREEMENT = 4.0f;
 
 bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int max_height,
                                  bst_background *out) {
@@ -19,10 +22,18 @@ bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int m
     size_t columns = (size_t)out->max_columns, meshes = columns * (size_t)out->max_rows;
     out->level = calloc(meshes, sizeof(float));
     out->noise = calloc(meshes, sizeof(float));
-    out->scratch = calloc(meshes > SAMPLE ? meshes : SAMPLE, sizeof(float));
+    out->error = calloc(meshes, sizeof(float));
+    out->scratch = calloc(2 * meshes, sizeof(float));
+    /* a mesh at the end may be half as long again */
+    size_t tile_width = (size_t)(mesh_px + mesh_px / 2 + 1);
+    size_t tile_height = tile_width < (size_t)max_height ? tile_width : (size_t)max_height;
+    tile_width = tile_width < (size_t)max_width ? tile_width : (size_t)max_width;
+    out->tile = tile_width * tile_height;
+    out->tiles = calloc(out->tile * (size_t)out->max_rows, sizeof(float));
     out->row_level = calloc(columns, sizeof(float));
     out->row_noise = calloc(columns, sizeof(float));
-    if (!out->level || !out->noise || !out->scratch || !out->row_level || !out->row_noise) {
+    if (!out->level || !out->noise || !out->error || !out->scratch || !out->tiles ||
+        !out->row_level || !out->row_noise) {
         bst_background_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu background meshes", meshes);
     }
@@ -32,7 +43,9 @@ bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int m
 void bst_background_free(bst_background *b) {
     free(b->level);
     free(b->noise);
+    free(b->error);
     free(b->scratch);
+    free(b->tiles);
     free(b->row_level);
     free(b->row_noise);
     *b = (bst_background){0};
@@ -70,8 +83,9 @@ static float select_kth(float *values, int count, int k) {
 }
 
 /* First guess from at most SAMPLE pixels spread over the mesh. False when none is usable. */
-static bool first_guess(bst_background *b, const float *image, int stride, int width, int height,
-                        float step_e, float *level, float *noise) {
+static bool first_guess(const float *tile, int width, int height, float step_e, float *level,
+                        float *noise) {
+    float sample[SAMPLE];
     int total = width * height;
     int step = (total + SAMPLE - 1) / SAMPLE;
     /* a step that shares a factor with the width would sample a few columns only */
@@ -80,36 +94,40 @@ static bool first_guess(bst_background *b, const float *image, int stride, int w
     }
     int count = 0;
     for (int i = 0; i < total && count < SAMPLE; i += step) {
-        float v = image[(size_t)(i / width) * (size_t)stride + (size_t)(i % width)];
-        if (v > BST_PIXEL_NONE) {
-            b->scratch[count++] = v;
+        if (tile[i] > BST_PIXEL_NONE) {
+            sample[count++] = tile[i];
+        }
+    }
+    for (int i = 0; i < total && count == 0; i++) {
+        if (tile[i] > BST_PIXEL_NONE) {
+            sample[count++] = tile[i];
         }
     }
     if (count == 0) {
         return false;
     }
-    float median = select_kth(b->scratch, count, count / 2);
+    float median = select_kth(sample, count, count / 2);
     for (int i = 0; i < count; i++) {
-        b->scratch[i] = fabsf(b->scratch[i] - median);
+        sample[i] = fabsf(sample[i] - median);
     }
     *level = median;
     /* coarse steps make the median deviation anything from 0 up: leave room for a step */
-    *noise = fmaxf(1.4826f * select_kth(b->scratch, count, count / 2), step_e);
+    *noise = fmaxf(1.4826f * select_kth(sample, count, count / 2), step_e);
     return true;
 }
 
-static bool estimate_mesh(bst_background *b, const float *image, int stride, int width, int height,
-                          float step_e, float *level, float *noise) {
-    if (!first_guess(b, image, stride, width, height, step_e, level, noise)) {
+static bool estimate_mesh(const float *tile, int width, int height, float step_e, float *level,
+                          float *noise, float *error) {
+    *error = 1.0f;
+    if (!first_guess(tile, width, height, step_e, level, noise)) {
         return false;
     }
-    int row_step = width * height >= 2 * ENOUGH_PIXELS ? 2 : 1;
     for (int pass = 0; pass < CLIP_PASSES; pass++) {
         bst_row_sums sums = {0};
         float limit = fmaxf(3.0f * *noise, 1.5f * step_e);
-        for (int y = 0; y < height; y += row_step) {
-            bst_row_clipped_sums(image + (size_t)y * (size_t)stride, width, *level, limit, &sums);
-        }
+        /* the first passes need not be exact */
+        int whole = width * height, part = pass + 2 < CLIP_PASSES ? whole / 2 : whole;
+        bst_row_clipped_sums(tile + (pass % 2) * (whole - part), part, *level, limit, &sums);
         double n = 0.0, s = 0.0, q = 0.0;
         for (int i = 0; i < BST_ROW_LANES; i++) {
             n += (double)sums.count[i];
@@ -124,8 +142,83 @@ static bool estimate_mesh(bst_background *b, const float *image, int stride, int
         double variance = fmax(q - n * mean * mean, 0.0) / ((n - 1.0) * 0.97334);
         *level += (float)mean;
         *noise = fmaxf((float)sqrt(variance), QUANTISATION * step_e);
+        *error = (float)(1.0 / sqrt(n));
     }
     return true;
+}
+
+/* Level and noise of a sum of normal noise and counted electrons from the moments of what was left
+ * within 3 sigma. To the second order of Edgeworth's series the clipped mean lies CLIPPED_MEAN
+ * times the skewness (in sigma) off, and the clipped variance CLIPPED_EXCESS times the excess
+ * kurtosis plus CLIPPED_SKEW times the squared skewness: integrals of He3 / 6, He4 / 24 and He6 /
+ * 72 under the normal density from -3 to 3. */
+static void undo_clipping(double read_variance, float *level, float *noise) {
+    static const double CLIPPED_MEAN = -0.0400, CLIPPED_EXCESS = -0.0755, CLIPPED_SKEW = -0.0473;
+    double variance = (double)*noise * (double)*noise;
+    double counted = fmax(variance - read_variance, 0.0);
+    double skewness = fmin(counted / (variance * (double)*noise), 1.0);
+    double excess = fmin(counted / (variance * variance), 1.0);
+    *level -= (float)(CLIPPED_MEAN * skewness * (double)*noise);
+    *noise *=
+        (float)(1.0 / sqrt(1.0 + CLIPPED_EXCESS * excess + CLIPPED_SKEW * skewness * skewness));
+}
+
+typedef struct reading {
+    bst_background *b;
+    double read_variance;
+    bst_pixel_fn pixels;
+    const void *user;
+    float step_e;
+} reading;
+
+/* Meshes of rows begin to end. */
+static void read_rows(void *user, int begin, int end) {
+    const reading *r = user;
+    bst_background *b = r->b;
+    for (int j = begin; j < end; j++) {
+        float *tile = b->tiles + (size_t)j * b->tile;
+        int y0 = j * b->mesh_px, y1 = j + 1 == b->rows ? b->height : y0 + b->mesh_px;
+        for (int i = 0; i < b->columns; i++) {
+            int x0 = i * b->mesh_px, x1 = i + 1 == b->columns ? b->width : x0 + b->mesh_px;
+            int k = j * b->columns + i, width = x1 - x0;
+            for (int y = y0; y < y1; y++) {
+                r->pixels(r->user, y, x0, width, tile + (size_t)(y - y0) * (size_t)width);
+            }
+            if (estimate_mesh(tile, width, y1 - y0, r->step_e, &b->level[k], &b->noise[k],
+                              &b->error[k])) {
+                undo_clipping(r->read_variance, &b->level[k], &b->noise[k]);
+            } else {
+                b->noise[k] = -1.0f;
+            }
+        }
+    }
+}
+
+/* Mean of `values` with the opposite neighbours that agree; error(k) is the standard error. */
+static void smooth(bst_background *b, float *values, bool of_noise) {
+    static const int across[4][2] = {{1, 0}, {0, 1}, {1, 1}, {1, -1}};
+    float *copy = b->scratch;
+    memcpy(copy, values, (size_t)(b->columns * b->rows) * sizeof *copy);
+    for (int j = 0; j < b->rows; j++) {
+        for (int i = 0; i < b->columns; i++) {
+            int k = j * b->columns + i;
+            float sum = copy[k], weight = 1.0f;
+            /* a standard deviation is known to sqrt(1/2) of the error of a mean */
+            float error = b->error[k] * b->noise[k] * (of_noise ? 0.70710678f : 1.0f);
+            for (int d = 0; d < 4; d++) {
+                int u = across[d][0], v = across[d][1];
+                if (i - u < 0 || i + u >= b->columns || j - abs(v) < 0 || j + abs(v) >= b->rows) {
+                    continue;
+                }
+                float pair = copy[k + v * b->columns + u] + copy[k - v * b->columns - u];
+                if (fabsf(0.5f * pair - copy[k]) < AGREEMENT * 1.2247449f * error) {
+                    sum += pair;
+                    weight += 2.0f;
+                }
+            }
+            values[k] = sum / weight;
+        }
+    }
 }
 
 static float median_of(bst_background *b, const float *values, int count) {
@@ -133,26 +226,69 @@ static float median_of(bst_background *b, const float *values, int count) {
     return select_kth(b->scratch, count, count / 2);
 }
 
-void bst_background_estimate(bst_background *b, const float *image, int width, int height,
-                             float step_e) {
+/* Change of level over a mesh along one axis: the smaller of both sides' where they agree in sign.
+ */
+static float slope_at(const float *level, int stride, bool before, bool after) {
+    float a = before ? level[0] - level[-stride] : after ? level[stride] - level[0] : 0.0f;
+    float c = after ? level[stride] - level[0] : a;
+    return a * c <= 0.0f ? 0.0f : fabsf(a) < fabsf(c) ? a : c;
+}
+
+/* A slope of the level over a mesh adds a twelfth of its square to the variance there. */
+static void take_slope_off(bst_background *b) {
+    for (int j = 0; j < b->rows; j++) {
+        for (int i = 0; i < b->columns; i++) {
+            int k = j * b->columns + i;
+            float x = slope_at(b->level + k, 1, i > 0, i + 1 < b->columns);
+            float y = slope_at(b->level + k, b->columns, j > 0, j + 1 < b->rows);
+            float variance = b->noise[k] * b->noise[k];
+            b->noise[k] = sqrtf(fmaxf(variance - (x * x + y * y) / 12.0f, 0.25f * variance));
+        }
+    }
+}
+
+static void fill_gaps(bst_background *b, float step_e);
+
+void bst_background_read(bst_background *b, bst_parallel *pool, bst_pixel_fn pixels,
+                         const void *user, int width, int height, float step_e,
+                         double read_variance_e2) {
     b->width = width;
     b->height = height;
     /* a rest narrower than half a mesh joins its neighbour */
     int half = b->mesh_px / 2;
     b->columns = (width + half) / b->mesh_px > 0 ? (width + half) / b->mesh_px : 1;
     b->rows = (height + half) / b->mesh_px > 0 ? (height + half) / b->mesh_px : 1;
+    reading r = {b, read_variance_e2, pixels, user, step_e};
+    /* a small frame is done before another thread wakes */
+    int grain = 65536 / (width * b->mesh_px) + 1;
+    bst_parallel_for(pool, b->rows, grain, read_rows, &r);
+    fill_gaps(b, step_e);
+    smooth(b, b->level, false);
+    take_slope_off(b);
+    smooth(b, b->noise, true);
+}
+
+typedef struct picture {
+    const float *pixels;
+    int width;
+} picture;
+
+static void of_picture(const void *user, int y, int x, int count, float *out) {
+    const picture *p = user;
+    memcpy(out, p->pixels + (size_t)y * (size_t)p->width + (size_t)x, (size_t)count * sizeof *out);
+}
+
+void bst_background_estimate(bst_background *b, const float *image, int width, int height,
+                             float step_e) {
+    picture p = {image, width};
+    bst_background_read(b, NULL, of_picture, &p, width, height, step_e, INFINITY);
+}
+
+/* Medians of the frame, which also stand for meshes without usable pixels. */
+static void fill_gaps(bst_background *b, float step_e) {
     int good = 0;
-    for (int j = 0; j < b->rows; j++) {
-        int y0 = j * b->mesh_px, y1 = j + 1 == b->rows ? height : y0 + b->mesh_px;
-        for (int i = 0; i < b->columns; i++) {
-            int x0 = i * b->mesh_px, x1 = i + 1 == b->columns ? width : x0 + b->mesh_px;
-            int k = j * b->columns + i;
-            b->noise[k] = -1.0f;
-            if (estimate_mesh(b, image + (size_t)y0 * (size_t)width + (size_t)x0, width, x1 - x0,
-                              y1 - y0, step_e, &b->level[k], &b->noise[k])) {
-                good++;
-            }
-        }
+    for (int k = 0; k < b->columns * b->rows; k++) {
+        good += b->noise[k] > 0.0f;
     }
     int count = b->columns * b->rows;
     b->median_level = 0.0f;
@@ -202,9 +338,13 @@ static int mesh_position(double p, int mesh, int count, float *fraction) {
     return i;
 }
 
-static void interpolate_rows(const bst_background *b, const float *values, int y, float *out) {
+static void interpolate_rows(const bst_background *b, const float *values, int y, bool beyond,
+                             float *out) {
     float f;
     int j = mesh_position(y, b->mesh_px, b->rows, &f);
+    if (beyond && b->rows > 1) {
+        f = ((float)y + 0.5f) / (float)b->mesh_px - 0.5f - (float)j;
+    }
     const float *a = values + (size_t)j * (size_t)b->columns;
     const float *c = b->rows > 1 ? a + b->columns : a;
     for (int i = 0; i < b->columns; i++) {
@@ -213,7 +353,7 @@ static void interpolate_rows(const bst_background *b, const float *values, int y
 }
 
 /* Straight lines between mesh centres. */
-static void expand_row(const bst_background *b, const float *nodes, float *out) {
+static void expand_row(const bst_background *b, const float *nodes, bool beyond, float *out) {
     int x = 0;
     float step = 1.0f / (float)b->mesh_px;
     float centre = 0.5f * (float)(b->mesh_px - 1);
@@ -221,10 +361,14 @@ static void expand_row(const bst_background *b, const float *nodes, float *out) 
         int end =
             i + 1 < b->columns ? (int)ceilf(centre + (float)((i + 1) * b->mesh_px)) : b->width;
         end = end < b->width ? end : b->width;
-        float left = nodes[i < 0 ? 0 : i];
-        float right = nodes[i + 1 < b->columns ? i + 1 : b->columns - 1];
-        float slope = (right - left) * step;
-        float origin = centre + (float)(i * b->mesh_px);
+        /* which two nodes the line goes through */
+        int a = i < 0 ? 0 : i, c = i + 1 < b->columns ? i + 1 : b->columns - 1;
+        if (beyond && b->columns > 1) {
+            a = i < 0 ? 0 : i + 1 < b->columns ? i : b->columns - 2;
+            c = a + 1;
+        }
+        float left = nodes[a], slope = (nodes[c] - left) * step;
+        float origin = centre + (float)(a * b->mesh_px);
         for (; x < end; x++) {
             out[x] = left + slope * ((float)x - origin);
         }
@@ -232,13 +376,13 @@ static void expand_row(const bst_background *b, const float *nodes, float *out) 
 }
 
 void bst_background_row(const bst_background *b, int y, float *level, float *inverse_noise) {
-    interpolate_rows(b, b->level, y, b->row_level);
-    interpolate_rows(b, b->noise, y, b->row_noise);
+    interpolate_rows(b, b->level, y, true, b->row_level);
+    interpolate_rows(b, b->noise, y, false, b->row_noise);
     for (int i = 0; i < b->columns; i++) {
         b->row_noise[i] = 1.0f / b->row_noise[i];
     }
-    expand_row(b, b->row_level, level);
-    expand_row(b, b->row_noise, inverse_noise);
+    expand_row(b, b->row_level, true, level);
+    expand_row(b, b->row_noise, false, inverse_noise);
 }
 
 double bst_background_noise_at(const bst_background *b, double x_px, double y_px) {

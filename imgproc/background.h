@@ -4,6 +4,7 @@
 
 #include <stdbool.h>
 
+#include "sim/core/parallel.h"
 #include "sim/core/status.h"
 
 /* Values of pixels that hold no measurement. Anything below BST_PIXEL_NONE is one of them. */
@@ -15,24 +16,39 @@ typedef struct bst_background {
     int mesh_px, max_columns, max_rows;
     int width, height, columns, rows; /* of the latest frame */
     float *level, *noise;             /* [rows][columns], electrons */
-    float *scratch;                   /* sample of a mesh; later all meshes, for medians */
+    float *error;                     /* [rows][columns]: standard error of level over noise */
+    float *scratch;                   /* all meshes, for medians and smoothing */
+    float *tiles;                     /* [rows] tiles of one mesh's pixels */
+    size_t tile;                      /* floats of a tile */
     float *row_level, *row_noise;     /* [columns], for one image row */
     float median_level, median_noise;
 } bst_background;
+
+/* Writes `count` pixels of row y from column x on, electrons or BST_PIXEL_... values. Called from
+ * several threads at a time. */
+typedef void (*bst_pixel_fn)(const void *user, int y, int x, int count, float *out);
 
 bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int max_height,
                                  bst_background *out) BST_MUST_CHECK;
 void bst_background_free(bst_background *background);
 
-/* Estimates level and noise in each mesh of image [height][width]: median and median absolute
- * deviation of a sample, then mean and standard deviation within 3 sigma, twice, on every second
- * row of a large mesh, the deviation corrected for the clipping. noise_floor (> 0) is the least
- * noise reported. A mesh without usable pixels takes the frame's medians. */
+/* Estimates level and noise in each mesh of a frame: median and median absolute deviation of a
+ * sample, then mean and standard deviation within 3 sigma, four times. Both are corrected for the
+ * clipping, which takes more off the long tail of counted electrons (variance beyond
+ * read_variance_e2) than off the other; the deviation also for the slope of the level. step_e (> 0)
+ * is a digital number's worth of electrons; no pixel is better known than it. A mesh without usable
+ * pixels takes the frame's medians. Then each mesh takes the mean with those pairs of opposite
+ * neighbours whose mean agrees with it to four standard errors: a slope stays what it is, and where
+ * the sky is even the error falls to a third. */
+void bst_background_read(bst_background *background, bst_parallel *pool, bst_pixel_fn pixels,
+                         const void *user, int width, int height, float step_e,
+                         double read_variance_e2);
+/* The same of image [height][width] whose noise is normal. */
 void bst_background_estimate(bst_background *background, const float *image, int width, int height,
                              float step_e);
 
-/* Level and 1 / noise for every pixel of image row y, bilinear between mesh centres, constant
- * outside them. */
+/* Level and 1 / noise for every pixel of image row y, bilinear between mesh centres; outside them
+ * the level goes on as it did, the noise stays. */
 void bst_background_row(const bst_background *background, int y, float *level,
                         float *inverse_noise);
 /* Noise at a place. */

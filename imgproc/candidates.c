@@ -2,151 +2,161 @@
 
 #include <math.h>
 #include <stdlib.h>
-
-#include "imgproc/heapsort.h"
+#include <string.h>
 
 static const float SADDLE_SIGMA = 3.0f, SADDLE_SHARE = 0.15f;
 
 bst_status bst_candidates_create(bst_ctx *ctx, int max_width, int max_height, bst_candidates *out) {
-    size_t pixels = (size_t)max_width * (size_t)max_height;
     /* maxima of an 8-connected neighbourhood cannot be denser than one in four */
     *out = (bst_candidates){.capacity = ((max_width + 1) / 2) * ((max_height + 1) / 2)};
-    out->pixel = calloc(pixels, sizeof *out->pixel);
-    out->owner = calloc(pixels, sizeof *out->owner);
-    out->items = calloc((size_t)out->capacity, sizeof *out->items);
-    out->order = calloc((size_t)out->capacity, sizeof *out->order);
-    out->parent = calloc((size_t)out->capacity, sizeof *out->parent);
-    bst_status status = BST_OK;
-    if (!out->pixel || !out->owner || !out->items || !out->order || !out->parent) {
-        status = bst_fail(ctx, BST_ERR_MEMORY, "no memory for the candidates of a %d x %d frame",
-                          max_width, max_height);
-    } else {
-        status = bst_cv_components_create(ctx, max_width, max_height, &out->components);
-    }
-    if (status != BST_OK) {
+    size_t n = (size_t)out->capacity;
+    out->items = calloc(n, sizeof *out->items);
+    out->order = calloc(n, sizeof *out->order);
+    out->maxima = calloc(n, sizeof *out->maxima);
+    out->row = calloc((size_t)max_height + 1, sizeof *out->row);
+    out->stands = calloc(n, sizeof *out->stands);
+    out->order_swap = calloc(n, sizeof *out->order_swap);
+    out->key = calloc(n, sizeof *out->key);
+    out->key_swap = calloc(n, sizeof *out->key_swap);
+    if (!out->items || !out->order || !out->maxima || !out->row || !out->stands ||
+        !out->order_swap || !out->key || !out->key_swap) {
         bst_candidates_free(out);
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the candidates of a %d x %d frame",
+                        max_width, max_height);
     }
-    return status;
+    return BST_OK;
 }
 
 void bst_candidates_free(bst_candidates *c) {
-    bst_cv_components_free(c->components);
-    free(c->pixel);
-    free(c->owner);
     free(c->items);
     free(c->order);
-    free(c->parent);
+    free(c->maxima);
+    free(c->row);
+    free(c->stands);
+    free(c->order_swap);
+    free(c->key);
+    free(c->key_swap);
     *c = (bst_candidates){0};
 }
 
-static bool brighter_pixel(const void *context, int a, int b) {
-    const float *map = context;
-    return map[a] > map[b] || (map[a] == map[b] && a < b);
+/* Whether the SNR stays above `least` on the pixels nearest to the straight way between two. */
+static bool is_ridge(const bst_filter *f, const bst_candidate *a, const bst_candidate *b,
+                     float least) {
+    int dx = b->x - a->x, dy = b->y - a->y;
+    int steps = abs(dx) > abs(dy) ? abs(dx) : abs(dy);
+    for (int i = 1; i < steps; i++) {
+        float t = (float)i / (float)steps;
+        int x = a->x + (int)lroundf(t * (float)dx), y = a->y + (int)lroundf(t * (float)dy);
+        if (!(bst_filter_best_at(f, x, y) > least)) {
+            return false;
+        }
+    }
+    return true;
 }
 
-static bool brighter_candidate(const bst_candidate *a, const bst_candidate *b) {
+static bool higher(const bst_candidate *a, const bst_candidate *b) {
     if (a->snr != b->snr) {
         return a->snr > b->snr;
     }
     return a->y != b->y ? a->y < b->y : a->x < b->x;
 }
 
-static int32_t root_of(bst_candidates *c, int32_t i) {
-    while (c->parent[i] != i) {
-        c->parent[i] = c->parent[c->parent[i]];
-        i = c->parent[i];
-    }
-    return i;
-}
+typedef struct search {
+    bst_candidates *c;
+    const bst_filter *f;
+    int reach;
+    float floor, certain;
+    bst_candidate_fn accept;
+    const void *user;
+} search;
 
-/* Floods the component from its brightest pixel down; `first` is its first candidate. */
-static void split_component(bst_candidates *c, const bst_filter *f, int pixels, int first) {
-    int width = f->width, height = f->height;
-    for (int k = 0; k < pixels; k++) {
-        int p = c->pixel[k], x = p % width, y = p / width;
-        float value = f->best[p];
-        int32_t owner = -1;
-        for (int dy = -1; dy <= 1; dy++) {
-            for (int dx = -1; dx <= 1; dx++) {
-                int nx = x + dx, ny = y + dy;
-                if (nx < 0 || ny < 0 || nx >= width || ny >= height) {
-                    continue;
-                }
-                int32_t other = c->owner[ny * width + nx] - 1;
-                if (other < 0) {
-                    continue;
-                }
-                other = root_of(c, other);
-                if (owner < 0 || owner == other) {
-                    owner = other;
-                    continue;
-                }
-                int32_t high = owner, low = other;
-                if (brighter_candidate(&c->items[low], &c->items[high])) {
-                    high = other;
-                    low = owner;
-                }
-                float peak = c->items[low].snr;
-                if (peak - value < fmaxf(SADDLE_SIGMA, SADDLE_SHARE * peak)) {
-                    c->parent[low] = high;
-                    c->items[high].pixels += c->items[low].pixels;
-                }
-                owner = high;
+static bool stands_alone(const search *s, const bst_candidate *m) {
+    const bst_candidates *c = s->c;
+    float least = fmaxf(m->snr - fmaxf(SADDLE_SIGMA, SADDLE_SHARE * m->snr), s->floor);
+    int top = m->y - s->reach > 0 ? m->y - s->reach : 0;
+    int bottom = m->y + s->reach < s->f->height ? m->y + s->reach : s->f->height - 1;
+    for (int y = top; y <= bottom; y++) {
+        int lo = c->row[y], hi = c->row[y + 1], end = hi;
+        while (lo < hi) { /* the first within reach */
+            int middle = lo + (hi - lo) / 2;
+            if (c->maxima[middle].x < m->x - s->reach) {
+                lo = middle + 1;
+            } else {
+                hi = middle;
             }
         }
-        if (owner < 0) {
-            owner = c->count++;
-            c->items[owner] = (bst_candidate){x, y, value, 0};
-            c->parent[owner] = owner;
-        }
-        c->items[owner].pixels++;
-        c->owner[p] = owner + 1;
-    }
-    for (int k = 0; k < pixels; k++) {
-        c->owner[c->pixel[k]] = 0;
-    }
-    /* keep the roots */
-    int kept = first;
-    for (int i = first; i < c->count; i++) {
-        if (c->parent[i] == i) {
-            c->items[kept++] = c->items[i];
-        }
-    }
-    c->count = kept;
-}
-
-static bool before_candidate(const void *context, int a, int b) {
-    const bst_candidate *items = context;
-    return brighter_candidate(&items[a], &items[b]);
-}
-
-bst_status bst_candidates_find(bst_ctx *ctx, bst_candidates *c, const bst_filter *f) {
-    c->count = 0;
-    if (f->last_row < f->first_row) {
-        return BST_OK;
-    }
-    const int32_t *labels;
-    int stride, count, width = f->width;
-    BST_TRY(bst_cv_components_label(ctx, c->components,
-                                    f->mask + (size_t)f->first_row * (size_t)width, width,
-                                    f->last_row - f->first_row + 1, &labels, &stride, &count));
-    for (int label = 1; label < count; label++) {
-        bst_cv_box box = bst_cv_components_box(c->components, label);
-        int pixels = 0;
-        for (int y = box.y; y < box.y + box.height; y++) {
-            const int32_t *row = labels + (size_t)y * (size_t)stride;
-            for (int x = box.x; x < box.x + box.width; x++) {
-                if (row[x] == label) {
-                    c->pixel[pixels++] = (y + f->first_row) * width + x;
-                }
+        for (; lo < end && c->maxima[lo].x <= m->x + s->reach; lo++) {
+            const bst_candidate *other = &c->maxima[lo];
+            if (other != m && higher(other, m) && is_ridge(s->f, m, other, least)) {
+                return false;
             }
         }
-        bst_heapsort_indices(c->pixel, pixels, brighter_pixel, f->best);
-        split_component(c, f, pixels, c->count);
     }
+    return true;
+}
+
+static void decide(void *user, int begin, int end) {
+    const search *s = user;
+    for (int i = begin; i < end; i++) {
+        const bst_candidate *m = &s->c->maxima[i];
+        s->c->stands[i] =
+            stands_alone(s, m) && (m->snr > s->certain || s->accept(s->user, m)) ? 1 : 0;
+    }
+}
+
+/* order: by falling SNR, of equals as they are: a stable radix sort. The bits of positive floats
+ * sort as the floats do. */
+static void sort_items(bst_candidates *c) {
+    enum { BITS = 11, BINS = 1 << BITS, PASSES = 3 };
     for (int i = 0; i < c->count; i++) {
+        uint32_t bits;
+        memcpy(&bits, &c->items[i].snr, sizeof bits);
+        c->key[i] = ~bits;
         c->order[i] = i;
     }
-    bst_heapsort_indices(c->order, c->count, before_candidate, c->items);
-    return BST_OK;
+    for (int pass = 0; pass < PASSES; pass++) {
+        int bins[BINS] = {0}, sum = 0;
+        for (int i = 0; i < c->count; i++) {
+            bins[c->key[i] >> (pass * BITS) & (BINS - 1)]++;
+        }
+        for (int b = 0; b < BINS; b++) {
+            int n = bins[b];
+            bins[b] = sum;
+            sum += n;
+        }
+        for (int i = 0; i < c->count; i++) {
+            int to = bins[c->key[i] >> (pass * BITS) & (BINS - 1)]++;
+            c->key_swap[to] = c->key[i];
+            c->order_swap[to] = c->order[i];
+        }
+        uint32_t *key = c->key;
+        int *order = c->order;
+        c->key = c->key_swap;
+        c->order = c->order_swap;
+        c->key_swap = key;
+        c->order_swap = order;
+    }
+}
+
+void bst_candidates_find(bst_candidates *c, bst_parallel *pool, const bst_filter *f, int reach_px,
+                         float floor, float certain, bst_candidate_fn accept, const void *user) {
+    int maxima = 0;
+    for (int y = 0; y < f->height; y++) {
+        size_t at = (size_t)y * (size_t)f->max_width;
+        c->row[y] = maxima;
+        for (int i = 0; i < f->maxima[y]; i++) {
+            c->maxima[maxima++] =
+                (bst_candidate){f->maximum_x[at + (size_t)i], y, f->maximum_snr[at + (size_t)i]};
+        }
+    }
+    c->row[f->height] = maxima;
+    search s = {c, f, reach_px, floor, certain, accept, user};
+    bst_parallel_for(pool, maxima, 256, decide, &s);
+    c->count = 0;
+    for (int i = 0; i < maxima; i++) {
+        if (c->stands[i]) {
+            c->items[c->count++] = c->maxima[i];
+        }
+    }
+    sort_items(c);
 }

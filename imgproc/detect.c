@@ -7,6 +7,12 @@
 #include "imgproc/locate.h"
 #include "imgproc/rows.h"
 #include "imgproc/streak_locate.h"
+#include "imgproc/tail.h"
+
+/* Maxima are looked at in between the pixels from this share of the threshold on at the least. */
+static const double LOOK_SHARE = 0.65;
+/* Above the threshold by this no skewness of noise matters. */
+static const double CERTAIN_ABOVE = 1.5;
 
 struct bst_imgproc {
     bst_camera camera;
@@ -20,6 +26,7 @@ struct bst_imgproc {
     bst_candidates candidates;
     bst_locator locator;
     bst_streak_locator streaks; /* only when config.streak_search_px > 0 */
+    bst_parallel *pool;
     int *order;
     /* of the latest frame */
     double exposure_s, binning, streak_px;
@@ -64,12 +71,13 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a frame of %d x %d", width, height);
     }
     BST_TRY(make_bad_map(ctx, ip));
+    BST_TRY(bst_parallel_create(ctx, (int)ip->config.threads, &ip->pool));
     BST_TRY(bst_background_create(ctx, (int)ip->config.mesh_px, width, height, &ip->background));
     BST_TRY(bst_filter_create(ctx, width, height, streak, &ip->filter));
     BST_TRY(bst_candidates_create(ctx, width, height, &ip->candidates));
-    BST_TRY(bst_locator_create(ctx, capacity, height, side, &ip->locator));
+    BST_TRY(bst_locator_create(ctx, capacity, width, height, side, &ip->locator));
     return ip->config.streak_search_px > 0.0
-               ? bst_streak_locator_create(ctx, &ip->locator.psf, width, height, fwhm,
+               ? bst_streak_locator_create(ctx, &ip->locator.psf, ip->pool, width, height, fwhm,
                                            ip->config.streak_search_px, &ip->streaks)
                : BST_OK;
 }
@@ -118,21 +126,22 @@ void bst_imgproc_free(bst_imgproc *ip) {
     bst_candidates_free(&ip->candidates);
     bst_locator_free(&ip->locator);
     bst_streak_locator_free(&ip->streaks);
+    bst_parallel_free(ip->pool);
     free(ip);
 }
 
-/* Dark, flat and bad pixels of one binned row, from the full-sensor maps. */
-static void correct_row(const bst_imgproc *ip, const bst_imgproc_frame *frame, int y, int width,
-                        float *row) {
+/* Dark, flat and bad pixels of part of a binned row, from the full-sensor maps. */
+static void correct(const bst_imgproc *ip, const bst_imgproc_frame *frame, int y, int first,
+                    int count, float *out) {
     int b = frame->binning;
     size_t stride = (size_t)ip->camera.width_px;
     float share = 1.0f / (float)(b * b);
-    for (int x = 0; x < width; x++) {
+    for (int x = 0; x < count; x++) {
         float dark = 0.0f, flat = 0.0f;
         bool bad = false;
         for (int j = 0; j < b; j++) {
             size_t k = (size_t)(frame->window.y0 + y * b + j) * stride +
-                       (size_t)(frame->window.x0 + x * b);
+                       (size_t)(frame->window.x0 + (first + x) * b);
             for (int i = 0; i < b; i++, k++) {
                 dark += ip->maps.dark_e_per_s ? ip->maps.dark_e_per_s[k] : 0.0f;
                 flat += ip->maps.flat ? ip->maps.flat[k] : 1.0f;
@@ -140,20 +149,49 @@ static void correct_row(const bst_imgproc *ip, const bst_imgproc_frame *frame, i
             }
         }
         bad = bad || !(flat > 0.0f);
-        row[x] = bad ? BST_PIXEL_BAD : (row[x] - dark * (float)frame->exposure_s) / (flat * share);
+        out[x] = bad ? BST_PIXEL_BAD : (out[x] - dark * (float)frame->exposure_s) / (flat * share);
     }
 }
 
-static void to_electrons(bst_imgproc *ip, const bst_imgproc_frame *frame, int width, int height) {
-    bool corrected = ip->maps.dark_e_per_s || ip->maps.flat || ip->bad;
-    for (int y = 0; y < height; y++) {
-        size_t row = (size_t)y * (size_t)width;
-        bst_row_electrons(frame->pixels + row, width, (float)ip->camera.offset_dn,
-                          (float)ip->camera.gain_e_per_dn, ip->electrons + row);
-        if (corrected) {
-            correct_row(ip, frame, y, width, ip->electrons + row);
-        }
+typedef struct reader {
+    const bst_imgproc *ip;
+    const bst_imgproc_frame *frame;
+    int width;
+} reader;
+
+static void read_electrons(const void *user, int y, int x, int count, float *out) {
+    const reader *r = user;
+    const bst_imgproc *ip = r->ip;
+    bst_row_electrons(r->frame->pixels + (size_t)y * (size_t)r->width + (size_t)x, count,
+                      (float)ip->camera.offset_dn, (float)ip->camera.gain_e_per_dn, out);
+    if (ip->maps.dark_e_per_s || ip->maps.flat || ip->bad) {
+        correct(ip, r->frame, y, x, count, out);
     }
+}
+
+/* What tells noise from a source. */
+typedef struct judge {
+    const bst_imgproc *ip;
+    double threshold;
+    double read_variance; /* of a pixel's noise that is normal, e-^2 */
+} judge;
+
+/* A maximum counts when the output between the pixels exceeds what noise of this skewness exceeds
+ * as rarely as normal noise the threshold. */
+static bool stands_out(const void *user, const bst_candidate *c) {
+    const judge *g = user;
+    const bst_filter *f = &g->ip->filter;
+    double noise = bst_background_noise_at(&g->ip->background, c->x, c->y);
+    double counted = fmax(noise * noise - g->read_variance, 0.0);
+    /* cumulants of the electrons that were counted, over the pixel's noise */
+    double skewness = counted / (noise * noise * noise), excess = skewness / noise;
+    if (bst_filter_peak(f, g->ip->electrons, noise, false, c->x, c->y) >
+        bst_tail_quantile(g->threshold, skewness * f->point_cubes, excess * f->point_fourths)) {
+        return true;
+    }
+    return f->streak && bst_filter_peak(f, g->ip->electrons, noise, true, c->x, c->y) >
+                            bst_tail_quantile(g->threshold, skewness * f->streak_cubes,
+                                              excess * f->streak_fourths);
 }
 
 /* The digital number from which a pixel no longer measures: the converter's end or the full well.
@@ -254,7 +292,8 @@ static bst_detection report(const bst_imgproc *ip, const bst_locate_frame *f,
     d.v_mag = -2.5 * log10(rate / ip->electrons_per_s_v0);
     d.flags = found->flags;
     widen_by_bend(ip, f, &s->shape, &d);
-    d.label = found->artefact ? BST_LABEL_ARTEFACT : BST_LABEL_UNKNOWN;
+    d.label = found->label;
+    d.label_probability = found->label_probability;
     return d;
 }
 
@@ -268,9 +307,11 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
     ip->exposure_s = frame->exposure_s;
     ip->binning = frame->binning;
 
-    to_electrons(ip, frame, width, height);
-    bst_background_estimate(&ip->background, ip->electrons, width, height,
-                            (float)ip->camera.gain_e_per_dn);
+    reader read = {ip, frame, width};
+    double gain = ip->camera.gain_e_per_dn, read_noise = ip->camera.read_noise_e;
+    double read_variance = read_noise * read_noise + gain * gain / 12.0;
+    bst_background_read(&ip->background, ip->pool, read_electrons, &read, width, height,
+                        (float)ip->camera.gain_e_per_dn, read_variance);
     double dx, dy;
     filter_path(ip, frame, motion, &dx, &dy);
     ip->streak_px = hypot(dx, dy) * frame->binning;
@@ -280,9 +321,14 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
     double false_alarms = (search ? 0.5 : 1.0) * ip->config.false_alarms_per_frame;
     double threshold = bst_filter_threshold(&ip->filter, false_alarms,
                                             (double)width * (double)height);
-    bst_filter_run(&ip->filter, &ip->background, frame->pixels, ip->electrons, width, height,
-                   saturation_dn(ip, frame), (float)threshold);
-    BST_TRY(bst_candidates_find(ctx, &ip->candidates, &ip->filter));
+    double look = ip->smeared ? threshold : fmax(0.93 * ip->filter.corner, LOOK_SHARE) * threshold;
+    bst_filter_run(&ip->filter, ip->pool, &ip->background, read_electrons, &read, frame->pixels,
+                   ip->electrons, width, height, saturation_dn(ip, frame), (float)look);
+    judge noise = {ip, threshold, read_variance};
+    double certain = ip->smeared ? threshold : threshold + CERTAIN_ABOVE;
+    bst_candidates_find(&ip->candidates, ip->pool, &ip->filter,
+                        (int)ceil(6.0 * sigma + hypot(dx, dy)) + 2, (float)look, (float)certain,
+                        stands_out, &noise);
     bst_locate_frame view = {.signal = ip->electrons,
                              .width = width,
                              .height = height,
@@ -294,7 +340,11 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
                              .binning = frame->binning};
     view.origin_x_px = frame->window.x0 + 0.5 * (frame->binning - 1);
     view.origin_y_px = frame->window.y0 + 0.5 * (frame->binning - 1);
-    bst_locate(&ip->locator, &view, &ip->candidates);
+    if (ip->smeared) {
+        bst_locate_roughly(&ip->locator, &view, &ip->candidates);
+    } else {
+        bst_locate(&ip->locator, &view, &ip->candidates);
+    }
 
     int kept = 0, room = capacity < ip->locator.capacity ? capacity : ip->locator.capacity;
     int lost = ip->candidates.count - ip->locator.count;

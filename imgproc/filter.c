@@ -5,6 +5,9 @@
 #include <string.h>
 
 #include "imgproc/rows.h"
+#include "imgproc/tail.h"
+
+enum { PART_PX = 131072 }; /* pixels of a part of a pass */
 
 bst_status bst_filter_create(bst_ctx *ctx, int max_width, int max_height, double streak_max_px,
                              bst_filter *out) {
@@ -13,13 +16,19 @@ bst_status bst_filter_create(bst_ctx *ctx, int max_width, int max_height, double
     *out = (bst_filter){.max_width = max_width, .max_height = max_height, .pad = pad};
     size_t pixels = (size_t)max_width * (size_t)max_height;
     size_t line = (size_t)(max_width + 2 * pad);
+    out->most_parts = (int)(pixels / PART_PX) + 2;
+    out->line_floats = line * (2 * BST_FILTER_MAX_RADIUS + 1 + 4);
     out->point = calloc(line * (size_t)(max_height + 2 * pad), sizeof(float));
     out->best = calloc(pixels, sizeof(float));
-    out->mask = calloc(pixels, 1);
-    out->lines = calloc(line * (2 * BST_FILTER_MAX_RADIUS + 1 + 3), sizeof(float));
+    out->maxima = calloc((size_t)max_height, sizeof *out->maxima);
+    out->maximum_x = calloc(pixels, sizeof *out->maximum_x);
+    out->maximum_snr = calloc(pixels, sizeof *out->maximum_snr);
+    out->lines = calloc(out->line_floats * (size_t)out->most_parts, sizeof(float));
+    out->mesh_rows = calloc(2 * (size_t)max_width * (size_t)out->most_parts, sizeof(float));
     out->edge_x = calloc((size_t)max_width, sizeof(float));
     out->edge_y = calloc((size_t)max_height, sizeof(float));
-    if (!out->point || !out->best || !out->mask || !out->lines || !out->edge_x || !out->edge_y) {
+    if (!out->point || !out->best || !out->maxima || !out->maximum_x || !out->maximum_snr ||
+        !out->lines || !out->mesh_rows || !out->edge_x || !out->edge_y) {
         bst_filter_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the filters of a %d x %d frame",
                         max_width, max_height);
@@ -30,21 +39,29 @@ bst_status bst_filter_create(bst_ctx *ctx, int max_width, int max_height, double
 void bst_filter_free(bst_filter *f) {
     free(f->point);
     free(f->best);
-    free(f->mask);
+    free(f->maxima);
+    free(f->maximum_x);
+    free(f->maximum_snr);
     free(f->lines);
+    free(f->mesh_rows);
     free(f->edge_x);
     free(f->edge_y);
     *f = (bst_filter){0};
 }
 
-/* Autocorrelation of the one-axis kernel (unit norm) at an integer lag. */
-static double axis_correlation(const bst_filter *f, int lag) {
-    lag = abs(lag);
-    double sum = 0.0;
-    for (int i = 0; i + lag <= 2 * f->radius; i++) {
-        sum += (double)f->kernel[i] * (double)f->kernel[i + lag];
+/* Autocorrelation of the one-axis kernel (unit norm) at integer lags. */
+static void correlate(bst_filter *f) {
+    for (int lag = 0; lag <= 2 * f->radius; lag++) {
+        double sum = 0.0;
+        for (int i = 0; i + lag <= 2 * f->radius; i++) {
+            sum += (double)f->kernel[i] * (double)f->kernel[i + lag];
+        }
+        f->correlation[lag] = sum;
     }
-    return sum;
+}
+
+static double axis_correlation(const bst_filter *f, int lag) {
+    return abs(lag) <= 2 * f->radius ? f->correlation[abs(lag)] : 0.0;
 }
 
 /* Covariance of the streak output at places a lag apart, with the weights as they are. */
@@ -67,6 +84,89 @@ static void add_tap(bst_filter *f, int x, int y, double weight) {
         f->tap_x[f->taps] = x;
         f->tap_y[f->taps] = y;
         f->tap_weight[f->taps++] = (float)weight;
+    }
+}
+
+/* The Gaussian's share of each pixel of one axis about a centre `shift` px off the middle one, for
+ * -radius - 1 .. radius + 1. */
+static void axis_shares(double sigma_px, double shift, int radius, double *out) {
+    double root = sigma_px * sqrt(2.0);
+    for (int i = -radius - 1; i <= radius + 1; i++) {
+        out[i + radius + 1] = 0.5 * (erf((i + 0.5 - shift) / root) - erf((i - 0.5 - shift) / root));
+    }
+}
+
+/* Density of maxima, cubes and fourth powers for the point, and the shifted kernels. The gradient's
+ * covariance is that of unit-norm kernels by shift, averaged over the phases. */
+static void describe_point(bst_filter *f, double sigma_px) {
+    enum { SIZE = 2 * BST_FILTER_MAX_RADIUS + 3 };
+    int n = 2 * f->radius + 3;
+    double roughness = 0.0, cubes = 0.0, fourths = 0.0;
+    for (int p = 0; p < BST_FILTER_PHASES; p++) {
+        double here[SIZE], before[SIZE], after[SIZE], h = 1e-3, squares[3] = {0}, metric = 0.0;
+        double shift = -0.5 + (double)p / (BST_FILTER_PHASES - 1);
+        axis_shares(sigma_px, shift, f->radius, here);
+        axis_shares(sigma_px, shift - h, f->radius, before);
+        axis_shares(sigma_px, shift + h, f->radius, after);
+        for (int i = 0; i < n; i++) {
+            squares[0] += before[i] * before[i];
+            squares[1] += here[i] * here[i];
+            squares[2] += after[i] * after[i];
+        }
+        for (int i = 0; i < n; i++) {
+            double slope = (after[i] / sqrt(squares[2]) - before[i] / sqrt(squares[0])) / (2.0 * h);
+            double k = here[i] / sqrt(squares[1]);
+            metric += slope * slope;
+            cubes += k * k * k / BST_FILTER_PHASES;
+            fourths += k * k * k * k / BST_FILTER_PHASES;
+            f->phase[p][i] = (float)k;
+        }
+        /* the two ends are one phase */
+        double weight = p == 0 || p == BST_FILTER_PHASES - 1 ? 0.5 : 1.0;
+        roughness += weight * metric / (BST_FILTER_PHASES - 1);
+    }
+    double half = 0.0;
+    for (int i = 0; i < n; i++) {
+        half += (double)f->phase[BST_FILTER_PHASES / 2][i] * (double)f->phase[0][i];
+    }
+    f->corner = half * half;
+    f->point_density = roughness; /* sqrt of the product over both axes, which are alike */
+    f->point_cubes = cubes * cubes;
+    f->point_fourths = fourths * fourths;
+}
+
+/* The same for the streak: the gradient's covariance from its correlations at lags of a pixel,
+ * whose logarithm is quadratic near 0, cubes and fourth powers from its kernel's values. */
+static void describe_streak(bst_filter *f) {
+    double r[3][3];
+    for (int j = -1; j <= 1; j++) {
+        for (int i = -1; i <= 1; i++) {
+            r[j + 1][i + 1] = streak_covariance(f, i, j) / streak_covariance(f, 0, 0);
+        }
+    }
+    double lxx = -2.0 * log(fmax(r[1][2], 1e-6)), lyy = -2.0 * log(fmax(r[2][1], 1e-6));
+    double lxy = -0.5 * (log(fmax(r[2][2], 1e-6)) - log(fmax(r[2][0], 1e-6)));
+    f->streak_density = sqrt(fmax(lxx * lyy - lxy * lxy, 1e-8));
+    /* cubes and fourth powers of the kernel: from its values at whole pixels */
+    int reach_x = 0, reach_y = 0;
+    for (int t = 0; t < f->taps; t++) {
+        reach_x = abs(f->tap_x[t]) > reach_x ? abs(f->tap_x[t]) : reach_x;
+        reach_y = abs(f->tap_y[t]) > reach_y ? abs(f->tap_y[t]) : reach_y;
+    }
+    f->streak_cubes = f->streak_fourths = 0.0;
+    for (int y = -reach_y - f->radius; y <= reach_y + f->radius; y++) {
+        for (int x = -reach_x - f->radius; x <= reach_x + f->radius; x++) {
+            double k = 0.0;
+            for (int t = 0; t < f->taps; t++) {
+                int u = x - f->tap_x[t], v = y - f->tap_y[t];
+                if (abs(u) <= f->radius && abs(v) <= f->radius) {
+                    k += (double)f->tap_weight[t] * (double)f->kernel[u + f->radius] *
+                         (double)f->kernel[v + f->radius];
+                }
+            }
+            f->streak_cubes += k * k * k;
+            f->streak_fourths += k * k * k * k;
+        }
     }
 }
 
@@ -106,9 +206,16 @@ static void set_streak(bst_filter *f, double dx, double dy) {
         f->tap_x[f->taps] = f->tap_y[f->taps] = 0;
         f->tap_weight[f->taps++] = 0.0f;
     }
+    describe_streak(f);
 }
 
 void bst_filter_set(bst_filter *f, double sigma_px, double dx_px, double dy_px) {
+    if (f->made_sigma == sigma_px && f->made_dx == dx_px && f->made_dy == dy_px) {
+        return;
+    }
+    f->made_sigma = sigma_px;
+    f->made_dx = dx_px;
+    f->made_dy = dy_px;
     f->radius = (int)ceil(3.2 * sigma_px);
     f->radius = f->radius < 1                       ? 1
                 : f->radius > BST_FILTER_MAX_RADIUS ? BST_FILTER_MAX_RADIUS
@@ -132,58 +239,24 @@ void bst_filter_set(bst_filter *f, double sigma_px, double dx_px, double dy_px) 
     f->dy_px = dy_px;
     f->overlap = 0.0;
     f->taps = 0;
+    f->threshold = 0.0;
+    correlate(f);
+    describe_point(f, sigma_px);
     if (f->streak) {
         set_streak(f, dx_px, dy_px);
     }
 }
 
-static double upper_tail(double u) {
-    return 0.5 * erfc(u / sqrt(2.0));
-}
-
-/* P(Y > v | X > u) for unit normals of correlation rho: integral over the density of X beyond u by
- * the midpoint rule in the exponential variable that the tail suggests. */
-static double tail_given_tail(double u, double v, double rho) {
-    if (rho >= 1.0 - 1e-12) {
-        return upper_tail(fmax(u, v)) / upper_tail(u);
-    }
-    enum { NODES = 48 };
-    double root = sqrt(1.0 - rho * rho), sum = 0.0, total = 0.0, scale = 1.0 / (u + 1.0);
-    for (int i = 0; i < NODES; i++) {
-        double e = (i + 0.5) / NODES, z = u - scale * log(e);
-        double density = exp(-0.5 * (z * z - u * u)) / e; /* phi(z) dz/de, up to a factor */
-        sum += density * upper_tail((v - rho * z) / root);
-        total += density;
-    }
-    return sum / total;
-}
-
-/* Separate excursions per pixel above u of a field with these lag-1 correlations along x, y and
- * both diagonals. */
-static double excursion_rate(double u, double rx, double ry, double rising, double falling) {
-    double rate =
-        upper_tail(u) * (1.0 - tail_given_tail(u, u, rx)) * (1.0 - tail_given_tail(u, u, ry));
-    double lxx = 2.0 * (1.0 - rx), lyy = 2.0 * (1.0 - ry), lxy = 0.5 * (falling - rising);
-    double tilt = lxx * lyy > 0.0 ? 1.0 - lxy * lxy / (lxx * lyy) : 1.0;
-    return rate * sqrt(fmax(tilt, 0.01));
-}
-
-double bst_filter_threshold(const bst_filter *f, double false_alarms, double pixels) {
-    double r1 = axis_correlation(f, 1);
-    double sx = 0.0, sy = 0.0, rising = 0.0, falling = 0.0;
-    if (f->streak) {
-        sx = streak_covariance(f, 1, 0);
-        sy = streak_covariance(f, 0, 1);
-        rising = streak_covariance(f, 1, 1);
-        falling = streak_covariance(f, 1, -1);
+double bst_filter_threshold(bst_filter *f, double false_alarms, double pixels) {
+    if (f->threshold > 0.0 && f->threshold_density == false_alarms / pixels) {
+        return f->threshold;
     }
     double lo = 2.5, hi = 9.0;
     for (int i = 0; i < 24; i++) {
         double u = 0.5 * (lo + hi);
-        double rate = excursion_rate(u, r1, r1, r1 * r1, r1 * r1);
+        double rate = bst_tail_maxima(u, f->point_density);
         if (f->streak) {
-            rate += excursion_rate(u, sx, sy, rising, falling) *
-                    (1.0 - tail_given_tail(u, u, f->overlap));
+            rate += bst_tail_maxima(u, f->streak_density) * (1.0 - bst_tail_both(u, u, f->overlap));
         }
         if (rate * pixels > false_alarms) {
             lo = u;
@@ -191,7 +264,9 @@ double bst_filter_threshold(const bst_filter *f, double false_alarms, double pix
             hi = u;
         }
     }
-    return 0.5 * (lo + hi);
+    f->threshold = 0.5 * (lo + hi);
+    f->threshold_density = false_alarms / pixels;
+    return f->threshold;
 }
 
 /* 1 / norm of the part of the kernel that lies on pixels 0..count-1, for each centre. */
@@ -210,22 +285,56 @@ static void edge_factors(const bst_filter *f, int count, float *out) {
     }
 }
 
-static void filter_points(bst_filter *f, const bst_background *background, const uint16_t *raw,
-                          float *electrons, int saturated_dn) {
+/* What a pass over the frame needs. */
+typedef struct pass {
+    bst_filter *f;
+    const bst_background *background;
+    bst_pixel_fn read;
+    const void *user;
+    const uint16_t *raw;
+    float *signal;
+    int saturated_dn, part_rows;
+    float threshold;
+} pass;
+
+static const float *best_row(const bst_filter *f, int y) {
+    return f->streak ? f->best + (size_t)y * (size_t)f->width
+                     : f->point + (size_t)(y + f->pad) * (size_t)f->stride + (size_t)f->pad;
+}
+
+/* Needs the rows above and below. */
+static void find_maxima(bst_filter *f, int y, float threshold) {
+    size_t at = (size_t)y * (size_t)f->max_width;
+    const float *row = best_row(f, y);
+    f->maxima[y] = bst_row_maxima(y > 0 ? best_row(f, y - 1) : NULL, row,
+                                  y + 1 < f->height ? best_row(f, y + 1) : NULL, f->width,
+                                  threshold, f->maximum_x + at, f->maximum_snr + at);
+}
+
+/* Rows begin to end of the point map, with the rows of signal that are theirs. */
+static void filter_points(void *user, int begin, int end) {
+    const pass *p = user;
+    bst_filter *f = p->f;
     int width = f->width, r = f->radius, taps = 2 * r + 1, padded = (taps + 3) / 4 * 4;
+    int part = begin / p->part_rows;
     size_t line = (size_t)f->stride;
-    float *normalised = f->lines, *level = normalised + line, *inverse = level + line,
-          *ring = inverse + line;
+    float *normalised = f->lines + f->line_floats * (size_t)part, *level = normalised + line,
+          *inverse = level + line, *halo = inverse + line, *ring = halo + line;
+    bst_background background = *p->background;
+    background.row_level = f->mesh_rows + 2 * (size_t)f->max_width * (size_t)part;
+    background.row_noise = background.row_level + f->max_width;
     const float *in[2 * BST_FILTER_MAX_RADIUS + 4];
     memset(normalised, 0, line * sizeof(float));
-    memset(ring, 0, line * (size_t)taps * sizeof(float));
-    for (int y = 0; y < f->height + r; y++) {
-        float *horizontal = ring + line * (size_t)(y % taps);
-        if (y < f->height) {
+    for (int y = begin - r; y < end + r; y++) {
+        float *horizontal = ring + line * (size_t)((y + taps) % taps);
+        if (y >= 0 && y < f->height) {
             size_t row = (size_t)y * (size_t)width;
-            bst_background_row(background, y, level, inverse);
-            bst_row_normalise(raw + row, electrons + row, level, inverse, width, saturated_dn,
-                              electrons + row, normalised + r);
+            bool own = y >= begin && y < end;
+            float *signal = own ? p->signal + row : halo;
+            p->read(p->user, y, 0, width, signal);
+            bst_background_row(&background, y, level, inverse);
+            bst_row_normalise(p->raw + row, signal, level, inverse, width, p->saturated_dn, signal,
+                              normalised + r);
             for (int t = 0; t < padded; t++) {
                 in[t] = normalised + (t < taps ? t : 0);
             }
@@ -234,7 +343,7 @@ static void filter_points(bst_filter *f, const bst_background *background, const
             memset(horizontal, 0, (size_t)width * sizeof(float));
         }
         int centre = y - r;
-        if (centre < 0) {
+        if (centre < begin) {
             continue;
         }
         for (int t = 0; t < padded; t++) {
@@ -244,34 +353,34 @@ static void filter_points(bst_filter *f, const bst_background *background, const
         float *out = f->point + (size_t)(centre + f->pad) * line + (size_t)f->pad;
         bst_row_combine(out, width, in, f->kernel, padded);
         bst_row_scale(out, f->edge_x, f->edge_y[centre], width);
+        if (!f->streak && centre - 2 >= begin) {
+            find_maxima(f, centre - 1, p->threshold);
+        }
     }
 }
 
-static void choose_best(bst_filter *f, float threshold) {
+static void filter_streaks(void *user, int begin, int end) {
+    const pass *p = user;
+    bst_filter *f = p->f;
     size_t line = (size_t)f->stride;
     const float *in[BST_FILTER_MAX_TAPS];
-    f->first_row = f->height;
-    f->last_row = -1;
-    for (int y = 0; y < f->height; y++) {
+    for (int y = begin; y < end; y++) {
         const float *point = f->point + (size_t)(y + f->pad) * line + (size_t)f->pad;
-        const float *streak = point;
-        if (f->streak) {
-            for (int t = 0; t < f->taps; t++) {
-                in[t] = point + (long)f->tap_y[t] * (long)line + f->tap_x[t];
-            }
-            bst_row_combine(f->lines, f->width, in, f->tap_weight, f->taps);
-            streak = f->lines;
+        for (int t = 0; t < f->taps; t++) {
+            in[t] = point + (long)f->tap_y[t] * (long)line + f->tap_x[t];
         }
-        size_t row = (size_t)y * (size_t)f->width;
-        if (bst_row_best(point, streak, f->width, threshold, f->best + row, f->mask + row)) {
-            f->first_row = y < f->first_row ? y : f->first_row;
-            f->last_row = y;
+        float *row = f->best + (size_t)y * (size_t)f->width;
+        bst_row_combine(row, f->width, in, f->tap_weight, f->taps);
+        bst_row_greater(row, point, f->width);
+        if (y - 2 >= begin) {
+            find_maxima(f, y - 1, p->threshold);
         }
     }
 }
 
-void bst_filter_run(bst_filter *f, const bst_background *background, const uint16_t *raw,
-                    float *electrons, int width, int height, int saturated_dn, float threshold) {
+void bst_filter_run(bst_filter *f, bst_parallel *pool, const bst_background *background,
+                    bst_pixel_fn read, const void *user, const uint16_t *raw, float *signal,
+                    int width, int height, int saturated_dn, float threshold) {
     if (f->width != width || f->height != height) {
         f->width = width;
         f->height = height;
@@ -280,8 +389,19 @@ void bst_filter_run(bst_filter *f, const bst_background *background, const uint1
     }
     edge_factors(f, width, f->edge_x);
     edge_factors(f, height, f->edge_y);
-    filter_points(f, background, raw, electrons, saturated_dn);
-    choose_best(f, threshold);
+    /* large parts: each reads 2 radius rows of its neighbours again */
+    int rows = PART_PX / width > 0 ? PART_PX / width : 1;
+    rows = (height + rows - 1) / rows < f->most_parts ? rows : height / f->most_parts + 1;
+    pass p = {f, background, read, user, raw, signal, saturated_dn, rows, threshold};
+    bst_parallel_for(pool, height, rows, filter_points, &p);
+    if (f->streak) {
+        bst_parallel_for(pool, height, rows, filter_streaks, &p);
+    }
+    for (int y = 0; y < height; y++) {
+        if (y % rows == 0 || y % rows == rows - 1 || y == height - 1) {
+            find_maxima(f, y, threshold);
+        }
+    }
 }
 
 float bst_filter_streak_at(const bst_filter *f, int x, int y) {
@@ -290,4 +410,79 @@ float bst_filter_streak_at(const bst_filter *f, int x, int y) {
         sum += f->tap_weight[t] * bst_filter_point_at(f, x + f->tap_x[t], y + f->tap_y[t]);
     }
     return sum;
+}
+
+/* Top of the parabola through three values one step apart, the middle one the greatest. */
+static double top(double left, double middle, double right) {
+    double bend = left - 2.0 * middle + right;
+    return bend < 0.0 ? middle - (right - left) * (right - left) / (8.0 * bend) : middle;
+}
+
+static double point_peak(const bst_filter *f, const float *signal, double noise_e, int x, int y) {
+    int r = f->radius + 1, n = 2 * r + 1;
+    if (x < r || y < r || x + r >= f->width || y + r >= f->height) {
+        return -INFINITY;
+    }
+    double value[BST_FILTER_PHASES][BST_FILTER_PHASES] = {{0.0}};
+    for (int j = 0; j < n; j++) {
+        const float *row = signal + (size_t)(y - r + j) * (size_t)f->width + (size_t)(x - r);
+        for (int px = 0; px < BST_FILTER_PHASES; px++) {
+            double sum = 0.0;
+            for (int i = 0; i < n; i++) {
+                sum += row[i] > BST_PIXEL_NONE ? (double)f->phase[px][i] * (double)row[i] : 0.0;
+            }
+            for (int py = 0; py < BST_FILTER_PHASES; py++) {
+                value[py][px] += (double)f->phase[py][j] * sum;
+            }
+        }
+    }
+    int bx = 0, by = 0;
+    for (int py = 0; py < BST_FILTER_PHASES; py++) {
+        for (int px = 0; px < BST_FILTER_PHASES; px++) {
+            if (value[py][px] > value[by][bx]) {
+                bx = px;
+                by = py;
+            }
+        }
+    }
+    double best = value[by][bx], more = 0.0;
+    if (bx > 0 && bx < BST_FILTER_PHASES - 1) {
+        more += top(value[by][bx - 1], best, value[by][bx + 1]) - best;
+    }
+    if (by > 0 && by < BST_FILTER_PHASES - 1) {
+        more += top(value[by - 1][bx], best, value[by + 1][bx]) - best;
+    }
+    return (best + more) / noise_e;
+}
+
+static double streak_peak(const bst_filter *f, int x, int y) {
+    double v[3][3];
+    double here = (double)bst_filter_streak_at(f, x, y);
+    if (x < 1 || y < 1 || x + 1 >= f->width || y + 1 >= f->height || !(here > 0.0)) {
+        return here;
+    }
+    for (int j = 0; j < 3; j++) {
+        for (int i = 0; i < 3; i++) {
+            double s = (double)bst_filter_streak_at(f, x + i - 1, y + j - 1);
+            v[j][i] = log(fmax(s, 0.05 * here));
+        }
+    }
+    double gx = 0.5 * (v[1][2] - v[1][0]), gy = 0.5 * (v[2][1] - v[0][1]);
+    double hxx = v[1][2] - 2.0 * v[1][1] + v[1][0], hyy = v[2][1] - 2.0 * v[1][1] + v[0][1];
+    double hxy = 0.25 * (v[2][2] - v[2][0] - v[0][2] + v[0][0]);
+    double det = hxx * hyy - hxy * hxy, gain = 0.0;
+    if (hxx < 0.0 && hyy < 0.0 && det > 1e-3 * hxx * hyy) {
+        gain = -0.5 * (gx * gx * hyy - 2.0 * gx * gy * hxy + gy * gy * hxx) / det;
+    } else if (hxx + hyy < 0.0) {
+        gain = hxx < hyy ? -0.5 * gx * gx / hxx : -0.5 * gy * gy / hyy;
+    }
+    /* half a pixel off on both axes costs no filter more than this */
+    return here * exp(fmin(fmax(gain, 0.0), 0.3));
+}
+
+double bst_filter_peak(const bst_filter *f, const float *signal, double noise_e, bool streak, int x,
+                       int y) {
+    double here = (double)(streak ? bst_filter_streak_at(f, x, y) : bst_filter_point_at(f, x, y));
+    double between = streak ? streak_peak(f, x, y) : point_peak(f, signal, noise_e, x, y);
+    return fmax(here, between);
 }

@@ -7,22 +7,33 @@
 
 #include "imgproc/background.h"
 
-enum { BST_FILTER_MAX_RADIUS = 24, BST_FILTER_MAX_TAPS = 4 * 256 };
+enum {
+    BST_FILTER_MAX_RADIUS = 24,
+    BST_FILTER_MAX_TAPS = 4 * 256,
+    BST_FILTER_PHASES = 5, /* shifts of -1/2 to 1/2 px */
+};
 
 typedef struct bst_filter {
     int max_width, max_height, pad, stride; /* of the padded map */
     int width, height;                      /* of the latest frame */
     float *point;                           /* padded map: SNR for a point */
-    float *best;                            /* [height][width]: the greater SNR */
-    uint8_t *mask;                          /* [height][width]: 255 above the threshold */
-    float *lines; /* rows of the separable pass: normalised, level, 1 / noise, ring */
+    float *best;                            /* [height][width]: the greater SNR, if streak */
+    /* pixels above the threshold whose neighbours have a lower SNR: those of row y from index
+     * y * max_width on, ascending */
+    int *maxima; /* [height] */
+    int32_t *maximum_x;
+    float *maximum_snr;
+    float *lines;       /* work space of each part of the passes */
+    size_t line_floats; /* of one part */
+    int most_parts;
+    float *mesh_rows; /* the same, for rows of the background */
     float *edge_x,
         *edge_y; /* 1 / norm of the kernel's part inside the frame, over the whole norm */
-    int first_row, last_row; /* rows with anything above the threshold; last < first: none */
     /* the PSF, one axis, unit norm */
     int radius;
     float kernel[2 * BST_FILTER_MAX_RADIUS + 4];
     double norm; /* sqrt(sum p^2) of the two-dimensional PSF of unit flux */
+    double correlation[2 * BST_FILTER_MAX_RADIUS + 1]; /* of the kernel with itself, by lag */
     /* the streak: a sum over shifted point maps */
     bool streak;
     double dx_px, dy_px;
@@ -31,6 +42,14 @@ typedef struct bst_filter {
     float tap_weight[BST_FILTER_MAX_TAPS];
     double streak_norm; /* as norm, for the streak */
     double overlap;     /* correlation of both outputs at one place */
+    /* of the kernels with unit norm: sums of cubes and fourth powers, and the expected density of
+     * maxima (see bst_filter_threshold) */
+    double point_cubes, point_fourths, point_density;
+    double streak_cubes, streak_fourths, streak_density;
+    double corner; /* output for a point between four pixels at one of them, over its greatest */
+    double threshold, threshold_density; /* the latest, and the false alarms per pixel of it */
+    double made_sigma, made_dx, made_dy; /* what the kernels were made for */
+    float phase[BST_FILTER_PHASES][2 * BST_FILTER_MAX_RADIUS + 3]; /* one axis, shifted */
 } bst_filter;
 
 bst_status bst_filter_create(bst_ctx *ctx, int max_width, int max_height, double streak_max_px,
@@ -41,23 +60,35 @@ void bst_filter_free(bst_filter *filter);
  * both 0, the same drawn along (dx, dy). */
 void bst_filter_set(bst_filter *filter, double sigma_px, double dx_px, double dy_px);
 
-/* The SNR above which noise alone gives `false_alarms` detections in `pixels` pixels.
+/* The output above which noise alone gives `false_alarms` maxima in `pixels` pixels, when each is
+ * looked for between the pixels too (bst_filter_peak).
  *
- * The number of separate excursions of a smooth Gaussian field above u is N Q(u) theta_x theta_y,
- * theta the chance that the next pixel along an axis is below u given that this one is above, from
- * the bivariate normal with the kernel's lag-1 correlation: it has the right limits, one excursion
- * per pixel for white noise and the expected Euler characteristic for a field that is smooth on the
- * grid (Adler, The Geometry of Random Fields, 1981, ch. 5). A tilted kernel takes the determinant
- * of its roughness matrix. Both filters add up, less what they share. At least 2.5. */
-double bst_filter_threshold(const bst_filter *filter, double false_alarms, double pixels);
+ * A normalised field of normal noise has sqrt(det L) (2 pi)^(-3/2) u exp(-u^2 / 2) maxima above a
+ * high u per pixel, L the covariance of its gradient (Adler, The Geometry of Random Fields, 1981,
+ * ch. 5; Siegmund and Worsley, Annals of Statistics 23, 1995). Both filters add up, less what they
+ * share. At least 2.5. */
+double bst_filter_threshold(bst_filter *filter, double false_alarms, double pixels);
 
-/* One pass over a frame [height][width]: electrons become signal (background off, in place), then
- * the maps and the mask are made. Memory outside the frame counts as noise-free background. */
-void bst_filter_run(bst_filter *filter, const bst_background *background, const uint16_t *raw,
-                    float *electrons, int width, int height, int saturated_dn, float threshold);
+/* One pass over a frame of pixels as `read` gives them: `signal` [height][width] becomes electrons
+ * above the background (BST_PIXEL_SATURATED where raw >= saturated_dn), then maps and maxima are
+ * made. Memory outside the frame counts as noise-free background. */
+void bst_filter_run(bst_filter *filter, bst_parallel *pool, const bst_background *background,
+                    bst_pixel_fn read, const void *user, const uint16_t *raw, float *signal,
+                    int width, int height, int saturated_dn, float threshold);
+
+/* The greatest output within about half a pixel of (x, y) in between the pixels: for a point
+ * by kernels shifted in steps of 1/4 px and a parabola through the best, on signal with the noise
+ * at that place; for the streak by a quadratic through the logarithms of 3 x 3 outputs. Not below
+ * the output at (x, y). */
+double bst_filter_peak(const bst_filter *filter, const float *signal, double noise_e, bool streak,
+                       int x, int y);
 
 static inline float bst_filter_point_at(const bst_filter *f, int x, int y) {
     return f->point[(long)(y + f->pad) * f->stride + x + f->pad];
+}
+/* The greater output. */
+static inline float bst_filter_best_at(const bst_filter *f, int x, int y) {
+    return f->streak ? f->best[(long)y * f->width + x] : bst_filter_point_at(f, x, y);
 }
 /* The streak output at a pixel of the latest frame; only when filter->streak. */
 float bst_filter_streak_at(const bst_filter *filter, int x, int y);

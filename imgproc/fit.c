@@ -165,8 +165,11 @@ bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
                  bst_source *const *free, int free_count, const bst_source *const *fixed,
                  int fixed_count, bool free_width, double limit_px) {
     int n = stamp->width * stamp->height, parameters = 3 * free_count + (free_width ? 1 : 0);
-    if (n <= 0 || n > fit->max_pixels || free_count < 1 || free_count > BST_FIT_MAX_FREE ||
-        load(fit, data, stamp, fixed, fixed_count) < parameters + 1) {
+    if (n <= 0 || n > fit->max_pixels || free_count < 1 || free_count > BST_FIT_MAX_FREE) {
+        return false;
+    }
+    int pixels = load(fit, data, stamp, fixed, fixed_count);
+    if (pixels < parameters + 1) {
         return false;
     }
     double a[BST_FIT_MAX_PARAMETERS][BST_FIT_MAX_PARAMETERS], g[BST_FIT_MAX_PARAMETERS];
@@ -242,6 +245,7 @@ bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
         free[0]->widening_variance = last[parameters - 1] / (free[0]->flux_e * free[0]->flux_e);
     }
     free[0]->chi_square = chi;
+    free[0]->pixels = pixels;
     free[0]->fitted = true;
     return true;
 }

@@ -17,6 +17,7 @@ typedef struct bst_source {
     /* results */
     double cov_xx, cov_xy, cov_yy, flux_variance, widening_variance;
     double chi_square;
+    int pixels; /* that it was fitted to */
     bool fitted;
 } bst_source;
 

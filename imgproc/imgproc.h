@@ -6,7 +6,7 @@
 #ifndef BST_IMGPROC_IMGPROC_H
 #define BST_IMGPROC_IMGPROC_H
 
-#include "imgproc/motion.h"
+#include "sim/world/motion.h"
 #include "sim/core/messages.h"
 #include "sim/core/module.h"
 #include "sim/world/camera.h"
@@ -23,6 +23,7 @@ typedef struct bst_imgproc_config {
     double streak_min_px, streak_max_px;
     double streak_search_px; /* 0: no search for streaks of unknown rate and direction */
     double search_radius_px, match_tolerance_px;
+    int64_t threads;            /* 0: one per processor */
     bst_config_list bad_pixels; /* of bst_bad_pixel */
     /* FITS images of the maps; "": none. bst_imgproc_create leaves them to the caller. */
     char dark_file[512], flat_file[512], bad_pixel_file[512];
@@ -62,11 +63,13 @@ void bst_imgproc_free(bst_imgproc *ip);
  *
  * Steps: artefact correction; electrons; background and noise by mesh (clipped mean and standard
  * deviation); two matched filters, for points and for the streak that stars draw when the camera
- * moves by `motion` (NULL: at rest), both normalised to unit noise; threshold on the greater of the
- * two; connected components, split at saddles; weighted least-squares fit of the pixel-integrated
- * Gaussian or streak, close neighbours together. The greater of two matched-filter outputs is the
- * generalised likelihood ratio test between both shapes (Kay, Fundamentals of Statistical Signal
- * Processing II, 1998, ch. 7).
+ * moves by `motion` (NULL: at rest), both normalised to unit noise; maxima of the greater of the
+ * two, looked for between the pixels, against a threshold that counts with the noise's skewness;
+ * of maxima that no saddle parts the highest; weighted least-squares fit of the pixel-integrated
+ * Gaussian or streak, close neighbours together (none when bst_imgproc_smeared). The greater of two
+ * matched-filter outputs is the generalised likelihood ratio test between both shapes (Kay,
+ * Fundamentals of Statistical Signal Processing II, 1998, ch. 7). The passes run on
+ * config->threads threads; the result does not depend on them.
  *
  * With config.streak_search_px, a frame in which stars are points is also searched for streaks of any
  * direction and length up to that (streak_locate.h); points and streaks then have half of the false

@@ -3,21 +3,26 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { BAND = 16, MAX_FIXED = 12 };
+enum { CELL_PX = 16, MAX_FIXED = 12, MAX_CHARGE = 64 };
 
 static const double WIDTH_FIT_SNR = 20.0; /* from here the widening is measured */
 static const double MOMENTS_SNR = 10.0;   /* below, extents are the model's own */
 static const double CLOSE_SHARE = 0.8; /* filter outputs closer than this: both shapes are tried */
+static const double LIGHT_SNR = 4.0;   /* beside charge, from here there is a source as well */
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
 
-bst_status bst_locator_create(bst_ctx *ctx, int capacity, int max_height, int max_side,
-                              bst_locator *out) {
-    *out =
-        (bst_locator){.max_side = max_side, .capacity = capacity, .buckets = max_height / BAND + 1};
+bst_status bst_locator_create(bst_ctx *ctx, int capacity, int max_width, int max_height,
+                              int max_side, bst_locator *out) {
+    *out = (bst_locator){.max_side = max_side,
+                         .capacity = capacity,
+                         .columns = max_width / CELL_PX + 1,
+                         .rows = max_height / CELL_PX + 1};
     bst_psf_init(&out->psf);
     out->found = calloc((size_t)capacity, sizeof *out->found);
-    out->bucket = calloc((size_t)out->buckets, sizeof *out->bucket);
-    if (!out->found || !out->bucket) {
+    out->cell = calloc((size_t)out->columns * (size_t)out->rows, sizeof *out->cell);
+    out->charged_capacity = 16 * capacity;
+    out->charged = calloc((size_t)out->charged_capacity, sizeof *out->charged);
+    if (!out->found || !out->cell || !out->charged) {
         bst_locator_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d detections", capacity);
     }
@@ -30,7 +35,8 @@ bst_status bst_locator_create(bst_ctx *ctx, int capacity, int max_height, int ma
 
 void bst_locator_free(bst_locator *l) {
     free(l->found);
-    free(l->bucket);
+    free(l->cell);
+    free(l->charged);
     bst_fit_free(&l->fit);
     *l = (bst_locator){0};
 }
@@ -54,6 +60,11 @@ static double reach(const bst_locate_frame *f) {
     return fmax(3.0, ceil(3.6 * f->sigma_px));
 }
 
+/* How far a fit may move a source from its maximum, px. */
+static double fit_limit(const bst_locate_frame *f, double path_px) {
+    return 1.5 + f->sigma_px + 0.4 * path_px;
+}
+
 /* Starts a source at its candidate. */
 static void start(const bst_locate_frame *f, const bst_candidate *c, bst_found *out) {
     *out = (bst_found){.peak_snr = c->snr, .peak_x = c->x, .peak_y = c->y};
@@ -67,15 +78,32 @@ static void start(const bst_locate_frame *f, const bst_candidate *c, bst_found *
     s->flux_e = (double)c->snr * out->noise_e / shape_norm(f, out->streak);
 }
 
-static void index_rows(bst_locator *l) {
-    for (int i = 0; i < l->buckets; i++) {
-        l->bucket[i] = -1;
+static void index_cells(bst_locator *l) {
+    for (int i = 0; i < l->columns * l->rows; i++) {
+        l->cell[i] = -1;
     }
     for (int i = l->count - 1; i >= 0; i--) {
-        int band = l->found[i].peak_y / BAND;
-        l->found[i].next = l->bucket[band];
-        l->bucket[band] = i;
+        int *cell =
+            &l->cell[l->found[i].peak_y / CELL_PX * l->columns + l->found[i].peak_x / CELL_PX];
+        l->found[i].next = *cell;
+        *cell = i;
     }
+}
+
+/* Cells, first and last, that hold all maxima within margin_px of a range of pixels. */
+static void cell_range(double from, double to, double margin_px, int cells, int *first, int *last) {
+    double lo = floor((from - margin_px) / CELL_PX), hi = floor((to + margin_px) / CELL_PX);
+    *first = lo < 0.0 ? 0 : lo > cells - 1 ? cells - 1 : (int)lo;
+    *last = hi < 0.0 ? 0 : hi > cells - 1 ? cells - 1 : (int)hi;
+}
+
+static bool is_charge(const bst_found *found) {
+    return found->label == BST_LABEL_HOT_PIXEL || found->label == BST_LABEL_HIT;
+}
+
+static void note_length(bst_locator *l, const bst_shape *s) {
+    l->longest_px = fmax(l->longest_px, fmax(0.5 * fabs(s->dx_px) + fabs(s->bend_x_px),
+                                             0.5 * fabs(s->dy_px) + fabs(s->bend_y_px)));
 }
 
 typedef struct company {
@@ -92,14 +120,17 @@ static void gather(bst_locator *l, const bst_locate_frame *f, int i, const bst_s
     out->free[0] = &l->found[i].source;
     out->free_count = 1;
     out->fixed_count = 0;
-    int margin = (int)reach(f) + l->max_side / 2;
-    int lo = (stamp->y0 - margin) / BAND, hi = (stamp->y0 + stamp->height + margin) / BAND;
-    lo = lo > 0 ? lo : 0;
-    hi = hi < l->buckets - 1 ? hi : l->buckets - 1;
-    int near[MAX_FIXED + BST_FIT_MAX_FREE], count = 0;
-    for (int band = lo; band <= hi; band++) {
-        for (int k = l->bucket[band]; k >= 0; k = l->found[k].next) {
-            if (k == i || l->found[k].dropped) {
+    /* a fit moves a source from its maximum by its limit at most */
+    double margin = reach(f) + 1.8 * l->longest_px + fit_limit(f, 0.0) + 1.0;
+    int first_column, last_column, first_row, last_row;
+    cell_range(stamp->x0, stamp->x0 + stamp->width, margin, l->columns, &first_column,
+               &last_column);
+    cell_range(stamp->y0, stamp->y0 + stamp->height, margin, l->rows, &first_row, &last_row);
+    int near[MAX_FIXED + BST_FIT_MAX_FREE], count = 0, across = last_column - first_column + 1;
+    for (int c = 0; c < across * (last_row - first_row + 1); c++) {
+        int cell = (first_row + c / across) * l->columns + first_column + c % across;
+        for (int k = l->cell[cell]; k >= 0; k = l->found[k].next) {
+            if (k == i || l->found[k].dropped || is_charge(&l->found[k])) {
                 continue;
             }
             bst_stamp other =
@@ -150,10 +181,19 @@ static bool fit_one(bst_locator *l, const bst_locate_frame *f, int i, const bst_
         free_sources[k] = &copies[k];
     }
     bst_fit_data data = {f->signal, f->width, f->height, l->found[i].noise_e};
-    double path = hypot(copies[0].shape.dx_px, copies[0].shape.dy_px);
-    double limit = 1.5 + f->sigma_px + 0.4 * path;
+    double limit = fit_limit(f, hypot(copies[0].shape.dx_px, copies[0].shape.dy_px));
     bool ok = bst_fit_run(&l->fit, &data, stamp, free_sources, c.free_count, c.fixed, c.fixed_count,
                           free_width && c.free_count == 1, limit);
+    if (!ok && c.free_count > 1) {
+        /* the pixels do not determine a neighbour, as at the stamp's edge: it stays as it is */
+        int fixed_count = c.fixed_count;
+        for (int k = 1; k < c.free_count && fixed_count < MAX_FIXED; k++) {
+            c.fixed[fixed_count++] = c.free[k];
+        }
+        copies[0] = *c.free[0];
+        ok =
+            bst_fit_run(&l->fit, &data, stamp, free_sources, 1, c.fixed, fixed_count, false, limit);
+    }
     if (ok) {
         l->found[i].source = copies[0];
     }
@@ -213,6 +253,7 @@ static void locate_one(bst_locator *l, const bst_locate_frame *f, int i) {
         bool point_ok = fit_one(l, f, i, &stamp, false);
         found->streak = streak_ok && (!point_ok || streak.chi_square < found->source.chi_square);
         found->source = found->streak ? streak : found->source;
+        note_length(l, &found->source.shape);
     }
     bst_stamp stamp = stamp_of(l, f, &found->source);
     bool bright = (double)found->peak_snr > WIDTH_FIT_SNR;
@@ -226,6 +267,156 @@ static void locate_one(bst_locator *l, const bst_locate_frame *f, int i) {
         l->widening_sum += weight * found->source.widening_px2;
         l->widening_weight += weight;
     }
+}
+
+/* The pixels that are sharper than light about a candidate's maximum, and those that they join. */
+static int find_charge(const bst_locator *l, const bst_locate_frame *f, const bst_found *found,
+                       int at[MAX_CHARGE], double *sharpest) {
+    int reach_px = 1 + (int)f->sigma_px, count = 0;
+    *sharpest = 0.0;
+    for (int round = -1; round < count; round++) {
+        int x = round < 0 ? found->peak_x : at[round] % f->width;
+        int y = round < 0 ? found->peak_y : at[round] / f->width;
+        int r = round < 0 ? reach_px : 1;
+        for (int v = y - r; v <= y + r; v++) {
+            for (int u = x - r; u <= x + r && count < MAX_CHARGE; u++) {
+                double sharp = bst_sharpness_at(&l->sharpness, f->signal, f->width, f->height,
+                                                found->noise_e, u, v);
+                bool known = false;
+                for (int k = 0; k < count && sharp > BST_SHARP_DEVIATION; k++) {
+                    known = known || at[k] == v * f->width + u;
+                }
+                if (sharp > BST_SHARP_DEVIATION && !known) {
+                    at[count++] = v * f->width + u;
+                    *sharpest = fmax(*sharpest, sharp);
+                }
+            }
+        }
+    }
+    return count;
+}
+
+/* What a candidate is when its charge is all there is: centroid and extent of the charge. */
+static void describe_charge(const bst_locate_frame *f, const int *at, int count, double sharpest,
+                            bst_found *found) {
+    double sum = 0.0, square = 0.0, mx = 0.0, my = 0.0, mxx = 0.0, mxy = 0.0, myy = 0.0;
+    for (int k = 0; k < count; k++) {
+        double v = (double)f->signal[at[k]], x = at[k] % f->width - found->peak_x,
+               y = at[k] / f->width - found->peak_y;
+        sum += v;
+        square += v * v;
+        mx += v * x;
+        my += v * y;
+        mxx += v * x * x;
+        mxy += v * x * y;
+        myy += v * y * y;
+    }
+    mx /= sum;
+    my /= sum;
+    mxx = fmax(mxx / sum - mx * mx, 0.0) + 1.0 / 12.0;
+    myy = fmax(myy / sum - my * my, 0.0) + 1.0 / 12.0;
+    mxy = mxy / sum - mx * my;
+    double mean = 0.5 * (mxx + myy), half = hypot(0.5 * (mxx - myy), mxy);
+    found->charge = (bst_charge){.pixels = count,
+                                 .sharpness = sharpest,
+                                 .x_px = found->peak_x + mx,
+                                 .y_px = found->peak_y + my,
+                                 .electrons = sum,
+                                 .snr = sqrt(square) / found->noise_e,
+                                 .length_px = FWHM_PER_SIGMA * sqrt(mean + half),
+                                 .width_px = FWHM_PER_SIGMA * sqrt(fmax(mean - half, 0.0)),
+                                 .angle_rad = half > 1e-9 ? 0.5 * atan2(2.0 * mxy, mxx - myy) : 0};
+}
+
+/* Charge about every candidate, and then off all pixels that hold it: one candidate's must not hide
+ * from another. */
+static void remove_charge(bst_locator *l, const bst_locate_frame *f) {
+    l->charged_count = 0;
+    for (int i = 0; i < l->count; i++) {
+        int at[MAX_CHARGE];
+        double sharpest;
+        int count = find_charge(l, f, &l->found[i], at, &sharpest);
+        if (count == 0) {
+            continue;
+        }
+        describe_charge(f, at, count, sharpest, &l->found[i]);
+        for (int k = 0; k < count && l->charged_count < l->charged_capacity; k++) {
+            l->charged[l->charged_count++] = at[k];
+        }
+    }
+    for (int k = 0; k < l->charged_count; k++) {
+        f->signal[l->charged[k]] = BST_PIXEL_BAD;
+    }
+}
+
+/* SNR of what the pixels without charge show of a point (or streak, locally) there. */
+static double light_beside_charge(const bst_locate_frame *f, const bst_found *found) {
+    int r = 1 + (int)ceil(1.5 * f->sigma_px);
+    double sum = 0.0, norm = 0.0, scale = -0.5 / (f->sigma_px * f->sigma_px + 1.0 / 12.0);
+    for (int y = found->peak_y - r; y <= found->peak_y + r; y++) {
+        for (int x = found->peak_x - r; x <= found->peak_x + r; x++) {
+            if (x < 0 || y < 0 || x >= f->width || y >= f->height) {
+                continue;
+            }
+            float v = f->signal[(size_t)y * (size_t)f->width + (size_t)x];
+            if (v > BST_PIXEL_NONE) {
+                double dx = x - found->charge.x_px, dy = y - found->charge.y_px;
+                double w = exp(scale * (dx * dx + dy * dy));
+                sum += w * (double)v;
+                norm += w * w;
+            }
+        }
+    }
+    return norm > 0.0 ? sum / (sqrt(norm) * found->noise_e) : 0.0;
+}
+
+/* Says that a candidate is charge and nothing else. */
+static void take_for_charge(bst_found *found) {
+    const bst_charge *c = &found->charge;
+    found->label = c->pixels == 1 ? BST_LABEL_HOT_PIXEL : BST_LABEL_HIT;
+    /* chance of light: its tail there, against one candidate in a thousand that is charge */
+    double odds = exp(fmin(0.5 * c->sharpness * c->sharpness, 300.0) - 7.0);
+    found->label_probability = odds / (1.0 + odds);
+    found->streak = false;
+    found->flags = 0;
+    found->source.shape.x_px = c->x_px;
+    found->source.shape.y_px = c->y_px;
+    found->source.shape.dx_px = found->source.shape.dy_px = 0.0;
+    found->source.shape.bend_x_px = found->source.shape.bend_y_px = 0.0;
+    found->source.flux_e = c->electrons;
+    found->source.flux_variance = c->pixels * found->noise_e * found->noise_e + c->electrons;
+    found->source.cov_xx = found->source.cov_yy = 1.0 / 12.0;
+    found->source.cov_xy = 0.0;
+    found->snr = c->snr;
+    found->length_px = c->length_px;
+    found->width_px = c->width_px;
+    found->angle_rad = c->angle_rad;
+}
+
+/* Whether the fit to the pixels without charge shows no source: too little light, or light that the
+ * PSF does not explain. */
+static bool is_charge_alone(const bst_found *found) {
+    const bst_source *s = &found->source;
+    double snr2 = s->flux_e * s->flux_e / fmax(s->flux_variance, 1e-30);
+    double excess = s->chi_square - s->pixels;
+    return !s->fitted || snr2 < LIGHT_SNR * LIGHT_SNR ||
+           excess > 5.0 * sqrt(2.0 * s->pixels) + 0.1 * snr2;
+}
+
+/* Whether charge was taken off about a candidate: the filters answer to it besides its own place.
+ */
+static bool is_charge_near(const bst_locator *l, const bst_locate_frame *f,
+                           const bst_found *found) {
+    bst_source s = found->source;
+    s.shape.x_px = found->peak_x;
+    s.shape.y_px = found->peak_y;
+    bst_stamp stamp = bst_fit_stamp(&s, reach(f), l->max_side, f->width, f->height);
+    bool near = false;
+    for (int k = 0; k < l->charged_count && !near; k++) {
+        int x = l->charged[k] % f->width - stamp.x0, y = l->charged[k] / f->width - stamp.y0;
+        near = x >= 0 && y >= 0 && x < stamp.width && y < stamp.height;
+    }
+    return near;
 }
 
 /* Principal axes of the measured or modelled second moments. */
@@ -318,6 +509,7 @@ static void fit_own_streak(bst_locator *l, const bst_locate_frame *f, int i) {
             return;
         }
         found->streak = true;
+        note_length(l, &found->source.shape);
         found->snr = found->source.flux_e * bst_fit_norm(&l->fit, &stamp) / found->noise_e;
     }
 }
@@ -341,19 +533,11 @@ static void judge(const bst_locate_frame *f, bst_found *found) {
             }
         }
     }
-    float hottest = 0.0f;
-    for (int j = found->peak_y - 1; j <= found->peak_y + 1; j++) {
-        for (int i = found->peak_x - 1; i <= found->peak_x + 1; i++) {
-            if (i >= 0 && j >= 0 && i < f->width && j < f->height) {
-                hottest = fmaxf(hottest, f->signal[(size_t)j * (size_t)f->width + (size_t)i]);
-            }
-        }
-    }
-    /* one pixel alone explains the light better than the PSF does: it has the greater SNR */
-    bool hot = !(found->flags & BST_DETECTION_SATURATED) &&
-               (double)hottest / found->noise_e > 1.1 * (double)found->peak_snr + 2.5;
     bool outside = x < -0.5 || y < -0.5 || x > f->width - 0.5 || y > f->height - 0.5;
-    found->artefact = hot || outside || !s->fitted;
+    if (outside || !s->fitted) {
+        found->label = BST_LABEL_ARTEFACT;
+        found->label_probability = 0.9;
+    }
 }
 
 /* A candidate whose fit failed keeps its maximum's place. */
@@ -367,15 +551,20 @@ static void use_maximum(const bst_locate_frame *f, bst_found *found) {
 
 static void drop_doubles(bst_locator *l, const bst_locate_frame *f) {
     double radius = 0.6 * FWHM_PER_SIGMA * f->sigma_px;
+    double margin = radius + 1.8 * l->longest_px + 2.0 * fit_limit(f, 0.0);
     for (int i = 0; i < l->count; i++) {
         const bst_shape *a = &l->found[i].source.shape;
-        int band = l->found[i].peak_y / BAND;
-        for (int b = band > 0 ? band - 1 : 0; b <= band + 1 && b < l->buckets; b++) {
-            for (int k = l->bucket[b]; k >= 0; k = l->found[k].next) {
-                const bst_shape *c = &l->found[k].source.shape;
+        int x0, x1, y0, y1;
+        cell_range(a->x_px, a->x_px, margin, l->columns, &x0, &x1);
+        cell_range(a->y_px, a->y_px, margin, l->rows, &y0, &y1);
+        for (int c = 0; c < (x1 - x0 + 1) * (y1 - y0 + 1); c++) {
+            int cell = (y0 + c / (x1 - x0 + 1)) * l->columns + x0 + c % (x1 - x0 + 1);
+            for (int k = l->cell[cell]; k >= 0; k = l->found[k].next) {
+                const bst_shape *b = &l->found[k].source.shape;
                 /* numbers are by brightness: the fainter goes */
                 if (k < i && !l->found[k].dropped &&
-                    hypot(a->x_px - c->x_px, a->y_px - c->y_px) < radius) {
+                    is_charge(&l->found[k]) == is_charge(&l->found[i]) &&
+                    hypot(a->x_px - b->x_px, a->y_px - b->y_px) < radius) {
                     l->found[i].dropped = true;
                 }
             }
@@ -385,15 +574,27 @@ static void drop_doubles(bst_locator *l, const bst_locate_frame *f) {
 
 void bst_locate(bst_locator *l, const bst_locate_frame *f, const bst_candidates *candidates) {
     l->count = candidates->count < l->capacity ? candidates->count : l->capacity;
+    l->longest_px = 0.0;
     for (int i = 0; i < l->count; i++) {
         start(f, &candidates->items[candidates->order[i]], &l->found[i]);
+        note_length(l, &l->found[i].source.shape);
     }
-    index_rows(l);
+    index_cells(l);
     double variance = f->sigma_px * f->sigma_px;
     l->widening_sum = 0.0;
     l->widening_weight = 1.0 / (0.0025 * variance * variance); /* no widening, to 5 % */
+    bst_sharpness_set(&l->sharpness, &l->psf, f->sigma_px);
+    remove_charge(l, f);
     for (int i = 0; i < l->count; i++) {
+        bst_found *found = &l->found[i];
+        if (found->charge.pixels > 0 && light_beside_charge(f, found) < LIGHT_SNR) {
+            take_for_charge(found);
+            continue;
+        }
         locate_one(l, f, i);
+        if (found->charge.pixels > 0 && is_charge_alone(found)) {
+            take_for_charge(found);
+        }
     }
     drop_doubles(l, f);
     /* blends again, now that every neighbour has its place */
@@ -407,16 +608,21 @@ void bst_locate(bst_locator *l, const bst_locate_frame *f, const bst_candidates 
     }
     for (int i = 0; i < l->count; i++) {
         bst_found *found = &l->found[i];
-        if (found->dropped) {
+        if (found->dropped || is_charge(found)) {
             continue;
         }
         if (!found->source.fitted) {
             use_maximum(f, found);
         }
         found->snr = found->source.flux_e * shape_norm(f, found->streak) / found->noise_e;
+        if (found->snr < LIGHT_SNR && is_charge_near(l, f, found)) {
+            found->dropped = true;
+            continue;
+        }
         judge(f, found);
         bool alone = !(found->flags & (BST_DETECTION_BLEND | BST_DETECTION_EDGE));
-        if (alone && !found->streak && !found->artefact && found->snr >= MOMENTS_SNR) {
+        if (alone && !found->streak && found->label == BST_LABEL_UNKNOWN &&
+            found->snr >= MOMENTS_SNR) {
             fit_own_streak(l, f, i);
         }
         measure_extent(l, f, i, 0.0);
@@ -425,5 +631,17 @@ void bst_locate(bst_locator *l, const bst_locate_frame *f, const bst_candidates 
              found->length_px > 1.5 * FWHM_PER_SIGMA * f->sigma_px)) {
             found->flags |= BST_DETECTION_STREAK;
         }
+    }
+}
+
+void bst_locate_roughly(bst_locator *l, const bst_locate_frame *f,
+                        const bst_candidates *candidates) {
+    l->count = candidates->count < l->capacity ? candidates->count : l->capacity;
+    for (int i = 0; i < l->count; i++) {
+        bst_found *found = &l->found[i];
+        start(f, &candidates->items[candidates->order[i]], found);
+        use_maximum(f, found);
+        found->snr = (double)found->peak_snr;
+        found->length_px = found->width_px = FWHM_PER_SIGMA * f->sigma_px;
     }
 }

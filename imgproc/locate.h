@@ -4,7 +4,17 @@
 
 #include "imgproc/candidates.h"
 #include "imgproc/fit.h"
-#include "imgproc/motion.h"
+#include "imgproc/sharpness.h"
+#include "sim/world/motion.h"
+
+/* Charge that is not light, in pixels of the frame. */
+typedef struct bst_charge {
+    int pixels;       /* 0: none */
+    double sharpness; /* greatest of them, see sharpness.h */
+    double x_px, y_px, electrons;
+    double snr; /* sqrt(sum d^2) over the background's noise */
+    double length_px, width_px, angle_rad;
+} bst_charge;
 
 typedef struct bst_found {
     bst_source source;
@@ -13,26 +23,33 @@ typedef struct bst_found {
     double length_px, width_px, angle_rad;
     unsigned flags; /* BST_DETECTION_... */
     bool streak;    /* the shape that fits is not a point */
-    bool artefact, dropped;
+    bool dropped;
+    int label; /* bst_label: UNKNOWN, ARTEFACT, HOT_PIXEL (one pixel's charge) or HIT */
+    double label_probability;
+    bst_charge charge;
     float peak_snr;
     int peak_x, peak_y;
-    int next; /* in the bucket of its row */
+    int next; /* in its cell of the frame */
 } bst_found;
 
 typedef struct bst_locator {
     bst_psf psf;
     bst_fit fit;
+    bst_sharpness sharpness;
     int max_side, capacity;
     bst_found *found;
     int count;
-    int *bucket; /* first found in each band of rows */
-    int buckets;
+    int *cell; /* first found in each square of the frame, by its maximum */
+    int columns, rows;
+    double longest_px; /* half of the longest path of a source of this frame, along an axis */
     double widening_sum, widening_weight;
+    int *charged; /* pixels of the latest frame that hold charge */
+    int charged_count, charged_capacity;
 } bst_locator;
 
 /* What one frame gives. */
 typedef struct bst_locate_frame {
-    const float *signal; /* [height][width] */
+    float *signal; /* [height][width]; pixels with charge that is not light become BST_PIXEL_BAD */
     int width, height;
     const bst_background *background;
     const bst_filter *filter;
@@ -42,8 +59,8 @@ typedef struct bst_locate_frame {
     double origin_x_px, origin_y_px, binning; /* full-sensor = origin + binning * frame pixel */
 } bst_locate_frame;
 
-bst_status bst_locator_create(bst_ctx *ctx, int capacity, int max_height, int max_side,
-                              bst_locator *out) BST_MUST_CHECK;
+bst_status bst_locator_create(bst_ctx *ctx, int capacity, int max_width, int max_height,
+                              int max_side, bst_locator *out) BST_MUST_CHECK;
 void bst_locator_free(bst_locator *locator);
 
 /* Fits the brightest `capacity` candidates, brightest first. Each is taken for a point or for a
@@ -51,8 +68,16 @@ void bst_locator_free(bst_locator *locator);
  * lower chi-square stays. Neighbours whose centres lie on its pixels are fitted with it. The
  * widening of the PSF (jitter) is measured on sources of SNR 20 and more and its mean is used for
  * the fainter ones. A point that turns out elongated is fitted again as a streak of its own length
- * and angle. */
+ * and angle.
+ *
+ * Pixels that are sharper than light are left out first. What the others then do not show to be a
+ * source is a HOT_PIXEL or a HIT, by the number of pixels. */
 void bst_locate(bst_locator *locator, const bst_locate_frame *frame,
                 const bst_candidates *candidates);
+
+/* The same without fits: each stands at its maximum's pixel, known to a pixel, with the flux that
+ * the filter says. For frames in which stars moved further than is modelled. */
+void bst_locate_roughly(bst_locator *locator, const bst_locate_frame *frame,
+                        const bst_candidates *candidates);
 
 #endif

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "imgproc/calibration.h"
+#include "imgproc/discriminate.h"
 #include "imgproc/imgproc.h"
 #include "imgproc/sky.h"
 #include "sim/io/psf_fits.h"
@@ -34,6 +35,10 @@ const bst_config_desc bst_imgproc_config_table[] = {
              "Greatest pointing error over which stars are identified."),
     BST_REAL(bst_imgproc_config, match_tolerance_px, "px", 0.5, 20, "3",
              "Greatest distance of one star from its place after the common shift."),
+    BST_INT(
+        bst_imgproc_config, threads, "", 0, 32, "0",
+        "Threads that share the passes over a frame; 0: one per processor. Results do not depend "
+        "on it."),
     BST_LIST(bst_imgproc_config, bad_pixels, bst_bad_pixel, bad_pixel_table, 0, 1000000, "[]",
              "Sensor pixels to leave out."),
     BST_PATH(
@@ -81,6 +86,7 @@ typedef struct imgproc_module {
     bst_imgproc_maps maps;
     lane lanes[BST_STEP_LANES];
     bst_starid *starid;
+    bst_discriminator *discriminator;
     bst_sky sky;
 } imgproc_module;
 
@@ -95,6 +101,7 @@ static void destroy(void *self) {
     }
     bst_calibration_free(&m->maps);
     bst_starid_free(m->starid);
+    bst_discriminator_free(m->discriminator);
     bst_sky_free(&m->sky);
     free(m);
 }
@@ -126,6 +133,8 @@ static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
                            bst_knowledge_julian_year(env->knowledge), CATALOGUE_CAPACITY, &m->sky));
     BST_TRY(bst_starid_create(env->ctx, CATALOGUE_CAPACITY, (int)m->config->capacity,
                               m->config->search_radius_px, &m->starid));
+    BST_TRY(bst_discriminator_create(env->ctx, &m->camera, (int)m->config->capacity,
+                                     &m->discriminator));
     bst_env_set_capacity(env, PORT_DETECTIONS, (int)m->config->capacity);
     return BST_OK;
 }
@@ -154,29 +163,25 @@ static bst_quat correction(const imgproc_module *m, const bst_predictions *predi
                                               predictions->attitude_error_rate_cam_radps));
 }
 
-/* Labels stars; what is no star is an object, unless it moved as stars do. */
-static void label(bst_detections *out, bool found_field, double streak_px) {
-    for (int i = 0; i < out->count; i++) {
-        bst_detection *d = &out->items[i];
-        if (d->label != BST_LABEL_UNKNOWN) {
-            continue;
-        }
-        bool moved_as_stars = streak_px >= 3.0 && (d->flags & BST_DETECTION_STREAK);
-        if (d->flags & BST_DETECTION_EDGE) {
-            d->label = BST_LABEL_ARTEFACT;
-        } else if (!moved_as_stars && (found_field || streak_px >= 3.0)) {
-            d->label = BST_LABEL_OBJECT;
-        }
-    }
-}
-
 static double shift_px(const bst_starid_result *r) {
     return hypot(r->shift_x_px, r->shift_y_px);
 }
 
+/* The attitude that the stars' common shift and turn tell. */
+static bst_quat attitude_of(const imgproc_module *m, const bst_starid_options *o,
+                            const bst_starid_result *r, bst_quat q) {
+    bst_vec3 seen = bst_camera_unproject(&m->camera, o->centre_x_px + r->shift_x_px,
+                                         o->centre_y_px + r->shift_y_px);
+    bst_vec3 meant = bst_camera_unproject(&m->camera, o->centre_x_px, o->centre_y_px);
+    bst_vec3 turn = bst_vec3_axpy(bst_vec3_cross(meant, seen), r->roll_rad, meant);
+    return bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(turn), q));
+}
+
+/* *q_cam_from_gcrf: in, the attitude that is believed; out, that of the stars, when any are
+ * identified. */
 static bst_status identify(imgproc_module *m, const lane *l, bst_ctx *ctx,
                            const bst_nav_telemetry *nav, bst_window window, bool locked,
-                           bst_detections *out) {
+                           bst_detections *out, bst_quat *q_cam_from_gcrf) {
     bst_light light = {nav->velocity_bary_mps, nav->sun_m};
     double v_limit = bst_imgproc_v_limit(l->ip, SNR_SHARE_EXPECTED * out->threshold_snr);
     int expected = 0;
@@ -201,22 +206,22 @@ static bst_status identify(imgproc_module *m, const lane *l, bst_ctx *ctx,
     }
     if (m->camera.geometry.general && result.matched > 0 && shift_px(&result) > RESHIFT_PX) {
         /* distortion makes a shift uneven over the field: look again from where the stars were */
-        bst_vec3 seen = bst_camera_unproject(&m->camera, options.centre_x_px + result.shift_x_px,
-                                             options.centre_y_px + result.shift_y_px);
-        bst_vec3 turn = bst_vec3_cross((bst_vec3){0, 0, 1}, seen);
-        turn.z = result.roll_rad;
-        bst_quat q = bst_quat_mul(bst_quat_from_rotvec(turn), out->q_cam_from_gcrf);
+        *q_cam_from_gcrf = attitude_of(m, &options, &result, out->q_cam_from_gcrf);
         for (int i = 0; i < out->count; i++) {
             if (out->items[i].label == BST_LABEL_STAR) {
                 out->items[i].label = BST_LABEL_UNKNOWN;
+                out->items[i].label_probability = 0.0;
                 out->items[i].star_id = 0;
             }
         }
-        BST_TRY(bst_sky_expect(ctx, &m->sky, bst_quat_unit(q), &light, window,
+        BST_TRY(bst_sky_expect(ctx, &m->sky, *q_cam_from_gcrf, &light, window,
                                m->config->search_radius_px, v_limit, &expected));
         options.search_radius_px = fmin(options.search_radius_px, LOCKED_RADIUS_PX);
         bst_starid_match(m->starid, &options, m->sky.expected, expected, out->items, out->count,
                          &result);
+    }
+    if (result.matched > 0) {
+        *q_cam_from_gcrf = attitude_of(m, &options, &result, *q_cam_from_gcrf);
     }
     out->stars_identified = result.matched;
     return BST_OK;
@@ -310,19 +315,29 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
     out->q_cam_from_gcrf = out->q_telemetry_from_gcrf = motion.q_cam_from_gcrf;
     const bst_predictions *predictions = predicted.stale ? NULL : predicted.payload;
     bool locked = oriented && predictions && predictions->attitude_valid;
+    double middle = 0.5 * ((double)message->start_tick + (double)message->end_tick);
     if (locked) {
-        double middle = 0.5 * ((double)message->start_tick + (double)message->end_tick);
         out->q_cam_from_gcrf =
             bst_quat_unit(bst_quat_mul(correction(m, predictions, middle), motion.q_cam_from_gcrf));
     }
 
     BST_TRY(detections_of(ctx, m, l, message, oriented ? &motion : NULL, out, capacity));
     bool smeared = bst_imgproc_smeared(l->ip);
+    bst_frame_knowledge known = {.q_cam_from_gcrf = out->q_cam_from_gcrf,
+                                 .window = message->window,
+                                 .streak_px = bst_imgproc_streak_px(l->ip),
+                                 .predictions = predictions};
     if (oriented && nav.payload && !nav.stale && !smeared) {
-        BST_TRY(identify(m, l, ctx, nav.payload, message->window, locked, out));
+        const bst_nav_telemetry *n = nav.payload;
+        BST_TRY(identify(m, l, ctx, n, message->window, locked, out, &known.q_cam_from_gcrf));
+        known.light = (bst_light){n->velocity_bary_mps, n->sun_m};
+        known.oriented = out->stars_identified > 0;
+    }
+    if (predictions) {
+        known.predictions_age_s = (middle - (double)predictions->tick) / (double)m->tick_rate_hz;
     }
     if (!smeared) {
-        label(out, out->stars_identified > 0, bst_imgproc_streak_px(l->ip));
+        bst_discriminator_label(m->discriminator, &known, out);
     }
     if (out->stars_identified == 0) {
         bst_step_count(step, "frame_without_stars");

@@ -1,6 +1,7 @@
 #include "imgproc/rows.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "imgproc/background.h"
 
@@ -8,43 +9,59 @@
  * the clones round alike. */
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
     !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-#define ROW_FUNCTION __attribute__((target_clones("default", "avx2")))
+#define ROW_FUNCTION __attribute__((target_clones("default", "avx2", "avx512f")))
+/* for comparisons that are kept as numbers, which 512-bit registers are slow at */
+#define MASK_FUNCTION __attribute__((target_clones("default", "avx2")))
 #else
 #define ROW_FUNCTION
+#define MASK_FUNCTION
 #endif
 
-ROW_FUNCTION
+/* Half of the lanes as one value, so that they stay in registers. */
+enum { HALF = BST_ROW_LANES / 2 };
+typedef float lanes __attribute__((vector_size(HALF * sizeof(float))));
+typedef int32_t lane_masks __attribute__((vector_size(HALF * sizeof(float))));
+
+MASK_FUNCTION
 void bst_row_clipped_sums(const float *restrict row, int count, float level, float limit,
                           bst_row_sums *restrict sums) {
-    float n[BST_ROW_LANES], s[BST_ROW_LANES], q[BST_ROW_LANES];
-    for (int j = 0; j < BST_ROW_LANES; j++) {
-        n[j] = sums->count[j];
-        s[j] = sums->sum[j];
-        q[j] = sums->square[j];
-    }
+    lane_masks n0 = {0}, n1 = {0};
+    lanes s0, s1, q0, q1, d0, d1;
+    memcpy(&s0, sums->sum, sizeof s0);
+    memcpy(&s1, sums->sum + HALF, sizeof s1);
+    memcpy(&q0, sums->square, sizeof q0);
+    memcpy(&q1, sums->square + HALF, sizeof q1);
     int x = 0;
     for (; x + BST_ROW_LANES <= count; x += BST_ROW_LANES) {
-        for (int j = 0; j < BST_ROW_LANES; j++) {
-            float d = row[x + j] - level;
-            float inside = fabsf(d) <= limit ? 1.0f : 0.0f;
-            float kept = fabsf(d) <= limit ? d : 0.0f;
-            n[j] += inside;
-            s[j] += kept;
-            q[j] += kept * kept;
-        }
+        memcpy(&d0, row + x, sizeof d0);
+        memcpy(&d1, row + x + HALF, sizeof d1);
+        d0 -= level;
+        d1 -= level;
+        lane_masks in0 = (d0 <= limit) & (d0 >= -limit), in1 = (d1 <= limit) & (d1 >= -limit);
+        n0 -= in0;
+        n1 -= in1;
+        d0 = (lanes)((lane_masks)d0 & in0);
+        d1 = (lanes)((lane_masks)d1 & in1);
+        s0 += d0;
+        s1 += d1;
+        q0 += d0 * d0;
+        q1 += d1 * d1;
+    }
+    memcpy(sums->sum, &s0, sizeof s0);
+    memcpy(sums->sum + HALF, &s1, sizeof s1);
+    memcpy(sums->square, &q0, sizeof q0);
+    memcpy(sums->square + HALF, &q1, sizeof q1);
+    for (int j = 0; j < HALF; j++) {
+        sums->count[j] += (float)n0[j];
+        sums->count[j + HALF] += (float)n1[j];
     }
     for (int j = 0; x < count; x++, j++) {
-        float d = row[x] - level;
-        if (fabsf(d) <= limit) {
-            n[j] += 1.0f;
-            s[j] += d;
-            q[j] += d * d;
+        float rest = row[x] - level;
+        if (fabsf(rest) <= limit) {
+            sums->count[j] += 1.0f;
+            sums->sum[j] += rest;
+            sums->square[j] += rest * rest;
         }
-    }
-    for (int j = 0; j < BST_ROW_LANES; j++) {
-        sums->count[j] = n[j];
-        sums->sum[j] = s[j];
-        sums->square[j] = q[j];
     }
 }
 
@@ -73,33 +90,86 @@ void bst_row_normalise(const uint16_t *restrict raw, const float *electrons,
 ROW_FUNCTION
 void bst_row_combine(float *restrict out, int count, const float *const *in, const float *weight,
                      int taps) {
-    for (int t = 0; t < taps; t += 4) {
+    int t = 0;
+    if (taps >= 8) {
+        const float *restrict a = in[0], *restrict b = in[1], *restrict c = in[2],
+                              *restrict d = in[3], *restrict e = in[4], *restrict f = in[5],
+                              *restrict g = in[6], *restrict h = in[7];
+        float wa = weight[0], wb = weight[1], wc = weight[2], wd = weight[3], we = weight[4],
+              wf = weight[5], wg = weight[6], wh = weight[7];
+        for (int x = 0; x < count; x++) {
+            out[x] = ((wa * a[x] + wb * b[x]) + (wc * c[x] + wd * d[x])) +
+                     ((we * e[x] + wf * f[x]) + (wg * g[x] + wh * h[x]));
+        }
+        t = 8;
+    } else {
+        memset(out, 0, (size_t)count * sizeof *out);
+    }
+    for (; t + 8 <= taps; t += 8) {
+        const float *restrict a = in[t], *restrict b = in[t + 1], *restrict c = in[t + 2],
+                              *restrict d = in[t + 3], *restrict e = in[t + 4],
+                              *restrict f = in[t + 5], *restrict g = in[t + 6],
+                              *restrict h = in[t + 7];
+        float wa = weight[t], wb = weight[t + 1], wc = weight[t + 2], wd = weight[t + 3],
+              we = weight[t + 4], wf = weight[t + 5], wg = weight[t + 6], wh = weight[t + 7];
+        for (int x = 0; x < count; x++) {
+            out[x] += ((wa * a[x] + wb * b[x]) + (wc * c[x] + wd * d[x])) +
+                      ((we * e[x] + wf * f[x]) + (wg * g[x] + wh * h[x]));
+        }
+    }
+    for (; t < taps; t += 4) {
         const float *restrict a = in[t], *restrict b = in[t + 1], *restrict c = in[t + 2],
                               *restrict d = in[t + 3];
         float wa = weight[t], wb = weight[t + 1], wc = weight[t + 2], wd = weight[t + 3];
-        if (t == 0) {
-            for (int x = 0; x < count; x++) {
-                out[x] = (wa * a[x] + wb * b[x]) + (wc * c[x] + wd * d[x]);
-            }
-        } else {
-            for (int x = 0; x < count; x++) {
-                out[x] += (wa * a[x] + wb * b[x]) + (wc * c[x] + wd * d[x]);
-            }
+        for (int x = 0; x < count; x++) {
+            out[x] += (wa * a[x] + wb * b[x]) + (wc * c[x] + wd * d[x]);
         }
     }
 }
 
 ROW_FUNCTION
-bool bst_row_best(const float *restrict a, const float *restrict b, int count, float threshold,
-                  float *restrict best, uint8_t *restrict mask) {
-    uint8_t any = 0;
+void bst_row_greater(float *restrict a, const float *restrict b, int count) {
     for (int x = 0; x < count; x++) {
-        float m = a[x] > b[x] ? a[x] : b[x];
-        best[x] = m;
-        mask[x] = m > threshold ? 255 : 0;
-        any |= mask[x];
+        a[x] = a[x] > b[x] ? a[x] : b[x];
     }
-    return any != 0;
+}
+
+static bool is_maximum(const float *above, const float *row, const float *below, int count, int x) {
+    float v = row[x];
+    int lo = x > 0 ? x - 1 : 0, hi = x + 1 < count ? x + 1 : x;
+    if ((x > 0 && row[x - 1] >= v) || row[hi] > v) {
+        return false;
+    }
+    for (int i = lo; i <= hi; i++) {
+        if ((above && above[i] >= v) || (below && below[i] > v)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+ROW_FUNCTION
+int bst_row_maxima(const float *above, const float *row, const float *below, int count,
+                   float threshold, int32_t *x, float *value) {
+    int found = 0;
+    for (int at = 0; at < count; at += BST_ROW_LANES) {
+        int end = at + BST_ROW_LANES < count ? at + BST_ROW_LANES : count, any = 0;
+        if (end - at == BST_ROW_LANES) {
+            for (int j = 0; j < BST_ROW_LANES; j++) {
+                any |= row[at + j] > threshold;
+            }
+            if (!any) {
+                continue;
+            }
+        }
+        for (int i = at; i < end; i++) {
+            if (row[i] > threshold && is_maximum(above, row, below, count, i)) {
+                x[found] = i;
+                value[found++] = row[i];
+            }
+        }
+    }
+    return found;
 }
 
 ROW_FUNCTION

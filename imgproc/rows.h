@@ -31,9 +31,14 @@ void bst_row_normalise(const uint16_t *raw, const float *electrons, const float 
 /* out[x] = sum over taps of weight[t] * in[t][x]; taps is a multiple of 4. */
 void bst_row_combine(float *out, int count, const float *const *in, const float *weight, int taps);
 
-/* best = max(a, b); mask = 255 where best > threshold, else 0. Returns whether any is above. */
-bool bst_row_best(const float *a, const float *b, int count, float threshold, float *best,
-                  uint8_t *mask);
+/* a = max(a, b) */
+void bst_row_greater(float *a, const float *b, int count);
+
+/* Writes the places and values of the elements above the threshold that exceed their eight
+ * neighbours (of equals the first in row-major order); returns how many. above and below may be
+ * NULL. */
+int bst_row_maxima(const float *above, const float *row, const float *below, int count,
+                   float threshold, int32_t *x, float *value);
 
 /* out *= by */
 void bst_row_scale(float *out, const float *by, float factor, int count);

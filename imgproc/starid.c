@@ -76,7 +76,7 @@ static bool detection_brighter(const void *context, int a, int b) {
 /* Whether a detection may be a star: saturated sources may be brighter than they seem, cut ones
  * too. */
 static bool consistent(const bst_detection *d, const bst_expected_star *s) {
-    if (d->label == BST_LABEL_ARTEFACT) {
+    if (d->label != BST_LABEL_UNKNOWN && d->label != BST_LABEL_STAR) {
         return false;
     }
     double sigma = d->flux_e > 0.0 ? 1.0857 * d->flux_sigma_e / d->flux_e : 1.0;
@@ -302,10 +302,23 @@ void bst_starid_match(bst_starid *s, const bst_starid_options *o, const bst_expe
             floor_px = fmax(0.25, fmin(out->rms_px, 0.5 * floor_px));
         }
     }
+    double others = 0.0; /* per px^2, that are no stars of the catalogue */
     for (int i = 0; i < count; i++) {
-        if (s->star_of[i] >= 0) {
-            items[i].star_id = stars[s->star_of[i]].id;
-            items[i].label = BST_LABEL_STAR;
+        others += s->star_of[i] < 0;
+    }
+    others /= fmax(o->field_width_px * o->field_height_px, 1.0);
+    for (int i = 0; i < count; i++) {
+        if (s->star_of[i] < 0) {
+            continue;
         }
+        bst_detection *d = &items[i];
+        /* both at one place by the errors, or by the chance density of the others */
+        double distance = s->distance[s->star_of[i]];
+        double variance =
+            0.5 * fmax(d->cov_xx + d->cov_yy, 0.0) + fmax(out->rms_px * out->rms_px, 1e-4);
+        double near = exp(-0.5 * distance * distance / variance) / (2.0 * BST_PI * variance);
+        d->star_id = stars[s->star_of[i]].id;
+        d->label = BST_LABEL_STAR;
+        d->label_probability = near / (near + others);
     }
 }

@@ -38,8 +38,9 @@ void bst_starid_free(bst_starid *starid);
  * densest 4 x 4 px square wins if chance would fill a square anywhere as well in less than 1 of 100
  * frames (Poisson, at the density of consistent pairs). Then the nearest consistent partners are
  * matched one to one, shift and turn fitted by least squares, and again with a closer tolerance.
- * Sets star_id and label STAR of the matched ones, leaves the others untouched. ARTEFACT detections
- * take no part. */
+ * Sets star_id, label STAR and its probability (the pair's distance against the density of what
+ * matches no star) of the matched ones, leaves the others untouched. Only detections of label
+ * UNKNOWN (or STAR) take part. */
 void bst_starid_match(bst_starid *starid, const bst_starid_options *options,
                       const bst_expected_star *stars, int star_count, bst_detection *items,
                       int count, bst_starid_result *out);

@@ -16,14 +16,14 @@ static const double CROWD_PER_PX = 0.0015;
 static const double BRIGHT_POINT_SNR = 12.0, AREA_SHARE = 1.6, AREA_PIXELS = 10.0;
 static const double OWN_LIGHT = 3.0, OWN_LIGHT_SNR = 6.0, LOST_SNR = 1.5;
 
-bst_status bst_streak_locator_create(bst_ctx *ctx, const bst_psf *psf, int max_width,
-                                     int max_height, double fwhm_px, double max_px,
+bst_status bst_streak_locator_create(bst_ctx *ctx, const bst_psf *psf, bst_parallel *pool,
+                                     int max_width, int max_height, double fwhm_px, double max_px,
                                      bst_streak_locator *out) {
     *out = (bst_streak_locator){0};
     int side = (int)ceil(1.25 * max_px + 6.0 * fwhm_px) + 14;
     side = side < BST_PSF_MAX_SIDE ? side : BST_PSF_MAX_SIDE;
     bst_status status =
-        bst_streak_search_create(ctx, max_width, max_height, max_px, 0, &out->search);
+        bst_streak_search_create(ctx, pool, max_width, max_height, max_px, &out->search);
     if (status == BST_OK) {
         status = bst_streak_fit_create(ctx, psf, side, &out->fit);
     }
@@ -63,6 +63,10 @@ static double across(const bst_streak_line *line, double x, double y, double *al
     return fabs(px * uy - py * ux) / length;
 }
 
+static bool is_charge(const bst_found *found) {
+    return found->label == BST_LABEL_HOT_PIXEL || found->label == BST_LABEL_HIT;
+}
+
 /* Drops the points that are pieces of the line, each of SNR piece_snr at most but for chance, up to
  * beyond_px past its ends; returns how many, and marks them by `pieces`. */
 static int drop_pieces(bst_streak_locator *l, bst_locator *found, int count,
@@ -76,7 +80,7 @@ static int drop_pieces(bst_streak_locator *l, bst_locator *found, int count,
         double beyond = fmax(-along, along - 1.0) * length;
         bool inside = distance < 3.0 * sigma_px + 0.5 && beyond < beyond_px;
         bool own = !f->streak && f->snr > OWN_LIGHT * piece_snr + OWN_LIGHT_SNR;
-        if (inside && !own && !f->dropped) {
+        if (inside && !own && !f->dropped && !is_charge(f)) {
             f->dropped = true;
             l->pieces[pieces++] = i;
         }
@@ -92,7 +96,7 @@ static void exclude(bst_streak_locator *l, const bst_locate_frame *f, const bst_
         const bst_found *o = &found->found[i];
         double x = o->source.shape.x_px - stamp->x0, y = o->source.shape.y_px - stamp->y0;
         double radius = disc_radius(o->snr, f->sigma_px);
-        if (o->dropped || x < -radius || y < -radius || x > stamp->width + radius ||
+        if (o->dropped || is_charge(o) || x < -radius || y < -radius || x > stamp->width + radius ||
             y > stamp->height + radius) {
             continue;
         }
@@ -171,6 +175,11 @@ static bool measure(bst_streak_locator *l, const bst_locate_frame *f, const bst_
     out->flags = BST_DETECTION_STREAK;
     if (at_edge(f, &s->shape)) {
         out->flags |= BST_DETECTION_EDGE;
+    }
+    const bst_shape *p = &s->shape;
+    if (p->x_px < -0.5 || p->y_px < -0.5 || p->x_px > f->width - 0.5 || p->y_px > f->height - 0.5) {
+        out->label = BST_LABEL_ARTEFACT;
+        out->label_probability = 0.9;
     }
     return fitted;
 }
@@ -293,26 +302,83 @@ static void blank_point(bst_streak_locator *l, double x, double y, double snr, d
     bst_streak_map_blank(&l->search.map, x, y, x, y, widen * disc_radius(snr, sigma));
 }
 
+/* Takes charge out: what is left of its track beside the pixels that were left out. */
+static void blank_charge(bst_streak_locator *l, const bst_found *o) {
+    /* a track of even charge, by its second moment */
+    double half = 0.5 * sqrt(12.0) / FWHM_PER_SIGMA * o->length_px;
+    double dx = half * cos(o->angle_rad), dy = half * sin(o->angle_rad);
+    double x = o->source.shape.x_px, y = o->source.shape.y_px;
+    bst_streak_map_blank(&l->search.map, x - dx, y - dy, x + dx, y + dy,
+                         3.0 * o->source.shape.sigma_px + 1.5);
+}
+
+/* The run of pixels above the threshold of row y that touches *lo to *hi and takes its place; their
+ * number, 0 when there is none. */
+static int lit_in_row(const bst_filter *filter, double threshold, int y, int *lo, int *hi) {
+    int first = *lo - 1, last = *hi + 1, count = 0;
+    while (first <= last && !(first >= 0 && first < filter->width &&
+                              (double)bst_filter_point_at(filter, first, y) > threshold)) {
+        first++;
+    }
+    while (last >= first && !(last >= 0 && last < filter->width &&
+                              (double)bst_filter_point_at(filter, last, y) > threshold)) {
+        last--;
+    }
+    if (first > last) {
+        return 0;
+    }
+    while (first > 0 && (double)bst_filter_point_at(filter, first - 1, y) > threshold) {
+        first--;
+    }
+    while (last < filter->width - 1 &&
+           (double)bst_filter_point_at(filter, last + 1, y) > threshold) {
+        last++;
+    }
+    for (int x = first; x <= last; x++) {
+        count += (double)bst_filter_point_at(filter, x, y) > threshold;
+    }
+    *lo = first;
+    *hi = last;
+    return count;
+}
+
+/* Pixels above the threshold that are joined to a maximum, row by row; counting ends at `enough`.
+ */
+static int lit_pixels(const bst_filter *filter, double threshold, int x, int y, double enough) {
+    int lo = x, hi = x, count = lit_in_row(filter, threshold, y, &lo, &hi);
+    for (int step = -1; step <= 1; step += 2) {
+        int l = lo, h = hi, more = count;
+        for (int v = y + step; more > 0 && v >= 0 && v < filter->height && count < enough;
+             v += step) {
+            more = lit_in_row(filter, threshold, v, &l, &h);
+            count += more;
+        }
+    }
+    return count;
+}
+
 /* Whether a source is too bright for a piece of a streak of that many pixels: filtered, a point is
  * above a threshold t on 4 pi sigma^2 ln(snr / t) pixels. */
-static bool is_bright_point(const bst_found *o, const bst_candidate *c, double threshold,
-                            double sigma_px) {
-    double snr = (double)o->peak_snr;
-    double area = 4.0 * BST_PI * sigma_px * sigma_px * log(fmax(snr / threshold, 1.0));
-    return !o->streak && !(o->flags & BST_DETECTION_BLEND) && snr > BRIGHT_POINT_SNR &&
-           c->pixels < AREA_SHARE * area + AREA_PIXELS;
+static bool is_bright_point(const bst_locate_frame *f, const bst_found *o) {
+    double snr = (double)o->peak_snr, threshold = f->filter->threshold;
+    if (o->streak || (o->flags & BST_DETECTION_BLEND) || !(snr > BRIGHT_POINT_SNR)) {
+        return false;
+    }
+    double area = 4.0 * BST_PI * f->sigma_px * f->sigma_px * log(fmax(snr / threshold, 1.0));
+    double most = AREA_SHARE * area + AREA_PIXELS;
+    return lit_pixels(f->filter, threshold, o->peak_x, o->peak_y, most) < most;
 }
 
 void bst_streak_locate(bst_streak_locator *l, const bst_locate_frame *f,
                        const bst_candidates *candidates, double false_alarms, bst_locator *found) {
     int points = found->count;
     bst_streak_search_fill(&l->search, f->signal, f->width, f->height, f->background, f->sigma_px);
-    double least = points > 0 ? (double)found->found[points - 1].peak_snr : 0.0;
     for (int i = 0; i < points; i++) {
         const bst_found *o = &found->found[i];
         bool saturated = o->flags & BST_DETECTION_SATURATED;
-        if (saturated ||
-            is_bright_point(o, &candidates->items[candidates->order[i]], least, f->sigma_px)) {
+        if (is_charge(o)) {
+            blank_charge(l, o);
+        } else if (saturated || is_bright_point(f, o)) {
             blank_point(l, o->source.shape.x_px, o->source.shape.y_px, o->snr, f->sigma_px,
                         saturated ? 1.5 : 1.0);
         }
@@ -323,7 +389,7 @@ void bst_streak_locate(bst_streak_locator *l, const bst_locate_frame *f,
     }
     for (int i = 0; i < points; i++) {
         const bst_found *o = &found->found[i];
-        if (!o->dropped) {
+        if (!o->dropped && !is_charge(o)) {
             blank_point(l, o->source.shape.x_px, o->source.shape.y_px, o->snr, f->sigma_px, 1.0);
         }
     }

@@ -13,15 +13,16 @@ typedef struct bst_streak_locator {
     int *pieces;       /* points that a streak takes the place of */
 } bst_streak_locator;
 
-/* psf is kept. */
-bst_status bst_streak_locator_create(bst_ctx *ctx, const bst_psf *psf, int max_width,
-                                     int max_height, double fwhm_px, double max_px,
+/* psf and pool are kept; pool NULL: the caller's thread alone. */
+bst_status bst_streak_locator_create(bst_ctx *ctx, const bst_psf *psf, bst_parallel *pool,
+                                     int max_width, int max_height, double fwhm_px, double max_px,
                                      bst_streak_locator *out) BST_MUST_CHECK;
 void bst_streak_locator_free(bst_streak_locator *locator);
 
 /* Searches the frame that `found` was located in (bst_locate) for streaks and adds each to `found`
  * as long as there is room: fitted in place, path and flux, with flag BST_DETECTION_STREAK. Points
- * that are light of such a streak are dropped from it. */
+ * that are light of such a streak are dropped from it. Charge that is not light (BST_PIXEL_BAD in
+ * the signal) counts for nothing. */
 void bst_streak_locate(bst_streak_locator *locator, const bst_locate_frame *frame,
                        const bst_candidates *candidates, double false_alarms, bst_locator *found);
 

@@ -15,16 +15,13 @@ static const double RATE = 0.72, SIGMA_POWER = -2.35, LENGTH_PX = 200.0;
 enum { BRIGHT_OCTAVE = 1 };
 static const double BRIGHT_SNR = 7.5, BRIGHT_FILLED = 0.75, BRIGHT_PX = 11.0;
 
-bst_status bst_streak_search_create(bst_ctx *ctx, int max_width, int max_height, double max_px,
-                                    int threads, bst_streak_search *out) {
-    *out = (bst_streak_search){.max_px = max_px};
-    bst_status status = bst_parallel_create(ctx, threads, &out->pool);
-    if (status == BST_OK) {
-        status = bst_streak_map_create(ctx, max_width, max_height, &out->map);
-    }
+bst_status bst_streak_search_create(bst_ctx *ctx, bst_parallel *pool, int max_width, int max_height,
+                                    double max_px, bst_streak_search *out) {
+    *out = (bst_streak_search){.pool = pool, .max_px = max_px};
+    bst_status status = bst_streak_map_create(ctx, max_width, max_height, &out->map);
     if (status == BST_OK) {
         status = bst_streak_bank_create(ctx, max_width, max_height, max_px,
-                                        bst_parallel_threads(out->pool), &out->bank);
+                                        pool ? bst_parallel_threads(pool) : 1, &out->bank);
     }
     if (status == BST_OK) {
         out->order = calloc((size_t)bst_streak_bank_capacity(&out->bank), sizeof *out->order);
@@ -41,7 +38,6 @@ bst_status bst_streak_search_create(bst_ctx *ctx, int max_width, int max_height,
 }
 
 void bst_streak_search_free(bst_streak_search *s) {
-    bst_parallel_free(s->pool);
     bst_streak_map_free(&s->map);
     bst_streak_bank_free(&s->bank);
     free(s->order);

@@ -7,7 +7,7 @@
 enum { BST_STREAK_MAX_CANDIDATES = 2048, BST_STREAK_MAX_FOUND = 256 };
 
 typedef struct bst_streak_search {
-    bst_parallel *pool;
+    bst_parallel *pool; /* not its own */
     bst_streak_map map;
     bst_streak_bank bank;
     double max_px;
@@ -19,9 +19,9 @@ typedef struct bst_streak_search {
     bst_streak_line found[BST_STREAK_MAX_FOUND];
 } bst_streak_search;
 
-/* threads: 0, one per processor. */
-bst_status bst_streak_search_create(bst_ctx *ctx, int max_width, int max_height, double max_px,
-                                    int threads, bst_streak_search *out) BST_MUST_CHECK;
+/* pool is kept; NULL: the caller's thread alone. */
+bst_status bst_streak_search_create(bst_ctx *ctx, bst_parallel *pool, int max_width, int max_height,
+                                    double max_px, bst_streak_search *out) BST_MUST_CHECK;
 void bst_streak_search_free(bst_streak_search *search);
 
 /* The SNR that noise alone exceeds `false_alarms` times in a frame, over all places, directions and

@@ -9,6 +9,7 @@
 #include "scenegen/renderer.h"
 #include "sim/world/frame_updates.h"
 #include "sim/world/psf.h"
+#include "sim/world/truth_list.h"
 
 typedef struct fidelity_config {
     double tolerance_sigma;
@@ -75,13 +76,6 @@ static const bst_port ports[PORT_COUNT] = {
     [PORT_PLANES] = {BST_CHANNEL_PLANES, BST_PORT_OUT, 0, 0.0, 0},
 };
 
-/* A source that asks for room in the truth. */
-typedef struct pick {
-    double rate;
-    int index;
-    bool object;
-} pick;
-
 typedef struct scenegen {
     const bst_camera *camera, *world_camera;
     bst_camera changed; /* the camera at the pixel scale and jitter of the latest exposure */
@@ -95,8 +89,7 @@ typedef struct scenegen {
     bst_rng_key key;
     bst_field *field;
     bst_renderer *renderer;
-    pick *picks;
-    int pick_capacity;
+    bst_truth_list list;
     long long saturated_told, saturated_before; /* frames; those of earlier renderers */
     bst_plane_maker *planes;                    /* NULL: not asked for */
     int *item_source; /* source of each item of the truth, for the planes */
@@ -110,7 +103,7 @@ static void destroy(void *self) {
         bst_plane_maker_free(s->planes);
         bst_psf_free(s->psf);
         free(s->item_source);
-        free(s->picks);
+        bst_truth_list_free(&s->list);
         free(s);
     }
 }
@@ -175,85 +168,9 @@ static bst_status create(const bst_module_env *env, const void *config_object, v
     return BST_OK;
 }
 
-static int objects_then_brightest(const void *a, const void *b) {
-    const pick *p = a, *q = b;
-    if (p->object != q->object) {
-        return p->object ? -1 : 1;
-    }
-    return p->rate != q->rate ? (p->rate > q->rate ? -1 : 1)
-                              : (p->index > q->index) - (p->index < q->index);
-}
-
-static int by_index(const void *a, const void *b) {
-    int p = ((const pick *)a)->index, q = ((const pick *)b)->index;
-    return (p > q) - (p < q);
-}
-
-/* Where there are more sources than the truth has room for: the objects and the brightest stars, in
- * the order of the sources. */
-static bst_status pick_sources(bst_ctx *ctx, scenegen *s, const bst_source *sources, int count,
-                               int capacity) {
-    if (count > s->pick_capacity) {
-        pick *more = realloc(s->picks, 2 * (size_t)count * sizeof *more);
-        if (!more) {
-            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the truth of %d sources", count);
-        }
-        s->picks = more;
-        s->pick_capacity = 2 * count;
-    }
-    for (int i = 0; i < count; i++) {
-        s->picks[i] = (pick){sources[i].electrons_per_s, i, sources[i].kind == BST_SOURCE_OBJECT};
-    }
-    qsort(s->picks, (size_t)count, sizeof *s->picks, objects_then_brightest);
-    qsort(s->picks, (size_t)capacity, sizeof *s->picks, by_index);
-    return BST_OK;
-}
-
-/* Light of a source's brightest binned pixel over that of its brightest sensor pixel: of a streak
- * that is taken for a Gaussian of its own spread. */
-static double binned_share(const bst_camera *camera, int binning, const bst_truth_item *item) {
-    if (binning < 2) {
-        return 1.0;
-    }
-    double psf = bst_camera_psf_sigma_px(camera), share = 1.0;
-    const double way[2] = {item->x_end_px - item->x_start_px, item->y_end_px - item->y_start_px};
-    for (int i = 0; i < 2; i++) {
-        double spread = isfinite(way[i]) ? way[i] * way[i] / 12.0 : 0.0;
-        double half = 0.5 / sqrt(2.0 * (psf * psf + spread));
-        share *= erf(binning * half) / erf(half);
-    }
-    return share;
-}
-
-/* Fills the truth's items; whatever finds no room is counted in `lost`. */
-static bst_status write_items(bst_ctx *ctx, scenegen *s, const bst_los_track *track,
-                              const bst_source *sources, int count, const bst_exposure *e,
-                              bst_truth *truth, int capacity) {
-    truth->count = count < capacity ? count : capacity;
-    truth->lost = count - truth->count;
-    if (truth->lost > 0) {
-        BST_TRY(pick_sources(ctx, s, sources, count, capacity));
-    }
-    double top_e =
-        ((double)((1 << s->camera->bits) - 1) - s->camera->offset_dn) * s->camera->gain_e_per_dn;
-    int binning = e->binning > 1 ? e->binning : 1, added = binning * binning;
-    for (int i = 0; i < truth->count; i++) {
-        int k = truth->lost > 0 ? s->picks[i].index : i;
-        bst_field_truth_item(s->field, track, &sources[k], e->window, truth, &truth->items[i]);
-        if (s->item_source) {
-            s->item_source[i] = k;
-        }
-        double x = truth->items[i].x_mean_px, y = truth->items[i].y_mean_px;
-        double light = isfinite(x) ? bst_camera_illumination(s->camera, x, y) : 1.0;
-        double sky_e = bst_field_background_e(s->field, truth, x, y);
-        double peak_e = light * bst_renderer_peak_e(s->renderer, k), dark_e = truth->dark_e + sky_e;
-        /* the wells fill before pixels are added, the converter after */
-        if (peak_e >= s->camera->full_well_e - dark_e ||
-            peak_e * binned_share(s->camera, binning, &truth->items[i]) >= top_e - added * dark_e) {
-            truth->items[i].flags |= BST_TRUTH_SATURATED;
-        }
-    }
-    return BST_OK;
+static double peak_e(const void *user, int index, const bst_truth_item *item) {
+    (void)item;
+    return bst_renderer_peak_e(user, index);
 }
 
 /* Counts the saturated frames among those that are done. */
@@ -379,7 +296,16 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
     truth->nodes = stats.nodes;
     truth->one_track = stats.single_kernel;
     /* while the device renders */
-    BST_TRY(write_items(ctx, s, &track, sources, count, e, truth, capacity));
+    const bst_truth_request items = {.field = s->field,
+                                     .camera = s->camera,
+                                     .track = &track,
+                                     .sources = sources,
+                                     .count = count,
+                                     .window = e->window,
+                                     .binning = e->binning,
+                                     .peak_e = peak_e,
+                                     .user = s->renderer};
+    BST_TRY(bst_truth_list_fill(ctx, &s->list, &items, truth, capacity, s->item_source));
     if (truth->lost > 0) {
         bst_step_count(step, "truth_overflow");
     }

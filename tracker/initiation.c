@@ -59,7 +59,8 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
                         const bst_mtt_frame *frame) {
     double dt = mtt->now.seconds - pool->seconds;
     double reach = gate->gate_radps * dt + 3.0 * sqrt(spread(earlier) + spread(later));
-    double variance = 0.04 + earlier->v_mag_sigma * earlier->v_mag_sigma;
+    double floor = mtt->params.brightness_floor_mag;
+    double variance = floor * floor + earlier->v_mag_sigma * earlier->v_mag_sigma;
     bst_mtt_track *track = &mtt->tracks[mtt->track_count++];
     *track = (bst_mtt_track){
         .id = mtt->next_id++,
@@ -84,6 +85,7 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
     bst_mtt_note_place(track, later);
     mtt->rest_count += gate->rest;
     bst_sky_from_pair(&earlier->sky, &later->sky, dt, mtt->params.noise_rad2ps3, &track->state);
+    bst_filter_start(&mtt->filter, &track->state, &track->models);
     bst_mtt_set_rest(mtt, track, bst_mtt_is_at_rest(mtt, frame, track));
 }
 

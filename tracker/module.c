@@ -43,8 +43,11 @@ static void destroy(void *self) {
     }
 }
 
-static bst_status create(const bst_module_env *env, const void *config, void **self) {
-    const bst_tracker_config *c = config;
+static bst_status create(const bst_module_env *env, const void *config, bst_filter_kind filter,
+                         void **self) {
+    bst_tracker_config with_filter = *(const bst_tracker_config *)config;
+    with_filter.filter = filter;
+    const bst_tracker_config *c = &with_filter;
     tracker_module *m = calloc(1, sizeof *m);
     *self = NULL;
     if (!m) {
@@ -68,15 +71,37 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
     return BST_OK;
 }
 
+static bst_status create_ekf(const bst_module_env *env, const void *config, void **self) {
+    return create(env, config, BST_FILTER_EKF, self);
+}
+
+static bst_status create_ukf(const bst_module_env *env, const void *config, void **self) {
+    return create(env, config, BST_FILTER_UKF, self);
+}
+
+static bst_status create_imm(const bst_module_env *env, const void *config, void **self) {
+    return create(env, config, BST_FILTER_IMM, self);
+}
+
 static void report(struct bst_step *step, const bst_tracker *tracker) {
-    static const char *const kinds[] = {"track_confirmed", "track_lost", "target_selected",
-                                        "target_lost", "attitude_lost"};
+    static const char *const kinds[] = {[BST_TRACKER_TRACK_CONFIRMED] = "track_confirmed",
+                                        [BST_TRACKER_TRACK_LOST] = "track_lost",
+                                        [BST_TRACKER_TARGET_SELECTED] = "target_selected",
+                                        [BST_TRACKER_TARGET_LOST] = "target_lost",
+                                        [BST_TRACKER_ATTITUDE_LOST] = "attitude_lost",
+                                        [BST_TRACKER_TRACK_RESUMED] = "track_resumed",
+                                        [BST_TRACKER_MANOEUVRE] = "manoeuvre",
+                                        [BST_TRACKER_BRIGHTNESS_CHANGE] = "brightness_change"};
     int count;
     const bst_tracker_event *events = bst_tracker_events(tracker, &count);
     for (int i = 0; i < count; i++) {
         const bst_tracker_event *e = &events[i];
         if (e->kind == BST_TRACKER_ATTITUDE_LOST) {
             bst_step_event(step, kinds[e->kind], "no attitude from stars that is good enough");
+        } else if (e->kind == BST_TRACKER_MANOEUVRE || e->kind == BST_TRACKER_BRIGHTNESS_CHANGE) {
+            bst_step_event(step, kinds[e->kind], "track %lld, chi-square %.1f of %d, V %.2f",
+                           (long long)e->track_id, e->statistic,
+                           e->kind == BST_TRACKER_MANOEUVRE ? 2 : 1, e->v_mag);
         } else if (e->kind == BST_TRACKER_TARGET_LOST) {
             bst_step_event(step, kinds[e->kind], "track %lld", (long long)e->track_id);
         } else {
@@ -143,17 +168,16 @@ static bst_status step_module(void *self, struct bst_step *step) {
     }
 }
 
-const bst_module_desc bst_tracker_module = {
-    .abi = BST_MODULE_ABI,
-    .role = "tracker",
-    .type = "ekf",
-    .flags = BST_MODULE_APART,
-    .doc = "Attitude from stars, extended Kalman filters, nearest-neighbour association.",
-    .config = bst_tracker_config_table,
-    .config_bytes = sizeof(bst_tracker_config),
-    .ports = ports,
-    .port_count = PORT_COUNT,
-    .create = create,
-    .step = step_module,
-    .destroy = destroy,
-};
+#define DESCRIPTOR(name, what)                                                                  \
+    {                                                                                           \
+        .abi = BST_MODULE_ABI, .role = "tracker", .type = #name, .flags = BST_MODULE_APART,     \
+        .doc = "Attitude from stars, " what ", association by name.",                           \
+        .config = bst_tracker_config_table, .config_bytes = sizeof(bst_tracker_config),         \
+        .ports = ports, .port_count = PORT_COUNT, .create = create_##name, .step = step_module, \
+        .destroy = destroy                                                                      \
+    }
+
+const bst_module_desc bst_tracker_module = DESCRIPTOR(ekf, "extended Kalman filters");
+const bst_module_desc bst_tracker_ukf_module = DESCRIPTOR(ukf, "unscented Kalman filters");
+const bst_module_desc bst_tracker_imm_module =
+    DESCRIPTOR(imm, "two interacting models (quiet, manoeuvring) per track");

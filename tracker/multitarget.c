@@ -25,11 +25,18 @@ static bst_status check(bst_ctx *ctx, const bst_mtt_params *p) {
     if (p->max_tracks < 1 || p->max_detections < 1 || p->confirm_hits < 2 ||
         p->confirm_frames < p->confirm_hits || p->max_stars < 0 || !(p->field_sr > 0.0) ||
         !(p->detection_probability > 0.0 && p->detection_probability < 1.0) ||
-        !(p->false_alarms_per_frame > 0.0) || !(p->gate_chi2 > 0.0) || !(p->noise_rad2ps3 >= 0.0)) {
+        !(p->false_alarms_per_frame > 0.0) || !(p->gate_chi2 > 0.0) || !(p->noise_rad2ps3 >= 0.0) ||
+        p->max_memory < 0 || p->event_window < 0 || p->event_window > BST_MTT_EVENT_WINDOW) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "tracker: parameters out of range (need at least one track and detection, "
                         "2 <= confirm_hits <= confirm_frames, detection_probability in (0, 1), "
-                        "positive field, false alarms and gate)");
+                        "positive field, false alarms and gate, event_window 0 to %d)",
+                        BST_MTT_EVENT_WINDOW);
+    }
+    if (p->filter == BST_FILTER_IMM &&
+        !(p->manoeuvre_noise_rad2ps3 >= 0.0 && p->quiet_s > 0.0 && p->manoeuvre_s > 0.0)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "tracker: imm needs manoeuvre noise >= 0, quiet_s > 0 and manoeuvre_s > 0");
     }
     return BST_OK;
 }
@@ -37,18 +44,33 @@ static bst_status check(bst_ctx *ctx, const bst_mtt_params *p) {
 bst_status bst_mtt_create(bst_ctx *ctx, const bst_mtt_params *params, bst_mtt **out) {
     *out = NULL;
     BST_TRY(check(ctx, params));
+    if (params->filter == BST_FILTER_IMM && params->association == BST_MTT_MIXTURE) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "tracker: association \"mixture\" does not go with type \"imm\"; use "
+                        "\"pda\"");
+    }
     bst_mtt *m = calloc(1, sizeof *m);
     if (!m) {
         return bst_fail(ctx, BST_ERR_MEMORY, "tracker: out of memory");
     }
     m->params = *params;
+    m->filter = (bst_filter_params){.kind = params->filter,
+                                    .noise_rad2ps3 = params->noise_rad2ps3,
+                                    .manoeuvre_noise_rad2ps3 = params->manoeuvre_noise_rad2ps3,
+                                    .quiet_s = params->quiet_s,
+                                    .manoeuvre_s = params->manoeuvre_s};
     m->next_id = 1;
     m->clutter = params->false_alarms_per_frame;
     m->clutter_density = params->false_alarms_per_frame / params->field_sr;
     size_t nt = (size_t)params->max_tracks + (size_t)params->max_stars + 1,
            ne = nt * BST_MTT_CANDIDATES;
     m->tracks = calloc(nt, sizeof *m->tracks);
-    m->events = calloc(2 * nt, sizeof *m->events);
+    m->memory = calloc((size_t)params->max_memory + 1, sizeof *m->memory);
+    m->events = calloc(4 * nt, sizeof *m->events);
+    m->edge_order = calloc(ne, sizeof *m->edge_order);
+    m->edge_row = calloc(ne, sizeof *m->edge_row);
+    m->edge_key = calloc(ne, sizeof *m->edge_key);
+    m->owner = calloc((size_t)params->max_detections, sizeof *m->owner);
     m->rows = calloc(nt, sizeof *m->rows);
     m->first = calloc(nt, sizeof *m->first);
     m->column_of_row = calloc(nt, sizeof *m->column_of_row);
@@ -59,7 +81,8 @@ bst_status bst_mtt_create(bst_ctx *ctx, const bst_mtt_params *params, bst_mtt **
     m->extra = calloc(nt, sizeof *m->extra);
     m->shared = calloc(nt, sizeof *m->shared);
     m->observable = calloc(nt, sizeof *m->observable);
-    bool ok = m->tracks && m->events && m->rows && m->first && m->column_of_row && m->miss_costs &&
+    bool ok = m->tracks && m->memory && m->events && m->edge_order && m->edge_row && m->edge_key &&
+              m->owner && m->rows && m->first && m->column_of_row && m->miss_costs &&
               m->edge_columns && m->edge_costs && m->detection_of_track && m->extra && m->shared &&
               m->observable && pool_create(&m->now, params->max_detections);
     for (int h = 0; ok && h < BST_MTT_HISTORY; h++) {
@@ -83,7 +106,12 @@ void bst_mtt_free(bst_mtt *m) {
         return;
     }
     free(m->tracks);
+    free(m->memory);
     free(m->events);
+    free(m->edge_order);
+    free(m->edge_row);
+    free(m->edge_key);
+    free(m->owner);
     free(m->rows);
     free(m->first);
     free(m->column_of_row);
@@ -102,8 +130,10 @@ void bst_mtt_free(bst_mtt *m) {
     free(m);
 }
 
-static void record(bst_mtt *m, bst_mtt_event_kind kind, const bst_mtt_track *track) {
-    m->events[m->event_count++] = (bst_mtt_event){.kind = kind, .track = *track};
+static void record(bst_mtt *m, bst_mtt_event_kind kind, const bst_mtt_track *track,
+                   double statistic) {
+    m->events[m->event_count++] =
+        (bst_mtt_event){.kind = kind, .statistic = statistic, .track = *track};
 }
 
 /* What the cue's motion has that a constant rate has not, as tangent vectors at the cue's present
@@ -129,30 +159,43 @@ static bool cue_acceleration(const bst_mtt_frame *frame, double dt_s, bst_vec3 *
 
 /* What the observer's motion adds to a rate falls with the range, as the rate itself does: what is
  * at rest, or nearly so beside the cue, is too far away to share the cue's acceleration. */
-static bool shares_acceleration(const bst_mtt_track *track, const bst_mtt_frame *frame) {
+static bool shares_acceleration(const bst_mtt *m, const bst_mtt_track *track,
+                                const bst_mtt_frame *frame) {
     return !track->at_rest &&
+           bst_vec3_dot(track->state.direction, frame->cue_direction) >
+               cos(m->params.feed_forward_rad) &&
            bst_vec3_norm(track->state.rate_radps) > 0.1 * bst_vec3_norm(frame->cue_rate_radps);
+}
+
+static void shift(bst_mtt_track *track, const bst_mtt_frame *frame, bst_vec3 step, bst_vec3 rate) {
+    bst_vec3 d = track->state.direction;
+    bst_filter_shift(&track->state, &track->models,
+                     bst_tangent_carry(frame->cue_direction, d, step),
+                     bst_tangent_carry(frame->cue_direction, d, rate));
 }
 
 static void predict(bst_mtt *m, const bst_mtt_frame *frame) {
     double dt = frame->seconds - m->seconds;
     bst_vec3 step = {0}, rate = {0};
     bool forward = m->started && cue_acceleration(frame, dt, &step, &rate);
-    double near = cos(m->params.feed_forward_rad);
     for (int t = 0; t < m->track_count; t++) {
-        bst_sky_state *state = &m->tracks[t].state;
-        if (m->tracks[t].star) {
-            bst_mtt_predict_star(m, dt, &m->tracks[t]);
+        bst_mtt_track *track = &m->tracks[t];
+        if (track->star) {
+            bst_mtt_predict_star(m, dt, track);
             m->observable[t] = true;
             continue;
         }
-        bst_sky_predict(state, dt, m->params.noise_rad2ps3);
-        if (forward && bst_vec3_dot(state->direction, frame->cue_direction) > near &&
-            shares_acceleration(&m->tracks[t], frame)) {
-            bst_sky_shift(state, bst_tangent_carry(frame->cue_direction, state->direction, step),
-                          bst_tangent_carry(frame->cue_direction, state->direction, rate));
+        bst_filter_predict(&m->filter, dt, &track->state, &track->models);
+        if (forward && shares_acceleration(m, track, frame)) {
+            shift(track, frame, step, rate);
         }
-        m->observable[t] = !frame->in_field || frame->in_field(frame->user, state->direction);
+        m->observable[t] = !frame->in_field || frame->in_field(frame->user, track->state.direction);
+    }
+    bst_mtt_predict_memory(m, dt);
+    for (int i = 0; forward && i < m->memory_count; i++) {
+        if (shares_acceleration(m, &m->memory[i], frame)) {
+            shift(&m->memory[i], frame, step, rate);
+        }
     }
     m->seconds = frame->seconds;
     m->started = true;
@@ -171,26 +214,69 @@ static void load_detections(bst_mtt *m, const bst_mtt_frame *frame) {
     bst_mtt_pool_index(now);
 }
 
-static void take_brightness(bst_mtt_track *track, const bst_mtt_detection *detection) {
-    double r = 0.04 + detection->v_mag_sigma * detection->v_mag_sigma;
+static void take_brightness(bst_mtt *m, bst_mtt_track *track, const bst_mtt_detection *detection,
+                            double dt_s) {
+    double floor = m->params.brightness_floor_mag, walk = m->params.brightness_walk_mag;
+    double r = floor * floor + detection->v_mag_sigma * detection->v_mag_sigma;
     if (!isfinite(r) || !isfinite(detection->v_mag)) {
         return;
     }
-    double p = track->v_mag_variance + 0.0025; /* walks by 0.05 mag a frame */
-    double gain = p / (p + r);
-    track->v_mag += gain * (detection->v_mag - track->v_mag);
+    double p = track->v_mag_variance + walk * walk;
+    double off = detection->v_mag - track->v_mag, gain = p / (p + r), statistic;
+    track->v_mag += gain * off;
     track->v_mag_variance = (1.0 - gain) * p;
+    if (track->status != BST_TRACK_TENTATIVE && !track->star &&
+        bst_mtt_note_brightness(&m->params, track, off / sqrt(p + r), dt_s, &statistic)) {
+        record(m, BST_MTT_BRIGHTNESS, track, statistic);
+    }
+}
+
+/* The filter's update by what may be the object's: the detection that it was given, or with
+ * probabilistic data association all in its gate. */
+static void update_filter(bst_mtt *m, int t) {
+    bst_mtt_track *track = &m->tracks[t];
+    int given = m->detection_of_track[t];
+    bool weighs = m->params.association == BST_MTT_PDA || m->params.association == BST_MTT_MIXTURE;
+    int components = m->params.association == BST_MTT_MIXTURE ? BST_FILTER_COMPONENTS : 1;
+    bst_filter_candidate candidates[BST_MTT_CANDIDATES];
+    if (!weighs || track->status == BST_TRACK_TENTATIVE || track->star || m->shared[t]) {
+        if (given >= 0) {
+            candidates[0] = (bst_filter_candidate){.measurement = &m->now.items[given].sky,
+                                                   .extra = m->shared[t] ? m->extra[t] : NULL};
+            bst_filter_update(&m->filter, &track->state, &track->models, candidates, 1, 0.0, 1.0,
+                              components);
+        }
+        return;
+    }
+    int columns[BST_MTT_CANDIDATES];
+    int count = m->observable[t] ? bst_mtt_gated(m, t, columns) : 0;
+    for (int i = 0; i < count; i++) {
+        candidates[i] = (bst_filter_candidate){.measurement = &m->now.items[columns[i]].sky};
+    }
+    if (count > 0) {
+        double pd = m->params.detection_probability, pg = -expm1(-0.5 * m->params.gate_chi2);
+        bst_filter_update(&m->filter, &track->state, &track->models, candidates, count,
+                          1.0 - pd * pg, pd / m->alarm_density, components);
+    }
 }
 
 static void hit(bst_mtt *m, int t) {
     bst_mtt_track *track = &m->tracks[t];
-    const bst_mtt_detection *detection = &m->now.items[m->detection_of_track[t]];
-    bst_sky_innovation innovation;
-    if (!bst_sky_innovate(&track->state, &detection->sky, m->shared[t] ? m->extra[t] : NULL,
-                          &innovation)) {
+    int given = m->detection_of_track[t];
+    const bst_mtt_detection *detection = given >= 0 ? &m->now.items[given] : NULL;
+    bst_filter_candidate candidate = {.extra = m->shared[t] ? m->extra[t] : NULL};
+    bst_filter_fit fit;
+    if (detection) {
+        candidate.measurement = &detection->sky;
+    }
+    bool taken = detection &&
+                 bst_filter_evaluate(&m->filter, &track->state, &track->models, &candidate, &fit);
+    if (taken || !detection) {
+        update_filter(m, t);
+    }
+    if (!taken) {
         return;
     }
-    bst_sky_update(&track->state, &innovation);
     track->x_px = detection->x_px;
     track->y_px = detection->y_px;
     track->snr = detection->snr;
@@ -198,17 +284,21 @@ static void hit(bst_mtt *m, int t) {
         track->merged_in_row++;
         return;
     }
+    double dt = m->now.seconds - track->last_update_s, statistic;
     track->merged_in_row = 0;
     track->misses_in_row = 0;
     track->hits++;
-    track->chi2 += innovation.chi2;
-    track->last_chi2 = innovation.chi2;
-    track->score += log(m->params.detection_probability / m->clutter_density) - log(2.0 * BST_PI) -
-                    0.5 * innovation.log_det_s - 0.5 * innovation.chi2;
+    track->chi2 += fit.chi2;
+    track->last_chi2 = fit.chi2;
+    track->score += log(m->params.detection_probability / m->clutter_density) + fit.log_likelihood;
     bst_mtt_note_place(track, detection);
     track->last_update_tick = m->now.tick;
     track->last_update_s = m->now.seconds;
-    take_brightness(track, detection);
+    if (track->status != BST_TRACK_TENTATIVE && !track->star &&
+        bst_mtt_note_innovation(&m->params, track, &fit.innovation, dt, &statistic)) {
+        record(m, BST_MTT_MANOEUVRE, track, statistic);
+    }
+    take_brightness(m, track, detection, dt);
 }
 
 /* 99.9 % quantile of chi-square (Wilson and Hilferty 1931). */
@@ -266,7 +356,7 @@ static void become_star(bst_mtt *m, bst_mtt_track *track) {
     bst_mtt_set_rest(m, track, true);
     if (track->at_rest) {
         if (track->status != BST_TRACK_TENTATIVE) {
-            record(m, BST_MTT_LOST, track);
+            record(m, BST_MTT_LOST, track, 0.0);
         }
         bst_mtt_make_star(track);
     }
@@ -297,7 +387,8 @@ static void judge(bst_mtt *m, const bst_mtt_frame *frame) {
             track->status = taken ? BST_TRACK_CONFIRMED : BST_TRACK_COASTING;
         } else if (taken && may_confirm(m, track)) {
             track->status = BST_TRACK_CONFIRMED;
-            record(m, BST_MTT_CONFIRMED, track);
+            bool resumed = bst_mtt_resume(m, track);
+            record(m, resumed ? BST_MTT_RESUMED : BST_MTT_CONFIRMED, track, 0.0);
         }
     }
     int kept = 0;
@@ -306,9 +397,13 @@ static void judge(bst_mtt *m, const bst_mtt_frame *frame) {
         const bst_mtt_track *track = &m->tracks[t];
         if (!is_finished(m, track, m->observable[t])) {
             m->rest_count += track->at_rest;
-            m->tracks[kept++] = *track;
+            if (kept != t) {
+                m->tracks[kept] = *track;
+            }
+            kept++;
         } else if (track->status != BST_TRACK_TENTATIVE && !track->star) {
-            record(m, BST_MTT_LOST, track);
+            record(m, BST_MTT_LOST, track, 0.0);
+            bst_mtt_remember(m, track);
         }
     }
     m->track_count = kept;
@@ -340,14 +435,14 @@ static void remember(bst_mtt *m) {
 void bst_mtt_step(bst_mtt *m, const bst_mtt_frame *frame) {
     predict(m, frame);
     load_detections(m, frame);
-    m->clutter_density = fmax(m->clutter, m->params.false_alarms_per_frame) / m->params.field_sr;
+    double floor = m->params.false_alarms_per_frame;
+    m->clutter_density = fmax(m->clutter, floor) / m->params.field_sr;
+    m->alarm_density = fmax(m->alarms, floor) / m->params.field_sr;
     bst_mtt_associate(m);
     int unused = 0;
     for (int t = 0; t < m->track_count; t++) {
         m->tracks[t].last_chi2 = -1.0;
-        if (m->detection_of_track[t] >= 0) {
-            hit(m, t);
-        }
+        hit(m, t);
     }
     for (int i = 0; i < m->now.count; i++) {
         unused += !m->now.used[i];
@@ -386,6 +481,15 @@ const bst_mtt_track *bst_mtt_find(const bst_mtt *m, int64_t id) {
 const bst_mtt_event *bst_mtt_events(const bst_mtt *m, int *count) {
     *count = m->event_count;
     return m->events;
+}
+
+const bst_mtt_track *bst_mtt_memory(const bst_mtt *m, int *count) {
+    *count = m->memory_count;
+    return m->memory;
+}
+
+double bst_mtt_clutter_density(const bst_mtt *m) {
+    return m->alarm_density;
 }
 
 int bst_mtt_lost(const bst_mtt *m) {

@@ -1,5 +1,5 @@
-/* Multi-target tracking on the sky: gating, global nearest neighbour, two-point initiation, M-of-N
- * confirmation, coasting and deletion.
+/* Multi-target tracking on the sky: gating, association and filter by name, two-point initiation,
+ * M-of-N confirmation, coasting, deletion, and memory of what was deleted.
  *
  * A track that two detections start is tentative; it is confirmed when it has M hits in its first N
  * frames, its innovations fit their covariances, and its log-likelihood ratio against clutter
@@ -20,12 +20,25 @@
 
 #include "sim/core/messages.h"
 #include "sim/core/status.h"
-#include "tracker/sky_filter.h"
+#include "tracker/filter.h"
+
+typedef enum bst_mtt_association {
+    BST_MTT_GNN = 0, /* the assignment of least total cost */
+    BST_MTT_NEAREST, /* the cheapest pair first, then the cheapest of the rest */
+    BST_MTT_PDA, /* as GNN, but a confirmed track's filter weighs every detection in its gate that
+                    no other confirmed track has */
+    BST_MTT_MIXTURE, /* as PDA, and the filter keeps the likeliest choices apart, so that later
+                        detections decide; not with BST_FILTER_IMM */
+} bst_mtt_association;
 
 typedef struct bst_mtt_params {
     int max_tracks, max_detections;
-    double noise_rad2ps3; /* acceleration's power spectral density */
-    double gate_chi2;     /* 2 degrees of freedom */
+    bst_filter_kind filter;
+    bst_mtt_association association;
+    double noise_rad2ps3; /* acceleration's power spectral density; of a quiet object */
+    /* of a manoeuvring one, and mean times between manoeuvres and of one: IMM only */
+    double manoeuvre_noise_rad2ps3, quiet_s, manoeuvre_s;
+    double gate_chi2; /* 2 degrees of freedom */
     double detection_probability;
     double false_alarms_per_frame;    /* least density of clutter that is believed */
     double field_sr;                  /* solid angle of the field */
@@ -44,7 +57,22 @@ typedef struct bst_mtt_params {
     double star_rate_radps;  /* the slowest object's; 0: nothing is taken for a star */
     double motion_chi2;      /* of a rate against none that proves motion, 2 degrees of freedom */
     int max_stars;           /* room for tracks at rest */
+    double brightness_floor_mag; /* 1 sigma added to every magnitude */
+    double brightness_walk_mag;  /* 1 sigma by which an object's brightness changes per frame */
+    /* Manoeuvres and changes of brightness are told by the innovations of the latest event_window
+     * hits (at most BST_MTT_EVENT_WINDOW), with at most so many false events per hour and track of
+     * either kind; 0: none are told. */
+    int event_window;
+    double false_events_per_hour;
+    /* Deleted tracks that had been confirmed are remembered; what is confirmed where and as one of
+     * them should be by now takes over its identity. */
+    int max_memory;          /* room for them; 0: none is remembered */
+    double memory_s;         /* for so long */
+    double memory_sigma_rad; /* and while the place is known to this, 1 sigma */
+    double memory_chi2;      /* largest misfit of place and rate, 4 degrees of freedom */
 } bst_mtt_params;
+
+#define BST_MTT_EVENT_WINDOW 16
 
 /* One detection that is not a star, on the sky. */
 typedef struct bst_mtt_detection {
@@ -59,6 +87,7 @@ typedef struct bst_mtt_track {
     int64_t id;
     bst_track_status status;
     bst_sky_state state;
+    bst_filter_models models;
     double v_mag, v_mag_variance;
     double snr, x_px, y_px; /* latest detection */
     int hits, misses_in_row, merged_in_row;
@@ -74,6 +103,9 @@ typedef struct bst_mtt_track {
     bool at_rest; /* shows no motion and is not what the cue expects */
     bool star;    /* and is known to be slower than any object: its rate is zero, its status is not
                      tentative, its life is only ended by max_coast_s */
+    /* normalised innovations of the latest hits: two of place, one of brightness; rings */
+    double innovations[BST_MTT_EVENT_WINDOW][2], brightness[BST_MTT_EVENT_WINDOW];
+    int innovation_count, brightness_count; /* since the start or the latest event */
 } bst_mtt_track;
 
 /* What one frame brings. */
@@ -97,10 +129,17 @@ typedef struct bst_mtt_frame {
     double common_rate_sigma_radps;
 } bst_mtt_frame;
 
-typedef enum bst_mtt_event_kind { BST_MTT_CONFIRMED, BST_MTT_LOST } bst_mtt_event_kind;
+typedef enum bst_mtt_event_kind {
+    BST_MTT_CONFIRMED,
+    BST_MTT_RESUMED, /* confirmed, and known again as a remembered track, whose identity it has */
+    BST_MTT_LOST,
+    BST_MTT_MANOEUVRE,
+    BST_MTT_BRIGHTNESS,
+} bst_mtt_event_kind;
 
 typedef struct bst_mtt_event {
     bst_mtt_event_kind kind;
+    double statistic;    /* of manoeuvre (chi-square, 2 degrees of freedom) and brightness (1) */
     bst_mtt_track track; /* as it was */
 } bst_mtt_event;
 
@@ -123,6 +162,10 @@ const bst_mtt_track *bst_mtt_tracks(const bst_mtt *mtt, int *count);
 const bst_mtt_track *bst_mtt_find(const bst_mtt *mtt, int64_t id);
 /* What happened in the latest frame; lent until the next step. */
 const bst_mtt_event *bst_mtt_events(const bst_mtt *mtt, int *count);
+/* Remembered tracks, carried to the latest frame; lent until the next step. */
+const bst_mtt_track *bst_mtt_memory(const bst_mtt *mtt, int *count);
+/* False alarms per steradian as they are believed for confirmed tracks in the latest frame. */
+double bst_mtt_clutter_density(const bst_mtt *mtt);
 /* Tracks and detections of the latest frame that found no room. */
 int bst_mtt_lost(const bst_mtt *mtt);
 

@@ -8,7 +8,7 @@
 /* Frames whose unused detections wait for a partner. */
 #define BST_MTT_HISTORY 3
 /* Candidates kept per track: the likeliest. */
-#define BST_MTT_CANDIDATES 16
+#define BST_MTT_CANDIDATES BST_FILTER_CANDIDATES
 
 /* Unused detections of one frame, sorted along one axis. */
 typedef struct bst_mtt_pool {
@@ -24,7 +24,10 @@ typedef struct bst_mtt_pool {
 
 struct bst_mtt {
     bst_mtt_params params;
+    bst_filter_params filter;
     bst_mtt_track *tracks;
+    bst_mtt_track *memory; /* what was deleted, oldest first */
+    int memory_count;
     int track_count;
     int rest_count; /* of them at rest */
     int64_t next_id;
@@ -32,6 +35,11 @@ struct bst_mtt {
     bool started;
     double clutter;         /* smoothed number of unused detections per frame */
     double clutter_density; /* per steradian, for this frame */
+    /* smoothed number of detections that no confirmed track has, of how many frames, and their
+     * density */
+    double alarms;
+    int alarm_frames;
+    double alarm_density;
     int lost;
     bst_mtt_event *events;
     int event_count;
@@ -43,11 +51,18 @@ struct bst_mtt {
     int *rows; /* track of each assignment row */
     int *first, *edge_columns, *column_of_row;
     double *edge_costs, *miss_costs;
+    int *edge_order, *edge_row; /* for the cheapest pair first */
+    double *edge_key;
+    int *owner; /* index of the confirmed track that has a detection; negative: none or several */
+    double largest_sigma;    /* of the frame's detections, rad */
     int *detection_of_track; /* index into now.items, -1 none */
     double (*extra)[3];      /* widening of a shared detection, tangent axes of the track */
     bool *shared, *observable;
 };
 
+/* Heap sort of `count` keys, ascending, and of what goes with them: in place, no worst case, no
+ * library sort that may allocate. */
+void bst_mtt_sort(double *key, int *order, int count);
 /* Sorts the pool's detections so that ranges can be looked up. */
 void bst_mtt_pool_index(bst_mtt_pool *pool);
 /* Range of sorted positions whose component lies within `chord` of direction's. */
@@ -56,6 +71,26 @@ void bst_mtt_pool_range(const bst_mtt_pool *pool, bst_vec3 direction, double cho
 
 /* Fills detection_of_track, shared and extra for the tracks of this frame (already predicted). */
 void bst_mtt_associate(bst_mtt *mtt);
+
+/* Detections in the gate of track t that no other confirmed track has: at most BST_MTT_CANDIDATES,
+ * the likeliest. Returns their number. */
+int bst_mtt_gated(const bst_mtt *mtt, int t, int *columns);
+
+/* Carries the memory over dt_s; forgets what is too old or too vague. */
+void bst_mtt_predict_memory(bst_mtt *mtt, double dt_s);
+/* Remembers a confirmed track that is deleted. */
+void bst_mtt_remember(bst_mtt *mtt, const bst_mtt_track *track);
+/* Gives a track that has just been confirmed the identity of the remembered one that it is; false
+ * when it is none of them. */
+bool bst_mtt_resume(bst_mtt *mtt, bst_mtt_track *track);
+
+/* Note a hit's innovation, and the difference of its magnitude over its standard deviation; true
+ * when the latest ones together are an event, which starts the window anew. dt_s is the time since
+ * the hit before. */
+bool bst_mtt_note_innovation(const bst_mtt_params *params, bst_mtt_track *track,
+                             const bst_sky_innovation *innovation, double dt_s, double *statistic);
+bool bst_mtt_note_brightness(const bst_mtt_params *params, bst_mtt_track *track, double z,
+                             double dt_s, double *statistic);
 
 /* Whether there is room for one more track, at rest or not, with `reserve` places left over. */
 bool bst_mtt_has_room(const bst_mtt *mtt, bool at_rest, int reserve);

@@ -55,6 +55,7 @@ void bst_mtt_set_rest(bst_mtt *m, bst_mtt_track *track, bool at_rest) {
 void bst_mtt_make_star(bst_mtt_track *track) {
     track->star = true;
     track->status = BST_TRACK_CONFIRMED;
+    track->models.count = 0;
     track->state.rate_radps = (bst_vec3){0, 0, 0};
     for (int i = 0; i < 4; i++) {
         for (int j = i < 2 ? 2 : 0; j < 4; j++) {

@@ -11,7 +11,7 @@
 /* Places in the cache of catalogue directions; a power of two. */
 #define STAR_CACHE 4096
 /* Stars of one frame that the attitude looks at. */
-#define MAX_STARS 8192
+#define MAX_STARS 16384
 
 typedef struct cached_star {
     uint32_t id; /* 0: empty */
@@ -34,6 +34,7 @@ struct bst_tracker {
     bst_attitude_star *stars;
     bst_mtt_detection *detections;
     bst_tracker_event *events;
+    size_t event_capacity;
     int event_count;
     bst_attitude_error error;
     bst_target target;
@@ -60,8 +61,8 @@ static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_par
         (bst_attitude_error_params){.rate_sigma_radps = arcsec(c->drift_sigma_arcsec_per_s),
                                     .noise_rad2ps3 = square(arcsec(c->drift_noise_arcsec_per_s15)),
                                     .jitter_rad = c->jitter_px * scale,
-                                    .gate_chi2 = 30.0,
-                                    .gate_patience = 3,
+                                    .gate_chi2 = c->telemetry_gate_chi2,
+                                    .gate_patience = (int)c->telemetry_patience,
                                     .telemetry_sigma_rad = arcsec(c->telemetry_sigma_arcsec)};
     t->target_params = (bst_target_params){
         .direction_chi2 = c->target_direction_chi2,
@@ -70,10 +71,10 @@ static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_par
         .release_chi2 = c->target_release_chi2,
         .rate_floor_radps = arcsec(c->target_rate_floor_arcsec_per_s),
         .max_rate_sigma_radps = arcsec(c->target_max_rate_sigma_arcsec_per_s),
-        .max_chi2 = 4.0,
+        .max_chi2 = c->target_max_chi2,
         .min_hits = (int)c->target_min_hits,
-        .margin = 2.0,
-        .margin_hits = 8,
+        .margin = c->target_margin,
+        .margin_hits = (int)c->target_margin_hits,
         .memory_s = c->target_memory_s,
         .memory_chi2 = 23.5, /* 99.99 %, 4 degrees of freedom */
         /* what was lost may have manoeuvred: ten times the usual acceleration */
@@ -87,7 +88,20 @@ static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_par
     *mtt = (bst_mtt_params){
         .max_tracks = (int)c->max_tracks,
         .max_detections = (int)c->max_detections,
+        .filter = c->filter,
+        .association = (bst_mtt_association)c->association,
         .noise_rad2ps3 = square(arcsec(c->process_noise_arcsec_per_s15)),
+        .manoeuvre_noise_rad2ps3 = square(arcsec(c->manoeuvre_noise_arcsec_per_s15)),
+        .quiet_s = c->quiet_s,
+        .manoeuvre_s = c->manoeuvre_s,
+        .brightness_floor_mag = c->brightness_floor_mag,
+        .brightness_walk_mag = c->brightness_walk_mag,
+        .event_window = (int)c->event_window,
+        .false_events_per_hour = c->false_events_per_hour,
+        .max_memory = (int)c->max_memory,
+        .memory_s = c->memory_s,
+        .memory_sigma_rad = c->memory_sigma_deg * BST_DEG_RAD,
+        .memory_chi2 = c->memory_chi2,
         .gate_chi2 = c->gate_chi2,
         .detection_probability = c->detection_probability,
         .false_alarms_per_frame = c->false_alarms_per_frame,
@@ -103,7 +117,7 @@ static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_par
         .max_sigma_rad = arcsec(c->max_sigma_arcsec),
         .merge_rad = c->merge_px * scale,
         .merge_floor_rad = c->merge_floor_px * scale,
-        .max_merged = 30,
+        .max_merged = (int)c->max_merged,
         .feed_forward_rad = c->feed_forward_deg * BST_DEG_RAD,
         .star_rate_radps = arcsec(c->star_rate_arcsec_per_s),
         .motion_chi2 = c->motion_chi2,
@@ -136,7 +150,9 @@ bst_status bst_tracker_create(bst_ctx *ctx, const bst_tracker_config *config,
     t->cache = calloc(STAR_CACHE, sizeof *t->cache);
     t->stars = calloc(MAX_STARS, sizeof *t->stars);
     t->detections = calloc((size_t)t->max_detections, sizeof *t->detections);
-    t->events = calloc(2 * (size_t)mtt.max_tracks + 8, sizeof *t->events);
+    /* each track may be confirmed, lost, and change in two ways; four more for the target */
+    t->event_capacity = 4 * ((size_t)mtt.max_tracks + (size_t)mtt.max_stars + 1) + 4;
+    t->events = calloc(t->event_capacity, sizeof *t->events);
     bst_status status = t->cache && t->stars && t->detections && t->events
                             ? bst_mtt_create(ctx, &mtt, &t->mtt)
                             : bst_fail(ctx, BST_ERR_MEMORY, "tracker: out of memory");
@@ -312,8 +328,10 @@ static int collect_objects(bst_tracker *t, const bst_detections *d, const frame_
             item->cov_xx > 0.0 && item->cov_xx * item->cov_yy > item->cov_xy * item->cov_xy;
         /* places as uncertain as an attitude that is not used would only feed false tracks */
         bool sharp = item->cov_xx <= t->max_variance_px2 && item->cov_yy <= t->max_variance_px2;
-        if ((item->label != BST_LABEL_OBJECT && item->label != BST_LABEL_UNKNOWN) || !positive ||
-            !sharp || !isfinite(item->x_px) || !isfinite(item->y_px)) {
+        /* a star that no catalogue has is told from a slow object by its track */
+        bool may_move = item->label == BST_LABEL_OBJECT || item->label == BST_LABEL_UNKNOWN ||
+                        (item->label == BST_LABEL_STAR && item->star_id == 0);
+        if (!may_move || !positive || !sharp || !isfinite(item->x_px) || !isfinite(item->y_px)) {
             continue;
         }
         if (count == t->max_detections) {
@@ -358,6 +376,9 @@ static bool is_expected(const void *user, const bst_mtt_track *track) {
 }
 
 static void add_event(bst_tracker *t, bst_tracker_event_kind kind, const bst_mtt_track *track) {
+    if ((size_t)t->event_count == t->event_capacity) {
+        return;
+    }
     bst_tracker_event *event = &t->events[t->event_count++];
     *event = (bst_tracker_event){.kind = kind};
     if (track) {
@@ -371,11 +392,15 @@ static void add_event(bst_tracker *t, bst_tracker_event_kind kind, const bst_mtt
 static void choose_target(bst_tracker *t, const bst_target_cue *cue, double seconds) {
     int count;
     const bst_mtt_event *events = bst_mtt_events(t->mtt, &count);
+    static const bst_tracker_event_kind kinds[] = {
+        [BST_MTT_CONFIRMED] = BST_TRACKER_TRACK_CONFIRMED,
+        [BST_MTT_RESUMED] = BST_TRACKER_TRACK_RESUMED,
+        [BST_MTT_LOST] = BST_TRACKER_TRACK_LOST,
+        [BST_MTT_MANOEUVRE] = BST_TRACKER_MANOEUVRE,
+        [BST_MTT_BRIGHTNESS] = BST_TRACKER_BRIGHTNESS_CHANGE};
     for (int i = 0; i < count; i++) {
-        add_event(t,
-                  events[i].kind == BST_MTT_CONFIRMED ? BST_TRACKER_TRACK_CONFIRMED
-                                                      : BST_TRACKER_TRACK_LOST,
-                  &events[i].track);
+        add_event(t, kinds[events[i].kind], &events[i].track);
+        t->events[t->event_count - 1].statistic = events[i].statistic;
     }
     int64_t before = t->target.id;
     const bst_mtt_track *tracks = bst_mtt_tracks(t->mtt, &count);
@@ -389,21 +414,26 @@ static void choose_target(bst_tracker *t, const bst_target_cue *cue, double seco
     }
 }
 
-static void write_track(const bst_mtt_track *track, int64_t target_id, bst_track *out) {
-    *out = (bst_track){.id = track->id,
-                       .status = (int32_t)track->status,
-                       .target_of_interest = track->id == target_id,
-                       .direction_gcrf = track->state.direction,
-                       .rate_gcrf_radps = track->state.rate_radps,
-                       .v_mag = track->v_mag,
-                       .snr = track->snr,
-                       .score = track->score,
-                       .hits = track->hits,
-                       .misses_in_row = track->misses_in_row,
-                       .first_tick = track->first_tick,
-                       .last_update_tick = track->last_update_tick,
-                       .x_px = track->x_px,
-                       .y_px = track->y_px};
+static void write_track(const bst_tracker *t, const bst_target_cue *cue, const bst_mtt_track *track,
+                        bst_track *out) {
+    bool is_target = track->id == t->target.id;
+    *out =
+        (bst_track){.id = track->id,
+                    .status = (int32_t)track->status,
+                    .target_of_interest = is_target,
+                    .direction_gcrf = track->state.direction,
+                    .rate_gcrf_radps = track->state.rate_radps,
+                    .v_mag = track->v_mag,
+                    .snr = track->snr,
+                    .score = track->score,
+                    .hits = track->hits,
+                    .misses_in_row = track->misses_in_row,
+                    .first_tick = track->first_tick,
+                    .last_update_tick = track->last_update_tick,
+                    .x_px = track->x_px,
+                    .y_px = track->y_px,
+                    .uncorrelated = !is_target && track->status != BST_TRACK_TENTATIVE &&
+                                    !bst_target_is_expected(&t->target_params, cue, track, false)};
     memcpy(out->covariance, track->state.covariance, sizeof out->covariance);
 }
 
@@ -416,8 +446,8 @@ static int rank(const bst_mtt_track *track, int64_t target_id) {
 }
 
 static void write_outputs(bst_tracker *t, const bst_detections *d, const frame_attitude *attitude,
-                          const bst_quat *q_now, int detections_lost, bst_tracks *tracks,
-                          int track_capacity, bst_predictions *predictions,
+                          const bst_target_cue *cue, const bst_quat *q_now, int detections_lost,
+                          bst_tracks *tracks, int track_capacity, bst_predictions *predictions,
                           int prediction_capacity) {
     int64_t tick = attitude->fix.tick;
     bst_quat q = q_now ? *q_now : bst_quat_unit(d->q_telemetry_from_gcrf);
@@ -443,7 +473,7 @@ static void write_outputs(bst_tracker *t, const bst_detections *d, const frame_a
                 continue;
             }
             if (tracks->count < track_capacity) {
-                write_track(&all[i], t->target.id, &tracks->items[tracks->count++]);
+                write_track(t, cue, &all[i], &tracks->items[tracks->count++]);
             } else {
                 tracks->lost++;
             }
@@ -528,8 +558,8 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
     }
     t->attitude_was_lost = !attitude.usable;
     choose_target(t, &view.cue, seconds);
-    write_outputs(t, d, &attitude, input->q_telemetry_now, detections_lost, tracks, track_capacity,
-                  predictions, prediction_capacity);
+    write_outputs(t, d, &attitude, &view.cue, input->q_telemetry_now, detections_lost, tracks,
+                  track_capacity, predictions, prediction_capacity);
     t->cue_before = *cue;
     t->started = true;
     t->last_exposure_id = d->exposure_id;

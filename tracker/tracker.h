@@ -9,9 +9,11 @@
 #include "sim/core/config.h"
 #include "sim/core/messages.h"
 #include "sim/world/camera.h"
+#include "tracker/filter.h"
 
 /* Values of a scenario's tracker block; the table says what each is. */
 typedef struct bst_tracker_config {
+    bst_filter_kind filter; /* not in the table, which leaves BST_FILTER_EKF: set by the caller */
     double star_floor_px, star_reject_chi2, max_attitude_sigma_px, max_roll_sigma_arcsec;
     double drift_sigma_arcsec_per_s, drift_noise_arcsec_per_s15, jitter_px, telemetry_sigma_arcsec;
     double process_noise_arcsec_per_s15, gate_chi2, detection_probability, false_alarms_per_frame;
@@ -25,6 +27,16 @@ typedef struct bst_tracker_config {
         target_rate_floor_arcsec_per_s, target_max_rate_sigma_arcsec_per_s, target_memory_s;
     double star_rate_arcsec_per_s, motion_chi2;
     int64_t target_min_hits, max_tracks, max_stars, max_detections;
+    int32_t association; /* bst_mtt_association */
+    double manoeuvre_noise_arcsec_per_s15, quiet_s, manoeuvre_s;
+    double brightness_floor_mag, brightness_walk_mag;
+    int64_t event_window;
+    double false_events_per_hour;
+    int64_t max_memory;
+    double memory_s, memory_sigma_deg, memory_chi2;
+    int64_t max_merged, telemetry_patience;
+    double telemetry_gate_chi2, target_max_chi2, target_margin;
+    int64_t target_margin_hits;
 } bst_tracker_config;
 
 extern const bst_config_desc bst_tracker_config_table[];
@@ -56,6 +68,9 @@ typedef enum bst_tracker_event_kind {
     BST_TRACKER_TARGET_SELECTED,
     BST_TRACKER_TARGET_LOST,
     BST_TRACKER_ATTITUDE_LOST, /* no attitude good enough to measure directions with */
+    BST_TRACKER_TRACK_RESUMED, /* confirmed again after it had been lost: the same identity */
+    BST_TRACKER_MANOEUVRE,
+    BST_TRACKER_BRIGHTNESS_CHANGE,
 } bst_tracker_event_kind;
 
 typedef struct bst_tracker_event {
@@ -63,6 +78,7 @@ typedef struct bst_tracker_event {
     int64_t track_id; /* 0 where none is meant */
     bst_vec3 direction_gcrf, rate_gcrf_radps;
     double v_mag;
+    double statistic; /* chi-square of a manoeuvre (2 degrees of freedom), of a change (1) */
 } bst_tracker_event;
 
 /* What became of a frame. */

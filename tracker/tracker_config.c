@@ -2,6 +2,9 @@
 
 #define C bst_tracker_config
 
+/* in the order of bst_mtt_association */
+static const char *const associations[] = {"gnn", "nearest", "pda", "mixture", NULL};
+
 const bst_config_desc bst_tracker_config_table[] = {
     BST_REAL(C, star_floor_px, "px", 0, 10, "0.03",
              "Standard deviation added to every star's centroid (catalogue, distortion)."),
@@ -82,4 +85,47 @@ const bst_config_desc bst_tracker_config_table[] = {
             "Room for what is at rest: stars that the catalogue lacks."),
     BST_INT(C, max_detections, "", 1, 1000000, "8192",
             "Room for detections of one frame that are not stars."),
+    BST_ENUM(
+        C, association, associations, "\"gnn\"",
+        "gnn: the assignment of least total cost. nearest: the cheapest pair first. pda: as gnn, "
+        "but the filter of a confirmed track weighs every detection in its gate by its "
+        "probability. mixture: as pda, and the likeliest choices live on apart until later "
+        "detections decide (for dense clutter; not with type imm)."),
+    BST_REAL(C, manoeuvre_noise_arcsec_per_s15, "arcsec/s^1.5", 0, 1e5, "3",
+             "Type imm: the same as process_noise_arcsec_per_s15 while an object manoeuvres."),
+    BST_REAL(C, quiet_s, "s", 1e-3, 1e9, "3600",
+             "Type imm: mean time between the end of a manoeuvre and the next one."),
+    BST_REAL(C, manoeuvre_s, "s", 1e-3, 1e9, "60", "Type imm: mean length of a manoeuvre."),
+    BST_REAL(C, brightness_floor_mag, "mag", 0, 10, "0.2",
+             "Standard deviation added to every magnitude."),
+    BST_REAL(C, brightness_walk_mag, "mag", 0, 10, "0.05",
+             "Standard deviation by which an object's brightness changes from frame to frame."),
+    BST_INT(C, event_window, "", 0, 16, "8",
+            "Manoeuvres and changes of brightness are told from so many detections of a track; 0: "
+            "none are."),
+    BST_REAL(
+        C, false_events_per_hour, "1/h", 0, 1e4, "0.01",
+        "Greatest number of false manoeuvres, and of false changes of brightness, per hour and "
+        "track; 0: none are told."),
+    BST_INT(C, max_memory, "", 0, 100000, "64",
+            "Room for tracks that were lost; what is confirmed where one of them should be is that "
+            "track again."),
+    BST_REAL(C, memory_s, "s", 0, 1e6, "7200", "Lost tracks are remembered for this long."),
+    BST_REAL(C, memory_sigma_deg, "deg", 0, 30, "1",
+             "Lost tracks whose direction is worse than this are forgotten."),
+    BST_REAL(C, memory_chi2, "", 0, 1e6, "18.5",
+             "Largest misfit of a new track to a lost one, 4 degrees of freedom."),
+    BST_INT(C, max_merged, "", 0, 10000, "30",
+            "Frames in a row that a track may live on detections that it shares."),
+    BST_REAL(C, telemetry_gate_chi2, "", 1, 1e6, "30",
+             "Attitudes from stars that contradict the telemetry's history by more (3 degrees of "
+             "freedom) are not used ..."),
+    BST_INT(C, telemetry_patience, "", 1, 1000, "3",
+            "... until so many in a row do: then the history starts anew."),
+    BST_REAL(C, target_max_chi2, "", 0.1, 1e6, "4",
+             "A track whose mean innovation (per degree of freedom) exceeds this is not taken for "
+             "the target."),
+    BST_REAL(C, target_margin, "", 0, 1e3, "2",
+             "Log-likelihood by which the best candidate for the target must lead the second ..."),
+    BST_INT(C, target_margin_hits, "", 2, 10000, "8", "... unless it has this many hits."),
     BST_CONFIG_END};

@@ -11,12 +11,15 @@ enum { BST_EXIT_OK = 0, BST_EXIT_FAILED = 1, BST_EXIT_USAGE = 2, BST_EXIT_INTERR
 int bst_cmd_run(int argc, char **argv);
 int bst_cmd_info(int argc, char **argv);
 int bst_cmd_export(int argc, char **argv);
+int bst_cmd_orbit(int argc, char **argv);
 int bst_cmd_check(int argc, char **argv);
 int bst_cmd_schema(int argc, char **argv);
 int bst_cmd_stars(int argc, char **argv);
 int bst_cmd_propagate(int argc, char **argv);
 int bst_cmd_calframes(int argc, char **argv);
 int bst_cmd_bench(int argc, char **argv);
+int bst_cmd_pd(int argc, char **argv);
+int bst_cmd_calibrate_obsgen(int argc, char **argv);
 
 /* Log sink that writes to standard error: "boresight: warning: ...". */
 void bst_app_log(void *user, bst_log_level level, const char *message);

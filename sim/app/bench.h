@@ -20,6 +20,7 @@ typedef struct bst_bench_result {
     double peak_rss_mib;
     double setup_s, ms_max, error_px;
     double error_m; /* of a place */
+    double detections, detections_lost; /* per frame: reported; more than there was room for */
     struct bst_bench_phase {
         char name[24];
         double ms;
@@ -62,6 +63,9 @@ bst_status bst_bench_numerical(bst_ctx *ctx, const bst_bench *self,
 bst_status bst_bench_scene_run(bst_ctx *ctx, const bst_bench *self,
                                const bst_bench_options *options,
                                bst_bench_result *out) BST_MUST_CHECK;
+/* Image processing on the frames of the scene whose name follows "imgproc_" (bench_imgproc.c). */
+bst_status bst_bench_imgproc(bst_ctx *ctx, const bst_bench *self, const bst_bench_options *options,
+                             bst_bench_result *out) BST_MUST_CHECK;
 /* First frame of fresh processes, from their start until its pixels are mapped, kernels in the
  * cache (bench_cold_start.c). */
 bst_status bst_bench_cold_start(bst_ctx *ctx, const bst_bench *self,
@@ -72,6 +76,11 @@ bst_status bst_bench_first_frame(bst_ctx *ctx, const bst_bench_options *options)
 /* The closed loop (bench_foundations.c). */
 bst_status bst_bench_loop(bst_ctx *ctx, const bst_bench *self, const bst_bench_options *options,
                           bst_bench_result *out) BST_MUST_CHECK;
+/* A day of it with the observation generator, hour by hour: a frame every 2 s, plant and control at
+ * 100 Hz (scenarios/day_generator.json). */
+bst_status bst_bench_loop_obsgen(bst_ctx *ctx, const bst_bench *self,
+                                 const bst_bench_options *options,
+                                 bst_bench_result *out) BST_MUST_CHECK;
 
 /* Whole runs of an open-loop scenario, frames recorded, with and without --serial, in processes of
  * their own: per frame, start and end taken off (bench_open_loop.c). */

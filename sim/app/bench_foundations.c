@@ -89,25 +89,25 @@ bst_status bst_bench_star_cull(bst_ctx *ctx, const bst_bench *self,
 
 /* The closed loop of the scenario, nothing recorded: time per frame of rendering, processing,
  * tracking, control and plant. */
-bst_status bst_bench_loop(bst_ctx *ctx, const bst_bench *self, const bst_bench_options *options,
-                          bst_bench_result *out) {
-    (void)self;
+/* Runs a scenario in parts of part_s, each of `frames`; the first is warm-up. */
+static bst_status run_in_parts(bst_ctx *ctx, const bst_bench_options *options, const char *file,
+                               double duration_s, int part_s, int frames, bst_bench_result *out) {
     bst_load_options load = BST_LOAD_DEFAULTS;
-    load.duration_s = 60.0;
+    load.duration_s = duration_s;
     bst_json *json = NULL;
     bst_scenario scenario;
-    BST_TRY(bst_load_scenario(ctx, options->scenario, &load, &json, &scenario));
+    BST_TRY(bst_load_scenario(ctx, file, &load, &json, &scenario));
     bst_simulation *sim = NULL;
     const bst_simulation_options sim_options = {options->device, options->threads, false};
     bst_status status = bst_simulation_create(ctx, &scenario, &sim_options, &sim);
     bst_bench_clock clock = {.count = 0};
-    int seconds = (int)scenario.duration_s;
-    for (int s = 0; status == BST_OK && s < seconds; s++) {
-        /* one frame a second; the first is warm-up */
+    int parts = (int)scenario.duration_s / part_s;
+    for (int p = 0; status == BST_OK && p < parts; p++) {
         bst_bench_start(&clock);
-        status = bst_engine_run(ctx, bst_simulation_engine(sim), (s + 1) * scenario.tick_rate_hz);
-        bst_bench_stop(&clock, 1);
-        if (s == 0) {
+        status = bst_engine_run(ctx, bst_simulation_engine(sim),
+                                (p + 1) * part_s * scenario.tick_rate_hz);
+        bst_bench_stop(&clock, frames);
+        if (p == 0) {
             clock.count = 0;
             clock.cpu_total_ms = 0.0;
         }
@@ -117,4 +117,17 @@ bst_status bst_bench_loop(bst_ctx *ctx, const bst_bench *self, const bst_bench_o
     bst_scenario_free(&scenario);
     bst_json_free(json);
     return status;
+}
+
+bst_status bst_bench_loop(bst_ctx *ctx, const bst_bench *self, const bst_bench_options *options,
+                          bst_bench_result *out) {
+    (void)self;
+    return run_in_parts(ctx, options, options->scenario, 60.0, 1, 1, out);
+}
+
+bst_status bst_bench_loop_obsgen(bst_ctx *ctx, const bst_bench *self,
+                                 const bst_bench_options *options, bst_bench_result *out) {
+    (void)self;
+    const int hour_s = 3600, frames = 1800;
+    return run_in_parts(ctx, options, "scenarios/day_generator.json", 86400.0, hour_s, frames, out);
 }

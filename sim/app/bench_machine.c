@@ -114,6 +114,8 @@ cJSON *bst_bench_result_json(const bst_bench_result *r, const bst_bench_device *
     bst_json_add_number(node, "ms_max", r->ms_max);
     bst_json_add_number(node, "error_px", r->error_px);
     bst_json_add_number(node, "error_m", r->error_m);
+    bst_json_add_number(node, "detections", r->detections);
+    bst_json_add_number(node, "detections_lost", r->detections_lost);
     if (r->phase_count > 0) {
         cJSON *phases = cJSON_AddObjectToObject(node, "phases_ms");
         for (int i = 0; i < r->phase_count; i++) {

@@ -29,7 +29,9 @@ bst_bench_result bst_bench_nothing(const char *name) {
                               .setup_s = NAN,
                               .ms_max = NAN,
                               .error_px = NAN,
-                              .error_m = NAN};
+                              .error_m = NAN,
+                              .detections = NAN,
+                              .detections_lost = NAN};
 }
 
 static double clock_ms(clockid_t id) {

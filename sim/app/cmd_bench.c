@@ -31,7 +31,15 @@ static const bst_bench benches[] = {
     {"rate_track_fast", "2048x2048, target at rest, stars 200 px", bst_bench_scene_run},
     {"galactic_core", "2048x2048, 100,000 stars, 5 px of motion", bst_bench_scene_run},
     {"window", "256x256 read-out window on a tracked target", bst_bench_scene_run},
+    {"imgproc_acquisition", "image processing of the frames of acquisition, rendered beforehand",
+     bst_bench_imgproc},
+    {"imgproc_worst_case", "of worst_case", bst_bench_imgproc},
+    {"imgproc_galactic_core", "of galactic_core", bst_bench_imgproc},
+    {"imgproc_window", "of window", bst_bench_imgproc},
     {"loop_full", "closed loop of the main scenario, per frame", bst_bench_loop},
+    {"loop_obsgen",
+     "a day of the closed loop with the observation generator, per frame of 2 s, plant at 100 Hz",
+     bst_bench_loop_obsgen},
     {"open_loop", "run of an open-loop scenario with recording, per frame, and with --serial",
      bst_bench_open_loop},
     {"cold_start", "first frame of a fresh process, kernels in the cache", bst_bench_cold_start},
@@ -91,6 +99,10 @@ static void print_result(const bst_bench_result *r, bool markdown) {
     }
     if (!markdown && isfinite(r->error_m)) {
         printf("%-25s error at most %.1e m\n", "", r->error_m);
+    }
+    if (!markdown && isfinite(r->detections)) {
+        printf("%-25s %.0f detections a frame, %.0f more without room\n", "", r->detections,
+               r->detections_lost);
     }
     for (int i = 0; !markdown && i < r->phase_count; i++) {
         printf(r->phases[i].ms < 20.0 ? "%s%s %.1f ms%s" : "%s%s %.0f ms%s",

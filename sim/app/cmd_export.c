@@ -90,7 +90,8 @@ static const char help_text[] =
     "Writes what a run recorded in formats that other programs read: frames as PNG pictures or a "
     "film, tables as\n"
     "CSV, the true orbits as CCSDS OEM or CZML (with the fields of view), the measured angles as "
-    "CCSDS TDM, frames\n"
+    "CCSDS TDM, JSON\n"
+    "or CSV, frames\n"
     "with annotations as SatNet has them. Interrupted and killed runs are exported as far as they "
     "go. Files appear whole or not at all and replace earlier ones; the "
     "run itself is not\n"
@@ -110,7 +111,7 @@ int bst_cmd_export(int argc, char **argv) {
     bool help = false;
     double split[3];
     int frames = NOT_ASKED, table_format = NOT_ASKED, orbits = NOT_ASKED, observations = NOT_ASKED;
-    int stretch = 0;
+    int stretch = 0, angles = 0;
     const char *out = NULL, *tables = NULL;
     bst_export e = {.last = INT64_C(9007199254740992),
                     .every = 1,
@@ -136,8 +137,13 @@ int bst_cmd_export(int argc, char **argv) {
         {.name = "observations",
          .kind = BST_OPTION_CHOICE,
          .target = &observations,
-         .argument = "tdm",
-         .doc = "angles and magnitudes of confirmed tracks"},
+         .argument = "tdm|json|csv",
+         .doc = "directions and magnitudes of confirmed tracks; tdm with the observers' OEM"},
+        {.name = "angles",
+         .kind = BST_OPTION_CHOICE,
+         .target = &angles,
+         .argument = "measured|filtered",
+         .doc = "observations: what each frame measured (default), or the tracker's states"},
         {.name = "satnet",
          .kind = BST_OPTION_TEXT,
          .target = &e.satnet,
@@ -266,7 +272,8 @@ int bst_cmd_export(int argc, char **argv) {
                   observations != NOT_ASKED;
     e.film = frames == 1;
     e.czml = orbits == 1;
-    e.names_oem = orbits == 0;
+    e.observation_format = observations;
+    e.filtered = angles == 1;
     e.each_stretch = stretch == 1;
     bst_stop_catch_signals();
     bst_run_reader *run = NULL;
@@ -297,6 +304,9 @@ int bst_cmd_export(int argc, char **argv) {
     }
     if (status == BST_OK && observations != NOT_ASKED) {
         status = bst_export_observations(&ctx, &e);
+    }
+    if (status == BST_OK && observations == BST_OBSERVATIONS_TDM) {
+        status = bst_export_observers(&ctx, &e);
     }
     if (status == BST_OK && frames != NOT_ASKED) {
         status = bst_export_frames(&ctx, &e);

@@ -310,7 +310,8 @@ static bst_status watch_sensors(run_state *run, const bst_world *world) {
 static bool has_module(const bst_scenario *scenario, int observer, int sensor, const char *role) {
     for (int i = 0; i < scenario->module_count; i++) {
         const bst_module_config *m = &scenario->modules[i];
-        if (m->observer == observer && m->sensor == sensor && strcmp(m->desc->role, role) == 0) {
+        if (m->observer == observer && m->sensor == sensor && !m->off &&
+            strcmp(m->desc->role, role) == 0) {
             return true;
         }
     }

@@ -9,6 +9,12 @@
 #include "sim/io/run_reader.h"
 #include "sim/world/world.h"
 
+typedef enum bst_observation_format {
+    BST_OBSERVATIONS_TDM,
+    BST_OBSERVATIONS_JSON,
+    BST_OBSERVATIONS_CSV
+} bst_observation_format;
+
 /* A sensor of the run. */
 typedef struct bst_export_sensor {
     int64_t index; /* row of the table sensors */
@@ -27,8 +33,11 @@ typedef struct bst_export {
     int64_t first, last, every, longest_side; /* longest_side 0: as it is */
     double frame_rate;
     /* orbits */
-    bool czml, names_oem; /* names_oem: observations name the orbits' file */
+    bool czml;
     double step_s;
+    /* observations */
+    int observation_format; /* bst_observation_format */
+    bool filtered;          /* the tracker's states instead of measured directions */
     /* SatNet */
     const char *satnet; /* folder */
     double box_px;      /* side of a box; 0: the extent of the track */
@@ -56,7 +65,10 @@ bst_status bst_export_views(bst_ctx *ctx, const bst_export *e, const bst_scenari
 bst_status bst_export_split(bst_ctx *ctx, const char *text, double shares[3]) BST_MUST_CHECK;
 /* Images and annotations as SatNet has them, below e->satnet. */
 bst_status bst_export_satnet(bst_ctx *ctx, const bst_export *e) BST_MUST_CHECK;
+/* observations.tdm, .json or .csv: what sensors measured of tracks. */
 bst_status bst_export_observations(bst_ctx *ctx, const bst_export *e) BST_MUST_CHECK;
+/* observers.oem: the observers' orbits as they are known on board, which a TDM refers to. */
+bst_status bst_export_observers(bst_ctx *ctx, const bst_export *e) BST_MUST_CHECK;
 
 /* BST_ERR_INTERRUPTED when the user asked to stop. */
 static inline bst_status bst_export_check(bst_ctx *ctx) {

@@ -1,4 +1,5 @@
-/* True orbits of a run, made again from the run's own scenario.json; and its angles. */
+/* Orbits of a run, made again from the run's own scenario.json: true ones, and those that observers
+ * believe to be on. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -11,18 +12,11 @@
 #include "sim/app/export.h"
 #include "sim/app/progress.h"
 #include "sim/app/registry.h"
+#include "sim/app/run_observations.h"
 #include "sim/io/czml_writer.h"
 #include "sim/io/draft_file.h"
 #include "sim/io/oem_writer.h"
-#include "sim/io/tdm_writer.h"
 #include "sim/world/world.h"
-
-static void creation_date(char text[32]) {
-    time_t now = time(NULL);
-    struct tm utc = {0};
-    gmtime_r(&now, &utc);
-    strftime(text, 32, "%Y-%m-%dT%H:%M:%S", &utc);
-}
 
 /* Simulated seconds that the run holds. */
 static double recorded_s(const bst_run_reader *run, const bst_scenario *scenario) {
@@ -43,6 +37,7 @@ typedef struct track {
     bst_view *view;
     const bst_world *world;
     int observer, object; /* one is -1 */
+    int sensor;           /* whose knowledge of the observer is meant; -1: the truth */
     double step_s, span_s;
     double breaks[MOST_BREAKS + 2]; /* 0, where burns begin and end, the end */
     int break_count;
@@ -52,6 +47,10 @@ typedef struct track {
 } track;
 
 static bst_status state_of(const track *t, bst_ctx *ctx, double seconds, bst_state *out) {
+    bst_bodies bodies;
+    if (t->sensor >= 0) {
+        return bst_view_believed(ctx, t->view, t->observer, t->sensor, seconds, out, &bodies);
+    }
     return t->observer >= 0 ? bst_view_observer_state(ctx, t->view, t->observer, seconds, out)
                             : bst_view_object_state(ctx, t->view, t->object, seconds, out);
 }
@@ -167,12 +166,14 @@ static bst_status write_piece(bst_ctx *ctx, const bst_export *e, FILE *stream, t
     } else {
         snprintf(id, sizeof id, "%s", name);
     }
-    bst_oem_segment segment = {
-        .object_name = name,
-        .object_id = id,
-        .ref_frame = "GCRF",
-        .comment = info ? "true orbit of an object" : "true orbit of an observer",
-        .series = series};
+    bst_oem_segment segment = {.object_name = name,
+                               .object_id = id,
+                               .ref_frame = "GCRF",
+                               .comment = info ? "true orbit of an object"
+                                          : t->sensor >= 0
+                                              ? "orbit of an observer, as it is known on board"
+                                              : "true orbit of an observer",
+                               .series = series};
     return bst_oem_write_segment(ctx, stream, &segment);
 }
 
@@ -218,7 +219,7 @@ static bst_status write_one(bst_ctx *ctx, const bst_export *e, const bst_scenari
 
 static bst_status write_orbits(bst_ctx *ctx, const bst_export *e, const bst_scenario *scenario,
                                const bst_world *world, bst_view *view, FILE *stream, int *written) {
-    track t = {.view = view, .world = world, .span_s = recorded_s(e->run, scenario)};
+    track t = {.view = view, .world = world, .sensor = -1, .span_s = recorded_s(e->run, scenario)};
     t.step_s = e->step_s > 0.0 ? e->step_s : fmin(60.0, t.span_s / 20.0);
     if (!(t.span_s > 0.0)) {
         return bst_fail(ctx, BST_ERR_NOT_FOUND, "%s: holds no time span to write orbits for",
@@ -229,7 +230,7 @@ static bst_status write_orbits(bst_ctx *ctx, const bst_export *e, const bst_scen
                                     bst_world_time(world, t.span_s), 1.0));
     } else {
         char created[32];
-        creation_date(created);
+        bst_creation_date(created);
         BST_TRY(bst_oem_write_head(ctx, stream, created, "BORESIGHT",
                                    "true states of a simulated run"));
     }
@@ -255,7 +256,40 @@ static bst_status write_orbits(bst_ctx *ctx, const bst_export *e, const bst_scen
     return status;
 }
 
-static bst_status orbits_of(bst_ctx *ctx, const bst_export *e, const bst_scenario *scenario) {
+/* The observers' orbits as they believe them; of several sensors the first that is asked for. */
+static bst_status write_believed(bst_ctx *ctx, const bst_export *e, const bst_scenario *scenario,
+                                 const bst_world *world, bst_view *view, FILE *stream,
+                                 int *written) {
+    track t = {.view = view, .world = world, .object = -1, .span_s = recorded_s(e->run, scenario)};
+    bst_export_sensor sensors[BST_EXPORT_SENSORS];
+    char created[32];
+    int count;
+    t.step_s = e->step_s > 0.0 ? e->step_s : fmin(60.0, t.span_s / 20.0);
+    if (!(t.span_s > 0.0)) {
+        return bst_fail(ctx, BST_ERR_NOT_FOUND, "%s: holds no time span to write orbits for",
+                        bst_run_reader_folder(e->run));
+    }
+    BST_TRY(bst_export_sensors(ctx, e, sensors, &count));
+    bst_creation_date(created);
+    BST_TRY(bst_oem_write_head(ctx, stream, created, "BORESIGHT",
+                               "states of a simulated run's observers as they are known on board"));
+    const bst_run_scene scene = {.run = e->run, .scenario = *scenario};
+    for (int i = 0; i < count; i++) {
+        bool before = false;
+        for (int k = 0; k < i; k++) {
+            before = before || strcmp(sensors[k].observer, sensors[i].observer) == 0;
+        }
+        if (!before) {
+            BST_TRY(bst_export_check(ctx));
+            BST_TRY(bst_run_scene_find(ctx, &scene, &sensors[i], &t.observer, &t.sensor));
+            BST_TRY(write_one(ctx, e, scenario, stream, &t, written));
+        }
+    }
+    return BST_OK;
+}
+
+static bst_status orbits_of(bst_ctx *ctx, const bst_export *e, const bst_scenario *scenario,
+                            bool believed) {
     char path[4096];
     bst_draft draft;
     bst_world *world = NULL;
@@ -265,7 +299,8 @@ static bst_status orbits_of(bst_ctx *ctx, const bst_export *e, const bst_scenari
     bst_world_config config = scenario->world;
     config.faint_stars = BST_FAINT_NONE;
     snprintf(config.star_catalogue, sizeof config.star_catalogue, "embedded");
-    int n = snprintf(path, sizeof path, "%s/orbits.%s", e->out, e->czml ? "czml" : "oem");
+    int n = snprintf(path, sizeof path, "%s/%s.%s", e->out, believed ? "observers" : "orbits",
+                     e->czml ? "czml" : "oem");
     if (n < 0 || (size_t)n >= sizeof path) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", e->out);
     }
@@ -276,7 +311,8 @@ static bst_status orbits_of(bst_ctx *ctx, const bst_export *e, const bst_scenari
         status = bst_draft_open(ctx, path, &draft);
     }
     if (status == BST_OK) {
-        status = write_orbits(ctx, e, scenario, world, view, draft.stream, &written);
+        status = (believed ? write_believed : write_orbits)(ctx, e, scenario, world, view,
+                                                            draft.stream, &written);
         status = bst_draft_close(ctx, &draft, status);
     }
     if (status == BST_OK) {
@@ -287,7 +323,7 @@ static bst_status orbits_of(bst_ctx *ctx, const bst_export *e, const bst_scenari
     return status;
 }
 
-bst_status bst_export_orbits(bst_ctx *ctx, const bst_export *e) {
+static bst_status export_orbits(bst_ctx *ctx, const bst_export *e, bool believed) {
     char path[4096];
     bst_json *json;
     bst_scenario scenario;
@@ -295,145 +331,19 @@ bst_status bst_export_orbits(bst_ctx *ctx, const bst_export *e) {
     BST_TRY(bst_json_load(ctx, path, &json));
     bst_status status = bst_scenario_read(ctx, json, bst_app_registry(), &scenario);
     if (status == BST_OK) {
-        status = orbits_of(ctx, e, &scenario);
+        status = orbits_of(ctx, e, &scenario, believed);
     }
     bst_scenario_free(&scenario);
     bst_json_free(json);
     return status;
 }
 
-/* ------------------------------------------------------------------ observations */
-
-/* The observations of one track, and where the file is. */
-typedef struct angles {
-    const bst_export *e;
-    const bst_export_sensor *sensor;
-    FILE *stream;
-    bst_time epoch;
-    int64_t tick_rate_hz, track_id, written, segments;
-    bool target;
-    double exposure_s;
-    bst_tdm_observation *items;
-    int64_t count, capacity;
-} angles;
-
-static bst_status add_observation(bst_ctx *ctx, angles *a, const bst_rows *rows) {
-    if (a->count == a->capacity) {
-        int64_t capacity = a->capacity ? 2 * a->capacity : 1024;
-        bst_tdm_observation *items = realloc(a->items, (size_t)capacity * sizeof *items);
-        if (!items) {
-            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a track's observations");
-        }
-        a->items = items;
-        a->capacity = capacity;
-    }
-    a->items[a->count++] = (bst_tdm_observation){
-        .time = bst_time_at_tick(a->epoch, bst_rows_int(rows, 1), a->tick_rate_hz),
-        .ra_rad = bst_rows_real(rows, 3) * BST_DEG_RAD,
-        .dec_rad = bst_rows_real(rows, 4) * BST_DEG_RAD,
-        .mag = bst_rows_real(rows, 5)};
-    a->target = a->target || bst_rows_int(rows, 2) != 0;
-    return BST_OK;
+bst_status bst_export_orbits(bst_ctx *ctx, const bst_export *e) {
+    return export_orbits(ctx, e, false);
 }
 
-/* Writes what has been gathered of a track. */
-static bst_status write_track(bst_ctx *ctx, angles *a) {
-    if (a->count == 0) {
-        return BST_OK;
-    }
-    char object[96], comment[300];
-    bool named = a->target && a->sensor->target[0];
-    if (named) {
-        snprintf(object, sizeof object, "%s", a->sensor->target);
-    } else {
-        snprintf(object, sizeof object, "TRACK-%" PRId64, a->track_id);
-    }
-    snprintf(comment, sizeof comment,
-             "sensor %s, track %" PRId64
-             "%s\nstates of the onboard filter at mid exposure, in "
-             "frames with a detection",
-             a->sensor->name, a->track_id,
-             a->target ? ", which the tracker took for its target" : "");
-    bst_tdm_segment segment = {.observer = a->sensor->observer,
-                               .object = object,
-                               .observer_ephemeris = a->e->names_oem ? "orbits.oem" : NULL,
-                               .comment = comment,
-                               .integration_s = a->exposure_s,
-                               .aberration_removed = true,
-                               .light_time_removed = false,
-                               .aberration_yearly_deg = NAN,
-                               .aberration_orbital_deg = NAN,
-                               .observations = a->items,
-                               .count = a->count};
-    BST_TRY(bst_tdm_write_segment(ctx, a->stream, &segment));
-    a->written += a->count;
-    a->segments++;
-    a->count = 0;
-    a->target = false;
-    return BST_OK;
-}
-
-static bst_status write_sensor(bst_ctx *ctx, angles *a) {
-    bst_rows *rows;
-    bool more;
-    BST_TRY(bst_rows_open(ctx, a->e->run, "SELECT exposure_s FROM frames WHERE sensor = ?1 LIMIT 1",
-                          a->sensor->index, 0, &rows));
-    bst_status status = bst_rows_next(ctx, rows, &more);
-    a->exposure_s = status == BST_OK && more ? bst_rows_real(rows, 0) : 0.0;
-    bst_rows_close(rows);
-    BST_TRY(status);
-    BST_TRY(bst_rows_open(ctx, a->e->run,
-                          "SELECT track_id, tick, target_of_interest, ra_deg, dec_deg, v_mag"
-                          " FROM tracks WHERE sensor = ?1 AND misses_in_row = 0"
-                          " AND (status = 'confirmed' OR target_of_interest = 1)"
-                          " ORDER BY track_id, tick",
-                          a->sensor->index, 0, &rows));
-    while ((status = bst_rows_next(ctx, rows, &more)) == BST_OK && more) {
-        int64_t id = bst_rows_int(rows, 0);
-        if (id != a->track_id) {
-            status = write_track(ctx, a);
-            a->track_id = id;
-        }
-        status = status == BST_OK ? add_observation(ctx, a, rows) : status;
-        if (status != BST_OK) {
-            break;
-        }
-    }
-    bst_rows_close(rows);
-    return status == BST_OK ? write_track(ctx, a) : status;
-}
-
-bst_status bst_export_observations(bst_ctx *ctx, const bst_export *e) {
-    bst_export_sensor sensors[BST_EXPORT_SENSORS];
-    int count;
-    char path[4096], created[32];
-    bst_draft draft;
-    angles a = {.e = e,
-                .tick_rate_hz = bst_run_reader_int(e->run, "SELECT tick_rate_hz FROM run", 0, 0)};
-    if (!bst_run_reader_epoch(e->run, &a.epoch) || a.tick_rate_hz < 1) {
-        return bst_fail(ctx, BST_ERR_FORMAT, "%s: does not say when it began",
-                        bst_run_reader_folder(e->run));
-    }
-    BST_TRY(bst_export_sensors(ctx, e, sensors, &count));
-    int n = snprintf(path, sizeof path, "%s/observations.tdm", e->out);
-    if (n < 0 || (size_t)n >= sizeof path) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", e->out);
-    }
-    BST_TRY(bst_draft_open(ctx, path, &draft));
-    a.stream = draft.stream;
-    creation_date(created);
-    bst_status status =
-        bst_tdm_write_head(ctx, draft.stream, created, "BORESIGHT", "angles of a simulated run");
-    for (int i = 0; i < count && status == BST_OK; i++) {
-        a.sensor = &sensors[i];
-        status = write_sensor(ctx, &a);
-    }
-    free(a.items);
-    if (status == BST_OK && a.segments == 0) {
-        status = bst_fail(ctx, BST_ERR_NOT_FOUND, "%s: holds no confirmed track to write",
-                          bst_run_reader_folder(e->run));
-    }
-    BST_TRY(bst_draft_close(ctx, &draft, status));
-    printf("%s: %" PRId64 " observations of %" PRId64 " tracks\n", path, a.written, a.segments);
-    return BST_OK;
+bst_status bst_export_observers(bst_ctx *ctx, const bst_export *e) {
+    bst_export oem = *e;
+    oem.czml = false;
+    return export_orbits(ctx, &oem, true);
 }

@@ -14,12 +14,16 @@ static const command commands[] = {
     {"run", bst_cmd_run, "run a scenario"},
     {"info", bst_cmd_info, "what the folder of a run holds"},
     {"export", bst_cmd_export, "frames, tables, orbits and observations of a run for others"},
+    {"orbit", bst_cmd_orbit, "an orbit from the directions that a run measured"},
     {"check", bst_cmd_check, "validate a scenario and print it with every default written out"},
     {"schema", bst_cmd_schema, "print the JSON Schema of scenarios"},
     {"stars", bst_cmd_stars, "get, import or describe the star catalogue"},
     {"propagate", bst_cmd_propagate, "positions and velocities from two-line element sets"},
     {"calframes", bst_cmd_calframes, "bias, dark and flat frames of a scenario's sensors"},
+    {"calibrate-obsgen", bst_cmd_calibrate_obsgen,
+     "fit the observation generator to the image path, or compare them"},
     {"bench", bst_cmd_bench, "measure speed and error"},
+    {"pd", bst_cmd_pd, "measure detection, false alarms and location against theory"},
 };
 
 void bst_app_log(void *user, bst_log_level level, const char *message) {
@@ -40,7 +44,7 @@ static void usage(FILE *stream) {
             "\n"
             "commands:\n");
     for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {
-        fprintf(stream, "  %-10s %s\n", commands[i].name, commands[i].doc);
+        fprintf(stream, "  %-16s %s\n", commands[i].name, commands[i].doc);
     }
     fprintf(
         stream,

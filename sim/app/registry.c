@@ -3,13 +3,15 @@
 #include "control/modules.h"
 #include "gimbal/modules.h"
 #include "imgproc/imgproc.h"
+#include "obsgen/obsgen.h"
 #include "scenegen/module.h"
 #include "tracker/module.h"
 
 static const bst_module_desc *const modules[] = {
     &bst_gimbal_two_axis_module,  &bst_gimbal_ideal_module, &bst_gimbal_scripted_module,
     &bst_scenegen_module,         &bst_imgproc_module,      &bst_tracker_module,
-    &bst_control_standard_module,
+    &bst_control_standard_module, &bst_tracker_ukf_module,  &bst_tracker_imm_module,
+    &bst_obsgen_module,
 };
 
 static const bst_registry registry = {modules, sizeof modules / sizeof *modules};

@@ -193,9 +193,11 @@ typedef struct bst_planes {
 
 typedef enum bst_label {
     BST_LABEL_UNKNOWN = 0,
-    BST_LABEL_STAR,     /* identified in the onboard catalogue */
-    BST_LABEL_OBJECT,   /* not a star: moves, or no catalogue star is there */
-    BST_LABEL_ARTEFACT, /* hot pixel, edge, radiation hit */
+    BST_LABEL_STAR,   /* identified in the onboard catalogue; without star_id: at rest among them */
+    BST_LABEL_OBJECT, /* not a star: moves, or no catalogue star is there */
+    BST_LABEL_ARTEFACT,  /* cut by the edge, spike of a bright star, no source's shape */
+    BST_LABEL_HOT_PIXEL, /* sharper than the PSF, at the same pixel again, or one pixel alone */
+    BST_LABEL_HIT,       /* radiation: sharper than the PSF, in this frame only */
 } bst_label;
 
 enum {
@@ -213,8 +215,9 @@ typedef struct bst_detection {
     double length_px, width_px, angle_rad; /* extent; angle of the long axis from +x towards +y */
     double v_mag;                          /* from flux and the onboard zero point */
     uint32_t flags;
-    uint32_t star_id; /* Tycho-2 identity, 0 when none */
-    int32_t label;    /* bst_label */
+    uint32_t star_id;         /* Tycho-2 identity, 0 when none */
+    int32_t label;            /* bst_label */
+    double label_probability; /* that the label is right, 0 to 1; 0 where the label is UNKNOWN */
 } bst_detection;
 
 /* detections (queue): what image processing (or the generator) found in one frame. */
@@ -252,6 +255,7 @@ typedef struct bst_track {
     int32_t hits, misses_in_row;
     int64_t first_tick, last_update_tick;
     double x_px, y_px; /* latest detection, full-sensor coordinates */
+    bool uncorrelated; /* confirmed, and neither the target nor what the cue expects */
 } bst_track;
 
 /* Attitude from stars, and the telemetry's error that follows from it. */

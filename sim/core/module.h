@@ -85,6 +85,10 @@ typedef struct bst_module_desc {
      * and keeps what it made by bst_step_lane for the step, which does it itself where nothing is
      * kept: what fails here fails there again. */
     bst_status (*ahead)(void *self, struct bst_step *step);
+    /* May be NULL. Roles, NULL-terminated, in whose place this module steps where the sensor's
+     * observation_source is "generator"; otherwise it does not step. Keys of its table that theirs
+     * have too take their values. Its last trigger is delayed by what passes between them. */
+    const char *const *stands_for;
 } bst_module_desc;
 
 /* In create: number of items that an output's payload shall hold. `port` indexes desc->ports. */

@@ -11,7 +11,7 @@
 void *bst_pages_alloc(size_t bytes) {
     size_t align = bytes >= 2 * LARGE_PAGE ? LARGE_PAGE : VECTOR;
     void *memory;
-    if (bytes > SIZE_MAX - align || posix_memalign(&memory, align, bytes ? bytes : align) != 0) {
+    if (bytes > PTRDIFF_MAX || posix_memalign(&memory, align, bytes ? bytes : align) != 0) {
         return NULL;
     }
 #ifdef MADV_HUGEPAGE

@@ -36,10 +36,18 @@ bst_quat bst_quat_from_mat3(const bst_mat3 *a) {
 }
 
 bst_quat bst_quat_from_rotvec(bst_vec3 r) {
-    double angle = bst_vec3_norm(r);
-    /* sin(a/2)/a, by its series where the quotient would lose digits */
-    double s = angle > 1e-4 ? sin(0.5 * angle) / angle : 0.5 - angle * angle / 48.0;
-    return (bst_quat){s * r.x, s * r.y, s * r.z, cos(0.5 * angle)};
+    double square = 0.25 * bst_vec3_dot(r, r); /* of half the angle */
+    if (square < 2e-4) {
+        /* sin(a/2)/a and cos(a/2) by their series, exact to rounding: most turns are small, and the
+         * quotient would lose digits */
+        double s = 0.5 - square * (1.0 / 12.0 - square * (1.0 / 240.0 - square / 10080.0));
+        double c =
+            1.0 -
+            square * (0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0 - square / 40320.0)));
+        return (bst_quat){s * r.x, s * r.y, s * r.z, c};
+    }
+    double half = sqrt(square), s = 0.5 * sin(half) / half;
+    return (bst_quat){s * r.x, s * r.y, s * r.z, cos(half)};
 }
 
 bst_vec3 bst_quat_to_rotvec(bst_quat q) {

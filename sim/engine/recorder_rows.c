@@ -259,6 +259,10 @@ static const char *label_name(int32_t label) {
             return "object";
         case BST_LABEL_ARTEFACT:
             return "artefact";
+        case BST_LABEL_HOT_PIXEL:
+            return "hot_pixel";
+        case BST_LABEL_HIT:
+            return "hit";
         default:
             return "unknown";
     }
@@ -309,6 +313,7 @@ bst_status bst_recorder_detection_rows(bst_ctx *ctx, bst_recorder *recorder, int
         put_flag(&r, item->flags & BST_DETECTION_EDGE);
         put_flag(&r, item->flags & BST_DETECTION_STREAK);
         put_flag(&r, item->flags & BST_DETECTION_BLEND);
+        put_real(&r, item->label_probability);
         BST_TRY(append(ctx, recorder, BST_TABLE_DETECTIONS, &r));
     }
     return BST_OK;
@@ -357,6 +362,7 @@ static bst_status track_row(bst_ctx *ctx, bst_recorder *recorder, int sensor, co
     put_int(&r, k->last_update_tick);
     put_real(&r, k->x_px);
     put_real(&r, k->y_px);
+    put_flag(&r, k->uncorrelated);
     return append(ctx, recorder, BST_TABLE_TRACKS, &r);
 }
 

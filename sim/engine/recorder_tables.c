@@ -154,7 +154,7 @@ static const bst_column detection_columns[] = {
     EXPOSURE,
     MID,
     INT("item", "", "number of the detection in its frame"),
-    TEXT("label", "unknown, star, object or artefact"),
+    TEXT("label", "unknown, star, object, artefact, hot_pixel or hit"),
     INT("star_id", "", "Tycho-2 identity, 0 when none"),
     REAL("x_px", "px", "column on the whole sensor, mid exposure"),
     REAL("y_px", "px", "row"),
@@ -172,6 +172,7 @@ static const bst_column detection_columns[] = {
     INT("edge", "", "1: touches the window's edge"),
     INT("streak", "", "1: longer than the PSF"),
     INT("blend", "", "1: several sources"),
+    REAL("label_probability", "", "that the label is right; 0: unknown"),
 };
 static const bst_column track_frame_columns[] = {
     SENSOR,
@@ -226,6 +227,7 @@ static const bst_column track_columns[] = {
     INT("last_update_tick", "tick", "latest detection"),
     REAL("x_px", "px", "latest detection, whole sensor"),
     REAL("y_px", "px", "latest detection, whole sensor"),
+    INT("uncorrelated", "", "1: confirmed, and neither the target nor what the cue expects"),
 };
 static const bst_column los_command_columns[] = {
     SENSOR,

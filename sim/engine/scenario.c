@@ -8,6 +8,8 @@
 
 #include <cjson/cJSON.h>
 
+#include "sim/engine/stand_in.h"
+
 enum { FORMAT_VERSION = 1 };
 
 const bst_config_desc bst_scenario_table[] = {
@@ -328,7 +330,7 @@ static bst_status read_modules(bst_ctx *ctx, const bst_json *json, const bst_reg
                     return bst_config_fail(ctx, out->file, path, block, "wrong type", "an object");
                 }
                 if (pass == 0) {
-                    total += cJSON_GetArraySize(block);
+                    total += cJSON_GetArraySize(block) + 1; /* one may be made */
                     continue;
                 }
                 for (const cJSON *node = block ? block->child : NULL; node; node = node->next) {
@@ -339,6 +341,7 @@ static bst_status read_modules(bst_ctx *ctx, const bst_json *json, const bst_reg
                     snprintf(module_path, sizeof module_path, "%s/%.60s", path, node->string);
                     BST_TRY(read_module(ctx, json, registry, out, node, module_path, module));
                 }
+                BST_TRY(bst_stand_in(ctx, registry, block, i, s, out));
             }
         }
         if (pass == 0) {
@@ -465,47 +468,6 @@ void bst_scenario_free(bst_scenario *s) {
     free(s->modules);
     bst_config_free(bst_scenario_table, s);
     memset(s, 0, sizeof *s);
-}
-
-static cJSON *echo_module(const bst_scenario *s, const bst_module_config *module) {
-    cJSON *node = cJSON_CreateObject();
-    cJSON_AddStringToObject(node, "type", module->desc->type);
-    if (module->rate_hz > 0.0) {
-        cJSON_AddNumberToObject(node, "rate_hz", module->rate_hz);
-    }
-    cJSON_AddNumberToObject(node, "offset_s", module->offset_s);
-    if (module->delay_count > 0) {
-        cJSON *delays = cJSON_AddObjectToObject(node, "delay_s");
-        for (int i = 0; i < module->delay_count; i++) {
-            cJSON_AddNumberToObject(delays, module->desc->ports[module->delays[i].port].channel,
-                                    (double)module->delays[i].ticks / (double)s->tick_rate_hz);
-        }
-    }
-    cJSON *own =
-        module->desc->config ? bst_config_echo(module->desc->config, module->config) : NULL;
-    while (own && own->child) {
-        cJSON *item = cJSON_DetachItemViaPointer(own, own->child);
-        cJSON_AddItemToObject(node, item->string, item);
-    }
-    cJSON_Delete(own);
-    return node;
-}
-
-cJSON *bst_scenario_echo(const bst_scenario *s) {
-    cJSON *root = bst_config_echo(bst_scenario_table, s);
-    for (int i = 0; root && i < s->module_count; i++) {
-        const bst_module_config *module = &s->modules[i];
-        cJSON *sensor = cJSON_GetArrayItem(cJSON_GetObjectItemCaseSensitive(root, "observers"),
-                                           module->observer);
-        sensor =
-            cJSON_GetArrayItem(cJSON_GetObjectItemCaseSensitive(sensor, "sensors"), module->sensor);
-        cJSON *block = cJSON_GetObjectItemCaseSensitive(sensor, "modules");
-        if (!block) {
-            block = cJSON_AddObjectToObject(sensor, "modules");
-        }
-        cJSON_AddItemToObject(block, module->name, echo_module(s, module));
-    }
-    return root;
 }
 
 /* Schema of one module: its own keys, the common ones, and "type" fixed. */

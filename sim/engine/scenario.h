@@ -23,6 +23,7 @@ typedef struct bst_module_config {
     int64_t period_ticks, offset_ticks;
     bst_input_delay delays[BST_MAX_DELAYS];
     int delay_count;
+    bool off; /* another stands in for it, or it for others that are there: does not step */
 } bst_module_config;
 
 typedef struct bst_scenario {

@@ -124,7 +124,7 @@ static bst_status add_modules(bst_ctx *ctx, const bst_scenario *scenario, bst_si
             BST_TRY(bst_engine_add(ctx, sim->engine, &spec));
             for (int m = 0; m < scenario->module_count; m++) {
                 const bst_module_config *module = &scenario->modules[m];
-                if (module->observer != i || module->sensor != s) {
+                if (module->observer != i || module->sensor != s || module->off) {
                     continue;
                 }
                 snprintf(name, sizeof name, "%s/%s", scope, module->name);
@@ -199,7 +199,8 @@ static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
     BST_TRY(bst_world_prepare(ctx, sim->world, options->threads));
     BST_TRY(make_knowledge(ctx, scenario, sim));
     for (int m = 0; m < scenario->module_count && !sim->device; m++) {
-        if (scenario->modules[m].desc->flags & BST_MODULE_NEEDS_DEVICE) {
+        if (!scenario->modules[m].off &&
+            (scenario->modules[m].desc->flags & BST_MODULE_NEEDS_DEVICE)) {
             BST_TRY(bst_device_open(ctx, options->device ? options->device : "", options->threads,
                                     &sim->device));
         }

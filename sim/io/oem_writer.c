@@ -40,6 +40,21 @@ static bst_status write_metadata(bst_ctx *ctx, FILE *stream, const bst_oem_segme
     return bst_text_stream_ok(ctx, stream);
 }
 
+static void write_covariance(FILE *stream, const bst_oem_segment *s) {
+    char text[BST_TIME_TEXT_BYTES];
+    bst_text_utc(s->covariance->epoch, text);
+    fputs("\nCOVARIANCE_START\n", stream);
+    bst_kvn_write(stream, "EPOCH", text);
+    bst_kvn_write(stream, "COV_REF_FRAME", s->ref_frame);
+    for (int i = 0; i < 6; i++) {
+        for (int k = 0; k <= i; k++) {
+            fprintf(stream, "%s%.12e", k ? " " : "", s->covariance->matrix[i][k] * 1e-6);
+        }
+        fputc('\n', stream);
+    }
+    fputs("COVARIANCE_STOP\n", stream);
+}
+
 bst_status bst_oem_write_segment(bst_ctx *ctx, FILE *stream, const bst_oem_segment *s) {
     if (!s->object_name || !*s->object_name || !s->object_id || !*s->object_id || !s->ref_frame) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "an OEM segment needs OBJECT_NAME and OBJECT_ID");
@@ -64,5 +79,8 @@ bst_status bst_oem_write_segment(bst_ctx *ctx, FILE *stream, const bst_oem_segme
                 r.z * 1e-3, v.x * 1e-3, v.y * 1e-3, v.z * 1e-3);
         BST_TRY(bst_text_stream_ok(ctx, stream));
     }
-    return BST_OK;
+    if (s->covariance) {
+        write_covariance(stream, s);
+    }
+    return bst_text_stream_ok(ctx, stream);
 }

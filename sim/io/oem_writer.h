@@ -10,6 +10,12 @@
 extern "C" {
 #endif
 
+/* A state's covariance, order x y z vx vy vz, m and m/s, in the axes of the segment's ref_frame. */
+typedef struct bst_oem_covariance {
+    bst_time epoch;
+    double matrix[6][6];
+} bst_oem_covariance;
+
 typedef struct bst_oem_segment {
     const char *object_name, *object_id; /* "INMARSAT GX5", "2019-081A"; not empty */
     const char *ref_frame;               /* of the series, as OEM names it: "GCRF", "TEME" ... */
@@ -18,7 +24,8 @@ typedef struct bst_oem_segment {
      * (less for fewer rows). Positions and velocities of SGP4 differ from one motion by several
      * cm/s, which Hermite polynomials turn into 0.6 m between rows of a LEO 60 s apart. */
     int hermite_degree;
-    bst_state_series series; /* at least one row */
+    const bst_oem_covariance *covariance; /* after the rows; NULL: none */
+    bst_state_series series;              /* at least one row */
 } bst_oem_segment;
 
 /* Starts the message. `creation_utc` is "YYYY-MM-DDThh:mm:ss"; `comment` may be NULL. The stream is
@@ -28,7 +35,8 @@ bst_status bst_oem_write_head(bst_ctx *ctx, FILE *stream, const char *creation_u
                               const char *originator, const char *comment) BST_MUST_CHECK;
 
 /* One object: metadata with the series' span, TIME_SYSTEM UTC and the interpolation, then a row per
- * state: UTC to 1 ns, km to 1e-9, km/s to 1e-12. Rows must rise in time (BST_ERR_ARGUMENT). */
+ * state: UTC to 1 ns, km to 1e-9, km/s to 1e-12; then the covariance, km and km/s to 13 digits.
+ * Rows must rise in time (BST_ERR_ARGUMENT). */
 bst_status bst_oem_write_segment(bst_ctx *ctx, FILE *stream,
                                  const bst_oem_segment *segment) BST_MUST_CHECK;
 

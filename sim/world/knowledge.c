@@ -1,14 +1,35 @@
 #include "sim/world/knowledge.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "sim/world/psf.h"
 #include "sim/world/world_internal.h"
 
+/* The cue's direction is kept at whole seconds and interpolated by six of them. */
+enum { KNOTS = 16, STENCIL = 6, REMEMBERED = 256 };
+/* Fifth difference, rad, up to which the interpolation is used: what it misses is 200 times less.
+ */
+static const double SMOOTH_RAD = 1e-11;
+
+typedef struct cue_knot {
+    bool made, known; /* known: there is a direction */
+    int64_t second;
+    bst_vec3 direction;
+} cue_knot;
+
 struct bst_knowledge_view {
     const bst_knowledge *knowledge;
     bst_sky_clock *clock;
+    cue_knot knots[KNOTS];
+    struct {
+        bool made;
+        double seconds;
+        bst_cue cue;
+    } remembered[REMEMBERED]; /* by time: control asks for the same instants again and again */
+    int64_t checked;          /* second whose stencil was looked at last */
+    bool any_checked, smooth;
 };
 
 /* The onboard PSF is one Gaussian: of the width given, or else that with the true one's
@@ -133,20 +154,76 @@ void bst_knowledge_view_free(bst_knowledge_view *view) {
     }
 }
 
-bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
-                                bst_cue *out) {
+/* Where the target nominally is, as the spacecraft reckons it. */
+static bst_status nominal_direction(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
+                                    bst_vec3 *out) {
+    const bst_knowledge *k = view->knowledge;
+    double t = bst_believed_seconds(k->world, k->observer, k->sensor, seconds);
+    bst_state eye;
+    BST_TRY(bst_orbit_state(ctx, &k->world->observers[k->observer].orbit, view->clock,
+                            k->world->epoch, t, true, &eye));
+    bst_believe(k->world, k->observer, k->sensor, t, &eye);
+    return bst_cue_nominal_direction(ctx, k->world, k->observer, k->sensor, view->clock, t, &eye,
+                                     out);
+}
+
+static const cue_knot *knot_at(bst_knowledge_view *view, int64_t second) {
+    cue_knot *knot = &view->knots[((second % KNOTS) + KNOTS) % KNOTS];
+    if (!knot->made || knot->second != second) {
+        bst_ctx quiet = {0}; /* beyond the end of an orbit there is none, which is no error here */
+        knot->made = true;
+        knot->second = second;
+        knot->known = nominal_direction(&quiet, view, (double)second, &knot->direction) == BST_OK;
+    }
+    return knot;
+}
+
+/* Whether the direction between a second and the next one follows a quintic. */
+static bool is_smooth(bst_knowledge_view *view, int64_t second) {
+    static const double fifth[STENCIL] = {-1.0, 5.0, -10.0, 10.0, -5.0, 1.0};
+    if (!view->any_checked || view->checked != second) {
+        bst_vec3 sum = {0, 0, 0};
+        bool known = true;
+        for (int i = 0; i < STENCIL; i++) {
+            const cue_knot *knot = knot_at(view, second - 2 + i);
+            known = known && knot->known;
+            sum = bst_vec3_axpy(sum, fifth[i], knot->direction);
+        }
+        view->any_checked = true;
+        view->checked = second;
+        view->smooth = known && bst_vec3_norm(sum) <= SMOOTH_RAD;
+    }
+    return view->smooth;
+}
+
+/* By Lagrange's polynomial through the six seconds around where that is exact, else directly: a
+ * function of time alone. */
+static bst_status direction_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
+                               bst_vec3 *out) {
+    double whole = floor(seconds);
+    if (!(fabs(seconds) < 1e12) || !is_smooth(view, (int64_t)whole)) {
+        return nominal_direction(ctx, view, seconds, out);
+    }
+    double u = seconds - whole;
+    const double a = u + 2.0, b = u + 1.0, d = u - 1.0, e = u - 2.0, f = u - 3.0;
+    const double w[STENCIL] = {-b * u * d * e * f / 120.0, a * u * d * e * f / 24.0,
+                               -a * b * d * e * f / 12.0,  a * b * u * e * f / 12.0,
+                               -a * b * u * d * f / 24.0,  a * b * u * d * e / 120.0};
+    bst_vec3 sum = {0, 0, 0};
+    for (int i = 0; i < STENCIL; i++) {
+        sum = bst_vec3_axpy(sum, w[i], knot_at(view, (int64_t)whole - 2 + i)->direction);
+    }
+    *out = sum;
+    return BST_OK;
+}
+
+static bst_status make_cue(bst_ctx *ctx, bst_knowledge_view *view, double seconds, bst_cue *out) {
     const bst_knowledge *k = view->knowledge;
     /* central difference: the third derivative of a LEO-to-GEO direction leaves < 1e-11 rad/s */
     const double h = 0.5;
     bst_vec3 d[3];
     for (int i = 0; i < 3; i++) {
-        double t = bst_believed_seconds(k->world, k->observer, k->sensor, seconds + (i - 1) * h);
-        bst_state eye;
-        BST_TRY(bst_orbit_state(ctx, &k->world->observers[k->observer].orbit, view->clock,
-                                k->world->epoch, t, true, &eye));
-        bst_believe(k->world, k->observer, k->sensor, t, &eye);
-        BST_TRY(bst_cue_nominal_direction(ctx, k->world, k->observer, k->sensor, view->clock, t,
-                                          &eye, &d[i]));
+        BST_TRY(direction_at(ctx, view, seconds + (i - 1) * h, &d[i]));
     }
     const world_sensor *sensor = &k->world->observers[k->observer].sensors[k->sensor];
     const bst_cue_config *cue = &sensor->config.cue;
@@ -159,5 +236,21 @@ bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double s
     out->rate_sigma_radps = cue->rate_sigma_arcsec_per_s * BST_ARCSEC_RAD;
     out->v_mag = cue->v_mag;
     out->v_mag_sigma = cue->v_mag_sigma;
+    return BST_OK;
+}
+
+bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
+                                bst_cue *out) {
+    uint64_t bits;
+    memcpy(&bits, &seconds, sizeof bits);
+    /* Fibonacci hashing: the upper bits of the product */
+    unsigned place = (unsigned)((bits * UINT64_C(0x9E3779B97F4A7C15)) >> 56) % REMEMBERED;
+    if (!view->remembered[place].made || view->remembered[place].seconds != seconds) {
+        view->remembered[place].made = false;
+        BST_TRY(make_cue(ctx, view, seconds, &view->remembered[place].cue));
+        view->remembered[place].seconds = seconds;
+        view->remembered[place].made = true;
+    }
+    *out = view->remembered[place].cue;
     return BST_OK;
 }

@@ -195,6 +195,8 @@ static const bst_config_desc knowledge_table[] = {
     BST_CONFIG_END,
 };
 
+static const char *const observation_sources[] = {"image", "generator", NULL};
+
 const bst_config_desc bst_sensor_config_table[] = {
     BST_STRING(bst_sensor_config, name, "\"camera\"", "Name, unique on its observer."),
     BST_PATH(bst_sensor_config, frame_updates_file, "\"\"",
@@ -208,6 +210,10 @@ const bst_config_desc bst_sensor_config_table[] = {
     BST_OBJECT(bst_sensor_config, cue, cue_table, "{}", "Where the target is believed to be."),
     BST_OBJECT(bst_sensor_config, knowledge, knowledge_table, "{}",
                "What the onboard side knows otherwise than it is."),
+    BST_ENUM(bst_sensor_config, observation_source, observation_sources, "\"image\"",
+             "Where detections come from: a rendered image that is processed (image), or the "
+             "statistics of both without an image (generator): then the module obsgen stands in "
+             "for scenegen and imgproc, with their settings."),
     {.key = "modules",
      .type = BST_CONFIG_RAW,
      .doc = "The modules of this sensor by role: {\"gimbal\": {\"type\": ...}, ...}."},

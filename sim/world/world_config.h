@@ -130,6 +130,10 @@ typedef struct bst_knowledge_config {
     bst_orbit_error_config orbit;
 } bst_knowledge_config;
 
+/* Where a sensor's detections come from: a rendered and processed image, or the generator that
+ * stands in for both. */
+enum { BST_OBSERVE_IMAGE, BST_OBSERVE_GENERATOR };
+
 typedef struct bst_sensor_config {
     char name[64];
     char frame_updates_file[512]; /* path as above; "": none */
@@ -138,6 +142,7 @@ typedef struct bst_sensor_config {
     bst_exposure_config exposure;
     bst_cue_config cue;
     bst_knowledge_config knowledge;
+    int32_t observation_source; /* BST_OBSERVE_... */
 } bst_sensor_config;
 
 typedef struct bst_observer_config {

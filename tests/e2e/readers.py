@@ -54,12 +54,16 @@ def read_boxes(data):
 
 def read_oem(path):
     """Segments of an OEM: (metadata, [(utc, [x y z vx vy vz] in km and km/s)])."""
-    segments, meta, inside = [], None, False
+    segments, meta, inside, covariance = [], None, False, False
     with open(path, encoding="ascii") as file:
         lines = file.read().splitlines()
     assert lines[0] == "CCSDS_OEM_VERS = 2.0"
     for line in lines[1:]:
-        if line == "META_START":
+        if line in ("COVARIANCE_START", "COVARIANCE_STOP"):
+            covariance = line == "COVARIANCE_START"
+        elif covariance:
+            continue
+        elif line == "META_START":
             meta, inside = {}, True
             segments.append((meta, []))
         elif line == "META_STOP":

@@ -286,7 +286,7 @@ class Exported(unittest.TestCase):
 
     def test_tdm(self):
         out = self.out()
-        export(self.made, "--observations", "tdm", "--orbits", "oem", "--out", out)
+        export(self.made, "--observations", "tdm", "--angles", "filtered", "--out", out)
         rows = self.database.execute(
             "SELECT time_s, ra_deg, dec_deg, v_mag FROM tracks WHERE misses_in_row = 0 AND"
             " target_of_interest = 1 ORDER BY tick").fetchall()
@@ -296,7 +296,7 @@ class Exported(unittest.TestCase):
         self.assertEqual(len(segments), 1)
         meta, data = segments[0]
         self.assertEqual((meta["PARTICIPANT_1"], meta["TIME_SYSTEM"], meta["ANGLE_TYPE"],
-                          meta["EPHEMERIS_NAME_1"]), ("neossat", "UTC", "RADEC", "orbits.oem"))
+                          meta["EPHEMERIS_NAME_1"]), ("neossat", "UTC", "RADEC", "observers.oem"))
         words = " ".join(meta["COMMENT"]).lower()
         self.assertIn("aberration", words)
         self.assertIn("light time contained", words)
@@ -318,6 +318,46 @@ class Exported(unittest.TestCase):
         row = truth[round(time_s * 1e6)]
         self.assertAlmostEqual(dec, row["dec_deg"], delta=5 / 3600)
         self.assertAlmostEqual(ra, row["ra_deg"], delta=5 / 3600)
+
+    def test_measured_directions(self):
+        """TDM, JSON and CSV say one thing: what frames measured, with the observer's states."""
+        out = self.out()
+        for form in ("tdm", "json", "csv"):
+            export(self.made, "--observations", form, "--out", out)
+        self.assertEqual(sorted(os.listdir(out)),
+                         ["observations.csv", "observations.json", "observations.tdm",
+                          "observers.oem"])
+        (_, states), = read_oem(out + "/observers.oem")
+        self.assertEqual((seconds(states[0][0], self.epoch), seconds(states[-1][0], self.epoch)),
+                         (0, 28))
+        with open(out + "/observations.json", encoding="utf-8") as file:
+            items = json.load(file)
+        with open(out + "/observations.csv", newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file, strict=True))
+        angles = [(utc, ra, dec, meta["PARTICIPANT_2"])
+                  for meta, data in read_tdm(out + "/observations.tdm")
+                  for (utc, ra), (_, dec) in zip(data["ANGLE_1"], data["ANGLE_2"], strict=True)]
+        self.assertGreater(len(angles), 3)
+        self.assertIn("INMARSAT GX5", {name for *_, name in angles})
+        exposures = {round(row["mid_s"] * 1e6): row
+                     for row in self.database.execute("SELECT * FROM exposures")}
+        for (utc, ra, dec, name), item, row in zip(angles, items, rows, strict=True):
+            mid_s = seconds(utc, self.epoch)
+            self.assertEqual(mid_s, seconds(item["obTime"], self.epoch))
+            self.assertEqual(mid_s, seconds(row["utc"], self.epoch))
+            self.assertEqual((item["origObjectId"], row["object"]), (name, name))
+            self.assertEqual(row["track"], f"neossat/telescope/{item['trackId']}")
+            for found in (item["ra"], float(row["ra_deg"])):
+                self.assertAlmostEqual(found, ra, delta=1e-9)  # as written in the TDM
+            for found in (item["declination"], float(row["dec_deg"])):
+                self.assertAlmostEqual(found, dec, delta=1e-9)
+            # nominally known on board: the truth, computed twice
+            true = exposures[round(mid_s * 1e6)]
+            for axis in "xyz":
+                self.assertAlmostEqual(item[f"sen{axis}"] * 1e3, true[f"observer_gcrf_{axis}_m"],
+                                       delta=1e-3)
+                self.assertAlmostEqual(float(row[f"observer_gcrf_{axis}_mps"]),
+                                       true[f"observer_gcrf_{axis}_mps"], delta=1e-6)
 
     # -------------------------------------------------------------- frames
 

@@ -66,6 +66,15 @@ def small_disks_work():
         return False
 
 
+def drawing(pid):
+    """Whether a program has loaded the kernel that draws frames."""
+    try:
+        with open(f"/proc/{pid}/maps", encoding="utf-8") as file:
+            return "bst_scene_frame" in file.read()
+    except OSError:
+        return False
+
+
 class Faults(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -91,9 +100,9 @@ class Faults(unittest.TestCase):
         first = out + (".partial/run.sqlite" if form == "none" else ".partial/frames.fits")
         with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                               text=True) as process:
-            while not os.path.exists(first) and process.poll() is None:
+            while not (os.path.exists(first) and drawing(process.pid)) and process.poll() is None:
                 time.sleep(0.01)
-            time.sleep(0.3 if form == "none" else 0.1)
+            time.sleep(0.1)
             if process.poll() is None:
                 resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (limit, limit))
             said = process.communicate(timeout=120)

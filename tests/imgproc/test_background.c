@@ -85,8 +85,7 @@ static void degenerate(void **state) {
     assert_true(isfinite(f->b.median_level) && f->b.median_noise > 0.0f);
 }
 
-/* A plane comes back as a plane between the outer mesh centres; noise at a place agrees with the
- * row. */
+/* A plane comes back as a plane, up to the edges; noise at a place agrees with the row. */
 static void interpolation(void **state) {
     fixture *f = *state;
     fill(f, 10.0, 0.5, 0.0, 1e-3);
@@ -94,11 +93,10 @@ static void interpolation(void **state) {
     float level[SIDE], inverse[SIDE];
     for (int y = 0; y < SIDE; y += 17) {
         bst_background_row(&f->b, y, level, inverse);
-        for (int x = 32; x < SIDE - 32; x++) {
+        for (int x = 0; x < SIDE; x++) {
             /* a mesh samples whole columns: exact up to the image's step and rounding */
             bst_assert_close(level[x], 10.0 + 0.5 * x, 2e-3);
         }
-        assert_true(level[0] == level[31]);
         bst_assert_close(1.0 / (double)inverse[100] / bst_background_noise_at(&f->b, 100, y), 1.0,
                          1e-3);
     }

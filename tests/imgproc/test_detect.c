@@ -391,7 +391,7 @@ static void hot_and_bad_pixels(void **state) {
     f.s.pixels[100 * 128 + 20] = 400;
     process(&f, NULL);
     assert_int_equal(synthetic_nearest(f.d, 30, 40, 5.0), -1);
-    assert_int_equal(near_to(&f, 20, 100, 1.0)->label, BST_LABEL_ARTEFACT);
+    assert_int_equal(near_to(&f, 20, 100, 1.0)->label, BST_LABEL_HOT_PIXEL);
     const bst_detection *d = near_to(&f, 80.3, 80.2, 1.0);
     assert_int_equal(d->label, BST_LABEL_UNKNOWN);
     /* five sigma */

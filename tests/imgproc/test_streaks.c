@@ -131,8 +131,10 @@ static void false_alarms_as_requested(void **state) {
     bst_ctx ctx = {0};
     bst_streak_search one, two;
     bst_background background;
-    bst_assert_ok(&ctx, bst_streak_search_create(&ctx, SIDE, SIDE, 64.0, 1, &one));
-    bst_assert_ok(&ctx, bst_streak_search_create(&ctx, SIDE, SIDE, 64.0, 2, &two));
+    bst_parallel *pool;
+    bst_assert_ok(&ctx, bst_parallel_create(&ctx, 2, &pool));
+    bst_assert_ok(&ctx, bst_streak_search_create(&ctx, NULL, SIDE, SIDE, 64.0, &one));
+    bst_assert_ok(&ctx, bst_streak_search_create(&ctx, pool, SIDE, SIDE, 64.0, &two));
     bst_assert_ok(&ctx, bst_background_create(&ctx, 64, SIDE, SIDE, &background));
     float *image = calloc(SIDE * SIDE, sizeof *image);
     assert_non_null(image);
@@ -167,6 +169,7 @@ static void false_alarms_as_requested(void **state) {
     bst_background_free(&background);
     bst_streak_search_free(&one);
     bst_streak_search_free(&two);
+    bst_parallel_free(pool);
 }
 
 /* 60 stars of SNR 3 to 2000 and a close pair of bright ones in 512 x 512 px: no star becomes a

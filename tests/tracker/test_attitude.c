@@ -5,7 +5,7 @@
 #include "tracker/attitude_error.h"
 
 #define AS BST_ARCSEC_RAD
-#define MAX_STARS 4000
+#define MAX_STARS 10000
 
 static bst_camera camera = {.width_px = 1024, .height_px = 1024, .pixel_scale_arcsec = 3.0};
 static const bst_attitude_params params = {

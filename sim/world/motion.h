@@ -1,6 +1,6 @@
 /* How the camera moved during one exposure, as pointing telemetry tells it. */
-#ifndef BST_IMGPROC_MOTION_H
-#define BST_IMGPROC_MOTION_H
+#ifndef BST_WORLD_MOTION_H
+#define BST_WORLD_MOTION_H
 
 #include <stdbool.h>
 

@@ -1,4 +1,4 @@
-#include "imgproc/motion.h"
+#include "sim/world/motion.h"
 
 static const bst_pointing_sample *sample_at(const bst_pointing_telemetry *t, int64_t n) {
     return &t->items[n % t->capacity];

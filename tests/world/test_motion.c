@@ -1,6 +1,6 @@
 #include <stdlib.h>
 
-#include "imgproc/motion.h"
+#include "sim/world/motion.h"
 #include "tests/test_support.h"
 
 enum { CAPACITY = 64 };

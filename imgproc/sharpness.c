@@ -1,0 +1,108 @@
+#include "imgproc/sharpness.h"
+
+#include <math.h>
+#include <stdbool.h>
+
+#include "imgproc/background.h"
+
+static const double MODEL_SHARE = 0.09;
+
+typedef struct neighbour {
+    int dx, dy;
+} neighbour;
+
+static const neighbour neighbours[8] = {{-1, 0},  {1, 0}, {0, -1}, {0, 1},
+                                        {-1, -1}, {1, 1}, {1, -1}, {-1, 1}};
+static const int first_of[BST_SHARP_GROUPS] = {0, 0, 2, 4, 6},
+                 end_of[BST_SHARP_GROUPS] = {8, 2, 4, 6, 8};
+
+static double estimate(const bst_sharpness *s, int group, const double at[3][3]) {
+    double sum = 0.0;
+    for (int k = first_of[group]; k < end_of[group]; k++) {
+        const neighbour *n = &neighbours[k];
+        sum += s->ratio[n->dy + 1][n->dx + 1] * at[n->dy + 1][n->dx + 1];
+    }
+    return sum * s->inverse_square[group];
+}
+
+void bst_sharpness_set(bst_sharpness *s, const bst_psf *psf, double sigma_px) {
+    if (s->sigma_px == sigma_px) {
+        return;
+    }
+    enum { PHASES = 5 };
+    double image[3][3], unused[3][9];
+    bst_stamp stamp = {-1, -1, 3, 3};
+    bst_shape shape = {.sigma_px = sigma_px};
+    s->sigma_px = sigma_px;
+    bst_psf_render(psf, &shape, &stamp, image[0], unused[0], unused[1], unused[2]);
+    for (int j = 0; j < 3; j++) {
+        for (int i = 0; i < 3; i++) {
+            s->ratio[j][i] = image[j][i] / image[1][1];
+        }
+    }
+    for (int g = 0; g < BST_SHARP_GROUPS; g++) {
+        double square = 0.0, cube = 0.0;
+        for (int k = first_of[g]; k < end_of[g]; k++) {
+            double r = s->ratio[neighbours[k].dy + 1][neighbours[k].dx + 1];
+            square += r * r;
+            cube += r * r * r;
+        }
+        square = fmax(square, 1e-12);
+        s->inverse_square[g] = 1.0 / square;
+        s->cube[g] = cube / (square * square);
+        s->floor[g] = 1.0;
+    }
+    for (int p = 0; p < PHASES * PHASES; p++) {
+        shape.x_px = (p % PHASES + 0.5) / PHASES - 0.5;
+        shape.y_px = (p / PHASES + 0.5) / PHASES - 0.5;
+        bst_psf_render(psf, &shape, &stamp, image[0], unused[0], unused[1], unused[2]);
+        for (int g = 0; g < BST_SHARP_GROUPS; g++) {
+            double ratio = estimate(s, g, (const double(*)[3])image) / image[1][1];
+            s->floor[g] = fmin(s->floor[g], ratio);
+        }
+    }
+}
+
+double bst_sharpness_at(const bst_sharpness *s, const float *signal, int width, int height,
+                        double noise_e, int x, int y) {
+    if (x < 0 || y < 0 || x >= width || y >= height) {
+        return 0.0;
+    }
+    double centre = (double)signal[(long)y * width + x];
+    if (!(centre > 3.0 * noise_e)) {
+        return 0.0;
+    }
+    double at[3][3], worst = 0.0, noise2 = noise_e * noise_e;
+    bool known[3][3], suspicious = false;
+    for (int j = 0; j < 3; j++) {
+        for (int i = 0; i < 3; i++) {
+            int u = x + i - 1, v = y + j - 1;
+            known[j][i] = u >= 0 && v >= 0 && u < width && v < height &&
+                          signal[(long)v * width + u] > BST_PIXEL_NONE;
+            at[j][i] = known[j][i] ? (double)signal[(long)v * width + u] : 0.0;
+        }
+    }
+    /* the group of all is a mean of the pairs: it is short only where one of them is */
+    for (int g = 1; g < BST_SHARP_GROUPS; g++) {
+        suspicious = suspicious || estimate(s, g, (const double(*)[3])at) < s->floor[g] * centre;
+    }
+    if (!suspicious) {
+        return 0.0;
+    }
+    for (int g = 0; g < BST_SHARP_GROUPS; g++) {
+        bool all = true;
+        for (int k = first_of[g]; k < end_of[g]; k++) {
+            all = all && known[neighbours[k].dy + 1][neighbours[k].dx + 1];
+        }
+        if (!all) {
+            continue;
+        }
+        double light = s->floor[g] * centre;
+        double own = s->floor[g] * s->floor[g] * (noise2 + centre);
+        double others = s->inverse_square[g] * noise2 + s->cube[g] * centre;
+        double model = MODEL_SHARE * centre;
+        double missing = light - estimate(s, g, (const double(*)[3])at);
+        worst = fmax(worst, missing / sqrt(own + others + model * model));
+    }
+    return worst;
+}

@@ -1,0 +1,39 @@
+/* Tells charge that no light can leave through the PSF: hot pixels and radiation hits.
+ *
+ * Whatever the scene is, a pixel's neighbours hold at least the share of its light that they hold
+ * when a point sits on its centre, because every image is a sum of PSFs of positive flux. With
+ * c the pixel's signal, d_k its neighbours' and r_k = p_k / p_0 the pixel-integrated PSF's values
+ * about its centre, the estimate of c from a group of neighbours, sum r_k d_k / sum r_k^2, is not
+ * below s c on average, s = min(1, its least ratio to c over places of a point in the pixel). Five
+ * groups are asked: all eight neighbours, and the two opposite ones in each of four directions,
+ * because a track of charge is sharp across itself only. The least of the five deviations, in
+ * standard deviations (noise, the light's own, and 9 % of c for an imperfectly known PSF), is the
+ * pixel's. */
+#ifndef BST_IMGPROC_SHARPNESS_H
+#define BST_IMGPROC_SHARPNESS_H
+
+#include "imgproc/psf.h"
+
+enum { BST_SHARP_GROUPS = 5 };
+
+typedef struct bst_sharpness {
+    double sigma_px; /* that it was made for */
+    double ratio[3][3];
+    double inverse_square[BST_SHARP_GROUPS]; /* 1 / sum r^2 of the group */
+    double cube[BST_SHARP_GROUPS];           /* sum r^3 (inverse_square)^2 */
+    double floor[BST_SHARP_GROUPS];          /* s */
+} bst_sharpness;
+
+/* Deviation from which a pixel is taken for charge: one star in several thousand reaches it. */
+#define BST_SHARP_DEVIATION 4.0
+
+/* Prepares the ratios for a PSF of sigma_px; at once when they are already there. */
+void bst_sharpness_set(bst_sharpness *sharpness, const bst_psf *psf, double sigma_px);
+
+/* How far, in standard deviations, the pixel (x, y) of signal [height][width] stands out of what
+ * light could do; 0 or less: not at all. Neighbours outside or without a measurement speak for
+ * light. */
+double bst_sharpness_at(const bst_sharpness *sharpness, const float *signal, int width, int height,
+                        double noise_e, int x, int y);
+
+#endif

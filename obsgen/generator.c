@@ -1,0 +1,571 @@
+#include "obsgen/generator.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "obsgen/clutter.h"
+#include "obsgen/fragments.h"
+#include "obsgen/generator_internal.h"
+
+static const double FWHM_PER_SIGMA = 2.3548200450309493;
+/* Image processing tells two sources apart where the saddle between them is so much lower than the
+ * fainter one; and two places closer than this share of the FWHM are one. */
+static const double SADDLE_SIGMA = 3.0, SADDLE_SHARE = 0.15, CLOSEST_FWHM = 0.6;
+/* From here on extents and a source's own streak are measured. */
+static const double MOMENTS_SNR = 10.0;
+/* Sources below this share of the threshold are no detections, but light. */
+static const double FAINTEST_SHARE = 0.3;
+
+/* Draws of one source. */
+enum { DRAW_PEAK, DRAW_PLACE, DRAW_FLUX, DRAWS = 8 };
+
+bst_status bst_generator_create(bst_ctx *ctx, const bst_camera *camera, const bst_camera *knowledge,
+                                const bst_generator_settings *settings,
+                                const bst_obsgen_calibration *calibration, bst_rng_key key,
+                                bst_generator **out) {
+    *out = NULL;
+    bst_generator *g = calloc(1, sizeof *g);
+    if (!g) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the observation generator");
+    }
+    g->camera = camera;
+    g->electrons_per_s_v0 = bst_camera_electrons_per_s(knowledge, 0.0);
+    g->settings = *settings;
+    g->calibration = *calibration;
+    g->key = key;
+    g->items = calloc((size_t)settings->capacity, sizeof *g->items);
+    if (!g->items) {
+        bst_generator_free(g);
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d detections", settings->capacity);
+    }
+    *out = g;
+    return BST_OK;
+}
+
+void bst_generator_free(bst_generator *g) {
+    if (g) {
+        free(g->items);
+        free(g->sources);
+        free(g->ranks);
+        free(g);
+    }
+}
+
+double bst_generator_peak_e(double sigma_px, const bst_truth_item *item) {
+    double sigma = fmax(sigma_px, 0.1);
+    double length = hypot(item->x_end_px - item->x_start_px, item->y_end_px - item->y_start_px);
+    double across = erf(0.5 / (sigma * sqrt(2.0)));
+    double along = across;
+    if (length > 1e-3) {
+        double s = sigma * sqrt(2.0), a = 0.5 * (length + 1.0) / s, b = 0.5 * (length - 1.0) / s;
+        /* a segment over a pixel at its middle */
+        double second =
+            (a * erf(a) + exp(-a * a) / sqrt(BST_PI)) - (b * erf(b) + exp(-b * b) / sqrt(BST_PI));
+        along = fmin(along, s * second / length);
+    }
+    return item->electrons * across * along;
+}
+
+/* Share of the light of a Gaussian at `at` that falls between two edges. */
+static double inside(double at, double low, double high, double sigma) {
+    double s = sigma * sqrt(2.0);
+    return 0.5 * (erf((high - at) / s) - erf((low - at) / s));
+}
+
+/* SNR of a source of the truth over that of its light with the PSF alone on the frame's mean
+ * background: jitter and bends of its path widen it, and the background may differ at its place. */
+static double sharpness(const bst_generator *g, const bst_generator_frame *f,
+                        const bst_truth_item *item, double length) {
+    double v = f->truth->background_e + f->truth->dark_e +
+               g->camera->read_noise_e * g->camera->read_noise_e;
+    double plain = item->electrons * bst_bound_norm(&g->bound, length) / sqrt(fmax(v, 1e-6));
+    bool known = g->binning == 1 && item->snr > 0.0 && plain > 0.0;
+    return known ? fmin(fmax(item->snr / plain, 0.2), 2.0) : 1.0;
+}
+
+/* A source's path cut to the frame: its length, middle and light on it. */
+static bool place_source(const bst_generator *g, const bst_generator_frame *f,
+                         const bst_truth_item *item, generator_source *s) {
+    double b = g->binning, light = item->electrons;
+    if (!(light > 0.0) || (item->flags & BST_TRUTH_OCCULTED) || !isfinite(item->x_mean_px) ||
+        !isfinite(item->x_start_px) || !isfinite(item->x_end_px)) {
+        return false;
+    }
+    double x0 = f->window.x0 + 0.5 * (b - 1.0), y0 = f->window.y0 + 0.5 * (b - 1.0);
+    s->path.dx = (item->x_end_px - item->x_start_px) / b;
+    s->path.dy = (item->y_end_px - item->y_start_px) / b;
+    s->x = (item->x_mean_px - x0) / b;
+    s->y = (item->y_mean_px - y0) / b;
+    s->length = hypot(s->path.dx, s->path.dy);
+    s->sharp = sharpness(g, f, item, s->length);
+    if (s->length > 1.0) {
+        double low = -0.5, high = 0.5; /* of the path, from its middle */
+        const double at[2] = {s->x, s->y}, way[2] = {s->path.dx, s->path.dy};
+        const double end[2] = {g->width - 0.5, g->height - 0.5};
+        for (int k = 0; k < 2; k++) {
+            double lo = -0.5 - at[k], hi = end[k] - at[k];
+            if (fabs(way[k]) < 1e-9) {
+                if (lo > 0.0 || hi < 0.0) {
+                    return false;
+                }
+                continue;
+            }
+            double t0 = lo / way[k], t1 = hi / way[k];
+            low = fmax(low, fmin(t0, t1));
+            high = fmin(high, fmax(t0, t1));
+        }
+        if (!(high > low)) {
+            return false;
+        }
+        if (high - low < 1.0) {
+            double middle = 0.5 * (low + high);
+            s->x += middle * way[0];
+            s->y += middle * way[1];
+            light *= high - low;
+            s->path.dx *= high - low;
+            s->path.dy *= high - low;
+            s->length *= high - low;
+        }
+    }
+    if (s->x < -0.5 - 2.0 * g->sigma || s->y < -0.5 - 2.0 * g->sigma ||
+        s->x > g->width - 0.5 + 2.0 * g->sigma || s->y > g->height - 0.5 + 2.0 * g->sigma) {
+        return false;
+    }
+    light *= inside(s->x, -0.5, g->width - 0.5, g->sigma) *
+             inside(s->y, -0.5, g->height - 0.5, g->sigma);
+    s->flux_e = light;
+    return light > 0.0;
+}
+
+/* Amplitude of a source at the filter's output without noise, and which filter gives it. */
+static void respond(const bst_generator *g, generator_source *s) {
+    const bst_path_px point = {0.0, 0.0};
+    double gain = bst_obsgen_between(bst_obsgen_lengths_px, g->calibration.gain, BST_OBSGEN_LENGTHS,
+                                     s->length);
+    double ideal = s->sharp * s->flux_e * bst_bound_norm(&g->bound, s->length) / g->noise_e;
+    double efficiency = 1.0;
+    s->as_streak = false;
+    if (s->star) {
+        s->as_streak = g->streak > 0.0;
+        if (!s->as_streak && s->length > 0.5) {
+            efficiency = bst_matched_efficiency(s->path, point, g->total_sigma);
+        }
+    } else {
+        if (s->length > 0.5) {
+            efficiency = bst_matched_efficiency(s->path, point, g->total_sigma);
+        }
+        if (g->streak > 0.0) {
+            double other = bst_matched_efficiency(s->path, g->star_path, g->total_sigma);
+            s->as_streak = other > efficiency;
+            efficiency = fmax(other, efficiency);
+        }
+    }
+    s->amplitude = gain * efficiency * ideal;
+}
+
+static bst_status reserve(bst_ctx *ctx, bst_generator *g, int count) {
+    if (count <= g->source_capacity) {
+        return BST_OK;
+    }
+    int capacity = 2 * count;
+    generator_source *sources = realloc(g->sources, (size_t)capacity * sizeof *sources);
+    g->sources = sources ? sources : g->sources;
+    generator_rank *ranks = realloc(g->ranks, (size_t)capacity * sizeof *ranks);
+    g->ranks = ranks ? ranks : g->ranks;
+    if (!sources || !ranks) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d sources", count);
+    }
+    g->source_capacity = capacity;
+    return BST_OK;
+}
+
+static int by_row(const void *a, const void *b) {
+    const generator_source *p = a, *q = b;
+    if (p->y != q->y) {
+        return p->y < q->y ? -1 : 1;
+    }
+    return p->x != q->x ? (p->x < q->x ? -1 : 1) : (p->item > q->item) - (p->item < q->item);
+}
+
+/* Noise of the frame as image processing measures it: the faint sources' light is part of it. */
+static void set_noise(bst_generator *g, const bst_generator_frame *f) {
+    const bst_camera *c = g->camera;
+    const bst_detector_config *d = &c->detector;
+    double added = (double)g->binning * g->binning;
+    double level = (f->truth->background_e + f->truth->dark_e) * added;
+    double variance = level + c->read_noise_e * c->read_noise_e +
+                      c->gain_e_per_dn * c->gain_e_per_dn / 12.0 + d->row_noise_e * d->row_noise_e +
+                      d->row_offset_rms_e * d->row_offset_rms_e +
+                      d->column_offset_rms_e * d->column_offset_rms_e +
+                      d->read_tail_fraction * d->read_tail_rms_e * d->read_tail_rms_e +
+                      level * level * d->prnu_rms * d->prnu_rms / added;
+    g->background_e = f->truth->background_e * added;
+    g->noise_e = sqrt(fmax(variance, 1e-6)) * g->calibration.noise_factor;
+}
+
+static void add_crowding(bst_generator *g, double threshold) {
+    double squares = 0.0, pixels = (double)g->width * g->height;
+    for (int i = 0; i < g->source_count; i++) {
+        const generator_source *s = &g->sources[i];
+        if (s->amplitude < threshold) {
+            double norm = bst_bound_norm(&g->bound, s->length);
+            squares += s->flux_e * s->flux_e * norm * norm;
+        }
+    }
+    double more = g->calibration.crowding * squares / pixels;
+    double before = g->noise_e;
+    g->noise_e = sqrt(before * before + more);
+    for (int i = 0; i < g->source_count; i++) {
+        g->sources[i].amplitude *= before / g->noise_e;
+    }
+}
+
+/* The threshold, kept by streak length. Streaks count in steps of half a pixel, as the filters do.
+ */
+static void set_threshold(bst_generator *g) {
+    struct generator_thresholds *t = &g->thresholds;
+    if (t->width != g->width || t->height != g->height || t->sigma != g->total_sigma) {
+        *t = (struct generator_thresholds){
+            .width = g->width, .height = g->height, .sigma = g->total_sigma};
+    }
+    int step = (int)floor(2.0 * g->streak + 0.5);
+    step = step < GENERATOR_STEPS ? step : GENERATOR_STEPS - 1;
+    if (!(t->threshold[step] > 0.0)) {
+        t->threshold[step] =
+            bst_matched_threshold(g->total_sigma, 0.5 * step, g->settings.false_alarms_per_frame,
+                                  (double)g->width * g->height, &t->streak_share[step]);
+    }
+    g->threshold = fmax(t->threshold[step] + g->calibration.threshold_offset, 1.0);
+    g->streak_share = t->streak_share[step];
+}
+
+static void set_frame(bst_generator *g, const bst_generator_frame *f) {
+    g->binning = f->binning > 1 ? f->binning : 1;
+    g->width = f->window.width / g->binning;
+    g->height = f->window.height / g->binning;
+    g->exposure_s = f->exposure_s;
+    double sigma = fmax(f->sigma_px / g->binning, 0.2);
+    if (sigma != g->sigma) {
+        g->sigma = sigma;
+        g->total_sigma = sqrt(sigma * sigma + 1.0 / 12.0);
+        bst_bound_init(&g->bound, sigma);
+    }
+    double length = hypot(f->streak_dx_px, f->streak_dy_px) / g->binning;
+    bool filtered = length >= g->settings.streak_min_px && length <= g->settings.streak_max_px;
+    g->smeared = length > g->settings.streak_max_px;
+    g->star_path = filtered
+                       ? (bst_path_px){f->streak_dx_px / g->binning, f->streak_dy_px / g->binning}
+                       : (bst_path_px){0.0, 0.0};
+    g->streak = filtered ? length : 0.0;
+}
+
+static bst_status collect(bst_ctx *ctx, bst_generator *g, const bst_generator_frame *f) {
+    const bst_truth *t = f->truth;
+    BST_TRY(reserve(ctx, g, t->count));
+    g->source_count = 0;
+    for (int i = 0; i < t->count; i++) {
+        generator_source *s = &g->sources[g->source_count];
+        *s = (generator_source){.item = i, .star = t->items[i].kind == BST_SOURCE_STAR, .head = -1};
+        if (!place_source(g, f, &t->items[i], s)) {
+            continue;
+        }
+        s->name = (uint64_t)t->items[i].id | (uint64_t)(t->items[i].kind & 1) << 32;
+        respond(g, s);
+        g->source_count++;
+    }
+    set_threshold(g);
+    add_crowding(g, g->threshold);
+    qsort(g->sources, (size_t)g->source_count, sizeof *g->sources, by_row);
+    return BST_OK;
+}
+
+static double draw(const bst_generator *g, const generator_source *s, int which) {
+    return bst_rng_normal(g->key, (uint64_t)g->exposure_id, s->name * DRAWS + (uint64_t)which);
+}
+
+/* What source b adds at source a's place to the output of the filter for a. */
+static double overlap(const bst_generator *g, const generator_source *a,
+                      const generator_source *b) {
+    double dx = b->x - a->x, dy = b->y - a->y;
+    double c = a->length > 0.0 ? a->path.dx / a->length : 1.0;
+    double s = a->length > 0.0 ? a->path.dy / a->length : 0.0;
+    double length = a->as_streak ? g->streak : a->length;
+    return bst_matched_falloff(dx * c + dy * s, dy * c - dx * s, length, g->total_sigma);
+}
+
+/* Whether image processing would find two maxima: the fainter source b beside a. */
+static bool told_apart(const bst_generator *g, const generator_source *a,
+                       const generator_source *b) {
+    generator_source at = *b;
+    double factor = g->calibration.blend_distance_factor;
+    double dx = (b->x - a->x) / factor, dy = (b->y - a->y) / factor;
+    if (hypot(dx, dy) < CLOSEST_FWHM * FWHM_PER_SIGMA * g->sigma) {
+        return false;
+    }
+    at.x = a->x + dx;
+    at.y = a->y + dy;
+    double top = b->amplitude + a->amplitude * overlap(g, a, &at), saddle = top;
+    enum { STEPS = 12 };
+    for (int i = 1; i < STEPS; i++) {
+        generator_source p = *a;
+        p.x = a->x + dx * i / STEPS;
+        p.y = a->y + dy * i / STEPS;
+        double value = a->amplitude * overlap(g, a, &p) + b->amplitude * overlap(g, &at, &p);
+        saddle = fmin(saddle, value);
+    }
+    return top - saddle > fmax(SADDLE_SIGMA, SADDLE_SHARE * top);
+}
+
+/* Calls for every other source whose light reaches number i. */
+static int first_near(const bst_generator *g, int i, double reach) {
+    int k = i;
+    while (k > 0 && g->sources[k - 1].y >= g->sources[i].y - reach) {
+        k--;
+    }
+    return k;
+}
+
+static int brighter(const void *a, const void *b) {
+    const generator_rank *p = a, *q = b;
+    if (p->amplitude != q->amplitude) {
+        return p->amplitude > q->amplitude ? -1 : 1;
+    }
+    return (p->index > q->index) - (p->index < q->index);
+}
+
+/* Finds which sources are detected, and which are seen in one with a brighter one. */
+static void decide(bst_generator *g) {
+    double most = 0.0;
+    for (int i = 0; i < g->source_count; i++) {
+        most = fmax(most, g->sources[i].length);
+    }
+    g->reach = 6.0 * g->total_sigma + most;
+    int ranks = 0;
+    for (int i = 0; i < g->source_count; i++) {
+        if (g->sources[i].amplitude > FAINTEST_SHARE * g->threshold) {
+            g->ranks[ranks++] = (generator_rank){g->sources[i].amplitude, i};
+        }
+    }
+    qsort(g->ranks, (size_t)ranks, sizeof *g->ranks, brighter);
+    for (int r = 0; r < ranks; r++) {
+        int i = g->ranks[r].index;
+        generator_source *s = &g->sources[i];
+        double own = s->amplitude, peak = own;
+        bool merged = false;
+        for (int k = first_near(g, i, g->reach);
+             k < g->source_count && g->sources[k].y <= s->y + g->reach; k++) {
+            generator_source *o = &g->sources[k];
+            if (k == i || fabs(o->x - s->x) > g->reach) {
+                continue;
+            }
+            double light = o->amplitude * overlap(g, o, s);
+            if (light < 0.01) {
+                continue;
+            }
+            if (o->found && !merged && !told_apart(g, o, s)) {
+                s->head = k;
+                merged = true;
+            }
+            /* what a found neighbour gives here is a slope, not a peak */
+            peak += o->found ? 0.0 : light;
+        }
+        if (merged) {
+            continue;
+        }
+        if (s->length > g->settings.streak_max_px) {
+            s->broken = true;
+            continue;
+        }
+        s->noise = draw(g, s, DRAW_PEAK);
+        s->found = g->calibration.slope * (peak - g->threshold) + s->noise > 0.0;
+        s->peak = peak;
+    }
+}
+
+typedef struct blend {
+    double flux_e, x, y; /* as one source */
+    double widen;        /* factor on the variances from neighbours that are fitted too */
+    bool near;           /* another detection in the fitted pixels, or a merged source of note */
+} blend;
+
+/* Light of sources that are seen in this one, and of what is fitted beside it. */
+static blend blend_of(const bst_generator *g, int i) {
+    const generator_source *s = &g->sources[i];
+    double weight = s->flux_e, x = 0.0, y = 0.0, widen = 1.0;
+    double stamp = fmax(3.0, ceil(3.6 * g->sigma)) + 1.5;
+    bool near = false;
+    for (int k = first_near(g, i, g->reach);
+         k < g->source_count && g->sources[k].y <= s->y + g->reach; k++) {
+        const generator_source *o = &g->sources[k];
+        if (k == i) {
+            continue;
+        }
+        double dx = o->x - s->x, dy = o->y - s->y;
+        double half_x = stamp + 0.5 * fabs(s->path.dx), half_y = stamp + 0.5 * fabs(s->path.dy);
+        if (fabs(dx) > half_x + stamp || fabs(dy) > half_y + stamp) {
+            continue;
+        }
+        double share = overlap(g, s, o);
+        if (o->found) {
+            near = near || (fabs(dx) <= half_x && fabs(dy) <= half_y);
+            /* both fluxes and places are free: what they have in common is not known */
+            widen *= 1.0 / fmax(1.0 - share * share, 0.1);
+            continue;
+        }
+        double light = o->flux_e * share;
+        weight += light;
+        x += light * dx;
+        y += light * dy;
+        near = near || (o->head == i && light > 0.1 * s->flux_e);
+    }
+    return (blend){weight, s->x + x / weight, s->y + y / weight, widen, near};
+}
+
+/* Place with error and covariance, along and across the path. */
+static void measure_place(const bst_generator *g, const generator_source *s, const blend *b,
+                          const bst_bound_at *truth, const bst_bound_at *told, double snr,
+                          double length, bst_detection *d) {
+    const bst_obsgen_calibration *cal = &g->calibration;
+    double across = bst_obsgen_between(bst_obsgen_snrs, cal->across_factor, BST_OBSGEN_SNRS, snr);
+    double along =
+        length > 1.0 ? bst_obsgen_between(bst_obsgen_snrs, cal->along_factor, BST_OBSGEN_SNRS, snr)
+                     : across;
+    double error[2];
+    bst_rng_normal2(g->key, (uint64_t)g->exposure_id, s->name * DRAWS + DRAW_PLACE, error);
+    double worse = (s->saturated ? 4.0 : 1.0) / fmin(s->sharp, 1.0);
+    error[0] *= along * worse * sqrt(truth->var_along_px2 * b->widen);
+    error[1] *= across * worse * sqrt(truth->var_across_px2 * b->widen);
+    double c = s->length > 0.0 ? s->path.dx / s->length : 1.0;
+    double n = s->length > 0.0 ? s->path.dy / s->length : 0.0;
+    double x = b->x + c * error[0] - n * error[1], y = b->y + n * error[0] + c * error[1];
+    double bias = cal->phase_bias_px / g->binning;
+    x += bias * sin(2.0 * BST_PI * b->x);
+    y += bias * sin(2.0 * BST_PI * b->y);
+    double scale = g->binning, a2 = told->var_along_px2 * b->widen * scale * scale,
+           b2 = told->var_across_px2 * b->widen * scale * scale;
+    d->x_px = g->origin_x + scale * x;
+    d->y_px = g->origin_y + scale * y;
+    d->cov_xx = c * c * a2 + n * n * b2;
+    d->cov_xy = c * n * (a2 - b2);
+    d->cov_yy = n * n * a2 + c * c * b2;
+}
+
+static void set_extent(const bst_generator *g, const generator_source *s, bst_detection *d) {
+    double modelled = s->as_streak ? g->streak : 0.0, b = g->binning;
+    double length = d->snr >= MOMENTS_SNR ? s->length : modelled;
+    double across2 = g->sigma * g->sigma, along2 = across2 + length * length / 12.0;
+    d->length_px = b * FWHM_PER_SIGMA * sqrt(along2);
+    d->width_px = b * FWHM_PER_SIGMA * sqrt(across2);
+    d->angle_rad = length > 0.01 ? atan2(s->path.dy, s->path.dx) : 0.0;
+    if (d->angle_rad > 0.5 * BST_PI) {
+        d->angle_rad -= BST_PI;
+    } else if (d->angle_rad <= -0.5 * BST_PI) {
+        d->angle_rad += BST_PI;
+    }
+    bool long_enough = d->length_px > 1.5 * fmax(d->width_px, b);
+    if (s->as_streak || (d->snr >= MOMENTS_SNR && long_enough)) {
+        d->flags |= BST_DETECTION_STREAK;
+    }
+}
+
+static bst_detection measure(const bst_generator *g, int i) {
+    const generator_source *s = &g->sources[i];
+    bst_detection d = {0};
+    blend b = blend_of(g, i);
+    /* a point filter's flux of a streak too faint to be fitted as one is what it caught */
+    bool own = s->as_streak || s->peak >= MOMENTS_SNR || s->length < 0.5;
+    double length = own ? s->length : 0.0;
+    double caught =
+        own ? 1.0
+            : bst_matched_product(s->path, (bst_path_px){0, 0}, g->total_sigma) /
+                  bst_matched_product((bst_path_px){0, 0}, (bst_path_px){0, 0}, g->total_sigma);
+    double flux = b.flux_e * caught;
+    bst_bound_at truth = bst_bound_of(&g->bound, b.flux_e, g->noise_e, s->length);
+    bst_bound_at fitted = bst_bound_of(&g->bound, flux, g->noise_e, length);
+    /* flux goes with the peak that was detected: nearly the same filter on the same noise */
+    const double together = 0.95;
+    double noise = together * s->noise + sqrt(1.0 - together * together) * draw(g, s, DRAW_FLUX);
+    d.flux_e = fmax(flux + noise * sqrt(fitted.flux_variance * b.widen), 0.1 * flux);
+    bst_bound_at told = bst_bound_of(&g->bound, d.flux_e, g->noise_e, length);
+    d.flux_sigma_e = sqrt(told.flux_variance * b.widen);
+    d.snr = d.flux_e * told.norm / g->noise_e;
+    measure_place(g, s, &b, &truth, &told, b.flux_e * truth.norm / g->noise_e, length, &d);
+    d.v_mag = -2.5 * log10(d.flux_e / (fmax(g->exposure_s, 1e-9) * g->electrons_per_s_v0));
+    set_extent(g, s, &d);
+    d.flags |= b.near ? BST_DETECTION_BLEND : 0u;
+    d.flags |= s->saturated ? BST_DETECTION_SATURATED : 0u;
+    double half_x = 0.5 * fabs(s->path.dx) + 2.0 * g->sigma;
+    double half_y = 0.5 * fabs(s->path.dy) + 2.0 * g->sigma;
+    if (s->x - half_x < -0.5 || s->y - half_y < -0.5 || s->x + half_x > g->width - 0.5 ||
+        s->y + half_y > g->height - 0.5) {
+        d.flags |= BST_DETECTION_EDGE;
+    }
+    return d;
+}
+
+void bst_generator_keep(bst_generator *g, const bst_generated *item) {
+    if (g->count < g->settings.capacity) {
+        g->items[g->count++] = *item;
+        return;
+    }
+    /* the brightest stay */
+    g->lost++;
+    int faintest = 0;
+    for (int i = 1; i < g->count; i++) {
+        faintest = g->items[i].detection.snr < g->items[faintest].detection.snr ? i : faintest;
+    }
+    if (g->items[faintest].detection.snr < item->detection.snr) {
+        g->items[faintest] = *item;
+    }
+}
+
+static int generated_by_row(const void *a, const void *b) {
+    const bst_detection *p = &((const bst_generated *)a)->detection,
+                        *q = &((const bst_generated *)b)->detection;
+    if (p->y_px != q->y_px) {
+        return p->y_px < q->y_px ? -1 : 1;
+    }
+    return (p->x_px > q->x_px) - (p->x_px < q->x_px);
+}
+
+bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator_frame *f,
+                             bst_generator_result *out) {
+    set_frame(g, f);
+    g->origin_x = f->window.x0 + 0.5 * (g->binning - 1);
+    g->origin_y = f->window.y0 + 0.5 * (g->binning - 1);
+    g->exposure_id = f->truth->exposure_id;
+    g->count = g->lost = 0;
+    set_noise(g, f);
+    BST_TRY(collect(ctx, g, f));
+    for (int i = 0; i < g->source_count; i++) {
+        g->sources[i].saturated =
+            (f->truth->items[g->sources[i].item].flags & BST_TRUTH_SATURATED) != 0;
+    }
+    decide(g);
+    for (int i = 0; i < g->source_count; i++) {
+        if (g->sources[i].broken) {
+            bst_generator_fragments(g, &g->sources[i]);
+        } else if (g->sources[i].found) {
+            bst_generated item = {measure(g, i), g->sources[i].item, false};
+            bst_generator_keep(g, &item);
+        }
+    }
+    bst_generator_false_alarms(g);
+    bst_generator_hits(g);
+    qsort(g->items, (size_t)g->count, sizeof *g->items, generated_by_row);
+    *out = (bst_generator_result){.items = g->items,
+                                  .count = g->count,
+                                  .lost = g->lost,
+                                  .background_e = g->background_e,
+                                  .noise_e = g->noise_e,
+                                  .threshold_snr = g->threshold,
+                                  .streak_px = g->streak * g->binning,
+                                  .smeared = g->smeared};
+    return BST_OK;
+}
+
+double bst_generator_v_limit(const bst_generator *g, double snr) {
+    double electrons = snr * g->noise_e / bst_bound_norm(&g->bound, g->streak);
+    return -2.5 * log10(electrons / (fmax(g->exposure_s, 1e-9) * g->electrons_per_s_v0));
+}

@@ -1,0 +1,67 @@
+/* Detections from the truth of an exposure, without an image. */
+#ifndef BST_OBSGEN_GENERATOR_H
+#define BST_OBSGEN_GENERATOR_H
+
+#include "obsgen/bound.h"
+#include "obsgen/calibration.h"
+#include "obsgen/matched.h"
+#include "sim/core/messages.h"
+#include "sim/core/rng.h"
+#include "sim/world/camera.h"
+
+/* Settings of the image path that the generator follows. */
+typedef struct bst_generator_settings {
+    int capacity;
+    double false_alarms_per_frame;
+    double jitter_px;                    /* that widens the onboard PSF */
+    double streak_min_px, streak_max_px; /* star streaks that are filtered for */
+} bst_generator_settings;
+
+/* A detection with where it comes from. */
+typedef struct bst_generated {
+    bst_detection detection;
+    int32_t item; /* of the truth, the brightest that is in it; -1: none */
+    bool hit;     /* a radiation hit */
+} bst_generated;
+
+typedef struct bst_generator bst_generator;
+
+/* camera: the true one, borrowed; knowledge: the onboard one. */
+bst_status bst_generator_create(bst_ctx *ctx, const bst_camera *camera, const bst_camera *knowledge,
+                                const bst_generator_settings *settings,
+                                const bst_obsgen_calibration *calibration, bst_rng_key key,
+                                bst_generator **out) BST_MUST_CHECK;
+void bst_generator_free(bst_generator *generator);
+/* What was exposed. */
+typedef struct bst_generator_frame {
+    const bst_truth *truth;
+    bst_window window;
+    int binning;
+    double exposure_s;
+    double sigma_px; /* of the true PSF, a Gaussian, without the pixel's width; sensor px */
+    double streak_dx_px,
+        streak_dy_px; /* path of the stars in the middle of the window, sensor px */
+} bst_generator_frame;
+
+typedef struct bst_generator_result {
+    const bst_generated *items; /* by row, then column; held until the next call */
+    int count, lost;
+    double background_e, noise_e, threshold_snr;
+    double streak_px; /* of the stars, as far as they are filtered for; sensor px */
+    bool smeared;     /* stars moved further than is filtered for */
+} bst_generator_result;
+
+/* Makes the detections of a frame: draws depend on the key, the exposure's number and the sources'
+ * identities alone. BST_ERR_MEMORY. */
+bst_status bst_generator_run(bst_ctx *ctx, bst_generator *generator,
+                             const bst_generator_frame *frame,
+                             bst_generator_result *out) BST_MUST_CHECK;
+
+/* V of the faintest star that the latest frame could show at `snr`. */
+double bst_generator_v_limit(const bst_generator *generator, double snr);
+
+/* Expected electrons of a source of the truth in its brightest sensor pixel: a Gaussian on the
+ * middle of a pixel, drawn along its path. */
+double bst_generator_peak_e(double sigma_px, const bst_truth_item *item);
+
+#endif

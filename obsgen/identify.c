@@ -1,0 +1,152 @@
+#include "obsgen/identify.h"
+
+#include <math.h>
+
+/* Image processing's: brightest of each kind that vote, side of a cell of votes, chance allowed,
+ * radius that is tried first when the error is known. */
+enum { VOTERS = 150 };
+static const double CELL_PX = 2.0, CHANCE = 0.01, LOCKED_RADIUS_PX = 10.0;
+/* Share of pairs of a star and a detection that agree in magnitude by chance. */
+static const double CONSISTENT_SHARE = 0.4;
+/* Draws beyond those of the generator. */
+static const uint64_t IDENTIFY = (uint64_t)1 << 42;
+
+static bool consistent(const bst_detection *d, double v_mag) {
+    double sigma = d->flux_e > 0.0 ? 1.0857 * d->flux_sigma_e / d->flux_e : 1.0;
+    double limit = 1.0 + 3.0 * fmin(sigma, 1.0), excess = d->v_mag - v_mag;
+    bool cut = (d->flags & (BST_DETECTION_SATURATED | BST_DETECTION_EDGE)) != 0;
+    return excess > -limit && excess < (cut ? limit + 2.5 : limit);
+}
+
+static double poisson_tail(double mean, int k) {
+    double term = exp(-mean), below = 0.0;
+    for (int i = 0; i < k; i++) {
+        below += term;
+        term *= mean / (i + 1);
+    }
+    double sum = 0.0;
+    for (int i = k; i < k + 100; i++) {
+        sum += term;
+        term *= mean / (i + 1);
+    }
+    return k <= 0 ? 1.0 : fmin(fmax(sum, 0.0), 1.0 - (below > 1.0 ? 1.0 : 0.0));
+}
+
+/* Distance of the onboard catalogue's place of a star from the true one, px; INFINITY where it is
+ * not in it. */
+static bst_status off_px(bst_ctx *ctx, const bst_identify_options *o, const bst_truth *truth,
+                         const bst_truth_item *item, double *off) {
+    *off = INFINITY;
+    if (item->kind != BST_SOURCE_STAR || (item->id & UINT32_C(0x80000000)) ||
+        item->v_mag > o->v_limit) {
+        return BST_OK;
+    }
+    *off = 0.0;
+    if (o->catalogue == o->world_catalogue) {
+        return BST_OK;
+    }
+    bst_star star;
+    bst_status status = bst_stars_find(ctx, o->catalogue, item->id, o->julian_year, &star);
+    if (status == BST_ERR_NOT_FOUND) {
+        *off = INFINITY;
+        return BST_OK;
+    }
+    BST_TRY(status);
+    bst_vec3 true_place = bst_vec3_from_radec(item->ra_rad, item->dec_rad);
+    *off = bst_vec3_angle(true_place, star.icrs) / (truth->pixel_scale_arcsec * BST_ARCSEC_RAD);
+    return BST_OK;
+}
+
+static bool enough(const bst_identify_options *o, const bst_generator_frame *f, double radius_px,
+                   int agreeing, int count) {
+    if (o->shift_px > radius_px) {
+        return false;
+    }
+    int votes = agreeing < VOTERS ? agreeing : VOTERS, seen = count < VOTERS ? count : VOTERS;
+    double search = 2.0 * radius_px;
+    double wide = f->window.width + search, high = f->window.height + search;
+    double inner = (double)f->window.width * f->window.height;
+    double stars = fmin(votes * wide * high / inner, VOTERS);
+    double mean = CONSISTENT_SHARE * stars * seen * 4.0 * CELL_PX * CELL_PX / (wide * high);
+    double trials = fmax(search * search / (4.0 * CELL_PX * CELL_PX), 1.0);
+    return votes > 0 && trials * poisson_tail(mean, votes) < CHANCE;
+}
+
+/* Something else that lies on a star of its brightness. */
+static bst_status mistake(bst_ctx *ctx, const bst_identify_options *o, const bst_generator_frame *f,
+                          const bst_generated *generated, int count, bst_detection *d) {
+    double tolerance = fmin(o->match_tolerance_px, 4.0 * sqrt(d->cov_xx + d->cov_yy + 0.0625)),
+           nearest = tolerance;
+    const bst_truth *t = f->truth;
+    for (int i = 0; i < t->count; i++) {
+        const bst_truth_item *item = &t->items[i];
+        double distance = hypot(item->x_mean_px - d->x_px, item->y_mean_px - d->y_px), off;
+        if (!(distance < nearest) || !consistent(d, item->v_mag)) {
+            continue;
+        }
+        bool seen = false;
+        for (int k = 0; k < count && !seen; k++) {
+            seen = generated[k].item == i;
+        }
+        BST_TRY(off_px(ctx, o, t, item, &off));
+        if (!seen && distance + off < nearest) {
+            nearest = distance;
+            d->star_id = item->id;
+            d->label = BST_LABEL_STAR;
+        }
+    }
+    return BST_OK;
+}
+
+bst_status bst_obsgen_identify(bst_ctx *ctx, const bst_identify_options *o,
+                               const bst_generator_frame *f, const bst_generated *generated,
+                               bst_detection *items, int count, int *identified) {
+    const bst_truth *t = f->truth;
+    int found = 0;
+    *identified = 0;
+    for (int i = 0; i < count; i++) {
+        bst_detection *d = &items[i];
+        double off = INFINITY;
+        if (generated[i].item >= 0) {
+            BST_TRY(off_px(ctx, o, t, &t->items[generated[i].item], &off));
+        }
+        double tolerance = fmin(o->match_tolerance_px, 4.0 * sqrt(d->cov_xx + d->cov_yy + 0.0625));
+        if (off < tolerance && d->label != BST_LABEL_ARTEFACT &&
+            consistent(d, t->items[generated[i].item].v_mag)) {
+            d->star_id = t->items[generated[i].item].id;
+            d->label = BST_LABEL_STAR;
+            found++;
+        }
+    }
+    bool known = (o->locked && enough(o, f, LOCKED_RADIUS_PX, found, count)) ||
+                 enough(o, f, o->search_radius_px, found, count);
+    for (int i = 0; i < count; i++) {
+        bst_detection *d = &items[i];
+        if (d->label == BST_LABEL_STAR) {
+            uint64_t draw = IDENTIFY + d->star_id;
+            bool kept =
+                known && bst_rng_uniform(o->key, (uint64_t)t->exposure_id, draw) < o->probability;
+            d->label = kept ? BST_LABEL_STAR : BST_LABEL_UNKNOWN;
+            d->star_id = kept ? d->star_id : 0;
+        } else if (known && d->label == BST_LABEL_UNKNOWN && generated[i].item < 0) {
+            BST_TRY(mistake(ctx, o, f, generated, count, d));
+        }
+        *identified += d->label == BST_LABEL_STAR;
+    }
+    return BST_OK;
+}
+
+void bst_obsgen_label(bst_detection *items, int count, bool found_stars, double streak_px) {
+    for (int i = 0; i < count; i++) {
+        bst_detection *d = &items[i];
+        if (d->label != BST_LABEL_UNKNOWN) {
+            continue;
+        }
+        bool moved_as_stars = streak_px >= 3.0 && (d->flags & BST_DETECTION_STREAK);
+        if (d->flags & BST_DETECTION_EDGE) {
+            d->label = BST_LABEL_ARTEFACT;
+        } else if (!moved_as_stars && (found_stars || streak_px >= 3.0)) {
+            d->label = BST_LABEL_OBJECT;
+        }
+    }
+}

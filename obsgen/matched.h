@@ -1,0 +1,35 @@
+/* Matched filters on smeared Gaussian images, in closed form: what a filter makes of a source that
+ * it was not made for, how its output falls off beside a source, and the threshold for a rate of
+ * false alarms. Pixels are those that are read (binned); sigma_px holds the pixel's own width. */
+#ifndef BST_OBSGEN_MATCHED_H
+#define BST_OBSGEN_MATCHED_H
+
+/* A straight path during the exposure, px; {0, 0}: at rest. */
+typedef struct bst_path_px {
+    double dx, dy;
+} bst_path_px;
+
+/* Integral over the plane of the product of two unit images centred on one place, 1/px^2: uniform
+ * segments p and q, each blurred by a Gaussian of sigma_px. Over one of them in closed form (error
+ * functions), over the shorter one by midpoints half a sigma apart: right to 1 % of the value. */
+double bst_matched_product(bst_path_px p, bst_path_px q, double sigma_px);
+
+/* SNR that the filter for `filter` gives of a source that moved by `source`, over the greatest
+ * possible: 1 where they are equal. */
+double bst_matched_efficiency(bst_path_px source, bst_path_px filter, double sigma_px);
+
+/* Output of a filter for a streak of length_px at (along, across) px from a source that it was made
+ * for, over that at the source: the autocorrelation of the image. */
+double bst_matched_falloff(double along_px, double across_px, double length_px, double sigma_px);
+
+/* SNR above which noise alone gives `false_alarms` separate excursions in `pixels` pixels of the
+ * output of the filter for a point, and, where length_px > 0, of that for a streak too. As image
+ * processing reckons: Q(u) times the chances, per axis, that the next pixel is below u where this
+ * one is above (bivariate normal, lag-1 correlation of the filter): the expected Euler
+ * characteristic of a field that is smooth on the grid, one excursion per pixel of white noise
+ * (Adler, The Geometry of Random Fields, 1981, ch. 5). At least 2.5. *streak_share: of the false
+ * alarms. */
+double bst_matched_threshold(double sigma_px, double length_px, double false_alarms, double pixels,
+                             double *streak_share);
+
+#endif

@@ -1,0 +1,416 @@
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "obsgen/generator.h"
+#include "obsgen/identify.h"
+#include "obsgen/obsgen.h"
+#include "sim/world/field.h"
+#include "sim/world/frame_updates.h"
+#include "sim/world/knowledge.h"
+#include "sim/world/motion.h"
+#include "sim/world/psf.h"
+#include "sim/world/truth_list.h"
+
+typedef struct obsgen_config {
+    char calibration_file[512];
+    /* those of scenegen and imgproc where the sensor has them */
+    double v_limit, margin_px;
+    int64_t truth_capacity, capacity;
+    double false_alarms_per_frame, jitter_px, streak_min_px, streak_max_px, search_radius_px,
+        match_tolerance_px;
+} obsgen_config;
+
+static const char *const no_file[] = {"theory", NULL};
+
+#define OF_OTHERS " (scenegen's or imgproc's where the sensor has them)"
+static const bst_config_desc config_table[] = {
+    BST_PATH_OR(obsgen_config, calibration_file, no_file, "\"theory\"",
+                "Calibration that `boresight calibrate-obsgen` wrote, or theory: no measured "
+                "factors."),
+    BST_REAL(obsgen_config, v_limit, "mag", -30.0, 30.0, "16",
+             "Stars fainter than this are left out" OF_OTHERS "."),
+    BST_REAL(obsgen_config, margin_px, "px", 0.0, 1e4, "0",
+             "Sources this far outside the window count too" OF_OTHERS "."),
+    BST_INT(obsgen_config, truth_capacity, "", 1, 1048576, "4096",
+            "Sources that the truth of one exposure has room for" OF_OTHERS "."),
+    BST_INT(obsgen_config, capacity, "", 1, 65536, "2048",
+            "Detections kept per frame, the brightest first" OF_OTHERS "."),
+    BST_REAL(obsgen_config, false_alarms_per_frame, "", 1e-6, 1e4, "1",
+             "Detections per frame that noise alone may cause, on average" OF_OTHERS "."),
+    BST_REAL(obsgen_config, jitter_px, "px", 0, 5, "0",
+             "RMS per axis of the line-of-sight jitter that widens the onboard PSF" OF_OTHERS "."),
+    BST_REAL(obsgen_config, streak_min_px, "px", 0.5, 100, "1.5",
+             "Star streaks shorter than this are taken for points" OF_OTHERS "."),
+    BST_REAL(obsgen_config, streak_max_px, "px", 1, 128, "64",
+             "Star streaks longer than this are not filtered for" OF_OTHERS "."),
+    BST_REAL(obsgen_config, search_radius_px, "px", 2, 500, "60",
+             "Greatest pointing error over which stars are identified" OF_OTHERS "."),
+    BST_REAL(obsgen_config, match_tolerance_px, "px", 0.5, 20, "3",
+             "Greatest distance of one star from its place after the common shift" OF_OTHERS "."),
+    BST_CONFIG_END,
+};
+
+/* Both read the exposures: at once for the truth, later (delay_s) for what would have been seen. */
+enum {
+    PORT_EXPOSED,
+    PORT_PROCESSED,
+    PORT_LOS,
+    PORT_PREDICTIONS,
+    PORT_POINTING,
+    PORT_NAV,
+    PORT_TRUTH,
+    PORT_DETECTIONS,
+    PORT_COUNT
+};
+
+static const bst_port ports[PORT_COUNT] = {
+    [PORT_EXPOSED] = {BST_CHANNEL_EXPOSURE, BST_PORT_IN, BST_PORT_TRIGGER, 0.0, 0},
+    [PORT_PROCESSED] = {BST_CHANNEL_EXPOSURE, BST_PORT_IN, BST_PORT_TRIGGER, 0.0, 0},
+    [PORT_LOS] = {BST_CHANNEL_LOS_HISTORY, BST_PORT_IN, 0, 0.0, 0},
+    [PORT_PREDICTIONS] = {BST_CHANNEL_PREDICTIONS, BST_PORT_IN,
+                          BST_PORT_OPTIONAL | BST_PORT_FEEDBACK, 30.0, 0},
+    [PORT_POINTING] = {BST_CHANNEL_POINTING_TELEMETRY, BST_PORT_IN, 0, 10.0, 0},
+    [PORT_NAV] = {BST_CHANNEL_NAV_TELEMETRY, BST_PORT_IN, 0, 60.0, 0},
+    [PORT_TRUTH] = {BST_CHANNEL_TRUTH, BST_PORT_OUT, 0, 0.0, 4096},
+    [PORT_DETECTIONS] = {BST_CHANNEL_DETECTIONS, BST_PORT_OUT, 0, 0.0, 2048},
+};
+
+/* All sources of one exposure, until it is processed. */
+typedef struct pending {
+    int64_t exposure_id; /* -1: none */
+    bst_truth *truth;
+    int room;
+    double streak_dx_px, streak_dy_px, sigma_px;
+} pending;
+
+enum { PENDING = 16 };
+
+typedef struct obsgen {
+    const obsgen_config *config;
+    const bst_camera *world_camera;
+    const bst_knowledge *knowledge;
+    const bst_stars *world_stars;
+    int64_t tick_rate_hz;
+    bst_rng_key key;
+    bst_obsgen_calibration calibration;
+    bst_field *field;
+    bst_truth_list list;
+    bst_generator *generator;
+    bst_camera camera;            /* at the pixel scale and jitter of the latest exposure */
+    bst_psf *psf;                 /* of it, if it is wider than the world's */
+    double jitter_rad2, sigma_px; /* sigma: of the Gaussian that the PSF is or stands for */
+    pending waiting[PENDING];
+} obsgen;
+
+static void destroy(void *self) {
+    obsgen *o = self;
+    if (!o) {
+        return;
+    }
+    bst_field_free(o->field);
+    bst_truth_list_free(&o->list);
+    bst_generator_free(o->generator);
+    bst_psf_free(o->psf);
+    for (int i = 0; i < PENDING; i++) {
+        free(o->waiting[i].truth);
+    }
+    free(o);
+}
+
+/* Of a PSF that is no Gaussian, the one with the same noise-equivalent area in the field's middle.
+ */
+static double gaussian_px(const bst_camera *c) {
+    double sigma_px;
+    if (!c->psf || bst_psf_gaussian(c->psf, &sigma_px)) {
+        return bst_camera_psf_sigma_px(c);
+    }
+    return bst_psf_equivalent_fwhm_px(c->psf, 0.5 * (double)(c->width_px - 1),
+                                      0.5 * (double)(c->height_px - 1)) /
+           2.3548200450309493;
+}
+
+static bst_status prepare(const bst_module_env *env, obsgen *o) {
+    const obsgen_config *c = o->config;
+    if (strcmp(c->calibration_file, no_file[0]) == 0 || !*c->calibration_file) {
+        bst_obsgen_calibration_theory(&o->calibration);
+    } else {
+        BST_TRY(bst_obsgen_calibration_read(env->ctx, c->calibration_file, &o->calibration));
+    }
+    const bst_generator_settings settings = {.capacity = (int)c->capacity,
+                                             .false_alarms_per_frame = c->false_alarms_per_frame,
+                                             .jitter_px = c->jitter_px,
+                                             .streak_min_px = c->streak_min_px,
+                                             .streak_max_px = c->streak_max_px};
+    BST_TRY(bst_generator_create(env->ctx, o->world_camera, bst_knowledge_camera(env->knowledge),
+                                 &settings, &o->calibration, o->key, &o->generator));
+    BST_TRY(bst_field_create(env->ctx, env->world, env->observer, env->sensor, &o->field));
+    bst_env_set_capacity(env, PORT_TRUTH, (int)c->truth_capacity);
+    bst_env_set_capacity(env, PORT_DETECTIONS, (int)c->capacity);
+    return BST_OK;
+}
+
+static bst_status create(const bst_module_env *env, const void *config, void **self) {
+    obsgen *o = calloc(1, sizeof *o);
+    *self = NULL;
+    if (!o) {
+        return bst_fail(env->ctx, BST_ERR_MEMORY, "no memory for %s", env->instance);
+    }
+    o->config = config;
+    o->world_camera = bst_world_camera(env->world, env->observer, env->sensor);
+    o->world_stars = bst_world_stars(env->world);
+    o->camera = *o->world_camera;
+    o->sigma_px = gaussian_px(&o->camera);
+    o->knowledge = env->knowledge;
+    o->tick_rate_hz = env->tick_rate_hz;
+    o->key = bst_env_rng(env, "observations");
+    for (int i = 0; i < PENDING; i++) {
+        o->waiting[i].exposure_id = -1;
+    }
+    bst_status status = prepare(env, o);
+    if (status != BST_OK) {
+        destroy(o);
+        return status;
+    }
+    *self = o;
+    return BST_OK;
+}
+
+/* The world's camera at the exposure's pixel scale, its PSF widened by the jitter. */
+static bst_status set_camera(bst_ctx *ctx, obsgen *o, double scale_arcsec, double jitter_rad2) {
+    if (scale_arcsec <= 0.0) {
+        scale_arcsec = o->camera.pixel_scale_arcsec;
+    }
+    if (scale_arcsec == o->camera.pixel_scale_arcsec && jitter_rad2 == o->jitter_rad2) {
+        return BST_OK;
+    }
+    bst_camera scaled, camera;
+    bst_psf *psf = NULL;
+    BST_TRY(bst_camera_at_scale(ctx, o->world_camera, scale_arcsec, &scaled));
+    camera = scaled;
+    if (jitter_rad2 > 0.0) {
+        double sigma_px = sqrt(jitter_rad2) / bst_camera_scale_rad(&scaled);
+        BST_TRY(bst_camera_blurred(ctx, &scaled, sigma_px, &camera));
+        psf = (bst_psf *)camera.psf;
+    }
+    bst_psf_free(o->psf);
+    o->psf = psf;
+    o->camera = camera;
+    o->jitter_rad2 = jitter_rad2;
+    bst_field_set_camera(o->field, &o->camera);
+    o->sigma_px = gaussian_px(&o->camera);
+    return BST_OK;
+}
+
+static double peak_e(const void *user, int index, const bst_truth_item *item) {
+    (void)index;
+    return bst_generator_peak_e(*(const double *)user, item);
+}
+
+/* Path of a star in the middle of the window. */
+static void star_path(const obsgen *o, const bst_los_track *track, bst_window window, pending *p) {
+    const bst_quat *q = track->q_cam_from_gcrf;
+    double x = window.x0 + 0.5 * (window.width - 1), y = window.y0 + 0.5 * (window.height - 1);
+    bst_vec3 star =
+        bst_quat_rotate(bst_quat_conj(q[track->count / 2]), bst_camera_unproject(&o->camera, x, y));
+    double x0, y0, x1, y1;
+    p->streak_dx_px = p->streak_dy_px = 0.0;
+    if (bst_camera_project(&o->camera, bst_quat_rotate(q[0], star), &x0, &y0) &&
+        bst_camera_project(&o->camera, bst_quat_rotate(q[track->count - 1], star), &x1, &y1)) {
+        p->streak_dx_px = x1 - x0;
+        p->streak_dy_px = y1 - y0;
+    }
+}
+
+static bst_status reserve(bst_ctx *ctx, pending *p, int count) {
+    if (count <= p->room) {
+        return BST_OK;
+    }
+    int room = count + count / 4 + 64;
+    bst_truth *more = realloc(p->truth, sizeof *more + (size_t)room * sizeof more->items[0]);
+    if (!more) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d sources", room);
+    }
+    p->truth = more;
+    p->room = room;
+    return BST_OK;
+}
+
+/* The truth of an exposure, published, and kept with all its sources until it is processed. */
+static bst_status expose(obsgen *o, struct bst_step *step, const bst_exposure *e,
+                         const bst_los_history *history) {
+    bst_ctx *ctx = bst_step_ctx(step);
+    BST_TRY(set_camera(ctx, o, e->pixel_scale_arcsec, history->jitter_rad2));
+    bst_los_track track;
+    int64_t lead =
+        bst_detector_lead_ticks(&o->camera.detector, e->window.height, (double)o->tick_rate_hz);
+    BST_TRY(bst_field_track(ctx, o->field, history, e->start_tick - lead, e->end_tick + lead,
+                            o->tick_rate_hz, &track));
+    const bst_field_options options = {
+        .v_limit = o->config->v_limit,
+        .margin_px = fmax(o->config->margin_px, ceil(6.0 * o->sigma_px)),
+        .lead_s = (double)lead / (double)o->tick_rate_hz};
+    int capacity, count;
+    const bst_source *sources;
+    bst_truth *truth = bst_step_write(step, PORT_TRUTH, &capacity);
+    truth->exposure_id = e->id;
+    truth->dropped = e->dropped;
+    BST_TRY(bst_field_query(ctx, o->field, &track, e->start_tick, e->end_tick, o->tick_rate_hz,
+                            e->window, &options, truth, &sources, &count));
+    truth->hits = 0;
+    truth->hits_e = 0.0;
+    truth->error_sigma = NAN;
+    truth->nodes = 0;
+    truth->one_track = false;
+    const bst_truth_request request = {.field = o->field,
+                                       .camera = &o->camera,
+                                       .track = &track,
+                                       .sources = sources,
+                                       .count = count,
+                                       .window = e->window,
+                                       .binning = e->binning,
+                                       .peak_e = peak_e,
+                                       .user = &o->sigma_px};
+    BST_TRY(bst_truth_list_fill(ctx, &o->list, &request, truth, capacity, NULL));
+    if (truth->lost > 0) {
+        bst_step_count(step, "truth_overflow");
+    }
+    pending *p = &o->waiting[e->id % PENDING];
+    p->exposure_id = e->dropped ? -1 : e->id;
+    if (e->dropped) {
+        return BST_OK;
+    }
+    star_path(o, &track, e->window, p);
+    p->sigma_px = o->sigma_px;
+    BST_TRY(reserve(ctx, p, count));
+    if (truth->lost == 0) {
+        memcpy(p->truth, truth, sizeof *truth + (size_t)count * sizeof truth->items[0]);
+        return BST_OK;
+    }
+    memcpy(p->truth, truth, sizeof *truth);
+    return bst_truth_list_fill(ctx, &o->list, &request, p->truth, p->room, NULL);
+}
+
+static void set_attitude(const obsgen *o, struct bst_step *step, const bst_exposure *e,
+                         bool *oriented, bool *locked, bst_detections *out) {
+    bst_sample pointing = bst_step_latest(step, PORT_POINTING);
+    bst_sample predicted = bst_step_latest(step, PORT_PREDICTIONS);
+    bst_motion motion = {BST_QUAT_IDENTITY, {0, 0, 0}, {0, 0, 0}};
+    *oriented = pointing.payload && !pointing.stale &&
+                bst_motion_from_telemetry(pointing.payload, e->start_tick, e->end_tick, &motion);
+    out->q_cam_from_gcrf = out->q_telemetry_from_gcrf = motion.q_cam_from_gcrf;
+    const bst_predictions *p = predicted.stale ? NULL : predicted.payload;
+    *locked = *oriented && p && p->attitude_valid;
+    if (*locked) {
+        double middle = 0.5 * ((double)e->start_tick + (double)e->end_tick);
+        double dt = (middle - (double)p->tick) / (double)o->tick_rate_hz;
+        bst_quat error = bst_quat_from_rotvec(
+            bst_vec3_axpy(p->attitude_error_cam_rad, dt, p->attitude_error_rate_cam_radps));
+        out->q_cam_from_gcrf = bst_quat_unit(bst_quat_mul(error, motion.q_cam_from_gcrf));
+    }
+}
+
+/* How far the stars are from where the onboard attitude has them. */
+static double shift_px(const obsgen *o, const bst_truth *t, bst_quat q_onboard) {
+    bst_vec3 e =
+        bst_quat_to_rotvec(bst_quat_mul(q_onboard, bst_quat_conj(t->q_cam_from_gcrf_mean)));
+    return hypot(e.x, e.y) / bst_camera_scale_rad(&o->camera);
+}
+
+static bst_status process(obsgen *o, struct bst_step *step, const bst_exposure *e) {
+    pending *p = &o->waiting[e->id % PENDING];
+    if (p->exposure_id != e->id) {
+        return BST_OK; /* dropped */
+    }
+    p->exposure_id = -1;
+    bst_ctx *ctx = bst_step_ctx(step);
+    int capacity;
+    bst_detections *out = bst_step_write(step, PORT_DETECTIONS, &capacity);
+    out->exposure_id = e->id;
+    out->start_tick = e->start_tick;
+    out->end_tick = e->end_tick;
+    bool oriented, locked;
+    set_attitude(o, step, e, &oriented, &locked, out);
+    const bst_generator_frame frame = {
+        .truth = p->truth,
+        .window = e->window,
+        .binning = e->binning,
+        .exposure_s = (double)(e->end_tick - e->start_tick) / (double)o->tick_rate_hz,
+        .sigma_px = p->sigma_px,
+        .streak_dx_px = p->streak_dx_px,
+        .streak_dy_px = p->streak_dy_px};
+    bst_generator_result made;
+    BST_TRY(bst_generator_run(ctx, o->generator, &frame, &made));
+    out->background_e = made.background_e;
+    out->noise_e = made.noise_e;
+    out->threshold_snr = made.threshold_snr;
+    out->stars_identified = 0;
+    out->count = made.count < capacity ? made.count : capacity;
+    out->lost = made.lost + made.count - out->count;
+    for (int i = 0; i < out->count; i++) {
+        out->items[i] = made.items[i].detection;
+    }
+    bst_sample nav = bst_step_latest(step, PORT_NAV);
+    if (oriented && nav.payload && !nav.stale && !made.smeared) {
+        const bst_identify_options options = {
+            .catalogue = bst_knowledge_stars(o->knowledge),
+            .world_catalogue = o->world_stars,
+            .julian_year = bst_knowledge_julian_year(o->knowledge),
+            .search_radius_px = o->config->search_radius_px,
+            .match_tolerance_px = o->config->match_tolerance_px,
+            .probability = o->calibration.star_id_probability,
+            .v_limit = bst_generator_v_limit(o->generator, 0.7 * made.threshold_snr),
+            .locked = locked,
+            .shift_px = shift_px(o, p->truth, out->q_cam_from_gcrf),
+            .key = o->key};
+        BST_TRY(bst_obsgen_identify(ctx, &options, &frame, made.items, out->items, out->count,
+                                    &out->stars_identified));
+    }
+    if (!made.smeared) {
+        bst_obsgen_label(out->items, out->count, out->stars_identified > 0, made.streak_px);
+    }
+    if (out->stars_identified == 0) {
+        bst_step_count(step, "frame_without_stars");
+    }
+    if (out->lost > 0) {
+        bst_step_count(step, "detections_overflow");
+    }
+    return BST_OK;
+}
+
+static bst_status step_module(void *self, struct bst_step *step) {
+    bst_sample exposure;
+    while ((exposure = bst_step_next(step, PORT_EXPOSED)).payload) {
+        bst_sample history = bst_step_latest(step, PORT_LOS);
+        if (!history.payload) {
+            return bst_fail(bst_step_ctx(step), BST_ERR_STATE,
+                            "an exposure ended before any line of sight was published");
+        }
+        BST_TRY(expose(self, step, exposure.payload, history.payload));
+    }
+    while ((exposure = bst_step_next(step, PORT_PROCESSED)).payload) {
+        BST_TRY(process(self, step, exposure.payload));
+    }
+    return BST_OK;
+}
+
+static const char *const stands_for[] = {"scenegen", "imgproc", NULL};
+
+const bst_module_desc bst_obsgen_module = {
+    .abi = BST_MODULE_ABI,
+    .role = "obsgen",
+    .type = "statistical",
+    .doc =
+        "Makes detections from the truth, by the statistics of rendering and image processing, "
+        "where observation_source is generator.",
+    .flags = BST_MODULE_READS_TRUTH,
+    .config = config_table,
+    .config_bytes = sizeof(obsgen_config),
+    .default_rate_hz = 0.0,
+    .ports = ports,
+    .port_count = PORT_COUNT,
+    .create = create,
+    .step = step_module,
+    .destroy = destroy,
+    .stands_for = stands_for,
+};

@@ -1,0 +1,10 @@
+/* The observation generator: detections from the truth, in place of rendering and image
+ * processing. */
+#ifndef BST_OBSGEN_OBSGEN_H
+#define BST_OBSGEN_OBSGEN_H
+
+#include "sim/core/module.h"
+
+extern const bst_module_desc bst_obsgen_module;
+
+#endif

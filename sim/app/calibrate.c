@@ -1,0 +1,415 @@
+#include "sim/app/calibrate.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "obsgen/generator.h"
+#include "sim/app/pairing.h"
+
+/* SNR about the threshold in which Pd is fitted, and least number of sources for a fit. */
+static const double PD_REACH = 4.0;
+enum { LEAST_SOURCES = 200, LEAST_ALARMS = 10, LEAST_PLACES = 30, GRID = 48 };
+static const double FWHM_PER_SIGMA = 2.3548200450309493;
+
+/* A source that stands alone, near the threshold. */
+typedef struct trial {
+    float amplitude, threshold, length;
+    bool detected;
+} trial;
+
+typedef struct mean_square {
+    double sum;
+    long count;
+} mean_square;
+
+struct bst_calibrator {
+    bst_calibrated_path path;
+    bst_generator *theory;
+    double sigma_px;
+    bst_bound bound;
+    bst_pairing pairing;
+    trial *trials;
+    long trial_count, trial_room;
+    double *alarm_energy; /* (u^2 - T^2) / 2 */
+    long alarm_count, alarm_room;
+    double alarms_expected;
+    mean_square across[BST_OBSGEN_SNRS], along[BST_OBSGEN_SNRS];
+    double bias_sum, bias_weight;
+    double threshold_offset;
+    double nn, nq, qq, ny, qy; /* least squares of noise^2 by theory's and by the light left over */
+    long identified, identifiable;
+    long hits, hits_told;
+    long frames, detected;
+};
+
+bst_status bst_calibrator_create(bst_ctx *ctx, bst_calibrator **out) {
+    *out = calloc(1, sizeof **out);
+    return *out ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory for a calibration");
+}
+
+void bst_calibrator_free(bst_calibrator *c) {
+    if (c) {
+        bst_generator_free(c->theory);
+        bst_pairing_free(&c->pairing);
+        free(c->trials);
+        free(c->alarm_energy);
+        free(c);
+    }
+}
+
+bst_status bst_calibrator_begin(bst_ctx *ctx, bst_calibrator *c, const bst_calibrated_path *path) {
+    bst_obsgen_calibration theory;
+    bst_obsgen_calibration_theory(&theory);
+    theory.crowding = 0.0;
+    const bst_generator_settings settings = {.capacity = 4096,
+                                             .false_alarms_per_frame = path->false_alarms_per_frame,
+                                             .streak_min_px = path->streak_min_px,
+                                             .streak_max_px = path->streak_max_px};
+    bst_generator_free(c->theory);
+    c->theory = NULL;
+    c->path = *path;
+    c->sigma_px = hypot(bst_camera_psf_sigma_px(path->camera), path->jitter_px);
+    bst_bound_init(&c->bound, c->sigma_px);
+    return bst_generator_create(ctx, path->camera, path->camera, &settings, &theory,
+                                bst_rng_make_key(1, 0, "calibration", "observations"), &c->theory);
+}
+
+static bst_status grow(bst_ctx *ctx, void **items, long count, long *room, size_t bytes) {
+    if (count < *room) {
+        return BST_OK;
+    }
+    long more = 2 * *room + 1024;
+    void *moved = realloc(*items, (size_t)more * bytes);
+    if (!moved) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %ld sources of a calibration", more);
+    }
+    *items = moved;
+    *room = more;
+    return BST_OK;
+}
+
+static double length_of(const bst_truth_item *t) {
+    double length = hypot(t->x_end_px - t->x_start_px, t->y_end_px - t->y_start_px);
+    return isfinite(length) ? length : 0.0;
+}
+
+/* Path of the stars in the middle of the frame: of the star that is nearest to it. */
+static void star_path(const bst_truth *truth, double x, double y, double *dx, double *dy) {
+    double nearest = INFINITY;
+    *dx = *dy = 0.0;
+    for (int i = 0; i < truth->count; i++) {
+        const bst_truth_item *t = &truth->items[i];
+        double distance = hypot(t->x_mean_px - x, t->y_mean_px - y);
+        if (t->kind == BST_SOURCE_STAR && distance < nearest && isfinite(t->x_end_px) &&
+            isfinite(t->x_start_px)) {
+            nearest = distance;
+            *dx = t->x_end_px - t->x_start_px;
+            *dy = t->y_end_px - t->y_start_px;
+        }
+    }
+}
+
+/* Whether a place is further than `reach` from every source of the truth that shows. */
+static bool is_free(const bst_truth *truth, double x, double y, double reach, int except,
+                    double snr) {
+    for (int i = 0; i < truth->count; i++) {
+        const bst_truth_item *t = &truth->items[i];
+        if (i == except || !(t->snr > snr) || (t->flags & BST_TRUTH_OCCULTED)) {
+            continue;
+        }
+        double away = reach * fmin(1.0 + t->snr / 1000.0, 4.0) + 0.5 * length_of(t);
+        if (fabs(t->x_mean_px - x) < away && fabs(t->y_mean_px - y) < away) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static int snr_node(double snr) {
+    int best = 0;
+    for (int i = 1; i < BST_OBSGEN_SNRS; i++) {
+        best =
+            fabs(log(snr / bst_obsgen_snrs[i])) < fabs(log(snr / bst_obsgen_snrs[best])) ? i : best;
+    }
+    return best;
+}
+
+static void add_place(bst_calibrator *c, const bst_truth_item *t, const bst_detection *d,
+                      double noise_e) {
+    double length = length_of(t), dx = d->x_px - t->x_mean_px, dy = d->y_px - t->y_mean_px;
+    double cosine = length > 0.0 ? (t->x_end_px - t->x_start_px) / length : 1.0;
+    double sine = length > 0.0 ? (t->y_end_px - t->y_start_px) / length : 0.0;
+    bst_bound_at at = bst_bound_of(&c->bound, t->electrons, noise_e, length);
+    double along = dx * cosine + dy * sine, across = dy * cosine - dx * sine;
+    int node = snr_node(t->electrons * at.norm / noise_e);
+    mean_square *a = length > 1.0 ? &c->along[node] : &c->across[node];
+    a->sum += along * along / at.var_along_px2;
+    a->count++;
+    c->across[node].sum += across * across / at.var_across_px2;
+    c->across[node].count++;
+    double weight = 1.0 / (at.var_across_px2 + 1e-6);
+    const double place[2] = {t->x_mean_px, t->y_mean_px}, off[2] = {dx, dy};
+    for (int k = 0; k < 2 && length < 1.0; k++) {
+        double wave = sin(2.0 * BST_PI * place[k]);
+        c->bias_sum += weight * wave * off[k];
+        c->bias_weight += weight * wave * wave;
+    }
+}
+
+static bst_status add_trial(bst_ctx *ctx, bst_calibrator *c, const bst_truth_item *t,
+                            double amplitude, double threshold, bool detected) {
+    if (fabs(amplitude - threshold) > PD_REACH) {
+        return BST_OK;
+    }
+    BST_TRY(grow(ctx, (void **)&c->trials, c->trial_count, &c->trial_room, sizeof *c->trials));
+    c->trials[c->trial_count++] =
+        (trial){(float)amplitude, (float)threshold, (float)length_of(t), detected};
+    return BST_OK;
+}
+
+static bst_status add_alarms(bst_ctx *ctx, bst_calibrator *c, const bst_truth *truth,
+                             const bst_detections *detections, double reach) {
+    double width = (double)c->path.camera->width_px, height = (double)c->path.camera->height_px;
+    int open = 0;
+    for (int k = 0; k < GRID * GRID; k++) {
+        double x = width * (k % GRID + 0.5) / GRID;
+        double y = height * ((double)(k / GRID) + 0.5) / GRID;
+        open += is_free(truth, x, y, reach, -1, 1.0);
+    }
+    c->alarms_expected += c->path.false_alarms_per_frame * open / (GRID * GRID);
+    for (int i = 0; i < detections->count; i++) {
+        const bst_detection *d = &detections->items[i];
+        if (c->pairing.item_of[i] >= 0 || !is_free(truth, d->x_px, d->y_px, reach, -1, 1.0)) {
+            continue;
+        }
+        double T = detections->threshold_snr;
+        if (truth->hits > 0 && d->snr > 1.5 * T) {
+            c->hits++;
+            c->hits_told += d->label == BST_LABEL_ARTEFACT;
+            continue;
+        }
+        BST_TRY(grow(ctx, (void **)&c->alarm_energy, c->alarm_count, &c->alarm_room,
+                     sizeof *c->alarm_energy));
+        c->alarm_energy[c->alarm_count++] = fmax(0.5 * (d->snr * d->snr - T * T), 0.0);
+    }
+    return BST_OK;
+}
+
+static void add_noise(bst_calibrator *c, const bst_truth *truth, const bst_detections *detections,
+                      double theory_noise) {
+    double light = 0.0;
+    for (int i = 0; i < truth->count; i++) {
+        const bst_truth_item *t = &truth->items[i];
+        if ((t->flags & BST_TRUTH_IN_FIELD) && t->snr < detections->threshold_snr) {
+            double e = t->electrons * bst_bound_norm(&c->bound, length_of(t));
+            light += e * e;
+        }
+    }
+    light /= (double)c->path.camera->width_px * (double)c->path.camera->height_px;
+    double n = 1.0, q = light / (theory_noise * theory_noise),
+           y = detections->noise_e * detections->noise_e / (theory_noise * theory_noise);
+    c->nn += n * n;
+    c->nq += n * q;
+    c->qq += q * q;
+    c->ny += n * y;
+    c->qy += q * y;
+}
+
+bst_status bst_calibrator_add(bst_ctx *ctx, bst_calibrator *c, const bst_truth *truth,
+                              const bst_detections *detections, double exposure_s) {
+    const bst_camera *camera = c->path.camera;
+    bst_generator_frame frame = {.truth = truth,
+                                 .window = {0, 0, (int)camera->width_px, (int)camera->height_px},
+                                 .binning = 1,
+                                 .exposure_s = exposure_s,
+                                 .sigma_px = c->sigma_px};
+    star_path(truth, 0.5 * (double)camera->width_px, 0.5 * (double)camera->height_px,
+              &frame.streak_dx_px, &frame.streak_dy_px);
+    bst_generator_result theory;
+    BST_TRY(bst_generator_run(ctx, c->theory, &frame, &theory));
+    if (theory.smeared || !(detections->noise_e > 0.0)) {
+        return BST_OK;
+    }
+    c->frames++;
+    c->threshold_offset += detections->threshold_snr - theory.threshold_snr;
+    add_noise(c, truth, detections, theory.noise_e);
+    double fwhm = FWHM_PER_SIGMA * c->sigma_px, reach = 5.0 * c->sigma_px + 3.0;
+    BST_TRY(bst_pairing_make(ctx, &c->pairing, truth, detections, fwhm));
+    double plain =
+        sqrt(truth->background_e + truth->dark_e + camera->read_noise_e * camera->read_noise_e);
+    for (int i = 0; i < truth->count; i++) {
+        const bst_truth_item *t = &truth->items[i];
+        double x = t->x_mean_px, y = t->y_mean_px, edge = reach + 0.5 * length_of(t);
+        bool whole = x > edge && y > edge && x < (double)camera->width_px - edge &&
+                     y < (double)camera->height_px - edge;
+        bool dark = !(t->flags & BST_TRUTH_IN_FIELD) || (t->flags & BST_TRUTH_OCCULTED) ||
+                    (t->flags & BST_TRUTH_SATURATED);
+        if (dark || !whole || !(t->snr > 1.0) || t->kind != BST_SOURCE_STAR ||
+            !is_free(truth, x, y, reach + 0.5 * length_of(t), i, 0.5)) {
+            continue;
+        }
+        int k = c->pairing.detection_of[i];
+        BST_TRY(add_trial(ctx, c, t, t->snr * plain / detections->noise_e,
+                          detections->threshold_snr, k >= 0));
+        if (k < 0) {
+            continue;
+        }
+        c->detected++;
+        const bst_detection *d = &detections->items[k];
+        add_place(c, t, d, detections->noise_e);
+        if (detections->stars_identified > 0 && t->snr > detections->threshold_snr + 2.0 &&
+            !(t->id & UINT32_C(0x80000000))) {
+            c->identifiable++;
+            c->identified += d->star_id == t->id;
+        }
+    }
+    return add_alarms(ctx, c, truth, detections, reach);
+}
+
+/* Log-likelihood of the trials of one streak length. */
+static double likelihood(const bst_calibrator *c, int node, double gain, double slope) {
+    double sum = 0.0;
+    for (long i = 0; i < c->trial_count; i++) {
+        const trial *t = &c->trials[i];
+        int own = 0;
+        for (int n = 1; n < BST_OBSGEN_LENGTHS; n++) {
+            bool nearer = fabs(sqrt((double)t->length) - sqrt(bst_obsgen_lengths_px[n])) <
+                          fabs(sqrt((double)t->length) - sqrt(bst_obsgen_lengths_px[own]));
+            own = nearer ? n : own;
+        }
+        if (own != node) {
+            continue;
+        }
+        double z = slope * (gain * (double)t->amplitude - (double)t->threshold);
+        double p = 0.5 * erfc(-z * 0.70710678118654752);
+        sum += log(fmax(t->detected ? p : 1.0 - p, 1e-4)); /* a few are paired by mistake */
+    }
+    return sum;
+}
+
+/* The gain of one streak length at a slope, by golden section. */
+static double best_gain(const bst_calibrator *c, int node, double slope, double *value) {
+    const double part = 0.38196601125010515;
+    double low = 0.5, high = 1.3, a = low + part * (high - low), b = high - part * (high - low);
+    double at_a = likelihood(c, node, a, slope), at_b = likelihood(c, node, b, slope);
+    for (int i = 0; i < 22; i++) {
+        if (at_a > at_b) {
+            high = b;
+            b = a;
+            at_b = at_a;
+            a = low + part * (high - low);
+            at_a = likelihood(c, node, a, slope);
+        } else {
+            low = a;
+            a = b;
+            at_a = at_b;
+            b = high - part * (high - low);
+            at_b = likelihood(c, node, b, slope);
+        }
+    }
+    *value = fmax(at_a, at_b);
+    return 0.5 * (low + high);
+}
+
+static void fit_detection(const bst_calibrator *c, bst_obsgen_calibration *out) {
+    long count[BST_OBSGEN_LENGTHS] = {0};
+    for (long i = 0; i < c->trial_count; i++) {
+        int own = 0;
+        for (int n = 1; n < BST_OBSGEN_LENGTHS; n++) {
+            bool nearer =
+                fabs(sqrt((double)c->trials[i].length) - sqrt(bst_obsgen_lengths_px[n])) <
+                fabs(sqrt((double)c->trials[i].length) - sqrt(bst_obsgen_lengths_px[own]));
+            own = nearer ? n : own;
+        }
+        count[own]++;
+    }
+    double best = -INFINITY;
+    for (double slope = 0.7; slope <= 1.301; slope += 0.02) {
+        double total = 0.0, gain[BST_OBSGEN_LENGTHS] = {0};
+        for (int n = 0; n < BST_OBSGEN_LENGTHS; n++) {
+            double value = 0.0;
+            /* a length that only few frames had would be told by their oddities */
+            if (count[n] >= LEAST_SOURCES && count[n] >= c->trial_count / 50) {
+                gain[n] = best_gain(c, n, slope, &value);
+            }
+            total += value;
+        }
+        if (total > best) {
+            best = total;
+            out->slope = slope;
+            for (int n = 0; n < BST_OBSGEN_LENGTHS; n++) {
+                out->gain[n] = gain[n];
+            }
+        }
+    }
+    /* a length that was not seen has the gain of the nearest one that was */
+    double seen[BST_OBSGEN_LENGTHS];
+    for (int n = 0; n < BST_OBSGEN_LENGTHS; n++) {
+        seen[n] = out->gain[n];
+    }
+    for (int n = 0; n < BST_OBSGEN_LENGTHS; n++) {
+        for (int away = 1; away < BST_OBSGEN_LENGTHS && out->gain[n] <= 0.0; away++) {
+            int low = n - away, high = n + away;
+            out->gain[n] = low >= 0 && seen[low] > 0.0 ? seen[low]
+                           : high < BST_OBSGEN_LENGTHS ? seen[high]
+                                                       : 0.0;
+        }
+    }
+}
+
+static void fit_places(const mean_square *seen, double *factors) {
+    double before = 1.0;
+    for (int i = 0; i < BST_OBSGEN_SNRS; i++) {
+        if (seen[i].count >= LEAST_PLACES) {
+            before = sqrt(seen[i].sum / (double)seen[i].count);
+        }
+        factors[i] = fmin(fmax(before, 0.1), 20.0);
+    }
+}
+
+bst_status bst_calibrator_fit(bst_ctx *ctx, bst_calibrator *c, bst_obsgen_calibration *out,
+                              bst_calibration_counts *counts) {
+    *counts = (bst_calibration_counts){.frames = c->frames,
+                                       .sources = c->trial_count,
+                                       .detected = c->detected,
+                                       .false_alarms = c->alarm_count};
+    bst_obsgen_calibration_theory(out);
+    if (c->trial_count < LEAST_SOURCES || c->alarm_count < LEAST_ALARMS) {
+        return bst_fail(ctx, BST_ERR_STATE,
+                        "%ld stars near the detection limit and %ld false alarms are too few for a "
+                        "calibration (needed: %d and %d); give --seeds more, or scenarios with "
+                        "world/faint_stars = \"statistical\" and a scenegen/v_limit beyond the "
+                        "limit of detection",
+                        c->trial_count, c->alarm_count, LEAST_SOURCES, LEAST_ALARMS);
+    }
+    fit_detection(c, out);
+    fit_places(c->across, out->across_factor);
+    fit_places(c->along, out->along_factor);
+    for (int i = 0; i < BST_OBSGEN_SNRS; i++) {
+        counts->places += c->across[i].count;
+    }
+    out->phase_bias_px = c->bias_weight > 0.0 ? c->bias_sum / c->bias_weight : 0.0;
+    out->threshold_offset = c->threshold_offset / (double)c->frames;
+    /* noise^2 = factor^2 theory^2 + crowding light */
+    double determinant = c->nn * c->qq - c->nq * c->nq;
+    double flat = c->ny / c->nn, crowding = out->crowding;
+    if (determinant > 1e-9 * c->nn * c->qq) {
+        crowding = fmin(fmax((c->nn * c->qy - c->nq * c->ny) / determinant, 0.0), 2.0);
+    }
+    flat = (c->ny - crowding * c->nq) / c->nn;
+    out->crowding = crowding;
+    out->noise_factor = sqrt(fmax(flat, 0.01));
+    out->false_alarm_factor = (double)c->alarm_count / c->alarms_expected;
+    double energy = 0.0;
+    for (long i = 0; i < c->alarm_count; i++) {
+        energy += fmin(c->alarm_energy[i], 10.0);
+    }
+    out->false_alarm_tail = fmin((double)c->alarm_count / fmax(energy, 1e-3), 10.0);
+    if (c->identifiable >= LEAST_PLACES) {
+        out->star_id_probability = (double)c->identified / (double)c->identifiable;
+    }
+    if (c->hits >= LEAST_SOURCES) {
+        out->hit_told_probability = (double)c->hits_told / (double)c->hits;
+    }
+    return BST_OK;
+}

@@ -1,0 +1,36 @@
+/* Mean elements for SGP4 that follow a given orbit. */
+#ifndef BST_ASTRO_SGP4_FIT_H
+#define BST_ASTRO_SGP4_FIT_H
+
+#include "sim/astro/sgp4.h"
+#include "sim/core/vec.h"
+
+/* A place on the orbit, TEME of date, m, so many minutes after the elements' epoch. */
+typedef struct bst_sgp4_place {
+    double minutes;
+    bst_vec3 position_teme_m;
+} bst_sgp4_place;
+
+/* Fits the six mean elements of `elements`, whose epoch, names and bstar are the caller's, so that
+ * SGP4 (WGS-72, improved mode) comes nearest to `count` (at least 6) places in the sense of least
+ * squares. `position_teme_m`, `velocity_teme_mps`: the state at the epoch, which the iteration
+ * starts from. Mean motion, eccentricity vector, inclination vector and mean longitude are what is
+ * varied: regular for circular and equatorial orbits. *rms_m: of the distances that remain.
+ * BST_ERR_NUMERIC when the state is on no ellipse or within 0.1 degree of 180 degrees of
+ * inclination, or without convergence; BST_ERR_ARGUMENT for too few places.
+ * Vallado and Crawford, SGP4 orbit determination, AIAA 2008-6770. */
+bst_status bst_sgp4_fit(bst_ctx *ctx, const bst_sgp4_place *places, int count,
+                        bst_vec3 position_teme_m, bst_vec3 velocity_teme_mps,
+                        bst_elements *elements, double *rms_m) BST_MUST_CHECK;
+
+/* Osculating elements of a state (m, m/s; any axes) about a centre of gravitational parameter mu
+ * (m^3/s^2). Circular orbits have their perigee at the node, equatorial ones their node at x. */
+typedef struct bst_kepler_elements {
+    double semi_major_axis_m; /* negative: hyperbola */
+    double eccentricity;
+    double inclination_rad, raan_rad, arg_perigee_rad;
+    double mean_anomaly_rad; /* of a hyperbola the hyperbolic one */
+} bst_kepler_elements;
+bst_kepler_elements bst_kepler_elements_of(double mu, bst_vec3 position_m, bst_vec3 velocity_mps);
+
+#endif

@@ -1,0 +1,211 @@
+#include "sim/eval/location_bound.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/core/vec.h"
+
+enum { N = BST_BOUND_COUNT };
+
+/* Inverse of a symmetric positive definite matrix by its Cholesky factor; false if it is none. */
+static bool invert(const double in[N][N], double out[N][N]) {
+    double l[N][N] = {{0.0}}, scale[N];
+    for (int i = 0; i < N; i++) {
+        if (!(in[i][i] > 0.0)) {
+            return false;
+        }
+        scale[i] = 1.0 / sqrt(in[i][i]);
+    }
+    for (int i = 0; i < N; i++) {
+        for (int j = 0; j <= i; j++) {
+            double sum = in[i][j] * scale[i] * scale[j];
+            for (int k = 0; k < j; k++) {
+                sum -= l[i][k] * l[j][k];
+            }
+            if (i == j && !(sum > 1e-12)) {
+                return false;
+            }
+            l[i][j] = i == j ? sqrt(sum) : sum / l[j][j];
+        }
+    }
+    for (int c = 0; c < N; c++) {
+        double v[N];
+        for (int i = 0; i < N; i++) {
+            v[i] = i == c;
+            for (int k = 0; k < i; k++) {
+                v[i] -= l[i][k] * v[k];
+            }
+            v[i] /= l[i][i];
+        }
+        for (int i = N - 1; i >= 0; i--) {
+            for (int k = i + 1; k < N; k++) {
+                v[i] -= l[k][i] * v[k];
+            }
+            v[i] /= l[i][i];
+            out[i][c] = v[i] * scale[i] * scale[c];
+        }
+    }
+    return true;
+}
+
+bst_status bst_location_bound_of(bst_ctx *ctx, const double *share, const double *by_x,
+                                 const double *by_y, int count, double flux_e,
+                                 const bst_bound_noise *noise, bst_location_bound *out) {
+    double variance = noise->noise_e * noise->noise_e, fisher[N][N] = {{0.0}}, sharpness = 0.0;
+    if (!(flux_e > 0.0 && variance > 0.0)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "a bound needs flux and noise above 0 (flux %g e-, noise %g e-)", flux_e,
+                        noise->noise_e);
+    }
+    for (int p = 0; p < count; p++) {
+        double slope[N] = {flux_e * by_x[p], flux_e * by_y[p], share[p], 1.0};
+        double v = variance + (noise->own_shot_noise ? fmax(flux_e * share[p], 0.0) : 0.0);
+        for (int i = 0; i < N; i++) {
+            for (int j = 0; j <= i; j++) {
+                fisher[i][j] += slope[i] * slope[j] / v;
+            }
+        }
+        sharpness += share[p] * share[p];
+    }
+    if (!invert(fisher, out->covariance)) {
+        return bst_fail(ctx, BST_ERR_NUMERIC,
+                        "%d pixels do not determine place, flux and background", count);
+    }
+    out->snr = flux_e * sqrt(sharpness / variance);
+    return BST_OK;
+}
+
+void bst_location_bound_along(const bst_location_bound *bound, double dx, double dy,
+                              double out[2]) {
+    double length = hypot(dx, dy), c = length > 0.0 ? dx / length : 1.0,
+           s = length > 0.0 ? dy / length : 0.0;
+    double xx = bound->covariance[BST_BOUND_X][BST_BOUND_X],
+           xy = bound->covariance[BST_BOUND_X][BST_BOUND_Y],
+           yy = bound->covariance[BST_BOUND_Y][BST_BOUND_Y];
+    out[0] = c * c * xx + 2.0 * c * s * xy + s * s * yy;
+    out[1] = s * s * xx - 2.0 * c * s * xy + c * c * yy;
+}
+
+/* A Gaussian's image on a rectangle of pixels. */
+typedef struct image {
+    int x0, y0, width, height, pixels;
+    double *share, *by_x, *by_y;         /* [height][width] */
+    double *row_share, *row_slope;       /* [width], of one node */
+    double *column_share, *column_slope; /* [height] */
+    double *memory;
+} image;
+
+/* Shares of a 1-D Gaussian about `centre` in pixels 0 .. count-1 and their derivatives by the
+ * centre, in the pixels within 8.3 sigma: what is beyond is below 1e-16. */
+static void profile(double centre, double sigma, int count, double *share, double *slope,
+                    int *first, int *last) {
+    double reach = 8.3 * sigma;
+    *first = (int)fmax(0.0, floor(centre - reach + 0.5));
+    *last = (int)fmin(count - 1.0, floor(centre + reach + 0.5));
+    double scale = 1.0 / (sigma * sqrt(2.0)), peak = 1.0 / (sigma * sqrt(2.0 * BST_PI));
+    double t = (*first - 0.5 - centre) * scale;
+    double step = erf(t), bell = exp(-t * t);
+    for (int i = *first; i <= *last; i++) {
+        t = (i + 0.5 - centre) * scale;
+        double next = erf(t), next_bell = exp(-t * t);
+        share[i] = 0.5 * (next - step);
+        slope[i] = peak * (bell - next_bell);
+        step = next;
+        bell = next_bell;
+    }
+}
+
+static void add_node(image *m, double x, double y, double sigma, double weight) {
+    int x1, x2, y1, y2;
+    profile(x - m->x0, sigma, m->width, m->row_share, m->row_slope, &x1, &x2);
+    profile(y - m->y0, sigma, m->height, m->column_share, m->column_slope, &y1, &y2);
+    for (int j = y1; j <= y2; j++) {
+        double s = weight * m->column_share[j], d = weight * m->column_slope[j];
+        size_t row = (size_t)j * (size_t)m->width;
+        for (int i = x1; i <= x2; i++) {
+            m->share[row + (size_t)i] += s * m->row_share[i];
+            m->by_x[row + (size_t)i] += s * m->row_slope[i];
+            m->by_y[row + (size_t)i] += d * m->row_share[i];
+        }
+    }
+}
+
+/* Gauss-Legendre rule of six nodes on [-1/2, 1/2] (Abramowitz and Stegun, table 25.4). */
+static const double gauss_node[3] = {0.5 * 0.238619186083197, 0.5 * 0.661209386466265,
+                                     0.5 * 0.932469514203152};
+static const double gauss_weight[3] = {0.5 * 0.467913934572691, 0.5 * 0.360761573048139,
+                                       0.5 * 0.171324492379170};
+
+static void draw(image *m, const bst_bound_source *s) {
+    double length = hypot(s->dx_px, s->dy_px) / s->sigma_px;
+    if (length == 0.0) {
+        add_node(m, s->x_px, s->y_px, s->sigma_px, 1.0);
+        return;
+    }
+    int parts = (int)ceil(length / 1.5);
+    for (int p = 0; p < parts; p++) {
+        for (int k = 0; k < 6; k++) {
+            double u = k < 3 ? -gauss_node[2 - k] : gauss_node[k - 3];
+            double at = (p + 0.5 + u) / parts - 0.5; /* of the path, -1/2 to 1/2 */
+            add_node(m, s->x_px + at * s->dx_px, s->y_px + at * s->dy_px, s->sigma_px,
+                     gauss_weight[k < 3 ? 2 - k : k - 3] / parts);
+        }
+    }
+}
+
+static bst_status open_image(bst_ctx *ctx, const bst_bound_source *s, double margin_px,
+                             image *out) {
+    double half_x = 0.5 * fabs(s->dx_px) + margin_px, half_y = 0.5 * fabs(s->dy_px) + margin_px;
+    if (!(s->sigma_px >= 0.01 && s->sigma_px <= 1000.0 && margin_px >= 0.0 && fabs(s->x_px) < 1e8 &&
+          fabs(s->y_px) < 1e8 && (2.0 * half_x + 1.0) * (2.0 * half_y + 1.0) <= 1e7)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "no bound for a PSF of sigma %g px, streak (%g, %g) px, margin %g px: "
+                        "sigma must be 0.01 to 1000 px and the region at most 1e7 pixels",
+                        s->sigma_px, s->dx_px, s->dy_px, margin_px);
+    }
+    image m = {.x0 = (int)ceil(s->x_px - half_x), .y0 = (int)ceil(s->y_px - half_y)};
+    m.width = (int)floor(s->x_px + half_x) - m.x0 + 1;
+    m.height = (int)floor(s->y_px + half_y) - m.y0 + 1;
+    m.pixels = m.width * m.height;
+    size_t n = (size_t)m.pixels;
+    m.memory = calloc(3 * n + 2 * (size_t)(m.width + m.height), sizeof *m.memory);
+    if (!m.memory) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a bound on %d pixels", m.pixels);
+    }
+    m.share = m.memory;
+    m.by_x = m.share + n;
+    m.by_y = m.by_x + n;
+    m.row_share = m.by_y + n;
+    m.row_slope = m.row_share + m.width;
+    m.column_share = m.row_slope + m.width;
+    m.column_slope = m.column_share + m.height;
+    *out = m;
+    return BST_OK;
+}
+
+bst_status bst_location_bound_gaussian(bst_ctx *ctx, const bst_bound_source *source,
+                                       const bst_bound_noise *noise, double margin_px,
+                                       bst_location_bound *out) {
+    image m = {.pixels = 0};
+    BST_TRY(open_image(ctx, source, margin_px, &m));
+    draw(&m, source);
+    bst_status status =
+        bst_location_bound_of(ctx, m.share, m.by_x, m.by_y, m.pixels, source->flux_e, noise, out);
+    free(m.memory);
+    return status;
+}
+
+bst_status bst_gaussian_powers(bst_ctx *ctx, const bst_bound_source *source, double out[2]) {
+    image m = {.pixels = 0};
+    BST_TRY(open_image(ctx, source, 8.3 * source->sigma_px + 1.0, &m));
+    draw(&m, source);
+    out[0] = out[1] = 0.0;
+    for (int p = 0; p < m.pixels; p++) {
+        double square = m.share[p] * m.share[p];
+        out[0] += square;
+        out[1] += square * m.share[p];
+    }
+    free(m.memory);
+    return BST_OK;
+}

@@ -1,0 +1,155 @@
+#include "sim/eval/track_bound.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "sim/core/rng.h"
+#include "sim/core/vec.h"
+
+/* Inverse of a symmetric positive definite matrix by Cholesky after scaling the diagonal to 1. */
+static bool invert(double a[4][4], double out[4][4]) {
+    double scale[4], l[4][4] = {{0}}, m[4][4] = {{0}};
+    for (int i = 0; i < 4; i++) {
+        if (!(a[i][i] > 0.0)) {
+            return false;
+        }
+        scale[i] = 1.0 / sqrt(a[i][i]);
+    }
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j <= i; j++) {
+            double v = a[i][j] * scale[i] * scale[j];
+            for (int k = 0; k < j; k++) {
+                v -= l[i][k] * l[j][k];
+            }
+            if (i == j && !(v > 1e-15)) {
+                return false;
+            }
+            l[i][j] = i == j ? sqrt(v) : v / l[j][j];
+        }
+    }
+    for (int i = 0; i < 4; i++) {
+        m[i][i] = 1.0 / l[i][i];
+        for (int j = 0; j < i; j++) {
+            double v = 0.0;
+            for (int k = j; k < i; k++) {
+                v -= l[i][k] * m[k][j];
+            }
+            m[i][j] = v / l[i][i];
+        }
+    }
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < 4; j++) {
+            double v = 0.0;
+            for (int k = 0; k < 4; k++) {
+                v += m[k][i] * m[k][j];
+            }
+            out[i][j] = v * scale[i] * scale[j];
+        }
+    }
+    return true;
+}
+
+bool bst_track_bound_start(bst_track_bound *bound, const double r1[3], const double r2[3],
+                           double dt_s, double noise_rad2ps3) {
+    double p[4][4];
+    for (int i = 0; i < 2; i++) {
+        for (int j = 0; j < 2; j++) {
+            double a = r1[i + j], b = r2[i + j];
+            p[i][j] = b;
+            p[i][j + 2] = p[j + 2][i] = b / dt_s;
+            p[i + 2][j + 2] = (a + b) / (dt_s * dt_s) + (i == j ? noise_rad2ps3 * dt_s / 3.0 : 0.0);
+        }
+    }
+    return invert(p, bound->information);
+}
+
+bool bst_track_bound_step(bst_track_bound *bound, double dt_s, double rate_radps,
+                          double noise_rad2ps3, const double r[3], double factor) {
+    double angle = rate_radps * dt_s;
+    double sinc = fabs(angle) > 1e-4 ? sin(angle) / angle : 1.0 - angle * angle / 6.0;
+    const double f[4][4] = {{1, 0, dt_s, 0},
+                            {0, cos(angle), 0, dt_s * sinc},
+                            {0, 0, 1, 0},
+                            {0, -rate_radps * sin(angle), 0, cos(angle)}};
+    double p[4][4], t[4][4], moved[4][4];
+    if (!invert(bound->information, p)) {
+        return false;
+    }
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < 4; j++) {
+            t[i][j] = 0.0;
+            for (int k = 0; k < 4; k++) {
+                t[i][j] += f[i][k] * p[k][j];
+            }
+        }
+    }
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < 4; j++) {
+            moved[i][j] = 0.0;
+            for (int k = 0; k < 4; k++) {
+                moved[i][j] += t[i][k] * f[j][k];
+            }
+        }
+    }
+    for (int i = 0; i < 2; i++) {
+        moved[i][i] += noise_rad2ps3 * dt_s * dt_s * dt_s / 3.0;
+        moved[i][i + 2] += noise_rad2ps3 * dt_s * dt_s / 2.0;
+        moved[i + 2][i] += noise_rad2ps3 * dt_s * dt_s / 2.0;
+        moved[i + 2][i + 2] += noise_rad2ps3 * dt_s;
+    }
+    double det = r[0] * r[2] - r[1] * r[1];
+    if (!(det > 0.0) || !invert(moved, bound->information)) {
+        return false;
+    }
+    bound->information[0][0] += factor * r[2] / det;
+    bound->information[0][1] -= factor * r[1] / det;
+    bound->information[1][0] -= factor * r[1] / det;
+    bound->information[1][1] += factor * r[0] / det;
+    return true;
+}
+
+bool bst_track_bound_covariance(const bst_track_bound *bound, double covariance[4][4]) {
+    double j[4][4];
+    memcpy(j, bound->information, sizeof j);
+    return invert(j, covariance);
+}
+
+/* Half width, in sigma, of the square about the true place in which false alarms are drawn: those
+ * beyond say less than exp(-18) about the place. */
+#define REACH 6.0
+#define DRAWS 200000
+
+double bst_information_factor(double pd, double density) {
+    if (!(density > 0.0)) {
+        return pd;
+    }
+    bst_rng_key key = bst_rng_make_key(0, 0, "track_bound", "information_factor");
+    double mean = density * 4.0 * REACH * REACH, ratio = pd / (2.0 * BST_PI * density);
+    double sum = 0.0;
+    for (uint64_t i = 0; i < DRAWS; i++) {
+        uint64_t draw = 0;
+        double weight = 1.0 - pd, score[2] = {0.0, 0.0};
+        if (bst_rng_uniform(key, i, draw++) < pd) {
+            double n[2];
+            bst_rng_normal2(key, i, draw++, n);
+            double w = ratio * exp(-0.5 * (n[0] * n[0] + n[1] * n[1]));
+            weight += w;
+            score[0] += w * n[0];
+            score[1] += w * n[1];
+        }
+        /* gaps between false alarms in a Poisson sequence of length `mean` */
+        for (double t = -log(bst_rng_uniform(key, i, draw++)); t < mean;
+             t -= log(bst_rng_uniform(key, i, draw++))) {
+            double x = REACH * (2.0 * bst_rng_uniform(key, i, draw++) - 1.0);
+            double y = REACH * (2.0 * bst_rng_uniform(key, i, draw++) - 1.0);
+            double w = ratio * exp(-0.5 * (x * x + y * y));
+            weight += w;
+            score[0] += w * x;
+            score[1] += w * y;
+        }
+        if (weight > 0.0) {
+            sum += (score[0] * score[0] + score[1] * score[1]) / (weight * weight);
+        }
+    }
+    return 0.5 * sum / DRAWS;
+}

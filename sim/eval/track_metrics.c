@@ -1,0 +1,180 @@
+#include "sim/eval/track_metrics.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/eval/gospa.h"
+
+typedef struct object_record {
+    int64_t visible, tracked, last_track; /* frames, frames, identity (0: none yet) */
+    double first_seen_s, first_tracked_s;
+    int breaks;
+} object_record;
+
+typedef struct track_record {
+    int64_t id, frames;
+} track_record;
+
+struct bst_track_metrics {
+    int objects, max_tracks, max_at_once;
+    double cutoff;
+    int64_t frames;
+    double first_s, last_s, gospa2;
+    int tracks;
+    object_record *object;
+    track_record *track;
+    int64_t *paired; /* frames of track t with object o: [t * objects + o] */
+    double *distance;
+    int *row, *pair, *identity;
+};
+
+bst_status bst_track_metrics_create(bst_ctx *ctx, int objects, int max_tracks, int max_at_once,
+                                    double cutoff_rad, bst_track_metrics **out) {
+    *out = NULL;
+    if (objects < 0 || max_tracks < 1 || max_at_once < 1 || !(cutoff_rad > 0.0)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "track metrics: need room for a track and a cutoff > 0");
+    }
+    bst_track_metrics *m = calloc(1, sizeof *m);
+    if (!m) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "track metrics: out of memory");
+    }
+    size_t o = (size_t)objects + 1, t = (size_t)max_tracks, now = (size_t)max_at_once;
+    m->objects = objects;
+    m->max_tracks = max_tracks;
+    m->max_at_once = max_at_once;
+    m->cutoff = cutoff_rad;
+    m->object = calloc(o, sizeof *m->object);
+    m->track = calloc(t, sizeof *m->track);
+    m->paired = calloc(t * o, sizeof *m->paired);
+    m->distance = calloc(o * now, sizeof *m->distance);
+    m->row = calloc(o, sizeof *m->row);
+    m->pair = calloc(o, sizeof *m->pair);
+    m->identity = calloc(now, sizeof *m->identity);
+    if (!m->object || !m->track || !m->paired || !m->distance || !m->row || !m->pair ||
+        !m->identity) {
+        bst_track_metrics_free(m);
+        return bst_fail(ctx, BST_ERR_MEMORY, "track metrics: out of memory");
+    }
+    *out = m;
+    return BST_OK;
+}
+
+void bst_track_metrics_free(bst_track_metrics *m) {
+    if (m) {
+        free(m->object);
+        free(m->track);
+        free(m->paired);
+        free(m->distance);
+        free(m->row);
+        free(m->pair);
+        free(m->identity);
+        free(m);
+    }
+}
+
+static int identify(bst_track_metrics *m, int64_t id) {
+    /* identities grow: the newest are asked for most */
+    for (int t = m->tracks - 1; t >= 0; t--) {
+        if (m->track[t].id == id) {
+            return t;
+        }
+    }
+    if (m->tracks == m->max_tracks) {
+        return -1;
+    }
+    m->track[m->tracks] = (track_record){.id = id};
+    return m->tracks++;
+}
+
+static void note(object_record *object, double seconds, int64_t id) {
+    if (object->tracked++ == 0) {
+        object->first_tracked_s = seconds;
+    } else if (object->last_track != id) {
+        object->breaks++;
+    }
+    object->last_track = id;
+}
+
+bst_status bst_track_metrics_frame(bst_ctx *ctx, bst_track_metrics *m, double seconds,
+                                   const bst_vec3 *truth, const bool *visible,
+                                   const int64_t *track_ids, const bst_vec3 *track_directions,
+                                   int tracks) {
+    if (tracks > m->max_at_once) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "track metrics: %d tracks in a frame, room for %d",
+                        tracks, m->max_at_once);
+    }
+    for (int t = 0; t < tracks; t++) {
+        m->identity[t] = identify(m, track_ids[t]);
+        if (m->identity[t] < 0) {
+            return bst_fail(ctx, BST_ERR_ARGUMENT,
+                            "track metrics: more than %d identities; give more room",
+                            m->max_tracks);
+        }
+    }
+    int rows = 0;
+    for (int o = 0; o < m->objects; o++) {
+        if (!visible[o]) {
+            continue;
+        }
+        for (int t = 0; t < tracks; t++) {
+            m->distance[rows * tracks + t] = bst_vec3_angle(truth[o], track_directions[t]);
+        }
+        m->row[rows++] = o;
+        if (m->object[o].visible++ == 0) {
+            m->object[o].first_seen_s = seconds;
+        }
+    }
+    bst_gospa_result gospa;
+    BST_TRY(bst_gospa(ctx, m->distance, rows, tracks, m->cutoff, 2.0, m->pair, &gospa));
+    m->gospa2 += gospa.gospa * gospa.gospa;
+    for (int r = 0; r < rows; r++) {
+        if (m->pair[r] >= 0) {
+            int t = m->identity[m->pair[r]], o = m->row[r];
+            m->paired[t * m->objects + o]++;
+            note(&m->object[o], seconds, m->track[t].id);
+        }
+    }
+    for (int t = 0; t < tracks; t++) {
+        m->track[m->identity[t]].frames++;
+    }
+    m->first_s = m->frames == 0 ? seconds : m->first_s;
+    m->last_s = seconds;
+    m->frames++;
+    return BST_OK;
+}
+
+void bst_track_metrics_figures(const bst_track_metrics *m, bst_track_figures *out) {
+    memset(out, 0, sizeof *out);
+    out->frames = m->frames;
+    out->hours = (m->last_s - m->first_s) / 3600.0;
+    out->gospa_rms = m->frames > 0 ? sqrt(m->gospa2 / (double)m->frames) : NAN;
+    int64_t visible = 0, tracked = 0, most_sum = 0, paired_sum = 0;
+    double wait = 0.0;
+    for (int o = 0; o < m->objects; o++) {
+        const object_record *object = &m->object[o];
+        visible += object->visible;
+        tracked += object->tracked;
+        out->objects_seen += object->visible > 0;
+        out->objects_tracked += object->tracked > 0;
+        out->breaks += object->breaks;
+        wait += object->tracked > 0 ? object->first_tracked_s - object->first_seen_s : 0.0;
+    }
+    out->tracks = m->tracks;
+    for (int t = 0; t < m->tracks; t++) {
+        int64_t most = 0, all = 0;
+        for (int o = 0; o < m->objects; o++) {
+            int64_t n = m->paired[t * m->objects + o];
+            all += n;
+            most = n > most ? n : most;
+        }
+        most_sum += most;
+        paired_sum += all;
+        out->false_tracks += 2 * all < m->track[t].frames;
+    }
+    out->coverage = visible > 0 ? (double)tracked / (double)visible : NAN;
+    out->time_to_confirm_s = out->objects_tracked > 0 ? wait / out->objects_tracked : NAN;
+    out->purity = paired_sum > 0 ? (double)most_sum / (double)paired_sum : NAN;
+    out->false_tracks_per_hour = out->hours > 0.0 ? out->false_tracks / out->hours : NAN;
+}

@@ -1,0 +1,69 @@
+#!/usr/bin/env python3
+"""The main job with observation_source "generator": found, confirmed, held, and the same again.
+
+Usage, from the repository root:
+  /usr/bin/python3 tests/e2e/test_generator.py BORESIGHT
+"""
+import os
+import unittest
+
+import runs
+
+GENERATOR = runs.SENSOR + "/observation_source=generator"
+
+
+class Generator(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = runs.scratch()
+
+    def play(self, name, *sets, **options):
+        out = os.path.join(self.folder, name)
+        return out, runs.run(runs.TRACK, out, "/record/telemetry_hz=0.1", GENERATOR, *sets,
+                             **options)["summary"]
+
+    def test_confirms_and_holds(self):
+        for seed in range(1, 6):
+            _, summary = self.play(f"seed{seed}", seed=seed, duration=150)
+            self.assertEqual(summary["final_mode"], "track", seed)
+            # as the image path does (README): confirmed within a minute, then held
+            self.assertLess(summary["time_to_confirm_s"], 60, seed)
+            self.assertGreaterEqual(summary["track_fraction"], 0.95, seed)
+            # the image path's is 0.21 px; five seeds of 100 frames scatter by a tenth
+            self.assertLess(summary["pointing_rms_px"], 0.35, seed)
+            self.assertEqual(summary["wrong_target_frames"], 0, seed)
+
+    def test_repeats_whatever_the_threads(self):
+        tables = []
+        for name, options in (("a", {}), ("b", {"threads": 2}), ("c", {"serial": True})):
+            out, _ = self.play(name, seed=9, duration=40, **options)
+            db = runs.database(out)
+            tables.append([[tuple(row) for row in db.execute(f"SELECT * FROM {table}")]
+                           for table in ("detections", "truth", "tracks", "control")])
+        self.assertTrue(tables[0][0] and tables[0][2])
+        self.assertEqual(tables[0], tables[1])
+        self.assertEqual(tables[0], tables[2])
+
+    def test_truth_is_that_of_the_image(self):
+        truths = []
+        for source in ("image", "generator"):
+            out = os.path.join(self.folder, "truth_" + source)
+            # two frames: the third is pointed by what was seen in the first
+            runs.run(runs.STARE, out, runs.NO_FRAMES, duration=2,
+                     *[f"{runs.SENSOR}/observation_source={source}"])
+            db = runs.database(out)
+            truths.append([tuple(row) for row in db.execute(
+                "SELECT exposure_id, kind, id, in_field, x_mean_px, y_mean_px, electrons, snr "
+                "FROM truth")])
+        self.assertTrue(truths[0])
+        # the generator asks for a margin of its own beyond the window
+        inside = [[row for row in rows if row[3]] for rows in truths]
+        self.assertEqual(inside[0], inside[1])
+
+
+def tearDownModule():
+    runs.clean()
+
+
+if __name__ == "__main__":
+    unittest.main()

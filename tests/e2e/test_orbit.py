@@ -1,0 +1,168 @@
+#!/usr/bin/env python3
+"""boresight orbit: from rendered frames to an orbit, judged by the truth that it does not use.
+
+Usage, from the repository root: /usr/bin/python3 tests/e2e/test_orbit.py BORESIGHT
+"""
+import json
+import math
+import os
+import subprocess
+import unittest
+
+import runs
+from readers import read_oem, read_tdm, seconds
+
+
+def call(*words):
+    return subprocess.run([runs.BORESIGHT, *words], capture_output=True, text=True, timeout=120)
+
+
+class Orbit(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = runs.scratch()
+        cls.made = os.path.join(cls.folder, "run")
+        runs.run(runs.TRACK, cls.made, runs.NO_FRAMES, duration=140)
+        cls.database = runs.database(cls.made)
+        cls.epoch = cls.database.execute("SELECT epoch_utc FROM run").fetchone()[0]
+        files = {key: os.path.join(cls.folder, name)
+                 for key, name in (("oem", "o.oem"), ("omm", "o.json"), ("tdm", "o.tdm"),
+                                   ("json", "obs.json"), ("report", "r.json"))}
+        words = [word for key, path in files.items() for word in ("--" + key, path)]
+        result = call("orbit", cls.made, "--predict", "3600", "--step", "5", *words)
+        if result.returncode or result.stderr:
+            raise AssertionError(result.stderr)
+        cls.said, cls.files = result.stdout, files
+        with open(files["report"], encoding="utf-8") as file:
+            cls.report = json.load(file)
+
+    def truth(self):
+        """True states of the object every second."""
+        out = os.path.join(self.folder, "true")
+        result = call("export", self.made, "--orbits", "oem", "--step", "0.25", "--out", out)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return {round(4 * seconds(utc, self.epoch)): state
+                for utc, state in read_oem(out + "/orbits.oem")[1][1]}
+
+    def test_it_is_the_true_orbit(self):
+        report = self.report
+        self.assertEqual((report["object"], report["observer"]), ("INMARSAT GX5", "neossat"))
+        self.assertGreater(report["used"], 100)
+        self.assertEqual(report["rejected"], 0)
+        # five sigma of chi-square over its degrees of freedom, with what the model of errors lacks
+        self.assertAlmostEqual(report["chi2"] / report["dof"], 1,
+                               delta=5 * math.sqrt(2 / report["dof"]) + 0.1)
+        state = self.truth()[round(4 * report["epoch_s"])]
+        sigma = [math.sqrt(report["covariance_gcrf"][i][i]) for i in range(6)]
+        found = report["position_gcrf_m"] + report["velocity_gcrf_mps"]
+        for i in range(6):
+            # four sigma, and SGP4's velocity, which is 0.1 m/s from its positions' derivative
+            self.assertAlmostEqual(found[i], 1e3 * state[i], delta=4 * sigma[i] + 0.2 * (i > 2))
+        # two minutes of a LEO's own motion tell the range of a GEO to some 10 km
+        self.assertLess(math.hypot(*sigma[:3]), 100e3)
+        self.assertAlmostEqual(report["osculating"]["semi_major_axis_m"], 42.165e6, delta=1e6)
+
+    def test_what_it_says(self):
+        self.assertIn("neossat/telescope, track 1 (INMARSAT GX5)\n", self.said)
+        self.assertIn(f"{self.report['used']} used, 0 left out", self.said)
+
+    def test_oem_and_omm(self):
+        (meta, rows), = read_oem(self.files["oem"])
+        self.assertEqual((meta["OBJECT_NAME"], meta["REF_FRAME"]), ("INMARSAT GX5", "GCRF"))
+        start, stop = (seconds(rows[i][0], self.epoch) for i in (0, -1))
+        self.assertAlmostEqual(stop - start, self.report["arc_s"] + 3600, delta=1e-6)
+        with open(self.files["oem"], encoding="ascii") as file:
+            text = file.read()
+        block = text[text.index("COVARIANCE_START"):].splitlines()
+        self.assertEqual([len(line.split()) for line in block[3:9]], [1, 2, 3, 4, 5, 6])
+        self.assertAlmostEqual(float(block[3]) * 1e6 / self.report["covariance_gcrf"][0][0], 1,
+                               delta=1e-10)
+        # our own reader takes it: an object of a scenario moves along it
+        target = "/world/objects=" + json.dumps([{"name": "INMARSAT GX5", "orbit": {
+            "source": "oem", "oem_file": self.files["oem"]}}])
+        epoch = '/epoch_utc="2022-06-16T22:11:00Z"'
+        checked = call("check", runs.TRACK, "--quiet", "--set", target, "--set", epoch,
+                       "--duration", "60", "--set", "/world/star_catalogue=embedded")
+        self.assertEqual(checked.returncode, 0, checked.stderr)
+        # mean elements: SGP4 goes along the orbit as far as it says
+        with open(self.files["omm"], encoding="utf-8") as file:
+            omm, = json.load(file)
+        self.assertEqual((omm["MEAN_ELEMENT_THEORY"], omm["REF_FRAME"]), ("SGP4", "TEME"))
+        self.assertAlmostEqual(omm["MEAN_MOTION"], 1.0027, delta=0.03)
+        table = call("propagate", "--elements", self.files["omm"], "--frame", "gcrf", "--start",
+                     "2022-06-16T22:12:00Z", "--stop", "2022-06-16T22:12:00Z", "--step", "1")
+        self.assertEqual(table.returncode, 0, table.stderr)
+        place = [float(word) for word in table.stdout.splitlines()[-1].split(",")[2:5]]
+        near = min(rows, key=lambda row: abs(seconds(row[0], self.epoch) - 120))
+        away = seconds(near[0], self.epoch) - 120
+        expected = [near[1][i] - away * near[1][3 + i] for i in range(3)]
+        self.assertLess(math.dist(place, expected) * 1e3,
+                        5 * self.report["mean_elements_rms_m"] + 1)
+
+    def test_observations(self):
+        (meta, data), = read_tdm(self.files["tdm"])
+        self.assertEqual((meta["PARTICIPANT_1"], meta["PARTICIPANT_2"], meta["ANGLE_TYPE"]),
+                         ("neossat", "INMARSAT GX5", "RADEC"))
+        with open(self.files["json"], encoding="utf-8") as file:
+            items = json.load(file)
+        truth = {round(row["mid_s"] * 1e6): row for row in self.database.execute(
+            "SELECT t.mid_s, ra_deg, dec_deg, observer_gcrf_x_m FROM truth t JOIN exposures e"
+            " USING (sensor, exposure_id) WHERE kind = 'object'")}
+        self.assertEqual(len(items), len(data["ANGLE_1"]))
+        worst = 0
+        for item, (utc, ra), (_, dec) in zip(items, data["ANGLE_1"], data["ANGLE_2"], strict=True):
+            self.assertAlmostEqual(item["ra"], ra, delta=1e-9)
+            row = truth[round(seconds(utc, self.epoch) * 1e6)]
+            self.assertEqual(seconds(item["obTime"], self.epoch), seconds(utc, self.epoch))
+            self.assertEqual((item["type"], item["satNo"], item["uct"]), ("OPTICAL", 44801, False))
+            self.assertAlmostEqual(item["senx"], row["observer_gcrf_x_m"] * 1e-3, delta=1e-6)
+            self.assertAlmostEqual(item["expDuration"], 0.5, delta=1e-9)
+            off = math.hypot((ra - row["ra_deg"]) * math.cos(math.radians(dec)),
+                             dec - row["dec_deg"])
+            worst = max(worst, off / math.hypot(item["raUnc"], item["declinationUnc"]))
+        self.assertLess(worst, 5)  # of hundreds
+
+    def test_from_a_tdm(self):
+        """What is exported and read again gives the same orbit."""
+        out = os.path.join(self.folder, "out")
+        self.assertEqual(call("export", self.made, "--observations", "tdm", "--out",
+                              out).returncode, 0)
+        report = os.path.join(self.folder, "again.json")
+        words = [out + "/observations.tdm", "--observer", out + "/observers.oem"]
+        result = call("orbit", *words, "--sigma", "0.16", "--report", report)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with open(report, encoding="utf-8") as file:
+            again = json.load(file)
+        self.assertEqual((again["object"], again["observer"]), ("INMARSAT GX5", "neossat"))
+        self.assertEqual(again["used"], self.report["used"])
+        # other weights, the same angles: well within what they leave open
+        self.assertLess(math.dist(again["position_gcrf_m"], self.report["position_gcrf_m"]),
+                        0.5 * self.report["range_sigma_m"])
+        # aberration that was not there is 20 arcsec, the same for all: the target's own apparent
+        # place, which no orbit shows; but the range goes wrong where it changes
+        wrong = call("orbit", *words, "--aberration", "contained")
+        self.assertNotEqual(wrong.stdout.splitlines()[6:8], result.stdout.splitlines()[6:8])
+        for extra, message in (((words[0],), "add --observer FILE.oem"),
+                               ((*words, "--object", "X"), 'has no angles of "X"'),
+                               ((*words, "--observer-name", "X"), "observers.oem"),
+                               ((words[2], "--observer", words[2]), "does not begin as a TDM")):
+            result = call("orbit", *extra)
+            self.assertEqual(result.returncode, 1)
+            self.assertIn(message, result.stderr)
+
+    def test_mistakes(self):
+        for words, code, message in (
+                ((self.made, "--track", "77"), 1, "holds no confirmed track 77"),
+                ((self.made, "--sensor", "x"), 1, 'has no sensor "x"; it has neossat/telescope'),
+                ((), 2, "one folder of a run, or a TDM, is expected"),
+                ((self.folder + "/none",), 1, "none"),
+                ((self.made, "--track", "0"), 2, "--track"),
+                ((self.made, "--oem", self.folder), 1, self.folder)):
+            result = call("orbit", *words)
+            self.assertEqual(result.returncode, code, result.stderr)
+            self.assertIn(message, result.stderr)
+        self.assertEqual(call("orbit", "--help").returncode, 0)
+
+
+if __name__ == "__main__":
+    unittest.main()

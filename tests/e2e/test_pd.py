@@ -1,0 +1,160 @@
+"""`boresight pd` from outside: its figures agree with one another and with formulae worked out here,
+the detector is near its bounds, results repeat, wrong calls are explained.
+
+Usage, from the repository root: /usr/bin/python3 tests/e2e/test_pd.py BORESIGHT
+"""
+import json
+import os
+import statistics
+import subprocess
+import unittest
+
+import numpy as np
+
+import runs
+
+NORMAL = statistics.NormalDist()
+
+
+def pd(*words, scenario=runs.STARE):
+    return subprocess.run([runs.BORESIGHT, "pd", scenario, *words], capture_output=True, text=True,
+                          timeout=600)
+
+
+class Measured(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = runs.scratch()
+        cls.path = os.path.join(cls.folder, "pd.json")
+        cls.plot = os.path.join(cls.folder, "pd.png")
+        cls.words = ["--snr", "3:9:1", "--trials", "300", "--false-alarms", "4", "--empty-frames",
+                     "60", "--threads", "1", "--json", cls.path]
+        cls.result = pd(*cls.words, "--plot", cls.plot)
+        with open(cls.path) as file:
+            cls.out = json.load(file)
+
+    def test_points(self):
+        self.assertEqual(self.result.returncode, 0, self.result.stderr)
+        self.assertEqual([p["snr"] for p in self.out["points"]], [3, 4, 5, 6, 7, 8, 9])
+        pixels = self.out["width_px"] * self.out["height_px"]
+        threshold = -NORMAL.inv_cdf(self.out["false_alarms_per_frame"] / pixels)
+        z = NORMAL.inv_cdf(0.975)
+        for p in self.out["points"]:
+            self.assertEqual(p["trials"], 300)
+            raw = p["detected"] / p["trials"]
+            self.assertAlmostEqual(p["pd"], (raw - self.out["chance"]) / (1 - self.out["chance"]),
+                                   delta=1e-12)
+            self.assertTrue(0 <= p["pd_low"] <= p["pd"] <= p["pd_high"] <= 1)
+            centre = (raw + z * z / 600) / (1 + z * z / 300)
+            self.assertAlmostEqual((p["pd_low"] + p["pd_high"]) / 2, centre,
+                                   delta=2 * self.out["chance"] + 1e-12)
+            self.assertTrue(min(p["ideal_pd"], 0.5) - 0.03 < p["matched_filter_pd"]
+                            < max(p["ideal_pd"], 0.5) + 0.03)
+            self.assertAlmostEqual(p["ideal_pd"], 1 - NORMAL.cdf(threshold - p["snr"]), delta=1e-9)
+
+    def test_light_is_what_the_snr_says(self):
+        """White noise, Gaussian PSF blurred by the jitter, integrated over pixels: the noise-
+        equivalent area is 4 pi (sigma^2 + 1/12) to half a per cent."""
+        sigma2 = (2 / 2.35482)**2 + self.out["jitter_px"]**2 + 1 / 12
+        self.assertAlmostEqual(self.out["jitter_px"], 0.14)
+        for p in self.out["points"]:
+            snr = p["flux_e"] / self.out["noise_e"] / np.sqrt(4 * np.pi * sigma2)
+            self.assertAlmostEqual(snr / p["snr"], 1, delta=0.005)
+        noise2 = self.out["background_e"] + 64  # read noise 8
+        self.assertAlmostEqual(self.out["noise_e"]**2, noise2, delta=1e-6)
+
+    def test_the_detector_is_near_its_bounds(self):
+        self.assertAlmostEqual(self.out["false_alarms_per_frame"], 4, delta=4 * np.sqrt(4 / 60) + 1)
+        self.assertLess(abs(self.out["loss_db_pd50"]), 0.8)
+        self.assertLess(abs(self.out["loss_db_pd90"]), 1.0)
+        bright = self.out["points"][-1]
+        self.assertGreater(bright["pd"], 0.97)
+        # RMS of 300: 4 %; a detector may be worse than the bound, not better
+        self.assertTrue(0.88 < bright["centroid_rms_over_bound"] < 1.3)
+        self.assertTrue(0.85 < bright["flux_rms_over_bound"] < 1.3)
+
+    def test_plot(self):
+        if os.path.exists(self.plot):  # gnuplot may be missing: a warning then
+            with open(self.plot, "rb") as file:
+                self.assertEqual(file.read(8), b"\x89PNG\r\n\x1a\n")
+        else:
+            self.assertIn("gnuplot", self.result.stderr)
+
+    def test_the_same_seed_gives_the_same(self):
+        again = pd(*self.words[:-1], self.path + ".2", "--threads", "2")
+        self.assertEqual(again.returncode, 0, again.stderr)
+        with open(self.path + ".2") as file:
+            out = json.load(file)
+        self.assertEqual(out["points"], self.out["points"])
+        self.assertEqual(out["false_alarms_per_frame"], self.out["false_alarms_per_frame"])
+
+    def test_a_module_is_stepped_to_the_same_end(self):
+        """The path of detectors that users plug in, taken with the one whose function was called."""
+        words = ["--snr", "5:7:1", "--trials", "60", "--empty-frames", "4", "--streak", "5",
+                 "--known-rate"]
+        out = []
+        for extra in ([], ["--module"]):
+            path = os.path.join(self.folder, "module.json")
+            result = pd(*words, "--json", path, *extra)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            with open(path) as file:
+                out.append(json.load(file))
+        self.assertEqual(out[0]["false_alarms_per_frame"], out[1]["false_alarms_per_frame"])
+        for a, b in zip(out[0]["points"], out[1]["points"]):
+            self.assertEqual(a["detected"], b["detected"])
+            # the camera's motion by telemetry differs in the last places
+            self.assertAlmostEqual(a["centroid_rms_across_px"], b["centroid_rms_across_px"],
+                                   delta=1e-6)
+
+    def test_stars_are_no_false_alarms(self):
+        path = os.path.join(self.folder, "stars.json")
+        for extra in ([], ["--star-streak", "12"]):
+            result = pd("--snr", "5:20:15", "--trials", "60", "--empty-frames", "15", "--stars",
+                        "--json", path, *extra)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            with open(path) as file:
+                out = json.load(file)
+            # V 16 in 0.73 square degrees of which the embedded catalogue has those to V 12
+            self.assertGreater(out["star_detections_per_frame"], 5)
+            self.assertLess(out["false_alarms_per_frame"], 3)  # 1 is asked for; 15: 0.26, 1 sigma
+            self.assertGreater(out["points"][1]["pd"], 0.9)
+
+    def test_streaks_of_known_rate(self):
+        path = os.path.join(self.folder, "streak.json")
+        result = pd("--snr", "10:30:20", "--trials", "40", "--empty-frames", "2", "--streak", "20",
+                    "--known-rate", "--json", path)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with open(path) as file:
+            out = json.load(file)
+        for p in out["points"]:
+            self.assertGreater(p["pd"], 0.9)
+            self.assertLess(p["centroid_rms_across_px"], 0.5)
+        self.assertIsNone(out["loss_db_pd50"])  # Pd is above a half all over
+
+
+class WrongCalls(unittest.TestCase):
+    def test_messages(self):
+        for words, code, hint in ((["--snr", "2:12"], 2, "FIRST:LAST:STEP"),
+                                  (["--snr", "9:3:1"], 2, "the first not above the last"),
+                                  (["--snr", "1:9:0.001"], 2, "more than 200 steps"),
+                                  (["--snr", "2:9:1", "--magnitude", "12:15:1"], 2, "not both"),
+                                  (["--known-rate"], 2, "--streak"),
+                                  (["--trials", "0"], 2, "trials"),
+                                  (["--sensor", "nobody"], 1, "OBSERVER/SENSOR"),
+                                  (["--stars", "--background", "9"], 2, "give one"),
+                                  (["--star-streak", "9", "--streak", "9", "--known-rate"], 2,
+                                   "leave out --star-streak"),
+                                  (["--module", "--false-alarms", "2"], 1, "--set"),
+                                  (["--cell", "10"], 1, "--cell"),
+                                  (["--streak", "990"], 1, "no room")):
+            result = pd(*words)
+            self.assertEqual(result.returncode, code, (words, result.stderr))
+            self.assertIn(hint, result.stderr)
+
+
+def tearDownModule():
+    runs.clean()
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)

@@ -1,0 +1,317 @@
+/* Chi-square bounds, the posterior bound and GOSPA against tables, closed forms and brute force. */
+#include "sim/core/rng.h"
+#include "sim/core/vec.h"
+#include "sim/eval/consistency.h"
+#include "sim/eval/gospa.h"
+#include "sim/eval/track_bound.h"
+#include "sim/eval/track_metrics.h"
+#include "tests/test_support.h"
+
+static void quantiles_of_the_tables(void **state) {
+    (void)state;
+    /* Abramowitz and Stegun, table 26.8 */
+    const double table[][3] = {{0.95, 1, 3.84146},    {0.95, 2, 5.99146},   {0.95, 10, 18.3070},
+                               {0.95, 100, 124.342},  {0.025, 50, 32.3574}, {0.975, 50, 71.4202},
+                               {0.001, 3, 0.0242976}, {0.999, 20, 45.3147}};
+    for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
+        double q = bst_chi2_quantile(table[i][0], table[i][1]);
+        bst_assert_close(q / table[i][2], 1.0, 5e-6); /* six digits are printed */
+        bst_assert_close(bst_chi2_cdf(q, table[i][1]), table[i][0], 1e-12);
+    }
+    /* two degrees of freedom: exp(-x/2) */
+    bst_assert_close(bst_chi2_cdf(7.0, 2.0), 1.0 - exp(-3.5), 1e-15);
+    bst_assert_close(bst_chi2_cdf(1e4, 1e4), 0.50188, 1e-5); /* 1/2 + 2 / (3 sqrt(4 pi 1e4)) */
+    assert_true(isnan(bst_chi2_quantile(0.0, 2.0)));
+    assert_true(isnan(bst_chi2_quantile(1.0, 2.0)));
+    assert_true(isnan(bst_chi2_quantile(0.5, 0.0)));
+}
+
+static void true_covariances_are_inside(void **state) {
+    (void)state;
+    enum { RUNS = 200, STEPS = 400 };
+    static double values[RUNS * STEPS];
+    bst_rng_key key = bst_rng_make_key(1, 0, "test", "chi2");
+    const double scale[3] = {1.0, 1.2, 0.8};
+    for (int s = 0; s < 3; s++) {
+        for (uint64_t i = 0; i < RUNS * STEPS; i++) {
+            double n[4];
+            bst_rng_normal2(key, i, 0, n);
+            bst_rng_normal2(key, i, 1, n + 2);
+            values[i] = scale[s] * (n[0] * n[0] + n[1] * n[1] + n[2] * n[2] + n[3] * n[3]);
+            if (i % 10 == 3 || i % STEPS == 5) {
+                values[i] = NAN;
+            }
+        }
+        bst_consistency c;
+        bst_consistency_check(values, RUNS, STEPS, 4, 0.95, &c);
+        /* steps of which i % 10 is 3 have no value at all (400 is a multiple of 10), nor has step 5
+         */
+        assert_int_equal(c.steps_judged, STEPS - STEPS / 10 - 1);
+        /* 72000 values of standard deviation sqrt(2/4): 0.003 */
+        bst_assert_close(c.mean_over_dof, scale[s], 0.012 * scale[s]);
+        if (s == 0) {
+            bst_assert_close(c.inside, 0.95, 0.035); /* 359 steps: 0.0115 */
+        } else {
+            /* 0.2 is 4 sigma of sqrt(2 / 800) = 0.05 */
+            assert_true(c.inside < 0.15);
+            assert_true(s == 1 ? c.below == 0.0 : c.above == 0.0);
+        }
+    }
+}
+
+/* A line through n points: variance of its end and of its slope (Bar-Shalom, Li and Kirubarajan
+ * 2001, section 3.5). */
+static void bound_of_a_straight_line(void **state) {
+    (void)state;
+    const double s2 = 4e-14, dt = 0.5, r[3] = {s2, 0.0, s2};
+    bst_track_bound b;
+    double p[4][4];
+    assert_true(bst_track_bound_start(&b, r, r, dt, 0.0));
+    for (int n = 3; n <= 100; n++) {
+        assert_true(bst_track_bound_step(&b, dt, 0.0, 0.0, r, 1.0));
+        assert_true(bst_track_bound_covariance(&b, p));
+        for (int i = 0; i < 2; i++) {
+            /* 100 inversions of condition up to 1e4 */
+            bst_assert_close(p[i][i] / (s2 * 2.0 * (2.0 * n - 1.0) / (n * (n + 1.0))), 1.0, 1e-9);
+            bst_assert_close(p[i + 2][i + 2] / (12.0 * s2 / (dt * dt * n * (n * n - 1.0))), 1.0,
+                             1e-9);
+        }
+    }
+    /* a step that brings nothing adds noise alone: q dt^3/3, q dt */
+    double before = p[2][2], q = 1e-16;
+    assert_true(bst_track_bound_step(&b, dt, 0.0, q, r, 0.0));
+    assert_true(bst_track_bound_covariance(&b, p));
+    bst_assert_close(p[2][2] / (before + q * dt), 1.0, 1e-9);
+    /* a quarter turn: across the track what was rate is place now */
+    bst_track_bound turn;
+    assert_true(bst_track_bound_start(&turn, r, r, dt, 0.0));
+    double was[4][4], w = 0.1;
+    assert_true(bst_track_bound_covariance(&turn, was));
+    assert_true(bst_track_bound_step(&turn, 0.5 * BST_PI / w, w, 0.0, r, 0.0));
+    assert_true(bst_track_bound_covariance(&turn, p));
+    bst_assert_close(p[1][1] / (was[3][3] / (w * w)), 1.0, 1e-9);
+    bst_assert_close(p[3][3] / (was[1][1] * w * w), 1.0, 1e-9);
+    const double none[3] = {0.0, 0.0, 0.0};
+    assert_false(bst_track_bound_step(&b, dt, 0.0, 0.0, none, 1.0));
+    assert_false(bst_track_bound_start(&b, none, none, dt, 0.0));
+}
+
+static double log_likelihood(double pd, double density, double x, const double (*z)[2], int n) {
+    double sum = 1.0 - pd;
+    for (int i = 0; i < n; i++) {
+        double dx = z[i][0] - x, dy = z[i][1];
+        sum += pd / (2.0 * BST_PI * density) * exp(-0.5 * (dx * dx + dy * dy));
+    }
+    return log(sum);
+}
+
+/* The same information from the curvature of the likelihood, with other draws. */
+static double factor_by_curvature(double pd, double density) {
+    bst_rng_key key = bst_rng_make_key(2, 0, "test", "curvature");
+    enum { DRAWS = 100000 };
+    double sum = 0.0;
+    const double h = 1e-3, half = 7.0;
+    for (uint64_t i = 0; i < DRAWS; i++) {
+        double z[200][2];
+        int n = 0;
+        uint64_t draw = 0;
+        if (bst_rng_uniform(key, i, draw++) < pd) {
+            bst_rng_normal2(key, i, draw++, z[n++]);
+        }
+        for (double t = -log(bst_rng_uniform(key, i, draw++)); t < density * 4 * half * half;
+             t -= log(bst_rng_uniform(key, i, draw++))) {
+            z[n][0] = half * (2 * bst_rng_uniform(key, i, draw++) - 1);
+            z[n++][1] = half * (2 * bst_rng_uniform(key, i, draw++) - 1);
+        }
+        sum -= (log_likelihood(pd, density, h, z, n) - 2 * log_likelihood(pd, density, 0, z, n) +
+                log_likelihood(pd, density, -h, z, n)) /
+               (h * h);
+    }
+    return sum / DRAWS;
+}
+
+static void information_left_in_clutter(void **state) {
+    (void)state;
+    bst_assert_close(bst_information_factor(1.0, 0.0), 1.0, 0.0);
+    bst_assert_close(bst_information_factor(0.7, 0.0), 0.7, 0.0);
+    bst_assert_close(bst_information_factor(0.9, 1e-9), 0.9, 0.01); /* 3 sigma of 2e5 draws */
+    const double cases[][2] = {{0.9, 0.003}, {0.9, 0.02}, {1.0, 0.05}, {0.6, 0.01}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        double a = bst_information_factor(cases[i][0], cases[i][1]);
+        double b = factor_by_curvature(cases[i][0], cases[i][1]);
+        print_message("Pd %.1f, %.3f false alarms per sigma^2: factor %.4f, by curvature %.4f\n",
+                      cases[i][0], cases[i][1], a, b);
+        bst_assert_close(a, b, 0.02); /* 1 sigma of either is about 0.003 */
+        assert_true(a < cases[i][0]);
+    }
+    double last = 0.9;
+    for (double density = 0.01; density < 0.5; density *= 4) {
+        double f = bst_information_factor(0.9, density);
+        assert_true(f < last);
+        last = f;
+    }
+}
+
+static void gospa_by_hand(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_gospa_result g;
+    /* objects at 0 and 10, a track at 1: 1^2 + 4^2/2 */
+    const double one[] = {1.0, 9.0};
+    int pair[5];
+    bst_assert_ok(&ctx, bst_gospa(&ctx, one, 2, 1, 4.0, 2.0, pair, &g));
+    bst_assert_close(g.gospa, 3.0, 1e-15);
+    bst_assert_close(g.localisation, 1.0, 1e-15);
+    bst_assert_close(g.missed, 8.0, 1e-15);
+    assert_int_equal(g.missed_count, 1);
+    assert_int_equal(g.false_count, 0);
+    assert_int_equal(pair[0], 0);
+    assert_int_equal(pair[1], -1);
+    /* farther than the cutoff: one missed and one false, c^p in all */
+    const double far[] = {100.0};
+    bst_assert_ok(&ctx, bst_gospa(&ctx, far, 1, 1, 5.0, 1.0, pair, &g));
+    bst_assert_close(g.gospa, 5.0, 1e-15);
+    assert_int_equal(g.missed_count, 1);
+    assert_int_equal(g.false_count, 1);
+    assert_int_equal(pair[0], -1);
+    /* nothing, and nothing on one side: (n c^p / 2)^(1/p) */
+    bst_assert_ok(&ctx, bst_gospa(&ctx, NULL, 0, 0, 5.0, 2.0, NULL, &g));
+    bst_assert_close(g.gospa, 0.0, 0.0);
+    bst_assert_ok(&ctx, bst_gospa(&ctx, NULL, 0, 3, 2.0, 2.0, NULL, &g));
+    bst_assert_close(g.gospa, sqrt(6.0), 1e-15);
+    /* the nearest pair first would leave 1 + 8; the best is 3 + 2 */
+    const double crossed[] = {3.0, 1.0, 8.0, 2.0};
+    bst_assert_ok(&ctx, bst_gospa(&ctx, crossed, 2, 2, 10.0, 1.0, pair, &g));
+    bst_assert_close(g.gospa, 5.0, 1e-15);
+    assert_int_equal(bst_gospa(&ctx, far, 1, 1, 0.0, 2.0, NULL, &g), BST_ERR_ARGUMENT);
+    assert_int_equal(bst_gospa(&ctx, far, 1, 1, 1.0, 0.5, NULL, &g), BST_ERR_ARGUMENT);
+    const double bad[] = {NAN};
+    assert_int_equal(bst_gospa(&ctx, bad, 1, 1, 1.0, 2.0, NULL, &g), BST_ERR_ARGUMENT);
+}
+
+/* The least over all assignments, each object taking one of the free tracks or none. */
+static double exhaustive(const double *d, int n, int m, double c, double p, int i, unsigned taken) {
+    if (i == n) {
+        int free_tracks = m;
+        for (int j = 0; j < m; j++) {
+            free_tracks -= (int)(taken >> j & 1u);
+        }
+        return 0.5 * pow(c, p) * free_tracks;
+    }
+    double best = 0.5 * pow(c, p) + exhaustive(d, n, m, c, p, i + 1, taken);
+    for (int j = 0; j < m; j++) {
+        if (!(taken >> j & 1u)) {
+            best = fmin(best,
+                        pow(d[i * m + j], p) + exhaustive(d, n, m, c, p, i + 1, taken | 1u << j));
+        }
+    }
+    return best;
+}
+
+static void gospa_is_the_least_and_a_metric(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_rng_key key = bst_rng_make_key(3, 0, "test", "gospa");
+    for (uint64_t t = 0; t < 500; t++) {
+        uint64_t u = 0;
+        int n[3];
+        double set[3][5][2];
+        for (int k = 0; k < 3; k++) {
+            n[k] = (int)(6 * bst_rng_uniform(key, t, u++));
+            for (int i = 0; i < n[k]; i++) {
+                set[k][i][0] = 10 * bst_rng_uniform(key, t, u++);
+                set[k][i][1] = 10 * bst_rng_uniform(key, t, u++);
+            }
+        }
+        double c = 1 + 6 * bst_rng_uniform(key, t, u++), p = 1 + (double)(t % 3), g[3];
+        for (int k = 0; k < 3; k++) {
+            int a = k, b = (k + 1) % 3;
+            double d[25];
+            for (int i = 0; i < n[a]; i++) {
+                for (int j = 0; j < n[b]; j++) {
+                    d[i * n[b] + j] =
+                        hypot(set[a][i][0] - set[b][j][0], set[a][i][1] - set[b][j][1]);
+                }
+            }
+            bst_gospa_result out;
+            bst_assert_ok(&ctx, bst_gospa(&ctx, d, n[a], n[b], c, p, NULL, &out));
+            g[k] = out.gospa;
+            double least = exhaustive(d, n[a], n[b], c, p, 0, 0);
+            bst_assert_close(pow(out.gospa, p), least, 1e-9 * (1 + least)); /* roundings of pow */
+        }
+        /* the triangle of three sets */
+        for (int k = 0; k < 3; k++) {
+            assert_true(g[k] <= g[(k + 1) % 3] + g[(k + 2) % 3] + 1e-9);
+        }
+    }
+}
+
+/* Two objects over 11 frames of 360 s by hand: the first has track 1, then 3 after a gap of one
+ * frame; the second is visible from frame 2 on and has track 2 from frame 4 on, which strays to the
+ * first in the last frame; track 9 is nobody's for 5 frames. */
+static void track_metrics_by_hand(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_track_metrics *m;
+    const double cutoff = 1e-4;
+    bst_assert_ok(&ctx, bst_track_metrics_create(&ctx, 2, 4, 3, cutoff, &m));
+    const bst_vec3 a = bst_vec3_from_radec(0.0, 0.0), b = bst_vec3_from_radec(0.1, 0.0),
+                   far = bst_vec3_from_radec(0.2, 0.3), near_a = bst_vec3_from_radec(3e-5, 0.0);
+    const bst_vec3 truth[2] = {a, b};
+    double gospa2 = 0.0;
+    for (int k = 0; k < 11; k++) {
+        const bool visible[2] = {true, k >= 2};
+        int64_t ids[3];
+        bst_vec3 d[3];
+        int n = 0, missed = 0;
+        if (k != 5 && k != 10) {
+            ids[n] = k < 5 ? 1 : 3;
+            d[n++] = near_a;
+        }
+        missed += k == 5;
+        if (k >= 4) {
+            ids[n] = 2;
+            d[n++] = k == 10 ? near_a : b;
+        }
+        missed += (k >= 2 && k < 4) || k == 10;
+        if (k < 5) {
+            ids[n] = 9;
+            d[n++] = far;
+        }
+        gospa2 += (k == 5 ? 0.0 : 9e-10) + 0.5 * cutoff * cutoff * (missed + (k < 5));
+        bst_assert_ok(&ctx, bst_track_metrics_frame(&ctx, m, 360.0 * k, truth, visible, ids, d, n));
+    }
+    bst_track_figures f;
+    bst_track_metrics_figures(m, &f);
+    assert_int_equal(f.frames, 11);
+    bst_assert_close(f.hours, 1.0, 1e-12);
+    bst_assert_close(f.gospa_rms / sqrt(gospa2 / 11.0), 1.0, 1e-9); /* angles of 1e-5 hold 1e-11 */
+    bst_assert_close(f.coverage, 16.0 / 20.0, 1e-15);               /* 10 of 11, 6 of 9 */
+    bst_assert_close(f.time_to_confirm_s, 0.5 * (0.0 + 720.0), 1e-9);
+    assert_int_equal(f.objects_seen, 2);
+    assert_int_equal(f.objects_tracked, 2);
+    assert_int_equal(f.breaks, 2);                  /* 1 to 3, 3 to 2 */
+    bst_assert_close(f.purity, 15.0 / 16.0, 1e-15); /* track 2 was with the other one once */
+    assert_int_equal(f.tracks, 4);
+    assert_int_equal(f.false_tracks, 1);
+    bst_assert_close(f.false_tracks_per_hour, 1.0, 1e-12);
+    const bool visible[2] = {true, true};
+    const int64_t id = 77, many[4] = {1, 2, 3, 9};
+    const bst_vec3 four[4] = {a, a, b, b};
+    assert_int_equal(bst_track_metrics_frame(&ctx, m, 9e3, truth, visible, &id, &far, 1),
+                     BST_ERR_ARGUMENT);
+    assert_int_equal(bst_track_metrics_frame(&ctx, m, 9e3, truth, visible, many, four, 4),
+                     BST_ERR_ARGUMENT);
+    bst_track_metrics_free(m);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(quantiles_of_the_tables),
+                                       cmocka_unit_test(true_covariances_are_inside),
+                                       cmocka_unit_test(bound_of_a_straight_line),
+                                       cmocka_unit_test(information_left_in_clutter),
+                                       cmocka_unit_test(gospa_by_hand),
+                                       cmocka_unit_test(gospa_is_the_least_and_a_metric),
+                                       cmocka_unit_test(track_metrics_by_hand)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,219 @@
+/* What earlier frames say about a detection: fields of known sources, seen by a turning camera. */
+#include <stdlib.h>
+
+#include "imgproc/discriminate.h"
+#include "tests/imgproc/synthetic.h"
+#include "tests/test_support.h"
+
+enum { SIDE = 512, ROOM = 2048 };
+
+typedef struct scene {
+    bst_ctx ctx;
+    synthetic s;
+    bst_discriminator *d;
+    bst_detections *out;
+    bst_frame_knowledge frame;
+    bst_rng_key key;
+    int number;
+} scene;
+
+static scene make(void) {
+    scene s = {.out = synthetic_detections(ROOM), .key = bst_rng_make_key(2, 0, "test", "labels")};
+    synthetic_init(&s.s, SIDE, SIDE);
+    s.s.camera.psf_fwhm_px = 2;
+    bst_assert_ok(&s.ctx, bst_discriminator_create(&s.ctx, &s.s.camera, ROOM, &s.d));
+    s.frame = (bst_frame_knowledge){.oriented = true,
+                                    .light = {.sun_m = {1.5e11, 0, 0}},
+                                    .q_cam_from_gcrf = BST_QUAT_IDENTITY,
+                                    .window = {0, 0, SIDE, SIDE}};
+    return s;
+}
+
+static void end(scene *s) {
+    bst_discriminator_free(s->d);
+    synthetic_free(&s->s);
+    free(s->out);
+}
+
+/* The next frame: the camera turned by so many pixels, no detections yet. */
+static void next(scene *s, double shift_px) {
+    double scale = bst_camera_scale_rad(&s->s.camera);
+    s->out->count = 0;
+    s->number++;
+    s->frame.q_cam_from_gcrf = bst_quat_from_rotvec((bst_vec3){0, s->number * shift_px * scale, 0});
+}
+
+static bst_detection *add(scene *s, double x, double y, double v_mag, int label) {
+    bst_detection *d = &s->out->items[s->out->count++];
+    *d = (bst_detection){.x_px = x,
+                         .y_px = y,
+                         .cov_xx = 0.01,
+                         .cov_yy = 0.01,
+                         .flux_e = 1000,
+                         .flux_sigma_e = 50,
+                         .snr = 20,
+                         .v_mag = v_mag,
+                         .label = label};
+    d->label_probability = label == BST_LABEL_UNKNOWN ? 0 : 1;
+    return d;
+}
+
+/* A source at a place of the sky given by where the first attitude shows it. */
+static bst_detection *add_sky(scene *s, double x, double y, double v_mag) {
+    bst_vec3 v = bst_camera_unproject(&s->s.camera, x, y);
+    double u, w;
+    bst_camera_project(&s->s.camera, bst_quat_rotate(s->frame.q_cam_from_gcrf, v), &u, &w);
+    double noise[2];
+    bst_rng_normal2(s->key, (uint64_t)s->number, (uint64_t)s->out->count, noise);
+    return add(s, u + 0.1 * noise[0], w + 0.1 * noise[1], v_mag, BST_LABEL_UNKNOWN);
+}
+
+static void label(scene *s) {
+    bst_discriminator_label(s->d, &s->frame, s->out);
+    for (int i = 0; i < s->out->count; i++) {
+        double p = s->out->items[i].label_probability;
+        assert_true(p >= 0 && p <= 1);
+    }
+}
+
+/* Charge at the same pixel in every frame is a hot pixel; elsewhere each time, hits. */
+static void hot_pixels_and_hits(void **state) {
+    (void)state;
+    scene s = make();
+    for (int frame = 0; frame < 4; frame++) {
+        next(&s, 30);
+        add(&s, 100, 200, 12, BST_LABEL_HOT_PIXEL);
+        add(&s, 150 + 7 * frame, 300, 12, BST_LABEL_HOT_PIXEL);
+        add(&s, 250.4 + 9 * frame, 310.7, 12, BST_LABEL_HIT);
+        /* too faint for its shape to tell, in the last frame */
+        add(&s, 400, 400, 14, frame < 3 ? BST_LABEL_HOT_PIXEL : BST_LABEL_UNKNOWN)->snr = 5.5;
+        label(&s);
+        assert_int_equal(s.out->items[3].label, BST_LABEL_HOT_PIXEL);
+        assert_int_equal(s.out->items[0].label, BST_LABEL_HOT_PIXEL);
+        assert_int_equal(s.out->items[1].label, frame == 0 ? BST_LABEL_HOT_PIXEL : BST_LABEL_HIT);
+        assert_int_equal(s.out->items[2].label, BST_LABEL_HIT);
+    }
+    assert_true(s.out->items[0].label_probability > 0.95);
+    end(&s);
+}
+
+/* 300 stars that no catalogue has, of which the faint half shows in two frames of three, and 10
+ * objects at 5 px per frame among them; from the fifth frame on the labels are nearly all right. */
+static void stars_without_catalogue_and_objects(void **state) {
+    (void)state;
+    scene s = make();
+    int stars = 0, right = 0, objects = 0, right_objects = 0;
+    for (int frame = 0; frame < 12; frame++) {
+        next(&s, 8);
+        for (int k = 0; k < 300; k++) {
+            bool faint = k % 2;
+            double shows = bst_rng_uniform(s.key, 500 + (uint64_t)frame, (uint64_t)k);
+            double x = 150 + 340 * bst_rng_uniform(s.key, 1, (uint64_t)k);
+            double y = 10 + 490 * bst_rng_uniform(s.key, 2, (uint64_t)k);
+            if (!faint || shows < 0.67) {
+                add_sky(&s, x, y, faint ? 15.2 : 12.2);
+            }
+        }
+        int first_object = s.out->count;
+        for (int k = 0; k < 10; k++) {
+            double x = 180 + 28 * k, angle = k;
+            add_sky(&s, x + 5 * frame * cos(angle), 250 + 5 * frame * sin(angle), 12.7);
+        }
+        label(&s);
+        for (int i = 0; frame >= 5 && i < s.out->count; i++) {
+            int given = s.out->items[i].label;
+            if (i < first_object) {
+                stars++;
+                right += given == BST_LABEL_STAR;
+            } else {
+                objects++;
+                right_objects += given == BST_LABEL_OBJECT;
+            }
+        }
+    }
+    assert_true(right >= 0.98 * stars);
+    assert_true(right_objects >= 0.95 * objects);
+    end(&s);
+}
+
+/* Slower than the errors from frame to frame, but away from where it began: an object in the end.
+ */
+static void slow_object_leaves_its_place(void **state) {
+    (void)state;
+    scene s = make();
+    int last = 0;
+    for (int frame = 0; frame < 12; frame++) {
+        next(&s, 3);
+        add_sky(&s, 200 + 0.3 * frame, 200, 12);
+        add_sky(&s, 300, 300, 12);
+        label(&s);
+        last = s.out->items[0].label;
+    }
+    assert_int_equal(last, BST_LABEL_OBJECT);
+    assert_int_equal(s.out->items[1].label, BST_LABEL_STAR);
+    end(&s);
+}
+
+/* A track's prediction names the object even where a star has been; identified stars stay; the edge
+ * makes artefacts; without orientation nothing is said. */
+static void other_rules(void **state) {
+    (void)state;
+    scene s = make();
+    for (int frame = 0; frame < 3; frame++) {
+        next(&s, 0);
+        add_sky(&s, 200, 200, 12);
+        label(&s);
+    }
+    assert_int_equal(s.out->items[0].label, BST_LABEL_STAR);
+    bst_predictions *p = calloc(1, sizeof *p + sizeof(bst_prediction));
+    assert_non_null(p);
+    p->count = 1;
+    p->items[0] = (bst_prediction){.track_id = 1,
+                                   .direction_gcrf = bst_camera_unproject(&s.s.camera, 200, 200)};
+    s.frame.predictions = p;
+    next(&s, 0);
+    add_sky(&s, 200, 200, 12);
+    bst_detection *star = add(&s, 400, 400, 9, BST_LABEL_STAR);
+    star->star_id = 17;
+    add(&s, 1, 300, 9, BST_LABEL_UNKNOWN)->flags = BST_DETECTION_EDGE;
+    label(&s);
+    assert_int_equal(s.out->items[0].label, BST_LABEL_OBJECT);
+    assert_int_equal(s.out->items[1].label, BST_LABEL_STAR);
+    assert_int_equal(s.out->items[1].star_id, 17);
+    assert_int_equal(s.out->items[2].label, BST_LABEL_ARTEFACT);
+    s.frame.predictions = NULL;
+    s.frame.oriented = false;
+    next(&s, 0);
+    add_sky(&s, 200, 200, 12);
+    label(&s);
+    assert_int_equal(s.out->items[0].label, BST_LABEL_UNKNOWN);
+    free(p);
+    end(&s);
+}
+
+/* Stars draw streaks while the camera follows something else: points are no stars. */
+static void following_something(void **state) {
+    (void)state;
+    scene s = make();
+    s.frame.streak_px = 12;
+    for (int frame = 0; frame < 3; frame++) {
+        next(&s, 20);
+        add_sky(&s, 300, 200, 12)->flags = BST_DETECTION_STREAK;
+        add(&s, 256, 256, 12, BST_LABEL_UNKNOWN);
+        label(&s);
+        assert_int_equal(s.out->items[0].label, BST_LABEL_STAR);
+        assert_int_equal(s.out->items[1].label, BST_LABEL_OBJECT);
+    }
+    end(&s);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(hot_pixels_and_hits),
+        cmocka_unit_test(stars_without_catalogue_and_objects),
+        cmocka_unit_test(slow_object_leaves_its_place),
+        cmocka_unit_test(other_rules),
+        cmocka_unit_test(following_something),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

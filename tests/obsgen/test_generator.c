@@ -1,0 +1,457 @@
+/* The generator's statistics against the laws that it states. */
+#include "obsgen/generator.h"
+#include "sim/core/vec.h"
+#include "tests/test_support.h"
+
+enum { SIDE = 1024, MOST = 1200 };
+
+typedef struct scene {
+    bst_ctx ctx;
+    bst_camera camera;
+    bst_generator_settings settings;
+    bst_obsgen_calibration calibration;
+    bst_truth *truth;
+    bst_generator_frame frame;
+    bst_generator *generator;
+} scene;
+
+static void open_scene(scene *s) {
+    memset(s, 0, sizeof *s);
+    s->camera = (bst_camera){.width_px = SIDE,
+                             .height_px = SIDE,
+                             .pixel_scale_arcsec = 3.0,
+                             .aperture_m = 0.15,
+                             .throughput = 0.7,
+                             .quantum_efficiency = 0.7,
+                             .photon_flux_v0_per_s_m2 = 3.6e10,
+                             .psf_fwhm_px = 2.0,
+                             .read_noise_e = 8.0,
+                             .full_well_e = 1e5,
+                             .gain_e_per_dn = 1.6,
+                             .bits = 16};
+    s->settings = (bst_generator_settings){.capacity = 2048,
+                                           .false_alarms_per_frame = 1e-6,
+                                           .streak_min_px = 1.5,
+                                           .streak_max_px = 64.0};
+    bst_obsgen_calibration_theory(&s->calibration);
+    s->truth = calloc(1, sizeof *s->truth + MOST * sizeof s->truth->items[0]);
+    assert_non_null(s->truth);
+    s->truth->background_e = 36.0;
+    s->frame = (bst_generator_frame){.truth = s->truth,
+                                     .window = {0, 0, SIDE, SIDE},
+                                     .binning = 1,
+                                     .exposure_s = 0.5,
+                                     .sigma_px = 2.0 / 2.3548200450309493};
+}
+
+static void start(scene *s) {
+    bst_generator_free(s->generator);
+    bst_assert_ok(
+        &s->ctx,
+        bst_generator_create(&s->ctx, &s->camera, &s->camera, &s->settings, &s->calibration,
+                             bst_rng_make_key(7, 0, "a/b/obsgen", "observations"), &s->generator));
+}
+
+static void close_scene(scene *s) {
+    bst_generator_free(s->generator);
+    free(s->truth);
+}
+
+/* Electrons of a point source of this SNR. */
+static double electrons_of(const scene *s, double snr) {
+    static bst_bound bound;
+    bst_bound_init(&bound, s->frame.sigma_px);
+    const bst_camera *c = &s->camera;
+    double noise = sqrt(s->truth->background_e + c->read_noise_e * c->read_noise_e +
+                        c->gain_e_per_dn * c->gain_e_per_dn / 12.0);
+    return snr * noise / bst_bound_norm(&bound, 0.0);
+}
+
+static bst_truth_item *add_source(scene *s, uint32_t id, double x, double y, double electrons) {
+    bst_truth_item *item = &s->truth->items[s->truth->count++];
+    *item = (bst_truth_item){.kind = BST_SOURCE_STAR,
+                             .id = id,
+                             .flags = BST_TRUTH_IN_FIELD,
+                             .x_start_px = x,
+                             .x_mid_px = x,
+                             .x_end_px = x,
+                             .x_mean_px = x,
+                             .y_start_px = y,
+                             .y_mid_px = y,
+                             .y_end_px = y,
+                             .y_mean_px = y,
+                             .electrons = electrons};
+    return item;
+}
+
+/* 900 sources, kept apart, all of one SNR, at many places in the pixel. */
+static void fill(scene *s, double snr) {
+    s->truth->count = 0;
+    double electrons = electrons_of(s, snr);
+    for (int i = 0; i < 900; i++) {
+        add_source(s, (uint32_t)i + 1, 20.0 + 33.0 * (i % 30) + 0.37 * (i % 7),
+                   20.0 + 33.0 * (i / 30) + 0.29 * (i % 11), electrons);
+    }
+}
+
+static bst_generator_result run(scene *s, int64_t exposure) {
+    bst_generator_result result;
+    s->truth->exposure_id = exposure;
+    bst_assert_ok(&s->ctx, bst_generator_run(&s->ctx, s->generator, &s->frame, &result));
+    return result;
+}
+
+static double above(double z) {
+    return 0.5 * erfc(z / sqrt(2.0));
+}
+
+static void detection_follows_the_ideal_law(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    s.settings.false_alarms_per_frame = 1.0;
+    s.calibration.false_alarm_factor = 0.0;
+    s.calibration.crowding = 0.0;
+    for (int slope = 0; slope < 2; slope++) {
+        s.calibration.slope = slope ? 0.8 : 1.0;
+        s.calibration.gain[0] = slope ? 0.95 : 1.0;
+        start(&s);
+        for (double snr = 3.0; snr < 8.0; snr += 0.5) {
+            enum { FRAMES = 10 };
+            fill(&s, snr);
+            int found = 0, trials = 0;
+            double threshold = 0.0;
+            for (int f = 0; f < FRAMES; f++) {
+                bst_generator_result r = run(&s, f);
+                found += r.count;
+                trials += s.truth->count;
+                threshold = r.threshold_snr;
+            }
+            double pd = above(s.calibration.slope * (threshold - s.calibration.gain[0] * snr));
+            /* four standard deviations of a binomial share */
+            double sigma = sqrt(fmax(pd * (1.0 - pd), 1e-4) / trials);
+            bst_assert_close((double)found / trials, pd, 4.0 * sigma);
+        }
+    }
+    close_scene(&s);
+}
+
+/* Reported places are off by what the bound and the factor say, and their covariance is the bound.
+ */
+static void places_scatter_by_the_bound(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    for (int i = 0; i < BST_OBSGEN_SNRS; i++) {
+        s.calibration.across_factor[i] = 1.2;
+    }
+    start(&s);
+    bst_bound bound;
+    bst_bound_init(&bound, s.frame.sigma_px);
+    fill(&s, 25.0);
+    double sum2 = 0.0, told = 0.0, flux = 0.0, flux2 = 0.0, cross = 0.0;
+    long n = 0;
+    for (int f = 0; f < 12; f++) {
+        bst_generator_result r = run(&s, f);
+        for (int i = 0; i < r.count; i++) {
+            const bst_detection *d = &r.items[i].detection;
+            const bst_truth_item *t = &s.truth->items[r.items[i].item];
+            double dx = d->x_px - t->x_mean_px, dy = d->y_px - t->y_mean_px;
+            sum2 += dx * dx + dy * dy;
+            cross += dx * dy;
+            told += d->cov_xx + d->cov_yy;
+            flux += d->flux_e / t->electrons - 1.0;
+            flux2 += (d->flux_e - t->electrons) * (d->flux_e - t->electrons);
+            n++;
+        }
+    }
+    assert_true(n == 900 * 12);
+    bst_generator_result r = run(&s, 0);
+    bst_bound_at at = bst_bound_of(&bound, electrons_of(&s, 25.0), r.noise_e, 0.0);
+    double variance = sum2 / (2.0 * (double)n);
+    /* four standard deviations of a variance of 21,600 normal deviates: 4 sqrt(2 / n) */
+    bst_assert_close(variance / (1.44 * at.var_along_px2), 1.0, 4.0 * sqrt(1.0 / (double)n));
+    bst_assert_close(cross / (double)n / variance, 0.0, 4.0 / sqrt((double)n));
+    /* the covariance is told for the measured flux: its mean is off by the square of 5 % */
+    bst_assert_close(told / (2.0 * (double)n) / at.var_along_px2, 1.0, 0.015);
+    bst_assert_close(flux2 / (double)n / at.flux_variance, 1.0, 4.0 * sqrt(2.0 / (double)n));
+    bst_assert_close(flux / (double)n, 0.0,
+                     4.0 * sqrt(at.flux_variance / (double)n) / electrons_of(&s, 25.0));
+    close_scene(&s);
+}
+
+static void the_phase_bias_is_as_stated(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    s.calibration.phase_bias_px = 0.03;
+    start(&s);
+    fill(&s, 3000.0);
+    double worst = 0.0;
+    bst_generator_result r = run(&s, 3);
+    for (int i = 0; i < r.count; i++) {
+        const bst_detection *d = &r.items[i].detection;
+        const bst_truth_item *t = &s.truth->items[r.items[i].item];
+        double bias = 0.03 * sin(2.0 * BST_PI * t->x_mean_px);
+        worst = fmax(worst, fabs(d->x_px - t->x_mean_px - bias));
+    }
+    /* five standard deviations of places of 1e5 electrons */
+    assert_true(r.count == 900 && worst < 0.014);
+    close_scene(&s);
+}
+
+static void false_alarms_are_poisson_with_a_gaussian_tail(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    s.settings.false_alarms_per_frame = 5.0;
+    start(&s);
+    enum { FRAMES = 4000 };
+    double n = 0.0, n2 = 0.0, energy = 0.0, x = 0.0, y2 = 0.0;
+    for (int f = 0; f < FRAMES; f++) {
+        bst_generator_result r = run(&s, f);
+        n += r.count;
+        n2 += (double)r.count * r.count;
+        for (int i = 0; i < r.count; i++) {
+            const bst_detection *d = &r.items[i].detection;
+            assert_true(d->snr >= r.threshold_snr && r.items[i].item == -1);
+            energy += 0.5 * (d->snr * d->snr - r.threshold_snr * r.threshold_snr);
+            x += d->x_px;
+            y2 += (d->y_px - 0.5 * (SIDE - 1)) * (d->y_px - 0.5 * (SIDE - 1));
+        }
+    }
+    double mean = n / FRAMES;
+    /* four standard deviations each: of a Poisson mean, its variance, an exponential's mean, and
+     * the first two moments of a uniform place */
+    bst_assert_close(mean, 5.0, 4.0 * sqrt(5.0 / FRAMES));
+    bst_assert_close((n2 / FRAMES - mean * mean) / mean, 1.0, 4.0 * sqrt(2.0 / FRAMES));
+    bst_assert_close(energy / n, 1.0, 4.0 / sqrt(n));
+    bst_assert_close(x / n, 0.5 * (SIDE - 1), 4.0 * SIDE / sqrt(12.0 * n));
+    bst_assert_close(y2 / n / (SIDE * (double)SIDE / 12.0), 1.0, 4.0 * sqrt(0.8 / n));
+    close_scene(&s);
+}
+
+static bool same(const bst_generated *a, const bst_generated *b) {
+    const bst_detection *p = &a->detection, *q = &b->detection;
+    const double x[] = {p->x_px, p->y_px, p->cov_xx, p->cov_xy, p->cov_yy, p->flux_e, p->snr},
+                 y[] = {q->x_px, q->y_px, q->cov_xx, q->cov_xy, q->cov_yy, q->flux_e, q->snr};
+    return memcmp(x, y, sizeof x) == 0 && p->flags == q->flags && p->label == q->label;
+}
+
+static int same_until(const bst_generated *a, const bst_generated *b, int count) {
+    int n = 0;
+    while (n < count && same(&a[n], &b[n])) {
+        n++;
+    }
+    return n;
+}
+
+/* The same bytes again; and a source's draws do not depend on what else there is or in which
+ * order. */
+static void draws_depend_on_names_alone(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    start(&s);
+    fill(&s, 8.0);
+    bst_generator_result r = run(&s, 11);
+    int count = r.count;
+    bst_generated *first = malloc((size_t)count * sizeof *first);
+    assert_non_null(first);
+    memcpy(first, r.items, (size_t)count * sizeof *first);
+    r = run(&s, 12);
+    assert_true(r.count != count || same_until(first, r.items, count) < count);
+    r = run(&s, 11);
+    assert_int_equal(r.count, count);
+    assert_int_equal(same_until(first, r.items, count), count);
+    /* reversed, and every third source gone; crowding goes by all sources and is left out */
+    s.calibration.crowding = 0.0;
+    start(&s);
+    r = run(&s, 11);
+    count = r.count;
+    bst_generated *all = realloc(first, (size_t)count * sizeof *all);
+    assert_non_null(all);
+    memcpy(all, r.items, (size_t)count * sizeof *all);
+    static bst_truth_item kept[MOST];
+    int left = 0;
+    for (int i = s.truth->count - 1; i >= 0; i--) {
+        if (i % 3 != 0) {
+            kept[left++] = s.truth->items[i];
+        }
+    }
+    memcpy(s.truth->items, kept, (size_t)left * sizeof *kept);
+    s.truth->count = left;
+    r = run(&s, 11);
+    int met = 0;
+    for (int i = 0, k = 0; i < r.count; i++) {
+        while (k < count && !same(&all[k], &r.items[i])) {
+            k++;
+        }
+        met += k < count;
+    }
+    assert_true(r.count > 300);
+    assert_int_equal(met, r.count);
+    free(all);
+    close_scene(&s);
+}
+
+static void close_sources_are_one(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    start(&s);
+    double bright = electrons_of(&s, 80.0), faint = electrons_of(&s, 40.0);
+    const double distance[] = {0.8, 5.0};
+    for (int k = 0; k < 2; k++) {
+        double x = 0.0, y = 0.0;
+        enum { FRAMES = 200 };
+        for (int f = 0; f < FRAMES; f++) {
+            s.truth->count = 0;
+            add_source(&s, 1, 300.0, 400.0, bright);
+            add_source(&s, 2, 300.0 + distance[k], 400.0, faint);
+            bst_generator_result r = run(&s, f);
+            assert_int_equal(r.count, 1 + k);
+            const bst_generated *seen = &r.items[r.items[0].item == 0 ? 0 : r.count - 1];
+            assert_true(seen->detection.flags & BST_DETECTION_BLEND);
+            x += seen->detection.x_px / FRAMES;
+            y += seen->detection.y_px / FRAMES;
+        }
+        /* weighted with flux, less what the fit of one source misses of the other's light:
+         * exp(-d^2 / 4 sigma^2); five standard deviations of 200 places at SNR 100 */
+        double s2 = s.frame.sigma_px * s.frame.sigma_px + 1.0 / 12.0;
+        double share = 0.5 * exp(-0.64 / (4.0 * s2));
+        double expected = k == 0 ? 300.0 + 0.8 * share / (1.0 + share) : 300.0;
+        bst_assert_close(x, expected, 0.01);
+        bst_assert_close(y, 400.0, 0.01);
+    }
+    close_scene(&s);
+}
+
+/* A streak cut by the frame's edge shows what is on the frame; one beside it nothing. */
+static void the_edge_cuts(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    start(&s);
+    double light = electrons_of(&s, 400.0);
+    bst_truth_item *item = add_source(&s, 1, 0.0, 500.0, light);
+    item->x_start_px = -20.5;
+    item->x_mean_px = -0.5;
+    item->x_end_px = 19.5;
+    s.frame.streak_dx_px = 40.0;
+    bst_generator_result r = run(&s, 0);
+    assert_int_equal(r.count, 1);
+    const bst_detection *d = &r.items[0].detection;
+    assert_true(d->flags & BST_DETECTION_EDGE);
+    assert_true(d->flags & BST_DETECTION_STREAK);
+    /* the middle of the half that is on the frame, -0.5 to 19.5; a tenth of it for the error */
+    bst_assert_close(d->x_px, 9.5, 1.0);
+    bst_assert_close(d->flux_e, 0.5 * light, 0.1 * light);
+    item->x_start_px = -60.0;
+    item->x_mean_px = -40.0;
+    item->x_end_px = -20.0;
+    assert_int_equal(run(&s, 0).count, 0);
+    s.frame.streak_dx_px = 100.0;
+    assert_true(run(&s, 0).smeared);
+    close_scene(&s);
+}
+
+/* A streak longer than is filtered for is seen in parts: on its path, above the threshold, more of
+ * them where the light is near the threshold than where it is far above. */
+static void long_streaks_are_seen_in_parts(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    start(&s);
+    int parts[2] = {0, 0};
+    for (int bright = 0; bright < 2; bright++) {
+        for (int f = 0; f < 20; f++) {
+            s.truth->count = 0;
+            bst_truth_item *item =
+                add_source(&s, 1, 500.0, 500.0, electrons_of(&s, bright ? 8000.0 : 500.0));
+            item->x_start_px = 420.0;
+            item->x_end_px = 580.0;
+            item->y_start_px = 440.0;
+            item->y_end_px = 560.0;
+            s.frame.streak_dx_px = 160.0;
+            s.frame.streak_dy_px = 120.0;
+            bst_generator_result r = run(&s, f);
+            assert_true(r.smeared);
+            for (int i = 0; i < r.count; i++) {
+                const bst_detection *d = &r.items[i].detection;
+                double along = 0.8 * (d->x_px - 500.0) + 0.6 * (d->y_px - 500.0);
+                double across = 0.8 * (d->y_px - 500.0) - 0.6 * (d->x_px - 500.0);
+                /* half of 200 px and the PSF; six standard deviations of a place at SNR 5 */
+                assert_true(fabs(along) < 105.0 && fabs(across) < 1.5);
+                assert_true(d->snr > r.threshold_snr);
+            }
+            parts[bright] += r.count;
+        }
+    }
+    assert_true(parts[1] >= 20 && parts[0] > parts[1]);
+    close_scene(&s);
+}
+
+static void room_is_for_the_brightest(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    s.settings.capacity = 10;
+    start(&s);
+    fill(&s, 20.0);
+    for (int i = 0; i < 10; i++) {
+        s.truth->items[50 * i].electrons *= 3.0;
+    }
+    bst_generator_result r = run(&s, 1);
+    assert_int_equal(r.count, 10);
+    assert_int_equal(r.lost, 890);
+    for (int i = 0; i < 10; i++) {
+        assert_int_equal(r.items[i].item % 50, 0);
+    }
+    close_scene(&s);
+}
+
+static void hits_come_at_the_detectors_rate(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    s.camera.detector.hits = (bst_hits_config){.rate_per_cm2_s = 5.0,
+                                               .pixel_pitch_um = 13.0,
+                                               .depth_um = 15.0,
+                                               .e_per_um = 80.0,
+                                               .straggling = 0.12};
+    start(&s);
+    double seen = 0.0, told = 0.0;
+    enum { FRAMES = 400 };
+    for (int f = 0; f < FRAMES; f++) {
+        bst_generator_result r = run(&s, f);
+        for (int i = 0; i < r.count; i++) {
+            assert_true(r.items[i].hit && r.items[i].item == -1);
+            told += r.items[i].detection.label == BST_LABEL_ARTEFACT;
+        }
+        seen += r.count;
+    }
+    /* all of them shine: 1200 e- at least on the filter's few pixels; four standard deviations, and
+     * tracks that leave the frame */
+    double expected = 5.0 * SIDE * SIDE * 169e-8 * 0.5;
+    bst_assert_close(seen / FRAMES, expected, 4.0 * sqrt(expected / FRAMES) + 0.01 * expected);
+    /* most fill one pixel or two, and stand out */
+    assert_true(told > 0.6 * seen);
+    close_scene(&s);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(detection_follows_the_ideal_law),
+        cmocka_unit_test(places_scatter_by_the_bound),
+        cmocka_unit_test(the_phase_bias_is_as_stated),
+        cmocka_unit_test(false_alarms_are_poisson_with_a_gaussian_tail),
+        cmocka_unit_test(draws_depend_on_names_alone),
+        cmocka_unit_test(close_sources_are_one),
+        cmocka_unit_test(the_edge_cuts),
+        cmocka_unit_test(long_streaks_are_seen_in_parts),
+        cmocka_unit_test(room_is_for_the_brightest),
+        cmocka_unit_test(hits_come_at_the_detectors_rate),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
