@@ -319,8 +319,8 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
     /* stars are points: what else there is may be a streak */
     bool search = ip->config.streak_search_px > 0.0 && !ip->filter.streak && !ip->smeared;
     double false_alarms = (search ? 0.5 : 1.0) * ip->config.false_alarms_per_frame;
-    double threshold = bst_filter_threshold(&ip->filter, false_alarms,
-                                            (double)width * (double)height);
+    double threshold =
+        bst_filter_threshold(&ip->filter, false_alarms, (double)width * (double)height);
     double look = ip->smeared ? threshold : fmax(0.93 * ip->filter.corner, LOOK_SHARE) * threshold;
     bst_filter_run(&ip->filter, ip->pool, &ip->background, read_electrons, &read, frame->pixels,
                    ip->electrons, width, height, saturation_dn(ip, frame), (float)look);

@@ -53,6 +53,7 @@ struct bst_discriminator {
     charged *charge, *merged; /* [room], by pixel */
     int charge_count;
     int *keys_order;
+    int *again; /* [capacity]: number of the remembered source that a detection is, -1: none */
     int64_t *keys;
     int *band;
     int bands;
@@ -80,8 +81,10 @@ bst_status bst_discriminator_create(bst_ctx *ctx, const bst_camera *camera, int 
     d->merged = calloc(room, sizeof *d->merged);
     d->keys = calloc((size_t)capacity, sizeof *d->keys);
     d->keys_order = calloc((size_t)capacity, sizeof *d->keys_order);
+    d->again = calloc((size_t)capacity, sizeof *d->again);
     d->band = calloc((size_t)d->bands, sizeof *d->band);
-    if (!d->sources || !d->charge || !d->merged || !d->keys || !d->keys_order || !d->band) {
+    if (!d->sources || !d->charge || !d->merged || !d->keys || !d->keys_order || !d->again ||
+        !d->band) {
         bst_discriminator_free(d);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory to remember %d detections", capacity);
     }
@@ -98,6 +101,7 @@ void bst_discriminator_free(bst_discriminator *d) {
     free(d->merged);
     free(d->keys);
     free(d->keys_order);
+    free(d->again);
     free(d->band);
     free(d);
 }
@@ -238,10 +242,10 @@ static double mag_sigma(const bst_detection *item) {
     return item->flux_e > 0.0 ? fmin(1.0857 * item->flux_sigma_e / item->flux_e, 1.0) : 1.0;
 }
 
-/* The nearest remembered source of like brightness; NULL: none. */
-static remembered *recall(bst_discriminator *d, const bst_detection *item) {
+/* Number of the nearest remembered source of like brightness; -1: none. */
+static int recall(bst_discriminator *d, const bst_detection *item) {
     double scale = bst_camera_scale_rad(&d->camera), closest = 1.0;
-    remembered *best = NULL;
+    int best = -1;
     int band = (int)(item->y_px / BAND);
     for (int b = band - 1; b <= band + 1; b++) {
         for (int i = b >= 0 && b < d->bands ? d->band[b] : -1; i >= 0; i = d->sources[i].next) {
@@ -254,7 +258,7 @@ static remembered *recall(bst_discriminator *d, const bst_detection *item) {
             double distance = hypot(item->x_px - r->x_px, item->y_px - r->y_px) / gate;
             if (distance < closest) {
                 closest = distance;
-                best = r;
+                best = i;
             }
         }
     }
@@ -266,8 +270,12 @@ static fate *fate_of(bst_discriminator *d, double v_mag, bool blend) {
     return &d->fates[blend][bin < 0 ? 0 : bin >= MAG_BINS ? MAG_BINS - 1 : bin];
 }
 
-/* Notes that an earlier source was seen again; says whether it is where it was first. */
-static bool note_again(bst_discriminator *d, const bst_detection *item, bst_vec3 direction,
+static bool is_source(const bst_detection *item) {
+    return !is_charge(item) && item->label != BST_LABEL_ARTEFACT;
+}
+
+/* Notes that an earlier source was seen again. */
+static void note_again(bst_discriminator *d, const bst_detection *item, bst_vec3 direction,
                        remembered *r) {
     double scale = bst_camera_scale_rad(&d->camera);
     double variance = place_variance(item) * scale * scale;
@@ -278,13 +286,33 @@ static bool note_again(bst_discriminator *d, const bst_detection *item, bst_vec3
     r->missed = 0;
     r->latest = direction;
     r->latest_var = variance;
-    if (r->fresh) {
-        fate *t = fate_of(d, r->v_mag, r->blend);
-        t->judged += 1.0;
-        t->stayed += r->moved ? 0.0 : 1.0;
-        r->fresh = false;
+}
+
+static bst_vec3 direction_of(const bst_discriminator *d, const bst_frame_knowledge *f,
+                             const bst_detection *item) {
+    return bst_quat_rotate(bst_quat_conj(f->q_cam_from_gcrf),
+                           bst_camera_unproject(&d->camera, item->x_px, item->y_px));
+}
+
+/* Finds the sources that were there before, and judges what was new in the frame before. */
+static void look_back(bst_discriminator *d, const bst_frame_knowledge *f,
+                      const bst_detections *out) {
+    for (int i = 0; i < out->count && i < d->capacity; i++) {
+        d->again[i] = is_source(&out->items[i]) ? recall(d, &out->items[i]) : -1;
+        if (d->again[i] >= 0) {
+            note_again(d, &out->items[i], direction_of(d, f, &out->items[i]),
+                       &d->sources[d->again[i]]);
+        }
     }
-    return !r->moved;
+    for (int i = 0; i < d->count; i++) {
+        remembered *r = &d->sources[i];
+        if (r->fresh && r->inside) {
+            fate *t = fate_of(d, r->v_mag, r->blend);
+            t->judged += 1.0;
+            t->stayed += r->taken && !r->moved ? 1.0 : 0.0;
+            r->fresh = false;
+        }
+    }
 }
 
 static void remember(bst_discriminator *d, const bst_detection *item, bst_vec3 direction,
@@ -311,13 +339,7 @@ static void forget(bst_discriminator *d) {
     int kept = 0;
     for (int i = 0; i < d->count; i++) {
         remembered *r = &d->sources[i];
-        if (!r->taken) {
-            r->missed++;
-            if (r->fresh && r->inside) {
-                fate_of(d, r->v_mag, r->blend)->judged += 1.0;
-                r->fresh = false;
-            }
-        }
+        r->missed += !r->taken;
         if (r->missed <= KEEP_MISSED) {
             d->sources[kept++] = *r;
         }
@@ -328,7 +350,7 @@ static void forget(bst_discriminator *d) {
 /* The probability that a source which no earlier frame had there is a star all the same. */
 static double new_star_probability(bst_discriminator *d, const bst_detection *item) {
     const fate *t = fate_of(d, item->v_mag, (item->flags & BST_DETECTION_BLEND) != 0);
-    /* one source that moved is believed in beforehand: two judged ones weigh as much */
+    /* two that moved are believed in beforehand */
     double stayed = t->stayed / (t->judged + 2.0);
     return fmin(stayed / STAR_REDETECTED, 0.98);
 }
@@ -368,15 +390,14 @@ static bool is_long_streak(const bst_detection *item) {
 }
 
 static void label_source(bst_discriminator *d, const bst_frame_knowledge *f, double unlisted,
-                         bst_detection *item) {
-    bst_vec3 direction = bst_quat_rotate(bst_quat_conj(f->q_cam_from_gcrf),
-                                         bst_camera_unproject(&d->camera, item->x_px, item->y_px));
-    remembered *r = recall(d, item);
+                         int again, bst_detection *item) {
     bool open = item->label == BST_LABEL_UNKNOWN;
     double star = 0.0;
-    if (r) {
-        star = note_again(d, item, direction, r) ? 1.0 - 0.1 / r->seen : 0.05;
+    if (again >= 0) {
+        const remembered *r = &d->sources[again];
+        star = r->moved ? 0.05 : 1.0 - 0.1 / r->seen;
     } else {
+        bst_vec3 direction = direction_of(d, f, item);
         double x, y;
         bool looked = d->covered && project(d, d->q_cam_from_gcrf, direction, &x, &y) &&
                       in_window(&d->window, x, y, MAX_GATE_PX);
@@ -392,7 +413,7 @@ static void label_source(bst_discriminator *d, const bst_frame_knowledge *f, dou
     } else if (f->streak_px >= STREAK_PX) {
         bool drawn = (item->flags & BST_DETECTION_STREAK) != 0;
         say(item, drawn ? BST_LABEL_STAR : BST_LABEL_OBJECT, drawn ? 0.9 : 0.95);
-    } else if ((!r || r->moved) && is_long_streak(item)) {
+    } else if ((again < 0 || d->sources[again].moved) && is_long_streak(item)) {
         say(item, BST_LABEL_OBJECT, 0.95);
     } else if (star > 0.5) {
         say(item, BST_LABEL_STAR, star);
@@ -426,10 +447,10 @@ void bst_discriminator_label(bst_discriminator *d, const bst_frame_knowledge *f,
     }
     label_predicted(d, f, out);
     place_memory(d, f);
-    for (int i = 0; i < out->count; i++) {
-        bst_detection *item = &out->items[i];
-        if (!is_charge(item) && item->label != BST_LABEL_ARTEFACT) {
-            label_source(d, f, unlisted, item);
+    look_back(d, f, out);
+    for (int i = 0; i < out->count && i < d->capacity; i++) {
+        if (is_source(&out->items[i])) {
+            label_source(d, f, unlisted, d->again[i], &out->items[i]);
         }
     }
     forget(d);

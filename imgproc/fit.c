@@ -180,13 +180,22 @@ bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
     bool good = true, settled = false;
     double chi = 0.0;
     double widest = 0.6 * free[0]->shape.sigma_px * free[0]->shape.sigma_px;
-    for (int iteration = 0; iteration < MAX_ITERATIONS && good && !settled; iteration++) {
+    /* a streak's ends tell of a shift only as far as the PSF reaches: it is found step by step */
+    double path = hypot(free[0]->shape.dx_px, free[0]->shape.dy_px);
+    int iterations = MAX_ITERATIONS + (int)fmin(path, BST_PSF_MAX_SIDE);
+    for (int iteration = 0; iteration < iterations && good && !settled; iteration++) {
         chi = accumulate(fit, data, stamp, free, free_count, free_width, a, g);
         good = factor(a, parameters);
         if (!good) {
             break;
         }
+        double gradient[BST_FIT_MAX_PARAMETERS];
+        memcpy(gradient, g, sizeof gradient);
         solve(a, parameters, g);
+        double gain = 0.0;
+        for (int k = 0; k < parameters; k++) {
+            gain += gradient[k] * g[k];
+        }
         settled = iteration > 0;
         for (int s = 0; s < free_count; s++) {
             const double *step = g + 3 * s;
@@ -195,15 +204,17 @@ bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
                              start[s].shape.x_px - limit_px, start[s].shape.x_px + limit_px);
             double y = clamp(f->shape.y_px + clamp(step[1], -0.7, 0.7),
                              start[s].shape.y_px - limit_px, start[s].shape.y_px + limit_px);
-            /* a hundredth of the standard deviation that the diagonal promises, at least 1e-5 px */
-            double slack_x = fmax(1e-5, 0.01 / a[3 * s][3 * s]);
-            double slack_y = fmax(1e-5, 0.01 / a[3 * s + 1][3 * s + 1]);
+            /* a hundredth of the standard deviation that the diagonal promises, at least 1e-5 px; a
+             * tenth for the neighbours, whose values are not kept */
+            double share = s == 0 ? 0.01 : 0.1;
+            double slack_x = fmax(1e-5, share / a[3 * s][3 * s]);
+            double slack_y = fmax(1e-5, share / a[3 * s + 1][3 * s + 1]);
             settled =
                 settled && fabs(x - f->shape.x_px) < slack_x && fabs(y - f->shape.y_px) < slack_y;
             double product = f->flux_e * f->widening_px2;
             double flux = f->flux_e + step[2];
             flux = flux > 0.1 * f->flux_e ? flux : 0.1 * f->flux_e;
-            settled = settled && fabs(flux - f->flux_e) < 0.01 / a[3 * s + 2][3 * s + 2];
+            settled = settled && fabs(flux - f->flux_e) < share / a[3 * s + 2][3 * s + 2];
             f->shape.x_px = x;
             f->shape.y_px = y;
             f->flux_e = flux;
@@ -212,8 +223,9 @@ bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
                 f->widening_px2 = clamp(product / flux, -widest, 3.0 * widest);
             }
         }
+        chi -= settled ? gain : 0.0; /* what so small a step still brings */
     }
-    if (good) {
+    if (good && !settled) {
         /* the covariance belongs to the place where the fit ended */
         chi = accumulate(fit, data, stamp, free, free_count, free_width, a, g);
         good = factor(a, parameters);

@@ -6,10 +6,10 @@
 #ifndef BST_IMGPROC_IMGPROC_H
 #define BST_IMGPROC_IMGPROC_H
 
-#include "sim/world/motion.h"
 #include "sim/core/messages.h"
 #include "sim/core/module.h"
 #include "sim/world/camera.h"
+#include "sim/world/motion.h"
 
 typedef struct bst_bad_pixel {
     int64_t x, y; /* full-sensor coordinates */
@@ -71,9 +71,9 @@ void bst_imgproc_free(bst_imgproc *ip);
  * Fundamentals of Statistical Signal Processing II, 1998, ch. 7). The passes run on
  * config->threads threads; the result does not depend on them.
  *
- * With config.streak_search_px, a frame in which stars are points is also searched for streaks of any
- * direction and length up to that (streak_locate.h); points and streaks then have half of the false
- * alarms each, and threshold_snr is that of points.
+ * With config.streak_search_px, a frame in which stars are points is also searched for streaks of
+ * any direction and length up to that (streak_locate.h); points and streaks then have half of the
+ * false alarms each, and threshold_snr is that of points.
  *
  * Fills background_e, noise_e, threshold_snr, count, lost and items of *out (room for `capacity`),
  * sorted by y, then x; label is UNKNOWN or ARTEFACT, star_id 0. When there is no room the brightest

@@ -3,13 +3,13 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { CELL_PX = 16, MAX_FIXED = 12, MAX_CHARGE = 64 };
+#include "imgproc/charge.h"
+
+enum { CELL_PX = 16, MAX_FIXED = 12 };
 
 static const double WIDTH_FIT_SNR = 20.0; /* from here the widening is measured */
 static const double MOMENTS_SNR = 10.0;   /* below, extents are the model's own */
 static const double CLOSE_SHARE = 0.8; /* filter outputs closer than this: both shapes are tried */
-static const double LIGHT_SNR = 4.0;   /* beside charge, from here there is a source as well */
-static const double FWHM_PER_SIGMA = 2.3548200450309493;
 
 bst_status bst_locator_create(bst_ctx *ctx, int capacity, int max_width, int max_height,
                               int max_side, bst_locator *out) {
@@ -269,156 +269,6 @@ static void locate_one(bst_locator *l, const bst_locate_frame *f, int i) {
     }
 }
 
-/* The pixels that are sharper than light about a candidate's maximum, and those that they join. */
-static int find_charge(const bst_locator *l, const bst_locate_frame *f, const bst_found *found,
-                       int at[MAX_CHARGE], double *sharpest) {
-    int reach_px = 1 + (int)f->sigma_px, count = 0;
-    *sharpest = 0.0;
-    for (int round = -1; round < count; round++) {
-        int x = round < 0 ? found->peak_x : at[round] % f->width;
-        int y = round < 0 ? found->peak_y : at[round] / f->width;
-        int r = round < 0 ? reach_px : 1;
-        for (int v = y - r; v <= y + r; v++) {
-            for (int u = x - r; u <= x + r && count < MAX_CHARGE; u++) {
-                double sharp = bst_sharpness_at(&l->sharpness, f->signal, f->width, f->height,
-                                                found->noise_e, u, v);
-                bool known = false;
-                for (int k = 0; k < count && sharp > BST_SHARP_DEVIATION; k++) {
-                    known = known || at[k] == v * f->width + u;
-                }
-                if (sharp > BST_SHARP_DEVIATION && !known) {
-                    at[count++] = v * f->width + u;
-                    *sharpest = fmax(*sharpest, sharp);
-                }
-            }
-        }
-    }
-    return count;
-}
-
-/* What a candidate is when its charge is all there is: centroid and extent of the charge. */
-static void describe_charge(const bst_locate_frame *f, const int *at, int count, double sharpest,
-                            bst_found *found) {
-    double sum = 0.0, square = 0.0, mx = 0.0, my = 0.0, mxx = 0.0, mxy = 0.0, myy = 0.0;
-    for (int k = 0; k < count; k++) {
-        double v = (double)f->signal[at[k]], x = at[k] % f->width - found->peak_x,
-               y = at[k] / f->width - found->peak_y;
-        sum += v;
-        square += v * v;
-        mx += v * x;
-        my += v * y;
-        mxx += v * x * x;
-        mxy += v * x * y;
-        myy += v * y * y;
-    }
-    mx /= sum;
-    my /= sum;
-    mxx = fmax(mxx / sum - mx * mx, 0.0) + 1.0 / 12.0;
-    myy = fmax(myy / sum - my * my, 0.0) + 1.0 / 12.0;
-    mxy = mxy / sum - mx * my;
-    double mean = 0.5 * (mxx + myy), half = hypot(0.5 * (mxx - myy), mxy);
-    found->charge = (bst_charge){.pixels = count,
-                                 .sharpness = sharpest,
-                                 .x_px = found->peak_x + mx,
-                                 .y_px = found->peak_y + my,
-                                 .electrons = sum,
-                                 .snr = sqrt(square) / found->noise_e,
-                                 .length_px = FWHM_PER_SIGMA * sqrt(mean + half),
-                                 .width_px = FWHM_PER_SIGMA * sqrt(fmax(mean - half, 0.0)),
-                                 .angle_rad = half > 1e-9 ? 0.5 * atan2(2.0 * mxy, mxx - myy) : 0};
-}
-
-/* Charge about every candidate, and then off all pixels that hold it: one candidate's must not hide
- * from another. */
-static void remove_charge(bst_locator *l, const bst_locate_frame *f) {
-    l->charged_count = 0;
-    for (int i = 0; i < l->count; i++) {
-        int at[MAX_CHARGE];
-        double sharpest;
-        int count = find_charge(l, f, &l->found[i], at, &sharpest);
-        if (count == 0) {
-            continue;
-        }
-        describe_charge(f, at, count, sharpest, &l->found[i]);
-        for (int k = 0; k < count && l->charged_count < l->charged_capacity; k++) {
-            l->charged[l->charged_count++] = at[k];
-        }
-    }
-    for (int k = 0; k < l->charged_count; k++) {
-        f->signal[l->charged[k]] = BST_PIXEL_BAD;
-    }
-}
-
-/* SNR of what the pixels without charge show of a point (or streak, locally) there. */
-static double light_beside_charge(const bst_locate_frame *f, const bst_found *found) {
-    int r = 1 + (int)ceil(1.5 * f->sigma_px);
-    double sum = 0.0, norm = 0.0, scale = -0.5 / (f->sigma_px * f->sigma_px + 1.0 / 12.0);
-    for (int y = found->peak_y - r; y <= found->peak_y + r; y++) {
-        for (int x = found->peak_x - r; x <= found->peak_x + r; x++) {
-            if (x < 0 || y < 0 || x >= f->width || y >= f->height) {
-                continue;
-            }
-            float v = f->signal[(size_t)y * (size_t)f->width + (size_t)x];
-            if (v > BST_PIXEL_NONE) {
-                double dx = x - found->charge.x_px, dy = y - found->charge.y_px;
-                double w = exp(scale * (dx * dx + dy * dy));
-                sum += w * (double)v;
-                norm += w * w;
-            }
-        }
-    }
-    return norm > 0.0 ? sum / (sqrt(norm) * found->noise_e) : 0.0;
-}
-
-/* Says that a candidate is charge and nothing else. */
-static void take_for_charge(bst_found *found) {
-    const bst_charge *c = &found->charge;
-    found->label = c->pixels == 1 ? BST_LABEL_HOT_PIXEL : BST_LABEL_HIT;
-    /* chance of light: its tail there, against one candidate in a thousand that is charge */
-    double odds = exp(fmin(0.5 * c->sharpness * c->sharpness, 300.0) - 7.0);
-    found->label_probability = odds / (1.0 + odds);
-    found->streak = false;
-    found->flags = 0;
-    found->source.shape.x_px = c->x_px;
-    found->source.shape.y_px = c->y_px;
-    found->source.shape.dx_px = found->source.shape.dy_px = 0.0;
-    found->source.shape.bend_x_px = found->source.shape.bend_y_px = 0.0;
-    found->source.flux_e = c->electrons;
-    found->source.flux_variance = c->pixels * found->noise_e * found->noise_e + c->electrons;
-    found->source.cov_xx = found->source.cov_yy = 1.0 / 12.0;
-    found->source.cov_xy = 0.0;
-    found->snr = c->snr;
-    found->length_px = c->length_px;
-    found->width_px = c->width_px;
-    found->angle_rad = c->angle_rad;
-}
-
-/* Whether the fit to the pixels without charge shows no source: too little light, or light that the
- * PSF does not explain. */
-static bool is_charge_alone(const bst_found *found) {
-    const bst_source *s = &found->source;
-    double snr2 = s->flux_e * s->flux_e / fmax(s->flux_variance, 1e-30);
-    double excess = s->chi_square - s->pixels;
-    return !s->fitted || snr2 < LIGHT_SNR * LIGHT_SNR ||
-           excess > 5.0 * sqrt(2.0 * s->pixels) + 0.1 * snr2;
-}
-
-/* Whether charge was taken off about a candidate: the filters answer to it besides its own place.
- */
-static bool is_charge_near(const bst_locator *l, const bst_locate_frame *f,
-                           const bst_found *found) {
-    bst_source s = found->source;
-    s.shape.x_px = found->peak_x;
-    s.shape.y_px = found->peak_y;
-    bst_stamp stamp = bst_fit_stamp(&s, reach(f), l->max_side, f->width, f->height);
-    bool near = false;
-    for (int k = 0; k < l->charged_count && !near; k++) {
-        int x = l->charged[k] % f->width - stamp.x0, y = l->charged[k] / f->width - stamp.y0;
-        near = x >= 0 && y >= 0 && x < stamp.width && y < stamp.height;
-    }
-    return near;
-}
-
 /* Principal axes of the measured or modelled second moments. */
 static bool measure_extent(bst_locator *l, const bst_locate_frame *f, int i, double wider) {
     bst_found *found = &l->found[i];
@@ -458,8 +308,8 @@ static bool measure_extent(bst_locator *l, const bst_locate_frame *f, int i, dou
     }
     double mean = 0.5 * (m[0] + m[2]), half = hypot(0.5 * (m[0] - m[2]), m[1]);
     double limit = 0.5 * l->max_side;
-    found->length_px = fmin(FWHM_PER_SIGMA * sqrt(mean + half), limit);
-    found->width_px = fmin(FWHM_PER_SIGMA * sqrt(fmax(mean - half, 0.0)), limit);
+    found->length_px = fmin(BST_FWHM_PER_SIGMA * sqrt(mean + half), limit);
+    found->width_px = fmin(BST_FWHM_PER_SIGMA * sqrt(fmax(mean - half, 0.0)), limit);
     found->angle_rad = half > 1e-9 * mean ? 0.5 * atan2(2.0 * m[1], m[0] - m[2]) : 0.0;
     return measured;
 }
@@ -479,13 +329,13 @@ static double try_path(bst_locator *l, const bst_locate_frame *f, int i, const b
  * through three values of chi-square gives it well. */
 static void fit_own_streak(bst_locator *l, const bst_locate_frame *f, int i) {
     bst_found *found = &l->found[i];
-    double psf_fwhm = FWHM_PER_SIGMA * f->sigma_px;
+    double psf_fwhm = BST_FWHM_PER_SIGMA * f->sigma_px;
     for (int round = 0; round < 4; round++) {
         if (!measure_extent(l, f, i, 2.0 * reach(f)) || found->length_px < 1.5 * psf_fwhm) {
             return;
         }
         double spread = (found->length_px * found->length_px - psf_fwhm * psf_fwhm) /
-                        (FWHM_PER_SIGMA * FWHM_PER_SIGMA);
+                        (BST_FWHM_PER_SIGMA * BST_FWHM_PER_SIGMA);
         double path = fmin(sqrt(12.0 * spread), 0.4 * l->max_side), angle = found->angle_rad;
         bst_found before = *found;
         bst_source longest = before.source;
@@ -512,6 +362,17 @@ static void fit_own_streak(bst_locator *l, const bst_locate_frame *f, int i) {
         note_length(l, &found->source.shape);
         found->snr = found->source.flux_e * bst_fit_norm(&l->fit, &stamp) / found->noise_e;
     }
+}
+
+/* Whether charge was taken off about a candidate: the filters answer to it besides its own place.
+ */
+static bool is_charge_near(const bst_locator *l, const bst_locate_frame *f,
+                           const bst_found *found) {
+    bst_source s = found->source;
+    s.shape.x_px = found->peak_x;
+    s.shape.y_px = found->peak_y;
+    bst_stamp stamp = bst_fit_stamp(&s, reach(f), l->max_side, f->width, f->height);
+    return bst_charge_in(l, f->width, &stamp);
 }
 
 /* Flags and plausibility. */
@@ -550,7 +411,7 @@ static void use_maximum(const bst_locate_frame *f, bst_found *found) {
 }
 
 static void drop_doubles(bst_locator *l, const bst_locate_frame *f) {
-    double radius = 0.6 * FWHM_PER_SIGMA * f->sigma_px;
+    double radius = 0.6 * BST_FWHM_PER_SIGMA * f->sigma_px;
     double margin = radius + 1.8 * l->longest_px + 2.0 * fit_limit(f, 0.0);
     for (int i = 0; i < l->count; i++) {
         const bst_shape *a = &l->found[i].source.shape;
@@ -584,16 +445,16 @@ void bst_locate(bst_locator *l, const bst_locate_frame *f, const bst_candidates 
     l->widening_sum = 0.0;
     l->widening_weight = 1.0 / (0.0025 * variance * variance); /* no widening, to 5 % */
     bst_sharpness_set(&l->sharpness, &l->psf, f->sigma_px);
-    remove_charge(l, f);
+    bst_charge_remove(l, f);
     for (int i = 0; i < l->count; i++) {
         bst_found *found = &l->found[i];
-        if (found->charge.pixels > 0 && light_beside_charge(f, found) < LIGHT_SNR) {
-            take_for_charge(found);
+        if (found->charge.pixels > 0 && bst_charge_light(f, found) < BST_CHARGE_LIGHT_SNR) {
+            bst_charge_take(found);
             continue;
         }
         locate_one(l, f, i);
-        if (found->charge.pixels > 0 && is_charge_alone(found)) {
-            take_for_charge(found);
+        if (found->charge.pixels > 0 && bst_charge_alone(found)) {
+            bst_charge_take(found);
         }
     }
     drop_doubles(l, f);
@@ -615,7 +476,7 @@ void bst_locate(bst_locator *l, const bst_locate_frame *f, const bst_candidates 
             use_maximum(f, found);
         }
         found->snr = found->source.flux_e * shape_norm(f, found->streak) / found->noise_e;
-        if (found->snr < LIGHT_SNR && is_charge_near(l, f, found)) {
+        if (found->snr < BST_CHARGE_LIGHT_SNR && is_charge_near(l, f, found)) {
             found->dropped = true;
             continue;
         }
@@ -628,7 +489,7 @@ void bst_locate(bst_locator *l, const bst_locate_frame *f, const bst_candidates 
         measure_extent(l, f, i, 0.0);
         if (found->streak ||
             (found->snr >= MOMENTS_SNR && found->length_px > 1.5 * fmax(found->width_px, 1.0) &&
-             found->length_px > 1.5 * FWHM_PER_SIGMA * f->sigma_px)) {
+             found->length_px > 1.5 * BST_FWHM_PER_SIGMA * f->sigma_px)) {
             found->flags |= BST_DETECTION_STREAK;
         }
     }
@@ -642,6 +503,6 @@ void bst_locate_roughly(bst_locator *l, const bst_locate_frame *f,
         start(f, &candidates->items[candidates->order[i]], found);
         use_maximum(f, found);
         found->snr = (double)found->peak_snr;
-        found->length_px = found->width_px = FWHM_PER_SIGMA * f->sigma_px;
+        found->length_px = found->width_px = BST_FWHM_PER_SIGMA * f->sigma_px;
     }
 }

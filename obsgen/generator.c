@@ -165,10 +165,10 @@ static void respond(const bst_generator *g, generator_source *s) {
 }
 
 static bst_status reserve(bst_ctx *ctx, bst_generator *g, int count) {
-    if (count <= g->source_capacity) {
+    if (count < g->source_capacity) {
         return BST_OK;
     }
-    int capacity = 2 * count;
+    int capacity = 2 * count + 16;
     generator_source *sources = realloc(g->sources, (size_t)capacity * sizeof *sources);
     g->sources = sources ? sources : g->sources;
     generator_rank *ranks = realloc(g->ranks, (size_t)capacity * sizeof *ranks);

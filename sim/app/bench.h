@@ -19,7 +19,7 @@ typedef struct bst_bench_result {
     int error_sources; /* how many sources the error was measured on, 0: does not apply */
     double peak_rss_mib;
     double setup_s, ms_max, error_px;
-    double error_m; /* of a place */
+    double error_m;                     /* of a place */
     double detections, detections_lost; /* per frame: reported; more than there was room for */
     struct bst_bench_phase {
         char name[24];

@@ -92,8 +92,8 @@ static void add_track(synthetic *s, double x, double y, double length, double an
 }
 
 /* Hits as a detector of 13 um pixels and 15 um depth sees them, 1125 e- and more, and tracks up to
- * 10 px; single pixels from an SNR of 9 on. At least 95 % are found out, and nearly all that are one
- * pixel or long: 300 of each, of which a share of 0.97 has a standard deviation of 0.01. */
+ * 10 px; single pixels from an SNR of 9 on. At least 95 % are found out, and nearly all that are
+ * one pixel or long: 300 of each, of which a share of 0.97 has a standard deviation of 0.01. */
 static void charge_is_not_light(void **state) {
     (void)state;
     static const double cases[][3] = {

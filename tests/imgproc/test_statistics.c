@@ -12,11 +12,11 @@ typedef struct tally {
     double flux_bias, flux_scatter_ratio;
 } tally;
 
-/* Frames of 36 equal sources at random sub-pixel phases. */
-static tally measure(double dx, double dy, double snr, int frames) {
+/* Frames of 36 equal sources at random sub-pixel phases, `spacing` px apart. */
+static tally measure_apart(double dx, double dy, double snr, int frames, int spacing) {
     bst_ctx ctx = {0};
     synthetic s;
-    synthetic_init(&s, 256, 256);
+    synthetic_init(&s, 6 * spacing + 28, 6 * spacing + 28);
     bst_imgproc *ip = synthetic_processor(&ctx, &s);
     bst_detections *d = synthetic_detections(2048);
     bst_motion motion = synthetic_motion(&s, dx, dy);
@@ -33,8 +33,10 @@ static tally measure(double dx, double dy, double snr, int frames) {
         double x[36], y[36];
         synthetic_clear(&s);
         for (int k = 0; k < 36; k++) {
-            x[k] = 30 + k % 6 * 38 + bst_rng_uniform(key, (uint64_t)i, (uint64_t)(2 * k));
-            y[k] = 30 + k / 6 * 38 + bst_rng_uniform(key, (uint64_t)i, (uint64_t)(2 * k + 1));
+            x[k] = 11 + spacing / 2 + k % 6 * spacing +
+                   bst_rng_uniform(key, (uint64_t)i, (uint64_t)(2 * k));
+            y[k] = 11 + spacing / 2 + k / 6 * spacing +
+                   bst_rng_uniform(key, (uint64_t)i, (uint64_t)(2 * k + 1));
             synthetic_add(&s, x[k], y[k], flux, dx, dy);
         }
         synthetic_expose(&s, key, (uint64_t)(1000 + i));
@@ -83,6 +85,10 @@ static tally measure(double dx, double dy, double snr, int frames) {
     return t;
 }
 
+static tally measure(double dx, double dy, double snr, int frames) {
+    return measure_apart(dx, dy, snr, frames, 38);
+}
+
 /* The required Pd; theory at 1 false alarm per frame of 256^2 gives about 0.96. */
 static void finds_snr_six(void **state) {
     (void)state;
@@ -111,8 +117,34 @@ static void locates_to_the_bound(void **state) {
     }
 }
 
-/* Noise-free but for read noise far below the light: the error is the model's bias. 0.01 px is what
- * is required. */
+/* 1.05 of the bound is what is asked; 720 points or 360 streaks know the RMS to 2.6 or 3.7 %
+ * (1 sigma; two of them are allowed for). The longer run, `test_imgproc_statistics long`, holds
+ * 7,200 each to 1.07, two of its standard deviations. */
+static bool long_run;
+static void within_five_percent_of_the_bound(void **state) {
+    (void)state;
+    static const double cases[][4] = {/* path, SNR, spacing */
+                                      {0, 0, 10, 38},  {0, 0, 30, 38},  {0, 0, 100, 38},
+                                      {5, 0, 10, 38},  {20, 0, 20, 60}, {14, 14, 20, 60},
+                                      {60, 0, 50, 90}, {42, 42, 50, 80}};
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        const double *p = cases[c];
+        int frames = long_run ? 200 : p[3] > 40 ? 10 : 20;
+        double limit = 1.05 + 2.0 / sqrt(2.0 * 36 * frames);
+        tally t = measure_apart(p[0], p[1], p[2], frames, (int)p[3]);
+        print_message(
+            "path (%g, %g) px, SNR %g: RMS / bound %.3f along, %.3f across; RMS / stated "
+            "%.3f, %.3f\n",
+            p[0], p[1], p[2], t.ratio_along, t.ratio_across, t.claimed_along, t.claimed_across);
+        assert_true(t.found >= 0.99 * t.sources);
+        assert_true(t.ratio_along < limit && t.ratio_across < limit);
+        bst_assert_close(t.claimed_along, 1.0, 0.1);
+        bst_assert_close(t.claimed_across, 1.0, 0.1);
+    }
+}
+
+/* Noise-free but for read noise far below the light: the error is the model's bias. 0.005 px is
+ * what is required. */
 static void no_bias_over_pixel_phase(void **state) {
     (void)state;
     static const double paths[][2] = {{0, 0}, {8.3, 0}, {3.1, -5.7}};
@@ -141,8 +173,8 @@ static void no_bias_over_pixel_phase(void **state) {
             bst_assert_ok(&ctx, bst_imgproc_detect(&ctx, ip, &frame, &motion, d, 64));
             int n = synthetic_nearest(d, x, y, 2.0);
             assert_true(n >= 0);
-            bst_assert_close(d->items[n].x_px, x, 0.01);
-            bst_assert_close(d->items[n].y_px, y, 0.01);
+            bst_assert_close(d->items[n].x_px, x, 0.005);
+            bst_assert_close(d->items[n].y_px, y, 0.005);
         }
         free(d);
         bst_imgproc_free(ip);
@@ -179,8 +211,63 @@ static void false_alarms_are_as_requested(void **state) {
     }
 }
 
-int main(void) {
+/* One source per frame of 128 x 128, at (x, y); every frame must find it within `near` px, and the
+ * mean squared error over the stated variance, both axes, stays below `limit`. 30 frames know 1 to
+ * 0.18 (1 sigma). */
+static void hard_case(double fwhm, double x, double y, double snr, double dx, double dy,
+                      double second_px, double near, double limit) {
+    bst_ctx ctx = {0};
+    synthetic s;
+    synthetic_init(&s, 128, 128);
+    s.camera.psf_fwhm_px = fwhm;
+    bst_imgproc *ip = synthetic_processor(&ctx, &s);
+    bst_detections *d = synthetic_detections(64);
+    bst_motion motion = synthetic_motion(&s, dx, dy);
+    bst_imgproc_frame frame = synthetic_frame(&s);
+    bst_rng_key key = bst_rng_make_key(11, 0, "test", "hard");
+    double flux = snr * synthetic_noise(&s) / synthetic_norm(&s, 60.3, 60.7, dx, dy), sum = 0;
+    int frames = 30;
+    for (int i = 0; i < frames; i++) {
+        double u = x + bst_rng_uniform(key, (uint64_t)i, 1),
+               v = y + bst_rng_uniform(key, (uint64_t)i, 2);
+        synthetic_clear(&s);
+        synthetic_add(&s, u, v, flux, dx, dy);
+        if (second_px > 0) {
+            synthetic_add(&s, u + second_px, v, 0.8 * flux, dx, dy);
+        }
+        synthetic_expose(&s, key, (uint64_t)(100 + i));
+        bst_assert_ok(&ctx, bst_imgproc_detect(&ctx, ip, &frame, &motion, d, 64));
+        assert_true(synthetic_sound(d));
+        int n = synthetic_nearest(d, u, v, near);
+        assert_true(n >= 0);
+        const bst_detection *p = &d->items[n];
+        sum +=
+            (p->x_px - u) * (p->x_px - u) / p->cov_xx + (p->y_px - v) * (p->y_px - v) / p->cov_yy;
+    }
+    print_message("FWHM %g px at (%g, %g), SNR %g, path (%g, %g): %.2f\n", fwhm, x, y, snr, dx, dy,
+                  sum / (2 * frames));
+    assert_true(sum / (2 * frames) < limit);
+    free(d);
+    bst_imgproc_free(ip);
+    synthetic_free(&s);
+}
+
+static void hard_cases(void **state) {
+    (void)state;
+    /* narrower than a pixel: the bound differs over the pixel by more than the error is small */
+    hard_case(0.8, 60, 60, 30, 0, 0, 0, 1, 2);
+    hard_case(8, 60, 60, 30, 0, 0, 0, 2, 1.5);
+    hard_case(2, -0.5, 60, 50, 0, 0, 0, 1.5, 2); /* on the frame's edge */
+    hard_case(2, 60, 60, 60, 0, 0, 4, 1, 1.6);   /* a pair at 2 FWHM */
+    hard_case(2, 60, 60, 20000, 0, 0, 0, 1, 4);  /* core beyond the full well */
+    hard_case(2, 10, 60, 60, 60, 0, 0, 3, 2);    /* a streak cut by the edge */
+}
+
+int main(int argc, char **argv) {
+    long_run = argc > 1 && strcmp(argv[1], "long") == 0;
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(within_five_percent_of_the_bound),
+        cmocka_unit_test(hard_cases),
         cmocka_unit_test(finds_snr_six),
         cmocka_unit_test(locates_to_the_bound),
         cmocka_unit_test(no_bias_over_pixel_phase),
