@@ -211,9 +211,9 @@ static void stars_are_no_streaks(void **state) {
     synthetic_free(&s);
 }
 
-/* Tracks of charge and hot pixels beside and under streaks: none becomes a streak or a piece of
- * one, and the streaks of SNR 15 (1 in 10,000 is lost at most by theory) are found: 30 of 32, since
- * charge covers part of each. Chance makes 1 / 16 of a streak per frame. */
+/* Tracks of charge and hot pixels beside and on streaks of SNR 15: no charge becomes a streak, and
+ * the streaks, which lose a pixel or two of light, are found in one piece: 30 of 32. Chance makes
+ * 1 / 16 of a streak per frame. */
 static void charge_is_no_streak(void **state) {
     (void)state;
     enum { SIDE = 512, STREAKS = 4 };
