@@ -6,6 +6,7 @@
 #include "imgproc/imgproc.h"
 #include "imgproc/locate.h"
 #include "imgproc/rows.h"
+#include "imgproc/streak_locate.h"
 #include "imgproc/tail.h"
 
 /* Maxima are looked at in between the pixels from this share of the threshold on at the least. */
@@ -24,6 +25,7 @@ struct bst_imgproc {
     bst_filter filter;
     bst_candidates candidates;
     bst_locator locator;
+    bst_streak_locator streaks; /* only when config.streak_search_px > 0 */
     bst_parallel *pool;
     int *order;
     /* of the latest frame */
@@ -73,7 +75,11 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     BST_TRY(bst_background_create(ctx, (int)ip->config.mesh_px, width, height, &ip->background));
     BST_TRY(bst_filter_create(ctx, width, height, streak, &ip->filter));
     BST_TRY(bst_candidates_create(ctx, width, height, &ip->candidates));
-    return bst_locator_create(ctx, capacity, width, height, side, &ip->locator);
+    BST_TRY(bst_locator_create(ctx, capacity, width, height, side, &ip->locator));
+    return ip->config.streak_search_px > 0.0
+               ? bst_streak_locator_create(ctx, &ip->locator.psf, ip->pool, width, height, fwhm,
+                                           ip->config.streak_search_px, &ip->streaks)
+               : BST_OK;
 }
 
 bst_status bst_imgproc_create(bst_ctx *ctx, const bst_camera *camera, double electrons_per_s_v0,
@@ -119,6 +125,7 @@ void bst_imgproc_free(bst_imgproc *ip) {
     bst_filter_free(&ip->filter);
     bst_candidates_free(&ip->candidates);
     bst_locator_free(&ip->locator);
+    bst_streak_locator_free(&ip->streaks);
     bst_parallel_free(ip->pool);
     free(ip);
 }
@@ -309,8 +316,11 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
     filter_path(ip, frame, motion, &dx, &dy);
     ip->streak_px = hypot(dx, dy) * frame->binning;
     bst_filter_set(&ip->filter, sigma, dx, dy);
-    double threshold = bst_filter_threshold(&ip->filter, ip->config.false_alarms_per_frame,
-                                            (double)width * (double)height);
+    /* stars are points: what else there is may be a streak */
+    bool search = ip->config.streak_search_px > 0.0 && !ip->filter.streak && !ip->smeared;
+    double false_alarms = (search ? 0.5 : 1.0) * ip->config.false_alarms_per_frame;
+    double threshold =
+        bst_filter_threshold(&ip->filter, false_alarms, (double)width * (double)height);
     double look = ip->smeared ? threshold : fmax(0.93 * ip->filter.corner, LOOK_SHARE) * threshold;
     bst_filter_run(&ip->filter, ip->pool, &ip->background, read_electrons, &read, frame->pixels,
                    ip->electrons, width, height, saturation_dn(ip, frame), (float)look);
@@ -338,6 +348,9 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
 
     int kept = 0, room = capacity < ip->locator.capacity ? capacity : ip->locator.capacity;
     int lost = ip->candidates.count - ip->locator.count;
+    if (search) {
+        bst_streak_locate(&ip->streaks, &view, &ip->candidates, false_alarms, &ip->locator);
+    }
     for (int i = 0; i < ip->locator.count; i++) {
         if (ip->locator.found[i].dropped) {
             continue;

@@ -14,8 +14,9 @@ static const double PLACE_SIGMA_PX = 0.15;   /* of a place from one frame to ano
 static const double SAME_SIGMAS = 4.0;
 static const double SAME_MAG = 0.75;
 static const double MAX_GATE_PX = 3.0;
-static const double STREAK_PX = 3.0; /* stars that move further are told from points */
-static const double FAINT_SNR = 8.0; /* below, a hot pixel may look like light */
+static const double STREAK_PX = 3.0;  /* stars that move further are told from points */
+static const double LONG_SHARE = 3.0; /* length over width that no pair of points has */
+static const double FAINT_SNR = 8.0;  /* below, a hot pixel may look like light */
 static const double STAR_REDETECTED = 0.6;
 
 /* A source of earlier frames. */
@@ -382,6 +383,12 @@ static void label_predicted(const bst_discriminator *d, const bst_frame_knowledg
     }
 }
 
+/* Drawn further than stars that lie close together in a frame of points. */
+static bool is_long_streak(const bst_detection *item) {
+    return (item->flags & BST_DETECTION_STREAK) && !(item->flags & BST_DETECTION_BLEND) &&
+           item->length_px > LONG_SHARE * item->width_px;
+}
+
 static void label_source(bst_discriminator *d, const bst_frame_knowledge *f, double unlisted,
                          int again, bst_detection *item) {
     bool open = item->label == BST_LABEL_UNKNOWN;
@@ -406,6 +413,8 @@ static void label_source(bst_discriminator *d, const bst_frame_knowledge *f, dou
     } else if (f->streak_px >= STREAK_PX) {
         bool drawn = (item->flags & BST_DETECTION_STREAK) != 0;
         say(item, drawn ? BST_LABEL_STAR : BST_LABEL_OBJECT, drawn ? 0.9 : 0.95);
+    } else if ((again < 0 || d->sources[again].moved) && is_long_streak(item)) {
+        say(item, BST_LABEL_OBJECT, 0.95);
     } else if (star > 0.5) {
         say(item, BST_LABEL_STAR, star);
     } else {

@@ -33,13 +33,14 @@ void bst_discriminator_free(bst_discriminator *discriminator);
  * where it did not although an earlier frame covered it; a source below SNR 8 on a pixel that held
  * charge in two frames is a HOT_PIXEL too. Of the rest, in this order: cut by the
  * edge, an ARTEFACT; at a moving track's predicted place, an OBJECT; drawn as the stars are in a
- * frame that follows something else, a STAR, and a point there an OBJECT; where earlier frames had
- * a source of its brightness at the same place of the sky, a STAR without star_id, or an OBJECT
- * once it has left the place where it was seen first; else new: of the new sources of like
- * brightness in earlier frames some stayed where they were (stars near the limit of detection that
- * show in some frames only) and some did not, and their share is the probability. Without earlier
- * frames ten objects are expected in a frame and the others are stars. Nothing is said without
- * orientation, except of charge. */
+ * frame that follows something else, a STAR, and a point there an OBJECT; three
+ * times as long as wide where stars are points, and not at rest there before, an OBJECT; where
+ * earlier frames had a source of its brightness at the same place of the sky, a STAR without
+ * star_id, or an OBJECT once it has left the place where it was seen first; else new: of the new
+ * sources of like brightness in earlier frames some stayed where they were (stars near the limit of
+ * detection that show in some frames only) and some did not, and their share is the probability.
+ * Without earlier frames ten objects are expected in a frame and the others are stars. Nothing is
+ * said without orientation, except of charge. */
 void bst_discriminator_label(bst_discriminator *discriminator, const bst_frame_knowledge *frame,
                              bst_detections *detections);
 

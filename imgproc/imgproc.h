@@ -21,6 +21,7 @@ typedef struct bst_imgproc_config {
     double false_alarms_per_frame; /* on noise alone */
     double jitter_px;              /* RMS per axis by which the PSF is expected to be widened */
     double streak_min_px, streak_max_px;
+    double streak_search_px; /* 0: no search for streaks of unknown rate and direction */
     double search_radius_px, match_tolerance_px;
     int64_t threads;            /* 0: one per processor */
     bst_config_list bad_pixels; /* of bst_bad_pixel */
@@ -69,6 +70,10 @@ void bst_imgproc_free(bst_imgproc *ip);
  * matched-filter outputs is the generalised likelihood ratio test between both shapes (Kay,
  * Fundamentals of Statistical Signal Processing II, 1998, ch. 7). The passes run on
  * config->threads threads; the result does not depend on them.
+ *
+ * With config.streak_search_px, a frame in which stars are points is also searched for streaks of
+ * any direction and length up to that (streak_locate.h); points and streaks then have half of the
+ * false alarms each, and threshold_snr is that of points.
  *
  * Fills background_e, noise_e, threshold_snr, count, lost and items of *out (room for `capacity`),
  * sorted by y, then x; label is UNKNOWN or ARTEFACT, star_id 0. When there is no room the brightest

@@ -28,6 +28,9 @@ const bst_config_desc bst_imgproc_config_table[] = {
              "Star streaks shorter than this are taken for points."),
     BST_REAL(bst_imgproc_config, streak_max_px, "px", 1, 128, "64",
              "Star streaks longer than this are not filtered for."),
+    BST_REAL(bst_imgproc_config, streak_search_px, "px", 0, 128, "0",
+             "Greatest length of streaks of unknown rate and direction that are searched for in "
+             "frames in which stars are points; 0: no search."),
     BST_REAL(bst_imgproc_config, search_radius_px, "px", 2, 500, "60",
              "Greatest pointing error over which stars are identified."),
     BST_REAL(bst_imgproc_config, match_tolerance_px, "px", 0.5, 20, "3",

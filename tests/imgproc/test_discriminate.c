@@ -207,6 +207,32 @@ static void following_something(void **state) {
     end(&s);
 }
 
+/* Stars are points: a new source drawn across the frame is none, whatever else new ones were; what
+ * is little longer than wide (two stars that touch) may be. */
+static void drawn_among_points(void **state) {
+    (void)state;
+    scene s = make();
+    for (int frame = 0; frame < 3; frame++) {
+        next(&s, 2);
+        for (int k = 0; k < 400; k++) {
+            add_sky(&s, 30 + k % 20 * 22, 30 + k / 20 * 22, 12);
+        }
+        bst_detection *streak = add(&s, 100 + 90 * frame, 41, 12, BST_LABEL_UNKNOWN);
+        streak->flags = BST_DETECTION_STREAK;
+        streak->width_px = 2;
+        streak->length_px = 10;
+        bst_detection *pair = add_sky(&s, 173, 173, 12);
+        pair->flags = BST_DETECTION_STREAK;
+        pair->width_px = 2;
+        pair->length_px = 3.5;
+        label(&s);
+        assert_int_equal(s.out->items[400].label, BST_LABEL_OBJECT);
+        assert_true(s.out->items[400].label_probability > 0.9);
+        assert_int_equal(s.out->items[401].label, BST_LABEL_STAR);
+    }
+    end(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(hot_pixels_and_hits),
@@ -214,6 +240,7 @@ int main(void) {
         cmocka_unit_test(slow_object_leaves_its_place),
         cmocka_unit_test(other_rules),
         cmocka_unit_test(following_something),
+        cmocka_unit_test(drawn_among_points),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
