@@ -9,6 +9,11 @@
 #define BST_CHARGE_LIGHT_SNR 4.0
 #define BST_FWHM_PER_SIGMA 2.3548200450309493
 
+/* Whether a label says charge instead of light. */
+static inline bool bst_charge_label(int32_t label) {
+    return label == BST_LABEL_HOT_PIXEL || label == BST_LABEL_HIT;
+}
+
 /* Charge about every candidate (bst_found.charge), and then off all pixels that hold it: one
  * candidate's must not hide from another. */
 void bst_charge_remove(bst_locator *locator, const bst_locate_frame *frame);

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "imgproc/charge.h"
 #include "imgproc/heapsort.h"
 
 enum { BAND = 8, MAG_BINS = 60, KEEP_MISSED = 8, KEEP_CHARGE = 50 };
@@ -106,10 +107,6 @@ void bst_discriminator_free(bst_discriminator *d) {
     free(d);
 }
 
-static bool is_charge(const bst_detection *d) {
-    return d->label == BST_LABEL_HOT_PIXEL || d->label == BST_LABEL_HIT;
-}
-
 static void say(bst_detection *d, bst_label label, double probability) {
     d->label = (int32_t)label;
     d->label_probability = fmin(fmax(probability, 0.0), 1.0);
@@ -173,7 +170,7 @@ static void remember_charge(bst_discriminator *d, const bst_window *window,
                             const bst_detections *out) {
     int fresh = 0;
     for (int i = 0; i < out->count && fresh < d->capacity; i++) {
-        if (is_charge(&out->items[i])) {
+        if (bst_charge_label(out->items[i].label)) {
             d->keys_order[fresh] = fresh;
             d->keys[fresh++] = pixel_of(d, &out->items[i]);
         }
@@ -271,7 +268,7 @@ static fate *fate_of(bst_discriminator *d, double v_mag, bool blend) {
 }
 
 static bool is_source(const bst_detection *item) {
-    return !is_charge(item) && item->label != BST_LABEL_ARTEFACT;
+    return !bst_charge_label(item->label) && item->label != BST_LABEL_ARTEFACT;
 }
 
 /* Notes that an earlier source was seen again. */
@@ -427,7 +424,7 @@ void bst_discriminator_label(bst_discriminator *d, const bst_frame_knowledge *f,
     double unlisted = 0.0;
     for (int i = 0; i < out->count; i++) {
         bst_detection *item = &out->items[i];
-        if (is_charge(item)) {
+        if (bst_charge_label(item->label)) {
             label_charge(d, item);
         } else if (item->label == BST_LABEL_UNKNOWN && item->snr < FAINT_SNR &&
                    times_charged(d, pixel_of(d, item)) > 1) {

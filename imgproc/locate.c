@@ -97,10 +97,6 @@ static void cell_range(double from, double to, double margin_px, int cells, int 
     *last = hi < 0.0 ? 0 : hi > cells - 1 ? cells - 1 : (int)hi;
 }
 
-static bool is_charge(const bst_found *found) {
-    return found->label == BST_LABEL_HOT_PIXEL || found->label == BST_LABEL_HIT;
-}
-
 static void note_length(bst_locator *l, const bst_shape *s) {
     l->longest_px = fmax(l->longest_px, fmax(0.5 * fabs(s->dx_px) + fabs(s->bend_x_px),
                                              0.5 * fabs(s->dy_px) + fabs(s->bend_y_px)));
@@ -130,7 +126,7 @@ static void gather(bst_locator *l, const bst_locate_frame *f, int i, const bst_s
     for (int c = 0; c < across * (last_row - first_row + 1); c++) {
         int cell = (first_row + c / across) * l->columns + first_column + c % across;
         for (int k = l->cell[cell]; k >= 0; k = l->found[k].next) {
-            if (k == i || l->found[k].dropped || is_charge(&l->found[k])) {
+            if (k == i || l->found[k].dropped || bst_charge_label(l->found[k].label)) {
                 continue;
             }
             bst_stamp other =
@@ -424,7 +420,7 @@ static void drop_doubles(bst_locator *l, const bst_locate_frame *f) {
                 const bst_shape *b = &l->found[k].source.shape;
                 /* numbers are by brightness: the fainter goes */
                 if (k < i && !l->found[k].dropped &&
-                    is_charge(&l->found[k]) == is_charge(&l->found[i]) &&
+                    bst_charge_label(l->found[k].label) == bst_charge_label(l->found[i].label) &&
                     hypot(a->x_px - b->x_px, a->y_px - b->y_px) < radius) {
                     l->found[i].dropped = true;
                 }
@@ -469,7 +465,7 @@ void bst_locate(bst_locator *l, const bst_locate_frame *f, const bst_candidates 
     }
     for (int i = 0; i < l->count; i++) {
         bst_found *found = &l->found[i];
-        if (found->dropped || is_charge(found)) {
+        if (found->dropped || bst_charge_label(found->label)) {
             continue;
         }
         if (!found->source.fitted) {

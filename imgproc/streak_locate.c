@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "imgproc/charge.h"
 #include "sim/core/messages.h"
 #include "sim/core/vec.h"
 
@@ -63,10 +64,6 @@ static double across(const bst_streak_line *line, double x, double y, double *al
     return fabs(px * uy - py * ux) / length;
 }
 
-static bool is_charge(const bst_found *found) {
-    return found->label == BST_LABEL_HOT_PIXEL || found->label == BST_LABEL_HIT;
-}
-
 /* Drops the points that are pieces of the line, each of SNR piece_snr at most but for chance, up to
  * beyond_px past its ends; returns how many, and marks them by `pieces`. */
 static int drop_pieces(bst_streak_locator *l, bst_locator *found, int count,
@@ -80,7 +77,7 @@ static int drop_pieces(bst_streak_locator *l, bst_locator *found, int count,
         double beyond = fmax(-along, along - 1.0) * length;
         bool inside = distance < 3.0 * sigma_px + 0.5 && beyond < beyond_px;
         bool own = !f->streak && f->snr > OWN_LIGHT * piece_snr + OWN_LIGHT_SNR;
-        if (inside && !own && !f->dropped && !is_charge(f)) {
+        if (inside && !own && !f->dropped && !bst_charge_label(f->label)) {
             f->dropped = true;
             l->pieces[pieces++] = i;
         }
@@ -96,8 +93,8 @@ static void exclude(bst_streak_locator *l, const bst_locate_frame *f, const bst_
         const bst_found *o = &found->found[i];
         double x = o->source.shape.x_px - stamp->x0, y = o->source.shape.y_px - stamp->y0;
         double radius = disc_radius(o->snr, f->sigma_px);
-        if (o->dropped || is_charge(o) || x < -radius || y < -radius || x > stamp->width + radius ||
-            y > stamp->height + radius) {
+        if (o->dropped || bst_charge_label(o->label) || x < -radius || y < -radius ||
+            x > stamp->width + radius || y > stamp->height + radius) {
             continue;
         }
         int top = (int)fmax(ceil(y - radius), 0.0);
@@ -376,7 +373,7 @@ void bst_streak_locate(bst_streak_locator *l, const bst_locate_frame *f,
     for (int i = 0; i < points; i++) {
         const bst_found *o = &found->found[i];
         bool saturated = o->flags & BST_DETECTION_SATURATED;
-        if (is_charge(o)) {
+        if (bst_charge_label(o->label)) {
             blank_charge(l, o);
         } else if (saturated || is_bright_point(f, o)) {
             blank_point(l, o->source.shape.x_px, o->source.shape.y_px, o->snr, f->sigma_px,
@@ -389,7 +386,7 @@ void bst_streak_locate(bst_streak_locator *l, const bst_locate_frame *f,
     }
     for (int i = 0; i < points; i++) {
         const bst_found *o = &found->found[i];
-        if (!o->dropped && !is_charge(o)) {
+        if (!o->dropped && !bst_charge_label(o->label)) {
             blank_point(l, o->source.shape.x_px, o->source.shape.y_px, o->snr, f->sigma_px, 1.0);
         }
     }
