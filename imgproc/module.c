@@ -239,7 +239,7 @@ static bool motion_of(struct bst_step *step, const bst_frame_message *message, b
 /* What is in a frame. It depends on how the camera turned, not on where it looked. */
 static bst_status detect(bst_ctx *ctx, const imgproc_module *m, const lane *l,
                          const bst_frame_message *message, const bst_motion *motion,
-                         bst_detections *out, int capacity) {
+                         bool beside_another, bst_detections *out, int capacity) {
     const uint16_t *pixels;
     BST_TRY(bst_frame_map(message->frame, ctx, &pixels));
     bst_imgproc_frame frame = {
@@ -247,7 +247,8 @@ static bst_status detect(bst_ctx *ctx, const imgproc_module *m, const lane *l,
         .window = message->window,
         .binning = message->binning,
         .bits = message->bits,
-        .exposure_s = (double)(message->end_tick - message->start_tick) / (double)m->tick_rate_hz};
+        .exposure_s = (double)(message->end_tick - message->start_tick) / (double)m->tick_rate_hz,
+        .beside_another = beside_another};
     bst_status status = bst_imgproc_detect(ctx, l->ip, &frame, motion, out, capacity);
     bst_frame_unmap(message->frame);
     return status;
@@ -273,7 +274,7 @@ static bst_status ahead(void *self, struct bst_step *step) {
     const bst_frame_message *message = sample.payload;
     bst_motion motion;
     bool oriented = motion_of(step, message, &motion);
-    BST_TRY(detect(ctx, m, l, message, oriented ? &motion : NULL, l->made, capacity));
+    BST_TRY(detect(ctx, m, l, message, oriented ? &motion : NULL, true, l->made, capacity));
     l->exposure_id = message->exposure_id;
     l->ready = true;
     return BST_OK;
@@ -287,7 +288,7 @@ static bst_status detections_of(bst_ctx *ctx, imgproc_module *m, lane *l,
     l->ready = false;
     if (!made) {
         BST_TRY(open_lane(ctx, m, l));
-        return detect(ctx, m, l, message, motion, out, capacity);
+        return detect(ctx, m, l, message, motion, false, out, capacity);
     }
     out->background_e = l->made->background_e;
     out->noise_e = l->made->noise_e;
