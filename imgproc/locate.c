@@ -26,7 +26,10 @@ bst_status bst_locator_create(bst_ctx *ctx, int capacity, int max_width, int max
         bst_locator_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d detections", capacity);
     }
-    bst_status status = bst_fit_create(ctx, &out->psf, max_side, &out->fit);
+    bst_status status = bst_profiles_create(ctx, &out->profiles);
+    if (status == BST_OK) {
+        status = bst_fit_create(ctx, &out->psf, &out->profiles, max_side, &out->fit);
+    }
     if (status != BST_OK) {
         bst_locator_free(out);
     }
@@ -38,6 +41,7 @@ void bst_locator_free(bst_locator *l) {
     free(l->cell);
     free(l->charged);
     bst_fit_free(&l->fit);
+    bst_profiles_free(&l->profiles);
     *l = (bst_locator){0};
 }
 
@@ -441,6 +445,7 @@ void bst_locate(bst_locator *l, const bst_locate_frame *f, const bst_candidates 
     l->widening_sum = 0.0;
     l->widening_weight = 1.0 / (0.0025 * variance * variance); /* no widening, to 5 % */
     bst_sharpness_set(&l->sharpness, &l->psf, f->sigma_px);
+    bst_profiles_set(&l->profiles, &l->psf, f->sigma_px);
     bst_charge_remove(l, f);
     for (int i = 0; i < l->count; i++) {
         bst_found *found = &l->found[i];

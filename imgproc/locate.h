@@ -34,6 +34,7 @@ typedef struct bst_found {
 
 typedef struct bst_locator {
     bst_psf psf;
+    bst_profiles profiles;
     bst_fit fit;
     bst_sharpness sharpness;
     int max_side, capacity;
