@@ -489,8 +489,28 @@ static double point_peak(const bst_filter *f, const float *signal, double noise_
     return (best + more) / noise_e;
 }
 
+/* Gain of the top of a quadratic through 3 x 3 logarithms over its middle, and its place. */
+static double quadratic_top(double v[3][3], double *dx, double *dy) {
+    double gx = 0.5 * (v[1][2] - v[1][0]), gy = 0.5 * (v[2][1] - v[0][1]);
+    double hxx = v[1][2] - 2.0 * v[1][1] + v[1][0], hyy = v[2][1] - 2.0 * v[1][1] + v[0][1];
+    double hxy = 0.25 * (v[2][2] - v[2][0] - v[0][2] + v[0][0]);
+    double det = hxx * hyy - hxy * hxy, gain = 0.0;
+    *dx = *dy = 0.0;
+    if (hxx < 0.0 && hyy < 0.0 && det > 1e-3 * hxx * hyy) {
+        *dx = (hxy * gy - hyy * gx) / det;
+        *dy = (hxy * gx - hxx * gy) / det;
+        gain = 0.5 * (gx * *dx + gy * *dy);
+    } else if (hxx + hyy < 0.0) {
+        *dx = hxx < hyy ? -gx / hxx : 0.0;
+        *dy = hxx < hyy ? 0.0 : -gy / hyy;
+        gain = 0.5 * (gx * *dx + gy * *dy);
+    }
+    /* half a pixel off on both axes costs no filter more than this */
+    return fmin(fmax(gain, 0.0), 0.3);
+}
+
 static double streak_peak(const bst_filter *f, int x, int y) {
-    double v[3][3];
+    double v[3][3], dx, dy;
     double here = (double)bst_filter_streak_at(f, x, y);
     if (x < 1 || y < 1 || x + 1 >= f->width || y + 1 >= f->height || !(here > 0.0)) {
         return here;
@@ -501,17 +521,26 @@ static double streak_peak(const bst_filter *f, int x, int y) {
             v[j][i] = log(fmax(s, 0.05 * here));
         }
     }
-    double gx = 0.5 * (v[1][2] - v[1][0]), gy = 0.5 * (v[2][1] - v[0][1]);
-    double hxx = v[1][2] - 2.0 * v[1][1] + v[1][0], hyy = v[2][1] - 2.0 * v[1][1] + v[0][1];
-    double hxy = 0.25 * (v[2][2] - v[2][0] - v[0][2] + v[0][0]);
-    double det = hxx * hyy - hxy * hxy, gain = 0.0;
-    if (hxx < 0.0 && hyy < 0.0 && det > 1e-3 * hxx * hyy) {
-        gain = -0.5 * (gx * gx * hyy - 2.0 * gx * gy * hxy + gy * gy * hxx) / det;
-    } else if (hxx + hyy < 0.0) {
-        gain = hxx < hyy ? -0.5 * gx * gx / hxx : -0.5 * gy * gy / hyy;
+    return here * exp(quadratic_top(v, &dx, &dy));
+}
+
+double bst_filter_top(const bst_filter *f, bool point, int x, int y, double *dx, double *dy) {
+    const float *map = map_row(f, point || !f->streak ? f->point : f->best, y) + x;
+    double v[3][3], here = (double)*map;
+    *dx = *dy = 0.0;
+    if (x < 1 || y < 1 || x + 1 >= f->width || y + 1 >= f->height || !(here > 0.0)) {
+        return here;
     }
-    /* half a pixel off on both axes costs no filter more than this */
-    return here * exp(fmin(fmax(gain, 0.0), 0.3));
+    for (int j = 0; j < 3; j++) {
+        for (int i = 0; i < 3; i++) {
+            float s = map[(j - 1) * f->stride + i - 1];
+            v[j][i] = (double)logf(fmaxf(s, 0.05f * (float)here));
+        }
+    }
+    double gain = quadratic_top(v, dx, dy);
+    *dx = fmin(fmax(*dx, -0.7), 0.7);
+    *dy = fmin(fmax(*dy, -0.7), 0.7);
+    return here * exp(gain);
 }
 
 double bst_filter_peak(const bst_filter *f, const float *signal, double noise_e, bool streak, int x,

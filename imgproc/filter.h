@@ -90,6 +90,11 @@ static inline float bst_filter_point_at(const bst_filter *f, int x, int y) {
 static inline float bst_filter_best_at(const bst_filter *f, int x, int y) {
     return (f->streak ? f->best : f->point)[(long)(y + f->pad) * f->stride + x + f->pad];
 }
+/* The top between the pixels near a maximum (x, y) of the greater output, or of the point output,
+ * by a quadratic through the logarithms of 3 x 3 outputs; (dx, dy): its place less (x, y), up to
+ * 0.7 px. Quicker than bst_filter_peak, and good to about 1 %. */
+double bst_filter_top(const bst_filter *filter, bool point, int x, int y, double *dx, double *dy);
+
 /* The streak output at a pixel of the latest frame; only when filter->streak. */
 float bst_filter_streak_at(const bst_filter *filter, int x, int y);
 

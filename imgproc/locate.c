@@ -15,7 +15,9 @@ enum {
 
 static const double WIDTH_FIT_SNR = 20.0; /* from here the widening is measured */
 static const double MOMENTS_SNR = 10.0;   /* below, extents are the model's own */
-static const double CLOSE_SHARE = 0.8; /* filter outputs closer than this: both shapes are tried */
+/* a streak's filter output above this share of a point's, and a point's whose square is less than a
+ * streak's by no more than the other two: both shapes are tried */
+static const double CLOSE_SHARE = 0.8, CLEAR_CHI = 3.0, CLEAR_SHARE = 0.04;
 
 bst_status bst_locator_create(bst_ctx *ctx, bst_parallel *pool, int capacity, int max_width,
                               int max_height, int max_side, bst_locator *out) {
@@ -84,17 +86,28 @@ static double fit_limit(const bst_locate_frame *f, double path_px) {
     return 1.5 + f->sigma_px + 0.4 * path_px;
 }
 
-/* Starts a source at its candidate. */
+/* A found one as a point or a streak at its maximum. */
+static bst_source as_shape(const bst_locate_frame *f, const bst_found *found, bool streak) {
+    bst_source s = {.flux_e = found->top_snr * found->noise_e / shape_norm(f, streak),
+                    .widening_px2 = found->source.widening_px2};
+    s.shape =
+        (bst_shape){.x_px = found->top_x_px, .y_px = found->top_y_px, .sigma_px = f->sigma_px};
+    if (streak) {
+        set_star_path(f, &s.shape);
+    }
+    return s;
+}
+
+/* Starts a source at its candidate: at the top of the filter's output, between the pixels. */
 static void start(const bst_locate_frame *f, const bst_candidate *c, bst_found *out) {
     *out = (bst_found){.peak_snr = c->snr, .peak_x = c->x, .peak_y = c->y};
     out->noise_e = bst_background_noise_at(f->background, c->x, c->y);
-    bst_source *s = &out->source;
-    s->shape = (bst_shape){.x_px = c->x, .y_px = c->y, .sigma_px = f->sigma_px};
+    double dx, dy;
+    out->top_snr = bst_filter_top(f->filter, false, c->x, c->y, &dx, &dy);
+    out->top_x_px = c->x + dx;
+    out->top_y_px = c->y + dy;
     out->streak = f->filter->streak && c->snr > bst_filter_point_at(f->filter, c->x, c->y);
-    if (out->streak) {
-        set_star_path(f, &s->shape);
-    }
-    s->flux_e = (double)c->snr * out->noise_e / shape_norm(f, out->streak);
+    out->source = as_shape(f, out, out->streak);
 }
 
 static void index_cells(bst_locator *l) {
@@ -225,39 +238,38 @@ static bool fit_one(const worker *w, int i, bst_found *found, const bst_stamp *s
     return ok;
 }
 
-static bst_source as_shape(const bst_locate_frame *f, const bst_found *found, bool streak) {
-    bst_source s = found->source;
-    s.shape = (bst_shape){.x_px = found->peak_x, .y_px = found->peak_y, .sigma_px = f->sigma_px};
-    if (streak) {
-        set_star_path(f, &s.shape);
-    }
-    s.flux_e = (double)found->peak_snr * found->noise_e / shape_norm(f, streak);
-    return s;
-}
-
 static bst_stamp stamp_of(const bst_locator *l, const bst_locate_frame *f, const bst_source *s) {
     return bst_fit_stamp(s, reach(f), l->max_side, f->width, f->height);
 }
 
-/* Whether the filters leave the shape open. */
+/* Whether the filters leave the shape open. A fit's chi-square is less by the square of its
+ * filter's output, so that the two outputs tell which of the shapes fits better, but for what they
+ * are off between the pixels and what neighbours add. Most sources of a frame with streaks are
+ * streaks: a point is always fitted as both. */
 static bool shape_is_open(const bst_locate_frame *f, const bst_found *found) {
     if (!f->filter->streak) {
         return false;
     }
-    float best = found->peak_snr, other = 0.0f;
-    if (found->streak) {
-        for (int dy = -2; dy <= 2; dy++) {
-            for (int dx = -2; dx <= 2; dx++) {
-                int x = found->peak_x + dx, y = found->peak_y + dy;
-                if (x >= 0 && y >= 0 && x < f->width && y < f->height) {
-                    other = fmaxf(other, bst_filter_point_at(f->filter, x, y));
-                }
+    if (!found->streak) {
+        double other = (double)bst_filter_streak_at(f->filter, found->peak_x, found->peak_y);
+        return other > CLOSE_SHARE * (double)found->peak_snr;
+    }
+    float highest = 0.0f;
+    int at_x = found->peak_x, at_y = found->peak_y;
+    for (int dy = -2; dy <= 2; dy++) {
+        for (int dx = -2; dx <= 2; dx++) {
+            int x = found->peak_x + dx, y = found->peak_y + dy;
+            if (x >= 0 && y >= 0 && x < f->width && y < f->height &&
+                bst_filter_point_at(f->filter, x, y) > highest) {
+                highest = bst_filter_point_at(f->filter, x, y);
+                at_x = x;
+                at_y = y;
             }
         }
-    } else {
-        other = bst_filter_streak_at(f->filter, found->peak_x, found->peak_y);
     }
-    return (double)other > CLOSE_SHARE * (double)best;
+    double dx, dy, point = bst_filter_top(f->filter, true, at_x, at_y, &dx, &dy);
+    double best2 = found->top_snr * found->top_snr;
+    return point * point > best2 - CLEAR_CHI - CLEAR_SHARE * best2;
 }
 
 /* First fit: shape and place. */
@@ -266,6 +278,7 @@ static void locate_one(const worker *w, int i, bst_found *found) {
     const bst_locate_frame *f = w->f;
     double widening = l->widening_weight > 0.0 ? l->widening_sum / l->widening_weight : 0.0;
     found->source.widening_px2 = widening;
+    bool bright = (double)found->peak_snr > WIDTH_FIT_SNR;
     if (shape_is_open(f, found)) {
         bst_source point = as_shape(f, found, false), streak = as_shape(f, found, true);
         bst_stamp stamp = stamp_of(l, f, &streak);
@@ -275,10 +288,14 @@ static void locate_one(const worker *w, int i, bst_found *found) {
         found->source = point;
         bool point_ok = fit_one(w, i, found, &stamp, false);
         found->streak = streak_ok && (!point_ok || streak.chi_square < found->source.chi_square);
-        found->source = found->streak ? streak : found->source;
+        if (found->streak) {
+            found->source = streak;
+            if (!bright) {
+                return;
+            }
+        }
     }
     bst_stamp stamp = stamp_of(l, f, &found->source);
-    bool bright = (double)found->peak_snr > WIDTH_FIT_SNR;
     found->source.fitted = fit_one(w, i, found, &stamp, bright);
 }
 

@@ -29,7 +29,8 @@ typedef struct bst_found {
     bst_charge charge;
     float peak_snr;
     int peak_x, peak_y;
-    int next; /* in its cell of the frame */
+    double top_snr, top_x_px, top_y_px; /* of the filter's output between the pixels */
+    int next;                           /* in its cell of the frame */
 } bst_found;
 
 typedef struct bst_locator {
@@ -68,13 +69,13 @@ bst_status bst_locator_create(bst_ctx *ctx, bst_parallel *pool, int capacity, in
 void bst_locator_free(bst_locator *locator);
 
 /* Fits the brightest `capacity` candidates, brightest first. Each is taken for a point or for a
- * streak as the greater filter output says; both are fitted where the outputs are close, and the
- * lower chi-square stays. Neighbours whose centres lie on its pixels are fitted with it. Fits are
- * shared by the pool's threads: a group of like brightness at a time, which see the brighter ones
- * where these were found and one another at their maxima; blends are then fitted again. The
- * widening of the PSF (jitter) is measured on sources of SNR 20 and more and its mean is used for
- * the fainter ones. A point that turns out elongated is fitted again as a streak of its own length
- * and angle.
+ * streak as the greater filter output says; both are fitted where the outputs are close, or the
+ * point's is the greater but not by far, and the lower chi-square stays. Neighbours whose centres
+ * lie on its pixels are fitted with it. Fits are shared by the pool's threads: a group of like
+ * brightness at a time, which see the brighter ones where these were found and one another at their
+ * maxima; blends are then fitted again. The widening of the PSF (jitter) is measured on sources of
+ * SNR 20 and more and its mean is used for the fainter ones. A point that turns out elongated is
+ * fitted again as a streak of its own length and angle.
  *
  * Pixels that are sharper than light are left out first. What the others then do not show to be a
  * source is a HOT_PIXEL or a HIT, by the number of pixels. */
