@@ -72,10 +72,12 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     }
     BST_TRY(make_bad_map(ctx, ip));
     BST_TRY(bst_parallel_create(ctx, (int)ip->config.threads, &ip->pool));
-    BST_TRY(bst_background_create(ctx, (int)ip->config.mesh_px, width, height, &ip->background));
-    BST_TRY(bst_filter_create(ctx, width, height, streak, &ip->filter));
+    BST_TRY(bst_background_create(ctx, (int)ip->config.mesh_px, width, height,
+                                  bst_parallel_threads(ip->pool), &ip->background));
+    BST_TRY(
+        bst_filter_create(ctx, width, height, streak, bst_parallel_threads(ip->pool), &ip->filter));
     BST_TRY(bst_candidates_create(ctx, width, height, &ip->candidates));
-    BST_TRY(bst_locator_create(ctx, capacity, width, height, side, &ip->locator));
+    BST_TRY(bst_locator_create(ctx, ip->pool, capacity, width, height, side, &ip->locator));
     return ip->config.streak_search_px > 0.0
                ? bst_streak_locator_create(ctx, &ip->locator.psf, ip->pool, width, height, fwhm,
                                            ip->config.streak_search_px, &ip->streaks)

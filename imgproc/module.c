@@ -38,8 +38,8 @@ const bst_config_desc bst_imgproc_config_table[] = {
              "Greatest distance of one star from its place after the common shift."),
     BST_INT(
         bst_imgproc_config, threads, "", 0, 32, "0",
-        "Threads that share the passes over a frame; 0: one per processor. Results do not depend "
-        "on it."),
+        "Threads that share the passes over a frame and the fits; 0: one per processor. Results do "
+        "not depend on it."),
     BST_LIST(bst_imgproc_config, bad_pixels, bst_bad_pixel, bad_pixel_table, 0, 1000000, "[]",
              "Sensor pixels to leave out."),
     BST_PATH(
