@@ -55,8 +55,8 @@ def variance(row):
 
 
 class Loop(unittest.TestCase):
-    """Every shipped scenario but those of PSF and throughput: the loop holds, and what is known wrongly shows
-    where theory says."""
+    """Every shipped scenario but those of PSF and throughput: the loop holds, and what is known
+    wrongly shows where theory says."""
 
     @classmethod
     def setUpClass(cls):
