@@ -8,7 +8,7 @@
 #include "sim/world/world_internal.h"
 
 /* The cue's direction is kept at whole seconds and interpolated by six of them. */
-enum { KNOTS = 16, STENCIL = 6, REMEMBERED = 256 };
+enum { KNOTS = 16, STENCIL = 6 };
 /* Fifth difference, rad, up to which the interpolation is used: what it misses is 200 times less.
  */
 static const double SMOOTH_RAD = 1e-11;
@@ -23,12 +23,7 @@ struct bst_knowledge_view {
     const bst_knowledge *knowledge;
     bst_sky_clock *clock;
     cue_knot knots[KNOTS];
-    struct {
-        bool made;
-        double seconds;
-        bst_cue cue;
-    } remembered[REMEMBERED]; /* by time: control asks for the same instants again and again */
-    int64_t checked;          /* second whose stencil was looked at last */
+    int64_t checked; /* second whose stencil was looked at last */
     bool any_checked, smooth;
 };
 
@@ -138,7 +133,7 @@ bst_status bst_knowledge_view_create(bst_ctx *ctx, const bst_knowledge *knowledg
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a view of onboard knowledge");
     }
     view->knowledge = knowledge;
-    bst_status status = bst_sky_clock_create(ctx, knowledge->world->eop, &view->clock);
+    bst_status status = bst_sky_clock_create_on(ctx, knowledge->world->sky_grid, &view->clock);
     if (status != BST_OK) {
         free(view);
         return status;
@@ -217,7 +212,8 @@ static bst_status direction_at(bst_ctx *ctx, bst_knowledge_view *view, double se
     return BST_OK;
 }
 
-static bst_status make_cue(bst_ctx *ctx, bst_knowledge_view *view, double seconds, bst_cue *out) {
+bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
+                                bst_cue *out) {
     const bst_knowledge *k = view->knowledge;
     /* central difference: the third derivative of a LEO-to-GEO direction leaves < 1e-11 rad/s */
     const double h = 0.5;
@@ -239,18 +235,13 @@ static bst_status make_cue(bst_ctx *ctx, bst_knowledge_view *view, double second
     return BST_OK;
 }
 
-bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
-                                bst_cue *out) {
-    uint64_t bits;
-    memcpy(&bits, &seconds, sizeof bits);
-    /* Fibonacci hashing: the upper bits of the product */
-    unsigned place = (unsigned)((bits * UINT64_C(0x9E3779B97F4A7C15)) >> 56) % REMEMBERED;
-    if (!view->remembered[place].made || view->remembered[place].seconds != seconds) {
-        view->remembered[place].made = false;
-        BST_TRY(make_cue(ctx, view, seconds, &view->remembered[place].cue));
-        view->remembered[place].seconds = seconds;
-        view->remembered[place].made = true;
-    }
-    *out = view->remembered[place].cue;
+bst_status bst_knowledge_cue_direction_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
+                                          bool *valid, bst_vec3 *direction) {
+    const bst_knowledge *k = view->knowledge;
+    bst_vec3 nominal;
+    BST_TRY(direction_at(ctx, view, seconds, &nominal));
+    const world_sensor *sensor = &k->world->observers[k->observer].sensors[k->sensor];
+    *valid = true;
+    *direction = bst_quat_rotate(bst_quat_from_rotvec(sensor->cue_rotation), nominal);
     return BST_OK;
 }
