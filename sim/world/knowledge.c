@@ -23,8 +23,10 @@ struct bst_knowledge_view {
     const bst_knowledge *knowledge;
     bst_sky_clock *clock;
     cue_knot knots[KNOTS];
-    int64_t checked; /* second whose stencil was looked at last */
+    /* the second whose stencil was looked at last */
+    int64_t checked;
     bool any_checked, smooth;
+    bst_vec3 stencil[STENCIL];
 };
 
 /* The onboard PSF is one Gaussian: of the width given, or else that with the true one's
@@ -183,6 +185,7 @@ static bool is_smooth(bst_knowledge_view *view, int64_t second) {
             const cue_knot *knot = knot_at(view, second - 2 + i);
             known = known && knot->known;
             sum = bst_vec3_axpy(sum, fifth[i], knot->direction);
+            view->stencil[i] = knot->direction;
         }
         view->any_checked = true;
         view->checked = second;
@@ -206,7 +209,7 @@ static bst_status direction_at(bst_ctx *ctx, bst_knowledge_view *view, double se
                                -a * b * u * d * f / 24.0,  a * b * u * d * e / 120.0};
     bst_vec3 sum = {0, 0, 0};
     for (int i = 0; i < STENCIL; i++) {
-        sum = bst_vec3_axpy(sum, w[i], knot_at(view, (int64_t)whole - 2 + i)->direction);
+        sum = bst_vec3_axpy(sum, w[i], view->stencil[i]);
     }
     *out = sum;
     return BST_OK;
