@@ -391,8 +391,7 @@ static bst_status look(bst_ctx *ctx, bst_control *c, bool *arrived, double off_p
     off_px[0] = atan2(v.x, v.z) / c->env.pixel_rad;
     off_px[1] = atan2(v.y, v.z) / c->env.pixel_rad;
     double tolerance = c->config.arrive_tolerance_px;
-    *arrived = c->settled &&
-               off_px[0] * off_px[0] + off_px[1] * off_px[1] <= tolerance * tolerance;
+    *arrived = c->settled && off_px[0] * off_px[0] + off_px[1] * off_px[1] <= tolerance * tolerance;
     return BST_OK;
 }
 

@@ -162,8 +162,8 @@ void bst_two_axis_step(bst_two_axis *plant, const bst_los_command *command, doub
         bst_axis_unwind(outer, outer->reference_rad > 0.0 ? -1.0 : 1.0);
         turn_half(&half);
     }
-    plant->q_cam_from_gcrf = bst_platform_true_camera(
-        &plant->platform, n, (double)n * plant->dt_s, attitude_of(&half));
+    plant->q_cam_from_gcrf =
+        bst_platform_true_camera(&plant->platform, n, (double)n * plant->dt_s, attitude_of(&half));
     if (measure) {
         double wrapped = wrap(outer->angle_rad);
         if (wrapped != outer->angle_rad) {
