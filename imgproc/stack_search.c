@@ -9,9 +9,9 @@ enum { GROUP = 4, MAX_GROUPS = BST_STACK_MAX_FRAMES / GROUP, HITS = 16384, MAX_R
 
 /* Steps of the grid, in the field's length 1 / sqrt(roughness) at the paths' ends: of groups and of
  * the whole. */
-static const double GROUP_STEP = 0.85, STEP = 1.7;
+static const double GROUP_STEP = 1.3, STEP = 1.7;
 /* Sums on the grid this far below the threshold are followed: what the grid's steps cost. */
-static const double MARGIN_SNR = 2.2;
+static const double MARGIN_SNR = 1.7;
 /* In a frame by itself no more counts than this: a radiation hit is not to make a path. */
 static const int BRIGHT_COUNTS = 5 * STACK_QUANTA / 2;
 
@@ -236,14 +236,20 @@ static void look(const grid *g, stack_tile *t, int width, int height, double vx,
         return;
     }
     for (int y = 0; y < height; y++) {
-        for (int x = 0; x < width; x++) {
-            int sum = 0;
-            for (int i = 0; i < g->groups; i++) {
-                sum += in[i][(long)y * g->group_side + x];
+        if (stack_rows_greatest(in, g->groups, g->group_side, t->row, width, 1) > t->level) {
+            for (int x = 0; x < width; x++) {
+                int sum = 0;
+                for (int i = 0; i < g->groups; i++) {
+                    sum += in[i][x];
+                }
+                if (sum > t->level) {
+                    add_hit(g->s, t,
+                            (hit){(int16_t)x, (int16_t)y, (int16_t)sum, (float)vx, (float)vy});
+                }
             }
-            if (sum > t->level) {
-                add_hit(g->s, t, (hit){(int16_t)x, (int16_t)y, (int16_t)sum, (float)vx, (float)vy});
-            }
+        }
+        for (int i = 0; i < g->groups; i++) {
+            in[i] += g->group_side;
         }
     }
 }
