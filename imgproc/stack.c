@@ -163,10 +163,10 @@ static bool stronger(const void *context, int a, int b) {
 }
 
 /* Of the paths of all squares those that stand by themselves, the strongest first: each takes its
- * light away from the others. */
+ * light away from the others. They are added to the `kept` that are there; returns the sum. */
 static int choose(bst_stack *s, int kept) {
     int columns = (s->width + STACK_TILE - 1) / STACK_TILE;
-    int rows = (s->height + STACK_TILE - 1) / STACK_TILE, count = 0, first = kept;
+    int rows = (s->height + STACK_TILE - 1) / STACK_TILE, count = 0;
     s->followed = 0;
     for (int tile = 0; tile < columns * rows; tile++) {
         s->followed += s->tile_followed[tile];
@@ -183,7 +183,7 @@ static int choose(bst_stack *s, int kept) {
             stack_clean_path(s, &p);
         }
     }
-    return kept - first;
+    return kept;
 }
 
 /* The place in the last frame of what is at a place of the first frame's pixels. */
@@ -213,7 +213,9 @@ static bool report(const bst_stack *s, const stack_path *p, bool at_rest, bst_st
     if (!on_last(s, x, y, now) || !on_last(s, x - p->vx, y - p->vy, before)) {
         return false;
     }
-    double place = s->binning * s->binning / (p->snr * p->snr * s->roughness);
+    /* the square of a maximum over four coordinates is that much above the signal's own */
+    double signal2 = p->snr * p->snr - 4.0;
+    double place = s->binning * s->binning / (signal2 * s->roughness);
     double electrons = electrons_per_snr(s), root = sqrt((double)p->frames);
     *out = (bst_stack_found){.x_px = now[0],
                              .y_px = now[1],
@@ -242,11 +244,15 @@ const bst_stack_found *bst_stack_search(bst_stack *s, int *count) {
     stack_clean_charge(s);
     int rest = stack_clean_rest(s);
     stack_search_tiles(s);
-    int moving = choose(s, rest), kept = 0;
-    for (int i = 0; i < moving + rest; i++) {
-        bool at_rest = i >= moving;
-        const stack_path *p = &s->paths[at_rest ? i - moving : rest + i];
-        kept += report(s, p, at_rest, &s->found[kept]);
+    int count_all = choose(s, rest), kept = 0;
+    for (int pass = 0; pass < 2; pass++) { /* in motion first */
+        for (int i = 0; i < count_all; i++) {
+            const stack_path *p = &s->paths[i];
+            bool at_rest = i < rest || stack_at_rest(s, p);
+            if (at_rest == (pass == 1)) {
+                kept += report(s, p, at_rest, &s->found[kept]);
+            }
+        }
     }
     s->count = 0;
     *count = kept;

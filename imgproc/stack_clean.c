@@ -9,9 +9,8 @@
 
 /* Charge: this SNR in the sum of its own pixel, and neighbours lower than a point's by as much. */
 static const double CHARGE_SNR = 5.5, CHARGE_SHARP = 4.0;
-/* Sources at rest: SNR of the sum at a pixel, and square of the rate over its standard deviation
- * (chance of one in 3,000 for two components). */
-static const double REST_SNR = 4.5, REST_MOTION2 = 16.0;
+/* Sources at rest: SNR of the sum at a pixel. */
+static const double REST_SNR = 4.5;
 /* Light is followed down to this many standard deviations, of the sum or of a frame. */
 static const double FADED = 1.5;
 enum { REACH_PX = 48 };
@@ -182,7 +181,7 @@ int stack_clean_rest(bst_stack *s) {
     for (int i = 0; i < count; i++) {
         int k = s->order[i];
         const stack_path *p = &s->rest_paths[k];
-        if (s->rest[s->maxima[k]] == INT16_MIN || stack_motion2(s, p) > REST_MOTION2) {
+        if (s->rest[s->maxima[k]] == INT16_MIN || !stack_at_rest(s, p)) {
             continue;
         }
         bool counts = p->snr > s->threshold && kept < BST_STACK_MAX_FOUND && stack_holds(s, p);

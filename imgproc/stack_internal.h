@@ -83,8 +83,8 @@ double stack_sum(const bst_stack *stack, const stack_path *path, int clamp, int 
 void stack_climb(const bst_stack *stack, stack_path *path);
 /* Whether what a path shows is not due to a few frames alone. */
 bool stack_holds(const bst_stack *stack, const stack_path *path);
-/* Square of the rate over its standard deviation. */
-double stack_motion2(const bst_stack *stack, const stack_path *path);
+/* Whether its rate may be that of a star. */
+bool stack_at_rest(const bst_stack *stack, const stack_path *path);
 
 /* stack_clean.c */
 /* Takes out charge at the same pixel of the sensor in all frames. */

@@ -4,6 +4,9 @@
 
 /* Fewer frames than this share of a stack, each bright by itself, are chance: hits on a line. */
 static const double CHANCE_SHARE = 0.375;
+/* Square of a rate over its standard deviation: stars, of which there are many more than of what
+ * moves as slowly, exceed it once in 270,000. */
+static const double REST_MOTION2 = 25.0;
 
 /* One frame's value at a place; false without a measurement there. */
 static bool sample(const bst_stack *s, int frame, double x, double y, float *out) {
@@ -123,6 +126,7 @@ bool stack_holds(const bst_stack *s, const stack_path *p) {
     return seen == 0 || seen >= CHANCE_SHARE * s->count || without > s->threshold;
 }
 
-double stack_motion2(const bst_stack *s, const stack_path *p) {
-    return (p->vx * p->vx + p->vy * p->vy) * s->roughness * s->time_variance * p->snr * p->snr;
+bool stack_at_rest(const bst_stack *s, const stack_path *p) {
+    double precision = s->roughness * s->time_variance * p->snr * p->snr;
+    return (p->vx * p->vx + p->vy * p->vy) * precision < REST_MOTION2;
 }
