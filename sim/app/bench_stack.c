@@ -1,5 +1,5 @@
-/* Stacks of 16 frames of noise, 2048 x 2048 pixels, rates to 3 px per frame: what a frame costs, the
- * search's share included. */
+/* Stacks of 16 frames of noise, 2048 x 2048 pixels, rates to 3 px per frame: what a frame costs,
+ * the search's share included. */
 #include <stdlib.h>
 
 #include "imgproc/stack.h"
