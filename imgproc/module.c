@@ -36,6 +36,8 @@ const bst_config_desc bst_imgproc_config_table[] = {
              "Greatest pointing error over which stars are identified."),
     BST_REAL(bst_imgproc_config, match_tolerance_px, "px", 0.5, 20, "3",
              "Greatest distance of one star from its place after the common shift."),
+    BST_OBJECT(bst_imgproc_config, stack, bst_stack_config_table, "{}",
+               "Search for objects too faint for one frame in stacks of frames."),
     BST_INT(
         bst_imgproc_config, threads, "", 0, 32, "0",
         "Threads that share the passes over a frame and the fits; 0: one per processor. Results do "
@@ -90,6 +92,7 @@ typedef struct imgproc_module {
     bst_discriminator *discriminator;
     bst_sky sky;
     bst_photometer photometer;
+    bst_stack *stack; /* NULL: no stacks */
 } imgproc_module;
 
 static void destroy(void *self) {
@@ -106,6 +109,7 @@ static void destroy(void *self) {
     bst_discriminator_free(m->discriminator);
     bst_sky_free(&m->sky);
     bst_photometer_free(&m->photometer);
+    bst_stack_free(m->stack);
     free(m);
 }
 
@@ -139,6 +143,10 @@ static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
     BST_TRY(bst_discriminator_create(env->ctx, &m->camera, (int)m->config->capacity,
                                      &m->discriminator));
     BST_TRY(bst_photometer_create(env->ctx, (int)m->config->capacity, &m->photometer));
+    if (m->config->stack.frames > 0) {
+        BST_TRY(bst_stack_create(env->ctx, &m->camera, &m->config->stack, (int)m->config->threads,
+                                 &m->stack));
+    }
     bst_env_set_capacity(env, PORT_DETECTIONS, (int)m->config->capacity);
     return BST_OK;
 }
@@ -310,6 +318,18 @@ static bst_status detections_of(bst_ctx *ctx, imgproc_module *m, lane *l,
     return BST_OK;
 }
 
+/* Each full stack adds what it shows to the detections of its last frame. */
+static void add_to_stack(imgproc_module *m, const lane *l, double middle_tick,
+                         bst_quat q_cam_from_gcrf, bst_detections *out, int capacity) {
+    bst_stack_frame frame =
+        bst_imgproc_stack_frame(l->ip, middle_tick / (double)m->tick_rate_hz, q_cam_from_gcrf);
+    if (bst_stack_add(m->stack, &frame) == m->config->stack.frames) {
+        int count;
+        const bst_stack_found *found = bst_stack_search(m->stack, &count);
+        bst_imgproc_append_stack(l->ip, found, count, m->camera.psf_fwhm_px, out, capacity);
+    }
+}
+
 static bst_status process(imgproc_module *m, struct bst_step *step,
                           const bst_frame_message *message) {
     bst_ctx *ctx = bst_step_ctx(step);
@@ -345,8 +365,6 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
         known.light = (bst_light){n->velocity_bary_mps, n->sun_m};
         known.oriented = out->stars_identified > 0;
     }
-    bst_zero_point zero_point = bst_photometer_zero_point(&m->photometer);
-    bst_photometry_apply(&zero_point, bst_camera_v_mag(&m->camera, 1.0), out);
     if (predictions) {
         known.predictions_age_s = (middle - (double)predictions->tick) / (double)m->tick_rate_hz;
     }
@@ -356,6 +374,11 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
     if (out->stars_identified == 0) {
         bst_step_count(step, "frame_without_stars");
     }
+    if (m->stack && !smeared) {
+        add_to_stack(m, l, middle, known.q_cam_from_gcrf, out, capacity);
+    }
+    bst_zero_point zero_point = bst_photometer_zero_point(&m->photometer);
+    bst_photometry_apply(&zero_point, bst_camera_v_mag(&m->camera, 1.0), out);
     if (out->lost > 0) {
         bst_step_count(step, "detections_overflow");
     }
