@@ -448,5 +448,6 @@ void bst_imgproc_append_stack(const bst_imgproc *ip, const bst_stack_found *foun
                              .rate_sigma_pxps = f->rate_sigma_pxps};
         double rate = f->flux_e / fmax(ip->exposure_s, 1e-9);
         d->v_mag = -2.5 * log10(rate / ip->electrons_per_s_v0);
+        d->v_mag_sigma = 2.5 / log(10.0) * f->flux_sigma_e / f->flux_e;
     }
 }

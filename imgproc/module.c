@@ -91,8 +91,8 @@ typedef struct imgproc_module {
     bst_starid *starid;
     bst_discriminator *discriminator;
     bst_sky sky;
-    bst_photometer photometer;
     bst_stack *stack; /* NULL: no stacks */
+    bst_photometer photometer;
 } imgproc_module;
 
 static void destroy(void *self) {
@@ -108,8 +108,8 @@ static void destroy(void *self) {
     bst_starid_free(m->starid);
     bst_discriminator_free(m->discriminator);
     bst_sky_free(&m->sky);
-    bst_photometer_free(&m->photometer);
     bst_stack_free(m->stack);
+    bst_photometer_free(&m->photometer);
     free(m);
 }
 
@@ -142,11 +142,11 @@ static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
                               m->config->search_radius_px, &m->starid));
     BST_TRY(bst_discriminator_create(env->ctx, &m->camera, (int)m->config->capacity,
                                      &m->discriminator));
-    BST_TRY(bst_photometer_create(env->ctx, (int)m->config->capacity, &m->photometer));
     if (m->config->stack.frames > 0) {
         BST_TRY(bst_stack_create(env->ctx, &m->camera, &m->config->stack, (int)m->config->threads,
                                  &m->stack));
     }
+    BST_TRY(bst_photometer_create(env->ctx, (int)m->config->capacity, &m->photometer));
     bst_env_set_capacity(env, PORT_DETECTIONS, (int)m->config->capacity);
     return BST_OK;
 }
@@ -320,13 +320,19 @@ static bst_status detections_of(bst_ctx *ctx, imgproc_module *m, lane *l,
 
 /* Each full stack adds what it shows to the detections of its last frame. */
 static void add_to_stack(imgproc_module *m, const lane *l, double middle_tick,
-                         bst_quat q_cam_from_gcrf, bst_detections *out, int capacity) {
+                         bst_quat q_cam_from_gcrf, const bst_zero_point *zero_point,
+                         bst_detections *out, int capacity) {
     bst_stack_frame frame =
         bst_imgproc_stack_frame(l->ip, middle_tick / (double)m->tick_rate_hz, q_cam_from_gcrf);
     if (bst_stack_add(m->stack, &frame) == m->config->stack.frames) {
-        int count;
+        int count, before = out->count;
         const bst_stack_found *found = bst_stack_search(m->stack, &count);
         bst_imgproc_append_stack(l->ip, found, count, m->camera.psf_fwhm_px, out, capacity);
+        for (int i = before; i < out->count; i++) {
+            bst_detection *d = &out->items[i];
+            d->v_mag += zero_point->offset_mag;
+            d->v_mag_sigma = hypot(d->v_mag_sigma, zero_point->sigma_mag);
+        }
     }
 }
 
@@ -365,6 +371,8 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
         known.light = (bst_light){n->velocity_bary_mps, n->sun_m};
         known.oriented = out->stars_identified > 0;
     }
+    bst_zero_point zero_point = bst_photometer_zero_point(&m->photometer);
+    bst_photometry_apply(&zero_point, bst_camera_v_mag(&m->camera, 1.0), out);
     if (predictions) {
         known.predictions_age_s = (middle - (double)predictions->tick) / (double)m->tick_rate_hz;
     }
@@ -375,10 +383,8 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
         bst_step_count(step, "frame_without_stars");
     }
     if (m->stack && !smeared) {
-        add_to_stack(m, l, middle, known.q_cam_from_gcrf, out, capacity);
+        add_to_stack(m, l, middle, known.q_cam_from_gcrf, &zero_point, out, capacity);
     }
-    bst_zero_point zero_point = bst_photometer_zero_point(&m->photometer);
-    bst_photometry_apply(&zero_point, bst_camera_v_mag(&m->camera, 1.0), out);
     if (out->lost > 0) {
         bst_step_count(step, "detections_overflow");
     }

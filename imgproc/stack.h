@@ -69,9 +69,10 @@ void bst_stack_free(bst_stack *stack);
 int bst_stack_add(bst_stack *stack, const bst_stack_frame *frame);
 
 /* Searches a full stack and empties it. Returns what it found, the strongest first, lent until the
- * next call: objects in motion that exceed the threshold, then sources at rest that do. Pixels with
- * charge at the same place of the sensor in all frames, and sources at rest, are left out of the
- * search for motion. Paths need half of the frames. */
+ * next call: objects in motion that exceed the threshold, then sources at rest that do and are
+ * below SNR 4.5 in a frame: others a frame shows by itself. Pixels with charge at the same place of
+ * the sensor in all frames, and sources at rest, are left out of the search for motion. Paths need
+ * half of the frames. */
 const bst_stack_found *bst_stack_search(bst_stack *stack, int *count);
 
 /* Of the latest search: the SNR of the sum that counts, and sums on the grid that were followed. */

@@ -178,13 +178,15 @@ int stack_clean_rest(bst_stack *s) {
     bst_heapsort_indices(s->order, count, stronger_path, s->rest_paths);
     int kept = 0;
     double radius = 2.2 * s->sigma_px;
+    double seen_by_itself = (double)STACK_VISIBLE / STACK_QUANTA * sqrt((double)s->count);
     for (int i = 0; i < count; i++) {
         int k = s->order[i];
         const stack_path *p = &s->rest_paths[k];
         if (s->rest[s->maxima[k]] == INT16_MIN || !stack_at_rest(s, p)) {
             continue;
         }
-        bool counts = p->snr > s->threshold && kept < BST_STACK_MAX_FOUND && stack_holds(s, p);
+        bool counts = p->snr > s->threshold && p->snr < seen_by_itself &&
+                      kept < BST_STACK_MAX_FOUND && stack_holds(s, p);
         blank_light(s, -1, s->maxima[k] % s->width, s->maxima[k] / s->width);
         for (int f = 0; f < s->count; f++) {
             blank_disc(s, f, p->x, p->y, radius);

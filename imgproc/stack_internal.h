@@ -89,8 +89,8 @@ bool stack_at_rest(const bst_stack *stack, const stack_path *path);
 /* stack_clean.c */
 /* Takes out charge at the same pixel of the sensor in all frames. */
 void stack_clean_charge(bst_stack *stack);
-/* Finds sources at rest, takes them out and leaves those above the threshold in stack->paths;
- * returns their number. */
+/* Finds sources at rest, takes them out and leaves those above the threshold, but not seen in a
+ * frame by themselves, in stack->paths; returns their number. */
 int stack_clean_rest(bst_stack *stack);
 /* Takes a path's light out of the maps. */
 void stack_clean_path(bst_stack *stack, const stack_path *path);

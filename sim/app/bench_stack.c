@@ -30,7 +30,7 @@ static bst_status make(bst_ctx *ctx, const bst_bench_options *options, noise *n)
         n->values[i] = (float)two[0];
         n->values[i + 1] = (float)two[1];
     }
-    BST_TRY(bst_background_create(ctx, 64, SIDE, SIDE, &n->background));
+    BST_TRY(bst_background_create(ctx, 64, SIDE, SIDE, 1, &n->background));
     bst_background_estimate(&n->background, n->values, SIDE, SIDE, 1e-3f);
     for (int i = 0; i < n->background.columns * n->background.rows; i++) {
         n->background.noise[i] = 1.0f; /* of all frames, not of the first */

@@ -123,7 +123,7 @@ void bst_pd_print(const bst_pd_scene *s, const bst_pd_result *r, const bst_pd_fi
                f->own_light_db_pd50);
     print_loss("0.9", f->pd90, bst_ideal_snr(f->pfa, 0.9), f->loss_db_pd90, f->loss_db_sigma_pd90,
                f->own_light_db_pd90);
-    if (s->options.stack > 0) {
+    if (s->options.stack > 0 && isfinite(f->gain_db_pd50) && isfinite(f->gain_db_pd90)) {
         printf(
             "  gain of the stack at the same false alarms per frame, ideal %.2f dB: Pd 0.5 %.2f dB "
             "over the ideal detector of one frame, %.2f dB over this one's; Pd 0.9 %.2f dB, %.2f "

@@ -35,7 +35,7 @@ static void open_scene(scene *s, int side, double rate, double false_alarms, int
         .width_px = side, .height_px = side, .pixel_scale_arcsec = 3.0, .psf_fwhm_px = FWHM_PX};
     bst_stack_config config = {FRAMES, rate, false_alarms};
     bst_assert_ok(&s->ctx, bst_stack_create(&s->ctx, &s->camera, &config, threads, &s->stack));
-    bst_assert_ok(&s->ctx, bst_background_create(&s->ctx, 64, side, side, &s->background));
+    bst_assert_ok(&s->ctx, bst_background_create(&s->ctx, 64, side, side, 1, &s->background));
     s->image = malloc((size_t)side * (size_t)side * sizeof(float));
     assert_non_null(s->image);
     s->key = bst_rng_make_key(7, 0, "test", "stack");
