@@ -5,6 +5,7 @@
 #include <stdbool.h>
 
 #include "imgproc/borrow.h"
+#include "imgproc/rows.h"
 #include "sim/core/parallel.h"
 #include "sim/core/status.h"
 
@@ -22,7 +23,6 @@ typedef struct bst_background {
     float *bands;                     /* one for each thread: the pixels of a row of meshes */
     size_t band;                      /* floats of a band */
     bst_borrow *lent;                 /* of bands */
-    float *row_level, *row_noise;     /* [columns], for one image row */
     float median_level, median_noise;
 } bst_background;
 
@@ -50,6 +50,9 @@ void bst_background_read(bst_background *background, bst_parallel *pool, bst_pix
 void bst_background_estimate(bst_background *background, const float *image, int width, int height,
                              float step_e);
 
+/* Level and 1 / noise of image row y, as bst_background_row, by parts [columns + 1]; returns how
+ * many. */
+int bst_background_parts(const bst_background *background, int y, bst_row_part *parts);
 /* Level and 1 / noise for every pixel of image row y, bilinear between mesh centres; outside them
  * the level goes on as it did, the noise stays. */
 void bst_background_row(const bst_background *background, int y, float *level,
