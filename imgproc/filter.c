@@ -321,7 +321,7 @@ static void filter_streak(bst_filter *f, int y) {
         in[t] = point + (long)f->tap_y[t] * (long)f->stride + f->tap_x[t];
     }
     float *row = map_row(f, f->best, y);
-    bst_row_streak(row, f->width, in, f->tap_weight, f->taps, point);
+    bst_row_streak(row, (size_t)f->stride, f->width, in, f->tap_weight, f->taps, point);
 }
 
 /* The kernel's cut at the frame's edges. */

@@ -587,14 +587,24 @@ void bst_locate(bst_locator *l, const bst_locate_frame *f, const bst_candidates 
     do_all(l, f, 0, l->count, finish);
 }
 
+/* A found one that is not fitted. */
+static void keep_maximum(const bst_locate_frame *f, bst_found *found) {
+    use_maximum(f, found);
+    found->snr = (double)found->peak_snr;
+    found->length_px = found->width_px = BST_FWHM_PER_SIGMA * f->sigma_px;
+}
+
+static void start_roughly(void *user, int begin, int end) {
+    const loop *p = user;
+    start_some(user, begin, end);
+    for (int i = begin; i < end; i++) {
+        keep_maximum(p->f, &p->l->found[i]);
+    }
+}
+
 void bst_locate_roughly(bst_locator *l, const bst_locate_frame *f,
                         const bst_candidates *candidates) {
     l->count = candidates->count < l->capacity ? candidates->count : l->capacity;
-    for (int i = 0; i < l->count; i++) {
-        bst_found *found = &l->found[i];
-        start(f, &candidates->items[candidates->order[i]], found);
-        use_maximum(f, found);
-        found->snr = (double)found->peak_snr;
-        found->length_px = found->width_px = BST_FWHM_PER_SIGMA * f->sigma_px;
-    }
+    loop p = {l, f, candidates, NULL, 0};
+    bst_parallel_for(l->pool, l->count, STARTS_A_TIME, start_roughly, &p);
 }

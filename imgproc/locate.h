@@ -82,8 +82,8 @@ void bst_locator_free(bst_locator *locator);
 void bst_locate(bst_locator *locator, const bst_locate_frame *frame,
                 const bst_candidates *candidates);
 
-/* The same without fits: each stands at its maximum's pixel, known to a pixel, with the flux that
- * the filter says. For frames in which stars moved further than is modelled. */
+/* The same without fits: each stands at its maximum, known to a pixel, with the flux that the
+ * filter says. For frames in which stars moved further than is modelled. */
 void bst_locate_roughly(bst_locator *locator, const bst_locate_frame *frame,
                         const bst_candidates *candidates);
 

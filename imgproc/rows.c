@@ -277,12 +277,15 @@ void bst_row_combine(float *restrict out, int count, const float *const *in, con
 }
 
 BST_CLONES
-void bst_row_streak(float *out, int count, const float *const *in, const float *weight, int taps,
-                    const float *floor) {
+void bst_row_streak(float *out, size_t stride, int count, const float *const *in,
+                    const float *weight, int taps, const float *floor) {
     enum { STEP = 4 * BST_LANES };
     int x = 0;
     for (; x + STEP <= count; x += STEP) {
         bst_lanes a = {0}, b = {0}, c = {0}, d = {0};
+        for (int k = 0; k < 4; k++) {
+            __builtin_prefetch(out + stride + x + k * BST_LANES, 1);
+        }
         for (int t = 0; t < taps; t++) {
             const float *row = in[t] + x;
             float w = weight[t];

@@ -8,7 +8,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { BST_ROW_LANES = 16, BST_ROW_MEDIAN = 104 };
+enum { BST_ROW_LANES = 16, BST_ROW_MEDIAN = 96 };
 
 /* Sums in separate lanes, added by the caller in lane order. */
 typedef struct bst_row_sums {
@@ -52,9 +52,10 @@ void bst_row_even_4(float *out, size_t stride, int count, const float *const *in
 /* out[x] = sum over taps of weight[t] * in[t][x] */
 void bst_row_combine(float *out, int count, const float *const *in, const float *weight, int taps);
 
-/* out[x] = the greater of floor[x] and the sum over taps of weight[t] * in[t][x] */
-void bst_row_streak(float *out, int count, const float *const *in, const float *weight, int taps,
-                    const float *floor);
+/* out[x] = the greater of floor[x] and the sum over taps of weight[t] * in[t][x]; what lies
+ * `stride` floats on is to be written next. */
+void bst_row_streak(float *out, size_t stride, int count, const float *const *in,
+                    const float *weight, int taps, const float *floor);
 
 /* Writes the places and values of the elements above the threshold (> 0) that exceed their eight
  * neighbours (of equals the first in row-major order); returns how many. On
