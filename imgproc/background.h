@@ -36,7 +36,8 @@ bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int m
 void bst_background_free(bst_background *background);
 
 /* Estimates level and noise in each mesh of a frame: median and median absolute deviation of a
- * sample, then mean and standard deviation within 3 sigma, four times. Both are corrected for the
+ * sample, then mean and standard deviation within 3 sigma, four times, from half of the rows where
+ * a mesh has 4096 pixels and more. Both are corrected for the
  * clipping, which takes more off the long tail of counted electrons (variance beyond
  * read_variance_e2) than off the other; the deviation also for the slope of the level. step_e (> 0)
  * is a digital number's worth of electrons; no pixel is better known than it. A mesh without usable
