@@ -8,6 +8,7 @@
 #include "imgproc/rows.h"
 #include "imgproc/streak_locate.h"
 #include "imgproc/tail.h"
+#include "sim/core/pages.h"
 
 /* Maxima are looked at in between the pixels from this share of the threshold on at the least. */
 static const double LOOK_SHARE = 0.65;
@@ -66,7 +67,7 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     int side = (int)ceil(streak + 6.0 * fwhm) + 14;
     side = side < BST_PSF_MAX_SIDE ? side : BST_PSF_MAX_SIDE;
     int capacity = (int)ip->config.capacity;
-    ip->electrons = calloc((size_t)width * (size_t)height, sizeof(float));
+    ip->electrons = bst_pages_alloc((size_t)width * (size_t)height * sizeof(float));
     ip->order = calloc((size_t)capacity, sizeof(int));
     if (!ip->electrons || !ip->order) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a frame of %d x %d", width, height);

@@ -20,8 +20,8 @@ bst_status bst_streak_map_create(bst_ctx *ctx, int max_width, int max_height, bo
     *out = (bst_streak_map){.max_width = max_width, .max_height = max_height};
     out->bands = max_height / BAND + 1;
     size_t line = (size_t)max_width + 2 * BST_FILTER_MAX_RADIUS;
-    /* normalised, level, inverse noise, sum, mesh rows twice, ring */
-    out->lines_per_band = line * (2 * BST_FILTER_MAX_RADIUS + 1 + 6);
+    /* normalised, level, inverse noise, sum, ring */
+    out->lines_per_band = line * (2 * BST_FILTER_MAX_RADIUS + 1 + 4);
     out->lines = calloc(out->lines_per_band * (size_t)out->bands, sizeof(float));
     out->memory[0] = calloc(plane_size(max_width, max_height), sizeof(int16_t));
     out->memory[1] = turned ? calloc(plane_size(max_width, max_height), sizeof(int16_t)) : NULL;
@@ -84,10 +84,7 @@ static void fill_band(const fill_job *job, int band) {
     size_t line = (size_t)map->max_width + 2 * BST_FILTER_MAX_RADIUS;
     float *normalised = map->lines + map->lines_per_band * (size_t)band;
     float *level = normalised + line, *inverse = level + line, *sum = inverse + line;
-    float *ring = sum + 3 * line;
-    bst_background background = *job->background;
-    background.row_level = sum + line;
-    background.row_noise = sum + 2 * line;
+    float *ring = sum + line;
     memset(normalised, 0, line * sizeof(float));
     const float *in[64];
     float clamp = (float)map->clamp, floor = -6.0f * (float)BST_STREAK_QUANTA;
@@ -95,7 +92,7 @@ static void fill_band(const fill_job *job, int band) {
         float *horizontal = ring + line * (size_t)((y + 64 * taps) % taps);
         if (y >= 0 && y < height) {
             const float *signal = job->signal + (size_t)y * (size_t)width;
-            bst_background_row(&background, y, level, inverse);
+            bst_background_row(job->background, y, level, inverse);
             for (int x = 0; x < width; x++) {
                 float v = signal[x] * inverse[x];
                 normalised[r + x] = signal[x] > BST_PIXEL_NONE ? v : 0.0f;
