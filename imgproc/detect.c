@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "imgproc/bend.h"
 #include "imgproc/heapsort.h"
 #include "imgproc/imgproc.h"
 #include "imgproc/locate.h"
@@ -11,6 +12,9 @@
 
 /* Maxima are looked at in between the pixels from this share of the threshold on at the least. */
 static const double LOOK_SHARE = 0.65;
+/* Bend of the stars' path, in its own time scale, that jitter of 1 px RMS has: that of noise that is
+ * flat up to a hundred cycles an exposure. */
+static const double JITTER_BEND = 0.1;
 /* Above the threshold by this no skewness of noise matters. */
 static const double CERTAIN_ABOVE = 1.5;
 
@@ -25,6 +29,7 @@ struct bst_imgproc {
     bst_filter filter;
     bst_candidates candidates;
     bst_locator locator;
+    bst_bend bend;
     bst_streak_locator streaks; /* only when config.streak_search_px > 0 */
     bst_parallel *pool;
     int *order;
@@ -76,6 +81,7 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     BST_TRY(bst_filter_create(ctx, width, height, streak, &ip->filter));
     BST_TRY(bst_candidates_create(ctx, width, height, &ip->candidates));
     BST_TRY(bst_locator_create(ctx, capacity, width, height, side, &ip->locator));
+    BST_TRY(bst_bend_create(ctx, side, &ip->bend));
     return ip->config.streak_search_px > 0.0
                ? bst_streak_locator_create(ctx, &ip->locator.psf, ip->pool, width, height, fwhm,
                                            ip->config.streak_search_px, &ip->streaks)
@@ -125,6 +131,7 @@ void bst_imgproc_free(bst_imgproc *ip) {
     bst_filter_free(&ip->filter);
     bst_candidates_free(&ip->candidates);
     bst_locator_free(&ip->locator);
+    bst_bend_free(&ip->bend);
     bst_streak_locator_free(&ip->streaks);
     bst_parallel_free(ip->pool);
     free(ip);
@@ -340,6 +347,17 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
                              .binning = frame->binning};
     view.origin_x_px = frame->window.x0 + 0.5 * (frame->binning - 1);
     view.origin_y_px = frame->window.y0 + 0.5 * (frame->binning - 1);
+    bst_motion measured;
+    if (motion && !ip->smeared) {
+        measured = *motion;
+        double bend_px = motion->bend_sigma_rad / bst_camera_scale_rad(&ip->camera);
+        double prior = hypot(JITTER_BEND * ip->config.jitter_px, bend_px) / frame->binning;
+        double shift;
+        if (bst_bend_measure(&ip->bend, &ip->locator.psf, &view, &ip->candidates, prior, &measured,
+                             &shift)) {
+            view.motion = &measured;
+        }
+    }
     if (ip->smeared) {
         bst_locate_roughly(&ip->locator, &view, &ip->candidates);
     } else {

@@ -6,7 +6,7 @@
 static const char *const associations[] = {"gnn", "nearest", "pda", "mixture", NULL};
 
 const bst_config_desc bst_tracker_config_table[] = {
-    BST_REAL(C, star_floor_px, "px", 0, 10, "0.03",
+    BST_REAL(C, star_floor_px, "px", 0, 10, "0",
              "Standard deviation added to every star's centroid (catalogue, distortion)."),
     BST_REAL(C, star_reject_chi2, "", 4, 1e6, "18.4",
              "Stars that fit worse (2 degrees of freedom) do not count for the attitude."),
