@@ -43,4 +43,11 @@ void bst_psf_init(bst_psf *psf);
 void bst_psf_render(const bst_psf *psf, const bst_shape *shape, const bst_stamp *stamp,
                     double *share, double *by_x, double *by_y, double *by_variance);
 
+/* The same, and the derivatives by the parts of the path that all streaks of a frame share:
+ * by_motion[0] by the path's length in direction (ex, ey), [1] by its end minus start across that,
+ * (-ey, ex), [2] by the bend in direction (ex, ey). */
+void bst_psf_render_motion(const bst_psf *psf, const bst_shape *shape, const bst_stamp *stamp,
+                           double ex, double ey, double *share, double *by_x, double *by_y,
+                           double *by_variance, double *const by_motion[3]);
+
 #endif

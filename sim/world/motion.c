@@ -154,10 +154,18 @@ void bst_motion_bend(const bst_motion *motion, const bst_camera *camera, double 
     *y_px = (k[1][0] * a + k[1][1] * b) / scale;
 }
 
-void bst_motion_set_bend(bst_motion *motion, const bst_camera *camera, double x_px, double y_px) {
+/* The rotation vector that moves the boresight by (x_px, y_px). */
+static bst_vec3 rotation_of(const bst_camera *camera, double x_px, double y_px) {
     double scale = bst_camera_scale_rad(camera), k[2][2];
     bst_camera_jacobian(camera, (bst_vec3){0, 0, 1}, k);
     double det = k[0][0] * k[1][1] - k[0][1] * k[1][0];
-    motion->bend_cam_rad.y = (k[1][1] * x_px - k[0][1] * y_px) * scale / det;
-    motion->bend_cam_rad.x = -(k[0][0] * y_px - k[1][0] * x_px) * scale / det;
+    return (bst_vec3){-(k[0][0] * y_px - k[1][0] * x_px) * scale / det,
+                      (k[1][1] * x_px - k[0][1] * y_px) * scale / det, 0.0};
+}
+
+void bst_motion_add(bst_motion *motion, const bst_camera *camera, double dx_px, double dy_px,
+                    double bend_x_px, double bend_y_px) {
+    motion->turn_cam_rad = bst_vec3_add(motion->turn_cam_rad, rotation_of(camera, dx_px, dy_px));
+    motion->bend_cam_rad =
+        bst_vec3_add(motion->bend_cam_rad, rotation_of(camera, bend_x_px, bend_y_px));
 }

@@ -34,7 +34,9 @@ void bst_motion_streak(const bst_motion *motion, const bst_camera *camera, doubl
 /* The bend of a star's path near the boresight, px. */
 void bst_motion_bend(const bst_motion *motion, const bst_camera *camera, double *x_px,
                      double *y_px);
-/* Gives the motion the bend that is (x_px, y_px) near the boresight; about z it stays. */
-void bst_motion_set_bend(bst_motion *motion, const bst_camera *camera, double x_px, double y_px);
+/* Adds to the motion what makes paths near the boresight longer by (dx_px, dy_px) and bends them by
+ * (bend_x_px, bend_y_px) more. */
+void bst_motion_add(bst_motion *motion, const bst_camera *camera, double dx_px, double dy_px,
+                    double bend_x_px, double bend_y_px);
 
 #endif
