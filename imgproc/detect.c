@@ -12,9 +12,9 @@
 
 /* Maxima are looked at in between the pixels from this share of the threshold on at the least. */
 static const double LOOK_SHARE = 0.65;
-/* Bend of the stars' path that jitter of 1 px RMS has: that of noise that is flat up to a hundred
+/* Bend of the stars' path that jitter of 1 px RMS has: that of noise that is flat from 2.5 to 100
  * cycles an exposure. */
-static const double JITTER_BEND = 0.1;
+static const double JITTER_BEND = 0.075;
 /* What telemetry may not know of the camera's motion: drift, in px an exposure. */
 static const double DRIFT_PX = 1.0;
 /* Above the threshold by this no skewness of noise matters. */

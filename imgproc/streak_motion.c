@@ -8,9 +8,13 @@ static const double LEAST_SNR = 20.0;
 /* A neighbour this bright relative to a streak would bend it. */
 static const double ALONE_SHARE = 0.02;
 static const double LEAST_PATH_SIGMAS = 4.0;
+/* More of the path than this, and a bend is no correction to an even motion. */
+static const double MOST_BEND = 0.1;
 /* Chi-square, COMMON degrees of freedom, of what a star wants against what all agree on. */
 static const double REJECT_CHI2 = 25.0;
 enum { COMMON = BST_STREAK_MOTION_COUNT, LOCAL = 4, HELD = 1, ROUNDS = 5 };
+/* Brightest candidates among which stars that stand alone are looked for. */
+enum { LOOKED_AT = 16 * BST_STREAK_MOTION_STARS };
 
 typedef struct star {
     bst_shape shape;
@@ -126,8 +130,8 @@ static bool solve(int n, double a[LOCAL][LOCAL], int count, double x[][LOCAL]) {
 }
 
 /* Normal equations of one star at the present motion. */
-static bool accumulate(const bst_streak_motion *work, const bst_psf *psf,
-                       const bst_locate_frame *f, double ex, double ey, star *s) {
+static bool accumulate(const bst_streak_motion *work, const bst_psf *psf, const bst_locate_frame *f,
+                       double ex, double ey, star *s) {
     size_t n = (size_t)s->stamp.width * (size_t)s->stamp.height;
     double *m = work->render, *const by_motion[COMMON] = {m + 4 * n, m + 5 * n, m + 6 * n};
     bst_psf_render_motion(psf, &s->shape, &s->stamp, ex, ey, m, m + n, m + 2 * n, m + 3 * n,
@@ -136,8 +140,9 @@ static bool accumulate(const bst_streak_motion *work, const bst_psf *psf,
     double common[COMMON][COMMON] = {{0}}, g[COMMON] = {0};
     for (size_t i = 0; i < n; i++) {
         size_t y = i / (size_t)s->stamp.width, x = i % (size_t)s->stamp.width;
-        double value = (double)f->signal[((size_t)s->stamp.y0 + y) * (size_t)f->width +
-                                         (size_t)s->stamp.x0 + x];
+        double value =
+            (double)
+                f->signal[((size_t)s->stamp.y0 + y) * (size_t)f->width + (size_t)s->stamp.x0 + x];
         double total = s->flux_e * m[i] + s->product_e * m[3 * n + i];
         double weight = 1.0 / (s->noise_e * s->noise_e + fmax(total, 0.0));
         double r = value - total;
@@ -274,12 +279,14 @@ bool bst_streak_motion_measure(bst_streak_motion *work, const bst_psf *psf,
     path.bend_y_px /= f->binning;
     double length = hypot(path.dx_px, path.dy_px);
     double ex = path.dx_px / length, ey = path.dy_px / length;
-    if (!(length >= LEAST_PATH_SIGMAS * f->sigma_px * f->binning)) {
+    double bend = f->binning * hypot(path.bend_x_px, path.bend_y_px);
+    if (!(length >= LEAST_PATH_SIGMAS * f->sigma_px * f->binning) || bend > MOST_BEND * length) {
         return false;
     }
     star stars[BST_STREAK_MOTION_STARS];
     int count = 0;
-    for (int k = 0; k < candidates->count && count < BST_STREAK_MOTION_STARS; k++) {
+    for (int k = 0; k < candidates->count && k < LOOKED_AT && count < BST_STREAK_MOTION_STARS;
+         k++) {
         if ((double)candidates->items[candidates->order[k]].snr < LEAST_SNR) {
             break;
         }

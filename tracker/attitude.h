@@ -25,9 +25,9 @@ typedef struct bst_attitude_solution {
     bst_quat q_cam_from_gcrf;
     /* of the rotation vector e in camera axes with q = bst_quat_from_rotvec(e) * q_true, rad^2 */
     double covariance[3][3];
-    double rms_px; /* of the residuals of the stars used, per axis */
-    double chi2;   /* of the stars used */
-    int dof;       /* 2 * stars_used - 3 */
+    double rms_px;    /* of the residuals of the stars used, per axis */
+    double chi2;      /* of the stars used */
+    int dof;          /* 2 * stars_used - 3 */
     double excess_px; /* 1 sigma per axis that was found missing from the stars' covariances */
 } bst_attitude_solution;
 

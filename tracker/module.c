@@ -1,9 +1,9 @@
 #include "tracker/module.h"
 
-#include <math.h>
 #include <stdlib.h>
 
 #include "sim/world/knowledge.h"
+#include "tracker/photocentre.h"
 #include "tracker/tracker.h"
 
 enum { PORT_DETECTIONS, PORT_POINTING, PORT_NAV, PORT_TRACKS, PORT_PREDICTIONS, PORT_COUNT };
@@ -38,15 +38,7 @@ static bst_vec3 photocentre(const tracker_module *m, bst_ctx *ctx, const bst_sta
         count > MAX_COMPANIONS) {
         return star->icrs;
     }
-    bst_vec3 sum = star->icrs;
-    for (int i = 0; i < count; i++) {
-        if (near[i].id == star->id && near[i].v_mag == star->v_mag) {
-            continue;
-        }
-        double share = pow(10.0, -0.4 * ((double)near[i].v_mag - (double)star->v_mag));
-        sum = bst_vec3_axpy(sum, share, near[i].icrs);
-    }
-    return bst_vec3_unit(sum);
+    return bst_photocentre(star, near, count, m->blend_rad);
 }
 
 static bool find_star(void *user, uint32_t star_id, bst_vec3 *icrs) {

@@ -23,8 +23,8 @@ typedef struct bst_motion {
  * last samples there. With at least 8 samples in the exposure their noise is told from their third
  * differences, which smooth motion leaves alone, and the bend about x and y is shrunk by 2 s^2 over
  * its square, s the sigma that such noise gives it (James and Stein 1961, positive part). A
- * zero-length exposure gives the attitude then, no turn and no bend. False, and *out untouched, when
- * the ring is empty. */
+ * zero-length exposure gives the attitude then, no turn and no bend. False, and *out untouched,
+ * when the ring is empty. */
 bool bst_motion_from_telemetry(const bst_pointing_telemetry *telemetry, int64_t start_tick,
                                int64_t end_tick, bst_motion *out);
 
