@@ -34,6 +34,11 @@ static bst_status cue_at(bst_ctx *ctx, const bst_control *c, int64_t tick, bst_c
     return c->env.cue_at(c->env.cue_user, ctx, seconds_of(c, tick), out);
 }
 
+static bst_status cue_direction_at(bst_ctx *ctx, const bst_control *c, int64_t tick, bool *valid,
+                                   bst_vec3 *out) {
+    return c->env.cue_direction_at(c->env.cue_user, ctx, seconds_of(c, tick), valid, out);
+}
+
 /* ---- aim ---- */
 
 /* A held track at a tick. Its rate changes along the arc as the cue's does. */
@@ -41,12 +46,13 @@ static bst_status held_at(bst_ctx *ctx, const bst_control *c, const bst_control_
                           int64_t tick, bst_vec3 *direction) {
     double dt = (double)(tick - held->tick) / c->env.tick_rate_hz;
     bst_vec3 d = bst_vec3_axpy(held->direction_gcrf, dt, held->rate_gcrf_radps);
-    bst_cue then, now;
-    BST_TRY(cue_at(ctx, c, held->tick, &then));
-    BST_TRY(cue_at(ctx, c, tick, &now));
-    if (then.valid && now.valid) {
-        bst_vec3 straight = bst_vec3_axpy(then.direction_gcrf, dt, then.rate_gcrf_radps);
-        d = bst_vec3_add(d, bst_vec3_sub(now.direction_gcrf, straight));
+    const bst_cue *then = &held->cue;
+    bool valid;
+    bst_vec3 now;
+    BST_TRY(cue_direction_at(ctx, c, tick, &valid, &now));
+    if (then->valid && valid) {
+        bst_vec3 straight = bst_vec3_axpy(then->direction_gcrf, dt, then->rate_gcrf_radps);
+        d = bst_vec3_add(d, bst_vec3_sub(now, straight));
     }
     *direction = bst_vec3_unit(d);
     return BST_OK;
@@ -61,18 +67,15 @@ static bst_vec3 offset_by(bst_vec3 d, bst_vec3 x_axis, bst_search_tile tile) {
 
 bst_status bst_control_aim(bst_ctx *ctx, const bst_control *c, int64_t tick, bool *valid,
                            bst_vec3 *direction) {
-    bst_cue cue;
     *valid = true;
     switch (c->mode) {
         case BST_MODE_SLEW:
         case BST_MODE_RATE:
         case BST_MODE_SEARCH:
-            BST_TRY(cue_at(ctx, c, tick, &cue));
-            *valid = cue.valid;
-            *direction = cue.direction_gcrf;
-            if (c->mode == BST_MODE_SEARCH && cue.valid) {
+            BST_TRY(cue_direction_at(ctx, c, tick, valid, direction));
+            if (c->mode == BST_MODE_SEARCH && *valid) {
                 *direction =
-                    offset_by(cue.direction_gcrf, c->search_x_gcrf, c->search.tile[c->search_step]);
+                    offset_by(*direction, c->search_x_gcrf, c->search.tile[c->search_step]);
             }
             return BST_OK;
         case BST_MODE_ACQUIRE:
@@ -100,13 +103,30 @@ static bst_vec3 apparent_of(const bst_control *c, bst_vec3 geometric) {
     return bst_light_aberrate(&light, geometric);
 }
 
+/* After a change of anything that bst_control_aim or the pointing error rests on. */
+static void forget_aims(bst_control *c) {
+    for (int i = 0; i < BST_CONTROL_AIMED; i++) {
+        c->aimed[i].known = false;
+    }
+}
+
 /* Where the telemetry's boresight has to be for the true one to be on the aim. */
-static bst_status boresight_at(bst_ctx *ctx, const bst_control *c, int64_t tick, bool *valid,
+static bst_status boresight_at(bst_ctx *ctx, bst_control *c, int64_t tick, bool *valid,
                                bst_vec3 *direction) {
-    BST_TRY(bst_control_aim(ctx, c, tick, valid, direction));
+    /* commands come at a fixed period, of which Fibonacci hashing spreads the multiples evenly */
+    uint64_t spread = (uint64_t)tick * UINT64_C(0x9E3779B97F4A7C15);
+    bst_control_aimed *aimed = &c->aimed[spread >> 57];
+    _Static_assert(BST_CONTROL_AIMED == 1 << (64 - 57), "the hash's greatest value");
+    if (!aimed->known || aimed->tick != tick) {
+        aimed->known = false;
+        BST_TRY(bst_control_aim(ctx, c, tick, &aimed->valid, &aimed->direction_gcrf));
+        aimed->error = bst_pointing_error_at(&c->pointing_error, tick, c->env.tick_rate_hz);
+        aimed->tick = tick;
+        aimed->known = true;
+    }
+    *valid = aimed->valid;
     if (*valid) {
-        bst_quat error = bst_pointing_error_at(&c->pointing_error, tick, c->env.tick_rate_hz);
-        *direction = bst_quat_rotate(error, apparent_of(c, *direction));
+        *direction = bst_quat_rotate(aimed->error, apparent_of(c, aimed->direction_gcrf));
     }
     return BST_OK;
 }
@@ -120,6 +140,7 @@ static void enter(bst_control *c, int mode, int64_t tick, const char *reason) {
     }
     c->mode = mode;
     c->mode_tick = tick;
+    forget_aims(c);
 }
 
 static void go_to_tile(bst_control *c, int32_t step, int64_t tick) {
@@ -127,6 +148,7 @@ static void go_to_tile(bst_control *c, int32_t step, int64_t tick) {
     c->tile_tick = tick;
     c->arrival_tick = -1;
     c->frames = 0;
+    forget_aims(c);
 }
 
 static bst_status start_search(bst_ctx *ctx, bst_control *c, int mode, int64_t tick,
@@ -174,11 +196,12 @@ static bst_status next_tile(bst_ctx *ctx, bst_control *c, int64_t tick) {
                                                    : "not near its predicted place");
 }
 
-static void hold(bst_control *c, const bst_track *track, int64_t tick) {
+static bst_status hold(bst_ctx *ctx, bst_control *c, const bst_track *track, int64_t tick) {
     c->held.id = track->id;
     c->held.tick = tick;
     c->held.direction_gcrf = track->direction_gcrf;
     c->held.rate_gcrf_radps = track->rate_gcrf_radps;
+    return cue_at(ctx, c, tick, &c->held.cue);
 }
 
 static const bst_track *find_track(const bst_tracks *tracks, int64_t id) {
@@ -258,7 +281,7 @@ static bool at_rest(const bst_control *c, int64_t mid_tick) {
 static bst_status observe_searching(bst_ctx *ctx, bst_control *c, int64_t tick,
                                     const bst_tracks *tracks, const bst_track *target) {
     if (target) {
-        hold(c, target, tracks->tick);
+        BST_TRY(hold(ctx, c, target, tracks->tick));
         enter(c, BST_MODE_ACQUIRE, tick, "the tracker names a target");
         return BST_OK;
     }
@@ -268,7 +291,7 @@ static bst_status observe_searching(bst_ctx *ctx, bst_control *c, int64_t tick,
     const bst_track *candidate;
     BST_TRY(best_candidate(ctx, c, tracks, &candidate));
     if (candidate) {
-        hold(c, candidate, tracks->tick);
+        BST_TRY(hold(ctx, c, candidate, tracks->tick));
         enter(c, BST_MODE_ACQUIRE, tick, "a candidate moves as the target should");
         return BST_OK;
     }
@@ -293,7 +316,7 @@ static bst_status observe_holding(bst_ctx *ctx, bst_control *c, int64_t tick,
         return BST_OK;
     }
     bool other = was_target && target->id != c->held.id;
-    hold(c, track, tracks->tick);
+    BST_TRY(hold(ctx, c, track, tracks->tick));
     double off = off_boresight_px(c, tracks, track);
     if (c->mode == BST_MODE_ACQUIRE && target && off <= c->config.track_entry_px) {
         enter(c, BST_MODE_TRACK, tick, "the target is centred");
@@ -305,6 +328,7 @@ static bst_status observe_holding(bst_ctx *ctx, bst_control *c, int64_t tick,
 
 bst_status bst_control_observe(bst_ctx *ctx, bst_control *c, int64_t tick,
                                const bst_tracks *tracks) {
+    forget_aims(c); /* a new fix, and what is held may change */
     if (c->config.compensate_attitude) {
         bst_pointing_error_update(&c->pointing_error, &tracks->attitude, c->env.tick_rate_hz);
     }
@@ -351,7 +375,7 @@ void bst_control_telemetry(bst_control *c, const bst_pointing_telemetry *pointin
 
 /* Whether the servo has come to rest on the present aim, not on one that a command on its way will
  * replace. Also gives where the aim is from the believed true boresight, px. */
-static bst_status look(bst_ctx *ctx, const bst_control *c, bool *arrived, double off_px[2]) {
+static bst_status look(bst_ctx *ctx, bst_control *c, bool *arrived, double off_px[2]) {
     off_px[0] = off_px[1] = 0.0;
     *arrived = false;
     if (!c->pointing_valid || !c->nav_valid) {
@@ -366,7 +390,8 @@ static bst_status look(bst_ctx *ctx, const bst_control *c, bool *arrived, double
     bst_vec3 v = bst_quat_rotate(c->pointing.q_cam_from_gcrf, wanted);
     off_px[0] = atan2(v.x, v.z) / c->env.pixel_rad;
     off_px[1] = atan2(v.y, v.z) / c->env.pixel_rad;
-    *arrived = c->settled && hypot(off_px[0], off_px[1]) <= c->config.arrive_tolerance_px;
+    double tolerance = c->config.arrive_tolerance_px;
+    *arrived = c->settled && off_px[0] * off_px[0] + off_px[1] * off_px[1] <= tolerance * tolerance;
     return BST_OK;
 }
 

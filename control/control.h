@@ -38,6 +38,9 @@ extern const bst_config_desc bst_control_config_table[];
 
 /* The cue `seconds` after the epoch. */
 typedef bst_status (*bst_control_cue_fn)(void *user, bst_ctx *ctx, double seconds, bst_cue *out);
+/* Its direction alone. */
+typedef bst_status (*bst_control_cue_direction_fn)(void *user, bst_ctx *ctx, double seconds,
+                                                   bool *valid, bst_vec3 *direction);
 
 /* What a controller knows besides its messages. */
 typedef struct bst_control_env {
@@ -46,6 +49,7 @@ typedef struct bst_control_env {
     double rotation_rad; /* of the image's axes about the boresight, from camera +x towards +y */
     int width_px, height_px; /* of the field, undistorted */
     bst_control_cue_fn cue_at;
+    bst_control_cue_direction_fn cue_direction_at;
     void *cue_user;
 } bst_control_env;
 
@@ -58,9 +62,21 @@ typedef struct bst_control_transition {
 typedef struct bst_control_held {
     int64_t id, tick;
     bst_vec3 direction_gcrf, rate_gcrf_radps; /* geometric */
+    bst_cue cue;                              /* at that time */
 } bst_control_held;
 
 #define BST_CONTROL_TRANSITIONS 4 /* greatest number in one observe and one update */
+
+/* An aim that was worked out: each tick is asked for several times, as a command's own and as those
+ * that its rate is taken between. */
+typedef struct bst_control_aimed {
+    bool known, valid;
+    int64_t tick;
+    bst_vec3 direction_gcrf; /* geometric */
+    bst_quat error;          /* of the pointing */
+} bst_control_aimed;
+
+#define BST_CONTROL_AIMED 128
 
 typedef struct bst_control {
     bst_control_config config;
@@ -90,6 +106,7 @@ typedef struct bst_control {
     bool pointing_valid, settled;
     bst_vec3 stare_gcrf;
     bool stare_valid;
+    bst_control_aimed aimed[BST_CONTROL_AIMED]; /* as long as nothing that they rest on changes */
 } bst_control;
 
 /* Copies config and env. BST_ERR_CONFIG for settings that do not fit together. */

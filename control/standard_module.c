@@ -26,6 +26,11 @@ static bst_status cue_at(void *user, bst_ctx *ctx, double seconds, bst_cue *out)
     return bst_knowledge_cue_at(ctx, user, seconds, out);
 }
 
+static bst_status cue_direction_at(void *user, bst_ctx *ctx, double seconds, bool *valid,
+                                   bst_vec3 *direction) {
+    return bst_knowledge_cue_direction_at(ctx, user, seconds, valid, direction);
+}
+
 static void destroy(void *self) {
     module *m = self;
     if (m) {
@@ -50,6 +55,7 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
                                        .width_px = (int)width_px,
                                        .height_px = (int)height_px,
                                        .cue_at = cue_at,
+                                       .cue_direction_at = cue_direction_at,
                                        .cue_user = m->view};
         status = bst_control_init(env->ctx, &m->control, config, &control_env);
     }

@@ -75,8 +75,11 @@ bst_quat bst_platform_true_camera(bst_platform *platform, int64_t n, double seco
 
 bst_quat bst_platform_true_camera_between(bst_platform *platform, int64_t n, double fraction,
                                           double seconds, bst_quat q_cam_from_body) {
-    bst_quat body =
-        turned(platform->q_nominal_from_gcrf, bst_vec3_scale(platform->drift_radps, seconds));
+    bst_vec3 drift = platform->drift_radps;
+    bst_quat body = platform->q_nominal_from_gcrf;
+    if (drift.x != 0.0 || drift.y != 0.0 || drift.z != 0.0) {
+        body = turned(body, bst_vec3_scale(drift, seconds));
+    }
     double shake[2], next[2];
     bst_jitter_at(&platform->jitter, n, shake);
     if (fraction > 0.0) {

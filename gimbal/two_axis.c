@@ -57,11 +57,46 @@ void bst_two_axis_solve(bst_vec3 b, bst_vec3 rate, double outer_at_pole_rad, dou
     rate_radps[1] = -rate.y / h;
 }
 
-bst_quat bst_two_axis_attitude(const double angle_rad[2]) {
-    double so = sin(0.5 * angle_rad[0]), co = cos(0.5 * angle_rad[0]);
-    double si = sin(0.5 * angle_rad[1]), ci = cos(0.5 * angle_rad[1]);
+/* Sines and cosines of half the axes' angles. */
+typedef struct halves {
+    double sin[2], cos[2];
+} halves;
+
+static halves halves_of(const double angle_rad[2]) {
+    return (halves){{sin(0.5 * angle_rad[0]), sin(0.5 * angle_rad[1])},
+                    {cos(0.5 * angle_rad[0]), cos(0.5 * angle_rad[1])}};
+}
+
+/* The same a little further: up to a milliradian by the series, which is exact to rounding. */
+static halves halves_beside(const halves *h, const double more_rad[2]) {
+    halves out;
+    for (int a = 0; a < 2; a++) {
+        double d = 0.5 * more_rad[a], s = d * (1.0 - d * d / 6.0), c = 1.0 - 0.5 * d * d;
+        if (fabs(d) > 5e-4) {
+            s = sin(d);
+            c = cos(d);
+        }
+        out.sin[a] = h->sin[a] * c + h->cos[a] * s;
+        out.cos[a] = h->cos[a] * c - h->sin[a] * s;
+    }
+    return out;
+}
+
+/* After a whole turn of the outer axis. */
+static void turn_half(halves *h) {
+    h->sin[0] = -h->sin[0];
+    h->cos[0] = -h->cos[0];
+}
+
+static bst_quat attitude_of(const halves *h) {
     /* from_rotvec(-inner x) * from_rotvec(-outer y), multiplied out */
-    return (bst_quat){-si * co, -ci * so, si * so, ci * co};
+    return (bst_quat){-h->sin[1] * h->cos[0], -h->cos[1] * h->sin[0], h->sin[1] * h->sin[0],
+                      h->cos[1] * h->cos[0]};
+}
+
+bst_quat bst_two_axis_attitude(const double angle_rad[2]) {
+    halves h = halves_of(angle_rad);
+    return attitude_of(&h);
 }
 
 static double wrap(double angle) {
@@ -112,7 +147,9 @@ void bst_two_axis_step(bst_two_axis *plant, const bst_los_command *command, doub
         bst_axis_step(outer, angle[0], rate[0], noise[0]);
         bst_axis_step(inner, angle[1], rate[1], noise[1]);
     }
-    double cross = cos(inner->angle_rad);
+    double truth[2] = {outer->angle_rad, inner->angle_rad};
+    halves half = halves_of(truth);
+    double cross = half.cos[1] * half.cos[1] - half.sin[1] * half.sin[1];
     double off_o = (outer->angle_rad - angle[0]) * cross, off_i = inner->angle_rad - angle[1];
     double rate_o = (outer->rate_radps - rate[0]) * cross, rate_i = inner->rate_radps - rate[1];
     double settle_rate = plant->settle_tolerance_rad * outer->spec.natural_frequency_radps;
@@ -123,16 +160,20 @@ void bst_two_axis_step(bst_two_axis *plant, const bst_los_command *command, doub
 
     if (fabs(outer->reference_rad) > BST_PI) {
         bst_axis_unwind(outer, outer->reference_rad > 0.0 ? -1.0 : 1.0);
+        turn_half(&half);
     }
-    double truth[2] = {outer->angle_rad, inner->angle_rad};
-    bst_quat q_cam_from_body = bst_two_axis_attitude(truth);
     plant->q_cam_from_gcrf =
-        bst_platform_true_camera(&plant->platform, n, (double)n * plant->dt_s, q_cam_from_body);
+        bst_platform_true_camera(&plant->platform, n, (double)n * plant->dt_s, attitude_of(&half));
     if (measure) {
-        plant->encoder_rad[0] = wrap(truth[0]) + noise[0];
-        plant->encoder_rad[1] = truth[1] + noise[1];
+        double wrapped = wrap(outer->angle_rad);
+        if (wrapped != outer->angle_rad) {
+            turn_half(&half);
+        }
+        halves seen = halves_beside(&half, noise);
+        plant->encoder_rad[0] = wrapped + noise[0];
+        plant->encoder_rad[1] = inner->angle_rad + noise[1];
         plant->q_measured_body_from_gcrf = bst_platform_measured_body(&plant->platform, n);
-        plant->q_measured_from_gcrf = bst_quat_unit(bst_quat_mul(
-            bst_two_axis_attitude(plant->encoder_rad), plant->q_measured_body_from_gcrf));
+        plant->q_measured_from_gcrf =
+            bst_quat_unit(bst_quat_mul(attitude_of(&seen), plant->q_measured_body_from_gcrf));
     }
 }

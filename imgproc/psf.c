@@ -1,6 +1,7 @@
 #include "imgproc/psf.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <string.h>
 
 #include "sim/core/vec.h"
@@ -100,6 +101,18 @@ static int node_count(const bst_shape *shape) {
         (hypot(shape->dx_px, shape->dy_px) + 6.0 * hypot(shape->bend_x_px, shape->bend_y_px)) /
         shape->sigma_px;
     return length < 1e-3 ? 1 : (int)fmin(5.0 + 1.15 * length, BST_PSF_MAX_NODES);
+}
+
+void bst_psf_profile(const bst_psf *psf, double centre, double sigma, int side, double *share,
+                     double *slope, double *curvature) {
+    profile p;
+    make_profile(psf, centre, sigma, side, &p);
+    for (int i = 0; i < side; i++) {
+        bool in = i >= p.first && i < p.first + p.count;
+        share[i] = in ? p.share[i - p.first] : 0.0;
+        slope[i] = in ? p.slope[i - p.first] : 0.0;
+        curvature[i] = in ? p.curvature[i - p.first] : 0.0;
+    }
 }
 
 void bst_psf_render(const bst_psf *psf, const bst_shape *shape, const bst_stamp *stamp,

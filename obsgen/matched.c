@@ -22,6 +22,14 @@ static double ramp(double z, double s) {
     return z * below(z / s) + s * density(z / s);
 }
 
+/* Autocorrelation of a blurred segment along itself, times s. */
+static double along_itself(double d, double length, double s) {
+    if (length < 0.05 * s) {
+        return density(d / s);
+    }
+    return s * (ramp(d + length, s) - 2.0 * ramp(d, s) + ramp(d - length, s)) / (length * length);
+}
+
 double bst_matched_product(bst_path_px p, bst_path_px q, double sigma_px) {
     double lp = hypot(p.dx, p.dy), lq = hypot(q.dx, q.dy), s = sigma_px * sqrt(2.0);
     if (lp > lq) {
@@ -34,6 +42,9 @@ double bst_matched_product(bst_path_px p, bst_path_px q, double sigma_px) {
     }
     if (lq < 0.02 * s) {
         return 1.0 / (2.0 * BST_PI * s * s);
+    }
+    if (p.dx == q.dx && p.dy == q.dy) {
+        return density(0.0) * along_itself(0.0, lq, s) / (s * s);
     }
     double cx = q.dx / lq, cy = q.dy / lq;
     int parts = lp < 0.02 * s ? 1 : (int)ceil(2.0 * lp / sigma_px);
@@ -51,14 +62,6 @@ double bst_matched_efficiency(bst_path_px source, bst_path_px filter, double sig
     double both = bst_matched_product(source, source, sigma_px) *
                   bst_matched_product(filter, filter, sigma_px);
     return fmin(bst_matched_product(source, filter, sigma_px) / sqrt(both), 1.0);
-}
-
-/* Autocorrelation of a blurred segment along itself, times s. */
-static double along_itself(double d, double length, double s) {
-    if (length < 0.05 * s) {
-        return density(d / s);
-    }
-    return s * (ramp(d + length, s) - 2.0 * ramp(d, s) + ramp(d - length, s)) / (length * length);
 }
 
 double bst_matched_falloff(double along_px, double across_px, double length_px, double sigma_px) {

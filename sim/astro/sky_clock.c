@@ -1,5 +1,6 @@
 #include "sim/astro/sky_clock.h"
 
+#include <pthread.h>
 #include <stdint.h>
 #include <stdlib.h>
 
@@ -8,6 +9,8 @@
 #define STEPS_PER_DAY 720
 /* Enough that look-backs over a grid point do not push out what the present needs. */
 #define NODES 4
+/* The same for clocks that are not at the same place of the run. */
+#define SHARED_NODES 16
 
 typedef struct node {
     int64_t index;
@@ -17,10 +20,42 @@ typedef struct node {
     bst_bodies bodies;
 } node;
 
+struct bst_sky_grid {
+    const bst_eop *eop;
+    pthread_mutex_t lock;
+    node nodes[SHARED_NODES];
+};
+
 struct bst_sky_clock {
     const bst_eop *eop;
+    bst_sky_grid *grid; /* NULL: works its values out itself */
     node nodes[NODES];
 };
+
+bst_status bst_sky_grid_create(bst_ctx *ctx, const bst_eop *eop, bst_sky_grid **out) {
+    bst_sky_grid *grid = calloc(1, sizeof *grid);
+    *out = NULL;
+    if (!grid) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the values of sky clocks");
+    }
+    grid->eop = eop;
+    pthread_mutex_init(&grid->lock, NULL);
+    *out = grid;
+    return BST_OK;
+}
+
+void bst_sky_grid_free(bst_sky_grid *grid) {
+    if (grid) {
+        pthread_mutex_destroy(&grid->lock);
+        free(grid);
+    }
+}
+
+bst_status bst_sky_clock_create_on(bst_ctx *ctx, bst_sky_grid *grid, bst_sky_clock **out) {
+    BST_TRY(bst_sky_clock_create(ctx, grid->eop, out));
+    (*out)->grid = grid;
+    return BST_OK;
+}
 
 bst_status bst_sky_clock_create(bst_ctx *ctx, const bst_eop *eop, bst_sky_clock **out) {
     bst_sky_clock *clock = calloc(1, sizeof *clock);
@@ -36,25 +71,46 @@ void bst_sky_clock_free(bst_sky_clock *clock) {
     free(clock);
 }
 
-/* The grid value of an index, from its slot or worked out anew. Beyond the Earth-orientation table
- * it has the values of its end, for instants just before. */
+/* Works out the grid value of an index. Beyond the Earth-orientation table it has the values of its
+ * end, for instants just before. */
+static bst_status make_node(bst_ctx *ctx, const bst_eop *eop, int64_t index, node *n) {
+    int64_t day = index / STEPS_PER_DAY, step = index % STEPS_PER_DAY;
+    bst_time t = {(double)day + 0.5, (double)step / STEPS_PER_DAY};
+    n->valid = false;
+    bst_status status = bst_earth_parts_at(ctx, eop, t, t, &n->parts);
+    n->beyond = status == BST_ERR_RANGE;
+    if (n->beyond) {
+        bst_time read_at;
+        BST_TRY(bst_eop_nearest(ctx, eop, t, &read_at));
+        status = bst_earth_parts_at(ctx, eop, t, read_at, &n->parts);
+    }
+    BST_TRY(status);
+    bst_bodies_at(t, &n->bodies);
+    n->index = index;
+    n->valid = true;
+    return BST_OK;
+}
+
+/* The same by way of the shared grid. */
+static bst_status shared_node(bst_ctx *ctx, bst_sky_grid *grid, int64_t index, node *out) {
+    node *n = &grid->nodes[index % SHARED_NODES];
+    bst_status status = BST_OK;
+    pthread_mutex_lock(&grid->lock);
+    if (!n->valid || n->index != index) {
+        status = make_node(ctx, grid->eop, index, n);
+    }
+    *out = *n;
+    pthread_mutex_unlock(&grid->lock);
+    return status;
+}
+
+/* The grid value of an index, from its slot or worked out anew. */
 static bst_status node_at(bst_ctx *ctx, bst_sky_clock *clock, int64_t index, const node **out) {
     node *n = &clock->nodes[index % NODES];
     if (!n->valid || n->index != index) {
-        int64_t day = index / STEPS_PER_DAY, step = index % STEPS_PER_DAY;
-        bst_time t = {(double)day + 0.5, (double)step / STEPS_PER_DAY};
         n->valid = false;
-        bst_status status = bst_earth_parts_at(ctx, clock->eop, t, t, &n->parts);
-        n->beyond = status == BST_ERR_RANGE;
-        if (n->beyond) {
-            bst_time read_at;
-            BST_TRY(bst_eop_nearest(ctx, clock->eop, t, &read_at));
-            status = bst_earth_parts_at(ctx, clock->eop, t, read_at, &n->parts);
-        }
-        BST_TRY(status);
-        bst_bodies_at(t, &n->bodies);
-        n->index = index;
-        n->valid = true;
+        BST_TRY(clock->grid ? shared_node(ctx, clock->grid, index, n)
+                            : make_node(ctx, clock->eop, index, n));
     }
     *out = n;
     return BST_OK;

@@ -15,7 +15,17 @@ typedef struct bst_sky {
  * never on the order of the calls. One user (thread) at a time. */
 typedef struct bst_sky_clock bst_sky_clock;
 
-/* Makes a clock; eop is borrowed and must outlive it. Freed with bst_sky_clock_free. */
+/* The grid's values for several clocks, which then work each out once between them. Its memory is
+ * fixed too. Clocks on it may run in different threads. eop is borrowed and must outlive it. */
+typedef struct bst_sky_grid bst_sky_grid;
+bst_status bst_sky_grid_create(bst_ctx *ctx, const bst_eop *eop, bst_sky_grid **out) BST_MUST_CHECK;
+void bst_sky_grid_free(bst_sky_grid *grid); /* NULL allowed; after its clocks */
+
+/* Makes a clock on a grid, which is borrowed and must outlive it. Freed with bst_sky_clock_free. */
+bst_status bst_sky_clock_create_on(bst_ctx *ctx, bst_sky_grid *grid,
+                                   bst_sky_clock **out) BST_MUST_CHECK;
+
+/* Makes a clock of its own; eop is borrowed and must outlive it. Freed with bst_sky_clock_free. */
 bst_status bst_sky_clock_create(bst_ctx *ctx, const bst_eop *eop,
                                 bst_sky_clock **out) BST_MUST_CHECK;
 void bst_sky_clock_free(bst_sky_clock *clock); /* NULL allowed */

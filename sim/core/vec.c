@@ -55,7 +55,14 @@ bst_vec3 bst_quat_to_rotvec(bst_quat q) {
     bst_vec3 v = {sign * q.x, sign * q.y, sign * q.z};
     double n = bst_vec3_norm(v);
     double w = sign * q.w;
-    double scale = n > 1e-8 ? 2.0 * atan2(n, w) / n : 2.0;
+    double scale;
+    if (n < 0.01 * w) {
+        /* the arc tangent's series, exact to rounding: most turns are small */
+        double t2 = n * n / (w * w);
+        scale = 2.0 / w * (1.0 - t2 * (1.0 / 3.0 - t2 * (0.2 - t2 * (1.0 / 7.0 - t2 / 9.0))));
+    } else {
+        scale = n > 0.0 ? 2.0 * atan2(n, w) / n : 2.0;
+    }
     return bst_vec3_scale(v, scale);
 }
 

@@ -445,10 +445,10 @@ bst_status bst_ephemeris_create(bst_ctx *ctx, const bst_world *world, bst_epheme
     e->table_memory = calloc(rows * 4 * TABLES, sizeof *e->table_memory);
     bst_status status =
         e->bodies && e->table_memory
-            ? bst_sky_clock_create(ctx, world->eop, &e->clock_knots)
+            ? bst_sky_clock_create_on(ctx, world->sky_grid, &e->clock_knots)
             : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for an ephemeris of %d", e->body_count);
     if (status == BST_OK) {
-        status = bst_sky_clock_create(ctx, world->eop, &e->clock_tables);
+        status = bst_sky_clock_create_on(ctx, world->sky_grid, &e->clock_tables);
     }
     if (status != BST_OK) {
         bst_ephemeris_free(e);

@@ -8,7 +8,7 @@
 #include "sim/world/world_internal.h"
 
 /* The cue's direction is kept at whole seconds and interpolated by six of them. */
-enum { KNOTS = 16, STENCIL = 6, REMEMBERED = 256 };
+enum { KNOTS = 16, STENCIL = 6 };
 /* Fifth difference, rad, up to which the interpolation is used: what it misses is 200 times less.
  */
 static const double SMOOTH_RAD = 1e-11;
@@ -23,13 +23,10 @@ struct bst_knowledge_view {
     const bst_knowledge *knowledge;
     bst_sky_clock *clock;
     cue_knot knots[KNOTS];
-    struct {
-        bool made;
-        double seconds;
-        bst_cue cue;
-    } remembered[REMEMBERED]; /* by time: control asks for the same instants again and again */
-    int64_t checked;          /* second whose stencil was looked at last */
+    /* the second whose stencil was looked at last */
+    int64_t checked;
     bool any_checked, smooth;
+    bst_vec3 stencil[STENCIL];
 };
 
 /* The onboard PSF is one Gaussian: of the width given, or else that with the true one's
@@ -57,6 +54,7 @@ static bst_status alter_camera(bst_ctx *ctx, const bst_camera_errors_config *err
     c->pixel_scale_arcsec *= 1.0 + 1e-6 * errors->scale_error_ppm;
     c->rotation_deg += errors->rotation_error_deg;
     c->distortion = errors->own_distortion ? errors->distortion : c->distortion;
+    c->throughput *= 1.0 + errors->throughput_error;
     know_psf(c, errors->psf_fwhm_px);
     bst_status status = bst_camera_prepare(ctx, c);
     return status == BST_OK
@@ -138,7 +136,7 @@ bst_status bst_knowledge_view_create(bst_ctx *ctx, const bst_knowledge *knowledg
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a view of onboard knowledge");
     }
     view->knowledge = knowledge;
-    bst_status status = bst_sky_clock_create(ctx, knowledge->world->eop, &view->clock);
+    bst_status status = bst_sky_clock_create_on(ctx, knowledge->world->sky_grid, &view->clock);
     if (status != BST_OK) {
         free(view);
         return status;
@@ -188,6 +186,7 @@ static bool is_smooth(bst_knowledge_view *view, int64_t second) {
             const cue_knot *knot = knot_at(view, second - 2 + i);
             known = known && knot->known;
             sum = bst_vec3_axpy(sum, fifth[i], knot->direction);
+            view->stencil[i] = knot->direction;
         }
         view->any_checked = true;
         view->checked = second;
@@ -211,13 +210,14 @@ static bst_status direction_at(bst_ctx *ctx, bst_knowledge_view *view, double se
                                -a * b * u * d * f / 24.0,  a * b * u * d * e / 120.0};
     bst_vec3 sum = {0, 0, 0};
     for (int i = 0; i < STENCIL; i++) {
-        sum = bst_vec3_axpy(sum, w[i], knot_at(view, (int64_t)whole - 2 + i)->direction);
+        sum = bst_vec3_axpy(sum, w[i], view->stencil[i]);
     }
     *out = sum;
     return BST_OK;
 }
 
-static bst_status make_cue(bst_ctx *ctx, bst_knowledge_view *view, double seconds, bst_cue *out) {
+bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
+                                bst_cue *out) {
     const bst_knowledge *k = view->knowledge;
     /* central difference: the third derivative of a LEO-to-GEO direction leaves < 1e-11 rad/s */
     const double h = 0.5;
@@ -239,18 +239,13 @@ static bst_status make_cue(bst_ctx *ctx, bst_knowledge_view *view, double second
     return BST_OK;
 }
 
-bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
-                                bst_cue *out) {
-    uint64_t bits;
-    memcpy(&bits, &seconds, sizeof bits);
-    /* Fibonacci hashing: the upper bits of the product */
-    unsigned place = (unsigned)((bits * UINT64_C(0x9E3779B97F4A7C15)) >> 56) % REMEMBERED;
-    if (!view->remembered[place].made || view->remembered[place].seconds != seconds) {
-        view->remembered[place].made = false;
-        BST_TRY(make_cue(ctx, view, seconds, &view->remembered[place].cue));
-        view->remembered[place].seconds = seconds;
-        view->remembered[place].made = true;
-    }
-    *out = view->remembered[place].cue;
+bst_status bst_knowledge_cue_direction_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
+                                          bool *valid, bst_vec3 *direction) {
+    const bst_knowledge *k = view->knowledge;
+    bst_vec3 nominal;
+    BST_TRY(direction_at(ctx, view, seconds, &nominal));
+    const world_sensor *sensor = &k->world->observers[k->observer].sensors[k->sensor];
+    *valid = true;
+    *direction = bst_quat_rotate(bst_quat_from_rotvec(sensor->cue_rotation), nominal);
     return BST_OK;
 }

@@ -37,6 +37,9 @@ void bst_knowledge_view_free(bst_knowledge_view *view);
 /* The cue at `seconds` after the epoch. */
 bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                 bst_cue *out) BST_MUST_CHECK;
+/* Its direction alone, at a third of the cost; *valid as bst_cue has it. */
+bst_status bst_knowledge_cue_direction_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
+                                          bool *valid, bst_vec3 *direction) BST_MUST_CHECK;
 
 /* The body attitude in which the spacecraft starts and that it tries to hold (see
  * bst_world_body_attitude). */

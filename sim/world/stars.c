@@ -18,8 +18,17 @@
 extern const unsigned char bst_stars_embedded_begin[];
 extern const unsigned char bst_stars_embedded_end[];
 
+/* A point and a distance from it that hold all cells of a group: cells of consecutive numbers are
+ * neighbours, so that a query passes by most of the sky a group at a time. */
+typedef struct cell_group {
+    double centre[3], radius, pm_max_radpyr;
+} cell_group;
+
+enum { GROUP = 32, GROUPS = (BST_STAR_CELLS + GROUP - 1) / GROUP };
+
 struct bst_stars {
     bst_star_view view;
+    cell_group groups[GROUPS];
     void *mapping; /* NULL when embedded */
     size_t mapping_bytes;
     char path[512];
@@ -28,6 +37,37 @@ struct bst_stars {
     bst_star_errors_config errors;
     bst_rng_key key;
 };
+
+static void group_cells(bst_stars *s) {
+    for (uint32_t g = 0; g < GROUPS; g++) {
+        cell_group *group = &s->groups[g];
+        uint32_t first = g * GROUP, last = first + GROUP;
+        uint32_t end = last < BST_STAR_CELLS ? last : BST_STAR_CELLS;
+        *group = (cell_group){.radius = -1.0}; /* no star */
+        int filled = 0;
+        for (uint32_t c = first; c < end; c++) {
+            const bst_star_cell *cell = &s->view.cells[c];
+            filled += cell->count > 0;
+            for (int k = 0; k < 3 && cell->count > 0; k++) {
+                group->centre[k] += cell->centre[k];
+            }
+        }
+        for (int k = 0; k < 3 && filled > 0; k++) {
+            group->centre[k] /= filled;
+        }
+        for (uint32_t c = first; c < end; c++) {
+            const bst_star_cell *cell = &s->view.cells[c];
+            if (cell->count > 0) {
+                double dx = cell->centre[0] - group->centre[0],
+                       dy = cell->centre[1] - group->centre[1],
+                       dz = cell->centre[2] - group->centre[2];
+                double away = sqrt(dx * dx + dy * dy + dz * dz);
+                group->radius = fmax(group->radius, away + cell->radius_rad + 1e-9);
+                group->pm_max_radpyr = fmax(group->pm_max_radpyr, cell->pm_max_radpyr);
+            }
+        }
+    }
+}
 
 /* Beyond this many standard deviations nothing is drawn: Box and Muller of 53 bits end at 8.6. */
 #define MOST_SIGMAS 9.0
@@ -152,6 +192,7 @@ bst_status bst_stars_open(bst_ctx *ctx, const char *name, bst_stars **out) {
         bst_stars_close(s);
         return status;
     }
+    group_cells(s);
     if (use_default && !s->mapping) {
         bst_log(ctx, BST_LOG_WARNING,
                 "the full star catalogue is not there: using the stars embedded in the program "
@@ -244,6 +285,14 @@ static void unpack(const bst_star_record *r, uint32_t tyc1, bst_vec3 direction, 
     out->id = tyc1 << 16 | (r->tyc_vt & 0xFFFFu);
 }
 
+/* Whether a star of the group may lie within radius_rad of a unit vector after so many years. */
+static bool may_reach(const cell_group *group, bst_vec3 centre, double radius_rad, double years) {
+    double reach = radius_rad + group->radius + group->pm_max_radpyr * years;
+    bst_vec3 d = {centre.x - group->centre[0], centre.y - group->centre[1],
+                  centre.z - group->centre[2]};
+    return group->radius >= 0.0 && bst_vec3_dot(d, d) <= reach * reach;
+}
+
 bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre, double radius_rad,
                            double v_limit, double julian_year, bst_star *out, int capacity,
                            int *count) {
@@ -265,6 +314,11 @@ bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre
                        : 0.0;
     int found = 0;
     for (uint32_t c = 0; c < BST_STAR_CELLS; c++) {
+        if (c % GROUP == 0 &&
+            !may_reach(&stars->groups[c / GROUP], centre, radius_rad + slack, fabs(years))) {
+            c += GROUP - 1;
+            continue;
+        }
         const bst_star_cell *cell = &stars->view.cells[c];
         double drift = cell->pm_max_radpyr * fabs(years);
         double reach = radius_rad + cell->radius_rad + drift + slack;

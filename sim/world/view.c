@@ -28,7 +28,7 @@ bst_status bst_view_create(bst_ctx *ctx, const bst_world *world, bst_view **out)
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a view of the world");
     }
     view->world = world;
-    bst_status status = bst_sky_clock_create(ctx, world->eop, &view->clock);
+    bst_status status = bst_sky_clock_create_on(ctx, world->sky_grid, &view->clock);
     if (status != BST_OK) {
         free(view);
         return status;

@@ -161,7 +161,8 @@ static bst_status build(bst_world_builder *b, const bst_world_config *config,
     if (config->faint_stars == BST_FAINT_STATISTICAL || needs_starlight(observers)) {
         BST_TRY(bst_faint_sky_create(b->ctx, world->stars, config->faint_seed, &world->faint));
     }
-    BST_TRY(bst_sky_clock_create(b->ctx, world->eop, &b->clock));
+    BST_TRY(bst_sky_grid_create(b->ctx, world->eop, &world->sky_grid));
+    BST_TRY(bst_sky_clock_create_on(b->ctx, world->sky_grid, &b->clock));
     BST_TRY(bst_world_load_updates(b, observers));
     BST_TRY(bst_world_build_objects(b, config));
     BST_TRY(make_observers(b, observers));
@@ -224,6 +225,7 @@ void bst_world_free(bst_world *world) {
     free(world->observers);
     bst_faint_sky_free(world->faint);
     bst_stars_close(world->stars);
+    bst_sky_grid_free(world->sky_grid);
     bst_eop_free(world->eop);
     free(world);
 }

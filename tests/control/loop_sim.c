@@ -50,6 +50,15 @@ static bst_status cue_at(void *user, bst_ctx *ctx, double t, bst_cue *out) {
     return BST_OK;
 }
 
+static bst_status cue_direction_at(void *user, bst_ctx *ctx, double seconds, bool *valid,
+                                   bst_vec3 *direction) {
+    bst_cue cue;
+    BST_TRY(cue_at(user, ctx, seconds, &cue));
+    *valid = cue.valid;
+    *direction = cue.direction_gcrf;
+    return BST_OK;
+}
+
 static bst_nav_telemetry nav_at(double t, int64_t tick) {
     bst_nav_telemetry nav = {.tick = tick, .sun_m = {1.5e11, 0, 0}};
     nav.position_gcrf_m = observer(t, &nav.velocity_gcrf_mps);
@@ -270,6 +279,7 @@ void sim_run(const sim_options *o, sim_result *r) {
                            .width_px = 1024,
                            .height_px = 1024,
                            .cue_at = cue_at,
+                           .cue_direction_at = cue_direction_at,
                            .cue_user = &s};
     bst_assert_ok(&ctx, bst_control_init(&ctx, &control, &control_config, &env));
 

@@ -19,6 +19,15 @@ static bst_status cue_at(void *user, bst_ctx *ctx, double seconds, bst_cue *out)
     return BST_OK;
 }
 
+static bst_status cue_direction_at(void *user, bst_ctx *ctx, double seconds, bool *valid,
+                                   bst_vec3 *direction) {
+    bst_cue cue;
+    BST_TRY(cue_at(user, ctx, seconds, &cue));
+    *valid = cue.valid;
+    *direction = cue.direction_gcrf;
+    return BST_OK;
+}
+
 typedef struct rig {
     bst_ctx ctx;
     bst_control control;
@@ -45,6 +54,7 @@ static void rig_open(rig *r, bst_control_config *config_or_null, bool cue_valid)
                            .width_px = 1024,
                            .height_px = 1024,
                            .cue_at = cue_at,
+                           .cue_direction_at = cue_direction_at,
                            .cue_user = &r->cue_valid};
     bst_assert_ok(&r->ctx, bst_control_init(&r->ctx, &r->control, &config, &env));
     r->tracks = calloc(1, sizeof *r->tracks + 4 * sizeof(bst_track));
