@@ -3,7 +3,7 @@
 #include "synthetic.h"
 #include "tests/test_support.h"
 
-enum { FRAMES = 24, STARS = 12, SIDE = 256, PIECES = 24 };
+enum { FRAMES = 24, STARS = 12, SIDE = 256, PIECES = 60 };
 
 typedef struct figures {
     double shift2; /* mean square, over frames, of the stars' mean error along the path */
@@ -34,12 +34,10 @@ static figures measure(double dx, double dy, double said_x, double said_y, doubl
             place[i][0] = 40.0 + 58.0 * (i % 4) + bst_rng_uniform(key, 1, 2 * (uint64_t)i);
             place[i][1] = 50.0 + 70.0 * (i / 4) + bst_rng_uniform(key, 1, 2 * (uint64_t)i + 1);
             for (int k = 0; k < PIECES; k++) {
-                double a = 2.0 * k / PIECES - 1.0, b = 2.0 * (k + 1) / PIECES - 1.0;
-                double from = bend * (1.5 * a * a - 0.5), to = bend * (1.5 * b * b - 0.5);
-                double middle = 0.25 * length * (a + b) + 0.5 * (from + to);
-                double step = length / PIECES + to - from;
-                synthetic_add(&s, place[i][0] + middle * ex, place[i][1] + middle * ey,
-                              3e4 / PIECES, step * ex, step * ey);
+                double u = (2.0 * k + 1.0) / PIECES - 1.0;
+                double way = 0.5 * length * u + bend * (1.5 * u * u - 0.5);
+                synthetic_add(&s, place[i][0] + way * ex, place[i][1] + way * ey, 3e4 / PIECES, 0,
+                              0);
             }
         }
         synthetic_expose(&s, key, frame);
