@@ -22,6 +22,7 @@ typedef struct bst_sharpness {
     double inverse_square[BST_SHARP_GROUPS]; /* 1 / sum r^2 of the group */
     double cube[BST_SHARP_GROUPS];           /* sum r^3 (inverse_square)^2 */
     double floor[BST_SHARP_GROUPS];          /* s */
+    float pair[BST_SHARP_GROUPS]; /* a pair's sum times this is not below c, where light is all */
 } bst_sharpness;
 
 /* Deviation from which a pixel is taken for charge: one star in several thousand reaches it. */
