@@ -82,7 +82,7 @@ static void count_charge(void *user, int begin, int end) {
 void bst_charge_remove(bst_locator *l, const bst_locate_frame *f) {
     enum { A_TIME = 64 };
     search s = {l, f};
-    bst_parallel_for(l->pool, l->count, A_TIME, count_charge, &s);
+    bst_parallel_for(f->pool, l->count, A_TIME, count_charge, &s);
     l->charged_count = 0;
     for (int i = 0; i < l->count; i++) {
         if (l->found[i].charge.pixels == 0) {

@@ -35,6 +35,7 @@ struct bst_imgproc {
     bst_motion motion;
     double exposure_s, binning, streak_px;
     bool smeared;
+    bst_stack_frame left;
 };
 
 static bst_status make_bad_map(bst_ctx *ctx, bst_imgproc *ip) {
@@ -83,7 +84,8 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     BST_TRY(
         bst_filter_create(ctx, width, height, streak, bst_parallel_threads(ip->pool), &ip->filter));
     BST_TRY(bst_candidates_create(ctx, width, height, &ip->candidates));
-    BST_TRY(bst_locator_create(ctx, ip->pool, capacity, width, height, side, &ip->locator));
+    BST_TRY(bst_locator_create(ctx, bst_parallel_threads(ip->pool), capacity, width, height, side,
+                               &ip->locator));
     ip->locator.most_fits = (int)ip->config.most_fits;
     return ip->config.streak_search_px > 0.0
                ? bst_streak_locator_create(ctx, &ip->locator.psf, ip->pool, width, height, fwhm,
@@ -380,9 +382,18 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
                                   .sigma_px = sigma,
                                   .motion = motion ? &ip->motion : NULL,
                                   .camera = &ip->camera,
-                                  .binning = frame->binning};
+                                  .binning = frame->binning,
+                                  .pool = pool};
     ip->view.origin_x_px = frame->window.x0 + 0.5 * (frame->binning - 1);
     ip->view.origin_y_px = frame->window.y0 + 0.5 * (frame->binning - 1);
+    ip->left = (bst_stack_frame){.signal = ip->electrons,
+                                 .background = &ip->background,
+                                 .width = width,
+                                 .height = height,
+                                 .sigma_px = sigma,
+                                 .origin_x_px = ip->view.origin_x_px,
+                                 .origin_y_px = ip->view.origin_y_px,
+                                 .binning = frame->binning};
     if (ip->smeared) {
         bst_locate_roughly(&ip->locator, &ip->view, &ip->candidates);
     } else {
@@ -450,4 +461,53 @@ double bst_imgproc_streak_px(const bst_imgproc *ip) {
 
 bool bst_imgproc_smeared(const bst_imgproc *ip) {
     return ip->smeared;
+}
+
+bst_stack_frame bst_imgproc_stack_frame(const bst_imgproc *ip, double time_s,
+                                        bst_quat q_cam_from_gcrf) {
+    bst_stack_frame frame = ip->left;
+    frame.time_s = time_s;
+    frame.q_cam_from_gcrf = q_cam_from_gcrf;
+    return frame;
+}
+
+void bst_imgproc_append_stack(const bst_imgproc *ip, const bst_stack_found *found, int count,
+                              double reach_px, bst_detections *out, int capacity) {
+    int before = out->count;
+    for (int i = 0; i < count; i++) {
+        const bst_stack_found *f = &found[i];
+        double reach = fmax(reach_px, 3.0 * sqrt(fmax(f->cov_xx, f->cov_yy)));
+        bool known = false;
+        for (int k = 0; k < before && !known; k++) {
+            known = hypot(out->items[k].x_px - f->x_px, out->items[k].y_px - f->y_px) < reach;
+        }
+        if (known) {
+            continue;
+        }
+        if (out->count == capacity) {
+            out->lost++;
+            continue;
+        }
+        bst_detection *d = &out->items[out->count++];
+        double width = 2.3548200450309493 * ip->left.sigma_px * ip->left.binning;
+        *d = (bst_detection){.x_px = f->x_px,
+                             .y_px = f->y_px,
+                             .cov_xx = f->cov_xx,
+                             .cov_xy = f->cov_xy,
+                             .cov_yy = f->cov_yy,
+                             .flux_e = f->flux_e,
+                             .flux_sigma_e = f->flux_sigma_e,
+                             .snr = f->snr,
+                             .length_px = width,
+                             .width_px = width,
+                             .flags = BST_DETECTION_STACK,
+                             .label = f->at_rest ? BST_LABEL_STAR : BST_LABEL_OBJECT,
+                             .label_probability = 0.9,
+                             .rate_x_pxps = f->rate_x_pxps,
+                             .rate_y_pxps = f->rate_y_pxps,
+                             .rate_sigma_pxps = f->rate_sigma_pxps};
+        double rate = f->flux_e / fmax(ip->exposure_s, 1e-9);
+        d->v_mag = -2.5 * log10(rate / ip->electrons_per_s_v0);
+        d->v_mag_sigma = 2.5 / log(10.0) * f->flux_sigma_e / f->flux_e;
+    }
 }

@@ -22,10 +22,9 @@ static const double WIDTH_FIT_SNR = 20.0; /* from here the widening is measured 
  * streak's by no more than the other two: both shapes are tried */
 static const double CLOSE_SHARE = 0.8, CLEAR_CHI = 3.0, CLEAR_SHARE = 0.04;
 
-bst_status bst_locator_create(bst_ctx *ctx, bst_parallel *pool, int capacity, int max_width,
+bst_status bst_locator_create(bst_ctx *ctx, int threads, int capacity, int max_width,
                               int max_height, int max_side, bst_locator *out) {
-    int threads = bst_parallel_threads(pool);
-    *out = (bst_locator){.pool = pool,
+    *out = (bst_locator){.threads = threads,
                          .max_side = max_side,
                          .capacity = capacity,
                          .columns = max_width / BST_LOCATE_CELL_PX + 1,
@@ -63,7 +62,7 @@ void bst_locator_free(bst_locator *l) {
     free(l->chosen);
     free(l->cell);
     free(l->charged);
-    for (int i = 0; l->fits && i < bst_parallel_threads(l->pool); i++) {
+    for (int i = 0; l->fits && i < l->threads; i++) {
         bst_fit_free(&l->fits[i]);
     }
     free(l->fits);
@@ -261,7 +260,7 @@ static void do_some(void *user, int begin, int end) {
 static void do_all(bst_locator *l, const bst_locate_frame *f, int first, int end,
                    void (*each)(const bst_worker *, int, bst_found *)) {
     loop p = {l, f, NULL, each, first};
-    bst_parallel_for(l->pool, end - first, FITS_A_TIME, do_some, &p);
+    bst_parallel_for(f->pool, end - first, FITS_A_TIME, do_some, &p);
     for (int i = first; i < end; i++) {
         l->found[i] = l->next[i];
         note_length(l, &l->found[i].source.shape);
@@ -385,7 +384,7 @@ void bst_locate(bst_locator *l, const bst_locate_frame *f, const bst_candidates 
     int fits = l->most_fits > 0 && l->most_fits < l->count ? l->most_fits : l->count;
     choose(l, candidates, fits);
     loop p = {l, f, candidates, NULL, 0};
-    bst_parallel_for(l->pool, l->count, STARTS_A_TIME, start_some, &p);
+    bst_parallel_for(f->pool, l->count, STARTS_A_TIME, start_some, &p);
     for (int i = 0; i < l->count; i++) {
         note_length(l, &l->found[i].source.shape);
     }
@@ -447,5 +446,5 @@ void bst_locate_roughly(bst_locator *l, const bst_locate_frame *f,
     l->count = candidates->count < l->capacity ? candidates->count : l->capacity;
     choose(l, candidates, l->count);
     loop p = {l, f, candidates, NULL, 0};
-    bst_parallel_for(l->pool, l->count, STARTS_A_TIME, start_roughly, &p);
+    bst_parallel_for(f->pool, l->count, STARTS_A_TIME, start_roughly, &p);
 }

@@ -50,8 +50,8 @@ typedef struct bst_top_law {
 typedef struct bst_locator {
     bst_psf psf;
     bst_profiles profiles;
-    bst_parallel *pool;
     bst_fit *fits; /* one for each thread */
+    int threads;
     bst_borrow lent;
     bst_sharpness sharpness;
     bst_top_law law[2]; /* of a point, and of a star's streak on the middle of the frame */
@@ -79,13 +79,14 @@ typedef struct bst_locate_frame {
     const bst_motion *motion; /* NULL: stars are points */
     const bst_camera *camera;
     double origin_x_px, origin_y_px, binning; /* full-sensor = origin + binning * frame pixel */
+    bst_parallel *pool;                       /* for the loops; NULL: the caller's thread */
 } bst_locate_frame;
 
 /* Squares of the frame that the found ones are kept by, px. */
 enum { BST_LOCATE_CELL_PX = 16 };
 
-/* `pool` is borrowed. */
-bst_status bst_locator_create(bst_ctx *ctx, bst_parallel *pool, int capacity, int max_width,
+/* For loops on up to `threads` threads. */
+bst_status bst_locator_create(bst_ctx *ctx, int threads, int capacity, int max_width,
                               int max_height, int max_side, bst_locator *out) BST_MUST_CHECK;
 void bst_locator_free(bst_locator *locator);
 
