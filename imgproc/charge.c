@@ -15,6 +15,10 @@ static int find_charge(const bst_locator *l, const bst_locate_frame *f, const bs
         int r = round < 0 ? reach_px : 1;
         for (int v = y - r; v <= y + r; v++) {
             for (int u = x - r; u <= x + r && count < MAX_CHARGE; u++) {
+                if (!bst_sharpness_is_open(&l->sharpness, f->signal, f->width, f->height,
+                                           (float)found->noise_e, u, v)) {
+                    continue;
+                }
                 double sharp = bst_sharpness_at(&l->sharpness, f->signal, f->width, f->height,
                                                 found->noise_e, u, v);
                 bool known = false;
