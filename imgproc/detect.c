@@ -6,11 +6,17 @@
 #include "imgproc/locate.h"
 #include "imgproc/rows.h"
 #include "imgproc/streak_locate.h"
+#include "imgproc/streak_motion.h"
 #include "imgproc/tail.h"
 #include "sim/core/pages.h"
 
 /* Maxima are looked at in between the pixels from this share of the threshold on at the least. */
 static const double LOOK_SHARE = 0.65;
+/* Bend of the stars' path that jitter of 1 px RMS has: that of noise that is flat from 2.5 to 100
+ * cycles an exposure. */
+static const double JITTER_BEND = 0.075;
+/* What telemetry may not know of the camera's motion: drift, in px an exposure. */
+static const double DRIFT_PX = 1.0;
 /* Above the threshold by this no skewness of noise matters. */
 static const double CERTAIN_ABOVE = 1.5;
 
@@ -27,6 +33,7 @@ struct bst_imgproc {
     bst_filter filter;
     bst_candidates candidates;
     bst_locator locator;
+    bst_streak_motion streak_motion;
     bst_streak_locator streaks; /* only when config.streak_search_px > 0 */
     bst_parallel *pool;
     int *order, *order_swap, *row;
@@ -87,6 +94,7 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     BST_TRY(bst_locator_create(ctx, bst_parallel_threads(ip->pool), capacity, width, height, side,
                                &ip->locator));
     ip->locator.most_fits = (int)ip->config.most_fits;
+    BST_TRY(bst_streak_motion_create(ctx, side, &ip->streak_motion));
     return ip->config.streak_search_px > 0.0
                ? bst_streak_locator_create(ctx, &ip->locator.psf, ip->pool, width, height, fwhm,
                                            ip->config.streak_search_px, &ip->streaks)
@@ -138,6 +146,7 @@ void bst_imgproc_free(bst_imgproc *ip) {
     bst_filter_free(&ip->filter);
     bst_candidates_free(&ip->candidates);
     bst_locator_free(&ip->locator);
+    bst_streak_motion_free(&ip->streak_motion);
     bst_streak_locator_free(&ip->streaks);
     bst_parallel_free(ip->pool);
     free(ip);
@@ -394,6 +403,16 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
                                  .origin_x_px = ip->view.origin_x_px,
                                  .origin_y_px = ip->view.origin_y_px,
                                  .binning = frame->binning};
+    if (motion && !ip->smeared) {
+        double bend_px = hypot(JITTER_BEND * ip->config.jitter_px,
+                               motion->bend_sigma_rad / bst_camera_scale_rad(&ip->camera));
+        bst_motion measured = *motion;
+        if (bst_streak_motion_measure(&ip->streak_motion, &ip->locator.psf, &ip->view,
+                                      &ip->candidates, DRIFT_PX / frame->binning,
+                                      bend_px / frame->binning, &measured)) {
+            ip->motion = measured;
+        }
+    }
     if (ip->smeared) {
         bst_locate_roughly(&ip->locator, &ip->view, &ip->candidates);
     } else {

@@ -253,7 +253,7 @@ static bst_status identify(imgproc_module *m, const lane *l, bst_ctx *ctx,
 /* The camera's motion as telemetry tells it; false: not known. */
 static bool motion_of(struct bst_step *step, const bst_frame_message *message, bst_motion *motion) {
     bst_sample pointing = bst_step_latest(step, PORT_POINTING);
-    *motion = (bst_motion){BST_QUAT_IDENTITY, {0, 0, 0}, {0, 0, 0}};
+    *motion = (bst_motion){.q_cam_from_gcrf = BST_QUAT_IDENTITY};
     return pointing.payload && !pointing.stale &&
            bst_motion_from_telemetry(pointing.payload, message->start_tick, message->end_tick,
                                      motion);
