@@ -407,8 +407,8 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
         double bend_px = hypot(JITTER_BEND * ip->config.jitter_px,
                                motion->bend_sigma_rad / bst_camera_scale_rad(&ip->camera));
         bst_motion measured = *motion;
-        if (bst_streak_motion_measure(&ip->streak_motion, &ip->locator.psf, &ip->view,
-                                      &ip->candidates, DRIFT_PX / frame->binning,
+        if (bst_streak_motion_measure(&ip->streak_motion, &ip->locator.psf, &ip->locator.profiles,
+                                      &ip->view, &ip->candidates, DRIFT_PX / frame->binning,
                                       bend_px / frame->binning, &measured)) {
             ip->motion = measured;
         }
