@@ -35,6 +35,7 @@ struct bst_imgproc {
     bst_streak_locator streaks; /* only when config.streak_search_px > 0 */
     bst_parallel *pool;
     int *order;
+    uint16_t *cropped; /* a window's pixels */
     /* of the latest frame */
     double exposure_s, binning, streak_px;
     bool smeared;
@@ -74,7 +75,8 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     int capacity = (int)ip->config.capacity;
     ip->electrons = calloc((size_t)width * (size_t)height, sizeof(float));
     ip->order = calloc((size_t)capacity, sizeof(int));
-    if (!ip->electrons || !ip->order) {
+    ip->cropped = calloc((size_t)width * (size_t)height, sizeof *ip->cropped);
+    if (!ip->electrons || !ip->order || !ip->cropped) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a frame of %d x %d", width, height);
     }
     BST_TRY(make_bad_map(ctx, ip));
@@ -131,6 +133,7 @@ void bst_imgproc_free(bst_imgproc *ip) {
     free(ip->bad);
     free(ip->electrons);
     free(ip->order);
+    free(ip->cropped);
     bst_background_free(&ip->background);
     bst_filter_free(&ip->filter);
     bst_candidates_free(&ip->candidates);
@@ -308,9 +311,17 @@ static bst_detection report(const bst_imgproc *ip, const bst_locate_frame *f,
     return d;
 }
 
-bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
-                              const bst_motion *motion, bst_detections *out, int capacity) {
-    BST_TRY(check_frame(ctx, ip, frame));
+/* A frame, or a window of one, with its candidates found. */
+typedef struct part {
+    bst_locate_frame view;
+    double threshold, false_alarms;
+    bool search;
+} part;
+
+/* Finds the candidates of `frame`. `whole` is the frame of which it is a window, itself else: the
+ * density of false alarms and the filter are the whole frame's. */
+static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgproc_frame *whole,
+                 const bst_motion *motion, bst_parallel *pool, part *out) {
     int width = frame->window.width / frame->binning;
     int height = frame->window.height / frame->binning;
     double sigma = hypot(bst_camera_psf_sigma_px(&ip->camera), ip->config.jitter_px);
@@ -321,20 +332,19 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
     reader read = {ip, frame, width};
     double gain = ip->camera.gain_e_per_dn, read_noise = ip->camera.read_noise_e;
     double read_variance = read_noise * read_noise + gain * gain / 12.0;
-    /* a pool that has to wait for processors is slower than one thread that has one */
-    bool alone = frame->beside_another && bst_parallel_threads(ip->pool) <= BST_STEP_LANES;
-    bst_parallel *pool = alone ? NULL : ip->pool;
     bst_background_read(&ip->background, pool, read_electrons, &read, width, height,
                         (float)ip->camera.gain_e_per_dn, read_variance);
     double dx, dy;
-    filter_path(ip, frame, motion, &dx, &dy);
+    filter_path(ip, whole, motion, &dx, &dy);
     ip->streak_px = hypot(dx, dy) * frame->binning;
     bst_filter_set(&ip->filter, sigma, dx, dy);
     /* stars are points: what else there is may be a streak */
-    bool search = ip->config.streak_search_px > 0.0 && !ip->filter.streak && !ip->smeared;
+    bool search =
+        ip->config.streak_search_px > 0.0 && !ip->filter.streak && !ip->smeared && frame == whole;
+    double pixels = (double)(whole->window.width / whole->binning) *
+                    (double)(whole->window.height / whole->binning);
     double false_alarms = (search ? 0.5 : 1.0) * ip->config.false_alarms_per_frame;
-    double threshold =
-        bst_filter_threshold(&ip->filter, false_alarms, (double)width * (double)height);
+    double threshold = bst_filter_threshold(&ip->filter, false_alarms, pixels);
     double look = ip->smeared ? threshold : fmax(0.93 * ip->filter.corner, LOOK_SHARE) * threshold;
     bst_filter_run(&ip->filter, pool, &ip->background, read_electrons, &read, frame->pixels,
                    ip->electrons, width, height, saturation_dn(ip, frame), (float)look);
@@ -343,38 +353,43 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
     bst_candidates_find(&ip->candidates, pool, &ip->filter,
                         (int)ceil(6.0 * sigma + hypot(dx, dy)) + 2, (float)look, (float)certain,
                         stands_out, &noise);
-    bst_locate_frame view = {.signal = ip->electrons,
-                             .width = width,
-                             .height = height,
-                             .background = &ip->background,
-                             .filter = &ip->filter,
-                             .sigma_px = sigma,
-                             .motion = motion,
-                             .camera = &ip->camera,
-                             .binning = frame->binning};
-    view.origin_x_px = frame->window.x0 + 0.5 * (frame->binning - 1);
-    view.origin_y_px = frame->window.y0 + 0.5 * (frame->binning - 1);
-    bst_motion measured;
-    if (motion && !ip->smeared) {
-        measured = *motion;
-        double bend_px = hypot(JITTER_BEND * ip->config.jitter_px,
-                               motion->bend_sigma_rad / bst_camera_scale_rad(&ip->camera));
-        if (bst_streak_motion_measure(&ip->streak_motion, &ip->locator.psf, &view, &ip->candidates,
-                                      DRIFT_PX / frame->binning, bend_px / frame->binning,
-                                      &measured)) {
-            view.motion = &measured;
-        }
-    }
-    if (ip->smeared) {
-        bst_locate_roughly(&ip->locator, &view, &ip->candidates);
-    } else {
-        bst_locate(&ip->locator, &view, &ip->candidates);
-    }
+    *out = (part){.view = {.signal = ip->electrons,
+                           .width = width,
+                           .height = height,
+                           .background = &ip->background,
+                           .filter = &ip->filter,
+                           .sigma_px = sigma,
+                           .motion = motion,
+                           .camera = &ip->camera,
+                           .binning = frame->binning,
+                           .origin_x_px = frame->window.x0 + 0.5 * (frame->binning - 1),
+                           .origin_y_px = frame->window.y0 + 0.5 * (frame->binning - 1)},
+                  .threshold = threshold,
+                  .false_alarms = false_alarms,
+                  .search = search};
+}
 
-    int kept = 0, room = capacity < ip->locator.capacity ? capacity : ip->locator.capacity;
+/* The motion that the streaks added to ip->streak_motion show. */
+static bool corrected(bst_imgproc *ip, const bst_motion *motion, double binning, bst_motion *out) {
+    double bend_px = hypot(JITTER_BEND * ip->config.jitter_px,
+                           motion->bend_sigma_rad / bst_camera_scale_rad(&ip->camera));
+    *out = *motion;
+    return bst_streak_motion_solve(&ip->streak_motion, &ip->locator.psf, &ip->camera,
+                                   DRIFT_PX / binning, bend_px / binning, out);
+}
+
+/* Locates the candidates of a part and adds them to `out`. */
+static void take(bst_imgproc *ip, const part *p, bst_detections *out, int capacity) {
+    if (ip->smeared) {
+        bst_locate_roughly(&ip->locator, &p->view, &ip->candidates);
+    } else {
+        bst_locate(&ip->locator, &p->view, &ip->candidates);
+    }
+    int kept = 0, room = capacity - out->count;
+    room = room < ip->locator.capacity ? room : ip->locator.capacity;
     int lost = ip->candidates.count - ip->locator.count;
-    if (search) {
-        bst_streak_locate(&ip->streaks, &view, &ip->candidates, false_alarms, &ip->locator);
+    if (p->search) {
+        bst_streak_locate(&ip->streaks, &p->view, &ip->candidates, p->false_alarms, &ip->locator);
     }
     for (int i = 0; i < ip->locator.count; i++) {
         if (ip->locator.found[i].dropped) {
@@ -387,14 +402,96 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
         }
     }
     bst_heapsort_indices(ip->order, kept, before_on_sensor, ip->locator.found);
+    for (int i = 0; i < kept; i++) {
+        out->items[out->count++] = report(ip, &p->view, &ip->locator.found[ip->order[i]]);
+    }
+    out->lost += lost;
+}
+
+static void empty(bst_detections *out) {
+    out->background_e = out->noise_e = out->threshold_snr = 0.0;
+    out->stars_identified = 0;
+    out->count = 0;
+    out->lost = 0;
+}
+
+bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
+                              const bst_motion *motion, bst_detections *out, int capacity) {
+    BST_TRY(check_frame(ctx, ip, frame));
+    /* a pool that has to wait for processors is slower than one thread that has one */
+    bool alone = frame->beside_another && bst_parallel_threads(ip->pool) <= BST_STEP_LANES;
+    part whole;
+    bst_motion measured;
+    empty(out);
+    find(ip, frame, frame, motion, alone ? NULL : ip->pool, &whole);
+    if (!ip->smeared && bst_streak_motion_begin(&ip->streak_motion, &whole.view)) {
+        bst_streak_motion_add(&ip->streak_motion, &whole.view, &ip->candidates);
+        if (corrected(ip, motion, frame->binning, &measured)) {
+            whole.view.motion = &measured;
+        }
+    }
+    take(ip, &whole, out, capacity);
     out->background_e = (double)ip->background.median_level;
     out->noise_e = (double)ip->background.median_noise;
-    out->threshold_snr = threshold;
-    out->stars_identified = 0;
-    out->count = kept;
-    out->lost = lost;
-    for (int i = 0; i < kept; i++) {
-        out->items[i] = report(ip, &view, &ip->locator.found[ip->order[i]]);
+    out->threshold_snr = whole.threshold;
+    return BST_OK;
+}
+
+/* The pixels of one window, as a frame of its own. */
+static bst_imgproc_frame crop(bst_imgproc *ip, const bst_imgproc_frame *frame,
+                              const bst_window *w) {
+    int b = frame->binning, stride = frame->window.width / b;
+    size_t x = (size_t)((w->x0 - frame->window.x0) / b),
+           y = (size_t)((w->y0 - frame->window.y0) / b);
+    size_t width = (size_t)(w->width / b), height = (size_t)(w->height / b);
+    for (size_t j = 0; j < height; j++) {
+        memcpy(ip->cropped + j * width, frame->pixels + (y + j) * (size_t)stride + x,
+               width * sizeof *ip->cropped);
+    }
+    bst_imgproc_frame window = *frame;
+    window.pixels = ip->cropped;
+    window.window = *w;
+    return window;
+}
+
+bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
+                                      const bst_window *windows, int count,
+                                      const bst_motion *motion, bst_detections *out, int capacity) {
+    BST_TRY(check_frame(ctx, ip, frame));
+    double pixels = 0.0;
+    bool measure = false;
+    const bst_motion *used = motion;
+    bst_motion measured;
+    part p;
+    empty(out);
+    for (int pass = 0; pass < 2; pass++) {
+        for (int i = 0; i < count; i++) {
+            bst_imgproc_frame window = crop(ip, frame, &windows[i]);
+            find(ip, &window, frame, used, NULL, &p);
+            if (pass == 0 && i == 0) {
+                measure = !ip->smeared && bst_streak_motion_begin(&ip->streak_motion, &p.view);
+                if (!measure) {
+                    pass = 1;
+                }
+            }
+            if (pass == 0) {
+                bst_streak_motion_add(&ip->streak_motion, &p.view, &ip->candidates);
+                continue;
+            }
+            take(ip, &p, out, capacity);
+            double n = (double)windows[i].width * (double)windows[i].height;
+            pixels += n;
+            out->background_e += n * (double)ip->background.median_level;
+            out->noise_e += n * (double)ip->background.median_noise;
+            out->threshold_snr = p.threshold;
+        }
+        if (pass == 0 && measure && corrected(ip, motion, frame->binning, &measured)) {
+            used = &measured;
+        }
+    }
+    if (pixels > 0.0) {
+        out->background_e /= pixels;
+        out->noise_e /= pixels;
     }
     return BST_OK;
 }

@@ -2,6 +2,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* Streaks fainter than this say nothing beside bright ones. */
 static const double LEAST_SNR = 20.0;
@@ -16,7 +17,7 @@ enum { COMMON = BST_STREAK_MOTION_COUNT, LOCAL = 4, HELD = 1, ROUNDS = 5 };
 /* Brightest candidates among which stars that stand alone are looked for. */
 enum { LOOKED_AT = 16 * BST_STREAK_MOTION_STARS };
 
-typedef struct star {
+typedef struct bst_streak_motion_star {
     bst_shape shape;
     bst_stamp stamp;
     double flux_e, product_e; /* flux; flux times widening */
@@ -26,17 +27,27 @@ typedef struct star {
     double step[1 + COMMON][LOCAL];
     /* of the motion, the local parameters eliminated */
     double information[COMMON][COMMON], gradient[COMMON];
+    const float *signal; /* [stamp.height][stamp.width] */
     bool used;
 } star;
 
 bst_status bst_streak_motion_create(bst_ctx *ctx, int max_side, bst_streak_motion *out) {
-    out->max_pixels = max_side * max_side;
-    out->render = calloc((size_t)out->max_pixels * (4 + COMMON), sizeof *out->render);
-    return out->render ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory to measure motion");
+    size_t pixels = (size_t)max_side * (size_t)max_side;
+    *out = (bst_streak_motion){.max_pixels = max_side * max_side};
+    out->render = calloc(pixels * (4 + COMMON), sizeof *out->render);
+    out->signal = calloc(pixels * BST_STREAK_MOTION_STARS, sizeof *out->signal);
+    out->stars = calloc(BST_STREAK_MOTION_STARS, sizeof *out->stars);
+    if (!out->render || !out->signal || !out->stars) {
+        bst_streak_motion_free(out);
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory to measure motion");
+    }
+    return BST_OK;
 }
 
 void bst_streak_motion_free(bst_streak_motion *work) {
     free(work->render);
+    free(work->signal);
+    free(work->stars);
     *work = (bst_streak_motion){0};
 }
 
@@ -76,24 +87,25 @@ static double reach(const bst_locate_frame *f) {
 }
 
 static bool start_star(const bst_streak_motion *work, const bst_locate_frame *f,
-                       const bst_candidates *candidates, int rank, const bst_shape *path,
-                       star *out) {
+                       const bst_candidates *candidates, int rank, star *out) {
     const bst_candidate *c = &candidates->items[candidates->order[rank]];
     if (!(c->snr > bst_filter_point_at(f->filter, c->x, c->y))) {
         return false;
     }
-    *out = (star){.shape = *path, .start_x = c->x, .start_y = c->y, .used = true};
-    out->shape.x_px = c->x;
-    out->shape.y_px = c->y;
+    bst_shape shape = {.x_px = c->x, .y_px = c->y, .sigma_px = f->sigma_px};
     bst_motion_streak(f->motion, f->camera, f->origin_x_px + f->binning * c->x,
-                      f->origin_y_px + f->binning * c->y, &out->shape.dx_px, &out->shape.dy_px);
-    out->shape.dx_px /= f->binning;
-    out->shape.dy_px /= f->binning;
+                      f->origin_y_px + f->binning * c->y, &shape.dx_px, &shape.dy_px);
+    bst_motion_bend(f->motion, f->camera, &shape.bend_x_px, &shape.bend_y_px);
+    shape.dx_px /= f->binning;
+    shape.dy_px /= f->binning;
+    shape.bend_x_px /= f->binning;
+    shape.bend_y_px /= f->binning;
+    *out = (star){.shape = shape, .start_x = c->x, .start_y = c->y, .used = true};
     out->noise_e = bst_background_noise_at(f->background, c->x, c->y);
     out->flux_e = (double)c->snr * out->noise_e / f->filter->streak_norm;
-    bst_source source = {.shape = out->shape};
+    bst_source source = {.shape = shape};
     out->stamp = bst_fit_stamp(&source, reach(f), BST_PSF_MAX_SIDE, f->width, f->height);
-    double margin = 0.5 * hypot(out->shape.dx_px, out->shape.dy_px);
+    double margin = 0.5 * hypot(shape.dx_px, shape.dy_px);
     return out->stamp.width * out->stamp.height <= work->max_pixels &&
            is_alone(f, candidates, rank, &out->stamp, margin);
 }
@@ -130,19 +142,15 @@ static bool solve(int n, double a[LOCAL][LOCAL], int count, double x[][LOCAL]) {
 }
 
 /* Normal equations of one star at the present motion. */
-static bool accumulate(const bst_streak_motion *work, const bst_psf *psf, const bst_locate_frame *f,
-                       double ex, double ey, star *s) {
+static bool accumulate(const bst_streak_motion *work, const bst_psf *psf, star *s) {
     size_t n = (size_t)s->stamp.width * (size_t)s->stamp.height;
     double *m = work->render, *const by_motion[COMMON] = {m + 4 * n, m + 5 * n, m + 6 * n};
-    bst_psf_render_motion(psf, &s->shape, &s->stamp, ex, ey, m, m + n, m + 2 * n, m + 3 * n,
-                          by_motion);
+    bst_psf_render_motion(psf, &s->shape, &s->stamp, work->ex, work->ey, m, m + n, m + 2 * n,
+                          m + 3 * n, by_motion);
     double a[LOCAL][LOCAL] = {{0}}, right[1 + COMMON][LOCAL] = {{0}};
     double common[COMMON][COMMON] = {{0}}, g[COMMON] = {0};
     for (size_t i = 0; i < n; i++) {
-        size_t y = i / (size_t)s->stamp.width, x = i % (size_t)s->stamp.width;
-        double value =
-            (double)
-                f->signal[((size_t)s->stamp.y0 + y) * (size_t)f->width + (size_t)s->stamp.x0 + x];
+        double value = (double)s->signal[i];
         double total = s->flux_e * m[i] + s->product_e * m[3 * n + i];
         double weight = 1.0 / (s->noise_e * s->noise_e + fmax(total, 0.0));
         double r = value - total;
@@ -265,43 +273,59 @@ static void reject(star *stars, int count, const double step[COMMON]) {
     }
 }
 
-bool bst_streak_motion_measure(bst_streak_motion *work, const bst_psf *psf,
-                               const bst_locate_frame *f, const bst_candidates *candidates,
-                               double length_px, double bend_px, bst_motion *motion) {
+bool bst_streak_motion_begin(bst_streak_motion *work, const bst_locate_frame *f) {
+    work->count = 0;
     if (!f->motion || !f->filter->streak) {
         return false;
     }
-    bst_shape path = {.sigma_px = f->sigma_px};
-    bst_motion_streak(f->motion, f->camera, f->origin_x_px + 0.5 * f->binning * f->width,
-                      f->origin_y_px + 0.5 * f->binning * f->height, &path.dx_px, &path.dy_px);
-    bst_motion_bend(f->motion, f->camera, &path.bend_x_px, &path.bend_y_px);
-    path.bend_x_px /= f->binning;
-    path.bend_y_px /= f->binning;
-    double length = hypot(path.dx_px, path.dy_px);
-    double ex = path.dx_px / length, ey = path.dy_px / length;
-    double bend = f->binning * hypot(path.bend_x_px, path.bend_y_px);
-    if (!(length >= LEAST_PATH_SIGMAS * f->sigma_px * f->binning) || bend > MOST_BEND * length) {
-        return false;
-    }
-    star stars[BST_STREAK_MOTION_STARS];
-    int count = 0;
-    for (int k = 0; k < candidates->count && k < LOOKED_AT && count < BST_STREAK_MOTION_STARS;
-         k++) {
-        if ((double)candidates->items[candidates->order[k]].snr < LEAST_SNR) {
+    double dx, dy, bend_x, bend_y, b = f->binning;
+    bst_motion_streak(f->motion, f->camera, bst_camera_centre_x(f->camera),
+                      bst_camera_centre_y(f->camera), &dx, &dy);
+    bst_motion_bend(f->motion, f->camera, &bend_x, &bend_y);
+    double length = hypot(dx, dy);
+    work->ex = dx / length;
+    work->ey = dy / length;
+    work->binning = b;
+    return length >= LEAST_PATH_SIGMAS * f->sigma_px * b &&
+           hypot(bend_x, bend_y) <= MOST_BEND * length;
+}
+
+void bst_streak_motion_add(bst_streak_motion *work, const bst_locate_frame *f,
+                           const bst_candidates *candidates) {
+    for (int k = 0; k < candidates->count && k < LOOKED_AT; k++) {
+        if (work->count == BST_STREAK_MOTION_STARS ||
+            (double)candidates->items[candidates->order[k]].snr < LEAST_SNR) {
             break;
         }
-        count += start_star(work, f, candidates, k, &path, &stars[count]);
+        star *s = &work->stars[work->count];
+        if (!start_star(work, f, candidates, k, s)) {
+            continue;
+        }
+        float *signal = work->signal + (size_t)work->count * (size_t)work->max_pixels;
+        for (int j = 0; j < s->stamp.height; j++) {
+            memcpy(signal + (size_t)j * (size_t)s->stamp.width,
+                   f->signal + (size_t)(s->stamp.y0 + j) * (size_t)f->width + (size_t)s->stamp.x0,
+                   (size_t)s->stamp.width * sizeof *signal);
+        }
+        s->signal = signal;
+        work->count++;
     }
+}
+
+bool bst_streak_motion_solve(bst_streak_motion *work, const bst_psf *psf, const bst_camera *camera,
+                             double length_px, double bend_px, bst_motion *motion) {
+    star *stars = work->stars;
+    int count = work->count, left = 0;
+    double ex = work->ex, ey = work->ey, b = work->binning;
     /* what is known exactly leaves the matrix well conditioned */
     const double least = 1e-4;
     const double sigma[COMMON] = {fmax(length_px, least), fmax(length_px, least),
                                   fmax(bend_px, least)};
     double away[COMMON] = {0};
-    int left = 0;
     for (int round = 0; round < ROUNDS; round++) {
         double step[COMMON] = {0};
         for (int i = 0; i < count; i++) {
-            stars[i].used = stars[i].used && accumulate(work, psf, f, ex, ey, &stars[i]);
+            stars[i].used = stars[i].used && accumulate(work, psf, &stars[i]);
         }
         if (round >= HELD && !agree(stars, count, sigma, away, step)) {
             return false;
@@ -324,8 +348,7 @@ bool bst_streak_motion_measure(bst_streak_motion *work, const bst_psf *psf,
     if (left == 0) {
         return false;
     }
-    bst_motion_add(motion, f->camera, f->binning * (away[0] * ex - away[1] * ey),
-                   f->binning * (away[0] * ey + away[1] * ex), f->binning * away[2] * ex,
-                   f->binning * away[2] * ey);
+    bst_motion_add(motion, camera, b * (away[0] * ex - away[1] * ey),
+                   b * (away[0] * ey + away[1] * ex), b * away[2] * ex, b * away[2] * ey);
     return true;
 }
