@@ -46,9 +46,12 @@ const bst_config_desc bst_imgproc_config_table[] = {
             "star's streak come on top."),
     BST_INT(bst_imgproc_config, window_stars, "", 3, 64, "16",
             "track_windows: bright stars that are looked at, for the attitude."),
-    BST_INT(bst_imgproc_config, full_every, "", 1, 1000000, "10",
-            "track_windows: one frame of so many is looked at as a whole, for all that no track "
-            "predicts."),
+    BST_INT(bst_imgproc_config, full_every, "", 1, 1000000, "60",
+            "track_windows: of so many frames ..."),
+    BST_INT(
+        bst_imgproc_config, full_frames, "", 0, 1000000, "6",
+        "... the first so many are looked at as a whole, for all that no track predicts: enough "
+        "in a row to confirm a track."),
     BST_INT(
         bst_imgproc_config, threads, "", 0, 32, "0",
         "Threads that share the passes over a frame and the fits; 0: one per processor. Results do "
@@ -233,7 +236,7 @@ static bst_status plan_windows(imgproc_module *m, bst_ctx *ctx, const lane *l,
                                const bst_quat *q_cam_from_gcrf, bool *use) {
     *use = false;
     m->windows.count = 0;
-    if (!l->ip || message->exposure_id % m->config->full_every == 0) {
+    if (!l->ip || message->exposure_id % m->config->full_every < m->config->full_frames) {
         return BST_OK;
     }
     bst_light light = {nav->velocity_bary_mps, nav->sun_m};
@@ -431,11 +434,13 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
     }
 
     m->windows.count = 0;
+    out->windows = 0;
     if (m->config->track_windows && locked && nav.payload && !nav.stale) {
         bool use;
         BST_TRY(plan_windows(m, ctx, l, message, &motion, nav.payload, predictions,
                              &out->q_cam_from_gcrf, &use));
         m->windows.count = use ? m->windows.count : 0;
+        out->windows = m->windows.count;
     }
     BST_TRY(detections_of(ctx, m, l, message, oriented ? &motion : NULL, out, capacity));
     bool smeared = bst_imgproc_smeared(l->ip);

@@ -184,7 +184,9 @@ static void predict(bst_mtt *m, const bst_mtt_frame *frame) {
         if (forward && shares_acceleration(m, track, frame)) {
             shift(track, frame, step, rate);
         }
-        m->observable[t] = !frame->in_field || frame->in_field(frame->user, track->state.direction);
+        m->observable[t] =
+            !(frame->partial && track->status == BST_TRACK_TENTATIVE) &&
+            (!frame->in_field || frame->in_field(frame->user, track->state.direction));
     }
     bst_mtt_predict_memory(m, dt);
     for (int i = 0; forward && i < m->memory_count; i++) {
@@ -434,7 +436,7 @@ void bst_mtt_step(bst_mtt *m, const bst_mtt_frame *frame) {
     double floor = m->params.false_alarms_per_frame;
     m->clutter_density = fmax(m->clutter, floor) / m->params.field_sr;
     m->alarm_density = fmax(m->alarms, floor) / m->params.field_sr;
-    bst_mtt_associate(m);
+    bst_mtt_associate(m, frame->partial);
     int unused = 0;
     for (int t = 0; t < m->track_count; t++) {
         m->tracks[t].last_chi2 = -1.0;
@@ -443,7 +445,7 @@ void bst_mtt_step(bst_mtt *m, const bst_mtt_frame *frame) {
     for (int i = 0; i < m->now.count; i++) {
         unused += !m->now.used[i];
     }
-    m->clutter += 0.1 * (unused - m->clutter);
+    m->clutter += frame->partial ? 0.0 : 0.1 * (unused - m->clutter);
     judge(m, frame);
     bst_mtt_initiate(m, frame);
     remember(m);

@@ -114,6 +114,9 @@ typedef struct bst_mtt_frame {
     double seconds; /* the same, since the epoch */
     const bst_mtt_detection *detections;
     int count;
+    /* Only windows round the confirmed tracks were looked at: tentative tracks are not missed, and
+     * nothing is learnt of clutter. */
+    bool partial;
     /* Is a geometric direction on the sensor, well away from its edge? NULL: everything is. */
     bool (*in_field)(const void *user, bst_vec3 direction);
     const void *user;

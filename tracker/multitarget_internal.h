@@ -70,7 +70,7 @@ void bst_mtt_pool_range(const bst_mtt_pool *pool, bst_vec3 direction, double cho
                         int *end);
 
 /* Fills detection_of_track, shared and extra for the tracks of this frame (already predicted). */
-void bst_mtt_associate(bst_mtt *mtt);
+void bst_mtt_associate(bst_mtt *mtt, bool partial);
 
 /* Detections in the gate of track t that no other confirmed track has: at most BST_MTT_CANDIDATES,
  * the likeliest. Returns their number. */

@@ -535,6 +535,7 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
     bst_mtt_frame frame = {.tick = tick,
                            .seconds = seconds,
                            .detections = t->detections,
+                           .partial = d->windows > 0,
                            .in_field = in_field,
                            .expected = is_expected,
                            .user = &view,
