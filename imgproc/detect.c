@@ -9,6 +9,7 @@
 #include "imgproc/streak_locate.h"
 #include "imgproc/streak_motion.h"
 #include "imgproc/tail.h"
+#include "sim/core/pages.h"
 
 /* Maxima are looked at in between the pixels from this share of the threshold on at the least. */
 static const double LOOK_SHARE = 0.65;
@@ -39,6 +40,7 @@ struct bst_imgproc {
     /* of the latest frame */
     double exposure_s, binning, streak_px;
     bool smeared;
+    bst_stack_frame left;
 };
 
 static bst_status make_bad_map(bst_ctx *ctx, bst_imgproc *ip) {
@@ -73,7 +75,7 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     int side = (int)ceil(streak + 6.0 * fwhm) + 14;
     side = side < BST_PSF_MAX_SIDE ? side : BST_PSF_MAX_SIDE;
     int capacity = (int)ip->config.capacity;
-    ip->electrons = calloc((size_t)width * (size_t)height, sizeof(float));
+    ip->electrons = bst_pages_alloc((size_t)width * (size_t)height * sizeof(float));
     ip->order = calloc((size_t)capacity, sizeof(int));
     ip->cropped = calloc((size_t)width * (size_t)height, sizeof *ip->cropped);
     if (!ip->electrons || !ip->order || !ip->cropped) {
@@ -353,6 +355,7 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
     bst_candidates_find(&ip->candidates, pool, &ip->filter,
                         (int)ceil(6.0 * sigma + hypot(dx, dy)) + 2, (float)look, (float)certain,
                         stands_out, &noise);
+<<<<<<< HEAD
     *out = (part){.view = {.signal = ip->electrons,
                            .width = width,
                            .height = height,
@@ -368,6 +371,32 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
                   .false_alarms = false_alarms,
                   .search = search};
 }
+=======
+    bst_locate_frame view = {.signal = ip->electrons,
+                             .width = width,
+                             .height = height,
+                             .background = &ip->background,
+                             .filter = &ip->filter,
+                             .sigma_px = sigma,
+                             .motion = motion,
+                             .camera = &ip->camera,
+                             .binning = frame->binning};
+    view.origin_x_px = frame->window.x0 + 0.5 * (frame->binning - 1);
+    view.origin_y_px = frame->window.y0 + 0.5 * (frame->binning - 1);
+    ip->left = (bst_stack_frame){.signal = ip->electrons,
+                                 .background = &ip->background,
+                                 .width = width,
+                                 .height = height,
+                                 .sigma_px = sigma,
+                                 .origin_x_px = view.origin_x_px,
+                                 .origin_y_px = view.origin_y_px,
+                                 .binning = frame->binning};
+    if (ip->smeared) {
+        bst_locate_roughly(&ip->locator, &view, &ip->candidates);
+    } else {
+        bst_locate(&ip->locator, &view, &ip->candidates);
+    }
+>>>>>>> main
 
 /* The motion that the streaks added to ip->streak_motion show. */
 static bool corrected(bst_imgproc *ip, const bst_motion *motion, double binning, bst_motion *out) {
@@ -509,4 +538,53 @@ double bst_imgproc_streak_px(const bst_imgproc *ip) {
 
 bool bst_imgproc_smeared(const bst_imgproc *ip) {
     return ip->smeared;
+}
+
+bst_stack_frame bst_imgproc_stack_frame(const bst_imgproc *ip, double time_s,
+                                        bst_quat q_cam_from_gcrf) {
+    bst_stack_frame frame = ip->left;
+    frame.time_s = time_s;
+    frame.q_cam_from_gcrf = q_cam_from_gcrf;
+    return frame;
+}
+
+void bst_imgproc_append_stack(const bst_imgproc *ip, const bst_stack_found *found, int count,
+                              double reach_px, bst_detections *out, int capacity) {
+    int before = out->count;
+    for (int i = 0; i < count; i++) {
+        const bst_stack_found *f = &found[i];
+        double reach = fmax(reach_px, 3.0 * sqrt(fmax(f->cov_xx, f->cov_yy)));
+        bool known = false;
+        for (int k = 0; k < before && !known; k++) {
+            known = hypot(out->items[k].x_px - f->x_px, out->items[k].y_px - f->y_px) < reach;
+        }
+        if (known) {
+            continue;
+        }
+        if (out->count == capacity) {
+            out->lost++;
+            continue;
+        }
+        bst_detection *d = &out->items[out->count++];
+        double width = 2.3548200450309493 * ip->left.sigma_px * ip->left.binning;
+        *d = (bst_detection){.x_px = f->x_px,
+                             .y_px = f->y_px,
+                             .cov_xx = f->cov_xx,
+                             .cov_xy = f->cov_xy,
+                             .cov_yy = f->cov_yy,
+                             .flux_e = f->flux_e,
+                             .flux_sigma_e = f->flux_sigma_e,
+                             .snr = f->snr,
+                             .length_px = width,
+                             .width_px = width,
+                             .flags = BST_DETECTION_STACK,
+                             .label = f->at_rest ? BST_LABEL_STAR : BST_LABEL_OBJECT,
+                             .label_probability = 0.9,
+                             .rate_x_pxps = f->rate_x_pxps,
+                             .rate_y_pxps = f->rate_y_pxps,
+                             .rate_sigma_pxps = f->rate_sigma_pxps};
+        double rate = f->flux_e / fmax(ip->exposure_s, 1e-9);
+        d->v_mag = -2.5 * log10(rate / ip->electrons_per_s_v0);
+        d->v_mag_sigma = 2.5 / log(10.0) * f->flux_sigma_e / f->flux_e;
+    }
 }
