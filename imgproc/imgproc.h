@@ -24,12 +24,9 @@ typedef struct bst_imgproc_config {
     double streak_min_px, streak_max_px;
     double streak_search_px; /* 0: no search for streaks of unknown rate and direction */
     double search_radius_px, match_tolerance_px;
-<<<<<<< HEAD
     bool track_windows; /* look only at windows while a target is followed */
     int64_t window_px, window_stars, full_every, full_frames;
-=======
     bst_stack_config stack;
->>>>>>> main
     int64_t threads;            /* 0: one per processor */
     bst_config_list bad_pixels; /* of bst_bad_pixel */
     /* FITS images of the maps; "": none. bst_imgproc_create leaves them to the caller. */

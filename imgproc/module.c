@@ -37,7 +37,6 @@ const bst_config_desc bst_imgproc_config_table[] = {
              "Greatest pointing error over which stars are identified."),
     BST_REAL(bst_imgproc_config, match_tolerance_px, "px", 0.5, 20, "3",
              "Greatest distance of one star from its place after the common shift."),
-<<<<<<< HEAD
     BST_BOOL(
         bst_imgproc_config, track_windows, "false",
         "Look only at windows round the predicted places of tracks and of bright stars while a "
@@ -53,10 +52,8 @@ const bst_config_desc bst_imgproc_config_table[] = {
         bst_imgproc_config, full_frames, "", 0, 1000000, "6",
         "... the first so many are looked at as a whole, for all that no track predicts: enough "
         "in a row to confirm a track."),
-=======
     BST_OBJECT(bst_imgproc_config, stack, bst_stack_config_table, "{}",
                "Search for objects too faint for one frame in stacks of frames."),
->>>>>>> main
     BST_INT(
         bst_imgproc_config, threads, "", 0, 32, "0",
         "Threads that share the passes over a frame and the fits; 0: one per processor. Results do "
@@ -110,11 +107,8 @@ typedef struct imgproc_module {
     bst_starid *starid;
     bst_discriminator *discriminator;
     bst_sky sky;
-<<<<<<< HEAD
     bst_windows windows; /* of the present frame; none: all of it */
-=======
-    bst_stack *stack; /* NULL: no stacks */
->>>>>>> main
+    bst_stack *stack;    /* NULL: no stacks */
     bst_photometer photometer;
 } imgproc_module;
 
@@ -165,6 +159,11 @@ static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
                               m->config->search_radius_px, &m->starid));
     BST_TRY(bst_discriminator_create(env->ctx, &m->camera, (int)m->config->capacity,
                                      &m->discriminator));
+    if (m->config->stack.frames > 0 && m->config->track_windows) {
+        return bst_fail(env->ctx, BST_ERR_CONFIG,
+                        "imgproc: track_windows and stack do not go together: stacks are made of "
+                        "whole frames; turn one of them off");
+    }
     if (m->config->stack.frames > 0) {
         BST_TRY(bst_stack_create(env->ctx, &m->camera, &m->config->stack, (int)m->config->threads,
                                  &m->stack));
