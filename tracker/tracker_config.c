@@ -52,7 +52,7 @@ const bst_config_desc bst_tracker_config_table[] = {
              "Objects nearer to each other than this may share one detection."),
     BST_REAL(C, merge_floor_px, "px", 0, 100, "0.3",
              "Standard deviation added to a shared detection."),
-    BST_REAL(C, object_floor_px, "px", 0, 10, "0.05",
+    BST_REAL(C, object_floor_px, "px", 0, 10, "0.02",
              "Standard deviation added to the centroid of every detection that is not a star."),
     BST_REAL(C, blend_sigma_px, "px", 0, 100, "0.5",
              "Standard deviation added to detections flagged as blends or at an edge."),
