@@ -355,7 +355,6 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
     bst_candidates_find(&ip->candidates, pool, &ip->filter,
                         (int)ceil(6.0 * sigma + hypot(dx, dy)) + 2, (float)look, (float)certain,
                         stands_out, &noise);
-<<<<<<< HEAD
     *out = (part){.view = {.signal = ip->electrons,
                            .width = width,
                            .height = height,
@@ -370,50 +369,15 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
                   .threshold = threshold,
                   .false_alarms = false_alarms,
                   .search = search};
-=======
-    bst_locate_frame view = {.signal = ip->electrons,
-                             .width = width,
-                             .height = height,
-                             .background = &ip->background,
-                             .filter = &ip->filter,
-                             .sigma_px = sigma,
-                             .motion = motion,
-                             .camera = &ip->camera,
-                             .binning = frame->binning};
-    view.origin_x_px = frame->window.x0 + 0.5 * (frame->binning - 1);
-    view.origin_y_px = frame->window.y0 + 0.5 * (frame->binning - 1);
->>>>>>> main
     ip->left = (bst_stack_frame){.signal = ip->electrons,
                                  .background = &ip->background,
                                  .width = width,
                                  .height = height,
                                  .sigma_px = sigma,
-<<<<<<< HEAD
                                  .origin_x_px = out->view.origin_x_px,
                                  .origin_y_px = out->view.origin_y_px,
                                  .binning = frame->binning};
 }
-=======
-                                 .origin_x_px = view.origin_x_px,
-                                 .origin_y_px = view.origin_y_px,
-                                 .binning = frame->binning};
-    bst_motion measured;
-    if (motion && !ip->smeared) {
-        measured = *motion;
-        double bend_px = hypot(JITTER_BEND * ip->config.jitter_px,
-                               motion->bend_sigma_rad / bst_camera_scale_rad(&ip->camera));
-        if (bst_streak_motion_measure(&ip->streak_motion, &ip->locator.psf, &view, &ip->candidates,
-                                      DRIFT_PX / frame->binning, bend_px / frame->binning,
-                                      &measured)) {
-            view.motion = &measured;
-        }
-    }
-    if (ip->smeared) {
-        bst_locate_roughly(&ip->locator, &view, &ip->candidates);
-    } else {
-        bst_locate(&ip->locator, &view, &ip->candidates);
-    }
->>>>>>> main
 
 /* The motion that the streaks added to ip->streak_motion show. */
 static bool corrected(bst_imgproc *ip, const bst_motion *motion, double binning, bst_motion *out) {
