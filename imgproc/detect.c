@@ -18,6 +18,8 @@ static const double LOOK_SHARE = 0.65;
 static const double JITTER_BEND = 0.075;
 /* What telemetry may not know of the camera's motion: drift, in px an exposure. */
 static const double DRIFT_PX = 1.0;
+/* Share of a measured or told bend that may be no bend. */
+static const double BEND_LEFT = 0.05;
 /* Above the threshold by this no skewness of noise matters. */
 static const double CERTAIN_ABOVE = 1.5;
 
@@ -283,6 +285,12 @@ static void widen_by_bend(const bst_imgproc *ip, const bst_locate_frame *f, cons
     bst_motion_bend(f->motion, &ip->camera, &x, &y);
     x = 0.5 * (x - f->binning * shape->bend_x_px);
     y = 0.5 * (y - f->binning * shape->bend_y_px);
+    d->cov_xx += x * x;
+    d->cov_xy += x * y;
+    d->cov_yy += y * y;
+    /* of a bend that the fit follows, what a quadratic does not tell of a start or a stop */
+    x = BEND_LEFT * f->binning * shape->bend_x_px;
+    y = BEND_LEFT * f->binning * shape->bend_y_px;
     d->cov_xx += x * x;
     d->cov_xy += x * y;
     d->cov_yy += y * y;
