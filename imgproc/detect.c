@@ -2,13 +2,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "imgproc/heapsort.h"
+#include "imgproc/bad_map.h"
 #include "imgproc/imgproc.h"
 #include "imgproc/locate.h"
 #include "imgproc/rows.h"
 #include "imgproc/streak_locate.h"
 #include "imgproc/streak_motion.h"
 #include "imgproc/tail.h"
+#include "imgproc/windows.h"
 #include "sim/core/pages.h"
 
 /* Maxima are looked at in between the pixels from this share of the threshold on at the least. */
@@ -22,6 +23,8 @@ static const double DRIFT_PX = 1.0;
 static const double BEND_LEFT = 0.05;
 /* Above the threshold by this no skewness of noise matters. */
 static const double CERTAIN_ABOVE = 1.5;
+
+#define BST_MAG_PER_SHARE 1.0857362047581296 /* 2.5 / ln 10 */
 
 struct bst_imgproc {
     bst_camera camera;
@@ -37,39 +40,15 @@ struct bst_imgproc {
     bst_streak_motion streak_motion;
     bst_streak_locator streaks; /* only when config.streak_search_px > 0 */
     bst_parallel *pool;
-    int *order;
+    int *order, *order_swap, *row;
     uint16_t *cropped; /* a window's pixels */
     /* of the latest frame */
+    bst_locate_frame view;
+    bst_motion motion;
     double exposure_s, binning, streak_px;
-    bool smeared;
+    bool smeared, windowed;
     bst_stack_frame left;
 };
-
-static bst_status make_bad_map(bst_ctx *ctx, bst_imgproc *ip) {
-    const bst_bad_pixel *list = ip->config.bad_pixels.items;
-    if (!ip->maps.bad && ip->config.bad_pixels.count == 0) {
-        return BST_OK;
-    }
-    size_t width = (size_t)ip->camera.width_px, height = (size_t)ip->camera.height_px;
-    ip->bad = calloc(width, height);
-    if (!ip->bad) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a bad-pixel map");
-    }
-    if (ip->maps.bad) {
-        memcpy(ip->bad, ip->maps.bad, width * height);
-    }
-    for (int i = 0; i < ip->config.bad_pixels.count; i++) {
-        if (list[i].x < 0 || list[i].y < 0 || list[i].x >= ip->camera.width_px ||
-            list[i].y >= ip->camera.height_px) {
-            return bst_fail(ctx, BST_ERR_CONFIG,
-                            "bad_pixels/%d: (%lld, %lld) is outside the sensor of %lld x %lld", i,
-                            (long long)list[i].x, (long long)list[i].y,
-                            (long long)ip->camera.width_px, (long long)ip->camera.height_px);
-        }
-        ip->bad[(size_t)list[i].y * width + (size_t)list[i].x] = 1;
-    }
-    return BST_OK;
-}
 
 static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     int width = (int)ip->camera.width_px, height = (int)ip->camera.height_px;
@@ -79,18 +58,22 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     int capacity = (int)ip->config.capacity;
     ip->electrons = bst_pages_alloc((size_t)width * (size_t)height * sizeof(float));
     ip->order = calloc((size_t)capacity, sizeof(int));
+    ip->order_swap = calloc((size_t)capacity, sizeof(int));
+    ip->row = calloc((size_t)height + 1, sizeof(int));
     ip->cropped = calloc((size_t)width * (size_t)height, sizeof *ip->cropped);
-    if (!ip->electrons || !ip->order || !ip->cropped) {
+    if (!ip->electrons || !ip->order || !ip->order_swap || !ip->row || !ip->cropped) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a frame of %d x %d", width, height);
     }
-    BST_TRY(make_bad_map(ctx, ip));
+    BST_TRY(bst_bad_map_create(ctx, &ip->camera, &ip->maps, &ip->config.bad_pixels, &ip->bad));
     BST_TRY(bst_parallel_create(ctx, (int)ip->config.threads, &ip->pool));
     BST_TRY(bst_background_create(ctx, (int)ip->config.mesh_px, width, height,
                                   bst_parallel_threads(ip->pool), &ip->background));
     BST_TRY(
         bst_filter_create(ctx, width, height, streak, bst_parallel_threads(ip->pool), &ip->filter));
     BST_TRY(bst_candidates_create(ctx, width, height, &ip->candidates));
-    BST_TRY(bst_locator_create(ctx, ip->pool, capacity, width, height, side, &ip->locator));
+    BST_TRY(bst_locator_create(ctx, bst_parallel_threads(ip->pool), capacity, width, height, side,
+                               &ip->locator));
+    ip->locator.most_fits = (int)ip->config.most_fits;
     BST_TRY(bst_streak_motion_create(ctx, side, &ip->streak_motion));
     return ip->config.streak_search_px > 0.0
                ? bst_streak_locator_create(ctx, &ip->locator.psf, ip->pool, width, height, fwhm,
@@ -137,6 +120,8 @@ void bst_imgproc_free(bst_imgproc *ip) {
     free(ip->bad);
     free(ip->electrons);
     free(ip->order);
+    free(ip->order_swap);
+    free(ip->row);
     free(ip->cropped);
     bst_background_free(&ip->background);
     bst_filter_free(&ip->filter);
@@ -264,13 +249,39 @@ static bst_status check_frame(bst_ctx *ctx, const bst_imgproc *ip, const bst_img
     return BST_OK;
 }
 
-static bool before_on_sensor(const void *context, int a, int b) {
-    const bst_found *found = context;
+static int row_of(const bst_found *found, int height) {
+    double y = found->source.shape.y_px;
+    return y > height - 1.0 ? height - 1 : y > 0.0 ? (int)y : 0;
+}
+
+static bool before_on_sensor(const bst_found *found, int a, int b) {
     const bst_shape *p = &found[a].source.shape, *q = &found[b].source.shape;
     if (p->y_px != q->y_px) {
         return p->y_px < q->y_px;
     }
     return p->x_px != q->x_px ? p->x_px < q->x_px : a < b;
+}
+
+/* Orders ip->order: into rows of pixels by counting, within them one by one. */
+static void sort_on_sensor(bst_imgproc *ip, int count, int height) {
+    const bst_found *found = ip->locator.found;
+    memset(ip->row, 0, ((size_t)height + 1) * sizeof *ip->row);
+    for (int i = 0; i < count; i++) {
+        ip->row[row_of(&found[ip->order[i]], height) + 1]++;
+    }
+    for (int y = 0; y < height; y++) {
+        ip->row[y + 1] += ip->row[y];
+    }
+    for (int i = 0; i < count; i++) {
+        ip->order_swap[ip->row[row_of(&found[ip->order[i]], height)]++] = ip->order[i];
+    }
+    for (int i = 0; i < count; i++) {
+        int moved = ip->order_swap[i], at = i;
+        for (; at > 0 && before_on_sensor(found, moved, ip->order[at - 1]); at--) {
+            ip->order[at] = ip->order[at - 1];
+        }
+        ip->order[at] = moved;
+    }
 }
 
 /* A detection is to stand for the mean of its path, but a fit that does not follow the camera's
@@ -321,15 +332,14 @@ static bst_detection report(const bst_imgproc *ip, const bst_locate_frame *f,
     return d;
 }
 
-/* A frame, or a window of one, with its candidates found. */
+/* How a frame, or a window of one, was searched. */
 typedef struct part {
-    bst_locate_frame view;
     double threshold, false_alarms;
     bool search;
 } part;
 
-/* Finds the candidates of `frame`. `whole` is the frame of which it is a window, itself else: the
- * density of false alarms and the filter are the whole frame's. */
+/* Finds the candidates of `frame` and sets ip->view. `whole` is the frame of which it is a window,
+ * itself else: the density of false alarms and the filter are the whole frame's. */
 static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgproc_frame *whole,
                  const bst_motion *motion, bst_parallel *pool, part *out) {
     int width = frame->window.width / frame->binning;
@@ -363,51 +373,52 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
     bst_candidates_find(&ip->candidates, pool, &ip->filter,
                         (int)ceil(6.0 * sigma + hypot(dx, dy)) + 2, (float)look, (float)certain,
                         stands_out, &noise);
-    *out = (part){.view = {.signal = ip->electrons,
-                           .width = width,
-                           .height = height,
-                           .background = &ip->background,
-                           .filter = &ip->filter,
-                           .sigma_px = sigma,
-                           .motion = motion,
-                           .camera = &ip->camera,
-                           .binning = frame->binning,
-                           .origin_x_px = frame->window.x0 + 0.5 * (frame->binning - 1),
-                           .origin_y_px = frame->window.y0 + 0.5 * (frame->binning - 1)},
-                  .threshold = threshold,
-                  .false_alarms = false_alarms,
-                  .search = search};
+    if (motion) {
+        ip->motion = *motion;
+    }
+    ip->view = (bst_locate_frame){.signal = ip->electrons,
+                                  .width = width,
+                                  .height = height,
+                                  .background = &ip->background,
+                                  .filter = &ip->filter,
+                                  .sigma_px = sigma,
+                                  .motion = motion ? &ip->motion : NULL,
+                                  .camera = &ip->camera,
+                                  .binning = frame->binning,
+                                  .pool = pool};
+    ip->view.origin_x_px = frame->window.x0 + 0.5 * (frame->binning - 1);
+    ip->view.origin_y_px = frame->window.y0 + 0.5 * (frame->binning - 1);
     ip->left = (bst_stack_frame){.signal = ip->electrons,
                                  .background = &ip->background,
                                  .width = width,
                                  .height = height,
                                  .sigma_px = sigma,
-                                 .origin_x_px = out->view.origin_x_px,
-                                 .origin_y_px = out->view.origin_y_px,
+                                 .origin_x_px = ip->view.origin_x_px,
+                                 .origin_y_px = ip->view.origin_y_px,
                                  .binning = frame->binning};
+    *out = (part){threshold, false_alarms, search};
 }
 
-/* The motion that the streaks added to ip->streak_motion show. */
-static bool corrected(bst_imgproc *ip, const bst_motion *motion, double binning, bst_motion *out) {
+/* Corrects a motion by the streaks that were added to ip->streak_motion. */
+static void correct_motion(bst_imgproc *ip, double binning, bst_motion *motion) {
     double bend_px = hypot(JITTER_BEND * ip->config.jitter_px,
                            motion->bend_sigma_rad / bst_camera_scale_rad(&ip->camera));
-    *out = *motion;
-    return bst_streak_motion_solve(&ip->streak_motion, &ip->locator.psf, &ip->camera,
-                                   DRIFT_PX / binning, bend_px / binning, out);
+    (void)bst_streak_motion_solve(&ip->streak_motion, &ip->locator.psf, &ip->locator.profiles,
+                                  &ip->camera, DRIFT_PX / binning, bend_px / binning, motion);
 }
 
 /* Locates the candidates of a part and adds them to `out`. */
 static void take(bst_imgproc *ip, const part *p, bst_detections *out, int capacity) {
     if (ip->smeared) {
-        bst_locate_roughly(&ip->locator, &p->view, &ip->candidates);
+        bst_locate_roughly(&ip->locator, &ip->view, &ip->candidates);
     } else {
-        bst_locate(&ip->locator, &p->view, &ip->candidates);
+        bst_locate(&ip->locator, &ip->view, &ip->candidates);
     }
     int kept = 0, room = capacity - out->count;
     room = room < ip->locator.capacity ? room : ip->locator.capacity;
     int lost = ip->candidates.count - ip->locator.count;
     if (p->search) {
-        bst_streak_locate(&ip->streaks, &p->view, &ip->candidates, p->false_alarms, &ip->locator);
+        bst_streak_locate(&ip->streaks, &ip->view, &ip->candidates, p->false_alarms, &ip->locator);
     }
     for (int i = 0; i < ip->locator.count; i++) {
         if (ip->locator.found[i].dropped) {
@@ -419,11 +430,12 @@ static void take(bst_imgproc *ip, const part *p, bst_detections *out, int capaci
             lost++;
         }
     }
-    bst_heapsort_indices(ip->order, kept, before_on_sensor, ip->locator.found);
+    sort_on_sensor(ip, kept, ip->view.height);
     for (int i = 0; i < kept; i++) {
-        out->items[out->count++] = report(ip, &p->view, &ip->locator.found[ip->order[i]]);
+        out->items[out->count++] = report(ip, &ip->view, &ip->locator.found[ip->order[i]]);
     }
     out->lost += lost;
+    out->threshold_snr = p->threshold;
 }
 
 static void empty(bst_detections *out) {
@@ -439,37 +451,32 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
     /* a pool that has to wait for processors is slower than one thread that has one */
     bool alone = frame->beside_another && bst_parallel_threads(ip->pool) <= BST_STEP_LANES;
     part whole;
-    bst_motion measured;
     empty(out);
+    ip->windowed = false;
     find(ip, frame, frame, motion, alone ? NULL : ip->pool, &whole);
-    if (!ip->smeared && bst_streak_motion_begin(&ip->streak_motion, &whole.view)) {
-        bst_streak_motion_add(&ip->streak_motion, &whole.view, &ip->candidates);
-        if (corrected(ip, motion, frame->binning, &measured)) {
-            whole.view.motion = &measured;
-        }
+    if (!ip->smeared && bst_streak_motion_begin(&ip->streak_motion, &ip->view)) {
+        bst_streak_motion_add(&ip->streak_motion, &ip->view, &ip->candidates);
+        correct_motion(ip, frame->binning, &ip->motion);
     }
     take(ip, &whole, out, capacity);
     out->background_e = (double)ip->background.median_level;
     out->noise_e = (double)ip->background.median_noise;
-    out->threshold_snr = whole.threshold;
     return BST_OK;
 }
 
-/* The pixels of one window, as a frame of its own. */
-static bst_imgproc_frame crop(bst_imgproc *ip, const bst_imgproc_frame *frame,
-                              const bst_window *w) {
-    int b = frame->binning, stride = frame->window.width / b;
-    size_t x = (size_t)((w->x0 - frame->window.x0) / b),
-           y = (size_t)((w->y0 - frame->window.y0) / b);
-    size_t width = (size_t)(w->width / b), height = (size_t)(w->height / b);
-    for (size_t j = 0; j < height; j++) {
-        memcpy(ip->cropped + j * width, frame->pixels + (y + j) * (size_t)stride + x,
-               width * sizeof *ip->cropped);
+/* Whether the windows' streaks are to tell the motion: looks for them in all windows. */
+static bool measure_in_windows(bst_imgproc *ip, const bst_imgproc_frame *frame,
+                               const bst_window *windows, int count, const bst_motion *motion) {
+    for (int i = 0; i < count; i++) {
+        part p;
+        bst_imgproc_frame window = bst_windows_crop(frame, &windows[i], ip->cropped);
+        find(ip, &window, frame, motion, NULL, &p);
+        if (i == 0 && (ip->smeared || !bst_streak_motion_begin(&ip->streak_motion, &ip->view))) {
+            return false;
+        }
+        bst_streak_motion_add(&ip->streak_motion, &ip->view, &ip->candidates);
     }
-    bst_imgproc_frame window = *frame;
-    window.pixels = ip->cropped;
-    window.window = *w;
-    return window;
+    return count > 0;
 }
 
 bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
@@ -477,41 +484,50 @@ bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_i
                                       const bst_motion *motion, bst_detections *out, int capacity) {
     BST_TRY(check_frame(ctx, ip, frame));
     double pixels = 0.0;
-    bool measure = false;
-    const bst_motion *used = motion;
-    bst_motion measured;
-    part p;
+    bst_motion used = {.q_cam_from_gcrf = BST_QUAT_IDENTITY};
     empty(out);
-    for (int pass = 0; pass < 2; pass++) {
-        for (int i = 0; i < count; i++) {
-            bst_imgproc_frame window = crop(ip, frame, &windows[i]);
-            find(ip, &window, frame, used, NULL, &p);
-            if (pass == 0 && i == 0) {
-                measure = !ip->smeared && bst_streak_motion_begin(&ip->streak_motion, &p.view);
-                if (!measure) {
-                    pass = 1;
-                }
-            }
-            if (pass == 0) {
-                bst_streak_motion_add(&ip->streak_motion, &p.view, &ip->candidates);
-                continue;
-            }
-            take(ip, &p, out, capacity);
-            double n = (double)windows[i].width * (double)windows[i].height;
-            pixels += n;
-            out->background_e += n * (double)ip->background.median_level;
-            out->noise_e += n * (double)ip->background.median_noise;
-            out->threshold_snr = p.threshold;
+    ip->windowed = true;
+    if (motion) {
+        used = *motion;
+        if (measure_in_windows(ip, frame, windows, count, motion)) {
+            correct_motion(ip, frame->binning, &used);
         }
-        if (pass == 0 && measure && corrected(ip, motion, frame->binning, &measured)) {
-            used = &measured;
-        }
+    }
+    for (int i = 0; i < count; i++) {
+        part p;
+        bst_imgproc_frame window = bst_windows_crop(frame, &windows[i], ip->cropped);
+        find(ip, &window, frame, motion ? &used : NULL, NULL, &p);
+        take(ip, &p, out, capacity);
+        double n = (double)windows[i].width * (double)windows[i].height;
+        pixels += n;
+        out->background_e += n * (double)ip->background.median_level;
+        out->noise_e += n * (double)ip->background.median_noise;
     }
     if (pixels > 0.0) {
         out->background_e /= pixels;
         out->noise_e /= pixels;
     }
     return BST_OK;
+}
+
+void bst_imgproc_refine(bst_imgproc *ip, bst_detections *detections, int index) {
+    bst_detection *item = &detections->items[index];
+    const bst_found *found = &ip->locator.found[ip->order[index]];
+    if (ip->windowed || !found->rough) {
+        return;
+    }
+    bst_locate_again(&ip->locator, &ip->view, ip->order[index]);
+    bst_detection fitted = report(ip, &ip->view, found), before = *item;
+    /* the zero point may have been applied since */
+    fitted.v_mag = before.v_mag - 2.5 * log10(fitted.flux_e / before.flux_e);
+    double old_noise = BST_MAG_PER_SHARE * before.flux_sigma_e / before.flux_e;
+    double noise = BST_MAG_PER_SHARE * fitted.flux_sigma_e / fitted.flux_e;
+    double zero_point2 = before.v_mag_sigma * before.v_mag_sigma - old_noise * old_noise;
+    fitted.v_mag_sigma = sqrt(fmax(zero_point2, 0.0) + noise * noise);
+    fitted.label = before.label;
+    fitted.label_probability = before.label_probability;
+    fitted.star_id = before.star_id;
+    *item = fitted;
 }
 
 double bst_imgproc_v_limit(const bst_imgproc *ip, double snr) {

@@ -10,12 +10,13 @@ enum {
 };
 
 typedef struct bst_streak_motion {
-    int max_pixels;                       /* of a stamp */
-    double *render;                       /* [4 + BST_STREAK_MOTION_COUNT][max_pixels] */
-    float *signal;                        /* [BST_STREAK_MOTION_STARS][max_pixels] */
+    int max_side;  /* of a stamp */
+    float *planes; /* of bst_image_render_motion; then the pixels, and 1 where there is one */
+    float *scratch;
+    float *pixels; /* [BST_STREAK_MOTION_STARS]: each star's last two planes */
     struct bst_streak_motion_star *stars; /* [BST_STREAK_MOTION_STARS] */
     int count;
-    double ex, ey, binning; /* direction of the path; sensor pixels per pixel */
+    double ex, ey, binning, sigma_px; /* the path's direction; sensor pixels per pixel; PSF */
 } bst_streak_motion;
 
 bst_status bst_streak_motion_create(bst_ctx *ctx, int max_side,
@@ -33,12 +34,13 @@ void bst_streak_motion_free(bst_streak_motion *work);
  * stopping): nothing is to be measured then. add: takes the streaks of the frame or of a part of
  * it. solve: the priors, 1 sigma in px of the frame, are of the difference to frame->motion:
  * length_px of the path's length and direction, bend_px of the bend. *motion: a copy of
- * frame->motion, which is corrected. False, and nothing changed, when no streak was bright enough.
- */
+ * frame->motion, which is corrected; `profiles` are made for the frame's sigma. False, and nothing
+ * changed, when no streak was bright enough. */
 bool bst_streak_motion_begin(bst_streak_motion *work, const bst_locate_frame *frame);
 void bst_streak_motion_add(bst_streak_motion *work, const bst_locate_frame *frame,
                            const bst_candidates *candidates);
-bool bst_streak_motion_solve(bst_streak_motion *work, const bst_psf *psf, const bst_camera *camera,
-                             double length_px, double bend_px, bst_motion *motion);
+bool bst_streak_motion_solve(bst_streak_motion *work, const bst_psf *psf, bst_profiles *profiles,
+                             const bst_camera *camera, double length_px, double bend_px,
+                             bst_motion *motion);
 
 #endif

@@ -1,6 +1,7 @@
 #include "imgproc/windows.h"
 
 #include <math.h>
+#include <string.h>
 
 bool bst_windows_add(bst_windows *windows, const bst_window *frame, double x_px, double y_px,
                      double half_x_px, double half_y_px) {
@@ -83,4 +84,19 @@ bool bst_windows_hold(const bst_windows *windows, double x_px, double y_px, doub
         }
     }
     return false;
+}
+
+bst_imgproc_frame bst_windows_crop(const bst_imgproc_frame *frame, const bst_window *w,
+                                   uint16_t *pixels) {
+    int b = frame->binning;
+    size_t stride = (size_t)(frame->window.width / b), width = (size_t)(w->width / b);
+    size_t x = (size_t)((w->x0 - frame->window.x0) / b);
+    size_t y = (size_t)((w->y0 - frame->window.y0) / b);
+    for (size_t j = 0; j < (size_t)(w->height / b); j++) {
+        memcpy(pixels + j * width, frame->pixels + (y + j) * stride + x, width * sizeof *pixels);
+    }
+    bst_imgproc_frame window = *frame;
+    window.pixels = pixels;
+    window.window = *w;
+    return window;
 }

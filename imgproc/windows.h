@@ -4,7 +4,7 @@
 
 #include <stdbool.h>
 
-#include "sim/core/messages.h"
+#include "imgproc/imgproc.h"
 
 enum { BST_WINDOWS_MAX = 128 };
 
@@ -25,5 +25,10 @@ bool bst_windows_settle(bst_windows *windows, const bst_window *frame, int binni
 
 /* Whether a place lies in one of them or within margin_px of it. */
 bool bst_windows_hold(const bst_windows *windows, double x_px, double y_px, double margin_px);
+
+/* The pixels of one window (inside the frame, along its binned pixels) as a frame of its own,
+ * copied to `pixels`, which must have room for them. */
+bst_imgproc_frame bst_windows_crop(const bst_imgproc_frame *frame, const bst_window *window,
+                                   uint16_t *pixels);
 
 #endif
