@@ -39,8 +39,13 @@ typedef struct bst_generator_frame {
     int binning;
     double exposure_s;
     double sigma_px; /* of the true PSF, a Gaussian, without the pixel's width; sensor px */
-    double streak_dx_px,
-        streak_dy_px; /* path of the stars in the middle of the window, sensor px */
+    /* path of the stars in the middle of the window and its bend (bst_motion_bend) as image
+     * processing takes them from telemetry, sensor px */
+    double streak_dx_px, streak_dy_px, bend_x_px, bend_y_px;
+    /* the true path of a star there at path_count equal steps of the exposure, less its mean,
+     * sensor px; fewer than 2: straight and uniform */
+    const double *path_x_px, *path_y_px;
+    int path_count;
 } bst_generator_frame;
 
 typedef struct bst_generator_result {

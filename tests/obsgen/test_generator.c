@@ -327,7 +327,9 @@ static void close_sources_are_one(void **state) {
     close_scene(&s);
 }
 
-/* A streak cut by the frame's edge shows what is on the frame; one beside it nothing. */
+/* A streak cut by the frame's edge is fitted with its known path, so that place and flux are those
+ * of the whole, from half the light; what lies mostly beyond the edge is a point on it; one beside
+ * the frame shows nothing. */
 static void the_edge_cuts(void **state) {
     (void)state;
     scene s;
@@ -335,18 +337,27 @@ static void the_edge_cuts(void **state) {
     start(&s);
     double light = electrons_of(&s, 400.0);
     bst_truth_item *item = add_source(&s, 1, 0.0, 500.0, light);
-    item->x_start_px = -20.5;
-    item->x_mean_px = -0.5;
-    item->x_end_px = 19.5;
+    item->x_start_px = -20.0;
+    item->x_mean_px = 0.0;
+    item->x_end_px = 20.0;
     s.frame.streak_dx_px = 40.0;
     bst_generator_result r = run(&s, 0);
     assert_int_equal(r.count, 1);
     const bst_detection *d = &r.items[0].detection;
     assert_true(d->flags & BST_DETECTION_EDGE);
     assert_true(d->flags & BST_DETECTION_STREAK);
-    /* the middle of the half that is on the frame, -0.5 to 19.5; a tenth of it for the error */
-    bst_assert_close(d->x_px, 9.5, 1.0);
-    bst_assert_close(d->flux_e, 0.5 * light, 0.1 * light);
+    /* six times the bound of half the light at SNR 400 and 40 px */
+    bst_assert_close(d->x_px, 0.0, 0.2);
+    bst_assert_close(d->flux_e, light, 0.05 * light);
+    item->x_start_px = -36.0;
+    item->x_mean_px = -16.0;
+    item->x_end_px = 4.0;
+    r = run(&s, 0);
+    assert_int_equal(r.count, 1);
+    d = &r.items[0].detection;
+    assert_false(d->flags & BST_DETECTION_STREAK);
+    /* -0.5 to 4 are on the frame */
+    bst_assert_close(d->x_px, 1.75, 1.0);
     item->x_start_px = -60.0;
     item->x_mean_px = -40.0;
     item->x_end_px = -20.0;
