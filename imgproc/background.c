@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "imgproc/lanes.h"
 #include "imgproc/rows.h"
 
 /* no pixel is better known than its step: 1 / sqrt(12) */
@@ -14,8 +15,14 @@ enum { SAMPLE = 100, CLIP_PASSES = 4 };
 /* agreement asked of opposite neighbours, standard errors */
 static const float AGREEMENT = 4.0f;
 
+/* Floats from one row of a band to the next: no power of two, so that rows do not share a few lines
+ * of the cache. */
+static size_t band_stride(int width) {
+    return (size_t)((width + BST_LANES - 1) / BST_LANES * BST_LANES + BST_LANES);
+}
+
 bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int max_height,
-                                 bst_background *out) {
+                                 int threads, bst_background *out) {
     *out = (bst_background){.mesh_px = mesh_px,
                             .max_columns = (max_width + mesh_px - 1) / mesh_px,
                             .max_rows = (max_height + mesh_px - 1) / mesh_px};
@@ -25,18 +32,19 @@ bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int m
     out->error = calloc(meshes, sizeof(float));
     out->scratch = calloc(2 * meshes, sizeof(float));
     /* a mesh at the end may be half as long again */
-    size_t tile_width = (size_t)(mesh_px + mesh_px / 2 + 1);
-    size_t tile_height = tile_width < (size_t)max_height ? tile_width : (size_t)max_height;
-    tile_width = tile_width < (size_t)max_width ? tile_width : (size_t)max_width;
-    out->tile = tile_width * tile_height;
-    out->tiles = calloc(out->tile * (size_t)out->max_rows, sizeof(float));
+    size_t height = (size_t)(mesh_px + mesh_px / 2 + 1);
+    height = height < (size_t)max_height ? height : (size_t)max_height;
+    out->band = band_stride(max_width) * height;
+    out->lent = calloc(1, sizeof *out->lent);
+    out->bands = calloc(out->band * (size_t)threads, sizeof(float));
     out->row_level = calloc(columns, sizeof(float));
     out->row_noise = calloc(columns, sizeof(float));
-    if (!out->level || !out->noise || !out->error || !out->scratch || !out->tiles ||
+    if (!out->level || !out->noise || !out->error || !out->scratch || !out->bands || !out->lent ||
         !out->row_level || !out->row_noise) {
         bst_background_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu background meshes", meshes);
     }
+    bst_borrow_init(out->lent, threads);
     return BST_OK;
 }
 
@@ -45,7 +53,8 @@ void bst_background_free(bst_background *b) {
     free(b->noise);
     free(b->error);
     free(b->scratch);
-    free(b->tiles);
+    free(b->bands);
+    free(b->lent);
     free(b->row_level);
     free(b->row_noise);
     *b = (bst_background){0};
@@ -82,52 +91,58 @@ static float select_kth(float *values, int count, int k) {
     return values[k];
 }
 
+/* The pixels of a mesh. */
+typedef struct mesh_pixels {
+    const float *pixels;
+    size_t stride;
+    int width, height;
+} mesh_pixels;
+
 /* First guess from at most SAMPLE pixels spread over the mesh. False when none is usable. */
-static bool first_guess(const float *tile, int width, int height, float step_e, float *level,
-                        float *noise) {
+static bool first_guess(const mesh_pixels *m, float step_e, float *level, float *noise) {
     float sample[SAMPLE];
-    int total = width * height;
+    int total = m->width * m->height;
     int step = (total + SAMPLE - 1) / SAMPLE;
     /* a step that shares a factor with the width would sample a few columns only */
-    while (step > 1 && width % step == 0) {
+    while (step > 1 && m->width % step == 0) {
         step++;
     }
     int count = 0;
-    for (int i = 0; i < total && count < SAMPLE; i += step) {
-        if (tile[i] > BST_PIXEL_NONE) {
-            sample[count++] = tile[i];
-        }
-    }
-    for (int i = 0; i < total && count == 0; i++) {
-        if (tile[i] > BST_PIXEL_NONE) {
-            sample[count++] = tile[i];
+    for (int pass = 0; pass < 2 && count == 0; pass++) {
+        for (int i = 0; i < total && count < SAMPLE; i += pass == 0 ? step : 1) {
+            float v = m->pixels[(size_t)(i / m->width) * m->stride + (size_t)(i % m->width)];
+            if (v > BST_PIXEL_NONE) {
+                sample[count++] = v;
+            }
         }
     }
     if (count == 0) {
         return false;
     }
-    float median = select_kth(sample, count, count / 2);
+    float median = bst_row_median(sample, count);
     for (int i = 0; i < count; i++) {
         sample[i] = fabsf(sample[i] - median);
     }
     *level = median;
     /* coarse steps make the median deviation anything from 0 up: leave room for a step */
-    *noise = fmaxf(1.4826f * select_kth(sample, count, count / 2), step_e);
+    *noise = fmaxf(1.4826f * bst_row_median(sample, count), step_e);
     return true;
 }
 
-static bool estimate_mesh(const float *tile, int width, int height, float step_e, float *level,
-                          float *noise, float *error) {
+static bool estimate_mesh(const mesh_pixels *m, float step_e, float *level, float *noise,
+                          float *error) {
     *error = 1.0f;
-    if (!first_guess(tile, width, height, step_e, level, noise)) {
+    if (!first_guess(m, step_e, level, noise)) {
         return false;
     }
     for (int pass = 0; pass < CLIP_PASSES; pass++) {
         bst_row_sums sums = {0};
         float limit = fmaxf(3.0f * *noise, 1.5f * step_e);
         /* the first passes need not be exact */
-        int whole = width * height, part = pass + 2 < CLIP_PASSES ? whole / 2 : whole;
-        bst_row_clipped_sums(tile + (pass % 2) * (whole - part), part, *level, limit, &sums);
+        int half = (m->height + 1) / 2, first = pass == 1 ? m->height - half : 0;
+        int rows = pass + 2 < CLIP_PASSES ? half : m->height;
+        bst_row_clipped_sums(m->pixels + (size_t)first * m->stride, m->width, rows, m->stride,
+                             *level, limit, &sums);
         double n = 0.0, s = 0.0, q = 0.0;
         for (int i = 0; i < BST_ROW_LANES; i++) {
             n += (double)sums.count[i];
@@ -175,23 +190,27 @@ typedef struct reading {
 static void read_rows(void *user, int begin, int end) {
     const reading *r = user;
     bst_background *b = r->b;
+    int taken = bst_borrow_take(b->lent);
+    float *band = b->bands + (size_t)taken * b->band;
+    size_t stride = band_stride(b->width);
     for (int j = begin; j < end; j++) {
-        float *tile = b->tiles + (size_t)j * b->tile;
         int y0 = j * b->mesh_px, y1 = j + 1 == b->rows ? b->height : y0 + b->mesh_px;
+        /* whole rows: memory is read in the order in which it lies */
+        for (int y = y0; y < y1; y++) {
+            r->pixels(r->user, y, 0, b->width, band + (size_t)(y - y0) * stride);
+        }
         for (int i = 0; i < b->columns; i++) {
             int x0 = i * b->mesh_px, x1 = i + 1 == b->columns ? b->width : x0 + b->mesh_px;
-            int k = j * b->columns + i, width = x1 - x0;
-            for (int y = y0; y < y1; y++) {
-                r->pixels(r->user, y, x0, width, tile + (size_t)(y - y0) * (size_t)width);
-            }
-            if (estimate_mesh(tile, width, y1 - y0, r->step_e, &b->level[k], &b->noise[k],
-                              &b->error[k])) {
+            int k = j * b->columns + i;
+            mesh_pixels m = {band + x0, stride, x1 - x0, y1 - y0};
+            if (estimate_mesh(&m, r->step_e, &b->level[k], &b->noise[k], &b->error[k])) {
                 undo_clipping(r->read_variance, &b->level[k], &b->noise[k]);
             } else {
                 b->noise[k] = -1.0f;
             }
         }
     }
+    bst_borrow_give(b->lent, taken);
 }
 
 /* Mean of `values` with the opposite neighbours that agree; error(k) is the standard error. */
@@ -369,8 +388,9 @@ static void expand_row(const bst_background *b, const float *nodes, bool beyond,
         }
         float left = nodes[a], slope = (nodes[c] - left) * step;
         float origin = centre + (float)(a * b->mesh_px);
-        for (; x < end; x++) {
-            out[x] = left + slope * ((float)x - origin);
+        if (end > x) {
+            bst_row_line(out + x, end - x, left, slope, (float)x - origin);
+            x = end;
         }
     }
 }

@@ -4,6 +4,7 @@
 
 #include <stdbool.h>
 
+#include "imgproc/borrow.h"
 #include "sim/core/parallel.h"
 #include "sim/core/status.h"
 
@@ -18,8 +19,9 @@ typedef struct bst_background {
     float *level, *noise;             /* [rows][columns], electrons */
     float *error;                     /* [rows][columns]: standard error of level over noise */
     float *scratch;                   /* all meshes, for medians and smoothing */
-    float *tiles;                     /* [rows] tiles of one mesh's pixels */
-    size_t tile;                      /* floats of a tile */
+    float *bands;                     /* one for each thread: the pixels of a row of meshes */
+    size_t band;                      /* floats of a band */
+    bst_borrow *lent;                 /* of bands */
     float *row_level, *row_noise;     /* [columns], for one image row */
     float median_level, median_noise;
 } bst_background;
@@ -28,8 +30,9 @@ typedef struct bst_background {
  * several threads at a time. */
 typedef void (*bst_pixel_fn)(const void *user, int y, int x, int count, float *out);
 
+/* For loops on up to `threads` threads. */
 bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int max_height,
-                                 bst_background *out) BST_MUST_CHECK;
+                                 int threads, bst_background *out) BST_MUST_CHECK;
 void bst_background_free(bst_background *background);
 
 /* Estimates level and noise in each mesh of a frame: median and median absolute deviation of a

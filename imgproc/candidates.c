@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { CELL_PX = 16 };
+
 static const float SADDLE_SIGMA = 3.0f, SADDLE_SHARE = 0.15f;
 
 bst_status bst_candidates_create(bst_ctx *ctx, int max_width, int max_height, bst_candidates *out) {
@@ -13,12 +15,14 @@ bst_status bst_candidates_create(bst_ctx *ctx, int max_width, int max_height, bs
     out->items = calloc(n, sizeof *out->items);
     out->order = calloc(n, sizeof *out->order);
     out->maxima = calloc(n, sizeof *out->maxima);
-    out->row = calloc((size_t)max_height + 1, sizeof *out->row);
+    out->by_cell = calloc(n, sizeof *out->by_cell);
+    out->cell = calloc((size_t)(max_width / CELL_PX + 1) * (size_t)(max_height / CELL_PX + 1) + 1,
+                       sizeof *out->cell);
     out->stands = calloc(n, sizeof *out->stands);
     out->order_swap = calloc(n, sizeof *out->order_swap);
     out->key = calloc(n, sizeof *out->key);
     out->key_swap = calloc(n, sizeof *out->key_swap);
-    if (!out->items || !out->order || !out->maxima || !out->row || !out->stands ||
+    if (!out->items || !out->order || !out->maxima || !out->by_cell || !out->cell || !out->stands ||
         !out->order_swap || !out->key || !out->key_swap) {
         bst_candidates_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the candidates of a %d x %d frame",
@@ -31,7 +35,8 @@ void bst_candidates_free(bst_candidates *c) {
     free(c->items);
     free(c->order);
     free(c->maxima);
-    free(c->row);
+    free(c->by_cell);
+    free(c->cell);
     free(c->stands);
     free(c->order_swap);
     free(c->key);
@@ -44,9 +49,11 @@ static bool is_ridge(const bst_filter *f, const bst_candidate *a, const bst_cand
                      float least) {
     int dx = b->x - a->x, dy = b->y - a->y;
     int steps = abs(dx) > abs(dy) ? abs(dx) : abs(dy);
+    float slope_x = (float)dx / (float)steps, slope_y = (float)dy / (float)steps;
     for (int i = 1; i < steps; i++) {
-        float t = (float)i / (float)steps;
-        int x = a->x + (int)lroundf(t * (float)dx), y = a->y + (int)lroundf(t * (float)dy);
+        /* rounded; what is added keeps it positive */
+        int x = a->x + (int)((float)i * slope_x + 4096.5f) - 4096;
+        int y = a->y + (int)((float)i * slope_y + 4096.5f) - 4096;
         if (!(bst_filter_best_at(f, x, y) > least)) {
             return false;
         }
@@ -64,7 +71,7 @@ static bool higher(const bst_candidate *a, const bst_candidate *b) {
 typedef struct search {
     bst_candidates *c;
     const bst_filter *f;
-    int reach;
+    int reach, rows; /* rows of squares */
     float floor, certain;
     bst_candidate_fn accept;
     const void *user;
@@ -73,21 +80,17 @@ typedef struct search {
 static bool stands_alone(const search *s, const bst_candidate *m) {
     const bst_candidates *c = s->c;
     float least = fmaxf(m->snr - fmaxf(SADDLE_SIGMA, SADDLE_SHARE * m->snr), s->floor);
-    int top = m->y - s->reach > 0 ? m->y - s->reach : 0;
-    int bottom = m->y + s->reach < s->f->height ? m->y + s->reach : s->f->height - 1;
-    for (int y = top; y <= bottom; y++) {
-        int lo = c->row[y], hi = c->row[y + 1], end = hi;
-        while (lo < hi) { /* the first within reach */
-            int middle = lo + (hi - lo) / 2;
-            if (c->maxima[middle].x < m->x - s->reach) {
-                lo = middle + 1;
-            } else {
-                hi = middle;
-            }
-        }
-        for (; lo < end && c->maxima[lo].x <= m->x + s->reach; lo++) {
-            const bst_candidate *other = &c->maxima[lo];
-            if (other != m && higher(other, m) && is_ridge(s->f, m, other, least)) {
+    int left = m->x > s->reach ? (m->x - s->reach) / CELL_PX : 0;
+    int right = (m->x + s->reach) / CELL_PX, bottom = (m->y + s->reach) / CELL_PX;
+    right = right < c->columns ? right : c->columns - 1;
+    bottom = bottom < s->rows ? bottom : s->rows - 1;
+    for (int v = m->y > s->reach ? (m->y - s->reach) / CELL_PX : 0; v <= bottom; v++) {
+        const bst_candidate *other = &c->by_cell[c->cell[v * c->columns + left]];
+        const bst_candidate *end = &c->by_cell[c->cell[v * c->columns + right + 1]];
+        for (; other < end; other++) {
+            if (other->snr >= m->snr && abs(other->x - m->x) <= s->reach &&
+                abs(other->y - m->y) <= s->reach && higher(other, m) &&
+                is_ridge(s->f, m, other, least)) {
                 return false;
             }
         }
@@ -138,19 +141,37 @@ static void sort_items(bst_candidates *c) {
     }
 }
 
+/* by_cell: the maxima of each square together, by counting. */
+static void sort_by_cell(bst_candidates *c, int maxima, int cells) {
+    memset(c->cell, 0, ((size_t)cells + 1) * sizeof *c->cell);
+    for (int i = 0; i < maxima; i++) {
+        c->cell[c->maxima[i].y / CELL_PX * c->columns + c->maxima[i].x / CELL_PX + 1]++;
+    }
+    for (int k = 0; k < cells; k++) {
+        c->cell[k + 1] += c->cell[k];
+    }
+    /* filled from the back, each square's first moves to where it belongs */
+    for (int i = maxima - 1; i >= 0; i--) {
+        int k = c->maxima[i].y / CELL_PX * c->columns + c->maxima[i].x / CELL_PX;
+        c->by_cell[--c->cell[k + 1]] = c->maxima[i];
+    }
+    memmove(c->cell, c->cell + 1, (size_t)cells * sizeof *c->cell);
+    c->cell[cells] = maxima;
+}
+
 void bst_candidates_find(bst_candidates *c, bst_parallel *pool, const bst_filter *f, int reach_px,
                          float floor, float certain, bst_candidate_fn accept, const void *user) {
-    int maxima = 0;
+    int maxima = 0, rows = (f->height + CELL_PX - 1) / CELL_PX;
+    c->columns = (f->width + CELL_PX - 1) / CELL_PX;
     for (int y = 0; y < f->height; y++) {
         size_t at = (size_t)y * (size_t)f->max_width;
-        c->row[y] = maxima;
         for (int i = 0; i < f->maxima[y]; i++) {
             c->maxima[maxima++] =
                 (bst_candidate){f->maximum_x[at + (size_t)i], y, f->maximum_snr[at + (size_t)i]};
         }
     }
-    c->row[f->height] = maxima;
-    search s = {c, f, reach_px, floor, certain, accept, user};
+    sort_by_cell(c, maxima, c->columns * rows);
+    search s = {c, f, reach_px, rows, floor, certain, accept, user};
     bst_parallel_for(pool, maxima, 256, decide, &s);
     c->count = 0;
     for (int i = 0; i < maxima; i++) {

@@ -14,8 +14,9 @@ typedef struct bst_candidates {
     bst_candidate *items;
     int *order; /* of items: SNR falling, then y, then x */
     int count, capacity;
-    bst_candidate *maxima; /* all, by row */
-    int *row;              /* [height + 1]: the first of a row */
+    bst_candidate *maxima, *by_cell; /* all, by row, and by square of the frame */
+    int *cell;                       /* the first of each square, by row of squares */
+    int columns;                     /* of squares of the latest frame */
     uint8_t *stands;
     int *order_swap;
     uint32_t *key, *key_swap;

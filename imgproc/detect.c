@@ -72,10 +72,12 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     }
     BST_TRY(make_bad_map(ctx, ip));
     BST_TRY(bst_parallel_create(ctx, (int)ip->config.threads, &ip->pool));
-    BST_TRY(bst_background_create(ctx, (int)ip->config.mesh_px, width, height, &ip->background));
-    BST_TRY(bst_filter_create(ctx, width, height, streak, &ip->filter));
+    BST_TRY(bst_background_create(ctx, (int)ip->config.mesh_px, width, height,
+                                  bst_parallel_threads(ip->pool), &ip->background));
+    BST_TRY(
+        bst_filter_create(ctx, width, height, streak, bst_parallel_threads(ip->pool), &ip->filter));
     BST_TRY(bst_candidates_create(ctx, width, height, &ip->candidates));
-    BST_TRY(bst_locator_create(ctx, capacity, width, height, side, &ip->locator));
+    BST_TRY(bst_locator_create(ctx, ip->pool, capacity, width, height, side, &ip->locator));
     return ip->config.streak_search_px > 0.0
                ? bst_streak_locator_create(ctx, &ip->locator.psf, ip->pool, width, height, fwhm,
                                            ip->config.streak_search_px, &ip->streaks)
@@ -310,7 +312,10 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
     reader read = {ip, frame, width};
     double gain = ip->camera.gain_e_per_dn, read_noise = ip->camera.read_noise_e;
     double read_variance = read_noise * read_noise + gain * gain / 12.0;
-    bst_background_read(&ip->background, ip->pool, read_electrons, &read, width, height,
+    /* a pool that has to wait for processors is slower than one thread that has one */
+    bool alone = frame->beside_another && bst_parallel_threads(ip->pool) <= BST_STEP_LANES;
+    bst_parallel *pool = alone ? NULL : ip->pool;
+    bst_background_read(&ip->background, pool, read_electrons, &read, width, height,
                         (float)ip->camera.gain_e_per_dn, read_variance);
     double dx, dy;
     filter_path(ip, frame, motion, &dx, &dy);
@@ -322,11 +327,11 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
     double threshold =
         bst_filter_threshold(&ip->filter, false_alarms, (double)width * (double)height);
     double look = ip->smeared ? threshold : fmax(0.93 * ip->filter.corner, LOOK_SHARE) * threshold;
-    bst_filter_run(&ip->filter, ip->pool, &ip->background, read_electrons, &read, frame->pixels,
+    bst_filter_run(&ip->filter, pool, &ip->background, read_electrons, &read, frame->pixels,
                    ip->electrons, width, height, saturation_dn(ip, frame), (float)look);
     judge noise = {ip, threshold, read_variance};
     double certain = ip->smeared ? threshold : threshold + CERTAIN_ABOVE;
-    bst_candidates_find(&ip->candidates, ip->pool, &ip->filter,
+    bst_candidates_find(&ip->candidates, pool, &ip->filter,
                         (int)ceil(6.0 * sigma + hypot(dx, dy)) + 2, (float)look, (float)certain,
                         stands_out, &noise);
     bst_locate_frame view = {.signal = ip->electrons,

@@ -10,29 +10,31 @@
 enum { PART_PX = 131072 }; /* pixels of a part of a pass */
 
 bst_status bst_filter_create(bst_ctx *ctx, int max_width, int max_height, double streak_max_px,
-                             bst_filter *out) {
+                             int threads, bst_filter *out) {
     int pad = (int)ceil(0.5 * streak_max_px) + 2;
-    pad = pad > BST_FILTER_MAX_RADIUS + 1 ? pad : BST_FILTER_MAX_RADIUS + 1;
+    /* what looks for maxima reads beyond a row */
+    pad = pad > 2 * BST_ROW_LANES ? pad : 2 * BST_ROW_LANES;
     *out = (bst_filter){.max_width = max_width, .max_height = max_height, .pad = pad};
     size_t pixels = (size_t)max_width * (size_t)max_height;
     size_t line = (size_t)(max_width + 2 * pad);
-    out->most_parts = (int)(pixels / PART_PX) + 2;
-    out->line_floats = line * (2 * BST_FILTER_MAX_RADIUS + 1 + 4);
+    /* five rows and two of meshes, and a ring of rows */
+    out->line_floats = line * (2 * BST_FILTER_MAX_RADIUS + 1 + 7);
     out->point = calloc(line * (size_t)(max_height + 2 * pad), sizeof(float));
-    out->best = calloc(pixels, sizeof(float));
+    out->best = calloc(line * (size_t)(max_height + 2 * pad), sizeof(float));
     out->maxima = calloc((size_t)max_height, sizeof *out->maxima);
     out->maximum_x = calloc(pixels, sizeof *out->maximum_x);
     out->maximum_snr = calloc(pixels, sizeof *out->maximum_snr);
-    out->lines = calloc(out->line_floats * (size_t)out->most_parts, sizeof(float));
-    out->mesh_rows = calloc(2 * (size_t)max_width * (size_t)out->most_parts, sizeof(float));
+    out->lines = calloc(out->line_floats * (size_t)threads, sizeof(float));
+    out->lent = calloc(1, sizeof *out->lent);
     out->edge_x = calloc((size_t)max_width, sizeof(float));
     out->edge_y = calloc((size_t)max_height, sizeof(float));
     if (!out->point || !out->best || !out->maxima || !out->maximum_x || !out->maximum_snr ||
-        !out->lines || !out->mesh_rows || !out->edge_x || !out->edge_y) {
+        !out->lines || !out->lent || !out->edge_x || !out->edge_y) {
         bst_filter_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the filters of a %d x %d frame",
                         max_width, max_height);
     }
+    bst_borrow_init(out->lent, threads);
     return BST_OK;
 }
 
@@ -43,7 +45,7 @@ void bst_filter_free(bst_filter *f) {
     free(f->maximum_x);
     free(f->maximum_snr);
     free(f->lines);
-    free(f->mesh_rows);
+    free(f->lent);
     free(f->edge_x);
     free(f->edge_y);
     *f = (bst_filter){0};
@@ -294,36 +296,58 @@ typedef struct pass {
     const uint16_t *raw;
     float *signal;
     int saturated_dn, part_rows;
+    int reach; /* rows above and below that a row of the streak map needs */
     float threshold;
 } pass;
 
-static const float *best_row(const bst_filter *f, int y) {
-    return f->streak ? f->best + (size_t)y * (size_t)f->width
-                     : f->point + (size_t)(y + f->pad) * (size_t)f->stride + (size_t)f->pad;
+static float *map_row(const bst_filter *f, float *map, int y) {
+    return map + (long)(y + f->pad) * (long)f->stride + f->pad;
 }
 
-/* Needs the rows above and below. */
+/* Needs the rows above and below; those beyond the frame are 0. */
 static void find_maxima(bst_filter *f, int y, float threshold) {
     size_t at = (size_t)y * (size_t)f->max_width;
-    const float *row = best_row(f, y);
-    f->maxima[y] = bst_row_maxima(y > 0 ? best_row(f, y - 1) : NULL, row,
-                                  y + 1 < f->height ? best_row(f, y + 1) : NULL, f->width,
-                                  threshold, f->maximum_x + at, f->maximum_snr + at);
+    const float *row = map_row(f, f->streak ? f->best : f->point, y);
+    f->maxima[y] = bst_row_maxima(row - f->stride, row, row + f->stride, f->width, threshold,
+                                  f->maximum_x + at, f->maximum_snr + at);
 }
 
-/* Rows begin to end of the point map, with the rows of signal that are theirs. */
-static void filter_points(void *user, int begin, int end) {
+/* Needs the rows of the point map that the taps reach. */
+static void filter_streak(bst_filter *f, int y) {
+    const float *in[BST_FILTER_MAX_TAPS], *point = map_row(f, f->point, y);
+    for (int t = 0; t < f->taps; t++) {
+        in[t] = point + (long)f->tap_y[t] * (long)f->stride + f->tap_x[t];
+    }
+    float *row = map_row(f, f->best, y);
+    bst_row_combine(row, f->width, in, f->tap_weight, f->taps);
+    bst_row_greater(row, point, f->width);
+}
+
+/* The kernel's cut at the frame's edges. */
+static void mend_edges(const bst_filter *f, int y, float *row) {
+    int r = f->radius < f->width ? f->radius : f->width, last = f->width - r;
+    if (f->edge_y[y] != 1.0f || last < r) {
+        bst_row_scale(row, f->edge_x, f->edge_y[y], f->width);
+    } else {
+        bst_row_scale(row, f->edge_x, 1.0f, r);
+        bst_row_scale(row + last, f->edge_x + last, 1.0f, r);
+    }
+}
+
+/* Rows begin to end of the point map, with the rows of signal that are theirs; of the streak map
+ * and of maxima, those that need no other rows. */
+static void filter_rows(void *user, int begin, int end) {
     const pass *p = user;
     bst_filter *f = p->f;
-    int width = f->width, r = f->radius, taps = 2 * r + 1, padded = (taps + 3) / 4 * 4;
-    int part = begin / p->part_rows;
+    int width = f->width, r = f->radius, taps = 2 * r + 1;
     size_t line = (size_t)f->stride;
-    float *normalised = f->lines + f->line_floats * (size_t)part, *level = normalised + line,
+    int taken = bst_borrow_take(f->lent);
+    float *normalised = f->lines + f->line_floats * (size_t)taken, *level = normalised + line,
           *inverse = level + line, *halo = inverse + line, *ring = halo + line;
     bst_background background = *p->background;
-    background.row_level = f->mesh_rows + 2 * (size_t)f->max_width * (size_t)part;
-    background.row_noise = background.row_level + f->max_width;
-    const float *in[2 * BST_FILTER_MAX_RADIUS + 4];
+    background.row_level = ring + line * (size_t)taps;
+    background.row_noise = background.row_level + line;
+    const float *in[2 * BST_FILTER_MAX_RADIUS + 1], *const *middle = in + r;
     memset(normalised, 0, line * sizeof(float));
     for (int y = begin - r; y < end + r; y++) {
         float *horizontal = ring + line * (size_t)((y + taps) % taps);
@@ -335,10 +359,10 @@ static void filter_points(void *user, int begin, int end) {
             bst_background_row(&background, y, level, inverse);
             bst_row_normalise(p->raw + row, signal, level, inverse, width, p->saturated_dn, signal,
                               normalised + r);
-            for (int t = 0; t < padded; t++) {
-                in[t] = normalised + (t < taps ? t : 0);
+            for (int t = 0; t < taps; t++) {
+                in[t] = normalised + t;
             }
-            bst_row_combine(horizontal, width, in, f->kernel, padded);
+            bst_row_even(horizontal, width, middle, f->kernel + r, r);
         } else {
             memset(horizontal, 0, (size_t)width * sizeof(float));
         }
@@ -346,34 +370,44 @@ static void filter_points(void *user, int begin, int end) {
         if (centre < begin) {
             continue;
         }
-        for (int t = 0; t < padded; t++) {
-            int source = centre - r + (t < taps ? t : 0);
-            in[t] = ring + line * (size_t)((source + taps) % taps);
+        for (int t = 0; t < taps; t++) {
+            in[t] = ring + line * (size_t)((centre - r + t + taps) % taps);
         }
-        float *out = f->point + (size_t)(centre + f->pad) * line + (size_t)f->pad;
-        bst_row_combine(out, width, in, f->kernel, padded);
-        bst_row_scale(out, f->edge_x, f->edge_y[centre], width);
-        if (!f->streak && centre - 2 >= begin) {
-            find_maxima(f, centre - 1, p->threshold);
+        float *out = map_row(f, f->point, centre);
+        bst_row_even(out, width, middle, f->kernel + r, r);
+        mend_edges(f, centre, out);
+        int ready = centre - p->reach;
+        if (f->streak && ready >= begin + p->reach) {
+            filter_streak(f, ready);
+        }
+        if (ready - 2 >= begin + p->reach) {
+            find_maxima(f, ready - 1, p->threshold);
+        }
+    }
+    bst_borrow_give(f->lent, taken);
+}
+
+/* Whether a row depends on rows of other parts, `reach` away. */
+static bool is_border(const pass *p, int y, int reach) {
+    int begin = y / p->part_rows * p->part_rows, end = begin + p->part_rows;
+    end = end < p->f->height ? end : p->f->height;
+    return y < begin + reach || y >= end - reach;
+}
+
+static void finish_streaks(void *user, int begin, int end) {
+    const pass *p = user;
+    for (int y = begin; y < end; y++) {
+        if (is_border(p, y, p->reach)) {
+            filter_streak(p->f, y);
         }
     }
 }
 
-static void filter_streaks(void *user, int begin, int end) {
+static void finish_maxima(void *user, int begin, int end) {
     const pass *p = user;
-    bst_filter *f = p->f;
-    size_t line = (size_t)f->stride;
-    const float *in[BST_FILTER_MAX_TAPS];
     for (int y = begin; y < end; y++) {
-        const float *point = f->point + (size_t)(y + f->pad) * line + (size_t)f->pad;
-        for (int t = 0; t < f->taps; t++) {
-            in[t] = point + (long)f->tap_y[t] * (long)line + f->tap_x[t];
-        }
-        float *row = f->best + (size_t)y * (size_t)f->width;
-        bst_row_combine(row, f->width, in, f->tap_weight, f->taps);
-        bst_row_greater(row, point, f->width);
-        if (y - 2 >= begin) {
-            find_maxima(f, y - 1, p->threshold);
+        if (is_border(p, y, p->reach + 1)) {
+            find_maxima(p->f, y, p->threshold);
         }
     }
 }
@@ -385,23 +419,23 @@ void bst_filter_run(bst_filter *f, bst_parallel *pool, const bst_background *bac
         f->width = width;
         f->height = height;
         f->stride = width + 2 * f->pad;
-        memset(f->point, 0, (size_t)f->stride * (size_t)(height + 2 * f->pad) * sizeof(float));
+        size_t bytes = (size_t)f->stride * (size_t)(height + 2 * f->pad) * sizeof(float);
+        memset(f->point, 0, bytes);
+        memset(f->best, 0, bytes);
     }
     edge_factors(f, width, f->edge_x);
     edge_factors(f, height, f->edge_y);
     /* large parts: each reads 2 radius rows of its neighbours again */
-    int rows = PART_PX / width > 0 ? PART_PX / width : 1;
-    rows = (height + rows - 1) / rows < f->most_parts ? rows : height / f->most_parts + 1;
-    pass p = {f, background, read, user, raw, signal, saturated_dn, rows, threshold};
-    bst_parallel_for(pool, height, rows, filter_points, &p);
+    int rows = PART_PX / width > 0 ? PART_PX / width : 1, reach = 0;
+    for (int t = 0; t < f->taps; t++) {
+        reach = abs(f->tap_y[t]) > reach ? abs(f->tap_y[t]) : reach;
+    }
+    pass p = {f, background, read, user, raw, signal, saturated_dn, rows, reach, threshold};
+    bst_parallel_for(pool, height, rows, filter_rows, &p);
     if (f->streak) {
-        bst_parallel_for(pool, height, rows, filter_streaks, &p);
+        bst_parallel_for(pool, height, rows, finish_streaks, &p);
     }
-    for (int y = 0; y < height; y++) {
-        if (y % rows == 0 || y % rows == rows - 1 || y == height - 1) {
-            find_maxima(f, y, threshold);
-        }
-    }
+    bst_parallel_for(pool, height, rows, finish_maxima, &p);
 }
 
 float bst_filter_streak_at(const bst_filter *f, int x, int y) {
@@ -455,8 +489,28 @@ static double point_peak(const bst_filter *f, const float *signal, double noise_
     return (best + more) / noise_e;
 }
 
+/* Gain of the top of a quadratic through 3 x 3 logarithms over its middle, and its place. */
+static double quadratic_top(double v[3][3], double *dx, double *dy) {
+    double gx = 0.5 * (v[1][2] - v[1][0]), gy = 0.5 * (v[2][1] - v[0][1]);
+    double hxx = v[1][2] - 2.0 * v[1][1] + v[1][0], hyy = v[2][1] - 2.0 * v[1][1] + v[0][1];
+    double hxy = 0.25 * (v[2][2] - v[2][0] - v[0][2] + v[0][0]);
+    double det = hxx * hyy - hxy * hxy, gain = 0.0;
+    *dx = *dy = 0.0;
+    if (hxx < 0.0 && hyy < 0.0 && det > 1e-3 * hxx * hyy) {
+        *dx = (hxy * gy - hyy * gx) / det;
+        *dy = (hxy * gx - hxx * gy) / det;
+        gain = 0.5 * (gx * *dx + gy * *dy);
+    } else if (hxx + hyy < 0.0) {
+        *dx = hxx < hyy ? -gx / hxx : 0.0;
+        *dy = hxx < hyy ? 0.0 : -gy / hyy;
+        gain = 0.5 * (gx * *dx + gy * *dy);
+    }
+    /* half a pixel off on both axes costs no filter more than this */
+    return fmin(fmax(gain, 0.0), 0.3);
+}
+
 static double streak_peak(const bst_filter *f, int x, int y) {
-    double v[3][3];
+    double v[3][3], dx, dy;
     double here = (double)bst_filter_streak_at(f, x, y);
     if (x < 1 || y < 1 || x + 1 >= f->width || y + 1 >= f->height || !(here > 0.0)) {
         return here;
@@ -467,17 +521,26 @@ static double streak_peak(const bst_filter *f, int x, int y) {
             v[j][i] = log(fmax(s, 0.05 * here));
         }
     }
-    double gx = 0.5 * (v[1][2] - v[1][0]), gy = 0.5 * (v[2][1] - v[0][1]);
-    double hxx = v[1][2] - 2.0 * v[1][1] + v[1][0], hyy = v[2][1] - 2.0 * v[1][1] + v[0][1];
-    double hxy = 0.25 * (v[2][2] - v[2][0] - v[0][2] + v[0][0]);
-    double det = hxx * hyy - hxy * hxy, gain = 0.0;
-    if (hxx < 0.0 && hyy < 0.0 && det > 1e-3 * hxx * hyy) {
-        gain = -0.5 * (gx * gx * hyy - 2.0 * gx * gy * hxy + gy * gy * hxx) / det;
-    } else if (hxx + hyy < 0.0) {
-        gain = hxx < hyy ? -0.5 * gx * gx / hxx : -0.5 * gy * gy / hyy;
+    return here * exp(quadratic_top(v, &dx, &dy));
+}
+
+double bst_filter_top(const bst_filter *f, bool point, int x, int y, double *dx, double *dy) {
+    const float *map = map_row(f, point || !f->streak ? f->point : f->best, y) + x;
+    double v[3][3], here = (double)*map;
+    *dx = *dy = 0.0;
+    if (x < 1 || y < 1 || x + 1 >= f->width || y + 1 >= f->height || !(here > 0.0)) {
+        return here;
     }
-    /* half a pixel off on both axes costs no filter more than this */
-    return here * exp(fmin(fmax(gain, 0.0), 0.3));
+    for (int j = 0; j < 3; j++) {
+        for (int i = 0; i < 3; i++) {
+            float s = map[(j - 1) * f->stride + i - 1];
+            v[j][i] = (double)logf(fmaxf(s, 0.05f * (float)here));
+        }
+    }
+    double gain = quadratic_top(v, dx, dy);
+    *dx = fmin(fmax(*dx, -0.7), 0.7);
+    *dy = fmin(fmax(*dy, -0.7), 0.7);
+    return here * exp(gain);
 }
 
 double bst_filter_peak(const bst_filter *f, const float *signal, double noise_e, bool streak, int x,

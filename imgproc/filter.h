@@ -17,16 +17,15 @@ typedef struct bst_filter {
     int max_width, max_height, pad, stride; /* of the padded map */
     int width, height;                      /* of the latest frame */
     float *point;                           /* padded map: SNR for a point */
-    float *best;                            /* [height][width]: the greater SNR, if streak */
+    float *best;                            /* the same of the greater SNR, if streak */
     /* pixels above the threshold whose neighbours have a lower SNR: those of row y from index
      * y * max_width on, ascending */
     int *maxima; /* [height] */
     int32_t *maximum_x;
     float *maximum_snr;
-    float *lines;       /* work space of each part of the passes */
-    size_t line_floats; /* of one part */
-    int most_parts;
-    float *mesh_rows; /* the same, for rows of the background */
+    float *lines;       /* work space of each thread */
+    size_t line_floats; /* of one */
+    bst_borrow *lent;   /* of lines */
     float *edge_x,
         *edge_y; /* 1 / norm of the kernel's part inside the frame, over the whole norm */
     /* the PSF, one axis, unit norm */
@@ -52,8 +51,9 @@ typedef struct bst_filter {
     float phase[BST_FILTER_PHASES][2 * BST_FILTER_MAX_RADIUS + 3]; /* one axis, shifted */
 } bst_filter;
 
+/* For loops on up to `threads` threads. */
 bst_status bst_filter_create(bst_ctx *ctx, int max_width, int max_height, double streak_max_px,
-                             bst_filter *out) BST_MUST_CHECK;
+                             int threads, bst_filter *out) BST_MUST_CHECK;
 void bst_filter_free(bst_filter *filter);
 
 /* Prepares the kernels: a Gaussian of sigma_px integrated over pixels, and, unless dx and dy are
@@ -88,8 +88,13 @@ static inline float bst_filter_point_at(const bst_filter *f, int x, int y) {
 }
 /* The greater output. */
 static inline float bst_filter_best_at(const bst_filter *f, int x, int y) {
-    return f->streak ? f->best[(long)y * f->width + x] : bst_filter_point_at(f, x, y);
+    return (f->streak ? f->best : f->point)[(long)(y + f->pad) * f->stride + x + f->pad];
 }
+/* The top between the pixels near a maximum (x, y) of the greater output, or of the point output,
+ * by a quadratic through the logarithms of 3 x 3 outputs; (dx, dy): its place less (x, y), up to
+ * 0.7 px. Quicker than bst_filter_peak, and good to about 1 %. */
+double bst_filter_top(const bst_filter *filter, bool point, int x, int y, double *dx, double *dy);
+
 /* The streak output at a pixel of the latest frame; only when filter->streak. */
 float bst_filter_streak_at(const bst_filter *filter, int x, int y);
 

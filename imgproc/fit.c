@@ -6,18 +6,25 @@
 
 #include "imgproc/background.h"
 
-enum { MAX_ITERATIONS = 15 };
+enum { MAX_ITERATIONS = 15, MAX_SUMS = BST_FIT_MAX_PARAMETERS * (BST_FIT_MAX_PARAMETERS + 3) / 2 };
 
-bst_status bst_fit_create(bst_ctx *ctx, const bst_psf *psf, int max_side, bst_fit *out) {
-    size_t pixels = (size_t)max_side * (size_t)max_side;
-    *out = (bst_fit){.psf = psf, .max_pixels = (int)pixels};
-    out->value = calloc(pixels, sizeof(double));
-    out->fixed = calloc(pixels, sizeof(double));
-    out->valid = calloc(pixels, sizeof(double));
-    out->model = calloc(pixels * 4 * BST_FIT_MAX_FREE, sizeof(double));
-    if (!out->value || !out->fixed || !out->valid || !out->model) {
+/* steps below this share of the standard deviation, and for neighbours, whose values are not kept:
+ * what is left after such a step is a small part of it */
+static const double SETTLED = 0.03, NEIGHBOUR_SETTLED = 0.1;
+
+bst_status bst_fit_create(bst_ctx *ctx, const bst_psf *psf, const bst_profiles *profiles,
+                          int max_side, bst_fit *out) {
+    size_t plane = (size_t)max_side * (size_t)bst_lanes_up(max_side);
+    *out = (bst_fit){.psf = psf, .profiles = profiles, .max_side = max_side};
+    out->value = calloc(plane, sizeof(float));
+    out->fixed = calloc(plane, sizeof(float));
+    out->valid = calloc(plane, sizeof(float));
+    out->model = calloc(plane * 4 * BST_FIT_MAX_FREE, sizeof(float));
+    out->scratch = calloc(bst_image_scratch(max_side), sizeof(float));
+    if (!out->value || !out->fixed || !out->valid || !out->model || !out->scratch) {
         bst_fit_free(out);
-        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a fit on %zu pixels", pixels);
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a fit on %d x %d pixels", max_side,
+                        max_side);
     }
     return BST_OK;
 }
@@ -27,6 +34,7 @@ void bst_fit_free(bst_fit *fit) {
     free(fit->fixed);
     free(fit->valid);
     free(fit->model);
+    free(fit->scratch);
     *fit = (bst_fit){0};
 }
 
@@ -43,37 +51,65 @@ bst_stamp bst_fit_stamp(const bst_source *source, double reach_px, int max_side,
     return (bst_stamp){x0, y0, x1 >= x0 ? x1 - x0 + 1 : 0, y1 >= y0 ? y1 - y0 + 1 : 0};
 }
 
+static int plane_of(const bst_stamp *stamp) {
+    return bst_lanes_up(stamp->width) * stamp->height;
+}
+
+static bool fits_in(const bst_fit *fit, const bst_stamp *stamp) {
+    return stamp->width > 0 && stamp->height > 0 && stamp->width <= fit->max_side &&
+           stamp->height <= fit->max_side;
+}
+
 /* Renders a source into slot k of the work space. */
-static double *render(const bst_fit *fit, const bst_stamp *stamp, const bst_source *source, int k) {
-    size_t n = (size_t)stamp->width * (size_t)stamp->height;
-    double *m = fit->model + (size_t)k * 4 * n;
-    bst_psf_render(fit->psf, &source->shape, stamp, m, m + n, m + 2 * n, m + 3 * n);
+static float *render(const bst_fit *fit, const bst_stamp *stamp, const bst_source *source, int k) {
+    float *m = fit->model + (size_t)k * 4 * (size_t)plane_of(stamp);
+    bst_image_render(fit->profiles, fit->psf, &source->shape, stamp, fit->scratch, m);
     return m;
+}
+
+/* fixed += flux (share + widening by_variance) */
+BST_CLONES
+static void add_light(float *restrict fixed, const float *restrict m, int n, float flux,
+                      float widening) {
+    for (int i = 0; i < n; i += BST_LANES) {
+        bst_lanes share = BST_LOAD(m + i) + widening * BST_LOAD(m + 3 * n + i);
+        BST_STORE(fixed + i, BST_LOAD(fixed + i) + flux * share);
+    }
+}
+
+/* value and valid of the stamp's pixels; returns the number of those that count. */
+BST_CLONES
+static int load_pixels(const bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp) {
+    int stride = bst_lanes_up(stamp->width);
+    bst_lanes count = {0};
+    for (int j = 0; j < stamp->height; j++) {
+        const float *row =
+            data->signal + (size_t)(stamp->y0 + j) * (size_t)data->width + (size_t)stamp->x0;
+        float *value = fit->value + j * stride, *valid = fit->valid + j * stride;
+        BST_STORE(value + stride - BST_LANES, (bst_lanes){0} + BST_PIXEL_BAD);
+        memcpy(value, row, (size_t)stamp->width * sizeof *row);
+        for (int i = 0; i < stride; i += BST_LANES) {
+            bst_lanes v = BST_LOAD(value + i);
+            bst_lane_ints use = v > BST_PIXEL_NONE;
+            bst_lanes one = (bst_lanes)((bst_lane_ints)((bst_lanes){0} + 1.0f) & use);
+            BST_STORE(value + i, (bst_lanes)((bst_lane_ints)v & use));
+            BST_STORE(valid + i, one);
+            count += one;
+        }
+    }
+    return (int)bst_lane_sum((const float *)&count);
 }
 
 /* Loads pixels and the fixed sources' light; returns the number of pixels that count. */
 static int load(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
                 const bst_source *const *fixed, int fixed_count) {
-    int n = stamp->width * stamp->height, valid = 0;
-    memset(fit->fixed, 0, (size_t)n * sizeof(double));
+    int n = plane_of(stamp);
+    memset(fit->fixed, 0, (size_t)n * sizeof(float));
     for (int s = 0; s < fixed_count; s++) {
-        const double *m = render(fit, stamp, fixed[s], 0), *v = m + 3 * (size_t)n;
-        for (int i = 0; i < n; i++) {
-            fit->fixed[i] += fixed[s]->flux_e * (m[i] + fixed[s]->widening_px2 * v[i]);
-        }
+        const float *m = render(fit, stamp, fixed[s], 0);
+        add_light(fit->fixed, m, n, (float)fixed[s]->flux_e, (float)fixed[s]->widening_px2);
     }
-    for (int j = 0; j < stamp->height; j++) {
-        const float *row =
-            data->signal + (size_t)(stamp->y0 + j) * (size_t)data->width + (size_t)stamp->x0;
-        for (int i = 0; i < stamp->width; i++) {
-            int k = j * stamp->width + i;
-            bool use = row[i] > BST_PIXEL_NONE;
-            fit->valid[k] = use ? 1.0 : 0.0;
-            fit->value[k] = use ? (double)row[i] : 0.0;
-            valid += use;
-        }
-    }
-    return valid;
+    return load_pixels(fit, data, stamp);
 }
 
 /* Lower Cholesky factor in place; false when not positive definite. */
@@ -113,48 +149,103 @@ static void solve(double l[][BST_FIT_MAX_PARAMETERS], int n, double *b) {
     }
 }
 
+/* What the normal equations are summed from. */
+typedef struct terms {
+    const float *value, *fixed, *valid;
+    const float *model[BST_FIT_MAX_FREE]; /* by x, by y and by variance follow at n, 2 n, 3 n */
+    float flux[BST_FIT_MAX_FREE], widening[BST_FIT_MAX_FREE];
+    int n;
+    float noise2;
+} terms;
+
+/* Sums over the pixels: of each row p of the matrix its columns q <= p, then w_p r, and last
+ * chi-square. Called with constants, so that sums are registers. */
+static inline __attribute__((always_inline)) void sum_terms(const terms *t, int count,
+                                                            bool free_width, float *out) {
+    int n = t->n, parameters = 3 * count + (free_width ? 1 : 0);
+    int sums = parameters * (parameters + 3) / 2 + 1;
+    bst_lanes sum[MAX_SUMS + 1];
+    for (int k = 0; k < sums; k++) {
+        sum[k] = (bst_lanes){0};
+    }
+    for (int i = 0; i < n; i += BST_LANES) {
+        bst_lanes j[BST_FIT_MAX_PARAMETERS], total = BST_LOAD(t->fixed + i);
+        for (int s = 0; s < count; s++) {
+            const float *m = t->model[s] + i;
+            bst_lanes still = BST_LOAD(m), by_variance = BST_LOAD(m + 3 * n);
+            bst_lanes share = still + t->widening[s] * by_variance;
+            total += t->flux[s] * share;
+            j[3 * s] = t->flux[s] * BST_LOAD(m + n);
+            j[3 * s + 1] = t->flux[s] * BST_LOAD(m + 2 * n);
+            j[3 * s + 2] = s == 0 && free_width ? still : share;
+            if (s == 0 && free_width) {
+                j[3 * count] = by_variance;
+            }
+        }
+        bst_lanes weight = BST_LOAD(t->valid + i) / (t->noise2 + BST_ABOVE_0(total));
+        bst_lanes r = BST_LOAD(t->value + i) - total, wr = weight * r;
+        int k = 0;
+        for (int p = 0; p < parameters; p++) {
+            bst_lanes wj = weight * j[p];
+            for (int q = 0; q <= p; q++) {
+                sum[k++] += wj * j[q];
+            }
+            sum[k++] += wr * j[p];
+        }
+        sum[k] += wr * r;
+    }
+    for (int k = 0; k < sums; k++) {
+        BST_STORE(out + k * BST_LANES, sum[k]);
+    }
+}
+
+BST_CLONES static void sum_point(const terms *t, float *out) {
+    sum_terms(t, 1, false, out);
+}
+BST_CLONES static void sum_wide(const terms *t, float *out) {
+    sum_terms(t, 1, true, out);
+}
+BST_CLONES static void sum_pair(const terms *t, float *out) {
+    sum_terms(t, 2, false, out);
+}
+BST_CLONES static void sum_group(const terms *t, int count, float *out) {
+    sum_terms(t, count, false, out);
+}
+
 /* Normal equations at the current sources. Parameters: x, y, flux of each, then the product of flux
- * and widening of the first. Returns chi-square. */
+ * and widening of the first (only when it is alone). Returns chi-square. */
 static double accumulate(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
                          bst_source *const *free, int count, bool free_width,
                          double a[][BST_FIT_MAX_PARAMETERS], double *g) {
-    int n = stamp->width * stamp->height, parameters = 3 * count + (free_width ? 1 : 0);
+    terms t = {.value = fit->value,
+               .fixed = fit->fixed,
+               .valid = fit->valid,
+               .n = plane_of(stamp),
+               .noise2 = (float)(data->noise_e * data->noise_e)};
     for (int s = 0; s < count; s++) {
-        render(fit, stamp, free[s], s);
+        t.model[s] = render(fit, stamp, free[s], s);
+        t.flux[s] = (float)free[s]->flux_e;
+        t.widening[s] = (float)free[s]->widening_px2;
     }
-    for (int p = 0; p < parameters; p++) {
-        g[p] = 0.0;
-        for (int q = 0; q <= p; q++) {
-            a[p][q] = 0.0;
-        }
+    float sums[(MAX_SUMS + 1) * BST_LANES];
+    if (count == 1 && free_width) {
+        sum_wide(&t, sums);
+    } else if (count == 1) {
+        sum_point(&t, sums);
+    } else if (count == 2) {
+        sum_pair(&t, sums);
+    } else {
+        sum_group(&t, count, sums);
     }
-    double noise2 = data->noise_e * data->noise_e, chi = 0.0;
-    for (int i = 0; i < n; i++) {
-        double j[BST_FIT_MAX_PARAMETERS], total = fit->fixed[i];
-        for (int s = 0; s < count; s++) {
-            const double *m = fit->model + (size_t)s * 4 * (size_t)n + (size_t)i;
-            double share = m[0] + free[s]->widening_px2 * m[3 * (size_t)n];
-            total += free[s]->flux_e * share;
-            j[3 * s] = free[s]->flux_e * m[(size_t)n];
-            j[3 * s + 1] = free[s]->flux_e * m[2 * (size_t)n];
-            j[3 * s + 2] = share;
-            if (s == 0 && free_width) {
-                j[2] = m[0];
-                j[3 * count] = m[3 * (size_t)n];
-            }
+    const float *at = sums;
+    for (int p = 0; p < 3 * count + (free_width ? 1 : 0); p++) {
+        for (int q = 0; q <= p; q++, at += BST_LANES) {
+            a[p][q] = bst_lane_sum(at);
         }
-        double weight = fit->valid[i] / (noise2 + fmax(total, 0.0));
-        double r = fit->value[i] - total;
-        chi += weight * r * r;
-        for (int p = 0; p < parameters; p++) {
-            double wj = weight * j[p];
-            g[p] += wj * r;
-            for (int q = 0; q <= p; q++) {
-                a[p][q] += wj * j[q];
-            }
-        }
+        g[p] = bst_lane_sum(at);
+        at += BST_LANES;
     }
-    return chi;
+    return bst_lane_sum(at);
 }
 
 static double clamp(double v, double lo, double hi) {
@@ -164,8 +255,9 @@ static double clamp(double v, double lo, double hi) {
 bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
                  bst_source *const *free, int free_count, const bst_source *const *fixed,
                  int fixed_count, bool free_width, double limit_px) {
-    int n = stamp->width * stamp->height, parameters = 3 * free_count + (free_width ? 1 : 0);
-    if (n <= 0 || n > fit->max_pixels || free_count < 1 || free_count > BST_FIT_MAX_FREE) {
+    free_width = free_width && free_count == 1;
+    int parameters = 3 * free_count + (free_width ? 1 : 0);
+    if (!fits_in(fit, stamp) || free_count < 1 || free_count > BST_FIT_MAX_FREE) {
         return false;
     }
     int pixels = load(fit, data, stamp, fixed, fixed_count);
@@ -204,9 +296,8 @@ bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
                              start[s].shape.x_px - limit_px, start[s].shape.x_px + limit_px);
             double y = clamp(f->shape.y_px + clamp(step[1], -0.7, 0.7),
                              start[s].shape.y_px - limit_px, start[s].shape.y_px + limit_px);
-            /* a hundredth of the standard deviation that the diagonal promises, at least 1e-5 px; a
-             * tenth for the neighbours, whose values are not kept */
-            double share = s == 0 ? 0.01 : 0.1;
+            /* of the standard deviation that the diagonal promises, at least 1e-5 px */
+            double share = s == 0 ? SETTLED : NEIGHBOUR_SETTLED;
             double slack_x = fmax(1e-5, share / a[3 * s][3 * s]);
             double slack_y = fmax(1e-5, share / a[3 * s + 1][3 * s + 1]);
             settled =
@@ -264,17 +355,61 @@ bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
 
 double bst_fit_norm(const bst_fit *fit, const bst_stamp *stamp) {
     double sum = 0.0;
-    for (int i = 0; i < stamp->width * stamp->height; i++) {
-        sum += fit->model[i] * fit->model[i];
+    int stride = bst_lanes_up(stamp->width);
+    for (int j = 0; j < stamp->height; j++) {
+        for (int i = 0; i < stamp->width; i++) {
+            double m = (double)fit->model[j * stride + i];
+            sum += m * m;
+        }
     }
     return sqrt(sum);
+}
+
+/* Sums of v, v x^2, v x y and v y^2 for v = exp(-(a x^2 + 2 b x y + c y^2) / 2) d, x and y from a
+ * place of the stamp, d what the fixed sources leave of the stamp's pixels. */
+BST_CLONES
+static void sum_moments(const bst_fit *fit, const bst_stamp *stamp, const double place[2],
+                        const double window[3], float *out) {
+    int stride = bst_lanes_up(stamp->width);
+    float a = (float)(-0.5 * window[0]), b = (float)-window[1], c = (float)(-0.5 * window[2]);
+    bst_lanes step, sum = {0}, xx = {0}, xy = {0}, yy = {0};
+    for (int i = 0; i < BST_LANES; i++) {
+        step[i] = (float)i;
+    }
+    for (int j = 0; j < stamp->height; j++) {
+        float y = (float)(j - place[1]);
+        for (int i = 0; i < stride; i += BST_LANES) {
+            int k = j * stride + i;
+            bst_lanes x = step + (float)(i - place[0]);
+            bst_lanes q = a * x * x + b * y * x + c * y * y;
+            /* beyond e^-80 nothing counts */
+            q = (bst_lanes)((bst_lane_ints)(q + 80.0f) & (q > -80.0f)) - 80.0f;
+            /* 2^power times the Taylor series of what is left, |r| <= ln 2 */
+            bst_lane_ints power = __builtin_convertvector(q * 1.44269504f, bst_lane_ints);
+            bst_lanes r = q - 0.693147181f * __builtin_convertvector(power, bst_lanes);
+            bst_lanes e = 1.0f / 720.0f + r * (1.0f / 5040.0f);
+            e = 1.0f / 24.0f + r * (1.0f / 120.0f + r * e);
+            e = 1.0f + r * (1.0f + r * (0.5f + r * (1.0f / 6.0f + r * e)));
+            e = (bst_lanes)((bst_lane_ints)e + power * (1 << 23));
+            bst_lanes v = e * BST_LOAD(fit->valid + k) *
+                          (BST_LOAD(fit->value + k) - BST_LOAD(fit->fixed + k));
+            sum += v;
+            xx += v * x * x;
+            xy += v * x * y;
+            yy += v * y * y;
+        }
+    }
+    BST_STORE(out, sum);
+    BST_STORE(out + BST_LANES, xx);
+    BST_STORE(out + 2 * BST_LANES, xy);
+    BST_STORE(out + 3 * BST_LANES, yy);
 }
 
 bool bst_fit_moments(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
                      const bst_source *source, const bst_source *const *fixed, int fixed_count,
                      double out[3]) {
-    int n = stamp->width * stamp->height;
-    if (n <= 0 || n > fit->max_pixels || load(fit, data, stamp, fixed, fixed_count) < n) {
+    if (!fits_in(fit, stamp) ||
+        load(fit, data, stamp, fixed, fixed_count) < stamp->width * stamp->height) {
         return false;
     }
     const bst_shape *s = &source->shape;
@@ -284,20 +419,11 @@ bool bst_fit_moments(bst_fit *fit, const bst_fit_data *data, const bst_stamp *st
     double wxx = 2.0 * (base + path[0]), wxy = 2.0 * path[1], wyy = 2.0 * (base + path[2]);
     double det = wxx * wyy - wxy * wxy;
     double ixx = wyy / det, iyy = wxx / det, ixy = -wxy / det;
-    double sum = 0.0, mxx = 0.0, mxy = 0.0, myy = 0.0;
-    for (int j = 0; j < stamp->height; j++) {
-        double y = stamp->y0 + j - s->y_px;
-        for (int i = 0; i < stamp->width; i++) {
-            double x = stamp->x0 + i - s->x_px;
-            double q = ixx * x * x + 2.0 * ixy * x * y + iyy * y * y;
-            int k = j * stamp->width + i;
-            double v = exp(-0.5 * q) * (fit->value[k] - fit->fixed[k]);
-            sum += v;
-            mxx += v * x * x;
-            mxy += v * x * y;
-            myy += v * y * y;
-        }
-    }
+    float sums[4 * BST_LANES];
+    sum_moments(fit, stamp, (const double[2]){s->x_px - stamp->x0, s->y_px - stamp->y0},
+                (const double[3]){ixx, ixy, iyy}, sums);
+    double sum = bst_lane_sum(sums), mxx = bst_lane_sum(sums + BST_LANES);
+    double mxy = bst_lane_sum(sums + 2 * BST_LANES), myy = bst_lane_sum(sums + 3 * BST_LANES);
     if (!(sum > 0.0)) {
         return false;
     }

@@ -4,7 +4,7 @@
 
 #include <stdbool.h>
 
-#include "imgproc/psf.h"
+#include "imgproc/image.h"
 #include "sim/core/status.h"
 
 enum { BST_FIT_MAX_FREE = 5, BST_FIT_MAX_PARAMETERS = 3 * BST_FIT_MAX_FREE + 1 };
@@ -28,15 +28,18 @@ typedef struct bst_fit_data {
     double noise_e; /* of the background, at the source */
 } bst_fit_data;
 
+/* Work space; the planes are [height][width rounded up to lanes] of a stamp. */
 typedef struct bst_fit {
     const bst_psf *psf;
-    int max_pixels;
-    double *value, *fixed, *valid; /* [pixels] of the stamp */
-    double *model; /* [BST_FIT_MAX_FREE][4][pixels]: share, by x, by y, by variance */
+    const bst_profiles *profiles; /* made for the sources' sigma before a fit */
+    int max_side;
+    float *value, *fixed, *valid;
+    float *model; /* [BST_FIT_MAX_FREE][4]: share, by x, by y, by variance */
+    float *scratch;
 } bst_fit;
 
-bst_status bst_fit_create(bst_ctx *ctx, const bst_psf *psf, int max_side,
-                          bst_fit *out) BST_MUST_CHECK;
+bst_status bst_fit_create(bst_ctx *ctx, const bst_psf *psf, const bst_profiles *profiles,
+                          int max_side, bst_fit *out) BST_MUST_CHECK;
 void bst_fit_free(bst_fit *fit);
 
 /* The stamp that holds a source with `reach_px` around its path, cut to the frame; width or height

@@ -46,6 +46,8 @@ typedef struct bst_imgproc_frame {
     int binning;            /* sensor pixels summed per side of a pixel, >= 1 */
     int bits;
     double exposure_s;
+    /* another frame is processed meanwhile: leave half of the threads to it */
+    bool beside_another;
 } bst_imgproc_frame;
 
 /* Work space for one camera. */

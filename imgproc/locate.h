@@ -29,15 +29,19 @@ typedef struct bst_found {
     bst_charge charge;
     float peak_snr;
     int peak_x, peak_y;
-    int next; /* in its cell of the frame */
+    double top_snr, top_x_px, top_y_px; /* of the filter's output between the pixels */
+    int next;                           /* in its cell of the frame */
 } bst_found;
 
 typedef struct bst_locator {
     bst_psf psf;
-    bst_fit fit;
+    bst_profiles profiles;
+    bst_parallel *pool;
+    bst_fit *fits; /* one for each thread */
+    bst_borrow lent;
     bst_sharpness sharpness;
     int max_side, capacity;
-    bst_found *found;
+    bst_found *found, *next; /* [capacity]; next: what a loop makes of them */
     int count;
     int *cell; /* first found in each square of the frame, by its maximum */
     int columns, rows;
@@ -59,16 +63,19 @@ typedef struct bst_locate_frame {
     double origin_x_px, origin_y_px, binning; /* full-sensor = origin + binning * frame pixel */
 } bst_locate_frame;
 
-bst_status bst_locator_create(bst_ctx *ctx, int capacity, int max_width, int max_height,
-                              int max_side, bst_locator *out) BST_MUST_CHECK;
+/* `pool` is borrowed. */
+bst_status bst_locator_create(bst_ctx *ctx, bst_parallel *pool, int capacity, int max_width,
+                              int max_height, int max_side, bst_locator *out) BST_MUST_CHECK;
 void bst_locator_free(bst_locator *locator);
 
 /* Fits the brightest `capacity` candidates, brightest first. Each is taken for a point or for a
- * streak as the greater filter output says; both are fitted where the outputs are close, and the
- * lower chi-square stays. Neighbours whose centres lie on its pixels are fitted with it. The
- * widening of the PSF (jitter) is measured on sources of SNR 20 and more and its mean is used for
- * the fainter ones. A point that turns out elongated is fitted again as a streak of its own length
- * and angle.
+ * streak as the greater filter output says; both are fitted where the outputs are close, or the
+ * point's is the greater but not by far, and the lower chi-square stays. Neighbours whose centres
+ * lie on its pixels are fitted with it. Fits are shared by the pool's threads: a group of like
+ * brightness at a time, which see the brighter ones where these were found and one another at their
+ * maxima; blends are then fitted again. The widening of the PSF (jitter) is measured on sources of
+ * SNR 20 and more and its mean is used for the fainter ones. A point that turns out elongated is
+ * fitted again as a streak of its own length and angle.
  *
  * Pixels that are sharper than light are left out first. What the others then do not show to be a
  * source is a HOT_PIXEL or a HIT, by the number of pixels. */

@@ -8,6 +8,7 @@
 #include "imgproc/sky.h"
 #include "sim/io/psf_fits.h"
 #include "sim/world/knowledge.h"
+#include "sim/world/photometry.h"
 
 static const bst_config_desc bad_pixel_table[] = {
     BST_INT(bst_bad_pixel, x, "px", 0, 32767, NULL, "Column, 0 the first."),
@@ -37,8 +38,8 @@ const bst_config_desc bst_imgproc_config_table[] = {
              "Greatest distance of one star from its place after the common shift."),
     BST_INT(
         bst_imgproc_config, threads, "", 0, 32, "0",
-        "Threads that share the passes over a frame; 0: one per processor. Results do not depend "
-        "on it."),
+        "Threads that share the passes over a frame and the fits; 0: one per processor. Results do "
+        "not depend on it."),
     BST_LIST(bst_imgproc_config, bad_pixels, bst_bad_pixel, bad_pixel_table, 0, 1000000, "[]",
              "Sensor pixels to leave out."),
     BST_PATH(
@@ -88,6 +89,7 @@ typedef struct imgproc_module {
     bst_starid *starid;
     bst_discriminator *discriminator;
     bst_sky sky;
+    bst_photometer photometer;
 } imgproc_module;
 
 static void destroy(void *self) {
@@ -103,6 +105,7 @@ static void destroy(void *self) {
     bst_starid_free(m->starid);
     bst_discriminator_free(m->discriminator);
     bst_sky_free(&m->sky);
+    bst_photometer_free(&m->photometer);
     free(m);
 }
 
@@ -135,6 +138,7 @@ static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
                               m->config->search_radius_px, &m->starid));
     BST_TRY(bst_discriminator_create(env->ctx, &m->camera, (int)m->config->capacity,
                                      &m->discriminator));
+    BST_TRY(bst_photometer_create(env->ctx, (int)m->config->capacity, &m->photometer));
     bst_env_set_capacity(env, PORT_DETECTIONS, (int)m->config->capacity);
     return BST_OK;
 }
@@ -224,6 +228,12 @@ static bst_status identify(imgproc_module *m, const lane *l, bst_ctx *ctx,
         *q_cam_from_gcrf = attitude_of(m, &options, &result, *q_cam_from_gcrf);
     }
     out->stars_identified = result.matched;
+    for (int i = 0; i < out->count; i++) {
+        int star = bst_starid_star_of(m->starid, i);
+        if (star >= 0) {
+            bst_photometer_add(&m->photometer, &out->items[i], m->sky.expected[star].v_mag);
+        }
+    }
     return BST_OK;
 }
 
@@ -239,7 +249,7 @@ static bool motion_of(struct bst_step *step, const bst_frame_message *message, b
 /* What is in a frame. It depends on how the camera turned, not on where it looked. */
 static bst_status detect(bst_ctx *ctx, const imgproc_module *m, const lane *l,
                          const bst_frame_message *message, const bst_motion *motion,
-                         bst_detections *out, int capacity) {
+                         bool beside_another, bst_detections *out, int capacity) {
     const uint16_t *pixels;
     BST_TRY(bst_frame_map(message->frame, ctx, &pixels));
     bst_imgproc_frame frame = {
@@ -247,7 +257,8 @@ static bst_status detect(bst_ctx *ctx, const imgproc_module *m, const lane *l,
         .window = message->window,
         .binning = message->binning,
         .bits = message->bits,
-        .exposure_s = (double)(message->end_tick - message->start_tick) / (double)m->tick_rate_hz};
+        .exposure_s = (double)(message->end_tick - message->start_tick) / (double)m->tick_rate_hz,
+        .beside_another = beside_another};
     bst_status status = bst_imgproc_detect(ctx, l->ip, &frame, motion, out, capacity);
     bst_frame_unmap(message->frame);
     return status;
@@ -273,7 +284,7 @@ static bst_status ahead(void *self, struct bst_step *step) {
     const bst_frame_message *message = sample.payload;
     bst_motion motion;
     bool oriented = motion_of(step, message, &motion);
-    BST_TRY(detect(ctx, m, l, message, oriented ? &motion : NULL, l->made, capacity));
+    BST_TRY(detect(ctx, m, l, message, oriented ? &motion : NULL, true, l->made, capacity));
     l->exposure_id = message->exposure_id;
     l->ready = true;
     return BST_OK;
@@ -287,7 +298,7 @@ static bst_status detections_of(bst_ctx *ctx, imgproc_module *m, lane *l,
     l->ready = false;
     if (!made) {
         BST_TRY(open_lane(ctx, m, l));
-        return detect(ctx, m, l, message, motion, out, capacity);
+        return detect(ctx, m, l, message, motion, false, out, capacity);
     }
     out->background_e = l->made->background_e;
     out->noise_e = l->made->noise_e;
@@ -323,6 +334,7 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
 
     BST_TRY(detections_of(ctx, m, l, message, oriented ? &motion : NULL, out, capacity));
     bool smeared = bst_imgproc_smeared(l->ip);
+    bst_photometer_begin(&m->photometer);
     bst_frame_knowledge known = {.q_cam_from_gcrf = out->q_cam_from_gcrf,
                                  .window = message->window,
                                  .streak_px = bst_imgproc_streak_px(l->ip),
@@ -333,6 +345,8 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
         known.light = (bst_light){n->velocity_bary_mps, n->sun_m};
         known.oriented = out->stars_identified > 0;
     }
+    bst_zero_point zero_point = bst_photometer_zero_point(&m->photometer);
+    bst_photometry_apply(&zero_point, bst_camera_v_mag(&m->camera, 1.0), out);
     if (predictions) {
         known.predictions_age_s = (middle - (double)predictions->tick) / (double)m->tick_rate_hz;
     }

@@ -1,6 +1,7 @@
 #include "imgproc/psf.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <string.h>
 
 #include "sim/core/vec.h"
@@ -91,6 +92,18 @@ static void make_profile(const bst_psf *psf, double centre, double sigma, int si
         c0 = c1;
         g0 = g1;
         d0 = d1;
+    }
+}
+
+void bst_psf_profile(const bst_psf *psf, double centre, double sigma, int side, double *share,
+                     double *slope, double *curvature) {
+    profile p;
+    make_profile(psf, centre, sigma, side, &p);
+    for (int i = 0; i < side; i++) {
+        bool in = i >= p.first && i < p.first + p.count;
+        share[i] = in ? p.share[i - p.first] : 0.0;
+        slope[i] = in ? p.slope[i - p.first] : 0.0;
+        curvature[i] = in ? p.curvature[i - p.first] : 0.0;
     }
 }
 

@@ -43,4 +43,9 @@ void bst_psf_init(bst_psf *psf);
 void bst_psf_render(const bst_psf *psf, const bst_shape *shape, const bst_stamp *stamp,
                     double *share, double *by_x, double *by_y, double *by_variance);
 
+/* Along one axis: the pixel-integrated Gaussian about `centre` on pixels 0 to side - 1 (at most
+ * BST_PSF_MAX_SIDE), and its first and second derivative by the centre; 0 beyond 6 sigma. */
+void bst_psf_profile(const bst_psf *psf, double centre, double sigma, int side, double *share,
+                     double *slope, double *curvature);
+
 #endif

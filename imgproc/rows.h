@@ -5,18 +5,26 @@
 #define BST_IMGPROC_ROWS_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
-enum { BST_ROW_LANES = 16 };
+enum { BST_ROW_LANES = 16, BST_ROW_MEDIAN = 104 };
 
 /* Sums in separate lanes, added by the caller in lane order. */
 typedef struct bst_row_sums {
     float count[BST_ROW_LANES], sum[BST_ROW_LANES], square[BST_ROW_LANES];
 } bst_row_sums;
 
-/* Adds count, sum and sum of squares of (value - level) where |value - level| <= limit. */
-void bst_row_clipped_sums(const float *row, int count, float level, float limit,
-                          bst_row_sums *sums);
+/* Adds count, sum and sum of squares of (value - level) where |value - level| <= limit, over rows
+ * that lie `stride` floats apart. */
+void bst_row_clipped_sums(const float *pixels, int width, int height, size_t stride, float level,
+                          float limit, bst_row_sums *sums);
+
+/* The value at count / 2 of up to BST_ROW_MEDIAN in ascending order. */
+float bst_row_median(const float *values, int count);
+
+/* out[x] = left + slope * (x + first) */
+void bst_row_line(float *out, int count, float left, float slope, float first);
 
 /* out = (raw - offset) * gain */
 void bst_row_electrons(const uint16_t *raw, int count, float offset, float gain, float *out);
@@ -28,15 +36,19 @@ void bst_row_normalise(const uint16_t *raw, const float *electrons, const float 
                        const float *inverse_noise, int count, int saturated_dn, float *signal,
                        float *normalised);
 
+/* out[x] = weight[0] * in[0][x] + sum of weight[t] * (in[-t][x] + in[t][x]), t from 1 to radius */
+void bst_row_even(float *out, int count, const float *const *in, const float *weight, int radius);
+
 /* out[x] = sum over taps of weight[t] * in[t][x]; taps is a multiple of 4. */
 void bst_row_combine(float *out, int count, const float *const *in, const float *weight, int taps);
 
 /* a = max(a, b) */
 void bst_row_greater(float *a, const float *b, int count);
 
-/* Writes the places and values of the elements above the threshold that exceed their eight
- * neighbours (of equals the first in row-major order); returns how many. above and below may be
- * NULL. */
+/* Writes the places and values of the elements above the threshold (> 0) that exceed their eight
+ * neighbours (of equals the first in row-major order); returns how many. On
+ * either side of each row 2 BST_ROW_LANES more floats are read; those next to it must not exceed
+ * the threshold. */
 int bst_row_maxima(const float *above, const float *row, const float *below, int count,
                    float threshold, int32_t *x, float *value);
 

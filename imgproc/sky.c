@@ -25,6 +25,16 @@ void bst_sky_free(bst_sky *sky) {
     sky->expected = NULL;
 }
 
+/* V of a Sun-like star that gives the camera as much light. */
+static double seen_mag(const bst_camera *camera, const bst_star *star) {
+    double v_mag = (double)star->v_mag;
+    if (!camera->spectrum) {
+        return v_mag;
+    }
+    return bst_camera_v_mag(
+        camera, bst_camera_star_electrons_per_s(camera, v_mag, (double)star->b_minus_v));
+}
+
 bst_status bst_sky_expect(bst_ctx *ctx, bst_sky *sky, bst_quat q_cam_from_gcrf,
                           const bst_light *light, bst_window window, double margin_px,
                           double v_limit, int *count) {
@@ -59,7 +69,8 @@ bst_status bst_sky_expect(bst_ctx *ctx, bst_sky *sky, bst_quat q_cam_from_gcrf,
         double x, y;
         if (bst_camera_project(sky->camera, bst_quat_rotate(q_cam_from_gcrf, apparent), &x, &y) &&
             x >= x0 && x <= x1 && y >= y0 && y <= y1) {
-            sky->expected[(*count)++] = (bst_expected_star){x, y, (double)star->v_mag, star->id};
+            sky->expected[(*count)++] =
+                (bst_expected_star){x, y, seen_mag(sky->camera, star), star->id};
         }
     }
     return BST_OK;

@@ -18,6 +18,7 @@ struct bst_starid {
     int *by_y;         /* stars in order of y */
     int *bright;       /* brightest stars, brightest detections */
     int *star_of;      /* [detections], -1 none */
+    int matched_of;    /* detections that star_of tells of; 0 when nothing matched */
     int *detection_of; /* [stars], -1 none */
     double *distance;  /* [stars] of its detection */
 };
@@ -279,6 +280,7 @@ static void refine(const bst_starid *s, const bst_starid_options *o, const bst_e
 void bst_starid_match(bst_starid *s, const bst_starid_options *o, const bst_expected_star *stars,
                       int star_count, bst_detection *items, int count, bst_starid_result *out) {
     *out = (bst_starid_result){0};
+    s->matched_of = 0;
     star_count = star_count < s->max_stars ? star_count : s->max_stars;
     count = count < s->max_detections ? count : s->max_detections;
     if (star_count <= 0 || count <= 0 ||
@@ -302,6 +304,7 @@ void bst_starid_match(bst_starid *s, const bst_starid_options *o, const bst_expe
             floor_px = fmax(0.25, fmin(out->rms_px, 0.5 * floor_px));
         }
     }
+    s->matched_of = count;
     double others = 0.0; /* per px^2, that are no stars of the catalogue */
     for (int i = 0; i < count; i++) {
         others += s->star_of[i] < 0;
@@ -321,4 +324,8 @@ void bst_starid_match(bst_starid *s, const bst_starid_options *o, const bst_expe
         d->label = BST_LABEL_STAR;
         d->label_probability = near / (near + others);
     }
+}
+
+int bst_starid_star_of(const bst_starid *s, int detection) {
+    return detection < s->matched_of ? s->star_of[detection] : -1;
 }

@@ -7,7 +7,7 @@
 /* A catalogue star where telemetry says that it should be, mean over the exposure. */
 typedef struct bst_expected_star {
     double x_px, y_px; /* full-sensor coordinates */
-    double v_mag;
+    double v_mag;      /* as the camera sees it: that of a Sun-like star of the same light */
     uint32_t id;
 } bst_expected_star;
 
@@ -44,5 +44,8 @@ void bst_starid_free(bst_starid *starid);
 void bst_starid_match(bst_starid *starid, const bst_starid_options *options,
                       const bst_expected_star *stars, int star_count, bst_detection *items,
                       int count, bst_starid_result *out);
+
+/* Index of the star that the latest match gave a detection, -1: none. */
+int bst_starid_star_of(const bst_starid *starid, int detection);
 
 #endif

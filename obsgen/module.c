@@ -10,6 +10,7 @@
 #include "sim/world/knowledge.h"
 #include "sim/world/los_track.h"
 #include "sim/world/motion.h"
+#include "sim/world/photometry.h"
 #include "sim/world/psf.h"
 #include "sim/world/truth_list.h"
 
@@ -104,6 +105,7 @@ typedef struct obsgen {
     bst_camera camera;            /* at the pixel scale and jitter of the latest exposure */
     bst_psf *psf;                 /* of it, if it is wider than the world's */
     double jitter_rad2, sigma_px; /* sigma: of the Gaussian that the PSF is or stands for */
+    bst_photometer photometer;
     pending waiting[PENDING];
 } obsgen;
 
@@ -116,6 +118,7 @@ static void destroy(void *self) {
     bst_truth_list_free(&o->list);
     bst_generator_free(o->generator);
     bst_psf_free(o->psf);
+    bst_photometer_free(&o->photometer);
     for (int i = 0; i < PENDING; i++) {
         free(o->waiting[i].truth);
         free(o->waiting[i].path_x_px);
@@ -151,6 +154,7 @@ static bst_status prepare(const bst_module_env *env, obsgen *o) {
     BST_TRY(bst_generator_create(env->ctx, o->world_camera, bst_knowledge_camera(env->knowledge),
                                  &settings, &o->calibration, o->key, &o->generator));
     BST_TRY(bst_field_create(env->ctx, env->world, env->observer, env->sensor, &o->field));
+    BST_TRY(bst_photometer_create(env->ctx, (int)c->capacity, &o->photometer));
     bst_env_set_capacity(env, PORT_TRUTH, (int)c->truth_capacity);
     bst_env_set_capacity(env, PORT_DETECTIONS, (int)c->capacity);
     return BST_OK;
@@ -360,6 +364,19 @@ static double shift_px(const obsgen *o, const bst_truth *t, bst_quat q_onboard) 
     return hypot(e.x, e.y) / bst_camera_scale_rad(&o->camera);
 }
 
+/* The stars that were identified rightly, for the zero point. */
+static void add_stars(obsgen *o, const bst_generator_frame *frame, const bst_generated *generated,
+                      const bst_detections *detections) {
+    for (int i = 0; i < detections->count; i++) {
+        const bst_detection *d = &detections->items[i];
+        if (d->star_id != 0 && generated[i].item >= 0) {
+            double electrons = frame->truth->items[generated[i].item].electrons;
+            bst_photometer_add(&o->photometer, d,
+                               bst_camera_v_mag(o->world_camera, electrons / frame->exposure_s));
+        }
+    }
+}
+
 static bst_status process(obsgen *o, struct bst_step *step, const bst_exposure *e) {
     pending *p = &o->waiting[e->id % PENDING];
     if (p->exposure_id != e->id) {
@@ -402,6 +419,7 @@ static bst_status process(obsgen *o, struct bst_step *step, const bst_exposure *
     for (int i = 0; i < out->count; i++) {
         out->items[i] = made.items[i].detection;
     }
+    bst_photometer_begin(&o->photometer);
     bst_sample nav = bst_step_latest(step, PORT_NAV);
     if (oriented && nav.payload && !nav.stale && !made.smeared) {
         const bst_identify_options options = {
@@ -417,7 +435,11 @@ static bst_status process(obsgen *o, struct bst_step *step, const bst_exposure *
             .key = o->key};
         BST_TRY(bst_obsgen_identify(ctx, &options, &frame, made.items, out->items, out->count,
                                     &out->stars_identified));
+        add_stars(o, &frame, made.items, out);
     }
+    bst_zero_point zero_point = bst_photometer_zero_point(&o->photometer);
+    bst_photometry_apply(&zero_point, bst_camera_v_mag(bst_knowledge_camera(o->knowledge), 1.0),
+                         out);
     if (!made.smeared) {
         bst_obsgen_label(out->items, out->count, out->stars_identified > 0, made.streak_px);
     }

@@ -338,15 +338,15 @@ static int collect_objects(bst_tracker *t, const bst_detections *d, const frame_
             ++*lost;
             continue;
         }
-        double sigma = item->flux_e > 0.0 ? 1.0857 * item->flux_sigma_e / item->flux_e : INFINITY;
-        bool bright = isfinite(item->v_mag) && isfinite(sigma);
-        t->detections[count++] = (bst_mtt_detection){.sky = to_sky(t, item, attitude, light),
-                                                     .x_px = item->x_px,
-                                                     .y_px = item->y_px,
-                                                     .v_mag = bright ? item->v_mag : 0.0,
-                                                     .v_mag_sigma = bright ? sigma : INFINITY,
-                                                     .snr = item->snr,
-                                                     .length_rad = scale * item->length_px};
+        bool bright = isfinite(item->v_mag) && isfinite(item->v_mag_sigma);
+        t->detections[count++] =
+            (bst_mtt_detection){.sky = to_sky(t, item, attitude, light),
+                                .x_px = item->x_px,
+                                .y_px = item->y_px,
+                                .v_mag = bright ? item->v_mag : 0.0,
+                                .v_mag_sigma = bright ? item->v_mag_sigma : INFINITY,
+                                .snr = item->snr,
+                                .length_rad = scale * item->length_px};
     }
     return count;
 }

@@ -213,7 +213,8 @@ typedef struct bst_detection {
     double flux_e, flux_sigma_e;
     double snr;
     double length_px, width_px, angle_rad; /* extent; angle of the long axis from +x towards +y */
-    double v_mag;                          /* from flux and the onboard zero point */
+    double v_mag;                          /* from flux and zero point */
+    double v_mag_sigma; /* of the flux's noise and the zero point; INFINITY without light */
     uint32_t flags;
     uint32_t star_id;         /* Tycho-2 identity, 0 when none */
     int32_t label;            /* bst_label */
@@ -229,6 +230,10 @@ typedef struct bst_detections {
     bst_quat q_telemetry_from_gcrf; /* telemetry alone, mid-exposure */
     double background_e, noise_e;   /* median per pixel */
     double threshold_snr;
+    /* V of one electron per second, by zero_point_stars of the frame's stars; when these are 0, by
+     * the camera's own figures */
+    double zero_point_mag, zero_point_sigma_mag;
+    int32_t zero_point_stars;
     int32_t stars_identified;
     int32_t count, lost; /* items; detections that found no room */
     bst_detection items[];

@@ -284,6 +284,9 @@ bst_status bst_recorder_detection_rows(bst_ctx *ctx, bst_recorder *recorder, int
     put_real(&head, d->background_e);
     put_real(&head, d->noise_e);
     put_real(&head, d->threshold_snr);
+    put_real(&head, d->zero_point_mag);
+    put_real(&head, d->zero_point_sigma_mag);
+    put_int(&head, d->zero_point_stars);
     put_int(&head, d->stars_identified);
     put_int(&head, d->count);
     put_int(&head, d->lost);
@@ -309,6 +312,7 @@ bst_status bst_recorder_detection_rows(bst_ctx *ctx, bst_recorder *recorder, int
         put_real(&r, item->width_px);
         put_real(&r, item->angle_rad * DEG);
         put_real(&r, item->v_mag);
+        put_real(&r, isfinite(item->v_mag_sigma) ? item->v_mag_sigma : NAN);
         put_flag(&r, item->flags & BST_DETECTION_SATURATED);
         put_flag(&r, item->flags & BST_DETECTION_EDGE);
         put_flag(&r, item->flags & BST_DETECTION_STREAK);

@@ -54,6 +54,7 @@ static bst_status alter_camera(bst_ctx *ctx, const bst_camera_errors_config *err
     c->pixel_scale_arcsec *= 1.0 + 1e-6 * errors->scale_error_ppm;
     c->rotation_deg += errors->rotation_error_deg;
     c->distortion = errors->own_distortion ? errors->distortion : c->distortion;
+    c->throughput *= 1.0 + errors->throughput_error;
     know_psf(c, errors->psf_fwhm_px);
     bst_status status = bst_camera_prepare(ctx, c);
     return status == BST_OK

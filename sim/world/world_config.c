@@ -161,6 +161,10 @@ static const bst_config_desc camera_errors_table[] = {
              "camera's."),
     BST_OBJECT(bst_camera_errors_config, distortion, bst_distortion_config, "{}",
                "own_distortion: the coefficients on board."),
+    BST_REAL(
+        bst_camera_errors_config, throughput_error, "", -0.9, 9, "0",
+        "Onboard throughput over the true one, minus 1: what the camera's own zero point is wrong "
+        "by."),
     BST_REAL(bst_camera_errors_config, psf_fwhm_px, "px", 0, 16, "0",
              "Onboard width of the PSF; 0: the camera's."),
     BST_PATH(bst_camera_errors_config, psf_file, "\"\"",

@@ -112,6 +112,7 @@ typedef struct bst_camera_errors_config {
     double rotation_error_deg;
     bool own_distortion;       /* false: the camera's own coefficients are known */
     bst_distortion distortion; /* with own_distortion: what is known instead */
+    double throughput_error;   /* believed over true, minus 1 */
     double psf_fwhm_px;        /* 0: the camera's */
     char psf_file[512];        /* "": none */
     double psf_oversampling;   /* of psf_file; 0: its keyword OVERSAMP */

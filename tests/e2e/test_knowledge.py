@@ -55,8 +55,8 @@ def variance(row):
 
 
 class Loop(unittest.TestCase):
-    """Every shipped scenario but the one of the PSF: the loop holds, and what is known wrongly shows
-    where theory says."""
+    """Every shipped scenario but those of PSF and throughput: the loop holds, and what is known
+    wrongly shows where theory says."""
 
     @classmethod
     def setUpClass(cls):
@@ -98,7 +98,7 @@ class Loop(unittest.TestCase):
 
     def test_there_is_one_for_each_item(self):
         self.assertEqual({os.path.basename(path) for path in glob.glob(FOLDER + "*")},
-                         {name + ".json" for name in ITEMS + ["psf"]})
+                         {name + ".json" for name in ITEMS + ["psf", "throughput"]})
 
     def test_the_loop_holds(self):
         for name, out in self.out.items():
@@ -339,6 +339,34 @@ class Width(unittest.TestCase):
                   f"{expected:.4f}")
             self.assertGreater(len(both), 4)
             self.assertLess(abs(ratio - expected), 0.02)
+
+
+class Light(unittest.TestCase):
+    def test_stars_give_the_zero_point_back(self):
+        """Images and generator: magnitudes stay right though the throughput is known wrongly."""
+        for source in ("image", "generator"):
+            out = os.path.join(runs.scratch(), source)
+            runs.run(FOLDER + "throughput.json", out, runs.NO_FRAMES,
+                     runs.SENSOR + "/observation_source=" + source)
+            db = runs.database(out)
+            frames = db.execute(
+                "SELECT zero_point_mag AS m, zero_point_sigma_mag AS s, zero_point_stars AS n FROM "
+                "detection_frames WHERE zero_point_stars > 0").fetchall()
+            truth = db.execute("SELECT t.v_mag AS m, t.electrons AS e, "
+                               "(x.end_tick - x.start_tick) / 6e3 AS s FROM "
+                               "truth t JOIN exposures x USING (sensor, exposure_id) "
+                               "WHERE t.kind = 'star'").fetchall()
+            true = np.median([row["m"] + 2.5 * np.log10(row["e"] / row["s"]) for row in truth])
+            error = np.array([row["m"] - true for row in frames])
+            sigma = np.array([row["s"] for row in frames])
+            chi2 = np.mean((error / sigma) ** 2)
+            print(f"{source}: zero point off by {np.mean(error):.4f} mag (the camera's own: "
+                  f"{2.5 * np.log10(1.3):.4f}), frames scatter {np.std(error):.4f}, told "
+                  f"{np.sqrt(np.mean(sigma ** 2)):.4f}")
+            self.assertGreater(len(frames), 15)
+            # the same stars in all frames: their own errors do not average out
+            self.assertLess(abs(np.mean(error)), 0.006)
+            self.assertLess(chi2, 4)
 
 
 class Several(unittest.TestCase):

@@ -17,7 +17,7 @@ static int setup(void **state) {
     fixture *f = calloc(1, sizeof *f);
     assert_non_null(f);
     f->key = bst_rng_make_key(1, 2, "test", "background");
-    bst_assert_ok(&f->ctx, bst_background_create(&f->ctx, 64, SIDE, SIDE, &f->b));
+    bst_assert_ok(&f->ctx, bst_background_create(&f->ctx, 64, SIDE, SIDE, 1, &f->b));
     *state = f;
     return 0;
 }

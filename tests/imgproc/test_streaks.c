@@ -135,7 +135,7 @@ static void false_alarms_as_requested(void **state) {
     bst_assert_ok(&ctx, bst_parallel_create(&ctx, 2, &pool));
     bst_assert_ok(&ctx, bst_streak_search_create(&ctx, NULL, SIDE, SIDE, 64.0, &one));
     bst_assert_ok(&ctx, bst_streak_search_create(&ctx, pool, SIDE, SIDE, 64.0, &two));
-    bst_assert_ok(&ctx, bst_background_create(&ctx, 64, SIDE, SIDE, &background));
+    bst_assert_ok(&ctx, bst_background_create(&ctx, 64, SIDE, SIDE, 1, &background));
     float *image = calloc(SIDE * SIDE, sizeof *image);
     assert_non_null(image);
     bst_rng_key key = bst_rng_make_key(11, 0, "test", "noise");

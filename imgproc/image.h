@@ -1,0 +1,37 @@
+/* Images of sources in single precision, for fits: many a frame, all of one PSF. */
+#ifndef BST_IMGPROC_IMAGE_H
+#define BST_IMGPROC_IMAGE_H
+
+#include "imgproc/lanes.h"
+#include "imgproc/psf.h"
+#include "sim/core/status.h"
+
+enum {
+    BST_PROFILE_PHASES = 128,
+    BST_PROFILE_LENGTH = 96, /* the most */
+};
+
+/* The pixel-integrated Gaussian along one axis at centres of 1/128 px apart. */
+typedef struct bst_profiles {
+    double sigma_px;
+    int length, half; /* pixels of a row: a multiple of 16; of them before the centre's */
+    float *rows;      /* [PHASES + 1][3][length]: share, slope and half the curvature by centre */
+} bst_profiles;
+
+bst_status bst_profiles_create(bst_ctx *ctx, bst_profiles *out) BST_MUST_CHECK;
+void bst_profiles_free(bst_profiles *profiles);
+/* Makes them for a PSF of sigma_px, at most 9; at once when they are there. */
+void bst_profiles_set(bst_profiles *profiles, const bst_psf *psf, double sigma_px);
+
+/* Work space of bst_image_render for stamps of up to max_side, floats. */
+size_t bst_image_scratch(int max_side);
+
+/* As bst_psf_render, for the sigma of `profiles`: four planes [height][stride] one after the other,
+ * share, by x, by y and by variance; stride: the stamp's width rounded up to lanes, what is beyond
+ * the stamp is of no meaning. Errors stay below 2e-4 of the peak: half of it the sum along the
+ * path, the rest the straight lines between the profiles' centres and, for sigma beyond 1.5 px, the
+ * light beyond 4.5 sigma. */
+void bst_image_render(const bst_profiles *profiles, const bst_psf *psf, const bst_shape *shape,
+                      const bst_stamp *stamp, float *scratch, float *planes);
+
+#endif
