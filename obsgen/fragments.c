@@ -11,7 +11,7 @@
 static const double SADDLE_SIGMA = 3.0, SADDLE_SHARE = 0.15;
 /* What stays further below the threshold is seen as often as noise alone, which has its own draws.
  */
-static const double FAINTEST_SIGMA = 5.0;
+static const double FAINTEST_SIGMA = 4.0;
 /* Draws of pixels; those of other clutter stay below. */
 static const uint64_t PIXEL_NOISE = (uint64_t)1 << 60;
 
@@ -38,7 +38,7 @@ struct generator_streaks {
     maximum maxima[MOST_MAXIMA]; /* of one part of the way */
     maximum kept[MOST_MAXIMA];   /* of the whole */
     int kept_count;
-    double taps[2 * MOST_TAPS + 1];
+    float taps[2 * MOST_TAPS + 1];
     int reach;
     double taps_sigma;
     float normals[NORMALS];
@@ -50,12 +50,12 @@ static void set_taps(struct generator_streaks *w, double sigma) {
     }
     w->reach = (int)fmin(ceil(3.0 * sigma), MOST_TAPS);
     double square = 0.0;
-    for (int i = -w->reach; i <= w->reach; i++) {
-        w->taps[i + w->reach] = exp(-0.5 * i * i / (sigma * sigma));
-        square += w->taps[i + w->reach] * w->taps[i + w->reach];
-    }
-    for (int i = 0; i <= 2 * w->reach; i++) {
-        w->taps[i] /= sqrt(square);
+    for (int pass = 0; pass < 2; pass++) {
+        for (int i = -w->reach; i <= w->reach; i++) {
+            double tap = exp(-0.5 * i * i / (sigma * sigma));
+            square += pass ? 0.0 : tap * tap;
+            w->taps[i + w->reach] = (float)(tap / sqrt(square));
+        }
     }
     w->taps_sigma = sigma;
 }
@@ -96,15 +96,17 @@ static void white(const bst_generator *g, bool by_row, int at, int first, int co
 
 static void fill_noise(const bst_generator *g, const struct generator_streaks *w, bool by_row,
                        section *s) {
-    int half = ROWS + w->reach + 1, count = 2 * (half + w->reach) + 1;
+    int half = ROWS + w->reach + 1, rows = 2 * half + 1;
     float noise[2 * (HALF + MOST_TAPS) + 1];
-    white(g, by_row, s->at, s->middle - half - w->reach, count, noise);
-    for (int r = 0; r <= 2 * half; r++) {
-        double sum = 0.0;
-        for (int i = 0; i <= 2 * w->reach; i++) {
-            sum += w->taps[i] * (double)noise[r + i];
+    white(g, by_row, s->at, s->middle - half - w->reach, rows + 2 * w->reach, noise);
+    for (int r = 0; r < rows; r++) {
+        s->noise[r] = 0.0f;
+    }
+    for (int i = 0; i <= 2 * w->reach; i++) {
+        float tap = w->taps[i];
+        for (int r = 0; r < rows; r++) {
+            s->noise[r] += tap * noise[r + i];
         }
-        s->noise[r] = (float)sum;
     }
 }
 
@@ -114,21 +116,22 @@ static void fill_noise(const bst_generator *g, const struct generator_streaks *w
 static void add_noise(const bst_generator *g, const struct generator_streaks *w, section *s,
                       int count) {
     double shot = 1.0 / (sqrt(3.0 * BST_PI) * g->total_sigma * g->noise_e);
-    int half = ROWS + w->reach + 1;
+    int top = w->reach + 1;
     for (int k = 0; k < count; k++) {
-        for (int r = -ROWS; r <= ROWS; r++) {
-            double sum = 0.0;
-            for (int i = -w->reach; i <= w->reach; i++) {
-                int n = k + i;
-                if (n < 0 || n >= count) {
-                    continue;
+        float sum[2 * ROWS + 1] = {0.0f};
+        for (int i = -w->reach; i <= w->reach; i++) {
+            int n = k + i;
+            /* the way leaves no more than a row a step */
+            int row = n >= 0 && n < count ? s[k].middle - s[n].middle + top : -1;
+            if (row >= 0 && row <= 2 * top) {
+                for (int r = 0; r <= 2 * ROWS; r++) {
+                    sum[r] += w->taps[i + w->reach] * s[n].noise[row + r];
                 }
-                int row = s[k].middle + r - s[n].middle + half;
-                sum += row >= 0 && row <= 2 * half ? w->taps[i + w->reach] * (double)s[n].noise[row]
-                                                   : 0.0;
             }
-            float *out = &s[k].output[r + ROWS];
-            *out += (float)(sum * sqrt(1.0 + shot * (double)*out));
+        }
+        for (int r = 0; r <= 2 * ROWS; r++) {
+            float *out = &s[k].output[r];
+            *out += (float)((double)sum[r] * sqrt(1.0 + shot * fmax((double)*out, 0.0)));
         }
     }
 }
@@ -236,6 +239,8 @@ static void run_part(bst_generator *g, const generator_source *source, const bst
     struct generator_streaks *w = g->streaks;
     section *s = w->sections;
     double height = source->amplitude, scale = 0.25 / (g->total_sigma * g->total_sigma);
+    /* the background that was found is too much by this */
+    double taken = g->background_bias_e / (bst_bound_norm(&g->bound, 0.0) * g->noise_e);
     int made = 0, outside = w->reach + 1;
     int wide = by_row ? g->height : g->width;
     double from = by_row ? nodes[0].y : nodes[0].x;
@@ -259,7 +264,8 @@ static void run_part(bst_generator *g, const generator_source *source, const bst
             double light = n->light + part * (m->light - n->light);
             for (int r = -ROWS; r <= ROWS; r++) {
                 double d = now->middle + r - across;
-                now->output[r + ROWS] = (float)(height * light * exp(-scale * d * d * slant));
+                now->output[r + ROWS] =
+                    (float)(height * light * exp(-scale * d * d * slant) - taken);
             }
         }
     }
@@ -272,6 +278,30 @@ static void run_part(bst_generator *g, const generator_source *source, const bst
     add_noise(g, w, s, made);
     int found = find_maxima(g, s, made, by_row, number, w->maxima);
     keep_highest(g, s, made, by_row, w->maxima, found);
+}
+
+/* The same where light comes near enough to the threshold, and as far about it as noise is
+ * filtered.
+ */
+static void run_bright(bst_generator *g, const generator_source *source,
+                       const bst_route_node *nodes, int count, bool by_row, int number) {
+    double least = (g->threshold - FAINTEST_SIGMA) / source->amplitude;
+    int margin = 2 * g->streaks->reach + 4;
+    for (int first = 0; first < count;) {
+        while (first < count && nodes[first].light < least) {
+            first++;
+        }
+        int last = first, seen = first;
+        for (; seen < count && seen <= last + 2 * margin; seen++) {
+            last = nodes[seen].light >= least ? seen : last;
+        }
+        if (first < count) {
+            int from = first > margin ? first - margin : 0;
+            int to = last + margin < count ? last + margin : count - 1;
+            run_part(g, source, nodes + from, to - from + 1, by_row, number + from);
+        }
+        first = seen;
+    }
 }
 
 /* Where the way goes from a node on; it trembles from one to the next. */
@@ -320,7 +350,7 @@ bst_status bst_generator_fragments(bst_ctx *ctx, bst_generator *g, const generat
                 break;
             }
         }
-        run_part(g, source, way + first, end - first + 1, by_row, first);
+        run_bright(g, source, way + first, end - first + 1, by_row, first);
     }
     report(g, source);
     return BST_OK;

@@ -14,6 +14,8 @@ static const double FWHM_PER_SIGMA = 2.3548200450309493;
 static const double SADDLE_SIGMA = 3.0, SADDLE_SHARE = 0.15, CLOSEST_FWHM = 0.6;
 /* In a smeared frame, sources that move less are seen as one. */
 static const double ROUGH_PX = 8.0;
+/* Where image processing clips the pixels that it takes background and noise from. */
+static const double CLIP_SIGMA = 3.0;
 /* Sources of which less is on the frame are not seen. */
 static const double LEAST_VISIBLE = 0.01;
 /* Sources below this share of the threshold are no detections, but light. */
@@ -143,10 +145,9 @@ static bool place_source(const bst_generator *g, const bst_generator_frame *f,
     s->seen_y = s->y;
     if (g->smeared && s->length > ROUGH_PX) {
         s->broken = true; /* its way is laid out later */
-        return true;
     }
     see(g, s);
-    return s->visible > LEAST_VISIBLE;
+    return s->broken || s->visible > LEAST_VISIBLE;
 }
 
 /* Amplitude of a source at the filter's output without noise, and which filter gives it. */
@@ -220,20 +221,43 @@ static void set_noise(bst_generator *g, const bst_generator_frame *f) {
     g->noise_e = sqrt(fmax(variance, 1e-6)) * g->calibration.noise_factor;
 }
 
-static void add_crowding(bst_generator *g, double threshold) {
-    double squares = 0.0, pixels = (double)g->width * g->height;
-    for (int i = 0; i < g->source_count; i++) {
-        const generator_source *s = &g->sources[i];
-        if (s->amplitude < threshold && !s->broken) {
-            double norm = bst_bound_norm(&g->bound, s->length);
-            squares += s->flux_e * s->flux_e * norm * norm;
-        }
+/* Light and square of it per source that a clipped mean of the frame's pixels holds: of a Gaussian
+ * image or a line what lies below the clip. */
+static void left_in(const bst_generator *g, const generator_source *s, double clip_e, double *light,
+                    double *square) {
+    double area = 2.0 * BST_PI * g->total_sigma * g->total_sigma;
+    double peak = s->flux_e / (area * sqrt(1.0 + s->length * s->length / area));
+    double below = fmin(clip_e / peak, 1.0); /* of the peak */
+    if (s->length > 3.0 * g->total_sigma) {
+        double flank = -log(below);
+        *light = s->visible * s->flux_e * erfc(sqrt(flank));
+        *square = s->visible * s->flux_e * peak * sqrt(0.5) * erfc(sqrt(2.0 * flank));
+    } else {
+        *light = s->visible * s->flux_e * below;
+        *square = s->visible * s->flux_e * peak * 0.5 * below * below;
     }
-    double more = g->calibration.crowding * squares / pixels;
-    double before = g->noise_e;
-    g->noise_e = sqrt(before * before + more);
+}
+
+/* Sources are part of what image processing takes for background and noise. */
+static void add_crowding(bst_generator *g) {
+    double pixels = (double)g->width * g->height, before = g->noise_e;
+    g->faint_light_e = g->faint_square_e2 = 0.0;
     for (int i = 0; i < g->source_count; i++) {
-        g->sources[i].amplitude *= before / g->noise_e;
+        double light, square;
+        left_in(g, &g->sources[i], CLIP_SIGMA * before, &light, &square);
+        g->faint_light_e += light / pixels;
+        g->faint_square_e2 += square / pixels;
+    }
+    g->background_bias_e = g->calibration.background_share * g->faint_light_e;
+    g->background_e += g->background_bias_e;
+    g->noise_e = sqrt(before * before + g->calibration.crowding * g->faint_square_e2);
+    for (int i = 0; i < g->source_count; i++) {
+        generator_source *s = &g->sources[i];
+        s->amplitude *= before / g->noise_e;
+        if (!s->broken) { /* the filter's sum over its norm times what is too much */
+            double length = s->as_streak ? g->streak : 0.0;
+            s->amplitude -= g->background_bias_e / (bst_bound_norm(&g->bound, length) * g->noise_e);
+        }
     }
 }
 
@@ -348,7 +372,7 @@ static bst_status collect(bst_ctx *ctx, bst_generator *g, const bst_generator_fr
         g->source_count++;
     }
     set_threshold(g);
-    add_crowding(g, g->threshold);
+    add_crowding(g);
     qsort(g->sources, (size_t)g->source_count, sizeof *g->sources, by_row);
     return BST_OK;
 }
@@ -379,13 +403,13 @@ static bool told_apart(const bst_generator *g, const generator_source *a,
     }
     at.x = a->x + dx;
     at.y = a->y + dy;
-    double top = b->amplitude + a->amplitude * overlap(g, a, &at), saddle = top;
+    double top = b->level + a->level * overlap(g, a, &at), saddle = top;
     enum { STEPS = 12 };
     for (int i = 1; i < STEPS; i++) {
         generator_source p = *a;
         p.x = a->x + dx * i / STEPS;
         p.y = a->y + dy * i / STEPS;
-        double value = a->amplitude * overlap(g, a, &p) + b->amplitude * overlap(g, &at, &p);
+        double value = a->level * overlap(g, a, &p) + b->level * overlap(g, &at, &p);
         saddle = fmin(saddle, value);
     }
     return top - saddle > fmax(SADDLE_SIGMA, SADDLE_SHARE * top);
@@ -417,8 +441,11 @@ static void decide(bst_generator *g) {
     g->reach = 6.0 * g->total_sigma + most;
     int ranks = 0;
     for (int i = 0; i < g->source_count; i++) {
-        if (g->sources[i].amplitude > FAINTEST_SHARE * g->threshold) {
-            g->ranks[ranks++] = (generator_rank){g->sources[i].amplitude, i};
+        generator_source *s = &g->sources[i];
+        if (s->amplitude > FAINTEST_SHARE * g->threshold) {
+            s->noise = bst_generator_draw(g, s, GENERATOR_PEAK);
+            s->level = s->amplitude + s->noise / g->calibration.slope;
+            g->ranks[ranks++] = (generator_rank){s->level, i};
         }
     }
     qsort(g->ranks, (size_t)ranks, sizeof *g->ranks, brighter);
@@ -444,49 +471,58 @@ static void decide(bst_generator *g) {
                 s->head = k;
                 merged = true;
             }
-            /* what a found neighbour gives here is a slope, not a peak */
-            peak += o->found ? 0.0 : light;
+            peak += light;
         }
         if (merged) {
             continue;
         }
-        s->noise = bst_generator_draw(g, s, GENERATOR_PEAK);
         s->found = g->calibration.slope * (peak - g->threshold) + s->noise > 0.0;
         s->peak = peak;
     }
 }
 
-/* Light of sources that are seen in this one, and of what is fitted beside it. */
+/* Light of sources that are seen in this one, and of what is fitted beside it. A fit of one source
+ * to several lands where the filter's output is greatest: found by moving to the mean weighted with
+ * what each gives there (mean shift). */
 static generator_blend blend_of(const bst_generator *g, int i) {
-    const generator_source *s = &g->sources[i];
-    double weight = s->flux_e, x = 0.0, y = 0.0, widen = 1.0;
+    enum { MOST = 24, ROUNDS = 8 };
+    const generator_source *s = &g->sources[i], *merged[MOST];
+    generator_blend out = {s->flux_e, s->x, s->y, 1.0, false};
+    int count = 0;
     double stamp = fmax(3.0, ceil(3.6 * g->sigma)) + 1.5;
-    bool near = false;
     for (int k = first_near(g, i, g->reach);
          k < g->source_count && g->sources[k].y <= s->y + g->reach; k++) {
         const generator_source *o = &g->sources[k];
-        if (k == i) {
-            continue;
-        }
         double dx = o->x - s->x, dy = o->y - s->y;
         double half_x = stamp + 0.5 * fabs(s->path.dx), half_y = stamp + 0.5 * fabs(s->path.dy);
-        if (fabs(dx) > half_x + stamp || fabs(dy) > half_y + stamp) {
+        if (k == i || fabs(dx) > half_x + stamp || fabs(dy) > half_y + stamp) {
             continue;
         }
         double share = overlap(g, s, o);
         if (o->found) {
-            near = near || (fabs(dx) <= half_x && fabs(dy) <= half_y);
+            out.near = out.near || (fabs(dx) <= half_x && fabs(dy) <= half_y);
             /* both fluxes and places are free: what they have in common is not known */
-            widen *= 1.0 / fmax(1.0 - share * share, 0.1);
-            continue;
+            out.widen *= 1.0 / fmax(1.0 - share * share, 0.1);
+        } else if (count < MOST) {
+            merged[count++] = o;
         }
-        double light = o->flux_e * share;
-        weight += light;
-        x += light * dx;
-        y += light * dy;
-        near = near || (o->head == i && light > 0.1 * s->flux_e);
     }
-    return (generator_blend){weight, s->x + x / weight, s->y + y / weight, widen, near};
+    for (int round = 0; round < ROUNDS && count > 0; round++) {
+        generator_source at = *s;
+        at.x = out.x;
+        at.y = out.y;
+        double own = s->flux_e * overlap(g, s, &at), sum = own, x = 0.0, y = 0.0;
+        for (int k = 0; k < count; k++) {
+            double light = merged[k]->flux_e * overlap(g, &at, merged[k]);
+            sum += light;
+            x += light * (merged[k]->x - s->x);
+            y += light * (merged[k]->y - s->y);
+        }
+        out.flux_e = sum;
+        out.x = s->x + x / sum;
+        out.y = s->y + y / sum;
+    }
+    return out;
 }
 
 void bst_generator_keep(bst_generator *g, const bst_generated *item) {
@@ -574,6 +610,8 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
                                   .background_e = g->background_e,
                                   .noise_e = g->noise_e,
                                   .threshold_snr = g->threshold,
+                                  .faint_light_e = g->faint_light_e,
+                                  .faint_square_e2 = g->faint_square_e2,
                                   .streak_px = g->streak * g->binning,
                                   .smeared = g->smeared};
     return BST_OK;

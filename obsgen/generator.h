@@ -52,6 +52,9 @@ typedef struct bst_generator_result {
     const bst_generated *items; /* by row, then column; held until the next call */
     int count, lost;
     double background_e, noise_e, threshold_snr;
+    /* per pixel, of sources below the clip of background and noise: mean light, mean of its square
+     */
+    double faint_light_e, faint_square_e2;
     double streak_px; /* of the stars, as far as they are filtered for; sensor px */
     bool smeared;     /* stars moved further than is filtered for */
 } bst_generator_result;

@@ -17,6 +17,7 @@ typedef struct generator_source {
     double amplitude;      /* SNR at the filter's output, without noise */
     double peak;           /* the same with the light of neighbours */
     double noise;          /* drawn for the peak */
+    double level;          /* amplitude with it */
     uint64_t name;         /* of its draws */
     int item, head;        /* head: seen in one with this source; -1: not */
     bool star, as_streak, found, saturated;
@@ -58,6 +59,7 @@ struct bst_generator {
     double streak; /* 0: not filtered for */
     bool smeared;
     double background_e, noise_e, threshold, streak_share;
+    double faint_light_e, faint_square_e2, background_bias_e; /* bias: what is too much of it */
     struct generator_thresholds {
         int width, height;
         double sigma, threshold[GENERATOR_STEPS], streak_share[GENERATOR_STEPS]; /* 0: not made */
@@ -86,7 +88,7 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
 double bst_generator_draw(const bst_generator *g, const generator_source *s, int which);
 
 /* Draws of one source. */
-enum { GENERATOR_PEAK, GENERATOR_PLACE, GENERATOR_FLUX, GENERATOR_SADDLE, GENERATOR_DRAWS = 8 };
+enum { GENERATOR_PEAK, GENERATOR_PLACE, GENERATOR_FLUX, GENERATOR_DRAWS = 8 };
 
 /* Takes a maximum of the filter's output that is not fitted: at the pixel itself. item: of the
  * truth, or -1. */

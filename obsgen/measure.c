@@ -111,7 +111,8 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
     const double together = 0.95;
     double noise = together * s->noise +
                    sqrt(1.0 - together * together) * bst_generator_draw(g, s, GENERATOR_FLUX);
-    d.flux_e = fmax(flux + noise * sqrt(fitted.flux_variance * b->widen / seen), 0.1 * flux);
+    flux -= g->background_bias_e / (fitted.norm * fitted.norm);
+    d.flux_e = fmax(flux + noise * sqrt(fitted.flux_variance * b->widen / seen), 0.1 * fabs(flux));
     bst_bound_at told = bst_bound_of(&g->bound, d.flux_e, g->noise_e, length);
     d.flux_sigma_e = sqrt(told.flux_variance * b->widen / seen);
     d.snr = d.flux_e * told.norm / g->noise_e;

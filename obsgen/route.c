@@ -16,7 +16,8 @@ static double below(double z) {
 static const double BEYOND_SIGMAS = 4.0;
 
 static void add_node(bst_route_node *nodes, int *count, double x, double y, double time) {
-    for (int i = *count - 1; i >= 0; i--) {
+    enum { BACK = 48 }; /* further back a path that returns is another part of the way */
+    for (int i = *count - 1; i >= 0 && i >= *count - BACK; i--) {
         if (fabs(nodes[i].x - x) < 0.7 && fabs(nodes[i].y - y) < 0.7) {
             return;
         }

@@ -37,6 +37,7 @@ struct bst_calibrator {
     double bias_sum, bias_weight;
     double threshold_offset;
     double nn, nq, qq, ny, qy; /* least squares of noise^2 by theory's and by the light left over */
+    double light_square, light_bias; /* of background by the light in it */
     long identified, identifiable;
     long hits, hits_told;
     long frames, detected;
@@ -60,7 +61,7 @@ void bst_calibrator_free(bst_calibrator *c) {
 bst_status bst_calibrator_begin(bst_ctx *ctx, bst_calibrator *c, const bst_calibrated_path *path) {
     bst_obsgen_calibration theory;
     bst_obsgen_calibration_theory(&theory);
-    theory.crowding = 0.0;
+    theory.crowding = theory.background_share = 0.0;
     const bst_generator_settings settings = {.capacity = 4096,
                                              .false_alarms_per_frame = path->false_alarms_per_frame,
                                              .streak_min_px = path->streak_min_px,
@@ -195,24 +196,18 @@ static bst_status add_alarms(bst_ctx *ctx, bst_calibrator *c, const bst_truth *t
     return BST_OK;
 }
 
-static void add_noise(bst_calibrator *c, const bst_truth *truth, const bst_detections *detections,
-                      double theory_noise) {
-    double light = 0.0;
-    for (int i = 0; i < truth->count; i++) {
-        const bst_truth_item *t = &truth->items[i];
-        if ((t->flags & BST_TRUTH_IN_FIELD) && t->snr < detections->threshold_snr) {
-            double e = t->electrons * bst_bound_norm(&c->bound, length_of(t));
-            light += e * e;
-        }
-    }
-    light /= (double)c->path.camera->width_px * (double)c->path.camera->height_px;
-    double n = 1.0, q = light / (theory_noise * theory_noise),
-           y = detections->noise_e * detections->noise_e / (theory_noise * theory_noise);
+static void add_noise(bst_calibrator *c, const bst_detections *detections,
+                      const bst_generator_result *theory) {
+    double variance = theory->noise_e * theory->noise_e, n = 1.0,
+           q = theory->faint_square_e2 / variance,
+           y = detections->noise_e * detections->noise_e / variance;
     c->nn += n * n;
     c->nq += n * q;
     c->qq += q * q;
     c->ny += n * y;
     c->qy += q * y;
+    c->light_square += theory->faint_light_e * theory->faint_light_e;
+    c->light_bias += theory->faint_light_e * (detections->background_e - theory->background_e);
 }
 
 bst_status bst_calibrator_add(bst_ctx *ctx, bst_calibrator *c, const bst_truth *truth,
@@ -232,7 +227,7 @@ bst_status bst_calibrator_add(bst_ctx *ctx, bst_calibrator *c, const bst_truth *
     }
     c->frames++;
     c->threshold_offset += detections->threshold_snr - theory.threshold_snr;
-    add_noise(c, truth, detections, theory.noise_e);
+    add_noise(c, detections, &theory);
     double fwhm = FWHM_PER_SIGMA * c->sigma_px, reach = 5.0 * c->sigma_px + 3.0;
     BST_TRY(bst_pairing_make(ctx, &c->pairing, truth, detections, fwhm));
     double plain =
@@ -249,8 +244,11 @@ bst_status bst_calibrator_add(bst_ctx *ctx, bst_calibrator *c, const bst_truth *
             continue;
         }
         int k = c->pairing.detection_of[i];
+        /* what its background has too much is missing from the output */
+        double taken = (detections->background_e - theory.background_e) /
+                       (bst_bound_norm(&c->bound, length_of(t)) * detections->noise_e);
         BST_TRY(add_trial(ctx, c, t, t->snr * plain / detections->noise_e,
-                          detections->threshold_snr, k >= 0));
+                          detections->threshold_snr + taken, k >= 0));
         if (k < 0) {
             continue;
         }
@@ -398,6 +396,9 @@ bst_status bst_calibrator_fit(bst_ctx *ctx, bst_calibrator *c, bst_obsgen_calibr
     }
     flat = (c->ny - crowding * c->nq) / c->nn;
     out->crowding = crowding;
+    if (c->light_square > 1e-6 * (double)c->frames) {
+        out->background_share = fmin(fmax(c->light_bias / c->light_square, 0.0), 2.0);
+    }
     out->noise_factor = sqrt(fmax(flat, 0.01));
     out->false_alarm_factor = (double)c->alarm_count / c->alarms_expected;
     double energy = 0.0;
