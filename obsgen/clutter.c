@@ -47,8 +47,12 @@ bst_detection bst_generator_point(const bst_generator *g, double x, double y, do
 
 void bst_generator_false_alarms(bst_generator *g) {
     double expected = g->settings.false_alarms_per_frame * g->calibration.false_alarm_factor;
+    /* background that is found too bright takes from noise */
+    double taken = g->background_bias_e / (bst_bound_norm(&g->bound, 0.0) * g->noise_e);
+    expected *= exp(-taken * (g->threshold + 0.5 * taken));
     if (g->smeared) { /* nothing is looked at between the pixels */
-        expected = bst_matched_pixel_maxima(g->total_sigma, g->threshold) * g->width * g->height;
+        expected =
+            bst_matched_pixel_maxima(g->total_sigma, g->threshold + taken) * g->width * g->height;
     }
     double arrival = 0.0;
     for (uint64_t i = 0; i < 1000000; i++) {

@@ -14,6 +14,8 @@ static const double FWHM_PER_SIGMA = 2.3548200450309493;
 static const double SADDLE_SIGMA = 3.0, SADDLE_SHARE = 0.15, CLOSEST_FWHM = 0.6;
 /* In a smeared frame, sources that move less are seen as one. */
 static const double ROUGH_PX = 8.0;
+/* Errors of places grow by no more than this between sources that are seen as one. */
+static const double FLATTEST = 6.0;
 /* Where image processing clips the pixels that it takes background and noise from. */
 static const double CLIP_SIGMA = 3.0;
 /* Sources of which less is on the frame are not seen. */
@@ -487,7 +489,7 @@ static void decide(bst_generator *g) {
 static generator_blend blend_of(const bst_generator *g, int i) {
     enum { MOST = 24, ROUNDS = 8 };
     const generator_source *s = &g->sources[i], *merged[MOST];
-    generator_blend out = {s->flux_e, s->x, s->y, 1.0, false};
+    generator_blend out = {s->flux_e, s->x, s->y, 1.0, 1.0, false};
     int count = 0;
     double stamp = fmax(3.0, ceil(3.6 * g->sigma)) + 1.5;
     for (int k = first_near(g, i, g->reach);
@@ -507,8 +509,8 @@ static generator_blend blend_of(const bst_generator *g, int i) {
             merged[count++] = o;
         }
     }
+    generator_source at = *s;
     for (int round = 0; round < ROUNDS && count > 0; round++) {
-        generator_source at = *s;
         at.x = out.x;
         at.y = out.y;
         double own = s->flux_e * overlap(g, s, &at), sum = own, x = 0.0, y = 0.0;
@@ -521,6 +523,24 @@ static generator_blend blend_of(const bst_generator *g, int i) {
         out.flux_e = sum;
         out.x = s->x + x / sum;
         out.y = s->y + y / sum;
+    }
+    if (count > 0 && s->length > 1.0) {
+        /* two streaks on one line have a flat top between them, where noise decides the place */
+        double h = fmax(g->total_sigma, 0.25 * s->length) / s->length, alone = 0.0, all = 0.0;
+        for (int step = -1; step <= 1; step++) {
+            double weight = step == 0 ? 2.0 : -1.0;
+            at.x = out.x + step * h * s->path.dx;
+            at.y = out.y + step * h * s->path.dy;
+            all += weight * s->flux_e * overlap(g, &at, s);
+            for (int k = 0; k < count; k++) {
+                all += weight * merged[k]->flux_e * overlap(g, &at, merged[k]);
+            }
+            generator_source beside = *s;
+            beside.x = s->x + step * h * s->path.dx;
+            beside.y = s->y + step * h * s->path.dy;
+            alone += weight * s->flux_e * overlap(g, &beside, s);
+        }
+        out.flat = fmin(fmax(alone / fmax(all, 1e-9 * alone), 1.0), FLATTEST);
     }
     return out;
 }

@@ -33,6 +33,7 @@ typedef struct generator_rank {
 typedef struct generator_blend {
     double flux_e, x, y; /* as one source */
     double widen;        /* factor on the variances from neighbours that are fitted too */
+    double flat;         /* factor on the error along a streak where light of others is in it */
     bool near;           /* another detection in the fitted pixels, or a merged source of note */
 } generator_blend;
 

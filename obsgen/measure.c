@@ -44,7 +44,7 @@ static void measure_place(const bst_generator *g, const generator_source *s,
     double widen_along = b->widen / fmax(length > 1.0 ? s->ends : s->visible, LEAST_SEEN);
     double widen_across = b->widen / fmax(s->visible, LEAST_SEEN);
     double worse = (s->saturated ? 4.0 : 1.0) / fmin(s->sharp, 1.0);
-    error[0] *= along * worse * sqrt(truth->var_along_px2 * widen_along);
+    error[0] *= along * worse * b->flat * sqrt(truth->var_along_px2 * widen_along);
     error[1] *= across * worse * sqrt(truth->var_across_px2 * widen_across);
     double c = s->length > 0.0 ? s->path.dx / s->length : 1.0;
     double n = s->length > 0.0 ? s->path.dy / s->length : 0.0;

@@ -12,6 +12,8 @@ static double below(double z) {
     return 0.5 * erfc(-z * 0.70710678118654752);
 }
 
+/* Bends that are none. */
+static const double STRAIGHT_PX = 0.2;
 /* Ends of a path that stands still: this far on, light is gone. */
 static const double BEYOND_SIGMAS = 4.0;
 
@@ -92,39 +94,119 @@ int bst_route_lay(const bst_route_path *p, double sigma_px, bst_route_node *node
     return count;
 }
 
-void bst_route_bias(const bst_route_path *p, double dx_px, double dy_px, double bend_x_px,
-                    double bend_y_px, double sigma_px, double bias_px[2]) {
-    double s = sigma_px * sqrt(2.0), length = hypot(dx_px, dy_px);
-    double c = length > 0.0 ? dx_px / length : 1.0, n = length > 0.0 ? dy_px / length : 0.0;
-    bool drawn = length > 0.3 * s;
-    double along = 0.0, across = 0.0, value = 0.0;
-    for (int k = 0; k < p->count; k++) {
-        double t = -1.0 + 2.0 * k / (p->count - 1), bent = 0.5 * (3.0 * t * t - 1.0);
-        double weight = k == 0 || k == p->count - 1 ? 0.5 : 1.0;
-        double x = p->x_px[k] - bent * bend_x_px, y = p->y_px[k] - bent * bend_y_px;
-        double u = x * c + y * n, v = y * c - x * n, fall = weight * exp(-0.5 * v * v / (s * s));
-        if (drawn) {
-            double high = (u + 0.5 * length) / s, low = (u - 0.5 * length) / s;
-            double inside = fall * (below(high) - below(low));
-            along += fall * (density(low) - density(high)) / s;
-            across += inside * v / (s * s);
-            value += inside;
-        } else {
-            double peak = fall * exp(-0.5 * u * u / (s * s));
-            along += peak * u / (s * s);
-            across += peak * v / (s * s);
-            value += peak;
+/* The model's places at even times. */
+enum { MOST_PLACES = 48, MOST_SAMPLES = 128 };
+typedef struct model {
+    double x[MOST_PLACES], y[MOST_PLACES];
+    int count;
+} model;
+
+static model make_model(double dx, double dy, double bend_x, double bend_y, double s) {
+    model m;
+    double length = hypot(dx, dy) + 2.0 * hypot(bend_x, bend_y);
+    m.count = (int)fmin(ceil(1.5 * length / s) + 1.0, MOST_PLACES);
+    for (int i = 0; i < m.count; i++) {
+        double u = m.count > 1 ? (i + 0.5) / m.count * 2.0 - 1.0 : 0.0;
+        double bent = 0.5 * (3.0 * u * u - 1.0);
+        m.x[i] = 0.5 * u * dx + bent * bend_x;
+        m.y[i] = 0.5 * u * dy + bent * bend_y;
+    }
+    return m;
+}
+
+/* Gradient of the overlap of a place's light with the model moved by `at`, added up. */
+static void add_pull(const model *m, double x, double y, double s, double weight, double pull[2]) {
+    for (int i = 0; i < m->count; i++) {
+        double dx = x - m->x[i], dy = y - m->y[i];
+        double w = weight * exp(-0.5 * (dx * dx + dy * dy) / (s * s));
+        pull[0] += w * dx;
+        pull[1] += w * dy;
+    }
+}
+
+/* Minus the Hessian of the model's overlap with itself. */
+static void find_curvature(const model *m, double s, double h[3]) {
+    h[0] = h[1] = h[2] = 0.0;
+    for (int i = 0; i < m->count; i++) {
+        for (int k = 0; k < m->count; k++) {
+            double dx = m->x[i] - m->x[k], dy = m->y[i] - m->y[k];
+            double w = exp(-0.5 * (dx * dx + dy * dy) / (s * s)) / m->count;
+            h[0] += w * (1.0 - dx * dx / (s * s));
+            h[1] -= w * dx * dy / (s * s);
+            h[2] += w * (1.0 - dy * dy / (s * s));
         }
     }
-    value /= p->count - 1;
-    along /= p->count - 1;
-    across /= p->count - 1;
-    /* information of the model, of the same norm: of a streak minus the second derivative of its
-     * autocorrelation */
-    double info = drawn ? 2.0 * (density(0.0) - density(length / s)) / (s * length)
-                        : 1.0 / (s * s) * fmax(value, 1e-6);
-    double a = fmax(-s, fmin(along / info, s));
-    double b = fmax(-s, fmin(across * s * s / fmax(value, 1e-6), s));
+}
+
+/* The first step for a straight model in closed form: to first order that is all. */
+static void straight_bias(const bst_route_path *p, double dx_px, double dy_px, double s,
+                          double bias_px[2]) {
+    double length = hypot(dx_px, dy_px), along = 0.0, across = 0.0, value = 0.0;
+    double c = length > 0.0 ? dx_px / length : 1.0, n = length > 0.0 ? dy_px / length : 0.0;
+    bool drawn = length > 0.3 * s;
+    for (int k = 0; k < p->count; k++) {
+        double weight = (k == 0 || k == p->count - 1 ? 0.5 : 1.0) / (p->count - 1);
+        double u = p->x_px[k] * c + p->y_px[k] * n, v = p->y_px[k] * c - p->x_px[k] * n;
+        double fall = weight * exp(-0.5 * v * v / (s * s)), inside;
+        if (drawn) {
+            double high = (u + 0.5 * length) / s, low = (u - 0.5 * length) / s;
+            inside = fall * (below(high) - below(low));
+            along += fall * (density(low) - density(high)) / s;
+        } else {
+            inside = fall * exp(-0.5 * u * u / (s * s));
+            along += inside * u / (s * s);
+        }
+        across += inside * v / (s * s);
+        value += inside;
+    }
+    value = fmax(value, 1e-6);
+    /* of a streak minus the second derivative of its autocorrelation */
+    double curve =
+        drawn ? 2.0 * (density(0.0) - density(length / s)) / (s * length) : value / (s * s);
+    double a = fmax(-s, fmin(along / curve, s)), b = fmax(-s, fmin(across * s * s / value, s));
     bias_px[0] = a * c - b * n;
     bias_px[1] = a * n + b * c;
+}
+
+void bst_route_bias(const bst_route_path *p, double dx_px, double dy_px, double bend_x_px,
+                    double bend_y_px, double sigma_px, double bias_px[2]) {
+    enum { ROUNDS = 6 };
+    double s = sigma_px * sqrt(2.0), h[3], total = 0.0;
+    if (hypot(bend_x_px, bend_y_px) < STRAIGHT_PX) {
+        straight_bias(p, dx_px, dy_px, s, bias_px);
+        return;
+    }
+    model m = make_model(dx_px, dy_px, bend_x_px, bend_y_px, s);
+    find_curvature(&m, s, h);
+    double determinant = fmax(h[0] * h[2] - h[1] * h[1], 1e-12);
+    /* means over as many samples as show the trembling; their own mean is that of the path */
+    int samples = p->count < MOST_SAMPLES ? p->count : MOST_SAMPLES;
+    double x[MOST_SAMPLES], y[MOST_SAMPLES], weight[MOST_SAMPLES];
+    for (int i = 0; i < samples; i++) {
+        x[i] = y[i] = weight[i] = 0.0;
+    }
+    for (int k = 0; k < p->count; k++) {
+        int i = (int)((long)k * samples / p->count);
+        double w = k == 0 || k == p->count - 1 ? 0.5 : 1.0;
+        x[i] += w * p->x_px[k];
+        y[i] += w * p->y_px[k];
+        weight[i] += w;
+        total += w;
+    }
+    bias_px[0] = bias_px[1] = 0.0;
+    for (int round = 0; round < ROUNDS; round++) {
+        double pull[2] = {0.0, 0.0};
+        for (int i = 0; i < samples; i++) {
+            add_pull(&m, x[i] / weight[i] - bias_px[0], y[i] / weight[i] - bias_px[1], s,
+                     weight[i] / total, pull);
+        }
+        double step[2] = {(h[2] * pull[0] - h[1] * pull[1]) / determinant,
+                          (h[0] * pull[1] - h[1] * pull[0]) / determinant};
+        double far = hypot(step[0], step[1]), share = far > s ? s / far : 1.0;
+        bias_px[0] += share * step[0];
+        bias_px[1] += share * step[1];
+        if (far < 0.005) {
+            break;
+        }
+    }
 }

@@ -26,9 +26,8 @@ typedef struct bst_route_path {
 int bst_route_lay(const bst_route_path *path, double sigma_px, bst_route_node *nodes);
 
 /* How far the fit of a uniform straight streak (dx, dy) with the bend (the coefficient of (3u^2 -
- * 1) / 2, u from -1 to 1) lands from the mean of the path in the mean over noise: to first order
- * the projection of the light that is there, less the model's, on the model's derivatives. (0, 0)
- * and no bend: of a point. */
+ * 1) / 2, u from -1 to 1) lands from the mean of the path in the mean over noise: where the model
+ * overlaps most with the light that is there. (0, 0) and no bend: of a point. */
 void bst_route_bias(const bst_route_path *path, double dx_px, double dy_px, double bend_x_px,
                     double bend_y_px, double sigma_px, double bias_px[2]);
 

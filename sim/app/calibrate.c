@@ -169,7 +169,7 @@ static bst_status add_trial(bst_ctx *ctx, bst_calibrator *c, const bst_truth_ite
 }
 
 static bst_status add_alarms(bst_ctx *ctx, bst_calibrator *c, const bst_truth *truth,
-                             const bst_detections *detections, double reach) {
+                             const bst_detections *detections, double reach, double taken) {
     double width = (double)c->path.camera->width_px, height = (double)c->path.camera->height_px;
     int open = 0;
     for (int k = 0; k < GRID * GRID; k++) {
@@ -177,7 +177,9 @@ static bst_status add_alarms(bst_ctx *ctx, bst_calibrator *c, const bst_truth *t
         double y = height * ((double)(k / GRID) + 0.5) / GRID;
         open += is_free(truth, x, y, reach, -1, 1.0);
     }
-    c->alarms_expected += c->path.false_alarms_per_frame * open / (GRID * GRID);
+    /* background that is found too bright takes from noise */
+    double less = exp(-taken * (detections->threshold_snr + 0.5 * taken));
+    c->alarms_expected += c->path.false_alarms_per_frame * less * open / (GRID * GRID);
     for (int i = 0; i < detections->count; i++) {
         const bst_detection *d = &detections->items[i];
         if (c->pairing.item_of[i] >= 0 || !is_free(truth, d->x_px, d->y_px, reach, -1, 1.0)) {
@@ -245,10 +247,10 @@ bst_status bst_calibrator_add(bst_ctx *ctx, bst_calibrator *c, const bst_truth *
         }
         int k = c->pairing.detection_of[i];
         /* what its background has too much is missing from the output */
-        double taken = (detections->background_e - theory.background_e) /
-                       (bst_bound_norm(&c->bound, length_of(t)) * detections->noise_e);
+        double missing = (detections->background_e - theory.background_e) /
+                         (bst_bound_norm(&c->bound, length_of(t)) * detections->noise_e);
         BST_TRY(add_trial(ctx, c, t, t->snr * plain / detections->noise_e,
-                          detections->threshold_snr + taken, k >= 0));
+                          detections->threshold_snr + missing, k >= 0));
         if (k < 0) {
             continue;
         }
@@ -261,7 +263,9 @@ bst_status bst_calibrator_add(bst_ctx *ctx, bst_calibrator *c, const bst_truth *
             c->identified += d->star_id == t->id;
         }
     }
-    return add_alarms(ctx, c, truth, detections, reach);
+    double taken = (detections->background_e - theory.background_e) /
+                   (bst_bound_norm(&c->bound, 0.0) * detections->noise_e);
+    return add_alarms(ctx, c, truth, detections, reach, taken);
 }
 
 /* Log-likelihood of the trials of one streak length. */
