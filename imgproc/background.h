@@ -5,6 +5,7 @@
 #include <stdbool.h>
 
 #include "imgproc/borrow.h"
+#include "imgproc/rows.h"
 #include "sim/core/parallel.h"
 #include "sim/core/status.h"
 
@@ -22,7 +23,6 @@ typedef struct bst_background {
     float *bands;                     /* one for each thread: the pixels of a row of meshes */
     size_t band;                      /* floats of a band */
     bst_borrow *lent;                 /* of bands */
-    float *row_level, *row_noise;     /* [columns], for one image row */
     float median_level, median_noise;
 } bst_background;
 
@@ -36,7 +36,8 @@ bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int m
 void bst_background_free(bst_background *background);
 
 /* Estimates level and noise in each mesh of a frame: median and median absolute deviation of a
- * sample, then mean and standard deviation within 3 sigma, four times. Both are corrected for the
+ * sample, then mean and standard deviation within 3 sigma, four times, from half of the rows where
+ * a mesh has 4096 pixels and more. Both are corrected for the
  * clipping, which takes more off the long tail of counted electrons (variance beyond
  * read_variance_e2) than off the other; the deviation also for the slope of the level. step_e (> 0)
  * is a digital number's worth of electrons; no pixel is better known than it. A mesh without usable
@@ -50,6 +51,9 @@ void bst_background_read(bst_background *background, bst_parallel *pool, bst_pix
 void bst_background_estimate(bst_background *background, const float *image, int width, int height,
                              float step_e);
 
+/* Level and 1 / noise of image row y, as bst_background_row, by parts [columns + 1]; returns how
+ * many. */
+int bst_background_parts(const bst_background *background, int y, bst_row_part *parts);
 /* Level and 1 / noise for every pixel of image row y, bilinear between mesh centres; outside them
  * the level goes on as it did, the noise stays. */
 void bst_background_row(const bst_background *background, int y, float *level,

@@ -63,15 +63,34 @@ static void describe_charge(const bst_locate_frame *f, const int *at, int count,
                                  .angle_rad = half > 1e-9 ? 0.5 * atan2(2.0 * mxy, mxx - myy) : 0};
 }
 
+typedef struct search {
+    bst_locator *l;
+    const bst_locate_frame *f;
+} search;
+
+/* charge.pixels: how many, of each. */
+static void count_charge(void *user, int begin, int end) {
+    const search *s = user;
+    for (int i = begin; i < end; i++) {
+        int at[MAX_CHARGE];
+        double sharpest;
+        bst_found *found = &s->l->found[i];
+        found->charge.pixels = find_charge(s->l, s->f, found, at, &sharpest);
+    }
+}
+
 void bst_charge_remove(bst_locator *l, const bst_locate_frame *f) {
+    enum { A_TIME = 64 };
+    search s = {l, f};
+    bst_parallel_for(l->pool, l->count, A_TIME, count_charge, &s);
     l->charged_count = 0;
     for (int i = 0; i < l->count; i++) {
+        if (l->found[i].charge.pixels == 0) {
+            continue;
+        }
         int at[MAX_CHARGE];
         double sharpest;
         int count = find_charge(l, f, &l->found[i], at, &sharpest);
-        if (count == 0) {
-            continue;
-        }
         describe_charge(f, at, count, sharpest, &l->found[i]);
         for (int k = 0; k < count && l->charged_count < l->charged_capacity; k++) {
             l->charged[l->charged_count++] = at[k];

@@ -7,10 +7,17 @@
 #include "imgproc/locate.h"
 #include "imgproc/rows.h"
 #include "imgproc/streak_locate.h"
+#include "imgproc/streak_motion.h"
 #include "imgproc/tail.h"
+#include "sim/core/pages.h"
 
 /* Maxima are looked at in between the pixels from this share of the threshold on at the least. */
 static const double LOOK_SHARE = 0.65;
+/* Bend of the stars' path that jitter of 1 px RMS has: that of noise that is flat from 2.5 to 100
+ * cycles an exposure. */
+static const double JITTER_BEND = 0.075;
+/* What telemetry may not know of the camera's motion: drift, in px an exposure. */
+static const double DRIFT_PX = 1.0;
 /* Above the threshold by this no skewness of noise matters. */
 static const double CERTAIN_ABOVE = 1.5;
 
@@ -25,12 +32,14 @@ struct bst_imgproc {
     bst_filter filter;
     bst_candidates candidates;
     bst_locator locator;
+    bst_streak_motion streak_motion;
     bst_streak_locator streaks; /* only when config.streak_search_px > 0 */
     bst_parallel *pool;
     int *order;
     /* of the latest frame */
     double exposure_s, binning, streak_px;
     bool smeared;
+    bst_stack_frame left;
 };
 
 static bst_status make_bad_map(bst_ctx *ctx, bst_imgproc *ip) {
@@ -65,7 +74,7 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     int side = (int)ceil(streak + 6.0 * fwhm) + 14;
     side = side < BST_PSF_MAX_SIDE ? side : BST_PSF_MAX_SIDE;
     int capacity = (int)ip->config.capacity;
-    ip->electrons = calloc((size_t)width * (size_t)height, sizeof(float));
+    ip->electrons = bst_pages_alloc((size_t)width * (size_t)height * sizeof(float));
     ip->order = calloc((size_t)capacity, sizeof(int));
     if (!ip->electrons || !ip->order) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a frame of %d x %d", width, height);
@@ -78,6 +87,7 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
         bst_filter_create(ctx, width, height, streak, bst_parallel_threads(ip->pool), &ip->filter));
     BST_TRY(bst_candidates_create(ctx, width, height, &ip->candidates));
     BST_TRY(bst_locator_create(ctx, ip->pool, capacity, width, height, side, &ip->locator));
+    BST_TRY(bst_streak_motion_create(ctx, side, &ip->streak_motion));
     return ip->config.streak_search_px > 0.0
                ? bst_streak_locator_create(ctx, &ip->locator.psf, ip->pool, width, height, fwhm,
                                            ip->config.streak_search_px, &ip->streaks)
@@ -127,6 +137,7 @@ void bst_imgproc_free(bst_imgproc *ip) {
     bst_filter_free(&ip->filter);
     bst_candidates_free(&ip->candidates);
     bst_locator_free(&ip->locator);
+    bst_streak_motion_free(&ip->streak_motion);
     bst_streak_locator_free(&ip->streaks);
     bst_parallel_free(ip->pool);
     free(ip);
@@ -345,6 +356,25 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
                              .binning = frame->binning};
     view.origin_x_px = frame->window.x0 + 0.5 * (frame->binning - 1);
     view.origin_y_px = frame->window.y0 + 0.5 * (frame->binning - 1);
+    ip->left = (bst_stack_frame){.signal = ip->electrons,
+                                 .background = &ip->background,
+                                 .width = width,
+                                 .height = height,
+                                 .sigma_px = sigma,
+                                 .origin_x_px = view.origin_x_px,
+                                 .origin_y_px = view.origin_y_px,
+                                 .binning = frame->binning};
+    bst_motion measured;
+    if (motion && !ip->smeared) {
+        measured = *motion;
+        double bend_px = hypot(JITTER_BEND * ip->config.jitter_px,
+                               motion->bend_sigma_rad / bst_camera_scale_rad(&ip->camera));
+        if (bst_streak_motion_measure(&ip->streak_motion, &ip->locator.psf, &view, &ip->candidates,
+                                      DRIFT_PX / frame->binning, bend_px / frame->binning,
+                                      &measured)) {
+            view.motion = &measured;
+        }
+    }
     if (ip->smeared) {
         bst_locate_roughly(&ip->locator, &view, &ip->candidates);
     } else {
@@ -392,4 +422,53 @@ double bst_imgproc_streak_px(const bst_imgproc *ip) {
 
 bool bst_imgproc_smeared(const bst_imgproc *ip) {
     return ip->smeared;
+}
+
+bst_stack_frame bst_imgproc_stack_frame(const bst_imgproc *ip, double time_s,
+                                        bst_quat q_cam_from_gcrf) {
+    bst_stack_frame frame = ip->left;
+    frame.time_s = time_s;
+    frame.q_cam_from_gcrf = q_cam_from_gcrf;
+    return frame;
+}
+
+void bst_imgproc_append_stack(const bst_imgproc *ip, const bst_stack_found *found, int count,
+                              double reach_px, bst_detections *out, int capacity) {
+    int before = out->count;
+    for (int i = 0; i < count; i++) {
+        const bst_stack_found *f = &found[i];
+        double reach = fmax(reach_px, 3.0 * sqrt(fmax(f->cov_xx, f->cov_yy)));
+        bool known = false;
+        for (int k = 0; k < before && !known; k++) {
+            known = hypot(out->items[k].x_px - f->x_px, out->items[k].y_px - f->y_px) < reach;
+        }
+        if (known) {
+            continue;
+        }
+        if (out->count == capacity) {
+            out->lost++;
+            continue;
+        }
+        bst_detection *d = &out->items[out->count++];
+        double width = 2.3548200450309493 * ip->left.sigma_px * ip->left.binning;
+        *d = (bst_detection){.x_px = f->x_px,
+                             .y_px = f->y_px,
+                             .cov_xx = f->cov_xx,
+                             .cov_xy = f->cov_xy,
+                             .cov_yy = f->cov_yy,
+                             .flux_e = f->flux_e,
+                             .flux_sigma_e = f->flux_sigma_e,
+                             .snr = f->snr,
+                             .length_px = width,
+                             .width_px = width,
+                             .flags = BST_DETECTION_STACK,
+                             .label = f->at_rest ? BST_LABEL_STAR : BST_LABEL_OBJECT,
+                             .label_probability = 0.9,
+                             .rate_x_pxps = f->rate_x_pxps,
+                             .rate_y_pxps = f->rate_y_pxps,
+                             .rate_sigma_pxps = f->rate_sigma_pxps};
+        double rate = f->flux_e / fmax(ip->exposure_s, 1e-9);
+        d->v_mag = -2.5 * log10(rate / ip->electrons_per_s_v0);
+        d->v_mag_sigma = 2.5 / log(10.0) * f->flux_sigma_e / f->flux_e;
+    }
 }

@@ -6,8 +6,12 @@
 
 #include "imgproc/rows.h"
 #include "imgproc/tail.h"
+#include "sim/core/pages.h"
 
-enum { PART_PX = 131072 }; /* pixels of a part of a pass */
+enum {
+    PART_PX = 131072, /* pixels of a part of a pass */
+    GROUP = 4         /* rows that are made at a time */
+};
 
 bst_status bst_filter_create(bst_ctx *ctx, int max_width, int max_height, double streak_max_px,
                              int threads, bst_filter *out) {
@@ -17,10 +21,12 @@ bst_status bst_filter_create(bst_ctx *ctx, int max_width, int max_height, double
     *out = (bst_filter){.max_width = max_width, .max_height = max_height, .pad = pad};
     size_t pixels = (size_t)max_width * (size_t)max_height;
     size_t line = (size_t)(max_width + 2 * pad);
-    /* five rows and two of meshes, and a ring of rows */
-    out->line_floats = line * (2 * BST_FILTER_MAX_RADIUS + 1 + 7);
-    out->point = calloc(line * (size_t)(max_height + 2 * pad), sizeof(float));
-    out->best = calloc(line * (size_t)(max_height + 2 * pad), sizeof(float));
+    /* three rows, the parts of a row (two for each four pixels at the most, of five
+     * numbers), and a ring of rows */
+    out->line_floats = line * (3 + 3 + 2 * BST_FILTER_MAX_RADIUS + GROUP);
+    size_t map = line * (size_t)(max_height + 2 * pad) * sizeof(float);
+    out->point = bst_pages_alloc(map);
+    out->best = bst_pages_alloc(map);
     out->maxima = calloc((size_t)max_height, sizeof *out->maxima);
     out->maximum_x = calloc(pixels, sizeof *out->maximum_x);
     out->maximum_snr = calloc(pixels, sizeof *out->maximum_snr);
@@ -204,10 +210,6 @@ static void set_streak(bst_filter *f, double dx, double dy) {
     f->overlap = fmin(shared, 1.0);
     /* norm of the drawn kernel at unit flux: the point kernel's over total weight times scale */
     f->streak_norm = f->norm / (scale * total);
-    while (f->taps % 4) {
-        f->tap_x[f->taps] = f->tap_y[f->taps] = 0;
-        f->tap_weight[f->taps++] = 0.0f;
-    }
     describe_streak(f);
 }
 
@@ -319,8 +321,7 @@ static void filter_streak(bst_filter *f, int y) {
         in[t] = point + (long)f->tap_y[t] * (long)f->stride + f->tap_x[t];
     }
     float *row = map_row(f, f->best, y);
-    bst_row_combine(row, f->width, in, f->tap_weight, f->taps);
-    bst_row_greater(row, point, f->width);
+    bst_row_streak(row, (size_t)f->stride, f->width, in, f->tap_weight, f->taps, point);
 }
 
 /* The kernel's cut at the frame's edges. */
@@ -334,54 +335,73 @@ static void mend_edges(const bst_filter *f, int y, float *row) {
     }
 }
 
+/* One row of the kernel's horizontal part; own: with its row of signal. */
+static void filter_across(const pass *p, int y, bool own, float *lines, float *out) {
+    const bst_filter *f = p->f;
+    int width = f->width, r = f->radius;
+    if (y < 0 || y >= f->height) {
+        memset(out, 0, (size_t)width * sizeof(float));
+        return;
+    }
+    size_t row = (size_t)y * (size_t)width, line = (size_t)f->stride;
+    float *normalised = lines, *electrons = lines + line;
+    float *signal = own ? p->signal + row : lines + 2 * line;
+    bst_row_part *parts = (bst_row_part *)(void *)(lines + 3 * line);
+    p->read(p->user, y, 0, width, electrons);
+    bst_row_normalise(p->raw + row, electrons, parts, bst_background_parts(p->background, y, parts),
+                      p->saturated_dn, signal, normalised + r);
+    const float *in[2 * BST_FILTER_MAX_RADIUS + 1];
+    for (int t = 0; t <= 2 * r; t++) {
+        in[t] = normalised + t;
+    }
+    bst_row_even(out, width, in + r, f->kernel + r, r);
+}
+
+/* `count` (1 or GROUP) rows of the point map from the ring of horizontal parts. */
+static void filter_down(bst_filter *f, int y, int count, const float *ring, int ring_rows) {
+    const float *in[2 * BST_FILTER_MAX_RADIUS + GROUP];
+    size_t line = (size_t)f->stride;
+    int r = f->radius;
+    for (int t = 0; t < 2 * r + count; t++) {
+        in[t] = ring + line * (size_t)((y - r + t + ring_rows) % ring_rows);
+    }
+    float *out = map_row(f, f->point, y);
+    if (count == GROUP) {
+        bst_row_even_4(out, line, f->width, in + r, f->kernel + r, r);
+    } else {
+        bst_row_even(out, f->width, in + r, f->kernel + r, r);
+    }
+    for (int k = 0; k < count; k++) {
+        mend_edges(f, y + k, out + (size_t)k * line);
+    }
+}
+
 /* Rows begin to end of the point map, with the rows of signal that are theirs; of the streak map
  * and of maxima, those that need no other rows. */
 static void filter_rows(void *user, int begin, int end) {
     const pass *p = user;
     bst_filter *f = p->f;
-    int width = f->width, r = f->radius, taps = 2 * r + 1;
+    int r = f->radius, ring_rows = 2 * r + GROUP;
     size_t line = (size_t)f->stride;
     int taken = bst_borrow_take(f->lent);
-    float *normalised = f->lines + f->line_floats * (size_t)taken, *level = normalised + line,
-          *inverse = level + line, *halo = inverse + line, *ring = halo + line;
-    bst_background background = *p->background;
-    background.row_level = ring + line * (size_t)taps;
-    background.row_noise = background.row_level + line;
-    const float *in[2 * BST_FILTER_MAX_RADIUS + 1], *const *middle = in + r;
-    memset(normalised, 0, line * sizeof(float));
-    for (int y = begin - r; y < end + r; y++) {
-        float *horizontal = ring + line * (size_t)((y + taps) % taps);
-        if (y >= 0 && y < f->height) {
-            size_t row = (size_t)y * (size_t)width;
-            bool own = y >= begin && y < end;
-            float *signal = own ? p->signal + row : halo;
-            p->read(p->user, y, 0, width, signal);
-            bst_background_row(&background, y, level, inverse);
-            bst_row_normalise(p->raw + row, signal, level, inverse, width, p->saturated_dn, signal,
-                              normalised + r);
-            for (int t = 0; t < taps; t++) {
-                in[t] = normalised + t;
+    float *lines = f->lines + f->line_floats * (size_t)taken, *ring = lines + 6 * line;
+    memset(lines, 0, line * sizeof(float));
+    for (int y = begin - r, next = begin; y < end + r; y++) {
+        filter_across(p, y, y >= begin && y < end, lines,
+                      ring + line * (size_t)((y + ring_rows) % ring_rows));
+        int last = y - r; /* the last row that can be made */
+        int count = last - next + 1 == GROUP ? GROUP : last + 1 == end ? 1 : 0;
+        for (; count > 0 && next <= last; next += count) {
+            filter_down(f, next, count, ring, ring_rows);
+            for (int k = next; k < next + count; k++) {
+                int ready = k - p->reach;
+                if (f->streak && ready >= begin + p->reach) {
+                    filter_streak(f, ready);
+                }
+                if (ready - 2 >= begin + p->reach) {
+                    find_maxima(f, ready - 1, p->threshold);
+                }
             }
-            bst_row_even(horizontal, width, middle, f->kernel + r, r);
-        } else {
-            memset(horizontal, 0, (size_t)width * sizeof(float));
-        }
-        int centre = y - r;
-        if (centre < begin) {
-            continue;
-        }
-        for (int t = 0; t < taps; t++) {
-            in[t] = ring + line * (size_t)((centre - r + t + taps) % taps);
-        }
-        float *out = map_row(f, f->point, centre);
-        bst_row_even(out, width, middle, f->kernel + r, r);
-        mend_edges(f, centre, out);
-        int ready = centre - p->reach;
-        if (f->streak && ready >= begin + p->reach) {
-            filter_streak(f, ready);
-        }
-        if (ready - 2 >= begin + p->reach) {
-            find_maxima(f, ready - 1, p->threshold);
         }
     }
     bst_borrow_give(f->lent, taken);

@@ -6,6 +6,7 @@
 #ifndef BST_IMGPROC_IMGPROC_H
 #define BST_IMGPROC_IMGPROC_H
 
+#include "imgproc/stack.h"
 #include "sim/core/messages.h"
 #include "sim/core/module.h"
 #include "sim/world/camera.h"
@@ -23,6 +24,7 @@ typedef struct bst_imgproc_config {
     double streak_min_px, streak_max_px;
     double streak_search_px; /* 0: no search for streaks of unknown rate and direction */
     double search_radius_px, match_tolerance_px;
+    bst_stack_config stack;
     int64_t threads;            /* 0: one per processor */
     bst_config_list bad_pixels; /* of bst_bad_pixel */
     /* FITS images of the maps; "": none. bst_imgproc_create leaves them to the caller. */
@@ -96,6 +98,16 @@ double bst_imgproc_streak_px(const bst_imgproc *ip);
 /* Whether stars moved further in the latest frame than is modelled (streak_max_px): what was found
  * then is parts of streaks, and no place of it is to be trusted. */
 bool bst_imgproc_smeared(const bst_imgproc *ip);
+
+/* The latest frame for a stack (stack.h); its signal is lent until the next frame. q_cam_from_gcrf
+ * and time_s are of the middle of the exposure. */
+bst_stack_frame bst_imgproc_stack_frame(const bst_imgproc *ip, double time_s,
+                                        bst_quat q_cam_from_gcrf);
+/* Appends what a stack shows to the detections of its last frame (room for `capacity`), with the
+ * flag BST_DETECTION_STACK, labelled STAR where at rest and else OBJECT; not what lies within
+ * reach_px, or three of its standard deviations, of a detection that is there. */
+void bst_imgproc_append_stack(const bst_imgproc *ip, const bst_stack_found *found, int count,
+                              double reach_px, bst_detections *out, int capacity);
 
 extern const bst_module_desc bst_imgproc_module;
 

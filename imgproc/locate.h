@@ -63,10 +63,18 @@ typedef struct bst_locate_frame {
     double origin_x_px, origin_y_px, binning; /* full-sensor = origin + binning * frame pixel */
 } bst_locate_frame;
 
+/* Squares of the frame that the found ones are kept by, px. */
+enum { BST_LOCATE_CELL_PX = 16 };
+
 /* `pool` is borrowed. */
 bst_status bst_locator_create(bst_ctx *ctx, bst_parallel *pool, int capacity, int max_width,
                               int max_height, int max_side, bst_locator *out) BST_MUST_CHECK;
 void bst_locator_free(bst_locator *locator);
+
+/* SNR of a source of one electron in noise of one, as a point or drawn as stars are. */
+static inline double bst_locate_norm(const bst_locate_frame *frame, bool streak) {
+    return streak ? frame->filter->streak_norm : frame->filter->norm;
+}
 
 /* Fits the brightest `capacity` candidates, brightest first. Each is taken for a point or for a
  * streak as the greater filter output says; both are fitted where the outputs are close, or the
@@ -82,8 +90,8 @@ void bst_locator_free(bst_locator *locator);
 void bst_locate(bst_locator *locator, const bst_locate_frame *frame,
                 const bst_candidates *candidates);
 
-/* The same without fits: each stands at its maximum's pixel, known to a pixel, with the flux that
- * the filter says. For frames in which stars moved further than is modelled. */
+/* The same without fits: each stands at its maximum, known to a pixel, with the flux that the
+ * filter says. For frames in which stars moved further than is modelled. */
 void bst_locate_roughly(bst_locator *locator, const bst_locate_frame *frame,
                         const bst_candidates *candidates);
 

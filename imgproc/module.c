@@ -36,6 +36,8 @@ const bst_config_desc bst_imgproc_config_table[] = {
              "Greatest pointing error over which stars are identified."),
     BST_REAL(bst_imgproc_config, match_tolerance_px, "px", 0.5, 20, "3",
              "Greatest distance of one star from its place after the common shift."),
+    BST_OBJECT(bst_imgproc_config, stack, bst_stack_config_table, "{}",
+               "Search for objects too faint for one frame in stacks of frames."),
     BST_INT(
         bst_imgproc_config, threads, "", 0, 32, "0",
         "Threads that share the passes over a frame and the fits; 0: one per processor. Results do "
@@ -89,6 +91,7 @@ typedef struct imgproc_module {
     bst_starid *starid;
     bst_discriminator *discriminator;
     bst_sky sky;
+    bst_stack *stack; /* NULL: no stacks */
     bst_photometer photometer;
 } imgproc_module;
 
@@ -105,6 +108,7 @@ static void destroy(void *self) {
     bst_starid_free(m->starid);
     bst_discriminator_free(m->discriminator);
     bst_sky_free(&m->sky);
+    bst_stack_free(m->stack);
     bst_photometer_free(&m->photometer);
     free(m);
 }
@@ -138,6 +142,10 @@ static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
                               m->config->search_radius_px, &m->starid));
     BST_TRY(bst_discriminator_create(env->ctx, &m->camera, (int)m->config->capacity,
                                      &m->discriminator));
+    if (m->config->stack.frames > 0) {
+        BST_TRY(bst_stack_create(env->ctx, &m->camera, &m->config->stack, (int)m->config->threads,
+                                 &m->stack));
+    }
     BST_TRY(bst_photometer_create(env->ctx, (int)m->config->capacity, &m->photometer));
     bst_env_set_capacity(env, PORT_DETECTIONS, (int)m->config->capacity);
     return BST_OK;
@@ -240,7 +248,7 @@ static bst_status identify(imgproc_module *m, const lane *l, bst_ctx *ctx,
 /* The camera's motion as telemetry tells it; false: not known. */
 static bool motion_of(struct bst_step *step, const bst_frame_message *message, bst_motion *motion) {
     bst_sample pointing = bst_step_latest(step, PORT_POINTING);
-    *motion = (bst_motion){BST_QUAT_IDENTITY, {0, 0, 0}, {0, 0, 0}};
+    *motion = (bst_motion){.q_cam_from_gcrf = BST_QUAT_IDENTITY};
     return pointing.payload && !pointing.stale &&
            bst_motion_from_telemetry(pointing.payload, message->start_tick, message->end_tick,
                                      motion);
@@ -310,6 +318,24 @@ static bst_status detections_of(bst_ctx *ctx, imgproc_module *m, lane *l,
     return BST_OK;
 }
 
+/* Each full stack adds what it shows to the detections of its last frame. */
+static void add_to_stack(imgproc_module *m, const lane *l, double middle_tick,
+                         bst_quat q_cam_from_gcrf, const bst_zero_point *zero_point,
+                         bst_detections *out, int capacity) {
+    bst_stack_frame frame =
+        bst_imgproc_stack_frame(l->ip, middle_tick / (double)m->tick_rate_hz, q_cam_from_gcrf);
+    if (bst_stack_add(m->stack, &frame) == m->config->stack.frames) {
+        int count, before = out->count;
+        const bst_stack_found *found = bst_stack_search(m->stack, &count);
+        bst_imgproc_append_stack(l->ip, found, count, m->camera.psf_fwhm_px, out, capacity);
+        for (int i = before; i < out->count; i++) {
+            bst_detection *d = &out->items[i];
+            d->v_mag += zero_point->offset_mag;
+            d->v_mag_sigma = hypot(d->v_mag_sigma, zero_point->sigma_mag);
+        }
+    }
+}
+
 static bst_status process(imgproc_module *m, struct bst_step *step,
                           const bst_frame_message *message) {
     bst_ctx *ctx = bst_step_ctx(step);
@@ -355,6 +381,9 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
     }
     if (out->stars_identified == 0) {
         bst_step_count(step, "frame_without_stars");
+    }
+    if (m->stack && !smeared) {
+        add_to_stack(m, l, middle, known.q_cam_from_gcrf, &zero_point, out, capacity);
     }
     if (out->lost > 0) {
         bst_step_count(step, "detections_overflow");

@@ -95,6 +95,14 @@ static void make_profile(const bst_psf *psf, double centre, double sigma, int si
     }
 }
 
+static int node_count(const bst_shape *shape) {
+    /* path at the greatest speed, which is at an end */
+    double length =
+        (hypot(shape->dx_px, shape->dy_px) + 6.0 * hypot(shape->bend_x_px, shape->bend_y_px)) /
+        shape->sigma_px;
+    return length < 1e-3 ? 1 : (int)fmin(5.0 + 1.15 * length, BST_PSF_MAX_NODES);
+}
+
 void bst_psf_profile(const bst_psf *psf, double centre, double sigma, int side, double *share,
                      double *slope, double *curvature) {
     profile p;
@@ -114,11 +122,7 @@ void bst_psf_render(const bst_psf *psf, const bst_shape *shape, const bst_stamp 
     memset(by_x, 0, bytes);
     memset(by_y, 0, bytes);
     memset(by_variance, 0, bytes);
-    /* path at the greatest speed, which is at an end */
-    double length =
-        (hypot(shape->dx_px, shape->dy_px) + 6.0 * hypot(shape->bend_x_px, shape->bend_y_px)) /
-        shape->sigma_px;
-    int nodes = length < 1e-3 ? 1 : (int)fmin(5.0 + 1.15 * length, BST_PSF_MAX_NODES);
+    int nodes = node_count(shape);
     const double *node = psf->node + nodes * (nodes - 1) / 2;
     const double *weight = psf->weight + nodes * (nodes - 1) / 2;
     profile px, py;
@@ -138,6 +142,37 @@ void bst_psf_render(const bst_psf *psf, const bst_shape *shape, const bst_stamp 
                 sx[i] += p * px.slope[i];
                 sy[i] += d * px.share[i];
                 sv[i] += half_p * px.curvature[i] + half_c * px.share[i];
+            }
+        }
+    }
+}
+
+void bst_psf_render_motion(const bst_psf *psf, const bst_shape *shape, const bst_stamp *stamp,
+                           double ex, double ey, double *share, double *by_x, double *by_y,
+                           double *by_variance, double *const by_motion[3]) {
+    bst_psf_render(psf, shape, stamp, share, by_x, by_y, by_variance);
+    size_t bytes = (size_t)stamp->width * (size_t)stamp->height * sizeof(double);
+    for (int m = 0; m < 3; m++) {
+        memset(by_motion[m], 0, bytes);
+    }
+    int nodes = node_count(shape);
+    const double *node = psf->node + nodes * (nodes - 1) / 2;
+    const double *weight = psf->weight + nodes * (nodes - 1) / 2;
+    profile px, py;
+    for (int k = 0; k < nodes; k++) {
+        double bow = 6.0 * node[k] * node[k] - 0.5;
+        double x = shape->x_px + node[k] * shape->dx_px + bow * shape->bend_x_px;
+        double y = shape->y_px + node[k] * shape->dy_px + bow * shape->bend_y_px;
+        make_profile(psf, x - stamp->x0, shape->sigma_px, stamp->width, &px);
+        make_profile(psf, y - stamp->y0, shape->sigma_px, stamp->height, &py);
+        for (int j = 0; j < py.count; j++) {
+            double p = weight[k] * py.share[j], d = weight[k] * py.slope[j];
+            size_t row = (size_t)(py.first + j) * (size_t)stamp->width + (size_t)px.first;
+            for (int i = 0; i < px.count; i++) {
+                double sx = p * px.slope[i], sy = d * px.share[i], along = ex * sx + ey * sy;
+                by_motion[0][row + (size_t)i] += node[k] * along;
+                by_motion[1][row + (size_t)i] += node[k] * (ex * sy - ey * sx);
+                by_motion[2][row + (size_t)i] += bow * along;
             }
         }
     }

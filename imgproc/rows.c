@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "imgproc/background.h"
+#include "imgproc/lanes.h"
 
 /* Several instruction sets by the loader's choice. Contraction is off for the whole project, so
  * the clones round alike. */
@@ -18,7 +19,7 @@
 #endif
 
 /* Half of the lanes as one value, so that they stay in registers. */
-enum { HALF = BST_ROW_LANES / 2, MEDIAN_PARTS = BST_ROW_MEDIAN / HALF };
+enum { HALF = BST_ROW_LANES / 2, MEDIAN_PARTS = BST_ROW_MEDIAN / HALF, MAX_RADIUS = 32 };
 typedef float lanes __attribute__((vector_size(HALF * sizeof(float))));
 typedef int32_t lane_masks __attribute__((vector_size(HALF * sizeof(float))));
 
@@ -111,16 +112,56 @@ void bst_row_electrons(const uint16_t *restrict raw, int count, float offset, fl
 }
 
 ROW_FUNCTION
-void bst_row_normalise(const uint16_t *restrict raw, const float *electrons,
-                       const float *restrict level, const float *restrict inverse_noise, int count,
-                       int saturated_dn, float *signal, float *restrict normalised) {
+static uint16_t greatest(const uint16_t *raw, int count) {
+    uint16_t top = 0;
     for (int x = 0; x < count; x++) {
-        float value = electrons[x];
-        float difference = value - level[x];
-        float n = difference * inverse_noise[x];
-        normalised[x] = value > BST_PIXEL_NONE ? n : 0.0f;
-        float kept = value > BST_PIXEL_NONE ? difference : BST_PIXEL_BAD;
-        signal[x] = raw[x] >= saturated_dn && value > BST_PIXEL_NONE ? BST_PIXEL_SATURATED : kept;
+        top = raw[x] > top ? raw[x] : top;
+    }
+    return top;
+}
+
+/* What is written next is fetched meanwhile. */
+BST_CLONES
+static void take_level_off(const float *electrons, const bst_row_part *parts, int count,
+                           float *signal, float *normalised) {
+    int x = 0, width = count > 0 ? parts[count - 1].end : 0;
+    bst_lanes column;
+    for (int i = 0; i < BST_LANES; i++) {
+        column[i] = (float)i;
+    }
+    for (int i = 0; i < count; i++) {
+        bst_row_part p = parts[i];
+        for (; x + BST_LANES <= p.end; x += BST_LANES) {
+            __builtin_prefetch(signal + x + width, 1);
+            bst_lanes value = BST_LOAD(electrons + x), at = column + (float)x;
+            bst_lanes difference = value - (p.level + p.level_slope * at);
+            bst_lanes n = difference * (p.inverse + p.inverse_slope * at);
+            bst_lane_ints good = value > BST_PIXEL_NONE;
+            bst_lanes bad = {0};
+            bad += BST_PIXEL_BAD;
+            BST_STORE(normalised + x, (bst_lanes)((bst_lane_ints)n & good));
+            BST_STORE(signal + x, (bst_lanes)(((bst_lane_ints)difference & good) |
+                                              ((bst_lane_ints)bad & ~good)));
+        }
+        for (; x < p.end; x++) {
+            float value = electrons[x], at = (float)x;
+            float difference = value - (p.level + p.level_slope * at);
+            float n = difference * (p.inverse + p.inverse_slope * at);
+            normalised[x] = value > BST_PIXEL_NONE ? n : 0.0f;
+            signal[x] = value > BST_PIXEL_NONE ? difference : BST_PIXEL_BAD;
+        }
+    }
+}
+
+void bst_row_normalise(const uint16_t *raw, const float *electrons, const bst_row_part *parts,
+                       int count, int saturated_dn, float *signal, float *normalised) {
+    int width = count > 0 ? parts[count - 1].end : 0;
+    take_level_off(electrons, parts, count, signal, normalised);
+    int first = greatest(raw, width) >= saturated_dn ? 0 : width;
+    for (int x = first; x < width; x++) {
+        if (raw[x] >= saturated_dn && signal[x] > BST_PIXEL_NONE) {
+            signal[x] = BST_PIXEL_SATURATED;
+        }
     }
 }
 
@@ -148,6 +189,36 @@ void bst_row_even(float *restrict out, int count, const float *const *in, const 
         for (int x = 0; x < count; x++) {
             out[x] += w * (a[x] + b[x]);
         }
+    }
+}
+
+BST_CLONES
+void bst_row_even_4(float *out, size_t stride, int count, const float *const *in,
+                    const float *weight, int radius) {
+    int x = 0;
+    float w0 = weight[0], w1 = weight[1], w2 = radius > 1 ? weight[2] : 0.0f,
+          w3 = radius > 2 ? weight[3] : 0.0f;
+    /* a row that is read serves all four */
+    for (; radius == 3 && x + BST_LANES <= count; x += BST_LANES) {
+        bst_lanes a = BST_LOAD(in[-3] + x), b = BST_LOAD(in[-2] + x), c = BST_LOAD(in[-1] + x);
+        bst_lanes d = BST_LOAD(in[0] + x), e = BST_LOAD(in[1] + x), f = BST_LOAD(in[2] + x);
+        bst_lanes g = BST_LOAD(in[3] + x), h = BST_LOAD(in[4] + x), i = BST_LOAD(in[5] + x);
+        bst_lanes j = BST_LOAD(in[6] + x);
+        float *to = out + x;
+        for (int k = 4; k < 8; k++) {
+            __builtin_prefetch(to + (size_t)k * stride, 1); /* of the next four */
+        }
+        BST_STORE(to, (w0 * d + w1 * (c + e)) + (w2 * (b + f) + w3 * (a + g)));
+        BST_STORE(to + stride, (w0 * e + w1 * (d + f)) + (w2 * (c + g) + w3 * (b + h)));
+        BST_STORE(to + 2 * stride, (w0 * f + w1 * (e + g)) + (w2 * (d + h) + w3 * (c + i)));
+        BST_STORE(to + 3 * stride, (w0 * g + w1 * (f + h)) + (w2 * (e + i) + w3 * (d + j)));
+    }
+    for (int k = 0; k < 4 && x < count; k++) {
+        const float *row[2 * MAX_RADIUS + 1];
+        for (int t = -radius; t <= radius; t++) {
+            row[radius + t] = in[k + t] + x;
+        }
+        bst_row_even(out + (size_t)k * stride + x, count - x, row + radius, weight, radius);
     }
 }
 
@@ -181,7 +252,7 @@ void bst_row_combine(float *restrict out, int count, const float *const *in, con
                       ((we * e[x] + wf * f[x]) + (wg * g[x] + wh * h[x]));
         }
     }
-    for (; t < taps; t += 4) {
+    for (; t + 4 <= taps; t += 4) {
         const float *restrict a = in[t], *restrict b = in[t + 1], *restrict c = in[t + 2],
                               *restrict d = in[t + 3];
         float wa = weight[t], wb = weight[t + 1], wc = weight[t + 2], wd = weight[t + 3];
@@ -189,12 +260,56 @@ void bst_row_combine(float *restrict out, int count, const float *const *in, con
             out[x] += (wa * a[x] + wb * b[x]) + (wc * c[x] + wd * d[x]);
         }
     }
+    for (; t + 2 <= taps; t += 2) {
+        const float *restrict a = in[t], *restrict b = in[t + 1];
+        float wa = weight[t], wb = weight[t + 1];
+        for (int x = 0; x < count; x++) {
+            out[x] += wa * a[x] + wb * b[x];
+        }
+    }
+    for (; t < taps; t++) {
+        const float *restrict a = in[t];
+        float wa = weight[t];
+        for (int x = 0; x < count; x++) {
+            out[x] += wa * a[x];
+        }
+    }
 }
 
-ROW_FUNCTION
-void bst_row_greater(float *restrict a, const float *restrict b, int count) {
-    for (int x = 0; x < count; x++) {
-        a[x] = a[x] > b[x] ? a[x] : b[x];
+BST_CLONES
+void bst_row_streak(float *out, size_t stride, int count, const float *const *in,
+                    const float *weight, int taps, const float *floor) {
+    enum { STEP = 4 * BST_LANES };
+    int x = 0;
+    for (; x + STEP <= count; x += STEP) {
+        bst_lanes a = {0}, b = {0}, c = {0}, d = {0};
+        for (int k = 0; k < 4; k++) {
+            __builtin_prefetch(out + stride + x + k * BST_LANES, 1);
+        }
+        for (int t = 0; t < taps; t++) {
+            const float *row = in[t] + x;
+            float w = weight[t];
+            a += w * BST_LOAD(row);
+            b += w * BST_LOAD(row + BST_LANES);
+            c += w * BST_LOAD(row + 2 * BST_LANES);
+            d += w * BST_LOAD(row + 3 * BST_LANES);
+        }
+        const float *least = floor + x;
+        a = BST_LOAD(least) + BST_ABOVE_0(a - BST_LOAD(least));
+        b = BST_LOAD(least + BST_LANES) + BST_ABOVE_0(b - BST_LOAD(least + BST_LANES));
+        c = BST_LOAD(least + 2 * BST_LANES) + BST_ABOVE_0(c - BST_LOAD(least + 2 * BST_LANES));
+        d = BST_LOAD(least + 3 * BST_LANES) + BST_ABOVE_0(d - BST_LOAD(least + 3 * BST_LANES));
+        BST_STORE(out + x, a);
+        BST_STORE(out + x + BST_LANES, b);
+        BST_STORE(out + x + 2 * BST_LANES, c);
+        BST_STORE(out + x + 3 * BST_LANES, d);
+    }
+    for (; x < count; x++) {
+        float sum = 0.0f;
+        for (int t = 0; t < taps; t++) {
+            sum += weight[t] * in[t][x];
+        }
+        out[x] = sum > floor[x] ? sum : floor[x];
     }
 }
 

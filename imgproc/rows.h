@@ -8,7 +8,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { BST_ROW_LANES = 16, BST_ROW_MEDIAN = 104 };
+enum { BST_ROW_LANES = 16, BST_ROW_MEDIAN = 96 };
 
 /* Sums in separate lanes, added by the caller in lane order. */
 typedef struct bst_row_sums {
@@ -29,21 +29,33 @@ void bst_row_line(float *out, int count, float left, float slope, float first);
 /* out = (raw - offset) * gain */
 void bst_row_electrons(const uint16_t *raw, int count, float offset, float gain, float *out);
 
-/* Splits a row of electrons: signal = electrons - level, but BST_PIXEL_SATURATED where raw >=
- * saturated_dn; normalised = signal * inverse_noise (saturated pixels with their value), 0 where a
- * pixel is bad. In place allowed for electrons and signal. */
-void bst_row_normalise(const uint16_t *raw, const float *electrons, const float *level,
-                       const float *inverse_noise, int count, int saturated_dn, float *signal,
-                       float *normalised);
+/* A part of an image row, up to column `end`, on which level and 1 / noise are straight lines by
+ * column. */
+typedef struct bst_row_part {
+    int end;
+    float level, level_slope, inverse, inverse_slope;
+} bst_row_part;
+
+/* Takes the level off a row of electrons: signal = electrons - level, but BST_PIXEL_SATURATED where
+ * raw >= saturated_dn; normalised = signal / noise (saturated pixels with their value), 0 where a
+ * pixel is bad. The first part begins at column 0. The rows may not overlap. */
+void bst_row_normalise(const uint16_t *raw, const float *electrons, const bst_row_part *parts,
+                       int count, int saturated_dn, float *signal, float *normalised);
 
 /* out[x] = weight[0] * in[0][x] + sum of weight[t] * (in[-t][x] + in[t][x]), t from 1 to radius */
 void bst_row_even(float *out, int count, const float *const *in, const float *weight, int radius);
 
-/* out[x] = sum over taps of weight[t] * in[t][x]; taps is a multiple of 4. */
+/* The same for four rows of `out`, `stride` floats apart: row k about in[k]. */
+void bst_row_even_4(float *out, size_t stride, int count, const float *const *in,
+                    const float *weight, int radius);
+
+/* out[x] = sum over taps of weight[t] * in[t][x] */
 void bst_row_combine(float *out, int count, const float *const *in, const float *weight, int taps);
 
-/* a = max(a, b) */
-void bst_row_greater(float *a, const float *b, int count);
+/* out[x] = the greater of floor[x] and the sum over taps of weight[t] * in[t][x]; what lies
+ * `stride` floats on is to be written next. */
+void bst_row_streak(float *out, size_t stride, int count, const float *const *in,
+                    const float *weight, int taps, const float *floor);
 
 /* Writes the places and values of the elements above the threshold (> 0) that exceed their eight
  * neighbours (of equals the first in row-major order); returns how many. On

@@ -63,6 +63,20 @@ void bst_sharpness_set(bst_sharpness *s, const bst_psf *psf, double sigma_px) {
     }
 }
 
+/* Whether one of the pairs about a pixel inside the frame is short of what light would leave there,
+ * or is not measured: the quick answer for almost all pixels. */
+static bool is_suspicious(const bst_sharpness *s, const float *pixel, int stride) {
+    bool short_of = false;
+    for (int g = 1; g < BST_SHARP_GROUPS; g++) {
+        const neighbour *n = &neighbours[first_of[g]];
+        float ratio = (float)s->ratio[n->dy + 1][n->dx + 1];
+        float pair = pixel[n->dy * stride + n->dx] + pixel[-n->dy * stride - n->dx];
+        short_of |=
+            pair * ratio * (float)s->inverse_square[g] < 1.001f * (float)s->floor[g] * *pixel;
+    }
+    return short_of;
+}
+
 double bst_sharpness_at(const bst_sharpness *s, const float *signal, int width, int height,
                         double noise_e, int x, int y) {
     if (x < 0 || y < 0 || x >= width || y >= height) {
@@ -70,6 +84,10 @@ double bst_sharpness_at(const bst_sharpness *s, const float *signal, int width, 
     }
     double centre = (double)signal[(long)y * width + x];
     if (!(centre > 3.0 * noise_e)) {
+        return 0.0;
+    }
+    bool inside = x > 0 && y > 0 && x + 1 < width && y + 1 < height;
+    if (inside && !is_suspicious(s, signal + (long)y * width + x, width)) {
         return 0.0;
     }
     double at[3][3], worst = 0.0, noise2 = noise_e * noise_e;

@@ -9,24 +9,26 @@
 
 /* What is brighter is a point or a bright streak: a point counts for little among many rows. */
 enum { BAND = 64, TURN = 32, CLAMP_SIGMA = 5 };
+static const float SUM_BOUND = 6.0f;
 
 static size_t plane_size(int width, int height) {
     return (size_t)(width + 2 * BST_STREAK_PAD) * (size_t)(height + 2 * BST_STREAK_PAD);
 }
 
-bst_status bst_streak_map_create(bst_ctx *ctx, int max_width, int max_height, bst_streak_map *out) {
+bst_status bst_streak_map_create(bst_ctx *ctx, int max_width, int max_height, bool turned,
+                                 bst_streak_map *out) {
     *out = (bst_streak_map){.max_width = max_width, .max_height = max_height};
     out->bands = max_height / BAND + 1;
     size_t line = (size_t)max_width + 2 * BST_FILTER_MAX_RADIUS;
-    /* normalised, level, inverse noise, sum, mesh rows twice, ring */
-    out->lines_per_band = line * (2 * BST_FILTER_MAX_RADIUS + 1 + 6);
+    /* normalised, level, inverse noise, sum, ring */
+    out->lines_per_band = line * (2 * BST_FILTER_MAX_RADIUS + 1 + 4);
     out->lines = calloc(out->lines_per_band * (size_t)out->bands, sizeof(float));
     out->memory[0] = calloc(plane_size(max_width, max_height), sizeof(int16_t));
-    out->memory[1] = calloc(plane_size(max_width, max_height), sizeof(int16_t));
-    if (!out->lines || !out->memory[0] || !out->memory[1]) {
+    out->memory[1] = turned ? calloc(plane_size(max_width, max_height), sizeof(int16_t)) : NULL;
+    if (!out->lines || !out->memory[0] || (turned && !out->memory[1])) {
         bst_streak_map_free(out);
-        return bst_fail(ctx, BST_ERR_MEMORY, "no memory to search a %d x %d frame for streaks",
-                        max_width, max_height);
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory to search a %d x %d frame", max_width,
+                        max_height);
     }
     return BST_OK;
 }
@@ -61,8 +63,17 @@ static void set_kernel(bst_streak_map *map, double sigma) {
 typedef struct fill_job {
     bst_streak_map *map;
     const float *signal;
+    float *sum; /* NULL, or where each pixel's own SNR is added */
     const bst_background *background;
 } fill_job;
+
+/* One bright pixel of one frame is not to stand for many. */
+static void add_bounded(float *restrict sum, const float *restrict values, int count) {
+    for (int x = 0; x < count; x++) {
+        float v = values[x] > SUM_BOUND ? SUM_BOUND : values[x];
+        sum[x] += v < -SUM_BOUND ? -SUM_BOUND : v;
+    }
+}
 
 /* One band of rows of the separable filter. */
 static void fill_band(const fill_job *job, int band) {
@@ -73,10 +84,7 @@ static void fill_band(const fill_job *job, int band) {
     size_t line = (size_t)map->max_width + 2 * BST_FILTER_MAX_RADIUS;
     float *normalised = map->lines + map->lines_per_band * (size_t)band;
     float *level = normalised + line, *inverse = level + line, *sum = inverse + line;
-    float *ring = sum + 3 * line;
-    bst_background background = *job->background;
-    background.row_level = sum + line;
-    background.row_noise = sum + 2 * line;
+    float *ring = sum + line;
     memset(normalised, 0, line * sizeof(float));
     const float *in[64];
     float clamp = (float)map->clamp, floor = -6.0f * (float)BST_STREAK_QUANTA;
@@ -84,10 +92,13 @@ static void fill_band(const fill_job *job, int band) {
         float *horizontal = ring + line * (size_t)((y + 64 * taps) % taps);
         if (y >= 0 && y < height) {
             const float *signal = job->signal + (size_t)y * (size_t)width;
-            bst_background_row(&background, y, level, inverse);
+            bst_background_row(job->background, y, level, inverse);
             for (int x = 0; x < width; x++) {
                 float v = signal[x] * inverse[x];
                 normalised[r + x] = signal[x] > BST_PIXEL_NONE ? v : 0.0f;
+            }
+            if (job->sum && y >= first && y < last) {
+                add_bounded(job->sum + (size_t)y * (size_t)width, normalised + r, width);
             }
             for (int t = 0; t < padded; t++) {
                 in[t] = normalised + (t < taps ? t : 0);
@@ -140,20 +151,30 @@ static void turn_band(void *user, int begin, int end) {
     }
 }
 
-void bst_streak_map_fill(bst_streak_map *map, bst_parallel *pool, const float *signal, int width,
-                         int height, const bst_background *background, double sigma_px) {
+void bst_streak_map_filter(bst_streak_map *map, bst_parallel *pool, const float *signal, int width,
+                           int height, const bst_background *background, double sigma_px, int clamp,
+                           float *sum) {
     if (map->width != width || map->height != height) {
         map->width = width;
         map->height = height;
         map->stride[0] = width + 2 * BST_STREAK_PAD;
         map->stride[1] = height + 2 * BST_STREAK_PAD;
-        memset(map->memory[0], 0, plane_size(width, height) * sizeof(int16_t));
-        memset(map->memory[1], 0, plane_size(width, height) * sizeof(int16_t));
+        for (int plane = 0; plane < 2; plane++) {
+            if (map->memory[plane]) {
+                memset(map->memory[plane], 0, plane_size(width, height) * sizeof(int16_t));
+            }
+        }
     }
-    map->clamp = CLAMP_SIGMA * BST_STREAK_QUANTA;
+    map->clamp = clamp;
     set_kernel(map, sigma_px);
-    fill_job job = {map, signal, background};
+    fill_job job = {map, signal, sum, background};
     bst_parallel_for(pool, (height + BAND - 1) / BAND, 1, fill_bands, &job);
+}
+
+void bst_streak_map_fill(bst_streak_map *map, bst_parallel *pool, const float *signal, int width,
+                         int height, const bst_background *background, double sigma_px) {
+    bst_streak_map_filter(map, pool, signal, width, height, background, sigma_px,
+                          CLAMP_SIGMA * BST_STREAK_QUANTA, NULL);
     bst_parallel_for(pool, (width + TURN - 1) / TURN, 1, turn_band, map);
 }
 

@@ -18,7 +18,7 @@ static const double BRIGHT_SNR = 7.5, BRIGHT_FILLED = 0.75, BRIGHT_PX = 11.0;
 bst_status bst_streak_search_create(bst_ctx *ctx, bst_parallel *pool, int max_width, int max_height,
                                     double max_px, bst_streak_search *out) {
     *out = (bst_streak_search){.pool = pool, .max_px = max_px};
-    bst_status status = bst_streak_map_create(ctx, max_width, max_height, &out->map);
+    bst_status status = bst_streak_map_create(ctx, max_width, max_height, true, &out->map);
     if (status == BST_OK) {
         status = bst_streak_bank_create(ctx, max_width, max_height, max_px,
                                         pool ? bst_parallel_threads(pool) : 1, &out->bank);

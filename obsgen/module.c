@@ -341,7 +341,7 @@ static void set_attitude(const obsgen *o, struct bst_step *step, const bst_expos
                          bool *oriented, bool *locked, bst_motion *known, bst_detections *out) {
     bst_sample pointing = bst_step_latest(step, PORT_POINTING);
     bst_sample predicted = bst_step_latest(step, PORT_PREDICTIONS);
-    bst_motion motion = {BST_QUAT_IDENTITY, {0, 0, 0}, {0, 0, 0}};
+    bst_motion motion = {.q_cam_from_gcrf = BST_QUAT_IDENTITY};
     *oriented = pointing.payload && !pointing.stale &&
                 bst_motion_from_telemetry(pointing.payload, e->start_tick, e->end_tick, &motion);
     out->q_cam_from_gcrf = out->q_telemetry_from_gcrf = motion.q_cam_from_gcrf;

@@ -10,15 +10,15 @@ typedef struct star_residual {
     double chi2;
 } star_residual;
 
-static bool evaluate(const bst_camera *camera, double floor_px, bst_quat q,
+static bool evaluate(const bst_camera *camera, double extra_px2, bst_quat q,
                      const bst_attitude_star *star, star_residual *out) {
     bst_vec3 v = bst_quat_rotate(q, star->apparent_gcrf);
     double x, y;
     if (!bst_camera_project(camera, v, &x, &y)) {
         return false;
     }
-    double cxx = star->cov_xx + floor_px * floor_px, cyy = star->cov_yy + floor_px * floor_px,
-           cxy = star->cov_xy, det = cxx * cyy - cxy * cxy;
+    double cxx = star->cov_xx + extra_px2, cyy = star->cov_yy + extra_px2, cxy = star->cov_xy,
+           det = cxx * cyy - cxy * cxy;
     if (!(det > 0.0) || !(cxx > 0.0)) {
         return false;
     }
@@ -44,13 +44,13 @@ static bool evaluate(const bst_camera *camera, double floor_px, bst_quat q,
 typedef enum weighting { WEIGHT_CAUCHY, WEIGHT_GIVEN } weighting;
 
 /* One Gauss-Newton step; false when the normal matrix cannot be inverted. */
-static bool step(const bst_camera *camera, double floor_px, const bst_attitude_star *stars,
+static bool step(const bst_camera *camera, double extra_px2, const bst_attitude_star *stars,
                  int count, weighting how, double scale2, bst_quat *q, double covariance[3][3],
                  double *moved_rad) {
     double n[3][3] = {{0}}, g[3] = {0};
     for (int i = 0; i < count; i++) {
         star_residual s;
-        if (!evaluate(camera, floor_px, *q, &stars[i], &s)) {
+        if (!evaluate(camera, extra_px2, *q, &stars[i], &s)) {
             continue;
         }
         double weight = how == WEIGHT_GIVEN ? stars[i].weight : 1.0 / (1.0 + s.chi2 / scale2);
@@ -78,13 +78,14 @@ static bool step(const bst_camera *camera, double floor_px, const bst_attitude_s
 }
 
 /* Gives weight 1 to the stars within `limit`, 0 to the others; how many changed. */
-static int select_stars(const bst_camera *camera, double floor_px, double limit, bst_quat q,
+static int select_stars(const bst_camera *camera, double extra_px2, double limit, bst_quat q,
                         bst_attitude_star *stars, int count, int *used) {
     int changed = 0;
     *used = 0;
     for (int i = 0; i < count; i++) {
         star_residual s;
-        double weight = evaluate(camera, floor_px, q, &stars[i], &s) && s.chi2 <= limit ? 1.0 : 0.0;
+        double weight =
+            evaluate(camera, extra_px2, q, &stars[i], &s) && s.chi2 <= limit ? 1.0 : 0.0;
         changed += weight != stars[i].weight;
         stars[i].weight = weight;
         *used += weight > 0.0;
@@ -92,13 +93,13 @@ static int select_stars(const bst_camera *camera, double floor_px, double limit,
     return changed;
 }
 
-static double mean_chi2(const bst_camera *camera, double floor_px, bst_quat q,
+static double mean_chi2(const bst_camera *camera, double extra_px2, bst_quat q,
                         const bst_attitude_star *stars, int count) {
     double sum = 0.0;
     int n = 0;
     for (int i = 0; i < count; i++) {
         star_residual s;
-        if (evaluate(camera, floor_px, q, &stars[i], &s)) {
+        if (evaluate(camera, extra_px2, q, &stars[i], &s)) {
             sum += s.chi2;
             n++;
         }
@@ -106,36 +107,73 @@ static double mean_chi2(const bst_camera *camera, double floor_px, bst_quat q,
     return n > 0 ? sum / n : 0.0;
 }
 
-/* Factor by which the stars' stated variances are too small, from the median of their chi-square
- * (ln 4 for 2 degrees of freedom); 1 when they are right, when there are too few stars to tell, or
- * when the misfit cannot come from optimistic variances. */
-static double variance_factor(const bst_camera *camera, double floor_px, bst_quat q,
-                              bst_attitude_star *stars, int count) {
-    enum { FEWEST = 6 };
-    const double largest = 36.0;
-    if (count < FEWEST) {
-        return 1.0;
-    }
+/* The variance per axis that is missing from what all stars state. */
+enum { FEWEST_FOR_EXCESS = 6, BISECTIONS = 40 };
+static const double LARGEST_EXCESS_PX2 = 4.0;
+
+/* Median chi-square of the stars, by bisection: no memory, any order. */
+static double median_chi2(const bst_camera *camera, double extra_px2, bst_quat q,
+                          bst_attitude_star *stars, int count) {
+    double low = 0.0, high = 1e6;
     for (int i = 0; i < count; i++) {
         star_residual s;
-        stars[i].weight = evaluate(camera, floor_px, q, &stars[i], &s) ? s.chi2 : INFINITY;
+        stars[i].weight = evaluate(camera, extra_px2, q, &stars[i], &s) ? s.chi2 : INFINITY;
     }
-    /* the median by bisection: no memory, any order */
-    double low = 0.0, high = 2.0 * largest * log(4.0);
-    for (int k = 0; k < 30; k++) {
+    for (int k = 0; k < 60; k++) {
         double middle = 0.5 * (low + high);
         int below = 0;
         for (int i = 0; i < count; i++) {
             below += stars[i].weight <= middle;
         }
-        if (2 * below >= count) {
-            high = middle;
-        } else {
-            low = middle;
+        *(2 * below >= count ? &high : &low) = middle;
+    }
+    return high;
+}
+
+/* From the median, which misidentified stars hardly move: 0 when it lies within three standard
+ * errors of what it should be, ln 4. */
+static double excess_of_median(const bst_camera *camera, double floor_px2, bst_quat q,
+                               bst_attitude_star *stars, int count) {
+    const double right = log(4.0), error = 2.0 / sqrt((double)count);
+    if (count < FEWEST_FOR_EXCESS ||
+        median_chi2(camera, floor_px2, q, stars, count) <= right + error) {
+        return 0.0;
+    }
+    double low = 0.0, high = LARGEST_EXCESS_PX2;
+    for (int k = 0; k < BISECTIONS; k++) {
+        double middle = 0.5 * (low + high);
+        *(median_chi2(camera, floor_px2 + middle, q, stars, count) > right ? &low : &high) = middle;
+    }
+    return high;
+}
+
+static double total_chi2(const bst_camera *camera, double extra_px2, bst_quat q,
+                         const bst_attitude_star *stars, int count) {
+    double sum = 0.0;
+    for (int i = 0; i < count; i++) {
+        star_residual s;
+        if (stars[i].weight > 0.0 && evaluate(camera, extra_px2, q, &stars[i], &s)) {
+            sum += s.chi2;
         }
     }
-    double factor = high / log(4.0);
-    return factor > largest ? 1.0 : fmax(factor, 1.0);
+    return sum;
+}
+
+/* From the sum over the stars that are used (Paule and Mandel, J. Res. NBS 87, 1982): 0 when it is
+ * below its 99.9 % quantile (Wilson and Hilferty 1931). */
+static double excess_of_sum(const bst_camera *camera, double floor_px2, bst_quat q,
+                            const bst_attitude_star *stars, int count, int dof) {
+    double spread = 2.0 / (9.0 * dof), root = 1.0 - spread + 3.09 * sqrt(spread);
+    if (dof < 2 * FEWEST_FOR_EXCESS - 3 ||
+        total_chi2(camera, floor_px2, q, stars, count) <= dof * root * root * root) {
+        return 0.0;
+    }
+    double low = 0.0, high = LARGEST_EXCESS_PX2;
+    for (int k = 0; k < BISECTIONS; k++) {
+        double middle = 0.5 * (low + high);
+        *(total_chi2(camera, floor_px2 + middle, q, stars, count) > dof ? &low : &high) = middle;
+    }
+    return high;
 }
 
 /* Iterations are bounded by what the scales need: each halves, from at most 1e6 sigma. */
@@ -143,44 +181,43 @@ enum { MAX_ANNEAL = 24, MAX_RESELECT = 8, MAX_NEWTON = 6 };
 
 static bool solve(const bst_camera *camera, const bst_attitude_params *params,
                   bst_attitude_star *stars, int count, bst_quat *q, double covariance[3][3],
-                  int *used) {
-    double moved;
-    double scale2 = fmax(mean_chi2(camera, params->floor_px, *q, stars, count), 4.0);
+                  int *used, double *extra_px2) {
+    const double floor_px2 = params->floor_px * params->floor_px;
+    double moved, scale2 = fmax(mean_chi2(camera, floor_px2, *q, stars, count), 4.0);
     for (int i = 0; i < MAX_ANNEAL; i++) {
-        if (!step(camera, params->floor_px, stars, count, WEIGHT_CAUCHY, scale2, q, covariance,
-                  &moved)) {
+        if (!step(camera, floor_px2, stars, count, WEIGHT_CAUCHY, scale2, q, covariance, &moved)) {
             return false;
         }
         if (scale2 <= 4.0 && moved < 1e-9) {
             break;
         }
         /* a common shift of all stars leaves at the first step: follow what remains */
-        double now = mean_chi2(camera, params->floor_px, *q, stars, count);
+        double now = mean_chi2(camera, floor_px2, *q, stars, count);
         scale2 = fmax(fmin(0.25 * scale2, now), 4.0);
     }
-    double limit =
-        params->reject_chi2 * variance_factor(camera, params->floor_px, *q, stars, count);
+    *extra_px2 = floor_px2 + excess_of_median(camera, floor_px2, *q, stars, count);
     for (int i = 0; i < count; i++) {
         stars[i].weight = -1.0;
     }
     for (int i = 0; i < MAX_RESELECT; i++) {
-        if (select_stars(camera, params->floor_px, limit, *q, stars, count, used) == 0) {
+        if (select_stars(camera, *extra_px2, params->reject_chi2, *q, stars, count, used) == 0) {
             break;
         }
         if (*used < 2) {
             return false;
         }
         for (int k = 0; k < MAX_NEWTON; k++) {
-            if (!step(camera, params->floor_px, stars, count, WEIGHT_GIVEN, 1.0, q, covariance,
-                      &moved)) {
+            if (!step(camera, *extra_px2, stars, count, WEIGHT_GIVEN, 1.0, q, covariance, &moved)) {
                 return false;
             }
             if (moved < 1e-12) {
                 break;
             }
         }
+        *extra_px2 = floor_px2 + excess_of_sum(camera, floor_px2, *q, stars, count, 2 * *used - 3);
     }
-    return *used >= 2;
+    return *used >= 2 &&
+           step(camera, *extra_px2, stars, count, WEIGHT_GIVEN, 1.0, q, covariance, &moved);
 }
 
 void bst_attitude_solve(const bst_camera *camera, const bst_attitude_params *params,
@@ -192,13 +229,14 @@ void bst_attitude_solve(const bst_camera *camera, const bst_attitude_params *par
     }
     bst_quat q = bst_quat_unit(q_start);
     int used = 0;
-    if (!solve(camera, params, stars, count, &q, out->covariance, &used)) {
+    double extra_px2 = 0.0;
+    if (!solve(camera, params, stars, count, &q, out->covariance, &used, &extra_px2)) {
         return;
     }
     double square = 0.0;
     for (int i = 0; i < count; i++) {
         star_residual s;
-        if (stars[i].weight > 0.0 && evaluate(camera, params->floor_px, q, &stars[i], &s)) {
+        if (stars[i].weight > 0.0 && evaluate(camera, extra_px2, q, &stars[i], &s)) {
             out->chi2 += s.chi2;
             square += s.r[0] * s.r[0] + s.r[1] * s.r[1];
         }
@@ -206,14 +244,8 @@ void bst_attitude_solve(const bst_camera *camera, const bst_attitude_params *par
     out->q_cam_from_gcrf = q;
     out->stars_used = used;
     out->dof = 2 * used - 3;
+    out->excess_px = sqrt(fmax(extra_px2 - params->floor_px * params->floor_px, 0.0));
     out->rms_px = sqrt(square / (2.0 * used));
-    if (out->dof >= 10 && out->chi2 > out->dof) {
-        for (int i = 0; i < 3; i++) {
-            for (int j = 0; j < 3; j++) {
-                out->covariance[i][j] *= out->chi2 / out->dof;
-            }
-        }
-    }
     bool agree = used >= (used < count ? 3 : 2) && used * 10 >= count * 6;
     out->valid = agree && sqrt(out->covariance[0][0]) <= params->max_cross_rad &&
                  sqrt(out->covariance[1][1]) <= params->max_cross_rad &&

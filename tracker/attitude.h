@@ -25,21 +25,24 @@ typedef struct bst_attitude_solution {
     bst_quat q_cam_from_gcrf;
     /* of the rotation vector e in camera axes with q = bst_quat_from_rotvec(e) * q_true, rad^2 */
     double covariance[3][3];
-    double rms_px; /* of the residuals of the stars used, per axis */
-    double chi2;   /* of the stars used */
-    int dof;       /* 2 * stars_used - 3 */
+    double rms_px;    /* of the residuals of the stars used, per axis */
+    double chi2;      /* of the stars used */
+    int dof;          /* 2 * stars_used - 3 */
+    double excess_px; /* 1 sigma per axis that was found missing from the stars' covariances */
 } bst_attitude_solution;
 
 /* Finds the rotation that brings `count` stars onto their centroids, starting from q_start (within
  * a few degrees). Gauss-Newton on the rotation vector; misidentified stars lose their weight by
  * graduated non-convexity (Cauchy weights whose scale shrinks; Black and Rangarajan 1996), then
- * those beyond reject_chi2 are dropped and the rest is solved by weighted least squares. With at
- * least 6 stars reject_chi2 follows the median misfit, so that variances that are stated up to 25
- * times too small cost no stars.
+ * those beyond reject_chi2 are dropped and the rest is solved by weighted least squares.
+ *
+ * What the covariances of the centroids do not know (errors of the catalogue and of the camera's
+ * model) is a variance that all stars have besides: found from the median misfit before stars are
+ * dropped and from the sum of chi-square afterwards, and taken for none where the misfit may be
+ * chance. It needs at least 6 stars. Bright stars then count for no more than they are worth.
  * Not valid when: fewer than 2 stars agree, fewer than 3 when any star was rejected, less than 60 %
  * of the stars agree, two stars' separation is wrong, or the geometry leaves an axis worse than its
- * limit. The covariance is that of least squares, widened by chi2 / dof where that exceeds 1 with
- * at least 10 degrees of freedom. */
+ * limit. The covariance is that of least squares. */
 void bst_attitude_solve(const bst_camera *camera, const bst_attitude_params *params,
                         bst_quat q_start, bst_attitude_star *stars, int count,
                         bst_attitude_solution *out);

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 
 #include "sim/world/knowledge.h"
+#include "tracker/photocentre.h"
 #include "tracker/tracker.h"
 
 enum { PORT_DETECTIONS, PORT_POINTING, PORT_NAV, PORT_TRACKS, PORT_PREDICTIONS, PORT_COUNT };
@@ -19,9 +20,26 @@ typedef struct tracker_module {
     bst_tracker *tracker;
     bst_knowledge_view *view;
     const bst_stars *stars;
-    double julian_year;
+    double julian_year, blend_rad;
     double tick_rate_hz;
 } tracker_module;
+
+/* Brightness, of companions relative to a star, that moves its image. */
+static const double COMPANION_MAG = 6.0;
+enum { MAX_COMPANIONS = 16 };
+
+/* Where the light of a star and of the catalogue's stars within one FWHM of it has its centroid:
+ * they are one image. */
+static bst_vec3 photocentre(const tracker_module *m, bst_ctx *ctx, const bst_star *star) {
+    bst_star near[MAX_COMPANIONS];
+    int count = 0;
+    if (bst_stars_query(ctx, m->stars, star->icrs, m->blend_rad, star->v_mag + COMPANION_MAG,
+                        m->julian_year, near, MAX_COMPANIONS, &count) != BST_OK ||
+        count > MAX_COMPANIONS) {
+        return star->icrs;
+    }
+    return bst_photocentre(star, near, count, m->blend_rad);
+}
 
 static bool find_star(void *user, uint32_t star_id, bst_vec3 *icrs) {
     const tracker_module *m = user;
@@ -30,7 +48,7 @@ static bool find_star(void *user, uint32_t star_id, bst_vec3 *icrs) {
     if (bst_stars_find(&quiet, m->stars, star_id, m->julian_year, &star) != BST_OK) {
         return false;
     }
-    *icrs = star.icrs;
+    *icrs = photocentre(m, &quiet, &star);
     return true;
 }
 
@@ -56,6 +74,8 @@ static bst_status create(const bst_module_env *env, const void *config, bst_filt
     m->stars = bst_knowledge_stars(env->knowledge);
     m->julian_year = bst_knowledge_julian_year(env->knowledge);
     m->tick_rate_hz = (double)env->tick_rate_hz;
+    const bst_camera *camera = bst_knowledge_camera(env->knowledge);
+    m->blend_rad = camera->psf_fwhm_px * bst_camera_scale_rad(camera);
     bst_status status = bst_knowledge_view_create(env->ctx, env->knowledge, &m->view);
     if (status == BST_OK) {
         status = bst_tracker_create(env->ctx, c, bst_knowledge_camera(env->knowledge),

@@ -44,11 +44,6 @@ static bst_status check(bst_ctx *ctx, const bst_mtt_params *p) {
 bst_status bst_mtt_create(bst_ctx *ctx, const bst_mtt_params *params, bst_mtt **out) {
     *out = NULL;
     BST_TRY(check(ctx, params));
-    if (params->filter == BST_FILTER_IMM && params->association == BST_MTT_MIXTURE) {
-        return bst_fail(ctx, BST_ERR_CONFIG,
-                        "tracker: association \"mixture\" does not go with type \"imm\"; use "
-                        "\"pda\"");
-    }
     bst_mtt *m = calloc(1, sizeof *m);
     if (!m) {
         return bst_fail(ctx, BST_ERR_MEMORY, "tracker: out of memory");
@@ -237,7 +232,8 @@ static void update_filter(bst_mtt *m, int t) {
     bst_mtt_track *track = &m->tracks[t];
     int given = m->detection_of_track[t];
     bool weighs = m->params.association == BST_MTT_PDA || m->params.association == BST_MTT_MIXTURE;
-    int components = m->params.association == BST_MTT_MIXTURE ? BST_FILTER_COMPONENTS : 1;
+    bool apart = m->params.association == BST_MTT_MIXTURE && m->params.filter != BST_FILTER_IMM;
+    int components = apart ? BST_FILTER_COMPONENTS : 1;
     bst_filter_candidate candidates[BST_MTT_CANDIDATES];
     if (!weighs || track->status == BST_TRACK_TENTATIVE || track->star || m->shared[t]) {
         if (given >= 0) {

@@ -28,7 +28,7 @@ typedef enum bst_mtt_association {
     BST_MTT_PDA, /* as GNN, but a confirmed track's filter weighs every detection in its gate that
                     no other confirmed track has */
     BST_MTT_MIXTURE, /* as PDA, and the filter keeps the likeliest choices apart, so that later
-                        detections decide; not with BST_FILTER_IMM */
+                        detections decide; with BST_FILTER_IMM the same as PDA */
 } bst_mtt_association;
 
 typedef struct bst_mtt_params {

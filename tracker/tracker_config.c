@@ -6,7 +6,7 @@
 static const char *const associations[] = {"gnn", "nearest", "pda", "mixture", NULL};
 
 const bst_config_desc bst_tracker_config_table[] = {
-    BST_REAL(C, star_floor_px, "px", 0, 10, "0.03",
+    BST_REAL(C, star_floor_px, "px", 0, 10, "0",
              "Standard deviation added to every star's centroid (catalogue, distortion)."),
     BST_REAL(C, star_reject_chi2, "", 4, 1e6, "18.4",
              "Stars that fit worse (2 degrees of freedom) do not count for the attitude."),
@@ -86,11 +86,11 @@ const bst_config_desc bst_tracker_config_table[] = {
     BST_INT(C, max_detections, "", 1, 1000000, "8192",
             "Room for detections of one frame that are not stars."),
     BST_ENUM(
-        C, association, associations, "\"gnn\"",
+        C, association, associations, "\"mixture\"",
         "gnn: the assignment of least total cost. nearest: the cheapest pair first. pda: as gnn, "
         "but the filter of a confirmed track weighs every detection in its gate by its "
         "probability. mixture: as pda, and the likeliest choices live on apart until later "
-        "detections decide (for dense clutter; not with type imm)."),
+        "detections decide; with type imm the same as pda."),
     BST_REAL(C, manoeuvre_noise_arcsec_per_s15, "arcsec/s^1.5", 0, 1e5, "3",
              "Type imm: the same as process_noise_arcsec_per_s15 while an object manoeuvres."),
     BST_REAL(C, quiet_s, "s", 1e-3, 1e9, "3600",

@@ -66,6 +66,9 @@ bst_status bst_bench_scene_run(bst_ctx *ctx, const bst_bench *self,
 /* Image processing on the frames of the scene whose name follows "imgproc_" (bench_imgproc.c). */
 bst_status bst_bench_imgproc(bst_ctx *ctx, const bst_bench *self, const bst_bench_options *options,
                              bst_bench_result *out) BST_MUST_CHECK;
+/* Stacks of 16 frames of 2048 x 2048 pixels: per frame (bench_stack.c). */
+bst_status bst_bench_stack(bst_ctx *ctx, const bst_bench *self, const bst_bench_options *options,
+                           bst_bench_result *out) BST_MUST_CHECK;
 /* First frame of fresh processes, from their start until its pixels are mapped, kernels in the
  * cache (bench_cold_start.c). */
 bst_status bst_bench_cold_start(bst_ctx *ctx, const bst_bench *self,

@@ -36,6 +36,8 @@ static const bst_bench benches[] = {
     {"imgproc_worst_case", "of worst_case", bst_bench_imgproc},
     {"imgproc_galactic_core", "of galactic_core", bst_bench_imgproc},
     {"imgproc_window", "of window", bst_bench_imgproc},
+    {"imgproc_stack", "stacks of 16 frames of 2048x2048, rates to 3 px per frame: per frame",
+     bst_bench_stack},
     {"loop_full", "closed loop of the main scenario, per frame", bst_bench_loop},
     {"loop_obsgen",
      "a day of the closed loop with the observation generator, per frame of 2 s, plant at 100 Hz",

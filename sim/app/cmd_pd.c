@@ -56,7 +56,11 @@ static bst_status check(bst_ctx *ctx, pd_request *r) {
     }
     o->by_magnitude = r->magnitudes;
     BST_TRY(r->magnitudes ? parse_range(ctx, "magnitude", r->magnitudes, -30.0, 40.0, o)
-                          : parse_range(ctx, "snr", r->range ? r->range : "2:12:0.5", 0.1, 1e4, o));
+                          : parse_range(ctx, "snr",
+                                        r->range       ? r->range
+                                        : o->stack > 0 ? "0.8:2.4:0.1"
+                                                       : "2:12:0.5",
+                                        0.1, 1e4, o));
     if (o->known_rate && !(o->streak_px > 0.0)) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "--known-rate is of streaks: give their length with --streak PX");
@@ -64,6 +68,14 @@ static bst_status check(bst_ctx *ctx, pd_request *r) {
     if (o->known_rate && o->star_streak_px > 0.0) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "with --known-rate stars streak as targets do: leave out --star-streak");
+    }
+    if (o->stack % 4 != 0) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "--stack %lld: a multiple of 4",
+                        (long long)o->stack);
+    }
+    if (o->stack > 0 && (o->streak_px > 0.0 || o->star_streak_px > 0.0)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "--stack is of points: leave out --streak and --star-streak");
     }
     if (o->stars && o->background_e >= 0.0) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
@@ -73,10 +85,46 @@ static bst_status check(bst_ctx *ctx, pd_request *r) {
     return bst_load_check(ctx, &r->load);
 }
 
-static bst_status write_results(bst_ctx *ctx, const pd_request *r, const bst_pd_scene *scene,
-                                const bst_pd_result *result) {
-    bst_pd_figures figures;
+/* The same detector on frames by themselves, as many trials at the SNRs that it needs. */
+static bst_status measure_single(bst_ctx *ctx, const pd_request *r, const bst_scenario *scenario,
+                                 bst_pd_figures *out) {
+    bst_pd_options options = r->options;
+    options.stack = 0;
+    options.by_magnitude = false;
+    options.low = 3.5;
+    options.high = 7.5;
+    options.step = 0.5;
+    options.empty_frames = 0;
+    bst_pd_scene *scene = calloc(1, sizeof *scene);
+    bst_pd_result *result = calloc(1, sizeof *result);
+    bst_pd_detector *detector = NULL;
+    bst_status status = scene && result
+                            ? bst_pd_scene_open(ctx, scenario, &options, scene)
+                            : bst_fail(ctx, BST_ERR_MEMORY, "no memory for the measurement");
+    if (status == BST_OK) {
+        status = bst_pd_detector_open(ctx, scene, &detector);
+        if (status == BST_OK) {
+            status = bst_pd_run(ctx, scene, detector, result);
+        }
+        if (status == BST_OK) {
+            bst_pd_figures_of(scene, result, out);
+        }
+        bst_pd_detector_close(detector);
+        bst_pd_scene_close(scene);
+    }
+    free(scene);
+    free(result);
+    return status;
+}
+
+static bst_status write_results(bst_ctx *ctx, const pd_request *r, const bst_scenario *scenario,
+                                const bst_pd_scene *scene, const bst_pd_result *result) {
+    bst_pd_figures figures, single;
     bst_pd_figures_of(scene, result, &figures);
+    if (r->options.stack > 0) {
+        BST_TRY(measure_single(ctx, r, scenario, &single));
+        bst_pd_compare_single(&single, &figures);
+    }
     bst_pd_print(scene, result, &figures);
     if (r->json) {
         cJSON *root = bst_pd_json(scene, result, &figures);
@@ -103,7 +151,7 @@ static bst_status measure(bst_ctx *ctx, const pd_request *r, const bst_scenario 
             status = bst_pd_run(ctx, scene, detector, result);
         }
         if (status == BST_OK) {
-            status = write_results(ctx, r, scene, result);
+            status = write_results(ctx, r, scenario, scene, result);
         }
         bst_pd_detector_close(detector);
         bst_pd_scene_close(scene);
@@ -134,9 +182,12 @@ static void print_help(const bst_option *table) {
 }
 
 int bst_cmd_pd(int argc, char **argv) {
-    pd_request r = {
-        .load = BST_LOAD_DEFAULTS,
-        .options = {.trials = 1000, .background_e = -1.0, .jitter_px = -1.0, .apart_px = 24.0}};
+    pd_request r = {.load = BST_LOAD_DEFAULTS,
+                    .options = {.trials = 1000,
+                                .background_e = -1.0,
+                                .jitter_px = -1.0,
+                                .apart_px = 24.0,
+                                .rates_px = 3.0}};
     bst_pd_options *o = &r.options;
     const bst_option table[] = {
         {.name = "snr",
@@ -174,6 +225,23 @@ int bst_cmd_pd(int argc, char **argv) {
                 "points)",
          .minimum = 0,
          .maximum = 1000},
+        {.name = "stack",
+         .kind = BST_OPTION_INT,
+         .target = &o->stack,
+         .argument = "N",
+         .doc =
+             "search N frames together, in which targets move at rates of their own; SNRs are of "
+             "one frame (default 0: each frame by itself)",
+         .minimum = 0,
+         .maximum = BST_STACK_MAX_FRAMES},
+        {.name = "rates",
+         .kind = BST_OPTION_REAL,
+         .target = &o->rates_px,
+         .argument = "PX",
+         .doc = "greatest rate of the targets of a stack and of the search, px per frame in x and "
+                "in y (default 3)",
+         .minimum = 0.05,
+         .maximum = 16},
         {.name = "known-rate",
          .kind = BST_OPTION_FLAG,
          .target = &o->known_rate,

@@ -25,6 +25,8 @@ typedef struct bst_pd_options {
     double apart_px;       /* least distance between targets beyond their own length */
     double cell_px;        /* of the grid of targets; 0: apart_px + length + 40 */
     bool stars;            /* the scenario's stars and sky behind the targets */
+    int64_t stack;         /* frames that are searched together; 0: each by itself */
+    double rates_px;       /* per frame: targets of a stack move, up to this in x and in y */
     double star_streak_px; /* the camera turns, so that stars streak and targets do not */
     bool by_module;        /* step the scenario's module also where a function would do */
     const char *sensor;    /* "observer/sensor"; NULL: the first */
@@ -97,6 +99,9 @@ bst_status bst_pd_scene_set(bst_ctx *ctx, bst_pd_scene *scene, int64_t number, b
 /* sum p^2 of a target of unit flux. */
 double bst_pd_sharpness(const bst_pd_scene *scene, const bst_match_target *place);
 
+/* Frames that a detector takes before it answers. */
+int bst_pd_scene_stacked(const bst_pd_scene *scene);
+
 /* What was counted and measured at one SNR, of matched targets. Along and across the streak; x and
  * y of targets at rest. */
 typedef struct bst_pd_tally {
@@ -145,10 +150,17 @@ typedef struct bst_pd_figures {
     double false_alarms_per_frame, false_alarms_low, false_alarms_high, pfa, chance;
     bst_pd_needed pd50, pd90;
     double loss_db_pd50, loss_db_pd90, loss_db_sigma_pd50, loss_db_sigma_pd90;
+    /* in SNR per frame over one frame by itself at the same false alarms per frame: of the ideal
+     * detector, and of this one (NAN unless told) */
+    double gain_db_pd50, gain_db_pd90, gain_over_single_db_pd50, gain_over_single_db_pd90;
     /* against a matched filter, whose output has the target's own photon noise too */
     double own_light_db_pd50, own_light_db_pd90;
 } bst_pd_figures;
 void bst_pd_figures_of(const bst_pd_scene *scene, const bst_pd_result *result, bst_pd_figures *out);
+
+/* What the detector needs in one frame by itself: fills in gain_over_single of a stack's figures.
+ */
+void bst_pd_compare_single(const bst_pd_figures *single, bst_pd_figures *stack);
 
 void bst_pd_print(const bst_pd_scene *scene, const bst_pd_result *result,
                   const bst_pd_figures *figures);

@@ -28,6 +28,8 @@ struct bst_pd_detector {
     bst_imgproc_config config;
     bst_imgproc_maps maps;
     bst_imgproc *ip;
+    bst_stack *stack; /* NULL: frames by themselves */
+    int64_t taken;    /* frames */
     /* by module */
     bst_engine *engine;
     feed feed, *feed_config;
@@ -189,8 +191,13 @@ static bst_status open_function(bst_ctx *ctx, bst_pd_scene *s, bst_pd_detector *
         camera.psf_fwhm_px = psf.fwhm_px;
     }
     BST_TRY(bst_calibration_load(ctx, &d->config, &camera, &d->maps));
-    return bst_imgproc_create(ctx, &camera, bst_camera_electrons_per_s(&camera, 0.0), &d->config,
-                              &d->maps, &d->ip);
+    BST_TRY(bst_imgproc_create(ctx, &camera, bst_camera_electrons_per_s(&camera, 0.0), &d->config,
+                               &d->maps, &d->ip));
+    if (s->options.stack == 0) {
+        return BST_OK;
+    }
+    bst_stack_config stack = {s->options.stack, s->options.rates_px, s->options.false_alarms};
+    return bst_stack_create(ctx, &camera, &stack, (int)d->config.threads, &d->stack);
 }
 
 bst_status bst_pd_detector_open(bst_ctx *ctx, bst_pd_scene *s, bst_pd_detector **out) {
@@ -201,6 +208,11 @@ bst_status bst_pd_detector_open(bst_ctx *ctx, bst_pd_scene *s, bst_pd_detector *
                         "--false-alarms sets the detector that comes with Boresight, driven by its "
                         "function; set those of %s/%s by --set",
                         s->name, s->imgproc->name);
+    }
+    if (!by_function && s->options.stack > 0) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "--stack measures the stacks that come with Boresight, not %s/%s", s->name,
+                        s->imgproc->name);
     }
     bst_pd_detector *d = calloc(1, sizeof *d);
     if (!d) {
@@ -218,10 +230,24 @@ bst_status bst_pd_detector_open(bst_ctx *ctx, bst_pd_scene *s, bst_pd_detector *
 void bst_pd_detector_close(bst_pd_detector *d) {
     if (d) {
         bst_imgproc_free(d->ip);
+        bst_stack_free(d->stack);
         bst_calibration_free(&d->maps);
         bst_engine_free(d->engine);
         free(d);
     }
+}
+
+/* Of a stack only what it shows counts, once it is full. */
+static void stack_frame(bst_pd_detector *d, const bst_pd_frame *targets) {
+    bst_stack_frame frame =
+        bst_imgproc_stack_frame(d->ip, (double)d->taken++, targets->motion.q_cam_from_gcrf);
+    d->out->count = 0;
+    d->out->lost = 0;
+    int count;
+    bst_stack_add(d->stack, &frame);
+    const bst_stack_found *found = bst_stack_search(d->stack, &count);
+    d->out->threshold_snr = bst_stack_threshold_snr(d->stack);
+    bst_imgproc_append_stack(d->ip, found, count, 0.0, d->out, d->capacity);
 }
 
 static bst_status detect_by_function(bst_ctx *ctx, bst_pd_detector *d, const bst_pd_scene *s,
@@ -236,6 +262,9 @@ static bst_status detect_by_function(bst_ctx *ctx, bst_pd_detector *d, const bst
     bst_status status =
         bst_imgproc_detect(ctx, d->ip, &view, &targets->motion, d->out, d->capacity);
     bst_frame_unmap(frame);
+    if (status == BST_OK && d->stack) {
+        stack_frame(d, targets);
+    }
     return status;
 }
 

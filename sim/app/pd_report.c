@@ -75,7 +75,10 @@ static void print_head(const bst_pd_scene *s, const bst_pd_result *r) {
     printf("%s: %lld x %lld px, FWHM %.3g px, noise %.3g e- per pixel, %.3g s; ", s->name,
            (long long)s->camera.width_px, (long long)s->camera.height_px, s->fwhm_px, s->noise_e,
            s->exposure_s);
-    if (s->sharpness) {
+    if (s->options.stack > 0) {
+        printf("points in stacks of %lld frames, rates to %g px per frame\n",
+               (long long)s->options.stack, s->options.rates_px);
+    } else if (s->sharpness) {
         printf("streaks of %g px, rate and direction %s\n", s->options.streak_px,
                s->options.known_rate ? "known" : "unknown");
     } else {
@@ -120,6 +123,14 @@ void bst_pd_print(const bst_pd_scene *s, const bst_pd_result *r, const bst_pd_fi
                f->own_light_db_pd50);
     print_loss("0.9", f->pd90, bst_ideal_snr(f->pfa, 0.9), f->loss_db_pd90, f->loss_db_sigma_pd90,
                f->own_light_db_pd90);
+    if (s->options.stack > 0 && isfinite(f->gain_db_pd50) && isfinite(f->gain_db_pd90)) {
+        printf(
+            "  gain of the stack at the same false alarms per frame, ideal %.2f dB: Pd 0.5 %.2f dB "
+            "over the ideal detector of one frame, %.2f dB over this one's; Pd 0.9 %.2f dB, %.2f "
+            "dB\n",
+            10.0 * log10((double)s->options.stack), f->gain_db_pd50, f->gain_over_single_db_pd50,
+            f->gain_db_pd90, f->gain_over_single_db_pd90);
+    }
     if (r->lost > 0) {
         printf("  %lld detections found no room and are missing\n", (long long)r->lost);
     }
@@ -200,6 +211,15 @@ cJSON *bst_pd_json(const bst_pd_scene *s, const bst_pd_result *r, const bst_pd_f
     bst_json_add_number(root, "loss_db_pd90_sigma", f->loss_db_sigma_pd90);
     bst_json_add_number(root, "loss_over_matched_filter_db_pd50", f->own_light_db_pd50);
     bst_json_add_number(root, "loss_over_matched_filter_db_pd90", f->own_light_db_pd90);
+    if (s->options.stack > 0) {
+        bst_json_add_number(root, "stack_frames", (double)s->options.stack);
+        bst_json_add_number(root, "stack_rate_px_per_frame", s->options.rates_px);
+        bst_json_add_number(root, "gain_ideal_db", 10.0 * log10((double)s->options.stack));
+        bst_json_add_number(root, "gain_db_pd50", f->gain_db_pd50);
+        bst_json_add_number(root, "gain_db_pd90", f->gain_db_pd90);
+        bst_json_add_number(root, "gain_over_single_db_pd50", f->gain_over_single_db_pd50);
+        bst_json_add_number(root, "gain_over_single_db_pd90", f->gain_over_single_db_pd90);
+    }
     bst_json_add_number(root, "process_ms", 1e3 * r->process_s);
     bst_json_add_number(root, "wall_s", r->wall_s);
     cJSON *points = cJSON_AddArrayToObject(root, "points");

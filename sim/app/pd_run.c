@@ -43,10 +43,13 @@ static bst_status add_bound(bst_ctx *ctx, const runner *r, const bst_match_targe
     double along[2];
     BST_TRY(bst_location_bound_gaussian(ctx, &source, &noise, BOUND_MARGIN_PX, &bound));
     bst_location_bound_along(&bound, place->dx_px, place->dy_px, along);
-    tally->bound_square[0] += along[0];
-    tally->bound_square[1] += along[1];
-    tally->flux_bound_square +=
-        bound.covariance[BST_BOUND_FLUX][BST_BOUND_FLUX] / (target->flux_e * target->flux_e);
+    /* of n frames the mean has 1 / n of the variance; the place at their end has that of the rate
+     * too, which is 3 (n - 1) / (n + 1) of it */
+    double n = bst_pd_scene_stacked(s), share = 1.0 / n, end = (4.0 * n - 2.0) / (n * (n + 1.0));
+    tally->bound_square[0] += end * along[0];
+    tally->bound_square[1] += end * along[1];
+    tally->flux_bound_square += share * bound.covariance[BST_BOUND_FLUX][BST_BOUND_FLUX] /
+                                (target->flux_e * target->flux_e);
     tally->bounds++;
     return BST_OK;
 }
@@ -97,7 +100,7 @@ static bst_status count_targets(bst_ctx *ctx, runner *r, const bst_pd_frame *f) 
     }
     out->unmatched += r->detections->count - near;
     out->second += near - taken;
-    out->frames++;
+    out->frames += bst_pd_scene_stacked(r->scene);
     return BST_OK;
 }
 
@@ -111,11 +114,12 @@ static void count_chance(runner *r, const bst_pd_frame *f) {
         out->stars += star;
         out->false_alarms += !star;
     }
-    out->empty_frames++;
+    out->empty_frames += bst_pd_scene_stacked(r->scene);
 }
 
+/* `answers`: the frame is the last of those that are searched together. */
 static bst_status process(bst_ctx *ctx, runner *r, bst_frame *frame, const bst_pd_frame *f,
-                          bool targets) {
+                          bool targets, bool answers) {
     const uint16_t *pixels;
     BST_TRY(bst_frame_map(frame, ctx, &pixels)); /* waits for it, before the clock runs */
     double started = bst_wall_seconds();
@@ -123,7 +127,9 @@ static bst_status process(bst_ctx *ctx, runner *r, bst_frame *frame, const bst_p
         bst_pd_detect(ctx, r->detector, r->scene, frame, f, r->detections, r->capacity);
     r->result->process_s += targets ? 0.0 : bst_wall_seconds() - started;
     bst_frame_unmap(frame);
-    BST_TRY(status);
+    if (status != BST_OK || !answers) {
+        return status;
+    }
     r->result->threshold_snr = r->detections->threshold_snr;
     r->result->lost += r->detections->lost;
     if (!targets) {
@@ -154,7 +160,8 @@ static bst_status do_frames(bst_ctx *ctx, runner *r, int64_t count, bool targets
         }
         if (n > 0 && status == BST_OK) {
             int k = (int)((n - 1) % 2);
-            status = process(ctx, r, frames[k], &s->frames[k], targets);
+            status = process(ctx, r, frames[k], &s->frames[k], targets,
+                             n % bst_pd_scene_stacked(s) == 0);
             bst_frame_release(frames[k]);
             frames[k] = NULL;
             bst_progress_update(progress, done + n);
@@ -189,8 +196,10 @@ bst_status bst_pd_run(bst_ctx *ctx, bst_pd_scene *s, bst_pd_detector *detector,
         status = bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d detections", r.capacity);
     }
     double started = bst_wall_seconds();
-    int64_t trials = s->points * s->options.trials, frames = (trials + room - 1) / room;
+    int64_t stacked = bst_pd_scene_stacked(s);
+    int64_t trials = s->points * s->options.trials, frames = (trials + room - 1) / room * stacked;
     int64_t empty = empty_frames(&s->options, s->options.false_alarms);
+    empty = (empty + stacked - 1) / stacked * stacked;
     bst_progress progress;
     bst_progress_start(&progress, s->name, "frames", frames + empty);
     if (status == BST_OK) {
@@ -236,6 +245,14 @@ void bst_pd_figures_of(const bst_pd_scene *s, const bst_pd_result *r, bst_pd_fig
         20.0 * log10(out->pd50.snr / bst_matched_filter_snr(out->pfa, 0.5, s->own_light));
     out->own_light_db_pd90 =
         20.0 * log10(out->pd90.snr / bst_matched_filter_snr(out->pfa, 0.9, s->own_light));
+    out->gain_db_pd50 = -out->loss_db_pd50;
+    out->gain_db_pd90 = -out->loss_db_pd90;
+    out->gain_over_single_db_pd50 = out->gain_over_single_db_pd90 = NAN;
     out->loss_db_sigma_pd50 = loss_sigma(out->pd50, out->pfa, r->false_alarms, 0.5);
     out->loss_db_sigma_pd90 = loss_sigma(out->pd90, out->pfa, r->false_alarms, 0.9);
+}
+
+void bst_pd_compare_single(const bst_pd_figures *single, bst_pd_figures *stack) {
+    stack->gain_over_single_db_pd50 = stack->gain_db_pd50 + single->loss_db_pd50;
+    stack->gain_over_single_db_pd90 = stack->gain_db_pd90 + single->loss_db_pd90;
 }

@@ -204,6 +204,7 @@ static bst_status set_own_light(bst_ctx *ctx, bst_pd_scene *s) {
 static bst_status make_grid(bst_ctx *ctx, bst_pd_scene *s) {
     const bst_pd_options *o = &s->options;
     s->apart_px = o->apart_px + o->streak_px;
+    s->apart_px += o->stack > 0 ? o->rates_px * (double)(o->stack - 1) : 0.0;
     s->cell_px = o->cell_px > 0.0 ? o->cell_px : s->apart_px + 40.0;
     if (s->cell_px < s->apart_px + 2.0) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
@@ -380,11 +381,17 @@ static void set_motion(bst_pd_scene *s, bst_pd_frame *f, double heading, double 
     f->track = (bst_los_track){2, f->time_s, f->q};
 }
 
+int bst_pd_scene_stacked(const bst_pd_scene *s) {
+    return s->options.stack > 0 ? (int)s->options.stack : 1;
+}
+
 /* As many targets of each SNR, each in every part of the frame in turn; frames beyond the last
  * trial serve for chance. */
 static void place_targets(bst_pd_scene *s, int64_t number, double heading, bst_rng_key key,
                           bst_pd_frame *f) {
-    int room = bst_pd_scene_room(s);
+    int room = bst_pd_scene_room(s), stacked = bst_pd_scene_stacked(s);
+    double from_middle = (double)(number % stacked) - 0.5 * (stacked - 1);
+    number /= stacked;
     int64_t first = number * room, last = s->points * s->options.trials;
     int64_t shift = room % s->points == 0 ? number : 0;
     double origin_x = 0.5 * ((double)s->camera.width_px - s->columns * s->cell_px) - 0.5;
@@ -397,10 +404,18 @@ static void place_targets(bst_pd_scene *s, int64_t number, double heading, bst_r
         for (uint64_t k = 0; k < 3; k++) {
             u[k] = bst_rng_uniform(key, (uint64_t)number, draw + k);
         }
-        add_target(s, f, origin_x + (i % s->columns) * s->cell_px + 0.5 * s->apart_px + u[0] * span,
-                   origin_y + (i / s->columns) * s->cell_px + 0.5 * s->apart_px + u[1] * span,
-                   (int)((first + i + shift) % s->points),
-                   s->options.known_rate ? heading : 2.0 * BST_PI * u[2]);
+        double moved[2] = {0.0, 0.0};
+        for (uint64_t k = 0; k < 2 && stacked > 1; k++) {
+            double rate =
+                bst_rng_uniform(key, (uint64_t)number, 3 * (uint64_t)room + 2 * (uint64_t)i + k);
+            moved[k] = s->options.rates_px * (2.0 * rate - 1.0) * from_middle;
+        }
+        add_target(
+            s, f,
+            origin_x + (i % s->columns) * s->cell_px + 0.5 * s->apart_px + u[0] * span + moved[0],
+            origin_y + (i / s->columns) * s->cell_px + 0.5 * s->apart_px + u[1] * span + moved[1],
+            (int)((first + i + shift) % s->points),
+            s->options.known_rate ? heading : 2.0 * BST_PI * u[2]);
     }
 }
 
@@ -422,7 +437,8 @@ static bst_status add_stars(bst_ctx *ctx, bst_pd_scene *s, const bst_source *sta
 
 bst_status bst_pd_scene_set(bst_ctx *ctx, bst_pd_scene *s, int64_t number, bool targets,
                             bst_pd_frame *f) {
-    uint64_t seed = s->scenario->seed, run = (uint64_t)s->scenario->run, n = (uint64_t)number;
+    uint64_t seed = s->scenario->seed, run = (uint64_t)s->scenario->run;
+    uint64_t n = (uint64_t)(number / bst_pd_scene_stacked(s)); /* one attitude for a stack */
     bst_rng_key camera = bst_rng_make_key(seed, run, s->name, "pd camera");
     bst_rng_key key = bst_rng_make_key(seed, run, s->name, "pd targets");
     double heading = 2.0 * BST_PI * bst_rng_uniform(camera, n, 0);

@@ -11,7 +11,7 @@ typedef struct bst_frame bst_frame;
 
 /* Frames that may be under way behind the thread that steps the modules, besides those in queues.
  */
-enum { BST_OVERLAP_FRAMES = 6 };
+enum { BST_OVERLAP_FRAMES = 9 };
 
 /* What a maker of frames supplies. All functions get the maker's own pointer. */
 typedef struct bst_frame_ops {

@@ -205,6 +205,7 @@ enum {
     BST_DETECTION_EDGE = 1u << 1,
     BST_DETECTION_STREAK = 1u << 2, /* elongated beyond the PSF */
     BST_DETECTION_BLEND = 1u << 3,
+    BST_DETECTION_STACK = 1u << 4, /* seen in the sum of several frames, this one the last */
 };
 
 typedef struct bst_detection {
@@ -219,6 +220,8 @@ typedef struct bst_detection {
     uint32_t star_id;         /* Tycho-2 identity, 0 when none */
     int32_t label;            /* bst_label */
     double label_probability; /* that the label is right, 0 to 1; 0 where the label is UNKNOWN */
+    double rate_x_pxps, rate_y_pxps; /* against the stars; only of BST_DETECTION_STACK, else 0 */
+    double rate_sigma_pxps;          /* of each */
 } bst_detection;
 
 /* detections (queue): what image processing (or the generator) found in one frame. */

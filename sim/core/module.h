@@ -118,7 +118,7 @@ int64_t bst_step_tick(const struct bst_step *step);
 double bst_step_seconds(const struct bst_step *step); /* tick / rate, since the scenario's epoch */
 /* Steps of an instance whose `ahead` may have been called take turns in BST_STEP_LANES lanes, 0 the
  * first: no two with one lane are under way. 0 for all others. */
-enum { BST_STEP_LANES = 2 };
+enum { BST_STEP_LANES = 3 };
 int bst_step_lane(const struct bst_step *step);
 /* The newest visible message of an input. Queue messages stay unread. */
 bst_sample bst_step_latest(struct bst_step *step, int port);

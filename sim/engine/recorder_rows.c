@@ -318,6 +318,10 @@ bst_status bst_recorder_detection_rows(bst_ctx *ctx, bst_recorder *recorder, int
         put_flag(&r, item->flags & BST_DETECTION_STREAK);
         put_flag(&r, item->flags & BST_DETECTION_BLEND);
         put_real(&r, item->label_probability);
+        put_flag(&r, item->flags & BST_DETECTION_STACK);
+        put_real(&r, item->rate_x_pxps);
+        put_real(&r, item->rate_y_pxps);
+        put_real(&r, item->rate_sigma_pxps);
         BST_TRY(append(ctx, recorder, BST_TABLE_DETECTIONS, &r));
     }
     return BST_OK;

@@ -177,6 +177,10 @@ static const bst_column detection_columns[] = {
     INT("streak", "", "1: longer than the PSF"),
     INT("blend", "", "1: several sources"),
     REAL("label_probability", "", "that the label is right; 0: unknown"),
+    INT("stack", "", "1: seen in the sum of several frames, of which this is the last"),
+    REAL("rate_x_pxps", "px/s", "stack: rate against the stars"),
+    REAL("rate_y_pxps", "px/s", "stack: rate against the stars"),
+    REAL("rate_sigma_pxps", "px/s", "standard deviation of each"),
 };
 static const bst_column track_frame_columns[] = {
     SENSOR,

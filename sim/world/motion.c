@@ -26,6 +26,45 @@ static bst_vec3 lerp(bst_vec3 a, bst_vec3 b, double s) {
     return bst_vec3_axpy(a, s, bst_vec3_sub(b, a));
 }
 
+/* Third differences of rotation vectors at equal steps: 20 times the variance of white noise. */
+typedef struct roughness {
+    bst_vec3 last[3]; /* the newest first */
+    double step;
+    int run, count; /* samples at this step so far; differences */
+    double sum;     /* of squares about x and y */
+} roughness;
+
+static void add_sample(roughness *s, double step, bst_vec3 r) {
+    s->run = s->run > 0 && fabs(step - s->step) > 0.5 ? 1 : s->run;
+    s->step = step;
+    if (s->run >= 3) {
+        double x = r.x - 3.0 * (s->last[0].x - s->last[1].x) - s->last[2].x;
+        double y = r.y - 3.0 * (s->last[0].y - s->last[1].y) - s->last[2].y;
+        s->sum += x * x + y * y;
+        s->count++;
+    }
+    s->last[2] = s->last[1];
+    s->last[1] = s->last[0];
+    s->last[0] = r;
+    s->run++;
+}
+
+/* Fewest third differences that tell the noise. */
+enum { FEWEST_DIFFERENCES = 5 };
+
+static void judge_bend(const roughness *s, double samples, bst_motion *motion) {
+    if (s->count < FEWEST_DIFFERENCES) {
+        return;
+    }
+    /* least-squares coefficient of a Legendre polynomial of degree 2 */
+    double variance = s->sum / (2.0 * s->count * 20.0) * 5.0 / samples;
+    bst_vec3 b = motion->bend_cam_rad;
+    double square = b.x * b.x + b.y * b.y;
+    double share = square > 2.0 * variance ? 1.0 - 2.0 * variance / square : 0.0;
+    motion->bend_cam_rad = (bst_vec3){share * b.x, share * b.y, b.z};
+    motion->bend_sigma_rad = sqrt(share * variance);
+}
+
 bool bst_motion_from_telemetry(const bst_pointing_telemetry *telemetry, int64_t start_tick,
                                int64_t end_tick, bst_motion *out) {
     if (telemetry->written <= 0 || telemetry->capacity <= 0) {
@@ -48,6 +87,7 @@ bool bst_motion_from_telemetry(const bst_pointing_telemetry *telemetry, int64_t 
     double half = middle > 0.0 ? middle : 0.0;
     moments m = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
     bst_vec3 at_middle = {0, 0, 0};
+    roughness noise = {.run = 0};
     for (int64_t n = first; n < newest; n++) {
         const bst_pointing_sample *a = sample_at(telemetry, n), *b = sample_at(telemetry, n + 1);
         double ta = (double)(a->tick - start_tick) - middle;
@@ -62,6 +102,10 @@ bool bst_motion_from_telemetry(const bst_pointing_telemetry *telemetry, int64_t 
         if ((n == first || ta <= 0.0) && (n + 1 == newest || tb >= 0.0)) {
             at_middle = lerp(ra, rb, (0.0 - ta) / (tb - ta));
         }
+        if (noise.run == 0) {
+            add_sample(&noise, tb - ta, ra);
+        }
+        add_sample(&noise, tb - ta, rb);
         if (hi > lo) {
             add_segment(&m, lo, hi, lerp(ra, rb, (lo - ta) / (tb - ta)),
                         lerp(ra, rb, (hi - ta) / (tb - ta)));
@@ -83,6 +127,8 @@ bool bst_motion_from_telemetry(const bst_pointing_telemetry *telemetry, int64_t 
     out->q_cam_from_gcrf = bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(mean), reference));
     out->turn_cam_rad = turn;
     out->bend_cam_rad = bend;
+    out->bend_sigma_rad = 0.0;
+    judge_bend(&noise, 2.0 * half / fmax(noise.step, 1.0), out);
     return true;
 }
 
@@ -106,4 +152,20 @@ void bst_motion_bend(const bst_motion *motion, const bst_camera *camera, double 
     double a = motion->bend_cam_rad.y, b = -motion->bend_cam_rad.x;
     *x_px = (k[0][0] * a + k[0][1] * b) / scale;
     *y_px = (k[1][0] * a + k[1][1] * b) / scale;
+}
+
+/* The rotation vector that moves the boresight by (x_px, y_px). */
+static bst_vec3 rotation_of(const bst_camera *camera, double x_px, double y_px) {
+    double scale = bst_camera_scale_rad(camera), k[2][2];
+    bst_camera_jacobian(camera, (bst_vec3){0, 0, 1}, k);
+    double det = k[0][0] * k[1][1] - k[0][1] * k[1][0];
+    return (bst_vec3){-(k[0][0] * y_px - k[1][0] * x_px) * scale / det,
+                      (k[1][1] * x_px - k[0][1] * y_px) * scale / det, 0.0};
+}
+
+void bst_motion_add(bst_motion *motion, const bst_camera *camera, double dx_px, double dy_px,
+                    double bend_x_px, double bend_y_px) {
+    motion->turn_cam_rad = bst_vec3_add(motion->turn_cam_rad, rotation_of(camera, dx_px, dy_px));
+    motion->bend_cam_rad =
+        bst_vec3_add(motion->bend_cam_rad, rotation_of(camera, bend_x_px, bend_y_px));
 }

@@ -127,9 +127,6 @@ static void through_poles_and_zenith(void **state) {
     const double decs[] = {90.0, -90.0, 89.9999, 0.0, 37.0};
     for (int filter = 0; filter < 3; filter++) {
         for (int association = 0; association < 4; association++) {
-            if (filter == BST_FILTER_IMM && association == BST_MTT_MIXTURE) {
-                continue;
-            }
             for (int r = 0; r < 3; r++) {
                 for (int k = 0; k < 5; k++) {
                     bst_mtt_params params = defaults();
@@ -497,9 +494,6 @@ static void five_hundred_tracks_by_each(void **state) {
     (void)state;
     for (int filter = 0; filter < 3; filter++) {
         for (int association = 0; association < 4; association++) {
-            if (filter == BST_FILTER_IMM && association == BST_MTT_MIXTURE) {
-                continue;
-            }
             bst_mtt_params params = defaults();
             params.filter = (bst_filter_kind)filter;
             params.association = (bst_mtt_association)association;
@@ -543,10 +537,6 @@ static void wrong_names_are_refused(void **state) {
     bst_mtt *mtt;
     bst_mtt_params params = defaults();
     params.filter = BST_FILTER_IMM;
-    params.association = BST_MTT_MIXTURE;
-    assert_int_equal(bst_mtt_create(&ctx, &params, &mtt), BST_ERR_CONFIG);
-    assert_non_null(strstr(ctx.message, "pda"));
-    params.association = BST_MTT_GNN;
     params.manoeuvre_s = 0.0;
     assert_int_equal(bst_mtt_create(&ctx, &params, &mtt), BST_ERR_ARGUMENT);
     params = defaults();

@@ -1,5 +1,6 @@
 #include <stdlib.h>
 
+#include "sim/core/rng.h"
 #include "sim/world/motion.h"
 #include "tests/test_support.h"
 
@@ -80,7 +81,7 @@ static void accelerated(void **state) {
 static void few_samples(void **state) {
     (void)state;
     bst_pointing_telemetry *t = telemetry(0, 100, (bst_vec3){0, 0, 0});
-    bst_motion m = {{9, 9, 9, 9}, {9, 9, 9}, {9, 9, 9}};
+    bst_motion m = {.turn_cam_rad = {9, 9, 9}};
     assert_false(bst_motion_from_telemetry(t, 0, 100, &m));
     assert_true(m.turn_cam_rad.x == 9.0);
     free(t);
@@ -93,7 +94,8 @@ static void few_samples(void **state) {
 
 /* The path against projecting a fixed direction at both ends. */
 static void check_streak(bst_camera c) {
-    bst_motion m = {bst_quat_unit((bst_quat){0.1, 0.2, 0.3, 0.9}), {1e-4, -5e-5, 2e-3}, {0, 0, 0}};
+    bst_motion m = {.q_cam_from_gcrf = bst_quat_unit((bst_quat){0.1, 0.2, 0.3, 0.9}),
+                    .turn_cam_rad = {1e-4, -5e-5, 2e-3}};
     bst_quat end =
         bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(m.turn_cam_rad, 0.5)), m.q_cam_from_gcrf);
     bst_quat start =
@@ -121,17 +123,67 @@ static void streak_is_the_stars_path(void **state) {
     check_streak(c);
     /* the bend at the boresight: tilted by a small rotation vector, the boresight's own direction
      * moves as projecting it says */
-    bst_motion m = {BST_QUAT_IDENTITY, {0, 0, 0}, {3e-5, -7e-5, 0}};
+    bst_motion m = {.q_cam_from_gcrf = BST_QUAT_IDENTITY, .bend_cam_rad = {3e-5, -7e-5, 0}};
     double bx, by, x = 0, y = 0;
     bst_motion_bend(&m, &c, &bx, &by);
     bst_vec3 v = bst_quat_rotate(bst_quat_from_rotvec(m.bend_cam_rad), (bst_vec3){0, 0, 1});
     assert_true(bst_camera_project(&c, v, &x, &y));
     bst_assert_close(bx, x - 511.5, 1e-4); /* third order: 300 (7e-5)^2 of 5 px */
     bst_assert_close(by, y - 511.5, 1e-4);
+    /* what is added in pixels is there in pixels: both are linear but for the same third order */
+    double x0, y0, x1, y1, cx, cy;
+    bst_motion_streak(&m, &c, 511.5, 511.5, &x0, &y0);
+    bst_motion_add(&m, &c, 0.7, -0.4, 0.3, 0.2);
+    bst_motion_streak(&m, &c, 511.5, 511.5, &x1, &y1);
+    bst_motion_bend(&m, &c, &cx, &cy);
+    bst_assert_close(x1 - x0, 0.7, 1e-6);
+    bst_assert_close(y1 - y0, -0.4, 1e-6);
+    bst_assert_close(cx - bx, 0.3, 1e-9);
+    bst_assert_close(cy - by, 0.2, 1e-9);
+}
+
+/* Noise of the telemetry is no bend, and what it does to a true bend is told. 50 samples in the
+ * exposure: the least-squares coefficient of a Legendre polynomial of degree 2 has sigma
+ * sqrt(5 / 50) of a sample's. */
+static void noise_is_no_bend(void **state) {
+    (void)state;
+    enum { TRIALS = 400 };
+    const double sample = 5e-7, sigma = sample * sqrt(5.0 / 50.0);
+    for (int bent = 0; bent < 2; bent++) {
+        double true_bend = bent ? 20.0 * sigma : 0.0, error2 = 0.0, stated2 = 0.0;
+        for (uint64_t trial = 0; trial < TRIALS; trial++) {
+            bst_rng_key key = bst_rng_make_key(trial, 0, "test", "noise_is_no_bend");
+            bst_pointing_telemetry *t = telemetry(60, 60, (bst_vec3){1e-3, -2e-3, 0});
+            for (int n = 0; n < 60; n++) {
+                double e[2], u = ((double)(n * 60) - 1800.0) / 1500.0;
+                bst_rng_normal2(key, 0, (uint64_t)n, e);
+                bst_vec3 off = {sample * e[0] + true_bend * (1.5 * u * u - 0.5), sample * e[1], 0};
+                t->items[n].q_cam_from_gcrf =
+                    bst_quat_mul(bst_quat_from_rotvec(off), t->items[n].q_cam_from_gcrf);
+            }
+            bst_motion m;
+            assert_true(bst_motion_from_telemetry(t, 300, 3300, &m));
+            error2 += pow(m.bend_cam_rad.x - true_bend, 2) + pow(m.bend_cam_rad.y, 2);
+            stated2 += 2.0 * m.bend_sigma_rad * m.bend_sigma_rad;
+            free(t);
+        }
+        error2 /= TRIALS * 2.0 * sigma * sigma;
+        stated2 /= TRIALS * 2.0 * sigma * sigma;
+        if (bent) {
+            /* 800 draws: 5 %, three of them */
+            bst_assert_close(error2, 1.0, 0.15);
+            bst_assert_close(stated2, 1.0, 0.1);
+        } else {
+            /* of the positive-part estimator at the origin, by quadrature over the chi-square of 2
+             * degrees of freedom: E[(1 - 2/s)+^2 s] / 2 = 0.35 */
+            assert_true(error2 < 0.45);
+        }
+    }
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(noise_is_no_bend),
         cmocka_unit_test(constant_rate),
         cmocka_unit_test(accelerated),
         cmocka_unit_test(few_samples),

@@ -1,0 +1,331 @@
+#include "imgproc/streak_motion.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* Streaks fainter than this say nothing beside bright ones. */
+static const double LEAST_SNR = 20.0;
+/* A neighbour this bright relative to a streak would bend it. */
+static const double ALONE_SHARE = 0.02;
+static const double LEAST_PATH_SIGMAS = 4.0;
+/* More of the path than this, and a bend is no correction to an even motion. */
+static const double MOST_BEND = 0.1;
+/* Chi-square, COMMON degrees of freedom, of what a star wants against what all agree on. */
+static const double REJECT_CHI2 = 25.0;
+enum { COMMON = BST_STREAK_MOTION_COUNT, LOCAL = 4, HELD = 1, ROUNDS = 5 };
+/* Brightest candidates among which stars that stand alone are looked for. */
+enum { LOOKED_AT = 16 * BST_STREAK_MOTION_STARS };
+
+typedef struct star {
+    bst_shape shape;
+    bst_stamp stamp;
+    double flux_e, product_e; /* flux; flux times widening */
+    double start_x, start_y, noise_e;
+    /* the local parameters' step while the motion is held, and what a step of the motion takes off
+     * it */
+    double step[1 + COMMON][LOCAL];
+    /* of the motion, the local parameters eliminated */
+    double information[COMMON][COMMON], gradient[COMMON];
+    bool used;
+} star;
+
+bst_status bst_streak_motion_create(bst_ctx *ctx, int max_side, bst_streak_motion *out) {
+    out->max_pixels = max_side * max_side;
+    out->render = calloc((size_t)out->max_pixels * (4 + COMMON), sizeof *out->render);
+    return out->render ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory to measure motion");
+}
+
+void bst_streak_motion_free(bst_streak_motion *work) {
+    free(work->render);
+    *work = (bst_streak_motion){0};
+}
+
+/* Whether a stamp lies inside the frame, has only pixels that measure, and no other source that
+ * matters. */
+static bool is_alone(const bst_locate_frame *f, const bst_candidates *candidates, int rank,
+                     const bst_stamp *s, double margin) {
+    if (s->x0 <= 0 || s->y0 <= 0 || s->x0 + s->width >= f->width ||
+        s->y0 + s->height >= f->height) {
+        return false;
+    }
+    for (int j = 0; j < s->height; j++) {
+        const float *row = f->signal + (size_t)(s->y0 + j) * (size_t)f->width + (size_t)s->x0;
+        for (int i = 0; i < s->width; i++) {
+            if (!(row[i] > BST_PIXEL_NONE)) {
+                return false;
+            }
+        }
+    }
+    float least = (float)ALONE_SHARE * candidates->items[candidates->order[rank]].snr;
+    for (int k = 0; k < candidates->count; k++) {
+        const bst_candidate *c = &candidates->items[candidates->order[k]];
+        if (c->snr < least) {
+            break;
+        }
+        if (k != rank && c->x > s->x0 - margin && c->x < s->x0 + s->width + margin &&
+            c->y > s->y0 - margin && c->y < s->y0 + s->height + margin) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Room about a path for a motion that is not yet known, and for what PSF is modelled. */
+static double reach(const bst_locate_frame *f) {
+    return fmax(3.0, ceil(3.6 * f->sigma_px)) + 1.0;
+}
+
+static bool start_star(const bst_streak_motion *work, const bst_locate_frame *f,
+                       const bst_candidates *candidates, int rank, const bst_shape *path,
+                       star *out) {
+    const bst_candidate *c = &candidates->items[candidates->order[rank]];
+    if (!(c->snr > bst_filter_point_at(f->filter, c->x, c->y))) {
+        return false;
+    }
+    *out = (star){.shape = *path, .start_x = c->x, .start_y = c->y, .used = true};
+    out->shape.x_px = c->x;
+    out->shape.y_px = c->y;
+    bst_motion_streak(f->motion, f->camera, f->origin_x_px + f->binning * c->x,
+                      f->origin_y_px + f->binning * c->y, &out->shape.dx_px, &out->shape.dy_px);
+    out->shape.dx_px /= f->binning;
+    out->shape.dy_px /= f->binning;
+    out->noise_e = bst_background_noise_at(f->background, c->x, c->y);
+    out->flux_e = (double)c->snr * out->noise_e / f->filter->streak_norm;
+    bst_source source = {.shape = out->shape};
+    out->stamp = bst_fit_stamp(&source, reach(f), BST_PSF_MAX_SIDE, f->width, f->height);
+    double margin = 0.5 * hypot(out->shape.dx_px, out->shape.dy_px);
+    return out->stamp.width * out->stamp.height <= work->max_pixels &&
+           is_alone(f, candidates, rank, &out->stamp, margin);
+}
+
+/* Solves a x = v for a symmetric positive definite matrix of order n and `count` right-hand sides,
+ * each a row of x, by Cholesky; false when it is not definite. */
+static bool solve(int n, double a[LOCAL][LOCAL], int count, double x[][LOCAL]) {
+    for (int j = 0; j < n; j++) {
+        for (int i = j; i < n; i++) {
+            for (int k = 0; k < j; k++) {
+                a[i][j] -= a[i][k] * a[j][k];
+            }
+            if (i == j && !(a[j][j] > 0.0)) {
+                return false;
+            }
+            a[i][j] = i == j ? sqrt(a[j][j]) : a[i][j] / a[j][j];
+        }
+    }
+    for (int r = 0; r < count; r++) {
+        for (int i = 0; i < n; i++) {
+            for (int k = 0; k < i; k++) {
+                x[r][i] -= a[i][k] * x[r][k];
+            }
+            x[r][i] /= a[i][i];
+        }
+        for (int i = n - 1; i >= 0; i--) {
+            for (int k = i + 1; k < n; k++) {
+                x[r][i] -= a[k][i] * x[r][k];
+            }
+            x[r][i] /= a[i][i];
+        }
+    }
+    return true;
+}
+
+/* Normal equations of one star at the present motion. */
+static bool accumulate(const bst_streak_motion *work, const bst_psf *psf, const bst_locate_frame *f,
+                       double ex, double ey, star *s) {
+    size_t n = (size_t)s->stamp.width * (size_t)s->stamp.height;
+    double *m = work->render, *const by_motion[COMMON] = {m + 4 * n, m + 5 * n, m + 6 * n};
+    bst_psf_render_motion(psf, &s->shape, &s->stamp, ex, ey, m, m + n, m + 2 * n, m + 3 * n,
+                          by_motion);
+    double a[LOCAL][LOCAL] = {{0}}, right[1 + COMMON][LOCAL] = {{0}};
+    double common[COMMON][COMMON] = {{0}}, g[COMMON] = {0};
+    for (size_t i = 0; i < n; i++) {
+        size_t y = i / (size_t)s->stamp.width, x = i % (size_t)s->stamp.width;
+        double value =
+            (double)
+                f->signal[((size_t)s->stamp.y0 + y) * (size_t)f->width + (size_t)s->stamp.x0 + x];
+        double total = s->flux_e * m[i] + s->product_e * m[3 * n + i];
+        double weight = 1.0 / (s->noise_e * s->noise_e + fmax(total, 0.0));
+        double r = value - total;
+        double j[LOCAL] = {s->flux_e * m[n + i], s->flux_e * m[2 * n + i], m[i], m[3 * n + i]};
+        double c[COMMON];
+        for (int k = 0; k < COMMON; k++) {
+            c[k] = s->flux_e * by_motion[k][i];
+            g[k] += weight * c[k] * r;
+            for (int l = 0; l <= k; l++) {
+                common[k][l] += weight * c[k] * c[l];
+            }
+        }
+        for (int p = 0; p < LOCAL; p++) {
+            double w = weight * j[p];
+            right[0][p] += w * r;
+            for (int k = 0; k < COMMON; k++) {
+                right[1 + k][p] += w * c[k];
+            }
+            for (int q = 0; q <= p; q++) {
+                a[p][q] += w * j[q];
+            }
+        }
+    }
+    for (int r = 0; r <= COMMON; r++) {
+        for (int p = 0; p < LOCAL; p++) {
+            s->step[r][p] = right[r][p];
+        }
+    }
+    if (!solve(LOCAL, a, 1 + COMMON, s->step)) {
+        return false;
+    }
+    bool good = true;
+    for (int k = 0; k < COMMON; k++) {
+        s->gradient[k] = g[k];
+        for (int p = 0; p < LOCAL; p++) {
+            s->gradient[k] -= right[1 + k][p] * s->step[0][p];
+        }
+        for (int l = 0; l <= k; l++) {
+            double v = common[k][l];
+            for (int p = 0; p < LOCAL; p++) {
+                v -= right[1 + k][p] * s->step[1 + l][p];
+            }
+            s->information[k][l] = s->information[l][k] = v;
+        }
+        good = good && s->information[k][k] > 0.0 && isfinite(s->gradient[k]);
+    }
+    return good;
+}
+
+static double clamp(double v, double limit) {
+    return v < -limit ? -limit : v > limit ? limit : v;
+}
+
+/* Takes the local step that belongs to a step of the motion; false when the star runs away. */
+static bool advance(star *s, const double by[COMMON], double ex, double ey) {
+    double step[LOCAL];
+    for (int p = 0; p < LOCAL; p++) {
+        step[p] = s->step[0][p];
+        for (int k = 0; k < COMMON; k++) {
+            step[p] -= by[k] * s->step[1 + k][p];
+        }
+    }
+    s->shape.x_px += clamp(step[0], 0.7);
+    s->shape.y_px += clamp(step[1], 0.7);
+    s->shape.dx_px += by[0] * ex - by[1] * ey;
+    s->shape.dy_px += by[0] * ey + by[1] * ex;
+    s->shape.bend_x_px += by[2] * ex;
+    s->shape.bend_y_px += by[2] * ey;
+    s->flux_e = fmax(s->flux_e + step[2], 0.1 * s->flux_e);
+    double variance = s->shape.sigma_px * s->shape.sigma_px * s->flux_e;
+    s->product_e = fmax(-0.6 * variance, fmin(s->product_e + step[3], 1.8 * variance));
+    double limit = 2.0 + 0.4 * hypot(s->shape.dx_px, s->shape.dy_px);
+    return hypot(s->shape.x_px - s->start_x, s->shape.y_px - s->start_y) < limit &&
+           isfinite(s->flux_e) && isfinite(s->product_e);
+}
+
+/* The step on which the stars and the priors agree. */
+static bool agree(const star *stars, int count, const double sigma[COMMON],
+                  const double away[COMMON], double step[COMMON]) {
+    double a[LOCAL][LOCAL] = {{0}}, x[1][LOCAL] = {{0}};
+    for (int k = 0; k < COMMON; k++) {
+        double prior = 1.0 / (sigma[k] * sigma[k]);
+        a[k][k] = prior;
+        x[0][k] = -prior * away[k];
+        for (int i = 0; i < count; i++) {
+            if (stars[i].used) {
+                x[0][k] += stars[i].gradient[k];
+                for (int l = 0; l < COMMON; l++) {
+                    a[k][l] += stars[i].information[k][l];
+                }
+            }
+        }
+    }
+    if (!solve(COMMON, a, 1, x)) {
+        return false;
+    }
+    for (int k = 0; k < COMMON; k++) {
+        step[k] = x[0][k];
+    }
+    return isfinite(step[0]) && isfinite(step[1]) && isfinite(step[2]);
+}
+
+/* Leaves out stars that want another motion than all agree on: hit by radiation, double. */
+static void reject(star *stars, int count, const double step[COMMON]) {
+    for (int i = 0; i < count; i++) {
+        double a[LOCAL][LOCAL] = {{0}}, x[1][LOCAL] = {{0}}, left[COMMON], chi2 = 0.0;
+        for (int k = 0; k < COMMON; k++) {
+            left[k] = stars[i].gradient[k];
+            for (int l = 0; l < COMMON; l++) {
+                a[k][l] = stars[i].information[k][l];
+                left[k] -= a[k][l] * step[l];
+            }
+            x[0][k] = left[k];
+        }
+        bool solved = stars[i].used && solve(COMMON, a, 1, x);
+        for (int k = 0; k < COMMON; k++) {
+            chi2 += left[k] * x[0][k];
+        }
+        stars[i].used = solved && chi2 < REJECT_CHI2;
+    }
+}
+
+bool bst_streak_motion_measure(bst_streak_motion *work, const bst_psf *psf,
+                               const bst_locate_frame *f, const bst_candidates *candidates,
+                               double length_px, double bend_px, bst_motion *motion) {
+    if (!f->motion || !f->filter->streak) {
+        return false;
+    }
+    bst_shape path = {.sigma_px = f->sigma_px};
+    bst_motion_streak(f->motion, f->camera, f->origin_x_px + 0.5 * f->binning * f->width,
+                      f->origin_y_px + 0.5 * f->binning * f->height, &path.dx_px, &path.dy_px);
+    bst_motion_bend(f->motion, f->camera, &path.bend_x_px, &path.bend_y_px);
+    path.bend_x_px /= f->binning;
+    path.bend_y_px /= f->binning;
+    double length = hypot(path.dx_px, path.dy_px);
+    double ex = path.dx_px / length, ey = path.dy_px / length;
+    double bend = f->binning * hypot(path.bend_x_px, path.bend_y_px);
+    if (!(length >= LEAST_PATH_SIGMAS * f->sigma_px * f->binning) || bend > MOST_BEND * length) {
+        return false;
+    }
+    star stars[BST_STREAK_MOTION_STARS];
+    int count = 0;
+    for (int k = 0; k < candidates->count && k < LOOKED_AT && count < BST_STREAK_MOTION_STARS;
+         k++) {
+        if ((double)candidates->items[candidates->order[k]].snr < LEAST_SNR) {
+            break;
+        }
+        count += start_star(work, f, candidates, k, &path, &stars[count]);
+    }
+    /* what is known exactly leaves the matrix well conditioned */
+    const double least = 1e-4;
+    const double sigma[COMMON] = {fmax(length_px, least), fmax(length_px, least),
+                                  fmax(bend_px, least)};
+    double away[COMMON] = {0};
+    int left = 0;
+    for (int round = 0; round < ROUNDS; round++) {
+        double step[COMMON] = {0};
+        for (int i = 0; i < count; i++) {
+            stars[i].used = stars[i].used && accumulate(work, psf, f, ex, ey, &stars[i]);
+        }
+        if (round >= HELD && !agree(stars, count, sigma, away, step)) {
+            return false;
+        }
+        if (round == ROUNDS - 2) {
+            reject(stars, count, step);
+            if (!agree(stars, count, sigma, away, step)) {
+                return false;
+            }
+        }
+        left = 0;
+        for (int i = 0; i < count; i++) {
+            stars[i].used = stars[i].used && advance(&stars[i], step, ex, ey);
+            left += stars[i].used;
+        }
+        for (int k = 0; k < COMMON; k++) {
+            away[k] += step[k];
+        }
+    }
+    if (left == 0) {
+        return false;
+    }
+    bst_motion_add(motion, f->camera, f->binning * (away[0] * ex - away[1] * ey),
+                   f->binning * (away[0] * ey + away[1] * ex), f->binning * away[2] * ex,
+                   f->binning * away[2] * ey);
+    return true;
+}

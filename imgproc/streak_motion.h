@@ -1,0 +1,36 @@
+/* How the stars of a frame moved, from their streaks. */
+#ifndef BST_IMGPROC_STREAK_MOTION_H
+#define BST_IMGPROC_STREAK_MOTION_H
+
+#include "imgproc/locate.h"
+
+enum {
+    BST_STREAK_MOTION_STARS = 12,
+    BST_STREAK_MOTION_COUNT = 3, /* length, end minus start across it, bend along it; px */
+};
+
+typedef struct bst_streak_motion {
+    int max_pixels; /* of a stamp */
+    double *render; /* [4 + BST_STREAK_MOTION_COUNT][max_pixels] */
+} bst_streak_motion;
+
+bst_status bst_streak_motion_create(bst_ctx *ctx, int max_side,
+                                    bst_streak_motion *out) BST_MUST_CHECK;
+void bst_streak_motion_free(bst_streak_motion *work);
+
+/* Corrects frame->motion by what up to BST_STREAK_MOTION_STARS bright streaks that stand alone
+ * show, fitted jointly with their places, fluxes and widths (Gauss-Newton, as bst_fit_run): what
+ * the telemetry does not know (drift of the platform, jitter) or gets wrong (noise). Both would
+ * else move the stars: a bend that is not known shifts all along their path alike, by up to 0.7 of
+ * its error, and a path of the wrong direction turns the error ellipses.
+ *
+ * The priors, 1 sigma in px of the frame, are of the difference to frame->motion: length_px of the
+ * path's length and direction, bend_px of the bend. *motion: a copy of frame->motion, corrected.
+ * False, and nothing changed, when stars are points or their streaks too short to tell (4 sigma of
+ * the PSF), when frame->motion bends by more than a tenth of its length (the camera was starting or
+ * stopping), or when no streak is bright enough. */
+bool bst_streak_motion_measure(bst_streak_motion *work, const bst_psf *psf,
+                               const bst_locate_frame *frame, const bst_candidates *candidates,
+                               double length_px, double bend_px, bst_motion *motion);
+
+#endif
