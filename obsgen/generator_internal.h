@@ -31,10 +31,11 @@ typedef struct generator_rank {
 
 /* The light of a detection that is seen in one with others, and of what is fitted beside it. */
 typedef struct generator_blend {
-    double flux_e, x, y; /* as one source */
-    double widen;        /* factor on the variances from neighbours that are fitted too */
-    double flat;         /* factor on the error along a streak where light of others is in it */
-    bool near;           /* another detection in the fitted pixels, or a merged source of note */
+    double flux_e, x, y;       /* as one source */
+    double widen;              /* factor on the variances from neighbours that are fitted too */
+    double spread_x, spread_y; /* of its light: that of the brightest two */
+    double flat; /* factor on the error along a streak where light of others is in it */
+    bool near;   /* another detection in the fitted pixels, or a merged source of note */
 } generator_blend;
 
 /* Half pixels of the longest streak that is filtered for. */
@@ -82,6 +83,10 @@ struct bst_generator {
 
 /* Share of the frame that a Gaussian's light at (x, y) has. */
 double bst_generator_inside(const bst_generator *g, double x, double y, double sigma);
+/* Finds which sources are detected, and which are seen in one with a brighter one. */
+void bst_generator_decide(bst_generator *g);
+/* What is seen in source number i and fitted beside it. */
+generator_blend bst_generator_blend_of(const bst_generator *g, int i);
 /* The detection of a source that was found. */
 bst_detection bst_generator_measure(const bst_generator *g, const generator_source *s,
                                     const generator_blend *b);
@@ -89,7 +94,7 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
 double bst_generator_draw(const bst_generator *g, const generator_source *s, int which);
 
 /* Draws of one source. */
-enum { GENERATOR_PEAK, GENERATOR_PLACE, GENERATOR_FLUX, GENERATOR_DRAWS = 8 };
+enum { GENERATOR_PEAK, GENERATOR_PLACE, GENERATOR_FLUX, GENERATOR_BLEND, GENERATOR_DRAWS = 8 };
 
 /* Takes a maximum of the filter's output that is not fitted: at the pixel itself. item: of the
  * truth, or -1. */

@@ -49,6 +49,9 @@ static void measure_place(const bst_generator *g, const generator_source *s,
     double c = s->length > 0.0 ? s->path.dx / s->length : 1.0;
     double n = s->length > 0.0 ? s->path.dy / s->length : 0.0;
     double x = b->x + c * error[0] - n * error[1], y = b->y + n * error[0] + c * error[1];
+    double between = cal->blend_error * bst_generator_draw(g, s, GENERATOR_BLEND);
+    x += between * b->spread_x;
+    y += between * b->spread_y;
     double bias = cal->phase_bias_px / g->binning, shared[2];
     shared_bias(g, s, shared);
     x += shared[0] + bias * sin(2.0 * BST_PI * b->x);

@@ -8,7 +8,16 @@
 
 /* SNR about the threshold in which Pd is fitted, and least number of sources for a fit. */
 static const double PD_REACH = 4.0;
-enum { LEAST_SOURCES = 200, LEAST_ALARMS = 10, LEAST_PLACES = 30, GRID = 48 };
+enum { LEAST_SOURCES = 200, LEAST_ALARMS = 10, LEAST_PLACES = 30, LEAST_COMMON = 8, GRID = 48 };
+/* Distances of blends that are tried, over theory's; sources that count for them. */
+enum { BLENDS = 5, TYPICAL = 2, CAPACITY = 4096 };
+static const double blend_factors[BLENDS] = {0.7, 0.9, 1.1, 1.3, 1.5};
+static const double BLEND_SNR = 10.0;
+/* Error between sources that are seen as one which is tried, faintest of them over the brighter. */
+static const double BLEND_ERROR = 0.6, COMPANION_SHARE = 0.3;
+static const double COMPANION_LEAST = 5.0;
+/* Errors of places over the bound that count. */
+static const double MOST_SIGMAS = 2.5;
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
 
 /* A source that stands alone, near the threshold. */
@@ -24,10 +33,14 @@ typedef struct mean_square {
 
 struct bst_calibrator {
     bst_calibrated_path path;
-    bst_generator *theory;
+    bst_generator *theory, *blended[BLENDS + 1]; /* the last with BLEND_ERROR */
+    bst_detections *made;                        /* of one of them */
+    mean_square together[3]; /* places, px^2, of sources with a companion: in images, without and
+                                with the error that is tried */
+    long beside[BLENDS + 1]; /* sources beside a brighter one that were found: in images, by each */
     double sigma_px;
     bst_bound bound;
-    bst_pairing pairing;
+    bst_pairing pairing, blend_pairing;
     trial *trials;
     long trial_count, trial_room;
     double *alarm_energy; /* (u^2 - T^2) / 2 */
@@ -51,7 +64,12 @@ bst_status bst_calibrator_create(bst_ctx *ctx, bst_calibrator **out) {
 void bst_calibrator_free(bst_calibrator *c) {
     if (c) {
         bst_generator_free(c->theory);
+        for (int i = 0; i <= BLENDS; i++) {
+            bst_generator_free(c->blended[i]);
+        }
+        free(c->made);
         bst_pairing_free(&c->pairing);
+        bst_pairing_free(&c->blend_pairing);
         free(c->trials);
         free(c->alarm_energy);
         free(c);
@@ -62,7 +80,7 @@ bst_status bst_calibrator_begin(bst_ctx *ctx, bst_calibrator *c, const bst_calib
     bst_obsgen_calibration theory;
     bst_obsgen_calibration_theory(&theory);
     theory.crowding = theory.background_share = 0.0;
-    const bst_generator_settings settings = {.capacity = 4096,
+    const bst_generator_settings settings = {.capacity = CAPACITY,
                                              .false_alarms_per_frame = path->false_alarms_per_frame,
                                              .streak_min_px = path->streak_min_px,
                                              .streak_max_px = path->streak_max_px};
@@ -71,8 +89,23 @@ bst_status bst_calibrator_begin(bst_ctx *ctx, bst_calibrator *c, const bst_calib
     c->path = *path;
     c->sigma_px = hypot(bst_camera_psf_sigma_px(path->camera), path->jitter_px);
     bst_bound_init(&c->bound, c->sigma_px);
-    return bst_generator_create(ctx, path->camera, path->camera, &settings, &theory,
-                                bst_rng_make_key(1, 0, "calibration", "observations"), &c->theory);
+    bst_rng_key key = bst_rng_make_key(1, 0, "calibration", "observations");
+    BST_TRY(
+        bst_generator_create(ctx, path->camera, path->camera, &settings, &theory, key, &c->theory));
+    bst_obsgen_calibration_theory(&theory);
+    for (int i = 0; i <= BLENDS; i++) {
+        bst_generator_free(c->blended[i]);
+        c->blended[i] = NULL;
+        theory.blend_distance_factor = blend_factors[i < BLENDS ? i : TYPICAL];
+        theory.blend_error = i < BLENDS ? 0.0 : BLEND_ERROR;
+        BST_TRY(bst_generator_create(ctx, path->camera, path->camera, &settings, &theory, key,
+                                     &c->blended[i]));
+    }
+    if (!c->made) {
+        c->made = malloc(sizeof *c->made + CAPACITY * sizeof c->made->items[0]);
+    }
+    return c->made ? BST_OK
+                   : bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d detections", CAPACITY);
 }
 
 static bst_status grow(bst_ctx *ctx, void **items, long count, long *room, size_t bytes) {
@@ -135,19 +168,42 @@ static int snr_node(double snr) {
     return best;
 }
 
+/* What all places of a frame have in common: the generator has it from the camera's path. */
+typedef struct common_error {
+    double x, y, weight; /* of 1 / variance, px^-2 */
+    int count;
+} common_error;
+
+static double place_weight(const bst_calibrator *c, const bst_truth_item *t, double noise_e) {
+    bst_bound_at at = bst_bound_of(&c->bound, t->electrons, noise_e, length_of(t));
+    return 1.0 / (at.var_along_px2 + at.var_across_px2 + 1e-4);
+}
+
 static void add_place(bst_calibrator *c, const bst_truth_item *t, const bst_detection *d,
-                      double noise_e) {
-    double length = length_of(t), dx = d->x_px - t->x_mean_px, dy = d->y_px - t->y_mean_px;
+                      double noise_e, const common_error *common) {
+    /* the mean follows each of its members by its share */
+    double own = place_weight(c, t, noise_e) / common->weight;
+    if (common->count < LEAST_COMMON || own > 0.5) {
+        return;
+    }
+    double free_part = 1.0 / sqrt(1.0 - own);
+    double length = length_of(t), dx = (d->x_px - t->x_mean_px - common->x) * free_part,
+           dy = (d->y_px - t->y_mean_px - common->y) * free_part;
     double cosine = length > 0.0 ? (t->x_end_px - t->x_start_px) / length : 1.0;
     double sine = length > 0.0 ? (t->y_end_px - t->y_start_px) / length : 0.0;
     bst_bound_at at = bst_bound_of(&c->bound, t->electrons, noise_e, length);
     double along = dx * cosine + dy * sine, across = dy * cosine - dx * sine;
     int node = snr_node(t->electrons * at.norm / noise_e);
-    mean_square *a = length > 1.0 ? &c->along[node] : &c->across[node];
-    a->sum += along * along / at.var_along_px2;
-    a->count++;
-    c->across[node].sum += across * across / at.var_across_px2;
-    c->across[node].count++;
+    const double squares[2] = {along * along / at.var_along_px2,
+                               across * across / at.var_across_px2};
+    for (int k = 0; k < 2; k++) {
+        /* what is further off is another source's light */
+        if (squares[k] < MOST_SIGMAS * MOST_SIGMAS) {
+            mean_square *sum = k == 0 && length > 1.0 ? &c->along[node] : &c->across[node];
+            sum->sum += squares[k];
+            sum->count++;
+        }
+    }
     double weight = 1.0 / (at.var_across_px2 + 1e-6);
     const double place[2] = {t->x_mean_px, t->y_mean_px}, off[2] = {dx, dy};
     for (int k = 0; k < 2 && length < 1.0; k++) {
@@ -212,6 +268,125 @@ static void add_noise(bst_calibrator *c, const bst_detections *detections,
     c->light_bias += theory->faint_light_e * (detections->background_e - theory->background_e);
 }
 
+/* Whether a star is whole on the frame, with nothing near it. */
+static bool stands_alone(const bst_calibrator *c, const bst_truth *truth, int i, double reach) {
+    const bst_truth_item *t = &truth->items[i];
+    const bst_camera *camera = c->path.camera;
+    double x = t->x_mean_px, y = t->y_mean_px, edge = reach + 0.5 * length_of(t);
+    bool whole = x > edge && y > edge && x < (double)camera->width_px - edge &&
+                 y < (double)camera->height_px - edge;
+    bool dark = !(t->flags & BST_TRUTH_IN_FIELD) || (t->flags & BST_TRUTH_OCCULTED) ||
+                (t->flags & BST_TRUTH_SATURATED);
+    return !dark && whole && t->snr > 1.0 && t->kind == BST_SOURCE_STAR &&
+           is_free(truth, x, y, reach + 0.5 * length_of(t), i, 0.5);
+}
+
+/* A star that stands alone, and its detection: number k, or -1. dark_e: background and dark
+ * current.
+ */
+static bst_status add_star(bst_ctx *ctx, bst_calibrator *c, const bst_truth_item *t,
+                           const bst_detections *detections, int k,
+                           const bst_generator_result *theory, double dark_e,
+                           const common_error *common) {
+    const bst_camera *camera = c->path.camera;
+    double plain = sqrt(dark_e + camera->read_noise_e * camera->read_noise_e);
+    /* what its background has too much is missing from the output */
+    double missing = (detections->background_e - theory->background_e) /
+                     (bst_bound_norm(&c->bound, length_of(t)) * detections->noise_e);
+    BST_TRY(add_trial(ctx, c, t, t->snr * plain / detections->noise_e,
+                      detections->threshold_snr + missing, k >= 0));
+    if (k < 0) {
+        return BST_OK;
+    }
+    c->detected++;
+    const bst_detection *d = &detections->items[k];
+    add_place(c, t, d, detections->noise_e, common);
+    if (detections->stars_identified > 0 && t->snr > detections->threshold_snr + 2.0 &&
+        !(t->id & UINT32_C(0x80000000))) {
+        c->identifiable++;
+        c->identified += d->star_id == t->id;
+    }
+    return BST_OK;
+}
+
+/* Whether a source that would be seen alone has a brighter one so near that both may be one. */
+static bool is_beside(const bst_truth *truth, int i, double reach) {
+    const bst_truth_item *t = &truth->items[i];
+    if (!(t->snr >= BLEND_SNR) || !(t->flags & BST_TRUTH_IN_FIELD) ||
+        (t->flags & BST_TRUTH_OCCULTED)) {
+        return false;
+    }
+    for (int k = 0; k < truth->count; k++) {
+        const bst_truth_item *o = &truth->items[k];
+        if (k != i && o->snr > t->snr && fabs(o->x_mean_px - t->x_mean_px) < reach &&
+            fabs(o->y_mean_px - t->y_mean_px) < reach) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Whether a source has a fainter one near it that may be seen in one with it. */
+static bool has_companion(const bst_truth *truth, int i, double reach) {
+    const bst_truth_item *t = &truth->items[i];
+    if (!(t->snr >= COMPANION_LEAST) || !(t->flags & BST_TRUTH_IN_FIELD) ||
+        (t->flags & BST_TRUTH_OCCULTED)) {
+        return false;
+    }
+    for (int k = 0; k < truth->count; k++) {
+        const bst_truth_item *o = &truth->items[k];
+        if (k != i && o->snr <= t->snr && o->snr > COMPANION_SHARE * t->snr &&
+            fabs(o->x_mean_px - t->x_mean_px) < reach &&
+            fabs(o->y_mean_px - t->y_mean_px) < reach) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static void add_together(mean_square *sum, const bst_truth_item *t, const bst_detections *all,
+                         int k) {
+    if (k >= 0) {
+        double dx = all->items[k].x_px - t->x_mean_px, dy = all->items[k].y_px - t->y_mean_px;
+        sum->sum += dx * dx + dy * dy;
+        sum->count++;
+    }
+}
+
+/* Counts what is told apart in the image and at each distance of blends, paired alike. */
+static bst_status add_blends(bst_ctx *ctx, bst_calibrator *c, const bst_generator_frame *frame,
+                             const bst_detections *detections, double fwhm) {
+    const bst_truth *truth = frame->truth;
+    double reach = 4.0 * fwhm;
+    for (int n = 0; n <= BLENDS; n++) {
+        bst_generator_result made;
+        BST_TRY(bst_generator_run(ctx, c->blended[n], frame, &made));
+        c->made->count = made.count;
+        for (int i = 0; i < made.count; i++) {
+            c->made->items[i] = made.items[i].detection;
+        }
+        BST_TRY(bst_pairing_make(ctx, &c->blend_pairing, truth, c->made, fwhm));
+        for (int i = 0; i < truth->count; i++) {
+            if ((n == TYPICAL || n == BLENDS) && has_companion(truth, i, reach)) {
+                const bst_truth_item *t = &truth->items[i];
+                add_together(&c->together[n == TYPICAL ? 1 : 2], t, c->made,
+                             c->blend_pairing.detection_of[i]);
+                if (n == TYPICAL) {
+                    add_together(&c->together[0], t, detections, c->pairing.detection_of[i]);
+                }
+            }
+            if (n == BLENDS) {
+                continue;
+            }
+            bool beside =
+                (n == 0 || c->blend_pairing.detection_of[i] >= 0) && is_beside(truth, i, reach);
+            c->beside[BLENDS] += n == 0 && beside && c->pairing.detection_of[i] >= 0;
+            c->beside[n] += beside && c->blend_pairing.detection_of[i] >= 0;
+        }
+    }
+    return BST_OK;
+}
+
 bst_status bst_calibrator_add(bst_ctx *ctx, bst_calibrator *c, const bst_truth *truth,
                               const bst_detections *detections, double exposure_s) {
     const bst_camera *camera = c->path.camera;
@@ -232,35 +407,30 @@ bst_status bst_calibrator_add(bst_ctx *ctx, bst_calibrator *c, const bst_truth *
     add_noise(c, detections, &theory);
     double fwhm = FWHM_PER_SIGMA * c->sigma_px, reach = 5.0 * c->sigma_px + 3.0;
     BST_TRY(bst_pairing_make(ctx, &c->pairing, truth, detections, fwhm));
-    double plain =
-        sqrt(truth->background_e + truth->dark_e + camera->read_noise_e * camera->read_noise_e);
-    for (int i = 0; i < truth->count; i++) {
-        const bst_truth_item *t = &truth->items[i];
-        double x = t->x_mean_px, y = t->y_mean_px, edge = reach + 0.5 * length_of(t);
-        bool whole = x > edge && y > edge && x < (double)camera->width_px - edge &&
-                     y < (double)camera->height_px - edge;
-        bool dark = !(t->flags & BST_TRUTH_IN_FIELD) || (t->flags & BST_TRUTH_OCCULTED) ||
-                    (t->flags & BST_TRUTH_SATURATED);
-        if (dark || !whole || !(t->snr > 1.0) || t->kind != BST_SOURCE_STAR ||
-            !is_free(truth, x, y, reach + 0.5 * length_of(t), i, 0.5)) {
-            continue;
+    BST_TRY(add_blends(ctx, c, &frame, detections, fwhm));
+    /* first what all have in common, then each */
+    common_error common = {0.0, 0.0, 0.0, 0};
+    for (int pass = 0; pass < 2; pass++) {
+        for (int i = 0; i < truth->count; i++) {
+            const bst_truth_item *t = &truth->items[i];
+            int k = c->pairing.detection_of[i];
+            if ((pass == 0 && k < 0) || !stands_alone(c, truth, i, reach)) {
+                continue;
+            }
+            if (pass == 0) {
+                double weight = place_weight(c, t, detections->noise_e);
+                common.x += weight * (detections->items[k].x_px - t->x_mean_px);
+                common.y += weight * (detections->items[k].y_px - t->y_mean_px);
+                common.weight += weight;
+                common.count++;
+            } else {
+                BST_TRY(add_star(ctx, c, t, detections, k, &theory,
+                                 truth->background_e + truth->dark_e, &common));
+            }
         }
-        int k = c->pairing.detection_of[i];
-        /* what its background has too much is missing from the output */
-        double missing = (detections->background_e - theory.background_e) /
-                         (bst_bound_norm(&c->bound, length_of(t)) * detections->noise_e);
-        BST_TRY(add_trial(ctx, c, t, t->snr * plain / detections->noise_e,
-                          detections->threshold_snr + missing, k >= 0));
-        if (k < 0) {
-            continue;
-        }
-        c->detected++;
-        const bst_detection *d = &detections->items[k];
-        add_place(c, t, d, detections->noise_e);
-        if (detections->stars_identified > 0 && t->snr > detections->threshold_snr + 2.0 &&
-            !(t->id & UINT32_C(0x80000000))) {
-            c->identifiable++;
-            c->identified += d->star_id == t->id;
+        if (pass == 0 && common.count > 0) {
+            common.x /= common.weight;
+            common.y /= common.weight;
         }
     }
     double taken = (detections->background_e - theory.background_e) /
@@ -359,11 +529,53 @@ static void fit_detection(const bst_calibrator *c, bst_obsgen_calibration *out) 
     }
 }
 
+/* The distance at which the generator tells as many apart as the image path; fewer, the further. */
+static double fit_blends(const bst_calibrator *c) {
+    double image = (double)c->beside[BLENDS];
+    if (c->beside[BLENDS] < LEAST_SOURCES) {
+        return 1.0;
+    }
+    for (int n = 1; n < BLENDS; n++) {
+        double near = (double)c->beside[n - 1], far = (double)c->beside[n];
+        if (image >= far && near > far) {
+            double part = fmin((near - image) / (near - far), 1.0);
+            return blend_factors[n - 1] +
+                   fmax(part, 0.0) * (blend_factors[n] - blend_factors[n - 1]);
+        }
+    }
+    return blend_factors[BLENDS - 1];
+}
+
+/* The error between sources seen as one with which their places scatter as in images. */
+static double fit_blend_error(const bst_calibrator *c) {
+    double square[3];
+    for (int k = 0; k < 3; k++) {
+        if (c->together[k].count < LEAST_SOURCES) {
+            return 0.0;
+        }
+        square[k] = c->together[k].sum / (double)c->together[k].count;
+    }
+    double part = (square[0] - square[1]) / fmax(square[2] - square[1], 1e-6);
+    return BLEND_ERROR * sqrt(fmin(fmax(part, 0.0), 10.0));
+}
+
+/* Standard deviation of normal errors of which those beyond MOST_SIGMAS were left out, from the
+ * mean square of the rest: f^2 (1 - 2 c phi(c) / (2 Phi(c) - 1)), c = MOST_SIGMAS / f. */
+static double uncut(double square) {
+    double low = 0.1, high = 5.0;
+    for (int i = 0; i < 40; i++) {
+        double f = 0.5 * (low + high), c = MOST_SIGMAS / f;
+        double cut = 1.0 - 2.0 * c * exp(-0.5 * c * c) / sqrt(2.0 * BST_PI) / erf(c * sqrt(0.5));
+        *(f * f * cut < square ? &low : &high) = f;
+    }
+    return 0.5 * (low + high);
+}
+
 static void fit_places(const mean_square *seen, double *factors) {
     double before = 1.0;
     for (int i = 0; i < BST_OBSGEN_SNRS; i++) {
         if (seen[i].count >= LEAST_PLACES) {
-            before = sqrt(seen[i].sum / (double)seen[i].count);
+            before = uncut(seen[i].sum / (double)seen[i].count);
         }
         factors[i] = fmin(fmax(before, 0.1), 20.0);
     }
@@ -385,6 +597,8 @@ bst_status bst_calibrator_fit(bst_ctx *ctx, bst_calibrator *c, bst_obsgen_calibr
                         c->trial_count, c->alarm_count, LEAST_SOURCES, LEAST_ALARMS);
     }
     fit_detection(c, out);
+    out->blend_distance_factor = fit_blends(c);
+    out->blend_error = fit_blend_error(c);
     fit_places(c->across, out->across_factor);
     fit_places(c->along, out->along_factor);
     for (int i = 0; i < BST_OBSGEN_SNRS; i++) {
