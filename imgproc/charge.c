@@ -15,6 +15,10 @@ static int find_charge(const bst_locator *l, const bst_locate_frame *f, const bs
         int r = round < 0 ? reach_px : 1;
         for (int v = y - r; v <= y + r; v++) {
             for (int u = x - r; u <= x + r && count < MAX_CHARGE; u++) {
+                if (!bst_sharpness_is_open(&l->sharpness, f->signal, f->width, f->height,
+                                           (float)found->noise_e, u, v)) {
+                    continue;
+                }
                 double sharp = bst_sharpness_at(&l->sharpness, f->signal, f->width, f->height,
                                                 found->noise_e, u, v);
                 bool known = false;
@@ -82,7 +86,7 @@ static void count_charge(void *user, int begin, int end) {
 void bst_charge_remove(bst_locator *l, const bst_locate_frame *f) {
     enum { A_TIME = 64 };
     search s = {l, f};
-    bst_parallel_for(l->pool, l->count, A_TIME, count_charge, &s);
+    bst_parallel_for(f->pool, l->count, A_TIME, count_charge, &s);
     l->charged_count = 0;
     for (int i = 0; i < l->count; i++) {
         if (l->found[i].charge.pixels == 0) {

@@ -118,16 +118,17 @@ bool bst_company_fit(const bst_worker *w, int i, bst_found *found, const bst_sta
     if (ok) {
         found->source = copies[0];
     }
+    found->company = c.free_count - 1 + c.fixed_count;
     if (c.free_count > 1) {
         found->flags |= BST_DETECTION_BLEND;
     }
     return ok;
 }
 
-void bst_company_drop_doubles(bst_locator *l, const bst_locate_frame *f) {
+void bst_company_drop_doubles(bst_locator *l, const bst_locate_frame *f, int end) {
     double radius = 0.6 * BST_FWHM_PER_SIGMA * f->sigma_px;
     double margin = radius + 1.8 * l->longest_px + 2.0 * bst_company_fit_limit(f, 0.0);
-    for (int i = 0; i < l->count; i++) {
+    for (int i = 0; i < end; i++) {
         const bst_shape *a = &l->found[i].source.shape;
         int x0, x1, y0, y1;
         cell_range(a->x_px, a->x_px, margin, l->columns, &x0, &x1);

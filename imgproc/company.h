@@ -40,7 +40,7 @@ void bst_company_gather(const bst_locator *l, const bst_locate_frame *f, int i,
 bool bst_company_fit(const bst_worker *w, int i, bst_found *found, const bst_stamp *stamp,
                      bool free_width);
 
-/* Of fits that ended at one place all but the brightest are dropped. */
-void bst_company_drop_doubles(bst_locator *l, const bst_locate_frame *f);
+/* Of numbers 0 to end - 1, all fitted, those that ended at a brighter one's place are dropped. */
+void bst_company_drop_doubles(bst_locator *l, const bst_locate_frame *f, int end);
 
 #endif

@@ -2,7 +2,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "imgproc/heapsort.h"
 #include "imgproc/imgproc.h"
 #include "imgproc/locate.h"
 #include "imgproc/rows.h"
@@ -21,6 +20,8 @@ static const double DRIFT_PX = 1.0;
 /* Above the threshold by this no skewness of noise matters. */
 static const double CERTAIN_ABOVE = 1.5;
 
+#define BST_MAG_PER_SHARE 1.0857362047581296 /* 2.5 / ln 10 */
+
 struct bst_imgproc {
     bst_camera camera;
     bst_imgproc_config config;
@@ -35,8 +36,10 @@ struct bst_imgproc {
     bst_streak_motion streak_motion;
     bst_streak_locator streaks; /* only when config.streak_search_px > 0 */
     bst_parallel *pool;
-    int *order;
+    int *order, *order_swap, *row;
     /* of the latest frame */
+    bst_locate_frame view;
+    bst_motion motion;
     double exposure_s, binning, streak_px;
     bool smeared;
     bst_stack_frame left;
@@ -76,7 +79,9 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     int capacity = (int)ip->config.capacity;
     ip->electrons = bst_pages_alloc((size_t)width * (size_t)height * sizeof(float));
     ip->order = calloc((size_t)capacity, sizeof(int));
-    if (!ip->electrons || !ip->order) {
+    ip->order_swap = calloc((size_t)capacity, sizeof(int));
+    ip->row = calloc((size_t)height + 1, sizeof(int));
+    if (!ip->electrons || !ip->order || !ip->order_swap || !ip->row) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a frame of %d x %d", width, height);
     }
     BST_TRY(make_bad_map(ctx, ip));
@@ -86,7 +91,9 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     BST_TRY(
         bst_filter_create(ctx, width, height, streak, bst_parallel_threads(ip->pool), &ip->filter));
     BST_TRY(bst_candidates_create(ctx, width, height, &ip->candidates));
-    BST_TRY(bst_locator_create(ctx, ip->pool, capacity, width, height, side, &ip->locator));
+    BST_TRY(bst_locator_create(ctx, bst_parallel_threads(ip->pool), capacity, width, height, side,
+                               &ip->locator));
+    ip->locator.most_fits = (int)ip->config.most_fits;
     BST_TRY(bst_streak_motion_create(ctx, side, &ip->streak_motion));
     return ip->config.streak_search_px > 0.0
                ? bst_streak_locator_create(ctx, &ip->locator.psf, ip->pool, width, height, fwhm,
@@ -133,6 +140,8 @@ void bst_imgproc_free(bst_imgproc *ip) {
     free(ip->bad);
     free(ip->electrons);
     free(ip->order);
+    free(ip->order_swap);
+    free(ip->row);
     bst_background_free(&ip->background);
     bst_filter_free(&ip->filter);
     bst_candidates_free(&ip->candidates);
@@ -259,13 +268,39 @@ static bst_status check_frame(bst_ctx *ctx, const bst_imgproc *ip, const bst_img
     return BST_OK;
 }
 
-static bool before_on_sensor(const void *context, int a, int b) {
-    const bst_found *found = context;
+static int row_of(const bst_found *found, int height) {
+    double y = found->source.shape.y_px;
+    return y > height - 1.0 ? height - 1 : y > 0.0 ? (int)y : 0;
+}
+
+static bool before_on_sensor(const bst_found *found, int a, int b) {
     const bst_shape *p = &found[a].source.shape, *q = &found[b].source.shape;
     if (p->y_px != q->y_px) {
         return p->y_px < q->y_px;
     }
     return p->x_px != q->x_px ? p->x_px < q->x_px : a < b;
+}
+
+/* Orders ip->order: into rows of pixels by counting, within them one by one. */
+static void sort_on_sensor(bst_imgproc *ip, int count, int height) {
+    const bst_found *found = ip->locator.found;
+    memset(ip->row, 0, ((size_t)height + 1) * sizeof *ip->row);
+    for (int i = 0; i < count; i++) {
+        ip->row[row_of(&found[ip->order[i]], height) + 1]++;
+    }
+    for (int y = 0; y < height; y++) {
+        ip->row[y + 1] += ip->row[y];
+    }
+    for (int i = 0; i < count; i++) {
+        ip->order_swap[ip->row[row_of(&found[ip->order[i]], height)]++] = ip->order[i];
+    }
+    for (int i = 0; i < count; i++) {
+        int moved = ip->order_swap[i], at = i;
+        for (; at > 0 && before_on_sensor(found, moved, ip->order[at - 1]); at--) {
+            ip->order[at] = ip->order[at - 1];
+        }
+        ip->order[at] = moved;
+    }
 }
 
 /* A detection is to stand for the mean of its path, but a fit that does not follow the camera's
@@ -345,46 +380,49 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
     bst_candidates_find(&ip->candidates, pool, &ip->filter,
                         (int)ceil(6.0 * sigma + hypot(dx, dy)) + 2, (float)look, (float)certain,
                         stands_out, &noise);
-    bst_locate_frame view = {.signal = ip->electrons,
-                             .width = width,
-                             .height = height,
-                             .background = &ip->background,
-                             .filter = &ip->filter,
-                             .sigma_px = sigma,
-                             .motion = motion,
-                             .camera = &ip->camera,
-                             .binning = frame->binning};
-    view.origin_x_px = frame->window.x0 + 0.5 * (frame->binning - 1);
-    view.origin_y_px = frame->window.y0 + 0.5 * (frame->binning - 1);
+    if (motion) {
+        ip->motion = *motion;
+    }
+    ip->view = (bst_locate_frame){.signal = ip->electrons,
+                                  .width = width,
+                                  .height = height,
+                                  .background = &ip->background,
+                                  .filter = &ip->filter,
+                                  .sigma_px = sigma,
+                                  .motion = motion ? &ip->motion : NULL,
+                                  .camera = &ip->camera,
+                                  .binning = frame->binning,
+                                  .pool = pool};
+    ip->view.origin_x_px = frame->window.x0 + 0.5 * (frame->binning - 1);
+    ip->view.origin_y_px = frame->window.y0 + 0.5 * (frame->binning - 1);
     ip->left = (bst_stack_frame){.signal = ip->electrons,
                                  .background = &ip->background,
                                  .width = width,
                                  .height = height,
                                  .sigma_px = sigma,
-                                 .origin_x_px = view.origin_x_px,
-                                 .origin_y_px = view.origin_y_px,
+                                 .origin_x_px = ip->view.origin_x_px,
+                                 .origin_y_px = ip->view.origin_y_px,
                                  .binning = frame->binning};
-    bst_motion measured;
     if (motion && !ip->smeared) {
-        measured = *motion;
         double bend_px = hypot(JITTER_BEND * ip->config.jitter_px,
                                motion->bend_sigma_rad / bst_camera_scale_rad(&ip->camera));
-        if (bst_streak_motion_measure(&ip->streak_motion, &ip->locator.psf, &view, &ip->candidates,
-                                      DRIFT_PX / frame->binning, bend_px / frame->binning,
-                                      &measured)) {
-            view.motion = &measured;
+        bst_motion measured = *motion;
+        if (bst_streak_motion_measure(&ip->streak_motion, &ip->locator.psf, &ip->locator.profiles,
+                                      &ip->view, &ip->candidates, DRIFT_PX / frame->binning,
+                                      bend_px / frame->binning, &measured)) {
+            ip->motion = measured;
         }
     }
     if (ip->smeared) {
-        bst_locate_roughly(&ip->locator, &view, &ip->candidates);
+        bst_locate_roughly(&ip->locator, &ip->view, &ip->candidates);
     } else {
-        bst_locate(&ip->locator, &view, &ip->candidates);
+        bst_locate(&ip->locator, &ip->view, &ip->candidates);
     }
 
     int kept = 0, room = capacity < ip->locator.capacity ? capacity : ip->locator.capacity;
     int lost = ip->candidates.count - ip->locator.count;
     if (search) {
-        bst_streak_locate(&ip->streaks, &view, &ip->candidates, false_alarms, &ip->locator);
+        bst_streak_locate(&ip->streaks, &ip->view, &ip->candidates, false_alarms, &ip->locator);
     }
     for (int i = 0; i < ip->locator.count; i++) {
         if (ip->locator.found[i].dropped) {
@@ -396,7 +434,7 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
             lost++;
         }
     }
-    bst_heapsort_indices(ip->order, kept, before_on_sensor, ip->locator.found);
+    sort_on_sensor(ip, kept, height);
     out->background_e = (double)ip->background.median_level;
     out->noise_e = (double)ip->background.median_noise;
     out->threshold_snr = threshold;
@@ -404,9 +442,29 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
     out->count = kept;
     out->lost = lost;
     for (int i = 0; i < kept; i++) {
-        out->items[i] = report(ip, &view, &ip->locator.found[ip->order[i]]);
+        out->items[i] = report(ip, &ip->view, &ip->locator.found[ip->order[i]]);
     }
     return BST_OK;
+}
+
+void bst_imgproc_refine(bst_imgproc *ip, bst_detections *detections, int index) {
+    bst_detection *item = &detections->items[index];
+    const bst_found *found = &ip->locator.found[ip->order[index]];
+    if (!found->rough) {
+        return;
+    }
+    bst_locate_again(&ip->locator, &ip->view, ip->order[index]);
+    bst_detection fitted = report(ip, &ip->view, found), before = *item;
+    /* the zero point may have been applied since */
+    fitted.v_mag = before.v_mag - 2.5 * log10(fitted.flux_e / before.flux_e);
+    double old_noise = BST_MAG_PER_SHARE * before.flux_sigma_e / before.flux_e;
+    double noise = BST_MAG_PER_SHARE * fitted.flux_sigma_e / fitted.flux_e;
+    double zero_point2 = before.v_mag_sigma * before.v_mag_sigma - old_noise * old_noise;
+    fitted.v_mag_sigma = sqrt(fmax(zero_point2, 0.0) + noise * noise);
+    fitted.label = before.label;
+    fitted.label_probability = before.label_probability;
+    fitted.star_id = before.star_id;
+    *item = fitted;
 }
 
 double bst_imgproc_v_limit(const bst_imgproc *ip, double snr) {

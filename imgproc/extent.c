@@ -17,7 +17,10 @@ bool bst_extent_measure(const bst_worker *w, int i, bst_found *found, double wid
         bst_stamp stamp = bst_fit_stamp(&found->source, bst_company_reach(f) + wider,
                                         w->l->max_side, f->width, f->height);
         bst_company c;
-        bst_company_gather(w->l, f, i, &found->source, &stamp, &c);
+        c.free_count = c.fixed_count = 0;
+        if (!found->rough) {
+            bst_company_gather(w->l, f, i, &found->source, &stamp, &c);
+        }
         const bst_source *others[BST_FIT_MAX_FREE + BST_COMPANY_MAX_FIXED];
         int count = 0;
         for (int k = 1; k < c.free_count; k++) {

@@ -10,7 +10,9 @@
 
 enum {
     PART_PX = 131072, /* pixels of a part of a pass */
-    GROUP = 4         /* rows that are made at a time */
+    GROUP = 4,        /* rows that are made at a time */
+    LATEST = 3,       /* of the streak map that are kept beside it */
+    CACHED_PX = 1 << 20
 };
 
 bst_status bst_filter_create(bst_ctx *ctx, int max_width, int max_height, double streak_max_px,
@@ -18,12 +20,14 @@ bst_status bst_filter_create(bst_ctx *ctx, int max_width, int max_height, double
     int pad = (int)ceil(0.5 * streak_max_px) + 2;
     /* what looks for maxima reads beyond a row */
     pad = pad > 2 * BST_ROW_LANES ? pad : 2 * BST_ROW_LANES;
+    /* rows begin where lines of the cache do, as far as the frame's width allows */
+    pad = (pad + BST_ROW_LANES - 1) / BST_ROW_LANES * BST_ROW_LANES;
     *out = (bst_filter){.max_width = max_width, .max_height = max_height, .pad = pad};
     size_t pixels = (size_t)max_width * (size_t)max_height;
     size_t line = (size_t)(max_width + 2 * pad);
-    /* three rows, the parts of a row (two for each four pixels at the most, of five
+    /* three rows, the latest, the parts of a row (two for each four pixels at the most, of five
      * numbers), and a ring of rows */
-    out->line_floats = line * (3 + 3 + 2 * BST_FILTER_MAX_RADIUS + GROUP);
+    out->line_floats = line * (3 + LATEST + 3 + 2 * BST_FILTER_MAX_RADIUS + GROUP);
     size_t map = line * (size_t)(max_height + 2 * pad) * sizeof(float);
     out->point = bst_pages_alloc(map);
     out->best = bst_pages_alloc(map);
@@ -298,7 +302,8 @@ typedef struct pass {
     const uint16_t *raw;
     float *signal;
     int saturated_dn, part_rows;
-    int reach; /* rows above and below that a row of the streak map needs */
+    int reach;       /* rows above and below that a row of the streak map needs */
+    bool past_cache; /* the frame is larger than that */
     float threshold;
 } pass;
 
@@ -306,22 +311,27 @@ static float *map_row(const bst_filter *f, float *map, int y) {
     return map + (long)(y + f->pad) * (long)f->stride + f->pad;
 }
 
-/* Needs the rows above and below; those beyond the frame are 0. */
-static void find_maxima(bst_filter *f, int y, float threshold) {
+static void note_maxima(bst_filter *f, int y, const float *above, const float *row,
+                        const float *below, float threshold) {
     size_t at = (size_t)y * (size_t)f->max_width;
-    const float *row = map_row(f, f->streak ? f->best : f->point, y);
-    f->maxima[y] = bst_row_maxima(row - f->stride, row, row + f->stride, f->width, threshold,
-                                  f->maximum_x + at, f->maximum_snr + at);
+    f->maxima[y] = bst_row_maxima(above, row, below, f->width, threshold, f->maximum_x + at,
+                                  f->maximum_snr + at);
 }
 
-/* Needs the rows of the point map that the taps reach. */
-static void filter_streak(bst_filter *f, int y) {
+/* Needs the rows above and below; those beyond the frame are 0. */
+static void find_maxima(bst_filter *f, int y, float threshold) {
+    const float *row = map_row(f, f->streak ? f->best : f->point, y);
+    note_maxima(f, y, row - f->stride, row, row + f->stride, threshold);
+}
+
+/* A row of the streak map, and its copy, NULL: none. Needs the rows of the point map that the taps
+ * reach. */
+static void filter_streak(const bst_filter *f, int y, float *row, float *copy) {
     const float *in[BST_FILTER_MAX_TAPS], *point = map_row(f, f->point, y);
     for (int t = 0; t < f->taps; t++) {
         in[t] = point + (long)f->tap_y[t] * (long)f->stride + f->tap_x[t];
     }
-    float *row = map_row(f, f->best, y);
-    bst_row_streak(row, (size_t)f->stride, f->width, in, f->tap_weight, f->taps, point);
+    bst_row_streak(row, copy, f->width, in, f->tap_weight, f->taps, point);
 }
 
 /* The kernel's cut at the frame's edges. */
@@ -349,7 +359,7 @@ static void filter_across(const pass *p, int y, bool own, float *lines, float *o
     bst_row_part *parts = (bst_row_part *)(void *)(lines + 3 * line);
     p->read(p->user, y, 0, width, electrons);
     bst_row_normalise(p->raw + row, electrons, parts, bst_background_parts(p->background, y, parts),
-                      p->saturated_dn, signal, normalised + r);
+                      p->saturated_dn, own && p->past_cache, signal, normalised + r);
     const float *in[2 * BST_FILTER_MAX_RADIUS + 1];
     for (int t = 0; t <= 2 * r; t++) {
         in[t] = normalised + t;
@@ -385,7 +395,11 @@ static void filter_rows(void *user, int begin, int end) {
     size_t line = (size_t)f->stride;
     int taken = bst_borrow_take(f->lent);
     float *lines = f->lines + f->line_floats * (size_t)taken, *ring = lines + 6 * line;
+    /* the latest rows of the streak map: maxima are looked for while they are near */
+    float *latest = ring + line * (size_t)ring_rows + f->pad;
+    bool apart = f->streak && p->past_cache;
     memset(lines, 0, line * sizeof(float));
+    memset(latest - f->pad, 0, LATEST * line * sizeof(float));
     for (int y = begin - r, next = begin; y < end + r; y++) {
         filter_across(p, y, y >= begin && y < end, lines,
                       ring + line * (size_t)((y + ring_rows) % ring_rows));
@@ -396,9 +410,18 @@ static void filter_rows(void *user, int begin, int end) {
             for (int k = next; k < next + count; k++) {
                 int ready = k - p->reach;
                 if (f->streak && ready >= begin + p->reach) {
-                    filter_streak(f, ready);
+                    float *row = map_row(f, f->best, ready);
+                    filter_streak(f, ready, apart ? latest + line * (size_t)(ready % LATEST) : row,
+                                  apart ? row : NULL);
                 }
-                if (ready - 2 >= begin + p->reach) {
+                if (ready - 2 < begin + p->reach) {
+                    continue;
+                }
+                if (apart) {
+                    note_maxima(f, ready - 1, latest + line * (size_t)((ready - 2) % LATEST),
+                                latest + line * (size_t)((ready - 1) % LATEST),
+                                latest + line * (size_t)(ready % LATEST), p->threshold);
+                } else {
                     find_maxima(f, ready - 1, p->threshold);
                 }
             }
@@ -418,7 +441,7 @@ static void finish_streaks(void *user, int begin, int end) {
     const pass *p = user;
     for (int y = begin; y < end; y++) {
         if (is_border(p, y, p->reach)) {
-            filter_streak(p->f, y);
+            filter_streak(p->f, y, map_row(p->f, p->f->best, y), NULL);
         }
     }
 }
@@ -450,7 +473,9 @@ void bst_filter_run(bst_filter *f, bst_parallel *pool, const bst_background *bac
     for (int t = 0; t < f->taps; t++) {
         reach = abs(f->tap_y[t]) > reach ? abs(f->tap_y[t]) : reach;
     }
-    pass p = {f, background, read, user, raw, signal, saturated_dn, rows, reach, threshold};
+    pass p = {f,        background,   read, user,  raw,
+              signal,   saturated_dn, rows, reach, width * height > CACHED_PX,
+              threshold};
     bst_parallel_for(pool, height, rows, filter_rows, &p);
     if (f->streak) {
         bst_parallel_for(pool, height, rows, finish_streaks, &p);

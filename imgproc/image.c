@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { PARTS = 3, PLANES = 4, SIDE = BST_PSF_MAX_SIDE + BST_LANES };
+enum { PARTS = 3, SIDE = BST_PSF_MAX_SIDE + BST_LANES };
 
 bst_status bst_profiles_create(bst_ctx *ctx, bst_profiles *out) {
     *out = (bst_profiles){0};
@@ -29,6 +29,8 @@ void bst_profiles_set(bst_profiles *p, const bst_psf *psf, double sigma_px) {
     p->length = bst_lanes_up(2 * half + 1);
     p->length = p->length < BST_PROFILE_LENGTH ? p->length : BST_PROFILE_LENGTH;
     p->half = (p->length - 1) / 2;
+    p->reach = (int)ceil(4.5 * sigma_px) + 1;
+    p->reach = p->reach < p->half ? p->reach : p->half;
     double share[BST_PROFILE_LENGTH], slope[BST_PROFILE_LENGTH], curvature[BST_PROFILE_LENGTH];
     for (int phase = 0; phase <= BST_PROFILE_PHASES; phase++) {
         double centre = (double)phase / BST_PROFILE_PHASES - 0.5 + p->half;
@@ -63,7 +65,9 @@ static inline bool place(const bst_profiles *t, double centre, float weight, int
     double at = floor(centre + 0.5), u = (centre + 0.5 - at) * BST_PROFILE_PHASES;
     int before = (int)at - t->half, phase = (int)u;
     phase = phase < BST_PROFILE_PHASES ? phase : BST_PROFILE_PHASES - 1;
-    if (before >= side || before + t->length <= 0) {
+    *first = (int)at - t->reach;
+    *end = (int)at + t->reach + 1;
+    if (*first >= side || *end <= 0) {
         return false;
     }
     float fraction = (float)(u - phase);
@@ -86,8 +90,8 @@ static inline bool place(const bst_profiles *t, double centre, float weight, int
             BST_STORE(out + part * side + x, v);
         }
     }
-    *first = before < 0 ? 0 : before;
-    *end = before + t->length < side ? before + t->length : side;
+    *first = *first < 0 ? 0 : *first;
+    *end = *end < side ? *end : side;
     return true;
 }
 
@@ -98,9 +102,18 @@ static inline void widen(range *r, int first, int end, int node) {
     }
 }
 
-BST_CLONES
-void bst_image_render(const bst_profiles *t, const bst_psf *psf, const bst_shape *shape,
-                      const bst_stamp *stamp, float *scratch, float *planes) {
+/* A path laid out on a stamp. */
+typedef struct layout {
+    int stride, rows, used; /* rows: of the lanes; used: nodes that reach the stamp */
+    const float *across, *down;
+    range column[SIDE / BST_LANES], row[SIDE];
+    float node[BST_PSF_MAX_NODES], bow[BST_PSF_MAX_NODES];
+} layout;
+
+static inline __attribute__((always_inline)) void lay_out(const bst_profiles *t, const bst_psf *psf,
+                                                          const bst_shape *shape,
+                                                          const bst_stamp *stamp, float *scratch,
+                                                          layout *out) {
     int stride = bst_lanes_up(stamp->width), rows = bst_lanes_up(stamp->height);
     double bend = hypot(shape->bend_x_px, shape->bend_y_px);
     double length = (hypot(shape->dx_px, shape->dy_px) + 6.0 * bend) / t->sigma_px;
@@ -108,12 +121,11 @@ void bst_image_render(const bst_profiles *t, const bst_psf *psf, const bst_shape
     const double *node = psf->node + nodes * (nodes - 1) / 2;
     const double *weight = psf->weight + nodes * (nodes - 1) / 2;
     float *across = scratch, *down = scratch + BST_PSF_MAX_NODES * PARTS * stride;
-    range column[SIDE / BST_LANES], row[SIDE];
     for (int i = 0; i < stride / BST_LANES; i++) {
-        column[i] = (range){BST_PSF_MAX_NODES, 0};
+        out->column[i] = (range){BST_PSF_MAX_NODES, 0};
     }
     for (int j = 0; j < rows; j++) {
-        row[j] = (range){BST_PSF_MAX_NODES, 0};
+        out->row[j] = (range){BST_PSF_MAX_NODES, 0};
     }
     int used = 0;
     for (int k = 0; k < nodes; k++) {
@@ -125,19 +137,38 @@ void bst_image_render(const bst_profiles *t, const bst_psf *psf, const bst_shape
             !place(t, y, (float)weight[k], rows, down + used * PARTS * rows, &top, &bottom)) {
             continue;
         }
-        widen(column, first / BST_LANES, (end + BST_LANES - 1) / BST_LANES, used);
-        widen(row, top, bottom, used);
+        widen(out->column, first / BST_LANES, (end + BST_LANES - 1) / BST_LANES, used);
+        widen(out->row, top, bottom, used);
+        out->node[used] = (float)node[k];
+        out->bow[used] = (float)bow;
         used++;
     }
-    int n = stride * stamp->height;
+    out->stride = stride;
+    out->rows = rows;
+    out->used = used;
+    out->across = across;
+    out->down = down;
+}
+
+/* Nodes that reach row j and block b. */
+static inline range reaching(const layout *l, int j, int b) {
+    range r = l->row[j], c = l->column[b];
+    return (range){r.first > c.first ? r.first : c.first, r.end < c.end ? r.end : c.end};
+}
+
+BST_CLONES
+void bst_image_render(const bst_profiles *t, const bst_psf *psf, const bst_shape *shape,
+                      const bst_stamp *stamp, float *scratch, float *planes) {
+    layout l;
+    lay_out(t, psf, shape, stamp, scratch, &l);
+    int stride = l.stride, rows = l.rows, n = stride * stamp->height;
     for (int j = 0; j < stamp->height; j++) {
         for (int b = 0; b < stride / BST_LANES; b++) {
             bst_lanes s = {0}, sx = {0}, sy = {0}, sv = {0};
-            int k = row[j].first > column[b].first ? row[j].first : column[b].first;
-            int end = row[j].end < column[b].end ? row[j].end : column[b].end;
-            for (; k < end; k++) {
-                const float *x = across + k * PARTS * stride + b * BST_LANES;
-                const float *y = down + k * PARTS * rows + j;
+            range r = reaching(&l, j, b);
+            for (int k = r.first; k < r.end; k++) {
+                const float *x = l.across + k * PARTS * stride + b * BST_LANES;
+                const float *y = l.down + k * PARTS * rows + j;
                 bst_lanes share = BST_LOAD(x);
                 s += y[0] * share;
                 sx += y[0] * BST_LOAD(x + stride);
@@ -149,6 +180,45 @@ void bst_image_render(const bst_profiles *t, const bst_psf *psf, const bst_shape
             BST_STORE(out + n, sx);
             BST_STORE(out + 2 * n, sy);
             BST_STORE(out + 3 * n, sv);
+        }
+    }
+}
+
+BST_CLONES
+void bst_image_render_motion(const bst_profiles *t, const bst_psf *psf, const bst_shape *shape,
+                             const bst_stamp *stamp, double ex, double ey, float *scratch,
+                             float *planes) {
+    layout l;
+    lay_out(t, psf, shape, stamp, scratch, &l);
+    int stride = l.stride, rows = l.rows, n = stride * stamp->height;
+    float ux = (float)ex, uy = (float)ey;
+    for (int j = 0; j < stamp->height; j++) {
+        for (int b = 0; b < stride / BST_LANES; b++) {
+            bst_lanes s = {0}, sx = {0}, sy = {0}, sv = {0};
+            bst_lanes nx = {0}, ny = {0}, bx = {0}, by = {0};
+            range r = reaching(&l, j, b);
+            for (int k = r.first; k < r.end; k++) {
+                const float *x = l.across + k * PARTS * stride + b * BST_LANES;
+                const float *y = l.down + k * PARTS * rows + j;
+                bst_lanes share = BST_LOAD(x);
+                bst_lanes by_x = y[0] * BST_LOAD(x + stride), by_y = y[rows] * share;
+                s += y[0] * share;
+                sx += by_x;
+                sy += by_y;
+                sv += y[0] * BST_LOAD(x + 2 * stride) + y[2 * rows] * share;
+                nx += l.node[k] * by_x;
+                ny += l.node[k] * by_y;
+                bx += l.bow[k] * by_x;
+                by += l.bow[k] * by_y;
+            }
+            float *out = planes + j * stride + b * BST_LANES;
+            BST_STORE(out, s);
+            BST_STORE(out + n, sx);
+            BST_STORE(out + 2 * n, sy);
+            BST_STORE(out + 3 * n, sv);
+            BST_STORE(out + BST_IMAGE_BY_LENGTH * n, ux * nx + uy * ny);
+            BST_STORE(out + BST_IMAGE_BY_ACROSS * n, ux * ny - uy * nx);
+            BST_STORE(out + BST_IMAGE_BY_BEND * n, ux * bx + uy * by);
         }
     }
 }

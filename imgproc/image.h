@@ -15,6 +15,7 @@ enum {
 typedef struct bst_profiles {
     double sigma_px;
     int length, half; /* pixels of a row: a multiple of 16; of them before the centre's */
+    int reach;        /* pixels about the centre's that count */
     float *rows;      /* [PHASES + 1][3][length]: share, slope and half the curvature by centre */
 } bst_profiles;
 
@@ -33,5 +34,14 @@ size_t bst_image_scratch(int max_side);
  * light beyond 4.5 sigma. */
 void bst_image_render(const bst_profiles *profiles, const bst_psf *psf, const bst_shape *shape,
                       const bst_stamp *stamp, float *scratch, float *planes);
+
+/* The planes of a path's own changes, after the four: by its length in direction (ex, ey), by its
+ * end minus start across that, (-ey, ex), and by its bend in direction (ex, ey). */
+enum { BST_IMAGE_BY_LENGTH = 4, BST_IMAGE_BY_ACROSS, BST_IMAGE_BY_BEND, BST_IMAGE_MOTION_PLANES };
+
+/* As bst_image_render, with the planes of changes that all streaks of a frame share. */
+void bst_image_render_motion(const bst_profiles *profiles, const bst_psf *psf,
+                             const bst_shape *shape, const bst_stamp *stamp, double ex, double ey,
+                             float *scratch, float *planes);
 
 #endif

@@ -18,6 +18,7 @@ typedef struct bst_bad_pixel {
 
 typedef struct bst_imgproc_config {
     int64_t capacity;              /* detections per frame */
+    int64_t most_fits;             /* of them, the brightest, located by fits; 0: all */
     int64_t mesh_px;               /* side of a background mesh */
     double false_alarms_per_frame; /* on noise alone */
     double jitter_px;              /* RMS per axis by which the PSF is expected to be widened */
@@ -79,6 +80,10 @@ void bst_imgproc_free(bst_imgproc *ip);
  * any direction and length up to that (streak_locate.h); points and streaks then have half of the
  * false alarms each, and threshold_snr is that of points.
  *
+ * With config.most_fits, of more detections the fainter ones stand where the matched filter's
+ * output is the greatest, between the pixels; their covariance is that of the filter for a source
+ * alone.
+ *
  * Fills background_e, noise_e, threshold_snr, count, lost and items of *out (room for `capacity`),
  * sorted by y, then x; label is UNKNOWN or ARTEFACT, star_id 0. When there is no room the brightest
  * stay. The covariance is the inverse of the Fisher matrix, without background uncertainty, plus
@@ -89,6 +94,10 @@ void bst_imgproc_free(bst_imgproc *ip);
 bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
                               const bst_motion *motion, bst_detections *out,
                               int capacity) BST_MUST_CHECK;
+
+/* Fits detection `index` of the latest bst_imgproc_detect if the matched filter placed it (see
+ * most_fits), and sets all of it but label, label_probability and star_id. */
+void bst_imgproc_refine(bst_imgproc *ip, bst_detections *detections, int index);
 
 /* V magnitude of the faintest star that the latest frame could show at `snr`, with the shape
  * (point or streak) that stars had in it. */

@@ -2,9 +2,11 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "imgproc/charge.h"
 #include "imgproc/extent.h"
+#include "imgproc/top.h"
 
 enum {
     FIRST_GROUP = 32, /* the brightest, which are fitted before the others */
@@ -12,15 +14,17 @@ enum {
     STARTS_A_TIME = 512
 };
 
+/* a neighbour that moved further from its maximum's top matters */
+static const double MOVED_PX = 0.1;
+
 static const double WIDTH_FIT_SNR = 20.0; /* from here the widening is measured */
 /* a streak's filter output above this share of a point's, and a point's whose square is less than a
  * streak's by no more than the other two: both shapes are tried */
 static const double CLOSE_SHARE = 0.8, CLEAR_CHI = 3.0, CLEAR_SHARE = 0.04;
 
-bst_status bst_locator_create(bst_ctx *ctx, bst_parallel *pool, int capacity, int max_width,
+bst_status bst_locator_create(bst_ctx *ctx, int threads, int capacity, int max_width,
                               int max_height, int max_side, bst_locator *out) {
-    int threads = bst_parallel_threads(pool);
-    *out = (bst_locator){.pool = pool,
+    *out = (bst_locator){.threads = threads,
                          .max_side = max_side,
                          .capacity = capacity,
                          .columns = max_width / BST_LOCATE_CELL_PX + 1,
@@ -29,11 +33,15 @@ bst_status bst_locator_create(bst_ctx *ctx, bst_parallel *pool, int capacity, in
     bst_borrow_init(&out->lent, threads);
     out->found = calloc((size_t)capacity, sizeof *out->found);
     out->next = calloc((size_t)capacity, sizeof *out->next);
+    out->from = calloc((size_t)capacity, sizeof *out->from);
+    out->chosen = calloc(
+        (size_t)max_width * (size_t)max_height / 4 + (size_t)max_width + (size_t)max_height + 1, 1);
     out->cell = calloc((size_t)out->columns * (size_t)out->rows, sizeof *out->cell);
     out->charged_capacity = 16 * capacity;
     out->charged = calloc((size_t)out->charged_capacity, sizeof *out->charged);
     out->fits = calloc((size_t)threads, sizeof *out->fits);
-    if (!out->found || !out->next || !out->cell || !out->charged || !out->fits) {
+    if (!out->found || !out->next || !out->from || !out->chosen || !out->cell || !out->charged ||
+        !out->fits) {
         bst_locator_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d detections", capacity);
     }
@@ -50,9 +58,11 @@ bst_status bst_locator_create(bst_ctx *ctx, bst_parallel *pool, int capacity, in
 void bst_locator_free(bst_locator *l) {
     free(l->found);
     free(l->next);
+    free(l->from);
+    free(l->chosen);
     free(l->cell);
     free(l->charged);
-    for (int i = 0; l->fits && i < bst_parallel_threads(l->pool); i++) {
+    for (int i = 0; l->fits && i < l->threads; i++) {
         bst_fit_free(&l->fits[i]);
     }
     free(l->fits);
@@ -227,7 +237,7 @@ typedef struct loop {
 static void start_some(void *user, int begin, int end) {
     const loop *p = user;
     for (int i = begin; i < end; i++) {
-        start(p->f, &p->candidates->items[p->candidates->order[i]], &p->l->found[i]);
+        start(p->f, &p->candidates->items[p->l->from[i]], &p->l->found[i]);
     }
 }
 
@@ -250,7 +260,7 @@ static void do_some(void *user, int begin, int end) {
 static void do_all(bst_locator *l, const bst_locate_frame *f, int first, int end,
                    void (*each)(const bst_worker *, int, bst_found *)) {
     loop p = {l, f, NULL, each, first};
-    bst_parallel_for(l->pool, end - first, FITS_A_TIME, do_some, &p);
+    bst_parallel_for(f->pool, end - first, FITS_A_TIME, do_some, &p);
     for (int i = first; i < end; i++) {
         l->found[i] = l->next[i];
         note_length(l, &l->found[i].source.shape);
@@ -268,11 +278,47 @@ static void first_fit(const bst_worker *w, int i, bst_found *found) {
     }
 }
 
+/* Places by the filter; charge hides some of its pixels from the filter. */
+static void place(const bst_worker *w, int i, bst_found *found) {
+    if (found->charge.pixels > 0) {
+        first_fit(w, i, found);
+    } else {
+        bst_top_place(w, i, found);
+    }
+}
+
+/* The numbers that are fitted at a time end at powers of three times the first group. */
+static int group_end(int first) {
+    return first < FIRST_GROUP ? FIRST_GROUP : 3 * first;
+}
+
+/* Whether number i was fitted before its neighbour had its place: with a neighbour that is gone
+ * now, or held one where it is not any more. */
+static bool company_changed(const bst_worker *w, int i, const bst_found *found,
+                            const bst_stamp *stamp) {
+    bst_company c;
+    bst_company_gather(w->l, w->f, i, &found->source, stamp, &c);
+    int end = FIRST_GROUP;
+    while (end <= i) {
+        end = group_end(end);
+    }
+    int begin = end == FIRST_GROUP ? 0 : end / 3;
+    bool changed = c.free_count - 1 + c.fixed_count != found->company;
+    for (int k = 0; k < c.fixed_count && !changed; k++) {
+        const bst_found *other = bst_found_of(c.fixed[k]);
+        double moved = hypot(other->source.shape.x_px - other->top_x_px,
+                             other->source.shape.y_px - other->top_y_px);
+        changed = other - w->l->found >= begin && !other->rough && moved > MOVED_PX;
+    }
+    return changed;
+}
+
 /* Blends, now that every neighbour has its place. */
 static void second_fit(const bst_worker *w, int i, bst_found *found) {
-    if ((found->flags & BST_DETECTION_BLEND) && found->source.fitted) {
+    bst_stamp stamp = bst_company_stamp(w->l, w->f, &found->source);
+    if ((found->flags & BST_DETECTION_BLEND) && found->source.fitted &&
+        company_changed(w, i, found, &stamp)) {
         found->flags &= ~(unsigned)BST_DETECTION_BLEND;
-        bst_stamp stamp = bst_company_stamp(w->l, w->f, &found->source);
         found->source.fitted = bst_company_fit(w, i, found, &stamp, false);
     }
 }
@@ -289,7 +335,7 @@ static void finish(const bst_worker *w, int i, bst_found *found) {
     }
     judge(f, found);
     bool alone = !(found->flags & (BST_DETECTION_BLEND | BST_DETECTION_EDGE));
-    if (alone && !found->streak && found->label == BST_LABEL_UNKNOWN &&
+    if (alone && !found->rough && !found->streak && found->label == BST_LABEL_UNKNOWN &&
         found->snr >= BST_EXTENT_SNR) {
         bst_extent_own_streak(w, i, found);
     }
@@ -301,11 +347,44 @@ static void finish(const bst_worker *w, int i, bst_found *found) {
     }
 }
 
+static void set_laws(bst_locator *l, const bst_locate_frame *f) {
+    bst_worker w = {l, f, &l->fits[0]};
+    bst_shape shape = {.x_px = 0.5 * f->width, .y_px = 0.5 * f->height, .sigma_px = f->sigma_px};
+    l->law[0] = bst_top_law_of(&w, &shape);
+    if (f->filter->streak) {
+        set_star_path(f, &shape);
+        l->law[1] = bst_top_law_of(&w, &shape);
+    }
+}
+
+/* l->from: the brightest, of which `fits` by brightness and the others as they lie on the frame,
+ * because what is near on the frame is near in memory. */
+static void choose(bst_locator *l, const bst_candidates *candidates, int fits) {
+    const int *order = candidates->order;
+    if (fits == l->count) {
+        memcpy(l->from, order, (size_t)fits * sizeof *order);
+        return;
+    }
+    /* candidates are by row */
+    memset(l->chosen, 0, (size_t)candidates->count);
+    for (int i = fits; i < l->count; i++) {
+        l->chosen[order[i]] = 1;
+    }
+    memcpy(l->from, order, (size_t)fits * sizeof *order);
+    for (int k = 0, next = fits; k < candidates->count; k++) {
+        if (l->chosen[k]) {
+            l->from[next++] = k;
+        }
+    }
+}
+
 void bst_locate(bst_locator *l, const bst_locate_frame *f, const bst_candidates *candidates) {
     l->count = candidates->count < l->capacity ? candidates->count : l->capacity;
     l->longest_px = 0.0;
+    int fits = l->most_fits > 0 && l->most_fits < l->count ? l->most_fits : l->count;
+    choose(l, candidates, fits);
     loop p = {l, f, candidates, NULL, 0};
-    bst_parallel_for(l->pool, l->count, STARTS_A_TIME, start_some, &p);
+    bst_parallel_for(f->pool, l->count, STARTS_A_TIME, start_some, &p);
     for (int i = 0; i < l->count; i++) {
         note_length(l, &l->found[i].source.shape);
     }
@@ -316,17 +395,35 @@ void bst_locate(bst_locator *l, const bst_locate_frame *f, const bst_candidates 
     bst_sharpness_set(&l->sharpness, &l->psf, f->sigma_px);
     bst_profiles_set(&l->profiles, &l->psf, f->sigma_px);
     bst_charge_remove(l, f);
-    for (int first = 0, end; first < l->count; first = end) {
-        end = first < FIRST_GROUP ? FIRST_GROUP : 3 * first;
-        end = end < l->count ? end : l->count;
+    for (int first = 0, end; first < fits; first = end) {
+        end = group_end(first) < fits ? group_end(first) : fits;
         do_all(l, f, first, end, first_fit);
         for (int i = first; i < end; i++) {
             note_widening(l, f, &l->found[i]);
         }
     }
-    bst_company_drop_doubles(l, f);
-    do_all(l, f, 0, l->count, second_fit);
+    bst_company_drop_doubles(l, f, fits);
+    if (fits < l->count) {
+        set_laws(l, f);
+        do_all(l, f, fits, l->count, place);
+    }
+    do_all(l, f, 0, fits, second_fit);
     do_all(l, f, 0, l->count, finish);
+}
+
+void bst_locate_again(bst_locator *l, const bst_locate_frame *f, int i) {
+    bst_worker w = {l, f, &l->fits[0]};
+    bst_found found = l->found[i];
+    if (!found.rough || found.dropped) {
+        return;
+    }
+    found.rough = false;
+    found.flags = 0;
+    first_fit(&w, i, &found);
+    if (found.source.fitted) {
+        finish(&w, i, &found);
+        l->found[i] = found;
+    }
 }
 
 /* A found one that is not fitted. */
@@ -347,6 +444,7 @@ static void start_roughly(void *user, int begin, int end) {
 void bst_locate_roughly(bst_locator *l, const bst_locate_frame *f,
                         const bst_candidates *candidates) {
     l->count = candidates->count < l->capacity ? candidates->count : l->capacity;
+    choose(l, candidates, l->count);
     loop p = {l, f, candidates, NULL, 0};
-    bst_parallel_for(l->pool, l->count, STARTS_A_TIME, start_roughly, &p);
+    bst_parallel_for(f->pool, l->count, STARTS_A_TIME, start_roughly, &p);
 }

@@ -19,6 +19,11 @@ static const bst_config_desc bad_pixel_table[] = {
 const bst_config_desc bst_imgproc_config_table[] = {
     BST_INT(bst_imgproc_config, capacity, "", 1, 65536, "2048",
             "Detections kept per frame, the brightest first."),
+    BST_INT(
+        bst_imgproc_config, most_fits, "", 0, 65536, "2048",
+        "Detections per frame that are located by maximum likelihood, the brightest first, beside "
+        "those that are taken for objects; the others stand at the matched filter's greatest "
+        "output. 0: all."),
     BST_INT(bst_imgproc_config, mesh_px, "px", 8, 1024, "64",
             "Side of the meshes in which background and noise are estimated."),
     BST_REAL(bst_imgproc_config, false_alarms_per_frame, "", 1e-6, 1e4, "1",
@@ -378,6 +383,11 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
     }
     if (!smeared) {
         bst_discriminator_label(m->discriminator, &known, out);
+        for (int i = 0; i < out->count; i++) {
+            if (out->items[i].label == BST_LABEL_OBJECT) {
+                bst_imgproc_refine(l->ip, out, i);
+            }
+        }
     }
     if (out->stars_identified == 0) {
         bst_step_count(step, "frame_without_stars");

@@ -147,37 +147,6 @@ void bst_psf_render(const bst_psf *psf, const bst_shape *shape, const bst_stamp 
     }
 }
 
-void bst_psf_render_motion(const bst_psf *psf, const bst_shape *shape, const bst_stamp *stamp,
-                           double ex, double ey, double *share, double *by_x, double *by_y,
-                           double *by_variance, double *const by_motion[3]) {
-    bst_psf_render(psf, shape, stamp, share, by_x, by_y, by_variance);
-    size_t bytes = (size_t)stamp->width * (size_t)stamp->height * sizeof(double);
-    for (int m = 0; m < 3; m++) {
-        memset(by_motion[m], 0, bytes);
-    }
-    int nodes = node_count(shape);
-    const double *node = psf->node + nodes * (nodes - 1) / 2;
-    const double *weight = psf->weight + nodes * (nodes - 1) / 2;
-    profile px, py;
-    for (int k = 0; k < nodes; k++) {
-        double bow = 6.0 * node[k] * node[k] - 0.5;
-        double x = shape->x_px + node[k] * shape->dx_px + bow * shape->bend_x_px;
-        double y = shape->y_px + node[k] * shape->dy_px + bow * shape->bend_y_px;
-        make_profile(psf, x - stamp->x0, shape->sigma_px, stamp->width, &px);
-        make_profile(psf, y - stamp->y0, shape->sigma_px, stamp->height, &py);
-        for (int j = 0; j < py.count; j++) {
-            double p = weight[k] * py.share[j], d = weight[k] * py.slope[j];
-            size_t row = (size_t)(py.first + j) * (size_t)stamp->width + (size_t)px.first;
-            for (int i = 0; i < px.count; i++) {
-                double sx = p * px.slope[i], sy = d * px.share[i], along = ex * sx + ey * sy;
-                by_motion[0][row + (size_t)i] += node[k] * along;
-                by_motion[1][row + (size_t)i] += node[k] * (ex * sy - ey * sx);
-                by_motion[2][row + (size_t)i] += bow * along;
-            }
-        }
-    }
-}
-
 void bst_shape_path_variance(const bst_shape *s, double out[3]) {
     out[0] = s->dx_px * s->dx_px / 12.0 + s->bend_x_px * s->bend_x_px / 5.0;
     out[1] = s->dx_px * s->dy_px / 12.0 + s->bend_x_px * s->bend_y_px / 5.0;

@@ -43,12 +43,6 @@ void bst_psf_init(bst_psf *psf);
 void bst_psf_render(const bst_psf *psf, const bst_shape *shape, const bst_stamp *stamp,
                     double *share, double *by_x, double *by_y, double *by_variance);
 
-/* The same, and the derivatives by the parts of the path that all streaks of a frame share:
- * by_motion[0] by the path's length in direction (ex, ey), [1] by its end minus start across that,
- * (-ey, ex), [2] by the bend in direction (ex, ey). */
-void bst_psf_render_motion(const bst_psf *psf, const bst_shape *shape, const bst_stamp *stamp,
-                           double ex, double ey, double *share, double *by_x, double *by_y,
-                           double *by_variance, double *const by_motion[3]);
 /* Along one axis: the pixel-integrated Gaussian about `centre` on pixels 0 to side - 1 (at most
  * BST_PSF_MAX_SIDE), and its first and second derivative by the centre; 0 beyond 6 sigma. */
 void bst_psf_profile(const bst_psf *psf, double centre, double sigma, int side, double *share,

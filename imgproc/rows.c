@@ -2,6 +2,9 @@
 
 #include <math.h>
 #include <string.h>
+#ifdef __SSE__
+#include <xmmintrin.h>
+#endif
 
 #include "imgproc/background.h"
 #include "imgproc/lanes.h"
@@ -120,11 +123,35 @@ static uint16_t greatest(const uint16_t *raw, int count) {
     return top;
 }
 
-/* What is written next is fetched meanwhile. */
+/* Lanes to memory that lies on 16 bytes, past the caches: it is not read first, as it is when a
+ * part of a line is written. */
+static inline __attribute__((always_inline)) void stream(float *to, const bst_lanes *v) {
+#ifdef __SSE__
+    __m128 part[BST_LANES / 4];
+    memcpy(part, v, sizeof part);
+    for (int k = 0; k < BST_LANES / 4; k++) {
+        _mm_stream_ps(to + 4 * k, part[k]);
+    }
+#else
+    BST_STORE(to, *v);
+#endif
+}
+
+/* Makes what was streamed visible to other threads. */
+static inline void end_stream(void) {
+#ifdef __SSE__
+    _mm_sfence();
+#endif
+}
+
+static bool may_stream(const float *to) {
+    return (uintptr_t)to % 16 == 0;
+}
+
 BST_CLONES
 static void take_level_off(const float *electrons, const bst_row_part *parts, int count,
-                           float *signal, float *normalised) {
-    int x = 0, width = count > 0 ? parts[count - 1].end : 0;
+                           bool past_cache, float *signal, float *normalised) {
+    int x = 0;
     bst_lanes column;
     for (int i = 0; i < BST_LANES; i++) {
         column[i] = (float)i;
@@ -132,7 +159,6 @@ static void take_level_off(const float *electrons, const bst_row_part *parts, in
     for (int i = 0; i < count; i++) {
         bst_row_part p = parts[i];
         for (; x + BST_LANES <= p.end; x += BST_LANES) {
-            __builtin_prefetch(signal + x + width, 1);
             bst_lanes value = BST_LOAD(electrons + x), at = column + (float)x;
             bst_lanes difference = value - (p.level + p.level_slope * at);
             bst_lanes n = difference * (p.inverse + p.inverse_slope * at);
@@ -140,8 +166,13 @@ static void take_level_off(const float *electrons, const bst_row_part *parts, in
             bst_lanes bad = {0};
             bad += BST_PIXEL_BAD;
             BST_STORE(normalised + x, (bst_lanes)((bst_lane_ints)n & good));
-            BST_STORE(signal + x, (bst_lanes)(((bst_lane_ints)difference & good) |
-                                              ((bst_lane_ints)bad & ~good)));
+            bst_lanes kept =
+                (bst_lanes)(((bst_lane_ints)difference & good) | ((bst_lane_ints)bad & ~good));
+            if (past_cache) {
+                stream(signal + x, &kept);
+            } else {
+                BST_STORE(signal + x, kept);
+            }
         }
         for (; x < p.end; x++) {
             float value = electrons[x], at = (float)x;
@@ -154,9 +185,18 @@ static void take_level_off(const float *electrons, const bst_row_part *parts, in
 }
 
 void bst_row_normalise(const uint16_t *raw, const float *electrons, const bst_row_part *parts,
-                       int count, int saturated_dn, float *signal, float *normalised) {
+                       int count, int saturated_dn, bool past_cache, float *signal,
+                       float *normalised) {
     int width = count > 0 ? parts[count - 1].end : 0;
-    take_level_off(electrons, parts, count, signal, normalised);
+    /* parts begin where they like: all of them do on four pixels where the meshes are of eight */
+    bool stream_it = past_cache && may_stream(signal);
+    for (int i = 0; i + 1 < count; i++) {
+        stream_it = stream_it && parts[i].end % 4 == 0;
+    }
+    take_level_off(electrons, parts, count, stream_it, signal, normalised);
+    if (stream_it) {
+        end_stream();
+    }
     int first = greatest(raw, width) >= saturated_dn ? 0 : width;
     for (int x = first; x < width; x++) {
         if (raw[x] >= saturated_dn && signal[x] > BST_PIXEL_NONE) {
@@ -277,15 +317,13 @@ void bst_row_combine(float *restrict out, int count, const float *const *in, con
 }
 
 BST_CLONES
-void bst_row_streak(float *out, size_t stride, int count, const float *const *in,
-                    const float *weight, int taps, const float *floor) {
+void bst_row_streak(float *out, float *copy, int count, const float *const *in, const float *weight,
+                    int taps, const float *floor) {
     enum { STEP = 4 * BST_LANES };
     int x = 0;
+    bool streamed = copy && may_stream(copy);
     for (; x + STEP <= count; x += STEP) {
         bst_lanes a = {0}, b = {0}, c = {0}, d = {0};
-        for (int k = 0; k < 4; k++) {
-            __builtin_prefetch(out + stride + x + k * BST_LANES, 1);
-        }
         for (int t = 0; t < taps; t++) {
             const float *row = in[t] + x;
             float w = weight[t];
@@ -303,13 +341,26 @@ void bst_row_streak(float *out, size_t stride, int count, const float *const *in
         BST_STORE(out + x + BST_LANES, b);
         BST_STORE(out + x + 2 * BST_LANES, c);
         BST_STORE(out + x + 3 * BST_LANES, d);
+        if (streamed) {
+            stream(copy + x, &a);
+            stream(copy + x + BST_LANES, &b);
+            stream(copy + x + 2 * BST_LANES, &c);
+            stream(copy + x + 3 * BST_LANES, &d);
+        }
     }
+    if (streamed) {
+        end_stream();
+    }
+    int whole = streamed ? x : 0;
     for (; x < count; x++) {
         float sum = 0.0f;
         for (int t = 0; t < taps; t++) {
             sum += weight[t] * in[t][x];
         }
         out[x] = sum > floor[x] ? sum : floor[x];
+    }
+    if (copy) {
+        memcpy(copy + whole, out + whole, (size_t)(count - whole) * sizeof *out);
     }
 }
 

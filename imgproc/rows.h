@@ -38,9 +38,11 @@ typedef struct bst_row_part {
 
 /* Takes the level off a row of electrons: signal = electrons - level, but BST_PIXEL_SATURATED where
  * raw >= saturated_dn; normalised = signal / noise (saturated pixels with their value), 0 where a
- * pixel is bad. The first part begins at column 0. The rows may not overlap. */
+ * pixel is bad. The first part begins at column 0. The rows may not overlap. past_cache: signal is
+ * not wanted soon. */
 void bst_row_normalise(const uint16_t *raw, const float *electrons, const bst_row_part *parts,
-                       int count, int saturated_dn, float *signal, float *normalised);
+                       int count, int saturated_dn, bool past_cache, float *signal,
+                       float *normalised);
 
 /* out[x] = weight[0] * in[0][x] + sum of weight[t] * (in[-t][x] + in[t][x]), t from 1 to radius */
 void bst_row_even(float *out, int count, const float *const *in, const float *weight, int radius);
@@ -52,10 +54,10 @@ void bst_row_even_4(float *out, size_t stride, int count, const float *const *in
 /* out[x] = sum over taps of weight[t] * in[t][x] */
 void bst_row_combine(float *out, int count, const float *const *in, const float *weight, int taps);
 
-/* out[x] = the greater of floor[x] and the sum over taps of weight[t] * in[t][x]; what lies
- * `stride` floats on is to be written next. */
-void bst_row_streak(float *out, size_t stride, int count, const float *const *in,
-                    const float *weight, int taps, const float *floor);
+/* out[x] = the greater of floor[x] and the sum over taps of weight[t] * in[t][x]. The same goes to
+ * `copy`, which is not wanted soon, unless that is NULL. */
+void bst_row_streak(float *out, float *copy, int count, const float *const *in, const float *weight,
+                    int taps, const float *floor);
 
 /* Writes the places and values of the elements above the threshold (> 0) that exceed their eight
  * neighbours (of equals the first in row-major order); returns how many. On

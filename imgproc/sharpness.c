@@ -61,20 +61,33 @@ void bst_sharpness_set(bst_sharpness *s, const bst_psf *psf, double sigma_px) {
             s->floor[g] = fmin(s->floor[g], ratio);
         }
     }
+    for (int g = 0; g < BST_SHARP_GROUPS; g++) {
+        const neighbour *n = &neighbours[first_of[g]];
+        s->factor[g] = (float)(s->ratio[n->dy + 1][n->dx + 1] * s->inverse_square[g]);
+        s->share[g] = (float)(s->inverse_square[0] / s->inverse_square[g]);
+        /* a little less than in double precision */
+        double noise = sqrt(s->floor[g] * s->floor[g] + s->inverse_square[g]);
+        s->deviation[g] = (float)(0.999 * BST_SHARP_DEVIATION * noise);
+    }
 }
 
-/* Whether one of the pairs about a pixel inside the frame is short of what light would leave there,
- * or is not measured: the quick answer for almost all pixels. */
-static bool is_suspicious(const bst_sharpness *s, const float *pixel, int stride) {
-    bool short_of = false;
-    for (int g = 1; g < BST_SHARP_GROUPS; g++) {
-        const neighbour *n = &neighbours[first_of[g]];
-        float ratio = (float)s->ratio[n->dy + 1][n->dx + 1];
-        float pair = pixel[n->dy * stride + n->dx] + pixel[-n->dy * stride - n->dx];
-        short_of |=
-            pair * ratio * (float)s->inverse_square[g] < 1.001f * (float)s->floor[g] * *pixel;
+bool bst_sharpness_is_open(const bst_sharpness *s, const float *signal, int width, int height,
+                           float noise_e, int x, int y) {
+    if (x < 1 || y < 1 || x + 1 >= width || y + 1 >= height) {
+        return true;
     }
-    return short_of;
+    const float *pixel = signal + (long)y * width + x, *above = pixel - width,
+                *below = pixel + width;
+    float c = *pixel, e1 = (pixel[-1] + pixel[1]) * s->factor[1],
+          e2 = (above[0] + below[0]) * s->factor[2], e3 = (above[-1] + below[1]) * s->factor[3],
+          e4 = (above[1] + below[-1]) * s->factor[4];
+    float all = (e1 * s->share[1] + e2 * s->share[2]) + (e3 * s->share[3] + e4 * s->share[4]);
+    float f0 = (float)s->floor[0], f1 = (float)s->floor[1], f2 = (float)s->floor[2],
+          f3 = (float)s->floor[3], f4 = (float)s->floor[4];
+    /* the light's own noise and the model's error would add to the deviations */
+    return (f0 * c - all > noise_e * s->deviation[0]) | (f1 * c - e1 > noise_e * s->deviation[1]) |
+           (f2 * c - e2 > noise_e * s->deviation[2]) | (f3 * c - e3 > noise_e * s->deviation[3]) |
+           (f4 * c - e4 > noise_e * s->deviation[4]);
 }
 
 double bst_sharpness_at(const bst_sharpness *s, const float *signal, int width, int height,
@@ -84,10 +97,6 @@ double bst_sharpness_at(const bst_sharpness *s, const float *signal, int width, 
     }
     double centre = (double)signal[(long)y * width + x];
     if (!(centre > 3.0 * noise_e)) {
-        return 0.0;
-    }
-    bool inside = x > 0 && y > 0 && x + 1 < width && y + 1 < height;
-    if (inside && !is_suspicious(s, signal + (long)y * width + x, width)) {
         return 0.0;
     }
     double at[3][3], worst = 0.0, noise2 = noise_e * noise_e;

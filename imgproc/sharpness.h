@@ -12,6 +12,8 @@
 #ifndef BST_IMGPROC_SHARPNESS_H
 #define BST_IMGPROC_SHARPNESS_H
 
+#include <stdbool.h>
+
 #include "imgproc/psf.h"
 
 enum { BST_SHARP_GROUPS = 5 };
@@ -22,6 +24,9 @@ typedef struct bst_sharpness {
     double inverse_square[BST_SHARP_GROUPS]; /* 1 / sum r^2 of the group */
     double cube[BST_SHARP_GROUPS];           /* sum r^3 (inverse_square)^2 */
     double floor[BST_SHARP_GROUPS];          /* s */
+    /* for bst_sharpness_is_open: factor of each pair's sum in its estimate, share of the pairs'
+     * estimates in that of all, and the deviation of each group over the noise */
+    float factor[BST_SHARP_GROUPS], share[BST_SHARP_GROUPS], deviation[BST_SHARP_GROUPS];
 } bst_sharpness;
 
 /* Deviation from which a pixel is taken for charge: one star in several thousand reaches it. */
@@ -29,6 +34,11 @@ typedef struct bst_sharpness {
 
 /* Prepares the ratios for a PSF of sigma_px; at once when they are already there. */
 void bst_sharpness_set(bst_sharpness *sharpness, const bst_psf *psf, double sigma_px);
+
+/* Quick: false where bst_sharpness_at is sure to be below BST_SHARP_DEVIATION. (x, y) inside the
+ * frame. */
+bool bst_sharpness_is_open(const bst_sharpness *sharpness, const float *signal, int width,
+                           int height, float noise_e, int x, int y);
 
 /* How far, in standard deviations, the pixel (x, y) of signal [height][width] stands out of what
  * light could do; 0 or less: not at all. Neighbours outside or without a measurement speak for

@@ -14,7 +14,6 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "imgproc/background.h"
 #include "sim/core/config.h"
 #include "sim/core/vec.h"
 #include "sim/world/camera.h"
@@ -33,7 +32,7 @@ extern const bst_config_desc bst_stack_config_table[];
  * frame. */
 typedef struct bst_stack_frame {
     const float *signal; /* [height][width]: electrons above the background, or BST_PIXEL_... */
-    const bst_background *background;
+    const struct bst_background *background;
     int width, height;
     double sigma_px; /* of the PSF, in this frame's pixels */
     double time_s;   /* middle of the exposure */

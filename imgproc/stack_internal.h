@@ -2,6 +2,7 @@
 #ifndef BST_IMGPROC_STACK_INTERNAL_H
 #define BST_IMGPROC_STACK_INTERNAL_H
 
+#include "imgproc/background.h"
 #include "imgproc/stack.h"
 #include "imgproc/streak_map.h"
 #include "sim/core/parallel.h"

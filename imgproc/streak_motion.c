@@ -2,6 +2,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* Streaks fainter than this say nothing beside bright ones. */
 static const double LEAST_SNR = 20.0;
@@ -10,9 +11,11 @@ static const double ALONE_SHARE = 0.02;
 static const double LEAST_PATH_SIGMAS = 4.0;
 /* More of the path than this, and a bend is no correction to an even motion. */
 static const double MOST_BEND = 0.1;
+/* A motion that was this nearly right needs no third round. */
+static const double SMALL_STEP_PX = 0.2;
 /* Chi-square, COMMON degrees of freedom, of what a star wants against what all agree on. */
 static const double REJECT_CHI2 = 25.0;
-enum { COMMON = BST_STREAK_MOTION_COUNT, LOCAL = 4, HELD = 1, ROUNDS = 5 };
+enum { COMMON = BST_STREAK_MOTION_COUNT, LOCAL = 4, ROUNDS = 4 };
 /* Brightest candidates among which stars that stand alone are looked for. */
 enum { LOOKED_AT = 16 * BST_STREAK_MOTION_STARS };
 
@@ -30,13 +33,20 @@ typedef struct star {
 } star;
 
 bst_status bst_streak_motion_create(bst_ctx *ctx, int max_side, bst_streak_motion *out) {
-    out->max_pixels = max_side * max_side;
-    out->render = calloc((size_t)out->max_pixels * (4 + COMMON), sizeof *out->render);
-    return out->render ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory to measure motion");
+    out->max_side = max_side;
+    size_t plane = (size_t)max_side * (size_t)bst_lanes_up(max_side);
+    out->planes = calloc(plane * (BST_IMAGE_MOTION_PLANES + 2), sizeof *out->planes);
+    out->scratch = calloc(bst_image_scratch(max_side), sizeof *out->scratch);
+    if (!out->planes || !out->scratch) {
+        bst_streak_motion_free(out);
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory to measure motion");
+    }
+    return BST_OK;
 }
 
 void bst_streak_motion_free(bst_streak_motion *work) {
-    free(work->render);
+    free(work->planes);
+    free(work->scratch);
     *work = (bst_streak_motion){0};
 }
 
@@ -82,20 +92,20 @@ static bool start_star(const bst_streak_motion *work, const bst_locate_frame *f,
     if (!(c->snr > bst_filter_point_at(f->filter, c->x, c->y))) {
         return false;
     }
-    *out = (star){.shape = *path, .start_x = c->x, .start_y = c->y, .used = true};
-    out->shape.x_px = c->x;
-    out->shape.y_px = c->y;
+    double dx, dy, snr = bst_filter_top(f->filter, false, c->x, c->y, &dx, &dy);
+    *out = (star){.shape = *path, .start_x = c->x + dx, .start_y = c->y + dy, .used = true};
+    out->shape.x_px = out->start_x;
+    out->shape.y_px = out->start_y;
     bst_motion_streak(f->motion, f->camera, f->origin_x_px + f->binning * c->x,
                       f->origin_y_px + f->binning * c->y, &out->shape.dx_px, &out->shape.dy_px);
     out->shape.dx_px /= f->binning;
     out->shape.dy_px /= f->binning;
     out->noise_e = bst_background_noise_at(f->background, c->x, c->y);
-    out->flux_e = (double)c->snr * out->noise_e / f->filter->streak_norm;
+    out->flux_e = snr * out->noise_e / f->filter->streak_norm;
     bst_source source = {.shape = out->shape};
-    out->stamp = bst_fit_stamp(&source, reach(f), BST_PSF_MAX_SIDE, f->width, f->height);
+    out->stamp = bst_fit_stamp(&source, reach(f), work->max_side, f->width, f->height);
     double margin = 0.5 * hypot(out->shape.dx_px, out->shape.dy_px);
-    return out->stamp.width * out->stamp.height <= work->max_pixels &&
-           is_alone(f, candidates, rank, &out->stamp, margin);
+    return is_alone(f, candidates, rank, &out->stamp, margin);
 }
 
 /* Solves a x = v for a symmetric positive definite matrix of order n and `count` right-hand sides,
@@ -129,42 +139,86 @@ static bool solve(int n, double a[LOCAL][LOCAL], int count, double x[][LOCAL]) {
     return true;
 }
 
+enum { ALL = LOCAL + COMMON, SUMS = ALL * (ALL + 3) / 2 };
+
+/* Sums over the pixels of a star's planes: of each parameter p those with q <= p, then that with
+ * the residual. Parameters: x, y, flux, flux times widening, then the motion's. */
+BST_CLONES
+static void sum_star(const float *planes, int n, float flux, float product, float noise2,
+                     float *out) {
+    bst_lanes sum[SUMS];
+    for (int k = 0; k < SUMS; k++) {
+        sum[k] = (bst_lanes){0};
+    }
+    for (int i = 0; i < n; i += BST_LANES) {
+        const float *m = planes + i;
+        bst_lanes j[ALL] = {flux * BST_LOAD(m + n), flux * BST_LOAD(m + 2 * n), BST_LOAD(m),
+                            BST_LOAD(m + 3 * n)};
+        for (int k = 0; k < COMMON; k++) {
+            j[LOCAL + k] = flux * BST_LOAD(m + (LOCAL + k) * n);
+        }
+        bst_lanes total = flux * j[2] + product * j[3];
+        bst_lanes valid = BST_LOAD(m + (BST_IMAGE_MOTION_PLANES + 1) * n);
+        bst_lanes weight = valid / (noise2 + BST_ABOVE_0(total));
+        bst_lanes r = BST_LOAD(m + BST_IMAGE_MOTION_PLANES * n) - total;
+        int k = 0;
+        for (int p = 0; p < ALL; p++) {
+            bst_lanes w = weight * j[p];
+            for (int q = 0; q <= p; q++) {
+                sum[k++] += w * j[q];
+            }
+            sum[k++] += w * r;
+        }
+    }
+    for (int k = 0; k < SUMS; k++) {
+        BST_STORE(out + k * BST_LANES, sum[k]);
+    }
+}
+
+/* The star's pixels, all of which measure, behind its planes. */
+static void load_pixels(const bst_locate_frame *f, const bst_stamp *stamp, float *value) {
+    int stride = bst_lanes_up(stamp->width), n = stride * stamp->height;
+    float valid[BST_PSF_MAX_SIDE + BST_LANES];
+    for (int x = 0; x < stride; x++) {
+        valid[x] = x < stamp->width ? 1.0f : 0.0f;
+    }
+    for (int y = 0; y < stamp->height; y++) {
+        const float *row =
+            f->signal + (size_t)(stamp->y0 + y) * (size_t)f->width + (size_t)stamp->x0;
+        float *to = value + y * stride;
+        memset(to + stride - BST_LANES, 0, BST_LANES * sizeof *to);
+        memcpy(to, row, (size_t)stamp->width * sizeof *to);
+        memcpy(to + n, valid, (size_t)stride * sizeof *to);
+    }
+}
+
 /* Normal equations of one star at the present motion. */
-static bool accumulate(const bst_streak_motion *work, const bst_psf *psf, const bst_locate_frame *f,
-                       double ex, double ey, star *s) {
-    size_t n = (size_t)s->stamp.width * (size_t)s->stamp.height;
-    double *m = work->render, *const by_motion[COMMON] = {m + 4 * n, m + 5 * n, m + 6 * n};
-    bst_psf_render_motion(psf, &s->shape, &s->stamp, ex, ey, m, m + n, m + 2 * n, m + 3 * n,
-                          by_motion);
+static bool accumulate(const bst_streak_motion *work, const bst_psf *psf,
+                       const bst_profiles *profiles, const bst_locate_frame *f, double ex,
+                       double ey, star *s) {
+    int n = bst_lanes_up(s->stamp.width) * s->stamp.height;
+    bst_image_render_motion(profiles, psf, &s->shape, &s->stamp, ex, ey, work->scratch,
+                            work->planes);
+    load_pixels(f, &s->stamp, work->planes + BST_IMAGE_MOTION_PLANES * n);
+    float sums[SUMS * BST_LANES];
+    sum_star(work->planes, n, (float)s->flux_e, (float)s->product_e,
+             (float)(s->noise_e * s->noise_e), sums);
     double a[LOCAL][LOCAL] = {{0}}, right[1 + COMMON][LOCAL] = {{0}};
     double common[COMMON][COMMON] = {{0}}, g[COMMON] = {0};
-    for (size_t i = 0; i < n; i++) {
-        size_t y = i / (size_t)s->stamp.width, x = i % (size_t)s->stamp.width;
-        double value =
-            (double)
-                f->signal[((size_t)s->stamp.y0 + y) * (size_t)f->width + (size_t)s->stamp.x0 + x];
-        double total = s->flux_e * m[i] + s->product_e * m[3 * n + i];
-        double weight = 1.0 / (s->noise_e * s->noise_e + fmax(total, 0.0));
-        double r = value - total;
-        double j[LOCAL] = {s->flux_e * m[n + i], s->flux_e * m[2 * n + i], m[i], m[3 * n + i]};
-        double c[COMMON];
-        for (int k = 0; k < COMMON; k++) {
-            c[k] = s->flux_e * by_motion[k][i];
-            g[k] += weight * c[k] * r;
-            for (int l = 0; l <= k; l++) {
-                common[k][l] += weight * c[k] * c[l];
+    const float *at = sums;
+    for (int p = 0; p < ALL; p++) {
+        for (int q = 0; q <= p; q++, at += BST_LANES) {
+            double v = bst_lane_sum(at);
+            if (p < LOCAL) {
+                a[p][q] = v;
+            } else if (q < LOCAL) {
+                right[1 + p - LOCAL][q] = v;
+            } else {
+                common[p - LOCAL][q - LOCAL] = v;
             }
         }
-        for (int p = 0; p < LOCAL; p++) {
-            double w = weight * j[p];
-            right[0][p] += w * r;
-            for (int k = 0; k < COMMON; k++) {
-                right[1 + k][p] += w * c[k];
-            }
-            for (int q = 0; q <= p; q++) {
-                a[p][q] += w * j[q];
-            }
-        }
+        *(p < LOCAL ? &right[0][p] : &g[p - LOCAL]) = bst_lane_sum(at);
+        at += BST_LANES;
     }
     for (int r = 0; r <= COMMON; r++) {
         for (int p = 0; p < LOCAL; p++) {
@@ -265,7 +319,7 @@ static void reject(star *stars, int count, const double step[COMMON]) {
     }
 }
 
-bool bst_streak_motion_measure(bst_streak_motion *work, const bst_psf *psf,
+bool bst_streak_motion_measure(bst_streak_motion *work, const bst_psf *psf, bst_profiles *profiles,
                                const bst_locate_frame *f, const bst_candidates *candidates,
                                double length_px, double bend_px, bst_motion *motion) {
     if (!f->motion || !f->filter->streak) {
@@ -283,6 +337,7 @@ bool bst_streak_motion_measure(bst_streak_motion *work, const bst_psf *psf,
     if (!(length >= LEAST_PATH_SIGMAS * f->sigma_px * f->binning) || bend > MOST_BEND * length) {
         return false;
     }
+    bst_profiles_set(profiles, psf, f->sigma_px);
     star stars[BST_STREAK_MOTION_STARS];
     int count = 0;
     for (int k = 0; k < candidates->count && k < LOOKED_AT && count < BST_STREAK_MOTION_STARS;
@@ -301,9 +356,9 @@ bool bst_streak_motion_measure(bst_streak_motion *work, const bst_psf *psf,
     for (int round = 0; round < ROUNDS; round++) {
         double step[COMMON] = {0};
         for (int i = 0; i < count; i++) {
-            stars[i].used = stars[i].used && accumulate(work, psf, f, ex, ey, &stars[i]);
+            stars[i].used = stars[i].used && accumulate(work, psf, profiles, f, ex, ey, &stars[i]);
         }
-        if (round >= HELD && !agree(stars, count, sigma, away, step)) {
+        if (!agree(stars, count, sigma, away, step)) {
             return false;
         }
         if (round == ROUNDS - 2) {
@@ -317,8 +372,13 @@ bool bst_streak_motion_measure(bst_streak_motion *work, const bst_psf *psf,
             stars[i].used = stars[i].used && advance(&stars[i], step, ex, ey);
             left += stars[i].used;
         }
+        bool small = true;
         for (int k = 0; k < COMMON; k++) {
             away[k] += step[k];
+            small = small && fabs(step[k]) < SMALL_STEP_PX;
+        }
+        if (small && round < ROUNDS - 3) {
+            round = ROUNDS - 3;
         }
     }
     if (left == 0) {

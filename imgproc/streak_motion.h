@@ -10,8 +10,9 @@ enum {
 };
 
 typedef struct bst_streak_motion {
-    int max_pixels; /* of a stamp */
-    double *render; /* [4 + BST_STREAK_MOTION_COUNT][max_pixels] */
+    int max_side;  /* of a stamp */
+    float *planes; /* of bst_image_render_motion; then the pixels, and 1 where there is one */
+    float *scratch;
 } bst_streak_motion;
 
 bst_status bst_streak_motion_create(bst_ctx *ctx, int max_side,
@@ -28,8 +29,8 @@ void bst_streak_motion_free(bst_streak_motion *work);
  * path's length and direction, bend_px of the bend. *motion: a copy of frame->motion, corrected.
  * False, and nothing changed, when stars are points or their streaks too short to tell (4 sigma of
  * the PSF), when frame->motion bends by more than a tenth of its length (the camera was starting or
- * stopping), or when no streak is bright enough. */
-bool bst_streak_motion_measure(bst_streak_motion *work, const bst_psf *psf,
+ * stopping), or when no streak is bright enough. `profiles` are made for the frame's sigma. */
+bool bst_streak_motion_measure(bst_streak_motion *work, const bst_psf *psf, bst_profiles *profiles,
                                const bst_locate_frame *frame, const bst_candidates *candidates,
                                double length_px, double bend_px, bst_motion *motion);
 

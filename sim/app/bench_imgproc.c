@@ -4,11 +4,13 @@
 
 #include "imgproc/imgproc.h"
 #include "sim/app/bench_scenes.h"
+#include "sim/core/pages.h"
 #include "sim/device/device.h"
 
 enum { KEPT = 4, WARM_UP = 4, CALLS = 24, SMALL_CALLS = 2000, SMALL_PX = 512 * 512 };
+enum { FITS = 2048, ALL = 40000 }; /* FITS: the default capacity too */
 
-static const char PREFIX[] = "imgproc_";
+static const char PREFIX[] = "imgproc_", CROWDED[] = "imgproc_crowded";
 
 typedef struct shot {
     uint16_t *pixels;
@@ -41,7 +43,7 @@ static bst_status motion_of(bst_ctx *ctx, const bst_bench_view *v, bst_motion *o
 static bst_status keep_frame(bst_ctx *ctx, bst_renderer *renderer, shots *s, int n) {
     size_t bytes = (size_t)s->view.window.width * (size_t)s->view.window.height * sizeof(uint16_t);
     bst_bench_view_set(&s->view, n);
-    s->items[n].pixels = malloc(bytes);
+    s->items[n].pixels = bst_pages_alloc(bytes); /* as those of a device are */
     if (!s->items[n].pixels) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the frames of a scene");
     }
@@ -76,10 +78,11 @@ static bst_status render(bst_ctx *ctx, const bst_bench_options *options, shots *
     return status;
 }
 
-static bst_status process(bst_ctx *ctx, const bst_bench_options *options, shots *s,
+static bst_status process(bst_ctx *ctx, const bst_bench_options *options, shots *s, int room,
                           bst_bench_result *out) {
     const bst_camera *camera = &s->view.camera;
-    bst_imgproc_config config = {.capacity = 2048,
+    bst_imgproc_config config = {.capacity = room,
+                                 .most_fits = FITS,
                                  .mesh_px = 64,
                                  .false_alarms_per_frame = 1.0,
                                  .jitter_px = s->view.scene.jitter_px,
@@ -127,7 +130,9 @@ static bst_status process(bst_ctx *ctx, const bst_bench_options *options, shots 
 
 bst_status bst_bench_imgproc(bst_ctx *ctx, const bst_bench *self, const bst_bench_options *options,
                              bst_bench_result *out) {
-    const bst_bench_scene *scene = bst_bench_find_scene(self->name + strlen(PREFIX));
+    bool crowded = strcmp(self->name, CROWDED) == 0;
+    const bst_bench_scene *scene =
+        bst_bench_find_scene(crowded ? "galactic_core" : self->name + strlen(PREFIX));
     if (!scene) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "there is no scene for \"%s\"", self->name);
     }
@@ -137,7 +142,7 @@ bst_status bst_bench_imgproc(bst_ctx *ctx, const bst_bench *self, const bst_benc
         status = render(ctx, options, &s);
     }
     if (status == BST_OK) {
-        status = process(ctx, options, &s, out);
+        status = process(ctx, options, &s, crowded ? ALL : FITS, out);
     }
     for (int n = 0; n < KEPT; n++) {
         free(s.items[n].pixels);

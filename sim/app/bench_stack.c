@@ -2,6 +2,7 @@
  * the search's share included. */
 #include <stdlib.h>
 
+#include "imgproc/background.h"
 #include "imgproc/stack.h"
 #include "sim/app/bench.h"
 #include "sim/core/rng.h"

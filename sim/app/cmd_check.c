@@ -5,6 +5,7 @@
 
 #include "sim/app/app.h"
 #include "sim/app/load.h"
+#include "sim/app/plugins.h"
 #include "sim/engine/simulation.h"
 
 static int print_json(cJSON *node) {
@@ -100,5 +101,12 @@ int bst_cmd_schema(int argc, char **argv) {
             "  {\"$schema\": \"boresight.schema.json\", \"boresight\": 1, ...}\n");
         return BST_EXIT_OK;
     }
-    return print_json(bst_scenario_schema(bst_app_registry()));
+    bst_registry registry;
+    if (bst_plugins_registry(&ctx, &registry) != BST_OK) {
+        fprintf(stderr, "boresight: %s\n", ctx.message);
+        return BST_EXIT_FAILED;
+    }
+    int code = print_json(bst_scenario_schema(&registry));
+    bst_plugins_free(&registry);
+    return code;
 }

@@ -10,8 +10,8 @@
 #include <cjson/cJSON.h>
 
 #include "sim/app/export.h"
+#include "sim/app/plugins.h"
 #include "sim/app/progress.h"
-#include "sim/app/registry.h"
 #include "sim/app/run_observations.h"
 #include "sim/io/czml_writer.h"
 #include "sim/io/draft_file.h"
@@ -329,7 +329,7 @@ static bst_status export_orbits(bst_ctx *ctx, const bst_export *e, bool believed
     bst_scenario scenario;
     BST_TRY(bst_run_reader_file(ctx, e->run, "scenario.json", path, sizeof path));
     BST_TRY(bst_json_load(ctx, path, &json));
-    bst_status status = bst_scenario_read(ctx, json, bst_app_registry(), &scenario);
+    bst_status status = bst_plugins_scenario_read(ctx, json, &scenario);
     if (status == BST_OK) {
         status = orbits_of(ctx, e, &scenario, believed);
     }

@@ -13,8 +13,8 @@
 
 #include "sim/app/export.h"
 #include "sim/app/json_number.h"
+#include "sim/app/plugins.h"
 #include "sim/app/progress.h"
-#include "sim/app/registry.h"
 #include "sim/core/version.h"
 #include "sim/io/draft_file.h"
 #include "sim/io/fits_frames.h"
@@ -424,7 +424,7 @@ bst_status bst_export_satnet(bst_ctx *ctx, const bst_export *e) {
     BST_TRY(make_folders(ctx, e->satnet));
     BST_TRY(bst_run_reader_file(ctx, e->run, "scenario.json", path, sizeof path));
     BST_TRY(bst_json_load(ctx, path, &json));
-    bst_status status = bst_scenario_read(ctx, json, bst_app_registry(), &scenario);
+    bst_status status = bst_plugins_scenario_read(ctx, json, &scenario);
     if (status == BST_OK) {
         j.mask = scenario.record.planes & UINT32_C(1) << BST_PLANE_SEGMENTATION;
         status = e->split ? export_with_parts(ctx, &j) : export_all(ctx, &j);

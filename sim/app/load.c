@@ -3,6 +3,7 @@
 #include <stdio.h>
 
 #include "sim/app/app.h"
+#include "sim/app/plugins.h"
 
 static bst_status apply(bst_ctx *ctx, const bst_load_options *options, bst_json *json) {
     char text[128];
@@ -36,7 +37,7 @@ bst_status bst_load_scenario(bst_ctx *ctx, const char *path, const bst_load_opti
     BST_TRY(bst_json_load_extended(ctx, path, json));
     bst_status status = apply(ctx, options, *json);
     if (status == BST_OK) {
-        status = bst_scenario_read(ctx, *json, bst_app_registry(), out);
+        status = bst_plugins_scenario_read(ctx, *json, out);
         if (status != BST_OK) {
             bst_scenario_free(out);
         }

@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "sim/app/app.h"
+#include "sim/app/plugins.h"
 #include "sim/core/version.h"
 
 typedef struct command {
@@ -40,7 +41,7 @@ static void usage(FILE *stream) {
     fprintf(stream,
             "Boresight simulates a space-based telescope that finds and tracks satellites.\n"
             "\n"
-            "usage: boresight COMMAND [options]\n"
+            "usage: boresight [--plugin FILE]... COMMAND [options]\n"
             "\n"
             "commands:\n");
     for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {
@@ -51,6 +52,10 @@ static void usage(FILE *stream) {
         "\n"
         "A first run:\n"
         "  boresight run scenarios/neossat_geo_track.json --out runs/first\n"
+        "\n"
+        "--plugin FILE adds the modules of a shared library to those that scenarios can name:\n"
+        "  boresight --plugin ./my_detector.so pd scenarios/detection.json \\\n"
+        "    --set /observers/0/sensors/0/modules/imgproc='{\"type\": \"mine\"}'\n"
         "\n"
         "\"boresight COMMAND --help\" tells more. Exit codes: 0 done, 1 failed, 2 called wrongly,\n"
         "130 interrupted.\n");
@@ -69,6 +74,21 @@ int main(int argc, char **argv) {
     if (strcmp(argv[1], "--version") == 0) {
         printf("boresight %s (%s)\n", bst_version(), bst_git_revision());
         return BST_EXIT_OK;
+    }
+    while (strcmp(argv[1], "--plugin") == 0) {
+        bst_ctx ctx = {0};
+        if (argc < 4) {
+            fprintf(stderr,
+                    "boresight: --plugin takes the path of a shared library, and a command "
+                    "after it; see boresight --help\n");
+            return BST_EXIT_USAGE;
+        }
+        if (bst_plugins_add(&ctx, argv[2]) != BST_OK) {
+            fprintf(stderr, "boresight: %s\n", ctx.message);
+            return BST_EXIT_USAGE;
+        }
+        argc -= 2;
+        argv += 2;
     }
     for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {
         if (strcmp(argv[1], commands[i].name) == 0) {

@@ -46,7 +46,8 @@ class Messages(unittest.TestCase):
                    assignment)
 
     def test_usage(self):
-        self.fails(2, "usage: boresight COMMAND")
+        self.fails(2, r"usage: boresight \[--plugin FILE\]\.\.\. COMMAND")
+        self.fails(2, "--plugin takes the path of a shared library, and a command", "--plugin", "a")
         self.fails(2, 'no command "rum"', "rum")
         self.fails(2, "one scenario file is expected, 0 were given", "run")
         self.fails(2, "one scenario file is expected, 2 were given", "check", "a", "b")

@@ -6,6 +6,7 @@ Usage, from the repository root:
 /usr/bin/python3 tests/e2e/test_install.py BORESIGHT CMAKE CC BUILD_FOLDER
 """
 import glob
+import json
 import os
 import re
 import shutil
@@ -83,6 +84,53 @@ class Installed(unittest.TestCase):
         out = call("./first_frames", self.scenario, "3", cwd=work,
                    env={**os.environ, "LD_LIBRARY_PATH": self.libdir})
         self.check_output(out)
+
+    @unittest.skipUnless(shutil.which("pkg-config"), "needs pkg-config")
+    def test_plugin(self):
+        """The example detector, built against the installed library, measured by the program."""
+        work = os.path.join(self.folder, "plugin")
+        shutil.copytree(os.path.join(ROOT, "docs", "examples", "plugin_detector"), work)
+        flags = call("pkg-config", "--cflags", "--libs", "boresight",
+                     env={**os.environ, "PKG_CONFIG_PATH": self.libdir + "/pkgconfig"}).split()
+        words = [CC, "-std=c17", "-Wall", "-Wextra", "-Werror", "-O2", "-shared", "-fPIC",
+                 "box_detector.c", *flags, "-lm", "-o"]
+        call(*words, "box_detector.so", cwd=work)
+        environment = {**os.environ, "LD_LIBRARY_PATH": self.libdir}
+        sensor = "/observers/0/sensors/0"
+        imgproc = sensor + '/modules/imgproc={"type": "box", "threshold_sigma": 5}'
+        out = call(self.stage + "/bin/boresight", "--plugin", "box_detector.so", "pd",
+                   self.stage + "/share/boresight/scenarios/detection.json", "--snr", "4:12:2",
+                   "--trials", "400", "--empty-frames", "8", "--json", "pd.json", "--set", imgproc,
+                   "--set", sensor + "/camera/width_px=1024", "--set",
+                   sensor + "/camera/height_px=1024", cwd=work, env=environment)
+        with open(work + "/pd.json", encoding="utf-8") as file:
+            measured = json.load(file)
+        self.assertIn("loss", out)
+        # nine pixels alike have 0.71 of the best SNR at FWHM 2 px in a pixel's middle, 3.0 dB; the
+        # frames are few
+        self.assertGreater(measured["loss_db_pd50"], 1.5)
+        self.assertLess(measured["loss_db_pd50"], 4.5)
+        self.assertGreater(measured["points"][-1]["pd"], 0.98)
+        # in a loop, and read again from its folder
+        run = [self.stage + "/bin/boresight", "--plugin", "./box_detector.so", "run", self.scenario,
+               "--duration", "3", "--quiet", "--set", runs.NO_FRAMES, "--set", imgproc]
+        call(*run, "--out", "run", cwd=work, env=environment)
+        self.assertIn("box", call(self.stage + "/bin/boresight", "schema", cwd=work,
+                                  env={**environment, "BORESIGHT_PLUGINS": "./box_detector.so"}))
+        # what is no plugin is said
+        with open(work + "/box_detector.c", encoding="utf-8") as file:
+            text = file.read()
+        with open(work + "/box_detector.c", "w", encoding="utf-8") as file:
+            file.write(text.replace('"box",', '"standard",'))
+        call(*words, "twin.so", cwd=work)
+        for name, message in (("twin.so", 'role "imgproc" and type "standard" already'),
+                              (self.libdir + "/libboresight.so", "is no plugin"),
+                              ("none.so", "cannot load a plugin"), ("a:b.so", 'without ":"')):
+            result = subprocess.run(
+                [self.stage + "/bin/boresight", "--plugin", name, "check", self.scenario],
+                capture_output=True, text=True, timeout=60, cwd=work, env=environment)
+            self.assertIn(message, result.stderr)
+            self.assertIn(result.returncode, (1, 2))
 
     def test_cmake_package(self):
         work = os.path.join(self.folder, "by cmake")

@@ -2,6 +2,7 @@
  * among stars, hits and hot pixels, under a camera that turns, and at the edges. */
 #include <stdlib.h>
 
+#include "imgproc/background.h"
 #include "imgproc/stack.h"
 #include "imgproc/tail.h"
 #include "sim/core/rng.h"
