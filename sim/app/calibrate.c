@@ -3,58 +3,15 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "obsgen/generator.h"
-#include "sim/app/pairing.h"
+#include "sim/app/calibrate_internal.h"
 
-/* SNR about the threshold in which Pd is fitted, and least number of sources for a fit. */
+/* SNR about the threshold in which Pd is fitted, stars whose mean place is one, grid of places. */
 static const double PD_REACH = 4.0;
-enum { LEAST_SOURCES = 200, LEAST_ALARMS = 10, LEAST_PLACES = 30, LEAST_COMMON = 8, GRID = 48 };
-/* Distances of blends that are tried, over theory's; sources that count for them. */
-enum { BLENDS = 5, TYPICAL = 2, CAPACITY = 4096 };
-static const double blend_factors[BLENDS] = {0.7, 0.9, 1.1, 1.3, 1.5};
-static const double BLEND_SNR = 10.0;
-/* Error between sources that are seen as one which is tried, faintest of them over the brighter. */
-static const double BLEND_ERROR = 0.6, COMPANION_SHARE = 0.3;
-static const double COMPANION_LEAST = 5.0;
-/* Errors of places over the bound that count. */
-static const double MOST_SIGMAS = 2.5;
+enum { LEAST_COMMON = 8, GRID = 48, CAPACITY = 4096 };
+/* Sources that count for blends; of those that places are compared of, the least, and the least
+ * share of a companion's SNR. */
+static const double BLEND_SNR = 10.0, COMPANION_LEAST = 5.0, COMPANION_SHARE = 0.3;
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
-
-/* A source that stands alone, near the threshold. */
-typedef struct trial {
-    float amplitude, threshold, length;
-    bool detected;
-} trial;
-
-typedef struct mean_square {
-    double sum;
-    long count;
-} mean_square;
-
-struct bst_calibrator {
-    bst_calibrated_path path;
-    bst_generator *theory, *blended[BLENDS + 1]; /* the last with BLEND_ERROR */
-    bst_detections *made;                        /* of one of them */
-    mean_square together[3]; /* places, px^2, of sources with a companion: in images, without and
-                                with the error that is tried */
-    long beside[BLENDS + 1]; /* sources beside a brighter one that were found: in images, by each */
-    double sigma_px;
-    bst_bound bound;
-    bst_pairing pairing, blend_pairing;
-    trial *trials;
-    long trial_count, trial_room;
-    double *alarm_energy; /* (u^2 - T^2) / 2 */
-    long alarm_count, alarm_room;
-    double alarms_expected;
-    mean_square across[BST_OBSGEN_SNRS], along[BST_OBSGEN_SNRS];
-    double bias_sum, bias_weight;
-    double threshold_offset;
-    double nn, nq, qq, ny, qy; /* least squares of noise^2 by theory's and by the light left over */
-    double light_square, light_bias; /* of background by the light in it */
-    long identified, identifiable;
-    long hits, hits_told;
-    long frames, detected;
-};
 
 bst_status bst_calibrator_create(bst_ctx *ctx, bst_calibrator **out) {
     *out = calloc(1, sizeof **out);
@@ -64,7 +21,7 @@ bst_status bst_calibrator_create(bst_ctx *ctx, bst_calibrator **out) {
 void bst_calibrator_free(bst_calibrator *c) {
     if (c) {
         bst_generator_free(c->theory);
-        for (int i = 0; i <= BLENDS; i++) {
+        for (int i = 0; i <= CALIBRATE_BLENDS; i++) {
             bst_generator_free(c->blended[i]);
         }
         free(c->made);
@@ -93,11 +50,12 @@ bst_status bst_calibrator_begin(bst_ctx *ctx, bst_calibrator *c, const bst_calib
     BST_TRY(
         bst_generator_create(ctx, path->camera, path->camera, &settings, &theory, key, &c->theory));
     bst_obsgen_calibration_theory(&theory);
-    for (int i = 0; i <= BLENDS; i++) {
+    for (int i = 0; i <= CALIBRATE_BLENDS; i++) {
         bst_generator_free(c->blended[i]);
         c->blended[i] = NULL;
-        theory.blend_distance_factor = blend_factors[i < BLENDS ? i : TYPICAL];
-        theory.blend_error = i < BLENDS ? 0.0 : BLEND_ERROR;
+        theory.blend_distance_factor =
+            calibrate_blend_factors[i < CALIBRATE_BLENDS ? i : CALIBRATE_TYPICAL];
+        theory.blend_error = i < CALIBRATE_BLENDS ? 0.0 : CALIBRATE_BLEND_ERROR;
         BST_TRY(bst_generator_create(ctx, path->camera, path->camera, &settings, &theory, key,
                                      &c->blended[i]));
     }
@@ -198,8 +156,8 @@ static void add_place(bst_calibrator *c, const bst_truth_item *t, const bst_dete
                                across * across / at.var_across_px2};
     for (int k = 0; k < 2; k++) {
         /* what is further off is another source's light */
-        if (squares[k] < MOST_SIGMAS * MOST_SIGMAS) {
-            mean_square *sum = k == 0 && length > 1.0 ? &c->along[node] : &c->across[node];
+        if (squares[k] < CALIBRATE_MOST_SIGMAS * CALIBRATE_MOST_SIGMAS) {
+            calibrate_mean *sum = k == 0 && length > 1.0 ? &c->along[node] : &c->across[node];
             sum->sum += squares[k];
             sum->count++;
         }
@@ -220,7 +178,7 @@ static bst_status add_trial(bst_ctx *ctx, bst_calibrator *c, const bst_truth_ite
     }
     BST_TRY(grow(ctx, (void **)&c->trials, c->trial_count, &c->trial_room, sizeof *c->trials));
     c->trials[c->trial_count++] =
-        (trial){(float)amplitude, (float)threshold, (float)length_of(t), detected};
+        (calibrate_trial){(float)amplitude, (float)threshold, (float)length_of(t), detected};
     return BST_OK;
 }
 
@@ -344,7 +302,7 @@ static bool has_companion(const bst_truth *truth, int i, double reach) {
     return false;
 }
 
-static void add_together(mean_square *sum, const bst_truth_item *t, const bst_detections *all,
+static void add_together(calibrate_mean *sum, const bst_truth_item *t, const bst_detections *all,
                          int k) {
     if (k >= 0) {
         double dx = all->items[k].x_px - t->x_mean_px, dy = all->items[k].y_px - t->y_mean_px;
@@ -358,7 +316,7 @@ static bst_status add_blends(bst_ctx *ctx, bst_calibrator *c, const bst_generato
                              const bst_detections *detections, double fwhm) {
     const bst_truth *truth = frame->truth;
     double reach = 4.0 * fwhm;
-    for (int n = 0; n <= BLENDS; n++) {
+    for (int n = 0; n <= CALIBRATE_BLENDS; n++) {
         bst_generator_result made;
         BST_TRY(bst_generator_run(ctx, c->blended[n], frame, &made));
         c->made->count = made.count;
@@ -367,20 +325,21 @@ static bst_status add_blends(bst_ctx *ctx, bst_calibrator *c, const bst_generato
         }
         BST_TRY(bst_pairing_make(ctx, &c->blend_pairing, truth, c->made, fwhm));
         for (int i = 0; i < truth->count; i++) {
-            if ((n == TYPICAL || n == BLENDS) && has_companion(truth, i, reach)) {
+            if ((n == CALIBRATE_TYPICAL || n == CALIBRATE_BLENDS) &&
+                has_companion(truth, i, reach)) {
                 const bst_truth_item *t = &truth->items[i];
-                add_together(&c->together[n == TYPICAL ? 1 : 2], t, c->made,
+                add_together(&c->together[n == CALIBRATE_TYPICAL ? 1 : 2], t, c->made,
                              c->blend_pairing.detection_of[i]);
-                if (n == TYPICAL) {
+                if (n == CALIBRATE_TYPICAL) {
                     add_together(&c->together[0], t, detections, c->pairing.detection_of[i]);
                 }
             }
-            if (n == BLENDS) {
+            if (n == CALIBRATE_BLENDS) {
                 continue;
             }
             bool beside =
                 (n == 0 || c->blend_pairing.detection_of[i] >= 0) && is_beside(truth, i, reach);
-            c->beside[BLENDS] += n == 0 && beside && c->pairing.detection_of[i] >= 0;
+            c->beside[CALIBRATE_BLENDS] += n == 0 && beside && c->pairing.detection_of[i] >= 0;
             c->beside[n] += beside && c->blend_pairing.detection_of[i] >= 0;
         }
     }
@@ -436,199 +395,4 @@ bst_status bst_calibrator_add(bst_ctx *ctx, bst_calibrator *c, const bst_truth *
     double taken = (detections->background_e - theory.background_e) /
                    (bst_bound_norm(&c->bound, 0.0) * detections->noise_e);
     return add_alarms(ctx, c, truth, detections, reach, taken);
-}
-
-/* Log-likelihood of the trials of one streak length. */
-static double likelihood(const bst_calibrator *c, int node, double gain, double slope) {
-    double sum = 0.0;
-    for (long i = 0; i < c->trial_count; i++) {
-        const trial *t = &c->trials[i];
-        int own = 0;
-        for (int n = 1; n < BST_OBSGEN_LENGTHS; n++) {
-            bool nearer = fabs(sqrt((double)t->length) - sqrt(bst_obsgen_lengths_px[n])) <
-                          fabs(sqrt((double)t->length) - sqrt(bst_obsgen_lengths_px[own]));
-            own = nearer ? n : own;
-        }
-        if (own != node) {
-            continue;
-        }
-        double z = slope * (gain * (double)t->amplitude - (double)t->threshold);
-        double p = 0.5 * erfc(-z * 0.70710678118654752);
-        sum += log(fmax(t->detected ? p : 1.0 - p, 1e-4)); /* a few are paired by mistake */
-    }
-    return sum;
-}
-
-/* The gain of one streak length at a slope, by golden section. */
-static double best_gain(const bst_calibrator *c, int node, double slope, double *value) {
-    const double part = 0.38196601125010515;
-    double low = 0.5, high = 1.3, a = low + part * (high - low), b = high - part * (high - low);
-    double at_a = likelihood(c, node, a, slope), at_b = likelihood(c, node, b, slope);
-    for (int i = 0; i < 22; i++) {
-        if (at_a > at_b) {
-            high = b;
-            b = a;
-            at_b = at_a;
-            a = low + part * (high - low);
-            at_a = likelihood(c, node, a, slope);
-        } else {
-            low = a;
-            a = b;
-            at_a = at_b;
-            b = high - part * (high - low);
-            at_b = likelihood(c, node, b, slope);
-        }
-    }
-    *value = fmax(at_a, at_b);
-    return 0.5 * (low + high);
-}
-
-static void fit_detection(const bst_calibrator *c, bst_obsgen_calibration *out) {
-    long count[BST_OBSGEN_LENGTHS] = {0};
-    for (long i = 0; i < c->trial_count; i++) {
-        int own = 0;
-        for (int n = 1; n < BST_OBSGEN_LENGTHS; n++) {
-            bool nearer =
-                fabs(sqrt((double)c->trials[i].length) - sqrt(bst_obsgen_lengths_px[n])) <
-                fabs(sqrt((double)c->trials[i].length) - sqrt(bst_obsgen_lengths_px[own]));
-            own = nearer ? n : own;
-        }
-        count[own]++;
-    }
-    double best = -INFINITY;
-    for (double slope = 0.7; slope <= 1.301; slope += 0.02) {
-        double total = 0.0, gain[BST_OBSGEN_LENGTHS] = {0};
-        for (int n = 0; n < BST_OBSGEN_LENGTHS; n++) {
-            double value = 0.0;
-            /* a length that only few frames had would be told by their oddities */
-            if (count[n] >= LEAST_SOURCES && count[n] >= c->trial_count / 50) {
-                gain[n] = best_gain(c, n, slope, &value);
-            }
-            total += value;
-        }
-        if (total > best) {
-            best = total;
-            out->slope = slope;
-            for (int n = 0; n < BST_OBSGEN_LENGTHS; n++) {
-                out->gain[n] = gain[n];
-            }
-        }
-    }
-    /* a length that was not seen has the gain of the nearest one that was */
-    double seen[BST_OBSGEN_LENGTHS];
-    for (int n = 0; n < BST_OBSGEN_LENGTHS; n++) {
-        seen[n] = out->gain[n];
-    }
-    for (int n = 0; n < BST_OBSGEN_LENGTHS; n++) {
-        for (int away = 1; away < BST_OBSGEN_LENGTHS && out->gain[n] <= 0.0; away++) {
-            int low = n - away, high = n + away;
-            out->gain[n] = low >= 0 && seen[low] > 0.0 ? seen[low]
-                           : high < BST_OBSGEN_LENGTHS ? seen[high]
-                                                       : 0.0;
-        }
-    }
-}
-
-/* The distance at which the generator tells as many apart as the image path; fewer, the further. */
-static double fit_blends(const bst_calibrator *c) {
-    double image = (double)c->beside[BLENDS];
-    if (c->beside[BLENDS] < LEAST_SOURCES) {
-        return 1.0;
-    }
-    for (int n = 1; n < BLENDS; n++) {
-        double near = (double)c->beside[n - 1], far = (double)c->beside[n];
-        if (image >= far && near > far) {
-            double part = fmin((near - image) / (near - far), 1.0);
-            return blend_factors[n - 1] +
-                   fmax(part, 0.0) * (blend_factors[n] - blend_factors[n - 1]);
-        }
-    }
-    return blend_factors[BLENDS - 1];
-}
-
-/* The error between sources seen as one with which their places scatter as in images. */
-static double fit_blend_error(const bst_calibrator *c) {
-    double square[3];
-    for (int k = 0; k < 3; k++) {
-        if (c->together[k].count < LEAST_SOURCES) {
-            return 0.0;
-        }
-        square[k] = c->together[k].sum / (double)c->together[k].count;
-    }
-    double part = (square[0] - square[1]) / fmax(square[2] - square[1], 1e-6);
-    return BLEND_ERROR * sqrt(fmin(fmax(part, 0.0), 10.0));
-}
-
-/* Standard deviation of normal errors of which those beyond MOST_SIGMAS were left out, from the
- * mean square of the rest: f^2 (1 - 2 c phi(c) / (2 Phi(c) - 1)), c = MOST_SIGMAS / f. */
-static double uncut(double square) {
-    double low = 0.1, high = 5.0;
-    for (int i = 0; i < 40; i++) {
-        double f = 0.5 * (low + high), c = MOST_SIGMAS / f;
-        double cut = 1.0 - 2.0 * c * exp(-0.5 * c * c) / sqrt(2.0 * BST_PI) / erf(c * sqrt(0.5));
-        *(f * f * cut < square ? &low : &high) = f;
-    }
-    return 0.5 * (low + high);
-}
-
-static void fit_places(const mean_square *seen, double *factors) {
-    double before = 1.0;
-    for (int i = 0; i < BST_OBSGEN_SNRS; i++) {
-        if (seen[i].count >= LEAST_PLACES) {
-            before = uncut(seen[i].sum / (double)seen[i].count);
-        }
-        factors[i] = fmin(fmax(before, 0.1), 20.0);
-    }
-}
-
-bst_status bst_calibrator_fit(bst_ctx *ctx, bst_calibrator *c, bst_obsgen_calibration *out,
-                              bst_calibration_counts *counts) {
-    *counts = (bst_calibration_counts){.frames = c->frames,
-                                       .sources = c->trial_count,
-                                       .detected = c->detected,
-                                       .false_alarms = c->alarm_count};
-    bst_obsgen_calibration_theory(out);
-    if (c->trial_count < LEAST_SOURCES || c->alarm_count < LEAST_ALARMS) {
-        return bst_fail(ctx, BST_ERR_STATE,
-                        "%ld stars near the detection limit and %ld false alarms are too few for a "
-                        "calibration (needed: %d and %d); give --seeds more, or scenarios with "
-                        "world/faint_stars = \"statistical\" and a scenegen/v_limit beyond the "
-                        "limit of detection",
-                        c->trial_count, c->alarm_count, LEAST_SOURCES, LEAST_ALARMS);
-    }
-    fit_detection(c, out);
-    out->blend_distance_factor = fit_blends(c);
-    out->blend_error = fit_blend_error(c);
-    fit_places(c->across, out->across_factor);
-    fit_places(c->along, out->along_factor);
-    for (int i = 0; i < BST_OBSGEN_SNRS; i++) {
-        counts->places += c->across[i].count;
-    }
-    out->phase_bias_px = c->bias_weight > 0.0 ? c->bias_sum / c->bias_weight : 0.0;
-    out->threshold_offset = c->threshold_offset / (double)c->frames;
-    /* noise^2 = factor^2 theory^2 + crowding light */
-    double determinant = c->nn * c->qq - c->nq * c->nq;
-    double flat = c->ny / c->nn, crowding = out->crowding;
-    if (determinant > 1e-9 * c->nn * c->qq) {
-        crowding = fmin(fmax((c->nn * c->qy - c->nq * c->ny) / determinant, 0.0), 2.0);
-    }
-    flat = (c->ny - crowding * c->nq) / c->nn;
-    out->crowding = crowding;
-    if (c->light_square > 1e-6 * (double)c->frames) {
-        out->background_share = fmin(fmax(c->light_bias / c->light_square, 0.0), 2.0);
-    }
-    out->noise_factor = sqrt(fmax(flat, 0.01));
-    out->false_alarm_factor = (double)c->alarm_count / c->alarms_expected;
-    double energy = 0.0;
-    for (long i = 0; i < c->alarm_count; i++) {
-        energy += fmin(c->alarm_energy[i], 10.0);
-    }
-    out->false_alarm_tail = fmin((double)c->alarm_count / fmax(energy, 1e-3), 10.0);
-    if (c->identifiable >= LEAST_PLACES) {
-        out->star_id_probability = (double)c->identified / (double)c->identifiable;
-    }
-    if (c->hits >= LEAST_SOURCES) {
-        out->hit_told_probability = (double)c->hits_told / (double)c->hits;
-    }
-    return BST_OK;
 }
