@@ -2,12 +2,14 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "imgproc/bad_map.h"
 #include "imgproc/imgproc.h"
 #include "imgproc/locate.h"
 #include "imgproc/rows.h"
 #include "imgproc/streak_locate.h"
 #include "imgproc/streak_motion.h"
 #include "imgproc/tail.h"
+#include "imgproc/windows.h"
 #include "sim/core/pages.h"
 
 /* Maxima are looked at in between the pixels from this share of the threshold on at the least. */
@@ -17,6 +19,8 @@ static const double LOOK_SHARE = 0.65;
 static const double JITTER_BEND = 0.075;
 /* What telemetry may not know of the camera's motion: drift, in px an exposure. */
 static const double DRIFT_PX = 1.0;
+/* Share of a measured or told bend that may be no bend. */
+static const double BEND_LEFT = 0.05;
 /* Above the threshold by this no skewness of noise matters. */
 static const double CERTAIN_ABOVE = 1.5;
 
@@ -37,39 +41,14 @@ struct bst_imgproc {
     bst_streak_locator streaks; /* only when config.streak_search_px > 0 */
     bst_parallel *pool;
     int *order, *order_swap, *row;
+    uint16_t *cropped; /* a window's pixels */
     /* of the latest frame */
     bst_locate_frame view;
     bst_motion motion;
     double exposure_s, binning, streak_px;
-    bool smeared;
+    bool smeared, windowed;
     bst_stack_frame left;
 };
-
-static bst_status make_bad_map(bst_ctx *ctx, bst_imgproc *ip) {
-    const bst_bad_pixel *list = ip->config.bad_pixels.items;
-    if (!ip->maps.bad && ip->config.bad_pixels.count == 0) {
-        return BST_OK;
-    }
-    size_t width = (size_t)ip->camera.width_px, height = (size_t)ip->camera.height_px;
-    ip->bad = calloc(width, height);
-    if (!ip->bad) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a bad-pixel map");
-    }
-    if (ip->maps.bad) {
-        memcpy(ip->bad, ip->maps.bad, width * height);
-    }
-    for (int i = 0; i < ip->config.bad_pixels.count; i++) {
-        if (list[i].x < 0 || list[i].y < 0 || list[i].x >= ip->camera.width_px ||
-            list[i].y >= ip->camera.height_px) {
-            return bst_fail(ctx, BST_ERR_CONFIG,
-                            "bad_pixels/%d: (%lld, %lld) is outside the sensor of %lld x %lld", i,
-                            (long long)list[i].x, (long long)list[i].y,
-                            (long long)ip->camera.width_px, (long long)ip->camera.height_px);
-        }
-        ip->bad[(size_t)list[i].y * width + (size_t)list[i].x] = 1;
-    }
-    return BST_OK;
-}
 
 static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     int width = (int)ip->camera.width_px, height = (int)ip->camera.height_px;
@@ -81,10 +60,11 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     ip->order = calloc((size_t)capacity, sizeof(int));
     ip->order_swap = calloc((size_t)capacity, sizeof(int));
     ip->row = calloc((size_t)height + 1, sizeof(int));
-    if (!ip->electrons || !ip->order || !ip->order_swap || !ip->row) {
+    ip->cropped = calloc((size_t)width * (size_t)height, sizeof *ip->cropped);
+    if (!ip->electrons || !ip->order || !ip->order_swap || !ip->row || !ip->cropped) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a frame of %d x %d", width, height);
     }
-    BST_TRY(make_bad_map(ctx, ip));
+    BST_TRY(bst_bad_map_create(ctx, &ip->camera, &ip->maps, &ip->config.bad_pixels, &ip->bad));
     BST_TRY(bst_parallel_create(ctx, (int)ip->config.threads, &ip->pool));
     BST_TRY(bst_background_create(ctx, (int)ip->config.mesh_px, width, height,
                                   bst_parallel_threads(ip->pool), &ip->background));
@@ -142,6 +122,7 @@ void bst_imgproc_free(bst_imgproc *ip) {
     free(ip->order);
     free(ip->order_swap);
     free(ip->row);
+    free(ip->cropped);
     bst_background_free(&ip->background);
     bst_filter_free(&ip->filter);
     bst_candidates_free(&ip->candidates);
@@ -318,6 +299,12 @@ static void widen_by_bend(const bst_imgproc *ip, const bst_locate_frame *f, cons
     d->cov_xx += x * x;
     d->cov_xy += x * y;
     d->cov_yy += y * y;
+    /* of a bend that the fit follows, what a quadratic does not tell of a start or a stop */
+    x = BEND_LEFT * f->binning * shape->bend_x_px;
+    y = BEND_LEFT * f->binning * shape->bend_y_px;
+    d->cov_xx += x * x;
+    d->cov_xy += x * y;
+    d->cov_yy += y * y;
 }
 
 static bst_detection report(const bst_imgproc *ip, const bst_locate_frame *f,
@@ -345,9 +332,16 @@ static bst_detection report(const bst_imgproc *ip, const bst_locate_frame *f,
     return d;
 }
 
-bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
-                              const bst_motion *motion, bst_detections *out, int capacity) {
-    BST_TRY(check_frame(ctx, ip, frame));
+/* How a frame, or a window of one, was searched. */
+typedef struct part {
+    double threshold, false_alarms;
+    bool search;
+} part;
+
+/* Finds the candidates of `frame` and sets ip->view. `whole` is the frame of which it is a window,
+ * itself else: the density of false alarms and the filter are the whole frame's. */
+static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgproc_frame *whole,
+                 const bst_motion *motion, bst_parallel *pool, part *out) {
     int width = frame->window.width / frame->binning;
     int height = frame->window.height / frame->binning;
     double sigma = hypot(bst_camera_psf_sigma_px(&ip->camera), ip->config.jitter_px);
@@ -358,20 +352,19 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
     reader read = {ip, frame, width};
     double gain = ip->camera.gain_e_per_dn, read_noise = ip->camera.read_noise_e;
     double read_variance = read_noise * read_noise + gain * gain / 12.0;
-    /* a pool that has to wait for processors is slower than one thread that has one */
-    bool alone = frame->beside_another && bst_parallel_threads(ip->pool) <= BST_STEP_LANES;
-    bst_parallel *pool = alone ? NULL : ip->pool;
     bst_background_read(&ip->background, pool, read_electrons, &read, width, height,
                         (float)ip->camera.gain_e_per_dn, read_variance);
     double dx, dy;
-    filter_path(ip, frame, motion, &dx, &dy);
+    filter_path(ip, whole, motion, &dx, &dy);
     ip->streak_px = hypot(dx, dy) * frame->binning;
     bst_filter_set(&ip->filter, sigma, dx, dy);
     /* stars are points: what else there is may be a streak */
-    bool search = ip->config.streak_search_px > 0.0 && !ip->filter.streak && !ip->smeared;
+    bool search =
+        ip->config.streak_search_px > 0.0 && !ip->filter.streak && !ip->smeared && frame == whole;
+    double pixels = (double)(whole->window.width / whole->binning) *
+                    (double)(whole->window.height / whole->binning);
     double false_alarms = (search ? 0.5 : 1.0) * ip->config.false_alarms_per_frame;
-    double threshold =
-        bst_filter_threshold(&ip->filter, false_alarms, (double)width * (double)height);
+    double threshold = bst_filter_threshold(&ip->filter, false_alarms, pixels);
     double look = ip->smeared ? threshold : fmax(0.93 * ip->filter.corner, LOOK_SHARE) * threshold;
     bst_filter_run(&ip->filter, pool, &ip->background, read_electrons, &read, frame->pixels,
                    ip->electrons, width, height, saturation_dn(ip, frame), (float)look);
@@ -403,26 +396,29 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
                                  .origin_x_px = ip->view.origin_x_px,
                                  .origin_y_px = ip->view.origin_y_px,
                                  .binning = frame->binning};
-    if (motion && !ip->smeared) {
-        double bend_px = hypot(JITTER_BEND * ip->config.jitter_px,
-                               motion->bend_sigma_rad / bst_camera_scale_rad(&ip->camera));
-        bst_motion measured = *motion;
-        if (bst_streak_motion_measure(&ip->streak_motion, &ip->locator.psf, &ip->locator.profiles,
-                                      &ip->view, &ip->candidates, DRIFT_PX / frame->binning,
-                                      bend_px / frame->binning, &measured)) {
-            ip->motion = measured;
-        }
-    }
+    *out = (part){threshold, false_alarms, search};
+}
+
+/* Corrects a motion by the streaks that were added to ip->streak_motion. */
+static void correct_motion(bst_imgproc *ip, double binning, bst_motion *motion) {
+    double bend_px = hypot(JITTER_BEND * ip->config.jitter_px,
+                           motion->bend_sigma_rad / bst_camera_scale_rad(&ip->camera));
+    (void)bst_streak_motion_solve(&ip->streak_motion, &ip->locator.psf, &ip->locator.profiles,
+                                  &ip->camera, DRIFT_PX / binning, bend_px / binning, motion);
+}
+
+/* Locates the candidates of a part and adds them to `out`. */
+static void take(bst_imgproc *ip, const part *p, bst_detections *out, int capacity) {
     if (ip->smeared) {
         bst_locate_roughly(&ip->locator, &ip->view, &ip->candidates);
     } else {
         bst_locate(&ip->locator, &ip->view, &ip->candidates);
     }
-
-    int kept = 0, room = capacity < ip->locator.capacity ? capacity : ip->locator.capacity;
+    int kept = 0, room = capacity - out->count;
+    room = room < ip->locator.capacity ? room : ip->locator.capacity;
     int lost = ip->candidates.count - ip->locator.count;
-    if (search) {
-        bst_streak_locate(&ip->streaks, &ip->view, &ip->candidates, false_alarms, &ip->locator);
+    if (p->search) {
+        bst_streak_locate(&ip->streaks, &ip->view, &ip->candidates, p->false_alarms, &ip->locator);
     }
     for (int i = 0; i < ip->locator.count; i++) {
         if (ip->locator.found[i].dropped) {
@@ -434,15 +430,82 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
             lost++;
         }
     }
-    sort_on_sensor(ip, kept, height);
+    sort_on_sensor(ip, kept, ip->view.height);
+    for (int i = 0; i < kept; i++) {
+        out->items[out->count++] = report(ip, &ip->view, &ip->locator.found[ip->order[i]]);
+    }
+    out->lost += lost;
+    out->threshold_snr = p->threshold;
+}
+
+static void empty(bst_detections *out) {
+    out->background_e = out->noise_e = out->threshold_snr = 0.0;
+    out->stars_identified = 0;
+    out->count = 0;
+    out->lost = 0;
+}
+
+bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
+                              const bst_motion *motion, bst_detections *out, int capacity) {
+    BST_TRY(check_frame(ctx, ip, frame));
+    /* a pool that has to wait for processors is slower than one thread that has one */
+    bool alone = frame->beside_another && bst_parallel_threads(ip->pool) <= BST_STEP_LANES;
+    part whole;
+    empty(out);
+    ip->windowed = false;
+    find(ip, frame, frame, motion, alone ? NULL : ip->pool, &whole);
+    if (!ip->smeared && bst_streak_motion_begin(&ip->streak_motion, &ip->view)) {
+        bst_streak_motion_add(&ip->streak_motion, &ip->view, &ip->candidates);
+        correct_motion(ip, frame->binning, &ip->motion);
+    }
+    take(ip, &whole, out, capacity);
     out->background_e = (double)ip->background.median_level;
     out->noise_e = (double)ip->background.median_noise;
-    out->threshold_snr = threshold;
-    out->stars_identified = 0;
-    out->count = kept;
-    out->lost = lost;
-    for (int i = 0; i < kept; i++) {
-        out->items[i] = report(ip, &ip->view, &ip->locator.found[ip->order[i]]);
+    return BST_OK;
+}
+
+/* Whether the windows' streaks are to tell the motion: looks for them in all windows. */
+static bool measure_in_windows(bst_imgproc *ip, const bst_imgproc_frame *frame,
+                               const bst_window *windows, int count, const bst_motion *motion) {
+    for (int i = 0; i < count; i++) {
+        part p;
+        bst_imgproc_frame window = bst_windows_crop(frame, &windows[i], ip->cropped);
+        find(ip, &window, frame, motion, NULL, &p);
+        if (i == 0 && (ip->smeared || !bst_streak_motion_begin(&ip->streak_motion, &ip->view))) {
+            return false;
+        }
+        bst_streak_motion_add(&ip->streak_motion, &ip->view, &ip->candidates);
+    }
+    return count > 0;
+}
+
+bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
+                                      const bst_window *windows, int count,
+                                      const bst_motion *motion, bst_detections *out, int capacity) {
+    BST_TRY(check_frame(ctx, ip, frame));
+    double pixels = 0.0;
+    bst_motion used = {.q_cam_from_gcrf = BST_QUAT_IDENTITY};
+    empty(out);
+    ip->windowed = true;
+    if (motion) {
+        used = *motion;
+        if (measure_in_windows(ip, frame, windows, count, motion)) {
+            correct_motion(ip, frame->binning, &used);
+        }
+    }
+    for (int i = 0; i < count; i++) {
+        part p;
+        bst_imgproc_frame window = bst_windows_crop(frame, &windows[i], ip->cropped);
+        find(ip, &window, frame, motion ? &used : NULL, NULL, &p);
+        take(ip, &p, out, capacity);
+        double n = (double)windows[i].width * (double)windows[i].height;
+        pixels += n;
+        out->background_e += n * (double)ip->background.median_level;
+        out->noise_e += n * (double)ip->background.median_noise;
+    }
+    if (pixels > 0.0) {
+        out->background_e /= pixels;
+        out->noise_e /= pixels;
     }
     return BST_OK;
 }
@@ -450,7 +513,7 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
 void bst_imgproc_refine(bst_imgproc *ip, bst_detections *detections, int index) {
     bst_detection *item = &detections->items[index];
     const bst_found *found = &ip->locator.found[ip->order[index]];
-    if (!found->rough) {
+    if (ip->windowed || !found->rough) {
         return;
     }
     bst_locate_again(&ip->locator, &ip->view, ip->order[index]);

@@ -25,6 +25,8 @@ typedef struct bst_imgproc_config {
     double streak_min_px, streak_max_px;
     double streak_search_px; /* 0: no search for streaks of unknown rate and direction */
     double search_radius_px, match_tolerance_px;
+    bool track_windows; /* look only at windows while a target is followed */
+    int64_t window_px, window_stars, full_every, full_frames;
     bst_stack_config stack;
     int64_t threads;            /* 0: one per processor */
     bst_config_list bad_pixels; /* of bst_bad_pixel */
@@ -95,8 +97,20 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
                               const bst_motion *motion, bst_detections *out,
                               int capacity) BST_MUST_CHECK;
 
+/* The same in windows of the frame only, `count` of them, apart from each other, inside the frame's
+ * own and along its binned pixels, none smaller than a mesh is good for (about 24 pixels a side).
+ * Thresholds are those of the whole frame; background and noise are each window's own, and what is
+ * reported of them is the mean over the windows. No streaks of unknown rate are searched for. The
+ * time that it takes follows the windows' area. */
+bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
+                                      const bst_window *windows, int count,
+                                      const bst_motion *motion, bst_detections *out,
+                                      int capacity) BST_MUST_CHECK;
+
 /* Fits detection `index` of the latest bst_imgproc_detect if the matched filter placed it (see
- * most_fits), and sets all of it but label, label_probability and star_id. */
+ * most_fits), and sets all of it but label, label_probability and star_id. In windows all are
+ * fitted.
+ */
 void bst_imgproc_refine(bst_imgproc *ip, bst_detections *detections, int index);
 
 /* V magnitude of the faintest star that the latest frame could show at `snr`, with the shape

@@ -190,9 +190,26 @@ static bool is_charge_near(const bst_locator *l, const bst_locate_frame *f,
     return bst_charge_in(l, f->width, &stamp);
 }
 
-/* Flags and plausibility. */
+/* A candidate whose fit failed keeps its maximum's place. */
+static void use_maximum(const bst_locate_frame *f, bst_found *found) {
+    found->source = as_shape(f, found, found->streak);
+    found->source.cov_xx = found->source.cov_yy = 1.0;
+    found->source.cov_xy = 0.0;
+    double sigma = found->noise_e / bst_locate_norm(f, found->streak);
+    found->source.flux_variance = sigma * sigma + found->source.flux_e;
+}
+
+/* Flags and plausibility. The light of a source beyond the edge fits with any flux: a place outside
+ * of the frame is that of the maximum instead. */
 static void judge(const bst_locate_frame *f, bst_found *found) {
     const bst_source *s = &found->source;
+    bool outside = s->shape.x_px < -0.5 || s->shape.y_px < -0.5 || s->shape.x_px > f->width - 0.5 ||
+                   s->shape.y_px > f->height - 0.5;
+    if (outside) {
+        use_maximum(f, found);
+        found->snr = (double)found->peak_snr;
+        found->flags |= BST_DETECTION_EDGE;
+    }
     double half_x = 0.5 * fabs(s->shape.dx_px) + fabs(s->shape.bend_x_px) + 2.0 * f->sigma_px;
     double half_y = 0.5 * fabs(s->shape.dy_px) + fabs(s->shape.bend_y_px) + 2.0 * f->sigma_px;
     double x = s->shape.x_px, y = s->shape.y_px;
@@ -209,20 +226,10 @@ static void judge(const bst_locate_frame *f, bst_found *found) {
             }
         }
     }
-    bool outside = x < -0.5 || y < -0.5 || x > f->width - 0.5 || y > f->height - 0.5;
     if (outside || !s->fitted) {
         found->label = BST_LABEL_ARTEFACT;
         found->label_probability = 0.9;
     }
-}
-
-/* A candidate whose fit failed keeps its maximum's place. */
-static void use_maximum(const bst_locate_frame *f, bst_found *found) {
-    found->source = as_shape(f, found, found->streak);
-    found->source.cov_xx = found->source.cov_yy = 1.0;
-    found->source.cov_xy = 0.0;
-    double sigma = found->noise_e / bst_locate_norm(f, found->streak);
-    found->source.flux_variance = sigma * sigma + found->source.flux_e;
 }
 
 /* A loop over the found ones from `first` on. */

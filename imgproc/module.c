@@ -6,6 +6,7 @@
 #include "imgproc/discriminate.h"
 #include "imgproc/imgproc.h"
 #include "imgproc/sky.h"
+#include "imgproc/windows.h"
 #include "sim/io/psf_fits.h"
 #include "sim/world/knowledge.h"
 #include "sim/world/photometry.h"
@@ -41,6 +42,21 @@ const bst_config_desc bst_imgproc_config_table[] = {
              "Greatest pointing error over which stars are identified."),
     BST_REAL(bst_imgproc_config, match_tolerance_px, "px", 0.5, 20, "3",
              "Greatest distance of one star from its place after the common shift."),
+    BST_BOOL(
+        bst_imgproc_config, track_windows, "false",
+        "Look only at windows round the predicted places of tracks and of bright stars while a "
+        "target of interest is followed."),
+    BST_INT(bst_imgproc_config, window_px, "px", 24, 4096, "48",
+            "track_windows: side of a window; ten sigma of the prediction and the length of a "
+            "star's streak come on top."),
+    BST_INT(bst_imgproc_config, window_stars, "", 3, 64, "16",
+            "track_windows: bright stars that are looked at, for the attitude."),
+    BST_INT(bst_imgproc_config, full_every, "", 1, 1000000, "60",
+            "track_windows: of so many frames ..."),
+    BST_INT(
+        bst_imgproc_config, full_frames, "", 0, 1000000, "6",
+        "... the first so many are looked at as a whole, for all that no track predicts: enough "
+        "in a row to confirm a track."),
     BST_OBJECT(bst_imgproc_config, stack, bst_stack_config_table, "{}",
                "Search for objects too faint for one frame in stacks of frames."),
     BST_INT(
@@ -96,7 +112,8 @@ typedef struct imgproc_module {
     bst_starid *starid;
     bst_discriminator *discriminator;
     bst_sky sky;
-    bst_stack *stack; /* NULL: no stacks */
+    bst_windows windows; /* of the present frame; none: all of it */
+    bst_stack *stack;    /* NULL: no stacks */
     bst_photometer photometer;
 } imgproc_module;
 
@@ -147,6 +164,11 @@ static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
                               m->config->search_radius_px, &m->starid));
     BST_TRY(bst_discriminator_create(env->ctx, &m->camera, (int)m->config->capacity,
                                      &m->discriminator));
+    if (m->config->stack.frames > 0 && m->config->track_windows) {
+        return bst_fail(env->ctx, BST_ERR_CONFIG,
+                        "imgproc: track_windows and stack do not go together: stacks are made of "
+                        "whole frames; turn one of them off");
+    }
     if (m->config->stack.frames > 0) {
         BST_TRY(bst_stack_create(env->ctx, &m->camera, &m->config->stack, (int)m->config->threads,
                                  &m->stack));
@@ -194,6 +216,84 @@ static bst_quat attitude_of(const imgproc_module *m, const bst_starid_options *o
     return bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(turn), q));
 }
 
+/* Windows that cover more of the frame than this save nothing. */
+static const double WINDOWS_SHARE = 0.5;
+/* Stars that show with less are no help beside bright ones. */
+static const double WINDOW_STAR_SNR = 12.0;
+
+/* Windows for the brightest stars: *count of those expected, which are put in front, brightest
+ * first. */
+static void add_stars(imgproc_module *m, const bst_frame_message *message, const bst_motion *motion,
+                      int count) {
+    double half = 0.5 * (double)m->config->window_px;
+    int chosen = 0;
+    for (; chosen < count && chosen < m->config->window_stars; chosen++) {
+        bst_expected_star *e = m->sky.expected;
+        int best = chosen;
+        for (int i = chosen + 1; i < count; i++) {
+            best =
+                e[i].v_mag < e[best].v_mag || (e[i].v_mag == e[best].v_mag && e[i].id < e[best].id)
+                    ? i
+                    : best;
+        }
+        bst_expected_star star = e[best];
+        e[best] = e[chosen];
+        e[chosen] = star;
+        double dx, dy;
+        bst_motion_streak(motion, &m->camera, star.x_px, star.y_px, &dx, &dy);
+        (void)bst_windows_add(&m->windows, &message->window, star.x_px, star.y_px,
+                              half + 0.5 * fabs(dx), half + 0.5 * fabs(dy));
+    }
+}
+
+/* Where to look in a frame while a target is followed: round what the tracker predicts, and round
+ * bright stars. False: everywhere. */
+static bst_status plan_windows(imgproc_module *m, bst_ctx *ctx, const lane *l,
+                               const bst_frame_message *message, const bst_motion *motion,
+                               const bst_nav_telemetry *nav, const bst_predictions *predictions,
+                               const bst_quat *q_cam_from_gcrf, bool *use) {
+    *use = false;
+    m->windows.count = 0;
+    if (!l->ip || message->exposure_id % m->config->full_every < m->config->full_frames) {
+        return BST_OK;
+    }
+    bst_light light = {nav->velocity_bary_mps, nav->sun_m};
+    double middle = 0.5 * ((double)message->start_tick + (double)message->end_tick);
+    double age_s = (middle - (double)predictions->tick) / (double)m->tick_rate_hz;
+    double half = 0.5 * (double)m->config->window_px, scale = bst_camera_scale_rad(&m->camera);
+    bool target = false;
+    for (int i = 0; i < predictions->count; i++) {
+        const bst_prediction *p = &predictions->items[i];
+        bst_vec3 d = bst_vec3_unit(bst_vec3_axpy(p->direction_gcrf, age_s, p->rate_gcrf_radps));
+        bst_vec3 v = bst_quat_rotate(*q_cam_from_gcrf, bst_light_aberrate(&light, d));
+        double x, y, reach = half + 5.0 * p->sigma_rad / scale;
+        bool added = bst_camera_project(&m->camera, v, &x, &y) &&
+                     bst_windows_add(&m->windows, &message->window, x, y, reach, reach);
+        target = target || (added && p->target_of_interest);
+    }
+    if (!target || m->windows.count == BST_WINDOWS_MAX) {
+        return BST_OK;
+    }
+    int expected = 0;
+    BST_TRY(bst_sky_expect(ctx, &m->sky, *q_cam_from_gcrf, &light, message->window, 0.0,
+                           bst_imgproc_v_limit(l->ip, WINDOW_STAR_SNR), &expected));
+    add_stars(m, message, motion, expected);
+    *use = bst_windows_settle(&m->windows, &message->window, message->binning, WINDOWS_SHARE);
+    return BST_OK;
+}
+
+/* Leaves only those expected stars that may be seen in the windows. */
+static int in_windows(imgproc_module *m, int expected) {
+    int kept = 0;
+    for (int i = 0; i < expected; i++) {
+        const bst_expected_star *e = &m->sky.expected[i];
+        if (bst_windows_hold(&m->windows, e->x_px, e->y_px, LOCKED_RADIUS_PX)) {
+            m->sky.expected[kept++] = *e;
+        }
+    }
+    return kept;
+}
+
 /* *q_cam_from_gcrf: in, the attitude that is believed; out, that of the stars, when any are
  * identified. */
 static bst_status identify(imgproc_module *m, const lane *l, bst_ctx *ctx,
@@ -204,6 +304,7 @@ static bst_status identify(imgproc_module *m, const lane *l, bst_ctx *ctx,
     int expected = 0;
     BST_TRY(bst_sky_expect(ctx, &m->sky, out->q_cam_from_gcrf, &light, window,
                            m->config->search_radius_px, v_limit, &expected));
+    expected = m->windows.count > 0 ? in_windows(m, expected) : expected;
     bst_starid_options options = {m->config->search_radius_px,
                                   m->config->match_tolerance_px,
                                   bst_camera_centre_x(&m->camera),
@@ -233,6 +334,7 @@ static bst_status identify(imgproc_module *m, const lane *l, bst_ctx *ctx,
         }
         BST_TRY(bst_sky_expect(ctx, &m->sky, *q_cam_from_gcrf, &light, window,
                                m->config->search_radius_px, v_limit, &expected));
+        expected = m->windows.count > 0 ? in_windows(m, expected) : expected;
         options.search_radius_px = fmin(options.search_radius_px, LOCKED_RADIUS_PX);
         bst_starid_match(m->starid, &options, m->sky.expected, expected, out->items, out->count,
                          &result);
@@ -272,7 +374,10 @@ static bst_status detect(bst_ctx *ctx, const imgproc_module *m, const lane *l,
         .bits = message->bits,
         .exposure_s = (double)(message->end_tick - message->start_tick) / (double)m->tick_rate_hz,
         .beside_another = beside_another};
-    bst_status status = bst_imgproc_detect(ctx, l->ip, &frame, motion, out, capacity);
+    bst_status status = m->windows.count > 0
+                            ? bst_imgproc_detect_windows(ctx, l->ip, &frame, m->windows.items,
+                                                         m->windows.count, motion, out, capacity)
+                            : bst_imgproc_detect(ctx, l->ip, &frame, motion, out, capacity);
     bst_frame_unmap(message->frame);
     return status;
 }
@@ -283,7 +388,8 @@ static bst_status ahead(void *self, struct bst_step *step) {
     bst_ctx *ctx = bst_step_ctx(step);
     l->ready = false;
     bst_sample sample = bst_step_next(step, PORT_FRAME);
-    if (!sample.payload) {
+    /* where the windows are is known in the step */
+    if (!sample.payload || m->config->track_windows) {
         return BST_OK;
     }
     BST_TRY(open_lane(ctx, m, l));
@@ -363,6 +469,15 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
             bst_quat_unit(bst_quat_mul(correction(m, predictions, middle), motion.q_cam_from_gcrf));
     }
 
+    m->windows.count = 0;
+    out->windows = 0;
+    if (m->config->track_windows && locked && nav.payload && !nav.stale) {
+        bool use;
+        BST_TRY(plan_windows(m, ctx, l, message, &motion, nav.payload, predictions,
+                             &out->q_cam_from_gcrf, &use));
+        m->windows.count = use ? m->windows.count : 0;
+        out->windows = m->windows.count;
+    }
     BST_TRY(detections_of(ctx, m, l, message, oriented ? &motion : NULL, out, capacity));
     bool smeared = bst_imgproc_smeared(l->ip);
     bst_photometer_begin(&m->photometer);

@@ -384,9 +384,11 @@ void bst_streak_locate(bst_streak_locator *l, const bst_locate_frame *f,
     if (candidates->count < CROWD_PER_PX * (double)f->width * (double)f->height) {
         add(l, f, found, points, bst_streak_search_bright(&l->search));
     }
+    int light = 0;
     for (int i = 0; i < points; i++) {
         const bst_found *o = &found->found[i];
         if (!o->dropped && !bst_charge_label(o->label)) {
+            light++;
             blank_point(l, o->source.shape.x_px, o->source.shape.y_px, o->snr, f->sigma_px, 1.0);
         }
     }
@@ -394,5 +396,5 @@ void bst_streak_locate(bst_streak_locator *l, const bst_locate_frame *f,
         const bst_candidate *c = &candidates->items[candidates->order[i]];
         blank_point(l, c->x, c->y, (double)c->snr, f->sigma_px, 1.0);
     }
-    add(l, f, found, points, bst_streak_search_faint(&l->search, false_alarms));
+    add(l, f, found, points, bst_streak_search_faint(&l->search, false_alarms, light));
 }

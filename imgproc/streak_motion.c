@@ -19,7 +19,7 @@ enum { COMMON = BST_STREAK_MOTION_COUNT, LOCAL = 4, ROUNDS = 4 };
 /* Brightest candidates among which stars that stand alone are looked for. */
 enum { LOOKED_AT = 16 * BST_STREAK_MOTION_STARS };
 
-typedef struct star {
+typedef struct bst_streak_motion_star {
     bst_shape shape;
     bst_stamp stamp;
     double flux_e, product_e; /* flux; flux times widening */
@@ -29,6 +29,7 @@ typedef struct star {
     double step[1 + COMMON][LOCAL];
     /* of the motion, the local parameters eliminated */
     double information[COMMON][COMMON], gradient[COMMON];
+    const float *pixels; /* as load_pixels has them */
     bool used;
 } star;
 
@@ -37,7 +38,9 @@ bst_status bst_streak_motion_create(bst_ctx *ctx, int max_side, bst_streak_motio
     size_t plane = (size_t)max_side * (size_t)bst_lanes_up(max_side);
     out->planes = calloc(plane * (BST_IMAGE_MOTION_PLANES + 2), sizeof *out->planes);
     out->scratch = calloc(bst_image_scratch(max_side), sizeof *out->scratch);
-    if (!out->planes || !out->scratch) {
+    out->pixels = calloc(plane * 2 * BST_STREAK_MOTION_STARS, sizeof *out->pixels);
+    out->stars = calloc(BST_STREAK_MOTION_STARS, sizeof *out->stars);
+    if (!out->planes || !out->scratch || !out->pixels || !out->stars) {
         bst_streak_motion_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory to measure motion");
     }
@@ -47,6 +50,8 @@ bst_status bst_streak_motion_create(bst_ctx *ctx, int max_side, bst_streak_motio
 void bst_streak_motion_free(bst_streak_motion *work) {
     free(work->planes);
     free(work->scratch);
+    free(work->pixels);
+    free(work->stars);
     *work = (bst_streak_motion){0};
 }
 
@@ -86,20 +91,21 @@ static double reach(const bst_locate_frame *f) {
 }
 
 static bool start_star(const bst_streak_motion *work, const bst_locate_frame *f,
-                       const bst_candidates *candidates, int rank, const bst_shape *path,
-                       star *out) {
+                       const bst_candidates *candidates, int rank, star *out) {
     const bst_candidate *c = &candidates->items[candidates->order[rank]];
     if (!(c->snr > bst_filter_point_at(f->filter, c->x, c->y))) {
         return false;
     }
     double dx, dy, snr = bst_filter_top(f->filter, false, c->x, c->y, &dx, &dy);
-    *out = (star){.shape = *path, .start_x = c->x + dx, .start_y = c->y + dy, .used = true};
-    out->shape.x_px = out->start_x;
-    out->shape.y_px = out->start_y;
+    bst_shape shape = {.x_px = c->x + dx, .y_px = c->y + dy, .sigma_px = f->sigma_px};
     bst_motion_streak(f->motion, f->camera, f->origin_x_px + f->binning * c->x,
-                      f->origin_y_px + f->binning * c->y, &out->shape.dx_px, &out->shape.dy_px);
-    out->shape.dx_px /= f->binning;
-    out->shape.dy_px /= f->binning;
+                      f->origin_y_px + f->binning * c->y, &shape.dx_px, &shape.dy_px);
+    bst_motion_bend(f->motion, f->camera, &shape.bend_x_px, &shape.bend_y_px);
+    shape.dx_px /= f->binning;
+    shape.dy_px /= f->binning;
+    shape.bend_x_px /= f->binning;
+    shape.bend_y_px /= f->binning;
+    *out = (star){.shape = shape, .start_x = shape.x_px, .start_y = shape.y_px, .used = true};
     out->noise_e = bst_background_noise_at(f->background, c->x, c->y);
     out->flux_e = snr * out->noise_e / f->filter->streak_norm;
     bst_source source = {.shape = out->shape};
@@ -175,7 +181,7 @@ static void sum_star(const float *planes, int n, float flux, float product, floa
     }
 }
 
-/* The star's pixels, all of which measure, behind its planes. */
+/* The star's pixels, all of which measure, and behind them 1 for each. */
 static void load_pixels(const bst_locate_frame *f, const bst_stamp *stamp, float *value) {
     int stride = bst_lanes_up(stamp->width), n = stride * stamp->height;
     float valid[BST_PSF_MAX_SIDE + BST_LANES];
@@ -194,12 +200,12 @@ static void load_pixels(const bst_locate_frame *f, const bst_stamp *stamp, float
 
 /* Normal equations of one star at the present motion. */
 static bool accumulate(const bst_streak_motion *work, const bst_psf *psf,
-                       const bst_profiles *profiles, const bst_locate_frame *f, double ex,
-                       double ey, star *s) {
+                       const bst_profiles *profiles, star *s) {
     int n = bst_lanes_up(s->stamp.width) * s->stamp.height;
-    bst_image_render_motion(profiles, psf, &s->shape, &s->stamp, ex, ey, work->scratch,
+    bst_image_render_motion(profiles, psf, &s->shape, &s->stamp, work->ex, work->ey, work->scratch,
                             work->planes);
-    load_pixels(f, &s->stamp, work->planes + BST_IMAGE_MOTION_PLANES * n);
+    memcpy(work->planes + BST_IMAGE_MOTION_PLANES * n, s->pixels,
+           2 * (size_t)n * sizeof *s->pixels);
     float sums[SUMS * BST_LANES];
     sum_star(work->planes, n, (float)s->flux_e, (float)s->product_e,
              (float)(s->noise_e * s->noise_e), sums);
@@ -319,44 +325,58 @@ static void reject(star *stars, int count, const double step[COMMON]) {
     }
 }
 
-bool bst_streak_motion_measure(bst_streak_motion *work, const bst_psf *psf, bst_profiles *profiles,
-                               const bst_locate_frame *f, const bst_candidates *candidates,
-                               double length_px, double bend_px, bst_motion *motion) {
+bool bst_streak_motion_begin(bst_streak_motion *work, const bst_locate_frame *f) {
+    work->count = 0;
     if (!f->motion || !f->filter->streak) {
         return false;
     }
-    bst_shape path = {.sigma_px = f->sigma_px};
-    bst_motion_streak(f->motion, f->camera, f->origin_x_px + 0.5 * f->binning * f->width,
-                      f->origin_y_px + 0.5 * f->binning * f->height, &path.dx_px, &path.dy_px);
-    bst_motion_bend(f->motion, f->camera, &path.bend_x_px, &path.bend_y_px);
-    path.bend_x_px /= f->binning;
-    path.bend_y_px /= f->binning;
-    double length = hypot(path.dx_px, path.dy_px);
-    double ex = path.dx_px / length, ey = path.dy_px / length;
-    double bend = f->binning * hypot(path.bend_x_px, path.bend_y_px);
-    if (!(length >= LEAST_PATH_SIGMAS * f->sigma_px * f->binning) || bend > MOST_BEND * length) {
-        return false;
-    }
-    bst_profiles_set(profiles, psf, f->sigma_px);
-    star stars[BST_STREAK_MOTION_STARS];
-    int count = 0;
-    for (int k = 0; k < candidates->count && k < LOOKED_AT && count < BST_STREAK_MOTION_STARS;
-         k++) {
-        if ((double)candidates->items[candidates->order[k]].snr < LEAST_SNR) {
+    double dx, dy, bend_x, bend_y;
+    bst_motion_streak(f->motion, f->camera, bst_camera_centre_x(f->camera),
+                      bst_camera_centre_y(f->camera), &dx, &dy);
+    bst_motion_bend(f->motion, f->camera, &bend_x, &bend_y);
+    double length = hypot(dx, dy);
+    work->ex = dx / length;
+    work->ey = dy / length;
+    work->binning = f->binning;
+    work->sigma_px = f->sigma_px;
+    return length >= LEAST_PATH_SIGMAS * f->sigma_px * f->binning &&
+           hypot(bend_x, bend_y) <= MOST_BEND * length;
+}
+
+void bst_streak_motion_add(bst_streak_motion *work, const bst_locate_frame *f,
+                           const bst_candidates *candidates) {
+    size_t plane = (size_t)work->max_side * (size_t)bst_lanes_up(work->max_side);
+    for (int k = 0; k < candidates->count && k < LOOKED_AT; k++) {
+        if (work->count == BST_STREAK_MOTION_STARS ||
+            (double)candidates->items[candidates->order[k]].snr < LEAST_SNR) {
             break;
         }
-        count += start_star(work, f, candidates, k, &path, &stars[count]);
+        star *s = &work->stars[work->count];
+        if (start_star(work, f, candidates, k, s)) {
+            float *pixels = work->pixels + (size_t)work->count * 2 * plane;
+            load_pixels(f, &s->stamp, pixels);
+            s->pixels = pixels;
+            work->count++;
+        }
     }
+}
+
+bool bst_streak_motion_solve(bst_streak_motion *work, const bst_psf *psf, bst_profiles *profiles,
+                             const bst_camera *camera, double length_px, double bend_px,
+                             bst_motion *motion) {
+    star *stars = work->stars;
+    int count = work->count, left = 0;
+    double ex = work->ex, ey = work->ey, b = work->binning;
+    bst_profiles_set(profiles, psf, work->sigma_px);
     /* what is known exactly leaves the matrix well conditioned */
     const double least = 1e-4;
     const double sigma[COMMON] = {fmax(length_px, least), fmax(length_px, least),
                                   fmax(bend_px, least)};
     double away[COMMON] = {0};
-    int left = 0;
     for (int round = 0; round < ROUNDS; round++) {
         double step[COMMON] = {0};
         for (int i = 0; i < count; i++) {
-            stars[i].used = stars[i].used && accumulate(work, psf, profiles, f, ex, ey, &stars[i]);
+            stars[i].used = stars[i].used && accumulate(work, psf, profiles, &stars[i]);
         }
         if (!agree(stars, count, sigma, away, step)) {
             return false;
@@ -384,8 +404,7 @@ bool bst_streak_motion_measure(bst_streak_motion *work, const bst_psf *psf, bst_
     if (left == 0) {
         return false;
     }
-    bst_motion_add(motion, f->camera, f->binning * (away[0] * ex - away[1] * ey),
-                   f->binning * (away[0] * ey + away[1] * ex), f->binning * away[2] * ex,
-                   f->binning * away[2] * ey);
+    bst_motion_add(motion, camera, b * (away[0] * ex - away[1] * ey),
+                   b * (away[0] * ey + away[1] * ex), b * away[2] * ex, b * away[2] * ey);
     return true;
 }

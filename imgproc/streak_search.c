@@ -11,6 +11,9 @@ static const double MARGIN_SNR = 0.8;
 /* Measured on noise for PSFs of sigma 0.43 to 2.2 px, lengths of 24 to 120 px and 0.05 to 60 false
  * alarms per frame of 2048^2; theory has powers of -3 and 1 where nothing is discrete. */
 static const double RATE = 0.72, SIGMA_POWER = -2.35, LENGTH_PX = 200.0;
+/* Points too faint to be found, for each that is: as many as numbers that go with 1 / SNR have from
+ * SNR 3 up to a threshold of 5; and how near one another two of them look like a short streak. */
+static const double FAINTER = 0.7, PAIR_PX = 9.0;
 /* The search among points: a point alone stays below this SNR, and a chain of points has gaps. */
 enum { BRIGHT_OCTAVE = 1 };
 static const double BRIGHT_SNR = 7.5, BRIGHT_FILLED = 0.75, BRIGHT_PX = 11.0;
@@ -120,9 +123,10 @@ void bst_streak_search_fill(bst_streak_search *s, const float *signal, int width
     bst_streak_map_fill(&s->map, s->pool, signal, width, height, background, sigma_px);
 }
 
-/* Leaves lines above `threshold` whose `filled` and length are at least those given in s->found. */
+/* Leaves lines above `threshold` whose `filled` and length are at least those given in s->found.
+ * more: by which the square of a line's SNR exceeds that of the two brightest points on it. */
 static int run(bst_streak_search *s, int first_octave, double margin, double threshold,
-               double filled, double least_px) {
+               double filled, double least_px, double more) {
     s->threshold_snr = threshold;
     int hits = bst_streak_bank_run(&s->bank, s->pool, &s->map, first_octave, threshold - margin);
     s->candidates = choose(s, hits);
@@ -141,9 +145,9 @@ static int run(bst_streak_search *s, int first_octave, double margin, double thr
             /* without the light that is taken already */
             bst_streak_refine(&s->map, &s->chosen[s->order[i]], s->max_px, line);
         }
-        if (!(line->snr > threshold) ||
-            !(line->snr > hypot(line->point_snr[0], line->point_snr[1])) || line->filled < filled ||
-            hypot(line->x1 - line->x0, line->y1 - line->y0) < least_px) {
+        double of_points = hypot(line->point_snr[0], line->point_snr[1]);
+        if (!(line->snr > threshold) || !(line->snr * line->snr > of_points * of_points + more) ||
+            line->filled < filled || hypot(line->x1 - line->x0, line->y1 - line->y0) < least_px) {
             continue;
         }
         s->found[found++] = *line;
@@ -154,11 +158,13 @@ static int run(bst_streak_search *s, int first_octave, double margin, double thr
 }
 
 int bst_streak_search_bright(bst_streak_search *s) {
-    return run(s, BRIGHT_OCTAVE, 0.0, BRIGHT_SNR, BRIGHT_FILLED, BRIGHT_PX);
+    return run(s, BRIGHT_OCTAVE, 0.0, BRIGHT_SNR, BRIGHT_FILLED, BRIGHT_PX, 0.0);
 }
 
-int bst_streak_search_faint(bst_streak_search *s, double false_alarms) {
+int bst_streak_search_faint(bst_streak_search *s, double false_alarms, int points) {
+    double faint = FAINTER * points, pixels = (double)s->map.width * (double)s->map.height;
+    double pairs = faint * faint * BST_PI * PAIR_PX * PAIR_PX / (2.0 * pixels);
     double threshold =
         bst_streak_threshold(false_alarms, s->map.width, s->map.height, s->map.sigma_px, s->max_px);
-    return run(s, 0, MARGIN_SNR, threshold, 0.0, 0.0);
+    return run(s, 0, MARGIN_SNR, threshold, 0.0, 0.0, 2.0 * log1p(pairs / false_alarms));
 }

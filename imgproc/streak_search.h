@@ -44,7 +44,12 @@ void bst_streak_search_fill(bst_streak_search *search, const float *signal, int 
  * number. */
 int bst_streak_search_bright(bst_streak_search *search);
 /* The same for all that exceeds bst_streak_threshold. Points are to be taken out of search->map
- * before (bst_streak_map_blank). */
-int bst_streak_search_faint(bst_streak_search *search, double false_alarms);
+ * before (bst_streak_map_blank).
+ *
+ * Two points too faint to be found, near one another, look like a short streak. The likelihood of a
+ * line over that of the two brightest points on it, e^(half the difference of the squared SNRs),
+ * must exceed the number of such pairs, as `points` that were found in the frame lead to expect,
+ * over the false alarms. */
+int bst_streak_search_faint(bst_streak_search *search, double false_alarms, int points);
 
 #endif

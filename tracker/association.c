@@ -311,7 +311,7 @@ static void share(bst_mtt *mtt) {
     }
 }
 
-void bst_mtt_associate(bst_mtt *mtt) {
+void bst_mtt_associate(bst_mtt *mtt, bool partial) {
     mtt->largest_sigma = largest_sigma(&mtt->now);
     for (int t = 0; t < mtt->track_count; t++) {
         mtt->detection_of_track[t] = -1;
@@ -327,9 +327,12 @@ void bst_mtt_associate(bst_mtt *mtt) {
     for (int i = 0; i < mtt->now.count; i++) {
         unused += !mtt->now.used[i];
     }
-    mtt->alarm_frames++;
-    mtt->alarms += fmax(ALARM_GAIN, 1.0 / mtt->alarm_frames) * (unused - mtt->alarms);
-    mtt->clutter_density =
-        fmax(fmax(mtt->clutter, unused), mtt->params.false_alarms_per_frame) / mtt->params.field_sr;
+    if (!partial) {
+        mtt->alarm_frames++;
+        mtt->alarms += fmax(ALARM_GAIN, 1.0 / mtt->alarm_frames) * (unused - mtt->alarms);
+        mtt->clutter_density =
+            fmax(fmax(mtt->clutter, unused), mtt->params.false_alarms_per_frame) /
+            mtt->params.field_sr;
+    }
     assign_group(mtt, true);
 }

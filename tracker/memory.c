@@ -12,12 +12,15 @@ static void forget(bst_mtt *m, int i) {
     memmove(m->memory + i, m->memory + i + 1, (size_t)(m->memory_count - i) * sizeof *m->memory);
 }
 
-void bst_mtt_predict_memory(bst_mtt *m, double dt_s) {
+void bst_mtt_predict_memory(bst_mtt *m, const bst_mtt_frame *frame) {
+    double dt_s = frame->seconds - m->seconds;
     double limit2 = m->params.memory_sigma_rad * m->params.memory_sigma_rad;
     int kept = 0;
     for (int i = 0; i < m->memory_count; i++) {
         bst_mtt_track *track = &m->memory[i];
-        bst_filter_predict(&m->filter, dt_s, &track->state, &track->models);
+        if (!bst_mtt_predict_orbit(m, track, frame)) {
+            bst_filter_predict(&m->filter, dt_s, &track->state, &track->models);
+        }
         double variance = fmax(track->state.covariance[0][0], track->state.covariance[1][1]);
         if (variance <= limit2 && m->seconds + dt_s - track->last_update_s <= m->params.memory_s) {
             m->memory[kept++] = *track;
@@ -60,6 +63,16 @@ bool bst_mtt_resume(bst_mtt *m, bst_mtt_track *track) {
     track->id = before->id;
     track->hits += before->hits;
     track->first_tick = before->first_tick;
+    if (before->orbit.valid) {
+        /* the orbit knows more than the few detections since */
+        bst_orbit_track orbit = before->orbit;
+        bst_sky_state state = orbit.sky;
+        if (bst_sky_fuse(&state, &track->state) && bst_orbit_track_update(&orbit, &state)) {
+            track->orbit = orbit;
+            track->state = state;
+            track->models.count = 0;
+        }
+    }
     forget(m, best);
     return true;
 }

@@ -22,6 +22,7 @@ typedef struct tracker_module {
     const bst_stars *stars;
     double julian_year, blend_rad;
     double tick_rate_hz;
+    bool orbits;
 } tracker_module;
 
 /* Brightness, of companions relative to a star, that moves its image. */
@@ -74,6 +75,7 @@ static bst_status create(const bst_module_env *env, const void *config, bst_filt
     m->stars = bst_knowledge_stars(env->knowledge);
     m->julian_year = bst_knowledge_julian_year(env->knowledge);
     m->tick_rate_hz = (double)env->tick_rate_hz;
+    m->orbits = c->motion == 1;
     const bst_camera *camera = bst_knowledge_camera(env->knowledge);
     m->blend_rad = camera->psf_fwhm_px * bst_camera_scale_rad(camera);
     bst_status status = bst_knowledge_view_create(env->ctx, env->knowledge, &m->view);
@@ -163,6 +165,11 @@ static bst_status take(tracker_module *m, struct bst_step *step, const bst_detec
                                   .rate_sigma_radps = cue.rate_sigma_radps,
                                   .v_mag = cue.v_mag,
                                   .v_mag_sigma = cue.v_mag_sigma};
+    if (m->orbits) {
+        bool known;
+        BST_TRY(bst_knowledge_cue_range_at(bst_step_ctx(step), m->view, seconds, &known,
+                                           &input.cue.range_m, &input.cue.range_rate_mps));
+    }
     int track_room, prediction_room;
     bst_tracks *tracks = bst_step_write(step, PORT_TRACKS, &track_room);
     bst_predictions *predictions = bst_step_write(step, PORT_PREDICTIONS, &prediction_room);

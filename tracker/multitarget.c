@@ -33,6 +33,10 @@ static bst_status check(bst_ctx *ctx, const bst_mtt_params *p) {
                         "positive field, false alarms and gate, event_window 0 to %d)",
                         BST_MTT_EVENT_WINDOW);
     }
+    if (p->filter == BST_FILTER_IMM && p->orbits) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "tracker: motion \"orbit\" does not go with type \"imm\"; use \"ekf\"");
+    }
     if (p->filter == BST_FILTER_IMM &&
         !(p->manoeuvre_noise_rad2ps3 >= 0.0 && p->quiet_s > 0.0 && p->manoeuvre_s > 0.0)) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
@@ -180,15 +184,19 @@ static void predict(bst_mtt *m, const bst_mtt_frame *frame) {
             m->observable[t] = true;
             continue;
         }
-        bst_filter_predict(&m->filter, dt, &track->state, &track->models);
-        if (forward && shares_acceleration(m, track, frame)) {
-            shift(track, frame, step, rate);
+        if (!bst_mtt_predict_orbit(m, track, frame)) {
+            bst_filter_predict(&m->filter, dt, &track->state, &track->models);
+            if (forward && shares_acceleration(m, track, frame)) {
+                shift(track, frame, step, rate);
+            }
         }
-        m->observable[t] = !frame->in_field || frame->in_field(frame->user, track->state.direction);
+        m->observable[t] =
+            !(frame->partial && track->status == BST_TRACK_TENTATIVE) &&
+            (!frame->in_field || frame->in_field(frame->user, track->state.direction));
     }
-    bst_mtt_predict_memory(m, dt);
+    bst_mtt_predict_memory(m, frame);
     for (int i = 0; forward && i < m->memory_count; i++) {
-        if (shares_acceleration(m, &m->memory[i], frame)) {
+        if (!m->memory[i].orbit.valid && shares_acceleration(m, &m->memory[i], frame)) {
             shift(&m->memory[i], frame, step, rate);
         }
     }
@@ -434,7 +442,7 @@ void bst_mtt_step(bst_mtt *m, const bst_mtt_frame *frame) {
     double floor = m->params.false_alarms_per_frame;
     m->clutter_density = fmax(m->clutter, floor) / m->params.field_sr;
     m->alarm_density = fmax(m->alarms, floor) / m->params.field_sr;
-    bst_mtt_associate(m);
+    bst_mtt_associate(m, frame->partial);
     int unused = 0;
     for (int t = 0; t < m->track_count; t++) {
         m->tracks[t].last_chi2 = -1.0;
@@ -443,7 +451,8 @@ void bst_mtt_step(bst_mtt *m, const bst_mtt_frame *frame) {
     for (int i = 0; i < m->now.count; i++) {
         unused += !m->now.used[i];
     }
-    m->clutter += 0.1 * (unused - m->clutter);
+    m->clutter += frame->partial ? 0.0 : 0.1 * (unused - m->clutter);
+    bst_mtt_update_orbits(m, frame);
     judge(m, frame);
     bst_mtt_initiate(m, frame);
     remember(m);

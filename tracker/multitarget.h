@@ -21,6 +21,7 @@
 #include "sim/core/messages.h"
 #include "sim/core/status.h"
 #include "tracker/filter.h"
+#include "tracker/orbit_track.h"
 
 typedef enum bst_mtt_association {
     BST_MTT_GNN = 0, /* the assignment of least total cost */
@@ -44,19 +45,21 @@ typedef struct bst_mtt_params {
     double field_sr;                  /* solid angle of the field */
     int confirm_hits, confirm_frames; /* M of N, the two initial detections included */
     double confirm_score;             /* least log-likelihood ratio */
-    double max_rate_radps;            /* of tracks that start without the cue */
-    double cue_rate_margin_radps;     /* widens the cue's rate sigma */
-    double initiation_gap_s; /* longest time between the two detections that start a track */
-    int max_misses;          /* in a row, after which a confirmed track is deleted */
-    double max_coast_s;      /* longest time without a detection */
-    double max_sigma_rad;    /* a track with a direction worse than this is deleted */
-    double merge_rad;        /* closer than this two objects may share one detection */
-    double merge_floor_rad;  /* 1 sigma per axis added to a shared detection */
-    int max_merged;          /* frames in a row that a track may live on shared detections */
-    double feed_forward_rad; /* tracks this close to the cue follow the cue's acceleration */
-    double star_rate_radps;  /* the slowest object's; 0: nothing is taken for a star */
-    double motion_chi2;      /* of a rate against none that proves motion, 2 degrees of freedom */
-    int max_stars;           /* room for tracks at rest */
+    bool orbits; /* tracks whose range is known or assumed move along orbits (orbit_track.h) */
+    double orbit_noise_m2ps3;     /* white acceleration beside two-body motion */
+    double max_rate_radps;        /* of tracks that start without the cue */
+    double cue_rate_margin_radps; /* widens the cue's rate sigma */
+    double initiation_gap_s;      /* longest time between the two detections that start a track */
+    int max_misses;               /* in a row, after which a confirmed track is deleted */
+    double max_coast_s;           /* longest time without a detection */
+    double max_sigma_rad;         /* a track with a direction worse than this is deleted */
+    double merge_rad;             /* closer than this two objects may share one detection */
+    double merge_floor_rad;       /* 1 sigma per axis added to a shared detection */
+    int max_merged;               /* frames in a row that a track may live on shared detections */
+    double feed_forward_rad;      /* tracks this close to the cue follow the cue's acceleration */
+    double star_rate_radps;       /* the slowest object's; 0: nothing is taken for a star */
+    double motion_chi2; /* of a rate against none that proves motion, 2 degrees of freedom */
+    int max_stars;      /* room for tracks at rest */
     double brightness_floor_mag; /* 1 sigma added to every magnitude */
     double brightness_walk_mag;  /* 1 sigma by which an object's brightness changes per frame */
     /* Manoeuvres and changes of brightness are told by the innovations of the latest event_window
@@ -88,6 +91,7 @@ typedef struct bst_mtt_track {
     bst_track_status status;
     bst_sky_state state;
     bst_filter_models models;
+    bst_orbit_track orbit; /* valid: what state comes from */
     double v_mag, v_mag_variance;
     double snr, x_px, y_px; /* latest detection */
     int hits, misses_in_row, merged_in_row;
@@ -114,6 +118,9 @@ typedef struct bst_mtt_frame {
     double seconds; /* the same, since the epoch */
     const bst_mtt_detection *detections;
     int count;
+    /* Only windows round the confirmed tracks were looked at: tentative tracks are not missed, and
+     * nothing is learnt of clutter. */
+    bool partial;
     /* Is a geometric direction on the sensor, well away from its edge? NULL: everything is. */
     bool (*in_field)(const void *user, bst_vec3 direction);
     const void *user;
@@ -125,6 +132,10 @@ typedef struct bst_mtt_frame {
     double cue_rate_sigma_radps;
     /* Is a track what the cue expects, so that its slowness says nothing? NULL: none is. */
     bool (*expected)(const void *user, const bst_mtt_track *track);
+    /* Where the observer is, for tracks on orbits; NULL: their orbits wait. */
+    const bst_od_observer *observer;
+    /* What is believed of a confirmed track's range; false: nothing. NULL: nothing of any. */
+    bool (*range)(const void *user, const bst_mtt_track *track, bst_orbit_range *out);
     /* 1 sigma per axis of an apparent rate that all of this frame's directions may share */
     double common_rate_sigma_radps;
 } bst_mtt_frame;

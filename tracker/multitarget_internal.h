@@ -70,14 +70,19 @@ void bst_mtt_pool_range(const bst_mtt_pool *pool, bst_vec3 direction, double cho
                         int *end);
 
 /* Fills detection_of_track, shared and extra for the tracks of this frame (already predicted). */
-void bst_mtt_associate(bst_mtt *mtt);
+void bst_mtt_associate(bst_mtt *mtt, bool partial);
 
 /* Detections in the gate of track t that no other confirmed track has: at most BST_MTT_CANDIDATES,
  * the likeliest. Returns their number. */
 int bst_mtt_gated(const bst_mtt *mtt, int t, int *columns);
 
-/* Carries the memory over dt_s; forgets what is too old or too vague. */
-void bst_mtt_predict_memory(bst_mtt *mtt, double dt_s);
+/* Carries the memory to a frame; forgets what is too old or too vague. */
+void bst_mtt_predict_memory(bst_mtt *mtt, const bst_mtt_frame *frame);
+/* A track that has an orbit follows it to a frame; false: it has none, or the frame does not say
+ * where the observer is. */
+bool bst_mtt_predict_orbit(const bst_mtt *mtt, bst_mtt_track *track, const bst_mtt_frame *frame);
+/* Hands on to the orbits what the frame's detections told, and starts new ones. */
+void bst_mtt_update_orbits(bst_mtt *mtt, const bst_mtt_frame *frame);
 /* Remembers a confirmed track that is deleted. */
 void bst_mtt_remember(bst_mtt *mtt, const bst_mtt_track *track);
 /* Gives a track that has just been confirmed the identity of the remembered one that it is; false

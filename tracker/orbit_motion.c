@@ -146,20 +146,17 @@ bst_status bst_od_propagate(bst_ctx *ctx, const bst_od_motion *motion, const bst
     return BST_OK;
 }
 
-bst_status bst_od_predict(bst_ctx *ctx, const bst_od_motion *motion, const bst_od_state *state,
-                          const double covariance[6][6], const bst_od_observer *observer,
-                          bst_od_sight *out, double sky_covariance[4][4]) {
-    bst_od_state then;
-    double p[6][6], slope[4][6];
-    BST_TRY(bst_od_propagate(ctx, motion, state, covariance, observer->time_s, &then, p));
-    bst_od_see(&then, observer, out);
+void bst_od_project(const bst_od_state *state, const double covariance[6][6],
+                    const bst_od_observer *observer, bst_od_sight *out, double slope[4][6],
+                    double sky_covariance[4][4]) {
+    bst_od_see(state, observer, out);
     bst_tangent axes = bst_tangent_at(out->direction);
     for (int k = 0; k < 6; k++) {
         /* within a thousandth of the range, which may be far below that of the orbit */
-        double step = k < 3 ? 1e-5 * out->range_m : step_of(&then, k);
+        double step = k < 3 ? 1e-5 * out->range_m : step_of(state, k);
         bst_od_sight side[2];
         for (int i = 0; i < 2; i++) {
-            bst_od_state near = then;
+            bst_od_state near = *state;
             add_to_state(&near, k, i ? -step : step);
             bst_od_see(&near, observer, &side[i]);
         }
@@ -178,12 +175,21 @@ bst_status bst_od_predict(bst_ctx *ctx, const bst_od_motion *motion, const bst_o
             double sum = 0.0;
             for (int a = 0; a < 6; a++) {
                 for (int b = 0; b < 6; b++) {
-                    sum += slope[i][a] * p[a][b] * slope[j][b];
+                    sum += slope[i][a] * covariance[a][b] * slope[j][b];
                 }
             }
             sky_covariance[i][j] = sky_covariance[j][i] = sum;
         }
     }
+}
+
+bst_status bst_od_predict(bst_ctx *ctx, const bst_od_motion *motion, const bst_od_state *state,
+                          const double covariance[6][6], const bst_od_observer *observer,
+                          bst_od_sight *out, double sky_covariance[4][4]) {
+    bst_od_state then;
+    double p[6][6], slope[4][6];
+    BST_TRY(bst_od_propagate(ctx, motion, state, covariance, observer->time_s, &then, p));
+    bst_od_project(&then, p, observer, out, slope, sky_covariance);
     return BST_OK;
 }
 

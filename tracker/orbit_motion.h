@@ -56,6 +56,13 @@ bst_status bst_od_propagate(bst_ctx *ctx, const bst_od_motion *motion, const bst
                             const double covariance[6][6], double time_s, bst_od_state *out,
                             double covariance_out[6][6]) BST_MUST_CHECK;
 
+/* What the observer sees of a state with covariance at the same time: direction and rate, their
+ * derivatives by r and v (rows d1, d2, r1, r2 in the tangent axes at the direction; rad/m, rad s/m,
+ * 1/s ...), and their covariance in those axes. */
+void bst_od_project(const bst_od_state *state, const double covariance[6][6],
+                    const bst_od_observer *observer, bst_od_sight *out, double slope[4][6],
+                    double sky_covariance[4][4]);
+
 /* Direction and rate that an orbit with covariance predicts for the observer at observer->time_s,
  * and their covariance in the tangent axes at the direction, as bst_track has it: d1, d2, r1, r2
  * (rad^2, rad^2/s, rad^2/s^2). The orbital-motion model of a track whose range is known or assumed:

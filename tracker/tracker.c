@@ -4,8 +4,10 @@
 #include <string.h>
 
 #include "sim/astro/bodies.h"
+#include "sim/world/kepler.h"
 #include "tracker/attitude.h"
 #include "tracker/attitude_error.h"
+#include "tracker/sky_of_detection.h"
 #include "tracker/target.h"
 
 /* Places in the cache of catalogue directions; a power of two. */
@@ -26,6 +28,8 @@ struct bst_tracker {
     bst_attitude_params attitude_params;
     bst_attitude_error_params error_params;
     bst_target_params target_params;
+    bool orbits;
+    double assumed_range_m, range_sigma, range_rate_sigma_mps;
     double floor_variance_px2, blend_variance_px2, max_variance_px2, edge_margin_px,
         max_attitude_sigma_rad;
     int max_detections;
@@ -79,6 +83,10 @@ static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_par
         .memory_chi2 = 23.5, /* 99.99 %, 4 degrees of freedom */
         /* what was lost may have manoeuvred: ten times the usual acceleration */
         .memory_noise_rad2ps3 = square(10.0 * arcsec(c->process_noise_arcsec_per_s15))};
+    t->orbits = c->motion == 1;
+    t->assumed_range_m = 1e3 * c->assumed_range_km;
+    t->range_sigma = c->range_sigma;
+    t->range_rate_sigma_mps = c->range_rate_sigma_mps;
     t->floor_variance_px2 = square(c->object_floor_px);
     t->blend_variance_px2 = square(c->blend_sigma_px);
     t->max_variance_px2 = square(c->max_attitude_sigma_px);
@@ -102,6 +110,8 @@ static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_par
         .memory_s = c->memory_s,
         .memory_sigma_rad = c->memory_sigma_deg * BST_DEG_RAD,
         .memory_chi2 = c->memory_chi2,
+        .orbits = c->motion == 1,
+        .orbit_noise_m2ps3 = square(c->orbit_noise_mps15),
         .gate_chi2 = c->gate_chi2,
         .detection_probability = c->detection_probability,
         .false_alarms_per_frame = c->false_alarms_per_frame,
@@ -269,52 +279,14 @@ static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_lig
                   fmax(out->fix.sigma_rad[0], out->fix.sigma_rad[1]) <= t->max_attitude_sigma_rad;
 }
 
-/* A detection as a geometric direction with the covariance of centroid and attitude. */
 static bst_sky_measurement to_sky(const bst_tracker *t, const bst_detection *item,
                                   const frame_attitude *attitude, const bst_light *light) {
-    bst_vec3 v = bst_camera_unproject(&t->camera, item->x_px, item->y_px);
-    bst_quat back = bst_quat_conj(attitude->q_cam_from_gcrf);
-    bst_vec3 apparent = bst_quat_rotate(back, v);
-    bst_sky_measurement m = {.direction = bst_light_unaberrate(light, apparent)};
-    bst_tangent axes = bst_tangent_at(m.direction);
-    double scale = bst_camera_scale_rad(&t->camera) * v.z; /* rad per px towards the field's edge */
     double extra = t->floor_variance_px2;
     if (item->flags & (BST_DETECTION_BLEND | BST_DETECTION_EDGE)) {
         extra += t->blend_variance_px2;
     }
-    /* derivatives of the direction by x, y (px) and by rotation about camera x, y, z */
-    bst_vec3 unit[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, columns[5];
-    double s[2][2];
-    bst_camera_jacobian(&t->camera, v, s);
-    double det = s[0][0] * s[1][1] - s[0][1] * s[1][0];
-    const bst_vec3 by_px[2] = {{s[1][1] / det, -s[1][0] / det, 0.0},
-                               {-s[0][1] / det, s[0][0] / det, 0.0}};
-    for (int i = 0; i < 2; i++) {
-        columns[i] = bst_vec3_scale(bst_tangent_project(v, by_px[i]), scale);
-    }
-    for (int i = 0; i < 3; i++) {
-        columns[i + 2] = bst_vec3_cross(unit[i], v);
-    }
-    double j[2][5];
-    for (int i = 0; i < 5; i++) {
-        bst_vec3 g = bst_quat_rotate(back, columns[i]);
-        j[0][i] = bst_vec3_dot(g, axes.e1);
-        j[1][i] = bst_vec3_dot(g, axes.e2);
-    }
-    double c[5][5] = {{item->cov_xx + extra, item->cov_xy}, {item->cov_xy, item->cov_yy + extra}};
-    for (int i = 0; i < 3; i++) {
-        for (int k = 0; k < 3; k++) {
-            c[i + 2][k + 2] = attitude->covariance_cam[i][k];
-        }
-    }
-    for (int i = 0; i < 5; i++) {
-        for (int k = 0; k < 5; k++) {
-            m.cov_11 += j[0][i] * c[i][k] * j[0][k];
-            m.cov_12 += j[0][i] * c[i][k] * j[1][k];
-            m.cov_22 += j[1][i] * c[i][k] * j[1][k];
-        }
-    }
-    return m;
+    return bst_sky_of_detection(&t->camera, item, extra, attitude->q_cam_from_gcrf,
+                                attitude->covariance_cam, light);
 }
 
 static int collect_objects(bst_tracker *t, const bst_detections *d, const frame_attitude *attitude,
@@ -357,6 +329,8 @@ typedef struct frame_view {
     bst_quat q_cam_from_gcrf;
     bst_light light;
     bst_target_cue cue;
+    double range_m, range_rate_mps; /* of the cue's object; range 0: not known */
+    bst_od_observer observer;
 } frame_view;
 
 static bool in_field(const void *user, bst_vec3 direction) {
@@ -373,6 +347,37 @@ static bool is_expected(const void *user, const bst_mtt_track *track) {
     const frame_view *f = user;
     const bst_tracker *t = f->tracker;
     return bst_target_is_expected(&t->target_params, &f->cue, track, track->id == t->target.id);
+}
+
+/* Range rates of orbits about the Earth, 1 sigma. */
+static const double ANY_RANGE_RATE_MPS = 3000.0;
+
+static bool range_of(const void *user, const bst_mtt_track *track, bst_orbit_range *out) {
+    const frame_view *f = user;
+    const bst_tracker *t = f->tracker;
+    bool cued = f->range_m > 0.0 && is_expected(user, track);
+    if (!cued && !(t->assumed_range_m > 0.0)) {
+        return false;
+    }
+    double range = cued ? f->range_m : t->assumed_range_m;
+    *out = (bst_orbit_range){
+        .range_m = range,
+        .range_sigma_m = t->range_sigma * range,
+        .range_rate_mps = cued ? f->range_rate_mps : 0.0,
+        .range_rate_sigma_mps = cued ? t->range_rate_sigma_mps : ANY_RANGE_RATE_MPS};
+    return true;
+}
+
+/* The observer in mid-exposure, from navigation telemetry of about that time. */
+static bool find_observer(const bst_tracker *t, const bst_nav_telemetry *nav, double seconds,
+                          bst_od_observer *out) {
+    bst_ctx quiet = {0}; /* telemetry that is no orbit is no failure of the run */
+    double dt = seconds - (double)nav->tick / t->tick_rate_hz;
+    out->time_s = seconds;
+    out->earth_bary_mps = bst_vec3_sub(nav->velocity_bary_mps, nav->velocity_gcrf_mps);
+    return bst_kepler_propagate(&quiet, BST_EARTH_MU_M3PS2, nav->position_gcrf_m,
+                                nav->velocity_gcrf_mps, dt, &out->position_m,
+                                &out->velocity_mps) == BST_OK;
 }
 
 static void add_event(bst_tracker *t, bst_tracker_event_kind kind, const bst_mtt_track *track) {
@@ -525,6 +530,8 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
     frame_view view = {.tracker = t,
                        .q_cam_from_gcrf = attitude.q_cam_from_gcrf,
                        .light = light,
+                       .range_m = cue->range_m,
+                       .range_rate_mps = cue->range_rate_mps,
                        .cue = {.valid = cue->valid,
                                .direction = cue->direction_gcrf,
                                .rate_radps = cue->rate_gcrf_radps,
@@ -535,8 +542,10 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
     bst_mtt_frame frame = {.tick = tick,
                            .seconds = seconds,
                            .detections = t->detections,
+                           .partial = d->windows > 0,
                            .in_field = in_field,
                            .expected = is_expected,
+                           .range = range_of,
                            .user = &view,
                            .cue_valid = cue->valid,
                            .cue_before_valid = t->cue_before.valid,
@@ -546,6 +555,9 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
                            .cue_before_rate_radps = t->cue_before.rate_gcrf_radps,
                            .cue_rate_sigma_radps = cue->rate_sigma_radps,
                            .common_rate_sigma_radps = attitude.rate_sigma_radps};
+    if (t->orbits && find_observer(t, input->nav, seconds, &view.observer)) {
+        frame.observer = &view.observer;
+    }
     int detections_lost = 0;
     if (attitude.usable) {
         frame.count = collect_objects(t, d, &attitude, &light, &detections_lost);

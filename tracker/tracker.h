@@ -28,6 +28,8 @@ typedef struct bst_tracker_config {
     double star_rate_arcsec_per_s, motion_chi2;
     int64_t target_min_hits, max_tracks, max_stars, max_detections;
     int32_t association; /* bst_mtt_association */
+    int32_t motion;      /* 1: orbit */
+    double assumed_range_km, range_sigma, range_rate_sigma_mps, orbit_noise_mps15;
     double manoeuvre_noise_arcsec_per_s15, quiet_s, manoeuvre_s;
     double brightness_floor_mag, brightness_walk_mag;
     int64_t event_window;
@@ -50,6 +52,7 @@ typedef struct bst_tracker_cue {
     bst_vec3 direction_gcrf, rate_gcrf_radps;
     double sigma_rad, rate_sigma_radps;
     double v_mag, v_mag_sigma;
+    double range_m, range_rate_mps; /* of the cue's object; range 0: not known */
 } bst_tracker_cue;
 
 typedef struct bst_tracker_input {

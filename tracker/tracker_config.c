@@ -3,6 +3,7 @@
 #define C bst_tracker_config
 
 /* in the order of bst_mtt_association */
+static const char *const motions[] = {"constant_rate", "orbit", NULL};
 static const char *const associations[] = {"gnn", "nearest", "pda", "mixture", NULL};
 
 const bst_config_desc bst_tracker_config_table[] = {
@@ -51,7 +52,7 @@ const bst_config_desc bst_tracker_config_table[] = {
              "Objects nearer to each other than this may share one detection."),
     BST_REAL(C, merge_floor_px, "px", 0, 100, "0.3",
              "Standard deviation added to a shared detection."),
-    BST_REAL(C, object_floor_px, "px", 0, 10, "0.05",
+    BST_REAL(C, object_floor_px, "px", 0, 10, "0.02",
              "Standard deviation added to the centroid of every detection that is not a star."),
     BST_REAL(C, blend_sigma_px, "px", 0, 100, "0.5",
              "Standard deviation added to detections flagged as blends or at an edge."),
@@ -91,6 +92,21 @@ const bst_config_desc bst_tracker_config_table[] = {
         "but the filter of a confirmed track weighs every detection in its gate by its "
         "probability. mixture: as pda, and the likeliest choices live on apart until later "
         "detections decide; with type imm the same as pda."),
+    BST_ENUM(
+        C, motion, motions, "\"constant_rate\"",
+        "constant_rate: along a great circle, with the cue's acceleration near it. orbit: along "
+        "an orbit about the Earth, from a confirmed track's direction and rate and the range "
+        "of the cue's object or the assumed one (not with type imm)."),
+    BST_REAL(C, assumed_range_km, "km", 0, 1e7, "0",
+             "Motion orbit: range of tracks of which the cue knows none; 0: those keep a constant "
+             "rate."),
+    BST_REAL(C, range_sigma, "", 1e-6, 1, "0.02",
+             "Motion orbit: standard deviation of the range, as a share of it."),
+    BST_REAL(C, range_rate_sigma_mps, "m/s", 0, 1e5, "50",
+             "Motion orbit: standard deviation of the range rate (of an assumed range: 3000 m/s)."),
+    BST_REAL(C, orbit_noise_mps15, "m/s^1.5", 0, 1e3, "1e-3",
+             "Motion orbit: square root of the power spectral density of the acceleration beside "
+             "two-body motion."),
     BST_REAL(C, manoeuvre_noise_arcsec_per_s15, "arcsec/s^1.5", 0, 1e5, "3",
              "Type imm: the same as process_noise_arcsec_per_s15 while an object manoeuvres."),
     BST_REAL(C, quiet_s, "s", 1e-3, 1e9, "3600",

@@ -159,6 +159,18 @@ void bst_pd_stars_free(bst_pd_stars *stars) {
     *stars = (bst_pd_stars){.count = 0};
 }
 
+/* Whether a star lies on a detection that is as long as it says: many stars in a crowd, or one and
+ * its neighbours, make a streak. */
+static bool holds(const bst_detection *d, double reach_px, const bst_match_target *star) {
+    if (!(d->flags & BST_DETECTION_STREAK)) {
+        return false;
+    }
+    bst_match_target line = {d->x_px, d->y_px, d->length_px * cos(d->angle_rad),
+                             d->length_px * sin(d->angle_rad)};
+    bst_detection at = {.x_px = star->x_px, .y_px = star->y_px};
+    return bst_match_belongs(&line, reach_px, &at);
+}
+
 bool bst_pd_is_star(const bst_pd_stars *s, double reach_px, const bst_detection *d) {
     if (s->count == 0) {
         return false;
@@ -168,13 +180,18 @@ bool bst_pd_is_star(const bst_pd_stars *s, double reach_px, const bst_detection 
     for (int i = 0; i < s->count; i += 1 + s->count / 16) {
         half = fmax(half, 0.55 * hypot(s->places[i].dx_px, s->places[i].dy_px));
     }
+    if (d->flags & BST_DETECTION_EDGE) {
+        reach_px *= 2.0; /* the star may be beyond the edge, and its place is where its light is */
+    }
+    half = d->flags & BST_DETECTION_STREAK ? fmax(half, fmin(0.5 * d->length_px, 256.0)) : half;
     int around = (int)ceil((reach_px + half) / s->cell_px);
     for (int j = -around; j <= around; j++) {
         for (int i = -around; i <= around; i++) {
             double x = d->x_px + i * s->cell_px, y = d->y_px + j * s->cell_px;
             int cell = cell_of(s, x, y);
             for (int k = s->first[cell]; k < s->first[cell + 1]; k++) {
-                if (bst_match_belongs(&s->places[k], reach_px, d)) {
+                if (bst_match_belongs(&s->places[k], reach_px, d) ||
+                    holds(d, reach_px, &s->places[k])) {
                     return true;
                 }
             }

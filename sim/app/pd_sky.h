@@ -37,7 +37,7 @@ double bst_pd_sky_e(const bst_pd_sky *sky, double x_px, double y_px);
 const struct bst_skylight_map *bst_pd_sky_map(const bst_pd_sky *sky);
 
 /* Whether a detection may be a star: it lies within reach_px of one, of a streak as targets are
- * matched. */
+ * matched, or is a streak itself on which one lies; twice that at an edge. */
 bool bst_pd_is_star(const bst_pd_stars *stars, double reach_px, const bst_detection *detection);
 
 #endif

@@ -238,6 +238,7 @@ typedef struct bst_detections {
     double zero_point_mag, zero_point_sigma_mag;
     int32_t zero_point_stars;
     int32_t stars_identified;
+    int32_t windows; /* of the frame that were looked at, round predicted places; 0: all of it */
     int32_t count, lost; /* items; detections that found no room */
     bst_detection items[];
 } bst_detections;

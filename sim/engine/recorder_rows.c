@@ -288,6 +288,7 @@ bst_status bst_recorder_detection_rows(bst_ctx *ctx, bst_recorder *recorder, int
     put_real(&head, d->zero_point_sigma_mag);
     put_int(&head, d->zero_point_stars);
     put_int(&head, d->stars_identified);
+    put_int(&head, d->windows);
     put_int(&head, d->count);
     put_int(&head, d->lost);
     BST_TRY(append(ctx, recorder, BST_TABLE_DETECTION_FRAMES, &head));

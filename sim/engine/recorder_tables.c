@@ -149,6 +149,7 @@ static const bst_column detection_frame_columns[] = {
     REAL("zero_point_sigma_mag", "mag", "its standard deviation; 0: of no stars"),
     INT("zero_point_stars", "", "stars that it comes from; 0: the camera's own figures"),
     INT("stars_identified", "", "stars identified"),
+    INT("windows", "", "windows of the frame that were looked at; 0: all of it"),
     INT("detections", "", "detections kept"),
     INT("lost", "", "detections that found no room"),
 };

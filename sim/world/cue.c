@@ -1,5 +1,22 @@
 #include "sim/world/world_internal.h"
 
+bst_status bst_cue_nominal_line(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
+                                bst_sky_clock *clock, double seconds, const bst_state *eye,
+                                bst_vec3 *line_m) {
+    const world_sensor *s = &world->observers[observer].sensors[sensor];
+    *line_m = (bst_vec3){0, 0, 0};
+    if (s->cue_object < 0) {
+        return BST_OK;
+    }
+    bst_sky sky;
+    BST_TRY(bst_sky_clock_at(ctx, clock, bst_time_add(world->epoch, seconds), &sky));
+    bst_state target;
+    double emission_s;
+    return bst_orbit_line_of_sight(ctx, &world->objects[s->cue_object].orbit, eye, clock,
+                                   world->epoch, &sky.bodies, seconds, false, line_m, &target,
+                                   &emission_s);
+}
+
 bst_status bst_cue_nominal_direction(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
                                      bst_sky_clock *clock, double seconds, const bst_state *eye,
                                      bst_vec3 *out) {
@@ -9,15 +26,9 @@ bst_status bst_cue_nominal_direction(bst_ctx *ctx, const bst_world *world, int o
         *out = bst_vec3_from_radec(radec[0] * BST_DEG_RAD, radec[1] * BST_DEG_RAD);
         return BST_OK;
     }
-    bst_sky sky;
-    BST_TRY(bst_sky_clock_at(ctx, clock, bst_time_add(world->epoch, seconds), &sky));
-    bst_state target;
-    bst_vec3 geometric;
-    double emission_s;
-    BST_TRY(bst_orbit_line_of_sight(ctx, &world->objects[s->cue_object].orbit, eye, clock,
-                                    world->epoch, &sky.bodies, seconds, false, &geometric, &target,
-                                    &emission_s));
-    *out = bst_vec3_unit(geometric);
+    bst_vec3 line;
+    BST_TRY(bst_cue_nominal_line(ctx, world, observer, sensor, clock, seconds, eye, &line));
+    *out = bst_vec3_unit(line);
     return BST_OK;
 }
 

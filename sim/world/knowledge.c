@@ -249,3 +249,28 @@ bst_status bst_knowledge_cue_direction_at(bst_ctx *ctx, bst_knowledge_view *view
     *direction = bst_quat_rotate(bst_quat_from_rotvec(sensor->cue_rotation), nominal);
     return BST_OK;
 }
+
+bst_status bst_knowledge_cue_range_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
+                                      bool *known, double *range_m, double *range_rate_mps) {
+    const bst_knowledge *k = view->knowledge;
+    const double h = 0.5;
+    double range[3];
+    *range_m = *range_rate_mps = 0.0;
+    *known = k->world->observers[k->observer].sensors[k->sensor].cue_object >= 0;
+    for (int i = 0; *known && i < 3; i++) {
+        double t = bst_believed_seconds(k->world, k->observer, k->sensor, seconds + (i - 1) * h);
+        bst_state eye;
+        bst_vec3 line;
+        BST_TRY(bst_orbit_state(ctx, &k->world->observers[k->observer].orbit, view->clock,
+                                k->world->epoch, t, true, &eye));
+        bst_believe(k->world, k->observer, k->sensor, t, &eye);
+        BST_TRY(bst_cue_nominal_line(ctx, k->world, k->observer, k->sensor, view->clock, t, &eye,
+                                     &line));
+        range[i] = bst_vec3_norm(line);
+    }
+    if (*known) {
+        *range_m = range[1];
+        *range_rate_mps = 0.5 * (range[2] - range[0]) / h;
+    }
+    return BST_OK;
+}

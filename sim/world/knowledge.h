@@ -41,6 +41,12 @@ bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double s
 bst_status bst_knowledge_cue_direction_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                           bool *valid, bst_vec3 *direction) BST_MUST_CHECK;
 
+/* Range of the cue's object as it is believed, and its rate, at `seconds` after the epoch; *known
+ * false: the cue is a direction. */
+bst_status bst_knowledge_cue_range_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
+                                      bool *known, double *range_m,
+                                      double *range_rate_mps) BST_MUST_CHECK;
+
 /* The body attitude in which the spacecraft starts and that it tries to hold (see
  * bst_world_body_attitude). */
 bst_quat bst_knowledge_body_attitude(const bst_knowledge *knowledge);

@@ -166,6 +166,12 @@ bst_status bst_cue_nominal_direction(bst_ctx *ctx, const bst_world *world, int o
                                      bst_sky_clock *clock, double seconds, const bst_state *eye,
                                      bst_vec3 *out) BST_MUST_CHECK;
 
+/* The vector (m, GCRF, geometric) of which that is the direction; 0 where the cue is a direction
+ * only. */
+bst_status bst_cue_nominal_line(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
+                                bst_sky_clock *clock, double seconds, const bst_state *eye,
+                                bst_vec3 *line_m) BST_MUST_CHECK;
+
 /* Time after the epoch that the onboard clock shows `seconds` after the epoch. */
 double bst_believed_seconds(const bst_world *world, int observer, int sensor, double seconds);
 

@@ -156,11 +156,11 @@ static void false_alarms_as_requested(void **state) {
             }
         }
         bst_streak_search_fill(&one, image, SIDE, SIDE, &background, 0.85);
-        int found = bst_streak_search_faint(&one, 4.0);
+        int found = bst_streak_search_faint(&one, 4.0, 0);
         alarms += found;
         if (f < 3) {
             bst_streak_search_fill(&two, image, SIDE, SIDE, &background, 0.85);
-            assert_int_equal(bst_streak_search_faint(&two, 4.0), found);
+            assert_int_equal(bst_streak_search_faint(&two, 4.0, 0), found);
             assert_memory_equal(one.found, two.found, (size_t)found * sizeof one.found[0]);
         }
     }

@@ -531,6 +531,45 @@ static void five_hundred_tracks_by_each(void **state) {
     }
 }
 
+/* Of frames of which only windows were looked at: what is confirmed is missed in them, what is
+ * tentative is not, and no clutter is learnt from them. */
+static void partial_frames(void **state) {
+    (void)state;
+    bst_mtt_params params = defaults();
+    bench *b = start(77, &params);
+    bst_vec3 a = bst_vec3_from_radec(0.0, 0.5);
+    for (int k = 0; k < 8; k++) {
+        for (int i = 0; i < 30; i++) { /* clutter */
+            see(b, bst_vec3_from_radec(0.01 * uniform(b), 0.5 + 0.01 * uniform(b)), 15.0);
+        }
+        see(b, along(a, 0.3, 5 * AS * k), 13.0);
+        frame(b, k);
+    }
+    const bst_mtt_track *kept = track_at(b, along(a, 0.3, 35 * AS), 3 * AS);
+    assert_non_null(kept);
+    int64_t id = kept->id;
+    int misses = kept->misses_in_row + 2;
+    double density = bst_mtt_clutter_density(b->mtt);
+    int count, tentative = 0, after = 0;
+    const bst_mtt_track *all = bst_mtt_tracks(b->mtt, &count);
+    for (int i = 0; i < count; i++) {
+        tentative += all[i].status == BST_TRACK_TENTATIVE;
+    }
+    assert_true(tentative > 0);
+    for (int k = 8; k < 10; k++) {
+        bst_mtt_frame f = {.tick = k, .seconds = k, .partial = true};
+        bst_mtt_step(b->mtt, &f);
+    }
+    all = bst_mtt_tracks(b->mtt, &count);
+    for (int i = 0; i < count; i++) {
+        after += all[i].status == BST_TRACK_TENTATIVE;
+        assert_true(all[i].id != id || all[i].misses_in_row == misses);
+    }
+    assert_int_equal(after, tentative);
+    bst_assert_close(bst_mtt_clutter_density(b->mtt) / density, 1.0, 0.2);
+    bst_mtt_free(b->mtt);
+}
+
 static void wrong_names_are_refused(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -554,6 +593,7 @@ int main(void) {
                                        cmocka_unit_test(manoeuvres_and_flares_are_told),
                                        cmocka_unit_test(imm_holds_through_a_burn),
                                        cmocka_unit_test(five_hundred_tracks_by_each),
+                                       cmocka_unit_test(partial_frames),
                                        cmocka_unit_test(wrong_names_are_refused)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

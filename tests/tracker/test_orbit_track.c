@@ -1,0 +1,239 @@
+/* Tracks on orbits: consistent while they are seen, and over gaps in which a constant rate is lost.
+ */
+#include "sim/core/rng.h"
+#include "sim/world/kepler.h"
+#include "tests/test_support.h"
+#include "tests/tracker/orbit_scene.h"
+#include "tracker/multitarget.h"
+#include "tracker/orbit_track.h"
+
+#define AS BST_ARCSEC_RAD
+#define SIGMA (0.3 * AS)
+
+/* A geostationary object from an orbit of 800 km. */
+static bst_od_state geo(void) {
+    return from_elements(42164e3, 1e-3, 3.0, 40.0, 10.0, 20.0);
+}
+static bst_od_state low(void) {
+    return from_elements(7160e3, 1e-3, 98.5, 120.0, 30.0, -40.0);
+}
+
+static const bst_vec3 earth_mps = {-12e3, 25e3, 11e3};
+
+/* Where a body of two-body motion is seen from another at a time, light time by plain iteration. */
+static void look(double t, bst_od_observer *eye, bst_vec3 *direction, double *range_m) {
+    bst_ctx ctx = {0};
+    bst_od_state body = geo(), from = low();
+    bst_vec3 r, v, line = {0};
+    double tau = 0.0;
+    *eye = (bst_od_observer){.time_s = t, .earth_bary_mps = earth_mps};
+    bst_assert_ok(
+        &ctx, bst_kepler_propagate(&ctx, BST_EARTH_MU_M3PS2, from.position_m, from.velocity_mps, t,
+                                   &eye->position_m, &eye->velocity_mps));
+    for (int k = 0; k < 5; k++) {
+        bst_assert_ok(&ctx, bst_kepler_propagate(&ctx, BST_EARTH_MU_M3PS2, body.position_m,
+                                                 body.velocity_mps, t - tau, &r, &v));
+        line = bst_vec3_axpy(bst_vec3_sub(r, eye->position_m), -tau, earth_mps);
+        tau = bst_vec3_norm(line) / BST_LIGHT_SPEED_MPS;
+    }
+    *direction = bst_vec3_unit(line);
+    *range_m = bst_vec3_norm(line);
+}
+
+static bst_sky_measurement measure(bst_vec3 d, bst_rng_key key, uint64_t n) {
+    double e[2];
+    bst_rng_normal2(key, 3, n, e);
+    bst_tangent axes = bst_tangent_at(d);
+    return (bst_sky_measurement){
+        .direction = bst_tangent_exp(d, bst_tangent_vector(&axes, SIGMA * e[0], SIGMA * e[1])),
+        .cov_11 = SIGMA * SIGMA,
+        .cov_22 = SIGMA * SIGMA};
+}
+
+/* Chi-square of a true direction against a state's, 2 degrees of freedom. */
+static double misfit(const bst_sky_state *s, bst_vec3 truth) {
+    bst_tangent axes = bst_tangent_at(s->direction);
+    bst_vec3 off = bst_tangent_log(s->direction, truth);
+    double x = bst_vec3_dot(off, axes.e1), y = bst_vec3_dot(off, axes.e2);
+    double a = s->covariance[0][0], b = s->covariance[0][1], c = s->covariance[1][1];
+    return (c * x * x - 2 * b * x * y + a * y * y) / (a * c - b * b);
+}
+
+/* 100 runs: ten minutes at 1 Hz with the range known to 2 %, then nothing for an hour. The place is
+ * where the covariance says while it is seen (mean chi-square of 2 degrees of freedom: 2, standard
+ * error 0.2) and after the gap, and known to a fraction of a degree; a constant rate, with the
+ * acceleration noise that it needs while the object is seen, is degrees off and does not know. */
+static void the_gap_of_an_hour(void **state) {
+    (void)state;
+    enum { RUNS = 100, SEEN = 600 };
+    double seen = 0.0, after = 0.0, sigma = 0.0, constant = 0.0, off = 0.0;
+    for (uint64_t run = 0; run < RUNS; run++) {
+        bst_rng_key key = bst_rng_make_key(run, 0, "test", "orbit_track");
+        bst_orbit_track orbit = {.valid = false};
+        bst_sky_state sky = {.covariance = {{0}}}, plain = sky;
+        bst_sky_measurement first = {.cov_11 = 0.0};
+        bst_od_observer eye;
+        bst_vec3 d;
+        double range, before, later;
+        for (int k = 0; k < SEEN; k++) {
+            look(k, &eye, &d, &range);
+            bst_sky_measurement m = measure(d, key, (uint64_t)k);
+            bst_sky_innovation v;
+            if (k < 2) {
+                if (k == 1) {
+                    double n[2];
+                    bst_rng_normal2(key, 4, 0, n);
+                    bst_sky_from_pair(&first, &m, 1.0, 0.0, &sky);
+                    bst_od_observer a, b;
+                    bst_vec3 unused;
+                    look(0.5, &a, &unused, &before);
+                    look(1.5, &b, &unused, &later);
+                    bst_orbit_range known = {range * (1.0 + 0.02 * n[0]), 0.02 * range,
+                                             later - before + 50.0 * n[1], 50.0};
+                    bst_orbit_track_start(&sky, &eye, &known, &orbit);
+                    plain = sky;
+                }
+                first = m;
+                continue;
+            }
+            assert_true(bst_orbit_track_predict(&orbit, 1e-12, &eye));
+            sky = orbit.sky;
+            assert_true(bst_sky_innovate(&sky, &m, NULL, &v));
+            bst_sky_update(&sky, &v);
+            assert_true(bst_orbit_track_update(&orbit, &sky));
+            bst_sky_predict(&plain, 1.0, pow(0.02 * AS, 2));
+            assert_true(bst_sky_innovate(&plain, &m, NULL, &v));
+            bst_sky_update(&plain, &v);
+        }
+        seen += misfit(&sky, d) / RUNS;
+        look(SEEN + 3600.0, &eye, &d, &range);
+        assert_true(bst_orbit_track_predict(&orbit, 1e-12, &eye));
+        after += misfit(&orbit.sky, d) / RUNS;
+        sigma += sqrt(orbit.sky.covariance[0][0] + orbit.sky.covariance[1][1]) / RUNS;
+        bst_sky_predict(&plain, 3601.0, pow(0.02 * AS, 2));
+        constant += misfit(&plain, d) / RUNS;
+        off += bst_vec3_angle(plain.direction, d) / RUNS;
+    }
+    print_message(
+        "chi-square of 2: seen %.2f, after an hour %.2f (sigma %.3f deg); constant rate "
+        "%.0f (off by %.1f deg)\n",
+        seen, after, sigma / BST_DEG_RAD, constant, off / BST_DEG_RAD);
+    bst_assert_close(seen, 2.0, 0.7);
+    bst_assert_close(after, 2.0, 0.7);
+    assert_true(sigma < 0.2 * BST_DEG_RAD);
+    assert_true(constant > 18.4 && off > 1.0 * BST_DEG_RAD);
+}
+
+typedef struct bench {
+    double range_m, range_rate_mps;
+} bench;
+
+static bool range_of(const void *user, const bst_mtt_track *track, bst_orbit_range *out) {
+    const bench *b = user;
+    (void)track;
+    *out = (bst_orbit_range){b->range_m, 0.02 * b->range_m, b->range_rate_mps, 50.0};
+    return true;
+}
+
+/* The multi-target tracker over the same gap: with orbits the object is known again, by its number,
+ * when it comes back; with a constant rate it is a new one. */
+static void identity_over_the_gap(void **state) {
+    (void)state;
+    for (int orbits = 0; orbits < 2; orbits++) {
+        int kept = 0;
+        enum { RUNS = 8 };
+        for (uint64_t run = 0; run < RUNS; run++) {
+            bst_ctx ctx = {0};
+            bst_mtt_params params = {.max_tracks = 50,
+                                     .max_detections = 50,
+                                     .association = BST_MTT_MIXTURE,
+                                     .noise_rad2ps3 = pow(0.02 * AS, 2),
+                                     .orbits = orbits,
+                                     .orbit_noise_m2ps3 = 1e-12,
+                                     .gate_chi2 = 16,
+                                     .detection_probability = 0.95,
+                                     .false_alarms_per_frame = 1,
+                                     .field_sr = pow(3000 * AS, 2),
+                                     .confirm_hits = 3,
+                                     .confirm_frames = 5,
+                                     .confirm_score = 12,
+                                     .max_rate_radps = 120 * AS,
+                                     .initiation_gap_s = 5,
+                                     .max_misses = 12,
+                                     .max_coast_s = 120,
+                                     .max_sigma_rad = 60 * AS,
+                                     .max_memory = 16,
+                                     .memory_s = 7200,
+                                     .memory_sigma_rad = BST_DEG_RAD,
+                                     .memory_chi2 = 18.5};
+            bst_mtt *mtt;
+            bst_assert_ok(&ctx, bst_mtt_create(&ctx, &params, &mtt));
+            bst_rng_key key = bst_rng_make_key(run, 1, "test", "orbit_track");
+            int64_t before = -1, after = -2;
+            for (int k = 0; k < 4240; k++) {
+                bool hidden = k >= 600 && k < 4200;
+                if (hidden && k % 60 != 0) {
+                    continue; /* a frame a minute in the gap */
+                }
+                bst_od_observer eye, side;
+                bst_vec3 d, unused;
+                double range, from, to;
+                look(k, &eye, &d, &range);
+                look(k - 0.5, &side, &unused, &from);
+                look(k + 0.5, &side, &unused, &to);
+                bench b = {range, to - from};
+                bst_mtt_detection own = {.sky = measure(d, key, (uint64_t)k),
+                                         .v_mag = 12.0,
+                                         .v_mag_sigma = 0.1,
+                                         .snr = 20.0};
+                bst_mtt_frame f = {.tick = k,
+                                   .seconds = k,
+                                   .detections = &own,
+                                   .count = hidden ? 0 : 1,
+                                   .observer = &eye,
+                                   .range = range_of,
+                                   .user = &b};
+                bst_mtt_step(mtt, &f);
+                int n;
+                const bst_mtt_track *tracks = bst_mtt_tracks(mtt, &n);
+                for (int i = 0; i < n; i++) {
+                    if (tracks[i].status != BST_TRACK_TENTATIVE && !hidden) {
+                        *(k < 600 ? &before : &after) = tracks[i].id;
+                    }
+                }
+            }
+            kept += before == after;
+            bst_mtt_free(mtt);
+        }
+        print_message("%s: %d of %d known again\n", orbits ? "orbits" : "constant rate", kept,
+                      RUNS);
+        assert_true(orbits ? kept == RUNS : kept == 0);
+    }
+}
+
+static void not_with_imm(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_mtt *mtt;
+    bst_mtt_params params = {.max_tracks = 5,
+                             .max_detections = 5,
+                             .filter = BST_FILTER_IMM,
+                             .orbits = true,
+                             .gate_chi2 = 16,
+                             .detection_probability = 0.9,
+                             .false_alarms_per_frame = 1,
+                             .field_sr = 1e-4,
+                             .confirm_hits = 3,
+                             .confirm_frames = 5,
+                             .manoeuvre_s = 1,
+                             .quiet_s = 1};
+    assert_int_equal(bst_mtt_create(&ctx, &params, &mtt), BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "ekf"));
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(the_gap_of_an_hour),
+                                       cmocka_unit_test(identity_over_the_gap),
+                                       cmocka_unit_test(not_with_imm)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
