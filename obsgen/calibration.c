@@ -25,8 +25,10 @@ const bst_config_desc bst_obsgen_calibration_table[] = {
     BST_REAL(C, threshold_offset, "", -3, 3, NULL,
              "Image processing's threshold less that of theory, SNR."),
     BST_REAL(C, noise_factor, "", 0.1, 10, NULL, "Noise that it measures over that of theory."),
+    BST_REAL(C, background_share, "", 0, 10, NULL,
+             "Share of sources' mean light below its clip that its background contains."),
     BST_REAL(C, crowding, "", 0, 10, NULL,
-             "Share of the variance of undetected sources' light that its noise contains."),
+             "Share of the mean square of that light that its noise contains."),
     BST_REALS(C, gain, "", 0.1, 2, NULL,
               "SNR at the filter's greatest output over the ideal, at streak lengths of 0, 5, 20 "
               "and 60 px."),
@@ -47,6 +49,10 @@ const bst_config_desc bst_obsgen_calibration_table[] = {
     BST_REAL(C, blend_distance_factor, "", 0.1, 10, NULL,
              "Distance at which two sources are told apart, over that at which the saddle between "
              "them is deep enough without noise."),
+    BST_REAL(
+        C, blend_error, "", 0, 10, NULL,
+        "RMS error of the place of two sources that are seen as one, beyond that of a fit of one "
+        "to both, over the spread of their light."),
     BST_REAL(C, star_id_probability, "", 0, 1, NULL,
              "Probability that a detected catalogue star is identified where stars are."),
     BST_REAL(C, hit_told_probability, "", 0, 1, NULL,
@@ -58,7 +64,8 @@ void bst_obsgen_calibration_theory(bst_obsgen_calibration *out) {
     *out = (bst_obsgen_calibration){.version = BST_OBSGEN_CALIBRATION_VERSION,
                                     .made_from = "theory",
                                     .noise_factor = 1.0,
-                                    .crowding = 0.5,
+                                    .background_share = 1.0,
+                                    .crowding = 1.0,
                                     .gain = {1.0, 1.0, 1.0, 1.0},
                                     .slope = 1.0,
                                     .false_alarm_factor = 1.0,

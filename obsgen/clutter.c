@@ -47,6 +47,13 @@ bst_detection bst_generator_point(const bst_generator *g, double x, double y, do
 
 void bst_generator_false_alarms(bst_generator *g) {
     double expected = g->settings.false_alarms_per_frame * g->calibration.false_alarm_factor;
+    /* background that is found too bright takes from noise */
+    double taken = g->background_bias_e / (bst_bound_norm(&g->bound, 0.0) * g->noise_e);
+    expected *= exp(-taken * (g->threshold + 0.5 * taken));
+    if (g->smeared) { /* nothing is looked at between the pixels */
+        expected =
+            bst_matched_pixel_maxima(g->total_sigma, g->threshold + taken) * g->width * g->height;
+    }
     double arrival = 0.0;
     for (uint64_t i = 0; i < 1000000; i++) {
         uint64_t draw = FALSE_ALARM + 8 * i;
@@ -58,6 +65,10 @@ void bst_generator_false_alarms(bst_generator *g) {
         double y = g->height * uniform(g, draw + 2) - 0.5;
         double energy = -2.0 * log(uniform(g, draw + 3)) / g->calibration.false_alarm_tail;
         double snr = sqrt(g->threshold * g->threshold + energy);
+        if (g->smeared) {
+            bst_generator_keep_rough(g, (int)lround(x), (int)lround(y), snr, -1);
+            continue;
+        }
         bool streak = g->streak > 0.0 && uniform(g, draw + 4) < g->streak_share;
         bst_generated item = {bst_generator_point(g, x, y, snr, streak ? g->streak : 0.0), -1,
                               false};

@@ -1,144 +1,357 @@
 #include "obsgen/fragments.h"
 
 #include <math.h>
+#include <stdlib.h>
+#include <string.h>
 
 #include "obsgen/clutter.h"
+#include "sim/core/vec.h"
 
 /* As image processing tells maxima apart. */
 static const double SADDLE_SIGMA = 3.0, SADDLE_SHARE = 0.15;
 /* What stays further below the threshold is seen as often as noise alone, which has its own draws.
  */
-static const double FAINTEST_SIGMA = 5.0;
-/* Draws beyond those of other clutter; 2^15 of each source. */
-static const uint64_t FRAGMENT = (uint64_t)1 << 60;
+static const double FAINTEST_SIGMA = 4.0;
+/* Draws of pixels; those of other clutter stay below. */
+static const uint64_t PIXEL_NOISE = (uint64_t)1 << 60;
 
-enum { MOST_STEPS = 4096, MOST_PEAKS = 1024, MOST_TAPS = 65 };
+/* Rows on either side of the way whose output is made, taps of the filter on either side, and rows
+ * of noise that is filtered across the way already. */
+enum { ROWS = 2, MOST_TAPS = 9, HALF = ROWS + MOST_TAPS + 1, MOST_MAXIMA = 2048, NORMALS = 4096 };
 
-typedef struct peak {
-    int step;
-    double value, saddle; /* saddle: between it and the one before */
-} peak;
+/* One step of a pixel along the way: a column of the frame where the way runs more along the rows,
+ * a row otherwise. */
+typedef struct section {
+    int at, middle;               /* along, and the nearest pixel across */
+    float noise[2 * HALF + 1];    /* filtered across */
+    float output[2 * (ROWS) + 1]; /* SNR */
+} section;
 
-static double noise_at(const bst_generator *g, const generator_source *s, int row, int k) {
-    uint64_t draw = FRAGMENT + (s->name << 15) + ((uint64_t)row << 13) + (uint64_t)k;
-    return bst_rng_normal(g->key, (uint64_t)g->exposure_id, draw);
-}
+typedef struct maximum {
+    int x, y, section, part; /* part: of the way */
+    float value;
+    bool dropped;
+} maximum;
 
-/* The filter on white noise along the path. Draws come in pairs, of which two steps take one. */
-static void filter_noise(const bst_generator *g, const generator_source *s, const double *tap,
-                         int reach, int steps, int row, double *white, double *out) {
-    int count = steps + 2 * reach;
-    for (int k = 0; k < count; k += 2) {
-        uint64_t draw = FRAGMENT + (s->name << 15) + ((uint64_t)row << 13) + (uint64_t)k;
-        bst_rng_normal2(g->key, (uint64_t)g->exposure_id, draw, white + k);
-    }
-    for (int k = 0; k < steps; k++) {
-        double sum = 0.0;
-        for (int j = 0; j <= 2 * reach; j++) {
-            sum += tap[j] * white[k + j];
-        }
-        out[k] = sum;
-    }
-}
+struct generator_streaks {
+    section sections[BST_ROUTE_NODES];
+    maximum maxima[MOST_MAXIMA]; /* of one part of the way */
+    maximum kept[MOST_MAXIMA];   /* of the whole */
+    int kept_count;
+    float taps[2 * MOST_TAPS + 1];
+    int reach;
+    double taps_sigma;
+    float normals[NORMALS];
+};
 
-/* The filter's output at the steps of the path: the greatest of its middle row of pixels and the
- * two beside it, whose noise has the filter's correlation with the middle one's. */
-static void outputs(const bst_generator *g, const generator_source *s, const double *tap, int reach,
-                    int steps, double (*noise)[MOST_STEPS], double *out) {
-    double white[MOST_STEPS + MOST_TAPS + 1];
-    for (int row = 0; row < 3; row++) {
-        filter_noise(g, s, tap, reach, steps, row, white, noise[row]);
-    }
-    double beside = bst_matched_falloff(0.0, 1.0, 0.0, g->total_sigma);
-    double own = sqrt(1.0 - beside * beside);
-    for (int k = 0; k < steps; k++) {
-        double at = k - 0.5 * steps, S = g->total_sigma;
-        double start = (at + 0.5 * s->length) / (2.0 * S), end = (at - 0.5 * s->length) / (2.0 * S);
-        /* away from the ends the error functions are 1 and -1 to rounding */
-        double shape = start > 6.0 && end < -6.0 ? 1.0 : 0.5 * (erf(start) - erf(end));
-        double signal = s->amplitude * shape;
-        double best = signal + noise[0][k];
-        for (int row = 1; row < 3; row++) {
-            best = fmax(best, beside * (signal + noise[0][k]) + own * noise[row][k]);
-        }
-        out[k] = best;
-    }
-}
-
-/* Removes maxima that are no more than noise on the flank of a higher one. */
-static int merge(peak *peaks, int count, double threshold) {
-    for (;;) {
-        int worst = -1;
-        double least = INFINITY;
-        for (int i = 0; i < count; i++) {
-            double left =
-                i > 0 && peaks[i - 1].value >= peaks[i].value ? peaks[i].saddle : -INFINITY;
-            double right = i + 1 < count && peaks[i + 1].value > peaks[i].value
-                               ? peaks[i + 1].saddle
-                               : -INFINITY;
-            double saddle = fmax(left, right);
-            double depth = saddle > threshold ? peaks[i].value - saddle : INFINITY;
-            double needed = fmax(SADDLE_SIGMA, SADDLE_SHARE * peaks[i].value);
-            if (depth < needed && depth < least) {
-                least = depth;
-                worst = i;
-            }
-        }
-        if (worst < 0) {
-            return count;
-        }
-        if (worst + 1 < count) {
-            peaks[worst + 1].saddle = fmin(peaks[worst].saddle, peaks[worst + 1].saddle);
-        }
-        for (int i = worst; i + 1 < count; i++) {
-            peaks[i] = peaks[i + 1];
-        }
-        count--;
-    }
-}
-
-void bst_generator_fragments(bst_generator *g, const generator_source *s) {
-    if (s->amplitude < g->threshold - FAINTEST_SIGMA) {
+static void set_taps(struct generator_streaks *w, double sigma) {
+    if (w->taps_sigma == sigma) {
         return;
     }
-    double S = g->total_sigma;
-    int steps = (int)fmin(ceil(s->length + 4.0 * S), MOST_STEPS);
-    int reach = (int)fmin(ceil(3.0 * S), MOST_TAPS / 2);
-    double tap[MOST_TAPS], square = 0.0;
-    for (int j = -reach; j <= reach; j++) {
-        tap[j + reach] = exp(-0.5 * j * j / (S * S));
-        square += tap[j + reach] * tap[j + reach];
-    }
-    for (int j = 0; j <= 2 * reach; j++) {
-        tap[j] /= sqrt(square);
-    }
-    peak peaks[MOST_PEAKS];
-    int count = 0;
-    double before = -INFINITY, here = -INFINITY, lowest = INFINITY;
-    double noise[3][MOST_STEPS], out[MOST_STEPS];
-    outputs(g, s, tap, reach, steps, noise, out);
-    for (int k = 0; k <= steps; k++) {
-        double next = k < steps ? out[k] : -INFINITY;
-        if (here >= before && here > next && here > g->threshold && count < MOST_PEAKS) {
-            peaks[count++] = (peak){k - 1, here, lowest};
-            lowest = INFINITY;
-        }
-        before = here;
-        here = next;
-        lowest = fmin(lowest, here);
-    }
-    count = merge(peaks, count, g->threshold);
-    double c = s->path.dx / s->length, n = s->path.dy / s->length;
-    for (int i = 0; i < count; i++) {
-        double along = peaks[i].step - 0.5 * steps, across;
-        bst_generated item = {.item = s->item};
-        double x = s->x + along * c, y = s->y + along * n;
-        item.detection = bst_generator_point(g, x, y, peaks[i].value, 0.0);
-        across = noise_at(g, s, 3, i) * sqrt(item.detection.cov_xx) / g->binning;
-        item.detection.x_px -= n * across * g->binning;
-        item.detection.y_px += c * across * g->binning;
-        if (x > -0.5 && y > -0.5 && x < g->width - 0.5 && y < g->height - 0.5) {
-            bst_generator_keep(g, &item);
+    w->reach = (int)fmin(ceil(3.0 * sigma), MOST_TAPS);
+    double square = 0.0;
+    for (int pass = 0; pass < 2; pass++) {
+        for (int i = -w->reach; i <= w->reach; i++) {
+            double tap = exp(-0.5 * i * i / (sigma * sigma));
+            square += pass ? 0.0 : tap * tap;
+            w->taps[i + w->reach] = (float)(tap / sqrt(square));
         }
     }
+    w->taps_sigma = sigma;
+}
+
+/* Normal deviates at the middles of equal shares of probability, by bisection, with unit variance.
+ */
+static void set_normals(float *out) {
+    double low = -9.0, square = 0.0;
+    for (int i = 0; i < NORMALS; i++) {
+        double high = 9.0, p = (i + 0.5) / NORMALS;
+        for (int k = 0; k < 40; k++) {
+            double z = 0.5 * (low + high);
+            *(0.5 * erfc(-z * sqrt(0.5)) < p ? &low : &high) = z;
+        }
+        out[i] = (float)low;
+        square += low * low / NORMALS;
+    }
+    for (int i = 0; i < NORMALS; i++) {
+        out[i] = (float)((double)out[i] / sqrt(square));
+    }
+}
+
+/* White noise of pixels first..first+count-1 across the way: the same wherever a streak runs. The
+ * filter's many taps smooth the steps of the table. */
+static void white(const bst_generator *g, bool by_row, int at, int first, int count, float *out) {
+    for (int group = first >> 3; group <= (first + count - 1) >> 3; group++) {
+        uint64_t draw = PIXEL_NOISE | (uint64_t)by_row << 56 |
+                        (uint64_t)(uint32_t)(at + 65536) << 24 | (uint64_t)(group + 65536);
+        bst_philox_words r = bst_rng_words(g->key, (uint64_t)g->exposure_id, draw);
+        for (int k = 0; k < 8; k++) {
+            int i = 8 * group + k - first;
+            if (i >= 0 && i < count) {
+                out[i] = g->streaks->normals[(r.w[k >> 1] >> (k & 1 ? 16 : 0)) & (NORMALS - 1)];
+            }
+        }
+    }
+}
+
+static void fill_noise(const bst_generator *g, const struct generator_streaks *w, bool by_row,
+                       section *s) {
+    int half = ROWS + w->reach + 1, rows = 2 * half + 1;
+    float noise[2 * (HALF + MOST_TAPS) + 1];
+    white(g, by_row, s->at, s->middle - half - w->reach, rows + 2 * w->reach, noise);
+    for (int r = 0; r < rows; r++) {
+        s->noise[r] = 0.0f;
+    }
+    for (int i = 0; i <= 2 * w->reach; i++) {
+        float tap = w->taps[i];
+        for (int r = 0; r < rows; r++) {
+            s->noise[r] += tap * noise[r + i];
+        }
+    }
+}
+
+/* Adds to the sections' signal, in s->output, the filter along the way of their noise. Light has
+ * shot noise: the squares of the filter average a line's over 1 / (sqrt(3 pi) S) px of it, whose
+ * electrons are the output times the noise of a pixel. */
+static void add_noise(const bst_generator *g, const struct generator_streaks *w, section *s,
+                      int count) {
+    double shot = 1.0 / (sqrt(3.0 * BST_PI) * g->total_sigma * g->noise_e);
+    int top = w->reach + 1;
+    for (int k = 0; k < count; k++) {
+        float sum[2 * ROWS + 1] = {0.0f};
+        for (int i = -w->reach; i <= w->reach; i++) {
+            int n = k + i;
+            /* the way leaves no more than a row a step */
+            int row = n >= 0 && n < count ? s[k].middle - s[n].middle + top : -1;
+            if (row >= 0 && row <= 2 * top) {
+                for (int r = 0; r <= 2 * ROWS; r++) {
+                    sum[r] += w->taps[i + w->reach] * s[n].noise[row + r];
+                }
+            }
+        }
+        for (int r = 0; r <= 2 * ROWS; r++) {
+            float *out = &s[k].output[r];
+            *out += (float)((double)sum[r] * sqrt(1.0 + shot * fmax((double)*out, 0.0)));
+        }
+    }
+}
+
+static float output_at(const section *s, int count, int k, int across) {
+    int r = k >= 0 && k < count ? across - s[k].middle + ROWS : -1;
+    return r >= 0 && r <= 2 * ROWS ? s[k].output[r] : -INFINITY;
+}
+
+static int find_maxima(const bst_generator *g, const section *s, int count, bool by_row, int part,
+                       maximum *out) {
+    int found = 0, wide = by_row ? g->height : g->width, high = by_row ? g->width : g->height;
+    for (int k = 0; k < count; k++) {
+        for (int r = -ROWS + 1; r < ROWS && s[k].at >= 0 && s[k].at < wide; r++) {
+            int across = s[k].middle + r;
+            float value = s[k].output[r + ROWS];
+            bool top = value > (float)g->threshold && across >= 0 && across < high;
+            for (int i = -1; i <= 1 && top; i++) {
+                for (int j = -1; j <= 1 && top; j++) {
+                    top = (i == 0 && j == 0) || value > output_at(s, count, k + i, across + j);
+                }
+            }
+            if (top && found < MOST_MAXIMA) {
+                out[found++] = (maximum){.x = by_row ? across : s[k].at,
+                                         .y = by_row ? s[k].at : across,
+                                         .section = k,
+                                         .part = part,
+                                         .value = value};
+            }
+        }
+    }
+    return found;
+}
+
+/* Whether the output stays above `least` on the pixels between two maxima. */
+static bool is_ridge(const section *s, int count, bool by_row, const maximum *a, const maximum *b,
+                     float least) {
+    int dx = b->x - a->x, dy = b->y - a->y;
+    int steps = abs(dx) > abs(dy) ? abs(dx) : abs(dy);
+    for (int i = 1; i < steps; i++) {
+        float t = (float)i / (float)steps;
+        int x = a->x + (int)lroundf(t * (float)dx), y = a->y + (int)lroundf(t * (float)dy);
+        int at = by_row ? y : x, first = by_row ? a->y : a->x;
+        int way = s[1].at > s[0].at ? 1 : -1;
+        if (!(output_at(s, count, a->section + way * (at - first), by_row ? x : y) > least)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Half the side of the box in which maxima compete. */
+static int reach_of(const bst_generator *g) {
+    return (int)ceil(6.0 * g->sigma) + 2;
+}
+
+/* Keeps what no higher maximum in a box about it shares a ridge with. */
+static void keep_highest(bst_generator *g, const section *s, int count, bool by_row,
+                         maximum *maxima, int found) {
+    int reach = reach_of(g);
+    for (int i = 0; i < found; i++) {
+        maximum *m = &maxima[i];
+        double least = m->value - fmax(SADDLE_SIGMA, SADDLE_SHARE * m->value);
+        for (int way = -1; way <= 1 && !m->dropped; way += 2) {
+            for (int k = i + way; k >= 0 && k < found && !m->dropped; k += way) {
+                const maximum *o = &maxima[k];
+                if (abs(o->section - m->section) > reach) {
+                    break;
+                }
+                m->dropped = o->value > m->value && abs(o->x - m->x) <= reach &&
+                             abs(o->y - m->y) <= reach &&
+                             is_ridge(s, count, by_row, m, o, (float)fmax(least, g->threshold));
+            }
+        }
+    }
+    struct generator_streaks *w = g->streaks;
+    for (int i = 0; i < found; i++) {
+        if (!maxima[i].dropped && w->kept_count < MOST_MAXIMA) {
+            w->kept[w->kept_count++] = maxima[i];
+        }
+    }
+}
+
+/* Where the way turns, light of both of its parts is one ridge. */
+static void report(bst_generator *g, const generator_source *source) {
+    struct generator_streaks *w = g->streaks;
+    int reach = reach_of(g);
+    for (int i = 0; i < w->kept_count; i++) {
+        const maximum *m = &w->kept[i];
+        bool alone = true;
+        for (int k = 0; k < w->kept_count && alone; k++) {
+            const maximum *o = &w->kept[k];
+            alone = o->part == m->part || o->value <= m->value || abs(o->x - m->x) > reach ||
+                    abs(o->y - m->y) > reach;
+        }
+        if (alone) {
+            bst_generator_keep_rough(g, m->x, m->y, (double)m->value, source->item);
+        }
+    }
+}
+
+/* A part of the way that runs more along one axis, one way. Its nodes become sections. */
+static void run_part(bst_generator *g, const generator_source *source, const bst_route_node *nodes,
+                     int count, bool by_row, int number) {
+    struct generator_streaks *w = g->streaks;
+    section *s = w->sections;
+    double height = source->amplitude, scale = 0.25 / (g->total_sigma * g->total_sigma);
+    /* the background that was found is too much by this */
+    double taken = g->background_bias_e / (bst_bound_norm(&g->bound, 0.0) * g->noise_e);
+    int made = 0, outside = w->reach + 1;
+    int wide = by_row ? g->height : g->width;
+    double from = by_row ? nodes[0].y : nodes[0].x;
+    double to = by_row ? nodes[count - 1].y : nodes[count - 1].x, way = to > from ? 1.0 : -1.0;
+    double at = way > 0.0 ? ceil(from) : floor(from);
+    for (int k = 0; k + 1 < count; k++) {
+        const bst_route_node *n = &nodes[k], *m = &nodes[k + 1];
+        double a = by_row ? n->y : n->x, run = (by_row ? m->y : m->x) - a;
+        double rise = by_row ? m->x - n->x : m->y - n->y;
+        /* distances across the way, not across the axis */
+        double slant = run * run / (run * run + rise * rise);
+        for (; way * (a + run - at) > 0.0 && made < BST_ROUTE_NODES; at += way) {
+            double part = fmax((at - a) / run, 0.0);
+            double across = (by_row ? n->x : n->y) + part * rise;
+            if (at < -outside || at > wide + outside) {
+                continue;
+            }
+            section *now = &s[made++];
+            now->at = (int)at;
+            now->middle = (int)lround(across);
+            double light = n->light + part * (m->light - n->light);
+            for (int r = -ROWS; r <= ROWS; r++) {
+                double d = now->middle + r - across;
+                now->output[r + ROWS] =
+                    (float)(height * light * exp(-scale * d * d * slant) - taken);
+            }
+        }
+    }
+    if (made < 2) {
+        return;
+    }
+    for (int k = 0; k < made; k++) {
+        fill_noise(g, w, by_row, &s[k]);
+    }
+    add_noise(g, w, s, made);
+    int found = find_maxima(g, s, made, by_row, number, w->maxima);
+    keep_highest(g, s, made, by_row, w->maxima, found);
+}
+
+/* The same where light comes near enough to the threshold, and as far about it as noise is
+ * filtered.
+ */
+static void run_bright(bst_generator *g, const generator_source *source,
+                       const bst_route_node *nodes, int count, bool by_row, int number) {
+    double least = (g->threshold - FAINTEST_SIGMA) / source->amplitude;
+    int margin = 2 * g->streaks->reach + 4;
+    for (int first = 0; first < count;) {
+        while (first < count && nodes[first].light < least) {
+            first++;
+        }
+        int last = first, seen = first;
+        for (; seen < count && seen <= last + 2 * margin; seen++) {
+            last = nodes[seen].light >= least ? seen : last;
+        }
+        if (first < count) {
+            int from = first > margin ? first - margin : 0;
+            int to = last + margin < count ? last + margin : count - 1;
+            run_part(g, source, nodes + from, to - from + 1, by_row, number + from);
+        }
+        first = seen;
+    }
+}
+
+/* Where the way goes from a node on; it trembles from one to the next. */
+static void course(const bst_route_node *way, int count, int at, double *dx, double *dy) {
+    enum { AHEAD = 12 };
+    int end = at + AHEAD < count ? at + AHEAD : count - 1;
+    int start = end - AHEAD > 0 ? end - AHEAD : 0;
+    *dx = way[end].x - way[start].x;
+    *dy = way[end].y - way[start].y;
+}
+
+bst_status bst_generator_fragments(bst_ctx *ctx, bst_generator *g, const generator_source *source) {
+    if (source->amplitude * g->route_top < g->threshold - FAINTEST_SIGMA) {
+        return BST_OK;
+    }
+    if (!g->streaks) {
+        g->streaks = calloc(1, sizeof *g->streaks);
+        if (!g->streaks) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for long streaks");
+        }
+        set_normals(g->streaks->normals);
+    }
+    set_taps(g->streaks, g->total_sigma);
+    /* the stars' way in the middle of the frame, turned into this source's by what its own ends
+     * differ */
+    bst_route_node *way = g->way;
+    for (int i = 0; i < g->route_count; i++) {
+        const bst_route_node *n = &g->route[i];
+        double u = n->time - 0.5;
+        way[i] = *n;
+        way[i].x += source->x + u * (source->path.dx - g->whole_path.dx);
+        way[i].y += source->y + u * (source->path.dy - g->whole_path.dy);
+    }
+    g->streaks->kept_count = 0;
+    for (int first = 0, end; first + 1 < g->route_count; first = end) {
+        double dx, dy;
+        course(way, g->route_count, first, &dx, &dy);
+        bool by_row = fabs(dy) > fabs(dx);
+        for (end = first + 1; end + 1 < g->route_count; end++) {
+            double ex, ey;
+            course(way, g->route_count, end, &ex, &ey);
+            /* a little past the diagonal is no reason to part it */
+            bool same = by_row ? ey * dy > 0.0 && fabs(ey) > 0.6 * fabs(ex)
+                               : ex * dx > 0.0 && fabs(ex) > 0.6 * fabs(ey);
+            if (!same) {
+                break;
+            }
+        }
+        run_bright(g, source, way + first, end - first + 1, by_row, first);
+    }
+    report(g, source);
+    return BST_OK;
 }

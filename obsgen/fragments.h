@@ -5,8 +5,10 @@
 
 #include "obsgen/generator_internal.h"
 
-/* Draws the filter's output along the source's path, noise correlated as a Gaussian filter makes
- * it, and keeps its separate maxima above the threshold as detections: parts of the streak. */
-void bst_generator_fragments(bst_generator *generator, const generator_source *source);
+/* Draws the filter's output on the pixels about the source's way, with noise of its correlation,
+ * and keeps the maxima above the threshold that no higher one nearby shares a ridge with, as image
+ * processing does where it fits nothing: parts of the streak. BST_ERR_MEMORY. */
+bst_status bst_generator_fragments(bst_ctx *ctx, bst_generator *generator,
+                                   const generator_source *source) BST_MUST_CHECK;
 
 #endif

@@ -9,16 +9,12 @@
 #include "obsgen/generator_internal.h"
 
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
-/* Image processing tells two sources apart where the saddle between them is so much lower than the
- * fainter one; and two places closer than this share of the FWHM are one. */
-static const double SADDLE_SIGMA = 3.0, SADDLE_SHARE = 0.15, CLOSEST_FWHM = 0.6;
-/* From here on extents and a source's own streak are measured. */
-static const double MOMENTS_SNR = 10.0;
-/* Sources below this share of the threshold are no detections, but light. */
-static const double FAINTEST_SHARE = 0.3;
-
-/* Draws of one source. */
-enum { DRAW_PEAK, DRAW_PLACE, DRAW_FLUX, DRAWS = 8 };
+/* In a smeared frame, sources that move less are seen as one. */
+static const double ROUGH_PX = 8.0;
+/* Where image processing clips the pixels that it takes background and noise from. */
+static const double CLIP_SIGMA = 3.0;
+/* Sources of which less is on the frame are not seen. */
+static const double LEAST_VISIBLE = 0.01;
 
 bst_status bst_generator_create(bst_ctx *ctx, const bst_camera *camera, const bst_camera *knowledge,
                                 const bst_generator_settings *settings,
@@ -48,6 +44,13 @@ void bst_generator_free(bst_generator *g) {
         free(g->items);
         free(g->sources);
         free(g->ranks);
+        free(g->route);
+        free(g->way);
+        free(g->streaks);
+        free(g->path_x);
+        free(g->path_y);
+        free(g->object_x);
+        free(g->object_y);
         free(g);
     }
 }
@@ -68,9 +71,14 @@ double bst_generator_peak_e(double sigma_px, const bst_truth_item *item) {
 }
 
 /* Share of the light of a Gaussian at `at` that falls between two edges. */
-static double inside(double at, double low, double high, double sigma) {
+static double between_edges(double at, double low, double high, double sigma) {
     double s = sigma * sqrt(2.0);
     return 0.5 * (erf((high - at) / s) - erf((low - at) / s));
+}
+
+double bst_generator_inside(const bst_generator *g, double x, double y, double sigma) {
+    return between_edges(x, -0.5, g->width - 0.5, sigma) *
+           between_edges(y, -0.5, g->height - 0.5, sigma);
 }
 
 /* SNR of a source of the truth over that of its light with the PSF alone on the frame's mean
@@ -84,12 +92,39 @@ static double sharpness(const bst_generator *g, const bst_generator_frame *f,
     return known ? fmin(fmax(item->snr / plain, 0.2), 2.0) : 1.0;
 }
 
-/* A source's path cut to the frame: its length, middle and light on it. */
+/* How much of a source's image is on the frame. The squares of its light count: they are narrower
+ * than the light. */
+static void see(const bst_generator *g, generator_source *s) {
+    double margin_x = 4.0 * g->sigma + 0.5 * fabs(s->path.dx);
+    double margin_y = 4.0 * g->sigma + 0.5 * fabs(s->path.dy);
+    if (s->x > margin_x && s->y > margin_y && s->x < g->width - 1 - margin_x &&
+        s->y < g->height - 1 - margin_y) {
+        return;
+    }
+    double narrow = g->total_sigma * sqrt(0.5), sum = 0.0, along = 0.0;
+    int parts = (int)fmin(ceil(s->length / g->sigma) + 1.0, 256.0);
+    for (int i = 0; i < parts; i++) {
+        double u = (i + 0.5) / parts - 0.5;
+        double share =
+            bst_generator_inside(g, s->x + u * s->path.dx, s->y + u * s->path.dy, narrow);
+        sum += share;
+        along += u * share;
+    }
+    along /= fmax(sum, 1e-9);
+    s->seen_x += along * s->path.dx;
+    s->seen_y += along * s->path.dy;
+    s->visible = sum / parts;
+    s->ends =
+        0.5 * (bst_generator_inside(g, s->x - 0.5 * s->path.dx, s->y - 0.5 * s->path.dy, narrow) +
+               bst_generator_inside(g, s->x + 0.5 * s->path.dx, s->y + 0.5 * s->path.dy, narrow));
+}
+
+/* Where a source is on the frame; false when nothing of it is. */
 static bool place_source(const bst_generator *g, const bst_generator_frame *f,
                          const bst_truth_item *item, generator_source *s) {
-    double b = g->binning, light = item->electrons;
-    if (!(light > 0.0) || (item->flags & BST_TRUTH_OCCULTED) || !isfinite(item->x_mean_px) ||
-        !isfinite(item->x_start_px) || !isfinite(item->x_end_px)) {
+    double b = g->binning;
+    if (!(item->electrons > 0.0) || (item->flags & BST_TRUTH_OCCULTED) ||
+        !isfinite(item->x_mean_px) || !isfinite(item->x_start_px) || !isfinite(item->x_end_px)) {
         return false;
     }
     double x0 = f->window.x0 + 0.5 * (b - 1.0), y0 = f->window.y0 + 0.5 * (b - 1.0);
@@ -98,44 +133,16 @@ static bool place_source(const bst_generator *g, const bst_generator_frame *f,
     s->x = (item->x_mean_px - x0) / b;
     s->y = (item->y_mean_px - y0) / b;
     s->length = hypot(s->path.dx, s->path.dy);
+    s->flux_e = item->electrons;
     s->sharp = sharpness(g, f, item, s->length);
-    if (s->length > 1.0) {
-        double low = -0.5, high = 0.5; /* of the path, from its middle */
-        const double at[2] = {s->x, s->y}, way[2] = {s->path.dx, s->path.dy};
-        const double end[2] = {g->width - 0.5, g->height - 0.5};
-        for (int k = 0; k < 2; k++) {
-            double lo = -0.5 - at[k], hi = end[k] - at[k];
-            if (fabs(way[k]) < 1e-9) {
-                if (lo > 0.0 || hi < 0.0) {
-                    return false;
-                }
-                continue;
-            }
-            double t0 = lo / way[k], t1 = hi / way[k];
-            low = fmax(low, fmin(t0, t1));
-            high = fmin(high, fmax(t0, t1));
-        }
-        if (!(high > low)) {
-            return false;
-        }
-        if (high - low < 1.0) {
-            double middle = 0.5 * (low + high);
-            s->x += middle * way[0];
-            s->y += middle * way[1];
-            light *= high - low;
-            s->path.dx *= high - low;
-            s->path.dy *= high - low;
-            s->length *= high - low;
-        }
+    s->visible = s->ends = 1.0;
+    s->seen_x = s->x;
+    s->seen_y = s->y;
+    if (g->smeared && s->length > ROUGH_PX) {
+        s->broken = true; /* its way is laid out later */
     }
-    if (s->x < -0.5 - 2.0 * g->sigma || s->y < -0.5 - 2.0 * g->sigma ||
-        s->x > g->width - 0.5 + 2.0 * g->sigma || s->y > g->height - 0.5 + 2.0 * g->sigma) {
-        return false;
-    }
-    light *= inside(s->x, -0.5, g->width - 0.5, g->sigma) *
-             inside(s->y, -0.5, g->height - 0.5, g->sigma);
-    s->flux_e = light;
-    return light > 0.0;
+    see(g, s);
+    return s->broken || s->visible > LEAST_VISIBLE;
 }
 
 /* Amplitude of a source at the filter's output without noise, and which filter gives it. */
@@ -143,9 +150,14 @@ static void respond(const bst_generator *g, generator_source *s) {
     const bst_path_px point = {0.0, 0.0};
     double gain = bst_obsgen_between(bst_obsgen_lengths_px, g->calibration.gain, BST_OBSGEN_LENGTHS,
                                      s->length);
-    double ideal = s->sharp * s->flux_e * bst_bound_norm(&g->bound, s->length) / g->noise_e;
+    double ideal =
+        s->sharp * s->flux_e * bst_bound_norm(&g->bound, s->length) / g->noise_e * sqrt(s->visible);
     double efficiency = 1.0;
     s->as_streak = false;
+    if (s->broken) { /* at rest */
+        s->amplitude = s->flux_e * bst_bound_norm(&g->bound, 0.0) / g->noise_e;
+        return;
+    }
     if (s->star) {
         s->as_streak = g->streak > 0.0;
         if (!s->as_streak && s->length > 0.5) {
@@ -200,24 +212,47 @@ static void set_noise(bst_generator *g, const bst_generator_frame *f) {
                       d->column_offset_rms_e * d->column_offset_rms_e +
                       d->read_tail_fraction * d->read_tail_rms_e * d->read_tail_rms_e +
                       level * level * d->prnu_rms * d->prnu_rms / added;
-    g->background_e = f->truth->background_e * added;
+    g->background_e = level;
     g->noise_e = sqrt(fmax(variance, 1e-6)) * g->calibration.noise_factor;
 }
 
-static void add_crowding(bst_generator *g, double threshold) {
-    double squares = 0.0, pixels = (double)g->width * g->height;
-    for (int i = 0; i < g->source_count; i++) {
-        const generator_source *s = &g->sources[i];
-        if (s->amplitude < threshold) {
-            double norm = bst_bound_norm(&g->bound, s->length);
-            squares += s->flux_e * s->flux_e * norm * norm;
-        }
+/* Light and square of it per source that a clipped mean of the frame's pixels holds: of a Gaussian
+ * image or a line what lies below the clip. */
+static void left_in(const bst_generator *g, const generator_source *s, double clip_e, double *light,
+                    double *square) {
+    double area = 2.0 * BST_PI * g->total_sigma * g->total_sigma;
+    double peak = s->flux_e / (area * sqrt(1.0 + s->length * s->length / area));
+    double below = fmin(clip_e / peak, 1.0); /* of the peak */
+    if (s->length > 3.0 * g->total_sigma) {
+        double flank = -log(below);
+        *light = s->visible * s->flux_e * erfc(sqrt(flank));
+        *square = s->visible * s->flux_e * peak * sqrt(0.5) * erfc(sqrt(2.0 * flank));
+    } else {
+        *light = s->visible * s->flux_e * below;
+        *square = s->visible * s->flux_e * peak * 0.5 * below * below;
     }
-    double more = g->calibration.crowding * squares / pixels;
-    double before = g->noise_e;
-    g->noise_e = sqrt(before * before + more);
+}
+
+/* Sources are part of what image processing takes for background and noise. */
+static void add_crowding(bst_generator *g) {
+    double pixels = (double)g->width * g->height, before = g->noise_e;
+    g->faint_light_e = g->faint_square_e2 = 0.0;
     for (int i = 0; i < g->source_count; i++) {
-        g->sources[i].amplitude *= before / g->noise_e;
+        double light, square;
+        left_in(g, &g->sources[i], CLIP_SIGMA * before, &light, &square);
+        g->faint_light_e += light / pixels;
+        g->faint_square_e2 += square / pixels;
+    }
+    g->background_bias_e = g->calibration.background_share * g->faint_light_e;
+    g->background_e += g->background_bias_e;
+    g->noise_e = sqrt(before * before + g->calibration.crowding * g->faint_square_e2);
+    for (int i = 0; i < g->source_count; i++) {
+        generator_source *s = &g->sources[i];
+        s->amplitude *= before / g->noise_e;
+        if (!s->broken) { /* the filter's sum over its norm times what is too much */
+            double length = s->as_streak ? g->streak : 0.0;
+            s->amplitude -= g->background_bias_e / (bst_bound_norm(&g->bound, length) * g->noise_e);
+        }
     }
 }
 
@@ -240,7 +275,61 @@ static void set_threshold(bst_generator *g) {
     g->streak_share = t->streak_share[step];
 }
 
-static void set_frame(bst_generator *g, const bst_generator_frame *f) {
+static bst_status reserve_path(bst_ctx *ctx, bst_generator *g, int count) {
+    if (count <= g->path_room) {
+        return BST_OK;
+    }
+    double **all[] = {&g->path_x, &g->path_y, &g->object_x, &g->object_y};
+    for (int i = 0; i < 4; i++) {
+        double *more = realloc(*all[i], (size_t)count * sizeof **all[i]);
+        if (!more) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a path of %d steps", count);
+        }
+        *all[i] = more;
+    }
+    g->path_room = count;
+    return BST_OK;
+}
+
+/* The stars' true path, and what follows from it for all of them. */
+static bst_status set_path(bst_ctx *ctx, bst_generator *g, const bst_generator_frame *f) {
+    double b = g->binning;
+    bool known = f->path_count >= 2;
+    int count = known ? f->path_count : 2;
+    BST_TRY(reserve_path(ctx, g, count));
+    for (int k = 0; k < count; k++) {
+        g->path_x[k] = known ? f->path_x_px[k] / b : (k - 0.5) * f->streak_dx_px / b;
+        g->path_y[k] = known ? f->path_y_px[k] / b : (k - 0.5) * f->streak_dy_px / b;
+    }
+    g->path = (bst_route_path){g->path_x, g->path_y, count};
+    g->whole_path =
+        (bst_path_px){g->path_x[count - 1] - g->path_x[0], g->path_y[count - 1] - g->path_y[0]};
+    g->star_bias[0] = g->star_bias[1] = 0.0;
+    g->route_count = 0;
+    g->route_top = 0.0;
+    if (!g->smeared) {
+        if (known) {
+            bool drawn = g->streak > 0.0;
+            bst_route_bias(&g->path, g->star_path.dx, g->star_path.dy, drawn ? g->bend_x : 0.0,
+                           drawn ? g->bend_y : 0.0, g->total_sigma, g->star_bias);
+        }
+        return BST_OK;
+    }
+    if (!g->route) {
+        g->route = malloc(BST_ROUTE_NODES * sizeof *g->route);
+        g->way = malloc(BST_ROUTE_NODES * sizeof *g->way);
+        if (!g->route || !g->way) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the way of stars");
+        }
+    }
+    g->route_count = bst_route_lay(&g->path, g->total_sigma, g->route);
+    for (int i = 0; i < g->route_count; i++) {
+        g->route_top = fmax(g->route_top, g->route[i].light);
+    }
+    return BST_OK;
+}
+
+static bst_status set_frame(bst_ctx *ctx, bst_generator *g, const bst_generator_frame *f) {
     g->binning = f->binning > 1 ? f->binning : 1;
     g->width = f->window.width / g->binning;
     g->height = f->window.height / g->binning;
@@ -252,12 +341,15 @@ static void set_frame(bst_generator *g, const bst_generator_frame *f) {
         bst_bound_init(&g->bound, sigma);
     }
     double length = hypot(f->streak_dx_px, f->streak_dy_px) / g->binning;
+    g->bend_x = f->bend_x_px / g->binning;
+    g->bend_y = f->bend_y_px / g->binning;
     bool filtered = length >= g->settings.streak_min_px && length <= g->settings.streak_max_px;
-    g->smeared = length > g->settings.streak_max_px;
+    g->smeared = length + 2.0 * hypot(g->bend_x, g->bend_y) > g->settings.streak_max_px;
     g->star_path = filtered
                        ? (bst_path_px){f->streak_dx_px / g->binning, f->streak_dy_px / g->binning}
                        : (bst_path_px){0.0, 0.0};
     g->streak = filtered ? length : 0.0;
+    return set_path(ctx, g, f);
 }
 
 static bst_status collect(bst_ctx *ctx, bst_generator *g, const bst_generator_frame *f) {
@@ -275,233 +367,14 @@ static bst_status collect(bst_ctx *ctx, bst_generator *g, const bst_generator_fr
         g->source_count++;
     }
     set_threshold(g);
-    add_crowding(g, g->threshold);
+    add_crowding(g);
     qsort(g->sources, (size_t)g->source_count, sizeof *g->sources, by_row);
     return BST_OK;
 }
 
-static double draw(const bst_generator *g, const generator_source *s, int which) {
-    return bst_rng_normal(g->key, (uint64_t)g->exposure_id, s->name * DRAWS + (uint64_t)which);
-}
-
-/* What source b adds at source a's place to the output of the filter for a. */
-static double overlap(const bst_generator *g, const generator_source *a,
-                      const generator_source *b) {
-    double dx = b->x - a->x, dy = b->y - a->y;
-    double c = a->length > 0.0 ? a->path.dx / a->length : 1.0;
-    double s = a->length > 0.0 ? a->path.dy / a->length : 0.0;
-    double length = a->as_streak ? g->streak : a->length;
-    return bst_matched_falloff(dx * c + dy * s, dy * c - dx * s, length, g->total_sigma);
-}
-
-/* Whether image processing would find two maxima: the fainter source b beside a. */
-static bool told_apart(const bst_generator *g, const generator_source *a,
-                       const generator_source *b) {
-    generator_source at = *b;
-    double factor = g->calibration.blend_distance_factor;
-    double dx = (b->x - a->x) / factor, dy = (b->y - a->y) / factor;
-    if (hypot(dx, dy) < CLOSEST_FWHM * FWHM_PER_SIGMA * g->sigma) {
-        return false;
-    }
-    at.x = a->x + dx;
-    at.y = a->y + dy;
-    double top = b->amplitude + a->amplitude * overlap(g, a, &at), saddle = top;
-    enum { STEPS = 12 };
-    for (int i = 1; i < STEPS; i++) {
-        generator_source p = *a;
-        p.x = a->x + dx * i / STEPS;
-        p.y = a->y + dy * i / STEPS;
-        double value = a->amplitude * overlap(g, a, &p) + b->amplitude * overlap(g, &at, &p);
-        saddle = fmin(saddle, value);
-    }
-    return top - saddle > fmax(SADDLE_SIGMA, SADDLE_SHARE * top);
-}
-
-/* Calls for every other source whose light reaches number i. */
-static int first_near(const bst_generator *g, int i, double reach) {
-    int k = i;
-    while (k > 0 && g->sources[k - 1].y >= g->sources[i].y - reach) {
-        k--;
-    }
-    return k;
-}
-
-static int brighter(const void *a, const void *b) {
-    const generator_rank *p = a, *q = b;
-    if (p->amplitude != q->amplitude) {
-        return p->amplitude > q->amplitude ? -1 : 1;
-    }
-    return (p->index > q->index) - (p->index < q->index);
-}
-
-/* Finds which sources are detected, and which are seen in one with a brighter one. */
-static void decide(bst_generator *g) {
-    double most = 0.0;
-    for (int i = 0; i < g->source_count; i++) {
-        most = fmax(most, g->sources[i].length);
-    }
-    g->reach = 6.0 * g->total_sigma + most;
-    int ranks = 0;
-    for (int i = 0; i < g->source_count; i++) {
-        if (g->sources[i].amplitude > FAINTEST_SHARE * g->threshold) {
-            g->ranks[ranks++] = (generator_rank){g->sources[i].amplitude, i};
-        }
-    }
-    qsort(g->ranks, (size_t)ranks, sizeof *g->ranks, brighter);
-    for (int r = 0; r < ranks; r++) {
-        int i = g->ranks[r].index;
-        generator_source *s = &g->sources[i];
-        double own = s->amplitude, peak = own;
-        bool merged = false;
-        for (int k = first_near(g, i, g->reach);
-             k < g->source_count && g->sources[k].y <= s->y + g->reach; k++) {
-            generator_source *o = &g->sources[k];
-            if (k == i || fabs(o->x - s->x) > g->reach) {
-                continue;
-            }
-            double light = o->amplitude * overlap(g, o, s);
-            if (light < 0.01) {
-                continue;
-            }
-            if (o->found && !merged && !told_apart(g, o, s)) {
-                s->head = k;
-                merged = true;
-            }
-            /* what a found neighbour gives here is a slope, not a peak */
-            peak += o->found ? 0.0 : light;
-        }
-        if (merged) {
-            continue;
-        }
-        if (s->length > g->settings.streak_max_px) {
-            s->broken = true;
-            continue;
-        }
-        s->noise = draw(g, s, DRAW_PEAK);
-        s->found = g->calibration.slope * (peak - g->threshold) + s->noise > 0.0;
-        s->peak = peak;
-    }
-}
-
-typedef struct blend {
-    double flux_e, x, y; /* as one source */
-    double widen;        /* factor on the variances from neighbours that are fitted too */
-    bool near;           /* another detection in the fitted pixels, or a merged source of note */
-} blend;
-
-/* Light of sources that are seen in this one, and of what is fitted beside it. */
-static blend blend_of(const bst_generator *g, int i) {
-    const generator_source *s = &g->sources[i];
-    double weight = s->flux_e, x = 0.0, y = 0.0, widen = 1.0;
-    double stamp = fmax(3.0, ceil(3.6 * g->sigma)) + 1.5;
-    bool near = false;
-    for (int k = first_near(g, i, g->reach);
-         k < g->source_count && g->sources[k].y <= s->y + g->reach; k++) {
-        const generator_source *o = &g->sources[k];
-        if (k == i) {
-            continue;
-        }
-        double dx = o->x - s->x, dy = o->y - s->y;
-        double half_x = stamp + 0.5 * fabs(s->path.dx), half_y = stamp + 0.5 * fabs(s->path.dy);
-        if (fabs(dx) > half_x + stamp || fabs(dy) > half_y + stamp) {
-            continue;
-        }
-        double share = overlap(g, s, o);
-        if (o->found) {
-            near = near || (fabs(dx) <= half_x && fabs(dy) <= half_y);
-            /* both fluxes and places are free: what they have in common is not known */
-            widen *= 1.0 / fmax(1.0 - share * share, 0.1);
-            continue;
-        }
-        double light = o->flux_e * share;
-        weight += light;
-        x += light * dx;
-        y += light * dy;
-        near = near || (o->head == i && light > 0.1 * s->flux_e);
-    }
-    return (blend){weight, s->x + x / weight, s->y + y / weight, widen, near};
-}
-
-/* Place with error and covariance, along and across the path. */
-static void measure_place(const bst_generator *g, const generator_source *s, const blend *b,
-                          const bst_bound_at *truth, const bst_bound_at *told, double snr,
-                          double length, bst_detection *d) {
-    const bst_obsgen_calibration *cal = &g->calibration;
-    double across = bst_obsgen_between(bst_obsgen_snrs, cal->across_factor, BST_OBSGEN_SNRS, snr);
-    double along =
-        length > 1.0 ? bst_obsgen_between(bst_obsgen_snrs, cal->along_factor, BST_OBSGEN_SNRS, snr)
-                     : across;
-    double error[2];
-    bst_rng_normal2(g->key, (uint64_t)g->exposure_id, s->name * DRAWS + DRAW_PLACE, error);
-    double worse = (s->saturated ? 4.0 : 1.0) / fmin(s->sharp, 1.0);
-    error[0] *= along * worse * sqrt(truth->var_along_px2 * b->widen);
-    error[1] *= across * worse * sqrt(truth->var_across_px2 * b->widen);
-    double c = s->length > 0.0 ? s->path.dx / s->length : 1.0;
-    double n = s->length > 0.0 ? s->path.dy / s->length : 0.0;
-    double x = b->x + c * error[0] - n * error[1], y = b->y + n * error[0] + c * error[1];
-    double bias = cal->phase_bias_px / g->binning;
-    x += bias * sin(2.0 * BST_PI * b->x);
-    y += bias * sin(2.0 * BST_PI * b->y);
-    double scale = g->binning, a2 = told->var_along_px2 * b->widen * scale * scale,
-           b2 = told->var_across_px2 * b->widen * scale * scale;
-    d->x_px = g->origin_x + scale * x;
-    d->y_px = g->origin_y + scale * y;
-    d->cov_xx = c * c * a2 + n * n * b2;
-    d->cov_xy = c * n * (a2 - b2);
-    d->cov_yy = n * n * a2 + c * c * b2;
-}
-
-static void set_extent(const bst_generator *g, const generator_source *s, bst_detection *d) {
-    double modelled = s->as_streak ? g->streak : 0.0, b = g->binning;
-    double length = d->snr >= MOMENTS_SNR ? s->length : modelled;
-    double across2 = g->sigma * g->sigma, along2 = across2 + length * length / 12.0;
-    d->length_px = b * FWHM_PER_SIGMA * sqrt(along2);
-    d->width_px = b * FWHM_PER_SIGMA * sqrt(across2);
-    d->angle_rad = length > 0.01 ? atan2(s->path.dy, s->path.dx) : 0.0;
-    if (d->angle_rad > 0.5 * BST_PI) {
-        d->angle_rad -= BST_PI;
-    } else if (d->angle_rad <= -0.5 * BST_PI) {
-        d->angle_rad += BST_PI;
-    }
-    bool long_enough = d->length_px > 1.5 * fmax(d->width_px, b);
-    if (s->as_streak || (d->snr >= MOMENTS_SNR && long_enough)) {
-        d->flags |= BST_DETECTION_STREAK;
-    }
-}
-
-static bst_detection measure(const bst_generator *g, int i) {
-    const generator_source *s = &g->sources[i];
-    bst_detection d = {0};
-    blend b = blend_of(g, i);
-    /* a point filter's flux of a streak too faint to be fitted as one is what it caught */
-    bool own = s->as_streak || s->peak >= MOMENTS_SNR || s->length < 0.5;
-    double length = own ? s->length : 0.0;
-    double caught =
-        own ? 1.0
-            : bst_matched_product(s->path, (bst_path_px){0, 0}, g->total_sigma) /
-                  bst_matched_product((bst_path_px){0, 0}, (bst_path_px){0, 0}, g->total_sigma);
-    double flux = b.flux_e * caught;
-    bst_bound_at truth = bst_bound_of(&g->bound, b.flux_e, g->noise_e, s->length);
-    bst_bound_at fitted = bst_bound_of(&g->bound, flux, g->noise_e, length);
-    /* flux goes with the peak that was detected: nearly the same filter on the same noise */
-    const double together = 0.95;
-    double noise = together * s->noise + sqrt(1.0 - together * together) * draw(g, s, DRAW_FLUX);
-    d.flux_e = fmax(flux + noise * sqrt(fitted.flux_variance * b.widen), 0.1 * flux);
-    bst_bound_at told = bst_bound_of(&g->bound, d.flux_e, g->noise_e, length);
-    d.flux_sigma_e = sqrt(told.flux_variance * b.widen);
-    d.snr = d.flux_e * told.norm / g->noise_e;
-    measure_place(g, s, &b, &truth, &told, b.flux_e * truth.norm / g->noise_e, length, &d);
-    d.v_mag = -2.5 * log10(d.flux_e / (fmax(g->exposure_s, 1e-9) * g->electrons_per_s_v0));
-    set_extent(g, s, &d);
-    d.flags |= b.near ? BST_DETECTION_BLEND : 0u;
-    d.flags |= s->saturated ? BST_DETECTION_SATURATED : 0u;
-    double half_x = 0.5 * fabs(s->path.dx) + 2.0 * g->sigma;
-    double half_y = 0.5 * fabs(s->path.dy) + 2.0 * g->sigma;
-    if (s->x - half_x < -0.5 || s->y - half_y < -0.5 || s->x + half_x > g->width - 0.5 ||
-        s->y + half_y > g->height - 0.5) {
-        d.flags |= BST_DETECTION_EDGE;
-    }
-    return d;
+double bst_generator_draw(const bst_generator *g, const generator_source *s, int which) {
+    return bst_rng_normal(g->key, (uint64_t)g->exposure_id,
+                          s->name * GENERATOR_DRAWS + (uint64_t)which);
 }
 
 void bst_generator_keep(bst_generator *g, const bst_generated *item) {
@@ -520,6 +393,31 @@ void bst_generator_keep(bst_generator *g, const bst_generated *item) {
     }
 }
 
+void bst_generator_keep_rough(bst_generator *g, int x, int y, double snr, int item) {
+    double b = g->binning, norm = bst_bound_norm(&g->bound, 0.0), sigma = g->noise_e / norm;
+    bst_generated out = {.item = item};
+    bst_detection *d = &out.detection;
+    d->x_px = g->origin_x + b * x;
+    d->y_px = g->origin_y + b * y;
+    d->cov_xx = d->cov_yy = b * b;
+    d->flux_e = snr * sigma;
+    d->flux_sigma_e = sqrt(sigma * sigma + d->flux_e);
+    d->snr = snr;
+    d->length_px = d->width_px = b * FWHM_PER_SIGMA * g->sigma;
+    d->v_mag = -2.5 * log10(d->flux_e / (fmax(g->exposure_s, 1e-9) * g->electrons_per_s_v0));
+    bst_generator_keep(g, &out);
+}
+
+/* A source that hardly moved in a frame that nothing is fitted in: its pixel shows it. */
+static void keep_whole_rough(bst_generator *g, const generator_source *s) {
+    int x = (int)lround(s->x), y = (int)lround(s->y);
+    double value = s->peak * bst_matched_falloff(x - s->x, y - s->y, 0.0, g->total_sigma) +
+                   s->noise / g->calibration.slope;
+    if (value > g->threshold && x >= 0 && y >= 0 && x < g->width && y < g->height) {
+        bst_generator_keep_rough(g, x, y, value, s->item);
+    }
+}
+
 static int generated_by_row(const void *a, const void *b) {
     const bst_detection *p = &((const bst_generated *)a)->detection,
                         *q = &((const bst_generated *)b)->detection;
@@ -531,7 +429,7 @@ static int generated_by_row(const void *a, const void *b) {
 
 bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator_frame *f,
                              bst_generator_result *out) {
-    set_frame(g, f);
+    BST_TRY(set_frame(ctx, g, f));
     g->origin_x = f->window.x0 + 0.5 * (g->binning - 1);
     g->origin_y = f->window.y0 + 0.5 * (g->binning - 1);
     g->exposure_id = f->truth->exposure_id;
@@ -542,12 +440,16 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
         g->sources[i].saturated =
             (f->truth->items[g->sources[i].item].flags & BST_TRUTH_SATURATED) != 0;
     }
-    decide(g);
+    bst_generator_decide(g);
     for (int i = 0; i < g->source_count; i++) {
-        if (g->sources[i].broken) {
-            bst_generator_fragments(g, &g->sources[i]);
-        } else if (g->sources[i].found) {
-            bst_generated item = {measure(g, i), g->sources[i].item, false};
+        const generator_source *s = &g->sources[i];
+        if (s->broken) {
+            BST_TRY(bst_generator_fragments(ctx, g, s));
+        } else if (s->found && g->smeared) {
+            keep_whole_rough(g, s);
+        } else if (s->found) {
+            generator_blend b = bst_generator_blend_of(g, i);
+            bst_generated item = {bst_generator_measure(g, s, &b), s->item, false};
             bst_generator_keep(g, &item);
         }
     }
@@ -560,6 +462,8 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
                                   .background_e = g->background_e,
                                   .noise_e = g->noise_e,
                                   .threshold_snr = g->threshold,
+                                  .faint_light_e = g->faint_light_e,
+                                  .faint_square_e2 = g->faint_square_e2,
                                   .streak_px = g->streak * g->binning,
                                   .smeared = g->smeared};
     return BST_OK;

@@ -39,14 +39,22 @@ typedef struct bst_generator_frame {
     int binning;
     double exposure_s;
     double sigma_px; /* of the true PSF, a Gaussian, without the pixel's width; sensor px */
-    double streak_dx_px,
-        streak_dy_px; /* path of the stars in the middle of the window, sensor px */
+    /* path of the stars in the middle of the window and its bend (bst_motion_bend) as image
+     * processing takes them from telemetry, sensor px */
+    double streak_dx_px, streak_dy_px, bend_x_px, bend_y_px;
+    /* the true path of a star there at path_count equal steps of the exposure, less its mean,
+     * sensor px; fewer than 2: straight and uniform */
+    const double *path_x_px, *path_y_px;
+    int path_count;
 } bst_generator_frame;
 
 typedef struct bst_generator_result {
     const bst_generated *items; /* by row, then column; held until the next call */
     int count, lost;
     double background_e, noise_e, threshold_snr;
+    /* per pixel, of sources below the clip of background and noise: mean light, mean of its square
+     */
+    double faint_light_e, faint_square_e2;
     double streak_px; /* of the stars, as far as they are filtered for; sensor px */
     bool smeared;     /* stars moved further than is filtered for */
 } bst_generator_result;

@@ -3,18 +3,23 @@
 #define BST_OBSGEN_GENERATOR_INTERNAL_H
 
 #include "obsgen/generator.h"
+#include "obsgen/route.h"
 
 /* A source of the truth on the frame, in pixels that are read. */
 typedef struct generator_source {
-    double x, y; /* middle of what of its path is on the frame */
+    double x, y; /* mean of its path */
     bst_path_px path;
     double length, flux_e;
-    double sharp;     /* of its amplitude: 1 for the PSF alone */
-    double amplitude; /* SNR at the filter's output, without noise */
-    double peak;      /* the same with the light of neighbours */
-    double noise;     /* drawn for the peak */
-    uint64_t name;    /* of its draws */
-    int item, head;   /* head: seen in one with this source; -1: not */
+    double visible;        /* share of the squares of its image that is on the frame */
+    double ends;           /* share of both ends that is */
+    double seen_x, seen_y; /* middle of what is */
+    double sharp;          /* of its amplitude: 1 for the PSF alone */
+    double amplitude;      /* SNR at the filter's output, without noise */
+    double peak;           /* the same with the light of neighbours */
+    double noise;          /* drawn for the peak */
+    double level;          /* amplitude with it */
+    uint64_t name;         /* of its draws */
+    int item, head;        /* head: seen in one with this source; -1: not */
     bool star, as_streak, found, saturated;
     bool broken; /* longer than is filtered for: seen in parts */
 } generator_source;
@@ -23,6 +28,15 @@ typedef struct generator_rank {
     double amplitude;
     int index;
 } generator_rank;
+
+/* The light of a detection that is seen in one with others, and of what is fitted beside it. */
+typedef struct generator_blend {
+    double flux_e, x, y;       /* as one source */
+    double widen;              /* factor on the variances from neighbours that are fitted too */
+    double spread_x, spread_y; /* of its light: that of the brightest two */
+    double flat; /* factor on the error along a streak where light of others is in it */
+    bool near;   /* another detection in the fitted pixels, or a merged source of note */
+} generator_blend;
 
 /* Half pixels of the longest streak that is filtered for. */
 enum { GENERATOR_STEPS = 258 };
@@ -40,9 +54,14 @@ struct bst_generator {
     double sigma, total_sigma; /* of the PSF without and with the pixel's width */
     bst_bound bound;
     bst_path_px star_path;
+    double bend_x, bend_y;
+    bst_route_path path; /* the true one; count 0: not known */
+    double *path_x, *path_y, *object_x, *object_y;
+    int path_room;
     double streak; /* 0: not filtered for */
     bool smeared;
     double background_e, noise_e, threshold, streak_share;
+    double faint_light_e, faint_square_e2, background_bias_e; /* bias: what is too much of it */
     struct generator_thresholds {
         int width, height;
         double sigma, threshold[GENERATOR_STEPS], streak_share[GENERATOR_STEPS]; /* 0: not made */
@@ -51,9 +70,35 @@ struct bst_generator {
     generator_rank *ranks;
     int source_count, source_capacity;
     double reach; /* of any source's light */
+    /* the stars' way, in frames that are smeared, and a source's */
+    bst_route_node *route, *way;
+    int route_count;
+    double route_top;       /* greatest light */
+    bst_path_px whole_path; /* from its start to its end */
+    struct generator_streaks *streaks;
+    double star_bias[2], object_bias[2]; /* of fits, by how the camera really moved */
     bst_generated *items;
     int count, lost;
 };
+
+/* Share of the frame that a Gaussian's light at (x, y) has. */
+double bst_generator_inside(const bst_generator *g, double x, double y, double sigma);
+/* Finds which sources are detected, and which are seen in one with a brighter one. */
+void bst_generator_decide(bst_generator *g);
+/* What is seen in source number i and fitted beside it. */
+generator_blend bst_generator_blend_of(const bst_generator *g, int i);
+/* The detection of a source that was found. */
+bst_detection bst_generator_measure(const bst_generator *g, const generator_source *s,
+                                    const generator_blend *b);
+/* Draw number `which` of a source, a standard normal one. */
+double bst_generator_draw(const bst_generator *g, const generator_source *s, int which);
+
+/* Draws of one source. */
+enum { GENERATOR_PEAK, GENERATOR_PLACE, GENERATOR_FLUX, GENERATOR_BLEND, GENERATOR_DRAWS = 8 };
+
+/* Takes a maximum of the filter's output that is not fitted: at the pixel itself. item: of the
+ * truth, or -1. */
+void bst_generator_keep_rough(bst_generator *g, int x, int y, double snr, int item);
 
 /* Takes a detection, in place of the faintest where there is no room. */
 void bst_generator_keep(bst_generator *g, const bst_generated *item);

@@ -91,28 +91,39 @@ static double stays_above(double u, double rho) {
     return sum / total;
 }
 
-static double excursions(double u, double along_lag, double across_lag) {
-    return above(u) * (1.0 - stays_above(u, along_lag)) * (1.0 - stays_above(u, across_lag));
+/* Maxima above u per pixel of a field of unit variance; roughness: sqrt of the determinant of the
+ * covariance of its gradient. */
+static double maxima(double u, double roughness) {
+    return roughness * u * exp(-0.5 * u * u) / (2.0 * BST_PI * ROOT_2PI);
 }
 
 double bst_matched_threshold(double sigma_px, double length_px, double false_alarms, double pixels,
                              double *streak_share) {
-    double lag = bst_matched_falloff(1.0, 0.0, 0.0, sigma_px);
-    double along = bst_matched_falloff(1.0, 0.0, length_px, sigma_px);
-    double shared = length_px > 0.0 ? bst_matched_efficiency((bst_path_px){length_px, 0.0},
-                                                             (bst_path_px){0.0, 0.0}, sigma_px)
-                                    : 1.0;
+    double s = sigma_px * sqrt(2.0), steep = 1.0 / (s * s), drawn = 0.0, shared = 1.0;
+    if (length_px > 0.0) {
+        double curve = length_px < 0.05 * s ? steep * along_itself(0.0, 0.0, s) / s
+                                            : 2.0 * (density(0.0) - density(length_px / s)) /
+                                                  (s * length_px * length_px);
+        drawn = sqrt(steep * curve * s / along_itself(0.0, length_px, s));
+        shared = bst_matched_efficiency((bst_path_px){length_px, 0.0}, (bst_path_px){0.0, 0.0},
+                                        sigma_px);
+    }
     double low = 2.5, high = 9.0, point = 0.0, streak = 0.0;
     for (int i = 0; i < 24; i++) {
         double u = 0.5 * (low + high);
-        point = excursions(u, lag, lag);
-        streak = length_px > 0.0
-                     ? excursions(u, along, lag) * (1.0 - stays_above(u, fmin(shared, 0.999999)))
-                     : 0.0;
+        point = maxima(u, steep);
+        streak = length_px > 0.0 ? maxima(u, drawn) * (1.0 - stays_above(u, fmin(shared, 0.999999)))
+                                 : 0.0;
         *((point + streak) * pixels > false_alarms ? &low : &high) = u;
     }
     if (streak_share) {
         *streak_share = streak / (point + streak);
     }
     return 0.5 * (low + high);
+}
+
+double bst_matched_pixel_maxima(double sigma_px, double threshold) {
+    double lag = bst_matched_falloff(1.0, 0.0, 0.0, sigma_px);
+    double stays = stays_above(threshold, lag);
+    return above(threshold) * (1.0 - stays) * (1.0 - stays);
 }

@@ -22,14 +22,17 @@ double bst_matched_efficiency(bst_path_px source, bst_path_px filter, double sig
  * for, over that at the source: the autocorrelation of the image. */
 double bst_matched_falloff(double along_px, double across_px, double length_px, double sigma_px);
 
-/* SNR above which noise alone gives `false_alarms` separate excursions in `pixels` pixels of the
- * output of the filter for a point, and, where length_px > 0, of that for a streak too. As image
- * processing reckons: Q(u) times the chances, per axis, that the next pixel is below u where this
- * one is above (bivariate normal, lag-1 correlation of the filter): the expected Euler
- * characteristic of a field that is smooth on the grid, one excursion per pixel of white noise
- * (Adler, The Geometry of Random Fields, 1981, ch. 5). At least 2.5. *streak_share: of the false
- * alarms. */
+/* SNR above which noise alone gives `false_alarms` maxima in `pixels` pixels of the output of the
+ * filter for a point, and, where length_px > 0, of that for a streak too, looked for between the
+ * pixels: as image processing reckons, sqrt(det L) (2 pi)^(-3/2) u exp(-u^2 / 2) maxima above u per
+ * pixel of a field of unit variance whose gradient has the covariance L (Adler, The Geometry of
+ * Random Fields, 1981, ch. 5). At least 2.5. *streak_share (NULL allowed): of the false alarms. */
 double bst_matched_threshold(double sigma_px, double length_px, double false_alarms, double pixels,
                              double *streak_share);
+
+/* Maxima above `threshold` per pixel when only the pixels themselves are looked at: Q(u) times the
+ * chances, per axis, that the next pixel is below u where this one is above (bivariate normal,
+ * lag-1 correlation of the filter for a point). */
+double bst_matched_pixel_maxima(double sigma_px, double threshold);
 
 #endif

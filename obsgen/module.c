@@ -8,6 +8,7 @@
 #include "sim/world/field.h"
 #include "sim/world/frame_updates.h"
 #include "sim/world/knowledge.h"
+#include "sim/world/los_track.h"
 #include "sim/world/motion.h"
 #include "sim/world/photometry.h"
 #include "sim/world/psf.h"
@@ -82,10 +83,13 @@ typedef struct pending {
     int64_t exposure_id; /* -1: none */
     bst_truth *truth;
     int room;
-    double streak_dx_px, streak_dy_px, sigma_px;
+    double sigma_px;
+    double *path_x_px, *path_y_px; /* of a star in the middle, less its mean */
+    int path_count, path_room;
 } pending;
 
-enum { PENDING = 16 };
+/* Exposures that wait at once, and steps of a path that are kept. */
+enum { PENDING = 16, MOST_STEPS = 1024 };
 
 typedef struct obsgen {
     const obsgen_config *config;
@@ -117,6 +121,8 @@ static void destroy(void *self) {
     bst_photometer_free(&o->photometer);
     for (int i = 0; i < PENDING; i++) {
         free(o->waiting[i].truth);
+        free(o->waiting[i].path_x_px);
+        free(o->waiting[i].path_y_px);
     }
     free(o);
 }
@@ -211,19 +217,55 @@ static double peak_e(const void *user, int index, const bst_truth_item *item) {
     return bst_generator_peak_e(*(const double *)user, item);
 }
 
-/* Path of a star in the middle of the window. */
-static void star_path(const obsgen *o, const bst_los_track *track, bst_window window, pending *p) {
-    const bst_quat *q = track->q_cam_from_gcrf;
-    double x = window.x0 + 0.5 * (window.width - 1), y = window.y0 + 0.5 * (window.height - 1);
-    bst_vec3 star =
-        bst_quat_rotate(bst_quat_conj(q[track->count / 2]), bst_camera_unproject(&o->camera, x, y));
-    double x0, y0, x1, y1;
-    p->streak_dx_px = p->streak_dy_px = 0.0;
-    if (bst_camera_project(&o->camera, bst_quat_rotate(q[0], star), &x0, &y0) &&
-        bst_camera_project(&o->camera, bst_quat_rotate(q[track->count - 1], star), &x1, &y1)) {
-        p->streak_dx_px = x1 - x0;
-        p->streak_dy_px = y1 - y0;
+static bst_status reserve_path(bst_ctx *ctx, pending *p, int count) {
+    if (count <= p->path_room) {
+        return BST_OK;
     }
+    double *x = realloc(p->path_x_px, (size_t)count * sizeof *x);
+    p->path_x_px = x ? x : p->path_x_px;
+    double *y = realloc(p->path_y_px, (size_t)count * sizeof *y);
+    p->path_y_px = y ? y : p->path_y_px;
+    if (!x || !y) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a path of %d steps", count);
+    }
+    p->path_room = count;
+    return BST_OK;
+}
+
+/* Path of a star in the middle of the window, at even steps: those of the plant between the two
+ * ends. */
+static bst_status star_path(bst_ctx *ctx, const obsgen *o, const bst_los_track *track,
+                            double lead_s, bst_window window, pending *p) {
+    double x = window.x0 + 0.5 * (window.width - 1), y = window.y0 + 0.5 * (window.height - 1);
+    bst_vec3 star = bst_quat_rotate(bst_quat_conj(track->q_cam_from_gcrf[track->count / 2]),
+                                    bst_camera_unproject(&o->camera, x, y));
+    int count = track->count < MOST_STEPS ? track->count : MOST_STEPS;
+    double step_s = (track->time_s[track->count - 1] - 2.0 * lead_s) / (count - 1);
+    double mean_x = 0.0, mean_y = 0.0;
+    bool even = lead_s == 0.0 && count == track->count;
+    for (int k = 1; k < count && even; k++) {
+        even = fabs(track->time_s[k] - k * step_s) < 1e-3 * step_s;
+    }
+    BST_TRY(reserve_path(ctx, p, count));
+    p->path_count = count;
+    for (int k = 0; k < count; k++) {
+        bst_quat q =
+            even ? track->q_cam_from_gcrf[k] : bst_track_attitude(track, lead_s + k * step_s);
+        double weight = (k == 0 || k == count - 1 ? 0.5 : 1.0) / (count - 1);
+        if (!bst_camera_project(&o->camera, bst_quat_rotate(q, star), &x, &y)) {
+            p->path_count = 0;
+            return BST_OK;
+        }
+        p->path_x_px[k] = x;
+        p->path_y_px[k] = y;
+        mean_x += weight * x;
+        mean_y += weight * y;
+    }
+    for (int k = 0; k < count; k++) {
+        p->path_x_px[k] -= mean_x;
+        p->path_y_px[k] -= mean_y;
+    }
+    return BST_OK;
 }
 
 static bst_status reserve(bst_ctx *ctx, pending *p, int count) {
@@ -284,7 +326,7 @@ static bst_status expose(obsgen *o, struct bst_step *step, const bst_exposure *e
     if (e->dropped) {
         return BST_OK;
     }
-    star_path(o, &track, e->window, p);
+    BST_TRY(star_path(ctx, o, &track, options.lead_s, e->window, p));
     p->sigma_px = o->sigma_px;
     BST_TRY(reserve(ctx, p, count));
     if (truth->lost == 0) {
@@ -296,13 +338,14 @@ static bst_status expose(obsgen *o, struct bst_step *step, const bst_exposure *e
 }
 
 static void set_attitude(const obsgen *o, struct bst_step *step, const bst_exposure *e,
-                         bool *oriented, bool *locked, bst_detections *out) {
+                         bool *oriented, bool *locked, bst_motion *known, bst_detections *out) {
     bst_sample pointing = bst_step_latest(step, PORT_POINTING);
     bst_sample predicted = bst_step_latest(step, PORT_PREDICTIONS);
     bst_motion motion = {.q_cam_from_gcrf = BST_QUAT_IDENTITY};
     *oriented = pointing.payload && !pointing.stale &&
                 bst_motion_from_telemetry(pointing.payload, e->start_tick, e->end_tick, &motion);
     out->q_cam_from_gcrf = out->q_telemetry_from_gcrf = motion.q_cam_from_gcrf;
+    *known = motion;
     const bst_predictions *p = predicted.stale ? NULL : predicted.payload;
     *locked = *oriented && p && p->attitude_valid;
     if (*locked) {
@@ -347,15 +390,24 @@ static bst_status process(obsgen *o, struct bst_step *step, const bst_exposure *
     out->start_tick = e->start_tick;
     out->end_tick = e->end_tick;
     bool oriented, locked;
-    set_attitude(o, step, e, &oriented, &locked, out);
-    const bst_generator_frame frame = {
+    bst_motion motion;
+    set_attitude(o, step, e, &oriented, &locked, &motion, out);
+    bst_generator_frame frame = {
         .truth = p->truth,
         .window = e->window,
         .binning = e->binning,
         .exposure_s = (double)(e->end_tick - e->start_tick) / (double)o->tick_rate_hz,
         .sigma_px = p->sigma_px,
-        .streak_dx_px = p->streak_dx_px,
-        .streak_dy_px = p->streak_dy_px};
+        .path_x_px = p->path_x_px,
+        .path_y_px = p->path_y_px,
+        .path_count = p->path_count};
+    if (oriented) {
+        const bst_camera *camera = bst_knowledge_camera(o->knowledge);
+        bst_motion_streak(&motion, camera, e->window.x0 + 0.5 * (e->window.width - 1),
+                          e->window.y0 + 0.5 * (e->window.height - 1), &frame.streak_dx_px,
+                          &frame.streak_dy_px);
+        bst_motion_bend(&motion, camera, &frame.bend_x_px, &frame.bend_y_px);
+    }
     bst_generator_result made;
     BST_TRY(bst_generator_run(ctx, o->generator, &frame, &made));
     out->background_e = made.background_e;

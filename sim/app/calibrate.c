@@ -3,44 +3,15 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "obsgen/generator.h"
-#include "sim/app/pairing.h"
+#include "sim/app/calibrate_internal.h"
 
-/* SNR about the threshold in which Pd is fitted, and least number of sources for a fit. */
+/* SNR about the threshold in which Pd is fitted, stars whose mean place is one, grid of places. */
 static const double PD_REACH = 4.0;
-enum { LEAST_SOURCES = 200, LEAST_ALARMS = 10, LEAST_PLACES = 30, GRID = 48 };
+enum { LEAST_COMMON = 8, GRID = 48, CAPACITY = 4096 };
+/* Sources that count for blends; of those that places are compared of, the least, and the least
+ * share of a companion's SNR. */
+static const double BLEND_SNR = 10.0, COMPANION_LEAST = 5.0, COMPANION_SHARE = 0.3;
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
-
-/* A source that stands alone, near the threshold. */
-typedef struct trial {
-    float amplitude, threshold, length;
-    bool detected;
-} trial;
-
-typedef struct mean_square {
-    double sum;
-    long count;
-} mean_square;
-
-struct bst_calibrator {
-    bst_calibrated_path path;
-    bst_generator *theory;
-    double sigma_px;
-    bst_bound bound;
-    bst_pairing pairing;
-    trial *trials;
-    long trial_count, trial_room;
-    double *alarm_energy; /* (u^2 - T^2) / 2 */
-    long alarm_count, alarm_room;
-    double alarms_expected;
-    mean_square across[BST_OBSGEN_SNRS], along[BST_OBSGEN_SNRS];
-    double bias_sum, bias_weight;
-    double threshold_offset;
-    double nn, nq, qq, ny, qy; /* least squares of noise^2 by theory's and by the light left over */
-    long identified, identifiable;
-    long hits, hits_told;
-    long frames, detected;
-};
 
 bst_status bst_calibrator_create(bst_ctx *ctx, bst_calibrator **out) {
     *out = calloc(1, sizeof **out);
@@ -50,7 +21,12 @@ bst_status bst_calibrator_create(bst_ctx *ctx, bst_calibrator **out) {
 void bst_calibrator_free(bst_calibrator *c) {
     if (c) {
         bst_generator_free(c->theory);
+        for (int i = 0; i <= CALIBRATE_BLENDS; i++) {
+            bst_generator_free(c->blended[i]);
+        }
+        free(c->made);
         bst_pairing_free(&c->pairing);
+        bst_pairing_free(&c->blend_pairing);
         free(c->trials);
         free(c->alarm_energy);
         free(c);
@@ -60,8 +36,8 @@ void bst_calibrator_free(bst_calibrator *c) {
 bst_status bst_calibrator_begin(bst_ctx *ctx, bst_calibrator *c, const bst_calibrated_path *path) {
     bst_obsgen_calibration theory;
     bst_obsgen_calibration_theory(&theory);
-    theory.crowding = 0.0;
-    const bst_generator_settings settings = {.capacity = 4096,
+    theory.crowding = theory.background_share = 0.0;
+    const bst_generator_settings settings = {.capacity = CAPACITY,
                                              .false_alarms_per_frame = path->false_alarms_per_frame,
                                              .streak_min_px = path->streak_min_px,
                                              .streak_max_px = path->streak_max_px};
@@ -70,8 +46,24 @@ bst_status bst_calibrator_begin(bst_ctx *ctx, bst_calibrator *c, const bst_calib
     c->path = *path;
     c->sigma_px = hypot(bst_camera_psf_sigma_px(path->camera), path->jitter_px);
     bst_bound_init(&c->bound, c->sigma_px);
-    return bst_generator_create(ctx, path->camera, path->camera, &settings, &theory,
-                                bst_rng_make_key(1, 0, "calibration", "observations"), &c->theory);
+    bst_rng_key key = bst_rng_make_key(1, 0, "calibration", "observations");
+    BST_TRY(
+        bst_generator_create(ctx, path->camera, path->camera, &settings, &theory, key, &c->theory));
+    bst_obsgen_calibration_theory(&theory);
+    for (int i = 0; i <= CALIBRATE_BLENDS; i++) {
+        bst_generator_free(c->blended[i]);
+        c->blended[i] = NULL;
+        theory.blend_distance_factor =
+            calibrate_blend_factors[i < CALIBRATE_BLENDS ? i : CALIBRATE_TYPICAL];
+        theory.blend_error = i < CALIBRATE_BLENDS ? 0.0 : CALIBRATE_BLEND_ERROR;
+        BST_TRY(bst_generator_create(ctx, path->camera, path->camera, &settings, &theory, key,
+                                     &c->blended[i]));
+    }
+    if (!c->made) {
+        c->made = malloc(sizeof *c->made + CAPACITY * sizeof c->made->items[0]);
+    }
+    return c->made ? BST_OK
+                   : bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d detections", CAPACITY);
 }
 
 static bst_status grow(bst_ctx *ctx, void **items, long count, long *room, size_t bytes) {
@@ -134,19 +126,42 @@ static int snr_node(double snr) {
     return best;
 }
 
+/* What all places of a frame have in common: the generator has it from the camera's path. */
+typedef struct common_error {
+    double x, y, weight; /* of 1 / variance, px^-2 */
+    int count;
+} common_error;
+
+static double place_weight(const bst_calibrator *c, const bst_truth_item *t, double noise_e) {
+    bst_bound_at at = bst_bound_of(&c->bound, t->electrons, noise_e, length_of(t));
+    return 1.0 / (at.var_along_px2 + at.var_across_px2 + 1e-4);
+}
+
 static void add_place(bst_calibrator *c, const bst_truth_item *t, const bst_detection *d,
-                      double noise_e) {
-    double length = length_of(t), dx = d->x_px - t->x_mean_px, dy = d->y_px - t->y_mean_px;
+                      double noise_e, const common_error *common) {
+    /* the mean follows each of its members by its share */
+    double own = place_weight(c, t, noise_e) / common->weight;
+    if (common->count < LEAST_COMMON || own > 0.5) {
+        return;
+    }
+    double free_part = 1.0 / sqrt(1.0 - own);
+    double length = length_of(t), dx = (d->x_px - t->x_mean_px - common->x) * free_part,
+           dy = (d->y_px - t->y_mean_px - common->y) * free_part;
     double cosine = length > 0.0 ? (t->x_end_px - t->x_start_px) / length : 1.0;
     double sine = length > 0.0 ? (t->y_end_px - t->y_start_px) / length : 0.0;
     bst_bound_at at = bst_bound_of(&c->bound, t->electrons, noise_e, length);
     double along = dx * cosine + dy * sine, across = dy * cosine - dx * sine;
     int node = snr_node(t->electrons * at.norm / noise_e);
-    mean_square *a = length > 1.0 ? &c->along[node] : &c->across[node];
-    a->sum += along * along / at.var_along_px2;
-    a->count++;
-    c->across[node].sum += across * across / at.var_across_px2;
-    c->across[node].count++;
+    const double squares[2] = {along * along / at.var_along_px2,
+                               across * across / at.var_across_px2};
+    for (int k = 0; k < 2; k++) {
+        /* what is further off is another source's light */
+        if (squares[k] < CALIBRATE_MOST_SIGMAS * CALIBRATE_MOST_SIGMAS) {
+            calibrate_mean *sum = k == 0 && length > 1.0 ? &c->along[node] : &c->across[node];
+            sum->sum += squares[k];
+            sum->count++;
+        }
+    }
     double weight = 1.0 / (at.var_across_px2 + 1e-6);
     const double place[2] = {t->x_mean_px, t->y_mean_px}, off[2] = {dx, dy};
     for (int k = 0; k < 2 && length < 1.0; k++) {
@@ -163,12 +178,12 @@ static bst_status add_trial(bst_ctx *ctx, bst_calibrator *c, const bst_truth_ite
     }
     BST_TRY(grow(ctx, (void **)&c->trials, c->trial_count, &c->trial_room, sizeof *c->trials));
     c->trials[c->trial_count++] =
-        (trial){(float)amplitude, (float)threshold, (float)length_of(t), detected};
+        (calibrate_trial){(float)amplitude, (float)threshold, (float)length_of(t), detected};
     return BST_OK;
 }
 
 static bst_status add_alarms(bst_ctx *ctx, bst_calibrator *c, const bst_truth *truth,
-                             const bst_detections *detections, double reach) {
+                             const bst_detections *detections, double reach, double taken) {
     double width = (double)c->path.camera->width_px, height = (double)c->path.camera->height_px;
     int open = 0;
     for (int k = 0; k < GRID * GRID; k++) {
@@ -176,7 +191,9 @@ static bst_status add_alarms(bst_ctx *ctx, bst_calibrator *c, const bst_truth *t
         double y = height * ((double)(k / GRID) + 0.5) / GRID;
         open += is_free(truth, x, y, reach, -1, 1.0);
     }
-    c->alarms_expected += c->path.false_alarms_per_frame * open / (GRID * GRID);
+    /* background that is found too bright takes from noise */
+    double less = exp(-taken * (detections->threshold_snr + 0.5 * taken));
+    c->alarms_expected += c->path.false_alarms_per_frame * less * open / (GRID * GRID);
     for (int i = 0; i < detections->count; i++) {
         const bst_detection *d = &detections->items[i];
         if (c->pairing.item_of[i] >= 0 || !is_free(truth, d->x_px, d->y_px, reach, -1, 1.0)) {
@@ -195,24 +212,138 @@ static bst_status add_alarms(bst_ctx *ctx, bst_calibrator *c, const bst_truth *t
     return BST_OK;
 }
 
-static void add_noise(bst_calibrator *c, const bst_truth *truth, const bst_detections *detections,
-                      double theory_noise) {
-    double light = 0.0;
-    for (int i = 0; i < truth->count; i++) {
-        const bst_truth_item *t = &truth->items[i];
-        if ((t->flags & BST_TRUTH_IN_FIELD) && t->snr < detections->threshold_snr) {
-            double e = t->electrons * bst_bound_norm(&c->bound, length_of(t));
-            light += e * e;
-        }
-    }
-    light /= (double)c->path.camera->width_px * (double)c->path.camera->height_px;
-    double n = 1.0, q = light / (theory_noise * theory_noise),
-           y = detections->noise_e * detections->noise_e / (theory_noise * theory_noise);
+static void add_noise(bst_calibrator *c, const bst_detections *detections,
+                      const bst_generator_result *theory) {
+    double variance = theory->noise_e * theory->noise_e, n = 1.0,
+           q = theory->faint_square_e2 / variance,
+           y = detections->noise_e * detections->noise_e / variance;
     c->nn += n * n;
     c->nq += n * q;
     c->qq += q * q;
     c->ny += n * y;
     c->qy += q * y;
+    c->light_square += theory->faint_light_e * theory->faint_light_e;
+    c->light_bias += theory->faint_light_e * (detections->background_e - theory->background_e);
+}
+
+/* Whether a star is whole on the frame, with nothing near it. */
+static bool stands_alone(const bst_calibrator *c, const bst_truth *truth, int i, double reach) {
+    const bst_truth_item *t = &truth->items[i];
+    const bst_camera *camera = c->path.camera;
+    double x = t->x_mean_px, y = t->y_mean_px, edge = reach + 0.5 * length_of(t);
+    bool whole = x > edge && y > edge && x < (double)camera->width_px - edge &&
+                 y < (double)camera->height_px - edge;
+    bool dark = !(t->flags & BST_TRUTH_IN_FIELD) || (t->flags & BST_TRUTH_OCCULTED) ||
+                (t->flags & BST_TRUTH_SATURATED);
+    return !dark && whole && t->snr > 1.0 && t->kind == BST_SOURCE_STAR &&
+           is_free(truth, x, y, reach + 0.5 * length_of(t), i, 0.5);
+}
+
+/* A star that stands alone, and its detection: number k, or -1. dark_e: background and dark
+ * current.
+ */
+static bst_status add_star(bst_ctx *ctx, bst_calibrator *c, const bst_truth_item *t,
+                           const bst_detections *detections, int k,
+                           const bst_generator_result *theory, double dark_e,
+                           const common_error *common) {
+    const bst_camera *camera = c->path.camera;
+    double plain = sqrt(dark_e + camera->read_noise_e * camera->read_noise_e);
+    /* what its background has too much is missing from the output */
+    double missing = (detections->background_e - theory->background_e) /
+                     (bst_bound_norm(&c->bound, length_of(t)) * detections->noise_e);
+    BST_TRY(add_trial(ctx, c, t, t->snr * plain / detections->noise_e,
+                      detections->threshold_snr + missing, k >= 0));
+    if (k < 0) {
+        return BST_OK;
+    }
+    c->detected++;
+    const bst_detection *d = &detections->items[k];
+    add_place(c, t, d, detections->noise_e, common);
+    if (detections->stars_identified > 0 && t->snr > detections->threshold_snr + 2.0 &&
+        !(t->id & UINT32_C(0x80000000))) {
+        c->identifiable++;
+        c->identified += d->star_id == t->id;
+    }
+    return BST_OK;
+}
+
+/* Whether a source that would be seen alone has a brighter one so near that both may be one. */
+static bool is_beside(const bst_truth *truth, int i, double reach) {
+    const bst_truth_item *t = &truth->items[i];
+    if (!(t->snr >= BLEND_SNR) || !(t->flags & BST_TRUTH_IN_FIELD) ||
+        (t->flags & BST_TRUTH_OCCULTED)) {
+        return false;
+    }
+    for (int k = 0; k < truth->count; k++) {
+        const bst_truth_item *o = &truth->items[k];
+        if (k != i && o->snr > t->snr && fabs(o->x_mean_px - t->x_mean_px) < reach &&
+            fabs(o->y_mean_px - t->y_mean_px) < reach) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Whether a source has a fainter one near it that may be seen in one with it. */
+static bool has_companion(const bst_truth *truth, int i, double reach) {
+    const bst_truth_item *t = &truth->items[i];
+    if (!(t->snr >= COMPANION_LEAST) || !(t->flags & BST_TRUTH_IN_FIELD) ||
+        (t->flags & BST_TRUTH_OCCULTED)) {
+        return false;
+    }
+    for (int k = 0; k < truth->count; k++) {
+        const bst_truth_item *o = &truth->items[k];
+        if (k != i && o->snr <= t->snr && o->snr > COMPANION_SHARE * t->snr &&
+            fabs(o->x_mean_px - t->x_mean_px) < reach &&
+            fabs(o->y_mean_px - t->y_mean_px) < reach) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static void add_together(calibrate_mean *sum, const bst_truth_item *t, const bst_detections *all,
+                         int k) {
+    if (k >= 0) {
+        double dx = all->items[k].x_px - t->x_mean_px, dy = all->items[k].y_px - t->y_mean_px;
+        sum->sum += dx * dx + dy * dy;
+        sum->count++;
+    }
+}
+
+/* Counts what is told apart in the image and at each distance of blends, paired alike. */
+static bst_status add_blends(bst_ctx *ctx, bst_calibrator *c, const bst_generator_frame *frame,
+                             const bst_detections *detections, double fwhm) {
+    const bst_truth *truth = frame->truth;
+    double reach = 4.0 * fwhm;
+    for (int n = 0; n <= CALIBRATE_BLENDS; n++) {
+        bst_generator_result made;
+        BST_TRY(bst_generator_run(ctx, c->blended[n], frame, &made));
+        c->made->count = made.count;
+        for (int i = 0; i < made.count; i++) {
+            c->made->items[i] = made.items[i].detection;
+        }
+        BST_TRY(bst_pairing_make(ctx, &c->blend_pairing, truth, c->made, fwhm));
+        for (int i = 0; i < truth->count; i++) {
+            if ((n == CALIBRATE_TYPICAL || n == CALIBRATE_BLENDS) &&
+                has_companion(truth, i, reach)) {
+                const bst_truth_item *t = &truth->items[i];
+                add_together(&c->together[n == CALIBRATE_TYPICAL ? 1 : 2], t, c->made,
+                             c->blend_pairing.detection_of[i]);
+                if (n == CALIBRATE_TYPICAL) {
+                    add_together(&c->together[0], t, detections, c->pairing.detection_of[i]);
+                }
+            }
+            if (n == CALIBRATE_BLENDS) {
+                continue;
+            }
+            bool beside =
+                (n == 0 || c->blend_pairing.detection_of[i] >= 0) && is_beside(truth, i, reach);
+            c->beside[CALIBRATE_BLENDS] += n == 0 && beside && c->pairing.detection_of[i] >= 0;
+            c->beside[n] += beside && c->blend_pairing.detection_of[i] >= 0;
+        }
+    }
+    return BST_OK;
 }
 
 bst_status bst_calibrator_add(bst_ctx *ctx, bst_calibrator *c, const bst_truth *truth,
@@ -232,184 +363,36 @@ bst_status bst_calibrator_add(bst_ctx *ctx, bst_calibrator *c, const bst_truth *
     }
     c->frames++;
     c->threshold_offset += detections->threshold_snr - theory.threshold_snr;
-    add_noise(c, truth, detections, theory.noise_e);
+    add_noise(c, detections, &theory);
     double fwhm = FWHM_PER_SIGMA * c->sigma_px, reach = 5.0 * c->sigma_px + 3.0;
     BST_TRY(bst_pairing_make(ctx, &c->pairing, truth, detections, fwhm));
-    double plain =
-        sqrt(truth->background_e + truth->dark_e + camera->read_noise_e * camera->read_noise_e);
-    for (int i = 0; i < truth->count; i++) {
-        const bst_truth_item *t = &truth->items[i];
-        double x = t->x_mean_px, y = t->y_mean_px, edge = reach + 0.5 * length_of(t);
-        bool whole = x > edge && y > edge && x < (double)camera->width_px - edge &&
-                     y < (double)camera->height_px - edge;
-        bool dark = !(t->flags & BST_TRUTH_IN_FIELD) || (t->flags & BST_TRUTH_OCCULTED) ||
-                    (t->flags & BST_TRUTH_SATURATED);
-        if (dark || !whole || !(t->snr > 1.0) || t->kind != BST_SOURCE_STAR ||
-            !is_free(truth, x, y, reach + 0.5 * length_of(t), i, 0.5)) {
-            continue;
-        }
-        int k = c->pairing.detection_of[i];
-        BST_TRY(add_trial(ctx, c, t, t->snr * plain / detections->noise_e,
-                          detections->threshold_snr, k >= 0));
-        if (k < 0) {
-            continue;
-        }
-        c->detected++;
-        const bst_detection *d = &detections->items[k];
-        add_place(c, t, d, detections->noise_e);
-        if (detections->stars_identified > 0 && t->snr > detections->threshold_snr + 2.0 &&
-            !(t->id & UINT32_C(0x80000000))) {
-            c->identifiable++;
-            c->identified += d->star_id == t->id;
-        }
-    }
-    return add_alarms(ctx, c, truth, detections, reach);
-}
-
-/* Log-likelihood of the trials of one streak length. */
-static double likelihood(const bst_calibrator *c, int node, double gain, double slope) {
-    double sum = 0.0;
-    for (long i = 0; i < c->trial_count; i++) {
-        const trial *t = &c->trials[i];
-        int own = 0;
-        for (int n = 1; n < BST_OBSGEN_LENGTHS; n++) {
-            bool nearer = fabs(sqrt((double)t->length) - sqrt(bst_obsgen_lengths_px[n])) <
-                          fabs(sqrt((double)t->length) - sqrt(bst_obsgen_lengths_px[own]));
-            own = nearer ? n : own;
-        }
-        if (own != node) {
-            continue;
-        }
-        double z = slope * (gain * (double)t->amplitude - (double)t->threshold);
-        double p = 0.5 * erfc(-z * 0.70710678118654752);
-        sum += log(fmax(t->detected ? p : 1.0 - p, 1e-4)); /* a few are paired by mistake */
-    }
-    return sum;
-}
-
-/* The gain of one streak length at a slope, by golden section. */
-static double best_gain(const bst_calibrator *c, int node, double slope, double *value) {
-    const double part = 0.38196601125010515;
-    double low = 0.5, high = 1.3, a = low + part * (high - low), b = high - part * (high - low);
-    double at_a = likelihood(c, node, a, slope), at_b = likelihood(c, node, b, slope);
-    for (int i = 0; i < 22; i++) {
-        if (at_a > at_b) {
-            high = b;
-            b = a;
-            at_b = at_a;
-            a = low + part * (high - low);
-            at_a = likelihood(c, node, a, slope);
-        } else {
-            low = a;
-            a = b;
-            at_a = at_b;
-            b = high - part * (high - low);
-            at_b = likelihood(c, node, b, slope);
-        }
-    }
-    *value = fmax(at_a, at_b);
-    return 0.5 * (low + high);
-}
-
-static void fit_detection(const bst_calibrator *c, bst_obsgen_calibration *out) {
-    long count[BST_OBSGEN_LENGTHS] = {0};
-    for (long i = 0; i < c->trial_count; i++) {
-        int own = 0;
-        for (int n = 1; n < BST_OBSGEN_LENGTHS; n++) {
-            bool nearer =
-                fabs(sqrt((double)c->trials[i].length) - sqrt(bst_obsgen_lengths_px[n])) <
-                fabs(sqrt((double)c->trials[i].length) - sqrt(bst_obsgen_lengths_px[own]));
-            own = nearer ? n : own;
-        }
-        count[own]++;
-    }
-    double best = -INFINITY;
-    for (double slope = 0.7; slope <= 1.301; slope += 0.02) {
-        double total = 0.0, gain[BST_OBSGEN_LENGTHS] = {0};
-        for (int n = 0; n < BST_OBSGEN_LENGTHS; n++) {
-            double value = 0.0;
-            /* a length that only few frames had would be told by their oddities */
-            if (count[n] >= LEAST_SOURCES && count[n] >= c->trial_count / 50) {
-                gain[n] = best_gain(c, n, slope, &value);
+    BST_TRY(add_blends(ctx, c, &frame, detections, fwhm));
+    /* first what all have in common, then each */
+    common_error common = {0.0, 0.0, 0.0, 0};
+    for (int pass = 0; pass < 2; pass++) {
+        for (int i = 0; i < truth->count; i++) {
+            const bst_truth_item *t = &truth->items[i];
+            int k = c->pairing.detection_of[i];
+            if ((pass == 0 && k < 0) || !stands_alone(c, truth, i, reach)) {
+                continue;
             }
-            total += value;
-        }
-        if (total > best) {
-            best = total;
-            out->slope = slope;
-            for (int n = 0; n < BST_OBSGEN_LENGTHS; n++) {
-                out->gain[n] = gain[n];
+            if (pass == 0) {
+                double weight = place_weight(c, t, detections->noise_e);
+                common.x += weight * (detections->items[k].x_px - t->x_mean_px);
+                common.y += weight * (detections->items[k].y_px - t->y_mean_px);
+                common.weight += weight;
+                common.count++;
+            } else {
+                BST_TRY(add_star(ctx, c, t, detections, k, &theory,
+                                 truth->background_e + truth->dark_e, &common));
             }
         }
-    }
-    /* a length that was not seen has the gain of the nearest one that was */
-    double seen[BST_OBSGEN_LENGTHS];
-    for (int n = 0; n < BST_OBSGEN_LENGTHS; n++) {
-        seen[n] = out->gain[n];
-    }
-    for (int n = 0; n < BST_OBSGEN_LENGTHS; n++) {
-        for (int away = 1; away < BST_OBSGEN_LENGTHS && out->gain[n] <= 0.0; away++) {
-            int low = n - away, high = n + away;
-            out->gain[n] = low >= 0 && seen[low] > 0.0 ? seen[low]
-                           : high < BST_OBSGEN_LENGTHS ? seen[high]
-                                                       : 0.0;
+        if (pass == 0 && common.count > 0) {
+            common.x /= common.weight;
+            common.y /= common.weight;
         }
     }
-}
-
-static void fit_places(const mean_square *seen, double *factors) {
-    double before = 1.0;
-    for (int i = 0; i < BST_OBSGEN_SNRS; i++) {
-        if (seen[i].count >= LEAST_PLACES) {
-            before = sqrt(seen[i].sum / (double)seen[i].count);
-        }
-        factors[i] = fmin(fmax(before, 0.1), 20.0);
-    }
-}
-
-bst_status bst_calibrator_fit(bst_ctx *ctx, bst_calibrator *c, bst_obsgen_calibration *out,
-                              bst_calibration_counts *counts) {
-    *counts = (bst_calibration_counts){.frames = c->frames,
-                                       .sources = c->trial_count,
-                                       .detected = c->detected,
-                                       .false_alarms = c->alarm_count};
-    bst_obsgen_calibration_theory(out);
-    if (c->trial_count < LEAST_SOURCES || c->alarm_count < LEAST_ALARMS) {
-        return bst_fail(ctx, BST_ERR_STATE,
-                        "%ld stars near the detection limit and %ld false alarms are too few for a "
-                        "calibration (needed: %d and %d); give --seeds more, or scenarios with "
-                        "world/faint_stars = \"statistical\" and a scenegen/v_limit beyond the "
-                        "limit of detection",
-                        c->trial_count, c->alarm_count, LEAST_SOURCES, LEAST_ALARMS);
-    }
-    fit_detection(c, out);
-    fit_places(c->across, out->across_factor);
-    fit_places(c->along, out->along_factor);
-    for (int i = 0; i < BST_OBSGEN_SNRS; i++) {
-        counts->places += c->across[i].count;
-    }
-    out->phase_bias_px = c->bias_weight > 0.0 ? c->bias_sum / c->bias_weight : 0.0;
-    out->threshold_offset = c->threshold_offset / (double)c->frames;
-    /* noise^2 = factor^2 theory^2 + crowding light */
-    double determinant = c->nn * c->qq - c->nq * c->nq;
-    double flat = c->ny / c->nn, crowding = out->crowding;
-    if (determinant > 1e-9 * c->nn * c->qq) {
-        crowding = fmin(fmax((c->nn * c->qy - c->nq * c->ny) / determinant, 0.0), 2.0);
-    }
-    flat = (c->ny - crowding * c->nq) / c->nn;
-    out->crowding = crowding;
-    out->noise_factor = sqrt(fmax(flat, 0.01));
-    out->false_alarm_factor = (double)c->alarm_count / c->alarms_expected;
-    double energy = 0.0;
-    for (long i = 0; i < c->alarm_count; i++) {
-        energy += fmin(c->alarm_energy[i], 10.0);
-    }
-    out->false_alarm_tail = fmin((double)c->alarm_count / fmax(energy, 1e-3), 10.0);
-    if (c->identifiable >= LEAST_PLACES) {
-        out->star_id_probability = (double)c->identified / (double)c->identifiable;
-    }
-    if (c->hits >= LEAST_SOURCES) {
-        out->hit_told_probability = (double)c->hits_told / (double)c->hits;
-    }
-    return BST_OK;
+    double taken = (detections->background_e - theory.background_e) /
+                   (bst_bound_norm(&c->bound, 0.0) * detections->noise_e);
+    return add_alarms(ctx, c, truth, detections, reach, taken);
 }

@@ -60,7 +60,7 @@ static void known_factors_are_found(void **state) {
     made.slope = 0.9;
     made.threshold_offset = 0.1;
     made.noise_factor = 1.05;
-    made.crowding = 0.0;
+    made.crowding = made.background_share = 0.0;
     made.false_alarm_factor = 0.8;
     made.false_alarm_tail = 0.7;
     for (int i = 0; i < BST_OBSGEN_SNRS; i++) {
@@ -95,6 +95,7 @@ static void known_factors_are_found(void **state) {
         bst_generator_result r;
         bst_assert_ok(&ctx, bst_generator_run(&ctx, generator, &frame, &r));
         detections->exposure_id = f;
+        detections->background_e = r.background_e;
         detections->noise_e = r.noise_e;
         detections->threshold_snr = r.threshold_snr;
         detections->count = r.count;

@@ -265,7 +265,7 @@ static void draws_depend_on_names_alone(void **state) {
     assert_int_equal(r.count, count);
     assert_int_equal(same_until(first, r.items, count), count);
     /* reversed, and every third source gone; crowding goes by all sources and is left out */
-    s.calibration.crowding = 0.0;
+    s.calibration.crowding = s.calibration.background_share = 0.0;
     start(&s);
     r = run(&s, 11);
     count = r.count;
@@ -312,22 +312,30 @@ static void close_sources_are_one(void **state) {
             bst_generator_result r = run(&s, f);
             assert_int_equal(r.count, 1 + k);
             const bst_generated *seen = &r.items[r.items[0].item == 0 ? 0 : r.count - 1];
-            assert_true(seen->detection.flags & BST_DETECTION_BLEND);
+            assert_int_equal((seen->detection.flags & BST_DETECTION_BLEND) != 0, k);
             x += seen->detection.x_px / FRAMES;
             y += seen->detection.y_px / FRAMES;
         }
-        /* weighted with flux, less what the fit of one source misses of the other's light:
-         * exp(-d^2 / 4 sigma^2); five standard deviations of 200 places at SNR 100 */
-        double s2 = s.frame.sigma_px * s.frame.sigma_px + 1.0 / 12.0;
-        double share = 0.5 * exp(-0.64 / (4.0 * s2));
-        double expected = k == 0 ? 300.0 + 0.8 * share / (1.0 + share) : 300.0;
+        /* the fit of one source lands on the maximum of the filter's output, F1 exp(-x^2 / 4 s2) +
+         * F2 exp(-(x - d)^2 / 4 s2): the root of its slope; five standard deviations of 200 places
+         * at SNR 100 */
+        double s2 = s.frame.sigma_px * s.frame.sigma_px + 1.0 / 12.0, low = 0.0, high = 0.4;
+        for (int i = 0; i < 40 && k == 0; i++) {
+            double at = 0.5 * (low + high), away = 0.8 - at;
+            double slope =
+                0.5 * away * exp(-away * away / (4.0 * s2)) - at * exp(-at * at / (4.0 * s2));
+            *(slope > 0.0 ? &low : &high) = at;
+        }
+        double expected = 300.0 + (k == 0 ? low : 0.0);
         bst_assert_close(x, expected, 0.01);
         bst_assert_close(y, 400.0, 0.01);
     }
     close_scene(&s);
 }
 
-/* A streak cut by the frame's edge shows what is on the frame; one beside it nothing. */
+/* A streak cut by the frame's edge is fitted with its known path, so that place and flux are those
+ * of the whole, from half the light; what lies mostly beyond the edge is a point on it; one beside
+ * the frame shows nothing. */
 static void the_edge_cuts(void **state) {
     (void)state;
     scene s;
@@ -335,18 +343,27 @@ static void the_edge_cuts(void **state) {
     start(&s);
     double light = electrons_of(&s, 400.0);
     bst_truth_item *item = add_source(&s, 1, 0.0, 500.0, light);
-    item->x_start_px = -20.5;
-    item->x_mean_px = -0.5;
-    item->x_end_px = 19.5;
+    item->x_start_px = -20.0;
+    item->x_mean_px = 0.0;
+    item->x_end_px = 20.0;
     s.frame.streak_dx_px = 40.0;
     bst_generator_result r = run(&s, 0);
     assert_int_equal(r.count, 1);
     const bst_detection *d = &r.items[0].detection;
     assert_true(d->flags & BST_DETECTION_EDGE);
     assert_true(d->flags & BST_DETECTION_STREAK);
-    /* the middle of the half that is on the frame, -0.5 to 19.5; a tenth of it for the error */
-    bst_assert_close(d->x_px, 9.5, 1.0);
-    bst_assert_close(d->flux_e, 0.5 * light, 0.1 * light);
+    /* six times the bound of half the light at SNR 400 and 40 px */
+    bst_assert_close(d->x_px, 0.0, 0.2);
+    bst_assert_close(d->flux_e, light, 0.05 * light);
+    item->x_start_px = -36.0;
+    item->x_mean_px = -16.0;
+    item->x_end_px = 4.0;
+    r = run(&s, 0);
+    assert_int_equal(r.count, 1);
+    d = &r.items[0].detection;
+    assert_false(d->flags & BST_DETECTION_STREAK);
+    /* -0.5 to 4 are on the frame */
+    bst_assert_close(d->x_px, 1.75, 1.0);
     item->x_start_px = -60.0;
     item->x_mean_px = -40.0;
     item->x_end_px = -20.0;

@@ -74,25 +74,31 @@ static void falloff_is_the_autocorrelation(void **state) {
                      bst_matched_falloff(1.0, 0.5, 0.0499 * s, 1.0), 1e-3);
 }
 
-/* Excursions of white noise: every pixel is its own, so Pfa = rate / pixels. */
+/* White noise: every pixel is its own, so Pfa = rate / pixels. Smooth noise: the law of its maxima.
+ */
 static void thresholds_have_their_limits(void **state) {
     (void)state;
-    double share, white = bst_matched_threshold(0.05, 0.0, 1.0, 1048576.0, &share);
+    const double pixels = 1048576.0, pi = 3.14159265358979323846;
+    double share;
     /* Q(4.763) = 1 / 2^20; the law counts neighbours above as one, which are 1e-6 of them */
-    bst_assert_close(white, 4.7630, 0.002);
-    assert_true(share == 0.0);
-    /* a smooth field: Rice's expected Euler characteristic, N u exp(-u^2/2) / (2 pi)^1.5 lambda,
-     * lambda = 1 / (2 sigma^2) for the filtered noise of a Gaussian of sigma */
-    const double sigma = 4.0, pi = 3.14159265358979323846, pixels = 1048576.0;
+    bst_assert_close(bst_matched_pixel_maxima(0.05, 4.7630) * pixels, 1.0, 0.01);
+    /* Rice's expected number of maxima, N u exp(-u^2/2) / (2 pi)^1.5 lambda, lambda = 1 / (2
+     * sigma^2) for the filtered noise of a Gaussian of sigma */
+    const double sigma = 4.0;
     double u = bst_matched_threshold(sigma, 0.0, 1.0, pixels, &share);
     double rate = pixels * u * exp(-0.5 * u * u) / (pow(2.0 * pi, 1.5) * 2.0 * sigma * sigma);
-    /* the continuous field's law is reached only as sigma grows: 10 % at 4 px; a rate, where the
-     * threshold moves by 0.02 */
-    bst_assert_close(rate, 1.0, 0.25);
+    bst_assert_close(rate, 1.0, 1e-4); /* bisection to 4e-7 */
+    assert_true(share == 0.0);
+    /* on the pixels alone as many where the field is smooth on them, fewer where it is not: 10 % at
+     * 4 px, and beyond half at 0.9 px */
+    bst_assert_close(bst_matched_pixel_maxima(sigma, u) * pixels, 1.0, 0.25);
+    double sharp = bst_matched_threshold(0.9, 0.0, 1.0, pixels, NULL);
+    assert_true(bst_matched_pixel_maxima(0.9, sharp) * pixels < 0.8);
     double more = bst_matched_threshold(1.0, 20.0, 1.0, pixels, &share);
     assert_true(more > bst_matched_threshold(1.0, 0.0, 1.0, pixels, NULL));
     assert_true(share > 0.02 && share < 0.7);
-    assert_true(bst_matched_threshold(1.0, 0.0, 10.0, pixels, NULL) < u);
+    assert_true(bst_matched_threshold(1.0, 0.0, 10.0, pixels, NULL) <
+                bst_matched_threshold(1.0, 0.0, 1.0, pixels, NULL));
 }
 
 int main(void) {

@@ -1,0 +1,182 @@
+#include <math.h>
+#include <stdlib.h>
+
+#include "obsgen/generator_internal.h"
+
+static const double FWHM_PER_SIGMA = 2.3548200450309493;
+/* Image processing tells two sources apart where the saddle between them is so much lower than the
+ * fainter one; and two places closer than this share of the FWHM are one. */
+static const double SADDLE_SIGMA = 3.0, SADDLE_SHARE = 0.15, CLOSEST_FWHM = 0.6;
+/* Sources below this share of the threshold are no detections, but light. */
+static const double FAINTEST_SHARE = 0.3;
+/* Errors of places grow by no more than this between sources that are seen as one. */
+static const double FLATTEST = 6.0;
+
+/* What source b adds at source a's place to the output of the filter for a. */
+static double overlap(const bst_generator *g, const generator_source *a,
+                      const generator_source *b) {
+    double dx = b->x - a->x, dy = b->y - a->y;
+    double c = a->length > 0.0 ? a->path.dx / a->length : 1.0;
+    double s = a->length > 0.0 ? a->path.dy / a->length : 0.0;
+    double length = a->as_streak ? g->streak : a->length;
+    return bst_matched_falloff(dx * c + dy * s, dy * c - dx * s, length, g->total_sigma);
+}
+
+/* Whether image processing would find two maxima: the fainter source b beside a. */
+static bool told_apart(const bst_generator *g, const generator_source *a,
+                       const generator_source *b) {
+    generator_source at = *b;
+    double factor = g->calibration.blend_distance_factor;
+    double dx = (b->x - a->x) / factor, dy = (b->y - a->y) / factor;
+    if (hypot(dx, dy) < CLOSEST_FWHM * FWHM_PER_SIGMA * g->sigma) {
+        return false;
+    }
+    at.x = a->x + dx;
+    at.y = a->y + dy;
+    double top = b->level + a->level * overlap(g, a, &at), saddle = top;
+    enum { STEPS = 12 };
+    for (int i = 1; i < STEPS; i++) {
+        generator_source p = *a;
+        p.x = a->x + dx * i / STEPS;
+        p.y = a->y + dy * i / STEPS;
+        double value = a->level * overlap(g, a, &p) + b->level * overlap(g, &at, &p);
+        saddle = fmin(saddle, value);
+    }
+    return top - saddle > fmax(SADDLE_SIGMA, SADDLE_SHARE * top);
+}
+
+/* Calls for every other source whose light reaches number i. */
+static int first_near(const bst_generator *g, int i, double reach) {
+    int k = i;
+    while (k > 0 && g->sources[k - 1].y >= g->sources[i].y - reach) {
+        k--;
+    }
+    return k;
+}
+
+static int brighter(const void *a, const void *b) {
+    const generator_rank *p = a, *q = b;
+    if (p->amplitude != q->amplitude) {
+        return p->amplitude > q->amplitude ? -1 : 1;
+    }
+    return (p->index > q->index) - (p->index < q->index);
+}
+
+/* Finds which sources are detected, and which are seen in one with a brighter one. */
+void bst_generator_decide(bst_generator *g) {
+    double most = 0.0;
+    for (int i = 0; i < g->source_count; i++) {
+        most = fmax(most, g->sources[i].broken ? 0.0 : g->sources[i].length);
+    }
+    g->reach = 6.0 * g->total_sigma + most;
+    int ranks = 0;
+    for (int i = 0; i < g->source_count; i++) {
+        generator_source *s = &g->sources[i];
+        if (s->amplitude > FAINTEST_SHARE * g->threshold) {
+            s->noise = bst_generator_draw(g, s, GENERATOR_PEAK);
+            s->level = s->amplitude + s->noise / g->calibration.slope;
+            g->ranks[ranks++] = (generator_rank){s->level, i};
+        }
+    }
+    qsort(g->ranks, (size_t)ranks, sizeof *g->ranks, brighter);
+    for (int r = 0; r < ranks; r++) {
+        int i = g->ranks[r].index;
+        generator_source *s = &g->sources[i];
+        if (s->broken) {
+            continue;
+        }
+        double own = s->amplitude, peak = own;
+        bool merged = false;
+        for (int k = first_near(g, i, g->reach);
+             k < g->source_count && g->sources[k].y <= s->y + g->reach; k++) {
+            generator_source *o = &g->sources[k];
+            if (k == i || o->broken || fabs(o->x - s->x) > g->reach) {
+                continue;
+            }
+            double light = o->amplitude * overlap(g, o, s);
+            if (light < 0.01) {
+                continue;
+            }
+            if (o->found && !merged && !told_apart(g, o, s)) {
+                s->head = k;
+                merged = true;
+            }
+            peak += light;
+        }
+        if (merged) {
+            continue;
+        }
+        s->found = g->calibration.slope * (peak - g->threshold) + s->noise > 0.0;
+        s->peak = peak;
+    }
+}
+
+/* Light of sources that are seen in this one, and of what is fitted beside it. A fit of one source
+ * to several lands where the filter's output is greatest: found by moving to the mean weighted with
+ * what each gives there (mean shift). */
+generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
+    enum { MOST = 24, ROUNDS = 8 };
+    const generator_source *s = &g->sources[i], *merged[MOST];
+    generator_blend out = {
+        .flux_e = s->flux_e, .x = s->x, .y = s->y, .widen = 1.0, .flat = 1.0, .near = false};
+    double brightest = 0.0;
+    int count = 0;
+    double stamp = fmax(3.0, ceil(3.6 * g->sigma)) + 1.5;
+    for (int k = first_near(g, i, g->reach);
+         k < g->source_count && g->sources[k].y <= s->y + g->reach; k++) {
+        const generator_source *o = &g->sources[k];
+        double dx = o->x - s->x, dy = o->y - s->y;
+        double half_x = stamp + 0.5 * fabs(s->path.dx), half_y = stamp + 0.5 * fabs(s->path.dy);
+        if (k == i || fabs(dx) > half_x + stamp || fabs(dy) > half_y + stamp) {
+            continue;
+        }
+        double share = overlap(g, s, o);
+        if (o->found) {
+            out.near = out.near || (fabs(dx) <= half_x && fabs(dy) <= half_y);
+            /* both fluxes and places are free: what they have in common is not known */
+            out.widen *= 1.0 / fmax(1.0 - share * share, 0.1);
+        } else if (count < MOST) {
+            merged[count++] = o;
+            if (o->head == i && o->flux_e > brightest) {
+                brightest = o->flux_e;
+                double part = sqrt(s->flux_e * o->flux_e) / (s->flux_e + o->flux_e);
+                out.spread_x = part * dx;
+                out.spread_y = part * dy;
+            }
+        }
+    }
+    generator_source at = *s;
+    for (int round = 0; round < ROUNDS && count > 0; round++) {
+        at.x = out.x;
+        at.y = out.y;
+        double own = s->flux_e * overlap(g, s, &at), sum = own, x = 0.0, y = 0.0;
+        for (int k = 0; k < count; k++) {
+            double light = merged[k]->flux_e * overlap(g, &at, merged[k]);
+            sum += light;
+            x += light * (merged[k]->x - s->x);
+            y += light * (merged[k]->y - s->y);
+        }
+        out.flux_e = sum;
+        out.x = s->x + x / sum;
+        out.y = s->y + y / sum;
+    }
+    if (count > 0 && s->length > 1.0) {
+        /* two streaks on one line have a flat top between them, where noise decides the place */
+        double h = fmax(g->total_sigma, 0.25 * s->length) / s->length, alone = 0.0, all = 0.0;
+        for (int step = -1; step <= 1; step++) {
+            double weight = step == 0 ? 2.0 : -1.0;
+            at.x = out.x + step * h * s->path.dx;
+            at.y = out.y + step * h * s->path.dy;
+            all += weight * s->flux_e * overlap(g, &at, s);
+            for (int k = 0; k < count; k++) {
+                all += weight * merged[k]->flux_e * overlap(g, &at, merged[k]);
+            }
+            generator_source beside = *s;
+            beside.x = s->x + step * h * s->path.dx;
+            beside.y = s->y + step * h * s->path.dy;
+            alone += weight * s->flux_e * overlap(g, &beside, s);
+        }
+        out.flat = fmin(fmax(alone / fmax(all, 1e-9 * alone), 1.0), FLATTEST);
+    }
+    return out;
+}

@@ -1,0 +1,137 @@
+#include <math.h>
+
+#include "obsgen/generator_internal.h"
+
+static const double FWHM_PER_SIGMA = 2.3548200450309493;
+/* From here on extents and a source's own streak are measured. */
+static const double MOMENTS_SNR = 10.0;
+/* Errors do not grow further with what of a source is off the frame. */
+static const double LEAST_SEEN = 0.02;
+
+/* Where fits land in the mean: stars share what the camera's motion does to them, and an object
+ * that moved otherwise has its own. */
+static void shared_bias(const bst_generator *g, const generator_source *s, double bias[2]) {
+    bias[0] = g->star_bias[0];
+    bias[1] = g->star_bias[1];
+    if (s->star || s->broken || g->path.count < 3) {
+        return;
+    }
+    double dx = s->path.dx - g->whole_path.dx, dy = s->path.dy - g->whole_path.dy;
+    for (int k = 0; k < g->path.count; k++) {
+        double u = (double)k / (g->path.count - 1) - 0.5;
+        g->object_x[k] = g->path_x[k] + u * dx;
+        g->object_y[k] = g->path_y[k] + u * dy;
+    }
+    const bst_route_path path = {g->object_x, g->object_y, g->path.count};
+    const bst_path_px model = s->as_streak ? g->star_path : (bst_path_px){0.0, 0.0};
+    bst_route_bias(&path, model.dx, model.dy, s->as_streak ? g->bend_x : 0.0,
+                   s->as_streak ? g->bend_y : 0.0, g->total_sigma, bias);
+}
+
+/* Place with error and covariance, along and across the path. */
+static void measure_place(const bst_generator *g, const generator_source *s,
+                          const generator_blend *b, const bst_bound_at *truth,
+                          const bst_bound_at *told, double snr, double length, bst_detection *d) {
+    const bst_obsgen_calibration *cal = &g->calibration;
+    double across = bst_obsgen_between(bst_obsgen_snrs, cal->across_factor, BST_OBSGEN_SNRS, snr);
+    double along =
+        length > 1.0 ? bst_obsgen_between(bst_obsgen_snrs, cal->along_factor, BST_OBSGEN_SNRS, snr)
+                     : across;
+    double error[2];
+    bst_rng_normal2(g->key, (uint64_t)g->exposure_id, s->name * GENERATOR_DRAWS + GENERATOR_PLACE,
+                    error);
+    /* what of the image is off the frame says nothing; the place along a streak is in its ends */
+    double widen_along = b->widen / fmax(length > 1.0 ? s->ends : s->visible, LEAST_SEEN);
+    double widen_across = b->widen / fmax(s->visible, LEAST_SEEN);
+    double worse = (s->saturated ? 4.0 : 1.0) / fmin(s->sharp, 1.0);
+    error[0] *= along * worse * b->flat * sqrt(truth->var_along_px2 * widen_along);
+    error[1] *= across * worse * sqrt(truth->var_across_px2 * widen_across);
+    double c = s->length > 0.0 ? s->path.dx / s->length : 1.0;
+    double n = s->length > 0.0 ? s->path.dy / s->length : 0.0;
+    double x = b->x + c * error[0] - n * error[1], y = b->y + n * error[0] + c * error[1];
+    double between = cal->blend_error * bst_generator_draw(g, s, GENERATOR_BLEND);
+    x += between * b->spread_x;
+    y += between * b->spread_y;
+    double bias = cal->phase_bias_px / g->binning, shared[2];
+    shared_bias(g, s, shared);
+    x += shared[0] + bias * sin(2.0 * BST_PI * b->x);
+    y += shared[1] + bias * sin(2.0 * BST_PI * b->y);
+    double scale = g->binning, a2 = told->var_along_px2 * widen_along * scale * scale,
+           b2 = told->var_across_px2 * widen_across * scale * scale;
+    d->x_px = g->origin_x + scale * x;
+    d->y_px = g->origin_y + scale * y;
+    d->cov_xx = c * c * a2 + n * n * b2;
+    d->cov_xy = c * n * (a2 - b2);
+    d->cov_yy = n * n * a2 + c * c * b2;
+}
+
+static void set_extent(const bst_generator *g, const generator_source *s, bst_detection *d) {
+    double modelled = s->as_streak ? g->streak : 0.0, b = g->binning;
+    double length = d->snr >= MOMENTS_SNR ? s->length : modelled;
+    double across2 = g->sigma * g->sigma, along2 = across2 + length * length / 12.0;
+    d->length_px = b * FWHM_PER_SIGMA * sqrt(along2);
+    d->width_px = b * FWHM_PER_SIGMA * sqrt(across2);
+    d->angle_rad = length > 0.01 ? atan2(s->path.dy, s->path.dx) : 0.0;
+    if (d->angle_rad > 0.5 * BST_PI) {
+        d->angle_rad -= BST_PI;
+    } else if (d->angle_rad <= -0.5 * BST_PI) {
+        d->angle_rad += BST_PI;
+    }
+    bool long_enough = d->length_px > 1.5 * fmax(d->width_px, b);
+    if (s->as_streak || (d->snr >= MOMENTS_SNR && long_enough)) {
+        d->flags |= BST_DETECTION_STREAK;
+    }
+}
+
+/* Of a source whose middle is off the frame, image processing takes what it sees for a point. */
+static void see_part(const bst_generator *g, const generator_source *s, bst_detection *d) {
+    double off_x = g->binning * (s->seen_x - s->x), off_y = g->binning * (s->seen_y - s->y);
+    d->x_px += off_x;
+    d->y_px += off_y;
+    d->flux_e *= s->visible;
+    d->flux_sigma_e *= s->visible;
+    d->snr *= sqrt(s->visible);
+    d->v_mag -= 2.5 * log10(s->visible);
+    d->flags &= ~(unsigned)BST_DETECTION_STREAK;
+    d->label = BST_LABEL_ARTEFACT;
+}
+
+bst_detection bst_generator_measure(const bst_generator *g, const generator_source *s,
+                                    const generator_blend *b) {
+    bst_detection d = {0};
+    double seen = fmax(s->visible, LEAST_SEEN);
+    /* a point filter's flux of a streak too faint to be fitted as one is what it caught */
+    bool own = s->as_streak || s->peak >= MOMENTS_SNR || s->length < 0.5;
+    double length = own ? s->length : 0.0;
+    double caught =
+        own ? 1.0
+            : bst_matched_product(s->path, (bst_path_px){0, 0}, g->total_sigma) /
+                  bst_matched_product((bst_path_px){0, 0}, (bst_path_px){0, 0}, g->total_sigma);
+    double flux = b->flux_e * caught;
+    bst_bound_at truth = bst_bound_of(&g->bound, b->flux_e, g->noise_e, s->length);
+    bst_bound_at fitted = bst_bound_of(&g->bound, flux, g->noise_e, length);
+    /* flux goes with the peak that was detected: nearly the same filter on the same noise */
+    const double together = 0.95;
+    double noise = together * s->noise +
+                   sqrt(1.0 - together * together) * bst_generator_draw(g, s, GENERATOR_FLUX);
+    flux -= g->background_bias_e / (fitted.norm * fitted.norm);
+    d.flux_e = fmax(flux + noise * sqrt(fitted.flux_variance * b->widen / seen), 0.1 * fabs(flux));
+    bst_bound_at told = bst_bound_of(&g->bound, d.flux_e, g->noise_e, length);
+    d.flux_sigma_e = sqrt(told.flux_variance * b->widen / seen);
+    d.snr = d.flux_e * told.norm / g->noise_e;
+    measure_place(g, s, b, &truth, &told, b->flux_e * truth.norm / g->noise_e, length, &d);
+    d.v_mag = -2.5 * log10(d.flux_e / (fmax(g->exposure_s, 1e-9) * g->electrons_per_s_v0));
+    set_extent(g, s, &d);
+    d.flags |= b->near ? BST_DETECTION_BLEND : 0u;
+    d.flags |= s->saturated ? BST_DETECTION_SATURATED : 0u;
+    double half_x = 0.5 * fabs(s->path.dx) + 2.0 * g->sigma;
+    double half_y = 0.5 * fabs(s->path.dy) + 2.0 * g->sigma;
+    if (s->x - half_x < -0.5 || s->y - half_y < -0.5 || s->x + half_x > g->width - 0.5 ||
+        s->y + half_y > g->height - 0.5) {
+        d.flags |= BST_DETECTION_EDGE;
+    }
+    if (s->x < -0.5 || s->y < -0.5 || s->x > g->width - 0.5 || s->y > g->height - 0.5) {
+        see_part(g, s, &d);
+    }
+    return d;
+}

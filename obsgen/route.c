@@ -1,0 +1,212 @@
+#include "obsgen/route.h"
+
+#include <math.h>
+#include <stdbool.h>
+
+#include "sim/core/vec.h"
+
+static double density(double z) {
+    return exp(-0.5 * z * z) / 2.5066282746310002;
+}
+static double below(double z) {
+    return 0.5 * erfc(-z * 0.70710678118654752);
+}
+
+/* Bends that are none. */
+static const double STRAIGHT_PX = 0.2;
+/* Ends of a path that stands still: this far on, light is gone. */
+static const double BEYOND_SIGMAS = 4.0;
+
+static void add_node(bst_route_node *nodes, int *count, double x, double y, double time) {
+    enum { BACK = 48 }; /* further back a path that returns is another part of the way */
+    for (int i = *count - 1; i >= 0 && i >= *count - BACK; i--) {
+        if (fabs(nodes[i].x - x) < 0.7 && fabs(nodes[i].y - y) < 0.7) {
+            return;
+        }
+    }
+    if (*count < BST_ROUTE_NODES) {
+        nodes[(*count)++] = (bst_route_node){x, y, time, 0.0};
+    }
+}
+
+/* Straight on from one node, away from another. */
+static void lay_on(bst_route_node *nodes, int *count, int end, int before, double sigma_px,
+                   double time) {
+    const bst_route_node e = nodes[end], b = nodes[before];
+    double dx = e.x - b.x, dy = e.y - b.y, length = hypot(dx, dy);
+    for (int i = 1; i <= (int)ceil(BEYOND_SIGMAS * sigma_px) && length > 0.0; i++) {
+        add_node(nodes, count, e.x + i * dx / length, e.y + i * dy / length, time);
+    }
+}
+
+/* Light of the whole path at a place: each piece a uniform segment. */
+static double light_at(const bst_route_path *p, double x, double y, double s) {
+    double sum = 0.0;
+    for (int k = 1; k < p->count; k++) {
+        double dx = p->x_px[k] - p->x_px[k - 1], dy = p->y_px[k] - p->y_px[k - 1];
+        double mx = x - 0.5 * (p->x_px[k] + p->x_px[k - 1]),
+               my = y - 0.5 * (p->y_px[k] + p->y_px[k - 1]);
+        double length = hypot(dx, dy), near = 6.0 * s + 0.5 * length;
+        if (fabs(mx) > near || fabs(my) > near) {
+            continue;
+        }
+        if (length < 0.3 * s) {
+            sum += exp(-0.5 * (mx * mx + my * my) / (s * s));
+            continue;
+        }
+        double u = (mx * dx + my * dy) / length, v = (my * dx - mx * dy) / length;
+        sum += exp(-0.5 * v * v / (s * s)) * (s / length) * 2.5066282746310002 *
+               (below((u + 0.5 * length) / s) - below((u - 0.5 * length) / s));
+    }
+    return sum / (p->count - 1);
+}
+
+int bst_route_lay(const bst_route_path *p, double sigma_px, bst_route_node *nodes) {
+    int count = 0;
+    add_node(nodes, &count, p->x_px[0], p->y_px[0], 0.0);
+    for (int k = 1; k < p->count; k++) {
+        double dx = p->x_px[k] - p->x_px[k - 1], dy = p->y_px[k] - p->y_px[k - 1];
+        int steps = (int)fmin(ceil(hypot(dx, dy)), BST_ROUTE_NODES);
+        for (int i = 1; i <= steps; i++) {
+            double part = (double)i / steps;
+            add_node(nodes, &count, p->x_px[k - 1] + part * dx, p->y_px[k - 1] + part * dy,
+                     (k - 1 + part) / (p->count - 1));
+        }
+    }
+    int last = count - 1;
+    if (last > 0) {
+        lay_on(nodes, &count, last, last > 2 ? last - 3 : 0, sigma_px, 1.0);
+        /* those before the start go first, so that nodes stay in the order of the way */
+        int laid = count;
+        lay_on(nodes, &count, 0, last > 2 ? 3 : last, sigma_px, 0.0);
+        int more = count - laid;
+        for (int i = 0; i < more; i++) {
+            bst_route_node moved = nodes[count - 1];
+            for (int k = count - 1; k > i; k--) {
+                nodes[k] = nodes[k - 1];
+            }
+            nodes[i] = moved;
+        }
+    }
+    for (int i = 0; i < count; i++) {
+        nodes[i].light = light_at(p, nodes[i].x, nodes[i].y, sigma_px * sqrt(2.0));
+    }
+    return count;
+}
+
+/* The model's places at even times. */
+enum { MOST_PLACES = 48, MOST_SAMPLES = 128 };
+typedef struct model {
+    double x[MOST_PLACES], y[MOST_PLACES];
+    int count;
+} model;
+
+static model make_model(double dx, double dy, double bend_x, double bend_y, double s) {
+    model m;
+    double length = hypot(dx, dy) + 2.0 * hypot(bend_x, bend_y);
+    m.count = (int)fmin(ceil(1.5 * length / s) + 1.0, MOST_PLACES);
+    for (int i = 0; i < m.count; i++) {
+        double u = m.count > 1 ? (i + 0.5) / m.count * 2.0 - 1.0 : 0.0;
+        double bent = 0.5 * (3.0 * u * u - 1.0);
+        m.x[i] = 0.5 * u * dx + bent * bend_x;
+        m.y[i] = 0.5 * u * dy + bent * bend_y;
+    }
+    return m;
+}
+
+/* Gradient of the overlap of a place's light with the model moved by `at`, added up. */
+static void add_pull(const model *m, double x, double y, double s, double weight, double pull[2]) {
+    for (int i = 0; i < m->count; i++) {
+        double dx = x - m->x[i], dy = y - m->y[i];
+        double w = weight * exp(-0.5 * (dx * dx + dy * dy) / (s * s));
+        pull[0] += w * dx;
+        pull[1] += w * dy;
+    }
+}
+
+/* Minus the Hessian of the model's overlap with itself. */
+static void find_curvature(const model *m, double s, double h[3]) {
+    h[0] = h[1] = h[2] = 0.0;
+    for (int i = 0; i < m->count; i++) {
+        for (int k = 0; k < m->count; k++) {
+            double dx = m->x[i] - m->x[k], dy = m->y[i] - m->y[k];
+            double w = exp(-0.5 * (dx * dx + dy * dy) / (s * s)) / m->count;
+            h[0] += w * (1.0 - dx * dx / (s * s));
+            h[1] -= w * dx * dy / (s * s);
+            h[2] += w * (1.0 - dy * dy / (s * s));
+        }
+    }
+}
+
+/* The first step for a straight model in closed form: to first order that is all. */
+static void straight_bias(const bst_route_path *p, double dx_px, double dy_px, double s,
+                          double bias_px[2]) {
+    double length = hypot(dx_px, dy_px), along = 0.0, across = 0.0, value = 0.0;
+    double c = length > 0.0 ? dx_px / length : 1.0, n = length > 0.0 ? dy_px / length : 0.0;
+    bool drawn = length > 0.3 * s;
+    for (int k = 0; k < p->count; k++) {
+        double weight = (k == 0 || k == p->count - 1 ? 0.5 : 1.0) / (p->count - 1);
+        double u = p->x_px[k] * c + p->y_px[k] * n, v = p->y_px[k] * c - p->x_px[k] * n;
+        double fall = weight * exp(-0.5 * v * v / (s * s)), inside;
+        if (drawn) {
+            double high = (u + 0.5 * length) / s, low = (u - 0.5 * length) / s;
+            inside = fall * (below(high) - below(low));
+            along += fall * (density(low) - density(high)) / s;
+        } else {
+            inside = fall * exp(-0.5 * u * u / (s * s));
+            along += inside * u / (s * s);
+        }
+        across += inside * v / (s * s);
+        value += inside;
+    }
+    value = fmax(value, 1e-6);
+    /* of a streak minus the second derivative of its autocorrelation */
+    double curve =
+        drawn ? 2.0 * (density(0.0) - density(length / s)) / (s * length) : value / (s * s);
+    double a = fmax(-s, fmin(along / curve, s)), b = fmax(-s, fmin(across * s * s / value, s));
+    bias_px[0] = a * c - b * n;
+    bias_px[1] = a * n + b * c;
+}
+
+void bst_route_bias(const bst_route_path *p, double dx_px, double dy_px, double bend_x_px,
+                    double bend_y_px, double sigma_px, double bias_px[2]) {
+    enum { ROUNDS = 6 };
+    double s = sigma_px * sqrt(2.0), h[3], total = 0.0;
+    if (hypot(bend_x_px, bend_y_px) < STRAIGHT_PX) {
+        straight_bias(p, dx_px, dy_px, s, bias_px);
+        return;
+    }
+    model m = make_model(dx_px, dy_px, bend_x_px, bend_y_px, s);
+    find_curvature(&m, s, h);
+    double determinant = fmax(h[0] * h[2] - h[1] * h[1], 1e-12);
+    /* means over as many samples as show the trembling; their own mean is that of the path */
+    int samples = p->count < MOST_SAMPLES ? p->count : MOST_SAMPLES;
+    double x[MOST_SAMPLES], y[MOST_SAMPLES], weight[MOST_SAMPLES];
+    for (int i = 0; i < samples; i++) {
+        x[i] = y[i] = weight[i] = 0.0;
+    }
+    for (int k = 0; k < p->count; k++) {
+        int i = (int)((long)k * samples / p->count);
+        double w = k == 0 || k == p->count - 1 ? 0.5 : 1.0;
+        x[i] += w * p->x_px[k];
+        y[i] += w * p->y_px[k];
+        weight[i] += w;
+        total += w;
+    }
+    bias_px[0] = bias_px[1] = 0.0;
+    for (int round = 0; round < ROUNDS; round++) {
+        double pull[2] = {0.0, 0.0};
+        for (int i = 0; i < samples; i++) {
+            add_pull(&m, x[i] / weight[i] - bias_px[0], y[i] / weight[i] - bias_px[1], s,
+                     weight[i] / total, pull);
+        }
+        double step[2] = {(h[2] * pull[0] - h[1] * pull[1]) / determinant,
+                          (h[0] * pull[1] - h[1] * pull[0]) / determinant};
+        double far = hypot(step[0], step[1]), share = far > s ? s / far : 1.0;
+        bias_px[0] += share * step[0];
+        bias_px[1] += share * step[1];
+        if (far < 0.005) {
+            break;
+        }
+    }
+}

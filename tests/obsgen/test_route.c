@@ -1,0 +1,128 @@
+/* What the camera's true path does to streaks, against sums over the plane. */
+#include "obsgen/route.h"
+#include "sim/core/vec.h"
+#include "tests/test_support.h"
+
+enum { STEPS = 401 };
+
+typedef struct path {
+    double x[STEPS], y[STEPS];
+} path;
+
+static bst_route_path route_of(const path *p) {
+    return (bst_route_path){p->x, p->y, STEPS};
+}
+
+/* Places less their mean, ends with half the weight. */
+static void centre(path *p) {
+    double x = 0.0, y = 0.0;
+    for (int k = 0; k < STEPS; k++) {
+        double w = (k == 0 || k == STEPS - 1 ? 0.5 : 1.0) / (STEPS - 1);
+        x += w * p->x[k];
+        y += w * p->y[k];
+    }
+    for (int k = 0; k < STEPS; k++) {
+        p->x[k] -= x;
+        p->y[k] -= y;
+    }
+}
+
+/* The shift of a model, drawn at even times, that overlaps most with the path's light: by trying.
+ */
+static void best_shift(const path *p, double dx, double dy, double bend_y, double sigma,
+                       double best[2]) {
+    double most = 0.0, centre_x = 0.0, centre_y = 0.0;
+    for (double step = 0.2; step > 0.004; step *= 0.5) {
+        double from_x = centre_x, from_y = centre_y;
+        for (int j = -4; j <= 4; j++) {
+            for (int i = -4; i <= 4; i++) {
+                double sum = 0.0, sx = from_x + i * step, sy = from_y + j * step;
+                for (int k = 0; k < STEPS; k += 4) {
+                    for (int m = 0; m < 60; m++) {
+                        double u = (m + 0.5) / 30.0 - 1.0;
+                        double ax = p->x[k] - 0.5 * u * dx - sx;
+                        double ay = p->y[k] - 0.5 * u * dy - bend_y * 0.5 * (3 * u * u - 1) - sy;
+                        sum += exp(-0.25 * (ax * ax + ay * ay) / (sigma * sigma));
+                    }
+                }
+                if (sum > most) {
+                    most = sum;
+                    centre_x = sx;
+                    centre_y = sy;
+                }
+            }
+        }
+    }
+    best[0] = centre_x;
+    best[1] = centre_y;
+}
+
+static void fits_land_where_the_light_overlaps_most(void **state) {
+    (void)state;
+    const double sigma = 0.9;
+    path even, trembling, bent;
+    for (int k = 0; k < STEPS; k++) {
+        double u = 2.0 * k / (STEPS - 1) - 1.0;
+        even.x[k] = 4.0 * u;
+        even.y[k] = -3.0 * u;
+        trembling.x[k] = 5.0 * u + 0.4 * cos(3.0 * u + 0.4);
+        trembling.y[k] = 0.25 * sin(9.0 * u);
+        bent.x[k] = 6.0 * u;
+        bent.y[k] = 2.0 * 0.5 * (3.0 * u * u - 1.0) + 0.5 * u * u * u * u;
+    }
+    centre(&even);
+    centre(&trembling);
+    centre(&bent);
+    double bias[2], best[2];
+    bst_route_path p = route_of(&even);
+    bst_route_bias(&p, 8.0, -6.0, 0.0, 0.0, sigma, bias);
+    bst_assert_close(hypot(bias[0], bias[1]), 0.0, 1e-6); /* even: by symmetry */
+    /* to first order in the trembling, 0.4 of 1.3 px: a fifth of it; the grid of the trial */
+    p = route_of(&trembling);
+    bst_route_bias(&p, 10.0, 0.0, 0.0, 0.0, sigma, bias);
+    best_shift(&trembling, 10.0, 0.0, 0.0, sigma, best);
+    assert_true(fabs(best[0]) > 0.05);
+    bst_assert_close(bias[0], best[0], 0.2 * fabs(best[0]) + 0.01);
+    bst_assert_close(bias[1], best[1], 0.2 * fabs(best[1]) + 0.01);
+    /* a known bend is found in several rounds */
+    p = route_of(&bent);
+    bst_route_bias(&p, 12.0, 0.0, 0.0, 2.0, sigma, bias);
+    best_shift(&bent, 12.0, 0.0, 2.0, sigma, best);
+    bst_assert_close(bias[0], best[0], 0.02);
+    bst_assert_close(bias[1], best[1], 0.02);
+}
+
+static void the_way_has_the_light_of_the_path(void **state) {
+    (void)state;
+    static bst_route_node nodes[BST_ROUTE_NODES];
+    const double sigma = 0.9, s = sigma * sqrt(2.0);
+    path p;
+    /* at rest for a half, then 100 px */
+    for (int k = 0; k < STEPS; k++) {
+        double u = (double)k / (STEPS - 1);
+        p.x[k] = u < 0.5 ? 0.0 : 200.0 * (u - 0.5);
+        p.y[k] = 0.0;
+    }
+    bst_route_path route = route_of(&p);
+    int count = bst_route_lay(&route, sigma, nodes);
+    assert_true(count > 80 && count < 130);
+    double rest = 0.0, on = 0.0;
+    for (int i = 0; i < count; i++) {
+        assert_true(i == 0 || nodes[i].time >= nodes[i - 1].time);
+        rest = fabs(nodes[i].x) < 0.3 ? nodes[i].light : rest;
+        on = fabs(nodes[i].x - 50.0) < 0.8 ? nodes[i].light : on;
+    }
+    /* half of a point's light and half of the end of a streak's; a streak's in its middle: of 100
+     * px half the light, sqrt(2 pi) s of its length */
+    double line = 0.5 * sqrt(2.0 * BST_PI) * s / 100.0;
+    bst_assert_close(rest, 0.5 + 0.5 * line, 0.02); /* the node is up to 0.3 px off */
+    bst_assert_close(on, line, 1e-3 * line + 1e-5);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(fits_land_where_the_light_overlaps_most),
+        cmocka_unit_test(the_way_has_the_light_of_the_path),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
