@@ -313,8 +313,16 @@ static void course(const bst_route_node *way, int count, int at, double *dx, dou
     *dy = way[end].y - way[start].y;
 }
 
+/* Whether a source's way comes near the frame at all. */
+static bool comes_in(const bst_generator *g, const generator_source *s) {
+    double margin_x = ROWS + 1.0 + 0.5 * fabs(s->path.dx - g->whole_path.dx);
+    double margin_y = ROWS + 1.0 + 0.5 * fabs(s->path.dy - g->whole_path.dy);
+    return s->x + g->route_box[1] > -margin_x && s->x + g->route_box[0] < g->width + margin_x &&
+           s->y + g->route_box[3] > -margin_y && s->y + g->route_box[2] < g->height + margin_y;
+}
+
 bst_status bst_generator_fragments(bst_ctx *ctx, bst_generator *g, const generator_source *source) {
-    if (source->amplitude * g->route_top < g->threshold - FAINTEST_SIGMA) {
+    if (source->amplitude * g->route_top < g->threshold - FAINTEST_SIGMA || !comes_in(g, source)) {
         return BST_OK;
     }
     if (!g->streaks) {

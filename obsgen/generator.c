@@ -323,8 +323,16 @@ static bst_status set_path(bst_ctx *ctx, bst_generator *g, const bst_generator_f
         }
     }
     g->route_count = bst_route_lay(&g->path, g->total_sigma, g->route);
+    double *box = g->route_box;
+    box[0] = box[2] = INFINITY;
+    box[1] = box[3] = -INFINITY;
     for (int i = 0; i < g->route_count; i++) {
-        g->route_top = fmax(g->route_top, g->route[i].light);
+        const bst_route_node *n = &g->route[i];
+        g->route_top = fmax(g->route_top, n->light);
+        box[0] = fmin(box[0], n->x);
+        box[1] = fmax(box[1], n->x);
+        box[2] = fmin(box[2], n->y);
+        box[3] = fmax(box[3], n->y);
     }
     return BST_OK;
 }

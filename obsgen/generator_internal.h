@@ -74,6 +74,7 @@ struct bst_generator {
     bst_route_node *route, *way;
     int route_count;
     double route_top;       /* greatest light */
+    double route_box[4];    /* least and greatest x, least and greatest y */
     bst_path_px whole_path; /* from its start to its end */
     struct generator_streaks *streaks;
     double star_bias[2], object_bias[2]; /* of fits, by how the camera really moved */
