@@ -212,7 +212,9 @@ static void load_detections(bst_mtt *m, const bst_mtt_frame *frame) {
     now->tick = frame->tick;
     now->count = frame->count < m->params.max_detections ? frame->count : m->params.max_detections;
     m->lost += frame->count - now->count;
-    memcpy(now->items, frame->detections, (size_t)now->count * sizeof *now->items);
+    if (now->count > 0) {
+        memcpy(now->items, frame->detections, (size_t)now->count * sizeof *now->items);
+    }
     memset(now->used, 0, (size_t)now->count * sizeof *now->used);
     bst_mtt_pool_index(now);
 }
