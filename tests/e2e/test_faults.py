@@ -279,6 +279,7 @@ class Faults(unittest.TestCase):
         scenario = os.path.join(place, "scenario.json")
         shutil.copy(runs.TRACK, scenario)
         tle = shutil.copy("scenarios/catalogue_2022-06.tle", place)
+        shutil.copytree("scenarios/calibration", place + "/calibration")
         out = self.out("inputs run")
         check = [runs.BORESIGHT, "check", scenario, "--quiet", "--set",
                  "/world/star_catalogue=embedded"]
