@@ -4,6 +4,14 @@
  * the change of a line of sight's rate. */
 #define RATE_HALF_S 0.25
 
+static double seconds_of(const bst_control *c, int64_t tick) {
+    return (double)tick / c->env.tick_rate_hz;
+}
+
+static int64_t ticks_of(const bst_control *c, double seconds) {
+    return (int64_t)llround(seconds * c->env.tick_rate_hz);
+}
+
 bst_status bst_control_init(bst_ctx *ctx, bst_control *control, const bst_control_config *config,
                             const bst_control_env *env) {
     if (config->period_s > 0.0 && config->exposure_s > config->period_s) {
@@ -12,22 +20,20 @@ bst_status bst_control_init(bst_ctx *ctx, bst_control *control, const bst_contro
                         "other",
                         config->exposure_s, config->period_s);
     }
-    *control = (bst_control){
-        .config = *config, .env = *env, .mode = BST_MODE_IDLE, .frame_tick = INT64_MIN};
+    *control = (bst_control){.config = *config,
+                             .env = *env,
+                             .mode = BST_MODE_IDLE,
+                             .frame_tick = INT64_MIN,
+                             .aberration = {.inverse_gamma = 1.0, .share = 0.5}};
+    int64_t half = ticks_of(control, RATE_HALF_S);
+    control->rate_half_ticks = half > 0 ? half : 1;
+    control->latency_ticks = ticks_of(control, config->command_latency_s);
     bst_pointing_error_init(&control->pointing_error, config->disturbance_px_rms * env->pixel_rad,
                             config->disturbance_cutoff_hz,
                             config->fix_sigma_floor_px * env->pixel_rad,
                             config->attitude_sigma_arcsec * BST_ARCSEC_RAD,
                             config->drift_sigma_arcsec_per_s * BST_ARCSEC_RAD);
     return BST_OK;
-}
-
-static double seconds_of(const bst_control *c, int64_t tick) {
-    return (double)tick / c->env.tick_rate_hz;
-}
-
-static int64_t ticks_of(const bst_control *c, double seconds) {
-    return (int64_t)llround(seconds * c->env.tick_rate_hz);
 }
 
 static bst_status cue_at(bst_ctx *ctx, const bst_control *c, int64_t tick, bst_cue *out) {
@@ -97,16 +103,17 @@ bst_status bst_control_aim(bst_ctx *ctx, const bst_control *c, int64_t tick, boo
     }
 }
 
-/* Geometric to apparent with what navigation knows. */
-static bst_vec3 apparent_of(const bst_control *c, bst_vec3 geometric) {
-    bst_light light = {.velocity_mps = c->nav.velocity_bary_mps, .sun_m = c->nav.sun_m};
-    return bst_light_aberrate(&light, geometric);
+/* After a change of the pointing error. */
+static void forget_errors(bst_control *c) {
+    for (int i = 0; i < BST_CONTROL_AIMED; i++) {
+        c->aimed[i].error_known = false;
+    }
 }
 
-/* After a change of anything that bst_control_aim or the pointing error rests on. */
+/* After a change of anything that bst_control_aim rests on. */
 static void forget_aims(bst_control *c) {
     for (int i = 0; i < BST_CONTROL_AIMED; i++) {
-        c->aimed[i].known = false;
+        c->aimed[i].known = c->aimed[i].error_known = false;
     }
 }
 
@@ -118,15 +125,19 @@ static bst_status boresight_at(bst_ctx *ctx, bst_control *c, int64_t tick, bool 
     bst_control_aimed *aimed = &c->aimed[spread >> 57];
     _Static_assert(BST_CONTROL_AIMED == 1 << (64 - 57), "the hash's greatest value");
     if (!aimed->known || aimed->tick != tick) {
-        aimed->known = false;
+        aimed->known = aimed->error_known = false;
         BST_TRY(bst_control_aim(ctx, c, tick, &aimed->valid, &aimed->direction_gcrf));
-        aimed->error = bst_pointing_error_at(&c->pointing_error, tick, c->env.tick_rate_hz);
         aimed->tick = tick;
         aimed->known = true;
     }
+    if (!aimed->error_known) {
+        aimed->error = bst_pointing_error_at(&c->pointing_error, tick, c->env.tick_rate_hz);
+        aimed->error_known = true;
+    }
     *valid = aimed->valid;
     if (*valid) {
-        *direction = bst_quat_rotate(aimed->error, apparent_of(c, aimed->direction_gcrf));
+        *direction =
+            bst_quat_rotate(aimed->error, bst_aberrate(&c->aberration, aimed->direction_gcrf));
     }
     return BST_OK;
 }
@@ -201,6 +212,7 @@ static bst_status hold(bst_ctx *ctx, bst_control *c, const bst_track *track, int
     c->held.tick = tick;
     c->held.direction_gcrf = track->direction_gcrf;
     c->held.rate_gcrf_radps = track->rate_gcrf_radps;
+    forget_aims(c);
     return cue_at(ctx, c, tick, &c->held.cue);
 }
 
@@ -230,7 +242,7 @@ static double off_boresight_px(const bst_control *c, const bst_tracks *tracks,
         return INFINITY;
     }
     bst_vec3 d = bst_vec3_unit(bst_vec3_axpy(track->direction_gcrf, dt, track->rate_gcrf_radps));
-    bst_vec3 v = bst_quat_rotate(q, apparent_of(c, d));
+    bst_vec3 v = bst_quat_rotate(q, bst_aberrate(&c->aberration, d));
     return bst_vec3_angle(v, (bst_vec3){0, 0, 1}) / c->env.pixel_rad;
 }
 
@@ -328,8 +340,8 @@ static bst_status observe_holding(bst_ctx *ctx, bst_control *c, int64_t tick,
 
 bst_status bst_control_observe(bst_ctx *ctx, bst_control *c, int64_t tick,
                                const bst_tracks *tracks) {
-    forget_aims(c); /* a new fix, and what is held may change */
     if (c->config.compensate_attitude) {
+        forget_errors(c);
         bst_pointing_error_update(&c->pointing_error, &tracks->attitude, c->env.tick_rate_hz);
     }
     if (c->frame_tick != INT64_MIN && tracks->tick > c->frame_tick) {
@@ -367,9 +379,11 @@ void bst_control_telemetry(bst_control *c, const bst_pointing_telemetry *pointin
         c->pointing_valid = true;
         c->settled = pointing->settled;
     }
-    if (nav) {
+    if (nav && (!c->nav_valid || nav->tick != c->nav.tick)) {
         c->nav = *nav;
         c->nav_valid = true;
+        c->aberration = bst_aberration_of(
+            &(bst_light){.velocity_mps = nav->velocity_bary_mps, .sun_m = nav->sun_m});
     }
 }
 
@@ -388,8 +402,8 @@ static bst_status look(bst_ctx *ctx, bst_control *c, bool *arrived, double off_p
         return BST_OK;
     }
     bst_vec3 v = bst_quat_rotate(c->pointing.q_cam_from_gcrf, wanted);
-    off_px[0] = atan2(v.x, v.z) / c->env.pixel_rad;
-    off_px[1] = atan2(v.y, v.z) / c->env.pixel_rad;
+    off_px[0] = bst_atan2(v.x, v.z) / c->env.pixel_rad;
+    off_px[1] = bst_atan2(v.y, v.z) / c->env.pixel_rad;
     double tolerance = c->config.arrive_tolerance_px;
     *arrived = c->settled && off_px[0] * off_px[0] + off_px[1] * off_px[1] <= tolerance * tolerance;
     return BST_OK;
@@ -464,9 +478,7 @@ bst_status bst_control_update(bst_ctx *ctx, bst_control *c, int64_t tick, bool *
     if (!c->nav_valid) {
         return BST_OK;
     }
-    int64_t effect = tick + ticks_of(c, c->config.command_latency_s);
-    int64_t half = ticks_of(c, RATE_HALF_S);
-    half = half > 0 ? half : 1;
+    int64_t effect = tick + c->latency_ticks, half = c->rate_half_ticks;
     bool valid;
     bst_vec3 d, ahead, behind;
     BST_TRY(boresight_at(ctx, c, effect, &valid, &d));

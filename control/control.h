@@ -70,7 +70,7 @@ typedef struct bst_control_held {
 /* An aim that was worked out: each tick is asked for several times, as a command's own and as those
  * that its rate is taken between. */
 typedef struct bst_control_aimed {
-    bool known, valid;
+    bool known, valid, error_known;
     int64_t tick;
     bst_vec3 direction_gcrf; /* geometric */
     bst_quat error;          /* of the pointing */
@@ -81,12 +81,14 @@ typedef struct bst_control_aimed {
 typedef struct bst_control {
     bst_control_config config;
     bst_control_env env;
+    int64_t latency_ticks, rate_half_ticks;
     bst_pointing_error pointing_error;
     int mode;
     int64_t mode_tick; /* since when */
     bst_control_transition transitions[BST_CONTROL_TRANSITIONS];
     int transition_count;
     bst_nav_telemetry nav;
+    bst_aberration aberration; /* by nav */
     bool nav_valid;
     bst_control_held held;                    /* the track that the aim is on */
     bst_control_held lost;                    /* the target that BST_MODE_REACQUIRE looks for */
