@@ -24,9 +24,6 @@ static const double BEND_LEFT = 0.05;
 /* Above the threshold by this no skewness of noise matters. */
 static const double CERTAIN_ABOVE = 1.5;
 
-/* A row that is read is followed by the one so many below it: next, or after a few others. */
-enum { SOON = 4 };
-
 #define BST_MAG_PER_SHARE 1.0857362047581296 /* 2.5 / ln 10 */
 
 struct bst_imgproc {
@@ -169,11 +166,8 @@ static void read_electrons(const void *user, int y, int x, int count, float *out
     const reader *r = user;
     const bst_imgproc *ip = r->ip;
     const uint16_t *raw = r->frame->pixels + (size_t)y * (size_t)r->width + (size_t)x;
-    if (y + SOON < r->frame->window.height / r->frame->binning) {
-        bst_row_prefetch(raw + SOON * (size_t)r->width, count);
-    }
-    bst_row_electrons(raw, count,
-                      (float)ip->camera.offset_dn, (float)ip->camera.gain_e_per_dn, out);
+    bst_row_electrons(raw, count, (float)ip->camera.offset_dn, (float)ip->camera.gain_e_per_dn,
+                      out);
     if (ip->maps.dark_e_per_s || ip->maps.flat || ip->bad) {
         correct(ip, r->frame, y, x, count, out);
     }

@@ -22,12 +22,7 @@
 #endif
 
 /* Half of the lanes as one value, so that they stay in registers. */
-enum {
-    HALF = BST_ROW_LANES / 2,
-    KEYS = 16,
-    MEDIAN_PARTS = BST_ROW_MEDIAN / KEYS,
-    MAX_RADIUS = 32
-};
+enum { HALF = BST_ROW_LANES / 2, KEYS = 16, MEDIAN_PARTS = BST_ROW_MEDIAN / KEYS, MAX_RADIUS = 32 };
 typedef float lanes __attribute__((vector_size(HALF * sizeof(float))));
 typedef int16_t keys __attribute__((vector_size(KEYS * sizeof(int16_t))));
 typedef int32_t lane_masks __attribute__((vector_size(HALF * sizeof(float))));

@@ -26,7 +26,7 @@ float bst_row_median(const float *values, int count);
 /* out[x] = left + slope * (x + first) */
 void bst_row_line(float *out, int count, float left, float slope, float first);
 
-/* Says that a row will be read soon. */
+/* Says that a part of a row will be read soon. */
 static inline void bst_row_prefetch(const uint16_t *raw, int count) {
     for (int x = 0; x < count; x += 32) {
         __builtin_prefetch(raw + x);
