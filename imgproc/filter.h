@@ -19,6 +19,7 @@ typedef struct bst_filter {
     float *point;                           /* padded map: SNR for a point */
     float *best;                            /* the same of the greater SNR, if kept */
     bool kept;                              /* else it is made of `point` where it is asked for */
+    bool crowded;                           /* the latest frame: its maxima ask for it often */
     /* pixels above the threshold whose neighbours have a lower SNR: those of row y from index
      * y * max_width on, ascending */
     int *maxima; /* [height] */
