@@ -70,7 +70,7 @@ typedef struct bst_control_held {
 /* An aim that was worked out: each tick is asked for several times, as a command's own and as those
  * that its rate is taken between. */
 typedef struct bst_control_aimed {
-    bool known, valid, error_known;
+    bool known, valid;
     int64_t tick;
     bst_vec3 direction_gcrf; /* geometric */
     bst_quat error;          /* of the pointing */
@@ -88,7 +88,7 @@ typedef struct bst_control {
     bst_control_transition transitions[BST_CONTROL_TRANSITIONS];
     int transition_count;
     bst_nav_telemetry nav;
-    bst_aberration aberration; /* by nav */
+    bst_aberration aberration; /* by nav, once that is valid */
     bool nav_valid;
     bst_control_held held;                    /* the track that the aim is on */
     bst_control_held lost;                    /* the target that BST_MODE_REACQUIRE looks for */
