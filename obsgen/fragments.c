@@ -17,14 +17,24 @@ static const uint64_t PIXEL_NOISE = (uint64_t)1 << 60;
 
 /* Rows on either side of the way whose output is made, taps of the filter on either side, and rows
  * of noise that is filtered across the way already. */
-enum { ROWS = 2, MOST_TAPS = 9, HALF = ROWS + MOST_TAPS + 1, MOST_MAXIMA = 2048, NORMALS = 4096 };
+enum {
+    ROWS = 2,
+    WIDE = 2 * ROWS + 1,
+    MOST_TAPS = 9,
+    HALF = ROWS + MOST_TAPS + 1,
+    MOST_MAXIMA = 2048,
+    NORMALS = 4096,
+    LANES = 16,
+    MOST_GROUPS = (2 * (HALF + MOST_TAPS) + 8) / 8 + 1 /* of eight pixels across the way */
+};
 
 /* One step of a pixel along the way: a column of the frame where the way runs more along the rows,
  * a row otherwise. */
 typedef struct section {
-    int at, middle;               /* along, and the nearest pixel across */
-    float noise[2 * HALF + 1];    /* filtered across */
-    float output[2 * (ROWS) + 1]; /* SNR */
+    int at, middle;            /* along, and the nearest pixel across */
+    float height;              /* of the light */
+    float noise[2 * HALF + 1]; /* filtered across */
+    float output[WIDE];        /* SNR */
 } section;
 
 typedef struct maximum {
@@ -42,7 +52,15 @@ struct generator_streaks {
     int reach;
     double taps_sigma;
     float normals[NORMALS];
+    float light[BST_ROUTE_NODES * WIDE]; /* of the sections' rows, over their height */
 };
+
+/* Wider vectors where the processor has them; what comes out is the same. */
+#if defined(__x86_64__) && defined(__linux__)
+#define LANES_FUNCTION __attribute__((target_clones("default", "avx2", "avx512f")))
+#else
+#define LANES_FUNCTION
+#endif
 
 static void set_taps(struct generator_streaks *w, double sigma) {
     if (w->taps_sigma == sigma) {
@@ -78,60 +96,124 @@ static void set_normals(float *out) {
     }
 }
 
-/* White noise of pixels first..first+count-1 across the way: the same wherever a streak runs. The
- * filter's many taps smooth the steps of the table. */
-static void white(const bst_generator *g, bool by_row, int at, int first, int count, float *out) {
-    for (int group = first >> 3; group <= (first + count - 1) >> 3; group++) {
-        uint64_t draw = PIXEL_NOISE | (uint64_t)by_row << 56 |
-                        (uint64_t)(uint32_t)(at + 65536) << 24 | (uint64_t)(group + 65536);
-        bst_philox_words r = bst_rng_words(g->key, (uint64_t)g->exposure_id, draw);
-        for (int k = 0; k < 8; k++) {
-            int i = 8 * group + k - first;
-            if (i >= 0 && i < count) {
-                out[i] = g->streaks->normals[(r.w[k >> 1] >> (k & 1 ? 16 : 0)) & (NORMALS - 1)];
+/* bst_philox4x32 of LANES counters. */
+typedef struct lanes {
+    uint32_t c0[LANES], c1[LANES], c2[LANES], c3[LANES];
+} lanes;
+
+LANES_FUNCTION static void draw_lanes(bst_rng_key key, lanes *l) {
+    uint32_t key0 = key.k[0], key1 = key.k[1];
+    for (int round = 0; round < 10; round++) {
+        for (int i = 0; i < LANES; i++) {
+            uint64_t p0 = (uint64_t)0xD2511F53u * l->c0[i];
+            uint64_t p1 = (uint64_t)0xCD9E8D57u * l->c2[i];
+            l->c0[i] = (uint32_t)(p1 >> 32) ^ l->c1[i] ^ key0;
+            l->c2[i] = (uint32_t)(p0 >> 32) ^ l->c3[i] ^ key1;
+            l->c1[i] = (uint32_t)p1;
+            l->c3[i] = (uint32_t)p0;
+        }
+        key0 += 0x9E3779B9u;
+        key1 += 0xBB67AE85u;
+    }
+}
+
+/* White noise of the pixels of up to LANES sections from `first` pixels before their middles on,
+ * eight to a draw: the same wherever a streak runs. The filter's many taps smooth the steps of the
+ * table. */
+static void white(const bst_generator *g, bool by_row, const section *s, int sections, int first,
+                  int count, float out[LANES][2 * (HALF + MOST_TAPS) + 1]) {
+    const float *normals = g->streaks->normals;
+    int groups = (count + 14) / 8;
+    for (int k = 0; k < groups; k++) {
+        lanes l;
+        for (int i = 0; i < LANES; i++) {
+            const section *one = &s[i < sections ? i : 0];
+            uint64_t draw = PIXEL_NOISE | (uint64_t)by_row << 56 |
+                            (uint64_t)(uint32_t)(one->at + 65536) << 24 |
+                            (uint64_t)(((one->middle - first) >> 3) + k + 65536);
+            l.c0[i] = (uint32_t)draw;
+            l.c1[i] = (uint32_t)(draw >> 32);
+            l.c2[i] = (uint32_t)g->exposure_id;
+            l.c3[i] = (uint32_t)((uint64_t)g->exposure_id >> 32);
+        }
+        draw_lanes(g->key, &l);
+        for (int i = 0; i < sections; i++) {
+            int from = 8 * k - ((s[i].middle - first) & 7);
+            uint32_t words[4] = {l.c0[i], l.c1[i], l.c2[i], l.c3[i]};
+            int low = from < 0 ? -from : 0, high = count - from < 8 ? count - from : 8;
+            for (int p = low; p < high; p++) {
+                out[i][from + p] = normals[(words[p >> 1] >> (p & 1 ? 16 : 0)) & (NORMALS - 1)];
             }
         }
     }
 }
 
-static void fill_noise(const bst_generator *g, const struct generator_streaks *w, bool by_row,
-                       section *s) {
+/* Of all sections, filtered across the way. */
+static void fill_noise(const bst_generator *g, struct generator_streaks *w, bool by_row, section *s,
+                       int count) {
     int half = ROWS + w->reach + 1, rows = 2 * half + 1;
-    float noise[2 * (HALF + MOST_TAPS) + 1];
-    white(g, by_row, s->at, s->middle - half - w->reach, rows + 2 * w->reach, noise);
-    for (int r = 0; r < rows; r++) {
-        s->noise[r] = 0.0f;
-    }
-    for (int i = 0; i <= 2 * w->reach; i++) {
-        float tap = w->taps[i];
-        for (int r = 0; r < rows; r++) {
-            s->noise[r] += tap * noise[r + i];
+    float noise[LANES][2 * (HALF + MOST_TAPS) + 1];
+    for (int first = 0; first < count; first += LANES) {
+        int sections = count - first < LANES ? count - first : LANES;
+        white(g, by_row, &s[first], sections, half + w->reach, rows + 2 * w->reach, noise);
+        for (int k = 0; k < sections; k++) {
+            float *out = s[first + k].noise;
+            for (int r = 0; r < rows; r++) {
+                out[r] = 0.0f;
+            }
+            for (int i = 0; i <= 2 * w->reach; i++) {
+                float tap = w->taps[i];
+                for (int r = 0; r < rows; r++) {
+                    out[r] += tap * noise[k][r + i];
+                }
+            }
         }
     }
 }
 
-/* Adds to the sections' signal, in s->output, the filter along the way of their noise. Light has
- * shot noise: the squares of the filter average a line's over 1 / (sqrt(3 pi) S) px of it, whose
- * electrons are the output times the noise of a pixel. */
+/* exp of numbers from -80 to 0: 2^n times the series of 2^f, |f| <= 1/2, to a float's rounding. */
+LANES_FUNCTION static void exponentials(float *x, int count) {
+    for (int i = 0; i < count; i++) {
+        float y = (x[i] > -80.0f ? x[i] : -80.0f) * 1.442695041f;
+        int32_t n = (int32_t)(y - 0.5f);
+        float f = (y - (float)n) * 0.6931471806f;
+        float e = 1.0f + f * (1.0f / 7.0f);
+        e = 1.0f + f * (1.0f / 6.0f) * e;
+        e = 1.0f + f * (1.0f / 5.0f) * e;
+        e = 1.0f + f * (1.0f / 4.0f) * e;
+        e = 1.0f + f * (1.0f / 3.0f) * e;
+        e = 1.0f + f * (1.0f / 2.0f) * e;
+        e = 1.0f + f * e;
+        union {
+            uint32_t bits;
+            float value;
+        } power = {.bits = (uint32_t)(n + 127) << 23};
+        x[i] = e * power.value;
+    }
+}
+
+/* The filter along the way of the sections' noise, added to their signal. Light has shot noise: the
+ * squares of the filter average a line's over 1 / (sqrt(3 pi) S) px of it, whose electrons are the
+ * output times the noise of a pixel. */
 static void add_noise(const bst_generator *g, const struct generator_streaks *w, section *s,
                       int count) {
-    double shot = 1.0 / (sqrt(3.0 * BST_PI) * g->total_sigma * g->noise_e);
+    float shot = (float)(1.0 / (sqrt(3.0 * BST_PI) * g->total_sigma * g->noise_e));
     int top = w->reach + 1;
     for (int k = 0; k < count; k++) {
-        float sum[2 * ROWS + 1] = {0.0f};
+        float sum[WIDE] = {0.0f};
         for (int i = -w->reach; i <= w->reach; i++) {
             int n = k + i;
             /* the way leaves no more than a row a step */
             int row = n >= 0 && n < count ? s[k].middle - s[n].middle + top : -1;
             if (row >= 0 && row <= 2 * top) {
-                for (int r = 0; r <= 2 * ROWS; r++) {
+                for (int r = 0; r < WIDE; r++) {
                     sum[r] += w->taps[i + w->reach] * s[n].noise[row + r];
                 }
             }
         }
-        for (int r = 0; r <= 2 * ROWS; r++) {
-            float *out = &s[k].output[r];
-            *out += (float)((double)sum[r] * sqrt(1.0 + shot * fmax((double)*out, 0.0)));
+        for (int r = 0; r < WIDE; r++) {
+            float light = s[k].output[r];
+            s[k].output[r] = light + sum[r] * sqrtf(1.0f + shot * (light > 0.0f ? light : 0.0f));
         }
     }
 }
@@ -261,20 +343,24 @@ static void run_part(bst_generator *g, const generator_source *source, const bst
             section *now = &s[made++];
             now->at = (int)at;
             now->middle = (int)lround(across);
-            double light = n->light + part * (m->light - n->light);
+            now->height = (float)(height * (n->light + part * (m->light - n->light)));
+            float *light = &w->light[(made - 1) * WIDE];
             for (int r = -ROWS; r <= ROWS; r++) {
                 double d = now->middle + r - across;
-                now->output[r + ROWS] =
-                    (float)(height * light * exp(-scale * d * d * slant) - taken);
+                light[r + ROWS] = (float)(-scale * d * d * slant);
             }
         }
     }
     if (made < 2) {
         return;
     }
+    exponentials(w->light, made * WIDE);
     for (int k = 0; k < made; k++) {
-        fill_noise(g, w, by_row, &s[k]);
+        for (int r = 0; r < WIDE; r++) {
+            s[k].output[r] = s[k].height * w->light[k * WIDE + r] - (float)taken;
+        }
     }
+    fill_noise(g, w, by_row, s, made);
     add_noise(g, w, s, made);
     int found = find_maxima(g, s, made, by_row, number, w->maxima);
     keep_highest(g, s, made, by_row, w->maxima, found);
