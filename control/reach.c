@@ -154,7 +154,7 @@ static double clamped(double x, double limit) {
     return fmax(fmin(x, limit), -limit);
 }
 
-/* One step towards a target that is at `to` and moves at `to_rate`. */
+/* One step towards a target that is at `to` and moves at `to_rate` at the step's end. */
 static void follow(follower *f, const bst_mount_axis *axis, double share, double to,
                    double to_rate) {
     const double gain = 10.0, h = CHASE_STEP_S; /* 1/s, near the target */
@@ -165,7 +165,7 @@ static void follow(follower *f, const bst_mount_axis *axis, double share, double
         f->angle += f->rate * h;
         return;
     }
-    double d = f->angle - to, brake = 0.8 * hard, linear = brake / (gain * gain);
+    double d = f->angle - (to - to_rate * h), brake = 0.8 * hard, linear = brake / (gain * gain);
     double approach =
         fabs(d) <= linear ? gain * fabs(d) : sqrt(2.0 * brake * (fabs(d) - 0.5 * linear));
     double wanted = clamped(to_rate - copysign(approach, d), limit);

@@ -69,8 +69,8 @@ static void zones_of_navigation(void **state) {
     n = bst_exclusion_zones(&e, (bst_vec3){0, 0, r}, (bst_vec3){0}, (bst_vec3){0}, zones);
     assert_int_equal(n, 1);
     bst_assert_close(zones[0].half_angle_rad, BST_PI / 2, 1e-15); /* inside the air */
-    assert_int_equal(bst_exclusion_zones(&(bst_exclusion){0}, (bst_vec3){0, 0, r}, (bst_vec3){1, 0, 0},
-                                         (bst_vec3){1, 0, 0}, zones),
+    assert_int_equal(bst_exclusion_zones(&(bst_exclusion){0}, (bst_vec3){0, 0, r},
+                                         (bst_vec3){1, 0, 0}, (bst_vec3){1, 0, 0}, zones),
                      0);
 }
 
