@@ -5,7 +5,9 @@
 #include "sim/core/module.h"
 
 extern const bst_module_desc bst_gimbal_second_order_module; /* role "gimbal", "second_order" */
-extern const bst_module_desc bst_gimbal_ideal_module;        /* type "ideal" */
-extern const bst_module_desc bst_gimbal_scripted_module;     /* type "scripted" */
+extern const bst_module_desc bst_gimbal_azimuth_elevation_module;
+extern const bst_module_desc bst_gimbal_cross_elevation_module;
+extern const bst_module_desc bst_gimbal_ideal_module;    /* type "ideal" */
+extern const bst_module_desc bst_gimbal_scripted_module; /* type "scripted" */
 
 #endif

@@ -1,5 +1,6 @@
 #include <math.h>
 
+#include "gimbal/mount.h"
 #include "gimbal/two_axis.h"
 #include "sim/app/bench.h"
 
@@ -46,6 +47,44 @@ bst_status bst_bench_plant_second_order(bst_ctx *ctx, const bst_bench *self,
             }
             bst_two_axis_step(&plant, &command, t - commanded, i % TELEMETRY_STEPS == 0);
             sum += plant.q_cam_from_gcrf.x;
+        }
+        bst_bench_stop(&clock, PLANT_STEPS);
+    }
+    bst_bench_summarise(&clock, out);
+    return isfinite(sum) ? BST_OK : bst_fail(ctx, BST_ERR_NUMERIC, "the plant became infinite");
+}
+
+bst_status bst_bench_plant_full(bst_ctx *ctx, const bst_bench *self,
+                                const bst_bench_options *options, bst_bench_result *out) {
+    (void)self;
+    (void)options;
+    bst_mount_config config;
+    BST_TRY(bst_config_defaults(ctx, bst_mount_config_table, &config));
+    config.platform = demo_platform(config.platform);
+    config.flexible.frequency_hz[0] = config.flexible.frequency_hz[1] = 40.0;
+    bst_mount mount;
+    bst_platform platform;
+    BST_TRY(bst_mount_init(ctx, &mount, BST_MOUNT_AZIMUTH_ELEVATION, &config, PLANT_DT,
+                           (bst_rng_key){{5, 6}}));
+    BST_TRY(bst_platform_init(ctx, &platform, &config.platform, BST_QUAT_IDENTITY,
+                              3.0 * BST_ARCSEC_RAD, PLANT_DT, (bst_rng_key){{1, 2}},
+                              (bst_rng_key){{3, 4}}));
+    bst_mount_body body = {.rate_radps = platform.drift_radps,
+                           .q_believed_from_gcrf = platform.q_believed_from_gcrf};
+    bst_bench_clock clock = {.count = 0};
+    bst_los_command command = command_at(0.0);
+    double commanded = 0.0, sum = 0.0;
+    for (int round = 0; round < PLANT_ROUNDS; round++) {
+        bst_bench_start(&clock);
+        for (int i = 0; i < PLANT_STEPS; i++) {
+            int64_t n = mount.steps;
+            double t = (double)n * PLANT_DT;
+            if (n % 50 == 0) {
+                command = command_at(t);
+                commanded = t;
+            }
+            bst_mount_step(&mount, &body, &command, t - commanded, i % TELEMETRY_STEPS == 0);
+            sum += bst_platform_true_camera(&platform, n, t, mount.q_cam_from_body).x;
         }
         bst_bench_stop(&clock, PLANT_STEPS);
     }

@@ -48,6 +48,8 @@ static const bst_bench benches[] = {
     {"cold_start", "first frame of a fresh process, kernels in the cache", bst_bench_cold_start},
     {"plant_second_order", "plant step of the gimbal type second_order, as in the main scenario",
      bst_bench_plant_second_order},
+    {"plant_full", "of azimuth_elevation with friction, cable, a flexible mode and encoders",
+     bst_bench_plant_full},
     {"small", "256x256, 30 stars, 20 px streaks: a quick trial (only when named)",
      bst_bench_scene_run},
 };

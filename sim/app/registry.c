@@ -9,6 +9,8 @@
 
 static const bst_module_desc *const modules[] = {
     &bst_gimbal_second_order_module,
+    &bst_gimbal_azimuth_elevation_module,
+    &bst_gimbal_cross_elevation_module,
     &bst_gimbal_ideal_module,
     &bst_gimbal_scripted_module,
     &bst_scenegen_module,
