@@ -238,6 +238,8 @@ static void integrate(bst_mount *m, const double torque_nm[M], bst_vec3 rate_bod
             bst_vec3 gain = bst_vec3_scale(bst_vec3_sub(after, momentum), 1.0 / m->dt_s);
             gain = bst_vec3_axpy(gain, 0.5, bst_vec3_cross(before, momentum));
             gain = bst_vec3_axpy(gain, 0.5, bst_vec3_cross(rate, after));
+            /* as the body's axes will have turned when it acts */
+            gain = bst_vec3_axpy(gain, -m->dt_s, bst_vec3_cross(rate, gain));
             m->reaction_nm = bst_mount_swap(m->type, bst_vec3_scale(gain, -1.0));
         }
     }

@@ -178,6 +178,36 @@ static bst_status put_flexible(bst_ctx *ctx, const bst_mount_flexible_config *f,
     return BST_OK;
 }
 
+/* What else makes the axes faster than the step: viscous friction and cables. */
+static bst_status check_step(bst_ctx *ctx, const bst_joints *joints, double dt_s) {
+    for (int k = 0; k < joints->chain.stages; k++) {
+        const bst_joint *joint = &joints->joint[k];
+        /* the least inertia that the axis can have to itself */
+        double inertia = joints->chain.inertia[k][k == 1 ? 1 : 0] - joints->chain.flex_inertia[k];
+        double longest_s = joint->viscous_nms > 0.0 ? 0.5 * inertia / joint->viscous_nms : INFINITY;
+        if (dt_s > longest_s) {
+            return bst_fail(ctx, BST_ERR_CONFIG,
+                            "friction/viscous_nms_per_rad: %g N m s/rad bring the %s axis, %g kg "
+                            "m^2, to rest within a step of %g s; the largest step allowed is %.4g "
+                            "s: give rate_hz at least %.6g, or less friction",
+                            joint->viscous_nms, axis_names[k], inertia, dt_s, longest_s,
+                            1.0 / longest_s);
+        }
+        longest_s = joint->spring_nm > 0.0
+                        ? 2.0 * BST_PI / STEPS_PER_PERIOD * sqrt(inertia / joint->spring_nm)
+                        : INFINITY;
+        if (dt_s > longest_s) {
+            return bst_fail(ctx, BST_ERR_CONFIG,
+                            "cable/stiffness_nm_per_rad: on %g N m/rad the %s axis, %g kg m^2, "
+                            "swings too fast for a step of %g s; the largest step allowed is %.4g "
+                            "s: give rate_hz at least %.6g, or a softer cable",
+                            joint->spring_nm, axis_names[k], inertia, dt_s, longest_s,
+                            1.0 / longest_s);
+        }
+    }
+    return BST_OK;
+}
+
 bst_status bst_mount_config_joints(bst_ctx *ctx, int type, const bst_mount_config *c, double dt_s,
                                    bst_joints *joints) {
     *joints = (bst_joints){.method = c->integrator};
@@ -222,6 +252,7 @@ bst_status bst_mount_config_joints(bst_ctx *ctx, int type, const bst_mount_confi
                         .restitution = c->stop_restitution};
     }
     BST_TRY(put_flexible(ctx, &c->flexible, dt_s, chain));
+    BST_TRY(check_step(ctx, joints, dt_s));
     bst_joints_init(joints, start);
     return BST_OK;
 }

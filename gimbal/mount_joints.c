@@ -147,7 +147,8 @@ static inline void turned(const bst_joints *j, const bst_chain_state *state, dou
     }
 }
 
-static void runge_kutta(const bst_joints *j, const motion *m, double h, bst_chain_state *out) {
+static void runge_kutta(const bst_joints *j, const motion *m, double h, bst_chain_state *out,
+                        double accel[N]) {
     int n = stages_of(j);
     bst_chain_equations eq;
     slopes a, b, c, d;
@@ -166,6 +167,7 @@ static void runge_kutta(const bst_joints *j, const motion *m, double h, bst_chai
     evaluate(j, &at4, sine, cosine, m, h, &eq, &d);
     double w = h / 6.0;
     for (int k = 0; k < n; k++) {
+        accel[k] = a.accel[k];
         out->angle_rad[k] = from->angle_rad[k] +
                             w * (from->rate_radps[k] +
                                  2.0 * (at2.rate_radps[k] + at3.rate_radps[k]) + at4.rate_radps[k]);
@@ -181,7 +183,8 @@ static void runge_kutta(const bst_joints *j, const motion *m, double h, bst_chai
 }
 
 /* Drift, kick, drift; the kick's forces that depend on rates are those at the start. */
-static void leapfrog(const bst_joints *j, const motion *m, double h, bst_chain_state *out) {
+static void leapfrog(const bst_joints *j, const motion *m, double h, bst_chain_state *out,
+                     double accel[N]) {
     int n = stages_of(j);
     static const slopes none = {{0.0}, {0.0}};
     bst_chain_equations eq;
@@ -193,6 +196,7 @@ static void leapfrog(const bst_joints *j, const motion *m, double h, bst_chain_s
     evaluate(j, &half, sine, cosine, m, 0.5 * h, &eq, &kick);
     displace(n, &half, h, &half, &kick, out);
     for (int k = 0; k < n; k++) {
+        accel[k] = kick.accel[k];
         out->angle_rad[k] = half.angle_rad[k] + 0.5 * h * out->rate_radps[k];
         out->flex_rad[k] = half.flex_rad[k] + 0.5 * h * out->flex_radps[k];
     }
@@ -350,12 +354,23 @@ static void bounce(bst_joints *j, const motion *m, int k) {
     j->state.rate_radps[k] = back;
 }
 
-static void advance(bst_joints *j, const motion *m, double h, bst_chain_state *end) {
+/* The state after h; returns how soon a sliding joint would come to rest by its deceleration at the
+ * start, h at the latest. */
+static double advance(const bst_joints *j, const motion *m, double h, bst_chain_state *end) {
+    double accel[N], soonest = h;
     if (j->method == BST_JOINT_LEAPFROG) {
-        leapfrog(j, m, h, end);
+        leapfrog(j, m, h, end, accel);
     } else {
-        runge_kutta(j, m, h, end);
+        runge_kutta(j, m, h, end, accel);
     }
+    for (int k = 0; k < stages_of(j); k++) {
+        double rate = j->state.rate_radps[k];
+        if (!m->held[k] && j->joint[k].breakaway_nm > 0.0 && rate * accel[k] < 0.0 &&
+            fabs(rate) < soonest * fabs(accel[k])) {
+            soonest = fabs(rate / accel[k]);
+        }
+    }
+    return soonest;
 }
 
 static bool nothing_moves(const bst_joints *j, const motion *m) {
@@ -390,13 +405,21 @@ void bst_joints_step(bst_joints *j, double dt_s, const double torque_nm[N], bst_
         if (nothing_moves(j, &m)) {
             break;
         }
-        advance(j, &m, left, &end);
+        /* a joint that rests long before the part ends would be driven far beyond: first up to
+         * there, and a little further so that the reversal is seen */
+        double span = left, soonest = advance(j, &m, span, &end);
+        if (soonest < 0.25 * span && part < PARTS) {
+            span = 2.0 * soonest;
+            (void)advance(j, &m, span, &end);
+        }
         double time;
         int which;
-        enum event_kind kind = first_event(j, &m, &end, left, &time, &which);
+        enum event_kind kind = first_event(j, &m, &end, span, &time, &which);
         if (kind == EVENT_NONE) {
             accept(j, &end);
-            break;
+            m.rate = bst_vec3_axpy(m.rate, span, m.slope);
+            left -= span;
+            continue;
         }
         if (part >= PARTS) {
             m.held[which] = true;
@@ -405,8 +428,8 @@ void bst_joints_step(bst_joints *j, double dt_s, const double torque_nm[N], bst_
             continue; /* at most as often as there are joints */
         }
         if (time > 1e-12 * dt_s) {
-            if (time < left) {
-                advance(j, &m, time, &end);
+            if (time < span) {
+                (void)advance(j, &m, time, &end);
             }
             accept(j, &end);
             m.rate = bst_vec3_axpy(m.rate, time, m.slope);
