@@ -113,7 +113,7 @@ const bst_config_desc bst_mount_config_table[] = {
     BST_OBJECT(G, fault, fault_table, "{}", "What breaks."),
     BST_ENUM(G, integrator, integrator_names, "\"rk4\"",
              "How a step of the axes is worked out between events of friction and stops: "
-             "Runge-Kutta of order 4, or leapfrog, which takes a third of the time."),
+             "Runge-Kutta of order 4, or leapfrog, of order 2, which takes half of the time."),
     BST_OBJECT(G, platform, bst_platform_config_table, "{}",
                "The spacecraft: drift, jitter, attitude knowledge, telemetry."),
     BST_CONFIG_END};

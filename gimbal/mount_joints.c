@@ -182,7 +182,8 @@ static void runge_kutta(const bst_joints *j, const motion *m, double h, bst_chai
     }
 }
 
-/* Drift, kick, drift; the kick's forces that depend on rates are those at the start. */
+/* Drift, kick, drift; forces that depend on rates are those at the mean of the rates before and
+ * after the kick, which a first kick foretells. */
 static void leapfrog(const bst_joints *j, const motion *m, double h, bst_chain_state *out,
                      double accel[N]) {
     int n = stages_of(j);
@@ -190,13 +191,20 @@ static void leapfrog(const bst_joints *j, const motion *m, double h, bst_chain_s
     bst_chain_equations eq;
     slopes kick;
     double sine[N], cosine[N];
-    bst_chain_state half;
+    bst_chain_state half, middle;
     displace(n, &j->state, 0.5 * h, &j->state, &none, &half);
     turned(j, &half, sine, cosine);
     evaluate(j, &half, sine, cosine, m, 0.5 * h, &eq, &kick);
-    displace(n, &half, h, &half, &kick, out);
+    middle = half;
+    for (int k = 0; k < n; k++) {
+        middle.rate_radps[k] += 0.5 * h * kick.accel[k];
+        middle.flex_radps[k] += 0.5 * h * kick.flex_accel[k];
+    }
+    evaluate(j, &middle, sine, cosine, m, 0.5 * h, &eq, &kick);
     for (int k = 0; k < n; k++) {
         accel[k] = kick.accel[k];
+        out->rate_radps[k] = half.rate_radps[k] + h * kick.accel[k];
+        out->flex_radps[k] = half.flex_radps[k] + h * kick.flex_accel[k];
         out->angle_rad[k] = half.angle_rad[k] + 0.5 * h * out->rate_radps[k];
         out->flex_rad[k] = half.flex_rad[k] + 0.5 * h * out->flex_radps[k];
     }

@@ -23,7 +23,7 @@ typedef struct bst_joint {
 
 typedef enum bst_joint_method {
     BST_JOINT_RK4 = 0,  /* Runge-Kutta of order 4 */
-    BST_JOINT_LEAPFROG, /* velocity after position, order 2: one evaluation a step */
+    BST_JOINT_LEAPFROG, /* drift, kick, drift: order 2, keeps the energy of what is not damped */
 } bst_joint_method;
 
 typedef struct bst_joints {
