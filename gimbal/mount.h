@@ -55,10 +55,10 @@ typedef struct bst_mount {
     /* after each step */
     bst_quat q_cam_from_body;  /* true */
     bst_quat q_seen_from_body; /* by the encoders; when measured */
-    bst_vec3 reaction_nm; /* mean torque of the mount on the body in the last step, about the point
-                             where the axes meet, in the body's axes of the step to come, in which
-                             it acts; with want_reaction */
-    bool settled, limited;     /* settled: when measured */
+    bst_vec3 reaction_nm;  /* mean torque of the mount on the body in the last step, about the point
+                              where the axes meet, in the body's axes of the step to come, in which
+                              it acts; with want_reaction */
+    bool settled, limited; /* settled: when measured */
 } bst_mount;
 
 /* At rest at the start angles; step 0 is the first. Errors as bst_mount_config_joints and
