@@ -79,6 +79,7 @@ void bst_generator_decide(bst_generator *g) {
         }
     }
     qsort(g->ranks, (size_t)ranks, sizeof *g->ranks, brighter);
+    g->rank_count = ranks;
     for (int r = 0; r < ranks; r++) {
         int i = g->ranks[r].index;
         generator_source *s = &g->sources[i];

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "obsgen/clutter.h"
+#include "obsgen/streak_noise.h"
 #include "sim/core/vec.h"
 
 /* As image processing tells maxima apart. */
@@ -12,30 +13,21 @@ static const double SADDLE_SIGMA = 3.0, SADDLE_SHARE = 0.15;
 /* What stays further below the threshold is seen as often as noise alone, which has its own draws.
  */
 static const double FAINTEST_SIGMA = 4.0;
-/* Draws of pixels; those of other clutter stay below. */
-static const uint64_t PIXEL_NOISE = (uint64_t)1 << 60;
+/* Light below this counts for no other streak. */
+static const double LEAST_LIGHT = 0.4;
+/* A source whose path differs more from the stars' has a way of its own. */
+static const double OWN_WAY_PX = 1.0;
 
-/* Rows on either side of the way whose output is made, taps of the filter on either side, and rows
- * of noise that is filtered across the way already. */
+/* LIGHT_ROWS: on either side of the way that its light reaches. */
 enum {
-    ROWS = 2,
-    WIDE = 2 * ROWS + 1,
-    MOST_TAPS = 9,
-    HALF = ROWS + MOST_TAPS + 1,
-    MOST_MAXIMA = 2048,
-    NORMALS = 4096,
-    LANES = 16,
-    MOST_GROUPS = (2 * (HALF + MOST_TAPS) + 8) / 8 + 1 /* of eight pixels across the way */
+    ROWS = BST_STREAK_ROWS,
+    WIDE = BST_STREAK_WIDE,
+    LIGHT_ROWS = 4,
+    LIGHT_WIDE = 2 * LIGHT_ROWS + 1,
+    MOST_MAXIMA = 2048
 };
 
-/* One step of a pixel along the way: a column of the frame where the way runs more along the rows,
- * a row otherwise. */
-typedef struct section {
-    int at, middle;            /* along, and the nearest pixel across */
-    float height;              /* of the light */
-    float noise[2 * HALF + 1]; /* filtered across */
-    float output[WIDE];        /* SNR */
-} section;
+typedef bst_streak_section section;
 
 typedef struct maximum {
     int x, y, section, part; /* part: of the way */
@@ -48,175 +40,15 @@ struct generator_streaks {
     maximum maxima[MOST_MAXIMA]; /* of one part of the way */
     maximum kept[MOST_MAXIMA];   /* of the whole */
     int kept_count;
-    float taps[2 * MOST_TAPS + 1];
-    int reach;
-    double taps_sigma;
-    float normals[NORMALS];
-    float light[BST_ROUTE_NODES * WIDE]; /* of the sections' rows, over their height */
+    bst_streak_noise noise;
+    float light[BST_ROUTE_NODES * LIGHT_WIDE]; /* of the sections' rows, over their height */
+    /* light of all streaks on the frame's pixels, which of them have some, and those that a maximum
+     * was reported at */
+    float *map;
+    unsigned char *taken;
+    int *touched, *reported;
+    int map_room, touched_count, touched_room, reported_count, reported_room;
 };
-
-/* Wider vectors where the processor has them; what comes out is the same. */
-#if defined(__x86_64__) && defined(__linux__)
-#define LANES_FUNCTION __attribute__((target_clones("default", "avx2", "avx512f")))
-#else
-#define LANES_FUNCTION
-#endif
-
-static void set_taps(struct generator_streaks *w, double sigma) {
-    if (w->taps_sigma == sigma) {
-        return;
-    }
-    w->reach = (int)fmin(ceil(3.0 * sigma), MOST_TAPS);
-    double square = 0.0;
-    for (int pass = 0; pass < 2; pass++) {
-        for (int i = -w->reach; i <= w->reach; i++) {
-            double tap = exp(-0.5 * i * i / (sigma * sigma));
-            square += pass ? 0.0 : tap * tap;
-            w->taps[i + w->reach] = (float)(tap / sqrt(square));
-        }
-    }
-    w->taps_sigma = sigma;
-}
-
-/* Normal deviates at the middles of equal shares of probability, by bisection, with unit variance.
- */
-static void set_normals(float *out) {
-    double low = -9.0, square = 0.0;
-    for (int i = 0; i < NORMALS; i++) {
-        double high = 9.0, p = (i + 0.5) / NORMALS;
-        for (int k = 0; k < 40; k++) {
-            double z = 0.5 * (low + high);
-            *(0.5 * erfc(-z * sqrt(0.5)) < p ? &low : &high) = z;
-        }
-        out[i] = (float)low;
-        square += low * low / NORMALS;
-    }
-    for (int i = 0; i < NORMALS; i++) {
-        out[i] = (float)((double)out[i] / sqrt(square));
-    }
-}
-
-/* bst_philox4x32 of LANES counters. */
-typedef struct lanes {
-    uint32_t c0[LANES], c1[LANES], c2[LANES], c3[LANES];
-} lanes;
-
-LANES_FUNCTION static void draw_lanes(bst_rng_key key, lanes *l) {
-    uint32_t key0 = key.k[0], key1 = key.k[1];
-    for (int round = 0; round < 10; round++) {
-        for (int i = 0; i < LANES; i++) {
-            uint64_t p0 = (uint64_t)0xD2511F53u * l->c0[i];
-            uint64_t p1 = (uint64_t)0xCD9E8D57u * l->c2[i];
-            l->c0[i] = (uint32_t)(p1 >> 32) ^ l->c1[i] ^ key0;
-            l->c2[i] = (uint32_t)(p0 >> 32) ^ l->c3[i] ^ key1;
-            l->c1[i] = (uint32_t)p1;
-            l->c3[i] = (uint32_t)p0;
-        }
-        key0 += 0x9E3779B9u;
-        key1 += 0xBB67AE85u;
-    }
-}
-
-/* White noise of the pixels of up to LANES sections from `first` pixels before their middles on,
- * eight to a draw: the same wherever a streak runs. The filter's many taps smooth the steps of the
- * table. */
-static void white(const bst_generator *g, bool by_row, const section *s, int sections, int first,
-                  int count, float out[LANES][2 * (HALF + MOST_TAPS) + 1]) {
-    const float *normals = g->streaks->normals;
-    int groups = (count + 14) / 8;
-    for (int k = 0; k < groups; k++) {
-        lanes l;
-        for (int i = 0; i < LANES; i++) {
-            const section *one = &s[i < sections ? i : 0];
-            uint64_t draw = PIXEL_NOISE | (uint64_t)by_row << 56 |
-                            (uint64_t)(uint32_t)(one->at + 65536) << 24 |
-                            (uint64_t)(((one->middle - first) >> 3) + k + 65536);
-            l.c0[i] = (uint32_t)draw;
-            l.c1[i] = (uint32_t)(draw >> 32);
-            l.c2[i] = (uint32_t)g->exposure_id;
-            l.c3[i] = (uint32_t)((uint64_t)g->exposure_id >> 32);
-        }
-        draw_lanes(g->key, &l);
-        for (int i = 0; i < sections; i++) {
-            int from = 8 * k - ((s[i].middle - first) & 7);
-            uint32_t words[4] = {l.c0[i], l.c1[i], l.c2[i], l.c3[i]};
-            int low = from < 0 ? -from : 0, high = count - from < 8 ? count - from : 8;
-            for (int p = low; p < high; p++) {
-                out[i][from + p] = normals[(words[p >> 1] >> (p & 1 ? 16 : 0)) & (NORMALS - 1)];
-            }
-        }
-    }
-}
-
-/* Of all sections, filtered across the way. */
-static void fill_noise(const bst_generator *g, struct generator_streaks *w, bool by_row, section *s,
-                       int count) {
-    int half = ROWS + w->reach + 1, rows = 2 * half + 1;
-    float noise[LANES][2 * (HALF + MOST_TAPS) + 1];
-    for (int first = 0; first < count; first += LANES) {
-        int sections = count - first < LANES ? count - first : LANES;
-        white(g, by_row, &s[first], sections, half + w->reach, rows + 2 * w->reach, noise);
-        for (int k = 0; k < sections; k++) {
-            float *out = s[first + k].noise;
-            for (int r = 0; r < rows; r++) {
-                out[r] = 0.0f;
-            }
-            for (int i = 0; i <= 2 * w->reach; i++) {
-                float tap = w->taps[i];
-                for (int r = 0; r < rows; r++) {
-                    out[r] += tap * noise[k][r + i];
-                }
-            }
-        }
-    }
-}
-
-/* exp of numbers from -80 to 0: 2^n times the series of 2^f, |f| <= 1/2, to a float's rounding. */
-LANES_FUNCTION static void exponentials(float *x, int count) {
-    for (int i = 0; i < count; i++) {
-        float y = (x[i] > -80.0f ? x[i] : -80.0f) * 1.442695041f;
-        int32_t n = (int32_t)(y - 0.5f);
-        float f = (y - (float)n) * 0.6931471806f;
-        float e = 1.0f + f * (1.0f / 7.0f);
-        e = 1.0f + f * (1.0f / 6.0f) * e;
-        e = 1.0f + f * (1.0f / 5.0f) * e;
-        e = 1.0f + f * (1.0f / 4.0f) * e;
-        e = 1.0f + f * (1.0f / 3.0f) * e;
-        e = 1.0f + f * (1.0f / 2.0f) * e;
-        e = 1.0f + f * e;
-        union {
-            uint32_t bits;
-            float value;
-        } power = {.bits = (uint32_t)(n + 127) << 23};
-        x[i] = e * power.value;
-    }
-}
-
-/* The filter along the way of the sections' noise, added to their signal. Light has shot noise: the
- * squares of the filter average a line's over 1 / (sqrt(3 pi) S) px of it, whose electrons are the
- * output times the noise of a pixel. */
-static void add_noise(const bst_generator *g, const struct generator_streaks *w, section *s,
-                      int count) {
-    float shot = (float)(1.0 / (sqrt(3.0 * BST_PI) * g->total_sigma * g->noise_e));
-    int top = w->reach + 1;
-    for (int k = 0; k < count; k++) {
-        float sum[WIDE] = {0.0f};
-        for (int i = -w->reach; i <= w->reach; i++) {
-            int n = k + i;
-            /* the way leaves no more than a row a step */
-            int row = n >= 0 && n < count ? s[k].middle - s[n].middle + top : -1;
-            if (row >= 0 && row <= 2 * top) {
-                for (int r = 0; r < WIDE; r++) {
-                    sum[r] += w->taps[i + w->reach] * s[n].noise[row + r];
-                }
-            }
-        }
-        for (int r = 0; r < WIDE; r++) {
-            float light = s[k].output[r];
-            s[k].output[r] = light + sum[r] * sqrtf(1.0f + shot * (light > 0.0f ? light : 0.0f));
-        }
-    }
-}
 
 static float output_at(const section *s, int count, int k, int across) {
     int r = k >= 0 && k < count ? across - s[k].middle + ROWS : -1;
@@ -297,34 +129,49 @@ static void keep_highest(bst_generator *g, const section *s, int count, bool by_
     }
 }
 
-/* Where the way turns, light of both of its parts is one ridge. */
-static void report(bst_generator *g, const generator_source *source) {
+static bst_status push(bst_ctx *ctx, int **items, int *count, int *room, int value) {
+    if (*count == *room) {
+        int more = 2 * *room + 4096;
+        int *moved = realloc(*items, (size_t)more * sizeof *moved);
+        if (!moved) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d pixels of streaks", more);
+        }
+        *items = moved;
+        *room = more;
+    }
+    (*items)[(*count)++] = value;
+    return BST_OK;
+}
+
+/* Where the way turns, light of both of its parts is one ridge; and where two streaks run together,
+ * both show the same maximum: it is the brighter's. */
+static bst_status report(bst_ctx *ctx, bst_generator *g, const generator_source *source) {
     struct generator_streaks *w = g->streaks;
     int reach = reach_of(g);
     for (int i = 0; i < w->kept_count; i++) {
         const maximum *m = &w->kept[i];
-        bool alone = true;
+        int pixel = m->y * g->width + m->x;
+        bool alone = !w->taken[pixel];
         for (int k = 0; k < w->kept_count && alone; k++) {
             const maximum *o = &w->kept[k];
             alone = o->part == m->part || o->value <= m->value || abs(o->x - m->x) > reach ||
                     abs(o->y - m->y) > reach;
         }
         if (alone) {
+            w->taken[pixel] = 1;
+            BST_TRY(push(ctx, &w->reported, &w->reported_count, &w->reported_room, pixel));
             bst_generator_keep_rough(g, m->x, m->y, (double)m->value, source->item);
         }
     }
+    return BST_OK;
 }
 
-/* A part of the way that runs more along one axis, one way. Its nodes become sections. */
-static void run_part(bst_generator *g, const generator_source *source, const bst_route_node *nodes,
-                     int count, bool by_row, int number) {
+/* Sections of a part of the way that runs more along one axis, one way; their number. */
+static int make_sections(bst_generator *g, const generator_source *source,
+                         const bst_route_node *nodes, int count, bool by_row) {
     struct generator_streaks *w = g->streaks;
-    section *s = w->sections;
-    double height = source->amplitude, scale = 0.25 / (g->total_sigma * g->total_sigma);
-    /* the background that was found is too much by this */
-    double taken = g->background_bias_e / (bst_bound_norm(&g->bound, 0.0) * g->noise_e);
-    int made = 0, outside = w->reach + 1;
-    int wide = by_row ? g->height : g->width;
+    double fall = 0.25 / (g->total_sigma * g->total_sigma);
+    int made = 0, outside = w->noise.reach + 1, wide = by_row ? g->height : g->width;
     double from = by_row ? nodes[0].y : nodes[0].x;
     double to = by_row ? nodes[count - 1].y : nodes[count - 1].x, way = to > from ? 1.0 : -1.0;
     double at = way > 0.0 ? ceil(from) : floor(from);
@@ -340,39 +187,97 @@ static void run_part(bst_generator *g, const generator_source *source, const bst
             if (at < -outside || at > wide + outside) {
                 continue;
             }
-            section *now = &s[made++];
+            section *now = &w->sections[made++];
             now->at = (int)at;
             now->middle = (int)lround(across);
-            now->height = (float)(height * (n->light + part * (m->light - n->light)));
-            float *light = &w->light[(made - 1) * WIDE];
-            for (int r = -ROWS; r <= ROWS; r++) {
-                double d = now->middle + r - across;
-                light[r + ROWS] = (float)(-scale * d * d * slant);
-            }
+            now->height = (float)(source->amplitude * (n->light + part * (m->light - n->light)));
+            now->off = (float)(across - now->middle);
+            now->fall = (float)(fall * slant);
         }
     }
+    return made;
+}
+
+/* Light of the sections on the rows about them, into w->light. */
+static void light_rows(struct generator_streaks *w, int count, int rows) {
+    int wide = 2 * rows + 1;
+    for (int k = 0; k < count; k++) {
+        const section *s = &w->sections[k];
+        for (int r = 0; r < wide; r++) {
+            float d = (float)(r - rows) - s->off;
+            w->light[k * wide + r] = -s->fall * d * d;
+        }
+    }
+    bst_streak_exponentials(w->light, count * wide);
+    for (int k = 0; k < count; k++) {
+        for (int r = 0; r < wide; r++) {
+            w->light[k * wide + r] *= w->sections[k].height;
+        }
+    }
+}
+
+/* Pixel of the frame of a section's row, -1: outside. */
+static int pixel_of(const bst_generator *g, bool by_row, int at, int across) {
+    int x = by_row ? across : at, y = by_row ? at : across;
+    return x >= 0 && y >= 0 && x < g->width && y < g->height ? y * g->width + x : -1;
+}
+
+/* Adds the light of a part of the way to the map. */
+static bst_status lay_part(bst_ctx *ctx, bst_generator *g, const generator_source *source,
+                           const bst_route_node *nodes, int count, bool by_row) {
+    struct generator_streaks *w = g->streaks;
+    int made = make_sections(g, source, nodes, count, by_row);
+    light_rows(w, made, LIGHT_ROWS);
+    for (int k = 0; k < made; k++) {
+        const section *s = &w->sections[k];
+        for (int r = 0; r < LIGHT_WIDE; r++) {
+            int pixel = pixel_of(g, by_row, s->at, s->middle + r - LIGHT_ROWS);
+            if (pixel < 0) {
+                continue;
+            }
+            if (w->map[pixel] == 0.0f) {
+                BST_TRY(push(ctx, &w->touched, &w->touched_count, &w->touched_room, pixel));
+            }
+            w->map[pixel] += w->light[k * LIGHT_WIDE + r];
+        }
+    }
+    return BST_OK;
+}
+
+/* Maxima along a part of the way. */
+static void search_part(bst_generator *g, const generator_source *source,
+                        const bst_route_node *nodes, int count, bool by_row, int number) {
+    struct generator_streaks *w = g->streaks;
+    section *s = w->sections;
+    int made = make_sections(g, source, nodes, count, by_row);
     if (made < 2) {
         return;
     }
-    exponentials(w->light, made * WIDE);
+    /* the background that was found is too much by this */
+    double taken = g->background_bias_e / (bst_bound_norm(&g->bound, 0.0) * g->noise_e);
+    light_rows(w, made, ROWS);
     for (int k = 0; k < made; k++) {
         for (int r = 0; r < WIDE; r++) {
-            s[k].output[r] = s[k].height * w->light[k * WIDE + r] - (float)taken;
+            int pixel = pixel_of(g, by_row, s[k].at, s[k].middle + r - ROWS);
+            float light = pixel >= 0 ? w->map[pixel] : w->light[k * WIDE + r];
+            s[k].output[r] = light - (float)taken;
         }
     }
-    fill_noise(g, w, by_row, s, made);
-    add_noise(g, w, s, made);
+    /* the squares of the filter average a line's electrons over 1 / (sqrt(3 pi) S) px of it; they
+     * are the output times the noise of a pixel */
+    double shot = 1.0 / (sqrt(3.0 * BST_PI) * g->total_sigma * g->noise_e);
+    bst_streak_noise_add(&w->noise, g->key, g->exposure_id, by_row, shot, s, made);
     int found = find_maxima(g, s, made, by_row, number, w->maxima);
     keep_highest(g, s, made, by_row, w->maxima, found);
 }
 
-/* The same where light comes near enough to the threshold, and as far about it as noise is
- * filtered.
- */
-static void run_bright(bst_generator *g, const generator_source *source,
-                       const bst_route_node *nodes, int count, bool by_row, int number) {
-    double least = (g->threshold - FAINTEST_SIGMA) / source->amplitude;
-    int margin = 2 * g->streaks->reach + 4;
+/* A part of the way where its light is at least so much, and as far about it: its light is laid, or
+ * its maxima are searched for. */
+static bst_status do_bright(bst_ctx *ctx, bst_generator *g, const generator_source *source,
+                            const bst_route_node *nodes, int count, bool by_row, int number,
+                            bool lay) {
+    double least = (lay ? LEAST_LIGHT : g->threshold - FAINTEST_SIGMA) / source->amplitude;
+    int margin = lay ? 1 : 2 * g->streaks->noise.reach + 4;
     for (int first = 0; first < count;) {
         while (first < count && nodes[first].light < least) {
             first++;
@@ -384,10 +289,15 @@ static void run_bright(bst_generator *g, const generator_source *source,
         if (first < count) {
             int from = first > margin ? first - margin : 0;
             int to = last + margin < count ? last + margin : count - 1;
-            run_part(g, source, nodes + from, to - from + 1, by_row, number + from);
+            if (lay) {
+                BST_TRY(lay_part(ctx, g, source, nodes + from, to - from + 1, by_row));
+            } else {
+                search_part(g, source, nodes + from, to - from + 1, by_row, number + from);
+            }
         }
         first = seen;
     }
+    return BST_OK;
 }
 
 /* Where the way goes from a node on; it trembles from one to the next. */
@@ -407,36 +317,48 @@ static bool comes_in(const bst_generator *g, const generator_source *s) {
            s->y + g->route_box[3] > -margin_y && s->y + g->route_box[2] < g->height + margin_y;
 }
 
-bst_status bst_generator_fragments(bst_ctx *ctx, bst_generator *g, const generator_source *source) {
-    if (source->amplitude * g->route_top < g->threshold - FAINTEST_SIGMA || !comes_in(g, source)) {
+/* The stars' way in the middle of the frame, turned into this source's by what its own ends differ;
+ * or its own, where it moves otherwise. Its nodes are g->way; their number. */
+static int way_of(bst_generator *g, const generator_source *source) {
+    double dx = source->path.dx - g->whole_path.dx, dy = source->path.dy - g->whole_path.dy;
+    bst_route_node *way = g->way;
+    int count = g->route_count;
+    if (!source->star && hypot(dx, dy) > OWN_WAY_PX) {
+        for (int k = 0; k < g->path.count; k++) {
+            double u = (double)k / (g->path.count - 1) - 0.5;
+            g->object_x[k] = g->path_x[k] + u * dx;
+            g->object_y[k] = g->path_y[k] + u * dy;
+        }
+        const bst_route_path own = {g->object_x, g->object_y, g->path.count};
+        count = bst_route_lay(&own, g->total_sigma, way);
+        dx = dy = 0.0;
+    } else {
+        memcpy(way, g->route, (size_t)count * sizeof *way);
+    }
+    for (int i = 0; i < count; i++) {
+        double u = way[i].time - 0.5;
+        way[i].x += source->x + u * dx;
+        way[i].y += source->y + u * dy;
+    }
+    return count;
+}
+
+static bst_status do_source(bst_ctx *ctx, bst_generator *g, const generator_source *source,
+                            bool lay) {
+    double least = lay ? LEAST_LIGHT : g->threshold - FAINTEST_SIGMA;
+    if ((source->star && source->amplitude * g->route_top < least) || !comes_in(g, source)) {
         return BST_OK;
     }
-    if (!g->streaks) {
-        g->streaks = calloc(1, sizeof *g->streaks);
-        if (!g->streaks) {
-            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for long streaks");
-        }
-        set_normals(g->streaks->normals);
-    }
-    set_taps(g->streaks, g->total_sigma);
-    /* the stars' way in the middle of the frame, turned into this source's by what its own ends
-     * differ */
-    bst_route_node *way = g->way;
-    for (int i = 0; i < g->route_count; i++) {
-        const bst_route_node *n = &g->route[i];
-        double u = n->time - 0.5;
-        way[i] = *n;
-        way[i].x += source->x + u * (source->path.dx - g->whole_path.dx);
-        way[i].y += source->y + u * (source->path.dy - g->whole_path.dy);
-    }
+    int count = way_of(g, source);
+    const bst_route_node *way = g->way;
     g->streaks->kept_count = 0;
-    for (int first = 0, end; first + 1 < g->route_count; first = end) {
+    for (int first = 0, end; first + 1 < count; first = end) {
         double dx, dy;
-        course(way, g->route_count, first, &dx, &dy);
+        course(way, count, first, &dx, &dy);
         bool by_row = fabs(dy) > fabs(dx);
-        for (end = first + 1; end + 1 < g->route_count; end++) {
+        for (end = first + 1; end + 1 < count; end++) {
             double ex, ey;
-            course(way, g->route_count, end, &ex, &ey);
+            course(way, count, end, &ex, &ey);
             /* a little past the diagonal is no reason to part it */
             bool same = by_row ? ey * dy > 0.0 && fabs(ey) > 0.6 * fabs(ex)
                                : ex * dx > 0.0 && fabs(ex) > 0.6 * fabs(ey);
@@ -444,8 +366,60 @@ bst_status bst_generator_fragments(bst_ctx *ctx, bst_generator *g, const generat
                 break;
             }
         }
-        run_bright(g, source, way + first, end - first + 1, by_row, first);
+        BST_TRY(do_bright(ctx, g, source, way + first, end - first + 1, by_row, first, lay));
     }
-    report(g, source);
-    return BST_OK;
+    return lay ? BST_OK : report(ctx, g, source);
+}
+
+static bst_status prepare(bst_ctx *ctx, bst_generator *g) {
+    if (!g->streaks) {
+        g->streaks = calloc(1, sizeof *g->streaks);
+        if (!g->streaks) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for long streaks");
+        }
+        bst_streak_noise_init(&g->streaks->noise);
+    }
+    struct generator_streaks *w = g->streaks;
+    bst_streak_noise_set(&w->noise, g->total_sigma);
+    if (g->width * g->height > w->map_room) {
+        size_t room = (size_t)g->width * (size_t)g->height;
+        free(w->map);
+        free(w->taken);
+        w->map = calloc(room, sizeof *w->map);
+        w->taken = calloc(room, sizeof *w->taken);
+        w->map_room = w->map && w->taken ? (int)room : 0;
+    }
+    return w->map_room > 0 ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory for long streaks");
+}
+
+bst_status bst_generator_fragments(bst_ctx *ctx, bst_generator *g) {
+    BST_TRY(prepare(ctx, g));
+    struct generator_streaks *w = g->streaks;
+    bst_status status = BST_OK;
+    for (int pass = 0; pass < 2; pass++) {
+        for (int r = 0; r < g->rank_count && status == BST_OK; r++) {
+            const generator_source *source = &g->sources[g->ranks[r].index];
+            if (source->broken) {
+                status = do_source(ctx, g, source, pass == 0);
+            }
+        }
+    }
+    for (int i = 0; i < w->touched_count; i++) {
+        w->map[w->touched[i]] = 0.0f;
+    }
+    for (int i = 0; i < w->reported_count; i++) {
+        w->taken[w->reported[i]] = 0;
+    }
+    w->touched_count = w->reported_count = 0;
+    return status;
+}
+
+void bst_generator_free_streaks(struct generator_streaks *w) {
+    if (w) {
+        free(w->map);
+        free(w->taken);
+        free(w->touched);
+        free(w->reported);
+        free(w);
+    }
 }
