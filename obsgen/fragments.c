@@ -24,30 +24,29 @@ enum {
     WIDE = BST_STREAK_WIDE,
     LIGHT_ROWS = 4,
     LIGHT_WIDE = 2 * LIGHT_ROWS + 1,
-    MOST_MAXIMA = 2048
 };
 
 typedef bst_streak_section section;
 
 typedef struct maximum {
-    int x, y, section, part; /* part: of the way */
+    int x, y, item, order; /* order: in which it was found */
     float value;
-    bool dropped;
 } maximum;
+
+/* The filter's output on a pixel that streaks reach. */
+typedef struct pixel {
+    float light;  /* of all streaks */
+    float output; /* with noise; 0: not made */
+} pixel;
 
 struct generator_streaks {
     section sections[BST_ROUTE_NODES];
-    maximum maxima[MOST_MAXIMA]; /* of one part of the way */
-    maximum kept[MOST_MAXIMA];   /* of the whole */
-    int kept_count;
+    float light[BST_ROUTE_NODES * LIGHT_WIDE]; /* of the sections' rows */
     bst_streak_noise noise;
-    float light[BST_ROUTE_NODES * LIGHT_WIDE]; /* of the sections' rows, over their height */
-    /* light of all streaks on the frame's pixels, which of them have some, and those that a maximum
-     * was reported at */
-    float *map;
-    unsigned char *taken;
-    int *touched, *reported;
-    int map_room, touched_count, touched_room, reported_count, reported_room;
+    pixel *map; /* the frame; [touched] of it are not zero */
+    int *touched;
+    maximum *maxima;
+    int map_room, touched_count, touched_room, maxima_count, maxima_room;
 };
 
 static float output_at(const section *s, int count, int k, int across) {
@@ -55,9 +54,34 @@ static float output_at(const section *s, int count, int k, int across) {
     return r >= 0 && r <= 2 * ROWS ? s[k].output[r] : -INFINITY;
 }
 
-static int find_maxima(const bst_generator *g, const section *s, int count, bool by_row, int part,
-                       maximum *out) {
-    int found = 0, wide = by_row ? g->height : g->width, high = by_row ? g->width : g->height;
+static bst_status grow(bst_ctx *ctx, void **items, int count, int *room, size_t bytes) {
+    if (count < *room) {
+        return BST_OK;
+    }
+    int more = 2 * *room + 1024;
+    void *moved = realloc(*items, (size_t)more * bytes);
+    if (!moved) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d pixels of streaks", more);
+    }
+    *items = moved;
+    *room = more;
+    return BST_OK;
+}
+
+static bst_status touch(bst_ctx *ctx, struct generator_streaks *w, int at) {
+    if (w->map[at].light != 0.0f || w->map[at].output != 0.0f) {
+        return BST_OK;
+    }
+    BST_TRY(
+        grow(ctx, (void **)&w->touched, w->touched_count, &w->touched_room, sizeof *w->touched));
+    w->touched[w->touched_count++] = at;
+    return BST_OK;
+}
+
+static bst_status find_maxima(bst_ctx *ctx, bst_generator *g, const section *s, int count,
+                              bool by_row, int item) {
+    struct generator_streaks *w = g->streaks;
+    int wide = by_row ? g->height : g->width, high = by_row ? g->width : g->height;
     for (int k = 0; k < count; k++) {
         for (int r = -ROWS + 1; r < ROWS && s[k].at >= 0 && s[k].at < wide; r++) {
             int across = s[k].middle + r;
@@ -68,102 +92,71 @@ static int find_maxima(const bst_generator *g, const section *s, int count, bool
                     top = (i == 0 && j == 0) || value > output_at(s, count, k + i, across + j);
                 }
             }
-            if (top && found < MOST_MAXIMA) {
-                out[found++] = (maximum){.x = by_row ? across : s[k].at,
-                                         .y = by_row ? s[k].at : across,
-                                         .section = k,
-                                         .part = part,
-                                         .value = value};
+            if (top) {
+                BST_TRY(grow(ctx, (void **)&w->maxima, w->maxima_count, &w->maxima_room,
+                             sizeof *w->maxima));
+                w->maxima[w->maxima_count] = (maximum){.x = by_row ? across : s[k].at,
+                                                       .y = by_row ? s[k].at : across,
+                                                       .item = item,
+                                                       .order = w->maxima_count,
+                                                       .value = value};
+                w->maxima_count++;
             }
         }
     }
-    return found;
+    return BST_OK;
 }
 
 /* Whether the output stays above `least` on the pixels between two maxima. */
-static bool is_ridge(const section *s, int count, bool by_row, const maximum *a, const maximum *b,
-                     float least) {
+static bool is_ridge(const bst_generator *g, const maximum *a, const maximum *b, float least) {
     int dx = b->x - a->x, dy = b->y - a->y;
     int steps = abs(dx) > abs(dy) ? abs(dx) : abs(dy);
     for (int i = 1; i < steps; i++) {
         float t = (float)i / (float)steps;
         int x = a->x + (int)lroundf(t * (float)dx), y = a->y + (int)lroundf(t * (float)dy);
-        int at = by_row ? y : x, first = by_row ? a->y : a->x;
-        int way = s[1].at > s[0].at ? 1 : -1;
-        if (!(output_at(s, count, a->section + way * (at - first), by_row ? x : y) > least)) {
+        if (!(g->streaks->map[y * g->width + x].output > least)) {
             return false;
         }
     }
     return true;
 }
 
-/* Half the side of the box in which maxima compete. */
-static int reach_of(const bst_generator *g) {
-    return (int)ceil(6.0 * g->sigma) + 2;
+/* By place; of one that several streaks show, the brightest's first. */
+static int by_place(const void *a, const void *b) {
+    const maximum *p = a, *q = b;
+    if (p->y != q->y) {
+        return p->y < q->y ? -1 : 1;
+    }
+    if (p->x != q->x) {
+        return p->x < q->x ? -1 : 1;
+    }
+    return p->order < q->order ? -1 : 1;
 }
 
-/* Keeps what no higher maximum in a box about it shares a ridge with. */
-static void keep_highest(bst_generator *g, const section *s, int count, bool by_row,
-                         maximum *maxima, int found) {
-    int reach = reach_of(g);
-    for (int i = 0; i < found; i++) {
-        maximum *m = &maxima[i];
-        double least = m->value - fmax(SADDLE_SIGMA, SADDLE_SHARE * m->value);
-        for (int way = -1; way <= 1 && !m->dropped; way += 2) {
-            for (int k = i + way; k >= 0 && k < found && !m->dropped; k += way) {
-                const maximum *o = &maxima[k];
-                if (abs(o->section - m->section) > reach) {
+/* Reports what no higher maximum in a box about it shares a ridge with. */
+static void report(bst_generator *g) {
+    struct generator_streaks *w = g->streaks;
+    int reach = (int)ceil(6.0 * g->sigma) + 2;
+    qsort(w->maxima, (size_t)w->maxima_count, sizeof *w->maxima, by_place);
+    for (int i = 0; i < w->maxima_count; i++) {
+        const maximum *m = &w->maxima[i];
+        bool kept = i == 0 || m->x != m[-1].x || m->y != m[-1].y;
+        double saddle = m->value - fmax(SADDLE_SIGMA, SADDLE_SHARE * m->value);
+        float least = (float)fmax(saddle, g->threshold);
+        for (int way = -1; way <= 1 && kept; way += 2) {
+            for (int k = i + way; k >= 0 && k < w->maxima_count && kept; k += way) {
+                const maximum *o = &w->maxima[k];
+                if (abs(o->y - m->y) > reach) {
                     break;
                 }
-                m->dropped = o->value > m->value && abs(o->x - m->x) <= reach &&
-                             abs(o->y - m->y) <= reach &&
-                             is_ridge(s, count, by_row, m, o, (float)fmax(least, g->threshold));
+                kept =
+                    !(o->value > m->value) || abs(o->x - m->x) > reach || !is_ridge(g, m, o, least);
             }
         }
-    }
-    struct generator_streaks *w = g->streaks;
-    for (int i = 0; i < found; i++) {
-        if (!maxima[i].dropped && w->kept_count < MOST_MAXIMA) {
-            w->kept[w->kept_count++] = maxima[i];
+        if (kept) {
+            bst_generator_keep_rough(g, m->x, m->y, (double)m->value, m->item);
         }
     }
-}
-
-static bst_status push(bst_ctx *ctx, int **items, int *count, int *room, int value) {
-    if (*count == *room) {
-        int more = 2 * *room + 4096;
-        int *moved = realloc(*items, (size_t)more * sizeof *moved);
-        if (!moved) {
-            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d pixels of streaks", more);
-        }
-        *items = moved;
-        *room = more;
-    }
-    (*items)[(*count)++] = value;
-    return BST_OK;
-}
-
-/* Where the way turns, light of both of its parts is one ridge; and where two streaks run together,
- * both show the same maximum: it is the brighter's. */
-static bst_status report(bst_ctx *ctx, bst_generator *g, const generator_source *source) {
-    struct generator_streaks *w = g->streaks;
-    int reach = reach_of(g);
-    for (int i = 0; i < w->kept_count; i++) {
-        const maximum *m = &w->kept[i];
-        int pixel = m->y * g->width + m->x;
-        bool alone = !w->taken[pixel];
-        for (int k = 0; k < w->kept_count && alone; k++) {
-            const maximum *o = &w->kept[k];
-            alone = o->part == m->part || o->value <= m->value || abs(o->x - m->x) > reach ||
-                    abs(o->y - m->y) > reach;
-        }
-        if (alone) {
-            w->taken[pixel] = 1;
-            BST_TRY(push(ctx, &w->reported, &w->reported_count, &w->reported_room, pixel));
-            bst_generator_keep_rough(g, m->x, m->y, (double)m->value, source->item);
-        }
-    }
-    return BST_OK;
 }
 
 /* Sections of a part of the way that runs more along one axis, one way; their number. */
@@ -231,35 +224,32 @@ static bst_status lay_part(bst_ctx *ctx, bst_generator *g, const generator_sourc
     for (int k = 0; k < made; k++) {
         const section *s = &w->sections[k];
         for (int r = 0; r < LIGHT_WIDE; r++) {
-            int pixel = pixel_of(g, by_row, s->at, s->middle + r - LIGHT_ROWS);
-            if (pixel < 0) {
-                continue;
+            int at = pixel_of(g, by_row, s->at, s->middle + r - LIGHT_ROWS);
+            if (at >= 0) {
+                BST_TRY(touch(ctx, w, at));
+                w->map[at].light += w->light[k * LIGHT_WIDE + r];
             }
-            if (w->map[pixel] == 0.0f) {
-                BST_TRY(push(ctx, &w->touched, &w->touched_count, &w->touched_room, pixel));
-            }
-            w->map[pixel] += w->light[k * LIGHT_WIDE + r];
         }
     }
     return BST_OK;
 }
 
 /* Maxima along a part of the way. */
-static void search_part(bst_generator *g, const generator_source *source,
-                        const bst_route_node *nodes, int count, bool by_row, int number) {
+static bst_status search_part(bst_ctx *ctx, bst_generator *g, const generator_source *source,
+                              const bst_route_node *nodes, int count, bool by_row) {
     struct generator_streaks *w = g->streaks;
     section *s = w->sections;
     int made = make_sections(g, source, nodes, count, by_row);
     if (made < 2) {
-        return;
+        return BST_OK;
     }
     /* the background that was found is too much by this */
     double taken = g->background_bias_e / (bst_bound_norm(&g->bound, 0.0) * g->noise_e);
     light_rows(w, made, ROWS);
     for (int k = 0; k < made; k++) {
         for (int r = 0; r < WIDE; r++) {
-            int pixel = pixel_of(g, by_row, s[k].at, s[k].middle + r - ROWS);
-            float light = pixel >= 0 ? w->map[pixel] : w->light[k * WIDE + r];
+            int at = pixel_of(g, by_row, s[k].at, s[k].middle + r - ROWS);
+            float light = at >= 0 ? w->map[at].light : w->light[k * WIDE + r];
             s[k].output[r] = light - (float)taken;
         }
     }
@@ -267,15 +257,22 @@ static void search_part(bst_generator *g, const generator_source *source,
      * are the output times the noise of a pixel */
     double shot = 1.0 / (sqrt(3.0 * BST_PI) * g->total_sigma * g->noise_e);
     bst_streak_noise_add(&w->noise, g->key, g->exposure_id, by_row, shot, s, made);
-    int found = find_maxima(g, s, made, by_row, number, w->maxima);
-    keep_highest(g, s, made, by_row, w->maxima, found);
+    for (int k = 0; k < made; k++) {
+        for (int r = 0; r < WIDE; r++) {
+            int at = pixel_of(g, by_row, s[k].at, s[k].middle + r - ROWS);
+            if (at >= 0) {
+                BST_TRY(touch(ctx, w, at));
+                w->map[at].output = s[k].output[r];
+            }
+        }
+    }
+    return find_maxima(ctx, g, s, made, by_row, source->item);
 }
 
 /* A part of the way where its light is at least so much, and as far about it: its light is laid, or
  * its maxima are searched for. */
 static bst_status do_bright(bst_ctx *ctx, bst_generator *g, const generator_source *source,
-                            const bst_route_node *nodes, int count, bool by_row, int number,
-                            bool lay) {
+                            const bst_route_node *nodes, int count, bool by_row, bool lay) {
     double least = (lay ? LEAST_LIGHT : g->threshold - FAINTEST_SIGMA) / source->amplitude;
     int margin = lay ? 1 : 2 * g->streaks->noise.reach + 4;
     for (int first = 0; first < count;) {
@@ -289,11 +286,8 @@ static bst_status do_bright(bst_ctx *ctx, bst_generator *g, const generator_sour
         if (first < count) {
             int from = first > margin ? first - margin : 0;
             int to = last + margin < count ? last + margin : count - 1;
-            if (lay) {
-                BST_TRY(lay_part(ctx, g, source, nodes + from, to - from + 1, by_row));
-            } else {
-                search_part(g, source, nodes + from, to - from + 1, by_row, number + from);
-            }
+            BST_TRY((lay ? lay_part : search_part)(ctx, g, source, nodes + from, to - from + 1,
+                                                   by_row));
         }
         first = seen;
     }
@@ -351,7 +345,6 @@ static bst_status do_source(bst_ctx *ctx, bst_generator *g, const generator_sour
     }
     int count = way_of(g, source);
     const bst_route_node *way = g->way;
-    g->streaks->kept_count = 0;
     for (int first = 0, end; first + 1 < count; first = end) {
         double dx, dy;
         course(way, count, first, &dx, &dy);
@@ -366,9 +359,9 @@ static bst_status do_source(bst_ctx *ctx, bst_generator *g, const generator_sour
                 break;
             }
         }
-        BST_TRY(do_bright(ctx, g, source, way + first, end - first + 1, by_row, first, lay));
+        BST_TRY(do_bright(ctx, g, source, way + first, end - first + 1, by_row, lay));
     }
-    return lay ? BST_OK : report(ctx, g, source);
+    return BST_OK;
 }
 
 static bst_status prepare(bst_ctx *ctx, bst_generator *g) {
@@ -384,10 +377,8 @@ static bst_status prepare(bst_ctx *ctx, bst_generator *g) {
     if (g->width * g->height > w->map_room) {
         size_t room = (size_t)g->width * (size_t)g->height;
         free(w->map);
-        free(w->taken);
         w->map = calloc(room, sizeof *w->map);
-        w->taken = calloc(room, sizeof *w->taken);
-        w->map_room = w->map && w->taken ? (int)room : 0;
+        w->map_room = w->map ? (int)room : 0;
     }
     return w->map_room > 0 ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory for long streaks");
 }
@@ -404,22 +395,21 @@ bst_status bst_generator_fragments(bst_ctx *ctx, bst_generator *g) {
             }
         }
     }
+    if (status == BST_OK) {
+        report(g);
+    }
     for (int i = 0; i < w->touched_count; i++) {
-        w->map[w->touched[i]] = 0.0f;
+        w->map[w->touched[i]] = (pixel){0.0f, 0.0f};
     }
-    for (int i = 0; i < w->reported_count; i++) {
-        w->taken[w->reported[i]] = 0;
-    }
-    w->touched_count = w->reported_count = 0;
+    w->touched_count = w->maxima_count = 0;
     return status;
 }
 
 void bst_generator_free_streaks(struct generator_streaks *w) {
     if (w) {
         free(w->map);
-        free(w->taken);
         free(w->touched);
-        free(w->reported);
+        free(w->maxima);
         free(w);
     }
 }
