@@ -10,11 +10,14 @@
 
 /* As image processing tells maxima apart. */
 static const double SADDLE_SIGMA = 3.0, SADDLE_SHARE = 0.15;
-/* What stays further below the threshold is seen as often as noise alone, which has its own draws.
- */
-static const double FAINTEST_SIGMA = 4.0;
-/* Light below this counts for no other streak. */
-static const double LEAST_LIGHT = 0.4;
+/* What stays further below the threshold is seen here and there: the places are drawn. */
+static const double FAINTEST_SIGMA = 3.0;
+/* Light below this counts for no other streak, and below SEEN it adds no alarms. */
+static const double LEAST_LIGHT = 0.4, LEAST_SEEN = 0.05;
+/* Share of the light on a pixel from which on a source looks there itself. */
+static const double OWN_SHARE = 0.3;
+/* Draws of faint streaks; those of other clutter stay below. */
+static const uint64_t FAINT_STREAK = (uint64_t)1 << 59;
 /* A source whose path differs more from the stars' has a way of its own. */
 static const double OWN_WAY_PX = 1.0;
 
@@ -24,12 +27,16 @@ enum {
     WIDE = BST_STREAK_WIDE,
     LIGHT_ROWS = 4,
     LIGHT_WIDE = 2 * LIGHT_ROWS + 1,
+    /* of the tables below: outputs in steps of 1/8 from 1, lights in steps of 1/8 */
+    OUTPUTS = 64,
+    LIGHTS = 48,
 };
 
 typedef bst_streak_section section;
 
 typedef struct maximum {
     int x, y, item, order; /* order: in which it was found */
+    bool by_row;
     float value;
 } maximum;
 
@@ -43,7 +50,10 @@ struct generator_streaks {
     section sections[BST_ROUTE_NODES];
     float light[BST_ROUTE_NODES * LIGHT_WIDE]; /* of the sections' rows */
     bst_streak_noise noise;
-    pixel *map; /* the frame; [touched] of it are not zero */
+    double shot; /* variance that an output of one adds, by the photons' own noise */
+    double log_maxima[OUTPUTS], maxima_sigma; /* logarithm of maxima per pixel above an output */
+    double alarms[LIGHTS]; /* more of them than noise alone makes, per pixel of the way */
+    pixel *map;            /* the frame; [touched] of it are not zero */
     int *touched;
     maximum *maxima;
     int map_room, touched_count, touched_room, maxima_count, maxima_room;
@@ -99,6 +109,7 @@ static bst_status find_maxima(bst_ctx *ctx, bst_generator *g, const section *s, 
                                                        .y = by_row ? s[k].at : across,
                                                        .item = item,
                                                        .order = w->maxima_count,
+                                                       .by_row = by_row,
                                                        .value = value};
                 w->maxima_count++;
             }
@@ -149,8 +160,9 @@ static void report(bst_generator *g) {
                 if (abs(o->y - m->y) > reach) {
                     break;
                 }
-                kept =
-                    !(o->value > m->value) || abs(o->x - m->x) > reach || !is_ridge(g, m, o, least);
+                /* where a way turns, light of both of its parts is one ridge */
+                kept = !(o->value > m->value) || abs(o->x - m->x) > reach ||
+                       (o->by_row == m->by_row && !is_ridge(g, m, o, least));
             }
         }
         if (kept) {
@@ -234,6 +246,11 @@ static bst_status lay_part(bst_ctx *ctx, bst_generator *g, const generator_sourc
     return BST_OK;
 }
 
+/* The background that was found is too much by this, in the filter's output. */
+static double taken_of(const bst_generator *g) {
+    return g->background_bias_e / (bst_bound_norm(&g->bound, 0.0) * g->noise_e);
+}
+
 /* Maxima along a part of the way. */
 static bst_status search_part(bst_ctx *ctx, bst_generator *g, const generator_source *source,
                               const bst_route_node *nodes, int count, bool by_row) {
@@ -243,8 +260,7 @@ static bst_status search_part(bst_ctx *ctx, bst_generator *g, const generator_so
     if (made < 2) {
         return BST_OK;
     }
-    /* the background that was found is too much by this */
-    double taken = g->background_bias_e / (bst_bound_norm(&g->bound, 0.0) * g->noise_e);
+    double taken = taken_of(g);
     light_rows(w, made, ROWS);
     for (int k = 0; k < made; k++) {
         for (int r = 0; r < WIDE; r++) {
@@ -253,10 +269,7 @@ static bst_status search_part(bst_ctx *ctx, bst_generator *g, const generator_so
             s[k].output[r] = light - (float)taken;
         }
     }
-    /* the squares of the filter average a line's electrons over 1 / (sqrt(3 pi) S) px of it; they
-     * are the output times the noise of a pixel */
-    double shot = 1.0 / (sqrt(3.0 * BST_PI) * g->total_sigma * g->noise_e);
-    bst_streak_noise_add(&w->noise, g->key, g->exposure_id, by_row, shot, s, made);
+    bst_streak_noise_add(&w->noise, g->key, g->exposure_id, by_row, w->shot, s, made);
     for (int k = 0; k < made; k++) {
         for (int r = 0; r < WIDE; r++) {
             int at = pixel_of(g, by_row, s[k].at, s[k].middle + r - ROWS);
@@ -269,27 +282,117 @@ static bst_status search_part(bst_ctx *ctx, bst_generator *g, const generator_so
     return find_maxima(ctx, g, s, made, by_row, source->item);
 }
 
-/* A part of the way where its light is at least so much, and as far about it: its light is laid, or
- * its maxima are searched for. */
-static bst_status do_bright(bst_ctx *ctx, bst_generator *g, const generator_source *source,
-                            const bst_route_node *nodes, int count, bool by_row, bool lay) {
-    double least = (lay ? LEAST_LIGHT : g->threshold - FAINTEST_SIGMA) / source->amplitude;
-    int margin = lay ? 1 : 2 * g->streaks->noise.reach + 4;
-    for (int first = 0; first < count;) {
-        while (first < count && nodes[first].light < least) {
-            first++;
+static double log_maxima_above(const struct generator_streaks *w, double output) {
+    double at = fmin(fmax(8.0 * (output - 1.0), 0.0), OUTPUTS - 1.001);
+    int i = (int)at;
+    return w->log_maxima[i] + (at - i) * (w->log_maxima[i + 1] - w->log_maxima[i]);
+}
+
+/* How often light of a way that is below the threshold makes maxima above it. */
+static void set_alarms(bst_generator *g) {
+    struct generator_streaks *w = g->streaks;
+    /* the squares of the filter average a line's electrons over 1 / (sqrt(3 pi) S) px of it; they
+     * are the output times the noise of a pixel */
+    w->shot = 1.0 / (sqrt(3.0 * BST_PI) * g->total_sigma * g->noise_e);
+    if (w->maxima_sigma != g->total_sigma) {
+        for (int i = 0; i < OUTPUTS; i++) {
+            w->log_maxima[i] = log(bst_matched_pixel_maxima(g->total_sigma, 1.0 + i / 8.0));
         }
-        int last = first, seen = first;
-        for (; seen < count && seen <= last + 2 * margin; seen++) {
-            last = nodes[seen].light >= least ? seen : last;
+        w->maxima_sigma = g->total_sigma;
+    }
+    double threshold = g->threshold + taken_of(g), fall = 0.25 / (g->total_sigma * g->total_sigma);
+    double alone = exp(log_maxima_above(w, threshold));
+    for (int i = 0; i < LIGHTS; i++) {
+        w->alarms[i] = 0.0;
+        for (int k = -8; k <= 8; k++) {
+            double d = 0.5 * k, light = i / 8.0 * exp(-fall * d * d);
+            double output = (threshold - light) / sqrt(1.0 + w->shot * light);
+            w->alarms[i] += 0.5 * (exp(log_maxima_above(w, output)) - alone);
         }
-        if (first < count) {
-            int from = first > margin ? first - margin : 0;
-            int to = last + margin < count ? last + margin : count - 1;
-            BST_TRY((lay ? lay_part : search_part)(ctx, g, source, nodes + from, to - from + 1,
-                                                   by_row));
+    }
+}
+
+/* Arrivals along the way of one source. */
+typedef struct arrivals {
+    double next;
+    uint64_t draw;
+} arrivals;
+
+static double draw_exponential(const bst_generator *g, arrivals *a) {
+    return -log(bst_rng_uniform(g->key, (uint64_t)g->exposure_id, a->draw++));
+}
+
+/* Light of all streaks at a node; of the source alone where that is too faint to count for others.
+ */
+static double light_at(const bst_generator *g, const bst_route_node *node, double own) {
+    int at = pixel_of(g, false, (int)lround(node->x), (int)lround(node->y));
+    return at >= 0 ? fmax(g->streaks->map[at].light, own) : own;
+}
+
+/* Alarms that light too faint to be looked at pixel by pixel makes at a node. */
+static void draw_faint(bst_generator *g, const generator_source *source, const bst_route_node *n,
+                       double own, double light, arrivals *a) {
+    const struct generator_streaks *w = g->streaks;
+    double at = fmin(8.0 * light, LIGHTS - 1.001);
+    int i = (int)at;
+    a->next -= own / light * (w->alarms[i] + (at - i) * (w->alarms[i + 1] - w->alarms[i]));
+    while (a->next < 0.0) {
+        a->next += draw_exponential(g, a);
+        double noise = sqrt(1.0 + w->shot * light);
+        double least = (g->threshold + taken_of(g) - light) / noise;
+        double value = sqrt(least * least + 2.0 * draw_exponential(g, a));
+        double off[2];
+        bst_rng_normal2(g->key, (uint64_t)g->exposure_id, a->draw++, off);
+        /* alarms are the likelier, the nearer to the way */
+        double spread = g->total_sigma * sqrt(2.0 / (g->threshold * light + 1.0));
+        int x = (int)lround(n->x + spread * off[0]), y = (int)lround(n->y + spread * off[1]);
+        if (pixel_of(g, false, x, y) >= 0) {
+            bst_generator_keep_rough(g, x, y, g->threshold + noise * (value - least), source->item);
         }
-        first = seen;
+    }
+}
+
+/* Lays the light of a part of the way, where it counts. */
+static bst_status lay_bright(bst_ctx *ctx, bst_generator *g, const generator_source *source,
+                             const bst_route_node *nodes, int count, bool by_row) {
+    double least = LEAST_LIGHT / source->amplitude;
+    for (int first = 0, end; first < count; first = end) {
+        bool counts = nodes[first].light >= least;
+        for (end = first + 1; end < count && (nodes[end].light >= least) == counts; end++) {
+        }
+        if (counts) {
+            int from = first > 0 ? first - 1 : 0, to = end < count ? end : count - 1;
+            BST_TRY(lay_part(ctx, g, source, nodes + from, to - from + 1, by_row));
+        }
+    }
+    return BST_OK;
+}
+
+/* Looks for maxima in a part of the way: pixel by pixel where light is bright enough, and as far
+ * about that as noise is filtered. */
+static bst_status search_bright(bst_ctx *ctx, bst_generator *g, const generator_source *source,
+                                const bst_route_node *nodes, int count, bool by_row, arrivals *a) {
+    double least = g->threshold - FAINTEST_SIGMA;
+    int margin = 2 * g->streaks->noise.reach + 4, from = -1, last = -1;
+    for (int k = 0; k < count; k++) {
+        double own = source->amplitude * nodes[k].light, light = 0.0;
+        bool bright = false;
+        if (own > LEAST_SEEN) {
+            light = light_at(g, &nodes[k], own);
+            bright = light >= least && own >= OWN_SHARE * light;
+        }
+        if (bright) {
+            from = from < 0 ? k : from;
+            last = k;
+        } else if (own > LEAST_SEEN && light < least) {
+            draw_faint(g, source, &nodes[k], own, light, a);
+        }
+        if (from >= 0 && (k > last + 2 * margin || k == count - 1)) {
+            int start = from > margin ? from - margin : 0;
+            int end = last + margin < count ? last + margin : count - 1;
+            BST_TRY(search_part(ctx, g, source, nodes + start, end - start + 1, by_row));
+            from = -1;
+        }
     }
     return BST_OK;
 }
@@ -339,12 +442,14 @@ static int way_of(bst_generator *g, const generator_source *source) {
 
 static bst_status do_source(bst_ctx *ctx, bst_generator *g, const generator_source *source,
                             bool lay) {
-    double least = lay ? LEAST_LIGHT : g->threshold - FAINTEST_SIGMA;
+    double least = lay ? LEAST_LIGHT : LEAST_SEEN;
     if ((source->star && source->amplitude * g->route_top < least) || !comes_in(g, source)) {
         return BST_OK;
     }
     int count = way_of(g, source);
     const bst_route_node *way = g->way;
+    arrivals faint = {.draw = FAINT_STREAK | source->name << 24};
+    faint.next = draw_exponential(g, &faint);
     for (int first = 0, end; first + 1 < count; first = end) {
         double dx, dy;
         course(way, count, first, &dx, &dy);
@@ -359,7 +464,9 @@ static bst_status do_source(bst_ctx *ctx, bst_generator *g, const generator_sour
                 break;
             }
         }
-        BST_TRY(do_bright(ctx, g, source, way + first, end - first + 1, by_row, lay));
+        int nodes = end - first + 1;
+        BST_TRY(lay ? lay_bright(ctx, g, source, way + first, nodes, by_row)
+                    : search_bright(ctx, g, source, way + first, nodes, by_row, &faint));
     }
     return BST_OK;
 }
@@ -374,6 +481,7 @@ static bst_status prepare(bst_ctx *ctx, bst_generator *g) {
     }
     struct generator_streaks *w = g->streaks;
     bst_streak_noise_set(&w->noise, g->total_sigma);
+    set_alarms(g);
     if (g->width * g->height > w->map_room) {
         size_t room = (size_t)g->width * (size_t)g->height;
         free(w->map);
