@@ -1,6 +1,6 @@
 #include "tracker/attitude.h"
 
-#include "tracker/symmetric3.h"
+#include "sim/core/symmetric.h"
 
 /* Residual of a star (measured - predicted) and its derivative by the camera rotation vector. */
 typedef struct star_residual {
@@ -63,7 +63,7 @@ static bool step(const bst_camera *camera, double extra_px2, const bst_attitude_
             }
         }
     }
-    if (!bst_symmetric3_invert(n, covariance)) {
+    if (!bst_symmetric_invert(3, n[0], covariance[0])) {
         return false;
     }
     bst_vec3 e = {covariance[0][0] * g[0] + covariance[0][1] * g[1] + covariance[0][2] * g[2],

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "tracker/symmetric3.h"
+#include "sim/core/symmetric.h"
 
 void bst_attitude_error_predict(bst_attitude_error *filter, const bst_attitude_error_params *params,
                                 double dt_s) {
@@ -75,7 +75,7 @@ bool bst_attitude_error_update(bst_attitude_error *filter, const bst_attitude_er
             s[i][j] = p[i][j] + r[i][j];
         }
     }
-    bool invertible = bst_symmetric3_invert(s, inverse);
+    bool invertible = bst_symmetric_invert(3, s[0], inverse[0]);
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j < 3; j++) {
             chi2 += invertible ? nu[i] * inverse[i][j] * nu[j] : 0.0;

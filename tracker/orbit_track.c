@@ -3,49 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "sim/core/symmetric.h"
 #include "tracker/mixture.h"
-
-/* Inverse of a symmetric positive definite matrix by Cholesky after scaling its diagonal to 1. */
-static bool invert(const double a[4][4], double out[4][4]) {
-    double scale[4], l[4][4] = {{0}}, m[4][4] = {{0}};
-    for (int i = 0; i < 4; i++) {
-        if (!(a[i][i] > 0.0)) {
-            return false;
-        }
-        scale[i] = 1.0 / sqrt(a[i][i]);
-    }
-    for (int i = 0; i < 4; i++) {
-        for (int j = 0; j <= i; j++) {
-            double v = a[i][j] * scale[i] * scale[j];
-            for (int k = 0; k < j; k++) {
-                v -= l[i][k] * l[j][k];
-            }
-            if (i == j && !(v > 1e-13)) {
-                return false;
-            }
-            l[i][j] = i == j ? sqrt(v) : v / l[j][j];
-        }
-    }
-    for (int i = 0; i < 4; i++) {
-        m[i][i] = 1.0 / l[i][i];
-        for (int j = 0; j < i; j++) {
-            for (int k = j; k < i; k++) {
-                m[i][j] -= l[i][k] * m[k][j];
-            }
-            m[i][j] /= l[i][i];
-        }
-    }
-    for (int i = 0; i < 4; i++) {
-        for (int j = 0; j < 4; j++) {
-            double v = 0.0;
-            for (int k = 0; k < 4; k++) {
-                v += m[k][i] * m[k][j];
-            }
-            out[i][j] = v * scale[i] * scale[j];
-        }
-    }
-    return true;
-}
 
 /* Sets sky and cross from state and covariance. */
 static void look(bst_orbit_track *t, const bst_od_observer *observer) {
@@ -115,7 +74,7 @@ static void compare(const bst_sky_state *a, const bst_sky_state *b, double diffe
 
 bool bst_orbit_track_update(bst_orbit_track *t, const bst_sky_state *posterior) {
     double d[4], after[4][4], inverse[4][4], gain[6][4], half[6][4];
-    t->valid = t->valid && invert(t->sky.covariance, inverse);
+    t->valid = t->valid && bst_symmetric_invert(4, t->sky.covariance[0], inverse[0]);
     if (!t->valid) {
         return false;
     }
@@ -163,7 +122,7 @@ bool bst_sky_fuse(bst_sky_state *a, const bst_sky_state *b) {
             sum[i][j] = a->covariance[i][j] + pb[i][j];
         }
     }
-    if (!invert(sum, inverse)) {
+    if (!bst_symmetric_invert(4, sum[0], inverse[0])) {
         return false;
     }
     for (int i = 0; i < 4; i++) {

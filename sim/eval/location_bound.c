@@ -4,50 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/core/symmetric.h"
 #include "sim/core/vec.h"
 
 enum { N = BST_BOUND_COUNT };
-
-/* Inverse of a symmetric positive definite matrix by its Cholesky factor; false if it is none. */
-static bool invert(const double in[N][N], double out[N][N]) {
-    double l[N][N] = {{0.0}}, scale[N];
-    for (int i = 0; i < N; i++) {
-        if (!(in[i][i] > 0.0)) {
-            return false;
-        }
-        scale[i] = 1.0 / sqrt(in[i][i]);
-    }
-    for (int i = 0; i < N; i++) {
-        for (int j = 0; j <= i; j++) {
-            double sum = in[i][j] * scale[i] * scale[j];
-            for (int k = 0; k < j; k++) {
-                sum -= l[i][k] * l[j][k];
-            }
-            if (i == j && !(sum > 1e-12)) {
-                return false;
-            }
-            l[i][j] = i == j ? sqrt(sum) : sum / l[j][j];
-        }
-    }
-    for (int c = 0; c < N; c++) {
-        double v[N];
-        for (int i = 0; i < N; i++) {
-            v[i] = i == c;
-            for (int k = 0; k < i; k++) {
-                v[i] -= l[i][k] * v[k];
-            }
-            v[i] /= l[i][i];
-        }
-        for (int i = N - 1; i >= 0; i--) {
-            for (int k = i + 1; k < N; k++) {
-                v[i] -= l[k][i] * v[k];
-            }
-            v[i] /= l[i][i];
-            out[i][c] = v[i] * scale[i] * scale[c];
-        }
-    }
-    return true;
-}
 
 bst_status bst_location_bound_of(bst_ctx *ctx, const double *share, const double *by_x,
                                  const double *by_y, int count, double flux_e,
@@ -68,7 +28,7 @@ bst_status bst_location_bound_of(bst_ctx *ctx, const double *share, const double
         }
         sharpness += share[p] * share[p];
     }
-    if (!invert(fisher, out->covariance)) {
+    if (!bst_symmetric_invert(N, fisher[0], out->covariance[0])) {
         return bst_fail(ctx, BST_ERR_NUMERIC,
                         "%d pixels do not determine place, flux and background", count);
     }

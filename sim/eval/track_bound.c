@@ -1,53 +1,10 @@
 #include "sim/eval/track_bound.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "sim/core/rng.h"
+#include "sim/core/symmetric.h"
 #include "sim/core/vec.h"
-
-/* Inverse of a symmetric positive definite matrix by Cholesky after scaling the diagonal to 1. */
-static bool invert(double a[4][4], double out[4][4]) {
-    double scale[4], l[4][4] = {{0}}, m[4][4] = {{0}};
-    for (int i = 0; i < 4; i++) {
-        if (!(a[i][i] > 0.0)) {
-            return false;
-        }
-        scale[i] = 1.0 / sqrt(a[i][i]);
-    }
-    for (int i = 0; i < 4; i++) {
-        for (int j = 0; j <= i; j++) {
-            double v = a[i][j] * scale[i] * scale[j];
-            for (int k = 0; k < j; k++) {
-                v -= l[i][k] * l[j][k];
-            }
-            if (i == j && !(v > 1e-15)) {
-                return false;
-            }
-            l[i][j] = i == j ? sqrt(v) : v / l[j][j];
-        }
-    }
-    for (int i = 0; i < 4; i++) {
-        m[i][i] = 1.0 / l[i][i];
-        for (int j = 0; j < i; j++) {
-            double v = 0.0;
-            for (int k = j; k < i; k++) {
-                v -= l[i][k] * m[k][j];
-            }
-            m[i][j] = v / l[i][i];
-        }
-    }
-    for (int i = 0; i < 4; i++) {
-        for (int j = 0; j < 4; j++) {
-            double v = 0.0;
-            for (int k = 0; k < 4; k++) {
-                v += m[k][i] * m[k][j];
-            }
-            out[i][j] = v * scale[i] * scale[j];
-        }
-    }
-    return true;
-}
 
 bool bst_track_bound_start(bst_track_bound *bound, const double r1[3], const double r2[3],
                            double dt_s, double noise_rad2ps3) {
@@ -60,7 +17,7 @@ bool bst_track_bound_start(bst_track_bound *bound, const double r1[3], const dou
             p[i + 2][j + 2] = (a + b) / (dt_s * dt_s) + (i == j ? noise_rad2ps3 * dt_s / 3.0 : 0.0);
         }
     }
-    return invert(p, bound->information);
+    return bst_symmetric_invert(4, p[0], bound->information[0]);
 }
 
 bool bst_track_bound_step(bst_track_bound *bound, double dt_s, double rate_radps,
@@ -72,7 +29,7 @@ bool bst_track_bound_step(bst_track_bound *bound, double dt_s, double rate_radps
                             {0, 0, 1, 0},
                             {0, -rate_radps * sin(angle), 0, cos(angle)}};
     double p[4][4], t[4][4], moved[4][4];
-    if (!invert(bound->information, p)) {
+    if (!bst_symmetric_invert(4, bound->information[0], p[0])) {
         return false;
     }
     for (int i = 0; i < 4; i++) {
@@ -98,7 +55,7 @@ bool bst_track_bound_step(bst_track_bound *bound, double dt_s, double rate_radps
         moved[i + 2][i + 2] += noise_rad2ps3 * dt_s;
     }
     double det = r[0] * r[2] - r[1] * r[1];
-    if (!(det > 0.0) || !invert(moved, bound->information)) {
+    if (!(det > 0.0) || !bst_symmetric_invert(4, moved[0], bound->information[0])) {
         return false;
     }
     bound->information[0][0] += factor * r[2] / det;
@@ -109,9 +66,7 @@ bool bst_track_bound_step(bst_track_bound *bound, double dt_s, double rate_radps
 }
 
 bool bst_track_bound_covariance(const bst_track_bound *bound, double covariance[4][4]) {
-    double j[4][4];
-    memcpy(j, bound->information, sizeof j);
-    return invert(j, covariance);
+    return bst_symmetric_invert(4, bound->information[0], covariance[0]);
 }
 
 /* Half width, in sigma, of the square about the true place in which false alarms are drawn: those

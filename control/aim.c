@@ -1,0 +1,98 @@
+/* Where the boresight is to be. */
+#include "control/control_internal.h"
+
+bst_status bst_control_cue_at(bst_ctx *ctx, const bst_control *c, int64_t tick, bst_cue *out) {
+    return c->env.cue_at(c->env.cue_user, ctx, bst_control_seconds(c, tick), out);
+}
+
+static bst_status cue_direction_at(bst_ctx *ctx, const bst_control *c, int64_t tick, bool *valid,
+                                   bst_vec3 *out) {
+    return c->env.cue_direction_at(c->env.cue_user, ctx, bst_control_seconds(c, tick), valid, out);
+}
+
+/* A held track at a tick. Its rate changes along the arc as the cue's does. */
+static bst_status held_at(bst_ctx *ctx, const bst_control *c, const bst_control_held *held,
+                          int64_t tick, bst_vec3 *direction) {
+    double dt = (double)(tick - held->tick) / c->env.tick_rate_hz;
+    bst_vec3 d = bst_vec3_axpy(held->direction_gcrf, dt, held->rate_gcrf_radps);
+    const bst_cue *then = &held->cue;
+    bool valid;
+    bst_vec3 now;
+    BST_TRY(cue_direction_at(ctx, c, tick, &valid, &now));
+    if (then->valid && valid) {
+        bst_vec3 straight = bst_vec3_axpy(then->direction_gcrf, dt, then->rate_gcrf_radps);
+        d = bst_vec3_add(d, bst_vec3_sub(now, straight));
+    }
+    *direction = bst_vec3_unit(d);
+    return BST_OK;
+}
+
+static bst_vec3 offset_by(bst_vec3 d, bst_vec3 x_axis, bst_search_tile tile) {
+    bst_vec3 e1 = bst_vec3_axpy(x_axis, -bst_vec3_dot(x_axis, d), d);
+    e1 = bst_vec3_norm(e1) > 1e-6 ? bst_vec3_unit(e1) : bst_vec3_perpendicular(d);
+    bst_vec3 e2 = bst_vec3_cross(d, e1);
+    return bst_vec3_unit(bst_vec3_axpy(bst_vec3_axpy(d, tile.x_rad, e1), tile.y_rad, e2));
+}
+
+bst_status bst_control_aim(bst_ctx *ctx, const bst_control *c, int64_t tick, bool *valid,
+                           bst_vec3 *direction) {
+    *valid = true;
+    switch (c->mode) {
+        case BST_MODE_SLEW:
+        case BST_MODE_RATE:
+        case BST_MODE_SEARCH:
+            BST_TRY(cue_direction_at(ctx, c, tick, valid, direction));
+            if (c->mode == BST_MODE_SEARCH && *valid) {
+                *direction =
+                    offset_by(*direction, c->search_x_gcrf, c->search.tile[c->search_step]);
+            }
+            return BST_OK;
+        case BST_MODE_ACQUIRE:
+        case BST_MODE_TRACK:
+            return held_at(ctx, c, &c->held, tick, direction);
+        case BST_MODE_REACQUIRE: {
+            bst_vec3 d;
+            BST_TRY(held_at(ctx, c, &c->lost, tick, &d));
+            *direction = offset_by(d, c->search_x_gcrf, c->search.tile[c->search_step]);
+            return BST_OK;
+        }
+        case BST_MODE_STARE:
+            *valid = c->stare_valid;
+            *direction = c->stare_gcrf;
+            return BST_OK;
+        default:
+            *valid = false;
+            return BST_OK;
+    }
+}
+
+bst_vec3 bst_control_apparent(const bst_control *c, bst_vec3 geometric) {
+    bst_light light = {.velocity_mps = c->nav.velocity_bary_mps, .sun_m = c->nav.sun_m};
+    return bst_light_aberrate(&light, geometric);
+}
+
+void bst_control_forget_aims(bst_control *c) {
+    for (int i = 0; i < BST_CONTROL_AIMED; i++) {
+        c->aimed[i].known = false;
+    }
+}
+
+bst_status bst_control_boresight_at(bst_ctx *ctx, bst_control *c, int64_t tick, bool *valid,
+                                    bst_vec3 *direction) {
+    /* commands come at a fixed period, of which Fibonacci hashing spreads the multiples evenly */
+    uint64_t spread = (uint64_t)tick * UINT64_C(0x9E3779B97F4A7C15);
+    bst_control_aimed *aimed = &c->aimed[spread >> 57];
+    _Static_assert(BST_CONTROL_AIMED == 1 << (64 - 57), "the hash's greatest value");
+    if (!aimed->known || aimed->tick != tick) {
+        aimed->known = false;
+        BST_TRY(bst_control_aim(ctx, c, tick, &aimed->valid, &aimed->direction_gcrf));
+        aimed->error = bst_pointing_error_at(&c->pointing_error, tick, c->env.tick_rate_hz);
+        aimed->tick = tick;
+        aimed->known = true;
+    }
+    *valid = aimed->valid;
+    if (*valid) {
+        *direction = bst_quat_rotate(aimed->error, bst_control_apparent(c, aimed->direction_gcrf));
+    }
+    return BST_OK;
+}

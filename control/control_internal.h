@@ -1,0 +1,43 @@
+/* Shared by the files of the standard controller. */
+#ifndef BST_CONTROL_CONTROL_INTERNAL_H
+#define BST_CONTROL_CONTROL_INTERNAL_H
+
+#include "control/control.h"
+
+static inline double bst_control_seconds(const bst_control *c, int64_t tick) {
+    return (double)tick / c->env.tick_rate_hz;
+}
+
+static inline int64_t bst_control_ticks(const bst_control *c, double seconds) {
+    return (int64_t)llround(seconds * c->env.tick_rate_hz);
+}
+
+/* ---- aim.c ---- */
+
+bst_status bst_control_cue_at(bst_ctx *ctx, const bst_control *c, int64_t tick,
+                              bst_cue *out) BST_MUST_CHECK;
+
+/* Geometric to apparent with what navigation knows. */
+bst_vec3 bst_control_apparent(const bst_control *c, bst_vec3 geometric);
+
+/* After a change of anything that bst_control_aim or the pointing error rests on. */
+void bst_control_forget_aims(bst_control *c);
+
+/* Where the telemetry's boresight has to be for the true one to be on the aim. */
+bst_status bst_control_boresight_at(bst_ctx *ctx, bst_control *c, int64_t tick, bool *valid,
+                                    bst_vec3 *direction) BST_MUST_CHECK;
+
+/* ---- modes.c ---- */
+
+/* The first mode, out of BST_MODE_IDLE. */
+bst_status bst_control_start(bst_ctx *ctx, bst_control *c, int64_t tick) BST_MUST_CHECK;
+
+/* Transitions that time or telemetry bring about; arrived: the servo is at rest on the aim. */
+bst_status bst_control_advance(bst_ctx *ctx, bst_control *c, int64_t tick,
+                               bool arrived) BST_MUST_CHECK;
+
+/* Transitions that the tracker's message about one frame brings about. */
+bst_status bst_control_take_frame(bst_ctx *ctx, bst_control *c, int64_t tick,
+                                  const bst_tracks *tracks) BST_MUST_CHECK;
+
+#endif
