@@ -60,8 +60,9 @@ typedef struct bst_craft_body {
 
 /* At rest in its modes, turning at rate_radps (body axes), wheels at wheel_radps. BST_ERR_CONFIG
  * with the reason: an inertia that is none (not positive definite, or a principal moment above the
- * sum of the two others), wheels or appendages with more inertia than the whole, and a step in which the fastest mode of the free craft turns by more than
- * BST_MODE_STEP_CYCLES of its cycle: the message has the longest step allowed. */
+ * sum of the two others), wheels or appendages with more inertia than the whole, and a step in
+ * which the fastest mode of the free craft turns by more than BST_MODE_STEP_CYCLES of its cycle:
+ * the message has the longest step allowed. */
 bst_status bst_craft_body_init(bst_ctx *ctx, bst_craft_body *body, const bst_craft_spec *spec,
                                bst_quat q_body_from_gcrf, bst_vec3 rate_radps,
                                const double *wheel_radps) BST_MUST_CHECK;

@@ -149,10 +149,8 @@ double bst_wheel_torque(const bst_wheel *wheel, double speed_radps, double motor
 void bst_wheel_imbalance(const bst_wheel *wheel, double phase_rad, double speed_radps,
                          bst_vec3 *torque_nm) {
     double s = sin(phase_rad), c = cos(phase_rad), square = speed_radps * speed_radps;
-    bst_vec3 radial =
-        bst_vec3_axpy(bst_vec3_scale(wheel->across[0], c), s, wheel->across[1]);
-    bst_vec3 tangent =
-        bst_vec3_axpy(bst_vec3_scale(wheel->across[0], -s), c, wheel->across[1]);
+    bst_vec3 radial = bst_vec3_axpy(bst_vec3_scale(wheel->across[0], c), s, wheel->across[1]);
+    bst_vec3 tangent = bst_vec3_axpy(bst_vec3_scale(wheel->across[0], -s), c, wheel->across[1]);
     bst_vec3 force = bst_vec3_scale(radial, wheel->static_kgm * square);
     *torque_nm = bst_vec3_add(*torque_nm, bst_vec3_cross(wheel->position_m, force));
     *torque_nm = bst_vec3_axpy(*torque_nm, wheel->dynamic_kgm2 * square, tangent);

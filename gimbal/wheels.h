@@ -24,14 +24,14 @@ typedef struct bst_wheel_config {
 extern const bst_config_desc bst_wheel_config_table[];
 
 typedef struct bst_wheel {
-    bst_vec3 axis, position_m;          /* body axes; position from the centre of mass */
-    bst_vec3 across[2];                 /* unit, with axis right-handed: where imbalance turns */
+    bst_vec3 axis, position_m; /* body axes; position from the centre of mass */
+    bst_vec3 across[2];        /* unit, with axis right-handed: where imbalance turns */
     double inertia_kgm2;
-    double torque_limit_nm;             /* 0: failed */
+    double torque_limit_nm; /* 0: failed */
     double speed_limit_radps, start_radps;
     double coulomb_nm, viscous_nms;
     double static_kgm, dynamic_kgm2;
-    double phase0_rad;                  /* of the imbalance at time 0 */
+    double phase0_rad; /* of the imbalance at time 0 */
 } bst_wheel;
 
 typedef struct bst_wheels {
