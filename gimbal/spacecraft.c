@@ -13,7 +13,7 @@ typedef struct pending {
     bst_quat measured, estimate; /* estimate: of the instant of the measurement, as known now */
 } pending;
 
-struct bst_spacecraft {
+struct bst_craft {
     double dt_s;
     bst_craft_body body;
     bst_wheels wheels;
@@ -37,31 +37,31 @@ struct bst_spacecraft {
     double roll_rad, roll_radps;
     bst_sky_grid grid;
     bst_craft_sky sky;
-    bst_spacecraft_now now;
+    bst_craft_now now;
 };
 
-const bst_spacecraft_now *bst_spacecraft_at(const bst_spacecraft *craft) {
+const bst_craft_now *bst_craft_at(const bst_craft *craft) {
     return &craft->now;
 }
 
-const bst_craft_body *bst_spacecraft_body(const bst_spacecraft *craft) {
+const bst_craft_body *bst_craft_dynamics(const bst_craft *craft) {
     return &craft->body;
 }
 
-const bst_attitude_filter *bst_spacecraft_filter(const bst_spacecraft *craft) {
+const bst_attitude_filter *bst_craft_filter(const bst_craft *craft) {
     return &craft->filter;
 }
 
-bst_vec3 bst_spacecraft_gyro_bias(const bst_spacecraft *craft) {
+bst_vec3 bst_craft_gyro_bias(const bst_craft *craft) {
     return craft->gyro.bias_radps;
 }
 
-void bst_spacecraft_set_roll(bst_spacecraft *craft, double roll_rad, double roll_radps) {
+void bst_craft_set_roll(bst_craft *craft, double roll_rad, double roll_radps) {
     craft->roll_rad = roll_rad;
     craft->roll_radps = roll_radps;
 }
 
-void bst_spacecraft_free(bst_spacecraft *craft) {
+void bst_craft_free(bst_craft *craft) {
     if (craft) {
         free(craft->pending);
         free(craft);
@@ -76,11 +76,11 @@ static bst_quat turned(bst_quat q, bst_vec3 r) {
     return bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(r, -1.0)), q));
 }
 
-static bst_rng_key stream(const bst_spacecraft_setup *setup, const char *name) {
+static bst_rng_key stream(const bst_craft_setup *setup, const char *name) {
     return bst_rng_make_key(setup->seed, setup->run, setup->instance, name);
 }
 
-static bst_status set_law(bst_ctx *ctx, bst_spacecraft *craft, const bst_attitude_config *config,
+static bst_status set_law(bst_ctx *ctx, bst_craft *craft, const bst_attitude_config *config,
                           bst_quat q_nominal) {
     bst_vec3 axis = bst_vec3_unit(vec(config->axis)),
              second = bst_vec3_unit(vec(config->second_axis));
@@ -98,7 +98,7 @@ static bst_status set_law(bst_ctx *ctx, bst_spacecraft *craft, const bst_attitud
     return BST_OK;
 }
 
-static bst_status set_body(bst_ctx *ctx, bst_spacecraft *craft, const bst_spacecraft_config *config,
+static bst_status set_body(bst_ctx *ctx, bst_craft *craft, const bst_craft_config *config,
                            bst_quat q, bst_vec3 rate) {
     bst_craft_spec spec = {.wheels = craft->wheels.count,
                            .modes = config->modes.count,
@@ -127,7 +127,7 @@ static bst_status set_body(bst_ctx *ctx, bst_spacecraft *craft, const bst_spacec
 }
 
 /* Wheels that work must turn the body about every axis, unless nothing is controlled. */
-static bst_status check_wheels(bst_ctx *ctx, const bst_spacecraft *craft) {
+static bst_status check_wheels(bst_ctx *ctx, const bst_craft *craft) {
     double speed[BST_WHEELS_MOST] = {0}, motor[BST_WHEELS_MOST];
     if (craft->law.law != BST_LAW_FREE &&
         (bst_wheels_share(&craft->wheels, speed, (bst_vec3){0, 0, 0}, motor) & BST_WHEELS_SHORT)) {
@@ -140,9 +140,8 @@ static bst_status check_wheels(bst_ctx *ctx, const bst_spacecraft *craft) {
     return BST_OK;
 }
 
-static bst_status set_trackers(bst_ctx *ctx, bst_spacecraft *craft,
-                               const bst_spacecraft_config *config,
-                               const bst_spacecraft_setup *setup) {
+static bst_status set_trackers(bst_ctx *ctx, bst_craft *craft, const bst_craft_config *config,
+                               const bst_craft_setup *setup) {
     const bst_star_tracker_config *all = config->star_trackers.items;
     craft->trackers = config->star_trackers.count;
     for (int i = 0; i < craft->trackers; i++) {
@@ -182,8 +181,8 @@ static bst_vec3 normal3(bst_rng_key key) {
     return (bst_vec3){a[0], a[1], b[0]};
 }
 
-static bst_status prepare(bst_ctx *ctx, bst_spacecraft *craft, const bst_spacecraft_config *config,
-                          const bst_spacecraft_setup *setup) {
+static bst_status prepare(bst_ctx *ctx, bst_craft *craft, const bst_craft_config *config,
+                          const bst_craft_setup *setup) {
     double plant_hz = 1.0 / setup->dt_s;
     craft->dt_s = setup->dt_s;
     craft->disturbances = config->disturbances;
@@ -217,15 +216,15 @@ static bst_status prepare(bst_ctx *ctx, bst_spacecraft *craft, const bst_spacecr
     return BST_OK;
 }
 
-bst_status bst_spacecraft_create(bst_ctx *ctx, const bst_spacecraft_config *config,
-                                 const bst_spacecraft_setup *setup, bst_spacecraft **out) {
-    bst_spacecraft *craft = calloc(1, sizeof *craft);
+bst_status bst_craft_create(bst_ctx *ctx, const bst_craft_config *config,
+                            const bst_craft_setup *setup, bst_craft **out) {
+    bst_craft *craft = calloc(1, sizeof *craft);
     if (!craft) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a spacecraft");
     }
     bst_status status = prepare(ctx, craft, config, setup);
     if (status != BST_OK) {
-        bst_spacecraft_free(craft);
+        bst_craft_free(craft);
         return bst_fail_prefix(ctx, status, "platform/spacecraft");
     }
     *out = craft;
@@ -233,11 +232,11 @@ bst_status bst_spacecraft_create(bst_ctx *ctx, const bst_spacecraft_config *conf
 }
 
 /* Fastest imbalance that steps follow, rad/s. */
-static double followed_radps(const bst_spacecraft *craft) {
+static double followed_radps(const bst_craft *craft) {
     return 2.0 * BST_PI * BST_JITTER_RESOLVED / craft->dt_s;
 }
 
-static void move(bst_spacecraft *craft, bst_vec3 reaction_nm) {
+static void move(bst_craft *craft, bst_vec3 reaction_nm) {
     int wheels = craft->wheels.count;
     double dt = craft->dt_s, top = followed_radps(craft);
     double torque[BST_WHEELS_MOST];
@@ -257,7 +256,7 @@ static void move(bst_spacecraft *craft, bst_vec3 reaction_nm) {
     bst_craft_body_step(&craft->body, outer, torque);
 }
 
-static void observe_motion(bst_spacecraft *craft, bool moved) {
+static void observe_motion(bst_craft *craft, bool moved) {
     bst_body_state *body = &craft->now.body;
     bst_vec3 before = body->rate_radps;
     body->q_body_from_gcrf = bst_craft_body_attitude(&craft->body);
@@ -270,7 +269,7 @@ static void observe_motion(bst_spacecraft *craft, bool moved) {
     }
 }
 
-static void read_gyro(bst_spacecraft *craft, int64_t n) {
+static void read_gyro(bst_craft *craft, int64_t n) {
     double dt = craft->gyro.dt_s;
     bst_quat q = craft->now.body.q_body_from_gcrf;
     bst_vec3 turn = n == 0 ? bst_vec3_scale(craft->now.body.rate_radps, dt)
@@ -285,7 +284,7 @@ static void read_gyro(bst_spacecraft *craft, int64_t n) {
     craft->filter_step = n;
 }
 
-static void read_trackers(bst_spacecraft *craft, int64_t n, double seconds) {
+static void read_trackers(bst_craft *craft, int64_t n, double seconds) {
     bool asked = false, seen = false;
     for (int i = 0; i < craft->trackers; i++) {
         if (n % craft->tracker_steps[i] != 0) {
@@ -318,7 +317,7 @@ static void correct_past(bst_quat *estimate, bst_quat q_now, double age_s,
     *estimate = turned(*estimate, bst_quat_rotate(q_then_from_now, e));
 }
 
-static void take_in(bst_spacecraft *craft, int64_t n) {
+static void take_in(bst_craft *craft, int64_t n) {
     int kept = 0;
     for (int k = 0; k < craft->pendings; k++) {
         pending p = craft->pending[k];
@@ -347,7 +346,7 @@ static void take_in(bst_spacecraft *craft, int64_t n) {
 
 /* What the imbalance of wheels adds that the steps do not show: all of the fast ones, and of the
  * others what straight lines between the steps lack. */
-static double unresolved(const bst_spacecraft *craft) {
+static double unresolved(const bst_craft *craft) {
     double sum = 0.0, top = followed_radps(craft);
     const bst_mat3 *inertia = &craft->body.inertia;
     for (int i = 0; i < craft->wheels.count; i++) {
@@ -364,7 +363,7 @@ static double unresolved(const bst_spacecraft *craft) {
     return sum;
 }
 
-static bst_status control(bst_ctx *ctx, bst_spacecraft *craft, int64_t n, double seconds) {
+static bst_status control(bst_ctx *ctx, bst_craft *craft, int64_t n, double seconds) {
     BST_TRY(bst_sky_grid_at(&craft->grid, ctx, seconds, &craft->sky, &craft->now.reference));
     const bst_body_state *body = &craft->now.body;
     bst_vec3 momentum = {0, 0, 0};
@@ -396,8 +395,8 @@ static bst_status control(bst_ctx *ctx, bst_spacecraft *craft, int64_t n, double
     return BST_OK;
 }
 
-bst_status bst_spacecraft_step(bst_ctx *ctx, bst_spacecraft *craft, int64_t n, double seconds,
-                               bst_vec3 reaction_nm) {
+bst_status bst_craft_step(bst_ctx *ctx, bst_craft *craft, int64_t n, double seconds,
+                          bst_vec3 reaction_nm) {
     if (n > 0) {
         move(craft, reaction_nm);
     }

@@ -41,8 +41,8 @@ static const bst_config_desc attitude_table[] = {
     "[{\"axis\": [1, 1, 1]}, {\"axis\": [-1, 1, 1]}, {\"axis\": [-1, -1, 1]}" \
     ", {\"axis\": [1, -1, 1]}]"
 
-#define C bst_spacecraft_config
-const bst_config_desc bst_spacecraft_config_table[] = {
+#define C bst_craft_config
+const bst_config_desc bst_craft_config_table[] = {
     BST_ENUM(C, type, type_names, "\"inertial\"",
              "`inertial`: held but for drift_arcsec_per_s, known but for attitude_bias_arcsec and "
              "attitude_noise_arcsec. `rigid_body`: dynamics, wheels, sensors and controller of the "
@@ -71,7 +71,7 @@ const bst_config_desc bst_spacecraft_config_table[] = {
     BST_CONFIG_END};
 #undef C
 
-bst_attitude_control_spec bst_attitude_control_of(const bst_spacecraft_config *config) {
+bst_attitude_control_spec bst_attitude_control_of(const bst_craft_config *config) {
     const bst_attitude_config *a = &config->attitude;
     return (bst_attitude_control_spec){.natural_radps = 2.0 * BST_PI * a->bandwidth_hz,
                                        .damping = a->damping,

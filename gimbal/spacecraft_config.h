@@ -8,10 +8,10 @@
 #include "gimbal/spacecraft_control.h"
 #include "gimbal/wheels.h"
 
-typedef enum bst_spacecraft_type {
-    BST_SPACECRAFT_INERTIAL,   /* "inertial": the platform's drift, bias and noise */
-    BST_SPACECRAFT_RIGID_BODY, /* "rigid_body" */
-} bst_spacecraft_type;
+typedef enum bst_craft_type {
+    BST_CRAFT_INERTIAL,   /* "inertial": the platform's drift, bias and noise */
+    BST_CRAFT_RIGID_BODY, /* "rigid_body" */
+} bst_craft_type;
 
 typedef struct bst_mode_config {
     double frequency_hz, damping, coupling[3];
@@ -26,8 +26,8 @@ typedef struct bst_attitude_config {
     double rate_limit_degps, accel_limit_degps2;
 } bst_attitude_config;
 
-typedef struct bst_spacecraft_config {
-    int32_t type;       /* bst_spacecraft_type */
+typedef struct bst_craft_config {
+    int32_t type;       /* bst_craft_type */
     int32_t integrator; /* bst_integrator */
     double inertia_kgm2[6];
     double initial_turn_deg[3], initial_rate_degps[3];
@@ -36,11 +36,11 @@ typedef struct bst_spacecraft_config {
     bst_gyro_config gyro;
     bst_disturbance_config disturbances;
     bst_attitude_config attitude;
-} bst_spacecraft_config;
+} bst_craft_config;
 
-extern const bst_config_desc bst_spacecraft_config_table[];
+extern const bst_config_desc bst_craft_config_table[];
 
 /* The controller of a configuration. */
-bst_attitude_control_spec bst_attitude_control_of(const bst_spacecraft_config *config);
+bst_attitude_control_spec bst_attitude_control_of(const bst_craft_config *config);
 
 #endif

@@ -10,7 +10,7 @@ static void put(double out[2], cplx z) {
 }
 
 /* Element (axis, axis) of the inverse of s^2 (I - sum J a a' - sum d d' s^2 / (s^2 + c s + k)). */
-static cplx plant_at(const bst_spacecraft_config *config, int axis, double w) {
+static cplx plant_at(const bst_craft_config *config, int axis, double w) {
     cplx s = I * w, m[3][3];
     bst_mat3 inertia = bst_inertia_matrix(config->inertia_kgm2);
     for (int i = 0; i < 3; i++) {
@@ -61,7 +61,7 @@ typedef struct law {
     cplx attitude, rate;
 } law;
 
-static law law_at(const bst_spacecraft_config *config, int axis, double w) {
+static law law_at(const bst_craft_config *config, int axis, double w) {
     if (config->attitude.law == BST_LAW_FREE) {
         return (law){0.0, 0.0};
     }
@@ -74,13 +74,13 @@ static law law_at(const bst_spacecraft_config *config, int axis, double w) {
                  held * 2.0 * spec.damping * wn * mean_over(s, 1.0 / config->gyro.rate_hz)};
 }
 
-bst_spacecraft_response bst_spacecraft_response_at(const bst_spacecraft_config *config, int axis,
-                                                   double frequency_hz) {
+bst_craft_response bst_craft_response_at(const bst_craft_config *config, int axis,
+                                         double frequency_hz) {
     double w = 2.0 * BST_PI * frequency_hz;
     law l = law_at(config, axis, w);
     cplx plant = plant_at(config, axis, w), controller = l.attitude + I * w * l.rate;
     cplx loop = plant * controller;
-    bst_spacecraft_response out;
+    bst_craft_response out;
     put(out.plant, plant);
     put(out.controller, controller);
     put(out.closed, loop / (1.0 + loop));
@@ -92,10 +92,9 @@ static double square(cplx z) {
     return creal(z) * creal(z) + cimag(z) * cimag(z);
 }
 
-bst_spacecraft_noise bst_spacecraft_noise_at(const bst_spacecraft_config *config, int axis,
-                                             double frequency_hz) {
+bst_craft_noise bst_craft_noise_at(const bst_craft_config *config, int axis, double frequency_hz) {
     if (config->star_trackers.count == 0) {
-        return (bst_spacecraft_noise){INFINITY, INFINITY};
+        return (bst_craft_noise){INFINITY, INFINITY};
     }
     double w = 2.0 * BST_PI * frequency_hz;
     const bst_star_tracker_config *first = config->star_trackers.items;
@@ -112,7 +111,7 @@ bst_spacecraft_noise bst_spacecraft_noise_at(const bst_spacecraft_config *config
     law l = law_at(config, axis, w);
     cplx plant = plant_at(config, axis, w);
     cplx compliance = plant / (1.0 + plant * (l.attitude + s * l.rate));
-    bst_spacecraft_noise out = {0.0, 0.0};
+    bst_craft_noise out = {0.0, 0.0};
     for (int i = 0; i < 3; i++) {
         cplx rate = (s + k1) * error[i] - (i == 0 ? k1 : 0.0);
         out.knowledge += density[i] * square(error[i]);
@@ -121,8 +120,8 @@ bst_spacecraft_noise bst_spacecraft_noise_at(const bst_spacecraft_config *config
     return out;
 }
 
-void bst_spacecraft_imbalance_line(const bst_spacecraft_config *config, int wheel, int axis,
-                                   double *frequency_hz, double *amplitude_rad) {
+void bst_craft_imbalance_line(const bst_craft_config *config, int wheel, int axis,
+                              double *frequency_hz, double *amplitude_rad) {
     const bst_wheel_config *c = &((const bst_wheel_config *)config->wheels.items)[wheel];
     bst_vec3 spin = bst_vec3_unit((bst_vec3){c->axis[0], c->axis[1], c->axis[2]});
     bst_vec3 x = bst_vec3_perpendicular(spin);
@@ -137,7 +136,7 @@ void bst_spacecraft_imbalance_line(const bst_spacecraft_config *config, int whee
     *frequency_hz = speed / (2.0 * BST_PI);
     *amplitude_rad = 0.0;
     if (speed > 0.0 && about > 0.0) {
-        bst_spacecraft_response response = bst_spacecraft_response_at(config, axis, *frequency_hz);
+        bst_craft_response response = bst_craft_response_at(config, axis, *frequency_hz);
         *amplitude_rad = about * hypot(response.compliance[0], response.compliance[1]);
     }
 }

@@ -114,8 +114,12 @@ static void target(const bst_two_axis *plant, const bst_los_command *command, do
     bst_vec3 r = bst_vec3_scale(rate, scale);
     r = bst_vec3_axpy(r, -bst_vec3_dot(r, d), d);
     bst_quat body = plant->platform.q_believed_from_gcrf;
-    bst_two_axis_solve(bst_quat_rotate(body, d), bst_quat_rotate(body, r),
-                       plant->axis[0].reference_rad, angle_rad, rate_radps);
+    bst_vec3 d_body = bst_quat_rotate(body, d), r_body = bst_quat_rotate(body, r);
+    if (plant->platform.spacecraft) {
+        /* the body turns away from under the mount */
+        r_body = bst_vec3_sub(r_body, bst_vec3_cross(plant->platform.rate_believed_radps, d_body));
+    }
+    bst_two_axis_solve(d_body, r_body, plant->axis[0].reference_rad, angle_rad, rate_radps);
     /* the way round that is nearer to the present angle */
     angle_rad[0] = plant->axis[0].reference_rad + wrap(angle_rad[0] - plant->axis[0].reference_rad);
     *at_stop = fabs(angle_rad[1]) > plant->inner_travel_rad;
