@@ -22,7 +22,10 @@ struct bst_craft {
     bst_disturbance_config disturbances;
     bst_vec3 disturbance_nm; /* held */
     bst_gyro gyro;
-    bst_quat q_at_gyro; /* true, at the latest sample */
+    bst_quat q_at_gyro;          /* true, at the latest sample */
+    bst_vec3 turn_since_control; /* sum of the gyro's samples since the controller's step */
+    int samples_since_control;
+    bst_vec3 rate_control_radps; /* their mean rate */
     int64_t gyro_steps, control_steps;
     int trackers;
     bst_star_tracker tracker[BST_TRACKERS_MOST];
@@ -282,6 +285,8 @@ static void read_gyro(bst_craft *craft, int64_t n) {
         bst_vec3_axpy(bst_vec3_scale(sample, 1.0 / dt), -1.0, craft->filter.bias_radps);
     craft->q_at_gyro = q;
     craft->filter_step = n;
+    craft->turn_since_control = bst_vec3_add(craft->turn_since_control, sample);
+    craft->samples_since_control++;
 }
 
 static void read_trackers(bst_craft *craft, int64_t n, double seconds) {
@@ -387,8 +392,17 @@ static bst_status control(bst_ctx *ctx, bst_craft *craft, int64_t n, double seco
     double age = (double)(n - craft->filter_step) * craft->dt_s;
     bst_quat q =
         turned(craft->filter.q_body_from_gcrf, bst_vec3_scale(craft->now.rate_believed_radps, age));
+    if (craft->samples_since_control > 0) {
+        /* of all samples, lest their noise be counted twice */
+        craft->rate_control_radps =
+            bst_vec3_axpy(bst_vec3_scale(craft->turn_since_control,
+                                         1.0 / (craft->samples_since_control * craft->gyro.dt_s)),
+                          -1.0, craft->filter.bias_radps);
+        craft->turn_since_control = (bst_vec3){0, 0, 0};
+        craft->samples_since_control = 0;
+    }
     bst_vec3 torque = bst_attitude_control_step(&craft->control, &craft->now.reference, q,
-                                                craft->now.rate_believed_radps, momentum,
+                                                craft->rate_control_radps, momentum,
                                                 craft->now.wheel_flags != 0u);
     craft->now.wheel_flags =
         bst_wheels_share(&craft->wheels, craft->now.wheel_radps, torque, craft->motor_nm);

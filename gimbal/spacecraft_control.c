@@ -5,6 +5,9 @@
 /* Share of the acceleration limit that a slew's braking curve uses, the rest being the feedback's.
  */
 #define BRAKE_SHARE 0.7
+/* Of the range in which the law is linear, the part near the end in which the integral moves: what
+ * a slew's end would add to it takes long to go. */
+#define INTEGRAL_SHARE 0.05
 
 void bst_attitude_control_init(bst_attitude_control *control,
                                const bst_attitude_control_spec *spec) {
@@ -53,7 +56,7 @@ bst_vec3 bst_attitude_control_step(bst_attitude_control *control,
 
     bst_vec3 more = bst_vec3_scale(along, feed);
     more = bst_vec3_axpy(more, -2.0 * spec->damping * spec->natural_radps, rate_error);
-    if (angle <= linear && !saturated) {
+    if (angle <= INTEGRAL_SHARE * linear && !saturated) {
         control->integral_radps2 = bst_vec3_axpy(
             control->integral_radps2,
             spec->dt_s * spec->integral_radps * spec->natural_radps * spec->natural_radps, e);

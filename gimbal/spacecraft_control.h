@@ -29,9 +29,10 @@ void bst_attitude_control_init(bst_attitude_control *control,
  * clipped to the acceleration limit where it departs from a_ref, and the torque I a + w x (I w + h)
  * with the wheels' momentum h. Near the end that is -natural^2 e - 2 damping natural (w - w_ref).
  * Beyond 0.9 pi the way round taken last is kept, so that noise does not turn a slew of 180 deg
- * back; at exactly pi it is that of bst_quat_to_rotvec. The integral moves only where the law is
- * linear and with `saturated` false (what was asked last came). Wie, Space Vehicle Dynamics and
- * Control (2nd edition), section 7.3; Mayhew, Sanfelice and Teel, IEEE TAC 56 (2011) 2555. */
+ * back; at exactly pi it is that of bst_quat_to_rotvec. The integral moves only in the last
+ * twentieth of the range in which the law is linear, and with `saturated` false (what was asked
+ * last came). Wie, Space Vehicle Dynamics and Control (2nd edition), section 7.3; Mayhew, Sanfelice
+ * and Teel, IEEE TAC 56 (2011) 2555. */
 bst_vec3 bst_attitude_control_step(bst_attitude_control *control,
                                    const bst_attitude_reference *reference,
                                    bst_quat q_body_from_gcrf, bst_vec3 rate_radps,

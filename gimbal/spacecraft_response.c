@@ -69,9 +69,10 @@ static law law_at(const bst_craft_config *config, int axis, double w) {
     cplx s = I * w, z = cexp(s * spec.dt_s);
     double wn = spec.natural_radps;
     cplx integral = spec.integral_radps * spec.dt_s * z / (z - 1.0); /* the newest error counts */
+    double rate_s = fmax(spec.dt_s, 1.0 / config->gyro.rate_hz);
     cplx held = spec.inertia_kgm2.m[axis][axis] * mean_over(s, spec.dt_s);
     return (law){held * wn * wn * (1.0 + integral),
-                 held * 2.0 * spec.damping * wn * mean_over(s, 1.0 / config->gyro.rate_hz)};
+                 held * 2.0 * spec.damping * wn * mean_over(s, rate_s)};
 }
 
 bst_craft_response bst_craft_response_at(const bst_craft_config *config, int axis,
