@@ -177,6 +177,8 @@ static bst_status step(void *self, struct bst_step *s) {
         bst_platform_append_exact(&m->platform, n, telemetry, capacity, tick, q_cam_from_body);
         bst_mount_status *mount = bst_step_write(s, PORT_MOUNT, NULL);
         *mount = (bst_mount_status){.tick = tick,
+                                    .wheels_saturated = m->platform.wheels_saturated,
+                                    .rate_body_radps = m->platform.rate_believed_radps,
                                     .q_body_from_cam_at_zero = BST_QUAT_IDENTITY,
                                     .q_body_from_gcrf = telemetry->q_body_from_gcrf};
     }
