@@ -32,7 +32,7 @@ const bst_config_desc bst_control_config_table[] = {
              "Expected slow jitter (radial RMS), for the compensator's gains."),
     BST_REAL(C, disturbance_cutoff_hz, "Hz", 1e-6, 100, "0.05",
              "Highest frequency of the slow jitter, for the compensator's gains."),
-    BST_REAL(C, fix_sigma_floor_px, "px", 1e-6, 100, "0.02",
+    BST_REAL(C, fix_sigma_floor_px, "px", 1e-6, 100, "0.04",
              "Attitude fixes are never taken to be better than this."),
     BST_REAL(C, attitude_sigma_arcsec, "arcsec", 1e-6, 360000, "60",
              "Expected error of the spacecraft's own attitude at the start (1 sigma)."),

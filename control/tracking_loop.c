@@ -149,27 +149,40 @@ double complex bst_tracking_plant(const void *user, double w) {
     return angle_mean(loop, w, period * back / (1.0 - back), 1.0, -half, half);
 }
 
+/* What a frame's measurement without the mount's own part gives: the correction's angle at its
+ * time of effect, and its rate. */
+static void corrected_by(const bst_tracking_loop *loop, double w, double complex *c,
+                         double complex *r) {
+    double period = loop->timing.period_s;
+    double complex back = cexp(-I * w * period);
+    if (loop->observes) {
+        double complex predicted = back * (loop->alpha + loop->beta / (1.0 - back)) / (1.0 - back);
+        double complex innovation = 1.0 / (1.0 + predicted);
+        *r = loop->beta / period / (1.0 - back) * innovation;
+        *c = (predicted + loop->alpha) * innovation + *r * loop->timing.effect_s;
+    } else {
+        *r = bst_compensator_response(&loop->compensator, w) / (1.0 + bst_tracking_open(loop, w));
+        *c = *r * period * back / (1.0 - back);
+    }
+}
+
 double complex bst_tracking_open(const void *user, double w) {
     const bst_tracking_loop *loop = user;
     if (!loop->observes) {
         return bst_compensator_response(&loop->compensator, w) * bst_tracking_plant(loop, w);
     }
-    double complex back = cexp(-I * w * loop->timing.period_s);
-    return back * (loop->alpha + loop->beta / (1.0 - back)) / (1.0 - back);
+    /* internal model control: closed round by what telemetry says of the mount's motion */
+    double half = 0.5 * loop->timing.exposure_s;
+    double complex c, r;
+    corrected_by(loop, w, &c, &r);
+    double complex seen = angle_mean(loop, w, c, r, -half, half);
+    return seen / (1.0 - seen);
 }
 
 /* The mount's angle at an offset over what the frames measure without the mount's own part. */
 static double complex correction(const bst_tracking_loop *loop, double w, double offset_s) {
-    double period = loop->timing.period_s;
-    double complex back = cexp(-I * w * period), open = bst_tracking_open(loop, w), c, r;
-    if (loop->observes) {
-        double complex innovation = 1.0 / (1.0 + open);
-        r = loop->beta / period / (1.0 - back) * innovation;
-        c = (open + loop->alpha) * innovation + r * loop->timing.effect_s;
-    } else {
-        r = bst_compensator_response(&loop->compensator, w) / (1.0 + open);
-        c = r * period * back / (1.0 - back);
-    }
+    double complex c, r;
+    corrected_by(loop, w, &c, &r);
     return angle_mean(loop, w, c, r, offset_s, offset_s);
 }
 

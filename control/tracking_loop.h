@@ -41,8 +41,13 @@ void bst_tracking_loop_free(bst_tracking_loop *loop);
  * it, at omega rad/s. `user` is a bst_tracking_loop. */
 double complex bst_tracking_plant(const void *user, double omega_radps);
 
-/* The open loop: compensator times plant; of the observer, from the innovation to the prediction
- * that it is taken against. `user` is a bst_tracking_loop. */
+/* The open loop, broken where the mount's motion shows in the frames: compensator times plant. The
+ * observer takes from each measurement what telemetry says of that motion, and so has no loop as
+ * long as telemetry is right; its open loop is H / (1 - H), H from a measurement to the motion that
+ * it brings about in the frames: its margins tell how much more, or later, the image may move than
+ * telemetry says (internal model control: Morari and Zafiriou, Robust Process Control, 1989,
+ * chapter 3). When a correction acts before the next exposure begins, that is the observer's own
+ * loop broken at the innovation. `user` is a bst_tracking_loop. */
 double complex bst_tracking_open(const void *user, double omega_radps);
 
 /* Pointing error over disturbance at omega rad/s (any), at offset_s from the middle of each

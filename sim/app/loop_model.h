@@ -50,7 +50,7 @@ typedef struct bst_loop_model {
     double pixel_rad;
     bst_loop_timing timing;
     double command_latency_s;
-    bool observes; /* the observer: margins are of its innovation */
+    bool observes; /* the observer: margins as of bst_tracking_open */
     double alpha, beta;
     bst_compensator gains; /* else */
     bst_loop_axis axis[BST_LOOP_AXES];

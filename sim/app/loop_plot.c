@@ -34,8 +34,8 @@ static void put_frequency_data(FILE *o, const char *name, const bst_loop *loop,
     fputs("BST_END\n", o);
 }
 
-static bst_status put_step_data(bst_ctx *ctx, FILE *o, const char *name, const bst_loop *loop,
-                                const bst_loop_margins *m) {
+static void put_step_data(FILE *o, const char *name, const bst_loop *loop,
+                          const bst_loop_margins *m) {
     double out[STEP_POINTS];
     /* samples no denser than a two-hundredth of the crossover's period */
     double every = m->crossover_hz > 0.0 ? 1.0 / (m->crossover_hz * loop->dt_s) : 1.0;
@@ -45,7 +45,7 @@ static bst_status put_step_data(bst_ctx *ctx, FILE *o, const char *name, const b
     }
     if (!m->stable) {
         fprintf(o, "$%s << BST_END\n0 nan\nBST_END\n", name);
-        return BST_OK;
+        return;
     }
     bst_loop_step_response(&slow, STEP_LENGTH, NAN, out, STEP_POINTS);
     fprintf(o, "$%s << BST_END\n", name);
@@ -54,7 +54,6 @@ static bst_status put_step_data(bst_ctx *ctx, FILE *o, const char *name, const b
         fprintf(o, "%.9g %.9g\n", n * slow.dt_s, out[n]);
     }
     fputs("BST_END\n", o);
-    return ctx ? BST_OK : BST_OK;
 }
 
 /* Disturbance to pointing error, beyond half the frame rate too; and the jitter's density. */
@@ -73,7 +72,7 @@ static void put_rejection_data(FILE *o, const bst_loop_axis *axis, double period
 static void put_panels(FILE *o, bool tracked) {
     const char *loop = tracked ? "tracking" : "servo";
     fprintf(o,
-            "set multiplot layout 2,2 margins 0.07,0.97,0.08,0.90 spacing 0.09,0.12\n"
+            "set multiplot layout 2,2 margins 0.07,0.97,0.07,0.93 spacing 0.14,0.11\n"
             "set grid linecolor rgb '#d8dde4'\nset logscale x\nset key top right samplen 2\n"
             "set xlabel 'Hz'\nset ylabel 'open loop, dB'\nset y2label 'phase, deg'\n"
             "set y2tics 90\nset ytics nomirror\nset yrange [-60:60]\nset y2range [-540:0]\n"
@@ -83,7 +82,7 @@ static void put_panels(FILE *o, bool tracked) {
             "-180 axes x1y2 with lines linecolor rgb '#8a97a8' dashtype 2 notitle\n",
             loop, loop);
     fprintf(o,
-            "unset logscale x\nunset y2label\nunset y2tics\nset ytics mirror\n"
+            "unset title\nunset logscale x\nunset y2label\nunset y2tics\nset ytics mirror\n"
             "set xlabel 'Re L'\nset ylabel 'Im L'\nset xrange [-3:1.5]\nset yrange [-2.2:2.2]\n"
             "set key off\nset object 1 circle at -1,0 size 0.5 front fillstyle empty border "
             "linecolor rgb '#2a8c6e'\n"
@@ -124,18 +123,16 @@ bst_status bst_loop_plot(bst_ctx *ctx, const char *path, const bst_loop_model *m
     const bst_loop *loop = axis->tracked ? &axis->loop : &axis->servo.loop;
     const bst_loop_margins *m = axis->tracked ? &axis->margins : &axis->servo.margins;
     put_frequency_data(o, axis->tracked ? "tracking" : "servo", loop, m);
-    bst_status status =
-        put_step_data(ctx, o, axis->tracked ? "tracking_step" : "servo_step", loop, m);
+    put_step_data(o, axis->tracked ? "tracking_step" : "servo_step", loop, m);
     if (axis->tracked) {
         put_rejection_data(o, axis, model->timing.period_s);
     }
     fprintf(o,
             "set title \"%s/%s, %s axis: %s%s, gain margin %.3g dB, phase margin %.3g deg, "
-            "delay margin %.3g s, peak %.3g\" noenhanced offset 30,0\n",
+            "delay margin %.3g s, peak %.3g\" noenhanced offset 34,0\n",
             model->observer_name, model->sensor_name, axis->name,
             axis->tracked ? "tracking loop, " : "servo", axis->tracked ? model->compensator : "",
             m->gain_margin_db, m->phase_margin_deg, m->delay_margin_s, m->sensitivity_peak);
     put_panels(o, axis->tracked);
-    bst_status ended = bst_plot_end(ctx, &plot, NULL);
-    return status == BST_OK ? ended : status;
+    return bst_plot_end(ctx, &plot, NULL);
 }
