@@ -85,6 +85,7 @@ typedef struct bst_control_aimed {
 typedef struct bst_control {
     bst_control_config config;
     bst_control_env env;
+    int64_t latency_ticks, rate_half_ticks;
     bst_pointing_error pointing_error;
     bst_image_loop image_loop; /* sets pointing_error, unless the compensator is the observer */
     int mode;
@@ -92,6 +93,7 @@ typedef struct bst_control {
     bst_control_transition transitions[BST_CONTROL_TRANSITIONS];
     int transition_count;
     bst_nav_telemetry nav;
+    bst_aberration aberration; /* by nav, once that is valid */
     bool nav_valid;
     bst_control_held held;                    /* the track that the aim is on */
     bst_control_held lost;                    /* the target that BST_MODE_REACQUIRE looks for */
