@@ -48,8 +48,8 @@ void bst_loop_print(const bst_loop_model *model) {
         const bst_loop_axis *axis = &model->axis[a];
         if (axis->tracked && model->observes) {
             printf(
-                "  %s axis, tracking loop: observer, broken at its innovation (alpha %.3g, beta "
-                "%.3g)\n",
+                "  %s axis, tracking loop: observer (alpha %.3g, beta %.3g), broken where the "
+                "mount's motion shows in the frames\n",
                 axis->name, model->alpha, model->beta);
         } else if (axis->tracked) {
             printf("  %s axis, tracking loop: %s\n", axis->name, model->compensator);
