@@ -74,6 +74,7 @@ bst_status bst_platform_equip(const bst_module_env *env, bst_platform *platform,
 void bst_platform_free(bst_platform *platform) {
     bst_craft_free(platform->spacecraft);
     free_sky(platform->sky);
+    bst_jitter_free(&platform->jitter);
     platform->spacecraft = NULL;
     platform->sky = NULL;
 }
