@@ -48,6 +48,9 @@ static bst_status prepare(const bst_module_env *env, int type, const bst_mount_c
     BST_TRY(bst_mount_init(env->ctx, &m->mount, type, c, m->dt_s, bst_env_rng(env, "encoder")));
     BST_TRY(bst_platform_equip(env, &m->platform, platform, m->dt_s));
     m->mount.want_reaction = m->platform.spacecraft != NULL;
+    double inertia[6], zero[BST_MOUNT_MOST] = {0.0};
+    bst_chain_locked_inertia(&m->mount.joints.chain, zero, inertia);
+    BST_TRY(bst_platform_check_mount(env->ctx, &m->platform, inertia));
     BST_TRY(bst_platform_check_history(env->ctx, platform, env->exposure_s));
     BST_TRY(bst_platform_divider(env->ctx, "telemetry_rate_hz", 1.0 / m->dt_s,
                                  platform->telemetry_rate_hz, &m->telemetry_steps));
