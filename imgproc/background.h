@@ -35,17 +35,22 @@ bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int m
                                  int threads, bst_background *out) BST_MUST_CHECK;
 void bst_background_free(bst_background *background);
 
+/* The digital values of pixels, in electrons: origin_e + step_e n. */
+typedef struct bst_background_steps {
+    double step_e, origin_e;
+} bst_background_steps;
+
 /* Estimates level and noise in each mesh of a frame: median and median absolute deviation of a
  * sample, then mean and standard deviation within 3 sigma, four times, from half of the rows where
- * a mesh has 4096 pixels and more. Both are corrected for the
- * clipping, which takes more off the long tail of counted electrons (variance beyond
- * read_variance_e2) than off the other; the deviation also for the slope of the level. step_e (> 0)
- * is a digital number's worth of electrons; no pixel is better known than it. A mesh without usable
- * pixels takes the frame's medians. Then each mesh takes the mean with those pairs of opposite
- * neighbours whose mean agrees with it to four standard errors: a slope stays what it is, and where
- * the sky is even the error falls to a third. */
+ * a mesh has 4096 pixels and more. The last time is cut midway between digital values, and both are
+ * corrected for it as the noise of a normal part of read_variance_e2 and counted electrons asks
+ * (clipped.h); the deviation also for the slope of the level. No pixel is better known than its
+ * step, step_e (> 0) / sqrt(12). A mesh without usable pixels takes the frame's medians. Then each
+ * mesh takes the mean with those pairs of opposite neighbours whose mean agrees with it to four
+ * standard errors: a slope stays what it is, and where the sky is even the error falls to a third.
+ */
 void bst_background_read(bst_background *background, bst_parallel *pool, bst_pixel_fn pixels,
-                         const void *user, int width, int height, float step_e,
+                         const void *user, int width, int height, const bst_background_steps *steps,
                          double read_variance_e2);
 /* The same of image [height][width] whose noise is normal. */
 void bst_background_estimate(bst_background *background, const float *image, int width, int height,

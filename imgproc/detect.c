@@ -177,25 +177,28 @@ static void read_electrons(const void *user, int y, int x, int count, float *out
 typedef struct judge {
     const bst_imgproc *ip;
     double threshold;
-    double read_variance; /* of a pixel's noise that is normal, e-^2 */
+    double normal_variance; /* of a pixel's noise that is not counted electrons, e-^2 */
 } judge;
 
-/* A maximum counts when the output between the pixels exceeds what noise of this skewness exceeds
- * as rarely as normal noise the threshold. */
+static bool exceeds(double peak, const judge *g, const bst_tail_weights *weights,
+                    const bst_tail_noise *noise) {
+    return peak > g->threshold && peak > bst_tail_quantile(g->threshold, weights, noise);
+}
+
+/* A maximum counts when the output between the pixels exceeds what the noise there exceeds as
+ * rarely as normal noise the threshold. */
 static bool stands_out(const void *user, const bst_candidate *c) {
     const judge *g = user;
     const bst_filter *f = &g->ip->filter;
-    double noise = bst_background_noise_at(&g->ip->background, c->x, c->y);
-    double counted = fmax(noise * noise - g->read_variance, 0.0);
-    /* cumulants of the electrons that were counted, over the pixel's noise */
-    double skewness = counted / (noise * noise * noise), excess = skewness / noise;
-    if (bst_filter_peak(f, g->ip->electrons, noise, false, c->x, c->y) >
-        bst_tail_quantile(g->threshold, skewness * f->point_cubes, excess * f->point_fourths)) {
+    double noise_e = bst_background_noise_at(&g->ip->background, c->x, c->y);
+    bst_tail_noise noise = {noise_e, fmax(noise_e * noise_e - g->normal_variance, 0.0),
+                            g->ip->camera.gain_e_per_dn};
+    double point = bst_filter_peak(f, g->ip->electrons, noise_e, false, c->x, c->y);
+    if (exceeds(point, g, &f->point_weights, &noise)) {
         return true;
     }
-    return f->streak && bst_filter_peak(f, g->ip->electrons, noise, true, c->x, c->y) >
-                            bst_tail_quantile(g->threshold, skewness * f->streak_cubes,
-                                              excess * f->streak_fourths);
+    return f->streak && exceeds(bst_filter_peak(f, g->ip->electrons, noise_e, true, c->x, c->y), g,
+                                &f->streak_weights, &noise);
 }
 
 /* The digital number from which a pixel no longer measures: the converter's end or the full well.
@@ -353,8 +356,9 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
     reader read = {ip, frame, width};
     double gain = ip->camera.gain_e_per_dn, read_noise = ip->camera.read_noise_e;
     double read_variance = read_noise * read_noise + gain * gain / 12.0;
-    bst_background_read(&ip->background, pool, read_electrons, &read, width, height,
-                        (float)ip->camera.gain_e_per_dn, read_variance);
+    bst_background_steps steps = {gain, -ip->camera.offset_dn * gain};
+    bst_background_read(&ip->background, pool, read_electrons, &read, width, height, &steps,
+                        read_noise * read_noise);
     double dx, dy;
     filter_path(ip, whole, motion, &dx, &dy);
     ip->streak_px = hypot(dx, dy) * frame->binning;
