@@ -13,6 +13,7 @@ static const float QUANTISATION = 0.28867513f;
 
 enum {
     SAMPLE = 96,
+    LEFT_SHARE = 16,
     CLIP_PASSES = 4,
     MANY_PX = 4096 /* a mesh of so many pixels is known well enough from half of its rows */
 };
@@ -40,6 +41,8 @@ bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int m
     out->level = calloc(meshes, sizeof(float));
     out->noise = calloc(meshes, sizeof(float));
     out->error = calloc(meshes, sizeof(float));
+    out->left = calloc(meshes, sizeof(int));
+    out->read = calloc(meshes, sizeof(int));
     out->scratch = calloc(2 * meshes, sizeof(float));
     /* a mesh at the end may be half as long again */
     size_t height = (size_t)(mesh_px + mesh_px / 2 + 1);
@@ -47,7 +50,8 @@ bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int m
     out->band = band_stride(max_width) * height;
     out->lent = calloc(1, sizeof *out->lent);
     out->bands = calloc(out->band * (size_t)threads, sizeof(float));
-    if (!out->level || !out->noise || !out->error || !out->scratch || !out->bands || !out->lent) {
+    if (!out->level || !out->noise || !out->error || !out->left || !out->read || !out->scratch ||
+        !out->bands || !out->lent) {
         bst_background_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu background meshes", meshes);
     }
@@ -59,6 +63,8 @@ void bst_background_free(bst_background *b) {
     free(b->level);
     free(b->noise);
     free(b->error);
+    free(b->left);
+    free(b->read);
     free(b->scratch);
     free(b->bands);
     free(b->lent);
@@ -141,6 +147,7 @@ typedef struct reading {
     const void *user;
     float step_e;
     double origin_e; /* a digital value */
+    bool again;      /* a mesh may stay as it is */
 } reading;
 
 /* Sums over the pixels from low to high: their number, mean and variance. False for less than two.
@@ -219,6 +226,15 @@ static bool estimate_mesh(const reading *r, const mesh_pixels *m, float *level, 
     return true;
 }
 
+/* Pixels of a mesh that are measurements. */
+static int count_left(const mesh_pixels *m) {
+    int left = 0;
+    for (int y = 0; y < m->height; y++) {
+        left += bst_row_good(m->pixels + (size_t)y * m->stride, m->width);
+    }
+    return left;
+}
+
 /* Meshes of rows begin to end. */
 static void read_rows(void *user, int begin, int end) {
     const reading *r = user;
@@ -241,6 +257,13 @@ static void read_rows(void *user, int begin, int end) {
             int x0 = i * b->mesh_px, x1 = i + 1 == b->columns ? b->width : x0 + b->mesh_px;
             int k = j * b->columns + i;
             mesh_pixels m = {band + x0, stride, x1 - x0, rows};
+            if (r->again) {
+                b->left[k] = count_left(&m);
+                b->read[k] = m.width * m.height;
+                if (b->left[k] * LEFT_SHARE < b->read[k]) {
+                    continue;
+                }
+            }
             if (!estimate_mesh(r, &m, &b->level[k], &b->noise[k], &b->error[k])) {
                 b->noise[k] = -1.0f;
             }
@@ -304,6 +327,16 @@ static void take_slope_off(bst_background *b) {
 
 static void fill_gaps(bst_background *b, float step_e);
 
+static void read_meshes(bst_background *b, bst_parallel *pool, const reading *r) {
+    /* a small frame is done before another thread wakes */
+    int grain = 65536 / (b->width * b->mesh_px) + 1;
+    bst_parallel_for(pool, b->rows, grain, read_rows, (void *)r);
+    fill_gaps(b, r->step_e);
+    smooth(b, b->level, false);
+    take_slope_off(b);
+    smooth(b, b->noise, true);
+}
+
 void bst_background_read(bst_background *b, bst_parallel *pool, bst_pixel_fn pixels,
                          const void *user, int width, int height, const bst_background_steps *steps,
                          double read_variance_e2) {
@@ -313,14 +346,21 @@ void bst_background_read(bst_background *b, bst_parallel *pool, bst_pixel_fn pix
     int half = b->mesh_px / 2;
     b->columns = (width + half) / b->mesh_px > 0 ? (width + half) / b->mesh_px : 1;
     b->rows = (height + half) / b->mesh_px > 0 ? (height + half) / b->mesh_px : 1;
-    reading r = {b, read_variance_e2, pixels, user, (float)steps->step_e, steps->origin_e};
-    /* a small frame is done before another thread wakes */
-    int grain = 65536 / (width * b->mesh_px) + 1;
-    bst_parallel_for(pool, b->rows, grain, read_rows, &r);
-    fill_gaps(b, r.step_e);
-    smooth(b, b->level, false);
-    take_slope_off(b);
-    smooth(b, b->noise, true);
+    reading r = {b, read_variance_e2, pixels, user, (float)steps->step_e, steps->origin_e, false};
+    read_meshes(b, pool, &r);
+}
+
+double bst_background_read_again(bst_background *b, bst_parallel *pool, bst_pixel_fn pixels,
+                                 const void *user, const bst_background_steps *steps,
+                                 double read_variance_e2) {
+    reading r = {b, read_variance_e2, pixels, user, (float)steps->step_e, steps->origin_e, true};
+    read_meshes(b, pool, &r);
+    double left = 0.0, read = 0.0;
+    for (int k = 0; k < b->columns * b->rows; k++) {
+        left += b->left[k];
+        read += b->read[k];
+    }
+    return left / read;
 }
 
 typedef struct picture {

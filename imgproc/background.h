@@ -19,10 +19,11 @@ typedef struct bst_background {
     int width, height, columns, rows; /* of the latest frame */
     float *level, *noise;             /* [rows][columns], electrons */
     float *error;                     /* [rows][columns]: standard error of level over noise */
-    float *scratch;                   /* all meshes, for medians and smoothing */
-    float *bands;                     /* one for each thread: the pixels of a row of meshes */
-    size_t band;                      /* floats of a band */
-    bst_borrow *lent;                 /* of bands */
+    int *left, *read; /* [rows][columns], of the latest read_again: pixels left, and all of them */
+    float *scratch;   /* all meshes, for medians and smoothing */
+    float *bands;     /* one for each thread: the pixels of a row of meshes */
+    size_t band;      /* floats of a band */
+    bst_borrow *lent; /* of bands */
     float median_level, median_noise;
 } bst_background;
 
@@ -52,6 +53,11 @@ typedef struct bst_background_steps {
 void bst_background_read(bst_background *background, bst_parallel *pool, bst_pixel_fn pixels,
                          const void *user, int width, int height, const bst_background_steps *steps,
                          double read_variance_e2);
+/* The same again of the same frame with pixels left out; returns the share of pixels that were not.
+ * A mesh of which less than a sixteenth is left stays as it is. */
+double bst_background_read_again(bst_background *background, bst_parallel *pool,
+                                 bst_pixel_fn pixels, const void *user,
+                                 const bst_background_steps *steps, double read_variance_e2);
 /* The same of image [height][width] whose noise is normal. */
 void bst_background_estimate(bst_background *background, const float *image, int width, int height,
                              float step_e);

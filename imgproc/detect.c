@@ -21,6 +21,11 @@ static const double JITTER_BEND = 0.075;
 static const double DRIFT_PX = 1.0;
 /* Share of a measured or told bend that may be no bend. */
 static const double BEND_LEFT = 0.05;
+/* In a crowd light is what the filter says so much of; what it says is little there, since noise is
+ * told too high. */
+static const float STAR_SNR = 3.0f;
+/* Share of a crowded frame that is taken for open sky at the least. */
+static const double LEAST_OPEN = 0.02;
 /* Above the threshold by this no skewness of noise matters. */
 static const double CERTAIN_ABOVE = 1.5;
 
@@ -171,6 +176,12 @@ static void read_electrons(const void *user, int y, int x, int count, float *out
     if (ip->maps.dark_e_per_s || ip->maps.flat || ip->bad) {
         correct(ip, r->frame, y, x, count, out);
     }
+}
+
+static void read_between_stars(const void *user, int y, int x, int count, float *out) {
+    const reader *r = user;
+    read_electrons(user, y, x, count, out);
+    bst_filter_mask(&r->ip->filter, y, x, count, STAR_SNR, out);
 }
 
 /* What tells noise from a source. */
@@ -336,6 +347,11 @@ static bst_detection report(const bst_imgproc *ip, const bst_locate_frame *f,
     return d;
 }
 
+/* The output from which maxima are looked at in between the pixels. */
+static double look_from(const bst_imgproc *ip, double threshold) {
+    return ip->smeared ? threshold : fmax(0.93 * ip->filter.corner, LOOK_SHARE) * threshold;
+}
+
 /* How a frame, or a window of one, was searched. */
 typedef struct part {
     double threshold, false_alarms;
@@ -370,9 +386,19 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
                     (double)(whole->window.height / whole->binning);
     double false_alarms = (search ? 0.5 : 1.0) * ip->config.false_alarms_per_frame;
     double threshold = bst_filter_threshold(&ip->filter, false_alarms, pixels);
-    double look = ip->smeared ? threshold : fmax(0.93 * ip->filter.corner, LOOK_SHARE) * threshold;
+    int saturated_dn = saturation_dn(ip, frame);
     bst_filter_run(&ip->filter, pool, &ip->background, read_electrons, &read, frame->pixels,
-                   ip->electrons, width, height, saturation_dn(ip, frame), (float)look);
+                   ip->electrons, width, height, saturated_dn, (float)look_from(ip, threshold));
+    if (ip->filter.crowded && !ip->smeared) {
+        double share = bst_background_read_again(&ip->background, pool, read_between_stars, &read,
+                                                 &steps, read_noise * read_noise);
+        /* where there are stars noise makes no detections of its own */
+        pixels *= fmax(share, LEAST_OPEN);
+        threshold = bst_filter_threshold(&ip->filter, false_alarms, pixels);
+        bst_filter_run(&ip->filter, pool, &ip->background, read_electrons, &read, frame->pixels,
+                       ip->electrons, width, height, saturated_dn, (float)look_from(ip, threshold));
+    }
+    double look = look_from(ip, threshold);
     judge noise = {ip, threshold, read_variance};
     double certain = ip->smeared ? threshold : threshold + CERTAIN_ABOVE;
     bst_candidates_find(&ip->candidates, pool, &ip->filter,

@@ -568,3 +568,14 @@ float bst_filter_streak_at(const bst_filter *f, int x, int y) {
     }
     return sum;
 }
+
+void bst_filter_mask(const bst_filter *f, int y, int x, int count, float snr, float *out) {
+    /* the map's margin is zero */
+    const float *map = f->streak ? f->best : f->point;
+    const float *rows[2 * BST_ROW_NEAR + 1];
+    for (int j = -BST_ROW_NEAR; j <= BST_ROW_NEAR; j++) {
+        int v = y + j < 0 ? 0 : y + j < f->height ? y + j : f->height - 1;
+        rows[j + BST_ROW_NEAR] = map + (long)(v + f->pad) * f->stride + f->pad + x;
+    }
+    bst_row_mask(rows, count, snr, out);
+}

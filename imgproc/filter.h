@@ -79,6 +79,11 @@ void bst_filter_run(bst_filter *filter, bst_parallel *pool, const bst_background
                     bst_pixel_fn read, const void *user, const uint16_t *raw, float *signal,
                     int width, int height, int saturated_dn, float threshold);
 
+/* Sets to BST_PIXEL_BAD those of the `count` pixels of row y from column x on that lie within two
+ * rows and columns of one where the greater output of the latest frame is above `snr`. Only when a
+ * map of it is kept (filter->crowded). */
+void bst_filter_mask(const bst_filter *filter, int y, int x, int count, float snr, float *out);
+
 /* The greatest output within about half a pixel of (x, y) in between the pixels: for a point
  * by kernels shifted in steps of 1/4 px and a parabola through the best, on signal with the noise
  * at that place; for the streak by a quadratic through the logarithms of 3 x 3 outputs. Not below
