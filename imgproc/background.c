@@ -185,7 +185,7 @@ static void last_edges(const reading *r, float level, float noise, float *low, f
     double variance = (double)noise * (double)noise;
     double counted = fmax(variance - r->read_variance, 0.0);
     bool few = noise<FEW_STEPS * r->step_e, skew = counted> MUCH_SKEW * variance * (double)noise;
-    float limit = fmaxf((skew ? 5.0f : few ? 4.0f : 3.0f) * noise, 1.5f * r->step_e);
+    float limit = fmaxf((few ? 4.0f : skew ? 5.0f : 3.0f) * noise, 1.5f * r->step_e);
     *low = between_steps(r, level - limit);
     *high = between_steps(r, level + limit);
 }

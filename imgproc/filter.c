@@ -265,6 +265,10 @@ void bst_filter_set(bst_filter *f, double sigma_px, double dx_px, double dy_px) 
     }
 }
 
+/* Share of a smooth field's maxima above a threshold that a parabola through five shifts sees above
+ * it: nine see 1.7 % more, in 2,000 maxima. */
+static const double SEEN = 0.97;
+
 double bst_filter_threshold(bst_filter *f, double false_alarms, double pixels) {
     if (f->threshold > 0.0 && f->threshold_density == false_alarms / pixels) {
         return f->threshold;
@@ -276,7 +280,7 @@ double bst_filter_threshold(bst_filter *f, double false_alarms, double pixels) {
         if (f->streak) {
             rate += bst_tail_maxima(u, f->streak_density) * (1.0 - bst_tail_both(u, u, f->overlap));
         }
-        if (rate * pixels > false_alarms) {
+        if (SEEN * rate * pixels > false_alarms) {
             lo = u;
         } else {
             hi = u;
