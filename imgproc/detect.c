@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "imgproc/bad_map.h"
+#include "imgproc/electrons.h"
 #include "imgproc/imgproc.h"
 #include "imgproc/locate.h"
 #include "imgproc/rows.h"
@@ -138,50 +139,16 @@ void bst_imgproc_free(bst_imgproc *ip) {
     free(ip);
 }
 
-/* Dark, flat and bad pixels of part of a binned row, from the full-sensor maps. */
-static void correct(const bst_imgproc *ip, const bst_imgproc_frame *frame, int y, int first,
-                    int count, float *out) {
-    int b = frame->binning;
-    size_t stride = (size_t)ip->camera.width_px;
-    float share = 1.0f / (float)(b * b);
-    for (int x = 0; x < count; x++) {
-        float dark = 0.0f, flat = 0.0f;
-        bool bad = false;
-        for (int j = 0; j < b; j++) {
-            size_t k = (size_t)(frame->window.y0 + y * b + j) * stride +
-                       (size_t)(frame->window.x0 + (first + x) * b);
-            for (int i = 0; i < b; i++, k++) {
-                dark += ip->maps.dark_e_per_s ? ip->maps.dark_e_per_s[k] : 0.0f;
-                flat += ip->maps.flat ? ip->maps.flat[k] : 1.0f;
-                bad = bad || (ip->bad && ip->bad[k]);
-            }
-        }
-        bad = bad || !(flat > 0.0f);
-        out[x] = bad ? BST_PIXEL_BAD : (out[x] - dark * (float)frame->exposure_s) / (flat * share);
-    }
-}
+typedef struct sparing_reader {
+    bst_electrons read;
+    const bst_filter *filter;
+} sparing_reader;
 
-typedef struct reader {
-    const bst_imgproc *ip;
-    const bst_imgproc_frame *frame;
-    int width;
-} reader;
-
-static void read_electrons(const void *user, int y, int x, int count, float *out) {
-    const reader *r = user;
-    const bst_imgproc *ip = r->ip;
-    const uint16_t *raw = r->frame->pixels + (size_t)y * (size_t)r->width + (size_t)x;
-    bst_row_electrons(raw, count, (float)ip->camera.offset_dn, (float)ip->camera.gain_e_per_dn,
-                      out);
-    if (ip->maps.dark_e_per_s || ip->maps.flat || ip->bad) {
-        correct(ip, r->frame, y, x, count, out);
-    }
-}
-
+/* Without the stars that the filter found. */
 static void read_between_stars(const void *user, int y, int x, int count, float *out) {
-    const reader *r = user;
-    read_electrons(user, y, x, count, out);
-    bst_filter_mask(&r->ip->filter, y, x, count, STAR_SNR, out);
+    const sparing_reader *r = user;
+    bst_electrons_read(&r->read, y, x, count, out);
+    bst_filter_mask(r->filter, y, x, count, STAR_SNR, out);
 }
 
 /* What tells noise from a source. */
@@ -369,11 +336,12 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
     ip->exposure_s = frame->exposure_s;
     ip->binning = frame->binning;
 
-    reader read = {ip, frame, width};
+    sparing_reader sparing = {{&ip->camera, &ip->maps, ip->bad, frame}, &ip->filter};
+    const bst_electrons *read = &sparing.read;
     double gain = ip->camera.gain_e_per_dn, read_noise = ip->camera.read_noise_e;
     double read_variance = read_noise * read_noise + gain * gain / 12.0;
     bst_background_steps steps = {gain, -ip->camera.offset_dn * gain};
-    bst_background_read(&ip->background, pool, read_electrons, &read, width, height, &steps,
+    bst_background_read(&ip->background, pool, bst_electrons_read, read, width, height, &steps,
                         read_noise * read_noise);
     double dx, dy;
     filter_path(ip, whole, motion, &dx, &dy);
@@ -387,15 +355,15 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
     double false_alarms = (search ? 0.5 : 1.0) * ip->config.false_alarms_per_frame;
     double threshold = bst_filter_threshold(&ip->filter, false_alarms, pixels);
     int saturated_dn = saturation_dn(ip, frame);
-    bst_filter_run(&ip->filter, pool, &ip->background, read_electrons, &read, frame->pixels,
+    bst_filter_run(&ip->filter, pool, &ip->background, bst_electrons_read, read, frame->pixels,
                    ip->electrons, width, height, saturated_dn, (float)look_from(ip, threshold));
     if (ip->filter.crowded && !ip->smeared) {
-        double share = bst_background_read_again(&ip->background, pool, read_between_stars, &read,
-                                                 &steps, read_noise * read_noise);
+        double share = bst_background_read_again(&ip->background, pool, read_between_stars,
+                                                 &sparing, &steps, read_noise * read_noise);
         /* where there are stars noise makes no detections of its own */
         pixels *= fmax(share, LEAST_OPEN);
         threshold = bst_filter_threshold(&ip->filter, false_alarms, pixels);
-        bst_filter_run(&ip->filter, pool, &ip->background, read_electrons, &read, frame->pixels,
+        bst_filter_run(&ip->filter, pool, &ip->background, bst_electrons_read, read, frame->pixels,
                        ip->electrons, width, height, saturated_dn, (float)look_from(ip, threshold));
     }
     double look = look_from(ip, threshold);
