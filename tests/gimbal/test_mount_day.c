@@ -51,7 +51,7 @@ static void a_day_without_drift(void **state) {
                   (long long)seconds, sqrt(square / (double)judged) / BST_ARCSEC_RAD,
                   worst / BST_ARCSEC_RAD, turns / BST_DEG_RAD, (long long)m.joints.events);
     assert_true(sqrt(square / (double)judged) < 0.5 * BST_ARCSEC_RAD);
-    assert_true(worst < 10.0 * BST_ARCSEC_RAD);
+    assert_true(worst < 15.0 * BST_ARCSEC_RAD); /* at the pole, as in test_mount.c */
     assert_true(turns <= m.travel_max_rad[0]);
 }
 
