@@ -50,7 +50,7 @@ static bst_reach follows(const bst_reach_problem *problem, const bst_vec3 body[3
         return BST_REACH_TRAVEL;
     }
     for (int k = 0; k <= 2; k += 2) {
-        if (bst_mount_solve(mount, body[k], angle[1], ways) == 0) {
+        if (bst_mount_angles(mount, body[k], angle[1], ways) == 0) {
             return BST_REACH_TRAVEL;
         }
         for (int i = 0; i < BST_MOUNT_AXES; i++) {

@@ -67,8 +67,8 @@ static pair pair_of(const bst_mount_status *mount, bst_vec3 direction, const dou
     return p;
 }
 
-int bst_mount_solve(const bst_mount_status *mount, bst_vec3 direction_body,
-                    const double near_rad[BST_MOUNT_AXES], double angle_rad[2][BST_MOUNT_AXES]) {
+int bst_mount_angles(const bst_mount_status *mount, bst_vec3 direction_body,
+                     const double near_rad[BST_MOUNT_AXES], double angle_rad[2][BST_MOUNT_AXES]) {
     if (!bst_mount_steers(mount)) {
         return 0;
     }
@@ -140,7 +140,7 @@ static bool bring_within(const bst_mount_axis *axis, double *angle) {
 bool bst_mount_nearest(const bst_mount_status *mount, bst_vec3 direction_body,
                        const double near_rad[BST_MOUNT_AXES], double angle_rad[BST_MOUNT_AXES]) {
     double ways[2][BST_MOUNT_AXES], best = INFINITY;
-    int count = bst_mount_solve(mount, direction_body, near_rad, ways);
+    int count = bst_mount_angles(mount, direction_body, near_rad, ways);
     for (int k = 0; k < count; k++) {
         double distance = 0.0;
         bool within = true;
@@ -166,7 +166,7 @@ static int served(const bst_mount_status *mount, const bst_vec3 *directions, int
         at[i] = start[i];
     }
     for (int n = 0; n < count; n++) {
-        if (bst_mount_solve(mount, directions[n], at, ways) == 0 || !all_within(mount, ways[0])) {
+        if (bst_mount_angles(mount, directions[n], at, ways) == 0 || !all_within(mount, ways[0])) {
             return n;
         }
         for (int i = 0; i < BST_MOUNT_AXES; i++) {
@@ -182,7 +182,7 @@ bool bst_wrap_choose(const bst_mount_status *mount, const bst_vec3 *directions_b
     for (int i = 0; i < mount->axes; i++) {
         present[i] = mount->axis[i].angle_rad;
     }
-    int way_count = count > 0 ? bst_mount_solve(mount, directions_body[0], present, ways) : 0;
+    int way_count = count > 0 ? bst_mount_angles(mount, directions_body[0], present, ways) : 0;
     out->serves = 0;
     out->slew_s = INFINITY;
     for (int k = 0; k < way_count; k++) {

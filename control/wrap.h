@@ -16,13 +16,13 @@ bst_vec3 bst_mount_boresight(const bst_mount_status *mount, const double angle_r
  * nearest to near_rad, limits of travel not looked at. On the pole, where any outer angle will do,
  * it is that of near_rad. Paden and Kahan's subproblems 1 and 2 (Murray, Li and Sastry 1994, 3.2).
  */
-int bst_mount_solve(const bst_mount_status *mount, bst_vec3 direction_body,
-                    const double near_rad[BST_MOUNT_AXES], double angle_rad[2][BST_MOUNT_AXES]);
+int bst_mount_angles(const bst_mount_status *mount, bst_vec3 direction_body,
+                     const double near_rad[BST_MOUNT_AXES], double angle_rad[2][BST_MOUNT_AXES]);
 
 /* Whether an axis may stand at an angle. */
 bool bst_mount_within(const bst_mount_axis *axis, double angle_rad);
 
-/* The same as bst_mount_solve for the nearest way within travel, whole turns tried; false when
+/* The same as bst_mount_angles for the nearest way within travel, whole turns tried; false when
  * there is none. */
 bool bst_mount_nearest(const bst_mount_status *mount, bst_vec3 direction_body,
                        const double near_rad[BST_MOUNT_AXES], double angle_rad[BST_MOUNT_AXES]);

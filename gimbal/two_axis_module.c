@@ -109,10 +109,11 @@ static bst_status step(void *self, struct bst_step *s) {
     return BST_OK;
 }
 
-const bst_module_desc bst_gimbal_two_axis_module = {
+const bst_module_desc bst_gimbal_second_order_module = {
     .abi = BST_MODULE_ABI,
     .role = "gimbal",
-    .type = "two_axis",
+    .type = "second_order",
+    .also = "two_axis",
     .doc =
         "Two-axis gimbal with rate and acceleration limits and a second-order servo, on a "
         "drifting, jittering spacecraft.",
