@@ -134,9 +134,8 @@ bst_status bst_control_update(bst_ctx *ctx, bst_control *c, int64_t tick, bool *
         bst_vec3 bend = bst_vec3_axpy(bst_vec3_add(ahead, behind), -2.0, d);
         command->accel_gcrf_radps2 = bst_vec3_scale(bend, per_s2 * per_s2);
     }
-    *commanded = true;
     bst_vec3 boresight =
         bst_quat_rotate(bst_quat_conj(c->pointing.q_cam_from_gcrf), (bst_vec3){0, 0, 1});
     return bst_guidance_command(ctx, &c->guidance, &c->nav, c->pointing_valid ? &boresight : NULL,
-                                command);
+                                command, commanded);
 }

@@ -7,6 +7,8 @@
 /* Places along a motion of the axes that are looked at for cones, and a path's nodes. */
 #define SAMPLES 96
 #define PATH_NODES 385
+/* Of limits_share, along paths: their nodes hold the limits, what lies between to a few percent. */
+#define PATH_SHARE 0.9
 /* Directions to come that a turn is chosen by. */
 #define COMING 256
 
@@ -164,7 +166,7 @@ static bst_status plan_axes(bst_ctx *ctx, bst_guidance *g, int64_t tick, const b
         BST_TRY(target_angles(ctx, g, arrival, d, angle, to, &found));
         bst_quat body = bst_guidance_body(g, arrival + (int64_t)(0.1 * g->env.tick_rate_hz));
         bst_vec3 next = bst_quat_rotate(body, unit_after(d, r, 0.1));
-        if (!found || bst_mount_solve(&g->mount, next, to, ways) == 0) {
+        if (!found || bst_mount_angles(&g->mount, next, to, ways) == 0) {
             return BST_OK;
         }
         double duration = 0.0;
@@ -209,7 +211,7 @@ static void path_nodes(const bst_guidance *g, const bst_path *path, int64_t tick
     nodes->step = path->length_rad / (PATH_NODES - 1);
     *limits = (bst_slew_limits){.axes = steers ? g->mount.axes : 1};
     for (int i = 0; i < limits->axes; i++) {
-        double share = g->config.limits_share;
+        double share = PATH_SHARE * g->config.limits_share;
         double hard = steers ? share * g->mount.axis[i].accel_limit_radps2 : 0.0;
         limits->rate_radps[i] = steers ? share * g->mount.axis[i].rate_limit_radps : 0.0;
         limits->accel_radps2[i] = hard > 0.0 ? hard : 1.0;
@@ -297,7 +299,7 @@ static void command_slew(const bst_guidance *g, int64_t tick, bst_los_command *c
 static void keep_turn(bst_guidance *g, bst_los_command *command) {
     double ways[2][BST_MOUNT_AXES];
     bst_vec3 body = bst_quat_rotate(bst_guidance_body(g, command->tick), command->direction_gcrf);
-    if (!g->near_known || bst_mount_solve(&g->mount, body, g->near_rad, ways) == 0) {
+    if (!g->near_known || bst_mount_angles(&g->mount, body, g->near_rad, ways) == 0) {
         return;
     }
     command->near_given = true;
@@ -319,7 +321,7 @@ static bst_status still_wanted(bst_ctx *ctx, const bst_guidance *g, const bst_zo
 }
 
 static bst_status shape(bst_ctx *ctx, bst_guidance *g, const bst_nav_telemetry *nav,
-                        const bst_vec3 *boresight, bst_los_command *command) {
+                        const bst_vec3 *boresight, bst_los_command *command, bool *give) {
     bst_zone zones[BST_ZONE_KINDS];
     int zone_count = bst_guidance_zones(g, nav, zones);
     for (int i = 0; i < zone_count; i++) {
@@ -337,6 +339,7 @@ static bst_status shape(bst_ctx *ctx, bst_guidance *g, const bst_nav_telemetry *
     } else if (boresight) {
         from = *boresight;
     } else {
+        *give = false;
         return BST_OK;
     }
     if (g->slew.active) {
@@ -385,15 +388,18 @@ static bst_status shape(bst_ctx *ctx, bst_guidance *g, const bst_nav_telemetry *
 }
 
 bst_status bst_guidance_command(bst_ctx *ctx, bst_guidance *g, const bst_nav_telemetry *nav,
-                                const bst_vec3 *boresight, bst_los_command *command) {
+                                const bst_vec3 *boresight, bst_los_command *command, bool *give) {
+    *give = true;
     g->nav = *nav;
     if (g->config.look_ahead_s > 0.0 && command->tick >= g->ahead_tick) {
         g->ahead_tick =
             command->tick + (int64_t)llround(g->config.look_ahead_every_s * g->env.tick_rate_hz);
         BST_TRY(bst_guidance_look_ahead(ctx, g, command->tick));
     }
-    BST_TRY(shape(ctx, g, nav, boresight, command));
-    g->last = *command;
-    g->commanded = true;
+    BST_TRY(shape(ctx, g, nav, boresight, command, give));
+    if (*give) {
+        g->last = *command;
+        g->commanded = true;
+    }
     return BST_OK;
 }
