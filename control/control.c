@@ -17,6 +17,25 @@ static bst_status guidance_range(void *user, bst_ctx *ctx, int64_t tick, double 
                : BST_OK;
 }
 
+static bool on_image_error(const bst_control *c) {
+    return c->config.compensate_attitude && c->config.compensator.type != BST_CONTROL_OBSERVER;
+}
+
+static bst_status start_image_loop(bst_ctx *ctx, bst_control *c) {
+    if (!on_image_error(c)) {
+        return BST_OK;
+    }
+    bst_image_loop_env env = {.tick_rate_hz = c->env.tick_rate_hz,
+                              .frame_period_s = c->env.frame_period_s,
+                              .frame_exposure_s = c->env.frame_exposure_s,
+                              .frame_latency_s = c->env.frame_latency_s,
+                              .command_latency_s = c->config.command_latency_s,
+                              .servo_lag_s = c->config.servo_lag_s,
+                              .jump_rad = c->config.arrive_tolerance_px * c->env.pixel_rad};
+    bst_status status = bst_image_loop_init(ctx, &c->image_loop, &c->config.compensator, &env);
+    return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "compensator");
+}
+
 bst_status bst_control_init(bst_ctx *ctx, bst_control *control, const bst_control_config *config,
                             const bst_control_env *env) {
     if (config->period_s > 0.0 && config->exposure_s > config->period_s) {
@@ -41,7 +60,7 @@ bst_status bst_control_init(bst_ctx *ctx, bst_control *control, const bst_contro
                                        .range = guidance_range,
                                        .user = control};
     bst_guidance_init(&control->guidance, &config->guidance, &guidance);
-    return BST_OK;
+    return start_image_loop(ctx, control);
 }
 
 void bst_control_telemetry(bst_control *c, const bst_pointing_telemetry *pointing,
@@ -62,7 +81,9 @@ void bst_control_telemetry(bst_control *c, const bst_pointing_telemetry *pointin
 bst_status bst_control_observe(bst_ctx *ctx, bst_control *c, int64_t tick,
                                const bst_tracks *tracks) {
     bst_control_forget_aims(c); /* a new fix, and what is held may change */
-    if (c->config.compensate_attitude) {
+    if (on_image_error(c)) {
+        bst_image_loop_update(&c->image_loop, &c->pointing_error, tick, &tracks->attitude);
+    } else if (c->config.compensate_attitude) {
         bst_pointing_error_update(&c->pointing_error, &tracks->attitude, c->env.tick_rate_hz);
     }
     if (c->frame_tick != INT64_MIN && tracks->tick > c->frame_tick) {
@@ -133,6 +154,11 @@ bst_status bst_control_update(bst_ctx *ctx, bst_control *c, int64_t tick, bool *
         double per_s2 = c->env.tick_rate_hz / (double)half;
         bst_vec3 bend = bst_vec3_axpy(bst_vec3_add(ahead, behind), -2.0, d);
         command->accel_gcrf_radps2 = bst_vec3_scale(bend, per_s2 * per_s2);
+    }
+    if (on_image_error(c) &&
+        bst_image_loop_commanded(&c->image_loop, &c->pointing_error, effect, half,
+                                 (bst_vec3[]){d, ahead, behind}, arrived, c->pointing.tick)) {
+        bst_control_forget_aims(c);
     }
     bst_vec3 boresight =
         bst_quat_rotate(bst_quat_conj(c->pointing.q_cam_from_gcrf), (bst_vec3){0, 0, 1});

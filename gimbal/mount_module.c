@@ -32,6 +32,7 @@ typedef struct module {
 static void destroy(void *self) {
     module *m = self;
     if (m) {
+        bst_platform_free(&m->platform);
         bst_view_free(m->view);
         free(m);
     }
