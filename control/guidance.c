@@ -320,6 +320,15 @@ static bst_status still_wanted(bst_ctx *ctx, const bst_guidance *g, const bst_zo
     return BST_OK;
 }
 
+/* Whether there is a choice among turns to be made. */
+static bool turns_matter(const bst_guidance *g) {
+    bool matter = false;
+    for (int i = 0; g->config.look_ahead_s > 0.0 && g->mount_known && i < g->mount.axes; i++) {
+        matter = matter || g->mount.axis[i].max_rad - g->mount.axis[i].min_rad > 2.0 * BST_PI;
+    }
+    return matter;
+}
+
 static bst_status shape(bst_ctx *ctx, bst_guidance *g, const bst_nav_telemetry *nav,
                         const bst_vec3 *boresight, bst_los_command *command, bool *give) {
     bst_zone zones[BST_ZONE_KINDS];
@@ -327,7 +336,7 @@ static bst_status shape(bst_ctx *ctx, bst_guidance *g, const bst_nav_telemetry *
     for (int i = 0; i < zone_count; i++) {
         zones[i].half_angle_rad = fmin(zones[i].half_angle_rad + WIDER_RAD, BST_PI - 1e-6);
     }
-    if (zone_count == 0 && g->config.slews != BST_SLEWS_PLANNED) {
+    if (zone_count == 0 && g->config.slews != BST_SLEWS_PLANNED && !turns_matter(g)) {
         return BST_OK;
     }
     int64_t tick = command->tick;

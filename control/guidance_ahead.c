@@ -5,7 +5,9 @@
 #include "sim/astro/bodies.h"
 #include "sim/world/kepler.h"
 
-#define STEP_S 1.0
+/* Steps of the look: a thousandth of it within these. */
+#define LEAST_STEP_S 1.0
+#define MOST_STEP_S 10.0
 /* The chase starts so long before the limits are met, when the mount is still on its target. */
 #define RUN_UP_S 5.0
 /* A predicted loss that moves by more than this share of its length is told again. */
@@ -71,13 +73,14 @@ bst_status bst_guidance_look_ahead(bst_ctx *ctx, bst_guidance *g, int64_t tick) 
                                        .mount = g->mount_known ? &g->mount : NULL,
                                        .limits_share = g->config.limits_share};
     double horizon = g->config.look_ahead_s, now_s = (double)tick / g->env.tick_rate_hz;
+    double step = fmin(fmax(1e-3 * horizon, LEAST_STEP_S), MOST_STEP_S);
     double when = 0.0, until = INFINITY;
     bst_reach reach, why;
     bool found;
     BST_TRY(bst_reach_at(ctx, &problem, 0.0, &reach));
     if (reach != BST_REACH_OK) {
         if ((int)reach != g->reach) {
-            BST_TRY(bst_reach_next(ctx, &problem, 0.0, horizon, STEP_S, true, &found, &when, NULL));
+            BST_TRY(bst_reach_next(ctx, &problem, 0.0, horizon, step, true, &found, &when, NULL));
             tell(g, BST_GUIDANCE_UNREACHABLE, reach, now_s, found ? now_s + when : INFINITY);
         }
         g->reach = reach;
@@ -87,7 +90,7 @@ bst_status bst_guidance_look_ahead(bst_ctx *ctx, bst_guidance *g, int64_t tick) 
         tell(g, BST_GUIDANCE_REACHABLE, g->reach, now_s, now_s);
     }
     g->reach = BST_REACH_OK;
-    BST_TRY(bst_reach_next(ctx, &problem, 0.0, horizon, STEP_S, false, &found, &when, &why));
+    BST_TRY(bst_reach_next(ctx, &problem, 0.0, horizon, step, false, &found, &when, &why));
     if (!found) {
         return BST_OK;
     }
@@ -102,7 +105,7 @@ bst_status bst_guidance_look_ahead(bst_ctx *ctx, bst_guidance *g, int64_t tick) 
         }
         return BST_OK;
     }
-    BST_TRY(bst_reach_next(ctx, &problem, when, horizon, STEP_S, true, &found, &until, NULL));
+    BST_TRY(bst_reach_next(ctx, &problem, when, horizon, step, true, &found, &until, NULL));
     tell_ahead(g, now_s, BST_GUIDANCE_AHEAD, why, when, found ? until : INFINITY);
     return BST_OK;
 }

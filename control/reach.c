@@ -256,6 +256,9 @@ bst_status bst_reach_chase(bst_ctx *ctx, const bst_reach_problem *problem, doubl
                 losses[*count - 1].worst_rad = fmax(losses[*count - 1].worst_rad, off);
             }
         }
+        if (*count == most && !lost) {
+            return BST_OK;
+        }
         for (int i = 0; i < BST_MOUNT_AXES; i++) {
             to[i] = next[i];
         }
