@@ -61,6 +61,11 @@ bst_status bst_platform_init(bst_ctx *ctx, bst_platform *platform,
  * bst_platform_free. */
 bst_status bst_platform_equip(const bst_module_env *env, bst_platform *platform,
                               const bst_platform_config *config, double dt_s) BST_MUST_CHECK;
+/* BST_ERR_CONFIG when a mount of that inertia (kg m^2, in the order of bst_craft_spec) is too heavy
+ * for its spacecraft: its reaction comes a step late, which is stable while the mount's inertia is
+ * less than the rest's, here required to be below half of it. */
+bst_status bst_platform_check_mount(bst_ctx *ctx, const bst_platform *platform,
+                                    const double mount_kgm2[6]) BST_MUST_CHECK;
 /* What init and equip made; a zeroed platform is allowed. */
 void bst_platform_free(bst_platform *platform);
 
