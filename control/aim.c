@@ -49,6 +49,7 @@ bst_status bst_control_aim(bst_ctx *ctx, const bst_control *c, int64_t tick, boo
             return BST_OK;
         case BST_MODE_ACQUIRE:
         case BST_MODE_TRACK:
+        case BST_MODE_COAST:
             return held_at(ctx, c, &c->held, tick, direction);
         case BST_MODE_REACQUIRE: {
             bst_vec3 d;

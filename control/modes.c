@@ -145,6 +145,38 @@ static bool at_rest(const bst_control *c, int64_t mid_tick) {
     return c->arrival_tick >= 0 && half > 0 && mid_tick - half >= c->arrival_tick;
 }
 
+/* A frame that shows nothing new counts for the dwell. */
+static bst_status count_frame(bst_ctx *ctx, bst_control *c, int64_t tick,
+                              const bst_tracks *tracks) {
+    /* stars that give no valid attitude: the frame could show nothing */
+    bool wasted = tracks->attitude.stars > 0 && !tracks->attitude.valid;
+    if (!wasted && at_rest(c, tracks->tick) && ++c->frames >= c->config.dwell_frames) {
+        return next_tile(ctx, c, tick);
+    }
+    return BST_OK;
+}
+
+/* A target that its orbit hides, or that has not been seen since: the prediction is all there is.
+ */
+static bst_status observe_hidden(bst_ctx *ctx, bst_control *c, int64_t tick,
+                                 const bst_tracks *tracks, const bst_track *target) {
+    BST_TRY(hold(ctx, c, target, tracks->tick));
+    if (target->hidden == BST_HIDDEN_AWAITED) {
+        c->lost = c->held; /* what is searched about moves on with it */
+        if (c->mode != BST_MODE_REACQUIRE) {
+            return start_search(ctx, c, BST_MODE_REACQUIRE, tick,
+                                "the target should be seen again");
+        }
+        return count_frame(ctx, c, tick, tracks);
+    }
+    if (c->mode != BST_MODE_COAST) {
+        enter(c, BST_MODE_COAST, tick,
+              target->hidden == BST_HIDDEN_EARTH ? "the target is behind the Earth"
+                                                 : "the target is in the Earth's shadow");
+    }
+    return BST_OK;
+}
+
 /* A frame while nothing is held: take the target, or a candidate, or count the frame. */
 static bst_status observe_searching(bst_ctx *ctx, bst_control *c, int64_t tick,
                                     const bst_tracks *tracks, const bst_track *target) {
@@ -163,17 +195,12 @@ static bst_status observe_searching(bst_ctx *ctx, bst_control *c, int64_t tick,
         enter(c, BST_MODE_ACQUIRE, tick, "a candidate moves as the target should");
         return BST_OK;
     }
-    /* stars that give no valid attitude: the frame could show nothing */
-    bool wasted = tracks->attitude.stars > 0 && !tracks->attitude.valid;
-    if (!wasted && at_rest(c, tracks->tick) && ++c->frames >= c->config.dwell_frames) {
-        return next_tile(ctx, c, tick);
-    }
-    return BST_OK;
+    return count_frame(ctx, c, tick, tracks);
 }
 
 static bst_status observe_holding(bst_ctx *ctx, bst_control *c, int64_t tick,
                                   const bst_tracks *tracks, const bst_track *target) {
-    bool was_target = c->mode == BST_MODE_TRACK;
+    bool was_target = c->mode == BST_MODE_TRACK || c->mode == BST_MODE_COAST;
     const bst_track *track = target ? target : find_track(tracks, c->held.id);
     if (was_target && !target) {
         c->lost = c->held;
@@ -188,6 +215,9 @@ static bst_status observe_holding(bst_ctx *ctx, bst_control *c, int64_t tick,
     double off = off_boresight_px(c, tracks, track);
     if (c->mode == BST_MODE_ACQUIRE && target && off <= c->config.track_entry_px) {
         enter(c, BST_MODE_TRACK, tick, "the target is centred");
+    } else if (c->mode == BST_MODE_COAST) {
+        bool centred = off <= c->config.track_entry_px;
+        enter(c, centred ? BST_MODE_TRACK : BST_MODE_ACQUIRE, tick, "the target is seen again");
     } else if (other && off > c->config.arrive_tolerance_px) {
         enter(c, BST_MODE_ACQUIRE, tick, "the tracker names another target");
     }
@@ -197,6 +227,9 @@ static bst_status observe_holding(bst_ctx *ctx, bst_control *c, int64_t tick,
 bst_status bst_control_take_frame(bst_ctx *ctx, bst_control *c, int64_t tick,
                                   const bst_tracks *tracks) {
     const bst_track *target = find_track(tracks, tracks->target_id);
+    if (target && target->hidden != BST_HIDDEN_NOT && c->config.strategy == BST_CONTROL_TRACK) {
+        return observe_hidden(ctx, c, tick, tracks, target);
+    }
     switch (c->mode) {
         case BST_MODE_IDLE:
             /* without a cue only a target that the tracker names by itself can be followed */
@@ -210,6 +243,7 @@ bst_status bst_control_take_frame(bst_ctx *ctx, bst_control *c, int64_t tick,
             return observe_searching(ctx, c, tick, tracks, target);
         case BST_MODE_ACQUIRE:
         case BST_MODE_TRACK:
+        case BST_MODE_COAST:
             return observe_holding(ctx, c, tick, tracks, target);
         default:
             return BST_OK;

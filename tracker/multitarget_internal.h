@@ -76,6 +76,12 @@ void bst_mtt_associate(bst_mtt *mtt, bool partial);
  * the likeliest. Returns their number. */
 int bst_mtt_gated(const bst_mtt *mtt, int t, int *columns);
 
+/* Notes what there is to see of track t, already predicted, and whether it sleeps; sets observable
+ * and may_miss, the former having said whether its place is in the field. */
+void bst_mtt_look(bst_mtt *mtt, int t, const bst_mtt_frame *frame);
+/* Takes in the SNR of a detection in full light. */
+void bst_mtt_note_light(bst_mtt_track *track, double snr);
+
 /* Carries the memory to a frame; forgets what is too old or too vague. */
 void bst_mtt_predict_memory(bst_mtt *mtt, const bst_mtt_frame *frame);
 /* A track that has an orbit follows it to a frame; false: it has none, or the frame does not say
@@ -85,8 +91,8 @@ bool bst_mtt_predict_orbit(const bst_mtt *mtt, bst_mtt_track *track, const bst_m
 void bst_mtt_update_orbits(bst_mtt *mtt, const bst_mtt_frame *frame);
 /* Remembers a confirmed track that is deleted. */
 void bst_mtt_remember(bst_mtt *mtt, const bst_mtt_track *track);
-/* Gives a track that has just been confirmed the identity of the remembered one that it is; false
- * when it is none of them. */
+/* Gives a track that has just been confirmed the identity of the remembered or sleeping one that it
+ * is; false when it is none of them. A sleeping one is then `replaced`. */
 bool bst_mtt_resume(bst_mtt *mtt, bst_mtt_track *track);
 
 /* Note a hit's innovation, and the difference of its magnitude over its standard deviation; true

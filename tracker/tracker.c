@@ -7,6 +7,7 @@
 #include "sim/world/kepler.h"
 #include "tracker/attitude.h"
 #include "tracker/attitude_error.h"
+#include "tracker/sight.h"
 #include "tracker/sky_of_detection.h"
 #include "tracker/target.h"
 
@@ -14,6 +15,8 @@
 #define STAR_CACHE 4096
 /* Stars of one frame that the attitude looks at. */
 #define MAX_STARS 16384
+/* Taken for the detector's when it does not say. */
+#define USUAL_THRESHOLD_SNR 5.0
 
 typedef struct cached_star {
     uint32_t id; /* 0: empty */
@@ -331,6 +334,7 @@ typedef struct frame_view {
     bst_target_cue cue;
     double range_m, range_rate_mps; /* of the cue's object; range 0: not known */
     bst_od_observer observer;
+    double threshold_snr;
 } frame_view;
 
 static bool in_field(const void *user, bst_vec3 direction) {
@@ -366,6 +370,13 @@ static bool range_of(const void *user, const bst_mtt_track *track, bst_orbit_ran
         .range_rate_mps = cued ? f->range_rate_mps : 0.0,
         .range_rate_sigma_mps = cued ? t->range_rate_sigma_mps : ANY_RANGE_RATE_MPS};
     return true;
+}
+
+static bst_mtt_sight sight_of(const void *user, const bst_mtt_track *track, double *sunlight) {
+    const frame_view *f = user;
+    bst_vec3 eye = f->observer.position_m;
+    return bst_sight_of(track->orbit.state.position_m, eye, bst_vec3_add(eye, f->light.sun_m),
+                        track->full_snr, f->threshold_snr, sunlight);
 }
 
 /* The observer in mid-exposure, from navigation telemetry of about that time. */
@@ -438,7 +449,11 @@ static void write_track(const bst_tracker *t, const bst_target_cue *cue, const b
                     .x_px = track->x_px,
                     .y_px = track->y_px,
                     .uncorrelated = !is_target && track->status != BST_TRACK_TENTATIVE &&
-                                    !bst_target_is_expected(&t->target_params, cue, track, false)};
+                                    !bst_target_is_expected(&t->target_params, cue, track, false),
+                    .hidden = !track->asleep                  ? BST_HIDDEN_NOT
+                              : track->sight == BST_MTT_EARTH ? BST_HIDDEN_EARTH
+                              : track->sight == BST_MTT_CLEAR ? BST_HIDDEN_AWAITED
+                                                              : BST_HIDDEN_SHADOW};
     memcpy(out->covariance, track->state.covariance, sizeof out->covariance);
 }
 
@@ -557,6 +572,8 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
                            .common_rate_sigma_radps = attitude.rate_sigma_radps};
     if (t->orbits && find_observer(t, input->nav, seconds, &view.observer)) {
         frame.observer = &view.observer;
+        frame.sight = sight_of;
+        view.threshold_snr = d->threshold_snr > 0.0 ? d->threshold_snr : USUAL_THRESHOLD_SNR;
     }
     int detections_lost = 0;
     if (attitude.usable) {
