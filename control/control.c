@@ -104,9 +104,9 @@ bst_status bst_control_update(bst_ctx *ctx, bst_control *c, int64_t tick, bool *
     BST_TRY(bst_control_boresight_at(ctx, c, effect - half, &valid, &behind));
     bst_vec3 rate =
         bst_vec3_scale(bst_vec3_sub(ahead, behind), 0.5 * c->env.tick_rate_hz / (double)half);
-    command->tick = effect;
-    command->direction_gcrf = bst_vec3_unit(d);
-    command->rate_gcrf_radps = bst_vec3_axpy(rate, -bst_vec3_dot(rate, d), d);
+    *command = (bst_los_command){.tick = effect,
+                                 .direction_gcrf = bst_vec3_unit(d),
+                                 .rate_gcrf_radps = bst_vec3_axpy(rate, -bst_vec3_dot(rate, d), d)};
     *commanded = true;
     return BST_OK;
 }

@@ -6,7 +6,7 @@
 #include "gimbal/nav.h"
 #include "gimbal/platform.h"
 
-enum { PORT_HISTORY, PORT_POINTING, PORT_NAV, PORT_COUNT };
+enum { PORT_HISTORY, PORT_POINTING, PORT_NAV, PORT_MOUNT, PORT_COUNT };
 
 static const bst_port ports[PORT_COUNT] = {
     [PORT_HISTORY] = {.channel = BST_CHANNEL_LOS_HISTORY,
@@ -16,6 +16,7 @@ static const bst_port ports[PORT_COUNT] = {
                        .direction = BST_PORT_OUT,
                        .capacity = 800},
     [PORT_NAV] = {.channel = BST_CHANNEL_NAV_TELEMETRY, .direction = BST_PORT_OUT},
+    [PORT_MOUNT] = {.channel = BST_CHANNEL_MOUNT_STATUS, .direction = BST_PORT_OUT},
 };
 
 enum { TARGET_OBJECT, TARGET_DIRECTION, TARGET_STAR };
@@ -167,6 +168,10 @@ static bst_status step(void *self, struct bst_step *s) {
     if (n % m->telemetry_steps == 0) {
         bst_pointing_telemetry *telemetry = bst_step_write(s, PORT_POINTING, &capacity);
         bst_platform_append_exact(&m->platform, n, telemetry, capacity, tick, q_cam_from_body);
+        bst_mount_status *mount = bst_step_write(s, PORT_MOUNT, NULL);
+        *mount = (bst_mount_status){.tick = tick,
+                                    .q_body_from_cam_at_zero = BST_QUAT_IDENTITY,
+                                    .q_body_from_gcrf = telemetry->q_body_from_gcrf};
     }
     if (n % m->nav_steps == 0) {
         bst_nav_telemetry *nav = bst_step_write(s, PORT_NAV, NULL);

@@ -106,10 +106,12 @@ static double wrap(double angle) {
 /* Where the axes shall be at this step. */
 static void target(const bst_two_axis *plant, const bst_los_command *command, double age_s,
                    double angle_rad[2], double rate_radps[2], bool *at_stop) {
+    bst_vec3 rate = bst_vec3_axpy(command->rate_gcrf_radps, age_s, command->accel_gcrf_radps2);
     bst_vec3 v = bst_vec3_axpy(command->direction_gcrf, age_s, command->rate_gcrf_radps);
+    v = bst_vec3_axpy(v, 0.5 * age_s * age_s, command->accel_gcrf_radps2);
     double scale = 1.0 / bst_vec3_norm(v);
     bst_vec3 d = bst_vec3_scale(v, scale);
-    bst_vec3 r = bst_vec3_scale(command->rate_gcrf_radps, scale);
+    bst_vec3 r = bst_vec3_scale(rate, scale);
     r = bst_vec3_axpy(r, -bst_vec3_dot(r, d), d);
     bst_quat body = plant->platform.q_believed_from_gcrf;
     bst_two_axis_solve(bst_quat_rotate(body, d), bst_quat_rotate(body, r),
@@ -121,6 +123,26 @@ static void target(const bst_two_axis *plant, const bst_los_command *command, do
         angle_rad[1] = copysign(plant->inner_travel_rad, angle_rad[1]);
         rate_radps[1] = 0.0;
     }
+}
+
+void bst_two_axis_status(const bst_two_axis *plant, int64_t tick, bst_mount_status *out) {
+    *out = (bst_mount_status){.tick = tick,
+                              .axes = 2,
+                              .q_body_from_cam_at_zero = BST_QUAT_IDENTITY,
+                              .q_body_from_gcrf = plant->q_measured_body_from_gcrf};
+    for (int i = 0; i < 2; i++) {
+        const bst_axis *axis = &plant->axis[i];
+        out->axis[i] =
+            (bst_mount_axis){.axis_body = i == 0 ? (bst_vec3){0, 1, 0} : (bst_vec3){1, 0, 0},
+                             .angle_rad = plant->encoder_rad[i],
+                             .rate_radps = axis->reference_radps,
+                             .rate_limit_radps = axis->spec.rate_limit_radps,
+                             .accel_limit_radps2 = axis->spec.accel_limit_radps2,
+                             .flags = axis->limited ? BST_AXIS_SATURATED : 0u};
+    }
+    out->axis[1].min_rad = -plant->inner_travel_rad;
+    out->axis[1].max_rad = plant->inner_travel_rad;
+    out->axis[1].flags |= plant->at_stop ? BST_AXIS_AT_STOP : 0u;
 }
 
 void bst_two_axis_step(bst_two_axis *plant, const bst_los_command *command, double command_age_s,
@@ -156,6 +178,7 @@ void bst_two_axis_step(bst_two_axis *plant, const bst_los_command *command, doub
     double tolerance = plant->settle_tolerance_rad;
     plant->settled = command && off_o * off_o + off_i * off_i <= tolerance * tolerance &&
                      rate_o * rate_o + rate_i * rate_i <= settle_rate * settle_rate;
+    plant->at_stop = at_stop;
     plant->limited = at_stop || outer->limited || inner->limited;
 
     if (fabs(outer->reference_rad) > BST_PI) {

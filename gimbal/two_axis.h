@@ -34,7 +34,7 @@ typedef struct bst_two_axis {
     bst_quat q_measured_from_gcrf; /* encoders and measured body attitude */
     bst_quat q_measured_body_from_gcrf;
     double encoder_rad[2]; /* readings in (-pi, pi] plus noise */
-    bool settled, limited;
+    bool settled, limited, at_stop;
 } bst_two_axis;
 
 /* Random streams of a plant. */
@@ -52,6 +52,9 @@ bst_status bst_two_axis_init(bst_ctx *ctx, bst_two_axis *plant, const bst_two_ax
  * members are left alone (telemetry is slower than the plant). */
 void bst_two_axis_step(bst_two_axis *plant, const bst_los_command *command, double command_age_s,
                        bool measure);
+
+/* Geometry, limits and state as of the last step that measured. */
+void bst_two_axis_status(const bst_two_axis *plant, int64_t tick, bst_mount_status *out);
 
 /* Gimbal angles (outer in (-pi, pi], inner in [-pi/2, pi/2]) and their rates that put the boresight
  * on a body-axes direction with its time derivative. On the pole the outer angle is

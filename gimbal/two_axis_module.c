@@ -4,7 +4,7 @@
 #include "gimbal/nav.h"
 #include "gimbal/two_axis.h"
 
-enum { PORT_COMMAND, PORT_HISTORY, PORT_POINTING, PORT_NAV, PORT_COUNT };
+enum { PORT_COMMAND, PORT_HISTORY, PORT_POINTING, PORT_NAV, PORT_MOUNT, PORT_COUNT };
 
 static const bst_port ports[PORT_COUNT] = {
     [PORT_COMMAND] = {.channel = BST_CHANNEL_LOS_COMMAND,
@@ -17,6 +17,7 @@ static const bst_port ports[PORT_COUNT] = {
                        .direction = BST_PORT_OUT,
                        .capacity = 800},
     [PORT_NAV] = {.channel = BST_CHANNEL_NAV_TELEMETRY, .direction = BST_PORT_OUT},
+    [PORT_MOUNT] = {.channel = BST_CHANNEL_MOUNT_STATUS, .direction = BST_PORT_OUT},
 };
 
 typedef struct module {
@@ -98,6 +99,7 @@ static bst_status step(void *self, struct bst_step *s) {
         bst_platform_append_pointing(telemetry, capacity, tick, m->plant.q_measured_from_gcrf,
                                      m->plant.encoder_rad, m->plant.q_measured_body_from_gcrf,
                                      m->plant.settled, m->plant.limited);
+        bst_two_axis_status(&m->plant, tick, bst_step_write(s, PORT_MOUNT, NULL));
     }
     if (n % m->nav_steps == 0) {
         bst_nav_telemetry *nav = bst_step_write(s, PORT_NAV, NULL);

@@ -22,11 +22,13 @@
 #include "sim/io/manifest.h"
 #include "sim/io/wcs.h"
 
+#define TELEMETRY 4 /* channels */
+
 /* One sensor as the run watches it. */
 typedef struct watched_sensor {
     char scope[160];
     int recorder_index;
-    int64_t recorded[3]; /* latest telemetry by channel, on the recorder's grid */
+    int64_t recorded[TELEMETRY]; /* latest telemetry by channel, on the recorder's grid */
     bst_loop_summary *summary;
 } watched_sensor;
 
@@ -53,10 +55,11 @@ static watched_sensor *find_sensor(run_state *run, const char *scope) {
 
 /* Spares the telemetry that nobody below looks at: it comes at the plant's rate. */
 static bool wants(void *user, const char *scope, const char *channel, int64_t tick) {
-    static const char *const telemetry[3] = {
-        BST_CHANNEL_LOS_HISTORY, BST_CHANNEL_POINTING_TELEMETRY, BST_CHANNEL_NAV_TELEMETRY};
+    static const char *const telemetry[TELEMETRY] = {
+        BST_CHANNEL_LOS_HISTORY, BST_CHANNEL_POINTING_TELEMETRY, BST_CHANNEL_NAV_TELEMETRY,
+        BST_CHANNEL_MOUNT_STATUS};
     run_state *run = user;
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < TELEMETRY; i++) {
         if (strcmp(channel, telemetry[i]) == 0) {
             return bst_recorder_due(run->recorder, channel, tick,
                                     &find_sensor(run, scope)->recorded[i]);
@@ -298,7 +301,7 @@ static bst_status watch_sensors(run_state *run, const bst_world *world) {
                                                 target, &run->pictures));
                 bst_loop_summary_on_frame(w->summary, on_judged, run->pictures);
             }
-            for (int k = 0; k < 3; k++) {
+            for (int k = 0; k < TELEMETRY; k++) {
                 w->recorded[k] = -1;
             }
             run->sensor_count++;

@@ -24,6 +24,7 @@ static const bst_channel_type types[] = {
     WITH_ITEMS(BST_CHANNEL_LOS_HISTORY, BST_CHANNEL_LATEST, bst_los_history, bst_los_sample, true),
     WITH_ITEMS(BST_CHANNEL_POINTING_TELEMETRY, BST_CHANNEL_LATEST, bst_pointing_telemetry,
                bst_pointing_sample, true),
+    HEADER_ONLY(BST_CHANNEL_MOUNT_STATUS, BST_CHANNEL_LATEST, bst_mount_status),
     HEADER_ONLY(BST_CHANNEL_NAV_TELEMETRY, BST_CHANNEL_LATEST, bst_nav_telemetry),
     {BST_CHANNEL_FRAME, BST_CHANNEL_QUEUE, sizeof(bst_frame_message), 0, false, release_frame,
      retain_frame, false},

@@ -21,6 +21,7 @@
 #define BST_CHANNEL_LOS_COMMAND "los_command"
 #define BST_CHANNEL_LOS_HISTORY "los_history"
 #define BST_CHANNEL_POINTING_TELEMETRY "pointing_telemetry"
+#define BST_CHANNEL_MOUNT_STATUS "mount_status"
 #define BST_CHANNEL_NAV_TELEMETRY "nav_telemetry"
 #define BST_CHANNEL_FRAME "frame"
 #define BST_CHANNEL_TRUTH "truth"
@@ -86,6 +87,40 @@ typedef struct bst_pointing_telemetry {
     bst_pointing_sample items[];
 } bst_pointing_telemetry;
 
+enum { BST_MOUNT_AXES = 3 }; /* greatest number of axes of a mount */
+
+enum {
+    BST_AXIS_STUCK = 1u << 0,     /* commanded to move and does not */
+    BST_AXIS_SATURATED = 1u << 1, /* at its rate, acceleration or torque limit */
+    BST_AXIS_AT_STOP = 1u << 2,   /* held by the end of its travel */
+};
+
+/* One axis of a mount. Limits are what the mount allows a command to ask of it. */
+typedef struct bst_mount_axis {
+    bst_vec3 axis_body; /* unit: what it turns about, right-handed, when all angles are zero */
+    double angle_rad;   /* encoder, with whole turns: a cable is wound by as much */
+    double rate_radps;
+    double rate_limit_radps, accel_limit_radps2; /* 0: none */
+    double min_rad, max_rad; /* travel; both 0: turns without end, and angle_rad in (-pi, pi] */
+    bool redundant; /* not needed to reach a direction: the mount follows its axis_near_rad, or
+                       moves it as it sees fit */
+    uint32_t flags; /* BST_AXIS_... */
+} bst_mount_axis;
+
+/* mount_status (latest): geometry, limits and state of the mount, as far as it is known onboard,
+ * at the rate of pointing_telemetry. The attitude of the camera in the body is
+ * q_body_from_cam = R(axis 0, angle 0) R(axis 1, angle 1) ... q_body_from_cam_at_zero, axes in
+ * order from the body outwards to the camera, R(a, t) the rotation by t about a. */
+typedef struct bst_mount_status {
+    int64_t tick; /* of validity */
+    int32_t axes; /* 0: follows any command at once (an ideal mount) */
+    bool wheels_saturated;
+    bst_quat q_body_from_cam_at_zero;
+    bst_quat q_body_from_gcrf; /* measured */
+    bst_vec3 rate_body_radps;  /* measured inertial rate of the body, body axes */
+    bst_mount_axis axis[BST_MOUNT_AXES];
+} bst_mount_status;
+
 /* nav_telemetry (latest): what the spacecraft knows of its own orbit. */
 typedef struct bst_nav_telemetry {
     int64_t tick;               /* of validity */
@@ -96,11 +131,17 @@ typedef struct bst_nav_telemetry {
 } bst_nav_telemetry;
 
 /* los_command (latest): where the boresight shall be, as the onboard attitude knowledge sees it.
- * The command at tick t is the unit vector along direction + rate * (t - tick) / tick rate. */
+ * The command at tick t is the unit vector along direction + rate * dt + acceleration * dt^2 / 2,
+ * dt = (t - tick) / tick rate. All zero after the rate: straight on, by the nearest way round. */
 typedef struct bst_los_command {
-    int64_t tick;             /* of reference */
-    bst_vec3 direction_gcrf;  /* unit, apparent */
-    bst_vec3 rate_gcrf_radps; /* d(direction)/dt, perpendicular to direction */
+    int64_t tick;                      /* of reference */
+    bst_vec3 direction_gcrf;           /* unit, apparent */
+    bst_vec3 rate_gcrf_radps;          /* d(direction)/dt, perpendicular to direction */
+    bst_vec3 accel_gcrf_radps2;        /* d2(direction)/dt2 */
+    bool near_given;                   /* which of the angles that point alike are meant is told: */
+    double near_rad[BST_MOUNT_AXES];   /* those next to these (by axis of mount_status), at `tick`;
+                                          else those next to the present angles */
+    double near_radps[BST_MOUNT_AXES]; /* their rates */
 } bst_los_command;
 
 /* frame (queue). The channel slot owns one reference of `frame`. */

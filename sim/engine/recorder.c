@@ -84,6 +84,7 @@ static const channel_rows channels[] = {
     {BST_CHANNEL_LOS_COMMAND, BST_TABLE_LOS_COMMANDS, bst_recorder_los_command_rows},
     {BST_CHANNEL_SENSOR_COMMAND, BST_TABLE_SENSOR_COMMANDS, bst_recorder_sensor_command_rows},
     {BST_CHANNEL_POINTING_TELEMETRY, BST_TABLE_POINTING, bst_recorder_pointing_rows},
+    {BST_CHANNEL_MOUNT_STATUS, BST_TABLE_MOUNT, bst_recorder_mount_rows},
     {BST_CHANNEL_NAV_TELEMETRY, BST_TABLE_NAV, bst_recorder_nav_rows},
     {BST_CHANNEL_CONTROL_STATUS, BST_TABLE_CONTROL, bst_recorder_control_rows},
 };
@@ -145,7 +146,7 @@ static bst_status fill(bst_ctx *ctx, bst_recorder *recorder, const bst_recorder_
         BST_TRY(copy_name(ctx, s->target, sizeof s->target, from->target));
         s->camera = *from->camera;
         s->has_truth = from->has_truth;
-        s->last_los = s->last_pointing = s->last_nav = s->last_control = -1;
+        s->last_los = s->last_pointing = s->last_mount = s->last_nav = s->last_control = -1;
         s->last_mode = -1;
         s->shown.id = -1;
         s->last_target = -1;

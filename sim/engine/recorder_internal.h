@@ -21,6 +21,7 @@ typedef enum bst_record_table {
     BST_TABLE_LOS_COMMANDS,
     BST_TABLE_SENSOR_COMMANDS,
     BST_TABLE_POINTING,
+    BST_TABLE_MOUNT,
     BST_TABLE_NAV,
     BST_TABLE_CONTROL,
     BST_TABLE_EVENTS,
@@ -53,7 +54,7 @@ typedef struct bst_recorder_state {
     bst_truth_head heads[BST_TRUTH_HEADS];
     int next_head;
     /* the last period of the telemetry's grid in which each of these was recorded */
-    int64_t last_los, last_pointing, last_nav, last_control;
+    int64_t last_los, last_pointing, last_mount, last_nav, last_control;
     int32_t last_mode;
     int64_t last_target;
 } bst_recorder_state;
@@ -92,6 +93,7 @@ BST_RECORDER_ROWS(bst_recorder_track_rows);
 BST_RECORDER_ROWS(bst_recorder_los_command_rows);
 BST_RECORDER_ROWS(bst_recorder_sensor_command_rows);
 BST_RECORDER_ROWS(bst_recorder_pointing_rows);
+BST_RECORDER_ROWS(bst_recorder_mount_rows);
 BST_RECORDER_ROWS(bst_recorder_nav_rows);
 BST_RECORDER_ROWS(bst_recorder_control_rows);
 

@@ -68,7 +68,7 @@ static bool is_due(const bst_recorder *recorder, int64_t tick, int64_t *last) {
 bool bst_recorder_due(const bst_recorder *recorder, const char *channel, int64_t tick,
                       int64_t *last) {
     static const char *const decimated[] = {BST_CHANNEL_LOS_HISTORY, BST_CHANNEL_POINTING_TELEMETRY,
-                                            BST_CHANNEL_NAV_TELEMETRY};
+                                            BST_CHANNEL_MOUNT_STATUS, BST_CHANNEL_NAV_TELEMETRY};
     for (size_t i = 0; i < sizeof decimated / sizeof *decimated; i++) {
         if (strcmp(channel, decimated[i]) == 0) {
             return bst_recorder_wants(recorder, channel) && is_due(recorder, tick, last);
@@ -415,6 +415,7 @@ bst_status bst_recorder_los_command_rows(bst_ctx *ctx, bst_recorder *recorder, i
     put_real(&r, seconds(recorder, c->tick));
     put_radec(&r, c->direction_gcrf);
     put_vector(&r, c->rate_gcrf_radps);
+    put_vector(&r, c->accel_gcrf_radps2);
     return append(ctx, recorder, BST_TABLE_LOS_COMMANDS, &r);
 }
 
@@ -454,6 +455,29 @@ bst_status bst_recorder_pointing_rows(bst_ctx *ctx, bst_recorder *recorder, int 
     put_flag(&r, p->settled);
     put_flag(&r, p->limited);
     return append(ctx, recorder, BST_TABLE_POINTING, &r);
+}
+
+bst_status bst_recorder_mount_rows(bst_ctx *ctx, bst_recorder *recorder, int sensor,
+                                   const void *payload, int64_t written_tick) {
+    const bst_mount_status *m = payload;
+    if (!is_due(recorder, written_tick, &recorder->sensors[sensor].last_mount)) {
+        return BST_OK;
+    }
+    row r = {.count = 0};
+    put_int(&r, sensor);
+    put_int(&r, m->tick);
+    put_real(&r, seconds(recorder, m->tick));
+    put_int(&r, m->axes);
+    for (int i = 0; i < BST_MOUNT_AXES; i++) {
+        const bst_mount_axis *a = &m->axis[i];
+        double there = i < m->axes ? DEG : NAN;
+        put_real(&r, a->angle_rad * there);
+        put_real(&r, a->rate_radps * there);
+        put_int(&r, i < m->axes ? (int64_t)a->flags : 0);
+    }
+    put_vector(&r, bst_vec3_scale(m->rate_body_radps, DEG));
+    put_flag(&r, m->wheels_saturated);
+    return append(ctx, recorder, BST_TABLE_MOUNT, &r);
 }
 
 bst_status bst_recorder_nav_rows(bst_ctx *ctx, bst_recorder *recorder, int sensor,

@@ -246,6 +246,7 @@ static const bst_column los_command_columns[] = {
     REAL("ra_deg", "deg", "apparent direction commanded at tick"),
     REAL("dec_deg", "deg", "apparent direction commanded at tick"),
     VECTOR("rate_gcrf", "radps", "rad/s", "rate of the direction"),
+    VECTOR("accel_gcrf", "radps2", "rad/s^2", "its acceleration"),
 };
 static const bst_column sensor_command_columns[] = {
     SENSOR,
@@ -269,6 +270,21 @@ static const bst_column pointing_columns[] = {
     QUATERNION("q_body_from_gcrf", "body attitude as the spacecraft believes it"),
     INT("settled", "", "1: the servo has settled"),
     INT("limited", "", "1: an axis is at a limit"),
+};
+#define AXIS(n)                                                            \
+    REAL("axis" n "_deg", "deg", "encoder of the axis, with whole turns"), \
+        REAL("axis" n "_rate_degps", "deg/s", "rate of the axis"),         \
+        INT("axis" n "_flags", "", "1: stuck, 2: at a limit, 4: at a stop")
+static const bst_column mount_columns[] = {
+    SENSOR,
+    TICK,
+    TIME,
+    INT("axes", "", "axes of the mount; 0: ideal"),
+    AXIS("0"),
+    AXIS("1"),
+    AXIS("2"),
+    VECTOR("body_rate", "degps", "deg/s", "measured rate of the body, body axes"),
+    INT("wheels_saturated", "", "1: the spacecraft's wheels are"),
 };
 static const bst_column nav_columns[] = {
     SENSOR,
@@ -325,6 +341,7 @@ static const table_spec specs[BST_TABLE_COUNT] = {
     [BST_TABLE_SENSOR_COMMANDS] =
         SPEC("sensor_commands", sensor_command_columns, "Commands to the sensor."),
     [BST_TABLE_POINTING] = SPEC("pointing", pointing_columns, "Pointing telemetry."),
+    [BST_TABLE_MOUNT] = SPEC("mount", mount_columns, "The mount's axes, from the body outwards."),
     [BST_TABLE_NAV] = SPEC("nav", nav_columns, "Navigation telemetry."),
     [BST_TABLE_CONTROL] =
         SPEC("control", control_columns, "Control, at the telemetry's rate and at each change."),
@@ -349,6 +366,7 @@ static bool wanted(const bst_record_config *config, bst_record_table table) {
         case BST_TABLE_SENSOR_COMMANDS:
             return config->commands;
         case BST_TABLE_POINTING:
+        case BST_TABLE_MOUNT:
         case BST_TABLE_NAV:
         case BST_TABLE_CONTROL:
             return config->telemetry_hz > 0.0;

@@ -187,6 +187,9 @@ static void send_all(bst_ctx *ctx, bst_recorder *recorder) {
     free(t);
     const bst_los_command los = {.tick = 5000, .direction_gcrf = {0, 1, 0}};
     send(ctx, recorder, BST_CHANNEL_LOS_COMMAND, &los, 4800);
+    const bst_mount_status mount = {
+        .tick = 4800, .axes = 2, .axis = {{.angle_rad = BST_PI, .flags = BST_AXIS_STUCK}}};
+    send(ctx, recorder, BST_CHANNEL_MOUNT_STATUS, &mount, 4800);
     const bst_sensor_command sensor = {.exposure_s = 0.5, .window = {1, 2, 3, 4}};
     send(ctx, recorder, BST_CHANNEL_SENSOR_COMMAND, &sensor, 4800);
     bst_assert_ok(ctx, bst_recorder_event(ctx, recorder, 4800, "alpha/wide/control", "mode",
@@ -248,6 +251,8 @@ static void test_tables(void **state) {
         bst_assert_close(number(db, "SELECT attitude_error_x_arcsec FROM track_frames"), 1.0,
                          1e-12);
         assert_is(db, "SELECT ra_deg FROM los_commands WHERE written_tick = 4800", 90.0);
+        assert_is(db, "SELECT axis0_deg FROM mount WHERE axis0_flags = 1 AND axis2_deg IS NULL",
+                  180.0);
         assert_is(db, "SELECT width_px FROM sensor_commands WHERE x0_px = 1 AND y0_px = 2", 3);
         assert_is(db, "SELECT time_s FROM events WHERE kind = 'mode' AND text LIKE 'acq%'", 0.8);
         /* every column says what it is */
