@@ -5,6 +5,8 @@
 
 #include "tracker/multitarget_internal.h"
 
+#define JUMP_FLOOR_RAD 1e-6
+
 static bool pool_create(bst_mtt_pool *pool, int capacity) {
     size_t n = (size_t)capacity + 1;
     pool->order = calloc(n, sizeof *pool->order);
@@ -151,6 +153,11 @@ static bool cue_acceleration(const bst_mtt_frame *frame, double dt_s, bst_vec3 *
         return false;
     }
     *step = bst_vec3_scale(bst_tangent_log(now, cue.direction), -1.0);
+    /* what accelerates evenly is off by half the change of its rate; a cue that is off by more than
+     * its rate has jumped */
+    if (bst_vec3_norm(*step) > 2.0 * bst_vec3_norm(frame->cue_rate_radps) * dt_s + JUMP_FLOOR_RAD) {
+        return false;
+    }
     *rate = bst_vec3_sub(bst_tangent_project(now, frame->cue_rate_radps),
                          bst_tangent_carry(cue.direction, now, cue.rate_radps));
     return true;

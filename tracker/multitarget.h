@@ -145,6 +145,9 @@ typedef struct bst_mtt_frame {
     bst_vec3 cue_direction, cue_rate_radps;
     bst_vec3 cue_before_direction, cue_before_rate_radps;
     double cue_rate_sigma_radps;
+    /* The rate that the cue expects of what is seen in a direction; false: none. NULL: the cue's
+     * own rate everywhere. */
+    bool (*expected_rate)(const void *user, bst_vec3 direction, bst_vec3 *rate_radps);
     /* Is a track what the cue expects, so that its slowness says nothing? NULL: none is. */
     bool (*expected)(const void *user, const bst_mtt_track *track);
     /* Where the observer is, for tracks on orbits; NULL: their orbits wait. */
