@@ -386,31 +386,55 @@ static float inverse_node(const bst_background *b, const between *r, int i) {
     return 1.0f / (v[r->first] + r->noise * (v[r->second] - v[r->first]));
 }
 
-/* Part i, from the centre of column i - 1 to that of column i, ends at the last at the latest. */
-static bst_row_part part_at(const bst_background *b, const between *r, int i) {
-    float step = 1.0f / (float)b->mesh_px, centre = 0.5f * (float)(b->mesh_px - 1);
-    int last = b->columns - 1, end = i <= last ? b->mesh_px / 2 + i * b->mesh_px : b->width;
-    bst_row_part out = {.end = end < b->width ? end : b->width};
-    /* which two nodes the line goes through */
-    int a = i > 0 ? i - 1 : 0, c = i < last ? i : last;
-    float node = inverse_node(b, r, a);
-    out.inverse_slope = a == c ? 0.0f : (inverse_node(b, r, c) - node) * step;
-    out.inverse = node - out.inverse_slope * (centre + (float)(a * b->mesh_px));
-    if (last > 0) {
-        a = a < last ? a : last - 1;
-        c = a + 1;
+/* The parts of an image row from left to right. */
+typedef struct part_walk {
+    between rows;
+    int next;                   /* part */
+    float level[2], inverse[2]; /* at the two nodes that the latest line goes through */
+} part_walk;
+
+static part_walk walk_parts(const bst_background *b, int y) {
+    part_walk w = {.rows = rows_about(b, y)};
+    int right = b->columns > 1 ? 1 : 0;
+    for (int k = 0; k < 2; k++) {
+        w.level[k] = level_node(b, &w.rows, k * right);
+        w.inverse[k] = inverse_node(b, &w.rows, k * right);
     }
-    node = level_node(b, r, a);
-    out.level_slope = (level_node(b, r, c) - node) * step;
-    out.level = node - out.level_slope * (centre + (float)(a * b->mesh_px));
+    return w;
+}
+
+/* Part i, from the centre of column i - 1 to that of column i, ends at the last at the latest. */
+static bst_row_part next_part(const bst_background *b, part_walk *w) {
+    float step = 1.0f / (float)b->mesh_px, centre = 0.5f * (float)(b->mesh_px - 1);
+    int i = w->next++, last = b->columns - 1;
+    if (i >= 2 && i <= last) {
+        w->level[0] = w->level[1];
+        w->inverse[0] = w->inverse[1];
+        w->level[1] = level_node(b, &w->rows, i);
+        w->inverse[1] = inverse_node(b, &w->rows, i);
+    }
+    int end = i <= last ? b->mesh_px / 2 + i * b->mesh_px : b->width;
+    bst_row_part out = {.end = end < b->width ? end : b->width};
+    /* the first of the two nodes */
+    int node = i < 2 ? 0 : i <= last ? i - 1 : last - 1;
+    node = node > 0 ? node : 0;
+    float at = centre + (float)(node * b->mesh_px);
+    out.level_slope = (w->level[1] - w->level[0]) * step;
+    out.level = w->level[0] - out.level_slope * at;
+    if (i == 0 || i > last) {
+        out.inverse = w->inverse[i == 0 ? 0 : 1];
+    } else {
+        out.inverse_slope = (w->inverse[1] - w->inverse[0]) * step;
+        out.inverse = w->inverse[0] - out.inverse_slope * at;
+    }
     return out;
 }
 
 int bst_background_parts(const bst_background *b, int y, bst_row_part *parts) {
-    between r = rows_about(b, y);
+    part_walk w = walk_parts(b, y);
     int count = 0, begin = 0;
     for (int i = 0; i <= b->columns; i++) {
-        bst_row_part part = part_at(b, &r, i);
+        bst_row_part part = next_part(b, &w);
         if (part.end > begin) {
             begin = part.end;
             parts[count++] = part;
@@ -420,9 +444,9 @@ int bst_background_parts(const bst_background *b, int y, bst_row_part *parts) {
 }
 
 void bst_background_row(const bst_background *b, int y, float *level, float *inverse_noise) {
-    between r = rows_about(b, y);
+    part_walk w = walk_parts(b, y);
     for (int i = 0, x = 0; i <= b->columns; i++) {
-        bst_row_part part = part_at(b, &r, i);
+        bst_row_part part = next_part(b, &w);
         if (part.end > x) {
             bst_row_line(level + x, part.end - x, part.level, part.level_slope, (float)x);
             bst_row_line(inverse_noise + x, part.end - x, part.inverse, part.inverse_slope,

@@ -165,8 +165,9 @@ typedef struct reader {
 static void read_electrons(const void *user, int y, int x, int count, float *out) {
     const reader *r = user;
     const bst_imgproc *ip = r->ip;
-    bst_row_electrons(r->frame->pixels + (size_t)y * (size_t)r->width + (size_t)x, count,
-                      (float)ip->camera.offset_dn, (float)ip->camera.gain_e_per_dn, out);
+    const uint16_t *raw = r->frame->pixels + (size_t)y * (size_t)r->width + (size_t)x;
+    bst_row_electrons(raw, count, (float)ip->camera.offset_dn, (float)ip->camera.gain_e_per_dn,
+                      out);
     if (ip->maps.dark_e_per_s || ip->maps.flat || ip->bad) {
         correct(ip, r->frame, y, x, count, out);
     }

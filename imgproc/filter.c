@@ -12,7 +12,10 @@ enum {
     PART_PX = 131072, /* pixels of a part of a pass */
     GROUP = 4,        /* rows that are made at a time */
     LATEST = 3,       /* of the streak map that are kept beside it */
-    CACHED_PX = 1 << 20
+    CACHED_PX = 1 << 20,
+    FEW_TAPS = 24,  /* of a streak whose output is quickly made where it is asked for */
+    CROWD_PX = 400, /* to a maximum: where they are as dense as that it is asked for often */
+    SOON_PX = 512   /* that are read ahead at a time: as many lines as are on their way at once */
 };
 
 bst_status bst_filter_create(bst_ctx *ctx, int max_width, int max_height, double streak_max_px,
@@ -304,6 +307,7 @@ typedef struct pass {
     int saturated_dn, part_rows;
     int reach;       /* rows above and below that a row of the streak map needs */
     bool past_cache; /* the frame is larger than that */
+    bool apart;      /* rows of the streak map are kept no longer than maxima need them */
     float threshold;
 } pass;
 
@@ -361,10 +365,16 @@ static void filter_across(const pass *p, int y, bool own, float *lines, float *o
     bst_row_normalise(p->raw + row, electrons, parts, bst_background_parts(p->background, y, parts),
                       p->saturated_dn, own && p->past_cache, signal, normalised + r);
     const float *in[2 * BST_FILTER_MAX_RADIUS + 1];
-    for (int t = 0; t <= 2 * r; t++) {
-        in[t] = normalised + t;
+    for (int x = 0; x < width; x += SOON_PX) {
+        int count = width - x < SOON_PX ? width - x : SOON_PX;
+        if (y + 1 < f->height) {
+            bst_row_prefetch(p->raw + row + (size_t)(width + x), count);
+        }
+        for (int t = 0; t <= 2 * r; t++) {
+            in[t] = normalised + x + t;
+        }
+        bst_row_even(out + x, count, in + r, f->kernel + r, r);
     }
-    bst_row_even(out, width, in + r, f->kernel + r, r);
 }
 
 /* `count` (1 or GROUP) rows of the point map from the ring of horizontal parts. */
@@ -397,7 +407,7 @@ static void filter_rows(void *user, int begin, int end) {
     float *lines = f->lines + f->line_floats * (size_t)taken, *ring = lines + 6 * line;
     /* the latest rows of the streak map: maxima are looked for while they are near */
     float *latest = ring + line * (size_t)ring_rows + f->pad;
-    bool apart = f->streak && p->past_cache;
+    bool ring_of_streaks = f->streak && p->past_cache;
     memset(lines, 0, line * sizeof(float));
     memset(latest - f->pad, 0, LATEST * line * sizeof(float));
     for (int y = begin - r, next = begin; y < end + r; y++) {
@@ -411,13 +421,14 @@ static void filter_rows(void *user, int begin, int end) {
                 int ready = k - p->reach;
                 if (f->streak && ready >= begin + p->reach) {
                     float *row = map_row(f, f->best, ready);
-                    filter_streak(f, ready, apart ? latest + line * (size_t)(ready % LATEST) : row,
-                                  apart ? row : NULL);
+                    filter_streak(f, ready,
+                                  ring_of_streaks ? latest + line * (size_t)(ready % LATEST) : row,
+                                  ring_of_streaks && !p->apart ? row : NULL);
                 }
                 if (ready - 2 < begin + p->reach) {
                     continue;
                 }
-                if (apart) {
+                if (ring_of_streaks) {
                     note_maxima(f, ready - 1, latest + line * (size_t)((ready - 2) % LATEST),
                                 latest + line * (size_t)((ready - 1) % LATEST),
                                 latest + line * (size_t)(ready % LATEST), p->threshold);
@@ -446,6 +457,13 @@ static void finish_streaks(void *user, int begin, int end) {
     }
 }
 
+static void keep_streaks(void *user, int begin, int end) {
+    const pass *p = user;
+    for (int y = begin; y < end; y++) {
+        filter_streak(p->f, y, map_row(p->f, p->f->best, y), NULL);
+    }
+}
+
 static void finish_maxima(void *user, int begin, int end) {
     const pass *p = user;
     for (int y = begin; y < end; y++) {
@@ -453,6 +471,43 @@ static void finish_maxima(void *user, int begin, int end) {
             find_maxima(p->f, y, p->threshold);
         }
     }
+}
+
+/* The same where there is no map of the streak's output. */
+static void finish_apart(void *user, int begin, int end) {
+    const pass *p = user;
+    bst_filter *f = p->f;
+    size_t line = (size_t)f->stride;
+    int taken = bst_borrow_take(f->lent), made = -2;
+    float *ring = f->lines + f->line_floats * (size_t)taken;
+    memset(ring, 0, LATEST * line * sizeof(float));
+    for (int y = begin; y < end; y++) {
+        if (!is_border(p, y, p->reach + 1)) {
+            continue;
+        }
+        const float *rows[LATEST];
+        for (int k = 0; k < LATEST; k++) {
+            int at = y - 1 + k;
+            float *row = ring + line * (size_t)((at + LATEST) % LATEST) + f->pad;
+            bool outside = at < 0 || at >= f->height;
+            if (!outside && at > made) {
+                filter_streak(f, at, row, NULL);
+                made = at;
+            }
+            rows[k] = outside ? map_row(f, f->best, at) : row;
+        }
+        note_maxima(f, y, rows[0], rows[1], rows[2], p->threshold);
+    }
+    bst_borrow_give(f->lent, taken);
+}
+
+/* Whether the greater output will be asked for at so many places that a map of it is quicker. */
+static bool is_crowded(const bst_filter *f) {
+    long maxima = 0;
+    for (int y = 0; y < f->height; y++) {
+        maxima += f->maxima[y];
+    }
+    return maxima * CROWD_PX > (long)f->width * f->height;
 }
 
 void bst_filter_run(bst_filter *f, bst_parallel *pool, const bst_background *background,
@@ -473,14 +528,30 @@ void bst_filter_run(bst_filter *f, bst_parallel *pool, const bst_background *bac
     for (int t = 0; t < f->taps; t++) {
         reach = abs(f->tap_y[t]) > reach ? abs(f->tap_y[t]) : reach;
     }
-    pass p = {f,        background,   read, user,  raw,
-              signal,   saturated_dn, rows, reach, width * height > CACHED_PX,
-              threshold};
+    bool past_cache = width * height > CACHED_PX;
+    pass p = {.f = f,
+              .background = background,
+              .read = read,
+              .user = user,
+              .raw = raw,
+              .signal = signal,
+              .saturated_dn = saturated_dn,
+              .part_rows = rows,
+              .reach = reach,
+              .past_cache = past_cache,
+              .apart = f->streak && past_cache && f->taps <= FEW_TAPS && !f->crowded,
+              .threshold = threshold};
+    f->kept = f->streak && !p.apart;
     bst_parallel_for(pool, height, rows, filter_rows, &p);
-    if (f->streak) {
+    if (f->kept) {
         bst_parallel_for(pool, height, rows, finish_streaks, &p);
     }
-    bst_parallel_for(pool, height, rows, finish_maxima, &p);
+    bst_parallel_for(pool, height, rows, p.apart ? finish_apart : finish_maxima, &p);
+    f->crowded = is_crowded(f);
+    if (p.apart && f->crowded) {
+        bst_parallel_for(pool, height, rows, keep_streaks, &p);
+        f->kept = true;
+    }
 }
 
 float bst_filter_streak_at(const bst_filter *f, int x, int y) {
@@ -489,108 +560,4 @@ float bst_filter_streak_at(const bst_filter *f, int x, int y) {
         sum += f->tap_weight[t] * bst_filter_point_at(f, x + f->tap_x[t], y + f->tap_y[t]);
     }
     return sum;
-}
-
-/* Top of the parabola through three values one step apart, the middle one the greatest. */
-static double top(double left, double middle, double right) {
-    double bend = left - 2.0 * middle + right;
-    return bend < 0.0 ? middle - (right - left) * (right - left) / (8.0 * bend) : middle;
-}
-
-static double point_peak(const bst_filter *f, const float *signal, double noise_e, int x, int y) {
-    int r = f->radius + 1, n = 2 * r + 1;
-    if (x < r || y < r || x + r >= f->width || y + r >= f->height) {
-        return -INFINITY;
-    }
-    double value[BST_FILTER_PHASES][BST_FILTER_PHASES] = {{0.0}};
-    for (int j = 0; j < n; j++) {
-        const float *row = signal + (size_t)(y - r + j) * (size_t)f->width + (size_t)(x - r);
-        for (int px = 0; px < BST_FILTER_PHASES; px++) {
-            double sum = 0.0;
-            for (int i = 0; i < n; i++) {
-                sum += row[i] > BST_PIXEL_NONE ? (double)f->phase[px][i] * (double)row[i] : 0.0;
-            }
-            for (int py = 0; py < BST_FILTER_PHASES; py++) {
-                value[py][px] += (double)f->phase[py][j] * sum;
-            }
-        }
-    }
-    int bx = 0, by = 0;
-    for (int py = 0; py < BST_FILTER_PHASES; py++) {
-        for (int px = 0; px < BST_FILTER_PHASES; px++) {
-            if (value[py][px] > value[by][bx]) {
-                bx = px;
-                by = py;
-            }
-        }
-    }
-    double best = value[by][bx], more = 0.0;
-    if (bx > 0 && bx < BST_FILTER_PHASES - 1) {
-        more += top(value[by][bx - 1], best, value[by][bx + 1]) - best;
-    }
-    if (by > 0 && by < BST_FILTER_PHASES - 1) {
-        more += top(value[by - 1][bx], best, value[by + 1][bx]) - best;
-    }
-    return (best + more) / noise_e;
-}
-
-/* Gain of the top of a quadratic through 3 x 3 logarithms over its middle, and its place. */
-static double quadratic_top(double v[3][3], double *dx, double *dy) {
-    double gx = 0.5 * (v[1][2] - v[1][0]), gy = 0.5 * (v[2][1] - v[0][1]);
-    double hxx = v[1][2] - 2.0 * v[1][1] + v[1][0], hyy = v[2][1] - 2.0 * v[1][1] + v[0][1];
-    double hxy = 0.25 * (v[2][2] - v[2][0] - v[0][2] + v[0][0]);
-    double det = hxx * hyy - hxy * hxy, gain = 0.0;
-    *dx = *dy = 0.0;
-    if (hxx < 0.0 && hyy < 0.0 && det > 1e-3 * hxx * hyy) {
-        *dx = (hxy * gy - hyy * gx) / det;
-        *dy = (hxy * gx - hxx * gy) / det;
-        gain = 0.5 * (gx * *dx + gy * *dy);
-    } else if (hxx + hyy < 0.0) {
-        *dx = hxx < hyy ? -gx / hxx : 0.0;
-        *dy = hxx < hyy ? 0.0 : -gy / hyy;
-        gain = 0.5 * (gx * *dx + gy * *dy);
-    }
-    /* half a pixel off on both axes costs no filter more than this */
-    return fmin(fmax(gain, 0.0), 0.3);
-}
-
-static double streak_peak(const bst_filter *f, int x, int y) {
-    double v[3][3], dx, dy;
-    double here = (double)bst_filter_streak_at(f, x, y);
-    if (x < 1 || y < 1 || x + 1 >= f->width || y + 1 >= f->height || !(here > 0.0)) {
-        return here;
-    }
-    for (int j = 0; j < 3; j++) {
-        for (int i = 0; i < 3; i++) {
-            double s = (double)bst_filter_streak_at(f, x + i - 1, y + j - 1);
-            v[j][i] = log(fmax(s, 0.05 * here));
-        }
-    }
-    return here * exp(quadratic_top(v, &dx, &dy));
-}
-
-double bst_filter_top(const bst_filter *f, bool point, int x, int y, double *dx, double *dy) {
-    const float *map = map_row(f, point || !f->streak ? f->point : f->best, y) + x;
-    double v[3][3], here = (double)*map;
-    *dx = *dy = 0.0;
-    if (x < 1 || y < 1 || x + 1 >= f->width || y + 1 >= f->height || !(here > 0.0)) {
-        return here;
-    }
-    for (int j = 0; j < 3; j++) {
-        for (int i = 0; i < 3; i++) {
-            float s = map[(j - 1) * f->stride + i - 1];
-            v[j][i] = (double)logf(fmaxf(s, 0.05f * (float)here));
-        }
-    }
-    double gain = quadratic_top(v, dx, dy);
-    *dx = fmin(fmax(*dx, -0.7), 0.7);
-    *dy = fmin(fmax(*dy, -0.7), 0.7);
-    return here * exp(gain);
-}
-
-double bst_filter_peak(const bst_filter *f, const float *signal, double noise_e, bool streak, int x,
-                       int y) {
-    double here = (double)(streak ? bst_filter_streak_at(f, x, y) : bst_filter_point_at(f, x, y));
-    double between = streak ? streak_peak(f, x, y) : point_peak(f, signal, noise_e, x, y);
-    return fmax(here, between);
 }

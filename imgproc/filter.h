@@ -17,7 +17,9 @@ typedef struct bst_filter {
     int max_width, max_height, pad, stride; /* of the padded map */
     int width, height;                      /* of the latest frame */
     float *point;                           /* padded map: SNR for a point */
-    float *best;                            /* the same of the greater SNR, if streak */
+    float *best;                            /* the same of the greater SNR, if kept */
+    bool kept;                              /* else it is made of `point` where it is asked for */
+    bool crowded;                           /* the latest frame: its maxima ask for it often */
     /* pixels above the threshold whose neighbours have a lower SNR: those of row y from index
      * y * max_width on, ascending */
     int *maxima; /* [height] */
@@ -86,16 +88,23 @@ double bst_filter_peak(const bst_filter *filter, const float *signal, double noi
 static inline float bst_filter_point_at(const bst_filter *f, int x, int y) {
     return f->point[(long)(y + f->pad) * f->stride + x + f->pad];
 }
+/* The streak output at a pixel of the latest frame; only when filter->streak. */
+float bst_filter_streak_at(const bst_filter *filter, int x, int y);
 /* The greater output. */
 static inline float bst_filter_best_at(const bst_filter *f, int x, int y) {
-    return (f->streak ? f->best : f->point)[(long)(y + f->pad) * f->stride + x + f->pad];
+    float point = bst_filter_point_at(f, x, y);
+    if (!f->streak) {
+        return point;
+    }
+    if (f->kept) {
+        return f->best[(long)(y + f->pad) * f->stride + x + f->pad];
+    }
+    float streak = bst_filter_streak_at(f, x, y);
+    return streak > point ? streak : point;
 }
 /* The top between the pixels near a maximum (x, y) of the greater output, or of the point output,
  * by a quadratic through the logarithms of 3 x 3 outputs; (dx, dy): its place less (x, y), up to
  * 0.7 px. Quicker than bst_filter_peak, and good to about 1 %. */
 double bst_filter_top(const bst_filter *filter, bool point, int x, int y, double *dx, double *dy);
-
-/* The streak output at a pixel of the latest frame; only when filter->streak. */
-float bst_filter_streak_at(const bst_filter *filter, int x, int y);
 
 #endif

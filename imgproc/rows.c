@@ -22,8 +22,9 @@
 #endif
 
 /* Half of the lanes as one value, so that they stay in registers. */
-enum { HALF = BST_ROW_LANES / 2, MEDIAN_PARTS = BST_ROW_MEDIAN / HALF, MAX_RADIUS = 32 };
+enum { HALF = BST_ROW_LANES / 2, KEYS = 16, MEDIAN_PARTS = BST_ROW_MEDIAN / KEYS, MAX_RADIUS = 32 };
 typedef float lanes __attribute__((vector_size(HALF * sizeof(float))));
+typedef int16_t keys __attribute__((vector_size(KEYS * sizeof(int16_t))));
 typedef int32_t lane_masks __attribute__((vector_size(HALF * sizeof(float))));
 
 MASK_FUNCTION
@@ -75,28 +76,46 @@ void bst_row_clipped_sums(const float *restrict pixels, int width, int height, s
     }
 }
 
-/* By rank, without branches: the greatest that no more than half of them are below. */
+/* The first half of a float as a number that is greater where the float is. */
+static inline int16_t key_of(float value) {
+    int32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return (int16_t)((bits ^ ((bits >> 31) & 0x7FFFFFFF)) >> 16);
+}
+
+/* The middle of the floats that have this key. */
+static inline float value_of(int key) {
+    int32_t bits = (int32_t)((uint32_t)key << 16 | 0x8000u);
+    bits ^= (bits >> 31) & 0x7FFFFFFF;
+    float value;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
+/* The greatest key that no more than half of the values are below, bit by bit, without branches. */
 MASK_FUNCTION
 float bst_row_median(const float *values, int count) {
-    float v[BST_ROW_MEDIAN];
-    lanes part[MEDIAN_PARTS];
-    lane_masks below[MEDIAN_PARTS] = {{0}};
+    int16_t all[BST_ROW_MEDIAN];
+    keys part[MEDIAN_PARTS];
     for (int i = 0; i < BST_ROW_MEDIAN; i++) {
-        v[i] = i < count ? values[i] : INFINITY;
+        all[i] = i < count ? key_of(values[i]) : INT16_MAX;
     }
-    memcpy(part, v, sizeof part);
-    for (int i = 0; i < count; i++) {
+    memcpy(part, all, sizeof part);
+    int median = INT16_MIN;
+    for (int step = 1 << 15; step > 0; step >>= 1) {
+        int16_t trial = (int16_t)(median + step);
+        keys below = {0};
         for (int b = 0; b < MEDIAN_PARTS; b++) {
-            below[b] -= v[i] < part[b];
+            below -= part[b] < trial;
         }
+        uint64_t four[KEYS / 4];
+        memcpy(four, &below, sizeof four);
+        /* sums of four numbers of 16 bits, none of which overflows */
+        uint64_t sum = (four[0] + four[1]) + (four[2] + four[3]);
+        int rank = (int)((sum * 0x0001000100010001u) >> 48);
+        median = rank <= count / 2 ? trial : median;
     }
-    int32_t rank[BST_ROW_MEDIAN];
-    memcpy(rank, below, sizeof rank);
-    float median = -INFINITY;
-    for (int i = 0; i < count; i++) {
-        median = rank[i] <= count / 2 && v[i] > median ? v[i] : median;
-    }
-    return median;
+    return value_of(median);
 }
 
 ROW_FUNCTION

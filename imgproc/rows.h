@@ -20,11 +20,18 @@ typedef struct bst_row_sums {
 void bst_row_clipped_sums(const float *pixels, int width, int height, size_t stride, float level,
                           float limit, bst_row_sums *sums);
 
-/* The value at count / 2 of up to BST_ROW_MEDIAN in ascending order. */
+/* The value at count / 2 of up to BST_ROW_MEDIAN in ascending order, to 1/256 of itself. */
 float bst_row_median(const float *values, int count);
 
 /* out[x] = left + slope * (x + first) */
 void bst_row_line(float *out, int count, float left, float slope, float first);
+
+/* Says that a part of a row will be read soon. */
+static inline void bst_row_prefetch(const uint16_t *raw, int count) {
+    for (int x = 0; x < count; x += 32) {
+        __builtin_prefetch(raw + x);
+    }
+}
 
 /* out = (raw - offset) * gain */
 void bst_row_electrons(const uint16_t *raw, int count, float offset, float gain, float *out);
