@@ -12,11 +12,11 @@ eclipse  a target of an SNR of 10 to 38 goes through the Earth's shadow on the n
 
 In track means that control is in mode `track` and the track of interest lies within 5 px of the
 target. A case is a few runs, or with --full 100 with the observation generator and some with images
-(belt: none; eclipse: the last 10 minutes of one that lasts 12).
+(belt and eclipse: none).
 
 Usage, from the repository root:
   /usr/bin/python3 tests/e2e/test_acquisition.py BORESIGHT [--full] [--cases a,b] [--seeds N]
-      [--images N] [--times FILE]
+      [--images N] [--catalogue FILE] [--times FILE]
 """
 import argparse
 import json
@@ -34,13 +34,15 @@ options.add_argument("--full", action="store_true")
 options.add_argument("--cases", default="cue,belt,eclipse")
 options.add_argument("--seeds", type=int)
 options.add_argument("--images", type=int)
-options.add_argument("--catalogue", default="embedded")
+options.add_argument("--catalogue", help="of stars, for all cases; default: with --full yours, else "
+                     "stars that come with the program")
 options.add_argument("--times", help="JSON file for the times, by case")
 options = options.parse_args(runs.sys.argv[1:])
 del runs.sys.argv[1:]
 
 SCENARIO = {"cue": "scenarios/cue_one_degree.json", "belt": "scenarios/belt_search.json",
             "eclipse": "scenarios/equinox_eclipse.json"}
+STARS = {"cue": "embedded", "belt": "embedded", "eclipse": "stars/equinox_eclipse.stars"}
 SHORT = {"cue": 6, "belt": 3, "eclipse": 2}
 IMAGES = {"cue": 10, "belt": 0, "eclipse": 0}
 OBJECT = "/world/objects/0"
@@ -192,11 +194,15 @@ class Outcome:
                 f"{self.v_mag:.2f}{more}, wrong in {np.sum(~self.right)} frames, lost {len(lost)}")
 
 
+def catalogue_of(case):
+    return options.catalogue or ("default" if options.full else STARS[case])
+
+
 def play(job):
     case, seed, images = job
     out = os.path.join(play.folder, f"{case}_{seed}_{images}")
     sets = scene(case, seed)
-    sets.append(f"/world/star_catalogue={options.catalogue}")
+    sets.append(f"/world/star_catalogue={catalogue_of(case)}")
     if images:
         sets.append(runs.SENSOR + "/observation_source=image")
     runs.run(SCENARIO[case], out, *sets, seed=seed)
@@ -209,7 +215,8 @@ def play(job):
 def sweep_seconds():
     """Time of one sweep of the belt, with nothing there to be found."""
     out = os.path.join(play.folder, "sweep")
-    runs.run(SCENARIO["belt"], out, OBJECT + "/albedo=0", duration=1200)
+    runs.run(SCENARIO["belt"], out, OBJECT + "/albedo=0",
+             f"/world/star_catalogue={catalogue_of('belt')}", duration=1200)
     rows = runs.database(out).execute("SELECT time_s FROM events WHERE kind = 'mode' AND "
                                       "text LIKE 'search -> search%'").fetchall()
     return rows[0][0]
