@@ -6,6 +6,8 @@
 
 /* Log-likelihood by which the best remembered track must lead the second. */
 #define LEAD 2.0
+/* 1 sigma by which the brightness of what wakes may differ from what the shadow leaves of it. */
+#define DIMMING_MAG 0.5
 
 static void forget(bst_mtt *m, int i) {
     m->memory_count--;
@@ -48,6 +50,12 @@ typedef struct resume_choice {
 static void weigh(const bst_mtt *m, const bst_mtt_track *track, bst_mtt_track *before,
                   resume_choice *choice) {
     double chi2 = bst_sky_distance2(&before->state, &track->state);
+    if (before->asleep && before->sunlight > 0.0) {
+        double dimmed = before->v_mag - 2.5 * log10(before->sunlight);
+        double variance =
+            before->v_mag_variance + track->v_mag_variance + DIMMING_MAG * DIMMING_MAG;
+        chi2 += (track->v_mag - dimmed) * (track->v_mag - dimmed) / variance;
+    }
     if (!(chi2 <= m->params.memory_chi2)) {
         return;
     }
@@ -61,13 +69,15 @@ static void weigh(const bst_mtt *m, const bst_mtt_track *track, bst_mtt_track *b
     }
 }
 
-bool bst_mtt_resume(bst_mtt *m, bst_mtt_track *track) {
+bool bst_mtt_resume(bst_mtt *m, bst_mtt_track *track, bool anew) {
     resume_choice choice = {.lowest = INFINITY, .second = INFINITY};
-    for (int i = 0; i < m->memory_count; i++) {
+    for (int i = 0; anew && i < m->memory_count; i++) {
         weigh(m, track, &m->memory[i], &choice);
     }
     for (int t = 0; t < m->track_count; t++) {
-        if (m->tracks[t].asleep && !m->tracks[t].replaced) {
+        const bst_mtt_track *sleeper = &m->tracks[t];
+        if (sleeper->asleep && !sleeper->replaced && sleeper->sight < BST_MTT_DARK &&
+            track->first_tick > sleeper->last_update_tick) {
             weigh(m, track, &m->tracks[t], &choice);
         }
     }
@@ -79,6 +89,7 @@ bool bst_mtt_resume(bst_mtt *m, bst_mtt_track *track) {
     track->hits += before->hits;
     track->first_tick = before->first_tick;
     track->full_snr = before->full_snr;
+    track->lit = before->lit;
     if (before->orbit.valid) {
         /* the orbit knows more than the few detections since */
         bst_orbit_track orbit = before->orbit;

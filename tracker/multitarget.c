@@ -183,6 +183,7 @@ static void shift(bst_mtt_track *track, const bst_mtt_frame *frame, bst_vec3 ste
 static void predict(bst_mtt *m, const bst_mtt_frame *frame) {
     double dt = frame->seconds - m->seconds;
     bst_vec3 step = {0}, rate = {0};
+    m->sleepers = 0;
     bool forward = m->started && cue_acceleration(frame, dt, &step, &rate);
     for (int t = 0; t < m->track_count; t++) {
         bst_mtt_track *track = &m->tracks[t];
@@ -407,9 +408,12 @@ static void judge(bst_mtt *m, const bst_mtt_frame *frame) {
         }
         if (track->status != BST_TRACK_TENTATIVE) {
             track->status = taken ? BST_TRACK_CONFIRMED : BST_TRACK_COASTING;
+            if (taken && m->sleepers > 0 && bst_mtt_resume(m, track, false)) {
+                record(m, BST_MTT_RESUMED, track, 0.0);
+            }
         } else if (taken && may_confirm(m, track)) {
             track->status = BST_TRACK_CONFIRMED;
-            bool resumed = bst_mtt_resume(m, track);
+            bool resumed = bst_mtt_resume(m, track, true);
             record(m, resumed ? BST_MTT_RESUMED : BST_MTT_CONFIRMED, track, 0.0);
         }
     }

@@ -82,6 +82,7 @@ typedef enum bst_mtt_sight {
     BST_MTT_CLEAR = 0,
     BST_MTT_FAINT,  /* it may be too dim to be seen, or behind the Earth's limb: no miss counts */
     BST_MTT_SHADOW, /* too dim */
+    BST_MTT_DARK,   /* for sure without any light */
     BST_MTT_EARTH,  /* behind the Earth */
 } bst_mtt_sight;
 
@@ -114,9 +115,11 @@ typedef struct bst_mtt_track {
     bool moved;   /* the latest detection lies farther from the first than their images are long */
     bool at_rest; /* shows no motion and is not what the cue expects */
     bst_mtt_sight sight; /* in the latest frame; BST_MTT_CLEAR without an orbit */
+    double sunlight;     /* share of the Sun's light, in the latest frame; with an orbit only */
     /* It has been hidden and was not seen again yet: it only follows its orbit, and wakes when what
      * is confirmed anew is known again as it. Ends as what is remembered does, or by misses. */
     bool asleep;
+    bool lit;        /* it has had an orbit by which there was something to see */
     bool replaced;   /* by the track that it woke as, in this frame */
     bool may_miss;   /* in the latest frame */
     double full_snr; /* smoothed over detections in full light; 0: none yet */
