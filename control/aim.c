@@ -137,8 +137,7 @@ bst_status bst_control_aim(bst_ctx *ctx, const bst_control *c, int64_t tick, boo
 }
 
 bst_vec3 bst_control_apparent(const bst_control *c, bst_vec3 geometric) {
-    bst_light light = {.velocity_mps = c->nav.velocity_bary_mps, .sun_m = c->nav.sun_m};
-    return bst_light_aberrate(&light, geometric);
+    return bst_aberrate(&c->aberration, geometric);
 }
 
 void bst_control_forget_aims(bst_control *c) {

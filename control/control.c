@@ -34,6 +34,9 @@ bst_status bst_control_init(bst_ctx *ctx, bst_control *control, const bst_contro
                              .mode = BST_MODE_IDLE,
                              .frame_tick = INT64_MIN,
                              .watch = {.jump_tick = INT64_MIN}};
+    int64_t half = bst_control_ticks(control, RATE_HALF_S);
+    control->rate_half_ticks = half > 0 ? half : 1;
+    control->latency_ticks = bst_control_ticks(control, config->command_latency_s);
     bst_pointing_error_init(&control->pointing_error, config->disturbance_px_rms * env->pixel_rad,
                             config->disturbance_cutoff_hz,
                             config->fix_sigma_floor_px * env->pixel_rad,
@@ -68,9 +71,11 @@ void bst_control_telemetry(bst_control *c, const bst_pointing_telemetry *pointin
         c->pointing_valid = true;
         c->settled = pointing->settled;
     }
-    if (nav) {
+    if (nav && (!c->nav_valid || nav->tick != c->nav.tick)) {
         c->nav = *nav;
         c->nav_valid = true;
+        c->aberration = bst_aberration_of(
+            &(bst_light){.velocity_mps = nav->velocity_bary_mps, .sun_m = nav->sun_m});
     }
 }
 
@@ -106,8 +111,8 @@ static bst_status look(bst_ctx *ctx, bst_control *c, bool *arrived, double off_p
         return BST_OK;
     }
     bst_vec3 v = bst_quat_rotate(c->pointing.q_cam_from_gcrf, wanted);
-    off_px[0] = atan2(v.x, v.z) / c->env.pixel_rad;
-    off_px[1] = atan2(v.y, v.z) / c->env.pixel_rad;
+    off_px[0] = bst_atan2(v.x, v.z) / c->env.pixel_rad;
+    off_px[1] = bst_atan2(v.y, v.z) / c->env.pixel_rad;
     double tolerance = c->config.arrive_tolerance_px;
     *arrived = c->settled && off_px[0] * off_px[0] + off_px[1] * off_px[1] <= tolerance * tolerance;
     return BST_OK;
@@ -130,9 +135,7 @@ bst_status bst_control_update(bst_ctx *ctx, bst_control *c, int64_t tick, bool *
     if (!c->nav_valid) {
         return BST_OK;
     }
-    int64_t effect = tick + bst_control_ticks(c, c->config.command_latency_s);
-    int64_t half = bst_control_ticks(c, RATE_HALF_S);
-    half = half > 0 ? half : 1;
+    int64_t effect = tick + c->latency_ticks, half = c->rate_half_ticks;
     bool valid;
     bst_vec3 d, ahead, behind;
     BST_TRY(bst_control_boresight_at(ctx, c, effect, &valid, &d));

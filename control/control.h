@@ -119,12 +119,14 @@ typedef struct bst_control_aimed {
 typedef struct bst_control {
     bst_control_config config;
     bst_control_env env;
+    int64_t latency_ticks, rate_half_ticks;
     bst_pointing_error pointing_error;
     int mode;
     int64_t mode_tick; /* since when */
     bst_control_transition transitions[BST_CONTROL_TRANSITIONS];
     int transition_count;
     bst_nav_telemetry nav;
+    bst_aberration aberration; /* by nav, once that is valid */
     bool nav_valid;
     bst_control_held held; /* the track that the aim is on */
     bst_control_held lost; /* the target that BST_MODE_REACQUIRE looks for */

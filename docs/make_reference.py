@@ -98,7 +98,8 @@ def write(node, path, level):
             for choice in choices["oneOf"]:
                 kind = choice["properties"]["type"]
                 delays = choice["properties"]["delay_s"]["properties"]
-                print(f"## Module `{role}` of type `{kind['const']}`\n\n{kind.get('description', '')}\n")
+                name = kind.get("const") or kind["enum"][0]
+                print(f"## Module `{role}` of type `{name}`\n\n{kind.get('description', '')}\n")
                 print("Inputs that `delay_s` may name: "
                       + (", ".join(f"`{d}`" for d in delays) or "none") + ".\n")
                 write(choice, f"modules/{role}", 3)

@@ -41,8 +41,7 @@ void bst_axis_init(bst_axis *axis, const bst_axis_spec *spec) {
     axis->gamma[1] = axis->phi[0][1];
 }
 
-/* The shaped reference's acceleration for this step. */
-static double shape(bst_axis *axis, double target_rad, double target_radps) {
+double bst_axis_shape(bst_axis *axis, double target_rad, double target_radps) {
     double h = axis->spec.dt_s;
     double accel_limit = SHAPED_SHARE * axis->spec.accel_limit_radps2;
     double rate_limit = SHAPED_SHARE * axis->spec.rate_limit_radps;
@@ -66,7 +65,7 @@ void bst_axis_step(bst_axis *axis, double target_rad, double target_radps, doubl
     const bst_axis_spec *spec = &axis->spec;
     double h = spec->dt_s, wn = spec->natural_frequency_radps;
     axis->limited = false;
-    double accel = shape(axis, target_rad, target_radps);
+    double accel = bst_axis_shape(axis, target_rad, target_radps);
     double e = axis->angle_rad - axis->reference_rad;
     double e_rate = axis->rate_radps - axis->reference_radps;
     axis->reference_rad += axis->reference_radps * h + 0.5 * accel * h * h;

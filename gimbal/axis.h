@@ -25,6 +25,11 @@ typedef struct bst_axis {
 /* At rest at angle 0. */
 void bst_axis_init(bst_axis *axis, const bst_axis_spec *spec);
 
+/* The shaper alone: the acceleration with which the reference goes through the coming step, towards
+ * a target that will be at target_rad and move at target_radps at its end. Sets `limited` where a
+ * limit is met. */
+double bst_axis_shape(bst_axis *axis, double target_rad, double target_radps);
+
 /* Advances by dt_s towards a target that will be at target_rad and move at target_radps at the end
  * of the step; noise_rad is the encoder's error during the step.
  *

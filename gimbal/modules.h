@@ -4,8 +4,10 @@
 
 #include "sim/core/module.h"
 
-extern const bst_module_desc bst_gimbal_two_axis_module; /* role "gimbal", type "two_axis" */
-extern const bst_module_desc bst_gimbal_ideal_module;    /* role "gimbal", type "ideal" */
-extern const bst_module_desc bst_gimbal_scripted_module; /* role "gimbal", type "scripted" */
+extern const bst_module_desc bst_gimbal_second_order_module; /* role "gimbal", "second_order" */
+extern const bst_module_desc bst_gimbal_azimuth_elevation_module;
+extern const bst_module_desc bst_gimbal_cross_elevation_module;
+extern const bst_module_desc bst_gimbal_ideal_module;    /* type "ideal" */
+extern const bst_module_desc bst_gimbal_scripted_module; /* type "scripted" */
 
 #endif

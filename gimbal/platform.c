@@ -28,6 +28,8 @@ const bst_config_desc bst_platform_config_table[] = {
              "Time that the ring of pointing telemetry covers."),
     BST_REAL(P, nav_rate_hz, "Hz", 0.001, 10000, "10",
              "Rate of navigation telemetry; divides the plant's rate."),
+    BST_OBJECT(P, spacecraft, bst_craft_config_table, "{}",
+               "The body: held, or with dynamics, wheels, sensors and a pointing law."),
     BST_CONFIG_END};
 #undef P
 
@@ -62,9 +64,42 @@ bst_status bst_platform_init(bst_ctx *ctx, bst_platform *platform,
     platform->drift_radps = arcsec_vector(config->drift_arcsec_per_s);
     platform->attitude_noise_rad = config->attitude_noise_arcsec * BST_ARCSEC_RAD;
     platform->attitude_key = attitude_key;
-    platform->unresolved_rad2 = bst_jitter_unresolved_rad2(&spec, dt_s);
+    platform->jitter_unresolved_rad2 = bst_jitter_unresolved_rad2(&spec, dt_s);
+    platform->unresolved_rad2 = platform->jitter_unresolved_rad2;
+    platform->rate_believed_radps = (bst_vec3){0, 0, 0};
+    platform->body = (bst_body_state){q_nominal_from_gcrf, platform->drift_radps, {0, 0, 0}};
+    platform->spacecraft = NULL;
+    platform->sky = NULL;
+    platform->wheels_saturated = platform->trackers_blind = false;
     spec = bst_jitter_resolved(&spec, dt_s);
     bst_jitter_init(&platform->jitter, &spec, dt_s, jitter_key);
+    return BST_OK;
+}
+
+/* An inertial body. */
+static bst_quat drifted(const bst_platform *platform, double seconds) {
+    bst_vec3 drift = platform->drift_radps;
+    bst_quat body = platform->q_nominal_from_gcrf;
+    if (drift.x != 0.0 || drift.y != 0.0 || drift.z != 0.0) {
+        body = turned(body, bst_vec3_scale(drift, seconds));
+    }
+    return body;
+}
+
+bst_status bst_platform_advance(bst_ctx *ctx, bst_platform *platform, int64_t n, double seconds,
+                                bst_vec3 reaction_nm) {
+    if (!platform->spacecraft) {
+        platform->body.q_body_from_gcrf = drifted(platform, seconds);
+        return BST_OK;
+    }
+    BST_TRY(bst_craft_step(ctx, platform->spacecraft, n, seconds, reaction_nm));
+    const bst_craft_now *now = bst_craft_at(platform->spacecraft);
+    platform->body = now->body;
+    platform->q_believed_from_gcrf = now->q_believed_from_gcrf;
+    platform->rate_believed_radps = now->rate_believed_radps;
+    platform->unresolved_rad2 = platform->jitter_unresolved_rad2 + now->unresolved_rad2;
+    platform->wheels_saturated = now->wheel_flags != 0u;
+    platform->trackers_blind = !now->tracked;
     return BST_OK;
 }
 
@@ -75,11 +110,8 @@ bst_quat bst_platform_true_camera(bst_platform *platform, int64_t n, double seco
 
 bst_quat bst_platform_true_camera_between(bst_platform *platform, int64_t n, double fraction,
                                           double seconds, bst_quat q_cam_from_body) {
-    bst_vec3 drift = platform->drift_radps;
-    bst_quat body = platform->q_nominal_from_gcrf;
-    if (drift.x != 0.0 || drift.y != 0.0 || drift.z != 0.0) {
-        body = turned(body, bst_vec3_scale(drift, seconds));
-    }
+    bst_quat body =
+        platform->spacecraft ? platform->body.q_body_from_gcrf : drifted(platform, seconds);
     double shake[2], next[2];
     bst_jitter_at(&platform->jitter, n, shake);
     if (fraction > 0.0) {
@@ -92,7 +124,7 @@ bst_quat bst_platform_true_camera_between(bst_platform *platform, int64_t n, dou
 }
 
 bst_quat bst_platform_measured_body(const bst_platform *platform, int64_t n) {
-    if (platform->attitude_noise_rad == 0.0) {
+    if (platform->attitude_noise_rad == 0.0 || platform->spacecraft) {
         return platform->q_believed_from_gcrf;
     }
     double a[2], b[2];

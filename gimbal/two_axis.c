@@ -30,7 +30,8 @@ bst_status bst_two_axis_init(bst_ctx *ctx, bst_two_axis *plant, const bst_two_ax
                        .inner_travel_rad = config->inner_travel_deg * BST_DEG_RAD,
                        .settle_tolerance_rad = config->settle_tolerance_arcsec * BST_ARCSEC_RAD,
                        .encoder_key = keys->encoder,
-                       .dt_s = dt_s};
+                       .dt_s = dt_s,
+                       .near = {{0.0, 0.0, 1.0}, {0.0, 0.0, 1.0}}};
     bst_axis_spec spec = {.rate_limit_radps = config->rate_limit_degps * BST_DEG_RAD,
                           .accel_limit_radps2 = config->accel_limit_degps2 * BST_DEG_RAD,
                           .natural_frequency_radps = two_pi * config->natural_frequency_hz,
@@ -67,17 +68,41 @@ static halves halves_of(const double angle_rad[2]) {
                     {cos(0.5 * angle_rad[0]), cos(0.5 * angle_rad[1])}};
 }
 
-/* The same a little further: up to a milliradian by the series, which is exact to rounding. */
+/* Of an angle that is more_rad further: up to 0.02 rad by series, which are exact to rounding. */
+static void beside(double sin_half, double cos_half, double more_rad, double *sin_out,
+                   double *cos_out) {
+    double d = 0.5 * more_rad, s, c;
+    if (fabs(d) < 0.01) {
+        double q = d * d;
+        s = d * (1.0 - q * (1.0 / 6.0 - q * (1.0 / 120.0 - q * (1.0 / 5040.0))));
+        c = 1.0 - q * (0.5 - q * (1.0 / 24.0 - q * (1.0 / 720.0 - q * (1.0 / 40320.0))));
+    } else {
+        s = sin(d);
+        c = cos(d);
+    }
+    *sin_out = sin_half * c + cos_half * s;
+    *cos_out = cos_half * c - sin_half * s;
+}
+
+/* The same a little further. */
 static halves halves_beside(const halves *h, const double more_rad[2]) {
     halves out;
     for (int a = 0; a < 2; a++) {
-        double d = 0.5 * more_rad[a], s = d * (1.0 - d * d / 6.0), c = 1.0 - 0.5 * d * d;
-        if (fabs(d) > 5e-4) {
-            s = sin(d);
-            c = cos(d);
+        beside(h->sin[a], h->cos[a], more_rad[a], &out.sin[a], &out.cos[a]);
+    }
+    return out;
+}
+
+/* Of the axes' present angles. */
+static halves halves_now(bst_two_axis *plant) {
+    halves out;
+    for (int a = 0; a < 2; a++) {
+        bst_two_axis_half *near = &plant->near[a];
+        double angle = plant->axis[a].angle_rad;
+        if (!(fabs(angle - near->angle_rad) < 0.02)) {
+            *near = (bst_two_axis_half){angle, sin(0.5 * angle), cos(0.5 * angle)};
         }
-        out.sin[a] = h->sin[a] * c + h->cos[a] * s;
-        out.cos[a] = h->cos[a] * c - h->sin[a] * s;
+        beside(near->sin, near->cos, angle - near->angle_rad, &out.sin[a], &out.cos[a]);
     }
     return out;
 }
@@ -100,7 +125,33 @@ bst_quat bst_two_axis_attitude(const double angle_rad[2]) {
 }
 
 static double wrap(double angle) {
-    return angle - two_pi * ceil(angle / two_pi - 0.5);
+    return fabs(angle) < BST_PI ? angle : angle - two_pi * ceil(angle / two_pi - 0.5);
+}
+
+/* The angle of (x, y) where that is no further from a known one than the arc tangent's series
+ * reaches. */
+static bool angle_near(const bst_two_axis_half *near, double x, double y, double *angle_rad) {
+    double c = near->cos * near->cos - near->sin * near->sin, s = 2.0 * near->sin * near->cos;
+    double along = x * c + y * s, across = y * c - x * s;
+    if (!(fabs(across) < 0.01 * along)) {
+        return false;
+    }
+    *angle_rad = near->angle_rad + bst_atan2(across, along);
+    return true;
+}
+
+/* bst_two_axis_solve for the way round that is nearer to the present angle. */
+static void solve(const bst_two_axis *plant, bst_vec3 b, bst_vec3 rate, double angle_rad[2],
+                  double rate_radps[2]) {
+    double h2 = b.x * b.x + b.z * b.z, h = sqrt(h2), now = plant->axis[0].reference_rad;
+    if (h > POLE_RAD && angle_near(&plant->near[0], b.z, b.x, &angle_rad[0]) &&
+        angle_near(&plant->near[1], h, -b.y, &angle_rad[1])) {
+        rate_radps[0] = (b.z * rate.x - b.x * rate.z) / h2;
+        rate_radps[1] = -rate.y / h;
+        return;
+    }
+    bst_two_axis_solve(b, rate, now, angle_rad, rate_radps);
+    angle_rad[0] = now + wrap(angle_rad[0] - now);
 }
 
 /* Where the axes shall be at this step. */
@@ -114,10 +165,12 @@ static void target(const bst_two_axis *plant, const bst_los_command *command, do
     bst_vec3 r = bst_vec3_scale(rate, scale);
     r = bst_vec3_axpy(r, -bst_vec3_dot(r, d), d);
     bst_quat body = plant->platform.q_believed_from_gcrf;
-    bst_two_axis_solve(bst_quat_rotate(body, d), bst_quat_rotate(body, r),
-                       plant->axis[0].reference_rad, angle_rad, rate_radps);
-    /* the way round that is nearer to the present angle */
-    angle_rad[0] = plant->axis[0].reference_rad + wrap(angle_rad[0] - plant->axis[0].reference_rad);
+    bst_vec3 d_body = bst_quat_rotate(body, d), r_body = bst_quat_rotate(body, r);
+    if (plant->platform.spacecraft) {
+        /* the body turns away from under the mount */
+        r_body = bst_vec3_sub(r_body, bst_vec3_cross(plant->platform.rate_believed_radps, d_body));
+    }
+    solve(plant, d_body, r_body, angle_rad, rate_radps);
     *at_stop = fabs(angle_rad[1]) > plant->inner_travel_rad;
     if (*at_stop) {
         angle_rad[1] = copysign(plant->inner_travel_rad, angle_rad[1]);
@@ -128,6 +181,8 @@ static void target(const bst_two_axis *plant, const bst_los_command *command, do
 void bst_two_axis_status(const bst_two_axis *plant, int64_t tick, bst_mount_status *out) {
     *out = (bst_mount_status){.tick = tick,
                               .axes = 2,
+                              .wheels_saturated = plant->platform.wheels_saturated,
+                              .rate_body_radps = plant->platform.rate_believed_radps,
                               .q_body_from_cam_at_zero = BST_QUAT_IDENTITY,
                               .q_body_from_gcrf = plant->q_measured_body_from_gcrf};
     for (int i = 0; i < 2; i++) {
@@ -169,8 +224,7 @@ void bst_two_axis_step(bst_two_axis *plant, const bst_los_command *command, doub
         bst_axis_step(outer, angle[0], rate[0], noise[0]);
         bst_axis_step(inner, angle[1], rate[1], noise[1]);
     }
-    double truth[2] = {outer->angle_rad, inner->angle_rad};
-    halves half = halves_of(truth);
+    halves half = halves_now(plant);
     double cross = half.cos[1] * half.cos[1] - half.sin[1] * half.sin[1];
     double off_o = (outer->angle_rad - angle[0]) * cross, off_i = inner->angle_rad - angle[1];
     double rate_o = (outer->rate_radps - rate[0]) * cross, rate_i = inner->rate_radps - rate[1];
@@ -182,7 +236,10 @@ void bst_two_axis_step(bst_two_axis *plant, const bst_los_command *command, doub
     plant->limited = at_stop || outer->limited || inner->limited;
 
     if (fabs(outer->reference_rad) > BST_PI) {
-        bst_axis_unwind(outer, outer->reference_rad > 0.0 ? -1.0 : 1.0);
+        double turns = outer->reference_rad > 0.0 ? -1.0 : 1.0;
+        bst_axis_unwind(outer, turns);
+        bst_two_axis_half *near = &plant->near[0];
+        *near = (bst_two_axis_half){near->angle_rad + turns * two_pi, -near->sin, -near->cos};
         turn_half(&half);
     }
     plant->q_cam_from_gcrf =

@@ -18,6 +18,11 @@ typedef struct bst_two_axis_config {
 
 extern const bst_config_desc bst_two_axis_config_table[];
 
+/* Sine and cosine of half an angle, from which those of angles nearby follow by series. */
+typedef struct bst_two_axis_half {
+    double angle_rad, sin, cos;
+} bst_two_axis_half;
+
 /* The plant. At zero angles the camera has the body's axes; the outer axis turns about body y, the
  * inner one about the turned x axis (cross-elevation), right-handed. The boresight in body axes is
  * (cos(i) sin(o), -sin(i), cos(i) cos(o)): its poles lie along body +-y. The outer axis has no
@@ -29,6 +34,7 @@ typedef struct bst_two_axis {
     bst_rng_key encoder_key;
     double dt_s;
     int64_t steps;
+    bst_two_axis_half near[2]; /* the axes' angles not long ago */
     /* after each step */
     bst_quat q_cam_from_gcrf;      /* true */
     bst_quat q_measured_from_gcrf; /* encoders and measured body attitude */

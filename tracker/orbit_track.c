@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "sim/astro/bodies.h"
 #include "sim/core/symmetric.h"
 #include "tracker/mixture.h"
 
@@ -32,19 +33,48 @@ void bst_orbit_track_start(const bst_sky_state *sky, const bst_od_observer *obse
     look(out, observer);
 }
 
+/* Acceleration by the Earth's oblateness (Montenbruck and Gill 2000, 3.2.5, with J2 alone), m/s^2.
+ * Its axis is taken along z of GCRF: 0.1 degree of precession change it by less than 1 %. */
+static bst_vec3 oblateness(bst_vec3 r) {
+    const double j2 = 1.08263e-3;
+    double n2 = bst_vec3_dot(r, r), n = sqrt(n2);
+    double k =
+        -1.5 * j2 * BST_EARTH_MU_M3PS2 * BST_EARTH_RADIUS_M * BST_EARTH_RADIUS_M / (n2 * n2 * n);
+    double z2 = 5.0 * r.z * r.z / n2;
+    return (bst_vec3){k * r.x * (1.0 - z2), k * r.y * (1.0 - z2), k * r.z * (3.0 - z2)};
+}
+
+/* Greatest step between two pushes by the oblateness: they miss a ten-thousandth of it. */
+#define PUSH_S 30.0
+
+/* Two-body motion between half pushes (Strang splitting). */
+static bst_status move(bst_ctx *ctx, bst_orbit_track *t, double to_s) {
+    const bst_od_motion motion = {.forces = NULL};
+    double span = to_s - t->state.time_s;
+    int steps = (int)ceil(fabs(span) / PUSH_S);
+    double h = steps > 0 ? span / steps : 0.0, from_s = t->state.time_s;
+    for (int k = 1; k <= steps; k++) {
+        bst_od_state state;
+        double moved[6][6];
+        bst_vec3 *v = &t->state.velocity_mps;
+        *v = bst_vec3_axpy(*v, 0.5 * h, oblateness(t->state.position_m));
+        BST_TRY(bst_od_propagate(ctx, &motion, &t->state, t->covariance,
+                                 k < steps ? from_s + k * h : to_s, &state, moved));
+        t->state = state;
+        *v = bst_vec3_axpy(*v, 0.5 * h, oblateness(t->state.position_m));
+        memcpy(t->covariance, moved, sizeof moved);
+    }
+    return BST_OK;
+}
+
 bool bst_orbit_track_predict(bst_orbit_track *t, double noise_m2ps3,
                              const bst_od_observer *observer) {
     bst_ctx quiet = {0}; /* an orbit that ends is no failure of the run */
-    const bst_od_motion motion = {.forces = NULL};
-    double dt = fabs(observer->time_s - t->state.time_s), moved[6][6];
-    bst_od_state state;
-    t->valid = t->valid && bst_od_propagate(&quiet, &motion, &t->state, t->covariance,
-                                            observer->time_s, &state, moved) == BST_OK;
+    double dt = fabs(observer->time_s - t->state.time_s);
+    t->valid = t->valid && move(&quiet, t, observer->time_s) == BST_OK;
     if (!t->valid) {
         return false;
     }
-    t->state = state;
-    memcpy(t->covariance, moved, sizeof moved);
     for (int i = 0; i < 3; i++) {
         t->covariance[i][i] += noise_m2ps3 * dt * dt * dt / 3.0;
         t->covariance[i][i + 3] += noise_m2ps3 * dt * dt / 2.0;

@@ -25,9 +25,9 @@ void bst_orbit_track_start(const bst_sky_state *sky, const bst_od_observer *obse
                            const bst_orbit_range *range, bst_orbit_track *out);
 
 /* Moves the orbit to observer->time_s (either way) with white acceleration of power spectral
- * density noise_m2ps3 along each axis for what two-body motion leaves out, and sets track->sky to
- * what the observer then sees, to first order in the covariance. False, and the orbit no longer
- * valid, when there is no such orbit. */
+ * density noise_m2ps3 along each axis for what two-body motion and J2 leave out, and sets
+ * track->sky to what the observer then sees, to first order in the covariance. False, and the orbit
+ * no longer valid, when there is no such orbit. */
 bool bst_orbit_track_predict(bst_orbit_track *track, double noise_m2ps3,
                              const bst_od_observer *observer);
 

@@ -85,6 +85,15 @@ bst_status bst_bench_loop_obsgen(bst_ctx *ctx, const bst_bench *self,
                                  const bst_bench_options *options,
                                  bst_bench_result *out) BST_MUST_CHECK;
 
+/* Steps of a gimbal's plant, 1 kHz (bench_plant.c). */
+bst_status bst_bench_plant_second_order(bst_ctx *ctx, const bst_bench *self,
+                                        const bst_bench_options *options,
+                                        bst_bench_result *out) BST_MUST_CHECK;
+
+bst_status bst_bench_plant_full(bst_ctx *ctx, const bst_bench *self,
+                                const bst_bench_options *options,
+                                bst_bench_result *out) BST_MUST_CHECK;
+
 /* Whole runs of an open-loop scenario, frames recorded, with and without --serial, in processes of
  * their own: per frame, start and end taken off (bench_open_loop.c). */
 bst_status bst_bench_open_loop(bst_ctx *ctx, const bst_bench *self,

@@ -46,6 +46,10 @@ static const bst_bench benches[] = {
     {"open_loop", "run of an open-loop scenario with recording, per frame, and with --serial",
      bst_bench_open_loop},
     {"cold_start", "first frame of a fresh process, kernels in the cache", bst_bench_cold_start},
+    {"plant_second_order", "plant step of the gimbal type second_order, as in the main scenario",
+     bst_bench_plant_second_order},
+    {"plant_full", "of azimuth_elevation with friction, cable, a flexible mode and encoders",
+     bst_bench_plant_full},
     {"small", "256x256, 30 stars, 20 px streaks: a quick trial (only when named)",
      bst_bench_scene_run},
 };

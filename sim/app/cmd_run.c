@@ -12,6 +12,7 @@
 #include "sim/app/json_number.h"
 #include "sim/app/load.h"
 #include "sim/app/run_pictures.h"
+#include "sim/app/run_watched.h"
 #include "sim/app/stop_signals.h"
 #include "sim/core/version.h"
 #include "sim/core/wall_clock.h"
@@ -22,13 +23,14 @@
 #include "sim/io/manifest.h"
 #include "sim/io/wcs.h"
 
-#define TELEMETRY 4 /* channels */
+enum { WATCHED_CHANNELS = 32 };
 
 /* One sensor as the run watches it. */
 typedef struct watched_sensor {
     char scope[160];
     int recorder_index;
-    int64_t recorded[TELEMETRY]; /* latest telemetry by channel, on the recorder's grid */
+    bst_run_watched channels[WATCHED_CHANNELS];
+    int channel_count;
     bst_loop_summary *summary;
 } watched_sensor;
 
@@ -53,19 +55,19 @@ static watched_sensor *find_sensor(run_state *run, const char *scope) {
     return sensor;
 }
 
-/* Spares the telemetry that nobody below looks at: it comes at the plant's rate. */
-static bool wants(void *user, const char *scope, const char *channel, int64_t tick) {
-    static const char *const telemetry[TELEMETRY] = {
-        BST_CHANNEL_LOS_HISTORY, BST_CHANNEL_POINTING_TELEMETRY, BST_CHANNEL_NAV_TELEMETRY,
-        BST_CHANNEL_MOUNT_STATUS};
+/* Spares what nobody below looks at: much of it comes at the plant's rate. */
+static bool wants(void *user, const char *scope, const char *channel, const void *payload,
+                  int64_t tick, void **mark) {
     run_state *run = user;
-    for (int i = 0; i < TELEMETRY; i++) {
-        if (strcmp(channel, telemetry[i]) == 0) {
-            return bst_recorder_due(run->recorder, channel, tick,
-                                    &find_sensor(run, scope)->recorded[i]);
+    if (!*mark) {
+        watched_sensor *sensor = find_sensor(run, scope);
+        if (sensor->channel_count == WATCHED_CHANNELS) {
+            return true;
         }
+        *mark = &sensor->channels[sensor->channel_count++];
+        bst_run_watch(*mark, run->recorder, channel);
     }
-    return true;
+    return bst_run_wants(*mark, run->recorder, payload, tick);
 }
 
 static bst_status judge(run_state *run, watched_sensor *sensor, const char *channel,
@@ -300,9 +302,6 @@ static bst_status watch_sensors(run_state *run, const bst_world *world) {
                                                 run->scenario->tick_rate_hz, run->scenario->epoch,
                                                 target, &run->pictures));
                 bst_loop_summary_on_frame(w->summary, on_judged, run->pictures);
-            }
-            for (int k = 0; k < TELEMETRY; k++) {
-                w->recorded[k] = -1;
             }
             run->sensor_count++;
         }

@@ -8,9 +8,17 @@
 #include "tracker/module.h"
 
 static const bst_module_desc *const modules[] = {
-    &bst_gimbal_two_axis_module,  &bst_gimbal_ideal_module, &bst_gimbal_scripted_module,
-    &bst_scenegen_module,         &bst_imgproc_module,      &bst_tracker_module,
-    &bst_control_standard_module, &bst_tracker_ukf_module,  &bst_tracker_imm_module,
+    &bst_gimbal_second_order_module,
+    &bst_gimbal_azimuth_elevation_module,
+    &bst_gimbal_cross_elevation_module,
+    &bst_gimbal_ideal_module,
+    &bst_gimbal_scripted_module,
+    &bst_scenegen_module,
+    &bst_imgproc_module,
+    &bst_tracker_module,
+    &bst_control_standard_module,
+    &bst_tracker_ukf_module,
+    &bst_tracker_imm_module,
     &bst_obsgen_module,
 };
 

@@ -59,6 +59,15 @@ bst_vec3 bst_light_catalogue_star(const bst_light *light, bst_vec3 apparent);
 bst_vec3 bst_light_aberrate(const bst_light *light, bst_vec3 direction);
 bst_vec3 bst_light_unaberrate(const bst_light *light, bst_vec3 apparent); /* to 1e-12 rad */
 
+/* What bst_light_aberrate takes from the light alone, for many directions. */
+typedef struct bst_aberration {
+    bst_vec3 velocity;                      /* in units of the speed of light */
+    double inverse_gamma, share, potential; /* share: 1 / (1 + inverse_gamma) */
+} bst_aberration;
+
+bst_aberration bst_aberration_of(const bst_light *light);
+bst_vec3 bst_aberrate(const bst_aberration *aberration, bst_vec3 direction);
+
 /* The vector from observer to object that bst_light_aberrate wants, from geocentric GCRF positions
  * of the object at emission, tau_s before the observer's instant. The Earth's own motion during
  * tau counts: 20 arcsec, which aberration by the Earth's velocity takes back. */

@@ -19,14 +19,23 @@ static bst_vec3 deflect(const bst_light *light, bst_vec3 p) {
     return bst_vec3_axpy(p, w, bst_vec3_axpy(e, -pe, p));
 }
 
-static bst_vec3 aberrate(const bst_light *light, bst_vec3 p) {
+bst_aberration bst_aberration_of(const bst_light *light) {
     bst_vec3 v = bst_vec3_scale(light->velocity_mps, 1.0 / BST_LIGHT_SPEED_MPS);
     double inverse_gamma = sqrt(1.0 - bst_vec3_dot(v, v));
-    double potential = SUN_SCHWARZSCHILD_M / bst_vec3_norm(light->sun_m);
-    double pv = bst_vec3_dot(p, v);
-    bst_vec3 q = bst_vec3_scale(p, inverse_gamma - potential * pv);
-    q = bst_vec3_axpy(q, 1.0 + pv / (1.0 + inverse_gamma) + potential, v);
+    return (bst_aberration){v, inverse_gamma, 1.0 / (1.0 + inverse_gamma),
+                            SUN_SCHWARZSCHILD_M / bst_vec3_norm(light->sun_m)};
+}
+
+bst_vec3 bst_aberrate(const bst_aberration *a, bst_vec3 p) {
+    double pv = bst_vec3_dot(p, a->velocity);
+    bst_vec3 q = bst_vec3_scale(p, a->inverse_gamma - a->potential * pv);
+    q = bst_vec3_axpy(q, 1.0 + pv * a->share + a->potential, a->velocity);
     return bst_vec3_scale(q, 1.0 / bst_vec3_norm(q));
+}
+
+static bst_vec3 aberrate(const bst_light *light, bst_vec3 p) {
+    bst_aberration a = bst_aberration_of(light);
+    return bst_aberrate(&a, p);
 }
 
 bst_vec3 bst_light_apparent_star(const bst_light *light, bst_vec3 icrs) {

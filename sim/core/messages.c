@@ -12,27 +12,43 @@ static void retain_frame(void *payload) {
     bst_frame_retain(((bst_frame_message *)payload)->frame);
 }
 
+static int count_truth(const void *payload) {
+    return ((const bst_truth *)payload)->count;
+}
+static int count_detections(const void *payload) {
+    return ((const bst_detections *)payload)->count;
+}
+static int count_predictions(const void *payload) {
+    return ((const bst_predictions *)payload)->count;
+}
+static int count_tracks(const void *payload) {
+    return ((const bst_tracks *)payload)->count;
+}
+
 #define HEADER_ONLY(name, kind, header) \
-    { name, kind, sizeof(header), 0, false, NULL, NULL, false }
-#define WITH_ITEMS(name, kind, header, item, in_place) \
-    { name, kind, sizeof(header), sizeof(item), in_place, NULL, NULL, false }
+    { name, kind, sizeof(header), 0, false, NULL, NULL, false, NULL }
+#define RING(name, header, item) \
+    { name, BST_CHANNEL_LATEST, sizeof(header), sizeof(item), true, NULL, NULL, false, NULL }
+#define WITH_ITEMS(name, kind, header, item, count) \
+    { name, kind, sizeof(header), sizeof(item), false, NULL, NULL, false, count }
 
 static const bst_channel_type types[] = {
     HEADER_ONLY(BST_CHANNEL_SENSOR_COMMAND, BST_CHANNEL_LATEST, bst_sensor_command),
     HEADER_ONLY(BST_CHANNEL_EXPOSURE, BST_CHANNEL_QUEUE, bst_exposure),
     HEADER_ONLY(BST_CHANNEL_LOS_COMMAND, BST_CHANNEL_LATEST, bst_los_command),
-    WITH_ITEMS(BST_CHANNEL_LOS_HISTORY, BST_CHANNEL_LATEST, bst_los_history, bst_los_sample, true),
-    WITH_ITEMS(BST_CHANNEL_POINTING_TELEMETRY, BST_CHANNEL_LATEST, bst_pointing_telemetry,
-               bst_pointing_sample, true),
+    RING(BST_CHANNEL_LOS_HISTORY, bst_los_history, bst_los_sample),
+    RING(BST_CHANNEL_POINTING_TELEMETRY, bst_pointing_telemetry, bst_pointing_sample),
     HEADER_ONLY(BST_CHANNEL_MOUNT_STATUS, BST_CHANNEL_LATEST, bst_mount_status),
     HEADER_ONLY(BST_CHANNEL_NAV_TELEMETRY, BST_CHANNEL_LATEST, bst_nav_telemetry),
     {BST_CHANNEL_FRAME, BST_CHANNEL_QUEUE, sizeof(bst_frame_message), 0, false, release_frame,
-     retain_frame, false},
-    WITH_ITEMS(BST_CHANNEL_TRUTH, BST_CHANNEL_QUEUE, bst_truth, bst_truth_item, false),
-    {BST_CHANNEL_PLANES, BST_CHANNEL_LATEST, sizeof(bst_planes), 0, false, NULL, NULL, true},
-    WITH_ITEMS(BST_CHANNEL_DETECTIONS, BST_CHANNEL_QUEUE, bst_detections, bst_detection, false),
-    WITH_ITEMS(BST_CHANNEL_PREDICTIONS, BST_CHANNEL_LATEST, bst_predictions, bst_prediction, false),
-    WITH_ITEMS(BST_CHANNEL_TRACKS, BST_CHANNEL_QUEUE, bst_tracks, bst_track, false),
+     retain_frame, false, NULL},
+    WITH_ITEMS(BST_CHANNEL_TRUTH, BST_CHANNEL_QUEUE, bst_truth, bst_truth_item, count_truth),
+    {BST_CHANNEL_PLANES, BST_CHANNEL_LATEST, sizeof(bst_planes), 0, false, NULL, NULL, true, NULL},
+    WITH_ITEMS(BST_CHANNEL_DETECTIONS, BST_CHANNEL_QUEUE, bst_detections, bst_detection,
+               count_detections),
+    WITH_ITEMS(BST_CHANNEL_PREDICTIONS, BST_CHANNEL_LATEST, bst_predictions, bst_prediction,
+               count_predictions),
+    WITH_ITEMS(BST_CHANNEL_TRACKS, BST_CHANNEL_QUEUE, bst_tracks, bst_track, count_tracks),
     HEADER_ONLY(BST_CHANNEL_CONTROL_STATUS, BST_CHANNEL_LATEST, bst_control_status),
 };
 

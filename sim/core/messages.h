@@ -399,6 +399,7 @@ typedef struct bst_channel_type {
         void *payload); /* lets go of what a slot owns before it is written again; may be NULL */
     void (*retain)(void *payload); /* makes a copy of the payload own the same; with release */
     bool lends; /* the payload points to memory of its writer that the next message overwrites */
+    int (*count)(const void *payload); /* items in use, the first ones; NULL: any may be */
 } bst_channel_type;
 
 /* The type of a channel by its unscoped name; NULL when there is none. */

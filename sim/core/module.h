@@ -65,7 +65,7 @@ typedef struct bst_module_env {
 typedef struct bst_module_desc {
     uint32_t abi;     /* BST_MODULE_ABI */
     const char *role; /* "gimbal", "scenegen", "imgproc", "tracker", "control", ... */
-    const char *type; /* "two_axis": what a scenario writes as "type" */
+    const char *type; /* "second_order": what a scenario writes as "type" */
     const char *doc;
     unsigned flags;
     const bst_config_desc *config;
@@ -89,6 +89,7 @@ typedef struct bst_module_desc {
      * observation_source is "generator"; otherwise it does not step. Keys of its table that theirs
      * have too take their values. Its last trigger is delayed by what passes between them. */
     const char *const *stands_for;
+    const char *also; /* another name that a scenario may write as "type"; NULL: none */
 } bst_module_desc;
 
 /* In create: number of items that an output's payload shall hold. `port` indexes desc->ports. */

@@ -40,10 +40,10 @@ bst_quat bst_quat_from_rotvec(bst_vec3 r) {
     if (square < 2e-4) {
         /* sin(a/2)/a and cos(a/2) by their series, exact to rounding: most turns are small, and the
          * quotient would lose digits */
-        double s = 0.5 - square * (1.0 / 12.0 - square * (1.0 / 240.0 - square / 10080.0));
+        double s = 0.5 - square * (1.0 / 12.0 - square * (1.0 / 240.0 - square * (1.0 / 10080.0)));
         double c =
-            1.0 -
-            square * (0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0 - square / 40320.0)));
+            1.0 - square * (0.5 - square * (1.0 / 24.0 -
+                                            square * (1.0 / 720.0 - square * (1.0 / 40320.0))));
         return (bst_quat){s * r.x, s * r.y, s * r.z, c};
     }
     double half = sqrt(square), s = 0.5 * sin(half) / half;
@@ -59,7 +59,8 @@ bst_vec3 bst_quat_to_rotvec(bst_quat q) {
     if (n < 0.01 * w) {
         /* the arc tangent's series, exact to rounding: most turns are small */
         double t2 = n * n / (w * w);
-        scale = 2.0 / w * (1.0 - t2 * (1.0 / 3.0 - t2 * (0.2 - t2 * (1.0 / 7.0 - t2 / 9.0))));
+        scale =
+            2.0 / w * (1.0 - t2 * (1.0 / 3.0 - t2 * (0.2 - t2 * (1.0 / 7.0 - t2 * (1.0 / 9.0)))));
     } else {
         scale = n > 0.0 ? 2.0 * atan2(n, w) / n : 2.0;
     }

@@ -26,6 +26,16 @@ typedef struct bst_mat3 {
 
 #define BST_QUAT_IDENTITY ((bst_quat){0.0, 0.0, 0.0, 1.0})
 
+/* atan2(y, x), by its series (exact to rounding, a few times as fast) where y is small beside x >
+ * 0.
+ */
+static inline double bst_atan2(double y, double x) {
+    if (fabs(y) < 0.01 * x) {
+        double t = y / x, t2 = t * t;
+        return t * (1.0 - t2 * (1.0 / 3.0 - t2 * (0.2 - t2 * (1.0 / 7.0 - t2 * (1.0 / 9.0)))));
+    }
+    return atan2(y, x);
+}
 static inline bst_vec3 bst_vec3_make(double x, double y, double z) {
     return (bst_vec3){x, y, z};
 }
@@ -122,7 +132,8 @@ static inline bst_quat bst_quat_conj(bst_quat q) {
 /* Unit quaternion along q; a zero quaternion gives the identity. */
 static inline bst_quat bst_quat_unit(bst_quat q) {
     double n = sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);
-    return n > 0.0 ? (bst_quat){q.x / n, q.y / n, q.z / n, q.w / n} : BST_QUAT_IDENTITY;
+    double s = 1.0 / n;
+    return n > 0.0 ? (bst_quat){q.x * s, q.y * s, q.z * s, q.w * s} : BST_QUAT_IDENTITY;
 }
 /* Coordinates of v in b, given q_b_from_a and v in a. */
 static inline bst_vec3 bst_quat_rotate(bst_quat q, bst_vec3 v) {

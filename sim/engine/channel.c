@@ -153,8 +153,8 @@ static bst_status publish(struct bst_step *step, int port_index) {
         }
     }
     const bst_engine_hooks *hooks = &engine->hooks;
-    if (!hooks->message ||
-        (hooks->wants && !hooks->wants(hooks->user, ch->scope, ch->type->name, step->tick))) {
+    if (!hooks->message || (hooks->wants && !hooks->wants(hooks->user, ch->scope, ch->type->name,
+                                                          s->payload, step->tick, &ch->mark))) {
         return BST_OK;
     }
     return engine->overlap && !step->job

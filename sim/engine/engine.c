@@ -189,14 +189,16 @@ static bst_status run_until(bst_ctx *ctx, bst_engine *engine, int64_t until_tick
             break;
         }
         engine->tick = tick;
-        int stepped = 0;
-        for (; engine->due[engine->heap[0]] <= tick; stepped++) {
-            BST_TRY(step_instance(ctx, engine, engine->heap[0], tick));
+        bool long_step = false;
+        while (engine->due[engine->heap[0]] <= tick) {
+            int index = engine->heap[0];
+            long_step |= engine->instances[index]->spec.period_ticks == 0;
+            BST_TRY(step_instance(ctx, engine, index, tick));
         }
         bst_engine_release_read(engine);
         /* reading the clock costs as much as a plant step: only now and then, or after a step that
          * may be long */
-        if (engine->hooks.interrupted && (++since_clock >= 256 || stepped > 1)) {
+        if (engine->hooks.interrupted && (++since_clock >= 256 || long_step)) {
             since_clock = 0;
             double now = bst_wall_seconds();
             if (now - asked > 0.02) {

@@ -48,8 +48,11 @@ typedef struct bst_engine_hooks {
                         const char *text);
     /* Asked about every 20 ms of wall time; true ends the run with BST_ERR_INTERRUPTED. */
     bool (*interrupted)(void *user, int64_t tick);
-    /* False spares `message` one that it would ignore. */
-    bool (*wants)(void *user, const char *scope, const char *channel, int64_t tick);
+    /* False spares `message` one that it would ignore. Asked at every message, before `message`
+     * and always by the thread that steps; *mark is the channel's, NULL at first, to keep what was
+     * found out about it. */
+    bool (*wants)(void *user, const char *scope, const char *channel, const void *payload,
+                  int64_t tick, void **mark);
     /* Where `message` and `event` leave why they failed. NULL: in the context of the run; when
      * overlapping, give them one of their own. */
     bst_ctx *ctx;

@@ -9,7 +9,13 @@
 
 #include "sim/engine/engine_internal.h"
 
-enum { ALIGN = 16, MOST_FRAMES = BST_OVERLAP_FRAMES, KIND_BYTES = 48, NAME_BYTES = 256 };
+enum {
+    ALIGN = 16,
+    MOST_FRAMES = BST_OVERLAP_FRAMES,
+    KIND_BYTES = 48,
+    NAME_BYTES = 256,
+    GATHERED = 64
+};
 
 typedef enum record_kind { SKIP, MESSAGE, EVENT, JOB } record_kind;
 
@@ -98,6 +104,7 @@ static bst_status reserve(bst_ctx *ctx, bst_overlap *o, size_t content, bool hea
     pthread_mutex_lock(&o->lock);
     while (o->status == BST_OK &&
            ((heavy && o->heavy >= MOST_FRAMES) || (at = place(o, bytes)) == SIZE_MAX)) {
+        pthread_cond_broadcast(&o->changed);
         pthread_cond_wait(&o->changed, &o->lock);
     }
     if (o->status != BST_OK) {
@@ -130,7 +137,10 @@ static void commit(bst_overlap *o, record *r) {
     if (r->kind == JOB) {
         o->waiting[o->waiting_count++] = r;
     }
-    pthread_cond_broadcast(&o->changed);
+    /* to wake a thread costs more than a small message does: they may gather */
+    if (r->kind == JOB || r->heavy || o->records >= GATHERED) {
+        pthread_cond_broadcast(&o->changed);
+    }
     pthread_mutex_unlock(&o->lock);
 }
 
@@ -138,15 +148,23 @@ static void *content_of(record *r) {
     return (char *)r + RECORD_BYTES;
 }
 
+/* Of a message: what its readers may look at. */
+static size_t used_bytes(const channel *ch, const void *payload) {
+    const bst_channel_type *type = ch->type;
+    return type->count ? type->header_bytes + type->item_bytes * (size_t)type->count(payload)
+                       : ch->payload_bytes;
+}
+
 bst_status bst_overlap_message(bst_ctx *ctx, bst_engine *engine, const channel *ch,
                                const void *payload, int64_t tick) {
     bst_overlap *o = engine->overlap;
     record *r;
-    BST_TRY(reserve(ctx, o, ch->payload_bytes, ch->type->release != NULL, &r));
+    size_t bytes = used_bytes(ch, payload);
+    BST_TRY(reserve(ctx, o, bytes, ch->type->release != NULL, &r));
     r->kind = MESSAGE;
     r->tick = tick;
     r->ch = ch;
-    memcpy(content_of(r), payload, ch->payload_bytes);
+    memcpy(content_of(r), payload, bytes);
     if (ch->type->retain) {
         ch->type->retain(content_of(r));
     }
@@ -174,7 +192,7 @@ bst_status bst_overlap_event(bst_ctx *ctx, bst_engine *engine, int64_t tick, con
 /* Appends an input; `to` NULL: only its size. */
 static size_t add_input(char *to, int index, int port, const channel *ch, int64_t sequence) {
     const slot *s = ch ? bst_engine_slot(ch, sequence) : NULL;
-    size_t payload = s ? ch->payload_bytes : 0, bytes = INPUT_BYTES + aligned(payload);
+    size_t payload = s ? used_bytes(ch, s->payload) : 0, bytes = INPUT_BYTES + aligned(payload);
     if (to) {
         *(job_input *)(void *)to = (job_input){.bytes = bytes,
                                                .instance = index,
@@ -490,6 +508,7 @@ bst_status bst_overlap_drain(bst_ctx *ctx, bst_engine *engine) {
     bst_overlap *o = engine->overlap;
     pthread_mutex_lock(&o->lock);
     while (o->records > 0) {
+        pthread_cond_broadcast(&o->changed);
         pthread_cond_wait(&o->changed, &o->lock);
     }
     ctx->warnings += o->ctx.warnings;

@@ -67,11 +67,9 @@ int bst_recorder_find(const bst_recorder *recorder, const char *observer, const 
  * spare the call. */
 bool bst_recorder_wants(const bst_recorder *recorder, const char *channel);
 
-/* Whether a telemetry channel (los_history, pointing_telemetry, nav_telemetry) is recorded at this
- * tick, the next of its grid after *last (-1 at first), which is updated; true for other channels
- * that are wanted. */
-bool bst_recorder_due(const bst_recorder *recorder, const char *channel, int64_t tick,
-                      int64_t *last);
+/* Whether telemetry is recorded at this tick, the next of its grid after *last (-1 at first), which
+ * is updated. */
+bool bst_recorder_due(const bst_recorder *recorder, int64_t tick, int64_t *last);
 
 /* Records a message that was written at `written_tick`. Frames are retained until their truth is
  * there, at most one per sensor. Channels that are not wanted are ignored. Telemetry written in

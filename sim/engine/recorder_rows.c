@@ -53,8 +53,7 @@ static double mid_seconds(const bst_recorder *recorder, int64_t start_tick, int6
     return 0.5 * (double)(start_tick + end_tick) / (double)recorder->tick_rate_hz;
 }
 
-/* Whether a tick opens a new period of the telemetry's grid. */
-static bool is_due(const bst_recorder *recorder, int64_t tick, int64_t *last) {
+bool bst_recorder_due(const bst_recorder *recorder, int64_t tick, int64_t *last) {
     /* a grid point that falls on a tick may come out a rounding error below it */
     double period = (double)tick * recorder->config.telemetry_hz / (double)recorder->tick_rate_hz;
     int64_t now = (int64_t)floor(period + 1e-9);
@@ -63,18 +62,6 @@ static bool is_due(const bst_recorder *recorder, int64_t tick, int64_t *last) {
     }
     *last = now;
     return true;
-}
-
-bool bst_recorder_due(const bst_recorder *recorder, const char *channel, int64_t tick,
-                      int64_t *last) {
-    static const char *const decimated[] = {BST_CHANNEL_LOS_HISTORY, BST_CHANNEL_POINTING_TELEMETRY,
-                                            BST_CHANNEL_MOUNT_STATUS, BST_CHANNEL_NAV_TELEMETRY};
-    for (size_t i = 0; i < sizeof decimated / sizeof *decimated; i++) {
-        if (strcmp(channel, decimated[i]) == 0) {
-            return bst_recorder_wants(recorder, channel) && is_due(recorder, tick, last);
-        }
-    }
-    return bst_recorder_wants(recorder, channel);
 }
 
 static bst_status append(bst_ctx *ctx, bst_recorder *recorder, bst_record_table table,
@@ -238,7 +225,8 @@ bst_status bst_recorder_truth_rows(bst_ctx *ctx, bst_recorder *recorder, int sen
 bst_status bst_recorder_los_rows(bst_ctx *ctx, bst_recorder *recorder, int sensor,
                                  const void *payload, int64_t written_tick) {
     const bst_los_history *h = payload;
-    if (h->written < 1 || !is_due(recorder, written_tick, &recorder->sensors[sensor].last_los)) {
+    if (h->written < 1 ||
+        !bst_recorder_due(recorder, written_tick, &recorder->sensors[sensor].last_los)) {
         return BST_OK;
     }
     const bst_los_sample *s = &h->items[(h->written - 1) % h->capacity];
@@ -440,7 +428,7 @@ bst_status bst_recorder_pointing_rows(bst_ctx *ctx, bst_recorder *recorder, int 
                                       const void *payload, int64_t written_tick) {
     const bst_pointing_telemetry *p = payload;
     if (p->written < 1 ||
-        !is_due(recorder, written_tick, &recorder->sensors[sensor].last_pointing)) {
+        !bst_recorder_due(recorder, written_tick, &recorder->sensors[sensor].last_pointing)) {
         return BST_OK;
     }
     const bst_pointing_sample *s = &p->items[(p->written - 1) % p->capacity];
@@ -460,7 +448,7 @@ bst_status bst_recorder_pointing_rows(bst_ctx *ctx, bst_recorder *recorder, int 
 bst_status bst_recorder_mount_rows(bst_ctx *ctx, bst_recorder *recorder, int sensor,
                                    const void *payload, int64_t written_tick) {
     const bst_mount_status *m = payload;
-    if (!is_due(recorder, written_tick, &recorder->sensors[sensor].last_mount)) {
+    if (!bst_recorder_due(recorder, written_tick, &recorder->sensors[sensor].last_mount)) {
         return BST_OK;
     }
     row r = {.count = 0};
@@ -483,7 +471,7 @@ bst_status bst_recorder_mount_rows(bst_ctx *ctx, bst_recorder *recorder, int sen
 bst_status bst_recorder_nav_rows(bst_ctx *ctx, bst_recorder *recorder, int sensor,
                                  const void *payload, int64_t written_tick) {
     const bst_nav_telemetry *n = payload;
-    if (!is_due(recorder, written_tick, &recorder->sensors[sensor].last_nav)) {
+    if (!bst_recorder_due(recorder, written_tick, &recorder->sensors[sensor].last_nav)) {
         return BST_OK;
     }
     row r = {.count = 0};
@@ -499,7 +487,7 @@ bst_status bst_recorder_control_rows(bst_ctx *ctx, bst_recorder *recorder, int s
                                      const void *payload, int64_t written_tick) {
     const bst_control_status *c = payload;
     bst_recorder_state *s = &recorder->sensors[sensor];
-    bool due = is_due(recorder, written_tick, &s->last_control);
+    bool due = bst_recorder_due(recorder, written_tick, &s->last_control);
     if (!due && c->mode == s->last_mode && c->target_id == s->last_target) {
         return BST_OK;
     }

@@ -87,9 +87,10 @@ static cJSON *part_of(const cJSON *node, bool common) {
 static const bst_module_desc *find_module(const bst_registry *registry, const char *role,
                                           const char *type) {
     for (int i = 0; i < registry->count; i++) {
-        if (strcmp(registry->modules[i]->role, role) == 0 &&
-            (!type || strcmp(registry->modules[i]->type, type) == 0)) {
-            return registry->modules[i];
+        const bst_module_desc *m = registry->modules[i];
+        if (strcmp(m->role, role) == 0 &&
+            (!type || strcmp(m->type, type) == 0 || (m->also && strcmp(m->also, type) == 0))) {
+            return m;
         }
     }
     return NULL;
@@ -486,7 +487,13 @@ static cJSON *module_schema(const bst_module_desc *m) {
     cJSON *type = cJSON_GetObjectItemCaseSensitive(properties, "type");
     cJSON_DeleteItemFromObjectCaseSensitive(type, "maxLength");
     cJSON_DeleteItemFromObjectCaseSensitive(type, "description");
-    cJSON_AddStringToObject(type, "const", m->type);
+    if (m->also) {
+        cJSON *names = cJSON_AddArrayToObject(type, "enum");
+        cJSON_AddItemToArray(names, cJSON_CreateString(m->type));
+        cJSON_AddItemToArray(names, cJSON_CreateString(m->also));
+    } else {
+        cJSON_AddStringToObject(type, "const", m->type);
+    }
     cJSON_AddStringToObject(type, "description", m->doc);
     cJSON *delays = cJSON_GetObjectItemCaseSensitive(properties, "delay_s");
     cJSON_AddStringToObject(delays, "type", "object");

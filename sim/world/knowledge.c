@@ -23,10 +23,11 @@ struct bst_knowledge_view {
     const bst_knowledge *knowledge;
     bst_sky_clock *clock;
     cue_knot knots[KNOTS];
-    /* the second whose stencil was looked at last */
+    bst_quat cue_error; /* turns where the target nominally is to where the cue has it */
+    /* the second that was looked at last, and Newton's divided differences about it */
     int64_t checked;
     bool any_checked, smooth;
-    bst_vec3 stencil[STENCIL];
+    bst_vec3 newton[STENCIL];
 };
 
 /* The onboard PSF is one Gaussian: of the width given, or else that with the true one's
@@ -136,6 +137,8 @@ bst_status bst_knowledge_view_create(bst_ctx *ctx, const bst_knowledge *knowledg
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a view of onboard knowledge");
     }
     view->knowledge = knowledge;
+    view->cue_error = bst_quat_from_rotvec(
+        knowledge->world->observers[knowledge->observer].sensors[knowledge->sensor].cue_rotation);
     bst_status status = bst_sky_clock_create_on(ctx, knowledge->world->sky_grid, &view->clock);
     if (status != BST_OK) {
         free(view);
@@ -191,25 +194,30 @@ static const cue_knot *knot_at(bst_knowledge_view *view, int64_t second) {
 
 /* Whether the direction between a second and the next one follows a quintic. */
 static bool is_smooth(bst_knowledge_view *view, int64_t second) {
-    static const double fifth[STENCIL] = {-1.0, 5.0, -10.0, 10.0, -5.0, 1.0};
     if (!view->any_checked || view->checked != second) {
-        bst_vec3 sum = {0, 0, 0};
+        bst_vec3 *d = view->newton;
         bool known = true;
         for (int i = 0; i < STENCIL; i++) {
             const cue_knot *knot = knot_at(view, second - 2 + i);
             known = known && knot->known;
-            sum = bst_vec3_axpy(sum, fifth[i], knot->direction);
-            view->stencil[i] = knot->direction;
+            d[i] = knot->direction;
+        }
+        double last = 1.0; /* factorial of the order */
+        for (int order = 1; order < STENCIL; order++) {
+            last *= order;
+            for (int i = STENCIL - 1; i >= order; i--) {
+                d[i] = bst_vec3_scale(bst_vec3_sub(d[i], d[i - 1]), 1.0 / order);
+            }
         }
         view->any_checked = true;
         view->checked = second;
-        view->smooth = known && bst_vec3_norm(sum) <= SMOOTH_RAD;
+        view->smooth = known && last * bst_vec3_norm(d[STENCIL - 1]) <= SMOOTH_RAD;
     }
     return view->smooth;
 }
 
-/* By Lagrange's polynomial through the six seconds around where that is exact, else directly: a
- * function of time alone. */
+/* By the polynomial through the six seconds around where that is exact, else directly: a function
+ * of time alone. */
 static bst_status direction_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                bst_vec3 *out) {
     double whole = floor(seconds);
@@ -217,13 +225,9 @@ static bst_status direction_at(bst_ctx *ctx, bst_knowledge_view *view, double se
         return nominal_direction(ctx, view, seconds, out);
     }
     double u = seconds - whole;
-    const double a = u + 2.0, b = u + 1.0, d = u - 1.0, e = u - 2.0, f = u - 3.0;
-    const double w[STENCIL] = {-b * u * d * e * f / 120.0, a * u * d * e * f / 24.0,
-                               -a * b * d * e * f / 12.0,  a * b * u * e * f / 12.0,
-                               -a * b * u * d * f / 24.0,  a * b * u * d * e / 120.0};
-    bst_vec3 sum = {0, 0, 0};
-    for (int i = 0; i < STENCIL; i++) {
-        sum = bst_vec3_axpy(sum, w[i], view->stencil[i]);
+    bst_vec3 sum = view->newton[STENCIL - 1];
+    for (int i = STENCIL - 2; i >= 0; i--) {
+        sum = bst_vec3_axpy(view->newton[i], u + 2.0 - i, sum);
     }
     *out = sum;
     return BST_OK;
@@ -240,7 +244,7 @@ bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double s
     }
     const world_sensor *sensor = sensor_of(k);
     const bst_cue_config *cue = &sensor->config.cue;
-    bst_quat error = bst_quat_from_rotvec(sensor->cue_rotation);
+    bst_quat error = view->cue_error;
     out->valid = true;
     out->direction_gcrf = bst_quat_rotate(error, d[1]);
     out->rate_gcrf_radps =
@@ -258,12 +262,10 @@ bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double s
 
 bst_status bst_knowledge_cue_direction_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                           bool *valid, bst_vec3 *direction) {
-    const bst_knowledge *k = view->knowledge;
     bst_vec3 nominal;
     BST_TRY(direction_at(ctx, view, seconds, &nominal));
-    const world_sensor *sensor = sensor_of(k);
     *valid = true;
-    *direction = bst_quat_rotate(bst_quat_from_rotvec(sensor->cue_rotation), nominal);
+    *direction = bst_quat_rotate(view->cue_error, nominal);
     return BST_OK;
 }
 
@@ -284,7 +286,7 @@ bst_status bst_knowledge_region_direction_at(bst_ctx *ctx, bst_knowledge_view *v
     BST_TRY(believed_eye(ctx, view, seconds, &t, &eye));
     BST_TRY(bst_region_place(ctx, k->world, k->observer, k->sensor, view->clock, t, &eye, along_rad,
                              across_rad, &nominal));
-    *direction = bst_quat_rotate(bst_quat_from_rotvec(sensor_of(k)->cue_rotation), nominal);
+    *direction = bst_quat_rotate(view->cue_error, nominal);
     return BST_OK;
 }
 

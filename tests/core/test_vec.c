@@ -44,6 +44,18 @@ static void rotation_vectors_round_trip(void **state) {
     }
 }
 
+static void arc_tangents_are_those_of_the_library(void **state) {
+    (void)state;
+    for (int i = -400; i <= 400; i++) {
+        /* the series' range and both of its edges; a last digit or two of the angle */
+        double y = 0.0125 * 3.0 * i / 400.0, angle = atan2(y, 3.0);
+        bst_assert_close(bst_atan2(y, 3.0), angle, 4e-16 * fabs(angle));
+        assert_true(bst_atan2(y, -3.0) == atan2(y, -3.0));
+    }
+    assert_true(bst_atan2(0.0, 0.0) == 0.0);
+    assert_true(bst_atan2(1.0, 0.0) == atan2(1.0, 0.0));
+}
+
 static void slerp_takes_the_short_way(void **state) {
     (void)state;
     bst_quat a = BST_QUAT_IDENTITY;
@@ -88,6 +100,7 @@ int main(void) {
         cmocka_unit_test(quaternion_and_matrix_agree),
         cmocka_unit_test(matrix_to_quaternion_at_half_turns),
         cmocka_unit_test(rotation_vectors_round_trip),
+        cmocka_unit_test(arc_tangents_are_those_of_the_library),
         cmocka_unit_test(slerp_takes_the_short_way),
         cmocka_unit_test(look_survives_parallel_vectors),
         cmocka_unit_test(angle_is_accurate_at_both_ends),

@@ -81,7 +81,7 @@ class Messages(unittest.TestCase):
         self.bad_set("/seed=5", ": /seed: wrong type .*hexadecimal")
         self.bad_set("/epoch_utc=yesterday", ": /epoch_utc")
         self.bad_set(GIMBAL + "/type=three_axis", f": {GIMBAL}/type: there is no gimbal of type "
-                     '"three_axis" .*"two_axis"')
+                     '"three_axis" .*"second_order"')
         self.bad_set(GIMBAL + "/rate_hz=999", f": {GIMBAL}/rate_hz: .*857.142857 and 1000 Hz")
         self.bad_set(GIMBAL + "/platform/history_s=0.4", ": neossat/telescope/gimbal: platform/"
                      r"history_s: 0\.4 s do not cover the longest exposure_s of this sensor, 0\.5 s "

@@ -169,7 +169,7 @@ class Installed(unittest.TestCase):
         names = [line.split()[-1] for line in
                  call("nm", "-D", "--defined-only", library).splitlines()]
         self.assertIn("bst_simulation_create", names)
-        self.assertIn("bst_gimbal_two_axis_module", names)
+        self.assertIn("bst_gimbal_second_order_module", names)
         self.assertEqual([n for n in names if not n.startswith("bst_")], [])
 
     def test_nothing_names_the_build(self):

@@ -1,0 +1,374 @@
+/* The full mounts: geometry, following with all that is in the plant, keyhole with and without a
+ * third axis, wrap, stops, faults, what is refused. */
+#include "gimbal/mount.h"
+#include "tests/test_support.h"
+
+#define DT 1e-3
+
+static bst_mount_config default_config(void) {
+    bst_ctx ctx = {0};
+    bst_mount_config c;
+    bst_assert_ok(&ctx, bst_config_defaults(&ctx, bst_mount_config_table, &c));
+    return c;
+}
+
+static void make(bst_mount *mount, int type, const bst_mount_config *config) {
+    bst_ctx ctx = {0};
+    bst_assert_ok(&ctx, bst_mount_init(&ctx, mount, type, config, DT, (bst_rng_key){{1, 2}}));
+}
+
+static const bst_quat some_attitude = {0.18257418583505536, -0.3651483716701107, 0.5477225575051661,
+                                       0.7302967433402214};
+
+static bst_vec3 boresight(bst_quat q_cam_from_body) {
+    return bst_quat_rotate(bst_quat_conj(q_cam_from_body), (bst_vec3){0, 0, 1});
+}
+
+static bst_los_command command_from(bst_quat q_body, bst_vec3 body, bst_vec3 rate_body) {
+    bst_quat back = bst_quat_conj(q_body);
+    return (bst_los_command){.direction_gcrf = bst_quat_rotate(back, bst_vec3_unit(body)),
+                             .rate_gcrf_radps = bst_quat_rotate(back, rate_body)};
+}
+
+static void attitudes_are_rotations_about_the_stated_axes(void **state) {
+    (void)state;
+    const double angle[3] = {0.7, -1.2, 0.3};
+    for (int type = 0; type < 2; type++) {
+        /* q_body_from_cam = R(axis 0) R(axis 1) R(axis 2), as mount_status says */
+        bst_quat q = BST_QUAT_IDENTITY;
+        for (int k = 0; k < 3; k++) {
+            bst_vec3 r = bst_vec3_scale(bst_mount_axis_body(type, k), angle[k]);
+            q = bst_quat_mul(q, bst_quat_from_rotvec(r));
+        }
+        bst_quat cam = bst_mount_attitude(type, angle);
+        bst_quat none = bst_quat_mul(cam, q);
+        bst_assert_close(fabs(none.w), 1.0, 1e-15);
+        bst_assert_close(none.x * none.x + none.y * none.y + none.z * none.z, 0.0, 1e-30);
+        /* the closed forms of the header, two axes */
+        const double two[3] = {0.7, -1.2, 0.0};
+        bst_vec3 b = boresight(bst_mount_attitude(type, two));
+        double co = cos(0.7), so = sin(0.7), ci = cos(-1.2), si = sin(-1.2);
+        bst_vec3 expected = type == BST_MOUNT_AZIMUTH_ELEVATION ? (bst_vec3){si, -ci * so, ci * co}
+                                                                : (bst_vec3){ci * so, -si, ci * co};
+        bst_assert_close(bst_vec3_norm(bst_vec3_sub(b, expected)), 0.0, 1e-15);
+    }
+}
+
+static void solutions_point_there_and_move_along(void **state) {
+    (void)state;
+    for (int type = 0; type < 2; type++) {
+        for (int i = 0; i < 200; i++) {
+            double angle[3] = {-3.1 + 0.031 * i, -1.5 + 0.015 * i, 0.0};
+            bst_vec3 d = boresight(bst_mount_attitude(type, angle));
+            bst_vec3 r = bst_vec3_cross((bst_vec3){0.02, -0.03, 0.01}, d);
+            bst_mount_pose pose = bst_mount_solve(type, d, r, 0.0);
+            bst_mount_pose rest = bst_mount_solve_rest(type, d, r, angle[0] + 0.1, 0.05);
+            const bst_mount_pose *both[2] = {&pose, &rest};
+            double pole = 1.0 / cos(angle[1]);
+            bst_assert_close(pose.angle_rad[0], angle[0], 1e-14 * pole);
+            bst_assert_close(pose.angle_rad[1], angle[1], 1e-14 * pole);
+            for (int p = 0; p < 2; p++) {
+                double ahead[3], behind[3], h = 1e-5;
+                for (int k = 0; k < 3; k++) {
+                    ahead[k] = both[p]->angle_rad[k] + h * both[p]->rate_radps[k];
+                    behind[k] = both[p]->angle_rad[k] - h * both[p]->rate_radps[k];
+                }
+                bst_vec3 at = boresight(bst_mount_attitude(type, both[p]->angle_rad));
+                assert_true(bst_vec3_angle(at, d) < 1e-13);
+                bst_vec3 moved = bst_vec3_sub(boresight(bst_mount_attitude(type, ahead)),
+                                              boresight(bst_mount_attitude(type, behind)));
+                bst_vec3 miss = bst_vec3_axpy(bst_vec3_scale(moved, 0.5 / h), -1.0, r);
+                /* third derivatives h^2 / 6 of up to (rate pole)^3, rounding 1e-16 / h */
+                bst_assert_close(bst_vec3_norm(miss), 0.0, 1e-10 + 1e-10 * pole * pole * pole);
+            }
+        }
+    }
+}
+
+/* Runs against a direction that turns about `about` (body axes) at a rate from `from` on; returns
+ * the largest error of the true line of sight between two times. */
+typedef struct chase {
+    bst_vec3 from, about;
+    double rate_radps;
+} chase;
+
+static bst_vec3 chased(const chase *c, double t) {
+    return bst_quat_rotate(bst_quat_from_rotvec(bst_vec3_scale(c->about, c->rate_radps * t)),
+                           c->from);
+}
+
+static double run(bst_mount *m, const chase *c, double until_s, double judge_from_s,
+                  double judge_to_s) {
+    double worst = 0.0;
+    bst_mount_body body = {.q_believed_from_gcrf = some_attitude};
+    while ((double)m->steps * DT < until_s - 0.5 * DT) {
+        double t = (double)m->steps * DT;
+        bst_vec3 d = chased(c, t);
+        bst_vec3 r = bst_vec3_scale(bst_vec3_cross(c->about, d), c->rate_radps);
+        bst_los_command k = command_from(some_attitude, d, r);
+        bst_mount_step(m, &body, &k, 0.0, m->steps % 10 == 0);
+        assert_true(isfinite(m->q_cam_from_body.w));
+        for (int a = 0; a < m->axes; a++) {
+            assert_true(fabs(m->joints.state.rate_radps[a]) <=
+                        1.1 * m->servo[a].rate_limit_radps * (1 + 1e-6));
+            assert_true(fabs(m->servo[a].torque_nm) <= m->servo[a].torque_limit_nm);
+        }
+        if (t >= judge_from_s && t <= judge_to_s) {
+            worst = fmax(worst, bst_vec3_angle(boresight(m->q_cam_from_body), d));
+        }
+    }
+    return worst;
+}
+
+static void a_slow_and_a_fast_target_are_followed(void **state) {
+    (void)state;
+    for (int type = 0; type < 2; type++) {
+        for (int third = 0; third < 2; third++) {
+            bst_mount_config config = default_config();
+            config.third_axis = third == 1;
+            config.flexible.frequency_hz[0] = config.flexible.frequency_hz[1] = 50.0;
+            bst_mount m;
+            make(&m, type, &config);
+            /* a geostationary target from a low orbit: 15 arcsec/s */
+            chase slow = {bst_vec3_unit((bst_vec3){0.05, 0.03, 1.0}), {0, 1, 0}, 7e-5};
+            double worst = run(&m, &slow, 8.0, 4.0, 8.0);
+            /* friction at these rates, encoder of 0.05 arcsec: 0.1 px of 10 arcsec at the most */
+            assert_true(worst < 1.0 * BST_ARCSEC_RAD);
+            assert_true(m.settled);
+            make(&m, type, &config);
+            chase fast = {bst_vec3_unit((bst_vec3){-0.3, -0.4, 1.0}),
+                          bst_vec3_unit((bst_vec3){-1, 1, 0.2}), 2.0 * BST_DEG_RAD};
+            worst = run(&m, &fast, 20.0, 8.0, 20.0);
+            assert_true(worst < 2.0 * BST_ARCSEC_RAD);
+        }
+    }
+}
+
+/* Over the pole at 2 deg/s, at distances down to none. */
+static void the_third_axis_carries_a_target_through_the_pole(void **state) {
+    (void)state;
+    const double offset_deg[] = {0.0, 1e-6, 0.3, 2.0, 5.0};
+    for (int type = 0; type < 2; type++) {
+        for (int i = 0; i < 5; i++) {
+            bst_mount_config config = default_config();
+            config.third_axis = true;
+            config.travel_min_deg[1] = -100.0;
+            config.travel_max_deg[1] = 100.0;
+            bst_mount m;
+            make(&m, type, &config);
+            bst_vec3 pole = bst_mount_axis_body(type, 0);
+            if (type == BST_MOUNT_CROSS_ELEVATION) {
+                pole = bst_vec3_scale(pole, -1.0); /* the way from +z at positive angles */
+            }
+            bst_vec3 zenith = {0, 0, 1}, side = bst_vec3_cross(zenith, pole);
+            double off = offset_deg[i] * BST_DEG_RAD;
+            /* a great circle that passes the pole at `off`, starting 60 degrees before it */
+            bst_vec3 about =
+                bst_vec3_unit(bst_vec3_axpy(bst_vec3_scale(pole, sin(off)), cos(off), side));
+            bst_vec3 near = bst_vec3_unit(bst_vec3_axpy(pole, -bst_vec3_dot(pole, about), about));
+            double back = 60.0 * BST_DEG_RAD;
+            bst_quat turn = bst_quat_from_rotvec(bst_vec3_scale(about, back));
+            chase c = {bst_quat_rotate(bst_quat_conj(turn), near), about, 2.0 * BST_DEG_RAD};
+            if (bst_vec3_dot(c.from, zenith) < 0.0) {
+                c.from = bst_quat_rotate(turn, near);
+                c.rate_radps = -c.rate_radps;
+            }
+            double worst = run(&m, &c, 50.0, 12.0, 50.0);
+            /* the outer axis' start and end near the pole, with friction: 13 arcsec for some ms;
+             * 20 are 2 px of 10 arcsec */
+            assert_true(worst < 15.0 * BST_ARCSEC_RAD);
+        }
+    }
+}
+
+static void two_axes_lose_it_at_the_pole_and_find_it_again(void **state) {
+    (void)state;
+    bst_mount_config config = default_config();
+    bst_mount m;
+    make(&m, BST_MOUNT_AZIMUTH_ELEVATION, &config);
+    chase c = {bst_vec3_unit((bst_vec3){0.5, 1e-3, 0.866}), {0, 1, 0}, 2.0 * BST_DEG_RAD};
+    /* 30 s to the pole; half a turn at 9.5 deg/s takes 19 s, on which the target goes 38 degrees */
+    double lost = run(&m, &c, 70.0, 30.0, 40.0);
+    assert_true(lost > 5.0 * BST_DEG_RAD);
+    double found = run(&m, &c, 75.0, 70.0, 75.0);
+    assert_true(found < 2.0 * BST_ARCSEC_RAD);
+}
+
+static void half_a_turn_is_made_within_the_limits(void **state) {
+    (void)state;
+    bst_mount_config config = default_config();
+    config.motor_torque_nm[0] = 0.3; /* saturates */
+    config.accel_limit_degps2[0] = 60.0;
+    bst_mount m;
+    make(&m, BST_MOUNT_CROSS_ELEVATION, &config);
+    chase c = {bst_vec3_unit((bst_vec3){1e-3, 0.1, -1.0}), {0, 1, 0}, 0.0};
+    double worst = run(&m, &c, 45.0, 40.0, 45.0);
+    assert_true(worst < 1.0 * BST_ARCSEC_RAD);
+    assert_true(m.settled && !m.limited);
+    bst_assert_close(fabs(m.joints.state.angle_rad[0]), BST_PI, 0.01);
+}
+
+/* An azimuth that goes on and on: the encoder wraps, the cable's travel ends, and the axis goes
+ * back by a turn and finds the target again. */
+static void a_wound_cable_is_unwound(void **state) {
+    (void)state;
+    bst_mount_config config = default_config();
+    bst_mount m;
+    make(&m, BST_MOUNT_AZIMUTH_ELEVATION, &config);
+    chase c = {bst_vec3_unit((bst_vec3){0.5, 0.0, 1.0}), {1, 0, 0}, 4.0 * BST_DEG_RAD};
+    double worst = run(&m, &c, 60.0, 10.0, 60.0); /* 240 of 270 degrees */
+    assert_true(worst < 2.0 * BST_ARCSEC_RAD);
+    bst_assert_close(m.servo[0].unwrapped_rad, 240.0 * BST_DEG_RAD, 1e-3);
+    assert_true(m.servo[0].reading_rad < 0.0);
+    worst = run(&m, &c, 120.0, 115.0, 120.0);
+    assert_true(worst < 2.0 * BST_ARCSEC_RAD);
+    bst_assert_close(m.servo[0].unwrapped_rad, 120.0 * BST_DEG_RAD, 1e-3);
+    bst_mount_status status;
+    bst_mount_status_of(&m, 7, &status);
+    bst_assert_close(status.axis[0].angle_rad, 120.0 * BST_DEG_RAD, 1e-3);
+    assert_int_equal(status.axes, 2);
+}
+
+static void a_wanted_turn_of_the_outer_axis_is_taken(void **state) {
+    (void)state;
+    bst_mount_config config = default_config();
+    bst_mount m;
+    make(&m, BST_MOUNT_AZIMUTH_ELEVATION, &config);
+    bst_mount_body body = {.q_believed_from_gcrf = some_attitude};
+    /* azimuth 120 degrees, or -240 */
+    bst_vec3 d = {0.1, -sin(120.0 * BST_DEG_RAD), cos(120.0 * BST_DEG_RAD)};
+    bst_los_command k = command_from(some_attitude, d, (bst_vec3){0, 0, 0});
+    k.near_given = true;
+    k.near_rad[0] = -230.0 * BST_DEG_RAD;
+    for (int n = 0; n < 40000; n++) {
+        bst_mount_step(&m, &body, &k, 0.0, true);
+    }
+    bst_assert_close(m.servo[0].unwrapped_rad, -240.0 * BST_DEG_RAD, 1e-4);
+    assert_true(m.settled);
+}
+
+static void a_stuck_axis_is_told_and_the_rest_goes_on(void **state) {
+    (void)state;
+    bst_mount_config config = default_config();
+    config.fault.stuck_axis = 2;
+    config.fault.stuck_from_s = 2.0;
+    bst_mount m;
+    make(&m, BST_MOUNT_CROSS_ELEVATION, &config);
+    chase c = {{0, 0, 1}, bst_vec3_unit((bst_vec3){-1, 1, 0}), 0.5 * BST_DEG_RAD};
+    (void)run(&m, &c, 10.0, 0.0, 0.0);
+    bst_mount_status status;
+    bst_mount_status_of(&m, 0, &status);
+    assert_true((status.axis[1].flags & BST_AXIS_STUCK) != 0);
+    assert_true((status.axis[0].flags & BST_AXIS_STUCK) == 0);
+    assert_true(m.joints.state.rate_radps[1] == 0.0 && !m.settled);
+    bst_vec3 d = chased(&c, 10.0 - DT);
+    bst_assert_close(m.joints.state.angle_rad[0], atan2(d.x, d.z), 1e-5);
+}
+
+static void it_runs_into_its_stop_at_full_speed_and_stays_whole(void **state) {
+    (void)state;
+    bst_mount_config config = default_config();
+    bst_mount m;
+    make(&m, BST_MOUNT_CROSS_ELEVATION, &config);
+    double push[3] = {2.0, 1.0, 0.0};
+    double fastest = 0.0;
+    for (int n = 0; n < 120000; n++) {
+        bst_mount_drive(&m, push, (bst_vec3){0, 0, 0});
+        fastest = fmax(fastest, fabs(m.joints.state.rate_radps[1]));
+        assert_true(m.joints.state.angle_rad[0] <= m.travel_max_rad[0]);
+        assert_true(m.joints.state.angle_rad[1] <= m.travel_max_rad[1]);
+        assert_true(isfinite(m.q_cam_from_body.w));
+    }
+    assert_true(fastest > 1.0);
+    assert_true(m.joints.at_stop[0] && m.joints.at_stop[1]);
+    assert_true(m.joints.state.rate_radps[0] == 0.0 && m.joints.state.rate_radps[1] == 0.0);
+}
+
+/* The body drifts and turns below the mount: known rates are taken off, unknown ones move the line
+ * of sight by what the loop leaves. */
+static void a_turning_body_is_undone(void **state) {
+    (void)state;
+    bst_mount_config config = default_config();
+    bst_mount m;
+    make(&m, BST_MOUNT_AZIMUTH_ELEVATION, &config);
+    bst_vec3 rate = {0.002, -0.003, 0.001};
+    bst_vec3 target = bst_quat_rotate(bst_quat_conj(some_attitude), (bst_vec3){0.1, 0.2, 1.0});
+    bst_los_command k = {.direction_gcrf = bst_vec3_unit(target)};
+    double worst = 0.0;
+    for (int n = 0; n < 15000; n++) {
+        bst_quat q =
+            bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(rate, -n * DT)), some_attitude);
+        bst_mount_body body = {
+            .rate_radps = rate, .q_believed_from_gcrf = q, .believed_rate_radps = rate};
+        bst_mount_step(&m, &body, &k, 0.0, false);
+        if (n > 6000) {
+            bst_vec3 want = bst_quat_rotate(q, k.direction_gcrf);
+            worst = fmax(worst, bst_vec3_angle(boresight(m.q_cam_from_body), want));
+        }
+    }
+    assert_true(worst < 1.0 * BST_ARCSEC_RAD);
+}
+
+static void what_cannot_be_is_refused(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    static bst_mount m;
+    bst_rng_key key = {{1, 2}};
+    bst_mount_config c = default_config();
+    c.flexible.frequency_hz[1] = 80.0; /* free: 80 / sqrt(0.8) = 89.44 Hz, 1.118 ms allowed */
+    bst_assert_ok(&ctx, bst_mount_init(&ctx, &m, 0, &c, 1e-3, key));
+    assert_int_equal(bst_mount_init(&ctx, &m, 0, &c, 1e-2, key), BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "the inner axis' mode swings at 89.4427 Hz"));
+    assert_non_null(strstr(ctx.message, "largest step allowed is 0.001118 s"));
+    c = default_config();
+    c.inertia_inner_kgm2[2] = 2.0;
+    assert_int_equal(bst_mount_init(&ctx, &m, 0, &c, DT, key), BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "inertia_inner_kgm2: no body has this tensor"));
+    c = default_config();
+    c.friction.breakaway_nm[0] = 0.0;
+    assert_int_equal(bst_mount_init(&ctx, &m, 0, &c, DT, key), BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "friction/breakaway_nm"));
+    c = default_config();
+    c.start_deg[1] = 95.0;
+    assert_int_equal(bst_mount_init(&ctx, &m, 0, &c, DT, key), BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "start_deg: 95 of the inner axis"));
+    c = default_config();
+    c.fault.stuck_axis = 3;
+    assert_int_equal(bst_mount_init(&ctx, &m, 0, &c, DT, key), BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "set third_axis"));
+    c = default_config();
+    c.friction.viscous_nms_per_rad[1] = 1000.0;
+    assert_int_equal(bst_mount_init(&ctx, &m, 0, &c, DT, key), BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "viscous_nms_per_rad"));
+}
+
+static void the_same_seed_gives_the_same_bits(void **state) {
+    (void)state;
+    bst_mount_config config = default_config();
+    static bst_mount a, b;
+    make(&a, 0, &config);
+    make(&b, 0, &config);
+    chase c = {bst_vec3_unit((bst_vec3){0.1, 0.0, 1.0}), {0, 1, 0}, 0.01};
+    (void)run(&a, &c, 2.0, 0.0, 0.0);
+    (void)run(&b, &c, 2.0, 0.0, 0.0);
+    assert_memory_equal(&a.joints.state, &b.joints.state, sizeof a.joints.state);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(attitudes_are_rotations_about_the_stated_axes),
+        cmocka_unit_test(solutions_point_there_and_move_along),
+        cmocka_unit_test(a_slow_and_a_fast_target_are_followed),
+        cmocka_unit_test(the_third_axis_carries_a_target_through_the_pole),
+        cmocka_unit_test(two_axes_lose_it_at_the_pole_and_find_it_again),
+        cmocka_unit_test(half_a_turn_is_made_within_the_limits),
+        cmocka_unit_test(a_wound_cable_is_unwound),
+        cmocka_unit_test(a_wanted_turn_of_the_outer_axis_is_taken),
+        cmocka_unit_test(a_stuck_axis_is_told_and_the_rest_goes_on),
+        cmocka_unit_test(it_runs_into_its_stop_at_full_speed_and_stays_whole),
+        cmocka_unit_test(a_turning_body_is_undone),
+        cmocka_unit_test(what_cannot_be_is_refused),
+        cmocka_unit_test(the_same_seed_gives_the_same_bits),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
