@@ -71,33 +71,33 @@ bst_status bst_platform_equip(const bst_module_env *env, bst_platform *platform,
     return bst_craft_create(env->ctx, &config->spacecraft, &setup, &platform->spacecraft);
 }
 
+bst_status bst_platform_check_mount(bst_ctx *ctx, const bst_platform *platform,
+                                    const double mount_kgm2[6]) {
+    if (!platform->spacecraft) {
+        return BST_OK;
+    }
+    bst_mat3 mount = bst_inertia_matrix(mount_kgm2);
+    const bst_craft_body *body = bst_craft_dynamics(platform->spacecraft);
+    double heaviest[3], lightest = INFINITY;
+    bst_symmetric_eigen(3, &mount.m[0][0], heaviest, NULL);
+    for (int i = 0; i < 3; i++) {
+        lightest = fmin(lightest, 1.0 / body->per_moment[i]);
+    }
+    if (heaviest[2] > 0.5 * lightest) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "platform/spacecraft/inertia_kgm2: the smallest principal moment, without "
+                        "wheels and appendages, is %g kg m^2, and the mount's largest is %g, more "
+                        "than half of it; make the spacecraft heavier (its inertia is without the "
+                        "mount's) or the mount lighter",
+                        lightest, heaviest[2]);
+    }
+    return BST_OK;
+}
+
 void bst_platform_free(bst_platform *platform) {
     bst_craft_free(platform->spacecraft);
     free_sky(platform->sky);
+    bst_jitter_free(&platform->jitter);
     platform->spacecraft = NULL;
     platform->sky = NULL;
-}
-
-bst_status bst_platform_step(struct bst_step *step, bst_platform *platform, int64_t n,
-                             bst_vec3 reaction_nm) {
-    bool saturated = platform->wheels_saturated, blind = platform->trackers_blind;
-    BST_TRY(
-        bst_platform_advance(bst_step_ctx(step), platform, n, bst_step_seconds(step), reaction_nm));
-    if (platform->wheels_saturated != saturated) {
-        if (saturated) {
-            bst_step_event(step, "wheels", "reaction wheels within their limits again");
-        } else {
-            bst_step_event(step, "wheels", "reaction wheels at their limit");
-            bst_step_count(step, "wheels_saturated");
-        }
-    }
-    if (platform->trackers_blind != blind) {
-        if (blind) {
-            bst_step_event(step, "star_trackers", "stars in sight again");
-        } else {
-            bst_step_event(step, "star_trackers", "no star tracker sees stars");
-            bst_step_count(step, "star_trackers_blind");
-        }
-    }
-    return BST_OK;
 }

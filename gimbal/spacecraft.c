@@ -145,8 +145,7 @@ static bst_status check_wheels(bst_ctx *ctx, const bst_craft *craft) {
 
 static bst_status set_trackers(bst_ctx *ctx, bst_craft *craft, const bst_craft_config *config,
                                const bst_craft_setup *setup) {
-    const bst_star_tracker_config *all = config->star_trackers.items;
-    craft->trackers = config->star_trackers.count;
+    const bst_star_tracker_config *all = bst_craft_trackers(config, &craft->trackers);
     for (int i = 0; i < craft->trackers; i++) {
         char name[64];
         snprintf(name, sizeof name, "spacecraft/star_trackers/%d/rate_hz", i);
@@ -190,7 +189,9 @@ static bst_status prepare(bst_ctx *ctx, bst_craft *craft, const bst_craft_config
     craft->dt_s = setup->dt_s;
     craft->disturbances = config->disturbances;
     BST_TRY(set_law(ctx, craft, &config->attitude, setup->q_nominal));
-    BST_TRY(bst_wheels_init(ctx, &craft->wheels, &config->wheels, stream(setup, "wheels")));
+    int wheels;
+    const bst_wheel_config *wheel = bst_craft_wheels(config, &wheels);
+    BST_TRY(bst_wheels_init(ctx, &craft->wheels, wheel, wheels, stream(setup, "wheels")));
     BST_TRY(check_wheels(ctx, craft));
     BST_TRY(bst_platform_divider(ctx, "spacecraft/gyro/rate_hz", plant_hz, config->gyro.rate_hz,
                                  &craft->gyro_steps));

@@ -35,12 +35,6 @@ static const bst_config_desc attitude_table[] = {
     BST_CONFIG_END};
 #undef C
 
-/* Four wheels on the edges of a pyramid about z, 35.26 deg above its base: equal torque about all
- * axes. */
-#define PYRAMID                                                               \
-    "[{\"axis\": [1, 1, 1]}, {\"axis\": [-1, 1, 1]}, {\"axis\": [-1, -1, 1]}" \
-    ", {\"axis\": [1, -1, 1]}]"
-
 #define C bst_craft_config
 const bst_config_desc bst_craft_config_table[] = {
     BST_ENUM(C, type, type_names, "\"inertial\"",
@@ -50,7 +44,8 @@ const bst_config_desc bst_craft_config_table[] = {
     BST_ENUM(C, integrator, bst_integrator_names, "\"symplectic\"",
              "How the attitude is stepped; errors are in docs/spacecraft.md."),
     BST_REALS(C, inertia_kgm2, "kg m^2", -1e9, 1e9, "[12, 14, 10, 0, 0, 0]",
-              "Inertia tensor of all, wheels and appendages with it, about the centre of mass: xx, "
+              "Inertia tensor of all but a full mount, whose reaction has its share, wheels and "
+              "appendages with it, about the centre of mass: xx, "
               "yy, zz, xy, xz, yz."),
     BST_REALS(C, initial_turn_deg, "deg", -180, 180, "[0, 0, 0]",
               "Turn of the body, about its axes, from the attitude that the law wants at the "
@@ -59,13 +54,15 @@ const bst_config_desc bst_craft_config_table[] = {
               "Rate of the body at the epoch on top of the law's, body axes."),
     BST_REAL(C, initial_knowledge_arcsec, "arcsec", 1e-6, 648000, "10",
              "Standard deviation of the believed attitude's error about each axis at the epoch."),
-    BST_LIST(C, wheels, bst_wheel_config, bst_wheel_config_table, 0, BST_WHEELS_MOST, PYRAMID,
-             "Reaction wheels."),
+    BST_LIST(C, wheels, bst_wheel_config, bst_wheel_config_table, 0, BST_WHEELS_MOST, "[]",
+             "Reaction wheels. None given: four like the default one on the edges of a pyramid "
+             "about z, at [1, 1, 1] and so on; with the law `free` none."),
     BST_LIST(C, modes, bst_mode_config, mode_table, 0, BST_MODES_MOST, "[]",
              "Flexible modes of appendages."),
     BST_LIST(C, star_trackers, bst_star_tracker_config, bst_star_tracker_config_table, 0,
-             BST_TRACKERS_MOST, "[{\"axis\": [0, 1, 0]}, {\"axis\": [0, -1, 0]}]",
-             "Star trackers. Of the two by default one always looks away from the Earth."),
+             BST_TRACKERS_MOST, "[]",
+             "Star trackers. None given: two like the default one, along +y and -y, of which one "
+             "always looks away from the Earth."),
     BST_OBJECT(C, gyro, bst_gyro_config_table, "{}", "The gyro."),
     BST_OBJECT(C, disturbances, bst_disturbance_config_table, "{}", "Torques of the surroundings."),
     BST_OBJECT(C, attitude, attitude_table, "{}", "Pointing law and attitude controller."),
@@ -81,4 +78,28 @@ bst_attitude_control_spec bst_attitude_control_of(const bst_craft_config *config
                                        .accel_limit_radps2 = a->accel_limit_degps2 * BST_DEG_RAD,
                                        .dt_s = 1.0 / a->rate_hz,
                                        .inertia_kgm2 = bst_inertia_matrix(config->inertia_kgm2)};
+}
+
+#define WHEEL(x, y) \
+    { .axis = {x, y, 1}, .inertia_kgm2 = 0.001, .torque_limit_nm = 0.05, .speed_limit_rpm = 6000 }
+#define TRACKER(y)                                                                         \
+    {                                                                                      \
+        .axis = {0, y, 0}, .noise_arcsec = 3, .noise_about_axis_arcsec = 20, .rate_hz = 4, \
+        .latency_s = 0.1, .sun_exclusion_deg = 30, .earth_exclusion_deg = 20,              \
+        .rate_limit_degps = 2                                                              \
+    }
+
+const bst_wheel_config *bst_craft_wheels(const bst_craft_config *config, int *count) {
+    static const bst_wheel_config pyramid[4] = {WHEEL(1, 1), WHEEL(-1, 1), WHEEL(-1, -1),
+                                                WHEEL(1, -1)};
+    bool given = config->wheels.count > 0 || config->attitude.law == BST_LAW_FREE;
+    *count = given ? config->wheels.count : 4;
+    return given ? config->wheels.items : pyramid;
+}
+
+const bst_star_tracker_config *bst_craft_trackers(const bst_craft_config *config, int *count) {
+    static const bst_star_tracker_config pair[2] = {TRACKER(1), TRACKER(-1)};
+    bool given = config->star_trackers.count > 0;
+    *count = given ? config->star_trackers.count : 2;
+    return given ? config->star_trackers.items : pair;
 }

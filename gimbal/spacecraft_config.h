@@ -40,6 +40,11 @@ typedef struct bst_craft_config {
 
 extern const bst_config_desc bst_craft_config_table[];
 
+/* Wheels and star trackers of a configuration, those that it has when it lists none included; lent.
+ */
+const bst_wheel_config *bst_craft_wheels(const bst_craft_config *config, int *count);
+const bst_star_tracker_config *bst_craft_trackers(const bst_craft_config *config, int *count);
+
 /* The controller of a configuration. */
 bst_attitude_control_spec bst_attitude_control_of(const bst_craft_config *config);
 

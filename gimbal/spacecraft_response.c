@@ -18,8 +18,9 @@ static cplx plant_at(const bst_craft_config *config, int axis, double w) {
             m[i][j] = inertia.m[i][j];
         }
     }
-    const bst_wheel_config *wheels = config->wheels.items;
-    for (int k = 0; k < config->wheels.count; k++) {
+    int count;
+    const bst_wheel_config *wheels = bst_craft_wheels(config, &count);
+    for (int k = 0; k < count; k++) {
         const double *a = wheels[k].axis;
         double share = wheels[k].inertia_kgm2 / (a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
         for (int i = 0; i < 3; i++) {
@@ -94,11 +95,9 @@ static double square(cplx z) {
 }
 
 bst_craft_noise bst_craft_noise_at(const bst_craft_config *config, int axis, double frequency_hz) {
-    if (config->star_trackers.count == 0) {
-        return (bst_craft_noise){INFINITY, INFINITY};
-    }
     double w = 2.0 * BST_PI * frequency_hz;
-    const bst_star_tracker_config *first = config->star_trackers.items;
+    int count;
+    const bst_star_tracker_config *first = bst_craft_trackers(config, &count);
     bst_star_tracker tracker;
     bst_gyro gyro;
     bst_star_tracker_init(&tracker, first, (bst_rng_key){{0, 0}});
@@ -123,7 +122,8 @@ bst_craft_noise bst_craft_noise_at(const bst_craft_config *config, int axis, dou
 
 void bst_craft_imbalance_line(const bst_craft_config *config, int wheel, int axis,
                               double *frequency_hz, double *amplitude_rad) {
-    const bst_wheel_config *c = &((const bst_wheel_config *)config->wheels.items)[wheel];
+    int count;
+    const bst_wheel_config *c = &bst_craft_wheels(config, &count)[wheel];
     bst_vec3 spin = bst_vec3_unit((bst_vec3){c->axis[0], c->axis[1], c->axis[2]});
     bst_vec3 x = bst_vec3_perpendicular(spin);
     bst_wheel w = {.axis = spin,

@@ -23,10 +23,9 @@ bst_craft_response bst_craft_response_at(const bst_craft_config *config, int axi
  * believed attitude's error; `pointing`, of the body's own attitude, which the controller moves by
  * believed attitude and rate. With the steady filter in the limit of continuous measurements: gains
  * k1 = sqrt(v^2 / r + 2 u / sqrt(r)) and k2 = u / sqrt(r), r = sigma^2 / rate_hz, v and u the
- * gyro's random walks, sigma the noise about this axis of the first tracker (none: INFINITY at all
- * frequencies); tracker noise n, angle walk and rate walk make the error
- *     e = ((k1 s + k2) n + s v + u) / (s^2 + k1 s + k2)
- * and the rate's error (s + k1) e - k1 n. */
+ * gyro's random walks, sigma the noise about this axis of the first tracker; tracker noise n, angle
+ * walk and rate walk make the error e = ((k1 s + k2) n + s v + u) / (s^2 + k1 s + k2) and the
+ * rate's error (s + k1) e - k1 n. */
 typedef struct bst_craft_noise {
     double knowledge, pointing;
 } bst_craft_noise;

@@ -26,12 +26,11 @@ static bst_vec3 vec(const double v[3]) {
     return (bst_vec3){v[0], v[1], v[2]};
 }
 
-bst_status bst_wheels_init(bst_ctx *ctx, bst_wheels *wheels, const bst_config_list *config,
-                           bst_rng_key key) {
-    *wheels = (bst_wheels){.count = config->count};
-    const bst_wheel_config *all = config->items;
-    for (int i = 0; i < config->count; i++) {
-        const bst_wheel_config *c = &all[i];
+bst_status bst_wheels_init(bst_ctx *ctx, bst_wheels *wheels, const bst_wheel_config *config,
+                           int count, bst_rng_key key) {
+    *wheels = (bst_wheels){.count = count};
+    for (int i = 0; i < count; i++) {
+        const bst_wheel_config *c = &config[i];
         bst_vec3 axis = vec(c->axis);
         if (!(bst_vec3_norm(axis) > 0.0)) {
             return bst_fail(ctx, BST_ERR_CONFIG,

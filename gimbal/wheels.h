@@ -48,8 +48,8 @@ enum {
 
 /* Takes the configured wheels over; phases of the imbalance from `key`. BST_ERR_CONFIG: an axis of
  * no length. */
-bst_status bst_wheels_init(bst_ctx *ctx, bst_wheels *wheels, const bst_config_list *config,
-                           bst_rng_key key) BST_MUST_CHECK;
+bst_status bst_wheels_init(bst_ctx *ctx, bst_wheels *wheels, const bst_wheel_config *config,
+                           int count, bst_rng_key key) BST_MUST_CHECK;
 
 /* Motor torques (N m, on the wheels) that put torque_nm (body axes) on the body, by the
  * pseudo-inverse of the axes of all wheels that can (least sum of squares). A wheel at its greatest

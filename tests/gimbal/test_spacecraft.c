@@ -39,11 +39,16 @@ static bst_craft_config config_make(bst_law law) {
     bst_assert_ok(&ctx, bst_config_defaults(&ctx, bst_craft_config_table, &c));
     c.type = BST_CRAFT_RIGID_BODY;
     c.attitude.law = (int32_t)law;
+    /* the sets that it has without, to be changed */
+    static bst_wheel_config wheels[4];
+    static bst_star_tracker_config trackers[2];
+    int count;
+    bst_craft_config controlled = {.attitude.law = BST_LAW_NADIR};
+    memcpy(wheels, bst_craft_wheels(&controlled, &count), sizeof wheels);
+    memcpy(trackers, bst_craft_trackers(&controlled, &count), sizeof trackers);
+    c.wheels = (bst_config_list){wheels, 4};
+    c.star_trackers = (bst_config_list){trackers, 2};
     return c;
-}
-
-static void config_free(bst_craft_config *c) {
-    bst_config_free(bst_craft_config_table, c);
 }
 
 static bst_status create(const bst_craft_config *config, double dt_s, uint64_t run,
@@ -113,7 +118,6 @@ static void test_laws(void **state) {
         assert_true(bst_vec3_angle(axis, to) < 20.0 * BST_ARCSEC_RAD);
         assert_int_equal(now->wheel_flags, 0);
         bst_craft_free(f.craft);
-        config_free(&c);
     }
 }
 
@@ -136,7 +140,6 @@ static void test_half_turn(void **state) {
         }
         assert_true(off(fly(&f, 60.0)) < 30.0 * BST_ARCSEC_RAD);
         bst_craft_free(f.craft);
-        config_free(&c);
     }
 }
 
@@ -205,7 +208,6 @@ static void test_saturated_wheels(void **state) {
     assert_true(off(bst_craft_at(f.craft)) < 60.0 * BST_ARCSEC_RAD);
     assert_int_equal(bst_craft_at(f.craft)->wheel_flags, 0);
     bst_craft_free(f.craft);
-    config_free(&c);
 }
 
 /* One of four failed: the others turn the body about all axes. Two failed: refused. */
@@ -227,7 +229,6 @@ static void test_failed_wheel(void **state) {
     bst_craft *refused = NULL;
     assert_int_equal(create(&c, 1e-2, 0, &refused), BST_ERR_CONFIG);
     assert_non_null(strstr(ctx.message, "three axes"));
-    config_free(&c);
 }
 
 /* Without stars for an hour the attitude is known as the gyro keeps it, and the filter knows how
@@ -269,7 +270,6 @@ static void test_blind_for_an_hour(void **state) {
         assert_true(bst_vec3_norm(e) > 1.0 * BST_ARCSEC_RAD);
         assert_true(bst_vec3_norm(e) < 0.1 * BST_DEG_RAD);
         bst_craft_free(f.craft);
-        config_free(&c);
     }
     radius_m = 7e6;
     print_message("attitude NEES after an hour without stars %.2f of 3\n", sum);
@@ -304,7 +304,6 @@ static void test_free_tumble(void **state) {
     /* the motors stand still, so all that moves momentum is rounding */
     bst_assert_close(bst_vec3_norm(bst_vec3_sub(end, l)) / bst_vec3_norm(l), 0.0, 1e-12);
     bst_craft_free(f.craft);
-    config_free(&c);
 }
 
 /* The gain of the loop raised until it diverges: at the response's gain margin. */
@@ -370,7 +369,6 @@ static void test_margin_in_the_loop(void **state) {
     found[1] = low;
     print_message("unstable from a bandwidth of %.4f Hz, predicted %.4f Hz\n", found[1], found[0]);
     bst_assert_close(found[1] / found[0], 1.0, 0.05);
-    config_free(&c);
 }
 
 /* RMS of pointing and knowledge against the integral of their spectra. */
@@ -413,7 +411,6 @@ static void test_predicted_rms(void **state) {
         bst_assert_close(sqrt(sum[i] / count / predicted[i]), 1.0, 0.06);
     }
     bst_craft_free(f.craft);
-    config_free(&c);
 }
 
 /* Imbalance turns the body as the response says; beyond what the steps follow it is blur. */
@@ -460,7 +457,6 @@ static void test_imbalance(void **state) {
         }
         bst_craft_free(f.craft);
     }
-    config_free(&c);
 }
 
 static void test_refused(void **state) {
@@ -471,12 +467,58 @@ static void test_refused(void **state) {
     c.attitude.second_axis[2] = -2.0;
     assert_int_equal(create(&c, 1e-2, 0, &craft), BST_ERR_CONFIG);
     assert_non_null(strstr(ctx.message, "platform/spacecraft: attitude/second_axis"));
-    config_free(&c);
     c = config_make(BST_LAW_NADIR);
     c.gyro.rate_hz = 30.0;
     assert_int_equal(create(&c, 1e-2, 0, &craft), BST_ERR_CONFIG);
     assert_non_null(strstr(ctx.message, "spacecraft/gyro/rate_hz"));
-    config_free(&c);
+}
+
+/* The sets that are taken where a scenario gives none are those of the tables' defaults. */
+static void test_sets(void **state) {
+    (void)state;
+    static const char text[] =
+        "{\"wheels\": [{\"axis\": [1, 1, 1]}], \"star_trackers\": "
+        "[{\"axis\": [0, 1, 0]}]}";
+    bst_json *json = NULL;
+    bst_craft_config c, none_given = {.attitude.law = BST_LAW_NADIR};
+    bst_assert_ok(&ctx, bst_json_parse(&ctx, "text", text, strlen(text), &json));
+    bst_assert_ok(&ctx,
+                  bst_config_read(&ctx, json, bst_json_root(json), "", bst_craft_config_table, &c));
+    int wheels, trackers;
+    const bst_wheel_config *wheel = bst_craft_wheels(&none_given, &wheels);
+    const bst_star_tracker_config *tracker = bst_craft_trackers(&none_given, &trackers);
+    assert_int_equal(wheels, 4);
+    assert_int_equal(trackers, 2);
+    /* names of members, for padding is nobody's */
+    const bst_wheel_config *w = c.wheels.items;
+    const bst_star_tracker_config *t = c.star_trackers.items;
+    assert_memory_equal(w, wheel, offsetof(bst_wheel_config, failed));
+    assert_false(w->failed || wheel->failed);
+    assert_memory_equal(t, tracker, sizeof *t);
+    none_given.attitude.law = BST_LAW_FREE;
+    (void)bst_craft_wheels(&none_given, &wheels);
+    assert_int_equal(wheels, 0);
+    bst_config_free(bst_craft_config_table, &c);
+    bst_json_free(json);
+}
+
+/* A wheel of the free craft spins up from a torque of the mount's reaction: without control its
+ * rate is the impulse over its inertia, modes or no modes once these are damped out. */
+static void test_reaction(void **state) {
+    (void)state;
+    bst_craft_config c = config_make(BST_LAW_FREE);
+    c.disturbances.gravity_gradient = false;
+    bst_mode_config mode = {0.8, 0.2, {1.0, 0.0, 0.0}};
+    c.modes = (bst_config_list){&mode, 1};
+    c.wheels.count = 0;
+    flight f = start(&c, 0);
+    for (; f.n < 20000; f.n++) {
+        bst_vec3 push = {f.n <= 100 && f.n > 0 ? 0.012 : 0.0, 0, 0};
+        bst_assert_ok(&ctx, bst_craft_step(&ctx, f.craft, f.n, f.dt_s * (double)f.n, push));
+    }
+    /* 0.012 N m for 1 s on 12 kg m^2; the mode's swing has gone by exp(-2 z w t) */
+    bst_assert_close(bst_craft_at(f.craft)->body.rate_radps.x, 1e-3, 1e-12);
+    bst_craft_free(f.craft);
 }
 
 int main(void) {
@@ -486,6 +528,7 @@ int main(void) {
         cmocka_unit_test(test_failed_wheel),  cmocka_unit_test(test_blind_for_an_hour),
         cmocka_unit_test(test_free_tumble),   cmocka_unit_test(test_margin_in_the_loop),
         cmocka_unit_test(test_predicted_rms), cmocka_unit_test(test_imbalance),
+        cmocka_unit_test(test_sets),          cmocka_unit_test(test_reaction),
         cmocka_unit_test(test_refused)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -83,7 +83,13 @@ static void test_a_day_with_everything(void **state) {
     c.type = BST_CRAFT_RIGID_BODY;
     c.attitude.law = BST_LAW_NADIR;
     c.initial_turn_deg[0] = 40.0;
-    bst_wheel_config *wheels = c.wheels.items;
+    static bst_wheel_config wheels[4];
+    static bst_star_tracker_config trackers[2];
+    int count;
+    memcpy(wheels, bst_craft_wheels(&c, &count), sizeof wheels);
+    memcpy(trackers, bst_craft_trackers(&c, &count), sizeof trackers);
+    c.wheels = (bst_config_list){wheels, 4};
+    c.star_trackers = (bst_config_list){trackers, 2};
     for (int i = 0; i < 4; i++) {
         wheels[i].speed_rpm = i % 2 ? -1500.0 : 1500.0;
         wheels[i].coulomb_nm = 5e-4;
@@ -94,7 +100,6 @@ static void test_a_day_with_everything(void **state) {
     }
     static bst_mode_config modes[2] = {{1.1, 0.005, {1.2, 0.0, 0.3}}, {3.4, 0.005, {0, 0.8, 0.1}}};
     c.modes = (bst_config_list){modes, 2};
-    bst_star_tracker_config *trackers = c.star_trackers.items;
     trackers[0].alignment_arcsec[0] = 10.0;
     c.gyro.scale_factor_ppm[1] = 100.0;
     c.gyro.alignment_arcsec[2] = 30.0;
@@ -140,8 +145,6 @@ static void test_a_day_with_everything(void **state) {
     assert_true(pointing < 300.0 * BST_ARCSEC_RAD);
     assert_true(fastest < 5900.0 * BST_PI / 30.0);
     bst_craft_free(craft);
-    c.modes = (bst_config_list){NULL, 0};
-    bst_config_free(bst_craft_config_table, &c);
 }
 
 int main(int argc, char **argv) {

@@ -5,9 +5,8 @@ static bst_ctx ctx;
 
 static bst_wheels make(bst_wheel_config *config, int count) {
     bst_wheels wheels;
-    bst_config_list list = {config, count};
-    bst_assert_ok(&ctx,
-                  bst_wheels_init(&ctx, &wheels, &list, bst_rng_make_key(1, 0, "a", "wheels")));
+    bst_assert_ok(
+        &ctx, bst_wheels_init(&ctx, &wheels, config, count, bst_rng_make_key(1, 0, "a", "wheels")));
     return wheels;
 }
 
@@ -141,13 +140,12 @@ static void test_refused(void **state) {
     (void)state;
     bst_wheel_config config[2] = {wheel(0, 0, 1), wheel(0, 0, 0)};
     bst_wheels wheels;
-    bst_config_list list = {config, 2};
     bst_rng_key key = {{0, 0}};
-    assert_int_equal(bst_wheels_init(&ctx, &wheels, &list, key), BST_ERR_CONFIG);
+    assert_int_equal(bst_wheels_init(&ctx, &wheels, config, 2, key), BST_ERR_CONFIG);
     assert_non_null(strstr(ctx.message, "wheels/1/axis"));
     config[1] = wheel(1, 0, 0);
     config[1].speed_rpm = -6001.0;
-    assert_int_equal(bst_wheels_init(&ctx, &wheels, &list, key), BST_ERR_CONFIG);
+    assert_int_equal(bst_wheels_init(&ctx, &wheels, config, 2, key), BST_ERR_CONFIG);
     assert_non_null(strstr(ctx.message, "wheels/1/speed_rpm"));
 }
 
