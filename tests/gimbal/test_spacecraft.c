@@ -1,7 +1,6 @@
 /* The whole spacecraft, closed loop, in surroundings of closed form. */
 #include "gimbal/spacecraft.h"
 
-#include "gimbal/platform.h"
 #include "gimbal/spacecraft_response.h"
 #include "sim/astro/bodies.h"
 #include "sim/core/symmetric.h"
@@ -49,6 +48,13 @@ static bst_craft_config config_make(bst_law law) {
     c.wheels = (bst_config_list){wheels, 4};
     c.star_trackers = (bst_config_list){trackers, 2};
     return c;
+}
+
+/* The same for who errs in its orbit: it believes to be 100 km further north. */
+static bst_status sky_at_wrongly(void *user, bst_ctx *c, double seconds, bst_craft_sky *out) {
+    BST_TRY(sky_at(user, c, seconds, out));
+    out->known.position_m.z += 1e5;
+    return BST_OK;
 }
 
 static bst_status create(const bst_craft_config *config, double dt_s, uint64_t run,
@@ -470,7 +476,44 @@ static void test_refused(void **state) {
     c = config_make(BST_LAW_NADIR);
     c.gyro.rate_hz = 30.0;
     assert_int_equal(create(&c, 1e-2, 0, &craft), BST_ERR_CONFIG);
-    assert_non_null(strstr(ctx.message, "spacecraft/gyro/rate_hz"));
+    assert_non_null(strstr(ctx.message, "platform/spacecraft: gyro/rate_hz"));
+}
+
+/* The law goes by what is known: with a wrong orbit the axis points where the Earth is believed to
+ * be. */
+static void test_wrong_orbit(void **state) {
+    (void)state;
+    bst_craft_config c = config_make(BST_LAW_NADIR);
+    bst_craft_setup setup = {.dt_s = 1e-2,
+                             .q_nominal = BST_QUAT_IDENTITY,
+                             .sky_at = sky_at_wrongly,
+                             .seed = 7,
+                             .instance = "craft"};
+    flight f = {.dt_s = 1e-2};
+    bst_assert_ok(&ctx, bst_craft_create(&ctx, &c, &setup, &f.craft));
+    const bst_craft_now *now = fly(&f, 60.0 + f.dt_s);
+    bst_craft_sky sky;
+    bst_assert_ok(&ctx, sky_at_wrongly(NULL, &ctx, 60.0, &sky));
+    bst_vec3 axis = bst_quat_rotate(bst_quat_conj(now->body.q_body_from_gcrf), (bst_vec3){0, 0, 1});
+    double believed = bst_vec3_angle(axis, bst_vec3_scale(sky.known.position_m, -1.0));
+    double really = bst_vec3_angle(axis, bst_vec3_scale(sky.position_m, -1.0));
+    assert_true(believed < 30.0 * BST_ARCSEC_RAD); /* sensors and control */
+    assert_true(really > 0.4 * BST_DEG_RAD);       /* 100 km across 7000, partly along the way */
+    bst_craft_free(f.craft);
+}
+
+/* One seed gives one flight to the bit, another another. */
+static void test_repeats(void **state) {
+    (void)state;
+    bst_quat q[3];
+    for (int i = 0; i < 3; i++) {
+        bst_craft_config c = config_make(BST_LAW_NADIR);
+        flight f = start(&c, i < 2 ? 5 : 6);
+        q[i] = fly(&f, 20.0)->body.q_body_from_gcrf;
+        bst_craft_free(f.craft);
+    }
+    assert_memory_equal(&q[0], &q[1], sizeof q[0]);
+    assert_true(memcmp(&q[0], &q[2], sizeof q[0]) != 0);
 }
 
 /* The sets that are taken where a scenario gives none are those of the tables' defaults. */
@@ -528,6 +571,7 @@ int main(void) {
         cmocka_unit_test(test_failed_wheel),  cmocka_unit_test(test_blind_for_an_hour),
         cmocka_unit_test(test_free_tumble),   cmocka_unit_test(test_margin_in_the_loop),
         cmocka_unit_test(test_predicted_rms), cmocka_unit_test(test_imbalance),
+        cmocka_unit_test(test_wrong_orbit),   cmocka_unit_test(test_repeats),
         cmocka_unit_test(test_sets),          cmocka_unit_test(test_reaction),
         cmocka_unit_test(test_refused)};
     return cmocka_run_group_tests(tests, NULL, NULL);
