@@ -2,6 +2,9 @@
 
 static const char *const strategies[] = {"track", "stare", "rate", NULL};
 
+static const bst_config_desc compensator_table[] = {
+    BST_COMPENSATOR_KEYS(bst_control_compensators, "\"observer\""), BST_CONFIG_END};
+
 #define C bst_control_config
 const bst_config_desc bst_control_config_table[] = {
     BST_ENUM(C, strategy, strategies, "\"track\"",
@@ -17,11 +20,19 @@ const bst_config_desc bst_control_config_table[] = {
              "Time from a command's publication to its effect: the instant it is computed for."),
     BST_BOOL(C, compensate_attitude, "true",
              "Correct the pointing by what identified stars say of the attitude."),
+    BST_OBJECT(
+        C, compensator, compensator_table, "{}",
+        "How the correction follows from the frames: observer, a Kalman filter of the "
+        "telemetry's error by disturbance_px_rms and what follows; or a compensator on the "
+        "image error whose output is the rate at which the correction turns, rad/s per rad."),
+    BST_REAL(C, servo_lag_s, "s", 0, 10, "0.025",
+             "How late the mount follows a change of its command (second_order: 0.025), for a "
+             "compensator's specification."),
     BST_REAL(C, disturbance_px_rms, "px", 1e-6, 1000, "0.5",
              "Expected slow jitter (radial RMS), for the compensator's gains."),
     BST_REAL(C, disturbance_cutoff_hz, "Hz", 1e-6, 100, "0.05",
              "Highest frequency of the slow jitter, for the compensator's gains."),
-    BST_REAL(C, fix_sigma_floor_px, "px", 1e-6, 100, "0.02",
+    BST_REAL(C, fix_sigma_floor_px, "px", 1e-6, 100, "0.04",
              "Attitude fixes are never taken to be better than this."),
     BST_REAL(C, attitude_sigma_arcsec, "arcsec", 1e-6, 360000, "60",
              "Expected error of the spacecraft's own attitude at the start (1 sigma)."),

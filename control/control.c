@@ -4,6 +4,25 @@
  * the change of a line of sight's rate. */
 #define RATE_HALF_S 0.25
 
+static bool on_image_error(const bst_control *c) {
+    return c->config.compensate_attitude && c->config.compensator.type != BST_CONTROL_OBSERVER;
+}
+
+static bst_status start_image_loop(bst_ctx *ctx, bst_control *c) {
+    if (!on_image_error(c)) {
+        return BST_OK;
+    }
+    bst_image_loop_env env = {.tick_rate_hz = c->env.tick_rate_hz,
+                              .frame_period_s = c->env.frame_period_s,
+                              .frame_exposure_s = c->env.frame_exposure_s,
+                              .frame_latency_s = c->env.frame_latency_s,
+                              .command_latency_s = c->config.command_latency_s,
+                              .servo_lag_s = c->config.servo_lag_s,
+                              .jump_rad = c->config.arrive_tolerance_px * c->env.pixel_rad};
+    bst_status status = bst_image_loop_init(ctx, &c->image_loop, &c->config.compensator, &env);
+    return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "compensator");
+}
+
 bst_status bst_control_init(bst_ctx *ctx, bst_control *control, const bst_control_config *config,
                             const bst_control_env *env) {
     if (config->period_s > 0.0 && config->exposure_s > config->period_s) {
@@ -22,7 +41,7 @@ bst_status bst_control_init(bst_ctx *ctx, bst_control *control, const bst_contro
                             config->fix_sigma_floor_px * env->pixel_rad,
                             config->attitude_sigma_arcsec * BST_ARCSEC_RAD,
                             config->drift_sigma_arcsec_per_s * BST_ARCSEC_RAD);
-    return BST_OK;
+    return start_image_loop(ctx, control);
 }
 
 void bst_control_telemetry(bst_control *c, const bst_pointing_telemetry *pointing,
@@ -43,7 +62,9 @@ void bst_control_telemetry(bst_control *c, const bst_pointing_telemetry *pointin
 bst_status bst_control_observe(bst_ctx *ctx, bst_control *c, int64_t tick,
                                const bst_tracks *tracks) {
     bst_control_forget_aims(c); /* a new fix, and what is held may change */
-    if (c->config.compensate_attitude) {
+    if (on_image_error(c)) {
+        bst_image_loop_update(&c->image_loop, &c->pointing_error, tick, &tracks->attitude);
+    } else if (c->config.compensate_attitude) {
         bst_pointing_error_update(&c->pointing_error, &tracks->attitude, c->env.tick_rate_hz);
     }
     if (c->frame_tick != INT64_MIN && tracks->tick > c->frame_tick) {
@@ -111,5 +132,10 @@ bst_status bst_control_update(bst_ctx *ctx, bst_control *c, int64_t tick, bool *
                                  .direction_gcrf = bst_vec3_unit(d),
                                  .rate_gcrf_radps = bst_vec3_axpy(rate, -bst_vec3_dot(rate, d), d)};
     *commanded = true;
+    if (on_image_error(c) &&
+        bst_image_loop_commanded(&c->image_loop, &c->pointing_error, effect, half,
+                                 (bst_vec3[]){d, ahead, behind}, arrived, c->pointing.tick)) {
+        bst_control_forget_aims(c);
+    }
     return BST_OK;
 }

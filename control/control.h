@@ -3,6 +3,7 @@
 #ifndef BST_CONTROL_CONTROL_H
 #define BST_CONTROL_CONTROL_H
 
+#include "control/image_loop.h"
 #include "control/pointing_error.h"
 #include "control/search.h"
 #include "sim/core/config.h"
@@ -21,6 +22,8 @@ typedef struct bst_control_config {
     double exposure_s, period_s;
     double command_latency_s;
     bool compensate_attitude;
+    bst_compensator_config compensator; /* of type BST_CONTROL_OBSERVER: pointing_error's own */
+    double servo_lag_s;
     double disturbance_px_rms, disturbance_cutoff_hz;
     double fix_sigma_floor_px;
     double attitude_sigma_arcsec, drift_sigma_arcsec_per_s;
@@ -47,7 +50,8 @@ typedef struct bst_control_env {
     double tick_rate_hz;
     double pixel_rad;
     double rotation_rad; /* of the image's axes about the boresight, from camera +x towards +y */
-    int width_px, height_px; /* of the field, undistorted */
+    int width_px, height_px;                                  /* of the field, undistorted */
+    double frame_exposure_s, frame_period_s, frame_latency_s; /* as in bst_module_env */
     bst_control_cue_fn cue_at;
     bst_control_cue_direction_fn cue_direction_at;
     void *cue_user;
@@ -83,6 +87,7 @@ typedef struct bst_control {
     bst_control_env env;
     int64_t latency_ticks, rate_half_ticks;
     bst_pointing_error pointing_error;
+    bst_image_loop image_loop; /* sets pointing_error, unless the compensator is the observer */
     int mode;
     int64_t mode_tick; /* since when */
     bst_control_transition transitions[BST_CONTROL_TRANSITIONS];

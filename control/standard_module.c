@@ -54,6 +54,9 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
                                        .rotation_rad = camera->rotation_deg * BST_DEG_RAD,
                                        .width_px = (int)width_px,
                                        .height_px = (int)height_px,
+                                       .frame_exposure_s = env->frame_exposure_s,
+                                       .frame_period_s = env->frame_period_s,
+                                       .frame_latency_s = env->frame_latency_s,
                                        .cue_at = cue_at,
                                        .cue_direction_at = cue_direction_at,
                                        .cue_user = m->view};

@@ -14,6 +14,8 @@ const bst_config_desc bst_platform_config_table[] = {
         P, jitter_high_band_hz, "Hz", 0, 10000, "[5, 200]",
         "Lowest and highest frequency of the fast jitter; its spectrum is flat between. What is "
         "above 0.4 rate_hz widens the PSF."),
+    BST_OBJECT(P, jitter_psd, bst_jitter_psd_config_table, "{}",
+               "Jitter by tables of its density and by harmonic lines, besides the flat bands."),
     BST_REALS(P, attitude_bias_arcsec, "arcsec", -36000, 36000, "[0, 0, 0]",
               "Constant error of the believed body attitude, as a rotation about body axes."),
     BST_REAL(
@@ -42,10 +44,8 @@ static bst_quat turned(bst_quat q, bst_vec3 r) {
     return bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(r, -1.0)), q);
 }
 
-bst_status bst_platform_init(bst_ctx *ctx, bst_platform *platform,
-                             const bst_platform_config *config, bst_quat q_nominal_from_gcrf,
-                             double pixel_rad, double dt_s, bst_rng_key jitter_key,
-                             bst_rng_key attitude_key) {
+bst_status bst_platform_jitter_spectrum(bst_ctx *ctx, const bst_platform_config *config,
+                                        double pixel_rad, bst_jitter_spectrum *out) {
     const double *band = config->jitter_high_band_hz;
     if (config->jitter_high_px_rms > 0.0 && !(band[1] > band[0])) {
         return bst_fail(ctx, BST_ERR_CONFIG,
@@ -53,27 +53,41 @@ bst_status bst_platform_init(bst_ctx *ctx, bst_platform *platform,
                         "frequency first",
                         band[0], band[1]);
     }
-    bst_jitter_spec spec = {.low_rms_rad = config->jitter_low_px_rms * pixel_rad,
+    bst_jitter_spec flat = {.low_rms_rad = config->jitter_low_px_rms * pixel_rad,
                             .low_cutoff_hz = config->jitter_low_cutoff_hz,
                             .high_rms_rad = config->jitter_high_px_rms * pixel_rad,
                             .high_min_hz = band[0],
                             .high_max_hz = band[1]};
+    return bst_jitter_spectrum_create(ctx, &flat, &config->jitter_psd, pixel_rad, out);
+}
+
+bst_status bst_platform_init(bst_ctx *ctx, bst_platform *platform,
+                             const bst_platform_config *config, bst_quat q_nominal_from_gcrf,
+                             double pixel_rad, double dt_s, bst_rng_key jitter_key,
+                             bst_rng_key attitude_key) {
+    bst_jitter_spectrum spectrum;
+    platform->spacecraft = NULL;
+    platform->sky = NULL;
+    platform->jitter.more = NULL;
+    BST_TRY(bst_platform_jitter_spectrum(ctx, config, pixel_rad, &spectrum));
     platform->q_nominal_from_gcrf = q_nominal_from_gcrf;
     platform->q_believed_from_gcrf =
         turned(q_nominal_from_gcrf, arcsec_vector(config->attitude_bias_arcsec));
     platform->drift_radps = arcsec_vector(config->drift_arcsec_per_s);
     platform->attitude_noise_rad = config->attitude_noise_arcsec * BST_ARCSEC_RAD;
     platform->attitude_key = attitude_key;
-    platform->jitter_unresolved_rad2 = bst_jitter_unresolved_rad2(&spec, dt_s);
+    platform->jitter_unresolved_rad2 = bst_jitter_unresolved_rad2(&spectrum.flat, dt_s) +
+                                       bst_jitter_spectrum_unresolved_rad2(&spectrum, dt_s);
     platform->unresolved_rad2 = platform->jitter_unresolved_rad2;
     platform->rate_believed_radps = (bst_vec3){0, 0, 0};
     platform->body = (bst_body_state){q_nominal_from_gcrf, platform->drift_radps, {0, 0, 0}};
-    platform->spacecraft = NULL;
-    platform->sky = NULL;
     platform->wheels_saturated = platform->trackers_blind = false;
-    spec = bst_jitter_resolved(&spec, dt_s);
-    bst_jitter_init(&platform->jitter, &spec, dt_s, jitter_key);
-    return BST_OK;
+    bst_jitter_spec followed = bst_jitter_resolved(&spectrum.flat, dt_s);
+    bst_jitter_init(&platform->jitter, &followed, dt_s, jitter_key);
+    bst_rng_key more_key = {{jitter_key.k[0] ^ 0x7F4A7C15u, jitter_key.k[1]}}; /* a stream apart */
+    bst_status status = bst_jitter_add(ctx, &platform->jitter, &spectrum, more_key);
+    bst_jitter_spectrum_free(&spectrum);
+    return status;
 }
 
 /* An inertial body. */

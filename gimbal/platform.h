@@ -3,7 +3,7 @@
 #ifndef BST_GIMBAL_PLATFORM_H
 #define BST_GIMBAL_PLATFORM_H
 
-#include "gimbal/jitter.h"
+#include "gimbal/jitter_spectrum.h"
 #include "gimbal/spacecraft.h"
 #include "sim/core/config.h"
 #include "sim/core/module.h"
@@ -14,6 +14,7 @@ typedef struct bst_platform_config {
     double drift_arcsec_per_s[3];
     double jitter_low_px_rms, jitter_low_cutoff_hz;
     double jitter_high_px_rms, jitter_high_band_hz[2];
+    bst_jitter_psd_config jitter_psd;
     double attitude_bias_arcsec[3];
     double attitude_noise_arcsec;
     double history_s;
@@ -42,8 +43,14 @@ typedef struct bst_platform {
     bool trackers_blind;           /* no star tracker saw stars when last asked */
 } bst_platform;
 
+/* The jitter that a configuration asks for; pixel_rad: angle of a sensor pixel. Errors as
+ * bst_jitter_spectrum_create, and BST_ERR_CONFIG when the high band is empty; to be freed with
+ * bst_jitter_spectrum_free. */
+bst_status bst_platform_jitter_spectrum(bst_ctx *ctx, const bst_platform_config *config,
+                                        double pixel_rad, bst_jitter_spectrum *out) BST_MUST_CHECK;
+
 /* Prepares a platform. pixel_rad: angle of a sensor pixel (jitter is configured in pixels); dt_s:
- * plant step. BST_ERR_CONFIG when the high jitter band is empty. */
+ * plant step. Errors as bst_platform_jitter_spectrum. To be freed with bst_platform_free. */
 bst_status bst_platform_init(bst_ctx *ctx, bst_platform *platform,
                              const bst_platform_config *config, bst_quat q_nominal_from_gcrf,
                              double pixel_rad, double dt_s, bst_rng_key jitter_key,
@@ -59,7 +66,8 @@ bst_status bst_platform_equip(const bst_module_env *env, bst_platform *platform,
  * less than the rest's, here required to be below half of it. */
 bst_status bst_platform_check_mount(bst_ctx *ctx, const bst_platform *platform,
                                     const double mount_kgm2[6]) BST_MUST_CHECK;
-void bst_platform_free(bst_platform *platform); /* what equip made; a zeroed platform is allowed */
+/* What init and equip made; a zeroed platform is allowed. */
+void bst_platform_free(bst_platform *platform);
 
 /* Brings the body to plant step n = 0, 1, 2, ... in turn, `seconds` after the epoch: members body,
  * q_believed_from_gcrf, rate_believed_radps, unresolved_rad2 and the flags. reaction_nm: torque of

@@ -97,6 +97,7 @@ bst_status bst_platform_check_mount(bst_ctx *ctx, const bst_platform *platform,
 void bst_platform_free(bst_platform *platform) {
     bst_craft_free(platform->spacecraft);
     free_sky(platform->sky);
+    bst_jitter_free(&platform->jitter);
     platform->spacecraft = NULL;
     platform->sky = NULL;
 }

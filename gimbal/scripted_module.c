@@ -47,6 +47,7 @@ typedef struct module {
 static void destroy(void *self) {
     module *m = self;
     if (m) {
+        bst_platform_free(&m->platform);
         bst_scripted_free(m->scripted);
         bst_view_free(m->view);
         free(m);

@@ -5,6 +5,7 @@
 
 #include "sim/app/app.h"
 #include "sim/app/load.h"
+#include "sim/app/loop_model.h"
 #include "sim/app/plugins.h"
 #include "sim/engine/simulation.h"
 
@@ -73,8 +74,10 @@ int bst_cmd_check(int argc, char **argv) {
         bst_json_name_file(&ctx, json);
         fprintf(stderr, "boresight: %s\n", ctx.message);
         code = BST_EXIT_FAILED;
-    } else if (!quiet) {
-        code = print_json(bst_scenario_echo(&scenario));
+    } else {
+        ctx.log_level = BST_LOG_WARNING;
+        bst_loop_warn(&ctx, &scenario);
+        code = quiet ? BST_EXIT_OK : print_json(bst_scenario_echo(&scenario));
     }
     bst_simulation_free(sim);
     bst_scenario_free(&scenario);

@@ -11,6 +11,7 @@
 #include "sim/app/app.h"
 #include "sim/app/json_number.h"
 #include "sim/app/load.h"
+#include "sim/app/loop_model.h"
 #include "sim/app/run_pictures.h"
 #include "sim/app/run_watched.h"
 #include "sim/app/stop_signals.h"
@@ -564,6 +565,7 @@ int bst_cmd_run(int argc, char **argv) {
         bst_json_name_file(&ctx, json);
     }
     if (status == BST_OK) {
+        bst_loop_warn(&ctx, &scenario);
         status = watch_sensors(&run, bst_simulation_world(sim));
     }
     if (status == BST_OK) {

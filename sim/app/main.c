@@ -17,6 +17,7 @@ static const command commands[] = {
     {"export", bst_cmd_export, "frames, tables, orbits and observations of a run for others"},
     {"orbit", bst_cmd_orbit, "an orbit from the directions that a run measured"},
     {"check", bst_cmd_check, "validate a scenario and print it with every default written out"},
+    {"loop", bst_cmd_loop, "margins and predicted pointing of a scenario's control loops"},
     {"schema", bst_cmd_schema, "print the JSON Schema of scenarios"},
     {"stars", bst_cmd_stars, "get, import or describe the star catalogue"},
     {"propagate", bst_cmd_propagate, "positions and velocities from two-line element sets"},

@@ -60,6 +60,9 @@ typedef struct bst_module_env {
     uint32_t planes;                            /* bit k: the bst_plane k is recorded */
     double mask_threshold_sigma; /* least light of a pixel of the segmentation mask */
     void *engine_private;
+    double frame_exposure_s, frame_period_s; /* of this sensor's frames, as set and commanded */
+    double frame_latency_s; /* from an exposure's end until control has what it showed: the declared
+                               delays in between */
 } bst_module_env;
 
 typedef struct bst_module_desc {

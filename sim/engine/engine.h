@@ -30,6 +30,7 @@ typedef struct bst_instance_spec {
     struct bst_device *device;
     int observer, sensor;
     double exposure_s; /* the longest of the sensor that the scenario sets */
+    double frame_exposure_s, frame_period_s, frame_latency_s;
     int64_t los_period_ticks, los_offset_ticks; /* of its gimbal; 0: there is none with a period */
     uint32_t planes;                            /* bit k: the bst_plane k is recorded */
     double mask_threshold_sigma;

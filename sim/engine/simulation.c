@@ -7,6 +7,7 @@
 
 #include "sim/device/device.h"
 #include "sim/engine/exposure_clock.h"
+#include "sim/engine/loop_timing.h"
 #include "sim/engine/recorder.h"
 #include "sim/io/psf_fits.h"
 #include "sim/io/wcs.h"
@@ -95,6 +96,8 @@ static bst_instance_spec sensor_spec(const bst_scenario *scenario, const bst_sim
     for (int i = 0; i < observer; i++) {
         index += observers[i].sensors.count;
     }
+    bst_loop_timing timing;
+    bst_loop_timing_of(scenario, observer, sensor, &timing);
     return (bst_instance_spec){.scope = scope,
                                .world = sim->world,
                                .knowledge = sim->knowledge[index],
@@ -102,6 +105,9 @@ static bst_instance_spec sensor_spec(const bst_scenario *scenario, const bst_sim
                                .observer = observer,
                                .sensor = sensor,
                                .exposure_s = longest_exposure_s(scenario, observer, sensor),
+                               .frame_exposure_s = timing.exposure_s,
+                               .frame_period_s = timing.period_s,
+                               .frame_latency_s = timing.frame_latency_s,
                                .planes = scenario->record.planes,
                                .mask_threshold_sigma = scenario->record.mask_threshold_sigma,
                                .seed = scenario->seed,

@@ -42,13 +42,21 @@ bst_status bst_plot_begin(bst_ctx *ctx, bst_plot *plot, const char *path, int wi
         close(fd);
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
     }
-    fprintf(plot->script,
-            "if (strstrt(GPVAL_TERMINALS, 'pngcairo')) {\n"
-            "  set terminal pngcairo size %d,%d font 'DejaVu Sans,11' background '#ffffff'\n"
-            "} else {\n"
-            "  set terminal png size %d,%d background '#ffffff'\n"
-            "}\nset encoding utf8\nset output ",
-            width, height, width, height);
+    size_t length = strlen(path);
+    if (length > 4 && strcmp(path + length - 4, ".svg") == 0) {
+        fprintf(plot->script,
+                "set terminal svg size %d,%d font 'DejaVu Sans,11' background '#ffffff'\n", width,
+                height);
+    } else {
+        fprintf(plot->script,
+                "if (strstrt(GPVAL_TERMINALS, 'pngcairo')) {\n"
+                "  set terminal pngcairo size %d,%d font 'DejaVu Sans,11' background '#ffffff'\n"
+                "} else {\n"
+                "  set terminal png size %d,%d background '#ffffff'\n"
+                "}\n",
+                width, height, width, height);
+    }
+    fputs("set encoding utf8\nset output ", plot->script);
     put_quoted(plot->script, plot->draft);
     fputc('\n', plot->script);
     return BST_OK;

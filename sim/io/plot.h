@@ -15,8 +15,8 @@ typedef struct bst_plot {
     char draft[4096];
 } bst_plot;
 
-/* Begins a PNG of width x height pixels at `path`: terminal (pngcairo, or png where gnuplot lacks
- * it) and output are set. */
+/* Begins a PNG, or where the path ends in .svg an SVG, of width x height pixels at `path`: terminal
+ * (pngcairo, or png where gnuplot lacks it) and output are set. */
 bst_status bst_plot_begin(bst_ctx *ctx, bst_plot *plot, const char *path, int width,
                           int height) BST_MUST_CHECK;
 /* Lets gnuplot draw it. A missing or failing gnuplot is a logged warning and *made = false, not an

@@ -1,0 +1,56 @@
+/* Margins of a sampled control loop from its open-loop frequency response. */
+#ifndef BST_CONTROL_STABILITY_H
+#define BST_CONTROL_STABILITY_H
+
+#include "sim/core/compensator.h"
+#include "sim/core/status.h"
+
+/* An open loop L, negative feedback: closed loop L / (1 + L), sensitivity 1 / (1 + L). */
+typedef struct bst_loop {
+    bst_response_fn open; /* L(exp(j omega dt_s)) at omega rad/s, up to half the rate */
+    const void *user;
+    double dt_s; /* sampling interval; for a continuous loop one far shorter than its dynamics */
+    int unstable_poles;    /* of L, strictly outside the unit circle */
+    const double *hint_hz; /* frequencies of resonances too narrow to be met by chance */
+    int hints;
+} bst_loop;
+
+typedef struct bst_loop_margins {
+    bool stable;
+    int unstable_closed;       /* poles of the closed loop outside the unit circle (Nyquist) */
+    double gain_margin_db;     /* factor on L up to instability; INFINITY: none. Of an unstable loop
+                                  negative: what would have to be taken off */
+    double gain_reduction_db;  /* how far L may be lowered; INFINITY: to nothing */
+    double phase_margin_deg;   /* least, over all crossovers; INFINITY without one; negative when
+                                  unstable */
+    double delay_margin_s;     /* delay that L takes more; INFINITY without a crossover; 0 when
+                                  unstable */
+    double crossover_hz;       /* lowest frequency at which |L| falls through one; 0: none */
+    double phase_crossover_hz; /* of gain_margin_db; 0: none */
+    double sensitivity_peak, sensitivity_peak_hz; /* max |1 / (1 + L)| */
+    double bandwidth_hz; /* where |L / (1 + L)| falls through -3 dB, followed from the crossover
+                            upwards (below it where it is under -3 dB already there); half the rate
+                            when it never does; 0 without a crossover */
+} bst_loop_margins;
+
+/* Works the margins out. Frequencies are followed from 1e-5 of half the rate to half the rate,
+ * finer where the curve turns, and crossings bisected to rounding. Stability by the argument
+ * principle on the unit circle: with n the turns of 1 + L about zero, poles of L at z = 1 passed by
+ * on the outside, the closed loop has unstable_poles - n poles outside (Franklin, Powell, Workman,
+ * Digital Control of Dynamic Systems, 3rd ed., section 7.4). The number of poles at z = 1 is the
+ * slope of |L| at the lowest frequency. BST_ERR_NUMERIC: L is not finite somewhere. */
+bst_status bst_loop_analyse(bst_ctx *ctx, const bst_loop *loop,
+                            bst_loop_margins *out) BST_MUST_CHECK;
+
+/* Step response of the closed loop at count multiples of dt_s, from the frequency response by
+ * inverse transform over `length` samples (a power of two is not needed), in which it must have
+ * settled. L must be infinite at zero frequency (an integrator), or zero_hz_response be given: the
+ * closed loop's response there, NAN for one. */
+void bst_loop_step_response(const bst_loop *loop, int length, double zero_hz_response, double *out,
+                            int count);
+
+/* What is thin about a loop: NULL when gain margin >= 6 dB, phase margin >= 30 deg and sensitivity
+ * peak <= 2; else "is unstable", "has thin margins". */
+const char *bst_loop_verdict(const bst_loop_margins *margins);
+
+#endif

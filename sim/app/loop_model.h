@@ -1,0 +1,86 @@
+/* The linear loops of a scenario's sensor: the mount's servos and the tracking loop round them. */
+#ifndef BST_APP_LOOP_MODEL_H
+#define BST_APP_LOOP_MODEL_H
+
+#include "control/tracking_loop.h"
+#include "sim/engine/loop_timing.h"
+#include "sim/engine/scenario.h"
+
+enum { BST_LOOP_AXES = 2, BST_LOOP_BANDS = 64 };
+
+typedef struct bst_loop_options {
+    double fix_sigma_px; /* of the attitude that a frame's stars give, per axis */
+} bst_loop_options;
+
+#define BST_LOOP_DEFAULTS \
+    { .fix_sigma_px = 0.01 }
+
+/* Per axis, RMS in pixels at the middle of exposures. */
+typedef struct bst_loop_prediction {
+    double rms_px;           /* of all parts */
+    double jitter_px;        /* what the loop leaves of the jitter */
+    double open_px;          /* the jitter without a loop */
+    double above_px;         /* the part of it above half the frame rate, which no loop rejects */
+    double noise_px, lag_px; /* of the frames' errors; behind the drift */
+} bst_loop_prediction;
+
+/* A servo's loop, broken where it drives the axis. */
+typedef struct bst_loop_servo {
+    bool there, continuous;
+    double natural_radps, damping; /* second_order */
+    bst_loop loop;                 /* its `user` is this struct, which must stay where it is */
+    bst_loop_margins margins;
+} bst_loop_servo;
+
+typedef struct bst_loop_axis {
+    const char *name; /* "outer", "inner" */
+    bst_loop_servo servo;
+    bool tracked; /* there is a tracking loop */
+    bst_tracking_loop *tracking;
+    bst_loop loop;
+    bst_loop_margins margins;
+    bst_tracking_band bands[BST_LOOP_BANDS]; /* px^2 */
+    int band_count;
+    bst_loop_prediction prediction;
+} bst_loop_axis;
+
+typedef struct bst_loop_model {
+    int observer, sensor;
+    const char *observer_name, *sensor_name, *gimbal_type, *compensator;
+    double pixel_rad;
+    bst_loop_timing timing;
+    double command_latency_s;
+    bool observes; /* the observer: margins as of bst_tracking_open */
+    double alpha, beta;
+    bst_compensator gains; /* else */
+    bst_loop_axis axis[BST_LOOP_AXES];
+} bst_loop_model;
+
+/* Builds and analyses the loops of a sensor. *out is NULL when it has no mount that moves under
+ * command. BST_ERR_CONFIG: a compensator's specification that cannot be met, and what the modules
+ * themselves refuse. */
+bst_status bst_loop_model_create(bst_ctx *ctx, const bst_scenario *scenario, int observer,
+                                 int sensor, const bst_loop_options *options,
+                                 bst_loop_model **out) BST_MUST_CHECK;
+/* NULL is allowed. */
+void bst_loop_model_free(bst_loop_model *model);
+
+/* Logs a warning for each loop of a scenario that is unstable or has thin margins
+ * (bst_loop_verdict); what cannot be analysed is left to those who run it. */
+void bst_loop_warn(bst_ctx *ctx, const bst_scenario *scenario);
+
+/* ---- loop_report.c ---- */
+
+void bst_loop_print(const bst_loop_model *model);
+struct cJSON;
+/* The object of one sensor; NULL when out of memory. */
+struct cJSON *bst_loop_json(const bst_loop_model *model);
+
+/* ---- loop_plot.c ---- */
+
+/* Bode, Nyquist, step and rejection of a sensor's loops, as PNG or (a path that ends in .svg) SVG.
+ */
+bst_status bst_loop_plot(bst_ctx *ctx, const char *path,
+                         const bst_loop_model *model) BST_MUST_CHECK;
+
+#endif

@@ -1,0 +1,227 @@
+/* The linear model of the tracking loop against that loop stepped in time: the mount's servo at
+ * 1 kHz, frames averaged over their exposure, corrections late. */
+#include "control/tracking_loop.h"
+#include "gimbal/axis.h"
+#include "sim/core/vec.h"
+#include "tests/test_support.h"
+
+#define DT 1e-3
+enum { RESPONSE = 1500 };
+/* So small that the axis meets no limit. */
+#define TINY 1e-9
+
+static const bst_axis_spec spec = {.rate_limit_radps = 10.0,
+                                   .accel_limit_radps2 = 1000.0,
+                                   .natural_frequency_radps = 50.0,
+                                   .damping = 0.7,
+                                   .dt_s = DT};
+/* 10 frames a second, 60 ms exposures, control 130 ms after an exposure's middle, commands 20 ms on
+ * their way (and believed to be 50). */
+static const bst_tracking_timing timing = {0.1, 0.06, 0.13, 0.18, 0.15};
+
+typedef struct responses {
+    double step[RESPONSE], lag[RESPONSE];
+} responses;
+
+static bst_servo_response servo_of(responses *r) {
+    bst_axis axis;
+    bst_axis_init(&axis, &spec);
+    for (int n = 0; n < RESPONSE; n++) {
+        bst_axis_step(&axis, TINY, 0.0, 0.0);
+        r->step[n] = axis.angle_rad / TINY;
+    }
+    bst_axis_init(&axis, &spec);
+    for (int n = 0; n < RESPONSE; n++) {
+        bst_axis_step(&axis, TINY * n * DT, TINY, 0.0);
+        r->lag[n] = n * DT - axis.angle_rad / TINY;
+    }
+    return (bst_servo_response){.dt_s = DT, .count = RESPONSE, .step = r->step, .ramp_lag = r->lag};
+}
+
+static bst_compensator pi_with(double crossover_hz, const bst_servo_response *servo,
+                               double gain_scale, double delay_s) {
+    bst_ctx ctx = {0};
+    bst_tracking_loop *plant;
+    bst_compensator c = {.dt_s = timing.period_s, .stages = 1, .stage = {{.b0 = 1.0}}};
+    bst_assert_ok(&ctx, bst_tracking_loop_create(&ctx, &timing, servo, &c, 0.0, 0.0, &plant));
+    bst_compensator_config config = {.type = BST_COMPENSATOR_PI,
+                                     .crossover_hz = crossover_hz,
+                                     .phase_margin_deg = 45.0,
+                                     .gain_scale = gain_scale,
+                                     .delay_s = delay_s};
+    bst_assert_ok(
+        &ctx, bst_compensator_init(&ctx, &c, &config, timing.period_s, bst_tracking_plant, plant));
+    bst_tracking_loop_free(plant);
+    return c;
+}
+
+typedef struct simulated {
+    double complex error; /* over the amplitude of a sinusoid, at the exposures' middles */
+    double growth;        /* of the error's envelope, last tenth over first tenth of a free run */
+} simulated;
+
+/* Steps the loop. omega > 0: driven by a sinusoid that repeats after `frames` frames; 0: from an
+ * error at the start. observer: alpha and beta, else NULL. */
+static simulated simulate(const bst_compensator *compensator, const double *observer, double omega,
+                          int frames) {
+    bst_axis axis;
+    bst_axis_init(&axis, &spec);
+    bst_compensator c = compensator ? *compensator : (bst_compensator){0};
+    int period = 100, half = 30, late = 150;        /* steps */
+    double value = 0.0, rate = 0.0, value_at = 0.0; /* of the correction, at a time */
+    double estimate = 0.0, estimate_rate = 0.0;
+    double sum = 0.0, pending[8];
+    simulated out = {0};
+    double first = 0.0, last = 0.0;
+    int settle = omega > 0.0 ? 400 : 0, total = settle + frames;
+    for (int n = 0; n < total * period; n++) {
+        /* frame k is exposed from k period - half to k period + half, acted on `late` after it */
+        int k = (n - late) / period;
+        if (n >= late && (n - late) % period == 0) {
+            double m = pending[k % 8], effect = k * timing.period_s + timing.effect_s;
+            if (compensator) {
+                value += rate * (effect - value_at);
+                rate = TINY * bst_compensator_step(&c, m / TINY, 0.0);
+            } else {
+                double nu = m - (estimate + timing.period_s * estimate_rate);
+                estimate += timing.period_s * estimate_rate + observer[0] * nu;
+                estimate_rate += observer[1] / timing.period_s * nu;
+                value = estimate + estimate_rate * timing.effect_s;
+                rate = estimate_rate;
+            }
+            value_at = effect;
+        }
+        double t = n * DT;
+        bst_axis_step(&axis, value + rate * (t - value_at), rate, 0.0);
+        assert_false(axis.limited);
+        double d = omega > 0.0 ? TINY * cos(omega * t) : TINY;
+        double e = d - axis.angle_rad;
+        int phase = n % period, frame = (n + half) / period;
+        if (phase == 0 && n / period >= settle) {
+            int i = n / period - settle;
+            out.error += e / TINY * cexp(-I * omega * i * timing.period_s) / frames;
+            if (10 * i < frames) {
+                first = fmax(first, fabs(e));
+            } else if (10 * i >= 9 * frames) {
+                last = fmax(last, fabs(e));
+            }
+        }
+        if (phase >= period - half || phase <= half) {
+            double weight = phase == half || phase == period - half ? 0.5 : 1.0; /* trapezoids */
+            sum += weight * (observer ? d : e) / (2 * half);
+            if (phase == half) {
+                pending[frame % 8] = sum;
+                sum = 0.0;
+            }
+        }
+    }
+    out.error *= omega > 0.0 ? cexp(-I * omega * settle * timing.period_s) * 1.0 : 1.0;
+    out.growth = last / first;
+    return out;
+}
+
+/* cos = half a turn each way: of a frequency between 0 and half the frame rate only one is kept. */
+static double simulated_size(const bst_compensator *c, const double *observer, int turns,
+                             int frames) {
+    double omega = 2 * BST_PI * turns / (frames * timing.period_s);
+    return 2.0 * cabs(simulate(c, observer, omega, frames).error);
+}
+
+static void test_rejection(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    responses r;
+    bst_servo_response servo = servo_of(&r);
+    bst_compensator c = pi_with(0.4, &servo, 1.0, 0.0);
+    const double gains[2] = {0.5, 0.2};
+    bst_tracking_loop *image, *observer;
+    bst_assert_ok(&ctx, bst_tracking_loop_create(&ctx, &timing, &servo, &c, 0, 0, &image));
+    bst_assert_ok(
+        &ctx, bst_tracking_loop_create(&ctx, &timing, &servo, NULL, gains[0], gains[1], &observer));
+    for (int turns = 1; turns < 100; turns = turns * 3 + 1) {
+        double w = 2 * BST_PI * turns / 20.0;
+        /* the exposure's mean by trapezoids of 1 ms, the response between steps by straight lines:
+         * 1e-3 of what is made up for */
+        bst_assert_close(simulated_size(&c, NULL, turns, 200),
+                         cabs(bst_tracking_rejection(image, w, 0.0)), 2e-3);
+        bst_assert_close(simulated_size(NULL, gains, turns, 200),
+                         cabs(bst_tracking_rejection(observer, w, 0.0)), 2e-3);
+    }
+    /* both follow a steady drift without lag; so slowly, that only rounding is left */
+    bst_assert_close(bst_tracking_lag(image), 0.0, 1e-3);
+    bst_assert_close(bst_tracking_lag(observer), 0.0, 1e-3);
+    bst_tracking_loop_free(image);
+    bst_tracking_loop_free(observer);
+}
+
+static void test_margins(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    responses r;
+    bst_servo_response servo = servo_of(&r);
+    bst_compensator c = pi_with(0.4, &servo, 1.0, 0.0);
+    bst_tracking_loop *loop;
+    bst_assert_ok(&ctx, bst_tracking_loop_create(&ctx, &timing, &servo, &c, 0, 0, &loop));
+    bst_loop open = {bst_tracking_open, loop, timing.period_s, 0, NULL, 0};
+    bst_loop_margins m;
+    bst_assert_ok(&ctx, bst_loop_analyse(&ctx, &open, &m));
+    assert_true(m.stable);
+    bst_assert_close(m.crossover_hz, 0.4, 1e-6); /* as designed */
+    bst_assert_close(m.phase_margin_deg, 45.0, 1e-4);
+    double factor = pow(10.0, m.gain_margin_db / 20.0);
+    /* 0.5 % beyond either margin the free loop grows, 0.5 % before it it shrinks */
+    bst_compensator below = pi_with(0.4, &servo, 0.995 * factor, 0.0);
+    bst_compensator above = pi_with(0.4, &servo, 1.005 * factor, 0.0);
+    assert_true(simulate(&below, NULL, 0.0, 1000).growth < 0.9);
+    assert_true(simulate(&above, NULL, 0.0, 1000).growth > 1.1);
+    /* the compensator's own delay is between samples an interpolation, which also lowers the gain:
+     * the model knows, the margin is for a pure delay, 5 % */
+    below = pi_with(0.4, &servo, 1.0, 0.95 * m.delay_margin_s);
+    above = pi_with(0.4, &servo, 1.0, 1.05 * m.delay_margin_s);
+    assert_true(simulate(&below, NULL, 0.0, 1000).growth < 0.9);
+    assert_true(simulate(&above, NULL, 0.0, 1000).growth > 1.1);
+    bst_tracking_loop_free(loop);
+}
+
+static void test_variance(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_servo_response exact = {.delay_s = 0.0};
+    /* alpha = 1, beta = 0 holds the latest fix: the error is d at the middle less the mean of the
+     * exposure n frames before, n = 3 for an effect 0.25 to 0.35 s after the middle */
+    const bst_tracking_timing held = {0.1, 1e-9, 0.2, 0.25, 0.25};
+    bst_tracking_loop *loop;
+    bst_assert_ok(&ctx, bst_tracking_loop_create(&ctx, &held, &exact, NULL, 1.0, 0.0, &loop));
+    /* |1 - exp(-j w 3 T)|^2 = 2 - 2 cos(w 3 T) over a flat band from 0 to f: 2 - 2 sinc */
+    bst_tracking_band band = {0.0, 0.7, 5.0};
+    double x = 2 * BST_PI * 0.7 * 0.3;
+    bst_assert_close(bst_tracking_variance(loop, &band, 1), 5.0 * (2.0 - 2.0 * sin(x) / x), 1e-4);
+    bst_tracking_band line = {0.5, 0.5, 2.0};
+    bst_assert_close(bst_tracking_variance(loop, &line, 1), 4.0 - 4.0 * cos(0.3 * BST_PI), 1e-9);
+    bst_assert_close(bst_tracking_noise_gain(loop), 1.0, 1e-9);
+    bst_assert_close(bst_tracking_lag(loop), 0.3, 1e-6);
+    bst_tracking_loop_free(loop);
+}
+
+static void test_observer_gains(void **state) {
+    (void)state;
+    /* Kalata: lambda^2 = q T^3 / s^2 = beta^2 / (1 - alpha) holds for piecewise constant
+     * acceleration; for white acceleration the table of pointing_error.h */
+    double alpha, beta;
+    bst_tracking_observer_gains(1e-3, 0.05, 1.0, &alpha, &beta);
+    bst_assert_close(alpha, 0.68, 0.005);
+    bst_assert_close(beta, 0.36, 0.005);
+    bst_tracking_observer_gains(1e-3, 0.1, 1.0, &alpha, &beta);
+    bst_assert_close(alpha, 0.55, 0.005);
+    bst_assert_close(beta, 0.21, 0.005);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_rejection),
+        cmocka_unit_test(test_margins),
+        cmocka_unit_test(test_variance),
+        cmocka_unit_test(test_observer_gains),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
