@@ -377,6 +377,35 @@ static void test_margin_in_the_loop(void **state) {
     bst_assert_close(found[1] / found[0], 1.0, 0.05);
 }
 
+/* The default controller with the modes of scenarios/rigid_spacecraft.json: 1 + L keeps 0.5 from
+ * zero, a sensitivity peak below 2, and so a phase margin of 29 deg and 3.5 dB at least; where L is
+ * real and negative it is below 0.5. */
+static void test_default_margins(void **state) {
+    (void)state;
+    bst_craft_config c = config_make(BST_LAW_NADIR);
+    bst_mode_config modes[2] = {{1.1, 0.005, {1.2, 0.0, 0.3}}, {3.4, 0.005, {0.0, 0.8, 0.1}}};
+    for (int flexible = 0; flexible < 2; flexible++) {
+        c.modes = (bst_config_list){modes, flexible ? 2 : 0};
+        for (int axis = 0; axis < 3; axis++) {
+            double nearest = INFINITY, crossing = 0.0, last = 0.0;
+            for (double f = 1e-4; f < 25.0; f *= 1.0002) {
+                bst_craft_response r = bst_craft_response_at(&c, axis, f);
+                double re = r.plant[0] * r.controller[0] - r.plant[1] * r.controller[1];
+                double im = r.plant[0] * r.controller[1] + r.plant[1] * r.controller[0];
+                nearest = fmin(nearest, hypot(1.0 + re, im));
+                if (f > 0.05 && im * last < 0.0 && re < 0.0) {
+                    crossing = fmax(crossing, -re);
+                }
+                last = im;
+            }
+            print_message("axis %d, %s: sensitivity peak %.2f, gain margin %.1f dB\n", axis,
+                          flexible ? "modes" : "rigid", 1.0 / nearest, -20.0 * log10(crossing));
+            assert_true(nearest > 0.5);
+            assert_true(crossing < 0.5);
+        }
+    }
+}
+
 /* RMS of pointing and knowledge against the integral of their spectra. */
 static void test_predicted_rms(void **state) {
     (void)state;
@@ -565,14 +594,21 @@ static void test_reaction(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_laws),          cmocka_unit_test(test_half_turn),
-        cmocka_unit_test(test_antipodal),     cmocka_unit_test(test_saturated_wheels),
-        cmocka_unit_test(test_failed_wheel),  cmocka_unit_test(test_blind_for_an_hour),
-        cmocka_unit_test(test_free_tumble),   cmocka_unit_test(test_margin_in_the_loop),
-        cmocka_unit_test(test_predicted_rms), cmocka_unit_test(test_imbalance),
-        cmocka_unit_test(test_wrong_orbit),   cmocka_unit_test(test_repeats),
-        cmocka_unit_test(test_sets),          cmocka_unit_test(test_reaction),
-        cmocka_unit_test(test_refused)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_laws),
+                                       cmocka_unit_test(test_half_turn),
+                                       cmocka_unit_test(test_antipodal),
+                                       cmocka_unit_test(test_saturated_wheels),
+                                       cmocka_unit_test(test_failed_wheel),
+                                       cmocka_unit_test(test_blind_for_an_hour),
+                                       cmocka_unit_test(test_free_tumble),
+                                       cmocka_unit_test(test_margin_in_the_loop),
+                                       cmocka_unit_test(test_default_margins),
+                                       cmocka_unit_test(test_predicted_rms),
+                                       cmocka_unit_test(test_imbalance),
+                                       cmocka_unit_test(test_wrong_orbit),
+                                       cmocka_unit_test(test_repeats),
+                                       cmocka_unit_test(test_sets),
+                                       cmocka_unit_test(test_reaction),
+                                       cmocka_unit_test(test_refused)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
