@@ -3,16 +3,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "control/control.h"
 #include "gimbal/two_axis.h"
 
 static const double two_pi = 2.0 * BST_PI;
-
-/* So small that no axis meets a limit: the linear regime. */
-#define TINY 1e-9
-/* The mount is at rest when this much is missing; it is waited for no longer than that. */
-#define AT_REST 1e-9
-#define LONGEST_S 60.0
 
 static const bst_module_config *find_module(const bst_scenario *scenario, int observer, int sensor,
                                             const char *role) {
@@ -55,11 +48,11 @@ static int axis_response(const bst_axis_spec *spec, double rate, int most, doubl
     bst_axis_init(&axis, spec);
     int n = 0, still = 0;
     for (; n < most && still < 100; n++) {
-        double wanted = rate > 0.0 ? TINY * n * spec->dt_s : TINY;
-        bst_axis_step(&axis, wanted, TINY * rate, 0.0);
-        double missing = (wanted - axis.angle_rad) / TINY;
+        double wanted = rate > 0.0 ? BST_LOOP_TINY * n * spec->dt_s : BST_LOOP_TINY;
+        bst_axis_step(&axis, wanted, BST_LOOP_TINY * rate, 0.0);
+        double missing = (wanted - axis.angle_rad) / BST_LOOP_TINY;
         out[n] = rate > 0.0 ? missing : 1.0 - missing;
-        still = fabs(missing) < AT_REST ? still + 1 : 0;
+        still = fabs(missing) < BST_LOOP_AT_REST ? still + 1 : 0;
     }
     return n;
 }
@@ -71,7 +64,7 @@ static bst_status second_order_response(bst_ctx *ctx, const bst_two_axis_config 
                           .natural_frequency_radps = two_pi * config->natural_frequency_hz,
                           .damping = config->damping,
                           .dt_s = dt_s};
-    int most = (int)fmin(fmax(ceil(LONGEST_S / dt_s), 2.0), 1e6);
+    int most = (int)fmin(fmax(ceil(BST_LOOP_LONGEST_S / dt_s), 2.0), 1e6);
     double *step = calloc((size_t)most, 2 * sizeof *step);
     if (!step) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a mount's response");
@@ -92,14 +85,13 @@ static void add_band(bst_loop_axis *axis, double low_hz, double high_hz, double 
     }
 }
 
-static void platform_bands(const bst_platform_config *platform, double pixel_rad, double dt_s,
-                           bst_loop_axis *axis) {
+/* The platform's jitter is configured in pixels, radial. */
+static void platform_bands(const bst_platform_config *platform, double dt_s, bst_loop_axis *axis) {
     bst_jitter_spec spec = {.low_rms_rad = platform->jitter_low_px_rms,
                             .low_cutoff_hz = platform->jitter_low_cutoff_hz,
                             .high_rms_rad = platform->jitter_high_px_rms,
                             .high_min_hz = platform->jitter_high_band_hz[0],
                             .high_max_hz = platform->jitter_high_band_hz[1]};
-    (void)pixel_rad; /* the platform's jitter is configured in pixels, radial */
     spec = bst_jitter_resolved(&spec, dt_s);
     add_band(axis, 0.0, spec.low_cutoff_hz, 0.5 * spec.low_rms_rad * spec.low_rms_rad);
     add_band(axis, spec.high_min_hz, spec.high_max_hz, 0.5 * spec.high_rms_rad * spec.high_rms_rad);
@@ -168,10 +160,15 @@ static void predict(bst_loop_axis *axis, double drift_pxps, const bst_loop_optio
     }
 }
 
-static bst_status close_tracking(bst_ctx *ctx, const bst_control_config *control,
-                                 const bst_servo_response *servo, double drift_pxps,
-                                 const bst_loop_options *options, bst_loop_model *model,
-                                 bst_loop_axis *axis) {
+bst_status bst_loop_close_tracking(bst_ctx *ctx, const bst_control_config *control,
+                                   const bst_servo_response *servo,
+                                   const bst_platform_config *platform, double drift_pxps,
+                                   const bst_loop_options *options, bst_loop_model *model,
+                                   bst_loop_axis *axis) {
+    platform_bands(platform, model->timing.gimbal_period_s, axis);
+    if (!control || !control->compensate_attitude) {
+        return BST_OK;
+    }
     const bst_loop_timing *t = &model->timing;
     double arrival = 0.5 * t->exposure_s + t->frame_latency_s;
     bst_tracking_timing timing = {.period_s = t->period_s,
@@ -194,20 +191,21 @@ static bst_status build_second_order(bst_ctx *ctx, const bst_module_config *gimb
                                      const bst_control_config *control,
                                      const bst_loop_options *options, bst_loop_model *model) {
     const bst_two_axis_config *config = gimbal->config;
-    static const char *const names[BST_LOOP_AXES] = {"outer", "inner"};
+    static const char *const names[] = {"outer", "inner"};
+    model->axes = 2;
     double dt = model->timing.gimbal_period_s, arcsec_px = model->pixel_rad / BST_ARCSEC_RAD;
     bst_servo_response servo = {0};
     BST_TRY(second_order_response(ctx, config, dt, &servo));
     bst_status status = BST_OK;
-    for (int a = 0; status == BST_OK && a < BST_LOOP_AXES; a++) {
+    for (int a = 0; status == BST_OK && a < model->axes; a++) {
         bst_loop_axis *axis = &model->axis[a];
         axis->name = names[a];
         status = second_order_servo(ctx, config, &axis->servo);
-        platform_bands(&config->platform, model->pixel_rad, dt, axis);
         /* the outer axis moves the image along x, as a turn about body y does */
         double drift = config->platform.drift_arcsec_per_s[a == 0 ? 1 : 0] / arcsec_px;
-        if (status == BST_OK && control && control->compensate_attitude) {
-            status = close_tracking(ctx, control, &servo, drift, options, model, axis);
+        if (status == BST_OK) {
+            status = bst_loop_close_tracking(ctx, control, &servo, &config->platform, drift,
+                                             options, model, axis);
         }
     }
     free((double *)(uintptr_t)servo.step);
@@ -220,7 +218,9 @@ bst_status bst_loop_model_create(bst_ctx *ctx, const bst_scenario *scenario, int
     *out = NULL;
     const bst_module_config *gimbal = find_module(scenario, observer, sensor, "gimbal");
     const bst_module_config *control = find_module(scenario, observer, sensor, "control");
-    if (!gimbal || gimbal->desc->config != bst_two_axis_config_table) {
+    bool simple = gimbal && gimbal->desc->config == bst_two_axis_config_table;
+    bool full = gimbal && gimbal->desc->config == bst_mount_config_table;
+    if (!simple && !full) {
         return BST_OK;
     }
     if (control && control->desc->config != bst_control_config_table) {
@@ -246,8 +246,13 @@ bst_status bst_loop_model_create(bst_ctx *ctx, const bst_scenario *scenario, int
         model->command_latency_s = law->command_latency_s;
         status = control_gains(ctx, law, options, model);
     }
-    if (status == BST_OK) {
+    if (status == BST_OK && simple) {
         status = build_second_order(ctx, gimbal, law, options, model);
+    } else if (status == BST_OK) {
+        bool azimuth = strcmp(gimbal->desc->type, "azimuth_elevation") == 0;
+        status = bst_loop_build_mount(
+            ctx, azimuth ? BST_MOUNT_AZIMUTH_ELEVATION : BST_MOUNT_CROSS_ELEVATION, gimbal->config,
+            law, options, model);
     }
     if (status != BST_OK) {
         bst_loop_model_free(model);
@@ -290,7 +295,7 @@ void bst_loop_warn(bst_ctx *ctx, const bst_scenario *scenario) {
                 !model) {
                 continue;
             }
-            for (int a = 0; a < BST_LOOP_AXES; a++) {
+            for (int a = 0; a < model->axes; a++) {
                 const bst_loop_axis *axis = &model->axis[a];
                 bool twin = a > 0 && memcmp(&axis->margins, &model->axis[0].margins,
                                             sizeof axis->margins) == 0;

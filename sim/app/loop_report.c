@@ -44,7 +44,7 @@ void bst_loop_print(const bst_loop_model *model) {
             "%g s on their way\n",
             t->period_s, t->exposure_s, t->frame_latency_s, t->command_delay_s);
     }
-    for (int a = 0; a < BST_LOOP_AXES; a++) {
+    for (int a = 0; a < model->axes; a++) {
         const bst_loop_axis *axis = &model->axis[a];
         if (axis->tracked && model->observes) {
             printf(
@@ -94,7 +94,7 @@ cJSON *bst_loop_json(const bst_loop_model *model) {
     bst_json_add_number(root, "command_delay_s", model->timing.command_delay_s);
     cJSON *axes = cJSON_AddArrayToObject(root, "axes");
     double sum = 0.0;
-    for (int a = 0; a < BST_LOOP_AXES; a++) {
+    for (int a = 0; a < model->axes; a++) {
         const bst_loop_axis *axis = &model->axis[a];
         cJSON *node = cJSON_CreateObject();
         cJSON_AddItemToArray(axes, node);
