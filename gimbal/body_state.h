@@ -8,7 +8,7 @@
 typedef struct bst_body_state {
     bst_quat q_body_from_gcrf; /* unit */
     bst_vec3 rate_radps;       /* of the body against GCRF, body axes */
-    bst_vec3 accel_radps2;     /* d(rate_radps)/dt, body axes: the mean over the step to the next */
+    bst_vec3 accel_radps2;     /* change of rate_radps over the step before, by its length */
 } bst_body_state;
 
 #endif

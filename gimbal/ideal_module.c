@@ -101,6 +101,7 @@ static bst_status find_target(const bst_module_env *env, const config *c, module
 static void destroy(void *self) {
     module *m = self;
     if (m) {
+        bst_platform_free(&m->platform);
         bst_view_free(m->view);
         free(m);
     }
@@ -113,6 +114,7 @@ static bst_status prepare(const bst_module_env *env, const config *c, module *m)
     m->x_hint_gcrf = bst_quat_rotate(bst_quat_conj(nominal), (bst_vec3){1, 0, 0});
     BST_TRY(bst_platform_init(env->ctx, &m->platform, platform, nominal, pixel, m->dt_s,
                               bst_env_rng(env, "jitter"), bst_env_rng(env, "attitude")));
+    BST_TRY(bst_platform_equip(env, &m->platform, platform, m->dt_s));
     BST_TRY(bst_platform_check_history(env->ctx, platform, env->exposure_s));
     BST_TRY(bst_platform_divider(env->ctx, "telemetry_rate_hz", 1.0 / m->dt_s,
                                  platform->telemetry_rate_hz, &m->telemetry_steps));
@@ -158,7 +160,12 @@ static bst_status step(void *self, struct bst_step *s) {
     /* the ideal mount as seen from the nominal body, so that drift and jitter act as on a real one
      */
     bst_quat ideal = bst_quat_look(direction, m->x_hint_gcrf);
-    bst_quat q_cam_from_body = bst_quat_mul(ideal, bst_quat_conj(m->platform.q_nominal_from_gcrf));
+    bst_quat body = m->platform.q_nominal_from_gcrf;
+    if (m->platform.spacecraft) { /* follows what is believed of the body */
+        BST_TRY(bst_platform_step(s, &m->platform, n, (bst_vec3){0, 0, 0}));
+        body = m->platform.q_believed_from_gcrf;
+    }
+    bst_quat q_cam_from_body = bst_quat_mul(ideal, bst_quat_conj(body));
 
     int capacity;
     bst_los_history *history = bst_step_write(s, PORT_HISTORY, &capacity);
@@ -170,6 +177,8 @@ static bst_status step(void *self, struct bst_step *s) {
         bst_platform_append_exact(&m->platform, n, telemetry, capacity, tick, q_cam_from_body);
         bst_mount_status *mount = bst_step_write(s, PORT_MOUNT, NULL);
         *mount = (bst_mount_status){.tick = tick,
+                                    .wheels_saturated = m->platform.wheels_saturated,
+                                    .rate_body_radps = m->platform.rate_believed_radps,
                                     .q_body_from_cam_at_zero = BST_QUAT_IDENTITY,
                                     .q_body_from_gcrf = telemetry->q_body_from_gcrf};
     }

@@ -2,6 +2,7 @@
 
 #include <math.h>
 
+#include "gimbal/jitter_more.h"
 #include "sim/core/vec.h"
 
 /* Wider vectors where the processor has them; the order of sums is the same. */
@@ -116,11 +117,7 @@ LINES_FUNCTION static double sum(const bst_jitter_axis *axis) {
     return ((s[0] + s[4]) + (s[1] + s[5])) + ((s[2] + s[6]) + (s[3] + s[7]));
 }
 
-void bst_jitter_at(bst_jitter *jitter, int64_t n, double out_rad[2]) {
-    if (jitter->silent) {
-        out_rad[0] = out_rad[1] = 0.0;
-        return;
-    }
+static void flat_at(bst_jitter *jitter, int64_t n, double out_rad[2]) {
     int64_t block = n - n % RESYNC_STEPS;
     if (jitter->index < block || jitter->index > n) {
         synchronise(jitter, block);
@@ -133,4 +130,15 @@ void bst_jitter_at(bst_jitter *jitter, int64_t n, double out_rad[2]) {
     }
     out_rad[0] = sum(&jitter->axis[0]);
     out_rad[1] = sum(&jitter->axis[1]);
+}
+
+void bst_jitter_at(bst_jitter *jitter, int64_t n, double out_rad[2]) {
+    if (jitter->silent) {
+        out_rad[0] = out_rad[1] = 0.0;
+    } else {
+        flat_at(jitter, n, out_rad);
+    }
+    if (jitter->more) {
+        bst_jitter_more_at(jitter->more, n, jitter->dt_s, out_rad);
+    }
 }

@@ -28,8 +28,9 @@ typedef struct bst_jitter_axis {
 typedef struct bst_jitter {
     double dt_s;
     int64_t index; /* of the step that the phasors stand at; -1: none */
-    bool silent;
+    bool silent;   /* no flat bands */
     bst_jitter_axis axis[2];
+    struct bst_jitter_more *more; /* owned: of tables and lines (bst_jitter_add); NULL: none */
 } bst_jitter;
 
 /* Steps of dt_s follow jitter up to this times 1 / dt_s. */
@@ -53,5 +54,8 @@ void bst_jitter_init(bst_jitter *jitter, const bst_jitter_spec *spec, double dt_
 /* Rotation of the camera about its x and y axes at time n * dt_s, rad. A function of n alone, to
  * the bit, whatever was asked before; asking for n = 0, 1, 2, ... in turn is fast. */
 void bst_jitter_at(bst_jitter *jitter, int64_t n, double out_rad[2]);
+
+/* Frees what bst_jitter_add made; a zeroed jitter is allowed. */
+void bst_jitter_free(bst_jitter *jitter);
 
 #endif

@@ -32,6 +32,7 @@ typedef struct module {
 static void destroy(void *self) {
     module *m = self;
     if (m) {
+        bst_platform_free(&m->platform);
         bst_view_free(m->view);
         free(m);
     }
@@ -45,6 +46,11 @@ static bst_status prepare(const bst_module_env *env, int type, const bst_mount_c
     BST_TRY(bst_platform_init(env->ctx, &m->platform, platform, nominal, pixel, m->dt_s,
                               bst_env_rng(env, "jitter"), bst_env_rng(env, "attitude")));
     BST_TRY(bst_mount_init(env->ctx, &m->mount, type, c, m->dt_s, bst_env_rng(env, "encoder")));
+    BST_TRY(bst_platform_equip(env, &m->platform, platform, m->dt_s));
+    m->mount.want_reaction = m->platform.spacecraft != NULL;
+    double inertia[6], zero[BST_MOUNT_MOST] = {0.0};
+    bst_chain_locked_inertia(&m->mount.joints.chain, zero, inertia);
+    BST_TRY(bst_platform_check_mount(env->ctx, &m->platform, inertia));
     BST_TRY(bst_platform_check_history(env->ctx, platform, env->exposure_s));
     BST_TRY(bst_platform_divider(env->ctx, "telemetry_rate_hz", 1.0 / m->dt_s,
                                  platform->telemetry_rate_hz, &m->telemetry_steps));
@@ -96,8 +102,12 @@ static bst_status step(void *self, struct bst_step *s) {
     const bst_los_command *command = sample.payload;
     double age = command ? (double)(tick - command->tick) / m->tick_rate_hz : 0.0;
     bool measure = n % m->telemetry_steps == 0;
-    bst_mount_body body = {.rate_radps = m->platform.drift_radps,
-                           .q_believed_from_gcrf = m->platform.q_believed_from_gcrf};
+    if (m->platform.spacecraft) {
+        BST_TRY(bst_platform_step(s, &m->platform, n, mount->reaction_nm));
+    }
+    bst_mount_body body = {.rate_radps = m->platform.body.rate_radps,
+                           .q_believed_from_gcrf = m->platform.q_believed_from_gcrf,
+                           .believed_rate_radps = m->platform.rate_believed_radps};
     bst_mount_step(mount, &body, command, age, measure);
 
     int capacity;
@@ -116,6 +126,8 @@ static bst_status step(void *self, struct bst_step *s) {
         bst_mount_status *status = bst_step_write(s, PORT_MOUNT, NULL);
         bst_mount_status_of(mount, tick, status);
         status->q_body_from_gcrf = seen;
+        status->rate_body_radps = m->platform.rate_believed_radps;
+        status->wheels_saturated = m->platform.wheels_saturated;
     }
     if (n % m->nav_steps == 0) {
         bst_nav_telemetry *nav = bst_step_write(s, PORT_NAV, NULL);

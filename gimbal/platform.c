@@ -14,6 +14,8 @@ const bst_config_desc bst_platform_config_table[] = {
         P, jitter_high_band_hz, "Hz", 0, 10000, "[5, 200]",
         "Lowest and highest frequency of the fast jitter; its spectrum is flat between. What is "
         "above 0.4 rate_hz widens the PSF."),
+    BST_OBJECT(P, jitter_psd, bst_jitter_psd_config_table, "{}",
+               "Jitter by tables of its density and by harmonic lines, besides the flat bands."),
     BST_REALS(P, attitude_bias_arcsec, "arcsec", -36000, 36000, "[0, 0, 0]",
               "Constant error of the believed body attitude, as a rotation about body axes."),
     BST_REAL(
@@ -28,6 +30,8 @@ const bst_config_desc bst_platform_config_table[] = {
              "Time that the ring of pointing telemetry covers."),
     BST_REAL(P, nav_rate_hz, "Hz", 0.001, 10000, "10",
              "Rate of navigation telemetry; divides the plant's rate."),
+    BST_OBJECT(P, spacecraft, bst_craft_config_table, "{}",
+               "The body: held, or with dynamics, wheels, sensors and a pointing law."),
     BST_CONFIG_END};
 #undef P
 
@@ -40,10 +44,8 @@ static bst_quat turned(bst_quat q, bst_vec3 r) {
     return bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(r, -1.0)), q);
 }
 
-bst_status bst_platform_init(bst_ctx *ctx, bst_platform *platform,
-                             const bst_platform_config *config, bst_quat q_nominal_from_gcrf,
-                             double pixel_rad, double dt_s, bst_rng_key jitter_key,
-                             bst_rng_key attitude_key) {
+bst_status bst_platform_jitter_spectrum(bst_ctx *ctx, const bst_platform_config *config,
+                                        double pixel_rad, bst_jitter_spectrum *out) {
     const double *band = config->jitter_high_band_hz;
     if (config->jitter_high_px_rms > 0.0 && !(band[1] > band[0])) {
         return bst_fail(ctx, BST_ERR_CONFIG,
@@ -51,20 +53,67 @@ bst_status bst_platform_init(bst_ctx *ctx, bst_platform *platform,
                         "frequency first",
                         band[0], band[1]);
     }
-    bst_jitter_spec spec = {.low_rms_rad = config->jitter_low_px_rms * pixel_rad,
+    bst_jitter_spec flat = {.low_rms_rad = config->jitter_low_px_rms * pixel_rad,
                             .low_cutoff_hz = config->jitter_low_cutoff_hz,
                             .high_rms_rad = config->jitter_high_px_rms * pixel_rad,
                             .high_min_hz = band[0],
                             .high_max_hz = band[1]};
+    return bst_jitter_spectrum_create(ctx, &flat, &config->jitter_psd, pixel_rad, out);
+}
+
+bst_status bst_platform_init(bst_ctx *ctx, bst_platform *platform,
+                             const bst_platform_config *config, bst_quat q_nominal_from_gcrf,
+                             double pixel_rad, double dt_s, bst_rng_key jitter_key,
+                             bst_rng_key attitude_key) {
+    bst_jitter_spectrum spectrum;
+    platform->spacecraft = NULL;
+    platform->sky = NULL;
+    platform->jitter.more = NULL;
+    BST_TRY(bst_platform_jitter_spectrum(ctx, config, pixel_rad, &spectrum));
     platform->q_nominal_from_gcrf = q_nominal_from_gcrf;
     platform->q_believed_from_gcrf =
         turned(q_nominal_from_gcrf, arcsec_vector(config->attitude_bias_arcsec));
     platform->drift_radps = arcsec_vector(config->drift_arcsec_per_s);
     platform->attitude_noise_rad = config->attitude_noise_arcsec * BST_ARCSEC_RAD;
     platform->attitude_key = attitude_key;
-    platform->unresolved_rad2 = bst_jitter_unresolved_rad2(&spec, dt_s);
-    spec = bst_jitter_resolved(&spec, dt_s);
-    bst_jitter_init(&platform->jitter, &spec, dt_s, jitter_key);
+    platform->jitter_unresolved_rad2 = bst_jitter_unresolved_rad2(&spectrum.flat, dt_s) +
+                                       bst_jitter_spectrum_unresolved_rad2(&spectrum, dt_s);
+    platform->unresolved_rad2 = platform->jitter_unresolved_rad2;
+    platform->rate_believed_radps = (bst_vec3){0, 0, 0};
+    platform->body = (bst_body_state){q_nominal_from_gcrf, platform->drift_radps, {0, 0, 0}};
+    platform->wheels_saturated = platform->trackers_blind = false;
+    bst_jitter_spec followed = bst_jitter_resolved(&spectrum.flat, dt_s);
+    bst_jitter_init(&platform->jitter, &followed, dt_s, jitter_key);
+    bst_rng_key more_key = {{jitter_key.k[0] ^ 0x7F4A7C15u, jitter_key.k[1]}}; /* a stream apart */
+    bst_status status = bst_jitter_add(ctx, &platform->jitter, &spectrum, more_key);
+    bst_jitter_spectrum_free(&spectrum);
+    return status;
+}
+
+/* An inertial body. */
+static bst_quat drifted(const bst_platform *platform, double seconds) {
+    bst_vec3 drift = platform->drift_radps;
+    bst_quat body = platform->q_nominal_from_gcrf;
+    if (drift.x != 0.0 || drift.y != 0.0 || drift.z != 0.0) {
+        body = turned(body, bst_vec3_scale(drift, seconds));
+    }
+    return body;
+}
+
+bst_status bst_platform_advance(bst_ctx *ctx, bst_platform *platform, int64_t n, double seconds,
+                                bst_vec3 reaction_nm) {
+    if (!platform->spacecraft) {
+        platform->body.q_body_from_gcrf = drifted(platform, seconds);
+        return BST_OK;
+    }
+    BST_TRY(bst_craft_step(ctx, platform->spacecraft, n, seconds, reaction_nm));
+    const bst_craft_now *now = bst_craft_at(platform->spacecraft);
+    platform->body = now->body;
+    platform->q_believed_from_gcrf = now->q_believed_from_gcrf;
+    platform->rate_believed_radps = now->rate_believed_radps;
+    platform->unresolved_rad2 = platform->jitter_unresolved_rad2 + now->unresolved_rad2;
+    platform->wheels_saturated = now->wheel_flags != 0u;
+    platform->trackers_blind = !now->tracked;
     return BST_OK;
 }
 
@@ -75,11 +124,8 @@ bst_quat bst_platform_true_camera(bst_platform *platform, int64_t n, double seco
 
 bst_quat bst_platform_true_camera_between(bst_platform *platform, int64_t n, double fraction,
                                           double seconds, bst_quat q_cam_from_body) {
-    bst_vec3 drift = platform->drift_radps;
-    bst_quat body = platform->q_nominal_from_gcrf;
-    if (drift.x != 0.0 || drift.y != 0.0 || drift.z != 0.0) {
-        body = turned(body, bst_vec3_scale(drift, seconds));
-    }
+    bst_quat body =
+        platform->spacecraft ? platform->body.q_body_from_gcrf : drifted(platform, seconds);
     double shake[2], next[2];
     bst_jitter_at(&platform->jitter, n, shake);
     if (fraction > 0.0) {
@@ -92,7 +138,7 @@ bst_quat bst_platform_true_camera_between(bst_platform *platform, int64_t n, dou
 }
 
 bst_quat bst_platform_measured_body(const bst_platform *platform, int64_t n) {
-    if (platform->attitude_noise_rad == 0.0) {
+    if (platform->attitude_noise_rad == 0.0 || platform->spacecraft) {
         return platform->q_believed_from_gcrf;
     }
     double a[2], b[2];

@@ -47,6 +47,7 @@ typedef struct module {
 static void destroy(void *self) {
     module *m = self;
     if (m) {
+        bst_platform_free(&m->platform);
         bst_scripted_free(m->scripted);
         bst_view_free(m->view);
         free(m);
@@ -73,6 +74,11 @@ static bst_status prepare(const bst_module_env *env, const config *c, module *m)
     if (bst_platform_check_history(env->ctx, platform, longest_s) != BST_OK) {
         return bst_fail_prefix(env->ctx, BST_ERR_CONFIG, "with the exposures of %s",
                                bst_frame_updates_name(updates));
+    }
+    if (platform->spacecraft.type != BST_CRAFT_INERTIAL) {
+        return bst_fail(env->ctx, BST_ERR_CONFIG,
+                        "platform/spacecraft/type: the file of a scripted line of sight says where "
+                        "the camera points, whatever the body does; leave it \"inertial\"");
     }
     BST_TRY(bst_platform_divider(env->ctx, "telemetry_rate_hz", rate_hz,
                                  platform->telemetry_rate_hz, &m->telemetry_steps));

@@ -165,7 +165,12 @@ static void target(const bst_two_axis *plant, const bst_los_command *command, do
     bst_vec3 r = bst_vec3_scale(rate, scale);
     r = bst_vec3_axpy(r, -bst_vec3_dot(r, d), d);
     bst_quat body = plant->platform.q_believed_from_gcrf;
-    solve(plant, bst_quat_rotate(body, d), bst_quat_rotate(body, r), angle_rad, rate_radps);
+    bst_vec3 d_body = bst_quat_rotate(body, d), r_body = bst_quat_rotate(body, r);
+    if (plant->platform.spacecraft) {
+        /* the body turns away from under the mount */
+        r_body = bst_vec3_sub(r_body, bst_vec3_cross(plant->platform.rate_believed_radps, d_body));
+    }
+    solve(plant, d_body, r_body, angle_rad, rate_radps);
     *at_stop = fabs(angle_rad[1]) > plant->inner_travel_rad;
     if (*at_stop) {
         angle_rad[1] = copysign(plant->inner_travel_rad, angle_rad[1]);
@@ -176,6 +181,8 @@ static void target(const bst_two_axis *plant, const bst_los_command *command, do
 void bst_two_axis_status(const bst_two_axis *plant, int64_t tick, bst_mount_status *out) {
     *out = (bst_mount_status){.tick = tick,
                               .axes = 2,
+                              .wheels_saturated = plant->platform.wheels_saturated,
+                              .rate_body_radps = plant->platform.rate_believed_radps,
                               .q_body_from_cam_at_zero = BST_QUAT_IDENTITY,
                               .q_body_from_gcrf = plant->q_measured_body_from_gcrf};
     for (int i = 0; i < 2; i++) {

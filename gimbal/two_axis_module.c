@@ -31,6 +31,7 @@ typedef struct module {
 static void destroy(void *self) {
     module *m = self;
     if (m) {
+        bst_platform_free(&m->plant.platform);
         bst_view_free(m->view);
         free(m);
     }
@@ -55,6 +56,9 @@ static bst_status create(const bst_module_env *env, const void *config_in, void 
     bst_quat nominal = bst_world_body_attitude(env->world, env->observer, env->sensor);
     double pixel = bst_camera_scale_rad(bst_world_camera(env->world, env->observer, env->sensor));
     bst_status status = bst_two_axis_init(env->ctx, &m->plant, config, nominal, pixel, dt, &keys);
+    if (status == BST_OK) {
+        status = bst_platform_equip(env, &m->plant.platform, platform, dt);
+    }
     if (status == BST_OK) {
         status = bst_platform_check_history(env->ctx, platform, env->exposure_s);
     }
@@ -88,6 +92,9 @@ static bst_status step(void *self, struct bst_step *s) {
     const bst_los_command *command = sample.payload;
     double age = command ? (double)(tick - command->tick) / m->tick_rate_hz : 0.0;
     bool measure = n % m->telemetry_steps == 0;
+    if (m->plant.platform.spacecraft) { /* without reaction: a mount of this type has no inertia */
+        BST_TRY(bst_platform_step(s, &m->plant.platform, n, (bst_vec3){0, 0, 0}));
+    }
     bst_two_axis_step(&m->plant, command, age, measure);
 
     int capacity;

@@ -94,6 +94,14 @@ bst_status bst_bench_plant_full(bst_ctx *ctx, const bst_bench *self,
                                 const bst_bench_options *options,
                                 bst_bench_result *out) BST_MUST_CHECK;
 
+/* Of a spacecraft, and of it with a full mount (bench_spacecraft.c). */
+bst_status bst_bench_plant_spacecraft(bst_ctx *ctx, const bst_bench *self,
+                                      const bst_bench_options *options,
+                                      bst_bench_result *out) BST_MUST_CHECK;
+bst_status bst_bench_plant_all(bst_ctx *ctx, const bst_bench *self,
+                               const bst_bench_options *options,
+                               bst_bench_result *out) BST_MUST_CHECK;
+
 /* Whole runs of an open-loop scenario, frames recorded, with and without --serial, in processes of
  * their own: per frame, start and end taken off (bench_open_loop.c). */
 bst_status bst_bench_open_loop(bst_ctx *ctx, const bst_bench *self,
