@@ -130,12 +130,13 @@ bst_status bst_loop_build_mount(bst_ctx *ctx, int type, const bst_mount_config *
         }
         /* what the axis turns about at zero angles is what it makes up for */
         bst_vec3 about = bst_mount_axis_body(type, k);
+        int camera_axis = fabs(about.x) > fabs(about.y) ? 0 : 1;
         const double *d = config->platform.drift_arcsec_per_s;
         double drift = (about.x * d[0] + about.y * d[1] + about.z * d[2]) / arcsec_px;
         bst_servo_response servo = {0};
         BST_TRY(respond(ctx, config, &axis->servo.mount, k, dt, &servo));
-        bst_status status = bst_loop_close_tracking(ctx, control, &servo, &config->platform, drift,
-                                                    options, model, axis);
+        bst_status status = bst_loop_close_tracking(ctx, control, &servo, &config->platform,
+                                                    camera_axis, drift, options, model, axis);
         free((double *)(uintptr_t)servo.step);
         BST_TRY(status);
     }

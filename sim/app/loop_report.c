@@ -64,6 +64,10 @@ void bst_loop_print(const bst_loop_model *model) {
             print_margins(&axis->servo.margins);
         }
     }
+    for (int b = 0; b < model->bodies; b++) {
+        printf("  body %s axis, attitude loop\n", model->body[b].name);
+        print_margins(&model->body[b].margins);
+    }
 }
 
 static void add_margins(cJSON *node, const bst_loop_margins *m) {
@@ -112,6 +116,15 @@ cJSON *bst_loop_json(const bst_loop_model *model) {
         }
         if (axis->servo.there) {
             add_margins(cJSON_AddObjectToObject(node, "servo"), &axis->servo.margins);
+        }
+    }
+    if (model->bodies > 0) {
+        cJSON *bodies = cJSON_AddArrayToObject(root, "body");
+        for (int b = 0; b < model->bodies; b++) {
+            cJSON *node = cJSON_CreateObject();
+            cJSON_AddItemToArray(bodies, node);
+            cJSON_AddStringToObject(node, "axis", model->body[b].name);
+            add_margins(node, &model->body[b].margins);
         }
     }
     if (model->compensator) {

@@ -181,6 +181,51 @@ class Margins(unittest.TestCase):
             print("| " + " | ".join(row) + " |", flush=True)
 
 
+PLATFORM = MODULES + "/gimbal/platform/"
+PREDICTED = {
+    "main scenario, observer": (300, 40, {
+        runs.SENSOR + "/observation_source": "generator", "/record/frames": "none"}),
+    "pi, jitter 1 px below 0.3 Hz": (120, 20, dict(FAST, **{
+        LAW: LOOPS["pi, 10 frames/s"][2], PLATFORM + "jitter_low_px_rms": 1,
+        PLATFORM + "jitter_low_cutoff_hz": 0.3, PLATFORM + "jitter_high_px_rms": 0.1,
+        PLATFORM + "drift_arcsec_per_s": [3, -4, 0]})),
+    "lead_lag, jitter 1 px below 0.1 Hz and 0.3 px above": (200, 40, dict(LATE, **{
+        LAW: LOOPS["lead_lag, 4 frames/s, late"][2], PLATFORM + "jitter_low_px_rms": 1,
+        PLATFORM + "jitter_low_cutoff_hz": 0.1, PLATFORM + "jitter_high_px_rms": 0.3,
+        PLATFORM + "drift_arcsec_per_s": [3, -4, 0]})),
+    "proportional, lag behind a drift of 5 arcsec/s": (60, 20, dict(FAST, **{
+        LAW: {"type": "pi", "proportional": 2}, PLATFORM + "jitter_low_px_rms": 0.5,
+        PLATFORM + "jitter_low_cutoff_hz": 0.3, PLATFORM + "drift_arcsec_per_s": [3, -4, 0]})),
+}
+
+
+class Prediction(unittest.TestCase):
+    """RMS pointing from the densities against simulated, radial: within 10 %."""
+
+    def check(self, name, seeds):
+        duration, settled, sets = PREDICTED[name]
+        predicted = loop(runs.TRACK, sets)["predicted_rms_radial_px"]
+        square = [rms(pointing(sets, duration, "--seed", hex(seed)), settled, duration)**2
+                  for seed in range(1, seeds + 1)]
+        simulated = math.sqrt(sum(square) / seeds)
+        if FULL:
+            print(f"| {name} | {predicted:.3f} | {simulated:.3f} | "
+                  f"{100 * (simulated / predicted - 1):+.1f} % |", flush=True)
+        self.assertLess(abs(simulated / predicted - 1), 0.10)
+
+    def test_lag(self):
+        self.check("proportional, lag behind a drift of 5 arcsec/s", 1)
+
+    def test_jitter(self):
+        self.check("pi, jitter 1 px below 0.3 Hz", 1)
+
+    @unittest.skipUnless(FULL, "slow")
+    def test_all(self):
+        for name in PREDICTED:
+            with self.subTest(case=name):
+                self.check(name, 8)
+
+
 class Shipped(unittest.TestCase):
     def test_margins(self):
         """Every loop that ships: gain margin 6 dB, phase margin 30 deg, sensitivity peak 2."""
@@ -194,9 +239,9 @@ class Shipped(unittest.TestCase):
                 self.assertIn("no sensor has a mount", result.stderr)
                 continue
             for sensor in json.loads(result.stdout)["sensors"]:
-                for axis in sensor["axes"]:
+                for axis in sensor["axes"] + sensor.get("body", []):
                     loops = ([axis] if "stable" in axis else []) + \
-                        [axis[key] for key in ("servo", "body") if key in axis]
+                        ([axis["servo"]] if "servo" in axis else [])
                     for one in loops:
                         with self.subTest(scenario=path, axis=axis["axis"]):
                             self.assertTrue(one["stable"])
