@@ -3,7 +3,16 @@
 #include "control/control.h"
 #include "control/modules.h"
 
-enum { PORT_TRACKS, PORT_POINTING, PORT_NAV, PORT_COMMAND, PORT_SENSOR, PORT_STATUS, PORT_COUNT };
+enum {
+    PORT_TRACKS,
+    PORT_POINTING,
+    PORT_NAV,
+    PORT_MOUNT,
+    PORT_COMMAND,
+    PORT_SENSOR,
+    PORT_STATUS,
+    PORT_COUNT
+};
 
 static const bst_port ports[PORT_COUNT] = {
     [PORT_TRACKS] = {.channel = BST_CHANNEL_TRACKS,
@@ -11,6 +20,9 @@ static const bst_port ports[PORT_COUNT] = {
                      .flags = BST_PORT_TRIGGER | BST_PORT_OPTIONAL},
     [PORT_POINTING] = {.channel = BST_CHANNEL_POINTING_TELEMETRY, .direction = BST_PORT_IN},
     [PORT_NAV] = {.channel = BST_CHANNEL_NAV_TELEMETRY, .direction = BST_PORT_IN},
+    [PORT_MOUNT] = {.channel = BST_CHANNEL_MOUNT_STATUS,
+                    .direction = BST_PORT_IN,
+                    .flags = BST_PORT_OPTIONAL},
     [PORT_COMMAND] = {.channel = BST_CHANNEL_LOS_COMMAND, .direction = BST_PORT_OUT},
     [PORT_SENSOR] = {.channel = BST_CHANNEL_SENSOR_COMMAND, .direction = BST_PORT_OUT},
     [PORT_STATUS] = {.channel = BST_CHANNEL_CONTROL_STATUS, .direction = BST_PORT_OUT},
@@ -29,6 +41,14 @@ static bst_status cue_at(void *user, bst_ctx *ctx, double seconds, bst_cue *out)
 static bst_status cue_direction_at(void *user, bst_ctx *ctx, double seconds, bool *valid,
                                    bst_vec3 *direction) {
     return bst_knowledge_cue_direction_at(ctx, user, seconds, valid, direction);
+}
+
+static bst_status cue_range_at(void *user, bst_ctx *ctx, double seconds, double *range_m) {
+    bool known;
+    double rate;
+    BST_TRY(bst_knowledge_cue_range_at(ctx, user, seconds, &known, range_m, &rate));
+    *range_m = known ? *range_m : 0.0;
+    return BST_OK;
 }
 
 static void destroy(void *self) {
@@ -59,6 +79,7 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
                                        .frame_latency_s = env->frame_latency_s,
                                        .cue_at = cue_at,
                                        .cue_direction_at = cue_direction_at,
+                                       .cue_range_at = cue_range_at,
                                        .cue_user = m->view};
         status = bst_control_init(env->ctx, &m->control, config, &control_env);
     }
@@ -81,6 +102,7 @@ static bst_status step(void *self, struct bst_step *s) {
     int64_t tick = bst_step_tick(s);
     bst_control_telemetry(c, bst_step_latest(s, PORT_POINTING).payload,
                           bst_step_latest(s, PORT_NAV).payload);
+    bst_guidance_telemetry(&c->guidance, bst_step_latest(s, PORT_MOUNT).payload);
     for (bst_sample next = bst_step_next(s, PORT_TRACKS); next.payload;
          next = bst_step_next(s, PORT_TRACKS)) {
         BST_TRY(bst_control_observe(ctx, c, tick, next.payload));
@@ -105,6 +127,12 @@ static bst_status step(void *self, struct bst_step *s) {
                        t->reason);
     }
     c->transition_count = 0;
+    for (int i = 0; i < c->guidance.event_count; i++) {
+        char text[160];
+        bst_guidance_describe(&c->guidance.events[i], text, sizeof text);
+        bst_step_event(s, "guidance", "%s", text);
+    }
+    c->guidance.event_count = 0;
     return BST_OK;
 }
 
