@@ -44,6 +44,25 @@ static bst_quat turned(bst_quat q, bst_vec3 r) {
     return bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(r, -1.0)), q);
 }
 
+/* The camera turned by small angles about its own x and y axes, its quaternion's length brought
+ * back to one. */
+static bst_quat shaken(bst_quat q, const double shake_rad[2]) {
+    double x = shake_rad[0], y = shake_rad[1], half2 = 0.25 * (x * x + y * y);
+    if (half2 < 1e-6) {
+        /* by the series, exact to rounding: the quaternion {-s x, -s y, 0, c} times q */
+        double s = 0.5 - half2 * (1.0 / 12.0), c = 1.0 - half2 * (0.5 - half2 * (1.0 / 24.0));
+        x *= -s;
+        y *= -s;
+        q = (bst_quat){c * q.x + x * q.w + y * q.z, c * q.y + y * q.w - x * q.z,
+                       c * q.z + x * q.y - y * q.x, c * q.w - x * q.x - y * q.y};
+    } else {
+        q = turned(q, (bst_vec3){x, y, 0.0});
+    }
+    double n2 = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w;
+    double scale = fabs(n2 - 1.0) < 1e-8 ? 1.5 - 0.5 * n2 : 1.0 / sqrt(n2);
+    return (bst_quat){scale * q.x, scale * q.y, scale * q.z, scale * q.w};
+}
+
 bst_status bst_platform_jitter_spectrum(bst_ctx *ctx, const bst_platform_config *config,
                                         double pixel_rad, bst_jitter_spectrum *out) {
     const double *band = config->jitter_high_band_hz;
@@ -133,8 +152,7 @@ bst_quat bst_platform_true_camera_between(bst_platform *platform, int64_t n, dou
         shake[0] += fraction * (next[0] - shake[0]);
         shake[1] += fraction * (next[1] - shake[1]);
     }
-    return bst_quat_unit(
-        turned(bst_quat_mul(q_cam_from_body, body), (bst_vec3){shake[0], shake[1], 0.0}));
+    return shaken(bst_quat_mul(q_cam_from_body, body), shake);
 }
 
 bst_quat bst_platform_measured_body(const bst_platform *platform, int64_t n) {

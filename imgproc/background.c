@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "imgproc/clipped.h"
 #include "imgproc/lanes.h"
 #include "imgproc/rows.h"
 
@@ -12,9 +13,15 @@ static const float QUANTISATION = 0.28867513f;
 
 enum {
     SAMPLE = 96,
+    LEFT_SHARE = 16,
     CLIP_PASSES = 4,
     MANY_PX = 4096 /* a mesh of so many pixels is known well enough from half of its rows */
 };
+
+/* a noise of fewer steps, and of more counted electrons over the cube of its deviation, is far from
+ * normal */
+static const float FEW_STEPS = 1.2f;
+static const double MUCH_SKEW = 0.4;
 
 /* agreement asked of opposite neighbours, standard errors */
 static const float AGREEMENT = 4.0f;
@@ -34,6 +41,8 @@ bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int m
     out->level = calloc(meshes, sizeof(float));
     out->noise = calloc(meshes, sizeof(float));
     out->error = calloc(meshes, sizeof(float));
+    out->left = calloc(meshes, sizeof(int));
+    out->read = calloc(meshes, sizeof(int));
     out->scratch = calloc(2 * meshes, sizeof(float));
     /* a mesh at the end may be half as long again */
     size_t height = (size_t)(mesh_px + mesh_px / 2 + 1);
@@ -41,7 +50,8 @@ bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int m
     out->band = band_stride(max_width) * height;
     out->lent = calloc(1, sizeof *out->lent);
     out->bands = calloc(out->band * (size_t)threads, sizeof(float));
-    if (!out->level || !out->noise || !out->error || !out->scratch || !out->bands || !out->lent) {
+    if (!out->level || !out->noise || !out->error || !out->left || !out->read || !out->scratch ||
+        !out->bands || !out->lent) {
         bst_background_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu background meshes", meshes);
     }
@@ -53,6 +63,8 @@ void bst_background_free(bst_background *b) {
     free(b->level);
     free(b->noise);
     free(b->error);
+    free(b->left);
+    free(b->read);
     free(b->scratch);
     free(b->bands);
     free(b->lent);
@@ -128,62 +140,100 @@ static bool first_guess(const mesh_pixels *m, float step_e, float *level, float 
     return true;
 }
 
-static bool estimate_mesh(const mesh_pixels *m, float step_e, float *level, float *noise,
-                          float *error) {
-    *error = 1.0f;
-    if (!first_guess(m, step_e, level, noise)) {
-        return false;
-    }
-    for (int pass = 0; pass < CLIP_PASSES; pass++) {
-        bst_row_sums sums = {0};
-        float limit = fmaxf(3.0f * *noise, 1.5f * step_e);
-        /* the first passes need not be exact */
-        int half = (m->height + 1) / 2, first = pass == 1 ? m->height - half : 0;
-        int rows = pass + 2 < CLIP_PASSES ? half : m->height;
-        bst_row_clipped_sums(m->pixels + (size_t)first * m->stride, m->width, rows, m->stride,
-                             *level, limit, &sums);
-        double n = 0.0, s = 0.0, q = 0.0;
-        for (int i = 0; i < BST_ROW_LANES; i++) {
-            n += (double)sums.count[i];
-            s += (double)sums.sum[i];
-            q += (double)sums.square[i];
-        }
-        if (n < 2.0) {
-            break;
-        }
-        double mean = s / n;
-        /* 0.97334 = 1 - 6 phi(3) / (2 Phi(3) - 1): variance of a normal cut at 3 sigma */
-        double variance = fmax(q - n * mean * mean, 0.0) / ((n - 1.0) * 0.97334);
-        *level += (float)mean;
-        *noise = fmaxf((float)sqrt(variance), QUANTISATION * step_e);
-        *error = (float)(1.0 / sqrt(n));
-    }
-    return true;
-}
-
-/* Level and noise of a sum of normal noise and counted electrons from the moments of what was left
- * within 3 sigma. To the second order of Edgeworth's series the clipped mean lies CLIPPED_MEAN
- * times the skewness (in sigma) off, and the clipped variance CLIPPED_EXCESS times the excess
- * kurtosis plus CLIPPED_SKEW times the squared skewness: integrals of He3 / 6, He4 / 24 and He6 /
- * 72 under the normal density from -3 to 3. */
-static void undo_clipping(double read_variance, float *level, float *noise) {
-    static const double CLIPPED_MEAN = -0.0400, CLIPPED_EXCESS = -0.0755, CLIPPED_SKEW = -0.0473;
-    double variance = (double)*noise * (double)*noise;
-    double counted = fmax(variance - read_variance, 0.0);
-    double skewness = fmin(counted / (variance * (double)*noise), 1.0);
-    double excess = fmin(counted / (variance * variance), 1.0);
-    *level -= (float)(CLIPPED_MEAN * skewness * (double)*noise);
-    *noise *=
-        (float)(1.0 / sqrt(1.0 + CLIPPED_EXCESS * excess + CLIPPED_SKEW * skewness * skewness));
-}
-
 typedef struct reading {
     bst_background *b;
     double read_variance;
     bst_pixel_fn pixels;
     const void *user;
     float step_e;
+    double origin_e; /* a digital value */
+    bool again;      /* a mesh may stay as it is */
 } reading;
+
+/* Sums over the pixels from low to high: their number, mean and variance. False for less than two.
+ */
+static bool inner_moments(const mesh_pixels *m, int first, int rows, float low, float high,
+                          double *count, double *mean, double *variance) {
+    bst_row_sums sums = {0};
+    float middle = 0.5f * (low + high);
+    bst_row_clipped_sums(m->pixels + (size_t)first * m->stride, m->width, rows, m->stride, middle,
+                         0.5f * (high - low), &sums);
+    double n = 0.0, s = 0.0, q = 0.0;
+    for (int i = 0; i < BST_ROW_LANES; i++) {
+        n += (double)sums.count[i];
+        s += (double)sums.sum[i];
+        q += (double)sums.square[i];
+    }
+    if (n < 2.0) {
+        return false;
+    }
+    *count = n;
+    *mean = (double)middle + s / n;
+    *variance = fmax(q - s * s / n, 0.0) / (n - 1.0);
+    return true;
+}
+
+/* Midway between two digital values. */
+static float between_steps(const reading *r, float value) {
+    double step = (double)r->step_e;
+    return (float)((floor(((double)value - r->origin_e) / step) + 0.5) * step + r->origin_e);
+}
+
+/* Edges about the level, further out where the series of the noise's law converges slowly: where it
+ * has few steps or counts few electrons. */
+static void last_edges(const reading *r, float level, float noise, float *low, float *high) {
+    double variance = (double)noise * (double)noise;
+    double counted = fmax(variance - r->read_variance, 0.0);
+    bool few = noise<FEW_STEPS * r->step_e, skew = counted> MUCH_SKEW * variance * (double)noise;
+    float limit = fmaxf((few ? 4.0f : skew ? 5.0f : 3.0f) * noise, 1.5f * r->step_e);
+    *low = between_steps(r, level - limit);
+    *high = between_steps(r, level + limit);
+}
+
+static bool estimate_mesh(const reading *r, const mesh_pixels *m, float *level, float *noise,
+                          float *error) {
+    float step_e = r->step_e;
+    *error = 1.0f;
+    if (!first_guess(m, step_e, level, noise)) {
+        return false;
+    }
+    for (int pass = 0; pass < CLIP_PASSES; pass++) {
+        bool last = pass + 1 == CLIP_PASSES;
+        float limit = fmaxf(3.0f * *noise, 1.5f * step_e);
+        float low = *level - limit, high = *level + limit;
+        if (last) {
+            last_edges(r, *level, *noise, &low, &high);
+        }
+        /* the first passes need not be exact */
+        int half = (m->height + 1) / 2, first = pass == 1 ? m->height - half : 0;
+        int rows = pass + 2 < CLIP_PASSES ? half : m->height;
+        double n, mean, variance, deviation = (double)*noise, centre = (double)*level;
+        if (!inner_moments(m, first, rows, low, high, &n, &mean, &variance)) {
+            break;
+        }
+        if (last) {
+            bst_clipped_noise law = {r->read_variance, (double)step_e};
+            bst_clipped_solve(&law, (double)low, (double)high, mean, variance, &centre, &deviation);
+            mean = centre;
+        } else {
+            /* 0.97334 = 1 - 6 phi(3) / (2 Phi(3) - 1): variance of a normal cut at 3 sigma */
+            deviation = sqrt(variance / 0.97334);
+        }
+        *level = (float)mean;
+        *noise = fmaxf((float)deviation, QUANTISATION * step_e);
+        *error = (float)(1.0 / sqrt(n));
+    }
+    return true;
+}
+
+/* Pixels of a mesh that are measurements. */
+static int count_left(const mesh_pixels *m) {
+    int left = 0;
+    for (int y = 0; y < m->height; y++) {
+        left += bst_row_good(m->pixels + (size_t)y * m->stride, m->width);
+    }
+    return left;
+}
 
 /* Meshes of rows begin to end. */
 static void read_rows(void *user, int begin, int end) {
@@ -207,9 +257,14 @@ static void read_rows(void *user, int begin, int end) {
             int x0 = i * b->mesh_px, x1 = i + 1 == b->columns ? b->width : x0 + b->mesh_px;
             int k = j * b->columns + i;
             mesh_pixels m = {band + x0, stride, x1 - x0, rows};
-            if (estimate_mesh(&m, r->step_e, &b->level[k], &b->noise[k], &b->error[k])) {
-                undo_clipping(r->read_variance, &b->level[k], &b->noise[k]);
-            } else {
+            if (r->again) {
+                b->left[k] = count_left(&m);
+                b->read[k] = m.width * m.height;
+                if (b->left[k] * LEFT_SHARE < b->read[k]) {
+                    continue;
+                }
+            }
+            if (!estimate_mesh(r, &m, &b->level[k], &b->noise[k], &b->error[k])) {
                 b->noise[k] = -1.0f;
             }
         }
@@ -272,8 +327,18 @@ static void take_slope_off(bst_background *b) {
 
 static void fill_gaps(bst_background *b, float step_e);
 
+static void read_meshes(bst_background *b, bst_parallel *pool, const reading *r) {
+    /* a small frame is done before another thread wakes */
+    int grain = 65536 / (b->width * b->mesh_px) + 1;
+    bst_parallel_for(pool, b->rows, grain, read_rows, (void *)r);
+    fill_gaps(b, r->step_e);
+    smooth(b, b->level, false);
+    take_slope_off(b);
+    smooth(b, b->noise, true);
+}
+
 void bst_background_read(bst_background *b, bst_parallel *pool, bst_pixel_fn pixels,
-                         const void *user, int width, int height, float step_e,
+                         const void *user, int width, int height, const bst_background_steps *steps,
                          double read_variance_e2) {
     b->width = width;
     b->height = height;
@@ -281,14 +346,21 @@ void bst_background_read(bst_background *b, bst_parallel *pool, bst_pixel_fn pix
     int half = b->mesh_px / 2;
     b->columns = (width + half) / b->mesh_px > 0 ? (width + half) / b->mesh_px : 1;
     b->rows = (height + half) / b->mesh_px > 0 ? (height + half) / b->mesh_px : 1;
-    reading r = {b, read_variance_e2, pixels, user, step_e};
-    /* a small frame is done before another thread wakes */
-    int grain = 65536 / (width * b->mesh_px) + 1;
-    bst_parallel_for(pool, b->rows, grain, read_rows, &r);
-    fill_gaps(b, step_e);
-    smooth(b, b->level, false);
-    take_slope_off(b);
-    smooth(b, b->noise, true);
+    reading r = {b, read_variance_e2, pixels, user, (float)steps->step_e, steps->origin_e, false};
+    read_meshes(b, pool, &r);
+}
+
+double bst_background_read_again(bst_background *b, bst_parallel *pool, bst_pixel_fn pixels,
+                                 const void *user, const bst_background_steps *steps,
+                                 double read_variance_e2) {
+    reading r = {b, read_variance_e2, pixels, user, (float)steps->step_e, steps->origin_e, true};
+    read_meshes(b, pool, &r);
+    double left = 0.0, read = 0.0;
+    for (int k = 0; k < b->columns * b->rows; k++) {
+        left += b->left[k];
+        read += b->read[k];
+    }
+    return left / read;
 }
 
 typedef struct picture {
@@ -304,7 +376,8 @@ static void of_picture(const void *user, int y, int x, int count, float *out) {
 void bst_background_estimate(bst_background *b, const float *image, int width, int height,
                              float step_e) {
     picture p = {image, width};
-    bst_background_read(b, NULL, of_picture, &p, width, height, step_e, INFINITY);
+    bst_background_steps steps = {(double)step_e, 0.0};
+    bst_background_read(b, NULL, of_picture, &p, width, height, &steps, INFINITY);
 }
 
 /* Medians of the frame, which also stand for meshes without usable pixels. */

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "imgproc/bad_map.h"
+#include "imgproc/electrons.h"
 #include "imgproc/imgproc.h"
 #include "imgproc/locate.h"
 #include "imgproc/rows.h"
@@ -21,6 +22,11 @@ static const double JITTER_BEND = 0.075;
 static const double DRIFT_PX = 1.0;
 /* Share of a measured or told bend that may be no bend. */
 static const double BEND_LEFT = 0.05;
+/* In a crowd light is what the filter says so much of; what it says is little there, since noise is
+ * told too high. */
+static const float STAR_SNR = 3.0f;
+/* Share of a crowded frame that is taken for open sky at the least. */
+static const double LEAST_OPEN = 0.02;
 /* Above the threshold by this no skewness of noise matters. */
 static const double CERTAIN_ABOVE = 1.5;
 
@@ -133,69 +139,44 @@ void bst_imgproc_free(bst_imgproc *ip) {
     free(ip);
 }
 
-/* Dark, flat and bad pixels of part of a binned row, from the full-sensor maps. */
-static void correct(const bst_imgproc *ip, const bst_imgproc_frame *frame, int y, int first,
-                    int count, float *out) {
-    int b = frame->binning;
-    size_t stride = (size_t)ip->camera.width_px;
-    float share = 1.0f / (float)(b * b);
-    for (int x = 0; x < count; x++) {
-        float dark = 0.0f, flat = 0.0f;
-        bool bad = false;
-        for (int j = 0; j < b; j++) {
-            size_t k = (size_t)(frame->window.y0 + y * b + j) * stride +
-                       (size_t)(frame->window.x0 + (first + x) * b);
-            for (int i = 0; i < b; i++, k++) {
-                dark += ip->maps.dark_e_per_s ? ip->maps.dark_e_per_s[k] : 0.0f;
-                flat += ip->maps.flat ? ip->maps.flat[k] : 1.0f;
-                bad = bad || (ip->bad && ip->bad[k]);
-            }
-        }
-        bad = bad || !(flat > 0.0f);
-        out[x] = bad ? BST_PIXEL_BAD : (out[x] - dark * (float)frame->exposure_s) / (flat * share);
-    }
-}
+typedef struct sparing_reader {
+    bst_electrons read;
+    const bst_filter *filter;
+} sparing_reader;
 
-typedef struct reader {
-    const bst_imgproc *ip;
-    const bst_imgproc_frame *frame;
-    int width;
-} reader;
-
-static void read_electrons(const void *user, int y, int x, int count, float *out) {
-    const reader *r = user;
-    const bst_imgproc *ip = r->ip;
-    const uint16_t *raw = r->frame->pixels + (size_t)y * (size_t)r->width + (size_t)x;
-    bst_row_electrons(raw, count, (float)ip->camera.offset_dn, (float)ip->camera.gain_e_per_dn,
-                      out);
-    if (ip->maps.dark_e_per_s || ip->maps.flat || ip->bad) {
-        correct(ip, r->frame, y, x, count, out);
-    }
+/* Without the stars that the filter found. */
+static void read_between_stars(const void *user, int y, int x, int count, float *out) {
+    const sparing_reader *r = user;
+    bst_electrons_read(&r->read, y, x, count, out);
+    bst_filter_mask(r->filter, y, x, count, STAR_SNR, out);
 }
 
 /* What tells noise from a source. */
 typedef struct judge {
     const bst_imgproc *ip;
     double threshold;
-    double read_variance; /* of a pixel's noise that is normal, e-^2 */
+    double normal_variance; /* of a pixel's noise that is not counted electrons, e-^2 */
 } judge;
 
-/* A maximum counts when the output between the pixels exceeds what noise of this skewness exceeds
- * as rarely as normal noise the threshold. */
+static bool exceeds(double peak, const judge *g, const bst_tail_weights *weights,
+                    const bst_tail_noise *noise) {
+    return peak > g->threshold && peak > bst_tail_quantile(g->threshold, weights, noise);
+}
+
+/* A maximum counts when the output between the pixels exceeds what the noise there exceeds as
+ * rarely as normal noise the threshold. */
 static bool stands_out(const void *user, const bst_candidate *c) {
     const judge *g = user;
     const bst_filter *f = &g->ip->filter;
-    double noise = bst_background_noise_at(&g->ip->background, c->x, c->y);
-    double counted = fmax(noise * noise - g->read_variance, 0.0);
-    /* cumulants of the electrons that were counted, over the pixel's noise */
-    double skewness = counted / (noise * noise * noise), excess = skewness / noise;
-    if (bst_filter_peak(f, g->ip->electrons, noise, false, c->x, c->y) >
-        bst_tail_quantile(g->threshold, skewness * f->point_cubes, excess * f->point_fourths)) {
+    double noise_e = bst_background_noise_at(&g->ip->background, c->x, c->y);
+    bst_tail_noise noise = {noise_e, fmax(noise_e * noise_e - g->normal_variance, 0.0),
+                            g->ip->camera.gain_e_per_dn};
+    double point = bst_filter_peak(f, g->ip->electrons, noise_e, false, c->x, c->y);
+    if (exceeds(point, g, &f->point_weights, &noise)) {
         return true;
     }
-    return f->streak && bst_filter_peak(f, g->ip->electrons, noise, true, c->x, c->y) >
-                            bst_tail_quantile(g->threshold, skewness * f->streak_cubes,
-                                              excess * f->streak_fourths);
+    return f->streak && exceeds(bst_filter_peak(f, g->ip->electrons, noise_e, true, c->x, c->y), g,
+                                &f->streak_weights, &noise);
 }
 
 /* The digital number from which a pixel no longer measures: the converter's end or the full well.
@@ -333,6 +314,11 @@ static bst_detection report(const bst_imgproc *ip, const bst_locate_frame *f,
     return d;
 }
 
+/* The output from which maxima are looked at in between the pixels. */
+static double look_from(const bst_imgproc *ip, double threshold) {
+    return ip->smeared ? threshold : fmax(0.93 * ip->filter.corner, LOOK_SHARE) * threshold;
+}
+
 /* How a frame, or a window of one, was searched. */
 typedef struct part {
     double threshold, false_alarms;
@@ -350,11 +336,13 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
     ip->exposure_s = frame->exposure_s;
     ip->binning = frame->binning;
 
-    reader read = {ip, frame, width};
+    sparing_reader sparing = {{&ip->camera, &ip->maps, ip->bad, frame}, &ip->filter};
+    const bst_electrons *read = &sparing.read;
     double gain = ip->camera.gain_e_per_dn, read_noise = ip->camera.read_noise_e;
     double read_variance = read_noise * read_noise + gain * gain / 12.0;
-    bst_background_read(&ip->background, pool, read_electrons, &read, width, height,
-                        (float)ip->camera.gain_e_per_dn, read_variance);
+    bst_background_steps steps = {gain, -ip->camera.offset_dn * gain};
+    bst_background_read(&ip->background, pool, bst_electrons_read, read, width, height, &steps,
+                        read_noise * read_noise);
     double dx, dy;
     filter_path(ip, whole, motion, &dx, &dy);
     ip->streak_px = hypot(dx, dy) * frame->binning;
@@ -366,9 +354,19 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
                     (double)(whole->window.height / whole->binning);
     double false_alarms = (search ? 0.5 : 1.0) * ip->config.false_alarms_per_frame;
     double threshold = bst_filter_threshold(&ip->filter, false_alarms, pixels);
-    double look = ip->smeared ? threshold : fmax(0.93 * ip->filter.corner, LOOK_SHARE) * threshold;
-    bst_filter_run(&ip->filter, pool, &ip->background, read_electrons, &read, frame->pixels,
-                   ip->electrons, width, height, saturation_dn(ip, frame), (float)look);
+    int saturated_dn = saturation_dn(ip, frame);
+    bst_filter_run(&ip->filter, pool, &ip->background, bst_electrons_read, read, frame->pixels,
+                   ip->electrons, width, height, saturated_dn, (float)look_from(ip, threshold));
+    if (ip->filter.crowded && !ip->smeared) {
+        double share = bst_background_read_again(&ip->background, pool, read_between_stars,
+                                                 &sparing, &steps, read_noise * read_noise);
+        /* where there are stars noise makes no detections of its own */
+        pixels *= fmax(share, LEAST_OPEN);
+        threshold = bst_filter_threshold(&ip->filter, false_alarms, pixels);
+        bst_filter_run(&ip->filter, pool, &ip->background, bst_electrons_read, read, frame->pixels,
+                       ip->electrons, width, height, saturated_dn, (float)look_from(ip, threshold));
+    }
+    double look = look_from(ip, threshold);
     judge noise = {ip, threshold, read_variance};
     double certain = ip->smeared ? threshold : threshold + CERTAIN_ABOVE;
     bst_candidates_find(&ip->candidates, pool, &ip->filter,

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "imgproc/rows.h"
-#include "imgproc/tail.h"
 #include "sim/core/pages.h"
 
 enum {
@@ -111,12 +110,20 @@ static void axis_shares(double sigma_px, double shift, int radius, double *out) 
     }
 }
 
-/* Density of maxima, cubes and fourth powers for the point, and the shifted kernels. The gradient's
+static void add_powers(double k, double *powers) {
+    double power = k * k;
+    for (int i = 0; i < BST_TAIL_POWERS; i++) {
+        power *= k;
+        powers[i] += power;
+    }
+}
+
+/* Density of maxima and sums of powers for the point, and the shifted kernels. The gradient's
  * covariance is that of unit-norm kernels by shift, averaged over the phases. */
 static void describe_point(bst_filter *f, double sigma_px) {
     enum { SIZE = 2 * BST_FILTER_MAX_RADIUS + 3 };
     int n = 2 * f->radius + 3;
-    double roughness = 0.0, cubes = 0.0, fourths = 0.0;
+    double roughness = 0.0, powers[BST_TAIL_POWERS] = {0.0};
     for (int p = 0; p < BST_FILTER_PHASES; p++) {
         double here[SIZE], before[SIZE], after[SIZE], h = 1e-3, squares[3] = {0}, metric = 0.0;
         double shift = -0.5 + (double)p / (BST_FILTER_PHASES - 1);
@@ -132,8 +139,7 @@ static void describe_point(bst_filter *f, double sigma_px) {
             double slope = (after[i] / sqrt(squares[2]) - before[i] / sqrt(squares[0])) / (2.0 * h);
             double k = here[i] / sqrt(squares[1]);
             metric += slope * slope;
-            cubes += k * k * k / BST_FILTER_PHASES;
-            fourths += k * k * k * k / BST_FILTER_PHASES;
+            add_powers(k, powers);
             f->phase[p][i] = (float)k;
         }
         /* the two ends are one phase */
@@ -146,12 +152,14 @@ static void describe_point(bst_filter *f, double sigma_px) {
     }
     f->corner = half * half;
     f->point_density = roughness; /* sqrt of the product over both axes, which are alike */
-    f->point_cubes = cubes * cubes;
-    f->point_fourths = fourths * fourths;
+    for (int i = 0; i < BST_TAIL_POWERS; i++) {
+        double one_axis = powers[i] / BST_FILTER_PHASES;
+        f->point_weights.power[i] = one_axis * one_axis;
+    }
 }
 
 /* The same for the streak: the gradient's covariance from its correlations at lags of a pixel,
- * whose logarithm is quadratic near 0, cubes and fourth powers from its kernel's values. */
+ * whose logarithm is quadratic near 0, sums of powers from its kernel's values. */
 static void describe_streak(bst_filter *f) {
     double r[3][3];
     for (int j = -1; j <= 1; j++) {
@@ -162,13 +170,13 @@ static void describe_streak(bst_filter *f) {
     double lxx = -2.0 * log(fmax(r[1][2], 1e-6)), lyy = -2.0 * log(fmax(r[2][1], 1e-6));
     double lxy = -0.5 * (log(fmax(r[2][2], 1e-6)) - log(fmax(r[2][0], 1e-6)));
     f->streak_density = sqrt(fmax(lxx * lyy - lxy * lxy, 1e-8));
-    /* cubes and fourth powers of the kernel: from its values at whole pixels */
+    /* the kernel's values at whole pixels */
     int reach_x = 0, reach_y = 0;
     for (int t = 0; t < f->taps; t++) {
         reach_x = abs(f->tap_x[t]) > reach_x ? abs(f->tap_x[t]) : reach_x;
         reach_y = abs(f->tap_y[t]) > reach_y ? abs(f->tap_y[t]) : reach_y;
     }
-    f->streak_cubes = f->streak_fourths = 0.0;
+    f->streak_weights = (bst_tail_weights){{0.0}};
     for (int y = -reach_y - f->radius; y <= reach_y + f->radius; y++) {
         for (int x = -reach_x - f->radius; x <= reach_x + f->radius; x++) {
             double k = 0.0;
@@ -179,8 +187,7 @@ static void describe_streak(bst_filter *f) {
                          (double)f->kernel[v + f->radius];
                 }
             }
-            f->streak_cubes += k * k * k;
-            f->streak_fourths += k * k * k * k;
+            add_powers(k, f->streak_weights.power);
         }
     }
 }
@@ -258,6 +265,10 @@ void bst_filter_set(bst_filter *f, double sigma_px, double dx_px, double dy_px) 
     }
 }
 
+/* Share of a smooth field's maxima above a threshold that a parabola through five shifts sees above
+ * it: nine see 1.7 % more, in 2,000 maxima. */
+static const double SEEN = 0.97;
+
 double bst_filter_threshold(bst_filter *f, double false_alarms, double pixels) {
     if (f->threshold > 0.0 && f->threshold_density == false_alarms / pixels) {
         return f->threshold;
@@ -269,7 +280,7 @@ double bst_filter_threshold(bst_filter *f, double false_alarms, double pixels) {
         if (f->streak) {
             rate += bst_tail_maxima(u, f->streak_density) * (1.0 - bst_tail_both(u, u, f->overlap));
         }
-        if (rate * pixels > false_alarms) {
+        if (SEEN * rate * pixels > false_alarms) {
             lo = u;
         } else {
             hi = u;
@@ -560,4 +571,15 @@ float bst_filter_streak_at(const bst_filter *f, int x, int y) {
         sum += f->tap_weight[t] * bst_filter_point_at(f, x + f->tap_x[t], y + f->tap_y[t]);
     }
     return sum;
+}
+
+void bst_filter_mask(const bst_filter *f, int y, int x, int count, float snr, float *out) {
+    /* the map's margin is zero */
+    const float *map = f->streak ? f->best : f->point;
+    const float *rows[2 * BST_ROW_NEAR + 1];
+    for (int j = -BST_ROW_NEAR; j <= BST_ROW_NEAR; j++) {
+        int v = y + j < 0 ? 0 : y + j < f->height ? y + j : f->height - 1;
+        rows[j + BST_ROW_NEAR] = map + (long)(v + f->pad) * f->stride + f->pad + x;
+    }
+    bst_row_mask(rows, count, snr, out);
 }

@@ -6,6 +6,7 @@
 #include <stdint.h>
 
 #include "imgproc/background.h"
+#include "imgproc/tail.h"
 
 enum {
     BST_FILTER_MAX_RADIUS = 24,
@@ -43,10 +44,10 @@ typedef struct bst_filter {
     float tap_weight[BST_FILTER_MAX_TAPS];
     double streak_norm; /* as norm, for the streak */
     double overlap;     /* correlation of both outputs at one place */
-    /* of the kernels with unit norm: sums of cubes and fourth powers, and the expected density of
-     * maxima (see bst_filter_threshold) */
-    double point_cubes, point_fourths, point_density;
-    double streak_cubes, streak_fourths, streak_density;
+    /* of the kernels with unit norm: sums of powers, and the expected density of maxima (see
+     * bst_filter_threshold) */
+    bst_tail_weights point_weights, streak_weights;
+    double point_density, streak_density;
     double corner; /* output for a point between four pixels at one of them, over its greatest */
     double threshold, threshold_density; /* the latest, and the false alarms per pixel of it */
     double made_sigma, made_dx, made_dy; /* what the kernels were made for */
@@ -77,6 +78,11 @@ double bst_filter_threshold(bst_filter *filter, double false_alarms, double pixe
 void bst_filter_run(bst_filter *filter, bst_parallel *pool, const bst_background *background,
                     bst_pixel_fn read, const void *user, const uint16_t *raw, float *signal,
                     int width, int height, int saturated_dn, float threshold);
+
+/* Sets to BST_PIXEL_BAD those of the `count` pixels of row y from column x on that lie within two
+ * rows and columns of one where the greater output of the latest frame is above `snr`. Only when a
+ * map of it is kept (filter->crowded). */
+void bst_filter_mask(const bst_filter *filter, int y, int x, int count, float snr, float *out);
 
 /* The greatest output within about half a pixel of (x, y) in between the pixels: for a point
  * by kernels shifted in steps of 1/4 px and a parabola through the best, on signal with the noise

@@ -71,7 +71,8 @@ void bst_imgproc_free(bst_imgproc *ip);
  * Steps: artefact correction; electrons; background and noise by mesh (clipped mean and standard
  * deviation); two matched filters, for points and for the streak that stars draw when the camera
  * moves by `motion` (NULL: at rest), both normalised to unit noise; maxima of the greater of the
- * two, looked for between the pixels, against a threshold that counts with the noise's skewness;
+ * two, looked for between the pixels, against a threshold that counts with the noise's tail; in a
+ * crowded frame all that again with background and noise of what lies between the maxima;
  * of maxima that no saddle parts the highest; weighted least-squares fit of the pixel-integrated
  * Gaussian or streak, close neighbours together (none when bst_imgproc_smeared). The greater of two
  * matched-filter outputs is the generalised likelihood ratio test between both shapes (Kay,

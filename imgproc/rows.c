@@ -76,6 +76,15 @@ void bst_row_clipped_sums(const float *restrict pixels, int width, int height, s
     }
 }
 
+ROW_FUNCTION
+int bst_row_good(const float *pixels, int count) {
+    int good = 0;
+    for (int x = 0; x < count; x++) {
+        good += pixels[x] > BST_PIXEL_NONE;
+    }
+    return good;
+}
+
 /* The first half of a float as a number that is greater where the float is. */
 static inline int16_t key_of(float value) {
     int32_t bits;
@@ -446,5 +455,29 @@ ROW_FUNCTION
 void bst_row_scale(float *restrict out, const float *restrict by, float factor, int count) {
     for (int x = 0; x < count; x++) {
         out[x] *= by[x] * factor;
+    }
+}
+
+ROW_FUNCTION
+void bst_row_mask(const float *const *rows, int count, float limit, float *restrict out) {
+    enum { BLOCK = 256 };
+    const float *restrict a = rows[0], *restrict b = rows[1], *restrict c = rows[2],
+                          *restrict d = rows[3], *restrict e = rows[4];
+    for (int first = 0; first < count; first += BLOCK) {
+        float top[BLOCK + 2 * BST_ROW_NEAR];
+        int n = count - first < BLOCK ? count - first : BLOCK, at = first - BST_ROW_NEAR;
+        for (int x = 0; x < n + 2 * BST_ROW_NEAR; x++) {
+            float u = a[at + x] > b[at + x] ? a[at + x] : b[at + x];
+            float v = c[at + x] > d[at + x] ? c[at + x] : d[at + x];
+            u = u > v ? u : v;
+            top[x] = u > e[at + x] ? u : e[at + x];
+        }
+        for (int x = 0; x < n; x++) {
+            float u = top[x] > top[x + 1] ? top[x] : top[x + 1];
+            float v = top[x + 2] > top[x + 3] ? top[x + 2] : top[x + 3];
+            u = u > v ? u : v;
+            u = u > top[x + 4] ? u : top[x + 4];
+            out[first + x] = u > limit ? BST_PIXEL_BAD : out[first + x];
+        }
     }
 }

@@ -20,6 +20,9 @@ typedef struct bst_row_sums {
 void bst_row_clipped_sums(const float *pixels, int width, int height, size_t stride, float level,
                           float limit, bst_row_sums *sums);
 
+/* How many are measurements (not below BST_PIXEL_NONE). */
+int bst_row_good(const float *pixels, int count);
+
 /* The value at count / 2 of up to BST_ROW_MEDIAN in ascending order, to 1/256 of itself. */
 float bst_row_median(const float *values, int count);
 
@@ -72,6 +75,12 @@ void bst_row_streak(float *out, float *copy, int count, const float *const *in, 
  * the threshold. */
 int bst_row_maxima(const float *above, const float *row, const float *below, int count,
                    float threshold, int32_t *x, float *value);
+
+/* Sets out[x] to BST_PIXEL_BAD where one of the elements of the 2 BST_ROW_NEAR + 1 rows that are no
+ * further than BST_ROW_NEAR from column x is above the limit. On either side of each row as many
+ * more floats are read. */
+enum { BST_ROW_NEAR = 2 };
+void bst_row_mask(const float *const *rows, int count, float limit, float *out);
 
 /* out *= by */
 void bst_row_scale(float *out, const float *by, float factor, int count);

@@ -29,8 +29,41 @@ double bst_tail_both(double u, double v, double rho) {
     return sum / total;
 }
 
-double bst_tail_quantile(double u, double skewness, double excess) {
-    double square = u * u;
-    return u + skewness * (square - 1.0) / 6.0 + excess * u * (square - 3.0) / 24.0 -
-           skewness * skewness * u * (2.0 * square - 5.0) / 36.0;
+/* Cumulant generating function with its first two derivatives; its variance is 1. */
+static void generate(const double *cumulant, double t, double out[3]) {
+    double term = t; /* t^(n-1) / (n-1)! */
+    out[0] = 0.5 * t * t;
+    out[1] = t;
+    out[2] = 1.0;
+    for (int i = 0; i < BST_TAIL_POWERS; i++) {
+        int n = i + 3;
+        double before = term;
+        term *= t / (n - 1);
+        out[2] += cumulant[i] * before;
+        out[1] += cumulant[i] * term;
+        out[0] += cumulant[i] * term * t / n;
+    }
+}
+
+double bst_tail_quantile(double u, const bst_tail_weights *weights, const bst_tail_noise *noise) {
+    enum { PASSES = 5 };
+    double cumulant[BST_TAIL_POWERS], step = noise->step_e / noise->noise_e, k[3];
+    double scale = noise->counted_e2 / (noise->noise_e * noise->noise_e);
+    for (int i = 0; i < BST_TAIL_POWERS; i++) {
+        scale /= noise->noise_e;
+        cumulant[i] = scale * weights->power[i];
+    }
+    /* of an even distribution as wide as a step: -B_n / n step^n with Bernoulli's numbers */
+    double square = step * step;
+    cumulant[1] -= square * square / 120.0 * weights->power[1];
+    cumulant[3] += square * square * square / 252.0 * weights->power[3];
+    double t = u;
+    for (int i = 0; i < PASSES; i++) {
+        generate(cumulant, t, k);
+        double w = sqrt(2.0 * (t * k[1] - k[0]));
+        t -= (w + log(t * sqrt(k[2]) / w) / w - u) * w / (t * k[2]);
+        t = t < 0.2 * u ? 0.2 * u : t;
+    }
+    generate(cumulant, t, k);
+    return k[1];
 }

@@ -9,8 +9,22 @@ double bst_tail_maxima(double u, double density);
 /* P(Y > v | X > u) for unit normals of correlation rho. */
 double bst_tail_both(double u, double v, double rho);
 
-/* The value that a sum with this skewness and excess kurtosis, of unit variance, exceeds as often
- * as a normal one exceeds u (Cornish and Fisher 1938: to the second order). */
-double bst_tail_quantile(double u, double skewness, double excess);
+/* A weighted sum of independent pixels, of unit variance: its sums of powers of the weights, from
+ * the third on. */
+enum { BST_TAIL_POWERS = 22 };
+typedef struct bst_tail_weights {
+    double power[BST_TAIL_POWERS];
+} bst_tail_weights;
+
+/* A pixel's noise: normal, counted electrons, digital steps. */
+typedef struct bst_tail_noise {
+    double noise_e, counted_e2, step_e; /* all of it; variance of the electrons counted; a step */
+} bst_tail_noise;
+
+/* The value that the sum exceeds as often as a normal one exceeds u > 0, by the saddlepoint of its
+ * cumulant generating function (Lugannani and Rice, Advances in Applied Probability 12, 1980;
+ * Barndorff-Nielsen's r*): the function's series has the cumulants of the Poisson distribution and
+ * of even steps times the sums of powers. */
+double bst_tail_quantile(double u, const bst_tail_weights *weights, const bst_tail_noise *noise);
 
 #endif

@@ -131,7 +131,11 @@ static bst_status read_list(const reader *r, const cJSON *value, const char *pat
                         "%s: %s: wrong number of elements (found %s; allowed: %s)", r->file, path,
                         found, allowed);
     }
-    char *items = calloc((size_t)(count ? count : 1), d->item_bytes);
+    if (count == 0) {
+        *out = (bst_config_list){NULL, 0};
+        return BST_OK;
+    }
+    char *items = calloc((size_t)count, d->item_bytes);
     if (!items) {
         return bst_fail(r->ctx, BST_ERR_MEMORY, "%s: %s: out of memory", r->file, path);
     }

@@ -24,8 +24,8 @@ typedef enum bst_config_type {
     BST_CONFIG_RAW,     /* not stored: checked elsewhere (module blocks) */
 } bst_config_type;
 
-/* Where a LIST lands: `items` is one allocation of count * item_bytes, owned by the config object.
- */
+/* Where a LIST lands: `items` is one allocation of count * item_bytes, owned by the config object,
+ * NULL when it is empty. */
 typedef struct bst_config_list {
     void *items;
     int count;

@@ -135,6 +135,7 @@ static void a_slow_and_a_fast_target_are_followed(void **state) {
             /* friction at these rates, encoder of 0.05 arcsec: 0.1 px of 10 arcsec at the most */
             assert_true(worst < 1.0 * BST_ARCSEC_RAD);
             assert_true(m.settled);
+            assert_true(m.joints.events < 100000);
             make(&m, type, &config);
             chase fast = {bst_vec3_unit((bst_vec3){-0.3, -0.4, 1.0}),
                           bst_vec3_unit((bst_vec3){-1, 1, 0.2}), 2.0 * BST_DEG_RAD};
@@ -309,6 +310,110 @@ static void a_turning_body_is_undone(void **state) {
     assert_true(worst < 1.0 * BST_ARCSEC_RAD);
 }
 
+/* A free body carries a mount that slews: body and mount together keep their angular momentum, in
+ * both geometries, and the body recoils. */
+static void a_slew_turns_a_free_body_back(void **state) {
+    (void)state;
+    for (int type = 0; type < 2; type++) {
+        bst_mount_config config = default_config();
+        config.third_axis = true;
+        config.flexible.frequency_hz[1] = 40.0;
+        bst_mount m;
+        make(&m, type, &config);
+        m.want_reaction = true;
+        const double j[3] = {20.0, 30.0, 25.0};
+        bst_vec3 rate = {1e-3, -2e-3, 1.5e-3}, before = rate, first = {0, 0, 0};
+        bst_vec3 mount_before = {0, 0, 0};
+        bst_quat q = BST_QUAT_IDENTITY, q_before = q;
+        double worst = 0.0, recoil = 0.0;
+        for (int n = 0; n < 15000; n++) {
+            bst_mount_body body = {
+                .rate_radps = rate, .q_believed_from_gcrf = q, .believed_rate_radps = rate};
+            bst_vec3 aim = n < 5000 ? (bst_vec3){0.3, 0.4, 1.0} : (bst_vec3){-0.4, 0.2, 0.8};
+            bst_los_command k = {.direction_gcrf = bst_vec3_unit(aim)};
+            bst_mount_step(&m, &body, &k, 0.0, false);
+            /* the body's momentum now holds the reactions up to the step before, so that it belongs
+             * to the mount's of then */
+            bst_vec3 h = {j[0] * rate.x, j[1] * rate.y, j[2] * rate.z};
+            bst_vec3 total = bst_vec3_add(bst_quat_rotate(bst_quat_conj(q), h),
+                                          bst_quat_rotate(bst_quat_conj(q_before), mount_before));
+            if (n == 1) {
+                first = total;
+            } else if (n > 1) {
+                worst = fmax(worst, bst_vec3_norm(bst_vec3_sub(total, first)));
+                recoil = fmax(recoil, bst_vec3_norm(bst_vec3_sub(rate, before)));
+            }
+            mount_before = bst_mount_swap(
+                type, bst_chain_momentum(&m.joints.chain, &m.joints.state, m.base_rate_radps));
+            q_before = q;
+            bst_vec3 old = rate, mid = rate;
+            for (int i = 0; i < 4; i++) { /* midpoint rule of J dw/dt = torque - w x J w */
+                bst_vec3 hm = {j[0] * mid.x, j[1] * mid.y, j[2] * mid.z};
+                bst_vec3 t = bst_vec3_sub(m.reaction_nm, bst_vec3_cross(mid, hm));
+                rate = (bst_vec3){old.x + DT * t.x / j[0], old.y + DT * t.y / j[1],
+                                  old.z + DT * t.z / j[2]};
+                mid = bst_vec3_scale(bst_vec3_add(old, rate), 0.5);
+            }
+            q = bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(mid, -DT)), q));
+        }
+        assert_true(recoil > 1e-3);
+        /* of 0.1 N m s; second order in the step, worst while friction lets go within one */
+        assert_true(worst < 1e-6);
+        /* on the target all the same */
+        bst_vec3 d = bst_quat_rotate(q_before, bst_vec3_unit((bst_vec3){-0.4, 0.2, 0.8}));
+        assert_true(bst_vec3_angle(boresight(m.q_cam_from_body), d) < 1.0 * BST_ARCSEC_RAD);
+    }
+}
+
+/* Directions drawn anew every 0.7 s, the poles and the way straight back among them, with no, usual
+ * and huge friction, weak motors, soft and hard stops: all stays within its limits. */
+static void nothing_diverges(void **state) {
+    (void)state;
+    bst_rng_key key = {{9, 9}};
+    for (int hard = 0; hard < 8; hard++) {
+        bst_mount_config config = default_config();
+        config.third_axis = (hard & 1) != 0;
+        config.stop_restitution = (hard & 2) != 0 ? 1.0 : 0.0;
+        config.flexible.frequency_hz[0] = 50.0;
+        double friction = hard < 3 ? 0.0 : hard < 6 ? 0.02 : 1e9;
+        for (int k = 0; k < 3; k++) {
+            config.friction.coulomb_nm[k] = friction;
+            config.friction.breakaway_nm[k] = 1.5 * friction;
+            config.motor_torque_nm[k] *= hard == 4 ? 0.02 : 1.0;
+        }
+        bst_mount m;
+        int type = (hard >> 1) & 1;
+        make(&m, type, &config);
+        bst_quat minus = {-some_attitude.x, -some_attitude.y, -some_attitude.z, -some_attitude.w};
+        bst_los_command k = {.direction_gcrf = {0, 0, 1}};
+        for (int n = 0; n < 30000; n++) {
+            if (n % 700 == 0) {
+                uint64_t draw = (uint64_t)n;
+                bst_vec3 d = bst_vec3_from_radec(2.0 * BST_PI * bst_rng_uniform(key, draw, 0),
+                                                 asin(2.0 * bst_rng_uniform(key, draw, 1) - 1.0));
+                d = n % 3500 == 700    ? bst_mount_axis_body(type, 0)
+                    : n % 3500 == 1400 ? (bst_vec3){0, 0, -1}
+                                       : d;
+                k = command_from(some_attitude, d, (bst_vec3){0, 0, 0});
+                k.near_given = n % 2100 == 0;
+                k.near_rad[0] = 100.0;
+            }
+            bst_mount_body body = {.q_believed_from_gcrf = n % 2 ? some_attitude : minus};
+            bst_mount_step(&m, &body, &k, 0.0, true);
+            for (int a = 0; a < m.axes; a++) {
+                double angle = m.joints.state.angle_rad[a], rate = m.joints.state.rate_radps[a];
+                assert_true(angle >= m.travel_min_rad[a] && angle <= m.travel_max_rad[a]);
+                /* the mode throws its joint about by some more */
+                assert_true(fabs(rate) <= 1.5 * m.servo[a].rate_limit_radps);
+                assert_true(friction < 1e6 || rate == 0.0);
+            }
+        }
+        bst_mount_status status;
+        bst_mount_status_of(&m, 0, &status);
+        assert_true(friction < 1e6 || (status.axis[0].flags & BST_AXIS_STUCK) != 0);
+    }
+}
+
 static void what_cannot_be_is_refused(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -367,6 +472,8 @@ int main(void) {
         cmocka_unit_test(a_stuck_axis_is_told_and_the_rest_goes_on),
         cmocka_unit_test(it_runs_into_its_stop_at_full_speed_and_stays_whole),
         cmocka_unit_test(a_turning_body_is_undone),
+        cmocka_unit_test(a_slew_turns_a_free_body_back),
+        cmocka_unit_test(nothing_diverges),
         cmocka_unit_test(what_cannot_be_is_refused),
         cmocka_unit_test(the_same_seed_gives_the_same_bits),
     };

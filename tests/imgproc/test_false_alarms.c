@@ -149,6 +149,10 @@ static void alarms_at_three_rates(void **state) {
 static void alarms_of_other_kinds(void **state) {
     (void)state;
     check_alarms(1, 1, 0.5, 2, 0, 0, 100, 40);
+    /* the noise of 1 e- of sky and read noise in steps of 1 and 2 e-, and of 0.2 e- of sky */
+    check_alarms(1, 1, 1, 2, 0, 0, 100, 40);
+    check_alarms(1, 1, 2, 2, 0, 0, 100, 40);
+    check_alarms(0.2, 1, 1, 2, 0, 0, 100, 40);
     check_alarms(20, 5, 1, 1.5, 0, 0, 100, 40);
     check_alarms(20, 5, 1, 3, 0, 0, 100, 40);
     check_alarms(20, 5, 1, 2, 5, 0, 100, 40);
@@ -163,6 +167,62 @@ static void alarms_at_low_rates(void **state) {
     check_alarms(100, 8, 2, 2, 0, 0, 1, 2400);
     check_alarms(100, 8, 2, 2, 0, 0, 0.1, 8000);
     check_alarms(100, 8, 2, 2, 20, 0, 1, 2400);
+    check_alarms(1, 1, 1, 2, 0, 0, 10, 640);
+    check_alarms(1, 1, 1, 2, 0, 0, 1, 2400);
+}
+
+enum { STARS = 6200 };
+
+/* Fluxes from SNR 11 on in numbers that fall as those of stars do, a star in 42 pixels. */
+static void draw_stars(bench *b, double *x, double *y) {
+    bst_rng_key key = bst_rng_make_key(9, 0, "test", "crowd");
+    synthetic_clear(&b->s);
+    double norm = synthetic_norm(&b->s, 100.2, 100.3, 0, 0), noise = synthetic_noise(&b->s);
+    for (int i = 0; i < STARS; i++) {
+        uint64_t n = (uint64_t)i;
+        x[i] = SIDE * bst_rng_uniform(key, n, 0) - 0.5;
+        y[i] = SIDE * bst_rng_uniform(key, n, 1) - 0.5;
+        double snr = 11.0 * fmin(pow(1.0 - bst_rng_uniform(key, n, 2), -1.0), 1000.0);
+        synthetic_add(&b->s, x[i], y[i], snr * noise / norm, 0, 0);
+    }
+}
+
+/* In a crowd what is found away from all stars is as many as were asked for, to 25 % and three
+ * standard errors, and level and noise are those of the
+ * sky. */
+static void alarms_between_stars(void **state) {
+    (void)state;
+    enum { FRAMES = 8 };
+    bench b = {.state = 0};
+    double per_frame = 1000.0, *x = calloc(2 * STARS, sizeof *x), *y = x + STARS;
+    assert_non_null(x);
+    open_bench(&b, 100, 5, 1.6, 2, 0, 0, per_frame);
+    free(b.d);
+    b.d = synthetic_detections(ROOM);
+    draw_stars(&b, x, y);
+    int alarms = 0;
+    for (int f = 0; f < FRAMES; f++) {
+        synthetic_expose(&b.s, bst_rng_make_key(5, 0, "test", "noise"), (uint64_t)f);
+        int count = process(&b);
+        assert_true(count > 2000 && count < ROOM);
+        for (int k = 0; k < count; k++) {
+            double least = INFINITY;
+            for (int i = 0; i < STARS; i++) {
+                double dx = x[i] - b.d->items[k].x_px, dy = y[i] - b.d->items[k].y_px;
+                least = fmin(least, dx * dx + dy * dy);
+            }
+            alarms += least > 2.0 * 2.0;
+        }
+        /* of the sky between the stars */
+        bst_assert_close(b.d->background_e, 100.0, 0.6);
+        bst_assert_close(b.d->noise_e, synthetic_noise(&b.s), 0.02 * synthetic_noise(&b.s));
+    }
+    double expected = FRAMES * per_frame * SIDE * SIDE / FRAME_PX;
+    if (fabs(alarms - expected) > 0.25 * expected + 3.0 * sqrt(expected)) {
+        fail_msg("%d false alarms between stars, %.1f expected", alarms, expected);
+    }
+    free(x);
+    close_bench(&b);
 }
 
 /* u with Q(u) = p */
@@ -269,9 +329,8 @@ static void threads_do_not_matter(void **state) {
 
 int main(int argc, char **argv) {
     const struct CMUnitTest quick[] = {
-        cmocka_unit_test(alarms_at_three_rates),
-        cmocka_unit_test(alarms_of_other_kinds),
-        cmocka_unit_test(loss_is_below_0_3_db),
+        cmocka_unit_test(alarms_at_three_rates), cmocka_unit_test(alarms_of_other_kinds),
+        cmocka_unit_test(alarms_between_stars),  cmocka_unit_test(loss_is_below_0_3_db),
         cmocka_unit_test(threads_do_not_matter),
     };
     const struct CMUnitTest thorough[] = {

@@ -1,0 +1,21 @@
+/* Mean and deviation of noise from the moments of what lies between two edges. */
+#ifndef BST_IMGPROC_CLIPPED_H
+#define BST_IMGPROC_CLIPPED_H
+
+/* Noise that is the sum of a normal part and of counted electrons, in digital steps. */
+typedef struct bst_clipped_noise {
+    double read_variance_e2; /* of the normal part, without that of the steps; INFINITY: all is */
+    double step_e;           /* >= 0 */
+} bst_clipped_noise;
+
+/* Improves *mean and *deviation (of the noise as it is digitised, electrons; on entry a guess) of
+ * pixels whose values from `low` to `high` have the mean `inner_mean` and the variance
+ * `inner_variance`. The edges lie midway between digital values: what is left is then the noise
+ * before it was digitised, cut at the edges, and step^2 / 12 (Sheppard). That noise is taken for
+ * normal with the third and fourth cumulants of the electrons counted, variance beyond
+ * read_variance_e2, by Edgeworth's series to the second order; its moments between two edges are
+ * integrals of z^k He_n(z) phi(z), which Hermite polynomials have in closed form. */
+void bst_clipped_solve(const bst_clipped_noise *noise, double low, double high, double inner_mean,
+                       double inner_variance, double *mean, double *deviation);
+
+#endif

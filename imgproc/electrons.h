@@ -1,0 +1,17 @@
+/* A frame's pixels as electrons, corrected for dark, flat and bad pixels. */
+#ifndef BST_IMGPROC_ELECTRONS_H
+#define BST_IMGPROC_ELECTRONS_H
+
+#include "imgproc/imgproc.h"
+
+typedef struct bst_electrons {
+    const bst_camera *camera;
+    const bst_imgproc_maps *maps;
+    const uint8_t *bad; /* [height_px][width_px] of the sensor; NULL: none */
+    const bst_imgproc_frame *frame;
+} bst_electrons;
+
+/* A bst_pixel_fn (background.h) for a bst_electrons. */
+void bst_electrons_read(const void *electrons, int y, int x, int count, float *out);
+
+#endif
