@@ -83,5 +83,7 @@ const bst_config_desc bst_control_config_table[] = {
              "A lost target is awaited at its predicted place for this time before the search."),
     BST_REAL(C, reacquire_extent_deg, "deg", 0, 90, "1",
              "How far each way from its predicted place a lost target is searched."),
+    BST_OBJECT(C, guidance, bst_guidance_config_table, "{}",
+               "Slews, keep-out zones, and what is seen coming."),
     BST_CONFIG_END};
 #undef C

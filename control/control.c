@@ -5,6 +5,19 @@
 #define RATE_HALF_S 0.25
 #define BODY_RATE_SMOOTH_S 2.0
 
+static bst_status guidance_aim(void *user, bst_ctx *ctx, int64_t tick, bool *valid,
+                               bst_vec3 *direction) {
+    return bst_control_boresight_at(ctx, user, tick, valid, direction);
+}
+
+static bst_status guidance_range(void *user, bst_ctx *ctx, int64_t tick, double *range_m) {
+    const bst_control *c = user;
+    *range_m = 0.0;
+    return c->env.cue_range_at
+               ? c->env.cue_range_at(c->env.cue_user, ctx, bst_control_seconds(c, tick), range_m)
+               : BST_OK;
+}
+
 static bool on_image_error(const bst_control *c) {
     return c->config.compensate_attitude && c->config.compensator.type != BST_CONTROL_OBSERVER;
 }
@@ -61,6 +74,12 @@ bst_status bst_control_init(bst_ctx *ctx, bst_control *control, const bst_contro
                             config->fix_sigma_floor_px * env->pixel_rad,
                             config->attitude_sigma_arcsec * BST_ARCSEC_RAD,
                             config->drift_sigma_arcsec_per_s * BST_ARCSEC_RAD);
+    const bst_guidance_env guidance = {.tick_rate_hz = env->tick_rate_hz,
+                                       .pixel_rad = env->pixel_rad,
+                                       .aim = guidance_aim,
+                                       .range = guidance_range,
+                                       .user = control};
+    bst_guidance_init(&control->guidance, &config->guidance, &guidance);
     return start_image_loop(ctx, control);
 }
 
@@ -170,11 +189,18 @@ bst_status bst_control_update(bst_ctx *ctx, bst_control *c, int64_t tick, bool *
     *command = (bst_los_command){.tick = effect,
                                  .direction_gcrf = bst_vec3_unit(d),
                                  .rate_gcrf_radps = bst_vec3_axpy(rate, -bst_vec3_dot(rate, d), d)};
-    *commanded = true;
+    if (c->config.guidance.acceleration) {
+        double per_s2 = c->env.tick_rate_hz / (double)half;
+        bst_vec3 bend = bst_vec3_axpy(bst_vec3_add(ahead, behind), -2.0, d);
+        command->accel_gcrf_radps2 = bst_vec3_scale(bend, per_s2 * per_s2);
+    }
     if (on_image_error(c) &&
         bst_image_loop_commanded(&c->image_loop, &c->pointing_error, effect, half,
                                  (bst_vec3[]){d, ahead, behind}, arrived, c->pointing.tick)) {
         bst_control_forget_aims(c);
     }
-    return BST_OK;
+    bst_vec3 boresight =
+        bst_quat_rotate(bst_quat_conj(c->pointing.q_cam_from_gcrf), (bst_vec3){0, 0, 1});
+    return bst_guidance_command(ctx, &c->guidance, &c->nav, c->pointing_valid ? &boresight : NULL,
+                                command, commanded);
 }

@@ -3,6 +3,7 @@
 #ifndef BST_CONTROL_CONTROL_H
 #define BST_CONTROL_CONTROL_H
 
+#include "control/guidance.h"
 #include "control/image_loop.h"
 #include "control/pointing_error.h"
 #include "control/search.h"
@@ -53,6 +54,7 @@ typedef struct bst_control_config {
     double candidate_rate_sigmas, candidate_score;
     double acquire_timeout_s, track_entry_px;
     double reacquire_coast_s, reacquire_extent_deg;
+    bst_guidance_config guidance;
 } bst_control_config;
 
 extern const bst_config_desc bst_control_config_table[];
@@ -70,6 +72,9 @@ typedef bst_status (*bst_control_region_fn)(void *user, bst_ctx *ctx, double sec
 /* From where the belt is seen (bst_knowledge_belt_eye_at). */
 typedef bst_status (*bst_control_belt_eye_fn)(void *user, bst_ctx *ctx, double seconds, bool *known,
                                               bst_belt_eye *eye);
+/* The range of the cue's object, and 0 where that is not known. */
+typedef bst_status (*bst_control_cue_range_fn)(void *user, bst_ctx *ctx, double seconds,
+                                               double *range_m);
 
 /* What a controller knows besides its messages. */
 typedef struct bst_control_env {
@@ -83,6 +88,7 @@ typedef struct bst_control_env {
     bst_region region; /* kind BST_REGION_NONE: none, and the next two may be NULL */
     bst_control_region_fn region_at;
     bst_control_belt_eye_fn belt_eye_at;
+    bst_control_cue_range_fn cue_range_at; /* NULL: no range is known */
     void *cue_user;
 } bst_control_env;
 
@@ -162,10 +168,12 @@ typedef struct bst_control {
     bst_vec3 body_rate_radps;
     bst_vec3 stare_gcrf;
     bool stare_valid;
+    bst_guidance guidance;
     bst_control_aimed aimed[BST_CONTROL_AIMED]; /* as long as nothing that they rest on changes */
 } bst_control;
 
-/* Copies config and env. BST_ERR_CONFIG for settings that do not fit together. */
+/* Copies config and env; does not move afterwards. BST_ERR_CONFIG for settings that do not fit
+ * together. */
 bst_status bst_control_init(bst_ctx *ctx, bst_control *control, const bst_control_config *config,
                             const bst_control_env *env) BST_MUST_CHECK;
 

@@ -39,12 +39,20 @@ static bst_vec3 in_body(const bst_reach_look *look) {
     return bst_quat_rotate(look->q_body_from_gcrf, look->direction_gcrf);
 }
 
+static bool has_redundant(const bst_mount_status *mount) {
+    bool has = false;
+    for (int i = 0; i < mount->axes; i++) {
+        has = has || mount->axis[i].redundant;
+    }
+    return has;
+}
+
 /* Whether the axes can follow three directions HALF_S apart. */
 static bst_reach follows(const bst_reach_problem *problem, const bst_vec3 body[3]) {
     const bst_mount_status *mount = problem->mount;
     double present[BST_MOUNT_AXES], angle[3][BST_MOUNT_AXES], ways[2][BST_MOUNT_AXES];
     for (int i = 0; i < BST_MOUNT_AXES; i++) {
-        present[i] = mount->axis[i].angle_rad;
+        present[i] = mount->axis[i].redundant ? 0.0 : mount->axis[i].angle_rad;
     }
     if (!bst_mount_nearest(mount, body[1], present, angle[1])) {
         return BST_REACH_TRAVEL;
@@ -65,11 +73,19 @@ static bst_reach follows(const bst_reach_problem *problem, const bst_vec3 body[3
         double rate = fabs(angle[2][i] - angle[0][i]) / (2.0 * HALF_S);
         double accel = fabs(angle[2][i] - 2.0 * angle[1][i] + angle[0][i]) / (HALF_S * HALF_S);
         if (limit > 0.0 && rate > limit) {
-            return sky > limit ? BST_REACH_RATE : BST_REACH_KEYHOLE;
+            if (sky > limit) {
+                return BST_REACH_RATE;
+            }
+            /* a redundant axis takes over beside the pole */
+            worst = has_redundant(mount) ? worst : BST_REACH_KEYHOLE;
+            continue;
         }
         if (hard > 0.0 && accel > hard) {
             /* an axis that turns much faster than the line of sight does so beside the pole */
-            worst = rate > 2.0 * sky ? BST_REACH_KEYHOLE : BST_REACH_ACCEL;
+            bool pole = rate > 2.0 * sky;
+            if (worst == BST_REACH_OK && !(pole && has_redundant(mount))) {
+                worst = pole ? BST_REACH_KEYHOLE : BST_REACH_ACCEL;
+            }
         }
     }
     return worst;
@@ -193,7 +209,7 @@ bst_status bst_reach_chase(bst_ctx *ctx, const bst_reach_problem *problem, doubl
                            int *count) {
     const bst_mount_status *mount = problem->mount;
     *count = 0;
-    if (!mount || !bst_mount_steers(mount) || most < 1) {
+    if (!mount || !bst_mount_steers(mount) || has_redundant(mount) || most < 1) {
         return BST_OK;
     }
     follower axes[BST_MOUNT_AXES] = {{0.0, 0.0}};
@@ -239,6 +255,9 @@ bst_status bst_reach_chase(bst_ctx *ctx, const bst_reach_problem *problem, doubl
             if (lost) {
                 losses[*count - 1].worst_rad = fmax(losses[*count - 1].worst_rad, off);
             }
+        }
+        if (*count == most && !lost) {
+            return BST_OK;
         }
         for (int i = 0; i < BST_MOUNT_AXES; i++) {
             to[i] = next[i];

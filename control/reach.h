@@ -65,7 +65,8 @@ typedef struct bst_reach_loss {
 /* Follows what is expected from from_s to until_s with axes that keep their limits, from perfectly
  * on it: each axis heads for the nearest angle within travel, at full rate, braking at the last
  * moment that 0.8 of the acceleration allow, as the mounts do. What is lost by a keyhole or by
- * limits is lost from, and back at, those times. Writes up to `most` losses. */
+ * limits is lost from, and back at, those times. Ends after `most` losses; finds none for a mount
+ * with a redundant axis, which is taken to pass its pole. */
 bst_status bst_reach_chase(bst_ctx *ctx, const bst_reach_problem *problem, double from_s,
                            double until_s, double tolerance_rad, bst_reach_loss *losses, int most,
                            int *count) BST_MUST_CHECK;

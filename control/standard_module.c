@@ -3,7 +3,16 @@
 #include "control/control.h"
 #include "control/modules.h"
 
-enum { PORT_TRACKS, PORT_POINTING, PORT_NAV, PORT_COMMAND, PORT_SENSOR, PORT_STATUS, PORT_COUNT };
+enum {
+    PORT_TRACKS,
+    PORT_POINTING,
+    PORT_NAV,
+    PORT_MOUNT,
+    PORT_COMMAND,
+    PORT_SENSOR,
+    PORT_STATUS,
+    PORT_COUNT
+};
 
 static const bst_port ports[PORT_COUNT] = {
     [PORT_TRACKS] = {.channel = BST_CHANNEL_TRACKS,
@@ -11,6 +20,9 @@ static const bst_port ports[PORT_COUNT] = {
                      .flags = BST_PORT_TRIGGER | BST_PORT_OPTIONAL},
     [PORT_POINTING] = {.channel = BST_CHANNEL_POINTING_TELEMETRY, .direction = BST_PORT_IN},
     [PORT_NAV] = {.channel = BST_CHANNEL_NAV_TELEMETRY, .direction = BST_PORT_IN},
+    [PORT_MOUNT] = {.channel = BST_CHANNEL_MOUNT_STATUS,
+                    .direction = BST_PORT_IN,
+                    .flags = BST_PORT_OPTIONAL},
     [PORT_COMMAND] = {.channel = BST_CHANNEL_LOS_COMMAND, .direction = BST_PORT_OUT},
     [PORT_SENSOR] = {.channel = BST_CHANNEL_SENSOR_COMMAND, .direction = BST_PORT_OUT},
     [PORT_STATUS] = {.channel = BST_CHANNEL_CONTROL_STATUS, .direction = BST_PORT_OUT},
@@ -39,6 +51,14 @@ static bst_status region_at(void *user, bst_ctx *ctx, double seconds, double alo
 static bst_status belt_eye_at(void *user, bst_ctx *ctx, double seconds, bool *known,
                               bst_belt_eye *eye) {
     return bst_knowledge_belt_eye_at(ctx, user, seconds, known, eye);
+}
+
+static bst_status cue_range_at(void *user, bst_ctx *ctx, double seconds, double *range_m) {
+    bool known;
+    double rate;
+    BST_TRY(bst_knowledge_cue_range_at(ctx, user, seconds, &known, range_m, &rate));
+    *range_m = known ? *range_m : 0.0;
+    return BST_OK;
 }
 
 static void destroy(void *self) {
@@ -71,6 +91,7 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
                                        .cue_direction_at = cue_direction_at,
                                        .region_at = region_at,
                                        .belt_eye_at = belt_eye_at,
+                                       .cue_range_at = cue_range_at,
                                        .cue_user = m->view};
         bst_knowledge_region(env->knowledge, &control_env.region);
         status = bst_control_init(env->ctx, &m->control, config, &control_env);
@@ -94,6 +115,7 @@ static bst_status step(void *self, struct bst_step *s) {
     int64_t tick = bst_step_tick(s);
     bst_control_telemetry(c, bst_step_latest(s, PORT_POINTING).payload,
                           bst_step_latest(s, PORT_NAV).payload);
+    bst_guidance_telemetry(&c->guidance, bst_step_latest(s, PORT_MOUNT).payload);
     for (bst_sample next = bst_step_next(s, PORT_TRACKS); next.payload;
          next = bst_step_next(s, PORT_TRACKS)) {
         BST_TRY(bst_control_observe(ctx, c, tick, next.payload));
@@ -118,6 +140,12 @@ static bst_status step(void *self, struct bst_step *s) {
                        t->reason);
     }
     c->transition_count = 0;
+    for (int i = 0; i < c->guidance.event_count; i++) {
+        char text[160];
+        bst_guidance_describe(&c->guidance.events[i], text, sizeof text);
+        bst_step_event(s, "guidance", "%s", text);
+    }
+    c->guidance.event_count = 0;
     return BST_OK;
 }
 

@@ -11,5 +11,6 @@ bst_status bst_gimbal_nav(bst_ctx *ctx, bst_view *view, int observer, int sensor
     out->velocity_gcrf_mps = state.velocity_mps;
     out->velocity_bary_mps = light.velocity_mps;
     out->sun_m = light.sun_m;
+    out->moon_m = bst_vec3_sub(bodies.moon_m, state.position_m);
     return BST_OK;
 }

@@ -128,6 +128,7 @@ typedef struct bst_nav_telemetry {
     bst_vec3 velocity_gcrf_mps; /* geocentric */
     bst_vec3 velocity_bary_mps; /* relative to the solar-system barycentre, for aberration */
     bst_vec3 sun_m;             /* observer to Sun */
+    bst_vec3 moon_m;            /* observer to Moon */
 } bst_nav_telemetry;
 
 /* los_command (latest): where the boresight shall be, as the onboard attitude knowledge sees it.

@@ -1,0 +1,253 @@
+/* Guidance with a simulated mount: slews that take the least time, keep-out cones that the true
+ * boresight stays out of, and what is told beforehand. */
+#include <string.h>
+
+#include "control/guidance.h"
+#include "gimbal/two_axis.h"
+#include "sim/astro/bodies.h"
+#include "tests/test_support.h"
+
+#define TICKS 1000
+#define DEG BST_DEG_RAD
+
+typedef struct bench {
+    bst_ctx ctx;
+    bst_guidance guidance;
+    bst_two_axis plant;
+    bst_nav_telemetry nav;
+    bst_vec3 from, rate; /* the aim moves along a great circle: direction and rate at tick 0 */
+    bst_vec3 jump_to;    /* and is elsewhere from jump_tick on */
+    int64_t jump_tick;
+    bool jumped; /* nobody knows beforehand */
+    double range_m;
+    /* found */
+    double arrival_s;   /* from when on the boresight is on the aim, to 0.02 degree */
+    double nearest_rad; /* least distance to the Sun's direction, after `leaving` */
+    int told[8];
+    bst_guidance_event last[8];
+} bench;
+
+static bst_vec3 aim_of(const bench *b, int64_t tick) {
+    if (b->jumped) {
+        return b->jump_to;
+    }
+    double t = (double)tick / TICKS, w = bst_vec3_norm(b->rate);
+    if (w == 0.0) {
+        return b->from;
+    }
+    return bst_vec3_axpy(bst_vec3_scale(b->from, cos(w * t)), sin(w * t) / w, b->rate);
+}
+
+static bst_status aim(void *user, bst_ctx *ctx, int64_t tick, bool *valid, bst_vec3 *direction) {
+    (void)ctx;
+    *valid = true;
+    *direction = aim_of(user, tick);
+    return BST_OK;
+}
+
+static bst_status range(void *user, bst_ctx *ctx, int64_t tick, double *range_m) {
+    (void)ctx;
+    (void)tick;
+    *range_m = ((bench *)user)->range_m;
+    return BST_OK;
+}
+
+static void open_bench(bench *b, bst_vec3 from, bst_vec3 rate) {
+    *b = (bench){.from = from, .rate = rate, .jump_tick = INT64_MAX};
+    bst_guidance_config config;
+    bst_assert_ok(&b->ctx, bst_config_defaults(&b->ctx, bst_guidance_config_table, &config));
+    const bst_guidance_env env = {
+        .tick_rate_hz = TICKS, .pixel_rad = 1e-4, .aim = aim, .range = range, .user = b};
+    bst_guidance_init(&b->guidance, &config, &env);
+    bst_two_axis_config mount;
+    bst_assert_ok(&b->ctx, bst_config_defaults(&b->ctx, bst_two_axis_config_table, &mount));
+    mount.encoder_noise_arcsec = 0;
+    bst_two_axis_keys keys = {0};
+    bst_assert_ok(&b->ctx, bst_two_axis_init(&b->ctx, &b->plant, &mount, BST_QUAT_IDENTITY, 1e-5,
+                                             1e-3, &keys));
+    b->nav = (bst_nav_telemetry){.position_gcrf_m = {0, 0, 7000e3}, .sun_m = {0, 0, -1.5e11}};
+    b->nearest_rad = INFINITY;
+    b->arrival_s = INFINITY;
+}
+
+/* Commands at 20 Hz with a latency of 50 ms, telemetry at 100 Hz. */
+static void run(bench *b, double seconds) {
+    bst_los_command waiting = {0}, active = {0};
+    bool has = false, first = true;
+    bst_vec3 sun = bst_vec3_unit(b->nav.sun_m);
+    bool off_sun = bst_vec3_angle(sun, (bst_vec3){0, 0, 1}) >
+                   b->guidance.config.sun_keep_out_deg * DEG; /* the mount's start */
+    for (int64_t n = 0; n < (int64_t)(seconds * TICKS); n++) {
+        b->jumped = n >= b->jump_tick;
+        if (n % 50 == 0) {
+            active = waiting;
+            has = !first;
+            bst_vec3 boresight =
+                bst_quat_rotate(bst_quat_conj(b->plant.q_cam_from_gcrf), (bst_vec3){0, 0, 1});
+            int64_t effect = n + 50;
+            bst_vec3 up = aim_of(b, effect + 1), down = aim_of(b, effect - 1);
+            waiting = (bst_los_command){.tick = effect, .direction_gcrf = aim_of(b, effect)};
+            waiting.rate_gcrf_radps = bst_vec3_scale(bst_vec3_sub(up, down), 0.5 * TICKS);
+            bool give;
+            bst_assert_ok(&b->ctx,
+                          bst_guidance_command(&b->ctx, &b->guidance, &b->nav,
+                                               n > 0 ? &boresight : NULL, &waiting, &give));
+            first = first && !give;
+            for (int i = 0; i < b->guidance.event_count; i++) {
+                b->told[b->guidance.events[i].kind]++;
+                b->last[b->guidance.events[i].kind] = b->guidance.events[i];
+            }
+            b->guidance.event_count = 0;
+        }
+        bool measure = n % 10 == 0;
+        bst_two_axis_step(&b->plant, has ? &active : NULL, (double)(n - active.tick) / TICKS,
+                          measure);
+        if (measure) {
+            bst_mount_status status;
+            bst_two_axis_status(&b->plant, n, &status);
+            bst_guidance_telemetry(&b->guidance, &status);
+        }
+        bst_vec3 d = bst_quat_rotate(bst_quat_conj(b->plant.q_cam_from_gcrf), (bst_vec3){0, 0, 1});
+        double off = bst_vec3_angle(d, aim_of(b, n));
+        b->arrival_s = off > 0.02 * DEG      ? INFINITY
+                       : isinf(b->arrival_s) ? (double)n / TICKS
+                                             : b->arrival_s;
+        double to_sun = bst_vec3_angle(d, sun);
+        off_sun = off_sun || to_sun > b->guidance.config.sun_keep_out_deg * DEG;
+        if (off_sun) {
+            b->nearest_rad = fmin(b->nearest_rad, to_sun);
+        }
+    }
+}
+
+/* Body axes = GCRF; the boresight starts on +z, outer axis about y. */
+static bst_vec3 mount_at(double outer_deg, double inner_deg) {
+    double o = outer_deg * DEG, i = inner_deg * DEG;
+    return (bst_vec3){cos(i) * sin(o), -sin(i), cos(i) * cos(o)};
+}
+
+static void nothing_asked_nothing_changed(void **state) {
+    (void)state;
+    bench b;
+    open_bench(&b, mount_at(100, 20), (bst_vec3){0, 0, 0});
+    bst_los_command before = {.tick = 7,
+                              .direction_gcrf = mount_at(100, 20),
+                              .rate_gcrf_radps = {1e-5, 2e-5, 3e-5}},
+                    after = before;
+    bool give;
+    bst_assert_ok(&b.ctx, bst_guidance_command(&b.ctx, &b.guidance, &b.nav, NULL, &after, &give));
+    assert_true(give);
+    assert_memory_equal(&before, &after, sizeof before);
+    assert_int_equal(b.guidance.event_count, 0);
+}
+
+/* Limits of 2 deg/s and 4 deg/s^2, 0.95 of them used: 180 degrees take 180 / 1.9 + 1.9 / 3.8 s and
+ * the latency; the mount by itself brakes earlier. */
+static void slews_of_least_time(void **state) {
+    (void)state;
+    for (int planned = 0; planned < 2; planned++) {
+        bench b;
+        open_bench(&b, mount_at(179.99, 0), (bst_vec3){0, 0, 0});
+        b.guidance.config.slews = planned ? BST_SLEWS_PLANNED : BST_SLEWS_MOUNT;
+        run(&b, 100.0);
+        double bound = 179.99 / 1.9 + 1.9 / 3.8 + 0.1;
+        print_message("180 deg %s: %.2f s, bound %.2f s\n", planned ? "planned" : "by the mount",
+                      b.arrival_s, bound);
+        if (planned) {
+            bst_assert_close(b.arrival_s, bound, 0.01 * bound);
+        }
+        assert_true(b.arrival_s < 1.02 * bound);
+    }
+    /* exactly antipodal, and onto an aim that moves at 1 deg/s */
+    bench b;
+    open_bench(&b, (bst_vec3){0, 0, -1}, (bst_vec3){0, 0, 0});
+    b.guidance.config.slews = BST_SLEWS_PLANNED;
+    run(&b, 100.0);
+    assert_true(b.arrival_s < 97.0);
+    open_bench(&b, mount_at(40, 0), bst_vec3_scale(mount_at(130, 0), 1.0 * DEG));
+    b.guidance.config.slews = BST_SLEWS_PLANNED;
+    run(&b, 60.0);
+    /* 40 deg at 1.9 - 1 deg/s, 1.9 / 3.8 s to full rate (0.475 deg short) and 0.9 / 3.8 s back */
+    print_message("onto an aim at 1 deg/s: %.2f s\n", b.arrival_s);
+    bst_assert_close(b.arrival_s, (40 + 0.475 - 0.1) / 0.9 + 0.24, 0.5);
+    /* the aim jumps while the slew is under way */
+    open_bench(&b, mount_at(100, 0), (bst_vec3){0, 0, 0});
+    b.guidance.config.slews = BST_SLEWS_PLANNED;
+    b.jump_tick = 20000;
+    b.jump_to = mount_at(-20, 10);
+    run(&b, 70.0);
+    print_message("after a jump at 20 s: %.2f s\n", b.arrival_s);
+    /* 37 deg out by then: a stop, 58 deg and two changes of rate at full speed, latency */
+    assert_true(b.arrival_s < 20.0 + 58.0 / 1.9 + 2.0);
+}
+
+static void keeps_out_of_the_sun(void **state) {
+    (void)state;
+    /* the Sun half way on the straight line, cone of 30 degrees */
+    bench b;
+    open_bench(&b, mount_at(120, 3), (bst_vec3){0, 0, 0});
+    b.nav.sun_m = bst_vec3_scale(mount_at(60, 0), 1.5e11);
+    b.guidance.config.sun_keep_out_deg = 30;
+    run(&b, 130.0);
+    print_message("detour of %.1f deg, arrived at %.1f s, %.3f deg from the Sun\n",
+                  b.last[BST_GUIDANCE_DETOUR].length_rad / DEG, b.arrival_s, b.nearest_rad / DEG);
+    assert_int_equal(b.told[BST_GUIDANCE_DETOUR], 1);
+    assert_true(b.arrival_s < 125.0);
+    assert_true(b.nearest_rad > 30 * DEG);
+    /* cue and Sun parallel: it waits beside the cone, and goes on when the cue leaves it */
+    open_bench(&b, mount_at(60, 0), bst_vec3_scale(mount_at(150, 0), 0.5 * DEG));
+    b.nav.sun_m = bst_vec3_scale(mount_at(60, 0), 1.5e11);
+    b.guidance.config.sun_keep_out_deg = 25;
+    b.guidance.config.look_ahead_s = 200;
+    run(&b, 110.0);
+    assert_true(b.nearest_rad > 25 * DEG);
+    assert_int_equal(b.told[BST_GUIDANCE_UNREACHABLE], 1);
+    assert_int_equal(b.last[BST_GUIDANCE_UNREACHABLE].reason, BST_REACH_SUN);
+    bst_assert_close(b.last[BST_GUIDANCE_UNREACHABLE].until_s, 50.0, 0.02); /* 25 / 0.5 */
+    assert_int_equal(b.told[BST_GUIDANCE_REACHABLE], 1);
+    print_message("out of the cone at 50 s, followed from %.1f s on\n", b.arrival_s);
+    assert_true(b.arrival_s < 105.0);
+    /* inside of the cone at the start: out by the shortest way, and round it */
+    open_bench(&b, mount_at(90, 0), (bst_vec3){0, 0, 0});
+    b.nav.sun_m = bst_vec3_scale(mount_at(20, 0), 1.5e11);
+    b.guidance.config.sun_keep_out_deg = 40;
+    run(&b, 120.0);
+    assert_true(b.arrival_s < 115.0);
+    assert_true(b.nearest_rad > 40 * DEG * (1 - 1e-9));
+    /* unreachable for ever */
+    open_bench(&b, mount_at(20, 0), (bst_vec3){0, 0, 0});
+    b.nav.sun_m = bst_vec3_scale(mount_at(20, 0), 1.5e11);
+    b.guidance.config.sun_keep_out_deg = 40;
+    b.guidance.config.look_ahead_s = 300;
+    run(&b, 60.0);
+    assert_int_equal(b.told[BST_GUIDANCE_UNREACHABLE], 1);
+    assert_true(isinf(b.last[BST_GUIDANCE_UNREACHABLE].until_s));
+    assert_true(isinf(b.arrival_s));
+}
+
+/* A target that goes down behind the Earth, told before it does. */
+static void occultation_ahead(void **state) {
+    (void)state;
+    bench b;
+    open_bench(&b, (bst_vec3){0, 0, 1}, (bst_vec3){1 * DEG, 0, 0});
+    b.range_m = 2e7;
+    b.guidance.config.look_ahead_s = 150;
+    run(&b, 40.0);
+    assert_int_equal(b.told[BST_GUIDANCE_AHEAD], 1);
+    assert_int_equal(b.last[BST_GUIDANCE_AHEAD].reason, BST_REACH_BEHIND_EARTH);
+    double limb = asin(BST_EARTH_RADIUS_M / 7000e3) / DEG;
+    bst_assert_close(b.last[BST_GUIDANCE_AHEAD].from_s, 180.0 - limb, 0.1);
+    char text[160];
+    bst_guidance_describe(&b.last[BST_GUIDANCE_AHEAD], text, sizeof text);
+    assert_non_null(strstr(text, "behind the Earth"));
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(nothing_asked_nothing_changed),
+        cmocka_unit_test(slews_of_least_time),
+        cmocka_unit_test(keeps_out_of_the_sun),
+        cmocka_unit_test(occultation_ahead),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,89 @@
+#!/usr/bin/env python3
+"""Passes of a low satellite by another at 100 km and up to 2 deg/s: tracked through, away from the
+mount's pole and with a third axis through it; without one, lost and found when guidance said.
+
+Usage, from the repository root: /usr/bin/python3 tests/e2e/test_passes.py BORESIGHT [SEEDS]
+"""
+import math
+import re
+import sys
+import unittest
+
+import numpy as np
+
+import runs
+
+SEEDS = int(sys.argv.pop(1)) if len(sys.argv) > 1 and sys.argv[1].isdigit() else 1
+GENERATOR = runs.SENSOR + "/observation_source=generator"
+SETTLED_S = 5.0  # the cue's 0.3 degree are searched and centred by then
+LOST_PX = 2.0    # guidance's loss_tolerance_px
+
+
+def errors(out):
+    """Middle of each frame and distance of the target from the boresight, px; infinite outside."""
+    rows = runs.database(out).execute(
+        "SELECT e.mid_s, t.x_mean_px - e.boresight_x_px, t.y_mean_px - e.boresight_y_px"
+        " FROM exposures e LEFT JOIN truth t ON t.exposure_id = e.exposure_id AND t.kind = 'object'"
+        " WHERE e.mid_s > ? ORDER BY e.mid_s", (SETTLED_S,)).fetchall()
+    return (np.array([r[0] for r in rows]),
+            np.array([math.inf if r[1] is None else math.hypot(r[1], r[2]) for r in rows]))
+
+
+class Passes(unittest.TestCase):
+    def follow(self, scenario, seed, *sets):
+        out = runs.scratch() + "/run"
+        runs.run("scenarios/" + scenario, out, runs.NO_FRAMES, "/record/truth_stars=false", *sets,
+                 seed=seed)
+        mid_s, error = errors(out)
+        self.assertEqual(len(mid_s), 2950)
+        return out, mid_s, error
+
+    def tracked(self, scenario, *sets):
+        for seed in range(1, SEEDS + 1):
+            _, _, error = self.follow(scenario, seed, *sets)
+            p99 = np.percentile(error, 99)
+            print(f"{scenario} {' '.join(sets)} seed {seed}: p99 {p99:.2f}, "
+                  f"greatest {error.max():.2f} px")
+            # the figure asked for; 20 seeds had 0.4 to 0.6
+            self.assertLess(p99, 2.0)
+
+    def test_away_from_the_pole_by_images(self):
+        self.tracked("leo_leo_pass.json")
+
+    def test_away_from_the_pole_by_the_generator(self):
+        self.tracked("leo_leo_pass.json", GENERATOR)
+
+    def test_past_the_pole_with_a_third_axis(self):
+        self.tracked("leo_leo_third_axis.json", GENERATOR)
+
+    def test_keyhole(self):
+        for seed in range(1, SEEDS + 1):
+            out, mid_s, error = self.follow("leo_leo_keyhole.json", seed, GENERATOR)
+            told = [re.match(r"will be lost from ([\d.]+) s until ([\d.]+) s: in the keyhole", text)
+                    for text, in runs.database(out).execute(
+                        "SELECT text FROM events WHERE kind = 'guidance' ORDER BY tick")]
+            told = [match for match in told if match]
+            self.assertGreater(len(told), 0)
+            first, last = float(told[-1].group(1)), float(told[-1].group(2))
+            off = mid_s[error > LOST_PX]
+            lost = off.max() - off.min()
+            print(f"keyhole seed {seed}: told {first} to {last} s, lost {off.min():.2f} to "
+                  f"{off.max():.2f} s")
+            # one loss, and its ends to a tenth of its length
+            self.assertLess(lost, 0.1 * (len(off) + 5))
+            self.assertAlmostEqual(first, off.min(), delta=0.1 * lost)
+            self.assertAlmostEqual(last, off.max(), delta=0.1 * lost)
+            # told well before, and tracked to both sides of it
+            when, = runs.database(out).execute(
+                "SELECT max(time_s) FROM events WHERE kind = 'guidance'"
+                " AND text LIKE 'will be lost%'").fetchone()
+            self.assertLess(when, first - 30.0)
+            self.assertLess(np.percentile(error[error <= LOST_PX], 99), 1.0)
+
+
+def tearDownModule():
+    runs.clean()
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
