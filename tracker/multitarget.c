@@ -309,14 +309,12 @@ static void hit(bst_mtt *m, int t) {
     bst_mtt_note_place(track, detection);
     track->last_update_tick = m->now.tick;
     track->last_update_s = m->now.seconds;
-    if (track->sight == BST_MTT_CLEAR) {
-        bst_mtt_note_light(track, detection->snr);
-    }
     if (track->status != BST_TRACK_TENTATIVE && !track->star &&
         bst_mtt_note_innovation(&m->params, track, &fit.innovation, dt, &statistic)) {
         record(m, BST_MTT_MANOEUVRE, track, statistic);
     }
     take_brightness(m, track, detection, dt);
+    bst_mtt_note_light(track);
 }
 
 /* 99.9 % quantile of chi-square (Wilson and Hilferty 1931). */

@@ -119,10 +119,10 @@ typedef struct bst_mtt_track {
     /* It has been hidden and was not seen again yet: it only follows its orbit, and wakes when what
      * is confirmed anew is known again as it. Ends as what is remembered does, or by misses. */
     bool asleep;
-    bool lit;        /* it has had an orbit by which there was something to see */
-    bool replaced;   /* by the track that it woke as, in this frame */
-    bool may_miss;   /* in the latest frame */
-    double full_snr; /* smoothed over detections in full light; 0: none yet */
+    bool lit;                    /* it has had an orbit by which there was something to see */
+    bool replaced;               /* by the track that it woke as, in this frame */
+    bool may_miss;               /* in the latest frame */
+    double full_snr, full_v_mag; /* smoothed over detections in full light; SNR 0: none yet */
     bool star; /* and is known to be slower than any object: its rate is zero, its status is not
                   tentative, its life is only ended by max_coast_s */
     /* normalised innovations of the latest hits: two of place, one of brightness; rings */

@@ -80,8 +80,8 @@ int bst_mtt_gated(const bst_mtt *mtt, int t, int *columns);
 /* Notes what there is to see of track t, already predicted, and whether it sleeps; sets observable
  * and may_miss, the former having said whether its place is in the field. */
 void bst_mtt_look(bst_mtt *mtt, int t, const bst_mtt_frame *frame);
-/* Takes in the SNR of a detection in full light. */
-void bst_mtt_note_light(bst_mtt_track *track, double snr);
+/* After a detection: notes what the track looks like in full light, if it is in that. */
+void bst_mtt_note_light(bst_mtt_track *track);
 
 /* Carries the memory to a frame; forgets what is too old or too vague. */
 void bst_mtt_predict_memory(bst_mtt *mtt, const bst_mtt_frame *frame);

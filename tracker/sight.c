@@ -17,6 +17,7 @@
  * dim detections have left errors that the filter takes for smaller. */
 #define DOUBT 4.0
 #define LIGHT_GAIN 0.1
+#define FULL_LIGHT 0.99
 
 /* Least distance of the segment between two geocentric points from the Earth's centre. */
 static double least_distance(bst_vec3 a, bst_vec3 b) {
@@ -67,6 +68,7 @@ static void doubt(bst_mtt_track *track) {
 void bst_mtt_look(bst_mtt *m, int t, const bst_mtt_frame *frame) {
     bst_mtt_track *track = &m->tracks[t];
     track->sight = BST_MTT_CLEAR;
+    track->sunlight = 1.0;
     if (m->params.orbits && frame->sight && track->orbit.valid &&
         track->status != BST_TRACK_TENTATIVE) {
         track->sight = frame->sight(frame->user, track, &track->sunlight);
@@ -83,6 +85,10 @@ void bst_mtt_look(bst_mtt *m, int t, const bst_mtt_frame *frame) {
     m->observable[t] = m->observable[t] && !track->asleep;
 }
 
-void bst_mtt_note_light(bst_mtt_track *track, double snr) {
-    track->full_snr += (track->full_snr > 0.0 ? LIGHT_GAIN : 1.0) * (snr - track->full_snr);
+void bst_mtt_note_light(bst_mtt_track *track) {
+    if (track->orbit.valid && track->sunlight < FULL_LIGHT) {
+        return;
+    }
+    track->full_snr += (track->full_snr > 0.0 ? LIGHT_GAIN : 1.0) * (track->snr - track->full_snr);
+    track->full_v_mag = track->v_mag;
 }
