@@ -19,7 +19,8 @@ static bst_status held_at(bst_ctx *ctx, const bst_control *c, const bst_control_
     bool valid;
     bst_vec3 now;
     BST_TRY(cue_direction_at(ctx, c, tick, &valid, &now));
-    if (then->valid && valid) {
+    /* an arc across a jump of the cue is not the target's */
+    if (then->valid && valid && held->tick > c->watch.jump_tick) {
         bst_vec3 straight = bst_vec3_axpy(then->direction_gcrf, dt, then->rate_gcrf_radps);
         d = bst_vec3_add(d, bst_vec3_sub(now, straight));
     }
@@ -34,6 +35,66 @@ static bst_vec3 offset_by(bst_vec3 d, bst_vec3 x_axis, bst_search_tile tile) {
     return bst_vec3_unit(bst_vec3_axpy(bst_vec3_axpy(d, tile.x_rad, e1), tile.y_rad, e2));
 }
 
+bool bst_control_moves_with_region(const bst_control *c) {
+    return (c->env.region.kind == BST_REGION_GEOSTATIONARY) ==
+           (c->config.search_rate == BST_CONTROL_RATE_BELT);
+}
+
+bst_status bst_control_expected_rate(bst_ctx *ctx, const bst_control *c, int64_t tick,
+                                     bst_vec3 direction, bool *known, bst_vec3 *rate_radps) {
+    if (c->env.region.kind == BST_REGION_NONE) {
+        bst_cue cue;
+        BST_TRY(bst_control_cue_at(ctx, c, tick, &cue));
+        *known = cue.valid;
+        *rate_radps = cue.rate_gcrf_radps;
+        return BST_OK;
+    }
+    bst_belt_eye eye;
+    double range_m, range_rate_mps;
+    BST_TRY(c->env.belt_eye_at(c->env.cue_user, ctx, bst_control_seconds(c, tick), known, &eye));
+    *known = *known && bst_belt_motion(&eye, direction, rate_radps, &range_m, &range_rate_mps);
+    return BST_OK;
+}
+
+/* The present place of a search in the region. */
+static bst_status tile_at(bst_ctx *ctx, const bst_control *c, int64_t tick, bst_vec3 *direction) {
+    bst_search_tile tile = c->search.tile[c->search_step];
+    if (bst_control_moves_with_region(c)) {
+        return c->env.region_at(c->env.cue_user, ctx, bst_control_seconds(c, tick), tile.x_rad,
+                                tile.y_rad, direction);
+    }
+    double dt = bst_control_seconds(c, tick - c->tile_tick);
+    *direction = bst_vec3_unit(bst_vec3_axpy(c->tile_gcrf, dt, c->tile_rate_radps));
+    return BST_OK;
+}
+
+/* Angle along the region's middle of a scan that goes to and fro at a constant rate. */
+static double scanned_rad(const bst_control *c, int64_t tick) {
+    double rate = c->config.scan_rate_arcsec_per_s * BST_ARCSEC_RAD;
+    double length = 2.0 * c->env.region.half_length_rad;
+    double gone = fabs(rate) * bst_control_seconds(c, tick - c->mode_tick);
+    double on = gone - 2.0 * length * floor(gone / (2.0 * length));
+    double from_end = on <= length ? on : 2.0 * length - on;
+    return rate < 0.0 ? 0.5 * length - from_end : from_end - 0.5 * length;
+}
+
+static bst_status fixed_at(const bst_control *c, int64_t tick, bool *valid, bst_vec3 *direction) {
+    const double *f = c->config.fixed_direction;
+    bst_vec3 held = bst_vec3_unit((bst_vec3){f[0], f[1], f[2]});
+    if (c->config.fixed_frame == BST_CONTROL_FIXED_INERTIAL) {
+        *direction = held;
+        return BST_OK;
+    }
+    *valid = c->pointing_valid;
+    if (*valid) {
+        bst_vec3 turn =
+            bst_vec3_scale(c->body_rate_radps, bst_control_seconds(c, c->body_tick - tick));
+        bst_vec3 then = bst_quat_rotate(bst_quat_from_rotvec(turn), held);
+        *direction = bst_quat_rotate(bst_quat_conj(c->q_body_from_gcrf), then);
+    }
+    return BST_OK;
+}
+
 bst_status bst_control_aim(bst_ctx *ctx, const bst_control *c, int64_t tick, bool *valid,
                            bst_vec3 *direction) {
     *valid = true;
@@ -41,6 +102,9 @@ bst_status bst_control_aim(bst_ctx *ctx, const bst_control *c, int64_t tick, boo
         case BST_MODE_SLEW:
         case BST_MODE_RATE:
         case BST_MODE_SEARCH:
+            if (c->search_in_region && c->mode == BST_MODE_SEARCH) {
+                return tile_at(ctx, c, tick, direction);
+            }
             BST_TRY(cue_direction_at(ctx, c, tick, valid, direction));
             if (c->mode == BST_MODE_SEARCH && *valid) {
                 *direction =
@@ -49,6 +113,7 @@ bst_status bst_control_aim(bst_ctx *ctx, const bst_control *c, int64_t tick, boo
             return BST_OK;
         case BST_MODE_ACQUIRE:
         case BST_MODE_TRACK:
+        case BST_MODE_COAST:
             return held_at(ctx, c, &c->held, tick, direction);
         case BST_MODE_REACQUIRE: {
             bst_vec3 d;
@@ -60,6 +125,11 @@ bst_status bst_control_aim(bst_ctx *ctx, const bst_control *c, int64_t tick, boo
             *valid = c->stare_valid;
             *direction = c->stare_gcrf;
             return BST_OK;
+        case BST_MODE_FIXED:
+            return fixed_at(c, tick, valid, direction);
+        case BST_MODE_SCAN:
+            return c->env.region_at(c->env.cue_user, ctx, bst_control_seconds(c, tick),
+                                    scanned_rad(c, tick), 0.0, direction);
         default:
             *valid = false;
             return BST_OK;
@@ -76,6 +146,10 @@ void bst_control_forget_aims(bst_control *c) {
     }
 }
 
+static bool held_in_body(const bst_control *c) {
+    return c->mode == BST_MODE_FIXED && c->config.fixed_frame == BST_CONTROL_FIXED_BODY;
+}
+
 bst_status bst_control_boresight_at(bst_ctx *ctx, bst_control *c, int64_t tick, bool *valid,
                                     bst_vec3 *direction) {
     /* commands come at a fixed period, of which Fibonacci hashing spreads the multiples evenly */
@@ -90,7 +164,9 @@ bst_status bst_control_boresight_at(bst_ctx *ctx, bst_control *c, int64_t tick, 
         aimed->known = true;
     }
     *valid = aimed->valid;
-    if (*valid) {
+    if (*valid && held_in_body(c)) {
+        *direction = aimed->direction_gcrf; /* where the stars are does not matter */
+    } else if (*valid) {
         *direction = bst_quat_rotate(aimed->error, bst_control_apparent(c, aimed->direction_gcrf));
     }
     return BST_OK;

@@ -1,6 +1,10 @@
 #include "control/control.h"
 
-static const char *const strategies[] = {"track", "stare", "rate", NULL};
+/* in the order of the enums in control.h and search.h */
+static const char *const strategies[] = {"track", "stare", "rate", "fixed", "scan", NULL};
+static const char *const patterns[] = {"nearest_first", "raster", "spiral", "belt", NULL};
+static const char *const dwell_rates[] = {"belt", "sidereal", NULL};
+static const char *const fixed_frames[] = {"inertial", "body", NULL};
 
 static const bst_config_desc compensator_table[] = {
     BST_COMPENSATOR_KEYS(bst_control_compensators, "\"observer\""), BST_CONFIG_END};
@@ -9,9 +13,16 @@ static const bst_config_desc compensator_table[] = {
 const bst_config_desc bst_control_config_table[] = {
     BST_ENUM(C, strategy, strategies, "\"track\"",
              "track: closed loop; stare: inertially at the cue's place at stare_time_s; rate: open "
-             "loop along the cue."),
+             "loop along the cue; fixed: at fixed_direction; scan: along the cue's region."),
     BST_REAL(C, stare_time_s, "s", -1e6, 1e9, "0",
              "strategy stare: time after the epoch whose cue is stared at."),
+    BST_ENUM(C, fixed_frame, fixed_frames, "\"inertial\"",
+             "strategy fixed: axes of fixed_direction: GCRF, or the body's."),
+    BST_REALS(C, fixed_direction, "", -1, 1, "[0, 0, 1]",
+              "strategy fixed: where the boresight is held, a direction of any length."),
+    BST_REAL(C, scan_rate_arcsec_per_s, "arcsec/s", -36000, 36000, "60",
+             "strategy scan: rate along the middle of the cue's region, from its first end to the "
+             "second and back; negative: from the second end on."),
     BST_REAL(C, exposure_s, "s", 0, 3600, "0",
              "Exposure time asked of the sensor; 0 leaves the sensor's own."),
     BST_REAL(C, period_s, "s", 0, 3600, "0",
@@ -40,6 +51,14 @@ const bst_config_desc bst_control_config_table[] = {
              "Expected drift rate of the body at the start (1 sigma)."),
     BST_REAL(C, arrive_tolerance_px, "px", 0.01, 10000, "20",
              "A slew has arrived when the servo has settled within this of the aim."),
+    BST_ENUM(C, search_pattern, patterns, "\"nearest_first\"",
+             "Order of the places of a search: by distance from the middle; row by row, there and "
+             "back; round about the middle; or, in a region, across it step by step along it."),
+    BST_ENUM(C, search_rate, dwell_rates, "\"belt\"",
+             "How the boresight moves while it dwells on a place of the cue's region: with what "
+             "moves as the geostationary belt does, or with the stars."),
+    BST_REAL(C, search_timeout_s, "s", 0, 1e9, "0",
+             "A search that has found nothing after this time is given up; 0: never."),
     BST_REAL(C, search_sigmas, "", 0, 20, "3",
              "The search covers this many sigma of the cue's error each way, per image axis."),
     BST_REAL(C, search_max_deg, "deg", 0, 90, "2", "The search never reaches farther than this."),

@@ -3,6 +3,7 @@
 /* Half the interval over which a command's rate is taken: long against rounding, short against
  * the change of a line of sight's rate. */
 #define RATE_HALF_S 0.25
+#define BODY_RATE_SMOOTH_S 2.0
 
 static bst_status guidance_aim(void *user, bst_ctx *ctx, int64_t tick, bool *valid,
                                bst_vec3 *direction) {
@@ -44,8 +45,27 @@ bst_status bst_control_init(bst_ctx *ctx, bst_control *control, const bst_contro
                         "other",
                         config->exposure_s, config->period_s);
     }
-    *control = (bst_control){
-        .config = *config, .env = *env, .mode = BST_MODE_IDLE, .frame_tick = INT64_MIN};
+    const double *f = config->fixed_direction;
+    if (config->strategy == BST_CONTROL_FIXED && f[0] == 0.0 && f[1] == 0.0 && f[2] == 0.0) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "fixed_direction: strategy fixed needs a direction of a length other than "
+                        "zero");
+    }
+    bool has_region = env->region.kind != BST_REGION_NONE;
+    if (!has_region && config->strategy == BST_CONTROL_SCAN) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "strategy: \"scan\" goes along the cue's region; give the cue a region");
+    }
+    if (!has_region && config->search_pattern == BST_SEARCH_BELT) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "search_pattern: \"belt\" goes along the cue's region; give the cue a "
+                        "region, or choose nearest_first, raster or spiral");
+    }
+    *control = (bst_control){.config = *config,
+                             .env = *env,
+                             .mode = BST_MODE_IDLE,
+                             .frame_tick = INT64_MIN,
+                             .watch = {.jump_tick = INT64_MIN}};
     int64_t half = bst_control_ticks(control, RATE_HALF_S);
     control->rate_half_ticks = half > 0 ? half : 1;
     control->latency_ticks = bst_control_ticks(control, config->command_latency_s);
@@ -63,10 +83,29 @@ bst_status bst_control_init(bst_ctx *ctx, bst_control *control, const bst_contro
     return start_image_loop(ctx, control);
 }
 
+/* The body's attitude, and its rate smoothed against the noise of the attitude's estimate. */
+static void take_body(bst_control *c, int64_t tick, bst_quat q) {
+    if (c->config.fixed_frame != BST_CONTROL_FIXED_BODY) {
+        return;
+    }
+    if (c->pointing_valid && tick > c->body_tick) {
+        double dt = bst_control_seconds(c, tick - c->body_tick);
+        bst_vec3 turn = bst_quat_to_rotvec(bst_quat_mul(q, bst_quat_conj(c->q_body_from_gcrf)));
+        bst_vec3 rate = bst_vec3_scale(turn, 1.0 / dt);
+        double gain = -expm1(-dt / BODY_RATE_SMOOTH_S);
+        c->body_rate_radps =
+            bst_vec3_axpy(c->body_rate_radps, gain, bst_vec3_sub(rate, c->body_rate_radps));
+    }
+    c->q_body_from_gcrf = q;
+    c->body_tick = tick;
+    bst_control_forget_aims(c);
+}
+
 void bst_control_telemetry(bst_control *c, const bst_pointing_telemetry *pointing,
                            const bst_nav_telemetry *nav) {
     if (pointing && pointing->written > 0) {
         c->pointing = pointing->items[(pointing->written - 1) % pointing->capacity];
+        take_body(c, c->pointing.tick, pointing->q_body_from_gcrf);
         c->pointing_valid = true;
         c->settled = pointing->settled;
     }
@@ -162,6 +201,7 @@ bst_status bst_control_update(bst_ctx *ctx, bst_control *c, int64_t tick, bool *
     }
     bst_vec3 boresight =
         bst_quat_rotate(bst_quat_conj(c->pointing.q_cam_from_gcrf), (bst_vec3){0, 0, 1});
-    return bst_guidance_command(ctx, &c->guidance, &c->nav, c->pointing_valid ? &boresight : NULL,
-                                command, commanded);
+    bst_quat error = bst_pointing_error_at(&c->pointing_error, effect, c->env.tick_rate_hz);
+    return bst_guidance_command(ctx, &c->guidance, &c->nav, &error,
+                                c->pointing_valid ? &boresight : NULL, command, commanded);
 }

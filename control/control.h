@@ -15,11 +15,27 @@ typedef enum bst_control_strategy {
     BST_CONTROL_TRACK = 0, /* closed loop */
     BST_CONTROL_STARE,     /* where the cue is at stare_time_s, inertially */
     BST_CONTROL_RATE,      /* along the cue */
+    BST_CONTROL_FIXED,     /* a direction held, in inertial space or in the body */
+    BST_CONTROL_SCAN,      /* along the middle of the cue's region at a constant rate */
 } bst_control_strategy;
+
+/* How the boresight moves while it dwells on a place of a region. */
+typedef enum bst_control_dwell_rate {
+    BST_CONTROL_RATE_BELT = 0,
+    BST_CONTROL_RATE_SIDEREAL,
+} bst_control_dwell_rate;
+
+typedef enum bst_control_fixed_frame {
+    BST_CONTROL_FIXED_INERTIAL = 0,
+    BST_CONTROL_FIXED_BODY,
+} bst_control_fixed_frame;
 
 typedef struct bst_control_config {
     int32_t strategy;
     double stare_time_s;
+    int32_t fixed_frame; /* bst_control_fixed_frame */
+    double fixed_direction[3];
+    double scan_rate_arcsec_per_s;
     double exposure_s, period_s;
     double command_latency_s;
     bool compensate_attitude;
@@ -29,7 +45,9 @@ typedef struct bst_control_config {
     double fix_sigma_floor_px;
     double attitude_sigma_arcsec, drift_sigma_arcsec_per_s;
     double arrive_tolerance_px;
-    double search_sigmas, search_max_deg, search_step;
+    int32_t search_pattern; /* bst_search_pattern */
+    int32_t search_rate;    /* bst_control_dwell_rate */
+    double search_sigmas, search_max_deg, search_step, search_timeout_s;
     int64_t dwell_frames;
     double dwell_timeout_s;
     int64_t candidate_hits;
@@ -51,6 +69,14 @@ typedef bst_status (*bst_control_cue_direction_fn)(void *user, bst_ctx *ctx, dou
 typedef bst_status (*bst_control_cue_range_fn)(void *user, bst_ctx *ctx, double seconds,
                                                double *range_m);
 
+/* The direction of a place of the region (bst_knowledge_region_direction_at). */
+typedef bst_status (*bst_control_region_fn)(void *user, bst_ctx *ctx, double seconds,
+                                            double along_rad, double across_rad,
+                                            bst_vec3 *direction);
+/* From where the belt is seen (bst_knowledge_belt_eye_at). */
+typedef bst_status (*bst_control_belt_eye_fn)(void *user, bst_ctx *ctx, double seconds, bool *known,
+                                              bst_belt_eye *eye);
+
 /* What a controller knows besides its messages. */
 typedef struct bst_control_env {
     double tick_rate_hz;
@@ -61,6 +87,9 @@ typedef struct bst_control_env {
     bst_control_cue_fn cue_at;
     bst_control_cue_direction_fn cue_direction_at;
     bst_control_cue_range_fn cue_range_at; /* NULL: no range is known */
+    bst_region region; /* kind BST_REGION_NONE: none, and the next two may be NULL */
+    bst_control_region_fn region_at;
+    bst_control_belt_eye_fn belt_eye_at;
     void *cue_user;
 } bst_control_env;
 
@@ -75,6 +104,15 @@ typedef struct bst_control_held {
     bst_vec3 direction_gcrf, rate_gcrf_radps; /* geometric */
     bst_cue cue;                              /* at that time */
 } bst_control_held;
+
+/* The cue as it was when it was looked at last. */
+typedef struct bst_control_watch {
+    int count; /* of the directions below, the newest first: 0 to 2 */
+    int64_t tick, tick_before;
+    bst_vec3 direction, direction_before;
+    bool ended;        /* it has been there, and is no more */
+    int64_t jump_tick; /* when it was suddenly elsewhere, last */
+} bst_control_watch;
 
 #define BST_CONTROL_TRANSITIONS 4 /* greatest number in one observe and one update */
 
@@ -102,8 +140,12 @@ typedef struct bst_control {
     bst_nav_telemetry nav;
     bst_aberration aberration; /* by nav, once that is valid */
     bool nav_valid;
-    bst_control_held held;                    /* the track that the aim is on */
-    bst_control_held lost;                    /* the target that BST_MODE_REACQUIRE looks for */
+    bst_control_held held; /* the track that the aim is on */
+    bst_control_held lost; /* the target that BST_MODE_REACQUIRE looks for */
+    int64_t lost_tick;     /* since when */
+    bst_control_watch watch;
+    int64_t search_since_tick; /* when the present search began, failed candidates included */
+    bool gave_up;
     int64_t target_id;                        /* 0: the tracker names none */
     int64_t rejected_id;                      /* candidates up to this one have been given up */
     int64_t frame_tick, frame_interval_ticks; /* mid of the newest frame; shortest seen, 0: none */
@@ -111,6 +153,9 @@ typedef struct bst_control {
     bst_search search;
     int32_t search_step;
     int search_mode; /* BST_MODE_SEARCH or BST_MODE_REACQUIRE: where a failed acquisition goes */
+    bool search_in_region; /* tiles are angles of the cue's region */
+    /* a place of the region that the boresight does not follow: where it was at tile_tick */
+    bst_vec3 tile_gcrf, tile_rate_radps;
     bst_vec3 search_x_gcrf; /* image x axis at the start of the search */
     int64_t tile_tick;      /* when the tile was commanded */
     int64_t arrival_tick;   /* when the boresight came to rest on it; < 0: not yet */
@@ -118,6 +163,10 @@ typedef struct bst_control {
     /* newest telemetry */
     bst_pointing_sample pointing;
     bool pointing_valid, settled;
+    /* body attitude of the newest telemetry, and its smoothed rate, body axes */
+    bst_quat q_body_from_gcrf;
+    int64_t body_tick;
+    bst_vec3 body_rate_radps;
     bst_vec3 stare_gcrf;
     bool stare_valid;
     bst_guidance guidance;

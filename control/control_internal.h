@@ -27,6 +27,33 @@ void bst_control_forget_aims(bst_control *c);
 bst_status bst_control_boresight_at(bst_ctx *ctx, bst_control *c, int64_t tick, bool *valid,
                                     bst_vec3 *direction) BST_MUST_CHECK;
 
+/* The rate (rad/s) of what the cue expects in a direction: the cue's own, or that of the belt there
+ * when it gives a region; *known false: there is none. */
+bst_status bst_control_expected_rate(bst_ctx *ctx, const bst_control *c, int64_t tick,
+                                     bst_vec3 direction, bool *known,
+                                     bst_vec3 *rate_radps) BST_MUST_CHECK;
+
+/* Whether the boresight dwells on places of the region as they move. */
+bool bst_control_moves_with_region(const bst_control *c);
+
+/* ---- searching.c ---- */
+
+void bst_control_enter(bst_control *c, int mode, int64_t tick, const char *reason);
+
+/* Begins a search in BST_MODE_SEARCH or BST_MODE_REACQUIRE. */
+bst_status bst_control_start_search(bst_ctx *ctx, bst_control *c, int mode, int64_t tick,
+                                    const char *reason) BST_MUST_CHECK;
+/* Back to the place of the search that a failed candidate interrupted. */
+bst_status bst_control_resume_search(bst_ctx *ctx, bst_control *c, int64_t tick,
+                                     const char *reason) BST_MUST_CHECK;
+bst_status bst_control_next_tile(bst_ctx *ctx, bst_control *c, int64_t tick) BST_MUST_CHECK;
+/* A frame that shows nothing new counts for the dwell. */
+bst_status bst_control_count_frame(bst_ctx *ctx, bst_control *c, int64_t tick,
+                                   const bst_tracks *tracks) BST_MUST_CHECK;
+/* The best track that moves as the target should, NULL when there is none. */
+bst_status bst_control_best_candidate(bst_ctx *ctx, const bst_control *c, const bst_tracks *tracks,
+                                      const bst_track **out) BST_MUST_CHECK;
+
 /* ---- modes.c ---- */
 
 /* The first mode, out of BST_MODE_IDLE. */

@@ -1,68 +1,8 @@
 /* The mode logic: what brings one mode after another. */
 #include "control/control_internal.h"
 
-static void enter(bst_control *c, int mode, int64_t tick, const char *reason) {
-    if (c->transition_count < BST_CONTROL_TRANSITIONS) {
-        c->transitions[c->transition_count++] =
-            (bst_control_transition){.from = c->mode, .to = mode, .reason = reason};
-    }
-    c->mode = mode;
-    c->mode_tick = tick;
-    bst_control_forget_aims(c);
-}
-
-static void go_to_tile(bst_control *c, int32_t step, int64_t tick) {
-    c->search_step = step;
-    c->tile_tick = tick;
-    c->arrival_tick = -1;
-    c->frames = 0;
-    bst_control_forget_aims(c);
-}
-
-static bst_status start_search(bst_ctx *ctx, bst_control *c, int mode, int64_t tick,
-                               const char *reason) {
-    double extent = c->config.reacquire_extent_deg * BST_DEG_RAD;
-    if (mode == BST_MODE_SEARCH) {
-        bst_cue cue;
-        BST_TRY(bst_control_cue_at(ctx, c, tick, &cue));
-        extent = fmin(c->config.search_sigmas * (cue.valid ? cue.sigma_rad : 0.0),
-                      c->config.search_max_deg * BST_DEG_RAD);
-    }
-    bst_search_plan(&c->search, extent, 2.0 * atan(0.5 * c->env.width_px * c->env.pixel_rad),
-                    2.0 * atan(0.5 * c->env.height_px * c->env.pixel_rad), c->config.search_step);
-    bst_vec3 image_x = {cos(c->env.rotation_rad), sin(c->env.rotation_rad), 0.0};
-    c->search_x_gcrf = c->pointing_valid
-                           ? bst_quat_rotate(bst_quat_conj(c->pointing.q_cam_from_gcrf), image_x)
-                           : (bst_vec3){1, 0, 0};
-    c->search_mode = mode;
-    go_to_tile(c, 0, tick);
-    enter(c, mode, tick, reason);
-    return BST_OK;
-}
-
-/* Back to the place of the search that a failed candidate interrupted. */
-static void resume_search(bst_control *c, int64_t tick, const char *reason) {
-    if (c->held.id > c->rejected_id) {
-        c->rejected_id = c->held.id;
-    }
-    go_to_tile(c, c->search_step, tick);
-    enter(c, c->search_mode, tick, reason);
-}
-
-static bst_status next_tile(bst_ctx *ctx, bst_control *c, int64_t tick) {
-    /* the predicted place is the best one for as long as the prediction is good */
-    if (c->mode == BST_MODE_REACQUIRE && c->search_step == 0 &&
-        tick - c->lost.tick < bst_control_ticks(c, c->config.reacquire_coast_s)) {
-        return BST_OK;
-    }
-    if (c->search_step + 1 < c->search.count) {
-        go_to_tile(c, c->search_step + 1, tick);
-        return BST_OK;
-    }
-    return start_search(ctx, c, BST_MODE_SEARCH, tick,
-                        c->mode == BST_MODE_SEARCH ? "searched all, again from the cue"
-                                                   : "not near its predicted place");
-}
+/* Greatest angular acceleration of a cue: a pass at 100 km and 15 km/s has 1.5e-2 rad/s^2. */
+#define CUE_ACCEL_RADPS2 2e-2
 
 static bst_status hold(bst_ctx *ctx, bst_control *c, const bst_track *track, int64_t tick) {
     c->held.id = track->id;
@@ -102,47 +42,33 @@ static double off_boresight_px(const bst_control *c, const bst_tracks *tracks,
     return bst_vec3_angle(v, (bst_vec3){0, 0, 1}) / c->env.pixel_rad;
 }
 
-/* The best tentative track that moves as the target should, NULL when there is none. */
-static bst_status best_candidate(bst_ctx *ctx, const bst_control *c, const bst_tracks *tracks,
-                                 const bst_track **out) {
-    bst_cue cue;
-    BST_TRY(bst_control_cue_at(ctx, c, tracks->tick, &cue));
-    *out = NULL;
-    bst_vec3 rate = c->mode == BST_MODE_REACQUIRE ? c->lost.rate_gcrf_radps : cue.rate_gcrf_radps;
-    double rate_sigma = cue.valid ? cue.rate_sigma_radps : 0.0, best = 0.0;
-    if (!cue.valid && c->mode != BST_MODE_REACQUIRE) {
-        return BST_OK;
-    }
-    double own = c->config.candidate_rate_sigmas * rate_sigma;
-    double widest = fmax(2.0 * own, bst_vec3_norm(rate));
-    for (int i = 0; i < tracks->count; i++) {
-        const bst_track *t = &tracks->items[i];
-        if (t->hits < c->config.candidate_hits || t->score < c->config.candidate_score ||
-            t->id <= c->rejected_id) {
-            continue;
-        }
-        double off = bst_vec3_norm(bst_vec3_sub(t->rate_gcrf_radps, rate));
-        double variance = rate_sigma * rate_sigma + fmax(t->covariance[2][2], t->covariance[3][3]);
-        double gate = c->config.candidate_rate_sigmas * sqrt(variance);
-        /* a rate so uncertain that the track might as well stand still says nothing */
-        if (off > gate || gate > widest) {
-            continue;
-        }
-        double score = t->hits + 1.0 - off / gate; /* more hits first, then the nearer rate */
-        if (score > best) {
-            best = score;
-            *out = t;
-        }
-    }
-    return BST_OK;
+static void lose(bst_control *c, int64_t tick) {
+    c->lost = c->held;
+    c->lost_tick = tick;
 }
 
-/* Whether a frame with this mid-exposure was exposed wholly after the arrival. An exposure of
- * unknown length is taken to fill its frame period. */
-static bool at_rest(const bst_control *c, int64_t mid_tick) {
-    int64_t half = c->config.exposure_s > 0.0 ? bst_control_ticks(c, 0.5 * c->config.exposure_s)
-                                              : c->frame_interval_ticks / 2;
-    return c->arrival_tick >= 0 && half > 0 && mid_tick - half >= c->arrival_tick;
+/* A target that its orbit hides, or that has not been seen since: the prediction is all there is.
+ */
+static bst_status observe_hidden(bst_ctx *ctx, bst_control *c, int64_t tick,
+                                 const bst_tracks *tracks, const bst_track *target) {
+    BST_TRY(hold(ctx, c, target, tracks->tick));
+    if (target->hidden == BST_HIDDEN_AWAITED) {
+        /* what is searched about moves on with the prediction */
+        lose(c, c->mode == BST_MODE_REACQUIRE ? c->lost_tick : tick);
+        bst_control_forget_aims(c);
+        if (c->mode != BST_MODE_REACQUIRE) {
+            return bst_control_start_search(ctx, c, BST_MODE_REACQUIRE, tick,
+                                            "the target should be seen again");
+        }
+        return bst_control_count_frame(ctx, c, tick, tracks);
+    }
+    if (c->mode != BST_MODE_COAST) {
+        bst_control_enter(c, BST_MODE_COAST, tick,
+                          target->hidden == BST_HIDDEN_EARTH
+                              ? "the target is behind the Earth"
+                              : "the target is in the Earth's shadow");
+    }
+    return BST_OK;
 }
 
 /* A frame while nothing is held: take the target, or a candidate, or count the frame. */
@@ -150,46 +76,48 @@ static bst_status observe_searching(bst_ctx *ctx, bst_control *c, int64_t tick,
                                     const bst_tracks *tracks, const bst_track *target) {
     if (target) {
         BST_TRY(hold(ctx, c, target, tracks->tick));
-        enter(c, BST_MODE_ACQUIRE, tick, "the tracker names a target");
+        bst_control_enter(c, BST_MODE_ACQUIRE, tick, "the tracker names a target");
         return BST_OK;
     }
     if (c->mode == BST_MODE_SLEW) {
         return BST_OK;
     }
     const bst_track *candidate;
-    BST_TRY(best_candidate(ctx, c, tracks, &candidate));
+    BST_TRY(bst_control_best_candidate(ctx, c, tracks, &candidate));
     if (candidate) {
         BST_TRY(hold(ctx, c, candidate, tracks->tick));
-        enter(c, BST_MODE_ACQUIRE, tick, "a candidate moves as the target should");
+        bst_control_enter(c, BST_MODE_ACQUIRE, tick, "a candidate moves as the target should");
         return BST_OK;
     }
-    /* stars that give no valid attitude: the frame could show nothing */
-    bool wasted = tracks->attitude.stars > 0 && !tracks->attitude.valid;
-    if (!wasted && at_rest(c, tracks->tick) && ++c->frames >= c->config.dwell_frames) {
-        return next_tile(ctx, c, tick);
-    }
-    return BST_OK;
+    return bst_control_count_frame(ctx, c, tick, tracks);
 }
 
 static bst_status observe_holding(bst_ctx *ctx, bst_control *c, int64_t tick,
                                   const bst_tracks *tracks, const bst_track *target) {
-    bool was_target = c->mode == BST_MODE_TRACK;
+    bool was_target = c->mode == BST_MODE_TRACK || c->mode == BST_MODE_COAST;
     const bst_track *track = target ? target : find_track(tracks, c->held.id);
     if (was_target && !target) {
-        c->lost = c->held;
-        return start_search(ctx, c, BST_MODE_REACQUIRE, tick, "the tracker has lost the target");
+        lose(c, c->held.tick);
+        return bst_control_start_search(ctx, c, BST_MODE_REACQUIRE, tick,
+                                        "the tracker has lost the target");
     }
     if (!track) {
-        resume_search(c, tick, "the candidate is gone");
-        return BST_OK;
+        return bst_control_resume_search(ctx, c, tick, "the candidate is gone");
+    }
+    if (c->search_in_region && !target && track->uncorrelated) {
+        return bst_control_resume_search(ctx, c, tick, "the candidate is something else");
     }
     bool other = was_target && target->id != c->held.id;
     BST_TRY(hold(ctx, c, track, tracks->tick));
     double off = off_boresight_px(c, tracks, track);
     if (c->mode == BST_MODE_ACQUIRE && target && off <= c->config.track_entry_px) {
-        enter(c, BST_MODE_TRACK, tick, "the target is centred");
+        bst_control_enter(c, BST_MODE_TRACK, tick, "the target is centred");
+    } else if (c->mode == BST_MODE_COAST) {
+        bool centred = off <= c->config.track_entry_px;
+        bst_control_enter(c, centred ? BST_MODE_TRACK : BST_MODE_ACQUIRE, tick,
+                          "the target is seen again");
     } else if (other && off > c->config.arrive_tolerance_px) {
-        enter(c, BST_MODE_ACQUIRE, tick, "the tracker names another target");
+        bst_control_enter(c, BST_MODE_ACQUIRE, tick, "the tracker names another target");
     }
     return BST_OK;
 }
@@ -197,6 +125,9 @@ static bst_status observe_holding(bst_ctx *ctx, bst_control *c, int64_t tick,
 bst_status bst_control_take_frame(bst_ctx *ctx, bst_control *c, int64_t tick,
                                   const bst_tracks *tracks) {
     const bst_track *target = find_track(tracks, tracks->target_id);
+    if (target && target->hidden != BST_HIDDEN_NOT && c->config.strategy == BST_CONTROL_TRACK) {
+        return observe_hidden(ctx, c, tick, tracks, target);
+    }
     switch (c->mode) {
         case BST_MODE_IDLE:
             /* without a cue only a target that the tracker names by itself can be followed */
@@ -210,13 +141,15 @@ bst_status bst_control_take_frame(bst_ctx *ctx, bst_control *c, int64_t tick,
             return observe_searching(ctx, c, tick, tracks, target);
         case BST_MODE_ACQUIRE:
         case BST_MODE_TRACK:
+        case BST_MODE_COAST:
             return observe_holding(ctx, c, tick, tracks, target);
         default:
             return BST_OK;
     }
 }
 
-bst_status bst_control_start(bst_ctx *ctx, bst_control *c, int64_t tick) {
+/* Open-loop strategies begin as soon as there is something to aim at. */
+static bst_status start_open_loop(bst_ctx *ctx, bst_control *c, int64_t tick) {
     bst_cue cue;
     switch (c->config.strategy) {
         case BST_CONTROL_STARE:
@@ -224,26 +157,120 @@ bst_status bst_control_start(bst_ctx *ctx, bst_control *c, int64_t tick) {
             c->stare_valid = cue.valid;
             c->stare_gcrf = cue.direction_gcrf;
             if (cue.valid) {
-                enter(c, BST_MODE_STARE, tick, "the strategy");
+                bst_control_enter(c, BST_MODE_STARE, tick, "the strategy");
             }
             return BST_OK;
         case BST_CONTROL_RATE:
-        default:
             BST_TRY(bst_control_cue_at(ctx, c, tick, &cue));
             if (cue.valid) {
-                bool rate = c->config.strategy == BST_CONTROL_RATE;
-                enter(c, rate ? BST_MODE_RATE : BST_MODE_SLEW, tick,
-                      rate ? "the strategy" : "there is a cue");
+                bst_control_enter(c, BST_MODE_RATE, tick, "the strategy");
             }
+            return BST_OK;
+        case BST_CONTROL_FIXED:
+            bst_control_enter(c, BST_MODE_FIXED, tick, "the strategy");
+            return BST_OK;
+        default:
+            bst_control_enter(c, BST_MODE_SCAN, tick, "the strategy");
             return BST_OK;
     }
 }
 
+bst_status bst_control_start(bst_ctx *ctx, bst_control *c, int64_t tick) {
+    if (c->config.strategy != BST_CONTROL_TRACK) {
+        return start_open_loop(ctx, c, tick);
+    }
+    if (c->gave_up) {
+        return BST_OK;
+    }
+    if (c->env.region.kind != BST_REGION_NONE) {
+        if (!c->pointing_valid) {
+            return BST_OK; /* how the field lies to the region is not known yet */
+        }
+        c->search_since_tick = tick;
+        return bst_control_start_search(ctx, c, BST_MODE_SEARCH, tick,
+                                        "there is a region to search");
+    }
+    bst_cue cue;
+    BST_TRY(bst_control_cue_at(ctx, c, tick, &cue));
+    if (cue.valid) {
+        c->search_since_tick = tick;
+        bst_control_enter(c, BST_MODE_SLEW, tick, "there is a cue");
+    }
+    return BST_OK;
+}
+
+/* Modes in which nothing is held. */
+static bool is_looking(int mode) {
+    return mode == BST_MODE_SLEW || mode == BST_MODE_SEARCH || mode == BST_MODE_REACQUIRE;
+}
+
+/* The search's end when it has lasted too long. */
+static bool give_up(bst_control *c, int64_t tick) {
+    if (!is_looking(c->mode)) {
+        c->search_since_tick = tick;
+        return false;
+    }
+    if (!(c->config.search_timeout_s > 0.0) ||
+        tick - c->search_since_tick <= bst_control_ticks(c, c->config.search_timeout_s)) {
+        return false;
+    }
+    c->gave_up = true;
+    bst_control_enter(c, BST_MODE_IDLE, tick, "nothing found within search_timeout_s: given up");
+    return true;
+}
+
+/* A cue that is suddenly elsewhere, or is there again. */
+static bst_status watch_cue(bst_ctx *ctx, bst_control *c, int64_t tick) {
+    bool valid;
+    bst_vec3 now;
+    BST_TRY(
+        c->env.cue_direction_at(c->env.cue_user, ctx, bst_control_seconds(c, tick), &valid, &now));
+    bst_control_watch *w = &c->watch;
+    bool jumped = valid && w->ended;
+    if (valid && w->count == 2 && tick > w->tick) {
+        double dt = bst_control_seconds(c, tick - w->tick);
+        double before = bst_control_seconds(c, w->tick - w->tick_before);
+        bst_vec3 rate =
+            bst_vec3_scale(bst_vec3_sub(w->direction, w->direction_before), 1.0 / before);
+        double off = bst_vec3_norm(bst_vec3_sub(now, bst_vec3_axpy(w->direction, dt, rate)));
+        jumped = jumped || off > c->config.arrive_tolerance_px * c->env.pixel_rad +
+                                     CUE_ACCEL_RADPS2 * dt * (dt + before);
+    }
+    if (valid) {
+        bool first = w->count == 0 || jumped;
+        w->tick_before = first ? tick : w->tick;
+        w->direction_before = first ? now : w->direction;
+        w->tick = tick;
+        w->direction = now;
+        w->count = first ? 1 : 2;
+        w->ended = false;
+        if (jumped) {
+            w->jump_tick = tick;
+            c->gave_up = false;
+            bst_control_forget_aims(c);
+        }
+    } else if (w->count > 0) {
+        w->ended = true;
+    }
+    if (jumped && (c->mode == BST_MODE_SLEW || c->mode == BST_MODE_SEARCH) &&
+        !c->search_in_region) {
+        c->search_since_tick = tick;
+        bst_control_enter(c, BST_MODE_SLEW, tick, "the cue has moved");
+    }
+    return BST_OK;
+}
+
 bst_status bst_control_advance(bst_ctx *ctx, bst_control *c, int64_t tick, bool arrived) {
+    if (c->config.strategy == BST_CONTROL_TRACK) {
+        BST_TRY(watch_cue(ctx, c, tick));
+        if (give_up(c, tick)) {
+            return BST_OK;
+        }
+    }
     switch (c->mode) {
         case BST_MODE_SLEW:
             if (arrived) {
-                BST_TRY(start_search(ctx, c, BST_MODE_SEARCH, tick, "at the cue"));
+                BST_TRY(bst_control_start_search(ctx, c, BST_MODE_SEARCH, tick, "at the cue"));
                 c->arrival_tick = c->pointing.tick;
             }
             return BST_OK;
@@ -253,13 +280,14 @@ bst_status bst_control_advance(bst_ctx *ctx, bst_control *c, int64_t tick, bool 
                 c->arrival_tick = c->pointing.tick;
             }
             if (tick - c->tile_tick > bst_control_ticks(c, c->config.dwell_timeout_s)) {
-                return next_tile(ctx, c, tick);
+                return bst_control_next_tile(ctx, c, tick);
             }
             return BST_OK;
         case BST_MODE_ACQUIRE:
             if (tick - c->mode_tick > bst_control_ticks(c, c->config.acquire_timeout_s) &&
                 c->held.id != c->target_id) {
-                resume_search(c, tick, "the candidate was not confirmed in time");
+                return bst_control_resume_search(ctx, c, tick,
+                                                 "the candidate was not confirmed in time");
             }
             return BST_OK;
         default:

@@ -51,6 +51,16 @@ static bst_status cue_range_at(void *user, bst_ctx *ctx, double seconds, double 
     return BST_OK;
 }
 
+static bst_status region_at(void *user, bst_ctx *ctx, double seconds, double along_rad,
+                            double across_rad, bst_vec3 *direction) {
+    return bst_knowledge_region_direction_at(ctx, user, seconds, along_rad, across_rad, direction);
+}
+
+static bst_status belt_eye_at(void *user, bst_ctx *ctx, double seconds, bool *known,
+                              bst_belt_eye *eye) {
+    return bst_knowledge_belt_eye_at(ctx, user, seconds, known, eye);
+}
+
 static void destroy(void *self) {
     module *m = self;
     if (m) {
@@ -80,7 +90,10 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
                                        .cue_at = cue_at,
                                        .cue_direction_at = cue_direction_at,
                                        .cue_range_at = cue_range_at,
+                                       .region_at = region_at,
+                                       .belt_eye_at = belt_eye_at,
                                        .cue_user = m->view};
+        bst_knowledge_region(env->knowledge, &control_env.region);
         status = bst_control_init(env->ctx, &m->control, config, &control_env);
     }
     const bst_control_config *c = config;

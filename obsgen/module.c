@@ -269,7 +269,7 @@ static bst_status star_path(bst_ctx *ctx, const obsgen *o, const bst_los_track *
 }
 
 static bst_status reserve(bst_ctx *ctx, pending *p, int count) {
-    if (count <= p->room) {
+    if (p->truth && count <= p->room) {
         return BST_OK;
     }
     int room = count + count / 4 + 64;

@@ -277,7 +277,7 @@ static void share(bst_mtt *mtt) {
         int partner = -1;
         double nearest2 = near2;
         for (int u = 0; u < mtt->track_count; u++) {
-            if (u == t || mtt->tracks[u].status == BST_TRACK_TENTATIVE ||
+            if (u == t || mtt->tracks[u].status == BST_TRACK_TENTATIVE || mtt->tracks[u].asleep ||
                 (mtt->tracks[u].star && mtt->detection_of_track[u] < 0)) {
                 continue;
             }

@@ -95,7 +95,11 @@ static void start_all(bst_mtt *mtt, rate_gate gate, const bst_mtt_frame *frame, 
             continue;
         }
         bst_mtt_detection *detection = &mtt->now.items[i];
-        if (from_cue) {
+        if (from_cue && frame->expected_rate) {
+            if (!frame->expected_rate(frame->user, detection->sky.direction, &gate.rate_radps)) {
+                continue;
+            }
+        } else if (from_cue) {
             gate.rate_radps =
                 bst_tangent_carry(frame->cue_direction, detection->sky.direction,
                                   bst_tangent_project(frame->cue_direction, frame->cue_rate_radps));

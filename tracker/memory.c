@@ -6,6 +6,8 @@
 
 /* Log-likelihood by which the best remembered track must lead the second. */
 #define LEAD 2.0
+/* 1 sigma by which the brightness of what wakes may differ from what the shadow leaves of it. */
+#define DIMMING_MAG 0.5
 
 static void forget(bst_mtt *m, int i) {
     m->memory_count--;
@@ -39,30 +41,56 @@ void bst_mtt_remember(bst_mtt *m, const bst_mtt_track *track) {
     m->memory[m->memory_count++] = *track;
 }
 
-bool bst_mtt_resume(bst_mtt *m, bst_mtt_track *track) {
-    int best = -1;
-    double lowest = INFINITY, second = INFINITY;
-    for (int i = 0; i < m->memory_count; i++) {
-        double chi2 = bst_sky_distance2(&m->memory[i].state, &track->state);
-        if (!(chi2 <= m->params.memory_chi2)) {
-            continue;
-        }
-        double misfit = chi2 + bst_log_det4(m->memory[i].state.covariance);
-        if (misfit < lowest) {
-            second = lowest;
-            lowest = misfit;
-            best = i;
-        } else if (misfit < second) {
-            second = misfit;
+/* The best and the second of what a track may be. */
+typedef struct resume_choice {
+    bst_mtt_track *best;
+    double lowest, second;
+} resume_choice;
+
+static void weigh(const bst_mtt *m, const bst_mtt_track *track, bst_mtt_track *before,
+                  resume_choice *choice) {
+    double chi2 = bst_sky_distance2(&before->state, &track->state);
+    if (before->asleep && before->full_snr > 0.0 && before->sunlight > 0.0) {
+        double dimmed = before->full_v_mag - 2.5 * log10(before->sunlight);
+        double variance =
+            before->v_mag_variance + track->v_mag_variance + DIMMING_MAG * DIMMING_MAG;
+        chi2 += (track->v_mag - dimmed) * (track->v_mag - dimmed) / variance;
+    }
+    if (!(chi2 <= m->params.memory_chi2)) {
+        return;
+    }
+    double misfit = chi2 + bst_log_det4(before->state.covariance);
+    if (misfit < choice->lowest) {
+        choice->second = choice->lowest;
+        choice->lowest = misfit;
+        choice->best = before;
+    } else if (misfit < choice->second) {
+        choice->second = misfit;
+    }
+}
+
+bool bst_mtt_resume(bst_mtt *m, bst_mtt_track *track, bool anew) {
+    resume_choice choice = {.lowest = INFINITY, .second = INFINITY};
+    for (int i = 0; anew && i < m->memory_count; i++) {
+        weigh(m, track, &m->memory[i], &choice);
+    }
+    for (int t = 0; t < m->track_count; t++) {
+        const bst_mtt_track *sleeper = &m->tracks[t];
+        if (sleeper->asleep && !sleeper->replaced && sleeper->sight < BST_MTT_DARK &&
+            track->first_tick > sleeper->last_update_tick) {
+            weigh(m, track, &m->tracks[t], &choice);
         }
     }
-    if (best < 0 || 0.5 * (second - lowest) < LEAD) {
+    bst_mtt_track *before = choice.best;
+    if (!before || 0.5 * (choice.second - choice.lowest) < LEAD) {
         return false;
     }
-    const bst_mtt_track *before = &m->memory[best];
     track->id = before->id;
     track->hits += before->hits;
     track->first_tick = before->first_tick;
+    track->full_snr = before->full_snr;
+    track->full_v_mag = before->full_v_mag;
+    track->lit = before->lit;
     if (before->orbit.valid) {
         /* the orbit knows more than the few detections since */
         bst_orbit_track orbit = before->orbit;
@@ -73,6 +101,10 @@ bool bst_mtt_resume(bst_mtt *m, bst_mtt_track *track) {
             track->models.count = 0;
         }
     }
-    forget(m, best);
+    if (before->asleep && before >= m->tracks && before < m->tracks + m->track_count) {
+        before->replaced = true;
+    } else {
+        forget(m, (int)(before - m->memory));
+    }
     return true;
 }

@@ -165,6 +165,8 @@ static bst_status take(tracker_module *m, struct bst_step *step, const bst_detec
                                   .rate_sigma_radps = cue.rate_sigma_radps,
                                   .v_mag = cue.v_mag,
                                   .v_mag_sigma = cue.v_mag_sigma};
+    BST_TRY(bst_knowledge_belt_eye_at(bst_step_ctx(step), m->view, seconds, &input.cue.in_region,
+                                      &input.cue.belt_eye));
     if (m->orbits) {
         bool known;
         BST_TRY(bst_knowledge_cue_range_at(bst_step_ctx(step), m->view, seconds, &known,

@@ -5,6 +5,8 @@
 
 #include "tracker/multitarget_internal.h"
 
+#define JUMP_FLOOR_RAD 1e-6
+
 static bool pool_create(bst_mtt_pool *pool, int capacity) {
     size_t n = (size_t)capacity + 1;
     pool->order = calloc(n, sizeof *pool->order);
@@ -151,6 +153,11 @@ static bool cue_acceleration(const bst_mtt_frame *frame, double dt_s, bst_vec3 *
         return false;
     }
     *step = bst_vec3_scale(bst_tangent_log(now, cue.direction), -1.0);
+    /* what accelerates evenly is off by half the change of its rate; a cue that is off by more than
+     * its rate has jumped */
+    if (bst_vec3_norm(*step) > 2.0 * bst_vec3_norm(frame->cue_rate_radps) * dt_s + JUMP_FLOOR_RAD) {
+        return false;
+    }
     *rate = bst_vec3_sub(bst_tangent_project(now, frame->cue_rate_radps),
                          bst_tangent_carry(cue.direction, now, cue.rate_radps));
     return true;
@@ -176,6 +183,7 @@ static void shift(bst_mtt_track *track, const bst_mtt_frame *frame, bst_vec3 ste
 static void predict(bst_mtt *m, const bst_mtt_frame *frame) {
     double dt = frame->seconds - m->seconds;
     bst_vec3 step = {0}, rate = {0};
+    m->sleepers = 0;
     bool forward = m->started && cue_acceleration(frame, dt, &step, &rate);
     for (int t = 0; t < m->track_count; t++) {
         bst_mtt_track *track = &m->tracks[t];
@@ -193,6 +201,7 @@ static void predict(bst_mtt *m, const bst_mtt_frame *frame) {
         m->observable[t] =
             !(frame->partial && track->status == BST_TRACK_TENTATIVE) &&
             (!frame->in_field || frame->in_field(frame->user, track->state.direction));
+        bst_mtt_look(m, t, frame);
     }
     bst_mtt_predict_memory(m, frame);
     for (int i = 0; forward && i < m->memory_count; i++) {
@@ -305,6 +314,7 @@ static void hit(bst_mtt *m, int t) {
         record(m, BST_MTT_MANOEUVRE, track, statistic);
     }
     take_brightness(m, track, detection, dt);
+    bst_mtt_note_light(track);
 }
 
 /* 99.9 % quantile of chi-square (Wilson and Hilferty 1931). */
@@ -322,7 +332,7 @@ static bool may_confirm(const bst_mtt *m, const bst_mtt_track *track) {
     /* a second copy of what is tracked already is no new object */
     for (int u = 0; u < m->track_count; u++) {
         const bst_mtt_track *other = &m->tracks[u];
-        if (other != track && other->status != BST_TRACK_TENTATIVE &&
+        if (other != track && !other->asleep && other->status != BST_TRACK_TENTATIVE &&
             bst_vec3_dot(other->state.direction, track->state.direction) > 0.99999 &&
             bst_sky_distance2(&other->state, &track->state) < 13.3) { /* 99 %, 4 dof */
             return false;
@@ -335,6 +345,11 @@ static bool may_confirm(const bst_mtt *m, const bst_mtt_track *track) {
 static bool is_finished(const bst_mtt *m, const bst_mtt_track *track, bool observed) {
     const bst_mtt_params *p = &m->params;
     double variance = fmax(track->state.covariance[0][0], track->state.covariance[1][1]);
+    if (track->asleep) {
+        return m->seconds - track->last_update_s > p->memory_s ||
+               !(variance < p->memory_sigma_rad * p->memory_sigma_rad) ||
+               track->misses_in_row > p->max_misses;
+    }
     /* nothing is known of a tentative track that would be worth waiting for */
     double patience_s =
         track->status == BST_TRACK_TENTATIVE
@@ -376,7 +391,7 @@ static void judge(bst_mtt *m, const bst_mtt_frame *frame) {
         }
         bool taken = m->detection_of_track[t] >= 0 && track->merged_in_row <= m->params.max_merged;
         track->frames += m->observable[t];
-        if (m->observable[t] && !taken) {
+        if (track->may_miss && !taken) {
             track->misses_in_row++;
             track->score += log(1.0 - m->params.detection_probability);
         }
@@ -391,9 +406,12 @@ static void judge(bst_mtt *m, const bst_mtt_frame *frame) {
         }
         if (track->status != BST_TRACK_TENTATIVE) {
             track->status = taken ? BST_TRACK_CONFIRMED : BST_TRACK_COASTING;
+            if (taken && m->sleepers > 0 && bst_mtt_resume(m, track, false)) {
+                record(m, BST_MTT_RESUMED, track, 0.0);
+            }
         } else if (taken && may_confirm(m, track)) {
             track->status = BST_TRACK_CONFIRMED;
-            bool resumed = bst_mtt_resume(m, track);
+            bool resumed = bst_mtt_resume(m, track, true);
             record(m, resumed ? BST_MTT_RESUMED : BST_MTT_CONFIRMED, track, 0.0);
         }
     }
@@ -401,6 +419,9 @@ static void judge(bst_mtt *m, const bst_mtt_frame *frame) {
     m->rest_count = 0;
     for (int t = 0; t < m->track_count; t++) {
         const bst_mtt_track *track = &m->tracks[t];
+        if (track->replaced) {
+            continue;
+        }
         if (!is_finished(m, track, m->observable[t])) {
             m->rest_count += track->at_rest;
             if (kept != t) {
@@ -464,7 +485,7 @@ void bst_mtt_skip(bst_mtt *m, const bst_mtt_frame *frame) {
     predict(m, frame);
     m->now.count = 0;
     for (int t = 0; t < m->track_count; t++) {
-        m->observable[t] = false;
+        m->observable[t] = m->tracks[t].may_miss = false;
         m->detection_of_track[t] = -1;
         m->tracks[t].last_chi2 = -1.0;
     }

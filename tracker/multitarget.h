@@ -77,6 +77,15 @@ typedef struct bst_mtt_params {
 
 #define BST_MTT_EVENT_WINDOW 16
 
+/* What there is to see of an object, as its orbit has it. */
+typedef enum bst_mtt_sight {
+    BST_MTT_CLEAR = 0,
+    BST_MTT_FAINT,  /* it may be too dim to be seen, or behind the Earth's limb: no miss counts */
+    BST_MTT_SHADOW, /* too dim */
+    BST_MTT_DARK,   /* for sure without any light */
+    BST_MTT_EARTH,  /* behind the Earth */
+} bst_mtt_sight;
+
 /* One detection that is not a star, on the sky. */
 typedef struct bst_mtt_detection {
     bst_sky_measurement sky; /* geometric */
@@ -105,8 +114,17 @@ typedef struct bst_mtt_track {
     double first_length_rad;
     bool moved;   /* the latest detection lies farther from the first than their images are long */
     bool at_rest; /* shows no motion and is not what the cue expects */
-    bool star;    /* and is known to be slower than any object: its rate is zero, its status is not
-                     tentative, its life is only ended by max_coast_s */
+    bst_mtt_sight sight; /* in the latest frame; BST_MTT_CLEAR without an orbit */
+    double sunlight;     /* share of the Sun's light, in the latest frame; with an orbit only */
+    /* It has been hidden and was not seen again yet: it only follows its orbit, and wakes when what
+     * is confirmed anew is known again as it. Ends as what is remembered does, or by misses. */
+    bool asleep;
+    bool lit;                    /* it has had an orbit by which there was something to see */
+    bool replaced;               /* by the track that it woke as, in this frame */
+    bool may_miss;               /* in the latest frame */
+    double full_snr, full_v_mag; /* smoothed over detections in full light; SNR 0: none yet */
+    bool star; /* and is known to be slower than any object: its rate is zero, its status is not
+                  tentative, its life is only ended by max_coast_s */
     /* normalised innovations of the latest hits: two of place, one of brightness; rings */
     double innovations[BST_MTT_EVENT_WINDOW][2], brightness[BST_MTT_EVENT_WINDOW];
     int innovation_count, brightness_count; /* since the start or the latest event */
@@ -130,12 +148,18 @@ typedef struct bst_mtt_frame {
     bst_vec3 cue_direction, cue_rate_radps;
     bst_vec3 cue_before_direction, cue_before_rate_radps;
     double cue_rate_sigma_radps;
+    /* The rate that the cue expects of what is seen in a direction; false: none. NULL: the cue's
+     * own rate everywhere. */
+    bool (*expected_rate)(const void *user, bst_vec3 direction, bst_vec3 *rate_radps);
     /* Is a track what the cue expects, so that its slowness says nothing? NULL: none is. */
     bool (*expected)(const void *user, const bst_mtt_track *track);
     /* Where the observer is, for tracks on orbits; NULL: their orbits wait. */
     const bst_od_observer *observer;
     /* What is believed of a confirmed track's range; false: nothing. NULL: nothing of any. */
     bool (*range)(const void *user, const bst_mtt_track *track, bst_orbit_range *out);
+    /* What there is to see of a confirmed track with an orbit at the frame's time; *sunlight is the
+     * share of the Sun's light that it gets. NULL: everything is in full light. */
+    bst_mtt_sight (*sight)(const void *user, const bst_mtt_track *track, double *sunlight);
     /* 1 sigma per axis of an apparent rate that all of this frame's directions may share */
     double common_rate_sigma_radps;
 } bst_mtt_frame;

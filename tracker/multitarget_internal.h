@@ -30,6 +30,7 @@ struct bst_mtt {
     int memory_count;
     int track_count;
     int rest_count; /* of them at rest */
+    int sleepers;   /* of them asleep in this frame */
     int64_t next_id;
     double seconds; /* of the latest frame */
     bool started;
@@ -76,6 +77,12 @@ void bst_mtt_associate(bst_mtt *mtt, bool partial);
  * the likeliest. Returns their number. */
 int bst_mtt_gated(const bst_mtt *mtt, int t, int *columns);
 
+/* Notes what there is to see of track t, already predicted, and whether it sleeps; sets observable
+ * and may_miss, the former having said whether its place is in the field. */
+void bst_mtt_look(bst_mtt *mtt, int t, const bst_mtt_frame *frame);
+/* After a detection: notes what the track looks like in full light, if it is in that. */
+void bst_mtt_note_light(bst_mtt_track *track);
+
 /* Carries the memory to a frame; forgets what is too old or too vague. */
 void bst_mtt_predict_memory(bst_mtt *mtt, const bst_mtt_frame *frame);
 /* A track that has an orbit follows it to a frame; false: it has none, or the frame does not say
@@ -85,9 +92,10 @@ bool bst_mtt_predict_orbit(const bst_mtt *mtt, bst_mtt_track *track, const bst_m
 void bst_mtt_update_orbits(bst_mtt *mtt, const bst_mtt_frame *frame);
 /* Remembers a confirmed track that is deleted. */
 void bst_mtt_remember(bst_mtt *mtt, const bst_mtt_track *track);
-/* Gives a track that has just been confirmed the identity of the remembered one that it is; false
- * when it is none of them. */
-bool bst_mtt_resume(bst_mtt *mtt, bst_mtt_track *track);
+/* Gives a confirmed track the identity of what it is: of a remembered one, when it has been
+ * confirmed `anew`, or of a sleeping one that was not seen any more when it began, and that is then
+ * `replaced`. False when it is none of them. */
+bool bst_mtt_resume(bst_mtt *mtt, bst_mtt_track *track, bool anew);
 
 /* Note a hit's innovation, and the difference of its magnitude over its standard deviation; true
  * when the latest ones together are an event, which starts the window anew. dt_s is the time since

@@ -13,13 +13,23 @@ static void add2(bst_target_fit *fit, const double x[2], double p11, double p12,
     }
 }
 
+bst_vec3 bst_target_expected_rate(const bst_target_cue *cue, bst_vec3 direction) {
+    bst_vec3 rate;
+    double range_m, range_rate_mps;
+    if (cue->in_region &&
+        bst_belt_motion(&cue->belt_eye, direction, &rate, &range_m, &range_rate_mps)) {
+        return rate;
+    }
+    return bst_tangent_carry(cue->direction, direction,
+                             bst_tangent_project(cue->direction, cue->rate_radps));
+}
+
 /* Rate of the track less that of the cue, and its covariance (11, 12, 22), in the track's axes. */
 static void rate_difference(const bst_target_params *params, const bst_target_cue *cue,
                             const bst_mtt_track *track, double x[2], double p[3]) {
     const bst_sky_state *s = &track->state;
     bst_tangent axes = bst_tangent_at(s->direction);
-    bst_vec3 cue_rate = bst_tangent_carry(cue->direction, s->direction,
-                                          bst_tangent_project(cue->direction, cue->rate_radps));
+    bst_vec3 cue_rate = bst_target_expected_rate(cue, s->direction);
     bst_vec3 difference = bst_vec3_sub(s->rate_radps, cue_rate);
     double own = cue->rate_sigma_radps * cue->rate_sigma_radps +
                  params->rate_floor_radps * params->rate_floor_radps;

@@ -2,6 +2,7 @@
 #ifndef BST_TRACKER_TARGET_H
 #define BST_TRACKER_TARGET_H
 
+#include "sim/astro/belt.h"
 #include "tracker/multitarget.h"
 
 typedef struct bst_target_params {
@@ -29,7 +30,12 @@ typedef struct bst_target_cue {
     bst_vec3 direction, rate_radps;
     double sigma_rad, rate_sigma_radps;
     double v_mag, v_mag_sigma;
+    bool in_region; /* the rate is that of the belt at the track's place, seen from: */
+    bst_belt_eye belt_eye;
 } bst_target_cue;
+
+/* The rate that a valid cue expects of what is seen in a direction, perpendicular to it. */
+bst_vec3 bst_target_expected_rate(const bst_target_cue *cue, bst_vec3 direction);
 
 typedef struct bst_target {
     int64_t id; /* 0: none */

@@ -1,51 +1,9 @@
-#include "tracker/tracker.h"
+#include "tracker/tracker_internal.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/astro/bodies.h"
-#include "sim/world/kepler.h"
-#include "tracker/attitude.h"
-#include "tracker/attitude_error.h"
 #include "tracker/sky_of_detection.h"
-#include "tracker/target.h"
-
-/* Places in the cache of catalogue directions; a power of two. */
-#define STAR_CACHE 4096
-/* Stars of one frame that the attitude looks at. */
-#define MAX_STARS 16384
-
-typedef struct cached_star {
-    uint32_t id; /* 0: empty */
-    bst_vec3 icrs;
-} cached_star;
-
-struct bst_tracker {
-    bst_camera camera;
-    double tick_rate_hz;
-    bst_tracker_star_fn star;
-    void *star_user;
-    bst_attitude_params attitude_params;
-    bst_attitude_error_params error_params;
-    bst_target_params target_params;
-    bool orbits;
-    double assumed_range_m, range_sigma, range_rate_sigma_mps;
-    double floor_variance_px2, blend_variance_px2, max_variance_px2, edge_margin_px,
-        max_attitude_sigma_rad;
-    int max_detections;
-    bst_mtt *mtt;
-    cached_star *cache;
-    bst_attitude_star *stars;
-    bst_mtt_detection *detections;
-    bst_tracker_event *events;
-    size_t event_capacity;
-    int event_count;
-    bst_attitude_error error;
-    bst_target target;
-    bst_tracker_cue cue_before;
-    bool started, attitude_was_lost;
-    int64_t last_exposure_id, last_tick;
-};
 
 static double arcsec(double v) {
     return v * BST_ARCSEC_RAD;
@@ -323,63 +281,6 @@ static int collect_objects(bst_tracker *t, const bst_detections *d, const frame_
     return count;
 }
 
-/* What is asked of one frame. */
-typedef struct frame_view {
-    const bst_tracker *tracker;
-    bst_quat q_cam_from_gcrf;
-    bst_light light;
-    bst_target_cue cue;
-    double range_m, range_rate_mps; /* of the cue's object; range 0: not known */
-    bst_od_observer observer;
-} frame_view;
-
-static bool in_field(const void *user, bst_vec3 direction) {
-    const frame_view *f = user;
-    const bst_camera *camera = &f->tracker->camera;
-    double x, y, margin = f->tracker->edge_margin_px;
-    bst_vec3 v = bst_quat_rotate(f->q_cam_from_gcrf, bst_light_aberrate(&f->light, direction));
-    return bst_camera_project(camera, v, &x, &y) && x >= margin && y >= margin &&
-           x <= (double)(camera->width_px - 1) - margin &&
-           y <= (double)(camera->height_px - 1) - margin;
-}
-
-static bool is_expected(const void *user, const bst_mtt_track *track) {
-    const frame_view *f = user;
-    const bst_tracker *t = f->tracker;
-    return bst_target_is_expected(&t->target_params, &f->cue, track, track->id == t->target.id);
-}
-
-/* Range rates of orbits about the Earth, 1 sigma. */
-static const double ANY_RANGE_RATE_MPS = 3000.0;
-
-static bool range_of(const void *user, const bst_mtt_track *track, bst_orbit_range *out) {
-    const frame_view *f = user;
-    const bst_tracker *t = f->tracker;
-    bool cued = f->range_m > 0.0 && is_expected(user, track);
-    if (!cued && !(t->assumed_range_m > 0.0)) {
-        return false;
-    }
-    double range = cued ? f->range_m : t->assumed_range_m;
-    *out = (bst_orbit_range){
-        .range_m = range,
-        .range_sigma_m = t->range_sigma * range,
-        .range_rate_mps = cued ? f->range_rate_mps : 0.0,
-        .range_rate_sigma_mps = cued ? t->range_rate_sigma_mps : ANY_RANGE_RATE_MPS};
-    return true;
-}
-
-/* The observer in mid-exposure, from navigation telemetry of about that time. */
-static bool find_observer(const bst_tracker *t, const bst_nav_telemetry *nav, double seconds,
-                          bst_od_observer *out) {
-    bst_ctx quiet = {0}; /* telemetry that is no orbit is no failure of the run */
-    double dt = seconds - (double)nav->tick / t->tick_rate_hz;
-    out->time_s = seconds;
-    out->earth_bary_mps = bst_vec3_sub(nav->velocity_bary_mps, nav->velocity_gcrf_mps);
-    return bst_kepler_propagate(&quiet, BST_EARTH_MU_M3PS2, nav->position_gcrf_m,
-                                nav->velocity_gcrf_mps, dt, &out->position_m,
-                                &out->velocity_mps) == BST_OK;
-}
-
 static void add_event(bst_tracker *t, bst_tracker_event_kind kind, const bst_mtt_track *track) {
     if ((size_t)t->event_count == t->event_capacity) {
         return;
@@ -438,7 +339,11 @@ static void write_track(const bst_tracker *t, const bst_target_cue *cue, const b
                     .x_px = track->x_px,
                     .y_px = track->y_px,
                     .uncorrelated = !is_target && track->status != BST_TRACK_TENTATIVE &&
-                                    !bst_target_is_expected(&t->target_params, cue, track, false)};
+                                    !bst_target_is_expected(&t->target_params, cue, track, false),
+                    .hidden = !track->asleep                  ? BST_HIDDEN_NOT
+                              : track->sight == BST_MTT_EARTH ? BST_HIDDEN_EARTH
+                              : track->sight == BST_MTT_CLEAR ? BST_HIDDEN_AWAITED
+                                                              : BST_HIDDEN_SHADOW};
     memcpy(out->covariance, track->state.covariance, sizeof out->covariance);
 }
 
@@ -527,26 +432,29 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
     find_attitude(t, d, &light, tick, dt, &attitude);
     t->event_count = 0;
     const bst_tracker_cue *cue = &input->cue;
-    frame_view view = {.tracker = t,
-                       .q_cam_from_gcrf = attitude.q_cam_from_gcrf,
-                       .light = light,
-                       .range_m = cue->range_m,
-                       .range_rate_mps = cue->range_rate_mps,
-                       .cue = {.valid = cue->valid,
-                               .direction = cue->direction_gcrf,
-                               .rate_radps = cue->rate_gcrf_radps,
-                               .sigma_rad = cue->sigma_rad,
-                               .rate_sigma_radps = cue->rate_sigma_radps,
-                               .v_mag = cue->v_mag,
-                               .v_mag_sigma = cue->v_mag_sigma}};
+    bst_frame_view view = {.tracker = t,
+                           .q_cam_from_gcrf = attitude.q_cam_from_gcrf,
+                           .light = light,
+                           .range_m = cue->range_m,
+                           .range_rate_mps = cue->range_rate_mps,
+                           .cue = {.valid = cue->valid,
+                                   .direction = cue->direction_gcrf,
+                                   .rate_radps = cue->rate_gcrf_radps,
+                                   .sigma_rad = cue->sigma_rad,
+                                   .rate_sigma_radps = cue->rate_sigma_radps,
+                                   .v_mag = cue->v_mag,
+                                   .v_mag_sigma = cue->v_mag_sigma,
+                                   .in_region = cue->in_region,
+                                   .belt_eye = cue->belt_eye}};
     bst_mtt_frame frame = {.tick = tick,
                            .seconds = seconds,
                            .detections = t->detections,
                            .partial = d->windows > 0,
-                           .in_field = in_field,
-                           .expected = is_expected,
-                           .range = range_of,
+                           .in_field = bst_frame_in_field,
+                           .expected = bst_frame_is_expected,
+                           .range = bst_frame_range_of,
                            .user = &view,
+                           .expected_rate = cue->in_region ? bst_frame_expected_rate : NULL,
                            .cue_valid = cue->valid,
                            .cue_before_valid = t->cue_before.valid,
                            .cue_direction = cue->direction_gcrf,
@@ -555,8 +463,10 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
                            .cue_before_rate_radps = t->cue_before.rate_gcrf_radps,
                            .cue_rate_sigma_radps = cue->rate_sigma_radps,
                            .common_rate_sigma_radps = attitude.rate_sigma_radps};
-    if (t->orbits && find_observer(t, input->nav, seconds, &view.observer)) {
+    if (t->orbits && bst_frame_observer(t, input->nav, seconds, &view.observer)) {
         frame.observer = &view.observer;
+        frame.sight = bst_frame_sight_of;
+        view.threshold_snr = d->threshold_snr > 0.0 ? d->threshold_snr : USUAL_THRESHOLD_SNR;
     }
     int detections_lost = 0;
     if (attitude.usable) {

@@ -6,6 +6,7 @@
 #ifndef BST_TRACKER_TRACKER_H
 #define BST_TRACKER_TRACKER_H
 
+#include "sim/astro/belt.h"
 #include "sim/core/config.h"
 #include "sim/core/messages.h"
 #include "sim/world/camera.h"
@@ -53,6 +54,10 @@ typedef struct bst_tracker_cue {
     double sigma_rad, rate_sigma_radps;
     double v_mag, v_mag_sigma;
     double range_m, range_rate_mps; /* of the cue's object; range 0: not known */
+    /* the cue is a region: direction is its middle, and what is looked for moves as the belt does
+     * wherever it is */
+    bool in_region;
+    bst_belt_eye belt_eye;
 } bst_tracker_cue;
 
 typedef struct bst_tracker_input {

@@ -63,6 +63,7 @@ const bst_channel_type *bst_channel_type_find(const char *name) {
 
 const char *bst_mode_name(int mode) {
     static const char *const names[BST_MODE_COUNT] = {"idle",  "slew",      "search", "acquire",
-                                                      "track", "reacquire", "stare",  "rate"};
+                                                      "track", "reacquire", "stare",  "rate",
+                                                      "coast", "fixed",     "scan"};
     return mode >= 0 && mode < BST_MODE_COUNT ? names[mode] : "unknown";
 }

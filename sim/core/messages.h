@@ -291,6 +291,14 @@ typedef enum bst_track_status {
     BST_TRACK_COASTING, /* confirmed, no detection in the latest frames */
 } bst_track_status;
 
+/* What keeps a track's object from being seen, as its believed orbit has it. */
+typedef enum bst_track_hidden {
+    BST_HIDDEN_NOT = 0,
+    BST_HIDDEN_SHADOW,  /* in the Earth's shadow */
+    BST_HIDDEN_EARTH,   /* behind the Earth */
+    BST_HIDDEN_AWAITED, /* nothing any more, but it has not been seen again yet */
+} bst_track_hidden;
+
 typedef struct bst_track {
     int64_t id; /* 1, 2, ...: never reused */
     int32_t status;
@@ -307,6 +315,8 @@ typedef struct bst_track {
     int64_t first_tick, last_update_tick;
     double x_px, y_px; /* latest detection, full-sensor coordinates */
     bool uncorrelated; /* confirmed, and neither the target nor what the cue expects */
+    int32_t hidden;    /* bst_track_hidden; other than 0: coasting, and no detection is taken for it
+                          before one of its place and motion has been confirmed on its own */
 } bst_track;
 
 /* Attitude from stars, and the telemetry's error that follows from it. */
@@ -359,6 +369,9 @@ typedef enum bst_mode {
     BST_MODE_REACQUIRE, /* target lost: predicted place, then search about it */
     BST_MODE_STARE,     /* open loop, inertial */
     BST_MODE_RATE,      /* open loop, on the cue */
+    BST_MODE_COAST,     /* on the prediction of a target that cannot be seen */
+    BST_MODE_FIXED,     /* open loop, a direction held in inertial space or in the body */
+    BST_MODE_SCAN,      /* open loop, along an arc at a constant rate */
     BST_MODE_COUNT
 } bst_mode;
 

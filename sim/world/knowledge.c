@@ -155,15 +155,28 @@ void bst_knowledge_view_free(bst_knowledge_view *view) {
     }
 }
 
+static const world_sensor *sensor_of(const bst_knowledge *k) {
+    return &k->world->observers[k->observer].sensors[k->sensor];
+}
+
+/* Onboard time, and where the observer believes to be. */
+static bst_status believed_eye(bst_ctx *ctx, bst_knowledge_view *view, double seconds, double *t,
+                               bst_state *eye) {
+    const bst_knowledge *k = view->knowledge;
+    *t = bst_believed_seconds(k->world, k->observer, k->sensor, seconds);
+    BST_TRY(bst_orbit_state(ctx, &k->world->observers[k->observer].orbit, view->clock,
+                            k->world->epoch, *t, true, eye));
+    bst_believe(k->world, k->observer, k->sensor, *t, eye);
+    return BST_OK;
+}
+
 /* Where the target nominally is, as the spacecraft reckons it. */
 static bst_status nominal_direction(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                     bst_vec3 *out) {
     const bst_knowledge *k = view->knowledge;
-    double t = bst_believed_seconds(k->world, k->observer, k->sensor, seconds);
+    double t;
     bst_state eye;
-    BST_TRY(bst_orbit_state(ctx, &k->world->observers[k->observer].orbit, view->clock,
-                            k->world->epoch, t, true, &eye));
-    bst_believe(k->world, k->observer, k->sensor, t, &eye);
+    BST_TRY(believed_eye(ctx, view, seconds, &t, &eye));
     return bst_cue_nominal_direction(ctx, k->world, k->observer, k->sensor, view->clock, t, &eye,
                                      out);
 }
@@ -229,14 +242,18 @@ bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double s
     for (int i = 0; i < 3; i++) {
         BST_TRY(direction_at(ctx, view, seconds + (i - 1) * h, &d[i]));
     }
-    const world_sensor *sensor = &k->world->observers[k->observer].sensors[k->sensor];
+    const world_sensor *sensor = sensor_of(k);
     const bst_cue_config *cue = &sensor->config.cue;
     bst_quat error = view->cue_error;
     out->valid = true;
     out->direction_gcrf = bst_quat_rotate(error, d[1]);
     out->rate_gcrf_radps =
         bst_quat_rotate(error, bst_vec3_scale(bst_vec3_sub(d[2], d[0]), 0.5 / h));
-    out->sigma_rad = cue->sigma_deg * BST_DEG_RAD;
+    bst_region region;
+    bst_knowledge_region(k, &region);
+    out->sigma_rad = region.kind == BST_REGION_NONE
+                         ? cue->sigma_deg * BST_DEG_RAD
+                         : fmax(region.half_length_rad, region.half_width_rad);
     out->rate_sigma_radps = cue->rate_sigma_arcsec_per_s * BST_ARCSEC_RAD;
     out->v_mag = cue->v_mag;
     out->v_mag_sigma = cue->v_mag_sigma;
@@ -252,20 +269,58 @@ bst_status bst_knowledge_cue_direction_at(bst_ctx *ctx, bst_knowledge_view *view
     return BST_OK;
 }
 
+void bst_knowledge_region(const bst_knowledge *k, bst_region *out) {
+    const bst_region_config *region = &sensor_of(k)->config.cue.region;
+    *out = (bst_region){.kind = region->kind,
+                        .half_length_rad = bst_region_half_length_rad(region),
+                        .half_width_rad = region->half_width_deg * BST_DEG_RAD};
+}
+
+bst_status bst_knowledge_region_direction_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
+                                             double along_rad, double across_rad,
+                                             bst_vec3 *direction) {
+    const bst_knowledge *k = view->knowledge;
+    double t;
+    bst_state eye;
+    bst_vec3 nominal;
+    BST_TRY(believed_eye(ctx, view, seconds, &t, &eye));
+    BST_TRY(bst_region_place(ctx, k->world, k->observer, k->sensor, view->clock, t, &eye, along_rad,
+                             across_rad, &nominal));
+    *direction = bst_quat_rotate(view->cue_error, nominal);
+    return BST_OK;
+}
+
+bst_status bst_knowledge_belt_eye_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
+                                     bool *known, bst_belt_eye *eye) {
+    const bst_knowledge *k = view->knowledge;
+    *known = sensor_of(k)->config.cue.region.kind != BST_REGION_NONE;
+    if (!*known) {
+        return BST_OK;
+    }
+    double t;
+    bst_state state;
+    bst_sky sky;
+    BST_TRY(believed_eye(ctx, view, seconds, &t, &state));
+    BST_TRY(bst_sky_clock_at(ctx, view->clock, bst_time_add(k->world->epoch, t), &sky));
+    *eye = (bst_belt_eye){.position_m = state.position_m,
+                          .velocity_mps = state.velocity_mps,
+                          .earth_radps = bst_earth_rate_gcrf(&sky.frames)};
+    return BST_OK;
+}
+
 bst_status bst_knowledge_cue_range_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                       bool *known, double *range_m, double *range_rate_mps) {
     const bst_knowledge *k = view->knowledge;
     const double h = 0.5;
     double range[3];
     *range_m = *range_rate_mps = 0.0;
-    *known = k->world->observers[k->observer].sensors[k->sensor].cue_object >= 0;
+    *known =
+        sensor_of(k)->cue_object >= 0 && sensor_of(k)->config.cue.region.kind == BST_REGION_NONE;
     for (int i = 0; *known && i < 3; i++) {
-        double t = bst_believed_seconds(k->world, k->observer, k->sensor, seconds + (i - 1) * h);
+        double t;
         bst_state eye;
         bst_vec3 line;
-        BST_TRY(bst_orbit_state(ctx, &k->world->observers[k->observer].orbit, view->clock,
-                                k->world->epoch, t, true, &eye));
-        bst_believe(k->world, k->observer, k->sensor, t, &eye);
+        BST_TRY(believed_eye(ctx, view, seconds + (i - 1) * h, &t, &eye));
         BST_TRY(bst_cue_nominal_line(ctx, k->world, k->observer, k->sensor, view->clock, t, &eye,
                                      &line));
         range[i] = bst_vec3_norm(line);

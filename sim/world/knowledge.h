@@ -3,6 +3,8 @@
 #ifndef BST_WORLD_KNOWLEDGE_H
 #define BST_WORLD_KNOWLEDGE_H
 
+#include "sim/astro/belt.h"
+#include "sim/world/region.h"
 #include "sim/world/world.h"
 
 typedef struct bst_knowledge bst_knowledge;
@@ -46,6 +48,23 @@ bst_status bst_knowledge_cue_direction_at(bst_ctx *ctx, bst_knowledge_view *view
 bst_status bst_knowledge_cue_range_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                       bool *known, double *range_m,
                                       double *range_rate_mps) BST_MUST_CHECK;
+
+/* The region that the cue gives in place of a place; kind BST_REGION_NONE: none. The cue's
+ * direction is its middle, then, sigma_rad its greater half extent, and each of its places has a
+ * rate and a range of its own (bst_knowledge_belt_eye_at). */
+void bst_knowledge_region(const bst_knowledge *knowledge, bst_region *out);
+
+/* The direction (unit, geometric) of a place in the region at `seconds` after the epoch, by angles
+ * along and across it from its middle: on the sky (BST_REGION_ARC), or longitude and latitude about
+ * the Earth's centre (BST_REGION_GEOSTATIONARY: seen 0.85 to 1.2 times as large from low orbits).
+ */
+bst_status bst_knowledge_region_direction_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
+                                             double along_rad, double across_rad,
+                                             bst_vec3 *direction) BST_MUST_CHECK;
+
+/* From where the belt's motion is seen, as it is believed; *known false: the cue has no region. */
+bst_status bst_knowledge_belt_eye_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
+                                     bool *known, bst_belt_eye *eye) BST_MUST_CHECK;
 
 /* The body attitude in which the spacecraft starts and that it tries to hold (see
  * bst_world_body_attitude). */

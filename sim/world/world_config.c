@@ -120,6 +120,21 @@ static const bst_config_desc exposure_table[] = {
     BST_CONFIG_END,
 };
 
+static const char *const region_kinds[] = {"none", "arc", "geostationary", NULL};
+
+static const bst_config_desc region_table[] = {
+    BST_ENUM(bst_region_config, kind, region_kinds, "\"none\"",
+             "none: the cue is a place. arc: along a great circle among the stars. geostationary: "
+             "over a range of longitudes, at the radius of the geostationary belt."),
+    BST_REALS(bst_region_config, arc_radec_deg, "deg", -360, 360, "[0, 0, 0, 0]",
+              "arc: right ascension and declination (ICRS) of one end, and of the other."),
+    BST_REALS(bst_region_config, longitude_deg, "deg", -360, 720, "[0, 0]",
+              "geostationary: east longitudes from and to."),
+    BST_REAL(bst_region_config, half_width_deg, "deg", 0, 45, "2",
+             "How far the region reaches to either side; geostationary: geocentric latitude."),
+    BST_CONFIG_END,
+};
+
 static const bst_config_desc cue_table[] = {
     BST_STRING(bst_cue_config, object, "\"\"",
                "Object whose catalogued orbit (burns left out) is the cue."),
@@ -129,6 +144,12 @@ static const bst_config_desc cue_table[] = {
              "Error of the cue: a constant rotation of its direction."),
     BST_ENUM(bst_cue_config, offset_axis, axes, "\"x\"",
              "Image axis along which the cue is wrong."),
+    BST_REAL(bst_cue_config, offset_angle_deg, "deg", -360, 360, "0",
+             "Angle by which that direction is turned from image x towards image y."),
+    BST_OBJECT(bst_cue_config, region, region_table, "{}",
+               "Where to look for a target of which no place is known; it moves as the "
+               "geostationary belt does there, to rate_sigma_arcsec_per_s. The object named only "
+               "serves the summary, then."),
     BST_REAL(bst_cue_config, sigma_deg, "deg", 1e-6, 90, "0.5",
              "What the onboard side takes the cue's error to be, 1 sigma per axis."),
     BST_REAL(bst_cue_config, rate_sigma_arcsec_per_s, "arcsec/s", 1e-6, 1e5, "0.5",

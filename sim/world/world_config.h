@@ -6,6 +6,7 @@
 #include "sim/core/config.h"
 #include "sim/world/brightness_config.h"
 #include "sim/world/camera.h"
+#include "sim/world/region.h"
 
 enum { BST_ORBIT_SGP4, BST_ORBIT_RELATIVE, BST_ORBIT_OEM, BST_ORBIT_INJECTED, BST_ORBIT_NUMERICAL };
 
@@ -85,11 +86,21 @@ typedef struct bst_world_config {
     bst_config_list catalogues;  /* bst_catalogue_config */
 } bst_world_config;
 
+/* A region of the sky in which a target is to be found, in place of a cue to its place. */
+typedef struct bst_region_config {
+    int32_t kind;            /* BST_REGION_... */
+    double arc_radec_deg[4]; /* of both ends */
+    double longitude_deg[2]; /* geostationary: from and to, east */
+    double half_width_deg;
+} bst_region_config;
+
 typedef struct bst_cue_config {
     char object[64];               /* "" : no cue */
     double direction_radec_deg[2]; /* used when there is no object */
     double offset_deg;
-    int32_t offset_axis; /* index into {"x", "-x", "y", "-y"} */
+    int32_t offset_axis;     /* index into {"x", "-x", "y", "-y"} */
+    double offset_angle_deg; /* from there, from image x towards image y */
+    bst_region_config region;
     double sigma_deg, rate_sigma_arcsec_per_s;
     double v_mag, v_mag_sigma;
 } bst_cue_config;

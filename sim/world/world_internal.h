@@ -53,7 +53,7 @@ typedef struct world_object {
 
 typedef struct world_sensor {
     bst_sensor_config config;
-    int cue_object;         /* -1: a fixed direction */
+    int cue_object;         /* -1: none */
     bst_vec3 cue_rotation;  /* the cue's error: rotation vector, GCRF */
     bst_quat body_attitude; /* see bst_world_body_attitude */
 } world_sensor;
@@ -168,6 +168,12 @@ bst_status bst_cue_nominal_direction(bst_ctx *ctx, const bst_world *world, int o
 
 /* The vector (m, GCRF, geometric) of which that is the direction; 0 where the cue is a direction
  * only. */
+/* A place of the cue's region (kind other than none) by its angles from the middle, as
+ * bst_knowledge_region_direction_at. */
+bst_status bst_region_place(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
+                            bst_sky_clock *clock, double seconds, const bst_state *eye,
+                            double along_rad, double across_rad, bst_vec3 *out) BST_MUST_CHECK;
+double bst_region_half_length_rad(const bst_region_config *region);
 bst_status bst_cue_nominal_line(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
                                 bst_sky_clock *clock, double seconds, const bst_state *eye,
                                 bst_vec3 *line_m) BST_MUST_CHECK;

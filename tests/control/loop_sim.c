@@ -162,7 +162,10 @@ sim_options sim_defaults(void) {
                          .jitter_low_px_rms = 0.5,
                          .jitter_high_px_rms = 0.2,
                          .centroid_sigma_px = 0.1,
-                         .fix_sigma_px = 0.03};
+                         .fix_sigma_px = 0.03,
+                         .wrong_from_s = INFINITY,
+                         .frame_delay_s = 0.3,
+                         .control_rate_hz = 20.0};
 }
 
 bst_quat sim_body_with_pole_at(double t_s) {
@@ -179,6 +182,22 @@ bst_quat sim_body_with_pole_at(double t_s) {
 static int by_value(const void *a, const void *b) {
     double x = *(const double *)a, y = *(const double *)b;
     return (x > y) - (x < y);
+}
+
+/* What a command moved on from the one before, less what the aim did. */
+static double bump_px(bst_ctx *ctx, const bst_control *was, const bst_control *is,
+                      const bst_los_command *before, const bst_los_command *after) {
+    bool valid_before, valid_after;
+    bst_vec3 a, b;
+    bst_assert_ok(ctx, bst_control_aim(ctx, was, after->tick, &valid_before, &a));
+    bst_assert_ok(ctx, bst_control_aim(ctx, is, after->tick, &valid_after, &b));
+    if (!valid_before || !valid_after) {
+        return 0.0;
+    }
+    double age = (double)(after->tick - before->tick) / SIM_TICKS_PER_S;
+    bst_vec3 line = bst_vec3_axpy(before->direction_gcrf, age, before->rate_gcrf_radps);
+    double made = bst_vec3_angle(line, after->direction_gcrf);
+    return fabs(made - bst_vec3_angle(a, b)) / SIM_PIXEL_RAD;
 }
 
 typedef struct exposure {
@@ -218,6 +237,9 @@ static void measure(const scene *s, const exposure *x, tracker *k, int64_t frame
     bst_vec3 seen = {0, 0, 0};
     bool detected = in_field && !smeared && !dark && u < o->detection_probability;
     if (detected) {
+        if (t >= o->wrong_from_s && t < o->wrong_to_s) {
+            px += 40.0 + 3.0 * (t - o->wrong_from_s);
+        }
         double a[2];
         bst_rng_normal2(noise_key, (uint64_t)frame, 2, a);
         bst_vec3 w = bst_vec3_unit(
@@ -241,6 +263,8 @@ static void measure(const scene *s, const exposure *x, tracker *k, int64_t frame
     }
 }
 
+enum { WAY = 256, PENDING = 8 }; /* commands and messages on their way */
+
 void sim_run(const sim_options *o, sim_result *r) {
     bst_ctx ctx = {0};
     bst_two_axis_config gimbal_config;
@@ -252,6 +276,9 @@ void sim_run(const sim_options *o, sim_result *r) {
     gimbal_config.platform.jitter_low_px_rms = o->jitter_low_px_rms;
     gimbal_config.platform.jitter_high_px_rms = o->jitter_high_px_rms;
     control_config.exposure_s = 0.5;
+    control_config.search_timeout_s = o->search_timeout_s;
+    control_config.search_pattern = o->search_pattern;
+    const int64_t control_period = llround(SIM_TICKS_PER_S / o->control_rate_hz);
     control_config.period_s = 1.0;
 
     scene s = {.o = o};
@@ -285,9 +312,13 @@ void sim_run(const sim_options *o, sim_result *r) {
 
     int64_t steps = llround(o->duration_s / dt);
     double *errors = malloc(sizeof *errors * (size_t)steps);
-    bst_tracks *tracks = calloc(1, sizeof *tracks + 4 * sizeof(bst_track));
+    bst_tracks *tracks[PENDING];
+    for (int i = 0; i < PENDING; i++) {
+        tracks[i] = calloc(1, sizeof *tracks[i] + 4 * sizeof(bst_track));
+        assert_non_null(tracks[i]);
+    }
     bst_pointing_telemetry *telemetry = calloc(1, sizeof *telemetry + sizeof(bst_pointing_sample));
-    assert_true(errors && tracks && telemetry);
+    assert_true(errors && telemetry);
     *r = (sim_result){.confirmed_s = INFINITY};
     tracker tracker_state = {0};
     exposure x = {0};
@@ -295,12 +326,14 @@ void sim_run(const sim_options *o, sim_result *r) {
     struct {
         int64_t tick;
         bst_los_command command;
-    } way[64];
+    } way[WAY];
     int64_t sent = 0, arrived = 0;
-    const int64_t command_delay = SIM_TICKS_PER_S / 10, frame_delay = 3 * SIM_TICKS_PER_S / 10;
+    const int64_t command_delay = SIM_TICKS_PER_S / 10,
+                  frame_delay = llround(o->frame_delay_s * SIM_TICKS_PER_S);
     bst_los_command current = {0};
-    bool has_command = false, pending = false;
-    int64_t pending_tick = 0;
+    bool has_command = false;
+    double search_from_s = 0.0;
+    int64_t measured = 0, taken = 0, pending_tick[PENDING];
     double sum = 0.0, sum_track = 0.0, rate_before[2] = {0, 0};
     int64_t counted = 0, counted_track = 0, frames_after = 0, frames_held = 0;
     bst_vec3 apparent = d0, apparent_step = {0, 0, 0};
@@ -308,8 +341,8 @@ void sim_run(const sim_options *o, sim_result *r) {
     for (int64_t n = 0; n < steps; n++) {
         int64_t tick = n * SIM_STEP_TICKS;
         double t = (double)tick / SIM_TICKS_PER_S;
-        while (arrived < sent && way[arrived % 64].tick + command_delay <= tick) {
-            current = way[arrived++ % 64].command;
+        while (arrived < sent && way[arrived % WAY].tick + command_delay <= tick) {
+            current = way[arrived++ % WAY].command;
             has_command = true;
         }
         bst_two_axis_step(&plant, has_command ? &current : NULL,
@@ -351,9 +384,8 @@ void sim_run(const sim_options *o, sim_result *r) {
                         (t >= o->blackout_from_s && t < o->blackout_to_s);
             if (phase == SIM_TICKS_PER_S / 2) {
                 if (!lost) {
-                    measure(&s, &x, &tracker_state, frame, noise_key, tracks);
-                    pending = true;
-                    pending_tick = tick + frame_delay;
+                    measure(&s, &x, &tracker_state, frame, noise_key, tracks[measured % PENDING]);
+                    pending_tick[measured++ % PENDING] = tick + frame_delay;
                 }
                 if (t > r->confirmed_s) {
                     frames_after++;
@@ -363,8 +395,8 @@ void sim_run(const sim_options *o, sim_result *r) {
         }
 
         /* control at 20 Hz and whenever tracks arrive */
-        bool due = pending && tick >= pending_tick;
-        if (tick % (SIM_TICKS_PER_S / 20) == 0 || due) {
+        bool due = taken < measured && tick >= pending_tick[taken % PENDING];
+        if (tick % control_period == 0 || due) {
             telemetry->written = 1;
             telemetry->capacity = 1;
             telemetry->settled = plant.settled;
@@ -372,10 +404,12 @@ void sim_run(const sim_options *o, sim_result *r) {
             telemetry->items[0] =
                 (bst_pointing_sample){.tick = tick, .q_cam_from_gcrf = plant.q_measured_from_gcrf};
             bst_control_telemetry(&control, telemetry, &nav);
-            bst_los_command before = sent ? way[(sent - 1) % 64].command : current;
+            static bst_control was_control;
+            was_control = control;
+            bst_los_command before = sent ? way[(sent - 1) % WAY].command : current;
             if (due) {
-                bst_assert_ok(&ctx, bst_control_observe(&ctx, &control, tick, tracks));
-                pending = false;
+                bst_assert_ok(&ctx,
+                              bst_control_observe(&ctx, &control, tick, tracks[taken++ % PENDING]));
             }
             bool commanded;
             bst_los_command command;
@@ -383,15 +417,25 @@ void sim_run(const sim_options *o, sim_result *r) {
             bst_assert_ok(&ctx,
                           bst_control_update(&ctx, &control, tick, &commanded, &command, &status));
             if (commanded) {
-                way[sent % 64].tick = tick;
-                way[sent++ % 64].command = command;
+                way[sent % WAY].tick = tick;
+                way[sent++ % WAY].command = command;
             }
             for (int i = 0; i < control.transition_count; i++) {
                 int to = control.transitions[i].to;
+                if (to == BST_MODE_SEARCH && r->mode_count[to] == 0) {
+                    search_from_s = t;
+                } else if (to == BST_MODE_SEARCH && r->mode_count[to] == 1 && r->sweep_s == 0.0) {
+                    r->sweep_s = t - search_from_s;
+                    r->search = was_control.search;
+                }
                 r->mode_count[to]++;
                 if (getenv("LOOP_SIM_VERBOSE")) {
                     printf("%8.3f s %s -> %s: %s\n", t, bst_mode_name(control.transitions[i].from),
                            bst_mode_name(to), control.transitions[i].reason);
+                }
+                if (sent > 1 && commanded) {
+                    r->worst_bump_px = fmax(
+                        r->worst_bump_px, bump_px(&ctx, &was_control, &control, &before, &command));
                 }
                 if (to == BST_MODE_TRACK) {
                     double age = (double)(command.tick - before.tick) / SIM_TICKS_PER_S;
@@ -427,6 +471,8 @@ void sim_run(const sim_options *o, sim_result *r) {
     r->rms_track_px = counted_track ? sqrt(sum_track / (double)counted_track) : 0.0;
     r->track_fraction = frames_after ? (double)frames_held / (double)frames_after : 0.0;
     free(errors);
-    free(tracks);
+    for (int i = 0; i < PENDING; i++) {
+        free(tracks[i]);
+    }
     free(telemetry);
 }

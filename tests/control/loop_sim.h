@@ -27,6 +27,13 @@ typedef struct sim_options {
     double centroid_sigma_px, fix_sigma_px;
     bool clutter; /* a false candidate with a plausible rate at each place of the search */
     bst_quat q_body_from_gcrf; /* zero: towards the cue */
+    /* detections are of another object, 40 px beside the target at wrong_from_s and 3 px/s faster
+     */
+    double wrong_from_s, wrong_to_s;
+    double frame_delay_s; /* from an exposure's end to the tracks */
+    double control_rate_hz;
+    double search_timeout_s;
+    int search_pattern; /* bst_search_pattern */
 } sim_options;
 
 typedef struct sim_result {
@@ -39,6 +46,9 @@ typedef struct sim_result {
     int final_mode;
     int tiles;            /* greatest search step */
     double worst_jump_px; /* of the command at a change of mode to track */
+    double sweep_s;    /* from the first search's beginning until it began again; 0: it did not */
+    bst_search search; /* its places */
+    double worst_bump_px; /* at any change of mode: what the command moved less what the aim did */
 } sim_result;
 
 sim_options sim_defaults(void);

@@ -1,0 +1,93 @@
+#!/usr/bin/env python3
+"""A day with search, acquisition, track, occultations and an eclipse, without images: nothing
+diverges, no number is lost, memory stays flat.
+
+Two hours and a half of it, or with --full the day with the user's whole star catalogue.
+
+Usage, from the repository root:
+  /usr/bin/python3 tests/e2e/test_day_modes.py BORESIGHT [--full]
+"""
+import os
+import subprocess
+import sys
+import time
+import unittest
+
+import runs
+
+FULL = "--full" in sys.argv
+if FULL:
+    sys.argv.remove("--full")
+SCENARIO = "scenarios/day_eclipse.json"
+LENGTH_S = 86400 if FULL else 9000
+
+
+def play(out, duration_s):
+    """Greatest memory of a run, KiB: its own, without the mapped file of the star catalogue."""
+    words = runs.command(SCENARIO, out, duration=duration_s)
+    if FULL:
+        words += ["--set", "/world/star_catalogue=default"]
+    most = 0
+    with open(out + ".log", "w+", encoding="utf-8") as log:
+        with subprocess.Popen(words, stdout=log, stderr=log) as process:
+            while process.poll() is None:
+                with open(f"/proc/{process.pid}/status", encoding="utf-8") as status:
+                    own = [line.split()[1] for line in status if line.startswith("RssAnon")]
+                most = max(most, int(own[0]) if own else 0)
+                time.sleep(0.05)
+        if process.returncode != 0:
+            log.seek(0)
+            raise AssertionError(log.read())
+    return most
+
+
+class DayOfModes(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        folder = runs.scratch()
+        cls.first = play(os.path.join(folder, "first"), LENGTH_S / 8)
+        cls.out = os.path.join(folder, "whole")
+        cls.most = play(cls.out, LENGTH_S)
+        cls.db = runs.database(cls.out)
+        cls.modes = [row[0].split(" -> ")[1].split(":")[0] for row in cls.db.execute(
+            "SELECT text FROM events WHERE kind = 'mode' ORDER BY time_s")]
+        cls.summary = runs.manifest(cls.out)["summary"]
+        print(f"memory {cls.first} KiB after an eighth, {cls.most} KiB at most; modes "
+              f"{ {m: cls.modes.count(m) for m in sorted(set(cls.modes))} }; track fraction "
+              f"{cls.summary['track_fraction']:.4f}, RMS {cls.summary['pointing_rms_px']:.3f} px")
+
+    def test_memory_is_flat(self):
+        # 2 %, and a MiB for pages of the recorder that the short run did not reach
+        self.assertLess(self.most, 1.02 * self.first + 1024)
+
+    def test_no_number_is_lost(self):
+        # SQLite has NULL for what is no number
+        for table in ("pointing", "control", "tracks", "nav"):
+            columns = [row[1] for row in self.db.execute(f"PRAGMA table_info({table})")
+                       if row[2].upper() == "REAL"]
+            for column in columns:
+                lost = self.db.execute(
+                    f"SELECT count(*) FROM {table} WHERE {column} IS NULL OR abs({column}) > 1e300")
+                self.assertEqual(lost.fetchone()[0], 0, f"{table}.{column}")
+
+    def test_nothing_diverges(self):
+        for mode in ("search", "acquire", "track", "coast"):
+            self.assertIn(mode, self.modes)
+        self.assertEqual(self.summary["wrong_target_frames"], 0)
+        # of the frames in which the target is bright enough to be seen, after it was confirmed
+        rows = self.db.execute(
+            "SELECT count(*), sum(EXISTS(SELECT 1 FROM tracks t WHERE t.sensor = o.sensor AND "
+            "t.exposure_id = o.exposure_id AND t.target_of_interest AND t.status = 'confirmed')) "
+            "FROM truth o WHERE kind = 'object' AND id = 0 AND in_field AND NOT occulted AND "
+            "snr >= 10 AND mid_s > ?", (self.summary["time_to_confirm_s"],)).fetchone()
+        print(f"in track in {rows[1]} of {rows[0]} frames with an SNR of 10 or more")
+        # the stars that come with the program give an attitude in every other frame only
+        self.assertGreater(rows[1], (0.97 if FULL else 0.4) * rows[0])
+
+
+def tearDownModule():
+    runs.clean()
+
+
+if __name__ == "__main__":
+    unittest.main()

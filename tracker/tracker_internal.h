@@ -1,0 +1,73 @@
+/* Shared by the files of the tracker. */
+#ifndef BST_TRACKER_TRACKER_INTERNAL_H
+#define BST_TRACKER_TRACKER_INTERNAL_H
+
+#include "sim/astro/bodies.h"
+#include "tracker/attitude.h"
+#include "tracker/attitude_error.h"
+#include "tracker/target.h"
+#include "tracker/tracker.h"
+
+/* Places in the cache of catalogue directions; a power of two. */
+#define STAR_CACHE 4096
+/* Stars of one frame that the attitude looks at. */
+#define MAX_STARS 16384
+/* Taken for the detector's when it does not say. */
+#define USUAL_THRESHOLD_SNR 5.0
+
+typedef struct cached_star {
+    uint32_t id; /* 0: empty */
+    bst_vec3 icrs;
+} cached_star;
+
+struct bst_tracker {
+    bst_camera camera;
+    double tick_rate_hz;
+    bst_tracker_star_fn star;
+    void *star_user;
+    bst_attitude_params attitude_params;
+    bst_attitude_error_params error_params;
+    bst_target_params target_params;
+    bool orbits;
+    double assumed_range_m, range_sigma, range_rate_sigma_mps;
+    double floor_variance_px2, blend_variance_px2, max_variance_px2, edge_margin_px,
+        max_attitude_sigma_rad;
+    int max_detections;
+    bst_mtt *mtt;
+    cached_star *cache;
+    bst_attitude_star *stars;
+    bst_mtt_detection *detections;
+    bst_tracker_event *events;
+    size_t event_capacity;
+    int event_count;
+    bst_attitude_error error;
+    bst_target target;
+    bst_tracker_cue cue_before;
+    bool started, attitude_was_lost;
+    int64_t last_exposure_id, last_tick;
+};
+
+/* What is asked of one frame. */
+typedef struct bst_frame_view {
+    const bst_tracker *tracker;
+    bst_quat q_cam_from_gcrf;
+    bst_light light;
+    bst_target_cue cue;
+    double range_m, range_rate_mps; /* of the cue's object; range 0: not known */
+    bst_od_observer observer;
+    double threshold_snr;
+} bst_frame_view;
+
+/* Hooks of bst_mtt_frame; user is a bst_frame_view. */
+bool bst_frame_in_field(const void *user, bst_vec3 direction);
+bool bst_frame_is_expected(const void *user, const bst_mtt_track *track);
+bool bst_frame_expected_rate(const void *user, bst_vec3 direction, bst_vec3 *rate_radps);
+bool bst_frame_range_of(const void *user, const bst_mtt_track *track, bst_orbit_range *out);
+bst_mtt_sight bst_frame_sight_of(const void *user, const bst_mtt_track *track, double *sunlight);
+
+/* The observer in mid-exposure, from navigation telemetry of about that time; false when that is no
+ * orbit. */
+bool bst_frame_observer(const bst_tracker *tracker, const bst_nav_telemetry *nav, double seconds,
+                        bst_od_observer *out);
+
+#endif
