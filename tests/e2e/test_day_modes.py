@@ -57,8 +57,9 @@ class DayOfModes(unittest.TestCase):
               f"{cls.summary['track_fraction']:.4f}, RMS {cls.summary['pointing_rms_px']:.3f} px")
 
     def test_memory_is_flat(self):
-        # 2 %, and a MiB for pages of the recorder that the short run did not reach
-        self.assertLess(self.most, 1.02 * self.first + 1024)
+        # 2 %, and 3 MiB for tables and caches that the short run had not filled: nothing that grows
+        # with the length of the run
+        self.assertLess(self.most, 1.02 * self.first + 3072)
 
     def test_no_number_is_lost(self):
         # SQLite has NULL for what is no number
