@@ -65,6 +65,10 @@ typedef bst_status (*bst_control_cue_fn)(void *user, bst_ctx *ctx, double second
 typedef bst_status (*bst_control_cue_direction_fn)(void *user, bst_ctx *ctx, double seconds,
                                                    bool *valid, bst_vec3 *direction);
 
+/* The range of the cue's object, and 0 where that is not known. */
+typedef bst_status (*bst_control_cue_range_fn)(void *user, bst_ctx *ctx, double seconds,
+                                               double *range_m);
+
 /* The direction of a place of the region (bst_knowledge_region_direction_at). */
 typedef bst_status (*bst_control_region_fn)(void *user, bst_ctx *ctx, double seconds,
                                             double along_rad, double across_rad,
@@ -72,9 +76,6 @@ typedef bst_status (*bst_control_region_fn)(void *user, bst_ctx *ctx, double sec
 /* From where the belt is seen (bst_knowledge_belt_eye_at). */
 typedef bst_status (*bst_control_belt_eye_fn)(void *user, bst_ctx *ctx, double seconds, bool *known,
                                               bst_belt_eye *eye);
-/* The range of the cue's object, and 0 where that is not known. */
-typedef bst_status (*bst_control_cue_range_fn)(void *user, bst_ctx *ctx, double seconds,
-                                               double *range_m);
 
 /* What a controller knows besides its messages. */
 typedef struct bst_control_env {
@@ -85,10 +86,10 @@ typedef struct bst_control_env {
     double frame_exposure_s, frame_period_s, frame_latency_s; /* as in bst_module_env */
     bst_control_cue_fn cue_at;
     bst_control_cue_direction_fn cue_direction_at;
+    bst_control_cue_range_fn cue_range_at; /* NULL: no range is known */
     bst_region region; /* kind BST_REGION_NONE: none, and the next two may be NULL */
     bst_control_region_fn region_at;
     bst_control_belt_eye_fn belt_eye_at;
-    bst_control_cue_range_fn cue_range_at; /* NULL: no range is known */
     void *cue_user;
 } bst_control_env;
 

@@ -218,8 +218,10 @@ static void path_nodes(const bst_guidance *g, const bst_path *path, int64_t tick
     }
     for (int j = 0; j < PATH_NODES; j++) {
         bst_vec3 d = bst_path_at(path, j * nodes->step, &tangent, &bend);
-        /* within a step an arc turns by no more than its own curvature makes it */
-        nodes->corner[j] = j > 1 && bst_vec3_dot(tangent, before) < 0.9;
+        /* within a step an arc turns by no more than its own curvature makes it; beside an end,
+         * which is passed slowly anyway, the angles' second differences are enough */
+        nodes->corner[j] = j > 2 && j < PATH_NODES - 3 && !nodes->corner[j - 1] &&
+                           bst_vec3_dot(tangent, before) < 0.9;
         before = tangent;
         if (!steers) {
             nodes->angle_rad[j][0] = j * nodes->step;
@@ -397,15 +399,21 @@ static bst_status shape(bst_ctx *ctx, bst_guidance *g, const bst_nav_telemetry *
 }
 
 bst_status bst_guidance_command(bst_ctx *ctx, bst_guidance *g, const bst_nav_telemetry *nav,
-                                const bst_vec3 *boresight, bst_los_command *command, bool *give) {
+                                const bst_quat *error, const bst_vec3 *boresight,
+                                bst_los_command *command, bool *give) {
     *give = true;
+    /* cones and the Earth as the attitude telemetry sees them */
     g->nav = *nav;
+    g->nav.position_gcrf_m = bst_quat_rotate(*error, nav->position_gcrf_m);
+    g->nav.velocity_gcrf_mps = bst_quat_rotate(*error, nav->velocity_gcrf_mps);
+    g->nav.sun_m = bst_quat_rotate(*error, nav->sun_m);
+    g->nav.moon_m = bst_quat_rotate(*error, nav->moon_m);
     if (g->config.look_ahead_s > 0.0 && command->tick >= g->ahead_tick) {
         g->ahead_tick =
             command->tick + (int64_t)llround(g->config.look_ahead_every_s * g->env.tick_rate_hz);
         BST_TRY(bst_guidance_look_ahead(ctx, g, command->tick));
     }
-    BST_TRY(shape(ctx, g, nav, boresight, command, give));
+    BST_TRY(shape(ctx, g, &g->nav, boresight, command, give));
     if (*give) {
         g->last = *command;
         g->commanded = true;

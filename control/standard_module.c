@@ -43,6 +43,14 @@ static bst_status cue_direction_at(void *user, bst_ctx *ctx, double seconds, boo
     return bst_knowledge_cue_direction_at(ctx, user, seconds, valid, direction);
 }
 
+static bst_status cue_range_at(void *user, bst_ctx *ctx, double seconds, double *range_m) {
+    bool known;
+    double rate;
+    BST_TRY(bst_knowledge_cue_range_at(ctx, user, seconds, &known, range_m, &rate));
+    *range_m = known ? *range_m : 0.0;
+    return BST_OK;
+}
+
 static bst_status region_at(void *user, bst_ctx *ctx, double seconds, double along_rad,
                             double across_rad, bst_vec3 *direction) {
     return bst_knowledge_region_direction_at(ctx, user, seconds, along_rad, across_rad, direction);
@@ -51,14 +59,6 @@ static bst_status region_at(void *user, bst_ctx *ctx, double seconds, double alo
 static bst_status belt_eye_at(void *user, bst_ctx *ctx, double seconds, bool *known,
                               bst_belt_eye *eye) {
     return bst_knowledge_belt_eye_at(ctx, user, seconds, known, eye);
-}
-
-static bst_status cue_range_at(void *user, bst_ctx *ctx, double seconds, double *range_m) {
-    bool known;
-    double rate;
-    BST_TRY(bst_knowledge_cue_range_at(ctx, user, seconds, &known, range_m, &rate));
-    *range_m = known ? *range_m : 0.0;
-    return BST_OK;
 }
 
 static void destroy(void *self) {
@@ -89,9 +89,9 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
                                        .frame_latency_s = env->frame_latency_s,
                                        .cue_at = cue_at,
                                        .cue_direction_at = cue_direction_at,
+                                       .cue_range_at = cue_range_at,
                                        .region_at = region_at,
                                        .belt_eye_at = belt_eye_at,
-                                       .cue_range_at = cue_range_at,
                                        .cue_user = m->view};
         bst_knowledge_region(env->knowledge, &control_env.region);
         status = bst_control_init(env->ctx, &m->control, config, &control_env);

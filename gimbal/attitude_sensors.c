@@ -29,8 +29,9 @@ const bst_config_desc bst_gyro_config_table[] = {
     BST_REAL(C, rate_random_walk_deg_rth3, "deg/h^1.5", 1e-9, 100, "0.01",
              "Rate random walk, by which the bias wanders."),
     BST_REALS(C, bias_degph, "deg/h", -3600, 3600, "[0, 0, 0]", "Bias at the epoch."),
-    BST_REAL(C, bias_sigma_degph, "deg/h", 1e-6, 3600, "1",
-             "Drawn about each axis on top of bias_degph; what the filter first expects of it."),
+    BST_REAL(C, bias_sigma_degph, "deg/h", 1e-6, 3600, "0.05",
+             "Drawn about each axis on top of bias_degph; what the filter first expects of it (it "
+             "takes bias_degph for zero). The default is about what it comes to know."),
     BST_REALS(C, scale_factor_ppm, "1e-6", -1e5, 1e5, "[0, 0, 0]",
               "Errors of the scale factors, unknown onboard."),
     BST_REALS(C, alignment_arcsec, "arcsec", -36000, 36000, "[0, 0, 0]",

@@ -138,13 +138,15 @@ bst_status bst_platform_advance(bst_ctx *ctx, bst_platform *platform, int64_t n,
 
 bst_quat bst_platform_true_camera(bst_platform *platform, int64_t n, double seconds,
                                   bst_quat q_cam_from_body) {
-    return bst_platform_true_camera_between(platform, n, 0.0, seconds, q_cam_from_body);
+    double shake[2];
+    bst_jitter_at(&platform->jitter, n, shake);
+    bst_quat body =
+        platform->spacecraft ? platform->body.q_body_from_gcrf : drifted(platform, seconds);
+    return shaken(bst_quat_mul(q_cam_from_body, body), shake);
 }
 
 bst_quat bst_platform_true_camera_between(bst_platform *platform, int64_t n, double fraction,
                                           double seconds, bst_quat q_cam_from_body) {
-    bst_quat body =
-        platform->spacecraft ? platform->body.q_body_from_gcrf : drifted(platform, seconds);
     double shake[2], next[2];
     bst_jitter_at(&platform->jitter, n, shake);
     if (fraction > 0.0) {
@@ -152,6 +154,8 @@ bst_quat bst_platform_true_camera_between(bst_platform *platform, int64_t n, dou
         shake[0] += fraction * (next[0] - shake[0]);
         shake[1] += fraction * (next[1] - shake[1]);
     }
+    bst_quat body =
+        platform->spacecraft ? platform->body.q_body_from_gcrf : drifted(platform, seconds);
     return shaken(bst_quat_mul(q_cam_from_body, body), shake);
 }
 

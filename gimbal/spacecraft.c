@@ -4,7 +4,6 @@
 #include <stdlib.h>
 
 #include "gimbal/jitter.h"
-#include "gimbal/platform.h"
 
 /* A measurement on its way from a star tracker. */
 typedef struct pending {
@@ -83,6 +82,21 @@ static bst_rng_key stream(const bst_craft_setup *setup, const char *name) {
     return bst_rng_make_key(setup->seed, setup->run, setup->instance, name);
 }
 
+/* Plant steps between two of something at wanted_hz. */
+static bst_status whole_steps(bst_ctx *ctx, const char *key, double plant_hz, double wanted_hz,
+                              int64_t *out) {
+    double ratio = plant_hz / wanted_hz, steps = round(ratio);
+    if (steps < 1.0 || fabs(ratio - steps) > 1e-9 * ratio) {
+        double fewer = fmax(1.0, floor(ratio));
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "%s: %g Hz does not divide the plant's rate of %g Hz; the nearest rates "
+                        "that do are %g and %g Hz",
+                        key, wanted_hz, plant_hz, plant_hz / fewer, plant_hz / (fewer + 1.0));
+    }
+    *out = (int64_t)steps;
+    return BST_OK;
+}
+
 static bst_status set_law(bst_ctx *ctx, bst_craft *craft, const bst_attitude_config *config,
                           bst_quat q_nominal) {
     bst_vec3 axis = bst_vec3_unit(vec(config->axis)),
@@ -148,15 +162,15 @@ static bst_status set_trackers(bst_ctx *ctx, bst_craft *craft, const bst_craft_c
     const bst_star_tracker_config *all = bst_craft_trackers(config, &craft->trackers);
     for (int i = 0; i < craft->trackers; i++) {
         char name[64];
-        snprintf(name, sizeof name, "spacecraft/star_trackers/%d/rate_hz", i);
+        snprintf(name, sizeof name, "star_trackers/%d/rate_hz", i);
         if (!(bst_vec3_norm(vec(all[i].axis)) > 0.0)) {
             return bst_fail(ctx, BST_ERR_CONFIG,
                             "star_trackers/%d/axis: a direction of length zero (allowed: any "
                             "other)",
                             i);
         }
-        BST_TRY(bst_platform_divider(ctx, name, 1.0 / craft->dt_s, all[i].rate_hz,
-                                     &craft->tracker_steps[i]));
+        BST_TRY(
+            whole_steps(ctx, name, 1.0 / craft->dt_s, all[i].rate_hz, &craft->tracker_steps[i]));
         if (craft->tracker_steps[i] % craft->gyro_steps != 0) {
             return bst_fail(ctx, BST_ERR_CONFIG,
                             "star_trackers/%d/rate_hz: %g Hz does not divide the gyro's rate_hz of "
@@ -193,10 +207,9 @@ static bst_status prepare(bst_ctx *ctx, bst_craft *craft, const bst_craft_config
     const bst_wheel_config *wheel = bst_craft_wheels(config, &wheels);
     BST_TRY(bst_wheels_init(ctx, &craft->wheels, wheel, wheels, stream(setup, "wheels")));
     BST_TRY(check_wheels(ctx, craft));
-    BST_TRY(bst_platform_divider(ctx, "spacecraft/gyro/rate_hz", plant_hz, config->gyro.rate_hz,
-                                 &craft->gyro_steps));
-    BST_TRY(bst_platform_divider(ctx, "spacecraft/attitude/rate_hz", plant_hz,
-                                 config->attitude.rate_hz, &craft->control_steps));
+    BST_TRY(whole_steps(ctx, "gyro/rate_hz", plant_hz, config->gyro.rate_hz, &craft->gyro_steps));
+    BST_TRY(whole_steps(ctx, "attitude/rate_hz", plant_hz, config->attitude.rate_hz,
+                        &craft->control_steps));
     bst_gyro_init(&craft->gyro, &config->gyro, (double)craft->gyro_steps * setup->dt_s,
                   stream(setup, "gyro"));
     BST_TRY(set_trackers(ctx, craft, config, setup));

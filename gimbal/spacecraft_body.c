@@ -93,7 +93,7 @@ static bst_status set_modes(bst_ctx *ctx, bst_craft_body *body) {
     if (m == 0) {
         return BST_OK;
     }
-    double square[BST_MODES_MOST * BST_MODES_MOST], squared[BST_MODES_MOST];
+    double square[BST_MODES_MOST * BST_MODES_MOST] = {0.0}, squared[BST_MODES_MOST];
     for (int j = 0; j < m; j++) {
         for (int k = 0; k < m; k++) {
             square[j * m + k] = spec->mode[j].frequency_radps * spec->mode[k].frequency_radps *

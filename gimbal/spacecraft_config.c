@@ -52,7 +52,7 @@ const bst_config_desc bst_craft_config_table[] = {
               "epoch."),
     BST_REALS(C, initial_rate_degps, "deg/s", -1000, 1000, "[0, 0, 0]",
               "Rate of the body at the epoch on top of the law's, body axes."),
-    BST_REAL(C, initial_knowledge_arcsec, "arcsec", 1e-6, 648000, "10",
+    BST_REAL(C, initial_knowledge_arcsec, "arcsec", 1e-6, 648000, "3",
              "Standard deviation of the believed attitude's error about each axis at the epoch."),
     BST_LIST(C, wheels, bst_wheel_config, bst_wheel_config_table, 0, BST_WHEELS_MOST, "[]",
              "Reaction wheels. None given: four like the default one on the edges of a pyramid "

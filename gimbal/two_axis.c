@@ -2,6 +2,10 @@
 
 static const double two_pi = 2.0 * BST_PI;
 
+/* Sines and cosines are worked out anew where the axis is so far from where they are known. Targets
+ * that are near the axis stay within reach of the arc tangent's series. */
+#define NEAR_RAD 0.005
+
 /* Below this distance from the pole (rad) the outer angle is not defined well enough to follow. */
 #define POLE_RAD 1e-9
 
@@ -99,7 +103,7 @@ static halves halves_now(bst_two_axis *plant) {
     for (int a = 0; a < 2; a++) {
         bst_two_axis_half *near = &plant->near[a];
         double angle = plant->axis[a].angle_rad;
-        if (!(fabs(angle - near->angle_rad) < 0.02)) {
+        if (!(fabs(angle - near->angle_rad) < NEAR_RAD)) {
             *near = (bst_two_axis_half){angle, sin(0.5 * angle), cos(0.5 * angle)};
         }
         beside(near->sin, near->cos, angle - near->angle_rad, &out.sin[a], &out.cos[a]);
@@ -205,9 +209,12 @@ void bst_two_axis_step(bst_two_axis *plant, const bst_los_command *command, doub
     int64_t n = plant->steps++;
     double noise[2] = {0.0, 0.0};
     if (plant->encoder_noise_rad > 0.0) {
-        bst_rng_normal2(plant->encoder_key, (uint64_t)n, 0, noise);
-        noise[0] *= plant->encoder_noise_rad;
-        noise[1] *= plant->encoder_noise_rad;
+        int at = (int)(n % BST_RNG_BLOCK);
+        if (at == 0) {
+            bst_rng_normal_block(plant->encoder_key, (uint64_t)n, plant->encoder_noise);
+        }
+        noise[0] = plant->encoder_noise_rad * plant->encoder_noise[0][at];
+        noise[1] = plant->encoder_noise_rad * plant->encoder_noise[1][at];
     }
     double angle[2], rate[2];
     bool at_stop = false;

@@ -34,7 +34,8 @@ typedef struct bst_two_axis {
     bst_rng_key encoder_key;
     double dt_s;
     int64_t steps;
-    bst_two_axis_half near[2]; /* the axes' angles not long ago */
+    double encoder_noise[2][BST_RNG_BLOCK]; /* of the steps from steps - steps % BST_RNG_BLOCK on */
+    bst_two_axis_half near[2];              /* the axes' angles not long ago */
     /* after each step */
     bst_quat q_cam_from_gcrf;      /* true */
     bst_quat q_measured_from_gcrf; /* encoders and measured body attitude */

@@ -30,8 +30,6 @@ static const double LEAST_OPEN = 0.02;
 /* Above the threshold by this no skewness of noise matters. */
 static const double CERTAIN_ABOVE = 1.5;
 
-#define BST_MAG_PER_SHARE 1.0857362047581296 /* 2.5 / ln 10 */
-
 struct bst_imgproc {
     bst_camera camera;
     bst_imgproc_config config;
@@ -509,7 +507,8 @@ bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_i
     return BST_OK;
 }
 
-void bst_imgproc_refine(bst_imgproc *ip, bst_detections *detections, int index) {
+void bst_imgproc_refine(bst_imgproc *ip, bst_detections *detections, int index,
+                        const bst_zero_point *zero_point) {
     bst_detection *item = &detections->items[index];
     const bst_found *found = &ip->locator.found[ip->order[index]];
     if (ip->windowed || !found->rough) {
@@ -517,12 +516,7 @@ void bst_imgproc_refine(bst_imgproc *ip, bst_detections *detections, int index) 
     }
     bst_locate_again(&ip->locator, &ip->view, ip->order[index]);
     bst_detection fitted = report(ip, &ip->view, found), before = *item;
-    /* the zero point may have been applied since */
-    fitted.v_mag = before.v_mag - 2.5 * log10(fitted.flux_e / before.flux_e);
-    double old_noise = BST_MAG_PER_SHARE * before.flux_sigma_e / before.flux_e;
-    double noise = BST_MAG_PER_SHARE * fitted.flux_sigma_e / fitted.flux_e;
-    double zero_point2 = before.v_mag_sigma * before.v_mag_sigma - old_noise * old_noise;
-    fitted.v_mag_sigma = sqrt(fmax(zero_point2, 0.0) + noise * noise);
+    bst_photometry_correct(zero_point, &fitted);
     fitted.label = before.label;
     fitted.label_probability = before.label_probability;
     fitted.star_id = before.star_id;
@@ -589,6 +583,6 @@ void bst_imgproc_append_stack(const bst_imgproc *ip, const bst_stack_found *foun
                              .rate_sigma_pxps = f->rate_sigma_pxps};
         double rate = f->flux_e / fmax(ip->exposure_s, 1e-9);
         d->v_mag = -2.5 * log10(rate / ip->electrons_per_s_v0);
-        d->v_mag_sigma = 2.5 / log(10.0) * f->flux_sigma_e / f->flux_e;
+        d->v_mag_sigma = bst_photometry_noise_mag(d);
     }
 }

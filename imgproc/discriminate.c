@@ -6,6 +6,7 @@
 
 #include "imgproc/charge.h"
 #include "imgproc/heapsort.h"
+#include "sim/world/photometry.h"
 
 enum { BAND = 8, MAG_BINS = 60, KEEP_MISSED = 8, KEEP_CHARGE = 50 };
 
@@ -236,7 +237,7 @@ static double place_variance(const bst_detection *item) {
 }
 
 static double mag_sigma(const bst_detection *item) {
-    return item->flux_e > 0.0 ? fmin(1.0857 * item->flux_sigma_e / item->flux_e, 1.0) : 1.0;
+    return fmin(bst_photometry_noise_mag(item), 1.0);
 }
 
 /* Number of the nearest remembered source of like brightness; -1: none. */

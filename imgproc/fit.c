@@ -5,11 +5,14 @@
 #include <string.h>
 
 #include "imgproc/background.h"
+#include "imgproc/cholesky.h"
 
 enum { MAX_ITERATIONS = 15, MAX_SUMS = BST_FIT_MAX_PARAMETERS * (BST_FIT_MAX_PARAMETERS + 3) / 2 };
 
 /* steps below this share of the standard deviation, and for neighbours, whose values are not kept:
  * what is left after such a step is a small part of it */
+/* of a pivot, as a share of its diagonal element */
+static const double LEAST_PIVOT = 1e-11;
 static const double SETTLED = 0.03, NEIGHBOUR_SETTLED = 0.1;
 
 bst_status bst_fit_create(bst_ctx *ctx, const bst_psf *psf, const bst_profiles *profiles,
@@ -110,43 +113,6 @@ static int load(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
         add_light(fit->fixed, m, n, (float)fixed[s]->flux_e, (float)fixed[s]->widening_px2);
     }
     return load_pixels(fit, data, stamp);
-}
-
-/* Lower Cholesky factor in place; false when not positive definite. */
-static bool factor(double a[][BST_FIT_MAX_PARAMETERS], int n) {
-    for (int j = 0; j < n; j++) {
-        double original = a[j][j], d = original;
-        for (int k = 0; k < j; k++) {
-            d -= a[j][k] * a[j][k];
-        }
-        if (!(d > 1e-11 * original) || !(original < 1e280)) {
-            return false;
-        }
-        a[j][j] = sqrt(d);
-        for (int i = j + 1; i < n; i++) {
-            double s = a[i][j];
-            for (int k = 0; k < j; k++) {
-                s -= a[i][k] * a[j][k];
-            }
-            a[i][j] = s / a[j][j];
-        }
-    }
-    return true;
-}
-
-static void solve(double l[][BST_FIT_MAX_PARAMETERS], int n, double *b) {
-    for (int i = 0; i < n; i++) {
-        for (int k = 0; k < i; k++) {
-            b[i] -= l[i][k] * b[k];
-        }
-        b[i] /= l[i][i];
-    }
-    for (int i = n - 1; i >= 0; i--) {
-        for (int k = i + 1; k < n; k++) {
-            b[i] -= l[k][i] * b[k];
-        }
-        b[i] /= l[i][i];
-    }
 }
 
 /* What the normal equations are summed from. */
@@ -277,13 +243,13 @@ bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
     int iterations = MAX_ITERATIONS + (int)fmin(path, BST_PSF_MAX_SIDE);
     for (int iteration = 0; iteration < iterations && good && !settled; iteration++) {
         chi = accumulate(fit, data, stamp, free, free_count, free_width, a, g);
-        good = factor(a, parameters);
+        good = bst_cholesky_factor(a[0], BST_FIT_MAX_PARAMETERS, parameters, LEAST_PIVOT);
         if (!good) {
             break;
         }
         double gradient[BST_FIT_MAX_PARAMETERS];
         memcpy(gradient, g, sizeof gradient);
-        solve(a, parameters, g);
+        bst_cholesky_solve(a[0], BST_FIT_MAX_PARAMETERS, parameters, g);
         double gain = 0.0;
         for (int k = 0; k < parameters; k++) {
             gain += gradient[k] * g[k];
@@ -319,7 +285,7 @@ bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
     if (good && !settled) {
         /* the covariance belongs to the place where the fit ended */
         chi = accumulate(fit, data, stamp, free, free_count, free_width, a, g);
-        good = factor(a, parameters);
+        good = bst_cholesky_factor(a[0], BST_FIT_MAX_PARAMETERS, parameters, LEAST_PIVOT);
     }
     for (int s = 0; s < free_count; s++) {
         good = good && isfinite(free[s]->shape.x_px) && isfinite(free[s]->shape.y_px) &&
@@ -335,7 +301,7 @@ bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
     for (int c = 0; c < 3; c++) {
         memset(column[c], 0, sizeof column[c]);
         column[c][c] = 1.0;
-        solve(a, parameters, column[c]);
+        bst_cholesky_solve(a[0], BST_FIT_MAX_PARAMETERS, parameters, column[c]);
     }
     free[0]->cov_xx = column[0][0];
     free[0]->cov_xy = column[0][1];
@@ -344,7 +310,7 @@ bool bst_fit_run(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
     if (free_width) {
         double last[BST_FIT_MAX_PARAMETERS] = {0};
         last[parameters - 1] = 1.0;
-        solve(a, parameters, last);
+        bst_cholesky_solve(a[0], BST_FIT_MAX_PARAMETERS, parameters, last);
         free[0]->widening_variance = last[parameters - 1] / (free[0]->flux_e * free[0]->flux_e);
     }
     free[0]->chi_square = chi;

@@ -11,6 +11,7 @@
 #include "sim/core/module.h"
 #include "sim/world/camera.h"
 #include "sim/world/motion.h"
+#include "sim/world/photometry.h"
 
 typedef struct bst_bad_pixel {
     int64_t x, y; /* full-sensor coordinates */
@@ -109,10 +110,11 @@ bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_i
                                       int capacity) BST_MUST_CHECK;
 
 /* Fits detection `index` of the latest bst_imgproc_detect if the matched filter placed it (see
- * most_fits), and sets all of it but label, label_probability and star_id. In windows all are
- * fitted.
+ * most_fits), and sets all of it but label, label_probability and star_id; the magnitude is put on
+ * zero_point. In windows all are fitted.
  */
-void bst_imgproc_refine(bst_imgproc *ip, bst_detections *detections, int index);
+void bst_imgproc_refine(bst_imgproc *ip, bst_detections *detections, int index,
+                        const bst_zero_point *zero_point);
 
 /* V magnitude of the faintest star that the latest frame could show at `snr`, with the shape
  * (point or streak) that stars had in it. */

@@ -8,8 +8,14 @@
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
     !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define BST_CLONES __attribute__((target_clones("default", "avx2", "avx512f")))
+/* for comparisons that are kept as numbers, which 512-bit registers are slow at */
+#define BST_CLONES_256 __attribute__((target_clones("default", "avx2")))
+/* for 16-bit numbers */
+#define BST_CLONES_16 __attribute__((target_clones("default", "avx2", "arch=skylake-avx512")))
 #else
 #define BST_CLONES
+#define BST_CLONES_256
+#define BST_CLONES_16
 #endif
 
 enum { BST_LANES = 16 };

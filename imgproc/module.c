@@ -440,9 +440,7 @@ static void add_to_stack(imgproc_module *m, const lane *l, double middle_tick,
         const bst_stack_found *found = bst_stack_search(m->stack, &count);
         bst_imgproc_append_stack(l->ip, found, count, m->camera.psf_fwhm_px, out, capacity);
         for (int i = before; i < out->count; i++) {
-            bst_detection *d = &out->items[i];
-            d->v_mag += zero_point->offset_mag;
-            d->v_mag_sigma = hypot(d->v_mag_sigma, zero_point->sigma_mag);
+            bst_photometry_correct(zero_point, &out->items[i]);
         }
     }
 }
@@ -500,7 +498,7 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
         bst_discriminator_label(m->discriminator, &known, out);
         for (int i = 0; i < out->count; i++) {
             if (out->items[i].label == BST_LABEL_OBJECT) {
-                bst_imgproc_refine(l->ip, out, i);
+                bst_imgproc_refine(l->ip, out, i, &zero_point);
             }
         }
     }

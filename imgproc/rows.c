@@ -9,25 +9,13 @@
 #include "imgproc/background.h"
 #include "imgproc/lanes.h"
 
-/* Several instruction sets by the loader's choice. Contraction is off for the whole project, so
- * the clones round alike. */
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
-    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-#define ROW_FUNCTION __attribute__((target_clones("default", "avx2", "avx512f")))
-/* for comparisons that are kept as numbers, which 512-bit registers are slow at */
-#define MASK_FUNCTION __attribute__((target_clones("default", "avx2")))
-#else
-#define ROW_FUNCTION
-#define MASK_FUNCTION
-#endif
-
 /* Half of the lanes as one value, so that they stay in registers. */
 enum { HALF = BST_ROW_LANES / 2, KEYS = 16, MEDIAN_PARTS = BST_ROW_MEDIAN / KEYS, MAX_RADIUS = 32 };
 typedef float lanes __attribute__((vector_size(HALF * sizeof(float))));
 typedef int16_t keys __attribute__((vector_size(KEYS * sizeof(int16_t))));
 typedef int32_t lane_masks __attribute__((vector_size(HALF * sizeof(float))));
 
-MASK_FUNCTION
+BST_CLONES_256
 void bst_row_clipped_sums(const float *restrict pixels, int width, int height, size_t stride,
                           float level, float limit, bst_row_sums *restrict sums) {
     lane_masks n0 = {0}, n1 = {0};
@@ -76,7 +64,7 @@ void bst_row_clipped_sums(const float *restrict pixels, int width, int height, s
     }
 }
 
-ROW_FUNCTION
+BST_CLONES
 int bst_row_good(const float *pixels, int count) {
     int good = 0;
     for (int x = 0; x < count; x++) {
@@ -102,7 +90,7 @@ static inline float value_of(int key) {
 }
 
 /* The greatest key that no more than half of the values are below, bit by bit, without branches. */
-MASK_FUNCTION
+BST_CLONES_256
 float bst_row_median(const float *values, int count) {
     int16_t all[BST_ROW_MEDIAN];
     keys part[MEDIAN_PARTS];
@@ -127,14 +115,14 @@ float bst_row_median(const float *values, int count) {
     return value_of(median);
 }
 
-ROW_FUNCTION
+BST_CLONES
 void bst_row_line(float *restrict out, int count, float left, float slope, float first) {
     for (int x = 0; x < count; x++) {
         out[x] = left + slope * ((float)x + first);
     }
 }
 
-ROW_FUNCTION
+BST_CLONES
 void bst_row_electrons(const uint16_t *restrict raw, int count, float offset, float gain,
                        float *restrict out) {
     for (int x = 0; x < count; x++) {
@@ -142,7 +130,7 @@ void bst_row_electrons(const uint16_t *restrict raw, int count, float offset, fl
     }
 }
 
-ROW_FUNCTION
+BST_CLONES
 static uint16_t greatest(const uint16_t *raw, int count) {
     uint16_t top = 0;
     for (int x = 0; x < count; x++) {
@@ -233,7 +221,7 @@ void bst_row_normalise(const uint16_t *raw, const float *electrons, const bst_ro
     }
 }
 
-ROW_FUNCTION
+BST_CLONES
 void bst_row_even(float *restrict out, int count, const float *const *in, const float *weight,
                   int radius) {
     const float *restrict m = in[0];
@@ -290,7 +278,7 @@ void bst_row_even_4(float *out, size_t stride, int count, const float *const *in
     }
 }
 
-ROW_FUNCTION
+BST_CLONES
 void bst_row_combine(float *restrict out, int count, const float *const *in, const float *weight,
                      int taps) {
     int t = 0;
@@ -403,7 +391,7 @@ static inline void take(lanes *out, const float *from) {
     memcpy(out, from, sizeof *out);
 }
 
-MASK_FUNCTION
+BST_CLONES_256
 int bst_row_maxima(const float *above, const float *row, const float *below, int count,
                    float threshold, int32_t *x, float *value) {
     enum { STEP = 4 * HALF };
@@ -451,14 +439,14 @@ int bst_row_maxima(const float *above, const float *row, const float *below, int
     return found;
 }
 
-ROW_FUNCTION
+BST_CLONES
 void bst_row_scale(float *restrict out, const float *restrict by, float factor, int count) {
     for (int x = 0; x < count; x++) {
         out[x] *= by[x] * factor;
     }
 }
 
-ROW_FUNCTION
+BST_CLONES
 void bst_row_mask(const float *const *rows, int count, float limit, float *restrict out) {
     enum { BLOCK = 256 };
     const float *restrict a = rows[0], *restrict b = rows[1], *restrict c = rows[2],

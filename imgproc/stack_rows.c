@@ -1,14 +1,7 @@
+#include "imgproc/lanes.h"
 #include "imgproc/stack_internal.h"
 
-/* Several instruction sets by the loader's choice; whole numbers, so all give the same. */
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
-    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-#define ROW_FUNCTION __attribute__((target_clones("default", "avx2")))
-#else
-#define ROW_FUNCTION
-#endif
-
-ROW_FUNCTION
+BST_CLONES_256
 void stack_rows_add4(const int16_t *const in[4], int in_stride, int16_t *restrict out,
                      int out_stride, int width, int height) {
     for (int y = 0; y < height; y++) {
@@ -21,7 +14,7 @@ void stack_rows_add4(const int16_t *const in[4], int in_stride, int16_t *restric
     }
 }
 
-ROW_FUNCTION
+BST_CLONES_256
 static int greatest4(const int16_t *const *in, int stride, int width, int height) {
     int16_t most = INT16_MIN;
     for (int y = 0; y < height; y++) {
@@ -35,7 +28,7 @@ static int greatest4(const int16_t *const *in, int stride, int width, int height
     return most;
 }
 
-ROW_FUNCTION
+BST_CLONES_256
 static int greatest(const int16_t *const *in, int count, int stride, int16_t *restrict row,
                     int width, int height) {
     int16_t most = INT16_MIN;
@@ -62,7 +55,7 @@ int stack_rows_greatest(const int16_t *const *in, int count, int stride, int16_t
                       : greatest(in, count, stride, row, width, height);
 }
 
-ROW_FUNCTION
+BST_CLONES_256
 void stack_rows_add_bytes(const int8_t *restrict in, int16_t *restrict sum, int count) {
     for (int x = 0; x < count; x++) {
         sum[x] = (int16_t)(sum[x] + (in[x] == STACK_NONE ? 0 : in[x]));

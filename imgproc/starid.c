@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "imgproc/heapsort.h"
+#include "sim/world/photometry.h"
 
 enum { VOTERS = 150, PASSES = 5 };
 
@@ -80,8 +81,7 @@ static bool consistent(const bst_detection *d, const bst_expected_star *s) {
     if (d->label != BST_LABEL_UNKNOWN && d->label != BST_LABEL_STAR) {
         return false;
     }
-    double sigma = d->flux_e > 0.0 ? 1.0857 * d->flux_sigma_e / d->flux_e : 1.0;
-    double limit = 1.0 + 3.0 * fmin(sigma, 1.0);
+    double limit = 1.0 + 3.0 * fmin(bst_photometry_noise_mag(d), 1.0);
     double excess = d->v_mag - s->v_mag; /* > 0: fainter than the star */
     bool cut = (d->flags & (BST_DETECTION_SATURATED | BST_DETECTION_EDGE)) != 0;
     return excess > -limit && excess < (cut ? limit + 2.5 : limit);

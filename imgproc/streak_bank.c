@@ -6,16 +6,10 @@
 #include <string.h>
 
 #include "imgproc/heapsort.h"
+#include "imgproc/lanes.h"
 
 /* A tile holds the lines that begin in it. */
 enum { TILE_COLUMNS = 512, TILE_ROWS = 256, TILE_HITS = 2048, PIECES = 8 };
-
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
-    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-#define BANK_FUNCTION __attribute__((target_clones("default", "avx2", "arch=skylake-avx512")))
-#else
-#define BANK_FUNCTION
-#endif
 
 static int piece_rows(int octave) {
     return 1 << octave;
@@ -136,7 +130,7 @@ static void set_scales(bst_streak_bank *bank, const bst_streak_map *map) {
 }
 
 /* out = sum of rows */
-BANK_FUNCTION
+BST_CLONES_16
 static void sum_rows(int16_t *restrict out, int count, const int16_t *const *in, int rows) {
     if (rows == 1) {
         memcpy(out, in[0], (size_t)count * sizeof *out);
@@ -164,7 +158,7 @@ static void sum_rows(int16_t *restrict out, int count, const int16_t *const *in,
 
 /* Excess of the windows of 4 to 7 (8) pieces over their thresholds, the greatest of them; returns
  * whether any is above 0. */
-BANK_FUNCTION
+BST_CLONES_16
 static bool best_window(int16_t *restrict out, int count, const int16_t *const *in,
                         const int16_t *limit, int windows) {
     const int16_t *restrict p0 = in[0], *restrict p1 = in[1], *restrict p2 = in[2],

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "imgproc/cholesky.h"
+
 /* Streaks fainter than this say nothing beside bright ones. */
 static const double LEAST_SNR = 20.0;
 /* A neighbour this bright relative to a streak would bend it. */
@@ -117,30 +119,11 @@ static bool start_star(const bst_streak_motion *work, const bst_locate_frame *f,
 /* Solves a x = v for a symmetric positive definite matrix of order n and `count` right-hand sides,
  * each a row of x, by Cholesky; false when it is not definite. */
 static bool solve(int n, double a[LOCAL][LOCAL], int count, double x[][LOCAL]) {
-    for (int j = 0; j < n; j++) {
-        for (int i = j; i < n; i++) {
-            for (int k = 0; k < j; k++) {
-                a[i][j] -= a[i][k] * a[j][k];
-            }
-            if (i == j && !(a[j][j] > 0.0)) {
-                return false;
-            }
-            a[i][j] = i == j ? sqrt(a[j][j]) : a[i][j] / a[j][j];
-        }
+    if (!bst_cholesky_factor(a[0], LOCAL, n, 0.0)) {
+        return false;
     }
     for (int r = 0; r < count; r++) {
-        for (int i = 0; i < n; i++) {
-            for (int k = 0; k < i; k++) {
-                x[r][i] -= a[i][k] * x[r][k];
-            }
-            x[r][i] /= a[i][i];
-        }
-        for (int i = n - 1; i >= 0; i--) {
-            for (int k = i + 1; k < n; k++) {
-                x[r][i] -= a[k][i] * x[r][k];
-            }
-            x[r][i] /= a[i][i];
-        }
+        bst_cholesky_solve(a[0], LOCAL, n, x[r]);
     }
     return true;
 }

@@ -2,6 +2,7 @@
 #include <stdlib.h>
 
 #include "obsgen/generator_internal.h"
+#include "sim/core/vec.h"
 
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
 /* Image processing tells two sources apart where the saddle between them is so much lower than the
@@ -79,6 +80,7 @@ void bst_generator_decide(bst_generator *g) {
         }
     }
     qsort(g->ranks, (size_t)ranks, sizeof *g->ranks, brighter);
+    g->rank_count = ranks;
     for (int r = 0; r < ranks; r++) {
         int i = g->ranks[r].index;
         generator_source *s = &g->sources[i];
@@ -111,12 +113,33 @@ void bst_generator_decide(bst_generator *g) {
     }
 }
 
+/* What of a source's light lies near another's place: of a streak beside one that moved less its
+ * nearest part, and that share of its light which a filter there sees. */
+typedef struct nearest_light {
+    double dx, dy, share;
+} nearest_light;
+
+static nearest_light nearest_of(const bst_generator *g, const generator_source *s,
+                                const generator_source *o) {
+    nearest_light n = {o->x - s->x, o->y - s->y, 1.0};
+    if (o->length < s->length + 2.0) {
+        return n;
+    }
+    double c = o->path.dx / o->length, t = o->path.dy / o->length, half = 0.5 * o->length;
+    double along = fmax(-half, fmin(-(n.dx * c + n.dy * t), half));
+    n.dx += along * c;
+    n.dy += along * t;
+    n.share = fmin(1.0, 2.0 * sqrt(BST_PI) * g->total_sigma / o->length);
+    return n;
+}
+
 /* Light of sources that are seen in this one, and of what is fitted beside it. A fit of one source
  * to several lands where the filter's output is greatest: found by moving to the mean weighted with
  * what each gives there (mean shift). */
 generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
     enum { MOST = 24, ROUNDS = 8 };
-    const generator_source *s = &g->sources[i], *merged[MOST];
+    const generator_source *s = &g->sources[i];
+    generator_source merged[MOST];
     generator_blend out = {
         .flux_e = s->flux_e, .x = s->x, .y = s->y, .widen = 1.0, .flat = 1.0, .near = false};
     double brightest = 0.0;
@@ -136,12 +159,17 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
             /* both fluxes and places are free: what they have in common is not known */
             out.widen *= 1.0 / fmax(1.0 - share * share, 0.1);
         } else if (count < MOST) {
-            merged[count++] = o;
-            if (o->head == i && o->flux_e > brightest) {
-                brightest = o->flux_e;
-                double part = sqrt(s->flux_e * o->flux_e) / (s->flux_e + o->flux_e);
-                out.spread_x = part * dx;
-                out.spread_y = part * dy;
+            nearest_light n = nearest_of(g, s, o);
+            generator_source *m = &merged[count++];
+            *m = *o;
+            m->x = s->x + n.dx;
+            m->y = s->y + n.dy;
+            m->flux_e *= n.share;
+            if (o->head == i && m->flux_e > brightest) {
+                brightest = m->flux_e;
+                double part = sqrt(s->flux_e * m->flux_e) / (s->flux_e + m->flux_e);
+                out.spread_x = part * n.dx;
+                out.spread_y = part * n.dy;
             }
         }
     }
@@ -151,10 +179,10 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
         at.y = out.y;
         double own = s->flux_e * overlap(g, s, &at), sum = own, x = 0.0, y = 0.0;
         for (int k = 0; k < count; k++) {
-            double light = merged[k]->flux_e * overlap(g, &at, merged[k]);
+            double light = merged[k].flux_e * overlap(g, &at, &merged[k]);
             sum += light;
-            x += light * (merged[k]->x - s->x);
-            y += light * (merged[k]->y - s->y);
+            x += light * (merged[k].x - s->x);
+            y += light * (merged[k].y - s->y);
         }
         out.flux_e = sum;
         out.x = s->x + x / sum;
@@ -169,7 +197,7 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
             at.y = out.y + step * h * s->path.dy;
             all += weight * s->flux_e * overlap(g, &at, s);
             for (int k = 0; k < count; k++) {
-                all += weight * merged[k]->flux_e * overlap(g, &at, merged[k]);
+                all += weight * merged[k].flux_e * overlap(g, &at, &merged[k]);
             }
             generator_source beside = *s;
             beside.x = s->x + step * h * s->path.dx;

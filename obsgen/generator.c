@@ -46,7 +46,7 @@ void bst_generator_free(bst_generator *g) {
         free(g->ranks);
         free(g->route);
         free(g->way);
-        free(g->streaks);
+        bst_generator_free_streaks(g->streaks);
         free(g->path_x);
         free(g->path_y);
         free(g->object_x);
@@ -452,14 +452,18 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
     for (int i = 0; i < g->source_count; i++) {
         const generator_source *s = &g->sources[i];
         if (s->broken) {
-            BST_TRY(bst_generator_fragments(ctx, g, s));
-        } else if (s->found && g->smeared) {
+            continue;
+        }
+        if (s->found && g->smeared) {
             keep_whole_rough(g, s);
         } else if (s->found) {
             generator_blend b = bst_generator_blend_of(g, i);
             bst_generated item = {bst_generator_measure(g, s, &b), s->item, false};
             bst_generator_keep(g, &item);
         }
+    }
+    if (g->smeared) {
+        BST_TRY(bst_generator_fragments(ctx, g));
     }
     bst_generator_false_alarms(g);
     bst_generator_hits(g);

@@ -68,6 +68,7 @@ struct bst_generator {
     } thresholds;
     generator_source *sources; /* by row */
     generator_rank *ranks;
+    int rank_count; /* by brightness, those that are no light alone */
     int source_count, source_capacity;
     double reach; /* of any source's light */
     /* the stars' way, in frames that are smeared, and a source's */

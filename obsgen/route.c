@@ -39,26 +39,49 @@ static void lay_on(bst_route_node *nodes, int *count, int end, int before, doubl
     }
 }
 
-/* Light of the whole path at a place: each piece a uniform segment. */
-static double light_at(const bst_route_path *p, double x, double y, double s) {
-    double sum = 0.0;
-    for (int k = 1; k < p->count; k++) {
-        double dx = p->x_px[k] - p->x_px[k - 1], dy = p->y_px[k] - p->y_px[k - 1];
-        double mx = x - 0.5 * (p->x_px[k] + p->x_px[k - 1]),
-               my = y - 0.5 * (p->y_px[k] + p->y_px[k - 1]);
-        double length = hypot(dx, dy), near = 6.0 * s + 0.5 * length;
-        if (fabs(mx) > near || fabs(my) > near) {
-            continue;
-        }
-        if (length < 0.3 * s) {
-            sum += exp(-0.5 * (mx * mx + my * my) / (s * s));
-            continue;
-        }
-        double u = (mx * dx + my * dy) / length, v = (my * dx - mx * dy) / length;
-        sum += exp(-0.5 * v * v / (s * s)) * (s / length) * 2.5066282746310002 *
-               (below((u + 0.5 * length) / s) - below((u - 0.5 * length) / s));
+/* A piece of a path: a uniform segment. */
+typedef struct piece {
+    double x, y, cx, cy; /* middle; direction */
+    double half, near;   /* length; as far as its light counts along either axis */
+    double height;       /* of its light beside its middle: an equal share for each piece */
+} piece;
+
+static piece piece_of(const bst_route_path *p, int k, double s) {
+    double dx = p->x_px[k] - p->x_px[k - 1], dy = p->y_px[k] - p->y_px[k - 1];
+    double length = hypot(dx, dy), share = 1.0 / (p->count - 1);
+    piece out = {.x = 0.5 * (p->x_px[k] + p->x_px[k - 1]),
+                 .y = 0.5 * (p->y_px[k] + p->y_px[k - 1]),
+                 .half = 0.5 * length / s,
+                 .near = 6.0 * s + 0.5 * length,
+                 .height = share};
+    if (length >= 0.3 * s) {
+        out.cx = dx / (length * s);
+        out.cy = dy / (length * s);
+        out.height = share * (s / length) * 2.5066282746310002;
     }
-    return sum / (p->count - 1);
+    return out;
+}
+
+/* Light of a piece at a place (x, y) from its middle. */
+static double piece_light(const piece *p, double x, double y, double s) {
+    if (p->cx == 0.0 && p->cy == 0.0) { /* a point */
+        return p->height * exp(-0.5 * (x * x + y * y) / (s * s));
+    }
+    double u = x * p->cx + y * p->cy, v = y * p->cx - x * p->cy;
+    return p->height * exp(-0.5 * v * v) * (below(u + p->half) - below(u - p->half));
+}
+
+/* Adds the light of the whole path at its nodes. */
+static void add_light(const bst_route_path *path, double s, bst_route_node *nodes, int count) {
+    for (int k = 1; k < path->count; k++) {
+        piece p = piece_of(path, k, s);
+        for (int i = 0; i < count; i++) {
+            double x = nodes[i].x - p.x, y = nodes[i].y - p.y;
+            if (fabs(x) <= p.near && fabs(y) <= p.near) {
+                nodes[i].light += piece_light(&p, x, y, s);
+            }
+        }
+    }
 }
 
 int bst_route_lay(const bst_route_path *p, double sigma_px, bst_route_node *nodes) {
@@ -88,9 +111,7 @@ int bst_route_lay(const bst_route_path *p, double sigma_px, bst_route_node *node
             nodes[i] = moved;
         }
     }
-    for (int i = 0; i < count; i++) {
-        nodes[i].light = light_at(p, nodes[i].x, nodes[i].y, sigma_px * sqrt(2.0));
-    }
+    add_light(p, sigma_px * sqrt(2.0), nodes, count);
     return count;
 }
 

@@ -3,16 +3,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "control/control.h"
 #include "gimbal/two_axis.h"
 
 static const double two_pi = 2.0 * BST_PI;
-
-/* So small that no axis meets a limit: the linear regime. */
-#define TINY 1e-9
-/* The mount is at rest when this much is missing; it is waited for no longer than that. */
-#define AT_REST 1e-9
-#define LONGEST_S 60.0
 
 static const bst_module_config *find_module(const bst_scenario *scenario, int observer, int sensor,
                                             const char *role) {
@@ -55,11 +48,11 @@ static int axis_response(const bst_axis_spec *spec, double rate, int most, doubl
     bst_axis_init(&axis, spec);
     int n = 0, still = 0;
     for (; n < most && still < 100; n++) {
-        double wanted = rate > 0.0 ? TINY * n * spec->dt_s : TINY;
-        bst_axis_step(&axis, wanted, TINY * rate, 0.0);
-        double missing = (wanted - axis.angle_rad) / TINY;
+        double wanted = rate > 0.0 ? BST_LOOP_TINY * n * spec->dt_s : BST_LOOP_TINY;
+        bst_axis_step(&axis, wanted, BST_LOOP_TINY * rate, 0.0);
+        double missing = (wanted - axis.angle_rad) / BST_LOOP_TINY;
         out[n] = rate > 0.0 ? missing : 1.0 - missing;
-        still = fabs(missing) < AT_REST ? still + 1 : 0;
+        still = fabs(missing) < BST_LOOP_AT_REST ? still + 1 : 0;
     }
     return n;
 }
@@ -71,7 +64,7 @@ static bst_status second_order_response(bst_ctx *ctx, const bst_two_axis_config 
                           .natural_frequency_radps = two_pi * config->natural_frequency_hz,
                           .damping = config->damping,
                           .dt_s = dt_s};
-    int most = (int)fmin(fmax(ceil(LONGEST_S / dt_s), 2.0), 1e6);
+    int most = (int)fmin(fmax(ceil(BST_LOOP_LONGEST_S / dt_s), 2.0), 1e6);
     double *step = calloc((size_t)most, 2 * sizeof *step);
     if (!step) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a mount's response");
@@ -86,23 +79,50 @@ static bst_status second_order_response(bst_ctx *ctx, const bst_two_axis_config 
     return BST_OK;
 }
 
-static void add_band(bst_loop_axis *axis, double low_hz, double high_hz, double variance_px2) {
+void bst_loop_add_band(bst_loop_axis *axis, double low_hz, double high_hz, double variance_px2) {
     if (variance_px2 > 0.0 && high_hz >= low_hz && axis->band_count < BST_LOOP_BANDS) {
         axis->bands[axis->band_count++] = (bst_tracking_band){low_hz, high_hz, variance_px2};
     }
 }
 
-static void platform_bands(const bst_platform_config *platform, double pixel_rad, double dt_s,
-                           bst_loop_axis *axis) {
-    bst_jitter_spec spec = {.low_rms_rad = platform->jitter_low_px_rms,
-                            .low_cutoff_hz = platform->jitter_low_cutoff_hz,
-                            .high_rms_rad = platform->jitter_high_px_rms,
-                            .high_min_hz = platform->jitter_high_band_hz[0],
-                            .high_max_hz = platform->jitter_high_band_hz[1]};
-    (void)pixel_rad; /* the platform's jitter is configured in pixels, radial */
-    spec = bst_jitter_resolved(&spec, dt_s);
-    add_band(axis, 0.0, spec.low_cutoff_hz, 0.5 * spec.low_rms_rad * spec.low_rms_rad);
-    add_band(axis, spec.high_min_hz, spec.high_max_hz, 0.5 * spec.high_rms_rad * spec.high_rms_rad);
+/* A table cut at its points, and these at a quarter of an octave, up to what the plant's steps can
+ * follow. */
+static void table_bands(const bst_density *table, double scale, double top_hz,
+                        bst_loop_axis *axis) {
+    for (int i = 0; i + 1 < table->count; i++) {
+        double from = table->points[i].frequency_hz;
+        double to = fmin(table->points[i + 1].frequency_hz, top_hz);
+        int parts = from > 0.0 && to > from ? (int)fmin(ceil(4.0 * log2(to / from)), 40.0) : 8;
+        for (int k = 0; k < parts && to > from; k++) {
+            double a = from + (to - from) * k / parts, b = from + (to - from) * (k + 1) / parts;
+            bst_loop_add_band(axis, a, b, scale * bst_density_integral(table, a, b));
+        }
+    }
+}
+
+static bst_status platform_bands(bst_ctx *ctx, const bst_platform_config *platform,
+                                 double pixel_rad, double dt_s, int camera_axis,
+                                 bst_loop_axis *axis) {
+    bst_jitter_spectrum spectrum;
+    BST_TRY(bst_platform_jitter_spectrum(ctx, platform, pixel_rad, &spectrum));
+    double per_px2 = 1.0 / (pixel_rad * pixel_rad), top_hz = BST_JITTER_RESOLVED / dt_s;
+    bst_jitter_spec flat = bst_jitter_resolved(&spectrum.flat, dt_s);
+    bst_loop_add_band(axis, 0.0, flat.low_cutoff_hz,
+                      0.5 * per_px2 * flat.low_rms_rad * flat.low_rms_rad);
+    bst_loop_add_band(axis, flat.high_min_hz, flat.high_max_hz,
+                      0.5 * per_px2 * flat.high_rms_rad * flat.high_rms_rad);
+    double scale = per_px2 * (camera_axis == 1 ? spectrum.y_scale : 1.0);
+    table_bands(&spectrum.low, scale, top_hz, axis);
+    table_bands(&spectrum.high, scale, top_hz, axis);
+    for (int i = 0; i < spectrum.line_count; i++) {
+        const bst_jitter_line *line = &spectrum.line[i];
+        if (line->axis == camera_axis && line->frequency_hz <= top_hz) {
+            bst_loop_add_band(axis, line->frequency_hz, line->frequency_hz,
+                              0.5 * per_px2 * line->amplitude_rad * line->amplitude_rad);
+        }
+    }
+    bst_jitter_spectrum_free(&spectrum);
+    return BST_OK;
 }
 
 /* ---- the tracking loop ---- */
@@ -168,10 +188,17 @@ static void predict(bst_loop_axis *axis, double drift_pxps, const bst_loop_optio
     }
 }
 
-static bst_status close_tracking(bst_ctx *ctx, const bst_control_config *control,
-                                 const bst_servo_response *servo, double drift_pxps,
-                                 const bst_loop_options *options, bst_loop_model *model,
-                                 bst_loop_axis *axis) {
+bst_status bst_loop_close_tracking(bst_ctx *ctx, const bst_control_config *control,
+                                   const bst_servo_response *servo,
+                                   const bst_platform_config *platform, int camera_axis,
+                                   double drift_pxps, const bst_loop_options *options,
+                                   bst_loop_model *model, bst_loop_axis *axis) {
+    BST_TRY(platform_bands(ctx, platform, model->pixel_rad, model->timing.gimbal_period_s,
+                           camera_axis, axis));
+    bst_loop_body_bands(&platform->spacecraft, camera_axis, model->pixel_rad, axis);
+    if (!control || !control->compensate_attitude) {
+        return BST_OK;
+    }
     const bst_loop_timing *t = &model->timing;
     double arrival = 0.5 * t->exposure_s + t->frame_latency_s;
     bst_tracking_timing timing = {.period_s = t->period_s,
@@ -194,20 +221,21 @@ static bst_status build_second_order(bst_ctx *ctx, const bst_module_config *gimb
                                      const bst_control_config *control,
                                      const bst_loop_options *options, bst_loop_model *model) {
     const bst_two_axis_config *config = gimbal->config;
-    static const char *const names[BST_LOOP_AXES] = {"outer", "inner"};
+    static const char *const names[] = {"outer", "inner"};
+    model->axes = 2;
     double dt = model->timing.gimbal_period_s, arcsec_px = model->pixel_rad / BST_ARCSEC_RAD;
     bst_servo_response servo = {0};
     BST_TRY(second_order_response(ctx, config, dt, &servo));
     bst_status status = BST_OK;
-    for (int a = 0; status == BST_OK && a < BST_LOOP_AXES; a++) {
+    for (int a = 0; status == BST_OK && a < model->axes; a++) {
         bst_loop_axis *axis = &model->axis[a];
         axis->name = names[a];
         status = second_order_servo(ctx, config, &axis->servo);
-        platform_bands(&config->platform, model->pixel_rad, dt, axis);
         /* the outer axis moves the image along x, as a turn about body y does */
         double drift = config->platform.drift_arcsec_per_s[a == 0 ? 1 : 0] / arcsec_px;
-        if (status == BST_OK && control && control->compensate_attitude) {
-            status = close_tracking(ctx, control, &servo, drift, options, model, axis);
+        if (status == BST_OK) {
+            status = bst_loop_close_tracking(ctx, control, &servo, &config->platform,
+                                             a == 0 ? 1 : 0, drift, options, model, axis);
         }
     }
     free((double *)(uintptr_t)servo.step);
@@ -220,7 +248,9 @@ bst_status bst_loop_model_create(bst_ctx *ctx, const bst_scenario *scenario, int
     *out = NULL;
     const bst_module_config *gimbal = find_module(scenario, observer, sensor, "gimbal");
     const bst_module_config *control = find_module(scenario, observer, sensor, "control");
-    if (!gimbal || gimbal->desc->config != bst_two_axis_config_table) {
+    bool simple = gimbal && gimbal->desc->config == bst_two_axis_config_table;
+    bool full = gimbal && gimbal->desc->config == bst_mount_config_table;
+    if (!simple && !full) {
         return BST_OK;
     }
     if (control && control->desc->config != bst_control_config_table) {
@@ -246,8 +276,19 @@ bst_status bst_loop_model_create(bst_ctx *ctx, const bst_scenario *scenario, int
         model->command_latency_s = law->command_latency_s;
         status = control_gains(ctx, law, options, model);
     }
-    if (status == BST_OK) {
+    if (status == BST_OK && simple) {
         status = build_second_order(ctx, gimbal, law, options, model);
+        const bst_two_axis_config *c = gimbal->config;
+        status =
+            status == BST_OK ? bst_loop_build_body(ctx, &c->platform.spacecraft, model) : status;
+    } else if (status == BST_OK) {
+        bool azimuth = strcmp(gimbal->desc->type, "azimuth_elevation") == 0;
+        status = bst_loop_build_mount(
+            ctx, azimuth ? BST_MOUNT_AZIMUTH_ELEVATION : BST_MOUNT_CROSS_ELEVATION, gimbal->config,
+            law, options, model);
+        const bst_mount_config *c = gimbal->config;
+        status =
+            status == BST_OK ? bst_loop_build_body(ctx, &c->platform.spacecraft, model) : status;
     }
     if (status != BST_OK) {
         bst_loop_model_free(model);
@@ -267,15 +308,15 @@ void bst_loop_model_free(bst_loop_model *model) {
     }
 }
 
-static void warn_of(bst_ctx *ctx, const bst_loop_model *model, const bst_loop_axis *axis,
-                    const char *what, const bst_loop_margins *m) {
+static void warn_of(bst_ctx *ctx, const bst_loop_model *model, const char *axis, const char *what,
+                    const bst_loop_margins *m) {
     const char *verdict = bst_loop_verdict(m);
     if (verdict) {
         bst_log(ctx, BST_LOG_WARNING,
                 "%s/%s: the %s of the %s axis %s: gain margin %.3g dB, phase margin %.3g deg, "
                 "sensitivity peak %.3g (wanted: 6 dB, 30 deg, 2); see boresight loop",
-                model->observer_name, model->sensor_name, what, axis->name, verdict,
-                m->gain_margin_db, m->phase_margin_deg, m->sensitivity_peak);
+                model->observer_name, model->sensor_name, what, axis, verdict, m->gain_margin_db,
+                m->phase_margin_deg, m->sensitivity_peak);
     }
 }
 
@@ -290,16 +331,19 @@ void bst_loop_warn(bst_ctx *ctx, const bst_scenario *scenario) {
                 !model) {
                 continue;
             }
-            for (int a = 0; a < BST_LOOP_AXES; a++) {
+            for (int a = 0; a < model->axes; a++) {
                 const bst_loop_axis *axis = &model->axis[a];
                 bool twin = a > 0 && memcmp(&axis->margins, &model->axis[0].margins,
                                             sizeof axis->margins) == 0;
                 if (axis->tracked && !twin) {
-                    warn_of(ctx, model, axis, "tracking loop", &axis->margins);
+                    warn_of(ctx, model, axis->name, "tracking loop", &axis->margins);
                 }
                 if (axis->servo.there) {
-                    warn_of(ctx, model, axis, "servo", &axis->servo.margins);
+                    warn_of(ctx, model, axis->name, "servo", &axis->servo.margins);
                 }
+            }
+            for (int b = 0; b < model->bodies; b++) {
+                warn_of(ctx, model, model->body[b].name, "attitude loop", &model->body[b].margins);
             }
             bst_loop_model_free(model);
         }

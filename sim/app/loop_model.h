@@ -2,11 +2,13 @@
 #ifndef BST_APP_LOOP_MODEL_H
 #define BST_APP_LOOP_MODEL_H
 
+#include "control/control.h"
 #include "control/tracking_loop.h"
+#include "gimbal/mount_response.h"
 #include "sim/engine/loop_timing.h"
 #include "sim/engine/scenario.h"
 
-enum { BST_LOOP_AXES = 2, BST_LOOP_BANDS = 64 };
+enum { BST_LOOP_AXES = 3, BST_LOOP_BODY = 3, BST_LOOP_BANDS = 512, BST_LOOP_HINTS = 16 };
 
 typedef struct bst_loop_options {
     double fix_sigma_px; /* of the attitude that a frame's stars give, per axis */
@@ -28,7 +30,9 @@ typedef struct bst_loop_prediction {
 typedef struct bst_loop_servo {
     bool there, continuous;
     double natural_radps, damping; /* second_order */
-    bst_loop loop;                 /* its `user` is this struct, which must stay where it is */
+    bst_mount_axis_model mount;    /* the full types */
+    double hint_hz[2];
+    bst_loop loop; /* its `user` is this struct, which must stay where it is */
     bst_loop_margins margins;
 } bst_loop_servo;
 
@@ -44,6 +48,16 @@ typedef struct bst_loop_axis {
     bst_loop_prediction prediction;
 } bst_loop_axis;
 
+/* The attitude loop of the spacecraft about a body axis. */
+typedef struct bst_loop_body {
+    const char *name; /* "x", "y", "z" */
+    int number;
+    const bst_craft_config *config;
+    double hint_hz[BST_LOOP_HINTS];
+    bst_loop loop; /* its `user` is this struct */
+    bst_loop_margins margins;
+} bst_loop_body;
+
 typedef struct bst_loop_model {
     int observer, sensor;
     const char *observer_name, *sensor_name, *gimbal_type, *compensator;
@@ -53,6 +67,9 @@ typedef struct bst_loop_model {
     bool observes; /* the observer: margins as of bst_tracking_open */
     double alpha, beta;
     bst_compensator gains; /* else */
+    int bodies;            /* 0: the spacecraft has no loop */
+    bst_loop_body body[BST_LOOP_BODY];
+    int axes;
     bst_loop_axis axis[BST_LOOP_AXES];
 } bst_loop_model;
 
@@ -68,6 +85,39 @@ void bst_loop_model_free(bst_loop_model *model);
 /* Logs a warning for each loop of a scenario that is unstable or has thin margins
  * (bst_loop_verdict); what cannot be analysed is left to those who run it. */
 void bst_loop_warn(bst_ctx *ctx, const bst_scenario *scenario);
+
+/* ---- what loop_model.c shares with loop_mount.c ---- */
+
+/* So small a command that no axis meets a limit, rad: the linear regime. */
+#define BST_LOOP_TINY 1e-9
+/* The mount is at rest when this much of a command is missing; it is waited for up to LONGEST. */
+#define BST_LOOP_AT_REST 1e-9
+#define BST_LOOP_LONGEST_S 60.0
+
+/* A flat band (a line, where both frequencies are the same); more than there is room for are left
+ * out. */
+void bst_loop_add_band(bst_loop_axis *axis, double low_hz, double high_hz, double variance_px2);
+
+/* The loops of a rigid_body with an attitude law; nothing of other spacecraft. */
+bst_status bst_loop_build_body(bst_ctx *ctx, const bst_craft_config *config,
+                               bst_loop_model *model) BST_MUST_CHECK;
+/* What the error of its believed attitude about a body axis does to an axis of the mount. */
+void bst_loop_body_bands(const bst_craft_config *config, int body_axis, double pixel_rad,
+                         bst_loop_axis *axis);
+
+/* Adds the platform's jitter and attitude errors to an axis that turns about a camera axis (0 x, 1
+ * y), and closes the tracking loop round it (control NULL:
+ * none). drift_pxps: of the image along this axis. */
+bst_status bst_loop_close_tracking(bst_ctx *ctx, const bst_control_config *control,
+                                   const bst_servo_response *servo,
+                                   const bst_platform_config *platform, int camera_axis,
+                                   double drift_pxps, const bst_loop_options *options,
+                                   bst_loop_model *model, bst_loop_axis *axis) BST_MUST_CHECK;
+
+/* The axes of a full mount at its start angles. `type` as bst_mount_type. */
+bst_status bst_loop_build_mount(bst_ctx *ctx, int type, const bst_mount_config *config,
+                                const bst_control_config *control, const bst_loop_options *options,
+                                bst_loop_model *model) BST_MUST_CHECK;
 
 /* ---- loop_report.c ---- */
 

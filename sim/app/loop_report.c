@@ -44,7 +44,7 @@ void bst_loop_print(const bst_loop_model *model) {
             "%g s on their way\n",
             t->period_s, t->exposure_s, t->frame_latency_s, t->command_delay_s);
     }
-    for (int a = 0; a < BST_LOOP_AXES; a++) {
+    for (int a = 0; a < model->axes; a++) {
         const bst_loop_axis *axis = &model->axis[a];
         if (axis->tracked && model->observes) {
             printf(
@@ -63,6 +63,10 @@ void bst_loop_print(const bst_loop_model *model) {
                    axis->servo.continuous ? " (continuous)" : "");
             print_margins(&axis->servo.margins);
         }
+    }
+    for (int b = 0; b < model->bodies; b++) {
+        printf("  body %s axis, attitude loop\n", model->body[b].name);
+        print_margins(&model->body[b].margins);
     }
 }
 
@@ -94,7 +98,7 @@ cJSON *bst_loop_json(const bst_loop_model *model) {
     bst_json_add_number(root, "command_delay_s", model->timing.command_delay_s);
     cJSON *axes = cJSON_AddArrayToObject(root, "axes");
     double sum = 0.0;
-    for (int a = 0; a < BST_LOOP_AXES; a++) {
+    for (int a = 0; a < model->axes; a++) {
         const bst_loop_axis *axis = &model->axis[a];
         cJSON *node = cJSON_CreateObject();
         cJSON_AddItemToArray(axes, node);
@@ -112,6 +116,15 @@ cJSON *bst_loop_json(const bst_loop_model *model) {
         }
         if (axis->servo.there) {
             add_margins(cJSON_AddObjectToObject(node, "servo"), &axis->servo.margins);
+        }
+    }
+    if (model->bodies > 0) {
+        cJSON *bodies = cJSON_AddArrayToObject(root, "body");
+        for (int b = 0; b < model->bodies; b++) {
+            cJSON *node = cJSON_CreateObject();
+            cJSON_AddItemToArray(bodies, node);
+            cJSON_AddStringToObject(node, "axis", model->body[b].name);
+            add_margins(node, &model->body[b].margins);
         }
     }
     if (model->compensator) {

@@ -66,7 +66,12 @@ typedef struct bst_aberration {
 } bst_aberration;
 
 bst_aberration bst_aberration_of(const bst_light *light);
-bst_vec3 bst_aberrate(const bst_aberration *aberration, bst_vec3 direction);
+static inline bst_vec3 bst_aberrate(const bst_aberration *a, bst_vec3 direction) {
+    double along = bst_vec3_dot(direction, a->velocity);
+    bst_vec3 q = bst_vec3_scale(direction, a->inverse_gamma - a->potential * along);
+    q = bst_vec3_axpy(q, 1.0 + along * a->share + a->potential, a->velocity);
+    return bst_vec3_scale(q, 1.0 / bst_vec3_norm(q));
+}
 
 /* The vector from observer to object that bst_light_aberrate wants, from geocentric GCRF positions
  * of the object at emission, tau_s before the observer's instant. The Earth's own motion during

@@ -26,13 +26,6 @@ bst_aberration bst_aberration_of(const bst_light *light) {
                             SUN_SCHWARZSCHILD_M / bst_vec3_norm(light->sun_m)};
 }
 
-bst_vec3 bst_aberrate(const bst_aberration *a, bst_vec3 p) {
-    double pv = bst_vec3_dot(p, a->velocity);
-    bst_vec3 q = bst_vec3_scale(p, a->inverse_gamma - a->potential * pv);
-    q = bst_vec3_axpy(q, 1.0 + pv * a->share + a->potential, a->velocity);
-    return bst_vec3_scale(q, 1.0 / bst_vec3_norm(q));
-}
-
 static bst_vec3 aberrate(const bst_light *light, bst_vec3 p) {
     bst_aberration a = bst_aberration_of(light);
     return bst_aberrate(&a, p);

@@ -30,6 +30,9 @@ struct bst_sky_clock {
     const bst_eop *eop;
     bst_sky_grid *grid; /* NULL: works its values out itself */
     node nodes[NODES];
+    bool asked; /* before, for the instant `last` */
+    bst_time last;
+    bst_sky sky;
 };
 
 bst_status bst_sky_grid_create(bst_ctx *ctx, const bst_eop *eop, bst_sky_grid **out) {
@@ -153,6 +156,11 @@ bst_earth_parts bst_earth_parts_between(const bst_earth_parts *a, const bst_eart
 }
 
 bst_status bst_sky_clock_at(bst_ctx *ctx, bst_sky_clock *clock, bst_time t, bst_sky *out) {
+    /* one instant is asked for several times in a row */
+    if (clock->asked && t.jd1 == clock->last.jd1 && t.jd2 == clock->last.jd2) {
+        *out = clock->sky;
+        return BST_OK;
+    }
     if (!(t.jd1 >= 0.5 && t.jd1 < 1e8 && t.jd2 >= 0.0 && t.jd2 < 1.0)) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "JD %g + %g is not an instant", t.jd1, t.jd2);
     }
@@ -176,5 +184,8 @@ bst_status bst_sky_clock_at(bst_ctx *ctx, bst_sky_clock *clock, bst_time t, bst_
     out->bodies.moon_m = lerp(a->bodies.moon_m, b->bodies.moon_m, f);
     out->bodies.earth_bary_m = lerp(a->bodies.earth_bary_m, b->bodies.earth_bary_m, f);
     out->bodies.earth_bary_mps = lerp(a->bodies.earth_bary_mps, b->bodies.earth_bary_mps, f);
+    clock->asked = true;
+    clock->last = t;
+    clock->sky = *out;
     return BST_OK;
 }

@@ -35,18 +35,8 @@ bst_quat bst_quat_from_mat3(const bst_mat3 *a) {
     return bst_quat_unit(q);
 }
 
-bst_quat bst_quat_from_rotvec(bst_vec3 r) {
-    double square = 0.25 * bst_vec3_dot(r, r); /* of half the angle */
-    if (square < 2e-4) {
-        /* sin(a/2)/a and cos(a/2) by their series, exact to rounding: most turns are small, and the
-         * quotient would lose digits */
-        double s = 0.5 - square * (1.0 / 12.0 - square * (1.0 / 240.0 - square * (1.0 / 10080.0)));
-        double c =
-            1.0 - square * (0.5 - square * (1.0 / 24.0 -
-                                            square * (1.0 / 720.0 - square * (1.0 / 40320.0))));
-        return (bst_quat){s * r.x, s * r.y, s * r.z, c};
-    }
-    double half = sqrt(square), s = 0.5 * sin(half) / half;
+bst_quat bst_quat_from_large_rotvec(bst_vec3 r) {
+    double half = 0.5 * bst_vec3_norm(r), s = 0.5 * sin(half) / half;
     return (bst_quat){s * r.x, s * r.y, s * r.z, cos(half)};
 }
 

@@ -151,7 +151,20 @@ static inline bst_mat3 bst_quat_to_mat3(bst_quat q) {
 bst_quat bst_quat_from_mat3(const bst_mat3 *a);
 /* exp: the quaternion q with bst_quat_rotate(q, v) = v turned by |r| about r (right hand), rad.
  * Note: a *frame* that turns by r has q_new_from_old = bst_quat_from_rotvec(-r). */
-bst_quat bst_quat_from_rotvec(bst_vec3 r);
+bst_quat bst_quat_from_large_rotvec(bst_vec3 r); /* the same, r not zero */
+static inline bst_quat bst_quat_from_rotvec(bst_vec3 r) {
+    double square = 0.25 * bst_vec3_dot(r, r); /* of half the angle */
+    if (!(square < 2e-4)) {
+        return bst_quat_from_large_rotvec(r);
+    }
+    /* sin(a/2)/a and cos(a/2) by their series, exact to rounding: most turns are small, and the
+     * quotient would lose digits */
+    double s = 0.5 - square * (1.0 / 12.0 - square * (1.0 / 240.0 - square * (1.0 / 10080.0)));
+    double c =
+        1.0 -
+        square * (0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0 - square * (1.0 / 40320.0))));
+    return (bst_quat){s * r.x, s * r.y, s * r.z, c};
+}
 /* log: rotation vector of q, |r| in [0, pi]; takes the short way for antipodal representations. */
 bst_vec3 bst_quat_to_rotvec(bst_quat q);
 /* Spherical linear interpolation, s in [0, 1] (extrapolates outside); short way; right for

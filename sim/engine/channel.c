@@ -141,7 +141,7 @@ static bst_status publish(struct bst_step *step, int port_index) {
     ch->written++;
     ch->head = ch->head + 1 == ch->depth ? 0 : ch->head + 1;
     step->writing &= ~(1u << port_index);
-    for (int r = 0; r < ch->reader_count; r++) {
+    for (int r = 0; ch->triggers && r < ch->reader_count; r++) {
         int index = ch->readers[r].instance, p = ch->readers[r].port;
         const instance *other = engine->instances[index];
         /* a step behind the stepping thread sees to its own readers */

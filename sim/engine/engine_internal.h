@@ -35,6 +35,7 @@ typedef struct channel {
     void *mark;              /* of the hook `wants` */
     channel_reader *readers; /* BST_PORT_IN and BST_PORT_MODIFY ports, part of engine->readers */
     int reader_count;
+    bool triggers; /* one of them is stepped for its messages */
 } channel;
 
 enum { MAX_PORTS = 16 };

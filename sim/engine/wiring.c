@@ -284,6 +284,7 @@ static bst_status list_readers(bst_ctx *ctx, bst_engine *engine) {
                 if (self->spec.desc->ports[p].direction != BST_PORT_OUT &&
                     self->ports[p].channel == c) {
                     *next++ = (channel_reader){i, p};
+                    ch->triggers |= (self->spec.desc->ports[p].flags & BST_PORT_TRIGGER) != 0;
                 }
             }
         }

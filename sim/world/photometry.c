@@ -28,13 +28,13 @@ void bst_photometer_begin(bst_photometer *p) {
     p->count = 0;
 }
 
-static double noise_mag(const bst_detection *item) {
+double bst_photometry_noise_mag(const bst_detection *item) {
     return item->flux_e > 0.0 ? MAG_PER_SHARE * item->flux_sigma_e / item->flux_e : INFINITY;
 }
 
 void bst_photometer_add(bst_photometer *p, const bst_detection *star, double v_mag) {
     const uint32_t spoilt = BST_DETECTION_SATURATED | BST_DETECTION_EDGE | BST_DETECTION_BLEND;
-    double noise = noise_mag(star), excess = v_mag - star->v_mag;
+    double noise = bst_photometry_noise_mag(star), excess = v_mag - star->v_mag;
     if (p->count < p->capacity && (star->flags & spoilt) == 0 && star->snr >= LEAST_SNR &&
         isfinite(noise) && isfinite(excess)) {
         p->excess[p->count] = excess;
@@ -94,14 +94,17 @@ bst_zero_point bst_photometer_zero_point(bst_photometer *p) {
     return (bst_zero_point){kept, middle + sum / weights, sqrt(1.0 / weights), sqrt(shared)};
 }
 
+void bst_photometry_correct(const bst_zero_point *zero_point, bst_detection *item) {
+    item->v_mag += zero_point->offset_mag;
+    item->v_mag_sigma = hypot(bst_photometry_noise_mag(item), zero_point->sigma_mag);
+}
+
 void bst_photometry_apply(const bst_zero_point *zero_point, double camera_zero_point_mag,
                           bst_detections *detections) {
     detections->zero_point_mag = camera_zero_point_mag + zero_point->offset_mag;
     detections->zero_point_sigma_mag = zero_point->sigma_mag;
     detections->zero_point_stars = zero_point->stars;
     for (int i = 0; i < detections->count; i++) {
-        bst_detection *item = &detections->items[i];
-        item->v_mag += zero_point->offset_mag;
-        item->v_mag_sigma = hypot(noise_mag(item), zero_point->sigma_mag);
+        bst_photometry_correct(zero_point, &detections->items[i]);
     }
 }

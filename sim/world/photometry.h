@@ -31,6 +31,13 @@ void bst_photometer_add(bst_photometer *photometer, const bst_detection *star, d
  * least. The scatter follows from the median deviation, so that wrong ones weigh little. */
 bst_zero_point bst_photometer_zero_point(bst_photometer *photometer);
 
+/* Standard deviation of a detection's magnitude by the noise of its light alone; INFINITY without
+ * light. */
+double bst_photometry_noise_mag(const bst_detection *detection);
+
+/* Puts a magnitude by the camera's own figures on the zero point, with its standard deviation. */
+void bst_photometry_correct(const bst_zero_point *zero_point, bst_detection *detection);
+
 /* Puts a frame's magnitudes on the zero point, and sets their standard deviations from the noise of
  * the light and the zero point's; INFINITY without light. camera_zero_point_mag: V of an electron
  * per second by the camera's own figures. */

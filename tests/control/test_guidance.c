@@ -10,6 +10,8 @@
 #define TICKS 1000
 #define DEG BST_DEG_RAD
 
+static const bst_quat exact = BST_QUAT_IDENTITY;
+
 typedef struct bench {
     bst_ctx ctx;
     bst_guidance guidance;
@@ -90,7 +92,7 @@ static void run(bench *b, double seconds) {
             waiting.rate_gcrf_radps = bst_vec3_scale(bst_vec3_sub(up, down), 0.5 * TICKS);
             bool give;
             bst_assert_ok(&b->ctx,
-                          bst_guidance_command(&b->ctx, &b->guidance, &b->nav,
+                          bst_guidance_command(&b->ctx, &b->guidance, &b->nav, &exact,
                                                n > 0 ? &boresight : NULL, &waiting, &give));
             first = first && !give;
             for (int i = 0; i < b->guidance.event_count; i++) {
@@ -135,7 +137,8 @@ static void nothing_asked_nothing_changed(void **state) {
                               .rate_gcrf_radps = {1e-5, 2e-5, 3e-5}},
                     after = before;
     bool give;
-    bst_assert_ok(&b.ctx, bst_guidance_command(&b.ctx, &b.guidance, &b.nav, NULL, &after, &give));
+    bst_assert_ok(&b.ctx,
+                  bst_guidance_command(&b.ctx, &b.guidance, &b.nav, &exact, NULL, &after, &give));
     assert_true(give);
     assert_memory_equal(&before, &after, sizeof before);
     assert_int_equal(b.guidance.event_count, 0);

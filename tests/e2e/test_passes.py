@@ -81,6 +81,35 @@ class Passes(unittest.TestCase):
             self.assertLess(np.percentile(error[error <= LOST_PX], 99), 1.0)
 
 
+class KeepOut(unittest.TestCase):
+    """The same pass with a cone round the Earth that the target rises out of after a minute."""
+
+    def test_the_earth(self):
+        out = runs.scratch() + "/run"
+        guidance = runs.SENSOR + "/modules/control/guidance/"
+        runs.run("scenarios/leo_leo_pass.json", out, runs.NO_FRAMES, "/record/truth_stars=false",
+                 GENERATOR, guidance + "earth_keep_out=true", guidance + "look_ahead_s=200",
+                 guidance + "earth_limb_keep_out_deg=40", seed=1, duration=120)
+        rows = runs.database(out).execute(
+            "SELECT mid_s, radians(boresight_ra_deg), radians(boresight_dec_deg), observer_gcrf_x_m,"
+            " observer_gcrf_y_m, observer_gcrf_z_m FROM exposures WHERE mid_s > 5").fetchall()
+        margin = []
+        for _, ra, dec, x, y, z in rows:
+            r = math.sqrt(x * x + y * y + z * z)
+            up = (x * math.cos(ra) + y * math.sin(ra)) * math.cos(dec) + z * math.sin(dec)
+            # the limb of a sphere of 6378.137 km and 100 km of air
+            margin.append(math.degrees(math.acos(-up / r) - math.asin(6478137.0 / r)) - 40.0)
+        print(f"nearest to the cone: {min(margin):.3f} degrees outside")
+        self.assertGreater(min(margin), 0.0)  # the true boresight; it starts 9 degrees inside
+        self.assertLess(margin[0], 0.2)       # and waits at the edge
+        told = [text for text, in runs.database(out).execute(
+            "SELECT text FROM events WHERE kind = 'guidance' ORDER BY tick")]
+        # the target rises out of it then, by the margins above of a target that is followed
+        self.assertIn("unreachable until 67.0 s: in the keep-out cone of the Earth's limb", told)
+        mid_s, error = errors(out)
+        self.assertLess(np.percentile(error[mid_s > 80.0], 99), 2.0)
+
+
 def tearDownModule():
     runs.clean()
 

@@ -53,8 +53,9 @@ static void test_momentum_over_a_day(void **state) {
             full ? "with wheels and modes" : "rigid", day_s, momentum, norm, energy[0], energy[1]);
         assert_true(momentum < 1e-9);
         assert_true(norm < 1e-14);
-        /* the rigid body's stays within its bounds; with modes it grows, with time at most */
-        assert_true(energy[1] < (full ? 2.5 : 1.5) * energy[0] + 1e-12);
+        /* the rigid body's stays within its bounds; with modes it grows, with time at most; 1e-8:
+         * (w dt)^2, for short runs */
+        assert_true(energy[1] < (full ? 2.5 : 1.5) * energy[0] + 1e-8);
         assert_true(energy[0] < 1e-6);
     }
 }

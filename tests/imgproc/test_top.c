@@ -5,6 +5,8 @@
 #include "tests/imgproc/synthetic.h"
 #include "tests/test_support.h"
 
+static const bst_zero_point no_zero_point = {.stars = 0};
+
 enum { SIDE = 6, PER_FRAME = SIDE * SIDE, SPACING = 30, FRAMES = 10 };
 
 typedef struct scene {
@@ -59,7 +61,7 @@ static void measure(scene *c, bool refine, double *chi2, double *ratio) {
             int n = synthetic_nearest(c->d, c->x[k], c->y[k], 2.0);
             assert_true(n >= 0);
             if (refine) {
-                bst_imgproc_refine(c->ip, c->d, n);
+                bst_imgproc_refine(c->ip, c->d, n, &no_zero_point);
             }
             const bst_detection *p = &c->d->items[n];
             double ex = p->x_px - c->x[k], ey = p->y_px - c->y[k], b[3];
@@ -111,7 +113,7 @@ static void refining_fits(void **state) {
         p->label = BST_LABEL_OBJECT;
         p->label_probability = 0.9;
         double v_shift = p->v_mag - 2.5 * log10(q->flux_e / p->flux_e);
-        bst_imgproc_refine(few.ip, few.d, b);
+        bst_imgproc_refine(few.ip, few.d, b, &no_zero_point);
         moved += p->x_px != before.x_px;
         bst_assert_close(p->x_px, q->x_px, 0.01 * sqrt(q->cov_xx));
         bst_assert_close(p->y_px, q->y_px, 0.01 * sqrt(q->cov_yy));
@@ -120,7 +122,7 @@ static void refining_fits(void **state) {
         bst_assert_close(p->v_mag, v_shift, 1e-3);
         assert_int_equal(p->label, BST_LABEL_OBJECT);
         bst_detection once = *p;
-        bst_imgproc_refine(few.ip, few.d, b); /* a fitted one stays */
+        bst_imgproc_refine(few.ip, few.d, b, &no_zero_point); /* a fitted one stays */
         assert_memory_equal(&once, p, sizeof once);
     }
     assert_true(moved >= PER_FRAME - 1); /* all but the one that was fitted */
