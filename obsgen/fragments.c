@@ -13,7 +13,7 @@ static const double SADDLE_SIGMA = 3.0, SADDLE_SHARE = 0.15;
 /* What stays further below the threshold is seen here and there: the places are drawn. */
 static const double FAINTEST_SIGMA = 3.0;
 /* Light below this counts for no other streak, and below SEEN it adds no alarms. */
-static const double LEAST_LIGHT = 0.4, LEAST_SEEN = 0.05;
+static const double LEAST_LIGHT = 0.4, LEAST_SEEN = 0.25;
 /* Share of the light on a pixel from which on a source looks there itself. */
 static const double OWN_SHARE = 0.3;
 /* Draws of faint streaks; those of other clutter stay below. */
@@ -30,6 +30,7 @@ enum {
     /* of the tables below: outputs in steps of 1/8 from 1, lights in steps of 1/8 */
     OUTPUTS = 64,
     LIGHTS = 48,
+    SPARSE = 4 /* of so many nodes of faint light one is looked at */,
 };
 
 typedef bst_streak_section section;
@@ -46,6 +47,11 @@ typedef struct pixel {
     float output; /* with noise; 0: not made */
 } pixel;
 
+typedef struct touched {
+    int at, middle;
+    bool by_row;
+} touched;
+
 struct generator_streaks {
     section sections[BST_ROUTE_NODES];
     float light[BST_ROUTE_NODES * LIGHT_WIDE]; /* of the sections' rows */
@@ -53,8 +59,8 @@ struct generator_streaks {
     double shot; /* variance that an output of one adds, by the photons' own noise */
     double log_maxima[OUTPUTS], maxima_sigma; /* logarithm of maxima per pixel above an output */
     double alarms[LIGHTS]; /* more of them than noise alone makes, per pixel of the way */
-    pixel *map;            /* the frame; [touched] of it are not zero */
-    int *touched;
+    pixel *map;            /* the frame; about the touched sections it is not zero */
+    touched *touched;
     maximum *maxima;
     int map_room, touched_count, touched_room, maxima_count, maxima_room;
 };
@@ -78,13 +84,11 @@ static bst_status grow(bst_ctx *ctx, void **items, int count, int *room, size_t 
     return BST_OK;
 }
 
-static bst_status touch(bst_ctx *ctx, struct generator_streaks *w, int at) {
-    if (w->map[at].light != 0.0f || w->map[at].output != 0.0f) {
-        return BST_OK;
-    }
+/* A section whose pixels are not all zero any more. */
+static bst_status touch(bst_ctx *ctx, struct generator_streaks *w, const section *s, bool by_row) {
     BST_TRY(
         grow(ctx, (void **)&w->touched, w->touched_count, &w->touched_room, sizeof *w->touched));
-    w->touched[w->touched_count++] = at;
+    w->touched[w->touched_count++] = (touched){s->at, s->middle, by_row};
     return BST_OK;
 }
 
@@ -237,10 +241,10 @@ static bst_status lay_part(bst_ctx *ctx, bst_generator *g, const generator_sourc
     light_rows(w, made, LIGHT_ROWS);
     for (int k = 0; k < made; k++) {
         const section *s = &w->sections[k];
+        BST_TRY(touch(ctx, w, s, by_row));
         for (int r = 0; r < LIGHT_WIDE; r++) {
             int at = pixel_of(g, by_row, s->at, s->middle + r - LIGHT_ROWS);
             if (at >= 0) {
-                BST_TRY(touch(ctx, w, at));
                 w->map[at].light += w->light[k * LIGHT_WIDE + r];
             }
         }
@@ -273,10 +277,10 @@ static bst_status search_part(bst_ctx *ctx, bst_generator *g, const generator_so
     }
     bst_streak_noise_add(&w->noise, g->key, g->exposure_id, by_row, w->shot, s, made);
     for (int k = 0; k < made; k++) {
+        BST_TRY(touch(ctx, w, &s[k], by_row));
         for (int r = 0; r < WIDE; r++) {
             int at = pixel_of(g, by_row, s[k].at, s[k].middle + r - ROWS);
             if (at >= 0) {
-                BST_TRY(touch(ctx, w, at));
                 w->map[at].output = s[k].output[r];
             }
         }
@@ -327,17 +331,23 @@ static double draw_exponential(const bst_generator *g, arrivals *a) {
 /* Light of all streaks at a node; of the source alone where that is too faint to count for others.
  */
 static double light_at(const bst_generator *g, const bst_route_node *node, double own) {
-    int at = pixel_of(g, false, (int)lround(node->x), (int)lround(node->y));
-    return at >= 0 ? fmax(g->streaks->map[at].light, own) : own;
+    double x = node->x + 0.5, y = node->y + 0.5;
+    if (!(x >= 0.0 && y >= 0.0 && x < g->width && y < g->height)) {
+        return own;
+    }
+    double all = (double)g->streaks->map[(int)y * g->width + (int)x].light;
+    return all > own ? all : own;
 }
 
-/* Alarms that light too faint to be looked at pixel by pixel makes at a node. */
+/* Alarms that light too faint to be looked at pixel by pixel makes at a node. share: pixels of the
+ * way that it stands for, times this source's part of the light. */
 static void draw_faint(bst_generator *g, const generator_source *source, const bst_route_node *n,
-                       double own, double light, arrivals *a) {
+                       double share, double light, arrivals *a) {
     const struct generator_streaks *w = g->streaks;
-    double at = fmin(8.0 * light, LIGHTS - 1.001);
+    double at = 8.0 * light;
+    at = at < LIGHTS - 1.001 ? at : LIGHTS - 1.001;
     int i = (int)at;
-    a->next -= own / light * (w->alarms[i] + (at - i) * (w->alarms[i + 1] - w->alarms[i]));
+    a->next -= share * (w->alarms[i] + (at - i) * (w->alarms[i + 1] - w->alarms[i]));
     while (a->next < 0.0) {
         a->next += draw_exponential(g, a);
         double noise = sqrt(1.0 + w->shot * light);
@@ -377,17 +387,16 @@ static bst_status search_bright(bst_ctx *ctx, bst_generator *g, const generator_
     double least = g->threshold - FAINTEST_SIGMA;
     int margin = 2 * g->streaks->noise.reach + 4, from = -1, last = -1;
     for (int k = 0; k < count; k++) {
-        double own = source->amplitude * nodes[k].light, light = 0.0;
-        bool bright = false;
-        if (own > LEAST_SEEN) {
-            light = light_at(g, &nodes[k], own);
-            bright = light >= least && own >= OWN_SHARE * light;
-        }
-        if (bright) {
-            from = from < 0 ? k : from;
-            last = k;
-        } else if (own > LEAST_SEEN && light < least) {
-            draw_faint(g, source, &nodes[k], own, light, a);
+        double own = source->amplitude * nodes[k].light;
+        if (own >= OWN_SHARE * least || (own > LEAST_SEEN && k % SPARSE == 0)) {
+            double light = light_at(g, &nodes[k], own);
+            if (light >= least && own >= OWN_SHARE * light) {
+                from = from < 0 ? k : from;
+                last = k;
+            } else if (light < least) {
+                double pixels = own >= OWN_SHARE * least ? 1.0 : SPARSE;
+                draw_faint(g, source, &nodes[k], pixels * own / light, light, a);
+            }
         }
         if (from >= 0 && (k > last + 2 * margin || k == count - 1)) {
             int start = from > margin ? from - margin : 0;
@@ -509,7 +518,13 @@ bst_status bst_generator_fragments(bst_ctx *ctx, bst_generator *g) {
         report(g);
     }
     for (int i = 0; i < w->touched_count; i++) {
-        w->map[w->touched[i]] = (pixel){0.0f, 0.0f};
+        const touched *t = &w->touched[i];
+        for (int r = -LIGHT_ROWS; r <= LIGHT_ROWS; r++) {
+            int at = pixel_of(g, t->by_row, t->at, t->middle + r);
+            if (at >= 0) {
+                w->map[at] = (pixel){0.0f, 0.0f};
+            }
+        }
     }
     w->touched_count = w->maxima_count = 0;
     return status;
