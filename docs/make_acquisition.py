@@ -12,7 +12,7 @@ import subprocess
 import sys
 
 PANELS = [("cue", "cue wrong by a degree", "time  [s]", 120),
-          ("belt", "no cue, 20 by 4 degrees of the belt", "time  [s]", None),
+          ("belt", "no cue, 20 by 4 degrees of the belt", "time  [s]", 1634),
           ("eclipse", "out of the shadow", "time after the SNR passes 8  [s]", 10)]
 
 
@@ -30,8 +30,9 @@ def main():
         rows = [(low, 0.0)] + [(t, 100.0 * (i + 1) / count) for i, t in enumerate(found)]
         script.append(f"${name} << END\n" + "".join(f"{t} {share}\n" for t, share in rows) +
                       "END\n")
-        mark = f"set arrow 1 from {limit}, 0 to {limit}, 105 nohead dashtype 2 " \
-               "linecolor rgb '#c0392b'\n" if limit else "unset arrow 1\n"
+        mark = f"set xrange [{1.05 * low}:{1.05 * limit}]\n" \
+               f"set arrow 1 from {limit}, 0 to {limit}, 105 nohead dashtype 2 " \
+               "linecolor rgb '#c0392b'\n"
         script.append(f"{mark}set title '{title}'\nset xlabel '{label}'\n"
                       f"set ylabel '{'runs in track  [%]' if name == 'cue' else ''}'\n"
                       f"plot ${name} with steps linewidth 2 linecolor rgb '#1f4e9c'\n")

@@ -153,7 +153,9 @@ static int by_place(const void *a, const void *b) {
 static void report(bst_generator *g) {
     struct generator_streaks *w = g->streaks;
     int reach = (int)ceil(6.0 * g->sigma) + 2;
-    qsort(w->maxima, (size_t)w->maxima_count, sizeof *w->maxima, by_place);
+    if (w->maxima_count > 0) {
+        qsort(w->maxima, (size_t)w->maxima_count, sizeof *w->maxima, by_place);
+    }
     for (int i = 0; i < w->maxima_count; i++) {
         const maximum *m = &w->maxima[i];
         bool kept = i == 0 || m->x != m[-1].x || m->y != m[-1].y;

@@ -28,7 +28,7 @@ static inline double log_of(double x) {
     memcpy(&bits, &x, sizeof bits);
     int32_t above = (int32_t)(bits >> 32) - 0x3FE6A09E; /* the upper half of sqrt(1/2) */
     int32_t n = above >> 20;
-    bits -= (int64_t)n << 52;
+    bits -= n * (INT64_C(1) << 52);
     double m;
     memcpy(&m, &bits, sizeof m);
     double t = (m - 1.0) / (m + 1.0), q = t * t, series = 1.0 / 23.0;
