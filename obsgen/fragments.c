@@ -6,6 +6,7 @@
 
 #include "obsgen/clutter.h"
 #include "obsgen/streak_noise.h"
+#include "sim/core/pages.h"
 #include "sim/core/vec.h"
 
 /* As image processing tells maxima apart. */
@@ -482,28 +483,34 @@ static bst_status do_source(bst_ctx *ctx, bst_generator *g, const generator_sour
     return BST_OK;
 }
 
-static bst_status prepare(bst_ctx *ctx, bst_generator *g) {
+/* Memory is written to, so that it is the process's from here on. */
+bst_status bst_generator_reserve_streaks(bst_ctx *ctx, bst_generator *g, int width, int height) {
     if (!g->streaks) {
-        g->streaks = calloc(1, sizeof *g->streaks);
+        g->streaks = bst_pages_alloc(sizeof *g->streaks);
         if (!g->streaks) {
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for long streaks");
         }
+        memset(g->streaks, 0, sizeof *g->streaks);
         bst_streak_noise_init(&g->streaks->noise);
     }
     struct generator_streaks *w = g->streaks;
-    bst_streak_noise_set(&w->noise, g->total_sigma);
-    set_alarms(g);
-    if (g->width * g->height > w->map_room) {
-        size_t room = (size_t)g->width * (size_t)g->height;
+    if (width * height > w->map_room) {
+        size_t bytes = (size_t)width * (size_t)height * sizeof *w->map;
         free(w->map);
-        w->map = calloc(room, sizeof *w->map);
-        w->map_room = w->map ? (int)room : 0;
+        w->map = bst_pages_alloc(bytes);
+        w->map_room = w->map ? width * height : 0;
+        if (!w->map) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for long streaks");
+        }
+        memset(w->map, 0, bytes);
     }
-    return w->map_room > 0 ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory for long streaks");
+    return BST_OK;
 }
 
 bst_status bst_generator_fragments(bst_ctx *ctx, bst_generator *g) {
-    BST_TRY(prepare(ctx, g));
+    BST_TRY(bst_generator_reserve_streaks(ctx, g, g->width, g->height));
+    bst_streak_noise_set(&g->streaks->noise, g->total_sigma);
+    set_alarms(g);
     struct generator_streaks *w = g->streaks;
     bst_status status = BST_OK;
     for (int pass = 0; pass < 2; pass++) {

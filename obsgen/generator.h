@@ -32,6 +32,11 @@ bst_status bst_generator_create(bst_ctx *ctx, const bst_camera *camera, const bs
                                 const bst_obsgen_calibration *calibration, bst_rng_key key,
                                 bst_generator **out) BST_MUST_CHECK;
 void bst_generator_free(bst_generator *generator);
+
+/* Takes the memory that frames with long streaks need up to this many pixels that are read; without
+ * it, the first such frame does. BST_ERR_MEMORY. */
+bst_status bst_generator_reserve_streaks(bst_ctx *ctx, bst_generator *generator, int width,
+                                         int height) BST_MUST_CHECK;
 /* What was exposed. */
 typedef struct bst_generator_frame {
     const bst_truth *truth;

@@ -153,6 +153,8 @@ static bst_status prepare(const bst_module_env *env, obsgen *o) {
                                              .streak_max_px = c->streak_max_px};
     BST_TRY(bst_generator_create(env->ctx, o->world_camera, bst_knowledge_camera(env->knowledge),
                                  &settings, &o->calibration, o->key, &o->generator));
+    BST_TRY(bst_generator_reserve_streaks(env->ctx, o->generator, (int)o->world_camera->width_px,
+                                          (int)o->world_camera->height_px));
     BST_TRY(bst_field_create(env->ctx, env->world, env->observer, env->sensor, &o->field));
     BST_TRY(bst_photometer_create(env->ctx, (int)c->capacity, &o->photometer));
     bst_env_set_capacity(env, PORT_TRUTH, (int)c->truth_capacity);
