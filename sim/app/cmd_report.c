@@ -22,7 +22,9 @@ static const char help_text[] =
     "\n"
     "  boresight report runs/demo --out demo.html\n"
     "\n"
-    "Exit code: 0; 1 when it cannot be made (no file is left then); 2 wrong usage.\n"
+    "Exit code: 0; 1 when it cannot be made (no file is left then), or is made of a damaged "
+    "folder; 2 "
+    "wrong usage.\n"
     "\n"
     "options:\n";
 
@@ -38,7 +40,9 @@ static bst_status choose_path(bst_ctx *ctx, const char *given, const char *folde
     return n < 4096 ? BST_OK : bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", base);
 }
 
-static bst_status make(bst_ctx *ctx, const char *folder, const char *out, char path[4096]) {
+/* *damaged: the page is made, of a folder that is not whole. */
+static bst_status make(bst_ctx *ctx, const char *folder, const char *out, char path[4096],
+                       bool *damaged) {
     bst_run_reader *run = NULL;
     bst_draft draft;
     BST_TRY(choose_path(ctx, out, folder, path));
@@ -47,6 +51,11 @@ static bst_status make(bst_ctx *ctx, const char *folder, const char *out, char p
     if (status == BST_OK) {
         status = bst_report_run(ctx, run, draft.stream);
         status = bst_draft_close(ctx, &draft, status);
+    }
+    const char *problem;
+    for (int i = 0; status == BST_OK && (problem = bst_run_reader_problem(run, i)); i++) {
+        fprintf(stderr, "boresight: %s\n", problem);
+        *damaged = true;
     }
     bst_run_reader_close(run);
     return status;
@@ -82,11 +91,12 @@ int bst_cmd_report(int argc, char **argv) {
     }
     char path[4096];
     bst_stop_catch_signals();
-    bst_status status = make(&ctx, argv[1], out, path);
+    bool damaged = false;
+    bst_status status = make(&ctx, argv[1], out, path, &damaged);
     if (status != BST_OK) {
         fprintf(stderr, "boresight: %s\n", ctx.message);
         return status == BST_ERR_INTERRUPTED ? BST_EXIT_INTERRUPTED : BST_EXIT_FAILED;
     }
     printf("%s\n", path);
-    return BST_EXIT_OK;
+    return damaged ? BST_EXIT_FAILED : BST_EXIT_OK;
 }

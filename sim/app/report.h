@@ -102,10 +102,10 @@ typedef struct bst_report_sensor {
     size_t count;
     bst_report_mode *modes; /* changes of mode */
     size_t mode_count;
-    double settle_s;  /* the loop has settled by then; NAN: never */
-    bool has_truth;   /* the target's true place is known in some frame */
-    bool has_tracks;  /* there is a tracker, and its work was recorded */
-    bool tables_lost; /* tables were not recorded or cannot be read */
+    double settle_s; /* the loop has settled by then; NAN: never */
+    bool has_truth;  /* the target's true place is known in some frame */
+    bool has_tracks; /* there is a tracker, and its work was recorded */
+    bool damaged;    /* some table could not be read to its end */
 } bst_report_sensor;
 
 /* Reads it. `scene` is the run's world; NULL when it cannot be made again: what was recorded must
@@ -118,15 +118,19 @@ void bst_report_sensor_free(bst_report_sensor *sensor);
 
 /* ---- the parts ---- */
 
+/* A message about a file of the run without the path of the run's folder: pages do not depend on
+ * where it is. */
+const char *bst_report_local(const bst_run_reader *run, const char *message);
+
 /* What the manifest, counters, tables and events of a run say of what went wrong. */
 void bst_report_run_warnings(bst_run_reader *run, const bst_report_sensor *sensors, int count,
                              const bst_scenario *scenario, bst_warnings *warnings);
 /* The charts of a sensor. `span_s`: length of the run as far as it went. */
 bst_status bst_report_plots(bst_ctx *ctx, FILE *out, const bst_report_sensor *sensor,
                             double span_s) BST_MUST_CHECK;
-/* Some of its frames, with what the tables know of them drawn over. Frames that cannot be read
- * become a warning. */
-bst_status bst_report_frames(bst_ctx *ctx, FILE *out, const bst_run_reader *run,
+/* Some of its frames, with what the tables know of them drawn over. Where they
+ * cannot be read the page and the run's problems say so. */
+bst_status bst_report_frames(bst_ctx *ctx, FILE *out, bst_run_reader *run,
                              const bst_report_sensor *sensor) BST_MUST_CHECK;
 
 /* The whole page of a run. */

@@ -69,7 +69,7 @@ static bst_status each_row(bst_ctx *ctx, reading *r, const char *sql, int64_t pa
     }
     bst_rows_close(rows);
     if (status == BST_ERR_FORMAT) { /* a database with a damaged page: what came before it holds */
-        r->out->tables_lost = true;
+        r->out->damaged = true;
         return BST_OK;
     }
     return status;
@@ -377,7 +377,6 @@ bst_status bst_report_read(bst_ctx *ctx, const bst_run_reader *run, bst_run_scen
     reading r = {.run = run, .scene = scene, .object = -1, .object_id = -1, .out = out};
     bst_ctx unheard = {0};
     if (!bst_run_reader_has_tables(run) || sensor->index < 0) {
-        out->tables_lost = true;
         return BST_OK;
     }
     if (scene &&

@@ -141,13 +141,15 @@ static void find_middle(const bst_overlay *overlay, const bst_fits_read_frame *f
 }
 
 /* What is known of the frame, below the inset. */
-static void put_facts(FILE *out, const bst_report_frame *f, double x, double y) {
+static void put_facts(FILE *out, const bst_report_frame *f, bool tracked, double x, double y) {
     char lines[4][80] = {"", "", "", ""};
     if (!f) {
         return;
     }
     double error_px = hypot(f->error_x_px, f->error_y_px);
-    if (isfinite(error_px)) {
+    if (error_px < 1e-3) {
+        snprintf(lines[0], sizeof lines[0], "on the boresight");
+    } else if (isfinite(error_px)) {
         snprintf(lines[0], sizeof lines[0], "%.3g px from the boresight", error_px);
     }
     if (isfinite(f->snr)) {
@@ -160,7 +162,7 @@ static void put_facts(FILE *out, const bst_report_frame *f, double x, double y) 
     if (isfinite(f->detections)) {
         snprintf(lines[2], sizeof lines[2], "%.0f detections, %.0f stars", f->detections, f->stars);
     }
-    if (f->known) {
+    if (f->known && tracked) {
         snprintf(lines[3], sizeof lines[3], "%s", f->in_track ? "in track" : "not in track");
     }
     for (int k = 0; k < 4; k++) {
@@ -174,7 +176,8 @@ static void put_facts(FILE *out, const bst_report_frame *f, double x, double y) 
 }
 
 static bst_status put_frame(bst_ctx *ctx, FILE *out, const bst_fits_read_frame *frame,
-                            const bst_overlay *overlay, const bst_report_frame *facts) {
+                            const bst_overlay *overlay, const bst_report_frame *facts,
+                            bool tracked) {
     bst_stretch stretch = bst_stretch_of(frame->pixels, frame->width, frame->height);
     double scale = (double)SIDE / (frame->width > frame->height ? frame->width : frame->height);
     part whole = {.columns = frame->width,
@@ -214,7 +217,7 @@ static bst_status put_frame(bst_ctx *ctx, FILE *out, const bst_fits_read_frame *
             "stroke=\"#b9c0c8\" stroke-width=\".8\"/>",
             inset.column * scale, inset.row * scale, columns * scale, rows * scale, inset.x,
             inset.width - 0.4, inset.height - 0.8);
-    put_facts(out, facts, inset.x, inset.height + 2.0);
+    put_facts(out, facts, tracked, inset.x, inset.height + 2.0);
     fputs("</svg>\n", out);
     return BST_OK;
 }
@@ -270,22 +273,26 @@ static bst_status put_chosen(bst_ctx *ctx, FILE *out, const bst_report_sensor *s
     }
     fputs("</ul>\n", out);
     bst_page_grid(out, BST_PAGE_HALF);
-    for (int i = 0; i < count; i++) {
+    bst_status status = BST_OK;
+    for (int i = 0; i < count && status == BST_OK; i++) {
         bst_fits_read_frame frame;
         bst_overlay overlay = {0};
-        BST_TRY(bst_fits_reader_frame(ctx, fits, chosen[i], &frame));
-        if (ids[chosen[i]] >= 0) {
-            BST_TRY(bst_frame_marks_get(ctx, marks, ids[chosen[i]], &overlay));
+        int64_t id = ids[chosen[i]];
+        status = bst_fits_reader_frame(ctx, fits, chosen[i], &frame);
+        if (status == BST_OK && id >= 0) {
+            status = bst_frame_marks_get(ctx, marks, id, &overlay);
         }
-        bst_page_figure(out, BST_PAGE_HALF);
-        BST_TRY(put_frame(ctx, out, &frame, &overlay, facts_of(s, ids[chosen[i]])));
-        bst_page_figure_end(out, overlay.caption ? overlay.caption : "");
+        if (status == BST_OK) {
+            bst_page_figure(out, BST_PAGE_HALF);
+            status = put_frame(ctx, out, &frame, &overlay, facts_of(s, id), s->has_tracks);
+            bst_page_figure_end(out, overlay.caption ? overlay.caption : "");
+        }
     }
     bst_page_grid_end(out);
-    return BST_OK;
+    return status;
 }
 
-bst_status bst_report_frames(bst_ctx *ctx, FILE *out, const bst_run_reader *run,
+bst_status bst_report_frames(bst_ctx *ctx, FILE *out, bst_run_reader *run,
                              const bst_report_sensor *s) {
     char path[4096];
     bst_ctx unheard = {0};
@@ -312,5 +319,13 @@ bst_status bst_report_frames(bst_ctx *ctx, FILE *out, const bst_run_reader *run,
     free(ids);
     bst_frame_marks_free(marks);
     bst_fits_reader_close(fits);
+    if (status == BST_ERR_FORMAT || status == BST_ERR_IO) {
+        /* a damaged file: what could be read is there */
+        bst_run_reader_note_problem(run, "%s", ctx->message);
+        fputs("<p class=\"bad\">No more frames can be read: ", out);
+        bst_html_text(out, bst_report_local(run, ctx->message));
+        fputs("</p>\n", out);
+        status = BST_OK;
+    }
     return status;
 }

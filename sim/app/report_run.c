@@ -89,6 +89,10 @@ static bst_status read_sensors(bst_ctx *ctx, page *p) {
         BST_TRY(bst_report_read(ctx, p->run, p->has_scene ? &p->scene : NULL, &p->list[i], settle_s,
                                 s));
         p->count = i + 1;
+        if (s->damaged) {
+            bst_run_reader_note_problem(p->run, "run.sqlite is damaged: of %s not all can be shown",
+                                        s->name);
+        }
     }
     return BST_OK;
 }
@@ -281,6 +285,7 @@ static bst_status put_events(bst_ctx *ctx, const page *p) {
     fputs("</tbody></table></div>\n</details>\n", p->out);
     if (status == BST_ERR_FORMAT) {
         fputs("<p class=\"bad\">The table is damaged beyond here.</p>\n", p->out);
+        bst_run_reader_note_problem(p->run, "%s", unheard.message);
         status = BST_OK;
     }
     bst_page_section_end(p->out);
@@ -303,6 +308,23 @@ static bst_status put_sensor(bst_ctx *ctx, const page *p, int i) {
     return BST_OK;
 }
 
+/* The summary alone, of a run without tables. */
+static void put_summary(const page *p) {
+    const cJSON *summary = get(bst_run_reader_manifest(p->run), "summary"), *item;
+    bst_page_section(p->out, 2, "Summary");
+    fputs("<table class=\"two\">\n", p->out);
+    cJSON_ArrayForEach(item, summary) {
+        char text[32];
+        bst_page_row(
+            p->out, item->string, "%s",
+            cJSON_IsString(item)
+                ? item->valuestring
+                : bst_page_number(text, cJSON_IsNumber(item) ? item->valuedouble : NAN, 6));
+    }
+    fputs("</table>\n", p->out);
+    bst_page_section_end(p->out);
+}
+
 static bst_status put_page(bst_ctx *ctx, page *p) {
     char title[200];
     const cJSON *scenario = bst_run_reader_scenario(p->run),
@@ -316,6 +338,9 @@ static bst_status put_page(bst_ctx *ctx, page *p) {
     for (int i = 0; i < p->count; i++) {
         BST_TRY(bst_export_check(ctx));
         BST_TRY(put_sensor(ctx, p, i));
+    }
+    if (p->count == 0) {
+        put_summary(p);
     }
     BST_TRY(put_events(ctx, p));
     fprintf(p->out,

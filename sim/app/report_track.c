@@ -132,7 +132,7 @@ bst_status bst_report_read_tracks(bst_ctx *ctx, const bst_run_reader *run, bst_r
     bst_rows_close(frames.rows);
     bst_rows_close(tracks.rows);
     if (status == BST_ERR_FORMAT) {
-        s->tables_lost = true;
+        s->damaged = true;
         return BST_OK;
     }
     return status;

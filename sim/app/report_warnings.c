@@ -153,12 +153,6 @@ static void count_rows(const bst_run_reader *run, const bst_report_sensor *s, co
 }
 
 static void add_tables(const bst_run_reader *run, const bst_report_sensor *s, bst_warnings *w) {
-    if (s->tables_lost) {
-        bst_warnings_add(w, BST_SEVERITY_PROBLEM,
-                         "%s: its tables are missing or damaged; charts end where they do.",
-                         s->name);
-        return;
-    }
     if (s->every > 1) {
         bst_warnings_add(w, BST_SEVERITY_NOTE,
                          "%s: of %" PRId64 " exposures one in %" PRId64 " is drawn.", s->name,
@@ -238,12 +232,21 @@ static void hear(void *user, bst_log_level level, const char *message) {
     bst_warnings_add(user, BST_SEVERITY_WARNING, "%s.", message);
 }
 
+const char *bst_report_local(const bst_run_reader *run, const char *message) {
+    const char *folder = bst_run_reader_folder(run);
+    size_t n = strlen(folder);
+    if (n == 0 || strncmp(message, folder, n) != 0) {
+        return message;
+    }
+    return message + n + strspn(message + n, "/");
+}
+
 void bst_report_run_warnings(bst_run_reader *run, const bst_report_sensor *sensors, int count,
                              const bst_scenario *scenario, bst_warnings *w) {
     add_end(run, w);
     const char *problem;
     for (int i = 0; (problem = bst_run_reader_problem(run, i)); i++) {
-        bst_warnings_add(w, BST_SEVERITY_PROBLEM, "%s", problem);
+        bst_warnings_add(w, BST_SEVERITY_PROBLEM, "%s", bst_report_local(run, problem));
     }
     add_summaries(run, sensors, count, w);
     add_counters(run, w);

@@ -92,7 +92,7 @@ void bst_chart_fit(bst_chart_axis *axis, double low, double high, double margin)
         return;
     }
     double length = high - low;
-    if (!(length > 1e-12 * fmax(fabs(low), fabs(high)))) {
+    if (!(length > 1e-9 * fmax(fabs(low), fabs(high)))) { /* no number would tell it */
         length = fmax(fabs(low), 1.0) * 0.1;
         margin = 1.0;
     }
@@ -138,10 +138,15 @@ int bst_chart_ticks(double low, double high, bool logarithmic, int wanted, doubl
         ticks[count++] = k == 0.0 ? 0.0 : k * step; /* no -0 */
     }
     double digits = -floor(log10(step) + 1e-9);
-    if (fmax(fabs(low), fabs(high)) < 1e6 && digits <= 6.0) {
+    if (fmax(fabs(low), fabs(high)) < 1e9 && digits <= 9.0) {
         *decimals = digits > 0.0 ? (int)digits : 0;
     }
     return count;
+}
+
+/* x = high belongs to the last one. */
+static double column_of(double x, double low, double scale, int columns) {
+    return fmin(floor((x - low) * scale), columns - 1.0);
 }
 
 size_t bst_chart_thin(const double *x, const double *y, size_t n, double low, double high,
@@ -155,14 +160,13 @@ size_t bst_chart_thin(const double *x, const double *y, size_t n, double low, do
     }
     double scale = columns / (high - low);
     for (size_t i = 0; i < n;) {
-        double at = floor((x[i] - low) * scale);
-        if (!(at >= 0.0 && at <= columns)) {
+        if (!(x[i] >= low && x[i] <= high)) {
             i++;
             continue;
         }
-        double column = fmin(at, columns - 1.0); /* x = high belongs to the last one */
+        double column = column_of(x[i], low, scale, columns);
         size_t first = n, lowest = n, highest = n, last = n;
-        for (; i < n && fmin(floor((x[i] - low) * scale), columns - 1.0) <= column; i++) {
+        for (; i < n && x[i] <= high && column_of(x[i], low, scale, columns) <= column; i++) {
             if (!isfinite(y[i])) {
                 continue;
             }
@@ -214,7 +218,7 @@ static double inside_y(const bst_chart *c, double y) {
 static int write_number(char text[40], double value, int decimals) {
     bool exponent = value != 0.0 && (fabs(value) >= 1e6 || fabs(value) < 1e-4);
     return decimals >= 0 ? snprintf(text, 40, "%.*f", decimals, value)
-           : exponent    ? snprintf(text, 40, "%.3g", value)
+           : exponent    ? snprintf(text, 40, "%.6g", value)
                          : snprintf(text, 40, "%g", value);
 }
 
