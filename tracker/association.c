@@ -264,6 +264,18 @@ static int free_between(const bst_mtt *mtt, const bst_mtt_track *a, const bst_mt
     return best;
 }
 
+/* Two tracks that have lived on one detection for too long are one object: the one that was seen
+ * more often goes on with it, alone. */
+static void settle(bst_mtt *mtt, int missed, int owner) {
+    int column = mtt->detection_of_track[owner];
+    if (mtt->tracks[missed].hits > mtt->tracks[owner].hits &&
+        fits(mtt, &mtt->tracks[missed], column, NULL)) {
+        mtt->detection_of_track[missed] = column;
+        mtt->detection_of_track[owner] = -1;
+        mtt->owner[column] = missed;
+    }
+}
+
 /* A missed confirmed track beside another one, or beside a star that is seen, may have melted into
  * one detection with it: both then take that detection, widened along the line between them. */
 static void share(bst_mtt *mtt) {
@@ -291,7 +303,12 @@ static void share(bst_mtt *mtt) {
             continue;
         }
         bst_mtt_track *other = &mtt->tracks[partner];
-        int column = mtt->detection_of_track[partner];
+        int column = mtt->detection_of_track[partner], most = mtt->params.max_merged;
+        if (column >= 0 && !other->star && !mtt->shared[partner] && most > 0 &&
+            missed->merged_in_row >= most && other->merged_in_row >= most) {
+            settle(mtt, t, partner);
+            continue;
+        }
         if (column < 0) {
             column = free_between(mtt, missed, other);
         }

@@ -315,6 +315,46 @@ static void memory_has_its_limits(void **state) {
     bst_mtt_free(b->mtt);
 }
 
+/* Two confirmed tracks, of which one object is never seen apart from the other again: they live on
+ * one detection for max_merged frames, then the one that was seen longer goes on with it and the
+ * other one misses, and not both. */
+static void melted_for_good(void **state) {
+    (void)state;
+    for (int association = 0; association < 4; association++) {
+        for (uint64_t seed = 0; seed < 10; seed++) {
+            bst_mtt_params params = defaults();
+            params.association = (bst_mtt_association)association;
+            bench *b = start(seed, &params);
+            bst_vec3 from = bst_vec3_from_radec(0.3, 0.2);
+            int64_t id = 0;
+            for (int k = 0; k < 150; k++) {
+                bst_vec3 a = along(from, 0.4, 40 * AS * k), other = along(a, 2.0, 3 * AS);
+                see(b, a, 13.0);
+                if (k >= 10 && k < 30) {
+                    see(b, other, 13.0);
+                }
+                frame(b, k);
+                const bst_mtt_track *track = track_at(b, a, 2 * AS);
+                if (k == 9) {
+                    assert_non_null(track);
+                    id = track->id;
+                } else if (k == 29) {
+                    assert_non_null(track_at(b, other, 1.5 * AS));
+                } else if (k == 149) {
+                    assert_non_null(track);
+                    assert_int_equal(track->id, id);
+                    assert_true(track->hits > 100);
+                    int n;
+                    bst_mtt_tracks(b->mtt, &n);
+                    assert_int_equal(n, 1);
+                }
+                assert_true(k < 10 || track);
+            }
+            bst_mtt_free(b->mtt);
+        }
+    }
+}
+
 /* Two objects pass each other within a pixel of 3 arcsec, seen apart all the way: no blends. */
 static void crossing_within_a_pixel(void **state) {
     (void)state;
@@ -588,6 +628,7 @@ int main(void) {
                                        cmocka_unit_test(a_million_updates_of_each_filter),
                                        cmocka_unit_test(identity_through_an_hour),
                                        cmocka_unit_test(memory_has_its_limits),
+                                       cmocka_unit_test(melted_for_good),
                                        cmocka_unit_test(crossing_within_a_pixel),
                                        cmocka_unit_test(false_events_are_as_rare_as_asked),
                                        cmocka_unit_test(manoeuvres_and_flares_are_told),
