@@ -64,8 +64,9 @@ static bst_status observe_hidden(bst_ctx *ctx, bst_control *c, int64_t tick,
     }
     if (c->mode != BST_MODE_COAST) {
         bst_control_enter(c, BST_MODE_COAST, tick,
-                          target->hidden == BST_HIDDEN_EARTH
-                              ? "the target is behind the Earth"
+                          target->hidden == BST_HIDDEN_EARTH ? "the target is behind the Earth"
+                          : target->hidden == BST_HIDDEN_DIM
+                              ? "the target is too dim"
                               : "the target is in the Earth's shadow");
     }
     return BST_OK;

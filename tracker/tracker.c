@@ -343,7 +343,8 @@ static void write_track(const bst_tracker *t, const bst_target_cue *cue, const b
                     .hidden = !track->asleep                  ? BST_HIDDEN_NOT
                               : track->sight == BST_MTT_EARTH ? BST_HIDDEN_EARTH
                               : track->sight == BST_MTT_CLEAR ? BST_HIDDEN_AWAITED
-                                                              : BST_HIDDEN_SHADOW};
+                              : track->light.sunlight < 1.0   ? BST_HIDDEN_SHADOW
+                                                              : BST_HIDDEN_DIM};
     memcpy(out->covariance, track->state.covariance, sizeof out->covariance);
 }
 
