@@ -1,6 +1,10 @@
 /* Where the boresight is to be. */
 #include "control/control_internal.h"
 
+/* An aim is kept for so many times the interval over which rates are taken, 1 s: that of a low
+ * orbit's aberration changes by 5e-3 arcsec a second. */
+#define KEPT_OVER_HALF 4
+
 bst_status bst_control_cue_at(bst_ctx *ctx, const bst_control *c, int64_t tick, bst_cue *out) {
     return c->env.cue_at(c->env.cue_user, ctx, bst_control_seconds(c, tick), out);
 }
@@ -156,18 +160,23 @@ bst_status bst_control_boresight_at(bst_ctx *ctx, bst_control *c, int64_t tick, 
     uint64_t spread = (uint64_t)tick * UINT64_C(0x9E3779B97F4A7C15);
     bst_control_aimed *aimed = &c->aimed[spread >> 57];
     _Static_assert(BST_CONTROL_AIMED == 1 << (64 - 57), "the hash's greatest value");
-    if (!aimed->known || aimed->tick != tick) {
+    if (!aimed->known || aimed->tick != tick ||
+        c->nav.tick - aimed->nav_tick > KEPT_OVER_HALF * c->rate_half_ticks) {
         aimed->known = false;
-        BST_TRY(bst_control_aim(ctx, c, tick, &aimed->valid, &aimed->direction_gcrf));
-        aimed->error = bst_pointing_error_at(&c->pointing_error, tick, c->env.tick_rate_hz);
+        bst_vec3 d;
+        BST_TRY(bst_control_aim(ctx, c, tick, &aimed->valid, &d));
+        if (aimed->valid && !held_in_body(c)) { /* else, where the stars are does not matter */
+            bst_quat error = bst_pointing_error_at(&c->pointing_error, tick, c->env.tick_rate_hz);
+            d = bst_quat_rotate(error, bst_control_apparent(c, d));
+        }
+        aimed->boresight_gcrf = aimed->valid ? d : (bst_vec3){0.0, 0.0, 0.0};
         aimed->tick = tick;
+        aimed->nav_tick = c->nav.tick;
         aimed->known = true;
     }
     *valid = aimed->valid;
-    if (*valid && held_in_body(c)) {
-        *direction = aimed->direction_gcrf; /* where the stars are does not matter */
-    } else if (*valid) {
-        *direction = bst_quat_rotate(aimed->error, bst_control_apparent(c, aimed->direction_gcrf));
+    if (*valid) {
+        *direction = aimed->boresight_gcrf;
     }
     return BST_OK;
 }

@@ -121,8 +121,8 @@ typedef struct bst_control_watch {
 typedef struct bst_control_aimed {
     bool known, valid;
     int64_t tick;
-    bst_vec3 direction_gcrf; /* geometric */
-    bst_quat error;          /* of the pointing */
+    int64_t nav_tick;        /* of the navigation telemetry, whose velocity it is aberrated by */
+    bst_vec3 boresight_gcrf; /* bst_control_boresight_at */
 } bst_control_aimed;
 
 #define BST_CONTROL_AIMED 128

@@ -82,9 +82,10 @@ typedef struct bst_guidance {
     /* the way of pointing and turn that were chosen */
     bool near_known;
     double near_rad[BST_MOUNT_AXES];
-    int reach;                        /* bst_reach, as last told */
-    bool no_way;                      /* told */
-    int64_t ahead_tick;               /* of the next look ahead */
+    bst_vec3 near_body; /* direction in body axes that near_rad was worked out for; zero: none */
+    int reach;          /* bst_reach, as last told */
+    bool no_way;        /* told */
+    int64_t ahead_tick; /* of the next look ahead */
     double told_from_s, told_until_s; /* the loss ahead that was told; INFINITY: none */
     bst_guidance_event events[BST_GUIDANCE_EVENTS];
     int event_count;
