@@ -423,15 +423,21 @@ bst_status bst_guidance_command(bst_ctx *ctx, bst_guidance *g, const bst_nav_tel
                                 const bst_quat *error, const bst_vec3 *boresight,
                                 bst_los_command *command, bool *give) {
     *give = true;
+    /* cones and the Earth as the attitude telemetry sees them, those that are looked at */
     const bst_guidance_config *config = &g->config;
-    if (config->sun_keep_out_deg > 0.0 || config->moon_keep_out_deg > 0.0 ||
-        config->earth_keep_out || config->look_ahead_s > 0.0) {
-        /* cones and the Earth as the attitude telemetry sees them */
+    bool ahead = config->look_ahead_s > 0.0;
+    if (ahead) {
         g->nav = *nav;
+    }
+    if (config->sun_keep_out_deg > 0.0 || ahead) {
+        g->nav.sun_m = bst_quat_rotate(*error, nav->sun_m);
+    }
+    if (config->moon_keep_out_deg > 0.0 || ahead) {
+        g->nav.moon_m = bst_quat_rotate(*error, nav->moon_m);
+    }
+    if (config->earth_keep_out || ahead) {
         g->nav.position_gcrf_m = bst_quat_rotate(*error, nav->position_gcrf_m);
         g->nav.velocity_gcrf_mps = bst_quat_rotate(*error, nav->velocity_gcrf_mps);
-        g->nav.sun_m = bst_quat_rotate(*error, nav->sun_m);
-        g->nav.moon_m = bst_quat_rotate(*error, nav->moon_m);
     }
     if (g->config.look_ahead_s > 0.0 && command->tick >= g->ahead_tick) {
         g->ahead_tick =
