@@ -391,9 +391,9 @@ static bst_status shape(bst_ctx *ctx, bst_guidance *g, const bst_nav_telemetry *
             g->slew.active = false;
         }
     }
-    bool blocked = !bst_exclusion_nearest(zones, zone_count, target, from, &target);
     double depth;
-    bool inside = bst_exclusion_inside(zones, zone_count, command->direction_gcrf, &depth) >= 0;
+    bool inside = bst_exclusion_inside(zones, zone_count, target, &depth) >= 0;
+    bool blocked = inside && !bst_exclusion_nearest(zones, zone_count, target, from, &target);
     bool made = false;
     if (!blocked && is_beyond(from, target, g->config.slew_above_deg * BST_DEG_RAD)) {
         BST_TRY(plan_axes(ctx, g, tick, zones, zone_count, from, &made));
