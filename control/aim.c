@@ -187,7 +187,7 @@ static bst_control_aimed *aimed_at(bst_control *c, int64_t tick) {
     return aimed;
 }
 
-static void tell(const bst_control *c, bst_control_aimed *aimed, int64_t tick, bool valid,
+static void keep(const bst_control *c, bst_control_aimed *aimed, int64_t tick, bool valid,
                  bst_vec3 boresight) {
     *aimed = (bst_control_aimed){.known = true,
                                  .valid = valid,
@@ -211,7 +211,7 @@ static bst_status work_out(bst_ctx *ctx, bst_control *c, int64_t tick,
         bst_quat error = bst_pointing_error_at(&c->pointing_error, tick, c->env.tick_rate_hz);
         d = bst_quat_rotate(error, bst_aberrate(&aberration, d));
     }
-    tell(c, aimed, tick, valid, d);
+    keep(c, aimed, tick, valid, d);
     return BST_OK;
 }
 
@@ -271,7 +271,7 @@ bst_status bst_control_boresight_at(bst_ctx *ctx, bst_control *c, int64_t tick, 
     }
     if (piece) {
         double u = (double)(tick - piece->index * c->rate_half_ticks) / (double)c->rate_half_ticks;
-        tell(c, told, tick, true, bst_quintic_at(piece->way, u));
+        keep(c, told, tick, true, bst_quintic_at(piece->way, u));
     } else {
         BST_TRY(work_out(ctx, c, tick, &aimed));
     }
