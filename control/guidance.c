@@ -351,13 +351,10 @@ static bool turns_matter(const bst_guidance *g) {
     return matter;
 }
 
-static bst_status shape(bst_ctx *ctx, bst_guidance *g, const bst_nav_telemetry *nav,
-                        const bst_vec3 *boresight, bst_los_command *command, bool *give) {
-    bst_zone zones[BST_ZONE_KINDS];
-    int zone_count = bst_guidance_zones(g, nav, zones);
-    for (int i = 0; i < zone_count; i++) {
-        zones[i].half_angle_rad = fmin(zones[i].half_angle_rad + WIDER_RAD, BST_PI - 1e-6);
-    }
+static bst_status shape(bst_ctx *ctx, bst_guidance *g, const bst_vec3 *boresight,
+                        bst_los_command *command, bool *give) {
+    const bst_zone *zones = g->zones;
+    int zone_count = g->zone_count;
     if (zone_count == 0 && g->config.slews != BST_SLEWS_PLANNED && !turns_matter(g)) {
         return BST_OK;
     }
@@ -419,32 +416,35 @@ static bst_status shape(bst_ctx *ctx, bst_guidance *g, const bst_nav_telemetry *
     return BST_OK;
 }
 
+/* Cones and the Earth as the attitude telemetry sees them; they hardly move between two messages of
+ * navigation. */
+static void see_sky(bst_guidance *g, const bst_nav_telemetry *nav, const bst_quat *error) {
+    g->nav = *nav;
+    g->nav_known = true;
+    g->nav.position_gcrf_m = bst_quat_rotate(*error, nav->position_gcrf_m);
+    g->nav.velocity_gcrf_mps = bst_quat_rotate(*error, nav->velocity_gcrf_mps);
+    g->nav.sun_m = bst_quat_rotate(*error, nav->sun_m);
+    g->nav.moon_m = bst_quat_rotate(*error, nav->moon_m);
+    g->zone_count = bst_guidance_zones(g, &g->nav, g->zones);
+    for (int i = 0; i < g->zone_count; i++) {
+        double *half = &g->zones[i].half_angle_rad;
+        *half = fmin(*half + WIDER_RAD, BST_PI - 1e-6);
+    }
+}
+
 bst_status bst_guidance_command(bst_ctx *ctx, bst_guidance *g, const bst_nav_telemetry *nav,
                                 const bst_quat *error, const bst_vec3 *boresight,
                                 bst_los_command *command, bool *give) {
     *give = true;
-    /* cones and the Earth as the attitude telemetry sees them, those that are looked at */
-    const bst_guidance_config *config = &g->config;
-    bool ahead = config->look_ahead_s > 0.0;
-    if (ahead) {
-        g->nav = *nav;
-    }
-    if (config->sun_keep_out_deg > 0.0 || ahead) {
-        g->nav.sun_m = bst_quat_rotate(*error, nav->sun_m);
-    }
-    if (config->moon_keep_out_deg > 0.0 || ahead) {
-        g->nav.moon_m = bst_quat_rotate(*error, nav->moon_m);
-    }
-    if (config->earth_keep_out || ahead) {
-        g->nav.position_gcrf_m = bst_quat_rotate(*error, nav->position_gcrf_m);
-        g->nav.velocity_gcrf_mps = bst_quat_rotate(*error, nav->velocity_gcrf_mps);
+    if (!g->nav_known || nav->tick != g->nav.tick) {
+        see_sky(g, nav, error);
     }
     if (g->config.look_ahead_s > 0.0 && command->tick >= g->ahead_tick) {
         g->ahead_tick =
             command->tick + (int64_t)llround(g->config.look_ahead_every_s * g->env.tick_rate_hz);
         BST_TRY(bst_guidance_look_ahead(ctx, g, command->tick));
     }
-    BST_TRY(shape(ctx, g, &g->nav, boresight, command, give));
+    BST_TRY(shape(ctx, g, boresight, command, give));
     if (*give) {
         g->last = *command;
         g->commanded = true;

@@ -74,7 +74,10 @@ typedef struct bst_guidance {
     bst_guidance_env env;
     bst_mount_status mount;
     bool mount_known;
-    bst_nav_telemetry nav;
+    bst_nav_telemetry nav;          /* as the attitude telemetry sees it */
+    bst_zone zones[BST_ZONE_KINDS]; /* of nav, WIDER_RAD wider */
+    int zone_count;
+    bool nav_known;
     bool commanded;
     bst_los_command last;
     bst_guidance_slew slew;

@@ -417,6 +417,16 @@ bst_tracker_outcome bst_tracker_check(const bst_tracker *t, const bst_detections
     return t->started && mid_tick(d) <= t->last_tick ? BST_TRACKER_BACKWARDS : BST_TRACKER_USED;
 }
 
+bool bst_tracker_may_start_orbit(const bst_tracker *t) {
+    int count;
+    const bst_mtt_track *tracks = bst_mtt_tracks(t->mtt, &count);
+    bool may = false;
+    for (int i = 0; t->orbits && i < count; i++) {
+        may = may || (!tracks[i].star && !tracks[i].orbit.valid);
+    }
+    return may;
+}
+
 bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *input,
                                      bst_tracks *tracks, int track_capacity,
                                      bst_predictions *predictions, int prediction_capacity) {
