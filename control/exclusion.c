@@ -96,6 +96,10 @@ bool bst_exclusion_nearest(const bst_zone *zones, int count, bst_vec3 direction,
     for (int i = 0; i < count; i++) {
         bool centre = bst_vec3_norm(bst_vec3_cross(zones[i].axis, direction)) < 1e-12;
         bst_vec3 point[3] = {edge_point(&zones[i], centre ? towards : direction)};
+        if (count == 1) {
+            *out = point[0];
+            return true;
+        }
         for (int j = 0; j <= i; j++) {
             int points = 1;
             if (j < i) { /* where two edges cross */
