@@ -104,7 +104,7 @@ bst_status bst_statistics_of(bst_ctx *ctx, const double *values, int64_t rows, i
         describe(values, rows, columns, c, scratch, &out[c]);
     }
     for (size_t i = 0; i < cells; i++) {
-        there[i] = !isnan(values[i]);
+        there[i] = (uint8_t)!isnan(values[i]);
         centred[i] = there[i] ? values[i] - out[i % wide].mean : 0.0;
     }
     for (int64_t b = 0; b < resamples && rows > 1; b++) {
