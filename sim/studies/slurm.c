@@ -410,7 +410,7 @@ static void add_log(const slurm *s, const task *t, char text[BST_SHARD_TEXT_BYTE
 
 /* What is to be told of a task now; false when nothing. */
 static bool tell(const slurm *s, const task *t, double now, bst_shard_news *news) {
-    *news = (bst_shard_news){.id = t->job.id};
+    *news = (bst_shard_news){.id = t->job.id, .runs_done = -1, .runs_failed = -1};
     int code;
     char node[64];
     if (t->array == 0) {
@@ -421,7 +421,8 @@ static bool tell(const slurm *s, const task *t, double now, bst_shard_news *news
     if (has_ended(s, t, &code, node)) {
         news->kind = code < 128 ? BST_SHARD_ENDED : BST_SHARD_LOST;
         if (code >= 128) {
-            snprintf(news->text, sizeof news->text, "killed by signal %d on %s", code - 128,
+            snprintf(news->text, sizeof news->text, "%s by signal %d on %s",
+                     code == 128 + SIGKILL ? "killed" : "ended", code - 128,
                      node[0] ? node : "its node");
         }
         if (code != 0) {
