@@ -128,20 +128,8 @@ static bool starts_with_word(const bst_text_line *line, const char *word) {
 
 /* Splits "KEY = value". */
 static bst_status split(const reader *r, bst_text_span *name, bst_text_span *value) {
-    const char *equals = r->line.length ? memchr(r->line.text, '=', r->line.length) : NULL;
-    if (!equals) {
-        return fail_line(r, "is not a line that an OEM has here", "KEYWORD = value");
-    }
-    size_t left = (size_t)(equals - r->line.text);
-    *name = bst_text_trimmed((bst_text_span){r->line.text, left});
-    *value = bst_text_trimmed((bst_text_span){equals + 1, r->line.length - left - 1});
-    if (value->length == 0) {
-        return fail_line(r, "the keyword has no value", "KEYWORD = value");
-    }
-    if (!bst_text_is_plain(*name) || !bst_text_is_plain(*value)) {
-        return fail_line(r, "a character that is not printable ASCII", "plain text");
-    }
-    return BST_OK;
+    const char *expected, *problem = bst_text_split_keyword(&r->line, name, value, &expected);
+    return problem ? fail_line(r, problem, expected) : BST_OK;
 }
 
 /* Index of the keyword in `names`, a NULL-terminated list; an error suggests the nearest one. */

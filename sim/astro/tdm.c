@@ -78,25 +78,8 @@ static bool numbered(bst_text_span name, const char *stem, int *index) {
 }
 
 static bst_status split(const reader *r, bst_text_span *name, bst_text_span *rest) {
-    const char *equals = r->line.length ? memchr(r->line.text, '=', r->line.length) : NULL;
-    if (!equals) {
-        return fail(r, "is not a line that a TDM has here", "KEYWORD = value");
-    }
-    size_t left = (size_t)(equals - r->line.text);
-    *name = bst_text_trimmed((bst_text_span){r->line.text, left});
-    *rest = bst_text_trimmed((bst_text_span){equals + 1, r->line.length - left - 1});
-    bool plain = name->length > 0;
-    for (size_t i = 0; i < name->length; i++) {
-        char c = name->text[i];
-        plain = plain && ((c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_');
-    }
-    if (!plain) {
-        return fail(r, "the keyword is not one", "capitals, digits and underscores");
-    }
-    if (rest->length == 0 || !bst_text_is_plain(*rest)) {
-        return fail(r, "the keyword has no value of printable ASCII", "KEYWORD = value");
-    }
-    return BST_OK;
+    const char *expected, *problem = bst_text_split_keyword(&r->line, name, rest, &expected);
+    return problem ? fail(r, problem, expected) : BST_OK;
 }
 
 static bst_status read_head(reader *r) {

@@ -129,6 +129,35 @@ static size_t digits_at(const char *text, size_t length) {
     return i;
 }
 
+const char *bst_text_split_keyword(const bst_text_line *line, bst_text_span *keyword,
+                                   bst_text_span *value, const char **expected) {
+    *expected = "KEYWORD = value";
+    const char *equals = line->length ? memchr(line->text, '=', line->length) : NULL;
+    if (!equals) {
+        return "is not a line that this message has here";
+    }
+    size_t left = (size_t)(equals - line->text);
+    *keyword = bst_text_trimmed((bst_text_span){line->text, left});
+    *value = bst_text_trimmed((bst_text_span){equals + 1, line->length - left - 1});
+    bool is_keyword = keyword->length > 0;
+    for (size_t i = 0; i < keyword->length; i++) {
+        char c = keyword->text[i];
+        is_keyword = is_keyword && ((c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_');
+    }
+    if (!is_keyword) {
+        *expected = "capitals, digits and underscores";
+        return "the keyword is not one";
+    }
+    if (value->length == 0) {
+        return "the keyword has no value";
+    }
+    if (!bst_text_is_plain(*value)) {
+        *expected = "plain text";
+        return "a character that is not printable ASCII";
+    }
+    return NULL;
+}
+
 bool bst_text_number(bst_text_span span, double *out) {
     enum { LONGEST = 120 };
     const char *c = span.text;

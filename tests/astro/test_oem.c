@@ -396,7 +396,7 @@ static void errors_say_where_and_what(void **state) {
          "x.oem:4: the keyword is not known here (found \"ORIGNATOR\", "
          "expected ORIGINATOR)"},
         {VERSION "nonsense\n",
-         "x.oem:4: is not a line that an OEM has here (found \"nonsense\", "
+         "x.oem:4: is not a line that this message has here (found \"nonsense\", "
          "expected KEYWORD = value)"},
         {VERSION, "x.oem:3: the file ends before any metadata (expected META_START)"},
         {VERSION "META_START\n" META,
