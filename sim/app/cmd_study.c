@@ -428,7 +428,9 @@ static int command(bst_ctx *ctx, const study_request *r, const char *given) {
     if (r->emit >= 0) {
         status = emit(ctx, r, &study, kind);
     } else {
-        status = r->shard ? BST_OK : bst_study_check(ctx, &study, kind);
+        snprintf(file, sizeof file, "%.4000s/study.json", out);
+        bool checked = r->shard && access(file, F_OK) == 0; /* by who made the folder */
+        status = checked ? BST_OK : bst_study_check(ctx, &study, kind);
         if (status == BST_OK) {
             code = r->shard     ? run_shard(ctx, r, &study, kind, out)
                    : r->dry_run ? BST_EXIT_OK

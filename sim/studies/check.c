@@ -163,15 +163,33 @@ static bst_status try_list(checker *c, const bst_study_place *place, int factor)
     return BST_OK;
 }
 
+/* What is wrong with the first setting: its values are put in one after the other, as far as the
+ * scenario is right without them. */
+static bst_status blame(checker *c, const bst_study_place *place) {
+    const bst_study *study = c->study;
+    bst_study_value first[BST_STUDY_AXES];
+    bst_ctx quiet = {0};
+    memcpy(first, c->values, sizeof first);
+    memset(c->values, 0, sizeof first);
+    if (check_run(&quiet, study, c->kind, place, c->values, false) == BST_OK) {
+        for (int a = 0; a < study->swept_count; a++) {
+            c->values[a] = first[a];
+            BST_TRY(first[a].given ? try_values(c, place, a) : BST_OK);
+        }
+    }
+    memcpy(c->values, first, sizeof first);
+    bst_status status = check_run(c->ctx, study, c->kind, place, c->values, true);
+    return bst_fail_prefix(c->ctx, status, "%s: the first setting", study->file);
+}
+
 static bst_status try_base(checker *c, const bst_study_place *place) {
     const bst_study *study = c->study;
     int64_t levels[BST_STUDY_AXES + 1];
     bst_study_levels(study, place->setting, levels);
     memset(c->values, 0, BST_STUDY_AXES * sizeof *c->values);
     bst_study_swept_values(study, levels, c->values);
-    bst_status status = check_run(c->ctx, study, c->kind, place, c->values, true);
-    if (status != BST_OK) {
-        return bst_fail_prefix(c->ctx, status, "%s: the first setting", study->file);
+    if (check_run(c->ctx, study, c->kind, place, c->values, true) != BST_OK) {
+        return blame(c, place);
     }
     for (int f = 0; f < study->factor_count; f++) {
         const bst_study_factor *factor = &study->factors[f];

@@ -23,17 +23,18 @@ double bst_quantile(const double *sorted, int64_t n, double q) {
 
 static void describe(const double *values, int64_t rows, int columns, int column, double *scratch,
                      bst_statistics *s) {
-    double sum = 0.0, square = 0.0;
+    double sum = 0.0, square = 0.0, first = NAN; /* equal values have themselves for a mean */
     int64_t n = 0;
     for (int64_t i = 0; i < rows; i++) {
         double x = values[i * columns + column];
         if (!isnan(x)) {
+            first = n == 0 ? x : first;
             scratch[n++] = x;
-            sum += x;
+            sum += x - first;
         }
     }
     *s = (bst_statistics){.count = n, .missing = rows - n, .low = NAN, .high = NAN};
-    s->mean = n > 0 ? sum / (double)n : NAN;
+    s->mean = n > 0 ? first + sum / (double)n : NAN;
     for (int64_t i = 0; i < n; i++) {
         square += (scratch[i] - s->mean) * (scratch[i] - s->mean);
     }

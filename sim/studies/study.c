@@ -88,7 +88,7 @@ static bool taken(const bst_study *study, const char *name) {
 }
 
 static bst_status name_axis(bst_ctx *ctx, const bst_study *study, const char *given,
-                            bst_study_axis *axis) {
+                            const char *suffix, bst_study_axis *axis) {
     char path[96];
     if (*given) {
         snprintf(path, sizeof path, "%s/name", axis->where);
@@ -108,7 +108,7 @@ static bst_status name_axis(bst_ctx *ctx, const bst_study *study, const char *gi
         for (char *c = name; *c; c++) {
             *c = is_word((char[]){*c, '\0'}) ? *c : '_';
         }
-        snprintf(axis->name, sizeof axis->name, "%.60s", name);
+        snprintf(axis->name, sizeof axis->name, "%.50s%s", name, suffix);
         if (!taken(study, axis->name)) {
             return BST_OK;
         }
@@ -118,7 +118,7 @@ static bst_status name_axis(bst_ctx *ctx, const bst_study *study, const char *gi
 }
 
 static bst_status begin_axis(bst_ctx *ctx, bst_study *study, const cJSON *node, const char *where,
-                             const char *given_name, bst_study_axis **out) {
+                             const char *given_name, const char *suffix, bst_study_axis **out) {
     if (study->axis_count == BST_STUDY_AXES) {
         return bst_fail(ctx, BST_ERR_CONFIG, "%s: more than %d axes and dispersions", study->file,
                         BST_STUDY_AXES);
@@ -139,7 +139,7 @@ static bst_status begin_axis(bst_ctx *ctx, bst_study *study, const cJSON *node, 
     }
     BST_TRY(read_raw_array(ctx, study, node, where, "values", "an array of values", &axis->values));
     axis->value_count = cJSON_GetArraySize(axis->values);
-    BST_TRY(name_axis(ctx, study, given_name, axis));
+    BST_TRY(name_axis(ctx, study, given_name, suffix, axis));
     study->axis_count++;
     *out = axis;
     return BST_OK;
@@ -163,7 +163,7 @@ static bst_status check_range(bst_ctx *ctx, const bst_study *study, const char *
 static bst_status add_swept_axis(bst_ctx *ctx, bst_study *study, const cJSON *node,
                                  const char *where, const bst_axis_config *config, bool counted) {
     bst_study_axis *axis;
-    BST_TRY(begin_axis(ctx, study, node, where, config->name, &axis));
+    BST_TRY(begin_axis(ctx, study, node, where, config->name, "", &axis));
     axis->axis = config;
     bool range = config->from != config->to || config->count > 0;
     if (axis->values ? range : !range) {
@@ -290,10 +290,11 @@ static bst_status read_weights(bst_ctx *ctx, const bst_study *study, const cJSON
 static bst_status add_dispersion(bst_ctx *ctx, bst_study *study, const cJSON *node, int index) {
     const bst_dispersion_config *c =
         (const bst_dispersion_config *)study->config.dispersions.items + index;
+    static const char *const suffixes[] = {"", "_offset", "_factor"};
     bst_study_axis *axis;
     char where[64];
     snprintf(where, sizeof where, "/dispersions/%d", index);
-    BST_TRY(begin_axis(ctx, study, node, where, c->name, &axis));
+    BST_TRY(begin_axis(ctx, study, node, where, c->name, suffixes[c->apply], &axis));
     axis->dispersion = c;
     for (int a = study->swept_count; a < study->axis_count - 1; a++) {
         if (strcmp(study->axes[a].path, axis->path) == 0) {

@@ -14,7 +14,9 @@ static const char *const applies[] = {"set", "add", "multiply", NULL};
     "What is varied: a JSON pointer into the scenario, such as "                                  \
     "\"/observers/0/sensors/0/camera/read_noise_e\", or into the study's own block of its kind, " \
     "such as \"/pd/streak_px\"."
-#define NAME_DOC "Name of its column in tables; \"\": the pointer's last part."
+#define NAME_DOC                                                                                   \
+    "Name of its column in tables; \"\": the pointer's last part, with _offset or _factor behind " \
+    "it where that is what is drawn."
 #define RAW(key_, default_, doc_) \
     { .key = key_, .type = BST_CONFIG_RAW, .unit = "", .fallback = default_, .doc = doc_ }
 
@@ -66,7 +68,7 @@ static const bst_config_desc dispersion_table[] = {
     BST_REAL(bst_dispersion_config, to, "", -1e300, 1e300, "0",
              "Greatest value (uniform, log_uniform)."),
     BST_REAL(bst_dispersion_config, mean, "", -1e300, 1e300, "0", "Mean (normal)."),
-    BST_REAL(bst_dispersion_config, sigma, "", 0, 1e300, "0", "Standard deviation (normal)."),
+    BST_REAL(bst_dispersion_config, sigma, "", 0, 1e100, "0", "Standard deviation (normal)."),
     BST_REAL(bst_dispersion_config, truncate_sigma, "", 0.1, 8, "4",
              "Draws further than so many standard deviations from the mean are made again "
              "(normal)."),
