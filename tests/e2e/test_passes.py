@@ -68,6 +68,13 @@ class Passes(unittest.TestCase):
     def test_past_the_pole_with_a_third_axis(self):
         self.tracked("leo_leo_third_axis.json", GENERATOR)
 
+    def test_past_the_pole_by_rolling_the_body(self):
+        self.tracked("leo_leo_body_roll.json", GENERATOR)
+
+    @unittest.skipUnless(SEEDS > 1, "slow")
+    def test_past_the_pole_by_rolling_the_body_by_images(self):
+        self.tracked("leo_leo_body_roll.json")
+
     @unittest.skipUnless(SEEDS > 1, "slow")
     def test_past_the_pole_with_a_third_axis_by_images(self):
         self.tracked("leo_leo_third_axis.json")
