@@ -14,6 +14,7 @@ typedef struct command {
 static const command commands[] = {
     {"run", bst_cmd_run, "run a scenario"},
     {"info", bst_cmd_info, "what the folder of a run holds"},
+    {"report", bst_cmd_report, "a page of HTML about a run"},
     {"export", bst_cmd_export, "frames, tables, orbits and observations of a run for others"},
     {"orbit", bst_cmd_orbit, "an orbit from the directions that a run measured"},
     {"check", bst_cmd_check, "validate a scenario and print it with every default written out"},
@@ -25,6 +26,7 @@ static const command commands[] = {
     {"calibrate-obsgen", bst_cmd_calibrate_obsgen,
      "fit the observation generator to the image path, or compare them"},
     {"bench", bst_cmd_bench, "measure speed and error"},
+    {"study", bst_cmd_study, "many runs of varied scenarios, as tables"},
     {"pd", bst_cmd_pd, "measure detection, false alarms and location against theory"},
 };
 
