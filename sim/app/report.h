@@ -118,6 +118,8 @@ void bst_report_sensor_free(bst_report_sensor *sensor);
 
 /* ---- the parts ---- */
 
+/* The last part of the folder's path. */
+const char *bst_report_folder(const bst_run_reader *run, char text[256]);
 /* A message about a file of the run without the path of the run's folder: pages do not depend on
  * where it is. */
 const char *bst_report_local(const bst_run_reader *run, const char *message);

@@ -72,9 +72,10 @@ bst_report_statistics bst_report_measure(double *values, size_t n) {
     return r;
 }
 
-void bst_report_histogram(FILE *out, const char *name, const char *label, const double *values,
-                          size_t n, double low, double high, int bins, int colour,
-                          double (*density)(double x, const void *user), const void *user) {
+void bst_report_histogram(FILE *out, const char *name, const char *label, const char *what,
+                          const double *values, size_t n, double low, double high, int bins,
+                          int colour, double (*density)(double x, const void *user),
+                          const void *user) {
     enum { MOST = 64, CURVE = 120 };
     double counts[MOST] = {0}, top = 0.0, x[CURVE], y[CURVE], width = (high - low) / bins;
     size_t total = 0;
@@ -100,7 +101,7 @@ void bst_report_histogram(FILE *out, const char *name, const char *label, const 
                    .width = 360.0,
                    .height = 230.0,
                    .x = {.label = label, .low = low, .high = high},
-                   .y = {.label = "frames", .low = 0.0, .high = fmax(1.0, 1.08 * top)}};
+                   .y = {.label = what, .low = 0.0, .high = fmax(1.0, 1.08 * top)}};
     bst_chart_begin(&c);
     for (int i = 0; i < bins; i++) {
         if (counts[i] > 0.0) {
@@ -427,8 +428,8 @@ static void histogram_of_axis(const bst_report_drawing *d, bst_report_quantity q
     double law[2] = {m.median, fmax(inner, 1e-9)}, half = 5.0 * law[1];
     char caption[160], words[2][32];
     bst_page_figure(d->out, BST_PAGE_THIRD);
-    bst_report_histogram(d->out, label, label, d->y, n, m.median - half, m.median + half, 40,
-                         colour, normal, law);
+    bst_report_histogram(d->out, label, label, "frames", d->y, n, m.median - half, m.median + half,
+                         40, colour, normal, law);
     snprintf(caption, sizeof caption,
              "In track: mean %s px, RMS %s px; the curve is normal with the inner 68 %%.",
              bst_page_number(words[0], m.mean, 2), bst_page_number(words[1], m.rms, 3));
@@ -443,8 +444,8 @@ static void plot_histograms(const bst_report_drawing *d) {
     size_t n = gather(d->y, d->sensor->count);
     if (n >= 20) {
         bst_page_figure(d->out, BST_PAGE_THIRD);
-        bst_report_histogram(d->out, "NEES of the track", "NEES of the track", d->y, n, 0.0, 12.0,
-                             40, BST_CHART_GREEN, chi_square_2, NULL);
+        bst_report_histogram(d->out, "NEES of the track", "NEES of the track", "frames", d->y, n,
+                             0.0, 12.0, 40, BST_CHART_GREEN, chi_square_2, NULL);
         bst_page_figure_end(
             d->out, "Frames with a detection; the curve is chi-square with 2 degrees of freedom.");
     }

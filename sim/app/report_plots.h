@@ -32,10 +32,11 @@ typedef struct bst_report_statistics {
 bst_report_statistics bst_report_measure(double *values, size_t n);
 
 /* A histogram of what is finite among n values, between low and high, with a curve of expected
- * shares per unit of x (NULL: none) over it. */
-void bst_report_histogram(FILE *out, const char *name, const char *label, const double *values,
-                          size_t n, double low, double high, int bins, int colour,
-                          double (*density)(double x, const void *user), const void *user);
+ * shares per unit of x (NULL: none) over it. `what` is counted. */
+void bst_report_histogram(FILE *out, const char *name, const char *label, const char *what,
+                          const double *values, size_t n, double low, double high, int bins,
+                          int colour, double (*density)(double x, const void *user),
+                          const void *user);
 
 /* Timeline of modes and of what could be seen (report_timeline.c). */
 void bst_report_timeline(const bst_report_drawing *d);

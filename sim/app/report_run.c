@@ -43,16 +43,6 @@ static const cJSON *summary_of(const page *p, int i) {
     return own ? own : i == 0 ? get(manifest, "summary") : NULL;
 }
 
-/* The last part of the folder's path: reports do not depend on where a folder is. */
-static const char *folder_name(const bst_run_reader *run, char text[256]) {
-    snprintf(text, 256, "%s", bst_run_reader_folder(run));
-    for (size_t n = strlen(text); n > 1 && text[n - 1] == '/';) {
-        text[--n] = '\0';
-    }
-    const char *slash = strrchr(text, '/');
-    return slash && slash[1] ? slash + 1 : text;
-}
-
 /* ------------------------------------------------------------------ reading */
 
 static double span_of(const bst_run_reader *run) {
@@ -109,7 +99,7 @@ static void put_head(const page *p) {
     bst_run_state state = bst_run_reader_state(p->run);
     fprintf(p->out, "<p class=\"sub\"><span class=\"badge %s\">%s</span> Folder ", classes[state],
             bst_run_state_name(state));
-    bst_html_text(p->out, folder_name(p->run, name));
+    bst_html_text(p->out, bst_report_folder(p->run, name));
     fputs("</p>\n", p->out);
     const char *description = text_of(scenario, "description", "");
     if (description[0]) {

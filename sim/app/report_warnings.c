@@ -232,6 +232,12 @@ static void hear(void *user, bst_log_level level, const char *message) {
     bst_warnings_add(user, BST_SEVERITY_WARNING, "%s.", message);
 }
 
+const char *bst_report_folder(const bst_run_reader *run, char text[256]) {
+    snprintf(text, 256, "%s", bst_run_reader_folder(run));
+    const char *slash = strrchr(text, '/'); /* the reader's folder ends with none but in "/" */
+    return slash && slash[1] ? slash + 1 : text;
+}
+
 const char *bst_report_local(const bst_run_reader *run, const char *message) {
     const char *folder = bst_run_reader_folder(run);
     size_t n = strlen(folder);
