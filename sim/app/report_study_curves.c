@@ -9,7 +9,8 @@
 enum { CURVES = 6, CHARTS = 12, POINTS = 256 };
 
 typedef struct series {
-    char table[80], key[64], unit[32], ideal[64]; /* ideal: column of a bound; "" for none */
+    char table[80], ideal[64];  /* ideal: column of a bound; "" for none */
+    char x[2][64], unit[2][32]; /* the key, and the magnitude that goes with it; "" for none */
 } series;
 
 /* Finds the series that has a rate over a key: its statistics' columns begin with setting, runs,
@@ -33,16 +34,18 @@ static bool find_series(const bst_study_view *v, series *out) {
             continue;
         }
         snprintf(out->table, sizeof out->table, "%s", bst_rows_text(rows, 0));
-        if (!out->key[0] && strcmp(name, "setting") != 0 && strcmp(name, "runs") != 0) {
-            snprintf(out->key, sizeof out->key, "%s", name);
-            snprintf(out->unit, sizeof out->unit, "%s", bst_rows_text(rows, 2));
+        bool key = !out->x[0][0] && strcmp(name, "setting") != 0 && strcmp(name, "runs") != 0;
+        bool magnitude = strcmp(name, "v_mag") == 0;
+        if (key || magnitude) {
+            snprintf(out->x[!key], sizeof out->x[0], "%s", name);
+            snprintf(out->unit[!key], sizeof out->unit[0], "%s", bst_rows_text(rows, 2));
         }
         if (strstr(name, "ideal") == name) {
             snprintf(out->ideal, sizeof out->ideal, "%s", name);
         }
     }
     bst_rows_close(rows);
-    return out->table[0] && out->key[0] &&
+    return out->table[0] && out->x[0][0] &&
            strspn(out->table, "abcdefghijklmnopqrstuvwxyz0123456789_") == strlen(out->table);
 }
 
@@ -51,7 +54,7 @@ typedef struct curve {
     int count;
 } curve;
 
-static bst_status read_curve(bst_ctx *ctx, const bst_study_view *v, const series *s,
+static bst_status read_curve(bst_ctx *ctx, const bst_study_view *v, const series *s, int x,
                              int64_t setting, curve *out) {
     char sql[500];
     bst_rows *rows;
@@ -61,7 +64,7 @@ static bst_status read_curve(bst_ctx *ctx, const bst_study_view *v, const series
     snprintf(sql, sizeof sql,
              "SELECT \"%s\", rate, rate_low, rate_high, %s%s%s FROM \"%s\" WHERE setting = ?1"
              " ORDER BY 1",
-             s->key, s->ideal[0] ? "\"" : "", s->ideal[0] ? s->ideal : "NULL",
+             s->x[x], s->ideal[0] ? "\"" : "", s->ideal[0] ? s->ideal : "NULL",
              s->ideal[0] ? "\"" : "", s->table);
     BST_TRY(bst_rows_open(ctx, v->tables, sql, setting, 0, &rows));
     while ((status = bst_rows_next(ctx, rows, &more)) == BST_OK && more && out->count < POINTS) {
@@ -91,21 +94,23 @@ static void describe(const bst_study_view *v, int64_t setting, const bst_study_a
     }
 }
 
-/* One chart: the settings `group` with `count` curves. */
+/* One chart over s->x[x]: the settings `group` with `count` curves. */
 static bst_status put_chart(bst_ctx *ctx, FILE *out, const bst_study_view *v, const series *s,
-                            const int64_t *group, int count, const bst_study_axis_view *lines) {
+                            int x, const int64_t *group, int count,
+                            const bst_study_axis_view *lines) {
     static const int colours[CURVES] = {BST_CHART_BLUE,   BST_CHART_ORANGE, BST_CHART_GREEN,
                                         BST_CHART_VIOLET, BST_CHART_CYAN,   BST_CHART_BROWN};
     curve *curves = calloc((size_t)count, sizeof *curves);
     bst_status status = curves ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for curves");
     double low = INFINITY, high = -INFINITY;
     for (int i = 0; i < count && status == BST_OK; i++) {
-        status = read_curve(ctx, v, s, group[i], &curves[i]);
+        status = read_curve(ctx, v, s, x, group[i], &curves[i]);
         bst_chart_widen(curves[i].x, (size_t)curves[i].count, false, &low, &high);
     }
     if (status == BST_OK && low <= high) {
         char label[100], where[200], caption[400];
-        snprintf(label, sizeof label, "%s%s%s", s->key, s->unit[0] ? ", " : "", s->unit);
+        snprintf(label, sizeof label, "%s%s%s", strcmp(s->x[x], "snr") == 0 ? "SNR" : s->x[x],
+                 s->unit[x][0] ? ", " : "", s->unit[x]);
         describe(v, group[0], lines, NULL, where);
         bst_page_figure(out, BST_PAGE_HALF);
         bst_chart c = {.out = out,
@@ -142,8 +147,8 @@ static bst_status put_chart(bst_ctx *ctx, FILE *out, const bst_study_view *v, co
                              "ideal, place and shape known");
         }
         fputs("</ul>\n", out);
-        snprintf(caption, sizeof caption, "%s%s", where[0] ? where : "The study's one setting",
-                 where[0] ? "." : ".");
+        snprintf(caption, sizeof caption, "%s%sOf all trials of the runs, with 95 %% intervals.",
+                 where, where[0] ? ". " : "");
         bst_page_figure_end(out, caption);
     }
     free(curves);
@@ -205,7 +210,9 @@ bst_status bst_study_plot_curves(bst_ctx *ctx, FILE *out, const bst_study_view *
         }
         if (charts < CHARTS) {
             charts++;
-            status = put_chart(ctx, out, v, &s, group, count, lines);
+            for (int x = 0; x < 2 && s.x[x][0] && status == BST_OK; x++) {
+                status = put_chart(ctx, out, v, &s, x, group, count, lines);
+            }
         } else {
             left_out += count;
         }

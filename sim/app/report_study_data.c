@@ -56,7 +56,6 @@ static bst_status take_about(bst_ctx *ctx, bst_study_view *v, const bst_rows *ro
                   {"version", v->version, sizeof v->version, NULL},
                   {"digest", v->digest, sizeof v->digest, NULL},
                   {"runs", NULL, 0, &v->expected_runs},
-                  {"runs_failed", NULL, 0, &v->failed},
                   {"replicates", NULL, 0, &v->replicates}};
     for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
         if (strcmp(key, places[i].key) == 0 && places[i].text) {
@@ -170,6 +169,7 @@ static bst_status take_run(bst_ctx *ctx, bst_study_view *v, const bst_rows *rows
     v->run_numbers[r] = bst_rows_int(rows, 0);
     v->setting_of_run[r] = bst_rows_int(rows, 1);
     v->done[r] = strcmp(bst_rows_text(rows, 2), "done") == 0;
+    v->failed += !v->done[r];
     for (int i = 0; i < v->axis_count; i++) {
         v->axes[i].of_run[r] = axis_value(&v->axes[i], rows, column++);
     }

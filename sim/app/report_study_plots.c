@@ -301,12 +301,12 @@ void bst_study_plot_histograms(FILE *out, const bst_study_view *v) {
         /* the greatest value is to lie inside the last bin */
         bst_report_histogram(out, name, bst_study_label(m, label), "runs", values, n, low,
                              high + 1e-9 * (high - low), 30, BST_CHART_BLUE, NULL, NULL);
-        if (outside > 0) {
-            snprintf(caption, sizeof caption, "%s %zu runs; %zu more lie outside.", m->doc,
-                     n - outside, outside);
-        } else {
-            snprintf(caption, sizeof caption, "%s %zu runs.", m->doc, n);
-        }
+        /* a meaning that refers to the metric before it says nothing here */
+        bool refers = strncmp(m->doc, "The same", 8) == 0;
+        int used = snprintf(caption, sizeof caption, "%s%s%zu runs", refers ? "" : m->doc,
+                            refers || !m->doc[0] ? "" : " ", n - outside);
+        snprintf(caption + used, sizeof caption - (size_t)used,
+                 outside > 0 ? "; %zu more lie outside." : ".", outside);
         bst_page_figure_end(out, caption);
     }
     if (shown > 0) {
