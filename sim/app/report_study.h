@@ -41,6 +41,8 @@ typedef struct bst_study_view {
     int axis_count;
     bst_study_metric_view *metrics;
     int metric_count;
+    bst_study_metric_view
+        wall; /* wall time of the runs: not among the metrics, as it is no result */
 } bst_study_view;
 
 /* Reads the tables of a study. BST_ERR_FORMAT when they are not a study's, or damaged. Free with
@@ -67,8 +69,7 @@ void bst_study_plot_histograms(FILE *out, const bst_study_view *view);
 bst_status bst_study_plot_curves(bst_ctx *ctx, FILE *out,
                                  const bst_study_view *view) BST_MUST_CHECK;
 /* Ranked effects of the axes, of designs one_at_a_time and morris; nothing without them. */
-bst_status bst_study_plot_sensitivity(bst_ctx *ctx, FILE *out,
-                                      const bst_study_view *view) BST_MUST_CHECK;
+void bst_study_plot_sensitivity(FILE *out, const bst_study_view *view);
 
 /* The whole page of a study. `folder` is its name. */
 bst_status bst_report_study(bst_ctx *ctx, bst_run_reader *tables, FILE *out) BST_MUST_CHECK;

@@ -110,6 +110,14 @@ static bst_status add_scenarios(bst_ctx *ctx, bst_study_view *v) {
     return each_row(ctx, v, "SELECT name FROM scenarios ORDER BY scenario", take_scenario, v);
 }
 
+static bst_status make_room(bst_ctx *ctx, const bst_study_view *v, bst_study_metric_view *m) {
+    m->of_run = numbers(v->runs);
+    m->mean = numbers(v->settings);
+    m->low = numbers(v->settings);
+    m->high = numbers(v->settings);
+    return m->of_run && m->mean && m->low && m->high ? BST_OK : no_memory(ctx);
+}
+
 static bst_status take_metric(bst_ctx *ctx, bst_study_view *v, const bst_rows *rows) {
     if (!is_name(bst_rows_text(rows, 0)) || v->metric_count == MOST_COLUMNS / 2) {
         return BST_OK;
@@ -119,11 +127,7 @@ static bst_status take_metric(bst_ctx *ctx, bst_study_view *v, const bst_rows *r
     snprintf(m->unit, sizeof m->unit, "%s", bst_rows_text(rows, 1));
     snprintf(m->doc, sizeof m->doc, "%s", bst_rows_text(rows, 2));
     m->rate = strcmp(bst_rows_text(rows, 3), "rate") == 0;
-    m->of_run = numbers(v->runs);
-    m->mean = numbers(v->settings);
-    m->low = numbers(v->settings);
-    m->high = numbers(v->settings);
-    return m->of_run && m->mean && m->low && m->high ? BST_OK : no_memory(ctx);
+    return make_room(ctx, v, m);
 }
 
 /* ------------------------------------------------------------------ values */
@@ -175,6 +179,18 @@ static bst_status take_run(bst_ctx *ctx, bst_study_view *v, const bst_rows *rows
     }
     for (int i = 0; i < v->metric_count; i++) {
         v->metrics[i].of_run[r] = bst_rows_real(rows, column++);
+    }
+    return BST_OK;
+}
+
+/* Rows of the table speed, which has the runs of the table runs in their order. */
+static bst_status take_speed(bst_ctx *ctx, bst_study_view *v, const bst_rows *rows) {
+    (void)ctx;
+    while (v->read < v->runs && v->run_numbers[v->read] < bst_rows_int(rows, 0)) {
+        v->read++;
+    }
+    if (v->read < v->runs && v->run_numbers[v->read] == bst_rows_int(rows, 0)) {
+        v->wall.of_run[v->read] = bst_rows_real(rows, 1);
     }
     return BST_OK;
 }
@@ -240,6 +256,23 @@ static void find_levels(bst_study_axis_view *a, int64_t settings) {
     }
 }
 
+/* Means over the runs of each setting. */
+static void average(const bst_study_view *v, bst_study_metric_view *m) {
+    for (int64_t r = 0; r < v->runs;) {
+        int64_t setting = v->setting_of_run[r], n = 0;
+        double sum = 0.0;
+        for (; r < v->runs && v->setting_of_run[r] == setting; r++) {
+            if (isfinite(m->of_run[r])) {
+                sum += m->of_run[r];
+                n++;
+            }
+        }
+        if (setting >= 0 && setting < v->settings && n > 0) {
+            m->mean[setting] = sum / (double)n;
+        }
+    }
+}
+
 static void finish(bst_study_view *v) {
     for (int i = 0; i < v->axis_count; i++) {
         if (v->axes[i].swept) {
@@ -251,14 +284,11 @@ static void finish(bst_study_view *v) {
         double low = INFINITY, high = -INFINITY;
         bst_chart_widen(m->of_run, (size_t)v->runs, false, &low, &high);
         m->varies = high > low;
-        /* settings of one run have no statistics */
-        for (int64_t r = 0; r < v->runs && v->replicates <= 1; r++) {
-            int64_t setting = v->setting_of_run[r];
-            if (setting >= 0 && setting < v->settings) {
-                m->mean[setting] = m->of_run[r];
-            }
+        if (v->replicates <= 1) {
+            average(v, m); /* settings of one run have no statistics */
         }
     }
+    average(v, &v->wall);
 }
 
 static bst_status allocate(bst_ctx *ctx, bst_study_view *v) {
@@ -275,8 +305,11 @@ static bst_status allocate(bst_ctx *ctx, bst_study_view *v) {
     v->setting_of_run = calloc(runs, sizeof *v->setting_of_run);
     v->run_numbers = calloc(runs, sizeof *v->run_numbers);
     v->done = calloc(runs, sizeof *v->done);
-    return v->axes && v->metrics && v->setting_of_run && v->run_numbers && v->done ? BST_OK
-                                                                                   : no_memory(ctx);
+    v->wall = (bst_study_metric_view){
+        .name = "wall_s", .unit = "s", .doc = "Wall time of a run.", .varies = true};
+    return v->axes && v->metrics && v->setting_of_run && v->run_numbers && v->done
+               ? make_room(ctx, v, &v->wall)
+               : no_memory(ctx);
 }
 
 bst_status bst_study_view_read(bst_ctx *ctx, bst_run_reader *tables, bst_study_view *v) {
@@ -306,6 +339,10 @@ bst_status bst_study_view_read(bst_ctx *ctx, bst_run_reader *tables, bst_study_v
         status = each_row(ctx, v, sql, take_run, v);
     }
     if (status == BST_OK) {
+        v->read = 0;
+        status = each_row(ctx, v, "SELECT run, wall_s FROM speed ORDER BY run", take_speed, v);
+    }
+    if (status == BST_OK) {
         status = each_row(ctx, v,
                           "SELECT setting, metric, mean, low, high FROM statistics"
                           " WHERE setting IS NOT NULL",
@@ -318,6 +355,13 @@ bst_status bst_study_view_read(bst_ctx *ctx, bst_run_reader *tables, bst_study_v
     return status;
 }
 
+static void free_metric(bst_study_metric_view *m) {
+    free(m->of_run);
+    free(m->mean);
+    free(m->low);
+    free(m->high);
+}
+
 void bst_study_view_free(bst_study_view *v) {
     for (int i = 0; i < v->axis_count; i++) {
         free(v->axes[i].of_setting);
@@ -326,11 +370,9 @@ void bst_study_view_free(bst_study_view *v) {
         free(v->axes[i].words);
     }
     for (int i = 0; i < v->metric_count; i++) {
-        free(v->metrics[i].of_run);
-        free(v->metrics[i].mean);
-        free(v->metrics[i].low);
-        free(v->metrics[i].high);
+        free_metric(&v->metrics[i]);
     }
+    free_metric(&v->wall);
     free(v->axes);
     free(v->metrics);
     free(v->setting_of_run);

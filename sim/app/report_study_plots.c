@@ -226,7 +226,10 @@ static void put_dots(FILE *out, const bst_study_view *v, const bst_study_metric_
 void bst_study_plot_axes(FILE *out, const bst_study_view *v) {
     int metrics[KEY_METRICS], count = bst_study_key_metrics(v, metrics, KEY_METRICS), swept = 0;
     for (int i = 0; i < v->axis_count; i++) {
-        swept += v->axes[i].swept && v->axes[i].level_count > 1;
+        const bst_study_axis_view *a = &v->axes[i];
+        /* the others are told by their effects */
+        bool told = strcmp(a->design, "morris") != 0 && strcmp(a->design, "one_at_a_time") != 0;
+        swept += a->swept && a->level_count > 1 && told;
     }
     if (swept == 0 || v->settings < 2) {
         return;
@@ -245,7 +248,7 @@ void bst_study_plot_axes(FILE *out, const bst_study_view *v) {
             }
             if (grid && a->level_count <= BST_STUDY_LEVELS) {
                 put_curves(out, v, m, a);
-            } else if (!a->is_text) {
+            } else if (!a->is_text && strcmp(a->design, "latin_hypercube") == 0) {
                 put_dots(out, v, m, a);
             }
         }
