@@ -267,7 +267,7 @@ class Others(OnePage):
         self.check_alone(page)
         cards = page.cards()
         self.assertEqual((cards["objects seen"], cards["passes seen"]), ("2", "2"))
-        self.assertEqual(cards["custody, mean of all objects"], "25.0")
+        self.assertEqual(float(cards["custody, mean of all objects"]), 25)
         line = [part for part in page.root.iter("svg")
                 if part.get("aria-label", "").startswith("Timeline of the objects")][0]
         words = [text.text for text in line.iter("text") if text.get("text-anchor") == "end"]
