@@ -46,26 +46,23 @@ static const bst_study_axis_view *only_difference(const bst_study_view *v, int64
 
 /* ------------------------------------------------------------------ morris */
 
-/* Place of a value in the axis' range, 0 to 1. */
-static double place(const bst_study_view *v, const bst_study_axis_view *a, double value) {
-    double low = INFINITY, high = -INFINITY;
-    bst_chart_widen(a->of_setting, (size_t)v->settings, false, &low, &high);
-    return a->logarithmic ? log(value / low) / log(high / low) : (value - low) / (high - low);
-}
-
 /* Elementary effects (Morris 1991, Technometrics 33, 161) of neighbouring settings that differ in
  * this axis alone, over the axis' whole range; the mean of their sizes is mu* of Campolongo et al.
  * 2007, Environ. Model. Softw. 22, 1509. */
 static bool find_elementary(const bst_study_view *v, const bst_study_metric_view *m,
-                            const bst_study_axis_view *axis, effect *out) {
-    double sum = 0.0, squares = 0.0, sizes = 0.0;
+                            const bst_study_axis_view *axis,
+                            const bst_study_axis_view *const *differs, effect *out) {
+    double sum = 0.0, squares = 0.0, sizes = 0.0, low = INFINITY, high = -INFINITY;
     int n = 0;
+    bst_chart_widen(axis->of_setting, (size_t)v->settings, false, &low, &high);
     for (int64_t i = 0; i + 1 < v->settings; i++) {
-        if (only_difference(v, i, i + 1) != axis) {
+        if (differs[i] != axis) {
             continue;
         }
         double change = m->mean[i + 1] - m->mean[i];
-        double step = place(v, axis, axis->of_setting[i + 1]) - place(v, axis, axis->of_setting[i]);
+        double from = axis->of_setting[i], to = axis->of_setting[i + 1];
+        double step =
+            axis->logarithmic ? log(to / from) / log(high / low) : (to - from) / (high - low);
         double e = change / step;
         if (isfinite(e)) {
             sum += e;
@@ -151,10 +148,11 @@ static void put_morris(FILE *out, const bst_study_metric_view *m, const effect *
 
 /* Setting 0 has the scenario's own values. */
 static bool find_change(const bst_study_view *v, const bst_study_metric_view *m,
-                        const bst_study_axis_view *axis, effect *out) {
+                        const bst_study_axis_view *axis, const bst_study_axis_view *const *differs,
+                        effect *out) {
     *out = (effect){.axis = axis, .at = {INFINITY, -INFINITY}, .value = {NAN, NAN}};
     for (int64_t i = 1; i < v->settings; i++) {
-        if (only_difference(v, 0, i) != axis || !isfinite(m->mean[i])) {
+        if (differs[i] != axis || !isfinite(m->mean[i])) {
             continue;
         }
         out->size = fmax(out->size, fabs(m->mean[i] - m->mean[0]));
@@ -220,14 +218,14 @@ static void put_tornado(FILE *out, const bst_study_metric_view *m, const effect 
 /* ------------------------------------------------------------------ both */
 
 static void put_metric(FILE *out, const bst_study_view *v, const bst_study_metric_view *m,
-                       bool morris) {
+                       const bst_study_axis_view *const *differs, bool morris) {
     effect *list = calloc((size_t)v->axis_count + 1, sizeof *list);
     int count = 0;
     for (int i = 0; list && i < v->axis_count; i++) {
         const bst_study_axis_view *a = &v->axes[i];
-        bool good =
-            is_design(a, morris ? "morris" : "one_at_a_time") &&
-            (morris ? find_elementary(v, m, a, &list[count]) : find_change(v, m, a, &list[count]));
+        bool good = is_design(a, morris ? "morris" : "one_at_a_time") &&
+                    (morris ? find_elementary(v, m, a, differs, &list[count])
+                            : find_change(v, m, a, differs, &list[count]));
         count += good;
     }
     if (count > 0) {
@@ -249,7 +247,10 @@ void bst_study_plot_sensitivity(FILE *out, const bst_study_view *v) {
         there[0] = there[0] || is_design(&v->axes[i], "one_at_a_time");
         there[1] = there[1] || is_design(&v->axes[i], "morris");
     }
-    if ((!there[0] && !there[1]) || v->settings < 2) {
+    /* the axis in which a setting differs from its neighbour */
+    const bst_study_axis_view **differs = malloc((size_t)(v->settings + 1) * sizeof *differs);
+    if ((!there[0] && !there[1]) || v->settings < 2 || !differs) {
+        free(differs);
         return;
     }
     bst_page_section(out, 2, "What matters");
@@ -257,12 +258,19 @@ void bst_study_plot_sensitivity(FILE *out, const bst_study_view *v) {
         if (!there[morris]) {
             continue;
         }
+        /* from the setting before, or from the first one */
+        for (int64_t i = 0; i < v->settings; i++) {
+            bool last = i + 1 == v->settings;
+            differs[i] =
+                morris ? last ? NULL : only_difference(v, i, i + 1) : only_difference(v, 0, i);
+        }
         bst_page_grid(out, BST_PAGE_HALF);
         for (int k = 0; k < count; k++) {
-            put_metric(out, v, &v->metrics[metrics[k]], morris == 1);
+            put_metric(out, v, &v->metrics[metrics[k]], differs, morris == 1);
         }
-        put_metric(out, v, &v->wall, morris == 1);
+        put_metric(out, v, &v->wall, differs, morris == 1);
         bst_page_grid_end(out);
     }
+    free(differs);
     bst_page_section_end(out);
 }
