@@ -279,11 +279,14 @@ static bool same(const bst_mtt *mtt, const bst_mtt_track *a, const bst_mtt_track
 }
 
 /* Of two tracks that have lived on one detection for too long, the one that was seen more often
- * goes on with it, alone; where they are the same, the other one ends. */
-static void settle(bst_mtt *mtt, int missed, int owner, bool alike) {
+ * goes on with it, alone; where they are the same, the other one ends. False while the detection is
+ * not that one's without widening. */
+static bool settle(bst_mtt *mtt, int missed, int owner, bool alike) {
     int column = mtt->detection_of_track[owner];
-    if (mtt->tracks[missed].hits > mtt->tracks[owner].hits &&
-        fits(mtt, &mtt->tracks[missed], column, NULL)) {
+    if (mtt->tracks[missed].hits > mtt->tracks[owner].hits) {
+        if (!fits(mtt, &mtt->tracks[missed], column, NULL)) {
+            return false;
+        }
         mtt->detection_of_track[missed] = column;
         mtt->detection_of_track[owner] = -1;
         mtt->owner[column] = missed;
@@ -292,6 +295,7 @@ static void settle(bst_mtt *mtt, int missed, int owner, bool alike) {
     if (alike) {
         mtt->tracks[missed].misses_in_row = mtt->params.max_misses + 1;
     }
+    return true;
 }
 
 /* A missed confirmed track beside another one, or beside a star that is seen, may have melted into
@@ -325,8 +329,7 @@ static void share(bst_mtt *mtt) {
         bool alike = same(mtt, missed, other);
         bool long_since = missed->merged_in_row >= most && other->merged_in_row >= most;
         if (column >= 0 && !other->star && !mtt->shared[partner] && most > 0 &&
-            (alike || long_since)) {
-            settle(mtt, t, partner, alike);
+            (alike || long_since) && settle(mtt, t, partner, alike)) {
             continue;
         }
         if (column < 0) {

@@ -131,7 +131,7 @@ const bst_config_desc bst_tracker_config_table[] = {
              "Lost tracks whose direction is worse than this are forgotten."),
     BST_REAL(C, memory_chi2, "", 0, 1e6, "18.5",
              "Largest misfit of a new track to a lost one, 4 degrees of freedom."),
-    BST_INT(C, max_merged, "", 0, 10000, "30",
+    BST_INT(C, max_merged, "", 0, 10000, "60",
             "Frames in a row that a track may live on detections that it shares; of two tracks "
             "that then "
             "still share one, that with more hits goes on."),

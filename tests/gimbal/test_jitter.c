@@ -3,6 +3,7 @@
 
 #include "gimbal/jitter.h"
 #include "sim/core/vec.h"
+#include "tests/gimbal/periodogram.h"
 #include "tests/test_support.h"
 
 static bst_rng_key key(const char *stream) {
@@ -39,25 +40,6 @@ static void rms_is_what_was_asked(void **state) {
     bst_assert_close(radial_rms(&low_only, 2.0, 500000) / 7e-6, 1.0, 0.01);
 }
 
-/* Power of x at frequency f, Hann window. */
-static double power_at(const double *x, int count, double dt_s, double f) {
-    double re = 0.0, im = 0.0;
-    double cr = 1.0, ci = 0.0, tr = cos(2 * BST_PI * f * dt_s), ti = sin(2 * BST_PI * f * dt_s);
-    double wr = 1.0, wi = 0.0, vr = cos(2 * BST_PI / count), vi = sin(2 * BST_PI / count);
-    for (int n = 0; n < count; n++) {
-        double w = 0.5 - 0.5 * wr;
-        re += w * x[n] * cr;
-        im += w * x[n] * ci;
-        double t = cr * tr - ci * ti;
-        ci = cr * ti + ci * tr;
-        cr = t;
-        t = wr * vr - wi * vi;
-        wi = wr * vi + wi * vr;
-        wr = t;
-    }
-    return re * re + im * im;
-}
-
 static void spectrum_is_flat_in_its_band_and_empty_outside(void **state) {
     (void)state;
     enum { COUNT = 4096, SEGMENTS = 4 };
@@ -74,7 +56,7 @@ static void spectrum_is_flat_in_its_band_and_empty_outside(void **state) {
             }
             for (int k = 0; k < COUNT / 2; k++) {
                 double f = k / (COUNT * 1e-3);
-                double p = power_at(x, COUNT, 1e-3, f);
+                double p = periodogram(x, COUNT, 1e-3, f);
                 total += p;
                 if (f > 5.0 - 0.5 && f < 200.0 + 0.5) { /* two bins of window leakage */
                     inside += p;
@@ -105,7 +87,7 @@ static void slow_part_stays_below_its_cutoff(void **state) {
     }
     double total = 0.0, inside = 0.0;
     for (int k = 0; k < COUNT / 8; k++) {
-        double f = k / (COUNT * 0.5), p = power_at(x, COUNT, 0.5, f);
+        double f = k / (COUNT * 0.5), p = periodogram(x, COUNT, 0.5, f);
         total += p;
         inside += f <= 0.0505 ? p : 0.0;
     }

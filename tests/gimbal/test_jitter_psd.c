@@ -6,6 +6,7 @@
 #include "gimbal/jitter_noise.h"
 #include "gimbal/jitter_spectrum.h"
 #include "sim/core/vec.h"
+#include "tests/gimbal/periodogram.h"
 #include "tests/test_support.h"
 
 #define DT 1e-3
@@ -33,25 +34,6 @@ static void integrals_are_closed_forms(void **state) {
     bst_density r = {ramp, 3};
     bst_assert_close(bst_density_integral(&r, 0.0, 20.0), 12.0, 1e-14);
     bst_assert_close(bst_density_at(&r, 5.0), 1.0, 1e-15);
-}
-
-/* Periodogram of x at f: one-sided density, Hann window. */
-static double periodogram(const double *x, int count, double dt_s, double f) {
-    double re = 0.0, im = 0.0, cr = 1.0, ci = 0.0;
-    double tr = cos(2 * BST_PI * f * dt_s), ti = sin(2 * BST_PI * f * dt_s);
-    double wr = 1.0, wi = 0.0, vr = cos(2 * BST_PI / count), vi = sin(2 * BST_PI / count);
-    for (int n = 0; n < count; n++) {
-        double w = 0.5 - 0.5 * wr;
-        re += w * x[n] * cr;
-        im += w * x[n] * ci;
-        double t = cr * tr - ci * ti;
-        ci = cr * ti + ci * tr;
-        cr = t;
-        t = wr * vr - wi * vi;
-        wi = wr * vi + wi * vr;
-        wr = t;
-    }
-    return 2.0 * dt_s * (re * re + im * im) / (0.375 * count);
 }
 
 enum { COUNT = 1024, SEGMENTS = 120, PLACES = 24 };

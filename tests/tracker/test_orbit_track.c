@@ -3,41 +3,15 @@
 #include "sim/core/rng.h"
 #include "sim/world/kepler.h"
 #include "tests/test_support.h"
-#include "tests/tracker/orbit_scene.h"
+#include "tests/tracker/geo_look.h"
 #include "tracker/multitarget.h"
 #include "tracker/orbit_track.h"
 
 #define AS BST_ARCSEC_RAD
 #define SIGMA (0.3 * AS)
 
-/* A geostationary object from an orbit of 800 km. */
-static bst_od_state geo(void) {
-    return from_elements(42164e3, 1e-3, 3.0, 40.0, 10.0, 20.0);
-}
 static bst_od_state low(void) {
     return from_elements(7160e3, 1e-3, 98.5, 120.0, 30.0, -40.0);
-}
-
-static const bst_vec3 earth_mps = {-12e3, 25e3, 11e3};
-
-/* Where a body of two-body motion is seen from another at a time, light time by plain iteration. */
-static void look(double t, bst_od_observer *eye, bst_vec3 *direction, double *range_m) {
-    bst_ctx ctx = {0};
-    bst_od_state body = geo(), from = low();
-    bst_vec3 r, v, line = {0};
-    double tau = 0.0;
-    *eye = (bst_od_observer){.time_s = t, .earth_bary_mps = earth_mps};
-    bst_assert_ok(
-        &ctx, bst_kepler_propagate(&ctx, BST_EARTH_MU_M3PS2, from.position_m, from.velocity_mps, t,
-                                   &eye->position_m, &eye->velocity_mps));
-    for (int k = 0; k < 5; k++) {
-        bst_assert_ok(&ctx, bst_kepler_propagate(&ctx, BST_EARTH_MU_M3PS2, body.position_m,
-                                                 body.velocity_mps, t - tau, &r, &v));
-        line = bst_vec3_axpy(bst_vec3_sub(r, eye->position_m), -tau, earth_mps);
-        tau = bst_vec3_norm(line) / BST_LIGHT_SPEED_MPS;
-    }
-    *direction = bst_vec3_unit(line);
-    *range_m = bst_vec3_norm(line);
 }
 
 static bst_sky_measurement measure(bst_vec3 d, bst_rng_key key, uint64_t n) {
@@ -76,7 +50,7 @@ static void the_gap_of_an_hour(void **state) {
         bst_vec3 d;
         double range, before, later;
         for (int k = 0; k < SEEN; k++) {
-            look(k, &eye, &d, &range);
+            look(k, 0.0, &eye, &d, &range);
             bst_sky_measurement m = measure(d, key, (uint64_t)k);
             bst_sky_innovation v;
             if (k < 2) {
@@ -86,8 +60,8 @@ static void the_gap_of_an_hour(void **state) {
                     bst_sky_from_pair(&first, &m, 1.0, 0.0, &sky);
                     bst_od_observer a, b;
                     bst_vec3 unused;
-                    look(0.5, &a, &unused, &before);
-                    look(1.5, &b, &unused, &later);
+                    look(0.5, 0.0, &a, &unused, &before);
+                    look(1.5, 0.0, &b, &unused, &later);
                     bst_orbit_range known = {range * (1.0 + 0.02 * n[0]), 0.02 * range,
                                              later - before + 50.0 * n[1], 50.0};
                     bst_orbit_track_start(&sky, &eye, &known, &orbit);
@@ -106,7 +80,7 @@ static void the_gap_of_an_hour(void **state) {
             bst_sky_update(&plain, &v);
         }
         seen += misfit(&sky, d) / RUNS;
-        look(SEEN + 3600.0, &eye, &d, &range);
+        look(SEEN + 3600.0, 0.0, &eye, &d, &range);
         assert_true(bst_orbit_track_predict(&orbit, 1e-12, &eye));
         after += misfit(&orbit.sky, d) / RUNS;
         sigma += sqrt(orbit.sky.covariance[0][0] + orbit.sky.covariance[1][1]) / RUNS;
@@ -216,9 +190,9 @@ static void identity_over_the_gap(void **state) {
                 bst_od_observer eye, side;
                 bst_vec3 d, unused;
                 double range, from, to;
-                look(k, &eye, &d, &range);
-                look(k - 0.5, &side, &unused, &from);
-                look(k + 0.5, &side, &unused, &to);
+                look(k, 0.0, &eye, &d, &range);
+                look(k - 0.5, 0.0, &side, &unused, &from);
+                look(k + 0.5, 0.0, &side, &unused, &to);
                 bench b = {range, to - from};
                 bst_mtt_detection own = {.sky = measure(d, key, (uint64_t)k),
                                          .v_mag = 12.0,

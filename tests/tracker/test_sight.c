@@ -5,7 +5,7 @@
 #include "sim/core/rng.h"
 #include "sim/world/kepler.h"
 #include "tests/test_support.h"
-#include "tests/tracker/orbit_scene.h"
+#include "tests/tracker/geo_look.h"
 
 #define AS BST_ARCSEC_RAD
 #define SIGMA (0.3 * AS)
@@ -111,30 +111,6 @@ static void lit_from_behind(void **state) {
 }
 
 /* ---- the tracker through an hour of darkness ---- */
-
-static const bst_vec3 earth_mps = {-12e3, 25e3, 11e3};
-
-static void look(double t, double ahead_m, bst_od_observer *eye, bst_vec3 *direction,
-                 double *range_m) {
-    bst_ctx ctx = {0};
-    bst_od_state body =
-        from_elements(42164e3, 1e-3, 3.0, 40.0, 10.0, 20.0 + ahead_m / 42164e3 / BST_DEG_RAD);
-    bst_od_state from = from_elements(7160e3, 1e-3, 98.5, 120.0, 30.0, -40.0);
-    bst_vec3 r, v, line = {0};
-    double tau = 0.0;
-    *eye = (bst_od_observer){.time_s = t, .earth_bary_mps = earth_mps};
-    bst_assert_ok(
-        &ctx, bst_kepler_propagate(&ctx, BST_EARTH_MU_M3PS2, from.position_m, from.velocity_mps, t,
-                                   &eye->position_m, &eye->velocity_mps));
-    for (int k = 0; k < 5; k++) {
-        bst_assert_ok(&ctx, bst_kepler_propagate(&ctx, BST_EARTH_MU_M3PS2, body.position_m,
-                                                 body.velocity_mps, t - tau, &r, &v));
-        line = bst_vec3_axpy(bst_vec3_sub(r, eye->position_m), -tau, earth_mps);
-        tau = bst_vec3_norm(line) / BST_LIGHT_SPEED_MPS;
-    }
-    *direction = bst_vec3_unit(line);
-    *range_m = bst_vec3_norm(line);
-}
 
 typedef struct bench {
     bst_orbit_range range;
