@@ -14,7 +14,11 @@ typedef struct bst_clipped_noise {
  * before it was digitised, cut at the edges, and step^2 / 12 (Sheppard). That noise is taken for
  * normal with the third and fourth cumulants of the electrons counted, variance beyond
  * read_variance_e2, by Edgeworth's series to the second order; its moments between two edges are
- * integrals of z^k He_n(z) phi(z), which Hermite polynomials have in closed form. */
+ * integrals of z^k He_n(z) phi(z), which Hermite polynomials have in closed form.
+ *
+ * Below 12 electrons counted, with a normal part below 0.8 e-^2 and no more than 100 steps between
+ * the edges, no such series holds: the Poisson law of whole electrons, the normal part about each,
+ * is digitised and cut as it is, and mean and deviation are those of all digital values. */
 void bst_clipped_solve(const bst_clipped_noise *noise, double low, double high, double inner_mean,
                        double inner_variance, double *mean, double *deviation);
 

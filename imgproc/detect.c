@@ -174,8 +174,13 @@ static bool stands_out(const void *user, const bst_candidate *c) {
     const judge *g = user;
     const bst_filter *f = &g->ip->filter;
     double noise_e = bst_background_noise_at(&g->ip->background, c->x, c->y);
-    bst_tail_noise noise = {noise_e, fmax(noise_e * noise_e - g->normal_variance, 0.0),
-                            g->ip->camera.gain_e_per_dn};
+    double level_e = bst_background_level_at(&g->ip->background, c->x, c->y);
+    double variance = noise_e * noise_e, counted = fmax(variance - g->normal_variance, 0.0);
+    if (g->normal_variance < 1.0) {
+        /* steps wider than the noise of reading add none: what is counted is the level then */
+        counted = fmax(counted, fmin(level_e, variance));
+    }
+    bst_tail_noise noise = {noise_e, counted, g->ip->camera.gain_e_per_dn};
     double point = bst_filter_peak(f, g->ip->electrons, noise_e, false, c->x, c->y);
     if (exceeds(point, g, &f->point_weights, &noise)) {
         return true;
