@@ -9,7 +9,7 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes);
 
-enum { ITEMS = 64, ROOM = 1 << 16 };
+enum { ITEMS = 16, ROOM = 1 << 13 };
 
 static void read_payload(bst_link_type type, const uint8_t *data, size_t bytes, void *payload) {
     bst_ctx ctx = {0};

@@ -124,7 +124,8 @@ static void a_part_is_taken_up_by_the_next_peer(void **state) {
         assert_true(s.answered && s.given);
         bst_assert_close(s.detections.items[1].x_px, i < 3, 0.0);
     }
-    assert_int_equal(scene_count(&s, "link_left"), 1);
+    /* `end`; and when the next step found it gone before that was read */
+    assert_true(scene_count(&s, "link_left") >= 1);
     assert_int_equal(scene_count(&s, "link_hello"), 2);
     scene_close(&s);
 }
