@@ -12,6 +12,7 @@
 #include "sim/app/json_number.h"
 #include "sim/app/load.h"
 #include "sim/app/loop_model.h"
+#include "sim/app/run_link.h"
 #include "sim/app/run_pictures.h"
 #include "sim/app/run_watched.h"
 #include "sim/app/stop_signals.h"
@@ -516,6 +517,7 @@ int bst_cmd_run(int argc, char **argv) {
          .kind = BST_OPTION_FLAG,
          .target = &overwrite,
          .doc = "replace an earlier run there"},
+        BST_LINK_OPTIONS(load),
         BST_LOAD_OPTIONS(load),
         BST_DEVICE_OPTIONS(sim_options.device, threads),
         {.name = "serial",
@@ -565,6 +567,9 @@ int bst_cmd_run(int argc, char **argv) {
         bst_json_name_file(&ctx, json);
     }
     if (status == BST_OK) {
+        status = bst_run_link_open(&ctx, sim); /* before anything is written */
+    }
+    if (status == BST_OK) {
         bst_loop_warn(&ctx, &scenario);
         status = watch_sensors(&run, bst_simulation_world(sim));
     }
@@ -574,6 +579,7 @@ int bst_cmd_run(int argc, char **argv) {
     if (status != BST_OK) {
         fprintf(stderr, "boresight: %s\n", ctx.message);
     }
+    bst_run_link_end(sim, status, ctx.message);
     free_run(&run);
     bst_simulation_free(sim);
     bst_scenario_free(&scenario);

@@ -110,16 +110,26 @@ bst_status bst_link_open(bst_ctx *ctx, bst_link *link) {
     return status;
 }
 
+void bst_link_set_end(bst_link *link, int reason, const char *text) {
+    link->end.reason = reason;
+    snprintf(link->end.text, sizeof link->end.text, "%s", text);
+    for (char *c = link->end.text; *c; c++) {
+        *c = *c >= 0x20 && *c <= 0x7e ? *c : '?';
+    }
+    link->has_end = true;
+}
+
 void bst_link_close(bst_link *link, int reason, const char *text) {
     if (!link) {
         return;
     }
-    bst_link_end end = {.reason = reason};
-    snprintf(end.text, sizeof end.text, "%s", text);
+    if (!link->has_end) {
+        bst_link_set_end(link, reason, text);
+    }
     for (int p = 0; link->router && p < LINK_PEERS; p++) {
         if (link->peers[p].used && !link->peers[p].blocked) {
             bst_link_header header = {.type = BST_LINK_END, .step = -1, .slot = -1};
-            (void)bst_link_send(link, p, &header, &end, NULL, 0);
+            (void)bst_link_send(link, p, &header, &link->end, NULL, 0);
         }
     }
     if (link->router) {
@@ -177,6 +187,16 @@ bool bst_link_counter(const bst_link *link, int index, const char **name, int64_
     *name = event_names[index];
     *count = link->counts[index];
     return true;
+}
+
+int64_t bst_link_news(bst_link *link, int index, const char **name) {
+    int64_t count;
+    if (!bst_link_counter(link, index, name, &count)) {
+        return -1;
+    }
+    int64_t grown = count - link->told[index];
+    link->told[index] = count;
+    return grown;
 }
 
 void bst_link_event(bst_link *link, bst_ctx *ctx, int event, const char *format, ...) {

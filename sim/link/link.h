@@ -39,7 +39,10 @@ typedef struct bst_link_run {
 /* Checks the address; nothing is bound yet. */
 bst_status bst_link_create(bst_ctx *ctx, const bst_link_config *config, const bst_link_run *run,
                            bst_link **out) BST_MUST_CHECK;
-/* Tells the peers why (bst_link_end.reason) and lets go of everything; `link` may be NULL. */
+/* How the run has ended, for bst_link_close. */
+void bst_link_set_end(bst_link *link, int reason, const char *text);
+/* Tells the peers why (bst_link_end.reason; what bst_link_set_end has said goes before) and lets go
+ * of everything; `link` may be NULL. */
 void bst_link_close(bst_link *link, int reason, const char *text);
 
 /* Adds a part that a peer is to play; *number is what bst_link_exchange takes. Before
@@ -84,6 +87,9 @@ bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int part, int64_t tic
 
 /* What has been counted, by name ("link_bad_crc"); false after the last. */
 bool bst_link_counter(const bst_link *link, int index, const char **name, int64_t *count);
+/* What a counter has grown by since this was last asked, for those who pass counts on; -1 after the
+ * last counter. */
+int64_t bst_link_news(bst_link *link, int index, const char **name);
 /* The next line of what has happened that is worth a record ("peer x: ..."); NULL: no more. At most
  * a few dozen are kept between two calls. */
 const char *bst_link_note(bst_link *link);

@@ -84,7 +84,9 @@ struct bst_link {
     int part_count;
     bst_link_welcome *welcome; /* room for all parts */
     link_flying flying[LINK_FLYING];
-    int64_t counts[LINK_EVENTS];
+    int64_t counts[LINK_EVENTS], told[LINK_EVENTS];
+    bst_link_end end;
+    bool has_end;
     int64_t exchanges;
     int warnings;
     char notes[LINK_NOTES][LINK_NOTE_BYTES];
