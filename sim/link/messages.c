@@ -400,9 +400,10 @@ static const bst_wire_message messages[BST_LINK_TYPES] = {
                "Exposure, period, window and binning from the next exposure on."),
     [BST_LINK_CONTROL_STATUS] = RECORD("control_status", PEER, bst_control_status, control_status,
                                        "Mode and target, for the record and the summary."),
-    [BST_LINK_POINTING] =
-        ITEMS("pointing", PEER, bst_link_pointing, items, pointing, bst_los_sample, pointing_items,
-              65536, "The camera's true attitude, from a peer that moves it."),
+    [BST_LINK_POINTING] = ITEMS(
+        "pointing", PEER, bst_link_pointing, items, pointing, bst_los_sample, pointing_items, 65536,
+        "The camera's true attitude, from a peer that moves it. For programs that use the "
+        "library's link on its own: no module of a scenario takes it."),
 };
 
 const bst_wire_message *bst_wire_message_of(bst_link_type type) {
