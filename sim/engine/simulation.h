@@ -5,11 +5,13 @@
 #include "sim/engine/scenario.h"
 
 typedef struct bst_simulation bst_simulation;
+struct bst_device;
 
 typedef struct bst_simulation_options {
-    const char *device; /* selector as in bst_device_open; NULL: default */
-    int threads;        /* 0: all */
-    bool overlap;       /* as bst_engine_overlap: hooks are called by a second thread */
+    const char *device;        /* selector as in bst_device_open; NULL: default */
+    int threads;               /* 0: all */
+    bool overlap;              /* as bst_engine_overlap: hooks are called by a second thread */
+    struct bst_device *opened; /* used instead of opening one, and not closed; NULL: none */
     /* NULL, or the one module ("observer/sensor/module") that steps; in place of all others the
      * module `source`, called "observer/sensor/source", writes its inputs, which are seen at once
      */
@@ -30,7 +32,6 @@ bst_engine *bst_simulation_engine(bst_simulation *simulation);
 const struct bst_world *bst_simulation_world(const bst_simulation *simulation);
 /* NULL when no module is of type "external". */
 struct bst_link *bst_simulation_link(bst_simulation *simulation);
-struct bst_device;
 /* NULL when no module needed a device. */
 const struct bst_device *bst_simulation_device(const bst_simulation *simulation);
 

@@ -11,6 +11,7 @@ set(may_sim/link sim/link sim/world sim/astro sim/core)
 foreach(folder sim/engine sim/eval sim/studies ${subsystems})
   set(may_${folder} ${folder} ${low})
 endforeach()
+list(APPEND may_sim/studies sim/eval) # intervals and theory
 set(may_sim/app ${all_folders})
 set(wrong "")
 set(count 0)
