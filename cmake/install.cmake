@@ -9,7 +9,7 @@ include(CMakePackageConfigHelpers)
 # Sanitized and fuzzed builds are for this tree's own tests and have none.
 if(NOT BORESIGHT_SANITIZE AND NOT BORESIGHT_FUZZ)
   set(BST_VISIBLE ${PROJECT_SOURCE_DIR}/cmake/libboresight.map)
-  set(parts bst_core bst_astro bst_device bst_world bst_io bst_engine bst_eval bst_scenegen
+  set(parts bst_core bst_astro bst_device bst_world bst_io bst_link bst_engine bst_eval bst_scenegen
     bst_gimbal bst_imgproc bst_tracker bst_control bst_obsgen bst_registry)
   # all objects of each part, not only what others call; the archives then add nothing but what the
   # parts themselves link
@@ -87,6 +87,8 @@ endif()
 
 install(TARGETS boresight)
 install(DIRECTORY scenarios DESTINATION ${CMAKE_INSTALL_DATADIR}/boresight)
+install(DIRECTORY python DESTINATION ${CMAKE_INSTALL_DATADIR}/boresight
+  FILES_MATCHING PATTERN "*.py")
 install(FILES LICENSE README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR}
   FILES_MATCHING PATTERN "*.md" PATTERN "*.png" PATTERN "*.c" PATTERN "CMakeLists.txt")

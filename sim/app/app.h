@@ -22,6 +22,8 @@ int bst_cmd_orbit(int argc, char **argv);
 int bst_cmd_check(int argc, char **argv);
 int bst_cmd_loop(int argc, char **argv);
 int bst_cmd_schema(int argc, char **argv);
+int bst_cmd_serve(int argc, char **argv);
+int bst_cmd_icd(int argc, char **argv);
 int bst_cmd_stars(int argc, char **argv);
 int bst_cmd_propagate(int argc, char **argv);
 int bst_cmd_calframes(int argc, char **argv);

@@ -108,6 +108,11 @@ bst_status bst_bench_open_loop(bst_ctx *ctx, const bst_bench *self,
                                const bst_bench_options *options,
                                bst_bench_result *out) BST_MUST_CHECK;
 
+/* Round trips of a frame of 2048 x 2048 pixels to a peer in a process of its own, which looks at
+ * every pixel and answers with a pointing, over what self->name says (bench_link.c). */
+bst_status bst_bench_link(bst_ctx *ctx, const bst_bench *self, const bst_bench_options *options,
+                          bst_bench_result *out) BST_MUST_CHECK;
+
 /* Times of repeated calls. */
 enum { BST_BENCH_TIMES = 4096 };
 typedef struct bst_bench_clock {

@@ -4,6 +4,7 @@
 #include "sim/app/app.h"
 #include "sim/app/load.h"
 #include "sim/app/loop_model.h"
+#include "sim/app/run_link.h"
 #include "sim/app/run_scenario.h"
 #include "sim/app/stop_signals.h"
 
@@ -40,6 +41,7 @@ int bst_cmd_run(int argc, char **argv) {
          .kind = BST_OPTION_FLAG,
          .target = &overwrite,
          .doc = "replace an earlier run there"},
+        BST_LINK_OPTIONS(load),
         BST_LOAD_OPTIONS(load),
         BST_DEVICE_OPTIONS(sim_options.device, threads),
         {.name = "serial",
@@ -89,12 +91,16 @@ int bst_cmd_run(int argc, char **argv) {
         bst_json_name_file(&ctx, json);
     }
     if (status == BST_OK) {
+        status = bst_run_link_open(&ctx, sim); /* before anything is written */
+    }
+    if (status == BST_OK) {
         bst_loop_warn(&ctx, &scenario);
         status = bst_run_scenario(&ctx, &scenario, sim, &request, NULL);
     }
     if (status != BST_OK) {
         fprintf(stderr, "boresight: %s\n", ctx.message);
     }
+    bst_run_link_end(sim, status, ctx.message);
     bst_simulation_free(sim);
     bst_scenario_free(&scenario);
     bst_json_free(json);

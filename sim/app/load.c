@@ -1,14 +1,83 @@
 #include "sim/app/load.h"
 
 #include <stdio.h>
+#include <string.h>
+
+#include <cjson/cJSON.h>
 
 #include "sim/app/app.h"
 #include "sim/app/plugins.h"
+#include "sim/link/external.h"
+
+/* Makes a module external: its type changes, and of its other keys those stay that all modules have
+ * or that tell how frames are commanded. */
+static void make_external(cJSON *module) {
+    static const char *const kept[] = {"rate_hz",    "offset_s", "delay_s",
+                                       "exposure_s", "period_s", "description"};
+    bool control = strcmp(module->string, "control") == 0;
+    for (cJSON *item = module->child, *next; item; item = next) {
+        bool keep = false;
+        next = item->next;
+        for (size_t i = 0; i < sizeof kept / sizeof *kept; i++) {
+            keep |= strcmp(item->string, kept[i]) == 0 && (control || i < 3 || i == 5);
+        }
+        if (!keep) {
+            cJSON_Delete(cJSON_DetachItemViaPointer(module, item));
+        }
+    }
+    cJSON_AddStringToObject(module, "type", "external");
+}
+
+/* `names`: "imgproc,control" of all sensors, or "observer/sensor/imgproc". */
+static bst_status apply_external(bst_ctx *ctx, const char *names, bst_json *json) {
+    while (*names) {
+        int length = (int)strcspn(names, ","), found = 0;
+        const cJSON *observer, *sensor;
+        cJSON *module;
+        cJSON_ArrayForEach(observer,
+                           cJSON_GetObjectItemCaseSensitive(bst_json_root(json), "observers")) {
+            cJSON_ArrayForEach(sensor, cJSON_GetObjectItemCaseSensitive(observer, "sensors")) {
+                const char *o = cJSON_GetStringValue(
+                               cJSON_GetObjectItemCaseSensitive(observer, "name")),
+                           *s = cJSON_GetStringValue(
+                               cJSON_GetObjectItemCaseSensitive(sensor, "name"));
+                cJSON_ArrayForEach(module, cJSON_GetObjectItemCaseSensitive(sensor, "modules")) {
+                    char full[300];
+                    snprintf(full, sizeof full, "%.100s/%.100s/%.64s", o ? o : "", s ? s : "",
+                             module->string);
+                    bool named =
+                        ((int)strlen(full) == length && !strncmp(full, names, (size_t)length)) ||
+                        ((int)strlen(module->string) == length &&
+                         !strncmp(module->string, names, (size_t)length));
+                    if (named && cJSON_IsObject(module) && bst_external_role(module->string)) {
+                        make_external(module);
+                        found++;
+                    }
+                }
+            }
+        }
+        if (!found) {
+            return bst_fail(ctx, BST_ERR_ARGUMENT,
+                            "--external: the scenario has no module \"%.*s\" that can be outside "
+                            "(allowed: imgproc, tracker, control, or OBSERVER/SENSOR/MODULE)",
+                            length, names);
+        }
+        names += length + (names[length] == ',');
+    }
+    return BST_OK;
+}
 
 static bst_status apply(bst_ctx *ctx, const bst_load_options *options, bst_json *json) {
     char text[128];
     for (int i = 0; i < options->set.count; i++) {
         BST_TRY(bst_json_set(ctx, json, options->set.items[i]));
+    }
+    if (options->external) {
+        BST_TRY(apply_external(ctx, options->external, json));
+    }
+    if (options->link) {
+        snprintf(text, sizeof text, "/link/address=\"%.100s\"", options->link);
+        BST_TRY(bst_json_set(ctx, json, text));
     }
     if (options->seed) {
         snprintf(text, sizeof text, "/seed=\"%.40s\"", options->seed);

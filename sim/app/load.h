@@ -9,9 +9,23 @@
 typedef struct bst_load_options {
     bst_option_list set;
     const char *seed;
-    double duration_s; /* < 0: as the scenario says */
-    int64_t run;       /* < 0: as the scenario says */
+    double duration_s;    /* < 0: as the scenario says */
+    int64_t run;          /* < 0: as the scenario says */
+    const char *link;     /* address of the link; NULL: as the scenario says */
+    const char *external; /* modules that become "external", with commas between; NULL: none */
 } bst_load_options;
+
+/* The same of those runs that can have modules outside. */
+#define BST_LINK_OPTIONS(load)                                                                \
+    {.name = "link",                                                                          \
+     .kind = BST_OPTION_TEXT,                                                                 \
+     .target = &(load).link,                                                                  \
+     .argument = "ADDRESS",                                                                   \
+     .doc = "where peers connect that play modules: tcp://127.0.0.1:PORT or ipc://PATH"},     \
+    {                                                                                         \
+        .name = "external", .kind = BST_OPTION_TEXT, .target = &(load).external,              \
+        .argument = "MODULE,...", .doc = "modules that peers play: imgproc, tracker, control" \
+    }
 
 /* Entries of an options table that fill a bst_load_options named `load`. */
 #define BST_LOAD_OPTIONS(load)                                                                 \

@@ -20,6 +20,8 @@ static const command commands[] = {
     {"check", bst_cmd_check, "validate a scenario and print it with every default written out"},
     {"loop", bst_cmd_loop, "margins and predicted pointing of a scenario's control loops"},
     {"schema", bst_cmd_schema, "print the JSON Schema of scenarios"},
+    {"serve", bst_cmd_serve, "play a module of a scenario over the link"},
+    {"icd", bst_cmd_icd, "print the interface control document of the link"},
     {"stars", bst_cmd_stars, "get, import or describe the star catalogue"},
     {"propagate", bst_cmd_propagate, "positions and velocities from two-line element sets"},
     {"calframes", bst_cmd_calframes, "bias, dark and flat frames of a scenario's sensors"},

@@ -5,6 +5,7 @@
 #include "imgproc/imgproc.h"
 #include "obsgen/obsgen.h"
 #include "scenegen/module.h"
+#include "sim/link/external.h"
 #include "tracker/module.h"
 
 static const bst_module_desc *const modules[] = {
@@ -20,6 +21,9 @@ static const bst_module_desc *const modules[] = {
     &bst_tracker_ukf_module,
     &bst_tracker_imm_module,
     &bst_obsgen_module,
+    &bst_external_imgproc_module,
+    &bst_external_tracker_module,
+    &bst_external_control_module,
 };
 
 static const bst_registry registry = {modules, sizeof modules / sizeof *modules};

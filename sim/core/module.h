@@ -11,6 +11,7 @@
 struct bst_world;     /* sim/world: what is true */
 struct bst_knowledge; /* sim/world: what the onboard side knows */
 struct bst_device;    /* sim/device */
+struct bst_link;      /* sim/link */
 struct bst_step;      /* sim/engine; reached through the functions below */
 
 typedef enum bst_port_direction {
@@ -37,9 +38,10 @@ typedef struct bst_port {
 enum {
     BST_MODULE_READS_TRUTH = 1u << 0, /* gets env->world; onboard modules do not */
     BST_MODULE_NEEDS_DEVICE = 1u << 1,
-    BST_MODULE_APART = 1u << 2, /* may step in another thread than modules that do not read it:
-                                   shares with them only what is constant or locked, has no period
-                                   and never asks to be woken */
+    BST_MODULE_APART = 1u << 2,      /* may step in another thread than modules that do not read it:
+                                        shares with them only what is constant or locked, has no period
+                                        and never asks to be woken */
+    BST_MODULE_NEEDS_LINK = 1u << 3, /* gets env->link: another program plays it */
 };
 
 /* What create gets. Pointers outlive the module. */
@@ -63,6 +65,7 @@ typedef struct bst_module_env {
     double frame_exposure_s, frame_period_s; /* of this sensor's frames, as set and commanded */
     double frame_latency_s; /* from an exposure's end until control has what it showed: the declared
                                delays in between */
+    struct bst_link *link;  /* NULL unless the descriptor asks for it */
 } bst_module_env;
 
 typedef struct bst_module_desc {

@@ -130,6 +130,7 @@ bst_status bst_engine_load(bst_ctx *ctx, bst_engine *engine) {
                               .world = flags & BST_MODULE_READS_TRUTH ? spec->world : NULL,
                               .knowledge = spec->knowledge,
                               .device = flags & BST_MODULE_NEEDS_DEVICE ? spec->device : NULL,
+                              .link = flags & BST_MODULE_NEEDS_LINK ? spec->link : NULL,
                               .observer = spec->observer,
                               .sensor = spec->sensor,
                               .exposure_s = spec->exposure_s,
@@ -261,6 +262,25 @@ bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) 
         }
     }
     return status;
+}
+
+bst_status bst_engine_advance(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) {
+    if (!engine->loaded || engine->overlap) {
+        return bst_fail(ctx, BST_ERR_STATE, "an engine advances once loaded, and not overlapping");
+    }
+    return run_until(ctx, engine, until_tick);
+}
+
+bst_status bst_engine_wake(bst_ctx *ctx, bst_engine *engine, const char *name, int64_t tick) {
+    for (int i = 0; engine->loaded && i < engine->instance_count; i++) {
+        instance *self = engine->instances[i];
+        if (strcmp(self->name, name) == 0) {
+            self->wake = tick < self->wake ? tick : self->wake;
+            bst_engine_set_due(engine, i, bst_engine_earliest(engine, self));
+            return BST_OK;
+        }
+    }
+    return bst_fail(ctx, BST_ERR_NOT_FOUND, "no module is called %s", name);
 }
 
 int64_t bst_engine_tick(const bst_engine *engine) {

@@ -28,6 +28,7 @@ typedef struct bst_instance_spec {
     const struct bst_world *world;
     const struct bst_knowledge *knowledge;
     struct bst_device *device;
+    struct bst_link *link;
     int observer, sensor;
     double exposure_s; /* the longest of the sensor that the scenario sets */
     double frame_exposure_s, frame_period_s, frame_latency_s;
@@ -82,6 +83,13 @@ bst_status bst_engine_overlap(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
 
 /* Steps everything that is due before `until_tick` (exclusive). All of it is done on return. */
 bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) BST_MUST_CHECK;
+
+/* The same, when more is to come: what modules do at the end of a run is left to bst_engine_run. */
+bst_status bst_engine_advance(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) BST_MUST_CHECK;
+/* Has an instance (by its name) step at a tick besides those of its own; between two calls of
+ * bst_engine_advance. BST_ERR_NOT_FOUND. */
+bst_status bst_engine_wake(bst_ctx *ctx, bst_engine *engine, const char *instance,
+                           int64_t tick) BST_MUST_CHECK;
 
 /* Tick of the last step, -1 before the first. */
 int64_t bst_engine_tick(const bst_engine *engine);

@@ -44,6 +44,8 @@ const bst_config_desc bst_scenario_table[] = {
              "The spacecraft that look."),
     BST_OBJECT(bst_scenario, record, bst_record_config_table, "{}",
                "What is written to the run's folder."),
+    BST_OBJECT(bst_scenario, link, bst_link_config_table, "{}",
+               "Where other programs connect that play modules of type \"external\"."),
     BST_CONFIG_END,
 };
 

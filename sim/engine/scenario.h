@@ -4,6 +4,7 @@
 
 #include "sim/engine/engine.h"
 #include "sim/engine/recorder.h"
+#include "sim/link/link.h"
 #include "sim/world/world_config.h"
 
 /* All modules that a scenario may name; the list is the program's (or a test's). */
@@ -37,6 +38,7 @@ typedef struct bst_scenario {
     bst_world_config world;
     bst_config_list observers; /* bst_observer_config */
     bst_record_config record;
+    bst_link_config link;
     /* filled by bst_scenario_read, not by the table */
     char file[512];     /* for messages */
     char base_dir[512]; /* folder that relative paths start from */

@@ -20,6 +20,9 @@ struct bst_simulation {
     bst_knowledge **knowledge; /* [sensors of all observers] */
     int knowledge_count;
     bst_engine *engine;
+    bst_link *link;
+    bst_module_desc only; /* options->only without what holds its inputs back */
+    bst_port only_ports[BST_MAX_DELAYS];
 };
 
 static bst_status make_knowledge(bst_ctx *ctx, const bst_scenario *scenario, bst_simulation *sim) {
@@ -103,6 +106,7 @@ static bst_instance_spec sensor_spec(const bst_scenario *scenario, const bst_sim
                                .world = sim->world,
                                .knowledge = sim->knowledge[index],
                                .device = sim->device,
+                               .link = sim->link,
                                .observer = observer,
                                .sensor = sensor,
                                .exposure_s = longest_exposure_s(scenario, observer, sensor),
@@ -115,7 +119,39 @@ static bst_instance_spec sensor_spec(const bst_scenario *scenario, const bst_sim
                                .run = (uint64_t)scenario->run};
 }
 
-static bst_status add_modules(bst_ctx *ctx, const bst_scenario *scenario, bst_simulation *sim) {
+/* The module that options->only names, if this is it, and who writes its inputs. */
+static bst_status add_only(bst_ctx *ctx, const bst_simulation_options *options, const char *scope,
+                           const bst_module_config *module, bst_instance_spec *spec,
+                           bst_simulation *sim) {
+    char source[256];
+    if (strcmp(spec->instance, options->only) != 0) {
+        return BST_OK;
+    }
+    sim->only = *module->desc;
+    if (sim->only.port_count > BST_MAX_DELAYS) {
+        return bst_fail(ctx, BST_ERR_CONFIG, "%s has %d ports (allowed: %d)", options->only,
+                        sim->only.port_count, BST_MAX_DELAYS);
+    }
+    for (int p = 0; p < sim->only.port_count; p++) {
+        sim->only_ports[p] = sim->only.ports[p];
+        sim->only_ports[p].flags &= ~(unsigned)BST_PORT_FEEDBACK;
+    }
+    sim->only.ports = sim->only_ports;
+    spec->desc = &sim->only;
+    spec->delay_count = 0;
+    BST_TRY(bst_engine_add(ctx, sim->engine, spec));
+    bst_instance_spec writer = {.desc = options->source,
+                                .scope = scope,
+                                .config = options->source_config,
+                                .observer = spec->observer,
+                                .sensor = spec->sensor};
+    snprintf(source, sizeof source, "%s/source", scope);
+    writer.instance = source;
+    return bst_engine_add(ctx, sim->engine, &writer);
+}
+
+static bst_status add_modules(bst_ctx *ctx, const bst_scenario *scenario,
+                              const bst_simulation_options *options, bst_simulation *sim) {
     const bst_observer_config *observers = scenario->observers.items;
     for (int i = 0; i < scenario->observers.count; i++) {
         const bst_sensor_config *sensors = observers[i].sensors.items;
@@ -128,7 +164,9 @@ static bst_status add_modules(bst_ctx *ctx, const bst_scenario *scenario, bst_si
             spec.desc = &bst_exposure_clock_module;
             los_ticks(scenario, &spec);
             spec.config = &sensors[s].exposure;
-            BST_TRY(bst_engine_add(ctx, sim->engine, &spec));
+            if (!options->only) {
+                BST_TRY(bst_engine_add(ctx, sim->engine, &spec));
+            }
             for (int m = 0; m < scenario->module_count; m++) {
                 const bst_module_config *module = &scenario->modules[m];
                 if (module->observer != i || module->sensor != s || module->off) {
@@ -144,7 +182,8 @@ static bst_status add_modules(bst_ctx *ctx, const bst_scenario *scenario, bst_si
                 for (int d = 0; d < module->delay_count; d++) {
                     spec.delays[d] = module->delays[d];
                 }
-                BST_TRY(bst_engine_add(ctx, sim->engine, &spec));
+                BST_TRY(options->only ? add_only(ctx, options, scope, module, &spec, sim)
+                                      : bst_engine_add(ctx, sim->engine, &spec));
             }
         }
     }
@@ -197,6 +236,38 @@ static void warn_of_misfits(bst_ctx *ctx, const bst_scenario *scenario) {
     }
 }
 
+/* The link, where a module needs it. */
+static bst_status make_link(bst_ctx *ctx, const bst_scenario *scenario,
+                            const bst_simulation_options *options, bst_simulation *sim) {
+    bool needed = false;
+    for (int m = 0; m < scenario->module_count && !options->only; m++) {
+        const bst_module_config *module = &scenario->modules[m];
+        needed |= !module->off && (module->desc->flags & BST_MODULE_NEEDS_LINK);
+    }
+    if (!needed) {
+        return BST_OK;
+    }
+    if (!*scenario->link.address) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "/link/address: a module is of type \"external\" and there is no address "
+                        "where its peer could connect (allowed: tcp://127.0.0.1:PORT, ipc://PATH)");
+    }
+    bst_link_run run = {.scenario = scenario->name,
+                        .epoch = scenario->epoch,
+                        .tick_rate_hz = scenario->tick_rate_hz,
+                        .duration_ticks = scenario->duration_ticks};
+    const bst_observer_config *observers = scenario->observers.items;
+    for (int i = 0; i < scenario->observers.count; i++) {
+        const bst_sensor_config *sensors = observers[i].sensors.items;
+        for (int s = 0; s < observers[i].sensors.count; s++) {
+            size_t bytes = sizeof(uint16_t) * (size_t)sensors[s].camera.width_px *
+                           (size_t)sensors[s].camera.height_px;
+            run.pixel_bytes = bytes > run.pixel_bytes ? bytes : run.pixel_bytes;
+        }
+    }
+    return bst_link_create(ctx, &scenario->link, &run, &sim->link);
+}
+
 static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
                         const bst_simulation_options *options, bst_simulation *sim) {
     BST_TRY(bst_world_create(ctx, scenario->file, &scenario->world, &scenario->observers,
@@ -206,7 +277,7 @@ static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
     BST_TRY(bst_world_prepare(ctx, sim->world, options->threads));
     BST_TRY(make_knowledge(ctx, scenario, sim));
     for (int m = 0; m < scenario->module_count && !sim->device; m++) {
-        if (scenario->modules[m].off ||
+        if (scenario->modules[m].off || options->only ||
             !(scenario->modules[m].desc->flags & BST_MODULE_NEEDS_DEVICE)) {
             continue;
         }
@@ -220,7 +291,13 @@ static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
         }
     }
     BST_TRY(bst_engine_create(ctx, scenario->tick_rate_hz, &sim->engine));
-    bst_status status = add_modules(ctx, scenario, sim);
+    bst_status status = make_link(ctx, scenario, options, sim);
+    if (status == BST_OK) {
+        status = add_modules(ctx, scenario, options, sim);
+    }
+    if (status == BST_OK && options->only && !sim->only.create) {
+        status = bst_fail(ctx, BST_ERR_NOT_FOUND, "there is no module %s", options->only);
+    }
     if (status == BST_OK) {
         status = bst_engine_load(ctx, sim->engine);
     }
@@ -253,6 +330,7 @@ void bst_simulation_free(bst_simulation *sim) {
     if (!sim) {
         return;
     }
+    bst_link_close(sim->link, 2, "the simulation has ended"); /* frames that it holds come back */
     bst_engine_free(sim->engine);
     for (int i = 0; i < sim->knowledge_count; i++) {
         bst_knowledge_free(sim->knowledge[i]);
@@ -267,6 +345,9 @@ void bst_simulation_free(bst_simulation *sim) {
 
 bst_engine *bst_simulation_engine(bst_simulation *sim) {
     return sim->engine;
+}
+struct bst_link *bst_simulation_link(bst_simulation *sim) {
+    return sim ? sim->link : NULL;
 }
 const struct bst_world *bst_simulation_world(const bst_simulation *sim) {
     return sim->world;

@@ -12,6 +12,12 @@ typedef struct bst_simulation_options {
     int threads;               /* 0: all */
     bool overlap;              /* as bst_engine_overlap: hooks are called by a second thread */
     struct bst_device *opened; /* used instead of opening one, and not closed; NULL: none */
+    /* NULL, or the one module ("observer/sensor/module") that steps; in place of all others the
+     * module `source`, called "observer/sensor/source", writes its inputs, which are seen at once
+     */
+    const char *only;
+    const bst_module_desc *source;
+    const void *source_config;
 } bst_simulation_options;
 
 /* Opens what the scenario names (catalogue, orbits, the OpenCL device if a module needs one), makes
@@ -24,6 +30,8 @@ void bst_simulation_free(bst_simulation *simulation);
 
 bst_engine *bst_simulation_engine(bst_simulation *simulation);
 const struct bst_world *bst_simulation_world(const bst_simulation *simulation);
+/* NULL when no module is of type "external". */
+struct bst_link *bst_simulation_link(bst_simulation *simulation);
 /* NULL when no module needed a device. */
 const struct bst_device *bst_simulation_device(const bst_simulation *simulation);
 

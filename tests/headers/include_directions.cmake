@@ -1,12 +1,13 @@
-# Includes point one way: app -> studies, eval, engine, subsystems -> io, world, device, astro ->
+# Includes point one way: app -> studies, eval, engine, subsystems -> link, io, world, device, astro ->
 # core. A subsystem never includes another one, nor one of these three the other two.
 include(${CMAKE_CURRENT_LIST_DIR}/folders.cmake)
-set(low sim/io sim/world sim/device sim/astro sim/core)
+set(low sim/link sim/io sim/world sim/device sim/astro sim/core)
 set(may_sim/core sim/core)
 set(may_sim/astro sim/astro sim/core)
 set(may_sim/device sim/device sim/core)
 set(may_sim/world sim/world sim/astro sim/core)
 set(may_sim/io sim/io sim/world sim/astro sim/core)
+set(may_sim/link sim/link sim/world sim/astro sim/core)
 foreach(folder sim/engine sim/eval sim/studies ${subsystems})
   set(may_${folder} ${folder} ${low})
 endforeach()

@@ -1,0 +1,110 @@
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "sim/app/app.h"
+#include "sim/app/link_host.h"
+#include "sim/app/load.h"
+#include "sim/app/stop_signals.h"
+
+static const char help_text[] =
+    "usage: boresight serve SCENARIO.json --part MODULE --link ADDRESS [options]\n"
+    "\n"
+    "Plays one module of a scenario (image processing, tracker or control; plug-ins too) for a run "
+    "elsewhere\n"
+    "that has it outside, and ends with that run. Both are given the same scenario; the results "
+    "are those of a\n"
+    "run that has the module inside.\n"
+    "\n"
+    "  boresight run scenarios/neossat_geo_track.json --link tcp://127.0.0.1:5555 --external "
+    "control &\n"
+    "  boresight serve scenarios/neossat_geo_track.json --link tcp://127.0.0.1:5555 --part "
+    "control\n"
+    "\n"
+    "options:\n";
+
+static int serve(bst_ctx *ctx, const char *file, const bst_load_options *load, const char *part,
+                 const char *address, bool shared, int threads, double timeout_s) {
+    bst_json *json = NULL;
+    bst_scenario scenario;
+    if (bst_load_scenario(ctx, file, load, &json, &scenario) != BST_OK) {
+        fprintf(stderr, "boresight: %s\n", ctx->message);
+        return BST_EXIT_FAILED;
+    }
+    bst_stop_catch_signals();
+    bst_link_host *host = NULL;
+    int reason = 0;
+    bst_status status = bst_link_host_create(ctx, &scenario, part, threads, &host);
+    if (status == BST_OK) {
+        status =
+            bst_link_host_play(ctx, host, address, shared, timeout_s, bst_stop_requested, &reason);
+    }
+    if (status != BST_OK) {
+        fprintf(stderr, "boresight: %s\n", ctx->message);
+    }
+    bst_link_host_free(host);
+    bst_scenario_free(&scenario);
+    bst_json_free(json);
+    return status == BST_ERR_INTERRUPTED     ? BST_EXIT_INTERRUPTED
+           : status != BST_OK || reason == 2 ? BST_EXIT_FAILED
+                                             : BST_EXIT_OK;
+}
+
+int bst_cmd_serve(int argc, char **argv) {
+    bool help = false, shared = false;
+    const char *part = NULL, *address = NULL;
+    int64_t threads = 0;
+    double timeout_s = 60.0;
+    bst_load_options load = BST_LOAD_DEFAULTS;
+    const bst_option table[] = {
+        {.name = "link",
+         .kind = BST_OPTION_TEXT,
+         .target = &address,
+         .argument = "ADDRESS",
+         .doc = "where the run is: tcp://127.0.0.1:PORT or ipc://PATH"},
+        {.name = "part",
+         .kind = BST_OPTION_TEXT,
+         .target = &part,
+         .argument = "MODULE",
+         .doc = "imgproc, tracker, control, or OBSERVER/SENSOR/MODULE"},
+        {.name = "shared-memory",
+         .kind = BST_OPTION_FLAG,
+         .target = &shared,
+         .doc = "take frames by shared memory where the run offers it"},
+        {.name = "timeout",
+         .kind = BST_OPTION_REAL,
+         .target = &timeout_s,
+         .argument = "S",
+         .doc = "end when nothing has come for so long (default 60)",
+         .minimum = 0.1,
+         .maximum = 1e6},
+        BST_LOAD_OPTIONS(load),
+        {.name = "threads",
+         .kind = BST_OPTION_INT,
+         .target = &threads,
+         .argument = "N",
+         .doc = "threads (default: one per processor)",
+         .minimum = 0,
+         .maximum = 1024},
+        {.name = "help", .kind = BST_OPTION_FLAG, .target = &help, .doc = "print this"},
+        {.name = NULL},
+    };
+    bst_ctx ctx;
+    bst_ctx_init(&ctx, bst_app_log, NULL, BST_LOG_INFO);
+    int arguments = 0;
+    if (bst_options_parse(&ctx, table, argc, argv, &arguments) != BST_OK) {
+        return bst_options_misuse(&ctx, "serve");
+    }
+    if (help) {
+        fputs(help_text, stdout);
+        bst_options_print(stdout, table);
+        return BST_EXIT_OK;
+    }
+    if (arguments != 1 || !part || !address) {
+        bst_fail(&ctx, BST_ERR_ARGUMENT, "one scenario file, --part and --link are expected");
+        return bst_options_misuse(&ctx, "serve");
+    }
+    if (bst_load_check(&ctx, &load) != BST_OK) {
+        return bst_options_misuse(&ctx, "serve");
+    }
+    return serve(&ctx, argv[1], &load, part, address, shared, (int)threads, timeout_s);
+}

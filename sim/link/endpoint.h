@@ -1,0 +1,15 @@
+/* Addresses of the link: this machine only. */
+#ifndef BST_LINK_ENDPOINT_H
+#define BST_LINK_ENDPOINT_H
+
+#include "sim/core/status.h"
+
+enum { BST_LINK_ENDPOINT_BYTES = 128 };
+
+/* Checks "tcp://127.0.0.1:PORT" (also [::1] and localhost, which becomes 127.0.0.1) or
+ * "ipc://PATH" and writes it as ZeroMQ takes it. BST_ERR_ARGUMENT, with the tunnel to use instead,
+ * for an address that other machines could reach. */
+bst_status bst_link_endpoint_check(bst_ctx *ctx, const char *endpoint,
+                                   char out[BST_LINK_ENDPOINT_BYTES]) BST_MUST_CHECK;
+
+#endif

@@ -1,0 +1,287 @@
+#include "sim/link/icd.h"
+
+#include <string.h>
+
+#include "sim/link/crc32c.h"
+#include "sim/link/packet.h"
+#include "sim/link/payloads.h"
+#include "sim/link/shared_frames.h"
+
+static const char opening[] =
+    "# Interface control document of the link\n"
+    "\n"
+    "This page is made by `boresight icd` from the tables with which the program encodes, decodes "
+    "and checks;\n"
+    "a test keeps it current. How to use the link, with examples: [link.md](link.md).\n"
+    "\n"
+    "## Transport\n"
+    "\n"
+    "- ZeroMQ 4 over `tcp://127.0.0.1:PORT` (any loopback address, `[::1]` too) or `ipc://PATH`. "
+    "The simulation binds\n"
+    "  a ROUTER socket; a peer connects a DEALER socket, in any order and as often as it likes.\n"
+    "- A message is a multipart message of two parts: header, payload; `frame` has a third one, "
+    "the pixels, unless\n"
+    "  they lie in shared memory. A peer never sends more than 16 MiB in a part: it would be "
+    "disconnected.\n"
+    "- All numbers are little-endian. Floats are IEEE 754 binary64.\n"
+    "\n"
+    "## Header\n"
+    "\n"
+    "One flat JSON object in printable ASCII without escapes, of at most 1024 bytes, no member "
+    "twice, members in any order but the\n"
+    "last. Integers have at most 15 digits, no fraction, no exponent. Unknown members are passed "
+    "over.\n"
+    "\n"
+    "| member | required | value |\n"
+    "|---|---|---|\n"
+    "| `version` | yes | version of this protocol: 1 |\n"
+    "| `type` | yes | one of the messages below |\n"
+    "| `tick` | yes | tick of the simulation to which the message belongs (when it was written) |\n"
+    "| `utc` | no | the same instant, for readers |\n"
+    "| `sequence` | yes | 0, 1, 2, ... per sender and connection; a peer may go on counting after "
+    "`hello`; whatever becomes of a message, its number is used up |\n"
+    "| `step` | in a step | number of the step of this part; an answer repeats it |\n"
+    "| `instance` | in a step | the part, `observer/sensor/module`; an answer repeats it |\n"
+    "| `lengths` | yes | bytes of the payload; in `frame` then of the pixels |\n"
+    "| `crcs` | yes | CRC-32C of each of these parts that is in the message, 8 hexadecimal digits "
+    "in lower case |\n"
+    "| `slot` | no | number of the frame in shared memory (below); then there is no third part |\n"
+    "| `crc32c` | yes, last | CRC-32C of all bytes of the header before `\"crc32c\":` |\n"
+    "\n"
+    "CRC-32C is that of RFC 3720 (polynomial 0x1EDC6F41 reflected, initial value and final "
+    "complement 0xFFFFFFFF): the nine\n"
+    "bytes `123456789` give e3069283.\n"
+    "\n"
+    "## Conversation\n"
+    "\n"
+    "1. The peer sends `hello` with the parts that it plays. The simulation answers with "
+    "`welcome`. A second `hello` for a\n"
+    "   part takes it over.\n"
+    "2. For each step of a part the simulation sends its inputs that are new, then `step`, all "
+    "with the same `step` and\n"
+    "   `instance`. It waits.\n"
+    "3. The peer sends its outputs, at most one of each type, then `done` with their number. "
+    "Simulated time goes on.\n"
+    "4. At the end the simulation sends `end`. A peer that leaves sends `end`.\n"
+    "\n"
+    "| role | inputs | outputs |\n"
+    "|---|---|---|\n"
+    "| `imgproc` | `frame`, `predictions`, `pointing_telemetry`, `nav_telemetry`, `truth` on "
+    "request | `detections` |\n"
+    "| `tracker` | `detections`, `pointing_telemetry`, `nav_telemetry` | `tracks`, `predictions` "
+    "|\n"
+    "| `control` | `tracks`, `pointing_telemetry`, `nav_telemetry`, `mount_status` | "
+    "`los_command`, `sensor_command`, `control_status` |\n"
+    "\n"
+    "When a connection breaks, ZeroMQ makes it anew. The simulation answers whatever comes over it "
+    "with `error` and the\n"
+    "word `stranger`; the peer says `hello` again, and the step under way is sent again (`step` "
+    "tells the attempt).\n"
+    "\n"
+    "## What is wrong, and the answer\n"
+    "\n"
+    "Each has a counter in the run's `manifest.json`. The first twenty are in the log, more in the "
+    "table `events`. The\n"
+    "sender gets `error` with the word (without `link_`), at most 32 in a step.\n"
+    "\n"
+    "| counter | what came | what happens |\n"
+    "|---|---|---|\n"
+    "| `link_bad_header` | no header as above | not taken |\n"
+    "| `link_bad_version` | another `version` | not taken |\n"
+    "| `link_bad_length` | parts or bytes other than the header or the table says | not taken |\n"
+    "| `link_bad_crc` | a checksum that does not fit | not taken |\n"
+    "| `link_bad_value` | a number outside its table: NaN, no unit quaternion, out of range | not "
+    "taken |\n"
+    "| `link_unexpected` | an unknown type, or one that this role does not send | not taken |\n"
+    "| `link_duplicate` | the sequence of the message before | not taken |\n"
+    "| `link_out_of_order` | an earlier sequence | not taken |\n"
+    "| `link_gap` | a later sequence than the next one | taken |\n"
+    "| `link_late` | for another step than the one under way | not taken |\n"
+    "| `link_repeated` | a second output of a type in a step | not taken: the first one holds |\n"
+    "| `link_incomplete` | `done` with another number of outputs than were taken | not taken: the "
+    "step goes on |\n"
+    "| `link_items_dropped` | more items than there is room for | the first ones are taken |\n"
+    "| `link_stranger` | a message without `hello`, or of a peer that plays nothing now | not "
+    "taken "
+    "|\n"
+    "| `link_refused` | `hello` for no part that there is, or a 17th peer | it plays nothing |\n"
+    "| `link_flooded` | more than 10000 messages in a step | their sender is not heard any more on "
+    "this connection |\n"
+    "| `link_takeover` | `hello` for a part that another peer plays | the new one plays it |\n"
+    "| `link_left` | `end`, or a connection that is gone | the part waits for a `hello` |\n"
+    "| `link_unanswered` | nothing right within `timeout_s` | `on_silence`: the run ends with an "
+    "error, or goes on without |\n"
+    "| `link_connected`, `link_disconnected` | connections; a part of more than 16 MiB breaks one "
+    "| "
+    "the part waits for a `hello` |\n"
+    "| `link_hello`, `link_messages` | what was taken | |\n"
+    "\n"
+    "`health` and `hello` of a part's peer start its time-out anew, for at most ten time-outs in a "
+    "step: no step waits longer.\n"
+    "\n";
+
+static const char shared_text[] =
+    "## Frames in shared memory\n"
+    "\n"
+    "`welcome` names an object of POSIX shared memory (on Linux a file of `/dev/shm`) of `slots` "
+    "slots of `slot_bytes` bytes.\n"
+    "A `frame` with the member `slot` = n lies in slot n modulo `slots`:\n"
+    "\n"
+    "| offset | type | what |\n"
+    "|---|---|---|\n"
+    "| 0 | int64 | n; -1 while it is written |\n"
+    "| 8 | int64 | bytes of the pixels |\n"
+    "| 16 | | the message's header, then zeros |\n"
+    "| 4096 | uint16 | pixels |\n"
+    "\n"
+    "It stays until the step has been answered, and after that until the ring has been gone round. "
+    "A reader that takes\n"
+    "longer looks at n again afterwards. The pixels have no checksum here.\n"
+    "\n";
+
+static const char *type_name(const bst_wire_field *f, char *room, size_t bytes) {
+    static const char *const names[] = {
+        [BST_WIRE_I32] = "int32",   [BST_WIRE_U32] = "uint32", [BST_WIRE_I64] = "int64",
+        [BST_WIRE_F64] = "float64", [BST_WIRE_BOOL] = "int32", [BST_WIRE_TEXT] = "char",
+    };
+    if (f->count == 1) {
+        snprintf(room, bytes, "%s", names[f->type]);
+    } else {
+        snprintf(room, bytes, "%s[%d]", names[f->type], f->count);
+    }
+    return room;
+}
+
+static void allowed(const bst_wire_field *f, char *room, size_t bytes) {
+    *room = '\0';
+    if (f->type == BST_WIRE_BOOL) {
+        snprintf(room, bytes, "0, 1");
+    } else if (f->type == BST_WIRE_TEXT) {
+        snprintf(room, bytes, "ends with a zero");
+    } else if (f->check == BST_WIRE_RANGE) {
+        snprintf(room, bytes, "%.10g to %.10g", f->minimum, f->maximum);
+    } else if (f->check != BST_WIRE_COUNT) {
+        static const char *const words[] = {[BST_WIRE_ANY] = "any",
+                                            [BST_WIRE_FINITE] = "finite",
+                                            [BST_WIRE_UNIT] = "of length 1",
+                                            [BST_WIRE_UNIT_OR_ZERO] = "of length 1, or all 0"};
+        snprintf(room, bytes, "%s", words[f->check]);
+    }
+}
+
+static void print_table(FILE *out, const bst_wire_field *table) {
+    fputs("| offset | type | name | unit | allowed | what |\n|---|---|---|---|---|---|\n", out);
+    for (const bst_wire_field *f = table; f->name; f++) {
+        char type[32], range[64];
+        allowed(f, range, sizeof range);
+        fprintf(out, "| %zu | %s | `%s` | %s | %s | %s |\n", bst_wire_offset(table, f),
+                type_name(f, type, sizeof type), f->name, f->unit, range, f->doc);
+    }
+}
+
+static void print_message(FILE *out, const bst_wire_message *m) {
+    const char *from = m->from == BST_WIRE_FROM_SIM    ? "from the simulation"
+                       : m->from == BST_WIRE_FROM_PEER ? "from a peer"
+                                                       : "from either side";
+    fprintf(out, "### `%s` (%s)\n\n%s\n\nRecord, %zu bytes:\n\n", m->name, from, m->doc,
+            bst_wire_bytes(m->record));
+    print_table(out, m->record);
+    if (m->items) {
+        fprintf(out, "\nItems, `count` of them (0 to %d), %zu bytes each:\n\n", m->max_items,
+                bst_wire_bytes(m->items));
+        print_table(out, m->items);
+    }
+    if (m->pixels) {
+        fputs("\nSecond part: `height` rows of `width` pixels, uint16, row 0 and column 0 first.\n",
+              out);
+    }
+    fputs("\n", out);
+}
+
+static void print_bytes(FILE *out, const uint8_t *bytes, size_t count) {
+    for (size_t at = 0; at < count; at += 16) {
+        fprintf(out, "%04zx ", at);
+        for (size_t i = at; i < at + 16 && i < count; i++) {
+            fprintf(out, "%s %02x", i % 8 == 0 && i > at ? " " : "", bytes[i]);
+        }
+        fputs("\n", out);
+    }
+}
+
+/* A command as it goes over the wire. */
+static void print_example(FILE *out) {
+    const bst_wire_message *m = bst_wire_message_of(BST_LINK_LOS_COMMAND);
+    bst_los_command command = {.tick = 12600,
+                               .direction_gcrf = {0.6, 0.0, 0.8},
+                               .rate_gcrf_radps = {0.0, 7.292115e-5, 0.0}};
+    bst_link_header header = {.type = BST_LINK_LOS_COMMAND,
+                              .tick = 12000,
+                              .sequence = 5,
+                              .step = 40,
+                              .instance = "neossat/camera/control",
+                              .parts = 1,
+                              .slot = -1};
+    uint8_t payload[256];
+    char text[BST_LINK_HEADER_BYTES];
+    size_t bytes = bst_wire_encode(m, &command, payload);
+    header.lengths[0] = (int64_t)bytes;
+    header.crcs[0] = bst_crc32c(payload, bytes);
+    size_t length = bst_link_header_write(&header, text);
+    fprintf(out,
+            "## A message, byte by byte\n\n"
+            "In step 40 of `neossat/camera/control`, at tick 12000, a peer wants the boresight at "
+            "(0.6, 0, 0.8) at tick 12600,\n"
+            "turning with 7.292115e-5 rad/s towards +y. The header, %zu bytes in one line, whose "
+            "checksum is over its first %zu bytes:\n\n```\n",
+            length, length - 20);
+    fwrite(text, 1, length, out);
+    fprintf(out, "\n```\n\nThe payload, %zu bytes:\n\n```\n", bytes);
+    print_bytes(out, payload, bytes);
+    fputs("```\n\n", out);
+    fputs("| offset | bytes | value |\n|---|---|---|\n", out);
+    for (const bst_wire_field *f = m->record; f->name; f++) {
+        size_t at = bst_wire_offset(m->record, f), one = bst_wire_number_bytes(f->type);
+        for (int i = 0; i < f->count; i++, at += one) {
+            char name[64], index[16] = "";
+            if (f->count > 1) {
+                snprintf(index, sizeof index, "[%d]", i);
+            }
+            snprintf(name, sizeof name, "%s%s", f->name, index);
+            fprintf(out, "| %zu | ", at);
+            for (size_t b = 0; b < one; b++) {
+                fprintf(out, "%02x%s", payload[at + b], b + 1 < one ? " " : "");
+            }
+            if (f->type == BST_WIRE_F64) {
+                double value;
+                memcpy(&value, payload + at, sizeof value);
+                fprintf(out, " | `%s` = %.10g |\n", name, value);
+            } else {
+                int64_t value = 0;
+                memcpy(&value, payload + at, one);
+                fprintf(out, " | `%s` = %lld |\n", name, (long long)value);
+            }
+        }
+    }
+}
+
+bst_status bst_link_icd(bst_ctx *ctx, FILE *out) {
+    fputs(opening, out);
+    fputs(shared_text, out);
+    fputs(
+        "## Payloads\n\n"
+        "One record, then `count` items where there are any. Members follow one another without "
+        "gaps; a record and an item are\n"
+        "filled up with zeros to a multiple of 8 bytes. Directions are in GCRF axes; attitudes "
+        "are quaternions, scalar last, that\n"
+        "turn what the second name in them has into the first one's axes; pixel (0, 0) has its "
+        "centre at (0.0, 0.0)\n"
+        "([conventions](conventions.md)). What is outside \"allowed\" is not taken.\n\n",
+        out);
+    for (int type = 0; type < BST_LINK_TYPES; type++) {
+        print_message(out, bst_wire_message_of((bst_link_type)type));
+    }
+    print_example(out);
+    return fflush(out) == 0 && !ferror(out)
+               ? BST_OK
+               : bst_fail(ctx, BST_ERR_IO, "cannot write the interface control document");
+}

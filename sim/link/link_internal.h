@@ -1,0 +1,129 @@
+/* Inside of the simulation's end, shared by its files only. */
+#ifndef BST_LINK_LINK_INTERNAL_H
+#define BST_LINK_LINK_INTERNAL_H
+
+#include <zmq.h>
+
+#include "sim/link/endpoint.h"
+#include "sim/link/link.h"
+#include "sim/link/shared_frames.h"
+
+enum {
+    LINK_PEERS = 16,
+    LINK_FLYING = 3, /* frames that ZeroMQ may hold without a copy at a time */
+    LINK_NOTES = 32, /* lines kept for bst_link_note */
+    LINK_NOTE_BYTES = 300,
+    LINK_WARNINGS = 20,            /* lines of the log; then counters tell */
+    LINK_REPLIES = 32,             /* `error` messages in answer to wrong ones, per step */
+    LINK_FLOOD = 10000,            /* messages of a peer in a step, after which it is not heard */
+    LINK_QUEUE = 64,               /* messages that wait in each direction, per peer */
+    LINK_MESSAGE_BYTES = 16 << 20, /* of a part that a peer sends; beyond, it is disconnected */
+    LINK_ID_BYTES = 255,
+    LINK_EXTENSIONS = 10, /* time-outs that a step may take at most, by `health` and `hello` */
+};
+
+/* What is counted besides the faults of wire.h. */
+typedef enum link_event {
+    LINK_DUPLICATE = BST_WIRE_FAULTS,
+    LINK_OUT_OF_ORDER,
+    LINK_GAP,
+    LINK_LATE,
+    LINK_REPEATED,
+    LINK_INCOMPLETE,
+    LINK_STRANGER,
+    LINK_REFUSED,
+    LINK_FLOODED,
+    LINK_TAKEOVER,
+    LINK_HELLO_TAKEN,
+    LINK_LEFT,
+    LINK_UNANSWERED,
+    LINK_ITEMS_DROPPED,
+    LINK_CONNECTED,
+    LINK_DISCONNECTED,
+    LINK_EVENTS
+} link_event;
+
+typedef struct link_id {
+    uint8_t bytes[LINK_ID_BYTES];
+    size_t count;
+} link_id;
+
+typedef struct link_peer {
+    bool used, blocked, shared_memory;
+    link_id id;
+    char name[BST_LINK_NAME_BYTES];
+    int64_t expected;   /* next sequence from it */
+    int64_t sent;       /* next sequence to it */
+    int64_t heard_step; /* exchange in which it has been heard so many times: */
+    int heard;
+} link_peer;
+
+typedef struct link_part {
+    bst_link_part about;
+    int peer; /* -1: none */
+    bool had_peer;
+    int64_t step; /* of the next exchange */
+} link_part;
+
+/* A frame that ZeroMQ holds. */
+typedef struct link_flying {
+    int busy; /* atomic */
+    void (*release)(void *owner);
+    void *owner;
+} link_flying;
+
+struct bst_link {
+    bst_link_config config;
+    char address[BST_LINK_ENDPOINT_BYTES];
+    char scenario[BST_LINK_NAME_BYTES];
+    bst_link_run run;
+    void *context, *router, *monitor;
+    bst_shared_frames *shared;
+    link_peer peers[LINK_PEERS];
+    link_part *parts;
+    int part_count;
+    bst_link_welcome *welcome; /* room for all parts */
+    link_flying flying[LINK_FLYING];
+    int64_t counts[LINK_EVENTS], told[LINK_EVENTS];
+    bst_link_end end;
+    bool has_end;
+    int64_t exchanges;
+    int warnings;
+    char notes[LINK_NOTES][LINK_NOTE_BYTES];
+    int note_first, note_count;
+    bool (*stop)(void *user);
+    void *stop_user;
+};
+
+/* A step of a part that is under way. */
+typedef struct link_exchange {
+    bst_ctx *ctx;
+    int part; /* -1: none, messages are only looked at */
+    int64_t step, tick;
+    bst_link_output *outputs;
+    int output_count;
+    bool resend;        /* its peer has come, or come back */
+    bool prolong;       /* its time-out starts anew */
+    bool finished;      /* `done` has come */
+    bool failed;        /* the peer says so: the message is in ctx */
+    int replies, taken; /* taken: outputs */
+} link_exchange;
+
+/* link.c */
+/* Counts, and keeps the line as a note and in the log. */
+void bst_link_event(bst_link *link, bst_ctx *ctx, int event, const char *format, ...)
+    BST_PRINTF(4, 5);
+/* link_send.c */
+/* Sends a message to a peer; false when it is gone or takes nothing. `crc`: of the pixels. */
+bool bst_link_send(bst_link *link, int peer, bst_link_header *header, const void *payload,
+                   const bst_link_input *frame, uint32_t crc);
+/* An `error` in answer to a message. */
+void bst_link_reply(bst_link *link, const link_id *id, link_peer *peer, const char *fault,
+                    int64_t sequence, const char *text);
+/* link_receive.c */
+/* Waits up to wait_ms for one message and takes it, or says what is wrong with it. */
+bst_status bst_link_take(bst_link *link, link_exchange *x, int wait_ms) BST_MUST_CHECK;
+/* Takes its parts from a peer. */
+void bst_link_unassign(bst_link *link, int peer);
+
+#endif

@@ -1,0 +1,46 @@
+/* Frames in shared memory: a ring of slots that one process writes and others on the same machine
+ * read. Each slot begins with the header of the message that it belongs to; pixels follow at
+ * BST_LINK_PIXELS_AT. */
+#ifndef BST_LINK_SHARED_FRAMES_H
+#define BST_LINK_SHARED_FRAMES_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "sim/core/status.h"
+
+enum {
+    BST_LINK_SLOTS = 2,
+    BST_LINK_SLOT_HEADER_AT = 16, /* before it: int64 number (-1: being written), int64 bytes */
+    BST_LINK_PIXELS_AT = 4096,
+};
+
+typedef struct bst_shared_frames bst_shared_frames;
+
+/* Makes the object, readable and writable by this user alone, for images of up to pixel_bytes;
+ * bst_shared_frames_free removes it. */
+bst_status bst_shared_frames_create(bst_ctx *ctx, size_t pixel_bytes,
+                                    bst_shared_frames **out) BST_MUST_CHECK;
+/* Opens one that another process made, for reading. */
+bst_status bst_shared_frames_open(bst_ctx *ctx, const char *name, int64_t slot_bytes, int slots,
+                                  bst_shared_frames **out) BST_MUST_CHECK;
+void bst_shared_frames_free(bst_shared_frames *frames);
+
+const char *bst_shared_frames_name(const bst_shared_frames *frames);
+int64_t bst_shared_frames_slot_bytes(const bst_shared_frames *frames);
+
+/* Writer: the number of the message that is written next, 0, 1, ...: it lies in slot number %
+ * slots. Then that message. */
+int64_t bst_shared_frames_next(const bst_shared_frames *frames);
+void bst_shared_frames_write(bst_shared_frames *frames, const char *header, size_t header_bytes,
+                             const void *pixels, size_t bytes);
+
+/* Reader: the pixels of a message by its number; NULL when its slot holds another one or is
+ * shorter. They stay as they are until the writer has gone round the ring; bst_shared_frames_holds
+ * tells afterwards whether it had. */
+const uint16_t *bst_shared_frames_read(const bst_shared_frames *frames, int64_t number,
+                                       int64_t bytes);
+bool bst_shared_frames_holds(const bst_shared_frames *frames, int64_t number);
+
+#endif

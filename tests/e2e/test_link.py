@@ -1,0 +1,320 @@
+"""Modules outside: runs whose parts other processes play, in C and in Python."""
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+import unittest
+
+import numpy as np
+
+import runs
+
+sys.path.insert(0, "python")
+import boresight_link  # noqa: E402
+
+EMBEDDED = ["--set", "/world/star_catalogue=embedded"]
+SECONDS = 20
+SOURCES = [os.path.join("python", "examples", name)
+           for name in ("own_detector.py", "own_controller.py")]
+
+
+def tearDownModule():
+    runs.clean()
+
+
+def free_port():
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return one.getsockname()[1]
+
+
+def ipc():
+    return f"ipc://{runs.scratch()}/link"
+
+
+def start_run(scenario, out, address, external, *more, duration=SECONDS, frames=False):
+    words = runs.command(scenario, out, *([] if frames else [runs.NO_FRAMES]), duration=duration)
+    return subprocess.Popen(words + ["--link", address, "--external", external, *more],
+                            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def serve(scenario, address, part, *more):
+    return subprocess.Popen(
+        [runs.BORESIGHT, "serve", scenario, "--link", address, "--part", part, "--threads", "1",
+         "--duration", str(SECONDS), *EMBEDDED, *more],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def python(script, *words):
+    return subprocess.Popen(["/usr/bin/python3", script, *words], stdout=subprocess.PIPE,
+                            stderr=subprocess.PIPE, text=True,
+                            env=dict(os.environ, PYTHONPATH="python"))
+
+
+def ended(process, expected=0, timeout=120):
+    out, err = process.communicate(timeout=timeout)
+    if process.returncode != expected:
+        raise AssertionError(f"{process.args}: exit code {process.returncode}: {out}{err}")
+    return out + err
+
+
+def counters(folder):
+    return boresight_link.read_run(folder).manifest["counters"]
+
+
+class SameResults(unittest.TestCase):
+    """A part that `boresight serve` plays does what it does inside."""
+
+    def same(self, a, b):
+        one, other = boresight_link.read_run(a), boresight_link.read_run(b)
+        self.assertEqual(one.tables, other.tables)
+        for name in one.tables:
+            if name == "events":  # what a part says of itself stays with it
+                continue
+            x, y = one.table(name), other.table(name)
+            self.assertEqual(list(x), list(y))
+            for column in x:
+                np.testing.assert_array_equal(x[column], y[column], f"{name}.{column}")
+
+    def test_one_part_or_all_outside(self):
+        inside = runs.scratch() + "/inside"
+        runs.run(runs.TRACK, inside, runs.NO_FRAMES, duration=SECONDS)
+        self.assertGreater(len(boresight_link.read_run(inside).table("tracks")["track_id"]), 1)
+        tcp = f"tcp://127.0.0.1:{free_port()}"
+        for address, parts, memory in ((tcp, "control", []), (ipc(), "tracker", []),
+                                       (ipc(), "imgproc", ["--shared-memory"]),
+                                       (tcp, "imgproc,tracker,control", [])):
+            out = runs.scratch() + "/outside"
+            shared = ["--set", "/link/shared_memory=true"] if memory else []
+            # peers may be there before the simulation
+            peers = [serve(runs.TRACK, address, part, *memory) for part in parts.split(",")]
+            ended(start_run(runs.TRACK, out, address, parts, *shared))
+            for peer in peers:
+                self.assertIn("complete", ended(peer))
+            self.same(inside, out)
+            count = counters(out)
+            self.assertEqual(count["link_hello"], len(peers))
+            self.assertFalse([name for name in count if name.startswith("link_") and name not in (
+                "link_hello", "link_messages", "link_connected")], count)
+
+
+class Client(unittest.TestCase):
+    """python/boresight_link.py against the document, and by itself."""
+
+    def test_records_are_those_of_the_document(self):
+        with open("docs/icd.md", encoding="utf-8") as file:
+            text = file.read()
+        text = text[text.index("## Payloads"):text.index("## A message, byte by byte")]
+        formats = {"float64": "<f8", "int64": "<i8", "int32": "<i4", "uint32": "<u4"}
+        seen = set()
+        for part in text.split("\n### ")[1:]:
+            name = re.match(r"`(\w+)`", part).group(1)
+            seen.add(name)
+            pieces = re.split(r"\nItems, ", part)
+            ours = [boresight_link.RECORDS[name]]
+            ours += [boresight_link.ITEMS[name]] if len(pieces) > 1 else []
+            for piece, dtype in zip(pieces, ours):
+                rows = re.findall(r"^\| (\d+) \| (\w+)(?:\[(\d+)\])? \| `([^`]+)` \|", piece, re.M)
+                self.assertEqual([row[3] for row in rows], list(dtype.names))
+                self.assertEqual(int(re.search(r"(\d+) bytes", piece).group(1)), dtype.itemsize)
+                for offset, kind, count, member in rows:
+                    one, at = dtype.fields[member][:2]
+                    self.assertEqual(at, int(offset))
+                    expected = np.dtype("S" + count) if kind == "char" else np.dtype(
+                        (formats[kind], (int(count),) if count else ()))
+                    self.assertEqual(one, expected, f"{name}.{member}")
+        self.assertEqual(seen, set(boresight_link.RECORDS))
+
+    def test_the_worked_example_is_made_the_same(self):
+        with open("docs/icd.md", encoding="utf-8") as file:
+            text = file.read()
+        text = text[text.index("## A message, byte by byte"):]
+        header, dump = re.findall(r"```\n(.*?)\n```", text, re.S)
+        payload = bytes.fromhex("".join(line[4:] for line in dump.splitlines()))
+        record = boresight_link.new_record("los_command")
+        record["tick"] = 12600
+        record["direction_gcrf"] = 0.6, 0.0, 0.8
+        record["rate_gcrf_radps"] = 0.0, 7.292115e-5, 0.0
+        parts = boresight_link.encode("los_command", 5, record, tick=12000, step=40,
+                                      instance="neossat/camera/control")
+        self.assertEqual(parts[1], payload)
+        # the same members; JSON leaves the rest free
+        theirs, ours = json.loads(header), json.loads(parts[0])
+        self.assertEqual({**theirs, "crc32c": ""}, {**ours, "crc32c": ""})
+        message = boresight_link.decode([header.encode(), payload])
+        self.assertEqual(message["direction_gcrf"][2], 0.8)
+
+    def test_checksums(self):
+        self.assertEqual(boresight_link.crc32c(b"123456789"), 0xE3069283)
+        self.assertEqual(boresight_link.crc32c(bytes(32)), 0x8A9136AA)  # RFC 3720, B.4
+        bits = np.random.default_rng(1).integers(0, 256, 70001).astype(np.uint8).tobytes()
+        crc = 0xFFFFFFFF
+        wanted = {0, 1, 2047, 2048, 2049, 4095, 5000, 70001}
+        for n, byte in enumerate(bits, 1):
+            crc ^= byte
+            for _ in range(8):
+                crc = (crc >> 1) ^ (0x82F63B78 if crc & 1 else 0)
+            if n in wanted:
+                self.assertEqual(boresight_link.crc32c(bits[:n]), crc ^ 0xFFFFFFFF, n)
+
+    def test_a_spoilt_message_is_refused(self):
+        record = boresight_link.new_record("done")
+        parts = boresight_link.encode("done", 0, record)
+        boresight_link.decode(parts)
+        for index in range(2):
+            for at in range(len(parts[index])):
+                spoilt = [bytearray(part) for part in parts]
+                spoilt[index][at] ^= 1
+                with self.assertRaises(boresight_link.LinkError):
+                    boresight_link.decode(spoilt)
+
+    def test_run_folders(self):
+        from astropy.io import fits
+        out = runs.scratch() + "/run"
+        runs.run(runs.STARE, out, duration=3)
+        run = boresight_link.read_run(out)
+        with fits.open(out + "/frames.fits") as file:
+            theirs = [image for hdu in file if hdu.is_image and hdu.data is not None
+                      for image in (hdu.data if hdu.data.ndim == 3 else [hdu.data])]
+        ours = list(run.frames())
+        self.assertEqual(len(ours), len(theirs))
+        for one, other in zip(ours, theirs):
+            np.testing.assert_array_equal(one, other)
+        self.assertEqual(len(run.table("frames")["exposure_id"]), len(ours))
+        self.assertEqual(run.manifest["summary"]["frames"], len(ours))
+
+
+class Examples(unittest.TestCase):
+    def test_a_detector_of_ones_own(self):
+        address, out = ipc(), runs.scratch() + "/run"
+        peer = python(SOURCES[0], address)
+        ended(start_run(runs.STARE, out, address, "imgproc", "--set", "/link/shared_memory=true",
+                        duration=8))
+        ended(peer)
+        run = boresight_link.read_run(out)
+        found, truth = run.table("detections"), run.table("truth")
+        self.assertEqual(len(run.table("detection_frames")["exposure_id"]), 8)
+        near = total = 0
+        for exposure in range(8):
+            here = found["exposure_id"] == exposure
+            # bright, whole and not smeared out of the 3 x 3 pixels
+            bright = ((truth["exposure_id"] == exposure) & (truth["in_field"] == 1) &
+                      (truth["snr"] > 30) & (truth["saturated"] == 0) &
+                      (np.hypot(truth["x_end_px"] - truth["x_start_px"],
+                                truth["y_end_px"] - truth["y_start_px"]) < 3))
+            for x, y in zip(truth["x_mean_px"][bright], truth["y_mean_px"][bright]):
+                if not (3 < x < 1020 and 3 < y < 1020):
+                    continue
+                total += 1
+                distance = np.hypot(found["x_px"][here] - x, found["y_px"][here] - y)
+                near += distance.size > 0 and distance.min() < 1.0
+        self.assertGreater(total, 20)
+        self.assertGreater(near, 0.9 * total)  # the others have a neighbour as near as they are wide
+
+    def test_a_controller_of_ones_own(self):
+        inside, out, address = runs.scratch() + "/inside", runs.scratch() + "/run", ipc()
+        runs.run(runs.TRACK, inside, runs.NO_FRAMES, duration=SECONDS)
+        truth = boresight_link.read_run(inside).table("truth")
+        target = truth["kind"] == "object"
+        t, ra, dec = (truth[name][target] for name in ("mid_s", "ra_deg", "dec_deg"))
+        rate_ra, ra_0 = np.polyfit(t, ra, 1)
+        rate_dec, dec_0 = np.polyfit(t, dec, 1)
+        peer = python(SOURCES[1], address, "--ra", str(ra_0), "--dec", str(dec_0),
+                      "--rate-ra", str(rate_ra), "--rate-dec", str(rate_dec))
+        ended(start_run(runs.TRACK, out, address, "control", duration=30))
+        self.assertIn("follows the target", ended(peer))
+        summary = boresight_link.read_run(out).manifest["summary"]
+        self.assertEqual(summary["final_mode"], "track")
+        # telemetry drifts by 5 arcsec/s, 1.7 px a second that passes between frame and command
+        self.assertLess(summary["pointing_rms_px"], 4.0)
+
+
+class BadPeers(unittest.TestCase):
+    def test_nobody_comes(self):
+        out = runs.scratch() + "/run"
+        began = time.monotonic()
+        said = ended(start_run(runs.STARE, out, ipc(), "imgproc", "--set",
+                               "/link/connect_timeout_s=0.3"), expected=1)
+        self.assertIn("nobody plays neossat/telescope/imgproc", said)
+        self.assertLess(time.monotonic() - began, 60)  # a hang, not a slow machine
+        self.assertFalse(os.path.exists(out))
+        self.assertTrue(os.path.exists(out + ".partial/manifest.json"))
+
+    def test_interrupted_while_waiting(self):
+        # control steps first: no kernel is being built, which a signal would disturb
+        process = start_run(runs.TRACK, runs.scratch() + "/run", ipc(), "control")
+        while "waiting for peers" not in process.stderr.readline():
+            pass
+        time.sleep(0.3)
+        process.send_signal(signal.SIGINT)
+        ended(process, expected=130)
+
+    def test_what_is_called_wrongly(self):
+        for words, says in (
+                (["--link", "tcp://0.0.0.0:5555", "--external", "imgproc"],
+                 "ssh -L 5555:127.0.0.1:5555"),
+                (["--external", "imgproc"], "/link/address"),
+                (["--external", "gimbal"], "imgproc, tracker, control"),
+                (["--external", "imgproc", "--link", "http://127.0.0.1"], "is no address")):
+            out = runs.scratch() + "/run"
+            result = subprocess.run(runs.command(runs.STARE, out, duration=1) + words,
+                                    capture_output=True, text=True, timeout=60)
+            self.assertEqual(result.returncode, 1, result.stderr)
+            self.assertIn(says, result.stderr)
+            self.assertFalse(os.path.exists(out + ".partial"))
+        result = subprocess.run([runs.BORESIGHT, "serve", runs.STARE, "--link", ipc(), "--part",
+                                 "gimbal", *EMBEDDED], capture_output=True, text=True, timeout=60)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("imgproc, tracker, control", result.stderr)
+
+    def test_a_peer_is_killed_and_another_goes_on(self):
+        """The detector keeps nothing between frames: whoever answers, the answers are the same."""
+        whole, broken = runs.scratch() + "/whole", runs.scratch() + "/broken"
+        for out in (whole, broken):
+            address = ipc()
+            peer = python(SOURCES[0], address)
+            run = start_run(runs.STARE, out, address, "imgproc", "--set", "/link/timeout_s=30",
+                            duration=12)
+            if out == broken:
+                peer.stdout.readline()
+                peer.kill()
+                peer.communicate()
+                peer = python(SOURCES[0], address)
+            ended(run)
+            ended(peer)
+        a, b = (boresight_link.read_run(folder).table("detections") for folder in (whole, broken))
+        for column in a:
+            np.testing.assert_array_equal(a[column], b[column], column)
+
+    def test_the_run_goes_on_without_a_peer_that_has_died(self):
+        address, out = ipc(), runs.scratch() + "/run"
+        peer = python(SOURCES[0], address)
+        run = start_run(runs.STARE, out, address, "imgproc", "--set", "/link/on_silence=go_on",
+                        "--set", "/link/timeout_s=1", duration=300)
+        for _ in range(2):  # the second step is begun when the first is answered
+            peer.stdout.readline()
+        peer.kill()
+        peer.communicate()
+        ended(run, timeout=240)
+        found = boresight_link.read_run(out).table("detection_frames")
+        self.assertGreater(len(found["exposure_id"]), 0)
+        self.assertLess(len(found["exposure_id"]), 300)
+        self.assertGreaterEqual(counters(out)["link_unanswered"], 1)
+
+    def test_a_refused_answer_raises_in_python(self):
+        address = ipc()
+        run = start_run(runs.STARE, runs.scratch() + "/run", address, "imgproc", "--set",
+                        "/link/timeout_s=2", duration=3)
+        with self.assertRaisesRegex(boresight_link.LinkError, "bad_value.*x_px of item 0"):
+            with boresight_link.Link(address, serves="imgproc") as link:
+                for step in link.steps():
+                    step.send_detections(x_px=np.nan, y_px=5.0)
+        self.assertIn("its peer has left", ended(run, expected=1))
+
+
+if __name__ == "__main__":
+    unittest.main()
