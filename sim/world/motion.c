@@ -88,6 +88,8 @@ bool bst_motion_from_telemetry(const bst_pointing_telemetry *telemetry, int64_t 
     moments m = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
     bst_vec3 at_middle = {0, 0, 0};
     roughness noise = {.run = 0};
+    bst_vec3 rb = {0, 0, 0};
+    int64_t known = -1; /* sample that rb is of */
     for (int64_t n = first; n < newest; n++) {
         const bst_pointing_sample *a = sample_at(telemetry, n), *b = sample_at(telemetry, n + 1);
         double ta = (double)(a->tick - start_tick) - middle;
@@ -95,8 +97,10 @@ bool bst_motion_from_telemetry(const bst_pointing_telemetry *telemetry, int64_t 
         if (!(tb > ta)) {
             continue;
         }
-        bst_vec3 ra = bst_quat_to_rotvec(bst_quat_mul(a->q_cam_from_gcrf, inverse));
-        bst_vec3 rb = bst_quat_to_rotvec(bst_quat_mul(b->q_cam_from_gcrf, inverse));
+        bst_vec3 ra =
+            n == known ? rb : bst_quat_to_rotvec(bst_quat_mul(a->q_cam_from_gcrf, inverse));
+        rb = bst_quat_to_rotvec(bst_quat_mul(b->q_cam_from_gcrf, inverse));
+        known = n + 1;
         double lo = n == first || ta < -half ? -half : ta;
         double hi = n + 1 == newest || tb > half ? half : tb;
         if ((n == first || ta <= 0.0) && (n + 1 == newest || tb >= 0.0)) {
