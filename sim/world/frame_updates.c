@@ -7,8 +7,6 @@
 
 #include <cjson/cJSON.h>
 
-#include "sim/world/psf.h"
-
 enum { FORMAT_VERSION = 1, LAST_FRAME = 10000000 };
 
 /* How far a quaternion's norm may be from 1: six digits were written. */
@@ -467,18 +465,4 @@ bst_status bst_camera_at_scale(bst_ctx *ctx, const bst_camera *camera, double pi
     *out = *camera;
     out->pixel_scale_arcsec = pixel_scale_arcsec;
     return bst_camera_prepare(ctx, out);
-}
-
-bst_status bst_camera_trembling(bst_ctx *ctx, const bst_camera *camera, double pixel_scale_arcsec,
-                                double jitter_rad2, bst_camera *out, bst_psf **psf) {
-    bst_camera scaled;
-    *psf = NULL;
-    BST_TRY(bst_camera_at_scale(ctx, camera, pixel_scale_arcsec, &scaled));
-    *out = scaled;
-    if (jitter_rad2 > 0.0) {
-        double sigma_px = sqrt(jitter_rad2) / bst_camera_scale_rad(&scaled);
-        BST_TRY(bst_camera_blurred(ctx, &scaled, sigma_px, out));
-        *psf = (bst_psf *)out->psf;
-    }
-    return BST_OK;
 }

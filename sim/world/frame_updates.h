@@ -88,9 +88,4 @@ void bst_frame_updates_limits(const bst_frame_updates *updates, const bst_camera
 bst_status bst_camera_at_scale(bst_ctx *ctx, const bst_camera *camera, double pixel_scale_arcsec,
                                bst_camera *out) BST_MUST_CHECK;
 
-/* The same, its PSF widened by a line of sight that trembles with this variance per axis
- * (bst_camera_blurred). *psf: what the caller frees after the camera, NULL without jitter. */
-bst_status bst_camera_trembling(bst_ctx *ctx, const bst_camera *camera, double pixel_scale_arcsec,
-                                double jitter_rad2, bst_camera *out, bst_psf **psf) BST_MUST_CHECK;
-
 #endif

@@ -158,6 +158,21 @@ void bst_motion_bend(const bst_motion *motion, const bst_camera *camera, double 
     *y_px = (k[1][0] * a + k[1][1] * b) / scale;
 }
 
+/* Share of a measured or told bend that may be no bend. */
+static const double BEND_LEFT = 0.05;
+
+static void widen(double x, double y, bst_detection *d) {
+    d->cov_xx += x * x;
+    d->cov_xy += x * y;
+    d->cov_yy += y * y;
+}
+
+void bst_motion_widen(double bend_x_px, double bend_y_px, double followed_x_px,
+                      double followed_y_px, bst_detection *d) {
+    widen(0.5 * (bend_x_px - followed_x_px), 0.5 * (bend_y_px - followed_y_px), d);
+    widen(BEND_LEFT * followed_x_px, BEND_LEFT * followed_y_px, d);
+}
+
 /* The rotation vector that moves the boresight by (x_px, y_px). */
 static bst_vec3 rotation_of(const bst_camera *camera, double x_px, double y_px) {
     double scale = bst_camera_scale_rad(camera), k[2][2];
