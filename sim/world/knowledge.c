@@ -32,9 +32,10 @@ struct bst_knowledge_view {
     bst_vec3 cued[BST_QUINTIC_POINTS];
 };
 
-/* The onboard PSF is one Gaussian: of the width given, or else that with the true one's
- * noise-equivalent area in the middle of the field. */
-static void know_psf(bst_camera *c, double given_fwhm_px) {
+/* The onboard camera's PSF is one Gaussian: of the width given, or else that with the true one's
+ * noise-equivalent area in the middle of the field. *psf: the true one, where it is what is known
+ * and no such Gaussian. */
+static void know_psf(bst_camera *c, double given_fwhm_px, const bst_psf **psf) {
     double sigma_px;
     bool plain = (!c->psf && c->optics.psf == BST_PSF_GAUSSIAN) ||
                  (c->psf && bst_psf_gaussian(c->psf, &sigma_px));
@@ -44,6 +45,7 @@ static void know_psf(bst_camera *c, double given_fwhm_px) {
     if (given_fwhm_px > 0.0) {
         c->psf_fwhm_px = given_fwhm_px;
     } else if (c->psf) {
+        *psf = plain ? NULL : c->psf;
         c->psf_fwhm_px = bst_psf_equivalent_fwhm_px(c->psf, 0.5 * (double)(c->width_px - 1),
                                                     0.5 * (double)(c->height_px - 1));
     }
@@ -58,7 +60,7 @@ static bst_status alter_camera(bst_ctx *ctx, const bst_camera_errors_config *err
     c->rotation_deg += errors->rotation_error_deg;
     c->distortion = errors->own_distortion ? errors->distortion : c->distortion;
     c->throughput *= 1.0 + errors->throughput_error;
-    know_psf(c, errors->psf_fwhm_px);
+    know_psf(c, errors->psf_fwhm_px, &k->psf);
     bst_status status = bst_camera_prepare(ctx, c);
     return status == BST_OK
                ? status
@@ -116,6 +118,10 @@ const char *bst_knowledge_psf_file(const bst_knowledge *k, double *oversampling)
         &k->world->observers[k->observer].sensors[k->sensor].config.knowledge.camera;
     *oversampling = camera->psf_oversampling;
     return camera->psf_file;
+}
+
+const bst_psf *bst_knowledge_psf(const bst_knowledge *k) {
+    return k->psf;
 }
 
 const bst_camera *bst_knowledge_camera(const bst_knowledge *k) {
