@@ -21,8 +21,6 @@ static const double LOOK_SHARE = 0.65;
 static const double JITTER_BEND = 0.075;
 /* What telemetry may not know of the camera's motion: drift, in px an exposure. */
 static const double DRIFT_PX = 1.0;
-/* Share of a measured or told bend that may be no bend. */
-static const double BEND_LEFT = 0.05;
 /* In a crowd light is what the filter says so much of; what it says is little there, since noise is
  * told too high. */
 static const float STAR_SNR = 3.0f;
@@ -241,27 +239,13 @@ static bst_status check_frame(bst_ctx *ctx, const bst_imgproc *ip, const bst_img
     return BST_OK;
 }
 
-/* A detection is to stand for the mean of its path, but a fit that does not follow the camera's
- * uneven turn finds the place where the source dwelt: half the bend away when most of the path is
- * there. */
 static void widen_by_bend(const bst_imgproc *ip, const bst_locate_frame *f, const bst_shape *shape,
                           bst_detection *d) {
-    if (!f->motion) {
-        return;
+    if (f->motion) {
+        double x, y;
+        bst_motion_bend(f->motion, &ip->camera, &x, &y);
+        bst_motion_widen(x, y, f->binning * shape->bend_x_px, f->binning * shape->bend_y_px, d);
     }
-    double x, y;
-    bst_motion_bend(f->motion, &ip->camera, &x, &y);
-    x = 0.5 * (x - f->binning * shape->bend_x_px);
-    y = 0.5 * (y - f->binning * shape->bend_y_px);
-    d->cov_xx += x * x;
-    d->cov_xy += x * y;
-    d->cov_yy += y * y;
-    /* of a bend that the fit follows, what a quadratic does not tell of a start or a stop */
-    x = BEND_LEFT * f->binning * shape->bend_x_px;
-    y = BEND_LEFT * f->binning * shape->bend_y_px;
-    d->cov_xx += x * x;
-    d->cov_xy += x * y;
-    d->cov_yy += y * y;
 }
 
 static bst_detection report(const bst_imgproc *ip, const bst_locate_frame *f,

@@ -7,6 +7,7 @@
 #include "obsgen/clutter.h"
 #include "obsgen/fragments.h"
 #include "obsgen/generator_internal.h"
+#include "sim/world/motion.h"
 
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
 /* In a smeared frame, sources that move less are seen as one. */
@@ -467,6 +468,12 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
     }
     bst_generator_false_alarms(g);
     bst_generator_hits(g);
+    for (int i = 0; i < g->count; i++) {
+        bst_detection *d = &g->items[i].detection;
+        bool followed = !g->smeared && g->streak > 0.0 && (d->flags & BST_DETECTION_STREAK);
+        bst_motion_widen(f->bend_x_px, f->bend_y_px, followed ? f->bend_x_px : 0.0,
+                         followed ? f->bend_y_px : 0.0, d);
+    }
     qsort(g->items, (size_t)g->count, sizeof *g->items, generated_by_row);
     *out = (bst_generator_result){.items = g->items,
                                   .count = g->count,

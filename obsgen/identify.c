@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "sim/world/photometry.h"
+
 /* Image processing's: brightest of each kind that vote, side of a cell of votes, chance allowed,
  * radius that is tried first when the error is known. */
 enum { VOTERS = 150 };
@@ -12,8 +14,7 @@ static const double CONSISTENT_SHARE = 0.4;
 static const uint64_t IDENTIFY = (uint64_t)1 << 42;
 
 static bool consistent(const bst_detection *d, double v_mag) {
-    double sigma = d->flux_e > 0.0 ? 1.0857 * d->flux_sigma_e / d->flux_e : 1.0;
-    double limit = 1.0 + 3.0 * fmin(sigma, 1.0), excess = d->v_mag - v_mag;
+    double limit = 1.0 + 3.0 * fmin(bst_photometry_noise_mag(d), 1.0), excess = d->v_mag - v_mag;
     bool cut = (d->flags & (BST_DETECTION_SATURATED | BST_DETECTION_EDGE)) != 0;
     return excess > -limit && excess < (cut ? limit + 2.5 : limit);
 }

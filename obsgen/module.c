@@ -196,15 +196,9 @@ static bst_status set_camera(bst_ctx *ctx, obsgen *o, double scale_arcsec, doubl
     if (scale_arcsec == o->camera.pixel_scale_arcsec && jitter_rad2 == o->jitter_rad2) {
         return BST_OK;
     }
-    bst_camera scaled, camera;
-    bst_psf *psf = NULL;
-    BST_TRY(bst_camera_at_scale(ctx, o->world_camera, scale_arcsec, &scaled));
-    camera = scaled;
-    if (jitter_rad2 > 0.0) {
-        double sigma_px = sqrt(jitter_rad2) / bst_camera_scale_rad(&scaled);
-        BST_TRY(bst_camera_blurred(ctx, &scaled, sigma_px, &camera));
-        psf = (bst_psf *)camera.psf;
-    }
+    bst_camera camera;
+    bst_psf *psf;
+    BST_TRY(bst_camera_trembling(ctx, o->world_camera, scale_arcsec, jitter_rad2, &camera, &psf));
     bst_psf_free(o->psf);
     o->psf = psf;
     o->camera = camera;

@@ -189,21 +189,6 @@ static bst_status finish(void *self, struct bst_step *step) {
     return BST_OK;
 }
 
-/* The world's camera at another pixel scale, its PSF widened by the jitter. */
-static bst_status changed_camera(bst_ctx *ctx, const scenegen *s, double scale_arcsec,
-                                 double jitter_rad2, bst_camera *out, bst_psf **psf) {
-    bst_camera scaled;
-    *psf = NULL;
-    BST_TRY(bst_camera_at_scale(ctx, s->world_camera, scale_arcsec, &scaled));
-    *out = scaled;
-    if (jitter_rad2 > 0.0) {
-        double sigma_px = sqrt(jitter_rad2) / bst_camera_scale_rad(&scaled);
-        BST_TRY(bst_camera_blurred(ctx, &scaled, sigma_px, out));
-        *psf = (bst_psf *)out->psf;
-    }
-    return BST_OK;
-}
-
 /* Goes on with another pixel scale or jitter: everything that depends on the camera is made again.
  * Frames that were rendered before stay as they are. */
 static bst_status change_camera(bst_ctx *ctx, scenegen *s, double scale_arcsec,
@@ -211,7 +196,7 @@ static bst_status change_camera(bst_ctx *ctx, scenegen *s, double scale_arcsec,
     bst_camera camera;
     bst_psf *psf;
     long long pixels;
-    BST_TRY(changed_camera(ctx, s, scale_arcsec, jitter_rad2, &camera, &psf));
+    BST_TRY(bst_camera_trembling(ctx, s->world_camera, scale_arcsec, jitter_rad2, &camera, &psf));
     bst_renderer *renderer;
     bst_status status =
         bst_renderer_create(ctx, s->device, &camera, &s->renderer_options, &renderer);

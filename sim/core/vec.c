@@ -43,15 +43,16 @@ bst_quat bst_quat_from_large_rotvec(bst_vec3 r) {
 bst_vec3 bst_quat_to_rotvec(bst_quat q) {
     double sign = q.w < 0.0 ? -1.0 : 1.0;
     bst_vec3 v = {sign * q.x, sign * q.y, sign * q.z};
-    double n = bst_vec3_norm(v);
+    double n2 = bst_vec3_dot(v, v);
     double w = sign * q.w;
     double scale;
-    if (n < 0.01 * w) {
+    if (n2 < 1e-4 * w * w) {
         /* the arc tangent's series, exact to rounding: most turns are small */
-        double t2 = n * n / (w * w);
-        scale =
-            2.0 / w * (1.0 - t2 * (1.0 / 3.0 - t2 * (0.2 - t2 * (1.0 / 7.0 - t2 * (1.0 / 9.0)))));
+        double inverse = 1.0 / w, t2 = n2 * inverse * inverse;
+        scale = 2.0 * inverse *
+                (1.0 - t2 * (1.0 / 3.0 - t2 * (0.2 - t2 * (1.0 / 7.0 - t2 * (1.0 / 9.0)))));
     } else {
+        double n = bst_vec3_norm(v);
         scale = n > 0.0 ? 2.0 * atan2(n, w) / n : 2.0;
     }
     return bst_vec3_scale(v, scale);

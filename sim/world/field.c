@@ -138,8 +138,7 @@ static void summarise_track(bst_field *field, const bst_los_track *track, bst_qu
     for (int k = 0; k < track->count; k++) {
         bst_vec3 d = deviation(field->q_mid, track->q_cam_from_gcrf[k]);
         double now[D] = {d.x, d.y, d.z, exposure > 0.0 ? track->time_s[k] / exposure : 0.5};
-        reach =
-            fmax(reach, bst_track_moved_px(field->camera, field->q_mid, track->q_cam_from_gcrf[k]));
+        reach = fmax(reach, bst_track_turned_px(field->camera, d));
         /* moments of the piecewise linear path between the samples */
         double w = k > 0 ? (exposure > 0.0 ? track->time_s[k] - track->time_s[k - 1] : 1.0) : 0.0;
         for (int i = 0; i < D; i++) {

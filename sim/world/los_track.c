@@ -120,13 +120,17 @@ bst_status bst_track_part(bst_ctx *ctx, bst_track_store *store, const bst_los_tr
 }
 
 double bst_track_moved_px(const bst_camera *camera, bst_quat from, bst_quat to) {
-    double half_px = 0.5 * hypot((double)camera->width_px, (double)camera->height_px);
+    return bst_track_turned_px(camera, bst_quat_to_rotvec(bst_quat_mul(to, bst_quat_conj(from))));
+}
+
+double bst_track_turned_px(const bst_camera *camera, bst_vec3 d) {
+    double width = (double)camera->width_px, height = (double)camera->height_px;
+    double half_px = 0.5 * sqrt(width * width + height * height);
     double scale = bst_camera_scale_rad(camera), stretch = bst_camera_stretch(camera);
-    bst_vec3 d = bst_quat_to_rotvec(bst_quat_mul(to, bst_quat_conj(from)));
     /* a tilt moves points at the corner further than at the centre */
     double tilt = (1.0 + half_px * half_px * scale * scale) * stretch;
     half_px *= stretch;
-    return hypot(d.x, d.y) / scale * tilt + fabs(d.z) * half_px;
+    return sqrt(d.x * d.x + d.y * d.y) / scale * tilt + fabs(d.z) * half_px;
 }
 
 void bst_track_store_free(bst_track_store *store) {

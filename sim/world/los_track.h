@@ -26,5 +26,7 @@ bst_quat bst_track_attitude(const bst_los_track *track, double time_s);
 
 /* How far, in px, any point of the image moves at most from one attitude to another. */
 double bst_track_moved_px(const bst_camera *camera, bst_quat from, bst_quat to);
+/* The same for a turn (rotation vector, camera axes). */
+double bst_track_turned_px(const bst_camera *camera, bst_vec3 turn_rad);
 
 #endif

@@ -88,6 +88,8 @@ bool bst_motion_from_telemetry(const bst_pointing_telemetry *telemetry, int64_t 
     moments m = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
     bst_vec3 at_middle = {0, 0, 0};
     roughness noise = {.run = 0};
+    bst_vec3 rb = {0, 0, 0};
+    int64_t known = -1; /* sample that rb is of */
     for (int64_t n = first; n < newest; n++) {
         const bst_pointing_sample *a = sample_at(telemetry, n), *b = sample_at(telemetry, n + 1);
         double ta = (double)(a->tick - start_tick) - middle;
@@ -95,8 +97,10 @@ bool bst_motion_from_telemetry(const bst_pointing_telemetry *telemetry, int64_t 
         if (!(tb > ta)) {
             continue;
         }
-        bst_vec3 ra = bst_quat_to_rotvec(bst_quat_mul(a->q_cam_from_gcrf, inverse));
-        bst_vec3 rb = bst_quat_to_rotvec(bst_quat_mul(b->q_cam_from_gcrf, inverse));
+        bst_vec3 ra =
+            n == known ? rb : bst_quat_to_rotvec(bst_quat_mul(a->q_cam_from_gcrf, inverse));
+        rb = bst_quat_to_rotvec(bst_quat_mul(b->q_cam_from_gcrf, inverse));
+        known = n + 1;
         double lo = n == first || ta < -half ? -half : ta;
         double hi = n + 1 == newest || tb > half ? half : tb;
         if ((n == first || ta <= 0.0) && (n + 1 == newest || tb >= 0.0)) {
@@ -152,6 +156,21 @@ void bst_motion_bend(const bst_motion *motion, const bst_camera *camera, double 
     double a = motion->bend_cam_rad.y, b = -motion->bend_cam_rad.x;
     *x_px = (k[0][0] * a + k[0][1] * b) / scale;
     *y_px = (k[1][0] * a + k[1][1] * b) / scale;
+}
+
+/* Share of a measured or told bend that may be no bend. */
+static const double BEND_LEFT = 0.05;
+
+static void widen(double x, double y, bst_detection *d) {
+    d->cov_xx += x * x;
+    d->cov_xy += x * y;
+    d->cov_yy += y * y;
+}
+
+void bst_motion_widen(double bend_x_px, double bend_y_px, double followed_x_px,
+                      double followed_y_px, bst_detection *d) {
+    widen(0.5 * (bend_x_px - followed_x_px), 0.5 * (bend_y_px - followed_y_px), d);
+    widen(BEND_LEFT * followed_x_px, BEND_LEFT * followed_y_px, d);
 }
 
 /* The rotation vector that moves the boresight by (x_px, y_px). */

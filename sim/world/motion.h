@@ -34,6 +34,12 @@ void bst_motion_streak(const bst_motion *motion, const bst_camera *camera, doubl
 /* The bend of a star's path near the boresight, px. */
 void bst_motion_bend(const bst_motion *motion, const bst_camera *camera, double *x_px,
                      double *y_px);
+/* Widens the covariance of a detection's place, which stands for the mean of its path: a fit that
+ * does not follow the camera's uneven turn (bend, px) finds the place where the source dwelt, half
+ * the bend away when most of the path is there. followed: the bend that the fit had; a quadratic
+ * does not tell all of a start or a stop, and 5 % of it are left. */
+void bst_motion_widen(double bend_x_px, double bend_y_px, double followed_x_px,
+                      double followed_y_px, bst_detection *detection);
 /* Adds to the motion what makes paths near the boresight longer by (dx_px, dy_px) and bends them by
  * (bend_x_px, bend_y_px) more. */
 void bst_motion_add(bst_motion *motion, const bst_camera *camera, double dx_px, double dy_px,

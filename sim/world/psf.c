@@ -324,3 +324,19 @@ bst_status bst_camera_blurred(bst_ctx *ctx, const bst_camera *camera, double sig
     out->psf = psf;
     return BST_OK;
 }
+
+bst_status bst_camera_trembling(bst_ctx *ctx, const bst_camera *camera, double pixel_scale_arcsec,
+                                double jitter_rad2, bst_camera *out, bst_psf **psf) {
+    bst_camera scaled;
+    *psf = NULL;
+    scaled = *camera;
+    scaled.pixel_scale_arcsec = pixel_scale_arcsec;
+    BST_TRY(bst_camera_prepare(ctx, &scaled));
+    *out = scaled;
+    if (jitter_rad2 > 0.0) {
+        double sigma_px = sqrt(jitter_rad2) / bst_camera_scale_rad(&scaled);
+        BST_TRY(bst_camera_blurred(ctx, &scaled, sigma_px, out));
+        *psf = (bst_psf *)out->psf;
+    }
+    return BST_OK;
+}

@@ -54,6 +54,12 @@ void bst_psf_free(bst_psf *psf);
 bst_status bst_camera_blurred(bst_ctx *ctx, const bst_camera *camera, double sigma_px,
                               bst_camera *out) BST_MUST_CHECK;
 
+/* A camera at another pixel scale, its PSF widened by a line of sight that trembles with this
+ * variance per axis. *psf: what the caller frees after the camera, NULL without jitter.
+ * BST_ERR_CONFIG as bst_camera_prepare. */
+bst_status bst_camera_trembling(bst_ctx *ctx, const bst_camera *camera, double pixel_scale_arcsec,
+                                double jitter_rad2, bst_camera *out, bst_psf **psf) BST_MUST_CHECK;
+
 /* The OTF at (fx, fy) of a node: out = {real, imaginary}. */
 void bst_psf_otf(const bst_psf *psf, int node, double fx, double fy, double out[2]);
 

@@ -70,11 +70,64 @@ static void draws_follow_their_distributions(void **state) {
     assert_true(chi2 < 50.8); /* chi-square, 19 degrees of freedom, p = 1e-4 */
 }
 
+/* Blocks give what single draws do: 1e-15 of a logarithm and a square root of up to 8.6, of a sine
+ * near its zero. First counters below, across and far beyond 2^32. */
+static void normal_blocks_are_single_draws(void **state) {
+    (void)state;
+    const uint64_t firsts[] = {
+        0, 16, 12345, UINT64_C(0xFFFFFFF8), UINT64_C(1) << 40, UINT64_MAX - 4};
+    for (uint64_t seed = 1; seed <= 50; seed++) {
+        bst_rng_key key = bst_rng_make_key(seed, 0, "block", "normal");
+        for (size_t f = 0; f < sizeof firsts / sizeof *firsts; f++) {
+            double block[2][BST_RNG_BLOCK];
+            bst_rng_normal_block(key, firsts[f], block);
+            for (int i = 0; i < BST_RNG_BLOCK; i++) {
+                double one[2];
+                bst_rng_normal2(key, firsts[f] + (uint64_t)i, 0, one);
+                bst_assert_close(block[0][i], one[0], 2e-15 * (1.0 + fabs(one[0])));
+                bst_assert_close(block[1][i], one[1], 2e-15 * (1.0 + fabs(one[1])));
+            }
+        }
+    }
+}
+
+/* Mean, variance, correlation and tails of 320,000 deviates, at five standard errors each. */
+static void normal_blocks_are_normal(void **state) {
+    (void)state;
+    enum { BLOCKS = 10000, COUNT = 2 * BLOCKS * BST_RNG_BLOCK };
+    bst_rng_key key = bst_rng_make_key(7, 0, "block", "normal");
+    double sum = 0.0, square = 0.0, product = 0.0;
+    int beyond[2] = {0, 0}; /* of 1 and of 3 */
+    for (int b = 0; b < BLOCKS; b++) {
+        double block[2][BST_RNG_BLOCK];
+        bst_rng_normal_block(key, (uint64_t)b * BST_RNG_BLOCK, block);
+        for (int i = 0; i < BST_RNG_BLOCK; i++) {
+            product += block[0][i] * block[1][i];
+            for (int k = 0; k < 2; k++) {
+                double x = block[k][i];
+                sum += x;
+                square += x * x;
+                beyond[0] += fabs(x) > 1.0;
+                beyond[1] += fabs(x) > 3.0;
+            }
+        }
+    }
+    const double share[2] = {0.31731050786, 0.0026997960633}; /* erfc(n / sqrt 2) */
+    bst_assert_close(sum / COUNT, 0.0, 5.0 / sqrt(COUNT));
+    bst_assert_close(square / COUNT, 1.0, 5.0 * sqrt(2.0 / COUNT));
+    bst_assert_close(product / (COUNT / 2), 0.0, 5.0 / sqrt(COUNT / 2));
+    for (int k = 0; k < 2; k++) {
+        bst_assert_close((double)beyond[k] / COUNT, share[k], 5.0 * sqrt(share[k] / COUNT));
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(philox_known_answers),
         cmocka_unit_test(keys_depend_on_names_only),
         cmocka_unit_test(draws_follow_their_distributions),
+        cmocka_unit_test(normal_blocks_are_single_draws),
+        cmocka_unit_test(normal_blocks_are_normal),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

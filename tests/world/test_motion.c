@@ -181,6 +181,21 @@ static void noise_is_no_bend(void **state) {
     }
 }
 
+/* A place at 8 and -6 px of bend: half of what the fit does not follow, 5 % of what it does. */
+static void places_are_as_wrong_as_the_bend(void **state) {
+    (void)state;
+    bst_detection d = {.cov_xx = 1.0, .cov_yy = 2.0};
+    bst_motion_widen(8.0, -6.0, 0.0, 0.0, &d);
+    bst_assert_close(d.cov_xx, 17.0, 1e-14); /* rounding */
+    bst_assert_close(d.cov_xy, -12.0, 1e-14);
+    bst_assert_close(d.cov_yy, 11.0, 1e-14);
+    d = (bst_detection){.cov_xx = 1.0, .cov_yy = 2.0};
+    bst_motion_widen(8.0, -6.0, 8.0, -6.0, &d);
+    bst_assert_close(d.cov_xx, 1.16, 1e-14);
+    bst_assert_close(d.cov_xy, -0.12, 1e-14);
+    bst_assert_close(d.cov_yy, 2.09, 1e-14);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(noise_is_no_bend),
@@ -188,6 +203,7 @@ int main(void) {
         cmocka_unit_test(accelerated),
         cmocka_unit_test(few_samples),
         cmocka_unit_test(streak_is_the_stars_path),
+        cmocka_unit_test(places_are_as_wrong_as_the_bend),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
