@@ -17,6 +17,7 @@ enum {
 int bst_cmd_run(int argc, char **argv);
 int bst_cmd_info(int argc, char **argv);
 int bst_cmd_export(int argc, char **argv);
+int bst_cmd_report(int argc, char **argv);
 int bst_cmd_orbit(int argc, char **argv);
 int bst_cmd_check(int argc, char **argv);
 int bst_cmd_loop(int argc, char **argv);

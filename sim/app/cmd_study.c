@@ -24,12 +24,13 @@
 #include "sim/studies/tables.h"
 
 enum { FAILURES_SHOWN = 5 };
-static const double SHARD_S = 4.0;
+/* How long a shard takes. Slurm needs a while to start each, PoCL and the star catalogue too. */
+static const double SHARD_S = 4.0, SLURM_SHARD_S = 60.0;
 
 typedef struct study_request {
-    const char *out, *shard;
+    const char *out, *shard, *site;
     int64_t workers, emit, shard_runs;
-    bool resume, dry_run, quiet, schema, help, unpinned;
+    bool resume, dry_run, quiet, schema, help, unpinned, slurm;
 } study_request;
 
 const bst_study_kind *bst_app_study_kind(int kind) {
@@ -209,28 +210,40 @@ static void forget_what_is_gone(bst_ctx *ctx, bst_results *results, const bst_st
     }
 }
 
-static bst_status execute(bst_ctx *ctx, const study_request *r, const bst_study *study,
-                          const bst_study_kind *kind, const char *out, int lock,
-                          bst_results *results, bst_driver_outcome *outcome) {
-    bst_executor executor;
-    shown line = {.on = !r->quiet && isatty(STDERR_FILENO) == 1};
+static bst_status open_pool(bst_ctx *ctx, const study_request *r, const bst_study *study,
+                            const bst_study_kind *kind, const char *out, int lock,
+                            bst_executor *executor) {
     const bst_local_pool_options pool = {.study = study,
                                          .kind = kind,
                                          .out = out,
                                          .workers = (int)r->workers,
                                          .lock_fd = lock,
                                          .unpinned = r->unpinned};
-    const bst_driver_options options = {
-        .out = out,
-        .kind = kind,
-        .shard_s = SHARD_S,
-        .shard_runs = r->shard_runs,
-        .parallel = r->workers > 0 ? (int)r->workers : bst_local_cores(),
-        .progress = show,
-        .user = &line};
+    return bst_local_pool_open(ctx, &pool, executor);
+}
+
+static bst_status execute(bst_ctx *ctx, const study_request *r, const bst_study *study,
+                          const bst_study_kind *kind, const char *out, int lock,
+                          bst_results *results, bst_driver_outcome *outcome) {
+    bst_executor executor;
+    shown line = {.on = !r->quiet && isatty(STDERR_FILENO) == 1};
+    const bst_driver_options options = {.out = out,
+                                        .kind = kind,
+                                        .shard_s = r->slurm ? SLURM_SHARD_S : SHARD_S,
+                                        .shard_runs = r->shard_runs,
+                                        .parallel = r->slurm         ? 0
+                                                    : r->workers > 0 ? (int)r->workers
+                                                                     : bst_local_cores(),
+                                        .probe = r->slurm,
+                                        .progress = show,
+                                        .user = &line};
     BST_TRY(bst_results_load_folder(ctx, results, out, 0, study->runs, true));
     forget_what_is_gone(ctx, results, kind, out);
-    BST_TRY(bst_local_pool_open(ctx, &pool, &executor));
+    if (r->slurm) {
+        BST_TRY(bst_app_study_slurm(ctx, r->site, out, &executor));
+    } else {
+        BST_TRY(open_pool(ctx, r, study, kind, out, lock, &executor));
+    }
     bst_status status = bst_driver_run(ctx, results, &executor, &options, outcome);
     executor.close(executor.self);
     if (line.drawn) {
@@ -278,14 +291,23 @@ static int run_study(bst_ctx *ctx, const study_request *r, const bst_study *stud
 
 /* ------------------------------------------------------------------ one shard, by hand */
 
-/* "3/8": the third of eight equal parts. */
-static bst_status parse_shard(bst_ctx *ctx, const char *text, int64_t runs, bst_shard_job *job) {
+/* "3/8": the third of eight equal parts; "40:20": 20 runs from run 40 on, *exact. */
+static bst_status parse_shard(bst_ctx *ctx, const char *text, int64_t runs, bst_shard_job *job,
+                              bool *exact) {
     int64_t i, n;
     char rest;
+    *exact = sscanf(text, "%" SCNd64 ":%" SCNd64 "%c", &i, &n, &rest) == 2;
+    if (*exact && i >= 0 && n >= 1 && i < runs && n <= runs - i) {
+        job->first = i;
+        job->count = n;
+        return BST_OK;
+    }
     if (sscanf(text, "%" SCNd64 "/%" SCNd64 "%c", &i, &n, &rest) != 2 || n < 1 || i < 1 || i > n ||
         n > 1000000000) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
-                        "--shard %s: I/N is expected, from 1/N to N/N, such as 3/8", text);
+                        "--shard %s: I/N is expected, from 1/N to N/N, such as 3/8, or FIRST:COUNT "
+                        "within the study's %" PRId64 " runs",
+                        text, runs);
     }
     job->first = (int64_t)((double)runs * (double)(i - 1) / (double)n);
     job->count = (int64_t)((double)runs * (double)i / (double)n) - job->first;
@@ -319,11 +341,13 @@ static int run_shard(bst_ctx *ctx, const study_request *r, const bst_study *stud
     bst_results results;
     int lock = -1;
     int64_t done = 0;
-    if (parse_shard(ctx, r->shard, study->runs, &part) != BST_OK) {
+    bool exact;
+    if (parse_shard(ctx, r->shard, study->runs, &part, &exact) != BST_OK) {
         return bst_options_misuse(ctx, "study");
     }
     bst_status status = bst_results_create(ctx, study, kind, &results);
-    if (status == BST_OK) {
+    /* a driver that is at work holds the folder's lock, and asks for exact runs */
+    if (status == BST_OK && !exact) {
         status = open_folder(ctx, study, out, true, true, &lock);
     }
     if (status == BST_OK) {
@@ -462,6 +486,16 @@ int bst_cmd_study(int argc, char **argv) {
          .doc = "worker processes (default: one a core)",
          .minimum = 1,
          .maximum = 1024},
+        {.name = "slurm",
+         .kind = BST_OPTION_FLAG,
+         .target = &r.slurm,
+         .doc = "execute on a cluster, as job arrays of Slurm (docs/slurm.md)"},
+        {.name = "site",
+         .kind = BST_OPTION_TEXT,
+         .target = &r.site,
+         .argument = "FILE",
+         .doc = "what --slurm is to know of the cluster: account, partition, time (default "
+                "boresight/slurm.json in the user's configuration folder, where there is one)"},
         {.name = "resume",
          .kind = BST_OPTION_FLAG,
          .target = &r.resume,
@@ -482,8 +516,8 @@ int bst_cmd_study(int argc, char **argv) {
          .kind = BST_OPTION_TEXT,
          .target = &r.shard,
          .argument = "I/N",
-         .doc = "execute part I of N here, for a scheduler of your own; then --resume for the "
-                "tables"},
+         .doc = "execute part I of N here, for a scheduler of your own (or FIRST:COUNT); then "
+                "--resume for the tables"},
         {.name = "shard-runs",
          .kind = BST_OPTION_INT,
          .target = &r.shard_runs,
@@ -516,6 +550,10 @@ int bst_cmd_study(int argc, char **argv) {
     }
     if (r.schema && arguments == 0) {
         return print_schema();
+    }
+    if (r.slurm && r.workers > 0) {
+        bst_fail(&ctx, BST_ERR_ARGUMENT, "--workers is of this machine, --slurm of a cluster");
+        return bst_options_misuse(&ctx, "study");
     }
     if (arguments != 1) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "one study file is expected, %d were given", arguments);

@@ -3,6 +3,7 @@
 #define BST_APP_CMD_STUDY_H
 
 #include "sim/engine/simulation.h"
+#include "sim/studies/executor.h"
 #include "sim/studies/kind.h"
 #include "sim/world/stars.h"
 
@@ -39,5 +40,9 @@ bst_status bst_study_simulation(bst_ctx *ctx, bst_study_warm *warm, bst_scenario
 /* The scenario with every default, as text. */
 bst_status bst_study_print_scenario(bst_ctx *ctx, const bst_scenario *scenario,
                                     FILE *stream) BST_MUST_CHECK;
+
+/* Slurm as executor of the study in the folder `out`; `site_file` NULL: the user's own, if any. */
+bst_status bst_app_study_slurm(bst_ctx *ctx, const char *site_file, const char *out,
+                               bst_executor *executor) BST_MUST_CHECK;
 
 #endif

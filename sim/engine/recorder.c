@@ -40,6 +40,7 @@ const bst_config_desc bst_record_config_table[] = {
     BST_BOOL(bst_record_config, truth, "true", "True exposures and sources."),
     BST_BOOL(bst_record_config, truth_stars, "true", "Stars among the true sources."),
     BST_BOOL(bst_record_config, detections, "true", "What image processing found."),
+    BST_BOOL(bst_record_config, detection_stars, "true", "Detections labelled star."),
     BST_BOOL(bst_record_config, tracks, "true", "Tracks and the attitude from stars."),
     BST_BOOL(bst_record_config, commands, "true", "Commands to gimbal and sensor."),
     BST_BOOL(bst_record_config, events, "true", "Events."),

@@ -24,6 +24,7 @@ typedef struct bst_record_config {
     bool truth;
     bool truth_stars;
     bool detections;
+    bool detection_stars;
     bool tracks;
     bool commands;
     bool events;

@@ -8,9 +8,9 @@ typedef struct bst_simulation bst_simulation;
 struct bst_device;
 
 typedef struct bst_simulation_options {
-    const char *device; /* selector as in bst_device_open; NULL: default */
-    int threads;        /* 0: all */
-    bool overlap;       /* as bst_engine_overlap: hooks are called by a second thread */
+    const char *device;        /* selector as in bst_device_open; NULL: default */
+    int threads;               /* 0: all */
+    bool overlap;              /* as bst_engine_overlap: hooks are called by a second thread */
     struct bst_device *opened; /* used instead of opening one, and not closed; NULL: none */
 } bst_simulation_options;
 

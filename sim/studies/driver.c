@@ -48,9 +48,9 @@ static int64_t wanted_runs(const driver *d, int attempts) {
     double n = o->shard_runs > 0 ? (double)o->shard_runs
                : d->run_s > 0.0  ? o->shard_s / d->run_s
                                  : 1.0;
-    /* towards the end small ones, so that all are busy to the last */
-    double share = ceil((double)missing / (2.0 * (o->parallel > 0 ? o->parallel : 1)));
-    n = o->shard_runs > 0 ? n : fmin(n, share);
+    if (o->shard_runs == 0 && o->parallel > 0) {
+        n = fmin(n, ceil((double)missing / (2.0 * o->parallel)));
+    }
     n = attempts == 1 ? fmin(n, SMALL_SHARD) : attempts > 1 ? 1.0 : n;
     return (int64_t)fmax(fmin(n, MOST_RUNS_A_SHARD), 1.0);
 }
@@ -96,6 +96,9 @@ static bst_status start_shards(bst_ctx *ctx, driver *d) {
     enum { BATCH = 256 };
     bst_shard_job jobs[BATCH];
     int64_t room = d->executor->room(d->executor->self), n = 0;
+    if (d->options->probe && d->options->shard_runs == 0 && d->run_s <= 0.0) {
+        room = d->flight_count > 0 ? 0 : 1;
+    }
     while (n < BATCH && n < room) {
         jobs[n] = next_job(d);
         if (jobs[n].count == 0) {
@@ -135,6 +138,19 @@ static void count_attempt(driver *d, const bst_shard_job *job, bool blame) {
     d->cursor = job->first < d->cursor ? job->first : d->cursor;
 }
 
+/* What the runs of a job took that have rows now; without what it took to start. */
+static double mean_wall_s(const driver *d, const bst_shard_job *job) {
+    double sum = 0.0;
+    int64_t n = 0;
+    for (int64_t run = job->first; run < job->first + job->count; run++) {
+        if (d->results->state[run] != BST_ROW_MISSING) {
+            sum += d->results->wall_s[run];
+            n++;
+        }
+    }
+    return n > 0 ? fmax(sum / (double)n, 1e-6) : 0.0;
+}
+
 static bst_status end_shard(bst_ctx *ctx, driver *d, int64_t index, const bst_shard_news *news) {
     flight f = d->flights[index];
     int64_t before = d->results->done;
@@ -142,7 +158,7 @@ static bst_status end_shard(bst_ctx *ctx, driver *d, int64_t index, const bst_sh
     BST_TRY(take_rows(ctx, d, &f.job, news->runs_done));
     int64_t gained = d->results->done - before;
     if (gained > 0) {
-        double run_s = (bst_wall_seconds() - f.started) / (double)gained;
+        double run_s = mean_wall_s(d, &f.job);
         d->run_s = d->run_s > 0.0 ? 0.5 * (d->run_s + run_s) : run_s;
         d->failures_in_a_row = 0;
     }
@@ -190,8 +206,8 @@ static void tell(const driver *d) {
                              .runs_per_s = NAN,
                              .left_s = NAN};
     for (int64_t i = 0; i < d->flight_count; i++) {
-        p.done += d->flights[i].done;
-        p.failed += d->flights[i].failed;
+        p.done += d->flights[i].done > 0 ? d->flights[i].done : 0;
+        p.failed += d->flights[i].failed > 0 ? d->flights[i].failed : 0;
     }
     int64_t made = p.done - d->done_before;
     if (made > 0 && p.elapsed_s > 0.0) {

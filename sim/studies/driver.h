@@ -17,7 +17,9 @@ typedef struct bst_driver_options {
     double shard_s;     /* how long a shard is to take, seconds */
     double run_s;       /* a run, as far as that is known; 0: not at all */
     int64_t shard_runs; /* so many runs a shard; 0: by the two above */
-    int parallel;       /* shards that will go at a time */
+    int parallel;       /* shards that will go at a time; towards the end they get shorter, so
+                           that all are busy to the last. 0: not known, all are alike */
+    bool probe;         /* one run goes first, alone, to tell how long a run takes */
     void (*progress)(void *user, const bst_driver_progress *progress); /* NULL: none */
     void *user;
 } bst_driver_options;

@@ -31,7 +31,7 @@ enum { BST_SHARD_TEXT_BYTES = 480 };
 /* What became of a job. After ENDED or LOST no more is told of it. */
 typedef struct bst_shard_news {
     int64_t id;
-    int64_t runs_done, runs_failed; /* of this attempt */
+    int64_t runs_done, runs_failed; /* of this attempt; -1: not known */
     int32_t kind;                   /* bst_shard_news_kind */
     char text[BST_SHARD_TEXT_BYTES];
 } bst_shard_news;

@@ -43,6 +43,12 @@ static int bind_to_cores(int index, int workers, bool unpinned) {
     return each;
 }
 
+/* Cores that Slurm grants a task, which it need not be bound to; 0: this is no such task. */
+static int granted_cores(void) {
+    const char *text = getenv("SLURM_CPUS_PER_TASK");
+    return text ? atoi(text) : 0;
+}
+
 static bool make_folders(char *path) {
     for (char *slash = path; (slash = strchr(slash + 1, '/'));) {
         *slash = '\0';
@@ -92,7 +98,8 @@ static void take_cache(void) {
 
 int bst_local_settle(int index, int workers, bool unpinned) {
     char text[16];
-    int cores = bind_to_cores(index, workers, unpinned);
+    int cores = bind_to_cores(index, workers, unpinned), granted = granted_cores();
+    cores = granted > 0 && granted < cores ? granted : cores;
     unsetenv("POCL_AFFINITY");
     snprintf(text, sizeof text, "%d", cores);
     setenv("POCL_MAX_PTHREAD_COUNT", text, 1);

@@ -4,11 +4,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/core/quintic.h"
 #include "sim/world/psf.h"
 #include "sim/world/world_internal.h"
 
 /* The cue's direction is kept at whole seconds and interpolated by six of them. */
-enum { KNOTS = 16, STENCIL = 6 };
+enum { KNOTS = 16 };
 /* Fifth difference, rad, up to which the interpolation is used: what it misses is 200 times less.
  */
 static const double SMOOTH_RAD = 1e-11;
@@ -24,15 +25,17 @@ struct bst_knowledge_view {
     bst_sky_clock *clock;
     cue_knot knots[KNOTS];
     bst_quat cue_error; /* turns where the target nominally is to where the cue has it */
-    /* the second that was looked at last, and Newton's divided differences about it */
+    /* the second that was looked at last, and the quintic about it, of where the cue has the
+     * target */
     int64_t checked;
     bool any_checked, smooth;
-    bst_vec3 newton[STENCIL];
+    bst_vec3 cued[BST_QUINTIC_POINTS];
 };
 
-/* The onboard PSF is one Gaussian: of the width given, or else that with the true one's
- * noise-equivalent area in the middle of the field. */
-static void know_psf(bst_camera *c, double given_fwhm_px) {
+/* The onboard camera's PSF is one Gaussian: of the width given, or else that with the true one's
+ * noise-equivalent area in the middle of the field. *psf: the true one, where it is what is known
+ * and no such Gaussian. */
+static void know_psf(bst_camera *c, double given_fwhm_px, const bst_psf **psf) {
     double sigma_px;
     bool plain = (!c->psf && c->optics.psf == BST_PSF_GAUSSIAN) ||
                  (c->psf && bst_psf_gaussian(c->psf, &sigma_px));
@@ -42,6 +45,7 @@ static void know_psf(bst_camera *c, double given_fwhm_px) {
     if (given_fwhm_px > 0.0) {
         c->psf_fwhm_px = given_fwhm_px;
     } else if (c->psf) {
+        *psf = plain ? NULL : c->psf;
         c->psf_fwhm_px = bst_psf_equivalent_fwhm_px(c->psf, 0.5 * (double)(c->width_px - 1),
                                                     0.5 * (double)(c->height_px - 1));
     }
@@ -56,7 +60,7 @@ static bst_status alter_camera(bst_ctx *ctx, const bst_camera_errors_config *err
     c->rotation_deg += errors->rotation_error_deg;
     c->distortion = errors->own_distortion ? errors->distortion : c->distortion;
     c->throughput *= 1.0 + errors->throughput_error;
-    know_psf(c, errors->psf_fwhm_px);
+    know_psf(c, errors->psf_fwhm_px, &k->psf);
     bst_status status = bst_camera_prepare(ctx, c);
     return status == BST_OK
                ? status
@@ -114,6 +118,10 @@ const char *bst_knowledge_psf_file(const bst_knowledge *k, double *oversampling)
         &k->world->observers[k->observer].sensors[k->sensor].config.knowledge.camera;
     *oversampling = camera->psf_oversampling;
     return camera->psf_file;
+}
+
+const bst_psf *bst_knowledge_psf(const bst_knowledge *k) {
+    return k->psf;
 }
 
 const bst_camera *bst_knowledge_camera(const bst_knowledge *k) {
@@ -195,41 +203,30 @@ static const cue_knot *knot_at(bst_knowledge_view *view, int64_t second) {
 /* Whether the direction between a second and the next one follows a quintic. */
 static bool is_smooth(bst_knowledge_view *view, int64_t second) {
     if (!view->any_checked || view->checked != second) {
-        bst_vec3 *d = view->newton;
         bool known = true;
-        for (int i = 0; i < STENCIL; i++) {
-            const cue_knot *knot = knot_at(view, second - 2 + i);
+        for (int i = 0; i < BST_QUINTIC_POINTS; i++) {
+            const cue_knot *knot = knot_at(view, second - BST_QUINTIC_BEFORE + i);
             known = known && knot->known;
-            d[i] = knot->direction;
-        }
-        double last = 1.0; /* factorial of the order */
-        for (int order = 1; order < STENCIL; order++) {
-            last *= order;
-            for (int i = STENCIL - 1; i >= order; i--) {
-                d[i] = bst_vec3_scale(bst_vec3_sub(d[i], d[i - 1]), 1.0 / order);
-            }
+            view->cued[i] = bst_quat_rotate(view->cue_error, knot->direction);
         }
         view->any_checked = true;
         view->checked = second;
-        view->smooth = known && last * bst_vec3_norm(d[STENCIL - 1]) <= SMOOTH_RAD;
+        view->smooth = known && bst_quintic_make(view->cued) <= SMOOTH_RAD;
     }
     return view->smooth;
 }
 
-/* By the polynomial through the six seconds around where that is exact, else directly: a function
- * of time alone. */
+/* Where the cue has the target: by the polynomial through the six seconds around where that is
+ * exact, else directly; a function of time alone. */
 static bst_status direction_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                bst_vec3 *out) {
     double whole = floor(seconds);
-    if (!(fabs(seconds) < 1e12) || !is_smooth(view, (int64_t)whole)) {
-        return nominal_direction(ctx, view, seconds, out);
+    if (fabs(seconds) < 1e12 && is_smooth(view, (int64_t)whole)) {
+        *out = bst_quintic_at(view->cued, seconds - whole);
+        return BST_OK;
     }
-    double u = seconds - whole;
-    bst_vec3 sum = view->newton[STENCIL - 1];
-    for (int i = STENCIL - 2; i >= 0; i--) {
-        sum = bst_vec3_axpy(view->newton[i], u + 2.0 - i, sum);
-    }
-    *out = sum;
+    BST_TRY(nominal_direction(ctx, view, seconds, out));
+    *out = bst_quat_rotate(view->cue_error, *out);
     return BST_OK;
 }
 
@@ -244,11 +241,9 @@ bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double s
     }
     const world_sensor *sensor = sensor_of(k);
     const bst_cue_config *cue = &sensor->config.cue;
-    bst_quat error = view->cue_error;
     out->valid = true;
-    out->direction_gcrf = bst_quat_rotate(error, d[1]);
-    out->rate_gcrf_radps =
-        bst_quat_rotate(error, bst_vec3_scale(bst_vec3_sub(d[2], d[0]), 0.5 / h));
+    out->direction_gcrf = d[1];
+    out->rate_gcrf_radps = bst_vec3_scale(bst_vec3_sub(d[2], d[0]), 0.5 / h);
     bst_region region;
     bst_knowledge_region(k, &region);
     out->sigma_rad = region.kind == BST_REGION_NONE
@@ -262,11 +257,8 @@ bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double s
 
 bst_status bst_knowledge_cue_direction_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                           bool *valid, bst_vec3 *direction) {
-    bst_vec3 nominal;
-    BST_TRY(direction_at(ctx, view, seconds, &nominal));
     *valid = true;
-    *direction = bst_quat_rotate(view->cue_error, nominal);
-    return BST_OK;
+    return direction_at(ctx, view, seconds, direction);
 }
 
 void bst_knowledge_region(const bst_knowledge *k, bst_region *out) {
