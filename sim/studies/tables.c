@@ -383,6 +383,7 @@ static bst_status write_all(bst_ctx *ctx, const bst_tables_job *j) {
     BST_TRY(write_runs(ctx, j));
     BST_TRY(write_speed(ctx, j));
     BST_TRY(write_statistics(ctx, j));
+    BST_TRY(bst_study_write_sensitivity(ctx, j));
     return j->results->kind->series_count > 0 ? bst_study_write_series(ctx, j) : BST_OK;
 }
 
