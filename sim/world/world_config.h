@@ -86,7 +86,8 @@ typedef struct bst_world_config {
     char earth_orientation[512]; /* "builtin" or a path as above */
     bst_config_list objects;     /* bst_object_config */
     bst_config_list catalogues;  /* bst_catalogue_config */
-    /* not in the table: star_catalogue, open already, which outlives the world; NULL: it is opened */
+    /* not in the table: star_catalogue, open already, which outlives the world; NULL: it is opened
+     */
     const struct bst_stars *opened_stars;
 } bst_world_config;
 
