@@ -292,8 +292,8 @@ static bst_status open_scene(bst_ctx *ctx, bst_pd_scene *s) {
     set_points(s);
     s->device = s->options.opened;
     if (!s->device) {
-        BST_TRY(bst_device_open(ctx, s->options.device ? s->options.device : "",
-                                s->options.threads, &s->device));
+        BST_TRY(bst_device_open(ctx, s->options.device ? s->options.device : "", s->options.threads,
+                                &s->device));
     }
     bst_renderer_options fidelity = bst_renderer_default_options();
     fidelity.pattern = bst_detector_pattern_key(&s->camera, s->name);
