@@ -74,6 +74,9 @@ bst_status bst_bench_stack(bst_ctx *ctx, const bst_bench *self, const bst_bench_
 bst_status bst_bench_cold_start(bst_ctx *ctx, const bst_bench *self,
                                 const bst_bench_options *options,
                                 bst_bench_result *out) BST_MUST_CHECK;
+/* A study of 100,000 runs without anything to simulate: per run (bench_study.c). */
+bst_status bst_bench_study(bst_ctx *ctx, const bst_bench *self, const bst_bench_options *options,
+                           bst_bench_result *out) BST_MUST_CHECK;
 /* What such a process does: prints when each step was done, seconds of the monotonic clock. */
 bst_status bst_bench_first_frame(bst_ctx *ctx, const bst_bench_options *options) BST_MUST_CHECK;
 /* The closed loop (bench_foundations.c). */

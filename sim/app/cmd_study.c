@@ -34,8 +34,9 @@ typedef struct study_request {
 } study_request;
 
 const bst_study_kind *bst_app_study_kind(int kind) {
-    (void)kind;
-    return &bst_app_study_loop;
+    return kind == BST_STUDY_PD      ? &bst_app_study_pd
+           : kind == BST_STUDY_CUBES ? &bst_app_study_cubes
+                                     : &bst_app_study_loop;
 }
 
 /* ------------------------------------------------------------------ the folder */
@@ -190,6 +191,25 @@ static void print_end(const bst_results *r, const bst_driver_outcome *o, double 
     }
 }
 
+/* Rows whose files are gone or cut short, as a power cut may leave them, are made again. */
+static void forget_what_is_gone(bst_ctx *ctx, bst_results *results, const bst_study_kind *kind,
+                                const char *out) {
+    int64_t gone = 0;
+    for (int64_t i = 0; kind->intact && i < results->study->runs; i++) {
+        const bst_study_run run = {
+            .study = results->study, .place = bst_study_place_of(results->study, i), .out = out};
+        if (results->state[i] == BST_ROW_DONE &&
+            !kind->intact(kind->user, &run, results->metrics + i * kind->metric_count)) {
+            bst_results_forget(results, i);
+            gone++;
+        }
+    }
+    if (gone > 0) {
+        bst_log(ctx, BST_LOG_WARNING,
+                "the files of %" PRId64 " runs are gone or cut short; they are made again", gone);
+    }
+}
+
 static bst_status open_pool(bst_ctx *ctx, const study_request *r, const bst_study *study,
                             const bst_study_kind *kind, const char *out, int lock,
                             bst_executor *executor) {
@@ -218,6 +238,7 @@ static bst_status execute(bst_ctx *ctx, const study_request *r, const bst_study 
                                         .progress = show,
                                         .user = &line};
     BST_TRY(bst_results_load_folder(ctx, results, out, 0, study->runs, true));
+    forget_what_is_gone(ctx, results, kind, out);
     if (r->slurm) {
         BST_TRY(bst_app_study_slurm(ctx, r->site, out, &executor));
     } else {
@@ -246,9 +267,10 @@ static int run_study(bst_ctx *ctx, const study_request *r, const bst_study *stud
         status = execute(ctx, r, study, kind, out, lock, &results, &outcome);
     }
     if (status == BST_OK && outcome.missing == 0) {
-        status = bst_study_write_tables(ctx, &results, out);
-        if (status == BST_OK && kind->finish) {
-            status = kind->finish(ctx, kind->user, study, out);
+        bst_results_sort(&results);
+        status = kind->finish ? kind->finish(ctx, kind->user, &results, out) : BST_OK;
+        if (status == BST_OK) {
+            status = bst_study_write_tables(ctx, &results, out);
         }
     }
     if (status == BST_OK || status == BST_ERR_INTERRUPTED) {
@@ -432,9 +454,13 @@ static int command(bst_ctx *ctx, const study_request *r, const char *given) {
         bool checked = r->shard && access(file, F_OK) == 0; /* by who made the folder */
         status = checked ? BST_OK : bst_study_check(ctx, &study, kind);
         if (status == BST_OK) {
-            code = r->shard     ? run_shard(ctx, r, &study, kind, out)
-                   : r->dry_run ? BST_EXIT_OK
+            if (r->dry_run) {
+                bst_study_print_plan(&study, kind,
+                                     r->workers > 0 ? (int)r->workers : bst_local_cores(), out);
+            } else {
+                code = r->shard ? run_shard(ctx, r, &study, kind, out)
                                 : run_study(ctx, r, &study, kind, out);
+            }
         }
     }
     if (status != BST_OK) {

@@ -45,6 +45,7 @@ bst_status bst_study_warm_open(bst_ctx *ctx, void *user, int threads, void **wor
 void bst_study_warm_close(void *worker) {
     bst_study_warm *warm = worker;
     bst_device_close(warm->device);
+    bst_stars_close(warm->stars);
     free(warm);
 }
 
@@ -63,11 +64,30 @@ static bool needs_device(const bst_scenario *scenario) {
     return false;
 }
 
-bst_status bst_study_simulation(bst_ctx *ctx, bst_study_warm *warm, const bst_scenario *scenario,
+bst_status bst_study_warm_device(bst_ctx *ctx, bst_study_warm *warm) {
+    return warm->device ? BST_OK : bst_device_open(ctx, "", 0, &warm->device);
+}
+
+void bst_study_warm_stars(bst_study_warm *warm, bst_scenario *scenario) {
+    bst_ctx quiet = {0};
+    const char *name = scenario->world.star_catalogue;
+    if (!warm->stars || strcmp(name, warm->catalogue) != 0) {
+        bst_stars_close(warm->stars);
+        warm->stars = NULL;
+        snprintf(warm->catalogue, sizeof warm->catalogue, "%s", name);
+        /* who makes the world says what is wrong with it */
+        bst_status status = bst_stars_open(&quiet, name, &warm->stars);
+        (void)status;
+    }
+    scenario->world.opened_stars = warm->stars;
+}
+
+bst_status bst_study_simulation(bst_ctx *ctx, bst_study_warm *warm, bst_scenario *scenario,
                                 bst_simulation **out) {
     *out = NULL;
-    if (!warm->device && needs_device(scenario)) {
-        BST_TRY(bst_device_open(ctx, "", 0, &warm->device));
+    bst_study_warm_stars(warm, scenario);
+    if (needs_device(scenario)) {
+        BST_TRY(bst_study_warm_device(ctx, warm));
     }
     const bst_simulation_options options = {.threads = warm->threads, .opened = warm->device};
     return bst_simulation_create(ctx, scenario, &options, out);

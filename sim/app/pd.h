@@ -33,6 +33,8 @@ typedef struct bst_pd_options {
     const char *sensor;    /* "observer/sensor"; NULL: the first */
     const char *device;
     int threads;
+    bst_device *opened; /* used instead of opening one, and not closed; NULL: none */
+    bool quiet;         /* no progress line */
 } bst_pd_options;
 
 /* One target of a frame. */

@@ -290,8 +290,11 @@ static bst_status open_scene(bst_ctx *ctx, bst_pd_scene *s) {
     }
     BST_TRY(set_own_light(ctx, s));
     set_points(s);
-    BST_TRY(bst_device_open(ctx, s->options.device ? s->options.device : "", s->options.threads,
-                            &s->device));
+    s->device = s->options.opened;
+    if (!s->device) {
+        BST_TRY(bst_device_open(ctx, s->options.device ? s->options.device : "", s->options.threads,
+                                &s->device));
+    }
     bst_renderer_options fidelity = bst_renderer_default_options();
     fidelity.pattern = bst_detector_pattern_key(&s->camera, s->name);
     return bst_renderer_create(ctx, s->device, &s->camera, &fidelity, &s->renderer);
@@ -309,7 +312,9 @@ bst_status bst_pd_scene_open(bst_ctx *ctx, const bst_scenario *scenario,
 
 void bst_pd_scene_close(bst_pd_scene *s) {
     bst_renderer_free(s->renderer);
-    bst_device_close(s->device);
+    if (s->device != s->options.opened) {
+        bst_device_close(s->device);
+    }
     bst_psf_free(s->psf);
     bst_pd_image_free(s->image);
     bst_psf_free(s->seen);

@@ -1,9 +1,10 @@
+#define _GNU_SOURCE /* sched_getaffinity */
 #include "sim/core/parallel.h"
 
 #include <pthread.h>
+#include <sched.h>
 #include <stdbool.h>
 #include <stdlib.h>
-#include <unistd.h>
 
 enum { MOST_THREADS = 32 };
 
@@ -58,8 +59,9 @@ bst_status bst_parallel_create(bst_ctx *ctx, int threads, bst_parallel **out) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a pool of threads");
     }
     if (threads <= 0) {
-        long processors = sysconf(_SC_NPROCESSORS_ONLN);
-        threads = processors < 1 ? 1 : processors > MOST_THREADS ? MOST_THREADS : (int)processors;
+        cpu_set_t own;
+        int processors = sched_getaffinity(0, sizeof own, &own) == 0 ? CPU_COUNT(&own) : 1;
+        threads = processors < 1 ? 1 : processors > MOST_THREADS ? MOST_THREADS : processors;
     }
     pthread_mutex_init(&pool->lock, NULL);
     pthread_cond_init(&pool->work, NULL);

@@ -6,8 +6,9 @@
 
 typedef struct bst_parallel bst_parallel;
 
-/* Starts threads - 1 threads (the caller of a loop is the other one); 0: one per processor, 32 at
- * most. They sleep between loops. When fewer can be started the loops run on those there are. */
+/* Starts threads - 1 threads (the caller of a loop is the other one); 0: one per processor that
+ * this process may run on, 32 at most. They sleep between loops. When fewer can be started the
+ * loops run on those there are. */
 bst_status bst_parallel_create(bst_ctx *ctx, int threads, bst_parallel **out) BST_MUST_CHECK;
 /* NULL allowed; no loop may be running. */
 void bst_parallel_free(bst_parallel *pool);

@@ -11,7 +11,7 @@
 
 enum { MAX_PLATFORMS = 16, MAX_DEVICES = 32, NAME_BYTES = 256 };
 
-enum { MAX_BUILT = 64, MAX_PROGRAMS = 64, PROGRAM_SOURCES = 8 };
+enum { MAX_BUILT = 64, MAX_PROGRAMS = 64, PROGRAM_SOURCES = 32 };
 
 /* A program that was built. */
 typedef struct kept_program {

@@ -210,10 +210,10 @@ static bst_status try_base(checker *c, const bst_study_place *place) {
 /* Runs as they will be. */
 static bst_status try_runs(checker *c) {
     const bst_study *study = c->study;
-    int64_t count = study->settings < RUNS_TRIED ? study->settings : RUNS_TRIED;
+    int64_t count = study->runs < RUNS_TRIED ? study->runs : RUNS_TRIED;
     for (int64_t i = 0; i < count; i++) {
-        int64_t setting = (int64_t)((double)i * (double)study->settings / (double)count);
-        bst_study_place place = bst_study_place_of(study, setting * study->config.replicates);
+        int64_t run = (int64_t)((double)i * (double)study->runs / (double)count);
+        bst_study_place place = bst_study_place_of(study, run);
         bst_study_values(study, &place, c->values);
         bst_status status = check_run(c->ctx, study, c->kind, &place, c->values, false);
         if (status != BST_OK) {

@@ -21,6 +21,8 @@ typedef struct bst_metric {
 
 enum { BST_STUDY_METRICS = 48, BST_SERIES_COLUMNS = 24 };
 
+struct bst_results;
+
 /* One run, ready to be executed. */
 typedef struct bst_study_run {
     const bst_study *study;
@@ -60,8 +62,13 @@ typedef struct bst_study_kind {
      * to `command`. */
     bst_status (*emit)(bst_ctx *ctx, void *user, const bst_study_run *run, FILE *scenario,
                        FILE *command);
-    /* After the last run: what belongs beside the tables. NULL: nothing. */
-    bst_status (*finish)(bst_ctx *ctx, void *user, const bst_study *study, const char *out);
+    /* Whether what a run left in the study's folder is still there as its row (metrics) says. NULL:
+     * runs leave nothing that matters. */
+    bool (*intact)(void *user, const bst_study_run *run, const double *metrics);
+    /* After the last run, before the tables are put in their place: what belongs beside them. NULL:
+     * nothing. */
+    bst_status (*finish)(bst_ctx *ctx, void *user, const struct bst_results *results,
+                         const char *out);
     /* Whether the user asked to stop. */
     bool (*stop_requested)(void *user);
 } bst_study_kind;

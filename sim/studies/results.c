@@ -31,6 +31,20 @@ void bst_results_free(bst_results *r) {
     *r = (bst_results){.study = NULL};
 }
 
+void bst_results_forget(bst_results *r, int64_t run) {
+    if (r->state[run] != BST_ROW_DONE) {
+        return;
+    }
+    r->state[run] = BST_ROW_MISSING;
+    r->done--;
+    for (int64_t i = 0; i < r->part_count; i++) {
+        if (r->parts[i].run == run) {
+            r->parts[i] = r->parts[--r->part_count];
+            break;
+        }
+    }
+}
+
 static int compare_errors(const void *a, const void *b) {
     const bst_row_error *x = a, *y = b;
     return (x->run > y->run) - (x->run < y->run);

@@ -36,6 +36,9 @@ typedef struct bst_results {
     int64_t differing;    /* of them: other than what was there */
 } bst_results;
 
+/* Forgets the row of a run: it is to be made again. */
+void bst_results_forget(bst_results *results, int64_t run);
+
 bst_status bst_results_create(bst_ctx *ctx, const bst_study *study, const bst_study_kind *kind,
                               bst_results *out) BST_MUST_CHECK;
 void bst_results_free(bst_results *results);

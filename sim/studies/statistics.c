@@ -1,6 +1,7 @@
 #include "sim/studies/statistics.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -50,10 +51,11 @@ static void describe(const double *values, int64_t rows, int columns, int column
 }
 
 /* Means of one resample into means[columns]; NAN where none of its numbers was drawn. Values are
- * taken from the column's mean, so that sums do not cancel. */
-static void resample(const double *centred, const uint8_t *there, int64_t rows, int columns,
-                     bst_rng_key key, uint64_t number, double *sums, int64_t *counts,
-                     double *means) {
+ * taken from the column's mean, so that sums do not cancel. there: 1 for a number, 0 for none; NULL
+ * when all are numbers. */
+static void resample(const double *restrict centred, const double *restrict there, int64_t rows,
+                     int columns, bst_rng_key key, uint64_t number, double *restrict sums,
+                     double *restrict counts, double *restrict means) {
     memset(sums, 0, (size_t)columns * sizeof *sums);
     memset(counts, 0, (size_t)columns * sizeof *counts);
     bst_philox_words words = {{0, 0, 0, 0}};
@@ -64,14 +66,17 @@ static void resample(const double *centred, const uint8_t *there, int64_t rows, 
         /* rows are far below 2^32: the draw is even to rows / 2^32 */
         int64_t row = (int64_t)(((uint64_t)words.w[i % 4] * (uint64_t)rows) >> 32);
         const double *from = centred + row * columns;
-        const uint8_t *is = there + row * columns;
         for (int c = 0; c < columns; c++) {
             sums[c] += from[c];
+        }
+        const double *is = there ? there + row * columns : NULL;
+        for (int c = 0; is && c < columns; c++) {
             counts[c] += is[c];
         }
     }
     for (int c = 0; c < columns; c++) {
-        means[c] = counts[c] > 0 ? sums[c] / (double)counts[c] : NAN;
+        double n = there ? counts[c] : (double)rows;
+        means[c] = n > 0.0 ? sums[c] / n : NAN;
     }
 }
 
@@ -94,8 +99,8 @@ bst_status bst_statistics_of(bst_ctx *ctx, const double *values, int64_t rows, i
     double *centred = malloc(cells * sizeof *centred + 1), *sums = malloc(wide * sizeof *sums + 1);
     double *means = malloc((size_t)resamples * wide * sizeof *means + 1);
     double *scratch = malloc(most * sizeof *scratch + 1);
-    uint8_t *there = malloc(cells + 1);
-    int64_t *counts = malloc(wide * sizeof *counts + 1);
+    double *there = malloc(cells * sizeof *there + 1), *counts = malloc(wide * sizeof *counts + 1);
+    bool gaps = false;
     bst_status status = BST_OK;
     if (!centred || !sums || !means || !scratch || !there || !counts) {
         status = bst_fail(ctx, BST_ERR_MEMORY, "out of memory for statistics");
@@ -104,12 +109,22 @@ bst_status bst_statistics_of(bst_ctx *ctx, const double *values, int64_t rows, i
     for (int c = 0; c < columns; c++) {
         describe(values, rows, columns, c, scratch, &out[c]);
     }
+    if (rows > BST_BOOTSTRAP_RUNS) {
+        for (int c = 0; c < columns; c++) {
+            double half = 1.959963984540054 * out[c].std / sqrt((double)out[c].count);
+            out[c].low = out[c].mean - half;
+            out[c].high = out[c].mean + half;
+        }
+        goto exit;
+    }
     for (size_t i = 0; i < cells; i++) {
-        there[i] = (uint8_t)!isnan(values[i]);
-        centred[i] = there[i] ? values[i] - out[i % wide].mean : 0.0;
+        bool missing = isnan(values[i]);
+        there[i] = missing ? 0.0 : 1.0;
+        centred[i] = missing ? 0.0 : values[i] - out[i % wide].mean;
+        gaps = gaps || missing;
     }
     for (int64_t b = 0; b < resamples && rows > 1; b++) {
-        resample(centred, there, rows, columns, key, (uint64_t)b, sums, counts,
+        resample(centred, gaps ? there : NULL, rows, columns, key, (uint64_t)b, sums, counts,
                  means + (size_t)b * wide);
     }
     for (int c = 0; c < columns && rows > 1; c++) {

@@ -17,6 +17,10 @@ typedef struct bst_statistics {
  * Am. Stat. 50, 361). NAN for none. */
 double bst_quantile(const double *sorted, int64_t n, double q);
 
+/* Beyond so many runs the interval of a mean is that of a normal distribution, mean +- 1.96 std /
+ * sqrt(n), from which the bootstrap's differs by less than its own scatter. */
+enum { BST_BOOTSTRAP_RUNS = 5000 };
+
 /* Statistics of `columns` metrics over `rows` runs, values[rows][columns], into out[columns].
  * Intervals are percentile bootstrap intervals of the mean (Efron 1979, Ann. Stat. 7, 1) over
  * `resamples` resamples of the runs, which follow from `key` and are the same for all columns; none

@@ -105,6 +105,9 @@ static bst_status name_axis(bst_ctx *ctx, const bst_study *study, const char *gi
     char name[256];
     for (int parts = 1; parts <= 8; parts++) {
         name_of_pointer(axis->path, parts, name, sizeof name);
+        if (*name >= '0' && *name <= '9') {
+            continue; /* an element's number says nothing without its list's name */
+        }
         for (char *c = name; *c; c++) {
             *c = is_word((char[]){*c, '\0'}) ? *c : '_';
         }

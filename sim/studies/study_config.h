@@ -74,7 +74,6 @@ typedef struct bst_study_cubes_config {
     char sensor[160];
     double train, validation, test;
     bool compress;
-    bool segmentation;
     double box_px, star_limit_v_mag;
 } bst_study_cubes_config;
 

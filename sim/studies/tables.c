@@ -279,7 +279,8 @@ enum { STATISTICS_COLUMNS = 17 };
 static void statistics_columns(bst_column *c) {
     *c++ = int_column("setting", "Number of the setting; NULL: all runs of the study.");
     *c++ = text_column("metric", "Name of the metric.");
-    *c++ = text_column("method", "Of the interval: wilson (of a rate) or bootstrap (of a mean).");
+    *c++ = text_column("method",
+                       "Of the interval: wilson (of a rate), bootstrap or normal (of a mean).");
     *c++ = int_column("runs", "Runs that have a number.");
     *c++ = int_column("missing", "Runs that have none, failed ones among them.");
     *c++ = real_column("mean", "", "Mean, or rate.");
@@ -316,7 +317,9 @@ static bst_status put_statistics(bst_ctx *ctx, const bst_tables_job *j, bst_tabl
         const bst_value row[] = {
             setting < 0 ? bst_null_value(BST_COLUMN_INT) : bst_int_value(setting),
             bst_text_value(m->name),
-            bst_text_value(m->kind == BST_METRIC_FLAG ? "wilson" : "bootstrap"),
+            bst_text_value(m->kind == BST_METRIC_FLAG   ? "wilson"
+                           : count > BST_BOOTSTRAP_RUNS ? "normal"
+                                                        : "bootstrap"),
             bst_int_value(s->count),
             bst_int_value(s->missing),
             bst_real_value(s->mean),
@@ -380,6 +383,7 @@ static bst_status write_all(bst_ctx *ctx, const bst_tables_job *j) {
     BST_TRY(write_runs(ctx, j));
     BST_TRY(write_speed(ctx, j));
     BST_TRY(write_statistics(ctx, j));
+    BST_TRY(bst_study_write_sensitivity(ctx, j));
     return j->results->kind->series_count > 0 ? bst_study_write_series(ctx, j) : BST_OK;
 }
 

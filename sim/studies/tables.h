@@ -15,7 +15,8 @@
  *   statistics(setting, metric, ...): of the settings' runs; setting NULL: of all runs. Settings of
  *     one run have none of their own
  *   the series of the kind: SERIES(run, ...) and SERIES_statistics(setting, ...)
- *   sensitivity(...): of designs one_at_a_time and morris (sim/studies/sensitivity.h)
+ *   sensitivity(...): of designs one_at_a_time and morris (sim/studies/sensitivity.h), and
+ *     speed_sensitivity of the wall time
  * and runs.csv, settings.csv, speed.csv, statistics.csv and so on. Numbers do not depend on who
  * executed the runs, in what order, and how often; runs without a row are left out. */
 bst_status bst_study_write_tables(bst_ctx *ctx, bst_results *results,

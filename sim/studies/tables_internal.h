@@ -22,6 +22,8 @@ bst_column bst_axis_column(const bst_study_axis *axis);
 bst_value bst_axis_value(const bst_study *study, int axis, const bst_study_value *value, int base,
                          char **text);
 
+/* Ranked tables of designs that tell which axes matter, where the study has any. */
+bst_status bst_study_write_sensitivity(bst_ctx *ctx, const bst_tables_job *job) BST_MUST_CHECK;
 /* The kind's series, run by run, and over the runs of each setting. */
 bst_status bst_study_write_series(bst_ctx *ctx, const bst_tables_job *job) BST_MUST_CHECK;
 

@@ -104,6 +104,16 @@ bst_status bst_stars_with_errors(bst_ctx *ctx, const bst_stars *stars,
     return BST_OK;
 }
 
+bst_status bst_stars_share(bst_ctx *ctx, const bst_stars *stars, bst_stars **out) {
+    *out = malloc(sizeof **out);
+    if (!*out) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the star catalogue");
+    }
+    **out = *stars;
+    (*out)->borrowed = true;
+    return BST_OK;
+}
+
 bst_status bst_stars_default_path(bst_ctx *ctx, char *buffer, size_t bytes) {
     const char *data = getenv("XDG_DATA_HOME");
     const char *home = getenv("HOME");

@@ -46,6 +46,9 @@ typedef struct bst_stars_info {
  * BST_ERR_NOT_FOUND: no such file; BST_ERR_FORMAT: not a catalogue, truncated or damaged. */
 bst_status bst_stars_open(bst_ctx *ctx, const char *name, bst_stars **out) BST_MUST_CHECK;
 
+/* Another handle on an open catalogue, which is to be closed after it. */
+bst_status bst_stars_share(bst_ctx *ctx, const bst_stars *stars, bst_stars **out) BST_MUST_CHECK;
+
 /* Closes a catalogue; NULL is allowed. */
 void bst_stars_close(bst_stars *stars);
 

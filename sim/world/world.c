@@ -155,7 +155,11 @@ static bst_status build(bst_world_builder *b, const bst_world_config *config,
     if (status != BST_OK) {
         return bst_fail_prefix(b->ctx, status, "%s: /epoch_utc", b->scenario);
     }
-    BST_TRY(open_stars(b, config->star_catalogue, "/world/star_catalogue", &world->stars));
+    if (config->opened_stars) {
+        BST_TRY(bst_stars_share(b->ctx, config->opened_stars, &world->stars));
+    } else {
+        BST_TRY(open_stars(b, config->star_catalogue, "/world/star_catalogue", &world->stars));
+    }
     world->faint_limit_v_mag =
         config->faint_stars == BST_FAINT_STATISTICAL ? config->faint_limit_v_mag : -INFINITY;
     if (config->faint_stars == BST_FAINT_STATISTICAL || needs_starlight(observers)) {

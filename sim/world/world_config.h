@@ -76,6 +76,8 @@ typedef struct bst_catalogue_config {
 
 enum { BST_FAINT_NONE, BST_FAINT_STATISTICAL };
 
+struct bst_stars;
+
 typedef struct bst_world_config {
     char star_catalogue[512]; /* "default", "embedded" or a path as above */
     int32_t faint_stars;      /* BST_FAINT_... */
@@ -84,6 +86,9 @@ typedef struct bst_world_config {
     char earth_orientation[512]; /* "builtin" or a path as above */
     bst_config_list objects;     /* bst_object_config */
     bst_config_list catalogues;  /* bst_catalogue_config */
+    /* not in the table: star_catalogue, open already, which outlives the world; NULL: it is opened
+     */
+    const struct bst_stars *opened_stars;
 } bst_world_config;
 
 /* A region of the sky in which a target is to be found, in place of a cue to its place. */

@@ -4,6 +4,7 @@ made them, a study that was cut down anywhere goes on, mistakes are found before
 Usage, from the repository root: /usr/bin/python3 tests/e2e/test_study.py BORESIGHT [KILLS]
 """
 import csv
+import glob
 import json
 import math
 import os
@@ -245,7 +246,7 @@ class CutDown(unittest.TestCase):
         """A limit on the size of files stands for the disk: results that do not fit are made again
         when there is room."""
         out = os.path.join(self.folder, "full")
-        for size in (0, self.random.randrange(1, 3000)):
+        for size in [0] + [self.random.randrange(512, 20000) for _ in range(KILLS // 2)]:
             subprocess.run(["sh", "-c", f"ulimit -f {size // 512}; exec \"$@\"", "sh",
                             runs.BORESIGHT, "study", self.path, "--out", out, "--resume"],
                            capture_output=True, text=True, timeout=600, check=False)
@@ -292,6 +293,147 @@ class Mistakes(unittest.TestCase):
         self.refused("no such object", set={"/observers/0/sensors/0/cue/object": "no such object"})
 
 
+class Pd(unittest.TestCase):
+    """Kind pd: curves are those of boresight pd."""
+
+    def test_curves(self):
+        folder = runs.scratch()
+        path = write(folder, kind="pd", scenarios=[{"file": os.path.abspath(runs.STARE)}],
+                     set={"/world/star_catalogue": "embedded"}, dispersions=None, replicates=2,
+                     sweeps=[{"axes": [{"path": "/pd/streak_px", "values": [0, 6]}]}],
+                     pd={"snr_first": 4, "snr_last": 6, "snr_step": 1, "trials": 90,
+                         "empty_frames": 6, "false_alarms_per_frame": 20})
+        out = os.path.join(folder, "out")
+        result = study(path, "--out", out)
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        emitted = study(path, "--emit", "3")
+        scenario = os.path.join(folder, "run3.json")
+        with open(scenario, "w", encoding="utf-8") as file:
+            file.write(emitted.stdout)
+        words = emitted.stderr.split("boresight ")[1].split()
+        self.assertEqual(words[:2], ["pd", "SCENARIO.json"])
+        told = os.path.join(folder, "pd.json")
+        result = subprocess.run([runs.BORESIGHT, "pd", scenario, *words[2:], "--json", told],
+                                capture_output=True, text=True, timeout=600)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with open(told, encoding="utf-8") as file:
+            told = json.load(file)
+        row = rows(out)[3]
+        self.assertEqual(float(row["streak_px"]), 6)
+        # the JSON has 15 digits
+        for name in ("loss_db_pd50", "false_alarms_per_frame", "threshold_snr"):
+            self.assertAlmostEqual(float(row[name] or "nan"), told[name] or math.nan,
+                                   delta=1e-14 * abs(told[name] or 1), msg=name)
+        curve = [r for r in rows(out, "curve") if r["run"] == "3"]
+        self.assertEqual([(float(r["snr"]), float(r["trials"]), float(r["detected"]))
+                          for r in curve],
+                         [(p["snr"], p["trials"], p["detected"]) for p in told["points"]])
+        for r, p in zip(curve, told["points"]):
+            self.assertAlmostEqual(float(r["pd"]), p["pd"], delta=1e-14)
+        for pooled in rows(out, "curve_statistics"):
+            of = [r for r in rows(out, "curve") if r["snr"] == pooled["snr"] and
+                  int(r["run"]) // 2 == int(pooled["setting"])]
+            self.assertEqual(float(pooled["trials"]), 180)
+            self.assertEqual(float(pooled["detected"]), sum(float(r["detected"]) for r in of))
+            self.assertEqual(float(pooled["rate"]), float(pooled["detected"]) / 180)
+
+    def test_settings_are_checked(self):
+        folder = runs.scratch()
+        for pd, text in (({"snr_frist": 3}, "/pd/snr_frist: unknown key; did you mean"),
+                         ({"snr_first": 9, "snr_last": 3}, "/pd: SNR from 9 to 3"),
+                         ({"known_rate": True}, "/pd/known_rate: needs a streak_px")):
+            path = write(folder, kind="pd", scenarios=[{"file": os.path.abspath(runs.STARE)}],
+                         set=None, dispersions=None, pd=pd)
+            result = study(path, "--dry-run")
+            self.assertEqual(result.returncode, 1)
+            self.assertIn(text, result.stderr)
+
+
+class Cubes(unittest.TestCase):
+    """Kind cubes: frames are those of boresight run, labels those of its truth."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = runs.scratch()
+        cls.path = write(cls.folder, kind="cubes", sweeps=None, replicates=5,
+                         scenarios=[{"file": os.path.abspath("scenarios/datacube.json")}],
+                         set={"/world/star_catalogue": "embedded", "/duration_s": 4,
+                              "/observers/0/sensors/0/camera/width_px": 160,
+                              "/observers/0/sensors/0/camera/height_px": 128},
+                         dispersions=[{"path": NOISE, "from": 5, "to": 12}],
+                         cubes={"train": 60, "validation": 20, "test": 20})
+        cls.out = os.path.join(cls.folder, "out")
+        cls.result = study(cls.path, "--out", cls.out)
+
+    def read(self, *name):
+        with open(os.path.join(self.out, *name), "rb") as file:
+            return file.read()
+
+    def test_frames_and_labels_by_hand(self):
+        self.assertEqual((self.result.returncode, self.result.stderr), (0, ""))
+        scenario = os.path.join(self.folder, "run2.json")
+        with open(scenario, "w", encoding="utf-8") as file:
+            file.write(study(self.path, "--emit", "2").stdout)
+        out = os.path.join(self.folder, "run2")
+        result = subprocess.run([runs.BORESIGHT, "run", scenario, "--quiet", "--out", out],
+                                capture_output=True, text=True, timeout=600)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with open(os.path.join(out, "frames.fits"), "rb") as file:
+            self.assertEqual(file.read(), self.read("ImageFiles", "000002.fits"))
+        labels = json.loads(self.read("Annotations", "000002.json"))["data"]
+        self.assertEqual(len(labels["frames"]), int(rows(self.out)[2]["frames"]))
+        self.assertGreaterEqual(len(labels["frames"]), 3)
+        with runs.database(out) as database:
+            for frame in labels["frames"]:
+                truth = {(row["kind"], str(row["norad"] or row["id"])): row
+                         for row in database.execute(
+                             "SELECT * FROM truth WHERE exposure_id = ? AND electrons > 0",
+                             (frame["sequence_id"],))}
+                seen = 0
+                for item in frame["objects"]:
+                    kind = "star" if item["class_name"] == "Star" else "object"
+                    row = truth[kind, item["object_id"]]
+                    seen += kind == "object"
+                    # 12 digits of a fraction of the image
+                    self.assertAlmostEqual(item["x_mid"] * 160 - 0.5, row["x_mid_px"], delta=1e-8)
+                    self.assertAlmostEqual(item["y_end"] * 128 - 0.5, row["y_end_px"], delta=1e-8)
+                    self.assertAlmostEqual(item["snr_aperture"], row["snr"],
+                                           delta=1e-9 * row["snr"])
+                self.assertEqual(seen, 1)
+
+    def test_parts_and_card(self):
+        listed = []
+        card = json.loads(self.read("card.json"))
+        for part, name in enumerate(("train", "val", "test")):
+            lines = self.read(name + ".txt").decode().split("\n")[:-1]
+            listed += lines
+            of = [r["run"] for r in rows(self.out) if int(r["part"]) == part]
+            self.assertEqual([int(line[11:17]) for line in lines], [int(r) for r in of])
+        self.assertEqual(sorted(listed),
+                         [f"ImageFiles/{i:06}.fits Annotations/{i:06}.json" for i in range(5)])
+        self.assertEqual(sum(card["split"].values()), 5)
+        self.assertEqual(card["counts"]["frames"], sum(int(r["frames"]) for r in rows(self.out)))
+        self.assertEqual(card["varied"][0]["least"],
+                         min(float(r["read_noise_e"]) for r in rows(self.out)))
+
+    def test_what_is_gone_is_made_again(self):
+        before = self.read("ImageFiles", "000003.fits"), self.read("runs.csv")
+        os.truncate(os.path.join(self.out, "ImageFiles", "000003.fits"), 2880)
+        os.remove(os.path.join(self.out, "Annotations", "000000.json"))
+        result = study(self.out, "--resume")
+        self.assertEqual(result.returncode, 0)
+        self.assertIn("files of 2 runs are gone", result.stderr)
+        self.assertEqual((self.read("ImageFiles", "000003.fits"), self.read("runs.csv")), before)
+        self.assertTrue(os.path.exists(os.path.join(self.out, "Annotations", "000000.json")))
+
+
+class Ready(unittest.TestCase):
+    def test_ready_studies_are_right(self):
+        for path in sorted(glob.glob("scenarios/studies/*.json")):
+            result = study(path, "--dry-run")
+            self.assertEqual((result.returncode, result.stderr), (0, ""), path)
+
+
 class Schema(unittest.TestCase):
     def test_shipped_schema_is_current(self):
         result = study("--schema")
@@ -304,7 +446,7 @@ class Schema(unittest.TestCase):
         with open("scenarios/study.schema.json", encoding="utf-8") as file:
             schema = json.load(file)
         folder = runs.scratch()
-        for path in [write(folder)]:
+        for path in [write(folder), *glob.glob("scenarios/studies/*.json")]:
             with open(path, encoding="utf-8") as file:
                 jsonschema.validate(json.load(file), schema)
 

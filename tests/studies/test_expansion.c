@@ -1,6 +1,7 @@
 /* From a study to its runs: settings, designs, dispersions, documents. */
 #include <cjson/cJSON.h>
 
+#include "sim/studies/sensitivity.h"
 #include "tests/studies/study_fixture.h"
 
 static char folder[BST_TEST_PATH];
@@ -183,6 +184,71 @@ static void test_morris(void **state) {
     bst_study_close(&s);
 }
 
+/* Elementary effects of y = 3 u0 - u1 + 4 u1 u2 over unit ranges: axis 0 has 3 on every path; axes
+ * 1 and 2 have 4 u - 1 and 4 u at the other's place u, whose spread shows. One at a time from 0: y
+ * changes by 3, 1 and 0. */
+static void test_sensitivity(void **state) {
+    (void)state;
+    static const bst_metric metrics[] = {{"y", "", "y", BST_METRIC_VALUE}};
+    const bst_study_kind kind = {.name = "loop", .metrics = metrics, .metric_count = 1};
+    const char *axes =
+        "[{\"path\": \"/a\", \"from\": 0, \"to\": 1%s}, {\"path\": \"/b/c\", "
+        "\"from\": 0, \"to\": 1%s}, {\"path\": \"/d\", \"from\": 0, \"to\": "
+        "1%s}]";
+    for (int morris = 0; morris < 2; morris++) {
+        bst_ctx ctx = {0};
+        bst_study s;
+        bst_results r;
+        char body[1024], list[512];
+        const char *count = morris ? "" : ", \"count\": 3";
+        snprintf(list, sizeof list, axes, count, count, count);
+        snprintf(body, sizeof body,
+                 "\"replicates\": 2, \"sweeps\": [{\"axes\": [{\"path\": \"/word\", "
+                 "\"values\": [\"p\", \"q\"]}]}, {\"design\": \"%s\"%s, \"axes\": %s}]",
+                 morris ? "morris" : "one_at_a_time", morris ? ", \"trajectories\": 30" : "", list);
+        bst_assert_ok(&ctx, fixture_open(&ctx, folder, body, &s));
+        bst_assert_ok(&ctx, bst_results_create(&ctx, &s, &kind, &r));
+        for (int64_t run = 0; run < s.runs; run++) {
+            bst_study_value v[8];
+            values_of(&s, run, v);
+            double u[3];
+            for (int a = 0; a < 3; a++) {
+                u[a] = v[a + 1].given ? v[a + 1].number : 0.0;
+            }
+            r.state[run] = run % 7 == 3 ? BST_ROW_MISSING : BST_ROW_DONE;
+            r.metrics[run] = 3.0 * u[0] - u[1] + 4.0 * u[1] * u[2];
+        }
+        bst_sensitivity e[3];
+        bst_sensitivity_of(&r, 2, 0, e);
+        if (morris) {
+            const bst_sensitivity *of[4] = {NULL};
+            for (int i = 0; i < 3; i++) {
+                of[e[i].axis] = &e[i];
+                assert_int_equal(e[i].count, 60);
+                assert_true(i == 0 || e[i].effect <= e[i - 1].effect);
+            }
+            /* exact but for rounding */
+            bst_assert_close(of[1]->effect, 3.0, 1e-12);
+            bst_assert_close(of[1]->mean_effect, 3.0, 1e-12);
+            bst_assert_close(of[1]->spread, 0.0, 1e-6);
+            /* u is 0, 1/3, 2/3, 1 alike: means 1 and 2, deviation 4 sqrt(5) / 6 = 1.49, of
+             * which 1.4 is five standard errors of 30 paths */
+            bst_assert_close(of[2]->mean_effect, 1.0, 1.4);
+            bst_assert_close(of[3]->mean_effect, 2.0, 1.4);
+            bst_assert_close(of[3]->spread, 1.49, 0.5);
+            assert_true(of[3]->effect >= of[3]->mean_effect - 1e-12);
+        } else {
+            assert_int_equal(e[0].axis, 1);
+            assert_int_equal(e[1].axis, 2);
+            assert_int_equal(e[2].axis, 3);
+            assert_true(e[0].effect == 3.0 && e[1].effect == 1.0 && e[2].effect == 0.0);
+            assert_true(e[1].mean_effect == -1.0 && e[0].count == 2);
+        }
+        bst_results_free(&r);
+        bst_study_close(&s);
+    }
+}
+
 /* Moments of what is drawn, limits, weights; what is drawn does not depend on its neighbours. */
 static void test_dispersions(void **state) {
     (void)state;
@@ -360,6 +426,7 @@ int main(void) {
         cmocka_unit_test_setup_teardown(test_latin_hypercube, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_one_at_a_time, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_morris, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_sensitivity, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_dispersions, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_apply, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_common, set_up, tear_down),
