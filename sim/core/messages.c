@@ -50,6 +50,7 @@ static const bst_channel_type types[] = {
                count_predictions),
     WITH_ITEMS(BST_CHANNEL_TRACKS, BST_CHANNEL_QUEUE, bst_tracks, bst_track, count_tracks),
     HEADER_ONLY(BST_CHANNEL_CONTROL_STATUS, BST_CHANNEL_LATEST, bst_control_status),
+    HEADER_ONLY(BST_CHANNEL_TASK, BST_CHANNEL_LATEST, bst_task),
 };
 
 const bst_channel_type *bst_channel_type_find(const char *name) {

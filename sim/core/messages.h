@@ -30,6 +30,7 @@
 #define BST_CHANNEL_PREDICTIONS "predictions"
 #define BST_CHANNEL_TRACKS "tracks"
 #define BST_CHANNEL_CONTROL_STATUS "control_status"
+#define BST_CHANNEL_TASK "task"
 
 /* A read-out window in full-sensor pixels. */
 typedef struct bst_window {
@@ -383,6 +384,18 @@ typedef struct bst_control_status {
     int32_t search_step;
     double aim_error_px[2]; /* as control believes: where the target is from the boresight */
 } bst_control_status;
+
+/* task (latest): whom a sensor is to look for from now on, from who plans for several. Before the
+ * first one, and with object -1, it is the sensor's own cue. */
+typedef struct bst_task {
+    int64_t id;   /* 1, 2, ... by sensor: what follows a new one begins anew; 0: none was given */
+    int64_t tick; /* when it was given */
+    int32_t object; /* in the onboard catalogue (bst_knowledge_object_count), -1: the own cue */
+    int32_t norad;  /* its catalogue number, 0: none */
+    double sigma_rad, rate_sigma_radps; /* how far its place and rate may be off, 1 sigma per axis;
+                                           0: as the own cue's */
+    double v_mag, v_mag_sigma; /* brightness to be expected; sigma 0: as the own cue's */
+} bst_task;
 
 /* "track" for BST_MODE_TRACK, and so on. */
 const char *bst_mode_name(int mode);

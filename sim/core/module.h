@@ -40,7 +40,23 @@ enum {
     BST_MODULE_APART = 1u << 2, /* may step in another thread than modules that do not read it:
                                    shares with them only what is constant or locked, has no period
                                    and never asks to be woken */
+    BST_MODULE_LINKS = 1u << 3, /* one for all sensors of a scenario, which names it beside the
+                                   observers: its ports are there once for each sensor
+                                   (bst_member_port), and env->knowledge is NULL */
 };
+
+/* A sensor as a module sees it that links several. */
+typedef struct bst_fleet_member {
+    const char *scope;    /* "observer/sensor" */
+    int observer, sensor; /* indices in the world */
+    const struct bst_knowledge *knowledge;
+    double frame_exposure_s, frame_period_s, frame_latency_s; /* as in bst_module_env */
+} bst_fleet_member;
+
+/* The port of a module that links sensors: `port` of its descriptor for one of the members. */
+static inline int bst_member_port(int port_count, int member, int port) {
+    return member * port_count + port;
+}
 
 /* What create gets. Pointers outlive the module. */
 typedef struct bst_module_env {
@@ -63,6 +79,9 @@ typedef struct bst_module_env {
     double frame_exposure_s, frame_period_s; /* of this sensor's frames, as set and commanded */
     double frame_latency_s; /* from an exposure's end until control has what it showed: the declared
                                delays in between */
+    const bst_fleet_member *members; /* of a BST_MODULE_LINKS one: all sensors, in the order of the
+                                        scenario; else NULL */
+    int member_count;
 } bst_module_env;
 
 typedef struct bst_module_desc {

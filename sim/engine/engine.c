@@ -24,6 +24,16 @@ bst_status bst_engine_create(bst_ctx *ctx, int64_t tick_rate_hz, bst_engine **ou
     return BST_OK;
 }
 
+static void free_instance(instance *self) {
+    if (self) {
+        free(self->scope);
+        free(self->name);
+        free(self->ports);
+        free(self->triggers);
+        free(self);
+    }
+}
+
 void bst_engine_free(bst_engine *engine) {
     if (!engine) {
         return;
@@ -51,9 +61,7 @@ void bst_engine_free(bst_engine *engine) {
         if (self->created) {
             self->spec.desc->destroy(self->self);
         }
-        free(self->scope);
-        free(self->name);
-        free(self);
+        free_instance(self);
     }
     free(engine->instances);
     pthread_mutex_destroy(&engine->counting);
@@ -73,10 +81,6 @@ bst_status bst_engine_add(bst_ctx *ctx, bst_engine *engine, const bst_instance_s
                         "%s: module %s/%s was built for interface %u, this is %d", spec->instance,
                         spec->desc->role, spec->desc->type, spec->desc->abi, BST_MODULE_ABI);
     }
-    if (spec->desc->port_count > MAX_PORTS) {
-        return bst_fail(ctx, BST_ERR_CONFIG, "%s: %d ports (allowed: %d)", spec->instance,
-                        spec->desc->port_count, MAX_PORTS);
-    }
     if (engine->instance_count == engine->instance_capacity) {
         int capacity = engine->instance_capacity ? 2 * engine->instance_capacity : 16;
         instance **more = realloc(engine->instances, (size_t)capacity * sizeof *more);
@@ -90,13 +94,13 @@ bst_status bst_engine_add(bst_ctx *ctx, bst_engine *engine, const bst_instance_s
     if (self) {
         self->scope = strdup(spec->scope);
         self->name = strdup(spec->instance);
+        self->port_count =
+            spec->desc->port_count * (spec->member_count > 0 ? spec->member_count : 1);
+        self->ports = calloc((size_t)self->port_count + 1, sizeof *self->ports);
+        self->triggers = calloc((size_t)self->port_count + 1, sizeof *self->triggers);
     }
-    if (!self || !self->scope || !self->name) {
-        if (self) {
-            free(self->scope);
-            free(self->name);
-        }
-        free(self);
+    if (!self || !self->scope || !self->name || !self->ports || !self->triggers) {
+        free_instance(self);
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %s", spec->instance);
     }
     self->spec = *spec;
@@ -104,7 +108,7 @@ bst_status bst_engine_add(bst_ctx *ctx, bst_engine *engine, const bst_instance_s
     self->spec.instance = self->name;
     self->next_period = spec->period_ticks > 0 ? spec->offset_ticks : INT64_MAX;
     self->wake = INT64_MAX;
-    for (int p = 0; p < MAX_PORTS; p++) {
+    for (int p = 0; p < self->port_count; p++) {
         self->ports[p].channel = -1;
     }
     engine->instances[engine->instance_count++] = self;
@@ -138,6 +142,8 @@ bst_status bst_engine_load(bst_ctx *ctx, bst_engine *engine) {
                               .frame_latency_s = spec->frame_latency_s,
                               .los_period_ticks = spec->los_period_ticks,
                               .los_offset_ticks = spec->los_offset_ticks,
+                              .members = spec->members,
+                              .member_count = spec->member_count,
                               .planes = spec->planes,
                               .mask_threshold_sigma = spec->mask_threshold_sigma,
                               .engine_private = self};

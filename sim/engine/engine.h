@@ -8,7 +8,7 @@ typedef struct bst_engine bst_engine;
 
 /* Reading an input later than it was written. */
 typedef struct bst_input_delay {
-    int port; /* index into desc->ports */
+    int port; /* index into desc->ports; of one that links sensors, for each */
     int64_t ticks;
 } bst_input_delay;
 
@@ -32,6 +32,8 @@ typedef struct bst_instance_spec {
     double exposure_s; /* the longest of the sensor that the scenario sets */
     double frame_exposure_s, frame_period_s, frame_latency_s;
     int64_t los_period_ticks, los_offset_ticks; /* of its gimbal; 0: there is none with a period */
+    const bst_fleet_member *members; /* of a module that links sensors; outlive the engine */
+    int member_count;                /* 0: it is one sensor's, and has its scope */
     uint32_t planes;                            /* bit k: the bst_plane k is recorded */
     double mask_threshold_sigma;
     uint64_t seed, run;

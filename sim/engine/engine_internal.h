@@ -20,7 +20,7 @@ typedef struct channel_reader {
 /* A channel of one scope: a ring of slots that holds the last `depth` messages. */
 typedef struct channel {
     const bst_channel_type *type;
-    const char *scope; /* borrowed from an instance */
+    const char *scope; /* borrowed from an instance or a member */
     int writer;        /* instance */
     int writer_port;
     slot *slots;
@@ -38,8 +38,6 @@ typedef struct channel {
     bool triggers; /* one of them is stepped for its messages */
 } channel;
 
-enum { MAX_PORTS = 16 };
-
 /* What an instance needs to know about one of its ports. */
 typedef struct port_state {
     int channel; /* -1: optional and absent */
@@ -48,6 +46,7 @@ typedef struct port_state {
     int64_t cursor;         /* next sequence to read */
     int64_t trigger_cursor; /* next sequence to be stepped for */
     int capacity;
+    bool writing; /* its payload was handed out and not yet published */
 } port_state;
 
 typedef struct instance {
@@ -57,8 +56,9 @@ typedef struct instance {
     bool created;
     bool apart; /* no other instance waits for what it writes: steps last in a tick, and beside the
                    others when overlapping */
-    port_state ports[MAX_PORTS];
-    int triggers[MAX_PORTS]; /* ports whose messages make it step */
+    int port_count; /* the descriptor's; of one that links sensors, those for each */
+    port_state *ports;
+    int *triggers; /* ports whose messages make it step */
     int trigger_count;
     int64_t next_period, wake; /* INT64_MAX: none */
     int64_t steps;
@@ -106,7 +106,7 @@ struct bst_step {
     instance *self;
     bst_ctx *ctx;
     int64_t tick;
-    unsigned writing; /* bit of each port whose payload was handed out and not yet published */
+    int writing; /* ports whose payload was handed out and not yet published */
     bst_status hook_status; /* first failure of a hook during this step */
     bst_overlap_job *job;   /* inputs of a step behind the stepping thread, else NULL */
     bool ahead;             /* of that step, and none itself */
@@ -157,6 +157,17 @@ bst_status bst_overlap_drain(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
 bst_sample bst_overlap_latest(struct bst_step *step, int port);
 bst_sample bst_overlap_next(struct bst_step *step, int port);
 int bst_overlap_lane(const bst_overlap_job *job);
+
+static inline const bst_port *bst_instance_port(const instance *self, int port) {
+    return &self->spec.desc->ports[port % self->spec.desc->port_count];
+}
+
+/* Where the channel of a port lives. */
+static inline const char *bst_instance_port_scope(const instance *self, int port) {
+    return self->spec.member_count > 0
+               ? self->spec.members[port / self->spec.desc->port_count].scope
+               : self->scope;
+}
 
 /* The slot of a message among the last `depth`, or of the next one (sequence == written). */
 static inline slot *bst_engine_slot(const channel *ch, int64_t sequence) {

@@ -17,6 +17,8 @@ struct bst_simulation {
     bst_world *world;
     bst_device *device;
     bst_knowledge **knowledge; /* [sensors of all observers] */
+    bst_fleet_member *members; /* [knowledge_count] */
+    char (*scopes)[160];       /* [knowledge_count] of the members */
     int knowledge_count;
     bst_engine *engine;
 };
@@ -114,14 +116,55 @@ static bst_instance_spec sensor_spec(const bst_scenario *scenario, const bst_sim
                                .run = (uint64_t)scenario->run};
 }
 
+/* Adds the modules that link sensors. */
+static bst_status add_links(bst_ctx *ctx, const bst_scenario *scenario, bst_simulation *sim) {
+    for (int m = 0; m < scenario->module_count; m++) {
+        const bst_module_config *module = &scenario->modules[m];
+        if (module->observer >= 0) {
+            continue;
+        }
+        bst_instance_spec spec = {.scope = "",
+                                  .instance = module->name,
+                                  .desc = module->desc,
+                                  .config = module->config,
+                                  .period_ticks = module->period_ticks,
+                                  .offset_ticks = module->offset_ticks,
+                                  .delay_count = module->delay_count,
+                                  .world = sim->world,
+                                  .device = sim->device,
+                                  .observer = -1,
+                                  .sensor = -1,
+                                  .members = sim->members,
+                                  .member_count = sim->knowledge_count,
+                                  .seed = scenario->seed,
+                                  .run = (uint64_t)scenario->run};
+        memcpy(spec.delays, module->delays, sizeof spec.delays);
+        BST_TRY(bst_engine_add(ctx, sim->engine, &spec));
+    }
+    return BST_OK;
+}
+
 static bst_status add_modules(bst_ctx *ctx, const bst_scenario *scenario, bst_simulation *sim) {
     const bst_observer_config *observers = scenario->observers.items;
+    sim->members = calloc((size_t)sim->knowledge_count + 1, sizeof *sim->members);
+    sim->scopes = calloc((size_t)sim->knowledge_count + 1, sizeof *sim->scopes);
+    if (!sim->members || !sim->scopes) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d sensors", sim->knowledge_count);
+    }
+    int count = 0;
     for (int i = 0; i < scenario->observers.count; i++) {
         const bst_sensor_config *sensors = observers[i].sensors.items;
         for (int s = 0; s < observers[i].sensors.count; s++) {
-            char scope[160], name[256];
-            snprintf(scope, sizeof scope, "%s/%s", observers[i].name, sensors[s].name);
+            char *scope = sim->scopes[count], name[256];
+            snprintf(scope, sizeof sim->scopes[0], "%s/%s", observers[i].name, sensors[s].name);
             bst_instance_spec spec = sensor_spec(scenario, sim, i, s, scope);
+            sim->members[count++] = (bst_fleet_member){.scope = scope,
+                                                       .observer = i,
+                                                       .sensor = s,
+                                                       .knowledge = spec.knowledge,
+                                                       .frame_exposure_s = spec.frame_exposure_s,
+                                                       .frame_period_s = spec.frame_period_s,
+                                                       .frame_latency_s = spec.frame_latency_s};
             snprintf(name, sizeof name, "%s/exposure", scope);
             spec.instance = name;
             spec.desc = &bst_exposure_clock_module;
@@ -147,7 +190,7 @@ static bst_status add_modules(bst_ctx *ctx, const bst_scenario *scenario, bst_si
             }
         }
     }
-    return BST_OK;
+    return add_links(ctx, scenario, sim);
 }
 
 /* The PSFs that come from files. */
@@ -250,6 +293,8 @@ void bst_simulation_free(bst_simulation *sim) {
         bst_knowledge_free(sim->knowledge[i]);
     }
     free(sim->knowledge);
+    free(sim->members);
+    free(sim->scopes);
     bst_device_close(sim->device);
     bst_world_free(sim->world);
     free(sim);
