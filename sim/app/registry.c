@@ -20,6 +20,7 @@ static const bst_module_desc *const modules[] = {
     &bst_tracker_ukf_module,
     &bst_tracker_imm_module,
     &bst_obsgen_module,
+    &bst_tasking_priority_module,
 };
 
 static const bst_registry registry = {modules, sizeof modules / sizeof *modules};

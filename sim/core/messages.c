@@ -68,3 +68,8 @@ const char *bst_mode_name(int mode) {
                                                       "coast", "fixed",     "scan"};
     return mode >= 0 && mode < BST_MODE_COUNT ? names[mode] : "unknown";
 }
+
+const char *bst_task_end_name(int end) {
+    static const char *const names[BST_TASK_END_COUNT] = {"none", "done", "not_found", "lost"};
+    return end >= 0 && end < BST_TASK_END_COUNT ? names[end] : "unknown";
+}

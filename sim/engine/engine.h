@@ -34,7 +34,7 @@ typedef struct bst_instance_spec {
     int64_t los_period_ticks, los_offset_ticks; /* of its gimbal; 0: there is none with a period */
     const bst_fleet_member *members; /* of a module that links sensors; outlive the engine */
     int member_count;                /* 0: it is one sensor's, and has its scope */
-    uint32_t planes;                            /* bit k: the bst_plane k is recorded */
+    uint32_t planes;                 /* bit k: the bst_plane k is recorded */
     double mask_threshold_sigma;
     uint64_t seed, run;
 } bst_instance_spec;

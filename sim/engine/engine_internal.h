@@ -106,7 +106,7 @@ struct bst_step {
     instance *self;
     bst_ctx *ctx;
     int64_t tick;
-    int writing; /* ports whose payload was handed out and not yet published */
+    int writing;            /* ports whose payload was handed out and not yet published */
     bst_status hook_status; /* first failure of a hook during this step */
     bst_overlap_job *job;   /* inputs of a step behind the stepping thread, else NULL */
     bool ahead;             /* of that step, and none itself */

@@ -87,8 +87,7 @@ static bst_status connect_inputs(bst_ctx *ctx, bst_engine *engine) {
                                 "module that makes it",
                                 reader->name, scope, port->channel);
             }
-            state->delay_ticks =
-                declared_delay(&reader->spec, p % reader->spec.desc->port_count);
+            state->delay_ticks = declared_delay(&reader->spec, p % reader->spec.desc->port_count);
             if (state->delay_ticks < 1 && (port->flags & BST_PORT_FEEDBACK)) {
                 state->delay_ticks = 1;
             }

@@ -56,8 +56,8 @@ bst_status bst_knowledge_eye_at(bst_ctx *ctx, bst_knowledge_view *view, double s
     double t;
     bst_sky sky;
     BST_TRY(bst_believed_eye(ctx, view, seconds, &t, eye));
-    BST_TRY(bst_sky_clock_at(ctx, view->clock, bst_time_add(view->knowledge->world->epoch, t),
-                             &sky));
+    BST_TRY(
+        bst_sky_clock_at(ctx, view->clock, bst_time_add(view->knowledge->world->epoch, t), &sky));
     *bodies = sky.bodies;
     return BST_OK;
 }
