@@ -13,6 +13,8 @@
 #include "sim/app/load.h"
 #include "sim/app/loop_model.h"
 #include "sim/app/run_pictures.h"
+#include "sim/app/run_sightings.h"
+#include "sim/app/run_space.h"
 #include "sim/app/run_watched.h"
 #include "sim/app/stop_signals.h"
 #include "sim/core/version.h"
@@ -43,7 +45,8 @@ typedef struct run_state {
     bst_recorder *recorder;
     watched_sensor *sensors;
     int sensor_count;
-    bst_run_pictures *pictures; /* of the first sensor */
+    bst_run_pictures *pictures;   /* of the first sensor */
+    bst_run_sightings *sightings; /* may be NULL */
     bool progress;
     double started, shown; /* wall seconds */
 } run_state;
@@ -95,6 +98,8 @@ static bst_status on_message(void *user, const char *scope, const char *channel,
     if (sensor == run->sensors) {
         BST_TRY(bst_run_pictures_message(&run->hooks, run->pictures, channel, payload));
     }
+    BST_TRY(bst_run_sightings_message(&run->hooks, run->sightings, (int)(sensor - run->sensors),
+                                      channel, payload));
     pthread_mutex_lock(&run->summing);
     bst_status status = judge(run, sensor, channel, payload, tick);
     pthread_mutex_unlock(&run->summing);
@@ -243,6 +248,7 @@ static bst_status write_manifest(const run_state *run, bst_simulation *sim, cons
             cJSON_AddItemToObject(sensors, run->sensors[i].scope, summary_json(&figures, factor));
         }
     }
+    bst_run_sightings_add(run->sightings, root);
     bst_loop_summary_figures(run->sensors[0].summary, &figures);
     cJSON_AddItemToObject(root, "summary", summary_json(&figures, factor));
     bst_status status = bst_run_write_json(run->ctx, store, "manifest.json", root);
@@ -274,6 +280,7 @@ static void print_table(const run_state *run, bst_simulation *sim, const char *o
         print_row("pointing RMS", "%.3f", f.pointing_rms_px, "px");
         print_row("pointing 99th percentile", "%.3f", f.pointing_p99_px, "px");
     }
+    bst_run_sightings_print(run->sightings);
     print_row("wall time", "%.2f", wall, "s");
     print_row("speed", "%.1f", wall > 0.0 ? simulated / wall : NAN, "x real time");
     printf("  %-28s %s\n", "results", out);
@@ -364,6 +371,7 @@ static void free_run(run_state *run) {
     }
     free(run->sensors);
     bst_run_pictures_free(run->pictures);
+    bst_run_sightings_free(run->sightings);
     pthread_mutex_destroy(&run->summing);
 }
 
@@ -394,46 +402,13 @@ static bst_status write_ending(run_state *run, bst_simulation *sim, bst_run *sto
     return status == BST_OK ? written : status;
 }
 
-/* Warns when the disk does not look large enough for the frames. */
-static void warn_of_space(const run_state *run, const char *out) {
-    const bst_scenario *scenario = run->scenario;
-    const bst_observer_config *observers = scenario->observers.items;
-    const bst_record_config *record = &scenario->record;
-    /* Rice takes 8-bit noise to about half */
-    double bytes = 0.0, per_pixel = record->frames == BST_RECORD_NO_FRAMES ? 0.0
-                                    : record->compression                  ? 1.0
-                                                                           : 2.0;
-    for (uint32_t planes = record->planes; planes; planes &= planes - 1) {
-        per_pixel += planes == UINT32_C(1) << BST_PLANE_SATURATION ? 1.0 : 4.0;
-    }
-    for (int i = 0; i < scenario->observers.count; i++) {
-        const bst_sensor_config *sensors = observers[i].sensors.items;
-        for (int s = 0; s < observers[i].sensors.count; s++) {
-            const bst_exposure_config *e = &sensors[s].exposure;
-            double frames = floor((scenario->duration_s - e->first_s) / e->period_s);
-            bytes += fmax(frames, 0.0) * per_pixel * (double)sensors[s].camera.width_px *
-                     (double)sensors[s].camera.height_px;
-        }
-    }
-    double free_bytes = (double)bst_run_free_bytes(out);
-    if (free_bytes >= 0.0 && bytes > free_bytes) {
-        bst_log(run->ctx, BST_LOG_WARNING,
-                "%s: the frames will take about %.1f GB and %.1f GB are free there; shorten the "
-                "run (--duration), set /record/compression=rice or /record/frames=none, or choose "
-                "another output folder",
-                out, bytes * 1e-9, free_bytes * 1e-9);
-    }
-}
-
-/* Steps the simulation and writes what belongs into the folder; the folder is complete when this
- * returns BST_OK. An interrupted run is closed properly and keeps its .partial name. */
 static bst_status execute(run_state *run, bst_simulation *sim, const char *out, bool overwrite) {
     bst_ctx *ctx = run->ctx;
     bst_run *store = NULL;
     if (bst_stop_requested()) {
         return bst_fail(ctx, BST_ERR_INTERRUPTED, "interrupted before the run began");
     }
-    warn_of_space(run, out);
+    bst_run_warn_of_space(ctx, run->scenario, out);
     BST_TRY(bst_run_create(ctx, out, overwrite, &store));
     cJSON *echo = bst_scenario_echo(run->scenario);
     bst_status status = echo ? bst_run_write_json(ctx, store, "scenario.json", echo)
@@ -441,6 +416,10 @@ static bst_status execute(run_state *run, bst_simulation *sim, const char *out, 
     cJSON_Delete(echo);
     if (status == BST_OK) {
         status = open_recorder(run, bst_simulation_world(sim), store);
+    }
+    if (status == BST_OK) {
+        status = bst_run_sightings_create(ctx, bst_simulation_world(sim), &run->scenario->record,
+                                          run->scenario->tick_rate_hz, store, &run->sightings);
     }
     double wall = 0.0;
     bool stepped = false;
@@ -459,6 +438,15 @@ static bst_status execute(run_state *run, bst_simulation *sim, const char *out, 
     }
     /* closing must not hide why the run ended */
     bst_ctx closing = *ctx;
+    if (stepped && (status == BST_OK || status == BST_ERR_INTERRUPTED)) {
+        double end_s = (double)(bst_engine_tick(bst_simulation_engine(sim)) + 1) /
+                       (double)run->scenario->tick_rate_hz;
+        bst_status summed = bst_run_sightings_finish(&closing, run->sightings, end_s);
+        if (status == BST_OK && summed != BST_OK) {
+            *ctx = closing;
+            status = summed;
+        }
+    }
     bst_status closed = bst_recorder_close(&closing, run->recorder);
     if (status == BST_OK && closed != BST_OK) {
         *ctx = closing;

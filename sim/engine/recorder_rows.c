@@ -282,6 +282,10 @@ bst_status bst_recorder_detection_rows(bst_ctx *ctx, bst_recorder *recorder, int
     BST_TRY(append(ctx, recorder, BST_TABLE_DETECTION_FRAMES, &head));
     for (int i = 0; i < d->count; i++) {
         const bst_detection *item = &d->items[i];
+        if (recorder->config.detections_of == BST_RECORD_OBJECTS &&
+            item->label != BST_LABEL_OBJECT) {
+            continue;
+        }
         row r = {.count = 0};
         put_int(&r, sensor);
         put_int(&r, d->exposure_id);
