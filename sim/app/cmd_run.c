@@ -35,6 +35,7 @@ typedef struct watched_sensor {
     bst_run_watched channels[WATCHED_CHANNELS];
     int channel_count;
     bst_loop_summary *summary;
+    int target; /* of its own cue, -1: none */
 } watched_sensor;
 
 typedef struct run_state {
@@ -83,6 +84,9 @@ static bst_status judge(run_state *run, watched_sensor *sensor, const char *chan
         bst_loop_summary_tracks(sensor->summary, payload, tick);
     } else if (strcmp(channel, BST_CHANNEL_CONTROL_STATUS) == 0) {
         bst_loop_summary_status(sensor->summary, payload);
+    } else if (strcmp(channel, BST_CHANNEL_TASK) == 0) {
+        int object = ((const bst_task *)payload)->object;
+        bst_loop_summary_retarget(sensor->summary, object >= 0 ? object : sensor->target);
     }
     return BST_OK;
 }
@@ -303,6 +307,7 @@ static bst_status watch_sensors(run_state *run, const bst_world *world) {
             snprintf(w->scope, sizeof w->scope, "%s/%s", observers[i].name, sensors[s].name);
             int target =
                 *sensors[s].cue.object ? bst_world_find_object(world, sensors[s].cue.object) : -1;
+            w->target = target;
             BST_TRY(bst_loop_summary_create(run->ctx, world, i, s, run->scenario->tick_rate_hz,
                                             target, &w->summary));
             if (run->sensor_count == 0) {
