@@ -3,21 +3,9 @@
 
 #include "gimbal/ideal.h"
 #include "gimbal/modules.h"
-#include "gimbal/nav.h"
-#include "gimbal/platform.h"
+#include "gimbal/platform_step.h"
 
-enum { PORT_HISTORY, PORT_POINTING, PORT_NAV, PORT_MOUNT, PORT_COUNT };
-
-static const bst_port ports[PORT_COUNT] = {
-    [PORT_HISTORY] = {.channel = BST_CHANNEL_LOS_HISTORY,
-                      .direction = BST_PORT_OUT,
-                      .capacity = 4000},
-    [PORT_POINTING] = {.channel = BST_CHANNEL_POINTING_TELEMETRY,
-                       .direction = BST_PORT_OUT,
-                       .capacity = 800},
-    [PORT_NAV] = {.channel = BST_CHANNEL_NAV_TELEMETRY, .direction = BST_PORT_OUT},
-    [PORT_MOUNT] = {.channel = BST_CHANNEL_MOUNT_STATUS, .direction = BST_PORT_OUT},
-};
+static const bst_port ports[BST_GIMBAL_PORTS] = {BST_GIMBAL_PORTS_ALL};
 
 enum { TARGET_OBJECT, TARGET_DIRECTION, TARGET_STAR };
 static const char *const target_names[] = {"object", "direction", "star", NULL};
@@ -42,29 +30,29 @@ static const bst_config_desc config_table[] = {
     BST_CONFIG_END};
 
 typedef struct module {
+    bst_gimbal_base base;
     bst_platform platform;
     bst_ideal ideal;
-    bst_view *view;
-    int target, observer, sensor, object;
+    int target, object;
     bst_vec3 icrs;
     bst_vec3 x_hint_gcrf; /* body x: the camera's x stays as near to it as can be */
-    double dt_s;
-    int64_t steps, telemetry_steps, nav_steps;
+    int64_t steps;
 } module;
 
 /* Apparent direction of the target at a grid node. */
 static bst_status apparent(void *user, bst_ctx *ctx, double seconds, bst_vec3 *direction) {
     module *m = user;
+    bst_view *view = m->base.view;
     if (m->target == TARGET_OBJECT) {
         bst_sight sight;
-        BST_TRY(bst_view_sight(ctx, m->view, m->observer, m->object, seconds, &sight));
+        BST_TRY(bst_view_sight(ctx, view, m->base.observer, m->object, seconds, &sight));
         *direction = sight.apparent;
         return BST_OK;
     }
     bst_state state;
     bst_bodies bodies;
-    BST_TRY(bst_view_observer_state(ctx, m->view, m->observer, seconds, &state));
-    BST_TRY(bst_view_bodies(ctx, m->view, seconds, &bodies));
+    BST_TRY(bst_view_observer_state(ctx, view, m->base.observer, seconds, &state));
+    BST_TRY(bst_view_bodies(ctx, view, seconds, &bodies));
     bst_light light = bst_light_at(&bodies, state.position_m, state.velocity_mps);
     *direction = bst_light_apparent_star(&light, m->icrs);
     return BST_OK;
@@ -102,61 +90,32 @@ static void destroy(void *self) {
     module *m = self;
     if (m) {
         bst_platform_free(&m->platform);
-        bst_view_free(m->view);
+        bst_gimbal_base_free(&m->base);
         free(m);
     }
 }
 
-static bst_status prepare(const bst_module_env *env, const config *c, module *m) {
-    const bst_platform_config *platform = &c->platform;
-    bst_quat nominal = bst_world_body_attitude(env->world, env->observer, env->sensor);
-    double pixel = bst_camera_scale_rad(bst_world_camera(env->world, env->observer, env->sensor));
-    m->x_hint_gcrf = bst_quat_rotate(bst_quat_conj(nominal), (bst_vec3){1, 0, 0});
-    BST_TRY(bst_platform_init(env->ctx, &m->platform, platform, nominal, pixel, m->dt_s,
-                              bst_env_rng(env, "jitter"), bst_env_rng(env, "attitude")));
-    BST_TRY(bst_platform_equip(env, &m->platform, platform, m->dt_s));
-    BST_TRY(bst_platform_check_history(env->ctx, platform, env->exposure_s));
-    BST_TRY(bst_platform_divider(env->ctx, "telemetry_rate_hz", 1.0 / m->dt_s,
-                                 platform->telemetry_rate_hz, &m->telemetry_steps));
-    BST_TRY(bst_platform_divider(env->ctx, "nav_rate_hz", 1.0 / m->dt_s, platform->nav_rate_hz,
-                                 &m->nav_steps));
+static bst_status prepare(const bst_module_env *env, const void *config_in, void *self) {
+    const config *c = config_in;
+    module *m = self;
+    m->ideal = (bst_ideal){.direction_at = apparent, .user = m};
+    m->x_hint_gcrf = bst_quat_rotate(bst_quat_conj(bst_gimbal_nominal(env)), (bst_vec3){1, 0, 0});
+    BST_TRY(bst_gimbal_platform_init(env, &c->platform, m->base.dt_s, &m->platform));
+    BST_TRY(bst_platform_equip(env, &m->platform, &c->platform, m->base.dt_s));
     BST_TRY(find_target(env, c, m));
-    BST_TRY(bst_view_create(env->ctx, env->world, &m->view));
-    bst_env_set_capacity(env, PORT_HISTORY, bst_platform_ring(platform->history_s, 1.0 / m->dt_s));
-    bst_env_set_capacity(
-        env, PORT_POINTING,
-        bst_platform_ring(platform->telemetry_history_s, platform->telemetry_rate_hz));
-    return BST_OK;
+    return bst_gimbal_base_init(env, &c->platform, env->exposure_s, 0, &m->base);
 }
 
 static bst_status create(const bst_module_env *env, const void *config_in, void **self) {
-    if (env->period_ticks <= 0) {
-        return bst_fail(env->ctx, BST_ERR_CONFIG, "a gimbal needs a rate: give rate_hz above zero");
-    }
-    module *m = calloc(1, sizeof *m);
-    if (!m) {
-        return bst_fail(env->ctx, BST_ERR_MEMORY, "out of memory for a gimbal");
-    }
-    m->observer = env->observer;
-    m->sensor = env->sensor;
-    m->dt_s = (double)env->period_ticks / (double)env->tick_rate_hz;
-    m->ideal = (bst_ideal){.direction_at = apparent, .user = m};
-    bst_status status = prepare(env, config_in, m);
-    if (status != BST_OK) {
-        destroy(m);
-        return status;
-    }
-    *self = m;
-    return BST_OK;
+    return bst_gimbal_create(env, sizeof(module), prepare, destroy, config_in, self);
 }
 
 static bst_status step(void *self, struct bst_step *s) {
     module *m = self;
-    bst_ctx *ctx = bst_step_ctx(s);
-    int64_t tick = bst_step_tick(s), n = m->steps++;
+    int64_t n = m->steps++;
     double seconds = bst_step_seconds(s);
     bst_vec3 direction;
-    BST_TRY(bst_ideal_at(&m->ideal, ctx, seconds, &direction));
+    BST_TRY(bst_ideal_at(&m->ideal, bst_step_ctx(s), seconds, &direction));
     /* the ideal mount as seen from the nominal body, so that drift and jitter act as on a real one
      */
     bst_quat ideal = bst_quat_look(direction, m->x_hint_gcrf);
@@ -166,27 +125,16 @@ static bst_status step(void *self, struct bst_step *s) {
         body = m->platform.q_believed_from_gcrf;
     }
     bst_quat q_cam_from_body = bst_quat_mul(ideal, bst_quat_conj(body));
-
-    int capacity;
-    bst_los_history *history = bst_step_write(s, PORT_HISTORY, &capacity);
-    history->jitter_rad2 = m->platform.unresolved_rad2;
-    bst_platform_append_los(history, capacity, tick,
-                            bst_platform_true_camera(&m->platform, n, seconds, q_cam_from_body));
-    if (n % m->telemetry_steps == 0) {
-        bst_pointing_telemetry *telemetry = bst_step_write(s, PORT_POINTING, &capacity);
-        bst_platform_append_exact(&m->platform, n, telemetry, capacity, tick, q_cam_from_body);
-        bst_mount_status *mount = bst_step_write(s, PORT_MOUNT, NULL);
-        *mount = (bst_mount_status){.tick = tick,
-                                    .wheels_saturated = m->platform.wheels_saturated,
-                                    .rate_body_radps = m->platform.rate_believed_radps,
-                                    .q_body_from_cam_at_zero = BST_QUAT_IDENTITY,
-                                    .q_body_from_gcrf = telemetry->q_body_from_gcrf};
+    bst_gimbal_publish_sight(s, &m->platform,
+                             bst_platform_true_camera(&m->platform, n, seconds, q_cam_from_body));
+    if (n % m->base.telemetry_steps == 0) {
+        bst_gimbal_reading reading = bst_gimbal_exact(&m->platform, n, q_cam_from_body);
+        bst_mount_status *status = bst_step_write(s, BST_GIMBAL_MOUNT, NULL);
+        *status = (bst_mount_status){.tick = bst_step_tick(s),
+                                     .q_body_from_cam_at_zero = BST_QUAT_IDENTITY};
+        bst_gimbal_publish_reading(s, &m->platform, &reading, status);
     }
-    if (n % m->nav_steps == 0) {
-        bst_nav_telemetry *nav = bst_step_write(s, PORT_NAV, NULL);
-        BST_TRY(bst_gimbal_nav(ctx, m->view, m->observer, m->sensor, tick, seconds, nav));
-    }
-    return BST_OK;
+    return bst_gimbal_publish_nav(s, &m->base, n);
 }
 
 const bst_module_desc bst_gimbal_ideal_module = {
@@ -201,7 +149,7 @@ const bst_module_desc bst_gimbal_ideal_module = {
     .config_bytes = sizeof(config),
     .default_rate_hz = 1000.0,
     .ports = ports,
-    .port_count = PORT_COUNT,
+    .port_count = BST_GIMBAL_PORTS,
     .create = create,
     .step = step,
     .destroy = destroy,

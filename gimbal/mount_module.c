@@ -2,106 +2,67 @@
 
 #include "gimbal/modules.h"
 #include "gimbal/mount.h"
-#include "gimbal/nav.h"
+#include "gimbal/platform_step.h"
 
-enum { PORT_COMMAND, PORT_HISTORY, PORT_POINTING, PORT_NAV, PORT_MOUNT, PORT_COUNT };
+enum { PORT_COMMAND = BST_GIMBAL_PORTS, PORT_COUNT };
 
 static const bst_port ports[PORT_COUNT] = {
+    BST_GIMBAL_PORTS_ALL,
     [PORT_COMMAND] = {.channel = BST_CHANNEL_LOS_COMMAND,
                       .direction = BST_PORT_IN,
                       .flags = BST_PORT_OPTIONAL | BST_PORT_FEEDBACK},
-    [PORT_HISTORY] = {.channel = BST_CHANNEL_LOS_HISTORY,
-                      .direction = BST_PORT_OUT,
-                      .capacity = 4000},
-    [PORT_POINTING] = {.channel = BST_CHANNEL_POINTING_TELEMETRY,
-                       .direction = BST_PORT_OUT,
-                       .capacity = 800},
-    [PORT_NAV] = {.channel = BST_CHANNEL_NAV_TELEMETRY, .direction = BST_PORT_OUT},
-    [PORT_MOUNT] = {.channel = BST_CHANNEL_MOUNT_STATUS, .direction = BST_PORT_OUT},
 };
 
 typedef struct module {
+    bst_gimbal_base base;
     bst_mount mount;
     bst_platform platform;
-    bst_view *view;
-    int observer, sensor;
-    double dt_s, tick_rate_hz;
-    int64_t telemetry_steps, nav_steps;
 } module;
 
 static void destroy(void *self) {
     module *m = self;
     if (m) {
         bst_platform_free(&m->platform);
-        bst_view_free(m->view);
+        bst_gimbal_base_free(&m->base);
         free(m);
     }
 }
 
 static bst_status prepare(const bst_module_env *env, int type, const bst_mount_config *c,
                           module *m) {
-    const bst_platform_config *platform = &c->platform;
-    bst_quat nominal = bst_world_body_attitude(env->world, env->observer, env->sensor);
-    double pixel = bst_camera_scale_rad(bst_world_camera(env->world, env->observer, env->sensor));
-    BST_TRY(bst_platform_init(env->ctx, &m->platform, platform, nominal, pixel, m->dt_s,
-                              bst_env_rng(env, "jitter"), bst_env_rng(env, "attitude")));
-    BST_TRY(bst_mount_init(env->ctx, &m->mount, type, c, m->dt_s, bst_env_rng(env, "encoder")));
-    BST_TRY(bst_platform_equip(env, &m->platform, platform, m->dt_s));
+    double dt = m->base.dt_s, inertia[6], zero[BST_MOUNT_MOST] = {0.0};
+    BST_TRY(bst_gimbal_platform_init(env, &c->platform, dt, &m->platform));
+    BST_TRY(bst_mount_init(env->ctx, &m->mount, type, c, dt, bst_env_rng(env, "encoder")));
+    BST_TRY(bst_platform_equip(env, &m->platform, &c->platform, dt));
     m->mount.want_reaction = m->platform.spacecraft != NULL;
-    double inertia[6], zero[BST_MOUNT_MOST] = {0.0};
     bst_chain_locked_inertia(&m->mount.joints.chain, zero, inertia);
     BST_TRY(bst_platform_check_mount(env->ctx, &m->platform, inertia));
-    BST_TRY(bst_platform_check_history(env->ctx, platform, env->exposure_s));
-    BST_TRY(bst_platform_divider(env->ctx, "telemetry_rate_hz", 1.0 / m->dt_s,
-                                 platform->telemetry_rate_hz, &m->telemetry_steps));
-    BST_TRY(bst_platform_divider(env->ctx, "nav_rate_hz", 1.0 / m->dt_s, platform->nav_rate_hz,
-                                 &m->nav_steps));
-    BST_TRY(bst_view_create(env->ctx, env->world, &m->view));
-    bst_env_set_capacity(env, PORT_HISTORY, bst_platform_ring(platform->history_s, 1.0 / m->dt_s));
-    bst_env_set_capacity(
-        env, PORT_POINTING,
-        bst_platform_ring(platform->telemetry_history_s, platform->telemetry_rate_hz));
-    return BST_OK;
+    return bst_gimbal_base_init(env, &c->platform, env->exposure_s, 0, &m->base);
 }
 
-static bst_status create(const bst_module_env *env, int type, const bst_mount_config *config,
-                         void **self) {
-    if (env->period_ticks <= 0) {
-        return bst_fail(env->ctx, BST_ERR_CONFIG, "a gimbal needs a rate: give rate_hz above zero");
-    }
-    module *m = calloc(1, sizeof *m);
-    if (!m) {
-        return bst_fail(env->ctx, BST_ERR_MEMORY, "out of memory for a gimbal");
-    }
-    m->observer = env->observer;
-    m->sensor = env->sensor;
-    m->tick_rate_hz = (double)env->tick_rate_hz;
-    m->dt_s = (double)env->period_ticks / m->tick_rate_hz;
-    bst_status status = prepare(env, type, config, m);
-    if (status != BST_OK) {
-        destroy(m);
-        return status;
-    }
-    *self = m;
-    return BST_OK;
+static bst_status prepare_azimuth(const bst_module_env *env, const void *config, void *self) {
+    return prepare(env, BST_MOUNT_AZIMUTH_ELEVATION, config, self);
+}
+
+static bst_status prepare_cross(const bst_module_env *env, const void *config, void *self) {
+    return prepare(env, BST_MOUNT_CROSS_ELEVATION, config, self);
 }
 
 static bst_status create_azimuth(const bst_module_env *env, const void *config, void **self) {
-    return create(env, BST_MOUNT_AZIMUTH_ELEVATION, config, self);
+    return bst_gimbal_create(env, sizeof(module), prepare_azimuth, destroy, config, self);
 }
 
 static bst_status create_cross(const bst_module_env *env, const void *config, void **self) {
-    return create(env, BST_MOUNT_CROSS_ELEVATION, config, self);
+    return bst_gimbal_create(env, sizeof(module), prepare_cross, destroy, config, self);
 }
 
 static bst_status step(void *self, struct bst_step *s) {
     module *m = self;
     bst_mount *mount = &m->mount;
-    int64_t tick = bst_step_tick(s), n = mount->steps;
-    bst_sample sample = bst_step_latest(s, PORT_COMMAND);
-    const bst_los_command *command = sample.payload;
-    double age = command ? (double)(tick - command->tick) / m->tick_rate_hz : 0.0;
-    bool measure = n % m->telemetry_steps == 0;
+    int64_t n = mount->steps;
+    double age;
+    const bst_los_command *command = bst_gimbal_command(s, PORT_COMMAND, &m->base, &age);
+    bool measure = n % m->base.telemetry_steps == 0;
     if (m->platform.spacecraft) {
         BST_TRY(bst_platform_step(s, &m->platform, n, mount->reaction_nm));
     }
@@ -109,32 +70,22 @@ static bst_status step(void *self, struct bst_step *s) {
                            .q_believed_from_gcrf = m->platform.q_believed_from_gcrf,
                            .believed_rate_radps = m->platform.rate_believed_radps};
     bst_mount_step(mount, &body, command, age, measure);
-
-    int capacity;
-    bst_los_history *history = bst_step_write(s, PORT_HISTORY, &capacity);
-    history->jitter_rad2 = m->platform.unresolved_rad2;
-    bst_platform_append_los(
-        history, capacity, tick,
-        bst_platform_true_camera(&m->platform, n, (double)n * m->dt_s, mount->q_cam_from_body));
+    bst_gimbal_publish_sight(s, &m->platform,
+                             bst_platform_true_camera(&m->platform, n, (double)n * m->base.dt_s,
+                                                      mount->q_cam_from_body));
     if (measure) {
-        bst_pointing_telemetry *telemetry = bst_step_write(s, PORT_POINTING, &capacity);
         bst_quat seen = bst_platform_measured_body(&m->platform, n);
-        double axis_rad[2] = {mount->servo[0].reading_rad, mount->servo[1].reading_rad};
-        bst_platform_append_pointing(telemetry, capacity, tick,
-                                     bst_quat_unit(bst_quat_mul(mount->q_seen_from_body, seen)),
-                                     axis_rad, seen, mount->settled, mount->limited);
-        bst_mount_status *status = bst_step_write(s, PORT_MOUNT, NULL);
-        bst_mount_status_of(mount, tick, status);
-        status->q_body_from_gcrf = seen;
-        status->rate_body_radps = m->platform.rate_believed_radps;
-        status->wheels_saturated = m->platform.wheels_saturated;
+        const bst_gimbal_reading reading = {
+            .q_cam_from_gcrf = bst_quat_unit(bst_quat_mul(mount->q_seen_from_body, seen)),
+            .q_body_from_gcrf = seen,
+            .axis_rad = {mount->servo[0].reading_rad, mount->servo[1].reading_rad},
+            .settled = mount->settled,
+            .limited = mount->limited};
+        bst_mount_status *status = bst_step_write(s, BST_GIMBAL_MOUNT, NULL);
+        bst_mount_status_of(mount, bst_step_tick(s), status);
+        bst_gimbal_publish_reading(s, &m->platform, &reading, status);
     }
-    if (n % m->nav_steps == 0) {
-        bst_nav_telemetry *nav = bst_step_write(s, PORT_NAV, NULL);
-        BST_TRY(bst_gimbal_nav(bst_step_ctx(s), m->view, m->observer, m->sensor, tick,
-                               bst_step_seconds(s), nav));
-    }
-    return BST_OK;
+    return bst_gimbal_publish_nav(s, &m->base, n);
 }
 
 const bst_module_desc bst_gimbal_azimuth_elevation_module = {

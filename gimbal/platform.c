@@ -208,27 +208,9 @@ void bst_platform_append_los(bst_los_history *history, int capacity, int64_t tic
     history->written++;
 }
 
-void bst_platform_append_pointing(bst_pointing_telemetry *telemetry, int capacity, int64_t tick,
-                                  bst_quat q_cam_from_gcrf, const double axis_rad[2],
-                                  bst_quat q_body_from_gcrf, bool settled, bool limited) {
-    telemetry->capacity = capacity;
-    telemetry->q_body_from_gcrf = q_body_from_gcrf;
-    telemetry->settled = settled;
-    telemetry->limited = limited;
-    bst_pointing_sample *sample = &telemetry->items[telemetry->written % capacity];
-    sample->tick = tick;
-    sample->q_cam_from_gcrf = q_cam_from_gcrf;
-    sample->axis_rad[0] = axis_rad[0];
-    sample->axis_rad[1] = axis_rad[1];
-    telemetry->written++;
-}
-
-void bst_platform_append_exact(const bst_platform *platform, int64_t n,
-                               bst_pointing_telemetry *telemetry, int capacity, int64_t tick,
-                               bst_quat q_cam_from_body) {
-    static const double no_angles[2] = {0.0, 0.0};
-    bst_quat body = bst_platform_measured_body(platform, n);
-    bst_platform_append_pointing(telemetry, capacity, tick,
-                                 bst_quat_unit(bst_quat_mul(q_cam_from_body, body)), no_angles,
-                                 body, true, false);
+void bst_platform_add_status(const bst_platform *platform, bst_quat q_body_seen_from_gcrf,
+                             bst_mount_status *out) {
+    out->wheels_saturated = platform->wheels_saturated;
+    out->rate_body_radps = platform->rate_believed_radps;
+    out->q_body_from_gcrf = q_body_seen_from_gcrf;
 }

@@ -75,11 +75,6 @@ void bst_platform_free(bst_platform *platform);
  * inertial platform needs it only where `body` is read. Passes on errors of bst_craft_step. */
 bst_status bst_platform_advance(bst_ctx *ctx, bst_platform *platform, int64_t n, double seconds,
                                 bst_vec3 reaction_nm) BST_MUST_CHECK;
-/* The same in a module's step, with an event and a count where wheels saturate or star trackers
- * lose the stars, and an event when that is over. */
-bst_status bst_platform_step(struct bst_step *step, bst_platform *platform, int64_t n,
-                             bst_vec3 reaction_nm) BST_MUST_CHECK;
-
 /* True camera attitude at plant step n (seconds = n * dt_s), given the camera's attitude in the
  * body: the body nominal turned by drift * seconds about the (constant) drift vector, or as
  * bst_platform_advance left it where there is a spacecraft; then the camera turned by the jitter
@@ -106,21 +101,12 @@ bst_status bst_platform_divider(bst_ctx *ctx, const char *key, double plant_rate
 bst_status bst_platform_check_history(bst_ctx *ctx, const bst_platform_config *config,
                                       double exposure_s) BST_MUST_CHECK;
 
-/* Samples in a ring that covers history_s at rate_hz, both ends included. */
-static inline int bst_platform_ring(double history_s, double rate_hz) {
-    double samples = ceil(history_s * rate_hz) + 1.0;
-    return samples < 2.0 ? 2 : samples > 1e8 ? 100000000 : (int)samples;
-}
-
-/* Appends a sample to the rings; `capacity` is what bst_step_write said. */
+/* Appends a sample to the ring; `capacity` is what bst_step_write said. */
 void bst_platform_append_los(bst_los_history *history, int capacity, int64_t tick,
                              bst_quat q_cam_from_gcrf);
-void bst_platform_append_pointing(bst_pointing_telemetry *telemetry, int capacity, int64_t tick,
-                                  bst_quat q_cam_from_gcrf, const double axis_rad[2],
-                                  bst_quat q_body_from_gcrf, bool settled, bool limited);
-/* The same of a mount without axes that follows exactly, at plant step n: the body as measured. */
-void bst_platform_append_exact(const bst_platform *platform, int64_t n,
-                               bst_pointing_telemetry *telemetry, int capacity, int64_t tick,
-                               bst_quat q_cam_from_body);
+
+/* The body's part of a mount_status: its attitude as measured, rate and wheels. */
+void bst_platform_add_status(const bst_platform *platform, bst_quat q_body_seen_from_gcrf,
+                             bst_mount_status *out);
 
 #endif

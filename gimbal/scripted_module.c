@@ -2,21 +2,11 @@
 #include <stdlib.h>
 
 #include "gimbal/modules.h"
-#include "gimbal/nav.h"
-#include "gimbal/platform.h"
+#include "gimbal/platform_step.h"
 #include "gimbal/scripted.h"
 
-enum { PORT_HISTORY, PORT_POINTING, PORT_NAV, PORT_COUNT };
-
-static const bst_port ports[PORT_COUNT] = {
-    [PORT_HISTORY] = {.channel = BST_CHANNEL_LOS_HISTORY,
-                      .direction = BST_PORT_OUT,
-                      .capacity = 4000},
-    [PORT_POINTING] = {.channel = BST_CHANNEL_POINTING_TELEMETRY,
-                       .direction = BST_PORT_OUT,
-                       .capacity = 800},
-    [PORT_NAV] = {.channel = BST_CHANNEL_NAV_TELEMETRY, .direction = BST_PORT_OUT},
-};
+enum { PORT_COUNT = BST_GIMBAL_MOUNT }; /* no mount, and so none of its status */
+static const bst_port ports[PORT_COUNT] = {BST_GIMBAL_PORTS_SEEN};
 
 static const char *const missing_names[] = {"error", "hold", NULL};
 
@@ -34,14 +24,12 @@ static const bst_config_desc config_table[] = {
     BST_CONFIG_END};
 
 typedef struct module {
+    bst_gimbal_base base;
     bst_platform platform;
     bst_scripted *scripted;
     bst_frame_cursor frame; /* the first that has not ended */
-    bst_view *view;
-    int observer, sensor;
-    int64_t period_ticks, tick_rate_hz;
+    int64_t period_ticks;
     int64_t origin_tick; /* of the first step; -1: it is to come */
-    int64_t telemetry_steps, nav_steps;
 } module;
 
 static void destroy(void *self) {
@@ -49,12 +37,14 @@ static void destroy(void *self) {
     if (m) {
         bst_platform_free(&m->platform);
         bst_scripted_free(m->scripted);
-        bst_view_free(m->view);
+        bst_gimbal_base_free(&m->base);
         free(m);
     }
 }
 
-static bst_status prepare(const bst_module_env *env, const config *c, module *m) {
+static bst_status prepare(const bst_module_env *env, const void *config_in, void *self) {
+    const config *c = config_in;
+    module *m = self;
     const bst_platform_config *platform = &c->platform;
     const bst_camera *camera = bst_world_camera(env->world, env->observer, env->sensor);
     const bst_exposure_config *exposure =
@@ -65,12 +55,11 @@ static bst_status prepare(const bst_module_env *env, const config *c, module *m)
         return bst_fail(env->ctx, BST_ERR_CONFIG,
                         "the gimbal \"scripted\" needs its sensor's frame_updates_file");
     }
-    double rate_hz = (double)env->tick_rate_hz / (double)env->period_ticks, longest_s, cycle_s;
+    m->period_ticks = env->period_ticks;
+    m->origin_tick = -1;
+    double longest_s, cycle_s;
     bst_frame_updates_limits(updates, camera, exposure, &longest_s, &cycle_s);
-    BST_TRY(bst_platform_init(env->ctx, &m->platform, platform,
-                              bst_world_body_attitude(env->world, env->observer, env->sensor),
-                              bst_camera_scale_rad(camera), 1.0 / rate_hz,
-                              bst_env_rng(env, "jitter"), bst_env_rng(env, "attitude")));
+    BST_TRY(bst_gimbal_platform_init(env, platform, m->base.dt_s, &m->platform));
     if (bst_platform_check_history(env->ctx, platform, longest_s) != BST_OK) {
         return bst_fail_prefix(env->ctx, BST_ERR_CONFIG, "with the exposures of %s",
                                bst_frame_updates_name(updates));
@@ -80,65 +69,33 @@ static bst_status prepare(const bst_module_env *env, const config *c, module *m)
                         "platform/spacecraft/type: the file of a scripted line of sight says where "
                         "the camera points, whatever the body does; leave it \"inertial\"");
     }
-    BST_TRY(bst_platform_divider(env->ctx, "telemetry_rate_hz", rate_hz,
-                                 platform->telemetry_rate_hz, &m->telemetry_steps));
-    BST_TRY(bst_platform_divider(env->ctx, "nav_rate_hz", rate_hz, platform->nav_rate_hz,
-                                 &m->nav_steps));
     BST_TRY(bst_scripted_create(env->ctx, updates, camera, exposure, env->tick_rate_hz,
                                 (bst_scripted_missing)c->missing_frames, &m->scripted));
-    BST_TRY(bst_view_create(env->ctx, env->world, &m->view));
-    m->frame = bst_frame_cursor_begin(updates, camera, exposure, (double)env->tick_rate_hz);
+    m->frame = bst_frame_cursor_begin(updates, camera, exposure, m->base.tick_rate_hz);
     /* besides the plant's steps there are two samples for each frame, and up to two for each
      * attitude of the file */
-    int crowd = bst_scripted_crowd(m->scripted, platform->history_s * (double)env->tick_rate_hz);
+    int crowd = bst_scripted_crowd(m->scripted, platform->history_s * m->base.tick_rate_hz);
     double frames = 2.0 * platform->history_s / cycle_s + 4.0;
-    bst_env_set_capacity(
-        env, PORT_HISTORY,
-        bst_platform_ring(platform->history_s, rate_hz) + 2 * crowd + (int)fmin(frames, 1e7));
-    bst_env_set_capacity(
-        env, PORT_POINTING,
-        bst_platform_ring(platform->telemetry_history_s, platform->telemetry_rate_hz));
-    return BST_OK;
+    return bst_gimbal_base_init(env, platform, longest_s, 2 * crowd + (int)fmin(frames, 1e7),
+                                &m->base);
 }
 
 static bst_status create(const bst_module_env *env, const void *config_in, void **self) {
-    if (env->period_ticks <= 0) {
-        return bst_fail(env->ctx, BST_ERR_CONFIG, "a gimbal needs a rate: give rate_hz above zero");
-    }
-    module *m = calloc(1, sizeof *m);
-    if (!m) {
-        return bst_fail(env->ctx, BST_ERR_MEMORY, "out of memory for a gimbal");
-    }
-    m->observer = env->observer;
-    m->sensor = env->sensor;
-    m->period_ticks = env->period_ticks;
-    m->tick_rate_hz = env->tick_rate_hz;
-    m->origin_tick = -1;
-    bst_status status = prepare(env, config_in, m);
-    if (status != BST_OK) {
-        destroy(m);
-        return status;
-    }
-    *self = m;
-    return BST_OK;
+    return bst_gimbal_create(env, sizeof(module), prepare, destroy, config_in, self);
 }
 
 static bst_status step(void *self, struct bst_step *s) {
     module *m = self;
     int64_t tick = bst_step_tick(s);
-    double seconds = bst_step_seconds(s);
     m->origin_tick = m->origin_tick < 0 ? tick : m->origin_tick;
     int64_t n = (tick - m->origin_tick) / m->period_ticks;
     int64_t past = (tick - m->origin_tick) % m->period_ticks;
     bst_quat q_cam_from_body = bst_quat_mul(bst_scripted_at(m->scripted, tick),
                                             bst_quat_conj(m->platform.q_nominal_from_gcrf));
-    int capacity;
-    bst_los_history *history = bst_step_write(s, PORT_HISTORY, &capacity);
-    history->jitter_rad2 = m->platform.unresolved_rad2;
-    bst_platform_append_los(
-        history, capacity, tick,
+    bst_gimbal_publish_sight(
+        s, &m->platform,
         bst_platform_true_camera_between(&m->platform, n, (double)past / (double)m->period_ticks,
-                                         seconds, q_cam_from_body));
+                                         bst_step_seconds(s), q_cam_from_body));
     /* a sample of its own where the rate changes and at the ends of each exposure, so that the way
      * between samples is the file's */
     int64_t next = bst_scripted_next(m->scripted, tick);
@@ -148,16 +105,14 @@ static bst_status step(void *self, struct bst_step *s) {
     int64_t edge = m->frame.start_tick > tick ? m->frame.start_tick
                                               : m->frame.start_tick + m->frame.exposure_ticks;
     bst_step_wake_at(s, next < edge ? next : edge);
-    if (past == 0 && n % m->telemetry_steps == 0) {
-        bst_pointing_telemetry *telemetry = bst_step_write(s, PORT_POINTING, &capacity);
-        bst_platform_append_exact(&m->platform, n, telemetry, capacity, tick, q_cam_from_body);
+    if (past != 0) {
+        return BST_OK;
     }
-    if (past == 0 && n % m->nav_steps == 0) {
-        bst_nav_telemetry *nav = bst_step_write(s, PORT_NAV, NULL);
-        BST_TRY(
-            bst_gimbal_nav(bst_step_ctx(s), m->view, m->observer, m->sensor, tick, seconds, nav));
+    if (n % m->base.telemetry_steps == 0) {
+        bst_gimbal_reading reading = bst_gimbal_exact(&m->platform, n, q_cam_from_body);
+        bst_gimbal_publish_reading(s, &m->platform, &reading, NULL);
     }
-    return BST_OK;
+    return bst_gimbal_publish_nav(s, &m->base, n);
 }
 
 const bst_module_desc bst_gimbal_scripted_module = {

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "gimbal/attitude_warm_up.h"
 #include "gimbal/jitter.h"
 
 /* A measurement on its way from a star tracker. */
@@ -197,6 +198,35 @@ static bst_vec3 normal3(bst_rng_key key) {
     return (bst_vec3){a[0], a[1], b[0]};
 }
 
+/* The filter as it is at the epoch. */
+static void set_filter(bst_craft *craft, const bst_craft_config *config,
+                       const bst_craft_setup *setup, bst_quat q, bst_vec3 rate) {
+    double sigma = config->initial_knowledge_arcsec * BST_ARCSEC_RAD;
+    bst_vec3 error = bst_vec3_scale(normal3(stream(setup, "knowledge")), sigma);
+    bst_attitude_filter_init(&craft->filter, turned(q, error), sigma,
+                             config->gyro.bias_sigma_degph * BST_DEG_RAD / 3600.0,
+                             craft->gyro.angle_walk, craft->gyro.rate_walk);
+    if (config->running_s <= 0.0) {
+        return;
+    }
+    bst_attitude_past past = {.seconds = config->running_s,
+                              .q_body_from_gcrf = q,
+                              .rate_radps = rate,
+                              .gyro = &craft->gyro,
+                              .key = stream(setup, "past")};
+    for (int all = 0; all < 2 && past.trackers == 0; all++) {
+        for (int i = 0; i < craft->trackers; i++) {
+            const bst_star_tracker *tracker = &craft->tracker[i];
+            if (all || bst_star_tracker_sees(tracker, 0.0, q, rate, craft->sky.position_m,
+                                             craft->sky.sun_m)) {
+                past.rate_hz[past.trackers] = 1.0 / ((double)craft->tracker_steps[i] * craft->dt_s);
+                past.tracker[past.trackers++] = tracker;
+            }
+        }
+    }
+    bst_attitude_warm_up(&past, &craft->filter);
+}
+
 static bst_status prepare(bst_ctx *ctx, bst_craft *craft, const bst_craft_config *config,
                           const bst_craft_setup *setup) {
     double plant_hz = 1.0 / setup->dt_s;
@@ -222,12 +252,7 @@ static bst_status prepare(bst_ctx *ctx, bst_craft *craft, const bst_craft_config
                                     craft->now.reference.rate_radps);
     rate = bst_vec3_axpy(rate, BST_DEG_RAD, vec(config->initial_rate_degps));
     BST_TRY(set_body(ctx, craft, config, q, rate));
-
-    double sigma = config->initial_knowledge_arcsec * BST_ARCSEC_RAD;
-    bst_vec3 error = bst_vec3_scale(normal3(stream(setup, "knowledge")), sigma);
-    bst_attitude_filter_init(&craft->filter, turned(q, error), sigma,
-                             config->gyro.bias_sigma_degph * BST_DEG_RAD / 3600.0,
-                             craft->gyro.angle_walk, craft->gyro.rate_walk);
+    set_filter(craft, config, setup, q, rate);
     bst_attitude_control_spec spec = bst_attitude_control_of(config);
     bst_attitude_control_init(&craft->control, &spec);
     return BST_OK;

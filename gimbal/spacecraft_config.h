@@ -31,7 +31,7 @@ typedef struct bst_craft_config {
     int32_t integrator; /* bst_integrator */
     double inertia_kgm2[6];
     double initial_turn_deg[3], initial_rate_degps[3];
-    double initial_knowledge_arcsec;
+    double initial_knowledge_arcsec, running_s;
     bst_config_list wheels, modes, star_trackers;
     bst_gyro_config gyro;
     bst_disturbance_config disturbances;

@@ -183,12 +183,9 @@ static void target(const bst_two_axis *plant, const bst_los_command *command, do
 }
 
 void bst_two_axis_status(const bst_two_axis *plant, int64_t tick, bst_mount_status *out) {
-    *out = (bst_mount_status){.tick = tick,
-                              .axes = 2,
-                              .wheels_saturated = plant->platform.wheels_saturated,
-                              .rate_body_radps = plant->platform.rate_believed_radps,
-                              .q_body_from_cam_at_zero = BST_QUAT_IDENTITY,
-                              .q_body_from_gcrf = plant->q_measured_body_from_gcrf};
+    *out =
+        (bst_mount_status){.tick = tick, .axes = 2, .q_body_from_cam_at_zero = BST_QUAT_IDENTITY};
+    bst_platform_add_status(&plant->platform, plant->q_measured_body_from_gcrf, out);
     for (int i = 0; i < 2; i++) {
         const bst_axis *axis = &plant->axis[i];
         out->axis[i] =

@@ -9,6 +9,8 @@
 #define SEVERAL (-2)
 /* Share of a frame in the smoothed number of false alarms, once there are enough frames. */
 #define ALARM_GAIN 0.1
+/* Frames in a row with one detection after which two tracks may prove to be the same. */
+#define SAME_FRAMES 5
 
 static double component(bst_vec3 v, int axis) {
     return axis == 0 ? v.x : axis == 1 ? v.y : v.z;
@@ -264,6 +266,34 @@ static int free_between(const bst_mtt *mtt, const bst_mtt_track *a, const bst_mt
     return best;
 }
 
+/* Two tracks nearer to each other than any two objects are seen apart, moving alike, have one
+ * object, which has started a second track by a detection far off. */
+static bool same(const bst_mtt *mtt, const bst_mtt_track *a, const bst_mtt_track *b) {
+    bst_vec3 apart = bst_vec3_sub(a->state.direction, b->state.direction);
+    bst_vec3 rate = bst_vec3_sub(a->state.rate_radps, b->state.rate_radps);
+    double variance = a->state.covariance[2][2] + a->state.covariance[3][3] +
+                      b->state.covariance[2][2] + b->state.covariance[3][3];
+    return a->merged_in_row >= SAME_FRAMES && b->merged_in_row >= SAME_FRAMES &&
+           bst_vec3_norm(apart) < mtt->params.merge_floor_rad &&
+           bst_vec3_dot(rate, rate) < 9.0 * variance;
+}
+
+/* Of two tracks that have lived on one detection for too long, the one that was seen more often
+ * goes on with it, alone; where they are the same, the other one ends. */
+static void settle(bst_mtt *mtt, int missed, int owner, bool alike) {
+    int column = mtt->detection_of_track[owner];
+    if (mtt->tracks[missed].hits > mtt->tracks[owner].hits &&
+        fits(mtt, &mtt->tracks[missed], column, NULL)) {
+        mtt->detection_of_track[missed] = column;
+        mtt->detection_of_track[owner] = -1;
+        mtt->owner[column] = missed;
+        missed = owner;
+    }
+    if (alike) {
+        mtt->tracks[missed].misses_in_row = mtt->params.max_misses + 1;
+    }
+}
+
 /* A missed confirmed track beside another one, or beside a star that is seen, may have melted into
  * one detection with it: both then take that detection, widened along the line between them. */
 static void share(bst_mtt *mtt) {
@@ -291,7 +321,14 @@ static void share(bst_mtt *mtt) {
             continue;
         }
         bst_mtt_track *other = &mtt->tracks[partner];
-        int column = mtt->detection_of_track[partner];
+        int column = mtt->detection_of_track[partner], most = mtt->params.max_merged;
+        bool alike = same(mtt, missed, other);
+        bool long_since = missed->merged_in_row >= most && other->merged_in_row >= most;
+        if (column >= 0 && !other->star && !mtt->shared[partner] && most > 0 &&
+            (alike || long_since)) {
+            settle(mtt, t, partner, alike);
+            continue;
+        }
         if (column < 0) {
             column = free_between(mtt, missed, other);
         }

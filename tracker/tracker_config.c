@@ -132,7 +132,9 @@ const bst_config_desc bst_tracker_config_table[] = {
     BST_REAL(C, memory_chi2, "", 0, 1e6, "18.5",
              "Largest misfit of a new track to a lost one, 4 degrees of freedom."),
     BST_INT(C, max_merged, "", 0, 10000, "30",
-            "Frames in a row that a track may live on detections that it shares."),
+            "Frames in a row that a track may live on detections that it shares; of two tracks "
+            "that then "
+            "still share one, that with more hits goes on."),
     BST_REAL(C, telemetry_gate_chi2, "", 1, 1e6, "30",
              "Attitudes from stars that contradict the telemetry's history by more (3 degrees of "
              "freedom) are not used ..."),

@@ -11,6 +11,7 @@ enum { BST_EXIT_OK = 0, BST_EXIT_FAILED = 1, BST_EXIT_USAGE = 2, BST_EXIT_INTERR
 int bst_cmd_run(int argc, char **argv);
 int bst_cmd_info(int argc, char **argv);
 int bst_cmd_export(int argc, char **argv);
+int bst_cmd_report(int argc, char **argv);
 int bst_cmd_orbit(int argc, char **argv);
 int bst_cmd_check(int argc, char **argv);
 int bst_cmd_loop(int argc, char **argv);

@@ -4,6 +4,7 @@
 #include <cjson/cJSON.h>
 
 #include "sim/app/app.h"
+#include "sim/app/check_reach.h"
 #include "sim/app/load.h"
 #include "sim/app/loop_model.h"
 #include "sim/app/plugins.h"
@@ -48,7 +49,10 @@ int bst_cmd_check(int argc, char **argv) {
             "usage: boresight check SCENARIO.json [options]\n\n"
             "Reads and validates a scenario, opens what it names (orbits, star catalogue), wires "
             "its modules, and\n"
-            "prints the scenario with every default written out. Nothing is written to disk.\n\n"
+            "prints the scenario with every default written out. Warns of loops that are unstable "
+            "or "
+            "have thin\n"
+            "margins, and of what of a cue is out of reach. Nothing is written to disk.\n\n"
             "  boresight check scenarios/neossat_geo_track.json --set "
             "/duration_s=60\n\noptions:\n");
         bst_options_print(stdout, table);
@@ -77,7 +81,12 @@ int bst_cmd_check(int argc, char **argv) {
     } else {
         ctx.log_level = BST_LOG_WARNING;
         bst_loop_warn(&ctx, &scenario);
-        code = quiet ? BST_EXIT_OK : print_json(bst_scenario_echo(&scenario));
+        if (bst_check_reach(&ctx, &scenario, sim) != BST_OK) {
+            fprintf(stderr, "boresight: %s\n", ctx.message);
+            code = BST_EXIT_FAILED;
+        } else {
+            code = quiet ? BST_EXIT_OK : print_json(bst_scenario_echo(&scenario));
+        }
     }
     bst_simulation_free(sim);
     bst_scenario_free(&scenario);

@@ -2,12 +2,19 @@
 
 #include <errno.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 bst_status bst_draft_open(bst_ctx *ctx, const char *path, bst_draft *out) {
     int n = snprintf(out->path, sizeof out->path, "%s", path);
     if (n < 0 || (size_t)n >= sizeof out->path) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", path);
+    }
+    struct stat info;
+    if (stat(path, &info) == 0 && !S_ISREG(info.st_mode)) {
+        /* a rename would put a file in the place of a device or a pipe */
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: is not a regular file; give another path",
+                        path);
     }
     snprintf(out->name, sizeof out->name, "%s.tmp.%ld", out->path, (long)getpid());
     out->stream = fopen(out->name, "wbe");

@@ -11,7 +11,8 @@ typedef struct bst_draft {
     char path[4096], name[4128]; /* final name; the name while it is written */
 } bst_draft;
 
-/* Opens a temporary file beside `path` for writing. BST_ERR_IO with path and reason. */
+/* Opens a temporary file beside `path` for writing. BST_ERR_IO with path and reason;
+ * BST_ERR_ARGUMENT where a folder, device or pipe is there. */
 bst_status bst_draft_open(bst_ctx *ctx, const char *path, bst_draft *out) BST_MUST_CHECK;
 
 /* With BST_OK: flushes it to disk and gives it its name, replacing what was there. With another

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <new>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
@@ -251,6 +252,57 @@ extern "C" bst_status bst_picture_copy(bst_ctx *ctx, const bst_picture *picture,
         return bst_fail(ctx, BST_ERR_MEMORY, "cannot copy a picture: %s", e.what());
     } catch (...) {
         return bst_fail(ctx, BST_ERR_MEMORY, "cannot copy a picture");
+    }
+}
+
+extern "C" bst_status bst_picture_grey_png(bst_ctx *ctx, const bst_picture *picture, int levels,
+                                           uint8_t **out, size_t *bytes) noexcept {
+    *out = nullptr;
+    *bytes = 0;
+    if (levels < 2 || levels > 256) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "%d grey levels: 2 to 256 are possible", levels);
+    }
+    try {
+        cv::Mat final_size, grey;
+        cv::resize(picture->image, final_size, cv::Size(), 1.0 / kOver, 1.0 / kOver,
+                   cv::INTER_AREA);
+        cv::extractChannel(final_size, grey, 1);
+        std::vector<uchar> map(static_cast<size_t>(levels)),
+            indices(static_cast<size_t>(grey.total()));
+        for (int i = 0; i < levels; i++) {
+            map[static_cast<size_t>(i)] =
+                static_cast<uchar>((255 * i + (levels - 1) / 2) / (levels - 1));
+        }
+        for (int y = 0; y < grey.rows; y++) {
+            for (int x = 0; x < grey.cols; x++) {
+                indices[static_cast<size_t>(y) * static_cast<size_t>(grey.cols) +
+                        static_cast<size_t>(x)] =
+                    static_cast<uchar>((grey.at<uchar>(y, x) * (levels - 1) + 127) / 255);
+            }
+        }
+        png_image png = {};
+        png.version = PNG_IMAGE_VERSION;
+        png.width = static_cast<png_uint_32>(grey.cols);
+        png.height = static_cast<png_uint_32>(grey.rows);
+        png.format = PNG_FORMAT_GRAY | PNG_FORMAT_FLAG_COLORMAP;
+        png.colormap_entries = static_cast<png_uint_32>(levels);
+        png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(png);
+        uint8_t *encoded = static_cast<uint8_t *>(malloc(size));
+        if (!encoded) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a PNG");
+        }
+        if (!png_image_write_to_memory(&png, encoded, &size, 0, indices.data(), grey.cols,
+                                       map.data())) {
+            free(encoded);
+            return bst_fail(ctx, BST_ERR_IO, "no PNG can be made: %s", png.message);
+        }
+        *out = encoded;
+        *bytes = size;
+        return BST_OK;
+    } catch (const std::exception &e) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no PNG can be made: %s", e.what());
+    } catch (...) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no PNG can be made");
     }
 }
 

@@ -3,6 +3,7 @@
 #define BST_IO_PICTURE_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "sim/core/status.h"
@@ -67,6 +68,11 @@ double bst_picture_text_width(double height, bool bold, const char *text) BST_NO
 /* Copies the picture to `bgr`: height x width pixels of three bytes, blue first, no padding. */
 bst_status bst_picture_copy(bst_ctx *ctx, const bst_picture *picture,
                             uint8_t *bgr) BST_NOEXCEPT BST_MUST_CHECK;
+
+/* Encodes the picture as a grey PNG of `levels` grey levels, 2 to 256, evenly spread: few levels
+ * make noise small. The caller frees *png. */
+bst_status bst_picture_grey_png(bst_ctx *ctx, const bst_picture *picture, int levels, uint8_t **png,
+                                size_t *bytes) BST_NOEXCEPT BST_MUST_CHECK;
 
 /* Writes a PNG, whole or not at all. */
 bst_status bst_picture_save(bst_ctx *ctx, const bst_picture *picture,

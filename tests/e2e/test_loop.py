@@ -99,10 +99,10 @@ def loop(scenario, sets, *more):
     return json.loads(result.stdout)["sensors"][0]
 
 
-def pointing(sets, duration, *more):
+def pointing(sets, duration, *more, scenario=runs.TRACK):
     """Time and place of the target from the boresight in the middle of each exposure."""
     out = os.path.join(runs.scratch(), "run")
-    result = subprocess.run([runs.BORESIGHT, "run", runs.TRACK, "--quiet", "--out", out,
+    result = subprocess.run([runs.BORESIGHT, "run", scenario, "--quiet", "--out", out,
                              "--duration", str(duration), *words(sets), *more],
                             capture_output=True, text=True, timeout=1200)
     if result.returncode != 0:
@@ -196,6 +196,11 @@ PREDICTED = {
     "proportional, lag behind a drift of 5 arcsec/s": (60, 20, dict(FAST, **{
         LAW: {"type": "pi", "proportional": 2}, PLATFORM + "jitter_low_px_rms": 0.5,
         PLATFORM + "jitter_low_cutoff_hz": 0.3, PLATFORM + "drift_arcsec_per_s": [3, -4, 0]})),
+    "scenarios/rigid_spacecraft.json": (300, 40, {"/world/star_catalogue": "embedded"}),
+    "scenarios/full_plant.json": (300, 40, {
+        "/record/frames": "none", "/world/star_catalogue": "embedded",
+        MODULES + "/gimbal/friction/coulomb_nm": [0, 0, 0],
+        MODULES + "/gimbal/friction/breakaway_nm": [0, 0, 0]}),
 }
 
 
@@ -204,8 +209,10 @@ class Prediction(unittest.TestCase):
 
     def check(self, name, seeds):
         duration, settled, sets = PREDICTED[name]
-        predicted = loop(runs.TRACK, sets)["predicted_rms_radial_px"]
-        square = [rms(pointing(sets, duration, "--seed", hex(seed)), settled, duration)**2
+        scenario = name if name.endswith(".json") else runs.TRACK
+        predicted = loop(scenario, sets)["predicted_rms_radial_px"]
+        square = [rms(pointing(sets, duration, "--seed", hex(seed), scenario=scenario), settled,
+                      duration)**2
                   for seed in range(1, seeds + 1)]
         simulated = math.sqrt(sum(square) / seeds)
         if FULL:

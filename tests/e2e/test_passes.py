@@ -6,6 +6,7 @@ Usage, from the repository root: /usr/bin/python3 tests/e2e/test_passes.py BORES
 """
 import math
 import re
+import subprocess
 import sys
 import unittest
 
@@ -27,6 +28,17 @@ def errors(out):
         " WHERE e.mid_s > ? ORDER BY e.mid_s", (SETTLED_S,)).fetchall()
     return (np.array([r[0] for r in rows]),
             np.array([math.inf if r[1] is None else math.hypot(r[1], r[2]) for r in rows]))
+
+
+def foreseen(scenario, *sets):
+    """What `boresight check` warns of."""
+    words = [word for one in sets for word in ("--set", one)]
+    result = subprocess.run([runs.BORESIGHT, "check", "scenarios/" + scenario, "--quiet", "--set",
+                             "/world/star_catalogue=embedded", *words], capture_output=True,
+                            text=True, timeout=120)
+    if result.returncode != 0:
+        raise AssertionError(result.stderr)
+    return result.stderr
 
 
 class Passes(unittest.TestCase):
@@ -56,9 +68,20 @@ class Passes(unittest.TestCase):
     def test_past_the_pole_with_a_third_axis(self):
         self.tracked("leo_leo_third_axis.json", GENERATOR)
 
+    @unittest.skipUnless(SEEDS > 1, "slow")
+    def test_past_the_pole_with_a_third_axis_by_images(self):
+        self.tracked("leo_leo_third_axis.json")
+
     def test_keyhole(self):
+        self.lost_as_told(GENERATOR)
+
+    @unittest.skipUnless(SEEDS > 1, "slow")
+    def test_keyhole_by_images(self):
+        self.lost_as_told()
+
+    def lost_as_told(self, *sets):
         for seed in range(1, SEEDS + 1):
-            out, mid_s, error = self.follow("leo_leo_keyhole.json", seed, GENERATOR)
+            out, mid_s, error = self.follow("leo_leo_keyhole.json", seed, *sets)
             told = [re.match(r"will be lost from ([\d.]+) s until ([\d.]+) s: in the keyhole", text)
                     for text, in runs.database(out).execute(
                         "SELECT text FROM events WHERE kind = 'guidance' ORDER BY tick")]
@@ -73,6 +96,10 @@ class Passes(unittest.TestCase):
             self.assertLess(lost, 0.1 * (len(off) + 5))
             self.assertAlmostEqual(first, off.min(), delta=0.1 * lost)
             self.assertAlmostEqual(last, off.max(), delta=0.1 * lost)
+            match = re.search(r"out of reach from ([\d.]+) s until ([\d.]+) s: in the keyhole",
+                              foreseen("leo_leo_keyhole.json"))
+            self.assertAlmostEqual(float(match.group(1)), off.min(), delta=0.1 * lost)
+            self.assertAlmostEqual(float(match.group(2)), off.max(), delta=0.1 * lost)
             # told well before, and tracked to both sides of it
             when, = runs.database(out).execute(
                 "SELECT max(time_s) FROM events WHERE kind = 'guidance'"
@@ -87,9 +114,12 @@ class KeepOut(unittest.TestCase):
     def test_the_earth(self):
         out = runs.scratch() + "/run"
         guidance = runs.SENSOR + "/modules/control/guidance/"
+        cone = (guidance + "earth_keep_out=true", guidance + "earth_limb_keep_out_deg=40")
+        self.assertRegex(foreseen("leo_leo_pass.json", *cone),
+                         r"out of reach from 0.0 s until 6[67]\.\d s: in the keep-out cone of the Earth's")
+        self.assertEqual(foreseen("leo_leo_pass.json"), "")
         runs.run("scenarios/leo_leo_pass.json", out, runs.NO_FRAMES, "/record/truth_stars=false",
-                 GENERATOR, guidance + "earth_keep_out=true", guidance + "look_ahead_s=200",
-                 guidance + "earth_limb_keep_out_deg=40", seed=1, duration=120)
+                 GENERATOR, *cone, guidance + "look_ahead_s=200", seed=1, duration=120)
         rows = runs.database(out).execute(
             "SELECT mid_s, radians(boresight_ra_deg), radians(boresight_dec_deg), observer_gcrf_x_m,"
             " observer_gcrf_y_m, observer_gcrf_z_m FROM exposures WHERE mid_s > 5").fetchall()

@@ -264,6 +264,51 @@ static void test_wrong_orbit(void **state) {
     bst_craft_free(f.craft);
 }
 
+/* A filter that has been running begins as well as it goes on: as its covariance says, and no worse
+ * than minutes later; alignment errors and scale factors are as it has come to terms with them. */
+static void test_running(void **state) {
+    (void)state;
+    enum { RUNS = 40, TIMES = 4 };
+    const double at_s[TIMES] = {0.01, 10.0, 60.0, 200.0};
+    double nees[TIMES] = {0.0}, square[2][TIMES] = {{0.0}};
+    for (int wrong = 0; wrong < 2; wrong++) {
+        for (uint64_t run = 0; run < RUNS / (1u + 3u * (unsigned)wrong); run++) {
+            bst_craft_config c = config_make(BST_LAW_NADIR);
+            c.running_s = 600.0;
+            if (wrong) {
+                c.gyro.scale_factor_ppm[1] = 3000.0;
+                c.gyro.alignment_arcsec[0] = 200.0;
+            }
+            flight f = start(&c, 100 + run);
+            for (int k = 0; k < TIMES; k++) {
+                const bst_craft_now *now = fly(&f, at_s[k] - (k ? at_s[k - 1] : 0.0));
+                const bst_attitude_filter *filter = bst_craft_filter(f.craft);
+                bst_vec3 e =
+                    bst_attitude_error(now->body.q_body_from_gcrf, filter->q_body_from_gcrf);
+                double x[3] = {e.x, e.y, e.z}, p[9], inverse[9];
+                for (int i = 0; i < 9; i++) {
+                    p[i] = filter->covariance[i / 3][i % 3];
+                }
+                assert_true(bst_symmetric_invert(3, p, inverse));
+                square[wrong][k] += bst_vec3_dot(e, e);
+                for (int i = 0; i < 9 && !wrong; i++) {
+                    nees[k] += x[i / 3] * inverse[i] * x[i % 3] / RUNS;
+                }
+            }
+            bst_craft_free(f.craft);
+        }
+    }
+    for (int k = 0; k < TIMES; k++) {
+        double rms = sqrt(square[0][k] / RUNS) / BST_ARCSEC_RAD;
+        double rms_wrong = sqrt(square[1][k] / (RUNS / 4)) / BST_ARCSEC_RAD;
+        print_message("%g s: NEES %.2f of 3, off by %.2f arcsec, with a wrong gyro %.2f\n", at_s[k],
+                      nees[k], rms, rms_wrong);
+        /* the mean of 40 chi-square numbers of 3 degrees, 3.3 sigma */
+        bst_assert_close(nees[k], 3.0, 3.3 * sqrt(6.0 / RUNS));
+        assert_true(rms < 3.0 && rms_wrong < 5.0);
+    }
+}
+
 /* One seed gives one flight to the bit, another another. */
 static void test_repeats(void **state) {
     (void)state;
@@ -332,7 +377,8 @@ int main(void) {
         cmocka_unit_test(test_antipodal),    cmocka_unit_test(test_saturated_wheels),
         cmocka_unit_test(test_failed_wheel), cmocka_unit_test(test_blind_for_an_hour),
         cmocka_unit_test(test_free_tumble),  cmocka_unit_test(test_wrong_orbit),
-        cmocka_unit_test(test_repeats),      cmocka_unit_test(test_sets),
-        cmocka_unit_test(test_reaction),     cmocka_unit_test(test_refused)};
+        cmocka_unit_test(test_repeats),      cmocka_unit_test(test_running),
+        cmocka_unit_test(test_sets),         cmocka_unit_test(test_reaction),
+        cmocka_unit_test(test_refused)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,123 +1,11 @@
 /* Where trackers break: filters by name at the places and rates where angles fail, gaps of an hour,
- * crossings within a pixel, manoeuvres, changes of brightness, false events. */
+ * manoeuvres, changes of brightness, false events. */
 #include <time.h>
 
 #include "sim/core/rng.h"
 #include "tests/test_support.h"
+#include "tests/tracker/sky_bench.h"
 #include "tracker/multitarget.h"
-
-#define AS BST_ARCSEC_RAD
-#define SIGMA (0.3 * AS)
-
-typedef struct bench {
-    bst_mtt *mtt;
-    bst_mtt_params params;
-    bst_mtt_detection list[1200];
-    int count;
-    bst_rng_key key;
-    uint64_t draw;
-} bench;
-
-static bench work;
-
-static bst_mtt_params defaults(void) {
-    return (bst_mtt_params){.max_tracks = 1000,
-                            .max_detections = 1200,
-                            .noise_rad2ps3 = pow(0.02 * AS, 2),
-                            .manoeuvre_noise_rad2ps3 = pow(3 * AS, 2),
-                            .quiet_s = 3600,
-                            .manoeuvre_s = 60,
-                            .gate_chi2 = 16,
-                            .detection_probability = 0.9,
-                            .false_alarms_per_frame = 1,
-                            .field_sr = pow(3000 * AS, 2),
-                            .confirm_hits = 3,
-                            .confirm_frames = 5,
-                            .confirm_score = 12,
-                            .max_rate_radps = 120 * AS,
-                            .initiation_gap_s = 5,
-                            .max_misses = 12,
-                            .max_coast_s = 120,
-                            .max_sigma_rad = 60 * AS,
-                            .merge_rad = 18 * AS,
-                            .merge_floor_rad = 0.9 * AS,
-                            .max_merged = 30,
-                            .feed_forward_rad = 0.09,
-                            .brightness_floor_mag = 0.0,
-                            .brightness_walk_mag = 0.02,
-                            .event_window = 8,
-                            .max_memory = 64,
-                            .memory_s = 7200,
-                            .memory_sigma_rad = 1.0 * BST_DEG_RAD,
-                            .memory_chi2 = 18.5};
-}
-
-static bench *start(uint64_t seed, const bst_mtt_params *params) {
-    bst_ctx ctx = {0};
-    bench *b = &work;
-    memset(b, 0, sizeof *b);
-    b->params = *params;
-    b->key = bst_rng_make_key(seed, 0, "test", "hard");
-    bst_assert_ok(&ctx, bst_mtt_create(&ctx, params, &b->mtt));
-    return b;
-}
-
-static double uniform(bench *b) {
-    return bst_rng_uniform(b->key, 0, b->draw++);
-}
-
-static void see(bench *b, bst_vec3 d, double v_mag) {
-    double n[2], m = bst_rng_normal(b->key, 2, b->draw++);
-    bst_rng_normal2(b->key, 1, b->draw++, n);
-    bst_tangent axes = bst_tangent_at(d);
-    b->list[b->count++] =
-        (bst_mtt_detection){.sky = {.direction = bst_tangent_exp(
-                                        d, bst_tangent_vector(&axes, SIGMA * n[0], SIGMA * n[1])),
-                                    .cov_11 = SIGMA * SIGMA,
-                                    .cov_22 = SIGMA * SIGMA},
-                            .v_mag = v_mag + 0.1 * m,
-                            .v_mag_sigma = 0.1,
-                            .snr = 10,
-                            .length_rad = 6 * AS};
-}
-
-static void frame(bench *b, double seconds) {
-    bst_mtt_frame f = {.tick = (int64_t)llround(seconds * 6000),
-                       .seconds = seconds,
-                       .detections = b->list,
-                       .count = b->count};
-    bst_mtt_step(b->mtt, &f);
-    b->count = 0;
-}
-
-/* The confirmed track within `reach` of a direction; NULL when none. */
-static const bst_mtt_track *track_at(const bench *b, bst_vec3 d, double reach) {
-    int n;
-    const bst_mtt_track *tracks = bst_mtt_tracks(b->mtt, &n);
-    for (int i = 0; i < n; i++) {
-        if (tracks[i].status != BST_TRACK_TENTATIVE &&
-            bst_vec3_angle(d, tracks[i].state.direction) < reach) {
-            return &tracks[i];
-        }
-    }
-    return NULL;
-}
-
-static int events_of(const bench *b, bst_mtt_event_kind kind) {
-    int n, c = 0;
-    const bst_mtt_event *events = bst_mtt_events(b->mtt, &n);
-    for (int i = 0; i < n; i++) {
-        c += events[i].kind == kind;
-    }
-    return c;
-}
-
-/* A great circle from d along heading. */
-static bst_vec3 along(bst_vec3 d, double heading, double angle) {
-    bst_tangent axes = bst_tangent_at(d);
-    return bst_tangent_exp(d,
-                           bst_tangent_vector(&axes, angle * cos(heading), angle * sin(heading)));
-}
 
 /* Every filter and association through the poles, the wrap of right ascension and a direction
  * overhead of any site, at rates from none to 5 degrees a second. */
@@ -313,49 +201,6 @@ static void memory_has_its_limits(void **state) {
     bst_mtt_memory(b->mtt, &n);
     assert_int_equal(n, 0);
     bst_mtt_free(b->mtt);
-}
-
-/* Two objects pass each other within a pixel of 3 arcsec, seen apart all the way: no blends. */
-static void crossing_within_a_pixel(void **state) {
-    (void)state;
-    const bst_mtt_association kinds[] = {BST_MTT_GNN, BST_MTT_NEAREST, BST_MTT_PDA,
-                                         BST_MTT_MIXTURE};
-    for (int a = 0; a < 4; a++) {
-        int kept = 0;
-        for (uint64_t seed = 0; seed < 50; seed++) {
-            bst_mtt_params params = defaults();
-            params.association = kinds[a];
-            bench *b = start(seed, &params);
-            bst_vec3 centre = bst_vec3_from_radec(0.0, 0.5);
-            double heading = 6.28 * uniform(b), apart = 3 * AS * uniform(b);
-            int64_t before[2] = {0}, after[2] = {0};
-            for (int k = -20; k <= 20; k++) {
-                bst_vec3 o[2] = {
-                    along(centre, heading, 5 * AS * k),
-                    along(along(centre, heading + BST_PI / 2, apart), heading + 1.0, 6 * AS * k)};
-                for (int i = 0; i < 2; i++) {
-                    if (uniform(b) < 0.95) {
-                        see(b, o[i], 13.0);
-                    }
-                }
-                frame(b, 100 + k);
-                for (int i = 0; i < 2; i++) {
-                    const bst_mtt_track *track = track_at(b, o[i], 3 * AS);
-                    if (k == -6) {
-                        before[i] = track ? track->id : -1;
-                    }
-                    if (k == 20) {
-                        after[i] = track ? track->id : -2;
-                    }
-                }
-            }
-            kept += before[0] == after[0] && before[1] == after[1];
-            bst_mtt_free(b->mtt);
-        }
-        print_message("crossing within 1 px, association %d: %d of 50 keep both identities\n",
-                      kinds[a], kept);
-        assert_true(kept >= 48);
-    }
 }
 
 /* False events per hour and track: at most what was asked for, and not absurdly few. */
@@ -588,7 +433,7 @@ int main(void) {
                                        cmocka_unit_test(a_million_updates_of_each_filter),
                                        cmocka_unit_test(identity_through_an_hour),
                                        cmocka_unit_test(memory_has_its_limits),
-                                       cmocka_unit_test(crossing_within_a_pixel),
+
                                        cmocka_unit_test(false_events_are_as_rare_as_asked),
                                        cmocka_unit_test(manoeuvres_and_flares_are_told),
                                        cmocka_unit_test(imm_holds_through_a_burn),

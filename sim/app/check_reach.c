@@ -1,0 +1,247 @@
+#include "sim/app/check_reach.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "control/control.h"
+#include "gimbal/mount.h"
+#include "gimbal/two_axis.h"
+#include "sim/world/knowledge.h"
+#include "sim/world/world_config.h"
+
+/* Steps of the look: a thousandth of the run within these. */
+#define LEAST_STEP_S 0.5
+#define MOST_STEP_S 10.0
+/* What the limits lose is followed from so long before to so long after they are exceeded. */
+#define RUN_UP_S 5.0
+#define RUN_OUT_S 120.0
+enum { MOST_SPANS = 10000, MOST_LOSSES = 4 };
+
+typedef struct seeing {
+    int observer, sensor;
+    const bst_guidance_config *guidance;
+    bst_knowledge *knowledge;
+    bst_knowledge_view *cue;
+    bst_view *view;
+    bool turns; /* the body follows a law */
+    bst_pointing_law law;
+    bst_mount_status mount;
+} seeing;
+
+static bst_status look(void *user, bst_ctx *ctx, double seconds, bst_reach_look *out) {
+    seeing *s = user;
+    *out = (bst_reach_look){.valid = false};
+    bst_vec3 direction;
+    bst_state state;
+    bst_bodies bodies;
+    bool known;
+    double rate;
+    BST_TRY(bst_knowledge_cue_direction_at(ctx, s->cue, seconds, &out->valid, &direction));
+    if (!out->valid) {
+        return BST_OK;
+    }
+    BST_TRY(bst_knowledge_cue_range_at(ctx, s->cue, seconds, &known, &out->range_m, &rate));
+    out->range_m = known ? out->range_m : 0.0;
+    BST_TRY(bst_view_believed(ctx, s->view, s->observer, s->sensor, seconds, &state, &bodies));
+    bst_light light = bst_light_at(&bodies, state.position_m, state.velocity_mps);
+    out->direction_gcrf = bst_light_aberrate(&light, direction);
+    out->position_m = state.position_m;
+    bst_law_inputs inputs = {.position_m = state.position_m,
+                             .velocity_mps = state.velocity_mps,
+                             .sun_m = light.sun_m,
+                             .target = out->direction_gcrf};
+    out->q_body_from_gcrf =
+        s->turns ? bst_pointing_law_attitude(&s->law, &inputs) : s->law.q_nominal;
+    bst_nav_telemetry nav = {.position_gcrf_m = state.position_m,
+                             .sun_m = light.sun_m,
+                             .moon_m = bst_vec3_sub(bodies.moon_m, state.position_m)};
+    bst_guidance guidance = {.config = *s->guidance};
+    out->zone_count = bst_guidance_zones(&guidance, &nav, out->zones);
+    return BST_OK;
+}
+
+/* ---- what was found ---- */
+
+typedef struct found {
+    int count[BST_REACH_COUNT];
+    double from_s[BST_REACH_COUNT], until_s[BST_REACH_COUNT], sum_s[BST_REACH_COUNT];
+} found;
+
+static void note(found *f, int reason, double from_s, double until_s) {
+    if (f->count[reason]++ == 0) {
+        f->from_s[reason] = from_s;
+        f->until_s[reason] = until_s;
+    }
+    f->sum_s[reason] += until_s - from_s;
+}
+
+static void tell(bst_ctx *ctx, const char *name, const found *f, double duration_s) {
+    for (int reason = BST_REACH_BEHIND_EARTH; reason < BST_REACH_COUNT; reason++) {
+        char more[80] = "", until[48] = "the end of the run";
+        if (f->count[reason] == 0) {
+            continue;
+        }
+        if (f->count[reason] > 1) {
+            snprintf(more, sizeof more, " (the first of %d times, %.0f s in all)", f->count[reason],
+                     f->sum_s[reason]);
+        }
+        if (f->until_s[reason] < duration_s) {
+            snprintf(until, sizeof until, "%.1f s", f->until_s[reason]);
+        }
+        bst_log(ctx, BST_LOG_WARNING, "%s: the cue is out of reach from %.1f s until %s: %s%s",
+                name, f->from_s[reason], until, bst_reach_reason(reason), more);
+    }
+}
+
+/* What the mount's limits lose about [from_s, until_s]; *until_s: the end of the last loss. */
+static bst_status chase(bst_ctx *ctx, const bst_reach_problem *problem, double tolerance_rad,
+                        int reason, double from_s, double *until_s, double duration_s, found *f) {
+    bst_reach_loss losses[MOST_LOSSES];
+    bst_reach middle;
+    int count;
+    double end_s = fmin(*until_s + RUN_OUT_S, duration_s);
+    /* on the way to the pole it is the acceleration that is too great first */
+    BST_TRY(bst_reach_at(ctx, problem, 0.5 * (from_s + *until_s), &middle));
+    reason = middle == BST_REACH_KEYHOLE ? (int)middle : reason;
+    BST_TRY(bst_reach_chase(ctx, problem, fmax(from_s - RUN_UP_S, 0.0), end_s, tolerance_rad,
+                            losses, MOST_LOSSES, &count));
+    for (int i = 0; i < count; i++) {
+        double until = fmin(losses[i].until_s, end_s);
+        note(f, reason, losses[i].from_s, until);
+        *until_s = fmax(*until_s, until);
+    }
+    return BST_OK;
+}
+
+static bst_status spans(bst_ctx *ctx, seeing *s, double duration_s, double tolerance_rad,
+                        found *f) {
+    const bst_reach_problem problem = {.look = look,
+                                       .user = s,
+                                       .mount = s->mount.axes > 0 ? &s->mount : NULL,
+                                       .limits_share = s->guidance->limits_share};
+    double step = fmin(fmax(1e-3 * duration_s, LEAST_STEP_S), MOST_STEP_S);
+    double at = 0.0;
+    for (int i = 0; i < MOST_SPANS && at < duration_s; i++) {
+        bool lost, back;
+        double from, until = duration_s;
+        bst_reach why;
+        BST_TRY(
+            bst_reach_next(ctx, &problem, at, duration_s - at, step, false, &lost, &from, &why));
+        if (!lost) {
+            break;
+        }
+        BST_TRY(bst_reach_next(ctx, &problem, from, duration_s - from, step, true, &back, &until,
+                               NULL));
+        until = back ? until : duration_s;
+        if (why == BST_REACH_KEYHOLE || why == BST_REACH_RATE || why == BST_REACH_ACCEL) {
+            BST_TRY(chase(ctx, &problem, tolerance_rad, (int)why, from, &until, duration_s, f));
+        } else {
+            note(f, (int)why, from, until);
+        }
+        at = fmax(until, at + step);
+    }
+    return BST_OK;
+}
+
+/* ---- a sensor ---- */
+
+static bst_status set_mount(bst_ctx *ctx, const bst_module_config *gimbal, double dt_s,
+                            bst_quat nominal, seeing *s) {
+    const bst_platform_config *platform;
+    if (gimbal->desc->config == bst_two_axis_config_table) {
+        const bst_two_axis_config *config = gimbal->config;
+        const bst_two_axis_keys keys = {{{0, 0}}, {{0, 0}}, {{0, 0}}};
+        bst_two_axis plant;
+        platform = &config->platform;
+        BST_TRY(bst_two_axis_init(ctx, &plant, config, nominal, 1e-5, dt_s, &keys));
+        bst_two_axis_status(&plant, 0, &s->mount);
+        bst_platform_free(&plant.platform);
+    } else {
+        const bst_mount_config *config = gimbal->config;
+        bool azimuth = strcmp(gimbal->desc->type, "azimuth_elevation") == 0;
+        bst_mount mount;
+        platform = &config->platform;
+        BST_TRY(bst_mount_init(ctx, &mount,
+                               azimuth ? BST_MOUNT_AZIMUTH_ELEVATION : BST_MOUNT_CROSS_ELEVATION,
+                               config, dt_s, (bst_rng_key){{0, 0}}));
+        bst_mount_status_of(&mount, 0, &s->mount);
+    }
+    const bst_attitude_config *a = &platform->spacecraft.attitude;
+    s->turns = platform->spacecraft.type == BST_CRAFT_RIGID_BODY;
+    s->law = (bst_pointing_law){
+        .law = (bst_law)a->law,
+        .q_nominal = nominal,
+        .axis = bst_vec3_unit((bst_vec3){a->axis[0], a->axis[1], a->axis[2]}),
+        .second_axis =
+            bst_vec3_unit((bst_vec3){a->second_axis[0], a->second_axis[1], a->second_axis[2]}),
+        .roll_rad = a->roll_deg * BST_DEG_RAD};
+    if (s->turns && a->law == BST_LAW_FREE) {
+        s->mount.axes = 0; /* nobody knows how it will be turned */
+    }
+    return BST_OK;
+}
+
+static const bst_module_config *module_of(const bst_scenario *scenario, const seeing *s,
+                                          const char *role) {
+    for (int m = 0; m < scenario->module_count; m++) {
+        const bst_module_config *module = &scenario->modules[m];
+        if (module->observer == s->observer && module->sensor == s->sensor && !module->off &&
+            strcmp(module->desc->role, role) == 0) {
+            return module;
+        }
+    }
+    return NULL;
+}
+
+static bst_status check_sensor(bst_ctx *ctx, const bst_scenario *scenario, const bst_world *world,
+                               seeing *s, const char *name) {
+    const bst_module_config *gimbal = module_of(scenario, s, "gimbal");
+    const bst_module_config *control = module_of(scenario, s, "control");
+    if (!gimbal || !control || control->desc->config != bst_control_config_table ||
+        (gimbal->desc->config != bst_two_axis_config_table &&
+         gimbal->desc->config != bst_mount_config_table)) {
+        return BST_OK;
+    }
+    const bst_control_config *config = control->config;
+    if (config->strategy != BST_CONTROL_TRACK && config->strategy != BST_CONTROL_RATE) {
+        return BST_OK;
+    }
+    s->guidance = &config->guidance;
+    BST_TRY(bst_knowledge_create(ctx, world, s->observer, s->sensor, &s->knowledge));
+    bst_region region;
+    bst_knowledge_region(s->knowledge, &region);
+    if (region.kind != BST_REGION_NONE) {
+        return BST_OK;
+    }
+    BST_TRY(bst_knowledge_view_create(ctx, s->knowledge, &s->cue));
+    BST_TRY(bst_view_create(ctx, world, &s->view));
+    BST_TRY(set_mount(ctx, gimbal, (double)gimbal->period_ticks / (double)scenario->tick_rate_hz,
+                      bst_knowledge_body_attitude(s->knowledge), s));
+    double pixel = bst_camera_scale_rad(bst_knowledge_camera(s->knowledge));
+    found f = {.count = {0}};
+    BST_TRY(spans(ctx, s, scenario->duration_s, config->guidance.loss_tolerance_px * pixel, &f));
+    tell(ctx, name, &f, scenario->duration_s);
+    return BST_OK;
+}
+
+bst_status bst_check_reach(bst_ctx *ctx, const bst_scenario *scenario,
+                           const bst_simulation *simulation) {
+    const bst_observer_config *observers = scenario->observers.items;
+    for (int o = 0; o < scenario->observers.count; o++) {
+        const bst_sensor_config *sensors = observers[o].sensors.items;
+        for (int i = 0; i < observers[o].sensors.count; i++) {
+            char name[160];
+            snprintf(name, sizeof name, "%s/%s", observers[o].name, sensors[i].name);
+            seeing s = {.observer = o, .sensor = i};
+            bst_status status =
+                check_sensor(ctx, scenario, bst_simulation_world(simulation), &s, name);
+            bst_view_free(s.view);
+            bst_knowledge_view_free(s.cue);
+            bst_knowledge_free(s.knowledge);
+            if (status != BST_OK) {
+                return bst_fail_prefix(ctx, status, "%s", name);
+            }
+        }
+    }
+    return BST_OK;
+}

@@ -1,0 +1,270 @@
+#include <inttypes.h>
+#include <math.h>
+#include <string.h>
+
+#include <cjson/cJSON.h>
+
+#include "sim/app/loop_model.h"
+#include "sim/app/report.h"
+
+static const cJSON *get(const cJSON *node, const char *key) {
+    return cJSON_GetObjectItemCaseSensitive(node, key);
+}
+
+static double number_of(const cJSON *node, const char *key) {
+    const cJSON *item = get(node, key);
+    return cJSON_IsNumber(item) ? item->valuedouble : NAN;
+}
+
+/* ------------------------------------------------------------------ how it ended */
+
+static void add_end(const bst_run_reader *run, bst_warnings *w) {
+    const cJSON *manifest = bst_run_reader_manifest(run), *error = get(manifest, "error");
+    static const char *const words[] = {
+        [BST_RUN_INTERRUPTED] =
+            "The run was interrupted: it was closed properly before its end. "
+            "All figures are those of the part that was simulated.",
+        [BST_RUN_RUNNING] = "The run is still going on: this report is of what it had stored.",
+        [BST_RUN_KILLED] =
+            "The run was killed: it did not close its folder and has no summary. All "
+            "figures are those of what it had stored.",
+    };
+    if (bst_run_reader_state(run) != BST_RUN_COMPLETE) {
+        bst_warnings_add(w, BST_SEVERITY_PROBLEM, "%s", words[bst_run_reader_state(run)]);
+    }
+    if (cJSON_IsString(error)) {
+        bst_warnings_add(w, BST_SEVERITY_PROBLEM, "The run failed: %s", error->valuestring);
+    }
+    double logged = number_of(manifest, "warnings");
+    if (logged > 0.0) {
+        bst_warnings_add(
+            w, BST_SEVERITY_WARNING,
+            "%.0f warnings were logged while it ran; they stood on its standard error.", logged);
+    }
+}
+
+/* ------------------------------------------------------------------ counters */
+
+static void add_counters(const bst_run_reader *run, bst_warnings *w) {
+    static const struct {
+        const char *key;
+        bst_severity severity;
+        const char *text;
+    } known[] = {
+        {"tracker_overflow", BST_SEVERITY_PROBLEM,
+         "frames in which the tracker had no room for all "
+         "tracks"},
+        {"detections_overflow", BST_SEVERITY_PROBLEM,
+         "frames in which image processing had no room "
+         "for all detections"},
+        {"truth_overflow", BST_SEVERITY_WARNING,
+         "frames in which the truth had no room for all "
+         "sources: labels are missing"},
+        {"queue_overflow", BST_SEVERITY_PROBLEM, "messages were overwritten before they were read"},
+        {"stale_input", BST_SEVERITY_WARNING,
+         "times an input was read that is older than it may be"},
+        {"tracker_no_attitude", BST_SEVERITY_WARNING,
+         "frames whose attitude from stars was not good "
+         "enough to measure directions with"},
+        {"tracker_no_navigation", BST_SEVERITY_WARNING, "frames without navigation telemetry"},
+        {"tracker_frame_ignored", BST_SEVERITY_WARNING,
+         "frames came to the tracker twice or out of "
+         "order"},
+        {"frame_without_stars", BST_SEVERITY_NOTE, "frames in which no star was identified"},
+        {"saturated", BST_SEVERITY_NOTE, "frames with a full pixel"},
+    };
+    const cJSON *counters = get(bst_run_reader_manifest(run), "counters"), *item;
+    cJSON_ArrayForEach(item, counters) {
+        if (!cJSON_IsNumber(item) || item->valuedouble <= 0.0) {
+            continue;
+        }
+        bst_severity severity = BST_SEVERITY_WARNING;
+        const char *text = "counted";
+        for (size_t k = 0; k < sizeof known / sizeof *known; k++) {
+            if (strcmp(known[k].key, item->string) == 0) {
+                severity = known[k].severity;
+                text = known[k].text;
+            }
+        }
+        bst_warnings_add(w, severity, "%.0f %s (%s).", item->valuedouble, text, item->string);
+    }
+}
+
+/* ------------------------------------------------------------------ summaries */
+
+static void judge_summary(const char *sensor, const cJSON *summary, bool targeted, bool complete,
+                          bst_warnings *w) {
+    if (!cJSON_IsObject(summary) || !targeted) {
+        return;
+    }
+    double confirmed = number_of(summary, "time_to_confirm_s"),
+           settled = number_of(summary, "time_to_settle_s"),
+           fraction = number_of(summary, "track_fraction"),
+           wrong = number_of(summary, "wrong_target_frames");
+    const cJSON *mode = get(summary, "final_mode");
+    if (!isfinite(confirmed)) {
+        bst_warnings_add(w, BST_SEVERITY_PROBLEM, "%s: the target was never in confirmed track.",
+                         sensor);
+    } else if (!isfinite(settled)) {
+        bst_warnings_add(w, BST_SEVERITY_PROBLEM,
+                         "%s: the loop never settled on the target: there are no pointing figures.",
+                         sensor);
+    }
+    if (isfinite(confirmed) && fraction < 0.95) {
+        bst_warnings_add(
+            w, fraction < 0.5 ? BST_SEVERITY_PROBLEM : BST_SEVERITY_WARNING,
+            "%s: the target was in track in only %.1f %% of the frames in which it was "
+            "visible after the first confirmation.",
+            sensor, 100.0 * fraction);
+    }
+    if (wrong > 0.0) {
+        bst_warnings_add(w, BST_SEVERITY_WARNING,
+                         "%s: in %.0f frames the track of interest was not the target's.", sensor,
+                         wrong);
+    }
+    if (complete && isfinite(confirmed) && cJSON_IsString(mode) &&
+        strcmp(mode->valuestring, "track") != 0) {
+        bst_warnings_add(w, BST_SEVERITY_WARNING, "%s: at the end the mode was %s, not track.",
+                         sensor, mode->valuestring);
+    }
+}
+
+static void add_summaries(const bst_run_reader *run, const bst_report_sensor *sensors, int count,
+                          bst_warnings *w) {
+    const cJSON *manifest = bst_run_reader_manifest(run), *several = get(manifest, "sensors");
+    bool complete = bst_run_reader_state(run) == BST_RUN_COMPLETE;
+    for (int i = 0; i < count; i++) {
+        const cJSON *own = get(several, sensors[i].name);
+        const cJSON *summary = own ? own : i == 0 ? get(manifest, "summary") : NULL;
+        judge_summary(sensors[i].name, summary,
+                      sensors[i].sensor.target[0] && sensors[i].has_tracks, complete, w);
+    }
+}
+
+/* ------------------------------------------------------------------ tables */
+
+/* Adds a warning with a count where a query, on a sensor, finds more than none. */
+static void count_rows(const bst_run_reader *run, const bst_report_sensor *s, const char *sql,
+                       bst_severity severity, const char *text, bst_warnings *w) {
+    int64_t n = bst_run_reader_int(run, sql, s->sensor.index, 0);
+    if (n > 0) {
+        bst_warnings_add(w, severity, "%s: %" PRId64 " %s.", s->name, n, text);
+    }
+}
+
+static void add_tables(const bst_run_reader *run, const bst_report_sensor *s, bst_warnings *w) {
+    if (s->every > 1) {
+        bst_warnings_add(w, BST_SEVERITY_NOTE,
+                         "%s: of %" PRId64 " exposures one in %" PRId64 " is drawn.", s->name,
+                         s->exposures, s->every);
+    }
+    count_rows(run, s, "SELECT count(*) FROM exposures WHERE sensor = ?1 AND dropped = 1",
+               BST_SEVERITY_WARNING, "frames were lost on their way", w);
+    count_rows(run, s, "SELECT count(*) FROM exposures WHERE sensor = ?1 AND error_sigma > 0.3",
+               BST_SEVERITY_WARNING,
+               "frames were rendered with an expected error above 0.3 of a pixel's noise", w);
+    count_rows(run, s, "SELECT count(*) FROM exposures WHERE sensor = ?1 AND hits > 0",
+               BST_SEVERITY_NOTE, "frames hold radiation hits", w);
+    count_rows(run, s, "SELECT count(*) FROM pointing WHERE sensor = ?1 AND limited = 1",
+               BST_SEVERITY_WARNING, "rows of telemetry tell of an axis at a limit", w);
+    count_rows(run, s,
+               "SELECT count(*) FROM mount WHERE sensor = ?1 AND"
+               " ((axis0_flags | axis1_flags | axis2_flags) & 1) = 1",
+               BST_SEVERITY_PROBLEM, "rows of telemetry tell of a stuck axis", w);
+    count_rows(run, s, "SELECT count(*) FROM mount WHERE sensor = ?1 AND wheels_saturated = 1",
+               BST_SEVERITY_WARNING, "rows of telemetry tell of saturated reaction wheels", w);
+}
+
+/* ------------------------------------------------------------------ events */
+
+static void add_events(const bst_run_reader *run, bst_warnings *w) {
+    static const struct {
+        const char *kind;
+        bst_severity severity;
+        const char *text;
+    } known[] = {
+        {"mode", -1, ""}, /* told by the charts */
+        {"target_selected", -1, ""},
+        {"track_confirmed", -1, ""},
+        {"track_resumed", -1, ""},
+        {"target_lost", BST_SEVERITY_WARNING, "the track of the target was given up"},
+        {"track_lost", BST_SEVERITY_NOTE, "a track was given up"},
+        {"attitude_lost", BST_SEVERITY_WARNING, "stars no longer gave an attitude"},
+        {"guidance", BST_SEVERITY_NOTE, "guidance told of what is out of reach"},
+        {"wheels", BST_SEVERITY_WARNING, "reaction wheels came to a limit, or left it"},
+        {"star_trackers", BST_SEVERITY_WARNING, "star trackers lost the stars, or found them"},
+        {"manoeuvre", BST_SEVERITY_NOTE, "the tracker noticed a manoeuvre"},
+        {"brightness_change", BST_SEVERITY_NOTE, "the tracker noticed a change of brightness"},
+    };
+    bst_ctx unheard = {0};
+    bst_rows *rows;
+    bool more;
+    if (bst_rows_open(&unheard, run,
+                      "SELECT kind, source, count(*), min(time_s) FROM events GROUP BY kind, source"
+                      " ORDER BY min(tick), kind, source",
+                      0, 0, &rows) != BST_OK) {
+        return;
+    }
+    while (bst_rows_next(&unheard, rows, &more) == BST_OK && more) {
+        const char *kind = bst_rows_text(rows, 0);
+        int severity = BST_SEVERITY_NOTE;
+        const char *text = "told";
+        for (size_t k = 0; k < sizeof known / sizeof *known; k++) {
+            if (strcmp(known[k].kind, kind) == 0) {
+                severity = (int)known[k].severity;
+                text = known[k].text;
+            }
+        }
+        if (severity >= 0) {
+            bst_warnings_add(w, (bst_severity)severity,
+                             "%s: %s: %" PRId64 " time%s, first at %.6g s.", bst_rows_text(rows, 1),
+                             strcmp(text, "told") == 0 ? kind : text, bst_rows_int(rows, 2),
+                             bst_rows_int(rows, 2) == 1 ? "" : "s", bst_rows_real(rows, 3));
+        }
+    }
+    bst_rows_close(rows);
+}
+
+/* ------------------------------------------------------------------ margins */
+
+static void hear(void *user, bst_log_level level, const char *message) {
+    (void)level;
+    bst_warnings_add(user, BST_SEVERITY_WARNING, "%s.", message);
+}
+
+const char *bst_report_local(const bst_run_reader *run, const char *message) {
+    const char *folder = bst_run_reader_folder(run);
+    size_t n = strlen(folder);
+    if (n == 0 || strncmp(message, folder, n) != 0) {
+        return message;
+    }
+    return message + n + strspn(message + n, "/");
+}
+
+void bst_report_run_warnings(bst_run_reader *run, const bst_report_sensor *sensors, int count,
+                             const bst_scenario *scenario, bst_warnings *w) {
+    add_end(run, w);
+    const char *problem;
+    for (int i = 0; (problem = bst_run_reader_problem(run, i)); i++) {
+        bst_warnings_add(w, BST_SEVERITY_PROBLEM, "%s", bst_report_local(run, problem));
+    }
+    add_summaries(run, sensors, count, w);
+    add_counters(run, w);
+    for (int i = 0; i < count; i++) {
+        add_tables(run, &sensors[i], w);
+    }
+    const cJSON *misfits = get(bst_run_reader_manifest(run), "wcs_misfit_px"), *item;
+    cJSON_ArrayForEach(item, misfits) {
+        if (cJSON_IsNumber(item) && item->valuedouble > 1e-3) {
+            bst_warnings_add(w, BST_SEVERITY_WARNING,
+                             "%s: the WCS of its frames misses the distortion by up to %.3g px.",
+                             item->string, item->valuedouble);
+        }
+    }
+    if (scenario) {
+        bst_ctx ctx;
+        bst_ctx_init(&ctx, hear, w, BST_LOG_WARNING);
+        bst_loop_warn(&ctx, scenario);
+    }
+    add_events(run, w);
+}

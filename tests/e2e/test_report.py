@@ -1,0 +1,273 @@
+#!/usr/bin/env python3
+"""boresight report: pages of complete, killed and damaged runs, against the runs' own tables.
+
+Usage, from the repository root: /usr/bin/python3 tests/e2e/test_report.py BORESIGHT
+"""
+import base64
+import math
+import os
+import re
+import shutil
+import signal
+import sqlite3
+import struct
+import subprocess
+import time
+import unittest
+import xml.etree.ElementTree as tree
+from html.parser import HTMLParser
+
+import runs
+
+VOID = {"meta", "br", "hr", "img", "input", "link", "col", "path", "rect", "circle", "image"}
+CHARTS = ["Timeline of the mode of control", "Distance from the boresight to the true target",
+          "Pointing error along the sensor's columns and rows",
+          "Error of the track of interest and its own sigma",
+          "Normalised error squared of the track of interest",
+          "Signal-to-noise ratio of the target over time", "Detections per frame",
+          "pointing error in x, px", "pointing error in y, px",
+          "Paths of the boresight and of the target", "Path of the observer's sub-satellite point",
+          "Distance of the target from the observer.", "Angle Sun - target - observer.",
+          "Brightness of the target", "Angle from the boresight to the Sun.",
+          "Angle from the boresight to the Earth's limb"]
+
+
+def report(run, *words):
+    return subprocess.run([runs.BORESIGHT, "report", run, *words], capture_output=True, text=True,
+                          timeout=120)
+
+
+class Page(HTMLParser):
+    """A page as a browser's parser reads it: every element is closed where it has to be."""
+
+    def __init__(self, path):
+        super().__init__(convert_charrefs=True)
+        with open(path, "rb") as file:
+            self.bytes = file.read()
+        self.source = self.bytes.decode("utf-8")
+        self.stack, self.elements, self.words = [], [], []
+        self.feed(self.source)
+        self.close()
+        assert not self.stack, f"not closed: {self.stack}"
+        # the page is well-formed XML as well: a stricter check of the same
+        self.root = tree.fromstring(self.source.replace("<!DOCTYPE html>", ""))
+        self.text = " ".join("".join(self.root.find("body").itertext()).split())
+
+    def handle_starttag(self, tag, attrs):
+        self.elements.append((tag, dict(attrs)))
+        if tag not in VOID or not self.get_starttag_text().endswith("/>"):
+            if tag not in ("meta",):
+                self.stack.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.elements.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag):
+        assert self.stack and self.stack[-1] == tag, f"</{tag}> after {self.stack[-3:]}"
+        self.stack.pop()
+
+    def charts(self):
+        return [a["aria-label"] for tag, a in self.elements
+                if tag == "svg" and a.get("role") == "img"]
+
+    def cards(self):
+        """Name of each card to its figure."""
+        out = {}
+        for card in self.root.iter("div"):
+            if card.get("class") == "card":
+                out.setdefault(card.find("small").text, card.find("b").text)
+        return out
+
+    def pictures(self):
+        return [base64.b64decode(a["href"].split(",", 1)[1], validate=True)
+                for tag, a in self.elements if tag == "image"]
+
+    def warnings(self):
+        return ["".join(item.itertext()) for part in self.root.iter("ul")
+                if part.get("class") == "warnings" for item in part]
+
+
+class OnePage(unittest.TestCase):
+    def check_alone(self, page):
+        """Nothing is fetched, nothing runs."""
+        for tag, attributes in page.elements:
+            self.assertNotIn(tag, ("script", "link", "iframe", "object", "embed", "base", "form"))
+            for key, value in attributes.items():
+                self.assertFalse(key.startswith("on"), key)
+                if key in ("src", "href", "xlink:href", "data", "action"):
+                    self.assertTrue(value.startswith("data:image/png;base64,"), value[:80])
+        self.assertNotRegex(page.source, r"https?://|@import|url\(")
+        self.assertTrue(all(label.strip() for label in page.charts()))
+        self.assertNotRegex(re.sub(r"base64,[^\"]*", "", page.source), r"[\"> ,-](nan|inf)\b")
+
+
+class Complete(OnePage):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = runs.scratch()
+        cls.made = os.path.join(cls.folder, "run")
+        # the target is confirmed after some 22 s
+        cls.manifest = runs.run(runs.TRACK, cls.made, duration=60, seed=1)
+        result = report(cls.made)
+        assert (result.returncode, result.stderr) == (0, ""), result.stderr
+        assert result.stdout == cls.made + "/report.html\n"
+        cls.page = Page(cls.made + "/report.html")
+
+    def test_alone(self):
+        self.check_alone(self.page)
+        self.assertLess(len(self.page.bytes), 800_000)
+        self.assertTrue(self.page.source.startswith("<!DOCTYPE html>\n<html lang=\"en\">"))
+        self.assertIn("@media print", self.page.source)
+
+    def test_charts(self):
+        labels = self.page.charts()
+        for name in CHARTS:
+            self.assertEqual(sum(label.startswith(name) for label in labels), 1, name)
+
+    def test_figures(self):
+        summary, cards = self.manifest["summary"], self.page.cards()
+        # as many digits as the cards show
+        for name, value, digits in (
+                ("custody", 100 * summary["track_fraction"], 4),
+                ("time to acquire", summary["time_to_confirm_s"], 4),
+                ("pointing RMS from settling on", summary["pointing_rms_px"], 3),
+                ("speed", summary["real_time_factor"], 3)):
+            self.assertLessEqual(abs(float(cards[name]) - value),
+                                 0.51 * 10 ** (math.floor(math.log10(value)) + 1 - digits), name)
+        self.assertEqual(cards["exposures"], str(summary["frames"]))
+        self.assertEqual(cards["mode at the end"], summary["final_mode"])
+        with runs.database(self.made) as tables:
+            detections, = tables.execute("SELECT sum(detections) FROM detection_frames").fetchone()
+            events, = tables.execute("SELECT count(*) FROM events").fetchone()
+        self.assertEqual(cards["detections"], str(detections))
+        self.assertIn(f"{events} events", self.page.text)
+
+    def test_pointing(self):
+        """The caption's RMS is that of the truth's places, where all conditions hold."""
+        with runs.database(self.made) as tables:
+            rows = tables.execute(
+                "SELECT e.mid_s, t.x_mid_px - e.boresight_x_px, t.y_mid_px - e.boresight_y_px"
+                " FROM truth t JOIN exposures e USING (sensor, exposure_id)"
+                " WHERE t.kind = 'object' AND t.in_field = 1 AND e.mid_s >= ?",
+                (self.manifest["summary"]["time_to_settle_s"],)).fetchall()
+        rms = math.sqrt(sum(x * x + y * y for _, x, y in rows) / len(rows))
+        found = re.search(r"In the (\d+) frames in mode track with the visible target in track: "
+                          r"RMS ([0-9.]+)", self.page.text)
+        self.assertEqual(int(found[1]), len(rows))
+        # three digits
+        self.assertAlmostEqual(float(found[2]), rms, delta=0.006 * rms)
+
+    def test_identity(self):
+        for text in (self.manifest["git_revision"], self.manifest["device"], "seed 0x1, run 0",
+                     "2022-06-16T22:10:00.000Z", "2022-06-16T22:11:00.000Z", "neossat/telescope",
+                     "INMARSAT GX5", "idle -> slew: there is a cue"):
+            self.assertIn(text, self.page.text.replace("seed0x1", "seed 0x1"))
+        self.assertLess(self.page.source.index("Warnings</h2>"),
+                        self.page.source.index("What was run</h2>"))
+
+    def test_frames(self):
+        pictures = self.page.pictures()
+        self.assertEqual(len(pictures), 12)  # six frames and their insets
+        sizes = [struct.unpack(">II", png[16:24]) for png in pictures]
+        self.assertTrue(all(png.startswith(b"\x89PNG\r\n\x1a\n") for png in pictures))
+        self.assertEqual(set(sizes), {(352, 352), (48, 48)})
+        self.assertIn("frame 0 2022-06-16T22:10:00.250Z", self.page.text)
+
+    def test_same_bytes(self):
+        again = os.path.join(runs.scratch(), "again.html")
+        self.assertEqual(report(self.made + "/", "--out", again).returncode, 0)
+        with open(again, "rb") as file:
+            self.assertEqual(file.read(), self.page.bytes)
+        moved = os.path.join(runs.scratch(), "run")
+        shutil.copytree(self.made, moved)
+        self.assertEqual(report(moved, "--out", again).returncode, 0)
+        with open(again, "rb") as file:
+            self.assertEqual(file.read(), self.page.bytes)
+
+    def test_damaged(self):
+        folder = os.path.join(runs.scratch(), "run")
+        shutil.copytree(self.made, folder)
+        os.remove(folder + "/report.html")
+        with open(folder + "/run.sqlite", "r+b") as file:
+            size = os.path.getsize(folder + "/run.sqlite")
+            file.seek(size // 3)
+            file.write(b"\xA5" * (size // 3))
+        result = report(folder)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("run.sqlite", result.stderr)
+        page = Page(folder + "/report.html")
+        self.check_alone(page)
+        self.assertTrue(any("run.sqlite" in text for text in page.warnings()))
+
+    def test_errors(self):
+        folder = runs.scratch()
+        for run, words, code, message in (
+                (folder, (), 1, "is not the folder of a run"),
+                (folder + "/none", (), 1, "No such file or directory"),
+                (self.made, ("--out", folder + "/none/page.html"), 1, "cannot be made"),
+                (self.made, ("--out", "/dev/null"), 1, "is not a regular file"),
+                (self.made, ("--uot", "x"), 2, "--out"),
+                (self.made, ("more",), 2, "one folder")):
+            result = report(run, *words)
+            self.assertEqual(result.returncode, code, result.stderr)
+            self.assertIn(message, result.stderr)
+            self.assertEqual(result.stdout, "")
+        self.assertEqual(os.listdir(folder), [])
+        help_text = report("--help")
+        self.assertEqual(help_text.returncode, 0)
+        self.assertIn("boresight report runs/demo", help_text.stdout)
+
+
+class Others(OnePage):
+    def test_two_observers(self):
+        made = os.path.join(runs.scratch(), "run")
+        runs.run("scenarios/two_observers.json", made,
+                 '/name="two&<b>"')
+        with open(made + "/manifest.json", encoding="utf-8") as file:
+            text = file.read()
+        with open(made + "/manifest.json", "w", encoding="utf-8") as file:
+            file.write(re.sub('"device":\t"[^"]*"', '"device": "<script>alert(1)</script>"', text))
+        self.assertEqual(report(made).returncode, 0)
+        page = Page(made + "/report.html")
+        self.check_alone(page)
+        headings = [part.text for part in page.root.iter("h2")]
+        for name in ("neossat/narrow", "neossat/wide", "follower/narrow"):
+            self.assertIn("Sensor " + name, headings)
+        self.assertIn("<script>alert(1)</script>", page.text)
+        self.assertIn("two&<b>", page.root.find("head/title").text)
+        self.assertEqual(len(page.pictures()), 2 * (6 + 3 + 6))
+
+    def test_killed(self):
+        folder = runs.scratch()
+        process = subprocess.Popen(
+            runs.command(runs.TRACK, folder + "/run", runs.NO_FRAMES, duration=30000),
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        partial = folder + "/run.partial"
+        rows = 0
+        for _ in range(600):
+            time.sleep(0.1)
+            try:
+                with sqlite3.connect(f"file:{partial}/run.sqlite?mode=ro", uri=True) as tables:
+                    rows, = tables.execute("SELECT count(*) FROM exposures").fetchone()
+            except sqlite3.Error:
+                rows = 0
+            if rows >= 10:
+                break
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        self.assertGreaterEqual(rows, 10)
+        result = report(partial, "--out", folder + "/page.html")
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        page = Page(folder + "/page.html")
+        self.check_alone(page)
+        self.assertIn("The run was killed", page.warnings()[0])
+        self.assertIn("left over from a killed run", page.text)
+        self.assertGreaterEqual(int(page.cards()["exposures"]), rows)
+
+
+def tearDownModule():
+    runs.clean()
+
+
+if __name__ == "__main__":
+    unittest.main()
