@@ -1,6 +1,14 @@
 /* Where the boresight is to be. */
 #include "control/control_internal.h"
 
+/* An aim is kept for so many times the interval over which rates are taken: 1 s. */
+#define KEPT_OVER_HALF 4
+/* So far from its telemetry the observer's motion is taken to change evenly. */
+#define FALL_S 2.0
+/* Fifth difference up to which aims are interpolated: what that misses of smooth motion is 200
+ * times less, and aims worked out with different telemetry differ by 1e-10. */
+#define SMOOTH_RAD 1e-9
+
 bst_status bst_control_cue_at(bst_ctx *ctx, const bst_control *c, int64_t tick, bst_cue *out) {
     return c->env.cue_at(c->env.cue_user, ctx, bst_control_seconds(c, tick), out);
 }
@@ -144,30 +152,132 @@ void bst_control_forget_aims(bst_control *c) {
     for (int i = 0; i < BST_CONTROL_AIMED; i++) {
         c->aimed[i].known = false;
     }
+    for (int i = 0; i < BST_CONTROL_PIECES; i++) {
+        c->pieces[i].made = false;
+    }
+}
+
+static bool is_fresh(const bst_control *c, int64_t nav_tick) {
+    return c->nav.tick - nav_tick <= KEPT_OVER_HALF * c->rate_half_ticks;
 }
 
 static bool held_in_body(const bst_control *c) {
     return c->mode == BST_MODE_FIXED && c->config.fixed_frame == BST_CONTROL_FIXED_BODY;
 }
 
-bst_status bst_control_boresight_at(bst_ctx *ctx, bst_control *c, int64_t tick, bool *valid,
-                                    bst_vec3 *direction) {
+/* What aberrates a direction at a tick that navigation's telemetry is not of: the observer falls.
+ */
+static bst_aberration aberration_at(const bst_control *c, int64_t tick) {
+    const bst_nav_telemetry *nav = &c->nav;
+    double dt = fmax(fmin(bst_control_seconds(c, tick - nav->tick), FALL_S), -FALL_S);
+    double r = bst_vec3_norm(nav->position_gcrf_m);
+    double fall = r > 0.0 ? -BST_EARTH_MU_M3PS2 / (r * r * r) : 0.0;
+    return bst_aberration_of(&(bst_light){
+        .velocity_mps = bst_vec3_axpy(nav->velocity_bary_mps, dt * fall, nav->position_gcrf_m),
+        .sun_m = nav->sun_m});
+}
+
+/* An aim that is told, or worked out and told. */
+static bst_control_aimed *aimed_at(bst_control *c, int64_t tick) {
     /* commands come at a fixed period, of which Fibonacci hashing spreads the multiples evenly */
     uint64_t spread = (uint64_t)tick * UINT64_C(0x9E3779B97F4A7C15);
     bst_control_aimed *aimed = &c->aimed[spread >> 57];
     _Static_assert(BST_CONTROL_AIMED == 1 << (64 - 57), "the hash's greatest value");
-    if (!aimed->known || aimed->tick != tick) {
-        aimed->known = false;
-        BST_TRY(bst_control_aim(ctx, c, tick, &aimed->valid, &aimed->direction_gcrf));
-        aimed->error = bst_pointing_error_at(&c->pointing_error, tick, c->env.tick_rate_hz);
-        aimed->tick = tick;
-        aimed->known = true;
+    aimed->known = aimed->known && aimed->tick == tick && is_fresh(c, aimed->nav_tick);
+    return aimed;
+}
+
+static void keep(const bst_control *c, bst_control_aimed *aimed, int64_t tick, bool valid,
+                 bst_vec3 boresight) {
+    *aimed = (bst_control_aimed){.known = true,
+                                 .valid = valid,
+                                 .tick = tick,
+                                 .nav_tick = c->nav.tick,
+                                 .boresight_gcrf = boresight};
+}
+
+static bst_status work_out(bst_ctx *ctx, bst_control *c, int64_t tick,
+                           const bst_control_aimed **out) {
+    bst_control_aimed *aimed = aimed_at(c, tick);
+    *out = aimed;
+    if (aimed->known) {
+        return BST_OK;
+    }
+    bool valid;
+    bst_vec3 d = {0.0, 0.0, 0.0};
+    BST_TRY(bst_control_aim(ctx, c, tick, &valid, &d));
+    if (valid && !held_in_body(c)) { /* else, where the stars are does not matter */
+        bst_aberration aberration = aberration_at(c, tick);
+        bst_quat error = bst_pointing_error_at(&c->pointing_error, tick, c->env.tick_rate_hz);
+        d = bst_quat_rotate(error, bst_aberrate(&aberration, d));
+    }
+    keep(c, aimed, tick, valid, d);
+    return BST_OK;
+}
+
+/* Whether the aim goes on as it goes until it is forgotten, and will be asked for here again. */
+static bool goes_smoothly(const bst_control *c, int64_t tick) {
+    int64_t ahead = tick - c->nav.tick, near = KEPT_OVER_HALF * c->rate_half_ticks;
+    if (ahead > near || ahead < -near) {
+        return false;
+    }
+    switch (c->mode) {
+        case BST_MODE_SEARCH:
+            return !c->search_in_region;
+        case BST_MODE_SLEW:
+        case BST_MODE_RATE:
+        case BST_MODE_ACQUIRE:
+        case BST_MODE_TRACK:
+        case BST_MODE_COAST:
+        case BST_MODE_REACQUIRE:
+            return true;
+        default:
+            return false;
+    }
+}
+
+/* The piece of the way that a tick is in; NULL where the way is no quintic. */
+static bst_status piece_at(bst_ctx *ctx, bst_control *c, int64_t tick,
+                           const bst_control_piece **out) {
+    int64_t step = c->rate_half_ticks;
+    int64_t index = tick / step - (tick % step < 0);
+    bst_control_piece *piece =
+        &c->pieces[((index % BST_CONTROL_PIECES) + BST_CONTROL_PIECES) % BST_CONTROL_PIECES];
+    *out = NULL;
+    if (!piece->made || piece->index != index || !is_fresh(c, piece->nav_tick)) {
+        bool valid = true;
+        for (int i = 0; i < BST_QUINTIC_POINTS && valid; i++) {
+            const bst_control_aimed *aimed;
+            BST_TRY(work_out(ctx, c, (index - BST_QUINTIC_BEFORE + i) * step, &aimed));
+            valid = aimed->valid;
+            piece->way[i] = aimed->boresight_gcrf;
+        }
+        piece->made = true;
+        piece->index = index;
+        piece->nav_tick = c->nav.tick;
+        piece->smooth = valid && bst_quintic_make(piece->way) <= SMOOTH_RAD;
+    }
+    *out = piece->smooth ? piece : NULL;
+    return BST_OK;
+}
+
+bst_status bst_control_boresight_at(bst_ctx *ctx, bst_control *c, int64_t tick, bool *valid,
+                                    bst_vec3 *direction) {
+    const bst_control_piece *piece = NULL;
+    bst_control_aimed *told = aimed_at(c, tick);
+    const bst_control_aimed *aimed = told;
+    if (!told->known && goes_smoothly(c, tick)) {
+        BST_TRY(piece_at(ctx, c, tick, &piece));
+    }
+    if (piece) {
+        double u = (double)(tick - piece->index * c->rate_half_ticks) / (double)c->rate_half_ticks;
+        keep(c, told, tick, true, bst_quintic_at(piece->way, u));
+    } else {
+        BST_TRY(work_out(ctx, c, tick, &aimed));
     }
     *valid = aimed->valid;
-    if (*valid && held_in_body(c)) {
-        *direction = aimed->direction_gcrf; /* where the stars are does not matter */
-    } else if (*valid) {
-        *direction = bst_quat_rotate(aimed->error, bst_control_apparent(c, aimed->direction_gcrf));
+    if (*valid) {
+        *direction = aimed->boresight_gcrf;
     }
     return BST_OK;
 }

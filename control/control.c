@@ -212,8 +212,11 @@ bst_status bst_control_update(bst_ctx *ctx, bst_control *c, int64_t tick, bool *
                                  (bst_vec3[]){d, ahead, behind}, arrived, c->pointing.tick)) {
         bst_control_forget_aims(c);
     }
-    bst_vec3 boresight =
-        bst_quat_rotate(bst_quat_conj(c->pointing.q_cam_from_gcrf), (bst_vec3){0, 0, 1});
+    bst_vec3 boresight = {0.0, 0.0, 0.0};
+    if (!c->guidance.commanded && c->pointing_valid) { /* where the first slew starts */
+        boresight =
+            bst_quat_rotate(bst_quat_conj(c->pointing.q_cam_from_gcrf), (bst_vec3){0, 0, 1});
+    }
     bst_quat error = bst_pointing_error_at(&c->pointing_error, effect, c->env.tick_rate_hz);
     return bst_guidance_command(ctx, &c->guidance, &c->nav, &error,
                                 c->pointing_valid ? &boresight : NULL, command, commanded);

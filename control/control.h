@@ -9,6 +9,7 @@
 #include "control/search.h"
 #include "sim/core/config.h"
 #include "sim/core/messages.h"
+#include "sim/core/quintic.h"
 #include "sim/world/knowledge.h"
 
 typedef enum bst_control_strategy {
@@ -121,11 +122,22 @@ typedef struct bst_control_watch {
 typedef struct bst_control_aimed {
     bool known, valid;
     int64_t tick;
-    bst_vec3 direction_gcrf; /* geometric */
-    bst_quat error;          /* of the pointing */
+    int64_t nav_tick;        /* of the navigation telemetry, whose velocity it is aberrated by */
+    bst_vec3 boresight_gcrf; /* bst_control_boresight_at */
 } bst_control_aimed;
 
 #define BST_CONTROL_AIMED 128
+
+/* The boresight's way over rate_half_ticks by the quintic through six aims that lie so far apart.
+ */
+typedef struct bst_control_piece {
+    bool made, smooth;
+    int64_t index; /* it begins at this times rate_half_ticks */
+    int64_t nav_tick;
+    bst_vec3 way[BST_QUINTIC_POINTS];
+} bst_control_piece;
+
+#define BST_CONTROL_PIECES 8
 
 typedef struct bst_control {
     bst_control_config config;
@@ -171,7 +183,9 @@ typedef struct bst_control {
     bst_vec3 stare_gcrf;
     bool stare_valid;
     bst_guidance guidance;
-    bst_control_aimed aimed[BST_CONTROL_AIMED]; /* as long as nothing that they rest on changes */
+    /* as long as nothing that they rest on changes */
+    bst_control_aimed aimed[BST_CONTROL_AIMED];
+    bst_control_piece pieces[BST_CONTROL_PIECES]; /* by index modulo their number */
 } bst_control;
 
 /* Copies config and env; does not move afterwards. BST_ERR_CONFIG for settings that do not fit

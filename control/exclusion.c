@@ -30,7 +30,12 @@ int bst_exclusion_inside(const bst_zone *zones, int count, bst_vec3 direction, d
     int deepest = -1;
     *depth_rad = EDGE_RAD;
     for (int i = 0; i < count; i++) {
-        double depth = zones[i].half_angle_rad - bst_vec3_angle(zones[i].axis, direction);
+        /* cos x >= 1 - x^2 / 2: far outside is told without the angle */
+        double half = zones[i].half_angle_rad;
+        if (bst_vec3_dot(zones[i].axis, direction) < 0.999999 - 0.5 * half * half) {
+            continue;
+        }
+        double depth = half - bst_vec3_angle(zones[i].axis, direction);
         if (depth > *depth_rad) {
             *depth_rad = depth;
             deepest = i;
@@ -91,6 +96,10 @@ bool bst_exclusion_nearest(const bst_zone *zones, int count, bst_vec3 direction,
     for (int i = 0; i < count; i++) {
         bool centre = bst_vec3_norm(bst_vec3_cross(zones[i].axis, direction)) < 1e-12;
         bst_vec3 point[3] = {edge_point(&zones[i], centre ? towards : direction)};
+        if (count == 1) {
+            *out = point[0];
+            return true;
+        }
         for (int j = 0; j <= i; j++) {
             int points = 1;
             if (j < i) { /* where two edges cross */

@@ -9,6 +9,8 @@
 #define PATH_NODES 385
 /* Of limits_share, along paths: their nodes hold the limits, what lies between to a few percent. */
 #define PATH_SHARE 0.9
+/* Angles that tell which way and turn is meant are worked out anew this far on. */
+#define NEAR_RAD 1e-4
 /* Directions to come that a turn is chosen by. */
 #define COMING 256
 
@@ -46,6 +48,13 @@ static void tell(bst_guidance *g, bst_guidance_event event) {
     if (g->event_count < BST_GUIDANCE_EVENTS) {
         g->events[g->event_count++] = event;
     }
+}
+
+/* Whether two unit vectors are farther apart than an angle of up to 1 rad; the chord tells most. */
+static bool is_beyond(bst_vec3 a, bst_vec3 b, double angle_rad) {
+    bst_vec3 chord = bst_vec3_sub(a, b);
+    return !(bst_vec3_dot(chord, chord) < 0.9 * angle_rad * angle_rad) &&
+           bst_vec3_angle(a, b) > angle_rad;
 }
 
 static bst_vec3 unit_after(bst_vec3 d, bst_vec3 rate, double seconds) {
@@ -299,14 +308,25 @@ static void command_slew(const bst_guidance *g, int64_t tick, bst_los_command *c
 
 /* Keeps to the way and turn that a slew has chosen. */
 static void keep_turn(bst_guidance *g, bst_los_command *command) {
+    if (!g->near_known) {
+        return;
+    }
     double ways[2][BST_MOUNT_AXES];
     bst_vec3 body = bst_quat_rotate(bst_guidance_body(g, command->tick), command->direction_gcrf);
-    if (!g->near_known || bst_mount_angles(&g->mount, body, g->near_rad, ways) == 0) {
-        return;
+    bst_vec3 moved = bst_vec3_sub(body, g->near_body);
+    /* which way and turn is meant does not depend on the last digits; a redundant axis does */
+    if (g->mount.axes > 2 || bst_vec3_dot(moved, moved) > NEAR_RAD * NEAR_RAD) {
+        if (bst_mount_angles(&g->mount, body, g->near_rad, ways) == 0) {
+            return;
+        }
+        for (int i = 0; i < BST_MOUNT_AXES; i++) {
+            g->near_rad[i] = ways[0][i];
+        }
+        g->near_body = body;
     }
     command->near_given = true;
     for (int i = 0; i < BST_MOUNT_AXES; i++) {
-        g->near_rad[i] = command->near_rad[i] = ways[0][i];
+        command->near_rad[i] = g->near_rad[i];
     }
 }
 
@@ -331,13 +351,10 @@ static bool turns_matter(const bst_guidance *g) {
     return matter;
 }
 
-static bst_status shape(bst_ctx *ctx, bst_guidance *g, const bst_nav_telemetry *nav,
-                        const bst_vec3 *boresight, bst_los_command *command, bool *give) {
-    bst_zone zones[BST_ZONE_KINDS];
-    int zone_count = bst_guidance_zones(g, nav, zones);
-    for (int i = 0; i < zone_count; i++) {
-        zones[i].half_angle_rad = fmin(zones[i].half_angle_rad + WIDER_RAD, BST_PI - 1e-6);
-    }
+static bst_status shape(bst_ctx *ctx, bst_guidance *g, const bst_vec3 *boresight,
+                        bst_los_command *command, bool *give) {
+    const bst_zone *zones = g->zones;
+    int zone_count = g->zone_count;
     if (zone_count == 0 && g->config.slews != BST_SLEWS_PLANNED && !turns_matter(g)) {
         return BST_OK;
     }
@@ -363,6 +380,7 @@ static bst_status shape(bst_ctx *ctx, bst_guidance *g, const bst_nav_telemetry *
         }
         if (wanted) {
             g->near_known = !g->slew.along_path;
+            g->near_body = (bst_vec3){0.0, 0.0, 0.0};
             for (int i = 0; i < g->mount.axes && g->near_known; i++) {
                 double rate, accel;
                 bst_slew_axis_at(&g->slew.axis[i], t, &g->near_rad[i], &rate, &accel);
@@ -370,11 +388,11 @@ static bst_status shape(bst_ctx *ctx, bst_guidance *g, const bst_nav_telemetry *
             g->slew.active = false;
         }
     }
-    bool blocked = !bst_exclusion_nearest(zones, zone_count, target, from, &target);
     double depth;
-    bool inside = bst_exclusion_inside(zones, zone_count, command->direction_gcrf, &depth) >= 0;
+    bool inside = bst_exclusion_inside(zones, zone_count, target, &depth) >= 0;
+    bool blocked = inside && !bst_exclusion_nearest(zones, zone_count, target, from, &target);
     bool made = false;
-    if (!blocked && bst_vec3_angle(from, target) > g->config.slew_above_deg * BST_DEG_RAD) {
+    if (!blocked && is_beyond(from, target, g->config.slew_above_deg * BST_DEG_RAD)) {
         BST_TRY(plan_axes(ctx, g, tick, zones, zone_count, from, &made));
         if (!made) {
             BST_TRY(plan_path(ctx, g, tick, zones, zone_count, from, from_rate, &made));
@@ -398,22 +416,35 @@ static bst_status shape(bst_ctx *ctx, bst_guidance *g, const bst_nav_telemetry *
     return BST_OK;
 }
 
-bst_status bst_guidance_command(bst_ctx *ctx, bst_guidance *g, const bst_nav_telemetry *nav,
-                                const bst_quat *error, const bst_vec3 *boresight,
-                                bst_los_command *command, bool *give) {
-    *give = true;
-    /* cones and the Earth as the attitude telemetry sees them */
+/* Cones and the Earth as the attitude telemetry sees them; they hardly move between two messages of
+ * navigation. */
+static void see_sky(bst_guidance *g, const bst_nav_telemetry *nav, const bst_quat *error) {
     g->nav = *nav;
+    g->nav_known = true;
     g->nav.position_gcrf_m = bst_quat_rotate(*error, nav->position_gcrf_m);
     g->nav.velocity_gcrf_mps = bst_quat_rotate(*error, nav->velocity_gcrf_mps);
     g->nav.sun_m = bst_quat_rotate(*error, nav->sun_m);
     g->nav.moon_m = bst_quat_rotate(*error, nav->moon_m);
+    g->zone_count = bst_guidance_zones(g, &g->nav, g->zones);
+    for (int i = 0; i < g->zone_count; i++) {
+        double *half = &g->zones[i].half_angle_rad;
+        *half = fmin(*half + WIDER_RAD, BST_PI - 1e-6);
+    }
+}
+
+bst_status bst_guidance_command(bst_ctx *ctx, bst_guidance *g, const bst_nav_telemetry *nav,
+                                const bst_quat *error, const bst_vec3 *boresight,
+                                bst_los_command *command, bool *give) {
+    *give = true;
+    if (!g->nav_known || nav->tick != g->nav.tick) {
+        see_sky(g, nav, error);
+    }
     if (g->config.look_ahead_s > 0.0 && command->tick >= g->ahead_tick) {
         g->ahead_tick =
             command->tick + (int64_t)llround(g->config.look_ahead_every_s * g->env.tick_rate_hz);
         BST_TRY(bst_guidance_look_ahead(ctx, g, command->tick));
     }
-    BST_TRY(shape(ctx, g, &g->nav, boresight, command, give));
+    BST_TRY(shape(ctx, g, boresight, command, give));
     if (*give) {
         g->last = *command;
         g->commanded = true;

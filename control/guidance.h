@@ -74,7 +74,10 @@ typedef struct bst_guidance {
     bst_guidance_env env;
     bst_mount_status mount;
     bool mount_known;
-    bst_nav_telemetry nav;
+    bst_nav_telemetry nav;          /* as the attitude telemetry sees it */
+    bst_zone zones[BST_ZONE_KINDS]; /* of nav, WIDER_RAD wider */
+    int zone_count;
+    bool nav_known;
     bool commanded;
     bst_los_command last;
     bst_guidance_slew slew;
@@ -82,9 +85,10 @@ typedef struct bst_guidance {
     /* the way of pointing and turn that were chosen */
     bool near_known;
     double near_rad[BST_MOUNT_AXES];
-    int reach;                        /* bst_reach, as last told */
-    bool no_way;                      /* told */
-    int64_t ahead_tick;               /* of the next look ahead */
+    bst_vec3 near_body; /* direction in body axes that near_rad was worked out for; zero: none */
+    int reach;          /* bst_reach, as last told */
+    bool no_way;        /* told */
+    int64_t ahead_tick; /* of the next look ahead */
     double told_from_s, told_until_s; /* the loss ahead that was told; INFINITY: none */
     bst_guidance_event events[BST_GUIDANCE_EVENTS];
     int event_count;

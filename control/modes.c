@@ -3,6 +3,8 @@
 
 /* Greatest angular acceleration of a cue: a pass at 100 km and 15 km/s has 1.5e-2 rad/s^2. */
 #define CUE_ACCEL_RADPS2 2e-2
+/* The cue is looked at for jumps no more often than this. */
+#define WATCH_S 0.05
 
 static bst_status hold(bst_ctx *ctx, bst_control *c, const bst_track *track, int64_t tick) {
     c->held.id = track->id;
@@ -64,8 +66,9 @@ static bst_status observe_hidden(bst_ctx *ctx, bst_control *c, int64_t tick,
     }
     if (c->mode != BST_MODE_COAST) {
         bst_control_enter(c, BST_MODE_COAST, tick,
-                          target->hidden == BST_HIDDEN_EARTH
-                              ? "the target is behind the Earth"
+                          target->hidden == BST_HIDDEN_EARTH ? "the target is behind the Earth"
+                          : target->hidden == BST_HIDDEN_DIM
+                              ? "the target is too dim"
                               : "the target is in the Earth's shadow");
     }
     return BST_OK;
@@ -223,9 +226,12 @@ static bool give_up(bst_control *c, int64_t tick) {
 static bst_status watch_cue(bst_ctx *ctx, bst_control *c, int64_t tick) {
     bool valid;
     bst_vec3 now;
+    bst_control_watch *w = &c->watch;
+    if (w->count == 2 && tick - w->tick < bst_control_ticks(c, WATCH_S)) {
+        return BST_OK;
+    }
     BST_TRY(
         c->env.cue_direction_at(c->env.cue_user, ctx, bst_control_seconds(c, tick), &valid, &now));
-    bst_control_watch *w = &c->watch;
     bool jumped = valid && w->ended;
     if (valid && w->count == 2 && tick > w->tick) {
         double dt = bst_control_seconds(c, tick - w->tick);

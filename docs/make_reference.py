@@ -10,6 +10,8 @@ SKIPPED = {"description", "$schema"}
 
 
 def kind_of(node):
+    if not {"const", "enum", "type", "properties", "pattern"} & set(node):
+        return "any"
     if "const" in node:
         return f'`"{node["const"]}"`'
     if "enum" in node:
@@ -114,10 +116,16 @@ def write(node, path, level):
 
 def main():
     schema = json.load(sys.stdin)
-    print("# Reference of the scenario keys\n\n"
-          "Made from the program's own tables: `build/boresight schema | docs/make_reference.py > "
-          "docs/reference.md`.\nEvery object also takes a `description`, which is ignored. The path of a "
-          "key is what `--set` takes, with\nthe number of the element in place of `[]`.\n\n## The scenario\n")
+    if schema["title"] == "Boresight study":
+        print("# Reference of the study keys\n\n"
+              "Made from the program's own tables: `build/boresight study --schema | "
+              "docs/make_reference.py > docs/study_reference.md`.\nWhat the keys are for is in "
+              "[studies](studies.md).\n\n## The study\n")
+    else:
+        print("# Reference of the scenario keys\n\n"
+              "Made from the program's own tables: `build/boresight schema | docs/make_reference.py > "
+              "docs/reference.md`.\nEvery object also takes a `description`, which is ignored. The path of a "
+              "key is what `--set` takes, with\nthe number of the element in place of `[]`.\n\n## The scenario\n")
     write(schema, "", 2)
 
 

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include "sim/io/fits_image.h"
+#include "sim/io/psf_fits.h"
 
 static bst_status read_map(bst_ctx *ctx, const char *key, const char *path,
                            const bst_camera *camera, float **map) {
@@ -84,9 +85,38 @@ bst_status bst_calibration_load(bst_ctx *ctx, const bst_imgproc_config *config,
     return status;
 }
 
+bst_status bst_calibration_psf(bst_ctx *ctx, const bst_knowledge *knowledge, bst_camera *camera,
+                               bst_imgproc_maps *maps) {
+    double oversampling;
+    const char *path = bst_knowledge_psf_file(knowledge, &oversampling);
+    if (!*path) {
+        maps->psf = bst_knowledge_psf(knowledge);
+        return BST_OK;
+    }
+    bst_psf_summary summary;
+    bst_psf_samples samples;
+    BST_TRY(bst_psf_fits_read(ctx, path, oversampling, &summary));
+    BST_TRY(bst_psf_fits_samples(ctx, path, oversampling, &samples));
+    bst_camera source = {.width_px = camera->width_px,
+                         .height_px = camera->height_px,
+                         .psf_fwhm_px = camera->psf_fwhm_px,
+                         .optics = {.psf = BST_PSF_FILE}};
+    const bst_psf_inputs inputs = {.samples = &samples};
+    samples.planes = 1;
+    bst_status status = bst_psf_create_from(ctx, &source, &inputs, &maps->own_psf);
+    free((float *)samples.samples);
+    if (status == BST_OK) {
+        maps->psf = maps->own_psf;
+        camera->psf_fwhm_px = bst_psf_equivalent_fwhm_px(
+            maps->psf, 0.5 * (double)(camera->width_px - 1), 0.5 * (double)(camera->height_px - 1));
+    }
+    return status;
+}
+
 void bst_calibration_free(bst_imgproc_maps *maps) {
     free((void *)(uintptr_t)maps->dark_e_per_s);
     free((void *)(uintptr_t)maps->flat);
     free((void *)(uintptr_t)maps->bad);
+    bst_psf_free(maps->own_psf);
     *maps = (bst_imgproc_maps){0};
 }

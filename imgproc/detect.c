@@ -52,10 +52,15 @@ struct bst_imgproc {
     double exposure_s, binning, streak_px;
     bool smeared, windowed;
     bst_stack_frame left;
+    bst_known_psf *known; /* NULL: the PSF is a Gaussian */
 };
 
 static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     int width = (int)ip->camera.width_px, height = (int)ip->camera.height_px;
+    if (ip->maps.psf) {
+        BST_TRY(bst_known_psf_create(ctx, ip->maps.psf, width, height, ip->config.jitter_px,
+                                     &ip->known));
+    }
     double fwhm = ip->camera.psf_fwhm_px, streak = ip->config.streak_max_px;
     int side = (int)ceil(streak + 6.0 * fwhm) + 14;
     side = side < BST_PSF_MAX_SIDE ? side : BST_PSF_MAX_SIDE;
@@ -72,11 +77,11 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     BST_TRY(bst_parallel_create(ctx, (int)ip->config.threads, &ip->pool));
     BST_TRY(bst_background_create(ctx, (int)ip->config.mesh_px, width, height,
                                   bst_parallel_threads(ip->pool), &ip->background));
-    BST_TRY(
-        bst_filter_create(ctx, width, height, streak, bst_parallel_threads(ip->pool), &ip->filter));
+    BST_TRY(bst_filter_create(ctx, ip->known, width, height, streak, bst_parallel_threads(ip->pool),
+                              &ip->filter));
     BST_TRY(bst_candidates_create(ctx, width, height, &ip->candidates));
-    BST_TRY(bst_locator_create(ctx, bst_parallel_threads(ip->pool), capacity, width, height, side,
-                               &ip->locator));
+    BST_TRY(bst_locator_create(ctx, ip->known, bst_parallel_threads(ip->pool), capacity, width,
+                               height, side, &ip->locator));
     ip->locator.most_fits = (int)ip->config.most_fits;
     BST_TRY(bst_streak_motion_create(ctx, side, &ip->streak_motion));
     return ip->config.streak_search_px > 0.0
@@ -134,6 +139,7 @@ void bst_imgproc_free(bst_imgproc *ip) {
     bst_streak_motion_free(&ip->streak_motion);
     bst_streak_locator_free(&ip->streaks);
     bst_parallel_free(ip->pool);
+    bst_known_psf_free(ip->known);
     free(ip);
 }
 
@@ -329,7 +335,8 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
                  const bst_motion *motion, bst_parallel *pool, part *out) {
     int width = frame->window.width / frame->binning;
     int height = frame->window.height / frame->binning;
-    double sigma = hypot(bst_camera_psf_sigma_px(&ip->camera), ip->config.jitter_px);
+    double sigma = ip->known ? ip->known->sigma_px
+                             : hypot(bst_camera_psf_sigma_px(&ip->camera), ip->config.jitter_px);
     sigma = fmax(sigma / frame->binning, 0.2);
     ip->exposure_s = frame->exposure_s;
     ip->binning = frame->binning;
@@ -344,7 +351,7 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
     double dx, dy;
     filter_path(ip, whole, motion, &dx, &dy);
     ip->streak_px = hypot(dx, dy) * frame->binning;
-    bst_filter_set(&ip->filter, sigma, dx, dy);
+    bst_filter_set(&ip->filter, sigma, frame->binning, dx, dy);
     /* stars are points: what else there is may be a streak */
     bool search =
         ip->config.streak_search_px > 0.0 && !ip->filter.streak && !ip->smeared && frame == whole;

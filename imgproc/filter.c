@@ -17,19 +17,25 @@ enum {
     SOON_PX = 512   /* that are read ahead at a time: as many lines as are on their way at once */
 };
 
-bst_status bst_filter_create(bst_ctx *ctx, int max_width, int max_height, double streak_max_px,
-                             int threads, bst_filter *out) {
+static bool has_known(const bst_filter *f) {
+    return !f->known || (f->lags && f->phases && f->work);
+}
+
+bst_status bst_filter_create(bst_ctx *ctx, const bst_known_psf *known, int max_width,
+                             int max_height, double streak_max_px, int threads, bst_filter *out) {
     int pad = (int)ceil(0.5 * streak_max_px) + 2;
     /* what looks for maxima reads beyond a row */
     pad = pad > 2 * BST_ROW_LANES ? pad : 2 * BST_ROW_LANES;
     /* rows begin where lines of the cache do, as far as the frame's width allows */
     pad = (pad + BST_ROW_LANES - 1) / BST_ROW_LANES * BST_ROW_LANES;
-    *out = (bst_filter){.max_width = max_width, .max_height = max_height, .pad = pad};
+    *out = (bst_filter){
+        .known = known, .max_width = max_width, .max_height = max_height, .pad = pad, .rank = 1};
     size_t pixels = (size_t)max_width * (size_t)max_height;
     size_t line = (size_t)(max_width + 2 * pad);
     /* three rows, the latest, the parts of a row (two for each four pixels at the most, of five
      * numbers), and a ring of rows */
-    out->line_floats = line * (3 + LATEST + 3 + 2 * BST_FILTER_MAX_RADIUS + GROUP);
+    size_t ring = (2 * BST_FILTER_MAX_RADIUS + GROUP) * (known ? BST_FILTER_RANK : 1);
+    out->line_floats = line * (3 + LATEST + 3 + ring);
     size_t map = line * (size_t)(max_height + 2 * pad) * sizeof(float);
     out->point = bst_pages_alloc(map);
     out->best = bst_pages_alloc(map);
@@ -40,8 +46,13 @@ bst_status bst_filter_create(bst_ctx *ctx, int max_width, int max_height, double
     out->lent = calloc(1, sizeof *out->lent);
     out->edge_x = calloc((size_t)max_width, sizeof(float));
     out->edge_y = calloc((size_t)max_height, sizeof(float));
-    if (!out->point || !out->best || !out->maxima || !out->maximum_x || !out->maximum_snr ||
-        !out->lines || !out->lent || !out->edge_x || !out->edge_y) {
+    if (known) {
+        out->lags = calloc((size_t)BST_FILTER_LAGS * BST_FILTER_LAGS, sizeof *out->lags);
+        out->phases = calloc(BST_FILTER_PHASE_FLOATS, sizeof *out->phases);
+        out->work = calloc(BST_FILTER_WORK, sizeof *out->work);
+    }
+    if (!has_known(out) || !out->point || !out->best || !out->maxima || !out->maximum_x ||
+        !out->maximum_snr || !out->lines || !out->lent || !out->edge_x || !out->edge_y) {
         bst_filter_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the filters of a %d x %d frame",
                         max_width, max_height);
@@ -60,239 +71,14 @@ void bst_filter_free(bst_filter *f) {
     free(f->lent);
     free(f->edge_x);
     free(f->edge_y);
+    free(f->lags);
+    free(f->phases);
+    free(f->work);
     *f = (bst_filter){0};
 }
 
-/* Autocorrelation of the one-axis kernel (unit norm) at integer lags. */
-static void correlate(bst_filter *f) {
-    for (int lag = 0; lag <= 2 * f->radius; lag++) {
-        double sum = 0.0;
-        for (int i = 0; i + lag <= 2 * f->radius; i++) {
-            sum += (double)f->kernel[i] * (double)f->kernel[i + lag];
-        }
-        f->correlation[lag] = sum;
-    }
-}
-
-static double axis_correlation(const bst_filter *f, int lag) {
-    return abs(lag) <= 2 * f->radius ? f->correlation[abs(lag)] : 0.0;
-}
-
-/* Covariance of the streak output at places a lag apart, with the weights as they are. */
-static double streak_covariance(const bst_filter *f, int lag_x, int lag_y) {
-    double sum = 0.0;
-    for (int a = 0; a < f->taps; a++) {
-        for (int b = 0; b < f->taps; b++) {
-            int lx = f->tap_x[a] - f->tap_x[b] + lag_x, ly = f->tap_y[a] - f->tap_y[b] + lag_y;
-            if (abs(lx) <= 2 * f->radius && abs(ly) <= 2 * f->radius) {
-                sum += (double)f->tap_weight[a] * (double)f->tap_weight[b] *
-                       axis_correlation(f, lx) * axis_correlation(f, ly);
-            }
-        }
-    }
-    return sum;
-}
-
-static void add_tap(bst_filter *f, int x, int y, double weight) {
-    if (weight > 0.0 && f->taps < BST_FILTER_MAX_TAPS - 4) {
-        f->tap_x[f->taps] = x;
-        f->tap_y[f->taps] = y;
-        f->tap_weight[f->taps++] = (float)weight;
-    }
-}
-
-/* The Gaussian's share of each pixel of one axis about a centre `shift` px off the middle one, for
- * -radius - 1 .. radius + 1. */
-static void axis_shares(double sigma_px, double shift, int radius, double *out) {
-    double root = sigma_px * sqrt(2.0);
-    for (int i = -radius - 1; i <= radius + 1; i++) {
-        out[i + radius + 1] = 0.5 * (erf((i + 0.5 - shift) / root) - erf((i - 0.5 - shift) / root));
-    }
-}
-
-static void add_powers(double k, double *powers) {
-    double power = k * k;
-    for (int i = 0; i < BST_TAIL_POWERS; i++) {
-        power *= k;
-        powers[i] += power;
-    }
-}
-
-/* Density of maxima and sums of powers for the point, and the shifted kernels. The gradient's
- * covariance is that of unit-norm kernels by shift, averaged over the phases. */
-static void describe_point(bst_filter *f, double sigma_px) {
-    enum { SIZE = 2 * BST_FILTER_MAX_RADIUS + 3 };
-    int n = 2 * f->radius + 3;
-    double roughness = 0.0, powers[BST_TAIL_POWERS] = {0.0};
-    for (int p = 0; p < BST_FILTER_PHASES; p++) {
-        double here[SIZE], before[SIZE], after[SIZE], h = 1e-3, squares[3] = {0}, metric = 0.0;
-        double shift = -0.5 + (double)p / (BST_FILTER_PHASES - 1);
-        axis_shares(sigma_px, shift, f->radius, here);
-        axis_shares(sigma_px, shift - h, f->radius, before);
-        axis_shares(sigma_px, shift + h, f->radius, after);
-        for (int i = 0; i < n; i++) {
-            squares[0] += before[i] * before[i];
-            squares[1] += here[i] * here[i];
-            squares[2] += after[i] * after[i];
-        }
-        for (int i = 0; i < n; i++) {
-            double slope = (after[i] / sqrt(squares[2]) - before[i] / sqrt(squares[0])) / (2.0 * h);
-            double k = here[i] / sqrt(squares[1]);
-            metric += slope * slope;
-            add_powers(k, powers);
-            f->phase[p][i] = (float)k;
-        }
-        /* the two ends are one phase */
-        double weight = p == 0 || p == BST_FILTER_PHASES - 1 ? 0.5 : 1.0;
-        roughness += weight * metric / (BST_FILTER_PHASES - 1);
-    }
-    double half = 0.0;
-    for (int i = 0; i < n; i++) {
-        half += (double)f->phase[BST_FILTER_PHASES / 2][i] * (double)f->phase[0][i];
-    }
-    f->corner = half * half;
-    f->point_density = roughness; /* sqrt of the product over both axes, which are alike */
-    for (int i = 0; i < BST_TAIL_POWERS; i++) {
-        double one_axis = powers[i] / BST_FILTER_PHASES;
-        f->point_weights.power[i] = one_axis * one_axis;
-    }
-}
-
-/* The same for the streak: the gradient's covariance from its correlations at lags of a pixel,
- * whose logarithm is quadratic near 0, sums of powers from its kernel's values. */
-static void describe_streak(bst_filter *f) {
-    double r[3][3];
-    for (int j = -1; j <= 1; j++) {
-        for (int i = -1; i <= 1; i++) {
-            r[j + 1][i + 1] = streak_covariance(f, i, j) / streak_covariance(f, 0, 0);
-        }
-    }
-    double lxx = -2.0 * log(fmax(r[1][2], 1e-6)), lyy = -2.0 * log(fmax(r[2][1], 1e-6));
-    double lxy = -0.5 * (log(fmax(r[2][2], 1e-6)) - log(fmax(r[2][0], 1e-6)));
-    f->streak_density = sqrt(fmax(lxx * lyy - lxy * lxy, 1e-8));
-    /* the kernel's values at whole pixels */
-    int reach_x = 0, reach_y = 0;
-    for (int t = 0; t < f->taps; t++) {
-        reach_x = abs(f->tap_x[t]) > reach_x ? abs(f->tap_x[t]) : reach_x;
-        reach_y = abs(f->tap_y[t]) > reach_y ? abs(f->tap_y[t]) : reach_y;
-    }
-    f->streak_weights = (bst_tail_weights){{0.0}};
-    for (int y = -reach_y - f->radius; y <= reach_y + f->radius; y++) {
-        for (int x = -reach_x - f->radius; x <= reach_x + f->radius; x++) {
-            double k = 0.0;
-            for (int t = 0; t < f->taps; t++) {
-                int u = x - f->tap_x[t], v = y - f->tap_y[t];
-                if (abs(u) <= f->radius && abs(v) <= f->radius) {
-                    k += (double)f->tap_weight[t] * (double)f->kernel[u + f->radius] *
-                         (double)f->kernel[v + f->radius];
-                }
-            }
-            add_powers(k, f->streak_weights.power);
-        }
-    }
-}
-
-/* Samples one pixel apart along the longer axis; between the two nearest pixels of the other axis
- * by linear interpolation, which broadens the kernel by at most 1/4 px^2 and costs 0.3 % of the SNR
- * at FWHM 2. */
-static void set_streak(bst_filter *f, double dx, double dy) {
-    bool along_x = fabs(dx) >= fabs(dy);
-    double major = along_x ? dx : dy, minor = along_x ? dy : dx;
-    double slope = minor / major, half = 0.5 * fabs(major);
-    int reach = (int)ceil(half + 0.5);
-    f->taps = 0;
-    for (int j = -reach; j <= reach; j++) {
-        double lo = fmax(j - 0.5, -half), hi = fmin(j + 0.5, half);
-        if (hi <= lo) {
-            continue;
-        }
-        double across = 0.5 * (lo + hi) * slope, base = floor(across), fraction = across - base;
-        for (int k = 0; k < 2; k++) {
-            double weight = (hi - lo) * (k ? fraction : 1.0 - fraction);
-            int m = (int)base + k;
-            add_tap(f, along_x ? j : m, along_x ? m : j, weight);
-        }
-    }
-    double scale = 1.0 / sqrt(streak_covariance(f, 0, 0));
-    double total = 0.0, shared = 0.0;
-    for (int t = 0; t < f->taps; t++) {
-        total += (double)f->tap_weight[t];
-        f->tap_weight[t] = (float)((double)f->tap_weight[t] * scale);
-        shared += (double)f->tap_weight[t] * axis_correlation(f, f->tap_x[t]) *
-                  axis_correlation(f, f->tap_y[t]);
-    }
-    f->overlap = fmin(shared, 1.0);
-    /* norm of the drawn kernel at unit flux: the point kernel's over total weight times scale */
-    f->streak_norm = f->norm / (scale * total);
-    describe_streak(f);
-}
-
-void bst_filter_set(bst_filter *f, double sigma_px, double dx_px, double dy_px) {
-    if (f->made_sigma == sigma_px && f->made_dx == dx_px && f->made_dy == dy_px) {
-        return;
-    }
-    f->made_sigma = sigma_px;
-    f->made_dx = dx_px;
-    f->made_dy = dy_px;
-    f->radius = (int)ceil(3.2 * sigma_px);
-    f->radius = f->radius < 1                       ? 1
-                : f->radius > BST_FILTER_MAX_RADIUS ? BST_FILTER_MAX_RADIUS
-                                                    : f->radius;
-    double share[2 * BST_FILTER_MAX_RADIUS + 1], square = 0.0;
-    for (int i = -f->radius; i <= f->radius; i++) {
-        double root = sigma_px * sqrt(2.0);
-        double p = 0.5 * (erf((i + 0.5) / root) - erf((i - 0.5) / root));
-        share[i + f->radius] = p;
-        square += p * p;
-    }
-    f->norm = square;
-    for (int i = 0; i <= 2 * f->radius; i++) {
-        f->kernel[i] = (float)(share[i] / sqrt(square));
-    }
-    for (int i = 2 * f->radius + 1; i < 2 * f->radius + 4; i++) {
-        f->kernel[i] = 0.0f;
-    }
-    f->streak = dx_px != 0.0 || dy_px != 0.0;
-    f->dx_px = dx_px;
-    f->dy_px = dy_px;
-    f->overlap = 0.0;
-    f->taps = 0;
-    f->threshold = 0.0;
-    correlate(f);
-    describe_point(f, sigma_px);
-    if (f->streak) {
-        set_streak(f, dx_px, dy_px);
-    }
-}
-
-/* Share of a smooth field's maxima above a threshold that a parabola through five shifts sees above
- * it: nine see 1.7 % more, in 2,000 maxima. */
-static const double SEEN = 0.97;
-
-double bst_filter_threshold(bst_filter *f, double false_alarms, double pixels) {
-    if (f->threshold > 0.0 && f->threshold_density == false_alarms / pixels) {
-        return f->threshold;
-    }
-    double lo = 2.5, hi = 9.0;
-    for (int i = 0; i < 24; i++) {
-        double u = 0.5 * (lo + hi);
-        double rate = bst_tail_maxima(u, f->point_density);
-        if (f->streak) {
-            rate += bst_tail_maxima(u, f->streak_density) * (1.0 - bst_tail_both(u, u, f->overlap));
-        }
-        if (SEEN * rate * pixels > false_alarms) {
-            lo = u;
-        } else {
-            hi = u;
-        }
-    }
-    f->threshold = 0.5 * (lo + hi);
-    f->threshold_density = false_alarms / pixels;
-    return f->threshold;
-}
-
 /* 1 / norm of the part of the kernel that lies on pixels 0..count-1, for each centre. */
-static void edge_factors(const bst_filter *f, int count, float *out) {
+static void edge_factors(const bst_filter *f, const double *square_at, int count, float *out) {
     for (int x = 0; x < count; x++) {
         out[x] = 1.0f;
         if (x >= f->radius && x + f->radius < count) {
@@ -300,8 +86,7 @@ static void edge_factors(const bst_filter *f, int count, float *out) {
         }
         double square = 0.0;
         for (int i = -f->radius; i <= f->radius; i++) {
-            double k = (double)f->kernel[i + f->radius];
-            square += x + i >= 0 && x + i < count ? k * k : 0.0;
+            square += x + i >= 0 && x + i < count ? square_at[i + f->radius] : 0.0;
         }
         out[x] = (float)(1.0 / sqrt(square));
     }
@@ -364,11 +149,13 @@ static void mend_edges(const bst_filter *f, int y, float *row) {
 static void filter_across(const pass *p, int y, bool own, float *lines, float *out) {
     const bst_filter *f = p->f;
     int width = f->width, r = f->radius;
+    size_t row = (size_t)y * (size_t)width, line = (size_t)f->stride;
     if (y < 0 || y >= f->height) {
-        memset(out, 0, (size_t)width * sizeof(float));
+        for (int k = 0; k < f->rank; k++) {
+            memset(out + (size_t)k * line, 0, (size_t)width * sizeof(float));
+        }
         return;
     }
-    size_t row = (size_t)y * (size_t)width, line = (size_t)f->stride;
     float *normalised = lines, *electrons = lines + line;
     float *signal = own ? p->signal + row : lines + 2 * line;
     bst_row_part *parts = (bst_row_part *)(void *)(lines + 3 * line);
@@ -384,8 +171,28 @@ static void filter_across(const pass *p, int y, bool own, float *lines, float *o
         for (int t = 0; t <= 2 * r; t++) {
             in[t] = normalised + x + t;
         }
-        bst_row_even(out + x, count, in + r, f->kernel + r, r);
+        if (!f->known) {
+            bst_row_even(out + x, count, in + r, f->kernel + r, r);
+        }
+        for (int k = 0; f->known && k < f->rank; k++) {
+            bst_row_combine(out + (size_t)k * line + x, count, in, f->across[k], 2 * r + 1);
+        }
     }
+}
+
+/* A row of the point map for a known PSF. */
+static void filter_down_known(const bst_filter *f, int y, const float *ring, int ring_rows,
+                              float *out) {
+    const float *in[BST_FILTER_RANK * (2 * BST_FILTER_MAX_RADIUS + 1)];
+    size_t line = (size_t)f->stride;
+    int r = f->radius, taps = 2 * r + 1;
+    for (int k = 0; k < f->rank; k++) {
+        for (int t = 0; t < taps; t++) {
+            int at = (y - r + t + ring_rows) % ring_rows;
+            in[k * taps + t] = ring + line * (size_t)(at * f->rank + k);
+        }
+    }
+    bst_row_combine(out, f->width, in, f->down, f->rank * taps);
 }
 
 /* `count` (1 or GROUP) rows of the point map from the ring of horizontal parts. */
@@ -393,11 +200,16 @@ static void filter_down(bst_filter *f, int y, int count, const float *ring, int 
     const float *in[2 * BST_FILTER_MAX_RADIUS + GROUP];
     size_t line = (size_t)f->stride;
     int r = f->radius;
-    for (int t = 0; t < 2 * r + count; t++) {
+    float *out = map_row(f, f->point, y);
+    for (int t = 0; !f->known && t < 2 * r + count; t++) {
         in[t] = ring + line * (size_t)((y - r + t + ring_rows) % ring_rows);
     }
-    float *out = map_row(f, f->point, y);
-    if (count == GROUP) {
+    for (int k = 0; f->known && k < count; k++) {
+        filter_down_known(f, y + k, ring, ring_rows, out + (size_t)k * line);
+    }
+    if (f->known) {
+        /* done */
+    } else if (count == GROUP) {
         bst_row_even_4(out, line, f->width, in + r, f->kernel + r, r);
     } else {
         bst_row_even(out, f->width, in + r, f->kernel + r, r);
@@ -417,13 +229,14 @@ static void filter_rows(void *user, int begin, int end) {
     int taken = bst_borrow_take(f->lent);
     float *lines = f->lines + f->line_floats * (size_t)taken, *ring = lines + 6 * line;
     /* the latest rows of the streak map: maxima are looked for while they are near */
-    float *latest = ring + line * (size_t)ring_rows + f->pad;
+    size_t ring_lines = (size_t)(ring_rows * f->rank);
+    float *latest = ring + line * ring_lines + f->pad;
     bool ring_of_streaks = f->streak && p->past_cache;
     memset(lines, 0, line * sizeof(float));
     memset(latest - f->pad, 0, LATEST * line * sizeof(float));
     for (int y = begin - r, next = begin; y < end + r; y++) {
         filter_across(p, y, y >= begin && y < end, lines,
-                      ring + line * (size_t)((y + ring_rows) % ring_rows));
+                      ring + line * (size_t)((y + ring_rows) % ring_rows * f->rank));
         int last = y - r; /* the last row that can be made */
         int count = last - next + 1 == GROUP ? GROUP : last + 1 == end ? 1 : 0;
         for (; count > 0 && next <= last; next += count) {
@@ -532,8 +345,8 @@ void bst_filter_run(bst_filter *f, bst_parallel *pool, const bst_background *bac
         memset(f->point, 0, bytes);
         memset(f->best, 0, bytes);
     }
-    edge_factors(f, width, f->edge_x);
-    edge_factors(f, height, f->edge_y);
+    edge_factors(f, f->square_x, width, f->edge_x);
+    edge_factors(f, f->square_y, height, f->edge_y);
     /* large parts: each reads 2 radius rows of its neighbours again */
     int rows = PART_PX / width > 0 ? PART_PX / width : 1, reach = 0;
     for (int t = 0; t < f->taps; t++) {

@@ -6,12 +6,18 @@
 #include <stdint.h>
 
 #include "imgproc/background.h"
+#include "imgproc/known_psf.h"
 #include "imgproc/tail.h"
 
 enum {
     BST_FILTER_MAX_RADIUS = 24,
     BST_FILTER_MAX_TAPS = 4 * 256,
     BST_FILTER_PHASES = 5, /* shifts of -1/2 to 1/2 px */
+    BST_FILTER_RANK = 3,   /* products of rows and columns that a known PSF's kernel is a sum of */
+    BST_FILTER_LAGS = 4 * BST_FILTER_MAX_RADIUS + 1,
+    BST_FILTER_PHASE_FLOATS = BST_FILTER_PHASES * BST_FILTER_PHASES *
+                              (2 * BST_FILTER_MAX_RADIUS + 3) * 64, /* of rows in lanes */
+    BST_FILTER_WORK = 6 * (2 * BST_FILTER_MAX_RADIUS + 3) * (2 * BST_FILTER_MAX_RADIUS + 3),
 };
 
 typedef struct bst_filter {
@@ -31,11 +37,23 @@ typedef struct bst_filter {
     bst_borrow *lent;   /* of lines */
     float *edge_x,
         *edge_y; /* 1 / norm of the kernel's part inside the frame, over the whole norm */
-    /* the PSF, one axis, unit norm */
+    const bst_known_psf *known; /* NULL: a Gaussian, whose kernel is one even product */
     int radius;
+    double norm;        /* sqrt(sum p^2) of the two-dimensional PSF of unit flux */
+    double kernel_norm; /* the same on a pixel's centre */
+    double square_x[2 * BST_FILTER_MAX_RADIUS + 1]; /* of the kernel with unit norm, by column */
+    double square_y[2 * BST_FILTER_MAX_RADIUS + 1]; /* and by row */
+    /* a Gaussian, one axis, unit norm */
     float kernel[2 * BST_FILTER_MAX_RADIUS + 4];
-    double norm; /* sqrt(sum p^2) of the two-dimensional PSF of unit flux */
     double correlation[2 * BST_FILTER_MAX_RADIUS + 1]; /* of the kernel with itself, by lag */
+    /* a known PSF: sum over k of across[k] down[k], unit norm */
+    int rank;
+    float across[BST_FILTER_RANK][2 * BST_FILTER_MAX_RADIUS + 1];
+    float down[BST_FILTER_RANK * (2 * BST_FILTER_MAX_RADIUS + 1)]; /* [rank][2 radius + 1] */
+    double *lags;  /* of that kernel with itself, [LAGS][LAGS] by lag in y and x */
+    float *phases; /* [PHASES][PHASES][2 radius + 3][lanes]: shifted in y and x, unit norm */
+    int phase_stride;
+    double *work; /* planes to make them in */
     /* the streak: a sum over shifted point maps */
     bool streak;
     double dx_px, dy_px;
@@ -51,17 +69,20 @@ typedef struct bst_filter {
     double corner; /* output for a point between four pixels at one of them, over its greatest */
     double threshold, threshold_density; /* the latest, and the false alarms per pixel of it */
     double made_sigma, made_dx, made_dy; /* what the kernels were made for */
+    int made_binning;
     float phase[BST_FILTER_PHASES][2 * BST_FILTER_MAX_RADIUS + 3]; /* one axis, shifted */
 } bst_filter;
 
-/* For loops on up to `threads` threads. */
-bst_status bst_filter_create(bst_ctx *ctx, int max_width, int max_height, double streak_max_px,
-                             int threads, bst_filter *out) BST_MUST_CHECK;
+/* known: lent; NULL: the PSF is a Gaussian. For loops on up to `threads` threads. */
+bst_status bst_filter_create(bst_ctx *ctx, const bst_known_psf *known, int max_width,
+                             int max_height, double streak_max_px, int threads,
+                             bst_filter *out) BST_MUST_CHECK;
 void bst_filter_free(bst_filter *filter);
 
-/* Prepares the kernels: a Gaussian of sigma_px integrated over pixels, and, unless dx and dy are
- * both 0, the same drawn along (dx, dy). */
-void bst_filter_set(bst_filter *filter, double sigma_px, double dx_px, double dy_px);
+/* Prepares the kernels: the known PSF, mean of the field, in pixels of binning x binning; else a
+ * Gaussian of sigma_px integrated over pixels; and, unless dx and dy are both 0, the same drawn
+ * along (dx, dy). */
+void bst_filter_set(bst_filter *filter, double sigma_px, int binning, double dx_px, double dy_px);
 
 /* The output above which noise alone gives `false_alarms` maxima in `pixels` pixels, when each is
  * looked for between the pixels too (bst_filter_peak).

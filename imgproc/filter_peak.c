@@ -2,6 +2,7 @@
 #include <math.h>
 
 #include "imgproc/filter.h"
+#include "imgproc/lanes.h"
 
 /* Top of the parabola through three values one step apart, the middle one the greatest. */
 static double top(double left, double middle, double right) {
@@ -9,14 +10,45 @@ static double top(double left, double middle, double right) {
     return bend < 0.0 ? middle - (right - left) * (right - left) / (8.0 * bend) : middle;
 }
 
-static double point_peak(const bst_filter *f, const float *signal, double noise_e, int x, int y) {
-    int r = f->radius + 1, n = 2 * r + 1;
-    if (x < r || y < r || x + r >= f->width || y + r >= f->height) {
-        return -INFINITY;
+typedef double phase_values[BST_FILTER_PHASES][BST_FILTER_PHASES]; /* by shift in y and x */
+
+/* Sum of a row's pixels times the kernels' rows j: adds to each phase's lanes. */
+BST_CLONES
+static void add_row(const bst_filter *f, const float *row, int j, float *lanes) {
+    int n = 2 * f->radius + 3;
+    for (int p = 0; p < BST_FILTER_PHASES * BST_FILTER_PHASES; p++) {
+        const float *kernel = f->phases + (p * n + j) * f->phase_stride;
+        bst_lanes sum = BST_LOAD(lanes + p * BST_LANES);
+        for (int i = 0; i < f->phase_stride; i += BST_LANES) {
+            sum += BST_LOAD(kernel + i) * BST_LOAD(row + i);
+        }
+        BST_STORE(lanes + p * BST_LANES, sum);
     }
-    double value[BST_FILTER_PHASES][BST_FILTER_PHASES] = {{0.0}};
+}
+
+static void known_values(const bst_filter *f, const float *corner, phase_values value) {
+    float lanes[BST_FILTER_PHASES * BST_FILTER_PHASES * BST_LANES] = {0.0f};
+    float row[2 * BST_FILTER_MAX_RADIUS + 3 + BST_LANES];
+    int n = 2 * f->radius + 3;
+    for (int i = n; i < f->phase_stride; i++) {
+        row[i] = 0.0f;
+    }
     for (int j = 0; j < n; j++) {
-        const float *row = signal + (size_t)(y - r + j) * (size_t)f->width + (size_t)(x - r);
+        for (int i = 0; i < n; i++) {
+            float pixel = corner[(size_t)j * (size_t)f->width + (size_t)i];
+            row[i] = pixel > BST_PIXEL_NONE ? pixel : 0.0f;
+        }
+        add_row(f, row, j, lanes);
+    }
+    for (int p = 0; p < BST_FILTER_PHASES * BST_FILTER_PHASES; p++) {
+        value[p / BST_FILTER_PHASES][p % BST_FILTER_PHASES] = bst_lane_sum(lanes + p * BST_LANES);
+    }
+}
+
+static void gaussian_values(const bst_filter *f, const float *corner, phase_values value) {
+    int n = 2 * f->radius + 3;
+    for (int j = 0; j < n; j++) {
+        const float *row = corner + (size_t)j * (size_t)f->width;
         for (int px = 0; px < BST_FILTER_PHASES; px++) {
             double sum = 0.0;
             for (int i = 0; i < n; i++) {
@@ -26,6 +58,20 @@ static double point_peak(const bst_filter *f, const float *signal, double noise_
                 value[py][px] += (double)f->phase[py][j] * sum;
             }
         }
+    }
+}
+
+static double point_peak(const bst_filter *f, const float *signal, double noise_e, int x, int y) {
+    int r = f->radius + 1;
+    if (x < r || y < r || x + r >= f->width || y + r >= f->height) {
+        return -INFINITY;
+    }
+    phase_values value = {{0.0}};
+    const float *corner = signal + (size_t)(y - r) * (size_t)f->width + (size_t)(x - r);
+    if (f->known) {
+        known_values(f, corner, value);
+    } else {
+        gaussian_values(f, corner, value);
     }
     int bx = 0, by = 0;
     for (int py = 0; py < BST_FILTER_PHASES; py++) {

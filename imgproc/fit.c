@@ -15,7 +15,7 @@ enum { MAX_ITERATIONS = 15, MAX_SUMS = BST_FIT_MAX_PARAMETERS * (BST_FIT_MAX_PAR
 static const double LEAST_PIVOT = 1e-11;
 static const double SETTLED = 0.03, NEIGHBOUR_SETTLED = 0.1;
 
-bst_status bst_fit_create(bst_ctx *ctx, const bst_psf *psf, const bst_profiles *profiles,
+bst_status bst_fit_create(bst_ctx *ctx, const bst_gauss *psf, const bst_profiles *profiles,
                           int max_side, bst_fit *out) {
     size_t plane = (size_t)max_side * (size_t)bst_lanes_up(max_side);
     *out = (bst_fit){.psf = psf, .profiles = profiles, .max_side = max_side};

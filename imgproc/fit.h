@@ -30,7 +30,7 @@ typedef struct bst_fit_data {
 
 /* Work space; the planes are [height][width rounded up to lanes] of a stamp. */
 typedef struct bst_fit {
-    const bst_psf *psf;
+    const bst_gauss *psf;
     const bst_profiles *profiles; /* made for the sources' sigma before a fit */
     int max_side;
     float *value, *fixed, *valid;
@@ -38,7 +38,7 @@ typedef struct bst_fit {
     float *scratch;
 } bst_fit;
 
-bst_status bst_fit_create(bst_ctx *ctx, const bst_psf *psf, const bst_profiles *profiles,
+bst_status bst_fit_create(bst_ctx *ctx, const bst_gauss *psf, const bst_profiles *profiles,
                           int max_side, bst_fit *out) BST_MUST_CHECK;
 void bst_fit_free(bst_fit *fit);
 

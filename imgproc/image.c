@@ -7,19 +7,38 @@
 
 enum { PARTS = 3, SIDE = BST_PSF_MAX_SIDE + BST_LANES };
 
-bst_status bst_profiles_create(bst_ctx *ctx, bst_profiles *out) {
-    *out = (bst_profiles){0};
-    out->rows =
-        calloc((size_t)(BST_PROFILE_PHASES + 1) * PARTS * BST_PROFILE_LENGTH, sizeof(float));
-    return out->rows ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory for profiles");
+bst_status bst_profiles_create(bst_ctx *ctx, const bst_known_psf *known, bst_profiles *out) {
+    *out = (bst_profiles){.known = known, .binning = 1};
+    int length = known ? bst_lanes_up(2 * known->reach_px + 1) : BST_PROFILE_LENGTH;
+    size_t row = (size_t)(BST_PROFILE_PHASES + 1) * PARTS * (size_t)length;
+    size_t terms = known ? (size_t)known->terms : 1, nodes = known ? (size_t)known->nodes : 1;
+    out->rows = calloc(nodes * terms * row, sizeof(float));
+    out->down = known ? calloc(terms * row, sizeof(float)) : NULL;
+    if (!out->rows || (known && !out->down)) {
+        bst_profiles_free(out);
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for profiles");
+    }
+    return BST_OK;
 }
 
 void bst_profiles_free(bst_profiles *p) {
     free(p->rows);
+    free(p->down);
     *p = (bst_profiles){0};
 }
 
-void bst_profiles_set(bst_profiles *p, const bst_psf *psf, double sigma_px) {
+void bst_profiles_on(bst_profiles *p, double origin_x_px, double origin_y_px, int binning) {
+    p->origin_x_px = origin_x_px;
+    p->origin_y_px = origin_y_px;
+    p->binning = binning;
+}
+
+void bst_profiles_set(bst_profiles *p, const bst_gauss *psf, double sigma_px) {
+    if (p->known) {
+        p->sigma_px = sigma_px;
+        bst_profiles_set_known(p);
+        return;
+    }
     if (p->sigma_px == sigma_px) {
         return;
     }
@@ -34,7 +53,7 @@ void bst_profiles_set(bst_profiles *p, const bst_psf *psf, double sigma_px) {
     double share[BST_PROFILE_LENGTH], slope[BST_PROFILE_LENGTH], curvature[BST_PROFILE_LENGTH];
     for (int phase = 0; phase <= BST_PROFILE_PHASES; phase++) {
         double centre = (double)phase / BST_PROFILE_PHASES - 0.5 + p->half;
-        bst_psf_profile(psf, centre, sigma_px, p->length, share, slope, curvature);
+        bst_gauss_profile(psf, centre, sigma_px, p->length, share, slope, curvature);
         float *row = p->rows + (size_t)phase * PARTS * (size_t)p->length;
         for (int i = 0; i < p->length; i++) {
             row[i] = (float)share[i];
@@ -110,7 +129,8 @@ typedef struct layout {
     float node[BST_PSF_MAX_NODES], bow[BST_PSF_MAX_NODES];
 } layout;
 
-static inline __attribute__((always_inline)) void lay_out(const bst_profiles *t, const bst_psf *psf,
+static inline __attribute__((always_inline)) void lay_out(const bst_profiles *t,
+                                                          const bst_gauss *psf,
                                                           const bst_shape *shape,
                                                           const bst_stamp *stamp, float *scratch,
                                                           layout *out) {
@@ -157,8 +177,12 @@ static inline range reaching(const layout *l, int j, int b) {
 }
 
 BST_CLONES
-void bst_image_render(const bst_profiles *t, const bst_psf *psf, const bst_shape *shape,
+void bst_image_render(const bst_profiles *t, const bst_gauss *psf, const bst_shape *shape,
                       const bst_stamp *stamp, float *scratch, float *planes) {
+    if (t->known) {
+        bst_image_render_known(t, psf, shape, stamp, false, 0.0, 0.0, scratch, planes);
+        return;
+    }
     layout l;
     lay_out(t, psf, shape, stamp, scratch, &l);
     int stride = l.stride, rows = l.rows, n = stride * stamp->height;
@@ -185,7 +209,7 @@ void bst_image_render(const bst_profiles *t, const bst_psf *psf, const bst_shape
 }
 
 BST_CLONES
-void bst_image_render_motion(const bst_profiles *t, const bst_psf *psf, const bst_shape *shape,
+void bst_image_render_motion(const bst_profiles *t, const bst_gauss *psf, const bst_shape *shape,
                              const bst_stamp *stamp, double ex, double ey, float *scratch,
                              float *planes) {
     layout l;

@@ -37,12 +37,17 @@ typedef struct bst_imgproc_config {
 
 extern const bst_config_desc bst_imgproc_config_table[];
 
-/* Calibration maps on the full sensor, row-major [height_px][width_px]; any may be NULL: uniform
- * dark, uniform flat, no bad pixels. They must outlive the bst_imgproc that uses them. */
+struct bst_psf;
+
+/* What is known of the sensor beside the camera's numbers. Maps on the full sensor, row-major
+ * [height_px][width_px]; any may be NULL: uniform dark, uniform flat, no bad pixels, the PSF the
+ * Gaussian of the camera's psf_fwhm_px. They must outlive the bst_imgproc that uses them. */
 typedef struct bst_imgproc_maps {
     const float *dark_e_per_s; /* dark signal's departure from its mean; taken off */
     const float *flat;         /* relative response, > 0; divided by */
     const uint8_t *bad;        /* non-zero: pixel is left out */
+    const struct bst_psf *psf; /* see sim/world/psf.h */
+    struct bst_psf *own_psf;   /* bst_calibration_psf: what bst_calibration_free frees of it */
 } bst_imgproc_maps;
 
 /* One frame as it was read out. */

@@ -22,14 +22,14 @@ static const double WIDTH_FIT_SNR = 20.0; /* from here the widening is measured 
  * streak's by no more than the other two: both shapes are tried */
 static const double CLOSE_SHARE = 0.8, CLEAR_CHI = 3.0, CLEAR_SHARE = 0.04;
 
-bst_status bst_locator_create(bst_ctx *ctx, int threads, int capacity, int max_width,
-                              int max_height, int max_side, bst_locator *out) {
+bst_status bst_locator_create(bst_ctx *ctx, const bst_known_psf *known, int threads, int capacity,
+                              int max_width, int max_height, int max_side, bst_locator *out) {
     *out = (bst_locator){.threads = threads,
                          .max_side = max_side,
                          .capacity = capacity,
                          .columns = max_width / BST_LOCATE_CELL_PX + 1,
                          .rows = max_height / BST_LOCATE_CELL_PX + 1};
-    bst_psf_init(&out->psf);
+    bst_gauss_init(&out->psf);
     bst_borrow_init(&out->lent, threads);
     out->found = calloc((size_t)capacity, sizeof *out->found);
     out->next = calloc((size_t)capacity, sizeof *out->next);
@@ -45,7 +45,7 @@ bst_status bst_locator_create(bst_ctx *ctx, int threads, int capacity, int max_w
         bst_locator_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d detections", capacity);
     }
-    bst_status status = bst_profiles_create(ctx, &out->profiles);
+    bst_status status = bst_profiles_create(ctx, known, &out->profiles);
     for (int i = 0; i < threads && status == BST_OK; i++) {
         status = bst_fit_create(ctx, &out->psf, &out->profiles, max_side, &out->fits[i]);
     }
@@ -399,7 +399,8 @@ void bst_locate(bst_locator *l, const bst_locate_frame *f, const bst_candidates 
     double variance = f->sigma_px * f->sigma_px;
     l->widening_sum = 0.0;
     l->widening_weight = 1.0 / (0.0025 * variance * variance); /* no widening, to 5 % */
-    bst_sharpness_set(&l->sharpness, &l->psf, f->sigma_px);
+    bst_profiles_on(&l->profiles, f->origin_x_px, f->origin_y_px, (int)f->binning);
+    bst_sharpness_set(&l->sharpness, &l->psf, l->profiles.known, (int)f->binning, f->sigma_px);
     bst_profiles_set(&l->profiles, &l->psf, f->sigma_px);
     bst_charge_remove(l, f);
     for (int first = 0, end; first < fits; first = end) {

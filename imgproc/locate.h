@@ -48,7 +48,7 @@ typedef struct bst_top_law {
 } bst_top_law;
 
 typedef struct bst_locator {
-    bst_psf psf;
+    bst_gauss psf;
     bst_profiles profiles;
     bst_fit *fits; /* one for each thread */
     int threads;
@@ -85,9 +85,10 @@ typedef struct bst_locate_frame {
 /* Squares of the frame that the found ones are kept by, px. */
 enum { BST_LOCATE_CELL_PX = 16 };
 
-/* For loops on up to `threads` threads. */
-bst_status bst_locator_create(bst_ctx *ctx, int threads, int capacity, int max_width,
-                              int max_height, int max_side, bst_locator *out) BST_MUST_CHECK;
+/* known: lent; NULL: the PSF is a Gaussian. For loops on up to `threads` threads. */
+bst_status bst_locator_create(bst_ctx *ctx, const bst_known_psf *known, int threads, int capacity,
+                              int max_width, int max_height, int max_side,
+                              bst_locator *out) BST_MUST_CHECK;
 void bst_locator_free(bst_locator *locator);
 
 /* SNR of a source of one electron in noise of one, as a point or drawn as stars are. */

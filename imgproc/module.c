@@ -7,7 +7,6 @@
 #include "imgproc/imgproc.h"
 #include "imgproc/sky.h"
 #include "imgproc/windows.h"
-#include "sim/io/psf_fits.h"
 #include "sim/world/knowledge.h"
 #include "sim/world/photometry.h"
 
@@ -144,19 +143,13 @@ static bst_status open_lane(bst_ctx *ctx, imgproc_module *m, lane *l) {
 static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
     m->camera = *bst_knowledge_camera(env->knowledge);
     m->tick_rate_hz = env->tick_rate_hz;
-    double oversampling;
-    const char *psf_file = bst_knowledge_psf_file(env->knowledge, &oversampling);
-    if (*psf_file) {
-        bst_psf_summary psf;
-        bst_status status = bst_psf_fits_read(env->ctx, psf_file, oversampling, &psf);
-        if (status != BST_OK) {
-            return bst_fail_prefix(env->ctx, status,
-                                   "/observers/%d/sensors/%d/knowledge/camera/psf_file",
-                                   env->observer, env->sensor);
-        }
-        m->camera.psf_fwhm_px = psf.fwhm_px;
-    }
     BST_TRY(bst_calibration_load(env->ctx, m->config, &m->camera, &m->maps));
+    bst_status status = bst_calibration_psf(env->ctx, env->knowledge, &m->camera, &m->maps);
+    if (status != BST_OK) {
+        return bst_fail_prefix(env->ctx, status,
+                               "/observers/%d/sensors/%d/knowledge/camera/psf_file", env->observer,
+                               env->sensor);
+    }
     BST_TRY(open_lane(env->ctx, m, &m->lanes[0]));
     BST_TRY(bst_sky_create(env->ctx, &m->camera, bst_knowledge_stars(env->knowledge),
                            bst_knowledge_julian_year(env->knowledge), CATALOGUE_CAPACITY, &m->sky));

@@ -30,7 +30,7 @@ static void legendre_rule(int n, double *node, double *weight) {
     }
 }
 
-void bst_psf_init(bst_psf *psf) {
+void bst_gauss_init(bst_gauss *psf) {
     for (int i = 0; i < BST_PSF_TABLE_SIZE; i++) {
         double t = (double)i / BST_PSF_TABLE_PER_SIGMA - BST_PSF_REACH_SIGMA;
         psf->cdf[i] = 0.5 * erfc(-t / sqrt(2.0));
@@ -47,7 +47,7 @@ typedef struct profile {
 } profile;
 
 /* Normal distribution and density at t (in sigma) by cubic Hermite interpolation. */
-static void normal_at(const bst_psf *psf, double t, double *cdf, double *pdf) {
+static void normal_at(const bst_gauss *psf, double t, double *cdf, double *pdf) {
     double u = (t + BST_PSF_REACH_SIGMA) * BST_PSF_TABLE_PER_SIGMA;
     if (!(u > 0.0)) {
         *cdf = *pdf = 0.0;
@@ -70,7 +70,8 @@ static void normal_at(const bst_psf *psf, double t, double *cdf, double *pdf) {
 
 /* The 1-D pixel-integrated Gaussian about `centre` over pixels 0..side-1, and its derivatives by
  * the centre, first and second; only the pixels within reach. */
-static void make_profile(const bst_psf *psf, double centre, double sigma, int side, profile *out) {
+static void make_profile(const bst_gauss *psf, double centre, double sigma, int side,
+                         profile *out) {
     double reach = BST_PSF_REACH_SIGMA * sigma;
     double lo = floor(centre - reach + 0.5), hi = floor(centre + reach + 0.5);
     int first = lo < 0.0 ? 0 : lo > side ? side : (int)lo;
@@ -103,8 +104,8 @@ static int node_count(const bst_shape *shape) {
     return length < 1e-3 ? 1 : (int)fmin(5.0 + 1.15 * length, BST_PSF_MAX_NODES);
 }
 
-void bst_psf_profile(const bst_psf *psf, double centre, double sigma, int side, double *share,
-                     double *slope, double *curvature) {
+void bst_gauss_profile(const bst_gauss *psf, double centre, double sigma, int side, double *share,
+                       double *slope, double *curvature) {
     profile p;
     make_profile(psf, centre, sigma, side, &p);
     for (int i = 0; i < side; i++) {
@@ -115,8 +116,8 @@ void bst_psf_profile(const bst_psf *psf, double centre, double sigma, int side, 
     }
 }
 
-void bst_psf_render(const bst_psf *psf, const bst_shape *shape, const bst_stamp *stamp,
-                    double *share, double *by_x, double *by_y, double *by_variance) {
+void bst_gauss_render(const bst_gauss *psf, const bst_shape *shape, const bst_stamp *stamp,
+                      double *share, double *by_x, double *by_y, double *by_variance) {
     size_t bytes = (size_t)stamp->width * (size_t)stamp->height * sizeof(double);
     memset(share, 0, bytes);
     memset(by_x, 0, bytes);

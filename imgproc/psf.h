@@ -12,11 +12,11 @@ enum {
 
 /* Tables: the normal distribution by sigma, and Gauss-Legendre rules of 1 to BST_PSF_MAX_NODES
  * nodes. */
-typedef struct bst_psf {
+typedef struct bst_gauss {
     double cdf[BST_PSF_TABLE_SIZE], pdf[BST_PSF_TABLE_SIZE];
     double node[BST_PSF_MAX_NODES * (BST_PSF_MAX_NODES + 1) / 2];   /* in [-1/2, 1/2] */
     double weight[BST_PSF_MAX_NODES * (BST_PSF_MAX_NODES + 1) / 2]; /* sum 1 */
-} bst_psf;
+} bst_gauss;
 
 /* A source of unit flux. */
 typedef struct bst_shape {
@@ -34,18 +34,18 @@ typedef struct bst_stamp {
     int x0, y0, width, height;
 } bst_stamp;
 
-void bst_psf_init(bst_psf *psf);
+void bst_gauss_init(bst_gauss *psf);
 
 /* Writes the share of the source's light in each pixel of the stamp and its derivatives, each
  * [height][width]: by x, by y, and by sigma^2 (half the Laplacian: the heat equation). The streak
  * is quadratic in time; its integral along the path is a Gauss-Legendre sum with an error below
  * 1e-5 of the peak. Light beyond 6 sigma is left out. Sides at most BST_PSF_MAX_SIDE. */
-void bst_psf_render(const bst_psf *psf, const bst_shape *shape, const bst_stamp *stamp,
-                    double *share, double *by_x, double *by_y, double *by_variance);
+void bst_gauss_render(const bst_gauss *psf, const bst_shape *shape, const bst_stamp *stamp,
+                      double *share, double *by_x, double *by_y, double *by_variance);
 
 /* Along one axis: the pixel-integrated Gaussian about `centre` on pixels 0 to side - 1 (at most
  * BST_PSF_MAX_SIDE), and its first and second derivative by the centre; 0 beyond 6 sigma. */
-void bst_psf_profile(const bst_psf *psf, double centre, double sigma, int side, double *share,
-                     double *slope, double *curvature);
+void bst_gauss_profile(const bst_gauss *psf, double centre, double sigma, int side, double *share,
+                       double *slope, double *curvature);
 
 #endif

@@ -25,16 +25,42 @@ static double estimate(const bst_sharpness *s, int group, const double at[3][3])
     return sum * s->inverse_square[group];
 }
 
-void bst_sharpness_set(bst_sharpness *s, const bst_psf *psf, double sigma_px) {
+/* What the ratios are made from. */
+typedef struct source {
+    const bst_gauss *psf;
+    const bst_known_psf *known;
+    int binning;
+    double sigma_px;
+} source;
+
+/* Shares of the nine pixels about one, of a source (x, y) off it; node: of a known PSF's field. */
+static void image_of(const source *from, int node, double x, double y, double image[3][3]) {
+    if (!from->known) {
+        double unused[3][9];
+        bst_stamp stamp = {-1, -1, 3, 3};
+        bst_shape shape = {.x_px = x, .y_px = y, .sigma_px = from->sigma_px};
+        bst_gauss_render(from->psf, &shape, &stamp, image[0], unused[0], unused[1], unused[2]);
+        return;
+    }
+    for (int j = 0; j < 3; j++) {
+        for (int i = 0; i < 3; i++) {
+            image[j][i] =
+                bst_known_psf_share(from->known, node, from->binning, i - 1 - x, j - 1 - y);
+        }
+    }
+}
+
+void bst_sharpness_set(bst_sharpness *s, const bst_gauss *psf, const bst_known_psf *known,
+                       int binning, double sigma_px) {
     if (s->sigma_px == sigma_px) {
         return;
     }
     enum { PHASES = 5 };
-    double image[3][3], unused[3][9];
-    bst_stamp stamp = {-1, -1, 3, 3};
-    bst_shape shape = {.sigma_px = sigma_px};
+    double image[3][3];
+    source from = {psf, known, binning, sigma_px};
+    int nodes = known ? known->nodes : 0;
     s->sigma_px = sigma_px;
-    bst_psf_render(psf, &shape, &stamp, image[0], unused[0], unused[1], unused[2]);
+    image_of(&from, nodes, 0.0, 0.0, image);
     for (int j = 0; j < 3; j++) {
         for (int i = 0; i < 3; i++) {
             s->ratio[j][i] = image[j][i] / image[1][1];
@@ -52,10 +78,9 @@ void bst_sharpness_set(bst_sharpness *s, const bst_psf *psf, double sigma_px) {
         s->cube[g] = cube / (square * square);
         s->floor[g] = 1.0;
     }
-    for (int p = 0; p < PHASES * PHASES; p++) {
-        shape.x_px = (p % PHASES + 0.5) / PHASES - 0.5;
-        shape.y_px = (p / PHASES + 0.5) / PHASES - 0.5;
-        bst_psf_render(psf, &shape, &stamp, image[0], unused[0], unused[1], unused[2]);
+    for (int p = 0; p < PHASES * PHASES * (nodes + 1); p++) {
+        image_of(&from, p / (PHASES * PHASES), (p % PHASES + 0.5) / PHASES - 0.5,
+                 (p / PHASES % PHASES + 0.5) / PHASES - 0.5, image);
         for (int g = 0; g < BST_SHARP_GROUPS; g++) {
             double ratio = estimate(s, g, (const double(*)[3])image) / image[1][1];
             s->floor[g] = fmin(s->floor[g], ratio);

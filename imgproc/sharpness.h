@@ -14,6 +14,7 @@
 
 #include <stdbool.h>
 
+#include "imgproc/known_psf.h"
 #include "imgproc/psf.h"
 
 enum { BST_SHARP_GROUPS = 5 };
@@ -32,8 +33,11 @@ typedef struct bst_sharpness {
 /* Deviation from which a pixel is taken for charge: one star in several thousand reaches it. */
 #define BST_SHARP_DEVIATION 4.0
 
-/* Prepares the ratios for a PSF of sigma_px; at once when they are already there. */
-void bst_sharpness_set(bst_sharpness *sharpness, const bst_psf *psf, double sigma_px);
+/* Prepares the ratios for a Gaussian of sigma_px, or, unless `known` is NULL, for the known PSF in
+ * pixels of binning x binning, which sigma_px is the like of: at its sharpest in the field. At once
+ * when they are already there. */
+void bst_sharpness_set(bst_sharpness *sharpness, const bst_gauss *psf, const bst_known_psf *known,
+                       int binning, double sigma_px);
 
 /* Quick: false where bst_sharpness_at is sure to be below BST_SHARP_DEVIATION. (x, y) inside the
  * frame. */

@@ -13,7 +13,7 @@ static const double SETTLED = 0.01;
 
 static const double PATH_STEP_PX = 0.02;
 
-bst_status bst_streak_fit_create(bst_ctx *ctx, const bst_psf *psf, int max_side,
+bst_status bst_streak_fit_create(bst_ctx *ctx, const bst_gauss *psf, int max_side,
                                  bst_streak_fit *out) {
     size_t pixels = (size_t)max_side * (size_t)max_side;
     *out = (bst_streak_fit){.psf = psf, .max_side = max_side};
@@ -75,7 +75,7 @@ static double evaluate(bst_streak_fit *fit, const bst_fit_data *data, const bst_
                        const uint8_t *excluded, const bst_source *s) {
     size_t n = (size_t)stamp->width * (size_t)stamp->height;
     double *share = fit->image, *by_v = share + 3 * n, chi = 0.0;
-    bst_psf_render(fit->psf, &s->shape, stamp, share, share + n, share + 2 * n, by_v);
+    bst_gauss_render(fit->psf, &s->shape, stamp, share, share + n, share + 2 * n, by_v);
     double noise2 = data->noise_e * data->noise_e;
     for (int j = 0; j < stamp->height; j++) {
         const float *row =
@@ -100,10 +100,10 @@ static void accumulate(bst_streak_fit *fit, const bst_fit_data *data, const bst_
     double *along_x = by_v + n, *along_y = along_x + n, *spare = fit->spare;
     bst_shape moved = s->shape;
     moved.dx_px += PATH_STEP_PX;
-    bst_psf_render(fit->psf, &moved, stamp, along_x, spare, spare + n, spare + 2 * n);
+    bst_gauss_render(fit->psf, &moved, stamp, along_x, spare, spare + n, spare + 2 * n);
     moved = s->shape;
     moved.dy_px += PATH_STEP_PX;
-    bst_psf_render(fit->psf, &moved, stamp, along_y, spare, spare + n, spare + 2 * n);
+    bst_gauss_render(fit->psf, &moved, stamp, along_y, spare, spare + n, spare + 2 * n);
     memset(out, 0, sizeof *out);
     double noise2 = data->noise_e * data->noise_e;
     for (int j = 0; j < stamp->height; j++) {

@@ -7,13 +7,13 @@
 #include "imgproc/fit.h"
 
 typedef struct bst_streak_fit {
-    const bst_psf *psf;
+    const bst_gauss *psf;
     int max_side;
     double *image; /* [6][max_side^2]: share, by x, by y, by variance, share of two other paths */
     double *spare; /* [3][max_side^2] */
 } bst_streak_fit;
 
-bst_status bst_streak_fit_create(bst_ctx *ctx, const bst_psf *psf, int max_side,
+bst_status bst_streak_fit_create(bst_ctx *ctx, const bst_gauss *psf, int max_side,
                                  bst_streak_fit *out) BST_MUST_CHECK;
 void bst_streak_fit_free(bst_streak_fit *fit);
 

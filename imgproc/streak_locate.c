@@ -17,7 +17,7 @@ static const double CROWD_PER_PX = 0.0015;
 static const double BRIGHT_POINT_SNR = 12.0, AREA_SHARE = 1.6, AREA_PIXELS = 10.0;
 static const double OWN_LIGHT = 3.0, OWN_LIGHT_SNR = 6.0, LOST_SNR = 1.5;
 
-bst_status bst_streak_locator_create(bst_ctx *ctx, const bst_psf *psf, bst_parallel *pool,
+bst_status bst_streak_locator_create(bst_ctx *ctx, const bst_gauss *psf, bst_parallel *pool,
                                      int max_width, int max_height, double fwhm_px, double max_px,
                                      bst_streak_locator *out) {
     *out = (bst_streak_locator){0};
@@ -190,8 +190,8 @@ static double chi_of_pieces(bst_streak_locator *l, const bst_locate_frame *f,
     memset(total, 0, n * sizeof(double));
     for (int i = 0; i < pieces; i++) {
         const bst_source *s = &found->found[l->pieces[i]].source;
-        bst_psf_render(l->fit.psf, &s->shape, stamp, share, share + n, share + 2 * n,
-                       share + 3 * n);
+        bst_gauss_render(l->fit.psf, &s->shape, stamp, share, share + n, share + 2 * n,
+                         share + 3 * n);
         for (size_t k = 0; k < n; k++) {
             total[k] += s->flux_e * (share[k] + s->widening_px2 * share[k + 3 * n]);
         }

@@ -26,6 +26,7 @@ typedef struct bst_streak_motion_star {
     bst_stamp stamp;
     double flux_e, product_e; /* flux; flux times widening */
     double start_x, start_y, noise_e;
+    double origin_x_px, origin_y_px; /* of the frame it is in */
     /* the local parameters' step while the motion is held, and what a step of the motion takes off
      * it */
     double step[1 + COMMON][LOCAL];
@@ -107,7 +108,12 @@ static bool start_star(const bst_streak_motion *work, const bst_locate_frame *f,
     shape.dy_px /= f->binning;
     shape.bend_x_px /= f->binning;
     shape.bend_y_px /= f->binning;
-    *out = (star){.shape = shape, .start_x = shape.x_px, .start_y = shape.y_px, .used = true};
+    *out = (star){.shape = shape,
+                  .start_x = shape.x_px,
+                  .start_y = shape.y_px,
+                  .used = true,
+                  .origin_x_px = f->origin_x_px,
+                  .origin_y_px = f->origin_y_px};
     out->noise_e = bst_background_noise_at(f->background, c->x, c->y);
     out->flux_e = snr * out->noise_e / f->filter->streak_norm;
     bst_source source = {.shape = out->shape};
@@ -182,7 +188,7 @@ static void load_pixels(const bst_locate_frame *f, const bst_stamp *stamp, float
 }
 
 /* Normal equations of one star at the present motion. */
-static bool accumulate(const bst_streak_motion *work, const bst_psf *psf,
+static bool accumulate(const bst_streak_motion *work, const bst_gauss *psf,
                        const bst_profiles *profiles, star *s) {
     int n = bst_lanes_up(s->stamp.width) * s->stamp.height;
     bst_image_render_motion(profiles, psf, &s->shape, &s->stamp, work->ex, work->ey, work->scratch,
@@ -344,12 +350,13 @@ void bst_streak_motion_add(bst_streak_motion *work, const bst_locate_frame *f,
     }
 }
 
-bool bst_streak_motion_solve(bst_streak_motion *work, const bst_psf *psf, bst_profiles *profiles,
+bool bst_streak_motion_solve(bst_streak_motion *work, const bst_gauss *psf, bst_profiles *profiles,
                              const bst_camera *camera, double length_px, double bend_px,
                              bst_motion *motion) {
     star *stars = work->stars;
     int count = work->count, left = 0;
     double ex = work->ex, ey = work->ey, b = work->binning;
+    bst_profiles_on(profiles, 0.0, 0.0, (int)b);
     bst_profiles_set(profiles, psf, work->sigma_px);
     /* what is known exactly leaves the matrix well conditioned */
     const double least = 1e-4;
@@ -359,6 +366,7 @@ bool bst_streak_motion_solve(bst_streak_motion *work, const bst_psf *psf, bst_pr
     for (int round = 0; round < ROUNDS; round++) {
         double step[COMMON] = {0};
         for (int i = 0; i < count; i++) {
+            bst_profiles_on(profiles, stars[i].origin_x_px, stars[i].origin_y_px, (int)b);
             stars[i].used = stars[i].used && accumulate(work, psf, profiles, &stars[i]);
         }
         if (!agree(stars, count, sigma, away, step)) {

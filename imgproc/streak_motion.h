@@ -39,7 +39,7 @@ void bst_streak_motion_free(bst_streak_motion *work);
 bool bst_streak_motion_begin(bst_streak_motion *work, const bst_locate_frame *frame);
 void bst_streak_motion_add(bst_streak_motion *work, const bst_locate_frame *frame,
                            const bst_candidates *candidates);
-bool bst_streak_motion_solve(bst_streak_motion *work, const bst_psf *psf, bst_profiles *profiles,
+bool bst_streak_motion_solve(bst_streak_motion *work, const bst_gauss *psf, bst_profiles *profiles,
                              const bst_camera *camera, double length_px, double bend_px,
                              bst_motion *motion);
 

@@ -63,11 +63,13 @@ bool bst_frame_range_of(const void *user, const bst_mtt_track *track, bst_orbit_
     return true;
 }
 
-bst_mtt_sight bst_frame_sight_of(const void *user, const bst_mtt_track *track, double *sunlight) {
+bst_mtt_sight bst_frame_sight_of(const void *user, const bst_mtt_track *track,
+                                 bst_mtt_light *light) {
     const bst_frame_view *f = user;
     bst_vec3 eye = f->observer.position_m;
     return bst_sight_of(track->orbit.state.position_m, eye, bst_vec3_add(eye, f->light.sun_m),
-                        track->full_snr, f->threshold_snr, sunlight);
+                        &(bst_sight_seen){track->full_snr, track->full_glow, track->was_bright},
+                        f->threshold_snr, light);
 }
 
 bool bst_frame_observer(const bst_tracker *t, const bst_nav_telemetry *nav, double seconds,

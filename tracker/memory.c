@@ -50,8 +50,8 @@ typedef struct resume_choice {
 static void weigh(const bst_mtt *m, const bst_mtt_track *track, bst_mtt_track *before,
                   resume_choice *choice) {
     double chi2 = bst_sky_distance2(&before->state, &track->state);
-    if (before->asleep && before->full_snr > 0.0 && before->sunlight > 0.0) {
-        double dimmed = before->full_v_mag - 2.5 * log10(before->sunlight);
+    if (before->asleep && before->full_snr > 0.0 && before->light.snr > 0.0) {
+        double dimmed = before->full_v_mag - 2.5 * log10(before->light.snr / before->full_snr);
         double variance =
             before->v_mag_variance + track->v_mag_variance + DIMMING_MAG * DIMMING_MAG;
         chi2 += (track->v_mag - dimmed) * (track->v_mag - dimmed) / variance;
@@ -90,6 +90,8 @@ bool bst_mtt_resume(bst_mtt *m, bst_mtt_track *track, bool anew) {
     track->first_tick = before->first_tick;
     track->full_snr = before->full_snr;
     track->full_v_mag = before->full_v_mag;
+    track->full_glow = before->full_glow;
+    track->was_bright = before->was_bright;
     track->lit = before->lit;
     if (before->orbit.valid) {
         /* the orbit knows more than the few detections since */

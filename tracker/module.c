@@ -179,7 +179,7 @@ static bst_status take(tracker_module *m, struct bst_step *step, const bst_detec
                                   .v_mag_sigma = cue.v_mag_sigma};
     BST_TRY(bst_knowledge_belt_eye_at(bst_step_ctx(step), m->view, seconds, &input.cue.in_region,
                                       &input.cue.belt_eye));
-    if (m->orbits) {
+    if (m->orbits && bst_tracker_may_start_orbit(m->tracker)) {
         bool known;
         BST_TRY(bst_knowledge_cue_range_at(bst_step_ctx(step), m->view, seconds, &known,
                                            &input.cue.range_m, &input.cue.range_rate_mps));

@@ -86,6 +86,14 @@ typedef enum bst_mtt_sight {
     BST_MTT_EARTH,  /* behind the Earth */
 } bst_mtt_sight;
 
+/* Light of an object that moves along an orbit, by what is foreseen of it. */
+typedef struct bst_mtt_light {
+    double sunlight; /* share of the Sun's disc that it sees */
+    double glow; /* 1/m^2: of a diffuse sphere, as far and lit from as far aside; 0: not known */
+    double snr;  /* that it should have; 0: not known */
+    bool bright; /* so far above the threshold that nearly every frame shows it */
+} bst_mtt_light;
+
 /* One detection that is not a star, on the sky. */
 typedef struct bst_mtt_detection {
     bst_sky_measurement sky; /* geometric */
@@ -115,14 +123,17 @@ typedef struct bst_mtt_track {
     bool moved;   /* the latest detection lies farther from the first than their images are long */
     bool at_rest; /* shows no motion and is not what the cue expects */
     bst_mtt_sight sight; /* in the latest frame; BST_MTT_CLEAR without an orbit */
-    double sunlight;     /* share of the Sun's light, in the latest frame; with an orbit only */
+    bst_mtt_light light; /* in the latest frame; with an orbit only */
     /* It has been hidden and was not seen again yet: it only follows its orbit, and wakes when what
      * is confirmed anew is known again as it. Ends as what is remembered does, or by misses. */
     bool asleep;
-    bool lit;                    /* it has had an orbit by which there was something to see */
-    bool replaced;               /* by the track that it woke as, in this frame */
-    bool may_miss;               /* in the latest frame */
-    double full_snr, full_v_mag; /* smoothed over detections in full light; SNR 0: none yet */
+    bool lit;      /* it has had an orbit by which there was something to see */
+    bool replaced; /* by the track that it woke as, in this frame */
+    bool may_miss; /* in the latest frame */
+    /* smoothed over detections in full light that the threshold has not picked; SNR, glow 0: none
+     * yet */
+    double full_snr, full_v_mag, full_glow;
+    bool was_bright; /* in a frame so far */
     bool star; /* and is known to be slower than any object: its rate is zero, its status is not
                   tentative, its life is only ended by max_coast_s */
     /* normalised innovations of the latest hits: two of place, one of brightness; rings */
@@ -159,7 +170,7 @@ typedef struct bst_mtt_frame {
     bool (*range)(const void *user, const bst_mtt_track *track, bst_orbit_range *out);
     /* What there is to see of a confirmed track with an orbit at the frame's time; *sunlight is the
      * share of the Sun's light that it gets. NULL: everything is in full light. */
-    bst_mtt_sight (*sight)(const void *user, const bst_mtt_track *track, double *sunlight);
+    bst_mtt_sight (*sight)(const void *user, const bst_mtt_track *track, bst_mtt_light *light);
     /* 1 sigma per axis of an apparent rate that all of this frame's directions may share */
     double common_rate_sigma_radps;
 } bst_mtt_frame;

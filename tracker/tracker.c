@@ -343,7 +343,8 @@ static void write_track(const bst_tracker *t, const bst_target_cue *cue, const b
                     .hidden = !track->asleep                  ? BST_HIDDEN_NOT
                               : track->sight == BST_MTT_EARTH ? BST_HIDDEN_EARTH
                               : track->sight == BST_MTT_CLEAR ? BST_HIDDEN_AWAITED
-                                                              : BST_HIDDEN_SHADOW};
+                              : track->light.sunlight < 1.0   ? BST_HIDDEN_SHADOW
+                                                              : BST_HIDDEN_DIM};
     memcpy(out->covariance, track->state.covariance, sizeof out->covariance);
 }
 
@@ -414,6 +415,16 @@ bst_tracker_outcome bst_tracker_check(const bst_tracker *t, const bst_detections
         return BST_TRACKER_DUPLICATE;
     }
     return t->started && mid_tick(d) <= t->last_tick ? BST_TRACKER_BACKWARDS : BST_TRACKER_USED;
+}
+
+bool bst_tracker_may_start_orbit(const bst_tracker *t) {
+    int count;
+    const bst_mtt_track *tracks = bst_mtt_tracks(t->mtt, &count);
+    bool may = false;
+    for (int i = 0; t->orbits && i < count; i++) {
+        may = may || (!tracks[i].star && !tracks[i].orbit.valid);
+    }
+    return may;
 }
 
 bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *input,

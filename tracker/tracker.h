@@ -53,7 +53,8 @@ typedef struct bst_tracker_cue {
     bst_vec3 direction_gcrf, rate_gcrf_radps;
     double sigma_rad, rate_sigma_radps;
     double v_mag, v_mag_sigma;
-    double range_m, range_rate_mps; /* of the cue's object; range 0: not known */
+    /* of the cue's object; range 0: not known, or not wanted (bst_tracker_may_start_orbit) */
+    double range_m, range_rate_mps;
     /* the cue is a region: direction is its middle, and what is looked for moves as the belt does
      * wherever it is */
     bool in_region;
@@ -109,6 +110,9 @@ void bst_tracker_free(bst_tracker *tracker);
 /* What bst_tracker_step would answer before it looks at the content: BST_TRACKER_USED, or why the
  * frame is refused. */
 bst_tracker_outcome bst_tracker_check(const bst_tracker *tracker, const bst_detections *detections);
+
+/* Whether the next step may begin an orbit, for which it wants the range of the cue's object. */
+bool bst_tracker_may_start_orbit(const bst_tracker *tracker);
 
 /* Takes one frame and, unless it is a duplicate or late, fills `tracks` (room for track_capacity
  * items) and `predictions`. The target of interest comes first, then confirmed tracks, then

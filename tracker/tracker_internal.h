@@ -63,7 +63,8 @@ bool bst_frame_in_field(const void *user, bst_vec3 direction);
 bool bst_frame_is_expected(const void *user, const bst_mtt_track *track);
 bool bst_frame_expected_rate(const void *user, bst_vec3 direction, bst_vec3 *rate_radps);
 bool bst_frame_range_of(const void *user, const bst_mtt_track *track, bst_orbit_range *out);
-bst_mtt_sight bst_frame_sight_of(const void *user, const bst_mtt_track *track, double *sunlight);
+bst_mtt_sight bst_frame_sight_of(const void *user, const bst_mtt_track *track,
+                                 bst_mtt_light *light);
 
 /* The observer in mid-exposure, from navigation telemetry of about that time; false when that is no
  * orbit. */

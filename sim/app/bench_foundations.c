@@ -98,7 +98,8 @@ static bst_status run_in_parts(bst_ctx *ctx, const bst_bench_options *options, c
     bst_scenario scenario;
     BST_TRY(bst_load_scenario(ctx, file, &load, &json, &scenario));
     bst_simulation *sim = NULL;
-    const bst_simulation_options sim_options = {options->device, options->threads, false};
+    const bst_simulation_options sim_options = {.device = options->device,
+                                                .threads = options->threads};
     bst_status status = bst_simulation_create(ctx, &scenario, &sim_options, &sim);
     bst_bench_clock clock = {.count = 0};
     int parts = (int)scenario.duration_s / part_s;

@@ -26,6 +26,7 @@ static const command commands[] = {
     {"calibrate-obsgen", bst_cmd_calibrate_obsgen,
      "fit the observation generator to the image path, or compare them"},
     {"bench", bst_cmd_bench, "measure speed and error"},
+    {"study", bst_cmd_study, "many runs of varied scenarios, as tables"},
     {"pd", bst_cmd_pd, "measure detection, false alarms and location against theory"},
 };
 

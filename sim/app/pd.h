@@ -4,6 +4,7 @@
 
 #include "imgproc/imgproc.h"
 #include "scenegen/renderer.h"
+#include "sim/app/pd_image.h"
 #include "sim/app/pd_sky.h"
 #include "sim/engine/scenario.h"
 #include "sim/eval/pd_curve.h"
@@ -71,12 +72,13 @@ typedef struct bst_pd_scene {
     bst_renderer *renderer;
     bst_pd_sky *sky; /* NULL: no stars, and one level of sky all over */
     double exposure_s, sky_e, dark_e;
-    double noise_e;    /* of a pixel without the source's own light, at the boresight */
-    double fwhm_px;    /* of the PSF: how near a detection must be */
-    double own_light;  /* as bst_matched_filter_pd has it, mean of places and directions */
-    double sigma_px;   /* of the Gaussian with the PSF's noise-equivalent area */
-    bool gaussian;     /* the PSF is that Gaussian */
-    double *sharpness; /* of a streak, by its angle from an axis; NULL: targets are at rest */
+    double noise_e;       /* of a pixel without the source's own light, at the boresight */
+    double fwhm_px;       /* of the PSF: how near a detection must be */
+    double own_light;     /* as bst_matched_filter_pd has it, mean of places and directions */
+    double sigma_px;      /* of the Gaussian with the PSF's noise-equivalent area */
+    bst_pd_image *image;  /* of targets; NULL: the PSF is that Gaussian */
+    struct bst_psf *seen; /* that it is made from */
+    double *sharpness;    /* of a streak, by its angle from an axis; NULL: targets are at rest */
     double cell_px, apart_px;
     int columns, rows;
     int points;

@@ -9,7 +9,6 @@
 #include "sim/app/pd.h"
 #include "sim/astro/bodies.h"
 #include "sim/engine/engine.h"
-#include "sim/io/psf_fits.h"
 #include "sim/world/knowledge.h"
 
 enum { ROOM_PER_TARGET = 4, MOST_DETECTIONS = 65536, SAMPLES = 5, RING = 64 };
@@ -183,14 +182,8 @@ static bst_status open_function(bst_ctx *ctx, bst_pd_scene *s, bst_pd_detector *
         d->config.capacity = (int64_t)room;
     }
     bst_camera camera = *bst_knowledge_camera(s->knowledge);
-    double oversampling;
-    const char *psf_file = bst_knowledge_psf_file(s->knowledge, &oversampling);
-    if (*psf_file) {
-        bst_psf_summary psf;
-        BST_TRY(bst_psf_fits_read(ctx, psf_file, oversampling, &psf));
-        camera.psf_fwhm_px = psf.fwhm_px;
-    }
     BST_TRY(bst_calibration_load(ctx, &d->config, &camera, &d->maps));
+    BST_TRY(bst_calibration_psf(ctx, s->knowledge, &camera, &d->maps));
     BST_TRY(bst_imgproc_create(ctx, &camera, bst_camera_electrons_per_s(&camera, 0.0), &d->config,
                                &d->maps, &d->ip));
     if (s->options.stack == 0) {

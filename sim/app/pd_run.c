@@ -41,7 +41,11 @@ static bst_status add_bound(bst_ctx *ctx, const runner *r, const bst_match_targe
     bst_bound_noise noise = {target->noise_e, true};
     bst_location_bound bound;
     double along[2];
-    BST_TRY(bst_location_bound_gaussian(ctx, &source, &noise, BOUND_MARGIN_PX, &bound));
+    if (s->image) {
+        BST_TRY(bst_pd_image_bound(ctx, s->image, place, target->flux_e, &noise, &bound));
+    } else {
+        BST_TRY(bst_location_bound_gaussian(ctx, &source, &noise, BOUND_MARGIN_PX, &bound));
+    }
     bst_location_bound_along(&bound, place->dx_px, place->dy_px, along);
     /* of n frames the mean has 1 / n of the variance; the place at their end has that of the rate
      * too, which is 3 (n - 1) / (n + 1) of it */

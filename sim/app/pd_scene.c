@@ -123,12 +123,14 @@ static bst_status set_camera(bst_ctx *ctx, bst_pd_scene *s) {
     bst_psf *psf;
     BST_TRY(bst_psf_create(ctx, c, &psf));
     s->fwhm_px = bst_psf_equivalent_fwhm_px(psf, centre_x, centre_y);
-    s->gaussian = bst_psf_gaussian(psf, &s->sigma_px);
-    if (!s->gaussian) {
-        s->sigma_px = s->fwhm_px / FWHM_PER_SIGMA;
+    if (bst_psf_gaussian(psf, &s->sigma_px)) {
+        bst_psf_free(psf);
+        return BST_OK;
     }
-    bst_psf_free(psf);
-    return BST_OK;
+    s->sigma_px = s->fwhm_px / FWHM_PER_SIGMA;
+    s->seen = psf;
+    /* a camera's turn draws some targets longer than those in the middle */
+    return bst_pd_image_create(ctx, psf, 1.1 * s->options.streak_px, &s->image);
 }
 
 /* The mean over places in the pixel, which differ little for a streak. */
@@ -168,21 +170,24 @@ static double axis_sharpness(double x, double sigma) {
 }
 
 double bst_pd_sharpness(const bst_pd_scene *s, const bst_match_target *place) {
+    if (s->image) {
+        double powers[2];
+        bst_pd_image_powers(s->image, place, powers);
+        return powers[0];
+    }
     if (s->sharpness) {
         double angle = atan2(fabs(place->dy_px), fabs(place->dx_px));
         double at = angle / (0.5 * BST_PI) * (ANGLES - 1);
         int i = (int)fmin(at, ANGLES - 2.0);
         return s->sharpness[i] + (at - i) * (s->sharpness[i + 1] - s->sharpness[i]);
     }
-    if (s->gaussian) {
-        return axis_sharpness(place->x_px, s->sigma_px) * axis_sharpness(place->y_px, s->sigma_px);
-    }
-    double sum = 0.0; /* the equivalent Gaussian's, of the mean place in the pixel */
-    for (int p = 0; p < 4; p++) {
-        sum += 0.25 * axis_sharpness(0.125 + 0.5 * (p % 2), s->sigma_px) *
-               axis_sharpness(0.125 + 0.5 * (p / 2), s->sigma_px);
-    }
-    return sum;
+    return axis_sharpness(place->x_px, s->sigma_px) * axis_sharpness(place->y_px, s->sigma_px);
+}
+
+/* A place in the pixel on the middle of the sensor. */
+static bst_match_target middle_of(const bst_pd_scene *s, double x, double y) {
+    return (bst_match_target){.x_px = floor(bst_camera_centre_x(&s->camera)) + x,
+                              .y_px = floor(bst_camera_centre_y(&s->camera)) + y};
 }
 
 /* What the targets' own light adds to the noise of a matched filter's output. */
@@ -195,7 +200,14 @@ static bst_status set_own_light(bst_ctx *ctx, bst_pd_scene *s) {
                                    .sigma_px = s->sigma_px,
                                    .flux_e = 1.0};
         double powers[2];
-        BST_TRY(bst_gaussian_powers(ctx, &source, powers));
+        if (s->image) {
+            bst_match_target place = middle_of(s, source.x_px, source.y_px);
+            place.dx_px = source.dx_px;
+            place.dy_px = source.dy_px;
+            bst_pd_image_powers(s->image, &place, powers);
+        } else {
+            BST_TRY(bst_gaussian_powers(ctx, &source, powers));
+        }
         s->own_light += 0.25 * powers[1] / pow(powers[0], 1.5) / s->noise_e;
     }
     return BST_OK;
@@ -238,6 +250,11 @@ static bst_status make_grid(bst_ctx *ctx, bst_pd_scene *s) {
 static void set_points(bst_pd_scene *s) {
     const bst_pd_options *o = &s->options;
     bst_match_target quarter = {0.25, 0.25, 0.6 * o->streak_px, 0.8 * o->streak_px};
+    if (s->image) {
+        bst_match_target middle = middle_of(s, quarter.x_px, quarter.y_px);
+        quarter.x_px = middle.x_px;
+        quarter.y_px = middle.y_px;
+    }
     double norm = sqrt(bst_pd_sharpness(s, &quarter));
     s->points = (int)floor((o->high - o->low) / o->step + 1e-9) + 1;
     for (int i = 0; i < s->points; i++) {
@@ -294,6 +311,8 @@ void bst_pd_scene_close(bst_pd_scene *s) {
     bst_renderer_free(s->renderer);
     bst_device_close(s->device);
     bst_psf_free(s->psf);
+    bst_pd_image_free(s->image);
+    bst_psf_free(s->seen);
     bst_pd_sky_close(s->sky);
     bst_knowledge_free(s->knowledge);
     bst_world_free(s->world);

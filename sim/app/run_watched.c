@@ -18,7 +18,7 @@ void bst_run_watch(bst_run_watched *w, const bst_recorder *recorder, const char 
                                          BST_CHANNEL_DETECTIONS, BST_CHANNEL_TRACKS,
                                          BST_CHANNEL_TASK};
     *w = (bst_run_watched){
-        .recorded = bst_recorder_wants(recorder, channel), .last = -1, .mode = -1};
+        .recorded = recorder && bst_recorder_wants(recorder, channel), .last = -1, .mode = -1};
     if (strcmp(channel, BST_CHANNEL_CONTROL_STATUS) == 0) {
         w->kind = BST_WATCH_STATUS;
     } else if (is_one_of(channel, telemetry, 4)) {

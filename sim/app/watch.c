@@ -88,7 +88,7 @@ bst_status bst_watch_run(bst_ctx *ctx, const bst_scenario *scenario, const bst_w
                          const char *device, int threads, bst_loop_figures *figures) {
     const bst_observer_config *observer = scenario->observers.items;
     const bst_sensor_config *sensor = observer->sensors.items;
-    const bst_simulation_options options = {device, threads, false};
+    const bst_simulation_options options = {.device = device, .threads = threads};
     watch w = {.ctx = ctx, .watcher = watcher};
     snprintf(w.scope, sizeof w.scope, "%s/%s", observer->name, sensor->name);
     bst_simulation *sim;

@@ -62,8 +62,8 @@ void bst_text_copy(bst_text_span span, char *out, size_t out_bytes);
 /* Whether all characters are printable ASCII. */
 bool bst_text_is_plain(bst_text_span span);
 
-/* Takes a line "KEYWORD = value" of a CCSDS message (KVN) apart, blanks around both dropped. Returns
- * NULL, or what is wrong with the line, and in *expected what is allowed. */
+/* Takes a line "KEYWORD = value" of a CCSDS message (KVN) apart, blanks around both dropped.
+ * Returns NULL, or what is wrong with the line, and in *expected what is allowed. */
 const char *bst_text_split_keyword(const bst_text_line *line, bst_text_span *keyword,
                                    bst_text_span *value, const char **expected);
 

@@ -145,6 +145,11 @@ bst_status bst_json_check_assignment(bst_ctx *ctx, const char *assignment) BST_M
  * as a string). Objects on the way are made when missing; array elements must exist. */
 bst_status bst_json_set(bst_ctx *ctx, bst_json *json, const char *assignment) BST_MUST_CHECK;
 
+/* Puts `value`, which it takes, at a JSON pointer. Objects on the way are made when missing; array
+ * elements must exist. */
+bst_status bst_json_assign(bst_ctx *ctx, bst_json *json, const char *pointer,
+                           struct cJSON *value) BST_MUST_CHECK;
+
 /* Fills `object` (zeroed by the callee) from `node` by `table`. `path` is the JSON pointer of node,
  * for messages: FILE: PATH: what is wrong (found VALUE; allowed ...) Unknown keys suggest the
  * nearest known one. Keys "$schema" and "description" are allowed everywhere. */

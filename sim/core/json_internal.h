@@ -25,11 +25,6 @@ struct bst_json {
     int origin_count;
 };
 
-/* Puts `value`, which it takes, at a JSON pointer. Objects on the way are made when missing; array
- * elements must exist. */
-bst_status bst_json_assign(bst_ctx *ctx, bst_json *json, const char *pointer,
-                           struct cJSON *value) BST_MUST_CHECK;
-
 /* Notes that what is at `pointer` comes from `file`. */
 bst_status bst_json_note_origin(bst_ctx *ctx, bst_json *json, const char *pointer,
                                 const char *file) BST_MUST_CHECK;

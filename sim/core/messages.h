@@ -298,6 +298,7 @@ typedef enum bst_track_hidden {
     BST_HIDDEN_SHADOW,  /* in the Earth's shadow */
     BST_HIDDEN_EARTH,   /* behind the Earth */
     BST_HIDDEN_AWAITED, /* nothing any more, but it has not been seen again yet */
+    BST_HIDDEN_DIM,     /* nothing, but it is too dim: far away, or lit from behind */
 } bst_track_hidden;
 
 typedef struct bst_track {

@@ -11,7 +11,15 @@
 
 enum { MAX_PLATFORMS = 16, MAX_DEVICES = 32, NAME_BYTES = 256 };
 
-enum { MAX_BUILT = 64 };
+enum { MAX_BUILT = 64, MAX_PROGRAMS = 64, PROGRAM_SOURCES = 8 };
+
+/* A program that was built. */
+typedef struct kept_program {
+    cl_program program;
+    const bst_kernel_source *sources[PROGRAM_SOURCES];
+    int count;
+    char *options;
+} kept_program;
 
 struct bst_device {
     cl_device_id parent, id; /* equal unless a sub-device was made */
@@ -20,6 +28,8 @@ struct bst_device {
     char description[4 * NAME_BYTES];
     const bst_kernel_source *built[MAX_BUILT]; /* sources of all programs, each once */
     int built_count;
+    kept_program programs[MAX_PROGRAMS];
+    int program_count;
 };
 
 static const struct {
@@ -261,6 +271,10 @@ void bst_device_close(bst_device *device) {
     if (!device) {
         return;
     }
+    for (int i = 0; i < device->program_count; i++) {
+        clReleaseProgram(device->programs[i].program);
+        free(device->programs[i].options);
+    }
     if (device->queue) {
         clFinish(device->queue);
         wait_for_workers(device->queue);
@@ -325,10 +339,48 @@ const bst_kernel_source *bst_device_built(const bst_device *device, int index) {
     return index >= 0 && index < device->built_count ? device->built[index] : NULL;
 }
 
+void bst_device_begin_list(bst_device *device) {
+    device->built_count = 0;
+}
+
+static cl_program find_program(const bst_device *device, const bst_kernel_source *const *sources,
+                               int count, const char *options) {
+    for (int i = 0; i < device->program_count; i++) {
+        const kept_program *kept = &device->programs[i];
+        if (kept->count == count && strcmp(kept->options, options) == 0 &&
+            memcmp(kept->sources, sources, (size_t)count * sizeof *sources) == 0) {
+            return kept->program;
+        }
+    }
+    return NULL;
+}
+
+/* Keeps a reference of its own, where there is room. */
+static void keep_program(bst_device *device, const bst_kernel_source *const *sources, int count,
+                         const char *options, cl_program program) {
+    kept_program *kept = &device->programs[device->program_count];
+    if (device->program_count == MAX_PROGRAMS || count > PROGRAM_SOURCES ||
+        !(kept->options = strdup(options))) {
+        return;
+    }
+    clRetainProgram(program);
+    kept->program = program;
+    kept->count = count;
+    memcpy(kept->sources, sources, (size_t)count * sizeof *sources);
+    device->program_count++;
+}
+
 bst_status bst_device_build(bst_ctx *ctx, bst_device *device,
                             const bst_kernel_source *const *sources, int count, const char *options,
                             cl_program *out) {
-    *out = NULL;
+    *out = find_program(device, sources, count, options ? options : "");
+    if (*out) {
+        clRetainProgram(*out);
+        for (int i = 0; i < count; i++) {
+            note_built(device, sources[i]);
+        }
+        return BST_OK;
+    }
     /* a #line before each text, so that the log names the file */
     const char **texts = calloc((size_t)count * 2, sizeof *texts);
     char(*lines)[NAME_BYTES] = calloc((size_t)count, sizeof *lines);
@@ -356,6 +408,7 @@ bst_status bst_device_build(bst_ctx *ctx, bst_device *device,
     for (int i = 0; i < count; i++) {
         note_built(device, sources[i]);
     }
+    keep_program(device, sources, count, options ? options : "", program);
     *out = program;
     program = NULL;
 exit:

@@ -36,8 +36,9 @@ typedef struct bst_kernel_source {
     unsigned hash_high, hash_low; /* FNV-1a 64 of the text, for the manifest */
 } bst_kernel_source;
 
-/* Builds (or takes from the device's cache) the concatenation of `count` sources with the given
- * options. A build error's message holds the log's first lines with file names. */
+/* Builds the concatenation of `count` sources with the given options, or takes what was built of
+ * them on this device before: programs are kept until it is closed. A build error's message holds
+ * the log's first lines with file names. */
 bst_status bst_device_build(bst_ctx *ctx, bst_device *device,
                             const bst_kernel_source *const *sources, int count, const char *options,
                             cl_program *out) BST_MUST_CHECK;
@@ -45,6 +46,8 @@ bst_status bst_device_build(bst_ctx *ctx, bst_device *device,
 /* The kernel sources that were built on this device, in the order of first use; NULL after the
  * last. */
 const bst_kernel_source *bst_device_built(const bst_device *device, int index);
+/* Begins that list anew, for a user of a device that others have used. */
+void bst_device_begin_list(bst_device *device);
 
 /* BST_OK for CL_SUCCESS, else BST_ERR_DEVICE with "what: CL_NAME". */
 bst_status bst_device_check(bst_ctx *ctx, cl_int code, const char *what) BST_MUST_CHECK;

@@ -44,6 +44,7 @@ const bst_config_desc bst_record_config_table[] = {
     BST_BOOL(bst_record_config, detections, "true", "What image processing found."),
     BST_ENUM(bst_record_config, detections_of, detection_choices, "\"all\"",
              "Which of the detections: all, or those labelled as objects."),
+    BST_BOOL(bst_record_config, detection_stars, "true", "Detections labelled star."),
     BST_BOOL(bst_record_config, tracks, "true", "Tracks and the attitude from stars."),
     BST_BOOL(bst_record_config, commands, "true", "Commands to gimbal and sensor."),
     BST_BOOL(bst_record_config, events, "true", "Events, and tasks where sensors are given any."),

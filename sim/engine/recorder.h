@@ -30,6 +30,7 @@ typedef struct bst_record_config {
     bool truth_stars;
     bool detections;
     int32_t detections_of; /* bst_record_detections */
+    bool detection_stars;
     bool tracks;
     bool commands;
     bool events;

@@ -54,8 +54,12 @@ static double mid_seconds(const bst_recorder *recorder, int64_t start_tick, int6
 }
 
 bool bst_recorder_due(const bst_recorder *recorder, int64_t tick, int64_t *last) {
+    double hz = recorder->config.telemetry_hz, rate = (double)recorder->tick_rate_hz;
+    if ((double)tick * hz < ((double)*last + 1.0 - 1e-6) * rate) {
+        return false; /* far from due: most messages of the plant are */
+    }
     /* a grid point that falls on a tick may come out a rounding error below it */
-    double period = (double)tick * recorder->config.telemetry_hz / (double)recorder->tick_rate_hz;
+    double period = (double)tick * hz / rate;
     int64_t now = (int64_t)floor(period + 1e-9);
     if (recorder->config.telemetry_hz <= 0.0 || now <= *last) {
         return false;
@@ -282,8 +286,9 @@ bst_status bst_recorder_detection_rows(bst_ctx *ctx, bst_recorder *recorder, int
     BST_TRY(append(ctx, recorder, BST_TABLE_DETECTION_FRAMES, &head));
     for (int i = 0; i < d->count; i++) {
         const bst_detection *item = &d->items[i];
-        if (recorder->config.detections_of == BST_RECORD_OBJECTS &&
-            item->label != BST_LABEL_OBJECT) {
+        if ((item->label == BST_LABEL_STAR && !recorder->config.detection_stars) ||
+            (item->label != BST_LABEL_OBJECT &&
+             recorder->config.detections_of == BST_RECORD_OBJECTS)) {
             continue;
         }
         row r = {.count = 0};

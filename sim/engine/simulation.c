@@ -16,6 +16,7 @@
 struct bst_simulation {
     bst_world *world;
     bst_device *device;
+    bool lent;                 /* the device is the caller's */
     bst_knowledge **knowledge; /* [sensors of all observers] */
     bst_fleet_member *members; /* [knowledge_count] */
     char (*scopes)[160];       /* [knowledge_count] of the members */
@@ -248,8 +249,15 @@ static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
     BST_TRY(bst_world_prepare(ctx, sim->world, options->threads));
     BST_TRY(make_knowledge(ctx, scenario, sim));
     for (int m = 0; m < scenario->module_count && !sim->device; m++) {
-        if (!scenario->modules[m].off &&
-            (scenario->modules[m].desc->flags & BST_MODULE_NEEDS_DEVICE)) {
+        if (scenario->modules[m].off ||
+            !(scenario->modules[m].desc->flags & BST_MODULE_NEEDS_DEVICE)) {
+            continue;
+        }
+        if (options->opened) {
+            sim->device = options->opened;
+            sim->lent = true;
+            bst_device_begin_list(sim->device);
+        } else {
             BST_TRY(bst_device_open(ctx, options->device ? options->device : "", options->threads,
                                     &sim->device));
         }
@@ -295,7 +303,9 @@ void bst_simulation_free(bst_simulation *sim) {
     free(sim->knowledge);
     free(sim->members);
     free(sim->scopes);
-    bst_device_close(sim->device);
+    if (!sim->lent) {
+        bst_device_close(sim->device);
+    }
     bst_world_free(sim->world);
     free(sim);
 }

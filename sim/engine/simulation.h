@@ -5,11 +5,13 @@
 #include "sim/engine/scenario.h"
 
 typedef struct bst_simulation bst_simulation;
+struct bst_device;
 
 typedef struct bst_simulation_options {
-    const char *device; /* selector as in bst_device_open; NULL: default */
-    int threads;        /* 0: all */
-    bool overlap;       /* as bst_engine_overlap: hooks are called by a second thread */
+    const char *device;        /* selector as in bst_device_open; NULL: default */
+    int threads;               /* 0: all */
+    bool overlap;              /* as bst_engine_overlap: hooks are called by a second thread */
+    struct bst_device *opened; /* used instead of opening one, and not closed; NULL: none */
 } bst_simulation_options;
 
 /* Opens what the scenario names (catalogue, orbits, the OpenCL device if a module needs one), makes
@@ -22,7 +24,6 @@ void bst_simulation_free(bst_simulation *simulation);
 
 bst_engine *bst_simulation_engine(bst_simulation *simulation);
 const struct bst_world *bst_simulation_world(const bst_simulation *simulation);
-struct bst_device;
 /* NULL when no module needed a device. */
 const struct bst_device *bst_simulation_device(const bst_simulation *simulation);
 

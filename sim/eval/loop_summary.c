@@ -138,7 +138,7 @@ static void retire(bst_loop_summary *s) {
         s->visible_after++;
         s->in_track_after += f->in_track;
     }
-    if (f->settled && !isnan(f->error_px)) {
+    if (f->settled && f->mode != BST_MODE_COAST && !isnan(f->error_px)) {
         add_pointing(s, f);
     }
     s->last_in_track = f->in_track;

@@ -30,7 +30,8 @@ typedef struct bst_loop_figures {
                                     confirmed */
     int64_t wrong_target_frames; /* frames in which the track of interest was not the target's */
     double pointing_rms_px,
-        pointing_p99_px;     /* over the frames after settling; NAN when there are none */
+        pointing_p99_px;     /* over the frames after settling but those in which control coasts,
+                                as the target is hidden; NAN when there are none */
     double pointing_bias_px; /* length of the mean error vector */
     int64_t pointing_frames;
 } bst_loop_figures;

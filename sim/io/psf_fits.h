@@ -20,8 +20,8 @@ typedef struct bst_psf_summary {
  * square grid, before integration over the pixel, on any scale and anywhere in the image. Samples
  * per detector pixel: `oversampling` when it is > 0, else the keyword OVERSAMP of the image.
  *
- * The onboard filter is a Gaussian: it gets the width with the same noise-equivalent area, which is
- * what sets the detectability of a point in white noise. For a Gaussian the area is 4 pi sigma^2
+ * fwhm_px belongs to the Gaussian with the same noise-equivalent area, which is what sets the
+ * detectability of a point in white noise. For a Gaussian the area is 4 pi sigma^2
  * (King 1983, PASP 95, 163), so FWHM = 2.3548 sqrt(area / (4 pi)).
  *
  * BST_ERR_FORMAT, naming file and value: a value that is not finite or negative, a sum of zero, a

@@ -11,9 +11,10 @@
  */
 static const double SMOOTH_RAD = 1e-11;
 
-/* The onboard PSF is one Gaussian: of the width given, or else that with the true one's
- * noise-equivalent area in the middle of the field. */
-static void know_psf(bst_camera *c, double given_fwhm_px) {
+/* The onboard camera's PSF is one Gaussian: of the width given, or else that with the true one's
+ * noise-equivalent area in the middle of the field. *psf: the true one, where it is what is known
+ * and no such Gaussian. */
+static void know_psf(bst_camera *c, double given_fwhm_px, const bst_psf **psf) {
     double sigma_px;
     bool plain = (!c->psf && c->optics.psf == BST_PSF_GAUSSIAN) ||
                  (c->psf && bst_psf_gaussian(c->psf, &sigma_px));
@@ -23,6 +24,7 @@ static void know_psf(bst_camera *c, double given_fwhm_px) {
     if (given_fwhm_px > 0.0) {
         c->psf_fwhm_px = given_fwhm_px;
     } else if (c->psf) {
+        *psf = plain ? NULL : c->psf;
         c->psf_fwhm_px = bst_psf_equivalent_fwhm_px(c->psf, 0.5 * (double)(c->width_px - 1),
                                                     0.5 * (double)(c->height_px - 1));
     }
@@ -37,7 +39,7 @@ static bst_status alter_camera(bst_ctx *ctx, const bst_camera_errors_config *err
     c->rotation_deg += errors->rotation_error_deg;
     c->distortion = errors->own_distortion ? errors->distortion : c->distortion;
     c->throughput *= 1.0 + errors->throughput_error;
-    know_psf(c, errors->psf_fwhm_px);
+    know_psf(c, errors->psf_fwhm_px, &k->psf);
     bst_status status = bst_camera_prepare(ctx, c);
     return status == BST_OK
                ? status
@@ -95,6 +97,10 @@ const char *bst_knowledge_psf_file(const bst_knowledge *k, double *oversampling)
         &k->world->observers[k->observer].sensors[k->sensor].config.knowledge.camera;
     *oversampling = camera->psf_oversampling;
     return camera->psf_file;
+}
+
+const bst_psf *bst_knowledge_psf(const bst_knowledge *k) {
+    return k->psf;
 }
 
 const bst_camera *bst_knowledge_camera(const bst_knowledge *k) {
@@ -167,6 +173,10 @@ static bst_status nominal_direction(bst_ctx *ctx, bst_knowledge_view *view, doub
                                      out);
 }
 
+static bst_quat error_of(const bst_knowledge_view *view) {
+    return view->tasked ? (bst_quat){0.0, 0.0, 0.0, 1.0} : view->cue_error;
+}
+
 static const bst_cue_knot *knot_at(bst_knowledge_view *view, int64_t second) {
     bst_cue_knot *knot = &view->knots[((second % BST_CUE_KNOTS) + BST_CUE_KNOTS) % BST_CUE_KNOTS];
     if (!knot->made || knot->second != second) {
@@ -181,46 +191,31 @@ static const bst_cue_knot *knot_at(bst_knowledge_view *view, int64_t second) {
 /* Whether the direction between a second and the next one follows a quintic. */
 static bool is_smooth(bst_knowledge_view *view, int64_t second) {
     if (!view->any_checked || view->checked != second) {
-        bst_vec3 *d = view->newton;
         bool known = true;
-        for (int i = 0; i < BST_CUE_STENCIL; i++) {
-            const bst_cue_knot *knot = knot_at(view, second - 2 + i);
+        for (int i = 0; i < BST_QUINTIC_POINTS; i++) {
+            const bst_cue_knot *knot = knot_at(view, second - BST_QUINTIC_BEFORE + i);
             known = known && knot->known;
-            d[i] = knot->direction;
-        }
-        double last = 1.0; /* factorial of the order */
-        for (int order = 1; order < BST_CUE_STENCIL; order++) {
-            last *= order;
-            for (int i = BST_CUE_STENCIL - 1; i >= order; i--) {
-                d[i] = bst_vec3_scale(bst_vec3_sub(d[i], d[i - 1]), 1.0 / order);
-            }
+            view->cued[i] = bst_quat_rotate(error_of(view), knot->direction);
         }
         view->any_checked = true;
         view->checked = second;
-        view->smooth = known && last * bst_vec3_norm(d[BST_CUE_STENCIL - 1]) <= SMOOTH_RAD;
+        view->smooth = known && bst_quintic_make(view->cued) <= SMOOTH_RAD;
     }
     return view->smooth;
 }
 
-/* By the polynomial through the six seconds around where that is exact, else directly: a function
- * of time alone. */
+/* Where the cue has the target: by the polynomial through the six seconds around where that is
+ * exact, else directly; a function of time alone. */
 static bst_status direction_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                bst_vec3 *out) {
     double whole = floor(seconds);
-    if (!(fabs(seconds) < 1e12) || !is_smooth(view, (int64_t)whole)) {
-        return nominal_direction(ctx, view, seconds, out);
+    if (fabs(seconds) < 1e12 && is_smooth(view, (int64_t)whole)) {
+        *out = bst_quintic_at(view->cued, seconds - whole);
+        return BST_OK;
     }
-    double u = seconds - whole;
-    bst_vec3 sum = view->newton[BST_CUE_STENCIL - 1];
-    for (int i = BST_CUE_STENCIL - 2; i >= 0; i--) {
-        sum = bst_vec3_axpy(view->newton[i], u + 2.0 - i, sum);
-    }
-    *out = sum;
+    BST_TRY(nominal_direction(ctx, view, seconds, out));
+    *out = bst_quat_rotate(error_of(view), *out);
     return BST_OK;
-}
-
-static bst_quat error_of(const bst_knowledge_view *view) {
-    return view->tasked ? (bst_quat){0.0, 0.0, 0.0, 1.0} : view->cue_error;
 }
 
 bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
@@ -234,11 +229,9 @@ bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double s
     }
     const world_sensor *sensor = sensor_of(k);
     const bst_cue_config *cue = &sensor->config.cue;
-    bst_quat error = error_of(view);
     out->valid = true;
-    out->direction_gcrf = bst_quat_rotate(error, d[1]);
-    out->rate_gcrf_radps =
-        bst_quat_rotate(error, bst_vec3_scale(bst_vec3_sub(d[2], d[0]), 0.5 / h));
+    out->direction_gcrf = d[1];
+    out->rate_gcrf_radps = bst_vec3_scale(bst_vec3_sub(d[2], d[0]), 0.5 / h);
     bst_region region;
     bst_knowledge_view_region(view, &region);
     out->sigma_rad = region.kind == BST_REGION_NONE
@@ -262,11 +255,8 @@ bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double s
 
 bst_status bst_knowledge_cue_direction_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                           bool *valid, bst_vec3 *direction) {
-    bst_vec3 nominal;
-    BST_TRY(direction_at(ctx, view, seconds, &nominal));
     *valid = true;
-    *direction = bst_quat_rotate(error_of(view), nominal);
-    return BST_OK;
+    return direction_at(ctx, view, seconds, direction);
 }
 
 void bst_knowledge_region(const bst_knowledge *k, bst_region *out) {

@@ -10,9 +10,13 @@
 
 typedef struct bst_knowledge bst_knowledge;
 
-/* Its PSF is a plain Gaussian: where the true one is not, that with the same noise-equivalent area.
- */
+/* With a plain Gaussian for its PSF: where the known one is another (bst_knowledge_psf), that with
+ * the same noise-equivalent area. */
 const bst_camera *bst_knowledge_camera(const bst_knowledge *knowledge);
+/* The PSF that is known on board, lent as long as the world lives; NULL where it is the Gaussian of
+ * the camera's psf_fwhm_px, or that of a file (see below). Without an error in
+ * knowledge.camera it is the true one. */
+const struct bst_psf *bst_knowledge_psf(const bst_knowledge *knowledge);
 /* The FITS image of the PSF that is known on board ("": none, the camera's psf_fwhm_px holds), and
  * its samples per pixel (0: the file says). */
 const char *bst_knowledge_psf_file(const bst_knowledge *knowledge, double *oversampling);

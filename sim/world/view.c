@@ -1,5 +1,6 @@
 #include <stdlib.h>
 
+#include "sim/core/quintic.h"
 #include "sim/world/ephemeris.h"
 #include "sim/world/field_objects.h"
 
@@ -12,9 +13,22 @@ typedef struct eye {
     bst_sky sky;
 } eye;
 
+/* Velocities of one observer at six whole seconds about one, by a quintic. */
+typedef struct pace {
+    bool made, smooth;
+    int observer;
+    double second;
+    bst_vec3 velocity[BST_QUINTIC_POINTS];
+} pace;
+
+/* Fifth difference, m/s, up to which velocities are interpolated: what that misses is 200 times
+ * less. */
+static const double SMOOTH_MPS = 1e-7;
+
 struct bst_view {
     const bst_world *world;
     bst_sky_clock *clock;
+    pace pace;
     eye eyes[BST_PATH_NODES]; /* the last ones used, by place in the exposure */
 };
 
@@ -91,10 +105,39 @@ bst_status bst_view_observer_state(bst_ctx *ctx, bst_view *view, int observer, d
     return state_of(ctx, view, view->world->object_count + observer, seconds, FROM_EPHEMERIS, out);
 }
 
+/* The same of an observer that is asked for many times a second. */
+static bst_status dense_state(bst_ctx *ctx, bst_view *view, int observer, double seconds,
+                              bst_state *out) {
+    const bst_world *world = view->world;
+    const bst_orbit *orbit = &world->observers[observer].orbit;
+    pace *p = &view->pace;
+    double second = floor(seconds);
+    if (orbit->source == BST_ORBIT_SGP4 && orbit->burn_count == 0 && fabs(seconds) < 1e12 &&
+        (!p->made || p->observer != observer || p->second != second)) {
+        bst_ctx quiet = {0};
+        bst_state state;
+        *p = (pace){.made = true, .smooth = true, .observer = observer, .second = second};
+        for (int i = 0; i < BST_QUINTIC_POINTS && p->smooth; i++) {
+            p->smooth = bst_orbit_state(&quiet, orbit, view->clock, world->epoch,
+                                        second + i - BST_QUINTIC_BEFORE, true, &state) == BST_OK;
+            p->velocity[i] = state.velocity_mps;
+        }
+        p->smooth = p->smooth && bst_quintic_make(p->velocity) <= SMOOTH_MPS;
+    }
+    bst_vec3 derivative;
+    if (p->made && p->smooth && p->observer == observer && p->second == second &&
+        bst_ephemeris_at(world->ephemeris, world->object_count + observer, seconds,
+                         &out->position_m, &derivative)) {
+        out->velocity_mps = bst_quintic_at(p->velocity, seconds - second);
+        return BST_OK;
+    }
+    return bst_view_observer_state(ctx, view, observer, seconds, out);
+}
+
 bst_status bst_view_believed(bst_ctx *ctx, bst_view *view, int observer, int sensor, double seconds,
                              bst_state *state, bst_bodies *bodies) {
     double t = bst_believed_seconds(view->world, observer, sensor, seconds);
-    BST_TRY(bst_view_observer_state(ctx, view, observer, t, state));
+    BST_TRY(dense_state(ctx, view, observer, t, state));
     bst_believe(view->world, observer, sensor, t, state);
     return bst_view_bodies(ctx, view, t, bodies);
 }

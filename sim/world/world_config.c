@@ -187,10 +187,11 @@ static const bst_config_desc camera_errors_table[] = {
         "Onboard throughput over the true one, minus 1: what the camera's own zero point is wrong "
         "by."),
     BST_REAL(bst_camera_errors_config, psf_fwhm_px, "px", 0, 16, "0",
-             "Onboard width of the PSF; 0: the camera's."),
-    BST_PATH(bst_camera_errors_config, psf_file, "\"\"",
-             "FITS image of the PSF, relative to the scenario's folder; the onboard Gaussian gets "
-             "the width with the same noise-equivalent area, instead of psf_fwhm_px."),
+             "The PSF on board is a Gaussian of this width; 0: it is the camera's own PSF."),
+    BST_PATH(
+        bst_camera_errors_config, psf_file, "\"\"",
+        "FITS image of the PSF on board, relative to the scenario's folder, before integration "
+        "over the pixel; instead of psf_fwhm_px."),
     BST_REAL(bst_camera_errors_config, psf_oversampling, "", 0, 1000, "0",
              "psf_file: samples per detector pixel and axis; 0: its keyword OVERSAMP."),
     BST_CONFIG_END,

@@ -110,6 +110,7 @@ struct bst_knowledge {
     bst_stars *own_stars; /* NULL: the world's */
     bst_stars *altered;   /* those with the catalogue's errors; NULL: it has none */
     bst_camera camera;
+    const struct bst_psf *psf; /* lent by the world; NULL: the camera's Gaussian */
     int observer, sensor;
     double julian_year;
 };

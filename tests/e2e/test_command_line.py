@@ -18,7 +18,8 @@ except ImportError:
     jsonschema = None
 
 SCENARIOS = sorted(set(glob.glob("scenarios/**/*.json", recursive=True)) -
-                   set(glob.glob("scenarios/updates/*.json")) - {"scenarios/boresight.schema.json"})
+                   set(glob.glob("scenarios/updates/*.json")) - set(glob.glob("scenarios/studies/*.json")) -
+                   {"scenarios/boresight.schema.json", "scenarios/study.schema.json"})
 GIMBAL = runs.SENSOR + "/modules/gimbal"
 
 

@@ -196,6 +196,40 @@ static void send_all(bst_ctx *ctx, bst_recorder *recorder) {
                                           "acquire -> track"));
 }
 
+/* Of a star and an object, rows with and without detection_stars. */
+static void test_detections_without_stars(void **state) {
+    (void)state;
+    scratch s;
+    scratch_make(&s);
+    bst_ctx ctx;
+    bst_ctx_init(&ctx, NULL, NULL, BST_LOG_INFO);
+    bst_detections *d = calloc(1, sizeof *d + 2 * sizeof(bst_detection));
+    assert_non_null(d);
+    d->count = 2;
+    d->items[0] = (bst_detection){.label = BST_LABEL_STAR, .star_id = 5};
+    d->items[1] = (bst_detection){.label = BST_LABEL_OBJECT, .x_px = 2.0};
+    for (int stars = 0; stars <= 1; stars++) {
+        bst_record_config config;
+        bst_assert_ok(&ctx, bst_config_defaults(&ctx, bst_record_config_table, &config));
+        assert_true(config.detection_stars);
+        config.detection_stars = stars;
+        char out[600], db[640];
+        snprintf(out, sizeof out, "%s/stars%d", s.folder, stars);
+        snprintf(db, sizeof db, "%s/run.sqlite", out);
+        bst_run *run;
+        bst_assert_ok(&ctx, bst_run_create(&ctx, out, false, &run));
+        bst_recorder *recorder = make(&ctx, run, &config, 1);
+        send(&ctx, recorder, BST_CHANNEL_DETECTIONS, d, 4000);
+        bst_assert_ok(&ctx, bst_recorder_close(&ctx, recorder));
+        bst_assert_ok(&ctx, bst_run_finish(&ctx, run));
+        assert_is(db, "SELECT count(*) FROM detections", 1 + stars);
+        assert_is(db, "SELECT item FROM detections WHERE label = 'object' AND x_px = 2", 1);
+        assert_is(db, "SELECT detections FROM detection_frames", 2);
+    }
+    free(d);
+    scratch_remove(&s);
+}
+
 static void test_tables(void **state) {
     (void)state;
     scratch s;
@@ -445,9 +479,8 @@ static void test_choices(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_tables),
-        cmocka_unit_test(test_decimation),
-        cmocka_unit_test(test_frames_meet_truth),
+        cmocka_unit_test(test_tables),     cmocka_unit_test(test_detections_without_stars),
+        cmocka_unit_test(test_decimation), cmocka_unit_test(test_frames_meet_truth),
         cmocka_unit_test(test_choices),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -10,6 +10,7 @@ set(may_sim/io sim/io sim/world sim/astro sim/core)
 foreach(folder sim/engine sim/eval sim/studies ${subsystems})
   set(may_${folder} ${folder} ${low})
 endforeach()
+list(APPEND may_sim/studies sim/eval) # intervals and theory
 set(may_sim/app ${all_folders})
 set(wrong "")
 set(count 0)

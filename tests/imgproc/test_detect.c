@@ -423,7 +423,7 @@ static void calibration_maps(void **state) {
         f.s.mean_e[i] = (double)flat[i] * f.s.mean_e[i] + 0.5 * (double)dark[i];
     }
     synthetic_expose(&f.s, f.key, 1);
-    bst_imgproc_maps maps = {dark, flat, NULL};
+    bst_imgproc_maps maps = {.dark_e_per_s = dark, .flat = flat};
     bst_assert_ok(&f.ctx, bst_imgproc_create(&f.ctx, &f.s.camera, 1e8, &f.s.config, &maps, &f.ip));
     process(&f, NULL);
     /* sky and dark's shot noise, mean 150 e- + 4 e-^2; the flat's spread changes it by 2 % */

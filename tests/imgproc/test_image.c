@@ -8,7 +8,7 @@ enum { SIDE = 90 };
 
 typedef struct fixture {
     bst_ctx ctx;
-    bst_psf psf;
+    bst_gauss psf;
     bst_profiles profiles;
     float *scratch;
     float planes[4 * SIDE * (SIDE + BST_LANES)];
@@ -18,8 +18,8 @@ typedef struct fixture {
 static int setup(void **state) {
     fixture *f = calloc(1, sizeof *f);
     assert_non_null(f);
-    bst_psf_init(&f->psf);
-    bst_assert_ok(&f->ctx, bst_profiles_create(&f->ctx, &f->profiles));
+    bst_gauss_init(&f->psf);
+    bst_assert_ok(&f->ctx, bst_profiles_create(&f->ctx, NULL, &f->profiles));
     f->scratch = calloc(bst_image_scratch(SIDE), sizeof(float));
     assert_non_null(f->scratch);
     *state = f;
@@ -35,7 +35,7 @@ static int teardown(void **state) {
 
 static void compare(fixture *f, const bst_shape *s, const bst_stamp *stamp) {
     double peak[4] = {0}, worst[4] = {0};
-    bst_psf_render(&f->psf, s, stamp, f->exact[0], f->exact[1], f->exact[2], f->exact[3]);
+    bst_gauss_render(&f->psf, s, stamp, f->exact[0], f->exact[1], f->exact[2], f->exact[3]);
     bst_profiles_set(&f->profiles, &f->psf, s->sigma_px);
     bst_image_render(&f->profiles, &f->psf, s, stamp, f->scratch, f->planes);
     int stride = bst_lanes_up(stamp->width);

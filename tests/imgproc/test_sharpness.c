@@ -158,11 +158,11 @@ static void star_under_charge(void **state) {
  */
 static void without_neighbours(void **state) {
     (void)state;
-    bst_psf *psf = malloc(sizeof *psf);
+    bst_gauss *psf = malloc(sizeof *psf);
     assert_non_null(psf);
-    bst_psf_init(psf);
+    bst_gauss_init(psf);
     bst_sharpness s = {0};
-    bst_sharpness_set(&s, psf, 0.85);
+    bst_sharpness_set(&s, psf, NULL, 1, 0.85);
     float signal[9] = {100, 0, 0, 0, 100, 0, 0, 0, 0};
     assert_true(bst_sharpness_at(&s, signal, 3, 3, 5.0, 0, 0) == 0.0);
     assert_true(bst_sharpness_at(&s, signal, 3, 3, 5.0, -1, 5) == 0.0);

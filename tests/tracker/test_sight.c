@@ -15,7 +15,11 @@ static const bst_vec3 sun = {BST_AU_M, 0, 0};
 static bst_mtt_sight sight_at(double angle_deg, bst_vec3 eye, double snr, double *sunlight) {
     double a = angle_deg * BST_DEG_RAD;
     bst_vec3 object = {-42164e3 * cos(a), 42164e3 * sin(a), 0};
-    return bst_sight_of(object, eye, sun, snr, 5.0, sunlight);
+    bst_mtt_light light;
+    bst_mtt_sight sight =
+        bst_sight_of(object, eye, sun, &(bst_sight_seen){.snr = snr}, 5.0, &light);
+    *sunlight = light.sunlight;
+    return sight;
 }
 
 /* Angles from the axis of the shadow, of a geostationary object: the Earth's disc is 8.70 deg in
@@ -45,7 +49,8 @@ static void shadow_by_angle(void **state) {
 static void behind_the_earth(void **state) {
     (void)state;
     bst_vec3 object = {42164e3, 0, 0};
-    double light;
+    const bst_sight_seen seen = {.snr = 20.0};
+    bst_mtt_light light;
     const struct {
         double miss_km; /* of the line of sight, from the Earth's centre */
         bst_mtt_sight sight;
@@ -58,11 +63,51 @@ static void behind_the_earth(void **state) {
         /* the line from the object that misses the centre by so much, carried on by 5000 km */
         double angle = asin(cases[k].miss_km * 1e3 / 42164e3), length = 42164e3 * cos(angle) + 5e6;
         bst_vec3 eye = {42164e3 - length * cos(angle), length * sin(angle), 0};
-        assert_int_equal(bst_sight_of(object, eye, sun, 20.0, 5.0, &light), cases[k].sight);
+        assert_int_equal(bst_sight_of(object, eye, sun, &seen, 5.0, &light), cases[k].sight);
     }
     /* an observer on the near side sees it past nothing */
-    assert_int_equal(bst_sight_of(object, (bst_vec3){7e6, 0, 0}, sun, 20.0, 5.0, &light),
+    assert_int_equal(bst_sight_of(object, (bst_vec3){7e6, 0, 0}, sun, &seen, 5.0, &light),
                      BST_MTT_CLEAR);
+}
+
+/* An object of SNR 20 at a phase angle of 20 degrees, as that angle grows. The light of a diffuse
+ * sphere goes as (pi - phase) cos(phase) + sin(phase) (McCue et al. 1971): 2.966 there, 1 at 90
+ * degrees, 0.427 at 115, 0.342 at 120, 0.151 at 135. */
+static void lit_from_behind(void **state) {
+    (void)state;
+    const bst_vec3 object = {0, 0, 42164e3};
+    const double range = 35e6;
+    const struct {
+        double phase_deg, light;
+        bst_mtt_sight bright, dim; /* of what was seen bright and what was not */
+    } cases[] = {
+        {20, 2.96614, BST_MTT_CLEAR, BST_MTT_CLEAR},
+        {90, 1.0, BST_MTT_FAINT, BST_MTT_CLEAR}, /* 6.74 */
+        {115, 0.42686, BST_MTT_SHADOW, BST_MTT_SHADOW},
+        {135, 0.15175, BST_MTT_SHADOW, BST_MTT_SHADOW},
+    };
+    bst_sight_seen seen = {.snr = 20.0};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        double a = cases[k].phase_deg * BST_DEG_RAD;
+        bst_vec3 eye = {object.x + range * cos(a), object.y + range * sin(a), object.z};
+        bst_mtt_light light;
+        for (int bright = 0; bright <= 1; bright++) {
+            seen.was_bright = bright;
+            assert_int_equal(bst_sight_of(object, eye, sun, &seen, 5.0, &light),
+                             bright ? cases[k].bright : cases[k].dim);
+            /* the Sun stands 2e-4 rad beside its direction from the Earth */
+            bst_assert_close(light.glow, 2.0 / (3.0 * BST_PI * BST_PI) * cases[k].light / 1225e12,
+                             1e-3 * light.glow);
+            seen.glow = seen.glow > 0.0 ? seen.glow : light.glow;
+            bst_assert_close(light.snr, 20.0 * cases[k].light / cases[0].light, 0.02);
+        }
+    }
+    /* twice as far: a quarter */
+    bst_mtt_light light;
+    bst_vec3 eye = {2.0 * range * cos(20.0 * BST_DEG_RAD), 2.0 * range * sin(20.0 * BST_DEG_RAD),
+                    object.z};
+    assert_int_equal(bst_sight_of(object, eye, sun, &seen, 5.0, &light), BST_MTT_FAINT);
+    bst_assert_close(light.snr, 5.0, 0.01); /* as above */
 }
 
 /* ---- the tracker through an hour of darkness ---- */
@@ -102,9 +147,9 @@ static bool range_of(const void *user, const bst_mtt_track *track, bst_orbit_ran
     return true;
 }
 
-static bst_mtt_sight sight_of(const void *user, const bst_mtt_track *track, double *sunlight) {
+static bst_mtt_sight sight_of(const void *user, const bst_mtt_track *track, bst_mtt_light *light) {
     (void)track;
-    *sunlight = 1.0;
+    *light = (bst_mtt_light){.sunlight = 1.0};
     return ((const bench *)user)->sight;
 }
 
@@ -272,6 +317,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(shadow_by_angle),
         cmocka_unit_test(behind_the_earth),
+        cmocka_unit_test(lit_from_behind),
         cmocka_unit_test(it_wakes_as_itself),
         cmocka_unit_test(a_neighbour_that_is_seen_all_night_does_not_become_it),
         cmocka_unit_test(a_night_longer_than_the_memory_ends_the_track),

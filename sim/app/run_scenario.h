@@ -1,0 +1,35 @@
+/* A scenario run from its start to its end, judged against the truth, written to a folder or not.
+ */
+#ifndef BST_APP_RUN_SCENARIO_H
+#define BST_APP_RUN_SCENARIO_H
+
+#include "sim/engine/simulation.h"
+#include "sim/eval/run_metrics.h"
+
+typedef struct bst_run_request {
+    const char *out; /* folder of the results; NULL: nothing is written */
+    bool overwrite;  /* replace an earlier run there */
+    bool progress;   /* a line on the standard error */
+    bool print;      /* the table of results on the standard output */
+    bool metrics;    /* work out the figures of sim/eval/run_metrics.h too */
+} bst_run_request;
+
+typedef struct bst_run_sensor_figures {
+    char scope[160]; /* "observer/sensor" */
+    bst_loop_figures loop;
+    bst_run_metric_figures metrics; /* where asked for */
+} bst_run_sensor_figures;
+
+typedef struct bst_run_report {
+    bst_run_sensor_figures *sensors; /* in the scenario's order; the caller frees */
+    int count;
+    double wall_s; /* of stepping */
+} bst_run_report;
+
+/* Runs a simulation that was made of the scenario and was not stepped yet. BST_ERR_INTERRUPTED when
+ * the user asks to stop: then the folder keeps its .partial name, as after an error. `report`:
+ * NULL, or filled with BST_OK. */
+bst_status bst_run_scenario(bst_ctx *ctx, const bst_scenario *scenario, bst_simulation *sim,
+                            const bst_run_request *request, bst_run_report *report) BST_MUST_CHECK;
+
+#endif

@@ -1,0 +1,33 @@
+/* The quintic through six vectors at even steps, for values between the third and the fourth. */
+#ifndef BST_CORE_QUINTIC_H
+#define BST_CORE_QUINTIC_H
+
+#include "sim/core/vec.h"
+
+#define BST_QUINTIC_POINTS 6
+#define BST_QUINTIC_BEFORE 2 /* of them before the one that u is counted from */
+
+/* Turns the vectors, in place, into Newton's divided differences. Returns the length of their fifth
+ * difference: within the middle step the quintic misses smooth motion by less than 1/200 of what
+ * that changes by from step to step. */
+static inline double bst_quintic_make(bst_vec3 d[BST_QUINTIC_POINTS]) {
+    double last = 1.0; /* factorial of the order */
+    for (int order = 1; order < BST_QUINTIC_POINTS; order++) {
+        last *= order;
+        for (int i = BST_QUINTIC_POINTS - 1; i >= order; i--) {
+            d[i] = bst_vec3_scale(bst_vec3_sub(d[i], d[i - 1]), 1.0 / order);
+        }
+    }
+    return last * bst_vec3_norm(d[BST_QUINTIC_POINTS - 1]);
+}
+
+/* The value u steps after the third point; u in [0, 1] lies in the middle. */
+static inline bst_vec3 bst_quintic_at(const bst_vec3 d[BST_QUINTIC_POINTS], double u) {
+    bst_vec3 sum = d[BST_QUINTIC_POINTS - 1];
+    for (int i = BST_QUINTIC_POINTS - 2; i >= 0; i--) {
+        sum = bst_vec3_axpy(d[i], u + BST_QUINTIC_BEFORE - i, sum);
+    }
+    return sum;
+}
+
+#endif

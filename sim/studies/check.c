@@ -1,0 +1,243 @@
+/* What can be said of a study before its first run. */
+#include <cjson/cJSON.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/core/text.h"
+#include "sim/studies/kind.h"
+#include "sim/studies/study_internal.h"
+
+enum { RUNS_TRIED = 1000 };
+
+int bst_kind_metric(const bst_study_kind *kind, const char *name) {
+    for (int i = 0; i < kind->metric_count; i++) {
+        if (strcmp(kind->metrics[i].name, name) == 0) {
+            return i;
+        }
+    }
+    return -1;
+}
+
+static bst_status unknown_metric(bst_ctx *ctx, const bst_study *study, const bst_study_kind *kind,
+                                 int index, const char *name) {
+    const char *nearest = NULL;
+    size_t best = SIZE_MAX;
+    char known[700] = "";
+    for (int i = 0; i < kind->metric_count; i++) {
+        if (bst_text_is_nearer(name, kind->metrics[i].name, &best)) {
+            nearest = kind->metrics[i].name;
+        }
+        size_t used = strlen(known);
+        snprintf(known + used, sizeof known - used, "%s%s", used ? ", " : "",
+                 kind->metrics[i].name);
+    }
+    return nearest ? bst_fail(ctx, BST_ERR_CONFIG,
+                              "%s: /metrics/%d: kind %s has no metric \"%.60s\"; did you mean "
+                              "\"%s\"?",
+                              study->file, index, kind->name, name, nearest)
+                   : bst_fail(ctx, BST_ERR_CONFIG,
+                              "%s: /metrics/%d: kind %s has no metric \"%.60s\" (allowed: %s)",
+                              study->file, index, kind->name, name, known);
+}
+
+static bst_status check_metrics(bst_ctx *ctx, const bst_study *study, const bst_study_kind *kind) {
+    const cJSON *list = cJSON_GetObjectItemCaseSensitive(bst_json_root(study->json), "metrics");
+    const char *allowed = "an array of names";
+    if (list && !cJSON_IsArray(list)) {
+        return bst_config_fail(ctx, study->file, "/metrics", list, "wrong type", allowed);
+    }
+    int i = 0;
+    for (const cJSON *item = list ? list->child : NULL; item; item = item->next, i++) {
+        if (!cJSON_IsString(item)) {
+            return bst_config_fail(ctx, study->file, "/metrics", item, "wrong type", allowed);
+        }
+        if (bst_kind_metric(kind, item->valuestring) < 0) {
+            return unknown_metric(ctx, study, kind, i, item->valuestring);
+        }
+    }
+    return BST_OK;
+}
+
+static bst_status check_run(bst_ctx *ctx, const bst_study *study, const bst_study_kind *kind,
+                            const bst_study_place *place, const bst_study_value *values,
+                            bool deep) {
+    bst_study_run run = {.study = study, .place = *place};
+    cJSON *settings;
+    BST_TRY(bst_study_document(ctx, study, place, values, &run.scenario, &settings));
+    run.settings = settings;
+    bst_status status = kind->check(ctx, kind->user, &run, deep);
+    bst_json_free(run.scenario);
+    cJSON_Delete(settings);
+    return status;
+}
+
+/* "value 3 of read_noise_e" */
+static void say_value(const bst_study_axis *axis, const bst_study_value *value, char *out,
+                      size_t bytes) {
+    char number[40];
+    bst_study_number_text(value->number, number);
+    char *text = value->is_number ? NULL : cJSON_PrintUnformatted(value->json);
+    snprintf(out, bytes, "value %.80s of %s",
+             value->is_number ? number
+             : text           ? text
+                              : "?",
+             axis->name);
+    free(text);
+}
+
+typedef struct checker {
+    bst_ctx *ctx;
+    const bst_study *study;
+    const bst_study_kind *kind;
+    bst_study_value *values;
+} checker;
+
+/* With the values as they are; `axis`: which of them is tried. */
+static bst_status try_values(checker *c, const bst_study_place *place, int axis) {
+    char value[200];
+    bst_status status = check_run(c->ctx, c->study, c->kind, place, c->values, false);
+    if (status == BST_OK) {
+        return BST_OK;
+    }
+    say_value(&c->study->axes[axis], &c->values[axis], value, sizeof value);
+    return bst_fail_prefix(c->ctx, status, "%s: %s: %s", c->study->file, c->study->axes[axis].where,
+                           value);
+}
+
+static bst_study_value number_value(double number) {
+    return (bst_study_value){true, true, number, NULL};
+}
+
+static bst_study_value listed_value(const cJSON *item) {
+    bool number = cJSON_IsNumber(item);
+    return (bst_study_value){true, number, number ? item->valuedouble : 0.0, item};
+}
+
+/* Ends of ranges and values of lists of one axis, with the others as in the first setting. */
+static bst_status try_axis(checker *c, const bst_study_place *place, int a) {
+    const bst_study_axis *axis = &c->study->axes[a];
+    bst_study_value kept = c->values[a];
+    bst_status status = BST_OK;
+    if (axis->values) {
+        for (const cJSON *item = axis->values->child; item && status == BST_OK; item = item->next) {
+            c->values[a] = listed_value(item);
+            status = try_values(c, place, a);
+        }
+    } else {
+        double ends[2];
+        if (axis->axis) {
+            ends[0] = axis->axis->integer ? round(axis->axis->from) : axis->axis->from;
+            ends[1] = axis->axis->integer ? round(axis->axis->to) : axis->axis->to;
+        } else if (axis->dispersion->distribution == BST_DISTRIBUTION_NORMAL) {
+            double reach = axis->dispersion->truncate_sigma * axis->dispersion->sigma;
+            ends[0] = axis->dispersion->mean - reach;
+            ends[1] = axis->dispersion->mean + reach;
+        } else {
+            ends[0] = axis->dispersion->from;
+            ends[1] = axis->dispersion->to;
+        }
+        for (int e = 0; e < 2 && status == BST_OK; e++) {
+            c->values[a] = number_value(ends[e]);
+            status = try_values(c, place, a);
+        }
+    }
+    c->values[a] = kept;
+    return status;
+}
+
+/* Axes of a list go side by side: all values of one level together. */
+static bst_status try_list(checker *c, const bst_study_place *place, int factor) {
+    const bst_study_factor *f = &c->study->factors[factor];
+    int64_t levels[BST_STUDY_AXES + 1];
+    bst_study_levels(c->study, place->setting, levels);
+    for (int64_t level = 0; level < f->levels; level++) {
+        levels[factor] = level;
+        bst_study_swept_values(c->study, levels, c->values);
+        BST_TRY(try_values(c, place, f->first_axis));
+    }
+    levels[factor] = 0;
+    bst_study_swept_values(c->study, levels, c->values);
+    return BST_OK;
+}
+
+/* What is wrong with the first setting: its values are put in one after the other, as far as the
+ * scenario is right without them. */
+static bst_status blame(checker *c, const bst_study_place *place) {
+    const bst_study *study = c->study;
+    bst_study_value first[BST_STUDY_AXES];
+    bst_ctx quiet = {0};
+    memcpy(first, c->values, sizeof first);
+    memset(c->values, 0, sizeof first);
+    if (check_run(&quiet, study, c->kind, place, c->values, false) == BST_OK) {
+        for (int a = 0; a < study->swept_count; a++) {
+            c->values[a] = first[a];
+            BST_TRY(first[a].given ? try_values(c, place, a) : BST_OK);
+        }
+    }
+    memcpy(c->values, first, sizeof first);
+    bst_status status = check_run(c->ctx, study, c->kind, place, c->values, true);
+    return bst_fail_prefix(c->ctx, status, "%s: the first setting", study->file);
+}
+
+static bst_status try_base(checker *c, const bst_study_place *place) {
+    const bst_study *study = c->study;
+    int64_t levels[BST_STUDY_AXES + 1];
+    bst_study_levels(study, place->setting, levels);
+    memset(c->values, 0, BST_STUDY_AXES * sizeof *c->values);
+    bst_study_swept_values(study, levels, c->values);
+    if (check_run(c->ctx, study, c->kind, place, c->values, true) != BST_OK) {
+        return blame(c, place);
+    }
+    for (int f = 0; f < study->factor_count; f++) {
+        const bst_study_factor *factor = &study->factors[f];
+        if (factor->design == BST_SWEEP_LIST) {
+            BST_TRY(try_list(c, place, f));
+            continue;
+        }
+        for (int a = factor->first_axis; a < factor->first_axis + factor->axis_count; a++) {
+            BST_TRY(try_axis(c, place, a));
+        }
+    }
+    for (int a = study->swept_count; a < study->axis_count; a++) {
+        BST_TRY(try_axis(c, place, a));
+    }
+    return BST_OK;
+}
+
+/* Runs as they will be. */
+static bst_status try_runs(checker *c) {
+    const bst_study *study = c->study;
+    int64_t count = study->settings < RUNS_TRIED ? study->settings : RUNS_TRIED;
+    for (int64_t i = 0; i < count; i++) {
+        int64_t setting = (int64_t)((double)i * (double)study->settings / (double)count);
+        bst_study_place place = bst_study_place_of(study, setting * study->config.replicates);
+        bst_study_values(study, &place, c->values);
+        bst_status status = check_run(c->ctx, study, c->kind, &place, c->values, false);
+        if (status != BST_OK) {
+            return bst_fail_prefix(c->ctx, status, "%s: run %" PRId64, study->file, place.run);
+        }
+    }
+    return BST_OK;
+}
+
+bst_status bst_study_check(bst_ctx *ctx, const bst_study *study, const bst_study_kind *kind) {
+    BST_TRY(check_metrics(ctx, study, kind));
+    checker c = {ctx, study, kind, calloc(BST_STUDY_AXES, sizeof *c.values)};
+    if (!c.values) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the study");
+    }
+    bst_status status = BST_OK;
+    int64_t runs_per_base = study->runs / study->base_count;
+    for (int b = 0; b < study->base_count && status == BST_OK; b++) {
+        bst_study_place place = bst_study_place_of(study, b * runs_per_base);
+        status = try_base(&c, &place);
+    }
+    if (status == BST_OK) {
+        status = try_runs(&c);
+    }
+    free(c.values);
+    return status;
+}

@@ -1,0 +1,133 @@
+/* From the index of a run to its values. */
+#include <cjson/cJSON.h>
+#include <math.h>
+#include <string.h>
+
+#include "sim/core/rng.h"
+#include "sim/studies/study.h"
+
+bst_study_place bst_study_place_of(const bst_study *study, int64_t run) {
+    bst_study_place place = {.run = run,
+                             .setting = run / study->config.replicates,
+                             .replicate = run % study->config.replicates};
+    int64_t per_base = study->settings / study->base_count;
+    place.base = (int)(place.setting / per_base);
+    place.run_number =
+        (uint64_t)(study->config.random == BST_RANDOM_COMMON ? place.replicate : place.run);
+    return place;
+}
+
+void bst_study_levels(const bst_study *study, int64_t setting, int64_t *levels) {
+    for (int f = study->factor_count - 1; f >= 0; f--) {
+        levels[f] = setting % study->factors[f].levels;
+        setting /= study->factors[f].levels;
+    }
+}
+
+static bst_study_value listed(const bst_study_axis *axis, int64_t index) {
+    const cJSON *item = cJSON_GetArrayItem(axis->values, (int)index);
+    bool number = cJSON_IsNumber(item);
+    return (bst_study_value){true, number, number ? item->valuedouble : 0.0, item};
+}
+
+/* The value at `unit` of an axis: 0 its first, 1 its last. */
+static bst_study_value at_unit(const bst_study_axis *axis, double unit) {
+    const bst_axis_config *c = axis->axis;
+    double value = unit <= 0.0                     ? c->from
+                   : unit >= 1.0                   ? c->to
+                   : c->spacing == BST_SPACING_LOG ? c->from * exp(unit * log(c->to / c->from))
+                                                   : c->from + unit * (c->to - c->from);
+    return (bst_study_value){true, true, c->integer ? round(value) : value, NULL};
+}
+
+static int64_t own_levels(const bst_study_axis *axis) {
+    return axis->values ? axis->value_count : axis->axis->count;
+}
+
+static bst_study_value at_level(const bst_study_axis *axis, int64_t level) {
+    if (axis->values) {
+        return listed(axis, level);
+    }
+    int64_t last = axis->axis->count - 1;
+    return at_unit(axis, last > 0 ? (double)level / (double)last : 0.0);
+}
+
+/* Of a design that places points in a unit cube. `steps`: a grid of so many places, else 0. */
+static bst_study_value at_place(const bst_study_axis *axis, double unit, int steps) {
+    if (!axis->values) {
+        return at_unit(axis, unit);
+    }
+    double n = axis->value_count;
+    return listed(axis, (int64_t)fmin(steps ? round(unit * (n - 1.0)) : unit * n, n - 1.0));
+}
+
+static void factor_values(const bst_study *study, const bst_study_factor *f, int64_t level,
+                          bst_study_value *out) {
+    for (int a = 0; a < f->axis_count; a++) {
+        const bst_study_axis *axis = &study->axes[f->first_axis + a];
+        bst_study_value *value = &out[f->first_axis + a];
+        if (f->unit) {
+            *value = at_place(axis, f->unit[level * f->axis_count + a], f->steps);
+        } else if (f->design != BST_SWEEP_ONE_AT_A_TIME) {
+            *value = at_level(axis, level);
+        }
+    }
+    /* level 0 of one at a time is the scenario as it is */
+    for (int a = 0; f->design == BST_SWEEP_ONE_AT_A_TIME && a < f->axis_count && level > 0; a++) {
+        const bst_study_axis *axis = &study->axes[f->first_axis + a];
+        if (level <= own_levels(axis)) {
+            out[f->first_axis + a] = at_level(axis, level - 1);
+        }
+        level -= own_levels(axis);
+    }
+}
+
+void bst_study_swept_values(const bst_study *study, const int64_t *levels, bst_study_value *out) {
+    memset(out, 0, (size_t)study->swept_count * sizeof *out);
+    for (int f = 0; f < study->factor_count; f++) {
+        factor_values(study, &study->factors[f], levels[f], out);
+    }
+}
+
+static bst_study_value draw(const bst_study *study, const bst_study_axis *axis, uint64_t counter) {
+    const bst_dispersion_config *c = axis->dispersion;
+    bst_rng_key key = bst_rng_make_key(study->config.seed, 0, axis->path, "dispersion");
+    double u = bst_rng_uniform(key, counter, 0), z;
+    bst_study_value value = {true, true, 0.0, NULL};
+    switch ((bst_distribution)c->distribution) {
+        case BST_DISTRIBUTION_UNIFORM:
+            value.number = c->from + u * (c->to - c->from);
+            break;
+        case BST_DISTRIBUTION_LOG_UNIFORM:
+            value.number = c->from * exp(u * log(c->to / c->from));
+            break;
+        case BST_DISTRIBUTION_NORMAL:
+            /* 8 % of the draws pass the narrowest limit */
+            for (uint64_t b = 1; fabs(z = bst_rng_normal(key, counter, b)) > c->truncate_sigma;) {
+                b++;
+            }
+            value.number = c->mean + c->sigma * z;
+            break;
+        case BST_DISTRIBUTION_TABLE: {
+            int i = 0, n = axis->value_count;
+            if (axis->cumulative) {
+                while (i < n - 1 && u >= axis->cumulative[i]) {
+                    i++;
+                }
+            } else {
+                i = (int)fmin(u * n, n - 1.0);
+            }
+            return listed(axis, i);
+        }
+    }
+    return value;
+}
+
+void bst_study_values(const bst_study *study, const bst_study_place *place, bst_study_value *out) {
+    int64_t levels[BST_STUDY_AXES + 1];
+    bst_study_levels(study, place->setting, levels);
+    bst_study_swept_values(study, levels, out);
+    for (int a = study->swept_count; a < study->axis_count; a++) {
+        out[a] = draw(study, &study->axes[a], place->run_number);
+    }
+}

@@ -1,0 +1,32 @@
+/* The executor of one machine: worker processes, each on cores of its own. */
+#ifndef BST_STUDIES_LOCAL_POOL_H
+#define BST_STUDIES_LOCAL_POOL_H
+
+#include "sim/studies/executor.h"
+#include "sim/studies/kind.h"
+
+typedef struct bst_local_pool_options {
+    const bst_study *study;
+    const bst_study_kind *kind;
+    const char *out;
+    int workers;   /* 0: one for each core that this process may use */
+    int lock_fd;   /* closed by workers, -1: none */
+    bool unpinned; /* leave the choice of cores to the system */
+} bst_local_pool_options;
+
+/* Cores that this process may run on. */
+int bst_local_cores(void);
+
+/* Workers are started when they get their first shard: forks of this process, so that no OpenCL
+ * device may have been opened in it. Before anything else each is bound to its own cores, limits
+ * PoCL to as many threads (POCL_MAX_PTHREAD_COUNT, and POCL_AFFINITY unset: that binds the threads
+ * of every process from core 0), and takes a cache of kernels that no other worker uses
+ * (POCL_CACHE_DIR, in the user's cache folder, so that the next study finds it warm). What is given
+ * is to live as long as the executor. */
+bst_status bst_local_pool_open(bst_ctx *ctx, const bst_local_pool_options *options,
+                               bst_executor *out) BST_MUST_CHECK;
+
+/* Settles this process as such a worker: number `index` of `workers`. Returns its cores. */
+int bst_local_settle(int index, int workers, bool unpinned);
+
+#endif

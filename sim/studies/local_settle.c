@@ -1,0 +1,108 @@
+/* What a worker does before it opens a device: cores, threads, cache of kernels. */
+#define _GNU_SOURCE /* sched_setaffinity */
+#include <errno.h>
+#include <fcntl.h>
+#include <sched.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "sim/studies/local_pool.h"
+
+enum { CACHES = 4096 };
+
+int bst_local_cores(void) {
+    cpu_set_t set;
+    return sched_getaffinity(0, sizeof set, &set) == 0 && CPU_COUNT(&set) > 0 ? CPU_COUNT(&set) : 1;
+}
+
+/* The index-th of `workers` equal parts of the cores; one core when there are fewer. */
+static int bind_to_cores(int index, int workers, bool unpinned) {
+    cpu_set_t all, own;
+    if (sched_getaffinity(0, sizeof all, &all) != 0) {
+        return 1;
+    }
+    int cores = CPU_COUNT(&all), each = cores / workers > 1 ? cores / workers : 1;
+    int from = index * each % cores, n = 0, taken = 0;
+    CPU_ZERO(&own);
+    for (size_t c = 0; c < CPU_SETSIZE; c++) {
+        if (CPU_ISSET(c, &all)) {
+            if (n >= from && taken < each) {
+                CPU_SET(c, &own);
+                taken++;
+            }
+            n++;
+        }
+    }
+    if (!unpinned && taken > 0 && sched_setaffinity(0, sizeof own, &own) != 0) {
+        return each; /* slower, not wrong */
+    }
+    return each;
+}
+
+/* Cores that Slurm grants a task, which it need not be bound to; 0: this is no such task. */
+static int granted_cores(void) {
+    const char *text = getenv("SLURM_CPUS_PER_TASK");
+    return text ? atoi(text) : 0;
+}
+
+static bool make_folders(char *path) {
+    for (char *slash = path; (slash = strchr(slash + 1, '/'));) {
+        *slash = '\0';
+        bool made = mkdir(path, 0777) == 0 || errno == EEXIST || access(path, F_OK) == 0;
+        *slash = '/';
+        if (!made) {
+            return false;
+        }
+    }
+    return mkdir(path, 0777) == 0 || errno == EEXIST;
+}
+
+static bool cache_root(char *out, size_t bytes) {
+    const char *own = getenv("POCL_CACHE_DIR"), *xdg = getenv("XDG_CACHE_HOME"),
+               *home = getenv("HOME");
+    int n = own && *own     ? snprintf(out, bytes, "%s", own)
+            : xdg && *xdg   ? snprintf(out, bytes, "%s/boresight", xdg)
+            : home && *home ? snprintf(out, bytes, "%s/.cache/boresight", home)
+                            : snprintf(out, bytes, "/tmp/boresight-%ld", (long)getuid());
+    return n > 0 && (size_t)n < bytes;
+}
+
+/* The first cache that no living process uses; it stays locked until this one ends. Without one
+ * PoCL's own is used: that is slower to start, and safe once it is warm. */
+static void take_cache(void) {
+    char root[2048], path[2200], lock[2300];
+    if (!cache_root(root, sizeof root)) {
+        return;
+    }
+    for (int i = 0; i < CACHES; i++) {
+        snprintf(path, sizeof path, "%s/worker-%d", root, i);
+        snprintf(lock, sizeof lock, "%s/lock", path);
+        if (!make_folders(path)) {
+            return;
+        }
+        int fd = open(lock, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+        if (fd < 0) {
+            return;
+        }
+        if (flock(fd, LOCK_EX | LOCK_NB) == 0) {
+            setenv("POCL_CACHE_DIR", path, 1);
+            return;
+        }
+        close(fd);
+    }
+}
+
+int bst_local_settle(int index, int workers, bool unpinned) {
+    char text[16];
+    int cores = bind_to_cores(index, workers, unpinned), granted = granted_cores();
+    cores = granted > 0 && granted < cores ? granted : cores;
+    unsetenv("POCL_AFFINITY");
+    snprintf(text, sizeof text, "%d", cores);
+    setenv("POCL_MAX_PTHREAD_COUNT", text, 1);
+    take_cache();
+    return cores;
+}

@@ -1,0 +1,402 @@
+/* Files of shards: text, one line a row, with a checksum at the end. */
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "sim/core/file.h"
+#include "sim/studies/results.h"
+
+static const uint64_t MOST_BYTES = (uint64_t)4 << 30;
+
+static uint64_t checksum(const char *text, size_t bytes) {
+    uint64_t h = UINT64_C(0xcbf29ce484222325);
+    for (size_t i = 0; i < bytes; i++) {
+        h = (h ^ (unsigned char)text[i]) * UINT64_C(0x100000001b3);
+    }
+    return h;
+}
+
+/* ------------------------------------------------------------------ writing */
+
+static void print_names(FILE *stream, const char *what, const bst_metric *list, int count) {
+    fputs(what, stream);
+    for (int i = 0; i < count; i++) {
+        fprintf(stream, " %s", list[i].name);
+    }
+    fputc('\n', stream);
+}
+
+static void print_numbers(FILE *stream, const double *values, int count) {
+    for (int i = 0; i < count; i++) {
+        if (isnan(values[i])) {
+            fputs(" nan", stream);
+        } else if (values[i] == floor(values[i]) && fabs(values[i]) < 1e15) {
+            fprintf(stream, " %.0f", values[i]);
+        } else {
+            fprintf(stream, " %.17g", values[i]);
+        }
+    }
+    fputc('\n', stream);
+}
+
+bst_status bst_shard_begin(bst_ctx *ctx, const bst_study *study, const bst_study_kind *kind,
+                           int64_t first, bst_shard_draft *out) {
+    *out = (bst_shard_draft){.first = first, .kind = kind};
+    out->stream = open_memstream(&out->text, &out->bytes);
+    if (!out->stream) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the rows of a shard");
+    }
+    fprintf(out->stream, "boresight shard 1\nstudy %s %s\n", study->digest, kind->name);
+    print_names(out->stream, "metrics", kind->metrics, kind->metric_count);
+    print_names(out->stream, "series", kind->series, kind->series_count);
+    return BST_OK;
+}
+
+void bst_shard_add(bst_shard_draft *d, const bst_study_result *result, double wall_s,
+                   const char *error) {
+    int64_t run = d->first + d->count++;
+    if (error) {
+        fprintf(d->stream, "F %" PRId64 " %.6f ", run, wall_s);
+        for (; *error; error++) {
+            fputc(*error == '\n' ? '\x1f' : *error, d->stream);
+        }
+        fputc('\n', d->stream);
+        return;
+    }
+    fprintf(d->stream, "R %" PRId64 " %.6f", run, wall_s);
+    print_numbers(d->stream, result->metrics, d->kind->metric_count);
+    for (int i = 0; i < result->rows; i++) {
+        fputc('S', d->stream);
+        print_numbers(d->stream, result->series + (size_t)i * (size_t)d->kind->series_count,
+                      d->kind->series_count);
+    }
+}
+
+void bst_shard_drop(bst_shard_draft *d) {
+    if (d->stream) {
+        fclose(d->stream);
+    }
+    free(d->text);
+    *d = (bst_shard_draft){.count = 0};
+}
+
+bst_status bst_shard_path(bst_ctx *ctx, const char *out, int64_t first, int64_t count, char *path,
+                          size_t bytes) {
+    int n = snprintf(path, bytes, "%s/shards/%09" PRId64 "-%09" PRId64 ".rows", out, first,
+                     first + count - 1);
+    return n > 0 && (size_t)n < bytes
+               ? BST_OK
+               : bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", out);
+}
+
+static bool write_all(int fd, const char *data, size_t bytes) {
+    while (bytes > 0) {
+        ssize_t n = write(fd, data, bytes);
+        if (n < 0 && errno != EINTR) {
+            return false;
+        }
+        if (n > 0) {
+            data += n;
+            bytes -= (size_t)n;
+        }
+    }
+    return true;
+}
+
+static void sync_folder(const char *out) {
+    char folder[4096];
+    snprintf(folder, sizeof folder, "%s/shards", out);
+    int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (fd >= 0) {
+        fsync(fd);
+        close(fd);
+    }
+}
+
+/* Gives a draft its name unless that is taken; file systems without hard links rename. */
+static bool take_name(const char *draft, const char *path) {
+    if (link(draft, path) == 0 || errno == EEXIST) {
+        unlink(draft);
+        return true;
+    }
+    if (errno == EPERM || errno == EOPNOTSUPP || errno == ENOSYS) {
+        return access(path, F_OK) == 0 ? unlink(draft) == 0 : rename(draft, path) == 0;
+    }
+    return false;
+}
+
+static bst_status write_file(bst_ctx *ctx, const bst_shard_draft *d, const char *out) {
+    char path[4096], draft[4200], host[65] = "";
+    BST_TRY(bst_shard_path(ctx, out, d->first, d->count, path, sizeof path));
+    gethostname(host, sizeof host - 1);
+    snprintf(draft, sizeof draft, "%s.tmp.%.40s.%ld", path, host, (long)getpid());
+    int fd = open(draft, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+    bool ok = fd >= 0 && write_all(fd, d->text, d->bytes) && fsync(fd) == 0;
+    int error = ok ? 0 : errno;
+    if (fd >= 0 && close(fd) != 0 && ok) {
+        ok = false;
+        error = errno;
+    }
+    if (ok && !take_name(draft, path)) {
+        ok = false;
+        error = errno;
+    }
+    if (!ok) {
+        unlink(draft);
+        return bst_fail(ctx, BST_ERR_IO, "%s: cannot be written: %s", path, strerror(error));
+    }
+    sync_folder(out);
+    return BST_OK;
+}
+
+bst_status bst_shard_publish(bst_ctx *ctx, bst_shard_draft *d, const char *out) {
+    bst_status status = BST_OK;
+    if (d->count > 0) {
+        fflush(d->stream);
+        fprintf(d->stream, "end %" PRId64 " %016" PRIx64 "\n", d->count,
+                checksum(d->text, d->bytes));
+        bool good = fflush(d->stream) == 0 && !ferror(d->stream);
+        status = good ? write_file(ctx, d, out)
+                      : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the rows of a shard");
+    }
+    bst_shard_drop(d);
+    return status;
+}
+
+/* ------------------------------------------------------------------ reading */
+
+static bst_status grow(bst_ctx *ctx, void **list, int64_t count, int64_t *room, size_t item) {
+    if (count < *room) {
+        return BST_OK;
+    }
+    int64_t wanted = 2 * *room > 64 ? 2 * *room : 64;
+    void *grown = realloc(*list, (size_t)wanted * item);
+    if (!grown) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the rows of runs");
+    }
+    *list = grown;
+    *room = wanted;
+    return BST_OK;
+}
+
+static bool read_numbers(char **at, int count, double *out) {
+    for (int i = 0; i < count; i++) {
+        char *end;
+        out[i] = strtod(*at, &end);
+        if (end == *at) {
+            return false;
+        }
+        *at = end;
+    }
+    return **at == '\0';
+}
+
+/* Equal as results are: bit by bit, NAN like NAN. */
+static bool same(const double *a, const double *b, int count) {
+    for (int i = 0; i < count; i++) {
+        if (a[i] != b[i] && !(isnan(a[i]) && isnan(b[i]))) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* One line of a file: rows of a run, of a run's series. */
+static bst_status take_line(bst_ctx *ctx, bst_results *r, char *line, int64_t *run, bool *skip,
+                            bool *good) {
+    int metrics = r->kind->metric_count, columns = r->kind->series_count;
+    double values[BST_STUDY_METRICS];
+    *good = false;
+    if (line[0] == 'S' && *run >= 0) {
+        if (!*skip) {
+            size_t bytes = (size_t)columns * sizeof *r->series;
+            if (r->series_rows == r->series_room) {
+                size_t room = 2 * r->series_room + 256;
+                double *grown = realloc(r->series, room * bytes);
+                if (!grown) {
+                    return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the rows of runs");
+                }
+                r->series = grown;
+                r->series_room = room;
+            }
+            char *at = line + 1;
+            *good = read_numbers(&at, columns, r->series + r->series_rows * (size_t)columns);
+            r->series_rows++;
+            r->parts[r->part_count - 1].rows++;
+        }
+        *good = *good || *skip;
+        return BST_OK;
+    }
+    if (line[0] != 'R' && line[0] != 'F') {
+        return BST_OK;
+    }
+    char *at, *end;
+    *run = strtoll(line + 1, &at, 10);
+    if (at == line + 1 || *run < 0 || *run >= r->study->runs) {
+        return BST_OK;
+    }
+    double wall_s = strtod(at, &end);
+    bool failed = line[0] == 'F';
+    *good = failed ? *end == ' ' : end != at && read_numbers(&end, metrics, values);
+    if (!*good) {
+        return BST_OK;
+    }
+    *skip = r->state[*run] != BST_ROW_MISSING;
+    if (*skip) {
+        r->doubled++;
+        r->differing += (r->state[*run] == BST_ROW_FAILED) != failed ||
+                        (!failed && !same(values, r->metrics + *run * metrics, metrics));
+        return BST_OK;
+    }
+    r->wall_s[*run] = wall_s;
+    r->state[*run] = failed ? BST_ROW_FAILED : BST_ROW_DONE;
+    r->done++;
+    r->failed += failed;
+    for (int m = 0; m < metrics; m++) {
+        r->metrics[*run * metrics + m] = failed ? NAN : values[m];
+    }
+    if (failed) {
+        BST_TRY(grow(ctx, (void **)&r->errors, r->error_count, &r->error_room, sizeof *r->errors));
+        for (char *c = end + 1; *c; c++) {
+            *c = *c == '\x1f' ? '\n' : *c;
+        }
+        r->errors[r->error_count++] = (bst_row_error){*run, strdup(end + 1)};
+    } else if (columns > 0) {
+        BST_TRY(grow(ctx, (void **)&r->parts, r->part_count, &r->part_room, sizeof *r->parts));
+        r->parts[r->part_count++] = (bst_series_part){*run, r->series_rows, 0};
+    }
+    return BST_OK;
+}
+
+static bst_status damaged(bst_ctx *ctx, const char *path) {
+    return bst_fail(ctx, BST_ERR_FORMAT, "%s: is damaged", path);
+}
+
+/* Cuts the line at *text off and goes on to the next; NULL at the end. */
+static char *next_line(char **text) {
+    char *line = *text, *end = line ? strchr(line, '\n') : NULL;
+    if (!end) {
+        return NULL;
+    }
+    *end = '\0';
+    *text = end + 1;
+    return line;
+}
+
+static bst_status take_text(bst_ctx *ctx, bst_results *r, const char *path, char *text,
+                            size_t bytes) {
+    char *last = text + bytes;
+    if (bytes < 32 || last[-1] != '\n') {
+        return damaged(ctx, path);
+    }
+    last--;
+    while (last > text && last[-1] != '\n') {
+        last--;
+    }
+    int64_t count = 0, seen = 0, run = -1;
+    uint64_t sum = 0;
+    if (sscanf(last, "end %" SCNd64 " %" SCNx64, &count, &sum) != 2 ||
+        sum != checksum(text, (size_t)(last - text))) {
+        return damaged(ctx, path);
+    }
+    *last = '\0';
+    char expected[80];
+    snprintf(expected, sizeof expected, "study %s %s", r->study->digest, r->kind->name);
+    char *line = next_line(&text);
+    if (!line || strcmp(line, "boresight shard 1") != 0) {
+        return damaged(ctx, path);
+    }
+    line = next_line(&text);
+    if (!line || strcmp(line, expected) != 0) {
+        return bst_fail(ctx, BST_ERR_STATE, "%s: belongs to another study", path);
+    }
+    bool skip = false, good = next_line(&text) && next_line(&text);
+    while (good && (line = next_line(&text))) {
+        seen += line[0] != 'S';
+        BST_TRY(take_line(ctx, r, line, &run, &skip, &good));
+    }
+    return good && seen == count ? BST_OK : damaged(ctx, path);
+}
+
+bst_status bst_results_load(bst_ctx *ctx, bst_results *r, const char *path) {
+    char *text;
+    size_t bytes;
+    BST_TRY(bst_file_read(ctx, path, MOST_BYTES, "the rows of a shard", &text, &bytes));
+    bst_status status = take_text(ctx, r, path, text, bytes);
+    free(text);
+    return status;
+}
+
+static int compare_names(const void *a, const void *b) {
+    return strcmp(*(char *const *)a, *(char *const *)b);
+}
+
+/* Loads one file by its name in the folder. */
+static bst_status load_name(bst_ctx *ctx, bst_results *r, const char *folder, const char *name,
+                            int64_t first, int64_t count, bool clean) {
+    int64_t from, to;
+    int end = 0;
+    char path[4600];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    if (strstr(name, ".rows.tmp.")) {
+        if (clean) {
+            unlink(path);
+        }
+        return BST_OK;
+    }
+    if (sscanf(name, "%" SCNd64 "-%" SCNd64 ".rows%n", &from, &to, &end) != 2 || !end ||
+        name[end] || from >= first + count || to < first) {
+        return BST_OK;
+    }
+    bst_ctx quiet = {0};
+    bst_status status = bst_results_load(&quiet, r, path);
+    if (status == BST_ERR_FORMAT && clean) {
+        bst_log(ctx, BST_LOG_WARNING, "%s; its runs are made again", quiet.message);
+        unlink(path);
+        return BST_OK;
+    }
+    return status == BST_OK || status == BST_ERR_FORMAT || status == BST_ERR_NOT_FOUND
+               ? BST_OK
+               : bst_fail(ctx, status, "%s", quiet.message);
+}
+
+bst_status bst_results_load_folder(bst_ctx *ctx, bst_results *r, const char *out, int64_t first,
+                                   int64_t count, bool clean) {
+    char folder[4096];
+    snprintf(folder, sizeof folder, "%s/shards", out);
+    DIR *dir = opendir(folder);
+    if (!dir) {
+        return errno == ENOENT ? BST_OK
+                               : bst_fail(ctx, BST_ERR_IO, "%s: %s", folder, strerror(errno));
+    }
+    char **names = NULL;
+    int64_t n = 0, room = 0;
+    bst_status status = BST_OK;
+    for (struct dirent *entry; status == BST_OK && (entry = readdir(dir));) {
+        if (!strstr(entry->d_name, ".rows")) {
+            continue;
+        }
+        status = grow(ctx, (void **)&names, n, &room, sizeof *names);
+        if (status == BST_OK && (names[n] = strdup(entry->d_name))) {
+            n++;
+        }
+    }
+    closedir(dir);
+    if (n > 1) {
+        qsort(names, (size_t)n, sizeof *names, compare_names);
+    }
+    for (int64_t i = 0; i < n; i++) {
+        if (status == BST_OK) {
+            status = load_name(ctx, r, folder, names[i], first, count, clean);
+        }
+        free(names[i]);
+    }
+    free(names);
+    return status;
+}

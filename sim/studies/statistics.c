@@ -1,0 +1,131 @@
+#include "sim/studies/statistics.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static int compare(const void *a, const void *b) {
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+double bst_quantile(const double *sorted, int64_t n, double q) {
+    if (n == 0) {
+        return NAN;
+    }
+    double at = q * (double)(n - 1);
+    int64_t i = (int64_t)floor(at);
+    if (i >= n - 1) {
+        return sorted[n - 1];
+    }
+    return sorted[i] + (at - (double)i) * (sorted[i + 1] - sorted[i]);
+}
+
+static void describe(const double *values, int64_t rows, int columns, int column, double *scratch,
+                     bst_statistics *s) {
+    double sum = 0.0, square = 0.0, first = NAN; /* equal values have themselves for a mean */
+    int64_t n = 0;
+    for (int64_t i = 0; i < rows; i++) {
+        double x = values[i * columns + column];
+        if (!isnan(x)) {
+            first = n == 0 ? x : first;
+            scratch[n++] = x;
+            sum += x - first;
+        }
+    }
+    *s = (bst_statistics){.count = n, .missing = rows - n, .low = NAN, .high = NAN};
+    s->mean = n > 0 ? first + sum / (double)n : NAN;
+    for (int64_t i = 0; i < n; i++) {
+        square += (scratch[i] - s->mean) * (scratch[i] - s->mean);
+    }
+    s->std = n > 1 ? sqrt(square / (double)(n - 1)) : NAN;
+    qsort(scratch, (size_t)n, sizeof *scratch, compare);
+    s->minimum = n > 0 ? scratch[0] : NAN;
+    s->maximum = n > 0 ? scratch[n - 1] : NAN;
+    s->p05 = bst_quantile(scratch, n, 0.05);
+    s->p25 = bst_quantile(scratch, n, 0.25);
+    s->median = bst_quantile(scratch, n, 0.5);
+    s->p75 = bst_quantile(scratch, n, 0.75);
+    s->p95 = bst_quantile(scratch, n, 0.95);
+}
+
+/* Means of one resample into means[columns]; NAN where none of its numbers was drawn. Values are
+ * taken from the column's mean, so that sums do not cancel. */
+static void resample(const double *centred, const uint8_t *there, int64_t rows, int columns,
+                     bst_rng_key key, uint64_t number, double *sums, int64_t *counts,
+                     double *means) {
+    memset(sums, 0, (size_t)columns * sizeof *sums);
+    memset(counts, 0, (size_t)columns * sizeof *counts);
+    bst_philox_words words = {{0, 0, 0, 0}};
+    for (int64_t i = 0; i < rows; i++) {
+        if (i % 4 == 0) {
+            words = bst_rng_words(key, number, (uint64_t)(i / 4));
+        }
+        /* rows are far below 2^32: the draw is even to rows / 2^32 */
+        int64_t row = (int64_t)(((uint64_t)words.w[i % 4] * (uint64_t)rows) >> 32);
+        const double *from = centred + row * columns;
+        const uint8_t *is = there + row * columns;
+        for (int c = 0; c < columns; c++) {
+            sums[c] += from[c];
+            counts[c] += is[c];
+        }
+    }
+    for (int c = 0; c < columns; c++) {
+        means[c] = counts[c] > 0 ? sums[c] / (double)counts[c] : NAN;
+    }
+}
+
+static void set_interval(double *means, int64_t n, bst_statistics *s) {
+    int64_t kept = 0;
+    for (int64_t i = 0; i < n; i++) {
+        if (!isnan(means[i])) {
+            means[kept++] = means[i];
+        }
+    }
+    qsort(means, (size_t)kept, sizeof *means, compare);
+    s->low = s->mean + bst_quantile(means, kept, 0.025);
+    s->high = s->mean + bst_quantile(means, kept, 0.975);
+}
+
+bst_status bst_statistics_of(bst_ctx *ctx, const double *values, int64_t rows, int columns,
+                             int64_t resamples, bst_rng_key key, bst_statistics *out) {
+    size_t cells = (size_t)rows * (size_t)columns, wide = (size_t)columns;
+    size_t most = (size_t)(rows > resamples ? rows : resamples);
+    double *centred = malloc(cells * sizeof *centred + 1), *sums = malloc(wide * sizeof *sums + 1);
+    double *means = malloc((size_t)resamples * wide * sizeof *means + 1);
+    double *scratch = malloc(most * sizeof *scratch + 1);
+    uint8_t *there = malloc(cells + 1);
+    int64_t *counts = malloc(wide * sizeof *counts + 1);
+    bst_status status = BST_OK;
+    if (!centred || !sums || !means || !scratch || !there || !counts) {
+        status = bst_fail(ctx, BST_ERR_MEMORY, "out of memory for statistics");
+        goto exit;
+    }
+    for (int c = 0; c < columns; c++) {
+        describe(values, rows, columns, c, scratch, &out[c]);
+    }
+    for (size_t i = 0; i < cells; i++) {
+        there[i] = (uint8_t)!isnan(values[i]);
+        centred[i] = there[i] ? values[i] - out[i % wide].mean : 0.0;
+    }
+    for (int64_t b = 0; b < resamples && rows > 1; b++) {
+        resample(centred, there, rows, columns, key, (uint64_t)b, sums, counts,
+                 means + (size_t)b * wide);
+    }
+    for (int c = 0; c < columns && rows > 1; c++) {
+        for (int64_t b = 0; b < resamples; b++) {
+            scratch[b] = means[(size_t)b * wide + (size_t)c];
+        }
+        if (out[c].count > 1) {
+            set_interval(scratch, resamples, &out[c]);
+        }
+    }
+exit:
+    free(centred);
+    free(sums);
+    free(means);
+    free(scratch);
+    free(there);
+    free(counts);
+    return status;
+}

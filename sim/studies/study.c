@@ -1,0 +1,436 @@
+#define _XOPEN_SOURCE 700 /* realpath */
+#include "sim/studies/study.h"
+
+#include <cjson/cJSON.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/core/version.h"
+#include "sim/studies/study_internal.h"
+
+static const double MOST_RUNS = 1e9;
+
+static bst_status read_raw_array(bst_ctx *ctx, const bst_study *study, const cJSON *node,
+                                 const char *where, const char *key, const char *allowed,
+                                 const cJSON **out) {
+    const cJSON *value = cJSON_GetObjectItemCaseSensitive(node, key);
+    char path[96];
+    *out = NULL;
+    if (value && !cJSON_IsArray(value)) {
+        snprintf(path, sizeof path, "%s/%s", where, key);
+        return bst_config_fail(ctx, study->file, path, value, "wrong type", allowed);
+    }
+    *out = cJSON_GetArraySize(value) > 0 ? value : NULL;
+    return BST_OK;
+}
+
+static bst_status check_pointer(bst_ctx *ctx, const bst_study *study, const char *where,
+                                const cJSON *value) {
+    const char *allowed =
+        "a JSON pointer into the scenario, such as \"/observers/0/sensors/0/camera/read_noise_e\"";
+    if (!cJSON_IsString(value)) {
+        return bst_config_fail(ctx, study->file, where, value, "wrong type", allowed);
+    }
+    const char *p = value->valuestring;
+    if (*p != '/' || strlen(p) == strspn(p, "/") || p[strlen(p) - 1] == '/') {
+        return bst_config_fail(ctx, study->file, where, value, "no JSON pointer", allowed);
+    }
+    if (strcmp(p, "/seed") == 0 || strcmp(p, "/run") == 0) {
+        return bst_config_fail(ctx, study->file, where, value, "set by the study itself",
+                               "other pointers; \"seed\" and \"replicates\" of the study");
+    }
+    return BST_OK;
+}
+
+/* A name for a column from the last parts of a pointer. */
+static void name_of_pointer(const char *pointer, int parts, char *out, size_t bytes) {
+    const char *from = pointer + strlen(pointer);
+    while (from > pointer && parts > 0) {
+        from--;
+        parts -= *from == '/';
+    }
+    from += *from == '/';
+    snprintf(out, bytes, "%s", from);
+}
+
+static bool is_word(const char *text) {
+    return *text &&
+           strspn(text, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_") ==
+               strlen(text);
+}
+
+static bool same_word(const char *a, const char *b) {
+    for (; *a && *b; a++, b++) {
+        int x = *a >= 'A' && *a <= 'Z' ? *a + 32 : *a, y = *b >= 'A' && *b <= 'Z' ? *b + 32 : *b;
+        if (x != y) {
+            return false;
+        }
+    }
+    return *a == *b;
+}
+
+static bool taken(const bst_study *study, const char *name) {
+    static const char *const own[] = {"run",    "setting", "replicate", "scenario",
+                                      "status", "error",   "seed",      "run_number"};
+    for (size_t i = 0; i < sizeof own / sizeof *own; i++) {
+        if (same_word(name, own[i])) {
+            return true;
+        }
+    }
+    for (int a = 0; a < study->axis_count; a++) {
+        if (same_word(name, study->axes[a].name)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static bst_status name_axis(bst_ctx *ctx, const bst_study *study, const char *given,
+                            const char *suffix, bst_study_axis *axis) {
+    char path[96];
+    if (*given) {
+        snprintf(path, sizeof path, "%s/name", axis->where);
+        if (!is_word(given) || taken(study, given)) {
+            return bst_fail(ctx, BST_ERR_CONFIG,
+                            "%s: %s: %s (found \"%.60s\"; allowed: letters, digits and "
+                            "underscores, each name once, not that of a column of every study)",
+                            study->file, path, is_word(given) ? "in use" : "no name of a column",
+                            given);
+        }
+        snprintf(axis->name, sizeof axis->name, "%s", given);
+        return BST_OK;
+    }
+    char name[256];
+    for (int parts = 1; parts <= 8; parts++) {
+        name_of_pointer(axis->path, parts, name, sizeof name);
+        for (char *c = name; *c; c++) {
+            *c = is_word((char[]){*c, '\0'}) ? *c : '_';
+        }
+        snprintf(axis->name, sizeof axis->name, "%.50s%s", name, suffix);
+        if (!taken(study, axis->name)) {
+            return BST_OK;
+        }
+    }
+    snprintf(axis->name, sizeof axis->name, "axis_%d", study->axis_count);
+    return BST_OK;
+}
+
+static bst_status begin_axis(bst_ctx *ctx, bst_study *study, const cJSON *node, const char *where,
+                             const char *given_name, const char *suffix, bst_study_axis **out) {
+    if (study->axis_count == BST_STUDY_AXES) {
+        return bst_fail(ctx, BST_ERR_CONFIG, "%s: more than %d axes and dispersions", study->file,
+                        BST_STUDY_AXES);
+    }
+    bst_study_axis *axis = &study->axes[study->axis_count];
+    char path[96];
+    snprintf(axis->where, sizeof axis->where, "%s", where);
+    snprintf(path, sizeof path, "%s/path", where);
+    const cJSON *pointer = cJSON_GetObjectItemCaseSensitive(node, "path");
+    BST_TRY(check_pointer(ctx, study, path, pointer));
+    axis->path = pointer->valuestring;
+    BST_TRY(
+        read_raw_array(ctx, study, node, where, "also", "an array of JSON pointers", &axis->also));
+    int i = 0;
+    for (const cJSON *item = axis->also ? axis->also->child : NULL; item; item = item->next) {
+        snprintf(path, sizeof path, "%s/also/%d", where, i++);
+        BST_TRY(check_pointer(ctx, study, path, item));
+    }
+    BST_TRY(read_raw_array(ctx, study, node, where, "values", "an array of values", &axis->values));
+    axis->value_count = cJSON_GetArraySize(axis->values);
+    BST_TRY(name_axis(ctx, study, given_name, suffix, axis));
+    study->axis_count++;
+    *out = axis;
+    return BST_OK;
+}
+
+static bst_status check_range(bst_ctx *ctx, const bst_study *study, const char *where, double from,
+                              double to, bool log, bool down) {
+    if (!(from < to) && !(down && from > to)) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "%s: %s: from %g to %g is no range (allowed: \"from\" less than \"to\"%s)",
+                        study->file, where, from, to, down ? ", or a list of \"values\"" : "");
+    }
+    if (log && !(from > 0.0 && to > 0.0)) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "%s: %s: from %g to %g has no logarithm (allowed: both above 0)",
+                        study->file, where, from, to);
+    }
+    return BST_OK;
+}
+
+static bst_status add_swept_axis(bst_ctx *ctx, bst_study *study, const cJSON *node,
+                                 const char *where, const bst_axis_config *config, bool counted) {
+    bst_study_axis *axis;
+    BST_TRY(begin_axis(ctx, study, node, where, config->name, "", &axis));
+    axis->axis = config;
+    bool range = config->from != config->to || config->count > 0;
+    if (axis->values ? range : !range) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "%s: %s: give either a list of \"values\" or a range, \"from\" and "
+                        "\"to\"%s",
+                        study->file, where, counted ? " with a \"count\"" : "");
+    }
+    if (axis->values) {
+        return BST_OK;
+    }
+    if (counted && config->count < 2) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "%s: %s/count: a range needs at least 2 values (found %" PRId64 ")",
+                        study->file, where, config->count);
+    }
+    if (!counted && config->count > 0) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "%s: %s/count: not for this design, which has \"points\" or \"levels\" of "
+                        "the sweep",
+                        study->file, where);
+    }
+    return check_range(ctx, study, where, config->from, config->to,
+                       config->spacing == BST_SPACING_LOG, true);
+}
+
+static bst_status add_factor(bst_ctx *ctx, bst_study *study, const bst_study_factor *factor) {
+    bst_study_factor *list =
+        realloc(study->factors, ((size_t)study->factor_count + 1) * sizeof *list);
+    if (!list) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the study");
+    }
+    study->factors = list;
+    list[study->factor_count++] = *factor;
+    return BST_OK;
+}
+
+static int64_t levels_of(const bst_study_axis *axis) {
+    return axis->values ? axis->value_count : axis->axis->count;
+}
+
+static bst_status add_sweep(bst_ctx *ctx, bst_study *study, const cJSON *node, int index) {
+    const bst_sweep_config *sweep = (const bst_sweep_config *)study->config.sweeps.items + index;
+    const cJSON *axes = cJSON_GetObjectItemCaseSensitive(node, "axes");
+    bool placed = sweep->design == BST_SWEEP_LATIN_HYPERCUBE || sweep->design == BST_SWEEP_MORRIS;
+    bst_study_factor factor = {
+        .design = sweep->design, .sweep = index, .first_axis = study->axis_count};
+    if (sweep->design == BST_SWEEP_LATIN_HYPERCUBE ? sweep->points < 2 : sweep->points > 0) {
+        return bst_fail(
+            ctx, BST_ERR_CONFIG, "%s: /sweeps/%d/points: %s (found %" PRId64 ")", study->file,
+            index,
+            sweep->points ? "only for a latin_hypercube" : "a latin_hypercube needs at least 2",
+            sweep->points);
+    }
+    for (int a = 0; a < sweep->axes.count; a++) {
+        char where[64];
+        snprintf(where, sizeof where, "/sweeps/%d/axes/%d", index, a);
+        BST_TRY(add_swept_axis(ctx, study, cJSON_GetArrayItem(axes, a), where,
+                               (const bst_axis_config *)sweep->axes.items + a, !placed));
+        const bst_study_axis *axis = &study->axes[study->axis_count - 1];
+        if (sweep->design == BST_SWEEP_GRID) {
+            factor.first_axis = study->axis_count - 1;
+            factor.axis_count = 1;
+            factor.levels = levels_of(axis);
+            BST_TRY(add_factor(ctx, study, &factor));
+        } else if (sweep->design == BST_SWEEP_LIST && a > 0 && levels_of(axis) != factor.levels) {
+            return bst_fail(ctx, BST_ERR_CONFIG,
+                            "%s: %s: the axes of a list go side by side: %" PRId64
+                            " values here, %" PRId64 " on the first",
+                            study->file, where, levels_of(axis), factor.levels);
+        } else if (sweep->design == BST_SWEEP_LIST) {
+            factor.levels = levels_of(axis);
+        } else if (sweep->design == BST_SWEEP_ONE_AT_A_TIME) {
+            factor.levels += levels_of(axis);
+        }
+    }
+    if (sweep->design == BST_SWEEP_GRID) {
+        return BST_OK;
+    }
+    factor.axis_count = sweep->axes.count;
+    factor.levels += sweep->design == BST_SWEEP_ONE_AT_A_TIME;
+    if (placed) {
+        BST_TRY(bst_study_place_points(ctx, study, sweep, &factor));
+    }
+    bst_status status = add_factor(ctx, study, &factor);
+    if (status != BST_OK) {
+        free(factor.unit);
+    }
+    return status;
+}
+
+/* Running sums of a table's weights, the last of them 1. */
+static bst_status read_weights(bst_ctx *ctx, const bst_study *study, const cJSON *node,
+                               bst_study_axis *axis) {
+    const cJSON *weights;
+    char path[96];
+    const char *allowed = "an array of numbers of 0 or more, one for each value, not all 0";
+    BST_TRY(read_raw_array(ctx, study, node, axis->where, "weights", allowed, &weights));
+    if (!weights) {
+        return BST_OK;
+    }
+    snprintf(path, sizeof path, "%s/weights", axis->where);
+    axis->cumulative = calloc((size_t)axis->value_count, sizeof *axis->cumulative);
+    if (!axis->cumulative) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the study");
+    }
+    double sum = 0.0;
+    int n = 0;
+    bool good = cJSON_GetArraySize(weights) == axis->value_count;
+    for (const cJSON *item = weights->child; item && good; item = item->next) {
+        good = cJSON_IsNumber(item) && item->valuedouble >= 0.0;
+        sum += good ? item->valuedouble : 0.0;
+        axis->cumulative[n++] = sum;
+    }
+    if (!good || !(sum > 0.0)) {
+        return bst_config_fail(ctx, study->file, path, weights, "no weights", allowed);
+    }
+    for (int i = 0; i < n; i++) {
+        axis->cumulative[i] /= sum;
+    }
+    return BST_OK;
+}
+
+static bst_status add_dispersion(bst_ctx *ctx, bst_study *study, const cJSON *node, int index) {
+    const bst_dispersion_config *c =
+        (const bst_dispersion_config *)study->config.dispersions.items + index;
+    static const char *const suffixes[] = {"", "_offset", "_factor"};
+    bst_study_axis *axis;
+    char where[64];
+    snprintf(where, sizeof where, "/dispersions/%d", index);
+    BST_TRY(begin_axis(ctx, study, node, where, c->name, suffixes[c->apply], &axis));
+    axis->dispersion = c;
+    for (int a = study->swept_count; a < study->axis_count - 1; a++) {
+        if (strcmp(study->axes[a].path, axis->path) == 0) {
+            return bst_fail(ctx, BST_ERR_CONFIG, "%s: %s/path: \"%s\" is dispersed by %s already",
+                            study->file, where, axis->path, study->axes[a].where);
+        }
+    }
+    bool table = c->distribution == BST_DISTRIBUTION_TABLE;
+    if (table != (axis->values != NULL)) {
+        return bst_fail(
+            ctx, BST_ERR_CONFIG, "%s: %s/values: %s", study->file, where,
+            table ? "missing: a table is drawn from them" : "only for the distribution \"table\"");
+    }
+    if (table) {
+        for (const cJSON *item = axis->values->child; item; item = item->next) {
+            if (c->apply != BST_APPLY_SET && !cJSON_IsNumber(item)) {
+                return bst_config_fail(ctx, study->file, where, item,
+                                       "cannot be added or multiplied", "numbers");
+            }
+        }
+        return read_weights(ctx, study, node, axis);
+    }
+    if (c->distribution == BST_DISTRIBUTION_NORMAL) {
+        return c->sigma > 0.0 ? BST_OK
+                              : bst_fail(ctx, BST_ERR_CONFIG,
+                                         "%s: %s/sigma: a normal distribution needs one above 0",
+                                         study->file, where);
+    }
+    return check_range(ctx, study, where, c->from, c->to,
+                       c->distribution == BST_DISTRIBUTION_LOG_UNIFORM, false);
+}
+
+static bst_status add_axes(bst_ctx *ctx, bst_study *study) {
+    const cJSON *root = bst_json_root(study->json);
+    const cJSON *sweeps = cJSON_GetObjectItemCaseSensitive(root, "sweeps");
+    const cJSON *dispersions = cJSON_GetObjectItemCaseSensitive(root, "dispersions");
+    study->axes = calloc(BST_STUDY_AXES, sizeof *study->axes);
+    if (!study->axes) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the study");
+    }
+    BST_TRY(add_factor(ctx, study, &(bst_study_factor){.design = -1, .levels = study->base_count}));
+    for (int i = 0; i < study->config.sweeps.count; i++) {
+        BST_TRY(add_sweep(ctx, study, cJSON_GetArrayItem(sweeps, i), i));
+    }
+    study->swept_count = study->axis_count;
+    for (int i = 0; i < study->config.dispersions.count; i++) {
+        BST_TRY(add_dispersion(ctx, study, cJSON_GetArrayItem(dispersions, i), i));
+    }
+    double runs = (double)study->config.replicates;
+    study->settings = 1;
+    for (int f = 0; f < study->factor_count; f++) {
+        runs *= (double)study->factors[f].levels;
+        if (runs > MOST_RUNS) {
+            return bst_fail(ctx, BST_ERR_CONFIG,
+                            "%s: the study has more than %.0f runs; take fewer values, points or "
+                            "replicates",
+                            study->file, MOST_RUNS);
+        }
+        study->settings *= study->factors[f].levels;
+    }
+    study->runs = study->settings * study->config.replicates;
+    return BST_OK;
+}
+
+/* 64-bit FNV-1a. */
+static uint64_t hash_text(uint64_t h, const char *text) {
+    for (; *text; text++) {
+        h = (h ^ (unsigned char)*text) * UINT64_C(0x100000001b3);
+    }
+    return (h ^ 0xffu) * UINT64_C(0x100000001b3);
+}
+
+/* All that rows follow from: not what is made of them, nor where files lie. */
+static bst_status set_digest(bst_ctx *ctx, bst_study *study) {
+    static const char *const without[] = {"scenarios", "metrics", "resamples", "keep", "name"};
+    uint64_t h = hash_text(UINT64_C(0xcbf29ce484222325), bst_version());
+    cJSON *echo = bst_study_echo(study);
+    for (size_t i = 0; echo && i < sizeof without / sizeof *without; i++) {
+        cJSON_DeleteItemFromObjectCaseSensitive(echo, without[i]);
+    }
+    char *text = echo ? cJSON_PrintUnformatted(echo) : NULL;
+    cJSON_Delete(echo);
+    if (!text) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the study");
+    }
+    h = hash_text(h, text);
+    free(text);
+    for (int i = 0; i < study->base_count; i++) {
+        h = hash_text(h, study->bases[i].text);
+    }
+    snprintf(study->digest, sizeof study->digest, "%016" PRIx64, h);
+    return BST_OK;
+}
+
+static bst_status open_study(bst_ctx *ctx, const char *file, bst_study *study) {
+    char *full = realpath(file, NULL);
+    snprintf(study->file, sizeof study->file, "%s", file);
+    BST_TRY(bst_json_load(ctx, file, &study->json));
+    BST_TRY(bst_config_read(ctx, study->json, bst_json_root(study->json), "", bst_study_table,
+                            &study->config));
+    bst_status status = bst_study_read_bases(ctx, study, full ? full : file);
+    free(full);
+    BST_TRY(status);
+    if (!is_word(study->config.name) && strpbrk(study->config.name, "/ \t")) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "%s: /name: \"%s\" is to be a folder's name: no blanks and no \"/\"", file,
+                        study->config.name);
+    }
+    BST_TRY(add_axes(ctx, study));
+    return set_digest(ctx, study);
+}
+
+bst_status bst_study_open(bst_ctx *ctx, const char *file, bst_study *out) {
+    memset(out, 0, sizeof *out);
+    bst_status status = open_study(ctx, file, out);
+    if (status != BST_OK) {
+        bst_study_close(out);
+    }
+    return status;
+}
+
+void bst_study_close(bst_study *study) {
+    for (int i = 0; i < study->base_count; i++) {
+        bst_json_free(study->bases[i].json);
+        free(study->bases[i].text);
+    }
+    free(study->bases);
+    for (int i = 0; study->axes && i < BST_STUDY_AXES; i++) {
+        free(study->axes[i].cumulative);
+    }
+    free(study->axes);
+    for (int i = 0; i < study->factor_count; i++) {
+        free(study->factors[i].unit);
+    }
+    free(study->factors);
+    bst_config_free(bst_study_table, &study->config);
+    bst_json_free(study->json);
+    memset(study, 0, sizeof *study);
+}

@@ -1,0 +1,99 @@
+/* A study: a file that says what is varied, expanded into runs. Every run is a function of the
+ * study and its index: which values it has follows by arithmetic and counter-based random numbers,
+ * so that nothing is listed anywhere and any run can be made again by itself. */
+#ifndef BST_STUDIES_STUDY_H
+#define BST_STUDIES_STUDY_H
+
+#include "sim/studies/study_config.h"
+
+struct cJSON;
+
+enum { BST_STUDY_AXES = 320, BST_STUDY_NAME_BYTES = 64 };
+
+/* What a run has on one axis. */
+typedef struct bst_study_value {
+    bool given; /* else the scenario's own value stays */
+    bool is_number;
+    double number;
+    const struct cJSON *json; /* what is no number; lent by the study */
+} bst_study_value;
+
+/* One thing that is varied: an axis of a sweep, or a dispersion. */
+typedef struct bst_study_axis {
+    char name[BST_STUDY_NAME_BYTES]; /* of its column: unique, letters, digits, underscores */
+    char where[64];                  /* "/sweeps/0/axes/1", for messages */
+    const char *path;
+    const struct cJSON *also;   /* pointers that get the same value; NULL: none */
+    const struct cJSON *values; /* NULL: a range */
+    int value_count;
+    const bst_axis_config *axis;             /* NULL: a dispersion */
+    const bst_dispersion_config *dispersion; /* NULL: an axis of a sweep */
+    double *cumulative; /* [value_count] of a table's weights; NULL: all alike */
+} bst_study_axis;
+
+/* Axes that vary together; the settings are all combinations of the factors' levels. */
+typedef struct bst_study_factor {
+    int design; /* bst_sweep_design; -1: the scenarios themselves */
+    int sweep;  /* index of its sweep */
+    int first_axis, axis_count;
+    int64_t levels;
+    double *unit; /* latin_hypercube, morris: [levels][axis_count] in 0..1 */
+    int steps;    /* morris: levels of each axis */
+} bst_study_factor;
+
+typedef struct bst_study_base {
+    char file[512]; /* full path */
+    char name[64];
+    bst_json *json; /* as read, "extends" and the study's "set" applied */
+    char *text;     /* the same, as JSON */
+} bst_study_base;
+
+typedef struct bst_study {
+    bst_study_config config;
+    char file[512];
+    bst_json *json;
+    bst_study_base *bases;
+    int base_count;
+    bst_study_axis *axes; /* of sweeps, then dispersions */
+    int axis_count, swept_count;
+    bst_study_factor *factors; /* the last one varies fastest */
+    int factor_count;
+    int64_t settings, runs;
+    char digest[20]; /* of all that results follow from */
+} bst_study;
+
+/* Where a run belongs. */
+typedef struct bst_study_place {
+    int64_t run, setting, replicate;
+    int base;
+    uint64_t run_number; /* the scenario's /run */
+} bst_study_place;
+
+/* Reads a study and the scenarios that it names. Errors name file, JSON path and what is allowed.
+ * Nothing is written. Free with bst_study_close, also after an error. */
+bst_status bst_study_open(bst_ctx *ctx, const char *file, bst_study *out) BST_MUST_CHECK;
+void bst_study_close(bst_study *study);
+
+/* Run `run`, 0 <= run < study->runs: runs of a setting are neighbours. */
+bst_study_place bst_study_place_of(const bst_study *study, int64_t run);
+/* Levels of a setting's factors, [factor_count]. */
+void bst_study_levels(const bst_study *study, int64_t setting, int64_t *levels);
+/* Values on the axes of sweeps, [swept_count], at these levels. */
+void bst_study_swept_values(const bst_study *study, const int64_t *levels, bst_study_value *out);
+/* Values on all axes, [axis_count]. Of dispersions: what was drawn, before it is applied. */
+void bst_study_values(const bst_study *study, const bst_study_place *place, bst_study_value *out);
+
+/* The run's documents: the scenario that it is, and the settings of its kind (an object that
+ * follows study->config's table of the kind; NULL of kind loop). The caller frees both. */
+bst_status bst_study_document(bst_ctx *ctx, const bst_study *study, const bst_study_place *place,
+                              const bst_study_value *values, bst_json **scenario,
+                              struct cJSON **settings) BST_MUST_CHECK;
+
+/* The study as JSON with every default written out and full paths; the caller deletes it. NULL when
+ * out of memory. */
+struct cJSON *bst_study_echo(const bst_study *study);
+
+/* JSON Schema (draft 2020-12) of studies; the caller deletes it. */
+struct cJSON *bst_study_schema(void);
+
+#endif

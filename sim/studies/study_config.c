@@ -1,0 +1,160 @@
+#include "sim/studies/study_config.h"
+
+static const char *const kinds[] = {"loop", "pd", "cubes", NULL};
+static const char *const keeps[] = {"summary", "tables", "run", NULL};
+static const char *const randoms[] = {"each", "common", NULL};
+static const char *const designs[] = {"grid",          "list",   "latin_hypercube",
+                                      "one_at_a_time", "morris", NULL};
+static const char *const spacings[] = {"linear", "log", NULL};
+static const char *const distributions[] = {"uniform", "log_uniform", "normal", "table", NULL};
+static const char *const applies[] = {"set", "add", "multiply", NULL};
+
+#define ALSO_DOC "JSON pointers that get the same value."
+#define PATH_DOC                                                                                  \
+    "What is varied: a JSON pointer into the scenario, such as "                                  \
+    "\"/observers/0/sensors/0/camera/read_noise_e\", or into the study's own block of its kind, " \
+    "such as \"/pd/streak_px\"."
+#define NAME_DOC                                                                                   \
+    "Name of its column in tables; \"\": the pointer's last part, with _offset or _factor behind " \
+    "it where that is what is drawn."
+#define RAW(key_, default_, doc_) \
+    { .key = key_, .type = BST_CONFIG_RAW, .unit = "", .fallback = default_, .doc = doc_ }
+
+static const bst_config_desc scenario_table[] = {
+    BST_STRING(bst_study_scenario, file, NULL,
+               "A scenario; a relative path starts from the study's folder."),
+    BST_STRING(bst_study_scenario, name, "\"\"",
+               "Its name in tables; \"\": that which the scenario has."),
+    BST_CONFIG_END};
+
+static const bst_config_desc axis_table[] = {
+    BST_STRING(bst_axis_config, path, NULL, PATH_DOC),
+    RAW("also", "[]", ALSO_DOC),
+    BST_STRING(bst_axis_config, name, "\"\"", NAME_DOC),
+    RAW("values", "[]",
+        "The values one by one, of any type; else they are taken from the range from .. to."),
+    BST_REAL(bst_axis_config, from, "", -1e300, 1e300, "0", "First value of a range."),
+    BST_REAL(bst_axis_config, to, "", -1e300, 1e300, "0", "Last value of a range."),
+    BST_INT(bst_axis_config, count, "", 0, 1e6, "0",
+            "Values of a range, both ends among them (grid, list, one_at_a_time)."),
+    BST_ENUM(bst_axis_config, spacing, spacings, "\"linear\"",
+             "How the values of a range are spread."),
+    BST_BOOL(bst_axis_config, integer, "false", "Round the values of a range to whole numbers."),
+    BST_CONFIG_END};
+
+static const bst_config_desc sweep_table[] = {
+    BST_ENUM(bst_sweep_config, design, designs, "\"grid\"",
+             "How the axes combine: every value of one with every value of the others (grid); side "
+             "by side (list); at random, each axis cut into as many slices as there are points and "
+             "each slice taken once (latin_hypercube); one axis after the other away from the "
+             "scenario's own values (one_at_a_time); along random paths of single steps, of which "
+             "elementary effects follow (morris). Sweeps combine as a grid."),
+    BST_INT(bst_sweep_config, points, "", 0, 1e6, "0", "Points of a latin_hypercube."),
+    BST_INT(bst_sweep_config, trajectories, "", 2, 1e5, "10", "Paths of a morris design."),
+    BST_INT(bst_sweep_config, levels, "", 2, 64, "4",
+            "Values that a morris design takes on each axis, an even number."),
+    BST_LIST(bst_sweep_config, axes, bst_axis_config, axis_table, 1, 64, NULL, "What is varied."),
+    BST_CONFIG_END};
+
+static const bst_config_desc dispersion_table[] = {
+    BST_STRING(bst_dispersion_config, path, NULL, PATH_DOC),
+    RAW("also", "[]", ALSO_DOC),
+    BST_STRING(bst_dispersion_config, name, "\"\"", NAME_DOC),
+    BST_ENUM(bst_dispersion_config, distribution, distributions, "\"uniform\"",
+             "What the numbers are drawn from: evenly or evenly in the logarithm between from and "
+             "to; a normal distribution; a table of values."),
+    BST_REAL(bst_dispersion_config, from, "", -1e300, 1e300, "0",
+             "Least value (uniform, log_uniform)."),
+    BST_REAL(bst_dispersion_config, to, "", -1e300, 1e300, "0",
+             "Greatest value (uniform, log_uniform)."),
+    BST_REAL(bst_dispersion_config, mean, "", -1e300, 1e300, "0", "Mean (normal)."),
+    BST_REAL(bst_dispersion_config, sigma, "", 0, 1e100, "0", "Standard deviation (normal)."),
+    BST_REAL(bst_dispersion_config, truncate_sigma, "", 0.1, 8, "4",
+             "Draws further than so many standard deviations from the mean are made again "
+             "(normal)."),
+    RAW("values", "[]", "What is drawn from, of any type (table)."),
+    RAW("weights", "[]",
+        "How often each value comes, relative to the others; []: all alike "
+        "(table)."),
+    BST_ENUM(bst_dispersion_config, apply, applies, "\"set\"",
+             "What becomes of the number that is drawn: it takes the place of the scenario's, is "
+             "added to it, or multiplies it."),
+    BST_BOOL(bst_dispersion_config, integer, "false", "Round the result to a whole number."),
+    BST_CONFIG_END};
+
+const bst_config_desc bst_study_pd_table[] = {
+    BST_STRING(bst_study_pd_config, sensor, "\"\"",
+               "OBSERVER/SENSOR whose camera and detector are measured; \"\": the first."),
+    BST_REAL(bst_study_pd_config, snr_first, "", 0.1, 1e4, "3", "SNR of the faintest targets."),
+    BST_REAL(bst_study_pd_config, snr_last, "", 0.1, 1e4, "9", "SNR of the brightest targets."),
+    BST_REAL(bst_study_pd_config, snr_step, "", 1e-3, 1e4, "0.5", "From one SNR to the next."),
+    BST_INT(bst_study_pd_config, trials, "", 1, 1e9, "1000", "Targets of each SNR."),
+    BST_INT(bst_study_pd_config, empty_frames, "", 0, 1e7, "0",
+            "Frames without targets; 0: for 400 false alarms, 50 to 400."),
+    BST_REAL(bst_study_pd_config, false_alarms_per_frame, "", 0, 1e4, "0",
+             "Asked of the detector; 0: as the scenario says."),
+    BST_REAL(bst_study_pd_config, background_e, "electrons", -1, 1e6, "-1",
+             "Sky per pixel and exposure; -1: the camera's."),
+    BST_REAL(bst_study_pd_config, jitter_px, "px", -1, 5, "-1",
+             "RMS per axis by which the image is blurred; -1: jitter_px of imgproc."),
+    BST_REAL(bst_study_pd_config, streak_px, "px", 0, 1000, "0",
+             "Length of the targets' streaks; 0: points."),
+    BST_REAL(bst_study_pd_config, star_streak_px, "px", 0, 1000, "0",
+             "By how much stars streak, the camera turning with the targets."),
+    BST_REAL(bst_study_pd_config, apart_px, "px", 1, 1000, "24",
+             "Least distance between targets, their own length not counted."),
+    BST_BOOL(bst_study_pd_config, known_rate, "false",
+             "The camera turns, and image processing is told."),
+    BST_BOOL(bst_study_pd_config, stars, "false", "Keep the scenario's stars and sky."),
+    BST_CONFIG_END};
+
+const bst_config_desc bst_study_cubes_table[] = {
+    BST_STRING(bst_study_cubes_config, sensor, "\"\"",
+               "OBSERVER/SENSOR whose frames are kept; \"\": the first."),
+    BST_REAL(bst_study_cubes_config, train, "", 0, 1e6, "80", "Share of scenes for training."),
+    BST_REAL(bst_study_cubes_config, validation, "", 0, 1e6, "10",
+             "Share of scenes for validation."),
+    BST_REAL(bst_study_cubes_config, test, "", 0, 1e6, "10", "Share of scenes for tests."),
+    BST_BOOL(bst_study_cubes_config, compress, "false", "Compress frames (Rice, lossless)."),
+    BST_BOOL(bst_study_cubes_config, segmentation, "false",
+             "Add the segmentation mask to each frame's file."),
+    BST_REAL(bst_study_cubes_config, box_px, "px", 0, 1e4, "0",
+             "Side of the boxes around objects; 0: the extent of their tracks."),
+    BST_REAL(bst_study_cubes_config, star_limit_v_mag, "mag", -30, 40, "40",
+             "Faintest V of the stars that are labelled."),
+    BST_CONFIG_END};
+
+const bst_config_desc bst_study_table[] = {
+    {.key = "boresight_study",
+     .type = BST_CONFIG_INT,
+     .unit = "",
+     .minimum = 1,
+     .maximum = 1,
+     .doc = "Version of the format of studies.",
+     BST_FIELD_(bst_study_config, format)},
+    BST_STRING(bst_study_config, name, NULL,
+               "Name of the study; its results go to studies/NAME unless --out says otherwise."),
+    BST_ENUM(bst_study_config, kind, kinds, "\"loop\"",
+             "What one run is: a simulation (loop), a curve of detection over SNR (pd), a labelled "
+             "sequence of frames (cubes)."),
+    BST_LIST(bst_study_config, scenarios, bst_study_scenario, scenario_table, 1, 1000, NULL,
+             "What is varied; of several each is taken in turn."),
+    RAW("set", "{}", "Values by JSON pointer that replace those of every scenario."),
+    BST_LIST(bst_study_config, sweeps, bst_sweep_config, sweep_table, 0, 64, "[]",
+             "Values that are gone through: each combination is a setting of the study."),
+    BST_LIST(bst_study_config, dispersions, bst_dispersion_config, dispersion_table, 0, 256, "[]",
+             "Numbers that are drawn anew for every run."),
+    BST_INT(bst_study_config, replicates, "", 1, 1e7, "1", "Runs of each setting."),
+    BST_SEED(bst_study_config, seed, "\"0x1\"",
+             "Master seed: of dispersions and designs, and of every run."),
+    BST_ENUM(bst_study_config, random, randoms, "\"each\"",
+             "Random numbers of the runs: their own for each, or common to the runs of the same "
+             "replicate in all settings, so that differences between settings show sooner."),
+    BST_ENUM(bst_study_config, keep, keeps, "\"summary\"",
+             "What is left of a run: its row in the tables; also its folder, without frames; also "
+             "its folder, as the scenario's record block says."),
+    RAW("metrics", "[]", "Names of the figures that are aggregated; []: all of the kind."),
+    BST_INT(bst_study_config, resamples, "", 100, 1e5, "500", "Resamples of a bootstrap interval."),
+    BST_OBJECT(bst_study_config, pd, bst_study_pd_table, "{}", "Of kind pd."),
+    BST_OBJECT(bst_study_config, cubes, bst_study_cubes_table, "{}", "Of kind cubes."),
+    BST_CONFIG_END};

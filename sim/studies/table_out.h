@@ -1,0 +1,41 @@
+/* Tables that are written to a database and a CSV file at once. */
+#ifndef BST_STUDIES_TABLE_OUT_H
+#define BST_STUDIES_TABLE_OUT_H
+
+#include "sim/io/draft_file.h"
+#include "sim/io/run_store.h"
+
+struct sqlite3;
+struct sqlite3_stmt;
+
+/* A new database "FOLDER/study.sqlite" and the CSV files beside it: all appear when it is finished,
+ * or none does. */
+typedef struct bst_tables_out {
+    struct sqlite3 *db;
+    char folder[2048], draft[2112];
+} bst_tables_out;
+
+typedef struct bst_table_out {
+    bst_tables_out *tables;
+    struct sqlite3_stmt *insert;
+    bst_draft csv;
+    bool with_csv;
+    int columns;
+    char name[80];
+} bst_table_out;
+
+bst_status bst_tables_begin(bst_ctx *ctx, const char *folder, bst_tables_out *out) BST_MUST_CHECK;
+/* With BST_OK: puts the database in its place. With another status, or when that fails: removes it.
+ */
+bst_status bst_tables_end(bst_ctx *ctx, bst_tables_out *tables, bst_status status) BST_MUST_CHECK;
+
+/* A table of `count` columns, and FOLDER/<name>.csv if `csv`; columns are noted in the table
+ * "columns", with unit and meaning. */
+bst_status bst_table_begin(bst_ctx *ctx, bst_tables_out *tables, const char *name, const char *doc,
+                           const bst_column *columns, int count, bool csv,
+                           bst_table_out *out) BST_MUST_CHECK;
+bst_status bst_table_row(bst_ctx *ctx, bst_table_out *table,
+                         const bst_value *values) BST_MUST_CHECK;
+bst_status bst_table_end(bst_ctx *ctx, bst_table_out *table, bst_status status) BST_MUST_CHECK;
+
+#endif

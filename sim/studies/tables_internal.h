@@ -1,0 +1,28 @@
+/* What the parts that write tables share. */
+#ifndef BST_STUDIES_TABLES_INTERNAL_H
+#define BST_STUDIES_TABLES_INTERNAL_H
+
+#include "sim/studies/results.h"
+#include "sim/studies/study_internal.h"
+#include "sim/studies/table_out.h"
+
+typedef struct bst_tables_job {
+    bst_results *results;
+    bst_tables_out *out;
+    int metrics[BST_STUDY_METRICS]; /* that are told, of the kind's */
+    int metric_count;
+    bst_column *columns; /* scratch for one table */
+    bst_value *row;
+    bst_study_value *values;
+    char **texts;
+} bst_tables_job;
+
+/* The column of an axis, and its value there: *text is to be freed after use. */
+bst_column bst_axis_column(const bst_study_axis *axis);
+bst_value bst_axis_value(const bst_study *study, int axis, const bst_study_value *value, int base,
+                         char **text);
+
+/* The kind's series, run by run, and over the runs of each setting. */
+bst_status bst_study_write_series(bst_ctx *ctx, const bst_tables_job *job) BST_MUST_CHECK;
+
+#endif

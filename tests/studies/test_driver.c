@@ -1,0 +1,154 @@
+/* The driver over the pool of this machine: whatever happens to workers, each run counts once. */
+#include "sim/studies/driver.h"
+#include "sim/studies/local_pool.h"
+#include "sim/studies/tables.h"
+#include "tests/studies/fake_kind.h"
+
+enum { RUNS = 200 };
+
+typedef struct fixture {
+    char folder[BST_TEST_PATH];
+    bst_ctx ctx;
+    bst_study study;
+    bst_results results;
+    bst_driver_outcome outcome;
+} fixture;
+
+static int set_up(void **state) {
+    fixture *f = calloc(1, sizeof *f);
+    char path[512];
+    fixture_folder(f->folder);
+    /* caches of kernels go there too */
+    assert_int_equal(setenv("XDG_CACHE_HOME", f->folder, 1), 0);
+    snprintf(path, sizeof path, "%s/shards", f->folder);
+    assert_int_equal(mkdir(path, 0777), 0);
+    bst_assert_ok(&f->ctx, fixture_open(&f->ctx, f->folder,
+                                        "\"replicates\": 50, \"sweeps\": [{\"axes\": [{\"path\": "
+                                        "\"/b/c\", \"values\": [1, 2, 3, 4]}]}], \"dispersions\": "
+                                        "[{\"path\": \"/a\", \"from\": 0, \"to\": 1}]",
+                                        &f->study));
+    assert_int_equal(f->study.runs, RUNS);
+    *state = f;
+    return 0;
+}
+
+static int tear_down(void **state) {
+    fixture *f = *state;
+    bst_results_free(&f->results);
+    bst_study_close(&f->study);
+    fixture_remove(f->folder);
+    free(f);
+    return 0;
+}
+
+static bst_status drive(fixture *f, int workers, int64_t shard_runs) {
+    bst_executor executor;
+    const bst_local_pool_options pool = {.study = &f->study,
+                                         .kind = &fake_kind,
+                                         .out = f->folder,
+                                         .workers = workers,
+                                         .lock_fd = -1,
+                                         .unpinned = true};
+    const bst_driver_options options = {.out = f->folder,
+                                        .kind = &fake_kind,
+                                        .shard_s = 1.0,
+                                        .shard_runs = shard_runs,
+                                        .parallel = workers};
+    bst_results_free(&f->results);
+    bst_assert_ok(&f->ctx, bst_results_create(&f->ctx, &f->study, &fake_kind, &f->results));
+    bst_assert_ok(&f->ctx, bst_results_load_folder(&f->ctx, &f->results, f->folder, 0, RUNS, true));
+    bst_assert_ok(&f->ctx, bst_local_pool_open(&f->ctx, &pool, &executor));
+    bst_status status = bst_driver_run(&f->ctx, &f->results, &executor, &options, &f->outcome);
+    executor.close(executor.self);
+    return status;
+}
+
+static void read_text(const fixture *f, const char *name, char *out, size_t bytes) {
+    char path[512];
+    snprintf(path, sizeof path, "%s/%s", f->folder, name);
+    FILE *file = fopen(path, "r");
+    assert_non_null(file);
+    size_t n = fread(out, 1, bytes - 1, file);
+    assert_in_range(n, 10, bytes - 2);
+    out[n] = '\0';
+    fclose(file);
+}
+
+static void forget_rows(const fixture *f) {
+    char command[600];
+    snprintf(command, sizeof command, "rm -f '%s'/shards/*", f->folder);
+    assert_int_equal(system(command), 0);
+}
+
+/* Any number of workers, any size of shards, workers that die: the same tables. */
+static void test_same_tables(void **state) {
+    fixture *f = *state;
+    enum { BYTES = 1 << 17 };
+    static const char *const names[] = {"runs.csv", "statistics.csv", "parts_statistics.csv"};
+    char *first[3], *now = malloc(BYTES);
+    fixture_write(f->folder, "own-33", "");
+    for (int pass = 0; pass < 3; pass++) {
+        forget_rows(f);
+        if (pass == 2) {
+            fixture_write(f->folder, "once-7", "");
+            fixture_write(f->folder, "once-150", "");
+        }
+        bst_assert_ok(&f->ctx, drive(f, pass == 0 ? 1 : 3, pass == 1 ? 17 : 0));
+        assert_int_equal(f->outcome.missing, 0);
+        assert_int_equal(f->outcome.failed, 1);
+        assert_int_equal(f->outcome.attempts_lost, pass == 2 ? 2 : 0);
+        bst_assert_ok(&f->ctx, bst_study_write_tables(&f->ctx, &f->results, f->folder));
+        for (int i = 0; i < 3; i++) {
+            char *text = pass == 0 ? (first[i] = malloc(BYTES)) : now;
+            read_text(f, names[i], text, BYTES);
+            assert_string_equal(text, first[i]);
+        }
+    }
+    assert_non_null(strstr(first[0], "33,0,33,33,0,failed,\"diverged\nat once\""));
+    for (int i = 0; i < 3; i++) {
+        free(first[i]);
+    }
+    free(now);
+}
+
+/* Who kills every worker is given up alone, and is done when it does so no more. */
+static void test_deadly_run(void **state) {
+    fixture *f = *state;
+    char path[512];
+    fixture_write(f->folder, "kill-41", "");
+    bst_assert_ok(&f->ctx, drive(f, 2, 100));
+    assert_int_equal(f->outcome.missing, 1);
+    assert_int_equal(f->results.state[41], BST_ROW_MISSING);
+    assert_int_equal(f->outcome.attempts_lost, BST_DRIVER_ATTEMPTS);
+    assert_non_null(strstr(f->outcome.why, "killed by signal 9"));
+    snprintf(path, sizeof path, "%s/kill-41", f->folder);
+    assert_int_equal(unlink(path), 0);
+    bst_assert_ok(&f->ctx, drive(f, 2, 100));
+    assert_int_equal(f->outcome.missing, 0);
+    assert_int_equal(f->results.doubled, 0);
+}
+
+/* Where nothing can be written all is given up at once, and done later. */
+static void test_no_room(void **state) {
+    fixture *f = *state;
+    char path[512], away[512];
+    snprintf(path, sizeof path, "%s/shards", f->folder);
+    snprintf(away, sizeof away, "%s/away", f->folder);
+    assert_int_equal(rename(path, away), 0);
+    bst_assert_ok(&f->ctx, drive(f, 2, 1));
+    assert_int_equal(f->outcome.missing, RUNS);
+    assert_in_range(f->outcome.attempts_lost, 1, 20);
+    assert_int_equal(rename(away, path), 0);
+    bst_assert_ok(&f->ctx, drive(f, 2, 10));
+    assert_int_equal(f->outcome.missing, 0);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_same_tables, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_deadly_run, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_no_room, set_up, tear_down),
+    };
+    signal(SIGPIPE, SIG_IGN);
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
