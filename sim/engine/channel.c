@@ -158,6 +158,9 @@ static bst_status publish(struct bst_step *step, int port_index) {
                                                           s->payload, step->tick, &ch->mark))) {
         return BST_OK;
     }
+    if (engine->islands) {
+        return bst_islands_message(step, ch, s->payload);
+    }
     return engine->overlap && !step->job
                ? bst_overlap_message(step->ctx, engine, ch, s->payload, step->tick)
                : bst_engine_heard(step->ctx, engine,
@@ -254,7 +257,8 @@ void bst_step_event(struct bst_step *step, const char *kind, const char *format,
     vsnprintf(text, sizeof text, format, args);
     va_end(args);
     bst_status status =
-        engine->overlap && !step->job
+        engine->islands ? bst_islands_event(step, kind, text)
+        : engine->overlap && !step->job
             ? bst_overlap_event(step->ctx, engine, step->tick, step->self->name, kind, text)
             : bst_engine_heard(step->ctx, engine,
                                engine->hooks.event(engine->hooks.user, step->tick, step->self->name,

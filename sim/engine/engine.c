@@ -39,6 +39,7 @@ void bst_engine_free(bst_engine *engine) {
         return;
     }
     bst_overlap_stop(engine);
+    bst_islands_stop(engine);
     /* what the channels own goes back to its makers before they are destroyed */
     for (int c = 0; c < engine->channel_count; c++) {
         channel *ch = &engine->channels[c];
@@ -54,7 +55,7 @@ void bst_engine_free(bst_engine *engine) {
     free(engine->readers);
     free(engine->releasable);
     free(engine->due);
-    free(engine->heap);
+    free(engine->heap.items);
     free(engine->place);
     for (int i = engine->instance_count - 1; i >= 0; i--) {
         instance *self = engine->instances[i];
@@ -162,7 +163,7 @@ bst_status bst_engine_load(bst_ctx *ctx, bst_engine *engine) {
     return bst_engine_make_schedule(ctx, engine);
 }
 
-static bst_status step_instance(bst_ctx *ctx, bst_engine *engine, int index, int64_t tick) {
+bst_status bst_engine_step(bst_ctx *ctx, bst_engine *engine, int index, int64_t tick) {
     instance *self = engine->instances[index];
     if (engine->overlap && self->apart) {
         return bst_overlap_step(ctx, engine, index, tick);
@@ -193,16 +194,16 @@ static bst_status run_until(bst_ctx *ctx, bst_engine *engine, int64_t until_tick
     double asked = bst_wall_seconds();
     int since_clock = 0;
     while (engine->instance_count > 0) {
-        int64_t tick = engine->due[engine->heap[0]];
+        int64_t tick = engine->due[engine->heap.items[0]];
         if (tick >= until_tick) {
             break;
         }
         engine->tick = tick;
         bool long_step = false;
-        while (engine->due[engine->heap[0]] <= tick) {
-            int index = engine->heap[0];
+        while (engine->due[engine->heap.items[0]] <= tick) {
+            int index = engine->heap.items[0];
             long_step |= engine->instances[index]->spec.period_ticks == 0;
-            BST_TRY(step_instance(ctx, engine, index, tick));
+            BST_TRY(bst_engine_step(ctx, engine, index, tick));
         }
         bst_engine_release_read(engine);
         /* reading the clock costs as much as a plant step: only now and then, or after a step that
@@ -248,7 +249,8 @@ bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) 
     if (!engine->loaded) {
         return bst_fail(ctx, BST_ERR_STATE, "the engine is not loaded");
     }
-    bst_status status = run_until(ctx, engine, until_tick);
+    bst_status status = engine->islands ? bst_islands_run(ctx, engine, until_tick)
+                                        : run_until(ctx, engine, until_tick);
     if (engine->overlap) {
         /* what failed behind the stepping thread came before what failed in it */
         bst_ctx before = *ctx;

@@ -61,11 +61,19 @@ typedef struct instance {
     int *triggers; /* ports whose messages make it step */
     int trigger_count;
     int64_t next_period, wake; /* INT64_MAX: none */
+    struct bst_heap *heap;     /* that it waits in */
+    int island, order;         /* islands.c: its number; place in the stepping order */
     int64_t steps;
     int64_t jobs, jobs_done; /* put aside and made behind the stepping thread */
     double own_rate_hz;      /* set by bst_env_set_rate */
     double rate_hz;
 } instance;
+
+/* schedule.c: instances that wait, the next to be stepped first. */
+typedef struct bst_heap {
+    int *items; /* [place] instance */
+    int count;
+} bst_heap;
 
 typedef struct counter {
     char name[48];
@@ -77,6 +85,8 @@ enum { MAX_COUNTERS = 64 };
 /* overlap.c: what one thread does behind the stepping one */
 typedef struct bst_overlap bst_overlap;
 typedef struct bst_overlap_job bst_overlap_job;
+/* islands.c: sensors stepped by several threads */
+typedef struct bst_islands bst_islands;
 
 struct bst_engine {
     int64_t tick_rate_hz;
@@ -88,16 +98,17 @@ struct bst_engine {
     int *releasable; /* channels whose payloads own something */
     int releasable_count;
     /* schedule.c: a heap of instances, the next to be stepped at its top */
-    int64_t *due; /* [instance] */
-    int *heap;    /* [place] instance */
-    int *place;   /* [instance] in the heap */
+    int64_t *due;  /* [instance] */
+    bst_heap heap; /* of all */
+    int *place;    /* [instance] in its heap */
     bst_engine_hooks hooks;
     int64_t tick;
     bool loaded;
     pthread_mutex_t counting;
     counter counters[MAX_COUNTERS]; /* by name */
     int counter_count;
-    bst_overlap *overlap; /* NULL: everything is done by the stepping thread */
+    bst_overlap *overlap; /* NULL: everything is done by the stepping thread... */
+    bst_islands *islands; /* ...unless sensors are stepped by several */
 };
 
 /* What a module's step sees. */
@@ -135,6 +146,19 @@ bst_status bst_engine_make_schedule(bst_ctx *ctx, bst_engine *engine) BST_MUST_C
 /* Earliest tick at which an instance wants to be stepped. */
 int64_t bst_engine_earliest(const bst_engine *engine, const instance *self);
 void bst_engine_set_due(bst_engine *engine, int instance, int64_t due);
+
+/* engine.c: one step of an instance, and what it publishes. */
+bst_status bst_engine_step(bst_ctx *ctx, bst_engine *engine, int index,
+                           int64_t tick) BST_MUST_CHECK;
+
+/* islands.c */
+void bst_islands_stop(bst_engine *engine);
+bst_status bst_islands_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) BST_MUST_CHECK;
+/* In a step, in place of the hooks. */
+bst_status bst_islands_message(struct bst_step *step, const channel *ch,
+                               const void *payload) BST_MUST_CHECK;
+bst_status bst_islands_event(struct bst_step *step, const char *kind,
+                             const char *text) BST_MUST_CHECK;
 
 /* apart.c: finds the instances that are apart and puts them last; before channels are allocated
  */

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "sim/device/device.h"
 #include "sim/engine/exposure_clock.h"
@@ -240,6 +241,17 @@ static void warn_of_misfits(bst_ctx *ctx, const bst_scenario *scenario) {
     }
 }
 
+/* Whether modules of different sensors share only what is constant or locked: no device, and no
+ * cells of statistical stars that are drawn when first looked at. */
+static bool may_part(const bst_scenario *scenario, const bst_simulation *sim) {
+    return !sim->device && scenario->world.faint_stars == BST_FAINT_NONE;
+}
+
+static int processors(int threads) {
+    long online = sysconf(_SC_NPROCESSORS_ONLN);
+    return threads > 0 ? threads : online > 1 ? (int)online : 1;
+}
+
 static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
                         const bst_simulation_options *options, bst_simulation *sim) {
     BST_TRY(bst_world_create(ctx, scenario->file, &scenario->world, &scenario->observers,
@@ -267,7 +279,11 @@ static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
     if (status == BST_OK) {
         status = bst_engine_load(ctx, sim->engine);
     }
-    if (status == BST_OK && options->overlap) {
+    bool parted = false;
+    if (status == BST_OK && options->overlap && may_part(scenario, sim)) {
+        status = bst_engine_part(ctx, sim->engine, processors(options->threads), &parted);
+    }
+    if (status == BST_OK && options->overlap && !parted) {
         status = bst_engine_overlap(ctx, sim->engine);
     }
     return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "%s", scenario->file);
