@@ -133,7 +133,20 @@ bst_status bst_control_observe(bst_ctx *ctx, bst_control *c, int64_t tick,
     }
     c->frame_tick = tracks->tick;
     c->target_id = tracks->target_id;
+    for (int i = 0; i < tracks->count; i++) {
+        c->newest_id = tracks->items[i].id > c->newest_id ? tracks->items[i].id : c->newest_id;
+    }
     return bst_control_take_frame(ctx, c, tick, tracks);
+}
+
+void bst_control_retarget(bst_control *c, int64_t tick, const bst_region *region) {
+    c->env.region = *region;
+    c->held = c->lost = (bst_control_held){.id = 0};
+    c->watch = (bst_control_watch){.jump_tick = tick};
+    c->gave_up = false;
+    c->rejected_id = c->newest_id;
+    c->search_in_region = false;
+    bst_control_enter(c, BST_MODE_IDLE, tick, "a new task");
 }
 
 /* Whether the servo has come to rest on the present aim, not on one that a command on its way will

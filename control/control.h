@@ -160,6 +160,7 @@ typedef struct bst_control {
     bool gave_up;
     int64_t target_id;                        /* 0: the tracker names none */
     int64_t rejected_id;                      /* candidates up to this one have been given up */
+    int64_t newest_id;                        /* greatest identity of a track so far */
     int64_t frame_tick, frame_interval_ticks; /* mid of the newest frame; shortest seen, 0: none */
     /* search, about the cue or about what is lost */
     bst_search search;
@@ -200,6 +201,11 @@ void bst_control_telemetry(bst_control *control, const bst_pointing_telemetry *p
  */
 bst_status bst_control_observe(bst_ctx *ctx, bst_control *control, int64_t tick,
                                const bst_tracks *tracks) BST_MUST_CHECK;
+
+/* The cue is another one from now on (env.cue_at and so on give it already), with this region, or
+ * none: what was held, searched or given up is forgotten, and the tracks so far are no candidates.
+ */
+void bst_control_retarget(bst_control *control, int64_t tick, const bst_region *region);
 
 /* Runs the mode logic at `tick` and fills the command and the status. *commanded is false (and
  * *command untouched) while there is nothing to aim at or no navigation telemetry yet. */

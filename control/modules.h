@@ -5,5 +5,6 @@
 #include "sim/core/module.h"
 
 extern const bst_module_desc bst_control_standard_module; /* role "control", type "standard" */
+extern const bst_module_desc bst_tasking_priority_module; /* role "tasking", type "priority" */
 
 #endif

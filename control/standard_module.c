@@ -8,6 +8,7 @@ enum {
     PORT_POINTING,
     PORT_NAV,
     PORT_MOUNT,
+    PORT_TASK,
     PORT_COMMAND,
     PORT_SENSOR,
     PORT_STATUS,
@@ -23,6 +24,9 @@ static const bst_port ports[PORT_COUNT] = {
     [PORT_MOUNT] = {.channel = BST_CHANNEL_MOUNT_STATUS,
                     .direction = BST_PORT_IN,
                     .flags = BST_PORT_OPTIONAL},
+    [PORT_TASK] = {.channel = BST_CHANNEL_TASK,
+                   .direction = BST_PORT_IN,
+                   .flags = BST_PORT_OPTIONAL | BST_PORT_FEEDBACK},
     [PORT_COMMAND] = {.channel = BST_CHANNEL_LOS_COMMAND, .direction = BST_PORT_OUT},
     [PORT_SENSOR] = {.channel = BST_CHANNEL_SENSOR_COMMAND, .direction = BST_PORT_OUT},
     [PORT_STATUS] = {.channel = BST_CHANNEL_CONTROL_STATUS, .direction = BST_PORT_OUT},
@@ -116,6 +120,11 @@ static bst_status step(void *self, struct bst_step *s) {
     bst_control_telemetry(c, bst_step_latest(s, PORT_POINTING).payload,
                           bst_step_latest(s, PORT_NAV).payload);
     bst_guidance_telemetry(&c->guidance, bst_step_latest(s, PORT_MOUNT).payload);
+    if (bst_knowledge_view_task(m->view, bst_step_latest(s, PORT_TASK).payload)) {
+        bst_region region;
+        bst_knowledge_view_region(m->view, &region);
+        bst_control_retarget(c, tick, &region);
+    }
     for (bst_sample next = bst_step_next(s, PORT_TRACKS); next.payload;
          next = bst_step_next(s, PORT_TRACKS)) {
         BST_TRY(bst_control_observe(ctx, c, tick, next.payload));

@@ -82,6 +82,17 @@ def table(node):
     return rows, below
 
 
+def write_modules(role, choices, path):
+    for choice in choices:
+        kind = choice["properties"]["type"]
+        delays = choice["properties"]["delay_s"]["properties"]
+        name = kind.get("const") or kind["enum"][0]
+        print(f"## Module `{role}` of type `{name}`\n\n{kind.get('description', '')}\n")
+        print("Inputs that `delay_s` may name: "
+              + (", ".join(f"`{d}`" for d in delays) or "none") + ".\n")
+        write(choice, path, 3)
+
+
 def write(node, path, level):
     rows, below = table(node)
     modules = [b for b in below if b[0] == "modules"]
@@ -97,14 +108,10 @@ def write(node, path, level):
         write(child, here, min(level + 1, 4))
     for key, _, child in modules:
         for role, choices in child["properties"].items():
-            for choice in choices["oneOf"]:
-                kind = choice["properties"]["type"]
-                delays = choice["properties"]["delay_s"]["properties"]
-                name = kind.get("const") or kind["enum"][0]
-                print(f"## Module `{role}` of type `{name}`\n\n{kind.get('description', '')}\n")
-                print("Inputs that `delay_s` may name: "
-                      + (", ".join(f"`{d}`" for d in delays) or "none") + ".\n")
-                write(choice, f"modules/{role}", 3)
+            write_modules(role, choices["oneOf"], f"modules/{role}")
+    for key, child in node.get("properties", {}).items():
+        if "oneOf" in child:
+            write_modules(key, child["oneOf"], f"{path}/{key}")
 
 
 def main():

@@ -6,12 +6,21 @@
 #include "tracker/photocentre.h"
 #include "tracker/tracker.h"
 
-enum { PORT_DETECTIONS, PORT_POINTING, PORT_NAV, PORT_TRACKS, PORT_PREDICTIONS, PORT_COUNT };
+enum {
+    PORT_DETECTIONS,
+    PORT_POINTING,
+    PORT_NAV,
+    PORT_TASK,
+    PORT_TRACKS,
+    PORT_PREDICTIONS,
+    PORT_COUNT
+};
 
 static const bst_port ports[PORT_COUNT] = {
     [PORT_DETECTIONS] = {BST_CHANNEL_DETECTIONS, BST_PORT_IN, BST_PORT_TRIGGER, 0.0, 0},
     [PORT_POINTING] = {BST_CHANNEL_POINTING_TELEMETRY, BST_PORT_IN, BST_PORT_OPTIONAL, 10.0, 0},
     [PORT_NAV] = {BST_CHANNEL_NAV_TELEMETRY, BST_PORT_IN, 0, 60.0, 0},
+    [PORT_TASK] = {BST_CHANNEL_TASK, BST_PORT_IN, BST_PORT_OPTIONAL | BST_PORT_FEEDBACK, 0.0, 0},
     [PORT_TRACKS] = {BST_CHANNEL_TRACKS, BST_PORT_OUT, 0, 0.0, 256},
     [PORT_PREDICTIONS] = {BST_CHANNEL_PREDICTIONS, BST_PORT_OUT, 0, 0.0, 256},
 };
@@ -156,6 +165,9 @@ static bst_status take(tracker_module *m, struct bst_step *step, const bst_detec
     }
     double seconds =
         0.5 * (double)(detections->start_tick + detections->end_tick) / m->tick_rate_hz;
+    if (bst_knowledge_view_task(m->view, bst_step_latest(step, PORT_TASK).payload)) {
+        bst_tracker_retarget(m->tracker);
+    }
     bst_cue cue;
     BST_TRY(bst_knowledge_cue_at(bst_step_ctx(step), m->view, seconds, &cue));
     input.cue = (bst_tracker_cue){.valid = cue.valid,

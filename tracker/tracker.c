@@ -499,3 +499,8 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
     t->last_tick = tick;
     return attitude.usable ? BST_TRACKER_USED : BST_TRACKER_NO_ATTITUDE;
 }
+
+void bst_tracker_retarget(bst_tracker *t) {
+    t->target = (bst_target){.id = 0};
+    t->cue_before.valid = false; /* what has changed since is not any track's motion */
+}

@@ -122,6 +122,9 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *tracker, const bst_tracker_inp
                                      bst_tracks *tracks, int track_capacity,
                                      bst_predictions *predictions, int prediction_capacity);
 
+/* The cue is another one from the next frame on: no track is the target before it fits that. */
+void bst_tracker_retarget(bst_tracker *tracker);
+
 /* Events of the latest frame that was used; lent until the next step. */
 const bst_tracker_event *bst_tracker_events(const bst_tracker *tracker, int *count);
 

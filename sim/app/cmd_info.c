@@ -277,6 +277,9 @@ static cJSON *gather(bst_run_reader *run) {
     if (get(bst_run_reader_manifest(run), "sensors")) {
         copy(out, "sensor_summaries", bst_run_reader_manifest(run), "sensors");
     }
+    if (get(bst_run_reader_manifest(run), "sightings")) {
+        copy(out, "sightings", bst_run_reader_manifest(run), "sightings");
+    }
     copy(out, "counters", bst_run_reader_manifest(run), "counters");
     add_sensors(run, out);
     add_tables(run, out);
@@ -411,6 +414,7 @@ static void print_text(const bst_run_reader *run, const cJSON *info, bool column
     cJSON_ArrayForEach(item, sensors) {
         print_figures(item->string, item);
     }
+    print_figures("sightings", get(info, "sightings"));
     print_tables(info, columns);
     print_figures("events", get(info, "events"));
     print_figures("counters", get(info, "counters"));

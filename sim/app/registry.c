@@ -24,6 +24,7 @@ static const bst_module_desc *const modules[] = {
     &bst_external_imgproc_module,
     &bst_external_tracker_module,
     &bst_external_control_module,
+    &bst_tasking_priority_module,
 };
 
 static const bst_registry registry = {modules, sizeof modules / sizeof *modules};

@@ -10,6 +10,8 @@
 #include "sim/app/json_number.h"
 #include "sim/app/run_pictures.h"
 #include "sim/app/run_scenario.h"
+#include "sim/app/run_sightings.h"
+#include "sim/app/run_space.h"
 #include "sim/app/run_watched.h"
 #include "sim/app/stop_signals.h"
 #include "sim/core/version.h"
@@ -30,6 +32,7 @@ typedef struct watched_sensor {
     bst_run_watched channels[WATCHED_CHANNELS];
     int channel_count;
     bst_loop_summary *summary;
+    int target;                 /* of its own cue, -1: none */
     bst_run_metrics *metrics;   /* NULL: not asked for */
     bst_run_pictures *pictures; /* of the first sensor of a run that is written; else NULL */
 } watched_sensor;
@@ -42,6 +45,7 @@ typedef struct run_state {
     bst_recorder *recorder;
     watched_sensor *sensors;
     int sensor_count;
+    bst_run_sightings *sightings; /* NULL: not asked for */
     bool progress;
     double started, shown; /* wall seconds */
 } run_state;
@@ -86,6 +90,9 @@ static bst_status judge(run_state *run, watched_sensor *sensor, const char *chan
         bst_run_metrics_detections(sensor->metrics, payload);
     } else if (strcmp(channel, BST_CHANNEL_CONTROL_STATUS) == 0) {
         bst_loop_summary_status(sensor->summary, payload);
+    } else if (strcmp(channel, BST_CHANNEL_TASK) == 0) {
+        int object = ((const bst_task *)payload)->object;
+        bst_loop_summary_retarget(sensor->summary, object >= 0 ? object : sensor->target);
     }
     return BST_OK;
 }
@@ -101,6 +108,8 @@ static bst_status on_message(void *user, const char *scope, const char *channel,
     if (sensor->pictures) {
         BST_TRY(bst_run_pictures_message(&run->hooks, sensor->pictures, channel, payload));
     }
+    BST_TRY(bst_run_sightings_message(&run->hooks, run->sightings, (int)(sensor - run->sensors),
+                                      channel, payload));
     pthread_mutex_lock(&run->summing);
     bst_status status = judge(run, sensor, channel, payload, tick);
     pthread_mutex_unlock(&run->summing);
@@ -257,6 +266,7 @@ static bst_status write_manifest(const run_state *run, bst_simulation *sim, cons
             cJSON_AddItemToObject(sensors, run->sensors[i].scope, summary_json(&figures, factor));
         }
     }
+    bst_run_sightings_add(run->sightings, root);
     bst_loop_summary_figures(run->sensors[0].summary, &figures);
     cJSON_AddItemToObject(root, "summary", summary_json(&figures, factor));
     bst_status status = bst_run_write_json(run->ctx, store, "manifest.json", root);
@@ -288,6 +298,7 @@ static void print_table(const run_state *run, bst_simulation *sim, const char *o
         print_row("pointing RMS", "%.3f", f.pointing_rms_px, "px");
         print_row("pointing 99th percentile", "%.3f", f.pointing_p99_px, "px");
     }
+    bst_run_sightings_print(run->sightings);
     print_row("wall time", "%.2f", wall, "s");
     print_row("speed", "%.1f", wall > 0.0 ? simulated / wall : NAN, "x real time");
     printf("  %-28s %s\n", "results", out);
@@ -311,6 +322,7 @@ static bst_status watch_sensors(run_state *run, const bst_world *world,
             snprintf(w->scope, sizeof w->scope, "%s/%s", observers[i].name, sensors[s].name);
             int target =
                 *sensors[s].cue.object ? bst_world_find_object(world, sensors[s].cue.object) : -1;
+            w->target = target;
             BST_TRY(bst_loop_summary_create(run->ctx, world, i, s, run->scenario->tick_rate_hz,
                                             target, &w->summary));
             run->sensor_count++;
@@ -383,6 +395,7 @@ static void free_run(run_state *run) {
         bst_run_pictures_free(run->sensors[i].pictures);
     }
     free(run->sensors);
+    bst_run_sightings_free(run->sightings);
     pthread_mutex_destroy(&run->summing);
 }
 
@@ -413,37 +426,6 @@ static bst_status write_ending(run_state *run, bst_simulation *sim, bst_run *sto
     return status == BST_OK ? written : status;
 }
 
-/* Warns when the disk does not look large enough for the frames. */
-static void warn_of_space(const run_state *run, const char *out) {
-    const bst_scenario *scenario = run->scenario;
-    const bst_observer_config *observers = scenario->observers.items;
-    const bst_record_config *record = &scenario->record;
-    /* Rice takes 8-bit noise to about half */
-    double bytes = 0.0, per_pixel = record->frames == BST_RECORD_NO_FRAMES ? 0.0
-                                    : record->compression                  ? 1.0
-                                                                           : 2.0;
-    for (uint32_t planes = record->planes; planes; planes &= planes - 1) {
-        per_pixel += planes == UINT32_C(1) << BST_PLANE_SATURATION ? 1.0 : 4.0;
-    }
-    for (int i = 0; i < scenario->observers.count; i++) {
-        const bst_sensor_config *sensors = observers[i].sensors.items;
-        for (int s = 0; s < observers[i].sensors.count; s++) {
-            const bst_exposure_config *e = &sensors[s].exposure;
-            double frames = floor((scenario->duration_s - e->first_s) / e->period_s);
-            bytes += fmax(frames, 0.0) * per_pixel * (double)sensors[s].camera.width_px *
-                     (double)sensors[s].camera.height_px;
-        }
-    }
-    double free_bytes = (double)bst_run_free_bytes(out);
-    if (free_bytes >= 0.0 && bytes > free_bytes) {
-        bst_log(run->ctx, BST_LOG_WARNING,
-                "%s: the frames will take about %.1f GB and %.1f GB are free there; shorten the "
-                "run (--duration), set /record/compression=rice or /record/frames=none, or choose "
-                "another output folder",
-                out, bytes * 1e-9, free_bytes * 1e-9);
-    }
-}
-
 /* Steps the simulation. */
 static bst_status step_through(run_state *run, bst_simulation *sim, double *wall) {
     bst_ctx *ctx = run->ctx;
@@ -467,7 +449,7 @@ static bst_status execute(run_state *run, bst_simulation *sim, const bst_run_req
                           double *wall) {
     bst_ctx *ctx = run->ctx;
     bst_run *store = NULL;
-    warn_of_space(run, request->out);
+    bst_run_warn_of_space(ctx, run->scenario, request->out);
     BST_TRY(bst_run_create(ctx, request->out, request->overwrite, &store));
     cJSON *echo = bst_scenario_echo(run->scenario);
     bst_status status = echo ? bst_run_write_json(ctx, store, "scenario.json", echo)
@@ -476,12 +458,25 @@ static bst_status execute(run_state *run, bst_simulation *sim, const bst_run_req
     if (status == BST_OK) {
         status = open_recorder(run, bst_simulation_world(sim), store);
     }
+    if (status == BST_OK) {
+        status = bst_run_sightings_create(ctx, bst_simulation_world(sim), &run->scenario->record,
+                                          run->scenario->tick_rate_hz, store, &run->sightings);
+    }
     bool stepped = status == BST_OK;
     if (stepped) {
         status = step_through(run, sim, wall);
     }
     /* closing must not hide why the run ended */
     bst_ctx closing = *ctx;
+    if (stepped && (status == BST_OK || status == BST_ERR_INTERRUPTED)) {
+        double end_s = (double)(bst_engine_tick(bst_simulation_engine(sim)) + 1) /
+                       (double)run->scenario->tick_rate_hz;
+        bst_status summed = bst_run_sightings_finish(&closing, run->sightings, end_s);
+        if (status == BST_OK && summed != BST_OK) {
+            *ctx = closing;
+            status = summed;
+        }
+    }
     bst_status closed = bst_recorder_close(&closing, run->recorder);
     run->recorder = NULL;
     if (status == BST_OK && closed != BST_OK) {

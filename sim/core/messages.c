@@ -50,6 +50,7 @@ static const bst_channel_type types[] = {
                count_predictions),
     WITH_ITEMS(BST_CHANNEL_TRACKS, BST_CHANNEL_QUEUE, bst_tracks, bst_track, count_tracks),
     HEADER_ONLY(BST_CHANNEL_CONTROL_STATUS, BST_CHANNEL_LATEST, bst_control_status),
+    HEADER_ONLY(BST_CHANNEL_TASK, BST_CHANNEL_LATEST, bst_task),
 };
 
 const bst_channel_type *bst_channel_type_find(const char *name) {
@@ -66,4 +67,9 @@ const char *bst_mode_name(int mode) {
                                                       "track", "reacquire", "stare",  "rate",
                                                       "coast", "fixed",     "scan"};
     return mode >= 0 && mode < BST_MODE_COUNT ? names[mode] : "unknown";
+}
+
+const char *bst_task_end_name(int end) {
+    static const char *const names[BST_TASK_END_COUNT] = {"none", "done", "not_found", "lost"};
+    return end >= 0 && end < BST_TASK_END_COUNT ? names[end] : "unknown";
 }

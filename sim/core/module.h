@@ -42,7 +42,23 @@ enum {
                                         shares with them only what is constant or locked, has no period
                                         and never asks to be woken */
     BST_MODULE_NEEDS_LINK = 1u << 3, /* gets env->link: another program plays it */
+    BST_MODULE_LINKS = 1u << 4,      /* one for all sensors of a scenario, which names it beside the
+                                        observers: its ports are there once for each sensor
+                                        (bst_member_port), and env->knowledge is NULL */
 };
+
+/* A sensor as a module sees it that links several. */
+typedef struct bst_fleet_member {
+    const char *scope;    /* "observer/sensor" */
+    int observer, sensor; /* indices in the world */
+    const struct bst_knowledge *knowledge;
+    double frame_exposure_s, frame_period_s, frame_latency_s; /* as in bst_module_env */
+} bst_fleet_member;
+
+/* The port of a module that links sensors: `port` of its descriptor for one of the members. */
+static inline int bst_member_port(int port_count, int member, int port) {
+    return member * port_count + port;
+}
 
 /* What create gets. Pointers outlive the module. */
 typedef struct bst_module_env {
@@ -66,6 +82,9 @@ typedef struct bst_module_env {
     double frame_latency_s; /* from an exposure's end until control has what it showed: the declared
                                delays in between */
     struct bst_link *link;  /* NULL unless the descriptor asks for it */
+    const bst_fleet_member *members; /* of a BST_MODULE_LINKS one: all sensors, in the order of the
+                                        scenario; else NULL */
+    int member_count;
 } bst_module_env;
 
 typedef struct bst_module_desc {

@@ -8,8 +8,8 @@ static bool may_be_apart(const bst_engine *engine, const instance *self) {
         self->trigger_count == 0) {
         return false;
     }
-    for (int p = 0; p < self->spec.desc->port_count; p++) {
-        const bst_port *port = &self->spec.desc->ports[p];
+    for (int p = 0; p < self->port_count; p++) {
+        const bst_port *port = bst_instance_port(self, p);
         const port_state *state = &self->ports[p];
         if (state->channel < 0) {
             continue;
@@ -35,7 +35,7 @@ static bool may_be_apart(const bst_engine *engine, const instance *self) {
 static bool awaited(const bst_engine *engine, int index) {
     for (int i = 0; i < engine->instance_count; i++) {
         const instance *other = engine->instances[i];
-        for (int p = 0; !other->apart && p < other->spec.desc->port_count; p++) {
+        for (int p = 0; !other->apart && p < other->port_count; p++) {
             int c = other->ports[p].channel;
             if (c >= 0 && engine->channels[c].writer == index) {
                 return true;

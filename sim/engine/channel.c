@@ -140,12 +140,13 @@ static bst_status publish(struct bst_step *step, int port_index) {
     s->owned = ch->type->release != NULL;
     ch->written++;
     ch->head = ch->head + 1 == ch->depth ? 0 : ch->head + 1;
-    step->writing &= ~(1u << port_index);
+    step->self->ports[port_index].writing = false;
+    step->writing--;
     for (int r = 0; ch->triggers && r < ch->reader_count; r++) {
         int index = ch->readers[r].instance, p = ch->readers[r].port;
         const instance *other = engine->instances[index];
         /* a step behind the stepping thread sees to its own readers */
-        if (!step->job && (other->spec.desc->ports[p].flags & BST_PORT_TRIGGER)) {
+        if (!step->job && (bst_instance_port(other, p)->flags & BST_PORT_TRIGGER)) {
             int64_t visible = step->tick + other->ports[p].delay_ticks;
             if (visible < engine->due[index]) {
                 bst_engine_set_due(engine, index, visible);
@@ -157,6 +158,9 @@ static bst_status publish(struct bst_step *step, int port_index) {
                                                           s->payload, step->tick, &ch->mark))) {
         return BST_OK;
     }
+    if (engine->islands) {
+        return bst_islands_message(step, ch, s->payload);
+    }
     return engine->overlap && !step->job
                ? bst_overlap_message(step->ctx, engine, ch, s->payload, step->tick)
                : bst_engine_heard(step->ctx, engine,
@@ -166,8 +170,8 @@ static bst_status publish(struct bst_step *step, int port_index) {
 
 bst_status bst_engine_commit(struct bst_step *step) {
     BST_TRY(step->hook_status);
-    for (int p = 0; step->writing; p++) {
-        if (step->writing & 1u << p) {
+    for (int p = 0; step->writing > 0; p++) {
+        if (step->self->ports[p].writing) {
             BST_TRY(publish(step, p));
         }
     }
@@ -175,9 +179,9 @@ bst_status bst_engine_commit(struct bst_step *step) {
 }
 
 void *bst_step_write(struct bst_step *step, int port_index, int *capacity) {
-    const port_state *port = &step->self->ports[port_index];
+    port_state *port = &step->self->ports[port_index];
     channel *ch = &step->engine->channels[port->channel];
-    if (step->writing & 1u << port_index) {
+    if (port->writing) {
         /* a second message in one step: the first goes out */
         bst_status status = publish(step, port_index);
         if (step->hook_status == BST_OK) {
@@ -189,7 +193,8 @@ void *bst_step_write(struct bst_step *step, int port_index, int *capacity) {
     if (ch->type->kind == BST_CHANNEL_LATEST && ch->depth > 1 && ch->written > 0) {
         memcpy(s->payload, bst_engine_slot(ch, ch->written - 1)->payload, ch->payload_bytes);
     }
-    step->writing |= 1u << port_index;
+    port->writing = true;
+    step->writing++;
     if (capacity) {
         *capacity = ch->capacity;
     }
@@ -220,7 +225,7 @@ void bst_engine_release_read(bst_engine *engine) {
         for (int r = 0; r < ch->reader_count; r++) {
             const instance *other = engine->instances[ch->readers[r].instance];
             int p = ch->readers[r].port;
-            if (other->spec.desc->ports[p].direction == BST_PORT_IN &&
+            if (bst_instance_port(other, p)->direction == BST_PORT_IN &&
                 other->ports[p].cursor < read_by_all) {
                 read_by_all = other->ports[p].cursor;
             }
@@ -252,7 +257,8 @@ void bst_step_event(struct bst_step *step, const char *kind, const char *format,
     vsnprintf(text, sizeof text, format, args);
     va_end(args);
     bst_status status =
-        engine->overlap && !step->job
+        engine->islands ? bst_islands_event(step, kind, text)
+        : engine->overlap && !step->job
             ? bst_overlap_event(step->ctx, engine, step->tick, step->self->name, kind, text)
             : bst_engine_heard(step->ctx, engine,
                                engine->hooks.event(engine->hooks.user, step->tick, step->self->name,

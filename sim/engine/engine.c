@@ -24,11 +24,22 @@ bst_status bst_engine_create(bst_ctx *ctx, int64_t tick_rate_hz, bst_engine **ou
     return BST_OK;
 }
 
+static void free_instance(instance *self) {
+    if (self) {
+        free(self->scope);
+        free(self->name);
+        free(self->ports);
+        free(self->triggers);
+        free(self);
+    }
+}
+
 void bst_engine_free(bst_engine *engine) {
     if (!engine) {
         return;
     }
     bst_overlap_stop(engine);
+    bst_islands_stop(engine);
     /* what the channels own goes back to its makers before they are destroyed */
     for (int c = 0; c < engine->channel_count; c++) {
         channel *ch = &engine->channels[c];
@@ -44,16 +55,14 @@ void bst_engine_free(bst_engine *engine) {
     free(engine->readers);
     free(engine->releasable);
     free(engine->due);
-    free(engine->heap);
+    free(engine->heap.items);
     free(engine->place);
     for (int i = engine->instance_count - 1; i >= 0; i--) {
         instance *self = engine->instances[i];
         if (self->created) {
             self->spec.desc->destroy(self->self);
         }
-        free(self->scope);
-        free(self->name);
-        free(self);
+        free_instance(self);
     }
     free(engine->instances);
     pthread_mutex_destroy(&engine->counting);
@@ -73,10 +82,6 @@ bst_status bst_engine_add(bst_ctx *ctx, bst_engine *engine, const bst_instance_s
                         "%s: module %s/%s was built for interface %u, this is %d", spec->instance,
                         spec->desc->role, spec->desc->type, spec->desc->abi, BST_MODULE_ABI);
     }
-    if (spec->desc->port_count > MAX_PORTS) {
-        return bst_fail(ctx, BST_ERR_CONFIG, "%s: %d ports (allowed: %d)", spec->instance,
-                        spec->desc->port_count, MAX_PORTS);
-    }
     if (engine->instance_count == engine->instance_capacity) {
         int capacity = engine->instance_capacity ? 2 * engine->instance_capacity : 16;
         instance **more = realloc(engine->instances, (size_t)capacity * sizeof *more);
@@ -90,13 +95,13 @@ bst_status bst_engine_add(bst_ctx *ctx, bst_engine *engine, const bst_instance_s
     if (self) {
         self->scope = strdup(spec->scope);
         self->name = strdup(spec->instance);
+        self->port_count =
+            spec->desc->port_count * (spec->member_count > 0 ? spec->member_count : 1);
+        self->ports = calloc((size_t)self->port_count + 1, sizeof *self->ports);
+        self->triggers = calloc((size_t)self->port_count + 1, sizeof *self->triggers);
     }
-    if (!self || !self->scope || !self->name) {
-        if (self) {
-            free(self->scope);
-            free(self->name);
-        }
-        free(self);
+    if (!self || !self->scope || !self->name || !self->ports || !self->triggers) {
+        free_instance(self);
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %s", spec->instance);
     }
     self->spec = *spec;
@@ -104,7 +109,7 @@ bst_status bst_engine_add(bst_ctx *ctx, bst_engine *engine, const bst_instance_s
     self->spec.instance = self->name;
     self->next_period = spec->period_ticks > 0 ? spec->offset_ticks : INT64_MAX;
     self->wake = INT64_MAX;
-    for (int p = 0; p < MAX_PORTS; p++) {
+    for (int p = 0; p < self->port_count; p++) {
         self->ports[p].channel = -1;
     }
     engine->instances[engine->instance_count++] = self;
@@ -139,6 +144,8 @@ bst_status bst_engine_load(bst_ctx *ctx, bst_engine *engine) {
                               .frame_latency_s = spec->frame_latency_s,
                               .los_period_ticks = spec->los_period_ticks,
                               .los_offset_ticks = spec->los_offset_ticks,
+                              .members = spec->members,
+                              .member_count = spec->member_count,
                               .planes = spec->planes,
                               .mask_threshold_sigma = spec->mask_threshold_sigma,
                               .engine_private = self};
@@ -157,7 +164,7 @@ bst_status bst_engine_load(bst_ctx *ctx, bst_engine *engine) {
     return bst_engine_make_schedule(ctx, engine);
 }
 
-static bst_status step_instance(bst_ctx *ctx, bst_engine *engine, int index, int64_t tick) {
+bst_status bst_engine_step(bst_ctx *ctx, bst_engine *engine, int index, int64_t tick) {
     instance *self = engine->instances[index];
     if (engine->overlap && self->apart) {
         return bst_overlap_step(ctx, engine, index, tick);
@@ -188,16 +195,16 @@ static bst_status run_until(bst_ctx *ctx, bst_engine *engine, int64_t until_tick
     double asked = bst_wall_seconds();
     int since_clock = 0;
     while (engine->instance_count > 0) {
-        int64_t tick = engine->due[engine->heap[0]];
+        int64_t tick = engine->due[engine->heap.items[0]];
         if (tick >= until_tick) {
             break;
         }
         engine->tick = tick;
         bool long_step = false;
-        while (engine->due[engine->heap[0]] <= tick) {
-            int index = engine->heap[0];
+        while (engine->due[engine->heap.items[0]] <= tick) {
+            int index = engine->heap.items[0];
             long_step |= engine->instances[index]->spec.period_ticks == 0;
-            BST_TRY(step_instance(ctx, engine, index, tick));
+            BST_TRY(bst_engine_step(ctx, engine, index, tick));
         }
         bst_engine_release_read(engine);
         /* reading the clock costs as much as a plant step: only now and then, or after a step that
@@ -243,7 +250,8 @@ bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) 
     if (!engine->loaded) {
         return bst_fail(ctx, BST_ERR_STATE, "the engine is not loaded");
     }
-    bst_status status = run_until(ctx, engine, until_tick);
+    bst_status status = engine->islands ? bst_islands_run(ctx, engine, until_tick)
+                                        : run_until(ctx, engine, until_tick);
     if (engine->overlap) {
         /* what failed behind the stepping thread came before what failed in it */
         bst_ctx before = *ctx;

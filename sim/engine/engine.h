@@ -8,7 +8,7 @@ typedef struct bst_engine bst_engine;
 
 /* Reading an input later than it was written. */
 typedef struct bst_input_delay {
-    int port; /* index into desc->ports */
+    int port; /* index into desc->ports; of one that links sensors, for each */
     int64_t ticks;
 } bst_input_delay;
 
@@ -33,7 +33,9 @@ typedef struct bst_instance_spec {
     double exposure_s; /* the longest of the sensor that the scenario sets */
     double frame_exposure_s, frame_period_s, frame_latency_s;
     int64_t los_period_ticks, los_offset_ticks; /* of its gimbal; 0: there is none with a period */
-    uint32_t planes;                            /* bit k: the bst_plane k is recorded */
+    const bst_fleet_member *members; /* of a module that links sensors; outlive the engine */
+    int member_count;                /* 0: it is one sensor's, and has its scope */
+    uint32_t planes;                 /* bit k: the bst_plane k is recorded */
     double mask_threshold_sigma;
     uint64_t seed, run;
 } bst_instance_spec;
@@ -80,6 +82,15 @@ bst_status bst_engine_load(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
  * copied, as many as a bounded memory holds; then stepping waits. Results do not depend on it.
  * After bst_engine_load. */
 bst_status bst_engine_overlap(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
+
+/* Has bst_engine_run step sensors, which share nothing but what BST_MODULE_LINKS modules link, by
+ * so many threads, while the calling one does the hooks `message` and `event` in the order of a run
+ * without. Then `wants` is called by several threads, one at a time for each scope. In place of
+ * bst_engine_overlap, after bst_engine_load. *parted false, and nothing changed: there is one
+ * sensor only or one thread, or messages own what threads would share (frames). Modules of
+ * different sensors may share only what is constant or locked. */
+bst_status bst_engine_part(bst_ctx *ctx, bst_engine *engine, int threads,
+                           bool *parted) BST_MUST_CHECK;
 
 /* Steps everything that is due before `until_tick` (exclusive). All of it is done on return. */
 bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) BST_MUST_CHECK;

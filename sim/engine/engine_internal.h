@@ -20,7 +20,7 @@ typedef struct channel_reader {
 /* A channel of one scope: a ring of slots that holds the last `depth` messages. */
 typedef struct channel {
     const bst_channel_type *type;
-    const char *scope; /* borrowed from an instance */
+    const char *scope; /* borrowed from an instance or a member */
     int writer;        /* instance */
     int writer_port;
     slot *slots;
@@ -38,8 +38,6 @@ typedef struct channel {
     bool triggers; /* one of them is stepped for its messages */
 } channel;
 
-enum { MAX_PORTS = 16 };
-
 /* What an instance needs to know about one of its ports. */
 typedef struct port_state {
     int channel; /* -1: optional and absent */
@@ -48,6 +46,7 @@ typedef struct port_state {
     int64_t cursor;         /* next sequence to read */
     int64_t trigger_cursor; /* next sequence to be stepped for */
     int capacity;
+    bool writing; /* its payload was handed out and not yet published */
 } port_state;
 
 typedef struct instance {
@@ -57,15 +56,24 @@ typedef struct instance {
     bool created;
     bool apart; /* no other instance waits for what it writes: steps last in a tick, and beside the
                    others when overlapping */
-    port_state ports[MAX_PORTS];
-    int triggers[MAX_PORTS]; /* ports whose messages make it step */
+    int port_count; /* the descriptor's; of one that links sensors, those for each */
+    port_state *ports;
+    int *triggers; /* ports whose messages make it step */
     int trigger_count;
     int64_t next_period, wake; /* INT64_MAX: none */
+    struct bst_heap *heap;     /* that it waits in */
+    int island, order;         /* islands.c: its number; place in the stepping order */
     int64_t steps;
     int64_t jobs, jobs_done; /* put aside and made behind the stepping thread */
     double own_rate_hz;      /* set by bst_env_set_rate */
     double rate_hz;
 } instance;
+
+/* schedule.c: instances that wait, the next to be stepped first. */
+typedef struct bst_heap {
+    int *items; /* [place] instance */
+    int count;
+} bst_heap;
 
 typedef struct counter {
     char name[48];
@@ -77,6 +85,8 @@ enum { MAX_COUNTERS = 64 };
 /* overlap.c: what one thread does behind the stepping one */
 typedef struct bst_overlap bst_overlap;
 typedef struct bst_overlap_job bst_overlap_job;
+/* islands.c: sensors stepped by several threads */
+typedef struct bst_islands bst_islands;
 
 struct bst_engine {
     int64_t tick_rate_hz;
@@ -88,16 +98,17 @@ struct bst_engine {
     int *releasable; /* channels whose payloads own something */
     int releasable_count;
     /* schedule.c: a heap of instances, the next to be stepped at its top */
-    int64_t *due; /* [instance] */
-    int *heap;    /* [place] instance */
-    int *place;   /* [instance] in the heap */
+    int64_t *due;  /* [instance] */
+    bst_heap heap; /* of all */
+    int *place;    /* [instance] in its heap */
     bst_engine_hooks hooks;
     int64_t tick;
     bool loaded;
     pthread_mutex_t counting;
     counter counters[MAX_COUNTERS]; /* by name */
     int counter_count;
-    bst_overlap *overlap; /* NULL: everything is done by the stepping thread */
+    bst_overlap *overlap; /* NULL: everything is done by the stepping thread... */
+    bst_islands *islands; /* ...unless sensors are stepped by several */
 };
 
 /* What a module's step sees. */
@@ -106,7 +117,7 @@ struct bst_step {
     instance *self;
     bst_ctx *ctx;
     int64_t tick;
-    unsigned writing; /* bit of each port whose payload was handed out and not yet published */
+    int writing;            /* ports whose payload was handed out and not yet published */
     bst_status hook_status; /* first failure of a hook during this step */
     bst_overlap_job *job;   /* inputs of a step behind the stepping thread, else NULL */
     bool ahead;             /* of that step, and none itself */
@@ -136,6 +147,19 @@ bst_status bst_engine_make_schedule(bst_ctx *ctx, bst_engine *engine) BST_MUST_C
 int64_t bst_engine_earliest(const bst_engine *engine, const instance *self);
 void bst_engine_set_due(bst_engine *engine, int instance, int64_t due);
 
+/* engine.c: one step of an instance, and what it publishes. */
+bst_status bst_engine_step(bst_ctx *ctx, bst_engine *engine, int index,
+                           int64_t tick) BST_MUST_CHECK;
+
+/* islands.c */
+void bst_islands_stop(bst_engine *engine);
+bst_status bst_islands_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) BST_MUST_CHECK;
+/* In a step, in place of the hooks. */
+bst_status bst_islands_message(struct bst_step *step, const channel *ch,
+                               const void *payload) BST_MUST_CHECK;
+bst_status bst_islands_event(struct bst_step *step, const char *kind,
+                             const char *text) BST_MUST_CHECK;
+
 /* apart.c: finds the instances that are apart and puts them last; before channels are allocated
  */
 void bst_engine_set_apart(bst_engine *engine);
@@ -157,6 +181,17 @@ bst_status bst_overlap_drain(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
 bst_sample bst_overlap_latest(struct bst_step *step, int port);
 bst_sample bst_overlap_next(struct bst_step *step, int port);
 int bst_overlap_lane(const bst_overlap_job *job);
+
+static inline const bst_port *bst_instance_port(const instance *self, int port) {
+    return &self->spec.desc->ports[port % self->spec.desc->port_count];
+}
+
+/* Where the channel of a port lives. */
+static inline const char *bst_instance_port_scope(const instance *self, int port) {
+    return self->spec.member_count > 0
+               ? self->spec.members[port / self->spec.desc->port_count].scope
+               : self->scope;
+}
 
 /* The slot of a message among the last `depth`, or of the next one (sequence == written). */
 static inline slot *bst_engine_slot(const channel *ch, int64_t sequence) {

@@ -214,9 +214,9 @@ static size_t put_aside(bst_engine *engine, int index, int64_t tick, char *to) {
     instance *self = engine->instances[index];
     size_t bytes = 0;
     bool due = false;
-    for (int p = 0; p < self->spec.desc->port_count; p++) {
+    for (int p = 0; p < self->port_count; p++) {
         port_state *port = &self->ports[p];
-        if (self->spec.desc->ports[p].direction != BST_PORT_IN || port->channel < 0 ||
+        if (bst_instance_port(self, p)->direction != BST_PORT_IN || port->channel < 0 ||
             engine->channels[port->channel].apart) {
             continue;
         }
@@ -534,7 +534,7 @@ bst_status bst_overlap_start(bst_ctx *ctx, bst_engine *engine) {
         most += RECORD_BYTES + 2 * (INPUT_BYTES + aligned(engine->channels[c].payload_bytes));
     }
     for (int i = 0; i < engine->instance_count; i++) {
-        for (int p = 0; p < engine->instances[i]->spec.desc->port_count; p++) {
+        for (int p = 0; p < engine->instances[i]->port_count; p++) {
             int c = engine->instances[i]->ports[p].channel;
             most += c >= 0 ? INPUT_BYTES + aligned(engine->channels[c].payload_bytes) : 0;
         }

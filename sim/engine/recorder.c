@@ -10,6 +10,8 @@
 
 static const char *const frame_choices[] = {"extensions", "cube", "none", NULL};
 
+static const char *const detection_choices[] = {"all", "objects", NULL};
+
 static const char *const compression_choices[] = {"none", "rice", NULL};
 
 /* in the order of bst_plane; also the names of their files */
@@ -40,10 +42,17 @@ const bst_config_desc bst_record_config_table[] = {
     BST_BOOL(bst_record_config, truth, "true", "True exposures and sources."),
     BST_BOOL(bst_record_config, truth_stars, "true", "Stars among the true sources."),
     BST_BOOL(bst_record_config, detections, "true", "What image processing found."),
+    BST_ENUM(bst_record_config, detections_of, detection_choices, "\"all\"",
+             "Which of the detections: all, or those labelled as objects."),
     BST_BOOL(bst_record_config, detection_stars, "true", "Detections labelled star."),
     BST_BOOL(bst_record_config, tracks, "true", "Tracks and the attitude from stars."),
     BST_BOOL(bst_record_config, commands, "true", "Commands to gimbal and sensor."),
-    BST_BOOL(bst_record_config, events, "true", "Events."),
+    BST_BOOL(bst_record_config, events, "true", "Events, and tasks where sensors are given any."),
+    BST_BOOL(
+        bst_record_config, sightings, "true",
+        "Who saw what: the objects' passes through the fields, and their sums, against truth."),
+    BST_REAL(bst_record_config, custody_s, "s", 0, 1e9, "21600",
+             "sightings: an object counts as in custody for this long after each detection."),
     BST_REAL(bst_record_config, telemetry_hz, "Hz", 0.0, 1e6, "1",
              "Rate at which telemetry, control status and the true line of sight are kept; 0: "
              "not at all."),
@@ -88,6 +97,7 @@ static const channel_rows channels[] = {
     {BST_CHANNEL_MOUNT_STATUS, BST_TABLE_MOUNT, bst_recorder_mount_rows},
     {BST_CHANNEL_NAV_TELEMETRY, BST_TABLE_NAV, bst_recorder_nav_rows},
     {BST_CHANNEL_CONTROL_STATUS, BST_TABLE_CONTROL, bst_recorder_control_rows},
+    {BST_CHANNEL_TASK, BST_TABLE_TASKS, bst_recorder_task_rows},
 };
 
 static const channel_rows *find_channel(const bst_recorder *recorder, const char *channel) {

@@ -14,6 +14,11 @@ typedef enum bst_record_frames {
     BST_RECORD_NO_FRAMES,
 } bst_record_frames;
 
+typedef enum bst_record_detections {
+    BST_RECORD_ALL_DETECTIONS,
+    BST_RECORD_OBJECTS, /* those labelled so */
+} bst_record_detections;
+
 /* The scenario's "record" block. */
 typedef struct bst_record_config {
     int32_t frames;      /* bst_record_frames */
@@ -24,10 +29,13 @@ typedef struct bst_record_config {
     bool truth;
     bool truth_stars;
     bool detections;
+    int32_t detections_of; /* bst_record_detections */
     bool detection_stars;
     bool tracks;
     bool commands;
     bool events;
+    bool sightings; /* by the caller, who judges */
+    double custody_s;
     double telemetry_hz;
 } bst_record_config;
 

@@ -25,6 +25,7 @@ typedef enum bst_record_table {
     BST_TABLE_NAV,
     BST_TABLE_CONTROL,
     BST_TABLE_EVENTS,
+    BST_TABLE_TASKS,
     BST_TABLE_COUNT
 } bst_record_table;
 
@@ -96,5 +97,6 @@ BST_RECORDER_ROWS(bst_recorder_pointing_rows);
 BST_RECORDER_ROWS(bst_recorder_mount_rows);
 BST_RECORDER_ROWS(bst_recorder_nav_rows);
 BST_RECORDER_ROWS(bst_recorder_control_rows);
+BST_RECORDER_ROWS(bst_recorder_task_rows);
 
 #endif

@@ -286,7 +286,9 @@ bst_status bst_recorder_detection_rows(bst_ctx *ctx, bst_recorder *recorder, int
     BST_TRY(append(ctx, recorder, BST_TABLE_DETECTION_FRAMES, &head));
     for (int i = 0; i < d->count; i++) {
         const bst_detection *item = &d->items[i];
-        if (item->label == BST_LABEL_STAR && !recorder->config.detection_stars) {
+        if ((item->label == BST_LABEL_STAR && !recorder->config.detection_stars) ||
+            (item->label != BST_LABEL_OBJECT &&
+             recorder->config.detections_of == BST_RECORD_OBJECTS)) {
             continue;
         }
         row r = {.count = 0};

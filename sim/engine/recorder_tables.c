@@ -311,6 +311,19 @@ static const bst_column event_columns[] = {
     TEXT("text", "what happened"),
 };
 
+static const bst_column task_columns[] = {
+    SENSOR,
+    INT("tick", "tick", "when it was given"),
+    TIME,
+    INT("task_id", "", "by sensor"),
+    INT("object", "", "index in the scenario: id in truth; -1: the sensor's own cue"),
+    TEXT("name", "name of the object"),
+    INT("norad", "", "catalogue number, 0: none"),
+    REAL("v_mag", "mag", "expected brightness"),
+    REAL("snr", "", "expected signal to noise of a frame"),
+    TEXT("before", "how the task before ended: none, done, not_found or lost"),
+};
+
 typedef struct table_spec {
     const char *name, *doc;
     const bst_column *columns;
@@ -346,6 +359,7 @@ static const table_spec specs[BST_TABLE_COUNT] = {
     [BST_TABLE_CONTROL] =
         SPEC("control", control_columns, "Control, at the telemetry's rate and at each change."),
     [BST_TABLE_EVENTS] = SPEC("events", event_columns, "Events."),
+    [BST_TABLE_TASKS] = SPEC("tasks", task_columns, "What the sensors were given to look for."),
 };
 
 static bool wanted(const bst_record_config *config, bst_record_table table) {
@@ -371,6 +385,7 @@ static bool wanted(const bst_record_config *config, bst_record_table table) {
         case BST_TABLE_CONTROL:
             return config->telemetry_hz > 0.0;
         case BST_TABLE_EVENTS:
+        case BST_TABLE_TASKS:
             return config->events;
         default:
             return true;

@@ -42,6 +42,10 @@ const bst_config_desc bst_scenario_table[] = {
     BST_OBJECT(bst_scenario, world, bst_world_config_table, "{}", "What is out there."),
     BST_LIST(bst_scenario, observers, bst_observer_config, bst_observer_config_table, 1, 1000, NULL,
              "The spacecraft that look."),
+    {.key = "tasking",
+     .type = BST_CONFIG_RAW,
+     .doc = "The module that gives the sensors their targets: {\"type\": ...}; left out: each has "
+            "its cue alone."},
     BST_OBJECT(bst_scenario, record, bst_record_config_table, "{}",
                "What is written to the run's folder."),
     BST_OBJECT(bst_scenario, link, bst_link_config_table, "{}",
@@ -106,8 +110,8 @@ static void list_names(const bst_registry *registry, const char *role, char *buf
         if (role && strcmp(m->role, role) != 0) {
             continue;
         }
-        if (!role && find_module(registry, m->role, NULL) != m) {
-            continue; /* a role is listed once */
+        if (!role && (m->flags & BST_MODULE_LINKS || find_module(registry, m->role, NULL) != m)) {
+            continue; /* a role is listed once, and those that link sensors are not theirs */
         }
         size_t used = strlen(buffer);
         snprintf(buffer + used, bytes - used, "%s\"%s\"", used ? ", " : "",
@@ -253,7 +257,9 @@ static bst_status read_module(bst_ctx *ctx, const bst_json *json, const bst_regi
                               bst_module_config *module) {
     char names[400];
     snprintf(module->name, sizeof module->name, "%s", node->string);
-    if (!find_module(registry, node->string, NULL)) {
+    bool fleet = module->observer < 0;
+    const bst_module_desc *any = find_module(registry, node->string, NULL);
+    if (!any || (any->flags & BST_MODULE_LINKS) != (fleet ? BST_MODULE_LINKS : 0)) {
         list_names(registry, NULL, names, sizeof names);
         return bst_fail(ctx, BST_ERR_CONFIG, "%s: %s: no module of this name (allowed: %s)",
                         scenario->file, path, names);
@@ -322,7 +328,8 @@ static bst_status read_modules(bst_ctx *ctx, const bst_json *json, const bst_reg
                                bst_scenario *out) {
     const cJSON *root = bst_json_root(json);
     const bst_observer_config *observers = out->observers.items;
-    int total = 0;
+    const cJSON *tasking = cJSON_GetObjectItemCaseSensitive(root, "tasking");
+    int total = tasking != NULL;
     for (int pass = 0; pass < 2; pass++) {
         for (int i = 0; i < out->observers.count; i++) {
             for (int s = 0; s < observers[i].sensors.count; s++) {
@@ -353,6 +360,11 @@ static bst_status read_modules(bst_ctx *ctx, const bst_json *json, const bst_reg
                 return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d modules", total);
             }
         }
+    }
+    if (tasking) {
+        bst_module_config *module = &out->modules[out->module_count++];
+        module->observer = module->sensor = -1;
+        BST_TRY(read_module(ctx, json, registry, out, tasking, "/tasking", module));
     }
     return BST_OK;
 }
@@ -560,9 +572,12 @@ cJSON *bst_scenario_schema(const bst_registry *registry) {
     cJSON *roles = cJSON_AddObjectToObject(node, "properties");
     for (int i = 0; i < registry->count; i++) {
         const bst_module_desc *m = registry->modules[i];
-        cJSON *role = cJSON_GetObjectItemCaseSensitive(roles, m->role);
+        cJSON *into = m->flags & BST_MODULE_LINKS ? properties : roles;
+        cJSON *role = cJSON_GetObjectItemCaseSensitive(into, m->role);
         if (!role) {
-            role = cJSON_AddObjectToObject(roles, m->role);
+            role = cJSON_AddObjectToObject(into, m->role);
+        }
+        if (!cJSON_GetObjectItemCaseSensitive(role, "oneOf")) {
             cJSON_AddArrayToObject(role, "oneOf");
         }
         cJSON_AddItemToArray(cJSON_GetObjectItemCaseSensitive(role, "oneOf"), module_schema(m));

@@ -13,10 +13,10 @@ typedef struct bst_registry {
     int count;
 } bst_registry;
 
-/* One entry of a sensor's "modules" block. */
+/* One entry of a sensor's "modules" block, or "tasking". */
 typedef struct bst_module_config {
-    int observer, sensor;
-    char name[64]; /* key in the block; equals the role of the built-in modules */
+    int observer, sensor; /* -1: it links those of the scenario */
+    char name[64];        /* key in the block; equals the role of the built-in modules */
     const bst_module_desc *desc;
     void *config;   /* desc->config_bytes, filled */
     double rate_hz; /* 0: triggers only */

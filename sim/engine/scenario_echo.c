@@ -35,6 +35,10 @@ cJSON *bst_scenario_echo(const bst_scenario *s) {
     cJSON *root = bst_config_echo(bst_scenario_table, s);
     for (int i = 0; root && i < s->module_count; i++) {
         const bst_module_config *module = &s->modules[i];
+        if (module->observer < 0) {
+            cJSON_AddItemToObject(root, module->name, echo_module(s, module));
+            continue;
+        }
         cJSON *sensor = cJSON_GetArrayItem(cJSON_GetObjectItemCaseSensitive(root, "observers"),
                                            module->observer);
         sensor =

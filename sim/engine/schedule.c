@@ -7,14 +7,16 @@
 bst_status bst_engine_make_schedule(bst_ctx *ctx, bst_engine *engine) {
     size_t n = (size_t)engine->instance_count + 1;
     engine->due = calloc(n, sizeof *engine->due);
-    engine->heap = calloc(n, sizeof *engine->heap);
+    engine->heap.items = calloc(n, sizeof *engine->heap.items);
+    engine->heap.count = engine->instance_count;
     engine->place = calloc(n, sizeof *engine->place);
-    if (!engine->due || !engine->heap || !engine->place) {
+    if (!engine->due || !engine->heap.items || !engine->place) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the schedule");
     }
     for (int i = 0; i < engine->instance_count; i++) {
         engine->due[i] = INT64_MAX;
-        engine->heap[i] = i;
+        engine->heap.items[i] = i;
+        engine->instances[i]->heap = &engine->heap;
         engine->place[i] = i;
     }
     for (int i = 0; i < engine->instance_count; i++) {
@@ -45,27 +47,28 @@ static bool before(const bst_engine *engine, int a, int b) {
     return engine->due[a] < engine->due[b] || (engine->due[a] == engine->due[b] && a < b);
 }
 
-static void put(bst_engine *engine, int place, int i) {
-    engine->heap[place] = i;
+static void put(bst_engine *engine, bst_heap *heap, int place, int i) {
+    heap->items[place] = i;
     engine->place[i] = place;
 }
 
 void bst_engine_set_due(bst_engine *engine, int i, int64_t due) {
     engine->due[i] = due;
-    int place = engine->place[i], n = engine->instance_count;
-    while (place > 0 && before(engine, i, engine->heap[(place - 1) / 2])) {
-        put(engine, place, engine->heap[(place - 1) / 2]);
+    bst_heap *heap = engine->instances[i]->heap;
+    int place = engine->place[i], n = heap->count;
+    while (place > 0 && before(engine, i, heap->items[(place - 1) / 2])) {
+        put(engine, heap, place, heap->items[(place - 1) / 2]);
         place = (place - 1) / 2;
     }
     for (int child = 2 * place + 1; child < n; child = 2 * place + 1) {
-        if (child + 1 < n && before(engine, engine->heap[child + 1], engine->heap[child])) {
+        if (child + 1 < n && before(engine, heap->items[child + 1], heap->items[child])) {
             child++;
         }
-        if (!before(engine, engine->heap[child], i)) {
+        if (!before(engine, heap->items[child], i)) {
             break;
         }
-        put(engine, place, engine->heap[child]);
+        put(engine, heap, place, heap->items[child]);
         place = child;
     }
-    put(engine, place, i);
+    put(engine, heap, place, i);
 }

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "sim/device/device.h"
 #include "sim/engine/exposure_clock.h"
@@ -18,6 +19,8 @@ struct bst_simulation {
     bst_device *device;
     bool lent;                 /* the device is the caller's */
     bst_knowledge **knowledge; /* [sensors of all observers] */
+    bst_fleet_member *members; /* [knowledge_count] */
+    char (*scopes)[160];       /* [knowledge_count] of the members */
     int knowledge_count;
     bst_engine *engine;
     bst_link *link;
@@ -150,15 +153,56 @@ static bst_status add_only(bst_ctx *ctx, const bst_simulation_options *options, 
     return bst_engine_add(ctx, sim->engine, &writer);
 }
 
+/* Adds the modules that link sensors. */
+static bst_status add_links(bst_ctx *ctx, const bst_scenario *scenario, bst_simulation *sim) {
+    for (int m = 0; m < scenario->module_count; m++) {
+        const bst_module_config *module = &scenario->modules[m];
+        if (module->observer >= 0) {
+            continue;
+        }
+        bst_instance_spec spec = {.scope = "",
+                                  .instance = module->name,
+                                  .desc = module->desc,
+                                  .config = module->config,
+                                  .period_ticks = module->period_ticks,
+                                  .offset_ticks = module->offset_ticks,
+                                  .delay_count = module->delay_count,
+                                  .world = sim->world,
+                                  .device = sim->device,
+                                  .observer = -1,
+                                  .sensor = -1,
+                                  .members = sim->members,
+                                  .member_count = sim->knowledge_count,
+                                  .seed = scenario->seed,
+                                  .run = (uint64_t)scenario->run};
+        memcpy(spec.delays, module->delays, sizeof spec.delays);
+        BST_TRY(bst_engine_add(ctx, sim->engine, &spec));
+    }
+    return BST_OK;
+}
+
 static bst_status add_modules(bst_ctx *ctx, const bst_scenario *scenario,
                               const bst_simulation_options *options, bst_simulation *sim) {
     const bst_observer_config *observers = scenario->observers.items;
+    sim->members = calloc((size_t)sim->knowledge_count + 1, sizeof *sim->members);
+    sim->scopes = calloc((size_t)sim->knowledge_count + 1, sizeof *sim->scopes);
+    if (!sim->members || !sim->scopes) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d sensors", sim->knowledge_count);
+    }
+    int count = 0;
     for (int i = 0; i < scenario->observers.count; i++) {
         const bst_sensor_config *sensors = observers[i].sensors.items;
         for (int s = 0; s < observers[i].sensors.count; s++) {
-            char scope[160], name[256];
-            snprintf(scope, sizeof scope, "%s/%s", observers[i].name, sensors[s].name);
+            char *scope = sim->scopes[count], name[256];
+            snprintf(scope, sizeof sim->scopes[0], "%s/%s", observers[i].name, sensors[s].name);
             bst_instance_spec spec = sensor_spec(scenario, sim, i, s, scope);
+            sim->members[count++] = (bst_fleet_member){.scope = scope,
+                                                       .observer = i,
+                                                       .sensor = s,
+                                                       .knowledge = spec.knowledge,
+                                                       .frame_exposure_s = spec.frame_exposure_s,
+                                                       .frame_period_s = spec.frame_period_s,
+                                                       .frame_latency_s = spec.frame_latency_s};
             snprintf(name, sizeof name, "%s/exposure", scope);
             spec.instance = name;
             spec.desc = &bst_exposure_clock_module;
@@ -187,7 +231,7 @@ static bst_status add_modules(bst_ctx *ctx, const bst_scenario *scenario,
             }
         }
     }
-    return BST_OK;
+    return options->only ? BST_OK : add_links(ctx, scenario, sim);
 }
 
 /* The PSFs that come from files. */
@@ -268,6 +312,17 @@ static bst_status make_link(bst_ctx *ctx, const bst_scenario *scenario,
     return bst_link_create(ctx, &scenario->link, &run, &sim->link);
 }
 
+/* Whether modules of different sensors share only what is constant or locked: no device, no link,
+ * and no cells of statistical stars that are drawn when first looked at. */
+static bool may_part(const bst_scenario *scenario, const bst_simulation *sim) {
+    return !sim->device && !sim->link && scenario->world.faint_stars == BST_FAINT_NONE;
+}
+
+static int processors(int threads) {
+    long online = sysconf(_SC_NPROCESSORS_ONLN);
+    return threads > 0 ? threads : online > 1 ? (int)online : 1;
+}
+
 static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
                         const bst_simulation_options *options, bst_simulation *sim) {
     BST_TRY(bst_world_create(ctx, scenario->file, &scenario->world, &scenario->observers,
@@ -301,7 +356,11 @@ static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
     if (status == BST_OK) {
         status = bst_engine_load(ctx, sim->engine);
     }
-    if (status == BST_OK && options->overlap) {
+    bool parted = false;
+    if (status == BST_OK && options->overlap && may_part(scenario, sim)) {
+        status = bst_engine_part(ctx, sim->engine, processors(options->threads), &parted);
+    }
+    if (status == BST_OK && options->overlap && !parted) {
         status = bst_engine_overlap(ctx, sim->engine);
     }
     return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "%s", scenario->file);
@@ -336,6 +395,8 @@ void bst_simulation_free(bst_simulation *sim) {
         bst_knowledge_free(sim->knowledge[i]);
     }
     free(sim->knowledge);
+    free(sim->members);
+    free(sim->scopes);
     if (!sim->lent) {
         bst_device_close(sim->device);
     }

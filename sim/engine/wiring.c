@@ -22,7 +22,7 @@ static int by_name(const void *a, const void *b) {
 static bst_status collect_channels(bst_ctx *ctx, bst_engine *engine) {
     int most = 0;
     for (int i = 0; i < engine->instance_count; i++) {
-        most += engine->instances[i]->spec.desc->port_count;
+        most += engine->instances[i]->port_count;
     }
     engine->channels = calloc((size_t)most + 1, sizeof *engine->channels);
     if (!engine->channels) {
@@ -30,8 +30,8 @@ static bst_status collect_channels(bst_ctx *ctx, bst_engine *engine) {
     }
     for (int i = 0; i < engine->instance_count; i++) {
         instance *writer = engine->instances[i];
-        for (int p = 0; p < writer->spec.desc->port_count; p++) {
-            const bst_port *port = &writer->spec.desc->ports[p];
+        for (int p = 0; p < writer->port_count; p++) {
+            const bst_port *port = bst_instance_port(writer, p);
             if (port->direction != BST_PORT_OUT) {
                 continue;
             }
@@ -41,14 +41,15 @@ static bst_status collect_channels(bst_ctx *ctx, bst_engine *engine) {
                                 "%s: writes the channel \"%s\", which does not exist", writer->name,
                                 port->channel);
             }
-            int known = find_channel(engine, writer->scope, type);
+            const char *scope = bst_instance_port_scope(writer, p);
+            int known = find_channel(engine, scope, type);
             if (known >= 0) {
                 return bst_fail(ctx, BST_ERR_CONFIG, "%s and %s both write the channel %s/%s",
                                 engine->instances[engine->channels[known].writer]->name,
-                                writer->name, writer->scope, type->name);
+                                writer->name, scope, type->name);
             }
             engine->channels[engine->channel_count] =
-                (channel){.type = type, .scope = writer->scope, .writer = i, .writer_port = p};
+                (channel){.type = type, .scope = scope, .writer = i, .writer_port = p};
             writer->ports[p].channel = engine->channel_count++;
             writer->ports[p].capacity = port->capacity;
         }
@@ -68,14 +69,15 @@ static int64_t declared_delay(const bst_instance_spec *spec, int port) {
 static bst_status connect_inputs(bst_ctx *ctx, bst_engine *engine) {
     for (int i = 0; i < engine->instance_count; i++) {
         instance *reader = engine->instances[i];
-        for (int p = 0; p < reader->spec.desc->port_count; p++) {
-            const bst_port *port = &reader->spec.desc->ports[p];
+        for (int p = 0; p < reader->port_count; p++) {
+            const bst_port *port = bst_instance_port(reader, p);
             if (port->direction == BST_PORT_OUT) {
                 continue;
             }
             port_state *state = &reader->ports[p];
             const bst_channel_type *type = bst_channel_type_find(port->channel);
-            state->channel = type ? find_channel(engine, reader->scope, type) : -1;
+            const char *scope = bst_instance_port_scope(reader, p);
+            state->channel = type ? find_channel(engine, scope, type) : -1;
             if (state->channel < 0) {
                 if (port->flags & BST_PORT_OPTIONAL) {
                     continue;
@@ -83,9 +85,9 @@ static bst_status connect_inputs(bst_ctx *ctx, bst_engine *engine) {
                 return bst_fail(ctx, BST_ERR_CONFIG,
                                 "%s: reads the channel %s/%s, which no module writes; add the "
                                 "module that makes it",
-                                reader->name, reader->scope, port->channel);
+                                reader->name, scope, port->channel);
             }
-            state->delay_ticks = declared_delay(&reader->spec, p);
+            state->delay_ticks = declared_delay(&reader->spec, p % reader->spec.desc->port_count);
             if (state->delay_ticks < 1 && (port->flags & BST_PORT_FEEDBACK)) {
                 state->delay_ticks = 1;
             }
@@ -114,8 +116,8 @@ static bst_status connect_inputs(bst_ctx *ctx, bst_engine *engine) {
 /* Whether instance b must step after instance a within a tick. */
 static bool must_follow(const bst_engine *engine, int a, int b) {
     const instance *later = engine->instances[b], *earlier = engine->instances[a];
-    for (int p = 0; p < later->spec.desc->port_count; p++) {
-        const bst_port *port = &later->spec.desc->ports[p];
+    for (int p = 0; p < later->port_count; p++) {
+        const bst_port *port = bst_instance_port(later, p);
         const port_state *state = &later->ports[p];
         if (port->direction == BST_PORT_OUT || state->channel < 0) {
             continue;
@@ -130,8 +132,8 @@ static bool must_follow(const bst_engine *engine, int a, int b) {
             continue;
         }
         /* readers come after those who change the message */
-        for (int q = 0; q < earlier->spec.desc->port_count; q++) {
-            if (earlier->spec.desc->ports[q].direction == BST_PORT_MODIFY &&
+        for (int q = 0; q < earlier->port_count; q++) {
+            if (bst_instance_port(earlier, q)->direction == BST_PORT_MODIFY &&
                 earlier->ports[q].channel == state->channel) {
                 return true;
             }
@@ -251,8 +253,8 @@ static void settle_rates(bst_engine *engine) {
                 rate += engine->channels[self->ports[self->triggers[t]].channel].rate_hz;
             }
             self->rate_hz = rate;
-            for (int p = 0; p < self->spec.desc->port_count; p++) {
-                if (self->spec.desc->ports[p].direction == BST_PORT_OUT) {
+            for (int p = 0; p < self->port_count; p++) {
+                if (bst_instance_port(self, p)->direction == BST_PORT_OUT) {
                     engine->channels[self->ports[p].channel].rate_hz = rate;
                 }
             }
@@ -264,7 +266,7 @@ static void settle_rates(bst_engine *engine) {
 static bst_status list_readers(bst_ctx *ctx, bst_engine *engine) {
     int most = 0;
     for (int i = 0; i < engine->instance_count; i++) {
-        most += engine->instances[i]->spec.desc->port_count;
+        most += engine->instances[i]->port_count;
     }
     engine->readers = calloc((size_t)most + 1, sizeof *engine->readers);
     engine->releasable = calloc((size_t)engine->channel_count + 1, sizeof *engine->releasable);
@@ -280,11 +282,11 @@ static bst_status list_readers(bst_ctx *ctx, bst_engine *engine) {
         ch->readers = next;
         for (int i = 0; i < engine->instance_count; i++) {
             const instance *self = engine->instances[i];
-            for (int p = 0; p < self->spec.desc->port_count; p++) {
-                if (self->spec.desc->ports[p].direction != BST_PORT_OUT &&
+            for (int p = 0; p < self->port_count; p++) {
+                if (bst_instance_port(self, p)->direction != BST_PORT_OUT &&
                     self->ports[p].channel == c) {
                     *next++ = (channel_reader){i, p};
-                    ch->triggers |= (self->spec.desc->ports[p].flags & BST_PORT_TRIGGER) != 0;
+                    ch->triggers |= (bst_instance_port(self, p)->flags & BST_PORT_TRIGGER) != 0;
                 }
             }
         }
@@ -297,7 +299,7 @@ static bst_status list_readers(bst_ctx *ctx, bst_engine *engine) {
 static double longest_wait_s(const bst_engine *engine, const channel *ch, channel_reader r) {
     const instance *self = engine->instances[r.instance];
     double wait = (double)self->ports[r.port].delay_ticks / (double)engine->tick_rate_hz;
-    bool triggered = self->spec.desc->ports[r.port].flags & BST_PORT_TRIGGER;
+    bool triggered = bst_instance_port(self, r.port)->flags & BST_PORT_TRIGGER;
     if (ch->type->kind == BST_CHANNEL_QUEUE && !triggered && self->rate_hz > 0.0) {
         wait += 1.0 / self->rate_hz;
     }

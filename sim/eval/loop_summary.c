@@ -108,7 +108,9 @@ static void judge(bst_loop_summary *s, waiting_frame *w, const bst_track *track,
         w->frame.in_track = true;
         if (s->confirm_tick < 0) {
             s->confirm_tick = now;
-            s->figures.time_to_confirm_s = (double)now / s->rate_hz;
+            if (isnan(s->figures.time_to_confirm_s)) {
+                s->figures.time_to_confirm_s = (double)now / s->rate_hz;
+            }
         }
     } else {
         s->figures.wrong_target_frames++;
@@ -193,7 +195,9 @@ bst_status bst_loop_summary_truth(bst_ctx *ctx, bst_loop_summary *s, const bst_t
     if (s->settle_tick < 0 && s->confirm_tick >= 0 && s->mode == BST_MODE_TRACK &&
         f->error_px < SETTLED_PX) {
         s->settle_tick = truth->start_tick;
-        s->figures.time_to_settle_s = (double)truth->start_tick / s->rate_hz;
+        if (isnan(s->figures.time_to_settle_s)) {
+            s->figures.time_to_settle_s = (double)truth->start_tick / s->rate_hz;
+        }
     }
     f->settled = s->settle_tick >= 0;
     s->figures.frames++;
@@ -232,6 +236,12 @@ void bst_loop_summary_tracks(bst_loop_summary *s, const bst_tracks *tracks, int6
 void bst_loop_summary_status(bst_loop_summary *s, const bst_control_status *status) {
     s->mode = status->mode;
     s->figures.final_mode = status->mode;
+}
+
+void bst_loop_summary_retarget(bst_loop_summary *s, int target_object) {
+    s->target = target_object;
+    s->confirm_tick = s->settle_tick = -1;
+    s->has_toi = false;
 }
 
 void bst_loop_summary_finish(bst_loop_summary *s) {

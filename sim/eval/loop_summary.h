@@ -54,6 +54,10 @@ bst_status bst_loop_summary_truth(bst_ctx *ctx, bst_loop_summary *summary,
 void bst_loop_summary_tracks(bst_loop_summary *summary, const bst_tracks *tracks, int64_t tick);
 void bst_loop_summary_status(bst_loop_summary *summary, const bst_control_status *status);
 
+/* The target is another one from now on, -1: none: confirmation and settling begin anew; the times
+ * to them stay those of the first. */
+void bst_loop_summary_retarget(bst_loop_summary *summary, int target_object);
+
 /* Settles the frames that still wait for their tracks. */
 void bst_loop_summary_finish(bst_loop_summary *summary);
 void bst_loop_summary_figures(const bst_loop_summary *summary, bst_loop_figures *out);

@@ -1,21 +1,24 @@
 #include "sim/astro/belt.h"
 #include "sim/world/world_internal.h"
 
-bst_status bst_cue_nominal_line(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
-                                bst_sky_clock *clock, double seconds, const bst_state *eye,
-                                bst_vec3 *line_m) {
-    const world_sensor *s = &world->observers[observer].sensors[sensor];
-    *line_m = (bst_vec3){0, 0, 0};
-    if (s->cue_object < 0) {
-        return BST_OK;
-    }
+bst_status bst_object_nominal_line(bst_ctx *ctx, const bst_world *world, int object,
+                                   bst_sky_clock *clock, double seconds, const bst_state *eye,
+                                   bst_vec3 *line_m) {
     bst_sky sky;
     BST_TRY(bst_sky_clock_at(ctx, clock, bst_time_add(world->epoch, seconds), &sky));
     bst_state target;
     double emission_s;
-    return bst_orbit_line_of_sight(ctx, &world->objects[s->cue_object].orbit, eye, clock,
-                                   world->epoch, &sky.bodies, seconds, false, line_m, &target,
-                                   &emission_s);
+    return bst_orbit_line_of_sight(ctx, &world->objects[object].orbit, eye, clock, world->epoch,
+                                   &sky.bodies, seconds, false, line_m, &target, &emission_s);
+}
+
+bst_status bst_cue_nominal_line(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
+                                bst_sky_clock *clock, double seconds, const bst_state *eye,
+                                bst_vec3 *line_m) {
+    int object = world->observers[observer].sensors[sensor].cue_object;
+    *line_m = (bst_vec3){0, 0, 0};
+    return object < 0 ? BST_OK
+                      : bst_object_nominal_line(ctx, world, object, clock, seconds, eye, line_m);
 }
 
 bst_status bst_cue_nominal_direction(bst_ctx *ctx, const bst_world *world, int observer, int sensor,

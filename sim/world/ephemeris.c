@@ -2,6 +2,7 @@
 
 #include <pthread.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "sim/core/parallel.h"
 
@@ -353,6 +354,22 @@ int bst_ephemeris_near(bst_ephemeris *e, double seconds, const bst_ephemeris_con
     }
     pthread_mutex_unlock(&e->lock);
     return count;
+}
+
+double bst_ephemeris_places(bst_ephemeris *e, double seconds, double *x_m, double *y_m,
+                            double *z_m) {
+    int64_t index = llround(fmax(fmin(seconds, 1e9), -1e9) / TABLE_STEP_S);
+    size_t bytes = (size_t)e->object_count * sizeof *x_m;
+    pthread_mutex_lock(&e->lock);
+    table *t = &e->tables[slot_of(index, TABLES)];
+    if (!t->valid || t->index != index) {
+        make_table(e, t, index);
+    }
+    memcpy(x_m, t->x_m, bytes);
+    memcpy(y_m, t->y_m, bytes);
+    memcpy(z_m, t->z_m, bytes);
+    pthread_mutex_unlock(&e->lock);
+    return (double)index * TABLE_STEP_S;
 }
 
 /* ---- making it ---- */

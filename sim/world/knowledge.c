@@ -4,33 +4,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/core/quintic.h"
+#include "sim/world/knowledge_internal.h"
 #include "sim/world/psf.h"
-#include "sim/world/world_internal.h"
 
-/* The cue's direction is kept at whole seconds and interpolated by six of them. */
-enum { KNOTS = 16 };
 /* Fifth difference, rad, up to which the interpolation is used: what it misses is 200 times less.
  */
 static const double SMOOTH_RAD = 1e-11;
-
-typedef struct cue_knot {
-    bool made, known; /* known: there is a direction */
-    int64_t second;
-    bst_vec3 direction;
-} cue_knot;
-
-struct bst_knowledge_view {
-    const bst_knowledge *knowledge;
-    bst_sky_clock *clock;
-    cue_knot knots[KNOTS];
-    bst_quat cue_error; /* turns where the target nominally is to where the cue has it */
-    /* the second that was looked at last, and the quintic about it, of where the cue has the
-     * target */
-    int64_t checked;
-    bool any_checked, smooth;
-    bst_vec3 cued[BST_QUINTIC_POINTS];
-};
 
 /* The onboard camera's PSF is one Gaussian: of the width given, or else that with the true one's
  * noise-equivalent area in the middle of the field. *psf: the true one, where it is what is known
@@ -167,9 +146,8 @@ static const world_sensor *sensor_of(const bst_knowledge *k) {
     return &k->world->observers[k->observer].sensors[k->sensor];
 }
 
-/* Onboard time, and where the observer believes to be. */
-static bst_status believed_eye(bst_ctx *ctx, bst_knowledge_view *view, double seconds, double *t,
-                               bst_state *eye) {
+bst_status bst_believed_eye(bst_ctx *ctx, bst_knowledge_view *view, double seconds, double *t,
+                            bst_state *eye) {
     const bst_knowledge *k = view->knowledge;
     *t = bst_believed_seconds(k->world, k->observer, k->sensor, seconds);
     BST_TRY(bst_orbit_state(ctx, &k->world->observers[k->observer].orbit, view->clock,
@@ -184,13 +162,23 @@ static bst_status nominal_direction(bst_ctx *ctx, bst_knowledge_view *view, doub
     const bst_knowledge *k = view->knowledge;
     double t;
     bst_state eye;
-    BST_TRY(believed_eye(ctx, view, seconds, &t, &eye));
+    BST_TRY(bst_believed_eye(ctx, view, seconds, &t, &eye));
+    if (view->tasked) {
+        BST_TRY(
+            bst_object_nominal_line(ctx, k->world, view->task.object, view->clock, t, &eye, out));
+        *out = bst_vec3_unit(*out);
+        return BST_OK;
+    }
     return bst_cue_nominal_direction(ctx, k->world, k->observer, k->sensor, view->clock, t, &eye,
                                      out);
 }
 
-static const cue_knot *knot_at(bst_knowledge_view *view, int64_t second) {
-    cue_knot *knot = &view->knots[((second % KNOTS) + KNOTS) % KNOTS];
+static bst_quat error_of(const bst_knowledge_view *view) {
+    return view->tasked ? (bst_quat){0.0, 0.0, 0.0, 1.0} : view->cue_error;
+}
+
+static const bst_cue_knot *knot_at(bst_knowledge_view *view, int64_t second) {
+    bst_cue_knot *knot = &view->knots[((second % BST_CUE_KNOTS) + BST_CUE_KNOTS) % BST_CUE_KNOTS];
     if (!knot->made || knot->second != second) {
         bst_ctx quiet = {0}; /* beyond the end of an orbit there is none, which is no error here */
         knot->made = true;
@@ -205,9 +193,9 @@ static bool is_smooth(bst_knowledge_view *view, int64_t second) {
     if (!view->any_checked || view->checked != second) {
         bool known = true;
         for (int i = 0; i < BST_QUINTIC_POINTS; i++) {
-            const cue_knot *knot = knot_at(view, second - BST_QUINTIC_BEFORE + i);
+            const bst_cue_knot *knot = knot_at(view, second - BST_QUINTIC_BEFORE + i);
             known = known && knot->known;
-            view->cued[i] = bst_quat_rotate(view->cue_error, knot->direction);
+            view->cued[i] = bst_quat_rotate(error_of(view), knot->direction);
         }
         view->any_checked = true;
         view->checked = second;
@@ -226,7 +214,7 @@ static bst_status direction_at(bst_ctx *ctx, bst_knowledge_view *view, double se
         return BST_OK;
     }
     BST_TRY(nominal_direction(ctx, view, seconds, out));
-    *out = bst_quat_rotate(view->cue_error, *out);
+    *out = bst_quat_rotate(error_of(view), *out);
     return BST_OK;
 }
 
@@ -245,13 +233,23 @@ bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double s
     out->direction_gcrf = d[1];
     out->rate_gcrf_radps = bst_vec3_scale(bst_vec3_sub(d[2], d[0]), 0.5 / h);
     bst_region region;
-    bst_knowledge_region(k, &region);
+    bst_knowledge_view_region(view, &region);
     out->sigma_rad = region.kind == BST_REGION_NONE
                          ? cue->sigma_deg * BST_DEG_RAD
                          : fmax(region.half_length_rad, region.half_width_rad);
     out->rate_sigma_radps = cue->rate_sigma_arcsec_per_s * BST_ARCSEC_RAD;
     out->v_mag = cue->v_mag;
     out->v_mag_sigma = cue->v_mag_sigma;
+    if (view->tasked) {
+        const bst_task *task = &view->task;
+        out->sigma_rad = task->sigma_rad > 0.0 ? task->sigma_rad : cue->sigma_deg * BST_DEG_RAD;
+        out->rate_sigma_radps =
+            task->rate_sigma_radps > 0.0 ? task->rate_sigma_radps : out->rate_sigma_radps;
+        if (task->v_mag_sigma > 0.0) {
+            out->v_mag = task->v_mag;
+            out->v_mag_sigma = task->v_mag_sigma;
+        }
+    }
     return BST_OK;
 }
 
@@ -268,6 +266,13 @@ void bst_knowledge_region(const bst_knowledge *k, bst_region *out) {
                         .half_width_rad = region->half_width_deg * BST_DEG_RAD};
 }
 
+void bst_knowledge_view_region(const bst_knowledge_view *view, bst_region *out) {
+    *out = (bst_region){.kind = BST_REGION_NONE};
+    if (!view->tasked) {
+        bst_knowledge_region(view->knowledge, out);
+    }
+}
+
 bst_status bst_knowledge_region_direction_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                              double along_rad, double across_rad,
                                              bst_vec3 *direction) {
@@ -275,7 +280,7 @@ bst_status bst_knowledge_region_direction_at(bst_ctx *ctx, bst_knowledge_view *v
     double t;
     bst_state eye;
     bst_vec3 nominal;
-    BST_TRY(believed_eye(ctx, view, seconds, &t, &eye));
+    BST_TRY(bst_believed_eye(ctx, view, seconds, &t, &eye));
     BST_TRY(bst_region_place(ctx, k->world, k->observer, k->sensor, view->clock, t, &eye, along_rad,
                              across_rad, &nominal));
     *direction = bst_quat_rotate(view->cue_error, nominal);
@@ -285,14 +290,14 @@ bst_status bst_knowledge_region_direction_at(bst_ctx *ctx, bst_knowledge_view *v
 bst_status bst_knowledge_belt_eye_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                      bool *known, bst_belt_eye *eye) {
     const bst_knowledge *k = view->knowledge;
-    *known = sensor_of(k)->config.cue.region.kind != BST_REGION_NONE;
+    *known = !view->tasked && sensor_of(k)->config.cue.region.kind != BST_REGION_NONE;
     if (!*known) {
         return BST_OK;
     }
     double t;
     bst_state state;
     bst_sky sky;
-    BST_TRY(believed_eye(ctx, view, seconds, &t, &state));
+    BST_TRY(bst_believed_eye(ctx, view, seconds, &t, &state));
     BST_TRY(bst_sky_clock_at(ctx, view->clock, bst_time_add(k->world->epoch, t), &sky));
     *eye = (bst_belt_eye){.position_m = state.position_m,
                           .velocity_mps = state.velocity_mps,
@@ -306,15 +311,17 @@ bst_status bst_knowledge_cue_range_at(bst_ctx *ctx, bst_knowledge_view *view, do
     const double h = 0.5;
     double range[3];
     *range_m = *range_rate_mps = 0.0;
-    *known =
-        sensor_of(k)->cue_object >= 0 && sensor_of(k)->config.cue.region.kind == BST_REGION_NONE;
+    const world_sensor *sensor = sensor_of(k);
+    int object = view->tasked                                        ? view->task.object
+                 : sensor->config.cue.region.kind == BST_REGION_NONE ? sensor->cue_object
+                                                                     : -1;
+    *known = object >= 0;
     for (int i = 0; *known && i < 3; i++) {
         double t;
         bst_state eye;
         bst_vec3 line;
-        BST_TRY(believed_eye(ctx, view, seconds + (i - 1) * h, &t, &eye));
-        BST_TRY(bst_cue_nominal_line(ctx, k->world, k->observer, k->sensor, view->clock, t, &eye,
-                                     &line));
+        BST_TRY(bst_believed_eye(ctx, view, seconds + (i - 1) * h, &t, &eye));
+        BST_TRY(bst_object_nominal_line(ctx, k->world, object, view->clock, t, &eye, &line));
         range[i] = bst_vec3_norm(line);
     }
     if (*known) {

@@ -4,6 +4,7 @@
 #define BST_WORLD_KNOWLEDGE_H
 
 #include "sim/astro/belt.h"
+#include "sim/core/messages.h"
 #include "sim/world/region.h"
 #include "sim/world/world.h"
 
@@ -47,6 +48,12 @@ bst_status bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double s
 bst_status bst_knowledge_cue_direction_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                           bool *valid, bst_vec3 *direction) BST_MUST_CHECK;
 
+/* Has the cue be what a task says, from now on: its object, without an error, or with none the
+ * sensor's own. True when the task is a new one, by its id; NULL is none. */
+bool bst_knowledge_view_task(bst_knowledge_view *view, const bst_task *task);
+/* The cue's region, as bst_knowledge_region; none while the view has a task with an object. */
+void bst_knowledge_view_region(const bst_knowledge_view *view, bst_region *out);
+
 /* Range of the cue's object as it is believed, and its rate, at `seconds` after the epoch; *known
  * false: the cue is a direction. */
 bst_status bst_knowledge_cue_range_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
@@ -73,5 +80,28 @@ bst_status bst_knowledge_belt_eye_at(bst_ctx *ctx, bst_knowledge_view *view, dou
 /* The body attitude in which the spacecraft starts and that it tries to hold (see
  * bst_world_body_attitude). */
 bst_quat bst_knowledge_body_attitude(const bst_knowledge *knowledge);
+
+/* ---- the onboard catalogue: the scenario's objects on their orbits as catalogued ---- */
+
+int bst_knowledge_object_count(const bst_knowledge *knowledge);
+const bst_object_info *bst_knowledge_object(const bst_knowledge *knowledge, int object);
+/* -1: there is no object of this name. */
+int bst_knowledge_find_object(const bst_knowledge *knowledge, const char *name);
+/* Catalogue number of the spacecraft itself, 0: none. */
+int bst_knowledge_own_norad(const bst_knowledge *knowledge);
+/* Distances from the Earth's centre of the osculating orbit's apsides at the epoch; false: the
+ * object has no orbit then. */
+bool bst_knowledge_apsides(bst_knowledge_view *view, int object, double *perigee_m,
+                           double *apogee_m);
+/* Geocentric places (GCRF) of all objects within 2 s of `seconds`, to 1 km: for a first choice.
+ * Returns the time that they are for. NAN: not known so quickly; 0, 0, 0: it has no orbit. */
+double bst_knowledge_places(const bst_knowledge *knowledge, double seconds, double *x_m,
+                            double *y_m, double *z_m);
+/* Where the spacecraft believes to be, and the bodies by its clock. */
+bst_status bst_knowledge_eye_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
+                                bst_state *eye, bst_bodies *bodies) BST_MUST_CHECK;
+/* How an object should be seen from there. BST_ERR_NUMERIC when either has no orbit then. */
+bst_status bst_knowledge_sight_at(bst_ctx *ctx, bst_knowledge_view *view, int object,
+                                  double seconds, bst_sight *out) BST_MUST_CHECK;
 
 #endif

@@ -253,6 +253,9 @@ const bst_object_info *bst_world_object(const bst_world *world, int object) {
 int bst_world_observer_count(const bst_world *world) {
     return world->observer_count;
 }
+int bst_world_sensor_count(const bst_world *world, int observer) {
+    return world->observers[observer].sensor_count;
+}
 const char *bst_world_observer_name(const bst_world *world, int observer) {
     return world->observers[observer].name;
 }

@@ -37,6 +37,7 @@ const bst_object_info *bst_world_object(const bst_world *world, int object);
 /* Index of the object with this name, -1 when there is none. */
 int bst_world_find_object(const bst_world *world, const char *name);
 int bst_world_observer_count(const bst_world *world);
+int bst_world_sensor_count(const bst_world *world, int observer);
 const char *bst_world_observer_name(const bst_world *world, int observer);
 /* The sensor's true camera. */
 const bst_camera *bst_world_camera(const bst_world *world, int observer, int sensor);

@@ -179,6 +179,11 @@ bst_status bst_cue_nominal_line(bst_ctx *ctx, const bst_world *world, int observ
                                 bst_sky_clock *clock, double seconds, const bst_state *eye,
                                 bst_vec3 *line_m) BST_MUST_CHECK;
 
+/* The same of any object. */
+bst_status bst_object_nominal_line(bst_ctx *ctx, const bst_world *world, int object,
+                                   bst_sky_clock *clock, double seconds, const bst_state *eye,
+                                   bst_vec3 *line_m) BST_MUST_CHECK;
+
 /* Time after the epoch that the onboard clock shows `seconds` after the epoch. */
 double bst_believed_seconds(const bst_world *world, int observer, int sensor, double seconds);
 

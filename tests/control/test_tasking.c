@@ -1,0 +1,296 @@
+/* The rule that gives sensors their targets, on a small catalogue. */
+#include "control/tasking.h"
+#include "tests/world/world_support.h"
+
+#define FILE_ "\"elements_file\": \"scenarios/catalogue_2022-06.tle\""
+#define SENSORS_ "\"sensors\": [{" TEST_CAMERA "}]"
+
+enum { NEOSSAT_OBJECT, GX5, ISS, MOLNIYA, GPS };
+
+/* Two spacecraft: NEOSSat, and one 300 km from GX5; the five objects of the catalogue. */
+static const char world_text[] =
+    "{\"world\": {\"star_catalogue\": \"embedded\", \"catalogues\": [{" FILE_
+    "}], \"objects\": []}, \"observers\": [{\"name\": \"low\", \"orbit\": {" FILE_
+    ", \"norad\": 39089}, " SENSORS_
+    "}, {\"name\": \"high\", \"orbit\": {\"source\": \"relative\", \"reference\": \"INMARSAT "
+    "GX5\", "
+    "\"offset_rtn_m\": [-200000, -300000, 50000]}, " SENSORS_ "}]}";
+
+typedef struct fixture {
+    bst_ctx ctx;
+    bst_world *world;
+    bst_knowledge *knowledge[2];
+    bst_fleet_member members[2];
+    bst_tasking_config config;
+    bst_tasking tasking;
+} fixture;
+
+static void set_up(fixture *f, const char *config) {
+    *f = (fixture){.world = test_world(world_text)};
+    bst_json *json;
+    bst_assert_ok(&f->ctx, bst_json_parse(&f->ctx, "test", config, strlen(config), &json));
+    bst_assert_ok(&f->ctx, bst_config_read(&f->ctx, json, bst_json_root(json), "",
+                                           bst_tasking_config_table, &f->config));
+    bst_json_free(json);
+    for (int i = 0; i < 2; i++) {
+        bst_assert_ok(&f->ctx, bst_knowledge_create(&f->ctx, f->world, i, 0, &f->knowledge[i]));
+        f->members[i] = (bst_fleet_member){.scope = i ? "high/camera" : "low/camera",
+                                           .observer = i,
+                                           .knowledge = f->knowledge[i],
+                                           .frame_exposure_s = 0.5,
+                                           .frame_period_s = 2.0};
+    }
+}
+
+static void tear_down(fixture *f) {
+    bst_tasking_free(&f->tasking);
+    bst_config_free(bst_tasking_config_table, &f->config);
+    bst_knowledge_free(f->knowledge[0]);
+    bst_knowledge_free(f->knowledge[1]);
+    bst_world_free(f->world);
+}
+
+static void start(fixture *f, const char *config) {
+    set_up(f, config);
+    bst_assert_ok(&f->ctx, bst_tasking_init(&f->ctx, &f->tasking, &f->config, f->members, 2, 10.0));
+}
+
+/* Tells a sensor where it is. */
+static void tell_place(fixture *f, int sensor, double seconds) {
+    bst_state eye;
+    bst_bodies bodies;
+    bst_assert_ok(&f->ctx, bst_knowledge_eye_at(&f->ctx, f->tasking.sensors[sensor].view, seconds,
+                                                &eye, &bodies));
+    bst_nav_telemetry nav = {.position_gcrf_m = eye.position_m,
+                             .velocity_gcrf_mps = eye.velocity_mps,
+                             .sun_m = bst_vec3_sub(bodies.sun_m, eye.position_m),
+                             .moon_m = bst_vec3_sub(bodies.moon_m, eye.position_m)};
+    bst_tasking_telemetry(&f->tasking, sensor, &nav, NULL);
+}
+
+/* A frame in which the target is tracked. */
+static void tell_tracked(fixture *f, int sensor, int64_t tick) {
+    bst_tracks *tracks = test_calloc(1, sizeof *tracks + sizeof tracks->items[0]);
+    tracks->tick = tick;
+    tracks->count = 1;
+    tracks->items[0] = (bst_track){.status = BST_TRACK_CONFIRMED, .target_of_interest = true};
+    bst_tasking_tracks(&f->tasking, sensor, tracks);
+    test_free(tracks);
+}
+
+static bool plan(fixture *f, int sensor, int64_t tick) {
+    bool given;
+    tell_place(f, sensor, (double)tick / 10.0);
+    bst_assert_ok(&f->ctx, bst_tasking_plan(&f->ctx, &f->tasking, sensor, tick, &given));
+    return given;
+}
+
+static void earth_and_sun_are_where_the_geometry_has_them(void **state) {
+    (void)state;
+    fixture f;
+    start(&f,
+          "{\"targets\": [{}], \"min_snr\": 0, \"max_rate_arcsec_per_s\": 1e6, "
+          "\"sun_keep_out_deg\": 90, \"moon_keep_out_deg\": 0, "
+          "\"earth_limb_keep_out_deg\": 8, \"earth_limb_altitude_km\": 100}");
+    bst_view *view;
+    bst_assert_ok(&f.ctx, bst_view_create(&f.ctx, f.world, &view));
+    int seen[BST_WHY_COUNT] = {0};
+    for (double t = 0.0; t < 12000.0; t += 60.0) {
+        for (int object = GX5; object <= GPS; object++) {
+            bst_tasking_why why = BST_WHY_COUNT, expected = BST_WHY_NOT;
+            bst_sight sight;
+            double snr;
+            bst_assert_ok(&f.ctx,
+                          bst_tasking_look(&f.ctx, &f.tasking, 0, object, t, &why, &sight, &snr));
+            seen[why]++;
+            bst_state eye, target;
+            bst_bodies bodies;
+            bst_assert_ok(&f.ctx, bst_view_observer_state(&f.ctx, view, 0, t, &eye));
+            bst_assert_ok(&f.ctx, bst_view_object_state(&f.ctx, view, object, t, &target));
+            bst_assert_ok(&f.ctx, bst_view_bodies(&f.ctx, view, t, &bodies));
+            bst_vec3 to = bst_vec3_sub(target.position_m, eye.position_m);
+            double limb = asin((6378137.0 + 1e5) / bst_vec3_norm(eye.position_m));
+            double nadir = bst_vec3_angle(to, bst_vec3_scale(eye.position_m, -1.0));
+            double sun = bst_vec3_angle(to, bst_vec3_sub(bodies.sun_m, eye.position_m));
+            double earth_off = nadir - limb - 8.0 * BST_DEG_RAD, sun_off = sun - 90.0 * BST_DEG_RAD;
+            /* light time and aberration move directions by up to 0.2 mrad: not judged there */
+            if (fabs(earth_off) < 1e-3 || fabs(sun_off) < 1e-3) {
+                continue;
+            }
+            expected = earth_off < 0.0 ? BST_WHY_EARTH : sun_off < 0.0 ? BST_WHY_SUN : expected;
+            if (expected == BST_WHY_NOT) {
+                assert_true(why == BST_WHY_NOT || why == BST_WHY_SHADOW);
+                double lit = bst_sun_fraction(target.position_m, bodies.sun_m);
+                assert_true(why == BST_WHY_SHADOW ? lit < 0.6 : lit > 0.4);
+            } else {
+                assert_int_equal(why, expected);
+            }
+        }
+    }
+    assert_true(seen[BST_WHY_NOT] > 50 && seen[BST_WHY_EARTH] > 50 && seen[BST_WHY_SUN] > 5);
+    bst_tasking_why why;
+    double snr;
+    bst_assert_ok(&f.ctx,
+                  bst_tasking_look(&f.ctx, &f.tasking, 0, NEOSSAT_OBJECT, 0.0, &why, NULL, &snr));
+    assert_int_equal(why, BST_WHY_ITSELF);
+    bst_view_free(view);
+    tear_down(&f);
+}
+
+static void faint_and_fast_ones_are_left_out(void **state) {
+    (void)state;
+    fixture f;
+    start(&f, "{\"targets\": [{\"object\": \"INMARSAT GX5\"}], \"min_snr\": 8}");
+    bst_tasking_why why;
+    double snr;
+    bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &why, NULL, &snr));
+    assert_int_equal(why, BST_WHY_NOT);
+    double enough = snr;
+    f.tasking.config.min_snr = 1.01 * enough;
+    bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &why, NULL, &snr));
+    assert_int_equal(why, BST_WHY_FAINT);
+    f.tasking.config.min_snr = 0.99 * enough;
+    f.tasking.config.max_rate_arcsec_per_s = 10.0; /* it moves at about 50 */
+    bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, 0.0, &why, NULL, &snr));
+    assert_int_equal(why, BST_WHY_RATE);
+    tear_down(&f);
+}
+
+static void the_first_line_that_fits_counts(void **state) {
+    (void)state;
+    fixture f;
+    start(&f,
+          "{\"targets\": [{\"perigee_km\": [35000, 36600]}, {\"object\": \"INMARSAT GX5\"}, "
+          "{\"object\": \"GPS BIIR-4  (PRN 20)\"}, {\"apogee_km\": [30000, 1e9]}, "
+          "{\"apogee_km\": [0, 1000], \"priority\": 0}]}");
+    assert_int_equal(f.tasking.line[GX5], 0);
+    assert_int_equal(f.tasking.line[GPS], 2);
+    assert_int_equal(f.tasking.line[MOLNIYA], 3);
+    assert_int_equal(f.tasking.line[ISS], -1); /* priority 0 */
+    tear_down(&f);
+    set_up(&f, "{\"targets\": [{\"object\": \"NOBODY\"}]}");
+    assert_int_equal(bst_tasking_init(&f.ctx, &f.tasking, &f.config, f.members, 2, 10.0),
+                     BST_ERR_CONFIG);
+    assert_non_null(strstr(f.ctx.message, "targets/0/object: there is no object \"NOBODY\""));
+    tear_down(&f);
+}
+
+static void one_target_goes_to_one_sensor_until_it_is_due_again(void **state) {
+    (void)state;
+    fixture f;
+    start(&f,
+          "{\"targets\": [{\"object\": \"INMARSAT GX5\", \"revisit_s\": 600, \"frames\": 3}], "
+          "\"min_snr\": 0, \"sun_keep_out_deg\": 0}");
+    assert_true(plan(&f, 0, 0));
+    const bst_task *task = &f.tasking.sensors[0].task;
+    assert_int_equal(task->object, GX5);
+    assert_int_equal(task->id, 1);
+    assert_int_equal(task->norad, 44801);
+    assert_int_equal(task->before, BST_TASK_NONE);
+    assert_false(plan(&f, 1, 0)); /* taken */
+    for (int64_t k = 1; k <= 3; k++) {
+        assert_false(plan(&f, 0, 20 * k - 1));
+        tell_tracked(&f, 0, 20 * k);
+    }
+    assert_true(plan(&f, 0, 61)); /* done, and nothing else is there */
+    assert_int_equal(task->object, -1);
+    assert_int_equal(task->before, BST_TASK_DONE);
+    assert_false(plan(&f, 1, 200)); /* seen 14 s ago */
+    assert_false(plan(&f, 1, 5990));
+    assert_true(plan(&f, 1, 6100)); /* 604 s ago */
+    assert_int_equal(f.tasking.sensors[1].task.object, GX5);
+    tear_down(&f);
+}
+
+static void a_target_is_given_up_in_time(void **state) {
+    (void)state;
+    fixture f;
+    start(&f,
+          "{\"targets\": [{\"object\": \"INMARSAT GX5\", \"frames\": 100, \"revisit_s\": 1}], "
+          "\"min_snr\": 0, \"settle_s\": 10, \"find_timeout_s\": 30, \"retry_s\": 100}");
+    assert_true(plan(&f, 1, 0));
+    const bst_task *task = &f.tasking.sensors[1].task;
+    assert_int_equal(task->object, GX5);
+    assert_false(plan(&f, 1, 399)); /* arrival at 10 s, and 30 s */
+    assert_true(plan(&f, 1, 401));
+    assert_int_equal(task->before, BST_TASK_NOT_FOUND);
+    assert_int_equal(task->object, -1);
+    assert_false(plan(&f, 1, 1395)); /* not before 100 s have gone by */
+    assert_true(plan(&f, 1, 1505));
+    tell_tracked(&f, 1, 1700);
+    assert_false(plan(&f, 1, 1999)); /* seen at 170 s */
+    assert_true(plan(&f, 1, 2001));
+    assert_int_equal(task->before, BST_TASK_LOST);
+    tear_down(&f);
+}
+
+static void priority_and_waiting_decide(void **state) {
+    (void)state;
+    fixture f;
+    start(&f,
+          "{\"targets\": [{\"object\": \"INMARSAT GX5\", \"priority\": 1}, {\"object\": "
+          "\"MOLNIYA 3-8\", \"priority\": 3}], \"min_snr\": 0, \"sun_keep_out_deg\": 0, "
+          "\"moon_keep_out_deg\": 0, \"max_rate_arcsec_per_s\": 1e6, "
+          "\"earth_limb_keep_out_deg\": 0}");
+    /* a time at which the low one sees both */
+    double t = 4000.0, snr;
+    bst_tasking_why a = BST_WHY_EARTH, b = BST_WHY_EARTH;
+    for (; t < 24000.0; t += 60.0) {
+        bst_tasking_why later_a, later_b;
+        bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, t, &a, NULL, &snr));
+        bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, MOLNIYA, t, &b, NULL, &snr));
+        bst_assert_ok(
+            &f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, GX5, t + 120.0, &later_a, NULL, &snr));
+        bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, MOLNIYA, t + 120.0, &later_b,
+                                               NULL, &snr));
+        if (a == BST_WHY_NOT && b == BST_WHY_NOT && later_a == BST_WHY_NOT &&
+            later_b == BST_WHY_NOT) {
+            break;
+        }
+    }
+    assert_int_equal(a, BST_WHY_NOT);
+    assert_true(plan(&f, 0, (int64_t)(10.0 * t)));
+    assert_int_equal(f.tasking.sensors[0].task.object, MOLNIYA);
+    /* the other has waited for longer than its wish by a factor of more than 3 */
+    f.tasking.holder[MOLNIYA] = -1;
+    f.tasking.sensors[0].task.object = -1;
+    f.tasking.sensors[0].pointed = false;
+    f.tasking.seen_s[MOLNIYA] = t - 3700.0;
+    f.tasking.seen_s[GX5] = 0.0;
+    bst_tasking_line *lines = f.tasking.config.targets.items;
+    lines[0].revisit_s = fmax(t / 3.9, 1.0);
+    lines[1].revisit_s = 3600.0;
+    assert_true(plan(&f, 0, (int64_t)(10.0 * t)));
+    assert_int_equal(f.tasking.sensors[0].task.object, GX5);
+    tear_down(&f);
+}
+
+static void a_survey_counts_every_target_once(void **state) {
+    (void)state;
+    fixture f;
+    start(&f, "{\"targets\": [{}]}");
+    bst_tasking_report r;
+    bst_assert_ok(&f.ctx, bst_tasking_survey(&f.ctx, &f.tasking, 0.0, &r));
+    int sum = r.visible;
+    for (int i = 0; i < BST_WHY_COUNT; i++) {
+        sum += r.why[i];
+    }
+    assert_int_equal(r.targets, 5);
+    assert_int_equal(sum, 5);
+    assert_int_equal(r.seen, 0);
+    assert_int_equal(r.why[BST_WHY_NOT], 0);
+    tear_down(&f);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(earth_and_sun_are_where_the_geometry_has_them),
+        cmocka_unit_test(faint_and_fast_ones_are_left_out),
+        cmocka_unit_test(the_first_line_that_fits_counts),
+        cmocka_unit_test(one_target_goes_to_one_sensor_until_it_is_due_again),
+        cmocka_unit_test(a_target_is_given_up_in_time),
+        cmocka_unit_test(priority_and_waiting_decide),
+        cmocka_unit_test(a_survey_counts_every_target_once),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

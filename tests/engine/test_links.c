@@ -1,0 +1,225 @@
+/* A module that links sensors: its ports are there once for each, in their scopes. */
+#include "tests/engine/fake_module.h"
+
+static const bst_port sensor_ports[] = {
+    {.channel = "control_status", .direction = BST_PORT_OUT},
+    {.channel = "task", .direction = BST_PORT_IN, .flags = BST_PORT_OPTIONAL | BST_PORT_FEEDBACK},
+};
+static const bst_port link_ports[] = {
+    {.channel = "control_status", .direction = BST_PORT_IN, .flags = BST_PORT_OPTIONAL},
+    {.channel = "task", .direction = BST_PORT_OUT},
+};
+enum { STATUS, TASK, PORTS, SENSORS = 40 };
+static const bst_module_desc sensor_module = FAKE_DESC(sensor_ports),
+                             link_module = {.abi = BST_MODULE_ABI,
+                                            .role = "fake",
+                                            .type = "link",
+                                            .doc = "Links.",
+                                            .flags = BST_MODULE_LINKS,
+                                            .config_bytes = sizeof(fake *),
+                                            .ports = link_ports,
+                                            .port_count = PORTS,
+                                            .create = fake_create,
+                                            .step = fake_step,
+                                            .destroy = fake_destroy};
+
+/* value: its number; value2: the last task's object. A task is seen a tick after it was written. */
+static bst_status sensor_step(fake *self, struct bst_step *step) {
+    bst_control_status *status = bst_step_write(step, STATUS, NULL);
+    status->target_id = 100 * self->value + bst_step_tick(step);
+    bst_sample task = bst_step_latest(step, TASK);
+    if (bst_step_tick(step) == 0) {
+        assert_null(task.payload);
+    } else {
+        const bst_task *t = task.payload;
+        assert_int_equal(t->object, self->value);
+        assert_int_equal(t->id, 100 * self->value + (bst_step_tick(step) - 1) / 10 * 10);
+    }
+    return BST_OK;
+}
+
+static bst_status link_create(fake *self, const bst_module_env *env) {
+    (void)self;
+    assert_int_equal(env->member_count, SENSORS);
+    assert_null(env->knowledge);
+    assert_null(env->world); /* it does not say that it reads the truth */
+    for (int i = 0; i < SENSORS; i++) {
+        assert_int_equal(env->members[i].observer, i);
+    }
+    return BST_OK;
+}
+
+static bst_status link_step(fake *self, struct bst_step *step) {
+    (void)self;
+    for (int i = 0; i < SENSORS; i++) {
+        const bst_control_status *status =
+            bst_step_latest(step, bst_member_port(PORTS, i, STATUS)).payload;
+        /* writers step before it within a tick */
+        assert_int_equal(status->target_id, 100 * i + bst_step_tick(step));
+        bst_task *task = bst_step_write(step, bst_member_port(PORTS, i, TASK), NULL);
+        *task = (bst_task){.id = status->target_id, .object = i};
+    }
+    return BST_OK;
+}
+
+static bst_status count_tasks(void *user, const char *scope, const char *channel,
+                              const void *payload, int64_t tick) {
+    int *counts = user;
+    (void)tick;
+    if (strcmp(channel, "task") == 0) {
+        int sensor = atoi(scope + 1);
+        assert_int_equal(((const bst_task *)payload)->object, sensor);
+        counts[sensor]++;
+    }
+    return BST_OK;
+}
+
+static void every_sensor_has_its_own(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_engine *engine = fake_engine(&ctx, 10);
+    static fake sensors[SENSORS];
+    static char scopes[SENSORS][16], names[SENSORS][24];
+    static bst_fleet_member members[SENSORS];
+    fake *pointers[SENSORS], link = {.on_step = link_step, .on_create = link_create};
+    fake *link_pointer = &link;
+    int counts[SENSORS] = {0};
+    for (int i = 0; i < SENSORS; i++) {
+        sensors[i] = (fake){.on_step = sensor_step, .value = i};
+        pointers[i] = &sensors[i];
+        snprintf(scopes[i], sizeof scopes[i], "o%d/s", i);
+        snprintf(names[i], sizeof names[i], "o%d/s/fake", i);
+        members[i] = (bst_fleet_member){.scope = scopes[i], .observer = i};
+        bst_instance_spec spec = FAKE_SPEC(sensor_module, names[i], pointers[i], 1);
+        spec.scope = scopes[i];
+        fake_add(&ctx, engine, spec);
+    }
+    bst_instance_spec spec = FAKE_SPEC(link_module, "a_link", link_pointer, 10);
+    spec.scope = "";
+    spec.members = members;
+    spec.member_count = SENSORS;
+    fake_add(&ctx, engine, spec);
+    bst_assert_ok(&ctx, bst_engine_load(&ctx, engine));
+    const bst_engine_hooks hooks = {.user = counts, .message = count_tasks};
+    bst_engine_set_hooks(engine, &hooks);
+    bst_assert_ok(&ctx, bst_engine_run(&ctx, engine, 95));
+    assert_int_equal(link.steps, 10);
+    for (int i = 0; i < SENSORS; i++) {
+        assert_int_equal(sensors[i].steps, 95);
+        assert_int_equal(counts[i], 10);
+    }
+    bst_engine_free(engine);
+    assert_int_equal(link.destroyed, 1);
+}
+
+/* What the hooks see, as text. */
+typedef struct heard {
+    char *text;
+    size_t used;
+} heard;
+
+static void hear(heard *h, int64_t tick, const char *who, const char *what) {
+    h->used += (size_t)snprintf(h->text + h->used, 200, "%lld %s %s\n", (long long)tick, who, what);
+}
+
+static bst_status hear_message(void *user, const char *scope, const char *channel,
+                               const void *payload, int64_t tick) {
+    (void)payload;
+    hear(user, tick, scope, channel);
+    return BST_OK;
+}
+
+static bst_status hear_event(void *user, int64_t tick, const char *instance, const char *kind,
+                             const char *text) {
+    (void)kind;
+    hear(user, tick, instance, text);
+    return BST_OK;
+}
+
+/* Fails at tick value2; tells of every fifth tick. */
+static bst_status busy_step(fake *self, struct bst_step *step) {
+    if (bst_step_tick(step) == self->value2) {
+        bst_step_event(step, "end", "of %d", (int)self->value);
+        return bst_fail(bst_step_ctx(step), BST_ERR_NUMERIC, "number %d", (int)self->value);
+    }
+    if (bst_step_tick(step) % 5 == 0) {
+        bst_step_event(step, "tell", "tick of %d", (int)self->value);
+    }
+    bst_control_status *status = bst_step_write(step, STATUS, NULL);
+    status->target_id = self->value;
+    return BST_OK;
+}
+
+static bst_status quiet_link_step(fake *self, struct bst_step *step) {
+    (void)self;
+    bst_step_event(step, "tell", "link");
+    for (int i = 0; i < 4; i++) {
+        bst_task *task = bst_step_write(step, bst_member_port(PORTS, i, TASK), NULL);
+        task->object = i;
+    }
+    return BST_OK;
+}
+
+static bst_status play(heard *h, int threads, const int64_t fails[4], char message[200]) {
+    bst_ctx ctx = {0};
+    bst_engine *engine = fake_engine(&ctx, 10);
+    static const char *const scopes[] = {"o0/s", "o1/s", "o2/s", "o3/s"};
+    static const char *const names[] = {"o0/s/fake", "o1/s/fake", "o2/s/fake", "o3/s/fake"};
+    fake sensors[4], *pointers[4], link = {.on_step = quiet_link_step}, *link_pointer = &link;
+    bst_fleet_member members[4];
+    for (int i = 0; i < 4; i++) {
+        sensors[i] = (fake){.on_step = busy_step, .value = i, .value2 = fails[i]};
+        pointers[i] = &sensors[i];
+        members[i] = (bst_fleet_member){.scope = scopes[i], .observer = i};
+        bst_instance_spec spec = FAKE_SPEC(sensor_module, names[i], pointers[i], 1 + i);
+        spec.scope = scopes[i];
+        fake_add(&ctx, engine, spec);
+    }
+    bst_instance_spec spec = FAKE_SPEC(link_module, "link", link_pointer, 7);
+    spec.scope = "";
+    spec.members = members;
+    spec.member_count = 4;
+    fake_add(&ctx, engine, spec);
+    bst_assert_ok(&ctx, bst_engine_load(&ctx, engine));
+    if (threads > 1) {
+        bool parted;
+        bst_assert_ok(&ctx, bst_engine_part(&ctx, engine, threads, &parted));
+        assert_true(parted);
+    }
+    const bst_engine_hooks hooks = {.user = h, .message = hear_message, .event = hear_event};
+    bst_engine_set_hooks(engine, &hooks);
+    bst_status status = bst_engine_run(&ctx, engine, 100);
+    if (status == BST_OK) {
+        status = bst_engine_run(&ctx, engine, 203);
+    }
+    snprintf(message, 200, "%.199s", ctx.message);
+    bst_engine_free(engine);
+    return status;
+}
+
+static void threads_change_nothing_that_is_heard(void **state) {
+    (void)state;
+    const int64_t never[4] = {-1, -1, -1, -1}, some[4] = {-1, 180, 174, 180};
+    for (int k = 0; k < 2; k++) {
+        char message[2][200];
+        heard serial = {.text = test_calloc(1, 200000)}, parted = {.text = test_calloc(1, 200000)};
+        const int64_t *fails = k ? some : never;
+        bst_status one = play(&serial, 1, fails, message[0]);
+        assert_int_equal(one, k ? BST_ERR_NUMERIC : BST_OK);
+        assert_true(serial.used > 5000);
+        for (int threads = 2; threads <= 5; threads++) {
+            parted.used = 0;
+            assert_int_equal(play(&parted, threads, fails, message[1]), one);
+            assert_string_equal(serial.text, parted.text);
+            assert_string_equal(message[0], message[1]);
+        }
+        test_free(serial.text);
+        test_free(parted.text);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(every_sensor_has_its_own),
+                                       cmocka_unit_test(threads_change_nothing_that_is_heard)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,228 @@
+/* Who saw what: passes, gaps, custody and errors of made-up messages. */
+#include "sim/eval/sightings.h"
+#include "tests/world/world_support.h"
+
+#define FILE_ "\"elements_file\": \"scenarios/catalogue_2022-06.tle\""
+#define SENSOR_ "\"sensors\": [{" TEST_CAMERA "}]"
+
+static const char world_text[] =
+    "{\"world\": {\"star_catalogue\": \"embedded\", \"catalogues\": [{" FILE_
+    "}]}, \"observers\": [{\"name\": \"a\", \"orbit\": {" FILE_ ", \"norad\": 39089}, " SENSOR_
+    "}, {\"name\": \"b\", \"orbit\": {" FILE_ ", \"norad\": 25544}, " SENSOR_ "}]}";
+
+enum { RATE = 10 };
+
+typedef struct fixture {
+    bst_ctx ctx;
+    bst_world *world;
+    bst_sightings *sightings;
+    bst_pass passes[16];
+    int pass_count;
+    bst_sighting sums[16];
+    int sum_count;
+} fixture;
+
+static bst_status keep_pass(void *user, bst_ctx *ctx, const bst_pass *pass) {
+    fixture *f = user;
+    (void)ctx;
+    assert_true(f->pass_count < 16);
+    f->passes[f->pass_count++] = *pass;
+    return BST_OK;
+}
+
+static bst_status keep_sum(void *user, bst_ctx *ctx, const bst_sighting *sum) {
+    fixture *f = user;
+    (void)ctx;
+    assert_true(f->sum_count < 16);
+    f->sums[f->sum_count++] = *sum;
+    return BST_OK;
+}
+
+static void set_up(fixture *f, double custody_s) {
+    *f = (fixture){.world = test_world(world_text)};
+    bst_assert_ok(&f->ctx, bst_sightings_create(&f->ctx, f->world, RATE, custody_s, keep_pass, f,
+                                                &f->sightings));
+}
+
+static void tear_down(fixture *f) {
+    bst_sightings_free(f->sightings);
+    bst_world_free(f->world);
+}
+
+/* A frame of one object with its detection and its track: the camera looks along its own +z axis,
+ * GCRF; there is no aberration. */
+typedef struct shot {
+    int sensor, object;
+    double seconds;
+    bool dark, detected, taken_for_star, tracked;
+    double off_px, track_off_arcsec;
+} shot;
+
+static void take(fixture *f, shot s) {
+    static int64_t exposure;
+    const bst_camera *camera = bst_world_camera(f->world, s.sensor, 0);
+    double x = bst_camera_centre_x(camera) + 100.0, y = bst_camera_centre_y(camera);
+    bst_vec3 d = bst_camera_unproject(camera, x, y);
+    int64_t tick = (int64_t)(s.seconds * RATE);
+    bst_truth *truth = test_calloc(1, sizeof *truth + sizeof truth->items[0]);
+    *truth = (bst_truth){.exposure_id = ++exposure,
+                         .start_tick = tick,
+                         .end_tick = tick,
+                         .sun_m = {1.5e11, 0, 0},
+                         .count = s.object >= 0};
+    truth->items[0] = (bst_truth_item){.kind = BST_SOURCE_OBJECT,
+                                       .id = (uint32_t)s.object,
+                                       .flags = BST_TRUTH_IN_FIELD,
+                                       .x_mean_px = x,
+                                       .y_mean_px = y,
+                                       .electrons = s.dark ? 0.0 : 1000.0,
+                                       .snr = s.dark ? 0.0 : 20.0 + s.seconds,
+                                       .v_mag = 12.0,
+                                       .range_m = 1e6 + s.seconds};
+    bst_vec3_to_radec(d, &truth->items[0].ra_rad, &truth->items[0].dec_rad);
+    bst_assert_ok(&f->ctx, bst_sightings_truth(&f->ctx, f->sightings, s.sensor, truth));
+    bst_detections *found = test_calloc(1, sizeof *found + sizeof found->items[0]);
+    *found = (bst_detections){.exposure_id = exposure, .count = s.detected};
+    found->items[0] = (bst_detection){.x_px = x + s.off_px,
+                                      .y_px = y,
+                                      .label = s.taken_for_star ? BST_LABEL_STAR : BST_LABEL_OBJECT,
+                                      .star_id = s.taken_for_star ? 7 : 0};
+    bst_sightings_detections(f->sightings, s.sensor, found);
+    bst_tracks *tracks = test_calloc(1, sizeof *tracks + sizeof tracks->items[0]);
+    *tracks = (bst_tracks){.exposure_id = exposure,
+                           .tick = tick,
+                           .attitude = {.valid = true, .q_cam_from_gcrf = {0, 0, 0, 1}},
+                           .count = s.tracked};
+    bst_vec3 off = {0, s.track_off_arcsec * BST_ARCSEC_RAD, 0};
+    tracks->items[0] = (bst_track){.status = BST_TRACK_CONFIRMED,
+                                   .target_of_interest = true,
+                                   .direction_gcrf = bst_vec3_unit(bst_vec3_add(d, off))};
+    bst_sightings_tracks(f->sightings, s.sensor, tracks);
+    test_free(truth);
+    test_free(found);
+    test_free(tracks);
+}
+
+static void passes_gaps_and_custody(void **state) {
+    (void)state;
+    fixture f;
+    set_up(&f, 100.0);
+    /* sensor 0 sees object 2 at 100, 110, 120 s, not at 130; again at 400 */
+    for (int k = 0; k < 4; k++) {
+        take(&f, (shot){.object = 2, .seconds = 100.0 + 10.0 * k, .detected = k < 3});
+    }
+    take(&f, (shot){.object = -1, .seconds = 300.0});
+    assert_int_equal(f.pass_count, 1); /* it is over once 60 s have gone by */
+    take(&f, (shot){.object = 2, .seconds = 400.0, .detected = true});
+    /* sensor 1 sees it at 450 s, and object 3 in the dark, and one that it takes for a star */
+    take(&f, (shot){.sensor = 1, .object = 2, .seconds = 450.0, .detected = true});
+    take(&f, (shot){.sensor = 1, .object = 3, .seconds = 460.0, .dark = true});
+    take(&f,
+         (shot){
+             .sensor = 1, .object = 4, .seconds = 470.0, .detected = true, .taken_for_star = true});
+    bst_assert_ok(&f.ctx, bst_sightings_finish(&f.ctx, f.sightings, 1000.0));
+    assert_int_equal(f.pass_count, 5);
+    assert_int_equal(f.passes[0].frames, 4);
+    assert_int_equal(f.passes[0].lit, 4);
+    assert_int_equal(f.passes[0].detected, 3);
+    /* times are tenths of seconds */
+    bst_assert_close(f.passes[0].start_s, 100.0, 1e-9);
+    bst_assert_close(f.passes[0].end_s, 130.0, 1e-9);
+    bst_assert_close(f.passes[0].first_s, 100.0, 1e-9);
+    bst_assert_close(f.passes[0].last_s, 120.0, 1e-9);
+    bst_assert_close(f.passes[0].snr, 150.0, 1e-9);
+    bst_assert_close(f.passes[0].range_m, 1e6 + 100.0, 1e-3);
+    bst_assert_ok(&f.ctx, bst_sightings_each(&f.ctx, f.sightings, keep_sum, &f));
+    assert_int_equal(f.sum_count, 7); /* 2: all, 0, 1; 3: all, 1; 4: all, 1 */
+    const bst_sighting *all = &f.sums[0], *own = &f.sums[1];
+    assert_int_equal(all->sensor, -1);
+    assert_int_equal(all->object, 2);
+    assert_int_equal(all->passes, 3);
+    assert_int_equal(all->detected, 5);
+    assert_int_equal(all->revisits, 1); /* 280 s; 50 s are no revisit */
+    bst_assert_close(all->revisit_sum_s, 280.0, 1e-9);
+    bst_assert_close(all->longest_gap_s, 550.0, 1e-9); /* to the end */
+    /* 10 + 10 + 100 of 280 + 50 + 100 of the rest */
+    bst_assert_close(all->custody_s, 270.0, 1e-9);
+    assert_int_equal(own->sensor, 0);
+    assert_int_equal(own->passes, 2);
+    bst_assert_close(own->last_s, 400.0, 1e-9);
+    bst_assert_close(own->longest_gap_s, 600.0, 1e-9);
+    assert_int_equal(f.sums[3].object, 3);
+    assert_int_equal(f.sums[3].lit, 0);
+    assert_true(isnan(f.sums[3].first_s));
+    bst_assert_close(f.sums[3].longest_gap_s, 1000.0, 1e-9);
+    assert_int_equal(f.sums[5].detected, 0);
+    bst_sightings_figures sum;
+    bst_sightings_summary(f.sightings, &sum);
+    assert_int_equal(sum.objects, 5);
+    assert_int_equal(sum.in_field, 3);
+    assert_int_equal(sum.seen, 1);
+    assert_int_equal(sum.passes, 5);
+    assert_int_equal(sum.passes_seen, 3);
+    bst_assert_close(sum.custody_fraction, 0.27, 1e-12);
+    bst_assert_close(sum.custody_fraction_all, 0.27 / 5.0, 1e-12);
+    bst_assert_close(sum.gap_mean_s, 550.0, 1e-9);
+    tear_down(&f);
+}
+
+static void errors_are_angles_to_the_truth(void **state) {
+    (void)state;
+    fixture f;
+    set_up(&f, 100.0);
+    take(&f, (shot){.object = 1,
+                    .seconds = 0.0,
+                    .detected = true,
+                    .off_px = 0.3,
+                    .tracked = true,
+                    .track_off_arcsec = 0.5});
+    take(&f, (shot){.object = 1,
+                    .seconds = 2.0,
+                    .detected = true,
+                    .off_px = -0.4,
+                    .tracked = true,
+                    .track_off_arcsec = -1.2});
+    /* a track 20 arcsec off is something else: 5 px are 15 */
+    take(&f, (shot){.object = 1, .seconds = 4.0, .tracked = true, .track_off_arcsec = 20.0});
+    bst_assert_ok(&f.ctx, bst_sightings_finish(&f.ctx, f.sightings, 10.0));
+    assert_int_equal(f.pass_count, 1);
+    const bst_pass *pass = &f.passes[0];
+    assert_int_equal(pass->detected, 2);
+    assert_int_equal(pass->tracked, 2);
+    assert_int_equal(pass->target, 2);
+    /* 3 arcsec a pixel, less by the tangent's fall over 100 px: 2e-6 of it; light is deflected by
+     * the Sun by 4 mas, which the frame's light takes out of what is seen */
+    double rms = 3.0 * sqrt((0.09 + 0.16) / 2.0);
+    bst_assert_close(bst_sighting_rms(&pass->place), rms, 0.01);
+    bst_assert_close(pass->place.greatest, 1.2, 0.01);
+    bst_assert_close(bst_sighting_rms(&pass->track), sqrt((0.25 + 1.44) / 2.0), 1e-6);
+    tear_down(&f);
+}
+
+static void tasks_are_counted_by_their_ends(void **state) {
+    (void)state;
+    fixture f;
+    set_up(&f, 100.0);
+    const int ends[] = {BST_TASK_NONE, BST_TASK_DONE, BST_TASK_DONE, BST_TASK_LOST,
+                        BST_TASK_NOT_FOUND};
+    for (int i = 0; i < 5; i++) {
+        bst_task task = {.id = i + 1, .object = i == 4 ? -1 : i, .before = ends[i]};
+        bst_sightings_task(f.sightings, &task);
+    }
+    bst_assert_ok(&f.ctx, bst_sightings_finish(&f.ctx, f.sightings, 10.0));
+    bst_sightings_figures sum;
+    bst_sightings_summary(f.sightings, &sum);
+    assert_int_equal(sum.tasks, 4);
+    assert_int_equal(sum.tasks_done, 2);
+    assert_int_equal(sum.tasks_not_found, 1);
+    assert_int_equal(sum.tasks_lost, 1);
+    assert_int_equal(sum.seen, 0);
+    tear_down(&f);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(passes_gaps_and_custody),
+                                       cmocka_unit_test(errors_are_angles_to_the_truth),
+                                       cmocka_unit_test(tasks_are_counted_by_their_ends)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
