@@ -40,6 +40,9 @@ int bst_guidance_zones(const bst_guidance *g, const bst_nav_telemetry *nav,
 
 bst_quat bst_guidance_body(const bst_guidance *g, int64_t tick) {
     double dt = (double)(tick - g->mount.tick) / g->env.tick_rate_hz;
+    if (g->roll_given) {
+        return bst_guidance_rolled(g, dt, g->roll_rad);
+    }
     bst_vec3 turn = bst_vec3_scale(g->mount.rate_body_radps, -dt);
     return bst_quat_mul(bst_quat_from_rotvec(turn), g->mount.q_body_from_gcrf);
 }
@@ -446,6 +449,8 @@ bst_status bst_guidance_command(bst_ctx *ctx, bst_guidance *g, const bst_nav_tel
     }
     BST_TRY(shape(ctx, g, boresight, command, give));
     if (*give) {
+        command->roll_given = g->roll_given;
+        command->roll_rad = g->roll_rad;
         g->last = *command;
         g->commanded = true;
     }

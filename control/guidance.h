@@ -21,7 +21,7 @@ typedef struct bst_guidance_config {
     int32_t slews;
     double slew_above_deg, limits_share;
     double look_ahead_s, look_ahead_every_s, loss_tolerance_px;
-    bool acceleration;
+    bool acceleration, body_roll;
 } bst_guidance_config;
 
 extern const bst_config_desc bst_guidance_config_table[];
@@ -47,13 +47,14 @@ typedef enum bst_guidance_event_kind {
     BST_GUIDANCE_LOSS,        /* it will be lost for a while by the mount's limits */
     BST_GUIDANCE_DETOUR,      /* a slew goes round keep-out cones */
     BST_GUIDANCE_NO_WAY,      /* keep-out cones leave no way there */
+    BST_GUIDANCE_ROLL,        /* the body rolls out of the way of the pole */
 } bst_guidance_event_kind;
 
 typedef struct bst_guidance_event {
     int kind;
     int reason;             /* bst_reach */
     double from_s, until_s; /* seconds since the epoch; INFINITY: not within look_ahead_s */
-    double length_rad;      /* of a detour */
+    double length_rad;      /* of a detour, a roll */
 } bst_guidance_event;
 
 #define BST_GUIDANCE_EVENTS 4 /* greatest number in one command */
@@ -89,6 +90,8 @@ typedef struct bst_guidance {
     int reach;          /* bst_reach, as last told */
     bool no_way;        /* told */
     int64_t ahead_tick; /* of the next look ahead */
+    bool roll_given;    /* the body has been asked for */
+    double roll_rad;    /* this roll */
     double told_from_s, told_until_s; /* the loss ahead that was told; INFINITY: none */
     bst_guidance_event events[BST_GUIDANCE_EVENTS];
     int event_count;
@@ -115,8 +118,17 @@ bst_status bst_guidance_command(bst_ctx *ctx, bst_guidance *guidance, const bst_
 int bst_guidance_zones(const bst_guidance *guidance, const bst_nav_telemetry *nav,
                        bst_zone zones[BST_ZONE_KINDS]);
 
-/* Body attitude by the mount's status carried to a tick. */
+/* Body attitude by the mount's status carried to a tick: at its rate, the roll that it was asked
+ * for within its limits. */
 bst_quat bst_guidance_body(const bst_guidance *guidance, int64_t tick);
+
+/* guidance_roll.c: the body `seconds` after the mount's status, on its way to a roll. */
+bst_quat bst_guidance_rolled(const bst_guidance *guidance, double seconds, double roll_rad);
+/* Chooses the least roll of the body by which what `problem` expects (seconds from now) can be
+ * followed up to horizon_s without loss; *found false: there is none. */
+bst_status bst_guidance_choose_roll(bst_ctx *ctx, bst_guidance *guidance,
+                                    const bst_reach_problem *problem, double horizon_s,
+                                    bool *found) BST_MUST_CHECK;
 
 /* guidance_ahead.c: looks look_ahead_s ahead of `tick` and notes what changes as events. */
 bst_status bst_guidance_look_ahead(bst_ctx *ctx, bst_guidance *guidance,

@@ -100,7 +100,15 @@ bst_status bst_guidance_look_ahead(bst_ctx *ctx, bst_guidance *g, int64_t tick) 
         double from = fmax(when - RUN_UP_S, 0.0);
         BST_TRY(bst_reach_chase(ctx, &problem, from, horizon,
                                 g->config.loss_tolerance_px * g->env.pixel_rad, &loss, 1, &losses));
-        if (losses > 0) {
+        bool rolls = false;
+        double before = g->roll_rad;
+        if (losses > 0 && g->config.body_roll) {
+            BST_TRY(bst_guidance_choose_roll(ctx, g, &problem, horizon, &rolls));
+        }
+        if (rolls && g->event_count < BST_GUIDANCE_EVENTS) {
+            g->events[g->event_count++] = (bst_guidance_event){
+                .kind = BST_GUIDANCE_ROLL, .reason = why, .length_rad = g->roll_rad - before};
+        } else if (losses > 0) {
             tell_ahead(g, now_s, BST_GUIDANCE_LOSS, why, loss.from_s, loss.until_s);
         }
         return BST_OK;
@@ -132,6 +140,10 @@ void bst_guidance_describe(const bst_guidance_event *event, char *text, size_t b
         case BST_GUIDANCE_DETOUR:
             snprintf(text, bytes, "slew round keep-out cones by %.1f deg %s",
                      event->length_rad / BST_DEG_RAD, until);
+            break;
+        case BST_GUIDANCE_ROLL:
+            snprintf(text, bytes, "the body rolls by %.1f deg, lest the target be %s",
+                     event->length_rad / BST_DEG_RAD, why);
             break;
         default:
             snprintf(text, bytes, "keep-out cones leave no way to the aim");

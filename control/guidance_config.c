@@ -29,5 +29,8 @@ const bst_config_desc bst_guidance_config_table[] = {
     BST_BOOL(G, acceleration, "false",
              "Commands carry the aim's acceleration: for lines of sight whose rate changes within "
              "a control period."),
+    BST_BOOL(G, body_roll, "false",
+             "A rigid_body spacecraft rolls about the axis of its pointing law where that keeps a "
+             "target out of the mount's keyhole that look_ahead_s sees coming."),
     BST_CONFIG_END};
 #undef G

@@ -121,7 +121,7 @@ static bst_status step(void *self, struct bst_step *s) {
     bst_quat ideal = bst_quat_look(direction, m->x_hint_gcrf);
     bst_quat body = m->platform.q_nominal_from_gcrf;
     if (m->platform.spacecraft) { /* follows what is believed of the body */
-        BST_TRY(bst_platform_step(s, &m->platform, n, (bst_vec3){0, 0, 0}));
+        BST_TRY(bst_platform_step(s, &m->platform, n, (bst_vec3){0, 0, 0}, NULL));
         body = m->platform.q_believed_from_gcrf;
     }
     bst_quat q_cam_from_body = bst_quat_mul(ideal, bst_quat_conj(body));

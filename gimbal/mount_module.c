@@ -64,7 +64,7 @@ static bst_status step(void *self, struct bst_step *s) {
     const bst_los_command *command = bst_gimbal_command(s, PORT_COMMAND, &m->base, &age);
     bool measure = n % m->base.telemetry_steps == 0;
     if (m->platform.spacecraft) {
-        BST_TRY(bst_platform_step(s, &m->platform, n, mount->reaction_nm));
+        BST_TRY(bst_platform_step(s, &m->platform, n, mount->reaction_nm, command));
     }
     bst_mount_body body = {.rate_radps = m->platform.body.rate_radps,
                            .q_believed_from_gcrf = m->platform.q_believed_from_gcrf,

@@ -213,4 +213,7 @@ void bst_platform_add_status(const bst_platform *platform, bst_quat q_body_seen_
     out->wheels_saturated = platform->wheels_saturated;
     out->rate_body_radps = platform->rate_believed_radps;
     out->q_body_from_gcrf = q_body_seen_from_gcrf;
+    if (platform->spacecraft) {
+        out->roll = bst_craft_at(platform->spacecraft)->roll;
+    }
 }

@@ -66,7 +66,10 @@ void bst_gimbal_base_free(bst_gimbal_base *base) {
 }
 
 bst_status bst_platform_step(struct bst_step *step, bst_platform *platform, int64_t n,
-                             bst_vec3 reaction_nm) {
+                             bst_vec3 reaction_nm, const bst_los_command *command) {
+    if (command && command->roll_given) {
+        bst_craft_command_roll(platform->spacecraft, command->roll_rad);
+    }
     bool saturated = platform->wheels_saturated, blind = platform->trackers_blind;
     BST_TRY(
         bst_platform_advance(bst_step_ctx(step), platform, n, bst_step_seconds(step), reaction_nm));

@@ -64,10 +64,11 @@ bst_status bst_gimbal_base_init(const bst_module_env *env, const bst_platform_co
 /* What it owns; a zeroed base is allowed. */
 void bst_gimbal_base_free(bst_gimbal_base *base);
 
-/* bst_platform_advance in a module's step, with an event and a count where wheels saturate or star
+/* bst_platform_advance in a module's step, the body's roll as commanded (NULL: nothing), with an
+ * event and a count where wheels saturate or star
  * trackers lose the stars, and an event when that is over. */
 bst_status bst_platform_step(struct bst_step *step, bst_platform *platform, int64_t n,
-                             bst_vec3 reaction_nm) BST_MUST_CHECK;
+                             bst_vec3 reaction_nm, const bst_los_command *command) BST_MUST_CHECK;
 
 /* The newest los_command of a port (NULL: none yet), and its age. */
 const bst_los_command *bst_gimbal_command(struct bst_step *step, int port,

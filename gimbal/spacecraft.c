@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include "gimbal/attitude_warm_up.h"
+#include "gimbal/axis.h"
 #include "gimbal/jitter.h"
 
 /* A measurement on its way from a star tracker. */
@@ -37,7 +38,8 @@ struct bst_craft {
     int64_t filter_step; /* plant step of the filter's estimate */
     bst_attitude_control control;
     bst_pointing_law law;
-    double roll_rad, roll_radps;
+    bst_axis roll; /* its shaper */
+    double roll_target_rad;
     bst_sky_grid grid;
     bst_craft_sky sky;
     bst_craft_now now;
@@ -59,9 +61,8 @@ bst_vec3 bst_craft_gyro_bias(const bst_craft *craft) {
     return craft->gyro.bias_radps;
 }
 
-void bst_craft_set_roll(bst_craft *craft, double roll_rad, double roll_radps) {
-    craft->roll_rad = roll_rad;
-    craft->roll_radps = roll_radps;
+void bst_craft_command_roll(bst_craft *craft, double roll_rad) {
+    craft->roll_target_rad = roll_rad;
 }
 
 void bst_craft_free(bst_craft *craft) {
@@ -255,6 +256,17 @@ static bst_status prepare(bst_ctx *ctx, bst_craft *craft, const bst_craft_config
     set_filter(craft, config, setup, q, rate);
     bst_attitude_control_spec spec = bst_attitude_control_of(config);
     bst_attitude_control_init(&craft->control, &spec);
+    if (craft->law.law != BST_LAW_FREE) {
+        const bst_axis_spec limits = {.rate_limit_radps = spec.rate_limit_radps,
+                                      .accel_limit_radps2 = spec.accel_limit_radps2,
+                                      .natural_frequency_radps = spec.natural_radps,
+                                      .damping = spec.damping,
+                                      .dt_s = spec.dt_s};
+        bst_axis_init(&craft->roll, &limits);
+        craft->now.roll = (bst_body_roll){.axis_body = craft->law.axis,
+                                          .rate_limit_radps = spec.rate_limit_radps,
+                                          .accel_limit_radps2 = spec.accel_limit_radps2};
+    }
     return BST_OK;
 }
 
@@ -407,6 +419,25 @@ static double unresolved(const bst_craft *craft) {
     return sum;
 }
 
+/* Brings the commanded roll a step of the controller on. */
+static void roll(bst_craft *craft) {
+    bst_axis *axis = &craft->roll;
+    bst_body_roll *now = &craft->now.roll;
+    if (craft->roll_target_rad == 0.0 && axis->reference_rad == 0.0 &&
+        axis->reference_radps == 0.0) {
+        return;
+    }
+    now->angle_rad = axis->reference_rad;
+    now->rate_radps = axis->reference_radps;
+    double h = axis->spec.dt_s, accel = bst_axis_shape(axis, craft->roll_target_rad, 0.0);
+    craft->now.reference = bst_attitude_reference_rolled(&craft->now.reference, now->axis_body,
+                                                         now->angle_rad, now->rate_radps);
+    craft->now.reference.accel_radps2 =
+        bst_vec3_axpy(craft->now.reference.accel_radps2, accel, now->axis_body);
+    axis->reference_rad += axis->reference_radps * h + 0.5 * accel * h * h;
+    axis->reference_radps += accel * h;
+}
+
 static bst_status control(bst_ctx *ctx, bst_craft *craft, int64_t n, double seconds) {
     BST_TRY(bst_sky_grid_at(&craft->grid, ctx, seconds, &craft->sky, &craft->now.reference));
     const bst_body_state *body = &craft->now.body;
@@ -420,13 +451,10 @@ static bst_status control(bst_ctx *ctx, bst_craft *craft, int64_t n, double seco
                                                    body->q_body_from_gcrf, craft->sky.position_m,
                                                    craft->sky.sun_m, craft->sky.sunlit, momentum);
     craft->now.unresolved_rad2 = unresolved(craft);
-    if (craft->roll_rad != 0.0 || craft->roll_radps != 0.0) {
-        craft->now.reference = bst_attitude_reference_rolled(&craft->now.reference, craft->law.axis,
-                                                             craft->roll_rad, craft->roll_radps);
-    }
     if (craft->law.law == BST_LAW_FREE) {
         return BST_OK;
     }
+    roll(craft);
     /* the estimate stands at the newest gyro sample */
     double age = (double)(n - craft->filter_step) * craft->dt_s;
     bst_quat q =

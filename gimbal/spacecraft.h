@@ -7,6 +7,7 @@
 #include "gimbal/body_state.h"
 #include "gimbal/spacecraft_config.h"
 #include "gimbal/spacecraft_sky.h"
+#include "sim/core/messages.h"
 
 typedef struct bst_craft bst_craft;
 
@@ -45,6 +46,7 @@ typedef struct bst_craft_now {
     double wheel_radps[BST_WHEELS_MOST];
     unsigned wheel_flags;   /* BST_WHEELS_..., of the controller's latest step */
     bool tracked;           /* a star tracker saw stars at its latest measurement */
+    bst_body_roll roll;     /* as the reference has it */
     double unresolved_rad2; /* variance of the body's shake about one axis, the mean of
                                the three, that is not between the steps */
 } bst_craft_now;
@@ -56,8 +58,8 @@ const bst_attitude_filter *bst_craft_filter(const bst_craft *craft);
 /* True bias of its gyro, rad/s. */
 bst_vec3 bst_craft_gyro_bias(const bst_craft *craft);
 
-/* From now on the body is turned about the law's axis by roll_rad more than roll_deg, at a rate; at
- * once, so that who commands keeps to what the wheels can follow. */
-void bst_craft_set_roll(bst_craft *craft, double roll_rad, double roll_radps);
+/* The wanted attitude turns about the law's axis to roll_rad more than roll_deg, within the limits
+ * of a slew. Of no effect with the law `free`. */
+void bst_craft_command_roll(bst_craft *craft, double roll_rad);
 
 #endif

@@ -50,7 +50,7 @@ static bst_status step(void *self, struct bst_step *s) {
     const bst_los_command *command = bst_gimbal_command(s, PORT_COMMAND, &m->base, &age);
     bool measure = n % m->base.telemetry_steps == 0;
     if (plant->platform.spacecraft) { /* without reaction: a mount of this type has no inertia */
-        BST_TRY(bst_platform_step(s, &plant->platform, n, (bst_vec3){0, 0, 0}));
+        BST_TRY(bst_platform_step(s, &plant->platform, n, (bst_vec3){0, 0, 0}, command));
     }
     bst_two_axis_step(plant, command, age, measure);
     bst_gimbal_publish_sight(s, &plant->platform, plant->q_cam_from_gcrf);

@@ -529,13 +529,22 @@ void bst_background_row(const bst_background *b, int y, float *level, float *inv
     }
 }
 
-double bst_background_noise_at(const bst_background *b, double x_px, double y_px) {
+/* Bilinear between mesh centres. */
+static double value_at(const bst_background *b, const float *values, double x_px, double y_px) {
     float fx, fy;
     int i = mesh_position(x_px, b->mesh_px, b->columns, &fx);
     int j = mesh_position(y_px, b->mesh_px, b->rows, &fy);
     int right = b->columns > 1 ? 1 : 0, down = b->rows > 1 ? b->columns : 0;
-    const float *n = b->noise + (size_t)j * (size_t)b->columns + (size_t)i;
+    const float *n = values + (size_t)j * (size_t)b->columns + (size_t)i;
     float top = n[0] + fx * (n[right] - n[0]);
     float bottom = n[down] + fx * (n[down + right] - n[down]);
     return (double)(top + fy * (bottom - top));
+}
+
+double bst_background_level_at(const bst_background *b, double x_px, double y_px) {
+    return value_at(b, b->level, x_px, y_px);
+}
+
+double bst_background_noise_at(const bst_background *b, double x_px, double y_px) {
+    return value_at(b, b->noise, x_px, y_px);
 }

@@ -70,6 +70,7 @@ int bst_background_parts(const bst_background *background, int y, bst_row_part *
 void bst_background_row(const bst_background *background, int y, float *level,
                         float *inverse_noise);
 /* Noise at a place. */
+double bst_background_level_at(const bst_background *background, double x_px, double y_px);
 double bst_background_noise_at(const bst_background *background, double x_px, double y_px);
 
 #endif

@@ -7,6 +7,7 @@
 #include "imgproc/imgproc.h"
 #include "imgproc/locate.h"
 #include "imgproc/rows.h"
+#include "imgproc/sensor_order.h"
 #include "imgproc/streak_locate.h"
 #include "imgproc/streak_motion.h"
 #include "imgproc/tail.h"
@@ -235,41 +236,6 @@ static bst_status check_frame(bst_ctx *ctx, const bst_imgproc *ip, const bst_img
     return BST_OK;
 }
 
-static int row_of(const bst_found *found, int height) {
-    double y = found->source.shape.y_px;
-    return y > height - 1.0 ? height - 1 : y > 0.0 ? (int)y : 0;
-}
-
-static bool before_on_sensor(const bst_found *found, int a, int b) {
-    const bst_shape *p = &found[a].source.shape, *q = &found[b].source.shape;
-    if (p->y_px != q->y_px) {
-        return p->y_px < q->y_px;
-    }
-    return p->x_px != q->x_px ? p->x_px < q->x_px : a < b;
-}
-
-/* Orders ip->order: into rows of pixels by counting, within them one by one. */
-static void sort_on_sensor(bst_imgproc *ip, int count, int height) {
-    const bst_found *found = ip->locator.found;
-    memset(ip->row, 0, ((size_t)height + 1) * sizeof *ip->row);
-    for (int i = 0; i < count; i++) {
-        ip->row[row_of(&found[ip->order[i]], height) + 1]++;
-    }
-    for (int y = 0; y < height; y++) {
-        ip->row[y + 1] += ip->row[y];
-    }
-    for (int i = 0; i < count; i++) {
-        ip->order_swap[ip->row[row_of(&found[ip->order[i]], height)]++] = ip->order[i];
-    }
-    for (int i = 0; i < count; i++) {
-        int moved = ip->order_swap[i], at = i;
-        for (; at > 0 && before_on_sensor(found, moved, ip->order[at - 1]); at--) {
-            ip->order[at] = ip->order[at - 1];
-        }
-        ip->order[at] = moved;
-    }
-}
-
 /* A detection is to stand for the mean of its path, but a fit that does not follow the camera's
  * uneven turn finds the place where the source dwelt: half the bend away when most of the path is
  * there. */
@@ -434,7 +400,7 @@ static void take(bst_imgproc *ip, const part *p, bst_detections *out, int capaci
             lost++;
         }
     }
-    sort_on_sensor(ip, kept, ip->view.height);
+    bst_sensor_order(ip->locator.found, kept, ip->view.height, ip->order, ip->order_swap, ip->row);
     for (int i = 0; i < kept; i++) {
         out->items[out->count++] = report(ip, &ip->view, &ip->locator.found[ip->order[i]]);
     }
@@ -537,6 +503,14 @@ double bst_imgproc_v_limit(const bst_imgproc *ip, double snr) {
     return -2.5 * log10(electrons / (fmax(ip->exposure_s, 1e-9) * ip->electrons_per_s_v0));
 }
 
+void bst_imgproc_ground(const bst_imgproc *ip, double x_px, double y_px, double *level_e,
+                        double *noise_e) {
+    double x = (x_px - ip->view.origin_x_px) / ip->view.binning;
+    double y = (y_px - ip->view.origin_y_px) / ip->view.binning;
+    *level_e = bst_background_level_at(&ip->background, x, y);
+    *noise_e = bst_background_noise_at(&ip->background, x, y);
+}
+
 double bst_imgproc_streak_px(const bst_imgproc *ip) {
     return ip->streak_px;
 }
@@ -572,13 +546,15 @@ void bst_imgproc_append_stack(const bst_imgproc *ip, const bst_stack_found *foun
         }
         bst_detection *d = &out->items[out->count++];
         double width = 2.3548200450309493 * ip->left.sigma_px * ip->left.binning;
+        /* a stack's filter is the Gaussian that is like the PSF */
+        double like = ip->known ? ip->known->like_flux : 1.0;
         *d = (bst_detection){.x_px = f->x_px,
                              .y_px = f->y_px,
                              .cov_xx = f->cov_xx,
                              .cov_xy = f->cov_xy,
                              .cov_yy = f->cov_yy,
-                             .flux_e = f->flux_e,
-                             .flux_sigma_e = f->flux_sigma_e,
+                             .flux_e = f->flux_e / like,
+                             .flux_sigma_e = f->flux_sigma_e / like,
                              .snr = f->snr,
                              .length_px = width,
                              .width_px = width,
@@ -588,7 +564,7 @@ void bst_imgproc_append_stack(const bst_imgproc *ip, const bst_stack_found *foun
                              .rate_x_pxps = f->rate_x_pxps,
                              .rate_y_pxps = f->rate_y_pxps,
                              .rate_sigma_pxps = f->rate_sigma_pxps};
-        double rate = f->flux_e / fmax(ip->exposure_s, 1e-9);
+        double rate = d->flux_e / fmax(ip->exposure_s, 1e-9);
         d->v_mag = -2.5 * log10(rate / ip->electrons_per_s_v0);
         d->v_mag_sigma = bst_photometry_noise_mag(d);
     }

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "imgproc/background.h"
-#include "imgproc/cholesky.h"
+#include "sim/core/cholesky.h"
 
 enum { MAX_ITERATIONS = 15, MAX_SUMS = BST_FIT_MAX_PARAMETERS * (BST_FIT_MAX_PARAMETERS + 3) / 2 };
 

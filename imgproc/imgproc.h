@@ -124,6 +124,10 @@ void bst_imgproc_refine(bst_imgproc *ip, bst_detections *detections, int index,
 /* V magnitude of the faintest star that the latest frame could show at `snr`, with the shape
  * (point or streak) that stars had in it. */
 double bst_imgproc_v_limit(const bst_imgproc *ip, double snr);
+/* Background and its noise at a place of the sensor, per pixel of the latest frame; not in windows.
+ */
+void bst_imgproc_ground(const bst_imgproc *ip, double x_px, double y_px, double *level_e,
+                        double *noise_e);
 /* Length of the star streak that the latest frame was filtered for, px; 0: points only. */
 double bst_imgproc_streak_px(const bst_imgproc *ip);
 /* Whether stars moved further in the latest frame than is modelled (streak_max_px): what was found

@@ -7,6 +7,7 @@
 #include "imgproc/imgproc.h"
 #include "imgproc/sky.h"
 #include "imgproc/windows.h"
+#include "imgproc/wings.h"
 #include "sim/world/knowledge.h"
 #include "sim/world/photometry.h"
 
@@ -114,6 +115,7 @@ typedef struct imgproc_module {
     bst_windows windows; /* of the present frame; none: all of it */
     bst_stack *stack;    /* NULL: no stacks */
     bst_photometer photometer;
+    bst_wings *wings; /* NULL: the PSF has none */
 } imgproc_module;
 
 static void destroy(void *self) {
@@ -131,6 +133,7 @@ static void destroy(void *self) {
     bst_sky_free(&m->sky);
     bst_stack_free(m->stack);
     bst_photometer_free(&m->photometer);
+    bst_wings_free(m->wings);
     free(m);
 }
 
@@ -167,6 +170,10 @@ static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
                                  &m->stack));
     }
     BST_TRY(bst_photometer_create(env->ctx, (int)m->config->capacity, &m->photometer));
+    if (m->maps.psf) {
+        BST_TRY(bst_wings_create(env->ctx, m->maps.psf, (double)m->camera.width_px,
+                                 (double)m->camera.height_px, m->config->jitter_px, &m->wings));
+    }
     bst_env_set_capacity(env, PORT_DETECTIONS, (int)m->config->capacity);
     return BST_OK;
 }
@@ -345,6 +352,46 @@ static bst_status identify(imgproc_module *m, const lane *l, bst_ctx *ctx,
     return BST_OK;
 }
 
+static void ground_at(const void *user, double x_px, double y_px, bst_wings_ground *out) {
+    bst_imgproc_ground(user, x_px, y_px, &out->level_e, &out->noise_e);
+}
+
+/* Labels what the wings of bright stars pretend to be: catalogued ones, also beside the frame,
+ * where the attitude is that of stars, and what saturates. */
+static bst_status label_wings(imgproc_module *m, bst_ctx *ctx, const lane *l,
+                              const bst_frame_message *message, const bst_motion *motion,
+                              const bst_frame_knowledge *known, bst_detections *out) {
+    double dx = 0.0, dy = 0.0,
+           exposure_s = (double)(message->end_tick - message->start_tick) / (double)m->tick_rate_hz;
+    double bright_e =
+        bst_wings_bright_e(m->wings, out->noise_e / message->binning, out->threshold_snr);
+    if (motion) {
+        bst_motion_streak(motion, &m->camera, bst_camera_centre_x(&m->camera),
+                          bst_camera_centre_y(&m->camera), &dx, &dy);
+    }
+    bst_wings_begin(m->wings, dx, dy);
+    if (known->oriented) {
+        int expected = 0;
+        BST_TRY(bst_sky_expect(ctx, &m->sky, known->q_cam_from_gcrf, &known->light, message->window,
+                               BST_WINGS_REACH_PX,
+                               bst_camera_v_mag(&m->camera, bright_e / exposure_s), &expected));
+        for (int i = 0; i < expected; i++) {
+            const bst_expected_star *e = &m->sky.expected[i];
+            bst_wings_add(m->wings, e->x_px, e->y_px,
+                          exposure_s * bst_camera_electrons_per_s(&m->camera, e->v_mag));
+        }
+    }
+    for (int i = 0; i < out->count; i++) {
+        const bst_detection *d = &out->items[i];
+        if ((d->flags & BST_DETECTION_SATURATED) && d->flux_e > bright_e &&
+            !bst_wings_holds(m->wings, d->x_px, d->y_px, 5.0)) {
+            bst_wings_add(m->wings, d->x_px, d->y_px, d->flux_e);
+        }
+    }
+    bst_wings_label(m->wings, ground_at, l->ip, message->binning, out);
+    return BST_OK;
+}
+
 /* The camera's motion as telemetry tells it; false: not known. */
 static bool motion_of(struct bst_step *step, const bst_frame_message *message, bst_motion *motion) {
     bst_sample pointing = bst_step_latest(step, PORT_POINTING);
@@ -486,6 +533,9 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
     bst_photometry_apply(&zero_point, bst_camera_v_mag(&m->camera, 1.0), out);
     if (predictions) {
         known.predictions_age_s = (middle - (double)predictions->tick) / (double)m->tick_rate_hz;
+    }
+    if (m->wings && !smeared && m->windows.count == 0) {
+        BST_TRY(label_wings(m, ctx, l, message, oriented ? &motion : NULL, &known, out));
     }
     if (!smeared) {
         bst_discriminator_label(m->discriminator, &known, out);

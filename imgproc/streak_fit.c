@@ -5,11 +5,15 @@
 #include <string.h>
 
 #include "imgproc/background.h"
+#include "sim/core/cholesky.h"
 
 enum { PARAMETERS = 5, MAX_ITERATIONS = 20 };
 
 /* Change of chi-square below which a step moves the source by less than a tenth of its error. */
 static const double SETTLED = 0.01;
+
+/* Of a pivot, as a share of its diagonal element. */
+static const double LEAST_PIVOT = 1e-9;
 
 static const double PATH_STEP_PX = 0.02;
 
@@ -36,37 +40,14 @@ typedef struct normal {
     double a[PARAMETERS][PARAMETERS], g[PARAMETERS], square;
 } normal;
 
-/* Solves a x = b for symmetric positive definite a by Cholesky; false when it is not. */
+/* Solves a x = b for symmetric positive definite a; false when it is not. */
 static bool solve(double a[PARAMETERS][PARAMETERS], double *b) {
-    double l[PARAMETERS][PARAMETERS] = {{0}};
-    for (int j = 0; j < PARAMETERS; j++) {
-        for (int i = j; i < PARAMETERS; i++) {
-            double s = a[i][j];
-            for (int k = 0; k < j; k++) {
-                s -= l[i][k] * l[j][k];
-            }
-            if (i == j) {
-                if (!(s > 1e-9 * a[j][j]) || !(s < 1e280)) {
-                    return false;
-                }
-                l[j][j] = sqrt(s);
-            } else {
-                l[i][j] = s / l[j][j];
-            }
-        }
+    double l[PARAMETERS][PARAMETERS];
+    memcpy(l, a, sizeof l);
+    if (!bst_cholesky_factor(l[0], PARAMETERS, PARAMETERS, LEAST_PIVOT)) {
+        return false;
     }
-    for (int i = 0; i < PARAMETERS; i++) {
-        for (int k = 0; k < i; k++) {
-            b[i] -= l[i][k] * b[k];
-        }
-        b[i] /= l[i][i];
-    }
-    for (int i = PARAMETERS - 1; i >= 0; i--) {
-        for (int k = i + 1; k < PARAMETERS; k++) {
-            b[i] -= l[k][i] * b[k];
-        }
-        b[i] /= l[i][i];
-    }
+    bst_cholesky_solve(l[0], PARAMETERS, PARAMETERS, b);
     return true;
 }
 

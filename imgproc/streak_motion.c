@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "imgproc/cholesky.h"
+#include "sim/core/cholesky.h"
 
 /* Streaks fainter than this say nothing beside bright ones. */
 static const double LEAST_SNR = 20.0;

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/core/cholesky.h"
 #include "tracker/tangent.h"
 
 enum { PARAMETERS = 6, MAX_ITERATIONS = 60, MAX_ROUNDS = 6 };
@@ -186,34 +187,18 @@ static bool factor(const double n[PARAMETERS][PARAMETERS], double damping, doubl
     }
     for (int i = 0; i < PARAMETERS; i++) {
         for (int j = 0; j <= i; j++) {
-            double sum = i == j ? 1.0 + damping : n[i][j] / (size[i] * size[j]);
-            for (int k = 0; k < j; k++) {
-                sum -= l[i][k] * l[j][k];
-            }
-            if (i == j && !(sum > least)) {
-                return false;
-            }
-            l[i][j] = i == j ? sqrt(sum) : sum / l[j][j];
+            l[i][j] = i == j ? 1.0 + damping : n[i][j] / (size[i] * size[j]);
         }
     }
-    return true;
+    return bst_cholesky_factor(l[0], PARAMETERS, PARAMETERS, least / (1.0 + damping));
 }
 
 static void solve(const double l[PARAMETERS][PARAMETERS], const double size[PARAMETERS],
                   const double b[PARAMETERS], double x[PARAMETERS]) {
     for (int i = 0; i < PARAMETERS; i++) {
         x[i] = b[i] / size[i];
-        for (int k = 0; k < i; k++) {
-            x[i] -= l[i][k] * x[k];
-        }
-        x[i] /= l[i][i];
     }
-    for (int i = PARAMETERS - 1; i >= 0; i--) {
-        for (int k = i + 1; k < PARAMETERS; k++) {
-            x[i] -= l[k][i] * x[k];
-        }
-        x[i] /= l[i][i];
-    }
+    bst_cholesky_solve(l[0], PARAMETERS, PARAMETERS, x);
     for (int i = 0; i < PARAMETERS; i++) {
         x[i] /= size[i];
     }

@@ -75,7 +75,7 @@ static void note(found *f, int reason, double from_s, double until_s) {
     f->sum_s[reason] += until_s - from_s;
 }
 
-static void tell(bst_ctx *ctx, const char *name, const found *f, double duration_s) {
+static void tell(bst_ctx *ctx, const char *name, const found *f, double duration_s, bool rolls) {
     for (int reason = BST_REACH_BEHIND_EARTH; reason < BST_REACH_COUNT; reason++) {
         char more[80] = "", until[48] = "the end of the run";
         if (f->count[reason] == 0) {
@@ -88,8 +88,10 @@ static void tell(bst_ctx *ctx, const char *name, const found *f, double duration
         if (f->until_s[reason] < duration_s) {
             snprintf(until, sizeof until, "%.1f s", f->until_s[reason]);
         }
-        bst_log(ctx, BST_LOG_WARNING, "%s: the cue is out of reach from %.1f s until %s: %s%s",
-                name, f->from_s[reason], until, bst_reach_reason(reason), more);
+        bst_log(ctx, BST_LOG_WARNING, "%s: the cue is out of reach from %.1f s until %s: %s%s%s",
+                name, f->from_s[reason], until, bst_reach_reason(reason),
+                rolls && reason == BST_REACH_KEYHOLE ? ", unless the body rolls in time" : "",
+                more);
     }
 }
 
@@ -220,7 +222,8 @@ static bst_status check_sensor(bst_ctx *ctx, const bst_scenario *scenario, const
     double pixel = bst_camera_scale_rad(bst_knowledge_camera(s->knowledge));
     found f = {.count = {0}};
     BST_TRY(spans(ctx, s, scenario->duration_s, config->guidance.loss_tolerance_px * pixel, &f));
-    tell(ctx, name, &f, scenario->duration_s);
+    tell(ctx, name, &f, scenario->duration_s,
+         s->turns && s->law.law != BST_LAW_FREE && config->guidance.body_roll);
     return BST_OK;
 }
 

@@ -1,26 +1,31 @@
-/* boresight report: a page of HTML about a run. */
+/* boresight report: a page of HTML about a run or a study. */
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
 
 #include "sim/app/app.h"
 #include "sim/app/options.h"
-#include "sim/app/report.h"
+#include "sim/app/report_study.h"
 #include "sim/io/draft_file.h"
 
 static const char help_text[] =
-    "usage: boresight report RUN [options]\n"
+    "usage: boresight report RUN|STUDY [options]\n"
     "\n"
     "Writes one page of HTML about a run: what went wrong first, what was run, the figures, charts "
     "of pointing,\n"
     "track, detections and geometry over time, some frames with what was detected and what is "
     "true, "
     "and the events.\n"
-    "The file holds all that it shows and opens in a browser without a network. Interrupted and "
-    "killed runs are\n"
-    "reported as far as they go. Nothing that the run wrote is changed.\n"
+    "Of a study: failures first, what was varied, the figures and their intervals, charts against "
+    "each axis,\n"
+    "curves, histograms, sensitivity. The file holds all that it shows and opens in a browser "
+    "without a network.\n"
+    "Interrupted and killed runs are reported as far as they go. Nothing that a run or a study "
+    "wrote "
+    "is changed.\n"
     "\n"
     "  boresight report runs/demo --out demo.html\n"
+    "  boresight report studies/noise\n"
     "\n"
     "Exit code: 0; 1 when it cannot be made (no file is left then), or is made of a damaged "
     "folder; 2 "
@@ -40,16 +45,29 @@ static bst_status choose_path(bst_ctx *ctx, const char *given, const char *folde
     return n < 4096 ? BST_OK : bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", base);
 }
 
+static bool is_study(const char *folder) {
+    static const char *const names[] = {BST_STUDY_DATABASE, "study.json"};
+    bool found = false;
+    for (size_t k = 0; k < sizeof names / sizeof *names; k++) {
+        char path[4200];
+        struct stat info;
+        snprintf(path, sizeof path, "%.4096s/%s", folder, names[k]);
+        found = found || stat(path, &info) == 0;
+    }
+    return found;
+}
+
 /* *damaged: the page is made, of a folder that is not whole. */
 static bst_status make(bst_ctx *ctx, const char *folder, const char *out, char path[4096],
                        bool *damaged) {
     bst_run_reader *run = NULL;
     bst_draft draft;
     BST_TRY(choose_path(ctx, out, folder, path));
-    BST_TRY(bst_run_reader_open(ctx, folder, &run));
+    bool study = is_study(folder);
+    BST_TRY((study ? bst_run_reader_open_study : bst_run_reader_open)(ctx, folder, &run));
     bst_status status = bst_draft_open(ctx, path, &draft);
     if (status == BST_OK) {
-        status = bst_report_run(ctx, run, draft.stream);
+        status = (study ? bst_report_study : bst_report_run)(ctx, run, draft.stream);
         status = bst_draft_close(ctx, &draft, status);
     }
     const char *problem;
@@ -85,8 +103,8 @@ int bst_cmd_report(int argc, char **argv) {
         return BST_EXIT_OK;
     }
     if (arguments != 1) {
-        bst_fail(&ctx, BST_ERR_ARGUMENT, "one folder of a run is expected, %d were given",
-                 arguments);
+        bst_fail(&ctx, BST_ERR_ARGUMENT,
+                 "one folder of a run or a study is expected, %d were given", arguments);
         return bst_options_misuse(&ctx, "report");
     }
     char path[4096];

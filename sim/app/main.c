@@ -14,7 +14,7 @@ typedef struct command {
 static const command commands[] = {
     {"run", bst_cmd_run, "run a scenario"},
     {"info", bst_cmd_info, "what the folder of a run holds"},
-    {"report", bst_cmd_report, "a page of HTML about a run"},
+    {"report", bst_cmd_report, "a page of HTML about a run or a study"},
     {"export", bst_cmd_export, "frames, tables, orbits and observations of a run for others"},
     {"orbit", bst_cmd_orbit, "an orbit from the directions that a run measured"},
     {"check", bst_cmd_check, "validate a scenario and print it with every default written out"},

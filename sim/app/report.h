@@ -102,10 +102,11 @@ typedef struct bst_report_sensor {
     size_t count;
     bst_report_mode *modes; /* changes of mode */
     size_t mode_count;
-    double settle_s; /* the loop has settled by then; NAN: never */
-    bool has_truth;  /* the target's true place is known in some frame */
-    bool has_tracks; /* there is a tracker, and its work was recorded */
-    bool damaged;    /* some table could not be read to its end */
+    double settle_s;   /* the loop has settled by then; NAN: never */
+    bool has_truth;    /* the target's true place is known in some frame */
+    bool has_tracks;   /* there is a tracker, and its work was recorded */
+    size_t task_count; /* targets that it was given in turn */
+    bool damaged;      /* some table could not be read to its end */
 } bst_report_sensor;
 
 /* Reads it. `scene` is the run's world; NULL when it cannot be made again: what was recorded must
@@ -118,6 +119,8 @@ void bst_report_sensor_free(bst_report_sensor *sensor);
 
 /* ---- the parts ---- */
 
+/* The last part of the folder's path. */
+const char *bst_report_folder(const bst_run_reader *run, char text[256]);
 /* A message about a file of the run without the path of the run's folder: pages do not depend on
  * where it is. */
 const char *bst_report_local(const bst_run_reader *run, const char *message);
@@ -132,6 +135,10 @@ bst_status bst_report_plots(bst_ctx *ctx, FILE *out, const bst_report_sensor *se
  * cannot be read the page and the run's problems say so. */
 bst_status bst_report_frames(bst_ctx *ctx, FILE *out, bst_run_reader *run,
                              const bst_report_sensor *sensor) BST_MUST_CHECK;
+
+/* Who saw what, of a run with several objects and the table passes; nothing of others. */
+bst_status bst_report_sightings(bst_ctx *ctx, FILE *out, const bst_run_reader *run,
+                                double span_s) BST_MUST_CHECK;
 
 /* The whole page of a run. */
 bst_status bst_report_run(bst_ctx *ctx, bst_run_reader *run, FILE *out) BST_MUST_CHECK;

@@ -15,11 +15,18 @@
 /* Frames that are kept in memory; of longer runs every second, third ... one. */
 #define MOST_FRAMES 1000000
 
+typedef struct task {
+    double from_s;
+    int64_t object; /* -1: the sensor's own */
+} task;
+
 typedef struct reading {
     const bst_run_reader *run;
-    bst_run_scene *scene;               /* NULL: none */
-    int observer, camera_index, object; /* in the scene; object -1: none */
-    int64_t object_id;                  /* of the target in the table truth, -1: not known */
+    bst_run_scene *scene; /* NULL: none */
+    int observer, camera_index;
+    int64_t object; /* the sensor's own target: its number in the scenario and in truth; -1: none */
+    task *tasks;    /* what it was given to look for, in the order of time */
+    size_t task_count;
     bst_report_sensor *out;
 } reading;
 
@@ -112,12 +119,42 @@ static bst_report_frame *add_frame(reading *r, int64_t id, double mid_s) {
     return f;
 }
 
+static bst_status take_task(bst_ctx *ctx, reading *r, const bst_rows *rows) {
+    if ((r->task_count & (r->task_count - 1)) == 0) { /* room doubles */
+        task *more = realloc(r->tasks, (r->task_count ? 2 * r->task_count : 1) * sizeof *more);
+        if (!more) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the tasks");
+        }
+        r->tasks = more;
+    }
+    r->tasks[r->task_count++] = (task){bst_rows_real(rows, 0), bst_rows_int(rows, 1)};
+    return BST_OK;
+}
+
+/* What the sensor is to look at then; -1: nothing. */
+static int64_t object_at(const reading *r, double seconds) {
+    size_t low = 0, high = r->task_count;
+    while (low < high) { /* the first that begins later */
+        size_t middle = low + (high - low) / 2;
+        if (r->tasks[middle].from_s <= seconds) {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    return low > 0 && r->tasks[low - 1].object >= 0 ? r->tasks[low - 1].object : r->object;
+}
+
 /* The target as the world has it. */
 static bst_status look(bst_ctx *ctx, reading *r, bst_report_frame *f, bst_quat q_cam_from_gcrf,
                        double pixel_scale_arcsec) {
     bst_sight sight;
+    int64_t object = object_at(r, f->mid_s);
+    if (object < 0 || object >= bst_world_object_count(r->scene->world)) {
+        return BST_OK;
+    }
     bst_status status =
-        bst_view_sight(ctx, r->scene->view, r->observer, r->object, f->mid_s, &sight);
+        bst_view_sight(ctx, r->scene->view, r->observer, (int)object, f->mid_s, &sight);
     if (status == BST_ERR_NUMERIC) {
         return BST_OK; /* decayed */
     }
@@ -188,7 +225,7 @@ static bst_status take_exposure(bst_ctx *ctx, reading *r, const bst_rows *rows) 
     if (isfinite(distance)) {
         BST_TRY(bst_itrf_to_geodetic(ctx, itrf, &f->latitude_rad, &f->longitude_rad, &height));
     }
-    return r->object >= 0 ? look(ctx, r, f, q, bst_rows_real(rows, 17)) : BST_OK;
+    return look(ctx, r, f, q, bst_rows_real(rows, 17));
 }
 
 static bst_status take_frame(bst_ctx *ctx, reading *r, const bst_rows *rows) {
@@ -234,7 +271,7 @@ static bst_status read_frames(bst_ctx *ctx, reading *r) {
 static bst_status take_truth(bst_ctx *ctx, reading *r, const bst_rows *rows) {
     (void)ctx;
     bst_report_frame *f = find(r, bst_rows_int(rows, 0));
-    if (!f) {
+    if (!f || bst_rows_int(rows, 12) != object_at(r, f->mid_s)) {
         return BST_OK;
     }
     f->in_field = bst_rows_int(rows, 3) == 1;
@@ -341,19 +378,25 @@ static bst_status take_size(bst_ctx *ctx, reading *r, const bst_rows *rows) {
     return BST_OK;
 }
 
+#define TRUTH_COLUMNS                                                                            \
+    "exposure_id, x_mid_px, y_mid_px, in_field, snr, occulted, sunlit_fraction, v_mag, range_m," \
+    " phase_deg, ra_deg, dec_deg, id FROM truth WHERE sensor = ?1 AND kind = 'object'"
+
 static bst_status read_all(bst_ctx *ctx, reading *r) {
     bst_report_sensor *s = r->out;
     bool missing;
     BST_TRY(each_row(
         ctx, r, "SELECT width_px, height_px, pixel_scale_arcsec FROM sensors WHERE sensor = ?1", 0,
         take_size, &missing));
+    BST_TRY(each_row(ctx, r, "SELECT time_s, object FROM tasks WHERE sensor = ?1 ORDER BY rowid", 0,
+                     take_task, &missing));
     BST_TRY(read_frames(ctx, r));
-    if (r->object_id >= 0) {
+    /* of one target only its own rows are asked for */
+    bool one = r->task_count == 0;
+    if (r->object >= 0 || !one) {
         BST_TRY(each_row(ctx, r,
-                         "SELECT exposure_id, x_mid_px, y_mid_px, in_field, snr, occulted,"
-                         " sunlit_fraction, v_mag, range_m, phase_deg, ra_deg, dec_deg FROM truth"
-                         " WHERE sensor = ?1 AND kind = 'object' AND id = ?2",
-                         r->object_id, take_truth, &missing));
+                         one ? "SELECT " TRUTH_COLUMNS " AND id = ?2" : "SELECT " TRUTH_COLUMNS,
+                         r->object, take_truth, &missing));
     }
     BST_TRY(each_row(ctx, r,
                      "SELECT exposure_id, detections, stars_identified FROM detection_frames"
@@ -374,7 +417,7 @@ bst_status bst_report_read(bst_ctx *ctx, const bst_run_reader *run, bst_run_scen
     *out = (bst_report_sensor){
         .sensor = *sensor, .every = 1, .settle_s = settle_s, .pixel_scale_arcsec = NAN};
     snprintf(out->name, sizeof out->name, "%s/%s", sensor->observer, sensor->name);
-    reading r = {.run = run, .scene = scene, .object = -1, .object_id = -1, .out = out};
+    reading r = {.run = run, .scene = scene, .object = -1, .out = out};
     bst_ctx unheard = {0};
     if (!bst_run_reader_has_tables(run) || sensor->index < 0) {
         return BST_OK;
@@ -384,10 +427,12 @@ bst_status bst_report_read(bst_ctx *ctx, const bst_run_reader *run, bst_run_scen
         r.scene = NULL;
     }
     if (sensor->target[0]) {
-        r.object = r.scene ? bst_world_find_object(r.scene->world, sensor->target) : -1;
-        r.object_id = find_object(run, sensor->target);
+        r.object = r.scene ? bst_world_find_object(r.scene->world, sensor->target)
+                           : find_object(run, sensor->target);
     }
     bst_status status = read_all(ctx, &r);
+    out->task_count = r.task_count;
+    free(r.tasks);
     if (status != BST_OK) {
         bst_report_sensor_free(out);
     }

@@ -15,14 +15,53 @@ size_t bst_report_fill(const bst_report_drawing *d, bst_report_quantity quantity
     return numbers;
 }
 
-static void put_modes(const bst_report_drawing *d, const bst_chart *c) {
+/* The last mode that began by then; -1: none. *k goes on from call to call. */
+static int mode_at(const bst_report_sensor *s, double seconds, size_t *k) {
+    while (*k + 1 < s->mode_count && s->modes[*k + 1].from_s <= seconds) {
+        (*k)++;
+    }
+    return s->mode_count > 0 && s->modes[*k].from_s <= seconds ? s->modes[*k].mode : -1;
+}
+
+static void find_spans(const bst_report_drawing *d, bst_report_spans *out) {
     const bst_report_sensor *s = d->sensor;
-    for (size_t i = 0; i < s->mode_count; i++) {
-        double from = s->modes[i].from_s / d->unit_s;
-        double to = i + 1 < s->mode_count ? s->modes[i + 1].from_s / d->unit_s : c->x.high;
-        if (s->modes[i].mode >= 0 && to > from && from < c->x.high) {
-            bst_chart_band(c, from, to, BST_CHART_MODE + s->modes[i].mode,
-                           bst_mode_name(s->modes[i].mode));
+    double end = d->span_s / d->unit_s;
+    size_t k = 0;
+    out->count = 0;
+    out->thinned = s->mode_count > BST_REPORT_SPANS;
+    int parts = out->thinned ? BST_REPORT_SPANS : (int)s->mode_count;
+    for (int i = 0; i < parts; i++) {
+        double from = end * i / parts, to = end * (i + 1) / parts;
+        int mode = out->thinned ? mode_at(s, 0.5 * (from + to) * d->unit_s, &k) : s->modes[i].mode;
+        if (!out->thinned) {
+            from = s->modes[i].from_s / d->unit_s;
+            to = i + 1 < parts ? s->modes[i + 1].from_s / d->unit_s : end;
+        }
+        bool more =
+            out->count > 0 && out->mode[out->count - 1] == mode && out->to[out->count - 1] == from;
+        if (more) {
+            out->to[out->count - 1] = to;
+        } else if (mode >= 0 && to > from) {
+            out->from[out->count] = from;
+            out->to[out->count] = to;
+            out->mode[out->count++] = mode;
+        }
+    }
+}
+
+static void put_modes(const bst_report_drawing *d, const bst_chart *c) {
+    const bst_report_spans *s = d->modes;
+    for (int mode = 0; mode < BST_MODE_COUNT; mode++) {
+        double from[BST_REPORT_SPANS], to[BST_REPORT_SPANS];
+        size_t n = 0;
+        for (int i = 0; i < s->count; i++) {
+            if (s->mode[i] == mode) {
+                from[n] = s->from[i];
+                to[n++] = s->to[i];
+            }
+        }
+        if (n > 0) {
+            bst_chart_bands(c, from, to, n, BST_CHART_MODE + mode, bst_mode_name(mode));
         }
     }
 }
@@ -72,9 +111,10 @@ bst_report_statistics bst_report_measure(double *values, size_t n) {
     return r;
 }
 
-void bst_report_histogram(FILE *out, const char *name, const char *label, const double *values,
-                          size_t n, double low, double high, int bins, int colour,
-                          double (*density)(double x, const void *user), const void *user) {
+void bst_report_histogram(FILE *out, const char *name, const char *label, const char *what,
+                          const double *values, size_t n, double low, double high, int bins,
+                          int colour, double (*density)(double x, const void *user),
+                          const void *user) {
     enum { MOST = 64, CURVE = 120 };
     double counts[MOST] = {0}, top = 0.0, x[CURVE], y[CURVE], width = (high - low) / bins;
     size_t total = 0;
@@ -100,7 +140,7 @@ void bst_report_histogram(FILE *out, const char *name, const char *label, const 
                    .width = 360.0,
                    .height = 230.0,
                    .x = {.label = label, .low = low, .high = high},
-                   .y = {.label = "frames", .low = 0.0, .high = fmax(1.0, 1.08 * top)}};
+                   .y = {.label = what, .low = 0.0, .high = fmax(1.0, 1.08 * top)}};
     bst_chart_begin(&c);
     for (int i = 0; i < bins; i++) {
         if (counts[i] > 0.0) {
@@ -427,8 +467,8 @@ static void histogram_of_axis(const bst_report_drawing *d, bst_report_quantity q
     double law[2] = {m.median, fmax(inner, 1e-9)}, half = 5.0 * law[1];
     char caption[160], words[2][32];
     bst_page_figure(d->out, BST_PAGE_THIRD);
-    bst_report_histogram(d->out, label, label, d->y, n, m.median - half, m.median + half, 40,
-                         colour, normal, law);
+    bst_report_histogram(d->out, label, label, "frames", d->y, n, m.median - half, m.median + half,
+                         40, colour, normal, law);
     snprintf(caption, sizeof caption,
              "In track: mean %s px, RMS %s px; the curve is normal with the inner 68 %%.",
              bst_page_number(words[0], m.mean, 2), bst_page_number(words[1], m.rms, 3));
@@ -443,8 +483,8 @@ static void plot_histograms(const bst_report_drawing *d) {
     size_t n = gather(d->y, d->sensor->count);
     if (n >= 20) {
         bst_page_figure(d->out, BST_PAGE_THIRD);
-        bst_report_histogram(d->out, "NEES of the track", "NEES of the track", d->y, n, 0.0, 12.0,
-                             40, BST_CHART_GREEN, chi_square_2, NULL);
+        bst_report_histogram(d->out, "NEES of the track", "NEES of the track", "frames", d->y, n,
+                             0.0, 12.0, 40, BST_CHART_GREEN, chi_square_2, NULL);
         bst_page_figure_end(
             d->out, "Frames with a detection; the curve is chi-square with 2 degrees of freedom.");
     }
@@ -472,6 +512,13 @@ bst_status bst_report_plots(bst_ctx *ctx, FILE *out, const bst_report_sensor *s,
     for (size_t i = 0; i < s->count; i++) {
         d.x[i] = s->frames[i].mid_s / d.unit_s;
     }
+    bst_report_spans *spans = malloc(sizeof *spans);
+    if (!spans) {
+        free(d.x);
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the charts");
+    }
+    find_spans(&d, spans);
+    d.modes = spans;
     bst_report_timeline(&d);
     plot_pointing(&d);
     plot_axes(&d);
@@ -481,6 +528,7 @@ bst_status bst_report_plots(bst_ctx *ctx, FILE *out, const bst_report_sensor *s,
     plot_detections(&d);
     plot_histograms(&d);
     bst_report_sky(&d);
+    free(spans);
     free(d.x);
     return BST_OK;
 }

@@ -7,6 +7,17 @@
 /* A quantity of a frame; NAN: none. */
 typedef double (*bst_report_quantity)(const bst_report_frame *frame);
 
+enum { BST_REPORT_SPANS = 512 };
+
+/* Modes over time, in units of the time axis: as they changed, or where that was very often the one
+ * in the middle of each of BST_REPORT_SPANS parts of the run. */
+typedef struct bst_report_spans {
+    double from[BST_REPORT_SPANS], to[BST_REPORT_SPANS];
+    int mode[BST_REPORT_SPANS];
+    int count;
+    bool thinned;
+} bst_report_spans;
+
 /* A sensor being drawn, with room for series as long as its frames. */
 typedef struct bst_report_drawing {
     FILE *out;
@@ -14,6 +25,7 @@ typedef struct bst_report_drawing {
     double span_s;
     double unit_s; /* of the time axis */
     char time_label[40];
+    const bst_report_spans *modes;
     double *x, *y, *z, *w; /* x: the frames' times in units; the others are for use */
 } bst_report_drawing;
 
@@ -32,10 +44,11 @@ typedef struct bst_report_statistics {
 bst_report_statistics bst_report_measure(double *values, size_t n);
 
 /* A histogram of what is finite among n values, between low and high, with a curve of expected
- * shares per unit of x (NULL: none) over it. */
-void bst_report_histogram(FILE *out, const char *name, const char *label, const double *values,
-                          size_t n, double low, double high, int bins, int colour,
-                          double (*density)(double x, const void *user), const void *user);
+ * shares per unit of x (NULL: none) over it. `what` is counted. */
+void bst_report_histogram(FILE *out, const char *name, const char *label, const char *what,
+                          const double *values, size_t n, double low, double high, int bins,
+                          int colour, double (*density)(double x, const void *user),
+                          const void *user);
 
 /* Timeline of modes and of what could be seen (report_timeline.c). */
 void bst_report_timeline(const bst_report_drawing *d);

@@ -43,16 +43,6 @@ static const cJSON *summary_of(const page *p, int i) {
     return own ? own : i == 0 ? get(manifest, "summary") : NULL;
 }
 
-/* The last part of the folder's path: reports do not depend on where a folder is. */
-static const char *folder_name(const bst_run_reader *run, char text[256]) {
-    snprintf(text, 256, "%s", bst_run_reader_folder(run));
-    for (size_t n = strlen(text); n > 1 && text[n - 1] == '/';) {
-        text[--n] = '\0';
-    }
-    const char *slash = strrchr(text, '/');
-    return slash && slash[1] ? slash + 1 : text;
-}
-
 /* ------------------------------------------------------------------ reading */
 
 static double span_of(const bst_run_reader *run) {
@@ -109,7 +99,7 @@ static void put_head(const page *p) {
     bst_run_state state = bst_run_reader_state(p->run);
     fprintf(p->out, "<p class=\"sub\"><span class=\"badge %s\">%s</span> Folder ", classes[state],
             bst_run_state_name(state));
-    bst_html_text(p->out, folder_name(p->run, name));
+    bst_html_text(p->out, bst_report_folder(p->run, name));
     fputs("</p>\n", p->out);
     const char *description = text_of(scenario, "description", "");
     if (description[0]) {
@@ -153,6 +143,11 @@ static void put_objects(const page *p) {
     }
     bst_page_row(p->out, "objects", "%d%s%s%s", count, count ? ": " : "", names,
                  count > 8 ? " ..." : "");
+    const cJSON *catalogues = get(world, "catalogues"), *catalogue;
+    cJSON_ArrayForEach(catalogue, catalogues) {
+        const char *file = text_of(catalogue, "elements_file", "?"), *slash = strrchr(file, '/');
+        bst_page_row(p->out, "and all of", "%s", slash ? slash + 1 : file);
+    }
 }
 
 static void put_identity(const page *p) {
@@ -335,6 +330,13 @@ static bst_status put_page(bst_ctx *ctx, page *p) {
     put_head(p);
     bst_warnings_write(p->out, &p->warnings);
     put_identity(p);
+    bst_status status = bst_report_sightings(ctx, p->out, p->run, p->span_s);
+    if (status != BST_OK && status != BST_ERR_FORMAT) {
+        return status;
+    }
+    if (status == BST_ERR_FORMAT) {
+        bst_run_reader_note_problem(p->run, "%s", ctx->message);
+    }
     for (int i = 0; i < p->count; i++) {
         BST_TRY(bst_export_check(ctx));
         BST_TRY(put_sensor(ctx, p, i));
@@ -367,7 +369,8 @@ bst_status bst_report_run(bst_ctx *ctx, bst_run_reader *run, FILE *out) {
             &p->warnings, BST_SEVERITY_NOTE,
             "The run's world cannot be made again (%s): what lies outside the field is "
             "not shown.",
-            bst_run_reader_scenario(run) ? unheard.message : "no scenario.json");
+            bst_run_reader_scenario(run) ? bst_report_local(run, unheard.message)
+                                         : "no scenario.json");
     }
     bst_status status = read_sensors(ctx, p);
     if (status == BST_OK) {

@@ -49,26 +49,21 @@ static const lane lanes[LANES] = {
 
 static void put_span(const bst_report_drawing *d, const bst_chart *c, int row, double from,
                      double to, int colour, const char *word) {
+    double width = c->inner_width * (to - from) / (c->x.high - c->x.low);
     char title[128];
     snprintf(title, sizeof title, "%s: %.6g s to %.6g s", word, from * d->unit_s, to * d->unit_s);
-    bst_chart_bar(c, from, to, ROW_BOTTOM(row), ROW_TOP(row), colour, title);
+    /* nobody points at what is a hair wide */
+    bst_chart_bar(c, from, to, ROW_BOTTOM(row), ROW_TOP(row), colour, width > 3.0 ? title : NULL);
 }
 
 static void put_modes(const bst_report_drawing *d, const bst_chart *c) {
-    const bst_report_sensor *s = d->sensor;
-    for (size_t i = 0; i < s->mode_count; i++) {
-        double from = s->modes[i].from_s / d->unit_s;
-        double to = i + 1 < s->mode_count ? s->modes[i + 1].from_s / d->unit_s : c->x.high;
-        int mode = s->modes[i].mode;
-        if (mode < 0 || !(from < to)) {
-            continue;
-        }
-        const char *word = bst_mode_name(mode);
-        put_span(d, c, 0, from, to, BST_CHART_MODE + mode, word);
-        double width = c->inner_width * (fmin(to, c->x.high) - from) / (c->x.high - c->x.low);
+    const bst_report_spans *s = d->modes;
+    for (int i = 0; i < s->count; i++) {
+        const char *word = bst_mode_name(s->mode[i]);
+        put_span(d, c, 0, s->from[i], s->to[i], BST_CHART_MODE + s->mode[i], word);
+        double width = c->inner_width * (s->to[i] - s->from[i]) / (c->x.high - c->x.low);
         if (width > 8.0 * (double)strlen(word)) {
-            bst_chart_word(c, 0.5 * (from + fmin(to, c->x.high)), ROWS - 0.5, 0.0, 4.0, "middle",
-                           word);
+            bst_chart_word(c, 0.5 * (s->from[i] + s->to[i]), ROWS - 0.5, 0.0, 4.0, "middle", word);
         }
     }
 }
@@ -76,18 +71,18 @@ static void put_modes(const bst_report_drawing *d, const bst_chart *c) {
 /* Draws the spans of a lane; a gap too short to be seen does not end one. */
 static void put_lane(const bst_report_drawing *d, const bst_chart *c, const lane *l, int row) {
     const bst_report_sensor *s = d->sensor;
-    double seen = 0.4 * (c->x.high - c->x.low) / c->inner_width; /* of the axis' unit */
+    double seen = (c->x.high - c->x.low) / c->inner_width; /* of the axis' unit */
     for (size_t i = 0; i < s->count;) {
         int state = l->state(&s->frames[i]);
-        size_t next = i + 1, gap = i;
-        for (; next < s->count; next++) {
+        size_t last = i;
+        for (size_t next = i + 1; next < s->count; next++) {
             if (l->state(&s->frames[next]) == state) {
-                gap = next;
-            } else if (d->x[next] - d->x[gap] > seen) {
+                last = next;
+            } else if (d->x[next] - d->x[last] > seen) {
                 break;
             }
         }
-        next = gap + 1;
+        size_t next = last + 1;
         if (state >= 0) {
             double end = next < s->count ? d->x[next] : c->x.high;
             put_span(d, c, row, d->x[i], end, l->states[state].colour, l->states[state].word);

@@ -92,9 +92,9 @@ static void add_counters(const bst_run_reader *run, bst_warnings *w) {
 
 /* ------------------------------------------------------------------ summaries */
 
-static void judge_summary(const char *sensor, const cJSON *summary, bool targeted, bool complete,
+static void judge_summary(const char *sensor, const cJSON *summary, bool tasked, bool complete,
                           bst_warnings *w) {
-    if (!cJSON_IsObject(summary) || !targeted) {
+    if (!cJSON_IsObject(summary)) {
         return;
     }
     double confirmed = number_of(summary, "time_to_confirm_s"),
@@ -122,7 +122,8 @@ static void judge_summary(const char *sensor, const cJSON *summary, bool targete
                          "%s: in %.0f frames the track of interest was not the target's.", sensor,
                          wrong);
     }
-    if (complete && isfinite(confirmed) && cJSON_IsString(mode) &&
+    /* with tasks there is always a next target to slew to */
+    if (complete && !tasked && isfinite(confirmed) && cJSON_IsString(mode) &&
         strcmp(mode->valuestring, "track") != 0) {
         bst_warnings_add(w, BST_SEVERITY_WARNING, "%s: at the end the mode was %s, not track.",
                          sensor, mode->valuestring);
@@ -136,43 +137,63 @@ static void add_summaries(const bst_run_reader *run, const bst_report_sensor *se
     for (int i = 0; i < count; i++) {
         const cJSON *own = get(several, sensors[i].name);
         const cJSON *summary = own ? own : i == 0 ? get(manifest, "summary") : NULL;
-        judge_summary(sensors[i].name, summary,
-                      sensors[i].sensor.target[0] && sensors[i].has_tracks, complete, w);
+        if (sensors[i].sensor.target[0] && sensors[i].has_tracks) {
+            judge_summary(sensors[i].name, summary, sensors[i].task_count > 1, complete, w);
+        }
     }
 }
 
 /* ------------------------------------------------------------------ tables */
 
-/* Adds a warning with a count where a query, on a sensor, finds more than none. */
-static void count_rows(const bst_run_reader *run, const bst_report_sensor *s, const char *sql,
-                       bst_severity severity, const char *text, bst_warnings *w) {
-    int64_t n = bst_run_reader_int(run, sql, s->sensor.index, 0);
+/* Adds one warning where a query counts more than none on some sensors: "text: a/b 3, a/c 4". */
+static void count_rows(const bst_run_reader *run, const bst_report_sensor *sensors, int count,
+                       const char *sql, bst_severity severity, const char *text, bst_warnings *w) {
+    char list[300] = "";
+    size_t n = 0;
+    for (int i = 0; i < count && n < sizeof list; i++) {
+        int64_t rows = bst_run_reader_int(run, sql, sensors[i].sensor.index, 0);
+        if (rows > 0) {
+            n += (size_t)snprintf(list + n, sizeof list - n, "%s%s %" PRId64, n ? ", " : "",
+                                  sensors[i].name, rows);
+        }
+    }
     if (n > 0) {
-        bst_warnings_add(w, severity, "%s: %" PRId64 " %s.", s->name, n, text);
+        bst_warnings_add(w, severity, "%s: %s%s", text, list, n < sizeof list ? "." : " ...");
     }
 }
 
-static void add_tables(const bst_run_reader *run, const bst_report_sensor *s, bst_warnings *w) {
-    if (s->every > 1) {
-        bst_warnings_add(w, BST_SEVERITY_NOTE,
-                         "%s: of %" PRId64 " exposures one in %" PRId64 " is drawn.", s->name,
-                         s->exposures, s->every);
+static void add_tables(const bst_run_reader *run, const bst_report_sensor *sensors, int count,
+                       bst_warnings *w) {
+    static const struct {
+        const char *sql;
+        bst_severity severity;
+        const char *text;
+    } checks[] = {
+        {"SELECT count(*) FROM mount WHERE sensor = ?1 AND"
+         " ((axis0_flags | axis1_flags | axis2_flags) & 1) = 1",
+         BST_SEVERITY_PROBLEM, "Rows of telemetry that tell of a stuck axis"},
+        {"SELECT count(*) FROM exposures WHERE sensor = ?1 AND dropped = 1", BST_SEVERITY_WARNING,
+         "Frames that were lost on their way"},
+        {"SELECT count(*) FROM exposures WHERE sensor = ?1 AND error_sigma > 0.3",
+         BST_SEVERITY_WARNING,
+         "Frames rendered with an expected error above 0.3 of a pixel's noise"},
+        {"SELECT count(*) FROM pointing WHERE sensor = ?1 AND limited = 1", BST_SEVERITY_WARNING,
+         "Rows of telemetry that tell of an axis at a limit"},
+        {"SELECT count(*) FROM mount WHERE sensor = ?1 AND wheels_saturated = 1",
+         BST_SEVERITY_WARNING, "Rows of telemetry that tell of saturated reaction wheels"},
+        {"SELECT count(*) FROM exposures WHERE sensor = ?1 AND hits > 0", BST_SEVERITY_NOTE,
+         "Frames with radiation hits"},
+    };
+    for (size_t k = 0; k < sizeof checks / sizeof *checks; k++) {
+        count_rows(run, sensors, count, checks[k].sql, checks[k].severity, checks[k].text, w);
     }
-    count_rows(run, s, "SELECT count(*) FROM exposures WHERE sensor = ?1 AND dropped = 1",
-               BST_SEVERITY_WARNING, "frames were lost on their way", w);
-    count_rows(run, s, "SELECT count(*) FROM exposures WHERE sensor = ?1 AND error_sigma > 0.3",
-               BST_SEVERITY_WARNING,
-               "frames were rendered with an expected error above 0.3 of a pixel's noise", w);
-    count_rows(run, s, "SELECT count(*) FROM exposures WHERE sensor = ?1 AND hits > 0",
-               BST_SEVERITY_NOTE, "frames hold radiation hits", w);
-    count_rows(run, s, "SELECT count(*) FROM pointing WHERE sensor = ?1 AND limited = 1",
-               BST_SEVERITY_WARNING, "rows of telemetry tell of an axis at a limit", w);
-    count_rows(run, s,
-               "SELECT count(*) FROM mount WHERE sensor = ?1 AND"
-               " ((axis0_flags | axis1_flags | axis2_flags) & 1) = 1",
-               BST_SEVERITY_PROBLEM, "rows of telemetry tell of a stuck axis", w);
-    count_rows(run, s, "SELECT count(*) FROM mount WHERE sensor = ?1 AND wheels_saturated = 1",
-               BST_SEVERITY_WARNING, "rows of telemetry tell of saturated reaction wheels", w);
+    for (int i = 0; i < count; i++) {
+        if (sensors[i].every > 1) {
+            bst_warnings_add(w, BST_SEVERITY_NOTE,
+                             "%s: of %" PRId64 " exposures one in %" PRId64 " is drawn.",
+                             sensors[i].name, sensors[i].exposures, sensors[i].every);
+        }
+    }
 }
 
 /* ------------------------------------------------------------------ events */
@@ -200,27 +221,31 @@ static void add_events(const bst_run_reader *run, bst_warnings *w) {
     bst_rows *rows;
     bool more;
     if (bst_rows_open(&unheard, run,
-                      "SELECT kind, source, count(*), min(time_s) FROM events GROUP BY kind, source"
-                      " ORDER BY min(tick), kind, source",
+                      "SELECT kind, min(source), count(DISTINCT source), count(*), min(time_s)"
+                      " FROM events GROUP BY kind ORDER BY min(tick), kind",
                       0, 0, &rows) != BST_OK) {
         return;
     }
     while (bst_rows_next(&unheard, rows, &more) == BST_OK && more) {
-        const char *kind = bst_rows_text(rows, 0);
+        const char *kind = bst_rows_text(rows, 0), *text = kind;
         int severity = BST_SEVERITY_NOTE;
-        const char *text = "told";
         for (size_t k = 0; k < sizeof known / sizeof *known; k++) {
             if (strcmp(known[k].kind, kind) == 0) {
                 severity = (int)known[k].severity;
                 text = known[k].text;
             }
         }
-        if (severity >= 0) {
-            bst_warnings_add(w, (bst_severity)severity,
-                             "%s: %s: %" PRId64 " time%s, first at %.6g s.", bst_rows_text(rows, 1),
-                             strcmp(text, "told") == 0 ? kind : text, bst_rows_int(rows, 2),
-                             bst_rows_int(rows, 2) == 1 ? "" : "s", bst_rows_real(rows, 3));
+        if (severity < 0) {
+            continue;
         }
+        char who[120];
+        int64_t sources = bst_rows_int(rows, 2), times = bst_rows_int(rows, 3);
+        snprintf(who, sizeof who, "%s", bst_rows_text(rows, 1));
+        if (sources > 1) {
+            snprintf(who, sizeof who, "%" PRId64 " modules", sources);
+        }
+        bst_warnings_add(w, (bst_severity)severity, "%s: %s: %" PRId64 " time%s, first at %.6g s.",
+                         who, text, times, times == 1 ? "" : "s", bst_rows_real(rows, 4));
     }
     bst_rows_close(rows);
 }
@@ -230,6 +255,12 @@ static void add_events(const bst_run_reader *run, bst_warnings *w) {
 static void hear(void *user, bst_log_level level, const char *message) {
     (void)level;
     bst_warnings_add(user, BST_SEVERITY_WARNING, "%s.", message);
+}
+
+const char *bst_report_folder(const bst_run_reader *run, char text[256]) {
+    snprintf(text, 256, "%s", bst_run_reader_folder(run));
+    const char *slash = strrchr(text, '/'); /* the reader's folder ends with none but in "/" */
+    return slash && slash[1] ? slash + 1 : text;
 }
 
 const char *bst_report_local(const bst_run_reader *run, const char *message) {
@@ -250,9 +281,7 @@ void bst_report_run_warnings(bst_run_reader *run, const bst_report_sensor *senso
     }
     add_summaries(run, sensors, count, w);
     add_counters(run, w);
-    for (int i = 0; i < count; i++) {
-        add_tables(run, &sensors[i], w);
-    }
+    add_tables(run, sensors, count, w);
     const cJSON *misfits = get(bst_run_reader_manifest(run), "wcs_misfit_px"), *item;
     cJSON_ArrayForEach(item, misfits) {
         if (cJSON_IsNumber(item) && item->valuedouble > 1e-3) {

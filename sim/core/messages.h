@@ -111,6 +111,13 @@ typedef struct bst_mount_axis {
  * at the rate of pointing_telemetry. The attitude of the camera in the body is
  * q_body_from_cam = R(axis 0, angle 0) R(axis 1, angle 1) ... q_body_from_cam_at_zero, axes in
  * order from the body outwards to the camera, R(a, t) the rotation by t about a. */
+/* A turn of the body about the axis of its pointing law, which the spacecraft makes on command. */
+typedef struct bst_body_roll {
+    bst_vec3 axis_body; /* unit; zero: it makes none */
+    double angle_rad, rate_radps;
+    double rate_limit_radps, accel_limit_radps2;
+} bst_body_roll;
+
 typedef struct bst_mount_status {
     int64_t tick; /* of validity */
     int32_t axes; /* 0: follows any command at once (an ideal mount) */
@@ -118,6 +125,7 @@ typedef struct bst_mount_status {
     bst_quat q_body_from_cam_at_zero;
     bst_quat q_body_from_gcrf; /* measured */
     bst_vec3 rate_body_radps;  /* measured inertial rate of the body, body axes */
+    bst_body_roll roll;
     bst_mount_axis axis[BST_MOUNT_AXES];
 } bst_mount_status;
 
@@ -143,6 +151,8 @@ typedef struct bst_los_command {
     double near_rad[BST_MOUNT_AXES];   /* those next to these (by axis of mount_status), at `tick`;
                                           else those next to the present angles */
     double near_radps[BST_MOUNT_AXES]; /* their rates */
+    bool roll_given;                   /* the body is to go to this angle of bst_body_roll: */
+    double roll_rad;
 } bst_los_command;
 
 /* frame (queue). The channel slot owns one reference of `frame`. */

@@ -6,7 +6,7 @@
 #include "sim/core/messages.h"
 #include "sim/core/rng.h"
 
-#define BST_MODULE_ABI 2
+#define BST_MODULE_ABI 3
 
 struct bst_world;     /* sim/world: what is true */
 struct bst_knowledge; /* sim/world: what the onboard side knows */

@@ -3,6 +3,8 @@
 #include <assert.h>
 #include <math.h>
 
+#include "sim/core/cholesky.h"
+
 #define LEAST_PIVOT 1e-13
 
 enum { MOST = BST_SYMMETRIC_MOST };
@@ -19,15 +21,11 @@ bool bst_symmetric_invert(int n, const double *a, double *out) {
     }
     for (int i = 0; i < n; i++) {
         for (int j = 0; j <= i; j++) {
-            double v = a[i * n + j] * scale[i] * scale[j];
-            for (int k = 0; k < j; k++) {
-                v -= l[i][k] * l[j][k];
-            }
-            if (i == j && !(v > LEAST_PIVOT)) {
-                return false;
-            }
-            l[i][j] = i == j ? sqrt(v) : v / l[j][j];
+            l[i][j] = a[i * n + j] * scale[i] * scale[j];
         }
+    }
+    if (!bst_cholesky_factor(l[0], MOST, n, LEAST_PIVOT)) {
+        return false;
     }
     for (int j = 0; j < n; j++) {
         m[j][j] = 1.0 / l[j][j];

@@ -251,7 +251,8 @@ static void put_x_axis(const bst_chart *c) {
     double ticks[MOST_TICKS], bottom = c->top + c->inner_height;
     int decimals,
         n = bst_chart_ticks(c->x.low, c->x.high, c->x.logarithmic,
-                            (int)fmax(4.0, c->inner_width / 85.0), ticks, MOST_TICKS, &decimals);
+                            (int)fmax(fmin(7.0, c->inner_width / 60.0), c->inner_width / 85.0),
+                            ticks, MOST_TICKS, &decimals);
     for (int i = 0; i < n && !c->x.bare; i++) {
         double at = inside_x(c, ticks[i]);
         fprintf(c->out, "<path class=\"g\" d=\"M%.1f %.1fV%.1f\"/>", at, c->top, bottom);
@@ -326,9 +327,23 @@ static void put_rect(const bst_chart *c, const char *class, int colour, double x
     }
 }
 
-void bst_chart_band(const bst_chart *c, double x0, double x1, int colour, const char *title) {
-    put_rect(c, "b", colour, inside_x(c, x0), c->top, inside_x(c, x1), c->top + c->inner_height,
-             title);
+void bst_chart_bands(const bst_chart *c, const double *from, const double *to, size_t n, int colour,
+                     const char *title) {
+    fprintf(c->out, "<path class=\"b c%d\" d=\"", colour);
+    for (size_t i = 0; i < n; i++) {
+        double x0 = inside_x(c, from[i]), width = inside_x(c, to[i]) - x0;
+        if (width > 0.0) {
+            fprintf(c->out, "M%.1f %.1fh%.1fV%.1fh%.1fz", x0, c->top, width,
+                    c->top + c->inner_height, -width);
+        }
+    }
+    fputs("\">", c->out);
+    if (title) {
+        fputs("<title>", c->out);
+        bst_html_text(c->out, title);
+        fputs("</title>", c->out);
+    }
+    fputs("</path>\n", c->out);
 }
 
 void bst_chart_bar(const bst_chart *c, double x0, double x1, double y0, double y1, int colour,

@@ -73,8 +73,10 @@ size_t bst_chart_thin(const double *x, const double *y, size_t n, double low, do
 void bst_chart_begin(bst_chart *chart);
 void bst_chart_end(bst_chart *chart);
 
-/* A ground from x0 to x1, the whole height. `title` is shown under the pointer; NULL for none. */
-void bst_chart_band(const bst_chart *chart, double x0, double x1, int colour, const char *title);
+/* Grounds from from[i] to to[i], the whole height. `title` is shown under the pointer; NULL for
+ * none. */
+void bst_chart_bands(const bst_chart *chart, const double *from, const double *to, size_t n,
+                     int colour, const char *title);
 /* A line through points; one whose y is not finite breaks it. Thinned out where there are many. */
 void bst_chart_line(const bst_chart *chart, const double *x, const double *y, size_t n, int colour,
                     bool dashed);

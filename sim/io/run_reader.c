@@ -21,6 +21,7 @@ struct bst_run_reader {
     char folder[BST_RUN_PATH_BYTES];
     bst_run_state state;
     bst_json *manifest, *scenario;
+    const char *database; /* its name in the folder; a literal */
     sqlite3 *db;
     bool has_epoch;
     bst_time epoch;
@@ -149,13 +150,14 @@ static void make_uri(char *uri, size_t bytes, const char *path, const char *para
     snprintf(uri + n, bytes - n, "?%s", parameters);
 }
 
-static void open_database(bst_run_reader *reader) {
+static void open_database(bst_run_reader *reader, const char *name) {
     char path[BST_RUN_PATH_BYTES], uri[3 * BST_RUN_PATH_BYTES + 128];
-    if (!has_file(reader, BST_RUN_DATABASE)) {
-        bst_run_reader_note_problem(reader, BST_RUN_DATABASE " is missing");
+    reader->database = name;
+    if (!has_file(reader, name)) {
+        bst_run_reader_note_problem(reader, "%s is missing", name);
         return;
     }
-    if (bst_run_reader_file(NULL, reader, BST_RUN_DATABASE, path, sizeof path) != BST_OK) {
+    if (bst_run_reader_file(NULL, reader, name, path, sizeof path) != BST_OK) {
         return;
     }
     /* A living run is read as SQLite means it to be, through the locks and the shared index that
@@ -274,11 +276,41 @@ bst_status bst_run_reader_open(bst_ctx *ctx, const char *path, bst_run_reader **
     bool begun = has_db || reader->state == BST_RUN_COMPLETE;
     reader->scenario =
         load_json(reader, "scenario.json", begun ? "scenario.json is missing" : NULL);
-    open_database(reader);
+    open_database(reader, BST_RUN_DATABASE);
     find_epoch(reader);
     if (reader->db) {
         sqlite3_create_function(reader->db, "utc", 1, SQLITE_UTF8 | SQLITE_DETERMINISTIC, reader,
                                 sql_utc, NULL, NULL);
+    }
+    *out = reader;
+    return BST_OK;
+}
+
+bst_status bst_run_reader_open_study(bst_ctx *ctx, const char *path, bst_run_reader **out) {
+    *out = NULL;
+    size_t length = strlen(path);
+    while (length > 1 && path[length - 1] == '/') {
+        length--;
+    }
+    if (length == 0 || length > BST_RUN_PATH_BYTES - 256) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "'%.80s' is not a path of a folder", path);
+    }
+    bst_run_reader *reader = calloc(1, sizeof *reader);
+    if (!reader) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
+    }
+    memcpy(reader->folder, path, length);
+    reader->state = BST_RUN_COMPLETE; /* its tables appear when it is */
+    open_database(reader, BST_STUDY_DATABASE);
+    if (!reader->db) {
+        bst_status status = has_file(reader, BST_STUDY_DATABASE)
+                                ? bst_fail(ctx, BST_ERR_FORMAT, "%s", reader->problems[0])
+                                : bst_fail(ctx, BST_ERR_NOT_FOUND,
+                                           "%s: has no " BST_STUDY_DATABASE
+                                           " yet, which a study gets when all its runs are done",
+                                           reader->folder);
+        bst_run_reader_close(reader);
+        return status;
     }
     *out = reader;
     return BST_OK;
@@ -332,7 +364,7 @@ bool bst_run_reader_has_tables(const bst_run_reader *reader) {
 }
 
 static bst_status fail_sql(bst_ctx *ctx, const bst_run_reader *reader) {
-    return bst_fail(ctx, BST_ERR_FORMAT, "%s/%s: %s", reader->folder, BST_RUN_DATABASE,
+    return bst_fail(ctx, BST_ERR_FORMAT, "%s/%s: %s", reader->folder, reader->database,
                     sqlite3_errmsg(reader->db));
 }
 

@@ -25,6 +25,12 @@ typedef struct bst_run_reader bst_run_reader;
  * BST_ERR_FORMAT when it is no folder, or one that holds no run; BST_ERR_IO when it cannot be
  * looked into. The caller closes. */
 bst_status bst_run_reader_open(bst_ctx *ctx, const char *path, bst_run_reader **out) BST_MUST_CHECK;
+/* Name of the tables of a study in its folder. */
+#define BST_STUDY_DATABASE "study.sqlite"
+/* Opens the tables of a study's folder, and nothing else of it: there is no manifest, scenario or
+ * epoch. BST_ERR_NOT_FOUND when they are missing, BST_ERR_FORMAT when they cannot be read. */
+bst_status bst_run_reader_open_study(bst_ctx *ctx, const char *path,
+                                     bst_run_reader **out) BST_MUST_CHECK;
 /* NULL is allowed. */
 void bst_run_reader_close(bst_run_reader *reader);
 

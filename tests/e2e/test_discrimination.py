@@ -117,6 +117,42 @@ class Discrimination(unittest.TestCase):
             self.assertGreater(rest["hit"], 0.6 * hits)
 
 
+class BrightStars(unittest.TestCase):
+    def test_spikes_are_artefacts(self):
+        """Two saturated stars with diffraction spikes among stars that no catalogue has: these are
+        found as ever, and the spikes are told from them."""
+        out = runs.scratch() + "/spikes"
+        runs.run("scenarios/diffraction.json", out, "/world/faint_stars=statistical",
+                 "/world/faint_limit_v_mag=13.5", duration=3, threads=2)
+        db = runs.database(out)
+        spikes, real, stars, lost = 0, 0, 0, 0
+        angle = np.radians(28)  # of the first of four vanes
+        vanes = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        for frame, in db.execute("SELECT DISTINCT exposure_id FROM detections").fetchall():
+            truth = np.array(db.execute("SELECT x_mean_px, y_mean_px, v_mag FROM truth WHERE snr > 2.5 "
+                                        "AND exposure_id = ?", (frame,)).fetchall())
+            bright = truth[truth[:, 2] < 3]
+            self.assertEqual(len(bright), 2)
+            for x, y, label, star in db.execute(
+                    "SELECT x_px, y_px, label, star_id FROM detections WHERE exposure_id = ? AND edge = 0",
+                    (frame,)):
+                there = np.abs(truth[:, :2] - [x, y]).max(axis=1).min() < 2.5
+                if not there:
+                    spikes += 1
+                    stars += label != "artefact"
+                else:
+                    away = (bright[:, :2] - [x, y]) @ vanes
+                    if np.abs(away).min() > 8:  # px from every spike
+                        real += 1
+                        lost += label == "artefact"
+        print(f"spikes {spikes}, of them not artefacts {stars}; sources {real}, {lost} lost")
+        self.assertGreater(spikes, 100)
+        # a false alarm per frame is asked for; spikes that were left would be 35 a frame
+        self.assertLess(stars, 14)
+        self.assertGreater(real, 150)
+        self.assertLess(lost, 0.02 * real)
+
+
 def tearDownModule():
     runs.clean()
 

@@ -4,6 +4,7 @@
 Usage, from the repository root: /usr/bin/python3 tests/e2e/test_report.py BORESIGHT
 """
 import base64
+import json
 import math
 import os
 import re
@@ -236,6 +237,43 @@ class Others(OnePage):
         self.assertIn("<script>alert(1)</script>", page.text)
         self.assertIn("two&<b>", page.root.find("head/title").text)
         self.assertEqual(len(page.pictures()), 2 * (6 + 3 + 6))
+
+    def test_who_saw_what(self):
+        """Passes and sightings of three objects: who is told, in the order of detections."""
+        made = os.path.join(runs.scratch(), "run")
+        runs.run("scenarios/two_observers.json", made)
+        with sqlite3.connect(made + "/run.sqlite") as tables:
+            for name in ("passes", "sightings"):
+                tables.execute(f"DROP TABLE IF EXISTS {name}")
+            tables.execute("CREATE TABLE passes (sensor INTEGER, object INTEGER, name TEXT, start_s"
+                           " REAL, end_s REAL, frames INTEGER, detected INTEGER, first_s REAL)")
+            tables.execute("CREATE TABLE sightings (sensor INTEGER, object INTEGER, name TEXT, norad"
+                           " INTEGER, passes_seen INTEGER, detected INTEGER, tracked INTEGER,"
+                           " custody_fraction REAL, revisits INTEGER, revisit_mean_s REAL,"
+                           " longest_gap_s REAL, place_rms_arcsec REAL, track_rms_arcsec REAL)")
+            for i, (name, seen) in enumerate((("FEW", 1), ("MANY <b>", 3), ("NONE", 0))):
+                tables.execute("INSERT INTO passes VALUES (?, ?, ?, 1, 4, 3, ?, ?)",
+                               (i, i, name, seen, 1.5 if seen else None))
+                tables.execute("INSERT INTO sightings VALUES (NULL, ?, ?, ?, 1, ?, 0, 0.5, 0, NULL,"
+                               " 2, 0.25, NULL)", (i, name, i, seen))
+        manifest = runs.manifest(made)
+        manifest["sightings"] = {"objects": 3, "objects_seen": 2, "objects_in_field": 3,
+                                 "passes": 3, "passes_seen": 2, "custody_fraction_all": 0.25}
+        with open(made + "/manifest.json", "w", encoding="utf-8") as file:
+            json.dump(manifest, file)
+        result = report(made)
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        page = Page(made + "/report.html")
+        self.check_alone(page)
+        cards = page.cards()
+        self.assertEqual((cards["objects seen"], cards["passes seen"]), ("2", "2"))
+        self.assertEqual(float(cards["custody, mean of all objects"]), 25)
+        line = [part for part in page.root.iter("svg")
+                if part.get("aria-label", "").startswith("Timeline of the objects")][0]
+        words = [text.text for text in line.iter("text") if text.get("text-anchor") == "end"]
+        self.assertEqual(words, ["MANY <b>", "FEW"])
+        titles = [title.text for title in line.iter("title")]
+        self.assertIn("neossat/wide: 1 s to 4 s, detected in 3 of 3 frames", titles)
 
     def test_killed(self):
         folder = runs.scratch()

@@ -309,6 +309,36 @@ static void test_running(void **state) {
     }
 }
 
+/* A commanded roll: about the law's axis, within the limits of a slew, to rest, and back. */
+static void test_roll_on_command(void **state) {
+    (void)state;
+    bst_craft_config c = config_make(BST_LAW_NADIR);
+    flight f = start(&c, 3), still = start(&c, 3);
+    fly(&f, 10.0);
+    fly(&still, 10.0);
+    const double to[2] = {-0.6, 0.0};
+    for (int k = 0; k < 2; k++) {
+        bst_craft_command_roll(f.craft, to[k]);
+        double fastest = 0.0;
+        for (int i = 0; i < 300; i++) {
+            const bst_body_roll *roll = &fly(&f, 0.5)->roll;
+            fastest = fmax(fastest, fabs(roll->rate_radps));
+        }
+        const bst_craft_now *now = bst_craft_at(f.craft), *other = fly(&still, 150.0);
+        /* 0.95 of 0.5 deg/s; the shaper's approach is exponential at the end */
+        bst_assert_close(fastest / BST_DEG_RAD, 0.475, 0.005);
+        bst_assert_close(now->roll.angle_rad, to[k], 1e-6);
+        bst_quat rolled =
+            bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(now->roll.axis_body, -to[k])),
+                         other->reference.q_body_from_gcrf);
+        bst_assert_close(bst_vec3_norm(bst_attitude_error(now->reference.q_body_from_gcrf, rolled)),
+                         0.0, 1e-6);
+        assert_true(off(now) < 30.0 * BST_ARCSEC_RAD); /* sensors and control, as without */
+    }
+    bst_craft_free(f.craft);
+    bst_craft_free(still.craft);
+}
+
 /* One seed gives one flight to the bit, another another. */
 static void test_repeats(void **state) {
     (void)state;
@@ -372,13 +402,19 @@ static void test_reaction(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_laws),         cmocka_unit_test(test_half_turn),
-        cmocka_unit_test(test_antipodal),    cmocka_unit_test(test_saturated_wheels),
-        cmocka_unit_test(test_failed_wheel), cmocka_unit_test(test_blind_for_an_hour),
-        cmocka_unit_test(test_free_tumble),  cmocka_unit_test(test_wrong_orbit),
-        cmocka_unit_test(test_repeats),      cmocka_unit_test(test_running),
-        cmocka_unit_test(test_sets),         cmocka_unit_test(test_reaction),
-        cmocka_unit_test(test_refused)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_laws),
+                                       cmocka_unit_test(test_half_turn),
+                                       cmocka_unit_test(test_antipodal),
+                                       cmocka_unit_test(test_saturated_wheels),
+                                       cmocka_unit_test(test_failed_wheel),
+                                       cmocka_unit_test(test_blind_for_an_hour),
+                                       cmocka_unit_test(test_free_tumble),
+                                       cmocka_unit_test(test_wrong_orbit),
+                                       cmocka_unit_test(test_repeats),
+                                       cmocka_unit_test(test_running),
+                                       cmocka_unit_test(test_roll_on_command),
+                                       cmocka_unit_test(test_sets),
+                                       cmocka_unit_test(test_reaction),
+                                       cmocka_unit_test(test_refused)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -211,7 +211,8 @@ static void write_chart(FILE *out, void *user) {
                    .x = {.label = "x & y", .low = 0, .high = 3},
                    .y = {.label = "'label'", .low = 0, .high = 2}};
     bst_chart_begin(&c);
-    bst_chart_band(&c, -5, 1, BST_CHART_MODE, "band <b>");
+    double from[2] = {-5, 2}, to[2] = {1, NAN};
+    bst_chart_bands(&c, from, to, 2, BST_CHART_MODE, "band <b>");
     bst_chart_line(&c, x, y, 4, BST_CHART_BLUE, true);
     bst_chart_dots(&c, x, y, 4, BST_CHART_RED);
     bst_chart_area(&c, x, low, y, 4, BST_CHART_BLUE);

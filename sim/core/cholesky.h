@@ -1,7 +1,7 @@
 /* Symmetric positive definite equations of a few unknowns: a matrix a has `stride` numbers a row,
  * of which the lower triangle of order n is used. */
-#ifndef BST_IMGPROC_CHOLESKY_H
-#define BST_IMGPROC_CHOLESKY_H
+#ifndef BST_CORE_CHOLESKY_H
+#define BST_CORE_CHOLESKY_H
 
 #include <math.h>
 #include <stdbool.h>
