@@ -393,11 +393,11 @@ static bst_status set_digest(bst_ctx *ctx, bst_study *study) {
 }
 
 static bst_status open_study(bst_ctx *ctx, const char *file, bst_study *study) {
-    char *full = realpath(file, NULL);
     snprintf(study->file, sizeof study->file, "%s", file);
     BST_TRY(bst_json_load(ctx, file, &study->json));
     BST_TRY(bst_config_read(ctx, study->json, bst_json_root(study->json), "", bst_study_table,
                             &study->config));
+    char *full = realpath(file, NULL);
     bst_status status = bst_study_read_bases(ctx, study, full ? full : file);
     free(full);
     BST_TRY(status);
