@@ -201,7 +201,8 @@ class Hostile(unittest.TestCase):
         os.mkdir(folder + "/tables")
         os.mkdir(folder + "/tables/frames.csv")
         result = call("export", run, *TABLES, "--out", folder + "/tables")
-        self.ends(result, run, f"{folder}/tables/frames.csv: cannot be written: Is a directory",
+        self.ends(result, run,
+                  f"{folder}/tables/frames.csv: is not a regular file; give another path",
                   "folder in the place of a file")
         loop(folder + "/loop")
         self.ends(call("export", run, *TABLES, "--out", folder + "/loop"), run,
