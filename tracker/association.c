@@ -9,7 +9,8 @@
 #define SEVERAL (-2)
 /* Share of a frame in the smoothed number of false alarms, once there are enough frames. */
 #define ALARM_GAIN 0.1
-/* Frames in a row with one detection after which two tracks may prove to be the same. */
+/* Frames in a row with one detection after which two tracks may prove to be the same, and frames
+ * with a detection for each of two neighbours after which they are not. */
 #define SAME_FRAMES 5
 
 static double component(bst_vec3 v, int axis) {
@@ -266,14 +267,37 @@ static int free_between(const bst_mtt *mtt, const bst_mtt_track *a, const bst_mt
     return best;
 }
 
+/* Notes which confirmed tracks have a detection beside that of another one, no farther off than two
+ * that may share one. */
+static void note_apart(bst_mtt *mtt) {
+    for (int t = 0; t < mtt->track_count; t++) {
+        int column = mtt->detection_of_track[t], begin, end;
+        if (column < 0 || mtt->tracks[t].status == BST_TRACK_TENTATIVE || mtt->tracks[t].star) {
+            continue;
+        }
+        bst_vec3 place = mtt->now.items[column].sky.direction;
+        bool apart = false;
+        bst_mtt_pool_range(&mtt->now, place, mtt->params.merge_rad, &begin, &end);
+        for (int i = begin; i < end && !apart; i++) {
+            int near = mtt->now.order[i], other = mtt->owner[near];
+            bst_vec3 off = bst_vec3_sub(mtt->now.items[near].sky.direction, place);
+            apart = other >= 0 && other != t && !mtt->tracks[other].star &&
+                    bst_vec3_norm(off) < mtt->params.merge_rad;
+        }
+        mtt->tracks[t].apart += apart;
+    }
+}
+
 /* Two tracks nearer to each other than any two objects are seen apart, moving alike, have one
- * object, which has started a second track by a detection far off. */
+ * object, which has started a second track by a detection far off; unless both have been seen
+ * before, side by side. */
 static bool same(const bst_mtt *mtt, const bst_mtt_track *a, const bst_mtt_track *b) {
     bst_vec3 apart = bst_vec3_sub(a->state.direction, b->state.direction);
     bst_vec3 rate = bst_vec3_sub(a->state.rate_radps, b->state.rate_radps);
     double variance = a->state.covariance[2][2] + a->state.covariance[3][3] +
                       b->state.covariance[2][2] + b->state.covariance[3][3];
     return a->merged_in_row >= SAME_FRAMES && b->merged_in_row >= SAME_FRAMES &&
+           (a->apart < SAME_FRAMES || b->apart < SAME_FRAMES) &&
            bst_vec3_norm(apart) < mtt->params.merge_floor_rad &&
            bst_vec3_dot(rate, rate) < 9.0 * variance;
 }
@@ -362,6 +386,7 @@ void bst_mtt_associate(bst_mtt *mtt, bool partial) {
     }
     /* confirmed tracks choose first: a false start must not take their detections */
     assign_group(mtt, false);
+    note_apart(mtt);
     share(mtt);
     int unused = 0;
     for (int i = 0; i < mtt->now.count; i++) {
