@@ -88,9 +88,9 @@ typedef struct bst_link_output {
     int dropped; /* items beyond the capacity */
 } bst_link_output;
 
-/* One step of a part: sends the inputs, waits for the answer. *answered false: there was none in
- * time, and on_silence is BST_LINK_GO_ON. BST_ERR_IO: no peer came or answered, or one said that it
- * has failed; BST_ERR_INTERRUPTED: bst_link_on_wait. */
+/* One step of a part: sends the inputs (at most 63), waits for the answer. *answered false: there
+ * was none in time, and on_silence is BST_LINK_GO_ON. BST_ERR_IO: no peer came or answered, or one
+ * said that it has failed; BST_ERR_INTERRUPTED: bst_link_on_wait. */
 bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
                              const bst_link_input *inputs, int input_count,
                              bst_link_output *outputs, int output_count,

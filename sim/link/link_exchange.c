@@ -11,8 +11,8 @@
 typedef struct sending {
     const bst_link_input *inputs;
     int count, attempt;
-    bool has_crc;
-    uint32_t crc;
+    uint64_t has_crc; /* bit i: of input i, below 64 */
+    uint32_t crcs[64];
 } sending;
 
 /* Inputs, then `step`. A peer that takes none of it has gone. */
@@ -28,11 +28,12 @@ static void send_step(bst_link *link, link_exchange *x, sending *s) {
                                   .step = part->step - 1};
         memcpy(header.instance, part->about.instance, sizeof header.instance);
         const bst_link_input *frame = input && input->type == BST_LINK_FRAME ? input : NULL;
-        if (frame && !s->has_crc && !(link->shared && link->peers[peer].shared_memory)) {
-            s->crc = bst_crc32c(frame->pixels, frame->pixel_bytes);
-            s->has_crc = true;
+        if (frame && !(s->has_crc >> i & 1) && !(link->shared && link->peers[peer].shared_memory)) {
+            s->crcs[i] = bst_crc32c(frame->pixels, frame->pixel_bytes);
+            s->has_crc |= UINT64_C(1) << i;
         }
-        sent = bst_link_send(link, peer, &header, input ? input->payload : &step, frame, s->crc);
+        sent = bst_link_send(link, peer, &header, input ? input->payload : &step, frame,
+                             frame ? s->crcs[i] : 0);
     }
     s->attempt++;
     if (!sent) {
