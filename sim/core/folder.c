@@ -16,7 +16,8 @@ static bst_status make_one(bst_ctx *ctx, const char *path) {
     if (stat(path, &info) == 0 && S_ISDIR(info.st_mode)) {
         return BST_OK;
     }
-    return bst_fail(ctx, BST_ERR_IO, "%s: cannot make the folder: %s", path, strerror(reason));
+    return bst_fail(ctx, BST_ERR_IO, "%s: cannot make the folder: %s", path,
+                    strerror(reason == EEXIST ? ENOTDIR : reason));
 }
 
 bst_status bst_folder_make_above(bst_ctx *ctx, const char *path) {
