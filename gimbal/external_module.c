@@ -198,6 +198,19 @@ static void publish_answer(module *m, struct bst_step *s) {
     }
 }
 
+/* The answers to earlier steps that have come meanwhile. */
+static bst_status publish_more(module *m, struct bst_step *s) {
+    for (;;) {
+        bool more;
+        BST_TRY(bst_link_more(bst_step_ctx(s), m->link, m->part, bst_step_tick(s), m->outputs,
+                              OUTPUTS, &more));
+        if (!more) {
+            return BST_OK;
+        }
+        publish_answer(m, s);
+    }
+}
+
 /* One step of the peer, with the frames since the last one. */
 static bst_status exchange(module *m, struct bst_step *s) {
     bst_ctx *ctx = bst_step_ctx(s);
@@ -206,9 +219,7 @@ static bst_status exchange(module *m, struct bst_step *s) {
     bst_status status = bst_link_ready(ctx, m->link, m->part, tick, m->outputs, OUTPUTS, &ready);
     bst_external_tell(m->link, s);
     BST_TRY(status);
-    while (bst_link_more(m->link, m->part, m->outputs, OUTPUTS)) {
-        publish_answer(m, s);
-    }
+    BST_TRY(publish_more(m, s));
     if (!ready) {
         return BST_OK;
     }
@@ -246,10 +257,7 @@ static bst_status exchange(module *m, struct bst_step *s) {
     bst_external_tell(m->link, s);
     BST_TRY(status);
     publish_answer(m, s);
-    while (bst_link_more(m->link, m->part, m->outputs, OUTPUTS)) {
-        publish_answer(m, s);
-    }
-    return BST_OK;
+    return publish_more(m, s);
 }
 
 static bst_status step(void *self, struct bst_step *s) {

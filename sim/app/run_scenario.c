@@ -8,6 +8,7 @@
 
 #include "sim/app/app.h"
 #include "sim/app/json_number.h"
+#include "sim/app/run_link.h"
 #include "sim/app/run_pacing.h"
 #include "sim/app/run_pictures.h"
 #include "sim/app/run_scenario.h"
@@ -466,6 +467,9 @@ static bst_status execute(run_state *run, bst_simulation *sim, const bst_run_req
         status = bst_run_sightings_create(ctx, bst_simulation_world(sim), &run->scenario->record,
                                           run->scenario->tick_rate_hz, store, &run->sightings);
     }
+    if (status == BST_OK) {
+        status = bst_run_link_record(ctx, sim, bst_run_folder(store));
+    }
     bool stepped = status == BST_OK;
     if (stepped) {
         status = step_through(run, sim, wall);
@@ -483,6 +487,9 @@ static bst_status execute(run_state *run, bst_simulation *sim, const bst_run_req
     }
     bst_status closed = bst_recorder_close(&closing, run->recorder);
     run->recorder = NULL;
+    if (closed == BST_OK) {
+        closed = bst_run_link_recorded(&closing, sim);
+    }
     if (status == BST_OK && closed != BST_OK) {
         *ctx = closing;
         status = closed;

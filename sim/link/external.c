@@ -259,8 +259,14 @@ static void publish_answer(external *m, struct bst_step *step) {
     }
 }
 
-static void publish_more(external *m, struct bst_step *step) {
-    while (bst_link_more(m->link, m->part, m->outputs, m->output_count)) {
+static bst_status publish_more(external *m, struct bst_step *step) {
+    for (;;) {
+        bool more;
+        BST_TRY(bst_link_more(bst_step_ctx(step), m->link, m->part, bst_step_tick(step), m->outputs,
+                              m->output_count, &more));
+        if (!more) {
+            return BST_OK;
+        }
         publish_answer(m, step);
     }
 }
@@ -271,8 +277,7 @@ static bst_status ready(external *m, struct bst_step *step, bool *is_ready) {
                                        m->outputs, m->output_count, is_ready);
     bst_external_tell(m->link, step);
     BST_TRY(status);
-    publish_more(m, step);
-    return BST_OK;
+    return publish_more(m, step);
 }
 
 /* One exchange; what came goes to the channels. */
@@ -284,8 +289,7 @@ static bst_status exchange(external *m, struct bst_step *step, const bst_link_in
     bst_external_tell(m->link, step);
     BST_TRY(status);
     publish_answer(m, step);
-    publish_more(m, step);
-    return BST_OK;
+    return publish_more(m, step);
 }
 
 static bool is_queue(const bst_port *port) {

@@ -74,7 +74,7 @@ static bst_status silent(bst_link *link, link_exchange *x, double waited_s, bool
 }
 
 /* The oldest answer that is whole goes to the caller. */
-bool bst_link_more(bst_link *link, int number, bst_link_output *outputs, int output_count) {
+static bool oldest_answer(bst_link *link, int number, bst_link_output *outputs, int output_count) {
     link_part *part = &link->parts[number];
     link_answer *oldest = NULL;
     for (int a = 0; a < LINK_AHEAD; a++) {
@@ -98,6 +98,24 @@ bool bst_link_more(bst_link *link, int number, bst_link_output *outputs, int out
         oldest->open = false;
     }
     return oldest != NULL;
+}
+
+bst_status bst_link_more(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
+                         bst_link_output *outputs, int output_count, bool *more) {
+    *more = false;
+    if (link->run.waiting == BST_LINK_AWAIT) {
+        return BST_OK;
+    }
+    if (bst_link_replays(link)) {
+        return bst_link_tape_read_more(ctx, link, number, tick, outputs, output_count, more);
+    }
+    *more = oldest_answer(link, number, outputs, output_count);
+    if (*more) {
+        bst_link_tape_answer(link, number, tick, outputs, output_count);
+    } else {
+        bst_link_tape_note(link, number, tick, false, true);
+    }
+    return BST_OK;
 }
 
 /* Room for answers that are not awaited. */
@@ -182,6 +200,9 @@ bst_status bst_link_ready(bst_ctx *ctx, bst_link *link, int number, int64_t tick
     if (link->run.waiting == BST_LINK_AWAIT) {
         return BST_OK;
     }
+    if (bst_link_replays(link)) {
+        return bst_link_tape_read_ready(ctx, link, number, tick, ready);
+    }
     BST_TRY(bst_link_open(ctx, link));
     link_part *part = &link->parts[number];
     BST_TRY(make_ahead(ctx, part, outputs, output_count));
@@ -204,6 +225,7 @@ bst_status bst_link_ready(bst_ctx *ctx, bst_link *link, int number, int64_t tick
     if (!*ready) {
         link->counts[LINK_SKIPPED]++;
     }
+    bst_link_tape_note(link, number, tick, *ready, false);
     return BST_OK;
 }
 
@@ -237,12 +259,15 @@ static bst_status not_awaited(bst_ctx *ctx, bst_link *link, int number, int64_t 
     send_step(link, &x, &s);
     bool hold = link->run.waiting == BST_LINK_HOLD;
     BST_TRY(take_until(link, &x, place->sent_s + (hold ? link->run.hold_s : 0.0), newest_finished));
-    *answered = bst_link_more(link, number, outputs, output_count);
+    *answered = oldest_answer(link, number, outputs, output_count);
     link->counts[LINK_HELD] += !*answered;
     return BST_OK;
 }
 
 bst_status bst_link_gather(bst_ctx *ctx, bst_link *link) {
+    if (bst_link_replays(link)) {
+        return BST_OK;
+    }
     BST_TRY(bst_link_open(ctx, link));
     double began = bst_wall_seconds();
     for (int i = 0; i < link->part_count; i++) {
@@ -263,14 +288,9 @@ bst_status bst_link_gather(bst_ctx *ctx, bst_link *link) {
     return BST_OK;
 }
 
-bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
-                             const bst_link_input *inputs, int input_count,
-                             bst_link_output *outputs, int output_count, bool *answered) {
-    BST_TRY(bst_link_open(ctx, link));
-    if (link->run.waiting != BST_LINK_AWAIT) {
-        return not_awaited(ctx, link, number, tick, inputs, input_count, outputs, output_count,
-                           answered);
-    }
+static bst_status awaited(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
+                          const bst_link_input *inputs, int input_count, bst_link_output *outputs,
+                          int output_count, bool *answered) {
     link->exchanges++;
     link_part *part = &link->parts[number];
     link_exchange x = {.ctx = ctx,
@@ -322,4 +342,18 @@ bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int number, int64_t t
             return silent(link, &x, now - began, answered);
         }
     }
+}
+
+bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
+                             const bst_link_input *inputs, int input_count,
+                             bst_link_output *outputs, int output_count, bool *answered) {
+    if (bst_link_replays(link)) {
+        *answered = true;
+        return bst_link_tape_read(ctx, link, number, tick, outputs, output_count);
+    }
+    BST_TRY(bst_link_open(ctx, link));
+    BST_TRY((link->run.waiting == BST_LINK_AWAIT ? awaited : not_awaited)(
+        ctx, link, number, tick, inputs, input_count, outputs, output_count, answered));
+    bst_link_tape_answer(link, number, tick, outputs, output_count);
+    return BST_OK;
 }

@@ -102,6 +102,72 @@ class SameResults(unittest.TestCase):
                 "link_hello", "link_messages", "link_connected")], count)
 
 
+class Replay(unittest.TestCase):
+    """A recorded run without its peers."""
+
+    def replayed(self, scenario, recorded, *more, frames=False):
+        again = runs.scratch() + "/again"
+        words = runs.command(scenario, again, *([] if frames else [runs.NO_FRAMES]), duration=6)
+        result = subprocess.run(words + ["--replay", recorded, *more], capture_output=True,
+                                text=True, timeout=60)
+        return again, result
+
+    def same(self, a, b):
+        one, other = boresight_link.read_run(a), boresight_link.read_run(b)
+        self.assertEqual(one.tables, other.tables)
+        for name in one.tables:
+            x, y = one.table(name), other.table(name)
+            if name == "events":  # the link had peers to speak of, the run a clock
+                x, y = ({c: t[c][~np.isin(t["kind"], ("link", "overrun"))] for c in t}
+                        for t in (x, y))
+            for column in x:
+                np.testing.assert_array_equal(x[column], y[column], f"{name}.{column}")
+
+    def test_three_parts_in_lockstep(self):
+        address, out = f"tcp://127.0.0.1:{free_port()}", runs.scratch() + "/run"
+        parts = "imgproc,tracker,control"
+        peers = [serve(runs.TRACK, address, part) for part in parts.split(",")]
+        ended(start_run(runs.TRACK, out, address, parts, duration=6))
+        for peer in peers:
+            ended(peer)
+        again, result = self.replayed(runs.TRACK, out, "--external", parts)
+        self.assertEqual(result.returncode, 1)  # no address, which even a replay's scenario has
+        again, result = self.replayed(out + "/scenario.json", out)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.same(out, again)
+        self.assertFalse(os.path.exists(again + "/link.packets"))
+        # what is not the recorded run is told, not taken
+        _, result = self.replayed(out + "/scenario.json", out, "--duration", "9")
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("the recorded run was shorter", result.stderr)
+        _, result = self.replayed(out + "/scenario.json", out, "--set",
+                                  runs.SENSOR + "/modules/control/rate_hz=10")
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("is replayed by the scenario, seed and options of its run", result.stderr)
+        with open(out + "/link.packets", "r+b") as file:
+            file.seek(1000)
+            byte = file.read(1)
+            file.seek(1000)
+            file.write(bytes([byte[0] ^ 1]))
+        _, result = self.replayed(out + "/scenario.json", out)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("link.packets", result.stderr)
+        _, result = self.replayed(runs.TRACK, out)
+        self.assertIn("no module of the scenario is of type", result.stderr)
+
+    def test_a_run_that_waits_for_nobody(self):
+        """Which answers came when is in the recording."""
+        address, out = ipc(), runs.scratch() + "/run"
+        peer = serve(runs.TRACK, address, "control")
+        ended(start_run(runs.TRACK, out, address, "control", "--pacing", "realtime", "--set",
+                        "/pacing/overrun=hold", "--set", "/pacing/speed=10", "--set",
+                        "/pacing/deadline_s=0.001", duration=6))
+        ended(peer)
+        again, result = self.replayed(out + "/scenario.json", out)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.same(out, again)
+
+
 class Client(unittest.TestCase):
     """python/boresight_link.py against the document, and by itself."""
 
