@@ -3,6 +3,7 @@
 #define BST_ENGINE_ENGINE_H
 
 #include "sim/core/module.h"
+#include "sim/engine/pacing.h"
 
 typedef struct bst_engine bst_engine;
 
@@ -92,6 +93,13 @@ bst_status bst_engine_overlap(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
  * is constant or locked. */
 bst_status bst_engine_part(bst_ctx *ctx, bst_engine *engine, int threads,
                            bool *parted) BST_MUST_CHECK;
+
+/* Has bst_engine_run keep to the wall clock (BST_PACING_REALTIME), or only watch how long frames
+ * take (the other modes). After bst_engine_load; not with bst_engine_part. */
+bst_status bst_engine_pace(bst_ctx *ctx, bst_engine *engine,
+                           const bst_pacing_config *config) BST_MUST_CHECK;
+/* How the clock has been kept so far; false when the engine is not paced. */
+bool bst_engine_pacing(const bst_engine *engine, bst_pacing_figures *out);
 
 /* Steps everything that is due before `until_tick` (exclusive). All of it is done on return. */
 bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) BST_MUST_CHECK;
