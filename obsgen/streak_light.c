@@ -43,7 +43,8 @@ static inline float exponential(float x) {
     return e * power.value;
 }
 
-static inline void light_of(const bst_streak_place *p, float light[LANES]) {
+/* Adds the light of a place times `rows` to `sum`. */
+static inline void add_light(const bst_streak_place *p, const float rows[LANES], float sum[LANES]) {
     const float off = p->off + (float)LIGHT_ROWS, fall = -p->fall, height = p->height;
     float x[LANES]; /* in loops of its own, so that all lanes are done at once */
     for (int r = 0; r < LANES; r++) {
@@ -54,12 +55,17 @@ static inline void light_of(const bst_streak_place *p, float light[LANES]) {
         x[r] = x[r] > -80.0f ? x[r] : -80.0f;
     }
     for (int r = 0; r < LANES; r++) {
-        light[r] = exponential(x[r]) * height;
+        sum[r] += rows[r] * (exponential(x[r]) * height);
     }
 }
 
 LANES_FUNCTION void bst_streak_light_of(const bst_streak_place *place, float light[LANES]) {
-    light_of(place, light);
+    float all[LANES];
+    for (int r = 0; r < LANES; r++) {
+        all[r] = 1.0f;
+        light[r] = 0.0f;
+    }
+    add_light(place, all, light);
 }
 
 /* ---- runs ---- */
@@ -147,17 +153,20 @@ static void on_band(const bst_streak_light *l, const bst_streak_run *run, const 
 }
 
 LANES_FUNCTION static void lay_run(const band *b, const bst_streak_place *places, int count) {
+    float rows[LANES]; /* 1 where light is laid */
+    for (int r = 0; r < LANES; r++) {
+        rows[r] = r < LIGHT_WIDE ? 1.0f : 0.0f;
+    }
     for (int k = 0; k < count; k++) {
         const bst_streak_place *p = &places[k];
         if (p->middle < -LIGHT_ROWS || p->middle >= b->places + LIGHT_ROWS) {
             continue;
         }
-        float light[LANES];
+        float sum[LANES];
         float *to = b->values + (p->at - b->first) * b->stride + p->middle - LIGHT_ROWS + MARGIN;
-        light_of(p, light);
-        for (int r = 0; r < LANES; r++) {
-            to[r] += r < LIGHT_WIDE ? light[r] : 0.0f;
-        }
+        memcpy(sum, to, sizeof sum);
+        add_light(p, rows, sum);
+        memcpy(to, sum, sizeof sum);
     }
 }
 
