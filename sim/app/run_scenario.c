@@ -8,6 +8,7 @@
 
 #include "sim/app/app.h"
 #include "sim/app/json_number.h"
+#include "sim/app/plugins.h"
 #include "sim/app/run_link.h"
 #include "sim/app/run_pacing.h"
 #include "sim/app/run_pictures.h"
@@ -243,6 +244,7 @@ static bst_status write_manifest(const run_state *run, bst_simulation *sim, cons
         snprintf(text, sizeof text, "%08x%08x", kernel->hash_high, kernel->hash_low);
         cJSON_AddStringToObject(kernels, kernel->name, text);
     }
+    bst_plugins_tell(scenario, root);
     bst_stars_info stars;
     bst_stars_get_info(bst_world_stars(bst_simulation_world(sim)), &stars);
     cJSON_AddStringToObject(root, "star_catalogue", stars.source);
