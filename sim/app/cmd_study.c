@@ -15,6 +15,8 @@
 #include "sim/app/cmd_study.h"
 #include "sim/app/options.h"
 #include "sim/app/stop_signals.h"
+#include "sim/app/study_plugins.h"
+#include "sim/core/folder.h"
 #include "sim/core/wall_clock.h"
 #include "sim/io/manifest.h"
 #include "sim/io/run_store.h"
@@ -40,28 +42,6 @@ const bst_study_kind *bst_app_study_kind(int kind) {
 }
 
 /* ------------------------------------------------------------------ the folder */
-
-static bool is_folder(const char *path) {
-    struct stat info;
-    return stat(path, &info) == 0 && S_ISDIR(info.st_mode);
-}
-
-static bst_status make_folder(bst_ctx *ctx, const char *path) {
-    char part[4096];
-    int n = snprintf(part, sizeof part, "%s", path);
-    if (n < 0 || (size_t)n >= sizeof part - 16) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", path);
-    }
-    for (char *slash = part; (slash = strchr(slash + 1, '/'));) {
-        *slash = '\0';
-        mkdir(part, 0777);
-        *slash = '/';
-    }
-    if (mkdir(part, 0777) != 0 && !is_folder(part)) {
-        return bst_fail(ctx, BST_ERR_IO, "%s: cannot be made: %s", part, strerror(errno));
-    }
-    return BST_OK;
-}
 
 /* Locks the folder against another driver; -1 with a message. */
 static int lock_folder(bst_ctx *ctx, const char *out, bool shared) {
@@ -118,7 +98,7 @@ static bst_status open_folder(bst_ctx *ctx, const bst_study *study, const char *
                               bool shared, int *lock) {
     char shards[4200];
     *lock = -1;
-    if (!resume && is_folder(out)) {
+    if (!resume) {
         char path[4200];
         snprintf(path, sizeof path, "%.4000s/study.json", out);
         if (access(path, F_OK) != 0 && rmdir(out) != 0 && errno == ENOTEMPTY) {
@@ -129,7 +109,7 @@ static bst_status open_folder(bst_ctx *ctx, const bst_study *study, const char *
         }
     }
     snprintf(shards, sizeof shards, "%.4000s/shards", out);
-    BST_TRY(make_folder(ctx, shards));
+    BST_TRY(bst_folder_make(ctx, shards));
     *lock = lock_folder(ctx, out, shared);
     if (*lock < 0) {
         return BST_ERR_IO;
@@ -263,6 +243,9 @@ static int run_study(bst_ctx *ctx, const study_request *r, const bst_study *stud
         return BST_EXIT_FAILED;
     }
     bst_status status = open_folder(ctx, study, out, r->resume, false, &lock);
+    if (status == BST_OK) {
+        status = bst_study_plugins_settle(ctx, kind->user, out);
+    }
     if (status == BST_OK) {
         status = execute(ctx, r, study, kind, out, lock, &results, &outcome);
     }
@@ -431,6 +414,11 @@ static const char help_text[] =
     "\n"
     "options:\n";
 
+static bool is_folder(const char *path) {
+    struct stat info;
+    return stat(path, &info) == 0 && S_ISDIR(info.st_mode);
+}
+
 static int command(bst_ctx *ctx, const study_request *r, const char *given) {
     char file[4200], out[4200];
     bst_study study;
@@ -440,7 +428,10 @@ static int command(bst_ctx *ctx, const study_request *r, const char *given) {
         fprintf(stderr, "boresight: %s\n", ctx->message);
         return BST_EXIT_FAILED;
     }
-    const bst_study_kind *kind = bst_app_study_kind(study.config.kind);
+    bst_study_plugins plugins = {.count = 0};
+    bst_study_kind with_plugins = *bst_app_study_kind(study.config.kind);
+    const bst_study_kind *kind = &with_plugins;
+    with_plugins.user = &plugins;
     snprintf(out, sizeof out, "%s%.4000s", r->out || folder ? "" : "studies/",
              r->out   ? r->out
              : folder ? given
@@ -453,6 +444,8 @@ static int command(bst_ctx *ctx, const study_request *r, const char *given) {
         snprintf(file, sizeof file, "%.4000s/study.json", out);
         bool checked = r->shard && access(file, F_OK) == 0; /* by who made the folder */
         status = checked ? BST_OK : bst_study_check(ctx, &study, kind);
+        study.notes = plugins.notes;
+        study.note_count = plugins.count;
         if (status == BST_OK) {
             if (r->dry_run) {
                 bst_study_print_plan(&study, kind,
@@ -467,6 +460,7 @@ static int command(bst_ctx *ctx, const study_request *r, const char *given) {
         fprintf(stderr, "boresight: %s\n", ctx->message);
         code = status == BST_ERR_INTERRUPTED ? BST_EXIT_INTERRUPTED : BST_EXIT_FAILED;
     }
+    bst_study_plugins_free(&plugins);
     bst_study_close(&study);
     return code;
 }

@@ -14,6 +14,8 @@
 #include "sim/app/stop_signals.h"
 #include "sim/app/study_card.h"
 #include "sim/app/study_labels.h"
+#include "sim/app/study_plugins.h"
+#include "sim/core/folder.h"
 #include "sim/core/rng.h"
 #include "sim/core/version.h"
 #include "sim/io/fits_frames.h"
@@ -239,9 +241,7 @@ static bst_status make_folders(bst_ctx *ctx, const char *out) {
     for (int k = 0; k < 2; k++) {
         char path[4200];
         snprintf(path, sizeof path, "%.4000s/%s", out, names[k]);
-        if (mkdir(path, 0777) != 0 && errno != EEXIST) {
-            return bst_fail(ctx, BST_ERR_IO, "%s: cannot be made: %s", path, strerror(errno));
-        }
+        BST_TRY(bst_folder_make(ctx, path));
     }
     return BST_OK;
 }
@@ -365,7 +365,7 @@ static bst_status run_cubes(bst_ctx *ctx, void *worker, const bst_study_run *run
     cube c = {.config = &config, .scenario = &scenario, .ctx = ctx};
     int observer = 0, sensor = -1;
     BST_TRY(read_settings(ctx, run, &config));
-    bst_status status = bst_plugins_scenario_read(ctx, run->scenario, &scenario);
+    bst_status status = bst_study_read_scenario(ctx, run, &scenario);
     if (status == BST_OK) {
         sensor = find_sensor(&scenario, config.sensor, &observer, c.scope);
         status = sensor >= 0 ? bst_study_simulation(ctx, worker, &scenario, &sim)

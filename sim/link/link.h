@@ -28,12 +28,21 @@ typedef struct bst_link_config {
 
 extern const bst_config_desc bst_link_config_table[];
 
+/* How long a step waits for its answer. */
+typedef enum bst_link_waiting {
+    BST_LINK_AWAIT, /* until it comes, or the time-outs say that it does not */
+    BST_LINK_HOLD,  /* for hold_s; then the run goes on, and the answer counts when it comes */
+    BST_LINK_RUSH,  /* not at all: the same with hold_s 0 */
+} bst_link_waiting;
+
 /* What the run is, for `welcome` and headers. */
 typedef struct bst_link_run {
     const char *scenario;
     bst_time epoch;
     int64_t tick_rate_hz, duration_ticks;
     size_t pixel_bytes; /* of the largest frame */
+    bst_link_waiting waiting;
+    double hold_s;
 } bst_link_run;
 
 /* Checks the address; nothing is bound yet. */
@@ -51,6 +60,8 @@ bst_status bst_link_add(bst_ctx *ctx, bst_link *link, const bst_link_part *part,
                         int *number) BST_MUST_CHECK;
 /* Binds the address; once, else by the first exchange. BST_ERR_IO: it is taken. */
 bst_status bst_link_open(bst_ctx *ctx, bst_link *link) BST_MUST_CHECK;
+/* Waits until each part has a peer, for connect_timeout_s. Errors as bst_link_exchange. */
+bst_status bst_link_gather(bst_ctx *ctx, bst_link *link) BST_MUST_CHECK;
 /* Asked about ten times a second while waiting; true ends the wait with BST_ERR_INTERRUPTED. */
 void bst_link_on_wait(bst_link *link, bool (*stop)(void *user), void *user);
 
@@ -77,13 +88,33 @@ typedef struct bst_link_output {
     int dropped; /* items beyond the capacity */
 } bst_link_output;
 
-/* One step of a part: sends the inputs, waits for the answer. *answered false: there was none in
- * time, and on_silence is BST_LINK_GO_ON. BST_ERR_IO: no peer came or answered, or one said that it
- * has failed; BST_ERR_INTERRUPTED: bst_link_on_wait. */
+/* One step of a part: sends the inputs (at most 63), waits for the answer. *answered false: there
+ * was none in time, and on_silence is BST_LINK_GO_ON. BST_ERR_IO: no peer came or answered, or one
+ * said that it has failed; BST_ERR_INTERRUPTED: bst_link_on_wait. */
 bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
                              const bst_link_input *inputs, int input_count,
                              bst_link_output *outputs, int output_count,
                              bool *answered) BST_MUST_CHECK;
+
+/* With BST_LINK_HOLD and BST_LINK_RUSH, answers come when they come: an exchange gives out the
+ * oldest one that is there, be it of an earlier step, and *answered false is no failure. These give
+ * out the others, and tell whether the peer keeps up: one that has LINK_AHEAD steps to answer is
+ * sent no more (counted), and what would have gone to it is not to be prepared. With BST_LINK_AWAIT
+ * there is never more, and always room. */
+bst_status bst_link_more(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
+                         bst_link_output *outputs, int output_count, bool *more) BST_MUST_CHECK;
+bst_status bst_link_ready(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
+                          const bst_link_output *outputs, int output_count,
+                          bool *ready) BST_MUST_CHECK;
+
+/* Writes what the parts are answered to a file, before the first exchange; bst_link_record_end says
+ * whether it all got there. */
+bst_status bst_link_record(bst_ctx *ctx, bst_link *link, const char *path) BST_MUST_CHECK;
+bst_status bst_link_record_end(bst_ctx *ctx, bst_link *link) BST_MUST_CHECK;
+/* Has the parts answered from such a file: nothing is bound, nobody is waited for. An exchange that
+ * is not the recorded one is BST_ERR_FORMAT. */
+bst_status bst_link_replay(bst_ctx *ctx, bst_link *link, const char *path) BST_MUST_CHECK;
+bool bst_link_replays(const bst_link *link);
 
 /* What has been counted, by name ("link_bad_crc"); false after the last. */
 bool bst_link_counter(const bst_link *link, int index, const char **name, int64_t *count);
