@@ -1,5 +1,5 @@
-/* Peers that break off at any moment, in the middle of a frame or while the run ends: the simulation
- * outlives them. Argument: rounds. */
+/* Peers that break off at any moment, in the middle of a frame or while the run ends: the
+ * simulation outlives them. Argument: rounds. */
 #include "tests/test_support.h"
 
 #include <signal.h>
@@ -79,8 +79,7 @@ static void one_round(const char *folder, const uint16_t *pixels, int number) {
                                       .pixels = pixels,
                                       .pixel_bytes = sizeof(uint16_t) * PIXELS};
         bool answered;
-        bst_assert_ok(&ctx,
-                      bst_link_exchange(&ctx, link, index, i, &input, 1, NULL, 0, &answered));
+        bst_assert_ok(&ctx, bst_link_exchange(&ctx, link, index, i, &input, 1, NULL, 0, &answered));
     }
     bst_link_close(link, 0, "the round is over");
     assert_true(bst_wall_seconds() - began < 60.0); /* a hang, not a slow machine */
