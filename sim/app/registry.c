@@ -28,7 +28,8 @@ static const bst_module_desc *const modules[] = {
     &bst_tasking_priority_module,
 };
 
-static const bst_registry registry = {modules, sizeof modules / sizeof *modules};
+static const bst_registry registry = {.modules = modules,
+                                      .count = sizeof modules / sizeof *modules};
 
 const bst_registry *bst_app_registry(void) {
     return &registry;
