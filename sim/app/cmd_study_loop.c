@@ -10,14 +10,17 @@
 #include "sim/app/plugins.h"
 #include "sim/app/run_scenario.h"
 #include "sim/app/stop_signals.h"
+#include "sim/app/study_plugins.h"
 #include "sim/device/device.h"
 
 /* ------------------------------------------------------------------ shared with other kinds */
 
 bst_status bst_study_check_scenario(bst_ctx *ctx, void *user, const bst_study_run *run, bool deep) {
     bst_scenario scenario;
-    (void)user;
     bst_status status = bst_plugins_scenario_read(ctx, run->scenario, &scenario);
+    if (status == BST_OK && user) {
+        status = bst_study_plugins_take(ctx, user, &scenario);
+    }
     if (status == BST_OK && deep) {
         bst_world *world = NULL;
         status = bst_world_create(ctx, scenario.file, &scenario.world, &scenario.observers,
@@ -298,7 +301,7 @@ static bst_status run_loop(bst_ctx *ctx, void *worker, const bst_study_run *run,
     bst_run_report report = {.sensors = NULL};
     const bst_run_request request = {
         .out = run->folder, .overwrite = true, .metrics = true, .most_s = run->most_s};
-    bst_status status = bst_plugins_scenario_read(ctx, run->scenario, &scenario);
+    bst_status status = bst_study_read_scenario(ctx, run, &scenario);
     if (status == BST_OK) {
         status = bst_study_simulation(ctx, worker, &scenario, &sim);
     }

@@ -8,6 +8,8 @@
 
 #include "sim/app/app.h"
 #include "sim/app/json_number.h"
+#include "sim/app/plugins.h"
+#include "sim/app/run_link.h"
 #include "sim/app/run_pacing.h"
 #include "sim/app/run_pictures.h"
 #include "sim/app/run_scenario.h"
@@ -246,6 +248,7 @@ static bst_status write_manifest(const run_state *run, bst_simulation *sim, cons
         snprintf(text, sizeof text, "%08x%08x", kernel->hash_high, kernel->hash_low);
         cJSON_AddStringToObject(kernels, kernel->name, text);
     }
+    bst_plugins_tell(scenario, root);
     bst_stars_info stars;
     bst_stars_get_info(bst_world_stars(bst_simulation_world(sim)), &stars);
     cJSON_AddStringToObject(root, "star_catalogue", stars.source);
@@ -491,6 +494,9 @@ static bst_status execute(run_state *run, bst_simulation *sim, const bst_run_req
         status = bst_run_sightings_create(ctx, bst_simulation_world(sim), &run->scenario->record,
                                           run->scenario->tick_rate_hz, store, &run->sightings);
     }
+    if (status == BST_OK) {
+        status = bst_run_link_record(ctx, sim, bst_run_folder(store));
+    }
     bool stepped = status == BST_OK;
     if (stepped) {
         status = step_through(run, sim, wall);
@@ -507,6 +513,9 @@ static bst_status execute(run_state *run, bst_simulation *sim, const bst_run_req
     }
     bst_status closed = bst_recorder_close(&closing, run->recorder);
     run->recorder = NULL;
+    if (closed == BST_OK) {
+        closed = bst_run_link_recorded(&closing, sim);
+    }
     if (status == BST_OK && closed != BST_OK) {
         *ctx = closing;
         status = closed;
