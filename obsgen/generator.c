@@ -358,6 +358,9 @@ static bst_status set_frame(bst_ctx *ctx, bst_generator *g, const bst_generator_
                        ? (bst_path_px){f->streak_dx_px / g->binning, f->streak_dy_px / g->binning}
                        : (bst_path_px){0.0, 0.0};
     g->streak = filtered ? length : 0.0;
+    if (filtered) {
+        bst_wander_set(&g->wander, length, g->total_sigma);
+    }
     return set_path(ctx, g, f);
 }
 
