@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "obsgen/clutter.h"
+#include "obsgen/streak_light.h"
 #include "obsgen/streak_noise.h"
 #include "sim/core/pages.h"
 #include "sim/core/vec.h"
@@ -22,16 +23,15 @@ static const uint64_t FAINT_STREAK = (uint64_t)1 << 59;
 /* A source whose path differs more from the stars' has a way of its own. */
 static const double OWN_WAY_PX = 1.0;
 
-/* LIGHT_ROWS: on either side of the way that its light reaches. */
 enum {
     ROWS = BST_STREAK_ROWS,
     WIDE = BST_STREAK_WIDE,
-    LIGHT_ROWS = 4,
-    LIGHT_WIDE = 2 * LIGHT_ROWS + 1,
+    SPARSE = BST_STREAK_SPARSE,
+    BLOCK = 64, /* nodes of a way that are looked at together */
+    BLOCKS = BST_ROUTE_NODES / BLOCK,
     /* of the tables below: outputs in steps of 1/8 from 1, lights in steps of 1/8 */
     OUTPUTS = 64,
     LIGHTS = 48,
-    SPARSE = 4 /* of so many nodes of faint light one is looked at */,
 };
 
 typedef bst_streak_section section;
@@ -42,28 +42,33 @@ typedef struct maximum {
     float value;
 } maximum;
 
-/* The filter's output on a pixel that streaks reach. */
-typedef struct pixel {
-    float light;  /* of all streaks */
-    float output; /* with noise; 0: not made */
-} pixel;
+/* A way, its parts that run more along one axis and one way each, and where it goes. */
+typedef struct whole_way {
+    const bst_route_node *nodes;
+    int count, parts;
+    int first[BST_ROUTE_NODES + 1]; /* of a part; the last of it is the first of the next */
+    bool by_row[BST_ROUTE_NODES];
+    double box[BLOCKS][4]; /* least and greatest x, least and greatest y of a block and one more */
+} whole_way;
 
-typedef struct touched {
-    int at, middle;
-    bool by_row;
-} touched;
+/* Place of a source's way relative to another: moved, and turned by this much from end to end. */
+typedef struct shift {
+    double x, y, dx, dy;
+} shift;
 
 struct generator_streaks {
     section sections[BST_ROUTE_NODES];
-    float light[BST_ROUTE_NODES * LIGHT_WIDE]; /* of the sections' rows */
+    bst_streak_light light;
+    whole_way stars, own;
     bst_streak_noise noise;
     double shot; /* variance that an output of one adds, by the photons' own noise */
     double log_maxima[OUTPUTS], maxima_sigma; /* logarithm of maxima per pixel above an output */
     double alarms[LIGHTS]; /* more of them than noise alone makes, per pixel of the way */
-    pixel *map;            /* the frame; about the touched sections it is not zero */
-    touched *touched;
+    float *output;         /* the frame; on the pixels `shown` what is above the threshold */
+    size_t output_room;
+    int *shown;
     maximum *maxima;
-    int map_room, touched_count, touched_room, maxima_count, maxima_room;
+    int shown_count, shown_room, maxima_count, maxima_room;
 };
 
 static float output_at(const section *s, int count, int k, int across) {
@@ -85,23 +90,27 @@ static bst_status grow(bst_ctx *ctx, void **items, int count, int *room, size_t 
     return BST_OK;
 }
 
-/* A section whose pixels are not all zero any more. */
-static bst_status touch(bst_ctx *ctx, struct generator_streaks *w, const section *s, bool by_row) {
-    BST_TRY(
-        grow(ctx, (void **)&w->touched, w->touched_count, &w->touched_room, sizeof *w->touched));
-    w->touched[w->touched_count++] = (touched){s->at, s->middle, by_row};
-    return BST_OK;
+static bool is_on_frame(const bst_generator *g, int x, int y) {
+    return x >= 0 && y >= 0 && x < g->width && y < g->height;
 }
 
+/* Shows the outputs above the threshold, and finds the maxima among them. */
 static bst_status find_maxima(bst_ctx *ctx, bst_generator *g, const section *s, int count,
                               bool by_row, int item) {
     struct generator_streaks *w = g->streaks;
-    int wide = by_row ? g->height : g->width, high = by_row ? g->width : g->height;
     for (int k = 0; k < count; k++) {
-        for (int r = -ROWS + 1; r < ROWS && s[k].at >= 0 && s[k].at < wide; r++) {
-            int across = s[k].middle + r;
+        for (int r = -ROWS; r <= ROWS; r++) {
+            int across = s[k].middle + r, x = by_row ? across : s[k].at,
+                y = by_row ? s[k].at : across;
             float value = s[k].output[r + ROWS];
-            bool top = value > (float)g->threshold && across >= 0 && across < high;
+            if (!(value > (float)g->threshold) || !is_on_frame(g, x, y)) {
+                continue;
+            }
+            BST_TRY(
+                grow(ctx, (void **)&w->shown, w->shown_count, &w->shown_room, sizeof *w->shown));
+            w->shown[w->shown_count] = y * g->width + x;
+            w->output[w->shown[w->shown_count++]] = value;
+            bool top = r > -ROWS && r < ROWS;
             for (int i = -1; i <= 1 && top; i++) {
                 for (int j = -1; j <= 1 && top; j++) {
                     top = (i == 0 && j == 0) || value > output_at(s, count, k + i, across + j);
@@ -110,8 +119,8 @@ static bst_status find_maxima(bst_ctx *ctx, bst_generator *g, const section *s, 
             if (top) {
                 BST_TRY(grow(ctx, (void **)&w->maxima, w->maxima_count, &w->maxima_room,
                              sizeof *w->maxima));
-                w->maxima[w->maxima_count] = (maximum){.x = by_row ? across : s[k].at,
-                                                       .y = by_row ? s[k].at : across,
+                w->maxima[w->maxima_count] = (maximum){.x = x,
+                                                       .y = y,
                                                        .item = item,
                                                        .order = w->maxima_count,
                                                        .by_row = by_row,
@@ -123,14 +132,15 @@ static bst_status find_maxima(bst_ctx *ctx, bst_generator *g, const section *s, 
     return BST_OK;
 }
 
-/* Whether the output stays above `least` on the pixels between two maxima. */
+/* Whether the output stays above `least`, the threshold or more, on the pixels between two maxima.
+ */
 static bool is_ridge(const bst_generator *g, const maximum *a, const maximum *b, float least) {
     int dx = b->x - a->x, dy = b->y - a->y;
     int steps = abs(dx) > abs(dy) ? abs(dx) : abs(dy);
     for (int i = 1; i < steps; i++) {
         float t = (float)i / (float)steps;
         int x = a->x + (int)lroundf(t * (float)dx), y = a->y + (int)lroundf(t * (float)dy);
-        if (!(g->streaks->map[y * g->width + x].output > least)) {
+        if (!(g->streaks->output[y * g->width + x] > least)) {
             return false;
         }
     }
@@ -178,76 +188,90 @@ static void report(bst_generator *g) {
     }
 }
 
-/* Sections of a part of the way that runs more along one axis, one way; their number. */
-static int make_sections(bst_generator *g, const generator_source *source,
-                         const bst_route_node *nodes, int count, bool by_row) {
-    struct generator_streaks *w = g->streaks;
+/* A node of a way where a source's goes. */
+static bst_route_node moved(const bst_route_node *n, const shift *by) {
+    double u = n->time - 0.5;
+    return (bst_route_node){n->x + by->x + u * by->dx, n->y + by->y + u * by->dy, n->time,
+                            n->light};
+}
+
+/* Beyond the frame a way is followed as far as noise is filtered. */
+static int beyond(const bst_generator *g) {
+    return g->streaks->noise.reach + 1;
+}
+
+/* Makes runs of nodes first to last of a part of a way; step: of the places along it. */
+static bst_status make_runs(bst_ctx *ctx, bst_generator *g, int source, const bst_route_node *nodes,
+                            int first, int last, const shift *by, bool by_row, int step) {
+    bst_streak_light *l = &g->streaks->light;
+    double amplitude = g->sources[source].amplitude;
     double fall = 0.25 / (g->total_sigma * g->total_sigma);
-    int made = 0, outside = w->noise.reach + 1, wide = by_row ? g->height : g->width;
-    double from = by_row ? nodes[0].y : nodes[0].x;
-    double to = by_row ? nodes[count - 1].y : nodes[count - 1].x, way = to > from ? 1.0 : -1.0;
-    double at = way > 0.0 ? ceil(from) : floor(from);
-    for (int k = 0; k + 1 < count; k++) {
-        const bst_route_node *n = &nodes[k], *m = &nodes[k + 1];
-        double a = by_row ? n->y : n->x, run = (by_row ? m->y : m->x) - a;
-        double rise = by_row ? m->x - n->x : m->y - n->y;
-        /* distances across the way, not across the axis */
-        double slant = run * run / (run * run + rise * rise);
-        for (; way * (a + run - at) > 0.0 && made < BST_ROUTE_NODES; at += way) {
-            double part = fmax((at - a) / run, 0.0);
-            double across = (by_row ? n->x : n->y) + part * rise;
-            if (at < -outside || at > wide + outside) {
-                continue;
+    double dense = OWN_SHARE * (g->threshold - FAINTEST_SIGMA);
+    int outside = beyond(g), wide = by_row ? g->height : g->width,
+        high = by_row ? g->width : g->height;
+    bst_route_node n = moved(&nodes[first], by);
+    double at = by_row ? n.y : n.x, way = step;
+    at = step > 0 ? ceil(at) : floor(at);
+    bool begun = false;
+    for (int k = first; k < last; k++) {
+        bst_route_node m = moved(&nodes[k + 1], by);
+        double a = by_row ? n.y : n.x, run = (by_row ? m.y : m.x) - a;
+        if (way * (a + run - at) > 0.0) {
+            double across = by_row ? n.x : n.y, rise = by_row ? m.x - n.x : m.y - n.y;
+            /* distances across the way, not across the axis */
+            double slant = run * run / (run * run + rise * rise), slope = rise / run;
+            double more = (m.light - n.light) / run;
+            for (; way * (a + run - at) > 0.0; at += way) {
+                double part = way * (at - a) > 0.0 ? at - a : 0.0, c = across + part * slope;
+                bool near = at >= -outside && at <= wide + outside && c > -(outside + ROWS) &&
+                            c < high + outside + ROWS;
+                if (begun && !near) {
+                    BST_TRY(bst_streak_light_end(ctx, l, LEAST_SEEN, LEAST_LIGHT, dense));
+                } else if (near && !begun) {
+                    BST_TRY(bst_streak_light_run(ctx, l, source, by_row, step));
+                }
+                begun = near;
+                if (near) {
+                    bst_streak_place p = {.at = (int)at, .middle = (int)floor(c + 0.5)};
+                    p.height = (float)(amplitude * (n.light + part * more));
+                    p.off = (float)(c - p.middle);
+                    p.fall = (float)(fall * slant);
+                    BST_TRY(bst_streak_light_place(ctx, l, &p));
+                }
             }
-            section *now = &w->sections[made++];
-            now->at = (int)at;
-            now->middle = (int)lround(across);
-            now->height = (float)(source->amplitude * (n->light + part * (m->light - n->light)));
-            now->off = (float)(across - now->middle);
-            now->fall = (float)(fall * slant);
         }
+        n = m;
     }
-    return made;
+    return begun ? bst_streak_light_end(ctx, l, LEAST_SEEN, LEAST_LIGHT, dense) : BST_OK;
 }
 
-/* Light of the sections on the rows about them, into w->light. */
-static void light_rows(struct generator_streaks *w, int count, int rows) {
-    int wide = 2 * rows + 1;
-    for (int k = 0; k < count; k++) {
-        const section *s = &w->sections[k];
-        for (int r = 0; r < wide; r++) {
-            float d = (float)(r - rows) - s->off;
-            w->light[k * wide + r] = -s->fall * d * d;
-        }
-    }
-    bst_streak_exponentials(w->light, count * wide);
-    for (int k = 0; k < count; k++) {
-        for (int r = 0; r < wide; r++) {
-            w->light[k * wide + r] *= w->sections[k].height;
-        }
-    }
+/* Whether a block of nodes may come to the frame. */
+static bool block_comes_in(const bst_generator *g, const double box[4], const shift *by) {
+    double margin = beyond(g) + ROWS + 1.0;
+    double x = margin + 0.5 * fabs(by->dx), y = margin + 0.5 * fabs(by->dy);
+    return by->x + box[1] > -x && by->x + box[0] < g->width + x && by->y + box[3] > -y &&
+           by->y + box[2] < g->height + y;
 }
 
-/* Pixel of the frame of a section's row, -1: outside. */
-static int pixel_of(const bst_generator *g, bool by_row, int at, int across) {
-    int x = by_row ? across : at, y = by_row ? at : across;
-    return x >= 0 && y >= 0 && x < g->width && y < g->height ? y * g->width + x : -1;
-}
-
-/* Adds the light of a part of the way to the map. */
-static bst_status lay_part(bst_ctx *ctx, bst_generator *g, const generator_source *source,
-                           const bst_route_node *nodes, int count, bool by_row) {
-    struct generator_streaks *w = g->streaks;
-    int made = make_sections(g, source, nodes, count, by_row);
-    light_rows(w, made, LIGHT_ROWS);
-    for (int k = 0; k < made; k++) {
-        const section *s = &w->sections[k];
-        BST_TRY(touch(ctx, w, s, by_row));
-        for (int r = 0; r < LIGHT_WIDE; r++) {
-            int at = pixel_of(g, by_row, s->at, s->middle + r - LIGHT_ROWS);
-            if (at >= 0) {
-                w->map[at].light += w->light[k * LIGHT_WIDE + r];
+/* Makes the runs of a source: parts of the way, as far as they come to the frame. */
+static bst_status run_along(bst_ctx *ctx, bst_generator *g, int source, const whole_way *way,
+                            const shift *by) {
+    for (int i = 0; i < way->parts; i++) {
+        int first = way->first[i], last = way->first[i + 1], from = -1;
+        const bst_route_node *a = &way->nodes[first], *b = &way->nodes[last];
+        bool by_row = way->by_row[i];
+        int step = (by_row ? b->y - a->y : b->x - a->x) > 0.0 ? 1 : -1;
+        for (int k = first; k < last;) {
+            int end = (k / BLOCK + 1) * BLOCK;
+            end = end < last ? end : last;
+            bool in = block_comes_in(g, way->box[k / BLOCK], by);
+            from = in && from < 0 ? k : from;
+            if (from >= 0 && (!in || end == last)) {
+                BST_TRY(
+                    make_runs(ctx, g, source, way->nodes, from, in ? end : k, by, by_row, step));
+                from = -1;
             }
+            k = end;
         }
     }
     return BST_OK;
@@ -258,35 +282,24 @@ static double taken_of(const bst_generator *g) {
     return g->background_bias_e / (bst_bound_norm(&g->bound, 0.0) * g->noise_e);
 }
 
-/* Maxima along a part of the way. */
-static bst_status search_part(bst_ctx *ctx, bst_generator *g, const generator_source *source,
-                              const bst_route_node *nodes, int count, bool by_row) {
+/* Maxima about places of a run. */
+static bst_status search_part(bst_ctx *ctx, bst_generator *g, const bst_streak_run *run, int first,
+                              int last) {
     struct generator_streaks *w = g->streaks;
     section *s = w->sections;
-    int made = make_sections(g, source, nodes, count, by_row);
-    if (made < 2) {
-        return BST_OK;
-    }
-    double taken = taken_of(g);
-    light_rows(w, made, ROWS);
-    for (int k = 0; k < made; k++) {
+    const bst_streak_place *places = &w->light.places[run->first];
+    int count = last - first + 1 < BST_ROUTE_NODES ? last - first + 1 : BST_ROUTE_NODES;
+    float taken = (float)taken_of(g);
+    for (int k = 0; k < count; k++) {
+        const float *seen = bst_streak_seen(&w->light, run, first + k);
+        s[k].at = places[first + k].at;
+        s[k].middle = places[first + k].middle;
         for (int r = 0; r < WIDE; r++) {
-            int at = pixel_of(g, by_row, s[k].at, s[k].middle + r - ROWS);
-            float light = at >= 0 ? w->map[at].light : w->light[k * WIDE + r];
-            s[k].output[r] = light - (float)taken;
+            s[k].output[r] = seen[r] - taken;
         }
     }
-    bst_streak_noise_add(&w->noise, g->key, g->exposure_id, by_row, w->shot, s, made);
-    for (int k = 0; k < made; k++) {
-        BST_TRY(touch(ctx, w, &s[k], by_row));
-        for (int r = 0; r < WIDE; r++) {
-            int at = pixel_of(g, by_row, s[k].at, s[k].middle + r - ROWS);
-            if (at >= 0) {
-                w->map[at].output = s[k].output[r];
-            }
-        }
-    }
-    return find_maxima(ctx, g, s, made, by_row, source->item);
+    bst_streak_noise_add(&w->noise, g->key, g->exposure_id, run->by_row, w->shot, s, count);
+    return find_maxima(ctx, g, s, count, run->by_row, g->sources[run->source].item);
 }
 
 static double log_maxima_above(const struct generator_streaks *w, double output) {
@@ -329,20 +342,9 @@ static double draw_exponential(const bst_generator *g, arrivals *a) {
     return -log(bst_rng_uniform(g->key, (uint64_t)g->exposure_id, a->draw++));
 }
 
-/* Light of all streaks at a node; of the source alone where that is too faint to count for others.
- */
-static double light_at(const bst_generator *g, const bst_route_node *node, double own) {
-    double x = node->x + 0.5, y = node->y + 0.5;
-    if (!(x >= 0.0 && y >= 0.0 && x < g->width && y < g->height)) {
-        return own;
-    }
-    double all = (double)g->streaks->map[(int)y * g->width + (int)x].light;
-    return all > own ? all : own;
-}
-
-/* Alarms that light too faint to be looked at pixel by pixel makes at a node. share: pixels of the
+/* Alarms that light too faint to be looked at pixel by pixel makes at a place. share: pixels of the
  * way that it stands for, times this source's part of the light. */
-static void draw_faint(bst_generator *g, const generator_source *source, const bst_route_node *n,
+static void draw_faint(bst_generator *g, const bst_streak_run *run, const bst_streak_place *p,
                        double share, double light, arrivals *a) {
     const struct generator_streaks *w = g->streaks;
     double at = 8.0 * light;
@@ -358,51 +360,45 @@ static void draw_faint(bst_generator *g, const generator_source *source, const b
         bst_rng_normal2(g->key, (uint64_t)g->exposure_id, a->draw++, off);
         /* alarms are the likelier, the nearer to the way */
         double spread = g->total_sigma * sqrt(2.0 / (g->threshold * light + 1.0));
-        int x = (int)lround(n->x + spread * off[0]), y = (int)lround(n->y + spread * off[1]);
-        if (pixel_of(g, false, x, y) >= 0) {
-            bst_generator_keep_rough(g, x, y, g->threshold + noise * (value - least), source->item);
+        double along = p->at + spread * off[0],
+               across = p->middle + (double)p->off + spread * off[1];
+        int x = (int)lround(run->by_row ? across : along);
+        int y = (int)lround(run->by_row ? along : across);
+        if (is_on_frame(g, x, y)) {
+            bst_generator_keep_rough(g, x, y, g->threshold + noise * (value - least),
+                                     g->sources[run->source].item);
         }
     }
 }
 
-/* Lays the light of a part of the way, where it counts. */
-static bst_status lay_bright(bst_ctx *ctx, bst_generator *g, const generator_source *source,
-                             const bst_route_node *nodes, int count, bool by_row) {
-    double least = LEAST_LIGHT / source->amplitude;
-    for (int first = 0, end; first < count; first = end) {
-        bool counts = nodes[first].light >= least;
-        for (end = first + 1; end < count && (nodes[end].light >= least) == counts; end++) {
-        }
-        if (counts) {
-            int from = first > 0 ? first - 1 : 0, to = end < count ? end : count - 1;
-            BST_TRY(lay_part(ctx, g, source, nodes + from, to - from + 1, by_row));
-        }
-    }
-    return BST_OK;
-}
-
-/* Looks for maxima in a part of the way: pixel by pixel where light is bright enough, and as far
- * about that as noise is filtered. */
-static bst_status search_bright(bst_ctx *ctx, bst_generator *g, const generator_source *source,
-                                const bst_route_node *nodes, int count, bool by_row, arrivals *a) {
-    double least = g->threshold - FAINTEST_SIGMA;
-    int margin = 2 * g->streaks->noise.reach + 4, from = -1, last = -1;
-    for (int k = 0; k < count; k++) {
-        double own = source->amplitude * nodes[k].light;
-        if (own >= OWN_SHARE * least || (own > LEAST_SEEN && k % SPARSE == 0)) {
-            double light = light_at(g, &nodes[k], own);
+/* Looks for maxima in a run: pixel by pixel where light is bright enough, and as far about that as
+ * noise is filtered. */
+static bst_status search_run(bst_ctx *ctx, bst_generator *g, const bst_streak_run *run,
+                             arrivals *a) {
+    const struct generator_streaks *w = g->streaks;
+    const bst_streak_place *places = &w->light.places[run->first];
+    double least = g->threshold - FAINTEST_SIGMA, steep = 2.0 * g->total_sigma;
+    int margin = 2 * w->noise.reach + 4, from = -1, last = -1;
+    for (int k = 0; k < run->count; k++) {
+        const bst_streak_place *p = &places[k];
+        double own = (double)p->height;
+        bool bright = own >= OWN_SHARE * least;
+        if (bright || (own > LEAST_SEEN && k % SPARSE == 0)) {
+            double light = (double)bst_streak_seen(&w->light, run, k)[run->dense ? ROWS : 0];
+            light = light > own ? light : own;
             if (light >= least && own >= OWN_SHARE * light) {
                 from = from < 0 ? k : from;
                 last = k;
-            } else if (light < least) {
-                double pixels = own >= OWN_SHARE * least ? 1.0 : SPARSE;
-                draw_faint(g, source, &nodes[k], pixels * own / light, light, a);
+            } else if (light < least && is_on_frame(g, run->by_row ? p->middle : p->at,
+                                                    run->by_row ? p->at : p->middle)) {
+                double pixels = (bright ? 1.0 : SPARSE) / (steep * sqrt((double)p->fall));
+                draw_faint(g, run, p, pixels * own / light, light, a);
             }
         }
-        if (from >= 0 && (k > last + 2 * margin || k == count - 1)) {
+        if (from >= 0 && (k > last + 2 * margin || k == run->count - 1)) {
             int start = from > margin ? from - margin : 0;
-            int end = last + margin < count ? last + margin : count - 1;
-            BST_TRY(search_part(ctx, g, source, nodes + start, end - start + 1, by_row));
+            int end = last + margin < run->count ? last + margin : run->count - 1;
+            BST_TRY(search_part(ctx, g, run, start, end));
             from = -1;
         }
     }
@@ -426,49 +422,17 @@ static bool comes_in(const bst_generator *g, const generator_source *s) {
            s->y + g->route_box[3] > -margin_y && s->y + g->route_box[2] < g->height + margin_y;
 }
 
-/* The stars' way in the middle of the frame, turned into this source's by what its own ends differ;
- * or its own, where it moves otherwise. Its nodes are g->way; their number. */
-static int way_of(bst_generator *g, const generator_source *source) {
-    double dx = source->path.dx - g->whole_path.dx, dy = source->path.dy - g->whole_path.dy;
-    bst_route_node *way = g->way;
-    int count = g->route_count;
-    if (!source->star && hypot(dx, dy) > OWN_WAY_PX) {
-        for (int k = 0; k < g->path.count; k++) {
-            double u = (double)k / (g->path.count - 1) - 0.5;
-            g->object_x[k] = g->path_x[k] + u * dx;
-            g->object_y[k] = g->path_y[k] + u * dy;
-        }
-        const bst_route_path own = {g->object_x, g->object_y, g->path.count};
-        count = bst_route_lay(&own, g->total_sigma, way);
-        dx = dy = 0.0;
-    } else {
-        memcpy(way, g->route, (size_t)count * sizeof *way);
-    }
-    for (int i = 0; i < count; i++) {
-        double u = way[i].time - 0.5;
-        way[i].x += source->x + u * dx;
-        way[i].y += source->y + u * dy;
-    }
-    return count;
-}
-
-static bst_status do_source(bst_ctx *ctx, bst_generator *g, const generator_source *source,
-                            bool lay) {
-    double least = lay ? LEAST_LIGHT : LEAST_SEEN;
-    if ((source->star && source->amplitude * g->route_top < least) || !comes_in(g, source)) {
-        return BST_OK;
-    }
-    int count = way_of(g, source);
-    const bst_route_node *way = g->way;
-    arrivals faint = {.draw = FAINT_STREAK | source->name << 24};
-    faint.next = draw_exponential(g, &faint);
+static void part_way(whole_way *way, const bst_route_node *nodes, int count) {
+    way->nodes = nodes;
+    way->count = count;
+    way->parts = 0;
     for (int first = 0, end; first + 1 < count; first = end) {
         double dx, dy;
-        course(way, count, first, &dx, &dy);
+        course(nodes, count, first, &dx, &dy);
         bool by_row = fabs(dy) > fabs(dx);
         for (end = first + 1; end + 1 < count; end++) {
             double ex, ey;
-            course(way, count, end, &ex, &ey);
+            course(nodes, count, end, &ex, &ey);
             /* a little past the diagonal is no reason to part it */
             bool same = by_row ? ey * dy > 0.0 && fabs(ey) > 0.6 * fabs(ex)
                                : ex * dx > 0.0 && fabs(ex) > 0.6 * fabs(ey);
@@ -476,9 +440,58 @@ static bst_status do_source(bst_ctx *ctx, bst_generator *g, const generator_sour
                 break;
             }
         }
-        int nodes = end - first + 1;
-        BST_TRY(lay ? lay_bright(ctx, g, source, way + first, nodes, by_row)
-                    : search_bright(ctx, g, source, way + first, nodes, by_row, &faint));
+        way->by_row[way->parts] = by_row;
+        way->first[way->parts++] = first;
+        way->first[way->parts] = end;
+    }
+    for (int i = 0; i * BLOCK < count; i++) {
+        double *box = way->box[i];
+        box[0] = box[2] = INFINITY;
+        box[1] = box[3] = -INFINITY;
+        for (int k = i * BLOCK; k <= (i + 1) * BLOCK && k < count; k++) {
+            box[0] = fmin(box[0], nodes[k].x);
+            box[1] = fmax(box[1], nodes[k].x);
+            box[2] = fmin(box[2], nodes[k].y);
+            box[3] = fmax(box[3], nodes[k].y);
+        }
+    }
+}
+
+/* Makes the runs of a source's way: the stars' in the middle of the frame, turned by what its own
+ * ends differ; or its own, where it moves otherwise. */
+static bst_status make_way(bst_ctx *ctx, bst_generator *g, int index) {
+    struct generator_streaks *w = g->streaks;
+    const generator_source *source = &g->sources[index];
+    if ((source->star && source->amplitude * g->route_top < LEAST_SEEN) || !comes_in(g, source)) {
+        return BST_OK;
+    }
+    shift by = {source->x, source->y, source->path.dx - g->whole_path.dx,
+                source->path.dy - g->whole_path.dy};
+    if (source->star || hypot(by.dx, by.dy) <= OWN_WAY_PX) {
+        return run_along(ctx, g, index, &w->stars, &by);
+    }
+    for (int k = 0; k < g->path.count; k++) {
+        double u = (double)k / (g->path.count - 1) - 0.5;
+        g->object_x[k] = g->path_x[k] + u * by.dx;
+        g->object_y[k] = g->path_y[k] + u * by.dy;
+    }
+    const bst_route_path own = {g->object_x, g->object_y, g->path.count};
+    part_way(&w->own, g->way, bst_route_lay(&own, g->total_sigma, g->way));
+    by.dx = by.dy = 0.0;
+    return run_along(ctx, g, index, &w->own, &by);
+}
+
+/* Looks for what is seen of all runs. */
+static bst_status search_runs(bst_ctx *ctx, bst_generator *g) {
+    const bst_streak_light *l = &g->streaks->light;
+    arrivals faint = {0};
+    for (int i = 0; i < l->run_count; i++) {
+        const bst_streak_run *run = &l->runs[i];
+        if (i == 0 || run->source != run[-1].source) {
+            faint.draw = FAINT_STREAK | g->sources[run->source].name << 24;
+            faint.next = draw_exponential(g, &faint);
+        }
+        BST_TRY(search_run(ctx, g, run, &faint));
     }
     return BST_OK;
 }
@@ -494,53 +507,49 @@ bst_status bst_generator_reserve_streaks(bst_ctx *ctx, bst_generator *g, int wid
         bst_streak_noise_init(&g->streaks->noise);
     }
     struct generator_streaks *w = g->streaks;
-    if (width * height > w->map_room) {
-        size_t bytes = (size_t)width * (size_t)height * sizeof *w->map;
-        free(w->map);
-        w->map = bst_pages_alloc(bytes);
-        w->map_room = w->map ? width * height : 0;
-        if (!w->map) {
+    size_t pixels = (size_t)width * (size_t)height;
+    if (pixels > w->output_room) {
+        free(w->output);
+        w->output = bst_pages_alloc(pixels * sizeof *w->output);
+        w->output_room = w->output ? pixels : 0;
+        if (!w->output) {
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for long streaks");
         }
-        memset(w->map, 0, bytes);
+        memset(w->output, 0, pixels * sizeof *w->output);
     }
     return BST_OK;
 }
 
 bst_status bst_generator_fragments(bst_ctx *ctx, bst_generator *g) {
     BST_TRY(bst_generator_reserve_streaks(ctx, g, g->width, g->height));
-    bst_streak_noise_set(&g->streaks->noise, g->total_sigma);
-    set_alarms(g);
     struct generator_streaks *w = g->streaks;
-    bst_status status = BST_OK;
-    for (int pass = 0; pass < 2; pass++) {
-        for (int r = 0; r < g->rank_count && status == BST_OK; r++) {
-            const generator_source *source = &g->sources[g->ranks[r].index];
-            if (source->broken) {
-                status = do_source(ctx, g, source, pass == 0);
-            }
+    bst_streak_noise_set(&w->noise, g->total_sigma);
+    set_alarms(g);
+    bst_streak_light_begin(&w->light, g->width, g->height,
+                           fabs(g->whole_path.dy) > fabs(g->whole_path.dx));
+    part_way(&w->stars, g->route, g->route_count);
+    for (int r = 0; r < g->rank_count; r++) {
+        if (g->sources[g->ranks[r].index].broken) {
+            BST_TRY(make_way(ctx, g, g->ranks[r].index));
         }
     }
+    BST_TRY(bst_streak_light_add_up(ctx, &w->light));
+    bst_status status = search_runs(ctx, g);
     if (status == BST_OK) {
         report(g);
     }
-    for (int i = 0; i < w->touched_count; i++) {
-        const touched *t = &w->touched[i];
-        for (int r = -LIGHT_ROWS; r <= LIGHT_ROWS; r++) {
-            int at = pixel_of(g, t->by_row, t->at, t->middle + r);
-            if (at >= 0) {
-                w->map[at] = (pixel){0.0f, 0.0f};
-            }
-        }
+    for (int i = 0; i < w->shown_count; i++) {
+        w->output[w->shown[i]] = 0.0f;
     }
-    w->touched_count = w->maxima_count = 0;
+    w->shown_count = w->maxima_count = 0;
     return status;
 }
 
 void bst_generator_free_streaks(struct generator_streaks *w) {
     if (w) {
-        free(w->map);
-        free(w->touched);
+        bst_streak_light_free(&w->light);
+        free(w->output);
+        free(w->shown);
         free(w->maxima);
         free(w);
     }

@@ -156,24 +156,3 @@ void bst_streak_noise_add(const bst_streak_noise *w, bst_rng_key key, int64_t ex
     }
     add_along(w, shot, s, count);
 }
-
-/* 2^n times the series of 2^f, |f| <= 1/2. */
-LANES_FUNCTION void bst_streak_exponentials(float *x, int count) {
-    for (int i = 0; i < count; i++) {
-        float y = (x[i] > -80.0f ? x[i] : -80.0f) * 1.442695041f;
-        int32_t n = (int32_t)(y - 0.5f);
-        float f = (y - (float)n) * 0.6931471806f;
-        float e = 1.0f + f * (1.0f / 7.0f);
-        e = 1.0f + f * (1.0f / 6.0f) * e;
-        e = 1.0f + f * (1.0f / 5.0f) * e;
-        e = 1.0f + f * (1.0f / 4.0f) * e;
-        e = 1.0f + f * (1.0f / 3.0f) * e;
-        e = 1.0f + f * (1.0f / 2.0f) * e;
-        e = 1.0f + f * e;
-        union {
-            uint32_t bits;
-            float value;
-        } power = {.bits = (uint32_t)(n + 127) << 23};
-        x[i] = e * power.value;
-    }
-}

@@ -4,13 +4,11 @@
 
 #include <stdbool.h>
 
+#include "obsgen/streak_light.h"
 #include "sim/core/rng.h"
 
-/* Rows on either side of the way whose output is made, taps of the filter on either side, and rows
- * of noise that is filtered across the way already. */
+/* Taps of the filter on either side, and rows of noise that is filtered across the way already. */
 enum {
-    BST_STREAK_ROWS = 2,
-    BST_STREAK_WIDE = 2 * BST_STREAK_ROWS + 1,
     BST_STREAK_TAPS = 9,
     BST_STREAK_HALF = BST_STREAK_ROWS + BST_STREAK_TAPS + 1,
     BST_STREAK_NOISE = 32, /* 2 BST_STREAK_HALF + 1, a multiple of eight */
@@ -21,8 +19,6 @@ enum {
  * a row otherwise. */
 typedef struct bst_streak_section {
     int at, middle;                /* along, and the nearest pixel across */
-    float height;                  /* of the light on the way */
-    float off, fall;               /* way across from the middle; light falls as exp(-fall d^2) */
     float noise[BST_STREAK_NOISE]; /* filtered across */
     float output[BST_STREAK_WIDE]; /* SNR */
 } bst_streak_section;
@@ -44,8 +40,5 @@ void bst_streak_noise_set(bst_streak_noise *noise, double sigma);
  * the exposure, whichever streak runs there. */
 void bst_streak_noise_add(const bst_streak_noise *noise, bst_rng_key key, int64_t exposure_id,
                           bool by_row, double shot, bst_streak_section *sections, int count);
-
-/* x[i] becomes exp(x[i]), to a float's rounding; x from -80 (less counts as that) to 0. */
-void bst_streak_exponentials(float *x, int count);
 
 #endif

@@ -1,11 +1,10 @@
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #include "sim/app/bench_report.h"
+#include "sim/core/folder.h"
 #include "sim/io/manifest.h"
 #include "sim/io/plot.h"
 
@@ -111,13 +110,6 @@ static bst_status plot_growth(bst_ctx *ctx, const bst_growth *g, const char *tit
             "%.3g ms x'\n",
             title, g->offset_ms, g->slope_ms, g->offset_ms, g->slope_ms);
     return bst_plot_end(ctx, &plot, made);
-}
-
-static bst_status make_folder(bst_ctx *ctx, const char *path) {
-    if (mkdir(path, 0777) != 0 && errno != EEXIST) {
-        return bst_fail(ctx, BST_ERR_IO, "%s: cannot be made: %s", path, strerror(errno));
-    }
-    return BST_OK;
 }
 
 static void write_machine(FILE *f, const cJSON *machine) {
@@ -269,9 +261,9 @@ bst_status bst_bench_report_write(bst_ctx *ctx, const bst_bench_report *r, const
     if (strlen(folder) > PATH_BYTES - 100) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: too long a path", folder);
     }
-    BST_TRY(make_folder(ctx, folder));
+    BST_TRY(bst_folder_make(ctx, folder));
     snprintf(path, sizeof path, "%s/images", folder);
-    BST_TRY(make_folder(ctx, path));
+    BST_TRY(bst_folder_make(ctx, path));
     for (int k = 0; k < KNOBS; k++) {
         snprintf(path, sizeof path, "%s/images/speed_error_%s.png", folder, knobs[k].name);
         BST_TRY(plot_knob(ctx, r, knobs[k].name, path, &pictures[k]));

@@ -1,15 +1,14 @@
 /* boresight calframes: bias, dark and flat frames of a scenario's sensors. */
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #include "scenegen/detector.h"
 #include "scenegen/renderer.h"
 #include "sim/app/app.h"
 #include "sim/app/load.h"
+#include "sim/core/folder.h"
 #include "sim/core/version.h"
 #include "sim/io/fits_frames.h"
 
@@ -129,9 +128,7 @@ static bst_status do_sensor(bst_ctx *ctx, job *j) {
 
 static bst_status do_all(bst_ctx *ctx, const calframes_request *r, bst_scenario *scenario) {
     bst_device *device;
-    if (mkdir(r->out, 0777) != 0 && errno != EEXIST) {
-        return bst_fail(ctx, BST_ERR_IO, "%s: cannot be made: %s", r->out, strerror(errno));
-    }
+    BST_TRY(bst_folder_make(ctx, r->out));
     BST_TRY(bst_device_open(ctx, r->device ? r->device : "", (int)r->threads, &device));
     bst_status status = BST_OK;
     int done = 0;

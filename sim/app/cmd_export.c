@@ -1,6 +1,5 @@
 /* boresight export: frames, tables, orbits and observations of a run in formats that others read.
  */
-#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -9,6 +8,7 @@
 #include "sim/app/export.h"
 #include "sim/app/options.h"
 #include "sim/app/stop_signals.h"
+#include "sim/core/folder.h"
 
 static bool is_sensor(const char *wanted, const bst_export_sensor *sensor) {
     size_t n = strlen(sensor->observer);
@@ -63,20 +63,9 @@ static bst_status make_folder(bst_ctx *ctx, const char *given, const bst_run_rea
     if (n < 0 || (size_t)n >= bytes) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", given ? given : folder);
     }
-    for (char *slash = out; (slash = strchr(slash + 1, '/'));) {
-        *slash = '\0';
-        mkdir(out, 0777); /* what fails here fails again below */
-        *slash = '/';
-    }
-    struct stat info;
-    if (mkdir(out, 0777) != 0 && errno != EEXIST) {
-        return bst_fail(ctx, BST_ERR_IO, "%s: cannot make the folder: %s", out, strerror(errno));
-    }
-    if (stat(out, &info) != 0 || !S_ISDIR(info.st_mode)) {
-        return bst_fail(ctx, BST_ERR_IO, "%s: is not a folder; choose another --out", out);
-    }
-    struct stat source;
-    if (stat(folder, &source) == 0 && source.st_ino == info.st_ino &&
+    BST_TRY(bst_folder_make(ctx, out));
+    struct stat info, source;
+    if (stat(out, &info) == 0 && stat(folder, &source) == 0 && source.st_ino == info.st_ino &&
         source.st_dev == info.st_dev) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "%s: is the run itself, which is not changed; choose another --out", out);

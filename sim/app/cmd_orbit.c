@@ -1,5 +1,4 @@
 /* boresight orbit: an orbit from the directions that a run measured, or a TDM holds. */
-#include <errno.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>

@@ -69,6 +69,7 @@ int bst_cmd_run(int argc, char **argv) {
     }
     sim_options.threads = (int)threads;
     sim_options.overlap = !serial;
+    sim_options.pace = true;
     if (bst_load_check(&ctx, &load) != BST_OK) {
         return bst_options_misuse(&ctx, "run");
     }

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include "sim/app/cmd_stars.h"
+#include "sim/core/folder.h"
 #include "sim/core/wall_clock.h"
 #include "sim/world/star_fetch.h"
 #include "sim/world/star_import.h"
@@ -155,7 +156,7 @@ static int import(int argc, char **argv) {
         if (status == BST_OK) {
             char folder[512];
             snprintf(folder, sizeof folder, "%.*s", (int)(strrchr(path, '/') - path), path);
-            status = bst_star_fetch_make_folder(&ctx, folder);
+            status = bst_folder_make(&ctx, folder);
         }
     }
     long long stars = 0;

@@ -15,6 +15,7 @@
 #include "sim/app/cmd_study.h"
 #include "sim/app/options.h"
 #include "sim/app/stop_signals.h"
+#include "sim/core/folder.h"
 #include "sim/core/wall_clock.h"
 #include "sim/io/manifest.h"
 #include "sim/io/run_store.h"
@@ -40,28 +41,6 @@ const bst_study_kind *bst_app_study_kind(int kind) {
 }
 
 /* ------------------------------------------------------------------ the folder */
-
-static bool is_folder(const char *path) {
-    struct stat info;
-    return stat(path, &info) == 0 && S_ISDIR(info.st_mode);
-}
-
-static bst_status make_folder(bst_ctx *ctx, const char *path) {
-    char part[4096];
-    int n = snprintf(part, sizeof part, "%s", path);
-    if (n < 0 || (size_t)n >= sizeof part - 16) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", path);
-    }
-    for (char *slash = part; (slash = strchr(slash + 1, '/'));) {
-        *slash = '\0';
-        mkdir(part, 0777);
-        *slash = '/';
-    }
-    if (mkdir(part, 0777) != 0 && !is_folder(part)) {
-        return bst_fail(ctx, BST_ERR_IO, "%s: cannot be made: %s", part, strerror(errno));
-    }
-    return BST_OK;
-}
 
 /* Locks the folder against another driver; -1 with a message. */
 static int lock_folder(bst_ctx *ctx, const char *out, bool shared) {
@@ -118,7 +97,7 @@ static bst_status open_folder(bst_ctx *ctx, const bst_study *study, const char *
                               bool shared, int *lock) {
     char shards[4200];
     *lock = -1;
-    if (!resume && is_folder(out)) {
+    if (!resume) {
         char path[4200];
         snprintf(path, sizeof path, "%.4000s/study.json", out);
         if (access(path, F_OK) != 0 && rmdir(out) != 0 && errno == ENOTEMPTY) {
@@ -129,7 +108,7 @@ static bst_status open_folder(bst_ctx *ctx, const bst_study *study, const char *
         }
     }
     snprintf(shards, sizeof shards, "%.4000s/shards", out);
-    BST_TRY(make_folder(ctx, shards));
+    BST_TRY(bst_folder_make(ctx, shards));
     *lock = lock_folder(ctx, out, shared);
     if (*lock < 0) {
         return BST_ERR_IO;
@@ -430,6 +409,11 @@ static const char help_text[] =
     "130 interrupted.\n"
     "\n"
     "options:\n";
+
+static bool is_folder(const char *path) {
+    struct stat info;
+    return stat(path, &info) == 0 && S_ISDIR(info.st_mode);
+}
 
 static int command(bst_ctx *ctx, const study_request *r, const char *given) {
     char file[4200], out[4200];

@@ -14,6 +14,7 @@
 #include "sim/app/stop_signals.h"
 #include "sim/app/study_card.h"
 #include "sim/app/study_labels.h"
+#include "sim/core/folder.h"
 #include "sim/core/rng.h"
 #include "sim/core/version.h"
 #include "sim/io/fits_frames.h"
@@ -239,9 +240,7 @@ static bst_status make_folders(bst_ctx *ctx, const char *out) {
     for (int k = 0; k < 2; k++) {
         char path[4200];
         snprintf(path, sizeof path, "%.4000s/%s", out, names[k]);
-        if (mkdir(path, 0777) != 0 && errno != EEXIST) {
-            return bst_fail(ctx, BST_ERR_IO, "%s: cannot be made: %s", path, strerror(errno));
-        }
+        BST_TRY(bst_folder_make(ctx, path));
     }
     return BST_OK;
 }

@@ -1,15 +1,14 @@
-#include <errno.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #include "sim/app/export.h"
 #include "sim/app/frame_marks.h"
 #include "sim/app/progress.h"
 #include "sim/app/video.h"
+#include "sim/core/folder.h"
 #include "sim/io/fits_reader.h"
 
 enum { STRETCH_FRAMES = 9 };
@@ -124,10 +123,7 @@ static bst_status open_output(bst_ctx *ctx, job *j) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", j->e->out);
     }
     if (!j->e->film) {
-        if (mkdir(j->path, 0777) != 0 && errno != EEXIST) {
-            return bst_fail(ctx, BST_ERR_IO, "%s: cannot be made: %s", j->path, strerror(errno));
-        }
-        return BST_OK;
+        return bst_folder_make(ctx, j->path);
     }
     j->bgr = malloc(3 * (size_t)j->width * (size_t)j->height);
     if (!j->bgr) {

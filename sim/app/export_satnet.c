@@ -3,11 +3,9 @@
  * github.com/ssc-ai/satsim (commit 03e5ff3): coordinates are fractions of the image between pixel
  * edges, (pixel + 0.5) / size.
  */
-#include <errno.h>
 #include <inttypes.h>
 #include <math.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #include <cjson/cJSON.h>
 
@@ -15,6 +13,7 @@
 #include "sim/app/json_number.h"
 #include "sim/app/plugins.h"
 #include "sim/app/progress.h"
+#include "sim/core/folder.h"
 #include "sim/core/version.h"
 #include "sim/io/draft_file.h"
 #include "sim/io/fits_frames.h"
@@ -364,9 +363,7 @@ static bst_status make_folders(bst_ctx *ctx, const char *folder) {
     for (int k = 0; k < 2; k++) {
         char path[4200];
         snprintf(path, sizeof path, "%.4000s/%s", folder, names[k]);
-        if (mkdir(path, 0777) != 0 && errno != EEXIST) {
-            return bst_fail(ctx, BST_ERR_IO, "%s: cannot be made: %s", path, strerror(errno));
-        }
+        BST_TRY(bst_folder_make(ctx, path));
     }
     return BST_OK;
 }

@@ -79,6 +79,10 @@ static bst_status apply(bst_ctx *ctx, const bst_load_options *options, bst_json 
         snprintf(text, sizeof text, "/link/address=\"%.100s\"", options->link);
         BST_TRY(bst_json_set(ctx, json, text));
     }
+    if (options->pacing) {
+        snprintf(text, sizeof text, "/pacing/mode=\"%.40s\"", options->pacing);
+        BST_TRY(bst_json_set(ctx, json, text));
+    }
     if (options->seed) {
         snprintf(text, sizeof text, "/seed=\"%.40s\"", options->seed);
         BST_TRY(bst_json_set(ctx, json, text));

@@ -13,18 +13,24 @@ typedef struct bst_load_options {
     int64_t run;          /* < 0: as the scenario says */
     const char *link;     /* address of the link; NULL: as the scenario says */
     const char *external; /* modules that become "external", with commas between; NULL: none */
+    const char *pacing;   /* mode; NULL: as the scenario says */
 } bst_load_options;
 
 /* The same of those runs that can have modules outside. */
-#define BST_LINK_OPTIONS(load)                                                                \
-    {.name = "link",                                                                          \
-     .kind = BST_OPTION_TEXT,                                                                 \
-     .target = &(load).link,                                                                  \
-     .argument = "ADDRESS",                                                                   \
-     .doc = "where peers connect that play modules: tcp://127.0.0.1:PORT or ipc://PATH"},     \
-    {                                                                                         \
-        .name = "external", .kind = BST_OPTION_TEXT, .target = &(load).external,              \
-        .argument = "MODULE,...", .doc = "modules that peers play: imgproc, tracker, control" \
+#define BST_LINK_OPTIONS(load)                                                                   \
+    {.name = "link",                                                                             \
+     .kind = BST_OPTION_TEXT,                                                                    \
+     .target = &(load).link,                                                                     \
+     .argument = "ADDRESS",                                                                      \
+     .doc = "where peers connect that play modules: tcp://127.0.0.1:PORT or ipc://PATH"},        \
+        {.name = "external",                                                                     \
+         .kind = BST_OPTION_TEXT,                                                                \
+         .target = &(load).external,                                                             \
+         .argument = "MODULE,...",                                                               \
+         .doc = "modules that peers play: imgproc, tracker, control"},                           \
+    {                                                                                            \
+        .name = "pacing", .kind = BST_OPTION_TEXT, .target = &(load).pacing, .argument = "MODE", \
+        .doc = "lockstep (default), realtime, or fast"                                           \
     }
 
 /* Entries of an options table that fill a bst_load_options named `load`. */

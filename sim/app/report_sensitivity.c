@@ -1,6 +1,5 @@
 /* Which of what was swept matters, and for what: designs one_at_a_time and morris. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "sim/app/report_study.h"
@@ -8,81 +7,66 @@
 /* Metrics that are told beside the wall time; axes in a chart. */
 enum { METRICS = 6, AXES = 24 };
 
-/* What an axis does to a metric. */
+/* What an axis does to a metric: a row of the table sensitivity or speed_sensitivity. */
 typedef struct effect {
     const bst_study_axis_view *axis;
-    double size; /* ranks: mean of |elementary effect|, or the largest change */
-    /* morris */
-    double sigma, low, high; /* spread of the elementary effects; 95 % interval of `size` */
+    double size, error; /* ranks, and its standard error */
+    double sigma;       /* spread of the elementary effects */
     int count;
     /* one at a time: where the metric goes at the least and the greatest value of the axis */
     double at[2], value[2];
 } effect;
 
-static int largest_first(const void *a, const void *b) {
-    const effect *x = a, *y = b;
-    return x->size != y->size ? (x->size < y->size) - (x->size > y->size)
-                              : (x->axis > y->axis) - (x->axis < y->axis);
-}
-
-static bool is_design(const bst_study_axis_view *a, const char *design) {
-    return a->swept && strcmp(a->design, design) == 0;
-}
-
-/* The one axis in which two settings differ; NULL when there are none or several. */
-static const bst_study_axis_view *only_difference(const bst_study_view *v, int64_t a, int64_t b) {
-    const bst_study_axis_view *found = NULL;
+static const bst_study_axis_view *axis_of(const bst_study_view *v, const char *name) {
     for (int i = 0; i < v->axis_count; i++) {
-        const bst_study_axis_view *x = &v->axes[i];
-        if (x->swept && x->of_setting[a] != x->of_setting[b]) {
-            if (found) {
-                return NULL;
-            }
-            found = x;
+        if (v->axes[i].swept && strcmp(v->axes[i].name, name) == 0) {
+            return &v->axes[i];
         }
     }
-    return found;
+    return NULL;
+}
+
+/* The effects of a design's axes on a metric, as they are ranked; `table` is theirs. */
+static bst_status read_effects(bst_ctx *ctx, const bst_study_view *v, const char *table,
+                               const char *design, const char *metric, effect list[AXES],
+                               int *count) {
+    char sql[200];
+    bst_rows *rows;
+    bst_status status;
+    bool more;
+    *count = 0;
+    snprintf(sql, sizeof sql,
+             "SELECT design, metric, axis, effect, effect_error, spread, effects FROM %s "
+             "ORDER BY sweep, rank",
+             table);
+    BST_TRY(bst_rows_open(ctx, v->tables, sql, 0, 0, &rows));
+    while ((status = bst_rows_next(ctx, rows, &more)) == BST_OK && more) {
+        const bst_study_axis_view *axis = axis_of(v, bst_rows_text(rows, 2));
+        double size = bst_rows_real(rows, 3);
+        if (axis && *count < AXES && isfinite(size) &&
+            strcmp(bst_rows_text(rows, 0), design) == 0 &&
+            strcmp(bst_rows_text(rows, 1), metric) == 0) {
+            list[(*count)++] = (effect){.axis = axis,
+                                        .size = size,
+                                        .error = bst_rows_real(rows, 4),
+                                        .sigma = bst_rows_real(rows, 5),
+                                        .count = (int)bst_rows_int(rows, 6)};
+        }
+    }
+    bst_rows_close(rows);
+    return status;
+}
+
+/* The 95 % interval, taken for normal. */
+static double low_of(const effect *e) {
+    return isfinite(e->error) ? fmax(0.0, e->size - 1.96 * e->error) : e->size;
+}
+
+static double high_of(const effect *e) {
+    return isfinite(e->error) ? e->size + 1.96 * e->error : e->size;
 }
 
 /* ------------------------------------------------------------------ morris */
-
-/* Elementary effects (Morris 1991, Technometrics 33, 161) of neighbouring settings that differ in
- * this axis alone, over the axis' whole range; the mean of their sizes is mu* of Campolongo et al.
- * 2007, Environ. Model. Softw. 22, 1509. */
-static bool find_elementary(const bst_study_view *v, const bst_study_metric_view *m,
-                            const bst_study_axis_view *axis,
-                            const bst_study_axis_view *const *differs, effect *out) {
-    double sum = 0.0, squares = 0.0, sizes = 0.0, low = INFINITY, high = -INFINITY;
-    int n = 0;
-    bst_chart_widen(axis->of_setting, (size_t)v->settings, false, &low, &high);
-    for (int64_t i = 0; i + 1 < v->settings; i++) {
-        if (differs[i] != axis) {
-            continue;
-        }
-        double change = m->mean[i + 1] - m->mean[i];
-        double from = axis->of_setting[i], to = axis->of_setting[i + 1];
-        double step =
-            axis->logarithmic ? log(to / from) / log(high / low) : (to - from) / (high - low);
-        double e = change / step;
-        if (isfinite(e)) {
-            sum += e;
-            sizes += fabs(e);
-            squares += e * e;
-            n++;
-        }
-    }
-    if (n < 2) {
-        return false;
-    }
-    double mean = sum / n, size = sizes / n;
-    *out = (effect){.axis = axis, .size = size, .count = n};
-    out->sigma = sqrt(fmax(0.0, (squares - n * mean * mean) / (n - 1)));
-    /* of |e|, normal */
-    double spread = sqrt(fmax(0.0, (squares - n * size * size) / (n - 1)) / n);
-    out->low = fmax(0.0, size - 1.96 * spread);
-    out->high = size + 1.96 * spread;
-    return true;
-}
 
 static void put_row_names(const bst_chart *c, const effect *list, int count) {
     for (int i = 0; i < count; i++) {
@@ -96,7 +80,7 @@ static void put_morris(FILE *out, const bst_study_metric_view *m, const effect *
     char label[128], text[160];
     double most = 0.0, spread = 0.0;
     for (int i = 0; i < count; i++) {
-        most = fmax(most, list[i].high);
+        most = fmax(most, high_of(&list[i]));
         spread = fmax(spread, list[i].sigma);
     }
     bst_study_label(m, label);
@@ -113,7 +97,8 @@ static void put_morris(FILE *out, const bst_study_metric_view *m, const effect *
     for (int i = 0; i < count; i++) {
         double y = count - i;
         bst_chart_bar(&c, 0.0, list[i].size, y - 0.8, y - 0.2, BST_CHART_BLUE, list[i].axis->name);
-        bst_chart_bar(&c, list[i].low, list[i].high, y - 0.54, y - 0.46, BST_CHART_ORANGE, NULL);
+        bst_chart_bar(&c, low_of(&list[i]), high_of(&list[i]), y - 0.54, y - 0.46, BST_CHART_ORANGE,
+                      NULL);
     }
     put_row_names(&c, list, count);
     bst_chart_end(&c);
@@ -146,28 +131,35 @@ static void put_morris(FILE *out, const bst_study_metric_view *m, const effect *
 
 /* ------------------------------------------------------------------ one at a time */
 
-/* Setting 0 has the scenario's own values. */
-static bool find_change(const bst_study_view *v, const bst_study_metric_view *m,
-                        const bst_study_axis_view *axis, const bst_study_axis_view *const *differs,
-                        effect *out) {
-    *out = (effect){.axis = axis, .at = {INFINITY, -INFINITY}, .value = {NAN, NAN}};
+/* Whether a setting differs from setting 0, the scenario's own, in this axis alone. */
+static bool differs_in(const bst_study_view *v, const bst_study_axis_view *axis, int64_t setting) {
+    for (int i = 0; i < v->axis_count; i++) {
+        const bst_study_axis_view *x = &v->axes[i];
+        if (x->swept && (x->of_setting[setting] != x->of_setting[0]) != (x == axis)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static void find_ends(const bst_study_view *v, const bst_study_metric_view *m, effect *e) {
+    e->at[0] = INFINITY;
+    e->at[1] = -INFINITY;
+    e->value[0] = e->value[1] = NAN;
     for (int64_t i = 1; i < v->settings; i++) {
-        if (differs[i] != axis || !isfinite(m->mean[i])) {
+        if (!differs_in(v, e->axis, i) || !isfinite(m->mean[i])) {
             continue;
         }
-        out->size = fmax(out->size, fabs(m->mean[i] - m->mean[0]));
-        double value = axis->of_setting[i];
-        if (value < out->at[0]) {
-            out->at[0] = value;
-            out->value[0] = m->mean[i];
+        double at = e->axis->of_setting[i];
+        if (at < e->at[0]) {
+            e->at[0] = at;
+            e->value[0] = m->mean[i];
         }
-        if (value > out->at[1]) {
-            out->at[1] = value;
-            out->value[1] = m->mean[i];
+        if (at > e->at[1]) {
+            e->at[1] = at;
+            e->value[1] = m->mean[i];
         }
-        out->count++;
     }
-    return out->count > 0 && isfinite(out->size);
 }
 
 static void put_tornado(FILE *out, const bst_study_metric_view *m, const effect *list, int count) {
@@ -217,60 +209,50 @@ static void put_tornado(FILE *out, const bst_study_metric_view *m, const effect 
 
 /* ------------------------------------------------------------------ both */
 
-static void put_metric(FILE *out, const bst_study_view *v, const bst_study_metric_view *m,
-                       const bst_study_axis_view *const *differs, bool morris) {
-    effect *list = calloc((size_t)v->axis_count + 1, sizeof *list);
-    int count = 0;
-    for (int i = 0; list && i < v->axis_count; i++) {
-        const bst_study_axis_view *a = &v->axes[i];
-        bool good = is_design(a, morris ? "morris" : "one_at_a_time") &&
-                    (morris ? find_elementary(v, m, a, differs, &list[count])
-                            : find_change(v, m, a, differs, &list[count]));
-        count += good;
-    }
-    if (count > 0) {
-        qsort(list, (size_t)count, sizeof *list, largest_first);
-        count = count < AXES ? count : AXES;
-        if (morris) {
-            put_morris(out, m, list, count);
-        } else {
-            put_tornado(out, m, list, count);
+static bst_status put_metric(bst_ctx *ctx, FILE *out, const bst_study_view *v,
+                             const bst_study_metric_view *m, const char *table, bool morris) {
+    effect list[AXES];
+    int count;
+    BST_TRY(
+        read_effects(ctx, v, table, morris ? "morris" : "one_at_a_time", m->name, list, &count));
+    if (count > 0 && morris) {
+        put_morris(out, m, list, count);
+    } else if (count > 0) {
+        for (int i = 0; i < count; i++) {
+            find_ends(v, m, &list[i]);
         }
+        put_tornado(out, m, list, count);
     }
-    free(list);
+    return BST_OK;
 }
 
-void bst_study_plot_sensitivity(FILE *out, const bst_study_view *v) {
-    int metrics[METRICS], count = bst_study_key_metrics(v, metrics, METRICS);
-    bool there[2] = {false, false};
+static bool has_design(const bst_study_view *v, const char *design) {
     for (int i = 0; i < v->axis_count; i++) {
-        there[0] = there[0] || is_design(&v->axes[i], "one_at_a_time");
-        there[1] = there[1] || is_design(&v->axes[i], "morris");
+        if (v->axes[i].swept && strcmp(v->axes[i].design, design) == 0) {
+            return true;
+        }
     }
-    /* the axis in which a setting differs from its neighbour */
-    const bst_study_axis_view **differs = malloc((size_t)(v->settings + 1) * sizeof *differs);
-    if ((!there[0] && !there[1]) || v->settings < 2 || !differs) {
-        free(differs);
-        return;
+    return false;
+}
+
+bst_status bst_study_plot_sensitivity(bst_ctx *ctx, FILE *out, const bst_study_view *v) {
+    int metrics[METRICS], count = bst_study_key_metrics(v, metrics, METRICS);
+    bool there[2] = {has_design(v, "one_at_a_time"), has_design(v, "morris")};
+    if ((!there[0] && !there[1]) || v->settings < 2) {
+        return BST_OK;
     }
     bst_page_section(out, 2, "What matters");
     for (int morris = 0; morris < 2; morris++) {
         if (!there[morris]) {
             continue;
         }
-        /* from the setting before, or from the first one */
-        for (int64_t i = 0; i < v->settings; i++) {
-            bool last = i + 1 == v->settings;
-            differs[i] =
-                morris ? last ? NULL : only_difference(v, i, i + 1) : only_difference(v, 0, i);
-        }
         bst_page_grid(out, BST_PAGE_HALF);
         for (int k = 0; k < count; k++) {
-            put_metric(out, v, &v->metrics[metrics[k]], differs, morris == 1);
+            BST_TRY(put_metric(ctx, out, v, &v->metrics[metrics[k]], "sensitivity", morris == 1));
         }
-        put_metric(out, v, &v->wall, differs, morris == 1);
+        BST_TRY(put_metric(ctx, out, v, &v->wall, "speed_sensitivity", morris == 1));
         bst_page_grid_end(out);
     }
-    free(differs);
     bst_page_section_end(out);
+    return BST_OK;
 }

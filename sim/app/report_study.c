@@ -433,7 +433,7 @@ static bst_status put_page(bst_ctx *ctx, FILE *out, const bst_study_view *v) {
     put_cards(out, v);
     fputs("<p class=\"note\">Means over all runs that have a number.</p>\n", out);
     bst_page_section_end(out);
-    bst_study_plot_sensitivity(out, v);
+    BST_TRY(bst_study_plot_sensitivity(ctx, out, v));
     BST_TRY(bst_study_plot_curves(ctx, out, v));
     bst_study_plot_axes(out, v);
     bst_study_plot_histograms(out, v);

@@ -69,7 +69,8 @@ void bst_study_plot_histograms(FILE *out, const bst_study_view *view);
 bst_status bst_study_plot_curves(bst_ctx *ctx, FILE *out,
                                  const bst_study_view *view) BST_MUST_CHECK;
 /* Ranked effects of the axes, of designs one_at_a_time and morris; nothing without them. */
-void bst_study_plot_sensitivity(FILE *out, const bst_study_view *view);
+bst_status bst_study_plot_sensitivity(bst_ctx *ctx, FILE *out,
+                                      const bst_study_view *view) BST_MUST_CHECK;
 
 /* The whole page of a study. `folder` is its name. */
 bst_status bst_report_study(bst_ctx *ctx, bst_run_reader *tables, FILE *out) BST_MUST_CHECK;

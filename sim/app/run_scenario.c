@@ -8,6 +8,7 @@
 
 #include "sim/app/app.h"
 #include "sim/app/json_number.h"
+#include "sim/app/run_pacing.h"
 #include "sim/app/run_pictures.h"
 #include "sim/app/run_scenario.h"
 #include "sim/app/run_sightings.h"
@@ -267,6 +268,7 @@ static bst_status write_manifest(const run_state *run, bst_simulation *sim, cons
         }
     }
     bst_run_sightings_add(run->sightings, root);
+    bst_run_pacing_add(root, scenario, sim);
     bst_loop_summary_figures(run->sensors[0].summary, &figures);
     cJSON_AddItemToObject(root, "summary", summary_json(&figures, factor));
     bst_status status = bst_run_write_json(run->ctx, store, "manifest.json", root);
@@ -299,6 +301,7 @@ static void print_table(const run_state *run, bst_simulation *sim, const char *o
         print_row("pointing 99th percentile", "%.3f", f.pointing_p99_px, "px");
     }
     bst_run_sightings_print(run->sightings);
+    bst_run_pacing_print(run->scenario, sim);
     print_row("wall time", "%.2f", wall, "s");
     print_row("speed", "%.1f", wall > 0.0 ? simulated / wall : NAN, "x real time");
     printf("  %-28s %s\n", "results", out);
@@ -431,6 +434,7 @@ static bst_status step_through(run_state *run, bst_simulation *sim, double *wall
     bst_ctx *ctx = run->ctx;
     const bst_engine_hooks hooks = {run, on_message, on_event, interrupted, wants, &run->hooks};
     bst_engine_set_hooks(bst_simulation_engine(sim), &hooks);
+    BST_TRY(bst_run_pacing_begin(ctx, run->scenario, sim));
     run->started = bst_wall_seconds();
     bst_status status =
         bst_engine_run(ctx, bst_simulation_engine(sim), run->scenario->duration_ticks);

@@ -142,6 +142,9 @@ static bst_status publish(struct bst_step *step, int port_index) {
     ch->head = ch->head + 1 == ch->depth ? 0 : ch->head + 1;
     step->self->ports[port_index].writing = false;
     step->writing--;
+    if (ch->paced) {
+        bst_pacing_done(step, ch, s->payload);
+    }
     for (int r = 0; ch->triggers && r < ch->reader_count; r++) {
         int index = ch->readers[r].instance, p = ch->readers[r].port;
         const instance *other = engine->instances[index];

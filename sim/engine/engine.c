@@ -40,6 +40,7 @@ void bst_engine_free(bst_engine *engine) {
     }
     bst_overlap_stop(engine);
     bst_islands_stop(engine);
+    bst_pacing_free(engine->pacing);
     /* what the channels own goes back to its makers before they are destroyed */
     for (int c = 0; c < engine->channel_count; c++) {
         channel *ch = &engine->channels[c];
@@ -194,10 +195,14 @@ bst_status bst_engine_step(bst_ctx *ctx, bst_engine *engine, int index, int64_t 
 static bst_status run_until(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) {
     double asked = bst_wall_seconds();
     int since_clock = 0;
+    const bool by_clock = bst_pacing_by_clock(engine);
     while (engine->instance_count > 0) {
         int64_t tick = engine->due[engine->heap.items[0]];
         if (tick >= until_tick) {
             break;
+        }
+        if (by_clock) {
+            BST_TRY(bst_pacing_wait(ctx, engine, tick));
         }
         engine->tick = tick;
         bool long_step = false;
@@ -250,8 +255,15 @@ bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) 
     if (!engine->loaded) {
         return bst_fail(ctx, BST_ERR_STATE, "the engine is not loaded");
     }
+    bst_pacing_thread thread;
+    if (engine->pacing) {
+        bst_pacing_thread_take(ctx, engine, &thread);
+    }
     bst_status status = engine->islands ? bst_islands_run(ctx, engine, until_tick)
                                         : run_until(ctx, engine, until_tick);
+    if (engine->pacing) {
+        bst_pacing_thread_give_back(engine, &thread);
+    }
     if (engine->overlap) {
         /* what failed behind the stepping thread came before what failed in it */
         bst_ctx before = *ctx;

@@ -3,6 +3,7 @@
 #define BST_ENGINE_ENGINE_H
 
 #include "sim/core/module.h"
+#include "sim/engine/pacing.h"
 
 typedef struct bst_engine bst_engine;
 
@@ -84,13 +85,21 @@ bst_status bst_engine_load(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
 bst_status bst_engine_overlap(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
 
 /* Has bst_engine_run step sensors, which share nothing but what BST_MODULE_LINKS modules link, by
- * so many threads, while the calling one does the hooks `message` and `event` in the order of a run
- * without. Then `wants` is called by several threads, one at a time for each scope. In place of
- * bst_engine_overlap, after bst_engine_load. *parted false, and nothing changed: there is one
- * sensor only or one thread, or messages own what threads would share (frames). Modules of
- * different sensors may share only what is constant or locked. */
+ * so many threads, the calling one among them. In between they do the hooks `message` and `event`,
+ * one at a time and in the order of a run without, whichever thread is free. Then `wants` is called
+ * by several threads, one at a time for each scope. In place of bst_engine_overlap, after
+ * bst_engine_load. *parted false, and nothing changed: there is one sensor only or one thread, or
+ * messages own what threads would share (frames). Modules of different sensors may share only what
+ * is constant or locked. */
 bst_status bst_engine_part(bst_ctx *ctx, bst_engine *engine, int threads,
                            bool *parted) BST_MUST_CHECK;
+
+/* Has bst_engine_run keep to the wall clock (BST_PACING_REALTIME), or only watch how long frames
+ * take (the other modes). After bst_engine_load; not with bst_engine_part. */
+bst_status bst_engine_pace(bst_ctx *ctx, bst_engine *engine,
+                           const bst_pacing_config *config) BST_MUST_CHECK;
+/* How the clock has been kept so far; false when the engine is not paced. */
+bool bst_engine_pacing(const bst_engine *engine, bst_pacing_figures *out);
 
 /* Steps everything that is due before `until_tick` (exclusive). All of it is done on return. */
 bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) BST_MUST_CHECK;

@@ -36,6 +36,7 @@ typedef struct channel {
     channel_reader *readers; /* BST_PORT_IN and BST_PORT_MODIFY ports, part of engine->readers */
     int reader_count;
     bool triggers; /* one of them is stepped for its messages */
+    bool paced;    /* pacing.c: its messages show that a frame has been dealt with */
 } channel;
 
 /* What an instance needs to know about one of its ports. */
@@ -87,6 +88,8 @@ typedef struct bst_overlap bst_overlap;
 typedef struct bst_overlap_job bst_overlap_job;
 /* islands.c: sensors stepped by several threads */
 typedef struct bst_islands bst_islands;
+/* pacing.c: the wall clock */
+typedef struct bst_pacing bst_pacing;
 
 struct bst_engine {
     int64_t tick_rate_hz;
@@ -109,6 +112,7 @@ struct bst_engine {
     int counter_count;
     bst_overlap *overlap; /* NULL: everything is done by the stepping thread... */
     bst_islands *islands; /* ...unless sensors are stepped by several */
+    bst_pacing *pacing;   /* NULL: simulated time is free of the wall clock */
 };
 
 /* What a module's step sees. */
@@ -150,6 +154,23 @@ void bst_engine_set_due(bst_engine *engine, int instance, int64_t due);
 /* engine.c: one step of an instance, and what it publishes. */
 bst_status bst_engine_step(bst_ctx *ctx, bst_engine *engine, int index,
                            int64_t tick) BST_MUST_CHECK;
+
+/* pacing.c */
+void bst_pacing_free(bst_pacing *pacing);
+/* Whether ticks wait for their time. */
+bool bst_pacing_by_clock(const bst_engine *engine);
+/* Waits until a tick's time has come; the first one's is now. */
+bst_status bst_pacing_wait(bst_ctx *ctx, bst_engine *engine, int64_t tick) BST_MUST_CHECK;
+/* In the step in which an exposure ends: true when its frame is to be dropped. */
+bool bst_pacing_frame(struct bst_step *step, int64_t exposure_id);
+/* In the step that publishes on a paced channel. */
+void bst_pacing_done(const struct bst_step *step, const channel *ch, const void *payload);
+/* Priority and processor of the calling thread, as configured; and as they were. */
+typedef struct bst_pacing_thread {
+    unsigned char saved[256];
+} bst_pacing_thread;
+void bst_pacing_thread_take(bst_ctx *ctx, bst_engine *engine, bst_pacing_thread *saved);
+void bst_pacing_thread_give_back(const bst_engine *engine, const bst_pacing_thread *saved);
 
 /* islands.c */
 void bst_islands_stop(bst_engine *engine);

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "sim/engine/engine.h"
+#include "sim/engine/engine_internal.h"
 #include "sim/world/frame_updates.h"
 #include "sim/world/world.h"
 #include "sim/world/world_config.h"
@@ -194,16 +194,17 @@ static void open_exposure(exposure_clock *clock, bst_sample command) {
     clock->open = true;
 }
 
-static void close_exposure(exposure_clock *clock, bst_exposure *out) {
+/* `late`: the run is behind its clock, and does without the frame. */
+static void close_exposure(exposure_clock *clock, bool late, bst_exposure *out) {
     *out = (bst_exposure){.id = clock->id,
                           .start_tick = clock->start_tick,
                           .end_tick = clock->start_tick + clock->exposure_ticks,
                           .window = clock->window,
                           .binning = clock->binning,
                           .pixel_scale_arcsec = clock->updates.pixel_scale_arcsec,
-                          .dropped = clock->dropped_fraction > 0.0 &&
-                                     bst_rng_uniform(clock->drop_key, (uint64_t)clock->id, 0) <
-                                         clock->dropped_fraction};
+                          .dropped = late || (clock->dropped_fraction > 0.0 &&
+                                              bst_rng_uniform(clock->drop_key, (uint64_t)clock->id,
+                                                              0) < clock->dropped_fraction)};
     if (clock->updates.updates) {
         bst_frame_cursor_next(&clock->updates);
     }
@@ -225,7 +226,8 @@ static bst_status step(void *self, struct bst_step *step) {
             bst_step_wake_at(step, clock->open ? told_tick(clock) : open_tick);
             return BST_OK;
         }
-        close_exposure(clock, bst_step_write(step, PORT_EXPOSURE, NULL));
+        bool late = bst_pacing_frame(step, clock->id);
+        close_exposure(clock, late, bst_step_write(step, PORT_EXPOSURE, NULL));
     }
 }
 

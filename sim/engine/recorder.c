@@ -10,7 +10,7 @@
 
 static const char *const frame_choices[] = {"extensions", "cube", "none", NULL};
 
-static const char *const detection_choices[] = {"all", "objects", NULL};
+static const char *const detection_choices[] = {"all", "no_stars", "objects", NULL};
 
 static const char *const compression_choices[] = {"none", "rice", NULL};
 
@@ -43,8 +43,8 @@ const bst_config_desc bst_record_config_table[] = {
     BST_BOOL(bst_record_config, truth_stars, "true", "Stars among the true sources."),
     BST_BOOL(bst_record_config, detections, "true", "What image processing found."),
     BST_ENUM(bst_record_config, detections_of, detection_choices, "\"all\"",
-             "Which of the detections: all, or those labelled as objects."),
-    BST_BOOL(bst_record_config, detection_stars, "true", "Detections labelled star."),
+             "Which of the detections: all, all but those labelled star, or only those labelled "
+             "object."),
     BST_BOOL(bst_record_config, tracks, "true", "Tracks and the attitude from stars."),
     BST_BOOL(bst_record_config, commands, "true", "Commands to gimbal and sensor."),
     BST_BOOL(bst_record_config, events, "true", "Events, and tasks where sensors are given any."),

@@ -16,7 +16,8 @@ typedef enum bst_record_frames {
 
 typedef enum bst_record_detections {
     BST_RECORD_ALL_DETECTIONS,
-    BST_RECORD_OBJECTS, /* those labelled so */
+    BST_RECORD_NO_STARS, /* without those labelled star */
+    BST_RECORD_OBJECTS,  /* those labelled so */
 } bst_record_detections;
 
 /* The scenario's "record" block. */
@@ -30,7 +31,6 @@ typedef struct bst_record_config {
     bool truth_stars;
     bool detections;
     int32_t detections_of; /* bst_record_detections */
-    bool detection_stars;
     bool tracks;
     bool commands;
     bool events;

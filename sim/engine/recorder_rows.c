@@ -260,6 +260,17 @@ static const char *label_name(int32_t label) {
     }
 }
 
+static bool kept(const bst_recorder *recorder, const bst_detection *item) {
+    switch (recorder->config.detections_of) {
+        case BST_RECORD_NO_STARS:
+            return item->label != BST_LABEL_STAR;
+        case BST_RECORD_OBJECTS:
+            return item->label == BST_LABEL_OBJECT;
+        default:
+            return true;
+    }
+}
+
 bst_status bst_recorder_detection_rows(bst_ctx *ctx, bst_recorder *recorder, int sensor,
                                        const void *payload, int64_t written_tick) {
     const bst_detections *d = payload;
@@ -286,9 +297,7 @@ bst_status bst_recorder_detection_rows(bst_ctx *ctx, bst_recorder *recorder, int
     BST_TRY(append(ctx, recorder, BST_TABLE_DETECTION_FRAMES, &head));
     for (int i = 0; i < d->count; i++) {
         const bst_detection *item = &d->items[i];
-        if ((item->label == BST_LABEL_STAR && !recorder->config.detection_stars) ||
-            (item->label != BST_LABEL_OBJECT &&
-             recorder->config.detections_of == BST_RECORD_OBJECTS)) {
+        if (!kept(recorder, item)) {
             continue;
         }
         row r = {.count = 0};

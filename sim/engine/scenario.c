@@ -50,6 +50,8 @@ const bst_config_desc bst_scenario_table[] = {
                "What is written to the run's folder."),
     BST_OBJECT(bst_scenario, link, bst_link_config_table, "{}",
                "Where other programs connect that play modules of type \"external\"."),
+    BST_OBJECT(bst_scenario, pacing, bst_pacing_config_table, "{}",
+               "How simulated time goes by the wall clock in boresight run."),
     BST_CONFIG_END,
 };
 

@@ -39,6 +39,7 @@ typedef struct bst_scenario {
     bst_config_list observers; /* bst_observer_config */
     bst_record_config record;
     bst_link_config link;
+    bst_pacing_config pacing;
     /* filled by bst_scenario_read, not by the table */
     char file[512];     /* for messages */
     char base_dir[512]; /* folder that relative paths start from */

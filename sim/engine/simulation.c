@@ -300,10 +300,22 @@ static bst_status make_link(bst_ctx *ctx, const bst_scenario *scenario,
                         .epoch = scenario->epoch,
                         .tick_rate_hz = scenario->tick_rate_hz,
                         .duration_ticks = scenario->duration_ticks};
+    const bst_pacing_config *pacing = &scenario->pacing;
+    if (options->pace && pacing->mode == BST_PACING_FAST) {
+        run.waiting = BST_LINK_RUSH;
+    } else if (options->pace && pacing->mode == BST_PACING_REALTIME &&
+               pacing->overrun == BST_OVERRUN_HOLD) {
+        run.waiting = BST_LINK_HOLD;
+        run.hold_s = pacing->deadline_s;
+    }
     const bst_observer_config *observers = scenario->observers.items;
     for (int i = 0; i < scenario->observers.count; i++) {
         const bst_sensor_config *sensors = observers[i].sensors.items;
         for (int s = 0; s < observers[i].sensors.count; s++) {
+            double period_s = sensors[s].exposure.period_s / pacing->speed;
+            if (pacing->deadline_s == 0.0 && (run.hold_s == 0.0 || period_s < run.hold_s)) {
+                run.hold_s = period_s;
+            }
             size_t bytes = sizeof(uint16_t) * (size_t)sensors[s].camera.width_px *
                            (size_t)sensors[s].camera.height_px;
             run.pixel_bytes = bytes > run.pixel_bytes ? bytes : run.pixel_bytes;
@@ -356,12 +368,16 @@ static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
     if (status == BST_OK) {
         status = bst_engine_load(ctx, sim->engine);
     }
+    bool paced = options->pace && scenario->pacing.mode != BST_PACING_LOCKSTEP;
     bool parted = false;
-    if (status == BST_OK && options->overlap && may_part(scenario, sim)) {
+    if (status == BST_OK && options->overlap && !paced && may_part(scenario, sim)) {
         status = bst_engine_part(ctx, sim->engine, processors(options->threads), &parted);
     }
     if (status == BST_OK && options->overlap && !parted) {
         status = bst_engine_overlap(ctx, sim->engine);
+    }
+    if (status == BST_OK && paced) {
+        status = bst_engine_pace(ctx, sim->engine, &scenario->pacing);
     }
     return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "%s", scenario->file);
 }

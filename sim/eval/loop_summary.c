@@ -6,6 +6,8 @@
 /* A track within this many pixels of the true target is the target's: 2.5 FWHM of the shipped
  * cameras. */
 #define RIGHT_TARGET_PX 5.0
+/* 99.99 % quantile of chi-square, 2 degrees of freedom. */
+#define FORESEEN_CHI2 18.42
 /* The loop has settled when it is in track mode and the target lies this close to the boresight. */
 #define SETTLED_PX 3.0
 
@@ -98,6 +100,30 @@ static bool on_target(const bst_loop_summary *s, const waiting_frame *w, const b
     return bst_vec3_angle(d, w->direction) <= RIGHT_TARGET_PX * bst_camera_scale_rad(&s->camera);
 }
 
+/* Whether a track whose target cannot be seen foretells a place that the true one does not
+ * contradict: a prediction over hours is no claim to have the target within pixels. */
+static bool is_foreseen(const bst_loop_summary *s, const waiting_frame *w, const bst_track *track,
+                        int64_t tick) {
+    if (track->hidden == BST_HIDDEN_NOT || !w->known) {
+        return false;
+    }
+    double dt = (double)(w->mid_tick - tick) / s->rate_hz, p[2][2];
+    const double(*c)[4] = track->covariance;
+    for (int i = 0; i < 2; i++) {
+        for (int j = 0; j < 2; j++) {
+            p[i][j] = c[i][j] + dt * (c[i][j + 2] + c[i + 2][j]) + dt * dt * c[i + 2][j + 2];
+        }
+    }
+    bst_vec3 d = track_direction_at(track, dt);
+    bst_vec3 pole = hypot(d.x, d.y) < 1e-6 ? bst_vec3_make(1, 0, 0) : bst_vec3_make(0, 0, 1);
+    bst_vec3 e1 = bst_vec3_unit(bst_vec3_cross(pole, d)); /* as bst_track's covariance */
+    double x = bst_vec3_dot(w->direction, e1),
+           y = bst_vec3_dot(w->direction, bst_vec3_cross(d, e1)),
+           det = p[0][0] * p[1][1] - p[0][1] * p[0][1];
+    return bst_vec3_dot(w->direction, d) > 0.0 && det > 0.0 &&
+           p[1][1] * x * x - 2.0 * p[0][1] * x * y + p[0][0] * y * y <= FORESEEN_CHI2 * det;
+}
+
 static void judge(bst_loop_summary *s, waiting_frame *w, const bst_track *track, int64_t track_tick,
                   int64_t now) {
     w->frame.in_track = false;
@@ -112,7 +138,7 @@ static void judge(bst_loop_summary *s, waiting_frame *w, const bst_track *track,
                 s->figures.time_to_confirm_s = (double)now / s->rate_hz;
             }
         }
-    } else {
+    } else if (!is_foreseen(s, w, track, track_tick)) {
         s->figures.wrong_target_frames++;
     }
 }

@@ -24,11 +24,13 @@ typedef struct bst_loop_frame {
 typedef struct bst_loop_figures {
     int64_t frames;
     int final_mode;
-    double time_to_confirm_s;    /* NAN: never */
-    double time_to_settle_s;     /* NAN: never */
-    double track_fraction;       /* of the visible frames after the first confirmation; 0 if never
-                                    confirmed */
-    int64_t wrong_target_frames; /* frames in which the track of interest was not the target's */
+    double time_to_confirm_s; /* NAN: never */
+    double time_to_settle_s;  /* NAN: never */
+    double track_fraction;    /* of the visible frames after the first confirmation; 0 if never
+                                 confirmed */
+    /* frames in which the track of interest was not the target's: more than 5 px away and, where
+     * the tracker says what hides its object, also beyond 99.99 % of its covariance */
+    int64_t wrong_target_frames;
     double pointing_rms_px,
         pointing_p99_px;     /* over the frames after settling but those in which control coasts,
                                 as the target is hidden; NAN when there are none */

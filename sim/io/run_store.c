@@ -11,6 +11,7 @@
 #include <sys/statvfs.h>
 #include <unistd.h>
 
+#include "sim/core/folder.h"
 #include "sim/io/run_internal.h"
 
 #define LOCK_NAME "lock"
@@ -77,25 +78,6 @@ static bool looks_like_run(const char *folder) {
     }
     closedir(dir);
     return empty || tables;
-}
-
-static bst_status make_parents(bst_ctx *ctx, const char *path) {
-    char parent[BST_RUN_PATH_BYTES];
-    for (const char *slash = path; (slash = strchr(slash + 1, '/'));) {
-        size_t n = (size_t)(slash - path);
-        memcpy(parent, path, n);
-        parent[n] = '\0';
-        if (mkdir(parent, 0777) != 0 && errno != EEXIST) {
-            /* a folder that is there may answer EROFS or EACCES before EEXIST */
-            struct stat info;
-            int saved = errno;
-            if (stat(parent, &info) != 0 || !S_ISDIR(info.st_mode)) {
-                errno = saved;
-                return fail_errno(ctx, parent, "cannot make the folder");
-            }
-        }
-    }
-    return BST_OK;
 }
 
 /* Opens folder/lock and locks it; -1 with errno (EWOULDBLOCK: a living process holds it). */
@@ -244,7 +226,7 @@ bst_status bst_run_create(bst_ctx *ctx, const char *out_path, bool overwrite, bs
 
     bst_status status = check_out(ctx, run);
     if (status == BST_OK) {
-        status = make_parents(ctx, run->out);
+        status = bst_folder_make_above(ctx, run->out);
     }
     if (status == BST_OK) {
         status = claim_folder(ctx, run);

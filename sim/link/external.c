@@ -237,14 +237,8 @@ static void tell(external *m, struct bst_step *step) {
     }
 }
 
-/* One exchange; what came goes to the channels. */
-static bst_status exchange(external *m, struct bst_step *step, const bst_link_input *inputs,
-                           int count) {
-    bool answered;
-    bst_status status = bst_link_exchange(bst_step_ctx(step), m->link, m->part, bst_step_tick(step),
-                                          inputs, count, m->outputs, m->output_count, &answered);
-    tell(m, step);
-    BST_TRY(status);
+/* What a peer has answered goes to the channels. */
+static void publish_answer(external *m, struct bst_step *step) {
     for (int i = 0; i < m->output_count; i++) {
         const bst_link_output *output = &m->outputs[i];
         if (!output->given) {
@@ -255,6 +249,34 @@ static bst_status exchange(external *m, struct bst_step *step, const bst_link_in
         void *to = bst_step_write(step, m->output_ports[i], NULL);
         memcpy(to, output->payload, about->header_bytes + (size_t)items * about->item_bytes);
     }
+}
+
+static void publish_more(external *m, struct bst_step *step) {
+    while (bst_link_more(m->link, m->part, m->outputs, m->output_count)) {
+        publish_answer(m, step);
+    }
+}
+
+/* Whether the peer has an ear for this step; what it has answered to earlier ones goes out. */
+static bst_status ready(external *m, struct bst_step *step, bool *is_ready) {
+    bst_status status = bst_link_ready(bst_step_ctx(step), m->link, m->part, bst_step_tick(step),
+                                       m->outputs, m->output_count, is_ready);
+    tell(m, step);
+    BST_TRY(status);
+    publish_more(m, step);
+    return BST_OK;
+}
+
+/* One exchange; what came goes to the channels. */
+static bst_status exchange(external *m, struct bst_step *step, const bst_link_input *inputs,
+                           int count) {
+    bool answered;
+    bst_status status = bst_link_exchange(bst_step_ctx(step), m->link, m->part, bst_step_tick(step),
+                                          inputs, count, m->outputs, m->output_count, &answered);
+    tell(m, step);
+    BST_TRY(status);
+    publish_answer(m, step);
+    publish_more(m, step);
     return BST_OK;
 }
 
@@ -293,6 +315,11 @@ static bst_status step_by_queue(void *self, struct bst_step *step) {
     for (bst_sample next = bst_step_next(step, 0); next.payload; next = bst_step_next(step, 0)) {
         bst_link_input inputs[MOST_INPUTS];
         int count = 0;
+        bool is_ready;
+        BST_TRY(ready(m, step, &is_ready));
+        if (!is_ready) {
+            continue; /* lost for it */
+        }
         BST_TRY(add_latest(m, step, inputs, &count));
         if (m->desc->ports[0].channel[0] == 'd') { /* detections */
             inputs[count++] = (bst_link_input){
@@ -333,6 +360,11 @@ static bst_status step_control(void *self, struct bst_step *step) {
     external *m = self;
     bst_link_input inputs[MOST_INPUTS];
     int count = 0;
+    bool is_ready;
+    BST_TRY(ready(m, step, &is_ready));
+    if (!is_ready) {
+        return BST_OK; /* tracks wait for the next step */
+    }
     BST_TRY(add_latest(m, step, inputs, &count));
     for (int i = 0; i < MOST_QUEUED; i++) {
         bst_sample next = bst_step_next(step, 0);

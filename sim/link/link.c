@@ -145,6 +145,15 @@ void bst_link_close(bst_link *link, int reason, const char *text) {
     }
     bst_shared_frames_free(link->shared);
     free(link->welcome);
+    for (int i = 0; i < link->part_count; i++) {
+        for (int a = 0; a < LINK_AHEAD; a++) {
+            link_answer *answer = &link->parts[i].ahead[a];
+            for (int o = 0; o < answer->output_count; o++) {
+                free(answer->outputs[o].payload);
+            }
+            free(answer->outputs);
+        }
+    }
     free(link->parts);
     free(link);
 }
@@ -176,6 +185,8 @@ static const char *const event_names[LINK_EVENTS] = {
     [LINK_LEFT] = "link_left",
     [LINK_UNANSWERED] = "link_unanswered",
     [LINK_ITEMS_DROPPED] = "link_items_dropped",
+    [LINK_HELD] = "link_held",
+    [LINK_SKIPPED] = "link_skipped",
     [LINK_CONNECTED] = "link_connected",
     [LINK_DISCONNECTED] = "link_disconnected",
 };

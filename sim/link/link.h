@@ -28,12 +28,21 @@ typedef struct bst_link_config {
 
 extern const bst_config_desc bst_link_config_table[];
 
+/* How long a step waits for its answer. */
+typedef enum bst_link_waiting {
+    BST_LINK_AWAIT, /* until it comes, or the time-outs say that it does not */
+    BST_LINK_HOLD,  /* for hold_s; then the run goes on, and the answer counts when it comes */
+    BST_LINK_RUSH,  /* not at all: the same with hold_s 0 */
+} bst_link_waiting;
+
 /* What the run is, for `welcome` and headers. */
 typedef struct bst_link_run {
     const char *scenario;
     bst_time epoch;
     int64_t tick_rate_hz, duration_ticks;
     size_t pixel_bytes; /* of the largest frame */
+    bst_link_waiting waiting;
+    double hold_s;
 } bst_link_run;
 
 /* Checks the address; nothing is bound yet. */
@@ -51,6 +60,8 @@ bst_status bst_link_add(bst_ctx *ctx, bst_link *link, const bst_link_part *part,
                         int *number) BST_MUST_CHECK;
 /* Binds the address; once, else by the first exchange. BST_ERR_IO: it is taken. */
 bst_status bst_link_open(bst_ctx *ctx, bst_link *link) BST_MUST_CHECK;
+/* Waits until each part has a peer, for connect_timeout_s. Errors as bst_link_exchange. */
+bst_status bst_link_gather(bst_ctx *ctx, bst_link *link) BST_MUST_CHECK;
 /* Asked about ten times a second while waiting; true ends the wait with BST_ERR_INTERRUPTED. */
 void bst_link_on_wait(bst_link *link, bool (*stop)(void *user), void *user);
 
@@ -84,6 +95,16 @@ bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int part, int64_t tic
                              const bst_link_input *inputs, int input_count,
                              bst_link_output *outputs, int output_count,
                              bool *answered) BST_MUST_CHECK;
+
+/* With BST_LINK_HOLD and BST_LINK_RUSH, answers come when they come: an exchange gives out the
+ * oldest one that is there, be it of an earlier step, and *answered false is no failure. These give
+ * out the others, and tell whether the peer keeps up: one that has LINK_AHEAD steps to answer is
+ * sent no more (counted), and what would have gone to it is not to be prepared. With BST_LINK_AWAIT
+ * there is never more, and always room. */
+bool bst_link_more(bst_link *link, int part, bst_link_output *outputs, int output_count);
+bst_status bst_link_ready(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
+                          const bst_link_output *outputs, int output_count,
+                          bool *ready) BST_MUST_CHECK;
 
 /* What has been counted, by name ("link_bad_crc"); false after the last. */
 bool bst_link_counter(const bst_link *link, int index, const char **name, int64_t *count);

@@ -1,4 +1,6 @@
 /* A step of a part that a peer plays. */
+#include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "sim/core/wall_clock.h"
@@ -23,7 +25,7 @@ static void send_step(bst_link *link, link_exchange *x, sending *s) {
         const bst_link_input *input = i < s->count ? &s->inputs[i] : NULL;
         bst_link_header header = {.type = input ? input->type : BST_LINK_STEP,
                                   .tick = input ? input->tick : x->tick,
-                                  .step = x->step};
+                                  .step = part->step - 1};
         memcpy(header.instance, part->about.instance, sizeof header.instance);
         const bst_link_input *frame = input && input->type == BST_LINK_FRAME ? input : NULL;
         if (frame && !s->has_crc && !(link->shared && link->peers[peer].shared_memory)) {
@@ -43,11 +45,11 @@ static bst_status silent(bst_link *link, link_exchange *x, double waited_s, bool
     link_part *part = &link->parts[x->part];
     int peer = part->peer;
     bst_link_event(link, x->ctx, LINK_UNANSWERED, "%s has not answered step %lld of %s",
-                   peer >= 0 ? link->peers[peer].name : "nobody", (long long)x->step,
+                   peer >= 0 ? link->peers[peer].name : "nobody", (long long)part->step - 1,
                    part->about.instance);
     *answered = false;
-    for (int i = 0; i < x->output_count; i++) {
-        x->outputs[i].given = false; /* half of an answer is none */
+    for (int i = 0; i < x->answer.output_count; i++) {
+        x->answer.outputs[i].given = false; /* half of an answer is none */
     }
     if (link->config.on_silence == BST_LINK_GO_ON) {
         if (peer >= 0) {
@@ -59,7 +61,8 @@ static bst_status silent(bst_link *link, link_exchange *x, double waited_s, bool
         return bst_fail(x->ctx, BST_ERR_IO,
                         "link: \"%s\" has not answered step %lld of %s within %.3g s; "
                         "/link/timeout_s allows more, /link/on_silence \"go_on\" does without",
-                        link->peers[peer].name, (long long)x->step, part->about.instance, waited_s);
+                        link->peers[peer].name, (long long)part->step - 1, part->about.instance,
+                        waited_s);
     }
     return bst_fail(x->ctx, BST_ERR_IO,
                     "link: %s plays %s at %s, for which the run waited %.3g s; start one, for "
@@ -69,18 +72,213 @@ static bst_status silent(bst_link *link, link_exchange *x, double waited_s, bool
                     link->address);
 }
 
+/* The oldest answer that is whole goes to the caller. */
+bool bst_link_more(bst_link *link, int number, bst_link_output *outputs, int output_count) {
+    link_part *part = &link->parts[number];
+    link_answer *oldest = NULL;
+    for (int a = 0; a < LINK_AHEAD; a++) {
+        link_answer *answer = &part->ahead[a];
+        if (answer->open && answer->finished && (!oldest || answer->step < oldest->step)) {
+            oldest = answer;
+        }
+    }
+    for (int i = 0; oldest && i < output_count; i++) {
+        const bst_link_output *from = &oldest->outputs[i];
+        const bst_wire_message *about = bst_wire_message_of(from->type);
+        outputs[i].given = from->given;
+        outputs[i].dropped = from->dropped;
+        if (from->given) {
+            memcpy(outputs[i].payload, from->payload,
+                   about->header_bytes +
+                       (size_t)bst_wire_items(about, from->payload) * about->item_bytes);
+        }
+    }
+    if (oldest) {
+        oldest->open = false;
+    }
+    return oldest != NULL;
+}
+
+/* Room for answers that are not awaited. */
+static bst_status make_ahead(bst_ctx *ctx, link_part *part, const bst_link_output *outputs,
+                             int count) {
+    for (int a = 0; a < LINK_AHEAD && !part->ahead[a].outputs; a++) {
+        link_answer *answer = &part->ahead[a];
+        answer->outputs = calloc((size_t)count + 1, sizeof *answer->outputs);
+        if (!answer->outputs) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the link's answers");
+        }
+        for (int i = 0; i < count; i++) {
+            const bst_wire_message *about = bst_wire_message_of(outputs[i].type);
+            answer->outputs[i] = (bst_link_output){
+                .type = outputs[i].type,
+                .capacity = outputs[i].capacity,
+                .payload = calloc(
+                    1, about->header_bytes + (size_t)outputs[i].capacity * about->item_bytes)};
+            answer->output_count++;
+            if (!answer->outputs[i].payload) {
+                return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the link's answers");
+            }
+        }
+    }
+    return BST_OK;
+}
+
+/* A place for the answer to another step; NULL: there is none, or frames in shared memory would be
+ * written over that may not have been read. */
+static link_answer *free_place(bst_link *link, link_part *part) {
+    int open = 0;
+    for (int i = 0; i < link->part_count; i++) {
+        for (int a = 0; a < LINK_AHEAD; a++) {
+            open += link->parts[i].ahead[a].open;
+        }
+    }
+    link_answer *place = NULL;
+    for (int a = 0; a < LINK_AHEAD && !(link->shared && open >= BST_LINK_SLOTS - 1); a++) {
+        place = !part->ahead[a].open && !place ? &part->ahead[a] : place;
+    }
+    return place;
+}
+
+/* Takes what comes until `until` (wall seconds) or until `enough`; at least what is there. */
+static bst_status take_until(bst_link *link, link_exchange *x, double until,
+                             bool (*enough)(bst_link *link, link_exchange *x)) {
+    for (;;) {
+        bool over = enough && enough(link, x);
+        double left = over ? 0.0 : until - bst_wall_seconds();
+        BST_TRY(bst_link_take(link, x, left <= 0.0 ? 0 : left > 0.1 ? 100 : (int)(left * 1e3) + 1));
+        if (link->stop && link->stop(link->stop_user)) {
+            return bst_fail(x->ctx, BST_ERR_INTERRUPTED, "interrupted while waiting for %s",
+                            link->parts[x->part > 0 ? x->part : 0].about.instance);
+        }
+        if (x->quiet && (over || bst_wall_seconds() >= until)) {
+            return BST_OK;
+        }
+    }
+}
+
+static bool has_place(bst_link *link, link_exchange *x) {
+    link_part *part = &link->parts[x->part];
+    bool finished = false;
+    for (int a = 0; a < LINK_AHEAD; a++) {
+        finished |= part->ahead[a].open && part->ahead[a].finished;
+    }
+    return finished || part->peer < 0 || free_place(link, part);
+}
+
+static bool newest_finished(bst_link *link, link_exchange *x) {
+    link_part *part = &link->parts[x->part];
+    bool waiting = false;
+    for (int a = 0; a < LINK_AHEAD; a++) {
+        waiting |= part->ahead[a].open && !part->ahead[a].finished;
+    }
+    return !waiting;
+}
+
+bst_status bst_link_ready(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
+                          const bst_link_output *outputs, int output_count, bool *ready) {
+    *ready = true;
+    if (link->run.waiting == BST_LINK_AWAIT) {
+        return BST_OK;
+    }
+    BST_TRY(bst_link_open(ctx, link));
+    link_part *part = &link->parts[number];
+    BST_TRY(make_ahead(ctx, part, outputs, output_count));
+    link->exchanges++;
+    link_exchange x = {.ctx = ctx, .part = number, .tick = tick};
+    double now = bst_wall_seconds(), oldest = now;
+    BST_TRY(take_until(link, &x, now + (link->run.waiting == BST_LINK_HOLD ? link->run.hold_s : 0),
+                       has_place));
+    bool place = free_place(link, part) != NULL;
+    for (int a = 0; a < LINK_AHEAD; a++) {
+        const link_answer *answer = &part->ahead[a];
+        place |= answer->open && answer->finished; /* bst_link_more makes room */
+        oldest = answer->open && !answer->finished ? fmin(oldest, answer->sent_s) : oldest;
+    }
+    if (part->peer >= 0 && bst_wall_seconds() - oldest > link->config.timeout_s) {
+        bool answered;
+        BST_TRY(silent(link, &x, bst_wall_seconds() - oldest, &answered));
+    }
+    *ready = part->peer >= 0 && place;
+    if (!*ready) {
+        link->counts[LINK_SKIPPED]++;
+    }
+    return BST_OK;
+}
+
+/* A step that is sent and not awaited, or not for long. */
+static bst_status not_awaited(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
+                              const bst_link_input *inputs, int input_count,
+                              bst_link_output *outputs, int output_count, bool *answered) {
+    link_part *part = &link->parts[number];
+    *answered = false;
+    for (int i = 0; i < output_count; i++) {
+        outputs[i].given = false;
+    }
+    link_exchange x = {.ctx = ctx, .part = number, .tick = tick};
+    BST_TRY(make_ahead(ctx, part, outputs, output_count));
+    link_answer *place = free_place(link, part);
+    if (part->peer < 0 || !place) {
+        link->counts[LINK_SKIPPED]++;
+        return BST_OK;
+    }
+    link->exchanges++;
+    place->open = true;
+    place->finished = false;
+    place->step = part->step++;
+    place->taken = 0;
+    place->sent_s = bst_wall_seconds();
+    for (int i = 0; i < place->output_count; i++) {
+        place->outputs[i].given = false;
+        place->outputs[i].dropped = 0;
+    }
+    sending s = {.inputs = inputs, .count = input_count};
+    send_step(link, &x, &s);
+    bool hold = link->run.waiting == BST_LINK_HOLD;
+    BST_TRY(take_until(link, &x, place->sent_s + (hold ? link->run.hold_s : 0.0), newest_finished));
+    *answered = bst_link_more(link, number, outputs, output_count);
+    link->counts[LINK_HELD] += !*answered;
+    return BST_OK;
+}
+
+bst_status bst_link_gather(bst_ctx *ctx, bst_link *link) {
+    BST_TRY(bst_link_open(ctx, link));
+    double began = bst_wall_seconds();
+    for (int i = 0; i < link->part_count; i++) {
+        link_exchange x = {.ctx = ctx, .part = i};
+        while (link->parts[i].peer < 0) {
+            BST_TRY(bst_link_take(link, &x, 100));
+            if (link->stop && link->stop(link->stop_user)) {
+                return bst_fail(ctx, BST_ERR_INTERRUPTED, "interrupted while waiting for %s",
+                                link->parts[i].about.instance);
+            }
+            double waited = bst_wall_seconds() - began;
+            if (link->parts[i].peer < 0 && waited >= link->config.connect_timeout_s) {
+                bool answered;
+                return silent(link, &x, waited, &answered);
+            }
+        }
+    }
+    return BST_OK;
+}
+
 bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
                              const bst_link_input *inputs, int input_count,
                              bst_link_output *outputs, int output_count, bool *answered) {
     BST_TRY(bst_link_open(ctx, link));
+    if (link->run.waiting != BST_LINK_AWAIT) {
+        return not_awaited(ctx, link, number, tick, inputs, input_count, outputs, output_count,
+                           answered);
+    }
     link->exchanges++;
     link_part *part = &link->parts[number];
     link_exchange x = {.ctx = ctx,
                        .part = number,
-                       .step = part->step++,
                        .tick = tick,
-                       .outputs = outputs,
-                       .output_count = output_count,
+                       .answer = {.open = true,
+                                  .step = part->step++,
+                                  .outputs = outputs,
+                                  .output_count = output_count},
                        .resend = part->peer >= 0};
     sending s = {.inputs = inputs, .count = input_count};
     double began = bst_wall_seconds();
@@ -93,7 +291,7 @@ bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int number, int64_t t
     for (;;) {
         if (x.resend && part->peer >= 0) {
             x.resend = false;
-            x.taken = 0;
+            x.answer.taken = 0;
             for (int i = 0; i < output_count; i++) {
                 outputs[i].given = false;
                 outputs[i].dropped = 0;
@@ -103,7 +301,7 @@ bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int number, int64_t t
         double left = end - bst_wall_seconds();
         int wait_ms = left <= 0.0 ? 0 : left > 0.1 ? 100 : (int)(left * 1e3) + 1;
         BST_TRY(bst_link_take(link, &x, wait_ms));
-        if (x.finished) {
+        if (x.answer.finished) {
             return BST_OK;
         }
         if (link->stop && link->stop(link->stop_user)) {

@@ -19,6 +19,8 @@ enum {
     LINK_QUEUE = 64,               /* messages that wait in each direction, per peer */
     LINK_MESSAGE_BYTES = 16 << 20, /* of a part that a peer sends; beyond, it is disconnected */
     LINK_ID_BYTES = 255,
+    LINK_AHEAD = 2,       /* steps of a part that its peer may have to answer, where answers are not
+                             awaited */
     LINK_EXTENSIONS = 10, /* time-outs that a step may take at most, by `health` and `hello` */
 };
 
@@ -38,6 +40,8 @@ typedef enum link_event {
     LINK_LEFT,
     LINK_UNANSWERED,
     LINK_ITEMS_DROPPED,
+    LINK_HELD,
+    LINK_SKIPPED,
     LINK_CONNECTED,
     LINK_DISCONNECTED,
     LINK_EVENTS
@@ -58,11 +62,22 @@ typedef struct link_peer {
     int heard;
 } link_peer;
 
+/* The answer to a step, as it comes in. */
+typedef struct link_answer {
+    bool open, finished; /* finished: `done` has come */
+    int64_t step;
+    double sent_s; /* wall time */
+    bst_link_output *outputs;
+    int output_count, taken;
+} link_answer;
+
 typedef struct link_part {
     bst_link_part about;
     int peer; /* -1: none */
     bool had_peer;
     int64_t step; /* of the next exchange */
+    link_answer
+        ahead[LINK_AHEAD]; /* steps whose answers are not awaited; their outputs are owned */
 } link_part;
 
 /* A frame that ZeroMQ holds. */
@@ -99,14 +114,13 @@ struct bst_link {
 typedef struct link_exchange {
     bst_ctx *ctx;
     int part; /* -1: none, messages are only looked at */
-    int64_t step, tick;
-    bst_link_output *outputs;
-    int output_count;
+    int64_t tick;
+    link_answer answer; /* BST_LINK_AWAIT: of this step; the outputs are the caller's */
     bool resend;        /* its peer has come, or come back */
     bool prolong;       /* its time-out starts anew */
-    bool finished;      /* `done` has come */
     bool failed;        /* the peer says so: the message is in ctx */
-    int replies, taken; /* taken: outputs */
+    bool quiet;         /* no message has come */
+    int replies;
 } link_exchange;
 
 /* link.c */
@@ -123,7 +137,7 @@ void bst_link_reply(bst_link *link, const link_id *id, link_peer *peer, const ch
 /* link_receive.c */
 /* Waits up to wait_ms for one message and takes it, or says what is wrong with it. */
 bst_status bst_link_take(bst_link *link, link_exchange *x, int wait_ms) BST_MUST_CHECK;
-/* Takes its parts from a peer. */
+/* Takes its parts from a peer. What it has not answered is lost. */
 void bst_link_unassign(bst_link *link, int peer);
 
 #endif

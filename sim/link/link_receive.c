@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "sim/core/wall_clock.h"
 #include "sim/link/link_internal.h"
 
 enum { MOST_PARTS = 4 }; /* identity, header, payload, and one too many */
@@ -39,6 +40,9 @@ void bst_link_unassign(bst_link *link, int peer) {
     for (int i = 0; i < link->part_count; i++) {
         if (link->parts[i].peer == peer) {
             link->parts[i].peer = -1;
+            for (int a = 0; a < LINK_AHEAD; a++) {
+                link->parts[i].ahead[a].open = false;
+            }
         }
     }
 }
@@ -148,6 +152,9 @@ static void take_hello(bst_link *link, link_exchange *x, const message *m,
         }
         part->peer = p;
         part->had_peer = true;
+        for (int a = 0; a < LINK_AHEAD; a++) {
+            part->ahead[a].open = false;
+        }
         played++;
         if (i == x->part) {
             x->resend = x->prolong = true;
@@ -187,10 +194,29 @@ static bool in_order(bst_link *link, link_exchange *x, const message *m, int p) 
     return true;
 }
 
-static bst_link_output *output_of(const link_exchange *x, bst_link_type type) {
-    for (int i = 0; i < x->output_count; i++) {
-        if (x->outputs[i].type == type) {
-            return &x->outputs[i];
+static bst_link_output *output_of(const link_answer *answer, bst_link_type type) {
+    for (int i = 0; i < answer->output_count; i++) {
+        if (answer->outputs[i].type == type) {
+            return &answer->outputs[i];
+        }
+    }
+    return NULL;
+}
+
+/* The step that a message of peer p answers; NULL when it is none that is under way. */
+static link_answer *answer_of(bst_link *link, link_exchange *x, const bst_link_header *h, int p) {
+    for (int i = 0; i < link->part_count; i++) {
+        link_part *part = &link->parts[i];
+        if (part->peer != p || strcmp(h->instance, part->about.instance) != 0) {
+            continue;
+        }
+        if (i == x->part && x->answer.open && x->answer.step == h->step) {
+            return &x->answer;
+        }
+        for (int a = 0; a < LINK_AHEAD; a++) {
+            if (part->ahead[a].open && !part->ahead[a].finished && part->ahead[a].step == h->step) {
+                return &part->ahead[a];
+            }
         }
     }
     return NULL;
@@ -205,28 +231,28 @@ static void *room_for(bst_link *link, link_exchange *x, const message *m, int p,
         return control;
     }
     const link_part *part = x->part >= 0 ? &link->parts[x->part] : NULL;
+    const link_answer *answer = answer_of(link, x, h, p);
     char text[300];
-    if (!part || part->peer != p || h->step != x->step ||
-        strcmp(h->instance, part->about.instance) != 0) {
+    if (!answer) {
         snprintf(text, sizeof text, "%s for step %lld of %.100s; step %lld of %.100s is under way",
                  bst_wire_message_of(h->type)->name, (long long)h->step, h->instance,
-                 (long long)x->step, part ? part->about.instance : "no part");
+                 part ? (long long)part->step - 1 : -1LL, part ? part->about.instance : "no part");
         refuse(link, x, m, p, LINK_LATE, "late", text);
         return NULL;
     }
     if (h->type == BST_LINK_DONE) {
         return control;
     }
-    bst_link_output *output = output_of(x, h->type);
+    bst_link_output *output = output_of(answer, h->type);
     if (!output) {
-        snprintf(text, sizeof text, "%s is no output of a part of role %s",
-                 bst_wire_message_of(h->type)->name, part->about.role);
+        snprintf(text, sizeof text, "%s is no output of %.160s", bst_wire_message_of(h->type)->name,
+                 h->instance);
         refuse(link, x, m, p, BST_WIRE_UNEXPECTED, bst_wire_fault_name(BST_WIRE_UNEXPECTED), text);
         return NULL;
     }
     if (output->given) {
         snprintf(text, sizeof text, "a second %s in step %lld: the first one holds",
-                 bst_wire_message_of(h->type)->name, (long long)x->step);
+                 bst_wire_message_of(h->type)->name, (long long)h->step);
         refuse(link, x, m, p, LINK_REPEATED, "repeated", text);
         return NULL;
     }
@@ -238,19 +264,30 @@ static void *room_for(bst_link *link, link_exchange *x, const message *m, int p,
 static void take_done(bst_link *link, link_exchange *x, const message *m, int p,
                       const bst_link_done *done) {
     char text[120];
-    x->finished = done->outputs == x->taken;
-    if (!x->finished) {
+    link_answer *answer = answer_of(link, x, &m->header, p);
+    answer->finished = done->outputs == answer->taken;
+    if (!answer->finished) {
         snprintf(text, sizeof text,
                  "done with %d outputs, %d have been taken: send what is missing, "
                  "then done again",
-                 done->outputs, x->taken);
+                 done->outputs, answer->taken);
         refuse(link, x, m, p, LINK_INCOMPLETE, "incomplete", text);
+    }
+}
+
+/* The time-outs of steps that are not awaited start anew. */
+static void prolong_ahead(bst_link *link, int p) {
+    for (int i = 0; i < link->part_count; i++) {
+        for (int a = 0; link->parts[i].peer == p && a < LINK_AHEAD; a++) {
+            link->parts[i].ahead[a].sent_s = bst_wall_seconds();
+        }
     }
 }
 
 static void take_content(bst_link *link, link_exchange *x, const message *m, int p,
                          const control_message *control, int dropped) {
     bst_link_output *output;
+    link_answer *answer;
     switch (m->header.type) {
         case BST_LINK_HELLO:
             take_hello(link, x, m, &control->hello);
@@ -260,6 +297,7 @@ static void take_content(bst_link *link, link_exchange *x, const message *m, int
             return;
         case BST_LINK_HEALTH:
             x->prolong |= x->part >= 0 && link->parts[x->part].peer == p;
+            prolong_ahead(link, p);
             if (control->health.state == 2) {
                 bst_fail(x->ctx, BST_ERR_IO, "link: %s says that it has failed: %s",
                          name_of(link, p), control->health.text);
@@ -272,9 +310,10 @@ static void take_content(bst_link *link, link_exchange *x, const message *m, int
             bst_link_unassign(link, p);
             return;
         default:
-            output = output_of(x, m->header.type);
+            answer = answer_of(link, x, &m->header, p);
+            output = output_of(answer, m->header.type);
             output->given = true;
-            x->taken++;
+            answer->taken++;
             output->dropped = dropped;
             if (dropped > 0) {
                 bst_link_event(link, x->ctx, LINK_ITEMS_DROPPED,
@@ -429,7 +468,9 @@ bst_status bst_link_take(bst_link *link, link_exchange *x, int wait_ms) {
         watch(link);
     }
     message m;
+    x->quiet = true;
     if (ready > 0 && items[0].revents && receive(link, &m)) {
+        x->quiet = false;
         take_message(link, x, &m);
         for (int i = 0; i < m.count; i++) {
             zmq_msg_close(&m.parts[i]);

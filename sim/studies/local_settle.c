@@ -1,15 +1,14 @@
 /* What a worker does before it opens a device: cores, threads, cache of kernels. */
 #define _GNU_SOURCE /* sched_setaffinity */
-#include <errno.h>
 #include <fcntl.h>
 #include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
+#include "sim/core/folder.h"
 #include "sim/studies/local_pool.h"
 
 enum { CACHES = 4096 };
@@ -49,18 +48,6 @@ static int granted_cores(void) {
     return text ? atoi(text) : 0;
 }
 
-static bool make_folders(char *path) {
-    for (char *slash = path; (slash = strchr(slash + 1, '/'));) {
-        *slash = '\0';
-        bool made = mkdir(path, 0777) == 0 || errno == EEXIST || access(path, F_OK) == 0;
-        *slash = '/';
-        if (!made) {
-            return false;
-        }
-    }
-    return mkdir(path, 0777) == 0 || errno == EEXIST;
-}
-
 static bool cache_root(char *out, size_t bytes) {
     const char *own = getenv("POCL_CACHE_DIR"), *xdg = getenv("XDG_CACHE_HOME"),
                *home = getenv("HOME");
@@ -81,7 +68,7 @@ static void take_cache(void) {
     for (int i = 0; i < CACHES; i++) {
         snprintf(path, sizeof path, "%s/worker-%d", root, i);
         snprintf(lock, sizeof lock, "%s/lock", path);
-        if (!make_folders(path)) {
+        if (bst_folder_make(NULL, path) != BST_OK) {
             return;
         }
         int fd = open(lock, O_RDWR | O_CREAT | O_CLOEXEC, 0666);

@@ -6,9 +6,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
+#include "sim/core/folder.h"
 #include "sim/core/wall_clock.h"
 #include "sim/studies/slurm_internal.h"
 
@@ -312,9 +312,7 @@ static bst_status prepare(bst_ctx *ctx, bst_slurm *s, const char *study_folder) 
     if (snprintf(s->folder, sizeof s->folder, "%s/slurm", full) >= (int)sizeof s->folder) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path of the study is too long", full);
     }
-    if (mkdir(s->folder, 0777) != 0 && errno != EEXIST) {
-        return bst_fail(ctx, BST_ERR_IO, "%s: %s", s->folder, strerror(errno));
-    }
+    BST_TRY(bst_folder_make(ctx, s->folder));
     snprintf(s->name, sizeof s->name, "boresight-%012llx",
              (unsigned long long)(hash_of(full) & 0xffffffffffffu));
     struct timespec now;

@@ -1,7 +1,6 @@
 /* apt's sources, in both formats, into source-package entries for Debian's own. */
 #include <ctype.h>
 #include <dirent.h>
-#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>

@@ -9,32 +9,11 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "sim/core/folder.h"
 #include "sim/world/child.h"
 #include "sim/world/stars.h"
 
 #define PATH_BYTES 1024
-
-bst_status bst_star_fetch_make_folder(bst_ctx *ctx, const char *path) {
-    char part[PATH_BYTES];
-    int n = snprintf(part, sizeof part, "%s", path);
-    if (n <= 0 || (size_t)n >= sizeof part) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT, "the path \"%s\" is empty or too long", path);
-    }
-    for (char *p = part + 1;; p++) {
-        char c = *p;
-        if (c == '/' || c == '\0') {
-            *p = '\0';
-            if (mkdir(part, 0755) != 0 && errno != EEXIST) {
-                return bst_fail(ctx, BST_ERR_IO, "cannot make the folder %s: %s", part,
-                                strerror(errno));
-            }
-            *p = c;
-        }
-        if (c == '\0') {
-            return BST_OK;
-        }
-    }
-}
 
 static bst_status join(bst_ctx *ctx, char out[PATH_BYTES], const char *folder, const char *name) {
     int n = snprintf(out, PATH_BYTES, "%s/%s", folder, name);
@@ -75,7 +54,7 @@ static bst_status write_apt_files(bst_ctx *ctx, const char *folder) {
     char path[PATH_BYTES];
     for (size_t i = 0; i < sizeof folders / sizeof folders[0]; i++) {
         BST_TRY(join(ctx, path, folder, folders[i]));
-        BST_TRY(bst_star_fetch_make_folder(ctx, path));
+        BST_TRY(bst_folder_make(ctx, path));
     }
     BST_TRY(join(ctx, path, folder, "apt/sources.list"));
     FILE *list = fopen(path, "w");
@@ -175,7 +154,7 @@ bst_status bst_star_fetch_tarball(bst_ctx *ctx, const char *folder, bst_star_pro
         return BST_OK;
     }
     unlink(tarball);
-    BST_TRY(bst_star_fetch_make_folder(ctx, folder));
+    BST_TRY(bst_folder_make(ctx, folder));
     BST_TRY(write_apt_files(ctx, folder));
     static const char *const update[3] = {"update", NULL, NULL};
     static const char *const source[3] = {"source", "--download-only", "tycho2"};
@@ -237,9 +216,9 @@ bst_status bst_star_fetch(bst_ctx *ctx, const char *out_path, bst_star_progress_
     char *slash = n > 0 && n < PATH_BYTES ? strrchr(parent, '/') : NULL;
     if (slash && slash != parent) {
         *slash = '\0';
-        BST_TRY(bst_star_fetch_make_folder(ctx, parent));
+        BST_TRY(bst_folder_make(ctx, parent));
     }
-    BST_TRY(bst_star_fetch_make_folder(ctx, folder));
+    BST_TRY(bst_folder_make(ctx, folder));
     BST_TRY(bst_star_fetch_tarball(ctx, folder, progress, progress_user, tarball, sizeof tarball));
     bst_star_import_options options = bst_star_import_all();
     options.progress = progress;

@@ -40,7 +40,4 @@ bst_status bst_star_fetch_tarball(bst_ctx *ctx, const char *folder, bst_star_pro
 bst_status bst_star_fetch(bst_ctx *ctx, const char *out_path, bst_star_progress_fn progress,
                           void *progress_user, bool *already) BST_MUST_CHECK;
 
-/* Makes a folder and its parents (mode 0755). */
-bst_status bst_star_fetch_make_folder(bst_ctx *ctx, const char *path) BST_MUST_CHECK;
-
 #endif

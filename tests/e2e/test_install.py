@@ -36,6 +36,17 @@ def only(pattern):
     return found[0]
 
 
+class Readme(unittest.TestCase):
+    def test_names_every_package(self):
+        with open("dev", encoding="utf-8") as file:
+            lists = re.findall(r"packages_(?:build|run|test)='([^']*)'", file.read())
+        self.assertEqual(len(lists), 3)
+        with open("README.md", encoding="utf-8") as file:
+            words = set(re.split(r"[\s`.,]+", file.read()))
+        missing = set(" ".join(lists).split()) - words
+        self.assertFalse(missing, "packages that ./dev installs and README.md does not name")
+
+
 class Installed(unittest.TestCase):
     """The stage is made under one name and used under another."""
 

@@ -119,6 +119,9 @@ CREATE TABLE statistics(setting, metric, method, runs, missing, mean, low, high,
  p25, median, p75, p95, maximum);
 CREATE TABLE curve_statistics(setting, runs, snr, v_mag, trials, detected, rate, rate_low,
  rate_high, ideal_pd);
+CREATE TABLE sensitivity(sweep, design, metric, rank, axis, effect, effect_error, mean_effect,
+ spread, effects);
+CREATE TABLE speed_sensitivity AS SELECT * FROM sensitivity;
 INSERT INTO scenarios VALUES(0, 'one');
 INSERT INTO metrics VALUES('loss_db_pd50', 'dB', 'Loss.', 'value');
 """
@@ -141,6 +144,14 @@ def tables(folder, design, settings, failed=()):
                          c, None if bad else 10 * a + b))
             out.execute("INSERT INTO speed VALUES(?, ?)", (i, 1 + b))
         return out
+
+
+def ranked(out, table, design, metric, *effects):
+    """Rows of an axes' table: (axis, effect, error, spread), the greatest first."""
+    out.executemany(f"INSERT INTO {table} VALUES(0, ?, ?, ?, ?, ?, ?, 0, ?, 3)",
+                    [(design, metric, rank, axis, effect, error, spread)
+                     for rank, (axis, effect, error, spread) in enumerate(effects, 1)])
+    out.commit()
 
 
 class Made(OnePage):
@@ -171,8 +182,14 @@ class Made(OnePage):
 
     def test_one_at_a_time(self):
         folder = runs.scratch()
-        tables(folder, "one_at_a_time",
-               [(1, 1, "x"), (0, 1, "x"), (2, 1, "x"), (1, 0, "x"), (1, 4, "x"), (1, 1, "y")])
+        out = tables(folder, "one_at_a_time",
+                     [(1, 1, "x"), (0, 1, "x"), (2, 1, "x"), (1, 0, "x"), (1, 4, "x"),
+                      (1, 1, "y")])
+        # 10 a + b: a changes it by 20, b by 4, c by nothing; the wall time is 1 + b
+        ranked(out, "sensitivity", "one_at_a_time", "loss_db_pd50", ("a", 20, None, None),
+               ("b", 4, None, None), ("c", 0, None, None))
+        ranked(out, "speed_sensitivity", "one_at_a_time", "wall_s", ("b", 4, None, None),
+               ("a", 0, None, None), ("c", 0, None, None))
         self.assertEqual(report(folder).returncode, 0)
         page = Page(folder + "/report.html")
         self.check_alone(page)
@@ -183,22 +200,23 @@ class Made(OnePage):
                           "Change of wall_s with one axis at a time"])
         ranks = [[text.text for text in part.iter("text") if re.match(r"\d  ", text.text)]
                  for part in charts]
-        # 10 a + b: a changes it by 10, b by 3, c by nothing; the wall time is 1 + b
         self.assertEqual(ranks[0], ["1  a", "2  b", "3  c"])
         self.assertEqual(ranks[1][0], "1  b")
 
     def test_morris(self):
         folder = runs.scratch()
-        # three paths of single steps; ranges 0..3 of a and 0..30 of b
-        tables(folder, "morris",
-               [(0, 0, "x"), (2, 0, "x"), (2, 20, "x"), (1, 30, "x"), (3, 30, "x"), (3, 10, "x"),
-                (3, 0, "x"), (1, 0, "x"), (1, 20, "x")])
+        # three paths of single steps; ranges 0..3 of a and 0..30 of b: both change it by 30
+        out = tables(folder, "morris",
+                     [(0, 0, "x"), (2, 0, "x"), (2, 20, "x"), (1, 30, "x"), (3, 30, "x"),
+                      (3, 10, "x"), (3, 0, "x"), (1, 0, "x"), (1, 20, "x")])
+        ranked(out, "sensitivity", "morris", "loss_db_pd50", ("a", 30, 0, 0), ("b", 30, 0, 0))
+        ranked(out, "speed_sensitivity", "morris", "wall_s", ("b", 30, 2, 4))
         self.assertEqual(report(folder).returncode, 0)
         page = Page(folder + "/report.html")
         self.check_alone(page)
         chart = [part for part in page.root.iter("svg")
                  if part.get("aria-label", "") == "Ranked effects on loss_db_pd50"][0]
-        # over their ranges both change the metric by 30 exactly: equal bars, to their very ends
+        # equal bars, to their very ends
         bars = [part for part in chart.iter("rect") if "h c0" in part.get("class")]
         self.assertEqual(len(bars), 2)
         self.assertEqual(bars[0].get("width"), bars[1].get("width"))
@@ -210,6 +228,23 @@ class Made(OnePage):
                   if part.get("aria-label", "") == "Spread against size of the effects on "
                                                    "loss_db_pd50"]
         self.assertEqual(len(spread), 1)
+        # of the wall time: the interval's ends are 1.96 standard errors away
+        chart = [part for part in page.root.iter("svg")
+                 if part.get("aria-label", "") == "Ranked effects on wall_s"][0]
+        wide = {part.get("class"): float(part.get("width")) for part in chart.iter("rect")}
+        bar = [wide[name] for name in wide if "c0" in name][0]
+        interval = [wide[name] for name in wide if "c1" in name][0]
+        self.assertAlmostEqual(interval / bar, 2 * 1.96 * 2 / 30, delta=1e-3)
+
+    def test_without_effects(self):
+        """A study whose tables lack the effects is damaged."""
+        folder = runs.scratch()
+        out = tables(folder, "morris", [(0, 0, "x"), (2, 0, "x")])
+        out.execute("DROP TABLE sensitivity")
+        out.commit()
+        result = report(folder)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("sensitivity", result.stderr)
 
 
 def tearDownModule():

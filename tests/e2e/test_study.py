@@ -33,7 +33,7 @@ def write(folder, **changes):
     study = {"boresight_study": 1, "name": "small", "kind": "loop", "seed": "0x51",
              "scenarios": [{"file": os.path.abspath("scenarios/day_generator.json")}],
              "set": {"/duration_s": 60, "/world/star_catalogue": "embedded",
-                     "/record/detection_stars": True},
+                     "/record/detections_of": "all"},
              "sweeps": [{"axes": [{"path": NOISE, "values": [5, 15]}]}],
              "dispersions": [{"path": "/observers/0/sensors/0/camera/dark_current_e_per_s",
                               "from": 0.1, "to": 0.3}],

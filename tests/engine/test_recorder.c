@@ -196,25 +196,26 @@ static void send_all(bst_ctx *ctx, bst_recorder *recorder) {
                                           "acquire -> track"));
 }
 
-/* Of a star and an object, rows with and without detection_stars. */
-static void test_detections_without_stars(void **state) {
+/* Of a star, a hot pixel and an object, the rows of each choice. */
+static void test_detections_of(void **state) {
     (void)state;
     scratch s;
     scratch_make(&s);
     bst_ctx ctx;
     bst_ctx_init(&ctx, NULL, NULL, BST_LOG_INFO);
-    bst_detections *d = calloc(1, sizeof *d + 2 * sizeof(bst_detection));
+    bst_detections *d = calloc(1, sizeof *d + 3 * sizeof(bst_detection));
     assert_non_null(d);
-    d->count = 2;
+    d->count = 3;
     d->items[0] = (bst_detection){.label = BST_LABEL_STAR, .star_id = 5};
     d->items[1] = (bst_detection){.label = BST_LABEL_OBJECT, .x_px = 2.0};
-    for (int stars = 0; stars <= 1; stars++) {
+    d->items[2] = (bst_detection){.label = BST_LABEL_HOT_PIXEL};
+    for (int choice = 0; choice <= BST_RECORD_OBJECTS; choice++) {
         bst_record_config config;
         bst_assert_ok(&ctx, bst_config_defaults(&ctx, bst_record_config_table, &config));
-        assert_true(config.detection_stars);
-        config.detection_stars = stars;
+        assert_int_equal(config.detections_of, BST_RECORD_ALL_DETECTIONS);
+        config.detections_of = choice;
         char out[600], db[640];
-        snprintf(out, sizeof out, "%s/stars%d", s.folder, stars);
+        snprintf(out, sizeof out, "%s/choice%d", s.folder, choice);
         snprintf(db, sizeof db, "%s/run.sqlite", out);
         bst_run *run;
         bst_assert_ok(&ctx, bst_run_create(&ctx, out, false, &run));
@@ -222,9 +223,9 @@ static void test_detections_without_stars(void **state) {
         send(&ctx, recorder, BST_CHANNEL_DETECTIONS, d, 4000);
         bst_assert_ok(&ctx, bst_recorder_close(&ctx, recorder));
         bst_assert_ok(&ctx, bst_run_finish(&ctx, run));
-        assert_is(db, "SELECT count(*) FROM detections", 1 + stars);
+        assert_is(db, "SELECT count(*) FROM detections", 3 - choice);
         assert_is(db, "SELECT item FROM detections WHERE label = 'object' AND x_px = 2", 1);
-        assert_is(db, "SELECT detections FROM detection_frames", 2);
+        assert_is(db, "SELECT detections FROM detection_frames", 3);
     }
     free(d);
     scratch_remove(&s);
@@ -479,7 +480,7 @@ static void test_choices(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_tables),     cmocka_unit_test(test_detections_without_stars),
+        cmocka_unit_test(test_tables),     cmocka_unit_test(test_detections_of),
         cmocka_unit_test(test_decimation), cmocka_unit_test(test_frames_meet_truth),
         cmocka_unit_test(test_choices),
     };

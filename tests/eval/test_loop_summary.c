@@ -15,6 +15,8 @@ typedef struct scene {
     bst_tracks *tracks;
     bst_loop_frame judged[3000];
     int judged_count;
+    int hidden; /* of the track of interest, and its second axis' standard deviations */
+    double sigma2_rad, rate_sigma2_radps;
 } scene;
 
 static void on_frame(void *user, const bst_loop_frame *frame) {
@@ -99,7 +101,12 @@ static void tracks_at(scene *s, int64_t id, int status, double off_px) {
                                       .target_of_interest = status >= 0,
                                       .direction_gcrf = bst_vec3_unit(bst_vec3_axpy(
                                           m.geometric, off_px * 3 * BST_ARCSEC_RAD, aside)),
-                                      .rate_gcrf_radps = rate};
+                                      .rate_gcrf_radps = rate,
+                                      .hidden = s->hidden};
+    double(*c)[4] = s->tracks->items[1].covariance;
+    c[0][0] = BST_ARCSEC_RAD * BST_ARCSEC_RAD;
+    c[1][1] = s->sigma2_rad * s->sigma2_rad;
+    c[3][3] = s->rate_sigma2_radps * s->rate_sigma2_radps;
     bst_loop_summary_tracks(s->summary, s->tracks, id * RATE + 5400);
 }
 
@@ -182,6 +189,38 @@ static void the_wrong_target_counts_as_wrong(void **state) {
     /* frames 1 to 29 begin after the confirmation at 0.9 s; 1 to 19 are right */
     bst_assert_close(f.track_fraction, 19.0 / 29.0, 1e-15);
     close_scene(s);
+}
+
+/* A track that foretells where its hidden target is has no wrong one while its covariance allows
+ * the true place; it has when it does not, and when nothing hides it. */
+static void a_prediction_within_its_covariance_is_not_wrong(void **state) {
+    (void)state;
+    const double px = 3 * BST_ARCSEC_RAD;
+    for (int k = 0; k < 5; k++) {
+        scene *s = open_scene(GX5, 0);
+        for (int id = 0; id < 30; id++) {
+            mode(s, id, BST_MODE_COAST);
+            truth_at(s, id, 0, 1);
+            /* off along the second axis by 4.25 sigma, by 4.33, by far more, by 4.25 but with
+             * nothing that hides it, and in two frames of three by a second or two of a vague rate
+             */
+            s->hidden = k == 3 || id < 5 ? BST_HIDDEN_NOT : BST_HIDDEN_DIM;
+            s->sigma2_rad = k == 2 || k == 4 ? 1e-9 : 4 * px;
+            s->rate_sigma2_radps = k == 4 ? 16 * px : 0;
+            if (k < 4 || id % 3 == 0) {
+                tracks_at(s, id, id < 5 ? BST_TRACK_CONFIRMED : BST_TRACK_COASTING,
+                          id < 5   ? 0.1
+                          : k == 1 ? 17.3
+                                   : 17.0);
+            }
+        }
+        bst_loop_summary_finish(s->summary);
+        bst_loop_figures f;
+        bst_loop_summary_figures(s->summary, &f);
+        assert_int_equal(f.wrong_target_frames, k == 0 ? 0 : k == 4 ? 8 : 25);
+        assert_true(f.track_fraction < 0.2); /* within 5 px is what counts as in track */
+        close_scene(s);
+    }
 }
 
 /* Every third frame has no tracks of its own: judged by what was known before. After frame 21 the
@@ -322,6 +361,7 @@ int main(void) {
         cmocka_unit_test(a_target_that_is_never_confirmed),
         cmocka_unit_test(times_to_confirm_and_to_settle),
         cmocka_unit_test(the_wrong_target_counts_as_wrong),
+        cmocka_unit_test(a_prediction_within_its_covariance_is_not_wrong),
         cmocka_unit_test(dropped_frames_are_judged_by_the_track_known_before),
         cmocka_unit_test(frames_do_not_wait_for_ever),
         cmocka_unit_test(rms_is_exact_and_p99_within_a_bin),

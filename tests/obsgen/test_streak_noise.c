@@ -1,5 +1,5 @@
 /* The sums along a streak that the generator draws its fragments from: noise of the filter's
- * variance and correlation, that belongs to the pixels, and the exponentials of light. */
+ * variance and correlation, that belongs to the pixels. */
 #include "obsgen/streak_noise.h"
 
 #include <stdlib.h>
@@ -120,33 +120,11 @@ static void light_has_shot_noise(void **state) {
     free(noise);
 }
 
-/* A float has 6e-8; the series and its argument take a few of that. */
-static void exponentials_are_exact_to_rounding(void **state) {
-    (void)state;
-    enum { COUNT = 8001 };
-    float x[COUNT];
-    for (int i = 0; i < COUNT; i++) {
-        x[i] = -80.0f * (float)i / (COUNT - 1);
-    }
-    float below[3] = {-81.0f, -1e6f, -INFINITY};
-    bst_streak_exponentials(x, COUNT);
-    bst_streak_exponentials(below, 3);
-    for (int i = 0; i < COUNT; i++) {
-        double argument = (double)(-80.0f * (float)i / (COUNT - 1));
-        /* the argument in units of ln 2 is rounded to 24 bits: its own size times 6e-8 more */
-        bst_assert_close((double)x[i], exp(argument), exp(argument) * (1e-6 - 1.3e-7 * argument));
-    }
-    for (int i = 0; i < 3; i++) {
-        bst_assert_close((double)below[i], exp(-80.0), 2e-5 * exp(-80.0));
-    }
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(noise_has_the_filters_correlation),
         cmocka_unit_test(noise_belongs_to_the_pixel),
         cmocka_unit_test(light_has_shot_noise),
-        cmocka_unit_test(exponentials_are_exact_to_rounding),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,23 @@
+/* Making folders. */
+#ifndef BST_CORE_FOLDER_H
+#define BST_CORE_FOLDER_H
+
+#include "sim/core/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Makes a folder and those above it that are missing; one that is there is left as it is.
+ * BST_ERR_ARGUMENT: the path is empty or too long; BST_ERR_IO: one of them cannot be made, or is no
+ * folder. */
+bst_status bst_folder_make(bst_ctx *ctx, const char *path) BST_MUST_CHECK;
+
+/* Makes what is missing above `path`, which itself is left alone. As bst_folder_make. */
+bst_status bst_folder_make_above(bst_ctx *ctx, const char *path) BST_MUST_CHECK;
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
