@@ -144,7 +144,7 @@ static nearest_light nearest_of(const bst_generator *g, const generator_source *
 static void wander(const bst_generator *g, const generator_source *s,
                    const generator_source *merged, int count, double beside,
                    generator_blend *out) {
-    if (!s->as_streak || s->length < 1.0 || g->wander.steps == 0) {
+    if (!s->as_streak || s->length < 1.0) {
         return;
     }
     const bst_obsgen_calibration *cal = &g->calibration;
@@ -156,13 +156,17 @@ static void wander(const bst_generator *g, const generator_source *s,
     if (along * out->flat < WANDERS * g->total_sigma) {
         return;
     }
+    bst_wander_set(g->wander, g->streak, g->total_sigma);
+    if (g->wander->steps == 0) {
+        return;
+    }
     double across = bst_obsgen_between(bst_obsgen_snrs, cal->across_factor, BST_OBSGEN_SNRS, snr) *
                     sqrt(bound.var_across_px2 * out->widen);
     double gain =
         bst_obsgen_between(bst_obsgen_lengths_px, cal->gain, BST_OBSGEN_LENGTHS, s->length);
     double own = s->amplitude / gain;
     /* the bound's deviation over that of these filters' top where nothing wanders */
-    double noise = along * own * sqrt(g->wander.curvature);
+    double noise = along * own * sqrt(g->wander->curvature);
     noise = fmin(fmax(noise, LEAST_NOISE), MOST_NOISE);
     double turned = across * own / (g->total_sigma * sqrt(2.0)) / noise;
     turned = fmin(fmax(turned, LEAST_NOISE), MOST_NOISE);
@@ -178,7 +182,7 @@ static void wander(const bst_generator *g, const generator_source *s,
     bst_philox_words words = bst_rng_words(g->key, (uint64_t)g->exposure_id, WANDER | s->name);
     const bst_rng_key key = {{words.w[0], words.w[1]}};
     double threshold = g->threshold - beside;
-    bst_wander_top top = bst_wander_draw(&g->wander, key, sources, used, noise, threshold);
+    bst_wander_top top = bst_wander_draw(g->wander, key, sources, used, noise, threshold);
     if (!(top.snr > threshold)) {
         return; /* so faint that it is seen for another reason */
     }

@@ -62,9 +62,10 @@ struct bst_generator {
     double *path_x, *path_y, *object_x, *object_y;
     int path_room;
     double streak; /* 0: not filtered for */
-    bst_wander wander;
+    bst_wander *wander; /* for `streak`, once it was asked for */
     bool smeared;
     double background_e, noise_e, threshold, streak_share;
+    double dark_noise_e; /* the noise without the light that is part of it */
     double faint_light_e, faint_square_e2, background_bias_e; /* bias: what is too much of it */
     struct generator_thresholds {
         int width, height;

@@ -11,16 +11,18 @@ enum {
 };
 /* Looked at beyond the streak's ends, sigmas. */
 static const double BEYOND = 2.0;
+/* Distance of the rows, sigmas. */
+static const double APART = 0.7;
 
 static double below(double z) {
     return 0.5 * erfc(-z * 0.70710678118654752);
 }
 
-/* What makes of white rows those whose outputs are one sigma apart (Cholesky). */
+/* What makes of white rows those of the output (Cholesky). */
 static void set_mix(bst_wander *w) {
     for (int i = 0; i < ROWS; i++) {
         for (int k = 0; k <= i; k++) {
-            double sum = exp(-0.25 * (i - k) * (i - k));
+            double sum = exp(-0.25 * APART * APART * (i - k) * (i - k));
             for (int m = 0; m < k; m++) {
                 sum -= w->mix[i][m] * w->mix[k][m];
             }
@@ -80,7 +82,7 @@ static void add_light(const bst_wander *w, const bst_wander_source *sources, int
     for (int k = 0; k < count; k++) {
         double across[ROWS];
         for (int r = 0; r < ROWS; r++) {
-            double v = ((r - ROWS / 2) * w->sigma - sources[k].across_px) / s;
+            double v = ((r - ROWS / 2) * APART * w->sigma - sources[k].across_px) / s;
             across[r] = sources[k].snr * exp(-0.5 * v * v);
         }
         for (int i = 0; i <= 2 * w->side; i++) {
@@ -172,7 +174,7 @@ static bst_wander_top find_top(const bst_wander *w, const rows *out) {
         across = vertex(log(o[row - 1][column]), log(o[row][column]), log(o[row + 1][column]));
     }
     top.along_px = (column - w->side + along) * w->step;
-    top.across_px = (row - ROWS / 2 + across) * w->sigma;
+    top.across_px = (row - ROWS / 2 + across) * APART * w->sigma;
     return top;
 }
 

@@ -8,10 +8,10 @@
 #include "obsgen/matched.h"
 #include "sim/core/rng.h"
 
-/* Rows across the streak that are looked at, one sigma apart; most steps along it, with what the
+/* Rows across the streak that are looked at, 0.7 sigma apart; most steps along it, with what the
  * filters need beyond; taps of a point's image on either side of its middle. */
 enum {
-    BST_WANDER_ROWS = 5,
+    BST_WANDER_ROWS = 7,
     BST_WANDER_STEPS = 640,
     BST_WANDER_TAPS = 12,
     BST_WANDER_SOURCES = 25

@@ -82,8 +82,8 @@ static double length_of(const bst_truth_item *t) {
     return isfinite(length) ? length : 0.0;
 }
 
-/* Path of the stars in the middle of the frame: of the star that is nearest to it; false where there
- * is none. */
+/* Path of the stars in the middle of the frame: of the star that is nearest to it; false where
+ * there is none. */
 static bool star_path(const bst_truth *truth, double x, double y, double *dx, double *dy) {
     double nearest = INFINITY;
     *dx = *dy = 0.0;

@@ -26,7 +26,7 @@ typedef struct calibrate_mean {
 struct bst_calibrator {
     bst_calibrated_path path;
     bst_generator *theory, *blended[CALIBRATE_BLENDS];
-    bst_detections *made;                                  /* of one of them */
+    bst_detections *made; /* of one of them */
     long beside[CALIBRATE_BLENDS +
                 1]; /* sources beside a brighter one that were found: in images, by each */
     double sigma_px;
