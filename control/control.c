@@ -19,7 +19,8 @@ static bst_status guidance_range(void *user, bst_ctx *ctx, int64_t tick, double 
 }
 
 static bool on_image_error(const bst_control *c) {
-    return c->config.compensate_attitude && c->config.compensator.type != BST_CONTROL_OBSERVER;
+    return c->config.compensate_attitude &&
+           (c->config.compensator.plug.desc || c->config.compensator.type != BST_CONTROL_OBSERVER);
 }
 
 static bst_status start_image_loop(bst_ctx *ctx, bst_control *c) {

@@ -9,6 +9,11 @@ import sys
 SKIPPED = {"description", "$schema"}
 
 
+def own(node):
+    """The object's own keys, where a plug-in may take its place."""
+    return node.get("else", node)
+
+
 def kind_of(node):
     if not {"const", "enum", "type", "properties", "pattern"} & set(node):
         return "any"
@@ -69,6 +74,11 @@ def table(node):
     for key, child in node.get("properties", {}).items():
         if key in SKIPPED and child.get("type") == "string" and len(child) == 1:
             continue
+        if "then" in child:
+            below.append((key, "", child))
+            rows.append(f"| `{key}` | object, or a [plug-in](plugins.md) |  |  |  | "
+                        f"{cell(child.get('description', ''))} |")
+            continue
         doc, unit = split_unit(child.get("description", ""))
         default = f"`{json.dumps(child['default'])}`" if "default" in child else ""
         if key in required:
@@ -84,6 +94,8 @@ def table(node):
 
 def write_modules(role, choices, path):
     for choice in choices:
+        if choice.get("title"):
+            continue  # what any plug-in may say
         kind = choice["properties"]["type"]
         delays = choice["properties"]["delay_s"]["properties"]
         name = kind.get("const") or kind["enum"][0]
@@ -94,7 +106,10 @@ def write_modules(role, choices, path):
 
 
 def write(node, path, level):
-    rows, below = table(node)
+    rows, below = table(own(node))
+    if "then" in node:
+        properties = node["then"]["properties"]
+        rows.append(f"| `plugin` | string |  |  |  | {cell(properties['plugin']['description'])} |")
     modules = [b for b in below if b[0] == "modules"]
     print("| key | type | unit | allowed | default | meaning |\n|---|---|---|---|---|---|")
     print("\n".join(rows) + "\n")

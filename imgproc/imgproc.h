@@ -9,6 +9,7 @@
 #include "imgproc/stack.h"
 #include "sim/core/messages.h"
 #include "sim/core/module.h"
+#include "sim/core/stage.h"
 #include "sim/world/camera.h"
 #include "sim/world/motion.h"
 #include "sim/world/photometry.h"
@@ -33,6 +34,7 @@ typedef struct bst_imgproc_config {
     bst_config_list bad_pixels; /* of bst_bad_pixel */
     /* FITS images of the maps; "": none. bst_imgproc_create leaves them to the caller. */
     char dark_file[512], flat_file[512], bad_pixel_file[512];
+    bst_stage_use detector; /* a plug-in's in place of bst_imgproc_detect; left to the caller too */
 } bst_imgproc_config;
 
 extern const bst_config_desc bst_imgproc_config_table[];

@@ -5,76 +5,12 @@
 #include "imgproc/calibration.h"
 #include "imgproc/discriminate.h"
 #include "imgproc/imgproc.h"
+#include "imgproc/plugged.h"
 #include "imgproc/sky.h"
 #include "imgproc/windows.h"
 #include "imgproc/wings.h"
 #include "sim/world/knowledge.h"
 #include "sim/world/photometry.h"
-
-static const bst_config_desc bad_pixel_table[] = {
-    BST_INT(bst_bad_pixel, x, "px", 0, 32767, NULL, "Column, 0 the first."),
-    BST_INT(bst_bad_pixel, y, "px", 0, 32767, NULL, "Row, 0 the first."),
-    BST_CONFIG_END,
-};
-
-const bst_config_desc bst_imgproc_config_table[] = {
-    BST_INT(bst_imgproc_config, capacity, "", 1, 65536, "2048",
-            "Detections kept per frame, the brightest first."),
-    BST_INT(
-        bst_imgproc_config, most_fits, "", 0, 65536, "2048",
-        "Detections per frame that are located by maximum likelihood, the brightest first, beside "
-        "those that are taken for objects; the others stand at the matched filter's greatest "
-        "output. 0: all."),
-    BST_INT(bst_imgproc_config, mesh_px, "px", 8, 1024, "64",
-            "Side of the meshes in which background and noise are estimated."),
-    BST_REAL(bst_imgproc_config, false_alarms_per_frame, "", 1e-6, 1e4, "1",
-             "Detections per frame that noise alone may cause, on average."),
-    BST_REAL(bst_imgproc_config, jitter_px, "px", 0, 5, "0",
-             "RMS per axis of the line-of-sight jitter that widens the onboard PSF."),
-    BST_REAL(bst_imgproc_config, streak_min_px, "px", 0.5, 100, "1.5",
-             "Star streaks shorter than this are taken for points."),
-    BST_REAL(bst_imgproc_config, streak_max_px, "px", 1, 128, "64",
-             "Star streaks longer than this are not filtered for."),
-    BST_REAL(bst_imgproc_config, streak_search_px, "px", 0, 128, "0",
-             "Greatest length of streaks of unknown rate and direction that are searched for in "
-             "frames in which stars are points; 0: no search."),
-    BST_REAL(bst_imgproc_config, search_radius_px, "px", 2, 500, "60",
-             "Greatest pointing error over which stars are identified."),
-    BST_REAL(bst_imgproc_config, match_tolerance_px, "px", 0.5, 20, "3",
-             "Greatest distance of one star from its place after the common shift."),
-    BST_BOOL(
-        bst_imgproc_config, track_windows, "false",
-        "Look only at windows round the predicted places of tracks and of bright stars while a "
-        "target of interest is followed."),
-    BST_INT(bst_imgproc_config, window_px, "px", 24, 4096, "48",
-            "track_windows: side of a window; ten sigma of the prediction and the length of a "
-            "star's streak come on top."),
-    BST_INT(bst_imgproc_config, window_stars, "", 3, 64, "16",
-            "track_windows: bright stars that are looked at, for the attitude."),
-    BST_INT(bst_imgproc_config, full_every, "", 1, 1000000, "60",
-            "track_windows: of so many frames ..."),
-    BST_INT(
-        bst_imgproc_config, full_frames, "", 0, 1000000, "6",
-        "... the first so many are looked at as a whole, for all that no track predicts: enough "
-        "in a row to confirm a track."),
-    BST_OBJECT(bst_imgproc_config, stack, bst_stack_config_table, "{}",
-               "Search for objects too faint for one frame in stacks of frames."),
-    BST_INT(
-        bst_imgproc_config, threads, "", 0, 32, "0",
-        "Threads that share the passes over a frame and the fits; 0: one per processor. Results do "
-        "not depend on it."),
-    BST_LIST(bst_imgproc_config, bad_pixels, bst_bad_pixel, bad_pixel_table, 0, 1000000, "[]",
-             "Sensor pixels to leave out."),
-    BST_PATH(
-        bst_imgproc_config, dark_file, "\"\"",
-        "FITS image of the sensor's size: each pixel's dark signal less the mean, e-/s; empty: "
-        "uniform."),
-    BST_PATH(bst_imgproc_config, flat_file, "\"\"",
-             "FITS image of the sensor's size: each pixel's relative response; empty: uniform."),
-    BST_PATH(bst_imgproc_config, bad_pixel_file, "\"\"",
-             "FITS image of the sensor's size: what is not zero is left out; empty: none."),
-    BST_CONFIG_END,
-};
 
 enum { PORT_FRAME, PORT_PREDICTIONS, PORT_POINTING, PORT_NAV, PORT_DETECTIONS, PORT_COUNT };
 
@@ -115,7 +51,8 @@ typedef struct imgproc_module {
     bst_windows windows; /* of the present frame; none: all of it */
     bst_stack *stack;    /* NULL: no stacks */
     bst_photometer photometer;
-    bst_wings *wings; /* NULL: the PSF has none */
+    bst_wings *wings;     /* NULL: the PSF has none */
+    bst_plugged *plugged; /* NULL: detection is this module's own */
 } imgproc_module;
 
 static void destroy(void *self) {
@@ -134,13 +71,30 @@ static void destroy(void *self) {
     bst_stack_free(m->stack);
     bst_photometer_free(&m->photometer);
     bst_wings_free(m->wings);
+    bst_plugged_free(m->plugged);
     free(m);
 }
 
 static bst_status open_lane(bst_ctx *ctx, imgproc_module *m, lane *l) {
-    return l->ip ? BST_OK
-                 : bst_imgproc_create(ctx, &m->camera, bst_camera_electrons_per_s(&m->camera, 0.0),
-                                      m->config, &m->maps, &l->ip);
+    return l->ip || m->plugged
+               ? BST_OK
+               : bst_imgproc_create(ctx, &m->camera, bst_camera_electrons_per_s(&m->camera, 0.0),
+                                    m->config, &m->maps, &l->ip);
+}
+
+static bst_status open_plugged(const bst_module_env *env, imgproc_module *m) {
+    if (!m->config->detector.desc) {
+        return BST_OK;
+    }
+    if (m->config->stack.frames > 0 || m->config->track_windows) {
+        return bst_fail(
+            env->ctx, BST_ERR_CONFIG,
+            "/observers/%d/sensors/%d/modules/imgproc/detector: a plug-in looks at whole "
+            "frames by itself; turn track_windows and stack off",
+            env->observer, env->sensor);
+    }
+    return bst_plugged_create(env->ctx, &m->config->detector, &m->camera, &m->maps,
+                              (int)m->config->capacity, &m->plugged);
 }
 
 static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
@@ -153,6 +107,7 @@ static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
                                "/observers/%d/sensors/%d/knowledge/camera/psf_file", env->observer,
                                env->sensor);
     }
+    BST_TRY(open_plugged(env, m));
     BST_TRY(open_lane(env->ctx, m, &m->lanes[0]));
     BST_TRY(bst_sky_create(env->ctx, &m->camera, bst_knowledge_stars(env->knowledge),
                            bst_knowledge_julian_year(env->knowledge), CATALOGUE_CAPACITY, &m->sky));
@@ -300,7 +255,9 @@ static bst_status identify(imgproc_module *m, const lane *l, bst_ctx *ctx,
                            const bst_nav_telemetry *nav, bst_window window, bool locked,
                            bst_detections *out, bst_quat *q_cam_from_gcrf) {
     bst_light light = {nav->velocity_bary_mps, nav->sun_m};
-    double v_limit = bst_imgproc_v_limit(l->ip, SNR_SHARE_EXPECTED * out->threshold_snr);
+    double snr = SNR_SHARE_EXPECTED * out->threshold_snr;
+    double v_limit =
+        m->plugged ? bst_plugged_v_limit(m->plugged, snr) : bst_imgproc_v_limit(l->ip, snr);
     int expected = 0;
     BST_TRY(bst_sky_expect(ctx, &m->sky, out->q_cam_from_gcrf, &light, window,
                            m->config->search_radius_px, v_limit, &expected));
@@ -388,7 +345,8 @@ static bst_status label_wings(imgproc_module *m, bst_ctx *ctx, const lane *l,
             bst_wings_add(m->wings, d->x_px, d->y_px, d->flux_e);
         }
     }
-    bst_wings_label(m->wings, ground_at, l->ip, message->binning, out);
+    bst_wings_label(m->wings, m->plugged ? bst_plugged_ground : ground_at,
+                    m->plugged ? (const void *)m->plugged : l->ip, message->binning, out);
     return BST_OK;
 }
 
@@ -414,7 +372,9 @@ static bst_status detect(bst_ctx *ctx, const imgproc_module *m, const lane *l,
         .bits = message->bits,
         .exposure_s = (double)(message->end_tick - message->start_tick) / (double)m->tick_rate_hz,
         .beside_another = beside_another};
-    bst_status status = m->windows.count > 0
+    bst_status status = m->plugged ? bst_plugged_detect(ctx, m->plugged, &frame,
+                                                        message->exposure_id, motion, out, capacity)
+                        : m->windows.count > 0
                             ? bst_imgproc_detect_windows(ctx, l->ip, &frame, m->windows.items,
                                                          m->windows.count, motion, out, capacity)
                             : bst_imgproc_detect(ctx, l->ip, &frame, motion, out, capacity);
@@ -429,7 +389,7 @@ static bst_status ahead(void *self, struct bst_step *step) {
     l->ready = false;
     bst_sample sample = bst_step_next(step, PORT_FRAME);
     /* where the windows are is known in the step */
-    if (!sample.payload || m->config->track_windows) {
+    if (!sample.payload || m->config->track_windows || m->plugged) { /* frame by frame */
         return BST_OK;
     }
     BST_TRY(open_lane(ctx, m, l));
@@ -517,12 +477,13 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
         out->windows = m->windows.count;
     }
     BST_TRY(detections_of(ctx, m, l, message, oriented ? &motion : NULL, out, capacity));
-    bool smeared = bst_imgproc_smeared(l->ip);
+    bool smeared = !m->plugged && bst_imgproc_smeared(l->ip);
     bst_photometer_begin(&m->photometer);
-    bst_frame_knowledge known = {.q_cam_from_gcrf = out->q_cam_from_gcrf,
-                                 .window = message->window,
-                                 .streak_px = bst_imgproc_streak_px(l->ip),
-                                 .predictions = predictions};
+    bst_frame_knowledge known = {
+        .q_cam_from_gcrf = out->q_cam_from_gcrf,
+        .window = message->window,
+        .streak_px = m->plugged ? bst_plugged_streak_px(m->plugged) : bst_imgproc_streak_px(l->ip),
+        .predictions = predictions};
     if (oriented && nav.payload && !nav.stale && !smeared) {
         const bst_nav_telemetry *n = nav.payload;
         BST_TRY(identify(m, l, ctx, n, message->window, locked, out, &known.q_cam_from_gcrf));
@@ -539,7 +500,7 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
     }
     if (!smeared) {
         bst_discriminator_label(m->discriminator, &known, out);
-        for (int i = 0; i < out->count; i++) {
+        for (int i = 0; i < out->count && !m->plugged; i++) {
             if (out->items[i].label == BST_LABEL_OBJECT) {
                 bst_imgproc_refine(l->ip, out, i, &zero_point);
             }

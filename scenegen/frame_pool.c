@@ -71,6 +71,14 @@ static bst_status map(void *owner, bst_ctx *ctx, const uint16_t **pixels) {
     return bst_device_check(ctx, code, "rendering a frame");
 }
 
+bst_status bst_frame_pool_pixels(bst_ctx *ctx, bst_frame *frame, uint16_t **out) {
+    pooled_frame *f = frame->owner;
+    const uint16_t *pixels;
+    BST_TRY(map(f, ctx, &pixels));
+    *out = f->mapped;
+    return BST_OK;
+}
+
 /* The mapping stays for the next reader. */
 static void unmap(void *owner) {
     (void)owner;

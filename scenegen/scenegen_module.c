@@ -4,11 +4,13 @@
 #include <string.h>
 
 #include "scenegen/detector.h"
+#include "scenegen/frame_pool.h"
 #include "scenegen/module.h"
 #include "scenegen/planes.h"
 #include "scenegen/renderer.h"
 #include "sim/world/frame_updates.h"
 #include "sim/world/psf.h"
+#include "sim/world/stages.h"
 #include "sim/world/truth_list.h"
 
 typedef struct fidelity_config {
@@ -21,7 +23,20 @@ typedef struct scenegen_config {
     double v_limit, margin_px;
     fidelity_config fidelity;
     int64_t truth_capacity, pool_frames;
+    bst_stage_use frame_stage;
 } scenegen_config;
+
+static const char *const stage_kinds[] = {BST_STAGE_FRAME, NULL};
+
+static const bst_config_desc stage_table[] = {
+    {.key = "plugin",
+     .type = BST_CONFIG_STAGE,
+     .unit = "",
+     .doc = "A shared library with a frame stage, relative to the folder of the file that says so; "
+            "the other keys are then that one's. Left out: none.",
+     .size = sizeof(bst_stage_use),
+     .choices = stage_kinds},
+    BST_CONFIG_END};
 
 static const bst_config_desc fidelity_table[] = {
     BST_REAL(fidelity_config, tolerance_sigma, "sigma", 1e-4, 1.0, "0.05",
@@ -63,6 +78,8 @@ static const bst_config_desc config[] = {
         "Sources that the truth of one exposure has room for: objects, then the brightest stars."),
     BST_INT(scenegen_config, pool_frames, "", 2, 256, "8",
             "Frames that may be alive at a time: in queues, being rendered, being read."),
+    BST_OBJECT(scenegen_config, frame_stage, stage_table, "{}",
+               "A stage of one's own that changes rendered frames before anyone sees them."),
     BST_CONFIG_END,
 };
 
@@ -93,11 +110,16 @@ typedef struct scenegen {
     long long saturated_told, saturated_before; /* frames; those of earlier renderers */
     bst_plane_maker *planes;                    /* NULL: not asked for */
     int *item_source; /* source of each item of the truth, for the planes */
+    const bst_stage_use *stage_use;
+    void *stage; /* NULL: none */
 } scenegen;
 
 static void destroy(void *self) {
     scenegen *s = self;
     if (s) {
+        if (s->stage) {
+            ((const bst_frame_stage *)s->stage_use->desc->functions)->destroy(s->stage);
+        }
         bst_renderer_free(s->renderer);
         bst_field_free(s->field);
         bst_plane_maker_free(s->planes);
@@ -106,6 +128,41 @@ static void destroy(void *self) {
         bst_truth_list_free(&s->list);
         free(s);
     }
+}
+
+static bst_status open_stage(const bst_module_env *env, const bst_stage_use *use, scenegen *s) {
+    const bst_frame_stage *functions = use->desc ? use->desc->functions : NULL;
+    s->stage_use = use;
+    if (!functions) {
+        return BST_OK;
+    }
+    if (!functions->create || !functions->apply || !functions->destroy) {
+        return bst_fail(env->ctx, BST_ERR_CONFIG,
+                        "plug-in %s: its frame stage \"%s\" lacks one of create, apply and destroy",
+                        use->plugin, use->desc->type);
+    }
+    const bst_frame_stage_env given = {
+        .camera = s->world_camera, .instance = env->instance, .seed = env->seed, .run = env->run};
+    bst_status status = functions->create(env->ctx, use->config, &given, &s->stage);
+    return status == BST_OK ? BST_OK : bst_fail_prefix(env->ctx, status, "plug-in %s", use->plugin);
+}
+
+static bst_status change_frame(bst_ctx *ctx, const scenegen *s, const bst_frame_message *message) {
+    const bst_frame_stage *functions = s->stage_use->desc->functions;
+    const bst_frame_stage_frame given = {
+        .exposure_id = message->exposure_id,
+        .start_s = (double)message->start_tick / (double)s->tick_rate_hz,
+        .end_s = (double)message->end_tick / (double)s->tick_rate_hz,
+        .window = message->window,
+        .width = message->frame->width,
+        .height = message->frame->height,
+        .binning = message->binning,
+        .bits = message->bits};
+    uint16_t *pixels;
+    BST_TRY(bst_frame_pool_pixels(ctx, message->frame, &pixels));
+    bst_status status = functions->apply(s->stage, ctx, &given, pixels);
+    return status == BST_OK ? BST_OK
+                            : bst_fail_prefix(ctx, status, "plug-in %s", s->stage_use->plugin);
 }
 
 /* The patterns of this sensor: its name is the instance's without the module's. */
@@ -147,6 +204,9 @@ static bst_status create(const bst_module_env *env, const void *config_object, v
         bst_renderer_create(env->ctx, env->device, s->camera, &options, &s->renderer);
     if (status == BST_OK) {
         status = bst_field_create(env->ctx, env->world, env->observer, env->sensor, &s->field);
+    }
+    if (status == BST_OK) {
+        status = open_stage(env, &c->frame_stage, s);
     }
     if (status == BST_OK && env->planes) {
         status = bst_plane_maker_create(env->ctx, env->planes, (int)s->camera->width_px,
@@ -272,6 +332,9 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
                                        .window = e->window,
                                        .binning = e->binning > 1 ? e->binning : 1,
                                        .bits = (int)s->camera->bits};
+        if (s->stage) {
+            BST_TRY(change_frame(ctx, s, message));
+        }
     }
     bst_render_stats stats;
     bst_renderer_get_stats(s->renderer, &stats);

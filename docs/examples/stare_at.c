@@ -1,4 +1,11 @@
-/* A controller that keeps the boresight on one catalogue direction: the example of the guide. */
+/* A controller that keeps the boresight on one catalogue direction: a whole module of one's own.
+ *
+ *   cc -shared -fPIC stare_at.c $(pkg-config --cflags --libs boresight) -o stare_at.so
+ *
+ * and in a scenario, beside it:
+ *
+ *   "control": {"plugin": "stare_at.so", "ra_deg": 252.36, "dec_deg": -8.82}
+ */
 #include <stdlib.h>
 
 #include "sim/astro/bodies.h"
@@ -65,9 +72,8 @@ static void destroy(void *self) {
     free(self);
 }
 
-/* 4. The descriptor, which registry.c lists. */
-extern const bst_module_desc bst_control_stare_at_module;
-const bst_module_desc bst_control_stare_at_module = {
+/* 4. The descriptor. */
+static const bst_module_desc stare_at_module = {
     .abi = BST_MODULE_ABI,
     .role = "control",
     .type = "stare_at",
@@ -81,3 +87,7 @@ const bst_module_desc bst_control_stare_at_module = {
     .step = step,
     .destroy = destroy,
 };
+
+/* 5. What the program looks for in a plug-in. */
+extern const bst_module_desc *const bst_plugin_modules[];
+const bst_module_desc *const bst_plugin_modules[] = {&stare_at_module, NULL};

@@ -99,6 +99,9 @@ static void add_identity(bst_run_reader *run, cJSON *out) {
     copy(out, "seed", manifest ? manifest : scenario, "seed");
     copy(out, "run", manifest ? manifest : scenario, "run");
     copy(out, "device", manifest, "device");
+    if (get(manifest, "plugins")) {
+        copy(out, "plugins", manifest, "plugins");
+    }
     copy(out, "star_catalogue", manifest, "star_catalogue");
     copy(out, "stars", manifest, "stars");
     copy(out, "wall_time_s", manifest, "wall_time_s");
@@ -324,6 +327,12 @@ static void print_identity(const cJSON *info) {
     snprintf(text, sizeof text, "%s, run %.0f", text_of(info, "seed", "?"), number_of(info, "run"));
     line("seed", text);
     line("device", text_of(info, "device", ""));
+    const cJSON *plugin;
+    cJSON_ArrayForEach(plugin, get(info, "plugins")) {
+        snprintf(text, sizeof text, "%s of %s, SHA-256 %s", text_of(plugin, "type", "?"),
+                 text_of(plugin, "file", "?"), text_of(plugin, "sha256", "?"));
+        line("plug-in", text);
+    }
     snprintf(text, sizeof text, "%s to %s (%.3f s)", text_of(info, "start_utc", "?"),
              text_of(info, "end_utc", "?"), number_of(info, "simulated_s"));
     line("span", text);

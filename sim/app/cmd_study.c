@@ -15,6 +15,7 @@
 #include "sim/app/cmd_study.h"
 #include "sim/app/options.h"
 #include "sim/app/stop_signals.h"
+#include "sim/app/study_plugins.h"
 #include "sim/core/folder.h"
 #include "sim/core/wall_clock.h"
 #include "sim/io/manifest.h"
@@ -243,6 +244,9 @@ static int run_study(bst_ctx *ctx, const study_request *r, const bst_study *stud
     }
     bst_status status = open_folder(ctx, study, out, r->resume, false, &lock);
     if (status == BST_OK) {
+        status = bst_study_plugins_settle(ctx, kind->user, out);
+    }
+    if (status == BST_OK) {
         status = execute(ctx, r, study, kind, out, lock, &results, &outcome);
     }
     if (status == BST_OK && outcome.missing == 0) {
@@ -424,7 +428,10 @@ static int command(bst_ctx *ctx, const study_request *r, const char *given) {
         fprintf(stderr, "boresight: %s\n", ctx->message);
         return BST_EXIT_FAILED;
     }
-    const bst_study_kind *kind = bst_app_study_kind(study.config.kind);
+    bst_study_plugins plugins = {.count = 0};
+    bst_study_kind with_plugins = *bst_app_study_kind(study.config.kind);
+    const bst_study_kind *kind = &with_plugins;
+    with_plugins.user = &plugins;
     snprintf(out, sizeof out, "%s%.4000s", r->out || folder ? "" : "studies/",
              r->out   ? r->out
              : folder ? given
@@ -437,6 +444,8 @@ static int command(bst_ctx *ctx, const study_request *r, const char *given) {
         snprintf(file, sizeof file, "%.4000s/study.json", out);
         bool checked = r->shard && access(file, F_OK) == 0; /* by who made the folder */
         status = checked ? BST_OK : bst_study_check(ctx, &study, kind);
+        study.notes = plugins.notes;
+        study.note_count = plugins.count;
         if (status == BST_OK) {
             if (r->dry_run) {
                 bst_study_print_plan(&study, kind,
@@ -451,6 +460,7 @@ static int command(bst_ctx *ctx, const study_request *r, const char *given) {
         fprintf(stderr, "boresight: %s\n", ctx->message);
         code = status == BST_ERR_INTERRUPTED ? BST_EXIT_INTERRUPTED : BST_EXIT_FAILED;
     }
+    bst_study_plugins_free(&plugins);
     bst_study_close(&study);
     return code;
 }

@@ -25,7 +25,8 @@ typedef struct bst_study_warm {
 void bst_study_print_plan(const bst_study *study, const bst_study_kind *kind, int workers,
                           const char *out);
 
-/* As `check` of bst_study_kind, of the scenario. */
+/* As `check` of bst_study_kind, of the scenario. `user`: a bst_study_plugins that takes what the
+ * scenario uses, or NULL. */
 bst_status bst_study_check_scenario(bst_ctx *ctx, void *user, const bst_study_run *run, bool deep);
 bst_status bst_study_warm_open(bst_ctx *ctx, void *user, int threads, void **worker);
 void bst_study_warm_close(void *worker);

@@ -14,6 +14,7 @@
 #include "sim/app/stop_signals.h"
 #include "sim/app/study_card.h"
 #include "sim/app/study_labels.h"
+#include "sim/app/study_plugins.h"
 #include "sim/core/folder.h"
 #include "sim/core/rng.h"
 #include "sim/core/version.h"
@@ -364,7 +365,7 @@ static bst_status run_cubes(bst_ctx *ctx, void *worker, const bst_study_run *run
     cube c = {.config = &config, .scenario = &scenario, .ctx = ctx};
     int observer = 0, sensor = -1;
     BST_TRY(read_settings(ctx, run, &config));
-    bst_status status = bst_plugins_scenario_read(ctx, run->scenario, &scenario);
+    bst_status status = bst_study_read_scenario(ctx, run, &scenario);
     if (status == BST_OK) {
         sensor = find_sensor(&scenario, config.sensor, &observer, c.scope);
         status = sensor >= 0 ? bst_study_simulation(ctx, worker, &scenario, &sim)

@@ -7,6 +7,7 @@
 #include "sim/app/cmd_study.h"
 #include "sim/app/pd.h"
 #include "sim/app/plugins.h"
+#include "sim/app/study_plugins.h"
 #include "sim/eval/detection_theory.h"
 
 enum {
@@ -218,7 +219,7 @@ static bst_status run_pd(bst_ctx *ctx, void *worker, const bst_study_run *run,
     bst_study_pd_config config;
     bst_scenario scenario;
     BST_TRY(read_settings(ctx, run, &config));
-    bst_status status = bst_plugins_scenario_read(ctx, run->scenario, &scenario);
+    bst_status status = bst_study_read_scenario(ctx, run, &scenario);
     if (status == BST_OK) {
         status = bst_study_warm_device(ctx, warm);
     }

@@ -329,7 +329,7 @@ static bst_status export_orbits(bst_ctx *ctx, const bst_export *e, bool believed
     bst_scenario scenario;
     BST_TRY(bst_run_reader_file(ctx, e->run, "scenario.json", path, sizeof path));
     BST_TRY(bst_json_load(ctx, path, &json));
-    bst_status status = bst_plugins_scenario_read(ctx, json, &scenario);
+    bst_status status = bst_plugins_recorded_read(ctx, json, &scenario);
     if (status == BST_OK) {
         status = orbits_of(ctx, e, &scenario, believed);
     }

@@ -421,7 +421,7 @@ bst_status bst_export_satnet(bst_ctx *ctx, const bst_export *e) {
     BST_TRY(make_folders(ctx, e->satnet));
     BST_TRY(bst_run_reader_file(ctx, e->run, "scenario.json", path, sizeof path));
     BST_TRY(bst_json_load(ctx, path, &json));
-    bst_status status = bst_plugins_scenario_read(ctx, json, &scenario);
+    bst_status status = bst_plugins_recorded_read(ctx, json, &scenario);
     if (status == BST_OK) {
         j.mask = scenario.record.planes & UINT32_C(1) << BST_PLANE_SEGMENTATION;
         status = e->split ? export_with_parts(ctx, &j) : export_all(ctx, &j);

@@ -139,7 +139,7 @@ static void observer_gains(const bst_control_config *control, const bst_loop_opt
 
 static bst_status control_gains(bst_ctx *ctx, const bst_control_config *control,
                                 const bst_loop_options *options, bst_loop_model *model) {
-    if (control->compensator.type == BST_CONTROL_OBSERVER) {
+    if (control->compensator.type == BST_CONTROL_OBSERVER && !control->compensator.plug.desc) {
         observer_gains(control, options, model);
         model->observes = true;
         return BST_OK;
@@ -271,8 +271,9 @@ bst_status bst_loop_model_create(bst_ctx *ctx, const bst_scenario *scenario, int
     bst_loop_timing_of(scenario, observer, sensor, &model->timing);
     bst_status status = BST_OK;
     const bst_control_config *law = control ? control->config : NULL;
-    if (law && law->compensate_attitude) {
-        model->compensator = bst_control_compensators[law->compensator.type];
+    if (law && law->compensate_attitude && bst_compensator_is_linear(&law->compensator)) {
+        const bst_stage_desc *plug = law->compensator.plug.desc;
+        model->compensator = plug ? plug->type : bst_control_compensators[law->compensator.type];
         model->command_latency_s = law->command_latency_s;
         status = control_gains(ctx, law, options, model);
     }

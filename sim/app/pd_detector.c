@@ -195,7 +195,8 @@ static bst_status open_function(bst_ctx *ctx, bst_pd_scene *s, bst_pd_detector *
 
 bst_status bst_pd_detector_open(bst_ctx *ctx, bst_pd_scene *s, bst_pd_detector **out) {
     *out = NULL;
-    bool by_function = s->imgproc->desc == &bst_imgproc_module && !s->options.by_module;
+    bool by_function = s->imgproc->desc == &bst_imgproc_module && !s->options.by_module &&
+                       !((const bst_imgproc_config *)s->imgproc->config)->detector.desc;
     if (!by_function && s->options.false_alarms > 0.0) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "--false-alarms sets the detector that comes with Boresight, driven by its "

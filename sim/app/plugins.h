@@ -1,4 +1,5 @@
-/* Modules from shared libraries of the user's own, beside those that come with Boresight. */
+/* Modules from shared libraries that the command line names (sim/engine/plugin.h), beside those
+ * that come with Boresight and those that a scenario names by itself. */
 #ifndef BST_APP_PLUGINS_H
 #define BST_APP_PLUGINS_H
 
@@ -7,11 +8,6 @@
 /* Environment variable: paths of shared libraries, ':' between them. `boresight --plugin FILE` adds
  * to it, so that child processes have the same. */
 #define BST_PLUGINS_VARIABLE "BORESIGHT_PLUGINS"
-
-/* What such a library defines: a list of modules that NULL ends,
- *     const bst_module_desc *const bst_plugin_modules[] = {&my_module, NULL};
- */
-#define BST_PLUGIN_SYMBOL "bst_plugin_modules"
 
 /* Adds a library to the variable's list. BST_ERR_ARGUMENT for a path with ':' in it. */
 bst_status bst_plugins_add(bst_ctx *ctx, const char *path) BST_MUST_CHECK;
@@ -23,8 +19,21 @@ bst_status bst_plugins_add(bst_ctx *ctx, const char *path) BST_MUST_CHECK;
 bst_status bst_plugins_registry(bst_ctx *ctx, bst_registry *out) BST_MUST_CHECK;
 void bst_plugins_free(bst_registry *registry);
 
-/* bst_scenario_read with all these modules. */
+/* Adds the libraries that a scenario file names to the registry. */
+bst_status bst_plugins_of_scenario(bst_ctx *ctx, const char *path,
+                                   bst_registry *registry) BST_MUST_CHECK;
+
+/* bst_scenario_read with all these modules; plug-ins that it names are loaded. */
 bst_status bst_plugins_scenario_read(bst_ctx *ctx, const bst_json *json,
                                      bst_scenario *out) BST_MUST_CHECK;
+/* The same of a scenario that was recorded, for those who read the run and step no module: the
+ * plug-ins that it names are not loaded, and what names them is left out. */
+bst_status bst_plugins_recorded_read(bst_ctx *ctx, const bst_json *json,
+                                     bst_scenario *out) BST_MUST_CHECK;
+
+/* Adds "plugins" to an object, a list of the modules and stages of plug-ins that a scenario uses:
+ * where, type, file and its SHA-256; nothing when it uses none. */
+struct cJSON;
+void bst_plugins_tell(const bst_scenario *scenario, struct cJSON *to);
 
 #endif

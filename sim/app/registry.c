@@ -14,6 +14,7 @@ static const bst_module_desc *const modules[] = {
     &bst_gimbal_cross_elevation_module,
     &bst_gimbal_ideal_module,
     &bst_gimbal_scripted_module,
+    &bst_gimbal_external_module,
     &bst_scenegen_module,
     &bst_imgproc_module,
     &bst_tracker_module,
@@ -27,7 +28,8 @@ static const bst_module_desc *const modules[] = {
     &bst_tasking_priority_module,
 };
 
-static const bst_registry registry = {modules, sizeof modules / sizeof *modules};
+static const bst_registry registry = {.modules = modules,
+                                      .count = sizeof modules / sizeof *modules};
 
 const bst_registry *bst_app_registry(void) {
     return &registry;

@@ -21,7 +21,7 @@ bst_status bst_run_scene_open(bst_ctx *ctx, const bst_run_reader *run, bst_run_s
     *out = (bst_run_scene){.run = run};
     BST_TRY(bst_run_reader_file(ctx, run, "scenario.json", path, sizeof path));
     BST_TRY(bst_json_load(ctx, path, &out->json));
-    BST_TRY(bst_plugins_scenario_read(ctx, out->json, &out->scenario));
+    BST_TRY(bst_plugins_recorded_read(ctx, out->json, &out->scenario));
     /* directions need no stars */
     bst_world_config config = out->scenario.world;
     config.faint_stars = BST_FAINT_NONE;

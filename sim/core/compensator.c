@@ -6,6 +6,7 @@
 
 static const double two_pi = 2.0 * BST_PI;
 
+const char *const bst_compensator_kinds[] = {BST_STAGE_COMPENSATOR, NULL};
 const char *const bst_compensator_types[] = {"pi", "pid", "lead_lag", NULL};
 
 const bst_config_desc bst_notch_config_table[] = {
@@ -191,9 +192,30 @@ static bst_status build(bst_ctx *ctx, bst_compensator *c, const bst_compensator_
     return BST_OK;
 }
 
+static bst_status plug(bst_ctx *ctx, bst_compensator *c, const bst_stage_use *use, double dt_s) {
+    const bst_compensator_stage *stage = use->desc->functions;
+    if (stage->state_bytes > BST_COMPENSATOR_STATE_BYTES || !stage->init || !stage->step) {
+        return bst_fail(
+            ctx, BST_ERR_CONFIG,
+            "plug-in %s: its compensator \"%s\" lacks init or step, or its state of %zu "
+            "bytes is larger than %d",
+            use->plugin, use->desc->type, stage->state_bytes, BST_COMPENSATOR_STATE_BYTES);
+    }
+    *c = (bst_compensator){.dt_s = dt_s,
+                           .feed_forward = 1.0,
+                           .limit = INFINITY,
+                           .rate_limit = INFINITY,
+                           .plug = stage};
+    bst_status status = stage->init(ctx, use->config, dt_s, c->plug_state);
+    return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "plug-in %s", use->plugin);
+}
+
 bst_status bst_compensator_init(bst_ctx *ctx, bst_compensator *c,
                                 const bst_compensator_config *config, double dt_s,
                                 bst_response_fn plant, const void *user) {
+    if (config->plug.desc) {
+        return plug(ctx, c, &config->plug, dt_s);
+    }
     if (!(config->bandwidth_hz > 0.0 || config->crossover_hz > 0.0)) {
         return build(ctx, c, config, dt_s);
     }
@@ -234,7 +256,17 @@ static double delayed(bst_compensator *c, double output) {
     return c->past[newer] + c->delay_part * (c->past[older] - c->past[newer]);
 }
 
+static double step_plug(bst_compensator *c, double error, double feed_forward) {
+    double wanted = c->plug->step(c->plug_state, error) + c->feed_forward * feed_forward;
+    c->output = clamp(wanted, -c->limit, c->limit);
+    c->limited = c->output != wanted;
+    return c->output;
+}
+
 double bst_compensator_step(bst_compensator *c, double error, double feed_forward) {
+    if (c->plug) {
+        return step_plug(c, error, feed_forward);
+    }
     double x = error;
     int last = c->stages - 1;
     for (int i = 0; i < last; i++) {
@@ -260,6 +292,14 @@ static void rest(const bst_biquad *q, double state[2], double x, double y, doubl
 void bst_compensator_set(bst_compensator *c, double error, double feed_forward, double output) {
     double x = error, given = clamp(output, -c->limit, c->limit);
     int last = c->stages - 1;
+    if (c->plug) {
+        if (c->plug->set) {
+            c->plug->set(c->plug_state, error, given - c->feed_forward * feed_forward);
+        }
+        c->output = given;
+        c->limited = false;
+        return;
+    }
     for (int i = 0; i < last; i++) {
         const bst_biquad *q = &c->stage[i];
         double y = x * (q->b0 + q->b1 + q->b2) / (1.0 + q->a1 + q->a2);
@@ -279,6 +319,9 @@ void bst_compensator_set(bst_compensator *c, double error, double feed_forward, 
 
 double complex bst_compensator_response(const bst_compensator *c, double omega_radps) {
     double w = omega_radps * c->dt_s;
+    if (c->plug) {
+        return c->plug->response ? c->plug->response(c->plug_state, w) : NAN;
+    }
     double complex out =
         cexp(-I * w * c->delay_whole) * (1.0 - c->delay_part + c->delay_part * cexp(-I * w));
     for (int i = 0; i < c->stages; i++) {

@@ -7,7 +7,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "sim/core/config.h"
+#include "sim/core/stage.h"
 
 /* (b0 + b1 z^-1 + b2 z^-2) / (1 + a1 z^-1 + a2 z^-2) */
 typedef struct bst_biquad {
@@ -55,8 +55,38 @@ typedef struct bst_compensator_config {
     double feed_forward;
     double output_limit, output_rate_limit_per_s, anti_windup_s;
     double gain_scale, delay_s;
+    bst_stage_use plug; /* desc not NULL: a plug-in instead; the members above are defaults */
 } bst_compensator_config;
 
+#define BST_STAGE_COMPENSATOR "compensator"
+
+enum { BST_COMPENSATOR_STATE_BYTES = 4096 };
+
+/* The functions of a compensator of a user's own, one state for each axis. Limits, feed-forward and
+ * what else a "compensator" block sets are its own business. */
+typedef struct bst_compensator_stage {
+    size_t state_bytes; /* at most BST_COMPENSATOR_STATE_BYTES, of plain data: copies of it are
+                           independent compensators */
+    /* Fills the state of a compensator at rest, stepped every dt_s. */
+    bst_status (*init)(bst_ctx *ctx, const void *config, double dt_s, void *state);
+    /* The output for this sample's error. */
+    double (*step)(void *state, double error);
+    /* Bumpless transfer (bst_compensator_set); NULL: the state stays as it is. */
+    void (*set)(void *state, double error, double output);
+    /* Response from error to output at omega rad per sample, for margins and predicted pointing;
+     * NULL: it is not linear, and both are left out. */
+    double complex (*response)(const void *state, double omega_per_sample);
+} bst_compensator_stage;
+
+/* Whether margins can be worked out: gains, a specification, or a plug-in that says its response.
+ */
+static inline bool bst_compensator_is_linear(const bst_compensator_config *config) {
+    const bst_compensator_stage *stage =
+        config->plug.desc ? (const bst_compensator_stage *)config->plug.desc->functions : NULL;
+    return !stage || stage->response;
+}
+
+extern const char *const bst_compensator_kinds[]; /* BST_STAGE_COMPENSATOR, then NULL */
 extern const char *const bst_compensator_types[]; /* names of bst_compensator_type, then NULL */
 extern const bst_config_desc bst_notch_config_table[];
 extern const bst_config_desc bst_compensator_config_table[];
@@ -117,7 +147,10 @@ extern const bst_config_desc bst_compensator_config_table[];
                  "Factor on the output, after any design: for finding gain margins."),             \
         BST_REAL(bst_compensator_config, delay_s, "s", 0, 1e3, "0",                                \
                  "Delay of the output, on top of any design: for finding delay margins. Between "  \
-                 "samples it is interpolated.")
+                 "samples it is interpolated."),                                                   \
+        BST_STAGE(bst_compensator_config, plug, bst_compensator_kinds,                             \
+                  "A shared library with a compensator of one's own, relative to the folder of "   \
+                  "the file that says so; the other keys are then that one's.")
 
 #define BST_COMPENSATOR_STAGES 12
 #define BST_COMPENSATOR_DELAY 1024 /* samples */
@@ -137,6 +170,8 @@ typedef struct bst_compensator {
     double delay_part;
     int delay_next; /* where `past` is written next */
     double past[BST_COMPENSATOR_DELAY];
+    const bst_compensator_stage *plug; /* not NULL: this one with its state, and no stages */
+    _Alignas(16) unsigned char plug_state[BST_COMPENSATOR_STATE_BYTES];
 } bst_compensator;
 
 /* Frequency response of what the loop holds besides the compensator, from its output to the

@@ -8,6 +8,7 @@
 
 #include <cjson/cJSON.h>
 
+#include "sim/core/stage.h"
 #include "sim/core/text.h"
 
 /* 2^53, which the text 2^53 + 1 also reads as */
@@ -16,6 +17,8 @@ static const double END_OF_EXACT_INTEGERS = 9007199254740992.0;
 typedef struct reader {
     bst_ctx *ctx;
     const char *file;
+    const bst_json *json;
+    const bst_stage_loader *loader; /* NULL: no plug-ins */
 } reader;
 
 static bst_status read_object(const reader *r, const cJSON *node, const char *path,
@@ -257,6 +260,7 @@ static bst_status read_value(const reader *r, const cJSON *value, const char *pa
         case BST_CONFIG_LIST:
             return read_list(r, value, path, d, (bst_config_list *)(void *)member);
         case BST_CONFIG_RAW:
+        case BST_CONFIG_STAGE:
             return BST_OK;
     }
     return bst_fail(r->ctx, BST_ERR_ARGUMENT, "%s: descriptor of unknown type %d", path,
@@ -272,10 +276,69 @@ static const bst_config_desc *find(const bst_config_desc *table, const char *key
     return NULL;
 }
 
+static bool is_optional(const bst_config_desc *d) {
+    return d->type == BST_CONFIG_RAW || d->type == BST_CONFIG_STAGE;
+}
+
+/* The entry whose plug-in an object may name; NULL: none. */
+static const bst_config_desc *stage_of(const bst_config_desc *table) {
+    for (const bst_config_desc *d = table; d->key; d++) {
+        if (d->type == BST_CONFIG_STAGE) {
+            return d;
+        }
+    }
+    return NULL;
+}
+
+/* An object that names a plug-in: its other keys are the plug-in's. */
+static bst_status read_stage(const reader *r, const cJSON *node, const char *path,
+                             const bst_config_desc *d, bst_stage_use *use) {
+    char where[512];
+    const cJSON *plugin = cJSON_GetObjectItemCaseSensitive(node, d->key);
+    const cJSON *type = cJSON_GetObjectItemCaseSensitive(node, "type");
+    snprintf(where, sizeof where, "%s/%s", path, d->key);
+    if (!cJSON_IsString(plugin) || !*plugin->valuestring) {
+        return wrong(r, where, plugin, "wrong type", "the path of a shared library");
+    }
+    if (!r->loader) {
+        return wrong(r, where, plugin, "no plug-in is loaded here", "one in a scenario's modules");
+    }
+    if (type && !cJSON_IsString(type)) {
+        snprintf(where, sizeof where, "%s/type", path);
+        return wrong(r, where, type, "wrong type", "a string");
+    }
+    const bst_stage_desc *desc;
+    BST_TRY(r->loader->load(r->loader->user, r->ctx, r->json, where, plugin->valuestring,
+                            d->choices[0], type ? type->valuestring : NULL, &desc, use->plugin,
+                            sizeof use->plugin));
+    if (!desc) {
+        return BST_OK;
+    }
+    static const bst_config_desc none[] = {BST_CONFIG_END};
+    cJSON *own = cJSON_Duplicate(node, 1);
+    use->config = calloc(1, desc->config_bytes + 1);
+    if (!own || !use->config) {
+        cJSON_Delete(own);
+        return bst_fail(r->ctx, BST_ERR_MEMORY, "%s: out of memory", path);
+    }
+    use->desc = desc;
+    cJSON_DeleteItemFromObjectCaseSensitive(own, d->key);
+    cJSON_DeleteItemFromObjectCaseSensitive(own, "type");
+    bst_status status = read_object(r, own, path, desc->config ? desc->config : none, use->config);
+    cJSON_Delete(own);
+    return status;
+}
+
 static bst_status read_object(const reader *r, const cJSON *node, const char *path,
                               const bst_config_desc *table, void *object) {
     if (node && !cJSON_IsObject(node)) {
         return wrong(r, path, node, "wrong type", "an object");
+    }
+    const bst_config_desc *stage = stage_of(table);
+    if (stage && node && cJSON_GetObjectItemCaseSensitive(node, stage->key)) {
+        BST_TRY(read_stage(r, node, path, stage,
+                           (bst_stage_use *)(void *)((char *)object + stage->offset)));
+        node = NULL; /* the others keep their defaults */
     }
     for (const cJSON *item = node ? node->child : NULL; item; item = item->next) {
         if (!find(table, item->string) && strcmp(item->string, "$schema") != 0 &&
@@ -298,7 +361,7 @@ static bst_status read_object(const reader *r, const cJSON *node, const char *pa
             bst_status status = read_value(r, fallback, child_path, d, object);
             cJSON_Delete(fallback);
             BST_TRY(status);
-        } else if (d->type != BST_CONFIG_RAW) {
+        } else if (!is_optional(d)) {
             return bst_fail(r->ctx, BST_ERR_CONFIG, "%s: %s: missing; it is required: %s", r->file,
                             child_path, d->doc);
         }
@@ -317,8 +380,14 @@ static size_t table_bytes(const bst_config_desc *table) {
 
 bst_status bst_config_read(bst_ctx *ctx, const bst_json *json, const cJSON *node, const char *path,
                            const bst_config_desc *table, void *object) {
+    return bst_config_read_stages(ctx, json, node, path, table, NULL, object);
+}
+
+bst_status bst_config_read_stages(bst_ctx *ctx, const bst_json *json, const cJSON *node,
+                                  const char *path, const bst_config_desc *table,
+                                  const bst_stage_loader *loader, void *object) {
     memset(object, 0, table_bytes(table));
-    reader r = {ctx, bst_json_name(json)};
+    reader r = {ctx, bst_json_name(json), json, loader};
     bst_status status = read_object(&r, node, path, table, object);
     if (status != BST_OK) {
         bst_config_free(table, object);
@@ -328,7 +397,7 @@ bst_status bst_config_read(bst_ctx *ctx, const bst_json *json, const cJSON *node
 
 bst_status bst_config_defaults(bst_ctx *ctx, const bst_config_desc *table, void *object) {
     memset(object, 0, table_bytes(table));
-    reader r = {ctx, "defaults"};
+    reader r = {.ctx = ctx, .file = "defaults"};
     bst_status status = read_object(&r, NULL, "", table, object);
     if (status != BST_OK) {
         bst_config_free(table, object);
@@ -348,6 +417,13 @@ void bst_config_free(const bst_config_desc *table, void *object) {
             }
             free(list->items);
             *list = (bst_config_list){NULL, 0};
+        } else if (d->type == BST_CONFIG_STAGE) {
+            bst_stage_use *use = (bst_stage_use *)(void *)member;
+            if (use->desc && use->desc->config) {
+                bst_config_free(use->desc->config, use->config);
+            }
+            free(use->config);
+            *use = (bst_stage_use){.desc = NULL};
         }
     }
 }
@@ -409,12 +485,27 @@ static cJSON *echo_value(const bst_config_desc *d, const void *object) {
             return array;
         }
         case BST_CONFIG_RAW:
+        case BST_CONFIG_STAGE:
             return NULL;
     }
     return NULL;
 }
 
+static cJSON *echo_stage(const bst_stage_use *use) {
+    static const bst_config_desc none[] = {BST_CONFIG_END};
+    cJSON *node = bst_config_echo(use->desc->config ? use->desc->config : none, use->config);
+    cJSON_AddStringToObject(node, "plugin", use->plugin);
+    cJSON_AddStringToObject(node, "type", use->desc->type);
+    return node;
+}
+
 cJSON *bst_config_echo(const bst_config_desc *table, const void *object) {
+    const bst_config_desc *stage = stage_of(table);
+    const bst_stage_use *use =
+        stage ? (const bst_stage_use *)(const void *)((const char *)object + stage->offset) : NULL;
+    if (use && use->desc) {
+        return echo_stage(use);
+    }
     cJSON *node = cJSON_CreateObject();
     for (const bst_config_desc *d = table; d->key && node; d++) {
         cJSON *value = echo_value(d, object);

@@ -22,6 +22,7 @@ typedef enum bst_config_type {
     BST_CONFIG_OBJECT,  /* nested struct, children */
     BST_CONFIG_LIST,    /* bst_config_list of structs, children, item_bytes */
     BST_CONFIG_RAW,     /* not stored: checked elsewhere (module blocks) */
+    BST_CONFIG_STAGE,   /* bst_stage_use of sim/core/stage.h; choices: the stage's kind */
 } bst_config_type;
 
 /* Where a LIST lands: `items` is one allocation of count * item_bytes, owned by the config object,

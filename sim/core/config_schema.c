@@ -2,7 +2,7 @@
 
 #include <cjson/cJSON.h>
 
-#include "sim/core/config.h"
+#include "sim/core/stage.h"
 
 /* The largest magnitude that is shown as a bound; wider ranges mean "any finite number". */
 static const double OPEN_BOUND = 1e300;
@@ -69,6 +69,9 @@ static cJSON *value_schema(const bst_config_desc *d) {
             cJSON_AddNumberToObject(node, "maxItems", d->maximum);
             cJSON_AddItemToObject(node, "items", bst_config_schema(d->children));
             break;
+        case BST_CONFIG_STAGE:
+            cJSON_AddStringToObject(node, "type", "string");
+            break;
         case BST_CONFIG_OBJECT:
         case BST_CONFIG_RAW:
             break;
@@ -94,15 +97,39 @@ static cJSON *value_schema(const bst_config_desc *d) {
     return node;
 }
 
+/* An object whose keys are those of `own`, or a plug-in's where it names one. */
+static cJSON *either(cJSON *own, const bst_config_desc *stage) {
+    cJSON *node = cJSON_CreateObject();
+    cJSON_AddStringToObject(node, "type", "object");
+    cJSON *names = cJSON_AddArrayToObject(cJSON_AddObjectToObject(node, "if"), "required");
+    cJSON_AddItemToArray(names, cJSON_CreateString(stage->key));
+    cJSON *plugged = cJSON_AddObjectToObject(node, "then");
+    cJSON_AddStringToObject(plugged, "title", stage->choices[0]);
+    cJSON *properties = cJSON_AddObjectToObject(plugged, "properties");
+    cJSON_AddItemToObject(properties, stage->key, value_schema(stage));
+    cJSON *type = cJSON_AddObjectToObject(properties, "type");
+    cJSON_AddStringToObject(type, "type", "string");
+    cJSON_AddStringToObject(type, "description",
+                            "Which of the library's, where it has several of the kind.");
+    cJSON_DeleteItemFromObjectCaseSensitive(own, "type");
+    cJSON_AddItemToObject(node, "else", own);
+    return node;
+}
+
 cJSON *bst_config_schema(const bst_config_desc *table) {
+    const bst_config_desc *stage = NULL;
     cJSON *node = cJSON_CreateObject();
     cJSON_AddStringToObject(node, "type", "object");
     cJSON_AddBoolToObject(node, "additionalProperties", 0);
     cJSON *properties = cJSON_AddObjectToObject(node, "properties");
     cJSON *required = cJSON_CreateArray();
     for (const bst_config_desc *d = table; d->key; d++) {
+        stage = d->type == BST_CONFIG_STAGE ? d : stage;
+        if (d == stage) {
+            continue;
+        }
         cJSON_AddItemToObject(properties, d->key, value_schema(d));
-        if (!d->fallback && d->type != BST_CONFIG_RAW) {
+        if (!d->fallback && d->type != BST_CONFIG_RAW && d->type != BST_CONFIG_STAGE) {
             cJSON_AddItemToArray(required, cJSON_CreateString(d->key));
         }
     }
@@ -113,5 +140,5 @@ cJSON *bst_config_schema(const bst_config_desc *table) {
     } else {
         cJSON_Delete(required);
     }
-    return node;
+    return stage ? either(node, stage) : node;
 }

@@ -3,15 +3,35 @@
 #define BST_ENGINE_SCENARIO_H
 
 #include "sim/engine/engine.h"
+#include "sim/engine/plugin.h"
 #include "sim/engine/recorder.h"
 #include "sim/link/link.h"
 #include "sim/world/world_config.h"
+
+/* What becomes of "plugin" in a scenario. */
+typedef enum bst_plugin_policy {
+    BST_PLUGINS_LOAD = 0,
+    BST_PLUGINS_SKIP,   /* what names one is left unread: for those who need no modules, as their
+                           code is not to run when somebody's results are looked at */
+    BST_PLUGINS_REFUSE, /* an error */
+} bst_plugin_policy;
 
 /* All modules that a scenario may name; the list is the program's (or a test's). */
 typedef struct bst_registry {
     const bst_module_desc *const *modules;
     int count;
+    bst_plugin_policy policy;
+    /* libraries that some of these modules come from, so that it is told which were used */
+    const bst_plugin *plugins;
+    int plugin_count;
 } bst_registry;
+
+/* A module or stage of a plug-in that a scenario uses. */
+typedef struct bst_plugin_use {
+    char where[300]; /* JSON pointer of its block */
+    char file[512], sha256[BST_SHA256_TEXT];
+    char type[64];
+} bst_plugin_use;
 
 /* One entry of a sensor's "modules" block, or "tasking". */
 typedef struct bst_module_config {
@@ -24,7 +44,8 @@ typedef struct bst_module_config {
     int64_t period_ticks, offset_ticks;
     bst_input_delay delays[BST_MAX_DELAYS];
     int delay_count;
-    bool off; /* another stands in for it, or it for others that are there: does not step */
+    bool off;     /* another stands in for it, or it for others that are there: does not step */
+    bool plugged; /* its block names the plug-in that it comes from */
 } bst_module_config;
 
 typedef struct bst_scenario {
@@ -47,13 +68,16 @@ typedef struct bst_scenario {
     int64_t duration_ticks;
     bst_module_config *modules;
     int module_count;
+    bst_plugin_use *plugins; /* all that are used, in the order in which they were read */
+    int plugin_count;
 } bst_scenario;
 
 extern const bst_config_desc bst_scenario_table[];
 
 /* Reads and checks a scenario (bst_json_load_extended); nothing is opened or written but the JSON.
  * Paths of files that exist are made absolute; a file that a module's table names (BST_CONFIG_PATH,
- * outside of lists) has to. Free with bst_scenario_free, also after an error. */
+ * outside of lists) has to. Plug-ins are loaded into the process: see bst_plugin_open. Free with
+ * bst_scenario_free, also after an error. */
 bst_status bst_scenario_read(bst_ctx *ctx, const bst_json *json, const bst_registry *registry,
                              bst_scenario *out) BST_MUST_CHECK;
 void bst_scenario_free(bst_scenario *scenario);

@@ -1,11 +1,32 @@
+#include <stdio.h>
+#include <string.h>
+
 #include <cjson/cJSON.h>
 
 #include "sim/engine/scenario.h"
 #include "sim/engine/stand_in.h"
 
+/* JSON pointer of a module's block. */
+static void module_path(const bst_module_config *module, char *path, size_t bytes) {
+    if (module->observer < 0) {
+        snprintf(path, bytes, "/tasking");
+    } else {
+        snprintf(path, bytes, "/observers/%d/sensors/%d/modules/%.60s", module->observer,
+                 module->sensor, module->name);
+    }
+}
+
 static cJSON *echo_module(const bst_scenario *s, const bst_module_config *module) {
     cJSON *node = cJSON_CreateObject();
     cJSON_AddStringToObject(node, "type", module->desc->type);
+    for (int i = 0; module->plugged && i < s->plugin_count; i++) {
+        char where[300];
+        module_path(module, where, sizeof where);
+        if (strcmp(s->plugins[i].where, where) == 0) {
+            cJSON_AddStringToObject(node, "plugin", s->plugins[i].file);
+            break;
+        }
+    }
     if (module->rate_hz > 0.0) {
         cJSON_AddNumberToObject(node, "rate_hz", module->rate_hz);
     }

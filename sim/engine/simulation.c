@@ -377,7 +377,9 @@ static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
         status = bst_engine_overlap(ctx, sim->engine);
     }
     if (status == BST_OK && paced) {
-        status = bst_engine_pace(ctx, sim->engine, &scenario->pacing);
+        bst_pacing_config pacing = scenario->pacing;
+        pacing.replay = options->replay;
+        status = bst_engine_pace(ctx, sim->engine, &pacing);
     }
     return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "%s", scenario->file);
 }

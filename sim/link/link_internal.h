@@ -19,9 +19,11 @@ enum {
     LINK_QUEUE = 64,               /* messages that wait in each direction, per peer */
     LINK_MESSAGE_BYTES = 16 << 20, /* of a part that a peer sends; beyond, it is disconnected */
     LINK_ID_BYTES = 255,
-    LINK_AHEAD = 2,       /* steps of a part that its peer may have to answer, where answers are not
-                             awaited */
-    LINK_EXTENSIONS = 10, /* time-outs that a step may take at most, by `health` and `hello` */
+    LINK_AHEAD = 2, /* steps of a part that its peer may have to answer, where answers are not
+                       awaited */
+    LINK_PARTING_MS = 500, /* for `end`, and what is before it, to leave */
+    LINK_END_BYTES = 512,  /* room for its payload */
+    LINK_EXTENSIONS = 10,  /* time-outs that a step may take at most, by `health` and `hello` */
 };
 
 /* What is counted besides the faults of wire.h. */
@@ -80,6 +82,9 @@ typedef struct link_part {
         ahead[LINK_AHEAD]; /* steps whose answers are not awaited; their outputs are owned */
 } link_part;
 
+/* link_record.c: answers in a file */
+typedef struct link_tape link_tape;
+
 /* A frame that ZeroMQ holds. */
 typedef struct link_flying {
     int busy; /* atomic */
@@ -99,11 +104,13 @@ struct bst_link {
     int part_count;
     bst_link_welcome *welcome; /* room for all parts */
     link_flying flying[LINK_FLYING];
+    link_tape *tape; /* NULL: neither recorded nor replayed */
     int64_t counts[LINK_EVENTS], told[LINK_EVENTS];
     bst_link_end end;
     bool has_end;
     int64_t exchanges;
     int warnings;
+    int parting; /* atomic: `end` messages that have not left */
     char notes[LINK_NOTES][LINK_NOTE_BYTES];
     int note_first, note_count;
     bool (*stop)(void *user);
@@ -127,10 +134,25 @@ typedef struct link_exchange {
 /* Counts, and keeps the line as a note and in the log. */
 void bst_link_event(bst_link *link, bst_ctx *ctx, int event, const char *format, ...)
     BST_PRINTF(4, 5);
+/* link_record.c */
+void bst_link_tape_free(link_tape *tape);
+/* While recording: the answer of a call, and what it tells without one. */
+void bst_link_tape_answer(bst_link *link, int part, int64_t tick, const bst_link_output *outputs,
+                          int count);
+void bst_link_tape_note(bst_link *link, int part, int64_t tick, bool ready, bool more);
+/* While replaying. */
+bst_status bst_link_tape_read(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
+                              bst_link_output *outputs, int count) BST_MUST_CHECK;
+bst_status bst_link_tape_read_more(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
+                                   bst_link_output *outputs, int count, bool *more) BST_MUST_CHECK;
+bst_status bst_link_tape_read_ready(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
+                                    bool *ready) BST_MUST_CHECK;
 /* link_send.c */
 /* Sends a message to a peer; false when it is gone or takes nothing. `crc`: of the pixels. */
 bool bst_link_send(bst_link *link, int peer, bst_link_header *header, const void *payload,
                    const bst_link_input *frame, uint32_t crc);
+/* Sends `end`; `room` holds its payload until link->parting says that it has left. */
+bool bst_link_send_end(bst_link *link, int peer, uint8_t *room);
 /* An `error` in answer to a message. */
 void bst_link_reply(bst_link *link, const link_id *id, link_peer *peer, const char *fault,
                     int64_t sequence, const char *text);

@@ -11,6 +11,7 @@ typedef struct bst_shard_worker {
     const bst_study_kind *kind;
     const char *out; /* the study's folder */
     int threads;     /* cores that are its own */
+    double most_s;   /* > 0: runs may end after so much time, see bst_study_run */
     void *state;     /* of the kind; made with the first run */
 } bst_shard_worker;
 

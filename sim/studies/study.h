@@ -59,8 +59,16 @@ typedef struct bst_study {
     bst_study_factor *factors; /* the last one varies fastest */
     int factor_count;
     int64_t settings, runs;
-    char digest[20]; /* of all that results follow from */
+    char digest[20];                    /* of all that results follow from */
+    const struct bst_study_note *notes; /* lent */
+    int note_count;
 } bst_study;
+
+/* A further row of the table "about". */
+typedef struct bst_study_note {
+    const char *key;
+    char value[640];
+} bst_study_note;
 
 /* Where a run belongs. */
 typedef struct bst_study_place {

@@ -48,6 +48,11 @@ static bst_status write_about(bst_ctx *ctx, const bst_tables_job *j) {
         const bst_value row[] = {bst_text_value(pairs[i][0]), bst_text_value(pairs[i][1])};
         status = bst_table_row(ctx, &t, row);
     }
+    for (int i = 0; i < s->note_count && status == BST_OK; i++) {
+        const bst_value row[] = {bst_text_value(s->notes[i].key),
+                                 bst_text_value(s->notes[i].value)};
+        status = bst_table_row(ctx, &t, row);
+    }
     return bst_table_end(ctx, &t, status);
 }
 

@@ -123,7 +123,7 @@ static void open_bench(bench *b, const char *imgproc) {
     }
     modules[own->count] = &sum_module;
     modules[own->count + 1] = &needy_module;
-    const bst_registry registry = {modules, own->count + 2};
+    const bst_registry registry = {.modules = modules, .count = own->count + 2};
     char set[160];
     snprintf(set, sizeof set, "/observers/0/sensors/0/modules/imgproc=%s", imgproc);
     *b = (bench){.json = NULL};

@@ -2,7 +2,7 @@
 #include <cjson/cJSON.h>
 #include <stdlib.h>
 
-#include "sim/core/config.h"
+#include "sim/core/stage.h"
 #include "tests/test_support.h"
 
 typedef struct burn {
@@ -51,6 +51,103 @@ static const bst_config_desc thing_table[] = {
     BST_LIST(thing, burns, burn, burn_table, 0, 2, "[]", "Burns."),
     {.key = "modules", .type = BST_CONFIG_RAW, .unit = "", .doc = "Module blocks."},
     BST_CONFIG_END};
+
+typedef struct staged {
+    double gain;
+    bst_stage_use plug;
+} staged;
+
+typedef struct plugged {
+    double weight;
+    int64_t steps;
+} plugged;
+
+static const char *const stage_kinds[] = {"part", NULL};
+static const bst_config_desc staged_table[] = {BST_REAL(staged, gain, "", 0, 10, "2", "Gain."),
+                                               BST_STAGE(staged, plug, stage_kinds, "A library."),
+                                               BST_CONFIG_END};
+static const bst_config_desc plugged_table[] = {
+    BST_REAL(plugged, weight, "kg", 0, 1, NULL, "Weight."),
+    BST_INT(plugged, steps, "", 1, 9, "4", "Steps."), BST_CONFIG_END};
+static const bst_stage_desc plugged_stage = {.abi = BST_STAGE_ABI,
+                                             .kind = "part",
+                                             .type = "mine",
+                                             .config = plugged_table,
+                                             .config_bytes = sizeof(plugged)};
+
+static bst_status load_stage(void *user, bst_ctx *ctx, const bst_json *json, const char *path,
+                             const char *plugin, const char *kind, const char *type,
+                             const bst_stage_desc **out, char *file, size_t bytes) {
+    (void)ctx;
+    (void)json;
+    assert_string_equal(path, "/plugin");
+    assert_string_equal(plugin, "x.so");
+    assert_string_equal(kind, "part");
+    assert_true(!type || strcmp(type, "mine") == 0);
+    *out = *(bool *)user ? &plugged_stage : NULL;
+    snprintf(file, bytes, "/full/x.so");
+    return BST_OK;
+}
+
+/* An object that names a plug-in has the plug-in's keys, and its own defaults. */
+static void test_stage(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bool there = true;
+    const bst_stage_loader loader = {&there, load_stage};
+    static const struct {
+        const char *text, *message;
+    } cases[] = {
+        {"{\"plugin\": \"x.so\", \"type\": \"mine\", \"weight\": 0.5}", NULL},
+        {"{\"plugin\": \"x.so\", \"weight\": 2}",
+         "f.json: /weight: out of range (found 2; allowed: a number from 0 to 1 kg)"},
+        {"{\"plugin\": \"x.so\", \"weight\": 1, \"gain\": 3}",
+         "f.json: /gain: unknown key (allowed: weight, steps)"},
+        {"{\"plugin\": \"x.so\"}", "f.json: /weight: missing; it is required: Weight."},
+        {"{\"plugin\": \"\"}",
+         "f.json: /plugin: wrong type (found \"\"; allowed: the path of a shared library)"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        bst_json *json = NULL;
+        staged s;
+        bst_assert_ok(&ctx,
+                      bst_json_parse(&ctx, "f.json", cases[i].text, strlen(cases[i].text), &json));
+        bst_status status =
+            bst_config_read_stages(&ctx, json, bst_json_root(json), "", staged_table, &loader, &s);
+        if (cases[i].message) {
+            assert_int_equal(status, BST_ERR_CONFIG);
+            assert_string_equal(ctx.message, cases[i].message);
+        } else {
+            bst_assert_ok(&ctx, status);
+            assert_float_equal(s.gain, 2.0, 0.0); /* the table's text, exact */
+            assert_ptr_equal(s.plug.desc, &plugged_stage);
+            assert_float_equal(((plugged *)s.plug.config)->weight, 0.5, 0.0); /* exact */
+            assert_int_equal(((plugged *)s.plug.config)->steps, 4);
+            cJSON *echo = bst_config_echo(staged_table, &s);
+            char *text = cJSON_PrintUnformatted(echo);
+            assert_string_equal(text,
+                                "{\"weight\":0.5,\"steps\":4,\"plugin\":\"/full/x.so\","
+                                "\"type\":\"mine\"}");
+            free(text);
+            cJSON_Delete(echo);
+            bst_config_free(staged_table, &s);
+        }
+        /* without a loader; and with one that leaves it unread */
+        assert_int_equal(bst_config_read(&ctx, json, bst_json_root(json), "", staged_table, &s),
+                         BST_ERR_CONFIG);
+        if (i == 0) {
+            assert_string_equal(ctx.message,
+                                "f.json: /plugin: no plug-in is loaded here (found "
+                                "\"x.so\"; allowed: one in a scenario's modules)");
+            there = false;
+            bst_assert_ok(&ctx, bst_config_read_stages(&ctx, json, bst_json_root(json), "",
+                                                       staged_table, &loader, &s));
+            assert_null(s.plug.desc);
+            there = true;
+        }
+        bst_json_free(json);
+    }
+}
 
 static bst_status read_text(bst_ctx *ctx, const char *text, const bst_config_desc *table,
                             void *object) {
@@ -351,6 +448,7 @@ int main(void) {
         cmocka_unit_test(test_echo_reads_back),
         cmocka_unit_test(test_seeds),
         cmocka_unit_test(test_override_reaches_the_struct),
+        cmocka_unit_test(test_stage),
         cmocka_unit_test(test_schema),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

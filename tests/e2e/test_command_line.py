@@ -57,7 +57,8 @@ class Messages(unittest.TestCase):
         self.fails(2, "--threads 0: give an integer from 1", "run", runs.TRACK, "--threads", "0")
         self.fails(2, "--duration long: give a number", "run", runs.TRACK, "--duration", "long")
         self.fails(2, "--out needs a value", "run", runs.TRACK, "--out")
-        self.fails(2, '"x" is not expected here', "schema", "x")
+        self.fails(2, "no argument is expected", "icd", "x")
+        self.fails(2, "one scenario file at most is expected, 2 were", "schema", "x", "y")
         self.fails(2, "--start is missing", "propagate")
 
     def test_distortion_beyond_the_wcs(self):

@@ -108,8 +108,9 @@ class Installed(unittest.TestCase):
         call(*words, "box_detector.so", cwd=work)
         environment = {**os.environ, "LD_LIBRARY_PATH": self.libdir}
         sensor = "/observers/0/sensors/0"
-        imgproc = sensor + '/modules/imgproc={"type": "box", "threshold_sigma": 5}'
-        out = call(self.stage + "/bin/boresight", "--plugin", "box_detector.so", "pd",
+        imgproc = (sensor + '/modules/imgproc/detector={"plugin": ' +
+                   json.dumps(work + "/box_detector.so") + ', "threshold_sigma": 5}')
+        out = call(self.stage + "/bin/boresight", "pd",
                    self.stage + "/share/boresight/scenarios/detection.json", "--snr", "4:12:2",
                    "--trials", "400", "--empty-frames", "8", "--json", "pd.json", "--set", imgproc,
                    "--set", sensor + "/camera/width_px=1024", "--set",
@@ -117,26 +118,22 @@ class Installed(unittest.TestCase):
         with open(work + "/pd.json", encoding="utf-8") as file:
             measured = json.load(file)
         self.assertIn("loss", out)
-        # nine pixels alike have 0.71 of the best SNR at FWHM 2 px in a pixel's middle, 3.0 dB; the
-        # frames are few
-        self.assertGreater(measured["loss_db_pd50"], 1.5)
+        # nine pixels alike have 0.71 of the best SNR at FWHM 2 px in a pixel's middle, 3.0 dB, less
+        # what is gained by taking the best of several places; the frames are few
+        self.assertGreater(measured["loss_db_pd50"], 0.3)
         self.assertLess(measured["loss_db_pd50"], 4.5)
         self.assertGreater(measured["points"][-1]["pd"], 0.98)
-        # in a loop, and read again from its folder
-        run = [self.stage + "/bin/boresight", "--plugin", "./box_detector.so", "run", self.scenario,
-               "--duration", "3", "--quiet", "--set", runs.NO_FRAMES, "--set", imgproc]
-        call(*run, "--out", "run", cwd=work, env=environment)
-        self.assertIn("box", call(self.stage + "/bin/boresight", "schema", cwd=work,
-                                  env={**environment, "BORESIGHT_PLUGINS": "./box_detector.so"}))
-        # what is no plugin is said
-        with open(work + "/box_detector.c", encoding="utf-8") as file:
+        self.assertIn('"box"', call(self.stage + "/bin/boresight", "schema", cwd=work,
+                                    env={**environment, "BORESIGHT_PLUGINS": "./box_detector.so"}))
+        # a whole module, by the command line, that is called as one that is there; and none
+        with open(os.path.join(ROOT, "docs", "examples", "stare_at.c"), encoding="utf-8") as file:
             text = file.read()
         with open(work + "/box_detector.c", "w", encoding="utf-8") as file:
-            file.write(text.replace('"box",', '"standard",'))
+            file.write(text.replace('"stare_at",', '"standard",'))
         call(*words, "twin.so", cwd=work)
-        for name, message in (("twin.so", 'role "imgproc" and type "standard" already'),
-                              (self.libdir + "/libboresight.so", "is no plugin"),
-                              ("none.so", "cannot load a plugin"), ("a:b.so", 'without ":"')):
+        for name, message in (("twin.so", 'role "control" and type "standard" already'),
+                              (self.libdir + "/libboresight.so", "is no plug-in"),
+                              ("none.so", "there is no such file"), ("a:b.so", 'without ":"')):
             result = subprocess.run(
                 [self.stage + "/bin/boresight", "--plugin", name, "check", self.scenario],
                 capture_output=True, text=True, timeout=60, cwd=work, env=environment)

@@ -173,7 +173,7 @@ static record run_with(const char *saboteur) {
     memcpy(modules, shipped->modules, (size_t)shipped->count * sizeof *modules);
     modules[shipped->count] = &spoils_truth;
     modules[shipped->count + 1] = &spoils_detections;
-    const bst_registry registry = {modules, shipped->count + 2};
+    const bst_registry registry = {.modules = modules, .count = shipped->count + 2};
 
     record r = {0};
     for (int i = 0; i < WATCHED; i++) {

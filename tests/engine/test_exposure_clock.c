@@ -40,7 +40,8 @@ static bst_status commander_step(void *self, struct bst_step *step) {
     *out = (bst_sensor_command){c->exposure_s,
                                 c->period_s,
                                 {(int)c->x0, (int)c->y0, (int)c->width, (int)c->height},
-                                (int)c->binning};
+                                (int)c->binning,
+                                0.0};
     return BST_OK;
 }
 
@@ -62,7 +63,7 @@ static const bst_module_desc commander_module = {.abi = BST_MODULE_ABI,
                                                  .step = commander_step,
                                                  .destroy = commander_destroy};
 static const bst_module_desc *const modules[] = {&commander_module};
-static const bst_registry registry = {modules, 1};
+static const bst_registry registry = {.modules = modules, .count = 1};
 
 typedef struct train {
     bst_exposure items[400];

@@ -60,7 +60,7 @@ static const bst_module_desc gimbal_b = {
 static const bst_module_desc tracker = {
     .abi = BST_MODULE_ABI, .role = "tracker", .type = "ekf", .doc = "Tracker."};
 static const bst_module_desc *const modules[] = {&gimbal_a, &gimbal_b, &tracker};
-static const bst_registry registry = {modules, 3};
+static const bst_registry registry = {.modules = modules, .count = 3};
 
 #define HEAD "\"boresight\": 1, \"epoch_utc\": \"2022-06-16T22:10:00Z\", \"duration_s\": 300"
 #define ORBIT "\"orbit\": {\"elements_file\": \"catalogue_2022-06.tle\", \"norad\": 39089}"
@@ -303,6 +303,39 @@ static void paths_are_made_absolute(void **state) {
     assert_int_equal(system(message), 0);
 }
 
+/* Those who look at what somebody recorded load nothing of it. */
+static void plugins_can_be_left_out(void **state) {
+    (void)state;
+    const char *text = SCENARIO(
+        "\"gimbal\": {\"plugin\": \"none.so\", \"gain\": 3}, "
+        "\"tracker\": {\"type\": \"ekf\"}");
+    bst_registry without = registry;
+    bst_json *json = NULL;
+    bst_scenario s;
+    bst_ctx ctx = {0};
+    bst_assert_ok(&ctx, bst_json_parse(&ctx, "scenarios/x.json", text, strlen(text), &json));
+    without.policy = BST_PLUGINS_SKIP;
+    bst_assert_ok(&ctx, bst_scenario_read(&ctx, json, &without, &s));
+    assert_int_equal(s.module_count, 1);
+    assert_ptr_equal(s.modules[0].desc, &tracker);
+    assert_int_equal(s.plugin_count, 0);
+    bst_scenario_free(&s);
+    without.policy = BST_PLUGINS_REFUSE;
+    assert_int_equal(bst_scenario_read(&ctx, json, &without, &s), BST_ERR_CONFIG);
+    assert_string_equal(ctx.message,
+                        "scenarios/x.json: "
+                        "/observers/0/sensors/0/modules/gimbal/plugin: plug-ins are "
+                        "not loaded here (found \"none.so\")");
+    bst_scenario_free(&s);
+    bst_json_free(json);
+    refuse(text,
+           "scenarios/x.json: /observers/0/sensors/0/modules/gimbal/plugin: plug-in "
+           "scenarios/none.so: there is no such file; build it, or correct the path");
+    refuse(SCENARIO("\"gimbal\": {\"plugin\": 3}"),
+           "scenarios/x.json: /observers/0/sensors/0/modules/gimbal/plugin: wrong type (found 3; "
+           "allowed: a string of at most 511 bytes)");
+}
+
 static void the_schema_lists_every_module(void **state) {
     (void)state;
     cJSON *schema = bst_scenario_schema(&registry);
@@ -319,10 +352,14 @@ static void the_schema_lists_every_module(void **state) {
     for (int m = 0; m < registry.count; m++) {
         const cJSON *choices = cJSON_GetObjectItemCaseSensitive(
             cJSON_GetObjectItemCaseSensitive(node, modules[m]->role), "oneOf");
-        int found = 0;
+        int found = 0, unknown = 0;
         const cJSON *choice;
         cJSON_ArrayForEach(choice, choices) {
             const cJSON *properties = cJSON_GetObjectItemCaseSensitive(choice, "properties");
+            if (cJSON_GetObjectItemCaseSensitive(properties, "plugin")) {
+                unknown++;
+                continue;
+            }
             const cJSON *type = cJSON_GetObjectItemCaseSensitive(
                 cJSON_GetObjectItemCaseSensitive(properties, "type"), "const");
             found += strcmp(cJSON_GetStringValue(type), modules[m]->type) == 0;
@@ -331,10 +368,11 @@ static void the_schema_lists_every_module(void **state) {
                 cJSON_IsFalse(cJSON_GetObjectItemCaseSensitive(choice, "additionalProperties")));
         }
         assert_int_equal(found, 1);
+        assert_int_equal(unknown, 1); /* that of a plug-in */
     }
     assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItemCaseSensitive(
                          cJSON_GetObjectItemCaseSensitive(node, "gimbal"), "oneOf")),
-                     2);
+                     3);
     /* what can be delayed */
     assert_non_null(strstr(text, "\"los_command\""));
     assert_null(strstr(text, "\"los_history\""));
@@ -353,6 +391,7 @@ int main(void) {
         cmocka_unit_test(an_echo_reads_back_as_itself),
         cmocka_unit_test(paths_are_made_absolute),
         cmocka_unit_test(the_schema_lists_every_module),
+        cmocka_unit_test(plugins_can_be_left_out),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

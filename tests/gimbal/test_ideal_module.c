@@ -9,7 +9,7 @@
 #include "tests/test_support.h"
 
 static const bst_module_desc *const modules[] = {&bst_gimbal_ideal_module};
-static const bst_registry registry = {modules, 1};
+static const bst_registry registry = {.modules = modules, .count = 1};
 
 #define SCENARIO(gimbal_)                                                                          \
     "{\"boresight\": 1, \"epoch_utc\": \"2022-06-16T22:10:00Z\", \"duration_s\": 2, "              \

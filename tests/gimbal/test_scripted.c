@@ -8,7 +8,7 @@
 #include "tests/io/scratch.h"
 
 static const bst_module_desc *const modules[] = {&bst_gimbal_scripted_module};
-static const bst_registry registry = {modules, 1};
+static const bst_registry registry = {.modules = modules, .count = 1};
 
 #define SCENARIO                                                                                  \
     "{\"boresight\": 1, \"epoch_utc\": \"2022-06-16T22:10:00Z\", \"duration_s\": 3, "             \

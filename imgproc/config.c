@@ -1,0 +1,69 @@
+#include "imgproc/imgproc.h"
+#include "imgproc/plugged.h"
+
+static const bst_config_desc bad_pixel_table[] = {
+    BST_INT(bst_bad_pixel, x, "px", 0, 32767, NULL, "Column, 0 the first."),
+    BST_INT(bst_bad_pixel, y, "px", 0, 32767, NULL, "Row, 0 the first."),
+    BST_CONFIG_END,
+};
+
+const bst_config_desc bst_imgproc_config_table[] = {
+    BST_INT(bst_imgproc_config, capacity, "", 1, 65536, "2048",
+            "Detections kept per frame, the brightest first."),
+    BST_INT(
+        bst_imgproc_config, most_fits, "", 0, 65536, "2048",
+        "Detections per frame that are located by maximum likelihood, the brightest first, beside "
+        "those that are taken for objects; the others stand at the matched filter's greatest "
+        "output. 0: all."),
+    BST_INT(bst_imgproc_config, mesh_px, "px", 8, 1024, "64",
+            "Side of the meshes in which background and noise are estimated."),
+    BST_REAL(bst_imgproc_config, false_alarms_per_frame, "", 1e-6, 1e4, "1",
+             "Detections per frame that noise alone may cause, on average."),
+    BST_REAL(bst_imgproc_config, jitter_px, "px", 0, 5, "0",
+             "RMS per axis of the line-of-sight jitter that widens the onboard PSF."),
+    BST_REAL(bst_imgproc_config, streak_min_px, "px", 0.5, 100, "1.5",
+             "Star streaks shorter than this are taken for points."),
+    BST_REAL(bst_imgproc_config, streak_max_px, "px", 1, 128, "64",
+             "Star streaks longer than this are not filtered for."),
+    BST_REAL(bst_imgproc_config, streak_search_px, "px", 0, 128, "0",
+             "Greatest length of streaks of unknown rate and direction that are searched for in "
+             "frames in which stars are points; 0: no search."),
+    BST_REAL(bst_imgproc_config, search_radius_px, "px", 2, 500, "60",
+             "Greatest pointing error over which stars are identified."),
+    BST_REAL(bst_imgproc_config, match_tolerance_px, "px", 0.5, 20, "3",
+             "Greatest distance of one star from its place after the common shift."),
+    BST_BOOL(
+        bst_imgproc_config, track_windows, "false",
+        "Look only at windows round the predicted places of tracks and of bright stars while a "
+        "target of interest is followed."),
+    BST_INT(bst_imgproc_config, window_px, "px", 24, 4096, "48",
+            "track_windows: side of a window; ten sigma of the prediction and the length of a "
+            "star's streak come on top."),
+    BST_INT(bst_imgproc_config, window_stars, "", 3, 64, "16",
+            "track_windows: bright stars that are looked at, for the attitude."),
+    BST_INT(bst_imgproc_config, full_every, "", 1, 1000000, "60",
+            "track_windows: of so many frames ..."),
+    BST_INT(
+        bst_imgproc_config, full_frames, "", 0, 1000000, "6",
+        "... the first so many are looked at as a whole, for all that no track predicts: enough "
+        "in a row to confirm a track."),
+    BST_OBJECT(bst_imgproc_config, stack, bst_stack_config_table, "{}",
+               "Search for objects too faint for one frame in stacks of frames."),
+    BST_INT(
+        bst_imgproc_config, threads, "", 0, 32, "0",
+        "Threads that share the passes over a frame and the fits; 0: one per processor. Results do "
+        "not depend on it."),
+    BST_LIST(bst_imgproc_config, bad_pixels, bst_bad_pixel, bad_pixel_table, 0, 1000000, "[]",
+             "Sensor pixels to leave out."),
+    BST_PATH(
+        bst_imgproc_config, dark_file, "\"\"",
+        "FITS image of the sensor's size: each pixel's dark signal less the mean, e-/s; empty: "
+        "uniform."),
+    BST_PATH(bst_imgproc_config, flat_file, "\"\"",
+             "FITS image of the sensor's size: each pixel's relative response; empty: uniform."),
+    BST_PATH(bst_imgproc_config, bad_pixel_file, "\"\"",
+             "FITS image of the sensor's size: what is not zero is left out; empty: none."),
+    BST_OBJECT(bst_imgproc_config, detector, bst_plugged_table, "{}",
+               "A detector of one's own: what finds and measures sources in a frame."),
+    BST_CONFIG_END,
+};

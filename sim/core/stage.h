@@ -1,0 +1,53 @@
+/* A stage: a part of a module that a user's plug-in can take the place of, the rest of the module
+ * staying as it is. Which kinds there are, and what functions each has: sim/world/stages.h. */
+#ifndef BST_CORE_STAGE_H
+#define BST_CORE_STAGE_H
+
+#include "sim/core/config.h"
+
+#define BST_STAGE_ABI 1
+
+typedef struct bst_stage_desc {
+    uint32_t abi;     /* BST_STAGE_ABI */
+    const char *kind; /* BST_STAGE_DETECTOR, ... */
+    const char *type; /* the plug-in's own name for it */
+    const char *doc;
+    const bst_config_desc *config; /* keys that a scenario may set beside "plugin"; NULL: none */
+    size_t config_bytes;
+    const void *functions; /* struct of the kind */
+} bst_stage_desc;
+
+/* What a module's configuration holds where a stage may be a plug-in's: in a table
+ * BST_STAGE(my_config, plugin, kinds, "..."), kinds a list of the kind's name and NULL. The object
+ * that has this key takes, where it is given, "type" and the plug-in's own keys besides, and its
+ * other members keep their defaults. */
+typedef struct bst_stage_use {
+    char plugin[512];           /* path of the library; "": no plug-in */
+    const bst_stage_desc *desc; /* NULL: no plug-in */
+    void *config;               /* desc->config_bytes, filled; lives with the scenario */
+} bst_stage_use;
+
+#define BST_STAGE(s, m, kinds_, doc_)                                                          \
+    {                                                                                          \
+        .key = "plugin", .type = BST_CONFIG_STAGE, .unit = "", .doc = doc_, .choices = kinds_, \
+        BST_FIELD_(s, m)                                                                       \
+    }
+
+/* Who opens libraries for bst_config_read_stages. */
+typedef struct bst_stage_loader {
+    void *user;
+    /* The stage `type` (NULL: the only one) of `kind` of the library that the text `plugin` at the
+     * JSON pointer `path` names, in *out, and the library's full path in `file`. *out NULL: leave
+     * the block unread. Messages name `path`. */
+    bst_status (*load)(void *user, bst_ctx *ctx, const bst_json *json, const char *path,
+                       const char *plugin, const char *kind, const char *type,
+                       const bst_stage_desc **out, char *file, size_t bytes);
+} bst_stage_loader;
+
+/* bst_config_read of a table in which there may be stages; bst_config_read itself refuses
+ * plug-ins. */
+bst_status bst_config_read_stages(bst_ctx *ctx, const bst_json *json, const struct cJSON *node,
+                                  const char *path, const bst_config_desc *table,
+                                  const bst_stage_loader *loader, void *object) BST_MUST_CHECK;
+
+#endif

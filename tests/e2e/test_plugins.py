@@ -1,0 +1,227 @@
+#!/usr/bin/env python3
+"""Plug-ins by path: the examples, built with one command against what was built, do their work in
+a loop; what is wrong is said; and what was loaded is on record.
+
+Usage, from the repository root:
+/usr/bin/python3 tests/e2e/test_plugins.py BORESIGHT CC BUILD_FOLDER
+"""
+import hashlib
+import json
+import os
+import shutil
+import sqlite3
+import subprocess
+import sys
+import unittest
+
+import jsonschema
+
+CC, BUILD = sys.argv[2:4]
+del sys.argv[2:4]
+import runs  # noqa: E402  (takes the program's path off the arguments)
+
+ROOT = os.getcwd()
+EXAMPLES = ("plugin_detector/box_detector.c", "plugin_compensator/leaky.c",
+            "plugin_frame_stage/banding.c", "stare_at.c")
+M = runs.SENSOR + "/modules"
+# 0.2 s, so that stars are points while the camera follows the belt
+SHORT = f"{M}/control/exposure_s=0.2"
+
+
+class Plugins(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.work = runs.scratch()
+        cls.text = {}
+        jobs = []
+        for path in EXAMPLES:
+            name = os.path.basename(path)
+            with open(os.path.join("docs/examples", path), encoding="utf-8") as file:
+                cls.text[name] = file.read()
+            jobs.append(cls.start(name, cls.text[name]))
+        detector = cls.text["box_detector.c"]
+        jobs.append(cls.start("old.c", detector.replace("BST_STAGE_ABI", "99")))
+        jobs.append(cls.start("other.c", detector.replace("BST_STAGE_DETECTOR", '"telescope"')))
+        jobs.append(cls.start("aged.c", cls.text["stare_at.c"].replace("BST_MODULE_ABI", "2")))
+        jobs.append(cls.start("empty.c", "extern int a;\nint a;\n"))
+        jobs.append(cls.start("mad.c", detector.replace("d->snr =", "d->x_px = NAN; d->snr =")))
+        for job in jobs:
+            _, errors = job.communicate(timeout=300)
+            assert job.returncode == 0, errors
+        cls.scenario = os.path.join(cls.work, "mine.json")
+        with open(cls.scenario, "w", encoding="utf-8") as file:
+            json.dump({"extends": os.path.join(ROOT, runs.TRACK)}, file)
+
+    @classmethod
+    def start(cls, name, text):
+        """Builds a plug-in as its own first lines say, the build folder in the package's place."""
+        path = os.path.join(cls.work, name)
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(text)
+        return subprocess.Popen(
+            [CC, "-std=c17", "-Wall", "-Wextra", "-Werror", "-O2", "-shared", "-fPIC", path,
+             f"-I{ROOT}", f"-L{BUILD}", "-lboresight", f"-Wl,-rpath,{os.path.abspath(BUILD)}", "-lm",
+             "-o", path[:-1] + "so"], stderr=subprocess.PIPE, text=True)
+
+    def call(self, *words, code=0, **options):
+        result = subprocess.run([runs.BORESIGHT, *words], capture_output=True, text=True,
+                                timeout=120, cwd=self.work, **options)
+        self.assertEqual(result.returncode, code, result.stderr)
+        return result.stdout if code == 0 else result.stderr
+
+    def check(self, *sets, code=0):
+        return self.call("check", self.scenario, "--set", "/world/star_catalogue=embedded",
+                         *(word for one in sets for word in ("--set", one)), code=code)
+
+    def digest(self, name):
+        with open(os.path.join(self.work, name), "rb") as file:
+            return hashlib.sha256(file.read()).hexdigest()
+
+    def test_loop(self):
+        """Detector, compensator and frame stage at once; the target gets into track."""
+        out = os.path.join(self.work, "run")
+        manifest = runs.run(self.scenario, out, runs.NO_FRAMES, SHORT,
+                            M + '/imgproc/detector={"plugin": "box_detector.so"}',
+                            M + '/control/compensator={"plugin": "./leaky.so"}',
+                            M + '/scenegen/frame_stage={"plugin": "banding.so"}', duration=40)
+        self.assertEqual(manifest["summary"]["final_mode"], "track")
+        # the observer that they replace leaves 0.2 px
+        self.assertLess(manifest["summary"]["pointing_rms_px"], 1.5)
+        self.assertEqual([(p["where"], p["type"], p["file"], p["sha256"])
+                          for p in manifest["plugins"]],
+                         [(f"{M}/{key}", name[:-3] if name != "box_detector.so" else "box",
+                           os.path.join(os.path.realpath(self.work), name), self.digest(name))
+                          for key, name in (("scenegen/frame_stage", "banding.so"),
+                                            ("imgproc/detector", "box_detector.so"),
+                                            ("control/compensator", "leaky.so"))])
+        self.assertIn(self.digest("banding.so"), self.call("info", "run"))
+        # what is recorded is run again, and read by those who run nothing of it
+        again = os.path.join(self.work, "again")
+        runs.run(out + "/scenario.json", again, duration=3)
+        with sqlite3.connect(again + "/run.sqlite") as one, \
+                sqlite3.connect(out + "/run.sqlite") as two:
+            query = "SELECT * FROM detections WHERE exposure_id < 2 ORDER BY exposure_id, item"
+            rows = one.execute(query).fetchall()
+            self.assertGreater(len(rows), 20)
+            self.assertEqual(rows, two.execute(query).fetchall())
+        os.rename(os.path.join(self.work, "banding.so"), os.path.join(self.work, "gone.so"))
+        try:
+            self.call("export", "run", "--observations", "tdm", "--out", "angles")
+        finally:
+            os.rename(os.path.join(self.work, "gone.so"), os.path.join(self.work, "banding.so"))
+
+    def test_whole_module(self):
+        control = '{"plugin": "stare_at.so", "ra_deg": 252.36, "dec_deg": -8.82}'
+        echo = json.loads(self.check(f"{M}/control={control}"))
+        block = echo["observers"][0]["sensors"][0]["modules"]["control"]
+        self.assertEqual(block["plugin"], os.path.join(os.path.realpath(self.work), "stare_at.so"))
+        self.assertEqual((block["type"], block["ra_deg"]), ("stare_at", 252.36))
+        # the same by the command line
+        self.call("--plugin", "stare_at.so", "check", self.scenario, "--quiet", "--set",
+                  f'{M}/control={{"type": "stare_at", "ra_deg": 252.36, "dec_deg": -8.82}}')
+        self.assertIn("/control/dec_deg: missing; it is required: Declination (ICRS).", self.check(
+            f'{M}/control={{"plugin": "stare_at.so", "ra_deg": 1}}', code=1))
+
+    def test_margins(self):
+        """As the compensator says its response, its loop has margins."""
+        told = self.call("loop", self.scenario, "--set",
+                         M + '/control/compensator={"plugin": "leaky.so"}')
+        self.assertIn("tracking loop: leaky", told)
+        self.assertRegex(told, r"gain margin +1[0-9]\.")
+
+    def test_wrong(self):
+        block, control = f"{M}/imgproc/detector", f"{M}/control"
+        for setting, message in (
+                (f'{block}={{"plugin": "none.so"}}',
+                 "detector/plugin: plug-in .*none.so: there is no such file; build it"),
+                (f'{block}={{"plugin": "mine.json"}}', "plugin: plug-in .* cannot be loaded .* is "
+                                                       "it a shared library"),
+                (f'{block}={{"plugin": "empty.so"}}',
+                 "empty.so is no plug-in: it defines neither the list bst_plugin_modules"),
+                (f'{block}={{"plugin": "old.so"}}',
+                 "old.so has a stage of interface 99, this program takes 1: build it with"),
+                (f'{control}={{"plugin": "aged.so"}}',
+                 "aged.so has a module of interface 2, this program takes 3: build it with"),
+                (f'{block}={{"plugin": "other.so"}}',
+                 'of kind "telescope" .allowed: "detector", "compensator", "frame_stage"'),
+                (f'{block}={{"plugin": "leaky.so"}}',
+                 'no stage of kind "detector" .it has: stage "leaky" of kind "compensator"'),
+                (f'{M}/tracker={{"plugin": "stare_at.so"}}',
+                 'no module of role "tracker" .it has: module "stare_at" of role "control"'),
+                (f'{block}={{"plugin": "box_detector.so", "type": "bax"}}',
+                 'no stage of kind "detector" of type "bax"'),
+                (f'{block}={{"plugin": "box_detector.so", "threshhold_sigma": 5}}',
+                 'detector/threshhold_sigma: unknown key; did you mean "threshold_sigma"'),
+                (f'{block}={{"plugin": "box_detector.so", "threshold_sigma": "5"}}',
+                 'detector/threshold_sigma: wrong type .found "5"; allowed: a number from 1 to'),
+                (f'{block}={{"plugin": 7}}', "detector/plugin: wrong type .found 7; allowed: the "
+                                             "path of a shared library"),
+                (f'{M}/imgproc/stack={{"plugin": "x.so"}}', "stack/plugin: unknown key"),
+                (f'{control}/compensator={{"plugin": "leaky.so", "gain_per_s": 50}}',
+                 "gain_per_s: 50/s cannot be stable at a frame every 1 s; give less than 2"),
+                (f'{M}/imgproc={{"type": "standard", "track_windows": true, "detector": '
+                 f'{{"plugin": "box_detector.so"}}}}', "turn track_windows and stack off")):
+            self.assertRegex(self.check(setting, code=1), message)
+        # a detector that gives nonsense ends the run, and is named
+        self.assertRegex(self.call(
+            "run", self.scenario, "--out", "mad", "--quiet", "--duration", "2", "--set",
+            runs.NO_FRAMES, "--set", f'{block}={{"plugin": "mad.so"}}', code=1),
+            r"plug-in .*mad.so gave a detection at \(nan,")
+
+    def test_schema(self):
+        scenario = json.loads(self.check(M + '/imgproc/detector={"plugin": "box_detector.so"}',
+                                         f'{M}/control={{"plugin": "stare_at.so", "ra_deg": 1,'
+                                         f' "dec_deg": 2}}'))
+        modules = scenario["observers"][0]["sensors"][0]["modules"]
+        plain = json.loads(self.call("schema"))
+        known = json.loads(self.call("schema", "--plugin", "box_detector.so", "--plugin",
+                                     "stare_at.so"))
+        with open(os.path.join(self.work, "named.json"), "w", encoding="utf-8") as file:
+            json.dump(scenario, file)
+        self.assertEqual(json.loads(self.call("schema", "named.json")), known)
+        jsonschema.Draft202012Validator.check_schema(known)
+        for schema in (plain, known):
+            jsonschema.validate(scenario, schema)
+        self.assertIn("Sums above so many of their sigmas.", json.dumps(known))
+        for block, key in ((modules["imgproc"]["detector"], "treshold"),
+                           (modules["control"], "ra")):
+            block[key] = 1
+            jsonschema.validate(scenario, plain)
+            with self.assertRaises(jsonschema.ValidationError):
+                jsonschema.validate(scenario, known)
+            del block[key]
+        # without a plug-in all is as strict as ever
+        del modules["imgproc"]["detector"]["plugin"]
+        with self.assertRaises(jsonschema.ValidationError):
+            jsonschema.validate(scenario, plain)
+
+    def test_study(self):
+        """A study's tables say what was loaded, and a library that changes is noticed."""
+        shutil.copy(os.path.join(self.work, "leaky.so"), os.path.join(self.work, "changing.so"))
+        with open(os.path.join(self.work, "study.json"), "w", encoding="utf-8") as file:
+            json.dump({"boresight_study": 1, "name": "gains", "kind": "loop",
+                       "scenarios": [{"file": os.path.join(ROOT, "scenarios/day_generator.json")}],
+                       "set": {"/duration_s": 30, "/world/star_catalogue": "embedded",
+                               M + "/control/compensator":
+                                   {"plugin": os.path.join(self.work, "changing.so")}},
+                       "sweeps": [{"axes": [{"path": M + "/control/compensator/gain_per_s",
+                                             "values": [0.1, 0.3]}]}]}, file)
+        self.call("study", "study.json", "--out", "study", "--quiet", "--workers", "1")
+        file = os.path.join(os.path.realpath(self.work), "changing.so")
+        with sqlite3.connect(self.work + "/study/study.sqlite") as tables:
+            self.assertEqual(tables.execute("SELECT value FROM about WHERE key = 'plugin'")
+                             .fetchall(), [(f"{file} sha256 {self.digest('changing.so')}",)])
+            self.assertEqual(tables.execute("SELECT count(*), count(DISTINCT gain_per_s) FROM runs"
+                                            " WHERE status = 'done'").fetchone(), (2, 2))
+        job = self.start("changing.c", self.text["leaky.c"].replace('"1/s"', '"Hz"'))
+        self.assertEqual(job.wait(timeout=60), 0, job.communicate())
+        self.assertIn("has been changed since the study began",
+                      self.call("study", "study", "--resume", "--quiet", code=1))
+
+
+def tearDownModule():
+    runs.clean()
+
+
+if __name__ == "__main__":
+    unittest.main()
