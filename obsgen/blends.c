@@ -14,8 +14,7 @@ static const double FAINTEST_SHARE = 0.3;
 static const double FLATTEST = 6.0;
 /* Deviation along a streak, in sigmas of the PSF, from which on the place is not that of the
  * nearest top any more; noise of its filters over white noise's that is believed. */
-static const double WANDERS = 0.2, LEAST_NOISE = 0.7, MOST_NOISE = 1.6,
-                    UNLIFTED_SNR = 10.0;
+static const double WANDERS = 0.2, LEAST_NOISE = 0.7, MOST_NOISE = 1.6, UNLIFTED_SNR = 10.0;
 /* Keys of such streaks. */
 static const uint64_t WANDER = (uint64_t)1 << 52;
 
@@ -142,14 +141,14 @@ static nearest_light nearest_of(const bst_generator *g, const generator_source *
 /* Where a streak so faint is found that the top of the filters' output wanders along it. beside: of
  * the output there, what neighbours give that are found too. */
 static void wander(const bst_generator *g, const generator_source *s,
-                   const generator_source *merged, int count, double beside,
-                   generator_blend *out) {
+                   const generator_source *merged, int count, double beside, generator_blend *out) {
     if (!s->as_streak || s->length < 1.0) {
         return;
     }
     const bst_obsgen_calibration *cal = &g->calibration;
     bst_bound_at bound = bst_bound_of(&g->bound, s->flux_e, g->noise_e, s->length);
-    /* factors of fainter ones hold that noise has lifted them above the threshold, as it does here */
+    /* factors of fainter ones hold that noise has lifted them above the threshold, as it does here
+     */
     double snr = fmax(s->flux_e * bound.norm / g->noise_e, UNLIFTED_SNR);
     double along = bst_obsgen_between(bst_obsgen_snrs, cal->along_factor, BST_OBSGEN_SNRS, snr) *
                    sqrt(bound.var_along_px2 * out->widen);
@@ -176,8 +175,8 @@ static void wander(const bst_generator *g, const generator_source *s,
     for (int k = 0; k < count && used < BST_WANDER_SOURCES; k++) {
         const generator_source *m = &merged[k];
         double dx = m->x - s->x, dy = m->y - s->y;
-        sources[used++] = (bst_wander_source){dx * c + dy * n, dy * c - dx * n,
-                                              own * m->flux_e / s->flux_e};
+        sources[used++] =
+            (bst_wander_source){dx * c + dy * n, dy * c - dx * n, own * m->flux_e / s->flux_e};
     }
     bst_philox_words words = bst_rng_words(g->key, (uint64_t)g->exposure_id, WANDER | s->name);
     const bst_rng_key key = {{words.w[0], words.w[1]}};

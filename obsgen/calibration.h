@@ -26,8 +26,8 @@ typedef struct bst_obsgen_calibration {
     double along_factor[BST_OBSGEN_SNRS];  /* along a streak */
     double phase_bias_px;                  /* amplitude of the bias by place in the pixel */
     double blend_distance_factor;          /* of the distance at which two sources are told apart */
-    double star_id_probability;  /* that a catalogue star is identified, stars found */
-    double hit_told_probability; /* that a radiation hit is told from a source */
+    double star_id_probability;            /* that a catalogue star is identified, stars found */
+    double hit_told_probability;           /* that a radiation hit is told from a source */
 } bst_obsgen_calibration;
 
 extern const bst_config_desc bst_obsgen_calibration_table[];

@@ -330,8 +330,7 @@ static bst_status search_part(bst_ctx *ctx, bst_generator *g, const bst_streak_r
     for (int k = 0; k < count; k++) {
         const float *seen = bst_streak_seen(&w->light, run, first + k);
         int at = places[first + k].at, middle = places[first + k].middle;
-        float taken =
-            (float)taken_at(g, run->by_row ? middle : at, run->by_row ? at : middle);
+        float taken = (float)taken_at(g, run->by_row ? middle : at, run->by_row ? at : middle);
         s[k].at = places[first + k].at;
         s[k].middle = places[first + k].middle;
         for (int r = 0; r < WIDE; r++) {

@@ -32,13 +32,13 @@ typedef struct generator_rank {
 
 /* The light of a detection that is seen in one with others, and of what is fitted beside it. */
 typedef struct generator_blend {
-    double flux_e, x, y;       /* as one source */
-    double widen; /* factor on the variances from neighbours that are fitted too */
-    double flat;  /* factor on the error along a streak where light of others is in it */
-    bool near;    /* another detection in the fitted pixels, or a merged source of note */
-    bool drawn;   /* x and y have their error already */
-    bool point;   /* a streak that the filter for points shows better */
-    double snr;   /* of what was drawn */
+    double flux_e, x, y; /* as one source */
+    double widen;        /* factor on the variances from neighbours that are fitted too */
+    double flat;         /* factor on the error along a streak where light of others is in it */
+    bool near;           /* another detection in the fitted pixels, or a merged source of note */
+    bool drawn;          /* x and y have their error already */
+    bool point;          /* a streak that the filter for points shows better */
+    double snr;          /* of what was drawn */
 } generator_blend;
 
 /* Half pixels of the longest streak that is filtered for. */
@@ -61,7 +61,7 @@ struct bst_generator {
     bst_route_path path; /* the true one; count 0: not known */
     double *path_x, *path_y, *object_x, *object_y;
     int path_room;
-    double streak; /* 0: not filtered for */
+    double streak;      /* 0: not filtered for */
     bst_wander *wander; /* for `streak`, once it was asked for */
     bool smeared;
     double background_e, noise_e, threshold, streak_share;

@@ -10,12 +10,7 @@
 
 /* Rows across the streak that are looked at, 0.7 sigma apart; most steps along it, with what the
  * filters need beyond; taps of a point's image on either side of its middle. */
-enum {
-    BST_WANDER_ROWS = 7,
-    BST_WANDER_STEPS = 640,
-    BST_WANDER_TAPS = 12,
-    BST_WANDER_SOURCES = 25
-};
+enum { BST_WANDER_ROWS = 7, BST_WANDER_STEPS = 640, BST_WANDER_TAPS = 12, BST_WANDER_SOURCES = 25 };
 
 /* Both filters of a frame on steps along the streak. */
 typedef struct bst_wander {
