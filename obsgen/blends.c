@@ -12,6 +12,11 @@ static const double SADDLE_SIGMA = 3.0, SADDLE_SHARE = 0.15, CLOSEST_FWHM = 0.6;
 static const double FAINTEST_SHARE = 0.3;
 /* Errors of places grow by no more than this between sources that are seen as one. */
 static const double FLATTEST = 6.0;
+/* Deviation along a streak, in sigmas of the PSF, from which on the place is not that of the
+ * nearest top any more; noise of its filters over white noise's that is believed. */
+static const double WANDERS = 0.2, LEAST_NOISE = 0.7, MOST_NOISE = 1.6, UNLIFTED_SNR = 10.0;
+/* Keys of such streaks. */
+static const uint64_t WANDER = (uint64_t)1 << 52;
 
 /* What source b adds at source a's place to the output of the filter for a. */
 static double overlap(const bst_generator *g, const generator_source *a,
@@ -133,6 +138,61 @@ static nearest_light nearest_of(const bst_generator *g, const generator_source *
     return n;
 }
 
+/* Where a streak so faint is found that the top of the filters' output wanders along it. beside: of
+ * the output there, what neighbours give that are found too. */
+static void wander(const bst_generator *g, const generator_source *s,
+                   const generator_source *merged, int count, double beside, generator_blend *out) {
+    if (!s->as_streak || s->length < 1.0) {
+        return;
+    }
+    const bst_obsgen_calibration *cal = &g->calibration;
+    bst_bound_at bound = bst_bound_of(&g->bound, s->flux_e, g->noise_e, s->length);
+    /* factors of fainter ones hold that noise has lifted them above the threshold, as it does here
+     */
+    double snr = fmax(s->flux_e * bound.norm / g->noise_e, UNLIFTED_SNR);
+    double along = bst_obsgen_between(bst_obsgen_snrs, cal->along_factor, BST_OBSGEN_SNRS, snr) *
+                   sqrt(bound.var_along_px2 * out->widen);
+    if (along * out->flat < WANDERS * g->total_sigma) {
+        return;
+    }
+    bst_wander_set(g->wander, g->streak, g->total_sigma);
+    if (g->wander->steps == 0) {
+        return;
+    }
+    double across = bst_obsgen_between(bst_obsgen_snrs, cal->across_factor, BST_OBSGEN_SNRS, snr) *
+                    sqrt(bound.var_across_px2 * out->widen);
+    double gain =
+        bst_obsgen_between(bst_obsgen_lengths_px, cal->gain, BST_OBSGEN_LENGTHS, s->length);
+    double own = s->amplitude / gain;
+    /* the bound's deviation over that of these filters' top where nothing wanders */
+    double noise = along * own * sqrt(g->wander->curvature);
+    noise = fmin(fmax(noise, LEAST_NOISE), MOST_NOISE);
+    double turned = across * own / (g->total_sigma * sqrt(2.0)) / noise;
+    turned = fmin(fmax(turned, LEAST_NOISE), MOST_NOISE);
+    double c = s->path.dx / s->length, n = s->path.dy / s->length;
+    bst_wander_source sources[BST_WANDER_SOURCES] = {{0.0, 0.0, own}};
+    int used = 1;
+    for (int k = 0; k < count && used < BST_WANDER_SOURCES; k++) {
+        const generator_source *m = &merged[k];
+        double dx = m->x - s->x, dy = m->y - s->y;
+        sources[used++] =
+            (bst_wander_source){dx * c + dy * n, dy * c - dx * n, own * m->flux_e / s->flux_e};
+    }
+    bst_philox_words words = bst_rng_words(g->key, (uint64_t)g->exposure_id, WANDER | s->name);
+    const bst_rng_key key = {{words.w[0], words.w[1]}};
+    double threshold = g->threshold - beside;
+    bst_wander_top top = bst_wander_draw(g->wander, key, sources, used, noise, threshold);
+    if (!(top.snr > threshold)) {
+        return; /* so faint that it is seen for another reason */
+    }
+    double v = turned * top.across_px;
+    out->x = s->x + c * top.along_px - n * v;
+    out->y = s->y + n * top.along_px + c * v;
+    out->drawn = true;
+    out->point = top.point;
+    out->snr = top.snr;
+}
+
 /* Light of sources that are seen in this one, and of what is fitted beside it. A fit of one source
  * to several lands where the filter's output is greatest: found by moving to the mean weighted with
  * what each gives there (mean shift). */
@@ -142,9 +202,8 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
     generator_source merged[MOST];
     generator_blend out = {
         .flux_e = s->flux_e, .x = s->x, .y = s->y, .widen = 1.0, .flat = 1.0, .near = false};
-    double brightest = 0.0;
     int count = 0;
-    double stamp = fmax(3.0, ceil(3.6 * g->sigma)) + 1.5;
+    double beside = 0.0, stamp = fmax(3.0, ceil(3.6 * g->sigma)) + 1.5;
     for (int k = first_near(g, i, g->reach);
          k < g->source_count && g->sources[k].y <= s->y + g->reach; k++) {
         const generator_source *o = &g->sources[k];
@@ -155,6 +214,7 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
         }
         double share = overlap(g, s, o);
         if (o->found) {
+            beside += o->amplitude * share;
             out.near = out.near || (fabs(dx) <= half_x && fabs(dy) <= half_y);
             /* both fluxes and places are free: what they have in common is not known */
             out.widen *= 1.0 / fmax(1.0 - share * share, 0.1);
@@ -165,12 +225,6 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
             m->x = s->x + n.dx;
             m->y = s->y + n.dy;
             m->flux_e *= n.share;
-            if (o->head == i && m->flux_e > brightest) {
-                brightest = m->flux_e;
-                double part = sqrt(s->flux_e * m->flux_e) / (s->flux_e + m->flux_e);
-                out.spread_x = part * n.dx;
-                out.spread_y = part * n.dy;
-            }
         }
     }
     generator_source at = *s;
@@ -199,12 +253,13 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
             for (int k = 0; k < count; k++) {
                 all += weight * merged[k].flux_e * overlap(g, &at, &merged[k]);
             }
-            generator_source beside = *s;
-            beside.x = s->x + step * h * s->path.dx;
-            beside.y = s->y + step * h * s->path.dy;
-            alone += weight * s->flux_e * overlap(g, &beside, s);
+            generator_source off = *s;
+            off.x = s->x + step * h * s->path.dx;
+            off.y = s->y + step * h * s->path.dy;
+            alone += weight * s->flux_e * overlap(g, &off, s);
         }
         out.flat = fmin(fmax(alone / fmax(all, 1e-9 * alone), 1.0), FLATTEST);
     }
+    wander(g, s, merged, count, beside, &out);
     return out;
 }

@@ -49,10 +49,6 @@ const bst_config_desc bst_obsgen_calibration_table[] = {
     BST_REAL(C, blend_distance_factor, "", 0.1, 10, NULL,
              "Distance at which two sources are told apart, over that at which the saddle between "
              "them is deep enough without noise."),
-    BST_REAL(
-        C, blend_error, "", 0, 10, NULL,
-        "RMS error of the place of two sources that are seen as one, beyond that of a fit of one "
-        "to both, over the spread of their light."),
     BST_REAL(C, star_id_probability, "", 0, 1, NULL,
              "Probability that a detected catalogue star is identified where stars are."),
     BST_REAL(C, hit_told_probability, "", 0, 1, NULL,

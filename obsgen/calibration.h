@@ -4,7 +4,7 @@
 
 #include "sim/core/config.h"
 
-enum { BST_OBSGEN_CALIBRATION_VERSION = 2, BST_OBSGEN_LENGTHS = 4, BST_OBSGEN_SNRS = 6 };
+enum { BST_OBSGEN_CALIBRATION_VERSION = 3, BST_OBSGEN_LENGTHS = 4, BST_OBSGEN_SNRS = 6 };
 
 /* Streak lengths (px) and SNRs at which the tables below stand; between them straight, beyond them
  * the ends hold. */
@@ -26,9 +26,8 @@ typedef struct bst_obsgen_calibration {
     double along_factor[BST_OBSGEN_SNRS];  /* along a streak */
     double phase_bias_px;                  /* amplitude of the bias by place in the pixel */
     double blend_distance_factor;          /* of the distance at which two sources are told apart */
-    double blend_error; /* error of the place between two that are seen as one, over their spread */
-    double star_id_probability;  /* that a catalogue star is identified, stars found */
-    double hit_told_probability; /* that a radiation hit is told from a source */
+    double star_id_probability;            /* that a catalogue star is identified, stars found */
+    double hit_told_probability;           /* that a radiation hit is told from a source */
 } bst_obsgen_calibration;
 
 extern const bst_config_desc bst_obsgen_calibration_table[];

@@ -51,8 +51,9 @@ void bst_generator_false_alarms(bst_generator *g) {
     double taken = g->background_bias_e / (bst_bound_norm(&g->bound, 0.0) * g->noise_e);
     expected *= exp(-taken * (g->threshold + 0.5 * taken));
     if (g->smeared) { /* nothing is looked at between the pixels */
-        expected =
-            bst_matched_pixel_maxima(g->total_sigma, g->threshold + taken) * g->width * g->height;
+        double least = g->threshold * g->noise_e / g->dark_noise_e +
+                       g->background_bias_e / (bst_bound_norm(&g->bound, 0.0) * g->dark_noise_e);
+        expected = bst_matched_pixel_maxima(g->total_sigma, least) * g->width * g->height;
     }
     double arrival = 0.0;
     for (uint64_t i = 0; i < 1000000; i++) {

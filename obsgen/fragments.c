@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "obsgen/clutter.h"
+#include "obsgen/local_sky.h"
 #include "obsgen/streak_light.h"
 #include "obsgen/streak_noise.h"
 #include "sim/core/pages.h"
@@ -15,7 +16,7 @@ static const double SADDLE_SIGMA = 3.0, SADDLE_SHARE = 0.15;
 /* What stays further below the threshold is seen here and there: the places are drawn. */
 static const double FAINTEST_SIGMA = 3.0;
 /* Light below this counts for no other streak, and below SEEN it adds no alarms. */
-static const double LEAST_LIGHT = 0.4, LEAST_SEEN = 0.25;
+static const double LEAST_LIGHT = 0.25, LEAST_SEEN = 0.25;
 /* Share of the light on a pixel from which on a source looks there itself. */
 static const double OWN_SHARE = 0.3;
 /* Draws of faint streaks; those of other clutter stay below. */
@@ -32,6 +33,7 @@ enum {
     /* of the tables below: outputs in steps of 1/8 from 1, lights in steps of 1/8 */
     OUTPUTS = 64,
     LIGHTS = 48,
+    SKY_STEP = 8 /* of so many places of a run one stands for their light in the background */
 };
 
 typedef bst_streak_section section;
@@ -61,6 +63,7 @@ struct generator_streaks {
     bst_streak_light light;
     whole_way stars, own;
     bst_streak_noise noise;
+    bst_local_sky sky;
     double shot; /* variance that an output of one adds, by the photons' own noise */
     double log_maxima[OUTPUTS], maxima_sigma; /* logarithm of maxima per pixel above an output */
     double alarms[LIGHTS]; /* more of them than noise alone makes, per pixel of the way */
@@ -277,9 +280,44 @@ static bst_status run_along(bst_ctx *ctx, bst_generator *g, int source, const wh
     return BST_OK;
 }
 
-/* The background that was found is too much by this, in the filter's output. */
+/* What the light of streaks in background and noise takes from the filter's output, in noises of
+ * the frame without it, on average and at a place: the background is too much, and the threshold
+ * counts by a noise that is. */
+static double taken_from(const bst_generator *g, double level, double noise) {
+    return level / bst_bound_norm(&g->bound, 0.0) + g->threshold * (noise - 1.0);
+}
+
 static double taken_of(const bst_generator *g) {
-    return g->background_bias_e / (bst_bound_norm(&g->bound, 0.0) * g->noise_e);
+    return taken_from(g, g->background_bias_e / g->dark_noise_e, g->noise_e / g->dark_noise_e);
+}
+
+static double taken_at(const bst_generator *g, double x, double y) {
+    double level, noise;
+    bst_local_sky_at(&g->streaks->sky, x, y, &level, &noise);
+    return taken_from(g, level, noise);
+}
+
+/* Background and noise from the light of all runs. */
+static bst_status set_sky(bst_ctx *ctx, bst_generator *g) {
+    struct generator_streaks *w = g->streaks;
+    const bst_streak_light *l = &w->light;
+    double steep = 2.0 * g->total_sigma;
+    BST_TRY(bst_local_sky_begin(ctx, &w->sky, g->width, g->height, g->settings.mesh_px,
+                                g->total_sigma));
+    for (int i = 0; i < l->run_count; i++) {
+        const bst_streak_run *run = &l->runs[i];
+        for (int k = 0; k < run->count; k += SKY_STEP) {
+            const bst_streak_place *p = &l->places[run->first + (size_t)k];
+            int x = run->by_row ? p->middle : p->at, y = run->by_row ? p->at : p->middle;
+            int places = run->count - k < SKY_STEP ? run->count - k : SKY_STEP;
+            if (is_on_frame(g, x, y)) {
+                bst_local_sky_add(&w->sky, x, y, (double)p->height,
+                                  places / (steep * sqrt((double)p->fall)));
+            }
+        }
+    }
+    bst_local_sky_settle(&w->sky, g->calibration.background_share, g->calibration.crowding);
+    return BST_OK;
 }
 
 /* Maxima about places of a run. */
@@ -289,9 +327,10 @@ static bst_status search_part(bst_ctx *ctx, bst_generator *g, const bst_streak_r
     section *s = w->sections;
     const bst_streak_place *places = &w->light.places[run->first];
     int count = last - first + 1 < BST_ROUTE_NODES ? last - first + 1 : BST_ROUTE_NODES;
-    float taken = (float)taken_of(g);
     for (int k = 0; k < count; k++) {
         const float *seen = bst_streak_seen(&w->light, run, first + k);
+        int at = places[first + k].at, middle = places[first + k].middle;
+        float taken = (float)taken_at(g, run->by_row ? middle : at, run->by_row ? at : middle);
         s[k].at = places[first + k].at;
         s[k].middle = places[first + k].middle;
         for (int r = 0; r < WIDE; r++) {
@@ -347,14 +386,15 @@ static double draw_exponential(const bst_generator *g, arrivals *a) {
 static void draw_faint(bst_generator *g, const bst_streak_run *run, const bst_streak_place *p,
                        double share, double light, arrivals *a) {
     const struct generator_streaks *w = g->streaks;
-    double at = 8.0 * light;
-    at = at < LIGHTS - 1.001 ? at : LIGHTS - 1.001;
+    double taken = taken_at(g, run->by_row ? p->middle : p->at, run->by_row ? p->at : p->middle);
+    double at = 8.0 * (light + taken_of(g) - taken); /* the table is for what is taken on average */
+    at = at < LIGHTS - 1.001 ? fmax(at, 0.0) : LIGHTS - 1.001;
     int i = (int)at;
     a->next -= share * (w->alarms[i] + (at - i) * (w->alarms[i + 1] - w->alarms[i]));
     while (a->next < 0.0) {
         a->next += draw_exponential(g, a);
         double noise = sqrt(1.0 + w->shot * light);
-        double least = (g->threshold + taken_of(g) - light) / noise;
+        double least = (g->threshold + taken - light) / noise;
         double value = sqrt(least * least + 2.0 * draw_exponential(g, a));
         double off[2];
         bst_rng_normal2(g->key, (uint64_t)g->exposure_id, a->draw++, off);
@@ -534,6 +574,7 @@ bst_status bst_generator_fragments(bst_ctx *ctx, bst_generator *g) {
         }
     }
     BST_TRY(bst_streak_light_add_up(ctx, &w->light));
+    BST_TRY(set_sky(ctx, g));
     bst_status status = search_runs(ctx, g);
     if (status == BST_OK) {
         report(g);
@@ -548,6 +589,7 @@ bst_status bst_generator_fragments(bst_ctx *ctx, bst_generator *g) {
 void bst_generator_free_streaks(struct generator_streaks *w) {
     if (w) {
         bst_streak_light_free(&w->light);
+        bst_local_sky_free(&w->sky);
         free(w->output);
         free(w->shown);
         free(w->maxima);

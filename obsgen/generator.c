@@ -29,10 +29,12 @@ bst_status bst_generator_create(bst_ctx *ctx, const bst_camera *camera, const bs
     g->camera = camera;
     g->electrons_per_s_v0 = bst_camera_electrons_per_s(knowledge, 0.0);
     g->settings = *settings;
+    g->settings.mesh_px = settings->mesh_px > 0 ? settings->mesh_px : 64;
     g->calibration = *calibration;
     g->key = key;
     g->items = calloc((size_t)settings->capacity, sizeof *g->items);
-    if (!g->items) {
+    g->wander = calloc(1, sizeof *g->wander);
+    if (!g->items || !g->wander) {
         bst_generator_free(g);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d detections", settings->capacity);
     }
@@ -43,6 +45,7 @@ bst_status bst_generator_create(bst_ctx *ctx, const bst_camera *camera, const bs
 void bst_generator_free(bst_generator *g) {
     if (g) {
         free(g->items);
+        free(g->wander);
         free(g->sources);
         free(g->ranks);
         free(g->route);
@@ -237,6 +240,7 @@ static void left_in(const bst_generator *g, const generator_source *s, double cl
 /* Sources are part of what image processing takes for background and noise. */
 static void add_crowding(bst_generator *g) {
     double pixels = (double)g->width * g->height, before = g->noise_e;
+    g->dark_noise_e = before;
     g->faint_light_e = g->faint_square_e2 = 0.0;
     for (int i = 0; i < g->source_count; i++) {
         double light, square;
@@ -249,8 +253,8 @@ static void add_crowding(bst_generator *g) {
     g->noise_e = sqrt(before * before + g->calibration.crowding * g->faint_square_e2);
     for (int i = 0; i < g->source_count; i++) {
         generator_source *s = &g->sources[i];
-        s->amplitude *= before / g->noise_e;
         if (!s->broken) { /* the filter's sum over its norm times what is too much */
+            s->amplitude *= before / g->noise_e;
             double length = s->as_streak ? g->streak : 0.0;
             s->amplitude -= g->background_bias_e / (bst_bound_norm(&g->bound, length) * g->noise_e);
         }

@@ -15,6 +15,7 @@ typedef struct bst_generator_settings {
     double false_alarms_per_frame;
     double jitter_px;                    /* that widens the onboard PSF */
     double streak_min_px, streak_max_px; /* star streaks that are filtered for */
+    int mesh_px;                         /* side of the meshes of background and noise; 0: 64 */
 } bst_generator_settings;
 
 /* A detection with where it comes from. */

@@ -4,6 +4,7 @@
 
 #include "obsgen/generator.h"
 #include "obsgen/route.h"
+#include "obsgen/wander.h"
 
 /* A source of the truth on the frame, in pixels that are read. */
 typedef struct generator_source {
@@ -31,11 +32,13 @@ typedef struct generator_rank {
 
 /* The light of a detection that is seen in one with others, and of what is fitted beside it. */
 typedef struct generator_blend {
-    double flux_e, x, y;       /* as one source */
-    double widen;              /* factor on the variances from neighbours that are fitted too */
-    double spread_x, spread_y; /* of its light: that of the brightest two */
-    double flat; /* factor on the error along a streak where light of others is in it */
-    bool near;   /* another detection in the fitted pixels, or a merged source of note */
+    double flux_e, x, y; /* as one source */
+    double widen;        /* factor on the variances from neighbours that are fitted too */
+    double flat;         /* factor on the error along a streak where light of others is in it */
+    bool near;           /* another detection in the fitted pixels, or a merged source of note */
+    bool drawn;          /* x and y have their error already */
+    bool point;          /* a streak that the filter for points shows better */
+    double snr;          /* of what was drawn */
 } generator_blend;
 
 /* Half pixels of the longest streak that is filtered for. */
@@ -58,9 +61,11 @@ struct bst_generator {
     bst_route_path path; /* the true one; count 0: not known */
     double *path_x, *path_y, *object_x, *object_y;
     int path_room;
-    double streak; /* 0: not filtered for */
+    double streak;      /* 0: not filtered for */
+    bst_wander *wander; /* for `streak`, once it was asked for */
     bool smeared;
     double background_e, noise_e, threshold, streak_share;
+    double dark_noise_e; /* the noise without the light that is part of it */
     double faint_light_e, faint_square_e2, background_bias_e; /* bias: what is too much of it */
     struct generator_thresholds {
         int width, height;
@@ -96,7 +101,7 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
 double bst_generator_draw(const bst_generator *g, const generator_source *s, int which);
 
 /* Draws of one source. */
-enum { GENERATOR_PEAK, GENERATOR_PLACE, GENERATOR_FLUX, GENERATOR_BLEND, GENERATOR_DRAWS = 8 };
+enum { GENERATOR_PEAK, GENERATOR_PLACE, GENERATOR_FLUX, GENERATOR_DRAWS = 8 };
 
 /* Takes a maximum of the filter's output that is not fitted: at the pixel itself. item: of the
  * truth, or -1. */

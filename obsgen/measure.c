@@ -44,14 +44,12 @@ static void measure_place(const bst_generator *g, const generator_source *s,
     double widen_along = b->widen / fmax(length > 1.0 ? s->ends : s->visible, LEAST_SEEN);
     double widen_across = b->widen / fmax(s->visible, LEAST_SEEN);
     double worse = (s->saturated ? 4.0 : 1.0) / fmin(s->sharp, 1.0);
-    error[0] *= along * worse * b->flat * sqrt(truth->var_along_px2 * widen_along);
-    error[1] *= across * worse * sqrt(truth->var_across_px2 * widen_across);
+    double open = b->drawn ? 0.0 : worse;
+    error[0] *= along * open * b->flat * sqrt(truth->var_along_px2 * widen_along);
+    error[1] *= across * open * sqrt(truth->var_across_px2 * widen_across);
     double c = s->length > 0.0 ? s->path.dx / s->length : 1.0;
     double n = s->length > 0.0 ? s->path.dy / s->length : 0.0;
     double x = b->x + c * error[0] - n * error[1], y = b->y + n * error[0] + c * error[1];
-    double between = cal->blend_error * bst_generator_draw(g, s, GENERATOR_BLEND);
-    x += between * b->spread_x;
-    y += between * b->spread_y;
     double bias = cal->phase_bias_px / g->binning, shared[2];
     shared_bias(g, s, shared);
     x += shared[0] + bias * sin(2.0 * BST_PI * b->x);
@@ -65,8 +63,9 @@ static void measure_place(const bst_generator *g, const generator_source *s,
     d->cov_yy = n * n * a2 + c * c * b2;
 }
 
-static void set_extent(const bst_generator *g, const generator_source *s, bst_detection *d) {
-    double modelled = s->as_streak ? g->streak : 0.0, b = g->binning;
+static void set_extent(const bst_generator *g, const generator_source *s, bool as_streak,
+                       bst_detection *d) {
+    double modelled = as_streak ? g->streak : 0.0, b = g->binning;
     double length = d->snr >= MOMENTS_SNR ? s->length : modelled;
     double across2 = g->sigma * g->sigma, along2 = across2 + length * length / 12.0;
     d->length_px = b * FWHM_PER_SIGMA * sqrt(along2);
@@ -78,7 +77,7 @@ static void set_extent(const bst_generator *g, const generator_source *s, bst_de
         d->angle_rad += BST_PI;
     }
     bool long_enough = d->length_px > 1.5 * fmax(d->width_px, b);
-    if (s->as_streak || (d->snr >= MOMENTS_SNR && long_enough)) {
+    if (as_streak || (d->snr >= MOMENTS_SNR && long_enough)) {
         d->flags |= BST_DETECTION_STREAK;
     }
 }
@@ -101,7 +100,7 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
     bst_detection d = {0};
     double seen = fmax(s->visible, LEAST_SEEN);
     /* a point filter's flux of a streak too faint to be fitted as one is what it caught */
-    bool own = s->as_streak || s->peak >= MOMENTS_SNR || s->length < 0.5;
+    bool own = !b->point && (s->as_streak || s->peak >= MOMENTS_SNR || s->length < 0.5);
     double length = own ? s->length : 0.0;
     double caught =
         own ? 1.0
@@ -116,12 +115,15 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
                    sqrt(1.0 - together * together) * bst_generator_draw(g, s, GENERATOR_FLUX);
     flux -= g->background_bias_e / (fitted.norm * fitted.norm);
     d.flux_e = fmax(flux + noise * sqrt(fitted.flux_variance * b->widen / seen), 0.1 * fabs(flux));
+    if (b->drawn) {
+        d.flux_e = b->snr * g->noise_e / fitted.norm;
+    }
     bst_bound_at told = bst_bound_of(&g->bound, d.flux_e, g->noise_e, length);
     d.flux_sigma_e = sqrt(told.flux_variance * b->widen / seen);
     d.snr = d.flux_e * told.norm / g->noise_e;
     measure_place(g, s, b, &truth, &told, b->flux_e * truth.norm / g->noise_e, length, &d);
     d.v_mag = -2.5 * log10(d.flux_e / (fmax(g->exposure_s, 1e-9) * g->electrons_per_s_v0));
-    set_extent(g, s, &d);
+    set_extent(g, s, s->as_streak && !b->point, &d);
     d.flags |= b->near ? BST_DETECTION_BLEND : 0u;
     d.flags |= s->saturated ? BST_DETECTION_SATURATED : 0u;
     double half_x = 0.5 * fabs(s->path.dx) + 2.0 * g->sigma;

@@ -18,7 +18,7 @@ typedef struct obsgen_config {
     char calibration_file[512];
     /* those of scenegen and imgproc where the sensor has them */
     double v_limit, margin_px;
-    int64_t truth_capacity, capacity;
+    int64_t truth_capacity, capacity, mesh_px;
     double false_alarms_per_frame, jitter_px, streak_min_px, streak_max_px, search_radius_px,
         match_tolerance_px;
 } obsgen_config;
@@ -46,6 +46,8 @@ static const bst_config_desc config_table[] = {
              "Star streaks shorter than this are taken for points" OF_OTHERS "."),
     BST_REAL(obsgen_config, streak_max_px, "px", 1, 128, "64",
              "Star streaks longer than this are not filtered for" OF_OTHERS "."),
+    BST_INT(obsgen_config, mesh_px, "px", 8, 1024, "64",
+            "Side of the meshes in which background and noise are estimated" OF_OTHERS "."),
     BST_REAL(obsgen_config, search_radius_px, "px", 2, 500, "60",
              "Greatest pointing error over which stars are identified" OF_OTHERS "."),
     BST_REAL(obsgen_config, match_tolerance_px, "px", 0.5, 20, "3",
@@ -150,7 +152,8 @@ static bst_status prepare(const bst_module_env *env, obsgen *o) {
                                              .false_alarms_per_frame = c->false_alarms_per_frame,
                                              .jitter_px = c->jitter_px,
                                              .streak_min_px = c->streak_min_px,
-                                             .streak_max_px = c->streak_max_px};
+                                             .streak_max_px = c->streak_max_px,
+                                             .mesh_px = (int)c->mesh_px};
     BST_TRY(bst_generator_create(env->ctx, o->world_camera, bst_knowledge_camera(env->knowledge),
                                  &settings, &o->calibration, o->key, &o->generator));
     BST_TRY(bst_generator_reserve_streaks(env->ctx, o->generator, (int)o->world_camera->width_px,

@@ -8,9 +8,8 @@
 /* SNR about the threshold in which Pd is fitted, stars whose mean place is one, grid of places. */
 static const double PD_REACH = 4.0;
 enum { LEAST_COMMON = 8, GRID = 48, CAPACITY = 4096 };
-/* Sources that count for blends; of those that places are compared of, the least, and the least
- * share of a companion's SNR. */
-static const double BLEND_SNR = 10.0, COMPANION_LEAST = 5.0, COMPANION_SHARE = 0.3;
+/* Sources that count for blends. */
+static const double BLEND_SNR = 10.0;
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
 
 bst_status bst_calibrator_create(bst_ctx *ctx, bst_calibrator **out) {
@@ -21,7 +20,7 @@ bst_status bst_calibrator_create(bst_ctx *ctx, bst_calibrator **out) {
 void bst_calibrator_free(bst_calibrator *c) {
     if (c) {
         bst_generator_free(c->theory);
-        for (int i = 0; i <= CALIBRATE_BLENDS; i++) {
+        for (int i = 0; i < CALIBRATE_BLENDS; i++) {
             bst_generator_free(c->blended[i]);
         }
         free(c->made);
@@ -50,12 +49,10 @@ bst_status bst_calibrator_begin(bst_ctx *ctx, bst_calibrator *c, const bst_calib
     BST_TRY(
         bst_generator_create(ctx, path->camera, path->camera, &settings, &theory, key, &c->theory));
     bst_obsgen_calibration_theory(&theory);
-    for (int i = 0; i <= CALIBRATE_BLENDS; i++) {
+    for (int i = 0; i < CALIBRATE_BLENDS; i++) {
         bst_generator_free(c->blended[i]);
         c->blended[i] = NULL;
-        theory.blend_distance_factor =
-            calibrate_blend_factors[i < CALIBRATE_BLENDS ? i : CALIBRATE_TYPICAL];
-        theory.blend_error = i < CALIBRATE_BLENDS ? 0.0 : CALIBRATE_BLEND_ERROR;
+        theory.blend_distance_factor = calibrate_blend_factors[i];
         BST_TRY(bst_generator_create(ctx, path->camera, path->camera, &settings, &theory, key,
                                      &c->blended[i]));
     }
@@ -85,8 +82,9 @@ static double length_of(const bst_truth_item *t) {
     return isfinite(length) ? length : 0.0;
 }
 
-/* Path of the stars in the middle of the frame: of the star that is nearest to it. */
-static void star_path(const bst_truth *truth, double x, double y, double *dx, double *dy) {
+/* Path of the stars in the middle of the frame: of the star that is nearest to it; false where
+ * there is none. */
+static bool star_path(const bst_truth *truth, double x, double y, double *dx, double *dy) {
     double nearest = INFINITY;
     *dx = *dy = 0.0;
     for (int i = 0; i < truth->count; i++) {
@@ -99,6 +97,7 @@ static void star_path(const bst_truth *truth, double x, double y, double *dx, do
             *dy = t->y_end_px - t->y_start_px;
         }
     }
+    return isfinite(nearest);
 }
 
 /* Whether a place is further than `reach` from every source of the truth that shows. */
@@ -284,39 +283,12 @@ static bool is_beside(const bst_truth *truth, int i, double reach) {
     return false;
 }
 
-/* Whether a source has a fainter one near it that may be seen in one with it. */
-static bool has_companion(const bst_truth *truth, int i, double reach) {
-    const bst_truth_item *t = &truth->items[i];
-    if (!(t->snr >= COMPANION_LEAST) || !(t->flags & BST_TRUTH_IN_FIELD) ||
-        (t->flags & BST_TRUTH_OCCULTED)) {
-        return false;
-    }
-    for (int k = 0; k < truth->count; k++) {
-        const bst_truth_item *o = &truth->items[k];
-        if (k != i && o->snr <= t->snr && o->snr > COMPANION_SHARE * t->snr &&
-            fabs(o->x_mean_px - t->x_mean_px) < reach &&
-            fabs(o->y_mean_px - t->y_mean_px) < reach) {
-            return true;
-        }
-    }
-    return false;
-}
-
-static void add_together(calibrate_mean *sum, const bst_truth_item *t, const bst_detections *all,
-                         int k) {
-    if (k >= 0) {
-        double dx = all->items[k].x_px - t->x_mean_px, dy = all->items[k].y_px - t->y_mean_px;
-        sum->sum += dx * dx + dy * dy;
-        sum->count++;
-    }
-}
-
 /* Counts what is told apart in the image and at each distance of blends, paired alike. */
 static bst_status add_blends(bst_ctx *ctx, bst_calibrator *c, const bst_generator_frame *frame,
-                             const bst_detections *detections, double fwhm) {
+                             double fwhm) {
     const bst_truth *truth = frame->truth;
     double reach = 4.0 * fwhm;
-    for (int n = 0; n <= CALIBRATE_BLENDS; n++) {
+    for (int n = 0; n < CALIBRATE_BLENDS; n++) {
         bst_generator_result made;
         BST_TRY(bst_generator_run(ctx, c->blended[n], frame, &made));
         c->made->count = made.count;
@@ -325,18 +297,6 @@ static bst_status add_blends(bst_ctx *ctx, bst_calibrator *c, const bst_generato
         }
         BST_TRY(bst_pairing_make(ctx, &c->blend_pairing, truth, c->made, fwhm));
         for (int i = 0; i < truth->count; i++) {
-            if ((n == CALIBRATE_TYPICAL || n == CALIBRATE_BLENDS) &&
-                has_companion(truth, i, reach)) {
-                const bst_truth_item *t = &truth->items[i];
-                add_together(&c->together[n == CALIBRATE_TYPICAL ? 1 : 2], t, c->made,
-                             c->blend_pairing.detection_of[i]);
-                if (n == CALIBRATE_TYPICAL) {
-                    add_together(&c->together[0], t, detections, c->pairing.detection_of[i]);
-                }
-            }
-            if (n == CALIBRATE_BLENDS) {
-                continue;
-            }
             bool beside =
                 (n == 0 || c->blend_pairing.detection_of[i] >= 0) && is_beside(truth, i, reach);
             c->beside[CALIBRATE_BLENDS] += n == 0 && beside && c->pairing.detection_of[i] >= 0;
@@ -354,8 +314,10 @@ bst_status bst_calibrator_add(bst_ctx *ctx, bst_calibrator *c, const bst_truth *
                                  .binning = 1,
                                  .exposure_s = exposure_s,
                                  .sigma_px = c->sigma_px};
-    star_path(truth, 0.5 * (double)camera->width_px, 0.5 * (double)camera->height_px,
-              &frame.streak_dx_px, &frame.streak_dy_px);
+    if (!star_path(truth, 0.5 * (double)camera->width_px, 0.5 * (double)camera->height_px,
+                   &frame.streak_dx_px, &frame.streak_dy_px)) {
+        return BST_OK; /* how the camera moved is not known */
+    }
     bst_generator_result theory;
     BST_TRY(bst_generator_run(ctx, c->theory, &frame, &theory));
     if (theory.smeared || !(detections->noise_e > 0.0)) {
@@ -366,7 +328,7 @@ bst_status bst_calibrator_add(bst_ctx *ctx, bst_calibrator *c, const bst_truth *
     add_noise(c, detections, &theory);
     double fwhm = FWHM_PER_SIGMA * c->sigma_px, reach = 5.0 * c->sigma_px + 3.0;
     BST_TRY(bst_pairing_make(ctx, &c->pairing, truth, detections, fwhm));
-    BST_TRY(add_blends(ctx, c, &frame, detections, fwhm));
+    BST_TRY(add_blends(ctx, c, &frame, fwhm));
     /* first what all have in common, then each */
     common_error common = {0.0, 0.0, 0.0, 0};
     for (int pass = 0; pass < 2; pass++) {

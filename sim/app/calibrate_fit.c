@@ -114,19 +114,6 @@ static double fit_blends(const bst_calibrator *c) {
     return calibrate_blend_factors[CALIBRATE_BLENDS - 1];
 }
 
-/* The error between sources seen as one with which their places scatter as in images. */
-static double fit_blend_error(const bst_calibrator *c) {
-    double square[3];
-    for (int k = 0; k < 3; k++) {
-        if (c->together[k].count < LEAST_SOURCES) {
-            return 0.0;
-        }
-        square[k] = c->together[k].sum / (double)c->together[k].count;
-    }
-    double part = (square[0] - square[1]) / fmax(square[2] - square[1], 1e-6);
-    return CALIBRATE_BLEND_ERROR * sqrt(fmin(fmax(part, 0.0), 10.0));
-}
-
 /* Standard deviation of normal errors of which those beyond CALIBRATE_MOST_SIGMAS were left out,
  * from the mean square of the rest: f^2 (1 - 2 c phi(c) / (2 Phi(c) - 1)), c =
  * CALIBRATE_MOST_SIGMAS / f. */
@@ -167,7 +154,6 @@ bst_status bst_calibrator_fit(bst_ctx *ctx, bst_calibrator *c, bst_obsgen_calibr
     }
     fit_detection(c, out);
     out->blend_distance_factor = fit_blends(c);
-    out->blend_error = fit_blend_error(c);
     fit_places(c->across, out->across_factor);
     fit_places(c->along, out->along_factor);
     for (int i = 0; i < BST_OBSGEN_SNRS; i++) {

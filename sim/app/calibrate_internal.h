@@ -7,10 +7,8 @@
 #include "sim/app/pairing.h"
 
 /* Distances of blends that are tried, over theory's. */
-enum { CALIBRATE_BLENDS = 5, CALIBRATE_TYPICAL = 2 };
+enum { CALIBRATE_BLENDS = 5 };
 static const double calibrate_blend_factors[CALIBRATE_BLENDS] = {0.7, 0.9, 1.1, 1.3, 1.5};
-/* Error between sources that are seen as one which is tried. */
-static const double CALIBRATE_BLEND_ERROR = 0.6;
 /* Errors of places over the bound that count. */
 static const double CALIBRATE_MOST_SIGMAS = 2.5;
 
@@ -27,10 +25,8 @@ typedef struct calibrate_mean {
 
 struct bst_calibrator {
     bst_calibrated_path path;
-    bst_generator *theory, *blended[CALIBRATE_BLENDS + 1]; /* the last with CALIBRATE_BLEND_ERROR */
-    bst_detections *made;                                  /* of one of them */
-    calibrate_mean together[3]; /* places, px^2, of sources with a companion: in images, without and
-                                with the error that is tried */
+    bst_generator *theory, *blended[CALIBRATE_BLENDS];
+    bst_detections *made; /* of one of them */
     long beside[CALIBRATE_BLENDS +
                 1]; /* sources beside a brighter one that were found: in images, by each */
     double sigma_px;
