@@ -251,6 +251,7 @@ bst_status bst_study_plot_sensitivity(bst_ctx *ctx, FILE *out, const bst_study_v
             BST_TRY(put_metric(ctx, out, v, &v->metrics[metrics[k]], "sensitivity", morris == 1));
         }
         BST_TRY(put_metric(ctx, out, v, &v->wall, "speed_sensitivity", morris == 1));
+        BST_TRY(put_metric(ctx, out, v, &v->cpu, "speed_sensitivity", morris == 1));
         bst_page_grid_end(out);
     }
     bst_page_section_end(out);

@@ -191,6 +191,7 @@ static bst_status take_speed(bst_ctx *ctx, bst_study_view *v, const bst_rows *ro
     }
     if (v->read < v->runs && v->run_numbers[v->read] == bst_rows_int(rows, 0)) {
         v->wall.of_run[v->read] = bst_rows_real(rows, 1);
+        v->cpu.of_run[v->read] = bst_rows_real(rows, 2);
     }
     return BST_OK;
 }
@@ -289,6 +290,7 @@ static void finish(bst_study_view *v) {
         }
     }
     average(v, &v->wall);
+    average(v, &v->cpu);
 }
 
 static bst_status allocate(bst_ctx *ctx, bst_study_view *v) {
@@ -307,8 +309,13 @@ static bst_status allocate(bst_ctx *ctx, bst_study_view *v) {
     v->done = calloc(runs, sizeof *v->done);
     v->wall = (bst_study_metric_view){
         .name = "wall_s", .unit = "s", .doc = "Wall time of a run.", .varies = true};
-    return v->axes && v->metrics && v->setting_of_run && v->run_numbers && v->done
-               ? make_room(ctx, v, &v->wall)
+    v->cpu = (bst_study_metric_view){.name = "cpu_s",
+                                     .unit = "s",
+                                     .doc = "Processor time of a run, on all threads.",
+                                     .varies = true};
+    return v->axes && v->metrics && v->setting_of_run && v->run_numbers && v->done &&
+                   make_room(ctx, v, &v->wall) == BST_OK
+               ? make_room(ctx, v, &v->cpu)
                : no_memory(ctx);
 }
 
@@ -340,7 +347,13 @@ bst_status bst_study_view_read(bst_ctx *ctx, bst_run_reader *tables, bst_study_v
     }
     if (status == BST_OK) {
         v->read = 0;
-        status = each_row(ctx, v, "SELECT run, wall_s FROM speed ORDER BY run", take_speed, v);
+        bool both =
+            bst_run_reader_int(
+                tables, "SELECT 1 FROM pragma_table_info('speed') WHERE name = 'cpu_s'", 0, 0) == 1;
+        status = each_row(ctx, v,
+                          both ? "SELECT run, wall_s, cpu_s FROM speed ORDER BY run"
+                               : "SELECT run, wall_s, NULL FROM speed ORDER BY run",
+                          take_speed, v);
     }
     if (status == BST_OK) {
         status = each_row(ctx, v,
@@ -373,6 +386,7 @@ void bst_study_view_free(bst_study_view *v) {
         free_metric(&v->metrics[i]);
     }
     free_metric(&v->wall);
+    free_metric(&v->cpu);
     free(v->axes);
     free(v->metrics);
     free(v->setting_of_run);

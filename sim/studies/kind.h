@@ -38,6 +38,7 @@ typedef struct bst_study_result {
     double metrics[BST_STUDY_METRICS];
     double *series; /* [rows][series_count of the kind]; freed by who called run */
     int rows;
+    double cpu_s; /* processor time of the run on all threads; whoever calls run fills it in */
 } bst_study_result;
 
 typedef struct bst_study_kind {

@@ -45,7 +45,9 @@ static int bind_to_cores(int index, int workers, bool unpinned) {
 /* Cores that Slurm grants a task, which it need not be bound to; 0: this is no such task. */
 static int granted_cores(void) {
     const char *text = getenv("SLURM_CPUS_PER_TASK");
-    return text ? atoi(text) : 0;
+    char *end = NULL;
+    long n = text ? strtol(text, &end, 10) : 0;
+    return text && end != text && *end == '\0' && n > 0 && n < 65536 ? (int)n : 0;
 }
 
 static bool cache_root(char *out, size_t bytes) {

@@ -16,7 +16,8 @@ static double setting_mean(const bst_results *r, int metric, int64_t setting) {
     double sum = 0.0;
     for (int64_t i = setting * replicates; i < (setting + 1) * replicates; i++) {
         double x = r->state[i] != BST_ROW_DONE ? NAN
-                   : metric < 0                ? r->wall_s[i]
+                   : metric == BST_SPEED_WALL  ? r->wall_s[i]
+                   : metric == BST_SPEED_CPU   ? r->cpu_s[i]
                                                : r->metrics[i * r->kind->metric_count + metric];
         if (!isnan(x)) {
             sum += x;
@@ -133,7 +134,9 @@ static bst_status put_figure(bst_ctx *ctx, const bst_results *r, int factor, int
         const bst_value row[] = {
             bst_int_value(f->sweep),
             bst_text_value(f->design == BST_SWEEP_MORRIS ? "morris" : "one_at_a_time"),
-            bst_text_value(metric < 0 ? "wall_s" : r->kind->metrics[metric].name),
+            bst_text_value(metric == BST_SPEED_WALL  ? "wall_s"
+                           : metric == BST_SPEED_CPU ? "cpu_s"
+                                                     : r->kind->metrics[metric].name),
             bst_int_value(i + 1),
             bst_text_value(r->study->axes[list[i].axis].name),
             bst_real_value(list[i].effect),
@@ -174,8 +177,9 @@ static bst_status write_table(bst_ctx *ctx, const bst_tables_job *j, const char 
         if (!has_effects(&s->factors[f])) {
             continue;
         }
-        for (int m = 0; m < (speed ? 1 : j->metric_count) && status == BST_OK; m++) {
-            status = put_figure(ctx, j->results, f, speed ? -1 : j->metrics[m], &t);
+        for (int m = 0; m < (speed ? 2 : j->metric_count) && status == BST_OK; m++) {
+            static const int figures[2] = {BST_SPEED_WALL, BST_SPEED_CPU};
+            status = put_figure(ctx, j->results, f, speed ? figures[m] : j->metrics[m], &t);
         }
     }
     return bst_table_end(ctx, &t, status);
