@@ -11,9 +11,11 @@ typedef struct sums {
     double magnitude, magnitude_square, value, value_square;
 } sums;
 
-static double setting_mean(const bst_results *r, int metric, int64_t setting) {
+/* A metric's mean over the runs of a setting. Of speed the least: whatever else a worker has to do
+ * with its first run, or the machine with others' work, only adds to it. */
+static double setting_value(const bst_results *r, int metric, int64_t setting) {
     int64_t replicates = r->study->config.replicates, n = 0;
-    double sum = 0.0;
+    double sum = 0.0, least = INFINITY;
     for (int64_t i = setting * replicates; i < (setting + 1) * replicates; i++) {
         double x = r->state[i] != BST_ROW_DONE ? NAN
                    : metric == BST_SPEED_WALL  ? r->wall_s[i]
@@ -21,10 +23,11 @@ static double setting_mean(const bst_results *r, int metric, int64_t setting) {
                                                : r->metrics[i * r->kind->metric_count + metric];
         if (!isnan(x)) {
             sum += x;
+            least = fmin(least, x);
             n++;
         }
     }
-    return n > 0 ? sum / (double)n : NAN;
+    return n == 0 ? NAN : metric < 0 ? least : sum / (double)n;
 }
 
 static void add(sums *s, double magnitude, double value) {
@@ -50,8 +53,8 @@ static void add_paths(const bst_results *r, const bst_study_factor *f, int metri
         for (int a = 0; a < k; a++) {
             double by = to[a] - from[a];
             if (by != 0.0) {
-                double effect = (setting_mean(r, metric, first + (level + 1) * stride) -
-                                 setting_mean(r, metric, first + level * stride)) /
+                double effect = (setting_value(r, metric, first + (level + 1) * stride) -
+                                 setting_value(r, metric, first + level * stride)) /
                                 by;
                 add(&list[a], fabs(effect), effect);
             }
@@ -61,14 +64,14 @@ static void add_paths(const bst_results *r, const bst_study_factor *f, int metri
 
 static void add_axes(const bst_results *r, const bst_study_factor *f, int metric, int64_t first,
                      int64_t stride, sums *list) {
-    double own = setting_mean(r, metric, first);
+    double own = setting_value(r, metric, first);
     int64_t level = 1;
     for (int a = 0; a < f->axis_count; a++) {
         const bst_study_axis *axis = &r->study->axes[f->first_axis + a];
         int64_t count = axis->values ? axis->value_count : axis->axis->count;
         double least = own, most = own, begin = NAN, end = NAN;
         for (int64_t i = 0; i < count; i++, level++) {
-            double y = setting_mean(r, metric, first + level * stride);
+            double y = setting_value(r, metric, first + level * stride);
             least = fmin(least, y); /* a NAN is passed over */
             most = fmax(most, y);
             begin = i == 0 ? y : begin;

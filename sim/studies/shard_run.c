@@ -60,7 +60,7 @@ bst_status bst_shard_run_one(bst_ctx *ctx, bst_shard_worker *w, int64_t index,
     memset(result, 0, sizeof *result);
     error[0] = '\0';
     if (!w->state) {
-        BST_TRY(w->kind->open(ctx, w->kind->user, w->threads, &w->state));
+        BST_TRY(w->kind->open(ctx, w->kind->user, &w->place, &w->state));
     }
     bst_status status = run_documents(ctx, w, &run, result);
     *wall_s = bst_wall_seconds() - started;

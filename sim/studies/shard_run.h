@@ -10,8 +10,8 @@ typedef struct bst_shard_worker {
     const bst_study *study;
     const bst_study_kind *kind;
     const char *out; /* the study's folder */
-    int threads;     /* cores that are its own */
-    void *state;     /* of the kind; made with the first run */
+    bst_worker_place place;
+    void *state; /* of the kind; made with the first run */
 } bst_shard_worker;
 
 typedef void (*bst_shard_report)(void *user, const bst_shard_news *news);
