@@ -9,5 +9,6 @@ extern const bst_module_desc bst_gimbal_azimuth_elevation_module;
 extern const bst_module_desc bst_gimbal_cross_elevation_module;
 extern const bst_module_desc bst_gimbal_ideal_module;    /* type "ideal" */
 extern const bst_module_desc bst_gimbal_scripted_module; /* type "scripted" */
+extern const bst_module_desc bst_gimbal_external_module; /* type "external" */
 
 #endif

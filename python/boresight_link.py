@@ -97,7 +97,8 @@ _TABLES = {
         "axis[1].redundant:i4 axis[1].flags:u4 axis[2].axis_body:f8x3 "
         "axis[2].angle_rad:f8 axis[2].rate_radps:f8 axis[2].rate_limit_radps:f8 "
         "axis[2].accel_limit_radps2:f8 axis[2].min_rad:f8 axis[2].max_rad:f8 "
-        "axis[2].redundant:i4 axis[2].flags:u4",
+        "axis[2].redundant:i4 axis[2].flags:u4 roll.axis_body:f8x3 roll.angle_rad:f8 "
+        "roll.rate_radps:f8 roll.rate_limit_radps:f8 roll.accel_limit_radps2:f8",
     ),
     "detections": (
         "exposure_id:i8 start_tick:i8 end_tick:i8 q_cam_from_gcrf:f8x4 "
@@ -126,11 +127,11 @@ _TABLES = {
     ),
     "los_command": (
         "tick:i8 direction_gcrf:f8x3 rate_gcrf_radps:f8x3 accel_gcrf_radps2:f8x3 "
-        "near_given:i4 near_rad:f8x3 near_radps:f8x3",
+        "near_given:i4 near_rad:f8x3 near_radps:f8x3 roll_given:i4 roll_rad:f8",
     ),
     "sensor_command": (
         "exposure_s:f8 period_s:f8 window.x0:i4 window.y0:i4 window.width:i4 "
-        "window.height:i4 binning:i4",
+        "window.height:i4 binning:i4 pixel_scale_arcsec:f8",
     ),
     "control_status": (
         "tick:i8 mode:i4 target_id:i8 search_step:i4 aim_error_px:f8x2",
@@ -138,6 +139,10 @@ _TABLES = {
     "pointing": (
         "count:i4",
         "tick:i8 q_cam_from_gcrf:f8x4",
+    ),
+    "target_states": (
+        "count:i4",
+        "object:S64 tick:i8 position_gcrf_m:f8x3 velocity_gcrf_mps:f8x3",
     ),
 }
 
@@ -418,6 +423,36 @@ class Step:
         record = new_record("control_status")
         record["tick"], record["mode"], record["target_id"] = self.tick, MODES[mode], target_id
         self.send("control_status", record)
+
+    def send_sensor(self, exposure_s: float = 0.0, period_s: float = 0.0,
+                    window: tuple[int, int, int, int] = (0, 0, 0, 0), binning: int = 0,
+                    pixel_scale_arcsec: float = 0.0) -> None:
+        """How the sensor is to be exposed from the next exposure on; 0 keeps what is. `window`: x0, y0,
+        width, height in full-sensor pixels, zeros for all of it."""
+        record = new_record("sensor_command")
+        record["exposure_s"], record["period_s"], record["binning"] = exposure_s, period_s, binning
+        record["pixel_scale_arcsec"] = pixel_scale_arcsec
+        for name, value in zip(("x0", "y0", "width", "height"), window):
+            record["window." + name] = value
+        self.send("sensor_command", record)
+
+    def send_pointing(self, ticks: Any, q_cam_from_gcrf: Any) -> None:
+        """Of a gimbal: true attitudes (x, y, z, w), from GCRF to camera axes, at ascending ticks that
+        reach the next step, `period_ticks` from now; two for start and end, or a history."""
+        ticks = np.atleast_1d(np.asarray(ticks))
+        items = new_items("pointing", len(ticks))
+        items["tick"], items["q_cam_from_gcrf"] = ticks, q_cam_from_gcrf
+        self.send("pointing", new_record("pointing"), items)
+
+    def send_states(self, states: Any) -> None:
+        """Of a gimbal: where steered objects are: (name, tick, position m, velocity m/s) of each, in
+        GCRF; from the tick on it moves by two-body motion, until its next state."""
+        states = list(states)
+        items = new_items("target_states", len(states))
+        for item, (name, tick, position, velocity) in zip(items, states):
+            item["object"], item["tick"] = name, tick
+            item["position_gcrf_m"], item["velocity_gcrf_mps"] = position, velocity
+        self.send("target_states", new_record("target_states"), items)
 
     def done(self) -> None:
         """Ends the step. `Link.steps` does it when the next step is asked for."""

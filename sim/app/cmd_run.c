@@ -26,7 +26,7 @@ static const char help_text[] =
 
 int bst_cmd_run(int argc, char **argv) {
     bool help = false, overwrite = false, quiet = false;
-    const char *out = NULL;
+    const char *out = NULL, *replay = NULL;
     bool serial = false;
     bst_simulation_options sim_options = {0};
     int64_t threads = 0;
@@ -42,6 +42,11 @@ int bst_cmd_run(int argc, char **argv) {
          .target = &overwrite,
          .doc = "replace an earlier run there"},
         BST_LINK_OPTIONS(load),
+        {.name = "replay",
+         .kind = BST_OPTION_TEXT,
+         .target = &replay,
+         .argument = "RUN",
+         .doc = "external modules do what they did in the run of this folder, without their peers"},
         BST_LOAD_OPTIONS(load),
         BST_DEVICE_OPTIONS(sim_options.device, threads),
         {.name = "serial",
@@ -70,6 +75,7 @@ int bst_cmd_run(int argc, char **argv) {
     sim_options.threads = (int)threads;
     sim_options.overlap = !serial;
     sim_options.pace = true;
+    sim_options.replay = replay != NULL;
     if (bst_load_check(&ctx, &load) != BST_OK) {
         return bst_options_misuse(&ctx, "run");
     }
@@ -92,7 +98,8 @@ int bst_cmd_run(int argc, char **argv) {
         bst_json_name_file(&ctx, json);
     }
     if (status == BST_OK) {
-        status = bst_run_link_open(&ctx, sim); /* before anything is written */
+        status = replay ? bst_run_link_replay(&ctx, sim, replay)
+                        : bst_run_link_open(&ctx, sim); /* before anything is written */
     }
     if (status == BST_OK) {
         bst_loop_warn(&ctx, &scenario);

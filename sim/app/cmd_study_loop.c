@@ -141,7 +141,18 @@ enum {
     FALSE_TRACKS,
     OBJECTS_SEEN,
     OBJECTS_TRACKED,
-    METRICS
+    METRICS, /* of a sensor; what follows is of all of them together */
+    TASKS = METRICS,
+    TASKS_DONE,
+    PASSES_SEEN,
+    OBJECTS_DETECTED,
+    REVISIT,
+    LONGEST_GAP,
+    OBJECT_CUSTODY,
+    OBJECT_CUSTODY_SEEN,
+    PLACE_RMS_ARCSEC,
+    TRACKS_RMS_ARCSEC,
+    ALL_METRICS
 };
 
 #define METRIC_LIST                                                                               \
@@ -193,7 +204,33 @@ enum {
     [OBJECTS_TRACKED] = {"objects_tracked", "", "Of them: those with a confirmed track.",         \
                          BST_METRIC_VALUE}
 
-static const bst_metric metrics[METRICS] = {METRIC_LIST};
+static const bst_metric metrics[ALL_METRICS] = {
+    METRIC_LIST,
+    [TASKS] = {"tasks", "", "Tasks given, of all sensors.", BST_METRIC_VALUE},
+    [TASKS_DONE] = {"tasks_done", "", "Of them: those done.", BST_METRIC_VALUE},
+    [PASSES_SEEN] = {"passes_seen", "", "Passes of objects with a detection, by all sensors.",
+                     BST_METRIC_VALUE},
+    [OBJECTS_DETECTED] = {"objects_detected", "", "Objects that any sensor detected.",
+                          BST_METRIC_VALUE},
+    [REVISIT] = {"revisit_mean_s", "s",
+                 "From the last detection of a pass to the first of the object's next, mean.",
+                 BST_METRIC_VALUE},
+    [LONGEST_GAP] = {"longest_gap_mean_s", "s",
+                     "Longest time without a detection, mean of the objects that were detected.",
+                     BST_METRIC_VALUE},
+    [OBJECT_CUSTODY] = {"object_custody", "",
+                        "Share of the time in which an object's last detection was no older than "
+                        "record.custody_s, mean of all objects.",
+                        BST_METRIC_VALUE},
+    [OBJECT_CUSTODY_SEEN] = {"object_custody_seen", "", "The same of those that were detected.",
+                             BST_METRIC_VALUE},
+    [PLACE_RMS_ARCSEC] = {"place_rms_arcsec", "arcsec",
+                          "Detections of all objects, by the attitude from stars, against the "
+                          "truth, RMS.",
+                          BST_METRIC_VALUE},
+    [TRACKS_RMS_ARCSEC] = {"tracks_rms_arcsec", "arcsec",
+                           "Confirmed tracks of all objects against the truth, RMS.",
+                           BST_METRIC_VALUE}};
 /* of each sensor where there are several */
 static const bst_metric series[METRICS + 1] = {
     METRIC_LIST, [METRICS] = {"sensor", "", "Number of the sensor.", BST_METRIC_KEY}};
@@ -230,6 +267,26 @@ static void fill(const bst_run_sensor_figures *f, double *out) {
     out[OBJECTS_TRACKED] = (double)m->objects_tracked;
 }
 
+static void fill_all(const bst_run_report *report, double *out) {
+    const bst_sightings_figures *f = &report->sightings;
+    fill(&report->sensors[0], out);
+    for (int i = METRICS; i < ALL_METRICS; i++) {
+        out[i] = NAN;
+    }
+    if (report->has_sightings) {
+        out[TASKS] = (double)f->tasks;
+        out[TASKS_DONE] = (double)f->tasks_done;
+        out[PASSES_SEEN] = (double)f->passes_seen;
+        out[OBJECTS_DETECTED] = (double)f->seen;
+        out[REVISIT] = f->revisit_mean_s;
+        out[LONGEST_GAP] = f->gap_mean_s;
+        out[OBJECT_CUSTODY] = f->custody_fraction_all;
+        out[OBJECT_CUSTODY_SEEN] = f->custody_fraction;
+        out[PLACE_RMS_ARCSEC] = f->place_rms_arcsec;
+        out[TRACKS_RMS_ARCSEC] = f->track_rms_arcsec;
+    }
+}
+
 static bst_status fill_series(bst_ctx *ctx, const bst_run_report *report, bst_study_result *out) {
     enum { COLUMNS = METRICS + 1 };
     out->series = calloc((size_t)report->count * COLUMNS, sizeof *out->series);
@@ -249,7 +306,8 @@ static bst_status run_loop(bst_ctx *ctx, void *worker, const bst_study_run *run,
     bst_scenario scenario;
     bst_simulation *sim = NULL;
     bst_run_report report = {.sensors = NULL};
-    const bst_run_request request = {.out = run->folder, .overwrite = true, .metrics = true};
+    const bst_run_request request = {
+        .out = run->folder, .overwrite = true, .metrics = true, .most_s = run->most_s};
     bst_status status = bst_study_read_scenario(ctx, run, &scenario);
     if (status == BST_OK) {
         status = bst_study_simulation(ctx, worker, &scenario, &sim);
@@ -258,7 +316,8 @@ static bst_status run_loop(bst_ctx *ctx, void *worker, const bst_study_run *run,
         status = bst_run_scenario(ctx, &scenario, sim, &request, &report);
     }
     if (status == BST_OK) {
-        fill(&report.sensors[0], out->metrics);
+        fill_all(&report, out->metrics);
+        out->left_s = report.wall_s * (1.0 / fmax(report.part, 1e-9) - 1.0);
         status = report.count > 1 ? fill_series(ctx, &report, out) : BST_OK;
     }
     free(report.sensors);
@@ -282,7 +341,7 @@ static bst_status emit_loop(bst_ctx *ctx, void *user, const bst_study_run *run, 
 
 const bst_study_kind bst_app_study_loop = {.name = "loop",
                                            .metrics = metrics,
-                                           .metric_count = METRICS,
+                                           .metric_count = ALL_METRICS,
                                            .series_name = "sensors",
                                            .series = series,
                                            .series_count = METRICS + 1,

@@ -18,6 +18,8 @@
 #include "sim/studies/shard_run.h"
 
 enum { TRIED = 2, PATIENCE_MS = 60000 };
+/* Of a run that is tried; how long the rest takes follows from that. */
+static const double TRIED_S = 1.0;
 
 /* What the runs that are tried told. */
 typedef struct trial {
@@ -31,7 +33,8 @@ static void try_runs(const bst_study *study, const bst_study_kind *kind, const c
     bst_shard_worker worker = {.study = study,
                                .kind = kind,
                                .out = out,
-                               .place = {bst_local_settle(0, workers, 0, false), device}};
+                               .place = {bst_local_settle(0, workers, 0, false), device},
+                               .most_s = TRIED_S};
     trial t = {.count = 0};
     bst_ctx ctx = {0};
     while (t.count < TRIED && t.count < study->runs) {
@@ -44,9 +47,11 @@ static void try_runs(const bst_study *study, const bst_study_kind *kind, const c
             break;
         }
         free(result.series);
+        bool cut = result.left_s > 0.0;
+        t.wall_s[t.count] += result.left_s;
         snprintf(t.error, sizeof t.error, "%.250s", error);
         t.count++;
-        if (write(fd, &t, sizeof t) != (ssize_t)sizeof t) {
+        if (write(fd, &t, sizeof t) != (ssize_t)sizeof t || cut) {
             break;
         }
     }

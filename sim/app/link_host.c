@@ -176,7 +176,7 @@ static bst_status find_part(bst_ctx *ctx, bst_link_host *host, const char *part)
         bool named = strcmp(part, module->name) == 0 || strcmp(part, host->instance) == 0;
         host->module = named && !module->off ? module : NULL;
     }
-    if (!host->module || !bst_external_role(host->module->desc->role)) {
+    if (!host->module || !bst_external_serves(host->module->desc->role)) {
         return bst_fail(ctx, BST_ERR_NOT_FOUND,
                         "%s: no module \"%s\" that can be played over the link (allowed: imgproc, "
                         "tracker, control, or OBSERVER/SENSOR/MODULE)",

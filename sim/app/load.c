@@ -12,14 +12,16 @@
 /* Makes a module external: its type changes, and of its other keys those stay that all modules have
  * or that tell how frames are commanded. */
 static void make_external(cJSON *module) {
-    static const char *const kept[] = {"rate_hz",    "offset_s", "delay_s",
-                                       "exposure_s", "period_s", "description"};
-    bool control = strcmp(module->string, "control") == 0;
+    static const char *const kept[] = {"rate_hz",  "offset_s",    "delay_s", "exposure_s",
+                                       "period_s", "description", "platform"};
+    bool control = strcmp(module->string, "control") == 0,
+         gimbal = strcmp(module->string, "gimbal") == 0;
     for (cJSON *item = module->child, *next; item; item = next) {
         bool keep = false;
         next = item->next;
         for (size_t i = 0; i < sizeof kept / sizeof *kept; i++) {
-            keep |= strcmp(item->string, kept[i]) == 0 && (control || i < 3 || i == 5);
+            bool holds = i < 3 || i == 5 || (i < 5 && control) || (i == 6 && gimbal);
+            keep |= holds && strcmp(item->string, kept[i]) == 0;
         }
         if (!keep) {
             cJSON_Delete(cJSON_DetachItemViaPointer(module, item));
@@ -59,7 +61,8 @@ static bst_status apply_external(bst_ctx *ctx, const char *names, bst_json *json
         if (!found) {
             return bst_fail(ctx, BST_ERR_ARGUMENT,
                             "--external: the scenario has no module \"%.*s\" that can be outside "
-                            "(allowed: imgproc, tracker, control, or OBSERVER/SENSOR/MODULE)",
+                            "(allowed: imgproc, tracker, control, gimbal, or "
+                            "OBSERVER/SENSOR/MODULE)",
                             length, names);
         }
         names += length + (names[length] == ',');

@@ -27,7 +27,7 @@ typedef struct bst_load_options {
          .kind = BST_OPTION_TEXT,                                                                \
          .target = &(load).external,                                                             \
          .argument = "MODULE,...",                                                               \
-         .doc = "modules that peers play: imgproc, tracker, control"},                           \
+         .doc = "modules that peers play: imgproc, tracker, control, gimbal"},                   \
     {                                                                                            \
         .name = "pacing", .kind = BST_OPTION_TEXT, .target = &(load).pacing, .argument = "MODE", \
         .doc = "lockstep (default), realtime, or fast"                                           \

@@ -14,6 +14,7 @@ static const bst_module_desc *const modules[] = {
     &bst_gimbal_cross_elevation_module,
     &bst_gimbal_ideal_module,
     &bst_gimbal_scripted_module,
+    &bst_gimbal_external_module,
     &bst_scenegen_module,
     &bst_imgproc_module,
     &bst_tracker_module,

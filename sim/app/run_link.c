@@ -1,6 +1,11 @@
 #include "sim/app/run_link.h"
 
+#include <stdio.h>
+
+#include <cjson/cJSON.h>
+
 #include "sim/app/stop_signals.h"
+#include "sim/core/config.h"
 
 static bool stop(void *user) {
     (void)user;
@@ -14,6 +19,45 @@ bst_status bst_run_link_open(bst_ctx *ctx, bst_simulation *simulation) {
     }
     bst_link_on_wait(link, stop, NULL);
     return bst_link_open(ctx, link);
+}
+
+static const char tape[] = "link.packets";
+
+bst_status bst_run_link_replay(bst_ctx *ctx, bst_simulation *simulation, const char *folder) {
+    bst_link *link = bst_simulation_link(simulation);
+    char path[600];
+    if (!link) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "--replay: no module of the scenario is of type \"external\"; what has no "
+                        "peer is repeated by running it");
+    }
+    bst_json *json = NULL;
+    snprintf(path, sizeof path, "%.500s/manifest.json", folder);
+    BST_TRY(bst_json_load(ctx, path, &json));
+    const cJSON *pacing = cJSON_GetObjectItemCaseSensitive(bst_json_root(json), "pacing");
+    const cJSON *dropped = cJSON_GetObjectItemCaseSensitive(pacing, "dropped");
+    double count = cJSON_IsNumber(dropped) ? dropped->valuedouble : 0.0;
+    bst_json_free(json);
+    if (count > 0.0) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "--replay: %.0f frames of %s were dropped by the wall clock, which is not "
+                        "recorded; pacing/overrun \"slip\" or \"hold\" can be replayed",
+                        count, folder);
+    }
+    snprintf(path, sizeof path, "%.500s/%s", folder, tape);
+    return bst_link_replay(ctx, link, path);
+}
+
+bst_status bst_run_link_record(bst_ctx *ctx, bst_simulation *simulation, const char *folder) {
+    bst_link *link = bst_simulation_link(simulation);
+    char path[600];
+    snprintf(path, sizeof path, "%.500s/%s", folder, tape);
+    return link && !bst_link_replays(link) ? bst_link_record(ctx, link, path) : BST_OK;
+}
+
+bst_status bst_run_link_recorded(bst_ctx *ctx, bst_simulation *simulation) {
+    bst_link *link = bst_simulation_link(simulation);
+    return link ? bst_link_record_end(ctx, link) : BST_OK;
 }
 
 void bst_run_link_end(bst_simulation *simulation, bst_status status, const char *message) {

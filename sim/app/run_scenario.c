@@ -9,6 +9,7 @@
 #include "sim/app/app.h"
 #include "sim/app/json_number.h"
 #include "sim/app/plugins.h"
+#include "sim/app/run_link.h"
 #include "sim/app/run_pacing.h"
 #include "sim/app/run_pictures.h"
 #include "sim/app/run_scenario.h"
@@ -47,6 +48,8 @@ typedef struct run_state {
     bst_recorder *recorder;
     watched_sensor *sensors;
     int sensor_count;
+    double most_s;                /* of stepping; 0: as long as it takes */
+    bool cut;                     /* which was over */
     bst_run_sightings *sightings; /* NULL: not asked for */
     bool progress;
     double started, shown; /* wall seconds */
@@ -171,8 +174,10 @@ static void show_progress(run_state *run, int64_t tick, bool last) {
 }
 
 static bool interrupted(void *user, int64_t tick) {
-    show_progress(user, tick, false);
-    return bst_stop_requested();
+    run_state *run = user;
+    show_progress(run, tick, false);
+    run->cut = run->most_s > 0.0 && bst_wall_seconds() - run->started > run->most_s;
+    return run->cut || bst_stop_requested();
 }
 
 static cJSON *summary_json(const bst_loop_figures *f, double real_time_factor) {
@@ -431,6 +436,11 @@ static bst_status write_ending(run_state *run, bst_simulation *sim, bst_run *sto
     return status == BST_OK ? written : status;
 }
 
+static double seconds_run(const run_state *run, bst_simulation *sim) {
+    return (double)(bst_engine_tick(bst_simulation_engine(sim)) + 1) /
+           (double)run->scenario->tick_rate_hz;
+}
+
 /* Steps the simulation. */
 static bst_status step_through(run_state *run, bst_simulation *sim, double *wall) {
     bst_ctx *ctx = run->ctx;
@@ -447,6 +457,22 @@ static bst_status step_through(run_state *run, bst_simulation *sim, double *wall
     }
     show_progress(run, bst_engine_tick(bst_simulation_engine(sim)), true);
     return status;
+}
+
+/* Steps the simulation, and writes nothing. */
+static bst_status step_only(run_state *run, bst_simulation *sim, const bst_run_request *request,
+                            double *wall) {
+    if (request->metrics) {
+        BST_TRY(bst_run_sightings_create(run->ctx, bst_simulation_world(sim),
+                                         &run->scenario->record, run->scenario->tick_rate_hz, NULL,
+                                         &run->sightings));
+    }
+    run->most_s = request->most_s;
+    bst_status status = step_through(run, sim, wall);
+    if (status != BST_OK && !(status == BST_ERR_INTERRUPTED && run->cut)) {
+        return status;
+    }
+    return bst_run_sightings_finish(run->ctx, run->sightings, seconds_run(run, sim));
 }
 
 /* Steps the simulation and writes what belongs into the folder; the folder is complete when this
@@ -468,6 +494,9 @@ static bst_status execute(run_state *run, bst_simulation *sim, const bst_run_req
         status = bst_run_sightings_create(ctx, bst_simulation_world(sim), &run->scenario->record,
                                           run->scenario->tick_rate_hz, store, &run->sightings);
     }
+    if (status == BST_OK) {
+        status = bst_run_link_record(ctx, sim, bst_run_folder(store));
+    }
     bool stepped = status == BST_OK;
     if (stepped) {
         status = step_through(run, sim, wall);
@@ -475,9 +504,8 @@ static bst_status execute(run_state *run, bst_simulation *sim, const bst_run_req
     /* closing must not hide why the run ended */
     bst_ctx closing = *ctx;
     if (stepped && (status == BST_OK || status == BST_ERR_INTERRUPTED)) {
-        double end_s = (double)(bst_engine_tick(bst_simulation_engine(sim)) + 1) /
-                       (double)run->scenario->tick_rate_hz;
-        bst_status summed = bst_run_sightings_finish(&closing, run->sightings, end_s);
+        bst_status summed =
+            bst_run_sightings_finish(&closing, run->sightings, seconds_run(run, sim));
         if (status == BST_OK && summed != BST_OK) {
             *ctx = closing;
             status = summed;
@@ -485,6 +513,9 @@ static bst_status execute(run_state *run, bst_simulation *sim, const bst_run_req
     }
     bst_status closed = bst_recorder_close(&closing, run->recorder);
     run->recorder = NULL;
+    if (closed == BST_OK) {
+        closed = bst_run_link_recorded(&closing, sim);
+    }
     if (status == BST_OK && closed != BST_OK) {
         *ctx = closing;
         status = closed;
@@ -505,13 +536,15 @@ static bst_status execute(run_state *run, bst_simulation *sim, const bst_run_req
     return status;
 }
 
-static bst_status fill_report(run_state *run, double wall, bst_run_report *report) {
+static bst_status fill_report(run_state *run, double wall, double part, bst_run_report *report) {
     report->sensors = calloc((size_t)run->sensor_count, sizeof *report->sensors);
     if (!report->sensors) {
         return bst_fail(run->ctx, BST_ERR_MEMORY, "out of memory for the figures of the run");
     }
     report->count = run->sensor_count;
     report->wall_s = wall;
+    report->part = part;
+    report->has_sightings = bst_run_sightings_figures(run->sightings, &report->sightings);
     for (int i = 0; i < run->sensor_count; i++) {
         const watched_sensor *sensor = &run->sensors[i];
         bst_run_sensor_figures *f = &report->sensors[i];
@@ -535,13 +568,15 @@ bst_status bst_run_scenario(bst_ctx *ctx, const bst_scenario *scenario, bst_simu
         status = bst_fail(ctx, BST_ERR_INTERRUPTED, "interrupted before the run began");
     }
     if (status == BST_OK) {
-        status = request->out ? execute(&run, sim, request, &wall) : step_through(&run, sim, &wall);
+        status = request->out ? execute(&run, sim, request, &wall)
+                              : step_only(&run, sim, request, &wall);
     }
     if (status == BST_OK && request->print) {
         print_table(&run, sim, request->out, wall);
     }
     if (status == BST_OK && report) {
-        status = fill_report(&run, wall, report);
+        double part = run.cut ? seconds_run(&run, sim) / scenario->duration_s : 1.0;
+        status = fill_report(&run, wall, part, report);
     }
     free_run(&run);
     return status;

@@ -5,6 +5,7 @@
 
 #include "sim/engine/simulation.h"
 #include "sim/eval/run_metrics.h"
+#include "sim/eval/sightings.h"
 
 typedef struct bst_run_request {
     const char *out; /* folder of the results; NULL: nothing is written */
@@ -12,6 +13,7 @@ typedef struct bst_run_request {
     bool progress;   /* a line on the standard error */
     bool print;      /* the table of results on the standard output */
     bool metrics;    /* work out the figures of sim/eval/run_metrics.h too */
+    double most_s;   /* > 0, without a folder: stepping ends after so much time */
 } bst_run_request;
 
 typedef struct bst_run_sensor_figures {
@@ -23,7 +25,10 @@ typedef struct bst_run_sensor_figures {
 typedef struct bst_run_report {
     bst_run_sensor_figures *sensors; /* in the scenario's order; the caller frees */
     int count;
-    double wall_s; /* of stepping */
+    double wall_s;      /* of stepping */
+    double part;        /* of the scenario's duration that was stepped; below 1 after most_s */
+    bool has_sightings; /* there are objects, and the record is to have them */
+    bst_sightings_figures sightings; /* with figures asked for, or a folder */
 } bst_run_report;
 
 /* Runs a simulation that was made of the scenario and was not stepped yet. BST_ERR_INTERRUPTED when

@@ -98,6 +98,9 @@ static void put_errors(row *r, const bst_sighting_error *place, const bst_sighti
 static bst_status take_pass(void *user, bst_ctx *ctx, const bst_pass *p) {
     bst_run_sightings *s = user;
     row r = {.count = 0};
+    if (!s->passes) {
+        return BST_OK;
+    }
     put_int(&r, p->sensor);
     put_object(&r, s->world, p->object);
     put_real(&r, p->start_s);
@@ -160,12 +163,12 @@ bst_status bst_run_sightings_create(bst_ctx *ctx, const bst_world *world,
     s->world = world;
     bst_status status = bst_sightings_create(ctx, world, tick_rate_hz, record->custody_s, take_pass,
                                              s, &s->sightings);
-    if (status == BST_OK) {
+    if (status == BST_OK && store) {
         status =
             bst_table_create(ctx, store, "passes", "Objects in the field of a sensor.",
                              pass_columns, sizeof pass_columns / sizeof *pass_columns, &s->passes);
     }
-    if (status == BST_OK) {
+    if (status == BST_OK && store) {
         status = bst_table_create(ctx, store, "sightings",
                                   "Who saw what: by object, of each sensor and of all together.",
                                   sum_columns, sizeof sum_columns / sizeof *sum_columns, &s->sums);
@@ -209,7 +212,15 @@ bst_status bst_run_sightings_finish(bst_ctx *ctx, bst_run_sightings *s, double e
     }
     summing u = {s, end_s};
     BST_TRY(bst_sightings_finish(ctx, s->sightings, end_s));
-    return bst_sightings_each(ctx, s->sightings, take_sum, &u);
+    return s->sums ? bst_sightings_each(ctx, s->sightings, take_sum, &u) : BST_OK;
+}
+
+bool bst_run_sightings_figures(const bst_run_sightings *s, bst_sightings_figures *out) {
+    *out = (bst_sightings_figures){0};
+    if (s) {
+        bst_sightings_summary(s->sightings, out);
+    }
+    return s != NULL;
 }
 
 void bst_run_sightings_add(const bst_run_sightings *s, cJSON *manifest) {
@@ -248,10 +259,8 @@ static void print(const char *name, double value, const char *unit) {
 }
 
 void bst_run_sightings_print(const bst_run_sightings *s) {
-    bst_sightings_figures f = {0};
-    if (s) {
-        bst_sightings_summary(s->sightings, &f);
-    }
+    bst_sightings_figures f;
+    (void)bst_run_sightings_figures(s, &f);
     if (f.objects < 2) {
         return; /* of one object the sensors' rows tell */
     }

@@ -10,8 +10,8 @@ struct cJSON;
 
 typedef struct bst_run_sightings bst_run_sightings;
 
-/* Makes the tables in `store`, which outlives it. *out NULL when the record is not to have them, or
- * there are no objects. */
+/* Makes the tables in `store`, which outlives it; NULL: the figures only. *out NULL when the record
+ * is not to have them, or there are no objects. */
 bst_status bst_run_sightings_create(bst_ctx *ctx, const bst_world *world,
                                     const bst_record_config *record, int64_t tick_rate_hz,
                                     bst_run *store, bst_run_sightings **out) BST_MUST_CHECK;
@@ -23,6 +23,9 @@ bst_status bst_run_sightings_message(bst_ctx *ctx, bst_run_sightings *sightings,
 /* The last rows, at the end of the simulated time. */
 bst_status bst_run_sightings_finish(bst_ctx *ctx, bst_run_sightings *sightings,
                                     double end_s) BST_MUST_CHECK;
+
+/* After that: the summary; false and all zero when there is none. */
+bool bst_run_sightings_figures(const bst_run_sightings *sightings, bst_sightings_figures *out);
 
 /* Adds "sightings" to a manifest; prints the same as rows. */
 void bst_run_sightings_add(const bst_run_sightings *sightings, struct cJSON *manifest);

@@ -40,10 +40,11 @@ typedef struct bst_window {
 /* sensor_command (latest): what control asks of the exposure clock; latched at the next exposure's
  * start. */
 typedef struct bst_sensor_command {
-    double exposure_s; /* <= 0: keep */
-    double period_s;   /* <= 0: keep */
-    bst_window window; /* width 0: full sensor */
-    int binning;       /* 0: keep */
+    double exposure_s;         /* <= 0: keep */
+    double period_s;           /* <= 0: keep */
+    bst_window window;         /* width 0: full sensor */
+    int binning;               /* 0: keep */
+    double pixel_scale_arcsec; /* at the boresight; <= 0: keep */
 } bst_sensor_command;
 
 /* exposure (queue): published at the tick at which the exposure ends. */

@@ -21,7 +21,8 @@ typedef enum bst_port_direction {
 } bst_port_direction;
 
 enum {
-    BST_PORT_OPTIONAL = 1u << 0, /* input: may have no writer */
+    BST_PORT_OPTIONAL = 1u << 0, /* input: may have no writer; output: yields to another module
+                                    that writes the channel (bst_env_writes) */
     BST_PORT_TRIGGER = 1u << 1, /* input: the module steps whenever a new message becomes visible */
     BST_PORT_FEEDBACK = 1u << 2, /* input: closes a loop; read with a delay of at least one tick */
 };
@@ -119,6 +120,8 @@ typedef struct bst_module_desc {
 
 /* In create: number of items that an output's payload shall hold. `port` indexes desc->ports. */
 void bst_env_set_capacity(const bst_module_env *env, int port, int items);
+/* In create: whether an output that yields is this module's to write. */
+bool bst_env_writes(const bst_module_env *env, int port);
 /* In create of a module that wakes itself (bst_step_wake_at): about how often it will step at most.
  * Queues behind it are sized by that. */
 void bst_env_set_rate(const bst_module_env *env, double rate_hz);

@@ -280,6 +280,11 @@ void bst_env_set_capacity(const bst_module_env *env, int port, int items) {
     self->ports[port].capacity = items;
 }
 
+bool bst_env_writes(const bst_module_env *env, int port) {
+    const instance *self = env->engine_private;
+    return self->ports[port].channel >= 0;
+}
+
 void bst_env_ignore(const bst_module_env *env, int port) {
     instance *self = env->engine_private;
     self->ports[port].channel = -1;

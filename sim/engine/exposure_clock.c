@@ -15,6 +15,7 @@ typedef struct exposure_clock {
     int64_t exposure_ticks, period_ticks;
     bst_window full, window;
     int binning;
+    double pixel_scale_arcsec; /* 0: the camera's */
     bst_frame_cursor
         updates; /* what drives the sensor frame by frame; none: updates.updates NULL */
     double dropped_fraction;
@@ -166,6 +167,9 @@ static void latch(exposure_clock *clock, const bst_sensor_command *command) {
     if (command->binning > 0) {
         clock->binning = command->binning;
     }
+    if (command->pixel_scale_arcsec > 0.0) {
+        clock->pixel_scale_arcsec = command->pixel_scale_arcsec;
+    }
     const bst_window *w = &command->window;
     clock->window = clock->full;
     if (w->width > 0 && w->height > 0) {
@@ -187,6 +191,7 @@ static void open_exposure(exposure_clock *clock, bst_sample command) {
         clock->period_ticks = clock->updates.period_ticks;
         clock->window = clock->updates.window;
         clock->binning = clock->updates.binning;
+        clock->pixel_scale_arcsec = clock->updates.pixel_scale_arcsec;
     } else if (command.payload && !command.stale) {
         latch(clock, command.payload);
     }
@@ -201,7 +206,7 @@ static void close_exposure(exposure_clock *clock, bool late, bst_exposure *out) 
                           .end_tick = clock->start_tick + clock->exposure_ticks,
                           .window = clock->window,
                           .binning = clock->binning,
-                          .pixel_scale_arcsec = clock->updates.pixel_scale_arcsec,
+                          .pixel_scale_arcsec = clock->pixel_scale_arcsec,
                           .dropped = late || (clock->dropped_fraction > 0.0 &&
                                               bst_rng_uniform(clock->drop_key, (uint64_t)clock->id,
                                                               0) < clock->dropped_fraction)};

@@ -368,7 +368,7 @@ static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
     if (status == BST_OK) {
         status = bst_engine_load(ctx, sim->engine);
     }
-    bool paced = options->pace && scenario->pacing.mode != BST_PACING_LOCKSTEP;
+    bool paced = options->pace && !options->replay && scenario->pacing.mode != BST_PACING_LOCKSTEP;
     bool parted = false;
     if (status == BST_OK && options->overlap && !paced && may_part(scenario, sim)) {
         status = bst_engine_part(ctx, sim->engine, processors(options->threads), &parted);

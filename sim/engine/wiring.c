@@ -28,11 +28,15 @@ static bst_status collect_channels(bst_ctx *ctx, bst_engine *engine) {
     if (!engine->channels) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for channels");
     }
-    for (int i = 0; i < engine->instance_count; i++) {
+    /* those that yield to other writers come last */
+    for (int k = 0; k < 2 * engine->instance_count; k++) {
+        int i = k % engine->instance_count;
+        bool yields = k >= engine->instance_count;
         instance *writer = engine->instances[i];
         for (int p = 0; p < writer->port_count; p++) {
             const bst_port *port = bst_instance_port(writer, p);
-            if (port->direction != BST_PORT_OUT) {
+            if (port->direction != BST_PORT_OUT ||
+                yields != ((port->flags & BST_PORT_OPTIONAL) != 0)) {
                 continue;
             }
             const bst_channel_type *type = bst_channel_type_find(port->channel);
@@ -43,6 +47,9 @@ static bst_status collect_channels(bst_ctx *ctx, bst_engine *engine) {
             }
             const char *scope = bst_instance_port_scope(writer, p);
             int known = find_channel(engine, scope, type);
+            if (known >= 0 && yields) {
+                continue;
+            }
             if (known >= 0) {
                 return bst_fail(ctx, BST_ERR_CONFIG, "%s and %s both write the channel %s/%s",
                                 engine->instances[engine->channels[known].writer]->name,

@@ -94,8 +94,7 @@ static void destroy(void *self) {
     }
 }
 
-/* What the peer is told about the sensor: what is known on board. */
-static bst_link_part describe(const bst_module_env *env, const bst_module_desc *desc) {
+bst_link_part bst_external_describe(const bst_module_env *env, const char *role) {
     const bst_camera *c = bst_knowledge_camera(env->knowledge);
     bst_link_part part = {.width_px = (int32_t)c->width_px,
                           .height_px = (int32_t)c->height_px,
@@ -113,7 +112,7 @@ static bst_link_part describe(const bst_module_env *env, const bst_module_desc *
                           .period_s = env->frame_period_s,
                           .period_ticks = env->period_ticks};
     snprintf(part.instance, sizeof part.instance, "%s", env->instance);
-    snprintf(part.role, sizeof part.role, "%s", desc->role);
+    snprintf(part.role, sizeof part.role, "%s", role);
     return part;
 }
 
@@ -145,7 +144,7 @@ static bst_status create(const bst_module_env *env, const bst_module_desc *desc,
             return bst_fail(env->ctx, BST_ERR_MEMORY, "out of memory for %d items", items);
         }
     }
-    bst_link_part part = describe(env, desc);
+    bst_link_part part = bst_external_describe(env, desc->role);
     bst_status status = bst_link_add(env->ctx, m->link, &part, &m->part);
     if (status != BST_OK) {
         destroy(m);
@@ -209,22 +208,31 @@ static void release_frame(void *owner) {
     bst_frame_release(owner);
 }
 
-static bst_link_frame frame_of(const bst_frame_message *f) {
-    return (bst_link_frame){.exposure_id = f->exposure_id,
-                            .start_tick = f->start_tick,
-                            .end_tick = f->end_tick,
-                            .window = f->window,
-                            .binning = f->binning,
-                            .bits = f->bits,
-                            .width = f->frame->width,
-                            .height = f->frame->height};
+bst_status bst_external_frame(bst_ctx *ctx, const bst_frame_message *f, int64_t tick,
+                              bst_link_frame *payload, bst_link_input *input) {
+    *payload = (bst_link_frame){.exposure_id = f->exposure_id,
+                                .start_tick = f->start_tick,
+                                .end_tick = f->end_tick,
+                                .window = f->window,
+                                .binning = f->binning,
+                                .bits = f->bits,
+                                .width = f->frame->width,
+                                .height = f->frame->height};
+    *input = (bst_link_input){
+        .type = BST_LINK_FRAME,
+        .payload = payload,
+        .tick = tick,
+        .pixel_bytes = sizeof(uint16_t) * (size_t)f->frame->width * (size_t)f->frame->height,
+        .hold = hold_frame,
+        .release = release_frame,
+        .owner = f->frame};
+    return bst_frame_map(f->frame, ctx, &input->pixels);
 }
 
-/* What has been counted and what is to be remembered, into the run. */
-static void tell(external *m, struct bst_step *step) {
+void bst_external_tell(bst_link *link, struct bst_step *step) {
     const char *name;
     for (int i = 0;; i++) {
-        int64_t grown = bst_link_news(m->link, i, &name);
+        int64_t grown = bst_link_news(link, i, &name);
         if (grown < 0) {
             break;
         }
@@ -232,7 +240,7 @@ static void tell(external *m, struct bst_step *step) {
             bst_step_count(step, name);
         }
     }
-    for (const char *note = bst_link_note(m->link); note; note = bst_link_note(m->link)) {
+    for (const char *note = bst_link_note(link); note; note = bst_link_note(link)) {
         bst_step_event(step, "link", "%s", note);
     }
 }
@@ -251,8 +259,14 @@ static void publish_answer(external *m, struct bst_step *step) {
     }
 }
 
-static void publish_more(external *m, struct bst_step *step) {
-    while (bst_link_more(m->link, m->part, m->outputs, m->output_count)) {
+static bst_status publish_more(external *m, struct bst_step *step) {
+    for (;;) {
+        bool more;
+        BST_TRY(bst_link_more(bst_step_ctx(step), m->link, m->part, bst_step_tick(step), m->outputs,
+                              m->output_count, &more));
+        if (!more) {
+            return BST_OK;
+        }
         publish_answer(m, step);
     }
 }
@@ -261,10 +275,9 @@ static void publish_more(external *m, struct bst_step *step) {
 static bst_status ready(external *m, struct bst_step *step, bool *is_ready) {
     bst_status status = bst_link_ready(bst_step_ctx(step), m->link, m->part, bst_step_tick(step),
                                        m->outputs, m->output_count, is_ready);
-    tell(m, step);
+    bst_external_tell(m->link, step);
     BST_TRY(status);
-    publish_more(m, step);
-    return BST_OK;
+    return publish_more(m, step);
 }
 
 /* One exchange; what came goes to the channels. */
@@ -273,11 +286,10 @@ static bst_status exchange(external *m, struct bst_step *step, const bst_link_in
     bool answered;
     bst_status status = bst_link_exchange(bst_step_ctx(step), m->link, m->part, bst_step_tick(step),
                                           inputs, count, m->outputs, m->output_count, &answered);
-    tell(m, step);
+    bst_external_tell(m->link, step);
     BST_TRY(status);
     publish_answer(m, step);
-    publish_more(m, step);
-    return BST_OK;
+    return publish_more(m, step);
 }
 
 static bool is_queue(const bst_port *port) {
@@ -328,7 +340,7 @@ static bst_status step_by_queue(void *self, struct bst_step *step) {
             continue;
         }
         const bst_frame_message *message = next.payload;
-        const bst_link_frame frame = frame_of(message);
+        bst_link_frame frame;
         for (bst_sample truth = bst_step_next(step, PORT_TRUTH); truth.payload;
              truth = bst_step_next(step, PORT_TRUTH)) {
             const bst_truth *t = truth.payload;
@@ -338,16 +350,8 @@ static bst_status step_by_queue(void *self, struct bst_step *step) {
                 break;
             }
         }
-        bst_link_input *input = &inputs[count++];
-        *input = (bst_link_input){
-            .type = BST_LINK_FRAME,
-            .payload = &frame,
-            .tick = next.written_tick,
-            .pixel_bytes = sizeof(uint16_t) * (size_t)frame.width * (size_t)frame.height,
-            .hold = hold_frame,
-            .release = release_frame,
-            .owner = message->frame};
-        BST_TRY(bst_frame_map(message->frame, bst_step_ctx(step), &input->pixels));
+        BST_TRY(bst_external_frame(bst_step_ctx(step), message, next.written_tick, &frame,
+                                   &inputs[count++]));
         bst_status status = exchange(m, step, inputs, count);
         bst_frame_unmap(message->frame);
         BST_TRY(status);
@@ -394,6 +398,10 @@ const bst_module_desc bst_external_control_module =
     EXTERNAL("control", control_table, control_ports, 20.0, create_control, step_control);
 
 bool bst_external_role(const char *role) {
+    return strcmp(role, "gimbal") == 0 || bst_external_serves(role);
+}
+
+bool bst_external_serves(const char *role) {
     return strcmp(role, "imgproc") == 0 || strcmp(role, "tracker") == 0 ||
            strcmp(role, "control") == 0;
 }

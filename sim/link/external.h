@@ -3,6 +3,7 @@
 #define BST_LINK_EXTERNAL_H
 
 #include "sim/core/module.h"
+#include "sim/link/link.h"
 #include "sim/link/wire.h"
 
 extern const bst_module_desc bst_external_imgproc_module;
@@ -11,7 +12,20 @@ extern const bst_module_desc bst_external_control_module;
 
 /* The message of a channel; BST_LINK_TYPES where the link has none. */
 bst_link_type bst_external_type(const char *channel);
-/* Whether there is a module of type "external" for a role. */
+/* Whether there is a module of type "external" for a role; whether `boresight serve` can play it.
+ */
 bool bst_external_role(const char *role);
+bool bst_external_serves(const char *role);
+
+/* ---- for modules of this type ---- */
+
+/* What the peer is told about the sensor: what is known on board. */
+bst_link_part bst_external_describe(const bst_module_env *env, const char *role);
+/* A frame as an input of a step: *payload and the input are filled; the pixels are mapped until
+ * bst_frame_unmap(message->frame). */
+bst_status bst_external_frame(bst_ctx *ctx, const bst_frame_message *message, int64_t tick,
+                              bst_link_frame *payload, bst_link_input *input) BST_MUST_CHECK;
+/* What the link has counted and noted, into the run. */
+void bst_external_tell(bst_link *link, struct bst_step *step);
 
 #endif

@@ -72,6 +72,8 @@ static const char opening[] =
     "|\n"
     "| `control` | `tracks`, `pointing_telemetry`, `nav_telemetry`, `mount_status` | "
     "`los_command`, `sensor_command`, `control_status` |\n"
+    "| `gimbal` | `frame` (several where several have ended), `los_command` | `pointing`, "
+    "`target_states`, `sensor_command` where no control module gives it |\n"
     "\n"
     "When a connection breaks, ZeroMQ makes it anew. The simulation answers whatever comes over it "
     "with `error` and the\n"

@@ -92,7 +92,7 @@ static bst_status bind_address(bst_ctx *ctx, bst_link *link) {
 }
 
 bst_status bst_link_open(bst_ctx *ctx, bst_link *link) {
-    if (link->router) {
+    if (link->router || bst_link_replays(link)) {
         return BST_OK;
     }
     link->welcome =
@@ -143,6 +143,7 @@ void bst_link_close(bst_link *link, int reason, const char *text) {
     if (link->context) {
         zmq_ctx_term(link->context); /* all frames have been released when it returns */
     }
+    bst_link_tape_free(link->tape);
     bst_shared_frames_free(link->shared);
     free(link->welcome);
     for (int i = 0; i < link->part_count; i++) {

@@ -88,9 +88,9 @@ typedef struct bst_link_output {
     int dropped; /* items beyond the capacity */
 } bst_link_output;
 
-/* One step of a part: sends the inputs, waits for the answer. *answered false: there was none in
- * time, and on_silence is BST_LINK_GO_ON. BST_ERR_IO: no peer came or answered, or one said that it
- * has failed; BST_ERR_INTERRUPTED: bst_link_on_wait. */
+/* One step of a part: sends the inputs (at most 63), waits for the answer. *answered false: there
+ * was none in time, and on_silence is BST_LINK_GO_ON. BST_ERR_IO: no peer came or answered, or one
+ * said that it has failed; BST_ERR_INTERRUPTED: bst_link_on_wait. */
 bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
                              const bst_link_input *inputs, int input_count,
                              bst_link_output *outputs, int output_count,
@@ -101,10 +101,20 @@ bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int part, int64_t tic
  * out the others, and tell whether the peer keeps up: one that has LINK_AHEAD steps to answer is
  * sent no more (counted), and what would have gone to it is not to be prepared. With BST_LINK_AWAIT
  * there is never more, and always room. */
-bool bst_link_more(bst_link *link, int part, bst_link_output *outputs, int output_count);
+bst_status bst_link_more(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
+                         bst_link_output *outputs, int output_count, bool *more) BST_MUST_CHECK;
 bst_status bst_link_ready(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
                           const bst_link_output *outputs, int output_count,
                           bool *ready) BST_MUST_CHECK;
+
+/* Writes what the parts are answered to a file, before the first exchange; bst_link_record_end says
+ * whether it all got there. */
+bst_status bst_link_record(bst_ctx *ctx, bst_link *link, const char *path) BST_MUST_CHECK;
+bst_status bst_link_record_end(bst_ctx *ctx, bst_link *link) BST_MUST_CHECK;
+/* Has the parts answered from such a file: nothing is bound, nobody is waited for. An exchange that
+ * is not the recorded one is BST_ERR_FORMAT. */
+bst_status bst_link_replay(bst_ctx *ctx, bst_link *link, const char *path) BST_MUST_CHECK;
+bool bst_link_replays(const bst_link *link);
 
 /* What has been counted, by name ("link_bad_crc"); false after the last. */
 bool bst_link_counter(const bst_link *link, int index, const char **name, int64_t *count);

@@ -11,8 +11,8 @@
 typedef struct sending {
     const bst_link_input *inputs;
     int count, attempt;
-    bool has_crc;
-    uint32_t crc;
+    uint64_t has_crc; /* bit i: of input i, below 64 */
+    uint32_t crcs[64];
 } sending;
 
 /* Inputs, then `step`. A peer that takes none of it has gone. */
@@ -28,11 +28,12 @@ static void send_step(bst_link *link, link_exchange *x, sending *s) {
                                   .step = part->step - 1};
         memcpy(header.instance, part->about.instance, sizeof header.instance);
         const bst_link_input *frame = input && input->type == BST_LINK_FRAME ? input : NULL;
-        if (frame && !s->has_crc && !(link->shared && link->peers[peer].shared_memory)) {
-            s->crc = bst_crc32c(frame->pixels, frame->pixel_bytes);
-            s->has_crc = true;
+        if (frame && !(s->has_crc >> i & 1) && !(link->shared && link->peers[peer].shared_memory)) {
+            s->crcs[i] = bst_crc32c(frame->pixels, frame->pixel_bytes);
+            s->has_crc |= UINT64_C(1) << i;
         }
-        sent = bst_link_send(link, peer, &header, input ? input->payload : &step, frame, s->crc);
+        sent = bst_link_send(link, peer, &header, input ? input->payload : &step, frame,
+                             frame ? s->crcs[i] : 0);
     }
     s->attempt++;
     if (!sent) {
@@ -73,7 +74,7 @@ static bst_status silent(bst_link *link, link_exchange *x, double waited_s, bool
 }
 
 /* The oldest answer that is whole goes to the caller. */
-bool bst_link_more(bst_link *link, int number, bst_link_output *outputs, int output_count) {
+static bool oldest_answer(bst_link *link, int number, bst_link_output *outputs, int output_count) {
     link_part *part = &link->parts[number];
     link_answer *oldest = NULL;
     for (int a = 0; a < LINK_AHEAD; a++) {
@@ -97,6 +98,24 @@ bool bst_link_more(bst_link *link, int number, bst_link_output *outputs, int out
         oldest->open = false;
     }
     return oldest != NULL;
+}
+
+bst_status bst_link_more(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
+                         bst_link_output *outputs, int output_count, bool *more) {
+    *more = false;
+    if (link->run.waiting == BST_LINK_AWAIT) {
+        return BST_OK;
+    }
+    if (bst_link_replays(link)) {
+        return bst_link_tape_read_more(ctx, link, number, tick, outputs, output_count, more);
+    }
+    *more = oldest_answer(link, number, outputs, output_count);
+    if (*more) {
+        bst_link_tape_answer(link, number, tick, outputs, output_count);
+    } else {
+        bst_link_tape_note(link, number, tick, false, true);
+    }
+    return BST_OK;
 }
 
 /* Room for answers that are not awaited. */
@@ -181,6 +200,9 @@ bst_status bst_link_ready(bst_ctx *ctx, bst_link *link, int number, int64_t tick
     if (link->run.waiting == BST_LINK_AWAIT) {
         return BST_OK;
     }
+    if (bst_link_replays(link)) {
+        return bst_link_tape_read_ready(ctx, link, number, tick, ready);
+    }
     BST_TRY(bst_link_open(ctx, link));
     link_part *part = &link->parts[number];
     BST_TRY(make_ahead(ctx, part, outputs, output_count));
@@ -203,6 +225,7 @@ bst_status bst_link_ready(bst_ctx *ctx, bst_link *link, int number, int64_t tick
     if (!*ready) {
         link->counts[LINK_SKIPPED]++;
     }
+    bst_link_tape_note(link, number, tick, *ready, false);
     return BST_OK;
 }
 
@@ -236,12 +259,15 @@ static bst_status not_awaited(bst_ctx *ctx, bst_link *link, int number, int64_t 
     send_step(link, &x, &s);
     bool hold = link->run.waiting == BST_LINK_HOLD;
     BST_TRY(take_until(link, &x, place->sent_s + (hold ? link->run.hold_s : 0.0), newest_finished));
-    *answered = bst_link_more(link, number, outputs, output_count);
+    *answered = oldest_answer(link, number, outputs, output_count);
     link->counts[LINK_HELD] += !*answered;
     return BST_OK;
 }
 
 bst_status bst_link_gather(bst_ctx *ctx, bst_link *link) {
+    if (bst_link_replays(link)) {
+        return BST_OK;
+    }
     BST_TRY(bst_link_open(ctx, link));
     double began = bst_wall_seconds();
     for (int i = 0; i < link->part_count; i++) {
@@ -262,14 +288,9 @@ bst_status bst_link_gather(bst_ctx *ctx, bst_link *link) {
     return BST_OK;
 }
 
-bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
-                             const bst_link_input *inputs, int input_count,
-                             bst_link_output *outputs, int output_count, bool *answered) {
-    BST_TRY(bst_link_open(ctx, link));
-    if (link->run.waiting != BST_LINK_AWAIT) {
-        return not_awaited(ctx, link, number, tick, inputs, input_count, outputs, output_count,
-                           answered);
-    }
+static bst_status awaited(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
+                          const bst_link_input *inputs, int input_count, bst_link_output *outputs,
+                          int output_count, bool *answered) {
     link->exchanges++;
     link_part *part = &link->parts[number];
     link_exchange x = {.ctx = ctx,
@@ -321,4 +342,18 @@ bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int number, int64_t t
             return silent(link, &x, now - began, answered);
         }
     }
+}
+
+bst_status bst_link_exchange(bst_ctx *ctx, bst_link *link, int number, int64_t tick,
+                             const bst_link_input *inputs, int input_count,
+                             bst_link_output *outputs, int output_count, bool *answered) {
+    if (bst_link_replays(link)) {
+        *answered = true;
+        return bst_link_tape_read(ctx, link, number, tick, outputs, output_count);
+    }
+    BST_TRY(bst_link_open(ctx, link));
+    BST_TRY((link->run.waiting == BST_LINK_AWAIT ? awaited : not_awaited)(
+        ctx, link, number, tick, inputs, input_count, outputs, output_count, answered));
+    bst_link_tape_answer(link, number, tick, outputs, output_count);
+    return BST_OK;
 }

@@ -80,6 +80,9 @@ typedef struct link_part {
         ahead[LINK_AHEAD]; /* steps whose answers are not awaited; their outputs are owned */
 } link_part;
 
+/* link_record.c: answers in a file */
+typedef struct link_tape link_tape;
+
 /* A frame that ZeroMQ holds. */
 typedef struct link_flying {
     int busy; /* atomic */
@@ -99,6 +102,7 @@ struct bst_link {
     int part_count;
     bst_link_welcome *welcome; /* room for all parts */
     link_flying flying[LINK_FLYING];
+    link_tape *tape; /* NULL: neither recorded nor replayed */
     int64_t counts[LINK_EVENTS], told[LINK_EVENTS];
     bst_link_end end;
     bool has_end;
@@ -127,6 +131,19 @@ typedef struct link_exchange {
 /* Counts, and keeps the line as a note and in the log. */
 void bst_link_event(bst_link *link, bst_ctx *ctx, int event, const char *format, ...)
     BST_PRINTF(4, 5);
+/* link_record.c */
+void bst_link_tape_free(link_tape *tape);
+/* While recording: the answer of a call, and what it tells without one. */
+void bst_link_tape_answer(bst_link *link, int part, int64_t tick, const bst_link_output *outputs,
+                          int count);
+void bst_link_tape_note(bst_link *link, int part, int64_t tick, bool ready, bool more);
+/* While replaying. */
+bst_status bst_link_tape_read(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
+                              bst_link_output *outputs, int count) BST_MUST_CHECK;
+bst_status bst_link_tape_read_more(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
+                                   bst_link_output *outputs, int count, bool *more) BST_MUST_CHECK;
+bst_status bst_link_tape_read_ready(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
+                                    bool *ready) BST_MUST_CHECK;
 /* link_send.c */
 /* Sends a message to a peer; false when it is gone or takes nothing. `crc`: of the pixels. */
 bool bst_link_send(bst_link *link, int peer, bst_link_header *header, const void *payload,

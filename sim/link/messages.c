@@ -63,7 +63,7 @@ static const bst_wire_field welcome[] = {
 
 static const bst_wire_field welcome_parts[] = {
     TEXT(bst_link_part, instance, "`observer/sensor/module`: the header's `instance`."),
-    TEXT(bst_link_part, role, "`imgproc`, `tracker`, `control`."),
+    TEXT(bst_link_part, role, "`imgproc`, `tracker`, `control`, `gimbal`."),
     INT(bst_link_part, width_px, 0, 65536, "px", "Columns of the sensor."),
     INT(bst_link_part, height_px, 0, 65536, "px", "Rows."),
     INT(bst_link_part, bits, 0, 16, "", "Of a pixel's number."),
@@ -202,6 +202,11 @@ static const bst_wire_field mount_status[] = {
     AXIS(0),
     AXIS(1),
     AXIS(2),
+    REALS(bst_mount_status, roll.axis_body, 3, "", "What the body turns about; 0: it does not."),
+    REAL(bst_mount_status, roll.angle_rad, "rad", "Its angle."),
+    REAL(bst_mount_status, roll.rate_radps, "rad/s", "Its rate."),
+    REAL(bst_mount_status, roll.rate_limit_radps, "rad/s", "Limit."),
+    REAL(bst_mount_status, roll.accel_limit_radps2, "rad/s2", "Limit."),
     END};
 
 static const bst_wire_field detections[] = {
@@ -300,7 +305,8 @@ static const bst_wire_field track_items[] = {
     ANY(bst_track, x_px, "px", "Of the latest detection."),
     ANY(bst_track, y_px, "px", "The same."),
     BOOLEAN(bst_track, uncorrelated, "Confirmed, and nothing that was expected."),
-    INT(bst_track, hidden, 0, 3, "", "0 not, 1 in shadow, 2 behind the Earth, 3 awaited."),
+    INT(bst_track, hidden, 0, 4, "",
+        "0 not, 1 in shadow, 2 behind the Earth, 3 awaited, 4 too dim."),
     END};
 
 static const bst_wire_field los_command[] = {
@@ -311,12 +317,17 @@ static const bst_wire_field los_command[] = {
     BOOLEAN(bst_los_command, near_given, "The angles below tell which of those alike are meant."),
     REALS(bst_los_command, near_rad, 3, "rad", "Those next to these, by axis, at `tick`."),
     REALS(bst_los_command, near_radps, 3, "rad/s", "Their rates."),
+    BOOLEAN(bst_los_command, roll_given, "The body is to go to the angle below."),
+    REAL(bst_los_command, roll_rad, "rad", "Of `roll` in `mount_status`."),
     END};
 
 static const bst_wire_field sensor_command[] = {
     BOUNDED(bst_sensor_command, exposure_s, -1, 1e6, "s", "0 or less: keep."),
     BOUNDED(bst_sensor_command, period_s, -1, 1e6, "s", "0 or less: keep."),
-    WINDOW(bst_sensor_command, window), INT(bst_sensor_command, binning, 0, 64, "", "0: keep."),
+    WINDOW(bst_sensor_command, window),
+    INT(bst_sensor_command, binning, 0, 64, "", "0: keep."),
+    BOUNDED(bst_sensor_command, pixel_scale_arcsec, -1, 600, "arcsec/px",
+            "Field of view; 0 or less: keep."),
     END};
 
 static const bst_wire_field control_status[] = {
@@ -329,6 +340,14 @@ static const bst_wire_field control_status[] = {
     FIELD_(bst_control_status, aim_error_px, BST_WIRE_F64, 2, BST_WIRE_ANY, 0, 0, "px",
            "As control believes: target from boresight, x and y."),
     END};
+
+static const bst_wire_field target_states[] = {COUNT(bst_link_target_states, "States."), END};
+
+static const bst_wire_field target_state_items[] = {
+    TEXT(bst_link_target_state, object, "Its name in the scenario; its `steered` is true."),
+    TICK(bst_link_target_state, tick, "From when on: not before the step's, in order."),
+    VECTOR(bst_link_target_state, position_gcrf_m, "m", "Geocentric."),
+    VECTOR(bst_link_target_state, velocity_gcrf_mps, "m/s", "Geocentric."), END};
 
 static const bst_wire_field pointing[] = {
     COUNT(bst_link_pointing, "Attitudes: 2 for start and end, more for a history."), END};
@@ -392,7 +411,7 @@ static const bst_wire_message messages[BST_LINK_TYPES] = {
               prediction_items, 65536, "The tracker's help for image processing of later frames."),
     [BST_LINK_TRACKS] = ITEMS("tracks", BOTH, bst_tracks, items, tracks, bst_track, track_items,
                               16384, "The tracker's state after a frame."),
-    [BST_LINK_LOS_COMMAND] = RECORD("los_command", PEER, bst_los_command, los_command,
+    [BST_LINK_LOS_COMMAND] = RECORD("los_command", BOTH, bst_los_command, los_command,
                                     "Where the boresight shall be, as the onboard attitude "
                                     "knowledge sees it."),
     [BST_LINK_SENSOR_COMMAND] =
@@ -402,8 +421,13 @@ static const bst_wire_message messages[BST_LINK_TYPES] = {
                                        "Mode and target, for the record and the summary."),
     [BST_LINK_POINTING] = ITEMS(
         "pointing", PEER, bst_link_pointing, items, pointing, bst_los_sample, pointing_items, 65536,
-        "The camera's true attitude, from a peer that moves it. For programs that use the "
-        "library's link on its own: no module of a scenario takes it."),
+        "The camera's true attitude, from a peer that moves it: the ticks ascend, and reach the "
+        "part's next step."),
+    [BST_LINK_TARGET_STATES] =
+        ITEMS("target_states", PEER, bst_link_target_states, items, target_states,
+              bst_link_target_state, target_state_items, 4096,
+              "States of steered objects: from its tick on an object moves by two-body motion from "
+              "there, until its next state."),
 };
 
 const bst_wire_message *bst_wire_message_of(bst_link_type type) {

@@ -98,4 +98,16 @@ typedef struct bst_link_pointing {
     bst_los_sample items[];
 } bst_link_pointing;
 
+/* target_states: where objects are that the peer steers. */
+typedef struct bst_link_target_state {
+    char object[BST_LINK_NAME_BYTES];
+    int64_t tick;
+    bst_vec3 position_gcrf_m, velocity_gcrf_mps;
+} bst_link_target_state;
+
+typedef struct bst_link_target_states {
+    int32_t count;
+    bst_link_target_state items[];
+} bst_link_target_states;
+
 #endif

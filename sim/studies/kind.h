@@ -31,6 +31,7 @@ typedef struct bst_study_run {
     const struct cJSON *settings; /* of the kind */
     const char *folder;           /* where it may leave files: "STUDY/runs/000017"; NULL: nowhere */
     const char *out;              /* the study's folder */
+    double most_s; /* > 0: only to learn how long it takes; it may end after so much time */
 } bst_study_run;
 
 /* What it gave. */
@@ -38,7 +39,8 @@ typedef struct bst_study_result {
     double metrics[BST_STUDY_METRICS];
     double *series; /* [rows][series_count of the kind]; freed by who called run */
     int rows;
-    double cpu_s; /* processor time of the run on all threads; whoever calls run fills it in */
+    double cpu_s;  /* processor time of the run on all threads; whoever calls run fills it in */
+    double left_s; /* of a run that ended after most_s: what the rest of it would take */
 } bst_study_result;
 
 /* Where a worker is to work. */

@@ -55,8 +55,10 @@ bst_status bst_shard_run_one(bst_ctx *ctx, bst_shard_worker *w, int64_t index,
                              bst_study_result *result, char error[BST_MESSAGE_BYTES],
                              double *wall_s) {
     double started = bst_wall_seconds(), busy = processor_seconds();
-    bst_study_run run = {
-        .study = w->study, .place = bst_study_place_of(w->study, index), .out = w->out};
+    bst_study_run run = {.study = w->study,
+                         .place = bst_study_place_of(w->study, index),
+                         .out = w->out,
+                         .most_s = w->most_s};
     memset(result, 0, sizeof *result);
     error[0] = '\0';
     if (!w->state) {

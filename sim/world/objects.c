@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/world/steering.h"
 #include "sim/world/world_build.h"
 
 /* One satellite of a catalogue. */
@@ -79,6 +80,9 @@ static bst_status build_listed(const bst_world_builder *b, const bst_config_list
         world->object_count = i + 1;
         BST_TRY(bst_orbit_build(b, &config->orbit, &config->burns, path, object->info.name,
                                 &object->orbit, &object->info.norad));
+        if (config->steered) {
+            BST_TRY(bst_steering_create(b->ctx, &object->orbit.steering));
+        }
         bst_name_index_add(world->object_names, object->info.name, i);
     }
     return BST_OK;

@@ -1,6 +1,7 @@
 #include <stdlib.h>
 
 #include "sim/world/kepler.h"
+#include "sim/world/steering.h"
 #include "sim/world/world_internal.h"
 
 /* Columns of the rotation from radial, transverse, normal axes to GCRF. */
@@ -110,6 +111,13 @@ bst_status bst_orbit_set_burns(bst_ctx *ctx, bst_orbit *orbit, bst_sky_clock *cl
 
 bst_status bst_orbit_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *clock,
                            bst_time epoch, double seconds, bool with_burns, bst_state *out) {
+    bool steered = false;
+    if (with_burns && orbit->steering) {
+        BST_TRY(bst_steering_state(ctx, orbit->steering, seconds, &steered, out));
+    }
+    if (steered) {
+        return BST_OK;
+    }
     switch (orbit->source) {
         case BST_ORBIT_SGP4:
             BST_TRY(sgp4_state(ctx, orbit, clock, epoch, seconds, out));

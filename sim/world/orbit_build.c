@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/world/steering.h"
 #include "sim/world/world_build.h"
 
 bst_world_path bst_world_path_join(const bst_world_builder *b, const char *path) {
@@ -134,5 +135,6 @@ void bst_orbit_free(bst_orbit *orbit) {
     bst_trajectory_free(orbit->unburnt);
     bst_trajectory_free(orbit->burnt);
     bst_gravity_free(orbit->gravity);
+    bst_steering_free(orbit->steering);
     free(orbit->burns);
 }

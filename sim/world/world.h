@@ -36,6 +36,11 @@ int bst_world_object_count(const bst_world *world);
 const bst_object_info *bst_world_object(const bst_world *world, int object);
 /* Index of the object with this name, -1 when there is none. */
 int bst_world_find_object(const bst_world *world, const char *name);
+/* From `seconds` after the epoch on the object of this name is in this state (GCRF) and moves on by
+ * two-body motion, until its next one. Truth only: what is known on board stays. BST_ERR_NOT_FOUND:
+ * there is none that is steered; BST_ERR_ARGUMENT: not later than the state before. */
+bst_status bst_world_steer(bst_ctx *ctx, const bst_world *world, const char *name, double seconds,
+                           const bst_state *state) BST_MUST_CHECK;
 int bst_world_observer_count(const bst_world *world);
 int bst_world_sensor_count(const bst_world *world, int observer);
 const char *bst_world_observer_name(const bst_world *world, int observer);

@@ -65,6 +65,9 @@ static const bst_config_desc object_table[] = {
                "How its light follows from where it is; left out: a diffuse sphere."),
     BST_LIST(bst_object_config, burns, bst_burn_config, burn_table, 0, 64, "[]",
              "Burns in the order of time. The cue does not know of them."),
+    BST_BOOL(bst_object_config, steered, "false",
+             "Its states may come while the run goes, from the peer of an external gimbal; the cue "
+             "does not know of them."),
     BST_CONFIG_END,
 };
 

@@ -66,6 +66,7 @@ typedef struct bst_object_config {
     double area_m2, albedo;
     bst_brightness_config brightness;
     bst_config_list burns; /* bst_burn_config, by time */
+    bool steered;
 } bst_object_config;
 
 typedef struct bst_catalogue_config {

@@ -42,7 +42,8 @@ typedef struct bst_orbit {
 
     bst_burn *burns;
     int burn_count;
-    const char *name; /* for messages; borrowed */
+    struct bst_steering *steering; /* owned; NULL: its states do not come by message */
+    const char *name;              /* for messages; borrowed */
 } bst_orbit;
 
 typedef struct world_object {

@@ -532,7 +532,7 @@ with open(words[-1][5:], "wb") as file:
         path = os.path.join(runs.scratch(), "file")
         with open(path, "w", encoding="ascii"):
             pass
-        self.fails(1, f"boresight: {path}: is not a folder; choose another --out\n", self.made,
+        self.fails(1, f"boresight: {path}: cannot make the folder: Not a directory\n", self.made,
                    "--table", "csv", "--out", path)
 
     @unittest.skipUnless(os.path.exists("/dev/full"), "needs /dev/full")

@@ -102,6 +102,72 @@ class SameResults(unittest.TestCase):
                 "link_hello", "link_messages", "link_connected")], count)
 
 
+class Replay(unittest.TestCase):
+    """A recorded run without its peers."""
+
+    def replayed(self, scenario, recorded, *more, frames=False):
+        again = runs.scratch() + "/again"
+        words = runs.command(scenario, again, *([] if frames else [runs.NO_FRAMES]), duration=6)
+        result = subprocess.run(words + ["--replay", recorded, *more], capture_output=True,
+                                text=True, timeout=60)
+        return again, result
+
+    def same(self, a, b):
+        one, other = boresight_link.read_run(a), boresight_link.read_run(b)
+        self.assertEqual(one.tables, other.tables)
+        for name in one.tables:
+            x, y = one.table(name), other.table(name)
+            if name == "events":  # the link had peers to speak of, the run a clock
+                x, y = ({c: t[c][~np.isin(t["kind"], ("link", "overrun"))] for c in t}
+                        for t in (x, y))
+            for column in x:
+                np.testing.assert_array_equal(x[column], y[column], f"{name}.{column}")
+
+    def test_three_parts_in_lockstep(self):
+        address, out = f"tcp://127.0.0.1:{free_port()}", runs.scratch() + "/run"
+        parts = "imgproc,tracker,control"
+        peers = [serve(runs.TRACK, address, part) for part in parts.split(",")]
+        ended(start_run(runs.TRACK, out, address, parts, duration=6))
+        for peer in peers:
+            ended(peer)
+        again, result = self.replayed(runs.TRACK, out, "--external", parts)
+        self.assertEqual(result.returncode, 1)  # no address, which even a replay's scenario has
+        again, result = self.replayed(out + "/scenario.json", out)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.same(out, again)
+        self.assertFalse(os.path.exists(again + "/link.packets"))
+        # what is not the recorded run is told, not taken
+        _, result = self.replayed(out + "/scenario.json", out, "--duration", "9")
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("the recorded run was shorter", result.stderr)
+        _, result = self.replayed(out + "/scenario.json", out, "--set",
+                                  runs.SENSOR + "/modules/control/rate_hz=10")
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("is replayed by the scenario, seed and options of its run", result.stderr)
+        with open(out + "/link.packets", "r+b") as file:
+            file.seek(1000)
+            byte = file.read(1)
+            file.seek(1000)
+            file.write(bytes([byte[0] ^ 1]))
+        _, result = self.replayed(out + "/scenario.json", out)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("link.packets", result.stderr)
+        _, result = self.replayed(runs.TRACK, out)
+        self.assertIn("no module of the scenario is of type", result.stderr)
+
+    def test_a_run_that_waits_for_nobody(self):
+        """Which answers came when is in the recording."""
+        address, out = ipc(), runs.scratch() + "/run"
+        peer = serve(runs.TRACK, address, "control")
+        ended(start_run(runs.TRACK, out, address, "control", "--pacing", "realtime", "--set",
+                        "/pacing/overrun=hold", "--set", "/pacing/speed=10", "--set",
+                        "/pacing/deadline_s=0.001", duration=6))
+        ended(peer)
+        again, result = self.replayed(out + "/scenario.json", out)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.same(out, again)
+
+
 class Client(unittest.TestCase):
     """python/boresight_link.py against the document, and by itself."""
 
@@ -233,6 +299,128 @@ class Examples(unittest.TestCase):
         self.assertLess(summary["pointing_rms_px"], 4.0)
 
 
+class Driver(unittest.TestCase):
+    """A peer that moves the line of sight, steers an object and sets the sensor, and gets frames."""
+    RATE, UPDATE = 6000, 600  # ticks per second, and from step to step
+    DIRECTION = np.array([0.36, 0.48, 0.8])
+
+    @classmethod
+    def attitude(cls, tick):
+        """The boresight on DIRECTION at 1 s, turning about camera y by 0.001 rad/s: each attitude is
+        on the shortest way between those around it."""
+        z = cls.DIRECTION
+        x = np.cross([0.0, 0.0, 1.0], z)
+        x /= np.linalg.norm(x)
+        angle = 0.001 * (tick / cls.RATE - 1.0)
+        x, z = np.cos(angle) * x - np.sin(angle) * z, np.cos(angle) * z + np.sin(angle) * x
+        rows = np.array([x, np.cross(z, x), z])
+        w = np.sqrt(1.0 + np.trace(rows)) / 2.0
+        return np.array([rows[2, 1] - rows[1, 2], rows[0, 2] - rows[2, 0], rows[1, 0] - rows[0, 1],
+                         4.0 * w * w]) / (4.0 * w)
+
+    def scenario(self):
+        with open(runs.STARE, encoding="utf-8") as file:
+            scenario = json.load(file)
+        folder = os.path.abspath(os.path.dirname(runs.STARE))
+        for orbit in (scenario["world"]["objects"][0]["orbit"], scenario["observers"][0]["orbit"]):
+            orbit["elements_file"] = os.path.join(folder, orbit["elements_file"])
+        del scenario["$schema"]
+        scenario["world"]["objects"][0]["steered"] = True
+        sensor = scenario["observers"][0]["sensors"][0]
+        sensor["modules"] = {"gimbal": {"type": "external"},
+                             "scenegen": {"type": "opencl"}}
+        scenario["record"] = {"frames": "extensions"}
+        path = runs.scratch() + "/driver.json"
+        with open(path, "w", encoding="utf-8") as file:
+            json.dump(scenario, file)
+        return path
+
+    def drive(self, out, state, gap=False):
+        """Runs it; the frames that the peer got."""
+        address, frames = ipc(), []
+        words = runs.command(self.scenario(), out, duration=5)
+        run = subprocess.Popen(words + ["--link", address], stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE, text=True)
+        with boresight_link.Link(address, serves="gimbal") as link:
+            for step in link.steps():
+                frames += [(m.record.copy(), m.pixels.copy()) for m in step.inputs
+                           if m.type == "frame"]
+                ticks = [step.tick, step.tick + self.UPDATE]
+                if not (gap and step.tick >= 4 * self.RATE):
+                    step.send_pointing(ticks, [self.attitude(t) for t in ticks])
+                if state and step.tick == self.RATE:
+                    step.send_states([("INMARSAT GX5", step.tick, *state)])
+                if step.tick == 2 * self.RATE:
+                    step.send_sensor(exposure_s=0.2, window=(100, 200, 256, 128), binning=2,
+                                     pixel_scale_arcsec=4.0)
+        said = ended(run)
+        return frames, boresight_link.read_run(out), said
+
+    def test_pointing_frames_sensor_and_target(self):
+        out = runs.scratch() + "/first"
+        frames, run, _ = self.drive(out, None)
+        # pointing: what was sent, at each of the plant's ticks
+        los = run.table("los_truth")
+        q = np.stack([los["q_cam_from_gcrf_" + c] for c in "xyzw"], axis=1)
+        expected = np.array([self.attitude(t) for t in los["tick"]])
+        self.assertGreaterEqual(len(q), 5)  # at mid-exposures
+        # quaternions of the same rotation; 1e-9 rad is a thousandth of a microradian
+        self.assertLess(np.max(1.0 - np.abs(np.sum(q * expected, axis=1))), 1e-12)
+        # frames: those of the record, the last one ended too late for the peer
+        recorded = list(run.frames())
+        self.assertEqual(len(recorded), 5)
+        self.assertEqual(len(frames), 5)
+        for (record, pixels), other in zip(frames, recorded):
+            np.testing.assert_array_equal(pixels, other)
+        # the sensor, from the exposure at 3 s on: the one at 2 s had opened
+        told = run.table("frames")
+        self.assertEqual([p.shape for _, p in frames], 3 * [(1024, 1024)] + 2 * [(64, 128)])
+        np.testing.assert_allclose(told["exposure_s"], [0.5] * 3 + [0.2] * 2)
+        np.testing.assert_allclose(run.table("exposures")["pixel_scale_arcsec"], [3] * 3 + [4] * 2)
+        self.assertEqual(frames[3][0]["window.x0"], 100)
+        # the target: 1000 km from the observer on the boresight at 1.25 s, at rest against it
+        exposures = run.table("exposures")
+        position = np.array([exposures[f"observer_gcrf_{c}_m"][1] for c in "xyz"])
+        velocity = np.array([exposures[f"observer_gcrf_{c}_mps"][1] for c in "xyz"])
+        state = (position + 1e6 * self.DIRECTION - 0.25 * velocity, velocity)
+        _, run, _ = self.drive(runs.scratch() + "/second", state)
+        truth = run.table("truth")
+        there = (truth["kind"] == "object") & (truth["exposure_id"] == 1)
+        self.assertEqual(np.sum(there), 1)
+        # its own motion and the Earth's in 3.3 ms of light time are 25 and 100 m
+        self.assertAlmostEqual(truth["range_m"][there][0], 1e6, delta=200.0)
+        ra, dec = (np.radians(truth[n][there][0]) for n in ("ra_deg", "dec_deg"))
+        seen = np.array([np.cos(dec) * np.cos(ra), np.cos(dec) * np.sin(ra), np.sin(dec)])
+        self.assertLess(np.linalg.norm(seen - self.DIRECTION), 1.5e-4)
+        # on the image: 0.00025 rad from the boresight, 17 px along x; aberration is up to 9 px
+        self.assertLess(abs(truth["y_mid_px"][there][0] - 511.5), 10.0)
+        self.assertLess(abs(abs(truth["x_mid_px"][there][0] - 511.5) - 17.2), 10.0)
+        self.assertFalse(np.any(truth["range_m"][truth["exposure_id"] == 0] < 2e6))
+
+    def test_what_is_refused_and_what_is_missing(self):
+        state = (np.array([7e6, 0, 0]), np.array([0, 7.5e3, 0]))
+        address, out = ipc(), runs.scratch() + "/run"
+        words = runs.command(self.scenario(), out, duration=1)
+        run = subprocess.Popen(words + ["--link", address], stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE, text=True)
+        with boresight_link.Link(address, serves="gimbal") as link:
+            for step in link.steps():
+                if step.tick == 0:
+                    step.send_pointing([0, 600], [self.attitude(0), self.attitude(600)])
+                elif step.tick == 1200:
+                    step.send_states([("nobody", 1200, *state), ("INMARSAT GX5", 1000, *state),
+                                      ("INMARSAT GX5", 1300, *state),
+                                      ("INMARSAT GX5", 1300, *state)])
+        ended(run)
+        count = counters(out)
+        self.assertEqual(count["target_state_refused"], 3)
+        self.assertEqual(count["pointing_held"], 1)
+        events = "\n".join(boresight_link.read_run(out).table("events")["text"])
+        for text in ('no object "nobody"', "before the step", "in the order of time",
+                     "the line of sight stays"):
+            self.assertIn(text, events)
+
+
 class BadPeers(unittest.TestCase):
     def test_nobody_comes(self):
         out = runs.scratch() + "/run"
@@ -258,7 +446,7 @@ class BadPeers(unittest.TestCase):
                 (["--link", "tcp://0.0.0.0:5555", "--external", "imgproc"],
                  "ssh -L 5555:127.0.0.1:5555"),
                 (["--external", "imgproc"], "/link/address"),
-                (["--external", "gimbal"], "imgproc, tracker, control"),
+                (["--external", "scenegen"], "imgproc, tracker, control, gimbal"),
                 (["--external", "imgproc", "--link", "http://127.0.0.1"], "is no address")):
             out = runs.scratch() + "/run"
             result = subprocess.run(runs.command(runs.STARE, out, duration=1) + words,

@@ -119,6 +119,45 @@ class Whole(unittest.TestCase):
         with runs.database(out) as database:
             count, = database.execute("SELECT count(*) FROM detections").fetchone()
         self.assertEqual(int(row["detections"]), count)
+        self.check_sightings(row, out)
+
+    def check_sightings(self, row, out):
+        """What is of all sensors together."""
+        told = runs.manifest(out)["sightings"]
+        for name, of in (("tasks", "tasks"), ("tasks_done", "tasks_done"),
+                         ("passes_seen", "passes_seen"), ("objects_detected", "objects_seen"),
+                         ("revisit_mean_s", "revisit_mean_s"),
+                         ("longest_gap_mean_s", "longest_gap_mean_s"),
+                         ("object_custody", "custody_fraction_all"),
+                         ("object_custody_seen", "custody_fraction_seen"),
+                         ("place_rms_arcsec", "place_rms_arcsec"),
+                         ("tracks_rms_arcsec", "track_rms_arcsec")):
+            self.assertEqual(row[name] == "", told[of] is None, name)
+            if row[name]:
+                # JSON has 15 digits where they do
+                self.assertTrue(math.isclose(float(row[name]), told[of], rel_tol=1e-14), name)
+
+    def test_several_observers(self):
+        """The same of five with tasks, which have a row each in another table."""
+        folder = os.path.join(self.folder, "constellation")
+        os.mkdir(folder)
+        sensors = "/observers/{}/sensors/0/camera/pixel_scale_arcsec"
+        path = write(folder, sweeps=None, dispersions=None, replicates=1,
+                     scenarios=[{"file": os.path.abspath("scenarios/constellation_quick.json")}],
+                     set={"/duration_s": 60, "/world/star_catalogue": "embedded",
+                          **{sensors.format(i): 6 for i in range(5)}})
+        result = study(path, "--out", os.path.join(folder, "out"), "--workers", "1")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with open(os.path.join(folder, "run.json"), "w", encoding="utf-8") as file:
+            file.write(study(path, "--emit", "0").stdout)
+        by_hand = os.path.join(folder, "run")
+        result = subprocess.run([runs.BORESIGHT, "run", os.path.join(folder, "run.json"), "--quiet",
+                                 "--out", by_hand], capture_output=True, text=True, timeout=600)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        row, = rows(os.path.join(folder, "out"))
+        self.assertGreater(float(row["tasks"]), 5)
+        self.check_sightings(row, by_hand)
+        self.assertEqual(len(rows(os.path.join(folder, "out"), "sensors")), 5)
 
     def test_tables_agree(self):
         """Statistics are those of the rows; the database holds what the CSV files do."""

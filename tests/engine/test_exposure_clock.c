@@ -40,7 +40,8 @@ static bst_status commander_step(void *self, struct bst_step *step) {
     *out = (bst_sensor_command){c->exposure_s,
                                 c->period_s,
                                 {(int)c->x0, (int)c->y0, (int)c->width, (int)c->height},
-                                (int)c->binning};
+                                (int)c->binning,
+                                0.0};
     return BST_OK;
 }
 
