@@ -11,6 +11,7 @@ enum {
     PORT_SENSOR = BST_GIMBAL_MOUNT, /* no mount, and so none of its status */
     PORT_COMMAND,
     PORT_FRAME,
+    PORT_TRUTH,
     PORT_COUNT,
     MOST_FRAMES = 8, /* of a step; more are lost for the peer */
     MOST_ATTITUDES = 65536,
@@ -28,13 +29,16 @@ static const bst_port ports[PORT_COUNT] = {
     [PORT_FRAME] = {.channel = BST_CHANNEL_FRAME,
                     .direction = BST_PORT_IN,
                     .flags = BST_PORT_OPTIONAL | BST_PORT_FEEDBACK},
+    [PORT_TRUTH] = {.channel = BST_CHANNEL_TRUTH,
+                    .direction = BST_PORT_IN,
+                    .flags = BST_PORT_OPTIONAL | BST_PORT_FEEDBACK},
 };
 
 enum { OUT_POINTING, OUT_STATES, OUT_SENSOR, OUTPUTS };
 
 typedef struct config {
     double update_rate_hz, exposure_s, period_s;
-    bool send_frames;
+    bool send_frames, send_truth;
     bst_platform_config platform;
 } config;
 
@@ -43,6 +47,7 @@ static const bst_config_desc config_table[] = {
              "Steps of the peer per second, each with the pointing until the next; divides the "
              "plant's rate."),
     BST_BOOL(config, send_frames, "true", "Sends the frames to the peer."),
+    BST_BOOL(config, send_truth, "false", "Sends the true scene of each exposure too."),
     BST_REAL(config, exposure_s, "s", 0, 1e6, "0",
              "The longest exposure that the peer will command; 0: the sensor's."),
     BST_REAL(config, period_s, "s", 0, 1e6, "0",
@@ -105,6 +110,9 @@ static bst_status prepare(const bst_module_env *env, const void *config_in, void
     m->commands_sensor = bst_env_writes(env, PORT_SENSOR);
     if (!c->send_frames) {
         bst_env_ignore(env, PORT_FRAME);
+    }
+    if (!c->send_truth) {
+        bst_env_ignore(env, PORT_TRUTH);
     }
     if (c->platform.spacecraft.type != BST_CRAFT_INERTIAL) {
         return bst_fail(env->ctx, BST_ERR_CONFIG,
@@ -223,7 +231,7 @@ static bst_status exchange(module *m, struct bst_step *s) {
     if (!ready) {
         return BST_OK;
     }
-    bst_link_input inputs[MOST_FRAMES + 1];
+    bst_link_input inputs[2 * MOST_FRAMES + 1];
     bst_link_frame frames[MOST_FRAMES];
     bst_frame *mapped[MOST_FRAMES];
     int count = 0, frame_count = 0;
@@ -232,6 +240,11 @@ static bst_status exchange(module *m, struct bst_step *s) {
         m->command_seen = command.sequence;
         inputs[count++] = (bst_link_input){
             .type = BST_LINK_LOS_COMMAND, .payload = command.payload, .tick = command.written_tick};
+    }
+    for (bst_sample next = bst_step_next(s, PORT_TRUTH); next.payload && count <= MOST_FRAMES;
+         next = bst_step_next(s, PORT_TRUTH)) {
+        inputs[count++] = (bst_link_input){
+            .type = BST_LINK_TRUTH, .payload = next.payload, .tick = next.written_tick};
     }
     for (bst_sample next = bst_step_next(s, PORT_FRAME); next.payload && status == BST_OK;
          next = bst_step_next(s, PORT_FRAME)) {

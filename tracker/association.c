@@ -4,13 +4,8 @@
 
 #include "tracker/multitarget_internal.h"
 
-/* Owners of a detection beside the confirmed tracks. */
-#define NOBODY (-1)
-#define SEVERAL (-2)
 /* Share of a frame in the smoothed number of false alarms, once there are enough frames. */
 #define ALARM_GAIN 0.1
-/* Frames in a row with one detection after which two tracks may prove to be the same. */
-#define SAME_FRAMES 5
 
 static double component(bst_vec3 v, int axis) {
     return axis == 0 ? v.x : axis == 1 ? v.y : v.z;
@@ -141,7 +136,7 @@ static int collect(const bst_mtt *mtt, int t, double detection_sigma, int *colum
         const bst_mtt_detection *detection = &mtt->now.items[column];
         bst_filter_candidate candidate = {.measurement = &detection->sky};
         bst_filter_fit fit;
-        if ((mtt->owner[column] != NOBODY && mtt->owner[column] != t) ||
+        if ((mtt->owner[column] != BST_MTT_NOBODY && mtt->owner[column] != t) ||
             bst_vec3_norm(bst_vec3_sub(detection->sky.direction, track->state.direction)) >
                 radius ||
             !bst_filter_evaluate(&mtt->filter, &track->state, &track->models, &candidate, &fit) ||
@@ -224,130 +219,8 @@ static void assign_group(bst_mtt *mtt, bool tentative) {
         if (column >= 0) {
             mtt->now.used[column] = true;
             /* tentative tracks own nothing: theirs may be a confirmed track's too */
-            mtt->owner[column] = tentative ? NOBODY : mtt->rows[r];
+            mtt->owner[column] = tentative ? BST_MTT_NOBODY : mtt->rows[r];
         }
-    }
-}
-
-/* Widening of a detection that tracks a and b may share, in a's axes: the light's centroid lies
- * somewhere between them. */
-static void widen(const bst_mtt *mtt, const bst_mtt_track *a, const bst_mtt_track *b,
-                  double out[3]) {
-    bst_tangent axes = bst_tangent_at(a->state.direction);
-    bst_vec3 to = bst_tangent_log(a->state.direction, b->state.direction);
-    double s1 = bst_vec3_dot(to, axes.e1), s2 = bst_vec3_dot(to, axes.e2);
-    double floor2 = mtt->params.merge_floor_rad * mtt->params.merge_floor_rad;
-    out[0] = s1 * s1 + floor2;
-    out[1] = s1 * s2;
-    out[2] = s2 * s2 + floor2;
-}
-
-static bool fits(const bst_mtt *mtt, const bst_mtt_track *track, int column,
-                 const double extra[3]) {
-    bst_sky_innovation innovation;
-    return bst_sky_innovate(&track->state, &mtt->now.items[column].sky, extra, &innovation) &&
-           innovation.chi2 <= mtt->params.gate_chi2;
-}
-
-/* The free detection nearest to the middle of a and b, within merge_rad of it. */
-static int free_between(const bst_mtt *mtt, const bst_mtt_track *a, const bst_mtt_track *b) {
-    bst_vec3 middle = bst_vec3_unit(bst_vec3_add(a->state.direction, b->state.direction));
-    int begin, end, best = -1;
-    double nearest = mtt->params.merge_rad;
-    bst_mtt_pool_range(&mtt->now, middle, nearest, &begin, &end);
-    for (int i = begin; i < end; i++) {
-        int column = mtt->now.order[i];
-        double distance = bst_vec3_norm(bst_vec3_sub(mtt->now.items[column].sky.direction, middle));
-        if (!mtt->now.used[column] && distance < nearest) {
-            nearest = distance;
-            best = column;
-        }
-    }
-    return best;
-}
-
-/* Two tracks nearer to each other than any two objects are seen apart, moving alike, have one
- * object, which has started a second track by a detection far off. */
-static bool same(const bst_mtt *mtt, const bst_mtt_track *a, const bst_mtt_track *b) {
-    bst_vec3 apart = bst_vec3_sub(a->state.direction, b->state.direction);
-    bst_vec3 rate = bst_vec3_sub(a->state.rate_radps, b->state.rate_radps);
-    double variance = a->state.covariance[2][2] + a->state.covariance[3][3] +
-                      b->state.covariance[2][2] + b->state.covariance[3][3];
-    return a->merged_in_row >= SAME_FRAMES && b->merged_in_row >= SAME_FRAMES &&
-           bst_vec3_norm(apart) < mtt->params.merge_floor_rad &&
-           bst_vec3_dot(rate, rate) < 9.0 * variance;
-}
-
-/* Of two tracks that have lived on one detection for too long, the one that was seen more often
- * goes on with it, alone; where they are the same, the other one ends. False while the detection is
- * not that one's without widening. */
-static bool settle(bst_mtt *mtt, int missed, int owner, bool alike) {
-    int column = mtt->detection_of_track[owner];
-    if (mtt->tracks[missed].hits > mtt->tracks[owner].hits) {
-        if (!fits(mtt, &mtt->tracks[missed], column, NULL)) {
-            return false;
-        }
-        mtt->detection_of_track[missed] = column;
-        mtt->detection_of_track[owner] = -1;
-        mtt->owner[column] = missed;
-        missed = owner;
-    }
-    if (alike) {
-        mtt->tracks[missed].misses_in_row = mtt->params.max_misses + 1;
-    }
-    return true;
-}
-
-/* A missed confirmed track beside another one, or beside a star that is seen, may have melted into
- * one detection with it: both then take that detection, widened along the line between them. */
-static void share(bst_mtt *mtt) {
-    double near2 = mtt->params.merge_rad * mtt->params.merge_rad;
-    for (int t = 0; t < mtt->track_count; t++) {
-        bst_mtt_track *missed = &mtt->tracks[t];
-        if (missed->status == BST_TRACK_TENTATIVE || missed->star || !mtt->observable[t] ||
-            mtt->detection_of_track[t] >= 0) {
-            continue;
-        }
-        int partner = -1;
-        double nearest2 = near2;
-        for (int u = 0; u < mtt->track_count; u++) {
-            if (u == t || mtt->tracks[u].status == BST_TRACK_TENTATIVE || mtt->tracks[u].asleep ||
-                (mtt->tracks[u].star && mtt->detection_of_track[u] < 0)) {
-                continue;
-            }
-            bst_vec3 apart = bst_vec3_sub(mtt->tracks[u].state.direction, missed->state.direction);
-            if (bst_vec3_dot(apart, apart) < nearest2) {
-                nearest2 = bst_vec3_dot(apart, apart);
-                partner = u;
-            }
-        }
-        if (partner < 0) {
-            continue;
-        }
-        bst_mtt_track *other = &mtt->tracks[partner];
-        int column = mtt->detection_of_track[partner], most = mtt->params.max_merged;
-        bool alike = same(mtt, missed, other);
-        bool long_since = missed->merged_in_row >= most && other->merged_in_row >= most;
-        if (column >= 0 && !other->star && !mtt->shared[partner] && most > 0 &&
-            (alike || long_since) && settle(mtt, t, partner, alike)) {
-            continue;
-        }
-        if (column < 0) {
-            column = free_between(mtt, missed, other);
-        }
-        double extra[3], extra_other[3];
-        widen(mtt, missed, other, extra);
-        widen(mtt, other, missed, extra_other);
-        if (column < 0 || !fits(mtt, missed, column, extra) ||
-            !fits(mtt, other, column, extra_other)) {
-            continue;
-        }
-        mtt->detection_of_track[t] = mtt->detection_of_track[partner] = column;
-        mtt->shared[t] = mtt->shared[partner] = true;
-        memcpy(mtt->extra[t], extra, sizeof extra);
-        memcpy(mtt->extra[partner], extra_other, sizeof extra_other);
-        mtt->now.used[column] = true;
-        mtt->owner[column] = SEVERAL;
     }
 }
 
@@ -355,14 +228,14 @@ void bst_mtt_associate(bst_mtt *mtt, bool partial) {
     mtt->largest_sigma = largest_sigma(&mtt->now);
     for (int t = 0; t < mtt->track_count; t++) {
         mtt->detection_of_track[t] = -1;
-        mtt->shared[t] = false;
+        mtt->shared[t] = BST_MTT_ALONE;
     }
     for (int i = 0; i < mtt->now.count; i++) {
-        mtt->owner[i] = NOBODY;
+        mtt->owner[i] = BST_MTT_NOBODY;
     }
     /* confirmed tracks choose first: a false start must not take their detections */
     assign_group(mtt, false);
-    share(mtt);
+    bst_mtt_share(mtt);
     int unused = 0;
     for (int i = 0; i < mtt->now.count; i++) {
         unused += !mtt->now.used[i];

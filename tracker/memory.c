@@ -87,6 +87,7 @@ bool bst_mtt_resume(bst_mtt *m, bst_mtt_track *track, bool anew) {
     }
     track->id = before->id;
     track->hits += before->hits;
+    track->apart += before->apart;
     track->first_tick = before->first_tick;
     track->full_snr = before->full_snr;
     track->full_v_mag = before->full_v_mag;

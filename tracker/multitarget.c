@@ -279,14 +279,16 @@ static void hit(bst_mtt *m, int t) {
     bst_mtt_track *track = &m->tracks[t];
     int given = m->detection_of_track[t];
     const bst_mtt_detection *detection = given >= 0 ? &m->now.items[given] : NULL;
-    bst_filter_candidate candidate = {.extra = m->shared[t] ? m->extra[t] : NULL};
+    bst_mtt_sharing shared = m->shared[t];
+    bool hidden = shared == BST_MTT_HIDDEN, outshines = shared == BST_MTT_OUTSHINING;
+    bst_filter_candidate candidate = {.extra = shared ? m->extra[t] : NULL};
     bst_filter_fit fit;
     if (detection) {
         candidate.measurement = &detection->sky;
     }
-    bool taken = detection &&
-                 bst_filter_evaluate(&m->filter, &track->state, &track->models, &candidate, &fit);
-    if (taken || !detection) {
+    bool taken = hidden || (detection && bst_filter_evaluate(&m->filter, &track->state,
+                                                             &track->models, &candidate, &fit));
+    if (!hidden && (taken || !detection)) {
         update_filter(m, t);
     }
     if (!taken) {
@@ -295,7 +297,7 @@ static void hit(bst_mtt *m, int t) {
     track->x_px = detection->x_px;
     track->y_px = detection->y_px;
     track->snr = detection->snr;
-    if (m->shared[t]) {
+    if (shared && !outshines) {
         track->merged_in_row++;
         return;
     }
@@ -313,8 +315,10 @@ static void hit(bst_mtt *m, int t) {
         bst_mtt_note_innovation(&m->params, track, &fit.innovation, dt, &statistic)) {
         record(m, BST_MTT_MANOEUVRE, track, statistic);
     }
-    take_brightness(m, track, detection, dt);
-    bst_mtt_note_light(track);
+    if (!outshines) { /* the other one's light is in it */
+        take_brightness(m, track, detection, dt);
+        bst_mtt_note_light(track);
+    }
 }
 
 /* 99.9 % quantile of chi-square (Wilson and Hilferty 1931). */
@@ -389,7 +393,10 @@ static void judge(bst_mtt *m, const bst_mtt_frame *frame) {
         if (track->star) {
             continue;
         }
-        bool taken = m->detection_of_track[t] >= 0 && track->merged_in_row <= m->params.max_merged;
+        /* what is known to be hidden by its neighbour's light is not missed */
+        bool taken =
+            m->detection_of_track[t] >= 0 &&
+            (track->merged_in_row <= m->params.max_merged || m->shared[t] == BST_MTT_HIDDEN);
         track->frames += m->observable[t];
         if (track->may_miss && !taken) {
             track->misses_in_row++;

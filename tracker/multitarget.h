@@ -112,7 +112,9 @@ typedef struct bst_mtt_track {
     double v_mag, v_mag_variance;
     double snr, x_px, y_px; /* latest detection */
     int hits, misses_in_row, merged_in_row;
-    int frames;       /* observable frames since the first detection */
+    int apart;  /* frames, since it was confirmed, in which another track's detection lay beside its
+                 */
+    int frames; /* observable frames since the first detection */
     double score;     /* log-likelihood ratio against clutter */
     double chi2;      /* sum over the hits after initiation, 2 degrees of freedom each */
     double last_chi2; /* of the latest detection; negative when the latest frame brought none */

@@ -10,6 +10,18 @@
 /* Candidates kept per track: the likeliest. */
 #define BST_MTT_CANDIDATES BST_FILTER_CANDIDATES
 
+/* Owners of a detection beside the confirmed tracks. */
+#define BST_MTT_NOBODY (-1)
+#define BST_MTT_SEVERAL (-2)
+
+/* How a track has its detection. */
+typedef enum bst_mtt_sharing {
+    BST_MTT_ALONE = 0,
+    BST_MTT_WIDENED,    /* shared, and widened by `extra` */
+    BST_MTT_HIDDEN,     /* another's, which hides it: its filter gets nothing */
+    BST_MTT_OUTSHINING, /* its own, widened by `extra`: it hides another */
+} bst_mtt_sharing;
+
 /* Unused detections of one frame, sorted along one axis. */
 typedef struct bst_mtt_pool {
     double seconds;
@@ -58,7 +70,8 @@ struct bst_mtt {
     double largest_sigma;    /* of the frame's detections, rad */
     int *detection_of_track; /* index into now.items, -1 none */
     double (*extra)[3];      /* widening of a shared detection, tangent axes of the track */
-    bool *shared, *observable;
+    bst_mtt_sharing *shared;
+    bool *observable;
 };
 
 /* Heap sort of `count` keys, ascending, and of what goes with them: in place, no worst case, no
@@ -72,6 +85,9 @@ void bst_mtt_pool_range(const bst_mtt_pool *pool, bst_vec3 direction, double cho
 
 /* Fills detection_of_track, shared and extra for the tracks of this frame (already predicted). */
 void bst_mtt_associate(bst_mtt *mtt, bool partial);
+
+/* Gives missed confirmed tracks a detection that they share with a neighbour. */
+void bst_mtt_share(bst_mtt *mtt);
 
 /* Detections in the gate of track t that no other confirmed track has: at most BST_MTT_CANDIDATES,
  * the likeliest. Returns their number. */

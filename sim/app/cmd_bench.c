@@ -56,8 +56,8 @@ static const bst_bench benches[] = {
      bst_bench_plant_full},
     {"plant_spacecraft", "of a rigid_body with 4 wheels, 2 modes, sensors and control",
      bst_bench_plant_spacecraft},
-    {"study_100000", "expansion and aggregation of 100,000 runs, per run", bst_bench_study},
     {"plant_all", "of both together", bst_bench_plant_all},
+    {"study_100000", "expansion and aggregation of 100,000 runs, per run", bst_bench_study},
     {"small", "256x256, 30 stars, 20 px streaks: a quick trial (only when named)",
      bst_bench_scene_run},
 };

@@ -2,10 +2,7 @@
 
 #include <stdio.h>
 
-#include <cjson/cJSON.h>
-
 #include "sim/app/stop_signals.h"
-#include "sim/core/config.h"
 
 static bool stop(void *user) {
     (void)user;
@@ -30,19 +27,6 @@ bst_status bst_run_link_replay(bst_ctx *ctx, bst_simulation *simulation, const c
         return bst_fail(ctx, BST_ERR_CONFIG,
                         "--replay: no module of the scenario is of type \"external\"; what has no "
                         "peer is repeated by running it");
-    }
-    bst_json *json = NULL;
-    snprintf(path, sizeof path, "%.500s/manifest.json", folder);
-    BST_TRY(bst_json_load(ctx, path, &json));
-    const cJSON *pacing = cJSON_GetObjectItemCaseSensitive(bst_json_root(json), "pacing");
-    const cJSON *dropped = cJSON_GetObjectItemCaseSensitive(pacing, "dropped");
-    double count = cJSON_IsNumber(dropped) ? dropped->valuedouble : 0.0;
-    bst_json_free(json);
-    if (count > 0.0) {
-        return bst_fail(ctx, BST_ERR_CONFIG,
-                        "--replay: %.0f frames of %s were dropped by the wall clock, which is not "
-                        "recorded; pacing/overrun \"slip\" or \"hold\" can be replayed",
-                        count, folder);
     }
     snprintf(path, sizeof path, "%.500s/%s", folder, tape);
     return bst_link_replay(ctx, link, path);

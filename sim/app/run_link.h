@@ -8,8 +8,7 @@
  */
 bst_status bst_run_link_open(bst_ctx *ctx, bst_simulation *simulation) BST_MUST_CHECK;
 /* What peers are told when the simulation is freed; NULL allowed. */
-/* Has a linked simulation answered as in the run of this folder. BST_ERR_CONFIG: it has no link, or
- * the folder's run cannot be repeated. */
+/* Has a linked simulation answered as in the run of this folder. BST_ERR_CONFIG: it has no link. */
 bst_status bst_run_link_replay(bst_ctx *ctx, bst_simulation *simulation,
                                const char *folder) BST_MUST_CHECK;
 /* Records what peers answer into a run's folder; nothing without a link, or while replaying. */

@@ -10,6 +10,7 @@
 
 #include "sim/core/wall_clock.h"
 #include "sim/engine/engine_internal.h"
+#include "sim/link/link.h"
 
 static const char *const mode_names[] = {"lockstep", "realtime", "fast", NULL};
 static const char *const overrun_names[] = {"slip", "drop", "hold", NULL};
@@ -109,7 +110,9 @@ bst_status bst_engine_pace(bst_ctx *ctx, bst_engine *engine, const bst_pacing_co
     p->rate_hz = (double)engine->tick_rate_hz;
     pthread_mutex_init(&p->lock, NULL);
     engine->pacing = p;
-    choose_channels(engine);
+    if (!config->replay) {
+        choose_channels(engine);
+    }
     warn_of_rates(ctx, engine, p);
     return BST_OK;
 }
@@ -122,7 +125,7 @@ void bst_pacing_free(bst_pacing *p) {
 }
 
 bool bst_engine_pacing(const bst_engine *engine, bst_pacing_figures *out) {
-    if (!engine->pacing) {
+    if (!engine->pacing || engine->pacing->config.replay) {
         return false;
     }
     pthread_mutex_lock(&engine->pacing->lock);
@@ -163,10 +166,24 @@ bst_status bst_pacing_wait(bst_ctx *ctx, bst_engine *engine, int64_t tick) {
     return BST_OK;
 }
 
+/* Drops are in the recording of a linked run. */
+static bool drop_in_recording(struct bst_step *step, const bst_pacing *p, bool drop) {
+    struct bst_link *link = step->self->spec.link;
+    if (link && p->config.mode == BST_PACING_REALTIME && p->config.overrun == BST_OVERRUN_DROP) {
+        bst_status status =
+            bst_link_keep_drop(step->ctx, link, step->self->name, step->tick, &drop);
+        step->hook_status = step->hook_status == BST_OK ? status : step->hook_status;
+    }
+    return drop;
+}
+
 bool bst_pacing_frame(struct bst_step *step, int64_t id) {
     bst_pacing *p = step->engine->pacing;
     if (!p) {
         return false;
+    }
+    if (p->config.replay) {
+        return drop_in_recording(step, p, false);
     }
     pthread_mutex_lock(&p->lock);
     double behind = bst_wall_seconds() - due_s(p, step->tick);
@@ -191,7 +208,7 @@ bool bst_pacing_frame(struct bst_step *step, int64_t id) {
         bst_step_event(step, "overrun", "%.3f s behind the clock: %s", behind,
                        words[p->config.overrun]);
     }
-    return drop;
+    return drop_in_recording(step, p, drop);
 }
 
 /* Which exposure a message is about. */
@@ -237,7 +254,8 @@ void bst_pacing_done(const struct bst_step *step, const channel *ch, const void 
 }
 
 bool bst_pacing_by_clock(const bst_engine *engine) {
-    return engine->pacing && engine->pacing->config.mode == BST_PACING_REALTIME;
+    const bst_pacing *p = engine->pacing;
+    return p && p->config.mode == BST_PACING_REALTIME && !p->config.replay;
 }
 
 /* ---- the thread ---- */
@@ -254,6 +272,9 @@ void bst_pacing_thread_take(bst_ctx *ctx, bst_engine *engine, bst_pacing_thread 
     bst_pacing *p = engine->pacing;
     saved_thread saved;
     memset(&saved, 0, sizeof saved);
+    if (p->config.replay) {
+        return;
+    }
     (void)pthread_getschedparam(pthread_self(), &saved.policy, &saved.param);
     (void)pthread_getaffinity_np(pthread_self(), sizeof saved.cpus, &saved.cpus);
     memcpy(saved_out, &saved, sizeof saved);

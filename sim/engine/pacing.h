@@ -27,6 +27,7 @@ typedef struct bst_pacing_config {
     double deadline_s; /* of wall time; 0: a frame period */
     int64_t priority;  /* SCHED_FIFO, 0: none */
     int64_t cpu;       /* that the stepping thread stays on; -1: any */
+    bool replay;       /* not by the table: there is no clock, a link's recording tells of drops */
 } bst_pacing_config;
 
 extern const bst_config_desc bst_pacing_config_table[];

@@ -368,7 +368,7 @@ static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
     if (status == BST_OK) {
         status = bst_engine_load(ctx, sim->engine);
     }
-    bool paced = options->pace && !options->replay && scenario->pacing.mode != BST_PACING_LOCKSTEP;
+    bool paced = options->pace && scenario->pacing.mode != BST_PACING_LOCKSTEP;
     bool parted = false;
     if (status == BST_OK && options->overlap && !paced && may_part(scenario, sim)) {
         status = bst_engine_part(ctx, sim->engine, processors(options->threads), &parted);
@@ -377,7 +377,9 @@ static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
         status = bst_engine_overlap(ctx, sim->engine);
     }
     if (status == BST_OK && paced) {
-        status = bst_engine_pace(ctx, sim->engine, &scenario->pacing);
+        bst_pacing_config pacing = scenario->pacing;
+        pacing.replay = options->replay;
+        status = bst_engine_pace(ctx, sim->engine, &pacing);
     }
     return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "%s", scenario->file);
 }

@@ -126,11 +126,19 @@ void bst_link_close(bst_link *link, int reason, const char *text) {
     if (!link->has_end) {
         bst_link_set_end(link, reason, text);
     }
-    for (int p = 0; link->router && p < LINK_PEERS; p++) {
+    static uint8_t none[1];
+    uint8_t *rooms = link->router ? malloc((size_t)LINK_PEERS * LINK_END_BYTES) : none;
+    for (int p = 0; link->router && rooms && p < LINK_PEERS; p++) {
         if (link->peers[p].used && !link->peers[p].blocked) {
-            bst_link_header header = {.type = BST_LINK_END, .step = -1, .slot = -1};
-            (void)bst_link_send(link, p, &header, &link->end, NULL, 0);
+            (void)bst_link_send_end(link, p, rooms + (size_t)p * LINK_END_BYTES);
         }
+    }
+    /* A socket that closes while a message of several parts is on its way to a peer that breaks off
+     * just then ends the process in libzmq 4.3.4 (an assertion of its session): so the last message
+     * leaves first, unless the peer does not read. */
+    for (int ms = 0; ms < LINK_PARTING_MS && __atomic_load_n(&link->parting, __ATOMIC_ACQUIRE) > 0;
+         ms++) {
+        (void)zmq_poll(NULL, 0, 1);
     }
     if (link->router) {
         set(link->router, ZMQ_LINGER, 200); /* ms, for `end` to leave */
@@ -142,6 +150,9 @@ void bst_link_close(bst_link *link, int reason, const char *text) {
     }
     if (link->context) {
         zmq_ctx_term(link->context); /* all frames have been released when it returns */
+    }
+    if (rooms != none) {
+        free(rooms);
     }
     bst_link_tape_free(link->tape);
     bst_shared_frames_free(link->shared);

@@ -115,6 +115,10 @@ bst_status bst_link_record_end(bst_ctx *ctx, bst_link *link) BST_MUST_CHECK;
  * is not the recorded one is BST_ERR_FORMAT. */
 bst_status bst_link_replay(bst_ctx *ctx, bst_link *link, const char *path) BST_MUST_CHECK;
 bool bst_link_replays(const bst_link *link);
+/* For those who drop frames by the clock: while recording keeps *dropped of a frame of an instance
+ * that is no part, while replaying sets it to what it was. */
+bst_status bst_link_keep_drop(bst_ctx *ctx, bst_link *link, const char *instance, int64_t tick,
+                              bool *dropped) BST_MUST_CHECK;
 
 /* What has been counted, by name ("link_bad_crc"); false after the last. */
 bool bst_link_counter(const bst_link *link, int index, const char **name, int64_t *count);

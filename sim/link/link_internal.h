@@ -19,9 +19,11 @@ enum {
     LINK_QUEUE = 64,               /* messages that wait in each direction, per peer */
     LINK_MESSAGE_BYTES = 16 << 20, /* of a part that a peer sends; beyond, it is disconnected */
     LINK_ID_BYTES = 255,
-    LINK_AHEAD = 2,       /* steps of a part that its peer may have to answer, where answers are not
-                             awaited */
-    LINK_EXTENSIONS = 10, /* time-outs that a step may take at most, by `health` and `hello` */
+    LINK_AHEAD = 2, /* steps of a part that its peer may have to answer, where answers are not
+                       awaited */
+    LINK_PARTING_MS = 500, /* for `end`, and what is before it, to leave */
+    LINK_END_BYTES = 512,  /* room for its payload */
+    LINK_EXTENSIONS = 10,  /* time-outs that a step may take at most, by `health` and `hello` */
 };
 
 /* What is counted besides the faults of wire.h. */
@@ -108,6 +110,7 @@ struct bst_link {
     bool has_end;
     int64_t exchanges;
     int warnings;
+    int parting; /* atomic: `end` messages that have not left */
     char notes[LINK_NOTES][LINK_NOTE_BYTES];
     int note_first, note_count;
     bool (*stop)(void *user);
@@ -148,6 +151,8 @@ bst_status bst_link_tape_read_ready(bst_ctx *ctx, bst_link *link, int part, int6
 /* Sends a message to a peer; false when it is gone or takes nothing. `crc`: of the pixels. */
 bool bst_link_send(bst_link *link, int peer, bst_link_header *header, const void *payload,
                    const bst_link_input *frame, uint32_t crc);
+/* Sends `end`; `room` holds its payload until link->parting says that it has left. */
+bool bst_link_send_end(bst_link *link, int peer, uint8_t *room);
 /* An `error` in answer to a message. */
 void bst_link_reply(bst_link *link, const link_id *id, link_peer *peer, const char *fault,
                     int64_t sequence, const char *text);

@@ -97,7 +97,8 @@ static bool grow(link_tape *tape, size_t bytes) {
     return true;
 }
 
-static void put(bst_link *link, int part, int64_t tick, bst_link_type type, const void *payload) {
+static void put(bst_link *link, const char *instance, int64_t tick, bst_link_type type,
+                const void *payload) {
     link_tape *tape = link->tape;
     const bst_wire_message *about = bst_wire_message_of(type);
     size_t bytes = bst_wire_payload_bytes(about, bst_wire_items(about, payload));
@@ -114,7 +115,7 @@ static void put(bst_link *link, int part, int64_t tick, bst_link_type type, cons
                               .parts = 1,
                               .lengths = {(int64_t)bytes},
                               .crcs = {bst_crc32c(tape->payload, bytes)}};
-    memcpy(header.instance, link->parts[part].about.instance, sizeof header.instance);
+    snprintf(header.instance, sizeof header.instance, "%s", instance);
     char text[HEADER_ROOM];
     uint32_t lengths[2] = {(uint32_t)bst_link_header_write(&header, text), (uint32_t)bytes};
     uint8_t ahead[8];
@@ -133,24 +134,25 @@ void bst_link_tape_answer(bst_link *link, int part, int64_t tick, const bst_link
     if (!link->tape || !link->tape->writing || !link->tape->file) {
         return;
     }
+    const char *instance = link->parts[part].about.instance;
     bst_link_done done = {.outputs = 0};
     for (int i = 0; i < count; i++) {
         if (outputs[i].given) {
-            put(link, part, tick, outputs[i].type, outputs[i].payload);
+            put(link, instance, tick, outputs[i].type, outputs[i].payload);
             done.outputs++;
         }
     }
-    put(link, part, tick, BST_LINK_DONE, &done);
+    put(link, instance, tick, BST_LINK_DONE, &done);
 }
 
 void bst_link_tape_note(bst_link *link, int part, int64_t tick, bool ready, bool more) {
     if (link->tape && link->tape->writing && link->tape->file) {
         const bst_link_step step = {.inputs = ready, .attempt = more};
-        put(link, part, tick, BST_LINK_STEP, &step);
+        put(link, link->parts[part].about.instance, tick, BST_LINK_STEP, &step);
     }
 }
 
-static bst_status misfit(bst_ctx *ctx, const bst_link *link, int part, int64_t tick,
+static bst_status misfit(bst_ctx *ctx, const bst_link *link, const char *instance, int64_t tick,
                          const bst_link_header *found) {
     const link_tape *tape = link->tape;
     if (!found) {
@@ -158,7 +160,7 @@ static bst_status misfit(bst_ctx *ctx, const bst_link *link, int part, int64_t t
             ctx, BST_ERR_FORMAT,
             "link: %s ends before %s at tick %lld: the recorded run was shorter, or its "
             "file is cut",
-            tape->path, link->parts[part].about.instance, (long long)tick);
+            tape->path, instance, (long long)tick);
     }
     return bst_fail(
         ctx, BST_ERR_FORMAT,
@@ -166,11 +168,11 @@ static bst_status misfit(bst_ctx *ctx, const bst_link *link, int part, int64_t t
         "tick %lld: a recording is replayed by the scenario, seed and options of its run "
         "(scenario.json in its folder)",
         (long long)tape->packets - 1, tape->path, bst_wire_message_of(found->type)->name,
-        found->instance, (long long)found->tick, link->parts[part].about.instance, (long long)tick);
+        found->instance, (long long)found->tick, instance, (long long)tick);
 }
 
 /* The next packet; its payload is in tape->payload. */
-static bst_status get(bst_ctx *ctx, const bst_link *link, int part, int64_t tick,
+static bst_status get(bst_ctx *ctx, const bst_link *link, const char *instance, int64_t tick,
                       bst_link_header *header) {
     link_tape *tape = link->tape;
     uint8_t ahead[8];
@@ -181,7 +183,7 @@ static bst_status get(bst_ctx *ctx, const bst_link *link, int part, int64_t tick
         lengths[i / 4] |= (uint32_t)ahead[i] << (8 * (i % 4));
     }
     if (got < 8) {
-        return misfit(ctx, link, part, tick, NULL);
+        return misfit(ctx, link, instance, tick, NULL);
     }
     if (lengths[0] > HEADER_ROOM || lengths[1] > PAYLOAD_MOST) {
         return bst_fail(ctx, BST_ERR_FORMAT, "link: %s is damaged behind packet %lld", tape->path,
@@ -192,7 +194,7 @@ static bst_status get(bst_ctx *ctx, const bst_link *link, int part, int64_t tick
     }
     if (fread(text, 1, lengths[0], tape->file) != lengths[0] ||
         fread(tape->payload, 1, lengths[1], tape->file) != lengths[1]) {
-        return misfit(ctx, link, part, tick, NULL);
+        return misfit(ctx, link, instance, tick, NULL);
     }
     tape->packets++;
     if (bst_link_header_read(ctx, text, lengths[0], header) != BST_WIRE_GOOD ||
@@ -200,9 +202,9 @@ static bst_status get(bst_ctx *ctx, const bst_link *link, int part, int64_t tick
         return bst_fail_prefix(ctx, BST_ERR_FORMAT, "link: %s, packet %lld", tape->path,
                                (long long)tape->packets - 1);
     }
-    return header->tick == tick && strcmp(header->instance, link->parts[part].about.instance) == 0
+    return header->tick == tick && strcmp(header->instance, instance) == 0
                ? BST_OK
-               : misfit(ctx, link, part, tick, header);
+               : misfit(ctx, link, instance, tick, header);
 }
 
 static bst_status decode(bst_ctx *ctx, const bst_link *link, const bst_link_header *header,
@@ -227,11 +229,11 @@ static bst_status read_answer(bst_ctx *ctx, const bst_link *link, int part, int6
             i++;
         }
         if (i == count) {
-            return misfit(ctx, link, part, tick, header);
+            return misfit(ctx, link, link->parts[part].about.instance, tick, header);
         }
         BST_TRY(decode(ctx, link, header, outputs[i].payload, outputs[i].capacity));
         outputs[i].given = true;
-        BST_TRY(get(ctx, link, part, tick, header));
+        BST_TRY(get(ctx, link, link->parts[part].about.instance, tick, header));
     }
     return BST_OK;
 }
@@ -239,9 +241,9 @@ static bst_status read_answer(bst_ctx *ctx, const bst_link *link, int part, int6
 bst_status bst_link_tape_read(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
                               bst_link_output *outputs, int count) {
     bst_link_header header;
-    BST_TRY(get(ctx, link, part, tick, &header));
+    BST_TRY(get(ctx, link, link->parts[part].about.instance, tick, &header));
     return header.type == BST_LINK_STEP
-               ? misfit(ctx, link, part, tick, &header)
+               ? misfit(ctx, link, link->parts[part].about.instance, tick, &header)
                : read_answer(ctx, link, part, tick, &header, outputs, count);
 }
 
@@ -250,24 +252,45 @@ bst_status bst_link_tape_read_more(bst_ctx *ctx, bst_link *link, int part, int64
     bst_link_header header;
     bst_link_step step;
     *more = false;
-    BST_TRY(get(ctx, link, part, tick, &header));
+    BST_TRY(get(ctx, link, link->parts[part].about.instance, tick, &header));
     if (header.type != BST_LINK_STEP) {
         *more = true;
         return read_answer(ctx, link, part, tick, &header, outputs, count);
     }
     BST_TRY(decode(ctx, link, &header, &step, 0));
-    return step.attempt == 1 ? BST_OK : misfit(ctx, link, part, tick, &header);
+    return step.attempt == 1 ? BST_OK
+                             : misfit(ctx, link, link->parts[part].about.instance, tick, &header);
 }
 
 bst_status bst_link_tape_read_ready(bst_ctx *ctx, bst_link *link, int part, int64_t tick,
                                     bool *ready) {
     bst_link_header header;
     bst_link_step step;
-    BST_TRY(get(ctx, link, part, tick, &header));
+    BST_TRY(get(ctx, link, link->parts[part].about.instance, tick, &header));
     if (header.type != BST_LINK_STEP) {
-        return misfit(ctx, link, part, tick, &header);
+        return misfit(ctx, link, link->parts[part].about.instance, tick, &header);
     }
     BST_TRY(decode(ctx, link, &header, &step, 0));
     *ready = step.inputs != 0;
-    return step.attempt == 0 ? BST_OK : misfit(ctx, link, part, tick, &header);
+    return step.attempt == 0 ? BST_OK
+                             : misfit(ctx, link, link->parts[part].about.instance, tick, &header);
+}
+
+bst_status bst_link_keep_drop(bst_ctx *ctx, bst_link *link, const char *instance, int64_t tick,
+                              bool *dropped) {
+    bst_link_header header;
+    bst_link_step step = {.inputs = *dropped, .attempt = 2};
+    if (!bst_link_replays(link)) {
+        if (link->tape && link->tape->file) {
+            put(link, instance, tick, BST_LINK_STEP, &step);
+        }
+        return BST_OK;
+    }
+    BST_TRY(get(ctx, link, instance, tick, &header));
+    if (header.type != BST_LINK_STEP) {
+        return misfit(ctx, link, instance, tick, &header);
+    }
+    BST_TRY(decode(ctx, link, &header, &step, 0));
+    *dropped = step.inputs != 0;
+    return step.attempt == 2 ? BST_OK : misfit(ctx, link, instance, tick, &header);
 }

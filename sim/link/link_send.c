@@ -58,6 +58,33 @@ static bool send_parts(bst_link *link, const link_id *id, const char *header, si
     return sent;
 }
 
+/* ZeroMQ has done with a peer's `end`; called by its own thread. */
+static void parted(void *text, void *left) {
+    (void)text;
+    __atomic_sub_fetch((int *)left, 1, __ATOMIC_RELEASE);
+}
+
+bool bst_link_send_end(bst_link *link, int peer, uint8_t *room) {
+    const bst_wire_message *about = bst_wire_message_of(BST_LINK_END);
+    size_t bytes = bst_wire_encode(about, &link->end, room);
+    bst_link_header header = {.type = BST_LINK_END,
+                              .sequence = link->peers[peer].sent,
+                              .step = -1,
+                              .slot = -1,
+                              .parts = 1,
+                              .lengths = {(int64_t)bytes},
+                              .crcs = {bst_crc32c(room, bytes)}};
+    char text[BST_LINK_HEADER_BYTES];
+    zmq_msg_t payload;
+    __atomic_add_fetch(&link->parting, 1, __ATOMIC_RELAXED);
+    if (zmq_msg_init_data(&payload, room, bytes, parted, &link->parting) != 0) {
+        parted(NULL, &link->parting);
+        return false;
+    }
+    return send_parts(link, &link->peers[peer].id, text, bst_link_header_write(&header, text),
+                      &payload, NULL);
+}
+
 static bool encode(const bst_wire_message *message, const void *payload, bst_link_header *header,
                    zmq_msg_t *out) {
     size_t bytes = bst_wire_payload_bytes(message, bst_wire_items(message, payload));

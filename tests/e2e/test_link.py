@@ -156,16 +156,21 @@ class Replay(unittest.TestCase):
         self.assertIn("no module of the scenario is of type", result.stderr)
 
     def test_a_run_that_waits_for_nobody(self):
-        """Which answers came when is in the recording."""
-        address, out = ipc(), runs.scratch() + "/run"
-        peer = serve(runs.TRACK, address, "control")
-        ended(start_run(runs.TRACK, out, address, "control", "--pacing", "realtime", "--set",
-                        "/pacing/overrun=hold", "--set", "/pacing/speed=10", "--set",
-                        "/pacing/deadline_s=0.001", duration=6))
-        ended(peer)
-        again, result = self.replayed(out + "/scenario.json", out)
-        self.assertEqual(result.returncode, 0, result.stderr)
-        self.same(out, again)
+        """Which answers came when, and which frames the clock dropped, is in the recording."""
+        for policy, more in (("hold", ["/pacing/deadline_s=0.001", "/pacing/speed=20"]),
+                             ("drop", ["/pacing/deadline_s=0.0001", "/pacing/speed=1000"])):
+            address, out = ipc(), runs.scratch() + "/run"
+            peer = serve(runs.TRACK, address, "control")
+            words = [w for one in (f"/pacing/overrun={policy}", *more)
+                     for w in ("--set", one)]
+            ended(start_run(runs.TRACK, out, address, "control", "--pacing", "realtime", *words,
+                            duration=6))
+            ended(peer)
+            if policy == "drop":  # 6 s of simulated time in 6 ms: no machine makes it
+                self.assertGreater(boresight_link.read_run(out).manifest["pacing"]["dropped"], 0)
+            again, result = self.replayed(out + "/scenario.json", out)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.same(out, again)
 
 
 class Client(unittest.TestCase):
@@ -329,6 +334,7 @@ class Driver(unittest.TestCase):
         sensor = scenario["observers"][0]["sensors"][0]
         sensor["modules"] = {"gimbal": {"type": "external"},
                              "scenegen": {"type": "opencl"}}
+        sensor["modules"]["gimbal"]["send_truth"] = True
         scenario["record"] = {"frames": "extensions"}
         path = runs.scratch() + "/driver.json"
         with open(path, "w", encoding="utf-8") as file:
@@ -341,8 +347,10 @@ class Driver(unittest.TestCase):
         words = runs.command(self.scenario(), out, duration=5)
         run = subprocess.Popen(words + ["--link", address], stdout=subprocess.PIPE,
                                stderr=subprocess.PIPE, text=True)
+        self.truths = []
         with boresight_link.Link(address, serves="gimbal") as link:
             for step in link.steps():
+                self.truths += [int(m["exposure_id"]) for m in step.inputs if m.type == "truth"]
                 frames += [(m.record.copy(), m.pixels.copy()) for m in step.inputs
                            if m.type == "frame"]
                 ticks = [step.tick, step.tick + self.UPDATE]
@@ -373,6 +381,7 @@ class Driver(unittest.TestCase):
         for (record, pixels), other in zip(frames, recorded):
             np.testing.assert_array_equal(pixels, other)
         # the sensor, from the exposure at 3 s on: the one at 2 s had opened
+        self.assertEqual(self.truths, list(range(5)))
         told = run.table("frames")
         self.assertEqual([p.shape for _, p in frames], 3 * [(1024, 1024)] + 2 * [(64, 128)])
         np.testing.assert_allclose(told["exposure_s"], [0.5] * 3 + [0.2] * 2)
@@ -419,6 +428,26 @@ class Driver(unittest.TestCase):
         for text in ('no object "nobody"', "before the step", "in the order of time",
                      "the line of sight stays"):
             self.assertIn(text, events)
+
+
+    def test_beside_a_controller(self):
+        """Control's commands come to the peer, and the sensor is control's."""
+        address, out, commands = ipc(), runs.scratch() + "/run", 0
+        run = start_run(runs.TRACK, out, address, "gimbal", "--set",
+                        runs.SENSOR + "/observation_source=generator", duration=2)
+        with boresight_link.Link(address, serves="gimbal") as link:
+            for step in link.steps():
+                command = step.get("los_command")
+                if command is not None:
+                    commands += 1
+                    self.assertAlmostEqual(np.linalg.norm(command["direction_gcrf"]), 1.0)
+                step.send_pointing([step.tick], [self.attitude(step.tick)])
+                step.send_sensor(exposure_s=0.1)
+        ended(run)
+        self.assertGreater(commands, 10)
+        self.assertEqual(counters(out)["sensor_command_ignored"], 20)
+        commanded = boresight_link.read_run(out).table("sensor_commands")["exposure_s"]
+        self.assertFalse(np.any(commanded == 0.1))
 
 
 class BadPeers(unittest.TestCase):

@@ -162,7 +162,8 @@ class Margins(unittest.TestCase):
 
     @unittest.skipUnless(FULL, "slow")
     def test_pid(self):
-        self.check("pid with a notch, 10 frames/s", 0.03)
+        # beyond its delay margin it swings up so slowly that 100 s tell it from 3 % on
+        self.check("pid with a notch, 10 frames/s", 0.04)
 
     @unittest.skipUnless(FULL, "slow")
     def test_lead_lag(self):
