@@ -1,6 +1,7 @@
 #include "sim/core/folder.h"
 
 #include <errno.h>
+#include <stdbool.h>
 #include <string.h>
 #include <sys/stat.h>
 
@@ -13,11 +14,14 @@ static bst_status make_one(bst_ctx *ctx, const char *path) {
     /* a folder that is there may answer EROFS or EACCES before EEXIST */
     int reason = errno;
     struct stat info;
-    if (stat(path, &info) == 0 && S_ISDIR(info.st_mode)) {
+    bool there = stat(path, &info) == 0;
+    if (there && S_ISDIR(info.st_mode)) {
         return BST_OK;
     }
-    return bst_fail(ctx, BST_ERR_IO, "%s: cannot make the folder: %s", path,
-                    strerror(reason == EEXIST ? ENOTDIR : reason));
+    if (reason == EEXIST) { /* a file is in the way, or a link that leads nowhere */
+        reason = there ? ENOTDIR : errno;
+    }
+    return bst_fail(ctx, BST_ERR_IO, "%s: cannot make the folder: %s", path, strerror(reason));
 }
 
 bst_status bst_folder_make_above(bst_ctx *ctx, const char *path) {

@@ -204,10 +204,10 @@ class Faults(unittest.TestCase):
             self.assertTrue(os.path.lexists(path))
         self.assertTrue(os.path.exists(self.out("photos/a.jpg")))
         self.fails(call(runs.TRACK, self.out("file/run"), duration=1),
-                   f"{self.out('file/run.partial')}: cannot make the folder: "
+                   f"{self.out('file')}: cannot make the folder: "
                    f"{os.strerror(errno.ENOTDIR)}")
         self.fails(call(runs.TRACK, self.out("loop/run"), duration=1),
-                   f"{self.out('loop/run.partial')}: cannot make the folder: "
+                   f"{self.out('loop')}: cannot make the folder: "
                    f"{os.strerror(errno.ELOOP)}")
         # what is not a run's is not removed from the place of an unfinished one either
         os.mkdir(self.out("mine.partial"))

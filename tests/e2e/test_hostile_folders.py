@@ -4,6 +4,7 @@ message and exit code, nothing in them changed, no crash (the sanitized build ru
 
 Usage, from the repository root: /usr/bin/python3 tests/e2e/test_hostile_folders.py BORESIGHT
 """
+import errno
 import os
 import re
 import shutil
@@ -206,7 +207,7 @@ class Hostile(unittest.TestCase):
                   "folder in the place of a file")
         loop(folder + "/loop")
         self.ends(call("export", run, *TABLES, "--out", folder + "/loop"), run,
-                  f"{folder}/loop: is not a folder; choose another --out", "loop")
+                  f"{folder}/loop: cannot make the folder: {os.strerror(errno.ELOOP)}", "loop")
         self.ends(call("export", run, *TABLES, "--out", "/proc/none"), run,
                   "/proc/none: cannot make the folder: No such file or directory", "read only")
 

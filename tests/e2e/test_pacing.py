@@ -59,15 +59,15 @@ class RealTime(unittest.TestCase):
     def test_it_takes_its_time_and_changes_nothing(self):
         free, timed = runs.scratch() + "/free", runs.scratch() + "/timed"
         runs.run(runs.TRACK, free, GENERATOR, runs.NO_FRAMES, duration=4)
-        wall, manifest, said = paced(timed, "realtime", "/pacing/speed=4")
-        self.assertGreaterEqual(wall, 0.95)  # the last step is before 4 s
+        wall, manifest, said = paced(timed, "realtime", "/pacing/speed=8")
+        self.assertGreaterEqual(wall, 0.47)  # the last step is before 4 s
         pacing = manifest["pacing"]
         self.assertEqual((pacing["mode"], pacing["overrun"], pacing["repeats"]),
                          ("realtime", "slip", True))
         self.assertEqual(pacing["frames"], 4)
         self.assertEqual(sum(pacing["response_frames"]), pacing["done"])
         self.assertEqual(len(pacing["response_frames"]), len(pacing["response_up_to_ms"]))
-        self.assertAlmostEqual(pacing["deadline_s"], 0.25)
+        self.assertAlmostEqual(pacing["deadline_s"], 0.125)
         self.assertIn("late frames", said)
         a, b = boresight_link.read_run(free), boresight_link.read_run(timed)
         for name in a.tables:
@@ -81,34 +81,34 @@ class RealTime(unittest.TestCase):
         for policy in ("slip", "drop"):
             out = runs.scratch() + "/run"
             wall, manifest, _ = paced(out, "realtime", "/pacing/speed=20",
-                                      f"/pacing/overrun={policy}", duration=8, external="tracker",
+                                      f"/pacing/overrun={policy}", duration=5, external="tracker",
                                       peer=slow_tracker(0.15))
             pacing, taken = manifest["pacing"], boresight_link.read_run(out).table("exposures")
-            self.assertEqual(pacing["frames"], 8)
+            self.assertEqual(pacing["frames"], 5)
             self.assertGreaterEqual(pacing["overruns"], 2)
             events = boresight_link.read_run(out).table("events")
             self.assertEqual(np.sum(events["kind"] == "overrun"), pacing["overruns"])
             if policy == "slip":
                 self.assertEqual(pacing["dropped"], 0)
-                self.assertGreater(pacing["slipped_s"], 0.3)
+                self.assertGreater(pacing["slipped_s"], 0.2)
                 self.assertTrue(pacing["repeats"])
-                self.assertEqual(manifest["counters"]["link_messages"], 2 * 8 + 1)
-                self.assertGreaterEqual(wall, 8 * 0.15)
+                self.assertEqual(manifest["counters"]["link_messages"], 2 * 5 + 1)
+                self.assertGreaterEqual(wall, 5 * 0.15)
             else:
                 self.assertGreaterEqual(pacing["dropped"], 2)
                 self.assertEqual(pacing["dropped"], pacing["overruns"])
                 self.assertEqual(pacing["slipped_s"], 0)
                 self.assertFalse(pacing["repeats"])
-                self.assertEqual(pacing["done"] + pacing["dropped"], 8)
+                self.assertEqual(pacing["done"] + pacing["dropped"], 5)
             self.assertEqual(np.sum(taken["dropped"]), pacing["dropped"])
 
     def test_hold_does_not_wait(self):
         out = runs.scratch() + "/run"
         _, manifest, said = paced(out, "realtime", "/pacing/speed=20", "/pacing/overrun=hold",
-                                  "/pacing/deadline_s=0.01", duration=8, external="tracker",
+                                  "/pacing/deadline_s=0.01", duration=6, external="tracker",
                                   peer=slow_tracker(0.15))
         count = manifest["counters"]
-        self.assertGreaterEqual(count["link_held"] + count.get("link_skipped", 0), 5)
+        self.assertGreaterEqual(count["link_held"] + count.get("link_skipped", 0), 3)
         self.assertFalse(manifest["pacing"]["repeats"])
         self.assertEqual(manifest["pacing"]["dropped"], 0)
         self.assertIn("results repeat", said)
@@ -117,7 +117,7 @@ class RealTime(unittest.TestCase):
         words = runs.command(runs.TRACK, runs.scratch() + "/run", GENERATOR, runs.NO_FRAMES,
                              "/pacing/speed=0.01", duration=100) + ["--pacing", "realtime"]
         process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        time.sleep(1.0)
+        time.sleep(0.5)
         process.send_signal(signal.SIGINT)
         self.assertIn(process.wait(timeout=60), (130, -signal.SIGINT))
         process.communicate()
