@@ -61,7 +61,7 @@ static void take_away(const char *folder) {
 
 static bst_status make_rows(bst_ctx *ctx, const bst_study *study, const bst_study_kind *kind,
                             const char *folder) {
-    bst_shard_worker worker = {.study = study, .kind = kind, .out = folder, .threads = 1};
+    bst_shard_worker worker = {.study = study, .kind = kind, .out = folder, .place = {1, ""}};
     bst_status status = BST_OK;
     for (int64_t first = 0; first < RUNS && status == BST_OK; first += SHARD) {
         const bst_shard_job job = {.first = first, .count = SHARD};

@@ -15,6 +15,7 @@
 #include "sim/app/cmd_study.h"
 #include "sim/app/options.h"
 #include "sim/app/stop_signals.h"
+#include "sim/app/study_devices.h"
 #include "sim/app/study_plugins.h"
 #include "sim/core/folder.h"
 #include "sim/core/wall_clock.h"
@@ -30,9 +31,10 @@ enum { FAILURES_SHOWN = 5 };
 static const double SHARD_S = 4.0, SLURM_SHARD_S = 60.0;
 
 typedef struct study_request {
-    const char *out, *shard, *site;
-    int64_t workers, emit, shard_runs;
+    const char *out, *shard, *site, *device;
+    int64_t workers, cores, emit, shard_runs;
     bool resume, dry_run, quiet, schema, help, unpinned, slurm;
+    bst_study_devices devices; /* of `device` */
 } study_request;
 
 const bst_study_kind *bst_app_study_kind(int kind) {
@@ -190,10 +192,20 @@ static void forget_what_is_gone(bst_ctx *ctx, bst_results *results, const bst_st
     }
 }
 
+/* How many workers there will be. */
+static int worker_count(const study_request *r) {
+    return r->workers > 0         ? (int)r->workers
+           : r->devices.count > 0 ? r->devices.count
+                                  : bst_local_cores();
+}
+
 static bst_status open_pool(bst_ctx *ctx, const study_request *r, const bst_study *study,
                             const bst_study_kind *kind, const char *out, int lock,
                             bst_executor *executor) {
-    const bst_local_pool_options pool = {.study = study,
+    const bst_local_pool_options pool = {.devices = r->devices.list,
+                                         .device_count = r->devices.count,
+                                         .cores = (int)r->cores,
+                                         .study = study,
                                          .kind = kind,
                                          .out = out,
                                          .workers = (int)r->workers,
@@ -211,16 +223,14 @@ static bst_status execute(bst_ctx *ctx, const study_request *r, const bst_study 
                                         .kind = kind,
                                         .shard_s = r->slurm ? SLURM_SHARD_S : SHARD_S,
                                         .shard_runs = r->shard_runs,
-                                        .parallel = r->slurm         ? 0
-                                                    : r->workers > 0 ? (int)r->workers
-                                                                     : bst_local_cores(),
+                                        .parallel = r->slurm ? 0 : worker_count(r),
                                         .probe = r->slurm,
                                         .progress = show,
                                         .user = &line};
     BST_TRY(bst_results_load_folder(ctx, results, out, 0, study->runs, true));
     forget_what_is_gone(ctx, results, kind, out);
     if (r->slurm) {
-        BST_TRY(bst_app_study_slurm(ctx, r->site, out, &executor));
+        BST_TRY(bst_app_study_slurm(ctx, r->site, r->device ? r->device : "", out, &executor));
     } else {
         BST_TRY(open_pool(ctx, r, study, kind, out, lock, &executor));
     }
@@ -337,8 +347,12 @@ static int run_shard(bst_ctx *ctx, const study_request *r, const bst_study *stud
         status = bst_results_load_folder(ctx, &results, out, part.first, part.count, false);
     }
     if (status == BST_OK) {
-        bst_shard_worker worker = {
-            .study = study, .kind = kind, .out = out, .threads = bst_local_settle(0, 1, true)};
+        int64_t number = exact ? 0 : strtoll(r->shard, NULL, 10) - 1;
+        bst_shard_worker worker = {.study = study,
+                                   .kind = kind,
+                                   .out = out,
+                                   .place = {bst_local_settle(0, 1, (int)r->cores, true),
+                                             bst_study_device(&r->devices, number)}};
         status = run_part(ctx, &part, &worker, &results, &done);
         bst_shard_worker_close(&worker);
     }
@@ -448,8 +462,8 @@ static int command(bst_ctx *ctx, const study_request *r, const char *given) {
         study.note_count = plugins.count;
         if (status == BST_OK) {
             if (r->dry_run) {
-                bst_study_print_plan(&study, kind,
-                                     r->workers > 0 ? (int)r->workers : bst_local_cores(), out);
+                bst_study_print_plan(&study, kind, worker_count(r),
+                                     bst_study_device(&r->devices, 0), out);
             } else {
                 code = r->shard ? run_shard(ctx, r, &study, kind, out)
                                 : run_study(ctx, r, &study, kind, out);
@@ -477,9 +491,21 @@ int bst_cmd_study(int argc, char **argv) {
          .kind = BST_OPTION_INT,
          .target = &r.workers,
          .argument = "N",
-         .doc = "worker processes (default: one a core)",
+         .doc = "worker processes (default: one a core, or one for each of --device)",
          .minimum = 1,
          .maximum = 1024},
+        {.name = "cores",
+         .kind = BST_OPTION_INT,
+         .target = &r.cores,
+         .argument = "N",
+         .doc = "cores of each worker (default: all, in equal parts)",
+         .minimum = 1,
+         .maximum = 1024},
+        {.name = "device",
+         .kind = BST_OPTION_TEXT,
+         .target = &r.device,
+         .argument = "NAME,...",
+         .doc = "OpenCL devices by part of a name or P:D, which the workers take in turn"},
         {.name = "slurm",
          .kind = BST_OPTION_FLAG,
          .target = &r.slurm,
@@ -554,5 +580,6 @@ int bst_cmd_study(int argc, char **argv) {
         return bst_options_misuse(&ctx, "study");
     }
     bst_stop_catch_signals();
+    bst_study_devices_read(r.device, &r.devices);
     return command(&ctx, &r, argv[1]);
 }

@@ -15,6 +15,7 @@ const bst_study_kind *bst_app_study_kind(int kind);
  * catalogue, whose checksum takes as long to verify as some runs do. */
 typedef struct bst_study_warm {
     int threads;
+    char selector[128]; /* of the device; "": the default */
     struct bst_device *device;
     bst_stars *stars;
     char catalogue[512];
@@ -23,12 +24,13 @@ typedef struct bst_study_warm {
 /* Prints what the study will do: runs, time, disk. Two runs are tried, in a process and a folder of
  * their own. `out`: where the results would go. */
 void bst_study_print_plan(const bst_study *study, const bst_study_kind *kind, int workers,
-                          const char *out);
+                          const char *device, const char *out);
 
 /* As `check` of bst_study_kind, of the scenario. `user`: a bst_study_plugins that takes what the
  * scenario uses, or NULL. */
 bst_status bst_study_check_scenario(bst_ctx *ctx, void *user, const bst_study_run *run, bool deep);
-bst_status bst_study_warm_open(bst_ctx *ctx, void *user, int threads, void **worker);
+bst_status bst_study_warm_open(bst_ctx *ctx, void *user, const bst_worker_place *place,
+                               void **worker);
 void bst_study_warm_close(void *worker);
 bool bst_study_stop_requested(void *user);
 /* Opens the worker's device unless it is open. */
@@ -42,8 +44,9 @@ bst_status bst_study_simulation(bst_ctx *ctx, bst_study_warm *warm, bst_scenario
 bst_status bst_study_print_scenario(bst_ctx *ctx, const bst_scenario *scenario,
                                     FILE *stream) BST_MUST_CHECK;
 
-/* Slurm as executor of the study in the folder `out`; `site_file` NULL: the user's own, if any. */
-bst_status bst_app_study_slurm(bst_ctx *ctx, const char *site_file, const char *out,
-                               bst_executor *executor) BST_MUST_CHECK;
+/* Slurm as executor of the study in the folder `out`; `site_file` NULL: the user's own, if any;
+ * `device`: for its tasks, "" for the default. */
+bst_status bst_app_study_slurm(bst_ctx *ctx, const char *site_file, const char *device,
+                               const char *out, bst_executor *executor) BST_MUST_CHECK;
 
 #endif

@@ -34,13 +34,15 @@ bst_status bst_study_check_scenario(bst_ctx *ctx, void *user, const bst_study_ru
     return status;
 }
 
-bst_status bst_study_warm_open(bst_ctx *ctx, void *user, int threads, void **worker) {
+bst_status bst_study_warm_open(bst_ctx *ctx, void *user, const bst_worker_place *place,
+                               void **worker) {
     (void)user;
     bst_study_warm *warm = calloc(1, sizeof *warm);
     if (!warm) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a worker");
     }
-    warm->threads = threads;
+    warm->threads = place->threads;
+    snprintf(warm->selector, sizeof warm->selector, "%s", place->device);
     *worker = warm;
     return BST_OK;
 }
@@ -68,7 +70,12 @@ static bool needs_device(const bst_scenario *scenario) {
 }
 
 bst_status bst_study_warm_device(bst_ctx *ctx, bst_study_warm *warm) {
-    return warm->device ? BST_OK : bst_device_open(ctx, "", 0, &warm->device);
+    if (warm->device) {
+        return BST_OK;
+    }
+    bst_status status = bst_device_open(ctx, warm->selector, 0, &warm->device);
+    /* no fault of the run: a worker without its device executes none */
+    return status == BST_ERR_NOT_FOUND ? bst_fail_prefix(ctx, BST_ERR_DEVICE, "--device") : status;
 }
 
 void bst_study_warm_stars(bst_study_warm *warm, bst_scenario *scenario) {

@@ -29,11 +29,11 @@ typedef struct trial {
 } trial;
 
 static void try_runs(const bst_study *study, const bst_study_kind *kind, const char *out,
-                     int workers, int fd) {
+                     int workers, const char *device, int fd) {
     bst_shard_worker worker = {.study = study,
                                .kind = kind,
                                .out = out,
-                               .threads = bst_local_settle(0, workers, false),
+                               .place = {bst_local_settle(0, workers, 0, false), device},
                                .most_s = TRIED_S};
     trial t = {.count = 0};
     bst_ctx ctx = {0};
@@ -88,7 +88,7 @@ static double take_away(const char *path) {
 
 /* Two runs in a process and a folder of their own; *bytes: what they left. */
 static trial attempt(const bst_study *study, const bst_study_kind *kind, int workers,
-                     double *bytes) {
+                     const char *device, double *bytes) {
     trial t = {.count = 0}, news;
     char folder[256];
     int ends[2];
@@ -102,7 +102,7 @@ static trial attempt(const bst_study *study, const bst_study_kind *kind, int wor
     pid_t pid = fork();
     if (pid == 0) {
         close(ends[0]);
-        try_runs(study, kind, folder, workers, ends[1]);
+        try_runs(study, kind, folder, workers, device, ends[1]);
         _exit(0);
     }
     close(ends[1]);
@@ -147,14 +147,14 @@ static void print_axes(const bst_study *study) {
 }
 
 void bst_study_print_plan(const bst_study *study, const bst_study_kind *kind, int workers,
-                          const char *out) {
+                          const char *device, const char *out) {
     double bytes = 0.0, row_bytes = 60.0 * (kind->metric_count + study->axis_count + 8);
     printf("%s, kind %s: %" PRId64 " runs, %" PRId64 " settings x %" PRId64
            " replicates, of %d %s\n",
            study->config.name, kind->name, study->runs, study->settings, study->config.replicates,
            study->base_count, study->base_count == 1 ? "scenario" : "scenarios");
     print_axes(study);
-    trial t = attempt(study, kind, workers, &bytes);
+    trial t = attempt(study, kind, workers, device, &bytes);
     if (*t.error) {
         printf("  a run that was tried failed: %s\n", t.error);
     }

@@ -13,6 +13,7 @@
 #include "sim/app/json_number.h"
 #include "sim/app/plugins.h"
 #include "sim/app/progress.h"
+#include "sim/core/fnv.h"
 #include "sim/core/folder.h"
 #include "sim/core/version.h"
 #include "sim/io/draft_file.h"
@@ -245,10 +246,7 @@ static bst_status write_annotation(bst_ctx *ctx, job *j, const frame_row *row, c
 
 /* The part that a frame belongs to follows from its name alone (FNV-1a, mixed as in SplitMix64). */
 static int part_of(const job *j, const char *name) {
-    uint64_t h = UINT64_C(0xcbf29ce484222325);
-    for (const char *c = name; *c; c++) {
-        h = (h ^ (unsigned char)*c) * UINT64_C(0x100000001b3);
-    }
+    uint64_t h = bst_fnv(BST_FNV_START, name, strlen(name));
     h = (h ^ (h >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
     h = (h ^ (h >> 27)) * UINT64_C(0x94d049bb133111eb);
     double u = (double)((h ^ (h >> 31)) >> 11) * 0x1p-53;

@@ -131,11 +131,16 @@ static void put_morris(FILE *out, const bst_study_metric_view *m, const effect *
 
 /* ------------------------------------------------------------------ one at a time */
 
+/* Equal values; that of an axis is NAN where the scenario does not say it. */
+static bool same_value(double a, double b) {
+    return a == b || (isnan(a) && isnan(b));
+}
+
 /* Whether a setting differs from setting 0, the scenario's own, in this axis alone. */
 static bool differs_in(const bst_study_view *v, const bst_study_axis_view *axis, int64_t setting) {
     for (int i = 0; i < v->axis_count; i++) {
         const bst_study_axis_view *x = &v->axes[i];
-        if (x->swept && (x->of_setting[setting] != x->of_setting[0]) != (x == axis)) {
+        if (x->swept && same_value(x->of_setting[setting], x->of_setting[0]) == (x == axis)) {
             return false;
         }
     }
@@ -251,6 +256,7 @@ bst_status bst_study_plot_sensitivity(bst_ctx *ctx, FILE *out, const bst_study_v
             BST_TRY(put_metric(ctx, out, v, &v->metrics[metrics[k]], "sensitivity", morris == 1));
         }
         BST_TRY(put_metric(ctx, out, v, &v->wall, "speed_sensitivity", morris == 1));
+        BST_TRY(put_metric(ctx, out, v, &v->cpu, "speed_sensitivity", morris == 1));
         bst_page_grid_end(out);
     }
     bst_page_section_end(out);

@@ -42,7 +42,8 @@ typedef struct bst_study_view {
     bst_study_metric_view *metrics;
     int metric_count;
     bst_study_metric_view
-        wall; /* wall time of the runs: not among the metrics, as it is no result */
+        wall, /* wall time of the runs: not among the metrics, as it is no result */
+        cpu;  /* their processor time; tables of an earlier version have none: no values */
 } bst_study_view;
 
 /* Reads the tables of a study. BST_ERR_FORMAT when they are not a study's, or damaged. Free with

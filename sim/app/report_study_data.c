@@ -191,6 +191,7 @@ static bst_status take_speed(bst_ctx *ctx, bst_study_view *v, const bst_rows *ro
     }
     if (v->read < v->runs && v->run_numbers[v->read] == bst_rows_int(rows, 0)) {
         v->wall.of_run[v->read] = bst_rows_real(rows, 1);
+        v->cpu.of_run[v->read] = bst_rows_real(rows, 2);
     }
     return BST_OK;
 }
@@ -256,19 +257,21 @@ static void find_levels(bst_study_axis_view *a, int64_t settings) {
     }
 }
 
-/* Means over the runs of each setting. */
-static void average(const bst_study_view *v, bst_study_metric_view *m) {
+/* Means over the runs of each setting; of speed, with `least`, what the quickest took, as the table
+ * speed_sensitivity has it. */
+static void average(const bst_study_view *v, bst_study_metric_view *m, bool least) {
     for (int64_t r = 0; r < v->runs;) {
         int64_t setting = v->setting_of_run[r], n = 0;
-        double sum = 0.0;
+        double sum = 0.0, quickest = INFINITY;
         for (; r < v->runs && v->setting_of_run[r] == setting; r++) {
             if (isfinite(m->of_run[r])) {
                 sum += m->of_run[r];
+                quickest = fmin(quickest, m->of_run[r]);
                 n++;
             }
         }
         if (setting >= 0 && setting < v->settings && n > 0) {
-            m->mean[setting] = sum / (double)n;
+            m->mean[setting] = least ? quickest : sum / (double)n;
         }
     }
 }
@@ -285,10 +288,11 @@ static void finish(bst_study_view *v) {
         bst_chart_widen(m->of_run, (size_t)v->runs, false, &low, &high);
         m->varies = high > low;
         if (v->replicates <= 1) {
-            average(v, m); /* settings of one run have no statistics */
+            average(v, m, false); /* settings of one run have no statistics */
         }
     }
-    average(v, &v->wall);
+    average(v, &v->wall, true);
+    average(v, &v->cpu, true);
 }
 
 static bst_status allocate(bst_ctx *ctx, bst_study_view *v) {
@@ -307,8 +311,13 @@ static bst_status allocate(bst_ctx *ctx, bst_study_view *v) {
     v->done = calloc(runs, sizeof *v->done);
     v->wall = (bst_study_metric_view){
         .name = "wall_s", .unit = "s", .doc = "Wall time of a run.", .varies = true};
-    return v->axes && v->metrics && v->setting_of_run && v->run_numbers && v->done
-               ? make_room(ctx, v, &v->wall)
+    v->cpu = (bst_study_metric_view){.name = "cpu_s",
+                                     .unit = "s",
+                                     .doc = "Processor time of a run, on all threads.",
+                                     .varies = true};
+    return v->axes && v->metrics && v->setting_of_run && v->run_numbers && v->done &&
+                   make_room(ctx, v, &v->wall) == BST_OK
+               ? make_room(ctx, v, &v->cpu)
                : no_memory(ctx);
 }
 
@@ -340,7 +349,13 @@ bst_status bst_study_view_read(bst_ctx *ctx, bst_run_reader *tables, bst_study_v
     }
     if (status == BST_OK) {
         v->read = 0;
-        status = each_row(ctx, v, "SELECT run, wall_s FROM speed ORDER BY run", take_speed, v);
+        bool both =
+            bst_run_reader_int(
+                tables, "SELECT 1 FROM pragma_table_info('speed') WHERE name = 'cpu_s'", 0, 0) == 1;
+        status = each_row(ctx, v,
+                          both ? "SELECT run, wall_s, cpu_s FROM speed ORDER BY run"
+                               : "SELECT run, wall_s, NULL FROM speed ORDER BY run",
+                          take_speed, v);
     }
     if (status == BST_OK) {
         status = each_row(ctx, v,
@@ -373,6 +388,7 @@ void bst_study_view_free(bst_study_view *v) {
         free_metric(&v->metrics[i]);
     }
     free_metric(&v->wall);
+    free_metric(&v->cpu);
     free(v->axes);
     free(v->metrics);
     free(v->setting_of_run);
@@ -384,6 +400,8 @@ void bst_study_view_free(bst_study_view *v) {
 const char *bst_study_word(const bst_study_axis_view *axis, double value, char text[32]) {
     if (axis->is_text && value >= 0.0 && value < axis->word_count) {
         snprintf(text, 32, "%.31s", axis->words[(int)value]);
+    } else if (isnan(value)) {
+        snprintf(text, 32, "-"); /* the scenario does not say it */
     } else {
         snprintf(text, 32, "%.5g", value);
     }

@@ -2,16 +2,10 @@
 
 #include <math.h>
 #include <stddef.h>
+#include <string.h>
 
+#include "sim/core/fnv.h"
 #include "sim/core/vec.h"
-
-static uint64_t fnv1a(uint64_t hash, const void *data, size_t bytes) {
-    const unsigned char *p = data;
-    for (size_t i = 0; i < bytes; i++) {
-        hash = (hash ^ p[i]) * 0x100000001B3u;
-    }
-    return hash;
-}
 
 /* Byte order independent, so that a seed means the same on every machine. */
 static uint64_t fnv1a_u64(uint64_t hash, uint64_t value) {
@@ -19,21 +13,18 @@ static uint64_t fnv1a_u64(uint64_t hash, uint64_t value) {
     for (int i = 0; i < 8; i++) {
         bytes[i] = (unsigned char)(value >> (8 * i));
     }
-    return fnv1a(hash, bytes, sizeof bytes);
+    return bst_fnv(hash, bytes, sizeof bytes);
 }
 
 static uint64_t fnv1a_name(uint64_t hash, const char *name) {
-    size_t bytes = 0;
-    while (name[bytes]) {
-        bytes++;
-    }
-    return fnv1a(hash, name,
-                 bytes + 1); /* with the terminator, so that "a","bc" and "ab","c" differ */
+    return bst_fnv(
+        hash, name,
+        strlen(name) + 1); /* with the terminator, so that "a","bc" and "ab","c" differ */
 }
 
 bst_rng_key bst_rng_make_key(uint64_t seed, uint64_t run, const char *instance,
                              const char *stream) {
-    uint64_t h = 0xCBF29CE484222325u;
+    uint64_t h = BST_FNV_START;
     h = fnv1a_u64(h, seed);
     h = fnv1a_u64(h, run);
     h = fnv1a_name(h, instance);

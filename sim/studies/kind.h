@@ -39,8 +39,16 @@ typedef struct bst_study_result {
     double metrics[BST_STUDY_METRICS];
     double *series; /* [rows][series_count of the kind]; freed by who called run */
     int rows;
+    double cpu_s;  /* processor time of the run on all threads; whoever calls run fills it in */
     double left_s; /* of a run that ended after most_s: what the rest of it would take */
 } bst_study_result;
+
+/* Where a worker is to work. */
+typedef struct bst_worker_place {
+    int threads;        /* cores that are its own */
+    const char *device; /* OpenCL device, as bst_device_open takes it; "": the default. Lent for the
+                           worker's life */
+} bst_worker_place;
 
 typedef struct bst_study_kind {
     const char *name; /* as in the study file */
@@ -53,8 +61,8 @@ typedef struct bst_study_kind {
     /* Whether a run's documents are right, as far as that can be said without starting it. `deep`:
      * also open the files that they name. */
     bst_status (*check)(bst_ctx *ctx, void *user, const bst_study_run *run, bool deep);
-    /* What a worker keeps from run to run. `threads`: cores that are its own. */
-    bst_status (*open)(bst_ctx *ctx, void *user, int threads, void **worker);
+    /* What a worker keeps from run to run. */
+    bst_status (*open)(bst_ctx *ctx, void *user, const bst_worker_place *place, void **worker);
     void (*close)(void *worker);
     /* Executes a run. BST_ERR_INTERRUPTED: it was asked to stop. BST_ERR_IO, BST_ERR_MEMORY and
      * BST_ERR_DEVICE say that it could not be executed here and now; all other errors are the run's

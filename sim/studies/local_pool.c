@@ -82,10 +82,12 @@ static bool receive(int fd, void *data, size_t bytes) {
 
 static void work(const pool *p, int index, int in, int out) {
     const bst_local_pool_options *o = &p->options;
-    bst_shard_worker worker = {.study = o->study,
-                               .kind = o->kind,
-                               .out = o->out,
-                               .threads = bst_local_settle(index, p->count, o->unpinned)};
+    bst_shard_worker worker = {
+        .study = o->study,
+        .kind = o->kind,
+        .out = o->out,
+        .place = {bst_local_settle(index, p->count, o->cores, o->unpinned),
+                  o->device_count > 0 ? o->devices[index % o->device_count] : ""}};
     reporter to = {out, 0.0};
     bst_ctx ctx = {0};
     bst_shard_job job;
@@ -284,7 +286,9 @@ static void close_pool(void *self) {
 
 bst_status bst_local_pool_open(bst_ctx *ctx, const bst_local_pool_options *options,
                                bst_executor *out) {
-    int count = options->workers > 0 ? options->workers : bst_local_cores();
+    int count = options->workers > 0        ? options->workers
+                : options->device_count > 0 ? options->device_count
+                                            : bst_local_cores();
     pool *p = calloc(1, sizeof *p);
     count = count < MOST_WORKERS ? count : MOST_WORKERS;
     if (p) {

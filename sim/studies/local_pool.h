@@ -9,9 +9,13 @@ typedef struct bst_local_pool_options {
     const bst_study *study;
     const bst_study_kind *kind;
     const char *out;
-    int workers;   /* 0: one for each core that this process may use */
+    int workers;   /* 0: one for each device, or for each core that this process may use */
     int lock_fd;   /* closed by workers, -1: none */
+    int cores;     /* of each worker, 0: all, in equal parts */
     bool unpinned; /* leave the choice of cores to the system */
+    /* OpenCL devices, which the workers take in turn; NULL: the default one for all */
+    const char *const *devices;
+    int device_count;
 } bst_local_pool_options;
 
 /* Cores that this process may run on. */
@@ -26,7 +30,8 @@ int bst_local_cores(void);
 bst_status bst_local_pool_open(bst_ctx *ctx, const bst_local_pool_options *options,
                                bst_executor *out) BST_MUST_CHECK;
 
-/* Settles this process as such a worker: number `index` of `workers`. Returns its cores. */
-int bst_local_settle(int index, int workers, bool unpinned);
+/* Settles this process as such a worker: number `index` of `workers`, with so many cores (0: its
+ * part of all). Returns its cores. */
+int bst_local_settle(int index, int workers, int cores, bool unpinned);
 
 #endif

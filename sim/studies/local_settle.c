@@ -18,13 +18,15 @@ int bst_local_cores(void) {
     return sched_getaffinity(0, sizeof set, &set) == 0 && CPU_COUNT(&set) > 0 ? CPU_COUNT(&set) : 1;
 }
 
-/* The index-th of `workers` equal parts of the cores; one core when there are fewer. */
-static int bind_to_cores(int index, int workers, bool unpinned) {
+/* The index-th of `workers` parts of the cores, equal ones or of `wanted` each; one core when there
+ * are fewer. */
+static int bind_to_cores(int index, int workers, int wanted, bool unpinned) {
     cpu_set_t all, own;
     if (sched_getaffinity(0, sizeof all, &all) != 0) {
         return 1;
     }
     int cores = CPU_COUNT(&all), each = cores / workers > 1 ? cores / workers : 1;
+    each = wanted > 0 && wanted < cores ? wanted : wanted > 0 ? cores : each;
     int from = index * each % cores, n = 0, taken = 0;
     CPU_ZERO(&own);
     for (size_t c = 0; c < CPU_SETSIZE; c++) {
@@ -45,7 +47,9 @@ static int bind_to_cores(int index, int workers, bool unpinned) {
 /* Cores that Slurm grants a task, which it need not be bound to; 0: this is no such task. */
 static int granted_cores(void) {
     const char *text = getenv("SLURM_CPUS_PER_TASK");
-    return text ? atoi(text) : 0;
+    char *end = NULL;
+    long n = text ? strtol(text, &end, 10) : 0;
+    return text && end != text && *end == '\0' && n > 0 && n < 65536 ? (int)n : 0;
 }
 
 static bool cache_root(char *out, size_t bytes) {
@@ -83,9 +87,9 @@ static void take_cache(void) {
     }
 }
 
-int bst_local_settle(int index, int workers, bool unpinned) {
+int bst_local_settle(int index, int workers, int wanted, bool unpinned) {
     char text[16];
-    int cores = bind_to_cores(index, workers, unpinned), granted = granted_cores();
+    int cores = bind_to_cores(index, workers, wanted, unpinned), granted = granted_cores();
     cores = granted > 0 && granted < cores ? granted : cores;
     unsetenv("POCL_AFFINITY");
     snprintf(text, sizeof text, "%d", cores);

@@ -10,7 +10,8 @@ bst_status bst_results_create(bst_ctx *ctx, const bst_study *study, const bst_st
     out->state = calloc(runs, 1);
     out->metrics = malloc(runs * metrics * sizeof *out->metrics + 1);
     out->wall_s = malloc(runs * sizeof *out->wall_s);
-    if (!out->state || !out->metrics || !out->wall_s) {
+    out->cpu_s = malloc(runs * sizeof *out->cpu_s);
+    if (!out->state || !out->metrics || !out->wall_s || !out->cpu_s) {
         bst_results_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the rows of %lld runs",
                         (long long)study->runs);
@@ -28,6 +29,7 @@ void bst_results_free(bst_results *r) {
     free(r->state);
     free(r->metrics);
     free(r->wall_s);
+    free(r->cpu_s);
     *r = (bst_results){.study = NULL};
 }
 

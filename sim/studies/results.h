@@ -25,6 +25,7 @@ typedef struct bst_results {
     uint8_t *state;  /* [runs], bst_row_state */
     double *metrics; /* [runs][metric_count] */
     double *wall_s;  /* [runs] */
+    double *cpu_s;   /* [runs], of all threads */
     bst_row_error *errors;
     int64_t error_count, error_room;
     bst_series_part *parts;

@@ -11,19 +11,23 @@ typedef struct sums {
     double magnitude, magnitude_square, value, value_square;
 } sums;
 
-static double setting_mean(const bst_results *r, int metric, int64_t setting) {
+/* A metric's mean over the runs of a setting. Of speed the least: whatever else a worker has to do
+ * with its first run, or the machine with others' work, only adds to it. */
+static double setting_value(const bst_results *r, int metric, int64_t setting) {
     int64_t replicates = r->study->config.replicates, n = 0;
-    double sum = 0.0;
+    double sum = 0.0, least = INFINITY;
     for (int64_t i = setting * replicates; i < (setting + 1) * replicates; i++) {
         double x = r->state[i] != BST_ROW_DONE ? NAN
-                   : metric < 0                ? r->wall_s[i]
+                   : metric == BST_SPEED_WALL  ? r->wall_s[i]
+                   : metric == BST_SPEED_CPU   ? r->cpu_s[i]
                                                : r->metrics[i * r->kind->metric_count + metric];
         if (!isnan(x)) {
             sum += x;
+            least = fmin(least, x);
             n++;
         }
     }
-    return n > 0 ? sum / (double)n : NAN;
+    return n == 0 ? NAN : metric < 0 ? least : sum / (double)n;
 }
 
 static void add(sums *s, double magnitude, double value) {
@@ -49,8 +53,8 @@ static void add_paths(const bst_results *r, const bst_study_factor *f, int metri
         for (int a = 0; a < k; a++) {
             double by = to[a] - from[a];
             if (by != 0.0) {
-                double effect = (setting_mean(r, metric, first + (level + 1) * stride) -
-                                 setting_mean(r, metric, first + level * stride)) /
+                double effect = (setting_value(r, metric, first + (level + 1) * stride) -
+                                 setting_value(r, metric, first + level * stride)) /
                                 by;
                 add(&list[a], fabs(effect), effect);
             }
@@ -60,14 +64,14 @@ static void add_paths(const bst_results *r, const bst_study_factor *f, int metri
 
 static void add_axes(const bst_results *r, const bst_study_factor *f, int metric, int64_t first,
                      int64_t stride, sums *list) {
-    double own = setting_mean(r, metric, first);
+    double own = setting_value(r, metric, first);
     int64_t level = 1;
     for (int a = 0; a < f->axis_count; a++) {
         const bst_study_axis *axis = &r->study->axes[f->first_axis + a];
         int64_t count = axis->values ? axis->value_count : axis->axis->count;
         double least = own, most = own, begin = NAN, end = NAN;
         for (int64_t i = 0; i < count; i++, level++) {
-            double y = setting_mean(r, metric, first + level * stride);
+            double y = setting_value(r, metric, first + level * stride);
             least = fmin(least, y); /* a NAN is passed over */
             most = fmax(most, y);
             begin = i == 0 ? y : begin;
@@ -133,7 +137,9 @@ static bst_status put_figure(bst_ctx *ctx, const bst_results *r, int factor, int
         const bst_value row[] = {
             bst_int_value(f->sweep),
             bst_text_value(f->design == BST_SWEEP_MORRIS ? "morris" : "one_at_a_time"),
-            bst_text_value(metric < 0 ? "wall_s" : r->kind->metrics[metric].name),
+            bst_text_value(metric == BST_SPEED_WALL  ? "wall_s"
+                           : metric == BST_SPEED_CPU ? "cpu_s"
+                                                     : r->kind->metrics[metric].name),
             bst_int_value(i + 1),
             bst_text_value(r->study->axes[list[i].axis].name),
             bst_real_value(list[i].effect),
@@ -174,8 +180,9 @@ static bst_status write_table(bst_ctx *ctx, const bst_tables_job *j, const char 
         if (!has_effects(&s->factors[f])) {
             continue;
         }
-        for (int m = 0; m < (speed ? 1 : j->metric_count) && status == BST_OK; m++) {
-            status = put_figure(ctx, j->results, f, speed ? -1 : j->metrics[m], &t);
+        for (int m = 0; m < (speed ? 2 : j->metric_count) && status == BST_OK; m++) {
+            static const int figures[2] = {BST_SPEED_WALL, BST_SPEED_CPU};
+            status = put_figure(ctx, j->results, f, speed ? figures[m] : j->metrics[m], &t);
         }
     }
     return bst_table_end(ctx, &t, status);

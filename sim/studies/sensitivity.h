@@ -17,10 +17,13 @@ typedef struct bst_sensitivity {
     double spread;      /* morris: their standard deviation (sigma): curvature or interaction */
 } bst_sensitivity;
 
+/* Figures of speed, in place of a metric. */
+enum { BST_SPEED_WALL = -1, BST_SPEED_CPU = -2 };
+
 /* Of a figure over the axes of a factor of one of the two designs: out[factor->axis_count], the
- * greatest effect first, those without any last. `metric`: of the kind; -1: wall time. A setting's
- * value is the mean of its runs that have one; where other sweeps combine with the design, effects
- * of all their combinations are taken together. */
+ * greatest effect first, those without any last. `metric`: of the kind, or one of speed. A
+ * setting's value is the mean of its runs that have one, of speed the least; where other sweeps
+ * combine with the design, effects of all their combinations are taken together. */
 void bst_sensitivity_of(const bst_results *results, int factor, int metric, bst_sensitivity *out);
 
 #endif

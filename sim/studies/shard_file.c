@@ -10,16 +10,13 @@
 #include <unistd.h>
 
 #include "sim/core/file.h"
+#include "sim/core/fnv.h"
 #include "sim/studies/results.h"
 
 static const uint64_t MOST_BYTES = (uint64_t)4 << 30;
 
 static uint64_t checksum(const char *text, size_t bytes) {
-    uint64_t h = UINT64_C(0xcbf29ce484222325);
-    for (size_t i = 0; i < bytes; i++) {
-        h = (h ^ (unsigned char)text[i]) * UINT64_C(0x100000001b3);
-    }
-    return h;
+    return bst_fnv(BST_FNV_START, text, bytes);
 }
 
 /* ------------------------------------------------------------------ writing */
@@ -52,7 +49,7 @@ bst_status bst_shard_begin(bst_ctx *ctx, const bst_study *study, const bst_study
     if (!out->stream) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the rows of a shard");
     }
-    fprintf(out->stream, "boresight shard 1\nstudy %s %s\n", study->digest, kind->name);
+    fprintf(out->stream, "boresight shard 2\nstudy %s %s\n", study->digest, kind->name);
     print_names(out->stream, "metrics", kind->metrics, kind->metric_count);
     print_names(out->stream, "series", kind->series, kind->series_count);
     return BST_OK;
@@ -62,14 +59,14 @@ void bst_shard_add(bst_shard_draft *d, const bst_study_result *result, double wa
                    const char *error) {
     int64_t run = d->first + d->count++;
     if (error) {
-        fprintf(d->stream, "F %" PRId64 " %.6f ", run, wall_s);
+        fprintf(d->stream, "F %" PRId64 " %.6f %.6f ", run, wall_s, result->cpu_s);
         for (; *error; error++) {
             fputc(*error == '\n' ? '\x1f' : *error, d->stream);
         }
         fputc('\n', d->stream);
         return;
     }
-    fprintf(d->stream, "R %" PRId64 " %.6f", run, wall_s);
+    fprintf(d->stream, "R %" PRId64 " %.6f %.6f", run, wall_s, result->cpu_s);
     print_numbers(d->stream, result->metrics, d->kind->metric_count);
     for (int i = 0; i < result->rows; i++) {
         fputc('S', d->stream);
@@ -243,6 +240,8 @@ static bst_status take_line(bst_ctx *ctx, bst_results *r, char *line, int64_t *r
     }
     double wall_s = strtod(at, &end);
     bool failed = line[0] == 'F';
+    at = end;
+    double cpu_s = strtod(at, &end);
     *good = failed ? *end == ' ' : end != at && read_numbers(&end, metrics, values);
     if (!*good) {
         return BST_OK;
@@ -255,6 +254,7 @@ static bst_status take_line(bst_ctx *ctx, bst_results *r, char *line, int64_t *r
         return BST_OK;
     }
     r->wall_s[*run] = wall_s;
+    r->cpu_s[*run] = cpu_s;
     r->state[*run] = failed ? BST_ROW_FAILED : BST_ROW_DONE;
     r->done++;
     r->failed += failed;
@@ -309,7 +309,7 @@ static bst_status take_text(bst_ctx *ctx, bst_results *r, const char *path, char
     char expected[80];
     snprintf(expected, sizeof expected, "study %s %s", r->study->digest, r->kind->name);
     char *line = next_line(&text);
-    if (!line || strcmp(line, "boresight shard 1") != 0) {
+    if (!line || strcmp(line, "boresight shard 2") != 0) {
         return damaged(ctx, path);
     }
     line = next_line(&text);

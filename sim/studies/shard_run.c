@@ -4,6 +4,7 @@
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include "sim/core/wall_clock.h"
 #include "sim/studies/results.h"
@@ -43,10 +44,17 @@ static bst_status run_documents(bst_ctx *ctx, bst_shard_worker *w, bst_study_run
     return status;
 }
 
+/* Of all threads of this process so far. */
+static double processor_seconds(void) {
+    struct timespec used;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
+    return (double)used.tv_sec + 1e-9 * (double)used.tv_nsec;
+}
+
 bst_status bst_shard_run_one(bst_ctx *ctx, bst_shard_worker *w, int64_t index,
                              bst_study_result *result, char error[BST_MESSAGE_BYTES],
                              double *wall_s) {
-    double started = bst_wall_seconds();
+    double started = bst_wall_seconds(), busy = processor_seconds();
     bst_study_run run = {.study = w->study,
                          .place = bst_study_place_of(w->study, index),
                          .out = w->out,
@@ -54,10 +62,11 @@ bst_status bst_shard_run_one(bst_ctx *ctx, bst_shard_worker *w, int64_t index,
     memset(result, 0, sizeof *result);
     error[0] = '\0';
     if (!w->state) {
-        BST_TRY(w->kind->open(ctx, w->kind->user, w->threads, &w->state));
+        BST_TRY(w->kind->open(ctx, w->kind->user, &w->place, &w->state));
     }
     bst_status status = run_documents(ctx, w, &run, result);
     *wall_s = bst_wall_seconds() - started;
+    result->cpu_s = processor_seconds() - busy;
     if (status != BST_OK && !is_of_the_place(status)) {
         memcpy(error, ctx->message, BST_MESSAGE_BYTES);
         if (!*error) {

@@ -10,9 +10,9 @@ typedef struct bst_shard_worker {
     const bst_study *study;
     const bst_study_kind *kind;
     const char *out; /* the study's folder */
-    int threads;     /* cores that are its own */
-    double most_s;   /* > 0: runs may end after so much time, see bst_study_run */
-    void *state;     /* of the kind; made with the first run */
+    bst_worker_place place;
+    double most_s; /* > 0: runs may end after so much time, see bst_study_run */
+    void *state;   /* of the kind; made with the first run */
 } bst_shard_worker;
 
 typedef void (*bst_shard_report)(void *user, const bst_shard_news *news);

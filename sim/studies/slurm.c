@@ -8,6 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "sim/core/fnv.h"
 #include "sim/core/folder.h"
 #include "sim/core/wall_clock.h"
 #include "sim/studies/slurm_internal.h"
@@ -21,24 +22,49 @@ static int sleep_ms(int ms) {
     return nanosleep(&pause, NULL);
 }
 
+/* The submitted tasks by array and index, for a look at the queue. */
+typedef struct submitted {
+    bst_slurm_task **tasks;
+    size_t count;
+} submitted;
+
+static int by_number(const void *a, const void *b) {
+    const bst_slurm_task *x = *(bst_slurm_task *const *)a, *y = *(bst_slurm_task *const *)b;
+    int array = (x->array > y->array) - (x->array < y->array);
+    return array ? array : (x->index > y->index) - (x->index < y->index);
+}
+
+static bst_status sort_submitted(bst_ctx *ctx, const bst_slurm *s, submitted *out) {
+    *out = (submitted){.tasks = malloc(((size_t)s->count + 1) * sizeof *out->tasks)};
+    if (!out->tasks) {
+        return out_of_memory(ctx);
+    }
+    for (int64_t i = 0; i < s->count; i++) {
+        if (s->tasks[i].array > 0) {
+            out->tasks[out->count++] = &s->tasks[i];
+        }
+    }
+    qsort(out->tasks, out->count, sizeof *out->tasks, by_number);
+    return BST_OK;
+}
+
 /* One line of squeue: array, index, state, reason. */
 static void take_state(void *user, const char *line) {
-    bst_slurm *s = user;
+    const submitted *s = user;
     long long array = 0, index = 0;
     char state[32] = "", reason[64] = "";
     if (sscanf(line, "%lld %lld %31s %63[^\n]", &array, &index, state, reason) < 3) {
         return;
     }
-    for (int64_t i = 0; i < s->count; i++) {
-        bst_slurm_task *t = &s->tasks[i];
-        if (t->array == array && t->index == index) {
-            t->seen = true;
-            t->held = strcmp(state, "PENDING") == 0 &&
-                      (strstr(reason, "JobHeldAdmin") || strstr(reason, "requeued held") ||
-                       strstr(reason, "launch failed"));
-            snprintf(t->reason, sizeof t->reason, "%s", reason);
-            return;
-        }
+    bst_slurm_task wanted = {.array = array, .index = index}, *key = &wanted;
+    bst_slurm_task **found = bsearch(&key, s->tasks, s->count, sizeof *s->tasks, by_number);
+    if (found) {
+        bst_slurm_task *t = *found;
+        t->seen = true;
+        t->held = strcmp(state, "PENDING") == 0 &&
+                  (strstr(reason, "JobHeldAdmin") || strstr(reason, "requeued held") ||
+                   strstr(reason, "launch failed"));
+        snprintf(t->reason, sizeof t->reason, "%s", reason);
     }
 }
 
@@ -52,7 +78,11 @@ static bst_status look(bst_ctx *ctx, bst_slurm *s) {
                           name,     "--format=%F %K %T %r", NULL};
     int code;
     char said[BST_SHARD_TEXT_BYTES];
-    BST_TRY(bst_slurm_run(ctx, s, argv, take_state, s, &code, said));
+    submitted list;
+    BST_TRY(sort_submitted(ctx, s, &list));
+    bst_status asked = bst_slurm_run(ctx, s, argv, take_state, &list, &code, said);
+    free(list.tasks);
+    BST_TRY(asked);
     double now = bst_wall_seconds();
     s->looked_s = now;
     if (code != 0) {
@@ -280,15 +310,6 @@ static void slurm_close(void *self) {
     destroy(s);
 }
 
-/* FNV-1a, 64 bits. */
-static uint64_t hash_of(const char *text) {
-    uint64_t hash = 0xcbf29ce484222325u;
-    for (; *text; text++) {
-        hash = (hash ^ (unsigned char)*text) * 0x100000001b3u;
-    }
-    return hash;
-}
-
 static bst_status copy_program(bst_ctx *ctx, bst_slurm *s, const char *const program[]) {
     size_t words = 0;
     while (program[words]) {
@@ -314,7 +335,7 @@ static bst_status prepare(bst_ctx *ctx, bst_slurm *s, const char *study_folder) 
     }
     BST_TRY(bst_folder_make(ctx, s->folder));
     snprintf(s->name, sizeof s->name, "boresight-%012llx",
-             (unsigned long long)(hash_of(full) & 0xffffffffffffu));
+             (unsigned long long)(bst_fnv(BST_FNV_START, full, strlen(full)) & 0xffffffffffffu));
     struct timespec now;
     clock_gettime(CLOCK_REALTIME, &now);
     snprintf(s->token, sizeof s->token, "%llx-%x", (unsigned long long)now.tv_sec,

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/core/fnv.h"
 #include "sim/core/version.h"
 #include "sim/studies/study_internal.h"
 
@@ -362,18 +363,15 @@ static bst_status add_axes(bst_ctx *ctx, bst_study *study) {
     return BST_OK;
 }
 
-/* 64-bit FNV-1a. */
+/* With a byte after it that no text has. */
 static uint64_t hash_text(uint64_t h, const char *text) {
-    for (; *text; text++) {
-        h = (h ^ (unsigned char)*text) * UINT64_C(0x100000001b3);
-    }
-    return (h ^ 0xffu) * UINT64_C(0x100000001b3);
+    return bst_fnv(bst_fnv(h, text, strlen(text)), "\xff", 1);
 }
 
 /* All that rows follow from: not what is made of them, nor where files lie. */
 static bst_status set_digest(bst_ctx *ctx, bst_study *study) {
     static const char *const without[] = {"scenarios", "metrics", "resamples", "keep", "name"};
-    uint64_t h = hash_text(UINT64_C(0xcbf29ce484222325), bst_version());
+    uint64_t h = hash_text(BST_FNV_START, bst_version());
     cJSON *echo = bst_study_echo(study);
     for (size_t i = 0; echo && i < sizeof without / sizeof *without; i++) {
         cJSON_DeleteItemFromObjectCaseSensitive(echo, without[i]);

@@ -261,16 +261,18 @@ static bst_status write_runs(bst_ctx *ctx, const bst_tables_job *j) {
 
 static bst_status write_speed(bst_ctx *ctx, const bst_tables_job *j) {
     const bst_results *r = j->results;
-    const bst_column columns[] = {int_column("run", "Its number."),
-                                  real_column("wall_s", "s", "Wall time of the run.")};
+    const bst_column columns[] = {
+        int_column("run", "Its number."), real_column("wall_s", "s", "Wall time of the run."),
+        real_column("cpu_s", "s", "Processor time of the run, on all threads.")};
     bst_table_out t;
     BST_TRY(bst_table_begin(ctx, j->out, "speed",
                             "What differs from machine to machine, and is in no other table.",
-                            columns, 2, true, &t));
+                            columns, 3, true, &t));
     bst_status status = BST_OK;
     for (int64_t i = 0; i < r->study->runs && status == BST_OK; i++) {
         if (r->state[i] != BST_ROW_MISSING) {
-            const bst_value row[] = {bst_int_value(i), bst_real_value(r->wall_s[i])};
+            const bst_value row[] = {bst_int_value(i), bst_real_value(r->wall_s[i]),
+                                     bst_real_value(r->cpu_s[i])};
             status = bst_table_row(ctx, &t, row);
         }
     }

@@ -183,8 +183,8 @@ class Made(OnePage):
     def test_one_at_a_time(self):
         folder = runs.scratch()
         out = tables(folder, "one_at_a_time",
-                     [(1, 1, "x"), (0, 1, "x"), (2, 1, "x"), (1, 0, "x"), (1, 4, "x"),
-                      (1, 1, "y")])
+                     [(1, 1, None), (0, 1, None), (2, 1, None), (1, 0, None), (1, 4, None),
+                      (1, 1, "y")])  # the scenario says nothing of c
         # 10 a + b: a changes it by 20, b by 4, c by nothing; the wall time is 1 + b
         ranked(out, "sensitivity", "one_at_a_time", "loss_db_pd50", ("a", 20, None, None),
                ("b", 4, None, None), ("c", 0, None, None))
@@ -202,6 +202,12 @@ class Made(OnePage):
                  for part in charts]
         self.assertEqual(ranks[0], ["1  a", "2  b", "3  c"])
         self.assertEqual(ranks[1][0], "1  b")
+        # from the scenario's 11 to 1 and 21, and to 10 and 14: bars on both sides
+        wide = [float(part.get("width")) for part in charts[0].iter("rect")
+                if part.get("class").startswith("h ")]
+        self.assertEqual(len(wide), 5)
+        for bar, size in zip(wide, (10, 10, 1, 3, 0)):
+            self.assertAlmostEqual(bar / wide[0], size / 10, delta=0.01)
 
     def test_morris(self):
         folder = runs.scratch()

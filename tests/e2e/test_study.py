@@ -466,6 +466,66 @@ class Cubes(unittest.TestCase):
         self.assertTrue(os.path.exists(os.path.join(self.out, "Annotations", "000000.json")))
 
 
+class Devices(unittest.TestCase):
+    """Workers with a device each. Two of PoCL's CPU devices stand for two GPUs."""
+
+    def small(self, folder):
+        return write(folder, kind="cubes", sweeps=[], dispersions=[], replicates=4, keep="run",
+                     scenarios=[{"file": os.path.abspath("scenarios/datacube.json")}],
+                     set={"/duration_s": 1, "/world/star_catalogue": "embedded"})
+
+    def test_unknown_device(self):
+        """It is the workers' trouble, not the runs'."""
+        folder = runs.scratch()
+        result = study(self.small(folder), "--out", folder + "/out", "--device", "nonesuch",
+                       "--workers", "1")
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertIn('--device: no OpenCL device matches "nonesuch"; there is: 0:0 ',
+                      result.stdout)
+        self.assertIn("4 runs are missing", result.stdout)
+
+    @unittest.skipUnless(KILLS > 2, "slow: builds kernels for a second device")
+    def test_each_worker_has_its_own(self):
+        folder = runs.scratch()
+        path = self.small(folder)
+        environment = {**os.environ, "POCL_DEVICES": "pthread basic"}
+        for name, words in (("one", ("--device", "pthread", "--workers", "1")),
+                            ("two", ("--device", "0:0,0:1", "--shard-runs", "1"))):
+            result = study(path, "--out", f"{folder}/{name}", *words, env=environment)
+            self.assertEqual(result.returncode, 0, result.stderr)
+        cards = [sorted(glob.glob(f"{folder}/{name}/ImageFiles/*.fits")) for name in ("one", "two")]
+        self.assertEqual([len(c) for c in cards], [4, 4])
+        # both of PoCL's are the same processor: no bit differs
+        for one, two in zip(*cards):
+            with open(one, "rb") as a, open(two, "rb") as b:
+                self.assertEqual(a.read(), b.read())
+
+    def test_cores(self):
+        """A worker with one core has one thread of PoCL, and stays on it."""
+        folder = runs.scratch()
+        path = write(folder, replicates=40)
+        job = subprocess.Popen([runs.BORESIGHT, "study", path, "--out", folder + "/out", "--quiet",
+                                "--workers", "1", "--cores", "1"], stdout=subprocess.DEVNULL)
+        seen = set()
+        while job.poll() is None:
+            for worker in children(job.pid):
+                try:
+                    seen.add(len(os.sched_getaffinity(worker)))
+                except ProcessLookupError:
+                    pass
+            time.sleep(0.01)
+        self.assertEqual(job.returncode, 0)
+        self.assertIn(1, seen)
+
+
+def children(pid):
+    try:
+        with open(f"/proc/{pid}/task/{pid}/children", encoding="ascii") as file:
+            return [int(word) for word in file.read().split()]
+    except OSError:
+        return []
+
+
 class Ready(unittest.TestCase):
     def test_ready_studies_are_right(self):
         for path in sorted(glob.glob("scenarios/studies/*.json")):

@@ -48,11 +48,12 @@ static inline bst_status fake_run(bst_ctx *ctx, void *worker, const bst_study_ru
     return BST_OK;
 }
 
-static inline bst_status fake_open(bst_ctx *ctx, void *user, int threads, void **worker) {
+static inline bst_status fake_open(bst_ctx *ctx, void *user, const bst_worker_place *place,
+                                   void **worker) {
     static char kept;
     (void)ctx;
     (void)user;
-    (void)threads;
+    (void)place;
     *worker = &kept;
     return BST_OK;
 }

@@ -18,6 +18,11 @@ static int tear_down(void **state) {
     return 0;
 }
 
+static void open_study(const char *body, bst_study *out) {
+    bst_ctx ctx = {0};
+    bst_assert_ok(&ctx, fixture_open(&ctx, folder, body, out));
+}
+
 static void values_of(const bst_study *s, int64_t run, bst_study_value *out) {
     bst_study_place place = bst_study_place_of(s, run);
     bst_study_values(s, &place, out);
@@ -26,15 +31,13 @@ static void values_of(const bst_study *s, int64_t run, bst_study_value *out) {
 /* Grids combine, the last axis fastest; replicates are neighbours. */
 static void test_grid(void **state) {
     (void)state;
-    bst_ctx ctx = {0};
     bst_study s;
     bst_study_value v[8];
-    bst_assert_ok(&ctx,
-                  fixture_open(&ctx, folder,
-                               "\"replicates\": 2, \"sweeps\": [{\"axes\": [{\"path\": \"/a\", "
-                               "\"values\": [1, 5]}, {\"path\": \"/b/c\", \"from\": 1, \"to\": "
-                               "100, \"count\": 3, \"spacing\": \"log\"}]}]",
-                               &s));
+    open_study(
+        "\"replicates\": 2, \"sweeps\": [{\"axes\": [{\"path\": \"/a\", "
+        "\"values\": [1, 5]}, {\"path\": \"/b/c\", \"from\": 1, \"to\": "
+        "100, \"count\": 3, \"spacing\": \"log\"}]}]",
+        &s);
     assert_int_equal(s.settings, 6);
     assert_int_equal(s.runs, 12);
     assert_string_equal(s.axes[0].name, "a");
@@ -64,7 +67,7 @@ static void test_list(void **state) {
     const char *body =
         "\"sweeps\": [{\"design\": \"list\", \"axes\": [{\"path\": \"/word\", \"values\": [\"p\", "
         "\"q\"]}, {\"path\": \"/a\", \"also\": [\"/b/list/1\"], \"values\": [7, 8]}]}]";
-    bst_assert_ok(&ctx, fixture_open(&ctx, folder, body, &s));
+    open_study(body, &s);
     assert_int_equal(s.runs, 2);
     bst_study_place place = bst_study_place_of(&s, 1);
     bst_study_values(&s, &place, v);
@@ -88,14 +91,13 @@ static void test_list(void **state) {
 /* Every slice of every axis has one point. */
 static void test_latin_hypercube(void **state) {
     (void)state;
-    bst_ctx ctx = {0};
     bst_study s;
     bst_study_value v[8];
-    bst_assert_ok(&ctx, fixture_open(&ctx, folder,
-                                     "\"sweeps\": [{\"design\": \"latin_hypercube\", \"points\": "
-                                     "40, \"axes\": [{\"path\": \"/a\", \"from\": -1, \"to\": 3}, "
-                                     "{\"path\": \"/b/c\", \"from\": 10, \"to\": 0}]}]",
-                                     &s));
+    open_study(
+        "\"sweeps\": [{\"design\": \"latin_hypercube\", \"points\": "
+        "40, \"axes\": [{\"path\": \"/a\", \"from\": -1, \"to\": 3}, "
+        "{\"path\": \"/b/c\", \"from\": 10, \"to\": 0}]}]",
+        &s);
     assert_int_equal(s.runs, 40);
     int seen[2][40] = {{0}}, ordered = 0;
     double before = -10.0;
@@ -120,14 +122,13 @@ static void test_latin_hypercube(void **state) {
 /* The scenario itself, then one axis at a time. */
 static void test_one_at_a_time(void **state) {
     (void)state;
-    bst_ctx ctx = {0};
     bst_study s;
     bst_study_value v[8];
-    bst_assert_ok(&ctx, fixture_open(&ctx, folder,
-                                     "\"sweeps\": [{\"design\": \"one_at_a_time\", \"axes\": "
-                                     "[{\"path\": \"/a\", \"values\": [1, 3]}, {\"path\": "
-                                     "\"/b/c\", \"from\": 0, \"to\": 1, \"count\": 3}]}]",
-                                     &s));
+    open_study(
+        "\"sweeps\": [{\"design\": \"one_at_a_time\", \"axes\": "
+        "[{\"path\": \"/a\", \"values\": [1, 3]}, {\"path\": "
+        "\"/b/c\", \"from\": 0, \"to\": 1, \"count\": 3}]}]",
+        &s);
     assert_int_equal(s.runs, 6);
     const double a[] = {NAN, 1, 3, NAN, NAN, NAN}, c[] = {NAN, NAN, NAN, 0, 0.5, 1};
     for (int64_t run = 0; run < 6; run++) {
@@ -144,15 +145,14 @@ static void test_one_at_a_time(void **state) {
  * 0, 1/3, 2/3, 1, and both up and down happen. */
 static void test_morris(void **state) {
     (void)state;
-    bst_ctx ctx = {0};
     bst_study s;
     bst_study_value v[8], before[8] = {{0}};
-    bst_assert_ok(&ctx, fixture_open(&ctx, folder,
-                                     "\"sweeps\": [{\"design\": \"morris\", \"trajectories\": 20, "
-                                     "\"axes\": [{\"path\": \"/a\", \"from\": 0, \"to\": 1}, "
-                                     "{\"path\": \"/b/c\", \"from\": 0, \"to\": 1}, {\"path\": "
-                                     "\"/d\", \"from\": 0, \"to\": 1}]}]",
-                                     &s));
+    open_study(
+        "\"sweeps\": [{\"design\": \"morris\", \"trajectories\": 20, "
+        "\"axes\": [{\"path\": \"/a\", \"from\": 0, \"to\": 1}, "
+        "{\"path\": \"/b/c\", \"from\": 0, \"to\": 1}, {\"path\": "
+        "\"/d\", \"from\": 0, \"to\": 1}]}]",
+        &s);
     assert_int_equal(s.runs, 80);
     int up = 0, places[4] = {0};
     for (int64_t t = 0; t < 20; t++) {
@@ -206,7 +206,7 @@ static void test_sensitivity(void **state) {
                  "\"replicates\": 2, \"sweeps\": [{\"axes\": [{\"path\": \"/word\", "
                  "\"values\": [\"p\", \"q\"]}]}, {\"design\": \"%s\"%s, \"axes\": %s}]",
                  morris ? "morris" : "one_at_a_time", morris ? ", \"trajectories\": 30" : "", list);
-        bst_assert_ok(&ctx, fixture_open(&ctx, folder, body, &s));
+        open_study(body, &s);
         bst_assert_ok(&ctx, bst_results_create(&ctx, &s, &kind, &r));
         for (int64_t run = 0; run < s.runs; run++) {
             bst_study_value v[8];
@@ -267,7 +267,7 @@ static void test_dispersions(void **state) {
     char body[1024];
     snprintf(body, sizeof body, "\"replicates\": 4000, \"dispersions\": [%s, %s, %s]", normal,
              table, even);
-    bst_assert_ok(&ctx, fixture_open(&ctx, folder, body, &s));
+    open_study(body, &s);
     snprintf(body, sizeof body, "\"replicates\": 4000, \"dispersions\": [%s, %s]", even, normal);
     bst_assert_ok(&ctx, fixture_open(&ctx, folder, body, &other));
     double sum = 0.0, logs = 0.0;
@@ -295,13 +295,12 @@ static void test_apply(void **state) {
     bst_ctx ctx = {0};
     bst_study s;
     bst_study_value v[8];
-    bst_assert_ok(&ctx,
-                  fixture_open(&ctx, folder,
-                               "\"sweeps\": [{\"axes\": [{\"path\": \"/a\", \"values\": [10]}]}], "
-                               "\"dispersions\": [{\"path\": \"/a\", \"from\": 2, \"to\": 3, "
-                               "\"apply\": \"multiply\", \"integer\": true}, {\"path\": \"/b/c\", "
-                               "\"from\": 1, \"to\": 2, \"apply\": \"add\"}]",
-                               &s));
+    open_study(
+        "\"sweeps\": [{\"axes\": [{\"path\": \"/a\", \"values\": [10]}]}], "
+        "\"dispersions\": [{\"path\": \"/a\", \"from\": 2, \"to\": 3, "
+        "\"apply\": \"multiply\", \"integer\": true}, {\"path\": \"/b/c\", "
+        "\"from\": 1, \"to\": 2, \"apply\": \"add\"}]",
+        &s);
     assert_string_equal(s.axes[1].name, "a_factor");
     assert_string_equal(s.axes[2].name, "c_offset");
     bst_study_place place = bst_study_place_of(&s, 0);
@@ -320,7 +319,6 @@ static void test_apply(void **state) {
 /* Common random numbers: a replicate has the same draws in every setting. */
 static void test_common(void **state) {
     (void)state;
-    bst_ctx ctx = {0};
     bst_study s;
     bst_study_value v[8], w[8];
     const char *body =
@@ -330,7 +328,7 @@ static void test_common(void **state) {
     char text[512];
     for (int common = 0; common < 2; common++) {
         snprintf(text, sizeof text, body, common ? "common" : "each");
-        bst_assert_ok(&ctx, fixture_open(&ctx, folder, text, &s));
+        open_study(text, &s);
         values_of(&s, 1, v);
         values_of(&s, 4, w);
         assert_int_equal(v[1].number == w[1].number, common);
@@ -346,7 +344,7 @@ static void test_digest(void **state) {
     bst_study s, again;
     char path[512], digest[20];
     const char *axis = "\"sweeps\": [{\"axes\": [{\"path\": \"/a\", \"values\": [0.1, 2e-17]}]}]";
-    bst_assert_ok(&ctx, fixture_open(&ctx, folder, axis, &s));
+    open_study(axis, &s);
     strcpy(digest, s.digest);
     cJSON *echo = bst_study_echo(&s);
     char *text = cJSON_Print(echo);
@@ -358,11 +356,11 @@ static void test_digest(void **state) {
     cJSON_Delete(echo);
     bst_study_close(&again);
     bst_study_close(&s);
-    bst_assert_ok(&ctx, fixture_open(&ctx, folder, "\"replicates\": 2", &s));
+    open_study("\"replicates\": 2", &s);
     assert_string_not_equal(s.digest, digest);
     bst_study_close(&s);
     fixture_write(folder, "scenario.json", "{\"name\": \"base\", \"a\": 3}");
-    bst_assert_ok(&ctx, fixture_open(&ctx, folder, axis, &s));
+    open_study(axis, &s);
     assert_string_not_equal(s.digest, digest);
     bst_study_close(&s);
 }
