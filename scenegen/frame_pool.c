@@ -74,9 +74,15 @@ static bst_status map(void *owner, bst_ctx *ctx, const uint16_t **pixels) {
 bst_status bst_frame_pool_pixels(bst_ctx *ctx, bst_frame *frame, uint16_t **out) {
     pooled_frame *f = frame->owner;
     const uint16_t *pixels;
+    cl_int code;
+    size_t bytes = (size_t)frame->width * (size_t)frame->height * sizeof(uint16_t);
     BST_TRY(map(f, ctx, &pixels));
+    /* what is mapped for reading must not be written */
+    clEnqueueUnmapMemObject(f->pool->queue, f->buffer, f->mapped, 0, NULL, NULL);
+    f->mapped = clEnqueueMapBuffer(f->pool->queue, f->buffer, CL_TRUE, CL_MAP_READ | CL_MAP_WRITE,
+                                   0, bytes, 0, NULL, NULL, &code);
     *out = f->mapped;
-    return BST_OK;
+    return bst_device_check(ctx, code, "mapping a frame for writing");
 }
 
 /* The mapping stays for the next reader. */

@@ -24,8 +24,7 @@ bst_status bst_frame_pool_take(bst_ctx *ctx, bst_frame_pool *pool, int width, in
 bst_status bst_frame_pool_enqueued(bst_ctx *ctx, bst_frame *frame) BST_MUST_CHECK;
 
 /* Waits for the frame and gives its pixels [height][width] to be changed, before it is handed on.
- * They are those that all readers will map; the device's own copy, where it has one, which nobody
- * reads, stays as it was rendered. */
+ * All readers get what was changed; the device does when the frame is given back. */
 bst_status bst_frame_pool_pixels(bst_ctx *ctx, bst_frame *frame, uint16_t **out) BST_MUST_CHECK;
 
 #endif

@@ -66,6 +66,7 @@ struct bst_islands {
     int64_t span, hooked;                     /* spans that were begun, and whose hooks are done */
     int next, done; /* islands of the span that were taken, and that are finished */
     bool linked;    /* and what links them has stepped */
+    bool failed;    /* a step of it did: its hooks are for the caller */
     bool hooking;   /* somebody does */
     bool running, stop;
 };
@@ -290,7 +291,8 @@ static void step_one(bst_islands *s) {
         pthread_mutex_lock(&s->lock);
     }
     s->linked = true;
-    s->running = s->running && !first_failure(s) && first_due(s) < s->last_tick;
+    s->failed = first_failure(s) != NULL;
+    s->running = s->running && !s->failed && first_due(s) < s->last_tick;
     tell(s);
 }
 
@@ -320,7 +322,8 @@ static void do_or_await(bst_islands *s) {
     }
     if (s->next < s->count) {
         step_one(s);
-    } else if (!s->hooking && s->hooked < s->span - !s->linked && s->heard == BST_OK) {
+    } else if (!s->hooking && s->hooked < s->span - (!s->linked || s->failed) &&
+               s->heard == BST_OK) {
         hook_some(s);
     } else {
         await(s);
