@@ -84,8 +84,9 @@ class DayOfImages(unittest.TestCase):
                                "WHERE end_tick + 6000 < (SELECT max(end_tick) FROM exposures)"
                                ).fetchone()
         self.assertGreaterEqual(rows[0], self.frames - 2)
-        # 1.7 degrees: the stars that come with the program are some tens
-        self.assertGreater(rows[1], (0.9 if FULL else 0.5) * rows[0])
+        # 1.7 degrees: the stars that come with the program are some tens; for a quarter of the day
+        # the Earth is in the way
+        self.assertGreater(rows[1], (0.65 if FULL else 0.5) * rows[0])
 
     def test_the_target_is_kept(self):
         self.assertLess(self.summary["time_to_confirm_s"], 20.0)
