@@ -17,6 +17,7 @@ typedef struct module {
     bst_gimbal_base base;
     bst_mount mount;
     bst_platform platform;
+    bool stuck[BST_MOUNT_MOST]; /* as told */
 } module;
 
 static void destroy(void *self) {
@@ -56,6 +57,23 @@ static bst_status create_cross(const bst_module_env *env, const void *config, vo
     return bst_gimbal_create(env, sizeof(module), prepare_cross, destroy, config, self);
 }
 
+static void tell_stuck(module *m, struct bst_step *s) {
+    static const char *const names[] = {"outer", "inner", "third"};
+    for (int k = 0; k < BST_MOUNT_MOST; k++) {
+        bool stuck = m->mount.servo[k].stuck;
+        if (stuck != m->stuck[k]) {
+            m->stuck[k] = stuck;
+            bst_step_event(s, "axis",
+                           stuck ? "the %s axis is stuck: its motor pushes in vain"
+                                 : "the %s axis moves again",
+                           names[k]);
+            if (stuck) {
+                bst_step_count(s, "axis_stuck");
+            }
+        }
+    }
+}
+
 static bst_status step(void *self, struct bst_step *s) {
     module *m = self;
     bst_mount *mount = &m->mount;
@@ -70,6 +88,7 @@ static bst_status step(void *self, struct bst_step *s) {
                            .q_believed_from_gcrf = m->platform.q_believed_from_gcrf,
                            .believed_rate_radps = m->platform.rate_believed_radps};
     bst_mount_step(mount, &body, command, age, measure);
+    tell_stuck(m, s);
     bst_gimbal_publish_sight(s, &m->platform,
                              bst_platform_true_camera(&m->platform, n, (double)n * m->base.dt_s,
                                                       mount->q_cam_from_body));

@@ -85,6 +85,13 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
     bst_mtt_note_place(track, later);
     mtt->rest_count += gate->rest;
     bst_sky_from_pair(&earlier->sky, &later->sky, dt, mtt->params.noise_rad2ps3, &track->state);
+    if (mtt->cue_lag_valid && bst_mtt_shares_acceleration(mtt, track, frame)) {
+        /* the pair tells the mean rate between its detections, not that of the later one */
+        bst_vec3 lag = bst_vec3_scale(mtt->cue_lag_radps2, dt);
+        track->state.rate_radps =
+            bst_vec3_add(track->state.rate_radps,
+                         bst_tangent_carry(frame->cue_direction, track->state.direction, lag));
+    }
     bst_filter_start(&mtt->filter, &track->state, &track->models);
     bst_mtt_set_rest(mtt, track, bst_mtt_is_at_rest(mtt, frame, track));
 }

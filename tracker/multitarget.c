@@ -163,10 +163,8 @@ static bool cue_acceleration(const bst_mtt_frame *frame, double dt_s, bst_vec3 *
     return true;
 }
 
-/* What the observer's motion adds to a rate falls with the range, as the rate itself does: what is
- * at rest, or nearly so beside the cue, is too far away to share the cue's acceleration. */
-static bool shares_acceleration(const bst_mtt *m, const bst_mtt_track *track,
-                                const bst_mtt_frame *frame) {
+bool bst_mtt_shares_acceleration(const bst_mtt *m, const bst_mtt_track *track,
+                                 const bst_mtt_frame *frame) {
     return !track->at_rest &&
            bst_vec3_dot(track->state.direction, frame->cue_direction) >
                cos(m->params.feed_forward_rad) &&
@@ -185,6 +183,11 @@ static void predict(bst_mtt *m, const bst_mtt_frame *frame) {
     bst_vec3 step = {0}, rate = {0};
     m->sleepers = 0;
     bool forward = m->started && cue_acceleration(frame, dt, &step, &rate);
+    m->cue_lag_valid = forward && dt > 0.0;
+    if (m->cue_lag_valid) {
+        bst_vec3 behind = bst_vec3_sub(rate, bst_vec3_scale(step, 1.0 / dt));
+        m->cue_lag_radps2 = bst_vec3_scale(behind, 1.0 / dt);
+    }
     for (int t = 0; t < m->track_count; t++) {
         bst_mtt_track *track = &m->tracks[t];
         if (track->star) {
@@ -194,7 +197,7 @@ static void predict(bst_mtt *m, const bst_mtt_frame *frame) {
         }
         if (!bst_mtt_predict_orbit(m, track, frame)) {
             bst_filter_predict(&m->filter, dt, &track->state, &track->models);
-            if (forward && shares_acceleration(m, track, frame)) {
+            if (forward && bst_mtt_shares_acceleration(m, track, frame)) {
                 shift(track, frame, step, rate);
             }
         }
@@ -205,7 +208,7 @@ static void predict(bst_mtt *m, const bst_mtt_frame *frame) {
     }
     bst_mtt_predict_memory(m, frame);
     for (int i = 0; forward && i < m->memory_count; i++) {
-        if (!m->memory[i].orbit.valid && shares_acceleration(m, &m->memory[i], frame)) {
+        if (!m->memory[i].orbit.valid && bst_mtt_shares_acceleration(m, &m->memory[i], frame)) {
             shift(&m->memory[i], frame, step, rate);
         }
     }

@@ -46,6 +46,10 @@ struct bst_mtt {
     int64_t next_id;
     double seconds; /* of the latest frame */
     bool started;
+    /* By how much the cue's mean rate of the time before the frame is behind its rate at the frame,
+     * per second of that time; in the tangent plane at the cue. */
+    bool cue_lag_valid;
+    bst_vec3 cue_lag_radps2;
     double clutter;         /* smoothed number of unused detections per frame */
     double clutter_density; /* per steradian, for this frame */
     /* smoothed number of detections that no confirmed track has, of how many frames, and their
@@ -141,6 +145,12 @@ void bst_mtt_make_star(bst_mtt_track *track);
 
 /* Carries a star over dt_s. */
 void bst_mtt_predict_star(const bst_mtt *mtt, double dt_s, bst_mtt_track *track);
+
+/* Whether a track has the cue's acceleration. What the observer's motion adds to a rate falls with
+ * the range, as the rate itself does: what is at rest, or nearly so beside the cue, is too far away
+ * to share it. */
+bool bst_mtt_shares_acceleration(const bst_mtt *mtt, const bst_mtt_track *track,
+                                 const bst_mtt_frame *frame);
 
 /* Starts tentative tracks from unused detections of this frame and of earlier ones. */
 void bst_mtt_initiate(bst_mtt *mtt, const bst_mtt_frame *frame);

@@ -1,6 +1,7 @@
 #include "sim/world/ephemeris.h"
 
 #include <pthread.h>
+#include <sched.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -28,7 +29,7 @@ enum { STEP_CLASSES = 5, SHORTEST_STEP_S = 16 };
 #define DECAYED_M 6378136.0
 
 /* Table of all objects at one instant of this grid. */
-enum { TABLE_STEP_S = 4, TABLES = 4 };
+enum { TABLE_STEP_S = 8, TABLES = 4 };
 /* An object of a table is within this of where it is said to be. */
 #define TABLE_ERROR_M 1000.0
 #define TABLE_SPAN_S 60.0 /* for which its bound of the speed holds */
@@ -54,6 +55,7 @@ typedef struct rotations {
 typedef struct table {
     int64_t index; /* time / TABLE_STEP_S */
     bool valid;
+    int users; /* threads that read it without the lock */
     /* NAN: unknown, may be anywhere */
     double *x_m, *y_m, *z_m;
     double *speed_mps; /* bound of the speed; -INFINITY: has no orbit around that time */
@@ -310,6 +312,20 @@ static void make_table(bst_ephemeris *e, table *t, int64_t index) {
     t->valid = true;
 }
 
+/* The table of an instant, made where it is missing; with the lock held. */
+static table *table_at(bst_ephemeris *e, int64_t index) {
+    table *t = &e->tables[slot_of(index, TABLES)];
+    while (t->users > 0 && t->index != index) { /* somebody looks far back, and is soon done */
+        pthread_mutex_unlock(&e->lock);
+        sched_yield();
+        pthread_mutex_lock(&e->lock);
+    }
+    if (!t->valid || t->index != index) {
+        make_table(e, t, index);
+    }
+    return t;
+}
+
 int bst_ephemeris_near(bst_ephemeris *e, double seconds, const bst_ephemeris_cone *cone,
                        int *indices) {
     int count = 0;
@@ -327,10 +343,9 @@ int bst_ephemeris_near(bst_ephemeris *e, double seconds, const bst_ephemeris_con
            cos_half = cos(cone->half_angle_rad + SHIFT_RAD);
     bst_vec3 o = cone->apex_m, axis = cone->axis;
     pthread_mutex_lock(&e->lock);
-    table *t = &e->tables[slot_of(index, TABLES)];
-    if (!t->valid || t->index != index) {
-        make_table(e, t, index);
-    }
+    table *t = table_at(e, index);
+    t->users++;
+    pthread_mutex_unlock(&e->lock);
     enum { BLOCK = 256 };
     double outside[BLOCK];
     for (int begin = 0; begin < e->object_count; begin += BLOCK) {
@@ -352,6 +367,8 @@ int bst_ephemeris_near(bst_ephemeris *e, double seconds, const bst_ephemeris_con
             }
         }
     }
+    pthread_mutex_lock(&e->lock);
+    t->users--;
     pthread_mutex_unlock(&e->lock);
     return count;
 }
@@ -361,10 +378,7 @@ double bst_ephemeris_places(bst_ephemeris *e, double seconds, double *x_m, doubl
     int64_t index = llround(fmax(fmin(seconds, 1e9), -1e9) / TABLE_STEP_S);
     size_t bytes = (size_t)e->object_count * sizeof *x_m;
     pthread_mutex_lock(&e->lock);
-    table *t = &e->tables[slot_of(index, TABLES)];
-    if (!t->valid || t->index != index) {
-        make_table(e, t, index);
-    }
+    const table *t = table_at(e, index);
     memcpy(x_m, t->x_m, bytes);
     memcpy(y_m, t->y_m, bytes);
     memcpy(z_m, t->z_m, bytes);

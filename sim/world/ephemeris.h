@@ -47,7 +47,7 @@ typedef struct bst_ephemeris_cone {
 int bst_ephemeris_near(bst_ephemeris *ephemeris, double seconds, const bst_ephemeris_cone *cone,
                        int *indices);
 
-/* Geocentric places (m, GCRF) of all objects at the whole multiple of 4 s nearest to `seconds`,
+/* Geocentric places (m, GCRF) of all objects at the whole multiple of 8 s nearest to `seconds`,
  * which is returned, to BST_EPHEMERIS_PLACES_M. NAN: to be evaluated directly; all 0: no orbit. */
 #define BST_EPHEMERIS_PLACES_M 1e3
 double bst_ephemeris_places(bst_ephemeris *ephemeris, double seconds, double *x_m, double *y_m,

@@ -238,6 +238,12 @@ static const cJSON *of_type(const cJSON *schema, const cJSON *instance) {
     return schema;
 }
 
+/* The schemas of an object's keys; a stage that may be a plug-in has those of its own otherwise. */
+static const cJSON *properties_of(const cJSON *schema, const cJSON *instance) {
+    const cJSON *own = get(instance, "plugin") ? NULL : get(schema, "else");
+    return get(own ? own : schema, "properties");
+}
+
 static void walk_value(walk *w, const cJSON *schema, const cJSON *instance, const char *path) {
     char below[512];
     schema = of_type(schema, instance);
@@ -253,7 +259,7 @@ static void walk_value(walk *w, const cJSON *schema, const cJSON *instance, cons
         refuse_value(w, path, "7", "wrong type");
         const cJSON *item;
         cJSON_ArrayForEach(item, instance) {
-            const cJSON *known = get(get(schema, "properties"), item->string);
+            const cJSON *known = get(properties_of(schema, instance), item->string);
             assert_non_null(known);
             snprintf(below, sizeof below, "%s/%s", path, item->string);
             walk_value(w, known, item, below);

@@ -147,6 +147,23 @@ class KeepOut(unittest.TestCase):
         self.assertLess(np.percentile(error[mid_s > 80.0], 99), 2.0)
 
 
+class Faults(unittest.TestCase):
+    def test_a_stuck_axis_is_told(self):
+        out = runs.scratch() + "/run"
+        fault = runs.SENSOR + "/modules/gimbal/fault/"
+        runs.run("scenarios/full_plant.json", out, runs.NO_FRAMES, GENERATOR,
+                 fault + "stuck_axis=outer", fault + "stuck_from_s=0.2", duration=3)
+        told = runs.database(out).execute(
+            "SELECT time_s, text FROM events WHERE kind = 'axis' ORDER BY tick").fetchall()
+        self.assertEqual(told[0][1], "the outer axis is stuck: its motor pushes in vain")
+        self.assertGreater(told[0][0], 0.4)  # 0.25 s of pushing
+        self.assertLess(told[0][0], 1.5)
+        self.assertGreaterEqual(runs.manifest(out)["counters"]["axis_stuck"], 1)
+        lost = runs.database(out).execute(
+            "SELECT count(*) FROM pointing WHERE axis_outer_deg IS NULL OR axis_inner_deg IS NULL")
+        self.assertEqual(lost.fetchone()[0], 0)
+
+
 def tearDownModule():
     runs.clean()
 

@@ -1,0 +1,96 @@
+/* New tracks beside a cue whose motion bends. */
+#include <stdlib.h>
+
+#include "tests/test_support.h"
+#include "tracker/multitarget.h"
+
+#define AS BST_ARCSEC_RAD
+#define PX (3.0 * AS)
+
+enum { FRAMES = 12 };
+
+/* Place and rate after t seconds at `acceleration` along a great circle. */
+static bst_vec3 place(double acceleration, double rate, double t, bst_vec3 *rate_radps) {
+    double angle = rate * t + 0.5 * acceleration * t * t, now = rate + acceleration * t;
+    *rate_radps = (bst_vec3){-now * sin(angle), now * cos(angle), 0.0};
+    return (bst_vec3){cos(angle), sin(angle), 0.0};
+}
+
+/* Frames every 2 s; sharp detections with errors of 0.02 px, which are believed to be that; what
+ * accelerates by 1 arcsec/s2 is 0.33 px further after 2 s than the rate between two frames has it
+ * at the later one, and its rate 0.33 px/s greater. The first pair gives the rate at its end, so
+ * that the third detection is the track's, and all that follow; also when the second frame shows
+ * nothing, so that the pair is 4 s apart. */
+static void pairs_have_the_cues_acceleration(void **state) {
+    (void)state;
+    const double acceleration = 1.0 * AS, rate = 200.0 * AS, sigma = 0.02 * PX;
+    for (int gap = 0; gap < 2; gap++) {
+        bst_ctx ctx = {0};
+        bst_mtt *mtt;
+        bst_mtt_params params = {.max_tracks = 16,
+                                 .max_detections = 16,
+                                 .noise_rad2ps3 = pow(0.02 * AS, 2),
+                                 .gate_chi2 = 16,
+                                 .detection_probability = 0.9,
+                                 .false_alarms_per_frame = 1,
+                                 .field_sr = pow(1024 * PX, 2),
+                                 .confirm_hits = 3,
+                                 .confirm_frames = 5,
+                                 .confirm_score = 12,
+                                 .max_rate_radps = 120 * AS,
+                                 .cue_rate_margin_radps = 2 * AS,
+                                 .initiation_gap_s = 5,
+                                 .max_misses = 12,
+                                 .max_coast_s = 120,
+                                 .max_sigma_rad = 60 * AS,
+                                 .merge_rad = 6 * PX,
+                                 .merge_floor_rad = 0.3 * PX,
+                                 .max_merged = 30,
+                                 .feed_forward_rad = 0.09};
+        bst_assert_ok(&ctx, bst_mtt_create(&ctx, &params, &mtt));
+        bst_vec3 before = {0}, before_rate = {0}, cue_rate;
+        for (int k = 0; k < FRAMES; k++) {
+            double t = 2.0 * k;
+            bst_vec3 cue = place(acceleration, rate, t, &cue_rate);
+            double off = k % 2 ? sigma : -sigma; /* along the path */
+            bst_mtt_detection seen = {
+                .sky = {.direction = bst_vec3_unit(
+                            bst_vec3_add(cue, bst_vec3_scale(bst_vec3_unit(cue_rate), off))),
+                        .cov_11 = sigma * sigma,
+                        .cov_22 = sigma * sigma},
+                .v_mag = 10,
+                .v_mag_sigma = 0.05,
+                .snr = 500,
+                .length_rad = 2 * PX};
+            bst_mtt_frame f = {.tick = 2000 * k,
+                               .seconds = t,
+                               .detections = &seen,
+                               .count = gap && k == 1 ? 0 : 1,
+                               .cue_valid = true,
+                               .cue_before_valid = k > 0,
+                               .cue_direction = cue,
+                               .cue_rate_radps = cue_rate,
+                               .cue_before_direction = before,
+                               .cue_before_rate_radps = before_rate,
+                               .cue_rate_sigma_radps = 0.5 * AS};
+            bst_mtt_step(mtt, &f);
+            before = cue;
+            before_rate = cue_rate;
+            int n;
+            const bst_mtt_track *tracks = bst_mtt_tracks(mtt, &n);
+            int seen_so_far = k + 1 - (gap && k > 0);
+            assert_int_equal(n, seen_so_far > 1);
+            if (n > 0) {
+                assert_int_equal(tracks->hits, seen_so_far);
+                assert_int_equal(tracks->status,
+                                 seen_so_far > 2 ? BST_TRACK_CONFIRMED : BST_TRACK_TENTATIVE);
+            }
+        }
+        bst_mtt_free(mtt);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(pairs_have_the_cues_acceleration)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
