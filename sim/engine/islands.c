@@ -62,12 +62,12 @@ struct bst_islands {
     atomic_uint changes; /* for threads that wait awake */
     bst_ctx *ctx;        /* of who does hooks */
     bst_status heard;
-    int64_t from_tick, until_tick, last_tick; /* of the span; of the run */
-    int64_t span, hooked;                     /* spans that were begun, and whose hooks are done */
-    int next, done; /* islands of the span that were taken, and that are finished */
-    bool linked;    /* and what links them has stepped */
-    bool failed;    /* a step of it did: its hooks are for the caller */
-    bool hooking;   /* somebody does */
+    int64_t until_tick, last_tick; /* of the span; of the run */
+    int64_t span, hooked;          /* spans that were begun, and whose hooks are done */
+    int next, done;                /* islands of the span that were taken, and that are finished */
+    bool linked;                   /* and what links them has stepped */
+    bool failed;                   /* a step of it did: its hooks are for the caller */
+    bool hooking;                  /* somebody does */
     bool running, stop;
 };
 

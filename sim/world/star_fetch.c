@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "sim/core/folder.h"
+#include "sim/core/sha256.h"
 #include "sim/world/child.h"
 #include "sim/world/stars.h"
 
@@ -27,18 +28,8 @@ bst_status bst_star_fetch_verify(bst_ctx *ctx, const char *path, const char *sha
     if (access(path, R_OK) != 0) {
         return bst_fail(ctx, BST_ERR_NOT_FOUND, "%s: %s", path, strerror(errno));
     }
-    const char *argv[] = {"sha256sum", "--", path, NULL};
-    bst_child child;
-    BST_TRY(bst_child_start(ctx, argv, NULL, true, NULL, &child));
-    char line[256] = "";
-    /* A path with special characters makes sha256sum put a backslash first. */
-    char *found = fgets(line, sizeof line, child.output);
-    int code = bst_child_wait(&child);
-    if (!found || code != 0) {
-        return bst_fail(ctx, BST_ERR_IO, "sha256sum %s ended with %d", path, code);
-    }
-    char *sum = line + (line[0] == '\\');
-    sum[strcspn(sum, " ")] = '\0';
+    char sum[BST_SHA256_TEXT];
+    BST_TRY(bst_sha256_file(ctx, path, sum));
     if (strcmp(sum, sha256) != 0) {
         return bst_fail(ctx, BST_ERR_FORMAT, "%s is damaged: SHA-256 %s, expected %s", path, sum,
                         sha256);

@@ -23,7 +23,7 @@
 bst_status bst_star_fetch_sources(bst_ctx *ctx, const char *etc_apt, FILE *list, FILE *sources,
                                   int *count) BST_MUST_CHECK;
 
-/* Compares a file with a SHA-256 in lower-case hex, through the program sha256sum. BST_ERR_FORMAT
+/* Compares a file with a SHA-256 in lower-case hex. BST_ERR_FORMAT
  * when it differs. */
 bst_status bst_star_fetch_verify(bst_ctx *ctx, const char *path, const char *sha256) BST_MUST_CHECK;
 

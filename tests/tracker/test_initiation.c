@@ -1,11 +1,7 @@
 /* New tracks beside a cue whose motion bends. */
 #include <stdlib.h>
 
-#include "tests/test_support.h"
-#include "tracker/multitarget.h"
-
-#define AS BST_ARCSEC_RAD
-#define PX (3.0 * AS)
+#include "tests/tracker/pixel_tracker.h"
 
 enum { FRAMES = 12 };
 
@@ -27,26 +23,7 @@ static void pairs_have_the_cues_acceleration(void **state) {
     for (int gap = 0; gap < 2; gap++) {
         bst_ctx ctx = {0};
         bst_mtt *mtt;
-        bst_mtt_params params = {.max_tracks = 16,
-                                 .max_detections = 16,
-                                 .noise_rad2ps3 = pow(0.02 * AS, 2),
-                                 .gate_chi2 = 16,
-                                 .detection_probability = 0.9,
-                                 .false_alarms_per_frame = 1,
-                                 .field_sr = pow(1024 * PX, 2),
-                                 .confirm_hits = 3,
-                                 .confirm_frames = 5,
-                                 .confirm_score = 12,
-                                 .max_rate_radps = 120 * AS,
-                                 .cue_rate_margin_radps = 2 * AS,
-                                 .initiation_gap_s = 5,
-                                 .max_misses = 12,
-                                 .max_coast_s = 120,
-                                 .max_sigma_rad = 60 * AS,
-                                 .merge_rad = 6 * PX,
-                                 .merge_floor_rad = 0.3 * PX,
-                                 .max_merged = 30,
-                                 .feed_forward_rad = 0.09};
+        bst_mtt_params params = pixel_tracker(16, 16);
         bst_assert_ok(&ctx, bst_mtt_create(&ctx, &params, &mtt));
         bst_vec3 before = {0}, before_rate = {0}, cue_rate;
         for (int k = 0; k < FRAMES; k++) {

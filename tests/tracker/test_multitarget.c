@@ -2,35 +2,12 @@
 #include <stdlib.h>
 
 #include "sim/core/rng.h"
-#include "tests/test_support.h"
-#include "tracker/multitarget.h"
+#include "tests/tracker/pixel_tracker.h"
 
-#define AS BST_ARCSEC_RAD
-#define PX (3.0 * AS)
-#define FIELD_PX 1024.0
 #define MAX_DETECTIONS 8000
 
 static bst_mtt_params defaults(void) {
-    return (bst_mtt_params){.max_tracks = 256,
-                            .max_detections = MAX_DETECTIONS,
-                            .noise_rad2ps3 = pow(0.02 * AS, 2),
-                            .gate_chi2 = 16,
-                            .detection_probability = 0.9,
-                            .false_alarms_per_frame = 1,
-                            .field_sr = pow(FIELD_PX * PX, 2),
-                            .confirm_hits = 3,
-                            .confirm_frames = 5,
-                            .confirm_score = 12,
-                            .max_rate_radps = 120 * AS,
-                            .cue_rate_margin_radps = 2 * AS,
-                            .initiation_gap_s = 5,
-                            .max_misses = 12,
-                            .max_coast_s = 120,
-                            .max_sigma_rad = 60 * AS,
-                            .merge_rad = 6 * PX,
-                            .merge_floor_rad = 0.3 * PX,
-                            .max_merged = 30,
-                            .feed_forward_rad = 0.09};
+    return pixel_tracker(256, MAX_DETECTIONS);
 }
 
 /* An object in a plane of pixels about a point of the sky. */
