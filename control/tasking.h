@@ -65,6 +65,7 @@ typedef struct bst_tasking_sensor {
     bst_nav_telemetry nav;
     bst_mount_status mount;
     bst_zone zones[BST_ZONE_KINDS]; /* at the last nav */
+    double zone_cosines[BST_ZONE_KINDS];
     int zone_count;
     /* the task */
     bst_task task; /* as told; object -1: the own cue */

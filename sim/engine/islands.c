@@ -159,9 +159,9 @@ static bool can_hook(const bst_islands *s) {
 static bool finished(const bst_islands *s) {
     bool busy = s->linking || s->hooking;
     bool behind = false;
-    for (int i = 0; i < s->count; i++) {
-        busy |= s->islands[i].busy;
-        behind |= s->islands[i].status == BST_OK && s->islands[i].span < s->end;
+    for (int i = 0; i < s->count && !busy; i++) {
+        busy = s->islands[i].busy;
+        behind |= !busy && s->islands[i].status == BST_OK && s->islands[i].span < s->end;
     }
     if (busy || s->heard != BST_OK) {
         return !busy;
