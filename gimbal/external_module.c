@@ -291,11 +291,7 @@ static bst_status step(void *self, struct bst_step *s) {
     bst_gimbal_publish_sight(
         s, &m->platform,
         bst_platform_true_camera(&m->platform, n, bst_step_seconds(s), q_cam_from_body));
-    if (n % m->base.telemetry_steps == 0) {
-        bst_gimbal_reading reading = bst_gimbal_exact(&m->platform, n, q_cam_from_body);
-        bst_gimbal_publish_reading(s, &m->platform, &reading, NULL);
-    }
-    return bst_gimbal_publish_nav(s, &m->base, n);
+    return bst_gimbal_publish_exact(s, &m->platform, &m->base, n, q_cam_from_body);
 }
 
 const bst_module_desc bst_gimbal_external_module = {

@@ -153,3 +153,13 @@ bst_status bst_gimbal_publish_nav(struct bst_step *step, const bst_gimbal_base *
                                .moon_m = bst_vec3_sub(bodies.moon_m, state.position_m)};
     return BST_OK;
 }
+
+bst_status bst_gimbal_publish_exact(struct bst_step *step, const bst_platform *platform,
+                                    const bst_gimbal_base *base, int64_t n,
+                                    bst_quat q_cam_from_body) {
+    if (n % base->telemetry_steps == 0) {
+        bst_gimbal_reading reading = bst_gimbal_exact(platform, n, q_cam_from_body);
+        bst_gimbal_publish_reading(step, platform, &reading, NULL);
+    }
+    return bst_gimbal_publish_nav(step, base, n);
+}

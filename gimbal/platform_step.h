@@ -98,4 +98,10 @@ void bst_gimbal_publish_reading(struct bst_step *step, const bst_platform *platf
 bst_status bst_gimbal_publish_nav(struct bst_step *step, const bst_gimbal_base *base,
                                   int64_t n) BST_MUST_CHECK;
 
+/* Both, for a mount that follows exactly and has no status: its reading and the state, where it is
+ * time. */
+bst_status bst_gimbal_publish_exact(struct bst_step *step, const bst_platform *platform,
+                                    const bst_gimbal_base *base, int64_t n,
+                                    bst_quat q_cam_from_body) BST_MUST_CHECK;
+
 #endif

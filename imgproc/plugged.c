@@ -16,13 +16,9 @@ struct bst_plugged {
 static const char *const kinds[] = {BST_STAGE_DETECTOR, NULL};
 
 const bst_config_desc bst_plugged_table[] = {
-    {.key = "plugin",
-     .type = BST_CONFIG_STAGE,
-     .unit = "",
-     .doc = "A shared library with a detector, relative to the folder of the file that says so; "
-            "the other keys are then that one's. Left out: imgproc's own.",
-     .size = sizeof(bst_stage_use),
-     .choices = kinds},
+    BST_STAGE_ALONE(kinds,
+                    "A shared library with a detector, relative to the folder of the file that "
+                    "says so; the other keys are then that one's. Left out: imgproc's own."),
     BST_CONFIG_END};
 
 static bst_status told(bst_ctx *ctx, const bst_plugged *p, bst_status status) {

@@ -29,13 +29,9 @@ typedef struct scenegen_config {
 static const char *const stage_kinds[] = {BST_STAGE_FRAME, NULL};
 
 static const bst_config_desc stage_table[] = {
-    {.key = "plugin",
-     .type = BST_CONFIG_STAGE,
-     .unit = "",
-     .doc = "A shared library with a frame stage, relative to the folder of the file that says so; "
-            "the other keys are then that one's. Left out: none.",
-     .size = sizeof(bst_stage_use),
-     .choices = stage_kinds},
+    BST_STAGE_ALONE(stage_kinds,
+                    "A shared library with a frame stage, relative to the folder of the file that "
+                    "says so; the other keys are then that one's. Left out: none."),
     BST_CONFIG_END};
 
 static const bst_config_desc fidelity_table[] = {

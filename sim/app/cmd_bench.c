@@ -109,8 +109,14 @@ static void print_result(const bst_bench_result *r, bool markdown) {
     }
     printf("\n");
     if (!markdown && isfinite(r->setup_s)) {
-        printf("%-25s set-up %.3f s, at most %.3f ms, error at most %.1e px at 10 km\n", "",
-               r->setup_s, r->ms_max, r->error_px);
+        printf("%-25s set-up %.3f s", "", r->setup_s);
+        if (isfinite(r->ms_max)) {
+            printf(", at most %.3f ms", r->ms_max);
+        }
+        if (isfinite(r->error_px)) {
+            printf(", error at most %.1e px at 10 km", r->error_px);
+        }
+        printf("\n");
     }
     if (!markdown && isfinite(r->error_m)) {
         printf("%-25s error at most %.1e m\n", "", r->error_m);

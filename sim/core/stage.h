@@ -33,6 +33,13 @@ typedef struct bst_stage_use {
         BST_FIELD_(s, m)                                                                       \
     }
 
+/* The same in a table that fills a bst_stage_use and nothing else. */
+#define BST_STAGE_ALONE(kinds_, doc_)                                                          \
+    {                                                                                          \
+        .key = "plugin", .type = BST_CONFIG_STAGE, .unit = "", .doc = doc_, .choices = kinds_, \
+        .size = sizeof(bst_stage_use)                                                          \
+    }
+
 /* Who opens libraries for bst_config_read_stages. */
 typedef struct bst_stage_loader {
     void *user;
