@@ -7,7 +7,6 @@
  * is not. Hooks are done by whoever has nothing to step, of whole spans only and one at a time, in
  * the order in which a run on one thread would have done them: by tick, then by the stepping order
  * of the instances. */
-#include <sched.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,8 +16,6 @@
 
 /* HOOKS: done in one go. BACKLOG: of spans, from which on hooks go before steps. */
 enum { HOOKS = 32, BACKLOG = BST_ISLAND_SPANS / 2 };
-/* A thread sleeps when there was nothing to do for so long: waking takes about as long. */
-static const double AWAKE_S = 2e-4;
 
 /* ---- stepping ---- */
 
@@ -55,27 +52,8 @@ static const island *first_failure(const bst_islands *s) {
 
 /* Something changed that threads may wait for; by who holds the lock. */
 static void tell(bst_islands *s) {
-    atomic_fetch_add_explicit(&s->changes, 1, memory_order_release);
     if (s->sleeping > 0) {
         pthread_cond_broadcast(&s->changed);
-    }
-}
-
-/* Waits for the next change; holds the lock before and after. */
-static void await(bst_islands *s) {
-    unsigned seen = atomic_load_explicit(&s->changes, memory_order_relaxed);
-    pthread_mutex_unlock(&s->lock);
-    double begun = bst_wall_seconds();
-    bool changed = false;
-    while (!changed && bst_wall_seconds() - begun < AWAKE_S) {
-        sched_yield();
-        changed = atomic_load_explicit(&s->changes, memory_order_acquire) != seen;
-    }
-    pthread_mutex_lock(&s->lock);
-    if (atomic_load_explicit(&s->changes, memory_order_relaxed) == seen) {
-        s->sleeping++;
-        pthread_cond_wait(&s->changed, &s->lock);
-        s->sleeping--;
     }
 }
 
@@ -261,7 +239,9 @@ static void do_or_await(bst_islands *s) {
     } else if (going && can_hook(s)) {
         hook_some(s);
     } else {
-        await(s);
+        s->sleeping++;
+        pthread_cond_wait(&s->changed, &s->lock);
+        s->sleeping--;
     }
 }
 

@@ -2,8 +2,6 @@
 #ifndef BST_ENGINE_ISLANDS_INTERNAL_H
 #define BST_ENGINE_ISLANDS_INTERNAL_H
 
-#include <stdatomic.h>
-
 #include "sim/engine/engine_internal.h"
 
 /* Spans that may be under way, from the first whose hooks are left to do. */
@@ -42,8 +40,7 @@ struct bst_islands {
     pthread_mutex_t lock; /* over what follows, and `span`, `busy`, `free_tick` of islands */
     pthread_cond_t changed;
     int sleeping;
-    atomic_uint changes; /* for threads that wait awake */
-    bst_ctx *ctx;        /* of who does hooks */
+    bst_ctx *ctx; /* of who does hooks */
     bst_status heard;
     int64_t from_tick, last_tick; /* of the next span; of the run */
     int64_t link_tick;            /* when what links them steps in a span that is not yet open */
