@@ -17,8 +17,8 @@
 #define BST_CLONES_16
 #endif
 
-/* Rows are padded to this many floats, and sums over pixels made of as many, one for each place in a
- * group of them: the widest vectors have as many. */
+/* Rows are padded to this many floats, and sums over pixels made of as many, one for each place in
+ * a group of them: the widest vectors have as many. */
 enum { BST_LANES = 16 };
 
 /* A number of floats rounded up to whole lanes. */
