@@ -251,16 +251,28 @@ static bst_status choose(bst_ctx *ctx, bst_tasking *t, int sensor, double now_s,
     return BST_OK;
 }
 
-bst_status bst_tasking_plan(bst_ctx *ctx, bst_tasking *t, int sensor, int64_t tick, bool *given) {
+/* Until when it is certain that the sensor's task goes on: the frames that it still wants take
+ * their time, a search may last until its timeout. */
+static double certain_until_s(const bst_tasking *t, const bst_tasking_sensor *s, double now_s) {
+    if (s->task.object < 0) {
+        return s->next_plan_s;
+    }
+    double frames_s = (double)(s->frames_wanted - s->frames - 1) * s->period_s;
+    double seen_s = s->frames > 0 ? s->last_seen_s : fmin(s->arrival_s, now_s);
+    return fmin(now_s + frames_s, seen_s + t->config.find_timeout_s);
+}
+
+int64_t bst_tasking_quiet_until(const bst_tasking *t, int sensor) {
+    return t->sensors[sensor].quiet_until;
+}
+
+/* Ends the task when that is due, and chooses the next. */
+static bst_status change(bst_ctx *ctx, bst_tasking *t, int sensor, int64_t tick, bool *given) {
     bst_tasking_sensor *s = &t->sensors[sensor];
     double now_s = seconds_of(t, tick), snr = 0.0;
     bst_task_end before = BST_TASK_NONE;
     bst_sight sight;
     int chosen;
-    *given = false;
-    if (!s->nav_known || (s->task.object < 0 && now_s < s->next_plan_s)) {
-        return BST_OK;
-    }
     if (s->task.object >= 0) {
         before = ending(t, s, now_s);
         if (before == BST_TASK_NONE) {
@@ -282,5 +294,20 @@ bst_status bst_tasking_plan(bst_ctx *ctx, bst_tasking *t, int sensor, int64_t ti
         }
         s->next_plan_s = now_s + t->config.idle_s;
     }
+    return BST_OK;
+}
+
+bst_status bst_tasking_plan(bst_ctx *ctx, bst_tasking *t, int sensor, int64_t tick, bool *given) {
+    bst_tasking_sensor *s = &t->sensors[sensor];
+    double now_s = seconds_of(t, tick);
+    *given = false;
+    if (!s->nav_known || (s->task.object < 0 && now_s < s->next_plan_s)) {
+        return BST_OK;
+    }
+    if (tick >= s->quiet_until) {
+        BST_TRY(change(ctx, t, sensor, tick, given));
+    }
+    int64_t until = (int64_t)fmin(certain_until_s(t, s, now_s) * t->tick_rate_hz, 9e15);
+    s->quiet_until = until > s->quiet_until ? until : s->quiet_until;
     return BST_OK;
 }

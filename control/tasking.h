@@ -65,6 +65,7 @@ typedef struct bst_tasking_sensor {
     bst_nav_telemetry nav;
     bst_mount_status mount;
     bst_zone zones[BST_ZONE_KINDS]; /* at the last nav */
+    double zone_cosines[BST_ZONE_KINDS];
     int zone_count;
     /* the task */
     bst_task task; /* as told; object -1: the own cue */
@@ -73,6 +74,7 @@ typedef struct bst_tasking_sensor {
     double given_s, arrival_s;     /* when it was given; when the sensor should be there */
     int64_t frames, frames_wanted; /* in which it was seen */
     double last_seen_s, next_plan_s;
+    int64_t quiet_until; /* a tick before which the task does not change */
 } bst_tasking_sensor;
 
 typedef struct bst_tasking_choice {
@@ -117,6 +119,9 @@ void bst_tasking_tracks(bst_tasking *tasking, int sensor, const bst_tracks *trac
 /* Ends the sensor's task when that is due, and gives the next. *given: the task has changed. */
 bst_status bst_tasking_plan(bst_ctx *ctx, bst_tasking *tasking, int sensor, int64_t tick,
                             bool *given) BST_MUST_CHECK;
+
+/* A tick before which plans of the sensor change nothing, whatever it tells until then. */
+int64_t bst_tasking_quiet_until(const bst_tasking *tasking, int sensor);
 
 /* Whether an object can be seen by a sensor at a time, by what is known; *sight (may be NULL) and
  * *snr of a frame as far as they were worked out. */

@@ -28,6 +28,12 @@ static int zones_at(const bst_tasking_config *c, bst_vec3 position_m, bst_vec3 t
     return bst_exclusion_zones(&exclusion, position_m, to_sun, to_moon, zones);
 }
 
+static void cosines_of(const bst_zone *zones, int count, double cosines[BST_ZONE_KINDS]) {
+    for (int i = 0; i < count; i++) {
+        cosines[i] = cos(zones[i].half_angle_rad);
+    }
+}
+
 void bst_tasking_telemetry(bst_tasking *t, int sensor, const bst_nav_telemetry *nav,
                            const bst_mount_status *mount) {
     bst_tasking_sensor *s = &t->sensors[sensor];
@@ -36,6 +42,7 @@ void bst_tasking_telemetry(bst_tasking *t, int sensor, const bst_nav_telemetry *
         s->nav_known = true;
         s->zone_count =
             zones_at(&t->config, nav->position_gcrf_m, nav->sun_m, nav->moon_m, s->zones);
+        cosines_of(s->zones, s->zone_count, s->zone_cosines);
     }
     if (mount) {
         s->mount = *mount;
@@ -43,13 +50,14 @@ void bst_tasking_telemetry(bst_tasking *t, int sensor, const bst_nav_telemetry *
     }
 }
 
-static bst_tasking_why zone_reason(const bst_zone *zones, int count, bst_vec3 direction) {
+static bst_tasking_why zone_reason(const bst_zone *zones, const double *cosines, int count,
+                                   bst_vec3 direction) {
     static const bst_tasking_why reasons[BST_ZONE_KINDS] = {[BST_ZONE_SUN] = BST_WHY_SUN,
                                                             [BST_ZONE_MOON] = BST_WHY_MOON,
                                                             [BST_ZONE_EARTH] = BST_WHY_EARTH};
     bst_tasking_why why = BST_WHY_NOT;
     for (int i = 0; i < count; i++) {
-        if (bst_vec3_dot(zones[i].axis, direction) > cos(zones[i].half_angle_rad) &&
+        if (bst_vec3_dot(zones[i].axis, direction) > cosines[i] &&
             (why == BST_WHY_NOT || reasons[zones[i].kind] < why)) {
             why = reasons[zones[i].kind];
         }
@@ -61,7 +69,7 @@ bst_tasking_why bst_tasking_glance(const bst_tasking_sensor *s, bst_vec3 place_m
                                    bst_vec3 *direction) {
     bst_vec3 line = bst_vec3_sub(place_m, s->nav.position_gcrf_m);
     *direction = bst_vec3_unit(line);
-    bst_tasking_why why = zone_reason(s->zones, s->zone_count, *direction);
+    bst_tasking_why why = zone_reason(s->zones, s->zone_cosines, s->zone_count, *direction);
     if (why == BST_WHY_NOT) {
         bst_vec3 sun_m = bst_vec3_add(s->nav.sun_m, s->nav.position_gcrf_m);
         why = bst_sun_fraction(place_m, sun_m) > 0.5 ? BST_WHY_NOT : BST_WHY_SHADOW;
@@ -134,7 +142,9 @@ bst_status bst_tasking_look(bst_ctx *ctx, const bst_tasking *t, int sensor, int 
     bst_zone zones[BST_ZONE_KINDS];
     int count = zones_at(&t->config, eye.position_m, bst_vec3_sub(bodies.sun_m, eye.position_m),
                          bst_vec3_sub(bodies.moon_m, eye.position_m), zones);
-    *why = zone_reason(zones, count, now.apparent);
+    double cosines[BST_ZONE_KINDS];
+    cosines_of(zones, count, cosines);
+    *why = zone_reason(zones, cosines, count, now.apparent);
     *why = now.occulted && *why == BST_WHY_NOT ? BST_WHY_EARTH : *why;
     *why = *why == BST_WHY_NOT && now.sunlit_fraction < 0.5 ? BST_WHY_SHADOW : *why;
     if (*why != BST_WHY_NOT) {

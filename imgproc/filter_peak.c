@@ -4,6 +4,10 @@
 #include "imgproc/filter.h"
 #include "imgproc/lanes.h"
 
+/* A quadratic holds as far as the outputs reach that it was made from. Along a streak noise bends
+ * them little: its top would be pixels away, and higher than any output there. */
+static const double QUADRATIC_REACH_PX = 1.0;
+
 /* Top of the parabola through three values one step apart, the middle one the greatest. */
 static double top(double left, double middle, double right) {
     double bend = left - 2.0 * middle + right;
@@ -113,7 +117,9 @@ static double streak_peak(const bst_filter *f, int x, int y) {
             v[j][i] = log(fmax(s, 0.05 * here));
         }
     }
-    return here * exp(quadratic_top(v, &dx, &dy));
+    double gain = quadratic_top(v, &dx, &dy), off = fmax(fabs(dx), fabs(dy));
+    double share = fmin(1.0, QUADRATIC_REACH_PX / fmax(off, 1e-9)); /* of the way to the top */
+    return here * exp(gain * share * (2.0 - share));
 }
 
 double bst_filter_top(const bst_filter *f, bool point, int x, int y, double *dx, double *dy) {

@@ -24,6 +24,10 @@ double bst_sun_fraction(bst_vec3 position_m, bst_vec3 sun_m) {
     if (sun_distance <= BST_SUN_RADIUS_M || sun_distance < distance) {
         return 1.0; /* the Sun is nearer than the Earth, which cannot cover it */
     }
+    if (bst_vec3_dot(position_m, to_sun) > 0.0 && distance > 1.0001 * BST_EARTH_RADIUS_M &&
+        sun_distance > 200.0 * BST_SUN_RADIUS_M) {
+        return 1.0; /* the Earth fills less than a half of the sky, on the other side */
+    }
     double a = asin(BST_SUN_RADIUS_M / sun_distance);
     double b = asin(BST_EARTH_RADIUS_M / distance);
     double c = bst_vec3_angle(bst_vec3_scale(position_m, -1.0), to_sun);

@@ -46,6 +46,10 @@ enum {
     BST_MODULE_LINKS = 1u << 4,      /* one for all sensors of a scenario, which names it beside the
                                         observers: its ports are there once for each sensor
                                         (bst_member_port), and env->knowledge is NULL */
+    BST_MODULE_PROMISES = 1u << 5,   /* BST_MODULE_LINKS: says how long it will not write
+                                        (bst_step_promise), so that sensors go on meanwhile. It has
+                                        a period, never asks to be woken, and reads its queues to
+                                        the last message in each step */
 };
 
 /* A sensor as a module sees it that links several. */
@@ -162,6 +166,9 @@ void *bst_step_modify(struct bst_step *step, int port);
 /* Asks to be stepped at an absolute tick (later than now) besides the period and the triggers. One
  * wish is kept, the earliest, until it comes true. */
 void bst_step_wake_at(struct bst_step *step, int64_t tick);
+/* BST_MODULE_PROMISES: this output will not be written in steps before an absolute tick. To write
+ * it all the same is an error. */
+void bst_step_promise(struct bst_step *step, int port, int64_t tick);
 /* An event for the record: kind is a short fixed word, text free. */
 void bst_step_event(struct bst_step *step, const char *kind, const char *format, ...)
     BST_PRINTF(3, 4);

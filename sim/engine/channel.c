@@ -101,6 +101,9 @@ bst_sample bst_step_latest(struct bst_step *step, int port_index) {
     if (step->job && !ch->apart) {
         return bst_overlap_latest(step, port_index);
     }
+    if (step->self->reads_aside) {
+        return bst_islands_latest(step, port_index);
+    }
     return sample_at(step, ch, port, bst_engine_newest(ch, port, step->tick));
 }
 
@@ -112,6 +115,9 @@ bst_sample bst_step_next(struct bst_step *step, int port_index) {
     const channel *ch = &step->engine->channels[port->channel];
     if (step->job && !ch->apart) {
         return bst_overlap_next(step, port_index);
+    }
+    if (step->self->reads_aside) {
+        return bst_islands_next(step, port_index);
     }
     int64_t sequence = bst_engine_unread(step->engine, ch, port, step->tick);
     port->cursor += sequence >= 0;
@@ -130,6 +136,20 @@ static void release_slot(const channel *ch, slot *s) {
         ch->type->release(s->payload);
     }
     s->owned = false;
+}
+
+static void fail_in_step(struct bst_step *step, const char *what) {
+    if (step->hook_status == BST_OK) {
+        step->hook_status = bst_fail(step->ctx, BST_ERR_STATE, "%s %s", step->self->name, what);
+    }
+}
+
+void bst_step_promise(struct bst_step *step, int port_index, int64_t tick) {
+    port_state *port = &step->self->ports[port_index];
+    if (!(step->self->spec.desc->flags & BST_MODULE_PROMISES)) {
+        fail_in_step(step, "promises and does not say that it does (BST_MODULE_PROMISES)");
+    }
+    port->silent_until = tick > port->silent_until ? tick : port->silent_until;
 }
 
 static bst_status publish(struct bst_step *step, int port_index) {
@@ -184,6 +204,9 @@ bst_status bst_engine_commit(struct bst_step *step) {
 void *bst_step_write(struct bst_step *step, int port_index, int *capacity) {
     port_state *port = &step->self->ports[port_index];
     channel *ch = &step->engine->channels[port->channel];
+    if (step->tick < port->silent_until) {
+        fail_in_step(step, "writes what it has promised not to write yet");
+    }
     if (port->writing) {
         /* a second message in one step: the first goes out */
         bst_status status = publish(step, port_index);
@@ -244,7 +267,9 @@ void bst_engine_release_read(bst_engine *engine) {
 }
 
 void bst_step_wake_at(struct bst_step *step, int64_t tick) {
-    if (tick > step->tick && tick < step->self->wake) {
+    if (step->self->spec.desc->flags & BST_MODULE_PROMISES) {
+        fail_in_step(step, "asks to be woken, which a module does not that promises");
+    } else if (tick > step->tick && tick < step->self->wake) {
         step->self->wake = tick;
     }
 }

@@ -47,7 +47,9 @@ typedef struct port_state {
     int64_t cursor;         /* next sequence to read */
     int64_t trigger_cursor; /* next sequence to be stepped for */
     int capacity;
-    bool writing; /* its payload was handed out and not yet published */
+    bool writing;         /* its payload was handed out and not yet published */
+    int64_t silent_until; /* promised not to be written before */
+    int island;           /* islands.c: an output across islands: the one that it is for */
 } port_state;
 
 typedef struct instance {
@@ -64,6 +66,7 @@ typedef struct instance {
     int64_t next_period, wake; /* INT64_MAX: none */
     struct bst_heap *heap;     /* that it waits in */
     int island, order;         /* islands.c: its number; place in the stepping order */
+    bool reads_aside;          /* islands.c: what was put aside at the end of a span */
     int64_t steps;
     int64_t jobs, jobs_done; /* put aside and made behind the stepping thread */
     double own_rate_hz;      /* set by bst_env_set_rate */
@@ -180,6 +183,9 @@ bst_status bst_islands_message(struct bst_step *step, const channel *ch,
                                const void *payload) BST_MUST_CHECK;
 bst_status bst_islands_event(struct bst_step *step, const char *kind,
                              const char *text) BST_MUST_CHECK;
+/* Reads from what was put aside. */
+bst_sample bst_islands_latest(struct bst_step *step, int port);
+bst_sample bst_islands_next(struct bst_step *step, int port);
 
 /* apart.c: finds the instances that are apart and puts them last; before channels are allocated
  */

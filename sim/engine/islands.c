@@ -1,170 +1,24 @@
 /* Sensors that share nothing but what links them are stepped by several threads: each is an island,
- * with a schedule of its own. All of them go on to the next step of a module that links them, or
- * for a second: a span; then that steps, alone, by the thread that was the last to finish. The
+ * with a schedule of its own. Time is cut into spans, each up to the next step of a module that
+ * links them, or a second. What links them steps alone, once all have come to the end of a span; an
+ * island goes on to the next span after that, or at once when it is promised that nothing will be
+ * written for it until then: so one that takes long holds up only those that wait for word. The
  * calling thread is one of the threads. Which of them does what is left to chance; what comes out
  * is not. Hooks are done by whoever has nothing to step, of whole spans only and one at a time, in
  * the order in which a run on one thread would have done them: by tick, then by the stepping order
  * of the instances. */
 #include <sched.h>
 #include <signal.h>
-#include <stdatomic.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "sim/core/wall_clock.h"
-#include "sim/engine/engine_internal.h"
+#include "sim/engine/islands_internal.h"
 
-/* SPANS: of which hooks may be left to do. HOOKS: done in one go. */
-enum { ALIGN = 16, KIND_BYTES = 48, MOST_THREADS = 32, SPANS = 8, HOOKS = 32 };
+/* HOOKS: done in one go. BACKLOG: of spans, from which on hooks go before steps. */
+enum { HOOKS = 32, BACKLOG = BST_ISLAND_SPANS / 2 };
 /* A thread sleeps when there was nothing to do for so long: waking takes about as long. */
 static const double AWAKE_S = 2e-4;
-
-/* What a hook is to be told; its content follows. */
-typedef struct note {
-    size_t bytes; /* with the content */
-    int64_t tick;
-    int instance;
-    const channel *ch; /* NULL: an event */
-} note;
-
-typedef struct event_text {
-    char kind[KIND_BYTES], text[400];
-} event_text;
-
-enum { NOTE_BYTES = (sizeof(note) + ALIGN - 1) / ALIGN * ALIGN };
-
-typedef struct notes {
-    char *bytes;
-    size_t used, room, read;
-} notes;
-
-typedef struct island {
-    bst_heap heap;
-    notes notes[SPANS];
-    bst_ctx ctx;
-    bst_status status;
-    int64_t failed_tick, last_tick;
-    int failed_instance;
-    double took_s[2]; /* the last spans: frames come every other one */
-} island;
-
-struct bst_islands {
-    bst_engine *engine;
-    island *islands; /* the last one: what links the others */
-    int count;       /* without that */
-    pthread_t threads[MOST_THREADS];
-    int thread_count;
-    int *order; /* in which islands of a span are taken: those that will take long first */
-    pthread_mutex_t lock; /* over what follows */
-    pthread_cond_t changed;
-    int sleeping;
-    atomic_uint changes; /* for threads that wait awake */
-    bst_ctx *ctx;        /* of who does hooks */
-    bst_status heard;
-    int64_t until_tick, last_tick; /* of the span; of the run */
-    int64_t span, hooked;          /* spans that were begun, and whose hooks are done */
-    int next, done;                /* islands of the span that were taken, and that are finished */
-    bool linked;                   /* and what links them has stepped */
-    bool failed;                   /* a step of it did: its hooks are for the caller */
-    bool hooking;                  /* somebody does */
-    bool running, stop;
-};
-
-/* ---- notes ---- */
-
-static bst_status take_note(bst_ctx *ctx, notes *n, const note *head, const void *content,
-                            size_t bytes) {
-    size_t whole = NOTE_BYTES + (bytes + ALIGN - 1) / ALIGN * ALIGN;
-    if (n->used + whole > n->room) {
-        size_t room = 2 * (n->room + whole) + 65536;
-        char *more = aligned_alloc(ALIGN, room / ALIGN * ALIGN);
-        if (!more) {
-            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %zu bytes of messages", room);
-        }
-        memcpy(more, n->bytes ? n->bytes : more, n->used);
-        free(n->bytes);
-        n->bytes = more;
-        n->room = room / ALIGN * ALIGN;
-    }
-    note *to = (note *)(void *)(n->bytes + n->used);
-    *to = *head;
-    to->bytes = whole;
-    memcpy(n->bytes + n->used + NOTE_BYTES, content, bytes);
-    n->used += whole;
-    return BST_OK;
-}
-
-static notes *notes_of(bst_engine *engine, const instance *self) {
-    bst_islands *s = engine->islands;
-    return &s->islands[self->island].notes[(s->span - 1) % SPANS];
-}
-
-bst_status bst_islands_message(struct bst_step *step, const channel *ch, const void *payload) {
-    const bst_channel_type *type = ch->type;
-    size_t bytes = type->count
-                       ? type->header_bytes + type->item_bytes * (size_t)type->count(payload)
-                       : ch->payload_bytes;
-    note head = {.tick = step->tick, .instance = step->self->order, .ch = ch};
-    return take_note(step->ctx, notes_of(step->engine, step->self), &head, payload, bytes);
-}
-
-bst_status bst_islands_event(struct bst_step *step, const char *kind, const char *text) {
-    event_text e;
-    memset(&e, 0, sizeof e);
-    snprintf(e.kind, sizeof e.kind, "%s", kind);
-    snprintf(e.text, sizeof e.text, "%s", text);
-    note head = {.tick = step->tick, .instance = step->self->order};
-    return take_note(step->ctx, notes_of(step->engine, step->self), &head, &e, sizeof e);
-}
-
-static note *first_note(const notes *n) {
-    return n->read < n->used ? (note *)(void *)(n->bytes + n->read) : NULL;
-}
-
-static bool is_before(int64_t tick, int instance_, int64_t other_tick, int other) {
-    return tick < other_tick || (tick == other_tick && instance_ < other);
-}
-
-/* Does up to `most` hooks of one span, none after a step that failed. *all: those were all. */
-static bst_status do_hooks(bst_ctx *ctx, bst_engine *engine, int64_t span, int most,
-                           int64_t last_tick, int last_instance, bool *all) {
-    bst_islands *s = engine->islands;
-    const bst_engine_hooks *hooks = &engine->hooks;
-    bst_status status = BST_OK;
-    *all = false;
-    for (int done = 0; done < most && status == BST_OK && !*all; done++) {
-        notes *from = NULL;
-        note *next = NULL;
-        for (int i = 0; i <= s->count; i++) {
-            note *n = first_note(&s->islands[i].notes[span % SPANS]);
-            if (n && (!next || is_before(n->tick, n->instance, next->tick, next->instance))) {
-                next = n;
-                from = &s->islands[i].notes[span % SPANS];
-            }
-        }
-        if (!next || is_before(last_tick, last_instance, next->tick, next->instance)) {
-            *all = true;
-            break;
-        }
-        const void *content = (const char *)next + NOTE_BYTES;
-        if (next->ch) {
-            status = hooks->message(hooks->user, next->ch->scope, next->ch->type->name, content,
-                                    next->tick);
-        } else {
-            const event_text *e = content;
-            status = hooks->event(hooks->user, next->tick, engine->instances[next->instance]->name,
-                                  e->kind, e->text);
-        }
-        status = bst_engine_heard(ctx, engine, status);
-        from->read += next->bytes;
-    }
-    for (int i = 0; i <= s->count && (*all || status != BST_OK); i++) {
-        notes *n = &s->islands[i].notes[span % SPANS];
-        n->used = n->read = 0;
-    }
-    return status;
-}
 
 /* ---- stepping ---- */
 
@@ -191,30 +45,9 @@ static const island *first_failure(const bst_islands *s) {
     for (int i = 0; i <= s->count; i++) {
         const island *one = &s->islands[i];
         if (one->status != BST_OK &&
-            (!first || is_before(one->failed_tick, one->failed_instance, first->failed_tick,
-                                 first->failed_instance))) {
+            (!first || bst_islands_before(one->failed_tick, one->failed_instance,
+                                          first->failed_tick, first->failed_instance))) {
             first = one;
-        }
-    }
-    return first;
-}
-
-/* Tick after the last one of the next span. */
-static int64_t next_until(const bst_islands *s, int64_t from, int64_t until_tick) {
-    const bst_heap *links = &s->islands[s->count].heap;
-    int64_t until = from + s->engine->tick_rate_hz;
-    if (links->count > 0 && s->engine->due[links->items[0]] + 1 < until) {
-        until = s->engine->due[links->items[0]] + 1;
-    }
-    return until < until_tick ? until : until_tick;
-}
-
-static int64_t first_due(const bst_islands *s) {
-    int64_t first = INT64_MAX;
-    for (int i = 0; i <= s->count; i++) {
-        const bst_heap *heap = &s->islands[i].heap;
-        if (heap->count > 0 && s->engine->due[heap->items[0]] < first) {
-            first = s->engine->due[heap->items[0]];
         }
     }
     return first;
@@ -246,54 +79,157 @@ static void await(bst_islands *s) {
     }
 }
 
+/* ---- spans; all with the lock held ---- */
+
+/* When the instances that link the islands step next, as long as they do not run. */
+static int64_t link_due(const bst_islands *s) {
+    const bst_heap *links = &s->islands[s->count].heap;
+    return links->count > 0 ? s->engine->due[links->items[0]] : INT64_MAX;
+}
+
+/* Whether there is a span after the last one, which is opened where it was not yet. */
+static bool opens(bst_islands *s) {
+    if (s->from_tick >= s->last_tick || s->opened >= s->end ||
+        s->opened - s->hooked >= BST_ISLAND_SPANS || (!s->ahead && s->linked < s->opened)) {
+        return false;
+    }
+    s->link_tick = s->ahead ? s->link_tick : link_due(s);
+    int64_t until = s->from_tick + s->engine->tick_rate_hz;
+    if (s->link_tick < until) {
+        until = s->link_tick + 1;
+    }
+    until = until < s->last_tick ? until : s->last_tick;
+    if (s->ahead && s->link_tick < until) {
+        s->link_tick += s->engine->instances[s->link]->spec.period_ticks;
+    }
+    s->from_tick = s->until_tick[s->opened % BST_ISLAND_SPANS] = until;
+    s->opened++;
+    return true;
+}
+
+/* Whether an island can do its next span now. */
+static bool can_step(bst_islands *s, const island *self) {
+    if (self->busy || self->status != BST_OK || self->span >= s->end) {
+        return false;
+    }
+    if (self->span > s->linked &&
+        self->free_tick < s->until_tick[(self->span - 1) % BST_ISLAND_SPANS]) {
+        return false;
+    }
+    return self->span < s->opened || opens(s);
+}
+
 static double expected_s(const island *i) {
     return i->took_s[0] > i->took_s[1] ? i->took_s[0] : i->took_s[1];
 }
 
-static void begin_span(bst_islands *s) {
-    for (int i = 1; i < s->count; i++) {
-        int one = s->order[i], k = i;
-        for (; k > 0 && expected_s(&s->islands[one]) > expected_s(&s->islands[s->order[k - 1]]);
-             k--) {
-            s->order[k] = s->order[k - 1];
+/* The island to be stepped next: the one that is farthest behind, among those what will take long;
+ * NULL: none. */
+static island *next_island(bst_islands *s) {
+    island *best = NULL;
+    for (int i = 0; i < s->count; i++) {
+        island *one = &s->islands[i];
+        bool better = !best || one->span < best->span ||
+                      (one->span == best->span && expected_s(one) > expected_s(best));
+        if (better && can_step(s, one)) {
+            best = one;
         }
-        s->order[k] = one;
     }
-    int64_t from = first_due(s);
-    s->until_tick = next_until(s, from, s->last_tick);
-    s->next = s->done = 0;
-    s->linked = false;
-    s->span++;
+    return best;
+}
+
+/* Whether what links the islands is to be stepped. */
+static bool can_link(const bst_islands *s) {
+    if (s->linking || s->linked >= s->opened || s->linked >= s->end - s->failed) {
+        return false;
+    }
+    for (int i = 0; i < s->count; i++) {
+        if (s->islands[i].span <= s->linked) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static bool can_hook(const bst_islands *s) {
+    return !s->hooking && s->hooked < s->linked;
+}
+
+/* Whether all is done but hooks. */
+static bool finished(const bst_islands *s) {
+    bool busy = s->linking || s->hooking;
+    bool behind = false;
+    for (int i = 0; i < s->count && !busy; i++) {
+        busy = s->islands[i].busy;
+        behind |= !busy && s->islands[i].status == BST_OK && s->islands[i].span < s->end;
+    }
+    if (busy || s->heard != BST_OK) {
+        return !busy;
+    }
+    bool all = s->from_tick >= s->last_tick && s->linked == s->opened;
+    return all || (s->linked == s->end - s->failed && !(s->failed && behind));
+}
+
+static void end_span(bst_islands *s, island *self) {
+    self->busy = false;
+    if (self->last_tick > s->engine->tick) {
+        s->engine->tick = self->last_tick;
+    }
+    if (self->status == BST_OK) {
+        self->span++;
+    } else if (!s->failed || self->span + 1 < s->end) {
+        s->failed = true;
+        s->end = self->span + 1;
+    }
     tell(s);
 }
 
-/* Steps an island of the span; after the last one what links them. The lock is held before and
- * after. */
-static void step_one(bst_islands *s) {
-    island *self = &s->islands[s->order[s->next++]];
-    int64_t until = s->until_tick;
+static void step_one(bst_islands *s, island *self) {
+    int64_t until = s->until_tick[self->span % BST_ISLAND_SPANS];
+    self->busy = true;
     pthread_mutex_unlock(&s->lock);
     double begun = bst_wall_seconds();
     step_island(s->engine, self, until);
+    if (self->status == BST_OK && s->ahead && s->link >= 0) {
+        self->status = bst_islands_put_aside(&self->ctx, s->engine, self);
+        self->failed_tick = until - 1;
+        self->failed_instance = s->link;
+    }
     double took = bst_wall_seconds() - begun;
     pthread_mutex_lock(&s->lock);
-    self->took_s[s->span & 1] = took;
-    if (++s->done < s->count) {
-        return;
-    }
+    self->took_s[self->span & 1] = took;
+    end_span(s, self);
+}
+
+/* Until when what links the islands has promised to write nothing for each. */
+static void take_promises(bst_islands *s) {
+    const instance *link = s->engine->instances[s->link];
     for (int i = 0; i < s->count; i++) {
-        int64_t tick = s->islands[i].last_tick;
-        s->engine->tick = tick > s->engine->tick ? tick : s->engine->tick;
+        s->islands[i].free_tick = INT64_MAX;
     }
-    if (!first_failure(s)) {
-        pthread_mutex_unlock(&s->lock);
-        step_island(s->engine, &s->islands[s->count], until);
-        pthread_mutex_lock(&s->lock);
+    for (int p = 0; p < link->port_count; p++) {
+        const port_state *port = &link->ports[p];
+        if (bst_instance_port(link, p)->direction == BST_PORT_OUT && port->channel >= 0) {
+            island *to = &s->islands[port->island];
+            to->free_tick = port->silent_until < to->free_tick ? port->silent_until : to->free_tick;
+        }
     }
-    s->linked = true;
-    s->failed = first_failure(s) != NULL;
-    s->running = s->running && !s->failed && first_due(s) < s->last_tick;
-    tell(s);
+}
+
+/* Steps what links the islands at the end of a span. */
+static void step_links(bst_islands *s) {
+    island *self = &s->islands[s->count];
+    int64_t until = s->until_tick[self->span % BST_ISLAND_SPANS];
+    s->linking = true;
+    pthread_mutex_unlock(&s->lock);
+    step_island(s->engine, self, until);
+    pthread_mutex_lock(&s->lock);
+    s->linking = false;
+    if (s->ahead && s->link >= 0) {
+        take_promises(s);
+    }
+    s->linked += self->status == BST_OK;
+    end_span(s, self);
 }
 
 /* Does some hooks of the first span that has any left. */
@@ -302,28 +238,27 @@ static void hook_some(bst_islands *s) {
     int64_t span = s->hooked;
     pthread_mutex_unlock(&s->lock);
     bool all;
-    bst_status heard = do_hooks(s->ctx, s->engine, span, HOOKS, INT64_MAX, 0, &all);
+    bst_status heard = bst_islands_do_hooks(s->ctx, s->engine, span, HOOKS, INT64_MAX, 0, &all);
     pthread_mutex_lock(&s->lock);
     s->hooking = false;
     s->hooked += all;
-    if (heard != BST_OK) {
-        s->heard = heard;
-        s->running = false;
-    }
+    s->heard = heard;
     if (all || heard != BST_OK) {
         tell(s);
     }
 }
 
-/* Does one thing that there is to do, or waits; holds the lock before and after. */
+/* Does one thing that there is to do, or waits. */
 static void do_or_await(bst_islands *s) {
-    if (s->running && s->linked && s->span - s->hooked < SPANS - 1) {
-        begin_span(s);
-    }
-    if (s->next < s->count) {
-        step_one(s);
-    } else if (!s->hooking && s->hooked < s->span - (!s->linked || s->failed) &&
-               s->heard == BST_OK) {
+    bool going = s->heard == BST_OK;
+    island *next;
+    if (going && can_link(s)) {
+        step_links(s);
+    } else if (going && can_hook(s) && s->linked - s->hooked >= BACKLOG) {
+        hook_some(s);
+    } else if (going && (next = next_island(s)) != NULL) {
+        step_one(s, next);
+    } else if (going && can_hook(s)) {
         hook_some(s);
     } else {
         await(s);
@@ -340,14 +275,12 @@ static void *work(void *user) {
     return NULL;
 }
 
-/* The calling thread's part, until all of it is done but hooks of a span in which a step failed. */
+/* The calling thread's part, until all of it is done but hooks. */
 static bool run_spans(bst_islands *s) {
     const bst_engine *engine = s->engine;
     bool interrupted = false;
     double asked = bst_wall_seconds();
-    pthread_mutex_lock(&s->lock);
-    s->running = first_due(s) < s->last_tick;
-    while (s->running || !s->linked || s->hooking) {
+    while (!finished(s)) {
         double now = bst_wall_seconds();
         if (engine->hooks.interrupted && !interrupted && now - asked > 0.02) {
             asked = now;
@@ -355,32 +288,35 @@ static bool run_spans(bst_islands *s) {
             pthread_mutex_unlock(&s->lock);
             interrupted = engine->hooks.interrupted(engine->hooks.user, tick);
             pthread_mutex_lock(&s->lock);
-            s->running = s->running && !interrupted;
-        }
-        if (s->running || !s->linked || s->hooking) {
+            if (interrupted && s->opened < s->end) {
+                s->end = s->opened; /* what is under way is brought to its end */
+            }
+        } else {
             do_or_await(s);
         }
     }
     s->hooking = true; /* what is left is for the caller */
-    pthread_mutex_unlock(&s->lock);
     return interrupted;
 }
 
 bst_status bst_islands_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) {
     bst_islands *s = engine->islands;
+    pthread_mutex_lock(&s->lock);
     s->ctx = ctx;
     s->heard = BST_OK;
     s->last_tick = until_tick;
+    s->end = s->failed ? s->end : INT64_MAX;
+    s->hooking = false;
+    tell(s);
     bool interrupted = run_spans(s);
     const island *failed = first_failure(s);
     bst_status status = BST_OK, heard = s->heard;
-    pthread_mutex_lock(&s->lock);
-    for (; s->hooked < s->span && heard == BST_OK; s->hooked++) {
-        bool all, last = failed && s->hooked == s->span - 1;
-        heard = do_hooks(ctx, engine, s->hooked, INT32_MAX, last ? failed->failed_tick : INT64_MAX,
-                         last ? failed->failed_instance : 0, &all);
+    for (; s->hooked < s->linked + s->failed && heard == BST_OK; s->hooked++) {
+        bool all, last = s->hooked == s->linked;
+        heard = bst_islands_do_hooks(ctx, engine, s->hooked, INT32_MAX,
+                                     last ? failed->failed_tick : INT64_MAX,
+                                     last ? failed->failed_instance : 0, &all);
     }
-    s->hooking = false;
     pthread_mutex_unlock(&s->lock);
     for (int i = 0; i <= s->count; i++) {
         ctx->warnings += s->islands[i].ctx.warnings;
@@ -400,13 +336,10 @@ bst_status bst_islands_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick)
 
 /* ---- making them ---- */
 
-/* Gives each instance the number of its island; returns their number, 0 when the engine cannot be
- * parted: frames that threads would share, or a message that makes another island step. */
-static int part(bst_engine *engine) {
+/* Gives each instance the number of its island, sensors' instances first; returns how many there
+ * are. */
+static int number_islands(bst_engine *engine) {
     int count = 0;
-    if (engine->releasable_count > 0) {
-        return 0;
-    }
     for (int i = 0; i < engine->instance_count; i++) {
         instance *self = engine->instances[i];
         self->order = i;
@@ -422,42 +355,86 @@ static int part(bst_engine *engine) {
     }
     for (int i = 0; i < engine->instance_count; i++) {
         instance *self = engine->instances[i];
-        if (self->spec.member_count > 0) {
-            self->island = count;
-            if (self->trigger_count > 0) {
-                return 0;
-            }
+        self->island = self->spec.member_count > 0 ? count : self->island;
+    }
+    return count;
+}
+
+/* Whether instances of different islands can be stepped in any order between the steps of what
+ * links them: no message makes another island step, none is read at the tick it was written. */
+static bool can_part(const bst_engine *engine) {
+    for (int i = 0; i < engine->instance_count; i++) {
+        const instance *self = engine->instances[i];
+        if (self->spec.member_count > 0 && self->trigger_count > 0) {
+            return false;
         }
-        for (int t = 0; t < self->trigger_count; t++) {
-            const channel *ch = &engine->channels[self->ports[self->triggers[t]].channel];
-            if (engine->instances[ch->writer]->spec.member_count > 0) {
-                return 0;
+        for (int p = 0; p < self->port_count && self->spec.member_count == 0; p++) {
+            const bst_port *port = bst_instance_port(self, p);
+            const port_state *state = &self->ports[p];
+            if (port->direction == BST_PORT_OUT || state->channel < 0) {
+                continue;
+            }
+            int writer = engine->channels[state->channel].writer;
+            if (engine->instances[writer]->spec.member_count > 0 &&
+                (state->delay_ticks < 1 || (port->flags & BST_PORT_TRIGGER))) {
+                return false;
             }
         }
     }
-    return count;
+    return true;
+}
+
+/* Finds the one instance that links the islands, and whether they may go ahead of it. */
+static void find_link(bst_islands *s) {
+    bst_engine *engine = s->engine;
+    s->link = -1;
+    s->ahead = true;
+    for (int i = 0; i < engine->instance_count; i++) {
+        const instance *self = engine->instances[i];
+        if (self->spec.member_count > 0) {
+            s->ahead = s->ahead && s->link < 0 && self->spec.period_ticks > 0 &&
+                       (self->spec.desc->flags & BST_MODULE_PROMISES);
+            s->link = i;
+        }
+    }
+    for (int i = 0; i <= s->count; i++) {
+        s->islands[i].free_tick = s->link < 0 ? INT64_MAX : INT64_MIN;
+    }
+    if (s->link < 0 || !s->ahead) {
+        return;
+    }
+    instance *link = engine->instances[s->link];
+    for (int p = 0; p < link->port_count; p++) {
+        port_state *port = &link->ports[p];
+        bst_port_direction direction = bst_instance_port(link, p)->direction;
+        const channel *ch = port->channel >= 0 ? &engine->channels[port->channel] : NULL;
+        if (ch && (direction == BST_PORT_MODIFY || ch->type->in_place)) {
+            s->ahead = false;
+        }
+        for (int i = 0; ch && i < engine->instance_count; i++) {
+            if (i != s->link && strcmp(engine->instances[i]->scope, ch->scope) == 0) {
+                port->island = engine->instances[i]->island;
+            }
+        }
+    }
+    link->reads_aside = s->ahead;
 }
 
 static void free_islands(bst_islands *s) {
     for (int i = 0; s->islands && i <= s->count; i++) {
         free(s->islands[i].heap.items);
-        for (int k = 0; k < SPANS; k++) {
-            free(s->islands[i].notes[k].bytes);
-        }
+        bst_islands_free_notes(&s->islands[i]);
     }
     free(s->islands);
-    free(s->order);
+    free(s->threads);
     free(s);
 }
 
-static bst_status fill(bst_ctx *ctx, bst_islands *s) {
+static bst_status fill(bst_ctx *ctx, bst_islands *s, int threads) {
     bst_engine *engine = s->engine;
     s->islands = calloc((size_t)s->count + 1, sizeof *s->islands);
-    s->order = calloc((size_t)s->count + 1, sizeof *s->order);
-    bool enough = s->islands && s->order;
-    for (int i = 0; enough && i < s->count; i++) {
-        s->order[i] = i;
-    }
+    s->threads = calloc((size_t)threads + 1, sizeof *s->threads);
+    bool enough = s->islands && s->threads;
     for (int i = 0; enough && i <= s->count; i++) {
         island *self = &s->islands[i];
         self->last_tick = -1;
@@ -474,9 +451,13 @@ static bst_status fill(bst_ctx *ctx, bst_islands *s) {
         engine->place[i] = self->heap->count;
         self->heap->items[self->heap->count++] = i;
     }
+    s->from_tick = INT64_MAX;
     for (int i = 0; i < engine->instance_count; i++) {
         bst_engine_set_due(engine, i, engine->due[i]);
+        s->from_tick = engine->due[i] < s->from_tick ? engine->due[i] : s->from_tick;
     }
+    find_link(s);
+    s->link_tick = link_due(s);
     return BST_OK;
 }
 
@@ -485,8 +466,8 @@ bst_status bst_engine_part(bst_ctx *ctx, bst_engine *engine, int threads, bool *
     if (!engine->loaded || engine->overlap || engine->islands) {
         return bst_fail(ctx, BST_ERR_STATE, "an engine is parted once, after loading");
     }
-    int count = part(engine);
-    if (count < 2 || threads < 2) {
+    int count = number_islands(engine);
+    if (count < 2 || threads < 2 || engine->releasable_count > 0 || !can_part(engine)) {
         return BST_OK;
     }
     bst_islands *s = calloc(1, sizeof *s);
@@ -494,9 +475,9 @@ bst_status bst_engine_part(bst_ctx *ctx, bst_engine *engine, int threads, bool *
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d sensors", count);
     }
     s->engine = engine;
-    s->count = s->next = s->done = count;
-    s->linked = true;
-    bst_status status = fill(ctx, s);
+    s->count = count;
+    int wanted = (threads < count ? threads : count) - 1;
+    bst_status status = fill(ctx, s, wanted);
     if (status != BST_OK) {
         free_islands(s);
         return status;
@@ -506,8 +487,7 @@ bst_status bst_engine_part(bst_ctx *ctx, bst_engine *engine, int threads, bool *
     sigset_t all, before; /* signals are the main thread's */
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
-    int wanted = (threads < count ? threads : count) - 1;
-    while (s->thread_count < wanted && s->thread_count < MOST_THREADS &&
+    while (s->thread_count < wanted &&
            pthread_create(&s->threads[s->thread_count], NULL, work, s) == 0) {
         s->thread_count++;
     }

@@ -42,7 +42,7 @@ enum { BODIES_FOR_THREADS = 1024, GRAIN = 256 };
 typedef struct body {
     const bst_orbit *orbit; /* NULL: not interpolated */
     int step_class;
-    int64_t knot[RING]; /* which one a slot holds */
+    int64_t first, last; /* the knots that the slots hold; last < first: none */
     double place_m[3][RING];
 } body;
 
@@ -163,17 +163,34 @@ static bst_vec3 place_at(const bst_orbit *orbit, const bst_mat3 *gcrf_from_teme,
                           1000.0);
 }
 
-static void make_knots(bst_ephemeris *e, body *b, int64_t first, int64_t last) {
+static void make_missing_knots(bst_ephemeris *e, body *b, int64_t first, int64_t last) {
     for (int64_t k = first; k <= last; k++) {
-        int slot = slot_of(k, RING);
-        if (b->knot[slot] != k) {
+        if (k < b->first || k > b->last) {
+            int slot = slot_of(k, RING);
             bst_vec3 p = place_at(b->orbit, rotation_at(e, b->step_class, k),
                                   (double)k * step_of(b->step_class));
             b->place_m[0][slot] = p.x;
             b->place_m[1][slot] = p.y;
             b->place_m[2][slot] = p.z;
-            b->knot[slot] = k;
         }
+    }
+    if (first > b->last + 1 || last < b->first - 1) {
+        b->first = first;
+        b->last = last;
+    } else if (last > b->last) {
+        b->last = last;
+        int64_t oldest = last - (RING - 1);
+        b->first = oldest > b->first ? oldest : first < b->first ? first : b->first;
+    } else {
+        b->first = first;
+        int64_t newest = first + (RING - 1);
+        b->last = newest < b->last ? newest : b->last;
+    }
+}
+
+static inline void make_knots(bst_ephemeris *e, body *b, int64_t first, int64_t last) {
+    if (first < b->first || last > b->last) {
+        make_missing_knots(e, b, first, last);
     }
 }
 
@@ -260,8 +277,8 @@ static void table_rows(void *user, int begin, int end) {
         int ahead = c->late + (double)(i % SHARES) / SHARES >= 1.0;
         make_knots(job->e, b, c->first, c->first + CHECKED - 1 + ahead);
         double p[3] = {0};
-        for (int j = 0; j < 3; j++) {
-            for (int slot = 0; slot < RING; slot++) {
+        for (int slot = 0; slot < RING; slot++) {
+            for (int j = 0; j < 3; j++) {
                 p[j] += c->weight[slot] * b->place_m[j][slot];
             }
         }
@@ -326,6 +343,38 @@ static table *table_at(bst_ephemeris *e, int64_t index) {
     return t;
 }
 
+/* Wider vectors where the processor has them; what comes out is the same. */
+#if defined(__x86_64__) && defined(__linux__)
+#define LANES_FUNCTION __attribute__((target_clones("default", "avx2")))
+#else
+#define LANES_FUNCTION
+#endif
+
+/* The cone of a search, and how far objects may be from where a table has them. */
+typedef struct search {
+    bst_vec3 apex_m, axis;
+    double sin_half, cos_half, span_s, sure_m;
+    double least_mps; /* bound of the speed where the table's does not hold, else 0 */
+} search;
+
+/* Distances of n objects from `begin` on from the cone's surface, less how far they may be off;
+ * behind the apex the distance is longer than this. NAN: unknown. */
+LANES_FUNCTION static void distances(const table *t, int begin, int n, const search *c,
+                                     double *outside_m) {
+    const double *px = t->x_m + begin, *py = t->y_m + begin, *pz = t->z_m + begin,
+                 *speed = t->speed_mps + begin;
+    const bst_vec3 o = c->apex_m, axis = c->axis;
+    for (int i = 0; i < n; i++) {
+        double x = px[i] - o.x, y = py[i] - o.y, z = pz[i] - o.z;
+        double along = x * axis.x + y * axis.y + z * axis.z;
+        double square = x * x + y * y + z * z - along * along;
+        double across = sqrt(square > 0.0 ? square : 0.0);
+        double least = speed[i] < 0.0 ? speed[i] : c->least_mps;
+        double fastest = speed[i] > least ? speed[i] : least;
+        outside_m[i] = across * c->cos_half - along * c->sin_half - fastest * c->span_s - c->sure_m;
+    }
+}
+
 int bst_ephemeris_near(bst_ephemeris *e, double seconds, const bst_ephemeris_cone *cone,
                        int *indices) {
     int count = 0;
@@ -337,11 +386,13 @@ int bst_ephemeris_near(bst_ephemeris *e, double seconds, const bst_ephemeris_con
     }
     int64_t index = llround(seconds / TABLE_STEP_S);
     double span = fabs(seconds - (double)index * TABLE_STEP_S) + cone->half_span_s + 1e-3;
-    double sure = TABLE_ERROR_M + cone->apex_span_m;
-    bool near_in_time = span < TABLE_SPAN_S;
-    double sin_half = sin(cone->half_angle_rad + SHIFT_RAD),
-           cos_half = cos(cone->half_angle_rad + SHIFT_RAD);
-    bst_vec3 o = cone->apex_m, axis = cone->axis;
+    const search c = {.apex_m = cone->apex_m,
+                      .axis = cone->axis,
+                      .sin_half = sin(cone->half_angle_rad + SHIFT_RAD),
+                      .cos_half = cos(cone->half_angle_rad + SHIFT_RAD),
+                      .span_s = span,
+                      .sure_m = TABLE_ERROR_M + cone->apex_span_m,
+                      .least_mps = span < TABLE_SPAN_S ? 0.0 : HIGHEST_SPEED_MPS};
     pthread_mutex_lock(&e->lock);
     table *t = table_at(e, index);
     t->users++;
@@ -350,17 +401,7 @@ int bst_ephemeris_near(bst_ephemeris *e, double seconds, const bst_ephemeris_con
     double outside[BLOCK];
     for (int begin = 0; begin < e->object_count; begin += BLOCK) {
         int n = e->object_count - begin < BLOCK ? e->object_count - begin : BLOCK;
-        const double *px = t->x_m + begin, *py = t->y_m + begin, *pz = t->z_m + begin,
-                     *speed = t->speed_mps + begin;
-        for (int i = 0; i < n; i++) {
-            /* distance from the cone's surface against how far the object may be off; behind the
-             * apex the distance is longer than this */
-            double x = px[i] - o.x, y = py[i] - o.y, z = pz[i] - o.z;
-            double along = x * axis.x + y * axis.y + z * axis.z;
-            double across = sqrt(fmax(x * x + y * y + z * z - along * along, 0.0));
-            double fastest = near_in_time || speed[i] < 0.0 ? speed[i] : HIGHEST_SPEED_MPS;
-            outside[i] = across * cos_half - along * sin_half - fastest * span - sure;
-        }
+        distances(t, begin, n, &c, outside);
         for (int i = 0; i < n; i++) {
             if (!(outside[i] > 0.0)) {
                 indices[count++] = begin + i;
@@ -454,9 +495,8 @@ static void set_body(const bst_ephemeris *e, const bst_orbit *orbit, body *b) {
         b->orbit = orbit;
         b->step_class = choose_class(e, orbit);
     }
-    for (int slot = 0; slot < RING; slot++) {
-        b->knot[slot] = INT64_MIN;
-    }
+    b->first = 0;
+    b->last = -1;
 }
 
 bst_status bst_ephemeris_create(bst_ctx *ctx, const bst_world *world, bst_ephemeris **out) {

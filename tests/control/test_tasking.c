@@ -224,6 +224,32 @@ static void a_target_is_given_up_in_time(void **state) {
     tear_down(&f);
 }
 
+/* What it says of the time in which nothing will change comes true, however often it is asked. */
+static void quiet_times_are_kept(void **state) {
+    (void)state;
+    fixture f;
+    start(&f,
+          "{\"targets\": [{\"object\": \"INMARSAT GX5\", \"frames\": 5, \"revisit_s\": 1}], "
+          "\"min_snr\": 0, \"settle_s\": 10, \"find_timeout_s\": 30, \"idle_s\": 7}");
+    f.tasking.sensors[1].period_s = 2.0;
+    assert_true(plan(&f, 1, 0));
+    assert_int_equal(bst_tasking_quiet_until(&f.tasking, 1), 80); /* four periods of five frames */
+    assert_false(plan(&f, 1, 100));
+    assert_int_equal(bst_tasking_quiet_until(&f.tasking, 1), 180);
+    for (int frame = 0; frame < 4; frame++) {
+        tell_tracked(&f, 1, 181 + 20 * frame);
+        assert_false(plan(&f, 1, 182 + 20 * frame));
+        assert_int_equal(bst_tasking_quiet_until(&f.tasking, 1), 182 + 60);
+    }
+    tell_tracked(&f, 1, 262);
+    assert_true(plan(&f, 1, 270)); /* done */
+    f.tasking.holder[GX5] = 0;
+    f.tasking.sensors[1].task.object = -1;
+    assert_false(plan(&f, 1, 500));
+    assert_int_equal(bst_tasking_quiet_until(&f.tasking, 1), 570);
+    tear_down(&f);
+}
+
 static void priority_and_waiting_decide(void **state) {
     (void)state;
     fixture f;
@@ -255,6 +281,7 @@ static void priority_and_waiting_decide(void **state) {
     f.tasking.holder[MOLNIYA] = -1;
     f.tasking.sensors[0].task.object = -1;
     f.tasking.sensors[0].pointed = false;
+    f.tasking.sensors[0].quiet_until = 0;
     f.tasking.seen_s[MOLNIYA] = t - 3700.0;
     f.tasking.seen_s[GX5] = 0.0;
     bst_tasking_line *lines = f.tasking.config.targets.items;
@@ -289,6 +316,7 @@ int main(void) {
         cmocka_unit_test(the_first_line_that_fits_counts),
         cmocka_unit_test(one_target_goes_to_one_sensor_until_it_is_due_again),
         cmocka_unit_test(a_target_is_given_up_in_time),
+        cmocka_unit_test(quiet_times_are_kept),
         cmocka_unit_test(priority_and_waiting_decide),
         cmocka_unit_test(a_survey_counts_every_target_once),
     };

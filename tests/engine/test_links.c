@@ -160,22 +160,88 @@ static bst_status quiet_link_step(fake *self, struct bst_step *step) {
     return BST_OK;
 }
 
-static bst_status play(heard *h, int threads, const int64_t fails[4], char message[200]) {
+static const bst_port ahead_sensor_ports[] = {
+    {.channel = "control_status", .direction = BST_PORT_OUT},
+    {.channel = "exposure", .direction = BST_PORT_OUT},
+    {.channel = "task", .direction = BST_PORT_IN, .flags = BST_PORT_OPTIONAL | BST_PORT_FEEDBACK},
+};
+static const bst_port ahead_link_ports[] = {
+    {.channel = "control_status", .direction = BST_PORT_IN, .flags = BST_PORT_OPTIONAL},
+    {.channel = "exposure", .direction = BST_PORT_IN, .flags = BST_PORT_OPTIONAL},
+    {.channel = "task", .direction = BST_PORT_OUT},
+};
+enum { AHEAD_EXPOSURE = 1, AHEAD_TASK, AHEAD_PORTS };
+static const bst_module_desc ahead_sensor_module = FAKE_DESC(ahead_sensor_ports),
+                             ahead_link_module = {.abi = BST_MODULE_ABI,
+                                                  .role = "fake",
+                                                  .type = "ahead",
+                                                  .doc = "Links, and promises.",
+                                                  .flags = BST_MODULE_LINKS | BST_MODULE_PROMISES,
+                                                  .config_bytes = sizeof(fake *),
+                                                  .ports = ahead_link_ports,
+                                                  .port_count = AHEAD_PORTS,
+                                                  .create = fake_create,
+                                                  .step = fake_step,
+                                                  .destroy = fake_destroy};
+
+/* value2: as in busy_step. Tells of its task, and writes two exposures every third step. */
+static bst_status ahead_sensor_step(fake *self, struct bst_step *step) {
+    const bst_task *task = bst_step_latest(step, AHEAD_TASK).payload;
+    bst_step_event(step, "tell", "task %d", task ? (int)task->id : -1);
+    for (int i = 0; i < 2 && self->steps % 3 == 0; i++) {
+        bst_exposure *exposure = bst_step_write(step, AHEAD_EXPOSURE, NULL);
+        exposure->id = 2 * self->steps + i;
+    }
+    return busy_step(self, step);
+}
+
+/* Tells what it reads; gives each sensor a task for a while, of which it promises part. With value
+ * set it breaks a promise at that tick. */
+static bst_status ahead_link_step(fake *self, struct bst_step *step) {
+    int64_t tick = bst_step_tick(step);
+    for (int i = 0; i < 4; i++) {
+        int base = bst_member_port(AHEAD_PORTS, i, 0);
+        bst_sample status = bst_step_latest(step, base);
+        char text[100] = "";
+        bst_sample next = bst_step_next(step, base + AHEAD_EXPOSURE);
+        for (; next.payload; next = bst_step_next(step, base + AHEAD_EXPOSURE)) {
+            snprintf(text + strlen(text), sizeof text - strlen(text), " %lld at %lld",
+                     (long long)((const bst_exposure *)next.payload)->id,
+                     (long long)next.written_tick);
+        }
+        bst_step_event(step, "tell", "%d: %lld at %lld,%s", i, (long long)status.sequence,
+                       (long long)status.written_tick, text);
+        int64_t holds = 14 * (i + 1); /* ticks */
+        if (tick % holds == 0 || tick == self->value) {
+            bst_task *task = bst_step_write(step, base + AHEAD_TASK, NULL);
+            task->id = tick;
+        }
+        bst_step_promise(step, base + AHEAD_TASK, (tick / holds + 1) * holds - (i == 2 ? 7 : 0));
+    }
+    return BST_OK;
+}
+
+static bst_status play(heard *h, int threads, const int64_t fails[4], const fake *ahead,
+                       char message[200]) {
     bst_ctx ctx = {0};
     bst_engine *engine = fake_engine(&ctx, 10);
     static const char *const scopes[] = {"o0/s", "o1/s", "o2/s", "o3/s"};
     static const char *const names[] = {"o0/s/fake", "o1/s/fake", "o2/s/fake", "o3/s/fake"};
     fake sensors[4], *pointers[4], link = {.on_step = quiet_link_step}, *link_pointer = &link;
+    link = ahead ? *ahead : link;
     bst_fleet_member members[4];
     for (int i = 0; i < 4; i++) {
-        sensors[i] = (fake){.on_step = busy_step, .value = i, .value2 = fails[i]};
+        sensors[i] = (fake){
+            .on_step = ahead ? ahead_sensor_step : busy_step, .value = i, .value2 = fails[i]};
         pointers[i] = &sensors[i];
         members[i] = (bst_fleet_member){.scope = scopes[i], .observer = i};
         bst_instance_spec spec = FAKE_SPEC(sensor_module, names[i], pointers[i], 1 + i);
+        spec.desc = ahead ? &ahead_sensor_module : spec.desc;
         spec.scope = scopes[i];
         fake_add(&ctx, engine, spec);
     }
     bst_instance_spec spec = FAKE_SPEC(link_module, "link", link_pointer, 7);
+    spec.desc = ahead ? &ahead_link_module : spec.desc;
     spec.scope = "";
     spec.members = members;
     spec.member_count = 4;
@@ -197,29 +263,42 @@ static bst_status play(heard *h, int threads, const int64_t fails[4], char messa
     return status;
 }
 
+/* Plays with one thread and with several: all is heard alike. */
+static void assert_alike(const int64_t fails[4], const fake *ahead, bst_status expected) {
+    char message[2][200];
+    heard serial = {.text = test_calloc(1, 400000)}, parted = {.text = test_calloc(1, 400000)};
+    assert_int_equal(play(&serial, 1, fails, ahead, message[0]), expected);
+    assert_true(serial.used > 5000);
+    for (int threads = 2; threads <= 5; threads++) {
+        parted.used = 0;
+        assert_int_equal(play(&parted, threads, fails, ahead, message[1]), expected);
+        assert_string_equal(serial.text, parted.text);
+        assert_string_equal(message[0], message[1]);
+    }
+    test_free(serial.text);
+    test_free(parted.text);
+}
+
+static const int64_t never[4] = {-1, -1, -1, -1}, some[4] = {-1, 180, 174, 180};
+
 static void threads_change_nothing_that_is_heard(void **state) {
     (void)state;
-    const int64_t never[4] = {-1, -1, -1, -1}, some[4] = {-1, 180, 174, 180};
-    for (int k = 0; k < 2; k++) {
-        char message[2][200];
-        heard serial = {.text = test_calloc(1, 200000)}, parted = {.text = test_calloc(1, 200000)};
-        const int64_t *fails = k ? some : never;
-        bst_status one = play(&serial, 1, fails, message[0]);
-        assert_int_equal(one, k ? BST_ERR_NUMERIC : BST_OK);
-        assert_true(serial.used > 5000);
-        for (int threads = 2; threads <= 5; threads++) {
-            parted.used = 0;
-            assert_int_equal(play(&parted, threads, fails, message[1]), one);
-            assert_string_equal(serial.text, parted.text);
-            assert_string_equal(message[0], message[1]);
-        }
-        test_free(serial.text);
-        test_free(parted.text);
-    }
+    assert_alike(never, NULL, BST_OK);
+    assert_alike(some, NULL, BST_ERR_NUMERIC);
+}
+
+static void nor_do_sensors_that_go_ahead(void **state) {
+    (void)state;
+    fake link = {.on_step = ahead_link_step, .value = -1};
+    assert_alike(never, &link, BST_OK);
+    assert_alike(some, &link, BST_ERR_NUMERIC);
+    link.value = 91; /* a promise is broken */
+    assert_alike(never, &link, BST_ERR_STATE);
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(every_sensor_has_its_own),
-                                       cmocka_unit_test(threads_change_nothing_that_is_heard)};
+                                       cmocka_unit_test(threads_change_nothing_that_is_heard),
+                                       cmocka_unit_test(nor_do_sensors_that_go_ahead)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
