@@ -107,8 +107,8 @@ void bst_filter_mask(const bst_filter *filter, int y, int x, int count, float sn
 
 /* The greatest output within about half a pixel of (x, y) in between the pixels: for a point
  * by kernels shifted in steps of 1/4 px and a parabola through the best, on signal with the noise
- * at that place; for the streak by a quadratic through the logarithms of 3 x 3 outputs. Not below
- * the output at (x, y). */
+ * at that place; for the streak by a quadratic through the logarithms of 3 x 3 outputs, no further
+ * than these. Not below the output at (x, y). */
 double bst_filter_peak(const bst_filter *filter, const float *signal, double noise_e, bool streak,
                        int x, int y);
 

@@ -4,6 +4,10 @@
 #include "imgproc/filter.h"
 #include "imgproc/lanes.h"
 
+/* A quadratic holds as far as the outputs reach that it was made from. Along a streak noise bends
+ * them little: its top would be pixels away, and higher than any output there. */
+static const double QUADRATIC_REACH_PX = 1.0;
+
 /* Top of the parabola through three values one step apart, the middle one the greatest. */
 static double top(double left, double middle, double right) {
     double bend = left - 2.0 * middle + right;
@@ -12,19 +16,8 @@ static double top(double left, double middle, double right) {
 
 typedef double phase_values[BST_FILTER_PHASES][BST_FILTER_PHASES]; /* by shift in y and x */
 
-/* Sum of a row's pixels times the kernels' rows j: adds to each phase's lanes. */
-BST_CLONES
-static void add_row(const bst_filter *f, const float *row, int j, float *lanes) {
-    int n = 2 * f->radius + 3;
-    for (int p = 0; p < BST_FILTER_PHASES * BST_FILTER_PHASES; p++) {
-        const float *kernel = f->phases + (p * n + j) * f->phase_stride;
-        bst_lanes sum = BST_LOAD(lanes + p * BST_LANES);
-        for (int i = 0; i < f->phase_stride; i += BST_LANES) {
-            sum += BST_LOAD(kernel + i) * BST_LOAD(row + i);
-        }
-        BST_STORE(lanes + p * BST_LANES, sum);
-    }
-}
+#define BST_SIMD_KERNELS "imgproc/filter_peak_kernels.inc"
+#include "sim/core/simd_each.inc"
 
 static void known_values(const bst_filter *f, const float *corner, phase_values value) {
     float lanes[BST_FILTER_PHASES * BST_FILTER_PHASES * BST_LANES] = {0.0f};
@@ -38,7 +31,7 @@ static void known_values(const bst_filter *f, const float *corner, phase_values 
             float pixel = corner[(size_t)j * (size_t)f->width + (size_t)i];
             row[i] = pixel > BST_PIXEL_NONE ? pixel : 0.0f;
         }
-        add_row(f, row, j, lanes);
+        BST_SIMD_PICK(add_row)(f, row, j, lanes);
     }
     for (int p = 0; p < BST_FILTER_PHASES * BST_FILTER_PHASES; p++) {
         value[p / BST_FILTER_PHASES][p % BST_FILTER_PHASES] = bst_lane_sum(lanes + p * BST_LANES);
@@ -124,7 +117,9 @@ static double streak_peak(const bst_filter *f, int x, int y) {
             v[j][i] = log(fmax(s, 0.05 * here));
         }
     }
-    return here * exp(quadratic_top(v, &dx, &dy));
+    double gain = quadratic_top(v, &dx, &dy), off = fmax(fabs(dx), fabs(dy));
+    double share = fmin(1.0, QUADRATIC_REACH_PX / fmax(off, 1e-9)); /* of the way to the top */
+    return here * exp(gain * share * (2.0 - share));
 }
 
 double bst_filter_top(const bst_filter *f, bool point, int x, int y, double *dx, double *dy) {

@@ -70,51 +70,6 @@ static float *render(const bst_fit *fit, const bst_stamp *stamp, const bst_sourc
     return m;
 }
 
-/* fixed += flux (share + widening by_variance) */
-BST_CLONES
-static void add_light(float *restrict fixed, const float *restrict m, int n, float flux,
-                      float widening) {
-    for (int i = 0; i < n; i += BST_LANES) {
-        bst_lanes share = BST_LOAD(m + i) + widening * BST_LOAD(m + 3 * n + i);
-        BST_STORE(fixed + i, BST_LOAD(fixed + i) + flux * share);
-    }
-}
-
-/* value and valid of the stamp's pixels; returns the number of those that count. */
-BST_CLONES
-static int load_pixels(const bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp) {
-    int stride = bst_lanes_up(stamp->width);
-    bst_lanes count = {0};
-    for (int j = 0; j < stamp->height; j++) {
-        const float *row =
-            data->signal + (size_t)(stamp->y0 + j) * (size_t)data->width + (size_t)stamp->x0;
-        float *value = fit->value + j * stride, *valid = fit->valid + j * stride;
-        BST_STORE(value + stride - BST_LANES, (bst_lanes){0} + BST_PIXEL_BAD);
-        memcpy(value, row, (size_t)stamp->width * sizeof *row);
-        for (int i = 0; i < stride; i += BST_LANES) {
-            bst_lanes v = BST_LOAD(value + i);
-            bst_lane_ints use = v > BST_PIXEL_NONE;
-            bst_lanes one = (bst_lanes)((bst_lane_ints)((bst_lanes){0} + 1.0f) & use);
-            BST_STORE(value + i, (bst_lanes)((bst_lane_ints)v & use));
-            BST_STORE(valid + i, one);
-            count += one;
-        }
-    }
-    return (int)bst_lane_sum((const float *)&count);
-}
-
-/* Loads pixels and the fixed sources' light; returns the number of pixels that count. */
-static int load(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
-                const bst_source *const *fixed, int fixed_count) {
-    int n = plane_of(stamp);
-    memset(fit->fixed, 0, (size_t)n * sizeof(float));
-    for (int s = 0; s < fixed_count; s++) {
-        const float *m = render(fit, stamp, fixed[s], 0);
-        add_light(fit->fixed, m, n, (float)fixed[s]->flux_e, (float)fixed[s]->widening_px2);
-    }
-    return load_pixels(fit, data, stamp);
-}
-
 /* What the normal equations are summed from. */
 typedef struct terms {
     const float *value, *fixed, *valid;
@@ -124,58 +79,20 @@ typedef struct terms {
     float noise2;
 } terms;
 
-/* Sums over the pixels: of each row p of the matrix its columns q <= p, then w_p r, and last
- * chi-square. Called with constants, so that sums are registers. */
-static inline __attribute__((always_inline)) void sum_terms(const terms *t, int count,
-                                                            bool free_width, float *out) {
-    int n = t->n, parameters = 3 * count + (free_width ? 1 : 0);
-    int sums = parameters * (parameters + 3) / 2 + 1;
-    bst_lanes sum[MAX_SUMS + 1];
-    for (int k = 0; k < sums; k++) {
-        sum[k] = (bst_lanes){0};
-    }
-    for (int i = 0; i < n; i += BST_LANES) {
-        bst_lanes j[BST_FIT_MAX_PARAMETERS], total = BST_LOAD(t->fixed + i);
-        for (int s = 0; s < count; s++) {
-            const float *m = t->model[s] + i;
-            bst_lanes still = BST_LOAD(m), by_variance = BST_LOAD(m + 3 * n);
-            bst_lanes share = still + t->widening[s] * by_variance;
-            total += t->flux[s] * share;
-            j[3 * s] = t->flux[s] * BST_LOAD(m + n);
-            j[3 * s + 1] = t->flux[s] * BST_LOAD(m + 2 * n);
-            j[3 * s + 2] = s == 0 && free_width ? still : share;
-            if (s == 0 && free_width) {
-                j[3 * count] = by_variance;
-            }
-        }
-        bst_lanes weight = BST_LOAD(t->valid + i) / (t->noise2 + BST_ABOVE_0(total));
-        bst_lanes r = BST_LOAD(t->value + i) - total, wr = weight * r;
-        int k = 0;
-        for (int p = 0; p < parameters; p++) {
-            bst_lanes wj = weight * j[p];
-            for (int q = 0; q <= p; q++) {
-                sum[k++] += wj * j[q];
-            }
-            sum[k++] += wr * j[p];
-        }
-        sum[k] += wr * r;
-    }
-    for (int k = 0; k < sums; k++) {
-        BST_STORE(out + k * BST_LANES, sum[k]);
-    }
-}
+#define BST_SIMD_KERNELS "imgproc/fit_kernels.inc"
+#include "sim/core/simd_each.inc"
 
-BST_CLONES static void sum_point(const terms *t, float *out) {
-    sum_terms(t, 1, false, out);
-}
-BST_CLONES static void sum_wide(const terms *t, float *out) {
-    sum_terms(t, 1, true, out);
-}
-BST_CLONES static void sum_pair(const terms *t, float *out) {
-    sum_terms(t, 2, false, out);
-}
-BST_CLONES static void sum_group(const terms *t, int count, float *out) {
-    sum_terms(t, count, false, out);
+/* Loads pixels and the fixed sources' light; returns the number of pixels that count. */
+static int load(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
+                const bst_source *const *fixed, int fixed_count) {
+    int n = plane_of(stamp);
+    memset(fit->fixed, 0, (size_t)n * sizeof(float));
+    for (int s = 0; s < fixed_count; s++) {
+        const float *m = render(fit, stamp, fixed[s], 0);
+        BST_SIMD_PICK(add_light)
+        (fit->fixed, m, n, (float)fixed[s]->flux_e, (float)fixed[s]->widening_px2);
+    }
+    return BST_SIMD_PICK(load_pixels)(fit, data, stamp);
 }
 
 /* Normal equations at the current sources. Parameters: x, y, flux of each, then the product of flux
@@ -194,15 +111,7 @@ static double accumulate(bst_fit *fit, const bst_fit_data *data, const bst_stamp
         t.widening[s] = (float)free[s]->widening_px2;
     }
     float sums[(MAX_SUMS + 1) * BST_LANES];
-    if (count == 1 && free_width) {
-        sum_wide(&t, sums);
-    } else if (count == 1) {
-        sum_point(&t, sums);
-    } else if (count == 2) {
-        sum_pair(&t, sums);
-    } else {
-        sum_group(&t, count, sums);
-    }
+    BST_SIMD_PICK(sum_terms)(&t, count, free_width, sums);
     const float *at = sums;
     for (int p = 0; p < 3 * count + (free_width ? 1 : 0); p++) {
         for (int q = 0; q <= p; q++, at += BST_LANES) {
@@ -331,46 +240,6 @@ double bst_fit_norm(const bst_fit *fit, const bst_stamp *stamp) {
     return sqrt(sum);
 }
 
-/* Sums of v, v x^2, v x y and v y^2 for v = exp(-(a x^2 + 2 b x y + c y^2) / 2) d, x and y from a
- * place of the stamp, d what the fixed sources leave of the stamp's pixels. */
-BST_CLONES
-static void sum_moments(const bst_fit *fit, const bst_stamp *stamp, const double place[2],
-                        const double window[3], float *out) {
-    int stride = bst_lanes_up(stamp->width);
-    float a = (float)(-0.5 * window[0]), b = (float)-window[1], c = (float)(-0.5 * window[2]);
-    bst_lanes step, sum = {0}, xx = {0}, xy = {0}, yy = {0};
-    for (int i = 0; i < BST_LANES; i++) {
-        step[i] = (float)i;
-    }
-    for (int j = 0; j < stamp->height; j++) {
-        float y = (float)(j - place[1]);
-        for (int i = 0; i < stride; i += BST_LANES) {
-            int k = j * stride + i;
-            bst_lanes x = step + (float)(i - place[0]);
-            bst_lanes q = a * x * x + b * y * x + c * y * y;
-            /* beyond e^-80 nothing counts */
-            q = (bst_lanes)((bst_lane_ints)(q + 80.0f) & (q > -80.0f)) - 80.0f;
-            /* 2^power times the Taylor series of what is left, |r| <= ln 2 */
-            bst_lane_ints power = __builtin_convertvector(q * 1.44269504f, bst_lane_ints);
-            bst_lanes r = q - 0.693147181f * __builtin_convertvector(power, bst_lanes);
-            bst_lanes e = 1.0f / 720.0f + r * (1.0f / 5040.0f);
-            e = 1.0f / 24.0f + r * (1.0f / 120.0f + r * e);
-            e = 1.0f + r * (1.0f + r * (0.5f + r * (1.0f / 6.0f + r * e)));
-            e = (bst_lanes)((bst_lane_ints)e + power * (1 << 23));
-            bst_lanes v = e * BST_LOAD(fit->valid + k) *
-                          (BST_LOAD(fit->value + k) - BST_LOAD(fit->fixed + k));
-            sum += v;
-            xx += v * x * x;
-            xy += v * x * y;
-            yy += v * y * y;
-        }
-    }
-    BST_STORE(out, sum);
-    BST_STORE(out + BST_LANES, xx);
-    BST_STORE(out + 2 * BST_LANES, xy);
-    BST_STORE(out + 3 * BST_LANES, yy);
-}
-
 bool bst_fit_moments(bst_fit *fit, const bst_fit_data *data, const bst_stamp *stamp,
                      const bst_source *source, const bst_source *const *fixed, int fixed_count,
                      double out[3]) {
@@ -386,8 +255,9 @@ bool bst_fit_moments(bst_fit *fit, const bst_fit_data *data, const bst_stamp *st
     double det = wxx * wyy - wxy * wxy;
     double ixx = wyy / det, iyy = wxx / det, ixy = -wxy / det;
     float sums[4 * BST_LANES];
-    sum_moments(fit, stamp, (const double[2]){s->x_px - stamp->x0, s->y_px - stamp->y0},
-                (const double[3]){ixx, ixy, iyy}, sums);
+    BST_SIMD_PICK(sum_moments)
+    (fit, stamp, (const double[2]){s->x_px - stamp->x0, s->y_px - stamp->y0},
+     (const double[3]){ixx, ixy, iyy}, sums);
     double sum = bst_lane_sum(sums), mxx = bst_lane_sum(sums + BST_LANES);
     double mxy = bst_lane_sum(sums + 2 * BST_LANES), myy = bst_lane_sum(sums + 3 * BST_LANES);
     if (!(sum > 0.0)) {

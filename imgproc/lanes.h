@@ -1,9 +1,8 @@
-/* Sixteen floats at a time, in functions that are compiled for several instruction sets, of which
- * the loader picks one. Contraction is off for the whole project, so that all round alike. */
+/* How image processing lays out and sums floats for vectors, and functions that the compiler makes
+ * vectors of for several instruction sets, of which the loader picks one. Those written as vectors:
+ * the files *_kernels.inc, see sim/core/simd.h. */
 #ifndef BST_IMGPROC_LANES_H
 #define BST_IMGPROC_LANES_H
-
-#include <stdint.h>
 
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
     !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
@@ -18,18 +17,9 @@
 #define BST_CLONES_16
 #endif
 
+/* Rows are padded to this many floats, and sums over pixels made of as many, one for each place in
+ * a group of them: the widest vectors have as many. */
 enum { BST_LANES = 16 };
-
-typedef float bst_lanes __attribute__((vector_size(BST_LANES * sizeof(float))));
-typedef int32_t bst_lane_ints __attribute__((vector_size(BST_LANES * sizeof(int32_t))));
-/* the same wherever floats lie */
-typedef float bst_lanes_at
-    __attribute__((vector_size(BST_LANES * sizeof(float)), aligned(sizeof(float)), may_alias));
-
-#define BST_LOAD(p) (*(const bst_lanes_at *)(p))
-#define BST_STORE(p, v) (*(bst_lanes_at *)(p) = (v))
-/* the greater of v and 0 */
-#define BST_ABOVE_0(v) ((bst_lanes)((bst_lane_ints)(v) & ((v) > 0.0f)))
 
 /* A number of floats rounded up to whole lanes. */
 static inline int bst_lanes_up(int count) {

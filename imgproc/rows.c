@@ -139,20 +139,6 @@ static uint16_t greatest(const uint16_t *raw, int count) {
     return top;
 }
 
-/* Lanes to memory that lies on 16 bytes, past the caches: it is not read first, as it is when a
- * part of a line is written. */
-static inline __attribute__((always_inline)) void stream(float *to, const bst_lanes *v) {
-#ifdef __SSE__
-    __m128 part[BST_LANES / 4];
-    memcpy(part, v, sizeof part);
-    for (int k = 0; k < BST_LANES / 4; k++) {
-        _mm_stream_ps(to + 4 * k, part[k]);
-    }
-#else
-    BST_STORE(to, *v);
-#endif
-}
-
 /* Makes what was streamed visible to other threads. */
 static inline void end_stream(void) {
 #ifdef __SSE__
@@ -164,41 +150,8 @@ static bool may_stream(const float *to) {
     return (uintptr_t)to % 16 == 0;
 }
 
-BST_CLONES
-static void take_level_off(const float *electrons, const bst_row_part *parts, int count,
-                           bool past_cache, float *signal, float *normalised) {
-    int x = 0;
-    bst_lanes column;
-    for (int i = 0; i < BST_LANES; i++) {
-        column[i] = (float)i;
-    }
-    for (int i = 0; i < count; i++) {
-        bst_row_part p = parts[i];
-        for (; x + BST_LANES <= p.end; x += BST_LANES) {
-            bst_lanes value = BST_LOAD(electrons + x), at = column + (float)x;
-            bst_lanes difference = value - (p.level + p.level_slope * at);
-            bst_lanes n = difference * (p.inverse + p.inverse_slope * at);
-            bst_lane_ints good = value > BST_PIXEL_NONE;
-            bst_lanes bad = {0};
-            bad += BST_PIXEL_BAD;
-            BST_STORE(normalised + x, (bst_lanes)((bst_lane_ints)n & good));
-            bst_lanes kept =
-                (bst_lanes)(((bst_lane_ints)difference & good) | ((bst_lane_ints)bad & ~good));
-            if (past_cache) {
-                stream(signal + x, &kept);
-            } else {
-                BST_STORE(signal + x, kept);
-            }
-        }
-        for (; x < p.end; x++) {
-            float value = electrons[x], at = (float)x;
-            float difference = value - (p.level + p.level_slope * at);
-            float n = difference * (p.inverse + p.inverse_slope * at);
-            normalised[x] = value > BST_PIXEL_NONE ? n : 0.0f;
-            signal[x] = value > BST_PIXEL_NONE ? difference : BST_PIXEL_BAD;
-        }
-    }
-}
+#define BST_SIMD_KERNELS "imgproc/rows_kernels.inc"
+#include "sim/core/simd_each.inc"
 
 void bst_row_normalise(const uint16_t *raw, const float *electrons, const bst_row_part *parts,
                        int count, int saturated_dn, bool past_cache, float *signal,
@@ -209,7 +162,7 @@ void bst_row_normalise(const uint16_t *raw, const float *electrons, const bst_ro
     for (int i = 0; i + 1 < count; i++) {
         stream_it = stream_it && parts[i].end % 4 == 0;
     }
-    take_level_off(electrons, parts, count, stream_it, signal, normalised);
+    BST_SIMD_PICK(take_level_off)(electrons, parts, count, stream_it, signal, normalised);
     if (stream_it) {
         end_stream();
     }
@@ -248,27 +201,9 @@ void bst_row_even(float *restrict out, int count, const float *const *in, const 
     }
 }
 
-BST_CLONES
 void bst_row_even_4(float *out, size_t stride, int count, const float *const *in,
                     const float *weight, int radius) {
-    int x = 0;
-    float w0 = weight[0], w1 = weight[1], w2 = radius > 1 ? weight[2] : 0.0f,
-          w3 = radius > 2 ? weight[3] : 0.0f;
-    /* a row that is read serves all four */
-    for (; radius == 3 && x + BST_LANES <= count; x += BST_LANES) {
-        bst_lanes a = BST_LOAD(in[-3] + x), b = BST_LOAD(in[-2] + x), c = BST_LOAD(in[-1] + x);
-        bst_lanes d = BST_LOAD(in[0] + x), e = BST_LOAD(in[1] + x), f = BST_LOAD(in[2] + x);
-        bst_lanes g = BST_LOAD(in[3] + x), h = BST_LOAD(in[4] + x), i = BST_LOAD(in[5] + x);
-        bst_lanes j = BST_LOAD(in[6] + x);
-        float *to = out + x;
-        for (int k = 4; k < 8; k++) {
-            __builtin_prefetch(to + (size_t)k * stride, 1); /* of the next four */
-        }
-        BST_STORE(to, (w0 * d + w1 * (c + e)) + (w2 * (b + f) + w3 * (a + g)));
-        BST_STORE(to + stride, (w0 * e + w1 * (d + f)) + (w2 * (c + g) + w3 * (b + h)));
-        BST_STORE(to + 2 * stride, (w0 * f + w1 * (e + g)) + (w2 * (d + h) + w3 * (c + i)));
-        BST_STORE(to + 3 * stride, (w0 * g + w1 * (f + h)) + (w2 * (e + i) + w3 * (d + j)));
-    }
+    int x = radius == 3 ? BST_SIMD_PICK(even_4)(out, stride, count, in, weight) : 0;
     for (int k = 0; k < 4 && x < count; k++) {
         const float *row[2 * MAX_RADIUS + 1];
         for (int t = -radius; t <= radius; t++) {
@@ -332,38 +267,10 @@ void bst_row_combine(float *restrict out, int count, const float *const *in, con
     }
 }
 
-BST_CLONES
 void bst_row_streak(float *out, float *copy, int count, const float *const *in, const float *weight,
                     int taps, const float *floor) {
-    enum { STEP = 4 * BST_LANES };
-    int x = 0;
     bool streamed = copy && may_stream(copy);
-    for (; x + STEP <= count; x += STEP) {
-        bst_lanes a = {0}, b = {0}, c = {0}, d = {0};
-        for (int t = 0; t < taps; t++) {
-            const float *row = in[t] + x;
-            float w = weight[t];
-            a += w * BST_LOAD(row);
-            b += w * BST_LOAD(row + BST_LANES);
-            c += w * BST_LOAD(row + 2 * BST_LANES);
-            d += w * BST_LOAD(row + 3 * BST_LANES);
-        }
-        const float *least = floor + x;
-        a = BST_LOAD(least) + BST_ABOVE_0(a - BST_LOAD(least));
-        b = BST_LOAD(least + BST_LANES) + BST_ABOVE_0(b - BST_LOAD(least + BST_LANES));
-        c = BST_LOAD(least + 2 * BST_LANES) + BST_ABOVE_0(c - BST_LOAD(least + 2 * BST_LANES));
-        d = BST_LOAD(least + 3 * BST_LANES) + BST_ABOVE_0(d - BST_LOAD(least + 3 * BST_LANES));
-        BST_STORE(out + x, a);
-        BST_STORE(out + x + BST_LANES, b);
-        BST_STORE(out + x + 2 * BST_LANES, c);
-        BST_STORE(out + x + 3 * BST_LANES, d);
-        if (streamed) {
-            stream(copy + x, &a);
-            stream(copy + x + BST_LANES, &b);
-            stream(copy + x + 2 * BST_LANES, &c);
-            stream(copy + x + 3 * BST_LANES, &d);
-        }
-    }
+    int x = BST_SIMD_PICK(streak)(out, streamed ? copy : NULL, count, in, weight, taps, floor);
     if (streamed) {
         end_stream();
     }

@@ -136,39 +136,8 @@ static bool solve(int n, double a[LOCAL][LOCAL], int count, double x[][LOCAL]) {
 
 enum { ALL = LOCAL + COMMON, SUMS = ALL * (ALL + 3) / 2 };
 
-/* Sums over the pixels of a star's planes: of each parameter p those with q <= p, then that with
- * the residual. Parameters: x, y, flux, flux times widening, then the motion's. */
-BST_CLONES
-static void sum_star(const float *planes, int n, float flux, float product, float noise2,
-                     float *out) {
-    bst_lanes sum[SUMS];
-    for (int k = 0; k < SUMS; k++) {
-        sum[k] = (bst_lanes){0};
-    }
-    for (int i = 0; i < n; i += BST_LANES) {
-        const float *m = planes + i;
-        bst_lanes j[ALL] = {flux * BST_LOAD(m + n), flux * BST_LOAD(m + 2 * n), BST_LOAD(m),
-                            BST_LOAD(m + 3 * n)};
-        for (int k = 0; k < COMMON; k++) {
-            j[LOCAL + k] = flux * BST_LOAD(m + (LOCAL + k) * n);
-        }
-        bst_lanes total = flux * j[2] + product * j[3];
-        bst_lanes valid = BST_LOAD(m + (BST_IMAGE_MOTION_PLANES + 1) * n);
-        bst_lanes weight = valid / (noise2 + BST_ABOVE_0(total));
-        bst_lanes r = BST_LOAD(m + BST_IMAGE_MOTION_PLANES * n) - total;
-        int k = 0;
-        for (int p = 0; p < ALL; p++) {
-            bst_lanes w = weight * j[p];
-            for (int q = 0; q <= p; q++) {
-                sum[k++] += w * j[q];
-            }
-            sum[k++] += w * r;
-        }
-    }
-    for (int k = 0; k < SUMS; k++) {
-        BST_STORE(out + k * BST_LANES, sum[k]);
-    }
-}
+#define BST_SIMD_KERNELS "imgproc/streak_motion_kernels.inc"
+#include "sim/core/simd_each.inc"
 
 /* The star's pixels, all of which measure, and behind them 1 for each. */
 static void load_pixels(const bst_locate_frame *f, const bst_stamp *stamp, float *value) {
@@ -196,8 +165,9 @@ static bool accumulate(const bst_streak_motion *work, const bst_gauss *psf,
     memcpy(work->planes + BST_IMAGE_MOTION_PLANES * n, s->pixels,
            2 * (size_t)n * sizeof *s->pixels);
     float sums[SUMS * BST_LANES];
-    sum_star(work->planes, n, (float)s->flux_e, (float)s->product_e,
-             (float)(s->noise_e * s->noise_e), sums);
+    BST_SIMD_PICK(sum_star)
+    (work->planes, n, (float)s->flux_e, (float)s->product_e, (float)(s->noise_e * s->noise_e),
+     sums);
     double a[LOCAL][LOCAL] = {{0}}, right[1 + COMMON][LOCAL] = {{0}};
     double common[COMMON][COMMON] = {{0}}, g[COMMON] = {0};
     const float *at = sums;

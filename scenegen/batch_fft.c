@@ -22,81 +22,6 @@ struct bst_batch_fft {
 
 /* ------------------------------------------------------------------ passes */
 
-BST_LANES_INLINE void sum_and_difference(bst_batch *a, bst_batch *b) {
-    bst_batch s = {a->re + b->re, a->im + b->im};
-    b->re = a->re - b->re;
-    b->im = a->im - b->im;
-    *a = s;
-}
-
-/* times -i */
-BST_LANES_INLINE void quarter_turn(bst_batch *a) {
-    bst_lanes re = a->im;
-    a->im = -a->re;
-    a->re = re;
-}
-
-BST_LANES_INLINE void turn(bst_batch *a, const float *w) {
-    bst_lanes re = a->re * w[0] - a->im * w[1];
-    a->im = a->re * w[1] + a->im * w[0];
-    a->re = re;
-}
-
-/* Transforms of r elements in place; frequency k ends at the place that `places` gives. */
-BST_LANES_INLINE void butterfly2(bst_batch *a) {
-    sum_and_difference(&a[0], &a[1]);
-}
-
-BST_LANES_INLINE void butterfly3(bst_batch *a) {
-    const float s = 0.86602540378443865f; /* sin(pi / 3) */
-    bst_batch sum = {a[1].re + a[2].re, a[1].im + a[2].im};
-    bst_batch side = {s * (a[1].im - a[2].im), s * (a[2].re - a[1].re)};
-    bst_batch base = {a[0].re - 0.5f * sum.re, a[0].im - 0.5f * sum.im};
-    a[0].re += sum.re;
-    a[0].im += sum.im;
-    a[1] = (bst_batch){base.re + side.re, base.im + side.im};
-    a[2] = (bst_batch){base.re - side.re, base.im - side.im};
-}
-
-BST_LANES_INLINE void butterfly4(bst_batch *a) {
-    sum_and_difference(&a[0], &a[2]);
-    sum_and_difference(&a[1], &a[3]);
-    quarter_turn(&a[3]);
-    sum_and_difference(&a[0], &a[1]);
-    sum_and_difference(&a[2], &a[3]);
-}
-
-BST_LANES_INLINE void butterfly5(bst_batch *a) {
-    /* cos and sin of 2 pi / 5 and 4 pi / 5 */
-    const float c1 = 0.30901699437494742f, c2 = -0.80901699437494742f;
-    const float s1 = 0.95105651629515357f, s2 = 0.58778525229247313f;
-    bst_batch p = a[1], q = a[2], u = a[4], v = a[3];
-    sum_and_difference(&p, &u);
-    sum_and_difference(&q, &v);
-    bst_batch x = {a[0].re + c1 * p.re + c2 * q.re, a[0].im + c1 * p.im + c2 * q.im};
-    bst_batch y = {a[0].re + c2 * p.re + c1 * q.re, a[0].im + c2 * p.im + c1 * q.im};
-    bst_batch g = {s1 * u.im + s2 * v.im, -s1 * u.re - s2 * v.re};
-    bst_batch h = {s2 * u.im - s1 * v.im, s1 * v.re - s2 * u.re};
-    a[0].re += p.re + q.re;
-    a[0].im += p.im + q.im;
-    a[1] = (bst_batch){x.re + g.re, x.im + g.im};
-    a[4] = (bst_batch){x.re - g.re, x.im - g.im};
-    a[2] = (bst_batch){y.re + h.re, y.im + h.im};
-    a[3] = (bst_batch){y.re - h.re, y.im - h.im};
-}
-
-BST_LANES_INLINE void butterfly8(bst_batch *a) {
-    const float h = 0.70710678118654752f;
-    for (int i = 0; i < 4; i++) {
-        sum_and_difference(&a[i], &a[i + 4]);
-    }
-    a[5] = (bst_batch){h * (a[5].re + a[5].im), h * (a[5].im - a[5].re)};
-    quarter_turn(&a[6]);
-    a[7] = (bst_batch){h * (a[7].im - a[7].re), -h * (a[7].re + a[7].im)};
-    butterfly4(a);
-    butterfly4(a + 4);
-}
-
 /* Where the butterflies leave frequency k. */
 static const signed char places[MOST_RADIX + 1][MOST_RADIX] = {[2] = {0, 1},
                                                                [3] = {0, 1, 2},
@@ -104,65 +29,11 @@ static const signed char places[MOST_RADIX + 1][MOST_RADIX] = {[2] = {0, 1},
                                                                [5] = {0, 1, 2, 3, 4},
                                                                [8] = {0, 4, 2, 6, 1, 5, 3, 7}};
 
-/* The blocks of a pass, with a constant radix and knowledge of whether there are turns. */
-#define PASS_BODY(radix, butterfly)                                        \
-    for (bst_batch *x = data, *end = data + count; x < end;) {             \
-        for (int j = 0; j < p->step; j++, x++) {                           \
-            bst_batch a[radix];                                            \
-            for (int k = 0; k < radix; k++) {                              \
-                a[k] = x[k * p->step];                                     \
-            }                                                              \
-            butterfly(a);                                                  \
-            if (p->twiddle) {                                              \
-                const float *w = p->twiddle + 2 * (radix - 1) * (size_t)j; \
-                for (int k = 1; k < radix; k++) {                          \
-                    turn(&a[k], w + 2 * (k - 1));                          \
-                }                                                          \
-            }                                                              \
-            for (int k = 0; k < radix; k++) {                              \
-                x[k * p->step] = a[k];                                     \
-            }                                                              \
-        }                                                                  \
-        x += (radix - 1) * p->step;                                        \
-    }
-
-BST_LANES_FUNCTION
-static void pass2(const fft_pass *p, bst_batch *data, int count){PASS_BODY(2, butterfly2)}
-
-BST_LANES_FUNCTION
-    static void pass3(const fft_pass *p, bst_batch *data, int count){PASS_BODY(3, butterfly3)}
-
-BST_LANES_FUNCTION
-    static void pass4(const fft_pass *p, bst_batch *data, int count){PASS_BODY(4, butterfly4)}
-
-BST_LANES_FUNCTION
-    static void pass5(const fft_pass *p, bst_batch *data, int count){PASS_BODY(5, butterfly5)}
-
-BST_LANES_FUNCTION static void pass8(const fft_pass *p, bst_batch *data, int count) {
-    PASS_BODY(8, butterfly8)
-}
-
-static void run_pass(const fft_pass *p, bst_batch *data, int count) {
-    switch (p->radix) {
-        case 2:
-            pass2(p, data, count);
-            break;
-        case 3:
-            pass3(p, data, count);
-            break;
-        case 4:
-            pass4(p, data, count);
-            break;
-        case 5:
-            pass5(p, data, count);
-            break;
-        default:
-            pass8(p, data, count);
-            break;
-    }
-}
+#define BST_SIMD_KERNELS "scenegen/batch_fft_kernels.inc"
+#include "sim/core/simd_each.inc"
 
 void bst_batch_fft_run(const bst_batch_fft *f, bst_batch *data) {
+    void (*run_pass)(const fft_pass *, bst_batch *, int) = BST_SIMD_PICK(run_pass);
     /* after the first pass its blocks are transforms of their own, each in a core's cache */
     run_pass(&f->pass[0], data, f->n);
     int step = f->pass[0].step;

@@ -2,17 +2,19 @@
  *
  * The result of sequence l is X_l[k] = sum over j of x_l[j] exp(-2 pi i j k / n). It is left in the
  * order of decimation in frequency, which costs a reader that knows the order nothing. With real
- * and imaginary parts swapped before and after, the same gives the inverse, times n. Instruction
- * sets are chosen by the loader; the numbers are the same with each. */
+ * and imaginary parts swapped before and after, the same gives the inverse, times n. The numbers
+ * are the same with vectors of every width. */
 #ifndef BST_SCENEGEN_BATCH_FFT_H
 #define BST_SCENEGEN_BATCH_FFT_H
 
-#include "scenegen/lanes.h"
 #include "sim/core/status.h"
+
+enum { BST_LANES = 16 };
 
 /* One number of sixteen sequences. */
 typedef struct bst_batch {
-    bst_lanes re, im;
+    _Alignas(64) float re[BST_LANES];
+    float im[BST_LANES];
 } bst_batch;
 
 typedef struct bst_batch_fft bst_batch_fft;

@@ -148,7 +148,7 @@ double bst_light_fft_cell_place(const bst_light_fft *f, const bst_light_axis *ax
 static bst_status make_shares(bst_ctx *ctx, bst_light_fft *f) {
     int blocks = (f->shape.width + BLOCK - 1) / BLOCK;
     size_t wings = (size_t)BLOCK * (size_t)(f->cells_x + SHARES);
-    f->shares = aligned_alloc(sizeof(bst_lanes), (size_t)blocks * sizeof *f->shares);
+    f->shares = malloc((size_t)blocks * sizeof *f->shares);
     bool ok = f->shares;
     for (int i = 0; ok && i < f->bench_count; i++) {
         f->benches[i].wings = calloc(wings, sizeof(float));

@@ -8,7 +8,7 @@
 #include "scenegen/light_fft.h"
 #include "scenegen/light_wrap.h"
 
-/* Rows and columns are worked on in blocks of as many as a vector has lanes. */
+/* Rows and columns are worked on in blocks of as many as a batch has sequences. */
 enum { BLOCK = BST_LANES };
 
 /* A block of columns of the grid's spectrum, in frequencies k0 to k0 + 15 per period, which may be
@@ -27,7 +27,7 @@ typedef struct strip {
 enum { SHARES = 5 };
 typedef struct cell_shares {
     int cell;
-    bst_lanes share[SHARES];
+    float share[SHARES][BLOCK];
 } cell_shares;
 
 /* Working memory of one part; as many as there are threads. */

@@ -370,6 +370,13 @@ static void keep_program(bst_device *device, const bst_kernel_source *const *sou
     device->program_count++;
 }
 
+/* Clang tells, on the standard error and several hundred times, of each vector of 512 bits that a
+ * processor without registers for it passes to a function; all of a program are compiled alike. */
+static const char no_abi_warnings[] =
+    "#ifdef __clang__\n"
+    "#pragma clang diagnostic ignored \"-Wpsabi\"\n"
+    "#endif\n";
+
 bst_status bst_device_build(bst_ctx *ctx, bst_device *device,
                             const bst_kernel_source *const *sources, int count, const char *options,
                             cl_program *out) {
@@ -382,7 +389,7 @@ bst_status bst_device_build(bst_ctx *ctx, bst_device *device,
         return BST_OK;
     }
     /* a #line before each text, so that the log names the file */
-    const char **texts = calloc((size_t)count * 2, sizeof *texts);
+    const char **texts = calloc((size_t)count * 2 + 1, sizeof *texts);
     char(*lines)[NAME_BYTES] = calloc((size_t)count, sizeof *lines);
     cl_program program = NULL;
     bst_status status = BST_OK;
@@ -390,13 +397,15 @@ bst_status bst_device_build(bst_ctx *ctx, bst_device *device,
         status = bst_fail(ctx, BST_ERR_MEMORY, "no memory for the kernel sources");
         goto exit;
     }
+    texts[0] = no_abi_warnings;
     for (int i = 0; i < count; i++) {
         snprintf(lines[i], sizeof lines[i], "\n#line 1 \"%s\"\n", sources[i]->name);
-        texts[2 * i] = lines[i];
-        texts[2 * i + 1] = sources[i]->text;
+        texts[2 * i + 1] = lines[i];
+        texts[2 * i + 2] = sources[i]->text;
     }
     cl_int code;
-    program = clCreateProgramWithSource(device->context, (cl_uint)count * 2, texts, NULL, &code);
+    program =
+        clCreateProgramWithSource(device->context, (cl_uint)count * 2 + 1, texts, NULL, &code);
     if ((status = bst_device_check(ctx, code, "creating an OpenCL program")) != BST_OK) {
         goto exit;
     }

@@ -226,6 +226,8 @@ class Acquisition(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         play.folder = runs.scratch()
+        if options.full and not options.catalogue:
+            runs.need_full_catalogue()
         cls.cases = options.cases.split(",")
         jobs = []
         for case in cls.cases:

@@ -38,6 +38,8 @@ def play(out, duration_s):
 class DayOfModes(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
+        if FULL:
+            runs.need_full_catalogue()
         folder = runs.scratch()
         cls.first = play(os.path.join(folder, "first"), LENGTH_S / 2)
         cls.out = os.path.join(folder, "whole")

@@ -6,6 +6,7 @@
 
 #include "imgproc/image.h"
 #include "imgproc/low_rank.h"
+#include "sim/core/simd.h"
 #include "sim/world/psf_image.h"
 #include "tests/imgproc/synthetic.h"
 #include "tests/test_support.h"
@@ -272,5 +273,10 @@ int main(void) {
         cmocka_unit_test(images_are_those_of_the_place_in_the_field),
         cmocka_unit_test(places_and_light_are_right),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    int failed = 0;
+    for (int width = 4; width <= 16; width *= 2) { /* of vectors, where the processor has them */
+        bst_simd_limit(width);
+        failed += cmocka_run_group_tests(tests, NULL, NULL);
+    }
+    return failed;
 }
