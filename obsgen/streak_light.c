@@ -1,6 +1,5 @@
 #include "obsgen/streak_light.h"
 
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -16,57 +15,6 @@ enum {
     /* values of a band: it stays in fast memory while all runs pass */
     BAND_VALUES = 49152
 };
-
-/* Wider vectors where the processor has them; what comes out is the same. */
-#if defined(__x86_64__) && defined(__linux__)
-#define LANES_FUNCTION __attribute__((target_clones("default", "avx2", "avx512f")))
-#else
-#define LANES_FUNCTION
-#endif
-
-/* 2^n times the series of 2^f, |f| <= 1/2; x from -80 on. */
-static inline float exponential(float x) {
-    float y = x * 1.442695041f;
-    int32_t n = (int32_t)(y - 0.5f);
-    float f = (y - (float)n) * 0.6931471806f;
-    float e = 1.0f + f * (1.0f / 7.0f);
-    e = 1.0f + f * (1.0f / 6.0f) * e;
-    e = 1.0f + f * (1.0f / 5.0f) * e;
-    e = 1.0f + f * (1.0f / 4.0f) * e;
-    e = 1.0f + f * (1.0f / 3.0f) * e;
-    e = 1.0f + f * (1.0f / 2.0f) * e;
-    e = 1.0f + f * e;
-    union {
-        uint32_t bits;
-        float value;
-    } power = {.bits = (uint32_t)(n + 127) << 23};
-    return e * power.value;
-}
-
-/* Adds the light of a place times `rows` to `sum`. */
-static inline void add_light(const bst_streak_place *p, const float rows[LANES], float sum[LANES]) {
-    const float off = p->off + (float)LIGHT_ROWS, fall = -p->fall, height = p->height;
-    float x[LANES]; /* in loops of its own, so that all lanes are done at once */
-    for (int r = 0; r < LANES; r++) {
-        float d = (float)r - off;
-        x[r] = fall * d * d;
-    }
-    for (int r = 0; r < LANES; r++) {
-        x[r] = x[r] > -80.0f ? x[r] : -80.0f;
-    }
-    for (int r = 0; r < LANES; r++) {
-        sum[r] += rows[r] * (exponential(x[r]) * height);
-    }
-}
-
-LANES_FUNCTION void bst_streak_light_of(const bst_streak_place *place, float light[LANES]) {
-    float all[LANES];
-    for (int r = 0; r < LANES; r++) {
-        all[r] = 1.0f;
-        light[r] = 0.0f;
-    }
-    add_light(place, all, light);
-}
 
 /* ---- runs ---- */
 
@@ -152,22 +100,11 @@ static void on_band(const bst_streak_light *l, const bst_streak_run *run, const 
     *to = high < run->count ? high : run->count;
 }
 
-LANES_FUNCTION static void lay_run(const band *b, const bst_streak_place *places, int count) {
-    float rows[LANES]; /* 1 where light is laid */
-    for (int r = 0; r < LANES; r++) {
-        rows[r] = r < LIGHT_WIDE ? 1.0f : 0.0f;
-    }
-    for (int k = 0; k < count; k++) {
-        const bst_streak_place *p = &places[k];
-        if (p->middle < -LIGHT_ROWS || p->middle >= b->places + LIGHT_ROWS) {
-            continue;
-        }
-        float sum[LANES];
-        float *to = b->values + (p->at - b->first) * b->stride + p->middle - LIGHT_ROWS + MARGIN;
-        memcpy(sum, to, sizeof sum);
-        add_light(p, rows, sum);
-        memcpy(to, sum, sizeof sum);
-    }
+#define BST_SIMD_KERNELS "obsgen/streak_light_kernels.inc"
+#include "sim/core/simd_each.inc"
+
+void bst_streak_light_of(const bst_streak_place *place, float light[LANES]) {
+    BST_SIMD_PICK(light_of)(place, light);
 }
 
 /* Of a run along the lines that most ways cross. */
@@ -257,7 +194,7 @@ bst_status bst_streak_light_add_up(bst_ctx *ctx, bst_streak_light *l) {
             int from, to;
             if (run->lit && run->by_row == l->by_row) {
                 on_band(l, run, &b, &from, &to);
-                lay_run(&b, &l->places[run->first + (size_t)from], to - from);
+                BST_SIMD_PICK(lay_run)(&b, &l->places[run->first + (size_t)from], to - from);
             } else if (run->lit) {
                 lay_other(&b, &l->places[run->first], run->count);
             }
