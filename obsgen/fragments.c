@@ -8,6 +8,7 @@
 #include "obsgen/local_sky.h"
 #include "obsgen/streak_light.h"
 #include "obsgen/streak_noise.h"
+#include "obsgen/streak_ways.h"
 #include "sim/core/pages.h"
 #include "sim/core/vec.h"
 
@@ -21,18 +22,15 @@ static const double LEAST_LIGHT = 0.25, LEAST_SEEN = 0.25;
 static const double OWN_SHARE = 0.3;
 /* Draws of faint streaks; those of other clutter stay below. */
 static const uint64_t FAINT_STREAK = (uint64_t)1 << 59;
-/* A source whose path differs more from the stars' has a way of its own. */
-static const double OWN_WAY_PX = 1.0;
 
 enum {
     ROWS = BST_STREAK_ROWS,
     WIDE = BST_STREAK_WIDE,
     SPARSE = BST_STREAK_SPARSE,
-    BLOCK = 64, /* nodes of a way that are looked at together */
-    BLOCKS = BST_ROUTE_NODES / BLOCK,
     /* of the tables below: outputs in steps of 1/8 from 1, lights in steps of 1/8 */
     OUTPUTS = 64,
     LIGHTS = 48,
+    FLANK = 8, /* half pixels */
     SKY_STEP = 8 /* of so many places of a run one stands for their light in the background */
 };
 
@@ -44,26 +42,13 @@ typedef struct maximum {
     float value;
 } maximum;
 
-/* A way, its parts that run more along one axis and one way each, and where it goes. */
-typedef struct whole_way {
-    const bst_route_node *nodes;
-    int count, parts;
-    int first[BST_ROUTE_NODES + 1]; /* of a part; the last of it is the first of the next */
-    bool by_row[BST_ROUTE_NODES];
-    double box[BLOCKS][4]; /* least and greatest x, least and greatest y of a block and one more */
-} whole_way;
-
-/* Place of a source's way relative to another: moved, and turned by this much from end to end. */
-typedef struct shift {
-    double x, y, dx, dy;
-} shift;
-
 struct generator_streaks {
     section sections[BST_ROUTE_NODES];
     bst_streak_light light;
-    whole_way stars, own;
+    bst_streak_ways ways;
     bst_streak_noise noise;
     bst_local_sky sky;
+    double norm, taken; /* of the filter for points; from its output on average, see below */
     double shot; /* variance that an output of one adds, by the photons' own noise */
     double log_maxima[OUTPUTS], maxima_sigma; /* logarithm of maxima per pixel above an output */
     double alarms[LIGHTS]; /* more of them than noise alone makes, per pixel of the way */
@@ -191,109 +176,22 @@ static void report(bst_generator *g) {
     }
 }
 
-/* A node of a way where a source's goes. */
-static bst_route_node moved(const bst_route_node *n, const shift *by) {
-    double u = n->time - 0.5;
-    return (bst_route_node){n->x + by->x + u * by->dx, n->y + by->y + u * by->dy, n->time,
-                            n->light};
-}
-
-/* Beyond the frame a way is followed as far as noise is filtered. */
-static int beyond(const bst_generator *g) {
-    return g->streaks->noise.reach + 1;
-}
-
-/* Makes runs of nodes first to last of a part of a way; step: of the places along it. */
-static bst_status make_runs(bst_ctx *ctx, bst_generator *g, int source, const bst_route_node *nodes,
-                            int first, int last, const shift *by, bool by_row, int step) {
-    bst_streak_light *l = &g->streaks->light;
-    double amplitude = g->sources[source].amplitude;
-    double fall = 0.25 / (g->total_sigma * g->total_sigma);
-    double dense = OWN_SHARE * (g->threshold - FAINTEST_SIGMA);
-    int outside = beyond(g), wide = by_row ? g->height : g->width,
-        high = by_row ? g->width : g->height;
-    bst_route_node n = moved(&nodes[first], by);
-    double at = by_row ? n.y : n.x, way = step;
-    at = step > 0 ? ceil(at) : floor(at);
-    bool begun = false;
-    for (int k = first; k < last; k++) {
-        bst_route_node m = moved(&nodes[k + 1], by);
-        double a = by_row ? n.y : n.x, run = (by_row ? m.y : m.x) - a;
-        if (way * (a + run - at) > 0.0) {
-            double across = by_row ? n.x : n.y, rise = by_row ? m.x - n.x : m.y - n.y;
-            /* distances across the way, not across the axis */
-            double slant = run * run / (run * run + rise * rise), slope = rise / run;
-            double more = (m.light - n.light) / run;
-            for (; way * (a + run - at) > 0.0; at += way) {
-                double part = way * (at - a) > 0.0 ? at - a : 0.0, c = across + part * slope;
-                bool near = at >= -outside && at <= wide + outside && c > -(outside + ROWS) &&
-                            c < high + outside + ROWS;
-                if (begun && !near) {
-                    BST_TRY(bst_streak_light_end(ctx, l, LEAST_SEEN, LEAST_LIGHT, dense));
-                } else if (near && !begun) {
-                    BST_TRY(bst_streak_light_run(ctx, l, source, by_row, step));
-                }
-                begun = near;
-                if (near) {
-                    bst_streak_place p = {.at = (int)at, .middle = (int)floor(c + 0.5)};
-                    p.height = (float)(amplitude * (n.light + part * more));
-                    p.off = (float)(c - p.middle);
-                    p.fall = (float)(fall * slant);
-                    BST_TRY(bst_streak_light_place(ctx, l, &p));
-                }
-            }
-        }
-        n = m;
-    }
-    return begun ? bst_streak_light_end(ctx, l, LEAST_SEEN, LEAST_LIGHT, dense) : BST_OK;
-}
-
-/* Whether a block of nodes may come to the frame. */
-static bool block_comes_in(const bst_generator *g, const double box[4], const shift *by) {
-    double margin = beyond(g) + ROWS + 1.0;
-    double x = margin + 0.5 * fabs(by->dx), y = margin + 0.5 * fabs(by->dy);
-    return by->x + box[1] > -x && by->x + box[0] < g->width + x && by->y + box[3] > -y &&
-           by->y + box[2] < g->height + y;
-}
-
-/* Makes the runs of a source: parts of the way, as far as they come to the frame. */
-static bst_status run_along(bst_ctx *ctx, bst_generator *g, int source, const whole_way *way,
-                            const shift *by) {
-    for (int i = 0; i < way->parts; i++) {
-        int first = way->first[i], last = way->first[i + 1], from = -1;
-        const bst_route_node *a = &way->nodes[first], *b = &way->nodes[last];
-        bool by_row = way->by_row[i];
-        int step = (by_row ? b->y - a->y : b->x - a->x) > 0.0 ? 1 : -1;
-        for (int k = first; k < last;) {
-            int end = (k / BLOCK + 1) * BLOCK;
-            end = end < last ? end : last;
-            bool in = block_comes_in(g, way->box[k / BLOCK], by);
-            from = in && from < 0 ? k : from;
-            if (from >= 0 && (!in || end == last)) {
-                BST_TRY(
-                    make_runs(ctx, g, source, way->nodes, from, in ? end : k, by, by_row, step));
-                from = -1;
-            }
-            k = end;
-        }
-    }
-    return BST_OK;
-}
-
 /* What the light of streaks in background and noise takes from the filter's output, in noises of
  * the frame without it, on average and at a place: the background is too much, and the threshold
  * counts by a noise that is. */
 static double taken_from(const bst_generator *g, double level, double noise) {
-    return level / bst_bound_norm(&g->bound, 0.0) + g->threshold * (noise - 1.0);
+    return level / g->streaks->norm + g->threshold * (noise - 1.0);
 }
 
-static double taken_of(const bst_generator *g) {
-    return taken_from(g, g->background_bias_e / g->dark_noise_e, g->noise_e / g->dark_noise_e);
+static void set_taken(bst_generator *g) {
+    g->streaks->norm = bst_bound_norm(&g->bound, 0.0);
+    g->streaks->taken = taken_from(g, g->background_bias_e / g->dark_noise_e,
+                                   g->noise_e / g->dark_noise_e);
 }
 
-static double taken_at(const bst_generator *g, double x, double y) {
+static double taken_at(const bst_generator *g, int x, int y) {
     double level, noise;
-    bst_local_sky_at(&g->streaks->sky, x, y, &level, &noise);
+    bst_local_sky_at_pixel(&g->streaks->sky, x, y, &level, &noise);
     return taken_from(g, level, noise);
 }
 
@@ -336,6 +234,7 @@ static bst_status search_part(bst_ctx *ctx, bst_generator *g, const bst_streak_r
         for (int r = 0; r < WIDE; r++) {
             s[k].output[r] = seen[r] - taken;
         }
+        memset(s[k].output + WIDE, 0, sizeof s[k].output - WIDE * sizeof *seen);
     }
     bst_streak_noise_add(&w->noise, g->key, g->exposure_id, run->by_row, w->shot, s, count);
     return find_maxima(ctx, g, s, count, run->by_row, g->sources[run->source].item);
@@ -359,14 +258,18 @@ static void set_alarms(bst_generator *g) {
         }
         w->maxima_sigma = g->total_sigma;
     }
-    double threshold = g->threshold + taken_of(g), fall = 0.25 / (g->total_sigma * g->total_sigma);
+    double threshold = g->threshold + w->taken, fall = 0.25 / (g->total_sigma * g->total_sigma);
     double alone = exp(log_maxima_above(w, threshold));
     for (int i = 0; i < LIGHTS; i++) {
-        w->alarms[i] = 0.0;
-        for (int k = -8; k <= 8; k++) {
+        double more[FLANK + 1]; /* at so many half pixels from the way */
+        for (int k = 0; k <= FLANK; k++) {
             double d = 0.5 * k, light = i / 8.0 * exp(-fall * d * d);
             double output = (threshold - light) / sqrt(1.0 + w->shot * light);
-            w->alarms[i] += 0.5 * (exp(log_maxima_above(w, output)) - alone);
+            more[k] = 0.5 * (exp(log_maxima_above(w, output)) - alone);
+        }
+        w->alarms[i] = 0.0;
+        for (int k = -FLANK; k <= FLANK; k++) {
+            w->alarms[i] += more[abs(k)];
         }
     }
 }
@@ -387,7 +290,7 @@ static void draw_faint(bst_generator *g, const bst_streak_run *run, const bst_st
                        double share, double light, arrivals *a) {
     const struct generator_streaks *w = g->streaks;
     double taken = taken_at(g, run->by_row ? p->middle : p->at, run->by_row ? p->at : p->middle);
-    double at = 8.0 * (light + taken_of(g) - taken); /* the table is for what is taken on average */
+    double at = 8.0 * (light + w->taken - taken); /* the table is for what is taken on average */
     at = at < LIGHTS - 1.001 ? fmax(at, 0.0) : LIGHTS - 1.001;
     int i = (int)at;
     a->next -= share * (w->alarms[i] + (at - i) * (w->alarms[i + 1] - w->alarms[i]));
@@ -419,6 +322,7 @@ static bst_status search_run(bst_ctx *ctx, bst_generator *g, const bst_streak_ru
     const bst_streak_place *places = &w->light.places[run->first];
     double least = g->threshold - FAINTEST_SIGMA, steep = 2.0 * g->total_sigma;
     int margin = 2 * w->noise.reach + 4, from = -1, last = -1;
+    double fall = 0.0, density = 0.0; /* of the place before; pixels of the way per place */
     for (int k = 0; k < run->count; k++) {
         const bst_streak_place *p = &places[k];
         double own = (double)p->height;
@@ -431,7 +335,11 @@ static bst_status search_run(bst_ctx *ctx, bst_generator *g, const bst_streak_ru
                 last = k;
             } else if (light < least && is_on_frame(g, run->by_row ? p->middle : p->at,
                                                     run->by_row ? p->at : p->middle)) {
-                double pixels = (bright ? 1.0 : SPARSE) / (steep * sqrt((double)p->fall));
+                if ((double)p->fall != fall) {
+                    fall = (double)p->fall;
+                    density = 1.0 / (steep * sqrt(fall));
+                }
+                double pixels = (bright ? 1.0 : SPARSE) * density;
                 draw_faint(g, run, p, pixels * own / light, light, a);
             }
         }
@@ -443,82 +351,6 @@ static bst_status search_run(bst_ctx *ctx, bst_generator *g, const bst_streak_ru
         }
     }
     return BST_OK;
-}
-
-/* Where the way goes from a node on; it trembles from one to the next. */
-static void course(const bst_route_node *way, int count, int at, double *dx, double *dy) {
-    enum { AHEAD = 12 };
-    int end = at + AHEAD < count ? at + AHEAD : count - 1;
-    int start = end - AHEAD > 0 ? end - AHEAD : 0;
-    *dx = way[end].x - way[start].x;
-    *dy = way[end].y - way[start].y;
-}
-
-/* Whether a source's way comes near the frame at all. */
-static bool comes_in(const bst_generator *g, const generator_source *s) {
-    double margin_x = ROWS + 1.0 + 0.5 * fabs(s->path.dx - g->whole_path.dx);
-    double margin_y = ROWS + 1.0 + 0.5 * fabs(s->path.dy - g->whole_path.dy);
-    return s->x + g->route_box[1] > -margin_x && s->x + g->route_box[0] < g->width + margin_x &&
-           s->y + g->route_box[3] > -margin_y && s->y + g->route_box[2] < g->height + margin_y;
-}
-
-static void part_way(whole_way *way, const bst_route_node *nodes, int count) {
-    way->nodes = nodes;
-    way->count = count;
-    way->parts = 0;
-    for (int first = 0, end; first + 1 < count; first = end) {
-        double dx, dy;
-        course(nodes, count, first, &dx, &dy);
-        bool by_row = fabs(dy) > fabs(dx);
-        for (end = first + 1; end + 1 < count; end++) {
-            double ex, ey;
-            course(nodes, count, end, &ex, &ey);
-            /* a little past the diagonal is no reason to part it */
-            bool same = by_row ? ey * dy > 0.0 && fabs(ey) > 0.6 * fabs(ex)
-                               : ex * dx > 0.0 && fabs(ex) > 0.6 * fabs(ey);
-            if (!same) {
-                break;
-            }
-        }
-        way->by_row[way->parts] = by_row;
-        way->first[way->parts++] = first;
-        way->first[way->parts] = end;
-    }
-    for (int i = 0; i * BLOCK < count; i++) {
-        double *box = way->box[i];
-        box[0] = box[2] = INFINITY;
-        box[1] = box[3] = -INFINITY;
-        for (int k = i * BLOCK; k <= (i + 1) * BLOCK && k < count; k++) {
-            box[0] = fmin(box[0], nodes[k].x);
-            box[1] = fmax(box[1], nodes[k].x);
-            box[2] = fmin(box[2], nodes[k].y);
-            box[3] = fmax(box[3], nodes[k].y);
-        }
-    }
-}
-
-/* Makes the runs of a source's way: the stars' in the middle of the frame, turned by what its own
- * ends differ; or its own, where it moves otherwise. */
-static bst_status make_way(bst_ctx *ctx, bst_generator *g, int index) {
-    struct generator_streaks *w = g->streaks;
-    const generator_source *source = &g->sources[index];
-    if ((source->star && source->amplitude * g->route_top < LEAST_SEEN) || !comes_in(g, source)) {
-        return BST_OK;
-    }
-    shift by = {source->x, source->y, source->path.dx - g->whole_path.dx,
-                source->path.dy - g->whole_path.dy};
-    if (source->star || hypot(by.dx, by.dy) <= OWN_WAY_PX) {
-        return run_along(ctx, g, index, &w->stars, &by);
-    }
-    for (int k = 0; k < g->path.count; k++) {
-        double u = (double)k / (g->path.count - 1) - 0.5;
-        g->object_x[k] = g->path_x[k] + u * by.dx;
-        g->object_y[k] = g->path_y[k] + u * by.dy;
-    }
-    const bst_route_path own = {g->object_x, g->object_y, g->path.count};
-    part_way(&w->own, g->way, bst_route_lay(&own, g->total_sigma, g->way));
-    by.dx = by.dy = 0.0;
-    return run_along(ctx, g, index, &w->own, &by);
 }
 
 /* Looks for what is seen of all runs. */
@@ -564,13 +396,18 @@ bst_status bst_generator_fragments(bst_ctx *ctx, bst_generator *g) {
     BST_TRY(bst_generator_reserve_streaks(ctx, g, g->width, g->height));
     struct generator_streaks *w = g->streaks;
     bst_streak_noise_set(&w->noise, g->total_sigma);
+    set_taken(g);
     set_alarms(g);
     bst_streak_light_begin(&w->light, g->width, g->height,
                            fabs(g->whole_path.dy) > fabs(g->whole_path.dx));
-    part_way(&w->stars, g->route, g->route_count);
+    const bst_streak_limits limits = {.beyond = w->noise.reach + 1,
+                                      .seen = LEAST_SEEN,
+                                      .lit = LEAST_LIGHT,
+                                      .dense = OWN_SHARE * (g->threshold - FAINTEST_SIGMA)};
+    bst_streak_ways_begin(&w->ways, g, &limits);
     for (int r = 0; r < g->rank_count; r++) {
         if (g->sources[g->ranks[r].index].broken) {
-            BST_TRY(make_way(ctx, g, g->ranks[r].index));
+            BST_TRY(bst_streak_ways_add(ctx, &w->ways, g, g->ranks[r].index, &w->light));
         }
     }
     BST_TRY(bst_streak_light_add_up(ctx, &w->light));

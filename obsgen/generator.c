@@ -16,6 +16,8 @@ static const double ROUGH_PX = 8.0;
 static const double CLIP_SIGMA = 3.0;
 /* Sources of which less is on the frame are not seen. */
 static const double LEAST_VISIBLE = 0.01;
+/* Beyond so many sigmas of a Gaussian the error function is 1 in double precision: 6 sqrt(2). */
+static const double ALL_SIGMAS = 8.5;
 
 bst_status bst_generator_create(bst_ctx *ctx, const bst_camera *camera, const bst_camera *knowledge,
                                 const bst_generator_settings *settings,
@@ -81,6 +83,14 @@ static double between_edges(double at, double low, double high, double sigma) {
 }
 
 double bst_generator_inside(const bst_generator *g, double x, double y, double sigma) {
+    double all = ALL_SIGMAS * sigma - 0.5;
+    if (x > all && y > all && x < g->width - 1 - all && y < g->height - 1 - all) {
+        return 1.0;
+    }
+    double none = ALL_SIGMAS * sigma + 0.5;
+    if (x < -none || y < -none || x > g->width - 1 + none || y > g->height - 1 + none) {
+        return 0.0;
+    }
     return between_edges(x, -0.5, g->width - 0.5, sigma) *
            between_edges(y, -0.5, g->height - 0.5, sigma);
 }

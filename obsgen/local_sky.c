@@ -22,6 +22,33 @@ static void tabulate(bst_local_sky *sky, double sigma_px) {
     sky->sigma = sigma_px;
 }
 
+static bst_local_sky_place between(double at, int mesh, int count) {
+    double u = fmin(fmax((at + 0.5) / mesh - 0.5, 0.0), count - 1.0);
+    int i = (int)u;
+    i = i < count - 1 ? i : count > 1 ? count - 2 : 0;
+    return (bst_local_sky_place){count > 1 ? u - i : 0.0, i};
+}
+
+/* Places of all columns and rows of pixels. */
+static bst_status set_places(bst_ctx *ctx, bst_local_sky *sky) {
+    if (sky->width + sky->height > sky->places_room) {
+        int room = sky->width + sky->height;
+        bst_local_sky_place *more = realloc(sky->places, (size_t)room * sizeof *more);
+        if (!more) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d rows and columns", room);
+        }
+        sky->places = more;
+        sky->places_room = room;
+    }
+    for (int x = 0; x < sky->width; x++) {
+        sky->places[x] = between(x, sky->mesh, sky->columns);
+    }
+    for (int y = 0; y < sky->height; y++) {
+        sky->places[sky->width + y] = between(y, sky->mesh, sky->rows);
+    }
+    return BST_OK;
+}
+
 bst_status bst_local_sky_begin(bst_ctx *ctx, bst_local_sky *sky, int width, int height, int mesh_px,
                                double sigma_px) {
     int half = mesh_px / 2, columns = (width + half) / mesh_px, rows = (height + half) / mesh_px;
@@ -37,11 +64,14 @@ bst_status bst_local_sky_begin(bst_ctx *ctx, bst_local_sky *sky, int width, int 
     }
     sky->noise = sky->level + columns * rows;
     sky->scratch = sky->noise + columns * rows;
-    sky->mesh = mesh_px;
-    sky->columns = columns;
-    sky->rows = rows;
-    sky->width = width;
-    sky->height = height;
+    if (sky->mesh != mesh_px || sky->width != width || sky->height != height) {
+        sky->mesh = mesh_px;
+        sky->columns = columns;
+        sky->rows = rows;
+        sky->width = width;
+        sky->height = height;
+        BST_TRY(set_places(ctx, sky));
+    }
     memset(sky->level, 0, 2 * (size_t)(columns * rows) * sizeof *sky->level);
     if (sky->sigma != sigma_px) {
         tabulate(sky, sigma_px);
@@ -51,6 +81,7 @@ bst_status bst_local_sky_begin(bst_ctx *ctx, bst_local_sky *sky, int width, int 
 
 void bst_local_sky_free(bst_local_sky *sky) {
     free(sky->level);
+    free(sky->places);
     *sky = (bst_local_sky){0};
 }
 
@@ -113,25 +144,30 @@ void bst_local_sky_settle(bst_local_sky *sky, double share, double crowding) {
     average(sky, sky->noise, error * sqrt(0.5));
 }
 
-static int between(double at, int mesh, int count, double *part) {
-    double u = fmin(fmax((at + 0.5) / mesh - 0.5, 0.0), count - 1.0);
-    int i = (int)u;
-    i = i < count - 1 ? i : count > 1 ? count - 2 : 0;
-    *part = count > 1 ? u - i : 0.0;
-    return i;
-}
-
 static double mixed(const float *at, int right, int below, double x, double y) {
     double top = (double)at[0] + x * (double)(at[right] - at[0]);
     double bottom = (double)at[below] + x * (double)(at[below + right] - at[below]);
     return top + y * (bottom - top);
 }
 
-void bst_local_sky_at(const bst_local_sky *sky, double x, double y, double *level, double *noise) {
-    double u, v;
-    int k = between(y, sky->mesh, sky->rows, &v) * sky->columns;
-    k += between(x, sky->mesh, sky->columns, &u);
+static void mix(const bst_local_sky *sky, const bst_local_sky_place *x,
+                const bst_local_sky_place *y, double *level, double *noise) {
+    int k = y->first * sky->columns + x->first;
     int right = sky->columns > 1, below = sky->rows > 1 ? sky->columns : 0;
-    *level = mixed(sky->level + k, right, below, u, v);
-    *noise = mixed(sky->noise + k, right, below, u, v);
+    *level = mixed(sky->level + k, right, below, x->part, y->part);
+    *noise = mixed(sky->noise + k, right, below, x->part, y->part);
+}
+
+void bst_local_sky_at(const bst_local_sky *sky, double x, double y, double *level, double *noise) {
+    bst_local_sky_place across = between(x, sky->mesh, sky->columns);
+    bst_local_sky_place down = between(y, sky->mesh, sky->rows);
+    mix(sky, &across, &down, level, noise);
+}
+
+void bst_local_sky_at_pixel(const bst_local_sky *sky, int x, int y, double *level, double *noise) {
+    if (x < 0 || y < 0 || x >= sky->width || y >= sky->height) {
+        bst_local_sky_at(sky, x, y, level, noise);
+        return;
+    }
+    mix(sky, &sky->places[x], &sky->places[sky->width + y], level, noise);
 }

@@ -8,11 +8,19 @@
 /* Heights of lines, SNR, that what a clipped mean holds of them is tabulated at, four to one. */
 enum { BST_LOCAL_SKY_HEIGHTS = 256 };
 
+/* Where a place lies along an axis: between the middles of mesh `first` and the next. */
+typedef struct bst_local_sky_place {
+    double part; /* of the way from one to the other */
+    int first;
+} bst_local_sky_place;
+
 typedef struct bst_local_sky {
     int mesh, columns, rows, width, height; /* px; of meshes; px */
     float *level, *noise;                   /* of each mesh, see below */
     float *scratch;
     int room;
+    bst_local_sky_place *places; /* of the frame's columns, then of its rows */
+    int places_room;
     double sigma; /* that the tables are for; 0: none */
     float light[BST_LOCAL_SKY_HEIGHTS], square[BST_LOCAL_SKY_HEIGHTS];
 } bst_local_sky;
@@ -30,6 +38,8 @@ void bst_local_sky_add(bst_local_sky *sky, int x, int y, double height, double l
 void bst_local_sky_settle(bst_local_sky *sky, double share, double crowding);
 /* Both at a place, bilinear between the meshes' middles. */
 void bst_local_sky_at(const bst_local_sky *sky, double x, double y, double *level, double *noise);
+/* The same at a pixel, sooner where it is on the frame. */
+void bst_local_sky_at_pixel(const bst_local_sky *sky, int x, int y, double *level, double *noise);
 void bst_local_sky_free(bst_local_sky *sky);
 
 #endif

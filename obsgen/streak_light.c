@@ -138,28 +138,60 @@ static void see_place(const band *b, bool across, const bst_streak_place *p, int
     }
 }
 
-static void see_run(const bst_streak_light *l, const bst_streak_run *run, const band *b) {
+/* Whether a band shows all rows of a place: where light of the run's own is part of what is seen. */
+static bool is_whole(const bst_streak_run *run, const band *b, int lines,
+                     const bst_streak_place *p) {
+    return run->lit && p->at >= 0 && p->at < lines && p->middle >= ROWS &&
+           p->middle + ROWS < b->places;
+}
+
+/* Of a dense run that crosses the lines. */
+static void see_across(const bst_streak_run *run, const band *b, int lines,
+                       const bst_streak_place *places, int count, float *out) {
+    for (int k = 0; k < count; k++, out += WIDE) {
+        const bst_streak_place *p = &places[k];
+        if (is_whole(run, b, lines, p)) {
+            const float *all = b->values + (p->at - b->first) * b->stride + p->middle + MARGIN;
+            memcpy(out, all - ROWS, WIDE * sizeof *out);
+        } else {
+            see_place(b, true, p, ROWS, out);
+        }
+    }
+}
+
+static void see_run(const bst_streak_light *l, const bst_streak_run *run, const band *b,
+                    int lines) {
     bool across = run->by_row == l->by_row;
     int from = 0, to = run->count;
     if (across) {
         on_band(l, run, b, &from, &to);
     }
+    const bst_streak_place *places = &l->places[run->first];
+    float *out = l->seen + run->seen;
+    if (across && run->dense) {
+        see_across(run, b, lines, places + from, to - from, out + (ptrdiff_t)from * WIDE);
+        return;
+    }
     int every = run->dense ? 1 : SPARSE;
     for (int k = (from + every - 1) / every * every; k < to; k += every) {
-        float *out = l->seen + run->seen + (run->dense ? k * WIDE : k / SPARSE);
-        see_place(b, across, &l->places[run->first + (size_t)k], run->dense ? ROWS : 0, out);
+        see_place(b, across, &places[k], run->dense ? ROWS : 0,
+                  out + (run->dense ? k * WIDE : k / SPARSE));
     }
 }
 
-/* What is seen where no other light is. */
-static void see_alone(const bst_streak_light *l, const bst_streak_run *run) {
+/* What is seen where no other light is, but where the bands show all. */
+static void see_alone(const bst_streak_light *l, const bst_streak_run *run, const band *b,
+                      int lines) {
     const bst_streak_place *places = &l->places[run->first];
+    bool across = run->by_row == l->by_row;
     float *out = l->seen + run->seen;
     if (run->dense) {
         for (int k = 0; k < run->count; k++) {
-            float light[LANES];
-            bst_streak_light_of(&places[k], light);
-            memcpy(out + (ptrdiff_t)k * WIDE, light + LIGHT_ROWS - ROWS, WIDE * sizeof *out);
+            if (!across || !is_whole(run, b, lines, &places[k])) {
+                float light[LANES];
+                bst_streak_light_of(&places[k], light);
+                memcpy(out + (ptrdiff_t)k * WIDE, light + LIGHT_ROWS - ROWS, WIDE * sizeof *out);
+            }
         }
     } else {
         for (int k = 0; k < run->count; k += SPARSE) {
@@ -184,7 +216,7 @@ bst_status bst_streak_light_add_up(bst_ctx *ctx, bst_streak_light *l) {
     }
     b.values = l->band;
     for (int i = 0; i < l->run_count; i++) {
-        see_alone(l, &l->runs[i]);
+        see_alone(l, &l->runs[i], &b, lines);
     }
     for (b.first = 0; b.first < lines; b.first = b.end) {
         b.end = b.first + high < lines ? b.first + high : lines;
@@ -200,7 +232,7 @@ bst_status bst_streak_light_add_up(bst_ctx *ctx, bst_streak_light *l) {
             }
         }
         for (int i = 0; i < l->run_count; i++) {
-            see_run(l, &l->runs[i], &b);
+            see_run(l, &l->runs[i], &b, lines);
         }
     }
     return BST_OK;

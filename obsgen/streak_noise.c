@@ -7,7 +7,7 @@ static const uint64_t PIXEL_NOISE = (uint64_t)1 << 60;
 
 enum {
     ROWS = BST_STREAK_ROWS,
-    WIDE = BST_STREAK_WIDE,
+    SHOWN = BST_STREAK_SHOWN,
     LANES = 16,
     WHITE = BST_STREAK_NOISE + 2 * BST_STREAK_TAPS /* pixels across */
 };
@@ -120,21 +120,21 @@ LANES_FUNCTION static void filter(const float *in, const float *taps, int count,
 }
 
 /* Filtered along the way. */
-static void add_along(const bst_streak_noise *w, double shot, bst_streak_section *s, int count) {
+LANES_FUNCTION static void add_along(const bst_streak_noise *w, double shot, bst_streak_section *s, int count) {
     int top = w->reach + 1;
     for (int k = 0; k < count; k++) {
-        float sum[WIDE] = {0.0f};
+        float sum[SHOWN] = {0.0f};
         for (int i = -w->reach; i <= w->reach; i++) {
             int n = k + i;
             /* the way leaves no more than a row a step */
             int row = n >= 0 && n < count ? s[k].middle - s[n].middle + top : -1;
             if (row >= 0 && row <= 2 * top) {
-                for (int r = 0; r < WIDE; r++) {
+                for (int r = 0; r < SHOWN; r++) {
                     sum[r] += w->taps[i + w->reach] * s[n].noise[row + r];
                 }
             }
         }
-        for (int r = 0; r < WIDE; r++) {
+        for (int r = 0; r < SHOWN; r++) {
             float light = s[k].output[r];
             s[k].output[r] =
                 light + sum[r] * sqrtf(1.0f + (float)shot * (light > 0.0f ? light : 0.0f));

@@ -12,6 +12,7 @@ enum {
     BST_STREAK_TAPS = 9,
     BST_STREAK_HALF = BST_STREAK_ROWS + BST_STREAK_TAPS + 1,
     BST_STREAK_NOISE = 32, /* 2 BST_STREAK_HALF + 1, a multiple of eight */
+    BST_STREAK_SHOWN = 8,  /* BST_STREAK_WIDE, a multiple of eight */
     BST_STREAK_NORMALS = 4096
 };
 
@@ -20,7 +21,7 @@ enum {
 typedef struct bst_streak_section {
     int at, middle;                /* along, and the nearest pixel across */
     float noise[BST_STREAK_NOISE]; /* filtered across */
-    float output[BST_STREAK_WIDE]; /* SNR */
+    float output[BST_STREAK_SHOWN]; /* SNR; what is behind BST_STREAK_WIDE counts for nothing */
 } bst_streak_section;
 
 typedef struct bst_streak_noise {

@@ -1,0 +1,234 @@
+#include "obsgen/streak_ways.h"
+
+#include <math.h>
+
+/* A source whose path differs more from the stars' has a way of its own. */
+static const double OWN_WAY_PX = 1.0;
+
+enum { ROWS = BST_STREAK_ROWS, BLOCK = BST_STREAK_BLOCK };
+
+/* Place of a source's way relative to another: moved, and turned by this much from end to end. */
+typedef struct shift {
+    double x, y, dx, dy;
+} shift;
+
+/* ---- a way and its parts ---- */
+
+/* Where the way goes from a node on; it trembles from one to the next. */
+static void course(const bst_streak_way *way, int at, double *dx, double *dy) {
+    enum { AHEAD = 12 };
+    int end = at + AHEAD < way->count ? at + AHEAD : way->count - 1;
+    int start = end - AHEAD > 0 ? end - AHEAD : 0;
+    *dx = way->x[end] - way->x[start];
+    *dy = way->y[end] - way->y[start];
+}
+
+static void part_way(bst_streak_way *way) {
+    way->parts = 0;
+    for (int first = 0, end; first + 1 < way->count; first = end) {
+        double dx, dy;
+        course(way, first, &dx, &dy);
+        bool by_row = fabs(dy) > fabs(dx);
+        for (end = first + 1; end + 1 < way->count; end++) {
+            double ex, ey;
+            course(way, end, &ex, &ey);
+            /* a little past the diagonal is no reason to part it */
+            bool same = by_row ? ey * dy > 0.0 && fabs(ey) > 0.6 * fabs(ex)
+                               : ex * dx > 0.0 && fabs(ex) > 0.6 * fabs(ey);
+            if (!same) {
+                break;
+            }
+        }
+        way->by_row[way->parts] = by_row;
+        way->first[way->parts++] = first;
+        way->first[way->parts] = end;
+    }
+}
+
+static void set_way(bst_streak_way *way, const bst_route_node *nodes, int count) {
+    way->count = count;
+    for (int k = 0; k < count; k++) {
+        way->x[k] = nodes[k].x;
+        way->y[k] = nodes[k].y;
+        way->time[k] = nodes[k].time;
+        way->light[k] = nodes[k].light;
+    }
+    part_way(way);
+    for (int i = 0; i * BLOCK < count; i++) {
+        double *box = way->box[i];
+        box[0] = box[2] = INFINITY;
+        box[1] = box[3] = -INFINITY;
+        for (int k = i * BLOCK; k <= (i + 1) * BLOCK && k < count; k++) {
+            box[0] = fmin(box[0], way->x[k]);
+            box[1] = fmax(box[1], way->x[k]);
+            box[2] = fmin(box[2], way->y[k]);
+            box[3] = fmax(box[3], way->y[k]);
+        }
+    }
+}
+
+void bst_streak_ways_begin(bst_streak_ways *w, const bst_generator *g,
+                           const bst_streak_limits *limits) {
+    w->limits = *limits;
+    set_way(&w->stars, g->route, g->route_count);
+}
+
+/* ---- runs of a source ---- */
+
+/* Some of a source's nodes, along and across the axis that its way runs more along, and the lines
+ * between each and the next. */
+typedef struct stretch {
+    double along[BLOCK + 1], across[BLOCK + 1];
+    double slope[BLOCK], more[BLOCK]; /* per px along: across, light */
+    double slant[BLOCK];              /* of distances across the way over those across the axis */
+} stretch;
+
+/* Nodes from number `first` on, `count` lines. */
+static void set_stretch(const bst_streak_way *way, const shift *by, bool by_row, int first,
+                        int count, stretch *s) {
+    const double *x = by_row ? way->y + first : way->x + first;
+    const double *y = by_row ? way->x + first : way->y + first;
+    double bx = by_row ? by->y : by->x, by_dx = by_row ? by->dy : by->dx;
+    double cx = by_row ? by->x : by->y, by_dy = by_row ? by->dx : by->dy;
+    const double *time = way->time + first, *light = way->light + first;
+    for (int i = 0; i <= count; i++) {
+        double u = time[i] - 0.5;
+        s->along[i] = x[i] + bx + u * by_dx;
+        s->across[i] = y[i] + cx + u * by_dy;
+    }
+    for (int i = 0; i < count; i++) {
+        double run = s->along[i + 1] - s->along[i], rise = s->across[i + 1] - s->across[i];
+        s->slant[i] = run * run / (run * run + rise * rise);
+        s->slope[i] = rise / run;
+        s->more[i] = (light[i + 1] - light[i]) / run;
+    }
+}
+
+/* A run that is being made. */
+typedef struct making {
+    bst_streak_light *light;
+    int source, step; /* step: of the places along it */
+    bool by_row, begun;
+    double amplitude, fall, at; /* fall: across the way; at: the next place along it */
+} making;
+
+/* The places of a stretch. */
+static bst_status make_places(bst_ctx *ctx, const bst_generator *g, const bst_streak_limits *limits,
+                              const stretch *s, const double *lights, int count, making *m) {
+    bst_streak_light *l = m->light;
+    int outside = limits->beyond, wide = m->by_row ? g->height : g->width,
+        high = m->by_row ? g->width : g->height;
+    double at = m->at, way = m->step;
+    for (int k = 0; k < count; k++) {
+        double a = s->along[k], run = s->along[k + 1] - a;
+        for (; way * (a + run - at) > 0.0; at += way) {
+            double part = way * (at - a) > 0.0 ? at - a : 0.0, c = s->across[k] + part * s->slope[k];
+            bool near = at >= -outside && at <= wide + outside && c > -(outside + ROWS) &&
+                        c < high + outside + ROWS;
+            if (m->begun && !near) {
+                BST_TRY(bst_streak_light_end(ctx, l, limits->seen, limits->lit, limits->dense));
+            } else if (near && !m->begun) {
+                BST_TRY(bst_streak_light_run(ctx, l, m->source, m->by_row, m->step));
+            }
+            m->begun = near;
+            if (near) {
+                bst_streak_place p = {.at = (int)at, .middle = (int)floor(c + 0.5)};
+                p.height = (float)(m->amplitude * (lights[k] + part * s->more[k]));
+                p.off = (float)(c - p.middle);
+                p.fall = (float)(m->fall * s->slant[k]);
+                BST_TRY(bst_streak_light_place(ctx, l, &p));
+            }
+        }
+    }
+    m->at = at;
+    return BST_OK;
+}
+
+/* Makes runs of nodes first to last of a part of a way. */
+static bst_status make_runs(bst_ctx *ctx, const bst_generator *g, const bst_streak_limits *limits,
+                            const bst_streak_way *way, int first, int last, const shift *by,
+                            making *m) {
+    m->begun = false;
+    for (int k = first; k < last; k += BLOCK) {
+        int count = last - k < BLOCK ? last - k : BLOCK;
+        stretch s;
+        set_stretch(way, by, m->by_row, k, count, &s);
+        if (k == first) {
+            m->at = m->step > 0 ? ceil(s.along[0]) : floor(s.along[0]);
+        }
+        BST_TRY(make_places(ctx, g, limits, &s, way->light + k, count, m));
+    }
+    return m->begun
+               ? bst_streak_light_end(ctx, m->light, limits->seen, limits->lit, limits->dense)
+               : BST_OK;
+}
+
+/* Whether a block of nodes may come to the frame. */
+static bool block_comes_in(const bst_generator *g, int beyond, const double box[4],
+                           const shift *by) {
+    double margin = beyond + ROWS + 1.0;
+    double x = margin + 0.5 * fabs(by->dx), y = margin + 0.5 * fabs(by->dy);
+    return by->x + box[1] > -x && by->x + box[0] < g->width + x && by->y + box[3] > -y &&
+           by->y + box[2] < g->height + y;
+}
+
+/* Makes the runs of a source: parts of the way, as far as they come to the frame. */
+static bst_status run_along(bst_ctx *ctx, const bst_generator *g, const bst_streak_limits *limits,
+                            int source, const bst_streak_way *way, const shift *by,
+                            bst_streak_light *light) {
+    making m = {.light = light,
+                .source = source,
+                .amplitude = g->sources[source].amplitude,
+                .fall = 0.25 / (g->total_sigma * g->total_sigma)};
+    for (int i = 0; i < way->parts; i++) {
+        int first = way->first[i], last = way->first[i + 1], from = -1;
+        m.by_row = way->by_row[i];
+        const double *along = m.by_row ? way->y : way->x;
+        m.step = along[last] - along[first] > 0.0 ? 1 : -1;
+        for (int k = first; k < last;) {
+            int end = (k / BLOCK + 1) * BLOCK;
+            end = end < last ? end : last;
+            bool in = block_comes_in(g, limits->beyond, way->box[k / BLOCK], by);
+            from = in && from < 0 ? k : from;
+            if (from >= 0 && (!in || end == last)) {
+                BST_TRY(make_runs(ctx, g, limits, way, from, in ? end : k, by, &m));
+                from = -1;
+            }
+            k = end;
+        }
+    }
+    return BST_OK;
+}
+
+/* Whether a source's way comes near the frame at all. */
+static bool comes_in(const bst_generator *g, const generator_source *s) {
+    double margin_x = ROWS + 1.0 + 0.5 * fabs(s->path.dx - g->whole_path.dx);
+    double margin_y = ROWS + 1.0 + 0.5 * fabs(s->path.dy - g->whole_path.dy);
+    return s->x + g->route_box[1] > -margin_x && s->x + g->route_box[0] < g->width + margin_x &&
+           s->y + g->route_box[3] > -margin_y && s->y + g->route_box[2] < g->height + margin_y;
+}
+
+/* A source's way is the stars', turned by what its own ends differ; or its own, where it moves
+ * otherwise. */
+bst_status bst_streak_ways_add(bst_ctx *ctx, bst_streak_ways *w, bst_generator *g, int index,
+                               bst_streak_light *light) {
+    const generator_source *source = &g->sources[index];
+    if ((source->star && source->amplitude * g->route_top < w->limits.seen) ||
+        !comes_in(g, source)) {
+        return BST_OK;
+    }
+    shift by = {source->x, source->y, source->path.dx - g->whole_path.dx,
+                source->path.dy - g->whole_path.dy};
+    if (source->star || hypot(by.dx, by.dy) <= OWN_WAY_PX) {
+        return run_along(ctx, g, &w->limits, index, &w->stars, &by, light);
+    }
+    for (int k = 0; k < g->path.count; k++) {
+        double u = (double)k / (g->path.count - 1) - 0.5;
+        g->object_x[k] = g->path_x[k] + u * by.dx;
+        g->object_y[k] = g->path_y[k] + u * by.dy;
+    }
+    const bst_route_path own = {g->object_x, g->object_y, g->path.count};
+    set_way(&w->own, g->way, bst_route_lay(&own, g->total_sigma, g->way));
+    by.dx = by.dy = 0.0;
+    return run_along(ctx, g, &w->limits, index, &w->own, &by, light);
+}
