@@ -30,7 +30,7 @@ enum {
     /* of the tables below: outputs in steps of 1/8 from 1, lights in steps of 1/8 */
     OUTPUTS = 64,
     LIGHTS = 48,
-    FLANK = 8, /* half pixels */
+    FLANK = 8,   /* half pixels */
     SKY_STEP = 8 /* of so many places of a run one stands for their light in the background */
 };
 
@@ -49,7 +49,7 @@ struct generator_streaks {
     bst_streak_noise noise;
     bst_local_sky sky;
     double norm, taken; /* of the filter for points; from its output on average, see below */
-    double shot; /* variance that an output of one adds, by the photons' own noise */
+    double shot;        /* variance that an output of one adds, by the photons' own noise */
     double log_maxima[OUTPUTS], maxima_sigma; /* logarithm of maxima per pixel above an output */
     double alarms[LIGHTS]; /* more of them than noise alone makes, per pixel of the way */
     float *output;         /* the frame; on the pixels `shown` what is above the threshold */
@@ -64,11 +64,11 @@ static float output_at(const section *s, int count, int k, int across) {
     return r >= 0 && r <= 2 * ROWS ? s[k].output[r] : -INFINITY;
 }
 
-static bst_status grow(bst_ctx *ctx, void **items, int count, int *room, size_t bytes) {
-    if (count < *room) {
+static bst_status grow(bst_ctx *ctx, void **items, int needed, int *room, size_t bytes) {
+    if (needed <= *room) {
         return BST_OK;
     }
-    int more = 2 * *room + 1024;
+    int more = 2 * needed + 1024;
     void *moved = realloc(*items, (size_t)more * bytes);
     if (!moved) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d pixels of streaks", more);
@@ -82,31 +82,42 @@ static bool is_on_frame(const bst_generator *g, int x, int y) {
     return x >= 0 && y >= 0 && x < g->width && y < g->height;
 }
 
+/* Whether none of the pixels round row r of section k is as high. */
+static bool is_top(const section *s, int count, int k, int r) {
+    int across = s[k].middle + r - ROWS;
+    float value = s[k].output[r];
+    bool top = r > 0 && r < WIDE - 1;
+    for (int i = -1; i <= 1 && top; i++) {
+        for (int j = -1; j <= 1 && top; j++) {
+            top = (i == 0 && j == 0) || value > output_at(s, count, k + i, across + j);
+        }
+    }
+    return top;
+}
+
 /* Shows the outputs above the threshold, and finds the maxima among them. */
 static bst_status find_maxima(bst_ctx *ctx, bst_generator *g, const section *s, int count,
                               bool by_row, int item) {
     struct generator_streaks *w = g->streaks;
+    float threshold = (float)g->threshold;
+    BST_TRY(grow(ctx, (void **)&w->shown, w->shown_count + count * WIDE, &w->shown_room,
+                 sizeof *w->shown));
+    BST_TRY(grow(ctx, (void **)&w->maxima, w->maxima_count + count * WIDE, &w->maxima_room,
+                 sizeof *w->maxima));
     for (int k = 0; k < count; k++) {
-        for (int r = -ROWS; r <= ROWS; r++) {
-            int across = s[k].middle + r, x = by_row ? across : s[k].at,
-                y = by_row ? s[k].at : across;
-            float value = s[k].output[r + ROWS];
-            if (!(value > (float)g->threshold) || !is_on_frame(g, x, y)) {
+        for (int r = 0; r < WIDE; r++) {
+            float value = s[k].output[r];
+            if (!(value > threshold)) {
                 continue;
             }
-            BST_TRY(
-                grow(ctx, (void **)&w->shown, w->shown_count, &w->shown_room, sizeof *w->shown));
+            int across = s[k].middle + r - ROWS;
+            int x = by_row ? across : s[k].at, y = by_row ? s[k].at : across;
+            if (!is_on_frame(g, x, y)) {
+                continue;
+            }
             w->shown[w->shown_count] = y * g->width + x;
             w->output[w->shown[w->shown_count++]] = value;
-            bool top = r > -ROWS && r < ROWS;
-            for (int i = -1; i <= 1 && top; i++) {
-                for (int j = -1; j <= 1 && top; j++) {
-                    top = (i == 0 && j == 0) || value > output_at(s, count, k + i, across + j);
-                }
-            }
-            if (top) {
-                BST_TRY(grow(ctx, (void **)&w->maxima, w->maxima_count, &w->maxima_room,
-                             sizeof *w->maxima));
+            if (is_top(s, count, k, r)) {
                 w->maxima[w->maxima_count] = (maximum){.x = x,
                                                        .y = y,
                                                        .item = item,
@@ -120,6 +131,11 @@ static bst_status find_maxima(bst_ctx *ctx, bst_generator *g, const section *s, 
     return BST_OK;
 }
 
+/* lroundf of what is small. */
+static int nearest(float value) {
+    return (int)((double)value + (value < 0.0f ? -0.5 : 0.5));
+}
+
 /* Whether the output stays above `least`, the threshold or more, on the pixels between two maxima.
  */
 static bool is_ridge(const bst_generator *g, const maximum *a, const maximum *b, float least) {
@@ -127,7 +143,7 @@ static bool is_ridge(const bst_generator *g, const maximum *a, const maximum *b,
     int steps = abs(dx) > abs(dy) ? abs(dx) : abs(dy);
     for (int i = 1; i < steps; i++) {
         float t = (float)i / (float)steps;
-        int x = a->x + (int)lroundf(t * (float)dx), y = a->y + (int)lroundf(t * (float)dy);
+        int x = a->x + nearest(t * (float)dx), y = a->y + nearest(t * (float)dy);
         if (!(g->streaks->output[y * g->width + x] > least)) {
             return false;
         }
@@ -185,8 +201,8 @@ static double taken_from(const bst_generator *g, double level, double noise) {
 
 static void set_taken(bst_generator *g) {
     g->streaks->norm = bst_bound_norm(&g->bound, 0.0);
-    g->streaks->taken = taken_from(g, g->background_bias_e / g->dark_noise_e,
-                                   g->noise_e / g->dark_noise_e);
+    g->streaks->taken =
+        taken_from(g, g->background_bias_e / g->dark_noise_e, g->noise_e / g->dark_noise_e);
 }
 
 static double taken_at(const bst_generator *g, int x, int y) {

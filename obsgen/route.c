@@ -2,6 +2,7 @@
 
 #include <math.h>
 #include <stdbool.h>
+#include <string.h>
 
 #include "sim/core/vec.h"
 
@@ -12,30 +13,61 @@ static double below(double z) {
     return 0.5 * erfc(-z * 0.70710678118654752);
 }
 
+/* Beyond so many deviations a normal distribution is 0 or 1 to double precision. */
+static const double ALL_SIGMAS = 9.0;
 /* Bends that are none. */
 static const double STRAIGHT_PX = 0.2;
 /* Ends of a path that stands still: this far on, light is gone. */
 static const double BEYOND_SIGMAS = 4.0;
+/* Places that are closer along either axis are one. */
+static const double SAME_PX = 0.7;
 
-static void add_node(bst_route_node *nodes, int *count, double x, double y, double time) {
-    enum { BACK = 48 }; /* further back a path that returns is another part of the way */
-    for (int i = *count - 1; i >= 0 && i >= *count - BACK; i--) {
-        if (fabs(nodes[i].x - x) < 0.7 && fabs(nodes[i].y - y) < 0.7) {
-            return;
+enum { GROUP = 8 };
+
+/* Nodes as they are laid, and the least box about each GROUP of them. */
+typedef struct laying {
+    bst_route_node *nodes;
+    int count;
+    struct group_box {
+        double x0, x1, y0, y1;
+    } box[BST_ROUTE_NODES / GROUP];
+} laying;
+
+/* Whether one of the nodes from number `first` on is at a place. */
+static bool is_laid(const laying *l, int first, double x, double y) {
+    for (int from = first / GROUP * GROUP; from < l->count; from += GROUP) {
+        const struct group_box *b = &l->box[from / GROUP];
+        if (!(x > b->x0 - 1.0 && x < b->x1 + 1.0 && y > b->y0 - 1.0 && y < b->y1 + 1.0)) {
+            continue;
+        }
+        for (int i = from > first ? from : first; i < from + GROUP && i < l->count; i++) {
+            if (fabs(l->nodes[i].x - x) < SAME_PX && fabs(l->nodes[i].y - y) < SAME_PX) {
+                return true;
+            }
         }
     }
-    if (*count < BST_ROUTE_NODES) {
-        nodes[(*count)++] = (bst_route_node){x, y, time, 0.0};
+    return false;
+}
+
+static void add_node(laying *l, double x, double y, double time) {
+    enum { BACK = 48 }; /* further back a path that returns is another part of the way */
+    if (l->count == BST_ROUTE_NODES || is_laid(l, l->count > BACK ? l->count - BACK : 0, x, y)) {
+        return;
     }
+    struct group_box *b = &l->box[l->count / GROUP];
+    if (l->count % GROUP == 0) {
+        *b = (struct group_box){x, x, y, y};
+    }
+    *b = (struct group_box){fmin(b->x0, x), fmax(b->x1, x), fmin(b->y0, y), fmax(b->y1, y)};
+    l->nodes[l->count++] = (bst_route_node){x, y, time, 0.0};
 }
 
 /* Straight on from one node, away from another. */
-static void lay_on(bst_route_node *nodes, int *count, int end, int before, double sigma_px,
-                   double time) {
-    const bst_route_node e = nodes[end], b = nodes[before];
+static void lay_on(laying *l, int end, int before, double sigma_px, double time) {
+    const bst_route_node e = l->nodes[end], b = l->nodes[before];
     double dx = e.x - b.x, dy = e.y - b.y, length = hypot(dx, dy);
     for (int i = 1; i <= (int)ceil(BEYOND_SIGMAS * sigma_px) && length > 0.0; i++) {
-        add_node(nodes, count, e.x + i * dx / length, e.y + i * dy / length, time);
+        add_node(l, e.x + i * dx / length, e.y + i * dy / length, time);
     }
 }
 
@@ -68,7 +100,9 @@ static double piece_light(const piece *p, double x, double y, double s) {
         return p->height * exp(-0.5 * (x * x + y * y) / (s * s));
     }
     double u = x * p->cx + y * p->cy, v = y * p->cx - x * p->cy;
-    return p->height * exp(-0.5 * v * v) * (below(u + p->half) - below(u - p->half));
+    double high = u + p->half, low = u - p->half;
+    double within = high > ALL_SIGMAS && low < -ALL_SIGMAS ? 1.0 : below(high) - below(low);
+    return p->height * exp(-0.5 * v * v) * within;
 }
 
 /* Adds the light of the whole path at its nodes. */
@@ -85,34 +119,32 @@ static void add_light(const bst_route_path *path, double s, bst_route_node *node
 }
 
 int bst_route_lay(const bst_route_path *p, double sigma_px, bst_route_node *nodes) {
-    int count = 0;
-    add_node(nodes, &count, p->x_px[0], p->y_px[0], 0.0);
+    laying l = {.nodes = nodes};
+    add_node(&l, p->x_px[0], p->y_px[0], 0.0);
     for (int k = 1; k < p->count; k++) {
         double dx = p->x_px[k] - p->x_px[k - 1], dy = p->y_px[k] - p->y_px[k - 1];
         int steps = (int)fmin(ceil(hypot(dx, dy)), BST_ROUTE_NODES);
         for (int i = 1; i <= steps; i++) {
             double part = (double)i / steps;
-            add_node(nodes, &count, p->x_px[k - 1] + part * dx, p->y_px[k - 1] + part * dy,
+            add_node(&l, p->x_px[k - 1] + part * dx, p->y_px[k - 1] + part * dy,
                      (k - 1 + part) / (p->count - 1));
         }
     }
-    int last = count - 1;
+    int last = l.count - 1;
     if (last > 0) {
-        lay_on(nodes, &count, last, last > 2 ? last - 3 : 0, sigma_px, 1.0);
+        lay_on(&l, last, last > 2 ? last - 3 : 0, sigma_px, 1.0);
         /* those before the start go first, so that nodes stay in the order of the way */
-        int laid = count;
-        lay_on(nodes, &count, 0, last > 2 ? 3 : last, sigma_px, 0.0);
-        int more = count - laid;
+        int laid = l.count;
+        lay_on(&l, 0, last > 2 ? 3 : last, sigma_px, 0.0);
+        int more = l.count - laid;
         for (int i = 0; i < more; i++) {
-            bst_route_node moved = nodes[count - 1];
-            for (int k = count - 1; k > i; k--) {
-                nodes[k] = nodes[k - 1];
-            }
+            bst_route_node moved = nodes[l.count - 1];
+            memmove(nodes + i + 1, nodes + i, (size_t)(l.count - 1 - i) * sizeof *nodes);
             nodes[i] = moved;
         }
     }
-    add_light(p, sigma_px * sqrt(2.0), nodes, count);
-    return count;
+    add_light(p, sigma_px * sqrt(2.0), nodes, l.count);
+    return l.count;
 }
 
 /* The model's places at even times. */

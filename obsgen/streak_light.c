@@ -138,7 +138,8 @@ static void see_place(const band *b, bool across, const bst_streak_place *p, int
     }
 }
 
-/* Whether a band shows all rows of a place: where light of the run's own is part of what is seen. */
+/* Whether a band shows all rows of a place: where light of the run's own is part of what is seen.
+ */
 static bool is_whole(const bst_streak_run *run, const band *b, int lines,
                      const bst_streak_place *p) {
     return run->lit && p->at >= 0 && p->at < lines && p->middle >= ROWS &&

@@ -1,6 +1,7 @@
 #include "obsgen/streak_noise.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 /* Draws of pixels; those of other clutter stay below. */
 static const uint64_t PIXEL_NOISE = (uint64_t)1 << 60;
@@ -9,7 +10,8 @@ enum {
     ROWS = BST_STREAK_ROWS,
     SHOWN = BST_STREAK_SHOWN,
     LANES = 16,
-    WHITE = BST_STREAK_NOISE + 2 * BST_STREAK_TAPS /* pixels across */
+    BEFORE = 8, /* pixels across before those that are asked for, and all */
+    WHITE = BEFORE + BST_STREAK_NOISE + 2 * BST_STREAK_TAPS + 14
 };
 
 /* Wider vectors where the processor has them; what comes out is the same. */
@@ -73,11 +75,16 @@ LANES_FUNCTION static void draw_lanes(bst_rng_key key, lanes *l) {
 }
 
 /* White noise of the pixels of up to LANES sections from `first` pixels before their middles on,
- * eight to a draw. The filter's many taps smooth the steps of the table. */
+ * eight to a draw; out holds as many before the first. The filter's many taps smooth the steps of
+ * the table. */
 static void white(const bst_streak_noise *w, bst_rng_key key, int64_t exposure_id, bool by_row,
                   const bst_streak_section *s, int sections, int first, int count,
                   float out[LANES][WHITE]) {
-    int groups = (count + 14) / 8;
+    int offset[LANES], groups = 0;
+    for (int i = 0; i < sections; i++) {
+        offset[i] = (s[i].middle - first) & 7;
+        groups = offset[i] + count + 7 > 8 * groups ? (offset[i] + count + 7) / 8 : groups;
+    }
     for (int k = 0; k < groups; k++) {
         lanes l;
         for (int i = 0; i < LANES; i++) {
@@ -92,67 +99,44 @@ static void white(const bst_streak_noise *w, bst_rng_key key, int64_t exposure_i
         }
         draw_lanes(key, &l);
         for (int i = 0; i < sections; i++) {
-            int from = 8 * k - ((s[i].middle - first) & 7);
-            uint32_t words[4] = {l.c0[i], l.c1[i], l.c2[i], l.c3[i]};
-            int low = from < 0 ? -from : 0, high = count - from < 8 ? count - from : 8;
-            for (int p = low; p < high; p++) {
-                out[i][from + p] =
-                    w->normals[(words[p >> 1] >> (p & 1 ? 16 : 0)) & (BST_STREAK_NORMALS - 1)];
+            const uint32_t words[4] = {l.c0[i], l.c1[i], l.c2[i], l.c3[i]};
+            float *to = out[i] + BEFORE + 8 * k - offset[i];
+            for (int p = 0; p < 4; p++) {
+                to[2 * p] = w->normals[words[p] & (BST_STREAK_NORMALS - 1)];
+                to[2 * p + 1] = w->normals[(words[p] >> 16) & (BST_STREAK_NORMALS - 1)];
             }
         }
     }
 }
 
-/* out[r] = sum of taps[i] in[r + i]; rows: a multiple of eight. */
-LANES_FUNCTION static void filter(const float *in, const float *taps, int count, int rows,
-                                  float *out) {
-    for (int first = 0; first < rows; first += 8) {
-        float sum[8] = {0.0f};
-        for (int i = 0; i < count; i++) {
-            for (int r = 0; r < 8; r++) {
-                sum[r] += taps[i] * in[first + r + i];
-            }
-        }
-        for (int r = 0; r < 8; r++) {
-            out[first + r] = sum[r];
-        }
-    }
-}
+#define BST_SIMD_KERNELS "obsgen/streak_noise_kernels.inc"
+#include "sim/core/simd_each.inc"
 
-/* Filtered along the way. */
-LANES_FUNCTION static void add_along(const bst_streak_noise *w, double shot, bst_streak_section *s, int count) {
-    int top = w->reach + 1;
+/* By how many rows the way leaves a section within the filter's reach; it leaves no more than a row
+ * a step, or is another part of it. */
+static int rows_left(const bst_streak_noise *w, const bst_streak_section *s, int count) {
+    int most = 0;
     for (int k = 0; k < count; k++) {
-        float sum[SHOWN] = {0.0f};
-        for (int i = -w->reach; i <= w->reach; i++) {
-            int n = k + i;
-            /* the way leaves no more than a row a step */
-            int row = n >= 0 && n < count ? s[k].middle - s[n].middle + top : -1;
-            if (row >= 0 && row <= 2 * top) {
-                for (int r = 0; r < SHOWN; r++) {
-                    sum[r] += w->taps[i + w->reach] * s[n].noise[row + r];
-                }
-            }
-        }
-        for (int r = 0; r < SHOWN; r++) {
-            float light = s[k].output[r];
-            s[k].output[r] =
-                light + sum[r] * sqrtf(1.0f + (float)shot * (light > 0.0f ? light : 0.0f));
+        for (int n = k + 1; n <= k + w->reach && n < count; n++) {
+            int rows = abs(s[n].middle - s[k].middle);
+            most = rows > most && rows <= w->reach + 1 ? rows : most;
         }
     }
+    return most;
 }
 
 void bst_streak_noise_add(const bst_streak_noise *w, bst_rng_key key, int64_t exposure_id,
                           bool by_row, double shot, bst_streak_section *s, int count) {
-    int half = ROWS + w->reach + 1, rows = 2 * half + 1;
+    int most = rows_left(w, s, count), half = ROWS + most, rows = 2 * half + 1;
     float noise[LANES][WHITE] = {{0.0f}};
     for (int first = 0; first < count; first += LANES) {
         int sections = count - first < LANES ? count - first : LANES;
         white(w, key, exposure_id, by_row, &s[first], sections, half + w->reach,
               rows + 2 * w->reach, noise);
         for (int k = 0; k < sections; k++) {
-            filter(noise[k], w->taps, 2 * w->reach + 1, (rows + 7) & ~7, s[first + k].noise);
+            BST_SIMD_PICK(filter)
+            (noise[k] + BEFORE, w->taps, 2 * w->reach + 1, (rows + 7) & ~7, s[first + k].noise);
         }
     }
-    add_along(w, shot, s, count);
+    BST_SIMD_PICK(add_along)(w, (float)shot, most, s, count);
 }

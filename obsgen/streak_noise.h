@@ -19,8 +19,8 @@ enum {
 /* One step of a pixel along the way: a column of the frame where the way runs more along the rows,
  * a row otherwise. */
 typedef struct bst_streak_section {
-    int at, middle;                /* along, and the nearest pixel across */
-    float noise[BST_STREAK_NOISE]; /* filtered across */
+    int at, middle;                 /* along, and the nearest pixel across */
+    float noise[BST_STREAK_NOISE];  /* filtered across */
     float output[BST_STREAK_SHOWN]; /* SNR; what is behind BST_STREAK_WIDE counts for nothing */
 } bst_streak_section;
 

@@ -112,30 +112,39 @@ typedef struct making {
     double amplitude, fall, at; /* fall: across the way; at: the next place along it */
 } making;
 
+static int floor_of(double value) {
+    int whole = (int)value;
+    return whole - (value < whole);
+}
+
 /* The places of a stretch. */
 static bst_status make_places(bst_ctx *ctx, const bst_generator *g, const bst_streak_limits *limits,
                               const stretch *s, const double *lights, int count, making *m) {
     bst_streak_light *l = m->light;
-    int outside = limits->beyond, wide = m->by_row ? g->height : g->width,
-        high = m->by_row ? g->width : g->height;
+    double outside = limits->beyond, low = -(outside + ROWS);
+    double wide = (m->by_row ? g->height : g->width) + outside;
+    double high = (m->by_row ? g->width : g->height) + outside + ROWS;
     double at = m->at, way = m->step;
     for (int k = 0; k < count; k++) {
-        double a = s->along[k], run = s->along[k + 1] - a;
-        for (; way * (a + run - at) > 0.0; at += way) {
-            double part = way * (at - a) > 0.0 ? at - a : 0.0, c = s->across[k] + part * s->slope[k];
-            bool near = at >= -outside && at <= wide + outside && c > -(outside + ROWS) &&
-                        c < high + outside + ROWS;
-            if (m->begun && !near) {
-                BST_TRY(bst_streak_light_end(ctx, l, limits->seen, limits->lit, limits->dense));
-            } else if (near && !m->begun) {
-                BST_TRY(bst_streak_light_run(ctx, l, m->source, m->by_row, m->step));
+        double a = s->along[k], end = a + (s->along[k + 1] - a);
+        for (; way * (end - at) > 0.0; at += way) {
+            double part = way * (at - a) > 0.0 ? at - a : 0.0;
+            double c = s->across[k] + part * s->slope[k];
+            bool near = at >= -outside && at <= wide && c > low && c < high;
+            if (near != m->begun) {
+                BST_TRY(
+                    near ? bst_streak_light_run(ctx, l, m->source, m->by_row, m->step)
+                         : bst_streak_light_end(ctx, l, limits->seen, limits->lit, limits->dense));
+                m->begun = near;
             }
-            m->begun = near;
             if (near) {
-                bst_streak_place p = {.at = (int)at, .middle = (int)floor(c + 0.5)};
-                p.height = (float)(m->amplitude * (lights[k] + part * s->more[k]));
-                p.off = (float)(c - p.middle);
-                p.fall = (float)(m->fall * s->slant[k]);
+                int middle = floor_of(c + 0.5);
+                const bst_streak_place p = {
+                    .at = (int)at,
+                    .middle = middle,
+                    .height = (float)(m->amplitude * (lights[k] + part * s->more[k])),
+                    .off = (float)(c - middle),
+                    .fall = (float)(m->fall * s->slant[k])};
                 BST_TRY(bst_streak_light_place(ctx, l, &p));
             }
         }
@@ -158,9 +167,8 @@ static bst_status make_runs(bst_ctx *ctx, const bst_generator *g, const bst_stre
         }
         BST_TRY(make_places(ctx, g, limits, &s, way->light + k, count, m));
     }
-    return m->begun
-               ? bst_streak_light_end(ctx, m->light, limits->seen, limits->lit, limits->dense)
-               : BST_OK;
+    return m->begun ? bst_streak_light_end(ctx, m->light, limits->seen, limits->lit, limits->dense)
+                    : BST_OK;
 }
 
 /* Whether a block of nodes may come to the frame. */
