@@ -205,9 +205,16 @@ static void set_taken(bst_generator *g) {
         taken_from(g, g->background_bias_e / g->dark_noise_e, g->noise_e / g->dark_noise_e);
 }
 
-static double taken_at(const bst_generator *g, int x, int y) {
+/* cell: of the place before, as bst_local_sky_next has it. */
+static double taken_at(const bst_generator *g, bst_local_sky_cell *cell, const bst_streak_place *p,
+                       bool by_row) {
+    int x = by_row ? p->middle : p->at, y = by_row ? p->at : p->middle;
     double level, noise;
-    bst_local_sky_at_pixel(&g->streaks->sky, x, y, &level, &noise);
+    if (is_on_frame(g, x, y)) {
+        bst_local_sky_next(&g->streaks->sky, cell, x, y, &level, &noise);
+    } else {
+        bst_local_sky_at(&g->streaks->sky, x, y, &level, &noise);
+    }
     return taken_from(g, level, noise);
 }
 
@@ -241,10 +248,10 @@ static bst_status search_part(bst_ctx *ctx, bst_generator *g, const bst_streak_r
     section *s = w->sections;
     const bst_streak_place *places = &w->light.places[run->first];
     int count = last - first + 1 < BST_ROUTE_NODES ? last - first + 1 : BST_ROUTE_NODES;
+    bst_local_sky_cell cell = {.column = -1};
     for (int k = 0; k < count; k++) {
         const float *seen = bst_streak_seen(&w->light, run, first + k);
-        int at = places[first + k].at, middle = places[first + k].middle;
-        float taken = (float)taken_at(g, run->by_row ? middle : at, run->by_row ? at : middle);
+        float taken = (float)taken_at(g, &cell, &places[first + k], run->by_row);
         s[k].at = places[first + k].at;
         s[k].middle = places[first + k].middle;
         for (int r = 0; r < WIDE; r++) {
@@ -300,63 +307,82 @@ static double draw_exponential(const bst_generator *g, arrivals *a) {
     return -log(bst_rng_uniform(g->key, (uint64_t)g->exposure_id, a->draw++));
 }
 
-/* Alarms that light too faint to be looked at pixel by pixel makes at a place. share: pixels of the
- * way that it stands for, times this source's part of the light. */
-static void draw_faint(bst_generator *g, const bst_streak_run *run, const bst_streak_place *p,
-                       double share, double light, arrivals *a) {
-    const struct generator_streaks *w = g->streaks;
-    double taken = taken_at(g, run->by_row ? p->middle : p->at, run->by_row ? p->at : p->middle);
+/* An alarm that light too faint to be looked at pixel by pixel makes at a place. */
+static void draw_alarm(bst_generator *g, const bst_streak_run *run, const bst_streak_place *p,
+                       double light, double taken, arrivals *a) {
+    double noise = sqrt(1.0 + g->streaks->shot * light);
+    double least = (g->threshold + taken - light) / noise;
+    double value = sqrt(least * least + 2.0 * draw_exponential(g, a));
+    double off[2];
+    bst_rng_normal2(g->key, (uint64_t)g->exposure_id, a->draw++, off);
+    /* alarms are the likelier, the nearer to the way */
+    double spread = g->total_sigma * sqrt(2.0 / (g->threshold * light + 1.0));
+    double along = p->at + spread * off[0], across = p->middle + (double)p->off + spread * off[1];
+    int x = (int)lround(run->by_row ? across : along);
+    int y = (int)lround(run->by_row ? along : across);
+    if (is_on_frame(g, x, y)) {
+        bst_generator_keep_rough(g, x, y, g->threshold + noise * (value - least),
+                                 g->sources[run->source].item);
+    }
+}
+
+/* Alarms expected per pixel of a way with light from which this is taken. */
+static double alarms_of(const struct generator_streaks *w, double light, double taken) {
     double at = 8.0 * (light + w->taken - taken); /* the table is for what is taken on average */
-    at = at < LIGHTS - 1.001 ? fmax(at, 0.0) : LIGHTS - 1.001;
+    at = at > 0.0 ? at : 0.0;
+    at = at < LIGHTS - 1.001 ? at : LIGHTS - 1.001;
     int i = (int)at;
-    a->next -= share * (w->alarms[i] + (at - i) * (w->alarms[i + 1] - w->alarms[i]));
-    while (a->next < 0.0) {
-        a->next += draw_exponential(g, a);
-        double noise = sqrt(1.0 + w->shot * light);
-        double least = (g->threshold + taken - light) / noise;
-        double value = sqrt(least * least + 2.0 * draw_exponential(g, a));
-        double off[2];
-        bst_rng_normal2(g->key, (uint64_t)g->exposure_id, a->draw++, off);
-        /* alarms are the likelier, the nearer to the way */
-        double spread = g->total_sigma * sqrt(2.0 / (g->threshold * light + 1.0));
-        double along = p->at + spread * off[0],
-               across = p->middle + (double)p->off + spread * off[1];
-        int x = (int)lround(run->by_row ? across : along);
-        int y = (int)lround(run->by_row ? along : across);
-        if (is_on_frame(g, x, y)) {
-            bst_generator_keep_rough(g, x, y, g->threshold + noise * (value - least),
-                                     g->sources[run->source].item);
+    return w->alarms[i] + (at - i) * (w->alarms[i + 1] - w->alarms[i]);
+}
+
+/* Alarms along a run where its light is below `least`; of places that are faint themselves each
+ * SPARSEth stands for all. */
+static void draw_faint(bst_generator *g, const bst_streak_run *run, double least, arrivals *a) {
+    const struct generator_streaks *w = g->streaks;
+    const bst_streak_place *places = &w->light.places[run->first];
+    double bright = OWN_SHARE * least, steep = 2.0 * g->total_sigma;
+    double fall = 0.0, density = 0.0; /* of the place before; pixels of the way per place */
+    bst_local_sky_cell cell = {.column = -1};
+    for (int k = 0, step = run->dense ? 1 : SPARSE; k < run->count; k += step) {
+        const bst_streak_place *p = &places[k];
+        double own = (double)p->height, stands = own >= bright ? 1.0 : SPARSE;
+        if (own < bright && (own <= LEAST_SEEN || k % SPARSE != 0)) {
+            continue;
+        }
+        double light = (double)bst_streak_seen(&w->light, run, k)[run->dense ? ROWS : 0];
+        light = light > own ? light : own;
+        if (light >= least ||
+            !is_on_frame(g, run->by_row ? p->middle : p->at, run->by_row ? p->at : p->middle)) {
+            continue;
+        }
+        if ((double)p->fall != fall) {
+            fall = (double)p->fall;
+            density = 1.0 / (steep * sqrt(fall));
+        }
+        double taken = taken_at(g, &cell, p, run->by_row);
+        /* this source's part of the light */
+        a->next -= stands * density * own / light * alarms_of(w, light, taken);
+        while (a->next < 0.0) {
+            a->next += draw_exponential(g, a);
+            draw_alarm(g, run, p, light, taken, a);
         }
     }
 }
 
-/* Looks for maxima in a run: pixel by pixel where light is bright enough, and as far about that as
- * noise is filtered. */
-static bst_status search_run(bst_ctx *ctx, bst_generator *g, const bst_streak_run *run,
-                             arrivals *a) {
+/* Looks for maxima in a run pixel by pixel where its light is `least` or brighter, and as far about
+ * that as noise is filtered. */
+static bst_status search_bright(bst_ctx *ctx, bst_generator *g, const bst_streak_run *run,
+                                double least) {
     const struct generator_streaks *w = g->streaks;
-    const bst_streak_place *places = &w->light.places[run->first];
-    double least = g->threshold - FAINTEST_SIGMA, steep = 2.0 * g->total_sigma;
     int margin = 2 * w->noise.reach + 4, from = -1, last = -1;
-    double fall = 0.0, density = 0.0; /* of the place before; pixels of the way per place */
     for (int k = 0; k < run->count; k++) {
-        const bst_streak_place *p = &places[k];
-        double own = (double)p->height;
-        bool bright = own >= OWN_SHARE * least;
-        if (bright || (own > LEAST_SEEN && k % SPARSE == 0)) {
-            double light = (double)bst_streak_seen(&w->light, run, k)[run->dense ? ROWS : 0];
+        double own = (double)w->light.places[run->first + (size_t)k].height;
+        if (own >= OWN_SHARE * least) {
+            double light = (double)bst_streak_seen(&w->light, run, k)[ROWS];
             light = light > own ? light : own;
             if (light >= least && own >= OWN_SHARE * light) {
                 from = from < 0 ? k : from;
                 last = k;
-            } else if (light < least && is_on_frame(g, run->by_row ? p->middle : p->at,
-                                                    run->by_row ? p->at : p->middle)) {
-                if ((double)p->fall != fall) {
-                    fall = (double)p->fall;
-                    density = 1.0 / (steep * sqrt(fall));
-                }
-                double pixels = (bright ? 1.0 : SPARSE) * density;
-                draw_faint(g, run, p, pixels * own / light, light, a);
             }
         }
         if (from >= 0 && (k > last + 2 * margin || k == run->count - 1)) {
@@ -372,6 +398,7 @@ static bst_status search_run(bst_ctx *ctx, bst_generator *g, const bst_streak_ru
 /* Looks for what is seen of all runs. */
 static bst_status search_runs(bst_ctx *ctx, bst_generator *g) {
     const bst_streak_light *l = &g->streaks->light;
+    double least = g->threshold - FAINTEST_SIGMA;
     arrivals faint = {0};
     for (int i = 0; i < l->run_count; i++) {
         const bst_streak_run *run = &l->runs[i];
@@ -379,7 +406,10 @@ static bst_status search_runs(bst_ctx *ctx, bst_generator *g) {
             faint.draw = FAINT_STREAK | g->sources[run->source].name << 24;
             faint.next = draw_exponential(g, &faint);
         }
-        BST_TRY(search_run(ctx, g, run, &faint));
+        draw_faint(g, run, least, &faint);
+        if (run->dense) {
+            BST_TRY(search_bright(ctx, g, run, least));
+        }
     }
     return BST_OK;
 }

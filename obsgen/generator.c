@@ -82,7 +82,7 @@ static double between_edges(double at, double low, double high, double sigma) {
     return 0.5 * (erf((high - at) / s) - erf((low - at) / s));
 }
 
-double bst_generator_inside(const bst_generator *g, double x, double y, double sigma) {
+static inline double inside(const bst_generator *g, double x, double y, double sigma) {
     double all = ALL_SIGMAS * sigma - 0.5;
     if (x > all && y > all && x < g->width - 1 - all && y < g->height - 1 - all) {
         return 1.0;
@@ -93,6 +93,10 @@ double bst_generator_inside(const bst_generator *g, double x, double y, double s
     }
     return between_edges(x, -0.5, g->width - 0.5, sigma) *
            between_edges(y, -0.5, g->height - 0.5, sigma);
+}
+
+double bst_generator_inside(const bst_generator *g, double x, double y, double sigma) {
+    return inside(g, x, y, sigma);
 }
 
 /* SNR of a source of the truth over that of its light with the PSF alone on the frame's mean
@@ -106,6 +110,16 @@ static double sharpness(const bst_generator *g, const bst_generator_frame *f,
     return known ? fmin(fmax(item->snr / plain, 0.2), 2.0) : 1.0;
 }
 
+/* Takes from *first and *end steps along an axis that are not between two places; at: of step 0. */
+static void limit_steps(double at, double step, double low, double high, int *first, int *end) {
+    double a = (low - at) / step, b = (high - at) / step;
+    if (isfinite(a) && isfinite(b)) { /* a step more, for rounding */
+        double from = fmin(a, b) - 1.0, to = fmax(a, b) + 2.0;
+        *first = from > *first ? (int)fmin(from, *end) : *first;
+        *end = to < *end ? (int)fmax(to, *first) : *end;
+    }
+}
+
 /* How much of a source's image is on the frame. The squares of its light count: they are narrower
  * than the light. */
 static void see(const bst_generator *g, generator_source *s) {
@@ -117,10 +131,15 @@ static void see(const bst_generator *g, generator_source *s) {
     }
     double narrow = g->total_sigma * sqrt(0.5), sum = 0.0, along = 0.0;
     int parts = (int)fmin(ceil(s->length / g->sigma) + 1.0, 256.0);
-    for (int i = 0; i < parts; i++) {
+    int first = 0, end = parts;
+    double beyond = ALL_SIGMAS * narrow + 0.5, start = 0.5 / parts - 0.5;
+    limit_steps(s->x + start * s->path.dx, s->path.dx / parts, -beyond, g->width - 1 + beyond,
+                &first, &end);
+    limit_steps(s->y + start * s->path.dy, s->path.dy / parts, -beyond, g->height - 1 + beyond,
+                &first, &end);
+    for (int i = first; i < end; i++) {
         double u = (i + 0.5) / parts - 0.5;
-        double share =
-            bst_generator_inside(g, s->x + u * s->path.dx, s->y + u * s->path.dy, narrow);
+        double share = inside(g, s->x + u * s->path.dx, s->y + u * s->path.dy, narrow);
         sum += share;
         along += u * share;
     }
@@ -128,9 +147,8 @@ static void see(const bst_generator *g, generator_source *s) {
     s->seen_x += along * s->path.dx;
     s->seen_y += along * s->path.dy;
     s->visible = sum / parts;
-    s->ends =
-        0.5 * (bst_generator_inside(g, s->x - 0.5 * s->path.dx, s->y - 0.5 * s->path.dy, narrow) +
-               bst_generator_inside(g, s->x + 0.5 * s->path.dx, s->y + 0.5 * s->path.dy, narrow));
+    s->ends = 0.5 * (inside(g, s->x - 0.5 * s->path.dx, s->y - 0.5 * s->path.dy, narrow) +
+                     inside(g, s->x + 0.5 * s->path.dx, s->y + 0.5 * s->path.dy, narrow));
 }
 
 /* Where a source is on the frame; false when nothing of it is. */

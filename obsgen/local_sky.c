@@ -144,30 +144,27 @@ void bst_local_sky_settle(bst_local_sky *sky, double share, double crowding) {
     average(sky, sky->noise, error * sqrt(0.5));
 }
 
-static double mixed(const float *at, int right, int below, double x, double y) {
-    double top = (double)at[0] + x * (double)(at[right] - at[0]);
-    double bottom = (double)at[below] + x * (double)(at[below + right] - at[below]);
-    return top + y * (bottom - top);
+static void set_sides(const float *at, int right, int below, double cell[2][2]) {
+    cell[0][0] = (double)at[0];
+    cell[0][1] = (double)(at[right] - at[0]);
+    cell[1][0] = (double)at[below];
+    cell[1][1] = (double)(at[below + right] - at[below]);
 }
 
-static void mix(const bst_local_sky *sky, const bst_local_sky_place *x,
-                const bst_local_sky_place *y, double *level, double *noise) {
-    int k = y->first * sky->columns + x->first;
+void bst_local_sky_enter(const bst_local_sky *sky, int column, int row, bst_local_sky_cell *cell) {
+    int k = row * sky->columns + column;
     int right = sky->columns > 1, below = sky->rows > 1 ? sky->columns : 0;
-    *level = mixed(sky->level + k, right, below, x->part, y->part);
-    *noise = mixed(sky->noise + k, right, below, x->part, y->part);
+    cell->column = column;
+    cell->row = row;
+    set_sides(sky->level + k, right, below, cell->level);
+    set_sides(sky->noise + k, right, below, cell->noise);
 }
 
 void bst_local_sky_at(const bst_local_sky *sky, double x, double y, double *level, double *noise) {
     bst_local_sky_place across = between(x, sky->mesh, sky->columns);
     bst_local_sky_place down = between(y, sky->mesh, sky->rows);
-    mix(sky, &across, &down, level, noise);
-}
-
-void bst_local_sky_at_pixel(const bst_local_sky *sky, int x, int y, double *level, double *noise) {
-    if (x < 0 || y < 0 || x >= sky->width || y >= sky->height) {
-        bst_local_sky_at(sky, x, y, level, noise);
-        return;
-    }
-    mix(sky, &sky->places[x], &sky->places[sky->width + y], level, noise);
+    bst_local_sky_cell cell;
+    bst_local_sky_enter(sky, across.first, down.first, &cell);
+    *level = bst_local_sky_mix(cell.level, across.part, down.part);
+    *noise = bst_local_sky_mix(cell.noise, across.part, down.part);
 }

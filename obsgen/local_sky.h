@@ -14,6 +14,13 @@ typedef struct bst_local_sky_place {
     int first;
 } bst_local_sky_place;
 
+/* What is mixed between the middles of four meshes: at the upper and lower left one the value, and
+ * how much more it is at the right one. */
+typedef struct bst_local_sky_cell {
+    int column, row; /* of the upper left one */
+    double level[2][2], noise[2][2];
+} bst_local_sky_cell;
+
 typedef struct bst_local_sky {
     int mesh, columns, rows, width, height; /* px; of meshes; px */
     float *level, *noise;                   /* of each mesh, see below */
@@ -38,8 +45,23 @@ void bst_local_sky_add(bst_local_sky *sky, int x, int y, double height, double l
 void bst_local_sky_settle(bst_local_sky *sky, double share, double crowding);
 /* Both at a place, bilinear between the meshes' middles. */
 void bst_local_sky_at(const bst_local_sky *sky, double x, double y, double *level, double *noise);
-/* The same at a pixel, sooner where it is on the frame. */
-void bst_local_sky_at_pixel(const bst_local_sky *sky, int x, int y, double *level, double *noise);
+void bst_local_sky_enter(const bst_local_sky *sky, int column, int row, bst_local_sky_cell *cell);
 void bst_local_sky_free(bst_local_sky *sky);
+
+static inline double bst_local_sky_mix(const double cell[2][2], double x, double y) {
+    double top = cell[0][0] + x * cell[0][1], bottom = cell[1][0] + x * cell[1][1];
+    return top + y * (bottom - top);
+}
+
+/* Both at a pixel of the frame. cell: that of the pixel before, its column -1 at first. */
+static inline void bst_local_sky_next(const bst_local_sky *sky, bst_local_sky_cell *cell, int x,
+                                      int y, double *level, double *noise) {
+    const bst_local_sky_place *across = &sky->places[x], *down = &sky->places[sky->width + y];
+    if (cell->column != across->first || cell->row != down->first) {
+        bst_local_sky_enter(sky, across->first, down->first, cell);
+    }
+    *level = bst_local_sky_mix(cell->level, across->part, down->part);
+    *noise = bst_local_sky_mix(cell->noise, across->part, down->part);
+}
 
 #endif
