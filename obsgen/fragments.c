@@ -206,8 +206,8 @@ static void set_taken(bst_generator *g) {
 }
 
 /* cell: of the place before, as bst_local_sky_next has it. */
-static double taken_at(const bst_generator *g, bst_local_sky_cell *cell, const bst_streak_place *p,
-                       bool by_row) {
+static inline double taken_at(const bst_generator *g, bst_local_sky_cell *cell,
+                              const bst_streak_place *p, bool by_row) {
     int x = by_row ? p->middle : p->at, y = by_row ? p->at : p->middle;
     double level, noise;
     if (is_on_frame(g, x, y)) {

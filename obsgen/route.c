@@ -58,7 +58,10 @@ static void add_node(laying *l, double x, double y, double time) {
     if (l->count % GROUP == 0) {
         *b = (struct group_box){x, x, y, y};
     }
-    *b = (struct group_box){fmin(b->x0, x), fmax(b->x1, x), fmin(b->y0, y), fmax(b->y1, y)};
+    b->x0 = x < b->x0 ? x : b->x0;
+    b->x1 = x > b->x1 ? x : b->x1;
+    b->y0 = y < b->y0 ? y : b->y0;
+    b->y1 = y > b->y1 ? y : b->y1;
     l->nodes[l->count++] = (bst_route_node){x, y, time, 0.0};
 }
 

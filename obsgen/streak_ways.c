@@ -59,10 +59,11 @@ static void set_way(bst_streak_way *way, const bst_route_node *nodes, int count)
         box[0] = box[2] = INFINITY;
         box[1] = box[3] = -INFINITY;
         for (int k = i * BLOCK; k <= (i + 1) * BLOCK && k < count; k++) {
-            box[0] = fmin(box[0], way->x[k]);
-            box[1] = fmax(box[1], way->x[k]);
-            box[2] = fmin(box[2], way->y[k]);
-            box[3] = fmax(box[3], way->y[k]);
+            double x = way->x[k], y = way->y[k];
+            box[0] = x < box[0] ? x : box[0];
+            box[1] = x > box[1] ? x : box[1];
+            box[2] = y < box[2] ? y : box[2];
+            box[3] = y > box[3] ? y : box[3];
         }
     }
 }
@@ -117,20 +118,35 @@ static int floor_of(double value) {
     return whole - (value < whole);
 }
 
+/* Where places of a run are wanted: along and across. */
+typedef struct bounds {
+    double first, last, low, high;
+} bounds;
+
+/* The place at `at` on line k of a stretch; whether it is wanted. */
+static inline bool place_on(const stretch *s, const double *lights, const bounds *b, int k,
+                            double at, const making *m, bst_streak_place *p) {
+    double off = at - s->along[k], part = m->step * off > 0.0 ? off : 0.0;
+    double c = s->across[k] + part * s->slope[k];
+    int middle = floor_of(c + 0.5);
+    *p = (bst_streak_place){.at = (int)at,
+                            .middle = middle,
+                            .height = (float)(m->amplitude * (lights[k] + part * s->more[k])),
+                            .off = (float)(c - middle),
+                            .fall = (float)(m->fall * s->slant[k])};
+    return (at >= b->first) & (at <= b->last) & (c > b->low) & (c < b->high);
+}
+
 /* The places of a stretch. */
-static bst_status make_places(bst_ctx *ctx, const bst_generator *g, const bst_streak_limits *limits,
+static bst_status make_places(bst_ctx *ctx, const bst_streak_limits *limits, const bounds *b,
                               const stretch *s, const double *lights, int count, making *m) {
     bst_streak_light *l = m->light;
-    double outside = limits->beyond, low = -(outside + ROWS);
-    double wide = (m->by_row ? g->height : g->width) + outside;
-    double high = (m->by_row ? g->width : g->height) + outside + ROWS;
     double at = m->at, way = m->step;
     for (int k = 0; k < count; k++) {
-        double a = s->along[k], end = a + (s->along[k + 1] - a);
+        double end = s->along[k] + (s->along[k + 1] - s->along[k]);
         for (; way * (end - at) > 0.0; at += way) {
-            double part = way * (at - a) > 0.0 ? at - a : 0.0;
-            double c = s->across[k] + part * s->slope[k];
-            bool near = at >= -outside && at <= wide && c > low && c < high;
+            bst_streak_place p;
+            bool near = place_on(s, lights, b, k, at, m, &p);
             if (near != m->begun) {
                 BST_TRY(
                     near ? bst_streak_light_run(ctx, l, m->source, m->by_row, m->step)
@@ -138,13 +154,6 @@ static bst_status make_places(bst_ctx *ctx, const bst_generator *g, const bst_st
                 m->begun = near;
             }
             if (near) {
-                int middle = floor_of(c + 0.5);
-                const bst_streak_place p = {
-                    .at = (int)at,
-                    .middle = middle,
-                    .height = (float)(m->amplitude * (lights[k] + part * s->more[k])),
-                    .off = (float)(c - middle),
-                    .fall = (float)(m->fall * s->slant[k])};
                 BST_TRY(bst_streak_light_place(ctx, l, &p));
             }
         }
@@ -157,6 +166,9 @@ static bst_status make_places(bst_ctx *ctx, const bst_generator *g, const bst_st
 static bst_status make_runs(bst_ctx *ctx, const bst_generator *g, const bst_streak_limits *limits,
                             const bst_streak_way *way, int first, int last, const shift *by,
                             making *m) {
+    int beyond = limits->beyond, across = beyond + ROWS;
+    const bounds b = {-beyond, (m->by_row ? g->height : g->width) + beyond, -across,
+                      (m->by_row ? g->width : g->height) + across};
     m->begun = false;
     for (int k = first; k < last; k += BLOCK) {
         int count = last - k < BLOCK ? last - k : BLOCK;
@@ -165,7 +177,7 @@ static bst_status make_runs(bst_ctx *ctx, const bst_generator *g, const bst_stre
         if (k == first) {
             m->at = m->step > 0 ? ceil(s.along[0]) : floor(s.along[0]);
         }
-        BST_TRY(make_places(ctx, g, limits, &s, way->light + k, count, m));
+        BST_TRY(make_places(ctx, limits, &b, &s, way->light + k, count, m));
     }
     return m->begun ? bst_streak_light_end(ctx, m->light, limits->seen, limits->lit, limits->dense)
                     : BST_OK;

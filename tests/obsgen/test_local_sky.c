@@ -107,6 +107,14 @@ static void between_middles_it_is_straight_and_beyond_them_constant(void **state
     bst_assert_close(level, 0.0, 1e-6);
     bst_local_sky_at(&sky, SIDE - 1.0, SIDE - 1.0, &level, &noise);
     bst_assert_close(level, 33.0, 1e-6);
+    /* pixel after pixel as one by one */
+    bst_local_sky_cell cell = {.column = -1};
+    for (int k = 0; k < SIDE; k++) {
+        double same_level, same_noise;
+        bst_local_sky_next(&sky, &cell, k, SIDE - 1 - k / 3, &same_level, &same_noise);
+        bst_local_sky_at(&sky, k, SIDE - 1 - k / 3, &level, &noise);
+        assert_true(level == same_level && noise == same_noise);
+    }
     bst_local_sky_free(&sky);
     /* a frame smaller than a mesh is one */
     bst_ctx ctx = {0};

@@ -2,7 +2,9 @@
 #include "obsgen/streak_light.h"
 
 #include <stdlib.h>
+#include <string.h>
 
+#include "sim/core/simd.h"
 #include "tests/test_support.h"
 
 enum { ROWS = BST_STREAK_ROWS, LIGHT_ROWS = BST_STREAK_LIGHT_ROWS };
@@ -84,6 +86,32 @@ static void light_is_that_of_all_runs(void **state) {
     bst_streak_light_free(&l);
 }
 
+/* Vectors of all widths give the same bits. */
+static void all_widths_agree(void **state) {
+    (void)state;
+    bst_ctx ctx;
+    bst_ctx_init(&ctx, NULL, NULL, BST_LOG_ERROR);
+    bst_streak_light l = {0};
+    float *first = NULL;
+    for (int width = 4; width <= 16; width *= 2) {
+        bst_simd_limit(width);
+        bst_streak_light_begin(&l, 300, 200, true);
+        lay(&ctx, &l, 0, true, 1, -3, 20.3, 0.31, 205, 7.0);
+        lay(&ctx, &l, 1, true, -1, 190, 290.0, 0.2, 187, 3.0);
+        lay(&ctx, &l, 2, false, 1, 4, 23.4, 0.31, 250, 2.2);
+        assert_int_equal(bst_streak_light_add_up(&ctx, &l), BST_OK);
+        if (!first) {
+            first = calloc(l.seen_count, sizeof *first);
+            assert_non_null(first);
+            memcpy(first, l.seen, l.seen_count * sizeof *first);
+        }
+        assert_memory_equal(first, l.seen, l.seen_count * sizeof *first);
+    }
+    bst_simd_limit(16);
+    free(first);
+    bst_streak_light_free(&l);
+}
+
 /* A float has 6e-8; the series and its argument take a few of that: the argument in units of ln 2
  * is rounded to 24 bits, its own size times 6e-8 more. Below exp(-80) it falls no further. */
 static void light_falls_as_a_gaussian(void **state) {
@@ -107,6 +135,7 @@ static void light_falls_as_a_gaussian(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(light_is_that_of_all_runs),
+        cmocka_unit_test(all_widths_agree),
         cmocka_unit_test(light_falls_as_a_gaussian),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
