@@ -32,7 +32,7 @@ typedef struct channel {
     double rate_hz;          /* about how often it is written */
     int64_t released;        /* sequences below have been let go */
     bool apart;              /* its writer is */
-    void *mark;              /* of the hook `wants` */
+    bst_hook_mark mark;
     channel_reader *readers; /* BST_PORT_IN and BST_PORT_MODIFY ports, part of engine->readers */
     int reader_count;
     bool triggers; /* one of them is stepped for its messages */
