@@ -103,8 +103,8 @@ void bst_guidance_init(bst_guidance *guidance, const bst_guidance_config *config
 /* Takes in the mount's newest status (NULL: nothing new). */
 void bst_guidance_telemetry(bst_guidance *guidance, const bst_mount_status *mount);
 
-/* Takes in navigation's newest message: where cones and the Earth are, by an attitude telemetry with
- * this error (as bst_pointing_error has it). They hardly move between two messages. */
+/* Takes in navigation's newest message: where cones and the Earth are, by an attitude telemetry
+ * with this error (as bst_pointing_error has it). They hardly move between two messages. */
 void bst_guidance_see_sky(bst_guidance *guidance, const bst_nav_telemetry *nav, bst_quat error);
 
 /* Turns the command that would put the boresight on the aim at command->tick into the one to give:

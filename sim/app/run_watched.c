@@ -34,8 +34,8 @@ bool bst_run_wants(bst_run_watched *w, const bst_recorder *recorder, const void 
         *unwanted_before = w->kind == BST_WATCH_ALL ? 0 : INT64_MAX;
         return w->kind == BST_WATCH_ALL;
     }
-    bool due = w->recorded && tick >= w->not_due_before &&
-               bst_recorder_due(recorder, tick, &w->last);
+    bool due =
+        w->recorded && tick >= w->not_due_before && bst_recorder_due(recorder, tick, &w->last);
     if (due) {
         w->not_due_before = bst_recorder_not_due_before(recorder, w->last);
     }

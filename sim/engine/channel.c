@@ -180,8 +180,8 @@ static bst_status publish(struct bst_step *step, int port_index) {
     if (!hooks->message || step->tick < ch->mark.unwanted_before) {
         return BST_OK;
     }
-    if (hooks->wants && !hooks->wants(hooks->user, ch->scope, ch->type->name, s->payload,
-                                      step->tick, &ch->mark)) {
+    if (hooks->wants &&
+        !hooks->wants(hooks->user, ch->scope, ch->type->name, s->payload, step->tick, &ch->mark)) {
         return BST_OK;
     }
     if (engine->islands) {

@@ -10,7 +10,6 @@
 #define TICKS 1000
 #define DEG BST_DEG_RAD
 
-
 typedef struct bench {
     bst_ctx ctx;
     bst_guidance guidance;
