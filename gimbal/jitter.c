@@ -3,14 +3,8 @@
 #include <math.h>
 
 #include "gimbal/jitter_more.h"
+#include "sim/core/simd.h"
 #include "sim/core/vec.h"
-
-/* Wider vectors where the processor has them; the order of sums is the same. */
-#if defined(__x86_64__) && defined(__linux__)
-#define LINES_FUNCTION __attribute__((target_clones("default", "avx2", "avx512f")))
-#else
-#define LINES_FUNCTION
-#endif
 
 /* Rotation steps between two evaluations of the exact phase: rounding grows to about 1e-14. */
 #define RESYNC_STEPS 256
@@ -98,49 +92,38 @@ static void synchronise(bst_jitter *jitter, int64_t n) {
     }
 }
 
-/* Eight partial sums: a single chain of additions would cost more than the rotation. */
-static inline double total(const double s[8]) {
-    return ((s[0] + s[4]) + (s[1] + s[5])) + ((s[2] + s[6]) + (s[3] + s[7]));
-}
-
-/* A step further; gives the sum there. */
-LINES_FUNCTION static double rotate(bst_jitter_axis *axis) {
-    double s[8] = {0.0};
-    for (int i = 0; i < BST_JITTER_LINES; i += 8) {
-        for (int j = i; j < i + 8; j++) {
-            double re = axis->re[j] * axis->turn_re[j] - axis->im[j] * axis->turn_im[j];
-            axis->im[j] = axis->re[j] * axis->turn_im[j] + axis->im[j] * axis->turn_re[j];
-            axis->re[j] = re;
-            s[j - i] += re;
-        }
+BST_CLONES static void rotate(bst_jitter_axis *axis) {
+    for (int i = 0; i < BST_JITTER_LINES; i++) {
+        double re = axis->re[i] * axis->turn_re[i] - axis->im[i] * axis->turn_im[i];
+        axis->im[i] = axis->re[i] * axis->turn_im[i] + axis->im[i] * axis->turn_re[i];
+        axis->re[i] = re;
     }
-    return total(s);
 }
 
-LINES_FUNCTION static double sum(const bst_jitter_axis *axis) {
+/* Eight partial sums: a single chain of additions would cost more than the rotation. */
+BST_CLONES static double sum(const bst_jitter_axis *axis) {
     double s[8] = {0.0};
     for (int i = 0; i < BST_JITTER_LINES; i += 8) {
         for (int j = 0; j < 8; j++) {
             s[j] += axis->re[i + j];
         }
     }
-    return total(s);
+    return ((s[0] + s[4]) + (s[1] + s[5])) + ((s[2] + s[6]) + (s[3] + s[7]));
 }
 
 static void flat_at(bst_jitter *jitter, int64_t n, double out_rad[2]) {
     int64_t block = n - n % RESYNC_STEPS;
-    if (jitter->index < block || jitter->index >= n) {
-        if (jitter->index != n) {
-            synchronise(jitter, block);
-            jitter->index = block;
-        }
-        out_rad[0] = sum(&jitter->axis[0]);
-        out_rad[1] = sum(&jitter->axis[1]);
+    if (jitter->index < block || jitter->index > n) {
+        synchronise(jitter, block);
+        jitter->index = block;
     }
-    for (; jitter->index < n; jitter->index++) {
-        out_rad[0] = rotate(&jitter->axis[0]);
-        out_rad[1] = rotate(&jitter->axis[1]);
+    while (jitter->index < n) {
+        rotate(&jitter->axis[0]);
+        rotate(&jitter->axis[1]);
+        jitter->index++;
     }
+    out_rad[0] = sum(&jitter->axis[0]);
+    out_rad[1] = sum(&jitter->axis[1]);
 }
 
 void bst_jitter_at(bst_jitter *jitter, int64_t n, double out_rad[2]) {
