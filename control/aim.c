@@ -177,7 +177,7 @@ static bst_aberration aberration_at(const bst_control *c, int64_t tick) {
         .sun_m = nav->sun_m});
 }
 
-/* An aim that is told, or worked out and told. */
+/* Where the aim of a tick is kept, if it is known. */
 static bst_control_aimed *aimed_at(bst_control *c, int64_t tick) {
     /* commands come at a fixed period, of which Fibonacci hashing spreads the multiples evenly */
     uint64_t spread = (uint64_t)tick * UINT64_C(0x9E3779B97F4A7C15);
@@ -196,13 +196,8 @@ static void keep(const bst_control *c, bst_control_aimed *aimed, int64_t tick, b
                                  .boresight_gcrf = boresight};
 }
 
-static bst_status work_out(bst_ctx *ctx, bst_control *c, int64_t tick,
-                           const bst_control_aimed **out) {
-    bst_control_aimed *aimed = aimed_at(c, tick);
-    *out = aimed;
-    if (aimed->known) {
-        return BST_OK;
-    }
+static bst_status work_out(bst_ctx *ctx, const bst_control *c, int64_t tick,
+                           bst_control_aimed *aimed) {
     bool valid;
     bst_vec3 d = {0.0, 0.0, 0.0};
     BST_TRY(bst_control_aim(ctx, c, tick, &valid, &d));
@@ -241,14 +236,17 @@ static bst_status piece_at(bst_ctx *ctx, bst_control *c, int64_t tick,
                            const bst_control_piece **out) {
     int64_t step = c->rate_half_ticks;
     int64_t index = tick / step - (tick % step < 0);
-    bst_control_piece *piece =
-        &c->pieces[((index % BST_CONTROL_PIECES) + BST_CONTROL_PIECES) % BST_CONTROL_PIECES];
+    bst_control_piece *piece = &c->pieces[(uint64_t)index % BST_CONTROL_PIECES];
+    _Static_assert((BST_CONTROL_PIECES & (BST_CONTROL_PIECES - 1)) == 0, "divides 2^64");
     *out = NULL;
     if (!piece->made || piece->index != index || !is_fresh(c, piece->nav_tick)) {
         bool valid = true;
         for (int i = 0; i < BST_QUINTIC_POINTS && valid; i++) {
-            const bst_control_aimed *aimed;
-            BST_TRY(work_out(ctx, c, (index - BST_QUINTIC_BEFORE + i) * step, &aimed));
+            int64_t at = (index - BST_QUINTIC_BEFORE + i) * step;
+            bst_control_aimed *aimed = aimed_at(c, at);
+            if (!aimed->known) {
+                BST_TRY(work_out(ctx, c, at, aimed));
+            }
             valid = aimed->valid;
             piece->way[i] = aimed->boresight_gcrf;
         }
@@ -263,17 +261,19 @@ static bst_status piece_at(bst_ctx *ctx, bst_control *c, int64_t tick,
 
 bst_status bst_control_boresight_at(bst_ctx *ctx, bst_control *c, int64_t tick, bool *valid,
                                     bst_vec3 *direction) {
-    const bst_control_piece *piece = NULL;
-    bst_control_aimed *told = aimed_at(c, tick);
-    const bst_control_aimed *aimed = told;
-    if (!told->known && goes_smoothly(c, tick)) {
-        BST_TRY(piece_at(ctx, c, tick, &piece));
-    }
-    if (piece) {
-        double u = (double)(tick - piece->index * c->rate_half_ticks) / (double)c->rate_half_ticks;
-        keep(c, told, tick, true, bst_quintic_at(piece->way, u));
-    } else {
-        BST_TRY(work_out(ctx, c, tick, &aimed));
+    bst_control_aimed *aimed = aimed_at(c, tick);
+    if (!aimed->known) {
+        const bst_control_piece *piece = NULL;
+        if (goes_smoothly(c, tick)) {
+            BST_TRY(piece_at(ctx, c, tick, &piece));
+        }
+        if (piece) {
+            double u =
+                (double)(tick - piece->index * c->rate_half_ticks) / (double)c->rate_half_ticks;
+            keep(c, aimed, tick, true, bst_quintic_at(piece->way, u));
+        } else {
+            BST_TRY(work_out(ctx, c, tick, aimed));
+        }
     }
     *valid = aimed->valid;
     if (*valid) {

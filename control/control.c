@@ -218,7 +218,11 @@ bst_status bst_control_update(bst_ctx *ctx, bst_control *c, int64_t tick, bool *
         boresight =
             bst_quat_rotate(bst_quat_conj(c->pointing.q_cam_from_gcrf), (bst_vec3){0, 0, 1});
     }
-    bst_quat error = bst_pointing_error_at(&c->pointing_error, effect, c->env.tick_rate_hz);
-    return bst_guidance_command(ctx, &c->guidance, &c->nav, &error,
-                                c->pointing_valid ? &boresight : NULL, command, commanded);
+    if (!c->guidance.nav_known || c->guidance.nav.tick != c->nav.tick) {
+        bst_guidance_see_sky(
+            &c->guidance, &c->nav,
+            bst_pointing_error_at(&c->pointing_error, effect, c->env.tick_rate_hz));
+    }
+    return bst_guidance_command(ctx, &c->guidance, c->pointing_valid ? &boresight : NULL, command,
+                                commanded);
 }

@@ -419,15 +419,13 @@ static bst_status shape(bst_ctx *ctx, bst_guidance *g, const bst_vec3 *boresight
     return BST_OK;
 }
 
-/* Cones and the Earth as the attitude telemetry sees them; they hardly move between two messages of
- * navigation. */
-static void see_sky(bst_guidance *g, const bst_nav_telemetry *nav, const bst_quat *error) {
+void bst_guidance_see_sky(bst_guidance *g, const bst_nav_telemetry *nav, bst_quat error) {
     g->nav = *nav;
     g->nav_known = true;
-    g->nav.position_gcrf_m = bst_quat_rotate(*error, nav->position_gcrf_m);
-    g->nav.velocity_gcrf_mps = bst_quat_rotate(*error, nav->velocity_gcrf_mps);
-    g->nav.sun_m = bst_quat_rotate(*error, nav->sun_m);
-    g->nav.moon_m = bst_quat_rotate(*error, nav->moon_m);
+    g->nav.position_gcrf_m = bst_quat_rotate(error, nav->position_gcrf_m);
+    g->nav.velocity_gcrf_mps = bst_quat_rotate(error, nav->velocity_gcrf_mps);
+    g->nav.sun_m = bst_quat_rotate(error, nav->sun_m);
+    g->nav.moon_m = bst_quat_rotate(error, nav->moon_m);
     g->zone_count = bst_guidance_zones(g, &g->nav, g->zones);
     for (int i = 0; i < g->zone_count; i++) {
         double *half = &g->zones[i].half_angle_rad;
@@ -435,13 +433,9 @@ static void see_sky(bst_guidance *g, const bst_nav_telemetry *nav, const bst_qua
     }
 }
 
-bst_status bst_guidance_command(bst_ctx *ctx, bst_guidance *g, const bst_nav_telemetry *nav,
-                                const bst_quat *error, const bst_vec3 *boresight,
+bst_status bst_guidance_command(bst_ctx *ctx, bst_guidance *g, const bst_vec3 *boresight,
                                 bst_los_command *command, bool *give) {
     *give = true;
-    if (!g->nav_known || nav->tick != g->nav.tick) {
-        see_sky(g, nav, error);
-    }
     if (g->config.look_ahead_s > 0.0 && command->tick >= g->ahead_tick) {
         g->ahead_tick =
             command->tick + (int64_t)llround(g->config.look_ahead_every_s * g->env.tick_rate_hz);

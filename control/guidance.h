@@ -103,15 +103,17 @@ void bst_guidance_init(bst_guidance *guidance, const bst_guidance_config *config
 /* Takes in the mount's newest status (NULL: nothing new). */
 void bst_guidance_telemetry(bst_guidance *guidance, const bst_mount_status *mount);
 
+/* Takes in navigation's newest message: where cones and the Earth are, by an attitude telemetry
+ * with this error (as bst_pointing_error has it). They hardly move between two messages. */
+void bst_guidance_see_sky(bst_guidance *guidance, const bst_nav_telemetry *nav, bst_quat error);
+
 /* Turns the command that would put the boresight on the aim at command->tick into the one to give:
  * itself, unless keep-out cones are set, slews planned or turns to be chosen, and it is farther
  * than slew_above_deg from the last command (at first: from the present boresight) or within a
- * cone. `error`: of the telemetry's attitude, as bst_pointing_error has it. `boresight`: unit, the
- * telemetry's, NULL when there is none yet: then a slew cannot be planned, and *give is false:
- * there is to be no command. Looks ahead when that is due; what is found is in events, which the
- * caller empties (event_count = 0). */
-bst_status bst_guidance_command(bst_ctx *ctx, bst_guidance *guidance, const bst_nav_telemetry *nav,
-                                const bst_quat *error, const bst_vec3 *boresight,
+ * cone. `boresight`: unit, the telemetry's, NULL when there is none yet: then a slew cannot be
+ * planned, and *give is false: there is to be no command. Looks ahead when that is due; what is
+ * found is in events, which the caller empties (event_count = 0). */
+bst_status bst_guidance_command(bst_ctx *ctx, bst_guidance *guidance, const bst_vec3 *boresight,
                                 bst_los_command *command, bool *give) BST_MUST_CHECK;
 
 /* The cones of keep-out at present. */

@@ -3,14 +3,8 @@
 #include <math.h>
 
 #include "gimbal/jitter_more.h"
+#include "sim/core/simd.h"
 #include "sim/core/vec.h"
-
-/* Wider vectors where the processor has them; the order of sums is the same. */
-#if defined(__x86_64__) && defined(__linux__)
-#define LINES_FUNCTION __attribute__((target_clones("default", "avx2", "avx512f")))
-#else
-#define LINES_FUNCTION
-#endif
 
 /* Rotation steps between two evaluations of the exact phase: rounding grows to about 1e-14. */
 #define RESYNC_STEPS 256
@@ -98,7 +92,7 @@ static void synchronise(bst_jitter *jitter, int64_t n) {
     }
 }
 
-LINES_FUNCTION static void rotate(bst_jitter_axis *axis) {
+BST_CLONES static void rotate(bst_jitter_axis *axis) {
     for (int i = 0; i < BST_JITTER_LINES; i++) {
         double re = axis->re[i] * axis->turn_re[i] - axis->im[i] * axis->turn_im[i];
         axis->im[i] = axis->re[i] * axis->turn_im[i] + axis->im[i] * axis->turn_re[i];
@@ -107,7 +101,7 @@ LINES_FUNCTION static void rotate(bst_jitter_axis *axis) {
 }
 
 /* Eight partial sums: a single chain of additions would cost more than the rotation. */
-LINES_FUNCTION static double sum(const bst_jitter_axis *axis) {
+BST_CLONES static double sum(const bst_jitter_axis *axis) {
     double s[8] = {0.0};
     for (int i = 0; i < BST_JITTER_LINES; i += 8) {
         for (int j = 0; j < 8; j++) {

@@ -183,21 +183,26 @@ static void target(const bst_two_axis *plant, const bst_los_command *command, do
 }
 
 void bst_two_axis_status(const bst_two_axis *plant, int64_t tick, bst_mount_status *out) {
-    *out =
-        (bst_mount_status){.tick = tick, .axes = 2, .q_body_from_cam_at_zero = BST_QUAT_IDENTITY};
+    if (out->axes == 0) {
+        *out = (bst_mount_status){.axes = 2, .q_body_from_cam_at_zero = BST_QUAT_IDENTITY};
+        for (int i = 0; i < 2; i++) {
+            const bst_axis_spec *spec = &plant->axis[i].spec;
+            out->axis[i] =
+                (bst_mount_axis){.axis_body = i == 0 ? (bst_vec3){0, 1, 0} : (bst_vec3){1, 0, 0},
+                                 .rate_limit_radps = spec->rate_limit_radps,
+                                 .accel_limit_radps2 = spec->accel_limit_radps2};
+        }
+        out->axis[1].min_rad = -plant->inner_travel_rad;
+        out->axis[1].max_rad = plant->inner_travel_rad;
+    }
+    out->tick = tick;
     bst_platform_add_status(&plant->platform, plant->q_measured_body_from_gcrf, out);
     for (int i = 0; i < 2; i++) {
         const bst_axis *axis = &plant->axis[i];
-        out->axis[i] =
-            (bst_mount_axis){.axis_body = i == 0 ? (bst_vec3){0, 1, 0} : (bst_vec3){1, 0, 0},
-                             .angle_rad = plant->encoder_rad[i],
-                             .rate_radps = axis->reference_radps,
-                             .rate_limit_radps = axis->spec.rate_limit_radps,
-                             .accel_limit_radps2 = axis->spec.accel_limit_radps2,
-                             .flags = axis->limited ? BST_AXIS_SATURATED : 0u};
+        out->axis[i].angle_rad = plant->encoder_rad[i];
+        out->axis[i].rate_radps = axis->reference_radps;
+        out->axis[i].flags = axis->limited ? BST_AXIS_SATURATED : 0u;
     }
-    out->axis[1].min_rad = -plant->inner_travel_rad;
-    out->axis[1].max_rad = plant->inner_travel_rad;
     out->axis[1].flags |= plant->at_stop ? BST_AXIS_AT_STOP : 0u;
 }
 

@@ -60,7 +60,8 @@ bst_status bst_two_axis_init(bst_ctx *ctx, bst_two_axis *plant, const bst_two_ax
 void bst_two_axis_step(bst_two_axis *plant, const bst_los_command *command, double command_age_s,
                        bool measure);
 
-/* Geometry, limits and state as of the last step that measured. */
+/* Geometry, limits and state as of the last step that measured; `out` zero, or of an earlier call
+ * for this plant. */
 void bst_two_axis_status(const bst_two_axis *plant, int64_t tick, bst_mount_status *out);
 
 /* Gimbal angles (outer in (-pi, pi], inner in [-pi/2, pi/2]) and their rates that put the boresight

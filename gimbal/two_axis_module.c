@@ -63,7 +63,7 @@ static bst_status step(void *self, struct bst_step *s) {
             .limited = plant->limited};
         bst_mount_status *status = bst_step_write(s, BST_GIMBAL_MOUNT, NULL);
         bst_two_axis_status(plant, bst_step_tick(s), status);
-        bst_gimbal_publish_reading(s, &plant->platform, &reading, status);
+        bst_gimbal_publish_reading(s, &plant->platform, &reading, NULL);
     }
     return bst_gimbal_publish_nav(s, &m->base, n);
 }

@@ -1,11 +1,12 @@
 #include "imgproc/image.h"
 
 #include <math.h>
-#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { PARTS = 3, SIDE = BST_PSF_MAX_SIDE + BST_LANES };
+#include "imgproc/image_internal.h"
+
+enum { SIDE = BST_PSF_MAX_SIDE + BST_LANES };
 
 bst_status bst_profiles_create(bst_ctx *ctx, const bst_known_psf *known, bst_profiles *out) {
     *out = (bst_profiles){.known = known, .binning = 1};

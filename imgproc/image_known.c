@@ -2,9 +2,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "imgproc/image.h"
-
-enum { PARTS = 3, SIDE = BST_PSF_MAX_SIDE + BST_LANES };
+#include "imgproc/image_internal.h"
 
 /* One function's profile about a centre that is `phase` of the table's steps past -1/2 px. */
 static void add_profile(const bst_profiles *p, const double *samples, int phase, float *row) {
@@ -61,31 +59,6 @@ typedef struct mix {
     int count, node[4];
     float weight[4];
 } mix;
-
-/* Where a profile about `centre` comes to lie on pixels 0 to side - 1. */
-typedef struct laid {
-    int before, phase, first, end; /* first and end of the part that is not 0 */
-    float fraction;
-} laid;
-
-static inline bool lay(const bst_profiles *t, double centre, int side, laid *out) {
-    if (!(fabs(centre) < 1e6)) {
-        return false;
-    }
-    double at = floor(centre + 0.5), u = (centre + 0.5 - at) * BST_PROFILE_PHASES;
-    int phase = (int)u;
-    out->phase = phase < BST_PROFILE_PHASES ? phase : BST_PROFILE_PHASES - 1;
-    out->fraction = (float)(u - out->phase);
-    out->before = (int)at - t->half;
-    out->first = (int)at - t->reach;
-    out->end = (int)at + t->reach + 1;
-    if (out->first >= side || out->end <= 0) {
-        return false;
-    }
-    out->first = out->first < 0 ? 0 : out->first;
-    out->end = out->end < side ? out->end : side;
-    return true;
-}
 
 #define BST_SIMD_KERNELS "imgproc/image_known_kernels.inc"
 #include "sim/core/simd_each.inc"

@@ -2,9 +2,6 @@
 
 #include <math.h>
 #include <string.h>
-#ifdef __SSE__
-#include <xmmintrin.h>
-#endif
 
 #include "imgproc/background.h"
 #include "imgproc/lanes.h"
@@ -139,13 +136,6 @@ static uint16_t greatest(const uint16_t *raw, int count) {
     return top;
 }
 
-/* Makes what was streamed visible to other threads. */
-static inline void end_stream(void) {
-#ifdef __SSE__
-    _mm_sfence();
-#endif
-}
-
 static bool may_stream(const float *to) {
     return (uintptr_t)to % 16 == 0;
 }
@@ -164,7 +154,7 @@ void bst_row_normalise(const uint16_t *raw, const float *electrons, const bst_ro
     }
     BST_SIMD_PICK(take_level_off)(electrons, parts, count, stream_it, signal, normalised);
     if (stream_it) {
-        end_stream();
+        bst_end_stream();
     }
     int first = greatest(raw, width) >= saturated_dn ? 0 : width;
     for (int x = first; x < width; x++) {
@@ -272,7 +262,7 @@ void bst_row_streak(float *out, float *copy, int count, const float *const *in, 
     bool streamed = copy && may_stream(copy);
     int x = BST_SIMD_PICK(streak)(out, streamed ? copy : NULL, count, in, weight, taps, floor);
     if (streamed) {
-        end_stream();
+        bst_end_stream();
     }
     int whole = streamed ? x : 0;
     for (; x < count; x++) {

@@ -3,6 +3,8 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "sim/core/simd.h"
+
 /* Draws of pixels; those of other clutter stay below. */
 static const uint64_t PIXEL_NOISE = (uint64_t)1 << 60;
 
@@ -13,13 +15,6 @@ enum {
     BEFORE = 8, /* pixels across before those that are asked for, and all */
     WHITE = BEFORE + BST_STREAK_NOISE + 2 * BST_STREAK_TAPS + 14
 };
-
-/* Wider vectors where the processor has them; what comes out is the same. */
-#if defined(__x86_64__) && defined(__linux__)
-#define LANES_FUNCTION __attribute__((target_clones("default", "avx2", "avx512f")))
-#else
-#define LANES_FUNCTION
-#endif
 
 void bst_streak_noise_set(bst_streak_noise *w, double sigma) {
     if (w->sigma == sigma) {
@@ -58,7 +53,7 @@ typedef struct lanes {
     uint32_t c0[LANES], c1[LANES], c2[LANES], c3[LANES];
 } lanes;
 
-LANES_FUNCTION static void draw_lanes(bst_rng_key key, lanes *l) {
+BST_CLONES static void draw_lanes(bst_rng_key key, lanes *l) {
     uint32_t key0 = key.k[0], key1 = key.k[1];
     for (int round = 0; round < 10; round++) {
         for (int i = 0; i < LANES; i++) {

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "scenegen/light_fft_internal.h"
+#include "sim/core/simd.h"
 
 static bench *take_bench(bst_light_fft *f) {
     for (int i = 0;; i = (i + 1) % f->bench_count) {
@@ -10,13 +11,6 @@ static bench *take_bench(bst_light_fft *f) {
             return &f->benches[i];
         }
     }
-}
-
-/* Makes what was streamed visible to other threads. */
-static void end_stream(void) {
-#ifdef BST_SIMD_X86
-    __builtin_ia32_sfence();
-#endif
 }
 
 #define BST_SIMD_KERNELS "scenegen/light_fft_kernels.inc"
@@ -58,7 +52,7 @@ static void rows_forward(void *user, int begin, int end) {
             }
         }
     }
-    end_stream();
+    bst_end_stream();
     atomic_flag_clear(&w->taken);
 }
 
@@ -109,7 +103,7 @@ static void columns(void *user, int begin, int end) {
             BST_SIMD_PICK(store_image)(f, c, sum);
         }
     }
-    end_stream();
+    bst_end_stream();
     atomic_flag_clear(&w->taken);
 }
 
@@ -122,6 +116,7 @@ void bst_light_fft_add(bst_light_fft *f, int node, bool first, bool last, const 
 /* ------------------------------------------------------------------ rows inverse */
 
 /* Far wings of a row at the cells' centres. */
+BST_CLONES
 static void row_of_wings(const bst_light_fft *f, int row, float *out) {
     int j;
     float v = (float)bst_light_fft_cell_place(f, &f->shape.y, f->cells_y, row, &j);
@@ -151,7 +146,7 @@ static void rows_inverse(void *user, int begin, int end) {
             BST_SIMD_PICK(store_rows)(f, w->line, k > a, rows, f->wraps ? w->wings : NULL, image);
         }
     }
-    end_stream();
+    bst_end_stream();
     atomic_flag_clear(&w->taken);
 }
 

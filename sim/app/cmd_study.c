@@ -19,6 +19,7 @@
 #include "sim/app/study_plugins.h"
 #include "sim/core/folder.h"
 #include "sim/core/wall_clock.h"
+#include "sim/io/draft_file.h"
 #include "sim/io/manifest.h"
 #include "sim/io/run_store.h"
 #include "sim/studies/driver.h"
@@ -254,6 +255,7 @@ static int run_study(bst_ctx *ctx, const study_request *r, const bst_study *stud
     }
     bst_status status = open_folder(ctx, study, out, r->resume, false, &lock);
     if (status == BST_OK) {
+        bst_draft_sweep(out); /* under the lock: a driver's that was killed */
         status = bst_study_plugins_settle(ctx, kind->user, out);
     }
     if (status == BST_OK) {

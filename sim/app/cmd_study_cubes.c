@@ -200,16 +200,17 @@ static bst_status take_truth(cube *c, const bst_truth *truth) {
 }
 
 static bool wants(void *user, const char *scope, const char *channel, const void *payload,
-                  int64_t tick, void **mark) {
+                  int64_t tick, bst_hook_mark *mark) {
     cube *c = user;
     (void)payload;
     (void)tick;
-    if (!*mark) {
+    if (!mark->of) {
         bool looked_at = strcmp(scope, c->scope) == 0 && (strcmp(channel, BST_CHANNEL_FRAME) == 0 ||
                                                           strcmp(channel, BST_CHANNEL_TRUTH) == 0);
-        *mark = looked_at ? (void *)c : (void *)c->scope;
+        mark->of = c;
+        mark->unwanted_before = looked_at ? 0 : INT64_MAX;
     }
-    return *mark == c;
+    return mark->unwanted_before == 0;
 }
 
 static bst_status on_message(void *user, const char *scope, const char *channel,

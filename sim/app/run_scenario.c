@@ -65,17 +65,17 @@ static watched_sensor *find_sensor(run_state *run, const char *scope) {
 
 /* Spares what nobody below looks at: much of it comes at the plant's rate. */
 static bool wants(void *user, const char *scope, const char *channel, const void *payload,
-                  int64_t tick, void **mark) {
+                  int64_t tick, bst_hook_mark *mark) {
     run_state *run = user;
-    if (!*mark) {
+    if (!mark->of) {
         watched_sensor *sensor = find_sensor(run, scope);
         if (sensor->channel_count == WATCHED_CHANNELS) {
             return true;
         }
-        *mark = &sensor->channels[sensor->channel_count++];
-        bst_run_watch(*mark, run->recorder, channel);
+        mark->of = &sensor->channels[sensor->channel_count++];
+        bst_run_watch(mark->of, run->recorder, channel);
     }
-    return bst_run_wants(*mark, run->recorder, payload, tick);
+    return bst_run_wants(mark->of, run->recorder, payload, tick, &mark->unwanted_before);
 }
 
 static bst_status judge(run_state *run, watched_sensor *sensor, const char *channel,

@@ -29,11 +29,19 @@ void bst_run_watch(bst_run_watched *w, const bst_recorder *recorder, const char 
 }
 
 bool bst_run_wants(bst_run_watched *w, const bst_recorder *recorder, const void *payload,
-                   int64_t tick) {
+                   int64_t tick, int64_t *unwanted_before) {
     if (w->kind == BST_WATCH_NONE || w->kind == BST_WATCH_ALL) {
+        *unwanted_before = w->kind == BST_WATCH_ALL ? 0 : INT64_MAX;
         return w->kind == BST_WATCH_ALL;
     }
-    bool due = w->recorded && bst_recorder_due(recorder, tick, &w->last);
+    bool due =
+        w->recorded && tick >= w->not_due_before && bst_recorder_due(recorder, tick, &w->last);
+    if (due) {
+        w->not_due_before = bst_recorder_not_due_before(recorder, w->last);
+    }
+    if (w->kind == BST_WATCH_TELEMETRY) {
+        *unwanted_before = w->not_due_before;
+    }
     if (w->kind == BST_WATCH_STATUS) {
         const bst_control_status *status = payload;
         due = due || status->mode != w->mode || status->target_id != w->target_id;

@@ -16,7 +16,8 @@ typedef enum bst_run_watch_kind {
 typedef struct bst_run_watched {
     bst_run_watch_kind kind;
     bool recorded;
-    int64_t last; /* on the recorder's grid */
+    int64_t last;           /* on the recorder's grid */
+    int64_t not_due_before; /* tick */
     /* of control_status, the latest */
     int32_t mode;
     int64_t target_id;
@@ -25,8 +26,9 @@ typedef struct bst_run_watched {
 /* `channel`: its unscoped name. */
 void bst_run_watch(bst_run_watched *watched, const bst_recorder *recorder, const char *channel);
 
-/* Whether a message is looked at; every message is asked for, in order. */
+/* Whether a message is looked at; messages are asked for in order. None need be before the tick
+ * *unwanted_before, which is put forward where it can be. */
 bool bst_run_wants(bst_run_watched *watched, const bst_recorder *recorder, const void *payload,
-                   int64_t tick);
+                   int64_t tick, int64_t *unwanted_before);
 
 #endif

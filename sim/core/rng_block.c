@@ -3,14 +3,8 @@
 #include <string.h>
 
 #include "sim/core/rng.h"
+#include "sim/core/simd.h"
 #include "sim/core/vec.h"
-
-/* Wider vectors where the processor has them; what comes out is the same. */
-#if defined(__x86_64__) && defined(__linux__)
-#define BLOCK_FUNCTION __attribute__((target_clones("default", "avx2", "avx512f")))
-#else
-#define BLOCK_FUNCTION
-#endif
 
 enum { COUNT = BST_RNG_BLOCK };
 
@@ -52,8 +46,8 @@ static inline void turn_of(double u, double *cosine, double *sine) {
     *sine = quarters & 2 ? -b : b;
 }
 
-BLOCK_FUNCTION void bst_rng_normal_block(bst_rng_key key, uint64_t first,
-                                         double out[2][BST_RNG_BLOCK]) {
+BST_CLONES void bst_rng_normal_block(bst_rng_key key, uint64_t first,
+                                     double out[2][BST_RNG_BLOCK]) {
     uint32_t c0[COUNT], c1[COUNT], c2[COUNT], c3[COUNT], key0 = key.k[0], key1 = key.k[1];
     for (int i = 0; i < COUNT; i++) {
         uint64_t a = first + (uint64_t)i;

@@ -1,4 +1,5 @@
-/* Vectors of floats as wide as the processor has them.
+/* Vectors of floats as wide as the processor has them: made by the compiler of plain loops in
+ * functions marked BST_CLONES, or written.
  *
  * A file of kernels is compiled once for each width:
  *
@@ -16,9 +17,25 @@
 #define BST_CORE_SIMD_H
 
 #include <stdint.h>
+#include <string.h>
 
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
 #define BST_SIMD_X86
+#endif
+
+/* Marks a function of plain loops, compiled for several instruction sets of which the loader picks
+ * one; not with sanitizers, which are not ready when it does. */
+#if defined(BST_SIMD_X86) && defined(__linux__) && !defined(__SANITIZE_ADDRESS__) && \
+    !defined(__SANITIZE_THREAD__)
+#define BST_CLONES __attribute__((target_clones("default", "avx2", "avx512f")))
+/* for comparisons that are kept as numbers, which 512-bit registers are slow at */
+#define BST_CLONES_256 __attribute__((target_clones("default", "avx2")))
+/* for 16-bit numbers */
+#define BST_CLONES_16 __attribute__((target_clones("default", "avx2", "arch=skylake-avx512")))
+#else
+#define BST_CLONES
+#define BST_CLONES_256
+#define BST_CLONES_16
 #endif
 
 #define BST_SIMD_TYPES(width)                                                   \
@@ -37,6 +54,28 @@ BST_SIMD_TYPES(16)
 /* the greater of v and 0 */
 #define BST_ABOVE_0(v) ((bst_floats)((bst_ints)(v) & ((v) > 0.0f)))
 #define BST_SIMD_INLINE static inline __attribute__((always_inline))
+
+/* A vector of kernels to memory that lies on 16 bytes, past the caches: what is written is not read
+ * first, as it is when a part of a line is written. bst_end_stream() before other threads read. */
+#ifdef BST_SIMD_X86
+#define BST_STREAM(to, v) bst_stream(to, (const char *)&(v), BST_WIDTH)
+BST_SIMD_INLINE void bst_stream(float *to, const char *from, int floats) {
+    for (int i = 0; i < floats; i += 4) {
+        bst_floats_4 part;
+        memcpy(&part, from + sizeof(float) * (size_t)i, sizeof part);
+        __builtin_ia32_movntps(to + i, part);
+    }
+}
+#else
+#define BST_STREAM(to, v) BST_STORE(to, v)
+#endif
+
+/* Makes what was streamed visible to other threads. */
+static inline void bst_end_stream(void) {
+#ifdef BST_SIMD_X86
+    __builtin_ia32_sfence();
+#endif
+}
 
 /* Floats of the widest vectors that the processor has and bst_simd_limit lets be: 4, 8 or 16. */
 int bst_simd_floats(void);

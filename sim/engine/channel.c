@@ -104,6 +104,11 @@ bst_sample bst_step_latest(struct bst_step *step, int port_index) {
     if (step->self->reads_aside) {
         return bst_islands_latest(step, port_index);
     }
+    const slot *s = bst_engine_slot(ch, ch->written - 1);
+    if (ch->written > 0 && port->max_age_ticks == 0 &&
+        s->written_tick + port->delay_ticks <= step->tick) {
+        return (bst_sample){s->payload, s->written_tick, ch->written - 1, false}; /* as mostly */
+    }
     return sample_at(step, ch, port, bst_engine_newest(ch, port, step->tick));
 }
 
@@ -177,8 +182,11 @@ static bst_status publish(struct bst_step *step, int port_index) {
         }
     }
     const bst_engine_hooks *hooks = &engine->hooks;
-    if (!hooks->message || (hooks->wants && !hooks->wants(hooks->user, ch->scope, ch->type->name,
-                                                          s->payload, step->tick, &ch->mark))) {
+    if (!hooks->message || step->tick < ch->mark.unwanted_before) {
+        return BST_OK;
+    }
+    if (hooks->wants &&
+        !hooks->wants(hooks->user, ch->scope, ch->type->name, s->payload, step->tick, &ch->mark)) {
         return BST_OK;
     }
     if (engine->islands) {

@@ -41,6 +41,12 @@ typedef struct bst_instance_spec {
     uint64_t seed, run;
 } bst_instance_spec;
 
+/* What the hook `wants` keeps about a channel; zero at first. */
+typedef struct bst_hook_mark {
+    void *of;
+    int64_t unwanted_before; /* tick: earlier messages are not asked for */
+} bst_hook_mark;
+
 /* Sees what happens; any member may be NULL. `message` and `event` are called by one thread at a
  * time in the order in which things happen: the stepping one, or when overlapping the one behind
  * it. The others are called by the stepping thread. */
@@ -53,11 +59,10 @@ typedef struct bst_engine_hooks {
                         const char *text);
     /* Asked about every 20 ms of wall time; true ends the run with BST_ERR_INTERRUPTED. */
     bool (*interrupted)(void *user, int64_t tick);
-    /* False spares `message` one that it would ignore. Asked at every message, before `message`
-     * and always by the thread that steps; *mark is the channel's, NULL at first, to keep what was
-     * found out about it. */
+    /* False spares `message` one that it would ignore. Asked at every message from the mark's tick
+     * on, before `message` and always by the thread that steps. */
     bool (*wants)(void *user, const char *scope, const char *channel, const void *payload,
-                  int64_t tick, void **mark);
+                  int64_t tick, bst_hook_mark *mark);
     /* Where `message` and `event` leave why they failed. NULL: in the context of the run; when
      * overlapping, give them one of their own. */
     bst_ctx *ctx;

@@ -28,11 +28,11 @@ typedef struct channel {
     int head;        /* slot of the next message */
     int64_t written; /* messages so far */
     size_t payload_bytes;
-    int capacity;            /* items */
-    double rate_hz;          /* about how often it is written */
-    int64_t released;        /* sequences below have been let go */
-    bool apart;              /* its writer is */
-    void *mark;              /* of the hook `wants` */
+    int capacity;     /* items */
+    double rate_hz;   /* about how often it is written */
+    int64_t released; /* sequences below have been let go */
+    bool apart;       /* its writer is */
+    bst_hook_mark mark;
     channel_reader *readers; /* BST_PORT_IN and BST_PORT_MODIFY ports, part of engine->readers */
     int reader_count;
     bool triggers; /* one of them is stepped for its messages */

@@ -79,6 +79,8 @@ bool bst_recorder_wants(const bst_recorder *recorder, const char *channel);
 /* Whether telemetry is recorded at this tick, the next of its grid after *last (-1 at first), which
  * is updated. */
 bool bst_recorder_due(const bst_recorder *recorder, int64_t tick, int64_t *last);
+/* No tick below this is due after `last`. */
+int64_t bst_recorder_not_due_before(const bst_recorder *recorder, int64_t last);
 
 /* Records a message that was written at `written_tick`. Frames are retained until their truth is
  * there, at most one per sensor. Channels that are not wanted are ignored. Telemetry written in

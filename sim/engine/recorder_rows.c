@@ -53,11 +53,14 @@ static double mid_seconds(const bst_recorder *recorder, int64_t start_tick, int6
     return 0.5 * (double)(start_tick + end_tick) / (double)recorder->tick_rate_hz;
 }
 
+int64_t bst_recorder_not_due_before(const bst_recorder *recorder, int64_t last) {
+    double hz = recorder->config.telemetry_hz, rate = (double)recorder->tick_rate_hz;
+    double next = ((double)last + 1.0 - 1e-6) * rate / hz;
+    return hz > 0.0 && next < 9e15 ? (int64_t)floor(next) : INT64_MAX;
+}
+
 bool bst_recorder_due(const bst_recorder *recorder, int64_t tick, int64_t *last) {
     double hz = recorder->config.telemetry_hz, rate = (double)recorder->tick_rate_hz;
-    if ((double)tick * hz < ((double)*last + 1.0 - 1e-6) * rate) {
-        return false; /* far from due: most messages of the plant are */
-    }
     /* a grid point that falls on a tick may come out a rounding error below it */
     double period = (double)tick * hz / rate;
     int64_t now = (int64_t)floor(period + 1e-9);

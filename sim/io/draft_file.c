@@ -1,6 +1,8 @@
 #include "sim/io/draft_file.h"
 
+#include <dirent.h>
 #include <errno.h>
+#include <stdbool.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -44,4 +46,23 @@ bst_status bst_draft_close(bst_ctx *ctx, bst_draft *draft, bst_status status) {
     return status != BST_OK ? status
                             : bst_fail(ctx, BST_ERR_IO, "%s: cannot be written: %s", draft->path,
                                        strerror(error));
+}
+
+/* NAME.tmp.PROCESS */
+static bool is_draft(const char *name) {
+    const char *end = strrchr(name, '.');
+    return end && end[1] && end[1 + strspn(end + 1, "0123456789")] == '\0' && end - name > 4 &&
+           strncmp(end - 4, ".tmp", 4) == 0;
+}
+
+void bst_draft_sweep(const char *folder) {
+    DIR *dir = opendir(folder);
+    for (struct dirent *entry; dir && (entry = readdir(dir)) != NULL;) {
+        if (is_draft(entry->d_name)) {
+            (void)unlinkat(dirfd(dir), entry->d_name, 0); /* not a folder */
+        }
+    }
+    if (dir) {
+        closedir(dir);
+    }
 }

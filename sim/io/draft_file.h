@@ -20,4 +20,8 @@ bst_status bst_draft_open(bst_ctx *ctx, const char *path, bst_draft *out) BST_MU
  * with path and reason. */
 bst_status bst_draft_close(bst_ctx *ctx, bst_draft *draft, bst_status status) BST_MUST_CHECK;
 
+/* Removes drafts (of this module, of bst_write_file_atomic and of tables) that killed programs left
+ * in a folder. Nobody else may be writing there. */
+void bst_draft_sweep(const char *folder);
+
 #endif

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "sim/core/parallel.h"
+#include "sim/core/simd.h"
 
 /* Knots of the polynomial, and those that its error is estimated from: its own and one more on
  * either side. */
@@ -343,13 +344,6 @@ static table *table_at(bst_ephemeris *e, int64_t index) {
     return t;
 }
 
-/* Wider vectors where the processor has them; what comes out is the same. */
-#if defined(__x86_64__) && defined(__linux__)
-#define LANES_FUNCTION __attribute__((target_clones("default", "avx2")))
-#else
-#define LANES_FUNCTION
-#endif
-
 /* The cone of a search, and how far objects may be from where a table has them. */
 typedef struct search {
     bst_vec3 apex_m, axis;
@@ -359,7 +353,7 @@ typedef struct search {
 
 /* Distances of n objects from `begin` on from the cone's surface, less how far they may be off;
  * behind the apex the distance is longer than this. NAN: unknown. */
-LANES_FUNCTION static void distances(const table *t, int begin, int n, const search *c,
+BST_CLONES_256 static void distances(const table *t, int begin, int n, const search *c,
                                      double *outside_m) {
     const double *px = t->x_m + begin, *py = t->y_m + begin, *pz = t->z_m + begin,
                  *speed = t->speed_mps + begin;

@@ -1,4 +1,5 @@
 #include <stdlib.h>
+#include <string.h>
 
 #include "sim/core/quintic.h"
 #include "sim/world/ephemeris.h"
@@ -18,7 +19,8 @@ typedef struct pace {
     bool made, smooth;
     int observer;
     double second;
-    bst_vec3 velocity[BST_QUINTIC_POINTS];
+    bst_vec3 velocity[BST_QUINTIC_POINTS]; /* from BST_QUINTIC_BEFORE seconds before `second` on */
+    bst_vec3 quintic[BST_QUINTIC_POINTS];
 } pace;
 
 /* Fifth difference, m/s, up to which velocities are interpolated: what that misses is 200 times
@@ -105,30 +107,44 @@ bst_status bst_view_observer_state(bst_ctx *ctx, bst_view *view, int observer, d
     return state_of(ctx, view, view->world->object_count + observer, seconds, FROM_EPHEMERIS, out);
 }
 
+/* The view's pace about a second; what the second before has known is not worked out again. */
+static void make_pace(bst_view *view, const bst_orbit *orbit, int observer, double second) {
+    pace *p = &view->pace;
+    bst_ctx quiet = {0};
+    bst_state state;
+    int known = 0;
+    if (p->made && p->smooth && p->observer == observer && p->second + 1.0 == second) {
+        known = BST_QUINTIC_POINTS - 1;
+        memmove(p->velocity, p->velocity + 1, (size_t)known * sizeof *p->velocity);
+    }
+    p->made = p->smooth = true;
+    p->observer = observer;
+    p->second = second;
+    for (int i = known; i < BST_QUINTIC_POINTS && p->smooth; i++) {
+        p->smooth = bst_orbit_state(&quiet, orbit, view->clock, view->world->epoch,
+                                    second + i - BST_QUINTIC_BEFORE, true, &state) == BST_OK;
+        p->velocity[i] = state.velocity_mps;
+    }
+    memcpy(p->quintic, p->velocity, sizeof p->quintic);
+    p->smooth = p->smooth && bst_quintic_make(p->quintic) <= SMOOTH_MPS;
+}
+
 /* The same of an observer that is asked for many times a second. */
 static bst_status dense_state(bst_ctx *ctx, bst_view *view, int observer, double seconds,
                               bst_state *out) {
     const bst_world *world = view->world;
     const bst_orbit *orbit = &world->observers[observer].orbit;
-    pace *p = &view->pace;
+    const pace *p = &view->pace;
     double second = floor(seconds);
     if (orbit->source == BST_ORBIT_SGP4 && orbit->burn_count == 0 && fabs(seconds) < 1e12 &&
         (!p->made || p->observer != observer || p->second != second)) {
-        bst_ctx quiet = {0};
-        bst_state state;
-        *p = (pace){.made = true, .smooth = true, .observer = observer, .second = second};
-        for (int i = 0; i < BST_QUINTIC_POINTS && p->smooth; i++) {
-            p->smooth = bst_orbit_state(&quiet, orbit, view->clock, world->epoch,
-                                        second + i - BST_QUINTIC_BEFORE, true, &state) == BST_OK;
-            p->velocity[i] = state.velocity_mps;
-        }
-        p->smooth = p->smooth && bst_quintic_make(p->velocity) <= SMOOTH_MPS;
+        make_pace(view, orbit, observer, second);
     }
     bst_vec3 derivative;
     if (p->made && p->smooth && p->observer == observer && p->second == second &&
         bst_ephemeris_at(world->ephemeris, world->object_count + observer, seconds,
                          &out->position_m, &derivative)) {
-        out->velocity_mps = bst_quintic_at(p->velocity, seconds - second);
+        out->velocity_mps = bst_quintic_at(p->quintic, seconds - second);
         return BST_OK;
     }
     return bst_view_observer_state(ctx, view, observer, seconds, out);

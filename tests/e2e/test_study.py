@@ -9,6 +9,7 @@ import json
 import math
 import os
 import random
+import shutil
 import signal
 import sqlite3
 import subprocess
@@ -252,6 +253,16 @@ class CutDown(unittest.TestCase):
             process.kill()
             process.communicate()
         self.finish(out)
+
+    def test_killed_while_it_writes_tables(self):
+        out = os.path.join(self.folder, "tables")
+        os.makedirs(out)
+        shutil.copy(os.path.join(self.whole, "study.json"), out)
+        for name in ("study.sqlite.tmp.123", "runs.csv.tmp.7", "mine.tmp", "tmp.5"):
+            with open(os.path.join(out, name), "w", encoding="utf-8") as file:
+                file.write("half")
+        self.finish(out)
+        self.assertEqual(sorted(n for n in os.listdir(out) if "tmp" in n), ["mine.tmp", "tmp.5"])
 
     def test_workers_are_killed(self):
         out = os.path.join(self.folder, "workers")
