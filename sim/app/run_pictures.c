@@ -64,6 +64,9 @@ void bst_run_pictures_free(bst_run_pictures *p) {
 }
 
 static bst_status copy_frame(bst_ctx *ctx, bst_run_pictures *p, const bst_frame_message *m) {
+    if (!m->frame) {
+        return BST_OK;
+    }
     picture *pic = &p->pending;
     size_t pixels = (size_t)m->frame->width * (size_t)m->frame->height;
     if (!pic->pixels || (size_t)pic->width * (size_t)pic->height < pixels) {

@@ -73,9 +73,13 @@ static bool wants(void *user, const char *scope, const char *channel, const void
             return true;
         }
         mark->of = &sensor->channels[sensor->channel_count++];
-        bst_run_watch(mark->of, run->recorder, channel);
+        const bst_run_pixels pixels = {
+            .recorded = run->recorder && run->scenario->record.frames != BST_RECORD_NO_FRAMES,
+            .pictured = sensor->pictures != NULL,
+            .duration_ticks = run->scenario->duration_ticks};
+        bst_run_watch(mark->of, run->recorder, channel, &pixels);
     }
-    return bst_run_wants(mark->of, run->recorder, payload, tick, &mark->unwanted_before);
+    return bst_run_wants(mark->of, run->recorder, payload, tick, mark);
 }
 
 static bst_status judge(run_state *run, watched_sensor *sensor, const char *channel,

@@ -9,7 +9,10 @@ static void release_frame(void *payload) {
 }
 
 static void retain_frame(void *payload) {
-    bst_frame_retain(((bst_frame_message *)payload)->frame);
+    bst_frame *frame = ((bst_frame_message *)payload)->frame;
+    if (frame) {
+        bst_frame_retain(frame);
+    }
 }
 
 static int count_truth(const void *payload) {

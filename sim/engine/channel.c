@@ -1,3 +1,4 @@
+#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -157,6 +158,37 @@ void bst_step_promise(struct bst_step *step, int port_index, int64_t tick) {
     port->silent_until = tick > port->silent_until ? tick : port->silent_until;
 }
 
+/* Of a message that is shown without what it owns. */
+enum { BARE_BYTES = 256 };
+
+/* Shows a message to the hooks. */
+static bst_status tell(struct bst_step *step, channel *ch, const void *payload) {
+    bst_engine *engine = step->engine;
+    const bst_engine_hooks *hooks = &engine->hooks;
+    if (!hooks->message || step->tick < ch->mark.unwanted_before) {
+        return BST_OK;
+    }
+    if (hooks->wants &&
+        !hooks->wants(hooks->user, ch->scope, ch->type->name, payload, step->tick, &ch->mark)) {
+        return BST_OK;
+    }
+    _Alignas(max_align_t) char bare[BARE_BYTES];
+    if (ch->mark.bare && ch->type->release && ch->payload_bytes <= sizeof bare) {
+        memcpy(bare, payload, ch->payload_bytes);
+        ch->type->retain(bare);
+        ch->type->release(bare); /* the copy's */
+        payload = bare;
+    }
+    if (engine->islands) {
+        return bst_islands_message(step, ch, payload);
+    }
+    return engine->overlap && !step->job
+               ? bst_overlap_message(step->ctx, engine, ch, payload, step->tick)
+               : bst_engine_heard(
+                     step->ctx, engine,
+                     hooks->message(hooks->user, ch->scope, ch->type->name, payload, step->tick));
+}
+
 static bst_status publish(struct bst_step *step, int port_index) {
     bst_engine *engine = step->engine;
     channel *ch = &engine->channels[step->self->ports[port_index].channel];
@@ -181,22 +213,7 @@ static bst_status publish(struct bst_step *step, int port_index) {
             }
         }
     }
-    const bst_engine_hooks *hooks = &engine->hooks;
-    if (!hooks->message || step->tick < ch->mark.unwanted_before) {
-        return BST_OK;
-    }
-    if (hooks->wants &&
-        !hooks->wants(hooks->user, ch->scope, ch->type->name, s->payload, step->tick, &ch->mark)) {
-        return BST_OK;
-    }
-    if (engine->islands) {
-        return bst_islands_message(step, ch, s->payload);
-    }
-    return engine->overlap && !step->job
-               ? bst_overlap_message(step->ctx, engine, ch, s->payload, step->tick)
-               : bst_engine_heard(step->ctx, engine,
-                                  hooks->message(hooks->user, ch->scope, ch->type->name, s->payload,
-                                                 step->tick));
+    return tell(step, ch, s->payload);
 }
 
 bst_status bst_engine_commit(struct bst_step *step) {

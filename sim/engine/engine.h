@@ -45,6 +45,7 @@ typedef struct bst_instance_spec {
 typedef struct bst_hook_mark {
     void *of;
     int64_t unwanted_before; /* tick: earlier messages are not asked for */
+    bool bare; /* `message` gets this one without what it owns: a frame's message without frame */
 } bst_hook_mark;
 
 /* Sees what happens; any member may be NULL. `message` and `event` are called by one thread at a

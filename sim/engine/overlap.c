@@ -160,7 +160,7 @@ bst_status bst_overlap_message(bst_ctx *ctx, bst_engine *engine, const channel *
     bst_overlap *o = engine->overlap;
     record *r;
     size_t bytes = used_bytes(ch, payload);
-    BST_TRY(reserve(ctx, o, bytes, ch->type->release != NULL, &r));
+    BST_TRY(reserve(ctx, o, bytes, ch->type->release && !ch->mark.bare, &r));
     r->kind = MESSAGE;
     r->tick = tick;
     r->ch = ch;

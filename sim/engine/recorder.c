@@ -363,7 +363,9 @@ static bst_status take_frame(bst_ctx *ctx, bst_recorder *recorder, int sensor, c
     }
     s->frame = *m;
     s->frame_waits = true;
-    bst_frame_retain(m->frame);
+    if (m->frame) {
+        bst_frame_retain(m->frame);
+    }
     return BST_OK;
 }
 

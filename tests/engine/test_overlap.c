@@ -255,9 +255,72 @@ static void failures_are_those_of_a_serial_run(void **state) {
     }
 }
 
+/* Frames whose pixels the hook does not look at are shown without them, and not held for it. */
+typedef struct gallery {
+    bst_frame frames[128];
+    int recycled, shown, bare; /* recycled: atomic */
+} gallery;
+
+static void take_back(void *owner) {
+    __atomic_fetch_add(&((gallery *)owner)->recycled, 1, __ATOMIC_RELAXED);
+}
+
+static bst_status render(fake *self, struct bst_step *step) {
+    static const bst_frame_ops ops = {.recycle = take_back};
+    gallery *g = self->other;
+    bst_frame_message *m = bst_step_write(step, 0, NULL);
+    bst_frame *frame = &g->frames[self->steps % 128];
+    *frame = (bst_frame){.ops = &ops, .owner = g, .references = 1};
+    *m = (bst_frame_message){.frame = frame, .exposure_id = self->steps};
+    return BST_OK;
+}
+
+static bool wants_pixels(void *user, const char *scope, const char *channel, const void *payload,
+                         int64_t tick, bst_hook_mark *mark) {
+    (void)user, (void)scope, (void)channel, (void)tick;
+    mark->bare = ((const bst_frame_message *)payload)->exposure_id % 4 != 0;
+    return true;
+}
+
+static bst_status look_at(void *user, const char *scope, const char *channel, const void *payload,
+                          int64_t tick) {
+    (void)scope, (void)channel, (void)tick;
+    gallery *g = user;
+    const bst_frame_message *m = payload;
+    assert_true((m->frame == NULL) == (m->exposure_id % 4 != 0));
+    m->frame ? g->shown++ : g->bare++;
+    return BST_OK;
+}
+
+static void pixels_are_shown_to_who_looks_at_them(void **state) {
+    (void)state;
+    static const bst_port ports[] = {{.channel = BST_CHANNEL_FRAME, .direction = BST_PORT_OUT}};
+    static const bst_module_desc rendering = FAKE_DESC(ports);
+    for (int overlap = 0; overlap < 2; overlap++) {
+        bst_ctx ctx = {0};
+        gallery g = {.shown = 0};
+        bst_engine *engine = fake_engine(&ctx, 1000);
+        fake r = {.on_step = render, .other = &g};
+        fake *pr = &r;
+        fake_add(&ctx, engine, FAKE_SPEC(rendering, "r", pr, 10));
+        bst_assert_ok(&ctx, bst_engine_load(&ctx, engine));
+        bst_engine_set_hooks(
+            engine, &(bst_engine_hooks){.user = &g, .message = look_at, .wants = wants_pixels});
+        if (overlap) {
+            bst_assert_ok(&ctx, bst_engine_overlap(&ctx, engine));
+        }
+        bst_assert_ok(&ctx, bst_engine_run(&ctx, engine, 1000));
+        bst_engine_free(engine);
+        assert_int_equal(g.shown, 25);
+        assert_int_equal(g.bare, 75);
+        assert_int_equal(g.recycled, 100);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(nothing_but_the_thread_changes),
+        cmocka_unit_test(pixels_are_shown_to_who_looks_at_them),
         cmocka_unit_test(what_is_seen_ahead_is_used),
         cmocka_unit_test(what_is_awaited_stays_with_the_stepping_thread),
         cmocka_unit_test(failures_are_those_of_a_serial_run),
