@@ -157,8 +157,8 @@ typedef struct bst_los_command {
     double roll_rad;
 } bst_los_command;
 
-/* frame (queue). The channel slot owns one reference of `frame`; NULL: shown to a hook that does not
- * look at the pixels. */
+/* frame (queue). The channel slot owns one reference of `frame`; NULL: shown to a hook that does
+ * not look at the pixels. */
 typedef struct bst_frame_message {
     bst_frame *frame;
     int64_t exposure_id;
