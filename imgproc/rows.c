@@ -277,63 +277,9 @@ void bst_row_streak(float *out, float *copy, int count, const float *const *in, 
     }
 }
 
-/* Whether any of the lanes is set. */
-static inline bool any(const lane_masks *m) {
-    uint64_t part[HALF / 2];
-    memcpy(part, m, sizeof part);
-    return ((part[0] | part[1]) | (part[2] | part[3])) != 0;
-}
-
-static inline void take(lanes *out, const float *from) {
-    memcpy(out, from, sizeof *out);
-}
-
-BST_CLONES_256
 int bst_row_maxima(const float *above, const float *row, const float *below, int count,
                    float threshold, int32_t *x, float *value) {
-    enum { STEP = 4 * HALF };
-    int found = 0;
-    for (int at = 0; at < count; at += HALF) {
-        lanes v, n[8];
-        if (at % STEP == 0) {
-            lanes v1, v2, v3;
-            take(&v, row + at);
-            take(&v1, row + at + HALF);
-            take(&v2, row + at + 2 * HALF);
-            take(&v3, row + at + 3 * HALF);
-            lane_masks high =
-                ((v > threshold) | (v1 > threshold)) | ((v2 > threshold) | (v3 > threshold));
-            if (!any(&high)) {
-                at += STEP - HALF;
-                continue;
-            }
-        }
-        take(&v, row + at);
-        lane_masks top = v > threshold;
-        if (!any(&top)) {
-            continue;
-        }
-        take(&n[0], above + at - 1);
-        take(&n[1], above + at);
-        take(&n[2], above + at + 1);
-        take(&n[3], row + at - 1);
-        take(&n[4], row + at + 1);
-        take(&n[5], below + at - 1);
-        take(&n[6], below + at);
-        take(&n[7], below + at + 1);
-        top &= ((v > n[0]) & (v > n[1])) & ((v > n[2]) & (v > n[3]));
-        top &= ((v >= n[4]) & (v >= n[5])) & ((v >= n[6]) & (v >= n[7]));
-        if (!any(&top)) {
-            continue;
-        }
-        for (int i = 0; i < HALF && at + i < count; i++) {
-            if (top[i]) {
-                x[found] = at + i;
-                value[found++] = row[at + i];
-            }
-        }
-    }
-    return found;
+    return BST_SIMD_PICK(maxima)(above, row, below, count, threshold, x, value);
 }
 
 BST_CLONES
