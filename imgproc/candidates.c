@@ -137,10 +137,20 @@ static void decide(void *user, int begin, int end) {
     }
 }
 
-/* order: by falling SNR, of equals as they are: a stable radix sort. The bits of positive floats
- * sort as the floats do. */
+/* order: by falling SNR, of equals as they are: of many by a stable radix sort. The bits of
+ * positive floats sort as the floats do. */
 static void sort_items(bst_candidates *c) {
-    enum { BITS = 11, BINS = 1 << BITS, PASSES = 3 };
+    enum { BITS = 11, BINS = 1 << BITS, PASSES = 3, FEW = 64 };
+    if (c->count < FEW) {
+        for (int i = 0; i < c->count; i++) {
+            int at = i;
+            for (; at > 0 && c->items[c->order[at - 1]].snr < c->items[i].snr; at--) {
+                c->order[at] = c->order[at - 1];
+            }
+            c->order[at] = i;
+        }
+        return;
+    }
     for (int i = 0; i < c->count; i++) {
         uint32_t bits;
         memcpy(&bits, &c->items[i].snr, sizeof bits);
