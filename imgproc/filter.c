@@ -164,8 +164,8 @@ static void filter_across(const pass *p, int y, bool own, float *lines, float *o
         p->read(p->user, y, 0, width, electrons);
     }
     bst_row_normalise(p->raw + row, p->gain, electrons, parts,
-                      bst_background_parts(p->background, y, parts), p->saturated_dn,
-                      own && p->past_cache, signal, normalised + r);
+                      bst_background_parts(p->background, y, parts), p->saturated_dn, signal,
+                      normalised + r);
     const float *in[2 * BST_FILTER_MAX_RADIUS + 1];
     for (int x = 0; x < width; x += SOON_PX) {
         int count = width - x < SOON_PX ? width - x : SOON_PX;

@@ -144,24 +144,16 @@ static bool may_stream(const float *to) {
 #include "sim/core/simd_each.inc"
 
 void bst_row_normalise(const uint16_t *raw, const bst_row_gain *gain, const float *electrons,
-                       const bst_row_part *parts, int count, int saturated_dn, bool past_cache,
-                       float *signal, float *normalised) {
+                       const bst_row_part *parts, int count, int saturated_dn, float *signal,
+                       float *normalised) {
     int width = count > 0 ? parts[count - 1].end : 0;
-    /* parts begin where they like: all of them do on four pixels where the meshes are of eight */
-    bool stream_it = past_cache && may_stream(signal);
-    for (int i = 0; i + 1 < count; i++) {
-        stream_it = stream_it && parts[i].end % 4 == 0;
-    }
     bool full;
     if (gain) {
-        full = BST_SIMD_PICK(take_raw)(raw, gain, parts, count, (float)saturated_dn, stream_it,
-                                       signal, normalised);
+        full = BST_SIMD_PICK(take_raw)(raw, gain, parts, count, (float)saturated_dn, signal,
+                                       normalised);
     } else {
         full = greatest(raw, width) >= saturated_dn;
-        BST_SIMD_PICK(take_level_off)(electrons, parts, count, stream_it, signal, normalised);
-    }
-    if (stream_it) {
-        bst_end_stream();
+        BST_SIMD_PICK(take_level_off)(electrons, parts, count, signal, normalised);
     }
     for (int x = full ? 0 : width; x < width; x++) {
         if (raw[x] >= saturated_dn && signal[x] > BST_PIXEL_NONE) {
