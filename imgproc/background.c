@@ -120,11 +120,14 @@ static bool first_guess(const mesh_pixels *m, float step_e, float *level, float 
     }
     int count = 0;
     for (int pass = 0; pass < 2 && count == 0; pass++) {
-        for (int i = 0; i < total && count < SAMPLE; i += pass == 0 ? step : 1) {
-            float v = m->pixels[(size_t)(i / m->width) * m->stride + (size_t)(i % m->width)];
-            if (v > BST_PIXEL_NONE) {
-                sample[count++] = v;
+        const float *row = m->pixels;
+        int by = pass == 0 ? step : 1;
+        for (int i = 0, x = 0; i < total && count < SAMPLE; i += by, x += by) {
+            for (; x >= m->width; x -= m->width) {
+                row += m->stride;
             }
+            sample[count] = row[x];
+            count += row[x] > BST_PIXEL_NONE;
         }
     }
     if (count == 0) {

@@ -4,7 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { CELL_PX = 16 };
+enum {
+    CELL_PX = 16,
+    SOON = 8 /* rows */
+};
 
 static const float SADDLE_SIGMA = 3.0f, SADDLE_SHARE = 0.15f;
 
@@ -61,13 +64,6 @@ static bool is_ridge(const bst_filter *f, const bst_candidate *a, const bst_cand
     return true;
 }
 
-static bool higher(const bst_candidate *a, const bst_candidate *b) {
-    if (a->snr != b->snr) {
-        return a->snr > b->snr;
-    }
-    return a->y != b->y ? a->y < b->y : a->x < b->x;
-}
-
 typedef struct search {
     bst_candidates *c;
     const bst_filter *f;
@@ -77,7 +73,16 @@ typedef struct search {
     const void *user;
 } search;
 
+/* Whether a maximum is the lesser of the two, of equals the later, and they are near. Without
+ * branches, which nobody could foretell. */
+static bool is_lesser(const search *s, const bst_candidate *m, const bst_candidate *other) {
+    bool before = (other->y < m->y) | ((other->y == m->y) & (other->x < m->x));
+    bool higher = (other->snr > m->snr) | ((other->snr == m->snr) & before);
+    return higher & (abs(other->x - m->x) <= s->reach) & (abs(other->y - m->y) <= s->reach);
+}
+
 static bool stands_alone(const search *s, const bst_candidate *m) {
+    enum { A_TIME = 32 };
     const bst_candidates *c = s->c;
     float least = fmaxf(m->snr - fmaxf(SADDLE_SIGMA, SADDLE_SHARE * m->snr), s->floor);
     int left = m->x > s->reach ? (m->x - s->reach) / CELL_PX : 0;
@@ -85,32 +90,67 @@ static bool stands_alone(const search *s, const bst_candidate *m) {
     right = right < c->columns ? right : c->columns - 1;
     bottom = bottom < s->rows ? bottom : s->rows - 1;
     for (int v = m->y > s->reach ? (m->y - s->reach) / CELL_PX : 0; v <= bottom; v++) {
-        const bst_candidate *other = &c->by_cell[c->cell[v * c->columns + left]];
-        const bst_candidate *end = &c->by_cell[c->cell[v * c->columns + right + 1]];
-        for (; other < end; other++) {
-            if (other->snr >= m->snr && abs(other->x - m->x) <= s->reach &&
-                abs(other->y - m->y) <= s->reach && higher(other, m) &&
-                is_ridge(s->f, m, other, least)) {
-                return false;
+        int next = c->cell[v * c->columns + left], end = c->cell[v * c->columns + right + 1];
+        while (next < end) {
+            int some = end - next < A_TIME ? end : next + A_TIME, count = 0, near[A_TIME];
+            for (; next < some; next++) {
+                near[count] = next;
+                count += is_lesser(s, m, &c->by_cell[next]);
+            }
+            for (int k = 0; k < count; k++) {
+                if (is_ridge(s->f, m, &c->by_cell[near[k]], least)) {
+                    return false;
+                }
             }
         }
     }
     return true;
 }
 
+/* Brings rows `from` to `last` of the map into the cache, in the order in which they lie: in a
+ * crowd ways lead everywhere. Reads, since the processor foresees how they go on, as it does not
+ * for prefetches. Returns the next row. */
+static int read_ahead(const bst_filter *f, int from, int last) {
+    enum { LINE = 16 };
+    const float *map = f->streak && f->kept ? f->best : f->point;
+    int y = from;
+    for (; y <= last && y < f->height; y++) {
+        const float *row = map + (long)(y + f->pad) * f->stride + f->pad;
+        for (int x = 0; x < f->width; x += LINE) {
+            (void)*(const volatile float *)(row + x);
+        }
+    }
+    return y;
+}
+
 static void decide(void *user, int begin, int end) {
     const search *s = user;
+    int read = 0;
     for (int i = begin; i < end; i++) {
         const bst_candidate *m = &s->c->maxima[i];
+        if (s->f->crowded) {
+            int first = m->y > s->reach ? m->y - s->reach : 0;
+            read = read_ahead(s->f, read > first ? read : first, m->y + s->reach);
+        }
         s->c->stands[i] =
             stands_alone(s, m) && (m->snr > s->certain || s->accept(s->user, m)) ? 1 : 0;
     }
 }
 
-/* order: by falling SNR, of equals as they are: a stable radix sort. The bits of positive floats
- * sort as the floats do. */
+/* order: by falling SNR, of equals as they are: of many by a stable radix sort. The bits of
+ * positive floats sort as the floats do. */
 static void sort_items(bst_candidates *c) {
-    enum { BITS = 11, BINS = 1 << BITS, PASSES = 3 };
+    enum { BITS = 11, BINS = 1 << BITS, PASSES = 3, FEW = 64 };
+    if (c->count < FEW) {
+        for (int i = 0; i < c->count; i++) {
+            int at = i;
+            for (; at > 0 && c->items[c->order[at - 1]].snr < c->items[i].snr; at--) {
+                c->order[at] = c->order[at - 1];
+            }
+            c->order[at] = i;
+        }
+        return;
+    }
     for (int i = 0; i < c->count; i++) {
         uint32_t bits;
         memcpy(&bits, &c->items[i].snr, sizeof bits);
@@ -165,6 +205,10 @@ void bst_candidates_find(bst_candidates *c, bst_parallel *pool, const bst_filter
     c->columns = (f->width + CELL_PX - 1) / CELL_PX;
     for (int y = 0; y < f->height; y++) {
         size_t at = (size_t)y * (size_t)f->max_width;
+        if (y + SOON < f->height) { /* a row's maxima lie far from the next one's */
+            __builtin_prefetch(f->maximum_x + at + (size_t)(SOON * f->max_width));
+            __builtin_prefetch(f->maximum_snr + at + (size_t)(SOON * f->max_width));
+        }
         for (int i = 0; i < f->maxima[y]; i++) {
             c->maxima[maxima++] =
                 (bst_candidate){f->maximum_x[at + (size_t)i], y, f->maximum_snr[at + (size_t)i]};
@@ -172,7 +216,8 @@ void bst_candidates_find(bst_candidates *c, bst_parallel *pool, const bst_filter
     }
     sort_by_cell(c, maxima, c->columns * rows);
     search s = {c, f, reach_px, rows, floor, certain, accept, user};
-    bst_parallel_for(pool, maxima, 256, decide, &s);
+    /* long parts where each reads the rows about it */
+    bst_parallel_for(pool, maxima, f->crowded ? 1024 : 256, decide, &s);
     c->count = 0;
     for (int i = 0; i < maxima; i++) {
         if (c->stands[i]) {

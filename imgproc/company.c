@@ -16,7 +16,9 @@ bst_stamp bst_company_stamp(const bst_locator *l, const bst_locate_frame *f, con
     return bst_fit_stamp(s, bst_company_reach(f), l->max_side, f->width, f->height);
 }
 
-void bst_company_index(bst_locator *l) {
+void bst_company_index(bst_locator *l, const bst_locate_frame *f) {
+    l->columns = f->width / BST_LOCATE_CELL_PX + 1;
+    l->rows = f->height / BST_LOCATE_CELL_PX + 1;
     for (int i = 0; i < l->columns * l->rows; i++) {
         l->cell[i] = -1;
     }

@@ -28,7 +28,7 @@ double bst_company_fit_limit(const bst_locate_frame *frame, double path_px);
 bst_stamp bst_company_stamp(const bst_locator *l, const bst_locate_frame *f, const bst_source *s);
 
 /* Puts the found ones into squares of the frame, by their maxima. */
-void bst_company_index(bst_locator *locator);
+void bst_company_index(bst_locator *locator, const bst_locate_frame *frame);
 
 /* The sources that share light with `own`, number i: those centred on its stamp are free, the
  * brightest first; those that only reach into it are fixed. */

@@ -298,6 +298,8 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
 
     sparing_reader sparing = {{&ip->camera, &ip->maps, ip->bad, frame}, &ip->filter};
     const bst_electrons *read = &sparing.read;
+    bst_row_gain by_gain;
+    const bst_row_gain *plain = bst_electrons_plain(read, &by_gain) ? &by_gain : NULL;
     double gain = ip->camera.gain_e_per_dn, read_noise = ip->camera.read_noise_e;
     double read_variance = read_noise * read_noise + gain * gain / 12.0;
     bst_background_steps steps = {gain, -ip->camera.offset_dn * gain};
@@ -316,7 +318,8 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
     double threshold = bst_filter_threshold(&ip->filter, false_alarms, pixels);
     int saturated_dn = saturation_dn(ip, frame);
     bst_filter_run(&ip->filter, pool, &ip->background, bst_electrons_read, read, frame->pixels,
-                   ip->electrons, width, height, saturated_dn, (float)look_from(ip, threshold));
+                   plain, ip->electrons, width, height, saturated_dn,
+                   (float)look_from(ip, threshold));
     if (ip->filter.crowded && !ip->smeared) {
         double share = bst_background_read_again(&ip->background, pool, read_between_stars,
                                                  &sparing, &steps, read_noise * read_noise);
@@ -324,7 +327,8 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
         pixels *= fmax(share, LEAST_OPEN);
         threshold = bst_filter_threshold(&ip->filter, false_alarms, pixels);
         bst_filter_run(&ip->filter, pool, &ip->background, bst_electrons_read, read, frame->pixels,
-                       ip->electrons, width, height, saturated_dn, (float)look_from(ip, threshold));
+                       plain, ip->electrons, width, height, saturated_dn,
+                       (float)look_from(ip, threshold));
     }
     double look = look_from(ip, threshold);
     judge noise = {ip, threshold, read_variance};

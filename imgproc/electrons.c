@@ -1,7 +1,6 @@
 #include "imgproc/electrons.h"
 
 #include "imgproc/background.h"
-#include "imgproc/rows.h"
 
 /* Dark, flat and bad pixels of part of a binned row, from the full-sensor maps. */
 static void correct(const bst_electrons *e, int y, int first, int count, float *out) {
@@ -26,12 +25,19 @@ static void correct(const bst_electrons *e, int y, int first, int count, float *
     }
 }
 
+bool bst_electrons_plain(const bst_electrons *e, bst_row_gain *gain) {
+    *gain = (bst_row_gain){(float)e->camera->offset_dn, (float)e->camera->gain_e_per_dn};
+    return !e->maps->dark_e_per_s && !e->maps->flat && !e->bad;
+}
+
 void bst_electrons_read(const void *electrons, int y, int x, int count, float *out) {
     const bst_electrons *e = electrons;
+    bst_row_gain gain;
+    bool plain = bst_electrons_plain(e, &gain);
     int width = e->frame->window.width / e->frame->binning;
-    bst_row_electrons(e->frame->pixels + (size_t)y * (size_t)width + (size_t)x, count,
-                      (float)e->camera->offset_dn, (float)e->camera->gain_e_per_dn, out);
-    if (e->maps->dark_e_per_s || e->maps->flat || e->bad) {
+    bst_row_electrons(e->frame->pixels + (size_t)y * (size_t)width + (size_t)x, count, gain.offset,
+                      gain.gain, out);
+    if (!plain) {
         correct(e, y, x, count, out);
     }
 }

@@ -3,6 +3,7 @@
 #define BST_IMGPROC_ELECTRONS_H
 
 #include "imgproc/imgproc.h"
+#include "imgproc/rows.h"
 
 typedef struct bst_electrons {
     const bst_camera *camera;
@@ -13,5 +14,8 @@ typedef struct bst_electrons {
 
 /* A bst_pixel_fn (background.h) for a bst_electrons. */
 void bst_electrons_read(const void *electrons, int y, int x, int count, float *out);
+
+/* Whether nothing is corrected: electrons are digital numbers by their gain. */
+bool bst_electrons_plain(const bst_electrons *electrons, bst_row_gain *gain);
 
 #endif

@@ -99,6 +99,7 @@ typedef struct pass {
     bst_pixel_fn read;
     const void *user;
     const uint16_t *raw;
+    const bst_row_gain *gain; /* NULL: electrons as read gives them */
     float *signal;
     int saturated_dn, part_rows;
     int reach;       /* rows above and below that a row of the streak map needs */
@@ -159,9 +160,12 @@ static void filter_across(const pass *p, int y, bool own, float *lines, float *o
     float *normalised = lines, *electrons = lines + line;
     float *signal = own ? p->signal + row : lines + 2 * line;
     bst_row_part *parts = (bst_row_part *)(void *)(lines + 3 * line);
-    p->read(p->user, y, 0, width, electrons);
-    bst_row_normalise(p->raw + row, electrons, parts, bst_background_parts(p->background, y, parts),
-                      p->saturated_dn, own && p->past_cache, signal, normalised + r);
+    if (!p->gain) {
+        p->read(p->user, y, 0, width, electrons);
+    }
+    bst_row_normalise(p->raw + row, p->gain, electrons, parts,
+                      bst_background_parts(p->background, y, parts), p->saturated_dn, signal,
+                      normalised + r);
     const float *in[2 * BST_FILTER_MAX_RADIUS + 1];
     for (int x = 0; x < width; x += SOON_PX) {
         int count = width - x < SOON_PX ? width - x : SOON_PX;
@@ -335,8 +339,9 @@ static bool is_crowded(const bst_filter *f) {
 }
 
 void bst_filter_run(bst_filter *f, bst_parallel *pool, const bst_background *background,
-                    bst_pixel_fn read, const void *user, const uint16_t *raw, float *signal,
-                    int width, int height, int saturated_dn, float threshold) {
+                    bst_pixel_fn read, const void *user, const uint16_t *raw,
+                    const bst_row_gain *gain, float *signal, int width, int height,
+                    int saturated_dn, float threshold) {
     if (f->width != width || f->height != height) {
         f->width = width;
         f->height = height;
@@ -358,6 +363,7 @@ void bst_filter_run(bst_filter *f, bst_parallel *pool, const bst_background *bac
               .read = read,
               .user = user,
               .raw = raw,
+              .gain = gain,
               .signal = signal,
               .saturated_dn = saturated_dn,
               .part_rows = rows,

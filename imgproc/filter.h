@@ -7,13 +7,15 @@
 
 #include "imgproc/background.h"
 #include "imgproc/known_psf.h"
+#include "imgproc/rows.h"
 #include "imgproc/tail.h"
 
 enum {
     BST_FILTER_MAX_RADIUS = 24,
     BST_FILTER_MAX_TAPS = 4 * 256,
     BST_FILTER_PHASES = 5, /* shifts of -1/2 to 1/2 px */
-    BST_FILTER_RANK = 3,   /* products of rows and columns that a known PSF's kernel is a sum of */
+    BST_FILTER_PHASE_LANES = 8,
+    BST_FILTER_RANK = 3, /* products of rows and columns that a known PSF's kernel is a sum of */
     BST_FILTER_LAGS = 4 * BST_FILTER_MAX_RADIUS + 1,
     BST_FILTER_PHASE_FLOATS = BST_FILTER_PHASES * BST_FILTER_PHASES *
                               (2 * BST_FILTER_MAX_RADIUS + 3) * 64, /* of rows in lanes */
@@ -70,7 +72,8 @@ typedef struct bst_filter {
     double threshold, threshold_density; /* the latest, and the false alarms per pixel of it */
     double made_sigma, made_dx, made_dy; /* what the kernels were made for */
     int made_binning;
-    float phase[BST_FILTER_PHASES][2 * BST_FILTER_MAX_RADIUS + 3]; /* one axis, shifted */
+    /* one axis, by pixel, shifted; more lanes than shifts are 0 */
+    float phase[2 * BST_FILTER_MAX_RADIUS + 3][BST_FILTER_PHASE_LANES];
 } bst_filter;
 
 /* known: lent; NULL: the PSF is a Gaussian. For loops on up to `threads` threads. */
@@ -93,12 +96,14 @@ void bst_filter_set(bst_filter *filter, double sigma_px, int binning, double dx_
  * share. At least 2.5. */
 double bst_filter_threshold(bst_filter *filter, double false_alarms, double pixels);
 
-/* One pass over a frame of pixels as `read` gives them: `signal` [height][width] becomes electrons
- * above the background (BST_PIXEL_SATURATED where raw >= saturated_dn), then maps and maxima are
- * made. Memory outside the frame counts as noise-free background. */
+/* One pass over a frame of pixels as `read` gives them, which is (raw - offset) gain unless `gain`
+ * is NULL: `signal` [height][width] becomes electrons above the background (BST_PIXEL_SATURATED
+ * where raw >= saturated_dn), then maps and maxima are made. Memory outside the frame counts as
+ * noise-free background. */
 void bst_filter_run(bst_filter *filter, bst_parallel *pool, const bst_background *background,
-                    bst_pixel_fn read, const void *user, const uint16_t *raw, float *signal,
-                    int width, int height, int saturated_dn, float threshold);
+                    bst_pixel_fn read, const void *user, const uint16_t *raw,
+                    const bst_row_gain *gain, float *signal, int width, int height,
+                    int saturated_dn, float threshold);
 
 /* Sets to BST_PIXEL_BAD those of the `count` pixels of row y from column x on that lie within two
  * rows and columns of one where the greater output of the latest frame is above `snr`. Only when a

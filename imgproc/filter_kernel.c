@@ -116,7 +116,7 @@ static void describe_point(bst_filter *f, double sigma_px) {
             double k = here[i] / sqrt(squares[1]);
             metric += slope * slope;
             add_powers(k, powers);
-            f->phase[p][i] = (float)k;
+            f->phase[i][p] = (float)k;
         }
         /* the two ends are one phase */
         double weight = p == 0 || p == BST_FILTER_PHASES - 1 ? 0.5 : 1.0;
@@ -124,7 +124,7 @@ static void describe_point(bst_filter *f, double sigma_px) {
     }
     double half = 0.0;
     for (int i = 0; i < n; i++) {
-        half += (double)f->phase[BST_FILTER_PHASES / 2][i] * (double)f->phase[0][i];
+        half += (double)f->phase[i][BST_FILTER_PHASES / 2] * (double)f->phase[i][0];
     }
     f->corner = half * half;
     f->point_density = roughness; /* sqrt of the product over both axes, which are alike */

@@ -1,5 +1,6 @@
 /* The filters' outputs between the pixels. */
 #include <math.h>
+#include <string.h>
 
 #include "imgproc/filter.h"
 #include "imgproc/lanes.h"
@@ -38,19 +39,29 @@ static void known_values(const bst_filter *f, const float *corner, phase_values 
     }
 }
 
+BST_CLONES_256
 static void gaussian_values(const bst_filter *f, const float *corner, phase_values value) {
+    enum { LANES = BST_FILTER_PHASE_LANES };
+    double all[BST_FILTER_PHASES][LANES] = {{0.0}};
     int n = 2 * f->radius + 3;
     for (int j = 0; j < n; j++) {
         const float *row = corner + (size_t)j * (size_t)f->width;
-        for (int px = 0; px < BST_FILTER_PHASES; px++) {
-            double sum = 0.0;
-            for (int i = 0; i < n; i++) {
-                sum += row[i] > BST_PIXEL_NONE ? (double)f->phase[px][i] * (double)row[i] : 0.0;
-            }
-            for (int py = 0; py < BST_FILTER_PHASES; py++) {
-                value[py][px] += (double)f->phase[py][j] * sum;
+        double sum[LANES] = {0.0};
+        for (int i = 0; i < n; i++) {
+            double pixel = row[i] > BST_PIXEL_NONE ? (double)row[i] : 0.0;
+            for (int px = 0; px < LANES; px++) {
+                sum[px] += (double)f->phase[i][px] * pixel;
             }
         }
+        for (int py = 0; py < BST_FILTER_PHASES; py++) {
+            double weight = (double)f->phase[j][py];
+            for (int px = 0; px < LANES; px++) {
+                all[py][px] += weight * sum[px];
+            }
+        }
+    }
+    for (int py = 0; py < BST_FILTER_PHASES; py++) {
+        memcpy(value[py], all[py], sizeof value[py]);
     }
 }
 

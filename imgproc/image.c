@@ -11,10 +11,10 @@ enum { SIDE = BST_PSF_MAX_SIDE + BST_LANES };
 bst_status bst_profiles_create(bst_ctx *ctx, const bst_known_psf *known, bst_profiles *out) {
     *out = (bst_profiles){.known = known, .binning = 1};
     int length = known ? bst_lanes_up(2 * known->reach_px + 1) : BST_PROFILE_LENGTH;
-    size_t row = (size_t)(BST_PROFILE_PHASES + 1) * PARTS * (size_t)length;
+    size_t row = (size_t)(BST_PROFILE_PHASES + 1) * PARTS * (size_t)(length + BST_LANES);
     size_t terms = known ? (size_t)known->terms : 1, nodes = known ? (size_t)known->nodes : 1;
-    out->rows = calloc(nodes * terms * row, sizeof(float));
-    out->down = known ? calloc(terms * row, sizeof(float)) : NULL;
+    out->rows = calloc(BST_LANES + nodes * terms * row, sizeof(float));
+    out->down = known ? calloc(BST_LANES + terms * row, sizeof(float)) : NULL;
     if (!out->rows || (known && !out->down)) {
         bst_profiles_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for profiles");
@@ -49,17 +49,19 @@ void bst_profiles_set(bst_profiles *p, const bst_gauss *psf, double sigma_px) {
     p->length = bst_lanes_up(2 * half + 1);
     p->length = p->length < BST_PROFILE_LENGTH ? p->length : BST_PROFILE_LENGTH;
     p->half = (p->length - 1) / 2;
+    p->pitch = p->length + BST_LANES;
     p->reach = (int)ceil(4.5 * sigma_px) + 1;
     p->reach = p->reach < p->half ? p->reach : p->half;
     double share[BST_PROFILE_LENGTH], slope[BST_PROFILE_LENGTH], curvature[BST_PROFILE_LENGTH];
     for (int phase = 0; phase <= BST_PROFILE_PHASES; phase++) {
         double centre = (double)phase / BST_PROFILE_PHASES - 0.5 + p->half;
         bst_gauss_profile(psf, centre, sigma_px, p->length, share, slope, curvature);
-        float *row = p->rows + (size_t)phase * PARTS * (size_t)p->length;
+        float *row = p->rows + BST_LANES + (size_t)phase * PARTS * (size_t)p->pitch;
+        memset(row, 0, PARTS * (size_t)p->pitch * sizeof *row);
         for (int i = 0; i < p->length; i++) {
             row[i] = (float)share[i];
-            row[p->length + i] = (float)slope[i];
-            row[2 * p->length + i] = (float)(0.5 * curvature[i]);
+            row[p->pitch + i] = (float)slope[i];
+            row[2 * p->pitch + i] = (float)(0.5 * curvature[i]);
         }
     }
 }

@@ -22,8 +22,9 @@ typedef struct bst_profiles {
     double sigma_px;            /* that they were made for */
     int length, half;           /* pixels of a row: a multiple of 16; of them before the centre's */
     int reach;                  /* pixels about the centre's that count */
-    float *rows;                /* [PHASES + 1][nodes][terms][3][length] */
-    float *down;                /* of a known PSF along y: [PHASES + 1][terms][3][length] */
+    int pitch;                  /* floats from a row to the next: lanes before and after are 0 */
+    float *rows;                /* lanes, [PHASES + 1][nodes][terms][3][pitch] */
+    float *down;                /* of a known PSF along y: lanes, [PHASES + 1][terms][3][pitch] */
     /* the frame: full-sensor place = origin + binning * its pixel */
     double origin_x_px, origin_y_px;
     int binning, made_binning;

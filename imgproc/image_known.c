@@ -9,6 +9,7 @@ static void add_profile(const bst_profiles *p, const double *samples, int phase,
     const bst_known_psf *k = p->known;
     int b = p->binning;
     double centre = (double)phase / BST_PROFILE_PHASES - 0.5 + p->half;
+    memset(row, 0, PARTS * (size_t)p->pitch * sizeof *row);
     for (int i = 0; i < p->length; i++) {
         double v[PARTS] = {0.0};
         for (int sub = 0; sub < b; sub++) {
@@ -23,8 +24,8 @@ static void add_profile(const bst_profiles *p, const double *samples, int phase,
         }
         /* by the centre, which is the other way than by the distance from it */
         row[i] = (float)v[0];
-        row[p->length + i] = (float)(-b * v[1]);
-        row[2 * p->length + i] = (float)(0.5 * b * b * v[2]);
+        row[p->pitch + i] = (float)(-b * v[1]);
+        row[2 * p->pitch + i] = (float)(0.5 * b * b * v[2]);
     }
 }
 
@@ -39,17 +40,18 @@ void bst_profiles_set_known(bst_profiles *p) {
     p->length = bst_lanes_up(2 * half + 1);
     p->length = p->length < BST_PROFILE_LENGTH ? p->length : BST_PROFILE_LENGTH;
     p->half = (p->length - 1) / 2;
+    p->pitch = p->length + BST_LANES;
     p->reach = p->half;
-    size_t row = (size_t)PARTS * (size_t)p->length;
+    size_t row = (size_t)PARTS * (size_t)p->pitch;
     int each = k->nodes * k->terms;
     for (int phase = 0; phase <= BST_PROFILE_PHASES; phase++) {
         for (int f = 0; f < each; f++) {
             add_profile(p, k->across + (size_t)f * (size_t)k->side, phase,
-                        p->rows + (size_t)(phase * each + f) * row);
+                        p->rows + BST_LANES + (size_t)(phase * each + f) * row);
         }
         for (int t = 0; t < k->terms; t++) {
             add_profile(p, k->down + (size_t)t * (size_t)k->side, phase,
-                        p->down + (size_t)(phase * k->terms + t) * row);
+                        p->down + BST_LANES + (size_t)(phase * k->terms + t) * row);
         }
     }
 }

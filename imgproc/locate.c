@@ -395,7 +395,7 @@ void bst_locate(bst_locator *l, const bst_locate_frame *f, const bst_candidates 
     for (int i = 0; i < l->count; i++) {
         note_length(l, &l->found[i].source.shape);
     }
-    bst_company_index(l);
+    bst_company_index(l, f);
     double variance = f->sigma_px * f->sigma_px;
     l->widening_sum = 0.0;
     l->widening_weight = 1.0 / (0.0025 * variance * variance); /* no widening, to 5 % */

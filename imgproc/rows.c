@@ -143,21 +143,19 @@ static bool may_stream(const float *to) {
 #define BST_SIMD_KERNELS "imgproc/rows_kernels.inc"
 #include "sim/core/simd_each.inc"
 
-void bst_row_normalise(const uint16_t *raw, const float *electrons, const bst_row_part *parts,
-                       int count, int saturated_dn, bool past_cache, float *signal,
+void bst_row_normalise(const uint16_t *raw, const bst_row_gain *gain, const float *electrons,
+                       const bst_row_part *parts, int count, int saturated_dn, float *signal,
                        float *normalised) {
     int width = count > 0 ? parts[count - 1].end : 0;
-    /* parts begin where they like: all of them do on four pixels where the meshes are of eight */
-    bool stream_it = past_cache && may_stream(signal);
-    for (int i = 0; i + 1 < count; i++) {
-        stream_it = stream_it && parts[i].end % 4 == 0;
+    bool full;
+    if (gain) {
+        full = BST_SIMD_PICK(take_raw)(raw, gain, parts, count, (float)saturated_dn, signal,
+                                       normalised);
+    } else {
+        full = greatest(raw, width) >= saturated_dn;
+        BST_SIMD_PICK(take_level_off)(electrons, parts, count, signal, normalised);
     }
-    BST_SIMD_PICK(take_level_off)(electrons, parts, count, stream_it, signal, normalised);
-    if (stream_it) {
-        bst_end_stream();
-    }
-    int first = greatest(raw, width) >= saturated_dn ? 0 : width;
-    for (int x = first; x < width; x++) {
+    for (int x = full ? 0 : width; x < width; x++) {
         if (raw[x] >= saturated_dn && signal[x] > BST_PIXEL_NONE) {
             signal[x] = BST_PIXEL_SATURATED;
         }
@@ -277,63 +275,9 @@ void bst_row_streak(float *out, float *copy, int count, const float *const *in, 
     }
 }
 
-/* Whether any of the lanes is set. */
-static inline bool any(const lane_masks *m) {
-    uint64_t part[HALF / 2];
-    memcpy(part, m, sizeof part);
-    return ((part[0] | part[1]) | (part[2] | part[3])) != 0;
-}
-
-static inline void take(lanes *out, const float *from) {
-    memcpy(out, from, sizeof *out);
-}
-
-BST_CLONES_256
 int bst_row_maxima(const float *above, const float *row, const float *below, int count,
                    float threshold, int32_t *x, float *value) {
-    enum { STEP = 4 * HALF };
-    int found = 0;
-    for (int at = 0; at < count; at += HALF) {
-        lanes v, n[8];
-        if (at % STEP == 0) {
-            lanes v1, v2, v3;
-            take(&v, row + at);
-            take(&v1, row + at + HALF);
-            take(&v2, row + at + 2 * HALF);
-            take(&v3, row + at + 3 * HALF);
-            lane_masks high =
-                ((v > threshold) | (v1 > threshold)) | ((v2 > threshold) | (v3 > threshold));
-            if (!any(&high)) {
-                at += STEP - HALF;
-                continue;
-            }
-        }
-        take(&v, row + at);
-        lane_masks top = v > threshold;
-        if (!any(&top)) {
-            continue;
-        }
-        take(&n[0], above + at - 1);
-        take(&n[1], above + at);
-        take(&n[2], above + at + 1);
-        take(&n[3], row + at - 1);
-        take(&n[4], row + at + 1);
-        take(&n[5], below + at - 1);
-        take(&n[6], below + at);
-        take(&n[7], below + at + 1);
-        top &= ((v > n[0]) & (v > n[1])) & ((v > n[2]) & (v > n[3]));
-        top &= ((v >= n[4]) & (v >= n[5])) & ((v >= n[6]) & (v >= n[7]));
-        if (!any(&top)) {
-            continue;
-        }
-        for (int i = 0; i < HALF && at + i < count; i++) {
-            if (top[i]) {
-                x[found] = at + i;
-                value[found++] = row[at + i];
-            }
-        }
-    }
-    return found;
+    return BST_SIMD_PICK(maxima)(above, row, below, count, threshold, x, value);
 }
 
 BST_CLONES

@@ -46,12 +46,17 @@ typedef struct bst_row_part {
     float level, level_slope, inverse, inverse_slope;
 } bst_row_part;
 
-/* Takes the level off a row of electrons: signal = electrons - level, but BST_PIXEL_SATURATED where
- * raw >= saturated_dn; normalised = signal / noise (saturated pixels with their value), 0 where a
- * pixel is bad. The first part begins at column 0. The rows may not overlap. past_cache: signal is
- * not wanted soon. */
-void bst_row_normalise(const uint16_t *raw, const float *electrons, const bst_row_part *parts,
-                       int count, int saturated_dn, bool past_cache, float *signal,
+/* Electrons of a digital number: (it - offset) gain. */
+typedef struct bst_row_gain {
+    float offset, gain;
+} bst_row_gain;
+
+/* Takes the level off a row of electrons, of `raw` by their gain, or given where that is NULL:
+ * signal = electrons - level, but BST_PIXEL_SATURATED where raw >= saturated_dn; normalised =
+ * signal / noise (saturated pixels with their value), 0 where a pixel is bad. The first part begins
+ * at column 0. The rows may not overlap. */
+void bst_row_normalise(const uint16_t *raw, const bst_row_gain *gain, const float *electrons,
+                       const bst_row_part *parts, int count, int saturated_dn, float *signal,
                        float *normalised);
 
 /* out[x] = weight[0] * in[0][x] + sum of weight[t] * (in[-t][x] + in[t][x]), t from 1 to radius */
