@@ -60,16 +60,26 @@ bst_status bst_streak_light_run(bst_ctx *ctx, bst_streak_light *light, int sourc
 /* Makes room for more places. */
 bst_status bst_streak_light_grow(bst_ctx *ctx, bst_streak_light *light);
 
+/* Makes room for one. */
+static inline bst_status bst_streak_light_room(bst_ctx *ctx, bst_streak_light *light) {
+    return light->place_count == light->place_room ? bst_streak_light_grow(ctx, light) : BST_OK;
+}
+
+/* Takes the place that was written behind the last into the run that was begun last, or not. */
+static inline void bst_streak_light_take(bst_streak_light *light, bool taken) {
+    bst_streak_run *run = &light->runs[light->run_count - 1];
+    float height = taken ? light->places[light->place_count].height : 0.0f;
+    light->place_count += taken;
+    run->count += taken;
+    run->top = height > run->top ? height : run->top;
+}
+
 /* Adds a place to the run that was begun last. */
 static inline bst_status bst_streak_light_place(bst_ctx *ctx, bst_streak_light *light,
                                                 const bst_streak_place *place) {
-    if (light->place_count == light->place_room) {
-        BST_TRY(bst_streak_light_grow(ctx, light));
-    }
-    bst_streak_run *run = &light->runs[light->run_count - 1];
-    light->places[light->place_count++] = *place;
-    run->count++;
-    run->top = place->height > run->top ? place->height : run->top;
+    BST_TRY(bst_streak_light_room(ctx, light));
+    light->places[light->place_count] = *place;
+    bst_streak_light_take(light, true);
     return BST_OK;
 }
 

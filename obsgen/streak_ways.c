@@ -144,6 +144,16 @@ static bst_status make_places(bst_ctx *ctx, const bst_streak_limits *limits, con
     double at = m->at, way = m->step;
     for (int k = 0; k < count; k++) {
         double end = s->along[k] + (s->along[k + 1] - s->along[k]);
+        if (m->begun) { /* most lines have one place or none, and it goes on */
+            BST_TRY(bst_streak_light_room(ctx, l));
+            bst_streak_place *p = &l->places[l->place_count];
+            bool here = way * (end - at) > 0.0, near = place_on(s, lights, b, k, at, m, p);
+            bst_streak_light_take(l, here & near);
+            at += here & near ? way : 0.0;
+            if (here <= near && !(way * (end - at) > 0.0)) {
+                continue;
+            }
+        }
         for (; way * (end - at) > 0.0; at += way) {
             bst_streak_place p;
             bool near = place_on(s, lights, b, k, at, m, &p);
