@@ -480,7 +480,7 @@ static part_walk walk_parts(const bst_background *b, int y) {
 }
 
 /* Part i, from the centre of column i - 1 to that of column i, ends at the last at the latest. */
-static bst_row_part next_part(const bst_background *b, part_walk *w) {
+BST_SIMD_INLINE bst_row_part next_part(const bst_background *b, part_walk *w) {
     float step = 1.0f / (float)b->mesh_px, centre = 0.5f * (float)(b->mesh_px - 1);
     int i = w->next++, last = b->columns - 1;
     if (i >= 2 && i <= last) {

@@ -47,31 +47,34 @@ void bst_candidates_free(bst_candidates *c) {
     *c = (bst_candidates){0};
 }
 
+typedef struct search {
+    bst_candidates *c;
+    const bst_filter *f;
+    const float *map; /* the greater output of pixel 0, 0; NULL: made where it is asked for */
+    int reach, rows;  /* rows of squares */
+    float floor, certain;
+    bst_candidate_fn accept;
+    const void *user;
+} search;
+
 /* Whether the SNR stays above `least` on the pixels nearest to the straight way between two. */
-static bool is_ridge(const bst_filter *f, const bst_candidate *a, const bst_candidate *b,
-                     float least) {
+static bool is_ridge(const search *s, const bst_candidate *a, const bst_candidate *b, float least) {
     int dx = b->x - a->x, dy = b->y - a->y;
     int steps = abs(dx) > abs(dy) ? abs(dx) : abs(dy);
     float slope_x = (float)dx / (float)steps, slope_y = (float)dy / (float)steps;
+    const float *map = s->map ? s->map + (long)a->y * s->f->stride + a->x : NULL;
     for (int i = 1; i < steps; i++) {
         /* rounded; what is added keeps it positive */
-        int x = a->x + (int)((float)i * slope_x + 4096.5f) - 4096;
-        int y = a->y + (int)((float)i * slope_y + 4096.5f) - 4096;
-        if (!(bst_filter_best_at(f, x, y) > least)) {
+        int x = (int)((float)i * slope_x + 4096.5f) - 4096;
+        int y = (int)((float)i * slope_y + 4096.5f) - 4096;
+        float snr =
+            map ? map[(long)y * s->f->stride + x] : bst_filter_best_at(s->f, a->x + x, a->y + y);
+        if (!(snr > least)) {
             return false;
         }
     }
     return true;
 }
-
-typedef struct search {
-    bst_candidates *c;
-    const bst_filter *f;
-    int reach, rows; /* rows of squares */
-    float floor, certain;
-    bst_candidate_fn accept;
-    const void *user;
-} search;
 
 /* Whether a maximum is the lesser of the two, of equals the later, and they are near. Without
  * branches, which nobody could foretell. */
@@ -98,7 +101,7 @@ static bool stands_alone(const search *s, const bst_candidate *m) {
                 count += is_lesser(s, m, &c->by_cell[next]);
             }
             for (int k = 0; k < count; k++) {
-                if (is_ridge(s->f, m, &c->by_cell[near[k]], least)) {
+                if (is_ridge(s, m, &c->by_cell[near[k]], least)) {
                     return false;
                 }
             }
@@ -110,13 +113,12 @@ static bool stands_alone(const search *s, const bst_candidate *m) {
 /* Brings rows `from` to `last` of the map into the cache, in the order in which they lie: in a
  * crowd ways lead everywhere. Reads, since the processor foresees how they go on, as it does not
  * for prefetches. Returns the next row. */
-static int read_ahead(const bst_filter *f, int from, int last) {
+static int read_ahead(const search *s, int from, int last) {
     enum { LINE = 16 };
-    const float *map = f->streak && f->kept ? f->best : f->point;
     int y = from;
-    for (; y <= last && y < f->height; y++) {
-        const float *row = map + (long)(y + f->pad) * f->stride + f->pad;
-        for (int x = 0; x < f->width; x += LINE) {
+    for (; y <= last && y < s->f->height; y++) {
+        const float *row = s->map + (long)y * s->f->stride;
+        for (int x = 0; x < s->f->width; x += LINE) {
             (void)*(const volatile float *)(row + x);
         }
     }
@@ -128,9 +130,9 @@ static void decide(void *user, int begin, int end) {
     int read = 0;
     for (int i = begin; i < end; i++) {
         const bst_candidate *m = &s->c->maxima[i];
-        if (s->f->crowded) {
+        if (s->f->crowded && s->map) {
             int first = m->y > s->reach ? m->y - s->reach : 0;
-            read = read_ahead(s->f, read > first ? read : first, m->y + s->reach);
+            read = read_ahead(s, read > first ? read : first, m->y + s->reach);
         }
         s->c->stands[i] =
             stands_alone(s, m) && (m->snr > s->certain || s->accept(s->user, m)) ? 1 : 0;
@@ -215,7 +217,9 @@ void bst_candidates_find(bst_candidates *c, bst_parallel *pool, const bst_filter
         }
     }
     sort_by_cell(c, maxima, c->columns * rows);
-    search s = {c, f, reach_px, rows, floor, certain, accept, user};
+    const float *map = !f->streak ? f->point : f->kept ? f->best : NULL;
+    map = map ? map + (long)f->pad * f->stride + f->pad : NULL;
+    search s = {c, f, map, reach_px, rows, floor, certain, accept, user};
     /* long parts where each reads the rows about it */
     bst_parallel_for(pool, maxima, f->crowded ? 1024 : 256, decide, &s);
     c->count = 0;
