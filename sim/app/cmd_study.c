@@ -193,13 +193,6 @@ static void forget_what_is_gone(bst_ctx *ctx, bst_results *results, const bst_st
     }
 }
 
-/* How many workers there will be. */
-static int worker_count(const study_request *r) {
-    return r->workers > 0         ? (int)r->workers
-           : r->devices.count > 0 ? r->devices.count
-                                  : bst_local_cores();
-}
-
 static bst_status open_pool(bst_ctx *ctx, const study_request *r, const bst_study *study,
                             const bst_study_kind *kind, const char *out, int lock,
                             bst_executor *executor) {
@@ -220,14 +213,15 @@ static bst_status execute(bst_ctx *ctx, const study_request *r, const bst_study 
                           bst_results *results, bst_driver_outcome *outcome) {
     bst_executor executor;
     shown line = {.on = !r->quiet && isatty(STDERR_FILENO) == 1};
-    const bst_driver_options options = {.out = out,
-                                        .kind = kind,
-                                        .shard_s = r->slurm ? SLURM_SHARD_S : SHARD_S,
-                                        .shard_runs = r->shard_runs,
-                                        .parallel = r->slurm ? 0 : worker_count(r),
-                                        .probe = r->slurm,
-                                        .progress = show,
-                                        .user = &line};
+    const bst_driver_options options = {
+        .out = out,
+        .kind = kind,
+        .shard_s = r->slurm ? SLURM_SHARD_S : SHARD_S,
+        .shard_runs = r->shard_runs,
+        .parallel = r->slurm ? 0 : bst_local_workers((int)r->workers, r->devices.count),
+        .probe = r->slurm,
+        .progress = show,
+        .user = &line};
     BST_TRY(bst_results_load_folder(ctx, results, out, 0, study->runs, true));
     forget_what_is_gone(ctx, results, kind, out);
     if (r->slurm) {
@@ -464,7 +458,8 @@ static int command(bst_ctx *ctx, const study_request *r, const char *given) {
         study.note_count = plugins.count;
         if (status == BST_OK) {
             if (r->dry_run) {
-                bst_study_print_plan(&study, kind, worker_count(r),
+                bst_study_print_plan(&study, kind,
+                                     bst_local_workers((int)r->workers, r->devices.count),
                                      bst_study_device(&r->devices, 0), out);
             } else {
                 code = r->shard ? run_shard(ctx, r, &study, kind, out)
@@ -581,7 +576,9 @@ int bst_cmd_study(int argc, char **argv) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "one study file is expected, %d were given", arguments);
         return bst_options_misuse(&ctx, "study");
     }
+    if (bst_study_devices_read(&ctx, r.device, &r.devices) != BST_OK) {
+        return bst_options_misuse(&ctx, "study");
+    }
     bst_stop_catch_signals();
-    bst_study_devices_read(r.device, &r.devices);
     return command(&ctx, &r, argv[1]);
 }

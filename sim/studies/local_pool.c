@@ -284,13 +284,15 @@ static void close_pool(void *self) {
     free(p);
 }
 
+int bst_local_workers(int asked, int devices) {
+    int count = asked > 0 ? asked : devices > 0 ? devices : bst_local_cores();
+    return count < MOST_WORKERS ? count : MOST_WORKERS;
+}
+
 bst_status bst_local_pool_open(bst_ctx *ctx, const bst_local_pool_options *options,
                                bst_executor *out) {
-    int count = options->workers > 0        ? options->workers
-                : options->device_count > 0 ? options->device_count
-                                            : bst_local_cores();
+    int count = bst_local_workers(options->workers, options->device_count);
     pool *p = calloc(1, sizeof *p);
-    count = count < MOST_WORKERS ? count : MOST_WORKERS;
     if (p) {
         *p = (pool){.options = *options,
                     .count = count,

@@ -9,7 +9,7 @@ typedef struct bst_local_pool_options {
     const bst_study *study;
     const bst_study_kind *kind;
     const char *out;
-    int workers;   /* 0: one for each device, or for each core that this process may use */
+    int workers;   /* as bst_local_workers has it */
     int lock_fd;   /* closed by workers, -1: none */
     int cores;     /* of each worker, 0: all, in equal parts */
     bool unpinned; /* leave the choice of cores to the system */
@@ -20,6 +20,10 @@ typedef struct bst_local_pool_options {
 
 /* Cores that this process may run on. */
 int bst_local_cores(void);
+
+/* How many workers there are where so many are asked for, 0: one for each device, or without
+ * devices for each core that this process may run on. */
+int bst_local_workers(int asked, int devices);
 
 /* Workers are started when they get their first shard: forks of this process, so that no OpenCL
  * device may have been opened in it. Before anything else each is bound to its own cores, limits
