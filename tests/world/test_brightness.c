@@ -422,7 +422,7 @@ static void into_the_umbra_mid_exposure(void **state) {
     assert_true(bst_source_light(l.source, 0.5) > 0.9);
     bst_truth_item item;
     bst_window window = {0, 0, 1024, 1024};
-    bst_field_truth_item(l.field, &l.track, l.source, window, &l.truth, &item);
+    bst_field_truth_item(l.field, &l.track, l.source, window, 1, &l.truth, &item);
     bst_assert_close(item.electrons / (mean * seconds), 1, 1e-4);
     if (isfinite(item.x_start_px) && isfinite(item.x_mean_px)) {
         /* the light is near the start of the path */
