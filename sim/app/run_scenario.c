@@ -485,7 +485,7 @@ static bst_status execute(run_state *run, bst_simulation *sim, const bst_run_req
                           double *wall) {
     bst_ctx *ctx = run->ctx;
     bst_run *store = NULL;
-    bst_run_warn_of_space(ctx, run->scenario, request->out);
+    BST_TRY(bst_run_check_space(ctx, run->scenario, request->out, request->force));
     BST_TRY(bst_run_create(ctx, request->out, request->overwrite, &store));
     cJSON *echo = bst_scenario_echo(run->scenario);
     bst_status status = echo ? bst_run_write_json(ctx, store, "scenario.json", echo)

@@ -34,6 +34,9 @@ bst_time bst_world_time(const bst_world *world, double seconds);
 const bst_stars *bst_world_stars(const bst_world *world);
 int bst_world_object_count(const bst_world *world);
 const bst_object_info *bst_world_object(const bst_world *world, int object);
+/* Time from the epoch of a body's element set to the scenario's epoch, s; bodies are numbered
+ * objects first, then observers. False: its orbit is no element set. */
+bool bst_world_element_age(const bst_world *world, int body, double *seconds);
 /* Index of the object with this name, -1 when there is none. */
 int bst_world_find_object(const bst_world *world, const char *name);
 /* From `seconds` after the epoch on the object of this name is in this state (GCRF) and moves on by
