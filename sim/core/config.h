@@ -125,6 +125,8 @@ bst_status bst_json_load(bst_ctx *ctx, const char *path, bst_json **out) BST_MUS
 bst_status bst_json_parse(bst_ctx *ctx, const char *name, const char *text, size_t bytes,
                           bst_json **out) BST_MUST_CHECK;
 void bst_json_free(bst_json *json);
+/* A deep copy, with the file of each value (bst_json_file); the caller frees it. BST_ERR_MEMORY. */
+bst_status bst_json_copy(bst_ctx *ctx, const bst_json *json, bst_json **out) BST_MUST_CHECK;
 struct cJSON *bst_json_root(const bst_json *json);
 const char *bst_json_name(const bst_json *json);
 
@@ -147,7 +149,7 @@ bst_status bst_json_check_assignment(bst_ctx *ctx, const char *assignment) BST_M
 bst_status bst_json_set(bst_ctx *ctx, bst_json *json, const char *assignment) BST_MUST_CHECK;
 
 /* Puts `value`, which it takes, at a JSON pointer. Objects on the way are made when missing; array
- * elements must exist. */
+ * elements must exist. The value counts as given by the document's own file (bst_json_file). */
 bst_status bst_json_assign(bst_ctx *ctx, bst_json *json, const char *pointer,
                            struct cJSON *value) BST_MUST_CHECK;
 
