@@ -9,6 +9,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "sim/core/draft.h"
 #include "sim/core/file.h"
 #include "sim/core/fnv.h"
 #include "sim/studies/results.h"
@@ -129,14 +130,13 @@ static bool take_name(const char *draft, const char *path) {
 }
 
 static bst_status write_file(bst_ctx *ctx, const bst_shard_draft *d, const char *out) {
-    char path[4096], draft[4200], host[65] = "";
+    char path[4096], draft[4200];
+    int fd;
     BST_TRY(bst_shard_path(ctx, out, d->first, d->count, path, sizeof path));
-    gethostname(host, sizeof host - 1);
-    snprintf(draft, sizeof draft, "%s.tmp.%.40s.%ld", path, host, (long)getpid());
-    int fd = open(draft, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-    bool ok = fd >= 0 && write_all(fd, d->text, d->bytes) && fsync(fd) == 0;
+    BST_TRY(bst_draft_make(ctx, path, draft, sizeof draft, &fd));
+    bool ok = write_all(fd, d->text, d->bytes) && fsync(fd) == 0;
     int error = ok ? 0 : errno;
-    if (fd >= 0 && close(fd) != 0 && ok) {
+    if (close(fd) != 0 && ok) {
         ok = false;
         error = errno;
     }
