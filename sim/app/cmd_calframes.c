@@ -194,6 +194,7 @@ int bst_cmd_calframes(int argc, char **argv) {
         {.name = "out",
          .kind = BST_OPTION_TEXT,
          .target = &r.out,
+         .path = BST_PATH_OUTPUT_FOLDER,
          .argument = "FOLDER",
          .doc = "where the files go; it is made when missing",
          .required = true},
@@ -263,7 +264,7 @@ int bst_cmd_calframes(int argc, char **argv) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "one scenario file is expected, %d were given", arguments);
         return bst_options_misuse(&ctx, "calframes");
     }
-    if (bst_load_check(&ctx, &r.load) != BST_OK) {
+    if (bst_load_check(&ctx, &r.load, table) != BST_OK) {
         return bst_options_misuse(&ctx, "calframes");
     }
     bst_json *json = NULL;

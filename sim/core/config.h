@@ -138,6 +138,9 @@ bst_status bst_json_load_extended(bst_ctx *ctx, const char *path, bst_json **out
 /* The file that gave the value at a JSON pointer, or the latest that changed something in it; lent.
  */
 const char *bst_json_file(const bst_json *json, const char *pointer);
+/* The files that gave values, in the order in which they were applied, with repeats; NULL after the
+ * last one, and for a document that extends no other; lent. */
+const char *bst_json_origin_file(const bst_json *json, int index);
 /* Makes the message in ctx, when it begins "NAME: /json/pointer:", name bst_json_file instead of
  * the document. */
 void bst_json_name_file(bst_ctx *ctx, const bst_json *json);

@@ -43,6 +43,10 @@ const char *bst_json_file(const bst_json *json, const char *pointer) {
     return json->name;
 }
 
+const char *bst_json_origin_file(const bst_json *json, int index) {
+    return index < json->origin_count ? json->origins[index].file : NULL;
+}
+
 void bst_json_name_file(bst_ctx *ctx, const bst_json *json) {
     size_t length = strlen(json->name);
     if (!json->origins || strncmp(ctx->message, json->name, length) != 0 ||

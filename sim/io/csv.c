@@ -2,12 +2,15 @@
 
 #include <inttypes.h>
 #include <stdbool.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "sim/io/draft_file.h"
 
 void bst_csv_put_text(FILE *file, const char *text) {
-    bool formula = *text && strchr("=+-@\t\r", *text);
+    char *end;
+    bool number = strspn(text, "+-.eE0123456789") == strlen(text) && (strtod(text, &end), !*end);
+    bool formula = *text && strchr("=+-@\t\r", *text) && !number;
     if (!strpbrk(text, ",\"\r\n") && *text && !formula) {
         fputs(text, file);
         return;

@@ -10,8 +10,8 @@
 typedef void (*bst_csv_progress)(void *user, int64_t rows);
 
 /* Writes a cell of text: quoted where it must be, and where it is empty. Spreadsheets run a cell
- * that begins with = + - @, a tab or a carriage return as a formula; an apostrophe before it makes
- * it text (OWASP, CSV Injection). */
+ * that begins with = + - @, a tab or a carriage return as a formula, unless it is a number; an
+ * apostrophe before it makes it text (OWASP, CSV Injection). */
 void bst_csv_put_text(FILE *file, const char *text);
 
 /* Writes what `sql` selects to `path`: a header row with the columns' names, then a row each; lines

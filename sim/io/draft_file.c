@@ -2,7 +2,9 @@
 
 #include <dirent.h>
 #include <errno.h>
+#include <stdbool.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "sim/core/draft.h"
@@ -11,6 +13,14 @@ bst_status bst_draft_open(bst_ctx *ctx, const char *path, bst_draft *out) {
     int n = snprintf(out->path, sizeof out->path, "%s", path);
     if (n < 0 || (size_t)n >= sizeof out->path) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", path);
+    }
+    struct stat info;
+    if (stat(path, &info) == 0 && S_ISCHR(info.st_mode)) {
+        out->name[0] = '\0';
+        out->stream = fopen(path, "we");
+        return out->stream
+                   ? BST_OK
+                   : bst_fail(ctx, BST_ERR_IO, "%s: cannot be opened: %s", path, strerror(errno));
     }
     int fd;
     BST_TRY(bst_draft_make(ctx, path, out->name, sizeof out->name, &fd));
@@ -25,7 +35,8 @@ bst_status bst_draft_open(bst_ctx *ctx, const char *path, bst_draft *out) {
 
 bst_status bst_draft_close(bst_ctx *ctx, bst_draft *draft, bst_status status) {
     int error = 0;
-    if (fflush(draft->stream) != 0 || fsync(fileno(draft->stream)) != 0) {
+    bool device = !draft->name[0];
+    if (fflush(draft->stream) != 0 || (!device && fsync(fileno(draft->stream)) != 0)) {
         error = errno;
     } else if (ferror(draft->stream)) {
         error = EIO;
@@ -33,13 +44,15 @@ bst_status bst_draft_close(bst_ctx *ctx, bst_draft *draft, bst_status status) {
     if (fclose(draft->stream) != 0 && !error) {
         error = errno;
     }
-    if (status == BST_OK && !error && rename(draft->name, draft->path) != 0) {
+    if (status == BST_OK && !error && !device && rename(draft->name, draft->path) != 0) {
         error = errno;
     }
     if (status == BST_OK && !error) {
         return BST_OK;
     }
-    unlink(draft->name);
+    if (!device) {
+        unlink(draft->name);
+    }
     return status != BST_OK ? status
                             : bst_fail(ctx, BST_ERR_IO, "%s: cannot be written: %s", draft->path,
                                        strerror(error));

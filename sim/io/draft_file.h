@@ -8,11 +8,12 @@
 
 typedef struct bst_draft {
     FILE *stream;
-    char path[4096], name[4160]; /* final name; the name while it is written */
+    char path[4096], name[4160]; /* final name; while it is written, "" of a device */
 } bst_draft;
 
 /* Opens a temporary file (bst_draft_make) beside `path` for writing. BST_ERR_IO with path and
- * reason; BST_ERR_ARGUMENT where a folder, device or pipe is there. */
+ * reason; BST_ERR_ARGUMENT where a folder or pipe is there. A character device, such as /dev/null,
+ * is written to as it is. */
 bst_status bst_draft_open(bst_ctx *ctx, const char *path, bst_draft *out) BST_MUST_CHECK;
 
 /* With BST_OK: flushes it to disk and gives it its name, replacing what was there. With another

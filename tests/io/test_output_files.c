@@ -116,12 +116,14 @@ static void drafts_are_swept_by_their_names(void **state) {
 static void cells_of_csv_are_text(void **state) {
     (void)state;
     static const char *const cases[][2] = {
-        {"plain", "plain"},    {"", "\"\""},
-        {"a,b", "\"a,b\""},    {"say \"x\"", "\"say \"\"x\"\"\""},
-        {"=1+1", "\"'=1+1\""}, {"+a", "\"'+a\""},
-        {"-a", "\"'-a\""},     {"@a", "\"'@a\""},
-        {"\ta", "\"'\ta\""},   {"=\"x\"", "\"'=\"\"x\"\"\""},
-        {"a=1+1", "a=1+1"},
+        {"plain", "plain"},     {"", "\"\""},
+        {"a,b", "\"a,b\""},     {"say \"x\"", "\"say \"\"x\"\"\""},
+        {"=1+1", "\"'=1+1\""},  {"+a", "\"'+a\""},
+        {"-a", "\"'-a\""},      {"@a", "\"'@a\""},
+        {"\ta", "\"'\ta\""},    {"=\"x\"", "\"'=\"\"x\"\"\""},
+        {"a=1+1", "a=1+1"},     {"-0", "-0"},
+        {"+1.5e-3", "+1.5e-3"}, {"-1+1", "\"'-1+1\""},
+        {"-", "\"'-\""},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         char *text = NULL;
