@@ -7,6 +7,7 @@
 
 #include <cjson/cJSON.h>
 
+#include "sim/core/text.h"
 #include "sim/engine/scenario_internal.h"
 
 enum { FORMAT_VERSION = 1 };
@@ -84,6 +85,12 @@ static bst_status prepare_cameras(bst_ctx *ctx, bst_scenario *s) {
 
 static bst_status check_names(bst_ctx *ctx, const bst_scenario *s) {
     const bst_observer_config *observers = s->observers.items;
+    if (!bst_text_is_file_name(s->name)) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "%s: /name: \"%s\" cannot be the name of a folder (allowed: 1 to 63 bytes "
+                        "without \"/\" and control characters, not beginning with \".\")",
+                        s->file, s->name);
+    }
     for (int i = 0; i < s->observers.count; i++) {
         char path[100];
         snprintf(path, sizeof path, "/observers/%d/name", i);

@@ -8,6 +8,9 @@
 extern "C" {
 #endif
 
+/* The page that "boresight report" puts into the folder of a run or a study. */
+#define BST_RUN_PAGE "report.html"
+
 /* Whether `name` (without a folder) is that of a file that a run writes into its folder: tables,
  * manifest, scenario, frames and planes, pictures, recorded packets, lock, and drafts of these. */
 bool bst_run_owns(const char *name);

@@ -159,6 +159,63 @@ class Folders(unittest.TestCase):
         self.assertEqual(self.run_to(out, "--overwrite").returncode, 0)
         self.assertEqual(os.listdir(os.path.dirname(out)), ["run"])
 
+    def test_overwrite_keeps_what_no_run_wrote(self):
+        out = os.path.join(runs.scratch(), "run")
+        self.assertEqual(self.run_to(out, "--seed", "0x1").returncode, 0)
+        mine = {"notes.txt": "n", "frames_stacked.fits": "f", "work/a/b.txt": "b", "run.sqlite.bak": "s",
+                ".hidden": "h"}
+
+        def put(folder):
+            for name, text in mine.items():
+                path = os.path.join(folder, name)
+                os.makedirs(os.path.dirname(path), exist_ok=True)
+                with open(path, "w", encoding="ascii") as file:
+                    file.write(text)
+
+        def expect_mine():
+            for name, text in mine.items():
+                with open(os.path.join(out, name), encoding="ascii") as file:
+                    self.assertEqual(file.read(), text)
+            self.assertEqual(os.listdir(os.path.dirname(out)), ["run"])
+
+        put(out)
+        os.symlink("/nowhere", os.path.join(out, "link"))
+        for name in ("report.html", "frames_a_b.fits", "targets.fits"):  # of the former run
+            with open(os.path.join(out, name), "w", encoding="ascii"):
+                pass
+        result = self.run_to(out, "--overwrite", "--seed", "0x2")
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        expect_mine()
+        self.assertEqual(os.readlink(os.path.join(out, "link")), "/nowhere")
+        self.assertEqual(runs.manifest(out)["seed"], "0x2")
+        self.assertFalse({"report.html", "frames_a_b.fits", "targets.fits"} & set(os.listdir(out)))
+        # the same of what a killed run left
+        os.rename(out, out + ".partial")
+        result = self.run_to(out)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        expect_mine()
+
+    def test_names_stay_in_their_folder(self):
+        """What a scenario or a study is called becomes a folder below runs/ and studies/."""
+        folder = runs.scratch()
+        for name in ("../../x", "a/b", "..", ".x", "a\nb"):
+            for words in (("check",), ("run", "--quiet", "--duration", "0")):
+                result = call(words[0], os.path.abspath(runs.TRACK), *words[1:], "--set",
+                              "/name=" + json.dumps(name), cwd=folder)
+                self.assertEqual(result.returncode, 1)
+                self.assertIn("/name: ", result.stderr)
+                self.assertIn("cannot be the name of a folder", result.stderr)
+            self.assertEqual(os.listdir(folder), [])
+            path = os.path.join(folder, "study.json")
+            with open(path, "w", encoding="utf-8") as file:
+                json.dump({"boresight_study": 1, "name": name, "kind": "loop", "seed": "0x1",
+                           "scenarios": [{"file": os.path.abspath(runs.TRACK)}], "replicates": 1},
+                          file)
+            result = call("study", path, cwd=folder)
+            self.assertEqual(result.returncode, 1)
+            self.assertIn("cannot be the name of a folder", result.stderr)
+            os.remove(path)
+
     def test_what_is_no_run_is_not_overwritten(self):
         folder = runs.scratch()
         with open(os.path.join(folder, "thesis.tex"), "w", encoding="ascii") as file:
