@@ -6,6 +6,7 @@
 #include "sim/app/app.h"
 #include "sim/app/bench.h"
 #include "sim/app/load.h"
+#include "sim/app/shipped.h"
 #include "sim/io/manifest.h"
 
 static const bst_bench benches[] = {
@@ -245,7 +246,9 @@ int bst_cmd_bench(int argc, char **argv) {
     bool help = false, markdown = false, curve = false, first_frame = false;
     const char *json = NULL, *report = "docs";
     int64_t threads = 0;
-    bst_bench_options options = {.scenario = "scenarios/neossat_geo_track.json"};
+    char scenario[4096];
+    bst_app_shipped_file("scenarios/neossat_geo_track.json", scenario, sizeof scenario);
+    bst_bench_options options = {.scenario = scenario};
     const bst_option table[] = {
         {.name = "json",
          .kind = BST_OPTION_TEXT,

@@ -44,8 +44,8 @@ typedef struct bst_load_options {
         {.name = "seed",                                                                       \
          .kind = BST_OPTION_TEXT,                                                              \
          .target = &(load).seed,                                                               \
-         .argument = "HEX",                                                                    \
-         .doc = "master seed, for example 0x2A"},                                              \
+         .argument = "SEED",                                                                   \
+         .doc = "master seed, for example 42 or 0x2A"},                                        \
         {.name = "duration",                                                                   \
          .kind = BST_OPTION_REAL,                                                              \
          .target = &(load).duration_s,                                                         \

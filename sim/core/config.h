@@ -17,7 +17,7 @@ typedef enum bst_config_type {
     BST_CONFIG_PATH,    /* the same: a file; a scenario's are made absolute when it is read */
     BST_CONFIG_ENUM,    /* int32_t, index into choices */
     BST_CONFIG_CHOICES, /* uint32_t, bit k for choices[k]; in JSON a list of names */
-    BST_CONFIG_SEED,    /* uint64_t, hex string "0x..." */
+    BST_CONFIG_SEED,    /* uint64_t: "0x...", a decimal string, or an integer */
     BST_CONFIG_REALS,   /* double[size / sizeof(double)], a fixed-length array */
     BST_CONFIG_OBJECT,  /* nested struct, children */
     BST_CONFIG_LIST,    /* bst_config_list of structs, children, item_bytes */

@@ -36,7 +36,7 @@ const bst_config_desc bst_scenario_table[] = {
     BST_INT(bst_scenario, tick_rate_hz, "Hz", 1, 1000000, "6000",
             "Ticks per second; every rate must divide it."),
     BST_SEED(bst_scenario, seed, "\"0x1\"",
-             "Master seed of all random numbers, a hexadecimal string."),
+             "Master seed of all random numbers: \"0x2A\", \"42\" or 42."),
     BST_INT(bst_scenario, run, "", 0, 9e15, "0",
             "Number of the run in a study: other random numbers, same scene."),
     BST_OBJECT(bst_scenario, world, bst_world_config_table, "{}", "What is out there."),

@@ -49,7 +49,7 @@ class Messages(unittest.TestCase):
                    assignment)
 
     def test_usage(self):
-        self.fails(2, r"usage: boresight \[--plugin FILE\]\.\.\. COMMAND")
+        self.fails(2, r"usage: boresight \[--plugin FILE\]\.\.\. \[--no-plugins\] COMMAND")
         self.fails(2, "--plugin takes the path of a shared library, and a command", "--plugin", "a")
         self.fails(2, 'no command "rum"', "rum")
         self.fails(2, "one scenario file is expected, 0 were given", "run")
@@ -82,7 +82,7 @@ class Messages(unittest.TestCase):
         self.bad_set("/world/object=3", ': /world/object: unknown key; did you mean "objects"')
         self.bad_set("/duration_s=-1", r": /duration_s: out of range \(found -1; allowed: .*from 0")
         self.bad_set("/duration_s=long", r": /duration_s: wrong type \(found \"?long")
-        self.bad_set("/seed=5", ": /seed: wrong type .*hexadecimal")
+        self.bad_set("/seed=-5", ": /seed: not a seed .*hexadecimal")
         self.bad_set("/epoch_utc=yesterday", ": /epoch_utc")
         self.bad_set(GIMBAL + "/type=three_axis", f": {GIMBAL}/type: there is no gimbal of type "
                      '"three_axis" .*"second_order"')
@@ -407,6 +407,53 @@ class Help(unittest.TestCase):
             # what it does, and an example
             self.assertIn(f"boresight {command}", result.stdout)
             self.assertGreater(len(result.stdout.splitlines()), 4, command)
+
+    def test_help_of_a_command(self):
+        for command in ("run", "stars", "calibrate-obsgen"):
+            self.assertEqual(call("help", command).stdout, call(command, "--help").stdout)
+            self.assertEqual(call("help", command).returncode, 0)
+        self.assertEqual(call("help").stdout, call("--help").stdout)
+        self.assertEqual(call("help", "help").stdout, call("--help").stdout)
+        result = call("help", "rnu")
+        self.assertEqual((result.returncode, result.stdout), (2, ""))
+        self.assertIn('there is no command "rnu"; did you mean "run"?', result.stderr)
+        self.assertEqual(call("help", "run", "check").returncode, 2)
+
+    def test_suggestions(self):
+        for words, text in ((("chekc",), 'did you mean "check"?'), (("exprot", "x"), '"export"?'),
+                            (("calibrate-obsgn",), '"calibrate-obsgen"?'),
+                            (("--plugni", "x"), "did you mean --plugin?"),
+                            (("--no-plugin", "run"), "did you mean --"),
+                            (("run", "x.json", "--overwrit"), "did you mean --overwrite?")):
+            result = call(*words)
+            self.assertEqual((result.returncode, result.stdout), (2, ""), words)
+            self.assertIn(text, result.stderr)
+        self.assertNotIn("did you mean", call("xyzzy").stderr)
+
+    def test_seed(self):
+        """Decimal and hexadecimal, on the command line and in a scenario."""
+        seed = lambda *words: json.loads(call("check", runs.TRACK, *words).stdout)["seed"]
+        self.assertEqual(seed("--seed", "12"), "0xC")
+        self.assertEqual(seed("--seed", "0x12"), "0x12")
+        self.assertEqual(seed("--set", "/seed=12"), "0xC")
+        self.assertEqual(seed("--seed", "18446744073709551615"), "0xFFFFFFFFFFFFFFFF")
+        for bad in ("1F", "-1", "1.5", "18446744073709551616", "twelve"):
+            result = call("check", runs.TRACK, "--seed", bad)
+            self.assertEqual((result.returncode, result.stdout), (1, ""))
+            self.assertIn("/seed: not a seed", result.stderr)
+
+    def test_no_plugins(self):
+        """A scenario that names a shared library is refused before anything of it is loaded."""
+        imgproc = "--set", runs.SENSOR + '/modules/imgproc={"plugin": "/nowhere/x.so"}'
+        for command in ("check", "loop", "run"):
+            out = os.path.join(runs.scratch(), "run")
+            words = ("--out", out) if command == "run" else ()
+            result = call("--no-plugins", command, runs.TRACK, *imgproc, *words)
+            self.assertEqual((result.returncode, result.stdout), (1, ""))
+            self.assertIn("plug-ins are not loaded here, as --no-plugins asks", result.stderr)
+        self.assertNotIn("--no-plugins asks", call("check", runs.TRACK, *imgproc).stderr)
+        self.assertEqual(call("--no-plugins", "check", runs.TRACK, "--quiet").returncode, 0)
+        self.assertEqual(call("--no-plugins").returncode, 2)
 
     def test_version(self):
         result = call("--version")
