@@ -68,7 +68,7 @@ int bst_cmd_check(int argc, char **argv) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "one scenario file is expected, %d were given", arguments);
         return bst_options_misuse(&ctx, "check");
     }
-    if (bst_load_check(&ctx, &load) != BST_OK) {
+    if (bst_load_check(&ctx, &load, table) != BST_OK) {
         return bst_options_misuse(&ctx, "check");
     }
     bst_json *json = NULL;
@@ -107,6 +107,7 @@ int bst_cmd_schema(int argc, char **argv) {
         {.name = "plugin",
          .kind = BST_OPTION_LIST,
          .target = &plugins,
+         .path = BST_PATH_INPUT,
          .argument = "FILE",
          .doc = "with the keys of this shared library's modules and stages; may be given several "
                 "times"},

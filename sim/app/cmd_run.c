@@ -35,6 +35,7 @@ int bst_cmd_run(int argc, char **argv) {
         {.name = "out",
          .kind = BST_OPTION_TEXT,
          .target = &out,
+         .path = BST_PATH_OUTPUT_FOLDER,
          .argument = "FOLDER",
          .doc = "where the results go (default runs/NAME)"},
         {.name = "overwrite",
@@ -49,6 +50,7 @@ int bst_cmd_run(int argc, char **argv) {
         {.name = "replay",
          .kind = BST_OPTION_TEXT,
          .target = &replay,
+         .path = BST_PATH_INPUT,
          .argument = "RUN",
          .doc = "external modules do what they did in the run of this folder, without their peers"},
         BST_LOAD_OPTIONS(load),
@@ -81,7 +83,7 @@ int bst_cmd_run(int argc, char **argv) {
     sim_options.overlap = !serial;
     sim_options.pace = true;
     sim_options.replay = replay != NULL;
-    if (bst_load_check(&ctx, &load) != BST_OK) {
+    if (bst_load_check(&ctx, &load, table) != BST_OK) {
         return bst_options_misuse(&ctx, "run");
     }
     bst_json *json = NULL;

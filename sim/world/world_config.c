@@ -101,7 +101,7 @@ const bst_config_desc bst_world_config_table[] = {
              "Statistical stars are drawn one by one down to this V (and the renderer's v_limit); "
              "those fainter add to the background."),
     BST_SEED(bst_world_config, faint_seed, "\"0x5ca1ab1edeadbeef\"",
-             "Seed of the statistical sky, a hexadecimal string: the same sky in all runs."),
+             "Seed of the statistical sky: the same sky in all runs."),
     BST_PATH_OR(bst_world_config, earth_orientation, builtin_word, "\"builtin\"",
                 "\"builtin\" or a file in the IERS EOP C04 format."),
     BST_LIST(bst_world_config, objects, bst_object_config, object_table, 0, 100000, "[]",
