@@ -80,6 +80,8 @@ int bst_cmd_check(int argc, char **argv) {
         code = BST_EXIT_FAILED;
     } else {
         ctx.log_level = BST_LOG_WARNING;
+        bst_world_warn_earth_orientation(&ctx, scenario.file, bst_simulation_world(sim),
+                                         scenario.duration_s);
         bst_loop_warn(&ctx, &scenario);
         if (bst_check_reach(&ctx, &scenario, sim) != BST_OK) {
             fprintf(stderr, "boresight: %s\n", ctx.message);

@@ -102,6 +102,8 @@ int bst_cmd_run(int argc, char **argv) {
                         : bst_run_link_open(&ctx, sim); /* before anything is written */
     }
     if (status == BST_OK) {
+        bst_world_warn_earth_orientation(&ctx, scenario.file, bst_simulation_world(sim),
+                                         scenario.duration_s);
         bst_loop_warn(&ctx, &scenario);
         status = bst_run_scenario(&ctx, &scenario, sim, &request, NULL);
     }
