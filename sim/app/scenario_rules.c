@@ -116,6 +116,12 @@ static bst_status old_elements(bst_ctx *ctx, const bst_scenario *scenario, const
     return BST_OK;
 }
 
+static bst_status predicted_earth(bst_ctx *ctx, const bst_scenario *scenario,
+                                  const bst_world *world) {
+    bst_world_warn_earth_orientation(ctx, scenario->file, world, scenario->duration_s);
+    return BST_OK;
+}
+
 /* ---- rules about a sensor ---- */
 
 static bst_status no_modules(const subject *s) {
@@ -236,6 +242,9 @@ static bst_status loops(bst_ctx *ctx, const bst_scenario *scenario, const bst_si
 static const rule rules[] = {
     {"duration", "a run of 0 s", no_duration, NULL, NULL},
     {"element_age", "element sets more than 14 days away from the run", old_elements, NULL, NULL},
+    {"earth_orientation",
+     "dates beyond the table of the Earth's orientation, predicted with an uncertainty",
+     predicted_earth, NULL, NULL},
     {"modules", "a sensor without modules, without a gimbal, or with a tracker and no detections",
      NULL, no_modules, NULL},
     {"exposure_period", "an exposure longer than the period of the exposures", NULL, long_exposure,
@@ -285,6 +294,6 @@ bst_status bst_rules_apply(bst_ctx *ctx, const bst_scenario *scenario,
 
 void bst_rules_print(FILE *out) {
     for (size_t i = 0; i < sizeof rules / sizeof *rules; i++) {
-        fprintf(out, "%-16s %s\n", rules[i].name, rules[i].looks_for);
+        fprintf(out, "%-18s %s\n", rules[i].name, rules[i].looks_for);
     }
 }

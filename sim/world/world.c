@@ -283,3 +283,14 @@ const bst_exposure_config *bst_world_exposure(const bst_world *world, int observ
 bst_quat bst_world_body_attitude(const bst_world *world, int observer, int sensor) {
     return world->observers[observer].sensors[sensor].body_attitude;
 }
+
+const bst_eop *bst_world_earth_orientation(const bst_world *world) {
+    return world->eop;
+}
+
+void bst_world_warn_earth_orientation(bst_ctx *ctx, const char *scenario, const bst_world *world,
+                                      double duration_s) {
+    char where[600];
+    snprintf(where, sizeof where, "%.500s: /world/earth_orientation: ", scenario);
+    bst_eop_warn(ctx, world->eop, bst_world_time(world, duration_s), where);
+}
