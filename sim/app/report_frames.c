@@ -146,11 +146,12 @@ static void put_facts(FILE *out, const bst_report_frame *f, bool tracked, double
     if (!f) {
         return;
     }
-    double error_px = hypot(f->error_x_px, f->error_y_px);
-    if (error_px < 1e-3) {
+    char number[32];
+    if (f->error_px < 1e-3) {
         snprintf(lines[0], sizeof lines[0], "on the boresight");
-    } else if (isfinite(error_px)) {
-        snprintf(lines[0], sizeof lines[0], "%.3g px from the boresight", error_px);
+    } else if (isfinite(f->error_px)) {
+        snprintf(lines[0], sizeof lines[0], "%s px from the boresight",
+                 bst_page_number(number, f->error_px, 3));
     }
     if (isfinite(f->snr)) {
         snprintf(lines[1], sizeof lines[1], "SNR %.1f%s", f->snr,

@@ -92,53 +92,44 @@ static void add_counters(const bst_run_reader *run, bst_warnings *w) {
 
 /* ------------------------------------------------------------------ summaries */
 
-static void judge_summary(const char *sensor, const cJSON *summary, bool tasked, bool complete,
-                          bst_warnings *w) {
-    if (!cJSON_IsObject(summary)) {
-        return;
-    }
-    double confirmed = number_of(summary, "time_to_confirm_s"),
-           settled = number_of(summary, "time_to_settle_s"),
-           fraction = number_of(summary, "track_fraction"),
-           wrong = number_of(summary, "wrong_target_frames");
-    const cJSON *mode = get(summary, "final_mode");
-    if (!isfinite(confirmed)) {
-        bst_warnings_add(w, BST_SEVERITY_PROBLEM, "%s: the target was never in confirmed track.",
-                         sensor);
-    } else if (!isfinite(settled)) {
+static void judge_sensor(const bst_report_sensor *s, bool complete, bst_warnings *w) {
+    const bst_loop_figures *f = &s->loop;
+    bool acquired = isfinite(f->time_to_acquire_s);
+    if (!acquired) {
+        bst_warnings_add(
+            w, BST_SEVERITY_PROBLEM,
+            "%s: the target was never acquired: no track of interest was the target's.", s->name);
+    } else if (!isfinite(f->time_to_settle_s)) {
         bst_warnings_add(w, BST_SEVERITY_PROBLEM,
                          "%s: the loop never settled on the target: there are no pointing figures.",
-                         sensor);
+                         s->name);
     }
-    if (isfinite(confirmed) && fraction < 0.95) {
+    if (acquired && f->track_fraction < 0.95) {
         bst_warnings_add(
-            w, fraction < 0.5 ? BST_SEVERITY_PROBLEM : BST_SEVERITY_WARNING,
+            w, f->track_fraction < 0.5 ? BST_SEVERITY_PROBLEM : BST_SEVERITY_WARNING,
             "%s: the target was in track in only %.1f %% of the frames in which it was "
-            "visible after the first confirmation.",
-            sensor, 100.0 * fraction);
+            "visible from the acquisition on.",
+            s->name, 100.0 * f->track_fraction);
     }
-    if (wrong > 0.0) {
+    if (f->wrong_target_frames > 0) {
         bst_warnings_add(w, BST_SEVERITY_WARNING,
-                         "%s: in %.0f frames the track of interest was not the target's.", sensor,
-                         wrong);
+                         "%s: in %" PRId64 " frame%s the track of interest was not the target's.",
+                         s->name, f->wrong_target_frames, f->wrong_target_frames == 1 ? "" : "s");
     }
     /* with tasks there is always a next target to slew to */
-    if (complete && !tasked && isfinite(confirmed) && cJSON_IsString(mode) &&
-        strcmp(mode->valuestring, "track") != 0) {
+    if (complete && s->task_count < 2 && acquired && f->final_mode >= 0 &&
+        f->final_mode != BST_MODE_TRACK) {
         bst_warnings_add(w, BST_SEVERITY_WARNING, "%s: at the end the mode was %s, not track.",
-                         sensor, mode->valuestring);
+                         s->name, bst_mode_name(f->final_mode));
     }
 }
 
 static void add_summaries(const bst_run_reader *run, const bst_report_sensor *sensors, int count,
                           bst_warnings *w) {
-    const cJSON *manifest = bst_run_reader_manifest(run), *several = get(manifest, "sensors");
     bool complete = bst_run_reader_state(run) == BST_RUN_COMPLETE;
     for (int i = 0; i < count; i++) {
-        const cJSON *own = get(several, sensors[i].name);
-        const cJSON *summary = own ? own : i == 0 ? get(manifest, "summary") : NULL;
         if (sensors[i].sensor.target[0] && sensors[i].has_tracks) {
-            judge_summary(sensors[i].name, summary, sensors[i].task_count > 1, complete, w);
+            judge_sensor(&sensors[i], complete, w);
         }
     }
 }

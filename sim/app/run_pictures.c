@@ -224,8 +224,8 @@ static bst_quicklook_frame panel(const bst_run_pictures *p, const picture *pic, 
 }
 
 bst_status bst_run_pictures_write(bst_ctx *ctx, const bst_run_pictures *p, const char *folder,
-                                  const char *title) {
-    char path[4096];
+                                  const char *title, const bst_loop_figures *figures) {
+    char path[4096], label[160] = "never acquired";
     /* without image processing nothing is ever settled: the newest frame is then all there is */
     const picture *first = p->first.pixels ? &p->first : p->pending.pixels ? &p->pending : NULL;
     const picture *last =
@@ -241,8 +241,18 @@ bst_status bst_run_pictures_write(bst_ctx *ctx, const bst_run_pictures *p, const
     }
     if (p->point_count > 1) {
         bool made;
+        if (figures->pointing_frames > 0) {
+            snprintf(label, sizeof label,
+                     "pointing RMS %.3f px    largest %.3f px    custody %.1f %%    acquired at "
+                     "%.1f s",
+                     figures->pointing_rms_px, figures->pointing_max_px, 100.0 * figures->custody,
+                     figures->time_to_acquire_s);
+        } else if (isfinite(figures->time_to_acquire_s)) {
+            snprintf(label, sizeof label, "never settled    custody %.1f %%    acquired at %.1f s",
+                     100.0 * figures->custody, figures->time_to_acquire_s);
+        }
         snprintf(path, sizeof path, "%s/pointing.png", folder);
-        BST_TRY(bst_pointing_plot(ctx, path, title, p->points, p->point_count, 0.5, &made));
+        BST_TRY(bst_pointing_plot(ctx, path, title, label, p->points, p->point_count, 0.5, &made));
     }
     return BST_OK;
 }

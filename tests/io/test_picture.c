@@ -233,7 +233,7 @@ static void test_pointing_plot(void **state) {
     snprintf(path, sizeof path, "%s/it's \"pointing\".png", s.folder);
     bool made = false;
     bst_assert_ok(&ctx, bst_pointing_plot(&ctx, path, "neossat_geo_track: boresight to true target",
-                                          points, N, 0.5, &made));
+                                          "pointing RMS 0.2 px", points, N, 0.5, &made));
     if (!made && system("command -v gnuplot > /dev/null") != 0) {
         /* gnuplot is an optional program: without it a warning, and no file */
         assert_int_equal(warnings, 1);
@@ -252,12 +252,12 @@ static void test_pointing_plot(void **state) {
     for (int i = 0; i < N; i++) {
         points[i] = (bst_pointing_point){.time_s = i, .visible = true, .mode = BST_MODE_STARE};
     }
-    bst_assert_ok(&ctx, bst_pointing_plot(&ctx, path, NULL, points, N, 0.0, &made));
+    bst_assert_ok(&ctx, bst_pointing_plot(&ctx, path, NULL, NULL, points, N, 0.0, &made));
     assert_true(made);
-    assert_int_equal(bst_pointing_plot(&ctx, path, NULL, points, 1, 0.0, &made), BST_ERR_ARGUMENT);
+    assert_int_equal(bst_pointing_plot(&ctx, path, NULL, NULL, points, 1, 0.0, &made), BST_ERR_ARGUMENT);
     assert_false(made);
     assert_int_equal(
-        bst_pointing_plot(&ctx, scratch_path(&s, "no/a.png"), NULL, points, N, 0.0, &made),
+        bst_pointing_plot(&ctx, scratch_path(&s, "no/a.png"), NULL, NULL, points, N, 0.0, &made),
         BST_ERR_IO);
     /* without gnuplot: a warning, success, and nothing left behind */
     unlink(path);
@@ -265,7 +265,7 @@ static void test_pointing_plot(void **state) {
     assert_non_null(search);
     setenv("PATH", s.folder, 1);
     warnings = 0;
-    bst_status status = bst_pointing_plot(&ctx, path, NULL, points, N, 0.0, &made);
+    bst_status status = bst_pointing_plot(&ctx, path, NULL, NULL, points, N, 0.0, &made);
     setenv("PATH", search, 1);
     free(search);
     assert_int_equal(status, BST_OK);
