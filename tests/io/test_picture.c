@@ -51,7 +51,8 @@ static void draw_sky(uint16_t *pixels, double target_x, double target_y, uint64_
         double flux =
             target ? 1200.0 : 150.0 * pow(bst_rng_uniform(key, frame, 3 * (uint64_t)s + 2), -1.2);
         int steps = target ? 1 : 9;
-        marks[s] = (bst_mark){.x_px = x, .y_px = y, .star = !target};
+        marks[s] =
+            (bst_mark){.x_px = x, .y_px = y, .kind = target ? BST_MARK_DETECTION : BST_MARK_STAR};
         for (int k = 0; k < steps; k++) {
             double cx = x + (target ? 0.0 : 1.2 * (k - 4)), cy = y + (target ? 0.0 : 0.5 * (k - 4));
             for (int j = (int)cy - 6; j <= (int)cy + 6; j++) {
@@ -254,7 +255,8 @@ static void test_pointing_plot(void **state) {
     }
     bst_assert_ok(&ctx, bst_pointing_plot(&ctx, path, NULL, NULL, points, N, 0.0, &made));
     assert_true(made);
-    assert_int_equal(bst_pointing_plot(&ctx, path, NULL, NULL, points, 1, 0.0, &made), BST_ERR_ARGUMENT);
+    assert_int_equal(bst_pointing_plot(&ctx, path, NULL, NULL, points, 1, 0.0, &made),
+                     BST_ERR_ARGUMENT);
     assert_false(made);
     assert_int_equal(
         bst_pointing_plot(&ctx, scratch_path(&s, "no/a.png"), NULL, NULL, points, N, 0.0, &made),
