@@ -6,6 +6,7 @@
 
 #include "sim/app/loop_model.h"
 #include "sim/app/report.h"
+#include "sim/app/run_losses.h"
 
 static const cJSON *get(const cJSON *node, const char *key) {
     return cJSON_GetObjectItemCaseSensitive(node, key);
@@ -37,56 +38,39 @@ static void add_end(const bst_run_reader *run, bst_warnings *w) {
     }
     double logged = number_of(manifest, "warnings");
     if (logged > 0.0) {
-        bst_warnings_add(
-            w, BST_SEVERITY_WARNING,
-            "%.0f warnings were logged while it ran; they stood on its standard error.", logged);
+        char text[64];
+        bst_warnings_add(w, BST_SEVERITY_WARNING, "%s on its standard error while it ran.",
+                         bst_count_text(text, (int64_t)fmin(logged, 1e15), "warning", "warnings"));
     }
 }
 
 /* ------------------------------------------------------------------ counters */
 
-static void add_counters(const bst_run_reader *run, bst_warnings *w) {
-    static const struct {
-        const char *key;
-        bst_severity severity;
-        const char *text;
-    } known[] = {
-        {"tracker_overflow", BST_SEVERITY_PROBLEM,
-         "frames in which the tracker had no room for all "
-         "tracks"},
-        {"detections_overflow", BST_SEVERITY_PROBLEM,
-         "frames in which image processing had no room "
-         "for all detections"},
-        {"truth_overflow", BST_SEVERITY_WARNING,
-         "frames in which the truth had no room for all "
-         "sources: labels are missing"},
-        {"queue_overflow", BST_SEVERITY_PROBLEM, "messages were overwritten before they were read"},
-        {"stale_input", BST_SEVERITY_WARNING,
-         "times an input was read that is older than it may be"},
-        {"tracker_no_attitude", BST_SEVERITY_WARNING,
-         "frames whose attitude from stars was not good "
-         "enough to measure directions with"},
-        {"tracker_no_navigation", BST_SEVERITY_WARNING, "frames without navigation telemetry"},
-        {"tracker_frame_ignored", BST_SEVERITY_WARNING,
-         "frames came to the tracker twice or out of "
-         "order"},
-        {"frame_without_stars", BST_SEVERITY_NOTE, "frames in which no star was identified"},
-        {"saturated", BST_SEVERITY_NOTE, "frames with a full pixel"},
-    };
+typedef struct sensor_warnings {
+    const char *name; /* NULL: of no sensor */
+    bst_warnings *warnings;
+} sensor_warnings;
+
+static void add_loss(void *user, bst_severity severity, const char *text) {
+    const sensor_warnings *s = user;
+    bst_warnings_add(s->warnings, severity, "%s%s%s.", s->name ? s->name : "", s->name ? ": " : "",
+                     text);
+}
+
+static void add_losses(const bst_run_reader *run, const bst_report_sensor *sensors, int count,
+                       bst_warnings *w) {
+    for (int i = 0; i < count; i++) {
+        sensor_warnings s = {sensors[i].name, w};
+        bst_run_losses losses;
+        bst_losses_read(run, sensors[i].name, sensors[i].sensor.index, &losses);
+        bst_losses_tell(&losses, add_loss, &s);
+    }
     const cJSON *counters = get(bst_run_reader_manifest(run), "counters"), *item;
     cJSON_ArrayForEach(item, counters) {
-        if (!cJSON_IsNumber(item) || item->valuedouble <= 0.0) {
-            continue;
+        if (cJSON_IsNumber(item) && fabs(item->valuedouble) < 1e15 && item->string) {
+            bst_losses_tell_counter(item->string, (int64_t)item->valuedouble, add_loss,
+                                    &(sensor_warnings){NULL, w});
         }
-        bst_severity severity = BST_SEVERITY_WARNING;
-        const char *text = "counted";
-        for (size_t k = 0; k < sizeof known / sizeof *known; k++) {
-            if (strcmp(known[k].key, item->string) == 0) {
-                severity = known[k].severity;
-                text = known[k].text;
-            }
-        }
-        bst_warnings_add(w, severity, "%.0f %s (%s).", item->valuedouble, text, item->string);
     }
 }
 
@@ -163,8 +147,6 @@ static void add_tables(const bst_run_reader *run, const bst_report_sensor *senso
         {"SELECT count(*) FROM mount WHERE sensor = ?1 AND"
          " ((axis0_flags | axis1_flags | axis2_flags) & 1) = 1",
          BST_SEVERITY_PROBLEM, "Rows of telemetry that tell of a stuck axis"},
-        {"SELECT count(*) FROM exposures WHERE sensor = ?1 AND dropped = 1", BST_SEVERITY_WARNING,
-         "Frames that were lost on their way"},
         {"SELECT count(*) FROM exposures WHERE sensor = ?1 AND error_sigma > 0.3",
          BST_SEVERITY_WARNING,
          "Frames rendered with an expected error above 0.3 of a pixel's noise"},
@@ -271,7 +253,7 @@ void bst_report_run_warnings(bst_run_reader *run, const bst_report_sensor *senso
         bst_warnings_add(w, BST_SEVERITY_PROBLEM, "%s", bst_report_local(run, problem));
     }
     add_summaries(run, sensors, count, w);
-    add_counters(run, w);
+    add_losses(run, sensors, count, w);
     add_tables(run, sensors, count, w);
     const cJSON *misfits = get(bst_run_reader_manifest(run), "wcs_misfit_px"), *item;
     cJSON_ArrayForEach(item, misfits) {

@@ -10,11 +10,13 @@
 #include "sim/app/json_number.h"
 #include "sim/app/plugins.h"
 #include "sim/app/run_link.h"
+#include "sim/app/run_losses.h"
 #include "sim/app/run_pacing.h"
 #include "sim/app/run_pictures.h"
 #include "sim/app/run_scenario.h"
 #include "sim/app/run_sightings.h"
 #include "sim/app/run_space.h"
+#include "sim/app/run_summary.h"
 #include "sim/app/run_watched.h"
 #include "sim/app/stop_signals.h"
 #include "sim/core/version.h"
@@ -181,46 +183,16 @@ static bool interrupted(void *user, int64_t tick) {
     return run->cut || bst_stop_requested();
 }
 
-static void add_count(cJSON *node, const char *key, int64_t count) {
-    cJSON_AddNumberToObject(node, key, (double)count);
+static void get_figures(const watched_sensor *sensor, bst_run_sensor_figures *out) {
+    snprintf(out->scope, sizeof out->scope, "%s", sensor->scope);
+    bst_loop_summary_figures(sensor->summary, &out->loop);
+    bst_run_metrics_figures(sensor->metrics, &out->metrics);
 }
 
-/* The figures of a sensor under the keys that docs/user_guide.md defines; scripts rely on the order
- * of the first seven. */
-static cJSON *summary_json(const watched_sensor *sensor, double real_time_factor) {
-    cJSON *node = cJSON_CreateObject();
-    bst_loop_figures f;
-    bst_run_metric_figures m;
-    bst_loop_summary_figures(sensor->summary, &f);
-    bst_run_metrics_figures(sensor->metrics, &m);
-    add_count(node, "frames", f.frames);
-    cJSON_AddStringToObject(node, "final_mode", bst_mode_name(f.final_mode));
-    bst_json_add_number(node, "time_to_confirm_s", f.time_to_confirm_s);
-    bst_json_add_number(node, "track_fraction", f.track_fraction);
-    bst_json_add_number(node, "pointing_rms_px", f.pointing_rms_px);
-    bst_json_add_number(node, "pointing_p99_px", f.pointing_p99_px);
-    bst_json_add_number(node, "real_time_factor", real_time_factor);
-    bst_json_add_number(node, "time_to_acquire_s", f.time_to_acquire_s);
-    bst_json_add_number(node, "time_to_settle_s", f.time_to_settle_s);
-    add_count(node, "visible_frames", f.visible_frames);
-    bst_json_add_number(node, "custody", f.custody);
-    add_count(node, "breaks", f.breaks);
-    add_count(node, "wrong_target_frames", f.wrong_target_frames);
-    add_count(node, "pointing_frames", f.pointing_frames);
-    bst_json_add_number(node, "pointing_median_px", f.pointing_median_px);
-    bst_json_add_number(node, "pointing_p95_px", f.pointing_p95_px);
-    bst_json_add_number(node, "pointing_max_px", f.pointing_max_px);
-    bst_json_add_number(node, "pointing_bias_px", f.pointing_bias_px);
-    add_count(node, "detections", m.detections);
-    bst_json_add_number(node, "detected_fraction", m.detected_fraction);
-    add_count(node, "track_frames", m.track_frames);
-    bst_json_add_number(node, "track_rms_px", m.track_rms_px);
-    bst_json_add_number(node, "track_median_px", m.track_median_px);
-    bst_json_add_number(node, "track_p95_px", m.track_p95_px);
-    bst_json_add_number(node, "track_max_px", m.track_max_px);
-    add_count(node, "tracks", m.tracks);
-    add_count(node, "false_tracks", m.false_tracks);
-    return node;
+static cJSON *summary_of(const watched_sensor *sensor, double real_time_factor) {
+    bst_run_sensor_figures figures;
+    get_figures(sensor, &figures);
+    return bst_run_summary_json(&figures, real_time_factor);
 }
 
 /* How far the WCS of frames misfits the distortion of those cameras that have any. */
@@ -291,6 +263,11 @@ static bst_status write_manifest(const run_state *run, bst_simulation *sim, cons
     for (int i = 0; bst_engine_counter(bst_simulation_engine(sim), i, &name, &count); i++) {
         cJSON_AddNumberToObject(counters, name, (double)count);
     }
+    for (int i = 0; i < run->sensor_count; i++) {
+        bst_run_metric_figures figures;
+        bst_run_metrics_figures(run->sensors[i].metrics, &figures);
+        bst_losses_add(root, run->sensors[i].scope, &figures.losses);
+    }
     double simulated =
         (double)(bst_engine_tick(bst_simulation_engine(sim)) + 1) / (double)scenario->tick_rate_hz;
     double factor = wall > 0.0 ? simulated / wall : NAN;
@@ -298,47 +275,47 @@ static bst_status write_manifest(const run_state *run, bst_simulation *sim, cons
         cJSON *sensors = cJSON_AddObjectToObject(root, "sensors");
         for (int i = 0; i < run->sensor_count; i++) {
             cJSON_AddItemToObject(sensors, run->sensors[i].scope,
-                                  summary_json(&run->sensors[i], factor));
+                                  summary_of(&run->sensors[i], factor));
         }
     }
     bst_run_sightings_add(run->sightings, root);
     bst_run_pacing_add(root, scenario, sim);
-    cJSON_AddItemToObject(root, "summary", summary_json(&run->sensors[0], factor));
+    cJSON_AddItemToObject(root, "summary", summary_of(&run->sensors[0], factor));
     bst_status status = bst_run_write_json(run->ctx, store, "manifest.json", root);
     cJSON_Delete(root);
     return status;
 }
 
-static void print_row(const char *name, const char *format, double value, const char *unit) {
-    char text[48] = "-";
-    if (isfinite(value)) {
-        snprintf(text, sizeof text, format, value);
+/* A line for all that was lost and counted. */
+static void print_losses(const run_state *run, bst_simulation *sim) {
+    bst_losses_printer printer = {.begun = false};
+    for (int i = 0; i < run->sensor_count; i++) {
+        bst_run_sensor_figures figures;
+        get_figures(&run->sensors[i], &figures);
+        printer.sensor = run->sensor_count > 1 ? figures.scope : NULL;
+        bst_losses_tell(&figures.metrics.losses, bst_losses_print, &printer);
     }
-    printf("  %-28s %12s %s\n", name, text, unit);
+    const char *name;
+    int64_t count;
+    printer.sensor = NULL;
+    for (int i = 0; bst_engine_counter(bst_simulation_engine(sim), i, &name, &count); i++) {
+        bst_losses_tell_counter(name, count, bst_losses_print, &printer);
+    }
 }
 
 static void print_table(const run_state *run, bst_simulation *sim, const char *out, double wall) {
     double simulated = (double)(bst_engine_tick(bst_simulation_engine(sim)) + 1) /
                        (double)run->scenario->tick_rate_hz;
     for (int i = 0; i < run->sensor_count; i++) {
-        bst_loop_figures f;
-        bst_loop_summary_figures(run->sensors[i].summary, &f);
-        printf("%s\n", run->sensors[i].scope);
-        print_row("frames", "%.0f", (double)f.frames, "");
-        printf("  %-28s %12s\n", "final mode", bst_mode_name(f.final_mode));
-        print_row("time to confirm", "%.2f", f.time_to_confirm_s, "s");
-        print_row("time to acquire", "%.2f", f.time_to_acquire_s, "s");
-        print_row("time to settle", "%.2f", f.time_to_settle_s, "s");
-        print_row("custody", "%.2f", 100.0 * f.custody, "% of visible frames in track");
-        print_row("custody once acquired", "%.2f", 100.0 * f.track_fraction,
-                  "% of visible frames since then in track");
-        print_row("pointing RMS", "%.3f", f.pointing_rms_px, "px");
-        print_row("pointing 99th percentile", "%.3f", f.pointing_p99_px, "px");
+        bst_run_sensor_figures figures;
+        get_figures(&run->sensors[i], &figures);
+        bst_run_summary_print(&figures);
     }
     bst_run_sightings_print(run->sightings);
+    print_losses(run, sim);
     bst_run_pacing_print(run->scenario, sim);
-    print_row("wall time", "%.2f", wall, "s");
-    print_row("speed", "%.1f", wall > 0.0 ? simulated / wall : NAN, "x real time");
+    bst_run_print_row("wall time", "%.2f", wall, "s");
+    bst_run_print_row("speed", "%.1f", wall > 0.0 ? simulated / wall : NAN, "x real time");
     printf("  %-28s %s\n", "results", out);
 }
 
@@ -576,9 +553,7 @@ static bst_status fill_report(run_state *run, double wall, double part, bst_run_
     for (int i = 0; i < run->sensor_count; i++) {
         const watched_sensor *sensor = &run->sensors[i];
         bst_run_sensor_figures *f = &report->sensors[i];
-        snprintf(f->scope, sizeof f->scope, "%s", sensor->scope);
-        bst_loop_summary_figures(sensor->summary, &f->loop);
-        bst_run_metrics_figures(sensor->metrics, &f->metrics);
+        get_figures(sensor, f);
     }
     return BST_OK;
 }

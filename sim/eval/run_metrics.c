@@ -79,6 +79,11 @@ static const known_frame *find_frame(const bst_run_metrics *m, int64_t exposure_
 }
 
 bst_status bst_run_metrics_truth(bst_ctx *ctx, bst_run_metrics *m, const bst_truth *truth) {
+    bst_run_losses *lost = &m->figures.losses;
+    lost->frames++;
+    lost->dropped_frames += truth->dropped;
+    lost->truth += truth->lost;
+    lost->truth_frames += truth->lost > 0;
     m->newest = (m->newest + 1) % WAITING;
     known_frame *f = &m->frames[m->newest];
     f->exposure_id = truth->exposure_id;
@@ -112,7 +117,11 @@ bst_status bst_run_metrics_truth(bst_ctx *ctx, bst_run_metrics *m, const bst_tru
 }
 
 void bst_run_metrics_detections(bst_run_metrics *m, const bst_detections *detections) {
+    bst_run_losses *lost = &m->figures.losses;
     m->figures.detections += detections->count;
+    lost->detections += detections->lost;
+    lost->detection_frames += detections->lost > 0;
+    lost->no_stars_frames += detections->stars_identified == 0;
     const known_frame *f = find_frame(m, detections->exposure_id);
     for (int o = 0; f && o < f->count; o++) {
         if ((int)f->objects[o].id != m->target || !f->objects[o].lit) {
@@ -164,6 +173,10 @@ static void add_track_error(bst_run_metrics *m, bst_vec3 direction, bst_vec3 tru
 bst_status bst_run_metrics_tracks(bst_ctx *ctx, bst_run_metrics *m, const bst_tracks *tracks) {
     const known_frame *f = find_frame(m, tracks->exposure_id);
     double scale = bst_camera_scale_rad(&m->camera);
+    bst_run_losses *lost = &m->figures.losses;
+    lost->tracks += tracks->lost;
+    lost->track_frames += tracks->lost > 0;
+    lost->no_attitude_frames += !tracks->attitude.valid;
     for (int i = 0; f && i < tracks->count; i++) {
         const bst_track *t = &tracks->items[i];
         if (t->status != BST_TRACK_CONFIRMED && t->status != BST_TRACK_COASTING) {

@@ -9,6 +9,17 @@
 
 typedef struct bst_run_metrics bst_run_metrics;
 
+/* What of a sensor was lost, and in how many frames. */
+typedef struct bst_run_losses {
+    int64_t frames;                       /* of the sensor */
+    int64_t detections, detection_frames; /* detections that found no room */
+    int64_t tracks, track_frames;         /* tracks that found no room */
+    int64_t truth, truth_frames;          /* sources that found no room */
+    int64_t dropped_frames;               /* lost between camera and image processing */
+    int64_t no_stars_frames;              /* processed, and no star was identified */
+    int64_t no_attitude_frames;           /* seen by the tracker without an attitude from stars */
+} bst_run_losses;
+
 typedef struct bst_run_metric_figures {
     int64_t in_field_frames;  /* visible frames with the target in the field */
     int64_t detected_frames;  /* of them: with a detection within BST_RIGHT_TARGET_PX of it */
@@ -23,6 +34,7 @@ typedef struct bst_run_metric_figures {
     int64_t tracks, false_tracks;
     int64_t objects_seen;    /* objects that were in the field */
     int64_t objects_tracked; /* of them: ever near a confirmed track */
+    bst_run_losses losses;
 } bst_run_metric_figures;
 
 /* target_object: as of bst_loop_summary_create. The world must outlive the metrics. */

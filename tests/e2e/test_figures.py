@@ -121,6 +121,49 @@ class Figures(unittest.TestCase):
         self.check_page(self.read_page(out), mine)
 
 
+class Losses(unittest.TestCase):
+    """What a run lost: in the tables, in the manifest, at the end of `run` and on the page."""
+
+    def test_crowded(self):
+        out = os.path.join(runs.scratch(), "run")
+        done = subprocess.run(
+            runs.command("scenarios/crowded_geo_track.json", out, runs.NO_FRAMES,
+                         runs.SENSOR + "/modules/imgproc/capacity=200",
+                         runs.SENSOR + "/modules/scenegen/truth_capacity=300", duration=12),
+            capture_output=True, text=True, timeout=300)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        with runs.database(out) as tables:
+            def sums(what, table):
+                return tuple(tables.execute(f"SELECT {what} FROM {table}").fetchone())
+            frames, = sums("count(*)", "exposures")
+            cut, cut_frames = sums("sum(lost), sum(lost > 0)", "detection_frames")
+            truth, truth_frames = sums("sum(lost), sum(lost > 0)", "exposures")
+            blind, = sums("sum(stars_identified = 0)", "detection_frames")
+            lame, = sums("sum(attitude_valid = 0)", "track_frames")
+        self.assertGreater(min(cut, truth, blind), 0)
+        losses = runs.manifest(out)["losses"]["neossat/telescope"]
+        self.assertEqual(losses, {"frames": frames, "detections": cut, "detection_frames": cut_frames,
+                                  "truth": truth, "truth_frames": truth_frames,
+                                  "no_attitude_frames": lame, "no_stars_frames": blind})
+        lines = (f"cut to imgproc's capacity: {cut} detections in {cut_frames} of {frames} frames",
+                 "cut to truth_capacity, labels are missing: "
+                 f"{truth} sources of the truth in {truth_frames} of {frames} frames",
+                 f"no star identified: {blind} of {frames} frames")
+        self.assertEqual(subprocess.run([runs.BORESIGHT, "report", out],
+                                        capture_output=True, timeout=120).returncode, 0)
+        page = Page(out + "/report.html")
+        for line in lines:
+            self.assertIn(line + "\n", done.stdout)
+            self.assertTrue(any(line + "." in warning for warning in page.warnings()), line)
+
+    def test_nothing_lost(self):
+        out = os.path.join(runs.scratch(), "run")
+        done = subprocess.run(runs.command("scenarios/day_generator.json", out, duration=60),
+                              capture_output=True, text=True, timeout=300)
+        self.assertNotIn("losses", done.stdout)
+        self.assertEqual(runs.manifest(out)["losses"], {"neossat/telescope": {"frames": 30}})
+
+
 def tearDownModule():
     runs.clean()
 

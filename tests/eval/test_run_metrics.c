@@ -170,6 +170,34 @@ static void detected_fraction(void **state) {
     assert_int_equal(m.detections, 2 * (N + 2));
 }
 
+/* Amounts and frames are counted apart. */
+static void losses(void **state) {
+    fixture *f = *state;
+    for (int i = 0; i < 10; i++) {
+        f->truth->lost = i == 3 ? 40 : i == 4 ? 2 : 0;
+        f->truth->dropped = i >= 8;
+        show_truth(f, i, OBJECTS, BST_TRUTH_IN_FIELD, 10);
+        f->detections->lost = i < 3 ? 100 : 0;
+        f->detections->stars_identified = i == 5 ? 0 : 20;
+        show_detections(f, i, 0, 0);
+        f->tracks->lost = i == 7 ? 5 : 0;
+        f->tracks->attitude.valid = i % 2 == 0;
+        show_track(f, i, 1, BST_TRACK_TENTATIVE, false, beside(0, 0, 0));
+    }
+    bst_run_metric_figures m;
+    bst_run_metrics_figures(f->metrics, &m);
+    assert_int_equal(m.losses.frames, 10);
+    assert_int_equal(m.losses.detections, 300);
+    assert_int_equal(m.losses.detection_frames, 3);
+    assert_int_equal(m.losses.truth, 42);
+    assert_int_equal(m.losses.truth_frames, 2);
+    assert_int_equal(m.losses.tracks, 5);
+    assert_int_equal(m.losses.track_frames, 1);
+    assert_int_equal(m.losses.dropped_frames, 2);
+    assert_int_equal(m.losses.no_stars_frames, 1);
+    assert_int_equal(m.losses.no_attitude_frames, 5);
+}
+
 /* After a change of the target the other object counts. */
 static void another_target(void **state) {
     fixture *f = *state;
@@ -190,6 +218,7 @@ int main(void) {
         cmocka_unit_test_setup_teardown(track_errors, set_up, tear_down),
         cmocka_unit_test_setup_teardown(false_tracks, set_up, tear_down),
         cmocka_unit_test_setup_teardown(detected_fraction, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(losses, set_up, tear_down),
         cmocka_unit_test_setup_teardown(another_target, set_up, tear_down),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
