@@ -49,6 +49,9 @@ const bst_config_desc bst_imgproc_config_table[] = {
         "in a row to confirm a track."),
     BST_OBJECT(bst_imgproc_config, stack, bst_stack_config_table, "{}",
                "Search for objects too faint for one frame in stacks of frames."),
+    BST_OBJECT(bst_imgproc_config, bad_pixel_learning, bst_pixel_learner_config_table, "{}",
+               "The bad-pixel map that is learned on board, besides bad_pixels and bad_pixel_file; "
+               "not with a detector of one's own."),
     BST_INT(
         bst_imgproc_config, threads, "", 0, 32, "0",
         "Threads that share the passes over a frame and the fits; 0: one per processor. Results do "

@@ -6,6 +6,7 @@
 #include "imgproc/electrons.h"
 #include "imgproc/imgproc.h"
 #include "imgproc/locate.h"
+#include "imgproc/pixel_learner.h"
 #include "imgproc/rows.h"
 #include "imgproc/sensor_order.h"
 #include "imgproc/streak_locate.h"
@@ -51,7 +52,9 @@ struct bst_imgproc {
     double exposure_s, binning, streak_px;
     bool smeared, windowed;
     bst_stack_frame left;
-    bst_known_psf *known; /* NULL: the PSF is a Gaussian */
+    bst_known_psf *known;     /* NULL: the PSF is a Gaussian */
+    const bst_pixel_map *map; /* learned; NULL: none */
+    bst_pixel_shows shows;    /* of the latest frame; capacity 0: not wanted */
 };
 
 static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
@@ -139,6 +142,7 @@ void bst_imgproc_free(bst_imgproc *ip) {
     bst_streak_locator_free(&ip->streaks);
     bst_parallel_free(ip->pool);
     bst_known_psf_free(ip->known);
+    bst_pixel_shows_free(&ip->shows);
     free(ip);
 }
 
@@ -152,6 +156,14 @@ static void read_between_stars(const void *user, int y, int x, int count, float 
     const sparing_reader *r = user;
     bst_electrons_read(&r->read, y, x, count, out);
     bst_filter_mask(r->filter, y, x, count, STAR_SNR, out);
+}
+
+/* Learned bad pixels of a row that is not read by bst_electrons_read. */
+static void leave_out(const void *user, int y, int width, float *signal, float *normalised) {
+    const bst_electrons *e = user;
+    const bst_window *w = &e->frame->window;
+    bst_bad_rows_mask(e->learned, w, e->frame->binning, y, 0, width, BST_PIXEL_BAD, signal);
+    bst_bad_rows_mask(e->learned, w, e->frame->binning, y, 0, width, 0.0f, normalised);
 }
 
 /* What tells noise from a source. */
@@ -296,7 +308,10 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
     ip->exposure_s = frame->exposure_s;
     ip->binning = frame->binning;
 
-    sparing_reader sparing = {{&ip->camera, &ip->maps, ip->bad, frame}, &ip->filter};
+    const bst_bad_rows *learned = ip->map && ip->map->rows.count > 0 ? &ip->map->rows : NULL;
+    sparing_reader sparing = {{&ip->camera, &ip->maps, ip->bad, frame, learned}, &ip->filter};
+    ip->filter.correct_row = learned ? leave_out : NULL;
+    ip->filter.correct_user = &sparing.read;
     const bst_electrons *read = &sparing.read;
     bst_row_gain by_gain;
     const bst_row_gain *plain = bst_electrons_plain(read, &by_gain) ? &by_gain : NULL;
@@ -401,6 +416,40 @@ static void take(bst_imgproc *ip, const part *p, bst_detections *out, int capaci
     out->threshold_snr = p->threshold;
 }
 
+bst_status bst_imgproc_collect_shows(bst_ctx *ctx, bst_imgproc *ip, int capacity) {
+    return bst_pixel_shows_create(ctx, capacity, &ip->shows);
+}
+
+void bst_imgproc_use_map(bst_imgproc *ip, const bst_pixel_map *map) {
+    ip->map = map;
+}
+
+const bst_pixel_shows *bst_imgproc_shows(const bst_imgproc *ip) {
+    return &ip->shows;
+}
+
+static void begin_shows(bst_imgproc *ip) {
+    ip->shows.count = ip->shows.check_count = ip->shows.maxima = 0;
+    ip->shows.pixels = 0.0;
+    ip->shows.usable = ip->shows.capacity > 0;
+}
+
+/* Evidence of defective pixels in a frame, or a window of one, that was searched. */
+static void add_shows(bst_imgproc *ip, const bst_imgproc_frame *frame) {
+    ip->shows.usable = ip->shows.usable && !ip->smeared;
+    if (!ip->shows.usable) {
+        return;
+    }
+    bst_electrons read = {&ip->camera, &ip->maps, ip->bad, frame, NULL};
+    bst_locate_prepare(&ip->locator, &ip->view);
+    bst_pixel_shows_add(&ip->shows, &ip->locator, &ip->view, &ip->candidates);
+    if (ip->map) {
+        bst_pixel_map_check(ip->map, &ip->view, &frame->window, bst_electrons_read, &read,
+                            &ip->shows);
+    }
+    ip->shows.pixels += (double)ip->view.width * ip->view.height;
+}
+
 static void empty(bst_detections *out) {
     out->background_e = out->noise_e = out->threshold_snr = 0.0;
     out->stars_identified = 0;
@@ -421,6 +470,9 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
         bst_streak_motion_add(&ip->streak_motion, &ip->view, &ip->candidates);
         correct_motion(ip, frame->binning, &ip->motion);
     }
+    begin_shows(ip);
+    add_shows(ip, frame);
+    bst_pixel_shows_sort(&ip->shows);
     take(ip, &whole, out, capacity);
     out->background_e = (double)ip->background.median_level;
     out->noise_e = (double)ip->background.median_noise;
@@ -456,16 +508,19 @@ bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_i
             correct_motion(ip, frame->binning, &used);
         }
     }
+    begin_shows(ip);
     for (int i = 0; i < count; i++) {
         part p;
         bst_imgproc_frame window = bst_windows_crop(frame, &windows[i], ip->cropped);
         find(ip, &window, frame, motion ? &used : NULL, NULL, &p);
+        add_shows(ip, &window);
         take(ip, &p, out, capacity);
         double n = (double)windows[i].width * (double)windows[i].height;
         pixels += n;
         out->background_e += n * (double)ip->background.median_level;
         out->noise_e += n * (double)ip->background.median_noise;
     }
+    bst_pixel_shows_sort(&ip->shows);
     if (pixels > 0.0) {
         out->background_e /= pixels;
         out->noise_e /= pixels;

@@ -40,4 +40,8 @@ void bst_electrons_read(const void *electrons, int y, int x, int count, float *o
     if (!plain) {
         correct(e, y, x, count, out);
     }
+    if (e->learned && e->learned->count > 0) {
+        bst_bad_rows_mask(e->learned, &e->frame->window, e->frame->binning, y, x, count,
+                          BST_PIXEL_BAD, out);
+    }
 }

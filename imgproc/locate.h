@@ -26,9 +26,11 @@ typedef struct bst_found {
     unsigned flags; /* BST_DETECTION_... */
     bool streak;    /* the shape that fits is not a point */
     bool dropped;
-    bool rough;  /* placed by the filter, not fitted */
-    int company; /* neighbours that the latest fit counted with */
-    int label;   /* bst_label: UNKNOWN, ARTEFACT, HOT_PIXEL (one pixel's charge) or HIT */
+    bool bleed;               /* its charge overflowed along its columns: bleed.h */
+    double bleed_e, bleed_px; /* with bleed: charge of all its pixels, width of the full ones */
+    bool rough;               /* placed by the filter, not fitted */
+    int company;              /* neighbours that the latest fit counted with */
+    int label; /* bst_label: UNKNOWN, ARTEFACT, HOT_PIXEL (one pixel's charge) or HIT */
     double label_probability;
     bst_charge charge;
     float peak_snr;
@@ -112,6 +114,9 @@ static inline double bst_locate_norm(const bst_locate_frame *frame, bool streak)
  * source is a HOT_PIXEL or a HIT, by the number of pixels. */
 void bst_locate(bst_locator *locator, const bst_locate_frame *frame,
                 const bst_candidates *candidates);
+
+/* What bst_locate does first: the PSF's profiles and sharpness for the frame. */
+void bst_locate_prepare(bst_locator *locator, const bst_locate_frame *frame);
 
 /* Fits number i of the latest frame if the filter placed it. */
 void bst_locate_again(bst_locator *locator, const bst_locate_frame *frame, int i);
