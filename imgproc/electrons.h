@@ -3,6 +3,7 @@
 #define BST_IMGPROC_ELECTRONS_H
 
 #include "imgproc/bad_rows.h"
+#include "imgproc/columns.h"
 #include "imgproc/imgproc.h"
 #include "imgproc/rows.h"
 
@@ -12,6 +13,8 @@ typedef struct bst_electrons {
     const uint8_t *bad; /* [height_px][width_px] of the sensor; NULL: none */
     const bst_imgproc_frame *frame;
     const bst_bad_rows *learned; /* left out too; NULL: none */
+    const bst_columns *columns;  /* taken off; NULL: not measured */
+    int first_column;            /* of `columns`, that the frame begins with */
 } bst_electrons;
 
 /* A bst_pixel_fn (background.h) for a bst_electrons. */

@@ -96,7 +96,7 @@ static bst_source as_shape(const bst_locate_frame *f, const bst_found *found, bo
 /* Starts a source at its candidate: at the top of the filter's output, between the pixels. */
 static void start(const bst_locate_frame *f, const bst_candidate *c, bst_found *out) {
     *out = (bst_found){.peak_snr = c->snr, .peak_x = c->x, .peak_y = c->y};
-    out->noise_e = bst_background_noise_at(f->background, c->x, c->y);
+    out->noise_e = bst_locate_noise_at(f, c->x, c->y);
     double dx, dy;
     out->top_snr = bst_filter_top(f->filter, false, c->x, c->y, &dx, &dy);
     out->top_x_px = c->x + dx;

@@ -77,12 +77,19 @@ typedef struct bst_locate_frame {
     int width, height;
     const bst_background *background;
     const bst_filter *filter;
-    double sigma_px;          /* of the PSF, in this frame's pixels */
-    const bst_motion *motion; /* NULL: stars are points */
+    const float *column_noise; /* [width]: of a pixel over the background's; NULL: 1 */
+    double sigma_px;           /* of the PSF, in this frame's pixels */
+    const bst_motion *motion;  /* NULL: stars are points */
     const bst_camera *camera;
     double origin_x_px, origin_y_px, binning; /* full-sensor = origin + binning * frame pixel */
     bst_parallel *pool;                       /* for the loops; NULL: the caller's thread */
 } bst_locate_frame;
+
+/* Noise of a pixel. */
+static inline double bst_locate_noise_at(const bst_locate_frame *f, int x, int y) {
+    double noise = bst_background_noise_at(f->background, x, y);
+    return f->column_noise ? noise * (double)f->column_noise[x] : noise;
+}
 
 /* Squares of the frame that the found ones are kept by, px. */
 enum { BST_LOCATE_CELL_PX = 16 };

@@ -450,7 +450,7 @@ void bst_pixel_map_check(const bst_pixel_map *map, const bst_locate_frame *f,
             float electrons;
             read(user, y, x, 1, &electrons);
             if (electrons > BST_PIXEL_NONE) {
-                double noise = bst_background_noise_at(f->background, x, y);
+                double noise = bst_locate_noise_at(f, x, y);
                 double excess =
                     ((double)electrons - bst_background_level_at(f->background, x, y)) / noise;
                 shows->checks[shows->check_count++] =

@@ -94,7 +94,7 @@ void bst_pixel_shows_add(bst_pixel_shows *shows, const bst_locator *l, const bst
     for (int i = 0; i < candidates->count; i++) {
         int x = candidates->items[i].x, y = candidates->items[i].y;
         double alone;
-        a.noise_e = bst_background_noise_at(f->background, x, y);
+        a.noise_e = bst_locate_noise_at(f, x, y);
         find_highest(f, &x, &y);
         if (candidates->items[i].snr > CLEAR_SNR && !is_open(&a, x, y)) {
             continue;
