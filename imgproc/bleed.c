@@ -10,6 +10,12 @@ enum { MOST_COLUMNS = 96, MOST_SETS = 256 };
 static const double WELL_SHARE = 0.02;
 /* A fit whose mean square deviation is greater has not found the wings. */
 static const double MOST_MISFIT = 25.0;
+/* Weight of the deviation beyond noise in the covariance: neighbouring pixels share the PSF's error
+ * (tests/imgproc/test_bleed.c). */
+static const double MISFIT_WEIGHT = 3.0;
+/* Standard deviation of a place by the wings of a PSF that is 8 % wider than believed, of the
+ * saturated columns' width (tests/imgproc/test_bleed.c). */
+static const double FLOOR_SHARE = 0.004;
 /* Standard deviation of a place that no fit determines, of the saturated columns' width, and its
  * least, px: three times the greatest error of start_beside in tests/imgproc/test_bleed.c. */
 static const double UNFITTED_SHARE = 0.03, UNFITTED_PX = 0.1;
@@ -223,10 +229,12 @@ void bst_bleed_finish(const bst_locate_frame *f, bst_found *found) {
     bst_source *s = &found->source;
     double width = UNFITTED_SHARE * found->bleed_px;
     if (s->fitted) {
-        double misfit = fmax(s->chi_square / fmax(s->pixels - 4.0, 1.0), 1.0);
-        s->cov_xx *= misfit;
+        double misfit = s->chi_square / fmax(s->pixels - 4.0, 1.0);
+        misfit = 1.0 + MISFIT_WEIGHT * fmax(misfit - 1.0, 0.0);
+        double floor = FLOOR_SHARE * found->bleed_px;
+        s->cov_xx = misfit * s->cov_xx + floor * floor;
         s->cov_xy *= misfit;
-        s->cov_yy *= misfit;
+        s->cov_yy = misfit * s->cov_yy + floor * floor;
     } else {
         s->shape.x_px = found->top_x_px;
         s->shape.y_px = found->top_y_px;

@@ -25,6 +25,13 @@ static const double SHAPE_MOST = 5.0;
  * sources of a crowded field taken together, that a good one has it. */
 static const double STILL_SIGMAS = 3.0, STILL_CHANCE = 0.02;
 
+/* Greatest sum of the looks at a bad pixel, over the sum that made it one: a pixel that recovers is
+ * used again after some twelve looks. */
+static const double SURE = 1.25;
+/* Least chance that a bad pixel is found bad again: one that is bad in fewer than a quarter of the
+ * looks is used again in between. */
+static const double STILL_LEAST = 0.7;
+
 typedef struct suspect {
     int32_t pixel;
     uint8_t binning;
@@ -207,9 +214,9 @@ static float least_sum(const suspect *s) {
 /* A look at a bad pixel, whose sum is kept in at_rest. Returns whether it is still bad. */
 static bool take_check(const bst_pixel_learner *l, const bst_pixel_check *check, suspect *s) {
     bool still = (double)check->excess > STILL_SIGMAS;
-    double p = return_chance(s);
+    double p = fmax(return_chance(s), STILL_LEAST);
     add_to(&s->at_rest, still ? log(p / STILL_CHANCE) : log((1.0 - p) / (1.0 - STILL_CHANCE)));
-    s->at_rest = fminf(s->at_rest, (float)(2.0 * l->bad_from));
+    s->at_rest = fminf(s->at_rest, (float)(SURE * l->bad_from));
     note_look(s, still);
     return s->at_rest > 0.0f;
 }
@@ -271,7 +278,7 @@ static bool judge(bst_pixel_learner *l, const bst_pixel_frame *f, double q,
     }
     if ((double)least_sum(s) >= l->bad_from) {
         s->bad = true;
-        s->at_rest = (float)(2.0 * l->bad_from);
+        s->at_rest = (float)(SURE * l->bad_from);
     }
     return s->bad || (double)least_sum(s) > DISMISSED;
 }
