@@ -71,6 +71,11 @@ static void add_counters(const bst_run_reader *run, bst_warnings *w) {
          "frames came to the tracker twice or out of "
          "order"},
         {"frame_without_stars", BST_SEVERITY_NOTE, "frames in which no star was identified"},
+        {"bad_pixels_overflow", BST_SEVERITY_WARNING,
+         "frames in which the learned bad-pixel map had no room (bad_pixel_learning.capacity)"},
+        {"bad_pixels_sky_at_rest", BST_SEVERITY_NOTE,
+         "frames in which pixels looked bad that cannot be learned, because the sky did not move "
+         "over them"},
         {"saturated", BST_SEVERITY_NOTE, "frames with a full pixel"},
     };
     const cJSON *counters = get(bst_run_reader_manifest(run), "counters"), *item;
@@ -101,6 +106,13 @@ static void judge_summary(const char *sensor, const cJSON *summary, bool tasked,
            settled = number_of(summary, "time_to_settle_s"),
            fraction = number_of(summary, "track_fraction"),
            wrong = number_of(summary, "wrong_target_frames");
+    double bad = number_of(summary, "bad_pixels");
+    if (bad > 0.0) {
+        bst_warnings_add(
+            w, BST_SEVERITY_NOTE,
+            "%s: image processing learned that %.0f pixels are bad, and left them out.", sensor,
+            bad);
+    }
     const cJSON *mode = get(summary, "final_mode");
     if (!isfinite(confirmed)) {
         bst_warnings_add(w, BST_SEVERITY_PROBLEM, "%s: the target was never in confirmed track.",

@@ -95,8 +95,11 @@ static bst_status judge(run_state *run, watched_sensor *sensor, const char *chan
         return sensor->metrics ? bst_run_metrics_tracks(&run->hooks, sensor->metrics, payload)
                                : BST_OK;
     }
-    if (strcmp(channel, BST_CHANNEL_DETECTIONS) == 0 && sensor->metrics) {
-        bst_run_metrics_detections(sensor->metrics, payload);
+    if (strcmp(channel, BST_CHANNEL_DETECTIONS) == 0) {
+        bst_loop_summary_detections(sensor->summary, payload);
+        if (sensor->metrics) {
+            bst_run_metrics_detections(sensor->metrics, payload);
+        }
     } else if (strcmp(channel, BST_CHANNEL_CONTROL_STATUS) == 0) {
         bst_loop_summary_status(sensor->summary, payload);
     } else if (strcmp(channel, BST_CHANNEL_TASK) == 0) {
@@ -196,6 +199,7 @@ static cJSON *summary_json(const bst_loop_figures *f, double real_time_factor) {
     bst_json_add_number(node, "time_to_settle_s", f->time_to_settle_s);
     bst_json_add_number(node, "pointing_bias_px", f->pointing_bias_px);
     cJSON_AddNumberToObject(node, "wrong_target_frames", (double)f->wrong_target_frames);
+    cJSON_AddNumberToObject(node, "bad_pixels", (double)f->bad_pixels);
     return node;
 }
 
@@ -310,6 +314,9 @@ static void print_table(const run_state *run, bst_simulation *sim, const char *o
                   "% of visible frames after confirmation");
         print_row("pointing RMS", "%.3f", f.pointing_rms_px, "px");
         print_row("pointing 99th percentile", "%.3f", f.pointing_p99_px, "px");
+        if (f.bad_pixels > 0) {
+            print_row("bad pixels learned", "%.0f", (double)f.bad_pixels, "");
+        }
     }
     bst_run_sightings_print(run->sightings);
     bst_run_pacing_print(run->scenario, sim);

@@ -36,6 +36,7 @@ typedef struct bst_loop_figures {
                                 as the target is hidden; NAN when there are none */
     double pointing_bias_px; /* length of the mean error vector */
     int64_t pointing_frames;
+    int64_t bad_pixels; /* that image processing had learned by the latest frame */
 } bst_loop_figures;
 
 /* target_object: index of the right target in the world, -1 when there is none. The world must
@@ -54,6 +55,7 @@ void bst_loop_summary_on_frame(bst_loop_summary *summary, bst_loop_frame_fn fn, 
 bst_status bst_loop_summary_truth(bst_ctx *ctx, bst_loop_summary *summary,
                                   const bst_truth *truth) BST_MUST_CHECK;
 void bst_loop_summary_tracks(bst_loop_summary *summary, const bst_tracks *tracks, int64_t tick);
+void bst_loop_summary_detections(bst_loop_summary *summary, const bst_detections *detections);
 void bst_loop_summary_status(bst_loop_summary *summary, const bst_control_status *status);
 
 /* The target is another one from now on, -1: none: confirmation and settling begin anew; the times
