@@ -260,6 +260,14 @@ const char *bst_world_observer_name(const bst_world *world, int observer) {
     return world->observers[observer].name;
 }
 
+bool bst_world_element_age(const bst_world *world, int body, double *seconds) {
+    const bst_orbit *orbit = body < world->object_count
+                                 ? &world->objects[body].orbit
+                                 : &world->observers[body - world->object_count].orbit;
+    *seconds = orbit->epoch_offset_s;
+    return orbit->source == BST_ORBIT_SGP4;
+}
+
 int bst_world_find_object(const bst_world *world, const char *name) {
     return world->object_names ? bst_name_index_find(world->object_names, name) : -1;
 }

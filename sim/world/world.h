@@ -41,6 +41,9 @@ void bst_world_warn_earth_orientation(bst_ctx *ctx, const char *scenario, const 
 const bst_stars *bst_world_stars(const bst_world *world);
 int bst_world_object_count(const bst_world *world);
 const bst_object_info *bst_world_object(const bst_world *world, int object);
+/* Time from the epoch of a body's element set to the scenario's epoch, s; bodies are numbered
+ * objects first, then observers. False: its orbit is no element set. */
+bool bst_world_element_age(const bst_world *world, int body, double *seconds);
 /* The law that an object moves by (not where it is): SGP4 with a drag term, or forces. */
 typedef struct bst_object_motion {
     bool sgp4;                     /* an element set */

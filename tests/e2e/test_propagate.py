@@ -290,12 +290,12 @@ class CommandLine(unittest.TestCase):
         self.fails(1, "--frame gcrf needs --eop FILE here", "--elements", CATALOGUE, "--frame", "gcrf",
                    "--start", "2016-06-16T00:00:00Z", "--stop", "2016-06-16T00:00:00Z", "--step",
                    "1")
-        self.fails(1, "cannot be written", "--elements", CATALOGUE, *self.window, "--output",
+        self.fails(2, "there is no folder no_such_folder", "--elements", CATALOGUE, *self.window, "--output",
                    "no_such_folder/x.csv")
 
     def test_full_disk(self):
         if os.path.exists("/dev/full"):
-            self.fails(1, "is the disk full?", "--elements", CATALOGUE, *self.window, "--output",
+            self.fails(1, "/dev/full: cannot be written: No space left on device", "--elements", CATALOGUE, *self.window, "--output",
                        "/dev/full")
 
     def test_output_file_is_what_is_printed(self):
