@@ -391,7 +391,7 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
          * move with the Earth, stands for the star */
         bst_vec3 ray = bst_light_apparent_star(&geocentric, star->icrs);
         s->occulted = bst_earth_occults(eye.position_m, bst_vec3_axpy(eye.position_m, 1e12, ray),
-                                        &frames.itrf_from_gcrf);
+                                        bodies.pole);
         if (s->occulted) {
             s->electrons_per_s = 0.0;
         }

@@ -223,7 +223,7 @@ static void stars_set_at_the_limb(void **state) {
         bst_vec3 star =
             bst_light_catalogue_star(&around.light, bst_quat_rotate(bst_quat_conj(around.q[0]), d));
         bst_vec3 far = bst_vec3_axpy(eye, 1e12, bst_light_apparent_star(&geocentric, star));
-        bool occulted = bst_earth_occults(eye, far, &around.itrf_from_gcrf);
+        bool occulted = bst_earth_occults(eye, far, around.bodies.pole);
         hidden += occulted;
         seen += !occulted;
         /* 0.05 px of an edge that the PSF softens to 0.9 px */
