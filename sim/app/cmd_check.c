@@ -4,6 +4,7 @@
 #include <cjson/cJSON.h>
 
 #include "sim/app/app.h"
+#include "sim/app/check_bodies.h"
 #include "sim/app/check_reach.h"
 #include "sim/app/load.h"
 #include "sim/app/loop_model.h"
@@ -81,7 +82,8 @@ int bst_cmd_check(int argc, char **argv) {
     } else {
         ctx.log_level = BST_LOG_WARNING;
         bst_loop_warn(&ctx, &scenario);
-        if (bst_check_reach(&ctx, &scenario, sim) != BST_OK) {
+        if (bst_check_reach(&ctx, &scenario, sim) != BST_OK ||
+            bst_check_bodies(&ctx, &scenario, sim) != BST_OK) {
             fprintf(stderr, "boresight: %s\n", ctx.message);
             code = BST_EXIT_FAILED;
         } else {

@@ -7,6 +7,7 @@
 #include <cjson/cJSON.h>
 
 #include "sim/app/app.h"
+#include "sim/app/check_bodies.h"
 #include "sim/app/json_number.h"
 #include "sim/app/plugins.h"
 #include "sim/app/run_link.h"
@@ -196,6 +197,9 @@ static cJSON *summary_json(const bst_loop_figures *f, double real_time_factor) {
     bst_json_add_number(node, "time_to_settle_s", f->time_to_settle_s);
     bst_json_add_number(node, "pointing_bias_px", f->pointing_bias_px);
     cJSON_AddNumberToObject(node, "wrong_target_frames", (double)f->wrong_target_frames);
+    cJSON_AddNumberToObject(node, "earth_frames", (double)f->earth_frames);
+    cJSON_AddNumberToObject(node, "moon_frames", (double)f->moon_frames);
+    cJSON_AddNumberToObject(node, "sun_frames", (double)f->sun_frames);
     return node;
 }
 
@@ -458,6 +462,9 @@ static bst_status step_through(run_state *run, bst_simulation *sim, double *wall
     ctx->warnings += run->hooks.warnings;
     for (int i = 0; i < run->sensor_count; i++) {
         bst_loop_summary_finish(run->sensors[i].summary);
+        bst_loop_figures figures;
+        bst_loop_summary_figures(run->sensors[i].summary, &figures);
+        bst_warn_of_bodies(ctx, run->sensors[i].scope, &figures);
     }
     show_progress(run, bst_engine_tick(bst_simulation_engine(sim)), true);
     return status;
@@ -500,6 +507,9 @@ static bst_status execute(run_state *run, bst_simulation *sim, const bst_run_req
     }
     if (status == BST_OK) {
         status = bst_run_link_record(ctx, sim, bst_run_folder(store));
+    }
+    if (status == BST_OK) {
+        status = bst_check_bodies(ctx, run->scenario, sim);
     }
     bool stepped = status == BST_OK;
     if (stepped) {

@@ -77,6 +77,11 @@ typedef struct bst_sunlight {
 void bst_sunlight_at(bst_vec3 position_m, bst_vec3 sun_m, bst_vec3 pole, bool atmosphere,
                      bst_sunlight *out);
 
+/* Angle (rad) of a direction from the WGS-84 ellipsoid's limb, seen from position_m; negative where
+ * the Earth is in the way, pi where the direction is more than a right angle beyond, -pi inside of
+ * the Earth. Exact at the limb. */
+double bst_earth_limb_angle(bst_vec3 position_m, bst_vec3 pole, bst_vec3 direction);
+
 /* True when the segment between two geocentric points (GCRF) passes through the WGS-84 ellipsoid
  * about `pole`, also when an end lies inside it. A touch less than 1 cm deep does not count, so
  * that a point on the surface sees what is above its horizon. */

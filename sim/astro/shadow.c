@@ -140,6 +140,14 @@ double bst_sun_fraction(bst_vec3 position_m, bst_vec3 sun_m, bst_vec3 pole) {
     return bst_earth_limb_share(&limb, sine / sqrt(1.0 - sine * sine));
 }
 
+double bst_earth_limb_angle(bst_vec3 position_m, bst_vec3 pole, bst_vec3 direction) {
+    bst_earth_limb limb;
+    if (bst_earth_depth(position_m, pole) < 0.0) {
+        return -BST_PI;
+    }
+    return bst_earth_limb_at(position_m, pole, 0.0, direction, &limb) ? atan(limb.beyond) : BST_PI;
+}
+
 bool bst_earth_occults(bst_vec3 a_m, bst_vec3 b_m, bst_vec3 pole) {
     bst_vec3 near = bst_earth_unit_sphere(a_m, pole, 0.0);
     bst_vec3 far = bst_earth_unit_sphere(b_m, pole, 0.0);

@@ -36,6 +36,8 @@ typedef struct bst_loop_figures {
                                 as the target is hidden; NAN when there are none */
     double pointing_bias_px; /* length of the mean error vector */
     int64_t pointing_frames;
+    int64_t earth_frames, moon_frames,
+        sun_frames; /* in which their disc covers part of the image */
 } bst_loop_figures;
 
 /* target_object: index of the right target in the world, -1 when there is none. The world must
