@@ -140,7 +140,10 @@ static bst_status do_sensor(bst_ctx *ctx, job *j) {
     bst_renderer_options options = bst_renderer_default_options();
     options.pattern = bst_detector_pattern_key(&s->camera, j->name);
     options.pool_frames = 2;
-    BST_TRY(bst_renderer_create(ctx, j->device, &s->camera, &options, &j->renderer));
+    /* these frames have no point sources: a PSF from a file or of the aperture is not needed */
+    bst_camera camera = s->camera;
+    camera.optics.psf = BST_PSF_GAUSSIAN;
+    BST_TRY(bst_renderer_create(ctx, j->device, &camera, &options, &j->renderer));
     double exposure_s = r->exposure_s > 0.0 ? r->exposure_s : s->exposure.exposure_s;
     double level_e = r->level_e > 0.0 ? r->level_e : half_level_e(&s->camera);
     const series all[] = {{"bias", "BIAS", r->bias, 0.0, 0.0},

@@ -361,6 +361,9 @@ static bst_status propagate(bst_ctx *ctx, const request *q, bool *complete) {
                                 q->eop_path ? q->eop_path : "--frame gcrf needs --eop FILE here");
             }
         }
+        if (status == BST_OK) {
+            bst_eop_warn(ctx, eop, time_of(q, q->rows - 1), "");
+        }
     }
     if (status == BST_OK && q->output) {
         status = bst_draft_open(ctx, q->output, &draft);
@@ -457,7 +460,7 @@ int bst_cmd_propagate(int argc, char **argv) {
         {.name = "help", .kind = BST_OPTION_FLAG, .target = &q.help, .doc = "this text"},
         {.name = NULL}};
     bst_ctx ctx;
-    bst_ctx_init(&ctx, NULL, NULL, BST_LOG_ERROR);
+    bst_ctx_init(&ctx, bst_app_log, NULL, BST_LOG_WARNING);
     if (bst_options_parse(&ctx, table, argc, argv, NULL) != BST_OK) {
         return bst_options_misuse(&ctx, "propagate");
     }

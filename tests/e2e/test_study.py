@@ -114,8 +114,11 @@ class Whole(unittest.TestCase):
                                 capture_output=True, text=True, timeout=600)
         self.assertEqual(result.returncode, 0, result.stderr)
         summary = runs.manifest(out)["summary"]
-        for name in ("frames", "pointing_rms_px", "pointing_p99_px", "pointing_bias_px",
-                     "track_fraction", "time_to_confirm_s", "time_to_settle_s"):
+        for name in ("frames", "pointing_rms_px", "pointing_median_px", "pointing_p99_px",
+                     "pointing_bias_px", "track_fraction", "custody", "breaks", "visible_frames",
+                     "wrong_target_frames", "detected_fraction", "track_rms_px", "track_median_px",
+                     "track_p95_px", "tracks", "false_tracks", "time_to_confirm_s",
+                     "time_to_acquire_s", "time_to_settle_s"):
             told = float(row[name]) if row[name] else None
             self.assertEqual(told, summary[name], name)
         with runs.database(out) as database:
