@@ -5,6 +5,7 @@
 
 #include "sim/app/app.h"
 #include "sim/app/plugins.h"
+#include "sim/app/stack.h"
 #include "sim/core/text.h"
 #include "sim/core/version.h"
 
@@ -111,7 +112,7 @@ static int help(int argc, char **argv) {
     char name[32], option[] = "--help";
     snprintf(name, sizeof name, "%s", found->name);
     char *words[] = {name, option, NULL};
-    return found->run(2, words);
+    return bst_app_run_with_stack(found->run, 2, words);
 }
 
 /* Takes the options before the command: argv[*first] is the command then. */
@@ -174,5 +175,6 @@ int main(int argc, char **argv) {
         return code;
     }
     const command *found = find_command(argv[first]);
-    return found ? found->run(argc - first, argv + first) : unknown_command(argv[first]);
+    return found ? bst_app_run_with_stack(found->run, argc - first, argv + first)
+                 : unknown_command(argv[first]);
 }
