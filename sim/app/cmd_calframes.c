@@ -9,6 +9,7 @@
 #include "sim/app/app.h"
 #include "sim/app/load.h"
 #include "sim/core/folder.h"
+#include "sim/core/text.h"
 #include "sim/core/version.h"
 #include "sim/io/fits_frames.h"
 
@@ -94,7 +95,9 @@ static bst_status write_series(bst_ctx *ctx, const job *j, const series *s) {
     bst_status closed = bst_fits_close(ctx, fits);
     status = status == BST_OK ? closed : status;
     if (status == BST_OK) {
-        printf("%s: %lld frames of %g s\n", path, (long long)s->count, s->exposure_s);
+        printf("%s: %s of %g s\n", path,
+               bst_count_text((char[BST_COUNT_TEXT]){0}, s->count, "frame", "frames"),
+               s->exposure_s);
     }
     return status;
 }
