@@ -150,6 +150,7 @@ int bst_cmd_export(int argc, char **argv) {
         {.name = "satnet",
          .kind = BST_OPTION_TEXT,
          .target = &e.satnet,
+         .path = BST_PATH_OUTPUT_FOLDER,
          .argument = "FOLDER",
          .doc =
              "a FITS file and a JSON annotation per frame, for training networks: ImageFiles/ and "
@@ -157,6 +158,7 @@ int bst_cmd_export(int argc, char **argv) {
         {.name = "out",
          .kind = BST_OPTION_TEXT,
          .target = &out,
+         .path = BST_PATH_OUTPUT_FOLDER,
          .argument = "FOLDER",
          .doc = "where it all goes (default RUN.export)"},
         {.name = "sensor",

@@ -86,6 +86,7 @@ static void take_summary(bst_report_sensor *s, const cJSON *summary) {
                   {"breaks", &f->breaks},
                   {"wrong_target_frames", &f->wrong_target_frames},
                   {"pointing_frames", &f->pointing_frames},
+                  {"bad_pixels", &f->bad_pixels},
                   {"track_frames", &s->track_frames}};
     for (size_t k = 0; k < sizeof reals / sizeof *reals; k++) {
         take_real(summary, reals[k].key, reals[k].value);

@@ -95,6 +95,7 @@ static bst_status judge(run_state *run, watched_sensor *sensor, const char *chan
         return bst_run_metrics_tracks(&run->hooks, sensor->metrics, payload);
     }
     if (strcmp(channel, BST_CHANNEL_DETECTIONS) == 0) {
+        bst_loop_summary_detections(sensor->summary, payload);
         bst_run_metrics_detections(sensor->metrics, payload);
     } else if (strcmp(channel, BST_CHANNEL_CONTROL_STATUS) == 0) {
         bst_loop_summary_status(sensor->summary, payload);
@@ -486,7 +487,7 @@ static bst_status execute(run_state *run, bst_simulation *sim, const bst_run_req
                           double *wall) {
     bst_ctx *ctx = run->ctx;
     bst_run *store = NULL;
-    bst_run_warn_of_space(ctx, run->scenario, request->out);
+    BST_TRY(bst_run_check_space(ctx, run->scenario, request->out, request->force));
     BST_TRY(bst_run_create(ctx, request->out, request->overwrite, &store));
     cJSON *echo = bst_scenario_echo(run->scenario);
     bst_status status = echo ? bst_run_write_json(ctx, store, "scenario.json", echo)

@@ -10,6 +10,7 @@
 typedef struct bst_run_request {
     const char *out; /* folder of the results; NULL: nothing is written */
     bool overwrite;  /* replace an earlier run there */
+    bool force;      /* start although its frames need more space than is free */
     bool progress;   /* a line on the standard error */
     bool print;      /* the table of results on the standard output */
     bool metrics;    /* without a folder: work out sightings, too */

@@ -12,7 +12,7 @@
 typedef struct bst_plot {
     FILE *script;
     char path[4096];
-    char draft[4096];
+    char draft[4160];
 } bst_plot;
 
 /* Begins a PNG, or where the path ends in .svg an SVG, of width x height pixels at `path`: terminal

@@ -208,8 +208,7 @@ class Complete(OnePage):
         for run, words, code, message in (
                 (folder, (), 1, "is not the folder of a run"),
                 (folder + "/none", (), 1, "No such file or directory"),
-                (self.made, ("--out", folder + "/none/page.html"), 1, "cannot be made"),
-                (self.made, ("--out", "/dev/null"), 1, "is not a regular file"),
+                (self.made, ("--out", folder + "/none/page.html"), 2, "there is no folder"),
                 (self.made, ("--uot", "x"), 2, "--out"),
                 (self.made, ("more",), 2, "one folder")):
             result = report(run, *words)
