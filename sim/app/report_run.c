@@ -6,6 +6,7 @@
 #include <cjson/cJSON.h>
 
 #include "sim/app/report.h"
+#include "sim/core/text.h"
 #include "sim/core/version.h"
 
 enum { MOST_EVENTS = 400 };
@@ -257,8 +258,8 @@ static bst_status put_events(bst_ctx *ctx, const page *p) {
         bst_page_section_end(p->out);
         return BST_OK;
     }
-    fprintf(p->out, "<details%s><summary>%" PRId64 " events</summary>\n",
-            total <= 40 ? " open=\"open\"" : "", total);
+    fprintf(p->out, "<details%s><summary>%s</summary>\n", total <= 40 ? " open=\"open\"" : "",
+            bst_count_text((char[BST_COUNT_TEXT]){0}, total, "event", "events"));
     fputs(
         "<div class=\"scroll\"><table>\n<thead><tr><th class=\"n\">s</th><th>UTC</th>"
         "<th>from</th><th>kind</th><th>what</th></tr></thead>\n<tbody>\n",
@@ -271,7 +272,7 @@ static bst_status put_events(bst_ctx *ctx, const page *p) {
         if (!middle) {
             put_event(p->out, rows);
         } else if (shown == MOST_EVENTS / 2) {
-            fprintf(p->out, "<tr><td colspan=\"5\">%" PRId64 " events are left out</td></tr>\n",
+            fprintf(p->out, "<tr><td colspan=\"5\">%" PRId64 " events more</td></tr>\n",
                     total - MOST_EVENTS);
         }
         shown++;

@@ -7,6 +7,7 @@
 #include "sim/app/loop_model.h"
 #include "sim/app/report.h"
 #include "sim/app/run_losses.h"
+#include "sim/core/text.h"
 
 static const cJSON *get(const cJSON *node, const char *key) {
     return cJSON_GetObjectItemCaseSensitive(node, key);
