@@ -157,7 +157,7 @@ class Orbit(unittest.TestCase):
                 ((), 2, "one folder of a run, or a TDM, is expected"),
                 ((self.folder + "/none",), 1, "none"),
                 ((self.made, "--track", "0"), 2, "--track"),
-                ((self.made, "--oem", self.folder), 1, self.folder)):
+                ((self.made, "--oem", self.folder), 2, self.folder)):
             result = call("orbit", *words)
             self.assertEqual(result.returncode, code, result.stderr)
             self.assertIn(message, result.stderr)
