@@ -110,6 +110,7 @@ class Figures(unittest.TestCase):
             json.dump(manifest, file)
         cards = self.read_page(out).cards()
         self.near(cards["custody"], 100 * mine["custody"], 4)
+        self.near(cards["time to acquire"], mine["time_to_acquire_s"], 4)
         self.near(cards["pointing RMS"], mine["pointing_rms_px"])
 
     def test_clean(self):
