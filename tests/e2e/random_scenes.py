@@ -271,8 +271,8 @@ def modules(rng, c, sky, period, exposure, limit, strategy, leo):
     return {
         "gimbal": {"type": "second_order", "delay_s": {"los_command": rounded(0.05 * period, 3)},
                    "platform": platform},
-        "scenegen": {"type": "opencl", "v_limit": rounded(limit + (1.0 if sky == "crowded" else 0.5),
-                                                          3)},
+        "scenegen": {"type": "opencl",
+                     "v_limit": rounded(limit + (1.0 if sky == "crowded" else 0.5), 3)},
         "obsgen": {"type": "statistical", "calibration_file": ""},
         "imgproc": imgproc,
         "tracker": {"type": "ekf", **({"motion": "orbit"} if leo else {})},
@@ -304,6 +304,7 @@ def scene(seed, number, catalogue="default", generator=False, attempt=0):
     offset = rounded(field_deg * rng.uniform(0.0, 0.25), 3)
     mods = modules(rng, c, sky, period, exposure, limit, strategy, "leo" in kind.split("-")[1])
     mods["obsgen"]["calibration_file"] = CALIBRATION
+    faint = {"faint_stars": "statistical", "faint_limit_v_mag": max(rounded(limit + 1.0, 3), 6.0)}
     target = place["target"][1] or str(place["target"][0])
     observer = place["observer"][1] or str(place["observer"][0])
     return {
@@ -319,8 +320,7 @@ def scene(seed, number, catalogue="default", generator=False, attempt=0):
         "world": {
             "star_catalogue": catalogue,
             "earth_orientation": "builtin",
-            **({"faint_stars": "statistical",
-                "faint_limit_v_mag": max(rounded(limit + 1.0, 3), 6.0)} if sky == "crowded" else {}),
+            **(faint if sky == "crowded" else {}),
             "objects": [{"name": target, "area_m2": area, "albedo": albedo,
                          "orbit": {"source": "sgp4", "elements_file": ELEMENTS,
                                    "norad": place["target"][0]}}],
