@@ -25,7 +25,12 @@ static double overlap(const bst_generator *g, const generator_source *a,
     double c = a->length > 0.0 ? a->path.dx / a->length : 1.0;
     double s = a->length > 0.0 ? a->path.dy / a->length : 0.0;
     double length = a->as_streak ? g->streak : a->length;
-    return bst_matched_falloff(dx * c + dy * s, dy * c - dx * s, length, g->total_sigma);
+    return bst_matched_falloff(dx * c + dy * s, dy * c - dx * s, length, g->cross_sigma);
+}
+
+double bst_generator_output_variance(const bst_generator *g, const generator_source *s) {
+    const bst_generator_filter *filter = &g->filters[s->as_streak];
+    return filter->variance + filter->shot * fmax(s->amplitude, 0.0);
 }
 
 /* Whether image processing would find two maxima: the fainter source b beside a. */
@@ -80,7 +85,8 @@ void bst_generator_decide(bst_generator *g) {
         generator_source *s = &g->sources[i];
         if (s->amplitude > FAINTEST_SHARE * g->threshold) {
             s->noise = bst_generator_draw(g, s, GENERATOR_PEAK);
-            s->level = s->amplitude + s->noise / g->calibration.slope;
+            s->spread = sqrt(bst_generator_output_variance(g, s));
+            s->level = s->amplitude + s->spread * s->noise / g->calibration.slope;
             g->ranks[ranks++] = (generator_rank){s->level, i};
         }
     }
@@ -113,7 +119,9 @@ void bst_generator_decide(bst_generator *g) {
         if (merged) {
             continue;
         }
-        s->found = g->calibration.slope * (peak - g->threshold) + s->noise > 0.0;
+        s->found = g->calibration.slope * (peak - g->filters[s->as_streak].threshold) +
+                       s->spread * s->noise >
+                   0.0;
         s->peak = peak;
     }
 }
@@ -180,7 +188,7 @@ static void wander(const bst_generator *g, const generator_source *s,
     }
     bst_philox_words words = bst_rng_words(g->key, (uint64_t)g->exposure_id, WANDER | s->name);
     const bst_rng_key key = {{words.w[0], words.w[1]}};
-    double threshold = g->threshold - beside;
+    double threshold = g->filters[1].threshold - beside;
     bst_wander_top top = bst_wander_draw(g->wander, key, sources, used, noise, threshold);
     if (!(top.snr > threshold)) {
         return; /* so faint that it is seen for another reason */

@@ -30,6 +30,7 @@ bst_status bst_generator_create(bst_ctx *ctx, const bst_camera *camera, const bs
     }
     g->camera = camera;
     g->electrons_per_s_v0 = bst_camera_electrons_per_s(knowledge, 0.0);
+    g->onboard_sigma_px = hypot(bst_camera_psf_sigma_px(knowledge), settings->jitter_px);
     g->settings = *settings;
     g->settings.mesh_px = settings->mesh_px > 0 ? settings->mesh_px : 64;
     g->calibration = *calibration;
@@ -184,27 +185,33 @@ static void respond(const bst_generator *g, generator_source *s) {
                                      s->length);
     double ideal =
         s->sharp * s->flux_e * bst_bound_norm(&g->bound, s->length) / g->noise_e * sqrt(s->visible);
-    double efficiency = 1.0;
+    double efficiency = g->filters[0].efficiency;
     s->as_streak = false;
     if (s->broken) { /* at rest */
-        s->amplitude = s->flux_e * bst_bound_norm(&g->bound, 0.0) / g->noise_e;
+        s->amplitude = efficiency * s->flux_e * bst_bound_norm(&g->bound, 0.0) / g->noise_e;
         return;
     }
-    if (s->star) {
-        s->as_streak = g->streak > 0.0;
-        if (!s->as_streak && s->length > 0.5) {
-            efficiency = bst_matched_efficiency(s->path, point, g->total_sigma);
-        }
-    } else {
-        if (s->length > 0.5) {
-            efficiency = bst_matched_efficiency(s->path, point, g->total_sigma);
-        }
+    s->as_streak = s->star && g->streak > 0.0;
+    if (s->as_streak) {
+        efficiency = g->filters[1].efficiency;
+    } else if (!s->star) {
+        /* ends that tremble are no path */
+        const bst_path_px path = {s->path.dx + g->straight_path.dx - g->whole_path.dx,
+                                  s->path.dy + g->straight_path.dy - g->whole_path.dy};
+        efficiency = bst_response_efficiency(&g->response, path, point);
         if (g->streak > 0.0) {
-            double other = bst_matched_efficiency(s->path, g->star_path, g->total_sigma);
+            double other = bst_response_efficiency(&g->response, path, g->star_path);
             s->as_streak = other > efficiency;
             efficiency = fmax(other, efficiency);
         }
     }
+    if (g->response.source.across_px != g->response.source.along_px) {
+        ideal *= bst_response_norm_ratio(&g->response, s->length);
+    }
+    /* noise lifts the greatest output near a source the more, the flatter the image makes its top
+     */
+    double flatness = g->cross_sigma / g->filter_sigma;
+    gain = 1.0 + (gain - 1.0) * flatness * flatness;
     s->amplitude = gain * efficiency * ideal;
 }
 
@@ -238,12 +245,13 @@ static void set_noise(bst_generator *g, const bst_generator_frame *f) {
     const bst_detector_config *d = &c->detector;
     double added = (double)g->binning * g->binning;
     double level = (f->truth->background_e + f->truth->dark_e) * added;
-    double variance = level + c->read_noise_e * c->read_noise_e +
-                      c->gain_e_per_dn * c->gain_e_per_dn / 12.0 + d->row_noise_e * d->row_noise_e +
-                      d->row_offset_rms_e * d->row_offset_rms_e +
-                      d->column_offset_rms_e * d->column_offset_rms_e +
-                      d->read_tail_fraction * d->read_tail_rms_e * d->read_tail_rms_e +
-                      level * level * d->prnu_rms * d->prnu_rms / added;
+    double uneven_dark = f->truth->dark_e * d->dsnu_rms;
+    double variance =
+        level + c->read_noise_e * c->read_noise_e + c->gain_e_per_dn * c->gain_e_per_dn / 12.0 +
+        d->row_noise_e * d->row_noise_e + d->row_offset_rms_e * d->row_offset_rms_e +
+        d->column_offset_rms_e * d->column_offset_rms_e +
+        d->read_tail_fraction * d->read_tail_rms_e * d->read_tail_rms_e +
+        level * level * d->prnu_rms * d->prnu_rms / added + added * uneven_dark * uneven_dark;
     g->background_e = level;
     g->noise_e = sqrt(fmax(variance, 1e-6)) * g->calibration.noise_factor;
 }
@@ -287,25 +295,6 @@ static void add_crowding(bst_generator *g) {
             s->amplitude -= g->background_bias_e / (bst_bound_norm(&g->bound, length) * g->noise_e);
         }
     }
-}
-
-/* The threshold, kept by streak length. Streaks count in steps of half a pixel, as the filters do.
- */
-static void set_threshold(bst_generator *g) {
-    struct generator_thresholds *t = &g->thresholds;
-    if (t->width != g->width || t->height != g->height || t->sigma != g->total_sigma) {
-        *t = (struct generator_thresholds){
-            .width = g->width, .height = g->height, .sigma = g->total_sigma};
-    }
-    int step = (int)floor(2.0 * g->streak + 0.5);
-    step = step < GENERATOR_STEPS ? step : GENERATOR_STEPS - 1;
-    if (!(t->threshold[step] > 0.0)) {
-        t->threshold[step] =
-            bst_matched_threshold(g->total_sigma, 0.5 * step, g->settings.false_alarms_per_frame,
-                                  (double)g->width * g->height, &t->streak_share[step]);
-    }
-    g->threshold = fmax(t->threshold[step] + g->calibration.threshold_offset, 1.0);
-    g->streak_share = t->streak_share[step];
 }
 
 static bst_status reserve_path(bst_ctx *ctx, bst_generator *g, int count) {
@@ -355,7 +344,7 @@ static bst_status set_path(bst_ctx *ctx, bst_generator *g, const bst_generator_f
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the way of stars");
         }
     }
-    g->route_count = bst_route_lay(&g->path, g->total_sigma, g->route);
+    g->route_count = bst_route_lay(&g->path, g->cross_sigma, g->route);
     double *box = g->route_box;
     box[0] = box[2] = INFINITY;
     box[1] = box[3] = -INFINITY;
@@ -390,7 +379,11 @@ static bst_status set_frame(bst_ctx *ctx, bst_generator *g, const bst_generator_
                        ? (bst_path_px){f->streak_dx_px / g->binning, f->streak_dy_px / g->binning}
                        : (bst_path_px){0.0, 0.0};
     g->streak = filtered ? length : 0.0;
-    return set_path(ctx, g, f);
+    g->path.count = 0;
+    bst_generator_set_response(g, f);
+    BST_TRY(set_path(ctx, g, f));
+    bst_generator_set_response(g, f); /* with the path */
+    return BST_OK;
 }
 
 static bst_status collect(bst_ctx *ctx, bst_generator *g, const bst_generator_frame *f) {
@@ -407,8 +400,8 @@ static bst_status collect(bst_ctx *ctx, bst_generator *g, const bst_generator_fr
         respond(g, s);
         g->source_count++;
     }
-    set_threshold(g);
     add_crowding(g);
+    bst_generator_set_filters(g);
     qsort(g->sources, (size_t)g->source_count, sizeof *g->sources, by_row);
     return BST_OK;
 }
@@ -452,8 +445,9 @@ void bst_generator_keep_rough(bst_generator *g, int x, int y, double snr, int it
 /* A source that hardly moved in a frame that nothing is fitted in: its pixel shows it. */
 static void keep_whole_rough(bst_generator *g, const generator_source *s) {
     int x = (int)lround(s->x), y = (int)lround(s->y);
-    double value = s->peak * bst_matched_falloff(x - s->x, y - s->y, 0.0, g->total_sigma) +
-                   s->noise / g->calibration.slope;
+    double spread = sqrt(bst_generator_output_variance(g, s));
+    double value = s->peak * bst_matched_falloff(x - s->x, y - s->y, 0.0, g->cross_sigma) +
+                   spread * s->noise / g->calibration.slope;
     if (value > g->threshold && x >= 0 && y >= 0 && x < g->width && y < g->height) {
         bst_generator_keep_rough(g, x, y, value, s->item);
     }
@@ -513,6 +507,7 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
                                   .background_e = g->background_e,
                                   .noise_e = g->noise_e,
                                   .threshold_snr = g->threshold,
+                                  .filter = g->filters[g->streak > 0.0],
                                   .faint_light_e = g->faint_light_e,
                                   .faint_square_e2 = g->faint_square_e2,
                                   .streak_px = g->streak * g->binning,
