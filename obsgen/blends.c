@@ -15,6 +15,9 @@ static const double FLATTEST = 6.0;
 /* Deviation along a streak, in sigmas of the PSF, from which on the place is not that of the
  * nearest top any more; noise of its filters over white noise's that is believed. */
 static const double WANDERS = 0.2, LEAST_NOISE = 0.7, MOST_NOISE = 1.6, UNLIFTED_SNR = 10.0;
+/* Bright sources that nothing else is fitted beside are fitted with their width, up to so many of
+ * the PSF's variances more. */
+static const double WIDTH_FIT_SNR = 20.0, MOST_FREE_WIDENING = 1.8;
 /* Keys of such streaks. */
 static const uint64_t WANDER = (uint64_t)1 << 52;
 
@@ -236,19 +239,34 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
         }
     }
     generator_source at = *s;
+    double narrow = 1.0; /* variance of the PSF over that of the fitted width */
+    bool width_is_free = !out.near && s->amplitude > WIDTH_FIT_SNR;
     for (int round = 0; round < ROUNDS && count > 0; round++) {
         at.x = out.x;
         at.y = out.y;
-        double own = s->flux_e * overlap(g, s, &at), sum = own, x = 0.0, y = 0.0;
+        /* the fitted light's brightest pixel, over the noise's variance */
+        double bright = out.flux_e * bst_bound_norm(&g->bound, s->length) * g->fit_light;
+        double own = s->flux_e *
+                     bst_blend_weight(&g->blend_weights, bright, pow(overlap(g, s, &at), narrow));
+        double sum = own, x = 0.0, y = 0.0, square = 0.0;
         for (int k = 0; k < count; k++) {
-            double light = merged[k].flux_e * overlap(g, &at, &merged[k]);
+            double seen = pow(overlap(g, &at, &merged[k]), narrow);
+            double light = merged[k].flux_e * bst_blend_weight(&g->blend_weights, bright, seen);
+            double dx = merged[k].x - s->x, dy = merged[k].y - s->y;
             sum += light;
-            x += light * (merged[k].x - s->x);
-            y += light * (merged[k].y - s->y);
+            x += light * dx;
+            y += light * dy;
+            square += light * (dx * dx + dy * dy);
         }
         out.flux_e = sum;
         out.x = s->x + x / sum;
         out.y = s->y + y / sum;
+        if (width_is_free) { /* the mean of both axes */
+            double own_variance = g->cross_sigma * g->cross_sigma;
+            double spread = 0.5 * (square / sum - (x * x + y * y) / (sum * sum));
+            spread = fmin(spread, MOST_FREE_WIDENING * own_variance);
+            narrow = own_variance / (own_variance + spread);
+        }
     }
     if (count > 0 && s->length > 1.0) {
         /* two streaks on one line have a flat top between them, where noise decides the place */

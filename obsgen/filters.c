@@ -135,6 +135,8 @@ static bst_threshold_noise noise_law(const bst_generator *g) {
 }
 
 void bst_generator_set_filters(bst_generator *g) {
+    /* a Gaussian's top over its sqrt(sum p^2) */
+    g->fit_light = 1.0 / (sqrt(BST_PI) * g->cross_sigma * g->noise_e * g->noise_e);
     set_threshold(g);
     const bst_path_px paths[2] = {{0.0, 0.0}, g->star_path};
     const double lengths[2] = {0.0, g->streak};

@@ -34,6 +34,7 @@ bst_status bst_generator_create(bst_ctx *ctx, const bst_camera *camera, const bs
     g->settings = *settings;
     g->settings.mesh_px = settings->mesh_px > 0 ? settings->mesh_px : 64;
     g->calibration = *calibration;
+    bst_blend_weights_init(&g->blend_weights);
     g->key = key;
     g->items = calloc((size_t)settings->capacity, sizeof *g->items);
     g->wander = calloc(1, sizeof *g->wander);
@@ -165,6 +166,10 @@ static bool place_source(const bst_generator *g, const bst_generator_frame *f,
     s->path.dy = (item->y_end_px - item->y_start_px) / b;
     s->x = (item->x_mean_px - x0) / b;
     s->y = (item->y_mean_px - y0) / b;
+    if (!g->smeared) { /* ends that tremble are no path */
+        s->path.dx += g->straight_path.dx - g->whole_path.dx;
+        s->path.dy += g->straight_path.dy - g->whole_path.dy;
+    }
     s->length = hypot(s->path.dx, s->path.dy);
     s->flux_e = item->electrons;
     s->sharp = sharpness(g, f, item, s->length);
@@ -195,12 +200,9 @@ static void respond(const bst_generator *g, generator_source *s) {
     if (s->as_streak) {
         efficiency = g->filters[1].efficiency;
     } else if (!s->star) {
-        /* ends that tremble are no path */
-        const bst_path_px path = {s->path.dx + g->straight_path.dx - g->whole_path.dx,
-                                  s->path.dy + g->straight_path.dy - g->whole_path.dy};
-        efficiency = bst_response_efficiency(&g->response, path, point);
+        efficiency = bst_response_efficiency(&g->response, s->path, point);
         if (g->streak > 0.0) {
-            double other = bst_response_efficiency(&g->response, path, g->star_path);
+            double other = bst_response_efficiency(&g->response, s->path, g->star_path);
             s->as_streak = other > efficiency;
             efficiency = fmax(other, efficiency);
         }

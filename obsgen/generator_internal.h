@@ -2,6 +2,7 @@
 #ifndef BST_OBSGEN_GENERATOR_INTERNAL_H
 #define BST_OBSGEN_GENERATOR_INTERNAL_H
 
+#include "obsgen/blend_weight.h"
 #include "obsgen/generator.h"
 #include "obsgen/route.h"
 #include "obsgen/wander.h"
@@ -61,12 +62,15 @@ struct bst_generator {
     double cross_sigma; /* of what filters show of a source beside its place: sqrt(2) of it */
     bst_generator_filter filters[2]; /* for points, for the stars' streaks */
     double white_share;              /* of the noise's variance that pixels have each for itself */
-    bst_path_px straight_path;       /* nearest to the true one */
-    double widening;      /* width of the images over the PSF's: the path is not straight */
-    double place_ratio2;  /* variance of a place over that of a Gaussian of the PSF's
-                                         noise-equivalent             area */
-    double norm_ratio[2]; /* sqrt(sum p^2) of the filters' images over the bound's */
+    double
+        fit_light; /* brightest pixel over the noise's variance, per sqrt(sum p^2) and electron */
+    bst_path_px straight_path; /* nearest to the true one */
+    double widening;           /* width of the images over the PSF's: the path is not straight */
+    double place_ratio2;       /* variance of a place over that of a Gaussian of the PSF's
+                                              noise-equivalent             area */
+    double norm_ratio[2];      /* sqrt(sum p^2) of the filters' images over the bound's */
     bst_bound bound;
+    bst_blend_weights blend_weights;
     bst_path_px star_path;
     double bend_x, bend_y;
     bst_route_path path; /* the true one; count 0: not known */

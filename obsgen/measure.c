@@ -19,7 +19,8 @@ static void shared_bias(const bst_generator *g, const generator_source *s, doubl
     if (s->star || s->broken || g->path.count < 3) {
         return;
     }
-    double dx = s->path.dx - g->whole_path.dx, dy = s->path.dy - g->whole_path.dy;
+    const bst_path_px *stars = g->smeared ? &g->whole_path : &g->straight_path;
+    double dx = s->path.dx - stars->dx, dy = s->path.dy - stars->dy;
     for (int k = 0; k < g->path.count; k++) {
         double u = (double)k / (g->path.count - 1) - 0.5;
         g->object_x[k] = g->path_x[k] + u * dx;
