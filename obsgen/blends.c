@@ -8,6 +8,11 @@ static const double FWHM_PER_SIGMA = 2.3548200450309493;
 /* Image processing tells two sources apart where the saddle between them is so much lower than the
  * fainter one; and two places closer than this share of the FWHM are one. */
 static const double SADDLE_SIGMA = 3.0, SADDLE_SHARE = 0.15, CLOSEST_FWHM = 0.6;
+/* It looks at what is above these shares of the threshold: that which a source between four pixels
+ * shows on one of them, or the other one. */
+static const double LOOK_CORNER = 0.93, LOOK_SHARE = 0.65;
+/* Further apart than this, and their streaks, no two share a maximum. */
+static const double FAR_SIGMAS = 8.0;
 /* Sources below this share of the threshold are no detections, but light. */
 static const double FAINTEST_SHARE = 0.3;
 /* Errors of places grow by no more than this between sources that are seen as one. */
@@ -36,6 +41,41 @@ double bst_generator_output_variance(const bst_generator *g, const generator_sou
     return filter->variance + filter->shot * fmax(s->amplitude, 0.0);
 }
 
+/* The filter's output for two sources at a pixel. */
+static double output_of(const bst_generator *g, const generator_source *a,
+                        const generator_source *b, int x, int y) {
+    generator_source pixel = {.x = x, .y = y};
+    return a->level * overlap(g, a, &pixel) + b->level * overlap(g, b, &pixel);
+}
+
+typedef struct grid_place {
+    int x, y;
+    double value;
+} grid_place;
+
+/* The pixel of the output's maximum about source s, one of both. */
+static grid_place climb(const bst_generator *g, const generator_source *a,
+                        const generator_source *b, const generator_source *s) {
+    enum { MOST = 8 };
+    grid_place at = {(int)lround(s->x), (int)lround(s->y), 0.0};
+    at.value = output_of(g, a, b, at.x, at.y);
+    for (int step = 0; step < MOST; step++) {
+        grid_place best = at;
+        for (int k = 0; k < 9; k++) {
+            int x = at.x + k % 3 - 1, y = at.y + k / 3 - 1;
+            double value = output_of(g, a, b, x, y);
+            if (value > best.value) {
+                best = (grid_place){x, y, value};
+            }
+        }
+        if (best.x == at.x && best.y == at.y) {
+            break;
+        }
+        at = best;
+    }
+    return at;
+}
+
 /* Whether image processing would find two maxima: the fainter source b beside a. */
 static bool told_apart(const bst_generator *g, const generator_source *a,
                        const generator_source *b) {
@@ -45,18 +85,27 @@ static bool told_apart(const bst_generator *g, const generator_source *a,
     if (hypot(dx, dy) < CLOSEST_FWHM * FWHM_PER_SIGMA * g->sigma) {
         return false;
     }
+    if (hypot(dx, dy) > FAR_SIGMAS * g->cross_sigma + fmax(a->length, b->length)) {
+        return true;
+    }
     at.x = a->x + dx;
     at.y = a->y + dy;
-    double top = b->level + a->level * overlap(g, a, &at), saddle = top;
-    enum { STEPS = 12 };
-    for (int i = 1; i < STEPS; i++) {
-        generator_source p = *a;
-        p.x = a->x + dx * i / STEPS;
-        p.y = a->y + dy * i / STEPS;
-        double value = a->level * overlap(g, a, &p) + b->level * overlap(g, &at, &p);
-        saddle = fmin(saddle, value);
+    grid_place bright = climb(g, a, &at, a), faint = climb(g, a, &at, &at);
+    int steps = abs(faint.x - bright.x) > abs(faint.y - bright.y) ? abs(faint.x - bright.x)
+                                                                  : abs(faint.y - bright.y);
+    /* between the pixels a source between four of them is looked at */
+    double corner = exp(-0.125 / (g->filter_sigma * g->filter_sigma));
+    double least = fmax(faint.value - fmax(SADDLE_SIGMA, SADDLE_SHARE * faint.value),
+                        fmax(LOOK_CORNER * corner, LOOK_SHARE) * g->threshold);
+    for (int i = 1; i < steps; i++) {
+        double t = (double)i / steps;
+        int x = bright.x + (int)lround(t * (faint.x - bright.x));
+        int y = bright.y + (int)lround(t * (faint.y - bright.y));
+        if (output_of(g, a, &at, x, y) < least) {
+            return true;
+        }
     }
-    return top - saddle > fmax(SADDLE_SIGMA, SADDLE_SHARE * top);
+    return false;
 }
 
 /* Calls for every other source whose light reaches number i. */

@@ -92,8 +92,10 @@ void bst_generator_false_alarms(bst_generator *g) {
             bst_generator_keep_rough(g, (int)lround(x), (int)lround(y), snr, -1);
             continue;
         }
-        bst_generated item = {bst_generator_point(g, x, y, snr, streak ? g->streak : 0.0), -1,
-                              false};
+        bst_generated item = {
+            .detection = bst_generator_point(g, x, y, snr, streak ? g->streak : 0.0),
+            .item = -1,
+            .drawn = streak};
         bst_generator_keep(g, &item);
     }
 }
@@ -133,7 +135,8 @@ void bst_generator_hits(bst_generator *g) {
             y > g->height - 0.5) {
             continue;
         }
-        bst_generated item = {bst_generator_point(g, x, y, peak, 0.0), -1, true};
+        bst_generated item = {
+            .detection = bst_generator_point(g, x, y, peak, 0.0), .item = -1, .hit = true};
         bst_detection *d = &item.detection;
         double hottest = charge / fmax(length, 1.0) / g->noise_e;
         bool stands_out = hottest > HOT_SHARE * peak + HOT_SIGMA;

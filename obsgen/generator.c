@@ -487,7 +487,9 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
             keep_whole_rough(g, s);
         } else if (s->found) {
             generator_blend b = bst_generator_blend_of(g, i);
-            bst_generated item = {bst_generator_measure(g, s, &b), s->item, false};
+            bst_generated item = {.detection = bst_generator_measure(g, s, &b),
+                                  .item = s->item,
+                                  .drawn = s->as_streak && !b.point};
             bst_generator_keep(g, &item);
         }
     }
@@ -498,9 +500,9 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
     bst_generator_hits(g);
     for (int i = 0; i < g->count; i++) {
         bst_detection *d = &g->items[i].detection;
-        bool followed = !g->smeared && g->streak > 0.0 && (d->flags & BST_DETECTION_STREAK);
-        bst_motion_widen(f->bend_x_px, f->bend_y_px, followed ? f->bend_x_px : 0.0,
-                         followed ? f->bend_y_px : 0.0, d);
+        bool drawn = g->items[i].drawn;
+        bst_motion_widen(f->bend_x_px, f->bend_y_px, drawn ? f->bend_x_px : 0.0,
+                         drawn ? f->bend_y_px : 0.0, d);
     }
     qsort(g->items, (size_t)g->count, sizeof *g->items, generated_by_row);
     *out = (bst_generator_result){.items = g->items,

@@ -24,6 +24,7 @@ typedef struct bst_generated {
     bst_detection detection;
     int32_t item; /* of the truth, the brightest that is in it; -1: none */
     bool hit;     /* a radiation hit */
+    bool drawn;   /* fitted with the stars' path, its bend too */
 } bst_generated;
 
 typedef struct bst_generator bst_generator;
