@@ -273,7 +273,7 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
             continue;
         }
         double share = overlap(g, s, o);
-        if (o->found) {
+        if (o->found && !g->smeared) { /* in smeared frames nothing is fitted beside another */
             beside += o->amplitude * share;
             out.near = out.near || (fabs(dx) <= half_x && fabs(dy) <= half_y);
             /* both fluxes and places are free: what they have in common is not known */
@@ -289,12 +289,13 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
     }
     generator_source at = *s;
     double narrow = 1.0; /* variance of the PSF over that of the fitted width */
-    bool width_is_free = !out.near && s->amplitude > WIDTH_FIT_SNR;
+    bool width_is_free = !g->smeared && !out.near && s->amplitude > WIDTH_FIT_SNR;
     for (int round = 0; round < ROUNDS && count > 0; round++) {
         at.x = out.x;
         at.y = out.y;
         /* the fitted light's brightest pixel, over the noise's variance */
-        double bright = out.flux_e * bst_bound_norm(&g->bound, s->length) * g->fit_light;
+        double bright =
+            g->smeared ? 0.0 : out.flux_e * bst_bound_norm(&g->bound, s->length) * g->fit_light;
         double own = s->flux_e *
                      bst_blend_weight(&g->blend_weights, bright, pow(overlap(g, s, &at), narrow));
         double sum = own, x = 0.0, y = 0.0, square = 0.0;

@@ -213,7 +213,7 @@ static void respond(const bst_generator *g, generator_source *s) {
     /* noise lifts the greatest output near a source the more, the flatter the image makes its top
      */
     double flatness = g->cross_sigma / g->filter_sigma;
-    gain = 1.0 + (gain - 1.0) * flatness * flatness;
+    gain = g->smeared ? 1.0 : 1.0 + (gain - 1.0) * flatness * flatness;
     s->amplitude = gain * efficiency * ideal;
 }
 
@@ -429,7 +429,7 @@ void bst_generator_keep(bst_generator *g, const bst_generated *item) {
     }
 }
 
-void bst_generator_keep_rough(bst_generator *g, int x, int y, double snr, int item) {
+void bst_generator_keep_rough(bst_generator *g, double x, double y, double snr, int item) {
     double b = g->binning, norm = bst_bound_norm(&g->bound, 0.0), sigma = g->noise_e / norm;
     bst_generated out = {.item = item};
     bst_detection *d = &out.detection;
@@ -444,15 +444,24 @@ void bst_generator_keep_rough(bst_generator *g, int x, int y, double snr, int it
     bst_generator_keep(g, &out);
 }
 
-/* A source that hardly moved in a frame that nothing is fitted in: its pixel shows it. */
-static void keep_whole_rough(bst_generator *g, const generator_source *s) {
-    int x = (int)lround(s->x), y = (int)lround(s->y);
-    double spread = sqrt(bst_generator_output_variance(g, s));
-    double value = s->peak * bst_matched_falloff(x - s->x, y - s->y, 0.0, g->cross_sigma) +
-                   spread * s->noise / g->calibration.slope;
-    if (value > g->threshold && x >= 0 && y >= 0 && x < g->width && y < g->height) {
-        bst_generator_keep_rough(g, x, y, value, s->item);
+/* A source that hardly moved in a frame that nothing is fitted in: its brightest pixel shows it,
+ * and the outputs about that say where its top is. */
+static void keep_whole_rough(bst_generator *g, int i) {
+    const generator_source *s = &g->sources[i];
+    generator_blend b = bst_generator_blend_of(g, i);
+    int x = (int)lround(b.x), y = (int)lround(b.y);
+    double peak = fmax(s->peak, s->amplitude * b.flux_e / s->flux_e);
+    double value = peak * bst_matched_falloff(x - b.x, y - b.y, 0.0, g->cross_sigma) +
+                   s->spread * s->noise / g->calibration.slope;
+    if (!(value > g->threshold) || x < 0 || y < 0 || x >= g->width || y >= g->height) {
+        return;
     }
+    /* the top of noise and light: gradient of the one over curvature of the other */
+    double off[2], both = g->cross_sigma * g->cross_sigma;
+    double sigma = sqrt(2.0) * both / (g->filter_sigma * fmax(peak, g->threshold));
+    bst_rng_normal2(g->key, (uint64_t)g->exposure_id, s->name * GENERATOR_DRAWS + GENERATOR_PLACE,
+                    off);
+    bst_generator_keep_rough(g, b.x + sigma * off[0], b.y + sigma * off[1], value, s->item);
 }
 
 static int generated_by_row(const void *a, const void *b) {
@@ -484,7 +493,7 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
             continue;
         }
         if (s->found && g->smeared) {
-            keep_whole_rough(g, s);
+            keep_whole_rough(g, i);
         } else if (s->found) {
             generator_blend b = bst_generator_blend_of(g, i);
             bst_generated item = {.detection = bst_generator_measure(g, s, &b),

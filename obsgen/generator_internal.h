@@ -124,9 +124,9 @@ double bst_generator_draw(const bst_generator *g, const generator_source *s, int
 /* Draws of one source. */
 enum { GENERATOR_PEAK, GENERATOR_PLACE, GENERATOR_FLUX, GENERATOR_DRAWS = 8 };
 
-/* Takes a maximum of the filter's output that is not fitted: at the pixel itself. item: of the
- * truth, or -1. */
-void bst_generator_keep_rough(bst_generator *g, int x, int y, double snr, int item);
+/* Takes a maximum of the filter's output that is not fitted, at its top (x, y), pixels that are
+ * read. item: of the truth, or -1. */
+void bst_generator_keep_rough(bst_generator *g, double x, double y, double snr, int item);
 
 /* Takes a detection, in place of the faintest where there is no room. */
 void bst_generator_keep(bst_generator *g, const bst_generated *item);
