@@ -46,6 +46,16 @@ static const bst_module_config *module_of(const bst_scenario *scenario, const lo
     return NULL;
 }
 
+/* Whether a module gives sensors other targets than their cues while a run goes. */
+static bool has_tasking(const bst_scenario *scenario) {
+    for (int m = 0; m < scenario->module_count; m++) {
+        if (!scenario->modules[m].off && strcmp(scenario->modules[m].desc->role, "tasking") == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
 static gaze gaze_of(const bst_scenario *scenario, looking *l) {
     const bst_module_config *gimbal = module_of(scenario, l, "gimbal");
     const bst_module_config *control = module_of(scenario, l, "control");
@@ -57,7 +67,7 @@ static gaze gaze_of(const bst_scenario *scenario, looking *l) {
         return l->object >= 0 || l->ideal->target == BST_IDEAL_DIRECTION ? GAZE_IDEAL
                                                                          : GAZE_UNKNOWN;
     }
-    if (!gimbal || !control || control->desc->config != bst_control_config_table ||
+    if (!gimbal || !control || has_tasking(scenario) || control->desc->config != bst_control_config_table ||
         strcmp(gimbal->desc->type, "scripted") == 0 ||
         strcmp(gimbal->desc->type, "external") == 0) {
         return GAZE_UNKNOWN;

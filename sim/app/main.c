@@ -25,6 +25,7 @@ static const command commands[] = {
     {"loop", bst_cmd_loop, "margins and predicted pointing of a scenario's control loops"},
     {"schema", bst_cmd_schema, "print the JSON Schema of scenarios"},
     {"serve", bst_cmd_serve, "play a module of a scenario over the link"},
+    {"link-keys", bst_cmd_link_keys, "make keys for a link that takes only peers that have them"},
     {"icd", bst_cmd_icd, "print the interface control document of the link"},
     {"stars", bst_cmd_stars, "get, import or describe the star catalogue"},
     {"propagate", bst_cmd_propagate, "positions and velocities from two-line element sets"},

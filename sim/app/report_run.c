@@ -141,12 +141,15 @@ static void put_objects(const page *p) {
                      text_of(object, "name", "?"));
         }
     }
-    bst_page_row(p->out, "objects", "%d%s%s%s", count, count ? ": " : "", names,
-                 count > 8 ? " ..." : "");
     const cJSON *catalogues = get(world, "catalogues"), *catalogue;
+    if (count > 0 || cJSON_GetArraySize(catalogues) == 0) {
+        bst_page_row(p->out, "objects", "%d%s%s%s", count, count ? ": " : "", names,
+                     count > 8 ? " ..." : "");
+    }
     cJSON_ArrayForEach(catalogue, catalogues) {
         const char *file = text_of(catalogue, "elements_file", "?"), *slash = strrchr(file, '/');
-        bst_page_row(p->out, "and all of", "%s", slash ? slash + 1 : file);
+        bst_page_row(p->out, count > 0 ? "and all of" : "objects: all of", "%s",
+                     slash ? slash + 1 : file);
     }
 }
 

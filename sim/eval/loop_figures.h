@@ -50,7 +50,6 @@ typedef struct bst_loop_figures {
     double pointing_bias_px; /* length of the mean error vector */
     int64_t earth_frames, moon_frames,
         sun_frames;     /* in which their disc covers part of the image */
-    int64_t bad_pixels; /* that image processing had learned by the latest frame */
 } bst_loop_figures;
 
 /* What the figures of a run need of its frames. Zero it to begin. */
