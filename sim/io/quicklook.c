@@ -202,7 +202,7 @@ static bst_status draw_panel(bst_ctx *ctx, bst_picture *p, const bst_quicklook_f
 }
 
 static void draw_legend(bst_picture *p, double x, double y) {
-    const double h = 9.5, gap = 22;
+    const double h = 9.5, gap = 30;
     double mid = y - 4;
     bst_picture_rectangle(p, x, mid - 7, 14, 14, target_colour, 1.6);
     x += 22 + bst_picture_text(p, x + 22, y, h, soft, false, "target (truth)") + gap;
