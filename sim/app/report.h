@@ -112,6 +112,7 @@ typedef struct bst_report_sensor {
      * but for the time to confirm and wrong_target_frames */
     bst_loop_figures loop;
     double real_time_factor; /* NAN: not known */
+    int64_t bad_pixels;      /* that image processing had learned at the end */
     int64_t track_frames;    /* track errors of the summary; 0: none */
     double track_rms_px, track_median_px, track_p95_px, track_max_px;
     bool has_truth;    /* the target's true place is known in some frame */

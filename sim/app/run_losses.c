@@ -97,7 +97,7 @@ void bst_losses_tell_counter(const char *name, int64_t count, bst_loss_fn fn, vo
         {"bad_pixels_overflow", BST_SEVERITY_WARNING,
          "the learned bad-pixel map had no room (bad_pixel_learning.capacity)", "frame", "frames"},
         {"bad_pixels_sky_at_rest", BST_SEVERITY_NOTE,
-         "pixels looked bad but cannot be learned while the sky does not move over them", "frame",
+         "pixels look bad that cannot be learned, because the sky does not move over them", "frame",
          "frames"},
         {"saturated", BST_SEVERITY_NOTE, "full pixels in the image", "frame", "frames"},
     };

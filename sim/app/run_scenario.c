@@ -7,6 +7,7 @@
 #include <cjson/cJSON.h>
 
 #include "sim/app/app.h"
+#include "sim/app/check_bodies.h"
 #include "sim/app/json_number.h"
 #include "sim/app/plugins.h"
 #include "sim/app/run_link.h"
@@ -95,7 +96,6 @@ static bst_status judge(run_state *run, watched_sensor *sensor, const char *chan
         return bst_run_metrics_tracks(&run->hooks, sensor->metrics, payload);
     }
     if (strcmp(channel, BST_CHANNEL_DETECTIONS) == 0) {
-        bst_loop_summary_detections(sensor->summary, payload);
         bst_run_metrics_detections(sensor->metrics, payload);
     } else if (strcmp(channel, BST_CHANNEL_CONTROL_STATUS) == 0) {
         bst_loop_summary_status(sensor->summary, payload);
@@ -460,6 +460,9 @@ static bst_status step_through(run_state *run, bst_simulation *sim, double *wall
     ctx->warnings += run->hooks.warnings;
     for (int i = 0; i < run->sensor_count; i++) {
         bst_loop_summary_finish(run->sensors[i].summary);
+        bst_loop_figures figures;
+        bst_loop_summary_figures(run->sensors[i].summary, &figures);
+        bst_warn_of_bodies(ctx, run->sensors[i].scope, &figures);
     }
     show_progress(run, bst_engine_tick(bst_simulation_engine(sim)), true);
     return status;

@@ -210,6 +210,9 @@ bst_status bst_loop_summary_truth(bst_ctx *ctx, bst_loop_summary *s, const bst_t
     }
     f->settled = s->settle_tick >= 0;
     s->figures.frames++;
+    s->figures.earth_frames += truth->earth_fraction > 0.0;
+    s->figures.moon_frames += truth->moon_fraction > 0.0;
+    s->figures.sun_frames += truth->sun_fraction > 0.0;
     s->newest = *f;
     s->newest.in_track = s->last_in_track;
     s->next++;
@@ -252,10 +255,6 @@ void bst_loop_summary_tracks(bst_loop_summary *s, const bst_tracks *tracks, int6
         retire(s);
         s->newest.in_track = s->last_in_track;
     }
-}
-
-void bst_loop_summary_detections(bst_loop_summary *s, const bst_detections *detections) {
-    s->figures.bad_pixels = detections->bad_pixels;
 }
 
 void bst_loop_summary_status(bst_loop_summary *s, const bst_control_status *status) {
