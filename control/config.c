@@ -67,7 +67,7 @@ const bst_config_desc bst_control_config_table[] = {
     BST_INT(C, dwell_frames, "frames", 1, 10000, "4",
             "Frames exposed wholly at rest at each place of the search. Two of them must show the "
             "target, which three do not surely do near the detection limit."),
-    BST_REAL(C, dwell_timeout_s, "s", 0.001, 1e6, "15",
+    BST_REAL(C, dwell_timeout_s, "s", 0.001, 1e6, "30",
              "The search goes on after this time when frames fail to come."),
     BST_INT(C, candidate_hits, "frames", 1, 1000, "2",
             "Detections that make a tentative track with a plausible rate a candidate."),

@@ -6,6 +6,7 @@
 #include "imgproc/electrons.h"
 #include "imgproc/imgproc.h"
 #include "imgproc/locate.h"
+#include "imgproc/pixel_learner.h"
 #include "imgproc/rows.h"
 #include "imgproc/sensor_order.h"
 #include "imgproc/streak_locate.h"
@@ -51,7 +52,10 @@ struct bst_imgproc {
     double exposure_s, binning, streak_px;
     bool smeared, windowed;
     bst_stack_frame left;
-    bst_known_psf *known; /* NULL: the PSF is a Gaussian */
+    bst_known_psf *known;     /* NULL: the PSF is a Gaussian */
+    const bst_pixel_map *map; /* learned; NULL: none */
+    bst_columns columns;      /* of the latest frame; capacity 0: not wanted, count 0 */
+    bst_pixel_shows shows;    /* of the latest frame; capacity 0: not wanted */
 };
 
 static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
@@ -73,6 +77,9 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a frame of %d x %d", width, height);
     }
     BST_TRY(bst_bad_map_create(ctx, &ip->camera, &ip->maps, &ip->config.bad_pixels, &ip->bad));
+    if (bst_columns_wanted(&ip->config, &ip->camera)) {
+        BST_TRY(bst_columns_create(ctx, width, &ip->columns));
+    }
     BST_TRY(bst_parallel_create(ctx, (int)ip->config.threads, &ip->pool));
     BST_TRY(bst_background_create(ctx, (int)ip->config.mesh_px, width, height,
                                   bst_parallel_threads(ip->pool), &ip->background));
@@ -139,6 +146,8 @@ void bst_imgproc_free(bst_imgproc *ip) {
     bst_streak_locator_free(&ip->streaks);
     bst_parallel_free(ip->pool);
     bst_known_psf_free(ip->known);
+    bst_pixel_shows_free(&ip->shows);
+    bst_columns_free(&ip->columns);
     free(ip);
 }
 
@@ -154,9 +163,26 @@ static void read_between_stars(const void *user, int y, int x, int count, float 
     bst_filter_mask(r->filter, y, x, count, STAR_SNR, out);
 }
 
+/* The noise of a row's columns, and its learned bad pixels where bst_electrons_read did not read
+ * it.
+ */
+static void correct_row(const void *user, int y, int width, float *signal, float *normalised) {
+    const bst_electrons *e = user;
+    for (int x = 0; e->columns && x < width; x++) {
+        normalised[x] /= e->columns->noise[e->first_column + x];
+    }
+    if (!e->learned) {
+        return;
+    }
+    const bst_window *w = &e->frame->window;
+    bst_bad_rows_mask(e->learned, w, e->frame->binning, y, 0, width, BST_PIXEL_BAD, signal);
+    bst_bad_rows_mask(e->learned, w, e->frame->binning, y, 0, width, 0.0f, normalised);
+}
+
 /* What tells noise from a source. */
 typedef struct judge {
     const bst_imgproc *ip;
+    const float *column_noise; /* see bst_locate_frame */
     double threshold;
     double normal_variance; /* of a pixel's noise that is not counted electrons, e-^2 */
 } judge;
@@ -172,6 +198,7 @@ static bool stands_out(const void *user, const bst_candidate *c) {
     const judge *g = user;
     const bst_filter *f = &g->ip->filter;
     double noise_e = bst_background_noise_at(&g->ip->background, c->x, c->y);
+    noise_e *= g->column_noise ? (double)g->column_noise[c->x] : 1.0;
     double level_e = bst_background_level_at(&g->ip->background, c->x, c->y);
     double variance = noise_e * noise_e, counted = fmax(variance - g->normal_variance, 0.0);
     if (g->normal_variance < 1.0) {
@@ -296,7 +323,13 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
     ip->exposure_s = frame->exposure_s;
     ip->binning = frame->binning;
 
-    sparing_reader sparing = {{&ip->camera, &ip->maps, ip->bad, frame}, &ip->filter};
+    const bst_bad_rows *learned = ip->map && ip->map->rows.count > 0 ? &ip->map->rows : NULL;
+    const bst_columns *columns = ip->columns.count > 0 ? &ip->columns : NULL;
+    int first_column = (frame->window.x0 - whole->window.x0) / frame->binning;
+    sparing_reader sparing = {
+        {&ip->camera, &ip->maps, ip->bad, frame, learned, columns, first_column}, &ip->filter};
+    ip->filter.correct_row = learned || columns ? correct_row : NULL;
+    ip->filter.correct_user = &sparing.read;
     const bst_electrons *read = &sparing.read;
     bst_row_gain by_gain;
     const bst_row_gain *plain = bst_electrons_plain(read, &by_gain) ? &by_gain : NULL;
@@ -331,7 +364,7 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
                        (float)look_from(ip, threshold));
     }
     double look = look_from(ip, threshold);
-    judge noise = {ip, threshold, read_variance};
+    judge noise = {ip, columns ? columns->noise + first_column : NULL, threshold, read_variance};
     double certain = ip->smeared ? threshold : threshold + CERTAIN_ABOVE;
     bst_candidates_find(&ip->candidates, pool, &ip->filter,
                         (int)ceil(6.0 * sigma + hypot(dx, dy)) + 2, (float)look, (float)certain,
@@ -344,6 +377,7 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
                                   .height = height,
                                   .background = &ip->background,
                                   .filter = &ip->filter,
+                                  .column_noise = columns ? columns->noise + first_column : NULL,
                                   .sigma_px = sigma,
                                   .motion = motion ? &ip->motion : NULL,
                                   .camera = &ip->camera,
@@ -401,6 +435,53 @@ static void take(bst_imgproc *ip, const part *p, bst_detections *out, int capaci
     out->threshold_snr = p->threshold;
 }
 
+bst_status bst_imgproc_collect_shows(bst_ctx *ctx, bst_imgproc *ip, int capacity) {
+    return bst_pixel_shows_create(ctx, capacity, &ip->shows);
+}
+
+void bst_imgproc_use_map(bst_imgproc *ip, const bst_pixel_map *map) {
+    ip->map = map;
+}
+
+const bst_pixel_shows *bst_imgproc_shows(const bst_imgproc *ip) {
+    return &ip->shows;
+}
+
+static void measure_columns(bst_imgproc *ip, bst_parallel *pool, const bst_imgproc_frame *frame) {
+    if (ip->columns.capacity > 0) {
+        bst_columns_measure(&ip->columns, pool, &ip->camera, frame);
+    }
+}
+
+static void begin_shows(bst_imgproc *ip) {
+    ip->shows.count = ip->shows.check_count = ip->shows.maxima = 0;
+    ip->shows.pixels = 0.0;
+    ip->shows.usable = ip->shows.capacity > 0;
+}
+
+/* Evidence of defective pixels in a frame, or a window of one, that was searched. */
+static void add_shows(bst_imgproc *ip, const bst_imgproc_frame *frame,
+                      const bst_imgproc_frame *whole) {
+    ip->shows.usable = ip->shows.usable && !ip->smeared;
+    if (!ip->shows.usable) {
+        return;
+    }
+    bst_electrons read = {&ip->camera,
+                          &ip->maps,
+                          ip->bad,
+                          frame,
+                          NULL,
+                          ip->columns.count > 0 ? &ip->columns : NULL,
+                          (frame->window.x0 - whole->window.x0) / frame->binning};
+    bst_locate_prepare(&ip->locator, &ip->view);
+    bst_pixel_shows_add(&ip->shows, &ip->locator, &ip->view, &ip->candidates);
+    if (ip->map) {
+        bst_pixel_map_check(ip->map, &ip->view, &frame->window, bst_electrons_read, &read,
+                            &ip->shows);
+    }
+    ip->shows.pixels += (double)ip->view.width * ip->view.height;
+}
+
 static void empty(bst_detections *out) {
     out->background_e = out->noise_e = out->threshold_snr = 0.0;
     out->stars_identified = 0;
@@ -415,12 +496,16 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
     bool alone = frame->beside_another && bst_parallel_threads(ip->pool) <= BST_STEP_LANES;
     part whole;
     empty(out);
+    measure_columns(ip, alone ? NULL : ip->pool, frame);
     ip->windowed = false;
     find(ip, frame, frame, motion, alone ? NULL : ip->pool, &whole);
     if (!ip->smeared && bst_streak_motion_begin(&ip->streak_motion, &ip->view)) {
         bst_streak_motion_add(&ip->streak_motion, &ip->view, &ip->candidates);
         correct_motion(ip, frame->binning, &ip->motion);
     }
+    begin_shows(ip);
+    add_shows(ip, frame, frame);
+    bst_pixel_shows_sort(&ip->shows);
     take(ip, &whole, out, capacity);
     out->background_e = (double)ip->background.median_level;
     out->noise_e = (double)ip->background.median_noise;
@@ -449,6 +534,7 @@ bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_i
     double pixels = 0.0;
     bst_motion used = {.q_cam_from_gcrf = BST_QUAT_IDENTITY};
     empty(out);
+    measure_columns(ip, ip->pool, frame);
     ip->windowed = true;
     if (motion) {
         used = *motion;
@@ -456,16 +542,19 @@ bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_i
             correct_motion(ip, frame->binning, &used);
         }
     }
+    begin_shows(ip);
     for (int i = 0; i < count; i++) {
         part p;
         bst_imgproc_frame window = bst_windows_crop(frame, &windows[i], ip->cropped);
         find(ip, &window, frame, motion ? &used : NULL, NULL, &p);
+        add_shows(ip, &window, frame);
         take(ip, &p, out, capacity);
         double n = (double)windows[i].width * (double)windows[i].height;
         pixels += n;
         out->background_e += n * (double)ip->background.median_level;
         out->noise_e += n * (double)ip->background.median_noise;
     }
+    bst_pixel_shows_sort(&ip->shows);
     if (pixels > 0.0) {
         out->background_e /= pixels;
         out->noise_e /= pixels;

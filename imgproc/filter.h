@@ -22,6 +22,10 @@ enum {
     BST_FILTER_WORK = 6 * (2 * BST_FILTER_MAX_RADIUS + 3) * (2 * BST_FILTER_MAX_RADIUS + 3),
 };
 
+/* Corrects a normalised row, and its signal, before it is filtered. Called from several threads. */
+typedef void (*bst_filter_row_fn)(const void *user, int y, int width, float *signal,
+                                  float *normalised);
+
 typedef struct bst_filter {
     int max_width, max_height, pad, stride; /* of the padded map */
     int width, height;                      /* of the latest frame */
@@ -34,6 +38,8 @@ typedef struct bst_filter {
     int *maxima; /* [height] */
     int32_t *maximum_x;
     float *maximum_snr;
+    bst_filter_row_fn correct_row; /* of the next bst_filter_run; NULL: none */
+    const void *correct_user;
     float *lines;       /* work space of each thread */
     size_t line_floats; /* of one */
     bst_borrow *lent;   /* of lines */

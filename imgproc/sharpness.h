@@ -50,4 +50,10 @@ bool bst_sharpness_is_open(const bst_sharpness *sharpness, const float *signal, 
 double bst_sharpness_at(const bst_sharpness *sharpness, const float *signal, int width, int height,
                         double noise_e, int x, int y);
 
+/* The same deviation, and in *alone the one that charge in this pixel alone would have on average:
+ * 0 where the neighbours cannot be compared, small where the PSF is so narrow that a point looks
+ * like charge. */
+double bst_sharpness_compare(const bst_sharpness *sharpness, const float *signal, int width,
+                             int height, double noise_e, int x, int y, double *alone);
+
 #endif

@@ -103,10 +103,10 @@ double bst_generator_inside(const bst_generator *g, double x, double y, double s
  * background: jitter and bends of its path widen it, and the background may differ at its place. */
 static double sharpness(const bst_generator *g, const bst_generator_frame *f,
                         const bst_truth_item *item, double length) {
-    double v = f->truth->background_e + f->truth->dark_e +
+    double v = (double)g->binning * g->binning * (f->truth->background_e + f->truth->dark_e) +
                g->camera->read_noise_e * g->camera->read_noise_e;
     double plain = item->electrons * bst_bound_norm(&g->bound, length) / sqrt(fmax(v, 1e-6));
-    bool known = g->binning == 1 && item->snr > 0.0 && plain > 0.0;
+    bool known = item->snr > 0.0 && plain > 0.0;
     return known ? fmin(fmax(item->snr / plain, 0.2), 2.0) : 1.0;
 }
 

@@ -12,6 +12,8 @@
 /* Steps of the look: a thousandth of the run within these. */
 #define LEAST_STEP_S 0.5
 #define MOST_STEP_S 10.0
+/* Longer runs are looked at so far: a look at a day takes a fifth of a second. */
+#define MOST_LOOKED_S (3.0 * 86400.0)
 /* What the limits lose is followed from so long before to so long after they are exceeded. */
 #define RUN_UP_S 5.0
 #define RUN_OUT_S 120.0
@@ -75,9 +77,13 @@ static void note(found *f, int reason, double from_s, double until_s) {
     f->sum_s[reason] += until_s - from_s;
 }
 
-static void tell(bst_ctx *ctx, const char *name, const found *f, double duration_s, bool rolls) {
+static void tell(bst_ctx *ctx, const char *name, const found *f, double duration_s, bool rolls,
+                 bool cut) {
     for (int reason = BST_REACH_BEHIND_EARTH; reason < BST_REACH_COUNT; reason++) {
         char more[80] = "", until[48] = "the end of the run";
+        if (cut) {
+            snprintf(until, sizeof until, "the end of what was looked at");
+        }
         if (f->count[reason] == 0) {
             continue;
         }
@@ -88,10 +94,10 @@ static void tell(bst_ctx *ctx, const char *name, const found *f, double duration
         if (f->until_s[reason] < duration_s) {
             snprintf(until, sizeof until, "%.1f s", f->until_s[reason]);
         }
-        bst_log(ctx, BST_LOG_WARNING, "%s: the cue is out of reach from %.1f s until %s: %s%s%s",
+        bst_log(ctx, BST_LOG_WARNING, "%s: the cue is out of reach from %.1f s until %s: %s%s%s%s",
                 name, f->from_s[reason], until, bst_reach_reason(reason),
-                rolls && reason == BST_REACH_KEYHOLE ? ", unless the body rolls in time" : "",
-                more);
+                rolls && reason == BST_REACH_KEYHOLE ? ", unless the body rolls in time" : "", more,
+                cut ? " in the first three days" : "");
     }
 }
 
@@ -221,9 +227,11 @@ static bst_status check_sensor(bst_ctx *ctx, const bst_scenario *scenario, const
                       bst_knowledge_body_attitude(s->knowledge), s));
     double pixel = bst_camera_scale_rad(bst_knowledge_camera(s->knowledge));
     found f = {.count = {0}};
-    BST_TRY(spans(ctx, s, scenario->duration_s, config->guidance.loss_tolerance_px * pixel, &f));
-    tell(ctx, name, &f, scenario->duration_s,
-         s->turns && s->law.law != BST_LAW_FREE && config->guidance.body_roll);
+    double looked_s = fmin(scenario->duration_s, MOST_LOOKED_S);
+    BST_TRY(spans(ctx, s, looked_s, config->guidance.loss_tolerance_px * pixel, &f));
+    tell(ctx, name, &f, looked_s,
+         s->turns && s->law.law != BST_LAW_FREE && config->guidance.body_roll,
+         looked_s < scenario->duration_s);
     return BST_OK;
 }
 

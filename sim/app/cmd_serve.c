@@ -103,7 +103,7 @@ int bst_cmd_serve(int argc, char **argv) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "one scenario file, --part and --link are expected");
         return bst_options_misuse(&ctx, "serve");
     }
-    if (bst_load_check(&ctx, &load) != BST_OK) {
+    if (bst_load_check(&ctx, &load, table) != BST_OK) {
         return bst_options_misuse(&ctx, "serve");
     }
     return serve(&ctx, argv[1], &load, part, address, shared, (int)threads, timeout_s);

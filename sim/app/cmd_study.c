@@ -482,6 +482,7 @@ int bst_cmd_study(int argc, char **argv) {
         {.name = "out",
          .kind = BST_OPTION_TEXT,
          .target = &r.out,
+         .path = BST_PATH_OUTPUT_FOLDER,
          .argument = "FOLDER",
          .doc = "where the results go (default studies/NAME)"},
         {.name = "workers",
@@ -510,6 +511,7 @@ int bst_cmd_study(int argc, char **argv) {
         {.name = "site",
          .kind = BST_OPTION_TEXT,
          .target = &r.site,
+         .path = BST_PATH_INPUT,
          .argument = "FILE",
          .doc = "what --slurm is to know of the cluster: account, partition, time (default "
                 "boresight/slurm.json in the user's configuration folder, where there is one)"},
@@ -524,8 +526,8 @@ int bst_cmd_study(int argc, char **argv) {
         {.name = "emit",
          .kind = BST_OPTION_INT,
          .target = &r.emit,
-         .argument = "RUN",
-         .doc = "write the scenario of a run to the standard output, and how to run it by hand to "
+         .argument = "N",
+         .doc = "write the scenario of run N to the standard output, and how to run it by hand to "
                 "the standard error",
          .minimum = 0,
          .maximum = 1e9},

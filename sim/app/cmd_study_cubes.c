@@ -15,6 +15,7 @@
 #include "sim/app/study_card.h"
 #include "sim/app/study_labels.h"
 #include "sim/app/study_plugins.h"
+#include "sim/core/draft.h"
 #include "sim/core/folder.h"
 #include "sim/core/rng.h"
 #include "sim/core/version.h"
@@ -267,9 +268,12 @@ static bst_status step_through(bst_ctx *ctx, cube *c, bst_simulation *sim, const
     unlink(fits);
     BST_TRY(bst_fits_create(ctx, fits, c->config->compress ? BST_FITS_EXTENSIONS : BST_FITS_CUBE,
                             &info, &c->fits));
-    c->labels.stream = fopen(labels, "w");
+    int fd;
+    BST_TRY(bst_draft_make_at(ctx, labels, &fd));
+    c->labels.stream = fdopen(fd, "w");
     if (!c->labels.stream) {
-        return bst_fail(ctx, BST_ERR_IO, "%s: cannot be made: %s", labels, strerror(errno));
+        close(fd);
+        return bst_fail(ctx, BST_ERR_MEMORY, "%s: out of memory", labels);
     }
     fprintf(c->labels.stream,
             "{\"data\":{\"file\":{\"dirname\":\"ImageFiles\",\"sequence\":%" PRId64

@@ -76,7 +76,7 @@ static void put_cards(FILE *out, const bst_run_reader *run) {
     snprintf(note, sizeof note, "%s %% of those seen",
              bst_page_number(more, 100.0 * number_of(f, "custody_fraction_seen"), 3));
     bst_page_card(out, bst_page_number(text, 100.0 * number_of(f, "custody_fraction_all"), 3), "%",
-                  "custody, mean of all objects", note);
+                  "object custody, mean of all", note);
     snprintf(note, sizeof note, "tracks %s arcsec",
              bst_page_number(more, number_of(f, "track_rms_arcsec"), 3));
     bst_page_card(out, bst_page_number(text, number_of(f, "place_rms_arcsec"), 3), "arcsec",
@@ -269,9 +269,10 @@ static bst_status put_histogram(bst_ctx *ctx, FILE *out, const bst_run_reader *r
 }
 
 static bst_status put_table(bst_ctx *ctx, FILE *out, const bst_run_reader *run) {
-    static const char *const heads[] = {
-        "object",     "NORAD",      "passes seen",    "detected",          "tracked",
-        "custody, %", "revisit, s", "longest gap, s", "place RMS, arcsec", "track RMS, arcsec"};
+    static const char *const heads[] = {"object",           "NORAD",          "passes seen",
+                                        "detected",         "tracked",        "object custody, %",
+                                        "revisit, s",       "longest gap, s", "place RMS, arcsec",
+                                        "track RMS, arcsec"};
     bst_rows *rows;
     bst_status status;
     bool more;
@@ -316,7 +317,9 @@ static bst_status put_all(bst_ctx *ctx, FILE *out, const bst_run_reader *run, do
     bst_status status = put_histogram(
         ctx, out, run,
         "SELECT custody_fraction FROM sightings WHERE sensor IS NULL AND detected > 0",
-        "custody, %", 100.0, "Share of the time in custody, of the objects that were seen.");
+        "object custody, %", 100.0,
+        "Object custody (share of the time that the last detection is no older than "
+        "record.custody_s) of the objects that were seen.");
     if (status == BST_OK) {
         status = put_histogram(
             ctx, out, run,

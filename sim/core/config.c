@@ -1,5 +1,6 @@
 #include "sim/core/config.h"
 
+#include <errno.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -155,17 +156,29 @@ static bst_status read_list(const reader *r, const cJSON *value, const char *pat
 }
 
 static bst_status read_seed(const reader *r, const cJSON *value, const char *path, uint64_t *out) {
-    const char *allowed = "a hexadecimal string such as \"0x1F\", up to 64 bits";
+    const char *allowed =
+        "a hexadecimal string such as \"0x1F\" or a decimal one such as \"31\", up to 64 bits, or "
+        "an "
+        "integer from 0 to 9007199254740992";
+    /* integers up to 2^53 are exact in JSON's numbers */
+    if (cJSON_IsNumber(value) && value->valuedouble >= 0.0 && value->valuedouble <= 0x1p53 &&
+        value->valuedouble == floor(value->valuedouble)) {
+        *out = (uint64_t)value->valuedouble;
+        return BST_OK;
+    }
     if (!cJSON_IsString(value)) {
-        return wrong(r, path, value, "wrong type", allowed);
+        return wrong(r, path, value, cJSON_IsNumber(value) ? "not a seed" : "wrong type", allowed);
     }
     const char *text = value->valuestring;
-    size_t digits = strlen(text) > 2 ? strlen(text) - 2 : 0;
-    if (strncmp(text, "0x", 2) != 0 || digits == 0 || digits > 16 ||
-        strspn(text + 2, "0123456789abcdefABCDEF") != digits) {
+    bool hexadecimal = strncmp(text, "0x", 2) == 0;
+    const char *digits = hexadecimal ? text + 2 : text;
+    size_t count = strspn(digits, hexadecimal ? "0123456789abcdefABCDEF" : "0123456789");
+    errno = 0;
+    uint64_t seed = strtoull(digits, NULL, hexadecimal ? 16 : 10);
+    if (count == 0 || count > (hexadecimal ? 16 : 20) || digits[count] || errno == ERANGE) {
         return wrong(r, path, value, "not a seed", allowed);
     }
-    *out = strtoull(text + 2, NULL, 16);
+    *out = seed;
     return BST_OK;
 }
 

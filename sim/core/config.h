@@ -17,7 +17,7 @@ typedef enum bst_config_type {
     BST_CONFIG_PATH,    /* the same: a file; a scenario's are made absolute when it is read */
     BST_CONFIG_ENUM,    /* int32_t, index into choices */
     BST_CONFIG_CHOICES, /* uint32_t, bit k for choices[k]; in JSON a list of names */
-    BST_CONFIG_SEED,    /* uint64_t, hex string "0x..." */
+    BST_CONFIG_SEED,    /* uint64_t: "0x...", a decimal string, or an integer */
     BST_CONFIG_REALS,   /* double[size / sizeof(double)], a fixed-length array */
     BST_CONFIG_OBJECT,  /* nested struct, children */
     BST_CONFIG_LIST,    /* bst_config_list of structs, children, item_bytes */
@@ -125,6 +125,8 @@ bst_status bst_json_load(bst_ctx *ctx, const char *path, bst_json **out) BST_MUS
 bst_status bst_json_parse(bst_ctx *ctx, const char *name, const char *text, size_t bytes,
                           bst_json **out) BST_MUST_CHECK;
 void bst_json_free(bst_json *json);
+/* A deep copy, with the file of each value (bst_json_file); the caller frees it. BST_ERR_MEMORY. */
+bst_status bst_json_copy(bst_ctx *ctx, const bst_json *json, bst_json **out) BST_MUST_CHECK;
 struct cJSON *bst_json_root(const bst_json *json);
 const char *bst_json_name(const bst_json *json);
 
@@ -136,6 +138,9 @@ bst_status bst_json_load_extended(bst_ctx *ctx, const char *path, bst_json **out
 /* The file that gave the value at a JSON pointer, or the latest that changed something in it; lent.
  */
 const char *bst_json_file(const bst_json *json, const char *pointer);
+/* The files that gave values, in the order in which they were applied, with repeats; NULL after the
+ * last one, and for a document that extends no other; lent. */
+const char *bst_json_origin_file(const bst_json *json, int index);
 /* Makes the message in ctx, when it begins "NAME: /json/pointer:", name bst_json_file instead of
  * the document. */
 void bst_json_name_file(bst_ctx *ctx, const bst_json *json);
@@ -147,7 +152,7 @@ bst_status bst_json_check_assignment(bst_ctx *ctx, const char *assignment) BST_M
 bst_status bst_json_set(bst_ctx *ctx, bst_json *json, const char *assignment) BST_MUST_CHECK;
 
 /* Puts `value`, which it takes, at a JSON pointer. Objects on the way are made when missing; array
- * elements must exist. */
+ * elements must exist. The value counts as given by the document's own file (bst_json_file). */
 bst_status bst_json_assign(bst_ctx *ctx, bst_json *json, const char *pointer,
                            struct cJSON *value) BST_MUST_CHECK;
 

@@ -262,6 +262,7 @@ enum {
     BST_DETECTION_EDGE = 1u << 1,
     BST_DETECTION_STREAK = 1u << 2, /* elongated beyond the PSF */
     BST_DETECTION_BLEND = 1u << 3,
+    BST_DETECTION_BLOOM = 1u << 5, /* charge overflowed along its columns: placed by its wings */
     BST_DETECTION_STACK = 1u << 4, /* seen in the sum of several frames, this one the last */
 };
 
@@ -297,6 +298,7 @@ typedef struct bst_detections {
     int32_t stars_identified;
     int32_t windows; /* of the frame that were looked at, round predicted places; 0: all of it */
     int32_t count, lost; /* items; detections that found no room */
+    int32_t bad_pixels;  /* of the sensor, that image processing has learned so far */
     bst_detection items[];
 } bst_detections;
 

@@ -39,3 +39,16 @@ bool bst_text_is_nearer(const char *word, const char *candidate, size_t *best) {
     *best = distance;
     return true;
 }
+
+bool bst_text_is_file_name(const char *word) {
+    size_t length = strlen(word);
+    if (length == 0 || length > 255 || word[0] == '.') {
+        return false;
+    }
+    for (const char *c = word; *c; c++) {
+        if (*c == '/' || (unsigned char)*c < 0x20 || *c == 0x7f) {
+            return false;
+        }
+    }
+    return true;
+}

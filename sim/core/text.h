@@ -18,6 +18,10 @@ size_t bst_text_distance(const char *a, const char *b);
  * unit ("rate" for "rate_hz") counts as 1. */
 bool bst_text_is_nearer(const char *word, const char *candidate, size_t *best);
 
+/* Whether a word can be the name of a file or folder that is made: 1 to 255 bytes without "/" and
+ * control characters, not beginning with "." (which also refuses "." and ".."). */
+bool bst_text_is_file_name(const char *word);
+
 #ifdef __cplusplus
 }
 #endif

@@ -300,6 +300,7 @@ bst_status bst_recorder_detection_rows(bst_ctx *ctx, bst_recorder *recorder, int
     put_int(&head, d->windows);
     put_int(&head, d->count);
     put_int(&head, d->lost);
+    put_int(&head, d->bad_pixels);
     BST_TRY(append(ctx, recorder, BST_TABLE_DETECTION_FRAMES, &head));
     for (int i = 0; i < d->count; i++) {
         const bst_detection *item = &d->items[i];
@@ -335,6 +336,7 @@ bst_status bst_recorder_detection_rows(bst_ctx *ctx, bst_recorder *recorder, int
         put_real(&r, item->rate_x_pxps);
         put_real(&r, item->rate_y_pxps);
         put_real(&r, item->rate_sigma_pxps);
+        put_flag(&r, item->flags & BST_DETECTION_BLOOM);
         BST_TRY(append(ctx, recorder, BST_TABLE_DETECTIONS, &r));
     }
     return BST_OK;

@@ -155,6 +155,7 @@ static const bst_column detection_frame_columns[] = {
     INT("windows", "", "windows of the frame that were looked at; 0: all of it"),
     INT("detections", "", "detections kept"),
     INT("lost", "", "detections that found no room"),
+    INT("bad_pixels", "", "pixels of the sensor that are learned to be bad"),
 };
 static const bst_column detection_columns[] = {
     SENSOR,
@@ -185,6 +186,7 @@ static const bst_column detection_columns[] = {
     REAL("rate_x_pxps", "px/s", "stack: rate against the stars"),
     REAL("rate_y_pxps", "px/s", "stack: rate against the stars"),
     REAL("rate_sigma_pxps", "px/s", "standard deviation of each"),
+    INT("bloom", "", "1: charge overflowed along its columns; placed by its wings"),
 };
 static const bst_column track_frame_columns[] = {
     SENSOR,

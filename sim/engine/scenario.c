@@ -7,6 +7,7 @@
 
 #include <cjson/cJSON.h>
 
+#include "sim/core/text.h"
 #include "sim/engine/scenario_internal.h"
 
 enum { FORMAT_VERSION = 1 };
@@ -35,7 +36,7 @@ const bst_config_desc bst_scenario_table[] = {
     BST_INT(bst_scenario, tick_rate_hz, "Hz", 1, 1000000, "6000",
             "Ticks per second; every rate must divide it."),
     BST_SEED(bst_scenario, seed, "\"0x1\"",
-             "Master seed of all random numbers, a hexadecimal string."),
+             "Master seed of all random numbers: \"0x2A\", \"42\" or 42."),
     BST_INT(bst_scenario, run, "", 0, 9e15, "0",
             "Number of the run in a study: other random numbers, same scene."),
     BST_OBJECT(bst_scenario, world, bst_world_config_table, "{}", "What is out there."),
@@ -84,6 +85,12 @@ static bst_status prepare_cameras(bst_ctx *ctx, bst_scenario *s) {
 
 static bst_status check_names(bst_ctx *ctx, const bst_scenario *s) {
     const bst_observer_config *observers = s->observers.items;
+    if (!bst_text_is_file_name(s->name)) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "%s: /name: \"%s\" cannot be the name of a folder (allowed: 1 to 63 bytes "
+                        "without \"/\" and control characters, not beginning with \".\")",
+                        s->file, s->name);
+    }
     for (int i = 0; i < s->observers.count; i++) {
         char path[100];
         snprintf(path, sizeof path, "/observers/%d/name", i);

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "sim/link/link_internal.h"
 
@@ -82,8 +83,16 @@ static bst_status bind_address(bst_ctx *ctx, bst_link *link) {
         zmq_connect(link->monitor, "inproc://watch") != 0) {
         return bst_fail(ctx, BST_ERR_IO, "link: cannot watch connections: %s", zmq_strerror(errno));
     }
+    if (strncmp(link->address, "ipc://", 6) == 0) {
+        /* ZeroMQ itself would remove whatever is at the path */
+        BST_TRY(bst_ipc_socket_open(ctx, link->address + 6, &link->ipc));
+        set(link->router, ZMQ_USE_FD, link->ipc.fd);
+    }
     if (zmq_bind(link->router, link->address) != 0) {
         int why = errno;
+        if (*link->ipc.path) {
+            close(link->ipc.fd);
+        }
         return bst_fail(ctx, BST_ERR_IO, "link: cannot use %s: %s%s", link->address,
                         zmq_strerror(why),
                         why == EADDRINUSE ? "; another program has it: choose another port" : "");
@@ -151,6 +160,7 @@ void bst_link_close(bst_link *link, int reason, const char *text) {
     if (link->context) {
         zmq_ctx_term(link->context); /* all frames have been released when it returns */
     }
+    bst_ipc_socket_remove(&link->ipc);
     if (rooms != none) {
         free(rooms);
     }

@@ -5,6 +5,7 @@
 #include <zmq.h>
 
 #include "sim/link/endpoint.h"
+#include "sim/link/ipc_socket.h"
 #include "sim/link/link.h"
 #include "sim/link/shared_frames.h"
 
@@ -98,6 +99,7 @@ struct bst_link {
     char scenario[BST_LINK_NAME_BYTES];
     bst_link_run run;
     void *context, *router, *monitor;
+    bst_ipc_socket ipc; /* path "": none */
     bst_shared_frames *shared;
     link_peer peers[LINK_PEERS];
     link_part *parts;

@@ -502,8 +502,8 @@ static bst_image_moments place_in_rows(const bst_field *field, const bst_los_tra
 }
 
 void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
-                          const bst_source *source, bst_window window, const bst_truth *header,
-                          bst_truth_item *out) {
+                          const bst_source *source, bst_window window, int binning,
+                          const bst_truth *header, bst_truth_item *out) {
     const bst_camera *camera = field->camera;
     *out = (bst_truth_item){.kind = source->kind,
                             .id = source->id,
@@ -548,13 +548,17 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
     }
     double dark =
         bst_field_background_e(field, header, image.x_mean, image.y_mean) + header->dark_e;
-    double variance = dark + camera->read_noise_e * camera->read_noise_e;
+    /* pixels that are added are read once; their sum is the image blurred by a wider box */
+    double added = (double)binning * binning, widened = (added - 1.0) / 12.0;
+    double variance = dark + camera->read_noise_e * camera->read_noise_e / added;
     double length = hypot(out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px);
     double along, across;
     blur(camera, source, &image, out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px,
          &along, &across);
     if (isfinite(length) && variance > 0.0) {
-        out->snr = out->electrons * sqrt(bst_image_squared(along, across, length) / variance);
+        double square = bst_image_squared(sqrt(along * along + widened),
+                                          sqrt(across * across + widened), length);
+        out->snr = out->electrons * sqrt(square / variance);
     }
     if (source->occulted) {
         out->flags |= BST_TRUTH_OCCULTED;

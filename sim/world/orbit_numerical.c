@@ -163,6 +163,7 @@ bst_status bst_orbit_build_numerical(const bst_world_builder *b, const bst_orbit
         .position_m = state.position_m,
         .velocity_mps = state.velocity_mps,
         .tolerance = f->tolerance};
+    orbit->forces = options.forces;
     bst_status status = bst_trajectory_create(b->ctx, &options, &orbit->unburnt);
     if (status == BST_OK && burns->count > 0) {
         const bst_burn_config *items = burns->items;

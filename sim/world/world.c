@@ -261,6 +261,14 @@ const char *bst_world_observer_name(const bst_world *world, int observer) {
     return world->observers[observer].name;
 }
 
+bool bst_world_element_age(const bst_world *world, int body, double *seconds) {
+    const bst_orbit *orbit = body < world->object_count
+                                 ? &world->objects[body].orbit
+                                 : &world->observers[body - world->object_count].orbit;
+    *seconds = orbit->epoch_offset_s;
+    return orbit->source == BST_ORBIT_SGP4;
+}
+
 int bst_world_find_object(const bst_world *world, const char *name) {
     return world->object_names ? bst_name_index_find(world->object_names, name) : -1;
 }
@@ -275,4 +283,15 @@ const bst_exposure_config *bst_world_exposure(const bst_world *world, int observ
 
 bst_quat bst_world_body_attitude(const bst_world *world, int observer, int sensor) {
     return world->observers[observer].sensors[sensor].body_attitude;
+}
+
+const bst_eop *bst_world_earth_orientation(const bst_world *world) {
+    return world->eop;
+}
+
+void bst_world_warn_earth_orientation(bst_ctx *ctx, const char *scenario, const bst_world *world,
+                                      double duration_s) {
+    char where[600];
+    snprintf(where, sizeof where, "%.500s: /world/earth_orientation: ", scenario);
+    bst_eop_warn(ctx, world->eop, bst_world_time(world, duration_s), where);
 }

@@ -1,5 +1,7 @@
 #include "sim/world/world_config.h"
 
+#include <math.h>
+
 #include "sim/astro/elements.h"
 
 static const char *const orbit_sources[] = {"sgp4",     "relative",  "oem",
@@ -99,7 +101,7 @@ const bst_config_desc bst_world_config_table[] = {
              "Statistical stars are drawn one by one down to this V (and the renderer's v_limit); "
              "those fainter add to the background."),
     BST_SEED(bst_world_config, faint_seed, "\"0x5ca1ab1edeadbeef\"",
-             "Seed of the statistical sky, a hexadecimal string: the same sky in all runs."),
+             "Seed of the statistical sky: the same sky in all runs."),
     BST_PATH_OR(bst_world_config, earth_orientation, builtin_word, "\"builtin\"",
                 "\"builtin\" or a file in the IERS EOP C04 format."),
     BST_BOOL(bst_world_config, shadow_atmosphere, "true",
@@ -124,8 +126,35 @@ static const bst_config_desc exposure_table[] = {
         bst_exposure_config, binning, "px", 1, 8, "1",
         "Sensor pixels per side of a frame's pixel, added before they are read; control may ask "
         "for another."),
+    BST_REALS(bst_exposure_config, window_px, "px", 0, 65536, "[0, 0, 0, 0]",
+              "Part of the sensor that is read: first column, first row, width, height in whole "
+              "sensor pixels; width 0: all of it. Control may ask for another."),
     BST_CONFIG_END,
 };
+
+bst_status bst_exposure_window(bst_ctx *ctx, const bst_exposure_config *config, int64_t width_px,
+                               int64_t height_px, bst_window *out) {
+    const double *w = config->window_px;
+    *out = (bst_window){0, 0, (int)width_px, (int)height_px};
+    if (w[2] == 0.0) {
+        return BST_OK;
+    }
+    bool whole = true;
+    for (int k = 0; k < 4; k++) {
+        whole = whole && w[k] == floor(w[k]);
+    }
+    if (!whole || w[3] < 1.0 || w[0] + w[2] > (double)width_px || w[1] + w[3] > (double)height_px ||
+        fmin(w[2], w[3]) < (double)config->binning) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "exposure/window_px: [%g, %g, %g, %g] is no window of the sensor (allowed: "
+                        "whole numbers x0, y0, width, height within %lld x %lld pixels, at least "
+                        "the binning of %lld wide and high)",
+                        w[0], w[1], w[2], w[3], (long long)width_px, (long long)height_px,
+                        (long long)config->binning);
+    }
+    *out = (bst_window){(int)w[0], (int)w[1], (int)w[2], (int)w[3]};
+    return BST_OK;
+}
 
 static const char *const region_kinds[] = {"none", "arc", "geostationary", NULL};
 

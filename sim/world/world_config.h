@@ -4,6 +4,7 @@
 
 #include "sim/astro/time.h"
 #include "sim/core/config.h"
+#include "sim/core/messages.h"
 #include "sim/world/brightness_config.h"
 #include "sim/world/camera.h"
 #include "sim/world/region.h"
@@ -115,8 +116,14 @@ typedef struct bst_cue_config {
 typedef struct bst_exposure_config {
     double exposure_s, period_s, first_s;
     double dropped_fraction;
-    int64_t binning; /* sensor pixels per side of a pixel that is read */
+    int64_t binning;     /* sensor pixels per side of a pixel that is read */
+    double window_px[4]; /* x0, y0, width, height read out; width 0: all of the sensor */
 } bst_exposure_config;
+
+/* The part of a sensor of width_px x height_px that is read unless control asks for another.
+ * BST_ERR_CONFIG: it does not lie within the sensor. */
+bst_status bst_exposure_window(bst_ctx *ctx, const bst_exposure_config *config, int64_t width_px,
+                               int64_t height_px, bst_window *out) BST_MUST_CHECK;
 
 /* Errors of the onboard star catalogue; a star's fate follows from its identity and the seed. */
 typedef struct bst_star_errors_config {

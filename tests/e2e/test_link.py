@@ -470,6 +470,40 @@ class BadPeers(unittest.TestCase):
         process.send_signal(signal.SIGINT)
         ended(process, expected=130)
 
+    def test_what_is_at_the_path_of_a_socket(self):
+        """A file there stays, a live socket is not stolen, and none is left behind."""
+        folder = runs.scratch()
+        path = os.path.join(folder, "thesis.tex")
+        with open(path, "w", encoding="ascii") as file:
+            file.write("mine")
+        for words in (["--link", "ipc://" + path], ["--set", "/link/address=ipc://" + path]):
+            result = subprocess.run(
+                runs.command(runs.STARE, runs.scratch() + "/run", duration=1) +
+                ["--external", "imgproc", *words], capture_output=True, text=True, timeout=60)
+            self.assertEqual(result.returncode, 1)
+            self.assertIn("a file that is no socket is there, and is left alone", result.stderr)
+            with open(path, encoding="ascii") as file:
+                self.assertEqual(file.read(), "mine")
+        address = f"ipc://{folder}/socket"
+        first = start_run(runs.TRACK, runs.scratch() + "/run", address, "control")
+        while "waiting for peers" not in first.stderr.readline():
+            pass
+        said = ended(start_run(runs.TRACK, runs.scratch() + "/run", address, "control"), expected=1)
+        self.assertIn("another program listens there; choose another path", said)
+        first.send_signal(signal.SIGINT)
+        ended(first, expected=130)
+        self.assertEqual(os.listdir(folder), ["thesis.tex"])
+
+    def test_a_recording_that_is_a_pipe(self):
+        folder = runs.scratch()
+        os.mkfifo(folder + "/link.packets")
+        result = subprocess.run(
+            runs.command(runs.STARE, folder + "/run", duration=1) +
+            ["--external", "imgproc", "--link", ipc(), "--replay", folder],
+            capture_output=True, text=True, timeout=60)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("link.packets: is a pipe; give a run's", result.stderr)
+
     def test_what_is_called_wrongly(self):
         for words, says in (
                 (["--link", "tcp://0.0.0.0:5555", "--external", "imgproc"],

@@ -51,7 +51,8 @@ static void draw_sky(uint16_t *pixels, double target_x, double target_y, uint64_
         double flux =
             target ? 1200.0 : 150.0 * pow(bst_rng_uniform(key, frame, 3 * (uint64_t)s + 2), -1.2);
         int steps = target ? 1 : 9;
-        marks[s] = (bst_mark){.x_px = x, .y_px = y, .star = !target};
+        marks[s] =
+            (bst_mark){.x_px = x, .y_px = y, .kind = target ? BST_MARK_DETECTION : BST_MARK_STAR};
         for (int k = 0; k < steps; k++) {
             double cx = x + (target ? 0.0 : 1.2 * (k - 4)), cy = y + (target ? 0.0 : 0.5 * (k - 4));
             for (int j = (int)cy - 6; j <= (int)cy + 6; j++) {
@@ -233,7 +234,7 @@ static void test_pointing_plot(void **state) {
     snprintf(path, sizeof path, "%s/it's \"pointing\".png", s.folder);
     bool made = false;
     bst_assert_ok(&ctx, bst_pointing_plot(&ctx, path, "neossat_geo_track: boresight to true target",
-                                          points, N, 0.5, &made));
+                                          "pointing RMS 0.2 px", points, N, 0.5, &made));
     if (!made && system("command -v gnuplot > /dev/null") != 0) {
         /* gnuplot is an optional program: without it a warning, and no file */
         assert_int_equal(warnings, 1);
@@ -252,12 +253,13 @@ static void test_pointing_plot(void **state) {
     for (int i = 0; i < N; i++) {
         points[i] = (bst_pointing_point){.time_s = i, .visible = true, .mode = BST_MODE_STARE};
     }
-    bst_assert_ok(&ctx, bst_pointing_plot(&ctx, path, NULL, points, N, 0.0, &made));
+    bst_assert_ok(&ctx, bst_pointing_plot(&ctx, path, NULL, NULL, points, N, 0.0, &made));
     assert_true(made);
-    assert_int_equal(bst_pointing_plot(&ctx, path, NULL, points, 1, 0.0, &made), BST_ERR_ARGUMENT);
+    assert_int_equal(bst_pointing_plot(&ctx, path, NULL, NULL, points, 1, 0.0, &made),
+                     BST_ERR_ARGUMENT);
     assert_false(made);
     assert_int_equal(
-        bst_pointing_plot(&ctx, scratch_path(&s, "no/a.png"), NULL, points, N, 0.0, &made),
+        bst_pointing_plot(&ctx, scratch_path(&s, "no/a.png"), NULL, NULL, points, N, 0.0, &made),
         BST_ERR_IO);
     /* without gnuplot: a warning, success, and nothing left behind */
     unlink(path);
@@ -265,7 +267,7 @@ static void test_pointing_plot(void **state) {
     assert_non_null(search);
     setenv("PATH", s.folder, 1);
     warnings = 0;
-    bst_status status = bst_pointing_plot(&ctx, path, NULL, points, N, 0.0, &made);
+    bst_status status = bst_pointing_plot(&ctx, path, NULL, NULL, points, N, 0.0, &made);
     setenv("PATH", search, 1);
     free(search);
     assert_int_equal(status, BST_OK);
