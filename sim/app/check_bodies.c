@@ -1,10 +1,12 @@
 #include "sim/app/check_bodies.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "control/control.h"
 #include "gimbal/ideal.h"
+#include "sim/app/check_reach.h"
 #include "sim/world/knowledge.h"
 #include "sim/world/stray.h"
 #include "sim/world/world_config.h"
@@ -197,7 +199,7 @@ static bst_status look_ahead(bst_ctx *ctx, const bst_scenario *scenario, looking
         BST_TRY(bst_knowledge_view_create(ctx, l->knowledge, &l->cue));
     }
     l->half_rad = bst_camera_half_diagonal_rad(bst_world_camera(l->world, l->observer, l->sensor));
-    return spans_of(ctx, l, scenario->duration_s, spans, capacity, count);
+    return spans_of(ctx, l, fmin(scenario->duration_s, BST_CHECK_LOOKED_S), spans, capacity, count);
 }
 
 bst_status bst_check_bodies_in_field(bst_ctx *ctx, const bst_scenario *scenario,
@@ -227,15 +229,16 @@ static void warn_of_spans(bst_ctx *ctx, const char *name, int body, const bst_bo
     if (!first) {
         return;
     }
+    bool cut = duration_s > BST_CHECK_LOOKED_S;
     char until[48] = "the end of the run", more[80] = "";
-    if (first->until_s < duration_s) {
+    if (cut || first->until_s < duration_s) {
         snprintf(until, sizeof until, "%.1f s", first->until_s);
     }
     if (times > 1) {
         snprintf(more, sizeof more, " (the first of %d times, %.0f s in all)", times, sum_s);
     }
-    bst_log(ctx, BST_LOG_WARNING, "%s: the %s is in the field from %.1f s until %s%s", name,
-            body_names[body], first->from_s, until, more);
+    bst_log(ctx, BST_LOG_WARNING, "%s: the %s is in the field from %.1f s until %s%s%s", name,
+            body_names[body], first->from_s, until, more, cut ? " in the first three days" : "");
 }
 
 bst_status bst_check_bodies(bst_ctx *ctx, const bst_scenario *scenario,

@@ -15,7 +15,8 @@ typedef enum bst_field_body {
 /* A time in which the circle about the sensor meets a body's disc. */
 typedef struct bst_body_span {
     bst_field_body body;
-    double from_s, until_s; /* after the epoch, to 0.1 s; until_s: at most the run's duration */
+    double from_s, until_s; /* after the epoch, to 0.1 s; until_s: at most the run's duration,
+                             * of longer runs BST_CHECK_LOOKED_S */
 } bst_body_span;
 
 /* Times at which bodies are in the field of a sensor whose boresight is known beforehand.

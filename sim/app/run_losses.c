@@ -6,10 +6,7 @@
 
 #include <cjson/cJSON.h>
 
-const char *bst_count_text(char text[64], int64_t count, const char *one, const char *many) {
-    snprintf(text, 64, "%" PRId64 " %s", count, count == 1 ? one : many);
-    return text;
-}
+#include "sim/core/text.h"
 
 /* A loss of a sensor: an amount of something in some of the frames, or (noun NULL) frames alone. */
 typedef struct kind {
@@ -109,7 +106,7 @@ void bst_losses_tell_counter(const char *name, int64_t count, bst_loss_fn fn, vo
         {"bad_pixels_overflow", BST_SEVERITY_WARNING,
          "the learned bad-pixel map had no room (bad_pixel_learning.capacity)", "frame", "frames"},
         {"bad_pixels_sky_at_rest", BST_SEVERITY_NOTE,
-         "pixels looked bad but cannot be learned while the sky does not move over them", "frame",
+         "pixels look bad that cannot be learned, because the sky does not move over them", "frame",
          "frames"},
         {"saturated", BST_SEVERITY_NOTE, "full pixels in the image", "frame", "frames"},
     };

@@ -259,7 +259,7 @@ static const rule rules[] = {
      "times at which the cue is out of reach: Earth, keep-out cones, travel, limits, "
      "keyhole",
      NULL, NULL, bst_check_reach},
-    {"bodies", "times at which the Earth, the Moon or the Sun is in the field", NULL, NULL,
+    {"bodies", "times at which the Earth, the Moon or the Sun lies in the field", NULL, NULL,
      bst_check_bodies},
 };
 

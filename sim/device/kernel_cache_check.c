@@ -53,7 +53,7 @@ static bool walk(const char *folder, size_t skip, int depth, visit_file visit, v
 /* ------------------------------------------------------------------ one file */
 
 static bool sum_of(const char *path, uint64_t *sum) {
-    char block[65536];
+    char block[16384];
     int fd = open(path, O_RDONLY | O_NOFOLLOW | O_CLOEXEC);
     ssize_t got = fd >= 0 ? 1 : -1;
     for (*sum = BST_FNV_START; got > 0;) {

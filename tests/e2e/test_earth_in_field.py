@@ -133,6 +133,9 @@ class Drawn(unittest.TestCase):
             losses = runs.manifest(out)["losses"]["neossat/telescope"]
             self.assertEqual(losses["earth_frames"], losses["frames"])
             self.assertNotIn("moon_frames", losses)
+            summary = runs.manifest(out)["summary"]
+            self.assertEqual([summary[f"{body}_frames"] for body in ("earth", "moon", "sun")],
+                             [summary["frames"], 0, 0])
             self.assertIn("the Earth is in the field from 0.0 s until the end of the run", told)
         self.assertGreaterEqual(counted[0], 1)
         self.assertGreaterEqual(counted[1], 1)
