@@ -6,10 +6,7 @@
 
 #include <cjson/cJSON.h>
 
-const char *bst_count_text(char text[64], int64_t count, const char *one, const char *many) {
-    snprintf(text, 64, "%" PRId64 " %s", count, count == 1 ? one : many);
-    return text;
-}
+#include "sim/core/text.h"
 
 /* A loss of a sensor: an amount of something in some of the frames, or (noun NULL) frames alone. */
 typedef struct kind {

@@ -236,3 +236,14 @@ bst_status bst_world_build_objects(const bst_world_builder *b, const bst_world_c
     }
     return status;
 }
+
+bst_object_motion bst_world_object_motion(const bst_world *world, int object) {
+    const bst_orbit *orbit = &world->objects[object].orbit;
+    while (orbit->source == BST_ORBIT_RELATIVE) {
+        orbit = orbit->reference;
+    }
+    return (bst_object_motion){
+        .sgp4 = orbit->source == BST_ORBIT_SGP4,
+        .bstar = orbit->bstar,
+        .forces = orbit->source == BST_ORBIT_NUMERICAL ? &orbit->forces : NULL};
+}

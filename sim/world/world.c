@@ -75,8 +75,9 @@ static bst_status make_spectrum(const bst_world_builder *b, bst_camera *camera, 
 static bst_status make_pst(const bst_world_builder *b, bst_camera *camera, int observer,
                            int sensor) {
     bst_pst *pst;
-    bst_status status =
-        bst_pst_create(b->ctx, &camera->background, camera->optics.pixel_um, b->base_dir, &pst);
+    double own_um = camera->pixel_um > 0.0 ? camera->pixel_um : 0.0; /* NAN: not known */
+    double pixel_um = camera->optics.pixel_um > 0.0 ? camera->optics.pixel_um : own_um;
+    bst_status status = bst_pst_create(b->ctx, &camera->background, pixel_um, b->base_dir, &pst);
     if (status != BST_OK) {
         return bst_fail_prefix(b->ctx, BST_ERR_CONFIG,
                                "%s: /observers/%d/sensors/%d/camera/background", b->scenario,
@@ -160,6 +161,7 @@ static bst_status build(bst_world_builder *b, const bst_world_config *config,
     } else {
         BST_TRY(open_stars(b, config->star_catalogue, "/world/star_catalogue", &world->stars));
     }
+    world->shadow_atmosphere = config->shadow_atmosphere;
     world->faint_limit_v_mag =
         config->faint_stars == BST_FAINT_STATISTICAL ? config->faint_limit_v_mag : -INFINITY;
     if (config->faint_stars == BST_FAINT_STATISTICAL || needs_starlight(observers)) {

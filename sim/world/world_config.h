@@ -19,9 +19,17 @@ typedef struct bst_initial_state_config {
     int32_t from; /* BST_STATE_... */
     double at_s;
     double position_gcrf_m[3], velocity_gcrf_mps[3];
-    double perigee_radius_m, eccentricity;
-    double inclination_deg, raan_deg, arg_perigee_deg, true_anomaly_deg;
+    double semi_major_axis_m, perigee_radius_m; /* NAN: not given; at least one is */
+    double eccentricity;
+    double inclination_deg, raan_deg, arg_perigee_deg;
+    double true_anomaly_deg, mean_anomaly_deg; /* NAN: not given */
 } bst_initial_state_config;
+
+/* What Keplerian elements leave open (NAN) of semi-major axis and perigee, true and mean anomaly,
+ * from what they give; no anomaly: at the perigee. Of two that agree the radius of perigee and the
+ * true anomaly count. BST_ERR_CONFIG, with the keys but without their place, for elements that no
+ * orbit has, and when two contradict each other: by more than 1e-6 of the radius, 1e-6 degree. */
+bst_status bst_keplerian_resolve(bst_ctx *ctx, bst_initial_state_config *state) BST_MUST_CHECK;
 
 typedef struct bst_force_config {
     char gravity[512]; /* "builtin", "two_body", "j6" or a path as below */
@@ -86,6 +94,7 @@ typedef struct bst_world_config {
     double faint_limit_v_mag; /* single stars down to this V */
     uint64_t faint_seed;
     char earth_orientation[512]; /* "builtin" or a path as above */
+    bool shadow_atmosphere;      /* the air bends, reddens and weakens light at the shadow's edge */
     bst_config_list objects;     /* bst_object_config */
     bst_config_list catalogues;  /* bst_catalogue_config */
     /* not in the table: star_catalogue, open already, which outlives the world; NULL: it is opened
