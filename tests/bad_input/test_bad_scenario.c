@@ -251,7 +251,13 @@ static void walk_value(walk *w, const cJSON *schema, const cJSON *instance, cons
     char below[512];
     schema = of_type(schema, instance);
     const cJSON *type_node = get(schema, "type");
-    const char *type = cJSON_IsString(type_node) ? type_node->valuestring : "string";
+    /* ["number", "null"]: may be left open; ["string", ...]: a seed */
+    const char *first = cJSON_GetStringValue(cJSON_GetArrayItem(type_node, 0)),
+               *second = cJSON_GetStringValue(cJSON_GetArrayItem(type_node, 1));
+    const char *type = cJSON_IsString(type_node) ? type_node->valuestring
+                       : first                   ? first
+                                                 : "string";
+    bool open = second && strcmp(second, "null") == 0;
     /* the type of a module, which may have two names: refused by those of its role */
     const char *last = strrchr(path, '/');
     if (get(schema, "const") || (strstr(path, "/modules/") && last && !strcmp(last, "/type"))) {
@@ -276,7 +282,9 @@ static void walk_value(walk *w, const cJSON *schema, const cJSON *instance, cons
         }
     } else {
         refuse_value(w, path, "[true]", "wrong type");
-        refuse_value(w, path, "null", "wrong type");
+        if (!open) {
+            refuse_value(w, path, "null", "wrong type");
+        }
         refuse_value(w, path, strcmp(type, "boolean") == 0 ? "1" : "true", "wrong type");
         refuse_beyond(w, path, get(schema, "minimum"), -1.0);
         refuse_beyond(w, path, get(schema, "maximum"), 1.0);
