@@ -11,9 +11,9 @@
 #include "imgproc/sensor_order.h"
 #include "imgproc/streak_locate.h"
 #include "imgproc/streak_motion.h"
-#include "imgproc/tail.h"
 #include "imgproc/windows.h"
 #include "sim/core/pages.h"
+#include "sim/core/threshold_statistics.h"
 
 /* Maxima are looked at in between the pixels from this share of the threshold on at the least. */
 static const double LOOK_SHARE = 0.65;
@@ -187,9 +187,9 @@ typedef struct judge {
     double normal_variance; /* of a pixel's noise that is not counted electrons, e-^2 */
 } judge;
 
-static bool exceeds(double peak, const judge *g, const bst_tail_weights *weights,
-                    const bst_tail_noise *noise) {
-    return peak > g->threshold && peak > bst_tail_quantile(g->threshold, weights, noise);
+static bool exceeds(double peak, const judge *g, const bst_threshold_weights *weights,
+                    const bst_threshold_noise *noise) {
+    return peak > g->threshold && peak > bst_threshold_quantile(g->threshold, weights, noise);
 }
 
 /* A maximum counts when the output between the pixels exceeds what the noise there exceeds as
@@ -205,7 +205,7 @@ static bool stands_out(const void *user, const bst_candidate *c) {
         /* steps wider than the noise of reading add none: what is counted is the level then */
         counted = fmax(counted, fmin(level_e, variance));
     }
-    bst_tail_noise noise = {noise_e, counted, g->ip->camera.gain_e_per_dn};
+    bst_threshold_noise noise = {noise_e, counted, g->ip->camera.gain_e_per_dn};
     double point = bst_filter_peak(f, g->ip->electrons, noise_e, false, c->x, c->y);
     if (exceeds(point, g, &f->point_weights, &noise)) {
         return true;

@@ -27,7 +27,8 @@ bool bst_frame_in_field(const void *user, bst_vec3 direction) {
 bool bst_frame_is_expected(const void *user, const bst_mtt_track *track) {
     const bst_frame_view *f = user;
     const bst_tracker *t = f->tracker;
-    return bst_target_is_expected(&t->target_params, &f->cue, track, track->id == t->target.id);
+    return bst_target_is_expected(&t->target_params, &f->cue, track,
+                                  track->id == t->target.id ? &t->target : NULL);
 }
 
 /* Range rates of orbits about the Earth, 1 sigma. */

@@ -158,8 +158,11 @@ bst_status bst_bench_open_loop(bst_ctx *ctx, const bst_bench *self,
     (void)self;
     const char *place = getenv("TMPDIR");
     char folder[PATH_BYTES], run[PATH_BYTES + 8];
-    snprintf(folder, sizeof folder, "%.3000s/boresight-bench-%ld", place ? place : "/tmp",
-             (long)getpid());
+    snprintf(folder, sizeof folder, "%.3000s/boresight-bench-XXXXXX",
+             place && *place ? place : "/tmp");
+    if (!mkdtemp(folder)) {
+        return bst_fail(ctx, BST_ERR_IO, "%s: %s", folder, strerror(errno));
+    }
     snprintf(run, sizeof run, "%s/run", folder);
     bst_status status = measure(ctx, options, run, out);
     clear(folder, run);

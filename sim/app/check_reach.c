@@ -12,8 +12,6 @@
 /* Steps of the look: a thousandth of the run within these. */
 #define LEAST_STEP_S 0.5
 #define MOST_STEP_S 10.0
-/* Longer runs are looked at so far: a look at a day takes a fifth of a second. */
-#define MOST_LOOKED_S (3.0 * 86400.0)
 /* What the limits lose is followed from so long before to so long after they are exceeded. */
 #define RUN_UP_S 5.0
 #define RUN_OUT_S 120.0
@@ -227,7 +225,7 @@ static bst_status check_sensor(bst_ctx *ctx, const bst_scenario *scenario, const
                       bst_knowledge_body_attitude(s->knowledge), s));
     double pixel = bst_camera_scale_rad(bst_knowledge_camera(s->knowledge));
     found f = {.count = {0}};
-    double looked_s = fmin(scenario->duration_s, MOST_LOOKED_S);
+    double looked_s = fmin(scenario->duration_s, BST_CHECK_LOOKED_S);
     BST_TRY(spans(ctx, s, looked_s, config->guidance.loss_tolerance_px * pixel, &f));
     tell(ctx, name, &f, looked_s,
          s->turns && s->law.law != BST_LAW_FREE && config->guidance.body_roll,

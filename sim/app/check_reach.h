@@ -4,6 +4,9 @@
 
 #include "sim/engine/simulation.h"
 
+/* Longer runs are looked at so far beforehand, s: a look at a day takes a fifth of a second. */
+#define BST_CHECK_LOOKED_S (3.0 * 86400.0)
+
 /* Logs a warning for each reason for which a sensor whose control follows a cue cannot point at it
  * or loses it, with the first time span, and number and sum of all: behind the Earth, in keep-out
  * cones, outside of the mount's travel, by its limits, in the keyhole at its pole. The body is

@@ -1,6 +1,9 @@
+#define _XOPEN_SOURCE 700 /* realpath */
 #include "sim/app/load.h"
 
+#include <errno.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <cjson/cJSON.h>
@@ -82,6 +85,16 @@ static bst_status apply(bst_ctx *ctx, const bst_load_options *options, bst_json 
     if (options->link) {
         snprintf(text, sizeof text, "/link/address=\"%.100s\"", options->link);
         BST_TRY(bst_json_set(ctx, json, text));
+    }
+    if (options->link_keys) {
+        char *full = realpath(options->link_keys, NULL);
+        if (!full) {
+            return bst_fail(ctx, BST_ERR_NOT_FOUND, "--link-keys %s: %s", options->link_keys,
+                            strerror(errno));
+        }
+        cJSON *value = cJSON_CreateString(full);
+        free(full);
+        BST_TRY(bst_json_assign(ctx, json, "/link/keys_file", value));
     }
     if (options->pacing) {
         snprintf(text, sizeof text, "/pacing/mode=\"%.40s\"", options->pacing);

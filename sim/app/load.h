@@ -12,6 +12,7 @@ typedef struct bst_load_options {
     double duration_s;       /* < 0: as the scenario says */
     int64_t run;             /* < 0: as the scenario says */
     const char *link;        /* address of the link; NULL: as the scenario says */
+    const char *link_keys;   /* file; NULL: as the scenario says */
     const char *external;    /* modules that become "external", with commas between; NULL: none */
     const char *pacing;      /* mode; NULL: as the scenario says */
     const bst_option *table; /* of the command, for its outputs; bst_load_check sets it */
@@ -24,6 +25,12 @@ typedef struct bst_load_options {
      .target = &(load).link,                                                                     \
      .argument = "ADDRESS",                                                                      \
      .doc = "where peers connect that play modules: tcp://127.0.0.1:PORT or ipc://PATH"},        \
+        {.name = "link-keys",                                                                    \
+         .kind = BST_OPTION_TEXT,                                                                \
+         .target = &(load).link_keys,                                                            \
+         .path = BST_PATH_INPUT,                                                                 \
+         .argument = "FILE",                                                                     \
+         .doc = "keys of boresight link-keys that peers must have"},                             \
         {.name = "external",                                                                     \
          .kind = BST_OPTION_TEXT,                                                                \
          .target = &(load).external,                                                             \

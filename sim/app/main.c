@@ -5,6 +5,7 @@
 
 #include "sim/app/app.h"
 #include "sim/app/plugins.h"
+#include "sim/app/stack.h"
 #include "sim/core/text.h"
 #include "sim/core/version.h"
 
@@ -24,6 +25,7 @@ static const command commands[] = {
     {"loop", bst_cmd_loop, "margins and predicted pointing of a scenario's control loops"},
     {"schema", bst_cmd_schema, "print the JSON Schema of scenarios"},
     {"serve", bst_cmd_serve, "play a module of a scenario over the link"},
+    {"link-keys", bst_cmd_link_keys, "make keys for a link that takes only peers that have them"},
     {"icd", bst_cmd_icd, "print the interface control document of the link"},
     {"stars", bst_cmd_stars, "get, import or describe the star catalogue"},
     {"propagate", bst_cmd_propagate, "positions and velocities from two-line element sets"},
@@ -111,7 +113,7 @@ static int help(int argc, char **argv) {
     char name[32], option[] = "--help";
     snprintf(name, sizeof name, "%s", found->name);
     char *words[] = {name, option, NULL};
-    return found->run(2, words);
+    return bst_app_run_with_stack(found->run, 2, words);
 }
 
 /* Takes the options before the command: argv[*first] is the command then. */
@@ -174,5 +176,6 @@ int main(int argc, char **argv) {
         return code;
     }
     const command *found = find_command(argv[first]);
-    return found ? found->run(argc - first, argv + first) : unknown_command(argv[first]);
+    return found ? bst_app_run_with_stack(found->run, argc - first, argv + first)
+                 : unknown_command(argv[first]);
 }

@@ -7,6 +7,7 @@
 #include "sim/app/loop_model.h"
 #include "sim/app/report.h"
 #include "sim/app/run_losses.h"
+#include "sim/core/text.h"
 
 static const cJSON *get(const cJSON *node, const char *key) {
     return cJSON_GetObjectItemCaseSensitive(node, key);
@@ -99,6 +100,13 @@ static void judge_sensor(const bst_report_sensor *s, bool complete, bst_warnings
         bst_warnings_add(w, BST_SEVERITY_WARNING,
                          "%s: in %" PRId64 " frame%s the track of interest was not the target's.",
                          s->name, f->wrong_target_frames, f->wrong_target_frames == 1 ? "" : "s");
+    }
+    if (s->bad_pixels > 0) {
+        bst_warnings_add(w, BST_SEVERITY_NOTE,
+                         "%s: image processing learned that %" PRId64
+                         " pixel%s bad, and left %s out.",
+                         s->name, s->bad_pixels, s->bad_pixels == 1 ? " is" : "s are",
+                         s->bad_pixels == 1 ? "it" : "them");
     }
     /* with tasks there is always a next target to slew to */
     if (complete && s->task_count < 2 && acquired && f->final_mode >= 0 &&

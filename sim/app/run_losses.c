@@ -6,10 +6,7 @@
 
 #include <cjson/cJSON.h>
 
-const char *bst_count_text(char text[64], int64_t count, const char *one, const char *many) {
-    snprintf(text, 64, "%" PRId64 " %s", count, count == 1 ? one : many);
-    return text;
-}
+#include "sim/core/text.h"
 
 /* A loss of a sensor: an amount of something in some of the frames, or (noun NULL) frames alone. */
 typedef struct kind {
@@ -97,6 +94,11 @@ void bst_losses_tell_counter(const char *name, int64_t count, bst_loss_fn fn, vo
         {"axis_stuck", BST_SEVERITY_PROBLEM, "an axis of a mount stuck", "time", "times"},
         {"wheels_saturated", BST_SEVERITY_WARNING, "reaction wheels saturated", "time", "times"},
         {"star_trackers_blind", BST_SEVERITY_WARNING, "no star tracker saw stars", "time", "times"},
+        {"bad_pixels_overflow", BST_SEVERITY_WARNING,
+         "the learned bad-pixel map had no room (bad_pixel_learning.capacity)", "frame", "frames"},
+        {"bad_pixels_sky_at_rest", BST_SEVERITY_NOTE,
+         "pixels look bad that cannot be learned, because the sky does not move over them", "frame",
+         "frames"},
         {"saturated", BST_SEVERITY_NOTE, "full pixels in the image", "frame", "frames"},
     };
     char text[300], amount[64];

@@ -226,6 +226,7 @@ void bst_run_pictures_judged(bst_run_pictures *p, const bst_loop_frame *f) {
                                                        .dy_px = f->error_y_px,
                                                        .mode = f->mode,
                                                        .in_track = f->in_track,
+                                                       .counted = bst_loop_frame_is_pointing(f),
                                                        .visible = f->visible};
 }
 

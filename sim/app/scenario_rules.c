@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "sim/app/check_bodies.h"
 #include "sim/app/check_reach.h"
 #include "sim/app/loop_model.h"
 #include "sim/engine/loop_timing.h"
@@ -258,6 +259,8 @@ static const rule rules[] = {
      "times at which the cue is out of reach: Earth, keep-out cones, travel, limits, "
      "keyhole",
      NULL, NULL, bst_check_reach},
+    {"bodies", "times at which the Earth, the Moon or the Sun lies in the field", NULL, NULL,
+     bst_check_bodies},
 };
 
 static bst_status apply_to_sensors(bst_ctx *ctx, const rule *r, const bst_scenario *scenario,

@@ -209,6 +209,8 @@ typedef struct bst_truth {
     bst_vec3 sun_m;                        /* observer to Sun, mid */
     double boresight_x_px, boresight_y_px; /* where the boresight meets the focal plane */
     double background_e, dark_e;           /* expected electrons per pixel */
+    double earth_fraction, moon_fraction, sun_fraction; /* of the window's area that their discs
+                                                           cover, 0 to 1 */
     double hits_e;      /* charge of the radiation hits on the sensor, electrons */
     int32_t hits;       /* radiation hits */
     double error_sigma; /* largest error of the image expected in any pixel, in its noise; NAN: not

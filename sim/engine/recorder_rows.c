@@ -155,6 +155,9 @@ static bst_status exposure_row(bst_ctx *ctx, bst_recorder *recorder, int sensor,
     put_vector(&r, t->sun_m);
     put_real(&r, t->background_e);
     put_real(&r, t->dark_e);
+    put_real(&r, t->earth_fraction);
+    put_real(&r, t->moon_fraction);
+    put_real(&r, t->sun_fraction);
     put_real(&r, t->pixel_scale_arcsec);
     put_int(&r, t->count);
     put_int(&r, t->lost);

@@ -119,6 +119,7 @@ bst_status bst_run_metrics_truth(bst_ctx *ctx, bst_run_metrics *m, const bst_tru
 void bst_run_metrics_detections(bst_run_metrics *m, const bst_detections *detections) {
     bst_run_losses *lost = &m->figures.losses;
     m->figures.detections += detections->count;
+    m->figures.bad_pixels = detections->bad_pixels;
     lost->detections += detections->lost;
     lost->detection_frames += detections->lost > 0;
     lost->no_stars_frames += detections->stars_identified == 0;

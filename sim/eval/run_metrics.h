@@ -32,6 +32,7 @@ typedef struct bst_run_metric_figures {
     double track_rms_px, track_median_px, track_p95_px, track_max_px;
     /* confirmed tracks, by identity; false: near no object in most of its frames */
     int64_t tracks, false_tracks;
+    int64_t bad_pixels;      /* that image processing had learned by the latest frame */
     int64_t objects_seen;    /* objects that were in the field */
     int64_t objects_tracked; /* of them: ever near a confirmed track */
     bst_run_losses losses;

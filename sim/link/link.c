@@ -14,6 +14,9 @@ const bst_config_desc bst_link_config_table[] = {
     BST_STRING(bst_link_config, address, "\"\"",
                "Where peers connect: tcp://127.0.0.1:PORT or ipc://PATH; needed by modules of type "
                "\"external\"."),
+    BST_PATH(bst_link_config, keys_file, "\"\"",
+             "Keys of boresight link-keys: only peers that have them may connect, and what is sent "
+             "is encrypted; a file, relative to the scenario's folder."),
     BST_REAL(bst_link_config, timeout_s, "s", 0.001, 3600, "5",
              "For which the run waits for a peer's answer to a step."),
     BST_REAL(bst_link_config, connect_timeout_s, "s", 0.001, 86400, "60",
@@ -69,6 +72,15 @@ static bst_status bind_address(bst_ctx *ctx, bst_link *link) {
     link->monitor = link->context ? zmq_socket(link->context, ZMQ_PAIR) : NULL;
     if (!link->router || !link->monitor) {
         return bst_fail(ctx, BST_ERR_IO, "link: %s", zmq_strerror(errno));
+    }
+    if (*link->config.keys_file) {
+        BST_TRY(bst_curve_keys_read(ctx, link->config.keys_file, &link->keys));
+        BST_TRY(bst_curve_secure(ctx, link->router, &link->keys, true));
+        link->asker = bst_curve_asker(link->context);
+        if (!link->asker) {
+            return bst_fail(ctx, BST_ERR_IO, "link: keys cannot be checked: %s",
+                            zmq_strerror(errno));
+        }
     }
     int64_t most = LINK_MESSAGE_BYTES;
     (void)zmq_setsockopt(link->router, ZMQ_MAXMSGSIZE, &most, sizeof most);
@@ -157,6 +169,9 @@ void bst_link_close(bst_link *link, int reason, const char *text) {
     if (link->monitor) {
         zmq_close(link->monitor);
     }
+    if (link->asker) {
+        zmq_close(link->asker);
+    }
     if (link->context) {
         zmq_ctx_term(link->context); /* all frames have been released when it returns */
     }
@@ -202,6 +217,7 @@ static const char *const event_names[LINK_EVENTS] = {
     [LINK_STRANGER] = "link_stranger",
     [LINK_REFUSED] = "link_refused",
     [LINK_FLOODED] = "link_flooded",
+    [LINK_NO_KEY] = "link_no_key",
     [LINK_TAKEOVER] = "link_takeover",
     [LINK_HELLO_TAKEN] = "link_hello",
     [LINK_LEFT] = "link_left",

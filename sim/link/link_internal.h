@@ -4,6 +4,7 @@
 
 #include <zmq.h>
 
+#include "sim/link/curve_keys.h"
 #include "sim/link/endpoint.h"
 #include "sim/link/ipc_socket.h"
 #include "sim/link/link.h"
@@ -38,6 +39,7 @@ typedef enum link_event {
     LINK_STRANGER,
     LINK_REFUSED,
     LINK_FLOODED,
+    LINK_NO_KEY, /* peers without the keys that the link asks for */
     LINK_TAKEOVER,
     LINK_HELLO_TAKEN,
     LINK_LEFT,
@@ -99,6 +101,8 @@ struct bst_link {
     char scenario[BST_LINK_NAME_BYTES];
     bst_link_run run;
     void *context, *router, *monitor;
+    void *asker; /* where ZeroMQ asks about peers' keys; NULL: there are none */
+    bst_curve_keys keys;
     bst_ipc_socket ipc; /* path "": none */
     bst_shared_frames *shared;
     link_peer peers[LINK_PEERS];

@@ -458,14 +458,19 @@ static void watch(bst_link *link) {
 }
 
 bst_status bst_link_take(bst_link *link, link_exchange *x, int wait_ms) {
-    zmq_pollitem_t items[2] = {{.socket = link->router, .events = ZMQ_POLLIN},
-                               {.socket = link->monitor, .events = ZMQ_POLLIN}};
-    int ready = zmq_poll(items, 2, wait_ms);
+    zmq_pollitem_t items[3] = {{.socket = link->router, .events = ZMQ_POLLIN},
+                               {.socket = link->monitor, .events = ZMQ_POLLIN},
+                               {.socket = link->asker, .events = ZMQ_POLLIN}};
+    int ready = zmq_poll(items, link->asker ? 3 : 2, wait_ms);
     if (ready < 0 && errno != EINTR) {
         return bst_fail(x->ctx, BST_ERR_IO, "link: %s", zmq_strerror(errno));
     }
     if (ready > 0 && items[1].revents) {
         watch(link);
+    }
+    if (ready > 0 && link->asker && items[2].revents &&
+        bst_curve_answer(link->asker, &link->keys)) {
+        bst_link_event(link, x->ctx, LINK_NO_KEY, "a peer that has not the keys is refused");
     }
     message m;
     x->quiet = true;

@@ -177,6 +177,7 @@ static bst_status build(bst_world_builder *b, const bst_world_config *config,
     } else {
         BST_TRY(open_stars(b, config->star_catalogue, "/world/star_catalogue", &world->stars));
     }
+    world->shadow_atmosphere = config->shadow_atmosphere;
     world->faint_limit_v_mag =
         config->faint_stars == BST_FAINT_STATISTICAL ? config->faint_limit_v_mag : -INFINITY;
     if (config->faint_stars == BST_FAINT_STATISTICAL || needs_starlight(observers)) {

@@ -143,6 +143,10 @@ const bst_config_desc bst_world_config_table[] = {
              "Seed of the statistical sky: the same sky in all runs."),
     BST_PATH_OR(bst_world_config, earth_orientation, builtin_word, "\"builtin\"",
                 "\"builtin\" or a file in the IERS EOP C04 format."),
+    BST_BOOL(bst_world_config, shadow_atmosphere, "true",
+             "Sunlight on objects at the edge of the Earth's shadow is refracted, weakened and "
+             "reddened by the air; false: an Earth without air. The column sunlit_fraction is the "
+             "geometric one in both cases."),
     BST_LIST(bst_world_config, objects, bst_object_config, object_table, 0, 100000, "[]",
              "The space objects."),
     BST_LIST(bst_world_config, catalogues, bst_catalogue_config, catalogue_table, 0, 16, "[]",

@@ -116,9 +116,10 @@ typedef struct bst_world_config {
     int32_t faint_stars;      /* BST_FAINT_... */
     double faint_limit_v_mag; /* single stars down to this V */
     uint64_t faint_seed;
-    char earth_orientation[512];    /* "builtin" or a path as above */
-    bst_config_list objects;        /* bst_object_config */
-    bst_config_list catalogues;     /* bst_catalogue_config */
+    char earth_orientation[512]; /* "builtin" or a path as above */
+    bool shadow_atmosphere;      /* the air bends, reddens and weakens light at the shadow's edge */
+    bst_config_list objects;     /* bst_object_config */
+    bst_config_list catalogues;  /* bst_catalogue_config */
     bst_config_list constellations; /* bst_constellation_config */
     /* not in the table: star_catalogue, open already, which outlives the world; NULL: it is opened
      */

@@ -105,6 +105,29 @@ class BadInput(unittest.TestCase):
         self.refused(result, "/dev/null/kcache")
         self.assertIn("set POCL_CACHE_DIR to a folder that can be written", result.stderr)
 
+    def test_damaged_kernels_are_built_anew(self):
+        """PoCL aborts for a cached kernel that is cut; and what others may write is not loaded."""
+        cache = os.path.join(runs.scratch(), "kcache")
+
+        def run(**environment):
+            return self.call("run", runs.STARE, "--quiet", "--duration", "1", "--out",
+                             os.path.join(runs.scratch(), "run"), "--set", runs.NO_FRAMES, "--set",
+                             "/world/star_catalogue=embedded", POCL_CACHE_DIR=cache, **environment)
+        self.assertEqual(run().returncode, 0)
+        cut = 0
+        for folder, _, names in os.walk(cache):
+            for name in names:
+                if name.endswith(".so"):
+                    os.truncate(os.path.join(folder, name), 1000)
+                    cut += 1
+        if cut == 0:
+            self.skipTest("there is another OpenCL device than PoCL's")
+        result = run()
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("removed, to be built anew", result.stderr)
+        os.chmod(cache, 0o777)
+        self.refused(run(), "can be written to by others")
+
 
 def tearDownModule():
     runs.clean()

@@ -461,6 +461,26 @@ class Help(unittest.TestCase):
         self.assertRegex(result.stdout, r"^boresight \d+\.\d+\.\d+ \(\S*\)\n$")
 
 
+class SmallStack(unittest.TestCase):
+    """Nothing depends on the stack that the process is given (ulimit -s)."""
+
+    def test_commands(self):
+        folder = runs.scratch()
+        made = os.path.join(folder, "run")
+        kernels = ("run", runs.STARE, "--quiet", "--duration", "1", "--overwrite", "--out", made,
+                   "--set", "/world/star_catalogue=embedded")
+        # no kernel is compiled yet: the compiler of OpenCL takes the most
+        env = {**os.environ, "POCL_CACHE_DIR": os.path.join(folder, "kcache")}
+        for kib in (64, 256):
+            for words in (kernels, ("report", made), ("check", runs.TRACK, "--quiet"),
+                          ("loop", runs.TRACK), ("export", made, "--table", "csv", "--orbits", "oem"),
+                          ("study", "scenarios/studies/noise.json", "--emit", "0")):
+                result = subprocess.run(["sh", "-c", f'ulimit -s {kib}; exec "$@"', "sh",
+                                         runs.BORESIGHT, *words], capture_output=True, text=True,
+                                        timeout=120, env=env)
+                self.assertEqual(result.returncode, 0, (kib, words, result.stderr))
+
+
 class Resolved(unittest.TestCase):
     def test_check_is_a_fixed_point_and_runs_identically(self):
         first = call("check", runs.TRACK, "--set", "/world/star_catalogue=embedded", "--set",
@@ -492,7 +512,8 @@ class Resolved(unittest.TestCase):
         for path in SCENARIOS:
             result = call("check", path, "--quiet")
             said = [line for line in result.stderr.splitlines()
-                    if "the cue is out of reach from" not in line]
+                    if "the cue is out of reach from" not in line
+                    and " is in the field from " not in line]
             self.assertEqual((result.returncode, said), (0, []), path)
 
 

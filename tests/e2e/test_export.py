@@ -81,7 +81,8 @@ class Exported(unittest.TestCase):
         names = [row[0] for row in self.database.execute('SELECT "table" FROM tables')]
         self.assertEqual(sorted(os.listdir(out)), sorted(f"{name}.csv" for name in names))
         for name in names:
-            self.assertIn(f"{out}/{name}.csv: {self.check_csv(self.database, out, name)} rows\n",
+            rows = self.check_csv(self.database, out, name)
+            self.assertIn(f"{out}/{name}.csv: {rows} row{'' if rows == 1 else 's'}\n",
                           said)
 
     def test_some_tables_and_hard_text(self):

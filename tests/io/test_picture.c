@@ -227,6 +227,7 @@ static void test_pointing_plot(void **state) {
                                                  : i < 30 ? BST_MODE_ACQUIRE
                                                           : BST_MODE_TRACK,
                                          .in_track = i >= 34,
+                                         .counted = i >= 36,
                                          .visible = i != 100};
     }
     char path[700];
