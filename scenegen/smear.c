@@ -2,6 +2,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "scenegen/motion.h"
 #include "scenegen/place.h"
@@ -48,9 +49,22 @@ bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
     s->half_diagonal_px =
         tan(bst_camera_half_diagonal_rad(camera)) / bst_camera_scale_rad(camera) * s->stretch;
     if (!camera->geometry.general) {
-        s->half_diagonal_px = 0.5 * hypot((double)camera->width_px, (double)camera->height_px);
+        s->half_diagonal_px =
+            0.5 * hypot((double)camera->width_px + 2.0 * fabs(camera->boresight_offset_px[0]),
+                        (double)camera->height_px + 2.0 * fabs(camera->boresight_offset_px[1]));
     }
-    return BST_OK;
+    /* a tilt by t moves the image at the tangent R by (1 + R^2) t along the way from the boresight,
+     * and what is left of the second order by R (1 + R^2) t^2 */
+    double tangent = s->half_diagonal_px / s->stretch * bst_camera_scale_rad(camera);
+    s->wide_field = 1.0 + tangent * tangent;
+    s->curvature = 2.0 * tangent / s->wide_field * bst_camera_scale_rad(camera) +
+                   camera->geometry.curvature * bst_camera_scale_rad(camera) / s->stretch;
+    bst_status status = bst_motion_map_create(ctx, &s->map);
+    if (status != BST_OK) {
+        bst_smear_free(s);
+        *out = NULL;
+    }
+    return status;
 }
 
 void bst_smear_free(bst_smear *s) {
@@ -62,6 +76,7 @@ void bst_smear_free(bst_smear *s) {
         free(s->nodes.items);
         free(s->points.items);
         free(s->table);
+        bst_motion_map_free(s->map);
         free(s);
     }
 }
@@ -146,7 +161,10 @@ static bst_status append_nodes(bst_ctx *ctx, bst_smear *s, const bst_node_list *
     int blocks = (list->count + BST_BLOCK - 1) / BST_BLOCK;
     BST_TRY(bst_smear_reserve(ctx, (void **)&s->table, &s->table_capacity, s->table_blocks + blocks,
                               TABLE_FLOATS * sizeof(float)));
-    *out = (bst_smear_level){s->table_blocks, blocks, list->error + profile_error(s, list)};
+    *out = (bst_smear_level){.first_block = s->table_blocks,
+                             .blocks = blocks,
+                             .profile_error = profile_error(s, list)};
+    memcpy(out->error, list->error, sizeof out->error);
     s->table_blocks += blocks;
     for (int n = 0; n < blocks * BST_BLOCK; n++) {
         float *block = s->table + (size_t)(out->first_block + n / BST_BLOCK) * TABLE_FLOATS;
@@ -169,7 +187,7 @@ static double widening(const bst_smear *s, const bst_node *node) {
  * pixels and the focal plane's axes,
  * x' - x = ((m00 - m22) x + m01 y + m02 / a - x d) / (d + m22), d = a (m20 x + m21 y). */
 static void attitude_to_table(const bst_smear *s, const bst_node *node, float *t) {
-    double a = bst_camera_scale_rad(&s->camera), tilt = a / s->stretch;
+    double a = bst_camera_scale_rad(&s->camera), tilt = a / (s->stretch * s->wide_field);
     bst_quat q = bst_quat_from_rotvec(
         (bst_vec3){node->p[0] * tilt, node->p[1] * tilt, node->p[2] / s->half_diagonal_px});
     bst_mat3 m = bst_quat_to_mat3(q);
@@ -201,19 +219,24 @@ double bst_smear_largest_share(bst_smear *s) {
 }
 
 bst_status bst_smear_path_nodes(bst_ctx *ctx, bst_smear *s, const bst_path_point *path, int count,
-                                double part, double tolerance) {
+                                double part, bool turns, double tolerance) {
     double parts = ceil(part * s->options.temporal_oversample - 1e-9);
     if (parts > 0.0) {
         return bst_motion_midpoints(ctx, path, count, (int)parts, &s->nodes);
     }
-    return bst_nodes_from_path(ctx, path, count, s->sigma_px, tolerance, s->widest, &s->nodes);
+    bst_node_aim aim = {.psf_sigma_px = s->sigma_px,
+                        .tolerance = tolerance,
+                        .widest = s->widest,
+                        .wide_field = turns ? s->wide_field : 1.0,
+                        .curvature = turns ? s->curvature : 0.0};
+    return bst_nodes_from_path(ctx, path, count, &aim, &s->nodes);
 }
 
 static bst_status make_level(bst_ctx *ctx, bst_smear *s, int n) {
     if (s->levels[n].blocks == 0) {
-        s->nodes.count = 0;
-        s->nodes.error = 0.0;
-        BST_TRY(bst_smear_path_nodes(ctx, s, s->path, s->path_count, 1.0, s->tolerance[n]));
+        bst_nodes_clear(&s->nodes);
+        BST_TRY(bst_smear_path_nodes(ctx, s, s->path, s->path_count, 1.0, !s->single,
+                                     s->tolerance[n]));
         BST_TRY(append_nodes(ctx, s, &s->nodes, s->single ? shift_to_table : attitude_to_table,
                              &s->levels[n]));
     }
@@ -279,6 +302,25 @@ static bool stays_beside(const bst_smear *s, double x, double y) {
     return x < -far || y < -far || x > s->window.width + far || y > s->window.height + far;
 }
 
+/* The map of how stars move, from the nodes of the coarsest level, which were made last. */
+static bst_status begin_map(bst_ctx *ctx, bst_smear *s) {
+    double tilt = s->tilt_rad / bst_camera_scale_rad(&s->camera) * s->wide_field;
+    double from = s->half_diagonal_px / s->stretch;
+    bst_motion_map_frame frame = {.nodes = s->nodes.items,
+                                  .count = s->nodes.count,
+                                  .table = s->table + (size_t)s->levels[0].first_block *
+                                                          TABLE_FLOATS,
+                                  .scale_rad = bst_camera_scale_rad(&s->camera),
+                                  .tilt_px = s->stretch * s->wide_field,
+                                  .roll_px = s->half_diagonal_px,
+                                  .reach_px = fmin(from + tilt, 4.0 * s->far_px),
+                                  .sensor_px = from + 6.0 * s->sigma_px,
+                                  .shrink = bst_camera_shrink(&s->camera),
+                                  .stretch = s->stretch,
+                                  .sigma_px = s->share_sigma_px};
+    return bst_motion_map_begin(ctx, s->map, &frame);
+}
+
 bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *frame) {
     const bst_los_track *track = frame->track;
     s->track = *track;
@@ -315,22 +357,50 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *fr
     }
     measure_turn(s);
     choose_motion(s, frame->brightest_e_per_s);
+    for (int k = 0; k < s->path_count && !s->single; k++) {
+        s->path[k].p[0] *= s->wide_field;
+        s->path[k].p[1] *= s->wide_field;
+    }
     BST_TRY(make_level(ctx, s, 0));
+    if (!s->single) {
+        return begin_map(ctx, s);
+    }
     s->star_share = bst_smear_largest_share(s);
     return BST_OK;
 }
 
-int bst_smear_choose_level(const bst_smear *s, double peak_e) {
+int bst_smear_choose_level(const bst_smear *s, double peak_e, double scale) {
     double sigmas = peak_e / sqrt(FLANK * peak_e + s->dark_variance_e2);
     int n = 0;
     if (s->options.temporal_oversample > 0) {
         return n;
     }
-    while (n + 1 < BST_SMEAR_LEVELS &&
-           (s->tolerance[n] + s->point_error) * sigmas > NODE_SHARE * s->options.tolerance_sigma) {
+    /* mostly three nodes: errors of sixth order, of motions up to the path's */
+    double power = scale * scale * scale, part = fmin(power * power, 1.0);
+    while (n + 1 < BST_SMEAR_LEVELS && (part * s->tolerance[n] + s->point_error) * sigmas >
+                                           NODE_SHARE * s->options.tolerance_sigma) {
         n++;
     }
     return n;
+}
+
+/* A level's error for an image that moves by `scale` of the path, over the peak. */
+static double level_error(const bst_smear_level *level, double scale) {
+    return bst_nodes_error(level->error, scale) + level->profile_error;
+}
+
+/* The level for a star: from the one that its tolerance promises on, the first that keeps it. */
+static bst_status star_level(bst_ctx *ctx, bst_smear *s, double peak_e, double scale,
+                             const bst_smear_level **out) {
+    double sigmas = peak_e / sqrt(FLANK * peak_e + s->dark_variance_e2);
+    int n = bst_smear_choose_level(s, peak_e, scale);
+    BST_TRY(make_level(ctx, s, n));
+    while (n + 1 < BST_SMEAR_LEVELS && s->options.temporal_oversample <= 0 &&
+           level_error(&s->levels[n], scale) * sigmas > NODE_SHARE * s->options.tolerance_sigma) {
+        BST_TRY(make_level(ctx, s, ++n));
+    }
+    *out = &s->levels[n];
+    return BST_OK;
 }
 
 static int choose_radius(const bst_smear *s, double peak_e) {
@@ -372,8 +442,14 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
     if (!*visible) {
         return BST_OK;
     }
+    double scale = 1.0, share = s->star_share;
     if (!moving) {
-        s->last_peak_e = electrons * s->star_share;
+        if (!s->single) {
+            const bst_star_motion_cell *cell = bst_motion_map_at(s->map, x, y);
+            scale = cell->scale;
+            share = cell->share;
+        }
+        s->last_peak_e = electrons * share;
         *visible = !stays_beside(s, x, y);
         if (!*visible) {
             return BST_OK;
@@ -400,9 +476,7 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
         BST_TRY(append_nodes(ctx, s, &s->nodes, shift_to_table, &own));
         used = &own;
     } else {
-        int n = bst_smear_choose_level(s, s->last_peak_e);
-        BST_TRY(make_level(ctx, s, n));
-        used = &s->levels[n];
+        BST_TRY(star_level(ctx, s, s->last_peak_e, scale, &used));
     }
     int radius = choose_radius(s, s->last_peak_e);
     double lost = bst_stamp_excess(&s->stamp, radius);
@@ -418,7 +492,8 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
         (bst_crowd_source){.x_px = (float)x,
                            .y_px = (float)y,
                            .peak_e = (float)s->last_peak_e,
-                           .nodes_e = (float)((flank * used->error + rounded) * s->last_peak_e),
+                           .nodes_e = (float)((flank * level_error(used, scale) + rounded) *
+                                              s->last_peak_e),
                            .shared_e = (float)(shared * sigma_e),
                            .excess_e = (float)(lost * s->last_peak_e),
                            .border_e = (float)(s->last_peak_e * s->stamp.tail[border]),

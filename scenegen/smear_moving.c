@@ -88,8 +88,7 @@ static bst_status own_nodes(bst_ctx *ctx, bst_smear *s, int count, double x0, do
                             double tolerance) {
     const bst_path_point *p = s->own_path;
     double far = far_px(s), total = p[count - 1].s - p[0].s;
-    s->nodes.count = 0;
-    s->nodes.error = 0.0;
+    bst_nodes_clear(&s->nodes);
     for (int first = 0, last; first + 1 < count; first = last > first ? last : first + 1) {
         last = first;
         while (last + 1 < count && !isnan(p[last].p[0]) && !isnan(p[last + 1].p[0]) &&
@@ -99,7 +98,8 @@ static bst_status own_nodes(bst_ctx *ctx, bst_smear *s, int count, double x0, do
         if (last > first) {
             int n = s->nodes.count;
             double part = total > 0.0 ? (p[last].s - p[first].s) / total : 1.0;
-            BST_TRY(bst_smear_path_nodes(ctx, s, p + first, last - first + 1, part, tolerance));
+            BST_TRY(bst_smear_path_nodes(ctx, s, p + first, last - first + 1, part, false,
+                                         tolerance));
             for (; n < s->nodes.count && part < 1.0; n++) {
                 s->nodes.items[n].weight *= part;
             }
@@ -160,7 +160,7 @@ bst_status bst_smear_moving_nodes(bst_ctx *ctx, bst_smear *s, const bst_source *
         share = fmin(share, peak);
     }
     s->last_peak_e = electrons * share;
-    int level = bst_smear_choose_level(s, s->last_peak_e);
+    int level = bst_smear_choose_level(s, s->last_peak_e, 1.0);
     BST_TRY(own_nodes(ctx, s, count, x, y, s->tolerance[level]));
     return source->shape ? bst_shape_spread(ctx, &s->points, s->stretch, &s->nodes) : BST_OK;
 }
