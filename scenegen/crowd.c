@@ -37,7 +37,8 @@ struct bst_crowd {
     cell *cells;
     int *used; /* the frame's spots, then its cells */
     unsigned frame, mask;
-    double error; /* negative: not known yet */
+    double missing_e; /* everywhere */
+    double error;     /* negative: not known yet */
 };
 
 bst_status bst_crowd_create(bst_ctx *ctx, bst_crowd **out) {
@@ -81,6 +82,12 @@ bst_crowd_motion bst_crowd_motion_of(const bst_path_point *path, int count, bool
 void bst_crowd_begin(bst_crowd *c, const bst_crowd_motion *motion) {
     c->motion = *motion;
     c->count = 0;
+    c->missing_e = 0.0;
+    c->error = -1.0;
+}
+
+void bst_crowd_miss(bst_crowd *c, double electrons) {
+    c->missing_e += electrons;
     c->error = -1.0;
 }
 
@@ -247,7 +254,8 @@ double bst_crowd_error_sigma(bst_crowd *c) {
             const cell *p = &c->cells[c->used[i]];
             worst = p->worst_border + border > worst ? fmaxf(worst, crossing_error(c, p)) : worst;
         }
-        c->error = fmaxf(worst, apart) + REST * fminf(worst, apart);
+        c->error = fmaxf(worst, apart) + REST * fminf(worst, apart) +
+                   c->missing_e / sqrt(c->motion.dark_variance_e2);
     }
     return c->error;
 }

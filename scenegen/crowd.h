@@ -46,6 +46,9 @@ void bst_crowd_begin(bst_crowd *crowd, const bst_crowd_motion *motion);
 bst_status bst_crowd_add(bst_ctx *ctx, bst_crowd *crowd,
                          const bst_crowd_source *source) BST_MUST_CHECK;
 
+/* Adds light that any pixel may lack, e-: of sources too far away to be drawn. */
+void bst_crowd_miss(bst_crowd *crowd, double electrons);
+
 /* Largest error expected in any pixel, in its sigma. The work is done at the first call. */
 double bst_crowd_error_sigma(bst_crowd *crowd);
 

@@ -7,10 +7,10 @@
 #include "scenegen/kernels/scene_shared.h"
 #include "sim/core/vec.h"
 
-/* Cells per axis: few where the field turns by less than SMALL_ROLL, so that a cell's stars move
- * alike; and nodes about which light is summed. */
-enum { FEW_CELLS = 12, MANY_CELLS = 48, ANCHORS = 64 };
-#define SMALL_ROLL 0.1
+/* Cells per axis: as many as it takes for a cell's stars to move alike, but for UNLIKE of the path's
+ * length; and nodes about which light is summed. */
+enum { FEW_CELLS = 6, MANY_CELLS = 48, ANCHORS = 48 };
+#define UNLIKE 0.05
 /* Nodes that are nearer to each other than this, in sigma, give no scale. */
 #define LEAST_STEP 0.02
 
@@ -50,6 +50,16 @@ void bst_motion_map_free(bst_motion_map *map) {
     }
 }
 
+/* By how much a star's motion between two nodes differs, at most, from that of a star `apart_px`
+ * from it: the field turns, and a tilt stretches the tangent plane. */
+static double other_motion(const bst_motion_map *map, const turn *a, const turn *b,
+                           double apart_px) {
+    double tangent = map->f.reach_px * map->f.scale_rad;
+    double tilt = hypot(a->p[0] - b->p[0], a->p[1] - b->p[1]) / map->f.tilt_px;
+    return apart_px *
+           (fabs(a->roll_rad - b->roll_rad) + 2.0 * tangent * tilt * map->f.scale_rad);
+}
+
 bst_status bst_motion_map_begin(bst_ctx *ctx, bst_motion_map *map,
                                 const bst_motion_map_frame *frame) {
     if (frame->count > map->capacity) {
@@ -65,7 +75,7 @@ bst_status bst_motion_map_begin(bst_ctx *ctx, bst_motion_map *map,
     map->f = *frame;
     map->count = frame->count;
     map->frame++;
-    double low = 0.0, high = 0.0;
+    double low[3] = {0.0}, high[3] = {0.0};
     for (int n = 0; n < frame->count; n++) {
         const bst_node *node = &frame->nodes[n];
         const float *t = frame->table + (size_t)(n / BST_BLOCK) * BST_TABLE_ROWS * BST_BLOCK;
@@ -77,22 +87,24 @@ bst_status bst_motion_map_begin(bst_ctx *ctx, bst_motion_map *map,
         out->weight = node->weight;
         out->roll_rad = frame->roll_px > 0.0 ? node->p[2] / frame->roll_px : 0.0;
         out->tilt_px = hypot(node->p[0], node->p[1]) / frame->tilt_px;
-        low = n == 0 ? out->roll_rad : fmin(low, out->roll_rad);
-        high = n == 0 ? out->roll_rad : fmax(high, out->roll_rad);
+        for (int i = 0; i < 3; i++) {
+            low[i] = n == 0 ? node->p[i] : fmin(low[i], node->p[i]);
+            high[i] = n == 0 ? node->p[i] : fmax(high[i], node->p[i]);
+        }
     }
-    map->side = high - low < SMALL_ROLL ? FEW_CELLS : MANY_CELLS;
+    turn from = {.p = {low[0], low[1], low[2]}}, to = {.p = {high[0], high[1], high[2]}};
+    if (frame->roll_px > 0.0) {
+        from.roll_rad = low[2] / frame->roll_px;
+        to.roll_rad = high[2] / frame->roll_px;
+    }
+    double length = sqrt((high[0] - low[0]) * (high[0] - low[0]) +
+                         (high[1] - low[1]) * (high[1] - low[1]) +
+                         (high[2] - low[2]) * (high[2] - low[2]));
+    double side = sqrt(2.0) * other_motion(map, &from, &to, frame->reach_px) /
+                  (UNLIKE * fmax(length, map->f.sigma_px));
+    map->side = (int)fmin(fmax(ceil(side), FEW_CELLS), MANY_CELLS);
     map->cell_px = 2.0 * frame->reach_px / map->side;
     return BST_OK;
-}
-
-/* By how much a star's motion between two nodes differs, at most, from that of a star `apart_px`
- * from it: the field turns, and a tilt stretches the tangent plane. */
-static double other_motion(const bst_motion_map *map, const turn *a, const turn *b,
-                           double apart_px) {
-    double tangent = map->f.reach_px * map->f.scale_rad;
-    double tilt = hypot(a->p[0] - b->p[0], a->p[1] - b->p[1]) / map->f.tilt_px;
-    return apart_px *
-           (fabs(a->roll_rad - b->roll_rad) + 2.0 * tangent * tilt * map->f.scale_rad);
 }
 
 static void place_cell(bst_motion_map *map, double x, double y) {
@@ -106,9 +118,16 @@ static void place_cell(bst_motion_map *map, double x, double y) {
     }
 }
 
+double bst_motion_pixel_share(double sigma_px, int binning, double *spread_px) {
+    double line = erf(0.5 * binning / (sigma_px * sqrt(2.0)));
+    *spread_px = sqrt(sigma_px * sigma_px + (binning * binning - 1.0) / 12.0);
+    return line * line;
+}
+
 /* Largest share of the light that falls on one pixel, of any star of the cell. */
-static double cell_share(const bst_motion_map *map, double radius_px) {
-    double per = 1.0 / (map->f.sigma_px * sqrt(2.0)), best = 0.0;
+static double cell_share(const bst_motion_map *map, int binning, double radius_px) {
+    double spread, line = bst_motion_pixel_share(map->f.sigma_px, binning, &spread);
+    double per = 1.0 / (spread * sqrt(2.0)), best = 0.0;
     int stride = map->count / ANCHORS + 1;
     for (int a = 0; a < map->count; a += stride) {
         const place *at = &map->places[a];
@@ -122,8 +141,7 @@ static double cell_share(const bst_motion_map *map, double radius_px) {
         }
         best = fmax(best, sum);
     }
-    double line = erf(0.5 / (map->f.sigma_px * sqrt(2.0)));
-    return best * line * line;
+    return best * line;
 }
 
 /* Largest motion of a star of the cell over the path's, from node to node. */
@@ -150,7 +168,10 @@ static double cell_scale(const bst_motion_map *map, double radius_px) {
 static void fill_cell(bst_motion_map *map, bst_star_motion_cell *cell, double x, double y) {
     double radius = map->cell_px * sqrt(0.5);
     place_cell(map, x, y);
-    cell->share = cell_share(map, radius);
+    cell->share = cell->read_share = cell_share(map, 1, radius);
+    if (map->f.binning > 1) {
+        cell->read_share = cell_share(map, map->f.binning, radius);
+    }
     cell->scale = cell_scale(map, radius);
     turn still = {.weight = 0.0};
     for (int n = 0; n < map->count; n++) {

@@ -12,7 +12,8 @@ typedef struct bst_motion_map bst_motion_map;
 
 /* What holds for all stars of a cell. */
 typedef struct bst_star_motion_cell {
-    double share; /* at most, of a star's light on one pixel */
+    double share;      /* at most, of a star's light on one pixel */
+    double read_share; /* the same of a pixel that is read, binned from the sensor's */
     double scale; /* at most, of its motion over the path's */
     double low[2], high[2]; /* box of its places about the place at the reference attitude, px */
 } bst_star_motion_cell;
@@ -31,7 +32,12 @@ typedef struct bst_motion_map_frame {
     double sensor_px;   /* and places that are */
     double shrink, stretch; /* least and largest scale of the image by distortion */
     double sigma_px;    /* of the Gaussian that puts as much light on one pixel as the PSF */
+    int binning;
 } bst_motion_map_frame;
+
+/* Largest share of a Gaussian's light on a pixel that is read, binned from `binning` x `binning` of
+ * the sensor's, over the sum of exp(-d^2 / 2 s^2) of the path, d from the pixel; *spread_px: s. */
+double bst_motion_pixel_share(double sigma_px, int binning, double *spread_px);
 
 /* Starts a frame; its nodes and table are copied. BST_ERR_MEMORY. */
 bst_status bst_motion_map_begin(bst_ctx *ctx, bst_motion_map *map,

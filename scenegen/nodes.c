@@ -17,6 +17,7 @@ typedef struct maker {
     double widest;     /* px^2 */
     double wide_field; /* as in bst_node_aim */
     double curvature;
+    double pixel_part[3];
     double image_share; /* variance of the image per variance of the path, mean over the field */
     double most;   /* spread of the next group, px^2 */
     double limit;  /* of it */
@@ -276,7 +277,7 @@ static double covariance_error(const maker *m, double d[3][3], double widening, 
                                        {-0.70710678118654752, -0.70710678118654752},
                                        {0.70710678118654752, -0.70710678118654752}};
     double worst = 0.0, per = 1.0 / m->wide_field, more = m->wide_field - 1.0;
-    for (int k = 0; k < 5 && worst <= limit * m->variance; k++) {
+    for (int k = 0; k < 5 && m->pixel_part[0] * worst <= limit * m->variance; k++) {
         double x = place[k][0], y = place[k][1];
         /* image motion by the tilts and the roll; in a corner of a wide field more along the way
          * from the boresight, as (1 + r r^T) of the tangent plane has it */
@@ -403,11 +404,12 @@ static void try_rule(const maker *m, const moments *g, int n, bool widen, bool s
     error += 0.15 * wide * wide / (var * var);
     /* Groups are shorter than the PSF is wide, so that what jitter leaves over in neighbours adds
      * up; on straight paths it nearly cancels (factors measured on random paths) */
-    error *= 1.8;
+    error *= 1.8 * m->pixel_part[0];
     if (!(error <= limit)) {
         return;
     }
-    double left_out = covariance_error(m, d, r->widening * m->image_share, limit - error);
+    double left_out =
+        m->pixel_part[0] * covariance_error(m, d, r->widening * m->image_share, limit - error);
     r->fixed = r->widening > 0.0 ? left_out : 0.0;
     error += left_out;
     /* the mean of places is no place of the mean: by half the second derivative of what is left of
@@ -429,7 +431,7 @@ static void try_rule(const maker *m, const moments *g, int n, bool widen, bool s
     }
     static const double factor[4] = {0, 0, 8.0 / 1.08, 48.0 / 1.08}; /* 2^n n!, margin */
     double power = n == 3 ? var * var * var : var * var;
-    r->missed = n == 1 ? 0.0 : missed / (factor[n] * power);
+    r->missed = n == 1 ? 0.0 : m->pixel_part[n - 1] * missed / (factor[n] * power);
     r->error = error + r->missed;
 }
 
@@ -592,7 +594,10 @@ bst_status bst_nodes_from_path(bst_ctx *ctx, const bst_path_point *path, int cou
         return push(ctx, list, path[0].p, 1.0, 0.0);
     }
     /* three nodes on a uniform stretch of variance v miss 0.617 v^3 of the sixth moment */
-    m.limit = m.most = 0.95 * m.variance * cbrt(tolerance * 48.0 / 0.617);
+    for (int k = 0; k < 3; k++) {
+        m.pixel_part[k] = aim->pixel_part[k] > 0.0 ? aim->pixel_part[k] : 1.0;
+    }
+    m.limit = m.most = 0.95 * m.variance * cbrt(tolerance / m.pixel_part[2] * 48.0 / 0.617);
     group g = {0, path[0].s, path[0].s};
     extent e = {0};
     for (int k = 0; k + 1 < count; k++) {

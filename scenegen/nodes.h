@@ -53,6 +53,9 @@ typedef struct bst_node_aim {
                           where they are px in the sensor's corners, which a tangent plane moves
                           further; 0 is 1 */
     double curvature;  /* bound of the second derivative of the image's place by the path, 1/px */
+    /* what pixels show, over their peak, of the PSF's second, fourth and sixth derivatives, over
+     * those of a Gaussian of psf_sigma_px; 0 is 1 */
+    double pixel_part[3];
 } bst_node_aim;
 
 /* Appends the nodes of a path of `count` >= 2 points (two points at one time: a single node), so
