@@ -28,18 +28,11 @@ typedef enum motion_kind {
     MOVING_TARGETS,
     MOTIONS
 } motion_kind;
-static const char *const motion_name[MOTIONS] = {"stare",    "slew",      "roll about a corner",
-                                                 "reversal", "jitter",    "acceleration",
+static const char *const motion_name[MOTIONS] = {"stare",     "slew",       "roll about a corner",
+                                                 "reversal",  "jitter",     "acceleration",
                                                  "full turn", "wide field", "moving targets"};
 
-typedef enum psf_kind {
-    GAUSSIAN,
-    MOFFAT,
-    DIFFRACTION_Q1,
-    DIFFRACTION_Q2,
-    PSF_FILE,
-    PSFS
-} psf_kind;
+typedef enum psf_kind { GAUSSIAN, MOFFAT, DIFFRACTION_Q1, DIFFRACTION_Q2, PSF_FILE, PSFS } psf_kind;
 static const char *const psf_name[PSFS] = {"Gaussian", "Moffat", "diffraction Q 1",
                                            "diffraction Q 2", "file"};
 
@@ -97,26 +90,26 @@ static void make_file_psf(fixture *f, scene *s) {
 static void make_psf(fixture *f, scene *s) {
     bst_optics_config *o = &s->camera.optics;
     switch (s->psf_kind) {
-    case GAUSSIAN:
-        s->camera.psf_fwhm_px = draw_log(s, 0.8, 6.0);
-        break;
-    case MOFFAT:
-        s->camera.psf_fwhm_px = draw_log(s, 1.2, 4.0);
-        o->psf = BST_PSF_MOFFAT;
-        o->moffat_beta = draw(s, 2.2, 4.5);
-        break;
-    case PSF_FILE:
-        make_file_psf(f, s);
-        break;
-    default:
-        o->psf = BST_PSF_DIFFRACTION;
-        o->q = s->psf_kind == DIFFRACTION_Q1 ? 1.0 : 2.0;
-        o->central_obstruction = draw(s, 0.0, 0.4);
-        o->wavelengths = 1;
-        for (int j = 0; j < 6; j++) { /* Noll 4 to 9 */
-            o->zernike_waves.waves[j + 2] = draw(s, -0.05, 0.05);
-        }
-        break;
+        case GAUSSIAN:
+            s->camera.psf_fwhm_px = draw_log(s, 0.8, 6.0);
+            break;
+        case MOFFAT:
+            s->camera.psf_fwhm_px = draw_log(s, 1.2, 4.0);
+            o->psf = BST_PSF_MOFFAT;
+            o->moffat_beta = draw(s, 2.2, 4.5);
+            break;
+        case PSF_FILE:
+            make_file_psf(f, s);
+            break;
+        default:
+            o->psf = BST_PSF_DIFFRACTION;
+            o->q = s->psf_kind == DIFFRACTION_Q1 ? 1.0 : 2.0;
+            o->central_obstruction = draw(s, 0.0, 0.4);
+            o->wavelengths = 1;
+            for (int j = 0; j < 6; j++) { /* Noll 4 to 9 */
+                o->zernike_waves.waves[j + 2] = draw(s, -0.05, 0.05);
+            }
+            break;
     }
 }
 
@@ -129,12 +122,12 @@ typedef struct camera_motion {
 /* Image motion at the boresight for the kinds that move it along a line. */
 static double along_line(const scene *s, const camera_motion *m, double u) {
     switch (s->motion) {
-    case REVERSAL:
-        return 0.5 * m->travel_px * sin(2.0 * BST_PI * m->acceleration * u + m->phase);
-    case ACCELERATION:
-        return m->travel_px * (u + m->acceleration * u * u);
-    default:
-        return m->travel_px * u;
+        case REVERSAL:
+            return 0.5 * m->travel_px * sin(2.0 * BST_PI * m->acceleration * u + m->phase);
+        case ACCELERATION:
+            return m->travel_px * (u + m->acceleration * u * u);
+        default:
+            return m->travel_px * u;
     }
 }
 
@@ -154,42 +147,42 @@ static void choose_motion(scene *s, camera_motion *m) {
     m->pivot[0] = 0.5 * (WIDTH - 1);
     m->pivot[1] = 0.5 * (HEIGHT - 1);
     switch (s->motion) {
-    case STARE:
-    case MOVING_TARGETS:
-        m->travel_px = draw(s, 0.0, 1.0) < 0.5 ? 0.0 : draw_log(s, 0.5, 60.0);
-        m->travel_px = s->motion == STARE ? 0.0 : m->travel_px;
-        break;
-    case SLEW:
-        m->travel_px = draw_log(s, 0.5, 200.0);
-        break;
-    case ROLL_ABOUT_CORNER:
-        m->roll_rad = draw_sign(s) * draw_log(s, 0.02, 0.6);
-        m->pivot[0] = draw(s, 0.0, 1.0) < 0.5 ? -0.5 : WIDTH - 0.5;
-        m->pivot[1] = draw(s, 0.0, 1.0) < 0.5 ? -0.5 : HEIGHT - 0.5;
-        break;
-    case REVERSAL:
-        m->travel_px = draw_log(s, 1.0, 80.0);
-        m->acceleration = draw(s, 0.4, 2.5); /* turns back so many times */
-        m->phase = draw(s, 0.0, 2.0 * BST_PI);
-        break;
-    case JITTER:
-        m->travel_px = draw(s, 0.0, 1.0) < 0.5 ? 0.0 : draw_log(s, 0.5, 60.0);
-        m->jitter.jitter_px = draw_log(s, 0.05, 1.5);
-        break;
-    case ACCELERATION:
-        m->travel_px = draw_log(s, 2.0, 150.0);
-        m->acceleration = draw(s, -1.0, 1.0);
-        m->roll_rad = draw(s, -0.05, 0.05);
-        break;
-    case FULL_TURN:
-        m->roll_rad = draw_sign(s) * draw(s, BST_PI, 2.0 * BST_PI);
-        break;
-    default: /* WIDE_FIELD */
-        s->camera.pixel_scale_arcsec =
-            2.0 * tan(draw(s, 5.0, 45.0) * BST_DEG_RAD) / WIDTH / BST_ARCSEC_RAD;
-        m->travel_px = draw_log(s, 0.5, 60.0);
-        m->roll_rad = draw(s, -0.2, 0.2);
-        break;
+        case STARE:
+        case MOVING_TARGETS:
+            m->travel_px = draw(s, 0.0, 1.0) < 0.5 ? 0.0 : draw_log(s, 0.5, 60.0);
+            m->travel_px = s->motion == STARE ? 0.0 : m->travel_px;
+            break;
+        case SLEW:
+            m->travel_px = draw_log(s, 0.5, 200.0);
+            break;
+        case ROLL_ABOUT_CORNER:
+            m->roll_rad = draw_sign(s) * draw_log(s, 0.02, 0.6);
+            m->pivot[0] = draw(s, 0.0, 1.0) < 0.5 ? -0.5 : WIDTH - 0.5;
+            m->pivot[1] = draw(s, 0.0, 1.0) < 0.5 ? -0.5 : HEIGHT - 0.5;
+            break;
+        case REVERSAL:
+            m->travel_px = draw_log(s, 1.0, 80.0);
+            m->acceleration = draw(s, 0.4, 2.5); /* turns back so many times */
+            m->phase = draw(s, 0.0, 2.0 * BST_PI);
+            break;
+        case JITTER:
+            m->travel_px = draw(s, 0.0, 1.0) < 0.5 ? 0.0 : draw_log(s, 0.5, 60.0);
+            m->jitter.jitter_px = draw_log(s, 0.05, 1.5);
+            break;
+        case ACCELERATION:
+            m->travel_px = draw_log(s, 2.0, 150.0);
+            m->acceleration = draw(s, -1.0, 1.0);
+            m->roll_rad = draw(s, -0.05, 0.05);
+            break;
+        case FULL_TURN:
+            m->roll_rad = draw_sign(s) * draw(s, BST_PI, 2.0 * BST_PI);
+            break;
+        default: /* WIDE_FIELD */
+            s->camera.pixel_scale_arcsec =
+                2.0 * tan(draw(s, 5.0, 45.0) * BST_DEG_RAD) / WIDTH / BST_ARCSEC_RAD;
+            m->travel_px = draw_log(s, 0.5, 60.0);
+            m->roll_rad = draw(s, -0.2, 0.2);
+            break;
     }
 }
 
@@ -274,7 +267,9 @@ static double largest_error(const scene *s, const float *fast, const double *ref
                 error += (double)fast[at] - s->background_e - reference[at];
                 light += fmax(reference[at], 0.0) + s->background_e;
             }
-            if (getenv("DBG3") && fabs(error) / sqrt(light + read * read) > worst) fprintf(stderr, "x %d y %d err %.4g light %.4g bg %.4g\n", x, y, error, light, s->background_e*b*b);
+            if (getenv("DBG3") && fabs(error) / sqrt(light + read * read) > worst)
+                fprintf(stderr, "x %d y %d err %.4g light %.4g bg %.4g\n", x, y, error, light,
+                        s->background_e * b * b);
             worst = fmax(worst, fabs(error) / sqrt(light + read * read));
         }
     }
@@ -334,21 +329,22 @@ static void the_tolerance_is_kept(void **state) {
         if (o.measured > 1e-3 * s.tolerance_sigma) {
             ratio[lit++] = o.predicted / o.measured;
         }
-        print_message("%3d %-19s %-15s bin %d win %3d tol %5.3f measured %8.5f predicted %8.5f "
-                      "ratio %6.2f nodes %8lld%s%s\n",
-                      first_scene + i, motion_name[s.motion], psf_name[s.psf_kind], s.binning,
-                      s.window.width, s.tolerance_sigma, o.measured, o.predicted,
-                      o.predicted / o.measured, o.nodes, bad ? " MEASURED > PREDICTED" : "",
-                      over ? " PREDICTED > TOLERANCE" : "");
+        print_message(
+            "%3d %-19s %-15s bin %d win %3d tol %5.3f measured %8.5f predicted %8.5f "
+            "ratio %6.2f nodes %8lld%s%s\n",
+            first_scene + i, motion_name[s.motion], psf_name[s.psf_kind], s.binning, s.window.width,
+            s.tolerance_sigma, o.measured, o.predicted, o.predicted / o.measured, o.nodes,
+            bad ? " MEASURED > PREDICTED" : "", over ? " PREDICTED > TOLERANCE" : "");
         broken += bad;
         above += over && !o.missed;
         missed += o.missed;
         close_scene(&s);
     }
     qsort(ratio, (size_t)lit, sizeof *ratio, ascending);
-    print_message("%d scenes: %d above the prediction, %d predicted above the tolerance, %d said "
-                  "so; predicted / measured: least %.2f, median %.2f, largest %.2f\n",
-                  scenes, broken, above, missed, ratio[0], ratio[lit / 2], ratio[lit - 1]);
+    print_message(
+        "%d scenes: %d above the prediction, %d predicted above the tolerance, %d said "
+        "so; predicted / measured: least %.2f, median %.2f, largest %.2f\n",
+        scenes, broken, above, missed, ratio[0], ratio[lit / 2], ratio[lit - 1]);
     assert_int_equal(broken, 0);
     assert_int_equal(above, 0);
     assert_true(ratio[lit / 2] <= 3.0);
