@@ -19,6 +19,8 @@ typedef struct bst_crowd bst_crowd;
 typedef struct bst_crowd_motion {
     double direction[2];        /* unit vector */
     double length_px, width_px; /* along it and across */
+    double way_px;              /* length of the way, at most */
+    double overlap;             /* part of length times width that a star's light falls on */
     double sigma_px;            /* of the PSF */
     double dark_variance_e2;    /* noise of a dark pixel */
 } bst_crowd_motion;

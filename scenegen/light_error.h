@@ -19,7 +19,8 @@ bst_status bst_light_error_measure(bst_ctx *ctx, const bst_psf *psf, const bst_l
                                    bst_light_error *out) BST_MUST_CHECK;
 
 /* Error of the worst pixel, in its sigma, of a point with `peak_e` electrons in its brightest pixel
- * on noise of variance dark_variance_e2. */
-double bst_light_error_sigma(const bst_light_error *error, double peak_e, double dark_variance_e2);
+ * on noise of variance dark_variance_e2; of its wings alone, if so asked. */
+double bst_light_error_sigma(const bst_light_error *error, bool wings, double peak_e,
+                             double dark_variance_e2);
 
 #endif

@@ -68,10 +68,11 @@ static bst_status add_error(bst_ctx *ctx, planning *m, const bst_source *source)
     if (m->fft_light) { /* of its grid, on dark pixels too */
         double peak_e = bst_smear_last_read_e(m->smear),
                presence = bst_smear_last_presence(m->smear);
-        double grid = presence * bst_fft_light_error_sigma(m->fft_light, m->fine,
-                                                           m->request->window, peak_e, m->dark_e2);
+        double grid = bst_fft_light_error_sigma(m->fft_light, m->fine, presence < 1.0,
+                                                m->request->window, peak_e, m->dark_e2);
         m->grid_sigma = fmax(m->grid_sigma, grid);
-        error.excess_e += (float)(grid * sqrt((double)error.peak_e + m->dark_e2));
+        /* of either sign, as those of nodes */
+        error.nodes_e += (float)(grid * sqrt((double)error.peak_e + m->dark_e2));
         const float *colour = source->colour;
         if (colour[0] != 0.0F || colour[1] != 0.0F || colour[2] != 0.0F) {
             error.excess_e +=

@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "scenegen/kernels/deposit_shared.h"
 #include "scenegen/motion.h"
 #include "scenegen/place.h"
 #include "scenegen/profile_law.h"
@@ -147,7 +148,10 @@ static double profile_error(const bst_smear *s, const bst_node_list *list) {
         table = fmax(table, 0.75 * w / (wide * wide));
     }
     if (s->options.node_sigma_px > 0.0) {
-        return table / (BST_WIDTHS * BST_WIDTHS); /* by the widths of the Fourier path */
+        /* by the widths of the Fourier path, and by the phases of its kernel, between which linear
+         * interpolation widens by up to a quarter of a step squared, a half of that on each axis */
+        double step = 1.0 / (BST_SPREAD_PHASES * s->sigma_px);
+        return table / (BST_WIDTHS * BST_WIDTHS) + 0.25 * step * step;
     }
     if (widest > s->options.law_widest) {
         return fmax(s->edge_error, s->point_error);
