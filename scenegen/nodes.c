@@ -55,7 +55,7 @@ typedef struct rule {
 } rule;
 
 static bst_status push(bst_ctx *ctx, bst_node_list *list, const double p[3], double weight,
-                       double variance) {
+                       double variance, double error) {
     if (list->count == list->capacity) {
         int capacity = list->capacity ? 2 * list->capacity : 256;
         bst_node *items = realloc(list->items, (size_t)capacity * sizeof *items);
@@ -65,7 +65,7 @@ static bst_status push(bst_ctx *ctx, bst_node_list *list, const double p[3], dou
         list->items = items;
         list->capacity = capacity;
     }
-    list->items[list->count++] = (bst_node){{p[0], p[1], p[2]}, weight, variance};
+    list->items[list->count++] = (bst_node){{p[0], p[1], p[2]}, weight, variance, error};
     return BST_OK;
 }
 
@@ -476,7 +476,7 @@ static bst_status emit(bst_ctx *ctx, const maker *m, const moments *g, const rul
             }
             BST_TRY(
                 push(ctx, m->list, p, weight * r->weight[n] * (split ? 0.5 : 1.0),
-                     r->widening * m->image_share));
+                     r->widening * m->image_share, r->error));
             if (!split) {
                 break;
             }
@@ -522,7 +522,7 @@ static bst_status close_group(bst_ctx *ctx, maker *m, group g, int depth) {
     double spread = t.covariance[0][0] + t.covariance[1][1] + t.covariance[2][2];
     double weight = (g.to - g.from) / m->total;
     if (!(spread > 1e-12 * m->variance)) {
-        return push(ctx, m->list, t.mean, weight, 0.0);
+        return push(ctx, m->list, t.mean, weight, 0.0, 0.0);
     }
     high_moments(m, &g, &t);
     choose_rule(m, &t, m->tolerance, &best);
@@ -591,7 +591,7 @@ bst_status bst_nodes_from_path(bst_ctx *ctx, const bst_path_point *path, int cou
                /* of the boresight and four corners: all, and all along with 1 / wide^2 across */
                .image_share = (2.0 + 3.0 / (wide * wide)) / 5.0};
     if (!(m.total > 0.0)) {
-        return push(ctx, list, path[0].p, 1.0, 0.0);
+        return push(ctx, list, path[0].p, 1.0, 0.0, 0.0);
     }
     /* three nodes on a uniform stretch of variance v miss 0.617 v^3 of the sixth moment */
     for (int k = 0; k < 3; k++) {

@@ -26,6 +26,7 @@ typedef struct bst_node {
     double p[3];
     double weight;   /* share of the exposure; all nodes together: 1 */
     double variance; /* px^2, by which the node's PSF is wider per axis */
+    double error;    /* of its group, over the peak that the group has alone */
 } bst_node;
 
 /* Motions, over the path's, for which the error is estimated; see bst_nodes_error. */

@@ -169,7 +169,10 @@ static bst_status append_nodes(bst_ctx *ctx, bst_smear *s, const bst_node_list *
     *out = (bst_smear_level){.first_block = s->table_blocks,
                              .blocks = blocks,
                              .profile_error = profile_error(s, list)};
-    memcpy(out->error, list->error, sizeof out->error);
+    double part = bst_nodes_error_part(list->items, list->count, s->sigma_px);
+    for (int k = 0; k < BST_NODE_SCALES; k++) {
+        out->error[k] = part * list->error[k];
+    }
     s->table_blocks += blocks;
     for (int n = 0; n < blocks * BST_BLOCK; n++) {
         float *block = s->table + (size_t)(out->first_block + n / BST_BLOCK) * TABLE_FLOATS;
