@@ -22,7 +22,8 @@ CASES = [("duration", "/duration_s=0", "/duration_s: the run lasts 0 s"),
          ("short_times", MODULES + "/control/dwell_timeout_s=4", "(5 s here)"),
          ("short_times", MODULES + "/control/acquire_timeout_s=1", "before it can be confirmed"),
          ("loops", MODULES + "/control/delay_s/tracks=30", "loop"),
-         ("reach", "/duration_s=86400", "the cue is out of reach from")]
+         ("reach", "/duration_s=86400", "the cue is out of reach from"),
+         ("bodies", "/duration_s=86400", "the Earth is in the field from")]
 
 
 def check(*words):
