@@ -83,3 +83,51 @@ double bst_motion_stretch(const bst_source *source, double begin_s, double lengt
     *parts = wanted > 1.0 ? (int)ceil(wanted) : 1;
     return to;
 }
+
+double bst_nodes_peak_share(const bst_node *nodes, int count, double psf_sigma_px) {
+    double scale = 0.5 / (psf_sigma_px * psf_sigma_px), best = 0.0;
+    int stride = count / 128 + 1;
+    for (int a = 0; a < count; a += stride) {
+        double sum = 0.0;
+        for (int n = 0; n < count; n++) {
+            double dx = nodes[n].p[0] - nodes[a].p[0], dy = nodes[n].p[1] - nodes[a].p[1];
+            double q = (dx * dx + dy * dy) * scale;
+            sum += q < 20.0 ? nodes[n].weight * exp(-q) : 0.0;
+        }
+        best = fmax(best, sum);
+    }
+    double line = erf(0.5 / (psf_sigma_px * sqrt(2.0)));
+    return best * line * line;
+}
+
+double bst_nodes_error_part(const bst_node *nodes, int count, double psf_sigma_px) {
+    enum { ANCHORS = 24 };
+    double scale = 0.5 / (psf_sigma_px * psf_sigma_px), worst = 0.0, least = INFINITY;
+    int brightest = 0;
+    for (int n = 0; n < count; n++) {
+        double error = nodes[n].error * nodes[n].weight;
+        brightest = error > nodes[brightest].error * nodes[brightest].weight ? n : brightest;
+        worst = fmax(worst, nodes[n].error);
+        least = fmin(least, nodes[n].error);
+    }
+    if (!(worst > 0.0) || least > 0.9 * worst) {
+        return 1.0;
+    }
+    double light = 0.0, error = 0.0;
+    int stride = count / ANCHORS + 1;
+    for (int a = -1; a < count; a = a < 0 ? 0 : a + stride) {
+        const bst_node *at = &nodes[a < 0 ? brightest : a];
+        double here = 0.0, missed = 0.0;
+        for (int n = 0; n < count; n++) {
+            const double *p = nodes[n].p;
+            double dx = p[0] - at->p[0], dy = p[1] - at->p[1], dz = p[2] - at->p[2];
+            double q = (dx * dx + dy * dy + dz * dz) * scale;
+            double share = q < 20.0 ? nodes[n].weight * exp(-q) : 0.0;
+            here += share;
+            missed += share * nodes[n].error;
+        }
+        light = fmax(light, here);
+        error = fmax(error, missed);
+    }
+    return fmin(error / (worst * light), 1.0);
+}
