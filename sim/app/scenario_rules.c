@@ -257,7 +257,7 @@ static const rule rules[] = {
     {"loops", "loops that are unstable or have thin margins", NULL, NULL, loops},
     {"reach",
      "times at which the cue is out of reach: Earth, keep-out cones, travel, limits, "
-     "keyhole",
+     "keyhole; slews, steps of a search and scans that the mount's limits do not allow",
      NULL, NULL, bst_check_reach},
     {"bodies", "times at which the Earth, the Moon or the Sun lies in the field", NULL, NULL,
      bst_check_bodies},

@@ -84,6 +84,9 @@ bst_status bst_run_metrics_truth(bst_ctx *ctx, bst_run_metrics *m, const bst_tru
     lost->dropped_frames += truth->dropped;
     lost->truth += truth->lost;
     lost->truth_frames += truth->lost > 0;
+    lost->earth_frames += truth->earth_fraction > 0.0;
+    lost->moon_frames += truth->moon_fraction > 0.0;
+    lost->sun_frames += truth->sun_fraction > 0.0;
     m->newest = (m->newest + 1) % WAITING;
     known_frame *f = &m->frames[m->newest];
     f->exposure_id = truth->exposure_id;

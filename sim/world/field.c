@@ -278,6 +278,9 @@ static bool near_window(const bst_field *field, bst_quat q, bst_vec3 direction, 
  * not be the observer's to the metre. */
 static bool is_self(const bst_field *field, int index) {
     const world_object *object = &field->world->objects[index];
+    if (index == field->world->observers[field->observer].own_object) {
+        return true;
+    }
     return object->catalogued && object->info.norad != 0 &&
            object->info.norad == field->world->observers[field->observer].norad;
 }
