@@ -4,7 +4,6 @@
  * the tolerance with the nodes that a frame may have says so, and its prediction still holds. The
  * median of predicted over measured error is at most 3, and no scene has more than
  * BST_SCENE_MOST_NODES nodes. Usage: test_tolerance_sweep [slow] [scenes [first scene]]. */
-#include <stdio.h>
 #include <string.h>
 
 #include "scenegen/reference.h"
@@ -267,9 +266,6 @@ static double largest_error(const scene *s, const float *fast, const double *ref
                 error += (double)fast[at] - s->background_e - reference[at];
                 light += fmax(reference[at], 0.0) + s->background_e;
             }
-            if (getenv("DBG3") && fabs(error) / sqrt(light + read * read) > worst)
-                fprintf(stderr, "x %d y %d err %.4g light %.4g bg %.4g\n", x, y, error, light,
-                        s->background_e * b * b);
             worst = fmax(worst, fabs(error) / sqrt(light + read * read));
         }
     }
