@@ -39,6 +39,11 @@ const bst_config_desc bst_control_config_table[] = {
     BST_REAL(C, servo_lag_s, "s", 0, 10, "0.025",
              "How late the mount follows a change of its command (second_order: 0.025), for a "
              "compensator's specification."),
+    BST_BOOL(C, robust_observer, "true",
+             "Compensator observer: lower its gains where the frame period and the latency ask for "
+             "it, until its loop has a gain margin of 6 dB, a phase margin of 30 deg and a "
+             "sensitivity peak of at most 2; false: the gains of the disturbance below, whatever "
+             "the margins."),
     BST_REAL(C, disturbance_px_rms, "px", 1e-6, 1000, "0.5",
              "Expected slow jitter (radial RMS), for the compensator's gains."),
     BST_REAL(C, disturbance_cutoff_hz, "Hz", 1e-6, 100, "0.05",
@@ -67,7 +72,7 @@ const bst_config_desc bst_control_config_table[] = {
     BST_INT(C, dwell_frames, "frames", 1, 10000, "4",
             "Frames exposed wholly at rest at each place of the search. Two of them must show the "
             "target, which three do not surely do near the detection limit."),
-    BST_REAL(C, dwell_timeout_s, "s", 0.001, 1e6, "15",
+    BST_REAL(C, dwell_timeout_s, "s", 0.001, 1e6, "30",
              "The search goes on after this time when frames fail to come."),
     BST_INT(C, candidate_hits, "frames", 1, 1000, "2",
             "Detections that make a tentative track with a plausible rate a candidate."),

@@ -22,8 +22,10 @@ def kind_of(node):
     if "enum" in node:
         return ", ".join(f"`{choice}`" for choice in node["enum"])
     kind = node.get("type", "object")
+    if kind == ["number", "null"]:
+        return "number or `null`"
     if "pattern" in node:
-        return "hexadecimal string"
+        return "seed: `\"0x…\"`, decimal string or integer"
     if kind == "array" and node["items"].get("type") == "object":
         return "list of objects"
     if kind == "array" and "enum" in node["items"]:
@@ -47,6 +49,8 @@ def range_of(node):
         if item.get("type") == "object":
             return f"{number(node['minItems'])} to {number(node['maxItems'])} of them"
         node = item
+    if "pattern" in node:
+        return "up to 64 bits"
     if "minimum" in node:
         return f"{number(node['minimum'])} to {number(node['maximum'])}"
     if "maxLength" in node:

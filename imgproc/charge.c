@@ -79,7 +79,8 @@ static void count_charge(void *user, int begin, int end) {
         int at[MAX_CHARGE];
         double sharpest;
         bst_found *found = &s->l->found[i];
-        found->charge.pixels = find_charge(s->l, s->f, found, at, &sharpest);
+        bool light = found->dropped || found->bleed;
+        found->charge.pixels = light ? 0 : find_charge(s->l, s->f, found, at, &sharpest);
     }
 }
 

@@ -7,6 +7,9 @@ static const bst_config_desc bad_pixel_table[] = {
     BST_CONFIG_END,
 };
 
+/* in the order of columns.h */
+static const char *const column_levels[] = {"auto", "on", "off", NULL};
+
 const bst_config_desc bst_imgproc_config_table[] = {
     BST_INT(bst_imgproc_config, capacity, "", 1, 65536, "2048",
             "Detections kept per frame, the brightest first."),
@@ -49,6 +52,13 @@ const bst_config_desc bst_imgproc_config_table[] = {
         "in a row to confirm a track."),
     BST_OBJECT(bst_imgproc_config, stack, bst_stack_config_table, "{}",
                "Search for objects too faint for one frame in stacks of frames."),
+    BST_ENUM(bst_imgproc_config, column_level, column_levels, "\"auto\"",
+             "Whether each column's level over the others' is taken off, with the noise that it "
+             "brings: the smear of a frame transfer under light, offsets of columns. auto: where "
+             "the onboard camera has frame_transfer_s."),
+    BST_OBJECT(bst_imgproc_config, bad_pixel_learning, bst_pixel_learner_config_table, "{}",
+               "The bad-pixel map that is learned on board, besides bad_pixels and bad_pixel_file; "
+               "not with a detector of one's own."),
     BST_INT(
         bst_imgproc_config, threads, "", 0, 32, "0",
         "Threads that share the passes over a frame and the fits; 0: one per processor. Results do "

@@ -3,16 +3,15 @@
 #include <string.h>
 
 #include "imgproc/bad_map.h"
-#include "imgproc/electrons.h"
-#include "imgproc/imgproc.h"
-#include "imgproc/locate.h"
+#include "imgproc/detect_internal.h"
+#include "imgproc/pixel_learner.h"
 #include "imgproc/rows.h"
 #include "imgproc/sensor_order.h"
 #include "imgproc/streak_locate.h"
 #include "imgproc/streak_motion.h"
-#include "imgproc/tail.h"
 #include "imgproc/windows.h"
 #include "sim/core/pages.h"
+#include "sim/core/threshold_statistics.h"
 
 /* Maxima are looked at in between the pixels from this share of the threshold on at the least. */
 static const double LOOK_SHARE = 0.65;
@@ -28,31 +27,6 @@ static const float STAR_SNR = 3.0f;
 static const double LEAST_OPEN = 0.02;
 /* Above the threshold by this no skewness of noise matters. */
 static const double CERTAIN_ABOVE = 1.5;
-
-struct bst_imgproc {
-    bst_camera camera;
-    bst_imgproc_config config;
-    bst_imgproc_maps maps;
-    uint8_t *bad; /* [height_px][width_px]: the maps' and the list's bad pixels; NULL: none */
-    double electrons_per_s_v0;
-    float *electrons; /* [height][width] of the frame; signal once filtered */
-    bst_background background;
-    bst_filter filter;
-    bst_candidates candidates;
-    bst_locator locator;
-    bst_streak_motion streak_motion;
-    bst_streak_locator streaks; /* only when config.streak_search_px > 0 */
-    bst_parallel *pool;
-    int *order, *order_swap, *row;
-    uint16_t *cropped; /* a window's pixels */
-    /* of the latest frame */
-    bst_locate_frame view;
-    bst_motion motion;
-    double exposure_s, binning, streak_px;
-    bool smeared, windowed;
-    bst_stack_frame left;
-    bst_known_psf *known; /* NULL: the PSF is a Gaussian */
-};
 
 static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     int width = (int)ip->camera.width_px, height = (int)ip->camera.height_px;
@@ -73,6 +47,9 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a frame of %d x %d", width, height);
     }
     BST_TRY(bst_bad_map_create(ctx, &ip->camera, &ip->maps, &ip->config.bad_pixels, &ip->bad));
+    if (bst_columns_wanted(&ip->config, &ip->camera)) {
+        BST_TRY(bst_columns_create(ctx, width, &ip->columns));
+    }
     BST_TRY(bst_parallel_create(ctx, (int)ip->config.threads, &ip->pool));
     BST_TRY(bst_background_create(ctx, (int)ip->config.mesh_px, width, height,
                                   bst_parallel_threads(ip->pool), &ip->background));
@@ -139,6 +116,8 @@ void bst_imgproc_free(bst_imgproc *ip) {
     bst_streak_locator_free(&ip->streaks);
     bst_parallel_free(ip->pool);
     bst_known_psf_free(ip->known);
+    bst_pixel_shows_free(&ip->shows);
+    bst_columns_free(&ip->columns);
     free(ip);
 }
 
@@ -154,16 +133,33 @@ static void read_between_stars(const void *user, int y, int x, int count, float 
     bst_filter_mask(r->filter, y, x, count, STAR_SNR, out);
 }
 
+/* The noise of a row's columns, and its learned bad pixels where bst_electrons_read did not read
+ * it.
+ */
+static void correct_row(const void *user, int y, int width, float *signal, float *normalised) {
+    const bst_electrons *e = user;
+    for (int x = 0; e->columns && x < width; x++) {
+        normalised[x] /= e->columns->noise[e->first_column + x];
+    }
+    if (!e->learned) {
+        return;
+    }
+    const bst_window *w = &e->frame->window;
+    bst_bad_rows_mask(e->learned, w, e->frame->binning, y, 0, width, BST_PIXEL_BAD, signal);
+    bst_bad_rows_mask(e->learned, w, e->frame->binning, y, 0, width, 0.0f, normalised);
+}
+
 /* What tells noise from a source. */
 typedef struct judge {
     const bst_imgproc *ip;
+    const float *column_noise; /* see bst_locate_frame */
     double threshold;
     double normal_variance; /* of a pixel's noise that is not counted electrons, e-^2 */
 } judge;
 
-static bool exceeds(double peak, const judge *g, const bst_tail_weights *weights,
-                    const bst_tail_noise *noise) {
-    return peak > g->threshold && peak > bst_tail_quantile(g->threshold, weights, noise);
+static bool exceeds(double peak, const judge *g, const bst_threshold_weights *weights,
+                    const bst_threshold_noise *noise) {
+    return peak > g->threshold && peak > bst_threshold_quantile(g->threshold, weights, noise);
 }
 
 /* A maximum counts when the output between the pixels exceeds what the noise there exceeds as
@@ -172,13 +168,14 @@ static bool stands_out(const void *user, const bst_candidate *c) {
     const judge *g = user;
     const bst_filter *f = &g->ip->filter;
     double noise_e = bst_background_noise_at(&g->ip->background, c->x, c->y);
+    noise_e *= g->column_noise ? (double)g->column_noise[c->x] : 1.0;
     double level_e = bst_background_level_at(&g->ip->background, c->x, c->y);
     double variance = noise_e * noise_e, counted = fmax(variance - g->normal_variance, 0.0);
     if (g->normal_variance < 1.0) {
         /* steps wider than the noise of reading add none: what is counted is the level then */
         counted = fmax(counted, fmin(level_e, variance));
     }
-    bst_tail_noise noise = {noise_e, counted, g->ip->camera.gain_e_per_dn};
+    bst_threshold_noise noise = {noise_e, counted, g->ip->camera.gain_e_per_dn};
     double point = bst_filter_peak(f, g->ip->electrons, noise_e, false, c->x, c->y);
     if (exceeds(point, g, &f->point_weights, &noise)) {
         return true;
@@ -284,6 +281,35 @@ typedef struct part {
     bool search;
 } part;
 
+/* What the locator and stacks see of a frame that was searched. */
+static void set_view(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_motion *motion,
+                     double sigma, const float *column_noise, bst_parallel *pool) {
+    if (motion) {
+        ip->motion = *motion;
+    }
+    ip->view = (bst_locate_frame){.signal = ip->electrons,
+                                  .width = frame->window.width / frame->binning,
+                                  .height = frame->window.height / frame->binning,
+                                  .background = &ip->background,
+                                  .filter = &ip->filter,
+                                  .column_noise = column_noise,
+                                  .sigma_px = sigma,
+                                  .motion = motion ? &ip->motion : NULL,
+                                  .camera = &ip->camera,
+                                  .binning = frame->binning,
+                                  .pool = pool};
+    ip->view.origin_x_px = frame->window.x0 + 0.5 * (frame->binning - 1);
+    ip->view.origin_y_px = frame->window.y0 + 0.5 * (frame->binning - 1);
+    ip->left = (bst_stack_frame){.signal = ip->electrons,
+                                 .background = &ip->background,
+                                 .width = frame->window.width / frame->binning,
+                                 .height = frame->window.height / frame->binning,
+                                 .sigma_px = sigma,
+                                 .origin_x_px = ip->view.origin_x_px,
+                                 .origin_y_px = ip->view.origin_y_px,
+                                 .binning = frame->binning};
+}
+
 /* Finds the candidates of `frame` and sets ip->view. `whole` is the frame of which it is a window,
  * itself else: the density of false alarms and the filter are the whole frame's. */
 static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgproc_frame *whole,
@@ -296,7 +322,13 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
     ip->exposure_s = frame->exposure_s;
     ip->binning = frame->binning;
 
-    sparing_reader sparing = {{&ip->camera, &ip->maps, ip->bad, frame}, &ip->filter};
+    const bst_bad_rows *learned = ip->map && ip->map->rows.count > 0 ? &ip->map->rows : NULL;
+    const bst_columns *columns = ip->columns.count > 0 ? &ip->columns : NULL;
+    int first_column = (frame->window.x0 - whole->window.x0) / frame->binning;
+    sparing_reader sparing = {
+        {&ip->camera, &ip->maps, ip->bad, frame, learned, columns, first_column}, &ip->filter};
+    ip->filter.correct_row = learned || columns ? correct_row : NULL;
+    ip->filter.correct_user = &sparing.read;
     const bst_electrons *read = &sparing.read;
     bst_row_gain by_gain;
     const bst_row_gain *plain = bst_electrons_plain(read, &by_gain) ? &by_gain : NULL;
@@ -331,34 +363,13 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
                        (float)look_from(ip, threshold));
     }
     double look = look_from(ip, threshold);
-    judge noise = {ip, threshold, read_variance};
+    const float *column_noise = columns ? columns->noise + first_column : NULL;
+    judge noise = {ip, column_noise, threshold, read_variance};
     double certain = ip->smeared ? threshold : threshold + CERTAIN_ABOVE;
     bst_candidates_find(&ip->candidates, pool, &ip->filter,
                         (int)ceil(6.0 * sigma + hypot(dx, dy)) + 2, (float)look, (float)certain,
                         stands_out, &noise);
-    if (motion) {
-        ip->motion = *motion;
-    }
-    ip->view = (bst_locate_frame){.signal = ip->electrons,
-                                  .width = width,
-                                  .height = height,
-                                  .background = &ip->background,
-                                  .filter = &ip->filter,
-                                  .sigma_px = sigma,
-                                  .motion = motion ? &ip->motion : NULL,
-                                  .camera = &ip->camera,
-                                  .binning = frame->binning,
-                                  .pool = pool};
-    ip->view.origin_x_px = frame->window.x0 + 0.5 * (frame->binning - 1);
-    ip->view.origin_y_px = frame->window.y0 + 0.5 * (frame->binning - 1);
-    ip->left = (bst_stack_frame){.signal = ip->electrons,
-                                 .background = &ip->background,
-                                 .width = width,
-                                 .height = height,
-                                 .sigma_px = sigma,
-                                 .origin_x_px = ip->view.origin_x_px,
-                                 .origin_y_px = ip->view.origin_y_px,
-                                 .binning = frame->binning};
+    set_view(ip, frame, motion, sigma, column_noise, pool);
     *out = (part){threshold, false_alarms, search};
 }
 
@@ -401,6 +412,12 @@ static void take(bst_imgproc *ip, const part *p, bst_detections *out, int capaci
     out->threshold_snr = p->threshold;
 }
 
+static void measure_columns(bst_imgproc *ip, bst_parallel *pool, const bst_imgproc_frame *frame) {
+    if (ip->columns.capacity > 0) {
+        bst_columns_measure(&ip->columns, pool, &ip->camera, frame);
+    }
+}
+
 static void empty(bst_detections *out) {
     out->background_e = out->noise_e = out->threshold_snr = 0.0;
     out->stars_identified = 0;
@@ -415,12 +432,16 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
     bool alone = frame->beside_another && bst_parallel_threads(ip->pool) <= BST_STEP_LANES;
     part whole;
     empty(out);
+    measure_columns(ip, alone ? NULL : ip->pool, frame);
     ip->windowed = false;
     find(ip, frame, frame, motion, alone ? NULL : ip->pool, &whole);
     if (!ip->smeared && bst_streak_motion_begin(&ip->streak_motion, &ip->view)) {
         bst_streak_motion_add(&ip->streak_motion, &ip->view, &ip->candidates);
         correct_motion(ip, frame->binning, &ip->motion);
     }
+    bst_imgproc_begin_shows(ip);
+    bst_imgproc_add_shows(ip, frame, frame);
+    bst_pixel_shows_sort(&ip->shows);
     take(ip, &whole, out, capacity);
     out->background_e = (double)ip->background.median_level;
     out->noise_e = (double)ip->background.median_noise;
@@ -449,6 +470,7 @@ bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_i
     double pixels = 0.0;
     bst_motion used = {.q_cam_from_gcrf = BST_QUAT_IDENTITY};
     empty(out);
+    measure_columns(ip, ip->pool, frame);
     ip->windowed = true;
     if (motion) {
         used = *motion;
@@ -456,16 +478,19 @@ bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_i
             correct_motion(ip, frame->binning, &used);
         }
     }
+    bst_imgproc_begin_shows(ip);
     for (int i = 0; i < count; i++) {
         part p;
         bst_imgproc_frame window = bst_windows_crop(frame, &windows[i], ip->cropped);
         find(ip, &window, frame, motion ? &used : NULL, NULL, &p);
+        bst_imgproc_add_shows(ip, &window, frame);
         take(ip, &p, out, capacity);
         double n = (double)windows[i].width * (double)windows[i].height;
         pixels += n;
         out->background_e += n * (double)ip->background.median_level;
         out->noise_e += n * (double)ip->background.median_noise;
     }
+    bst_pixel_shows_sort(&ip->shows);
     if (pixels > 0.0) {
         out->background_e /= pixels;
         out->noise_e /= pixels;
@@ -510,55 +535,4 @@ double bst_imgproc_streak_px(const bst_imgproc *ip) {
 
 bool bst_imgproc_smeared(const bst_imgproc *ip) {
     return ip->smeared;
-}
-
-bst_stack_frame bst_imgproc_stack_frame(const bst_imgproc *ip, double time_s,
-                                        bst_quat q_cam_from_gcrf) {
-    bst_stack_frame frame = ip->left;
-    frame.time_s = time_s;
-    frame.q_cam_from_gcrf = q_cam_from_gcrf;
-    return frame;
-}
-
-void bst_imgproc_append_stack(const bst_imgproc *ip, const bst_stack_found *found, int count,
-                              double reach_px, bst_detections *out, int capacity) {
-    int before = out->count;
-    for (int i = 0; i < count; i++) {
-        const bst_stack_found *f = &found[i];
-        double reach = fmax(reach_px, 3.0 * sqrt(fmax(f->cov_xx, f->cov_yy)));
-        bool known = false;
-        for (int k = 0; k < before && !known; k++) {
-            known = hypot(out->items[k].x_px - f->x_px, out->items[k].y_px - f->y_px) < reach;
-        }
-        if (known) {
-            continue;
-        }
-        if (out->count == capacity) {
-            out->lost++;
-            continue;
-        }
-        bst_detection *d = &out->items[out->count++];
-        double width = 2.3548200450309493 * ip->left.sigma_px * ip->left.binning;
-        /* a stack's filter is the Gaussian that is like the PSF */
-        double like = ip->known ? ip->known->like_flux : 1.0;
-        *d = (bst_detection){.x_px = f->x_px,
-                             .y_px = f->y_px,
-                             .cov_xx = f->cov_xx,
-                             .cov_xy = f->cov_xy,
-                             .cov_yy = f->cov_yy,
-                             .flux_e = f->flux_e / like,
-                             .flux_sigma_e = f->flux_sigma_e / like,
-                             .snr = f->snr,
-                             .length_px = width,
-                             .width_px = width,
-                             .flags = BST_DETECTION_STACK,
-                             .label = f->at_rest ? BST_LABEL_STAR : BST_LABEL_OBJECT,
-                             .label_probability = 0.9,
-                             .rate_x_pxps = f->rate_x_pxps,
-                             .rate_y_pxps = f->rate_y_pxps,
-                             .rate_sigma_pxps = f->rate_sigma_pxps};
-        double rate = d->flux_e / fmax(ip->exposure_s, 1e-9);
-        d->v_mag = -2.5 * log10(rate / ip->electrons_per_s_v0);
-        d->v_mag_sigma = bst_photometry_noise_mag(d);
-    }
 }

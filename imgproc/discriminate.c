@@ -6,6 +6,7 @@
 
 #include "imgproc/charge.h"
 #include "imgproc/heapsort.h"
+#include "imgproc/pixel_learner.h"
 #include "sim/world/photometry.h"
 
 enum { BAND = 8, MAG_BINS = 60, KEEP_MISSED = 8, KEEP_CHARGE = 50 };
@@ -18,7 +19,10 @@ static const double SAME_MAG = 0.75;
 static const double MAX_GATE_PX = 3.0;
 static const double STREAK_PX = 3.0;  /* stars that move further are told from points */
 static const double LONG_SHARE = 3.0; /* length over width that no pair of points has */
-static const double FAINT_SNR = 8.0;  /* below, a hot pixel may look like light */
+/* Odds of 200: of light at rest in the frame at most one in two hundred is ever taken for a hot
+ * pixel. */
+static const double SUSPICIOUS = 5.3;
+static const double FAINT_SNR = 8.0; /* below, a hot pixel may look like light */
 static const double STAR_REDETECTED = 0.6;
 
 /* A source of earlier frames. */
@@ -143,9 +147,18 @@ static int times_charged(const bst_discriminator *d, int64_t pixel) {
     return lo < d->charge_count && d->charge[lo].pixel == pixel ? d->charge[lo].seen : 0;
 }
 
-static void label_charge(const bst_discriminator *d, bst_detection *item) {
+/* Log-odds that a maximum is that of a pixel that learning suspects. */
+static double suspicion(const bst_discriminator *d, const bst_frame_knowledge *f,
+                        const bst_detection *item) {
+    return f->learned
+               ? bst_pixel_learner_suspicion(f->learned, f->left_out, (int32_t)pixel_of(d, item))
+               : 0.0;
+}
+
+static void label_charge(const bst_discriminator *d, const bst_frame_knowledge *f,
+                         bst_detection *item) {
     int64_t pixel = pixel_of(d, item);
-    bool again = times_charged(d, pixel) > 0;
+    bool again = times_charged(d, pixel) > 0 || suspicion(d, f, item) >= SUSPICIOUS;
     if (item->label == BST_LABEL_HIT && !again) {
         /* the centroid of several pixels may round to another */
         const int64_t row = d->camera.width_px;
@@ -425,8 +438,11 @@ void bst_discriminator_label(bst_discriminator *d, const bst_frame_knowledge *f,
     double unlisted = 0.0;
     for (int i = 0; i < out->count; i++) {
         bst_detection *item = &out->items[i];
+        double odds = item->label == BST_LABEL_UNKNOWN ? suspicion(d, f, item) : 0.0;
         if (bst_charge_label(item->label)) {
-            label_charge(d, item);
+            label_charge(d, f, item);
+        } else if (odds >= SUSPICIOUS) {
+            say(item, BST_LABEL_HOT_PIXEL, 1.0 - exp(-odds));
         } else if (item->label == BST_LABEL_UNKNOWN && item->snr < FAINT_SNR &&
                    times_charged(d, pixel_of(d, item)) > 1) {
             say(item, BST_LABEL_HOT_PIXEL, 0.8);

@@ -27,17 +27,24 @@ static void correct(const bst_electrons *e, int y, int first, int count, float *
 
 bool bst_electrons_plain(const bst_electrons *e, bst_row_gain *gain) {
     *gain = (bst_row_gain){(float)e->camera->offset_dn, (float)e->camera->gain_e_per_dn};
-    return !e->maps->dark_e_per_s && !e->maps->flat && !e->bad;
+    return !e->maps->dark_e_per_s && !e->maps->flat && !e->bad && !e->columns;
 }
 
 void bst_electrons_read(const void *electrons, int y, int x, int count, float *out) {
     const bst_electrons *e = electrons;
     bst_row_gain gain;
-    bool plain = bst_electrons_plain(e, &gain);
+    (void)bst_electrons_plain(e, &gain);
     int width = e->frame->window.width / e->frame->binning;
     bst_row_electrons(e->frame->pixels + (size_t)y * (size_t)width + (size_t)x, count, gain.offset,
                       gain.gain, out);
-    if (!plain) {
+    for (int i = 0; e->columns && i < count; i++) {
+        out[i] -= e->columns->level_e[e->first_column + x + i];
+    }
+    if (e->maps->dark_e_per_s || e->maps->flat || e->bad) {
         correct(e, y, x, count, out);
+    }
+    if (e->learned && e->learned->count > 0) {
+        bst_bad_rows_mask(e->learned, &e->frame->window, e->frame->binning, y, x, count,
+                          BST_PIXEL_BAD, out);
     }
 }

@@ -2,6 +2,8 @@
 #ifndef BST_IMGPROC_ELECTRONS_H
 #define BST_IMGPROC_ELECTRONS_H
 
+#include "imgproc/bad_rows.h"
+#include "imgproc/columns.h"
 #include "imgproc/imgproc.h"
 #include "imgproc/rows.h"
 
@@ -10,12 +12,16 @@ typedef struct bst_electrons {
     const bst_imgproc_maps *maps;
     const uint8_t *bad; /* [height_px][width_px] of the sensor; NULL: none */
     const bst_imgproc_frame *frame;
+    const bst_bad_rows *learned; /* left out too; NULL: none */
+    const bst_columns *columns;  /* taken off; NULL: not measured */
+    int first_column;            /* of `columns`, that the frame begins with */
 } bst_electrons;
 
 /* A bst_pixel_fn (background.h) for a bst_electrons. */
 void bst_electrons_read(const void *electrons, int y, int x, int count, float *out);
 
-/* Whether nothing is corrected: electrons are digital numbers by their gain. */
+/* Whether nothing is corrected but learned bad pixels are left out: electrons are digital numbers
+ * by their gain. */
 bool bst_electrons_plain(const bst_electrons *electrons, bst_row_gain *gain);
 
 #endif

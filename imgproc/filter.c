@@ -166,6 +166,9 @@ static void filter_across(const pass *p, int y, bool own, float *lines, float *o
     bst_row_normalise(p->raw + row, p->gain, electrons, parts,
                       bst_background_parts(p->background, y, parts), p->saturated_dn, signal,
                       normalised + r);
+    if (f->correct_row) {
+        f->correct_row(f->correct_user, y, width, signal, normalised + r);
+    }
     const float *in[2 * BST_FILTER_MAX_RADIUS + 1];
     for (int x = 0; x < width; x += SOON_PX) {
         int count = width - x < SOON_PX ? width - x : SOON_PX;

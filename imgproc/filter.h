@@ -8,7 +8,7 @@
 #include "imgproc/background.h"
 #include "imgproc/known_psf.h"
 #include "imgproc/rows.h"
-#include "imgproc/tail.h"
+#include "sim/core/threshold_statistics.h"
 
 enum {
     BST_FILTER_MAX_RADIUS = 24,
@@ -22,6 +22,10 @@ enum {
     BST_FILTER_WORK = 6 * (2 * BST_FILTER_MAX_RADIUS + 3) * (2 * BST_FILTER_MAX_RADIUS + 3),
 };
 
+/* Corrects a normalised row, and its signal, before it is filtered. Called from several threads. */
+typedef void (*bst_filter_row_fn)(const void *user, int y, int width, float *signal,
+                                  float *normalised);
+
 typedef struct bst_filter {
     int max_width, max_height, pad, stride; /* of the padded map */
     int width, height;                      /* of the latest frame */
@@ -34,6 +38,8 @@ typedef struct bst_filter {
     int *maxima; /* [height] */
     int32_t *maximum_x;
     float *maximum_snr;
+    bst_filter_row_fn correct_row; /* of the next bst_filter_run; NULL: none */
+    const void *correct_user;
     float *lines;       /* work space of each thread */
     size_t line_floats; /* of one */
     bst_borrow *lent;   /* of lines */
@@ -66,7 +72,7 @@ typedef struct bst_filter {
     double overlap;     /* correlation of both outputs at one place */
     /* of the kernels with unit norm: sums of powers, and the expected density of maxima (see
      * bst_filter_threshold) */
-    bst_tail_weights point_weights, streak_weights;
+    bst_threshold_weights point_weights, streak_weights;
     double point_density, streak_density;
     double corner; /* output for a point between four pixels at one of them, over its greatest */
     double threshold, threshold_density; /* the latest, and the false alarms per pixel of it */

@@ -6,6 +6,7 @@
 #ifndef BST_IMGPROC_IMGPROC_H
 #define BST_IMGPROC_IMGPROC_H
 
+#include "imgproc/pixel_learner_config.h"
 #include "imgproc/stack.h"
 #include "sim/core/messages.h"
 #include "sim/core/module.h"
@@ -30,6 +31,8 @@ typedef struct bst_imgproc_config {
     bool track_windows; /* look only at windows while a target is followed */
     int64_t window_px, window_stars, full_every, full_frames;
     bst_stack_config stack;
+    bst_pixel_learner_config bad_pixel_learning;
+    int column_level;           /* see columns.h */
     int64_t threads;            /* 0: one per processor */
     bst_config_list bad_pixels; /* of bst_bad_pixel */
     /* FITS images of the maps; "": none. bst_imgproc_create leaves them to the caller. */
@@ -39,6 +42,8 @@ typedef struct bst_imgproc_config {
 
 extern const bst_config_desc bst_imgproc_config_table[];
 
+struct bst_pixel_map;
+struct bst_pixel_shows;
 struct bst_psf;
 
 /* What is known of the sensor beside the camera's numbers. Maps on the full sensor, row-major
@@ -115,6 +120,14 @@ bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_i
                                       const bst_window *windows, int count,
                                       const bst_motion *motion, bst_detections *out,
                                       int capacity) BST_MUST_CHECK;
+
+/* Has the following frames collect evidence of defective pixels, up to `capacity` pixels of a
+ * frame. BST_ERR_MEMORY. */
+bst_status bst_imgproc_collect_shows(bst_ctx *ctx, bst_imgproc *ip, int capacity) BST_MUST_CHECK;
+/* The pixels of `map` (lent; NULL: none) are left out of the following frames. */
+void bst_imgproc_use_map(bst_imgproc *ip, const struct bst_pixel_map *map);
+/* The evidence of the latest frame, in order of pixel. Lent until the next frame. */
+const struct bst_pixel_shows *bst_imgproc_shows(const bst_imgproc *ip);
 
 /* Fits detection `index` of the latest bst_imgproc_detect if the matched filter placed it (see
  * most_fits), and sets all of it but label, label_probability and star_id; the magnitude is put on

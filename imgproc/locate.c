@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "imgproc/bleed.h"
 #include "imgproc/charge.h"
 #include "imgproc/extent.h"
 #include "imgproc/top.h"
@@ -95,7 +96,7 @@ static bst_source as_shape(const bst_locate_frame *f, const bst_found *found, bo
 /* Starts a source at its candidate: at the top of the filter's output, between the pixels. */
 static void start(const bst_locate_frame *f, const bst_candidate *c, bst_found *out) {
     *out = (bst_found){.peak_snr = c->snr, .peak_x = c->x, .peak_y = c->y};
-    out->noise_e = bst_background_noise_at(f->background, c->x, c->y);
+    out->noise_e = bst_locate_noise_at(f, c->x, c->y);
     double dx, dy;
     out->top_snr = bst_filter_top(f->filter, false, c->x, c->y, &dx, &dy);
     out->top_x_px = c->x + dx;
@@ -143,6 +144,10 @@ static bool shape_is_open(const bst_locate_frame *f, const bst_found *found) {
 static void locate_one(const bst_worker *w, int i, bst_found *found) {
     const bst_locator *l = w->l;
     const bst_locate_frame *f = w->f;
+    if (found->bleed) {
+        found->source.fitted = bst_bleed_fit(w, i, found);
+        return;
+    }
     double widening = l->widening_weight > 0.0 ? l->widening_sum / l->widening_weight : 0.0;
     found->source.widening_px2 = widening;
     bool bright = (double)found->peak_snr > WIDTH_FIT_SNR;
@@ -168,7 +173,7 @@ static void locate_one(const bst_worker *w, int i, bst_found *found) {
 
 /* What the fit of a bright source says of the PSF's width. */
 static void note_widening(bst_locator *l, const bst_locate_frame *f, const bst_found *found) {
-    bool measured = found->source.fitted && found->source.widening_variance > 0.0;
+    bool measured = found->source.fitted && found->source.widening_variance > 0.0 && !found->bleed;
     double variance = f->sigma_px * f->sigma_px;
     if (measured && fabs(found->source.widening_px2) < 0.5 * variance) {
         /* no single source counts for more than one that is good to 3 % */
@@ -199,6 +204,22 @@ static void use_maximum(const bst_locate_frame *f, bst_found *found) {
     found->source.flux_variance = sigma * sigma + found->source.flux_e;
 }
 
+static void half_extent(const bst_locate_frame *f, const bst_shape *s, double *half_x,
+                        double *half_y) {
+    *half_x = 0.5 * fabs(s->dx_px) + fabs(s->bend_x_px) + 2.0 * f->sigma_px;
+    *half_y = 0.5 * fabs(s->dy_px) + fabs(s->bend_y_px) + 2.0 * f->sigma_px;
+}
+
+static void flag_edge(const bst_locate_frame *f, bst_found *found) {
+    const bst_shape *s = &found->source.shape;
+    double half_x, half_y;
+    half_extent(f, s, &half_x, &half_y);
+    if (s->x_px - half_x < -0.5 || s->y_px - half_y < -0.5 || s->x_px + half_x > f->width - 0.5 ||
+        s->y_px + half_y > f->height - 0.5) {
+        found->flags |= BST_DETECTION_EDGE;
+    }
+}
+
 /* Flags and plausibility. The light of a source beyond the edge fits with any flux: a place outside
  * of the frame is that of the maximum instead. */
 static void judge(const bst_locate_frame *f, bst_found *found) {
@@ -210,13 +231,9 @@ static void judge(const bst_locate_frame *f, bst_found *found) {
         found->snr = (double)found->peak_snr;
         found->flags |= BST_DETECTION_EDGE;
     }
-    double half_x = 0.5 * fabs(s->shape.dx_px) + fabs(s->shape.bend_x_px) + 2.0 * f->sigma_px;
-    double half_y = 0.5 * fabs(s->shape.dy_px) + fabs(s->shape.bend_y_px) + 2.0 * f->sigma_px;
-    double x = s->shape.x_px, y = s->shape.y_px;
-    if (x - half_x < -0.5 || y - half_y < -0.5 || x + half_x > f->width - 0.5 ||
-        y + half_y > f->height - 0.5) {
-        found->flags |= BST_DETECTION_EDGE;
-    }
+    flag_edge(f, found);
+    double half_x, half_y, x = s->shape.x_px, y = s->shape.y_px;
+    half_extent(f, &s->shape, &half_x, &half_y);
     int x0 = (int)fmax(x - half_x - 1.0, 0.0), x1 = (int)fmin(x + half_x + 1.0, f->width - 1.0);
     int y0 = (int)fmax(y - half_y - 1.0, 0.0), y1 = (int)fmin(y + half_y + 1.0, f->height - 1.0);
     for (int j = y0; j <= y1; j++) {
@@ -332,6 +349,11 @@ static void second_fit(const bst_worker *w, int i, bst_found *found) {
 
 static void finish(const bst_worker *w, int i, bst_found *found) {
     const bst_locate_frame *f = w->f;
+    if (found->bleed) {
+        bst_bleed_finish(f, found);
+        flag_edge(f, found);
+        return;
+    }
     if (!found->source.fitted) {
         use_maximum(f, found);
     }
@@ -385,6 +407,12 @@ static void choose(bst_locator *l, const bst_candidates *candidates, int fits) {
     }
 }
 
+void bst_locate_prepare(bst_locator *l, const bst_locate_frame *f) {
+    bst_profiles_on(&l->profiles, f->origin_x_px, f->origin_y_px, (int)f->binning);
+    bst_sharpness_set(&l->sharpness, &l->psf, l->profiles.known, (int)f->binning, f->sigma_px);
+    bst_profiles_set(&l->profiles, &l->psf, f->sigma_px);
+}
+
 void bst_locate(bst_locator *l, const bst_locate_frame *f, const bst_candidates *candidates) {
     l->count = candidates->count < l->capacity ? candidates->count : l->capacity;
     l->longest_px = 0.0;
@@ -399,9 +427,8 @@ void bst_locate(bst_locator *l, const bst_locate_frame *f, const bst_candidates 
     double variance = f->sigma_px * f->sigma_px;
     l->widening_sum = 0.0;
     l->widening_weight = 1.0 / (0.0025 * variance * variance); /* no widening, to 5 % */
-    bst_profiles_on(&l->profiles, f->origin_x_px, f->origin_y_px, (int)f->binning);
-    bst_sharpness_set(&l->sharpness, &l->psf, l->profiles.known, (int)f->binning, f->sigma_px);
-    bst_profiles_set(&l->profiles, &l->psf, f->sigma_px);
+    bst_locate_prepare(l, f);
+    bst_bleed_join(l, f);
     bst_charge_remove(l, f);
     for (int first = 0, end; first < fits; first = end) {
         end = group_end(first) < fits ? group_end(first) : fits;

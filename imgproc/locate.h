@@ -26,9 +26,11 @@ typedef struct bst_found {
     unsigned flags; /* BST_DETECTION_... */
     bool streak;    /* the shape that fits is not a point */
     bool dropped;
-    bool rough;  /* placed by the filter, not fitted */
-    int company; /* neighbours that the latest fit counted with */
-    int label;   /* bst_label: UNKNOWN, ARTEFACT, HOT_PIXEL (one pixel's charge) or HIT */
+    bool bleed;               /* its charge overflowed along its columns: bleed.h */
+    double bleed_e, bleed_px; /* with bleed: charge of all its pixels, width of the full ones */
+    bool rough;               /* placed by the filter, not fitted */
+    int company;              /* neighbours that the latest fit counted with */
+    int label; /* bst_label: UNKNOWN, ARTEFACT, HOT_PIXEL (one pixel's charge) or HIT */
     double label_probability;
     bst_charge charge;
     float peak_snr;
@@ -75,12 +77,19 @@ typedef struct bst_locate_frame {
     int width, height;
     const bst_background *background;
     const bst_filter *filter;
-    double sigma_px;          /* of the PSF, in this frame's pixels */
-    const bst_motion *motion; /* NULL: stars are points */
+    const float *column_noise; /* [width]: of a pixel over the background's; NULL: 1 */
+    double sigma_px;           /* of the PSF, in this frame's pixels */
+    const bst_motion *motion;  /* NULL: stars are points */
     const bst_camera *camera;
     double origin_x_px, origin_y_px, binning; /* full-sensor = origin + binning * frame pixel */
     bst_parallel *pool;                       /* for the loops; NULL: the caller's thread */
 } bst_locate_frame;
+
+/* Noise of a pixel. */
+static inline double bst_locate_noise_at(const bst_locate_frame *f, int x, int y) {
+    double noise = bst_background_noise_at(f->background, x, y);
+    return f->column_noise ? noise * (double)f->column_noise[x] : noise;
+}
 
 /* Squares of the frame that the found ones are kept by, px. */
 enum { BST_LOCATE_CELL_PX = 16 };
@@ -112,6 +121,9 @@ static inline double bst_locate_norm(const bst_locate_frame *frame, bool streak)
  * source is a HOT_PIXEL or a HIT, by the number of pixels. */
 void bst_locate(bst_locator *locator, const bst_locate_frame *frame,
                 const bst_candidates *candidates);
+
+/* What bst_locate does first: the PSF's profiles and sharpness for the frame. */
+void bst_locate_prepare(bst_locator *locator, const bst_locate_frame *frame);
 
 /* Fits number i of the latest frame if the filter placed it. */
 void bst_locate_again(bst_locator *locator, const bst_locate_frame *frame, int i);

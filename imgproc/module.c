@@ -5,6 +5,7 @@
 #include "imgproc/calibration.h"
 #include "imgproc/discriminate.h"
 #include "imgproc/imgproc.h"
+#include "imgproc/pixel_step.h"
 #include "imgproc/plugged.h"
 #include "imgproc/sky.h"
 #include "imgproc/windows.h"
@@ -36,6 +37,7 @@ typedef struct lane {
     bst_imgproc *ip;      /* NULL: not made yet */
     bst_detections *made; /* room for config->capacity; NULL in lane 0 until it is made ahead */
     bool ready;           /* made is of the frame below */
+    int map;              /* slot of the learned bad pixels that the present step uses */
     int64_t exposure_id;
 } lane;
 
@@ -51,8 +53,10 @@ typedef struct imgproc_module {
     bst_windows windows; /* of the present frame; none: all of it */
     bst_stack *stack;    /* NULL: no stacks */
     bst_photometer photometer;
-    bst_wings *wings;     /* NULL: the PSF has none */
-    bst_plugged *plugged; /* NULL: detection is this module's own */
+    bst_pixel_learner *pixels; /* NULL: no bad pixels are learned */
+    int64_t steps;             /* that were made */
+    bst_wings *wings;          /* NULL: the PSF has none */
+    bst_plugged *plugged;      /* NULL: detection is this module's own */
 } imgproc_module;
 
 static void destroy(void *self) {
@@ -70,16 +74,21 @@ static void destroy(void *self) {
     bst_sky_free(&m->sky);
     bst_stack_free(m->stack);
     bst_photometer_free(&m->photometer);
+    bst_pixel_learner_free(m->pixels);
     bst_wings_free(m->wings);
     bst_plugged_free(m->plugged);
     free(m);
 }
 
 static bst_status open_lane(bst_ctx *ctx, imgproc_module *m, lane *l) {
-    return l->ip || m->plugged
-               ? BST_OK
-               : bst_imgproc_create(ctx, &m->camera, bst_camera_electrons_per_s(&m->camera, 0.0),
-                                    m->config, &m->maps, &l->ip);
+    if (l->ip || m->plugged) {
+        return BST_OK;
+    }
+    BST_TRY(bst_imgproc_create(ctx, &m->camera, bst_camera_electrons_per_s(&m->camera, 0.0),
+                               m->config, &m->maps, &l->ip));
+    return m->pixels
+               ? bst_imgproc_collect_shows(ctx, l->ip, (int)m->config->bad_pixel_learning.capacity)
+               : BST_OK;
 }
 
 static bst_status open_plugged(const bst_module_env *env, imgproc_module *m) {
@@ -108,6 +117,10 @@ static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
                                env->sensor);
     }
     BST_TRY(open_plugged(env, m));
+    if (m->config->bad_pixel_learning.enabled && !m->plugged) {
+        BST_TRY(bst_pixel_learner_create(env->ctx, &m->camera, &m->config->bad_pixel_learning,
+                                         &m->pixels));
+    }
     BST_TRY(open_lane(env->ctx, m, &m->lanes[0]));
     BST_TRY(bst_sky_create(env->ctx, &m->camera, bst_knowledge_stars(env->knowledge),
                            bst_knowledge_julian_year(env->knowledge), CATALOGUE_CAPACITY, &m->sky));
@@ -364,6 +377,9 @@ static bst_status detect(bst_ctx *ctx, const imgproc_module *m, const lane *l,
                          const bst_frame_message *message, const bst_motion *motion,
                          bool beside_another, bst_detections *out, int capacity) {
     const uint16_t *pixels;
+    if (m->pixels) {
+        bst_imgproc_use_map(l->ip, bst_pixel_learner_map(m->pixels, l->map));
+    }
     BST_TRY(bst_frame_map(message->frame, ctx, &pixels));
     bst_imgproc_frame frame = {
         .pixels = pixels,
@@ -393,6 +409,7 @@ static bst_status ahead(void *self, struct bst_step *step) {
         return BST_OK;
     }
     BST_TRY(open_lane(ctx, m, l));
+    l->map = bst_step_lane(step);
     int capacity = (int)m->config->capacity;
     if (!l->made) {
         l->made = malloc(sizeof *l->made + (size_t)capacity * sizeof l->made->items[0]);
@@ -442,6 +459,22 @@ static void add_to_stack(imgproc_module *m, const lane *l, double middle_tick,
         for (int i = before; i < out->count; i++) {
             bst_photometry_correct(zero_point, &out->items[i]);
         }
+    }
+}
+
+static void learn_pixels(imgproc_module *m, struct bst_step *step, const lane *l,
+                         const bst_frame_message *message, const bst_frame_knowledge *known,
+                         bst_detections *out) {
+    int64_t lost = bst_pixel_learner_lost(m->pixels);
+    double middle_s =
+        0.5 * ((double)message->start_tick + (double)message->end_tick) / (double)m->tick_rate_hz;
+    bst_pixel_step(m->pixels, &m->camera, known, &m->windows, message->binning, middle_s,
+                   bst_imgproc_shows(l->ip), out);
+    if (bst_pixel_learner_waits(m->pixels)) {
+        bst_step_count(step, "bad_pixels_sky_at_rest");
+    }
+    if (bst_pixel_learner_lost(m->pixels) > lost) {
+        bst_step_count(step, "bad_pixels_overflow");
     }
 }
 
@@ -495,6 +528,12 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
     if (predictions) {
         known.predictions_age_s = (middle - (double)predictions->tick) / (double)m->tick_rate_hz;
     }
+    known.learned = m->pixels;
+    known.left_out = m->pixels ? bst_pixel_learner_map(m->pixels, l->map) : NULL;
+    if (m->pixels && oriented) {
+        learn_pixels(m, step, l, message, &known, out);
+    }
+    out->bad_pixels = m->pixels ? bst_pixel_learner_bad_count(m->pixels) : 0;
     if (m->wings && !smeared && m->windows.count == 0) {
         BST_TRY(label_wings(m, ctx, l, message, oriented ? &motion : NULL, &known, out));
     }
@@ -519,10 +558,18 @@ static bst_status process(imgproc_module *m, struct bst_step *step,
 }
 
 static bst_status step_module(void *self, struct bst_step *step) {
+    imgproc_module *m = self;
     bst_sample sample;
+    /* lanes take turns by steps; a map is as old in steps that nobody looked ahead of */
+    int slot = (int)(m->steps % BST_STEP_LANES);
+    m->lanes[bst_step_lane(step)].map = slot;
     while ((sample = bst_step_next(step, PORT_FRAME)).payload) {
         BST_TRY(process(self, step, sample.payload));
     }
+    if (m->pixels) {
+        bst_pixel_learner_publish(m->pixels, slot, m->steps);
+    }
+    m->steps++;
     return BST_OK;
 }
 

@@ -16,7 +16,7 @@ static const neighbour neighbours[8] = {{-1, 0},  {1, 0}, {0, -1}, {0, 1},
 static const int first_of[BST_SHARP_GROUPS] = {0, 0, 2, 4, 6},
                  end_of[BST_SHARP_GROUPS] = {8, 2, 4, 6, 8};
 
-static double estimate(const bst_sharpness *s, int group, const double at[3][3]) {
+static double estimate(const bst_sharpness *s, int group, const double (*at)[3]) {
     double sum = 0.0;
     for (int k = first_of[group]; k < end_of[group]; k++) {
         const neighbour *n = &neighbours[k];
@@ -115,46 +115,90 @@ bool bst_sharpness_is_open(const bst_sharpness *s, const float *signal, int widt
            (f4 * c - e4 > noise_e * s->deviation[4]);
 }
 
-double bst_sharpness_at(const bst_sharpness *s, const float *signal, int width, int height,
-                        double noise_e, int x, int y) {
-    if (x < 0 || y < 0 || x >= width || y >= height) {
-        return 0.0;
-    }
-    double centre = (double)signal[(long)y * width + x];
-    if (!(centre > 3.0 * noise_e)) {
-        return 0.0;
-    }
-    double at[3][3], worst = 0.0, noise2 = noise_e * noise_e;
-    bool known[3][3], suspicious = false;
+/* The pixel's signal and its neighbours'. */
+typedef struct surroundings {
+    double centre, at[3][3];
+    bool known[3][3];
+} surroundings;
+
+static surroundings look_around(const float *signal, int width, int height, int x, int y) {
+    surroundings s = {.centre = (double)signal[(long)y * width + x]};
     for (int j = 0; j < 3; j++) {
         for (int i = 0; i < 3; i++) {
             int u = x + i - 1, v = y + j - 1;
-            known[j][i] = u >= 0 && v >= 0 && u < width && v < height &&
-                          signal[(long)v * width + u] > BST_PIXEL_NONE;
-            at[j][i] = known[j][i] ? (double)signal[(long)v * width + u] : 0.0;
+            s.known[j][i] = u >= 0 && v >= 0 && u < width && v < height &&
+                            signal[(long)v * width + u] > BST_PIXEL_NONE;
+            s.at[j][i] = s.known[j][i] ? (double)signal[(long)v * width + u] : 0.0;
         }
     }
-    /* the group of all is a mean of the pairs: it is short only where one of them is */
-    for (int g = 1; g < BST_SHARP_GROUPS; g++) {
-        suspicious = suspicious || estimate(s, g, (const double(*)[3])at) < s->floor[g] * centre;
+    return s;
+}
+
+static bool is_whole(const surroundings *s, int group) {
+    bool all = true;
+    for (int k = first_of[group]; k < end_of[group]; k++) {
+        all = all && s->known[neighbours[k].dy + 1][neighbours[k].dx + 1];
     }
-    if (!suspicious) {
-        return 0.0;
-    }
+    return all;
+}
+
+/* Standard deviation of the light that a group of neighbours misses, for a given signal. */
+static double deviation_of(const bst_sharpness *s, int g, double centre, double noise2) {
+    double own = s->floor[g] * s->floor[g] * (noise2 + centre);
+    double others = s->inverse_square[g] * noise2 + s->cube[g] * centre;
+    double model = MODEL_SHARE * centre;
+    return sqrt(own + others + model * model);
+}
+
+/* The greatest deviation of the groups; 0: none is short of light. */
+static double worst_of(const bst_sharpness *s, const surroundings *p, double noise_e) {
+    double worst = 0.0;
     for (int g = 0; g < BST_SHARP_GROUPS; g++) {
-        bool all = true;
-        for (int k = first_of[g]; k < end_of[g]; k++) {
-            all = all && known[neighbours[k].dy + 1][neighbours[k].dx + 1];
+        if (is_whole(p, g)) {
+            double missing = s->floor[g] * p->centre - estimate(s, g, p->at);
+            worst = fmax(worst, missing / deviation_of(s, g, p->centre, noise_e * noise_e));
         }
-        if (!all) {
-            continue;
-        }
-        double light = s->floor[g] * centre;
-        double own = s->floor[g] * s->floor[g] * (noise2 + centre);
-        double others = s->inverse_square[g] * noise2 + s->cube[g] * centre;
-        double model = MODEL_SHARE * centre;
-        double missing = light - estimate(s, g, (const double(*)[3])at);
-        worst = fmax(worst, missing / sqrt(own + others + model * model));
     }
     return worst;
+}
+
+double bst_sharpness_at(const bst_sharpness *s, const float *signal, int width, int height,
+                        double noise_e, int x, int y) {
+    if (x < 0 || y < 0 || x >= width || y >= height ||
+        !((double)signal[(long)y * width + x] > 3.0 * noise_e)) {
+        return 0.0;
+    }
+    surroundings p = look_around(signal, width, height, x, y);
+    bool suspicious = false;
+    /* the group of all is a mean of the pairs: it is short only where one of them is */
+    for (int g = 1; g < BST_SHARP_GROUPS; g++) {
+        suspicious = suspicious || estimate(s, g, p.at) < s->floor[g] * p.centre;
+    }
+    return suspicious ? worst_of(s, &p, noise_e) : 0.0;
+}
+
+bst_sharpness_test bst_sharpness_compare(const bst_sharpness *s, const float *signal, int width,
+                                         int height, double noise_e, int x, int y) {
+    bst_sharpness_test out = {0};
+    if (x < 0 || y < 0 || x >= width || y >= height ||
+        !((double)signal[(long)y * width + x] > 3.0 * noise_e)) {
+        return out;
+    }
+    surroundings p = look_around(signal, width, height, x, y);
+    double alone = 0.0;
+    for (int g = 0; g < BST_SHARP_GROUPS; g++) {
+        if (!is_whole(&p, g)) {
+            continue;
+        }
+        double light = s->floor[g] * p.centre;
+        double deviation = deviation_of(s, g, p.centre, noise_e * noise_e);
+        alone = fmax(alone, light / deviation);
+        if (g == 0) {
+            out.all = (float)((light - estimate(s, g, p.at)) / deviation);
+            out.all_alone = (float)(light / deviation);
+        }
+    }
+    out.worst = (float)worst_of(s, &p, noise_e);
+    out.worst_alone = (float)alone;
+    return out;
 }

@@ -104,7 +104,7 @@ _TABLES = {
         "exposure_id:i8 start_tick:i8 end_tick:i8 q_cam_from_gcrf:f8x4 "
         "q_telemetry_from_gcrf:f8x4 background_e:f8 noise_e:f8 threshold_snr:f8 "
         "zero_point_mag:f8 zero_point_sigma_mag:f8 zero_point_stars:i4 "
-        "stars_identified:i4 windows:i4 count:i4 lost:i4",
+        "stars_identified:i4 windows:i4 count:i4 lost:i4 bad_pixels:i4",
         "x_px:f8 y_px:f8 cov_xx:f8 cov_xy:f8 cov_yy:f8 flux_e:f8 flux_sigma_e:f8 snr:f8 "
         "length_px:f8 width_px:f8 angle_rad:f8 v_mag:f8 v_mag_sigma:f8 flags:u4 "
         "star_id:u4 label:i4 label_probability:f8 rate_x_pxps:f8 rate_y_pxps:f8 "
@@ -461,11 +461,28 @@ class Step:
             self.link._answer(self)
 
 
+def read_keys(path: str) -> dict[str, bytes]:
+    """The keys of a file of `boresight link-keys`, which only its owner may read."""
+    with open(path, encoding="ascii") as file:
+        mode = os.fstat(file.fileno()).st_mode & 0o7777
+        if mode & 0o077:
+            raise LinkError(f"{path}: others can read or change it (found mode {mode:04o}; allowed: "
+                            "0600)")
+        lines = [line.split() for line in file if line.strip() and not line.startswith("#")]
+    keys = {words[0]: words[1].encode() for words in lines if len(words) == 2}
+    for name in ("simulation_public", "peer_public", "peer_secret"):
+        if len(keys.get(name, b"")) != 40:
+            raise LinkError(f"{path}: has no line {name} with 40 characters")
+    return keys
+
+
 class Link:
-    """A connection to a simulation, which need not be there yet. `serves`: parts as in `hello`."""
+    """A connection to a simulation, which need not be there yet. `serves`: parts as in `hello`;
+    `keys_file`: made by `boresight link-keys`, where the run asks for keys."""
 
     def __init__(self, address: str, serves: str = "*", name: str = "python",
-                 shared_memory: bool = False, timeout_s: float = 60.0, check_pixels: bool = True):
+                 shared_memory: bool = False, timeout_s: float = 60.0, check_pixels: bool = True,
+                 keys_file: Optional[str] = None):
         self.timeout_s, self.check_pixels = timeout_s, check_pixels
         self.welcome: Optional[Message] = None
         self.parts: dict[str, Part] = {}
@@ -480,6 +497,11 @@ class Link:
         self._last: Optional[Step] = None
         self._socket = zmq.Context.instance().socket(zmq.DEALER)
         self._socket.linger = 500
+        if keys_file is not None:
+            keys = read_keys(keys_file)
+            self._socket.curve_serverkey = keys["simulation_public"]
+            self._socket.curve_publickey = keys["peer_public"]
+            self._socket.curve_secretkey = keys["peer_secret"]
         self._socket.connect(address)
         self._send("hello", self._hello)
 

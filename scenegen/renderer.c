@@ -132,7 +132,7 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     r->camera = *camera;
     r->options = options ? *options : bst_renderer_default_options();
     r->taps = taps_for(bst_camera_psf_sigma_px(camera));
-    r->map = bst_skylight_varies(camera);
+    r->map = bst_skylight_may_vary(camera);
     double sigma_px = bst_camera_psf_sigma_px(camera);
     r->law_degree = r->options.psf_degree;
     r->context = bst_device_context(device);

@@ -54,7 +54,7 @@ typedef struct bst_render_request {
     double background_e; /* expected electrons per sensor pixel: sky and dark current */
     double dark_e;       /* of them, dark current (a map of it, if there is one, takes its place) */
     const struct bst_skylight_map *background; /* added to background_e, per sensor pixel; NULL:
-                    none. Only where bst_skylight_varies. It covers the window, and its whole
+                    none. Only where bst_skylight_may_vary. It covers the window, and its whole
                     columns where charge or light runs along them
                     (bst_detector_config_whole_columns) */
     int binning; /* 2 or more: so many pixels per side are added before they are read, and the

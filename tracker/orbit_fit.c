@@ -345,24 +345,41 @@ static bst_status check(work *w) {
     return BST_OK;
 }
 
-static bst_status finish(work *w, const chart *c, const double n[PARAMETERS][PARAMETERS],
-                         bst_od_solution *out) {
-    double l[PARAMETERS][PARAMETERS], size[PARAMETERS], p[PARAMETERS][PARAMETERS];
-    double map[6][PARAMETERS];
-    if (!factor(n, 0.0, 1e-15, l, size)) {
-        return fail_range(w);
+/* Covariance of the chart's steps: that of the observations' independent errors times the variance
+ * factor, and what their shared errors make of the solution, as consider parameters (Tapley, Schutz
+ * and Born, Statistical Orbit Determination, 2004, section 6.3). */
+static void covariance_of_steps(const work *w, const double l[PARAMETERS][PARAMETERS],
+                                const double size[PARAMETERS], double variance_factor,
+                                double p[PARAMETERS][PARAMETERS]) {
+    double shared[2][PARAMETERS];
+    for (int c = 0; c < 2; c++) {
+        double b[PARAMETERS] = {0.0};
+        for (int i = 0; i < w->count; i++) {
+            const double *white = w->white[i];
+            const double(*s)[2] = w->items[i].shared_rad;
+            const double r[2] = {white[0] * s[0][c], white[1] * s[0][c] + white[2] * s[1][c]};
+            for (int k = 0; k < PARAMETERS && w->used[i]; k++) {
+                b[k] += w->slope[i][k][0] * r[0] + w->slope[i][k][1] * r[1];
+            }
+        }
+        solve(l, size, b, shared[c]);
     }
     for (int k = 0; k < PARAMETERS; k++) {
         double unit[PARAMETERS] = {0.0}, x[PARAMETERS];
         unit[k] = 1.0;
         solve(l, size, unit, x);
         for (int i = 0; i < PARAMETERS; i++) {
-            p[i][k] = x[i];
+            p[i][k] =
+                variance_factor * x[i] + shared[0][i] * shared[0][k] + shared[1][i] * shared[1][k];
         }
     }
+}
+
+/* Observations and residuals of the solution in numbers. */
+static void count_residuals(work *w, bst_od_solution *out) {
+    double squares = 0.0;
     out->chi2 = total(w, w->residual);
     out->used = 0;
-    double squares = 0.0;
     for (int i = 0; i < w->count; i++) {
         if (w->used[i]) {
             const double *white = w->white[i], *r = w->residual[i];
@@ -374,10 +391,20 @@ static bst_status finish(work *w, const chart *c, const double n[PARAMETERS][PAR
     out->rejected = w->count - out->used;
     out->dof = 2 * out->used - PARAMETERS;
     out->rms_rad = sqrt(0.5 * squares / out->used);
-    /* Wilson and Hilferty's 99.9 % of chi-square */
-    double d = 2.0 / (9.0 * fmax(out->dof, 1)), cube = 1.0 - d + 3.09 * sqrt(d);
-    double excess = out->dof > 0 ? out->chi2 / out->dof : 1.0;
-    out->widened = w->options->widen && out->dof > 0 && excess > cube * cube * cube ? excess : 1.0;
+    out->variance_factor = w->options->scale_variance
+                               ? (BST_OD_PRIOR_DOF + out->chi2) / (BST_OD_PRIOR_DOF + out->dof)
+                               : 1.0;
+}
+
+static bst_status finish(work *w, const chart *c, const double n[PARAMETERS][PARAMETERS],
+                         bst_od_solution *out) {
+    double l[PARAMETERS][PARAMETERS], size[PARAMETERS], p[PARAMETERS][PARAMETERS];
+    double map[6][PARAMETERS];
+    if (!factor(n, 0.0, 1e-15, l, size)) {
+        return fail_range(w);
+    }
+    count_residuals(w, out);
+    covariance_of_steps(w, (const double(*)[PARAMETERS])l, size, out->variance_factor, p);
     chart_slope(c, map);
     for (int i = 0; i < 6; i++) {
         for (int j = 0; j <= i; j++) {
@@ -387,18 +414,17 @@ static bst_status finish(work *w, const chart *c, const double n[PARAMETERS][PAR
                     sum += map[i][a] * 0.5 * (p[a][b] + p[b][a]) * map[j][b];
                 }
             }
-            out->covariance[i][j] = out->covariance[j][i] = out->widened * sum;
+            out->covariance[i][j] = out->covariance[j][i] = sum;
         }
     }
     out->state = state_of(c);
     out->range_m = c->range_m;
-    double log_sigma = sqrt(out->widened * p[4][4]);
+    double log_sigma = sqrt(p[4][4]);
     out->range_sigma_m = c->range_m * log_sigma;
     double u = c->u_ps, t = c->span_s;
     /* range rate = range * u */
     out->range_rate_sigma_mps =
-        c->range_m *
-        sqrt(out->widened * fmax(0.0, u * u * p[4][4] + 2.0 * u / t * p[4][5] + p[5][5] / (t * t)));
+        c->range_m * sqrt(fmax(0.0, u * u * p[4][4] + 2.0 * u / t * p[4][5] + p[5][5] / (t * t)));
     return isfinite(log_sigma) && log_sigma < MOST_LOG_SIGMA ? BST_OK : fail_range(w);
 }
 

@@ -10,22 +10,29 @@ typedef struct bst_od_observation {
     bst_vec3 direction;       /* unit, geometric: aberration removed, light time contained */
     /* of its independent error, in the tangent axes at the direction (bst_tangent_at), rad^2 */
     double cov_11, cov_12, cov_22;
+    /* of what all observations of the arc have in common: the error along axis i is the sum of
+     * shared_rad[i][c] times two numbers of mean 0 and variance 1, the same for all. Not fitted,
+     * but part of the covariance. */
+    double shared_rad[2][2];
 } bst_od_observation;
 
 typedef struct bst_od_options {
     bst_od_motion motion;
     double reject_chi2; /* an observation whose chi-square (2 degrees of freedom) is above this, and
                            above 10 times the median, is left out; 0: none */
-    bool widen;         /* multiply the covariance by chi2 / dof where that is above what chance
-                           gives in one of a thousand arcs */
+    bool scale_variance; /* estimate one factor on the observations' covariances from the residuals
+                            (see bst_od_solution.variance_factor); false: they are taken as true */
 } bst_od_options;
 
 typedef struct bst_od_solution {
     bst_od_state state;      /* at the time of an observation near the middle of the arc */
     double covariance[6][6]; /* GCRF, m and m/s, order r, v */
-    double chi2;             /* of the observations used */
+    double chi2;             /* of the observations used, for their covariances as stated */
     int dof;                 /* 2 * used - 6 */
-    double widened;          /* factor on the covariance, 1 or chi2 / dof */
+    /* On the observations' covariances; `covariance` contains it. The a-posteriori variance of unit
+     * weight, (k + chi2) / (k + dof) with k = BST_OD_PRIOR_DOF; 1 without scale_variance.
+     * Source: Koch, Parameter Estimation and Hypothesis Testing in Linear Models (1999), 4.3. */
+    double variance_factor;
     int used, rejected;
     double rms_rad;                /* of the residuals used, per axis */
     double range_m, range_sigma_m; /* at state.time_s */
@@ -36,7 +43,11 @@ typedef struct bst_od_solution {
     int iterations;
 } bst_od_solution;
 
-enum { BST_OD_LEAST = 3 }; /* observations that are needed */
+enum {
+    BST_OD_LEAST = 3,     /* observations that are needed */
+    BST_OD_PRIOR_DOF = 20 /* weight of the covariances as stated: their variances are believed to
+                             within sqrt(2 / 20), a third */
+};
 
 /* Fits from a first state. Observations in order of time (equal times allowed). Levenberg and
  * Marquardt's iteration in the coordinates that angles determine: direction and its rate, the

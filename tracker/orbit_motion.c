@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "sim/astro/bodies.h"
+#include "sim/astro/sgp4_fit.h"
 
 #include "sim/world/kepler.h"
 #include "tracker/tangent.h"
@@ -11,11 +12,75 @@
 struct bst_od_path {
     bst_od_state state;
     double gm;
-    bst_trajectory *trajectory; /* NULL: two bodies */
+    bst_trajectory *trajectory; /* of forces */
+    bst_sgp4 *sgp4;             /* both NULL: two bodies */
+    bst_od_motion motion;
 };
 
 double bst_od_gm(const bst_od_motion *motion) {
-    return motion->forces ? bst_gravity_gm(motion->forces->gravity) : BST_EARTH_MU_M3PS2;
+    return motion->forces && !motion->sgp4 ? bst_gravity_gm(motion->forces->gravity)
+                                           : BST_EARTH_MU_M3PS2;
+}
+
+static bst_status teme_at_hour(bst_ctx *ctx, const bst_od_motion *motion, int64_t hour,
+                               const bst_mat3 **out) {
+    enum { SLOTS = sizeof motion->sgp4->hours / sizeof *motion->sgp4->hours };
+    int slot = (int)(((hour % SLOTS) + SLOTS) % SLOTS);
+    if (!motion->sgp4->hours[slot].valid || motion->sgp4->hours[slot].hour != hour) {
+        bst_sky sky;
+        BST_TRY(bst_sky_clock_at(ctx, motion->sgp4->clock,
+                                 bst_time_add(motion->epoch, 3600.0 * (double)hour), &sky));
+        motion->sgp4->hours[slot].gcrf_from_teme = sky.frames.gcrf_from_teme;
+        motion->sgp4->hours[slot].hour = hour;
+        motion->sgp4->hours[slot].valid = true;
+    }
+    *out = &motion->sgp4->hours[slot].gcrf_from_teme;
+    return BST_OK;
+}
+
+/* gcrf_from_teme at a time and its derivative (1/s), linear between hours: nutation bends by 5e-11
+ * rad in between, 2 mm at a geostationary distance. */
+static bst_status teme_at(bst_ctx *ctx, const bst_od_motion *motion, double time_s,
+                          bst_mat3 *rotation, bst_mat3 *rate) {
+    double hour = floor(time_s / 3600.0), f = time_s / 3600.0 - hour;
+    const bst_mat3 *a, *b;
+    BST_TRY(teme_at_hour(ctx, motion, (int64_t)hour, &a));
+    BST_TRY(teme_at_hour(ctx, motion, (int64_t)hour + 1, &b));
+    for (int i = 0; i < 3; i++) {
+        for (int k = 0; k < 3; k++) {
+            rate->m[i][k] = (b->m[i][k] - a->m[i][k]) / 3600.0;
+            rotation->m[i][k] = a->m[i][k] + f * (b->m[i][k] - a->m[i][k]);
+        }
+    }
+    return BST_OK;
+}
+
+static bst_status create_sgp4(bst_ctx *ctx, bst_od_path *path) {
+    const bst_od_state *s = &path->state;
+    bst_mat3 rotation, rate;
+    BST_TRY(teme_at(ctx, &path->motion, s->time_s, &rotation, &rate));
+    bst_elements elements = {.bstar = path->motion.sgp4->bstar};
+    bst_time_utc(bst_time_add(path->motion.epoch, s->time_s), &elements.epoch_utc_jd1,
+                 &elements.epoch_utc_jd2);
+    bst_vec3 r = bst_mat3_transpose_mul_vec(&rotation, s->position_m);
+    bst_vec3 drift = bst_mat3_mul_vec(&rate, r);
+    bst_vec3 v = bst_mat3_transpose_mul_vec(&rotation, bst_vec3_sub(s->velocity_mps, drift));
+    BST_TRY(bst_sgp4_through(ctx, r, v, &elements));
+    return bst_sgp4_create(ctx, &elements, BST_SGP4_WGS72, BST_SGP4_IMPROVED, &path->sgp4);
+}
+
+static bst_status sgp4_state(bst_ctx *ctx, const bst_od_path *path, double time_s,
+                             bst_od_state *out) {
+    bst_vec3 r, v;
+    bst_mat3 rotation, rate;
+    if (!bst_sgp4_motion(path->sgp4, (time_s - path->state.time_s) / 60.0, &r, &v)) {
+        return bst_fail(ctx, BST_ERR_NUMERIC, "SGP4 has no place %.6g s from the state's time",
+                        time_s - path->state.time_s);
+    }
+    BST_TRY(teme_at(ctx, &path->motion, time_s, &rotation, &rate));
+    out->position_m = bst_mat3_mul_vec(&rotation, r);
+    out->velocity_mps = bst_vec3_add(bst_mat3_mul_vec(&rotation, v), bst_mat3_mul_vec(&rate, r));
+    return BST_OK;
 }
 
 bst_status bst_od_path_create(bst_ctx *ctx, const bst_od_motion *motion, const bst_od_state *state,
@@ -25,8 +90,14 @@ bst_status bst_od_path_create(bst_ctx *ctx, const bst_od_motion *motion, const b
     if (!path) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for an orbit");
     }
-    *path = (bst_od_path){.state = *state, .gm = bst_od_gm(motion)};
-    if (motion->forces) {
+    *path = (bst_od_path){.state = *state, .gm = bst_od_gm(motion), .motion = *motion};
+    if (motion->sgp4) {
+        bst_status status = create_sgp4(ctx, path);
+        if (status != BST_OK) {
+            free(path);
+            return status;
+        }
+    } else if (motion->forces) {
         const bst_trajectory_options options = {.forces = *motion->forces,
                                                 .epoch = motion->epoch,
                                                 .at_s = state->time_s,
@@ -45,6 +116,7 @@ bst_status bst_od_path_create(bst_ctx *ctx, const bst_od_motion *motion, const b
 void bst_od_path_free(bst_od_path *path) {
     if (path) {
         bst_trajectory_free(path->trajectory);
+        bst_sgp4_free(path->sgp4);
         free(path);
     }
 }
@@ -52,6 +124,9 @@ void bst_od_path_free(bst_od_path *path) {
 bst_status bst_od_path_state(bst_ctx *ctx, const bst_od_path *path, double time_s,
                              bst_od_state *out) {
     out->time_s = time_s;
+    if (path->sgp4) {
+        return sgp4_state(ctx, path, time_s, out);
+    }
     if (path->trajectory) {
         return bst_trajectory_state(ctx, path->trajectory, time_s, &out->position_m,
                                     &out->velocity_mps);

@@ -3,13 +3,29 @@
 #ifndef BST_TRACKER_ORBIT_MOTION_H
 #define BST_TRACKER_ORBIT_MOTION_H
 
+#include "sim/astro/sky_clock.h"
 #include "sim/astro/trajectory.h"
 
-/* How a body moves. With `forces` NULL about a point mass in closed form, else as
- * sim/astro/trajectory.h integrates it; `epoch` is what seconds count from (unused without forces).
- */
+/* SGP4's theory in place of forces: an orbit is the one that passes through a state
+ * (bst_sgp4_through), and velocities are the derivatives of places. */
+typedef struct bst_od_sgp4 {
+    bst_sky_clock *clock; /* borrowed; one user at a time */
+    double bstar;         /* 1 / Earth radii */
+    /* of the motion's own: rotations from TEME at full hours after its epoch; zeroed by the caller
+     */
+    struct {
+        bool valid;
+        int64_t hour;
+        bst_mat3 gcrf_from_teme;
+    } hours[64];
+} bst_od_sgp4;
+
+/* How a body moves: by `sgp4` where that is set; else by `forces`, as sim/astro/trajectory.h
+ * integrates them; with both NULL about a point mass in closed form. `epoch` is what seconds count
+ * from (unused for a point mass). */
 typedef struct bst_od_motion {
     const bst_force_model *forces; /* borrowed */
+    bst_od_sgp4 *sgp4;             /* borrowed */
     bst_time epoch;
 } bst_od_motion;
 

@@ -136,7 +136,7 @@ static bst_status grow(bst_ctx *ctx, const bst_od_observation *o, int count, par
     double middle = 0.5 * (time_of(o, p.first) + time_of(o, p.last));
     double whole = time_of(o, count - 1) - time_of(o, 0);
     bst_od_options growing = *options;
-    growing.widen = false;
+    growing.scale_variance = false;
     while (span_s < whole) {
         int n = p.last - p.first + 1;
         span_s *= 2.0;

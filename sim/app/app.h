@@ -24,6 +24,7 @@ int bst_cmd_loop(int argc, char **argv);
 int bst_cmd_schema(int argc, char **argv);
 int bst_cmd_serve(int argc, char **argv);
 int bst_cmd_icd(int argc, char **argv);
+int bst_cmd_link_keys(int argc, char **argv);
 int bst_cmd_stars(int argc, char **argv);
 int bst_cmd_propagate(int argc, char **argv);
 int bst_cmd_calframes(int argc, char **argv);

@@ -5,6 +5,7 @@
 #include "sim/app/app.h"
 #include "sim/app/bench.h"
 #include "sim/app/load.h"
+#include "sim/app/shipped.h"
 #include "sim/astro/sgp4.h"
 #include "sim/engine/simulation.h"
 #include "sim/world/stars.h"
@@ -17,7 +18,12 @@ bst_status bst_bench_sgp4(bst_ctx *ctx, const bst_bench *self, const bst_bench_o
     bst_elements *sets = NULL;
     int count = 0;
     const bst_tle_options tle_options = {.skip_bad_sets = true};
-    const char *file = options->tle_file ? options->tle_file : "scenarios/catalogue_2022-06.tle";
+    char file[4096];
+    if (options->tle_file) {
+        snprintf(file, sizeof file, "%s", options->tle_file);
+    } else {
+        bst_app_shipped_file("scenarios/catalogue_2022-06.tle", file, sizeof file);
+    }
     BST_TRY(bst_tle_load(ctx, file, &tle_options, &sets, &count));
     bst_sgp4 **models = calloc(SATELLITES, sizeof *models);
     bst_status status = models && count > 0
@@ -130,5 +136,7 @@ bst_status bst_bench_loop_obsgen(bst_ctx *ctx, const bst_bench *self,
                                  const bst_bench_options *options, bst_bench_result *out) {
     (void)self;
     const int hour_s = 3600, frames = 1800;
-    return run_in_parts(ctx, options, "scenarios/day_generator.json", 86400.0, hour_s, frames, out);
+    char file[4096];
+    bst_app_shipped_file("scenarios/day_generator.json", file, sizeof file);
+    return run_in_parts(ctx, options, file, 86400.0, hour_s, frames, out);
 }

@@ -56,7 +56,7 @@ static int peer_process(const char *address) {
     bst_ctx ctx = {0};
     bst_link_hello hello = {.name = "bench", .serves = "*", .shared_memory = true};
     bst_link_peer *peer = NULL;
-    bst_status status = bst_link_peer_open(&ctx, address, &hello, &peer);
+    bst_status status = bst_link_peer_open(&ctx, address, NULL, &hello, &peer);
     if (status == BST_OK) {
         status = play(&ctx, peer);
     }

@@ -16,6 +16,7 @@
 #include <unistd.h>
 
 #include "sim/app/bench.h"
+#include "sim/app/shipped.h"
 
 extern char **environ;
 
@@ -57,9 +58,10 @@ static bst_status one_run(bst_ctx *ctx, const bst_bench_options *options, const 
     char duration[16], threads[16];
     snprintf(duration, sizeof duration, "%d", seconds);
     snprintf(threads, sizeof threads, "%d", options->threads);
-    const char *arguments[16] = {"boresight", "run",        "scenarios/neossat_geo_rate_open.json",
-                                 "--out",     folder,       "--overwrite",
-                                 "--quiet",   "--duration", duration};
+    char file[4096];
+    bst_app_shipped_file("scenarios/neossat_geo_rate_open.json", file, sizeof file);
+    const char *arguments[16] = {"boresight",   "run",     file,         "--out", folder,
+                                 "--overwrite", "--quiet", "--duration", duration};
     int n = 9;
     if (of != OVERLAPPED) {
         arguments[n++] = "--serial";
@@ -91,9 +93,7 @@ static bst_status one_run(bst_ctx *ctx, const bst_bench_options *options, const 
     *out = (run_time){1e3 * (bst_bench_wall_s() - start), children_cpu_ms() - cpu};
     return !failed && WIFEXITED(code) && WEXITSTATUS(code) == 0
                ? BST_OK
-               : bst_fail(ctx, BST_ERR_STATE,
-                          "a run of %s did not end well (start the benchmark where scenarios/ is)",
-                          arguments[2]);
+               : bst_fail(ctx, BST_ERR_STATE, "a run of %s did not end well", arguments[2]);
 }
 
 /* Removes a run's folder, which has no folders in it, and the one it is in. */
@@ -158,8 +158,11 @@ bst_status bst_bench_open_loop(bst_ctx *ctx, const bst_bench *self,
     (void)self;
     const char *place = getenv("TMPDIR");
     char folder[PATH_BYTES], run[PATH_BYTES + 8];
-    snprintf(folder, sizeof folder, "%.3000s/boresight-bench-%ld", place ? place : "/tmp",
-             (long)getpid());
+    snprintf(folder, sizeof folder, "%.3000s/boresight-bench-XXXXXX",
+             place && *place ? place : "/tmp");
+    if (!mkdtemp(folder)) {
+        return bst_fail(ctx, BST_ERR_IO, "%s: %s", folder, strerror(errno));
+    }
     snprintf(run, sizeof run, "%s/run", folder);
     bst_status status = measure(ctx, options, run, out);
     clear(folder, run);

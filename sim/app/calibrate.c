@@ -38,6 +38,7 @@ bst_status bst_calibrator_begin(bst_ctx *ctx, bst_calibrator *c, const bst_calib
     theory.crowding = theory.background_share = 0.0;
     const bst_generator_settings settings = {.capacity = CAPACITY,
                                              .false_alarms_per_frame = path->false_alarms_per_frame,
+                                             .jitter_px = path->jitter_px,
                                              .streak_min_px = path->streak_min_px,
                                              .streak_max_px = path->streak_max_px};
     bst_generator_free(c->theory);
@@ -171,18 +172,25 @@ static void add_place(bst_calibrator *c, const bst_truth_item *t, const bst_dete
 }
 
 static bst_status add_trial(bst_ctx *ctx, bst_calibrator *c, const bst_truth_item *t,
-                            double amplitude, double threshold, bool detected) {
+                            double amplitude, double threshold, const bst_generator_filter *filter,
+                            bool detected) {
     if (fabs(amplitude - threshold) > PD_REACH) {
         return BST_OK;
     }
     BST_TRY(grow(ctx, (void **)&c->trials, c->trial_count, &c->trial_room, sizeof *c->trials));
-    c->trials[c->trial_count++] =
-        (calibrate_trial){(float)amplitude, (float)threshold, (float)length_of(t), detected};
+    c->trials[c->trial_count++] = (calibrate_trial){.amplitude = (float)amplitude,
+                                                    .threshold = (float)threshold,
+                                                    .length = (float)length_of(t),
+                                                    .variance = (float)filter->variance,
+                                                    .shot = (float)filter->shot,
+                                                    .detected = detected};
     return BST_OK;
 }
 
+/* above: of the threshold at the pixels' own noise over that for normal noise. */
 static bst_status add_alarms(bst_ctx *ctx, bst_calibrator *c, const bst_truth *truth,
-                             const bst_detections *detections, double reach, double taken) {
+                             const bst_detections *detections, double reach, double taken,
+                             double above) {
     double width = (double)c->path.camera->width_px, height = (double)c->path.camera->height_px;
     int open = 0;
     for (int k = 0; k < GRID * GRID; k++) {
@@ -198,7 +206,7 @@ static bst_status add_alarms(bst_ctx *ctx, bst_calibrator *c, const bst_truth *t
         if (c->pairing.item_of[i] >= 0 || !is_free(truth, d->x_px, d->y_px, reach, -1, 1.0)) {
             continue;
         }
-        double T = detections->threshold_snr;
+        double T = detections->threshold_snr + above;
         if (truth->hits > 0 && d->snr > 1.5 * T) {
             c->hits++;
             c->hits_told += d->label == BST_LABEL_HIT || d->label == BST_LABEL_HOT_PIXEL;
@@ -250,8 +258,9 @@ static bst_status add_star(bst_ctx *ctx, bst_calibrator *c, const bst_truth_item
     /* what its background has too much is missing from the output */
     double missing = (detections->background_e - theory->background_e) /
                      (bst_bound_norm(&c->bound, length_of(t)) * detections->noise_e);
-    BST_TRY(add_trial(ctx, c, t, t->snr * plain / detections->noise_e,
-                      detections->threshold_snr + missing, k >= 0));
+    double threshold = theory->filter.threshold + detections->threshold_snr - theory->threshold_snr;
+    BST_TRY(add_trial(ctx, c, t, t->snr * plain / detections->noise_e, threshold + missing,
+                      &theory->filter, k >= 0));
     if (k < 0) {
         return BST_OK;
     }
@@ -356,5 +365,6 @@ bst_status bst_calibrator_add(bst_ctx *ctx, bst_calibrator *c, const bst_truth *
     }
     double taken = (detections->background_e - theory.background_e) /
                    (bst_bound_norm(&c->bound, 0.0) * detections->noise_e);
-    return add_alarms(ctx, c, truth, detections, reach, taken);
+    double above = theory.filter.threshold - theory.threshold_snr;
+    return add_alarms(ctx, c, truth, detections, reach, taken, above);
 }

@@ -6,6 +6,8 @@
 #include "control/control.h"
 #include "gimbal/mount.h"
 #include "gimbal/two_axis.h"
+#include "sim/app/check_moves.h"
+#include "sim/engine/loop_timing.h"
 #include "sim/world/knowledge.h"
 #include "sim/world/world_config.h"
 
@@ -75,9 +77,13 @@ static void note(found *f, int reason, double from_s, double until_s) {
     f->sum_s[reason] += until_s - from_s;
 }
 
-static void tell(bst_ctx *ctx, const char *name, const found *f, double duration_s, bool rolls) {
+static void tell(bst_ctx *ctx, const char *name, const found *f, double duration_s, bool rolls,
+                 bool cut) {
     for (int reason = BST_REACH_BEHIND_EARTH; reason < BST_REACH_COUNT; reason++) {
         char more[80] = "", until[48] = "the end of the run";
+        if (cut) {
+            snprintf(until, sizeof until, "the end of what was looked at");
+        }
         if (f->count[reason] == 0) {
             continue;
         }
@@ -88,10 +94,10 @@ static void tell(bst_ctx *ctx, const char *name, const found *f, double duration
         if (f->until_s[reason] < duration_s) {
             snprintf(until, sizeof until, "%.1f s", f->until_s[reason]);
         }
-        bst_log(ctx, BST_LOG_WARNING, "%s: the cue is out of reach from %.1f s until %s: %s%s%s",
+        bst_log(ctx, BST_LOG_WARNING, "%s: the cue is out of reach from %.1f s until %s: %s%s%s%s",
                 name, f->from_s[reason], until, bst_reach_reason(reason),
-                rolls && reason == BST_REACH_KEYHOLE ? ", unless the body rolls in time" : "",
-                more);
+                rolls && reason == BST_REACH_KEYHOLE ? ", unless the body rolls in time" : "", more,
+                cut ? " in the first three days" : "");
     }
 }
 
@@ -195,6 +201,50 @@ static const bst_module_config *module_of(const bst_scenario *scenario, const se
     return NULL;
 }
 
+/* Where the boresight is at the start, in the body. */
+static bst_vec3 start_boresight(const bst_mount_status *mount) {
+    bst_quat q = BST_QUAT_IDENTITY;
+    for (int a = 0; a < mount->axes; a++) {
+        const bst_mount_axis *axis = &mount->axis[a];
+        q = bst_quat_mul(q, bst_quat_from_rotvec(bst_vec3_scale(axis->axis_body, axis->angle_rad)));
+    }
+    return bst_quat_rotate(bst_quat_mul(q, mount->q_body_from_cam_at_zero), (bst_vec3){0, 0, 1});
+}
+
+/* Slew, search and scan under the limits of the mount. */
+static bst_status moves(bst_ctx *ctx, const bst_scenario *scenario, seeing *s,
+                        const bst_control_config *config, const char *name) {
+    if (s->mount.axes == 0) {
+        return BST_OK;
+    }
+    bst_loop_timing timing;
+    bst_loop_timing_of(scenario, s->observer, s->sensor, &timing);
+    const bst_camera *camera = bst_knowledge_camera(s->knowledge);
+    double pixel = bst_camera_scale_rad(camera), width_px, height_px;
+    bst_camera_field_px(camera, &width_px, &height_px);
+    bst_cue cue;
+    BST_TRY(bst_knowledge_cue_at(ctx, s->cue, 0.0, &cue));
+    bst_mount_moves request = {.control = config,
+                               .mount = &s->mount,
+                               .period_s = timing.period_s,
+                               .exposure_s = timing.exposure_s,
+                               .width_rad = width_px * pixel,
+                               .height_rad = height_px * pixel,
+                               .cue_sigma_rad = cue.valid ? cue.sigma_rad : 0.0,
+                               .duration_s = scenario->duration_s};
+    bst_knowledge_region(s->knowledge, &request.region);
+    (void)bst_check_moves(ctx, name, &request);
+    bst_reach_look first;
+    BST_TRY(look(s, ctx, 0.0, &first));
+    bool goes = config->strategy == BST_CONTROL_TRACK || config->strategy == BST_CONTROL_RATE;
+    if (goes && first.valid) {
+        bst_vec3 wanted = bst_quat_rotate(first.q_body_from_gcrf, first.direction_gcrf);
+        (void)bst_check_first_slew(ctx, name, &request,
+                                   bst_vec3_angle(start_boresight(&s->mount), wanted));
+    }
+    return BST_OK;
+}
+
 static bst_status check_sensor(bst_ctx *ctx, const bst_scenario *scenario, const bst_world *world,
                                seeing *s, const char *name) {
     const bst_module_config *gimbal = module_of(scenario, s, "gimbal");
@@ -205,25 +255,26 @@ static bst_status check_sensor(bst_ctx *ctx, const bst_scenario *scenario, const
         return BST_OK;
     }
     const bst_control_config *config = control->config;
-    if (config->strategy != BST_CONTROL_TRACK && config->strategy != BST_CONTROL_RATE) {
-        return BST_OK;
-    }
     s->guidance = &config->guidance;
     BST_TRY(bst_knowledge_create(ctx, world, s->observer, s->sensor, &s->knowledge));
-    bst_region region;
-    bst_knowledge_region(s->knowledge, &region);
-    if (region.kind != BST_REGION_NONE) {
-        return BST_OK;
-    }
     BST_TRY(bst_knowledge_view_create(ctx, s->knowledge, &s->cue));
     BST_TRY(bst_view_create(ctx, world, &s->view));
     BST_TRY(set_mount(ctx, gimbal, (double)gimbal->period_ticks / (double)scenario->tick_rate_hz,
                       bst_knowledge_body_attitude(s->knowledge), s));
+    BST_TRY(moves(ctx, scenario, s, config, name));
+    bst_region region;
+    bst_knowledge_region(s->knowledge, &region);
+    if ((config->strategy != BST_CONTROL_TRACK && config->strategy != BST_CONTROL_RATE) ||
+        region.kind != BST_REGION_NONE) {
+        return BST_OK;
+    }
     double pixel = bst_camera_scale_rad(bst_knowledge_camera(s->knowledge));
     found f = {.count = {0}};
-    BST_TRY(spans(ctx, s, scenario->duration_s, config->guidance.loss_tolerance_px * pixel, &f));
-    tell(ctx, name, &f, scenario->duration_s,
-         s->turns && s->law.law != BST_LAW_FREE && config->guidance.body_roll);
+    double looked_s = fmin(scenario->duration_s, BST_CHECK_LOOKED_S);
+    BST_TRY(spans(ctx, s, looked_s, config->guidance.loss_tolerance_px * pixel, &f));
+    tell(ctx, name, &f, looked_s,
+         s->turns && s->law.law != BST_LAW_FREE && config->guidance.body_roll,
+         looked_s < scenario->duration_s);
     return BST_OK;
 }
 

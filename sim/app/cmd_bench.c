@@ -6,6 +6,7 @@
 #include "sim/app/app.h"
 #include "sim/app/bench.h"
 #include "sim/app/load.h"
+#include "sim/app/shipped.h"
 #include "sim/io/manifest.h"
 
 static const bst_bench benches[] = {
@@ -245,11 +246,14 @@ int bst_cmd_bench(int argc, char **argv) {
     bool help = false, markdown = false, curve = false, first_frame = false;
     const char *json = NULL, *report = "docs";
     int64_t threads = 0;
-    bst_bench_options options = {.scenario = "scenarios/neossat_geo_track.json"};
+    char scenario[4096];
+    bst_app_shipped_file("scenarios/neossat_geo_track.json", scenario, sizeof scenario);
+    bst_bench_options options = {.scenario = scenario};
     const bst_option table[] = {
         {.name = "json",
          .kind = BST_OPTION_TEXT,
          .target = &json,
+         .path = BST_PATH_OUTPUT,
          .argument = "FILE",
          .doc = "write the results there, with the machine they were measured on"},
         {.name = "markdown",
@@ -264,18 +268,21 @@ int bst_cmd_bench(int argc, char **argv) {
         {.name = "report",
          .kind = BST_OPTION_TEXT,
          .target = &report,
+         .path = BST_PATH_OUTPUT_FOLDER,
          .argument = "FOLDER",
          .doc = "where --curve writes speed_error.md and its images (default docs)"},
         BST_DEVICE_OPTIONS(options.device, threads),
         {.name = "tle",
          .kind = BST_OPTION_TEXT,
          .target = &options.tle_file,
+         .path = BST_PATH_INPUT,
          .argument = "FILE",
          .doc = "element sets (default of sgp4: scenarios/catalogue_2022-06.tle, of ephemeris_*: "
                 "drawn)"},
         {.name = "scenario",
          .kind = BST_OPTION_TEXT,
          .target = &options.scenario,
+         .path = BST_PATH_INPUT,
          .argument = "FILE",
          .doc = "scenario of loop_full (default scenarios/neossat_geo_track.json)"},
         {.name = "first-frame",

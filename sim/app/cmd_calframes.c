@@ -1,14 +1,20 @@
 /* boresight calframes: bias, dark and flat frames of a scenario's sensors. */
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "scenegen/detector.h"
 #include "scenegen/renderer.h"
 #include "sim/app/app.h"
 #include "sim/app/load.h"
+#include "sim/app/stop_signals.h"
+#include "sim/core/draft.h"
 #include "sim/core/folder.h"
+#include "sim/core/text.h"
 #include "sim/core/version.h"
 #include "sim/io/fits_frames.h"
 
@@ -71,14 +77,28 @@ static bst_status write_frame(bst_ctx *ctx, const job *j, const series *s, int64
     return status;
 }
 
+/* The name under which a file is written, so that it appears whole or not at all. */
+static bst_status draft_of(bst_ctx *ctx, const char *path, char *draft, size_t bytes) {
+    struct stat there;
+    int fd;
+    if (lstat(path, &there) == 0) {
+        return bst_fail(ctx, BST_ERR_IO, "%s: cannot be made: %s", path, strerror(EEXIST));
+    }
+    BST_TRY(bst_draft_make(ctx, path, draft, bytes, &fd));
+    close(fd);
+    unlink(draft); /* bst_fits_create wants a new name */
+    return BST_OK;
+}
+
 static bst_status write_series(bst_ctx *ctx, const job *j, const series *s) {
     if (s->count == 0) {
         return BST_OK;
     }
-    char path[4096], program[64];
+    char path[4096], draft[4160], program[64];
     snprintf(program, sizeof program, "boresight %s", bst_version());
     snprintf(path, sizeof path, "%s/%s_%s_%s.fits", j->request->out, j->observer->name,
              j->sensor->name, s->name);
+    BST_TRY(draft_of(ctx, path, draft, sizeof draft));
     bst_fits_info info = {.observer = j->observer->name,
                           .instrument = j->sensor->name,
                           .object = s->type,
@@ -86,15 +106,26 @@ static bst_status write_series(bst_ctx *ctx, const job *j, const series *s) {
                           .program = program,
                           .camera = &j->sensor->camera};
     bst_fits *fits;
-    BST_TRY(bst_fits_create(ctx, path, BST_FITS_EXTENSIONS, &info, &fits));
-    bst_status status = BST_OK;
+    bst_status status = bst_fits_create(ctx, draft, BST_FITS_EXTENSIONS, &info, &fits);
+    if (status != BST_OK) {
+        unlink(draft);
+        return status;
+    }
     for (int64_t i = 0; status == BST_OK && i < s->count; i++) {
-        status = write_frame(ctx, j, s, i, fits);
+        status = bst_stop_requested() ? bst_fail(ctx, BST_ERR_INTERRUPTED, "interrupted")
+                                      : write_frame(ctx, j, s, i, fits);
     }
     bst_status closed = bst_fits_close(ctx, fits);
     status = status == BST_OK ? closed : status;
-    if (status == BST_OK) {
-        printf("%s: %lld frames of %g s\n", path, (long long)s->count, s->exposure_s);
+    if (status == BST_OK && rename(draft, path) != 0) {
+        status = bst_fail(ctx, BST_ERR_IO, "%s: cannot be made: %s", path, strerror(errno));
+    }
+    if (status != BST_OK) {
+        unlink(draft);
+    } else {
+        printf("%s: %s of %g s\n", path,
+               bst_count_text((char[BST_COUNT_TEXT]){0}, s->count, "frame", "frames"),
+               s->exposure_s);
     }
     return status;
 }
@@ -112,7 +143,10 @@ static bst_status do_sensor(bst_ctx *ctx, job *j) {
     bst_renderer_options options = bst_renderer_default_options();
     options.pattern = bst_detector_pattern_key(&s->camera, j->name);
     options.pool_frames = 2;
-    BST_TRY(bst_renderer_create(ctx, j->device, &s->camera, &options, &j->renderer));
+    /* these frames have no point sources: a PSF from a file or of the aperture is not needed */
+    bst_camera camera = s->camera;
+    camera.optics.psf = BST_PSF_GAUSSIAN;
+    BST_TRY(bst_renderer_create(ctx, j->device, &camera, &options, &j->renderer));
     double exposure_s = r->exposure_s > 0.0 ? r->exposure_s : s->exposure.exposure_s;
     double level_e = r->level_e > 0.0 ? r->level_e : half_level_e(&s->camera);
     const series all[] = {{"bias", "BIAS", r->bias, 0.0, 0.0},
@@ -166,6 +200,7 @@ int bst_cmd_calframes(int argc, char **argv) {
         {.name = "out",
          .kind = BST_OPTION_TEXT,
          .target = &r.out,
+         .path = BST_PATH_OUTPUT_FOLDER,
          .argument = "FOLDER",
          .doc = "where the files go; it is made when missing",
          .required = true},
@@ -235,7 +270,7 @@ int bst_cmd_calframes(int argc, char **argv) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "one scenario file is expected, %d were given", arguments);
         return bst_options_misuse(&ctx, "calframes");
     }
-    if (bst_load_check(&ctx, &r.load) != BST_OK) {
+    if (bst_load_check(&ctx, &r.load, table) != BST_OK) {
         return bst_options_misuse(&ctx, "calframes");
     }
     bst_json *json = NULL;
@@ -244,12 +279,14 @@ int bst_cmd_calframes(int argc, char **argv) {
         fprintf(stderr, "boresight: %s\n", ctx.message);
         return BST_EXIT_FAILED;
     }
-    int code = BST_EXIT_OK;
-    if (do_all(&ctx, &r, &scenario) != BST_OK) {
+    bst_stop_catch_signals();
+    bst_status status = do_all(&ctx, &r, &scenario);
+    if (status != BST_OK) {
         fprintf(stderr, "boresight: %s\n", ctx.message);
-        code = BST_EXIT_FAILED;
     }
     bst_scenario_free(&scenario);
     bst_json_free(json);
-    return code;
+    return status == BST_OK                ? BST_EXIT_OK
+           : status == BST_ERR_INTERRUPTED ? BST_EXIT_INTERRUPTED
+                                           : BST_EXIT_FAILED;
 }

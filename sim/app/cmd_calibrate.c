@@ -73,6 +73,9 @@ static bst_status collect(bst_ctx *ctx, const errand *e, const char *file, int64
                          &path.false_alarms_per_frame);
     }
     if (status == BST_OK) {
+        status = setting(ctx, &scenario, "imgproc", "jitter_px", &path.jitter_px);
+    }
+    if (status == BST_OK) {
         status = setting(ctx, &scenario, "imgproc", "streak_min_px", &path.streak_min_px);
     }
     if (status == BST_OK) {
@@ -187,6 +190,7 @@ int bst_cmd_calibrate_obsgen(int argc, char **argv) {
         {.name = "out",
          .kind = BST_OPTION_TEXT,
          .target = &e.out,
+         .path = BST_PATH_OUTPUT,
          .argument = "FILE",
          .doc = "where the calibration goes"},
         {.name = "seeds",
@@ -203,11 +207,13 @@ int bst_cmd_calibrate_obsgen(int argc, char **argv) {
         {.name = "calibration",
          .kind = BST_OPTION_TEXT,
          .target = &e.calibration,
+         .path = BST_PATH_INPUT,
          .argument = "FILE",
          .doc = "with --check: the generator's calibration (default: as the scenario says)"},
         {.name = "json",
          .kind = BST_OPTION_TEXT,
          .target = &e.json,
+         .path = BST_PATH_OUTPUT,
          .argument = "FILE",
          .doc = "with --check and one scenario: write the figures there"},
         BST_LOAD_OPTIONS(e.load),
@@ -232,7 +238,7 @@ int bst_cmd_calibrate_obsgen(int argc, char **argv) {
     } else if (e.check && e.out) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "--check writes no calibration: leave --out away");
     }
-    if (*ctx.message || bst_load_check(&ctx, &e.load) != BST_OK) {
+    if (*ctx.message || bst_load_check(&ctx, &e.load, table) != BST_OK) {
         return bst_options_misuse(&ctx, "calibrate-obsgen");
     }
     bool equivalent = true;

@@ -4,10 +4,9 @@
 #include <cjson/cJSON.h>
 
 #include "sim/app/app.h"
-#include "sim/app/check_reach.h"
 #include "sim/app/load.h"
-#include "sim/app/loop_model.h"
 #include "sim/app/plugins.h"
+#include "sim/app/scenario_rules.h"
 #include "sim/engine/simulation.h"
 
 static int print_json(cJSON *node) {
@@ -27,10 +26,14 @@ static int print_json(cJSON *node) {
 }
 
 int bst_cmd_check(int argc, char **argv) {
-    bool help = false, quiet = false;
+    bool help = false, quiet = false, list_rules = false;
     bst_load_options load = BST_LOAD_DEFAULTS;
     const bst_option table[] = {
         BST_LOAD_OPTIONS(load),
+        {.name = "rules",
+         .kind = BST_OPTION_FLAG,
+         .target = &list_rules,
+         .doc = "list what check and run warn of, and stop"},
         {.name = "quiet",
          .kind = BST_OPTION_FLAG,
          .target = &quiet,
@@ -49,20 +52,23 @@ int bst_cmd_check(int argc, char **argv) {
             "usage: boresight check SCENARIO.json [options]\n\n"
             "Reads and validates a scenario, opens what it names (orbits, star catalogue), wires "
             "its modules, and\n"
-            "prints the scenario with every default written out. Warns of loops that are unstable "
-            "or "
-            "have thin\n"
-            "margins, and of what of a cue is out of reach. Nothing is written to disk.\n\n"
+            "prints the scenario with every default written out. Warns of what a scenario hardly "
+            "means (--rules\n"
+            "lists it). Nothing is written to disk.\n\n"
             "  boresight check scenarios/neossat_geo_track.json --set "
             "/duration_s=60\n\noptions:\n");
         bst_options_print(stdout, table);
+        return BST_EXIT_OK;
+    }
+    if (list_rules) {
+        bst_rules_print(stdout);
         return BST_EXIT_OK;
     }
     if (arguments != 1) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "one scenario file is expected, %d were given", arguments);
         return bst_options_misuse(&ctx, "check");
     }
-    if (bst_load_check(&ctx, &load) != BST_OK) {
+    if (bst_load_check(&ctx, &load, table) != BST_OK) {
         return bst_options_misuse(&ctx, "check");
     }
     bst_json *json = NULL;
@@ -80,8 +86,8 @@ int bst_cmd_check(int argc, char **argv) {
         code = BST_EXIT_FAILED;
     } else {
         ctx.log_level = BST_LOG_WARNING;
-        bst_loop_warn(&ctx, &scenario);
-        if (bst_check_reach(&ctx, &scenario, sim) != BST_OK) {
+        if (bst_rules_apply(&ctx, &scenario, sim) != BST_OK) {
+            bst_json_name_file(&ctx, json);
             fprintf(stderr, "boresight: %s\n", ctx.message);
             code = BST_EXIT_FAILED;
         } else {
@@ -101,6 +107,7 @@ int bst_cmd_schema(int argc, char **argv) {
         {.name = "plugin",
          .kind = BST_OPTION_LIST,
          .target = &plugins,
+         .path = BST_PATH_INPUT,
          .argument = "FILE",
          .doc = "with the keys of this shared library's modules and stages; may be given several "
                 "times"},

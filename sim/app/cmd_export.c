@@ -73,6 +73,20 @@ static bst_status make_folder(bst_ctx *ctx, const char *given, const bst_run_rea
     return BST_OK;
 }
 
+/* The folder of --satnet: a relative one lies in that of --out, where there is one. */
+static bst_status make_satnet_folder(bst_ctx *ctx, const char *given, const char *base,
+                                     const bst_run_reader *run, char *out, size_t bytes) {
+    char path[4096];
+    if (!base || given[0] == '/') {
+        return make_folder(ctx, given, run, out, bytes);
+    }
+    BST_TRY(make_folder(ctx, base, run, out, bytes));
+    if ((size_t)snprintf(path, sizeof path, "%s/%s", base, given) >= sizeof path) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", given);
+    }
+    return make_folder(ctx, path, run, out, bytes);
+}
+
 static const char help_text[] =
     "usage: boresight export RUN [what] [options]\n"
     "\n"
@@ -136,13 +150,15 @@ int bst_cmd_export(int argc, char **argv) {
         {.name = "satnet",
          .kind = BST_OPTION_TEXT,
          .target = &e.satnet,
+         .path = BST_PATH_OUTPUT_FOLDER,
          .argument = "FOLDER",
          .doc =
              "a FITS file and a JSON annotation per frame, for training networks: ImageFiles/ and "
-             "Annotations/ in FOLDER"},
+             "Annotations/ in FOLDER, which lies in that of --out where that is given"},
         {.name = "out",
          .kind = BST_OPTION_TEXT,
          .target = &out,
+         .path = BST_PATH_OUTPUT_FOLDER,
          .argument = "FOLDER",
          .doc = "where it all goes (default RUN.export)"},
         {.name = "sensor",
@@ -279,7 +295,7 @@ int bst_cmd_export(int argc, char **argv) {
     }
     char satnet[4096];
     if (status == BST_OK && e.satnet) {
-        status = make_folder(&ctx, e.satnet, run, satnet, sizeof satnet);
+        status = make_satnet_folder(&ctx, e.satnet, out, run, satnet, sizeof satnet);
         e.satnet = satnet;
         for (size_t n = strlen(satnet); n > 1 && satnet[n - 1] == '/';) {
             satnet[--n] = '\0';

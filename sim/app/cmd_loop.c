@@ -9,6 +9,7 @@
 #include "sim/app/app.h"
 #include "sim/app/load.h"
 #include "sim/app/loop_model.h"
+#include "sim/io/draft_file.h"
 
 typedef struct loop_request {
     bst_load_options load;
@@ -22,12 +23,18 @@ static bst_status write_json(bst_ctx *ctx, const char *path, const cJSON *root) 
     if (!text) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
     }
-    FILE *file = strcmp(path, "-") == 0 ? stdout : fopen(path, "w");
-    bool good = file && fprintf(file, "%s\n", text) > 0;
-    good = file && (file == stdout ? fflush(file) : fclose(file)) == 0 && good;
+    bool print = strcmp(path, "-") == 0;
+    bst_draft draft = {.stream = stdout};
+    bst_status status = print ? BST_OK : bst_draft_open(ctx, path, &draft);
+    if (status == BST_OK) {
+        bool good = fprintf(draft.stream, "%s\n", text) > 0 && fflush(draft.stream) == 0;
+        status =
+            good ? BST_OK
+                 : bst_fail(ctx, BST_ERR_IO, "%s: cannot be written: %s", path, strerror(errno));
+        status = print ? status : bst_draft_close(ctx, &draft, status);
+    }
     free(text);
-    return good ? BST_OK
-                : bst_fail(ctx, BST_ERR_IO, "%s: cannot be written: %s", path, strerror(errno));
+    return status;
 }
 
 /* Prints one sensor's loops and adds them to the report. */
@@ -85,11 +92,13 @@ int bst_cmd_loop(int argc, char **argv) {
         {.name = "plot",
          .kind = BST_OPTION_TEXT,
          .target = &r.plot,
+         .path = BST_PATH_OUTPUT,
          .argument = "FILE",
          .doc = "Bode, Nyquist, step response and rejection as PNG or SVG (the first sensor's)"},
         {.name = "json",
          .kind = BST_OPTION_TEXT,
          .target = &r.json,
+         .path = BST_PATH_OUTPUT,
          .argument = "FILE",
          .doc = "the figures as JSON; - prints them in place of the table"},
         {.name = "sensor",
@@ -131,7 +140,7 @@ int bst_cmd_loop(int argc, char **argv) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "one scenario file is expected, %d were given", arguments);
         return bst_options_misuse(&ctx, "loop");
     }
-    if (bst_load_check(&ctx, &r.load) != BST_OK) {
+    if (bst_load_check(&ctx, &r.load, table) != BST_OK) {
         return bst_options_misuse(&ctx, "loop");
     }
     bst_json *json = NULL;

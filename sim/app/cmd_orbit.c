@@ -3,14 +3,13 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #include <cjson/cJSON.h>
 
 #include "sim/app/app.h"
 #include "sim/app/json_number.h"
 #include "sim/app/options.h"
-#include "sim/app/tdm_observations.h"
+#include "sim/app/orbit_choice.h"
 #include "sim/app/track_files.h"
 #include "sim/astro/bodies.h"
 #include "sim/astro/sgp4_fit.h"
@@ -29,8 +28,9 @@ static const char help_text[] =
     "the admissible\n"
     "region, two-point searches; chosen by residuals), then batch least squares over the whole arc "
     "with numerically\n"
-    "integrated motion, light time and the observer's states as the spacecraft believes them. "
-    "Truth is not used.\n"
+    "integrated motion or SGP4, light time and the observer's states as the spacecraft believes "
+    "them. True states are\n"
+    "not used; of the scenario only the law that moves the object (--forces).\n"
     "\n"
     "  boresight orbit runs/first\n"
     "  boresight orbit runs/first --oem target.oem --omm target.json --predict 86400\n"
@@ -42,102 +42,16 @@ static const char help_text[] =
     "\n"
     "options:\n";
 
-enum { FORCES_FULL, FORCES_J2, FORCES_TWO_BODY };
+enum { FORCES_SCENARIO, FORCES_FULL, FORCES_J2, FORCES_TWO_BODY, FORCES_SGP4 };
 
 typedef struct request {
-    const char *sensor, *oem, *omm, *tdm, *json, *report;
-    bst_tdm_request angles; /* for a TDM */
-    int64_t track;
+    bst_orbit_request choice;
+    const char *oem, *omm, *tdm, *json, *report;
     double sigma_arcsec, predict_s, step_s, reject_chi2;
     int forces, aberration;
 } request;
 
 enum { ABERRATION_REMOVED, ABERRATION_CONTAINED };
-
-/* The track that is chosen, copied. */
-typedef struct chosen {
-    bst_run_track track;
-    bst_run_observation *items;
-    bst_export_sensor sensor;
-    bst_time epoch; /* of the observations' seconds */
-    int norad;      /* 0: not known */
-} chosen;
-
-static bst_status consider(void *user, bst_ctx *ctx, const bst_run_track *track) {
-    chosen *c = user;
-    const bst_run_track *best = &c->track;
-    if (c->items && (best->target > track->target ||
-                     (best->target == track->target && best->count >= track->count))) {
-        return BST_OK;
-    }
-    size_t bytes = (size_t)track->count * sizeof *c->items;
-    bst_run_observation *items = realloc(c->items, bytes);
-    if (!items) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a track's observations");
-    }
-    memcpy(items, track->items, bytes);
-    c->items = items;
-    c->sensor = *track->sensor;
-    c->track = *track;
-    c->track.items = items;
-    c->track.sensor = &c->sensor;
-    return BST_OK;
-}
-
-static bst_status choose(bst_ctx *ctx, const request *q, bst_run_scene *scene, chosen *out) {
-    bst_export_sensor sensors[BST_EXPORT_SENSORS];
-    int count;
-    const bst_export e = {.run = scene->run, .sensor = q->sensor};
-    BST_TRY(bst_export_sensors(ctx, &e, sensors, &count));
-    for (int i = 0; i < count; i++) {
-        BST_TRY(bst_run_observations(ctx, scene, &sensors[i], q->track, false, consider, out));
-    }
-    if (!out->items && q->track) {
-        return bst_fail(ctx, BST_ERR_NOT_FOUND,
-                        "%s: holds no confirmed track %" PRId64
-                        " with an attitude from stars; its tracks: boresight export RUN --table "
-                        "csv --tables tracks",
-                        bst_run_reader_folder(scene->run), q->track);
-    }
-    return out->items ? BST_OK
-                      : bst_fail(ctx, BST_ERR_NOT_FOUND,
-                                 "%s: holds no confirmed track with an attitude from stars",
-                                 bst_run_reader_folder(scene->run));
-}
-
-static bst_status choose_in_run(bst_ctx *ctx, const request *q, const char *path, chosen *out) {
-    bst_run_reader *run = NULL;
-    bst_run_scene scene;
-    BST_TRY(bst_run_reader_open(ctx, path, &run));
-    bst_status status = bst_run_scene_open(ctx, run, &scene);
-    status = status == BST_OK ? choose(ctx, q, &scene, out) : status;
-    if (status == BST_OK) {
-        char object[96];
-        bst_track_object(&out->track, object, sizeof object);
-        int index = bst_world_find_object(scene.world, object);
-        out->norad = index >= 0 ? bst_world_object(scene.world, index)->norad : 0;
-        out->epoch = scene.scenario.epoch;
-    }
-    bst_run_scene_close(&scene);
-    bst_run_reader_close(run);
-    return status;
-}
-
-static bst_status choose_in_tdm(bst_ctx *ctx, const request *q, const char *path, chosen *out) {
-    bst_tdm_request of = q->angles;
-    of.path = path;
-    of.sigma_rad = q->sigma_arcsec * BST_ARCSEC_RAD;
-    of.aberrated = q->aberration == ABERRATION_CONTAINED;
-    int64_t count;
-    BST_TRY(bst_tdm_observations(ctx, &of, &out->sensor, &out->items, &count));
-    out->epoch = out->items[0].time;
-    out->track = (bst_run_track){.sensor = &out->sensor,
-                                 .target = true,
-                                 .exposure_s = NAN,
-                                 .items = out->items,
-                                 .count = count};
-    return BST_OK;
-}
 
 /* ------------------------------------------------------------------ the orbit */
 
@@ -148,9 +62,14 @@ typedef struct orbit {
     const bst_run_track *track;
     bst_od_observation *items;
     double *chi2;
-    bst_eop *eop;
+    const bst_eop *eop; /* the scenario's, or own_eop */
+    bst_eop *own_eop;
+    bst_sky_clock *clock;
     bst_gravity *gravity;
     bst_force_model forces;
+    bst_od_sgp4 sgp4;
+    bst_object_motion motion; /* in the scenario */
+    const char *model;        /* what it is fitted with, in words */
     bst_od_options options;
     bst_od_solution solution;
     bst_od_report report;
@@ -160,10 +79,38 @@ typedef struct orbit {
     char object[96];
 } orbit;
 
+static bst_time time_at(const orbit *o, double seconds) {
+    return bst_time_add(o->epoch, seconds);
+}
+
 static bst_status open_forces(bst_ctx *ctx, orbit *o) {
+    static const char *const words[] = {
+        "forces of the scenario", "gravity to degree 20, Sun and Moon", "J2", "two bodies", "SGP4"};
+    const bst_object_motion *m = &o->motion;
     int kind = o->request->forces;
+    if (kind == FORCES_SCENARIO && !m->forces) {
+        kind = m->sgp4 ? FORCES_SGP4 : FORCES_FULL;
+    }
+    o->model = words[kind];
     o->options.motion.epoch = o->epoch;
-    BST_TRY(bst_eop_builtin(ctx, &o->eop));
+    if (!o->eop) {
+        BST_TRY(bst_eop_builtin(ctx, &o->own_eop));
+        o->eop = o->own_eop;
+    }
+    bst_eop_warn(
+        ctx, o->eop,
+        time_at(o, o->track->items[o->track->count - 1].od.observer.time_s + o->request->predict_s),
+        "");
+    BST_TRY(bst_sky_clock_create(ctx, o->eop, &o->clock));
+    if (kind == FORCES_SGP4) {
+        o->sgp4 = (bst_od_sgp4){.clock = o->clock, .bstar = m->bstar};
+        o->options.motion.sgp4 = &o->sgp4;
+        return BST_OK;
+    }
+    if (kind == FORCES_SCENARIO) {
+        o->options.motion.forces = m->forces;
+        return BST_OK;
+    }
     if (kind == FORCES_TWO_BODY) {
         return BST_OK;
     }
@@ -191,14 +138,10 @@ static bst_status solve(bst_ctx *ctx, orbit *o) {
         o->items[i] = o->track->items[i].od;
     }
     o->options.reject_chi2 = o->request->reject_chi2;
-    o->options.widen = true;
+    o->options.scale_variance = true;
     BST_TRY(
         bst_od_determine(ctx, o->items, (int)n, &o->options, o->chi2, &o->solution, &o->report));
     return bst_od_path_create(ctx, &o->options.motion, &o->solution.state, &o->path);
-}
-
-static bst_time time_at(const orbit *o, double seconds) {
-    return bst_time_add(o->epoch, seconds);
 }
 
 /* Mean elements through a revolution about the epoch of the solution, or the arc where it is
@@ -206,7 +149,6 @@ static bst_time time_at(const orbit *o, double seconds) {
 static bst_status fit_mean(bst_ctx *ctx, orbit *o) {
     enum { PLACES = 73 };
     bst_sgp4_place places[PLACES];
-    bst_sky_clock *clock;
     bst_sky sky;
     const bst_od_state *s = &o->solution.state;
     double a = bst_kepler_elements_of(BST_EARTH_MU_M3PS2, s->position_m, s->velocity_mps)
@@ -217,7 +159,6 @@ static bst_status fit_mean(bst_ctx *ctx, orbit *o) {
     /* an epoch to the microsecond, as it is written */
     double epoch_s = round(s->time_s * 1e6) * 1e-6;
     bst_vec3 r = {0}, v = {0};
-    BST_TRY(bst_sky_clock_create(ctx, o->eop, &clock));
     bst_status status = BST_OK;
     for (int pass = 0; pass < 2 && status == BST_OK; pass++) { /* away from the epoch, both ways */
         for (int i = 0; i <= PLACES / 2 && status == BST_OK; i++) {
@@ -226,7 +167,7 @@ static bst_status fit_mean(bst_ctx *ctx, orbit *o) {
             bst_od_state there;
             status = bst_od_path_state(ctx, o->path, epoch_s + offset, &there);
             status = status == BST_OK
-                         ? bst_sky_clock_at(ctx, clock, time_at(o, epoch_s + offset), &sky)
+                         ? bst_sky_clock_at(ctx, o->clock, time_at(o, epoch_s + offset), &sky)
                          : status;
             if (status == BST_OK) {
                 const bst_mat3 *m = &sky.frames.gcrf_from_teme;
@@ -239,8 +180,8 @@ static bst_status fit_mean(bst_ctx *ctx, orbit *o) {
             }
         }
     }
-    bst_sky_clock_free(clock);
     BST_TRY(status);
+    o->mean.bstar = o->options.motion.sgp4 ? o->sgp4.bstar : 0.0;
     bst_time_utc(time_at(o, epoch_s), &o->mean.epoch_utc_jd1, &o->mean.epoch_utc_jd2);
     snprintf(o->mean.name, sizeof o->mean.name, "%.31s", o->object);
     BST_TRY(bst_sgp4_fit(ctx, places, PLACES, r, v, &o->mean, &o->mean_rms_m));
@@ -283,7 +224,7 @@ static bst_status write_oem(bst_ctx *ctx, const orbit *o, FILE *stream) {
              "chi2/dof %.4f, covariance multiplied by %.4f",
              s->used, o->track->sensor->observer, o->track->sensor->name,
              o->items[o->track->count - 1].observer.time_s - w.from_s, s->rms_rad / BST_ARCSEC_RAD,
-             s->dof > 0 ? s->chi2 / s->dof : 0.0, s->widened);
+             s->dof > 0 ? s->chi2 / s->dof : 0.0, s->variance_factor);
     bst_oem_covariance covariance = {.epoch = time_at(o, s->state.time_s)};
     memcpy(covariance.matrix, s->covariance, sizeof covariance.matrix);
     const bst_oem_segment segment = {.object_name = o->object,
@@ -343,9 +284,11 @@ static bst_status write_report(bst_ctx *ctx, const orbit *o, FILE *stream) {
     bst_json_add_number(
         node, "arc_s", o->items[o->track->count - 1].observer.time_s - o->items[0].observer.time_s);
     bst_json_add_number(node, "rms_arcsec", s->rms_rad / BST_ARCSEC_RAD);
-    bst_json_add_number(node, "chi2", s->chi2);
+    cJSON_AddStringToObject(node, "motion", o->model);
+    bst_json_add_number(node, "chi2", s->chi2 / s->variance_factor);
+    bst_json_add_number(node, "chi2_stated", s->chi2);
     cJSON_AddNumberToObject(node, "dof", s->dof);
-    bst_json_add_number(node, "covariance_factor", s->widened);
+    bst_json_add_number(node, "covariance_factor", s->variance_factor);
     bst_time_to_utc(time_at(o, s->state.time_s), 9, utc, sizeof utc);
     cJSON_AddStringToObject(node, "epoch_utc", utc);
     bst_json_add_number(node, "epoch_s", s->state.time_s);
@@ -373,7 +316,7 @@ static bst_status write_report(bst_ctx *ctx, const orbit *o, FILE *stream) {
         cJSON *item = cJSON_CreateObject();
         bst_time_to_utc(o->track->items[i].time, 6, utc, sizeof utc);
         cJSON_AddStringToObject(item, "utc", utc);
-        bst_json_add_number(item, "chi2", o->chi2[i]);
+        bst_json_add_number(item, "chi2", o->chi2[i] / s->variance_factor);
         cJSON_AddItemToArray(residuals, item);
     }
     char *text = cJSON_Print(node);
@@ -398,6 +341,9 @@ static bst_status write_file(bst_ctx *ctx, const orbit *o, const char *path,
 
 /* ------------------------------------------------------------------ the command */
 
+/* A variance this many times as stated is no error of a covariance any more. */
+static const double MOST_FACTOR = 4.0;
+
 static void print_orbit(const orbit *o) {
     const bst_od_solution *s = &o->solution;
     const bst_vec3 r = s->state.position_m, v = s->state.velocity_mps;
@@ -415,9 +361,9 @@ static void print_orbit(const orbit *o) {
     printf("  first orbit     %12s\n", bst_od_method_name(o->report.method));
     printf("  residuals       %12.3f arcsec rms, chi2/dof %.3f\n", s->rms_rad / BST_ARCSEC_RAD,
            s->dof > 0 ? s->chi2 / s->dof : 0.0);
-    if (s->widened > 1.0) {
-        printf("  covariance      %12.3f times, for residuals larger than foreseen\n", s->widened);
-    }
+    printf("  covariance      %12.3f times what the measurements state, by their residuals\n",
+           s->variance_factor);
+    printf("  motion          %12s\n", o->model);
     printf("  epoch        %s\n", utc);
     printf("  position, GCRF  %.6f %.6f %.6f km, +- %.3f km\n", r.x * 1e-3, r.y * 1e-3, r.z * 1e-3,
            sqrt(p) * 1e-3);
@@ -426,6 +372,11 @@ static void print_orbit(const orbit *o) {
     printf("  range           %12.3f km, +- %.3f km\n", s->range_m * 1e-3, s->range_sigma_m * 1e-3);
     printf("  a, e, i         %.3f km, %.6f, %.4f deg\n", k.semi_major_axis_m * 1e-3,
            k.eccentricity, k.inclination_rad / BST_DEG_RAD);
+    if (s->variance_factor > MOST_FACTOR) {
+        printf(
+            "  note: residuals are far above the measurements' errors: a manoeuvre, other forces "
+            "or another object's observations; the covariance does not hold\n");
+    }
     if (s->bend > 0.5) {
         printf("  note: the arc is short for its errors, which may be larger than stated\n");
     }
@@ -456,20 +407,24 @@ static bst_status determine(bst_ctx *ctx, const request *q, orbit *o) {
 }
 
 static bst_status orbit_of(bst_ctx *ctx, const request *q, const char *path) {
-    struct stat info;
-    chosen c = {.items = NULL};
+    bst_orbit_request wanted = q->choice;
+    wanted.angles.sigma_rad = q->sigma_arcsec * BST_ARCSEC_RAD;
+    wanted.angles.aberrated = q->aberration == ABERRATION_CONTAINED;
+    bst_orbit_choice c = {.items = NULL};
     orbit o = {.request = q, .track = &c.track};
-    bool file = stat(path, &info) == 0 && S_ISREG(info.st_mode);
-    bst_status status = (file ? choose_in_tdm : choose_in_run)(ctx, q, path, &c);
+    bst_status status = bst_orbit_choose(ctx, &wanted, path, &c);
     o.epoch = c.epoch;
     o.norad = c.norad;
+    o.motion = c.motion;
+    o.eop = c.scene.world ? bst_world_earth_orientation(c.scene.world) : NULL;
     status = status == BST_OK ? determine(ctx, q, &o) : status;
     bst_od_path_free(o.path);
     bst_gravity_free(o.gravity);
-    bst_eop_free(o.eop);
+    bst_sky_clock_free(o.clock);
+    bst_eop_free(o.own_eop);
     free(o.items);
     free(o.chi2);
-    free(c.items);
+    bst_orbit_choice_free(&c);
     return status;
 }
 
@@ -479,29 +434,30 @@ int bst_cmd_orbit(int argc, char **argv) {
     const bst_option options[] = {
         {.name = "track",
          .kind = BST_OPTION_INT,
-         .target = &q.track,
+         .target = &q.choice.track,
          .argument = "ID",
          .doc = "this track (column track_id of the table tracks)",
          .minimum = 1,
          .maximum = 9e15},
         {.name = "sensor",
          .kind = BST_OPTION_TEXT,
-         .target = &q.sensor,
+         .target = &q.choice.sensor,
          .argument = "NAME",
          .doc = "tracks of this sensor only: name or observer/name"},
         {.name = "observer",
          .kind = BST_OPTION_TEXT,
-         .target = &q.angles.observer,
+         .target = &q.choice.angles.observer,
+         .path = BST_PATH_INPUT,
          .argument = "FILE",
          .doc = "TDM: the observer's states, as CCSDS OEM"},
         {.name = "observer-name",
          .kind = BST_OPTION_TEXT,
-         .target = &q.angles.observer_name,
+         .target = &q.choice.angles.observer_name,
          .argument = "NAME",
          .doc = "TDM: its object in that file (default the participant's name, or the only one)"},
         {.name = "object",
          .kind = BST_OPTION_TEXT,
-         .target = &q.angles.object,
+         .target = &q.choice.angles.object,
          .argument = "NAME",
          .doc = "TDM: angles of this participant (default the one with the most)"},
         {.name = "sigma",
@@ -520,9 +476,10 @@ int bst_cmd_orbit(int argc, char **argv) {
         {.name = "forces",
          .kind = BST_OPTION_CHOICE,
          .target = &q.forces,
-         .argument = "full|j2|two_body",
-         .doc = "what moves the object: gravity to degree 20, Sun and Moon (default); oblateness "
-                "alone; a point mass"},
+         .argument = "scenario|full|j2|two_body|sgp4",
+         .doc = "what moves the object: the law of its orbit in the scenario, SGP4 or forces "
+                "(default; TDM: full); gravity to degree 20, Sun and Moon; oblateness alone; a "
+                "point mass; SGP4"},
         {.name = "reject",
          .kind = BST_OPTION_REAL,
          .target = &q.reject_chi2,
@@ -534,6 +491,7 @@ int bst_cmd_orbit(int argc, char **argv) {
         {.name = "oem",
          .kind = BST_OPTION_TEXT,
          .target = &q.oem,
+         .path = BST_PATH_OUTPUT,
          .argument = "FILE",
          .doc = "the orbit with its covariance, as CCSDS OEM in GCRF"},
         {.name = "predict",
@@ -553,21 +511,25 @@ int bst_cmd_orbit(int argc, char **argv) {
         {.name = "omm",
          .kind = BST_OPTION_TEXT,
          .target = &q.omm,
+         .path = BST_PATH_OUTPUT,
          .argument = "FILE",
          .doc = "mean elements for SGP4 fitted to the orbit, as CCSDS OMM in JSON"},
         {.name = "tdm",
          .kind = BST_OPTION_TEXT,
          .target = &q.tdm,
+         .path = BST_PATH_OUTPUT,
          .argument = "FILE",
          .doc = "the track's measured directions, as CCSDS TDM"},
         {.name = "json",
          .kind = BST_OPTION_TEXT,
          .target = &q.json,
+         .path = BST_PATH_OUTPUT,
          .argument = "FILE",
          .doc = "the same as JSON: obTime, ra, declination ... senvelz"},
         {.name = "report",
          .kind = BST_OPTION_TEXT,
          .target = &q.report,
+         .path = BST_PATH_OUTPUT,
          .argument = "FILE",
          .doc = "state, covariance, elements and residuals, as JSON"},
         {.name = "help", .kind = BST_OPTION_FLAG, .target = &help, .doc = "print this"},

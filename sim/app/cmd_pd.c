@@ -49,7 +49,7 @@ static bst_status parse_range(bst_ctx *ctx, const char *name, const char *text, 
     return BST_OK;
 }
 
-static bst_status check(bst_ctx *ctx, pd_request *r) {
+static bst_status check(bst_ctx *ctx, pd_request *r, const bst_option *table) {
     bst_pd_options *o = &r->options;
     if (r->range && r->magnitudes) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "give --snr or --magnitude, not both");
@@ -82,7 +82,7 @@ static bst_status check(bst_ctx *ctx, pd_request *r) {
                         "--stars keeps the scenario's sky, --background sets another: give one");
     }
     o->threads = (int)r->threads;
-    return bst_load_check(ctx, &r->load);
+    return bst_load_check(ctx, &r->load, table);
 }
 
 /* The same detector on frames by themselves, as many trials at the SNRs that it needs. */
@@ -210,11 +210,13 @@ int bst_cmd_pd(int argc, char **argv) {
         {.name = "json",
          .kind = BST_OPTION_TEXT,
          .target = &r.json,
+         .path = BST_PATH_OUTPUT,
          .argument = "FILE",
          .doc = "write the figures there"},
         {.name = "plot",
          .kind = BST_OPTION_TEXT,
          .target = &r.plot,
+         .path = BST_PATH_OUTPUT,
          .argument = "FILE",
          .doc = "draw Pd beside the ideal, and errors over bounds, as a PNG"},
         {.name = "streak",
@@ -330,7 +332,7 @@ int bst_cmd_pd(int argc, char **argv) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "one scenario file is expected, %d were given", arguments);
         return bst_options_misuse(&ctx, "pd");
     }
-    if (check(&ctx, &r) != BST_OK) {
+    if (check(&ctx, &r, table) != BST_OK) {
         return bst_options_misuse(&ctx, "pd");
     }
     bst_stop_catch_signals();

@@ -12,6 +12,7 @@
 #include "sim/astro/sky_clock.h"
 #include "sim/astro/tle.h"
 #include "sim/io/czml_writer.h"
+#include "sim/io/draft_file.h"
 #include "sim/io/oem_writer.h"
 
 static const char HELP[] =
@@ -342,6 +343,7 @@ static bst_status propagate(bst_ctx *ctx, const request *q, bool *complete) {
     int count = 0;
     bst_eop *eop = NULL;
     states s = {.request = q, .stream = stdout};
+    bst_draft draft = {.stream = NULL};
     const bst_elements_options only = {.norad = q->norad};
     const char *name = q->output ? q->output : "standard output";
     bst_status status = bst_elements_load(ctx, q->elements, &only, &sets, &count);
@@ -359,20 +361,22 @@ static bst_status propagate(bst_ctx *ctx, const request *q, bool *complete) {
                                 q->eop_path ? q->eop_path : "--frame gcrf needs --eop FILE here");
             }
         }
+        if (status == BST_OK) {
+            bst_eop_warn(ctx, eop, time_of(q, q->rows - 1), "");
+        }
     }
     if (status == BST_OK && q->output) {
-        s.stream = fopen(q->output, "w");
-        if (!s.stream) {
-            status =
-                bst_fail(ctx, BST_ERR_IO, "%s: cannot be written: %s", q->output, strerror(errno));
-        }
+        status = bst_draft_open(ctx, q->output, &draft);
+        s.stream = draft.stream;
     }
     if (status == BST_OK) {
         status = write_all(ctx, &s, sets, count, complete);
-        bool failed = ferror(s.stream) != 0;
-        failed = (s.stream == stdout ? fflush(s.stream) : fclose(s.stream)) != 0 || failed;
+        bool failed = ferror(s.stream) != 0 || (s.stream == stdout && fflush(stdout) != 0);
         if (failed && (status == BST_OK || status == BST_ERR_IO)) {
             status = bst_fail(ctx, BST_ERR_IO, "%s: writing failed; is the disk full?", name);
+        }
+        if (q->output) {
+            status = bst_draft_close(ctx, &draft, status);
         }
     }
     bst_sky_clock_free(s.clock);
@@ -387,11 +391,13 @@ int bst_cmd_propagate(int argc, char **argv) {
         {.name = "elements",
          .kind = BST_OPTION_TEXT,
          .target = &q.elements,
+         .path = BST_PATH_INPUT,
          .argument = "FILE",
          .doc = "element sets: TLE, or OMM as JSON or CSV (required)"},
         {.name = "tle",
          .kind = BST_OPTION_TEXT,
          .target = &q.elements,
+         .path = BST_PATH_INPUT,
          .argument = "FILE",
          .doc = "the same"},
         {.name = "norad",
@@ -442,17 +448,19 @@ int bst_cmd_propagate(int argc, char **argv) {
         {.name = "eop",
          .kind = BST_OPTION_TEXT,
          .target = &q.eop_path,
+         .path = BST_PATH_INPUT,
          .argument = "FILE",
          .doc = "Earth orientation, an IERS EOP C04 file, for gcrf"},
         {.name = "output",
          .kind = BST_OPTION_TEXT,
          .target = &q.output,
+         .path = BST_PATH_OUTPUT,
          .argument = "FILE",
          .doc = "write there instead of to the standard output"},
         {.name = "help", .kind = BST_OPTION_FLAG, .target = &q.help, .doc = "this text"},
         {.name = NULL}};
     bst_ctx ctx;
-    bst_ctx_init(&ctx, NULL, NULL, BST_LOG_ERROR);
+    bst_ctx_init(&ctx, bst_app_log, NULL, BST_LOG_WARNING);
     if (bst_options_parse(&ctx, table, argc, argv, NULL) != BST_OK) {
         return bst_options_misuse(&ctx, "propagate");
     }

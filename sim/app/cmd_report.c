@@ -86,6 +86,7 @@ int bst_cmd_report(int argc, char **argv) {
         {.name = "out",
          .kind = BST_OPTION_TEXT,
          .target = &out,
+         .path = BST_PATH_OUTPUT_INTO,
          .argument = "FILE",
          .doc = "where the page goes (default report.html in the folder)"},
         {.name = "help", .kind = BST_OPTION_FLAG, .target = &help, .doc = "print this"},

@@ -3,9 +3,9 @@
 
 #include "sim/app/app.h"
 #include "sim/app/load.h"
-#include "sim/app/loop_model.h"
 #include "sim/app/run_link.h"
 #include "sim/app/run_scenario.h"
+#include "sim/app/scenario_rules.h"
 #include "sim/app/stop_signals.h"
 
 static const char help_text[] =
@@ -27,7 +27,7 @@ static const char help_text[] =
 int bst_cmd_run(int argc, char **argv) {
     bool help = false, overwrite = false, quiet = false;
     const char *out = NULL, *replay = NULL;
-    bool serial = false;
+    bool serial = false, force = false;
     bst_simulation_options sim_options = {0};
     int64_t threads = 0;
     bst_load_options load = BST_LOAD_DEFAULTS;
@@ -35,16 +35,22 @@ int bst_cmd_run(int argc, char **argv) {
         {.name = "out",
          .kind = BST_OPTION_TEXT,
          .target = &out,
+         .path = BST_PATH_OUTPUT_FOLDER,
          .argument = "FOLDER",
          .doc = "where the results go (default runs/NAME)"},
         {.name = "overwrite",
          .kind = BST_OPTION_FLAG,
          .target = &overwrite,
          .doc = "replace an earlier run there"},
+        {.name = "force",
+         .kind = BST_OPTION_FLAG,
+         .target = &force,
+         .doc = "start although the frames will take more space than is free"},
         BST_LINK_OPTIONS(load),
         {.name = "replay",
          .kind = BST_OPTION_TEXT,
          .target = &replay,
+         .path = BST_PATH_INPUT,
          .argument = "RUN",
          .doc = "external modules do what they did in the run of this folder, without their peers"},
         BST_LOAD_OPTIONS(load),
@@ -72,11 +78,12 @@ int bst_cmd_run(int argc, char **argv) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "one scenario file is expected, %d were given", arguments);
         return bst_options_misuse(&ctx, "run");
     }
+    ctx.log_level = quiet ? BST_LOG_WARNING : BST_LOG_INFO;
     sim_options.threads = (int)threads;
     sim_options.overlap = !serial;
     sim_options.pace = true;
     sim_options.replay = replay != NULL;
-    if (bst_load_check(&ctx, &load) != BST_OK) {
+    if (bst_load_check(&ctx, &load, table) != BST_OK) {
         return bst_options_misuse(&ctx, "run");
     }
     bst_json *json = NULL;
@@ -90,6 +97,7 @@ int bst_cmd_run(int argc, char **argv) {
     bst_stop_catch_signals();
     const bst_run_request request = {.out = out ? out : default_out,
                                      .overwrite = overwrite,
+                                     .force = force,
                                      .progress = !quiet && isatty(STDERR_FILENO),
                                      .print = true};
     bst_simulation *sim = NULL;
@@ -102,7 +110,12 @@ int bst_cmd_run(int argc, char **argv) {
                         : bst_run_link_open(&ctx, sim); /* before anything is written */
     }
     if (status == BST_OK) {
-        bst_loop_warn(&ctx, &scenario);
+        status = bst_rules_apply(&ctx, &scenario, sim);
+        if (status != BST_OK) {
+            bst_json_name_file(&ctx, json);
+        }
+    }
+    if (status == BST_OK) {
         status = bst_run_scenario(&ctx, &scenario, sim, &request, NULL);
     }
     if (status != BST_OK) {

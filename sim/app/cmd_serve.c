@@ -35,6 +35,7 @@ static int serve(bst_ctx *ctx, const char *file, const bst_load_options *load, c
     int reason = 0;
     bst_status status = bst_link_host_create(ctx, &scenario, part, threads, &host);
     if (status == BST_OK) {
+        bst_link_host_use_keys(host, load->link_keys);
         status =
             bst_link_host_play(ctx, host, address, shared, timeout_s, bst_stop_requested, &reason);
     }
@@ -61,6 +62,12 @@ int bst_cmd_serve(int argc, char **argv) {
          .target = &address,
          .argument = "ADDRESS",
          .doc = "where the run is: tcp://127.0.0.1:PORT or ipc://PATH"},
+        {.name = "link-keys",
+         .kind = BST_OPTION_TEXT,
+         .target = &load.link_keys,
+         .path = BST_PATH_INPUT,
+         .argument = "FILE",
+         .doc = "keys of boresight link-keys, where the run asks for them"},
         {.name = "part",
          .kind = BST_OPTION_TEXT,
          .target = &part,
@@ -103,7 +110,7 @@ int bst_cmd_serve(int argc, char **argv) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "one scenario file, --part and --link are expected");
         return bst_options_misuse(&ctx, "serve");
     }
-    if (bst_load_check(&ctx, &load) != BST_OK) {
+    if (bst_load_check(&ctx, &load, table) != BST_OK) {
         return bst_options_misuse(&ctx, "serve");
     }
     return serve(&ctx, argv[1], &load, part, address, shared, (int)threads, timeout_s);

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include "sim/app/cmd_stars.h"
+#include "sim/app/outputs.h"
 #include "sim/core/folder.h"
 #include "sim/core/wall_clock.h"
 #include "sim/world/star_fetch.h"
@@ -135,6 +136,19 @@ static int import(int argc, char **argv) {
     }
     if (!tarball) {
         return usage_error("import needs the path of a tycho2_2.orig.tar.xz", NULL);
+    }
+    const bst_option table[] = {
+        {.name = "out", .kind = BST_OPTION_TEXT, .target = &out, .path = BST_PATH_OUTPUT},
+        {.name = "subset", .kind = BST_OPTION_TEXT, .target = &subset, .path = BST_PATH_INPUT},
+        {.name = NULL},
+    };
+    const bool given[] = {out != NULL, subset != NULL};
+    char tarball_word[4096];
+    char *const words[] = {tarball_word};
+    bst_ctx outputs = {0};
+    snprintf(tarball_word, sizeof tarball_word, "%s", tarball);
+    if (bst_outputs_check(&outputs, table, given, 1, words) != BST_OK) {
+        return usage_error(outputs.message, NULL);
     }
     if (subset && !out) {
         return usage_error("--subset needs --out: a part must not stand in for the whole", NULL);

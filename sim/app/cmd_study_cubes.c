@@ -15,6 +15,7 @@
 #include "sim/app/study_card.h"
 #include "sim/app/study_labels.h"
 #include "sim/app/study_plugins.h"
+#include "sim/core/draft.h"
 #include "sim/core/folder.h"
 #include "sim/core/rng.h"
 #include "sim/core/version.h"
@@ -135,15 +136,17 @@ static bst_status write_frame(cube *c, const bst_frame_message *m, const bst_tru
     int64_t rate = c->scenario->tick_rate_hz;
     bst_camera camera = *c->camera;
     char utc[48];
-    bst_fits_frame frame = {.id = m->exposure_id,
-                            .start = bst_time_at_tick(c->scenario->epoch, m->start_tick, rate),
-                            .exposure_s = (double)(m->end_tick - m->start_tick) / (double)rate,
-                            .window = m->window,
-                            .binning = m->binning,
-                            .bits = m->bits,
-                            .has_observer = true,
-                            .observer_gcrf_m = truth->observer_gcrf_m,
-                            .observer_gcrf_mps = truth->observer_gcrf_mps};
+    bst_fits_frame frame = {
+        .id = m->exposure_id,
+        .start = bst_time_at_tick(c->scenario->epoch, m->start_tick, rate),
+        .exposure_s = (double)(m->end_tick - m->start_tick) / (double)rate,
+        .window = m->window,
+        .binning = m->binning,
+        .bits = m->bits,
+        .has_observer = true,
+        .observer_gcrf_m = truth->observer_gcrf_m,
+        .observer_gcrf_mps = truth->observer_gcrf_mps,
+        .body_fraction = {truth->earth_fraction, truth->moon_fraction, truth->sun_fraction}};
     const bst_light light = {.velocity_mps = truth->velocity_bary_mps, .sun_m = truth->sun_m};
     if (truth->pixel_scale_arcsec > 0.0 && truth->pixel_scale_arcsec != camera.pixel_scale_arcsec) {
         BST_TRY(bst_camera_at_scale(ctx, c->camera, truth->pixel_scale_arcsec, &camera));
@@ -265,9 +268,12 @@ static bst_status step_through(bst_ctx *ctx, cube *c, bst_simulation *sim, const
     unlink(fits);
     BST_TRY(bst_fits_create(ctx, fits, c->config->compress ? BST_FITS_EXTENSIONS : BST_FITS_CUBE,
                             &info, &c->fits));
-    c->labels.stream = fopen(labels, "w");
+    int fd;
+    BST_TRY(bst_draft_make_at(ctx, labels, &fd));
+    c->labels.stream = fdopen(fd, "w");
     if (!c->labels.stream) {
-        return bst_fail(ctx, BST_ERR_IO, "%s: cannot be made: %s", labels, strerror(errno));
+        close(fd);
+        return bst_fail(ctx, BST_ERR_MEMORY, "%s: out of memory", labels);
     }
     fprintf(c->labels.stream,
             "{\"data\":{\"file\":{\"dirname\":\"ImageFiles\",\"sequence\":%" PRId64

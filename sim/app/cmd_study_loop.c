@@ -122,6 +122,7 @@ enum {
     VISIBLE_FRAMES,
     ACQUIRED,
     TIME_TO_CONFIRM,
+    TIME_TO_ACQUIRE,
     TIME_TO_SETTLE,
     CUSTODY,
     TRACK_FRACTION,
@@ -161,22 +162,24 @@ enum {
                         "Frames with the target lit and not behind the "                          \
                         "Earth.",                                                                 \
                         BST_METRIC_VALUE},                                                        \
-    [ACQUIRED] = {"acquired", "", "The target was in confirmed track at some time.",              \
+    [ACQUIRED] = {"acquired", "", "The track of interest was the target's at some time.",         \
                   BST_METRIC_FLAG},                                                               \
     [TIME_TO_CONFIRM] = {"time_to_confirm_s", "s",                                                \
                          "From the start to the first confirmed track "                           \
                          "of the target.",                                                        \
                          BST_METRIC_VALUE},                                                       \
+    [TIME_TO_ACQUIRE] = {"time_to_acquire_s", "s",                                                \
+                         "From the start until the target's track is the track "                  \
+                         "of interest.",                                                          \
+                         BST_METRIC_VALUE},                                                       \
     [TIME_TO_SETTLE] = {"time_to_settle_s", "s",                                                  \
                         "From the start until the target is held near "                           \
                         "the boresight.",                                                         \
                         BST_METRIC_VALUE},                                                        \
-    [CUSTODY] = {"custody", "", "Share of the visible frames in confirmed track.",                \
-                 BST_METRIC_VALUE},                                                               \
-    [TRACK_FRACTION] = {"track_fraction", "", "The same after the first confirmation.",           \
+    [CUSTODY] = {"custody", "", "Share of the visible frames in track.", BST_METRIC_VALUE},       \
+    [TRACK_FRACTION] = {"track_fraction", "", "The same since the acquisition.",                  \
                         BST_METRIC_VALUE},                                                        \
-    [IN_TRACK_AT_END] = {"in_track_at_end", "", "The last frame was in confirmed track.",         \
-                         BST_METRIC_FLAG},                                                        \
+    [IN_TRACK_AT_END] = {"in_track_at_end", "", "The last frame was in track.", BST_METRIC_FLAG}, \
     [BREAKS] = {"breaks", "", "Times that the track of the visible target was lost.",             \
                 BST_METRIC_VALUE},                                                                \
     [WRONG_TARGET_FRAMES] = {"wrong_target_frames", "", "Frames with another object for target.", \
@@ -186,7 +189,9 @@ enum {
                            "Share of the frames with the visible target "                         \
                            "in the field that have a detection on it.",                           \
                            BST_METRIC_VALUE},                                                     \
-    [POINTING_RMS] = {"pointing_rms_px", "px", "Boresight to true target after settling, RMS.",   \
+    [POINTING_RMS] = {"pointing_rms_px", "px",                                                    \
+                      "Angle from the boresight to the visible target in pixels, mode "           \
+                      "track, from settling on, RMS.",                                            \
                       BST_METRIC_VALUE},                                                          \
     [POINTING_MEDIAN] = {"pointing_median_px", "px", "The same, median.", BST_METRIC_VALUE},      \
     [POINTING_P99] = {"pointing_p99_px", "px", "The same, 99th percentile.", BST_METRIC_VALUE},   \
@@ -235,27 +240,24 @@ static const bst_metric metrics[ALL_METRICS] = {
 static const bst_metric series[METRICS + 1] = {
     METRIC_LIST, [METRICS] = {"sensor", "", "Number of the sensor.", BST_METRIC_KEY}};
 
-static double share(int64_t part, int64_t of) {
-    return of > 0 ? (double)part / (double)of : NAN;
-}
-
 static void fill(const bst_run_sensor_figures *f, double *out) {
     const bst_loop_figures *l = &f->loop;
     const bst_run_metric_figures *m = &f->metrics;
     out[FRAMES] = (double)l->frames;
-    out[VISIBLE_FRAMES] = (double)m->visible_frames;
-    out[ACQUIRED] = isnan(l->time_to_confirm_s) ? 0.0 : 1.0;
+    out[VISIBLE_FRAMES] = (double)l->visible_frames;
+    out[ACQUIRED] = isnan(l->time_to_acquire_s) ? 0.0 : 1.0;
     out[TIME_TO_CONFIRM] = l->time_to_confirm_s;
+    out[TIME_TO_ACQUIRE] = l->time_to_acquire_s;
     out[TIME_TO_SETTLE] = l->time_to_settle_s;
-    out[CUSTODY] = share(m->in_track_frames, m->visible_frames);
+    out[CUSTODY] = l->custody;
     out[TRACK_FRACTION] = l->track_fraction;
-    out[IN_TRACK_AT_END] = m->in_track_at_end ? 1.0 : 0.0;
-    out[BREAKS] = (double)m->breaks;
+    out[IN_TRACK_AT_END] = l->in_track_at_end ? 1.0 : 0.0;
+    out[BREAKS] = (double)l->breaks;
     out[WRONG_TARGET_FRAMES] = (double)l->wrong_target_frames;
     out[DETECTIONS] = (double)m->detections;
-    out[DETECTED_FRACTION] = share(m->detected_frames, m->in_field_frames);
+    out[DETECTED_FRACTION] = m->detected_fraction;
     out[POINTING_RMS] = l->pointing_rms_px;
-    out[POINTING_MEDIAN] = m->pointing_median_px;
+    out[POINTING_MEDIAN] = l->pointing_median_px;
     out[POINTING_P99] = l->pointing_p99_px;
     out[POINTING_BIAS] = l->pointing_bias_px;
     out[TRACK_RMS] = m->track_rms_px;

@@ -15,6 +15,7 @@
 #include "sim/app/progress.h"
 #include "sim/core/fnv.h"
 #include "sim/core/folder.h"
+#include "sim/core/text.h"
 #include "sim/core/version.h"
 #include "sim/io/draft_file.h"
 #include "sim/io/fits_frames.h"
@@ -435,7 +436,8 @@ bst_status bst_export_satnet(bst_ctx *ctx, const bst_export *e) {
         status = e->split ? export_with_parts(ctx, &j) : export_all(ctx, &j);
     }
     if (status == BST_OK) {
-        printf("%s: %" PRId64 " frames with annotations\n", e->satnet, j.written);
+        printf("%s: %s with annotations\n", e->satnet,
+               bst_count_text((char[BST_COUNT_TEXT]){0}, j.written, "frame", "frames"));
     }
     bst_scenario_free(&scenario);
     bst_json_free(json);

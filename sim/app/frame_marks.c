@@ -8,7 +8,7 @@
 
 #include <cjson/cJSON.h>
 
-enum { MAX_MARKS = 4096 };
+#include "sim/eval/loop_figures.h"
 
 /* Rows of a table in the order of their first column. */
 typedef struct cursor {
@@ -31,7 +31,7 @@ static const char *const queries[CURSORS] = {
         "SELECT exposure_id, id, norad, x_centroid_px, y_centroid_px FROM truth"
         " WHERE sensor = ?1 AND kind = 'object' AND in_field = 1",
     [DETECTIONS] =
-        "SELECT exposure_id, label, x_px, y_px, length_px FROM detections"
+        "SELECT exposure_id, label, x_px, y_px, length_px, star_id, flux_e FROM detections"
         " WHERE sensor = ?1",
     [TRACKS] =
         "SELECT exposure_id, track_id, status, target_of_interest, x_px, y_px, snr"
@@ -43,8 +43,10 @@ struct bst_frame_marks {
     const cJSON *objects; /* of the scenario; NULL when there is none */
     char target[80];
     cursor cursors[CURSORS], planes;
-    bst_overlay_mark marks[MAX_MARKS];
-    int count;
+    bst_overlay_mark *marks;
+    int count, room;
+    bool has_target; /* its true place on the frame */
+    double target_x_px, target_y_px;
     char mode[32], caption[200];
     double x0, y0, binning; /* of the frame */
 };
@@ -80,6 +82,7 @@ void bst_frame_marks_free(bst_frame_marks *m) {
             bst_rows_close(m->cursors[i].rows);
         }
         bst_rows_close(m->planes.rows);
+        free(m->marks);
         free(m);
     }
 }
@@ -115,20 +118,27 @@ bst_status bst_frame_marks_exposure(bst_ctx *ctx, bst_frame_marks *m, int64_t fi
     return BST_OK;
 }
 
-/* A new mark at a place of the sensor; NULL when there is no room. */
-static bst_overlay_mark *add(bst_frame_marks *m, bst_overlay_kind kind, double x_px, double y_px) {
-    if (m->count == MAX_MARKS) {
-        return NULL;
+/* A new mark at a place of the sensor. */
+static bst_status add(bst_ctx *ctx, bst_frame_marks *m, bst_overlay_kind kind, double importance,
+                      double x_px, double y_px) {
+    if (m->count == m->room) {
+        int room = 2 * m->room + 256;
+        bst_overlay_mark *more = realloc(m->marks, (size_t)room * sizeof *more);
+        if (!more) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the marks");
+        }
+        m->marks = more;
+        m->room = room;
     }
-    bst_overlay_mark *mark = &m->marks[m->count++];
     double middle = 0.5 * (m->binning - 1.0); /* of a binned pixel, from its first pixel's centre */
-    *mark = (bst_overlay_mark){.kind = kind,
-                               .x_px = (x_px - m->x0 - middle) / m->binning,
-                               .y_px = (y_px - m->y0 - middle) / m->binning};
-    return mark;
+    m->marks[m->count++] = (bst_overlay_mark){.kind = kind,
+                                              .x_px = (x_px - m->x0 - middle) / m->binning,
+                                              .y_px = (y_px - m->y0 - middle) / m->binning,
+                                              .importance = importance};
+    return BST_OK;
 }
 
-static void add_object(bst_frame_marks *m, const bst_rows *rows) {
+static bst_status add_object(bst_ctx *ctx, bst_frame_marks *m, const bst_rows *rows) {
     const cJSON *object =
         m->objects ? cJSON_GetArrayItem(m->objects, (int)bst_rows_int(rows, 1)) : NULL;
     const cJSON *name = cJSON_GetObjectItemCaseSensitive(object, "name");
@@ -139,21 +149,50 @@ static void add_object(bst_frame_marks *m, const bst_rows *rows) {
         snprintf(text, sizeof text, "NORAD %" PRId64, bst_rows_int(rows, 2));
     }
     bool target = m->target[0] && strcmp(text, m->target) == 0;
-    bst_overlay_mark *mark = add(m, target ? BST_OVERLAY_TARGET : BST_OVERLAY_OBJECT,
-                                 bst_rows_real(rows, 3), bst_rows_real(rows, 4));
-    if (mark) {
-        memcpy(mark->label, text, sizeof mark->label);
+    BST_TRY(add(ctx, m, target ? BST_OVERLAY_TARGET : BST_OVERLAY_OBJECT,
+                target ? BST_OVERLAY_FIRST : BST_OVERLAY_OF_OBJECT, bst_rows_real(rows, 3),
+                bst_rows_real(rows, 4)));
+    bst_overlay_mark *mark = &m->marks[m->count - 1];
+    memcpy(mark->label, text, sizeof mark->label);
+    if (target) {
+        m->has_target = true;
+        m->target_x_px = mark->x_px;
+        m->target_y_px = mark->y_px;
     }
+    return BST_OK;
 }
 
-static void add_track(bst_frame_marks *m, const bst_rows *rows) {
-    bst_overlay_mark *mark =
-        add(m, BST_OVERLAY_TRACK, bst_rows_real(rows, 4), bst_rows_real(rows, 5));
-    if (mark) {
-        snprintf(mark->label, sizeof mark->label, "%s%" PRId64 " SNR %.1f",
-                 bst_rows_int(rows, 3) ? "target: track " : "track ", bst_rows_int(rows, 1),
-                 bst_rows_real(rows, 6));
+static bst_status add_detection(bst_ctx *ctx, bst_frame_marks *m, const bst_rows *rows) {
+    bool star = strcmp(bst_rows_text(rows, 1), "star") == 0;
+    double flux_e = bst_rows_real(rows, 6);
+    BST_TRY(add(ctx, m,
+                !star                        ? BST_OVERLAY_DETECTION
+                : bst_rows_int(rows, 5) != 0 ? BST_OVERLAY_STAR
+                                             : BST_OVERLAY_REST,
+                isfinite(flux_e) ? flux_e : 0.0, bst_rows_real(rows, 2), bst_rows_real(rows, 3)));
+    bst_overlay_mark *mark = &m->marks[m->count - 1];
+    mark->radius_px = 0.5 * bst_rows_real(rows, 4) / m->binning + 2.0;
+    if (m->has_target && hypot(mark->x_px - m->target_x_px, mark->y_px - m->target_y_px) <=
+                             BST_RIGHT_TARGET_PX / m->binning) {
+        mark->importance = BST_OVERLAY_OF_TARGET;
     }
+    return BST_OK;
+}
+
+static bst_status add_track(bst_ctx *ctx, bst_frame_marks *m, const bst_rows *rows) {
+    BST_TRY(add(ctx, m, BST_OVERLAY_TRACK,
+                bst_rows_int(rows, 3) ? BST_OVERLAY_FIRST : BST_OVERLAY_OF_OBJECT,
+                bst_rows_real(rows, 4), bst_rows_real(rows, 5)));
+    bst_overlay_mark *mark = &m->marks[m->count - 1];
+    snprintf(mark->label, sizeof mark->label, "%s%" PRId64 " SNR %.1f",
+             bst_rows_int(rows, 3) ? "target: track " : "track ", bst_rows_int(rows, 1),
+             bst_rows_real(rows, 6));
+    return BST_OK;
+}
+
+static int by_importance(const void *a, const void *b) {
+    const bst_overlay_mark *p = a, *q = b;
+    return (p->importance < q->importance) - (p->importance > q->importance);
 }
 
 static bst_status get_frame(bst_ctx *ctx, bst_frame_marks *m, int64_t id) {
@@ -188,6 +227,7 @@ static bst_status get_frame(bst_ctx *ctx, bst_frame_marks *m, int64_t id) {
 bst_status bst_frame_marks_get(bst_ctx *ctx, bst_frame_marks *m, int64_t id, bst_overlay *out) {
     bool found;
     m->count = 0;
+    m->has_target = false;
     BST_TRY(get_frame(ctx, m, id));
     for (int i = EXPOSURES; i <= TRACKS; i++) {
         for (;;) {
@@ -197,21 +237,16 @@ bst_status bst_frame_marks_get(bst_ctx *ctx, bst_frame_marks *m, int64_t id, bst
             }
             const bst_rows *rows = m->cursors[i].rows;
             if (i == EXPOSURES) {
-                add(m, BST_OVERLAY_BORESIGHT, bst_rows_real(rows, 1), bst_rows_real(rows, 2));
-            } else if (i == OBJECTS) {
-                add_object(m, rows);
-            } else if (i == TRACKS) {
-                add_track(m, rows);
+                BST_TRY(add(ctx, m, BST_OVERLAY_BORESIGHT, BST_OVERLAY_FIRST,
+                            bst_rows_real(rows, 1), bst_rows_real(rows, 2)));
             } else {
-                bool star = strcmp(bst_rows_text(rows, 1), "star") == 0;
-                bst_overlay_mark *mark = add(m, star ? BST_OVERLAY_STAR : BST_OVERLAY_DETECTION,
-                                             bst_rows_real(rows, 2), bst_rows_real(rows, 3));
-                if (mark) {
-                    mark->radius_px = 0.5 * bst_rows_real(rows, 4) / m->binning + 2.0;
-                }
+                BST_TRY((i == OBJECTS      ? add_object
+                         : i == DETECTIONS ? add_detection
+                                           : add_track)(ctx, m, rows));
             }
         }
     }
+    qsort(m->marks, (size_t)m->count, sizeof *m->marks, by_importance);
     *out = (bst_overlay){.marks = m->marks, .count = m->count, .caption = m->caption};
     return BST_OK;
 }

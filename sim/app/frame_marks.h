@@ -19,8 +19,8 @@ void bst_frame_marks_free(bst_frame_marks *marks);
 bst_status bst_frame_marks_exposure(bst_ctx *ctx, bst_frame_marks *marks, int64_t fits_index,
                                     int64_t *exposure_id) BST_MUST_CHECK;
 
-/* Marks and caption of an exposure, in pixels of its frame; valid until the next call. Ask in
- * ascending order. */
+/* Marks by falling importance, and caption, of an exposure, in pixels of its frame; valid until the
+ * next call. Ask in ascending order. */
 bst_status bst_frame_marks_get(bst_ctx *ctx, bst_frame_marks *marks, int64_t exposure_id,
                                bst_overlay *out) BST_MUST_CHECK;
 

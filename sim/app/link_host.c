@@ -40,6 +40,7 @@ struct bst_link_host {
     size_t output_room[MOST_PORTS];
     int output_count;
     int64_t step; /* the latest, -1: none */
+    const char *keys_file;
 };
 
 static bst_status map_frame(void *owner, bst_ctx *ctx, const uint16_t **pixels) {
@@ -409,13 +410,17 @@ static bst_status play(bst_ctx *ctx, bst_link_host *host, bst_link_peer *peer, d
     }
 }
 
+void bst_link_host_use_keys(bst_link_host *host, const char *keys_file) {
+    host->keys_file = keys_file;
+}
+
 bst_status bst_link_host_play(bst_ctx *ctx, bst_link_host *host, const char *address,
                               bool shared_memory, double timeout_s, bool (*stop)(void),
                               int *reason) {
     bst_link_hello hello = {.name = "boresight serve", .shared_memory = shared_memory};
     bst_link_peer *peer = NULL;
     snprintf(hello.serves, sizeof hello.serves, "%s", host->instance);
-    BST_TRY(bst_link_peer_open(ctx, address, &hello, &peer));
+    BST_TRY(bst_link_peer_open(ctx, address, host->keys_file, &hello, &peer));
     bst_status status = play(ctx, host, peer, timeout_s, stop, reason);
     if (status != BST_OK) {
         bst_ctx leaving = {0};

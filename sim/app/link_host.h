@@ -14,6 +14,9 @@ bst_status bst_link_host_create(bst_ctx *ctx, const bst_scenario *scenario, cons
 void bst_link_host_free(bst_link_host *host);
 const char *bst_link_host_instance(const bst_link_host *host);
 
+/* Keys of a link that asks for them; the path is lent for as long as the host is. */
+void bst_link_host_use_keys(bst_link_host *host, const char *keys_file);
+
 /* Plays it for the simulation at `address` until that ends, *reason as in bst_link_end. A step that
  * comes a second time, after a break of the connection, is answered as the first time. BST_ERR_IO:
  * nothing has come for timeout_s; BST_ERR_INTERRUPTED: `stop` said so. */

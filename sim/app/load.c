@@ -1,11 +1,15 @@
+#define _XOPEN_SOURCE 700 /* realpath */
 #include "sim/app/load.h"
 
+#include <errno.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <cjson/cJSON.h>
 
 #include "sim/app/app.h"
+#include "sim/app/outputs.h"
 #include "sim/app/plugins.h"
 #include "sim/link/external.h"
 
@@ -82,6 +86,16 @@ static bst_status apply(bst_ctx *ctx, const bst_load_options *options, bst_json 
         snprintf(text, sizeof text, "/link/address=\"%.100s\"", options->link);
         BST_TRY(bst_json_set(ctx, json, text));
     }
+    if (options->link_keys) {
+        char *full = realpath(options->link_keys, NULL);
+        if (!full) {
+            return bst_fail(ctx, BST_ERR_NOT_FOUND, "--link-keys %s: %s", options->link_keys,
+                            strerror(errno));
+        }
+        cJSON *value = cJSON_CreateString(full);
+        free(full);
+        BST_TRY(bst_json_assign(ctx, json, "/link/keys_file", value));
+    }
     if (options->pacing) {
         snprintf(text, sizeof text, "/pacing/mode=\"%.40s\"", options->pacing);
         BST_TRY(bst_json_set(ctx, json, text));
@@ -101,11 +115,42 @@ static bst_status apply(bst_ctx *ctx, const bst_load_options *options, bst_json 
     return BST_OK;
 }
 
-bst_status bst_load_check(bst_ctx *ctx, const bst_load_options *options) {
+bst_status bst_load_check(bst_ctx *ctx, bst_load_options *options, const bst_option *table) {
+    options->table = table;
     for (int i = 0; i < options->set.count; i++) {
         BST_TRY(bst_json_check_assignment(ctx, options->set.items[i]));
     }
     return BST_OK;
+}
+
+static bst_status spare_named(bst_ctx *ctx, const bst_option *table, const cJSON *node) {
+    for (const cJSON *item = node->child; item; item = item->next) {
+        if (cJSON_IsString(item) && item->valuestring[0] == '/') {
+            BST_TRY(bst_outputs_spare(ctx, table, item->valuestring, "the scenario names it"));
+        }
+        BST_TRY(spare_named(ctx, table, item));
+    }
+    return BST_OK;
+}
+
+/* No output is a file that the scenario extends or names; the paths of files that exist are full
+ * ones in the resolved scenario. */
+static bst_status spare_inputs(bst_ctx *ctx, const bst_option *table, const bst_json *json,
+                               const bst_scenario *scenario) {
+    if (!table) {
+        return BST_OK;
+    }
+    const char *file;
+    for (int i = 0; (file = bst_json_origin_file(json, i)) != NULL; i++) {
+        BST_TRY(bst_outputs_spare(ctx, table, file, "the scenario extends it"));
+    }
+    cJSON *echo = bst_scenario_echo(scenario);
+    if (!echo) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the scenario");
+    }
+    bst_status status = spare_named(ctx, table, echo);
+    cJSON_Delete(echo);
+    return status;
 }
 
 bst_status bst_load_scenario(bst_ctx *ctx, const char *path, const bst_load_options *options,
@@ -114,6 +159,9 @@ bst_status bst_load_scenario(bst_ctx *ctx, const char *path, const bst_load_opti
     bst_status status = apply(ctx, options, *json);
     if (status == BST_OK) {
         status = bst_plugins_scenario_read(ctx, *json, out);
+        if (status == BST_OK) {
+            status = spare_inputs(ctx, options->table, *json, out);
+        }
         if (status != BST_OK) {
             bst_scenario_free(out);
         }

@@ -9,11 +9,13 @@
 typedef struct bst_load_options {
     bst_option_list set;
     const char *seed;
-    double duration_s;    /* < 0: as the scenario says */
-    int64_t run;          /* < 0: as the scenario says */
-    const char *link;     /* address of the link; NULL: as the scenario says */
-    const char *external; /* modules that become "external", with commas between; NULL: none */
-    const char *pacing;   /* mode; NULL: as the scenario says */
+    double duration_s;       /* < 0: as the scenario says */
+    int64_t run;             /* < 0: as the scenario says */
+    const char *link;        /* address of the link; NULL: as the scenario says */
+    const char *link_keys;   /* file; NULL: as the scenario says */
+    const char *external;    /* modules that become "external", with commas between; NULL: none */
+    const char *pacing;      /* mode; NULL: as the scenario says */
+    const bst_option *table; /* of the command, for its outputs; bst_load_check sets it */
 } bst_load_options;
 
 /* The same of those runs that can have modules outside. */
@@ -23,6 +25,12 @@ typedef struct bst_load_options {
      .target = &(load).link,                                                                     \
      .argument = "ADDRESS",                                                                      \
      .doc = "where peers connect that play modules: tcp://127.0.0.1:PORT or ipc://PATH"},        \
+        {.name = "link-keys",                                                                    \
+         .kind = BST_OPTION_TEXT,                                                                \
+         .target = &(load).link_keys,                                                            \
+         .path = BST_PATH_INPUT,                                                                 \
+         .argument = "FILE",                                                                     \
+         .doc = "keys of boresight link-keys that peers must have"},                             \
         {.name = "external",                                                                     \
          .kind = BST_OPTION_TEXT,                                                                \
          .target = &(load).external,                                                             \
@@ -43,8 +51,8 @@ typedef struct bst_load_options {
         {.name = "seed",                                                                       \
          .kind = BST_OPTION_TEXT,                                                              \
          .target = &(load).seed,                                                               \
-         .argument = "HEX",                                                                    \
-         .doc = "master seed, for example 0x2A"},                                              \
+         .argument = "SEED",                                                                   \
+         .doc = "master seed, for example 42 or 0x2A"},                                        \
         {.name = "duration",                                                                   \
          .kind = BST_OPTION_REAL,                                                              \
          .target = &(load).duration_s,                                                         \
@@ -75,11 +83,14 @@ typedef struct bst_load_options {
     }
 
 /* Whether the overrides have the form /path=value; BST_ERR_ARGUMENT when one has not: the command
- * was called wrongly. */
-bst_status bst_load_check(bst_ctx *ctx, const bst_load_options *options) BST_MUST_CHECK;
+ * was called wrongly. `table`: the command's options, kept in *options: bst_load_scenario looks at
+ * its outputs. */
+bst_status bst_load_check(bst_ctx *ctx, bst_load_options *options,
+                          const bst_option *table) BST_MUST_CHECK;
 
 /* Loads `path`, applies the options, reads the scenario. *json is kept for as long as the scenario;
- * free both. */
+ * free both. BST_ERR_ARGUMENT also when an output of the command is a file that the scenario is
+ * made of or names. */
 bst_status bst_load_scenario(bst_ctx *ctx, const char *path, const bst_load_options *options,
                              bst_json **json, bst_scenario *out) BST_MUST_CHECK;
 

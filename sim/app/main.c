@@ -1,8 +1,12 @@
+#include <signal.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "sim/app/app.h"
 #include "sim/app/plugins.h"
+#include "sim/app/stack.h"
+#include "sim/core/text.h"
 #include "sim/core/version.h"
 
 typedef struct command {
@@ -21,6 +25,7 @@ static const command commands[] = {
     {"loop", bst_cmd_loop, "margins and predicted pointing of a scenario's control loops"},
     {"schema", bst_cmd_schema, "print the JSON Schema of scenarios"},
     {"serve", bst_cmd_serve, "play a module of a scenario over the link"},
+    {"link-keys", bst_cmd_link_keys, "make keys for a link that takes only peers that have them"},
     {"icd", bst_cmd_icd, "print the interface control document of the link"},
     {"stars", bst_cmd_stars, "get, import or describe the star catalogue"},
     {"propagate", bst_cmd_propagate, "positions and velocities from two-line element sets"},
@@ -46,7 +51,8 @@ static void usage(FILE *stream) {
     fprintf(stream,
             "Boresight simulates a space-based telescope that finds and tracks satellites.\n"
             "\n"
-            "usage: boresight [--plugin FILE]... COMMAND [options]\n"
+            "usage: boresight [--plugin FILE]... [--no-plugins] COMMAND [options]\n"
+            "       boresight help [COMMAND]\n"
             "\n"
             "commands:\n");
     for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {
@@ -62,44 +68,114 @@ static void usage(FILE *stream) {
         "  boresight --plugin ./my_detector.so pd scenarios/detection.json \\\n"
         "    --set /observers/0/sensors/0/modules/imgproc='{\"type\": \"mine\"}'\n"
         "\n"
-        "\"boresight COMMAND --help\" tells more. Exit codes: 0 done, 1 failed, 2 called wrongly,\n"
+        "--no-plugins refuses scenarios that name shared libraries: for those that others wrote.\n"
+        "\n"
+        "\"boresight help COMMAND\" says more. Exit codes: 0 done, 1 failed, 2 called wrongly,\n"
         "130 interrupted.\n");
 }
 
+static const command *find_command(const char *name) {
+    for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {
+        if (strcmp(name, commands[i].name) == 0) {
+            return &commands[i];
+        }
+    }
+    return NULL;
+}
+
+static int unknown_command(const char *name) {
+    const char *nearest = NULL;
+    size_t best = SIZE_MAX;
+    for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {
+        if (bst_text_is_nearer(name, commands[i].name, &best)) {
+            nearest = commands[i].name;
+        }
+    }
+    fprintf(stderr, "boresight: there is no command \"%.80s\"%s%s%s; see boresight --help\n", name,
+            nearest ? "; did you mean \"" : "", nearest ? nearest : "", nearest ? "\"?" : "");
+    return BST_EXIT_USAGE;
+}
+
+/* "boresight help COMMAND" is "boresight COMMAND --help". */
+static int help(int argc, char **argv) {
+    if (argc < 3 || strcmp(argv[2], "help") == 0) {
+        usage(stdout);
+        return BST_EXIT_OK;
+    }
+    const command *found = find_command(argv[2]);
+    if (!found) {
+        return unknown_command(argv[2]);
+    }
+    if (argc > 3) {
+        fprintf(stderr, "boresight: help takes one command (found also \"%.80s\")\n", argv[3]);
+        return BST_EXIT_USAGE;
+    }
+    char name[32], option[] = "--help";
+    snprintf(name, sizeof name, "%s", found->name);
+    char *words[] = {name, option, NULL};
+    return bst_app_run_with_stack(found->run, 2, words);
+}
+
+/* Takes the options before the command: argv[*first] is the command then. */
+static int before_command(int argc, char **argv, int *first) {
+    for (; *first < argc && strncmp(argv[*first], "--", 2) == 0; ++*first) {
+        bst_ctx ctx = {0};
+        const char *word = argv[*first];
+        bst_status status = BST_OK;
+        if (strcmp(word, "--no-plugins") == 0) {
+            status = bst_plugins_refuse(&ctx);
+        } else if (strcmp(word, "--plugin") != 0) {
+            bool plugin = bst_text_distance(word, "--plugin") <= 2;
+            fprintf(stderr, "boresight: unknown option %.80s%s; see boresight --help\n", word,
+                    plugin                                         ? "; did you mean --plugin?"
+                    : bst_text_distance(word, "--no-plugins") <= 2 ? "; did you mean --no-plugins?"
+                                                                   : "");
+            return BST_EXIT_USAGE;
+        } else if (*first + 2 >= argc) {
+            break;
+        } else {
+            status = bst_plugins_add(&ctx, argv[++*first]);
+        }
+        if (status != BST_OK) {
+            fprintf(stderr, "boresight: %s\n", ctx.message);
+            return BST_EXIT_USAGE;
+        }
+    }
+    if (*first < argc && strncmp(argv[*first], "--", 2) != 0) {
+        return BST_EXIT_OK;
+    }
+    if (*first < argc) {
+        fprintf(stderr,
+                "boresight: --plugin takes the path of a shared library, and a command "
+                "after it; see boresight --help\n");
+    } else {
+        usage(stderr);
+    }
+    return BST_EXIT_USAGE;
+}
+
 int main(int argc, char **argv) {
+    signal(SIGXFSZ, SIG_IGN); /* a limit on the size of files is an error of a write */
     if (argc < 2) {
         usage(stderr);
         return BST_EXIT_USAGE;
     }
-    if (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0 ||
-        strcmp(argv[1], "help") == 0) {
+    if (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0) {
         usage(stdout);
         return BST_EXIT_OK;
+    }
+    if (strcmp(argv[1], "help") == 0) {
+        return help(argc, argv);
     }
     if (strcmp(argv[1], "--version") == 0) {
         printf("boresight %s (%s)\n", bst_version(), bst_git_revision());
         return BST_EXIT_OK;
     }
-    while (strcmp(argv[1], "--plugin") == 0) {
-        bst_ctx ctx = {0};
-        if (argc < 4) {
-            fprintf(stderr,
-                    "boresight: --plugin takes the path of a shared library, and a command "
-                    "after it; see boresight --help\n");
-            return BST_EXIT_USAGE;
-        }
-        if (bst_plugins_add(&ctx, argv[2]) != BST_OK) {
-            fprintf(stderr, "boresight: %s\n", ctx.message);
-            return BST_EXIT_USAGE;
-        }
-        argc -= 2;
-        argv += 2;
+    int first = 1, code = before_command(argc, argv, &first);
+    if (code != BST_EXIT_OK) {
+        return code;
     }
-    for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {
-        if (strcmp(argv[1], commands[i].name) == 0) {
-            return commands[i].run(argc - 1, argv + 1);
-        }
-    }
-    fprintf(stderr, "boresight: there is no command \"%s\"; see boresight --help\n", argv[1]);
-    return BST_EXIT_USAGE;
+    const command *found = find_command(argv[first]);
+    return found ? bst_app_run_with_stack(found->run, argc - first, argv + first)
+                 : unknown_command(argv[first]);
 }

@@ -4,7 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/app/outputs.h"
 #include "sim/core/text.h"
+
+enum { MOST_OPTIONS = 96 };
 
 static const bst_option *find(const bst_option *table, const char *name, size_t length) {
     for (const bst_option *o = table; o->name; o++) {
@@ -127,21 +130,32 @@ static bst_status read_option(bst_ctx *ctx, const bst_option *table, int argc, c
     return store(ctx, o, value);
 }
 
-static bool is_given(const bst_option *const *given, int count, const bst_option *o) {
-    for (int i = 0; i < count; i++) {
-        if (given[i] == o) {
-            return true;
+/* An option that names a file or folder without saying whether it is written is refused whatever is
+ * given, so that no table can forget it. */
+static bst_status check_table(bst_ctx *ctx, const bst_option *table) {
+    static const char *const names[] = {"FILE", "FOLDER", "RUN", "PATH"};
+    for (const bst_option *o = table; o->name; o++) {
+        bool text = o->kind == BST_OPTION_TEXT || o->kind == BST_OPTION_LIST;
+        for (size_t i = 0; text && i < sizeof names / sizeof *names; i++) {
+            if (strcmp(o->argument, names[i]) == 0 && o->path == BST_PATH_NONE) {
+                return bst_fail(ctx, BST_ERR_STATE,
+                                "--%s: the program's table does not say whether %s is read or "
+                                "written; please report this",
+                                o->name, o->argument);
+            }
+        }
+        if (o - table == MOST_OPTIONS) {
+            return bst_fail(ctx, BST_ERR_STATE, "more than %d options in a table", MOST_OPTIONS);
         }
     }
-    return false;
+    return BST_OK;
 }
 
 bst_status bst_options_parse(bst_ctx *ctx, const bst_option *table, int argc, char **argv,
                              int *arguments) {
-    enum { MOST_REQUIRED = 16 };
-    const bst_option *given[MOST_REQUIRED];
-    int given_count = 0;
+    bool given[MOST_OPTIONS] = {false};
     int kept = 0;
+    BST_TRY(check_table(ctx, table));
     bool options_end = false;
     for (int i = 1; i < argc; i++) {
         char *word = argv[i];
@@ -153,9 +167,7 @@ bst_status bst_options_parse(bst_ctx *ctx, const bst_option *table, int argc, ch
             if (strcmp(o->name, "help") == 0) {
                 return BST_OK;
             }
-            if (o->required && given_count < MOST_REQUIRED && !is_given(given, given_count, o)) {
-                given[given_count++] = o;
-            }
+            given[o - table] = true;
         } else if (!arguments) {
             return bst_fail(ctx, BST_ERR_ARGUMENT,
                             "\"%.80s\" is not expected here: every value follows its option", word);
@@ -164,7 +176,7 @@ bst_status bst_options_parse(bst_ctx *ctx, const bst_option *table, int argc, ch
         }
     }
     for (const bst_option *o = table; o->name; o++) {
-        if (o->required && !is_given(given, given_count, o)) {
+        if (o->required && !given[o - table]) {
             return bst_fail(ctx, BST_ERR_ARGUMENT, "--%s is missing: add --%s %s", o->name, o->name,
                             o->argument);
         }
@@ -172,7 +184,7 @@ bst_status bst_options_parse(bst_ctx *ctx, const bst_option *table, int argc, ch
     if (arguments) {
         *arguments = kept;
     }
-    return BST_OK;
+    return bst_outputs_check(ctx, table, given, kept, argv + 1);
 }
 
 void bst_options_print(FILE *stream, const bst_option *table) {

@@ -17,6 +17,16 @@ typedef enum bst_option_kind {
     BST_OPTION_LIST    /* bst_option_list: every value given, in order */
 } bst_option_kind;
 
+/* What the value of an option names. Every option whose argument is FILE, FOLDER or RUN says so:
+ * outputs are checked (sim/app/outputs.h) before the command begins. */
+typedef enum bst_option_path {
+    BST_PATH_NONE,
+    BST_PATH_INPUT,        /* a file or folder that is read */
+    BST_PATH_OUTPUT,       /* a file that is written */
+    BST_PATH_OUTPUT_INTO,  /* the same, or a folder that the file goes into */
+    BST_PATH_OUTPUT_FOLDER /* a folder that is written into, made when missing */
+} bst_option_path;
+
 enum { BST_OPTION_LIST_MAX = 256 };
 
 typedef struct bst_option_list {
@@ -33,13 +43,15 @@ typedef struct bst_option {
     const char *doc;      /* what it does, and the default where there is one */
     bool required;
     double minimum, maximum; /* INT, REAL */
+    bst_option_path path;    /* TEXT, LIST */
 } bst_option;
 
 /* Reads argv[1] .. argv[argc - 1] into the table's targets. Forms: --name value, --name=value,
  * --flag; "--" ends the options; of an option given twice the last value holds, lists excepted.
  * What is no option is moved, in order, to argv[1] .. argv[*arguments]. With arguments NULL such a
- * word is an error. "-h" stands for --help, and after --help nothing is checked any more. Errors:
- * BST_ERR_ARGUMENT with a message that says what to do; an unknown option suggests the nearest. */
+ * word is an error. "-h" stands for --help, and after --help nothing is checked any more. What
+ * outputs name is checked by bst_outputs_check. Errors: BST_ERR_ARGUMENT with a message that says
+ * what to do; an unknown option suggests the nearest. */
 bst_status bst_options_parse(bst_ctx *ctx, const bst_option *table, int argc, char **argv,
                              int *arguments) BST_MUST_CHECK;
 

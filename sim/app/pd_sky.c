@@ -129,7 +129,7 @@ bst_status bst_pd_sky_stars(bst_ctx *ctx, bst_pd_sky *sky, const bst_los_track *
     memset(out->first, 0, ((size_t)cells + 1) * sizeof *out->first);
     for (int i = 0; i < count; i++) {
         bst_truth_item item;
-        bst_field_truth_item(sky->field, track, &stars[i], window, &sky->header, &item);
+        bst_field_truth_item(sky->field, track, &stars[i], window, 1, &sky->header, &item);
         if (!(item.snr >= BST_PD_STAR_SNR) || !isfinite(item.x_centroid_px)) {
             continue;
         }

@@ -28,6 +28,17 @@ bst_status bst_plugins_add(bst_ctx *ctx, const char *path) {
                   : BST_OK;
 }
 
+bst_status bst_plugins_refuse(bst_ctx *ctx) {
+    return setenv(BST_NO_PLUGINS_VARIABLE, "1", 1) == 0
+               ? BST_OK
+               : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for --no-plugins");
+}
+
+static bst_plugin_policy policy_of_environment(void) {
+    const char *refused = getenv(BST_NO_PLUGINS_VARIABLE);
+    return refused && *refused ? BST_PLUGINS_REFUSE : BST_PLUGINS_LOAD;
+}
+
 static bst_status append(bst_ctx *ctx, const char *path, const bst_module_desc *module,
                          bst_registry *registry) {
     for (int i = 0; i < registry->count; i++) {
@@ -118,7 +129,7 @@ static bst_status read_with(bst_ctx *ctx, const bst_json *json, bst_plugin_polic
 }
 
 bst_status bst_plugins_scenario_read(bst_ctx *ctx, const bst_json *json, bst_scenario *out) {
-    return read_with(ctx, json, BST_PLUGINS_LOAD, out);
+    return read_with(ctx, json, policy_of_environment(), out);
 }
 
 bst_status bst_plugins_recorded_read(bst_ctx *ctx, const bst_json *json, bst_scenario *out) {
@@ -145,6 +156,7 @@ bst_status bst_plugins_of_scenario(bst_ctx *ctx, const char *path, bst_registry 
     bst_json *json;
     bst_scenario scenario = {.format = 0};
     BST_TRY(bst_json_load_extended(ctx, path, &json));
+    registry->policy = policy_of_environment();
     bst_status status = bst_scenario_read(ctx, json, registry, &scenario);
     for (int i = 0; i < scenario.plugin_count && status == BST_OK; i++) {
         bool known = false;

@@ -9,6 +9,11 @@
  * to it, so that child processes have the same. */
 #define BST_PLUGINS_VARIABLE "BORESIGHT_PLUGINS"
 
+/* Environment variable: when set, scenarios that name plug-ins are refused; those of the command
+ * line are loaded. `boresight --no-plugins` sets it, so that child processes do the same. */
+#define BST_NO_PLUGINS_VARIABLE "BORESIGHT_NO_PLUGINS"
+bst_status bst_plugins_refuse(bst_ctx *ctx) BST_MUST_CHECK;
+
 /* Adds a library to the variable's list. BST_ERR_ARGUMENT for a path with ':' in it. */
 bst_status bst_plugins_add(bst_ctx *ctx, const char *path) BST_MUST_CHECK;
 

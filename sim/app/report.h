@@ -6,6 +6,7 @@
 
 #include "sim/app/run_observations.h"
 #include "sim/core/messages.h"
+#include "sim/eval/loop_figures.h"
 #include "sim/io/chart.h"
 #include "sim/io/html.h"
 
@@ -59,12 +60,13 @@ void bst_warnings_write(FILE *out, const bst_warnings *warnings);
 
 /* ---- report_data.c: what one sensor recorded, frame by frame ---- */
 
-/* NAN: not known. Errors on the focal plane are the true target's place from the boresight. */
+/* NAN: not known. Errors are bst_pointing_error_px's. */
 typedef struct bst_report_frame {
     int64_t exposure_id;
-    double mid_s;
+    double mid_s, end_s;
+    double tracked_s; /* when its tracks were published */
     double boresight_x_px, boresight_y_px;
-    double error_x_px, error_y_px;
+    double error_px, error_x_px, error_y_px;
     double snr;               /* true one of the target, in the field and shining */
     double track_snr;         /* of the detection that the track of interest got */
     double detections, stars; /* kept, and of these identified as stars */
@@ -80,11 +82,15 @@ typedef struct bst_report_frame {
     bool known;                         /* the target's true direction is */
     bool visible, occulted, in_field, dark; /* of the target; dark: no sunlight at all */
     bool attitude;                          /* stars gave an attitude */
-    bool in_track;                          /* as in bst_loop_frame */
+    bool in_track, acquired, settled;       /* as in bst_loop_frame */
+    bool task_begins;                       /* it is the first of another target */
     bool updated; /* the track of interest got a detection of this frame */
     bool dropped;
-    int mode; /* bst_mode, -1: not known */
+    int mode; /* bst_mode at the end of the exposure, -1: not known */
 } bst_report_frame;
+
+/* The frame as the loop's figures take it. */
+bst_loop_frame bst_report_loop_frame(const bst_report_frame *frame);
 
 typedef struct bst_report_mode {
     double from_s;
@@ -102,7 +108,13 @@ typedef struct bst_report_sensor {
     size_t count;
     bst_report_mode *modes; /* changes of mode */
     size_t mode_count;
-    double settle_s;   /* the loop has settled by then; NAN: never */
+    /* of the run's summary; of a run without one (it was killed) by the same rules from `frames`,
+     * but for the time to confirm and wrong_target_frames */
+    bst_loop_figures loop;
+    double real_time_factor; /* NAN: not known */
+    int64_t bad_pixels;      /* that image processing had learned at the end */
+    int64_t track_frames;    /* track errors of the summary; 0: none */
+    double track_rms_px, track_median_px, track_p95_px, track_max_px;
     bool has_truth;    /* the target's true place is known in some frame */
     bool has_tracks;   /* there is a tracker, and its work was recorded */
     size_t task_count; /* targets that it was given in turn */
@@ -110,12 +122,18 @@ typedef struct bst_report_sensor {
 } bst_report_sensor;
 
 /* Reads it. `scene` is the run's world; NULL when it cannot be made again: what was recorded must
- * do then. `settle_s`: time_to_settle_s of its summary. Tables that are missing leave their
- * columns NAN. */
+ * do then. `summary`: the sensor's in the manifest (cJSON), NULL: none. Tables that are missing
+ * leave their columns NAN. */
 bst_status bst_report_read(bst_ctx *ctx, const bst_run_reader *run, bst_run_scene *scene,
-                           const bst_export_sensor *sensor, double settle_s,
+                           const bst_export_sensor *sensor, const struct cJSON *summary,
                            bst_report_sensor *out) BST_MUST_CHECK;
 void bst_report_sensor_free(bst_report_sensor *sensor);
+
+/* ---- report_figures.c: the figures of a sensor's loop ---- */
+
+/* Marks the frames that are acquired and settled, and fills the sensor's figures: those of
+ * `summary` (NULL: none), the others by the rules of sim/eval/loop_figures.h from the frames. */
+void bst_report_judge(bst_report_sensor *sensor, const struct cJSON *summary);
 
 /* ---- the parts ---- */
 

@@ -30,8 +30,10 @@ typedef struct reading {
     bst_report_sensor *out;
 } reading;
 
-static const bst_report_frame unknown = {.boresight_x_px = NAN,
+static const bst_report_frame unknown = {.tracked_s = NAN,
+                                         .boresight_x_px = NAN,
                                          .boresight_y_px = NAN,
+                                         .error_px = NAN,
                                          .error_x_px = NAN,
                                          .error_y_px = NAN,
                                          .snr = NAN,
@@ -115,7 +117,7 @@ static bst_report_frame *add_frame(reading *r, int64_t id, double mid_s) {
     bst_report_frame *f = &s->frames[s->count++];
     *f = unknown;
     f->exposure_id = id;
-    f->mid_s = mid_s;
+    f->mid_s = f->end_s = mid_s;
     return f;
 }
 
@@ -160,11 +162,6 @@ static bst_status look(bst_ctx *ctx, reading *r, bst_report_frame *f, bst_quat q
     }
     BST_TRY(status);
     const bst_camera *camera = bst_world_camera(r->scene->world, r->observer, r->camera_index);
-    bst_camera scaled;
-    if (pixel_scale_arcsec > 0.0 && pixel_scale_arcsec != camera->pixel_scale_arcsec) {
-        BST_TRY(bst_camera_at_scale(ctx, camera, pixel_scale_arcsec, &scaled));
-        camera = &scaled;
-    }
     f->known = true;
     f->occulted = sight.occulted;
     f->dark = sight.sunlit_fraction <= 0.0;
@@ -172,17 +169,15 @@ static bst_status look(bst_ctx *ctx, reading *r, bst_report_frame *f, bst_quat q
     f->v_mag = isfinite(sight.v_mag) ? sight.v_mag : NAN;
     f->range_m = sight.range_m;
     f->phase_rad = sight.phase_rad;
-    double ra, dec, x, y;
+    double ra, dec;
     bst_vec3_to_radec(sight.geometric, &ra, &dec);
     f->target_ra_deg = ra / BST_DEG_RAD;
     f->target_dec_deg = dec / BST_DEG_RAD;
     bst_vec3_to_radec(sight.apparent, &ra, &dec);
     f->apparent_ra_deg = ra / BST_DEG_RAD;
     f->apparent_dec_deg = dec / BST_DEG_RAD;
-    if (bst_camera_project(camera, bst_quat_rotate(q_cam_from_gcrf, sight.apparent), &x, &y)) {
-        f->error_x_px = x - f->boresight_x_px;
-        f->error_y_px = y - f->boresight_y_px;
-    }
+    f->error_px = bst_pointing_error_px(camera, pixel_scale_arcsec, q_cam_from_gcrf, sight.apparent,
+                                        &f->error_x_px, &f->error_y_px);
     return BST_OK;
 }
 
@@ -190,7 +185,8 @@ static const char exposures_sql[] =
     "SELECT exposure_id, mid_s, dropped, q_cam_from_gcrf_mid_x, q_cam_from_gcrf_mid_y,"
     " q_cam_from_gcrf_mid_z, q_cam_from_gcrf_mid_w, boresight_x_px, boresight_y_px,"
     " boresight_ra_deg, boresight_dec_deg, observer_gcrf_x_m, observer_gcrf_y_m,"
-    " observer_gcrf_z_m, sun_x_m, sun_y_m, sun_z_m, pixel_scale_arcsec"
+    " observer_gcrf_z_m, sun_x_m, sun_y_m, sun_z_m, pixel_scale_arcsec,"
+    " CAST(end_tick AS REAL) / (SELECT tick_rate_hz FROM run)"
     " FROM exposures WHERE sensor = ?1";
 
 static bst_status take_exposure(bst_ctx *ctx, reading *r, const bst_rows *rows) {
@@ -199,6 +195,7 @@ static bst_status take_exposure(bst_ctx *ctx, reading *r, const bst_rows *rows) 
         return BST_OK;
     }
     f->dropped = bst_rows_int(rows, 2) == 1;
+    f->end_s = bst_rows_real(rows, 18);
     bst_quat q = {bst_rows_real(rows, 3), bst_rows_real(rows, 4), bst_rows_real(rows, 5),
                   bst_rows_real(rows, 6)};
     f->boresight_x_px = bst_rows_real(rows, 7);
@@ -280,10 +277,12 @@ static bst_status take_truth(bst_ctx *ctx, reading *r, const bst_rows *rows) {
     if (f->known) {
         return BST_OK;
     }
-    /* no world: the recorded place, relative to the boresight */
+    /* no world: the recorded place, relative to the boresight; in the field it differs from the
+     * angle by the lens' distortion alone */
     f->known = true;
     f->error_x_px = bst_rows_real(rows, 1) - f->boresight_x_px;
     f->error_y_px = bst_rows_real(rows, 2) - f->boresight_y_px;
+    f->error_px = hypot(f->error_x_px, f->error_y_px);
     f->occulted = bst_rows_int(rows, 5) == 1;
     f->dark = bst_rows_real(rows, 6) <= 0.0;
     f->v_mag = bst_rows_real(rows, 7);
@@ -361,10 +360,21 @@ static bst_status take_mode(bst_ctx *ctx, reading *r, const bst_rows *rows) {
 static void spread_modes(bst_report_sensor *s) {
     size_t k = 0;
     for (size_t i = 0; i < s->count && s->mode_count > 0; i++) {
-        while (k + 1 < s->mode_count && s->modes[k + 1].from_s <= s->frames[i].mid_s) {
+        while (k + 1 < s->mode_count && s->modes[k + 1].from_s <= s->frames[i].end_s) {
             k++;
         }
-        s->frames[i].mode = s->modes[k].from_s <= s->frames[i].mid_s ? s->modes[k].mode : -1;
+        s->frames[i].mode = s->modes[k].from_s <= s->frames[i].end_s ? s->modes[k].mode : -1;
+    }
+}
+
+/* Marks the first frame after each task. */
+static void spread_tasks(const reading *r) {
+    bst_report_sensor *s = r->out;
+    size_t k = 0;
+    for (size_t i = 0; i < s->count; i++) {
+        for (; k < r->task_count && r->tasks[k].from_s <= s->frames[i].end_s; k++) {
+            s->frames[i].task_begins = true;
+        }
     }
 }
 
@@ -405,6 +415,7 @@ static bst_status read_all(bst_ctx *ctx, reading *r) {
     BST_TRY(each_row(ctx, r, "SELECT time_s, mode FROM control WHERE sensor = ?1", 0, take_mode,
                      &missing));
     spread_modes(s);
+    spread_tasks(r);
     for (size_t i = 0; i < s->count; i++) {
         s->has_truth = s->has_truth || s->frames[i].known;
     }
@@ -412,14 +423,14 @@ static bst_status read_all(bst_ctx *ctx, reading *r) {
 }
 
 bst_status bst_report_read(bst_ctx *ctx, const bst_run_reader *run, bst_run_scene *scene,
-                           const bst_export_sensor *sensor, double settle_s,
+                           const bst_export_sensor *sensor, const cJSON *summary,
                            bst_report_sensor *out) {
-    *out = (bst_report_sensor){
-        .sensor = *sensor, .every = 1, .settle_s = settle_s, .pixel_scale_arcsec = NAN};
+    *out = (bst_report_sensor){.sensor = *sensor, .every = 1, .pixel_scale_arcsec = NAN};
     snprintf(out->name, sizeof out->name, "%s/%s", sensor->observer, sensor->name);
     reading r = {.run = run, .scene = scene, .object = -1, .out = out};
     bst_ctx unheard = {0};
     if (!bst_run_reader_has_tables(run) || sensor->index < 0) {
+        bst_report_judge(out, summary);
         return BST_OK;
     }
     if (scene &&
@@ -433,6 +444,7 @@ bst_status bst_report_read(bst_ctx *ctx, const bst_run_reader *run, bst_run_scen
     bst_status status = read_all(ctx, &r);
     out->task_count = r.task_count;
     free(r.tasks);
+    bst_report_judge(out, summary);
     if (status != BST_OK) {
         bst_report_sensor_free(out);
     }

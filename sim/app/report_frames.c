@@ -5,6 +5,7 @@
 
 #include "sim/app/frame_marks.h"
 #include "sim/app/report.h"
+#include "sim/core/text.h"
 #include "sim/io/fits_reader.h"
 #include "sim/io/frame_picture.h"
 
@@ -18,6 +19,7 @@ static const struct {
     [BST_OVERLAY_TARGET] = {"#ff5c5c", "target (truth)"},
     [BST_OVERLAY_OBJECT] = {"#96a0b0", "object (truth)"},
     [BST_OVERLAY_STAR] = {"#6ebe78", "identified star"},
+    [BST_OVERLAY_REST] = {"#54868c", "at rest among stars"},
     [BST_OVERLAY_DETECTION] = {"#ffd64f", "detection"},
     [BST_OVERLAY_TRACK] = {"#5cdcff", "track"},
     [BST_OVERLAY_BORESIGHT] = {"#ec80ff", "boresight"},
@@ -69,6 +71,7 @@ static void put_mark(FILE *out, bst_overlay_kind kind, double x, double y, doubl
                     -2.0 * r);
             break;
         case BST_OVERLAY_STAR:
+        case BST_OVERLAY_REST:
         case BST_OVERLAY_DETECTION:
             fprintf(out, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"%.1f\"", x, y, fmax(r, 3.5 * size));
             break;
@@ -84,37 +87,55 @@ static void put_mark(FILE *out, bst_overlay_kind kind, double x, double y, doubl
             break;
     }
     fprintf(out, " fill=\"none\" stroke=\"%s\" stroke-width=\"%s\"/>", kinds[kind].colour,
-            kind == BST_OVERLAY_STAR ? ".7" : "1.2");
+            kind == BST_OVERLAY_STAR || kind == BST_OVERLAY_REST ? ".7" : "1.2");
 }
 
-static void put_marks(FILE *out, const bst_overlay *overlay, const part *p) {
+static bool is_detection(const bst_overlay_mark *m) {
+    return m->kind == BST_OVERLAY_STAR || m->kind == BST_OVERLAY_REST ||
+           m->kind == BST_OVERLAY_DETECTION;
+}
+
+/* Where a mark lies in a part; false: not there, or at a place that is not a number. */
+static bool find_mark(const bst_overlay_mark *m, const part *p, double *x, double *y) {
+    *x = (m->x_px - p->column + 0.5) * p->scale;
+    *y = (m->y_px - p->row + 0.5) * p->scale;
+    return *x > -20.0 && *y > -20.0 && *x < p->width + 20.0 && *y < p->height + 20.0;
+}
+
+static void put_label(FILE *out, const bst_overlay_mark *m, const part *p, double x, double y) {
+    /* beside the mark, or where that would leave the frame on its other side */
+    bool left = x > p->width - 110.0;
+    bool track = m->kind == BST_OVERLAY_TRACK;
+    fprintf(out, "<text class=\"m\" x=\"%.1f\" y=\"%.1f\" text-anchor=\"%s\" style=\"fill:%s\">",
+            left ? x - 14.0 : x + 14.0, track ? y - 5.0 : y + 11.0, left ? "end" : "start",
+            kinds[m->kind].colour);
+    bst_html_text(out, m->label);
+    fputs("</text>", out);
+}
+
+/* Draws the most important MOST_MARKS of a part's marks of detections and as many of the others,
+ * the first of them on top. *detections and *drawn count those of detections, in the part and
+ * drawn. */
+static void put_marks(FILE *out, const bst_overlay *overlay, const part *p, int *detections,
+                      int *drawn) {
+    double x, y;
+    int chosen[2 * MOST_MARKS], count = 0, others = 0;
+    *detections = 0;
+    for (int i = 0; i < overlay->count; i++) {
+        if (find_mark(&overlay->marks[i], p, &x, &y) &&
+            (is_detection(&overlay->marks[i]) ? ++*detections : ++others) <= MOST_MARKS) {
+            chosen[count++] = i;
+        }
+    }
+    *drawn = *detections < MOST_MARKS ? *detections : MOST_MARKS;
     fprintf(out, "<svg x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\">", p->x, p->y, p->width,
             p->height);
-    int drawn = 0;
-    /* stars first: what matters lies on top */
-    for (int pass = 0; pass < 2; pass++) {
-        for (int i = 0; i < overlay->count && drawn < MOST_MARKS; i++) {
-            const bst_overlay_mark *m = &overlay->marks[i];
-            double x = (m->x_px - p->column + 0.5) * p->scale;
-            double y = (m->y_px - p->row + 0.5) * p->scale;
-            bool inside = x > -20.0 && y > -20.0 && x < p->width + 20.0 && y < p->height + 20.0;
-            if ((m->kind == BST_OVERLAY_STAR) != (pass == 0) || !inside) {
-                continue; /* a place that is not a number is not inside */
-            }
-            put_mark(out, m->kind, x, y, m->radius_px * p->scale, p->marks);
-            drawn++;
-            if (p->labels && m->label[0] && m->kind != BST_OVERLAY_STAR) {
-                /* beside the mark, or where that would leave the frame on its other side */
-                bool left = x > p->width - 110.0;
-                bool track = m->kind == BST_OVERLAY_TRACK;
-                fprintf(
-                    out,
-                    "<text class=\"m\" x=\"%.1f\" y=\"%.1f\" text-anchor=\"%s\" style=\"fill:%s\">",
-                    left ? x - 14.0 : x + 14.0, track ? y - 5.0 : y + 11.0, left ? "end" : "start",
-                    kinds[m->kind].colour);
-                bst_html_text(out, m->label);
-                fputs("</text>", out);
-            }
+    while (count-- > 0) {
+        const bst_overlay_mark *m = &overlay->marks[chosen[count]];
+        find_mark(m, p, &x, &y);
+        put_mark(out, m->kind, x, y, m->radius_px * p->scale, p->marks);
+        if (p->labels && m->label[0]) {
+            put_label(out, m, p, x, y);
         }
     }
     fputs("</svg>\n", out);
@@ -146,11 +167,12 @@ static void put_facts(FILE *out, const bst_report_frame *f, bool tracked, double
     if (!f) {
         return;
     }
-    double error_px = hypot(f->error_x_px, f->error_y_px);
-    if (error_px < 1e-3) {
+    char number[32];
+    if (f->error_px < 1e-3) {
         snprintf(lines[0], sizeof lines[0], "on the boresight");
-    } else if (isfinite(error_px)) {
-        snprintf(lines[0], sizeof lines[0], "%.3g px from the boresight", error_px);
+    } else if (isfinite(f->error_px)) {
+        snprintf(lines[0], sizeof lines[0], "%s px from the boresight",
+                 bst_page_number(number, f->error_px, 3));
     }
     if (isfinite(f->snr)) {
         snprintf(lines[1], sizeof lines[1], "SNR %.1f%s", f->snr,
@@ -160,7 +182,9 @@ static void put_facts(FILE *out, const bst_report_frame *f, bool tracked, double
         }
     }
     if (isfinite(f->detections)) {
-        snprintf(lines[2], sizeof lines[2], "%.0f detections, %.0f stars", f->detections, f->stars);
+        snprintf(lines[2], sizeof lines[2], "%.0f detection%s, %.0f star%s identified",
+                 f->detections, f->detections == 1.0 ? "" : "s", f->stars,
+                 f->stars == 1.0 ? "" : "s");
     }
     if (f->known && tracked) {
         snprintf(lines[3], sizeof lines[3], "%s", f->in_track ? "in track" : "not in track");
@@ -176,8 +200,8 @@ static void put_facts(FILE *out, const bst_report_frame *f, bool tracked, double
 }
 
 static bst_status put_frame(bst_ctx *ctx, FILE *out, const bst_fits_read_frame *frame,
-                            const bst_overlay *overlay, const bst_report_frame *facts,
-                            bool tracked) {
+                            const bst_overlay *overlay, const bst_report_frame *facts, bool tracked,
+                            int *detections, int *drawn) {
     bst_stretch stretch = bst_stretch_of(frame->pixels, frame->width, frame->height);
     double scale = (double)SIDE / (frame->width > frame->height ? frame->width : frame->height);
     part whole = {.columns = frame->width,
@@ -207,9 +231,10 @@ static bst_status put_frame(bst_ctx *ctx, FILE *out, const bst_fits_read_frame *
     BST_TRY(put_pixels(ctx, out, frame, stretch, &whole,
                        small ? frame->width : (int)fmax(1.0, whole.width),
                        small ? frame->height : (int)fmax(1.0, whole.height)));
-    put_marks(out, overlay, &whole);
+    put_marks(out, overlay, &whole, detections, drawn);
     BST_TRY(put_pixels(ctx, out, frame, stretch, &inset, columns, rows));
-    put_marks(out, overlay, &inset);
+    int there, marked;
+    put_marks(out, overlay, &inset, &there, &marked);
     fprintf(out,
             "<rect x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\" fill=\"none\" "
             "stroke=\"#b9c0c8\" stroke-width=\".8\" stroke-dasharray=\"3 2\"/>"
@@ -284,8 +309,17 @@ static bst_status put_chosen(bst_ctx *ctx, FILE *out, const bst_report_sensor *s
         }
         if (status == BST_OK) {
             bst_page_figure(out, BST_PAGE_HALF);
-            status = put_frame(ctx, out, &frame, &overlay, facts_of(s, id), s->has_tracks);
-            bst_page_figure_end(out, overlay.caption ? overlay.caption : "");
+            int detections, drawn;
+            char caption[280];
+            status = put_frame(ctx, out, &frame, &overlay, facts_of(s, id), s->has_tracks,
+                               &detections, &drawn);
+            int n = snprintf(caption, sizeof caption, "%s", overlay.caption ? overlay.caption : "");
+            if (status == BST_OK && drawn < detections && n < 200) {
+                snprintf(caption + n, sizeof caption - (size_t)n,
+                         "   %d of %d detections drawn: the target's and the brightest", drawn,
+                         detections);
+            }
+            bst_page_figure_end(out, caption);
         }
     }
     bst_page_grid_end(out);

@@ -1,8 +1,11 @@
 #include "sim/app/report_plots.h"
 
+#include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "sim/core/text.h"
 
 /* ------------------------------------------------------------------ helpers */
 
@@ -155,33 +158,25 @@ void bst_report_histogram(FILE *out, const char *name, const char *label, const 
 
 /* ------------------------------------------------------------------ quantities */
 
-static double radial(const bst_report_frame *f) {
-    return hypot(f->error_x_px, f->error_y_px);
-}
-
 static double radial_seen(const bst_report_frame *f) {
-    return f->visible ? radial(f) : NAN;
+    return f->visible ? f->error_px : NAN;
 }
 
 static double radial_unseen(const bst_report_frame *f) {
-    return f->visible ? NAN : radial(f);
+    return f->visible ? NAN : f->error_px;
 }
 
-/* The loop is closed on the right target; where no mode is recorded, as far as the track tells. */
-static bool held(const bst_report_frame *f) {
-    return f->in_track && f->visible && (f->mode == BST_MODE_TRACK || f->mode < 0);
+static bool is_pointing(const bst_report_frame *f) {
+    bst_loop_frame frame = bst_report_loop_frame(f);
+    return bst_loop_frame_is_pointing(&frame);
 }
 
-static double held_x(const bst_report_frame *f) {
-    return held(f) ? f->error_x_px : NAN;
+static double pointing_x(const bst_report_frame *f) {
+    return is_pointing(f) ? f->error_x_px : NAN;
 }
 
-static double held_y(const bst_report_frame *f) {
-    return held(f) ? f->error_y_px : NAN;
-}
-
-static double held_radial(const bst_report_frame *f) {
-    return held(f) ? radial(f) : NAN;
+static double pointing_y(const bst_report_frame *f) {
+    return is_pointing(f) ? f->error_y_px : NAN;
 }
 
 static double track_error(const bst_report_frame *f) {
@@ -231,16 +226,23 @@ static size_t gather(double *series, size_t n) {
     return count;
 }
 
-/* "RMS 0.21, median 0.18, 95 % below 0.36, 99 % below 0.44, largest 0.6 px" */
-static void describe(char text[200], bst_report_statistics m, const char *unit) {
-    char words[5][32];
-    snprintf(text, 200, "RMS %s, median %s, 95 %% below %s, 99 %% below %s, largest %s %s",
-             bst_page_number(words[0], m.rms, 3), bst_page_number(words[1], m.median, 3),
-             bst_page_number(words[2], m.p95, 3), bst_page_number(words[3], m.p99, 3),
-             bst_page_number(words[4], m.worst, 3), unit);
+/* "RMS 0.21, median 0.18, 95 % below 0.36, 99 % below 0.44, largest 0.6 px"; NAN p99: left out */
+static void describe(char text[200], double rms, double median, double p95, double p99,
+                     double largest, const char *unit) {
+    char words[5][32], tail[48] = "";
+    if (isfinite(p99)) {
+        snprintf(tail, sizeof tail, " 99 %% below %s,", bst_page_number(words[3], p99, 3));
+    }
+    snprintf(text, 200, "RMS %s, median %s, 95 %% below %s,%s largest %s %s",
+             bst_page_number(words[0], rms, 3), bst_page_number(words[1], median, 3),
+             bst_page_number(words[2], p95, 3), tail, bst_page_number(words[4], largest, 3), unit);
 }
 
 /* ------------------------------------------------------------------ charts */
+
+#define POINTING_ERROR                                                                     \
+    "Pointing error: angle from the boresight to the target's true apparent direction at " \
+    "mid-exposure, in pixels of the boresight."
 
 static void plot_pointing(const bst_report_drawing *d) {
     size_t n = d->sensor->count;
@@ -269,25 +271,21 @@ static void plot_pointing(const bst_report_drawing *d) {
         bst_chart_legend(d->out, BST_KEY_LINE, BST_CHART_GREY, "target hidden or dark");
     }
     fputs("</ul>\n", d->out);
-    bst_report_fill(d, held_radial, d->z);
-    size_t count = gather(d->z, n);
-    char text[200], caption[400];
-    describe(text, bst_report_measure(d->z, count), "px");
-    snprintf(caption, sizeof caption,
-             "Pointing error, radial: distance from the boresight to the target's true apparent "
-             "place at mid-exposure. In the %zu frames in mode track with the visible target in "
-             "track: %s.",
-             count, text);
-    bst_page_figure_end(d->out, count > 0
-                                    ? caption
-                                    : "Pointing error, radial: distance from the boresight to "
-                                      "the target's true apparent place at mid-exposure.");
+    const bst_loop_figures *f = &d->sensor->loop;
+    char text[200], caption[500];
+    describe(text, f->pointing_rms_px, f->pointing_median_px, f->pointing_p95_px,
+             f->pointing_p99_px, f->pointing_max_px, "px");
+    snprintf(
+        caption, sizeof caption,
+        POINTING_ERROR " In the %s in mode track with the visible target, from settling on: %s.",
+        bst_count_text((char[BST_COUNT_TEXT]){0}, f->pointing_frames, "frame", "frames"), text);
+    bst_page_figure_end(d->out, f->pointing_frames > 0 ? caption : POINTING_ERROR);
 }
 
 static void plot_axes(const bst_report_drawing *d) {
     size_t n = d->sensor->count, count = 0;
-    size_t seen = bst_report_fill(d, held_x, d->y);
-    bst_report_fill(d, held_y, d->z);
+    size_t seen = bst_report_fill(d, pointing_x, d->y);
+    bst_report_fill(d, pointing_y, d->z);
     if (seen < 2) {
         return;
     }
@@ -318,9 +316,13 @@ static void plot_axes(const bst_report_drawing *d) {
     fputs("</ul>\n", d->out);
     bst_page_figure_end(
         d->out,
-        "Pointing error per axis, in mode track with the visible target in track; errors "
+        "Pointing error per axis, in mode track with the visible target, from settling on; errors "
         "beyond the axis are cut off.");
 }
+
+#define TRACK_ERROR                                                                         \
+    "Track of interest against the target's true direction, at mid-exposure, and the root " \
+    "of the trace of its covariance."
 
 static void plot_track(const bst_report_drawing *d) {
     size_t n = d->sensor->count;
@@ -341,12 +343,17 @@ static void plot_track(const bst_report_drawing *d) {
     bst_chart_legend(d->out, BST_KEY_LINE, BST_CHART_BLUE, "error of its direction");
     bst_chart_legend(d->out, BST_KEY_LINE, BST_CHART_RED, "sigma that the tracker states");
     fputs("</ul>\n", d->out);
-    char text[200], caption[400];
-    describe(text, bst_report_measure(d->y, gather(d->y, n)), "arcsec");
-    snprintf(caption, sizeof caption,
-             "Track of interest against the target's true direction, at mid-exposure, and the root "
-             "of the trace of its covariance: %s.",
-             text);
+    const bst_report_sensor *s = d->sensor;
+    char text[200], caption[500] = TRACK_ERROR;
+    if (s->track_frames > 0) {
+        describe(text, s->track_rms_px, s->track_median_px, s->track_p95_px, NAN, s->track_max_px,
+                 "px");
+        snprintf(caption, sizeof caption,
+                 TRACK_ERROR " In the %" PRId64
+                             " processed frames with the target in the field "
+                             "and in track: %s of %.4g arcsec.",
+                 s->track_frames, text, s->pixel_scale_arcsec);
+    }
     bst_page_figure_end(d->out, caption);
 }
 
@@ -434,12 +441,12 @@ static void plot_detections(const bst_report_drawing *d) {
     bst_chart_legend(d->out, BST_KEY_LINE, BST_CHART_GREEN, "identified as stars");
     bst_chart_legend(d->out, BST_KEY_LINE, BST_CHART_ORANGE, "others");
     fputs("</ul>\n", d->out);
-    char caption[200];
-    snprintf(
-        caption, sizeof caption,
-        "Detections per frame: %.3g on average, of which %.3g are identified as stars and %.3g "
-        "are not.",
-        words[0], words[1], words[2]);
+    char caption[200], numbers[3][32];
+    snprintf(caption, sizeof caption,
+             "Detections per frame: %s on average, of which %s are identified as stars and %s are "
+             "not.",
+             bst_page_number(numbers[0], words[0], 3), bst_page_number(numbers[1], words[1], 3),
+             bst_page_number(numbers[2], words[2], 3));
     bst_page_figure_end(d->out, caption);
 }
 
@@ -470,15 +477,15 @@ static void histogram_of_axis(const bst_report_drawing *d, bst_report_quantity q
     bst_report_histogram(d->out, label, label, "frames", d->y, n, m.median - half, m.median + half,
                          40, colour, normal, law);
     snprintf(caption, sizeof caption,
-             "In track: mean %s px, RMS %s px; the curve is normal with the inner 68 %%.",
+             "Mean %s px, RMS %s px; the curve is normal with the inner 68 %%.",
              bst_page_number(words[0], m.mean, 2), bst_page_number(words[1], m.rms, 3));
     bst_page_figure_end(d->out, caption);
 }
 
 static void plot_histograms(const bst_report_drawing *d) {
     bst_page_grid(d->out, BST_PAGE_THIRD);
-    histogram_of_axis(d, held_x, "pointing error in x, px", BST_CHART_BLUE);
-    histogram_of_axis(d, held_y, "pointing error in y, px", BST_CHART_ORANGE);
+    histogram_of_axis(d, pointing_x, "pointing error in x, px", BST_CHART_BLUE);
+    histogram_of_axis(d, pointing_y, "pointing error in y, px", BST_CHART_ORANGE);
     bst_report_fill(d, nees_updated, d->y);
     size_t n = gather(d->y, d->sensor->count);
     if (n >= 20) {

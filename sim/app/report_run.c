@@ -6,6 +6,7 @@
 #include <cjson/cJSON.h>
 
 #include "sim/app/report.h"
+#include "sim/core/text.h"
 #include "sim/core/version.h"
 
 enum { MOST_EVENTS = 400 };
@@ -75,9 +76,8 @@ static bst_status read_sensors(bst_ctx *ctx, page *p) {
         bst_report_sensor *s = &p->sensors[i];
         /* the summary's key needs the name, which the reading makes */
         snprintf(s->name, sizeof s->name, "%s/%s", p->list[i].observer, p->list[i].name);
-        double settle_s = number_of(summary_of(p, i), "time_to_settle_s");
-        BST_TRY(bst_report_read(ctx, p->run, p->has_scene ? &p->scene : NULL, &p->list[i], settle_s,
-                                s));
+        BST_TRY(bst_report_read(ctx, p->run, p->has_scene ? &p->scene : NULL, &p->list[i],
+                                summary_of(p, i), s));
         p->count = i + 1;
         if (s->damaged) {
             bst_run_reader_note_problem(p->run, "run.sqlite is damaged: of %s not all can be shown",
@@ -141,12 +141,15 @@ static void put_objects(const page *p) {
                      text_of(object, "name", "?"));
         }
     }
-    bst_page_row(p->out, "objects", "%d%s%s%s", count, count ? ": " : "", names,
-                 count > 8 ? " ..." : "");
     const cJSON *catalogues = get(world, "catalogues"), *catalogue;
+    if (count > 0 || cJSON_GetArraySize(catalogues) == 0) {
+        bst_page_row(p->out, "objects", "%d%s%s%s", count, count ? ": " : "", names,
+                     count > 8 ? " ..." : "");
+    }
     cJSON_ArrayForEach(catalogue, catalogues) {
         const char *file = text_of(catalogue, "elements_file", "?"), *slash = strrchr(file, '/');
-        bst_page_row(p->out, "and all of", "%s", slash ? slash + 1 : file);
+        bst_page_row(p->out, count > 0 ? "and all of" : "objects: all of", "%s",
+                     slash ? slash + 1 : file);
     }
 }
 
@@ -193,39 +196,40 @@ static int64_t count_of(const page *p, const char *sql, int sensor) {
 }
 
 static void put_cards(const page *p, int i) {
-    const cJSON *summary = summary_of(p, i);
     const bst_report_sensor *s = &p->sensors[i];
-    char text[32], note[160];
+    const bst_loop_figures *f = &s->loop;
+    char text[32], note[160], words[2][32];
     fputs("<div class=\"cards\">\n", p->out);
-    if (summary && s->sensor.target[0] && s->has_tracks) {
-        double fraction = 100.0 * number_of(summary, "track_fraction");
-        bst_page_card(p->out, bst_page_number(text, fraction, 4), "%", "custody",
-                      "of the visible frames after the first confirmation, in track");
-        snprintf(note, sizeof note, "settled after %s s",
-                 bst_page_number((char[32]){0}, s->settle_s, 4));
-        bst_page_card(p->out, bst_page_number(text, number_of(summary, "time_to_confirm_s"), 4),
-                      "s", "time to acquire", note);
+    if (s->sensor.target[0] && s->has_tracks) {
+        snprintf(note, sizeof note, "of the visible frames in track; %s %% from acquisition on",
+                 bst_page_number(words[0], 100.0 * f->track_fraction, 4));
+        bst_page_card(p->out, bst_page_number(text, 100.0 * f->custody, 4), "%", "custody", note);
+        snprintf(note, sizeof note, "confirmed after %s s, settled after %s s",
+                 bst_page_number(words[0], f->time_to_confirm_s, 4),
+                 bst_page_number(words[1], f->time_to_settle_s, 4));
+        bst_page_card(p->out, bst_page_number(text, f->time_to_acquire_s, 4), "s",
+                      "time to acquire", note);
         snprintf(note, sizeof note, "99 %% below %s px, bias %s px",
-                 bst_page_number((char[32]){0}, number_of(summary, "pointing_p99_px"), 3),
-                 bst_page_number((char[32]){0}, number_of(summary, "pointing_bias_px"), 2));
-        bst_page_card(p->out, bst_page_number(text, number_of(summary, "pointing_rms_px"), 3), "px",
-                      "pointing RMS from settling on", note);
-        bst_page_card(p->out, text_of(summary, "final_mode", "-"), "", "mode at the end", "");
+                 bst_page_number(words[0], f->pointing_p99_px, 3),
+                 bst_page_number(words[1], f->pointing_bias_px, 2));
+        bst_page_card(p->out, bst_page_number(text, f->pointing_rms_px, 3), "px", "pointing RMS",
+                      note);
+        bst_page_card(p->out, f->final_mode >= 0 ? bst_mode_name(f->final_mode) : "-", "",
+                      "mode at the end", "");
     }
-    snprintf(text, sizeof text, "%" PRId64,
-             summary ? (int64_t)number_of(summary, "frames") : s->exposures);
+    snprintf(text, sizeof text, "%" PRId64, f->frames);
     bst_page_card(p->out, text, "", "exposures", "");
     int64_t frames = count_of(p, "SELECT count(*) FROM detection_frames WHERE sensor = ?1", i);
     if (frames > 0) {
         int64_t all =
             count_of(p, "SELECT sum(detections) FROM detection_frames WHERE sensor = ?1", i);
         snprintf(text, sizeof text, "%" PRId64, all);
-        snprintf(note, sizeof note, "%.3g a frame", (double)all / (double)frames);
+        snprintf(note, sizeof note, "%s a frame",
+                 bst_page_number(words[0], (double)all / (double)frames, 3));
         bst_page_card(p->out, text, "", "detections", note);
     }
-    double speed = number_of(summary, "real_time_factor");
-    if (isfinite(speed)) {
-        bst_page_card(p->out, bst_page_number(text, speed, 3), "×", "speed",
+    if (isfinite(s->real_time_factor)) {
+        bst_page_card(p->out, bst_page_number(text, s->real_time_factor, 3), "×", "speed",
                       "simulated time over wall time");
     }
     fputs("</div>\n", p->out);
@@ -257,8 +261,8 @@ static bst_status put_events(bst_ctx *ctx, const page *p) {
         bst_page_section_end(p->out);
         return BST_OK;
     }
-    fprintf(p->out, "<details%s><summary>%" PRId64 " events</summary>\n",
-            total <= 40 ? " open=\"open\"" : "", total);
+    fprintf(p->out, "<details%s><summary>%s</summary>\n", total <= 40 ? " open=\"open\"" : "",
+            bst_count_text((char[BST_COUNT_TEXT]){0}, total, "event", "events"));
     fputs(
         "<div class=\"scroll\"><table>\n<thead><tr><th class=\"n\">s</th><th>UTC</th>"
         "<th>from</th><th>kind</th><th>what</th></tr></thead>\n<tbody>\n",
@@ -271,7 +275,7 @@ static bst_status put_events(bst_ctx *ctx, const page *p) {
         if (!middle) {
             put_event(p->out, rows);
         } else if (shown == MOST_EVENTS / 2) {
-            fprintf(p->out, "<tr><td colspan=\"5\">%" PRId64 " events are left out</td></tr>\n",
+            fprintf(p->out, "<tr><td colspan=\"5\">%" PRId64 " events more</td></tr>\n",
                     total - MOST_EVENTS);
         }
         shown++;
@@ -346,7 +350,7 @@ static bst_status put_page(bst_ctx *ctx, page *p) {
     }
     BST_TRY(put_events(ctx, p));
     fprintf(p->out,
-            "<p class=\"note\">Made by Boresight %s. boresight info tells the folder's tables and "
+            "<p class=\"note\">Made by Boresight %s. boresight info lists the folder's tables and "
             "files, boresight export takes them out.</p>\n",
             bst_version());
     bst_page_end(p->out);

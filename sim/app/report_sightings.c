@@ -7,6 +7,7 @@
 #include <cjson/cJSON.h>
 
 #include "sim/app/report_plots.h"
+#include "sim/core/text.h"
 
 /* Objects in the timeline and in the table; sensors with a colour of their own; points of the
  * curves. */
@@ -76,7 +77,7 @@ static void put_cards(FILE *out, const bst_run_reader *run) {
     snprintf(note, sizeof note, "%s %% of those seen",
              bst_page_number(more, 100.0 * number_of(f, "custody_fraction_seen"), 3));
     bst_page_card(out, bst_page_number(text, 100.0 * number_of(f, "custody_fraction_all"), 3), "%",
-                  "custody, mean of all objects", note);
+                  "object custody, mean of all", note);
     snprintf(note, sizeof note, "tracks %s arcsec",
              bst_page_number(more, number_of(f, "track_rms_arcsec"), 3));
     bst_page_card(out, bst_page_number(text, number_of(f, "place_rms_arcsec"), 3), "arcsec",
@@ -125,10 +126,11 @@ static bst_status put_passes(bst_ctx *ctx, const bst_chart *c, const bst_run_rea
         double from = bst_rows_real(rows, 1) / unit_s, to = bst_rows_real(rows, 2) / unit_s;
         double least = 1.5 * (c->x.high - c->x.low) / c->inner_width; /* that can be seen */
         char title[200];
-        snprintf(title, sizeof title,
-                 "%s: %.6g s to %.6g s, detected in %" PRId64 " of %" PRId64 " frames",
-                 sensor >= 0 && sensor < names->count ? names->names[sensor] : "a sensor",
-                 from * unit_s, to * unit_s, detected, bst_rows_int(rows, 4));
+        snprintf(
+            title, sizeof title, "%s: %.6g s to %.6g s, detected in %" PRId64 " of %s",
+            sensor >= 0 && sensor < names->count ? names->names[sensor] : "a sensor", from * unit_s,
+            to * unit_s, detected,
+            bst_count_text((char[BST_COUNT_TEXT]){0}, bst_rows_int(rows, 4), "frame", "frames"));
         bst_chart_bar(c, from, fmax(to, from + least), row + 0.15, row + 0.85,
                       detected > 0 ? colour_of(sensor) : BST_CHART_GREY, title);
     }
@@ -167,8 +169,8 @@ static bst_status put_timeline(bst_ctx *ctx, FILE *out, const bst_run_reader *ru
     }
     bst_chart_end(&c);
     put_legend(out, names, BST_KEY_GROUND, true);
-    snprintf(caption, sizeof caption,
-             "Who saw what, when: passes of the %d objects with most detections.", count);
+    snprintf(caption, sizeof caption, "Who saw what, when: passes of the %s with most detections.",
+             bst_count_text((char[BST_COUNT_TEXT]){0}, count, "object", "objects"));
     bst_page_figure_end(out, caption);
     return status;
 }
@@ -269,9 +271,10 @@ static bst_status put_histogram(bst_ctx *ctx, FILE *out, const bst_run_reader *r
 }
 
 static bst_status put_table(bst_ctx *ctx, FILE *out, const bst_run_reader *run) {
-    static const char *const heads[] = {
-        "object",     "NORAD",      "passes seen",    "detected",          "tracked",
-        "custody, %", "revisit, s", "longest gap, s", "place RMS, arcsec", "track RMS, arcsec"};
+    static const char *const heads[] = {"object",           "NORAD",          "passes seen",
+                                        "detected",         "tracked",        "object custody, %",
+                                        "revisit, s",       "longest gap, s", "place RMS, arcsec",
+                                        "track RMS, arcsec"};
     bst_rows *rows;
     bst_status status;
     bool more;
@@ -316,7 +319,9 @@ static bst_status put_all(bst_ctx *ctx, FILE *out, const bst_run_reader *run, do
     bst_status status = put_histogram(
         ctx, out, run,
         "SELECT custody_fraction FROM sightings WHERE sensor IS NULL AND detected > 0",
-        "custody, %", 100.0, "Share of the time in custody, of the objects that were seen.");
+        "object custody, %", 100.0,
+        "Object custody (share of the time that the last detection is no older than "
+        "record.custody_s) of the objects that were seen.");
     if (status == BST_OK) {
         status = put_histogram(
             ctx, out, run,

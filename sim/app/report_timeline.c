@@ -1,9 +1,12 @@
+#include <inttypes.h>
 #include <math.h>
 #include <string.h>
 
 #include "sim/app/report_plots.h"
+#include "sim/core/text.h"
 
-enum { LANES = 4, ROWS = LANES + 1, STATES = 4 };
+/* A run of more than EXACT frames is drawn as shares of INTERVALS intervals. */
+enum { LANES = 4, ROWS = LANES + 1, STATES = 4, INTERVALS = 230, EXACT = 2 * INTERVALS };
 
 /* A lane tells which of a few states holds; state -1: none of them. */
 typedef struct lane {
@@ -68,26 +71,83 @@ static void put_modes(const bst_report_drawing *d, const bst_chart *c) {
     }
 }
 
-/* Draws the spans of a lane; a gap too short to be seen does not end one. */
-static void put_lane(const bst_report_drawing *d, const bst_chart *c, const lane *l, int row) {
+/* Draws the states of a lane frame by frame: one span for neighbours in the same state, each frame
+ * until the next one. */
+static void put_frames(const bst_report_drawing *d, const bst_chart *c, const lane *l, int row) {
     const bst_report_sensor *s = d->sensor;
-    double seen = (c->x.high - c->x.low) / c->inner_width; /* of the axis' unit */
-    for (size_t i = 0; i < s->count;) {
+    for (size_t i = 0, next; i < s->count; i = next) {
         int state = l->state(&s->frames[i]);
-        size_t last = i;
-        for (size_t next = i + 1; next < s->count; next++) {
-            if (l->state(&s->frames[next]) == state) {
-                last = next;
-            } else if (d->x[next] - d->x[last] > seen) {
-                break;
-            }
+        for (next = i + 1; next < s->count && l->state(&s->frames[next]) == state; next++) {
         }
-        size_t next = last + 1;
         if (state >= 0) {
             double end = next < s->count ? d->x[next] : c->x.high;
             put_span(d, c, row, d->x[i], end, l->states[state].colour, l->states[state].word);
         }
-        i = next;
+    }
+}
+
+/* Frames of an interval, and of them those in each state. */
+typedef struct interval {
+    int64_t frames, in[STATES];
+} interval;
+
+/* Whether all frames of an interval are in one state, or in none: *state, -1. */
+static bool is_uniform(const interval *v, int *state) {
+    *state = -1;
+    int64_t in = 0;
+    for (int k = 0; k < STATES; k++) {
+        in += v->in[k];
+        *state = v->in[k] > 0 ? k : *state;
+    }
+    return in == 0 || (v->frames > 0 && v->in[*state] == v->frames);
+}
+
+/* The states of an interval on top of each other, each as high as its share of the frames. */
+static void put_shares(const bst_report_drawing *d, const bst_chart *c, const lane *l, int row,
+                       const interval *v, double from, double to) {
+    double bottom = ROW_BOTTOM(row), height = ROW_TOP(row) - ROW_BOTTOM(row);
+    for (int k = 0; k < STATES; k++) {
+        if (v->in[k] == 0) {
+            continue;
+        }
+        double share = (double)v->in[k] / (double)v->frames;
+        char title[160];
+        snprintf(title, sizeof title, "%s: %.1f %% of %s from %.6g s to %.6g s", l->states[k].word,
+                 100.0 * share,
+                 bst_count_text((char[BST_COUNT_TEXT]){0}, v->frames, "frame", "frames"),
+                 from * d->unit_s, to * d->unit_s);
+        bst_chart_bar(c, from, to, bottom, bottom + share * height, l->states[k].colour, title);
+        bottom += share * height;
+    }
+}
+
+/* Draws a lane of many frames by intervals: no state hides a rarer one. */
+static void put_intervals(const bst_report_drawing *d, const bst_chart *c, const lane *l, int row) {
+    const bst_report_sensor *s = d->sensor;
+    interval intervals[INTERVALS] = {{0}};
+    double width = (c->x.high - c->x.low) / INTERVALS;
+    for (size_t i = 0; i < s->count; i++) {
+        double at = fmax(0.0, fmin((d->x[i] - c->x.low) / width, INTERVALS - 1.0));
+        interval *v = &intervals[(int)at];
+        int state = l->state(&s->frames[i]);
+        v->frames++;
+        if (state >= 0) {
+            v->in[state]++;
+        }
+    }
+    for (int i = 0, next; i < INTERVALS; i = next) {
+        int state, other;
+        bool uniform = is_uniform(&intervals[i], &state);
+        for (next = i + 1;
+             uniform && next < INTERVALS && is_uniform(&intervals[next], &other) && other == state;
+             next++) {
+        }
+        double from = c->x.low + i * width, to = c->x.low + next * width;
+        if (!uniform) {
+            put_shares(d, c, l, row, &intervals[i], from, to);
+        } else if (state >= 0) {
+            put_span(d, c, row, from, to, l->states[state].colour, l->states[state].word);
+        }
     }
 }
 
@@ -134,7 +194,7 @@ void bst_report_timeline(const bst_report_drawing *d) {
         if (!there) {
             bst_chart_word(&c, c.x.low, ROWS - row - 0.5, 8.0, 4.0, "start", "not recorded");
         } else if (row > 0) {
-            put_lane(d, &c, &lanes[row - 1], row);
+            (s->count > EXACT ? put_intervals : put_frames)(d, &c, &lanes[row - 1], row);
         }
     }
     bst_chart_end(&c);
@@ -152,6 +212,10 @@ void bst_report_timeline(const bst_report_drawing *d) {
     }
     fputs("</ul>\n", d->out);
     bst_page_figure_end(d->out,
-                        "What control did, and what there was to see. The colours of the modes are "
-                        "the ground of the charts below.");
+                        s->count > EXACT
+                            ? "What control did, and what there was to see: the height of a bar is "
+                              "the share of the frames of its interval. The colours of the modes "
+                              "are the ground of the charts below."
+                            : "What control did, and what there was to see. The colours of the "
+                              "modes are the ground of the charts below.");
 }

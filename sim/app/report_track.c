@@ -3,9 +3,6 @@
 #include <math.h>
 #include <string.h>
 
-/* As in sim/eval/loop_summary.c. */
-#define RIGHT_TARGET_PX 5.0
-
 /* A row of the table tracks. */
 typedef struct track {
     bool there, firm; /* firm: confirmed or coasting */
@@ -66,12 +63,13 @@ static void judge(const bst_report_sensor *s, bst_report_frame *f, const track *
         return;
     }
     double dt = f->mid_s - t->time_s;
-    bst_vec3 d = bst_vec3_axpy(t->direction, dt * t->rate_east_radps, t->east);
-    d = bst_vec3_unit(bst_vec3_axpy(d, dt * t->rate_north_radps, t->north));
+    bst_vec3 rate = bst_vec3_add(bst_vec3_scale(t->east, t->rate_east_radps),
+                                 bst_vec3_scale(t->north, t->rate_north_radps));
+    bst_vec3 d = bst_vec3_unit(bst_vec3_axpy(t->direction, dt, rate));
     bst_vec3 truth =
         bst_vec3_from_radec(f->target_ra_deg * BST_DEG_RAD, f->target_dec_deg * BST_DEG_RAD);
-    f->in_track = t->firm && bst_vec3_angle(d, truth) <=
-                                 RIGHT_TARGET_PX * s->pixel_scale_arcsec * BST_ARCSEC_RAD;
+    f->in_track = t->firm && bst_track_is_on_target(t->direction, rate, dt, truth,
+                                                    s->pixel_scale_arcsec * BST_ARCSEC_RAD);
     if (!own) {
         return;
     }
@@ -95,6 +93,7 @@ static bst_status walk(bst_ctx *ctx, cursor *frames, cursor *tracks, bst_report_
         if (answered) {
             s->has_tracks = true;
             f->attitude = bst_rows_int(frames->rows, 1) == 1;
+            f->tracked_s = bst_rows_real(frames->rows, 2);
             latest.there = false;
         }
         for (;;) {
@@ -117,7 +116,8 @@ bst_status bst_report_read_tracks(bst_ctx *ctx, const bst_run_reader *run, bst_r
     bst_ctx unheard = {0};
     cursor frames = {0}, tracks = {0};
     if (bst_rows_open(&unheard, run,
-                      "SELECT exposure_id, attitude_valid FROM track_frames WHERE sensor = ?1",
+                      "SELECT exposure_id, attitude_valid, CAST(written_tick AS REAL) /"
+                      " (SELECT tick_rate_hz FROM run) FROM track_frames WHERE sensor = ?1",
                       s->sensor.index, 0, &frames.rows) != BST_OK ||
         bst_rows_open(&unheard, run,
                       "SELECT exposure_id, time_s, status, ra_deg, dec_deg, rate_east_arcsec_per_s,"

@@ -6,6 +6,8 @@
 
 #include "sim/app/loop_model.h"
 #include "sim/app/report.h"
+#include "sim/app/run_losses.h"
+#include "sim/core/text.h"
 
 static const cJSON *get(const cJSON *node, const char *key) {
     return cJSON_GetObjectItemCaseSensitive(node, key);
@@ -37,108 +39,89 @@ static void add_end(const bst_run_reader *run, bst_warnings *w) {
     }
     double logged = number_of(manifest, "warnings");
     if (logged > 0.0) {
-        bst_warnings_add(
-            w, BST_SEVERITY_WARNING,
-            "%.0f warnings were logged while it ran; they stood on its standard error.", logged);
+        char text[64];
+        bst_warnings_add(w, BST_SEVERITY_WARNING, "%s on its standard error while it ran.",
+                         bst_count_text(text, (int64_t)fmin(logged, 1e15), "warning", "warnings"));
     }
 }
 
 /* ------------------------------------------------------------------ counters */
 
-static void add_counters(const bst_run_reader *run, bst_warnings *w) {
-    static const struct {
-        const char *key;
-        bst_severity severity;
-        const char *text;
-    } known[] = {
-        {"tracker_overflow", BST_SEVERITY_PROBLEM,
-         "frames in which the tracker had no room for all "
-         "tracks"},
-        {"detections_overflow", BST_SEVERITY_PROBLEM,
-         "frames in which image processing had no room "
-         "for all detections"},
-        {"truth_overflow", BST_SEVERITY_WARNING,
-         "frames in which the truth had no room for all "
-         "sources: labels are missing"},
-        {"queue_overflow", BST_SEVERITY_PROBLEM, "messages were overwritten before they were read"},
-        {"stale_input", BST_SEVERITY_WARNING,
-         "times an input was read that is older than it may be"},
-        {"tracker_no_attitude", BST_SEVERITY_WARNING,
-         "frames whose attitude from stars was not good "
-         "enough to measure directions with"},
-        {"tracker_no_navigation", BST_SEVERITY_WARNING, "frames without navigation telemetry"},
-        {"tracker_frame_ignored", BST_SEVERITY_WARNING,
-         "frames came to the tracker twice or out of "
-         "order"},
-        {"frame_without_stars", BST_SEVERITY_NOTE, "frames in which no star was identified"},
-        {"saturated", BST_SEVERITY_NOTE, "frames with a full pixel"},
-    };
+typedef struct sensor_warnings {
+    const char *name; /* NULL: of no sensor */
+    bst_warnings *warnings;
+} sensor_warnings;
+
+static void add_loss(void *user, bst_severity severity, const char *text) {
+    const sensor_warnings *s = user;
+    bst_warnings_add(s->warnings, severity, "%s%s%s.", s->name ? s->name : "", s->name ? ": " : "",
+                     text);
+}
+
+static void add_losses(const bst_run_reader *run, const bst_report_sensor *sensors, int count,
+                       bst_warnings *w) {
+    for (int i = 0; i < count; i++) {
+        sensor_warnings s = {sensors[i].name, w};
+        bst_run_losses losses;
+        bst_losses_read(run, sensors[i].name, sensors[i].sensor.index, &losses);
+        bst_losses_tell(&losses, add_loss, &s);
+    }
     const cJSON *counters = get(bst_run_reader_manifest(run), "counters"), *item;
     cJSON_ArrayForEach(item, counters) {
-        if (!cJSON_IsNumber(item) || item->valuedouble <= 0.0) {
-            continue;
+        if (cJSON_IsNumber(item) && fabs(item->valuedouble) < 1e15 && item->string) {
+            bst_losses_tell_counter(item->string, (int64_t)item->valuedouble, add_loss,
+                                    &(sensor_warnings){NULL, w});
         }
-        bst_severity severity = BST_SEVERITY_WARNING;
-        const char *text = "counted";
-        for (size_t k = 0; k < sizeof known / sizeof *known; k++) {
-            if (strcmp(known[k].key, item->string) == 0) {
-                severity = known[k].severity;
-                text = known[k].text;
-            }
-        }
-        bst_warnings_add(w, severity, "%.0f %s (%s).", item->valuedouble, text, item->string);
     }
 }
 
 /* ------------------------------------------------------------------ summaries */
 
-static void judge_summary(const char *sensor, const cJSON *summary, bool tasked, bool complete,
-                          bst_warnings *w) {
-    if (!cJSON_IsObject(summary)) {
-        return;
-    }
-    double confirmed = number_of(summary, "time_to_confirm_s"),
-           settled = number_of(summary, "time_to_settle_s"),
-           fraction = number_of(summary, "track_fraction"),
-           wrong = number_of(summary, "wrong_target_frames");
-    const cJSON *mode = get(summary, "final_mode");
-    if (!isfinite(confirmed)) {
-        bst_warnings_add(w, BST_SEVERITY_PROBLEM, "%s: the target was never in confirmed track.",
-                         sensor);
-    } else if (!isfinite(settled)) {
+static void judge_sensor(const bst_report_sensor *s, bool complete, bst_warnings *w) {
+    const bst_loop_figures *f = &s->loop;
+    bool acquired = isfinite(f->time_to_acquire_s);
+    if (!acquired) {
+        bst_warnings_add(
+            w, BST_SEVERITY_PROBLEM,
+            "%s: the target was never acquired: no track of interest was the target's.", s->name);
+    } else if (!isfinite(f->time_to_settle_s)) {
         bst_warnings_add(w, BST_SEVERITY_PROBLEM,
                          "%s: the loop never settled on the target: there are no pointing figures.",
-                         sensor);
+                         s->name);
     }
-    if (isfinite(confirmed) && fraction < 0.95) {
+    if (acquired && f->track_fraction < 0.95) {
         bst_warnings_add(
-            w, fraction < 0.5 ? BST_SEVERITY_PROBLEM : BST_SEVERITY_WARNING,
+            w, f->track_fraction < 0.5 ? BST_SEVERITY_PROBLEM : BST_SEVERITY_WARNING,
             "%s: the target was in track in only %.1f %% of the frames in which it was "
-            "visible after the first confirmation.",
-            sensor, 100.0 * fraction);
+            "visible from the acquisition on.",
+            s->name, 100.0 * f->track_fraction);
     }
-    if (wrong > 0.0) {
+    if (f->wrong_target_frames > 0) {
         bst_warnings_add(w, BST_SEVERITY_WARNING,
-                         "%s: in %.0f frames the track of interest was not the target's.", sensor,
-                         wrong);
+                         "%s: in %" PRId64 " frame%s the track of interest was not the target's.",
+                         s->name, f->wrong_target_frames, f->wrong_target_frames == 1 ? "" : "s");
+    }
+    if (s->bad_pixels > 0) {
+        bst_warnings_add(w, BST_SEVERITY_NOTE,
+                         "%s: image processing learned that %" PRId64
+                         " pixel%s bad, and left %s out.",
+                         s->name, s->bad_pixels, s->bad_pixels == 1 ? " is" : "s are",
+                         s->bad_pixels == 1 ? "it" : "them");
     }
     /* with tasks there is always a next target to slew to */
-    if (complete && !tasked && isfinite(confirmed) && cJSON_IsString(mode) &&
-        strcmp(mode->valuestring, "track") != 0) {
+    if (complete && s->task_count < 2 && acquired && f->final_mode >= 0 &&
+        f->final_mode != BST_MODE_TRACK) {
         bst_warnings_add(w, BST_SEVERITY_WARNING, "%s: at the end the mode was %s, not track.",
-                         sensor, mode->valuestring);
+                         s->name, bst_mode_name(f->final_mode));
     }
 }
 
 static void add_summaries(const bst_run_reader *run, const bst_report_sensor *sensors, int count,
                           bst_warnings *w) {
-    const cJSON *manifest = bst_run_reader_manifest(run), *several = get(manifest, "sensors");
     bool complete = bst_run_reader_state(run) == BST_RUN_COMPLETE;
     for (int i = 0; i < count; i++) {
-        const cJSON *own = get(several, sensors[i].name);
-        const cJSON *summary = own ? own : i == 0 ? get(manifest, "summary") : NULL;
         if (sensors[i].sensor.target[0] && sensors[i].has_tracks) {
-            judge_summary(sensors[i].name, summary, sensors[i].task_count > 1, complete, w);
+            judge_sensor(&sensors[i], complete, w);
         }
     }
 }
@@ -171,16 +154,14 @@ static void add_tables(const bst_run_reader *run, const bst_report_sensor *senso
     } checks[] = {
         {"SELECT count(*) FROM mount WHERE sensor = ?1 AND"
          " ((axis0_flags | axis1_flags | axis2_flags) & 1) = 1",
-         BST_SEVERITY_PROBLEM, "Rows of telemetry that tell of a stuck axis"},
-        {"SELECT count(*) FROM exposures WHERE sensor = ?1 AND dropped = 1", BST_SEVERITY_WARNING,
-         "Frames that were lost on their way"},
+         BST_SEVERITY_PROBLEM, "Rows of telemetry with a stuck axis"},
         {"SELECT count(*) FROM exposures WHERE sensor = ?1 AND error_sigma > 0.3",
          BST_SEVERITY_WARNING,
          "Frames rendered with an expected error above 0.3 of a pixel's noise"},
         {"SELECT count(*) FROM pointing WHERE sensor = ?1 AND limited = 1", BST_SEVERITY_WARNING,
-         "Rows of telemetry that tell of an axis at a limit"},
+         "Rows of telemetry with an axis at a limit"},
         {"SELECT count(*) FROM mount WHERE sensor = ?1 AND wheels_saturated = 1",
-         BST_SEVERITY_WARNING, "Rows of telemetry that tell of saturated reaction wheels"},
+         BST_SEVERITY_WARNING, "Rows of telemetry with saturated reaction wheels"},
         {"SELECT count(*) FROM exposures WHERE sensor = ?1 AND hits > 0", BST_SEVERITY_NOTE,
          "Frames with radiation hits"},
     };
@@ -204,14 +185,14 @@ static void add_events(const bst_run_reader *run, bst_warnings *w) {
         bst_severity severity;
         const char *text;
     } known[] = {
-        {"mode", -1, ""}, /* told by the charts */
+        {"mode", -1, ""}, /* shown by the charts */
         {"target_selected", -1, ""},
         {"track_confirmed", -1, ""},
         {"track_resumed", -1, ""},
         {"target_lost", BST_SEVERITY_WARNING, "the track of the target was given up"},
         {"track_lost", BST_SEVERITY_NOTE, "a track was given up"},
         {"attitude_lost", BST_SEVERITY_WARNING, "stars no longer gave an attitude"},
-        {"guidance", BST_SEVERITY_NOTE, "guidance told of what is out of reach"},
+        {"guidance", BST_SEVERITY_NOTE, "guidance announced what is out of reach"},
         {"wheels", BST_SEVERITY_WARNING, "reaction wheels came to a limit, or left it"},
         {"star_trackers", BST_SEVERITY_WARNING, "star trackers lost the stars, or found them"},
         {"manoeuvre", BST_SEVERITY_NOTE, "the tracker noticed a manoeuvre"},
@@ -280,7 +261,7 @@ void bst_report_run_warnings(bst_run_reader *run, const bst_report_sensor *senso
         bst_warnings_add(w, BST_SEVERITY_PROBLEM, "%s", bst_report_local(run, problem));
     }
     add_summaries(run, sensors, count, w);
-    add_counters(run, w);
+    add_losses(run, sensors, count, w);
     add_tables(run, sensors, count, w);
     const cJSON *misfits = get(bst_run_reader_manifest(run), "wcs_misfit_px"), *item;
     cJSON_ArrayForEach(item, misfits) {

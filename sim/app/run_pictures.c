@@ -7,7 +7,7 @@
 #include "sim/io/plot.h"
 #include "sim/io/quicklook.h"
 
-enum { MAX_MARKS = 512, MAX_POINTS = 4096 };
+enum { MAX_POINTS = 4096 };
 
 /* A copied frame with what belongs to it. */
 typedef struct picture {
@@ -16,8 +16,9 @@ typedef struct picture {
     int64_t exposure_id;
     int64_t mid_tick;
     bst_window window;
-    bst_mark marks[MAX_MARKS];
-    int mark_count;
+    double binning;
+    bst_mark *marks; /* of all detections */
+    int mark_count, mark_room;
     bool processed;
     bool has_target;
     double target_x_px, target_y_px;
@@ -56,9 +57,11 @@ bst_status bst_run_pictures_create(bst_ctx *ctx, const bst_camera *camera, int64
 
 void bst_run_pictures_free(bst_run_pictures *p) {
     if (p) {
-        free(p->first.pixels);
-        free(p->last.pixels);
-        free(p->pending.pixels);
+        picture *all[] = {&p->first, &p->last, &p->pending};
+        for (int i = 0; i < 3; i++) {
+            free(all[i]->pixels);
+            free(all[i]->marks);
+        }
         free(p);
     }
 }
@@ -80,16 +83,21 @@ static bst_status copy_frame(bst_ctx *ctx, bst_run_pictures *p, const bst_frame_
     BST_TRY(bst_frame_map(m->frame, ctx, &source));
     memcpy(pic->pixels, source, pixels * sizeof *source);
     bst_frame_unmap(m->frame);
-    uint16_t *keep = pic->pixels;
-    memset(pic, 0, sizeof *pic);
-    pic->pixels = keep;
+    *pic = (picture){.pixels = pic->pixels, .marks = pic->marks, .mark_room = pic->mark_room};
     pic->width = m->frame->width;
     pic->height = m->frame->height;
     pic->exposure_id = m->exposure_id;
     pic->mid_tick = m->start_tick + (m->end_tick - m->start_tick) / 2;
     pic->window = m->window;
+    pic->binning = m->binning > 1 ? m->binning : 1.0;
     pic->mode = p->mode;
     return BST_OK;
+}
+
+/* Pixel of the picture at a place of the sensor; `first`: the window's corner. */
+static double pixel_of(const picture *pic, double place_px, int first) {
+    double middle = 0.5 * (pic->binning - 1.0); /* of a binned pixel, from its first one's centre */
+    return (place_px - first - middle) / pic->binning;
 }
 
 static void mark_truth(const bst_run_pictures *p, picture *pic, const bst_truth *truth) {
@@ -98,20 +106,44 @@ static void mark_truth(const bst_run_pictures *p, picture *pic, const bst_truth 
         if (item->kind == BST_SOURCE_OBJECT && (int)item->id == p->target &&
             (item->flags & BST_TRUTH_IN_FIELD)) {
             pic->has_target = true;
-            pic->target_x_px = item->x_centroid_px - pic->window.x0;
-            pic->target_y_px = item->y_centroid_px - pic->window.y0;
+            pic->target_x_px = pixel_of(pic, item->x_centroid_px, pic->window.x0);
+            pic->target_y_px = pixel_of(pic, item->y_centroid_px, pic->window.y0);
         }
     }
 }
 
-static void mark_detections(picture *pic, const bst_detections *detections) {
-    pic->mark_count = 0;
-    for (int i = 0; i < detections->count && pic->mark_count < MAX_MARKS; i++) {
-        const bst_detection *d = &detections->items[i];
-        pic->marks[pic->mark_count++] = (bst_mark){.x_px = d->x_px - pic->window.x0,
-                                                   .y_px = d->y_px - pic->window.y0,
-                                                   .star = d->label == BST_LABEL_STAR};
+static bst_status mark_detections(bst_ctx *ctx, picture *pic, const bst_detections *detections) {
+    if (detections->count > pic->mark_room) {
+        bst_mark *more = realloc(pic->marks, (size_t)detections->count * sizeof *more);
+        if (!more) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for pictures");
+        }
+        pic->marks = more;
+        pic->mark_room = detections->count;
     }
+    for (int i = 0; i < detections->count; i++) {
+        const bst_detection *d = &detections->items[i];
+        pic->marks[i] = (bst_mark){.x_px = pixel_of(pic, d->x_px, pic->window.x0),
+                                   .y_px = pixel_of(pic, d->y_px, pic->window.y0),
+                                   .importance = d->flux_e,
+                                   .kind = d->label != BST_LABEL_STAR ? BST_MARK_DETECTION
+                                           : d->star_id != 0          ? BST_MARK_STAR
+                                                                      : BST_MARK_REST};
+    }
+    pic->mark_count = detections->count;
+    return BST_OK;
+}
+
+/* The target's own detections first, then the brightest. */
+static void sort_marks(const picture *pic) {
+    for (int i = 0; i < pic->mark_count; i++) {
+        bst_mark *m = &pic->marks[i];
+        if (pic->has_target && hypot(m->x_px - pic->target_x_px, m->y_px - pic->target_y_px) <=
+                                   BST_RIGHT_TARGET_PX / pic->binning) {
+            m->importance = INFINITY;
+        }
+    }
+    bst_mark_sort(pic->marks, pic->mark_count);
 }
 
 /* The newest frame has been through the whole chain: it becomes the last one, and the first if
@@ -122,8 +154,8 @@ static bst_status settle_pending(bst_ctx *ctx, bst_run_pictures *p, const bst_tr
         const bst_track *t = &tracks->items[i];
         if (t->target_of_interest) {
             pic->has_track = true;
-            pic->track_x_px = t->x_px - pic->window.x0;
-            pic->track_y_px = t->y_px - pic->window.y0;
+            pic->track_x_px = pixel_of(pic, t->x_px, pic->window.x0);
+            pic->track_y_px = pixel_of(pic, t->y_px, pic->window.y0);
             snprintf(pic->track_label, sizeof pic->track_label, "track %lld  SNR %.1f",
                      (long long)t->id, t->snr);
         }
@@ -133,10 +165,15 @@ static bst_status settle_pending(bst_ctx *ctx, bst_run_pictures *p, const bst_tr
         size_t bytes = (size_t)pic->width * (size_t)pic->height * sizeof(uint16_t);
         p->first = *pic;
         p->first.pixels = malloc(bytes);
-        if (!p->first.pixels) {
+        p->first.marks = malloc((size_t)pic->mark_count * sizeof *pic->marks + 1);
+        p->first.mark_room = pic->mark_count;
+        if (!p->first.pixels || !p->first.marks) {
             return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for pictures");
         }
         memcpy(p->first.pixels, pic->pixels, bytes);
+        if (pic->mark_count > 0) {
+            memcpy(p->first.marks, pic->marks, (size_t)pic->mark_count * sizeof *pic->marks);
+        }
     }
     picture swap = p->last;
     p->last = *pic;
@@ -159,7 +196,7 @@ bst_status bst_run_pictures_message(bst_ctx *ctx, bst_run_pictures *p, const cha
     } else if (strcmp(channel, BST_CHANNEL_DETECTIONS) == 0) {
         const bst_detections *detections = payload;
         if (waiting && detections->exposure_id == p->pending.exposure_id) {
-            mark_detections(&p->pending, detections);
+            return mark_detections(ctx, &p->pending, detections);
         }
     } else if (strcmp(channel, BST_CHANNEL_TRACKS) == 0) {
         const bst_tracks *tracks = payload;
@@ -189,6 +226,7 @@ void bst_run_pictures_judged(bst_run_pictures *p, const bst_loop_frame *f) {
                                                        .dy_px = f->error_y_px,
                                                        .mode = f->mode,
                                                        .in_track = f->in_track,
+                                                       .counted = bst_loop_frame_is_pointing(f),
                                                        .visible = f->visible};
 }
 
@@ -202,30 +240,32 @@ static bst_quicklook_frame panel(const bst_run_pictures *p, const picture *pic, 
     double seconds = (double)pic->mid_tick / p->rate_hz;
     char utc[48];
     bst_time_to_utc(bst_time_add(p->epoch, seconds), 1, utc, sizeof utc);
+    sort_marks(pic);
     snprintf(text->time, sizeof text->time, "%s  t = %.1f s", utc, seconds);
-    return (bst_quicklook_frame){.pixels = pic->pixels,
-                                 .width = pic->width,
-                                 .height = pic->height,
-                                 .title = title,
-                                 .time = text->time,
-                                 .mode = bst_mode_name(pic->mode),
-                                 .detections = pic->marks,
-                                 .detection_count = pic->mark_count,
-                                 .has_target = pic->has_target,
-                                 .target_x_px = pic->target_x_px,
-                                 .target_y_px = pic->target_y_px,
-                                 .has_track = pic->has_track,
-                                 .track_x_px = pic->track_x_px,
-                                 .track_y_px = pic->track_y_px,
-                                 .track_label = pic->track_label,
-                                 .boresight_x_px = bst_camera_centre_x(&p->camera) - pic->window.x0,
-                                 .boresight_y_px = bst_camera_centre_y(&p->camera) - pic->window.y0,
-                                 .pixel_scale_arcsec = p->camera.pixel_scale_arcsec};
+    return (bst_quicklook_frame){
+        .pixels = pic->pixels,
+        .width = pic->width,
+        .height = pic->height,
+        .title = title,
+        .time = text->time,
+        .mode = bst_mode_name(pic->mode),
+        .detections = pic->marks,
+        .detection_count = pic->mark_count,
+        .has_target = pic->has_target,
+        .target_x_px = pic->target_x_px,
+        .target_y_px = pic->target_y_px,
+        .has_track = pic->has_track,
+        .track_x_px = pic->track_x_px,
+        .track_y_px = pic->track_y_px,
+        .track_label = pic->track_label,
+        .boresight_x_px = pixel_of(pic, bst_camera_centre_x(&p->camera), pic->window.x0),
+        .boresight_y_px = pixel_of(pic, bst_camera_centre_y(&p->camera), pic->window.y0),
+        .pixel_scale_arcsec = p->camera.pixel_scale_arcsec * pic->binning};
 }
 
 bst_status bst_run_pictures_write(bst_ctx *ctx, const bst_run_pictures *p, const char *folder,
-                                  const char *title) {
-    char path[4096];
+                                  const char *title, const bst_loop_figures *figures) {
+    char path[4096], label[160] = "never acquired";
     /* without image processing nothing is ever settled: the newest frame is then all there is */
     const picture *first = p->first.pixels ? &p->first : p->pending.pixels ? &p->pending : NULL;
     const picture *last =
@@ -241,8 +281,18 @@ bst_status bst_run_pictures_write(bst_ctx *ctx, const bst_run_pictures *p, const
     }
     if (p->point_count > 1) {
         bool made;
+        if (figures->pointing_frames > 0) {
+            snprintf(label, sizeof label,
+                     "pointing RMS %.3f px    largest %.3f px    custody %.1f %%    acquired at "
+                     "%.1f s",
+                     figures->pointing_rms_px, figures->pointing_max_px, 100.0 * figures->custody,
+                     figures->time_to_acquire_s);
+        } else if (isfinite(figures->time_to_acquire_s)) {
+            snprintf(label, sizeof label, "never settled    custody %.1f %%    acquired at %.1f s",
+                     100.0 * figures->custody, figures->time_to_acquire_s);
+        }
         snprintf(path, sizeof path, "%s/pointing.png", folder);
-        BST_TRY(bst_pointing_plot(ctx, path, title, p->points, p->point_count, 0.5, &made));
+        BST_TRY(bst_pointing_plot(ctx, path, title, label, p->points, p->point_count, 0.5, &made));
     }
     return BST_OK;
 }

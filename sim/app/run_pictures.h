@@ -20,9 +20,10 @@ bst_status bst_run_pictures_message(bst_ctx *ctx, bst_run_pictures *pictures, co
 /* A judged frame. */
 void bst_run_pictures_judged(bst_run_pictures *pictures, const bst_loop_frame *frame);
 
-/* Writes quicklook.png (when there was a frame) and pointing.png (when there was a target) into
- * `folder`. What cannot be drawn is a warning. */
+/* Writes quicklook.png (when there was a frame) and pointing.png (when there was a target), with
+ * `figures` of the run, into `folder`. What cannot be drawn is a warning. */
 bst_status bst_run_pictures_write(bst_ctx *ctx, const bst_run_pictures *pictures,
-                                  const char *folder, const char *title) BST_MUST_CHECK;
+                                  const char *folder, const char *title,
+                                  const bst_loop_figures *figures) BST_MUST_CHECK;
 
 #endif

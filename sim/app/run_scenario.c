@@ -10,11 +10,13 @@
 #include "sim/app/json_number.h"
 #include "sim/app/plugins.h"
 #include "sim/app/run_link.h"
+#include "sim/app/run_losses.h"
 #include "sim/app/run_pacing.h"
 #include "sim/app/run_pictures.h"
 #include "sim/app/run_scenario.h"
 #include "sim/app/run_sightings.h"
 #include "sim/app/run_space.h"
+#include "sim/app/run_summary.h"
 #include "sim/app/run_watched.h"
 #include "sim/app/stop_signals.h"
 #include "sim/core/version.h"
@@ -35,8 +37,8 @@ typedef struct watched_sensor {
     bst_run_watched channels[WATCHED_CHANNELS];
     int channel_count;
     bst_loop_summary *summary;
-    int target;                 /* of its own cue, -1: none */
-    bst_run_metrics *metrics;   /* NULL: not asked for */
+    int target; /* of its own cue, -1: none */
+    bst_run_metrics *metrics;
     bst_run_pictures *pictures; /* of the first sensor of a run that is written; else NULL */
 } watched_sensor;
 
@@ -85,23 +87,22 @@ static bool wants(void *user, const char *scope, const char *channel, const void
 static bst_status judge(run_state *run, watched_sensor *sensor, const char *channel,
                         const void *payload, int64_t tick) {
     if (strcmp(channel, BST_CHANNEL_TRUTH) == 0) {
-        if (sensor->metrics) {
-            BST_TRY(bst_run_metrics_truth(&run->hooks, sensor->metrics, payload));
-        }
+        BST_TRY(bst_run_metrics_truth(&run->hooks, sensor->metrics, payload));
         return bst_loop_summary_truth(&run->hooks, sensor->summary, payload);
     }
     if (strcmp(channel, BST_CHANNEL_TRACKS) == 0) {
         bst_loop_summary_tracks(sensor->summary, payload, tick);
-        return sensor->metrics ? bst_run_metrics_tracks(&run->hooks, sensor->metrics, payload)
-                               : BST_OK;
+        return bst_run_metrics_tracks(&run->hooks, sensor->metrics, payload);
     }
-    if (strcmp(channel, BST_CHANNEL_DETECTIONS) == 0 && sensor->metrics) {
+    if (strcmp(channel, BST_CHANNEL_DETECTIONS) == 0) {
         bst_run_metrics_detections(sensor->metrics, payload);
     } else if (strcmp(channel, BST_CHANNEL_CONTROL_STATUS) == 0) {
         bst_loop_summary_status(sensor->summary, payload);
     } else if (strcmp(channel, BST_CHANNEL_TASK) == 0) {
         int object = ((const bst_task *)payload)->object;
-        bst_loop_summary_retarget(sensor->summary, object >= 0 ? object : sensor->target);
+        int target = object >= 0 ? object : sensor->target;
+        bst_loop_summary_retarget(sensor->summary, target);
+        bst_run_metrics_retarget(sensor->metrics, target);
     }
     return BST_OK;
 }
@@ -135,9 +136,7 @@ static bst_status on_event(void *user, int64_t tick, const char *instance, const
 
 static void on_judged(void *user, const bst_loop_frame *frame) {
     watched_sensor *sensor = user;
-    if (sensor->metrics) {
-        bst_run_metrics_frame(sensor->metrics, frame);
-    }
+    bst_run_metrics_frame(sensor->metrics, frame);
     if (sensor->pictures) {
         bst_run_pictures_judged(sensor->pictures, frame);
     }
@@ -184,19 +183,16 @@ static bool interrupted(void *user, int64_t tick) {
     return run->cut || bst_stop_requested();
 }
 
-static cJSON *summary_json(const bst_loop_figures *f, double real_time_factor) {
-    cJSON *node = cJSON_CreateObject();
-    cJSON_AddNumberToObject(node, "frames", (double)f->frames);
-    cJSON_AddStringToObject(node, "final_mode", bst_mode_name(f->final_mode));
-    bst_json_add_number(node, "time_to_confirm_s", f->time_to_confirm_s);
-    bst_json_add_number(node, "track_fraction", f->track_fraction);
-    bst_json_add_number(node, "pointing_rms_px", f->pointing_rms_px);
-    bst_json_add_number(node, "pointing_p99_px", f->pointing_p99_px);
-    bst_json_add_number(node, "real_time_factor", real_time_factor);
-    bst_json_add_number(node, "time_to_settle_s", f->time_to_settle_s);
-    bst_json_add_number(node, "pointing_bias_px", f->pointing_bias_px);
-    cJSON_AddNumberToObject(node, "wrong_target_frames", (double)f->wrong_target_frames);
-    return node;
+static void get_figures(const watched_sensor *sensor, bst_run_sensor_figures *out) {
+    snprintf(out->scope, sizeof out->scope, "%s", sensor->scope);
+    bst_loop_summary_figures(sensor->summary, &out->loop);
+    bst_run_metrics_figures(sensor->metrics, &out->metrics);
+}
+
+static cJSON *summary_of(const watched_sensor *sensor, double real_time_factor) {
+    bst_run_sensor_figures figures;
+    get_figures(sensor, &figures);
+    return bst_run_summary_json(&figures, real_time_factor);
 }
 
 /* How far the WCS of frames misfits the distortion of those cameras that have any. */
@@ -267,54 +263,59 @@ static bst_status write_manifest(const run_state *run, bst_simulation *sim, cons
     for (int i = 0; bst_engine_counter(bst_simulation_engine(sim), i, &name, &count); i++) {
         cJSON_AddNumberToObject(counters, name, (double)count);
     }
+    for (int i = 0; i < run->sensor_count; i++) {
+        bst_run_metric_figures figures;
+        bst_run_metrics_figures(run->sensors[i].metrics, &figures);
+        bst_losses_add(root, run->sensors[i].scope, &figures.losses);
+    }
     double simulated =
         (double)(bst_engine_tick(bst_simulation_engine(sim)) + 1) / (double)scenario->tick_rate_hz;
     double factor = wall > 0.0 ? simulated / wall : NAN;
-    bst_loop_figures figures;
     if (run->sensor_count > 1) {
         cJSON *sensors = cJSON_AddObjectToObject(root, "sensors");
         for (int i = 0; i < run->sensor_count; i++) {
-            bst_loop_summary_figures(run->sensors[i].summary, &figures);
-            cJSON_AddItemToObject(sensors, run->sensors[i].scope, summary_json(&figures, factor));
+            cJSON_AddItemToObject(sensors, run->sensors[i].scope,
+                                  summary_of(&run->sensors[i], factor));
         }
     }
     bst_run_sightings_add(run->sightings, root);
     bst_run_pacing_add(root, scenario, sim);
-    bst_loop_summary_figures(run->sensors[0].summary, &figures);
-    cJSON_AddItemToObject(root, "summary", summary_json(&figures, factor));
+    cJSON_AddItemToObject(root, "summary", summary_of(&run->sensors[0], factor));
     bst_status status = bst_run_write_json(run->ctx, store, "manifest.json", root);
     cJSON_Delete(root);
     return status;
 }
 
-static void print_row(const char *name, const char *format, double value, const char *unit) {
-    char text[48] = "-";
-    if (isfinite(value)) {
-        snprintf(text, sizeof text, format, value);
+/* A line for all that was lost and counted. */
+static void print_losses(const run_state *run, bst_simulation *sim) {
+    bst_losses_printer printer = {.begun = false};
+    for (int i = 0; i < run->sensor_count; i++) {
+        bst_run_sensor_figures figures;
+        get_figures(&run->sensors[i], &figures);
+        printer.sensor = run->sensor_count > 1 ? figures.scope : NULL;
+        bst_losses_tell(&figures.metrics.losses, bst_losses_print, &printer);
     }
-    printf("  %-28s %12s %s\n", name, text, unit);
+    const char *name;
+    int64_t count;
+    printer.sensor = NULL;
+    for (int i = 0; bst_engine_counter(bst_simulation_engine(sim), i, &name, &count); i++) {
+        bst_losses_tell_counter(name, count, bst_losses_print, &printer);
+    }
 }
 
 static void print_table(const run_state *run, bst_simulation *sim, const char *out, double wall) {
     double simulated = (double)(bst_engine_tick(bst_simulation_engine(sim)) + 1) /
                        (double)run->scenario->tick_rate_hz;
     for (int i = 0; i < run->sensor_count; i++) {
-        bst_loop_figures f;
-        bst_loop_summary_figures(run->sensors[i].summary, &f);
-        printf("%s\n", run->sensors[i].scope);
-        print_row("frames", "%.0f", (double)f.frames, "");
-        printf("  %-28s %12s\n", "final mode", bst_mode_name(f.final_mode));
-        print_row("time to confirm", "%.2f", f.time_to_confirm_s, "s");
-        print_row("time to settle", "%.2f", f.time_to_settle_s, "s");
-        print_row("in confirmed track", "%.2f", 100.0 * f.track_fraction,
-                  "% of visible frames after confirmation");
-        print_row("pointing RMS", "%.3f", f.pointing_rms_px, "px");
-        print_row("pointing 99th percentile", "%.3f", f.pointing_p99_px, "px");
+        bst_run_sensor_figures figures;
+        get_figures(&run->sensors[i], &figures);
+        bst_run_summary_print(&figures);
     }
     bst_run_sightings_print(run->sightings);
+    print_losses(run, sim);
     bst_run_pacing_print(run->scenario, sim);
-    print_row("wall time", "%.2f", wall, "s");
-    print_row("speed", "%.1f", wall > 0.0 ? simulated / wall : NAN, "x real time");
+    bst_run_print_row("wall time", "%.2f", wall, "s");
+    bst_run_print_row("speed", "%.1f", wall > 0.0 ? simulated / wall : NAN, "x real time");
     printf("  %-28s %s\n", "results", out);
 }
 
@@ -345,9 +346,7 @@ static bst_status watch_sensors(run_state *run, const bst_world *world,
                                                 run->scenario->tick_rate_hz, run->scenario->epoch,
                                                 target, &w->pictures));
             }
-            if (request->metrics) {
-                BST_TRY(bst_run_metrics_create(run->ctx, world, i, s, target, &w->metrics));
-            }
+            BST_TRY(bst_run_metrics_create(run->ctx, world, i, s, target, &w->metrics));
             bst_loop_summary_on_frame(w->summary, on_judged, w);
         }
     }
@@ -422,8 +421,10 @@ static bst_status write_ending(run_state *run, bst_simulation *sim, bst_run *sto
     bool failed = ended != BST_OK && ended != BST_ERR_INTERRUPTED;
     bst_status status = BST_OK;
     if (!failed) {
+        bst_loop_figures figures;
+        bst_loop_summary_figures(run->sensors->summary, &figures);
         status = bst_run_pictures_write(ctx, run->sensors->pictures, bst_run_folder(store),
-                                        run->scenario->name);
+                                        run->scenario->name, &figures);
     }
     bst_status sealed = bst_run_seal(status == BST_OK ? ctx : NULL, store);
     status = status == BST_OK ? sealed : status;
@@ -485,7 +486,7 @@ static bst_status execute(run_state *run, bst_simulation *sim, const bst_run_req
                           double *wall) {
     bst_ctx *ctx = run->ctx;
     bst_run *store = NULL;
-    bst_run_warn_of_space(ctx, run->scenario, request->out);
+    BST_TRY(bst_run_check_space(ctx, run->scenario, request->out, request->force));
     BST_TRY(bst_run_create(ctx, request->out, request->overwrite, &store));
     cJSON *echo = bst_scenario_echo(run->scenario);
     bst_status status = echo ? bst_run_write_json(ctx, store, "scenario.json", echo)
@@ -552,11 +553,7 @@ static bst_status fill_report(run_state *run, double wall, double part, bst_run_
     for (int i = 0; i < run->sensor_count; i++) {
         const watched_sensor *sensor = &run->sensors[i];
         bst_run_sensor_figures *f = &report->sensors[i];
-        snprintf(f->scope, sizeof f->scope, "%s", sensor->scope);
-        bst_loop_summary_figures(sensor->summary, &f->loop);
-        if (sensor->metrics) {
-            bst_run_metrics_figures(sensor->metrics, &f->metrics);
-        }
+        get_figures(sensor, f);
     }
     return BST_OK;
 }

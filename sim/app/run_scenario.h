@@ -10,16 +10,17 @@
 typedef struct bst_run_request {
     const char *out; /* folder of the results; NULL: nothing is written */
     bool overwrite;  /* replace an earlier run there */
+    bool force;      /* start although its frames need more space than is free */
     bool progress;   /* a line on the standard error */
     bool print;      /* the table of results on the standard output */
-    bool metrics;    /* work out the figures of sim/eval/run_metrics.h too */
+    bool metrics;    /* without a folder: work out sightings, too */
     double most_s;   /* > 0, without a folder: stepping ends after so much time */
 } bst_run_request;
 
 typedef struct bst_run_sensor_figures {
     char scope[160]; /* "observer/sensor" */
     bst_loop_figures loop;
-    bst_run_metric_figures metrics; /* where asked for */
+    bst_run_metric_figures metrics;
 } bst_run_sensor_figures;
 
 typedef struct bst_run_report {

@@ -61,7 +61,7 @@ static const bst_column sum_columns[] = {
     REAL("revisit_mean_s", "s", "mean time between two such detections"),
     REAL("revisit_most_s", "s", "the longest"),
     REAL("longest_gap_s", "s", "without a detection, from the start and to the end as well"),
-    REAL("custody_s", "s", "time within record/custody_s after a detection"),
+    REAL("custody_s", "s", "object custody: time within record/custody_s after a detection"),
     REAL("custody_fraction", "", "the same over the run's length"),
     REAL("snr", "", "greatest true signal to noise of a frame"),
     ERRORS,
@@ -270,7 +270,7 @@ void bst_run_sightings_print(const bst_run_sightings *s) {
     print("seen", (double)f.seen, "");
     print("passes seen", (double)f.passes_seen, "");
     print("mean time between passes", f.revisit_mean_s, "s");
-    print("in custody", 100.0 * f.custody_fraction_all, "% of the time, mean of all");
+    print("object custody", 100.0 * f.custody_fraction_all, "% of the time, mean of all");
     print("detections against truth", f.place_rms_arcsec, "arcsec RMS");
     print("tracks against truth", f.track_rms_arcsec, "arcsec RMS");
     if (f.tasks > 0) {

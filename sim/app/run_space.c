@@ -4,7 +4,11 @@
 
 #include "sim/io/run_store.h"
 
-void bst_run_warn_of_space(bst_ctx *ctx, const bst_scenario *scenario, const char *out) {
+/* Less is written without a word. */
+#define WORTH_SAYING_BYTES 1e8
+
+/* Bytes of all frames and planes, before the tables. */
+static double frame_bytes(const bst_scenario *scenario) {
     const bst_observer_config *observers = scenario->observers.items;
     const bst_record_config *record = &scenario->record;
     /* Rice takes 8-bit noise to about half */
@@ -23,15 +27,35 @@ void bst_run_warn_of_space(bst_ctx *ctx, const bst_scenario *scenario, const cha
                      (double)sensors[s].camera.height_px;
         }
     }
-    double free_bytes = (double)bst_run_free_bytes(out);
-    if (free_bytes >= 0.0 && bytes > free_bytes) {
-        bst_log(ctx, BST_LOG_WARNING,
-                "%s: the frames will take about %.1f GB and %.1f GB are free there; shorten the "
-                "run (--duration), set /record/compression=rice or /record/frames=none, or choose "
-                "another output folder",
-                out, bytes * 1e-9, free_bytes * 1e-9);
-    }
+    return bytes;
 }
 
-/* Steps the simulation and writes what belongs into the folder; the folder is complete when this
- * returns BST_OK. An interrupted run is closed properly and keeps its .partial name. */
+bst_status bst_run_check_space(bst_ctx *ctx, const bst_scenario *scenario, const char *out,
+                               bool force) {
+    double bytes = frame_bytes(scenario), free_bytes = (double)bst_run_free_bytes(out);
+    if (!(bytes > WORTH_SAYING_BYTES)) {
+        return BST_OK;
+    }
+    if (free_bytes < 0.0) { /* not known */
+        bst_log(ctx, BST_LOG_INFO, "%s: the frames will take about %.1f GB", out, bytes * 1e-9);
+        return BST_OK;
+    }
+    if (bytes <= free_bytes) {
+        bst_log(ctx, BST_LOG_INFO, "%s: the frames will take about %.1f GB of %.1f GB free", out,
+                bytes * 1e-9, free_bytes * 1e-9);
+        return BST_OK;
+    }
+    static const char advice[] =
+        "shorten the run (--duration), set /record/compression=rice or /record/frames=none, or "
+        "choose another output folder";
+    if (!force) {
+        return bst_fail(ctx, BST_ERR_IO,
+                        "%s: the frames will take about %.1f GB and %.1f GB are free there; %s; "
+                        "--force starts all the same",
+                        out, bytes * 1e-9, free_bytes * 1e-9, advice);
+    }
+    bst_log(ctx, BST_LOG_WARNING,
+            "%s: the frames will take about %.1f GB and %.1f GB are free there; %s", out,
+            bytes * 1e-9, free_bytes * 1e-9, advice);
+    return BST_OK;
+}

@@ -4,7 +4,9 @@
 
 #include "sim/engine/scenario.h"
 
-/* Warns when the disk on which `out` lies does not look large enough for the frames. */
-void bst_run_warn_of_space(bst_ctx *ctx, const bst_scenario *scenario, const char *out);
+/* Says how much the frames of a run will take where that is 0.1 GB or more. BST_ERR_IO when the
+ * disk on which `out` lies has less; with `force` a warning instead. */
+bst_status bst_run_check_space(bst_ctx *ctx, const bst_scenario *scenario, const char *out,
+                               bool force) BST_MUST_CHECK;
 
 #endif

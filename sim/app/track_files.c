@@ -7,6 +7,7 @@
 #include <cjson/cJSON.h>
 
 #include "sim/app/json_number.h"
+#include "sim/io/csv.h"
 #include "sim/io/tdm_writer.h"
 
 void bst_track_object(const bst_run_track *track, char *name, size_t bytes) {
@@ -132,18 +133,6 @@ void bst_track_csv_head(FILE *stream) {
         stream);
 }
 
-/* A text field of a CSV, quoted as RFC 4180 has it. */
-static void write_field(FILE *stream, const char *text) {
-    fputc('"', stream);
-    for (; *text; text++) {
-        if (*text == '"') {
-            fputc('"', stream);
-        }
-        fputc(*text, stream);
-    }
-    fputc('"', stream);
-}
-
 static void write_number(FILE *stream, double value) {
     if (isfinite(value)) {
         fprintf(stream, ",%.17g", value);
@@ -153,9 +142,11 @@ static void write_number(FILE *stream, double value) {
 }
 
 bst_status bst_track_write_csv(bst_ctx *ctx, FILE *stream, const bst_run_track *track) {
-    char object[96], sensor[170], utc[40];
+    char object[96], sensor[170], id[200], utc[40];
     bst_track_object(track, object, sizeof object);
     snprintf(sensor, sizeof sensor, "%s/%s", track->sensor->observer, track->sensor->name);
+    /* a track's number is unique within its sensor */
+    snprintf(id, sizeof id, "%s/%" PRId64, sensor, track->id);
     for (int64_t i = 0; i < track->count; i++) {
         const bst_run_observation *o = &track->items[i];
         const bst_vec3 r = o->od.observer.position_m, v = o->od.observer.velocity_mps;
@@ -163,11 +154,12 @@ bst_status bst_track_write_csv(bst_ctx *ctx, FILE *stream, const bst_run_track *
         bst_vec3_to_radec(o->od.direction, &ra, &dec);
         sigmas(&o->od, &east, &north, &correlation);
         bst_time_to_utc(o->time, 6, utc, sizeof utc);
-        /* a track's number is unique within its sensor */
-        fprintf(stream, "%s,%s/%" PRId64 ",", utc, sensor, track->id);
-        write_field(stream, object);
+        fprintf(stream, "%s,", utc);
+        bst_csv_put_text(stream, id);
         fputc(',', stream);
-        write_field(stream, sensor);
+        bst_csv_put_text(stream, object);
+        fputc(',', stream);
+        bst_csv_put_text(stream, sensor);
         const double numbers[] = {ra / BST_DEG_RAD,
                                   dec / BST_DEG_RAD,
                                   east / BST_ARCSEC_RAD,

@@ -7,10 +7,11 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "sim/core/draft.h"
 #include "sim/world/child.h"
 
 struct bst_video {
-    char path[4096], draft[4128], words[4128];
+    char path[4096], draft[4160], words[4160];
     size_t bytes; /* of a frame */
     bool refused; /* a frame was not taken: whatever is there is not whole */
     bst_child child;
@@ -35,6 +36,20 @@ static bst_status has_x264(bst_ctx *ctx, bool *out) {
     return BST_OK;
 }
 
+/* The film, which ffmpeg writes into the file that is there (-y), and what it says. */
+static bst_status make_drafts(bst_ctx *ctx, bst_video *v) {
+    int fd;
+    BST_TRY(bst_draft_make(ctx, v->path, v->draft, sizeof v->draft, &fd));
+    close(fd);
+    bst_status status = bst_draft_make(ctx, v->path, v->words, sizeof v->words, &fd);
+    if (status == BST_OK) {
+        close(fd);
+    } else {
+        unlink(v->draft);
+    }
+    return status;
+}
+
 bst_status bst_video_begin(bst_ctx *ctx, const char *path, int width, int height, double frame_rate,
                            bst_video **out) {
     *out = NULL;
@@ -44,17 +59,20 @@ bst_status bst_video_begin(bst_ctx *ctx, const char *path, int width, int height
     if (!v) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a film");
     }
-    int n = snprintf(v->path, sizeof v->path, "%s", path);
-    if (n < 0 || (size_t)n >= sizeof v->path) {
+    if (strlen(path) + 3 > sizeof v->path) {
         free(v);
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", path);
     }
     /* a path is never taken for an option or a protocol */
     const char *here = path[0] == '/' ? "" : "./";
-    snprintf(v->draft, sizeof v->draft, "%s%s.tmp.%ld", here, v->path, (long)getpid());
-    snprintf(v->words, sizeof v->words, "%s%s.log.%ld", here, v->path, (long)getpid());
+    snprintf(v->path, sizeof v->path, "%s%s", here, path);
+    bst_status status = make_drafts(ctx, v);
+    if (status != BST_OK) {
+        free(v);
+        return status;
+    }
     v->bytes = 3 * (size_t)width * (size_t)height;
-    char size[32], rate[32], output[4160];
+    char size[32], rate[32], output[4200];
     snprintf(size, sizeof size, "%dx%d", width, height);
     snprintf(rate, sizeof rate, "%.6g", frame_rate);
     snprintf(output, sizeof output, "file:%s", v->draft);
@@ -89,8 +107,10 @@ bst_status bst_video_begin(bst_ctx *ctx, const char *path, int width, int height
                                 "mp4",
                                 output,
                                 NULL};
-    bst_status status = bst_child_start_fed(ctx, argv, v->words, &v->child);
+    status = bst_child_start_fed(ctx, argv, v->words, &v->child);
     if (status != BST_OK) {
+        unlink(v->draft);
+        unlink(v->words);
         free(v);
         return status;
     }

@@ -14,6 +14,7 @@ struct bst_eop {
     int first_mjd; /* of rows[0], 0h UTC */
     int count;     /* >= 2 */
     bst_eop_values *rows;
+    bst_eop_prediction after;
 };
 
 static bst_status out_of_memory(bst_ctx *ctx) {
@@ -34,7 +35,12 @@ bst_status bst_eop_builtin(bst_ctx *ctx, bst_eop **out) {
         rows[i] = (bst_eop_values){row->ut1_minus_utc * 1e-7, row->xp_uas * (1e-6 * BST_ARCSEC_RAD),
                                    row->yp_uas * (1e-6 * BST_ARCSEC_RAD)};
     }
-    *eop = (bst_eop){bst_eop_table_first_mjd, count, rows};
+    *eop = (bst_eop){.first_mjd = bst_eop_table_first_mjd, .count = count, .rows = rows};
+    bst_status status = bst_eop_prediction_fit(ctx, eop->first_mjd, count, rows, &eop->after);
+    if (status != BST_OK) {
+        bst_eop_free(eop);
+        return status;
+    }
     *out = eop;
     return BST_OK;
 }
@@ -179,6 +185,9 @@ bst_status bst_eop_read_buffer(bst_ctx *ctx, const char *name, const char *data,
     BST_TRY(bst_file_check_text(ctx, name, data, bytes));
     bst_eop *eop = calloc(1, sizeof *eop);
     bst_status status = eop ? read_rows(ctx, name, data, bytes, eop) : out_of_memory(ctx);
+    if (status == BST_OK) {
+        status = bst_eop_prediction_fit(ctx, eop->first_mjd, eop->count, eop->rows, &eop->after);
+    }
     if (status != BST_OK) {
         bst_eop_free(eop);
         return status;
@@ -197,44 +206,84 @@ bst_status bst_eop_load(bst_ctx *ctx, const char *path, bst_eop **out) {
     return status;
 }
 
+/* Days after the last row that are predicted. */
+static const double PREDICTED_DAYS = 365.25 * BST_EOP_PREDICTED_YEARS;
+
 static bst_status fail_outside(bst_ctx *ctx, const bst_eop *eop, bst_time t) {
     char when[40];
     int first[3], last[3];
     double fraction;
     bst_time_to_utc(t, 0, when, sizeof when);
     eraJd2cal(ERFA_DJM0, eop->first_mjd, &first[0], &first[1], &first[2], &fraction);
-    eraJd2cal(ERFA_DJM0, eop->first_mjd + eop->count - 1, &last[0], &last[1], &last[2], &fraction);
+    eraJd2cal(ERFA_DJM0, eop->after.last_mjd, &last[0], &last[1], &last[2], &fraction);
     return bst_fail(ctx, BST_ERR_RANGE,
                     "%s is outside the Earth-orientation table, which covers %04d-%02d-%02d to "
-                    "%04d-%02d-%02d 0h UTC; give an IERS EOP C04 file that covers it",
-                    when, first[0], first[1], first[2], last[0], last[1], last[2]);
+                    "%04d-%02d-%02d 0h UTC and is continued for %d years; give an IERS EOP C04 "
+                    "file that covers it",
+                    when, first[0], first[1], first[2], last[0], last[1], last[2],
+                    BST_EOP_PREDICTED_YEARS);
+}
+
+/* Days after the first row, in two parts. */
+static double day_of(const bst_eop *eop, bst_time t, double *fraction) {
+    double utc1;
+    bst_time_utc(t, &utc1, fraction);
+    return utc1 - ERFA_DJM0 - eop->first_mjd;
 }
 
 bst_status bst_eop_at(bst_ctx *ctx, const bst_eop *eop, bst_time t, bst_eop_values *out) {
-    double utc1, utc2;
-    bst_time_utc(t, &utc1, &utc2);
-    double day = utc1 - ERFA_DJM0 - eop->first_mjd;
-    /* The instant of the last row itself is still covered. */
-    bool last = day == eop->count - 1 && utc2 == 0.0;
-    if (!(day >= 0.0 && (day < eop->count - 1 || last))) {
+    double f, day = day_of(eop, t, &f);
+    if (!(day >= 0.0 && day + f - (eop->count - 1) <= PREDICTED_DAYS)) {
         return fail_outside(ctx, eop, t);
     }
-    int i = last ? eop->count - 2 : (int)day;
-    double f = last ? 1.0 : utc2;
-    const bst_eop_values *a = &eop->rows[i], *b = &eop->rows[i + 1];
+    if (day >= eop->count - 1) {
+        if (day == eop->count - 1 && f == 0.0) {
+            *out = eop->rows[eop->count - 1];
+        } else {
+            bst_eop_prediction_at(&eop->after, eop->first_mjd + day + f, out);
+        }
+        return BST_OK;
+    }
+    const bst_eop_values *a = &eop->rows[(int)day], *b = a + 1;
     /* A leap second at the end of the day moves UT1-UTC by a whole second at b. */
     double step = b->ut1_minus_utc_s - a->ut1_minus_utc_s;
     step -= round(step);
-    out->ut1_minus_utc_s = last ? b->ut1_minus_utc_s : a->ut1_minus_utc_s + f * step;
+    out->ut1_minus_utc_s = a->ut1_minus_utc_s + f * step;
     out->xp_rad = a->xp_rad + f * (b->xp_rad - a->xp_rad);
     out->yp_rad = a->yp_rad + f * (b->yp_rad - a->yp_rad);
     return BST_OK;
 }
 
+bool bst_eop_uncertainty_at(const bst_eop *eop, bst_time t, bst_eop_uncertainty *out) {
+    double f, day = day_of(eop, t, &f);
+    *out = (bst_eop_uncertainty){0};
+    if (!(day + f > eop->count - 1)) {
+        return false;
+    }
+    bst_eop_prediction_error(&eop->after, eop->first_mjd + day + f, out);
+    return true;
+}
+
+void bst_eop_warn(bst_ctx *ctx, const bst_eop *eop, bst_time last, const char *where) {
+    bst_eop_uncertainty u;
+    int end[3];
+    double fraction;
+    if (!bst_eop_uncertainty_at(eop, last, &u)) {
+        return;
+    }
+    eraJd2cal(ERFA_DJM0, eop->after.last_mjd, &end[0], &end[1], &end[2], &fraction);
+    bst_log(ctx, BST_LOG_WARNING,
+            "%sthe Earth-orientation table ends on %04d-%02d-%02d, %.0f days earlier: UT1 is "
+            "predicted to within %.*f ms (%.*f arcsec of the Earth's rotation), the pole to within "
+            "%.2f arcsec (95 %%); leap seconds after the last one announced are not known",
+            where, end[0], end[1], end[2], u.days, u.ut1_s < 0.1, 1e3 * u.ut1_s, u.ut1_s < 0.1,
+            15.041 * u.ut1_s, u.pole_arcsec);
+}
+
 bst_status bst_eop_nearest(bst_ctx *ctx, const bst_eop *eop, bst_time t, bst_time *out) {
     bst_time first, last;
     BST_TRY(bst_time_from_utc_jd(ctx, ERFA_DJM0, eop->first_mjd, &first));
-    BST_TRY(bst_time_from_utc_jd(ctx, ERFA_DJM0, eop->first_mjd + eop->count - 1, &last));
+    BST_TRY(bst_time_from_utc_jd(ctx, ERFA_DJM0, eop->after.last_mjd + PREDICTED_DAYS, &last));
     first = bst_time_add(first, 1.0);
     last = bst_time_add(last, -1.0);
     *out = bst_time_diff(t, first) < 0.0 ? first : bst_time_diff(t, last) > 0.0 ? last : t;

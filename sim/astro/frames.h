@@ -2,6 +2,8 @@
 #ifndef BST_ASTRO_FRAMES_H
 #define BST_ASTRO_FRAMES_H
 
+#include <stdbool.h>
+
 #include "sim/astro/time.h"
 #include "sim/core/vec.h"
 
@@ -24,9 +26,26 @@ bst_status bst_eop_read_buffer(bst_ctx *ctx, const char *name, const char *data,
                                bst_eop **out) BST_MUST_CHECK;
 void bst_eop_free(bst_eop *eop); /* NULL allowed */
 /* Values at t: linear interpolation between 0h UTC values, leap seconds handled; no sub-daily
- * tides. Outside the table: BST_ERR_RANGE naming the dates covered. */
+ * tides. After the table, for BST_EOP_PREDICTED_YEARS years, they are predicted from it
+ * (bst_eop_uncertainty_at). Before it and after those years: BST_ERR_RANGE naming the dates. */
 bst_status bst_eop_at(bst_ctx *ctx, const bst_eop *eop, bst_time t,
                       bst_eop_values *out) BST_MUST_CHECK;
+enum { BST_EOP_PREDICTED_YEARS = 30 };
+
+/* What predicted values are uncertain by: 2.5 times the root mean square of past predictions'
+ * errors, which at least 95 % of them kept. Leap seconds that are not announced yet are not in it:
+ * they change UT1-UTC by whole seconds, and what UTC calls an instant, but not where the Earth is
+ * at an instant of TAI. */
+typedef struct bst_eop_uncertainty {
+    double days;        /* after the table's last row */
+    double ut1_s;       /* 15 arcsec of the Earth's rotation a second */
+    double pole_arcsec; /* per axis */
+} bst_eop_uncertainty;
+/* True, and *out set, where t is after the table; false (all 0) in the table or before it. */
+bool bst_eop_uncertainty_at(const bst_eop *eop, bst_time t, bst_eop_uncertainty *out);
+/* Logs a warning with the uncertainty at `last` where that is after the table; `where` ("file: ")
+ * stands before it. */
+void bst_eop_warn(bst_ctx *ctx, const bst_eop *eop, bst_time last, const char *where);
 
 /* Rotations at one instant, for positions and velocities alike. The frames TEME and GCRF turn
  * against each other by 8e-12 rad/s, which velocities leave out (0.3 mm/s at a geostationary

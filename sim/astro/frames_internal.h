@@ -4,6 +4,29 @@
 
 #include "sim/astro/frames.h"
 
+/* How a table goes on after its last row. */
+typedef struct bst_eop_prediction {
+    int last_mjd; /* of the last row, 0h UTC */
+    int rows;     /* of the table */
+    double ut1_minus_tai_s, rate_s_per_day;
+    double terms_arcsec[2][5]; /* x and y: constant, cosine and sine of a year and of Chandler */
+    double rest_arcsec[2];     /* of the last row over them */
+} bst_eop_prediction;
+
+/* Fits what follows a table's rows (at least 2): the pole as the secular pole with an offset, a
+ * year and Chandler's wobble, the rest of the last row fading; UT1-TAI with the mean rate of the
+ * last half year and the conventional seasons. Continuous at the last row. BST_ERR_NUMERIC for
+ * values that are no numbers. Source: the form of IERS Bulletin A; McCarthy and Luzum, Bulletin
+ * Geodesique 65 (1991) 18. */
+bst_status bst_eop_prediction_fit(bst_ctx *ctx, int first_mjd, int count,
+                                  const bst_eop_values *rows,
+                                  bst_eop_prediction *out) BST_MUST_CHECK;
+/* Values at a UTC date after the table, with the leap seconds that ERFA knows. */
+void bst_eop_prediction_at(const bst_eop_prediction *prediction, double mjd, bst_eop_values *out);
+/* Their errors there. */
+void bst_eop_prediction_error(const bst_eop_prediction *prediction, double mjd,
+                              bst_eop_uncertainty *out);
+
 typedef struct bst_earth_parts {
     bst_mat3 cirs_from_gcrf; /* celestial intermediate pole and origin */
     bst_mat3 itrf_from_tirs; /* polar motion and TIO locator */

@@ -170,6 +170,31 @@ static bst_status fit(bst_ctx *ctx, const bst_sgp4_place *places, int count, dou
     return bst_fail(ctx, BST_ERR_NUMERIC, "the fit of mean elements does not converge");
 }
 
+/* What both functions start from; false for what is no ellipse or turns backwards in the equator.
+ */
+static bool start_from(bst_vec3 position_teme_m, bst_vec3 velocity_teme_mps, double x[ELEMENTS]) {
+    bst_kepler_elements k = bst_kepler_elements_of(MU_72, position_teme_m, velocity_teme_mps);
+    if (!(k.semi_major_axis_m > 0.0) || !(k.eccentricity < 1.0) ||
+        k.inclination_rad > BST_PI - 0.1 * BST_DEG_RAD) {
+        return false;
+    }
+    double a = k.semi_major_axis_m, perigee = k.arg_perigee_rad + k.raan_rad;
+    double tangent = tan(0.5 * k.inclination_rad);
+    x[0] = 60.0 * sqrt(MU_72 / (a * a * a));
+    x[1] = k.eccentricity * cos(perigee);
+    x[2] = k.eccentricity * sin(perigee);
+    x[3] = tangent * cos(k.raan_rad);
+    x[4] = tangent * sin(k.raan_rad);
+    x[5] = k.mean_anomaly_rad + perigee;
+    return true;
+}
+
+static bst_status fail_start(bst_ctx *ctx) {
+    return bst_fail(ctx, BST_ERR_NUMERIC,
+                    "mean elements of SGP4 need an ellipse with an inclination below 179.9 "
+                    "degrees");
+}
+
 bst_status bst_sgp4_fit(bst_ctx *ctx, const bst_sgp4_place *places, int count,
                         bst_vec3 position_teme_m, bst_vec3 velocity_teme_mps,
                         bst_elements *elements, double *rms_m) {
@@ -177,17 +202,133 @@ bst_status bst_sgp4_fit(bst_ctx *ctx, const bst_sgp4_place *places, int count,
         return bst_fail(ctx, BST_ERR_ARGUMENT, "mean elements need %d to %d places, not %d",
                         ELEMENTS, MOST_PLACES, count);
     }
-    bst_kepler_elements k = bst_kepler_elements_of(MU_72, position_teme_m, velocity_teme_mps);
-    if (!(k.semi_major_axis_m > 0.0) || !(k.eccentricity < 1.0) ||
-        k.inclination_rad > BST_PI - 0.1 * BST_DEG_RAD) {
-        return bst_fail(ctx, BST_ERR_NUMERIC,
-                        "mean elements of SGP4 need an ellipse with an inclination below 179.9 "
-                        "degrees");
+    double x[ELEMENTS];
+    if (!start_from(position_teme_m, velocity_teme_mps, x)) {
+        return fail_start(ctx);
     }
-    double a = k.semi_major_axis_m, perigee = k.arg_perigee_rad + k.raan_rad;
-    double tangent = tan(0.5 * k.inclination_rad);
-    double x[ELEMENTS] = {60.0 * sqrt(MU_72 / (a * a * a)), k.eccentricity * cos(perigee),
-                          k.eccentricity * sin(perigee),    tangent * cos(k.raan_rad),
-                          tangent * sin(k.raan_rad),        k.mean_anomaly_rad + perigee};
     return fit(ctx, places, count, x, elements, rms_m);
+}
+
+bool bst_sgp4_motion(const bst_sgp4 *sgp4, double minutes, bst_vec3 *r, bst_vec3 *v) {
+    const double h = 4.0; /* s: truncation 1e-7 m/s in low orbits, rounding 1e-8 m/s in high ones */
+    static const double weight[5] = {1.0 / 12.0, -8.0 / 12.0, 0.0, 8.0 / 12.0, -1.0 / 12.0};
+    *v = (bst_vec3){0.0, 0.0, 0.0};
+    for (int i = 0; i < 5; i++) {
+        double km[3], unused[3];
+        if (bst_sgp4_propagate(sgp4, minutes + (i - 2) * h / 60.0, km, unused) != BST_SGP4_OK) {
+            return false;
+        }
+        const bst_vec3 place = bst_vec3_scale((bst_vec3){km[0], km[1], km[2]}, 1e3);
+        *v = bst_vec3_axpy(*v, weight[i] / h, place);
+        if (i == 2) {
+            *r = place;
+        }
+    }
+    return true;
+}
+
+/* State at the epoch, as six numbers in m: places, and velocities times `time_s`. */
+static bool state_of(const bst_elements *elements, double time_s, double out[ELEMENTS]) {
+    bst_sgp4 *sgp4;
+    bst_vec3 r, v;
+    if (bst_sgp4_create(NULL, elements, BST_SGP4_WGS72, BST_SGP4_IMPROVED, &sgp4) != BST_OK) {
+        return false;
+    }
+    bool good = bst_sgp4_motion(sgp4, 0.0, &r, &v);
+    bst_sgp4_free(sgp4);
+    if (good) {
+        const double all[ELEMENTS] = {r.x, r.y, r.z, v.x * time_s, v.y * time_s, v.z * time_s};
+        memcpy(out, all, sizeof all);
+    }
+    return good;
+}
+
+/* Newton's step for `miss`, wanted less found; false when SGP4 has no orbit near. */
+static bool newton(const double x[ELEMENTS], const bst_elements *elements, double time_s,
+                   const double miss[ELEMENTS], double step[ELEMENTS]) {
+    double slope[ELEMENTS][ELEMENTS], a[ELEMENTS][ELEMENTS + 1], size[ELEMENTS];
+    for (int k = 0; k < ELEMENTS; k++) {
+        double side[2][ELEMENTS];
+        size[k] = k == 0 ? x[0] : 1.0;
+        for (int s = 0; s < 2; s++) {
+            double y[ELEMENTS];
+            bst_elements near = *elements;
+            memcpy(y, x, sizeof y);
+            y[k] += (s ? -1e-6 : 1e-6) * size[k];
+            if (!to_elements(y, &near) || !state_of(&near, time_s, side[s])) {
+                return false;
+            }
+        }
+        for (int i = 0; i < ELEMENTS; i++) {
+            slope[k][i] = (side[0][i] - side[1][i]) / 2e-6;
+        }
+    }
+    for (int k = 0; k < ELEMENTS; k++) {
+        for (int l = 0; l <= ELEMENTS; l++) {
+            a[k][l] = 0.0;
+            for (int i = 0; i < ELEMENTS; i++) {
+                a[k][l] += slope[k][i] * (l < ELEMENTS ? slope[l][i] : miss[i]);
+            }
+        }
+    }
+    if (!solve6(a, step)) {
+        return false;
+    }
+    step[0] *= size[0];
+    return true;
+}
+
+/* Wanted less what the elements of x give, and its square; false when SGP4 has no state there. */
+static bool miss_of(const double x[ELEMENTS], double time_s, const double wanted[ELEMENTS],
+                    bst_elements *elements, double miss[ELEMENTS], double *sum2) {
+    double here[ELEMENTS];
+    if (!to_elements(x, elements) || !state_of(elements, time_s, here)) {
+        return false;
+    }
+    *sum2 = 0.0;
+    for (int k = 0; k < ELEMENTS; k++) {
+        miss[k] = wanted[k] - here[k];
+        *sum2 += miss[k] * miss[k];
+    }
+    return isfinite(*sum2);
+}
+
+bst_status bst_sgp4_through(bst_ctx *ctx, bst_vec3 r, bst_vec3 v, bst_elements *elements) {
+    enum { STEPS = 60, HALVINGS = 12 };
+    double x[ELEMENTS], miss[ELEMENTS], sum2, time_s = bst_vec3_norm(r) / bst_vec3_norm(v);
+    const double wanted[ELEMENTS] = {r.x, r.y, r.z, v.x * time_s, v.y * time_s, v.z * time_s};
+    if (!start_from(r, v, x)) {
+        return fail_start(ctx);
+    }
+    bool good = miss_of(x, time_s, wanted, elements, miss, &sum2);
+    for (int i = 0; i < STEPS && good; i++) {
+        double step[ELEMENTS], share = 1.0, before = sum2;
+        bst_elements near = *elements;
+        bool better = false;
+        if (!newton(x, elements, time_s, miss, step)) {
+            break;
+        }
+        /* shorter where the theory bends: near the equator in deep space */
+        for (int k = 0; k < HALVINGS && !better; k++, share *= 0.5) {
+            double y[ELEMENTS], then[ELEMENTS];
+            for (int j = 0; j < ELEMENTS; j++) {
+                y[j] = x[j] + share * step[j];
+            }
+            better = miss_of(y, time_s, wanted, &near, then, &sum2) && sum2 < before;
+            if (better) {
+                memcpy(x, y, sizeof y);
+                memcpy(miss, then, sizeof then);
+                *elements = near;
+            }
+        }
+        sum2 = better ? sum2 : before;
+        if (!better || sum2 > 0.25 * before) {
+            /* as far as rounding lets it come */
+            if (sum2 < 1e-6) {
+                return BST_OK;
+            }
+            good = better;
+        }
+    }
+    return bst_fail(ctx, BST_ERR_NUMERIC, "SGP4 has no orbit through this state");
 }

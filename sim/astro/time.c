@@ -10,6 +10,10 @@
 /* The start of UTC. ERFA judges by the following day, and so lets the day before pass. */
 #define FIRST_YEAR 1960
 #define FIRST_JD 2436934.5
+/* Years after ERFA's own tables count the leap seconds that it knows; beyond this a date is taken
+ * for a slip. */
+#define LAST_YEAR 2099
+#define END_JD 2488069.5 /* 2100-01-01 */
 
 /* jd1 + jd2 as a midnight and a fraction in [0, 1). */
 static bst_time normalised(double jd1, double jd2) {
@@ -93,9 +97,8 @@ static bool read_iso(const char *text, calendar *c) {
 
 static bst_status fail_years(bst_ctx *ctx, const char *what) {
     return bst_fail(ctx, BST_ERR_RANGE,
-                    "the time %s lies outside the years for which leap seconds are known; UTC is "
-                    "accepted from 1960 to 5 years after the release of the ERFA library",
-                    what);
+                    "the time %s lies outside the years for which UTC is accepted, %d to %d", what,
+                    FIRST_YEAR, LAST_YEAR);
 }
 
 bst_status bst_time_from_utc(bst_ctx *ctx, const char *iso, bst_time *out) {
@@ -111,6 +114,7 @@ bst_status bst_time_from_utc(bst_ctx *ctx, const char *iso, bst_time *out) {
                           (double)c.second + c.fraction, &utc1, &utc2);
     switch (status) {
         case 0:
+        case 1: /* a year after ERFA's tables */
             break;
         case -2:
             return bst_fail(ctx, BST_ERR_FORMAT, "\"%.60s\": month %02d is not in 01..12", iso,
@@ -133,7 +137,7 @@ bst_status bst_time_from_utc(bst_ctx *ctx, const char *iso, bst_time *out) {
         default:
             return fail_years(ctx, iso);
     }
-    if (c.year < FIRST_YEAR || eraUtctai(utc1, utc2, &tai1, &tai2) != 0) {
+    if (c.year < FIRST_YEAR || c.year > LAST_YEAR || eraUtctai(utc1, utc2, &tai1, &tai2) < 0) {
         return fail_years(ctx, iso);
     }
     *out = normalised(tai1, tai2);
@@ -144,7 +148,8 @@ bst_status bst_time_from_utc_jd(bst_ctx *ctx, double jd1, double jd2, bst_time *
     double tai1, tai2;
     char what[64];
     snprintf(what, sizeof what, "JD %.9f (UTC)", jd1 + jd2);
-    if (!isfinite(jd1 + jd2) || jd1 + jd2 < FIRST_JD || eraUtctai(jd1, jd2, &tai1, &tai2) != 0) {
+    if (!isfinite(jd1 + jd2) || jd1 + jd2 < FIRST_JD || jd1 + jd2 >= END_JD ||
+        eraUtctai(jd1, jd2, &tai1, &tai2) < 0) {
         return fail_years(ctx, what);
     }
     *out = normalised(tai1, tai2);

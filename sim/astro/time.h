@@ -13,8 +13,8 @@ typedef struct bst_time {
 } bst_time;
 
 /* Reads "YYYY-MM-DDThh:mm:ss[.fff...][Z]" (UTC; second 60 in a leap second only). Errors:
- * BST_ERR_FORMAT with the text and what is allowed; BST_ERR_RANGE before 1960 or more than 5 years
- * after the release of the leap-second table of ERFA. */
+ * BST_ERR_FORMAT with the text and what is allowed; BST_ERR_RANGE before 1960 or after 2099.
+ * Leap seconds are those that ERFA knows; that none comes after them is an assumption. */
 bst_status bst_time_from_utc(bst_ctx *ctx, const char *iso, bst_time *out) BST_MUST_CHECK;
 
 /* Writes UTC as "YYYY-MM-DDThh:mm:ss.fffZ" with `digits` decimals (taken into 0..9); buffer of

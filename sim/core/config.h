@@ -17,7 +17,7 @@ typedef enum bst_config_type {
     BST_CONFIG_PATH,    /* the same: a file; a scenario's are made absolute when it is read */
     BST_CONFIG_ENUM,    /* int32_t, index into choices */
     BST_CONFIG_CHOICES, /* uint32_t, bit k for choices[k]; in JSON a list of names */
-    BST_CONFIG_SEED,    /* uint64_t, hex string "0x..." */
+    BST_CONFIG_SEED,    /* uint64_t: "0x...", a decimal string, or an integer */
     BST_CONFIG_REALS,   /* double[size / sizeof(double)], a fixed-length array */
     BST_CONFIG_OBJECT,  /* nested struct, children */
     BST_CONFIG_LIST,    /* bst_config_list of structs, children, item_bytes */
@@ -54,6 +54,10 @@ typedef struct bst_config_desc {
         .key = #m, .type = BST_CONFIG_REAL, .unit = unit_, .minimum = min_, .maximum = max_, \
         .fallback = def_, .doc = doc_, BST_FIELD_(s, m)                                      \
     }
+/* A number that may be left open: null, the default, is NAN in the struct. */
+#define BST_OPEN_REAL(s, m, unit_, min_, max_, doc_) \
+    BST_REAL(s, m, unit_, min_, max_, BST_CONFIG_OPEN, doc_)
+#define BST_CONFIG_OPEN "null"
 #define BST_INT(s, m, unit_, min_, max_, def_, doc_)                                        \
     {                                                                                       \
         .key = #m, .type = BST_CONFIG_INT, .unit = unit_, .minimum = min_, .maximum = max_, \
@@ -125,6 +129,8 @@ bst_status bst_json_load(bst_ctx *ctx, const char *path, bst_json **out) BST_MUS
 bst_status bst_json_parse(bst_ctx *ctx, const char *name, const char *text, size_t bytes,
                           bst_json **out) BST_MUST_CHECK;
 void bst_json_free(bst_json *json);
+/* A deep copy, with the file of each value (bst_json_file); the caller frees it. BST_ERR_MEMORY. */
+bst_status bst_json_copy(bst_ctx *ctx, const bst_json *json, bst_json **out) BST_MUST_CHECK;
 struct cJSON *bst_json_root(const bst_json *json);
 const char *bst_json_name(const bst_json *json);
 
@@ -136,6 +142,9 @@ bst_status bst_json_load_extended(bst_ctx *ctx, const char *path, bst_json **out
 /* The file that gave the value at a JSON pointer, or the latest that changed something in it; lent.
  */
 const char *bst_json_file(const bst_json *json, const char *pointer);
+/* The files that gave values, in the order in which they were applied, with repeats; NULL after the
+ * last one, and for a document that extends no other; lent. */
+const char *bst_json_origin_file(const bst_json *json, int index);
 /* Makes the message in ctx, when it begins "NAME: /json/pointer:", name bst_json_file instead of
  * the document. */
 void bst_json_name_file(bst_ctx *ctx, const bst_json *json);
@@ -147,7 +156,7 @@ bst_status bst_json_check_assignment(bst_ctx *ctx, const char *assignment) BST_M
 bst_status bst_json_set(bst_ctx *ctx, bst_json *json, const char *assignment) BST_MUST_CHECK;
 
 /* Puts `value`, which it takes, at a JSON pointer. Objects on the way are made when missing; array
- * elements must exist. */
+ * elements must exist. The value counts as given by the document's own file (bst_json_file). */
 bst_status bst_json_assign(bst_ctx *ctx, bst_json *json, const char *pointer,
                            struct cJSON *value) BST_MUST_CHECK;
 
@@ -168,6 +177,8 @@ void bst_config_free(const bst_config_desc *table, void *object);
 bst_status bst_config_defaults(bst_ctx *ctx, const bst_config_desc *table,
                                void *object) BST_MUST_CHECK;
 
+/* Whether a key may be null. */
+bool bst_config_is_open(const bst_config_desc *desc);
 /* The object as JSON with every default written out; the caller frees with cJSON_Delete. NULL when
  * out of memory. For printing: numbers are raw items whose text reads back as the same bits. */
 struct cJSON *bst_config_echo(const bst_config_desc *table, const void *object);

@@ -7,6 +7,16 @@
 /* The largest magnitude that is shown as a bound; wider ranges mean "any finite number". */
 static const double OPEN_BOUND = 1e300;
 
+/* Text or a number: the pattern is of text, the bounds of numbers. */
+static void add_seed(cJSON *node) {
+    cJSON *types = cJSON_AddArrayToObject(node, "type");
+    cJSON_AddItemToArray(types, cJSON_CreateString("string"));
+    cJSON_AddItemToArray(types, cJSON_CreateString("integer"));
+    cJSON_AddStringToObject(node, "pattern", "^(0x[0-9a-fA-F]{1,16}|[0-9]{1,20})$");
+    cJSON_AddNumberToObject(node, "minimum", 0);
+    cJSON_AddRawToObject(node, "maximum", "9007199254740992"); /* 2^53, exact */
+}
+
 static void add_range(cJSON *node, const bst_config_desc *d) {
     if (d->minimum > -OPEN_BOUND) {
         cJSON_AddNumberToObject(node, "minimum", d->minimum);
@@ -25,6 +35,13 @@ static cJSON *value_schema(const bst_config_desc *d) {
             break;
         case BST_CONFIG_INT:
         case BST_CONFIG_REAL:
+            if (bst_config_is_open(d)) {
+                cJSON *types = cJSON_AddArrayToObject(node, "type");
+                cJSON_AddItemToArray(types, cJSON_CreateString("number"));
+                cJSON_AddItemToArray(types, cJSON_CreateString("null"));
+                add_range(node, d);
+                break;
+            }
             cJSON_AddStringToObject(node, "type", d->type == BST_CONFIG_INT ? "integer" : "number");
             add_range(node, d);
             break;
@@ -50,8 +67,7 @@ static cJSON *value_schema(const bst_config_desc *d) {
             break;
         }
         case BST_CONFIG_SEED:
-            cJSON_AddStringToObject(node, "type", "string");
-            cJSON_AddStringToObject(node, "pattern", "^0x[0-9a-fA-F]{1,16}$");
+            add_seed(node);
             break;
         case BST_CONFIG_REALS: {
             cJSON_AddStringToObject(node, "type", "array");

@@ -221,6 +221,9 @@ bst_status bst_json_assign(bst_ctx *ctx, bst_json *json, const char *pointer, cJ
     }
     cJSON_Delete(value);
     free(path);
+    if (status == BST_OK && json->origins) {
+        status = bst_json_note_origin(ctx, json, pointer, json->name);
+    }
     return status;
 }
 
@@ -248,9 +251,6 @@ bst_status bst_json_set(bst_ctx *ctx, bst_json *json, const char *assignment) {
     } else {
         cJSON_Delete(value);
         bst_fail(ctx, status, "out of memory");
-    }
-    if (status == BST_OK && json->origins) {
-        status = bst_json_note_origin(ctx, json, pointer, json->name);
     }
     free(pointer);
     return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "--set %.300s", assignment);

@@ -43,6 +43,10 @@ const char *bst_json_file(const bst_json *json, const char *pointer) {
     return json->name;
 }
 
+const char *bst_json_origin_file(const bst_json *json, int index) {
+    return index < json->origin_count ? json->origins[index].file : NULL;
+}
+
 void bst_json_name_file(bst_ctx *ctx, const bst_json *json) {
     size_t length = strlen(json->name);
     if (!json->origins || strncmp(ctx->message, json->name, length) != 0 ||
@@ -74,6 +78,27 @@ bst_status bst_json_note_origin(bst_ctx *ctx, bst_json *json, const char *pointe
     return BST_OK;
 }
 
+bst_status bst_json_copy(bst_ctx *ctx, const bst_json *json, bst_json **out) {
+    bst_json *copy = calloc(1, sizeof *copy);
+    *out = NULL;
+    if (copy) {
+        copy->name = strdup(json->name);
+        copy->root = cJSON_Duplicate(json->root, 1);
+    }
+    bst_status status = copy && copy->name && copy->root
+                            ? BST_OK
+                            : bst_fail(ctx, BST_ERR_MEMORY, "%s: out of memory", json->name);
+    for (int i = 0; i < json->origin_count && status == BST_OK; i++) {
+        status = bst_json_note_origin(ctx, copy, json->origins[i].pointer, json->origins[i].file);
+    }
+    if (status != BST_OK) {
+        bst_json_free(copy);
+        return status;
+    }
+    *out = copy;
+    return BST_OK;
+}
+
 /* Moves the values of `node`, by top-level key or by pointer, into `json`, whose name is that of
  * the file they come from. */
 static bst_status move_values(bst_ctx *ctx, cJSON *node, bool by_pointer, bst_json *json) {
@@ -96,7 +121,6 @@ static bst_status move_values(bst_ctx *ctx, cJSON *node, bool by_pointer, bst_js
         if (bst_json_assign(ctx, json, pointer, value) != BST_OK) {
             return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: /set: %.200s", file, pointer);
         }
-        BST_TRY(bst_json_note_origin(ctx, json, pointer, file));
     }
     return BST_OK;
 }

@@ -212,6 +212,8 @@ typedef struct bst_truth {
     bst_vec3 sun_m;                        /* observer to Sun, mid */
     double boresight_x_px, boresight_y_px; /* where the boresight meets the focal plane */
     double background_e, dark_e;           /* expected electrons per pixel */
+    double earth_fraction, moon_fraction, sun_fraction; /* of the window's area that their discs
+                                                           cover, 0 to 1 */
     double hits_e;      /* charge of the radiation hits on the sensor, electrons */
     int32_t hits;       /* radiation hits */
     double error_sigma; /* largest error of the image expected in any pixel, in its noise; NAN: not
@@ -263,6 +265,7 @@ enum {
     BST_DETECTION_EDGE = 1u << 1,
     BST_DETECTION_STREAK = 1u << 2, /* elongated beyond the PSF */
     BST_DETECTION_BLEND = 1u << 3,
+    BST_DETECTION_BLOOM = 1u << 5, /* charge overflowed along its columns: placed by its wings */
     BST_DETECTION_STACK = 1u << 4, /* seen in the sum of several frames, this one the last */
 };
 
@@ -298,6 +301,7 @@ typedef struct bst_detections {
     int32_t stars_identified;
     int32_t windows; /* of the frame that were looked at, round predicted places; 0: all of it */
     int32_t count, lost; /* items; detections that found no room */
+    int32_t bad_pixels;  /* of the sensor, that image processing has learned so far */
     bst_detection items[];
 } bst_detections;
 

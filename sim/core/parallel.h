@@ -2,6 +2,7 @@
 #ifndef BST_CORE_PARALLEL_H
 #define BST_CORE_PARALLEL_H
 
+#include <pthread.h>
 #include "sim/core/status.h"
 
 typedef struct bst_parallel bst_parallel;
@@ -22,5 +23,12 @@ typedef void (*bst_parallel_fn)(void *user, int begin, int end);
  * and returns when all are done. pool NULL: on the caller's thread alone. A pool runs one loop at a
  * time: callers on several threads take turns by a lock of their own. */
 void bst_parallel_for(bst_parallel *pool, int count, int grain, bst_parallel_fn fn, void *user);
+
+/* Stack of every thread that is started: frames take up to 192 KiB, an OpenCL compiler more. */
+#define BST_THREAD_STACK_BYTES (8 << 20)
+
+/* pthread_create with a stack of BST_THREAD_STACK_BYTES, whatever the limit of the process is.
+ * Returned: 0, or the error's number. */
+int bst_thread_start(pthread_t *thread, void *(*body)(void *user), void *user);
 
 #endif

@@ -1,5 +1,6 @@
 #include "sim/core/text.h"
 
+#include <stdio.h>
 #include <string.h>
 
 enum { LONGEST_WORD = 64, FARTHEST_SUGGESTION = 3 };
@@ -37,5 +38,24 @@ bool bst_text_is_nearer(const char *word, const char *candidate, size_t *best) {
         return false;
     }
     *best = distance;
+    return true;
+}
+
+const char *bst_count_text(char text[BST_COUNT_TEXT], int64_t count, const char *one,
+                           const char *many) {
+    snprintf(text, BST_COUNT_TEXT, "%lld %s", (long long)count, count == 1 ? one : many);
+    return text;
+}
+
+bool bst_text_is_file_name(const char *word) {
+    size_t length = strlen(word);
+    if (length == 0 || length > 255 || word[0] == '.') {
+        return false;
+    }
+    for (const char *c = word; *c; c++) {
+        if (*c == '/' || (unsigned char)*c < 0x20 || *c == 0x7f) {
+            return false;
+        }
+    }
     return true;
 }

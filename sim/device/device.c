@@ -26,6 +26,8 @@ struct bst_device {
     cl_context context;
     cl_command_queue queue;
     char description[4 * NAME_BYTES];
+    time_t opened;
+    bool pocl;
     const bst_kernel_source *built[MAX_BUILT]; /* sources of all programs, each once */
     int built_count;
     kept_program programs[MAX_PROGRAMS];
@@ -215,7 +217,9 @@ bst_status bst_device_open(bst_ctx *ctx, const char *selector, int threads, bst_
         goto exit;
     }
     int count = 0;
-    if ((status = list_devices(ctx, list, &count)) != BST_OK) {
+    device->opened = time(NULL);
+    if ((status = bst_kernel_cache_prepare(ctx)) != BST_OK ||
+        (status = list_devices(ctx, list, &count)) != BST_OK) {
         goto exit;
     }
     int chosen = choose(list, count, selector ? selector : "");
@@ -225,6 +229,7 @@ bst_status bst_device_open(bst_ctx *ctx, const char *selector, int threads, bst_
     }
     const candidate *c = &list[chosen];
     device->parent = device->id = c->id;
+    device->pocl = c->pocl;
     cl_uint units = 1;
     if ((status = limit_threads(ctx, device, c, threads, &units)) != BST_OK) {
         goto exit;
@@ -285,6 +290,9 @@ void bst_device_close(bst_device *device) {
     }
     if (device->id != device->parent) {
         clReleaseDevice(device->id);
+    }
+    if (device->pocl && device->built_count > 0) {
+        bst_kernel_cache_settle(device->opened);
     }
     free(device);
 }

@@ -1,3 +1,4 @@
+#define _XOPEN_SOURCE 700 /* setenv */
 #include "sim/device/kernel_cache.h"
 
 #include <errno.h>
@@ -7,6 +8,9 @@
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
+
+#include "sim/core/folder.h"
+#include "sim/device/kernel_cache_check.h"
 
 /* Why a folder cannot be written, or made where it is not there yet; 0 when it can. */
 static int folder_error(char *path) {
@@ -29,19 +33,74 @@ static int folder_error(char *path) {
     return statvfs(path, &disk) == 0 && disk.f_bavail == 0 ? ENOSPC : 0;
 }
 
-bool bst_kernel_cache_is_unusable(char *text, size_t bytes) {
+/* The folder that PoCL chooses. */
+static void cache_path(char path[4096]) {
     const char *given = getenv("POCL_CACHE_DIR"), *cache = getenv("XDG_CACHE_HOME"),
                *home = getenv("HOME");
-    char path[4096], walked[4096];
     if (given) {
-        snprintf(path, sizeof path, "%s", given);
+        snprintf(path, 4096, "%s", given);
     } else if (cache) {
-        snprintf(path, sizeof path, "%s/pocl/kcache", cache);
+        snprintf(path, 4096, "%s/pocl/kcache", cache);
     } else if (home) {
-        snprintf(path, sizeof path, "%s/.cache/pocl/kcache", home);
+        snprintf(path, 4096, "%s/.cache/pocl/kcache", home);
     } else {
-        snprintf(path, sizeof path, "/tmp/pocl/kcache");
+        snprintf(path, 4096, "/tmp/pocl/kcache");
     }
+}
+
+/* Chooses the folder; see bst_kernel_cache_prepare. */
+static bst_status choose(bst_ctx *ctx, char path[4096]) {
+    bst_ctx quiet = {0};
+    bool given = getenv("POCL_CACHE_DIR") != NULL;
+    bool home = getenv("XDG_CACHE_HOME") || getenv("HOME");
+    cache_path(path);
+    if ((given || home) && bst_folder_make_private(&quiet, path) == BST_OK) {
+        return BST_OK;
+    }
+    struct stat info;
+    if (given && stat(path, &info) != 0) {
+        return BST_OK; /* who cannot write it says so: bst_kernel_cache_is_unusable */
+    }
+    if (given && !S_ISDIR(info.st_mode)) {
+        return BST_OK;
+    }
+    if (!given) {
+        snprintf(path, 4096, "/tmp/boresight-%ld", (long)geteuid());
+        if (bst_folder_make_private(&quiet, path) == BST_OK) {
+            snprintf(path, 4096, "/tmp/boresight-%ld/kcache", (long)geteuid());
+            if (bst_folder_make_private(&quiet, path) == BST_OK &&
+                setenv("POCL_CACHE_DIR", path, 1) == 0) {
+                return BST_OK;
+            }
+        }
+    }
+    return bst_fail(
+        ctx, BST_ERR_DEVICE,
+        "the cache of compiled kernels is not safe: %.500s; programs in it would be run "
+        "as this user: set POCL_CACHE_DIR to a folder of your own",
+        quiet.message);
+}
+
+bst_status bst_kernel_cache_prepare(bst_ctx *ctx) {
+    char path[4096];
+    BST_TRY(choose(ctx, path));
+    int removed = bst_kernel_cache_repair(path);
+    if (removed > 0) {
+        bst_log(ctx, BST_LOG_INFO, "%.500s: %d damaged program%s removed, to be built anew", path,
+                removed, removed == 1 ? "" : "s");
+    }
+    return BST_OK;
+}
+
+void bst_kernel_cache_settle(time_t since) {
+    char path[4096];
+    cache_path(path);
+    bst_kernel_cache_note(path, since);
+}
+
+bool bst_kernel_cache_is_unusable(char *text, size_t bytes) {
+    char path[4096], walked[4096];
+    cache_path(path);
     memcpy(walked, path, sizeof walked);
     int error = folder_error(walked);
     if (error) {

@@ -13,7 +13,7 @@ enum { PORT_COMMAND, PORT_EXPOSURE };
 typedef struct exposure_clock {
     int64_t tick_rate_hz;
     int64_t exposure_ticks, period_ticks;
-    bst_window full, window;
+    bst_window full, own, window; /* of the sensor, of the scenario, of the exposure */
     int binning;
     double pixel_scale_arcsec; /* 0: the camera's */
     bst_frame_cursor
@@ -94,12 +94,16 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
     const bst_camera *camera = bst_world_camera(env->world, env->observer, env->sensor);
     clock->tick_rate_hz = env->tick_rate_hz;
     clock->full = (bst_window){0, 0, (int)camera->width_px, (int)camera->height_px};
-    clock->window = clock->full;
     clock->binning = c->binning > 1 ? (int)c->binning : 1;
     clock->dropped_fraction = c->dropped_fraction;
     clock->drop_key = bst_env_rng(env, "dropped_frames");
     bst_status status =
-        bst_seconds_to_ticks(env->ctx, env->tick_rate_hz, c->exposure_s, &clock->exposure_ticks);
+        bst_exposure_window(env->ctx, c, camera->width_px, camera->height_px, &clock->own);
+    clock->window = clock->own;
+    if (status == BST_OK) {
+        status = bst_seconds_to_ticks(env->ctx, env->tick_rate_hz, c->exposure_s,
+                                      &clock->exposure_ticks);
+    }
     if (status == BST_OK) {
         status =
             bst_seconds_to_ticks(env->ctx, env->tick_rate_hz, c->period_s, &clock->period_ticks);
@@ -171,7 +175,7 @@ static void latch(exposure_clock *clock, const bst_sensor_command *command) {
         clock->pixel_scale_arcsec = command->pixel_scale_arcsec;
     }
     const bst_window *w = &command->window;
-    clock->window = clock->full;
+    clock->window = clock->own;
     if (w->width > 0 && w->height > 0) {
         int x0 = w->x0 < 0 ? 0 : w->x0, y0 = w->y0 < 0 ? 0 : w->y0;
         int x1 = clip_end(w->x0, w->width, clock->full.width);

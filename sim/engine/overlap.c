@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/core/parallel.h"
 #include "sim/engine/engine_internal.h"
 
 enum {
@@ -554,9 +555,9 @@ bst_status bst_overlap_start(bst_ctx *ctx, bst_engine *engine) {
     sigset_t all, before;
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
-    int error = pthread_create(&o->thread, NULL, work, o);
+    int error = bst_thread_start(&o->thread, work, o);
     /* without it all is done by the other */
-    o->looks = !error && has_ahead(engine) && pthread_create(&o->looker, NULL, look_ahead, o) == 0;
+    o->looks = !error && has_ahead(engine) && bst_thread_start(&o->looker, look_ahead, o) == 0;
     pthread_sigmask(SIG_SETMASK, &before, NULL);
     if (error) {
         pthread_cond_destroy(&o->changed);

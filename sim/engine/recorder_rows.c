@@ -155,6 +155,9 @@ static bst_status exposure_row(bst_ctx *ctx, bst_recorder *recorder, int sensor,
     put_vector(&r, t->sun_m);
     put_real(&r, t->background_e);
     put_real(&r, t->dark_e);
+    put_real(&r, t->earth_fraction);
+    put_real(&r, t->moon_fraction);
+    put_real(&r, t->sun_fraction);
     put_real(&r, t->pixel_scale_arcsec);
     put_int(&r, t->count);
     put_int(&r, t->lost);
@@ -299,6 +302,7 @@ bst_status bst_recorder_detection_rows(bst_ctx *ctx, bst_recorder *recorder, int
     put_int(&head, d->windows);
     put_int(&head, d->count);
     put_int(&head, d->lost);
+    put_int(&head, d->bad_pixels);
     BST_TRY(append(ctx, recorder, BST_TABLE_DETECTION_FRAMES, &head));
     for (int i = 0; i < d->count; i++) {
         const bst_detection *item = &d->items[i];
@@ -334,6 +338,7 @@ bst_status bst_recorder_detection_rows(bst_ctx *ctx, bst_recorder *recorder, int
         put_real(&r, item->rate_x_pxps);
         put_real(&r, item->rate_y_pxps);
         put_real(&r, item->rate_sigma_pxps);
+        put_flag(&r, item->flags & BST_DETECTION_BLOOM);
         BST_TRY(append(ctx, recorder, BST_TABLE_DETECTIONS, &r));
     }
     return BST_OK;

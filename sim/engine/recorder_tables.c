@@ -78,6 +78,9 @@ static const bst_column exposure_columns[] = {
     VECTOR("sun", "m", "m", "observer to Sun"),
     REAL("background_e", "e-/px", "expected sky electrons"),
     REAL("dark_e", "e-/px", "expected dark electrons"),
+    REAL("earth_fraction", "", "of the window's area that the Earth's disc covers"),
+    REAL("moon_fraction", "", "the same of the Moon"),
+    REAL("sun_fraction", "", "the same of the Sun"),
     REAL("pixel_scale_arcsec", "arcsec/px", "at the boresight, in this exposure"),
     INT("sources", "", "sources with a truth item"),
     INT("lost", "", "sources that found no room"),
@@ -154,6 +157,7 @@ static const bst_column detection_frame_columns[] = {
     INT("windows", "", "windows of the frame that were looked at; 0: all of it"),
     INT("detections", "", "detections kept"),
     INT("lost", "", "detections that found no room"),
+    INT("bad_pixels", "", "pixels of the sensor that are learned to be bad"),
 };
 static const bst_column detection_columns[] = {
     SENSOR,
@@ -184,6 +188,7 @@ static const bst_column detection_columns[] = {
     REAL("rate_x_pxps", "px/s", "stack: rate against the stars"),
     REAL("rate_y_pxps", "px/s", "stack: rate against the stars"),
     REAL("rate_sigma_pxps", "px/s", "standard deviation of each"),
+    INT("bloom", "", "1: charge overflowed along its columns; placed by its wings"),
 };
 static const bst_column track_frame_columns[] = {
     SENSOR,

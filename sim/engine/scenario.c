@@ -7,6 +7,7 @@
 
 #include <cjson/cJSON.h>
 
+#include "sim/core/text.h"
 #include "sim/engine/scenario_internal.h"
 
 enum { FORMAT_VERSION = 1 };
@@ -35,7 +36,7 @@ const bst_config_desc bst_scenario_table[] = {
     BST_INT(bst_scenario, tick_rate_hz, "Hz", 1, 1000000, "6000",
             "Ticks per second; every rate must divide it."),
     BST_SEED(bst_scenario, seed, "\"0x1\"",
-             "Master seed of all random numbers, a hexadecimal string."),
+             "Master seed of all random numbers: \"0x2A\", \"42\" or 42."),
     BST_INT(bst_scenario, run, "", 0, 9e15, "0",
             "Number of the run in a study: other random numbers, same scene."),
     BST_OBJECT(bst_scenario, world, bst_world_config_table, "{}", "What is out there."),
@@ -71,6 +72,10 @@ static bst_status prepare_cameras(bst_ctx *ctx, bst_scenario *s) {
     for (int i = 0; i < s->observers.count; i++) {
         for (int k = 0; k < observers[i].sensors.count; k++) {
             bst_camera *camera = &((bst_sensor_config *)observers[i].sensors.items)[k].camera;
+            if (bst_camera_resolve_scale(ctx, camera) != BST_OK) {
+                return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: /observers/%d/sensors/%d/camera",
+                                       s->file, i, k);
+            }
             bool image = bst_camera_prepare(ctx, camera) == BST_OK;
             if (!image || bst_detector_config_check(ctx, &camera->detector) != BST_OK) {
                 return bst_fail_prefix(ctx, BST_ERR_CONFIG,
@@ -82,8 +87,37 @@ static bst_status prepare_cameras(bst_ctx *ctx, bst_scenario *s) {
     return BST_OK;
 }
 
+/* Fills in what Keplerian elements leave open, so that the resolved scenario shows it. */
+static bst_status resolve_state(bst_ctx *ctx, const bst_scenario *s, const char *list, int index,
+                                bst_orbit_config *orbit) {
+    bool keplerian =
+        orbit->source == BST_ORBIT_NUMERICAL && orbit->state.from == BST_STATE_KEPLERIAN;
+    if (keplerian && bst_keplerian_resolve(ctx, &orbit->state) != BST_OK) {
+        return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: %s/%d/orbit/state", s->file, list, index);
+    }
+    return BST_OK;
+}
+
+static bst_status resolve_states(bst_ctx *ctx, bst_scenario *s) {
+    bst_observer_config *observers = s->observers.items;
+    bst_object_config *objects = s->world.objects.items;
+    for (int i = 0; i < s->observers.count; i++) {
+        BST_TRY(resolve_state(ctx, s, "/observers", i, &observers[i].orbit));
+    }
+    for (int i = 0; i < s->world.objects.count; i++) {
+        BST_TRY(resolve_state(ctx, s, "/world/objects", i, &objects[i].orbit));
+    }
+    return BST_OK;
+}
+
 static bst_status check_names(bst_ctx *ctx, const bst_scenario *s) {
     const bst_observer_config *observers = s->observers.items;
+    if (!bst_text_is_file_name(s->name)) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "%s: /name: \"%s\" cannot be the name of a folder (allowed: 1 to 63 bytes "
+                        "without \"/\" and control characters, not beginning with \".\")",
+                        s->file, s->name);
+    }
     for (int i = 0; i < s->observers.count; i++) {
         char path[100];
         snprintf(path, sizeof path, "/observers/%d/name", i);
@@ -143,6 +177,7 @@ static bst_status read_scenario(bst_ctx *ctx, const bst_json *json, const bst_re
         return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s", out->file);
     }
     BST_TRY(prepare_cameras(ctx, out));
+    BST_TRY(resolve_states(ctx, out));
     BST_TRY(check_names(ctx, out));
     BST_TRY(bst_scenario_paths(ctx, json, out, "", bst_scenario_table, out, false));
     return bst_scenario_modules(ctx, json, registry, out);

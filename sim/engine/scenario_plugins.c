@@ -14,7 +14,8 @@ bst_status bst_scenario_plugin(bst_ctx *ctx, const bst_json *json, const bst_reg
         return BST_OK;
     }
     if (registry->policy == BST_PLUGINS_REFUSE) {
-        return bst_fail(ctx, BST_ERR_CONFIG, "%s: %s: plug-ins are not loaded here (found \"%s\")",
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "%s: %s: plug-ins are not loaded here, as --no-plugins asks (found \"%s\")",
                         s->file, where, text);
     }
     bst_scenario_folder(bst_json_file(json, where), folder, sizeof folder);

@@ -3,22 +3,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A track within this many pixels of the true target is the target's: 2.5 FWHM of the shipped
- * cameras. */
-#define RIGHT_TARGET_PX 5.0
+#include "sim/world/frame_updates.h"
+
 /* 99.99 % quantile of chi-square, 2 degrees of freedom. */
 #define FORESEEN_CHI2 18.42
-/* The loop has settled when it is in track mode and the target lies this close to the boresight. */
-#define SETTLED_PX 3.0
 
 /* Frames that may wait for their tracks: 1 s of latency at 60 Hz. */
 enum { WAITING = 64 };
-
-/* Pointing errors in logarithmic bins of 1 %, from 1e-4 px: percentiles of a run of any length in
- * fixed memory. */
-enum { BINS = 2400 };
-#define BIN_RATIO 1.01
-#define BIN_FIRST 1e-4
 
 typedef struct waiting_frame {
     bst_loop_frame frame;
@@ -46,10 +37,8 @@ struct bst_loop_summary {
     bool last_in_track;
     bst_loop_frame newest;
     bst_loop_figures figures;
-    int64_t confirm_tick, settle_tick; /* -1: not yet */
-    int64_t visible_after, in_track_after;
-    double sum2, sum_x, sum_y;
-    int64_t bins[BINS];
+    int64_t acquire_tick, settle_tick; /* -1: not yet */
+    bst_loop_tally tally;
 };
 
 bst_status bst_loop_summary_create(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
@@ -69,9 +58,10 @@ bst_status bst_loop_summary_create(bst_ctx *ctx, const bst_world *world, int obs
     s->observer = observer;
     s->rate_hz = (double)tick_rate_hz;
     s->target = target_object;
-    s->confirm_tick = -1;
+    s->acquire_tick = -1;
     s->settle_tick = -1;
     s->figures.time_to_confirm_s = NAN;
+    s->figures.time_to_acquire_s = NAN;
     s->figures.time_to_settle_s = NAN;
     *out = s;
     return BST_OK;
@@ -96,8 +86,9 @@ static bst_vec3 track_direction_at(const bst_track *track, double seconds) {
 /* Whether the track, carried to the frame's middle, is on the true target. */
 static bool on_target(const bst_loop_summary *s, const waiting_frame *w, const bst_track *track,
                       int64_t tick) {
-    bst_vec3 d = track_direction_at(track, (double)(w->mid_tick - tick) / s->rate_hz);
-    return bst_vec3_angle(d, w->direction) <= RIGHT_TARGET_PX * bst_camera_scale_rad(&s->camera);
+    return w->known && bst_track_is_on_target(track->direction_gcrf, track->rate_gcrf_radps,
+                                              (double)(w->mid_tick - tick) / s->rate_hz,
+                                              w->direction, bst_camera_scale_rad(&s->camera));
 }
 
 /* Whether a track whose target cannot be seen foretells a place that the true one does not
@@ -130,26 +121,17 @@ static void judge(bst_loop_summary *s, waiting_frame *w, const bst_track *track,
     if (!track) {
         return;
     }
-    if (w->known && on_target(s, w, track, track_tick)) {
+    if (on_target(s, w, track, track_tick)) {
         w->frame.in_track = true;
-        if (s->confirm_tick < 0) {
-            s->confirm_tick = now;
-            if (isnan(s->figures.time_to_confirm_s)) {
-                s->figures.time_to_confirm_s = (double)now / s->rate_hz;
+        if (s->acquire_tick < 0) {
+            s->acquire_tick = now;
+            if (isnan(s->figures.time_to_acquire_s)) {
+                s->figures.time_to_acquire_s = (double)now / s->rate_hz;
             }
         }
     } else if (!is_foreseen(s, w, track, track_tick)) {
         s->figures.wrong_target_frames++;
     }
-}
-
-static void add_pointing(bst_loop_summary *s, const bst_loop_frame *f) {
-    s->figures.pointing_frames++;
-    s->sum2 += f->error_px * f->error_px;
-    s->sum_x += f->error_x_px;
-    s->sum_y += f->error_y_px;
-    double bin = f->error_px > BIN_FIRST ? log(f->error_px / BIN_FIRST) / log(BIN_RATIO) : 0.0;
-    s->bins[bin < BINS - 1 ? (int)bin : BINS - 1]++;
 }
 
 /* The verdict on the oldest waiting frame is final. */
@@ -160,13 +142,8 @@ static void retire(bst_loop_summary *s) {
         judge(s, w, s->has_toi ? &s->toi : NULL, s->toi_tick, w->mid_tick);
     }
     s->first++;
-    if (s->confirm_tick >= 0 && w->mid_tick >= s->confirm_tick && f->visible) {
-        s->visible_after++;
-        s->in_track_after += f->in_track;
-    }
-    if (f->settled && f->mode != BST_MODE_COAST && !isnan(f->error_px)) {
-        add_pointing(s, f);
-    }
+    f->acquired = s->acquire_tick >= 0 && w->mid_tick >= s->acquire_tick;
+    bst_loop_tally_add(&s->tally, f);
     s->last_in_track = f->in_track;
     if (s->fn) {
         s->fn(s->user, f);
@@ -186,12 +163,19 @@ static bst_status look_at_target(bst_ctx *ctx, bst_loop_summary *s, const bst_tr
     w->known = true;
     w->direction = sight.geometric;
     f->visible = !sight.occulted && bst_glow_electrons_per_s(&s->camera, &sight.glow, NULL) > 0.0;
-    bst_vec3 cam = bst_quat_rotate(truth->q_cam_from_gcrf_mid, sight.apparent);
-    if (bst_camera_project(&s->camera, cam, &f->target_x_px, &f->target_y_px)) {
-        f->error_x_px = f->target_x_px - truth->boresight_x_px;
-        f->error_y_px = f->target_y_px - truth->boresight_y_px;
-        f->error_px = hypot(f->error_x_px, f->error_y_px);
+    f->error_px =
+        bst_pointing_error_px(&s->camera, truth->pixel_scale_arcsec, truth->q_cam_from_gcrf_mid,
+                              sight.apparent, &f->error_x_px, &f->error_y_px);
+    const bst_camera *camera = &s->camera;
+    bst_camera scaled;
+    if (truth->pixel_scale_arcsec > 0.0 &&
+        truth->pixel_scale_arcsec != camera->pixel_scale_arcsec) {
+        BST_TRY(bst_camera_at_scale(ctx, camera, truth->pixel_scale_arcsec, &scaled));
+        camera = &scaled;
     }
+    /* without an image the place stays unknown */
+    (void)bst_camera_project(camera, bst_quat_rotate(truth->q_cam_from_gcrf_mid, sight.apparent),
+                             &f->target_x_px, &f->target_y_px);
     for (int i = 0; i < truth->count; i++) {
         const bst_truth_item *item = &truth->items[i];
         if (item->kind == BST_SOURCE_OBJECT && (int)item->id == s->target &&
@@ -218,8 +202,7 @@ bst_status bst_loop_summary_truth(bst_ctx *ctx, bst_loop_summary *s, const bst_t
     if (s->target >= 0) {
         BST_TRY(look_at_target(ctx, s, truth, w));
     }
-    if (s->settle_tick < 0 && s->confirm_tick >= 0 && s->mode == BST_MODE_TRACK &&
-        f->error_px < SETTLED_PX) {
+    if (s->settle_tick < 0 && bst_loop_settles(s->acquire_tick >= 0, s->mode, f->error_px)) {
         s->settle_tick = truth->start_tick;
         if (isnan(s->figures.time_to_settle_s)) {
             s->figures.time_to_settle_s = (double)truth->start_tick / s->rate_hz;
@@ -231,6 +214,17 @@ bst_status bst_loop_summary_truth(bst_ctx *ctx, bst_loop_summary *s, const bst_t
     s->newest.in_track = s->last_in_track;
     s->next++;
     return BST_OK;
+}
+
+/* The first confirmed track of the target, of interest or not, ends the wait for a confirmation. */
+static void note_confirmation(bst_loop_summary *s, const waiting_frame *w, const bst_tracks *tracks,
+                              int64_t now) {
+    for (int i = 0; i < tracks->count && isnan(s->figures.time_to_confirm_s); i++) {
+        if (tracks->items[i].status == BST_TRACK_CONFIRMED &&
+            on_target(s, w, &tracks->items[i], tracks->tick)) {
+            s->figures.time_to_confirm_s = (double)now / s->rate_hz;
+        }
+    }
 }
 
 void bst_loop_summary_tracks(bst_loop_summary *s, const bst_tracks *tracks, int64_t tick) {
@@ -253,6 +247,7 @@ void bst_loop_summary_tracks(bst_loop_summary *s, const bst_tracks *tracks, int6
     waiting_frame *w = &s->waiting[s->first % WAITING];
     if (s->first < s->next && w->frame.exposure_id == tracks->exposure_id) {
         w->judged = true;
+        note_confirmation(s, w, tracks, tick);
         judge(s, w, s->has_toi ? &s->toi : NULL, s->toi_tick, tick);
         retire(s);
         s->newest.in_track = s->last_in_track;
@@ -266,7 +261,7 @@ void bst_loop_summary_status(bst_loop_summary *s, const bst_control_status *stat
 
 void bst_loop_summary_retarget(bst_loop_summary *s, int target_object) {
     s->target = target_object;
-    s->confirm_tick = s->settle_tick = -1;
+    s->acquire_tick = s->settle_tick = -1;
     s->has_toi = false;
 }
 
@@ -278,20 +273,8 @@ void bst_loop_summary_finish(bst_loop_summary *s) {
 
 void bst_loop_summary_figures(const bst_loop_summary *s, bst_loop_figures *out) {
     *out = s->figures;
-    out->track_fraction =
-        s->visible_after > 0 ? (double)s->in_track_after / (double)s->visible_after : 0.0;
-    int64_t n = s->figures.pointing_frames;
-    out->pointing_rms_px = n > 0 ? sqrt(s->sum2 / (double)n) : NAN;
-    out->pointing_bias_px = n > 0 ? hypot(s->sum_x, s->sum_y) / (double)n : NAN;
-    out->pointing_p99_px = NAN;
-    int64_t seen = 0;
-    for (int b = 0; b < BINS && n > 0; b++) {
-        seen += s->bins[b];
-        if ((double)seen >= 0.99 * (double)n) {
-            out->pointing_p99_px = BIN_FIRST * pow(BIN_RATIO, b + 0.5);
-            break;
-        }
-    }
+    bst_loop_tally_figures(&s->tally, out);
+    out->frames = s->figures.frames; /* those that wait for their tracks, too */
 }
 
 void bst_loop_summary_newest(const bst_loop_summary *s, bst_loop_frame *out) {

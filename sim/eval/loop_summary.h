@@ -3,40 +3,10 @@
 #define BST_EVAL_LOOP_SUMMARY_H
 
 #include "sim/core/messages.h"
+#include "sim/eval/loop_figures.h"
 #include "sim/world/world.h"
 
 typedef struct bst_loop_summary bst_loop_summary;
-
-/* What one frame showed, for plots. */
-typedef struct bst_loop_frame {
-    int64_t exposure_id;
-    double time_s;   /* middle of the exposure */
-    double error_px; /* boresight to true target; NAN when the target is not there */
-    double error_x_px, error_y_px;
-    double target_x_px, target_y_px;
-    double target_snr; /* true SNR, target in the field; else 0 */
-    bool visible;      /* target sunlit, not behind the Earth, brighter than nothing */
-    bool in_track;     /* the track of interest is confirmed and is the right target's */
-    bool settled;      /* counts for the pointing figures */
-    int mode;          /* bst_mode at the end of the exposure */
-} bst_loop_frame;
-
-typedef struct bst_loop_figures {
-    int64_t frames;
-    int final_mode;
-    double time_to_confirm_s; /* NAN: never */
-    double time_to_settle_s;  /* NAN: never */
-    double track_fraction;    /* of the visible frames after the first confirmation; 0 if never
-                                 confirmed */
-    /* frames in which the track of interest was not the target's: more than 5 px away and, where
-     * the tracker says what hides its object, also beyond 99.99 % of its covariance */
-    int64_t wrong_target_frames;
-    double pointing_rms_px,
-        pointing_p99_px;     /* over the frames after settling but those in which control coasts,
-                                as the target is hidden; NAN when there are none */
-    double pointing_bias_px; /* length of the mean error vector */
-    int64_t pointing_frames;
-} bst_loop_figures;
 
 /* target_object: index of the right target in the world, -1 when there is none. The world must
  * outlive the summary. */
@@ -56,8 +26,8 @@ bst_status bst_loop_summary_truth(bst_ctx *ctx, bst_loop_summary *summary,
 void bst_loop_summary_tracks(bst_loop_summary *summary, const bst_tracks *tracks, int64_t tick);
 void bst_loop_summary_status(bst_loop_summary *summary, const bst_control_status *status);
 
-/* The target is another one from now on, -1: none: confirmation and settling begin anew; the times
- * to them stay those of the first. */
+/* The target is another one from now on, -1: none: acquisition and settling begin anew; the times
+ * stay those of the first. */
 void bst_loop_summary_retarget(bst_loop_summary *summary, int target_object);
 
 /* Settles the frames that still wait for their tracks. */

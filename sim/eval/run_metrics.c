@@ -3,21 +3,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* As in loop_summary.c: a track or detection this near is the object's. */
-#define NEAR_PX 5.0
-
 /* Frames whose truth is kept for messages that come late: 1 s of latency at 60 Hz. */
 enum { WAITING = 64 };
-
-/* Errors in logarithmic bins of 1 % from 1e-5 px. */
-enum { BINS = 2600 };
-#define BIN_RATIO 1.01
-#define BIN_FIRST 1e-5
 
 typedef struct known_object {
     uint32_t id;
     bst_vec3 direction; /* geometric with light time, middle of the exposure */
     double x_px, y_px;  /* mean over the exposure */
+    bool lit;           /* not occulted, and some of its light is there */
 } known_object;
 
 typedef struct known_frame {
@@ -30,11 +23,6 @@ typedef struct seen_track {
     int64_t id, frames, near_frames;
 } seen_track;
 
-typedef struct histogram {
-    int64_t count, bins[BINS];
-    double square;
-} histogram;
-
 struct bst_run_metrics {
     bst_camera camera;
     int target;
@@ -44,8 +32,7 @@ struct bst_run_metrics {
     int64_t track_count, track_room;
     uint8_t *objects; /* [objects of the world]: bit 0 seen, bit 1 tracked */
     int object_count;
-    histogram track_error, pointing;
-    bool was_in_track;
+    bst_error_statistics track_error;
     bst_run_metric_figures figures;
 };
 
@@ -82,24 +69,6 @@ void bst_run_metrics_free(bst_run_metrics *m) {
     }
 }
 
-static void add(histogram *h, double px) {
-    double bin = px > BIN_FIRST ? log(px / BIN_FIRST) / log(BIN_RATIO) : 0.0;
-    h->bins[bin < BINS - 1 ? (int)bin : BINS - 1]++;
-    h->square += px * px;
-    h->count++;
-}
-
-static double quantile(const histogram *h, double q) {
-    int64_t seen = 0;
-    for (int b = 0; b < BINS && h->count > 0; b++) {
-        seen += h->bins[b];
-        if ((double)seen >= q * (double)h->count) {
-            return BIN_FIRST * pow(BIN_RATIO, b + 0.5);
-        }
-    }
-    return NAN;
-}
-
 static const known_frame *find_frame(const bst_run_metrics *m, int64_t exposure_id) {
     for (int i = 0; i < WAITING; i++) {
         if (m->frames[i].exposure_id == exposure_id) {
@@ -110,6 +79,14 @@ static const known_frame *find_frame(const bst_run_metrics *m, int64_t exposure_
 }
 
 bst_status bst_run_metrics_truth(bst_ctx *ctx, bst_run_metrics *m, const bst_truth *truth) {
+    bst_run_losses *lost = &m->figures.losses;
+    lost->frames++;
+    lost->dropped_frames += truth->dropped;
+    lost->truth += truth->lost;
+    lost->truth_frames += truth->lost > 0;
+    lost->earth_frames += truth->earth_fraction > 0.0;
+    lost->moon_frames += truth->moon_fraction > 0.0;
+    lost->sun_frames += truth->sun_fraction > 0.0;
     m->newest = (m->newest + 1) % WAITING;
     known_frame *f = &m->frames[m->newest];
     f->exposure_id = truth->exposure_id;
@@ -133,7 +110,8 @@ bst_status bst_run_metrics_truth(bst_ctx *ctx, bst_run_metrics *m, const bst_tru
                            {cos(item->dec_rad) * cos(item->ra_rad),
                             cos(item->dec_rad) * sin(item->ra_rad), sin(item->dec_rad)},
                            item->x_centroid_px,
-                           item->y_centroid_px};
+                           item->y_centroid_px,
+                           !(item->flags & BST_TRUTH_OCCULTED) && item->snr > 0.0};
         if (item->id < (uint32_t)m->object_count) {
             m->objects[item->id] |= 1;
         }
@@ -142,15 +120,21 @@ bst_status bst_run_metrics_truth(bst_ctx *ctx, bst_run_metrics *m, const bst_tru
 }
 
 void bst_run_metrics_detections(bst_run_metrics *m, const bst_detections *detections) {
+    bst_run_losses *lost = &m->figures.losses;
     m->figures.detections += detections->count;
+    m->figures.bad_pixels = detections->bad_pixels;
+    lost->detections += detections->lost;
+    lost->detection_frames += detections->lost > 0;
+    lost->no_stars_frames += detections->stars_identified == 0;
     const known_frame *f = find_frame(m, detections->exposure_id);
     for (int o = 0; f && o < f->count; o++) {
-        if ((int)f->objects[o].id != m->target) {
+        if ((int)f->objects[o].id != m->target || !f->objects[o].lit) {
             continue;
         }
         for (int i = 0; i < detections->count; i++) {
             const bst_detection *d = &detections->items[i];
-            if (hypot(d->x_px - f->objects[o].x_px, d->y_px - f->objects[o].y_px) <= NEAR_PX) {
+            if (hypot(d->x_px - f->objects[o].x_px, d->y_px - f->objects[o].y_px) <=
+                BST_RIGHT_TARGET_PX) {
                 m->figures.detected_frames++;
                 return;
             }
@@ -179,9 +163,24 @@ static bst_status find_track(bst_ctx *ctx, bst_run_metrics *m, int64_t id, seen_
     return BST_OK;
 }
 
+/* The error's components along east and north. */
+static void add_track_error(bst_run_metrics *m, bst_vec3 direction, bst_vec3 truth,
+                            double scale_rad) {
+    bst_vec3 pole =
+        hypot(truth.x, truth.y) < 1e-6 ? bst_vec3_make(1, 0, 0) : bst_vec3_make(0, 0, 1);
+    bst_vec3 east = bst_vec3_unit(bst_vec3_cross(pole, truth));
+    bst_vec3 error = bst_vec3_sub(bst_vec3_unit(direction), truth);
+    bst_error_statistics_add(&m->track_error, bst_vec3_dot(error, east) / scale_rad,
+                             bst_vec3_dot(error, bst_vec3_cross(truth, east)) / scale_rad);
+}
+
 bst_status bst_run_metrics_tracks(bst_ctx *ctx, bst_run_metrics *m, const bst_tracks *tracks) {
     const known_frame *f = find_frame(m, tracks->exposure_id);
     double scale = bst_camera_scale_rad(&m->camera);
+    bst_run_losses *lost = &m->figures.losses;
+    lost->tracks += tracks->lost;
+    lost->track_frames += tracks->lost > 0;
+    lost->no_attitude_frames += !tracks->attitude.valid;
     for (int i = 0; f && i < tracks->count; i++) {
         const bst_track *t = &tracks->items[i];
         if (t->status != BST_TRACK_CONFIRMED && t->status != BST_TRACK_COASTING) {
@@ -190,13 +189,18 @@ bst_status bst_run_metrics_tracks(bst_ctx *ctx, bst_run_metrics *m, const bst_tr
         double least_px = INFINITY;
         const known_object *nearest = NULL;
         for (int o = 0; o < f->count; o++) {
-            double px = bst_vec3_angle(t->direction_gcrf, f->objects[o].direction) / scale;
+            const known_object *object = &f->objects[o];
+            double px = bst_vec3_angle(t->direction_gcrf, object->direction) / scale;
             if (px < least_px) {
                 least_px = px;
-                nearest = &f->objects[o];
+                nearest = object;
+            }
+            if (t->target_of_interest && (int)object->id == m->target &&
+                px <= BST_RIGHT_TARGET_PX) {
+                add_track_error(m, t->direction_gcrf, object->direction, scale);
             }
         }
-        bool near = least_px <= NEAR_PX;
+        bool near = least_px <= BST_RIGHT_TARGET_PX;
         /* what coasts out of the field is near nothing that is seen, and no evidence */
         if (near || t->status == BST_TRACK_CONFIRMED) {
             seen_track *seen = NULL;
@@ -207,36 +211,28 @@ bst_status bst_run_metrics_tracks(bst_ctx *ctx, bst_run_metrics *m, const bst_tr
         if (near && nearest->id < (uint32_t)m->object_count) {
             m->objects[nearest->id] |= 2;
         }
-        if (near && (int)nearest->id == m->target && t->target_of_interest) {
-            add(&m->track_error, least_px);
-        }
     }
     return BST_OK;
 }
 
 void bst_run_metrics_frame(bst_run_metrics *m, const bst_loop_frame *frame) {
-    bst_run_metric_figures *f = &m->figures;
-    f->frames++;
-    if (frame->settled && !isnan(frame->error_px)) {
-        add(&m->pointing, frame->error_px);
-    }
-    f->in_field_frames += frame->visible && frame->target_snr > 0.0;
-    if (frame->visible) {
-        f->visible_frames++;
-        f->in_track_frames += frame->in_track;
-        f->breaks += m->was_in_track && !frame->in_track;
-        m->was_in_track = frame->in_track;
-    }
-    f->in_track_at_end = frame->in_track;
+    m->figures.in_field_frames += frame->visible && frame->target_snr > 0.0;
+}
+
+void bst_run_metrics_retarget(bst_run_metrics *m, int target_object) {
+    m->target = target_object;
 }
 
 void bst_run_metrics_figures(const bst_run_metrics *m, bst_run_metric_figures *out) {
     *out = m->figures;
-    const histogram *h = &m->track_error;
-    out->track_rms_px = h->count > 0 ? sqrt(h->square / (double)h->count) : NAN;
-    out->track_median_px = quantile(h, 0.5);
-    out->track_p95_px = quantile(h, 0.95);
-    out->pointing_median_px = quantile(&m->pointing, 0.5);
+    out->detected_fraction = out->in_field_frames > 0
+                                 ? (double)out->detected_frames / (double)out->in_field_frames
+                                 : NAN;
+    out->track_frames = m->track_error.count;
+    out->track_rms_px = bst_error_statistics_rms(&m->track_error);
+    out->track_median_px = bst_error_statistics_quantile(&m->track_error, 0.5);
+    out->track_p95_px = bst_error_statistics_quantile(&m->track_error, 0.95);
+    out->track_max_px = bst_error_statistics_largest(&m->track_error);
     out->tracks = m->track_count;
     for (int64_t i = 0; i < m->track_count; i++) {
         out->false_tracks += 2 * m->tracks[i].near_frames < m->tracks[i].frames;

@@ -1,5 +1,5 @@
-/* What tables of many runs tell of one sensor: custody, detections, accuracy of the target's track,
- * false tracks; beside sim/eval/loop_summary.h, from the same messages. */
+/* Figures of one sensor beside those of its loop (sim/eval/loop_figures.h): detections, accuracy of
+ * the target's track, false tracks. */
 #ifndef BST_EVAL_RUN_METRICS_H
 #define BST_EVAL_RUN_METRICS_H
 
@@ -9,22 +9,34 @@
 
 typedef struct bst_run_metrics bst_run_metrics;
 
+/* What of a sensor was lost, and in how many frames. */
+typedef struct bst_run_losses {
+    int64_t frames;                       /* of the sensor */
+    int64_t detections, detection_frames; /* detections that found no room */
+    int64_t tracks, track_frames;         /* tracks that found no room */
+    int64_t truth, truth_frames;          /* sources that found no room */
+    int64_t dropped_frames;               /* lost between camera and image processing */
+    int64_t no_stars_frames;              /* processed, and no star was identified */
+    int64_t no_attitude_frames;           /* seen by the tracker without an attitude from stars */
+    int64_t earth_frames, moon_frames, sun_frames; /* covered in part by that body's disc */
+} bst_run_losses;
+
 typedef struct bst_run_metric_figures {
-    int64_t frames;
-    int64_t visible_frames;  /* the target lit, not behind the Earth */
-    int64_t in_field_frames; /* of them: in the field */
-    int64_t detected_frames; /* of those: with a detection on the target */
-    int64_t in_track_frames; /* visible, and in confirmed track */
-    int64_t breaks;          /* times that a confirmed track of the visible target was lost */
-    bool in_track_at_end;
-    int64_t detections; /* all */
-    /* the target's confirmed track against the truth, angle in pixels; NAN without any */
-    double track_rms_px, track_median_px, track_p95_px;
-    double pointing_median_px; /* of the frames that bst_loop_figures takes */
+    int64_t in_field_frames;  /* visible frames with the target in the field */
+    int64_t detected_frames;  /* of them: with a detection within BST_RIGHT_TARGET_PX of it */
+    double detected_fraction; /* detected_frames over in_field_frames; NAN: never in the field */
+    int64_t detections;       /* all, of any source */
+    /* angle from the target's true direction to the track of interest, confirmed or coasting, in
+     * pixels: frames with tracks of their own and the target in the field and in track; NAN without
+     * any */
+    int64_t track_frames;
+    double track_rms_px, track_median_px, track_p95_px, track_max_px;
     /* confirmed tracks, by identity; false: near no object in most of its frames */
     int64_t tracks, false_tracks;
+    int64_t bad_pixels;      /* that image processing had learned by the latest frame */
     int64_t objects_seen;    /* objects that were in the field */
     int64_t objects_tracked; /* of them: ever near a confirmed track */
+    bst_run_losses losses;
 } bst_run_metric_figures;
 
 /* target_object: as of bst_loop_summary_create. The world must outlive the metrics. */
@@ -39,6 +51,8 @@ void bst_run_metrics_detections(bst_run_metrics *metrics, const bst_detections *
 bst_status bst_run_metrics_tracks(bst_ctx *ctx, bst_run_metrics *metrics,
                                   const bst_tracks *tracks) BST_MUST_CHECK;
 void bst_run_metrics_frame(bst_run_metrics *metrics, const bst_loop_frame *frame);
+/* The target is another one from now on, -1: none. */
+void bst_run_metrics_retarget(bst_run_metrics *metrics, int target_object);
 
 void bst_run_metrics_figures(const bst_run_metrics *metrics, bst_run_metric_figures *out);
 

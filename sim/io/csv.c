@@ -1,18 +1,22 @@
 #include "sim/io/csv.h"
 
 #include <inttypes.h>
-#include <stdio.h>
+#include <stdbool.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "sim/io/draft_file.h"
 
-static void put_text(FILE *file, const char *text) {
-    if (!strpbrk(text, ",\"\r\n") && *text) {
+void bst_csv_put_text(FILE *file, const char *text) {
+    char *end;
+    bool number = strspn(text, "+-.eE0123456789") == strlen(text) && (strtod(text, &end), !*end);
+    bool formula = *text && strchr("=+-@\t\r", *text) && !number;
+    if (!strpbrk(text, ",\"\r\n") && *text && !formula) {
         fputs(text, file);
         return;
     }
     /* an empty text is quoted, so that it is not taken for NULL */
-    putc('"', file);
+    fputs(formula ? "\"'" : "\"", file);
     for (const char *c = text; *c; c++) {
         if (*c == '"') {
             putc('"', file);
@@ -33,7 +37,7 @@ static void put_cell(FILE *file, const bst_rows *rows, int column) {
             fprintf(file, "%.17g", bst_rows_real(rows, column));
             break;
         case BST_CELL_TEXT:
-            put_text(file, bst_rows_text(rows, column));
+            bst_csv_put_text(file, bst_rows_text(rows, column));
             break;
     }
 }
@@ -42,7 +46,7 @@ static bst_status write_rows(bst_ctx *ctx, bst_rows *rows, FILE *file, bst_csv_p
                              void *user, int64_t *count) {
     int columns = bst_rows_columns(rows);
     for (int i = 0; i < columns; i++) {
-        put_text(file, bst_rows_column_name(rows, i));
+        bst_csv_put_text(file, bst_rows_column_name(rows, i));
         fputs(i + 1 < columns ? "," : "\r\n", file);
     }
     for (;;) {

@@ -8,11 +8,12 @@
 
 typedef struct bst_draft {
     FILE *stream;
-    char path[4096], name[4128]; /* final name; the name while it is written */
+    char path[4096], name[4160]; /* final name; while it is written, "" of a device */
 } bst_draft;
 
-/* Opens a temporary file beside `path` for writing. BST_ERR_IO with path and reason;
- * BST_ERR_ARGUMENT where a folder, device or pipe is there. */
+/* Opens a temporary file (bst_draft_make) beside `path` for writing. BST_ERR_IO with path and
+ * reason; BST_ERR_ARGUMENT where a folder or pipe is there. A character device, such as /dev/null,
+ * is written to as it is. */
 bst_status bst_draft_open(bst_ctx *ctx, const char *path, bst_draft *out) BST_MUST_CHECK;
 
 /* With BST_OK: flushes it to disk and gives it its name, replacing what was there. With another
@@ -20,7 +21,7 @@ bst_status bst_draft_open(bst_ctx *ctx, const char *path, bst_draft *out) BST_MU
  * with path and reason. */
 bst_status bst_draft_close(bst_ctx *ctx, bst_draft *draft, bst_status status) BST_MUST_CHECK;
 
-/* Removes drafts (of this module, of bst_write_file_atomic and of tables) that killed programs left
+/* Removes drafts, files with a name of bst_draft_make, that killed programs left
  * in a folder. Nobody else may be writing there. */
 void bst_draft_sweep(const char *folder);
 

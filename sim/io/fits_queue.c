@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/core/parallel.h"
 #include "sim/io/fits_internal.h"
 
 /* Frames that may wait: enough to even out the work, few enough to lose little with the process. */
@@ -72,7 +73,7 @@ bst_status bst_fits_queue_create(bst_ctx *ctx, bst_fits *fits) {
     sigset_t all, before;
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
-    int error = pthread_create(&q->thread, NULL, work, fits);
+    int error = bst_thread_start(&q->thread, work, fits);
     pthread_sigmask(SIG_SETMASK, &before, NULL);
     if (error) {
         pthread_cond_destroy(&q->changed);

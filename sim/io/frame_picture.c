@@ -7,9 +7,10 @@
 static const bst_colour black = {0, 0, 0}, white = BST_WHITE, soft = BST_SOFT;
 
 static const bst_colour colours[] = {
-    [BST_OVERLAY_TARGET] = BST_TARGET_COLOUR, [BST_OVERLAY_OBJECT] = BST_SOFT,
-    [BST_OVERLAY_STAR] = BST_STAR_COLOUR,     [BST_OVERLAY_DETECTION] = BST_OBJECT_COLOUR,
-    [BST_OVERLAY_TRACK] = BST_TRACK_COLOUR,   [BST_OVERLAY_BORESIGHT] = BST_CROSS_COLOUR};
+    [BST_OVERLAY_TARGET] = BST_TARGET_COLOUR,    [BST_OVERLAY_OBJECT] = BST_SOFT,
+    [BST_OVERLAY_STAR] = BST_STAR_COLOUR,        [BST_OVERLAY_REST] = BST_REST_COLOUR,
+    [BST_OVERLAY_DETECTION] = BST_OBJECT_COLOUR, [BST_OVERLAY_TRACK] = BST_TRACK_COLOUR,
+    [BST_OVERLAY_BORESIGHT] = BST_CROSS_COLOUR};
 
 void bst_mark_cross(bst_picture *p, double x, double y, double gap, double arm) {
     const bst_colour colour = BST_CROSS_COLOUR;
@@ -37,9 +38,11 @@ static double draw_mark(bst_picture *p, bst_overlay_kind kind, double x, double 
             bst_picture_rectangle(p, x - r, y - r, 2 * r, 2 * r, colours[kind], 1.5);
             return r;
         case BST_OVERLAY_STAR:
+        case BST_OVERLAY_REST:
         case BST_OVERLAY_DETECTION:
             r = fmax(r, 5.0);
-            bst_picture_circle(p, x, y, r, colours[kind], kind == BST_OVERLAY_STAR ? 1.0 : 1.5);
+            bst_picture_circle(p, x, y, r, colours[kind],
+                               kind == BST_OVERLAY_DETECTION ? 1.5 : 1.0);
             return r;
         case BST_OVERLAY_TRACK:
             bst_mark_diamond(p, x, y, 18.0);
@@ -65,9 +68,11 @@ static void draw_legend(bst_picture *p, int width, int height, double h) {
     static const struct {
         bst_overlay_kind kind;
         const char *text;
-    } entries[] = {{BST_OVERLAY_TARGET, "target (truth)"}, {BST_OVERLAY_OBJECT, "object (truth)"},
-                   {BST_OVERLAY_TRACK, "track"},           {BST_OVERLAY_DETECTION, "detection"},
-                   {BST_OVERLAY_STAR, "identified star"},  {BST_OVERLAY_BORESIGHT, "boresight"}};
+    } entries[] = {
+        {BST_OVERLAY_TARGET, "target (truth)"}, {BST_OVERLAY_OBJECT, "object (truth)"},
+        {BST_OVERLAY_TRACK, "track"},           {BST_OVERLAY_DETECTION, "detection"},
+        {BST_OVERLAY_STAR, "identified star"},  {BST_OVERLAY_REST, "at rest among stars"},
+        {BST_OVERLAY_BORESIGHT, "boresight"}};
     double x = 10.0, y = height - 10.0;
     for (size_t i = 0; i < sizeof entries / sizeof *entries; i++) {
         double length = bst_picture_text_width(h, false, entries[i].text) + 16.0;
@@ -82,7 +87,7 @@ static void draw_overlay(bst_picture *p, const bst_overlay *overlay, int width, 
                          bst_box box, double scale) {
     double h = fmin(fmax(width / 100.0, 7.0), 14.0); /* of capital letters */
     bst_picture_clip(p, box);
-    for (int i = 0; i < overlay->count; i++) {
+    for (int i = overlay->count - 1; i >= 0; i--) {
         const bst_overlay_mark *m = &overlay->marks[i];
         if (!isfinite(m->x_px) || !isfinite(m->y_px)) {
             continue;

@@ -10,7 +10,8 @@
 typedef enum bst_overlay_kind {
     BST_OVERLAY_TARGET,    /* true place of the target: red square */
     BST_OVERLAY_OBJECT,    /* true place of another object: grey square */
-    BST_OVERLAY_STAR,      /* detection that was identified as a star: green circle */
+    BST_OVERLAY_STAR,      /* detection that was identified with a star: green circle */
+    BST_OVERLAY_REST,      /* one labelled a star because it rests among them: grey-blue circle */
     BST_OVERLAY_DETECTION, /* any other detection: yellow circle */
     BST_OVERLAY_TRACK,     /* a track: blue diamond */
     BST_OVERLAY_BORESIGHT  /* violet cross */
@@ -20,12 +21,19 @@ typedef enum bst_overlay_kind {
 typedef struct bst_overlay_mark {
     bst_overlay_kind kind;
     double x_px, y_px;
-    double radius_px; /* detections: size of the circle; 0: a default */
-    char label[48];   /* "" for none */
+    double radius_px;  /* detections: size of the circle; 0: a default */
+    double importance; /* where there is no room for all marks those with most are drawn */
+    char label[48];    /* "" for none */
 } bst_overlay_mark;
 
+/* Importance of marks that are not detections, and of the target's own detection; that of any other
+ * detection is its light in electrons. */
+#define BST_OVERLAY_FIRST 1e303
+#define BST_OVERLAY_OF_TARGET 1e302
+#define BST_OVERLAY_OF_OBJECT 1e301
+
 typedef struct bst_overlay {
-    const bst_overlay_mark *marks;
+    const bst_overlay_mark *marks; /* drawn from the last to the first: the most important on top */
     int count;
     const char *caption; /* one line, upper left; NULL for none */
 } bst_overlay;

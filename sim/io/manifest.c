@@ -2,11 +2,12 @@
 
 #include <cjson/cJSON.h>
 #include <errno.h>
-#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+
+#include "sim/core/draft.h"
 
 static bool write_all(int fd, const char *data, size_t bytes) {
     while (bytes > 0) {
@@ -23,15 +24,9 @@ static bool write_all(int fd, const char *data, size_t bytes) {
 }
 
 bst_status bst_write_file_atomic(bst_ctx *ctx, const char *path, const void *data, size_t bytes) {
-    char draft[4096];
-    int n = snprintf(draft, sizeof draft, "%s.tmp.%ld", path, (long)getpid());
-    if (n < 0 || (size_t)n >= sizeof draft) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", path);
-    }
-    int fd = open(draft, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-    if (fd < 0) {
-        return bst_fail(ctx, BST_ERR_IO, "%s: cannot be made: %s", path, strerror(errno));
-    }
+    char draft[4160];
+    int fd;
+    BST_TRY(bst_draft_make(ctx, path, draft, sizeof draft, &fd));
     bool ok = write_all(fd, data, bytes) && fsync(fd) == 0;
     int error = ok ? 0 : errno;
     if (close(fd) != 0 && ok) {

@@ -16,6 +16,8 @@
     { 255, 214, 79 }
 #define BST_STAR_COLOUR \
     { 110, 190, 120 }
+#define BST_REST_COLOUR \
+    { 84, 134, 140 }
 #define BST_CROSS_COLOUR \
     { 236, 128, 255 }
 

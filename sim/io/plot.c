@@ -10,6 +10,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "sim/core/draft.h"
+
 extern char **environ;
 
 /* A path inside gnuplot's single quotes: a quote is doubled. */
@@ -26,22 +28,26 @@ static void put_quoted(FILE *script, const char *text) {
 
 bst_status bst_plot_begin(bst_ctx *ctx, bst_plot *plot, const char *path, int width, int height) {
     int n = snprintf(plot->path, sizeof plot->path, "%s", path);
-    int d = snprintf(plot->draft, sizeof plot->draft, "%s.XXXXXX", path);
-    if (n < 0 || d < 0 || (size_t)d >= sizeof plot->draft || strchr(path, '\n')) {
+    if (n < 0 || (size_t)n >= sizeof plot->path || strchr(path, '\n')) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: not a path for a plot", path);
     }
-    /* The script has no name: nothing is left when the process dies. gnuplot draws into a file of
-     * another name, so that a plot appears whole or not at all. */
-    int fd = mkstemp(plot->draft);
-    if (fd < 0) {
-        return bst_fail(ctx, BST_ERR_IO, "%s: cannot be made: %s", path, strerror(errno));
-    }
+    /* The script's file loses its name at once: nothing of it is left when the process dies.
+     * gnuplot draws into the draft, so that a plot appears whole or not at all. */
+    int fd;
+    BST_TRY(bst_draft_make(ctx, path, plot->draft, sizeof plot->draft, &fd));
     unlink(plot->draft);
     plot->script = fdopen(fd, "w+");
     if (!plot->script) {
         close(fd);
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
     }
+    bst_status status = bst_draft_make(ctx, path, plot->draft, sizeof plot->draft, &fd);
+    if (status != BST_OK) {
+        fclose(plot->script);
+        plot->script = NULL;
+        return status;
+    }
+    close(fd); /* gnuplot writes into the file that is there */
     size_t length = strlen(path);
     if (length > 4 && strcmp(path + length - 4, ".svg") == 0) {
         fprintf(plot->script,
@@ -56,7 +62,8 @@ bst_status bst_plot_begin(bst_ctx *ctx, bst_plot *plot, const char *path, int wi
                 "}\n",
                 width, height, width, height);
     }
-    fputs("set encoding utf8\nset output ", plot->script);
+    /* names keep their underscores */
+    fputs("set termoption noenhanced\nset encoding utf8\nset output ", plot->script);
     put_quoted(plot->script, plot->draft);
     fputc('\n', plot->script);
     return BST_OK;

@@ -12,38 +12,32 @@ static const char *const mode_colours[BST_MODE_COUNT] = {
     "#e6efe9", "#dfeef5", "#d5d3e6", "#f0ead2", "#e2f0ee",
 };
 
-typedef struct figures {
-    int count;         /* visible points in track */
-    double rms, worst; /* px */
-    double first_s;    /* of the first point in track, NAN when none */
-    double top;        /* largest radial error */
-    double spread;     /* largest component after confirmation, in track */
-} figures;
+/* Extent of what is drawn. */
+typedef struct extent {
+    int counted;   /* points that are counted */
+    double top;    /* largest radial error */
+    double spread; /* largest component of points that are counted */
+} extent;
 
 static double radial(const bst_pointing_point *p) {
     return hypot(p->dx_px, p->dy_px);
 }
 
-static figures measure(const bst_pointing_point *points, int count) {
-    figures f = {.first_s = NAN};
-    double sum = 0.0;
+static extent measure(const bst_pointing_point *points, int count) {
+    extent e = {.counted = 0};
     for (int i = 0; i < count; i++) {
         const bst_pointing_point *p = &points[i];
         double r = radial(p);
         if (!p->visible || !isfinite(r)) {
             continue;
         }
-        f.top = fmax(f.top, r);
-        if (p->in_track) {
-            f.first_s = f.count ? f.first_s : p->time_s;
-            f.count++;
-            sum += r * r;
-            f.worst = fmax(f.worst, r);
-            f.spread = fmax(f.spread, fmax(fabs(p->dx_px), fabs(p->dy_px)));
+        e.top = fmax(e.top, r);
+        if (p->counted) {
+            e.counted++;
+            e.spread = fmax(e.spread, fmax(fabs(p->dx_px), fabs(p->dy_px)));
         }
     }
-    f.rms = f.count ? sqrt(sum / f.count) : NAN;
-    return f;
+    return e;
 }
 
 /* Text for gnuplot's double quotes in "noenhanced" places: quotes, backslashes and controls go. */
@@ -58,8 +52,8 @@ static void put_data(FILE *s, const bst_pointing_point *points, int count) {
     for (int i = 0; i < count; i++) {
         const bst_pointing_point *p = &points[i];
         if (p->visible && isfinite(radial(p))) {
-            fprintf(s, "%.9g %.9g %.9g %.9g %d\n", p->time_s, fmax(radial(p), FLOOR_PX), p->dx_px,
-                    p->dy_px, p->in_track ? 1 : 0);
+            fprintf(s, "%.9g %.9g %.9g %.9g %d %d\n", p->time_s, fmax(radial(p), FLOOR_PX),
+                    p->dx_px, p->dy_px, p->in_track ? 1 : 0, p->counted ? 1 : 0);
         } else {
             fputc('\n', s);
         }
@@ -89,7 +83,7 @@ static unsigned put_modes(FILE *s, const bst_pointing_point *points, int count, 
 }
 
 static void put_upper(FILE *s, const char *title, const bst_pointing_point *points, int count,
-                      double limit_px, const figures *f) {
+                      double limit_px, const extent *e) {
     double end_s = points[count - 1].time_s;
     fputs(
         "set tmargin 3.2\nset bmargin 0.6\n"
@@ -103,7 +97,7 @@ static void put_upper(FILE *s, const char *title, const bst_pointing_point *poin
         s);
     unsigned seen = put_modes(s, points, count, end_s);
     fprintf(s, "set yrange [%g:%.9g]\n", FLOOR_PX,
-            fmax(pow(10.0, ceil(log10(fmax(f->top, 1.0)))), 10.0));
+            fmax(pow(10.0, ceil(log10(fmax(e->top, 1.0)))), 10.0));
     fputs(
         "set key top right opaque width 1 spacing 1.15 samplen 2\n"
         "plot ",
@@ -128,21 +122,18 @@ static void put_upper(FILE *s, const char *title, const bst_pointing_point *poin
         s);
 }
 
-static void put_lower(FILE *s, double limit_px, const figures *f) {
-    double span = f->count ? fmax(1.45 * f->spread, limit_px > 0.0 ? 1.5 * limit_px : 0.1) : 1.0;
+static void put_lower(FILE *s, const char *label, double limit_px, const extent *e) {
+    double span = e->counted ? fmax(1.45 * e->spread, limit_px > 0.0 ? 1.5 * limit_px : 0.1) : 1.0;
     fputs(
         "unset title\nunset object\nunset logscale y\nset tmargin 0.6\nset bmargin 3.4\n"
         "set format x '%g'\nset xlabel 'time since the epoch  [s]'\n"
-        "set ylabel 'in track  [px]' offset 0.5,0\n",
+        "set ylabel 'settled, mode track  [px]' offset 0.5,0\n",
         s);
     fprintf(s, "set yrange [%.9g:%.9g]\n", -span, span);
-    if (f->count) {
-        fprintf(s,
-                "set label 1 'RMS %.3f px    largest %.3f px    in track from %.1f s' at graph "
-                "0.012, graph 0.92 font ',10' textcolor rgb '#222222'\n",
-                f->rms, f->worst, f->first_s);
-    } else {
-        fputs("set label 1 'never in track' at graph 0.012, graph 0.92 font ',10'\n", s);
+    if (label) {
+        fputs("set label 1 \"", s);
+        put_text(s, label);
+        fputs("\" noenhanced at graph 0.012, graph 0.92 font ',10' textcolor rgb '#222222'\n", s);
     }
     fputs("plot 0 with lines linecolor rgb '#999999' linewidth 0.8 notitle, ", s);
     if (limit_px > 0.0) {
@@ -152,14 +143,14 @@ static void put_lower(FILE *s, double limit_px, const figures *f) {
                 limit_px, -limit_px);
     }
     fputs(
-        "$points using 1:($5 == 1 ? $3 : NaN) with linespoints pointtype 7 pointsize 0.35 "
+        "$points using 1:($6 == 1 ? $3 : NaN) with linespoints pointtype 7 pointsize 0.35 "
         "linecolor rgb '#1f77b4' title 'x', "
-        "$points using 1:($5 == 1 ? $4 : NaN) with linespoints pointtype 7 pointsize 0.35 "
+        "$points using 1:($6 == 1 ? $4 : NaN) with linespoints pointtype 7 pointsize 0.35 "
         "linecolor rgb '#e08214' title 'y'\n",
         s);
 }
 
-bst_status bst_pointing_plot(bst_ctx *ctx, const char *path, const char *title,
+bst_status bst_pointing_plot(bst_ctx *ctx, const char *path, const char *title, const char *label,
                              const bst_pointing_point *points, int count, double limit_px,
                              bool *made) {
     if (made) {
@@ -168,7 +159,7 @@ bst_status bst_pointing_plot(bst_ctx *ctx, const char *path, const char *title,
     if (count < 2) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: a plot of pointing needs two points", path);
     }
-    figures f = measure(points, count);
+    extent e = measure(points, count);
     bst_plot plot;
     BST_TRY(bst_plot_begin(ctx, &plot, path, 1200, 760));
     FILE *s = plot.script;
@@ -180,8 +171,8 @@ bst_status bst_pointing_plot(bst_ctx *ctx, const char *path, const char *title,
             "set grid xtics ytics linecolor rgb '#c8c8c8' linewidth 0.6\n"
             "set xrange [%.9g:%.9g]\n",
             points[0].time_s, points[count - 1].time_s);
-    put_upper(s, title, points, count, limit_px, &f);
-    put_lower(s, limit_px, &f);
+    put_upper(s, title, points, count, limit_px, &e);
+    put_lower(s, label, limit_px, &e);
     fputs("unset multiplot\n", s);
     return bst_plot_end(ctx, &plot, made);
 }

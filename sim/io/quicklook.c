@@ -2,20 +2,23 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 
 #include "sim/io/marks_internal.h"
 
 #define PANEL 640 /* width and greatest height of a panel */
 #define MARGIN 20
-#define HEAD 58     /* title */
-#define CAPTION 58  /* above each panel */
-#define LEGEND 44   /* below */
+#define HEAD 58    /* title */
+#define CAPTION 58 /* above each panel */
+#define LEGEND 44  /* below */
+#define LEGEND_ROW 24
 #define INSET 208   /* side of the inset */
 #define INSET_PX 48 /* pixels of the frame in it */
 
 static const bst_colour ground = {16, 20, 28}, white = BST_WHITE, soft = BST_SOFT,
                         target_colour = BST_TARGET_COLOUR, track_colour = BST_TRACK_COLOUR,
-                        object_colour = BST_OBJECT_COLOUR, star_colour = BST_STAR_COLOUR;
+                        object_colour = BST_OBJECT_COLOUR, star_colour = BST_STAR_COLOUR,
+                        rest_colour = BST_REST_COLOUR;
 
 /* How frame pixels come to picture pixels in one view. */
 typedef struct view {
@@ -31,14 +34,30 @@ static double view_y(const view *v, double y_px) {
     return v->box.y + (y_px - v->y0) * v->scale - 0.5;
 }
 
+static int by_importance(const void *a, const void *b) {
+    const bst_mark *p = a, *q = b;
+    return (p->importance < q->importance) - (p->importance > q->importance);
+}
+
+void bst_mark_sort(bst_mark *marks, int count) {
+    qsort(marks, (size_t)count, sizeof *marks, by_importance);
+}
+
+static int drawn_of(const bst_quicklook_frame *f) {
+    return f->detection_count < BST_QUICKLOOK_MARKS ? f->detection_count : BST_QUICKLOOK_MARKS;
+}
+
 /* `size` scales the marks: they are larger in the inset. */
 static void draw_marks(bst_picture *p, const bst_quicklook_frame *f, const view *v, double size) {
     bst_picture_clip(p, v->box);
-    for (int i = 0; i < f->detection_count; i++) {
+    for (int i = drawn_of(f) - 1; i >= 0; i--) {
         const bst_mark *m = &f->detections[i];
         double r = fmax(m->radius_px * v->scale, 5.0 * size);
         bst_picture_circle(p, view_x(v, m->x_px), view_y(v, m->y_px), r,
-                           m->star ? star_colour : object_colour, m->star ? 1.0 : 1.5);
+                           m->kind == BST_MARK_STAR   ? star_colour
+                           : m->kind == BST_MARK_REST ? rest_colour
+                                                      : object_colour,
+                           m->kind == BST_MARK_DETECTION ? 1.5 : 1.0);
     }
     bst_mark_cross(p, view_x(v, f->boresight_x_px), view_y(v, f->boresight_y_px), 7.0 * size,
                    16.0 * size);
@@ -174,12 +193,20 @@ static bst_status draw_panel(bst_ctx *ctx, bst_picture *p, const bst_quicklook_f
     if (f->has_track && f->track_label) {
         bst_picture_text(p, x, top + 20, 11.0, track_colour, false, f->track_label);
     }
-    bst_picture_text(p, left, top + 44, 10.0, soft, false, f->time ? f->time : "");
+    x = left + bst_picture_text(p, left, top + 44, 10.0, soft, false, f->time ? f->time : "") + 16;
+    if (drawn_of(f) < f->detection_count) {
+        char text[64];
+        snprintf(text, sizeof text, "%d of %d detections drawn", drawn_of(f), f->detection_count);
+        bst_picture_text(p, x, top + 44, 10.0, white, false, text);
+    }
     return BST_OK;
 }
 
-static void draw_legend(bst_picture *p, double x, double y) {
+/* `single`: there is one panel, under which the legend takes two rows. */
+static void draw_legend(bst_picture *p, double left, double y, bool single) {
     const double h = 9.5, gap = 30;
+    double x = left;
+    y -= single ? LEGEND_ROW : 0;
     double mid = y - 4;
     bst_picture_rectangle(p, x, mid - 7, 14, 14, target_colour, 1.6);
     x += 22 + bst_picture_text(p, x + 22, y, h, soft, false, "target (truth)") + gap;
@@ -187,8 +214,15 @@ static void draw_legend(bst_picture *p, double x, double y) {
     x += 24 + bst_picture_text(p, x + 24, y, h, soft, false, "track") + gap;
     bst_picture_circle(p, x + 7, mid, 6.5, object_colour, 1.5);
     x += 22 + bst_picture_text(p, x + 22, y, h, soft, false, "detection") + gap;
+    if (single) {
+        x = left;
+        y += LEGEND_ROW;
+        mid += LEGEND_ROW;
+    }
     bst_picture_circle(p, x + 7, mid, 6.5, star_colour, 1.2);
     x += 22 + bst_picture_text(p, x + 22, y, h, soft, false, "identified star") + gap;
+    bst_picture_circle(p, x + 7, mid, 6.5, rest_colour, 1.2);
+    x += 22 + bst_picture_text(p, x + 22, y, h, soft, false, "at rest among stars") + gap;
     bst_mark_cross(p, x + 9, mid, 3, 9);
     bst_picture_text(p, x + 26, y, h, soft, false, "boresight");
 }
@@ -204,7 +238,7 @@ bst_status bst_quicklook_write(bst_ctx *ctx, const char *path, const char *title
         }
     }
     int width = MARGIN + panels * (PANEL + MARGIN);
-    int height = HEAD + CAPTION + PANEL + LEGEND;
+    int height = HEAD + CAPTION + PANEL + LEGEND + (second ? 0 : LEGEND_ROW);
     bst_picture *p;
     BST_TRY(bst_picture_create(ctx, width, height, ground, &p));
     bst_picture_text(p, MARGIN, 36, 16.0, white, true, title ? title : "");
@@ -213,7 +247,7 @@ bst_status bst_quicklook_write(bst_ctx *ctx, const char *path, const char *title
         status = draw_panel(ctx, p, frames[i], MARGIN + i * (PANEL + MARGIN), HEAD);
     }
     if (status == BST_OK) {
-        draw_legend(p, MARGIN, height - 16);
+        draw_legend(p, MARGIN, height - 16, !second);
         status = bst_picture_save(ctx, p, path);
     }
     bst_picture_free(p);

@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "sim/core/folder.h"
+#include "sim/io/run_files.h"
 #include "sim/io/run_internal.h"
 
 #define LOCK_NAME "lock"
@@ -62,6 +63,41 @@ static bool remove_tree(int parent, const char *name) {
     return ok && unlinkat(parent, name, AT_REMOVEDIR) == 0;
 }
 
+/* Empties and removes the folder of a run: its own files are deleted, whatever else is in there is
+ * moved into the folder `to`. False with errno; what cannot be moved stays in `from`. */
+static bool give_way(const char *from, const char *to) {
+    int source = open(from, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+    int target = open(to, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    DIR *dir = source >= 0 && target >= 0 ? fdopendir(dup(source)) : NULL;
+    bool ok = dir != NULL;
+    int error = errno;
+    for (struct dirent *entry; dir && (entry = readdir(dir));) {
+        const char *name = entry->d_name;
+        struct stat info;
+        bool done = is_dots(name);
+        if (!done && (bst_run_owns(name) || strcmp(name, BST_RUN_PAGE) == 0)) {
+            done = remove_tree(source, name);
+        } else if (!done && fstatat(target, name, &info, AT_SYMLINK_NOFOLLOW) != 0) {
+            done = renameat(source, name, target, name) == 0;
+        }
+        if (!done) {
+            error = ok ? errno : error;
+            ok = false;
+        }
+    }
+    if (dir) {
+        closedir(dir);
+    }
+    if (source >= 0) {
+        close(source);
+    }
+    if (target >= 0) {
+        close(target);
+    }
+    errno = error;
+    return ok && rmdir(from) == 0;
+}
+
 /* Whether a folder may be taken for a run's and removed: it holds a run's tables, or nothing (but
  * the lock of a run that died at once). Files such as manifest.json are other programs', too. */
 static bool looks_like_run(const char *folder) {
@@ -108,8 +144,9 @@ static int take_lock(const char *folder, int flags) {
     return fd;
 }
 
-/* Moves the .partial folder of a dead run out of the way and removes it. */
-static bst_status clear_dead_run(bst_ctx *ctx, const char *folder) {
+/* Moves the .partial folder of a dead run out of the way and removes it; what is no file of a run
+ * goes into the folder `to`. */
+static bst_status clear_dead_run(bst_ctx *ctx, const char *folder, const char *to) {
     if (!looks_like_run(folder)) {
         return bst_fail(ctx, BST_ERR_IO,
                         "%s: is in the way and does not look like an unfinished run; move it or "
@@ -128,8 +165,7 @@ static bst_status clear_dead_run(bst_ctx *ctx, const char *folder) {
     bst_log(ctx, BST_LOG_WARNING, "%s: replacing what an unfinished run left", folder);
     char dead[BST_RUN_PATH_BYTES];
     int n = snprintf(dead, sizeof dead, "%s.dead.%ld", folder, (long)getpid());
-    bool ok = n > 0 && (size_t)n < sizeof dead && rename(folder, dead) == 0 &&
-              remove_tree(AT_FDCWD, dead);
+    bool ok = n > 0 && (size_t)n < sizeof dead && rename(folder, dead) == 0 && give_way(dead, to);
     bst_status status = ok ? BST_OK : fail_errno(ctx, folder, "cannot remove the unfinished run");
     close(lock);
     return status;
@@ -161,7 +197,7 @@ static bst_status claim_folder(bst_ctx *ctx, bst_run *run) {
         status = fail_errno(ctx, run->folder, "cannot make the lock");
     } else if (rename(draft, run->folder) != 0) {
         if (errno == ENOTEMPTY || errno == EEXIST) {
-            status = clear_dead_run(ctx, run->folder);
+            status = clear_dead_run(ctx, run->folder, draft);
             if (status == BST_OK && rename(draft, run->folder) != 0) {
                 status = fail_errno(ctx, run->folder, "cannot make the folder");
             }
@@ -317,7 +353,10 @@ static bst_status sync_folder(bst_ctx *ctx, const char *folder) {
     bst_status status = BST_OK;
     for (struct dirent *entry; status == BST_OK && (entry = readdir(dir));) {
         char path[BST_RUN_PATH_BYTES];
-        if (!is_dots(entry->d_name)) {
+        struct stat info;
+        /* links, pipes and folders are somebody else's */
+        if (fstatat(dirfd(dir), entry->d_name, &info, AT_SYMLINK_NOFOLLOW) == 0 &&
+            S_ISREG(info.st_mode)) {
             status = join(ctx, path, sizeof path, folder, entry->d_name);
             status = status == BST_OK ? sync_path(ctx, path) : status;
         }
@@ -354,7 +393,7 @@ static bst_status publish(bst_ctx *ctx, bst_run *run) {
         }
         return fail_errno(ctx, run->out, "cannot name the finished run");
     }
-    if (old[0] && !remove_tree(AT_FDCWD, old)) {
+    if (old[0] && !give_way(old, run->out)) {
         bst_log(ctx, BST_LOG_WARNING, "%s: cannot be removed: %s", old, strerror(errno));
     }
     char parent[BST_RUN_PATH_BYTES];

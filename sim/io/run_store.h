@@ -18,8 +18,10 @@ typedef struct bst_table bst_table;
 
 /* Makes "<out>.partial" (and missing parents, as mkdir -p) with an empty database in it. Nothing is
  * written before this call.
- * An existing <out> is refused with BST_ERR_IO unless `overwrite` is set: then it is replaced when
- * the run finishes, and only if it is an empty folder or holds a run (manifest.json or run.sqlite).
+ * An existing <out> is refused with BST_ERR_IO unless `overwrite` is set: then its run is replaced
+ * when the new one finishes, and only if it is an empty folder or holds a run (run.sqlite). Other
+ * files and folders in it stay where they are; only those of a run (bst_run_owns) and its page are
+ * removed.
  * A .partial that a dead run left is logged as a warning and replaced; one that a living process
  * still writes (it holds a lock on it) is refused.
  * Errors, which leave nothing behind: BST_ERR_IO with the path and the system's reason;

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "sim/link/link_internal.h"
 
@@ -13,6 +14,9 @@ const bst_config_desc bst_link_config_table[] = {
     BST_STRING(bst_link_config, address, "\"\"",
                "Where peers connect: tcp://127.0.0.1:PORT or ipc://PATH; needed by modules of type "
                "\"external\"."),
+    BST_PATH(bst_link_config, keys_file, "\"\"",
+             "Keys of boresight link-keys: only peers that have them may connect, and what is sent "
+             "is encrypted; a file, relative to the scenario's folder."),
     BST_REAL(bst_link_config, timeout_s, "s", 0.001, 3600, "5",
              "For which the run waits for a peer's answer to a step."),
     BST_REAL(bst_link_config, connect_timeout_s, "s", 0.001, 86400, "60",
@@ -69,6 +73,15 @@ static bst_status bind_address(bst_ctx *ctx, bst_link *link) {
     if (!link->router || !link->monitor) {
         return bst_fail(ctx, BST_ERR_IO, "link: %s", zmq_strerror(errno));
     }
+    if (*link->config.keys_file) {
+        BST_TRY(bst_curve_keys_read(ctx, link->config.keys_file, &link->keys));
+        BST_TRY(bst_curve_secure(ctx, link->router, &link->keys, true));
+        link->asker = bst_curve_asker(link->context);
+        if (!link->asker) {
+            return bst_fail(ctx, BST_ERR_IO, "link: keys cannot be checked: %s",
+                            zmq_strerror(errno));
+        }
+    }
     int64_t most = LINK_MESSAGE_BYTES;
     (void)zmq_setsockopt(link->router, ZMQ_MAXMSGSIZE, &most, sizeof most);
     set(link->router, ZMQ_ROUTER_MANDATORY, 1);
@@ -82,8 +95,16 @@ static bst_status bind_address(bst_ctx *ctx, bst_link *link) {
         zmq_connect(link->monitor, "inproc://watch") != 0) {
         return bst_fail(ctx, BST_ERR_IO, "link: cannot watch connections: %s", zmq_strerror(errno));
     }
+    if (strncmp(link->address, "ipc://", 6) == 0) {
+        /* ZeroMQ itself would remove whatever is at the path */
+        BST_TRY(bst_ipc_socket_open(ctx, link->address + 6, &link->ipc));
+        set(link->router, ZMQ_USE_FD, link->ipc.fd);
+    }
     if (zmq_bind(link->router, link->address) != 0) {
         int why = errno;
+        if (*link->ipc.path) {
+            close(link->ipc.fd);
+        }
         return bst_fail(ctx, BST_ERR_IO, "link: cannot use %s: %s%s", link->address,
                         zmq_strerror(why),
                         why == EADDRINUSE ? "; another program has it: choose another port" : "");
@@ -148,9 +169,13 @@ void bst_link_close(bst_link *link, int reason, const char *text) {
     if (link->monitor) {
         zmq_close(link->monitor);
     }
+    if (link->asker) {
+        zmq_close(link->asker);
+    }
     if (link->context) {
         zmq_ctx_term(link->context); /* all frames have been released when it returns */
     }
+    bst_ipc_socket_remove(&link->ipc);
     if (rooms != none) {
         free(rooms);
     }
@@ -192,6 +217,8 @@ static const char *const event_names[LINK_EVENTS] = {
     [LINK_STRANGER] = "link_stranger",
     [LINK_REFUSED] = "link_refused",
     [LINK_FLOODED] = "link_flooded",
+    [LINK_OVERSIZED] = "link_oversized",
+    [LINK_NO_KEY] = "link_no_key",
     [LINK_TAKEOVER] = "link_takeover",
     [LINK_HELLO_TAKEN] = "link_hello",
     [LINK_LEFT] = "link_left",

@@ -20,6 +20,7 @@ typedef enum bst_link_silence { BST_LINK_STOP, BST_LINK_GO_ON } bst_link_silence
 /* A scenario's "link". */
 typedef struct bst_link_config {
     char address[128];
+    char keys_file[512];      /* "": the link asks for none */
     double timeout_s;         /* for the answer to a step */
     double connect_timeout_s; /* for a peer that plays a part, at its first step */
     int32_t on_silence;       /* bst_link_silence */
@@ -133,9 +134,10 @@ const char *bst_link_note(bst_link *link);
 
 typedef struct bst_link_peer bst_link_peer;
 
-/* Connects to a simulation, which need not be there yet, and says hello. */
-bst_status bst_link_peer_open(bst_ctx *ctx, const char *address, const bst_link_hello *hello,
-                              bst_link_peer **out) BST_MUST_CHECK;
+/* Connects to a simulation, which need not be there yet, and says hello. `keys_file`: of a link
+ * that asks for keys (bst_curve_keys_read), else NULL. */
+bst_status bst_link_peer_open(bst_ctx *ctx, const char *address, const char *keys_file,
+                              const bst_link_hello *hello, bst_link_peer **out) BST_MUST_CHECK;
 void bst_link_peer_close(bst_link_peer *peer);
 
 /* A message that came. Pointers are lent until the next bst_link_peer_receive. */

@@ -9,6 +9,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "sim/core/file.h"
 #include "sim/link/crc32c.h"
 #include "sim/link/link_internal.h"
 
@@ -34,7 +35,21 @@ static bst_status open_tape(bst_ctx *ctx, bst_link *link, const char *path, bool
     }
     tape->writing = writing;
     snprintf(tape->path, sizeof tape->path, "%s", path);
-    tape->file = fopen(path, writing ? "wb" : "rb");
+    if (!writing) {
+        int fd;
+        uint64_t bytes;
+        bst_ctx why_not = {0};
+        bst_status status =
+            bst_file_open(&why_not, path, INT64_MAX, "a run's link.packets", &fd, &bytes);
+        if (status != BST_OK && status != BST_ERR_NOT_FOUND) {
+            free(tape);
+            return bst_fail(ctx, status, "link: %s", why_not.message);
+        }
+        tape->file = status == BST_OK ? fdopen(fd, "rb") : NULL;
+        errno = status == BST_OK ? errno : ENOENT;
+    } else {
+        tape->file = fopen(path, "wb");
+    }
     if (!tape->file) {
         int why = errno;
         free(tape);

@@ -229,6 +229,7 @@ static const bst_wire_field detections[] = {
     INT(bst_detections, windows, 0, MANY, "", "Of the frame that were looked at; 0: all of it."),
     COUNT(bst_detections, "Items."),
     INT(bst_detections, lost, 0, MANY, "", "Detections that found no room."),
+    INT(bst_detections, bad_pixels, 0, MANY, "", "Of the sensor, that are learned to be bad."),
     END};
 
 static const bst_wire_field detection_items[] = {
@@ -245,7 +246,7 @@ static const bst_wire_field detection_items[] = {
     REAL(bst_detection, angle_rad, "rad", "Of the long axis, from +x towards +y."),
     ANY(bst_detection, v_mag, "mag", "V."),
     ANY(bst_detection, v_mag_sigma, "mag", "1 sigma of it; infinite without light."),
-    BITS(bst_detection, flags, "1 saturated, 2 edge, 4 streak, 8 blend, 16 stack."),
+    BITS(bst_detection, flags, "1 saturated, 2 edge, 4 streak, 8 blend, 16 stack, 32 bloom."),
     BITS(bst_detection, star_id, "Tycho-2 identity, 0 when none."),
     INT(bst_detection, label, 0, 5, "",
         "0 unknown, 1 star, 2 object, 3 artefact, 4 hot pixel, 5 radiation hit."),

@@ -6,6 +6,7 @@
 
 #include "sim/core/wall_clock.h"
 #include "sim/link/crc32c.h"
+#include "sim/link/curve_keys.h"
 #include "sim/link/endpoint.h"
 #include "sim/link/link.h"
 #include "sim/link/shared_frames.h"
@@ -54,8 +55,14 @@ static bst_status say_hello(bst_ctx *ctx, bst_link_peer *peer) {
     return bst_link_peer_send(ctx, peer, BST_LINK_HELLO, &peer->hello, NULL);
 }
 
-bst_status bst_link_peer_open(bst_ctx *ctx, const char *address, const bst_link_hello *hello,
-                              bst_link_peer **out) {
+static bst_status secure(bst_ctx *ctx, void *socket, const char *keys_file) {
+    bst_curve_keys keys;
+    BST_TRY(bst_curve_keys_read(ctx, keys_file, &keys));
+    return bst_curve_secure(ctx, socket, &keys, false);
+}
+
+bst_status bst_link_peer_open(bst_ctx *ctx, const char *address, const char *keys_file,
+                              const bst_link_hello *hello, bst_link_peer **out) {
     char checked[BST_LINK_ENDPOINT_BYTES];
     *out = NULL;
     BST_TRY(bst_link_endpoint_check(ctx, address, checked));
@@ -66,18 +73,23 @@ bst_status bst_link_peer_open(bst_ctx *ctx, const char *address, const bst_link_
     peer->hello = *hello;
     peer->context = zmq_ctx_new();
     peer->socket = peer->context ? zmq_socket(peer->context, ZMQ_DEALER) : NULL;
+    bst_status status = peer->socket && keys_file ? secure(ctx, peer->socket, keys_file) : BST_OK;
+    if (status != BST_OK) {
+        bst_link_peer_close(peer);
+        return status;
+    }
     int linger_ms = 500, ipv6 = strncmp(checked, "tcp://[", 7) == 0, reconnect_ms = 50;
     if (!peer->socket ||
         zmq_setsockopt(peer->socket, ZMQ_LINGER, &linger_ms, sizeof linger_ms) != 0 ||
         zmq_setsockopt(peer->socket, ZMQ_IPV6, &ipv6, sizeof ipv6) != 0 ||
         zmq_setsockopt(peer->socket, ZMQ_RECONNECT_IVL, &reconnect_ms, sizeof reconnect_ms) != 0 ||
         zmq_connect(peer->socket, checked) != 0) {
-        bst_status status = bst_fail(ctx, BST_ERR_IO, "link: cannot connect to %s: %s", checked,
-                                     zmq_strerror(errno));
+        status = bst_fail(ctx, BST_ERR_IO, "link: cannot connect to %s: %s", checked,
+                          zmq_strerror(errno));
         bst_link_peer_close(peer);
         return status;
     }
-    bst_status status = say_hello(ctx, peer);
+    status = say_hello(ctx, peer);
     if (status != BST_OK) {
         bst_link_peer_close(peer);
         return status;

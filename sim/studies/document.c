@@ -164,10 +164,7 @@ bst_status bst_study_document(bst_ctx *ctx, const bst_study *study, const bst_st
     const bst_study_base *base = &study->bases[place->base];
     const char *block = block_name(study);
     *settings = NULL;
-    BST_TRY(bst_json_parse(ctx, base->file, "{}", 2, scenario));
-    for (const cJSON *item = bst_json_root(base->json)->child; item; item = item->next) {
-        cJSON_AddItemToObject(bst_json_root(*scenario), item->string, cJSON_Duplicate(item, 1));
-    }
+    BST_TRY(bst_json_copy(ctx, base->json, scenario));
     bst_status status = make_document(ctx, study, place, values, *scenario);
     if (status != BST_OK) {
         bst_json_free(*scenario);

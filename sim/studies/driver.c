@@ -121,6 +121,10 @@ static bst_status take_rows(bst_ctx *ctx, driver *d, const bst_shard_job *job, i
         return bst_results_load_folder(ctx, d->results, d->options->out, job->first, job->count,
                                        true);
     }
+    if (status == BST_ERR_FORMAT) {
+        bst_results_reject(ctx, path, quiet.message);
+        return BST_OK;
+    }
     return status == BST_OK || status == BST_ERR_NOT_FOUND
                ? BST_OK
                : bst_fail(ctx, status, "%s", quiet.message);
@@ -151,6 +155,15 @@ static double mean_wall_s(const driver *d, const bst_shard_job *job) {
     return n > 0 ? fmax(sum / (double)n, 1e-6) : 0.0;
 }
 
+static bool has_missing(const driver *d, const bst_shard_job *job) {
+    for (int64_t run = job->first; run < job->first + job->count; run++) {
+        if (d->results->state[run] == BST_ROW_MISSING) {
+            return true;
+        }
+    }
+    return false;
+}
+
 static bst_status end_shard(bst_ctx *ctx, driver *d, int64_t index, const bst_shard_news *news) {
     flight f = d->flights[index];
     int64_t before = d->results->done;
@@ -162,15 +175,18 @@ static bst_status end_shard(bst_ctx *ctx, driver *d, int64_t index, const bst_sh
         d->run_s = d->run_s > 0.0 ? 0.5 * (d->run_s + run_s) : run_s;
         d->failures_in_a_row = 0;
     }
-    bool blame = !d->stopping && (news->kind == BST_SHARD_LOST || news->text[0]);
+    /* a shard that says that it is done and gained nothing would be begun for ever */
+    bool idle = gained == 0 && has_missing(d, &f.job);
+    const char *why = news->text[0] || news->kind == BST_SHARD_LOST || !idle
+                          ? news->text
+                          : "it ended well, but none of its rows could be read";
+    bool blame = !d->stopping && (news->kind == BST_SHARD_LOST || *why);
     if (blame) {
         d->outcome->attempts_lost++;
         d->failures_in_a_row += gained == 0 && news->kind != BST_SHARD_LOST;
-        snprintf(d->outcome->why, sizeof d->outcome->why, "%.*s", BST_SHARD_TEXT_BYTES - 1,
-                 news->text);
+        snprintf(d->outcome->why, sizeof d->outcome->why, "%.*s", BST_SHARD_TEXT_BYTES - 1, why);
         bst_log(ctx, BST_LOG_WARNING, "runs %" PRId64 " to %" PRId64 ", attempt %d: %s",
-                f.job.first + gained, f.job.first + f.job.count - 1, (int)f.job.attempt,
-                news->text);
+                f.job.first + gained, f.job.first + f.job.count - 1, (int)f.job.attempt, why);
     }
     count_attempt(d, &f.job, blame);
     return BST_OK;

@@ -72,10 +72,12 @@ static void take_cache(void) {
     for (int i = 0; i < CACHES; i++) {
         snprintf(path, sizeof path, "%s/worker-%d", root, i);
         snprintf(lock, sizeof lock, "%s/lock", path);
-        if (bst_folder_make(NULL, path) != BST_OK) {
+        bst_ctx quiet = {0};
+        /* PoCL loads what is in there */
+        if (bst_folder_make_private(&quiet, path) != BST_OK) {
             return;
         }
-        int fd = open(lock, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+        int fd = open(lock, O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0600);
         if (fd < 0) {
             return;
         }

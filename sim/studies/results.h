@@ -74,11 +74,15 @@ void bst_shard_drop(bst_shard_draft *draft);
 bst_status bst_shard_path(bst_ctx *ctx, const char *out, int64_t first, int64_t count, char *path,
                           size_t bytes) BST_MUST_CHECK;
 /* Takes the rows of a file. Rows that are there already stay as they are. BST_ERR_NOT_FOUND: there
- * is no such file; BST_ERR_FORMAT: it is damaged; BST_ERR_STATE: it is another study's. */
+ * is no such file; BST_ERR_FORMAT: it is damaged, or its rows are not those of the runs of its
+ * name; BST_ERR_STATE: it is another study's. */
 bst_status bst_results_load(bst_ctx *ctx, bst_results *results, const char *path) BST_MUST_CHECK;
 /* Takes all files of OUT/shards that have runs of first .. first + count - 1. `clean`: removes what
- * dead workers left and damaged files, with a warning for those. */
+ * dead workers left, and puts aside (bst_results_reject) damaged files and what is no file. */
 bst_status bst_results_load_folder(bst_ctx *ctx, bst_results *results, const char *out,
                                    int64_t first, int64_t count, bool clean) BST_MUST_CHECK;
+/* Puts a shard's file aside as PATH.rejected, so that its runs can be made again under its name,
+ * and logs a warning that begins with `why`. */
+void bst_results_reject(bst_ctx *ctx, const char *path, const char *why);
 
 #endif

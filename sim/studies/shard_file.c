@@ -7,8 +7,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include "sim/core/draft.h"
 #include "sim/core/file.h"
 #include "sim/core/fnv.h"
 #include "sim/studies/results.h"
@@ -116,11 +118,17 @@ static void sync_folder(const char *out) {
     }
 }
 
-/* Gives a draft its name unless that is taken; file systems without hard links rename. */
+/* Gives a draft its name unless another shard has it; file systems without hard links rename. */
 static bool take_name(const char *draft, const char *path) {
-    if (link(draft, path) == 0 || errno == EEXIST) {
+    struct stat info;
+    if (link(draft, path) == 0) {
         unlink(draft);
         return true;
+    }
+    if (errno == EEXIST) {
+        /* what is no file, a link that leads nowhere for instance, holds no rows */
+        bool taken = stat(path, &info) == 0 && S_ISREG(info.st_mode);
+        return taken ? unlink(draft) == 0 : rename(draft, path) == 0;
     }
     if (errno == EPERM || errno == EOPNOTSUPP || errno == ENOSYS) {
         return access(path, F_OK) == 0 ? unlink(draft) == 0 : rename(draft, path) == 0;
@@ -129,14 +137,13 @@ static bool take_name(const char *draft, const char *path) {
 }
 
 static bst_status write_file(bst_ctx *ctx, const bst_shard_draft *d, const char *out) {
-    char path[4096], draft[4200], host[65] = "";
+    char path[4096], draft[4200];
+    int fd;
     BST_TRY(bst_shard_path(ctx, out, d->first, d->count, path, sizeof path));
-    gethostname(host, sizeof host - 1);
-    snprintf(draft, sizeof draft, "%s.tmp.%.40s.%ld", path, host, (long)getpid());
-    int fd = open(draft, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-    bool ok = fd >= 0 && write_all(fd, d->text, d->bytes) && fsync(fd) == 0;
+    BST_TRY(bst_draft_make(ctx, path, draft, sizeof draft, &fd));
+    bool ok = write_all(fd, d->text, d->bytes) && fsync(fd) == 0;
     int error = ok ? 0 : errno;
-    if (fd >= 0 && close(fd) != 0 && ok) {
+    if (close(fd) != 0 && ok) {
         ok = false;
         error = errno;
     }
@@ -278,6 +285,39 @@ static bst_status damaged(bst_ctx *ctx, const char *path) {
     return bst_fail(ctx, BST_ERR_FORMAT, "%s: is damaged", path);
 }
 
+/* The runs that a shard's name says it has; false for another name. */
+static bool runs_of_name(const char *path, int64_t *from, int64_t *to) {
+    const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
+    int end = 0;
+    return sscanf(name, "%" SCNd64 "-%" SCNd64 ".rows%n", from, to, &end) == 2 && end &&
+           !name[end] && *from >= 0 && *to >= *from;
+}
+
+/* The rows of a shard are those of the runs of its name, in their order. */
+static bst_status check_runs(bst_ctx *ctx, const char *path, const char *text) {
+    int64_t from, to, next;
+    if (!runs_of_name(path, &from, &to)) {
+        return BST_OK;
+    }
+    next = from;
+    for (const char *line = text; line; line = strchr(line, '\n')) {
+        line += *line == '\n';
+        if (*line != 'R' && *line != 'F') {
+            continue;
+        }
+        int64_t run = strtoll(line + 1, NULL, 10);
+        if (run != next || run > to) {
+            return bst_fail(ctx, BST_ERR_FORMAT,
+                            "%s: holds a row of run %" PRId64 " (expected: run %" PRId64 ")", path,
+                            run, next);
+        }
+        next++;
+    }
+    return next == to + 1 ? BST_OK
+                          : bst_fail(ctx, BST_ERR_FORMAT,
+                                     "%s: ends before run %" PRId64 " of %" PRId64, path, next, to);
+}
+
 /* Cuts the line at *text off and goes on to the next; NULL at the end. */
 static char *next_line(char **text) {
     char *line = *text, *end = line ? strchr(line, '\n') : NULL;
@@ -317,6 +357,9 @@ static bst_status take_text(bst_ctx *ctx, bst_results *r, const char *path, char
         return bst_fail(ctx, BST_ERR_STATE, "%s: belongs to another study", path);
     }
     bool skip = false, good = next_line(&text) && next_line(&text);
+    if (good) {
+        BST_TRY(check_runs(ctx, path, text));
+    }
     while (good && (line = next_line(&text))) {
         seen += line[0] != 'S';
         BST_TRY(take_line(ctx, r, line, &run, &skip, &good));
@@ -337,11 +380,27 @@ static int compare_names(const void *a, const void *b) {
     return strcmp(*(char *const *)a, *(char *const *)b);
 }
 
+void bst_results_reject(bst_ctx *ctx, const char *path, const char *why) {
+    char aside[4700];
+    int n = snprintf(aside, sizeof aside, "%s.rejected", path);
+    if (n > 0 && (size_t)n < sizeof aside && rename(path, aside) == 0) {
+        bst_log(ctx, BST_LOG_WARNING, "%s; its runs are made again, and it is now %s", why, aside);
+    } else {
+        unlink(path);
+        bst_log(ctx, BST_LOG_WARNING, "%s; its runs are made again", why);
+    }
+}
+
+/* Whether a file of a shard's name is none: a link that leads nowhere, a folder, a pipe. */
+static bool is_no_file(const char *path) {
+    struct stat info;
+    return lstat(path, &info) == 0 && (stat(path, &info) != 0 || !S_ISREG(info.st_mode));
+}
+
 /* Loads one file by its name in the folder. */
 static bst_status load_name(bst_ctx *ctx, bst_results *r, const char *folder, const char *name,
                             int64_t first, int64_t count, bool clean) {
     int64_t from, to;
-    int end = 0;
     char path[4600];
     snprintf(path, sizeof path, "%s/%s", folder, name);
     if (strstr(name, ".rows.tmp.")) {
@@ -350,15 +409,13 @@ static bst_status load_name(bst_ctx *ctx, bst_results *r, const char *folder, co
         }
         return BST_OK;
     }
-    if (sscanf(name, "%" SCNd64 "-%" SCNd64 ".rows%n", &from, &to, &end) != 2 || !end ||
-        name[end] || from >= first + count || to < first) {
+    if (!runs_of_name(name, &from, &to) || from >= first + count || to < first) {
         return BST_OK;
     }
     bst_ctx quiet = {0};
     bst_status status = bst_results_load(&quiet, r, path);
-    if (status == BST_ERR_FORMAT && clean) {
-        bst_log(ctx, BST_LOG_WARNING, "%s; its runs are made again", quiet.message);
-        unlink(path);
+    if (clean && (status == BST_ERR_FORMAT || (status != BST_OK && is_no_file(path)))) {
+        bst_results_reject(ctx, path, quiet.message);
         return BST_OK;
     }
     return status == BST_OK || status == BST_ERR_FORMAT || status == BST_ERR_NOT_FOUND

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "sim/core/fnv.h"
+#include "sim/core/text.h"
 #include "sim/core/version.h"
 #include "sim/studies/study_internal.h"
 
@@ -399,10 +400,11 @@ static bst_status open_study(bst_ctx *ctx, const char *file, bst_study *study) {
     bst_status status = bst_study_read_bases(ctx, study, full ? full : file);
     free(full);
     BST_TRY(status);
-    if (!is_word(study->config.name) && strpbrk(study->config.name, "/ \t")) {
+    if (!bst_text_is_file_name(study->config.name) || strchr(study->config.name, ' ')) {
         return bst_fail(ctx, BST_ERR_CONFIG,
-                        "%s: /name: \"%s\" is to be a folder's name: no blanks and no \"/\"", file,
-                        study->config.name);
+                        "%s: /name: \"%s\" cannot be the name of a folder (allowed: 1 to 63 bytes "
+                        "without blanks, \"/\" and control characters, not beginning with \".\")",
+                        file, study->config.name);
     }
     BST_TRY(add_axes(ctx, study));
     return set_digest(ctx, study);

@@ -7,6 +7,9 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "sim/core/draft.h"
+#include "sim/io/csv.h"
+
 static bst_status fail_sql(bst_ctx *ctx, const bst_tables_out *t) {
     return bst_fail(ctx, BST_ERR_IO, "%s: %s", t->draft, sqlite3_errmsg(t->db));
 }
@@ -21,8 +24,11 @@ bst_status bst_tables_begin(bst_ctx *ctx, const char *folder, bst_tables_out *ou
     if (n < 0 || (size_t)n >= sizeof out->folder) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", folder);
     }
-    snprintf(out->draft, sizeof out->draft, "%s/study.sqlite.tmp.%ld", folder, (long)getpid());
-    unlink(out->draft);
+    char path[2112];
+    int fd;
+    snprintf(path, sizeof path, "%s/study.sqlite", folder);
+    BST_TRY(bst_draft_make(ctx, path, out->draft, sizeof out->draft, &fd));
+    close(fd); /* an empty file is an empty database */
     bst_status status = BST_OK;
     if (sqlite3_open(out->draft, &out->db) != SQLITE_OK) {
         status = fail_sql(ctx, out);
@@ -113,21 +119,6 @@ static bst_status create_table(bst_ctx *ctx, bst_table_out *out, const bst_colum
     return status;
 }
 
-static void put_text(FILE *file, const char *text) {
-    if (!strpbrk(text, ",\"\r\n") && *text) {
-        fputs(text, file);
-        return;
-    }
-    putc('"', file);
-    for (const char *c = text; *c; c++) {
-        if (*c == '"') {
-            putc('"', file);
-        }
-        putc(*c, file);
-    }
-    putc('"', file);
-}
-
 bst_status bst_table_begin(bst_ctx *ctx, bst_tables_out *tables, const char *name, const char *doc,
                            const bst_column *columns, int count, bool csv, bst_table_out *out) {
     char path[2200];
@@ -144,7 +135,7 @@ bst_status bst_table_begin(bst_ctx *ctx, bst_tables_out *tables, const char *nam
         }
         out->with_csv = true;
         for (int i = 0; i < count; i++) {
-            put_text(out->csv.stream, columns[i].name);
+            bst_csv_put_text(out->csv.stream, columns[i].name);
             fputs(i + 1 < count ? "," : "\r\n", out->csv.stream);
         }
     }
@@ -163,7 +154,7 @@ static void put_cell(FILE *file, const bst_value *v) {
             fprintf(file, "%.17g", v->as.real);
             break;
         case BST_COLUMN_TEXT:
-            put_text(file, v->as.text);
+            bst_csv_put_text(file, v->as.text);
             break;
     }
 }

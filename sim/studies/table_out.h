@@ -12,7 +12,7 @@ struct sqlite3_stmt;
  * or none does. */
 typedef struct bst_tables_out {
     struct sqlite3 *db;
-    char folder[2048], draft[2112];
+    char folder[2048], draft[2176];
 } bst_tables_out;
 
 typedef struct bst_table_out {

@@ -182,12 +182,13 @@ bool bst_field_project(const bst_camera *camera, const bst_los_track *track, int
 
 /* Makes the truth item of a source (positions, magnitude, electrons after vignetting at its mean
  * place; SNR for a Gaussian PSF that is smeared along the source's own track, sigma from
- * background, dark and read noise; of a PSF that is no Gaussian, the one with the same
+ * background, dark and read noise in the pixels that are read, binning x binning of the sensor's
+ * added; of a PSF that is no Gaussian, the one with the same
  * noise-equivalent area). With a rolling shutter all of it is that of the row where the source is
  * at the time: start and end are where the exposure of its own row starts and ends.
  */
 void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
-                          const bst_source *source, bst_window window, const bst_truth *header,
-                          bst_truth_item *out);
+                          const bst_source *source, bst_window window, int binning,
+                          const bst_truth *header, bst_truth_item *out);
 
 #endif

@@ -345,10 +345,13 @@ static bst_status make(bst_ctx *ctx, const bst_json *json, const bst_camera *cam
                 .out = calloc(1, sizeof *r.out),
                 .camera = camera,
                 .exposure_s = exposure->exposure_s,
-                .window = {0, 0, (int)camera->width_px, (int)camera->height_px},
                 .binning = exposure->binning > 1 ? (int)exposure->binning : 1};
     bst_status status =
-        r.out ? read_json(&r) : bst_fail(ctx, BST_ERR_MEMORY, "no memory for frame updates");
+        bst_exposure_window(ctx, exposure, camera->width_px, camera->height_px, &r.window);
+    if (status == BST_OK) {
+        status =
+            r.out ? read_json(&r) : bst_fail(ctx, BST_ERR_MEMORY, "no memory for frame updates");
+    }
     if (status != BST_OK) {
         bst_frame_updates_free(r.out);
         return status;
@@ -428,9 +431,14 @@ bst_frame_cursor bst_frame_cursor_begin(const bst_frame_updates *updates, const 
                           .start_s = exposure->first_s,
                           .exposure_s = exposure->exposure_s,
                           .period_s = exposure->period_s,
-                          .window = {0, 0, (int)camera->width_px, (int)camera->height_px},
                           .binning = exposure->binning > 1 ? (int)exposure->binning : 1,
                           .pixel_scale_arcsec = camera->pixel_scale_arcsec};
+    bst_ctx quiet = {0};
+    if (bst_exposure_window(&quiet, exposure, camera->width_px, camera->height_px, &c.window) !=
+        BST_OK) {
+        /* the exposure clock says so */
+        c.window = (bst_window){0, 0, (int)camera->width_px, (int)camera->height_px};
+    }
     c.start_tick = ticks(&c, c.start_s);
     apply(&c);
     return c;

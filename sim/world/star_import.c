@@ -6,7 +6,9 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "sim/core/draft.h"
 #include "sim/core/file.h"
+#include "sim/world/bright_stars.h"
 #include "sim/world/child.h"
 
 #define ROWS_PER_PROGRESS 20000
@@ -135,6 +137,7 @@ static bst_status read_rows(bst_ctx *ctx, FILE *rows, const bst_star_import_opti
         bst_star_record record;
         bst_status status = bst_star_parse_row(ctx, line, bytes, &values);
         if (status == BST_OK) {
+            bst_bright_star_correct(&values);
             status = bst_star_pack(ctx, &values, &record);
         }
         if (status == BST_OK && keeps(&options->subset, &record)) {
@@ -255,14 +258,14 @@ static bst_status build_image(bst_ctx *ctx, const import_list *list, const bst_s
 }
 
 static bst_status write_atomically(bst_ctx *ctx, const char *path, const void *data, size_t bytes) {
-    char temporary[1024];
-    int n = snprintf(temporary, sizeof temporary, "%s.partial.%ld", path, (long)getpid());
-    if (n < 0 || (size_t)n >= sizeof temporary) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT, "the path %s is too long", path);
-    }
-    FILE *f = fopen(temporary, "wb");
+    char temporary[4160];
+    int fd;
+    BST_TRY(bst_draft_make(ctx, path, temporary, sizeof temporary, &fd));
+    FILE *f = fdopen(fd, "wb");
     if (!f) {
-        return bst_fail(ctx, BST_ERR_IO, "cannot write %s: %s", temporary, strerror(errno));
+        close(fd);
+        unlink(temporary);
+        return bst_fail(ctx, BST_ERR_MEMORY, "%s: out of memory", path);
     }
     bool ok = fwrite(data, 1, bytes, f) == bytes && fflush(f) == 0 && fsync(fileno(f)) == 0;
     int why = errno;

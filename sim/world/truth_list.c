@@ -77,7 +77,7 @@ bst_status bst_truth_list_fill(bst_ctx *ctx, bst_truth_list *list, const bst_tru
     for (int i = 0; i < truth->count; i++) {
         int k = truth->lost > 0 ? list->picks[i].index : i;
         bst_truth_item *item = &truth->items[i];
-        bst_field_truth_item(q->field, q->track, &q->sources[k], q->window, truth, item);
+        bst_field_truth_item(q->field, q->track, &q->sources[k], q->window, binning, truth, item);
         if (source_of) {
             source_of[i] = k;
         }

@@ -4,6 +4,7 @@
 #define BST_WORLD_WORLD_H
 
 #include "sim/astro/bodies.h"
+#include "sim/astro/forces.h"
 #include "sim/core/config.h"
 #include "sim/world/brightness.h"
 #include "sim/world/camera.h"
@@ -31,9 +32,26 @@ typedef struct bst_state {
 
 /* The instant `seconds` after the scenario's epoch. */
 bst_time bst_world_time(const bst_world *world, double seconds);
+/* Earth orientation of the scenario; lent. */
+const bst_eop *bst_world_earth_orientation(const bst_world *world);
+/* Logs a warning where a run of `duration_s` goes on after the Earth-orientation table: how well
+ * what is predicted from it is known at its end. `scenario` names the file. */
+void bst_world_warn_earth_orientation(bst_ctx *ctx, const char *scenario, const bst_world *world,
+                                      double duration_s);
 const bst_stars *bst_world_stars(const bst_world *world);
 int bst_world_object_count(const bst_world *world);
 const bst_object_info *bst_world_object(const bst_world *world, int object);
+/* Time from the epoch of a body's element set to the scenario's epoch, s; bodies are numbered
+ * objects first, then observers. False: its orbit is no element set. */
+bool bst_world_element_age(const bst_world *world, int body, double *seconds);
+/* The law that an object moves by (not where it is): SGP4 with a drag term, or forces. */
+typedef struct bst_object_motion {
+    bool sgp4;                     /* an element set */
+    double bstar;                  /* of the set, 1 / Earth radii */
+    const bst_force_model *forces; /* of an integrated orbit, lent by the world; NULL: none known */
+} bst_object_motion;
+/* An object on an orbit relative to another one moves by the law of that one. */
+bst_object_motion bst_world_object_motion(const bst_world *world, int object);
 /* Index of the object with this name, -1 when there is none. */
 int bst_world_find_object(const bst_world *world, const char *name);
 /* From `seconds` after the epoch on the object of this name is in this state (GCRF) and moves on by

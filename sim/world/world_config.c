@@ -1,9 +1,12 @@
 #include "sim/world/world_config.h"
 
+#include <math.h>
+
 #include "sim/astro/elements.h"
 
-static const char *const orbit_sources[] = {"sgp4",     "relative",  "oem",
-                                            "injected", "numerical", NULL};
+static const char *const orbit_sources[] = {"sgp4",      "relative",      "oem", "injected",
+                                            "numerical", "constellation", NULL};
+static const char *const walker_patterns[] = {"delta", "star", NULL};
 static const char *const states_frames[] = {"gcrf", "teme", NULL};
 static const char *const faint_kinds[] = {"none", "statistical", NULL};
 static const char *const axes[] = {"x", "-x", "y", "-y", NULL};
@@ -12,7 +15,8 @@ static const bst_config_desc orbit_table[] = {
     BST_ENUM(
         bst_orbit_config, source, orbit_sources, "\"sgp4\"",
         "Where the orbit comes from: an element set, another object plus an offset, an ephemeris "
-        "file, states given per frame, or numerical integration from a state."),
+        "file, states given per frame, numerical integration from a state, or a place in one of "
+        "the world's constellations."),
     BST_PATH(bst_orbit_config, elements_file, "\"\"",
              "sgp4: file of element sets (TLE, or OMM as JSON or CSV), relative to the scenario's "
              "folder."),
@@ -37,6 +41,10 @@ static const bst_config_desc orbit_table[] = {
                "injected: the object in that file; empty: its only one."),
     BST_ENUM(bst_orbit_config, states_frame, states_frames, "\"gcrf\"",
              "injected: axes of the states, GCRF or true equator and mean equinox of date."),
+    BST_STRING(bst_orbit_config, constellation, "\"\"",
+               "constellation: the name of one of /world/constellations."),
+    BST_REALS(bst_orbit_config, member, "", 1, 10000, "[1, 1]",
+              "constellation: plane and slot of the satellite, from 1."),
     BST_OBJECT(bst_orbit_config, state, bst_initial_state_table, "{}",
                "numerical: what it starts from."),
     BST_OBJECT(bst_orbit_config, forces, bst_force_table, "{}", "numerical: what acts on it."),
@@ -84,6 +92,39 @@ static const bst_config_desc catalogue_table[] = {
     BST_CONFIG_END,
 };
 
+static const bst_config_desc constellation_table[] = {
+    BST_STRING(bst_constellation_config, name, NULL,
+               "Name; the satellites' are NAME PLANE-SLOT, as in \"NAME 2-5\"."),
+    BST_ENUM(bst_constellation_config, pattern, walker_patterns, "\"delta\"",
+             "Ascending nodes over 360 degrees (delta) or 180 degrees (star)."),
+    BST_INT(bst_constellation_config, satellites, "", 1, 20000, NULL,
+            "Number of satellites, t of i: t/p/f."),
+    BST_INT(bst_constellation_config, planes, "", 1, 10000, NULL,
+            "Number of planes, p; it divides t."),
+    BST_INT(bst_constellation_config, phasing, "", 0, 9999, "0",
+            "Phase from a plane to the next one to the east in units of 360 degrees / t: f, below "
+            "p."),
+    BST_REAL(bst_constellation_config, inclination_deg, "deg", 0, 179.9, NULL,
+             "Inclination, i, against the true equator of date."),
+    BST_REAL(bst_constellation_config, semi_major_axis_m, "m", 6.4e6, 1e9, NULL,
+             "Semi-major axis; the mean motion follows by Kepler's third law."),
+    BST_REAL(bst_constellation_config, eccentricity, "", 0, 0.9, "0", "Eccentricity."),
+    BST_REAL(bst_constellation_config, raan_deg, "deg", -360, 360, "0",
+             "Right ascension of the first plane's ascending node."),
+    BST_REAL(bst_constellation_config, arg_perigee_deg, "deg", -360, 360, "0",
+             "Argument of perigee of all orbits."),
+    BST_REAL(bst_constellation_config, mean_anomaly_deg, "deg", -360, 360, "0",
+             "Mean anomaly of satellite 1-1 at at_s."),
+    BST_REAL(bst_constellation_config, at_s, "s", -1e9, 1e9, "0",
+             "Time of the elements after the epoch; SGP4 carries them on without drag."),
+    BST_REAL(bst_constellation_config, area_m2, "m2", 0, 1e6, "4",
+             "Cross-section of the sphere that stands for each."),
+    BST_REAL(bst_constellation_config, albedo, "", 0, 1, "0.25", "Albedo of the sphere."),
+    BST_OBJECT(bst_constellation_config, brightness, bst_brightness_config_table, "{}",
+               "How the light of each follows from where it is."),
+    BST_CONFIG_END,
+};
+
 static const char *const catalogue_words[] = {"default", "embedded", NULL};
 static const char *const builtin_word[] = {"builtin", NULL};
 
@@ -99,13 +140,19 @@ const bst_config_desc bst_world_config_table[] = {
              "Statistical stars are drawn one by one down to this V (and the renderer's v_limit); "
              "those fainter add to the background."),
     BST_SEED(bst_world_config, faint_seed, "\"0x5ca1ab1edeadbeef\"",
-             "Seed of the statistical sky, a hexadecimal string: the same sky in all runs."),
+             "Seed of the statistical sky: the same sky in all runs."),
     BST_PATH_OR(bst_world_config, earth_orientation, builtin_word, "\"builtin\"",
                 "\"builtin\" or a file in the IERS EOP C04 format."),
+    BST_BOOL(bst_world_config, shadow_atmosphere, "true",
+             "Sunlight on objects at the edge of the Earth's shadow is refracted, weakened and "
+             "reddened by the air; false: an Earth without air. The column sunlit_fraction is the "
+             "geometric one in both cases."),
     BST_LIST(bst_world_config, objects, bst_object_config, object_table, 0, 100000, "[]",
              "The space objects."),
     BST_LIST(bst_world_config, catalogues, bst_catalogue_config, catalogue_table, 0, 16, "[]",
              "Files of element sets whose satellites are there as well."),
+    BST_LIST(bst_world_config, constellations, bst_constellation_config, constellation_table, 0, 64,
+             "[]", "Walker constellations whose satellites are there as well."),
     BST_CONFIG_END,
 };
 
@@ -120,8 +167,35 @@ static const bst_config_desc exposure_table[] = {
         bst_exposure_config, binning, "px", 1, 8, "1",
         "Sensor pixels per side of a frame's pixel, added before they are read; control may ask "
         "for another."),
+    BST_REALS(bst_exposure_config, window_px, "px", 0, 65536, "[0, 0, 0, 0]",
+              "Part of the sensor that is read: first column, first row, width, height in whole "
+              "sensor pixels; width 0: all of it. Control may ask for another."),
     BST_CONFIG_END,
 };
+
+bst_status bst_exposure_window(bst_ctx *ctx, const bst_exposure_config *config, int64_t width_px,
+                               int64_t height_px, bst_window *out) {
+    const double *w = config->window_px;
+    *out = (bst_window){0, 0, (int)width_px, (int)height_px};
+    if (w[2] == 0.0) {
+        return BST_OK;
+    }
+    bool whole = true;
+    for (int k = 0; k < 4; k++) {
+        whole = whole && w[k] == floor(w[k]);
+    }
+    if (!whole || w[3] < 1.0 || w[0] + w[2] > (double)width_px || w[1] + w[3] > (double)height_px ||
+        fmin(w[2], w[3]) < (double)config->binning) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "exposure/window_px: [%g, %g, %g, %g] is no window of the sensor (allowed: "
+                        "whole numbers x0, y0, width, height within %lld x %lld pixels, at least "
+                        "the binning of %lld wide and high)",
+                        w[0], w[1], w[2], w[3], (long long)width_px, (long long)height_px,
+                        (long long)config->binning);
+    }
+    *out = (bst_window){(int)w[0], (int)w[1], (int)w[2], (int)w[3]};
+    return BST_OK;
+}
 
 static const char *const region_kinds[] = {"none", "arc", "geostationary", NULL};
 

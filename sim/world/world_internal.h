@@ -26,6 +26,7 @@ typedef struct bst_orbit {
     /* sgp4 */
     bst_sgp4 *sgp4;
     double epoch_offset_s; /* scenario epoch minus element epoch */
+    double bstar;          /* 1 / Earth radii */
     /* relative */
     const struct bst_orbit *reference;
     double at_s;
@@ -38,6 +39,7 @@ typedef struct bst_orbit {
     double from_s, to_s; /* span of the states, after the epoch */
     /* numerical */
     bst_gravity *gravity;
+    bst_force_model forces;
     bst_trajectory *unburnt, *burnt; /* burnt NULL: there are no burns */
 
     bst_burn *burns;
@@ -61,7 +63,8 @@ typedef struct world_sensor {
 
 typedef struct world_observer {
     char name[64];
-    int norad; /* 0: none */
+    int norad;      /* 0: none */
+    int own_object; /* that this observer is, of a constellation; -1: none */
     bst_orbit orbit;
     world_sensor *sensors;
     int sensor_count;
@@ -88,6 +91,7 @@ struct bst_world {
     bst_time epoch;
     bst_eop *eop;
     bst_sky_grid *sky_grid; /* of all clocks of the world */
+    bool shadow_atmosphere; /* the air at the edge of the Earth's shadow counts for light */
     bst_stars *stars;
     bst_faint_sky *faint;     /* NULL: neither statistical stars nor their light */
     double faint_limit_v_mag; /* single statistical stars down to this; -INFINITY: none */

@@ -20,6 +20,7 @@ static void make_table(values *v, bst_option table[TABLE_LENGTH]) {
          .kind = BST_OPTION_TEXT,
          .target = &v->out,
          .argument = "FOLDER",
+         .path = BST_PATH_INPUT,
          .doc = "Where to write.",
          .required = true},
         {.name = "seed",

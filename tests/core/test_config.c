@@ -158,6 +158,41 @@ static bst_status read_text(bst_ctx *ctx, const char *text, const bst_config_des
     return status;
 }
 
+#define SEEDS                                                                                   \
+    "allowed: a hexadecimal string such as \"0x1F\" or a decimal one such as \"31\", up to 64 " \
+    "bits, or an integer from 0 to 9007199254740992)"
+
+static void seeds_are_decimal_or_hexadecimal(void **state) {
+    (void)state;
+    static const struct {
+        const char *text;
+        uint64_t seed;
+    } cases[] = {
+        {"{\"seed\": \"0x1F\"}", 31},
+        {"{\"seed\": \"31\"}", 31},
+        {"{\"seed\": 31}", 31},
+        {"{\"seed\": \"012\"}", 12}, /* not octal */
+        {"{\"seed\": 9007199254740992}", UINT64_C(1) << 53},
+        {"{\"seed\": \"18446744073709551615\"}", UINT64_MAX},
+        {"{\"seed\": \"0xffffffffffffffff\"}", UINT64_MAX},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        bst_ctx ctx = {0};
+        struct {
+            uint64_t seed;
+        } t;
+        static const bst_config_desc table[] = {
+            {.key = "seed", .type = BST_CONFIG_SEED, .unit = "", .doc = "", .size = sizeof t.seed},
+            BST_CONFIG_END};
+        bst_json *json = NULL;
+        bst_assert_ok(&ctx,
+                      bst_json_parse(&ctx, "f.json", cases[i].text, strlen(cases[i].text), &json));
+        bst_assert_ok(&ctx, bst_config_read(&ctx, json, bst_json_root(json), "", table, &t));
+        assert_true(t.seed == cases[i].seed);
+        bst_json_free(json);
+    }
+}
+
 static void test_messages(void **state) {
     (void)state;
     static const struct {
@@ -211,21 +246,18 @@ static void test_messages(void **state) {
         {"{\"burns\": [{\"time_s\": 1}, {}]}",
          "f.json: /burns/1/time_s: missing; it is required: Time of the burn."},
         {"{\"burns\": [3]}", "f.json: /burns/0: wrong type (found 3; allowed: an object)"},
-        {"{\"seed\": 1}",
-         "f.json: /seed: wrong type (found 1; allowed: a hexadecimal string such "
-         "as \"0x1F\", up to 64 bits)"},
-        {"{\"seed\": \"1F\"}",
-         "f.json: /seed: not a seed (found \"1F\"; allowed: a hexadecimal "
-         "string such as \"0x1F\", up to 64 bits)"},
-        {"{\"seed\": \"0x\"}",
-         "f.json: /seed: not a seed (found \"0x\"; allowed: a hexadecimal "
-         "string such as \"0x1F\", up to 64 bits)"},
+        {"{\"seed\": true}", "f.json: /seed: wrong type (found true; " SEEDS},
+        {"{\"seed\": -1}", "f.json: /seed: not a seed (found -1; " SEEDS},
+        {"{\"seed\": 1.5}", "f.json: /seed: not a seed (found 1.5; " SEEDS},
+        {"{\"seed\": 1e16}", "f.json: /seed: not a seed (found 1e+16; " SEEDS},
+        {"{\"seed\": \"1F\"}", "f.json: /seed: not a seed (found \"1F\"; " SEEDS},
+        {"{\"seed\": \"\"}", "f.json: /seed: not a seed (found \"\"; " SEEDS},
+        {"{\"seed\": \"0x\"}", "f.json: /seed: not a seed (found \"0x\"; " SEEDS},
         {"{\"seed\": \"0x12345678901234567\"}",
-         "f.json: /seed: not a seed (found \"0x12345678901234567\"; allowed: a hexadecimal string "
-         "such as \"0x1F\", up to 64 bits)"},
-        {"{\"seed\": \"0x-1\"}",
-         "f.json: /seed: not a seed (found \"0x-1\"; allowed: a "
-         "hexadecimal string such as \"0x1F\", up to 64 bits)"},
+         "f.json: /seed: not a seed (found \"0x12345678901234567\"; " SEEDS},
+        {"{\"seed\": \"18446744073709551616\"}", /* 2^64 */
+         "f.json: /seed: not a seed (found \"18446744073709551616\"; " SEEDS},
+        {"{\"seed\": \"0x-1\"}", "f.json: /seed: not a seed (found \"0x-1\"; " SEEDS},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         bst_ctx ctx = {0};
@@ -409,7 +441,9 @@ static void test_schema(void **state) {
         "\"enabled\":{\"type\":\"boolean\",\"description\":\"Switch.\",\"default\":false},"
         "\"kind\":{\"enum\":[\"ideal\",\"two_axis\"],\"description\":\"Kind.\","
         "\"default\":\"ideal\"},"
-        "\"seed\":{\"type\":\"string\",\"pattern\":\"^0x[0-9a-fA-F]{1,16}$\","
+        "\"seed\":{\"type\":[\"string\",\"integer\"],\"pattern\":\"^(0x[0-9a-fA-F]{1,16}|[0-9]{1,"
+        "20})$\","
+        "\"minimum\":0,\"maximum\":9007199254740992,"
         "\"description\":\"Seed.\",\"default\":\"0x1\"},"
         "\"axis\":{\"type\":\"array\",\"minItems\":3,\"maxItems\":3,\"items\":{"
         "\"type\":\"number\",\"minimum\":-1,\"maximum\":1},\"description\":\"Axis.\","
@@ -441,6 +475,7 @@ static void test_schema(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(seeds_are_decimal_or_hexadecimal),
         cmocka_unit_test(test_messages),
         cmocka_unit_test(test_long_value_is_shortened),
         cmocka_unit_test(test_defaults),

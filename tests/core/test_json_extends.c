@@ -80,6 +80,25 @@ static void a_chain_is_resolved(void **state) {
     bst_json_free(json);
 }
 
+/* A copy knows the file of each value too, and what is assigned to it is the document's own. */
+static void a_copy_keeps_the_files(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_json *json = NULL, *copy = NULL;
+    put("sub/far.json", "{\"path\": \"data.txt\", \"o\": {\"p\": 1, \"q\": 2}}");
+    const char *near = put("near.json", "{\"extends\": \"sub/far.json\", \"own\": 1}");
+    bst_assert_ok(&ctx, bst_json_load_extended(&ctx, near, &json));
+    bst_assert_ok(&ctx, bst_json_copy(&ctx, json, &copy));
+    bst_json_free(json);
+    expect_text(copy, "{\"path\":\"data.txt\",\"o\":{\"p\":1,\"q\":2},\"own\":1}");
+    expect_from(copy, "/path", "/sub/far.json");
+    expect_from(copy, "/own", "/near.json");
+    bst_assert_ok(&ctx, bst_json_assign(&ctx, copy, "/o/p", cJSON_CreateNumber(3)));
+    expect_from(copy, "/o/p", "/near.json");
+    expect_from(copy, "/o/q", "/sub/far.json");
+    bst_json_free(copy);
+}
+
 static void a_file_on_its_own_is_as_it_is(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -176,6 +195,7 @@ static void cycles_and_long_chains_are_refused(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_chain_is_resolved),
+        cmocka_unit_test(a_copy_keeps_the_files),
         cmocka_unit_test(a_file_on_its_own_is_as_it_is),
         cmocka_unit_test(wrong_ones_are_refused),
         cmocka_unit_test(cycles_and_long_chains_are_refused),

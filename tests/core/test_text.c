@@ -33,10 +33,29 @@ static void test_nearer(void **state) {
     assert_int_equal(best, 1);
 }
 
+static void test_file_name(void **state) {
+    (void)state;
+    static const char *const good[] = {"a", "my run 3", "a..b", "x.", "caf\xc3\xa9"};
+    static const char *const bad[] = {"",    ".",    "..",    ".hidden", "../x",
+                                      "a/b", "a\nb", "a\x7f", "/"};
+    for (size_t i = 0; i < sizeof good / sizeof *good; i++) {
+        assert_true(bst_text_is_file_name(good[i]));
+    }
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        assert_false(bst_text_is_file_name(bad[i]));
+    }
+    char name[257];
+    memset(name, 'a', 256);
+    name[256] = '\0';
+    assert_false(bst_text_is_file_name(name));
+    assert_true(bst_text_is_file_name(name + 1));
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_distance),
         cmocka_unit_test(test_nearer),
+        cmocka_unit_test(test_file_name),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,6 +3,7 @@
 #include <sys/stat.h>
 
 #include "sim/device/kernel_cache.h"
+#include "sim/device/kernel_cache_check.h"
 #include "tests/io/scratch.h"
 
 static void expect(const char *path, const char *reason) {
@@ -49,7 +50,90 @@ static void names_folder_and_reason(void **state) {
     scratch_remove(&place);
 }
 
+static void write_bytes(const char *path, const void *bytes, size_t count) {
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(bytes, 1, count, file), count);
+    fclose(file);
+}
+
+/* Programs of which a file is cut, empty, no ELF or bitcode, another user's, or not as it was noted
+ * are removed; the others stay. The whole ELF file is this test's own program. */
+static void damaged_programs_are_removed(void **state) {
+    (void)state;
+    enum { PROGRAMS = 8, MOST = 1 << 24 };
+    scratch place;
+    scratch_make(&place);
+    char program[PROGRAMS][700], path[PROGRAMS][900];
+    char *whole = malloc(MOST);
+    FILE *self = fopen("/proc/self/exe", "rb");
+    size_t bytes = fread(whole, 1, MOST, self);
+    fclose(self);
+    assert_in_range(bytes, 5000, MOST - 1);
+    mkdir(scratch_path(&place, "AB"), 0700);
+    for (int i = 0; i < PROGRAMS; i++) {
+        snprintf(program[i], sizeof program[i], "%s/AB/PROGRAM%d", place.folder, i);
+        assert_int_equal(mkdir(program[i], 0700), 0);
+        snprintf(path[i], sizeof path[i], "%.690s/kernel", program[i]);
+        assert_int_equal(mkdir(path[i], 0700), 0);
+        snprintf(path[i], sizeof path[i], "%.690s/kernel/%s", program[i], i == 6 ? "p.bc" : "k.so");
+        write_bytes(path[i], i == 6 ? "BC\xC0\xDE++++" : whole, i == 6 ? 8 : bytes);
+    }
+    bst_kernel_cache_note(place.folder, time(NULL) - 100);
+    assert_int_equal(bst_kernel_cache_repair(place.folder), 0);
+    /* 0 stays; 1 lost its note, which is no damage */
+    char sums[800];
+    for (int i = 1; i < 5; i++) {
+        snprintf(sums, sizeof sums, "%.690s/boresight.sums", program[i]);
+        assert_int_equal(unlink(sums), 0);
+    }
+    assert_int_equal(truncate(path[2], (off_t)bytes / 2), 0);
+    write_bytes(path[3], "", 0);
+    write_bytes(path[4], "garbage", 7);
+    whole[bytes / 2] ^= 1; /* in the middle, where only the sum tells */
+    write_bytes(path[5], whole, bytes);
+    write_bytes(path[6], "garbage ", 8);
+    bool root = geteuid() == 0;
+    assert_int_equal(root ? chown(path[7], 12345, 12345) : chmod(path[7], 0702), 0);
+    assert_int_equal(bst_kernel_cache_repair(place.folder), 6);
+    for (int i = 0; i < PROGRAMS; i++) {
+        assert_int_equal(scratch_has(program[i]), i < 2);
+    }
+    free(whole);
+    scratch_remove(&place);
+}
+
+/* Only a folder of this user's own is used; without HOME one that nobody else can write to. */
+static void caches_of_others_are_not_used(void **state) {
+    (void)state;
+    scratch place;
+    scratch_make(&place);
+    bst_ctx ctx = {0};
+    char path[2048];
+    snprintf(path, sizeof path, "%s/open", place.folder);
+    assert_int_equal(mkdir(path, 0700), 0);
+    assert_int_equal(chmod(path, 0777), 0);
+    setenv("POCL_CACHE_DIR", path, 1);
+    assert_int_equal(bst_kernel_cache_prepare(&ctx), BST_ERR_DEVICE);
+    assert_non_null(strstr(ctx.message, "is not safe: "));
+    assert_non_null(strstr(ctx.message, "can be written to by others"));
+    assert_non_null(strstr(ctx.message, "set POCL_CACHE_DIR to a folder of your own"));
+    unsetenv("POCL_CACHE_DIR");
+    unsetenv("XDG_CACHE_HOME");
+    unsetenv("HOME");
+    bst_assert_ok(&ctx, bst_kernel_cache_prepare(&ctx));
+    snprintf(path, sizeof path, "/tmp/boresight-%ld/kcache", (long)geteuid());
+    assert_string_equal(getenv("POCL_CACHE_DIR"), path);
+    struct stat info;
+    assert_int_equal(stat(path, &info), 0);
+    assert_int_equal(info.st_mode & 0077, 0);
+    unsetenv("POCL_CACHE_DIR");
+    scratch_remove(&place);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(names_folder_and_reason)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(names_folder_and_reason),
+                                       cmocka_unit_test(damaged_programs_are_removed),
+                                       cmocka_unit_test(caches_of_others_are_not_used)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

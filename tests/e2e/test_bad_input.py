@@ -7,6 +7,7 @@ Usage, from the repository root: /usr/bin/python3 tests/e2e/test_bad_input.py BO
 """
 import os
 import subprocess
+import tempfile
 import unittest
 
 import runs
@@ -21,10 +22,13 @@ def set_to(path, key):
     return "check", runs.STARE, "--quiet", "--set", f"{key}={path}"
 
 
+# an output that nothing is ever written to: every reader refuses its file before
+NEVER = os.path.join(tempfile.gettempdir(), f"boresight-never-{os.getpid()}")
+
 # how to hand each reader a file
 READERS = {
     "scenario of check": lambda path: ("check", path),
-    "scenario of run": lambda path: ("run", path, "--out", "/dev/null/run"),
+    "scenario of run": lambda path: ("run", path, "--out", NEVER),
     "element sets": lambda path: ("propagate", "--tle", path, *SPAN),
     "element sets in a scenario":
         lambda path: set_to(path, "/world/objects/0/orbit/elements_file"),
@@ -34,8 +38,8 @@ READERS = {
     "Earth orientation in a scenario": lambda path: set_to(path, "/world/earth_orientation"),
     "star catalogue": lambda path: ("stars", "info", path),
     "star catalogue in a scenario": lambda path: set_to(path, "/world/star_catalogue"),
-    "star import": lambda path: ("stars", "import", path, "--out", "/dev/null/x.stars"),
-    "star subset": lambda path: ("stars", "import", "none.tar.xz", "--out", "/dev/null/x.stars",
+    "star import": lambda path: ("stars", "import", path, "--out", NEVER),
+    "star subset": lambda path: ("stars", "import", "none.tar.xz", "--out", NEVER,
                                  "--subset", path),
     "calibration map":
         lambda path: set_to(path, runs.SENSOR + "/modules/imgproc/dark_file"),
@@ -84,11 +88,13 @@ class BadInput(unittest.TestCase):
         for (reader, path), result in zip(jobs, results):
             with self.subTest(reader=reader, path=path):
                 self.refused(result, path)
+        self.assertFalse(os.path.exists(NEVER))
 
     def test_output_that_cannot_be_written(self):
         result = self.call("propagate", "--tle", "scenarios/catalogue_2022-06.tle", *SPAN,
                            "--output", os.path.join(self.folder, "folder"))
-        self.refused(result, "folder")
+        self.assertEqual((result.returncode, result.stdout), (2, ""))
+        self.assertIn("folder: is a folder; give the name of a file in it", result.stderr)
 
     def test_kernel_cache_that_cannot_be_written(self):
         result = self.call("run", runs.STARE, "--quiet", "--duration", "1", "--out",
@@ -98,6 +104,29 @@ class BadInput(unittest.TestCase):
             self.skipTest("there is another OpenCL device than PoCL's")
         self.refused(result, "/dev/null/kcache")
         self.assertIn("set POCL_CACHE_DIR to a folder that can be written", result.stderr)
+
+    def test_damaged_kernels_are_built_anew(self):
+        """PoCL aborts for a cached kernel that is cut; and what others may write is not loaded."""
+        cache = os.path.join(runs.scratch(), "kcache")
+
+        def run(**environment):
+            return self.call("run", runs.STARE, "--quiet", "--duration", "1", "--out",
+                             os.path.join(runs.scratch(), "run"), "--set", runs.NO_FRAMES, "--set",
+                             "/world/star_catalogue=embedded", POCL_CACHE_DIR=cache, **environment)
+        self.assertEqual(run().returncode, 0)
+        cut = 0
+        for folder, _, names in os.walk(cache):
+            for name in names:
+                if name.endswith(".so"):
+                    os.truncate(os.path.join(folder, name), 1000)
+                    cut += 1
+        if cut == 0:
+            self.skipTest("there is another OpenCL device than PoCL's")
+        result = run()
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("removed, to be built anew", result.stderr)
+        os.chmod(cache, 0o777)
+        self.refused(run(), "can be written to by others")
 
 
 def tearDownModule():

@@ -50,6 +50,15 @@ def check_results(folder):
     assert sum(cold["phases_ms"].values()) < 3 * cold["ms_median"]
 
 
+def check_from_another_folder():
+    """The scenarios that benchmarks run are found wherever the program is started."""
+    with tempfile.TemporaryDirectory() as folder:
+        done = subprocess.run([os.path.abspath(PROGRAM), "bench", "sgp4"], capture_output=True,
+                              text=True, cwd=folder)
+        assert done.returncode == 0, done.stderr
+        assert os.listdir(folder) == []
+
+
 def check_markdown():
     done = bench("small", "--markdown")
     assert done.returncode == 0, done.stderr
@@ -86,8 +95,10 @@ def check_curve(folder):
 def check_messages():
     done = bench("nonsense")
     assert done.returncode == 2 and "nonsense" in done.stderr
-    done = bench("--curve", "sgp4", "--report", "/nonexistent/folder")
+    done = bench("--curve", "sgp4", "--report", tempfile.gettempdir())
     assert done.returncode == 1 and "sgp4" in done.stderr
+    done = bench("--curve", "sgp4", "--report", "/nonexistent/folder")
+    assert done.returncode == 2 and "there is no folder /nonexistent" in done.stderr
     done = bench("small", "--device", "no such device")
     assert done.returncode == 1 and "no such device" in done.stderr
 
@@ -95,6 +106,7 @@ def check_messages():
 def main():
     with tempfile.TemporaryDirectory() as folder:
         check_results(folder)
+        check_from_another_folder()
         check_markdown()
         check_curve(os.path.join(folder, "report"))
         check_messages()

@@ -39,6 +39,26 @@ class Calframes(unittest.TestCase):
         cls.dark = (mean["dark"] - mean["bias"]) * cls.gain
         cls.flat = (mean["flat"] - mean["dark"]) * cls.gain
 
+    def test_any_psf(self):
+        """Even light needs no PSF: one from a file, or of the aperture, changes no pixel."""
+        folder = runs.scratch()
+        fits.PrimaryHDU(np.ones((15, 15), np.float32),
+                        fits.Header({"OVERSAMP": 5})).writeto(folder + "/psf.fits")
+        frames = {}
+        for name, sets in (("gaussian", ()), ("diffraction", (CAMERA + '/optics/psf="diffraction"',)),
+                           ("file", (CAMERA + '/optics/psf="file"',
+                                     CAMERA + f'/optics/psf_file="{folder}/psf.fits"'))):
+            words = [runs.BORESIGHT, "calframes", runs.TRACK, "--out", f"{folder}/{name}", "--bias",
+                     "0", "--dark", "0", "--flat", "1"]
+            for one in sets:
+                words += ["--set", one]
+            result = subprocess.run(words, capture_output=True, text=True, timeout=300)
+            self.assertEqual((result.returncode, result.stderr), (0, ""), name)
+            with fits.open(f"{folder}/{name}/neossat_telescope_flat.fits") as hdus:
+                frames[name] = hdus[1].data.copy()
+        for name in ("diffraction", "file"):
+            self.assertTrue(np.array_equal(frames[name], frames["gaussian"]), name)
+
     def test_headers(self):
         self.assertEqual(self.result.returncode, 0)
         for kind, exposure in (("bias", 0), ("dark", 20), ("flat", 20)):
@@ -87,6 +107,17 @@ class Calframes(unittest.TestCase):
         # 2 per cm2 and s on 1.77 cm2 (13 um pixels) in 0.5 s, and a rim
         self.assertAlmostEqual(sum(row["hits"] for row in rows) / len(rows), 1.8, delta=0.8)
         self.assertGreater(sum(row["hits_e"] for row in rows), 0)
+
+    def test_full_disk_leaves_no_cut_file(self):
+        """A limit on the size of files stands for the disk: 1024^2 pixels of 2 bytes do not fit."""
+        folder = runs.scratch()
+        result = subprocess.run(
+            ["sh", "-c", 'ulimit -f 1024; exec "$@"', "sh", runs.BORESIGHT, "calframes", runs.TRACK,
+             "--out", folder, "--bias", "1", "--dark", "0", "--flat", "0"],
+            capture_output=True, text=True, timeout=120)
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertIn("File too large", result.stderr)
+        self.assertEqual(os.listdir(folder), [])
 
 
 def tearDownModule():

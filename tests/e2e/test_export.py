@@ -81,7 +81,8 @@ class Exported(unittest.TestCase):
         names = [row[0] for row in self.database.execute('SELECT "table" FROM tables')]
         self.assertEqual(sorted(os.listdir(out)), sorted(f"{name}.csv" for name in names))
         for name in names:
-            self.assertIn(f"{out}/{name}.csv: {self.check_csv(self.database, out, name)} rows\n",
+            rows = self.check_csv(self.database, out, name)
+            self.assertIn(f"{out}/{name}.csv: {rows} row{'' if rows == 1 else 's'}\n",
                           said)
 
     def test_some_tables_and_hard_text(self):
@@ -521,7 +522,7 @@ with open(words[-1][5:], "wb") as file:
                    "csv", "--tables", "truth,stars", "--out", out)
         self.fails(1, f'{self.made}: has no sensor "nose"; it has neossat/telescope\n', self.made,
                    "--frames", "png", "--sensor", "nose", "--out", out)
-        self.fails(1, f"{self.made}: is the run itself, which is not changed", self.made, "--table",
+        self.fails(2, f"--out {self.made}: is the folder {self.made}, which is read", self.made, "--table",
                    "csv", "--out", self.made)
         self.assertEqual(os.listdir(out), [])
         export(self.made, "--frames", "png", "--sensor", "neossat/telescope", "--last", "0", "--out",
@@ -532,7 +533,7 @@ with open(words[-1][5:], "wb") as file:
         path = os.path.join(runs.scratch(), "file")
         with open(path, "w", encoding="ascii"):
             pass
-        self.fails(1, f"boresight: {path}: cannot make the folder: Not a directory\n", self.made,
+        self.fails(2, f"--out {path}: Not a directory; give the name of a folder\n", self.made,
                    "--table", "csv", "--out", path)
 
     @unittest.skipUnless(os.path.exists("/dev/full"), "needs /dev/full")

@@ -8,6 +8,7 @@ Usage, from the repository root:
 import errno
 import json
 import os
+import re
 import random
 import resource
 import shutil
@@ -304,17 +305,22 @@ class Faults(unittest.TestCase):
 
     def test_disk_that_looks_too_small(self):
         out = self.out("large")
-        with subprocess.Popen(runs.command(runs.TRACK, out, duration=300_000_000),
-                              stderr=subprocess.PIPE, text=True) as process:
+        command = runs.command(runs.TRACK, out, duration=300_000_000)
+        words = (rf"{out}: the frames will take about 629145\.6 GB and "
+                 r"[0-9.]+ GB are free there; shorten the run")
+        refused = subprocess.run(command, capture_output=True, text=True, timeout=600)
+        self.assertEqual(refused.returncode, 1)
+        self.assertRegex(refused.stderr, words)
+        self.assertFalse(os.path.exists(out + ".partial"))
+        with subprocess.Popen(command + ["--force"], stderr=subprocess.PIPE, text=True) as process:
             while not os.path.exists(out + ".partial/frames.fits") and process.poll() is None:
                 time.sleep(0.01)
             process.send_signal(signal.SIGINT)
             said = process.stderr.read()
         free = shutil.disk_usage(self.folder).free
-        self.assertRegex(said, rf"warning: {out}: the frames will take about 629145\.6 GB and "
-                         r"[0-9.]+ GB are free there; shorten the run")
+        self.assertRegex(said, "warning: " + words)
         # other programs write here too
-        told = float(said.split("and ")[1].split(" GB")[0])
+        told = float(re.search(r"and ([0-9.]+) GB are free", said)[1])
         self.assertAlmostEqual(told, free / 1e9, delta=max(5.0, 0.2 * told))
 
     def test_manifest_tells_why(self):

@@ -38,8 +38,18 @@ def ipc():
 
 def start_run(scenario, out, address, external, *more, duration=SECONDS, frames=False):
     words = runs.command(scenario, out, *([] if frames else [runs.NO_FRAMES]), duration=duration)
+    words.remove("--quiet")  # it says when it waits for peers
     return subprocess.Popen(words + ["--link", address, "--external", external, *more],
                             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def wait_until_open(run):
+    """Returns when the run waits for its peers."""
+    line = run.stderr.readline()
+    while "waiting for peers" not in line:
+        if not line:
+            raise AssertionError(f"{run.args}: ended before it waited for peers")
+        line = run.stderr.readline()
 
 
 def serve(scenario, address, part, *more):
@@ -450,6 +460,74 @@ class Driver(unittest.TestCase):
         self.assertFalse(np.any(commanded == 0.1))
 
 
+class Keys(unittest.TestCase):
+    """A link with keys takes the peers that have them, in C and in Python, and no others."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = runs.scratch()
+        cls.keys = cls.make("link.keys")
+
+    @classmethod
+    def make(cls, name):
+        path = os.path.join(cls.folder, name)
+        subprocess.run([runs.BORESIGHT, "link-keys", "--out", path], check=True,
+                       stdout=subprocess.DEVNULL, timeout=60)
+        return path
+
+    def test_file(self):
+        self.assertEqual(os.stat(self.keys).st_mode & 0o777, 0o600)
+        result = subprocess.run([runs.BORESIGHT, "link-keys", "--out", self.keys],
+                                capture_output=True, text=True, timeout=60)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("cannot be made: File exists", result.stderr)
+        known = self.make("known.keys")
+        os.chmod(known, 0o640)
+        said = ended(start_run(runs.TRACK, runs.scratch() + "/run", ipc(), "control", "--link-keys",
+                               known), expected=1)
+        self.assertIn("others than this user can read or change it (found mode 0640", said)
+        with self.assertRaisesRegex(boresight_link.LinkError, "found mode 0640"):
+            boresight_link.read_keys(known)
+
+    def test_peers_with_the_keys(self):
+        address = f"tcp://127.0.0.1:{free_port()}"
+        run = start_run(runs.TRACK, runs.scratch() + "/run", address, "control", "--link-keys",
+                        self.keys, duration=3)
+        peer = serve(runs.TRACK, address, "control", "--link-keys", self.keys, "--duration", "3")
+        ended(run)
+        ended(peer)
+        address = ipc()
+        out = runs.scratch() + "/run"
+        run = start_run(runs.STARE, out, address, "imgproc", "--link-keys", self.keys, duration=3)
+        with boresight_link.Link(address, serves="imgproc", keys_file=self.keys) as link:
+            for step in link.steps():
+                step.send_detections(x_px=[10.0], y_px=[20.0], flux_e=1000.0, snr=10.0)
+        ended(run)
+        self.assertGreater(runs.manifest(out)["counters"]["link_messages"], 3)
+        self.assertEqual(runs.manifest(out)["counters"].get("link_no_key", 0), 0)
+
+    def test_peers_without_the_keys(self):
+        """One with no keys, one with others, one that knows the run's public key but not the peer's."""
+        other = self.make("other.keys")
+        with open(self.keys, encoding="ascii") as a, open(other, encoding="ascii") as b:
+            own, foreign = a.read().splitlines(), b.read().splitlines()
+        mixed = os.path.join(self.folder, "mixed.keys")
+        with open(os.open(mixed, os.O_WRONLY | os.O_CREAT, 0o600), "w", encoding="ascii") as file:
+            file.write("\n".join([line for line in own if line.startswith("simulation")] +
+                                 [line for line in foreign if line.startswith("peer")]) + "\n")
+        for keys, refused in ((None, False), (other, False), (mixed, True)):
+            address, out = f"tcp://127.0.0.1:{free_port()}", runs.scratch() + "/run"
+            run = start_run(runs.TRACK, out, address, "control", "--link-keys", self.keys, "--set",
+                            "/link/connect_timeout_s=1.5")
+            link = boresight_link.Link(address, serves="*", keys_file=keys)
+            said = ended(run, expected=1)
+            link._socket.close(linger=0)
+            self.assertIn("nobody plays neossat/telescope/control", said)
+            counters = runs.manifest(out + ".partial")["counters"]
+            self.assertEqual(counters.get("link_hello", 0), 0)
+            self.assertEqual(counters.get("link_no_key", 0) > 0, refused, counters)
+
+
 class BadPeers(unittest.TestCase):
     def test_nobody_comes(self):
         out = runs.scratch() + "/run"
@@ -464,11 +542,72 @@ class BadPeers(unittest.TestCase):
     def test_interrupted_while_waiting(self):
         # control steps first: no kernel is being built, which a signal would disturb
         process = start_run(runs.TRACK, runs.scratch() + "/run", ipc(), "control")
-        while "waiting for peers" not in process.stderr.readline():
-            pass
+        wait_until_open(process)
         time.sleep(0.3)
         process.send_signal(signal.SIGINT)
         ended(process, expected=130)
+
+    def test_what_is_at_the_path_of_a_socket(self):
+        """A file there stays, a live socket is not stolen, and none is left behind."""
+        folder = runs.scratch()
+        path = os.path.join(folder, "thesis.tex")
+        with open(path, "w", encoding="ascii") as file:
+            file.write("mine")
+        for words in (["--link", "ipc://" + path], ["--set", "/link/address=ipc://" + path]):
+            result = subprocess.run(
+                runs.command(runs.STARE, runs.scratch() + "/run", duration=1) +
+                ["--external", "imgproc", *words], capture_output=True, text=True, timeout=60)
+            self.assertEqual(result.returncode, 1)
+            self.assertIn("a file that is no socket is there, and is left alone", result.stderr)
+            with open(path, encoding="ascii") as file:
+                self.assertEqual(file.read(), "mine")
+        address = f"ipc://{folder}/socket"
+        first = start_run(runs.TRACK, runs.scratch() + "/run", address, "control")
+        wait_until_open(first)
+        said = ended(start_run(runs.TRACK, runs.scratch() + "/run", address, "control"), expected=1)
+        self.assertIn("another program listens there; choose another path", said)
+        first.send_signal(signal.SIGINT)
+        ended(first, expected=130)
+        self.assertEqual(os.listdir(folder), ["thesis.tex"])
+
+    def test_a_message_of_endless_parts(self):
+        """Each part is within the bound, the message has no end: the run does not keep it."""
+        port = free_port()
+        out = runs.scratch() + "/run"
+        run = start_run(runs.TRACK, out, f"tcp://127.0.0.1:{port}", "control", "--set",
+                        "/link/connect_timeout_s=20")
+        wait_until_open(run)
+        # ZMTP 3.0 (RFC 23): greeting, READY, then parts of 1 MiB that all say that more come
+        name, kind = b"Socket-Type", b"DEALER"
+        ready = (b"\x05READY" + bytes([len(name)]) + name + len(kind).to_bytes(4, "big") + kind)
+        with socket.create_connection(("127.0.0.1", port)) as peer:
+            peer.sendall(b"\xff" + bytes(8) + b"\x7f\x03\x00NULL" + bytes(16 + 32))
+            peer.sendall(bytes([4, len(ready)]) + ready)
+            part, sent = b"\x03" + (1 << 20).to_bytes(8, "big") + bytes(1 << 20), 0
+            try:
+                while sent < 600:
+                    peer.sendall(part)
+                    sent += 1
+            except OSError:
+                pass
+        self.assertLess(sent, 400)
+        peer = serve(runs.TRACK, f"tcp://127.0.0.1:{port}", "control")
+        with open(f"/proc/{run.pid}/status", encoding="ascii") as file:
+            peak = int(re.search(r"VmHWM:\s+(\d+) kB", file.read()).group(1))
+        ended(run)
+        ended(peer)
+        self.assertLess(peak, 600 << 10)  # the run itself takes about 200 MiB
+        self.assertEqual(counters(out)["link_oversized"], 1)
+
+    def test_a_recording_that_is_a_pipe(self):
+        folder = runs.scratch()
+        os.mkfifo(folder + "/link.packets")
+        result = subprocess.run(
+            runs.command(runs.STARE, folder + "/run", duration=1) +
+            ["--external", "imgproc", "--link", ipc(), "--replay", folder],
+            capture_output=True, text=True, timeout=60)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("link.packets: is a pipe; give a run's", result.stderr)
 
     def test_what_is_called_wrongly(self):
         for words, says in (
@@ -516,7 +655,8 @@ class BadPeers(unittest.TestCase):
             peer.stdout.readline()
         peer.kill()
         peer.communicate()
-        ended(run, timeout=240)
+        said = ended(run, timeout=240)
+        self.assertIn("of neossat/telescope/imgproc is not answered: no peer plays it", said)
         found = boresight_link.read_run(out).table("detection_frames")
         self.assertGreater(len(found["exposure_id"]), 0)
         self.assertLess(len(found["exposure_id"]), 300)

@@ -50,8 +50,14 @@ class Orbit(unittest.TestCase):
         self.assertGreater(report["used"], 100)
         self.assertEqual(report["rejected"], 0)
         # five sigma of chi-square over its degrees of freedom, with what the model of errors lacks
-        self.assertAlmostEqual(report["chi2"] / report["dof"], 1,
+        self.assertAlmostEqual(report["chi2_stated"] / report["dof"], 1,
                                delta=5 * math.sqrt(2 / report["dof"]) + 0.1)
+        self.assertAlmostEqual(report["chi2"] * report["covariance_factor"], report["chi2_stated"],
+                               delta=1e-9 * report["chi2"])
+        # the stated covariances count as 20 degrees of freedom
+        self.assertAlmostEqual(report["covariance_factor"], (20 + report["chi2_stated"])
+                               / (20 + report["dof"]), delta=1e-12)
+        self.assertEqual(report["motion"], "SGP4")
         state = self.truth()[round(4 * report["epoch_s"])]
         sigma = [math.sqrt(report["covariance_gcrf"][i][i]) for i in range(6)]
         found = report["position_gcrf_m"] + report["velocity_gcrf_mps"]
@@ -141,7 +147,7 @@ class Orbit(unittest.TestCase):
         # aberration that was not there is 20 arcsec, the same for all: the target's own apparent
         # place, which no orbit shows; but the range goes wrong where it changes
         wrong = call("orbit", *words, "--aberration", "contained")
-        self.assertNotEqual(wrong.stdout.splitlines()[6:8], result.stdout.splitlines()[6:8])
+        self.assertNotEqual(wrong.stdout.splitlines()[8:10], result.stdout.splitlines()[8:10])
         for extra, message in (((words[0],), "add --observer FILE.oem"),
                                ((*words, "--object", "X"), 'has no angles of "X"'),
                                ((*words, "--observer-name", "X"), "observers.oem"),
@@ -157,7 +163,7 @@ class Orbit(unittest.TestCase):
                 ((), 2, "one folder of a run, or a TDM, is expected"),
                 ((self.folder + "/none",), 1, "none"),
                 ((self.made, "--track", "0"), 2, "--track"),
-                ((self.made, "--oem", self.folder), 1, self.folder)):
+                ((self.made, "--oem", self.folder), 2, self.folder)):
             result = call("orbit", *words)
             self.assertEqual(result.returncode, code, result.stderr)
             self.assertIn(message, result.stderr)

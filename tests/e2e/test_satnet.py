@@ -51,6 +51,16 @@ class SatNet(unittest.TestCase):
         result = export(cls.made, "--satnet", cls.out, "--star-limit", "13", "--split", "80,10,10")
         assert (result.returncode, result.stderr) == (0, ""), result.stderr
 
+    def test_in_the_folder_of_out(self):
+        folder = runs.scratch()
+        for words, where in ((("--satnet", "set", "--out", folder + "/a"), "a/set"),
+                             (("--satnet", folder + "/b", "--out", folder + "/c"), "b")):
+            result = export(self.made, "--last", "0", *words)
+            self.assertEqual((result.returncode, result.stderr), (0, ""))
+            self.assertEqual(os.listdir(os.path.join(folder, where, "ImageFiles")),
+                             ["fly.0000.fits"])
+        self.assertFalse(os.path.exists("set"))
+
     def test_tree(self):
         self.assertEqual(sorted(os.listdir(self.out)),
                          ["Annotations", "ImageFiles", "test.txt", "train.txt", "val.txt"])

@@ -25,7 +25,8 @@ except ImportError:
 import runs
 
 KILLS = int(sys.argv.pop(1)) if len(sys.argv) > 1 and sys.argv[1].isdigit() else 2
-NOISE = "/observers/0/sensors/0/camera/read_noise_e"
+SENSOR = "/observers/0/sensors/0"
+NOISE = SENSOR + "/camera/read_noise_e"
 TABLES = ["runs.csv", "settings.csv", "statistics.csv", "sensors.csv", "sensors_statistics.csv"]
 
 
@@ -113,8 +114,11 @@ class Whole(unittest.TestCase):
                                 capture_output=True, text=True, timeout=600)
         self.assertEqual(result.returncode, 0, result.stderr)
         summary = runs.manifest(out)["summary"]
-        for name in ("frames", "pointing_rms_px", "pointing_p99_px", "pointing_bias_px",
-                     "track_fraction", "time_to_confirm_s", "time_to_settle_s"):
+        for name in ("frames", "pointing_rms_px", "pointing_median_px", "pointing_p99_px",
+                     "pointing_bias_px", "track_fraction", "custody", "breaks", "visible_frames",
+                     "wrong_target_frames", "detected_fraction", "track_rms_px", "track_median_px",
+                     "track_p95_px", "tracks", "false_tracks", "time_to_confirm_s",
+                     "time_to_acquire_s", "time_to_settle_s"):
             told = float(row[name]) if row[name] else None
             self.assertEqual(told, summary[name], name)
         with runs.database(out) as database:
@@ -301,6 +305,33 @@ class CutDown(unittest.TestCase):
                             runs.BORESIGHT, "study", self.path, "--out", out, "--resume"],
                            capture_output=True, text=True, timeout=600, check=False)
         self.finish(out)
+
+
+class Elsewhere(unittest.TestCase):
+    def test_scenario_extends_a_file_of_another_folder(self):
+        """Paths start from the folder of the file that gives them, for studies as for `check`."""
+        folder = runs.scratch()
+        os.mkdir(os.path.join(folder, "base"))
+        for name in ("day_generator.json", "neossat_geo_track.json"):
+            shutil.copy(os.path.join("scenarios", name), os.path.join(folder, "base"))
+        with open("scenarios/day_generator.json", encoding="utf-8") as file:
+            elements = json.load(file)["world"]["objects"][0]["orbit"]["elements_file"]
+        shutil.copy(os.path.join("scenarios", elements), os.path.join(folder, "base"))
+        near = os.path.join(folder, "near.json")
+        with open(near, "w", encoding="utf-8") as file:
+            json.dump({"extends": "base/day_generator.json", "name": "near",
+                       "set": {SENSOR + "/modules/obsgen/calibration_file": ""}}, file)
+        path = write(folder, scenarios=[{"file": near}], replicates=1)
+        checked = subprocess.run([runs.BORESIGHT, "check", near, "--set",
+                                  "/world/star_catalogue=embedded"],
+                                 capture_output=True, text=True, timeout=60)
+        emitted = study(path, "--emit", "0")
+        self.assertEqual((checked.returncode, emitted.returncode), (0, 0), emitted.stderr)
+        for text in (checked.stdout, emitted.stdout):
+            self.assertEqual(json.loads(text)["world"]["objects"][0]["orbit"]["elements_file"],
+                             os.path.join(os.path.realpath(folder), "base", elements))
+        result = study(path, "--out", os.path.join(folder, "out"))
+        self.assertEqual(result.returncode, 0, result.stderr)
 
 
 class Mistakes(unittest.TestCase):

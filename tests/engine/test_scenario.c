@@ -325,7 +325,7 @@ static void plugins_can_be_left_out(void **state) {
     assert_string_equal(ctx.message,
                         "scenarios/x.json: "
                         "/observers/0/sensors/0/modules/gimbal/plugin: plug-ins are "
-                        "not loaded here (found \"none.so\")");
+                        "not loaded here, as --no-plugins asks (found \"none.so\")");
     bst_scenario_free(&s);
     bst_json_free(json);
     refuse(text,

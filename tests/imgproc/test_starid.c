@@ -242,11 +242,44 @@ static void repeatable(void **state) {
     free(copy);
 }
 
+/* A place counts as a star's within four standard deviations of both axes together, never beyond
+ * the tolerance asked for. */
+static void the_tolerance_follows_the_errors_up_to_its_limit(void **state) {
+    scene *s = *state;
+    make_stars(s, 77, 60);
+    for (int i = 0; i < s->star_count; i++) {
+        s->stars[i].x_px = 60 + 900 * uniform(s, 78, 2 * i);
+        s->stars[i].y_px = 60 + 900 * uniform(s, 78, 2 * i + 1);
+    }
+    const struct {
+        double off_px, variance_px2;
+        bool known;
+    } cases[] = {{0.7, 1e-4, true},   /* floor of 0.25 px: tolerance 1.0 px */
+                 {2.0, 1e-4, false},  /* beyond it */
+                 {2.0, 0.25, true},   /* known to 0.5 px an axis: tolerance 3.0 px, of sigmas 3.0 */
+                 {2.8, 25.0, true},   /* any error */
+                 {3.3, 25.0, false}}; /* beyond the tolerance asked for */
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        for (int axis = 0; axis < 2; axis++) {
+            s->count = 0;
+            for (int i = 0; i < s->star_count; i++) {
+                detect(s, s->stars[i].x_px, s->stars[i].y_px, s->stars[i].v_mag, i);
+            }
+            bst_detection *d = &s->items[30];
+            *(axis == 0 ? &d->x_px : &d->y_px) += cases[k].off_px;
+            d->cov_xx = d->cov_yy = cases[k].variance_px2;
+            match(s);
+            assert_true((d->star_id != 0) == cases[k].known);
+        }
+    }
+}
+
 int main(void) {
 #define STARID_TEST(f) cmocka_unit_test_setup_teardown(f, setup, teardown)
     const struct CMUnitTest tests[] = {
         STARID_TEST(shifted_field_with_false_detections),
         STARID_TEST(few_stars),
+        STARID_TEST(the_tolerance_follows_the_errors_up_to_its_limit),
         STARID_TEST(single_star_when_locked),
         STARID_TEST(chance_is_not_a_match),
         STARID_TEST(nothing_to_match),

@@ -51,7 +51,8 @@ static void draw_sky(uint16_t *pixels, double target_x, double target_y, uint64_
         double flux =
             target ? 1200.0 : 150.0 * pow(bst_rng_uniform(key, frame, 3 * (uint64_t)s + 2), -1.2);
         int steps = target ? 1 : 9;
-        marks[s] = (bst_mark){.x_px = x, .y_px = y, .star = !target};
+        marks[s] =
+            (bst_mark){.x_px = x, .y_px = y, .kind = target ? BST_MARK_DETECTION : BST_MARK_STAR};
         for (int k = 0; k < steps; k++) {
             double cx = x + (target ? 0.0 : 1.2 * (k - 4)), cy = y + (target ? 0.0 : 0.5 * (k - 4));
             for (int j = (int)cy - 6; j <= (int)cy + 6; j++) {
@@ -130,7 +131,8 @@ static void test_quicklook(void **state) {
     memset(pixels[0], 0, sizeof(uint16_t) * SIZE * SIZE);
     bst_assert_ok(&ctx, bst_quicklook_write(&ctx, path, NULL, &frames[0], NULL));
     assert_true(png_size(path, one));
-    assert_true(one[0] < two[0] && one[1] == two[1]);
+    /* under one panel the legend takes a row more */
+    assert_true(one[0] < two[0] && one[1] == two[1] + 24);
     frames[0].width = 1;
     frames[0].height = 3;
     bst_assert_ok(&ctx, bst_quicklook_write(&ctx, path, NULL, &frames[0], NULL));
@@ -148,6 +150,22 @@ static void test_quicklook(void **state) {
     free(pixels[0]);
     free(pixels[1]);
     scratch_remove(&s);
+}
+
+/* Sorted by importance; equal ones and places that are not numbers do no harm. */
+static void test_mark_sort(void **state) {
+    (void)state;
+    bst_mark marks[5] = {{.importance = 3.0, .x_px = NAN},
+                         {.importance = INFINITY, .x_px = 1},
+                         {.importance = 0.0},
+                         {.importance = 7.5},
+                         {.importance = 3.0}};
+    bst_mark_sort(marks, 5);
+    const double expected[5] = {INFINITY, 7.5, 3.0, 3.0, 0.0};
+    for (int i = 0; i < 5; i++) {
+        assert_true(marks[i].importance == expected[i]);
+    }
+    assert_true(marks[0].x_px == 1);
 }
 
 static void test_stretch(void **state) {
@@ -226,6 +244,7 @@ static void test_pointing_plot(void **state) {
                                                  : i < 30 ? BST_MODE_ACQUIRE
                                                           : BST_MODE_TRACK,
                                          .in_track = i >= 34,
+                                         .counted = i >= 36,
                                          .visible = i != 100};
     }
     char path[700];
@@ -233,7 +252,7 @@ static void test_pointing_plot(void **state) {
     snprintf(path, sizeof path, "%s/it's \"pointing\".png", s.folder);
     bool made = false;
     bst_assert_ok(&ctx, bst_pointing_plot(&ctx, path, "neossat_geo_track: boresight to true target",
-                                          points, N, 0.5, &made));
+                                          "pointing RMS 0.2 px", points, N, 0.5, &made));
     if (!made && system("command -v gnuplot > /dev/null") != 0) {
         /* gnuplot is an optional program: without it a warning, and no file */
         assert_int_equal(warnings, 1);
@@ -252,12 +271,13 @@ static void test_pointing_plot(void **state) {
     for (int i = 0; i < N; i++) {
         points[i] = (bst_pointing_point){.time_s = i, .visible = true, .mode = BST_MODE_STARE};
     }
-    bst_assert_ok(&ctx, bst_pointing_plot(&ctx, path, NULL, points, N, 0.0, &made));
+    bst_assert_ok(&ctx, bst_pointing_plot(&ctx, path, NULL, NULL, points, N, 0.0, &made));
     assert_true(made);
-    assert_int_equal(bst_pointing_plot(&ctx, path, NULL, points, 1, 0.0, &made), BST_ERR_ARGUMENT);
+    assert_int_equal(bst_pointing_plot(&ctx, path, NULL, NULL, points, 1, 0.0, &made),
+                     BST_ERR_ARGUMENT);
     assert_false(made);
     assert_int_equal(
-        bst_pointing_plot(&ctx, scratch_path(&s, "no/a.png"), NULL, points, N, 0.0, &made),
+        bst_pointing_plot(&ctx, scratch_path(&s, "no/a.png"), NULL, NULL, points, N, 0.0, &made),
         BST_ERR_IO);
     /* without gnuplot: a warning, success, and nothing left behind */
     unlink(path);
@@ -265,7 +285,7 @@ static void test_pointing_plot(void **state) {
     assert_non_null(search);
     setenv("PATH", s.folder, 1);
     warnings = 0;
-    bst_status status = bst_pointing_plot(&ctx, path, NULL, points, N, 0.0, &made);
+    bst_status status = bst_pointing_plot(&ctx, path, NULL, NULL, points, N, 0.0, &made);
     setenv("PATH", search, 1);
     free(search);
     assert_int_equal(status, BST_OK);
@@ -277,9 +297,8 @@ static void test_pointing_plot(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_quicklook),
-        cmocka_unit_test(test_stretch),
-        cmocka_unit_test(test_picture_errors),
+        cmocka_unit_test(test_quicklook),     cmocka_unit_test(test_mark_sort),
+        cmocka_unit_test(test_stretch),       cmocka_unit_test(test_picture_errors),
         cmocka_unit_test(test_pointing_plot),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

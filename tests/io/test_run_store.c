@@ -147,12 +147,14 @@ static void test_refusals(void **state) {
     assert_non_null(strstr(ctx.message, "exists already"));
     assert_int_equal(scratch_count(s.folder), 2); /* no .partial left */
 
-    /* overwriting: the old run stays until the new one is whole */
-    write_file(scratch_path(&s, "run/old"), "x");
+    /* overwriting: the old run stays until the new one is whole, and what is not its own stays */
+    write_file(scratch_path(&s, "run/frames.fits"), "x");
+    write_file(scratch_path(&s, "run/notes"), "x");
     bst_assert_ok(&ctx, bst_run_create(&ctx, out, true, &run));
-    assert_true(scratch_has(scratch_path(&s, "run/old")));
+    assert_true(scratch_has(scratch_path(&s, "run/frames.fits")));
     bst_assert_ok(&ctx, bst_run_finish(&ctx, run));
-    assert_false(scratch_has(scratch_path(&s, "run/old")));
+    assert_false(scratch_has(scratch_path(&s, "run/frames.fits")));
+    assert_true(scratch_has(scratch_path(&s, "run/notes")));
     assert_true(scratch_has(scratch_path(&s, "run/run.sqlite")));
 
     /* ... but never a folder that is not a run's */

@@ -23,7 +23,7 @@ static void play(const char *address, int end_us, int reads, int pause_us) {
     bst_link_received got;
     const struct itimerval timer = {.it_value = {.tv_usec = end_us}};
     (void)setitimer(ITIMER_REAL, &timer, NULL);
-    if (bst_link_peer_open(&ctx, address, &hello, &peer) != BST_OK) {
+    if (bst_link_peer_open(&ctx, address, NULL, &hello, &peer) != BST_OK) {
         _exit(1);
     }
     for (int i = 0; i < reads; i++) {

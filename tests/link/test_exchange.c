@@ -12,7 +12,7 @@ static void serve(link_scene *s, const char *name, bool shared, int leave_after)
     bst_link_received got;
     double sum = 0.0;
     bool by_slot = false;
-    assert_int_equal(bst_link_peer_open(&ctx, s->address, &hello, &peer), BST_OK);
+    assert_int_equal(bst_link_peer_open(&ctx, s->address, NULL, &hello, &peer), BST_OK);
     while (bst_link_peer_receive(&ctx, peer, 5.0, &got) == BST_OK &&
            got.header.type != BST_LINK_END) {
         if (got.header.type == BST_LINK_FRAME) {

@@ -10,7 +10,7 @@ static const double reads[] = {0.3, 1.0, 5.0};
 /* p = 1e-4: normal deviate, and Kolmogorov's limit sqrt(-ln(p / 2) / 2) */
 static const double normal_limit = 3.719, kolmogorov_limit = 2.225;
 
-enum { SPREAD = 64 };
+enum { SPREAD = 64, NO_WELL = TOP };
 
 /* Probability that a charge reads d - SPREAD above itself, at gain 1. */
 static void read_law(double read, double *shift) {
@@ -20,15 +20,16 @@ static void read_law(double read, double *shift) {
     }
 }
 
-/* Adds the law of digital numbers at gain 1: sum over electrons of Poisson times normal. */
-static void add_exact_law(double mean, const double *shift, double *law) {
+/* Adds the law of digital numbers at gain 1: sum over electrons, at most `well`, of Poisson times
+ * normal. */
+static void add_exact_law(double mean, int well, const double *shift, double *law) {
     double reach = 9.0 * sqrt(mean) + 60.0;
     int first = (int)fmax(0.0, mean - reach), last = (int)(mean + reach);
     for (int n = first; n <= last; n++) {
         double p = mean > 0.0 ? exp(n * log(mean) - mean - lgamma(n + 1.0)) : n == 0 ? 1.0 : 0.0;
         if (p > 1e-16) {
             for (int d = -SPREAD; d <= SPREAD; d++) {
-                int dn = n + d + OFFSET;
+                int dn = (n < well ? n : well) + d + OFFSET;
                 if (dn >= 0 && dn < TOP) {
                     law[dn] += p * shift[d + SPREAD];
                 }
@@ -73,7 +74,8 @@ static void check_law(const char *what, double read, const double *law, double t
     }
 }
 
-static void check_case(bst_ctx *ctx, bst_renderer *r, double mean, double read, bst_rng_key key) {
+static void check_case(bst_ctx *ctx, bst_renderer *r, double mean, double read, int well,
+                       int frames, bst_rng_key key) {
     static double law[TOP];
     static long long seen[TOP];
     memset(seen, 0, sizeof seen);
@@ -81,7 +83,7 @@ static void check_case(bst_ctx *ctx, bst_renderer *r, double mean, double read, 
     double time_s[2] = {0.0, 0.5};
     bst_quat q[2] = {BST_QUAT_IDENTITY, BST_QUAT_IDENTITY};
     bst_los_track track = {2, time_s, q};
-    for (int f = 0; f < frames_per_case; f++) {
+    for (int f = 0; f < frames; f++) {
         bst_render_request request = {.window = {0, 0, SIDE, SIDE},
                                       .track = &track,
                                       .background_e = mean,
@@ -99,10 +101,10 @@ static void check_case(bst_ctx *ctx, bst_renderer *r, double mean, double read, 
     }
     double shift[2 * SPREAD + 1];
     read_law(read, shift);
-    add_exact_law(mean, shift, law);
+    add_exact_law(mean, well, shift, law);
     char what[64];
     snprintf(what, sizeof what, "mean %g", mean);
-    check_law(what, read, law, 1.0, seen, (double)SIDE * SIDE * frames_per_case);
+    check_law(what, read, law, 1.0, seen, (double)SIDE * SIDE * frames);
 }
 
 static void draws_follow_the_exact_law(void **state) {
@@ -118,8 +120,33 @@ static void draws_follow_the_exact_law(void **state) {
         bst_renderer *r;
         bst_assert_ok(&ctx, bst_renderer_create(&ctx, device, &camera, NULL, &r));
         for (size_t j = 0; j < sizeof means / sizeof *means; j++) {
-            check_case(&ctx, r, means[j], reads[i],
+            check_case(&ctx, r, means[j], reads[i], NO_WELL, frames_per_case,
                        bst_rng_make_key(11, i, "noise", j % 2 ? "odd" : "even"));
+        }
+        bst_renderer_free(r);
+    }
+    bst_device_close(device);
+}
+
+/* Charge is cut at the full well before the read noise comes, so that numbers near it are neither
+ * Poisson nor normal: means from five standard deviations below the well to three above it. */
+static void full_wells_cut_charge_before_it_is_read(void **state) {
+    (void)state;
+    enum { WELL = 10000 };
+    static const double above[] = {-5.0, -2.5, -1.0, 0.0, 3.0}; /* in sqrt(WELL) */
+    bst_ctx ctx = {0};
+    bst_device *device;
+    bst_assert_ok(&ctx, bst_device_open(&ctx, "", 0, &device));
+    for (int i = 1; i < 3; i++) {
+        bst_camera camera = scene_camera(SIDE, SIDE);
+        camera.read_noise_e = reads[i];
+        camera.full_well_e = WELL;
+        camera.offset_dn = OFFSET;
+        bst_renderer *r;
+        bst_assert_ok(&ctx, bst_renderer_create(&ctx, device, &camera, NULL, &r));
+        for (size_t j = 0; j < sizeof above / sizeof *above; j++) {
+            check_case(&ctx, r, WELL + above[j] * sqrt(WELL), reads[i], WELL, 1,
+                       bst_rng_make_key(12, (uint64_t)i, "noise", j % 2 ? "odd" : "even"));
         }
         bst_renderer_free(r);
     }
@@ -170,7 +197,7 @@ static void draws_follow_the_law_where_light_varies(void **state) {
             }
             group[i] = (unsigned char)g;
             pixels_of[g] += 1.0;
-            add_exact_law(image[i], shift, laws[g]);
+            add_exact_law(image[i], NO_WELL, shift, laws[g]);
         }
         int frames = 8 * frames_per_case;
         for (int f = 0; f < frames; f++) {
@@ -245,6 +272,7 @@ int main(int argc, char **argv) {
     }
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(draws_follow_the_exact_law),
+        cmocka_unit_test(full_wells_cut_charge_before_it_is_read),
         cmocka_unit_test(draws_follow_the_law_where_light_varies),
         cmocka_unit_test(pixels_and_frames_are_independent),
     };

@@ -143,11 +143,97 @@ static void test_no_room(void **state) {
     assert_int_equal(f->outcome.missing, 0);
 }
 
+/* A shard whose rows are other runs', and what is no file under a shard's name, hold nobody up:
+ * they are put aside, and their runs are made again. */
+static void test_wrong_shards(void **state) {
+    fixture *f = *state;
+    enum { SIZE = 10 };
+    char command[2000];
+    forget_rows(f);
+    bst_assert_ok(&f->ctx, drive(f, 1, SIZE));
+    snprintf(command, sizeof command,
+             "cd '%s/shards' && rm -f 000000010-000000019.rows 00000003?-00000003?.rows "
+             "000000040-000000049.rows 000000050-000000059.rows && "
+             "cp 000000000-000000009.rows 000000010-000000019.rows && "
+             "ln -s nowhere 000000030-000000039.rows && mkdir 000000040-000000049.rows && "
+             "mkfifo 000000050-000000059.rows",
+             f->folder);
+    assert_int_equal(system(command), 0);
+    bst_assert_ok(&f->ctx, drive(f, 1, SIZE));
+    assert_int_equal(f->outcome.missing, 0);
+    assert_int_equal(f->outcome.attempts_lost, 0);
+    assert_int_equal(f->results.doubled, 0);
+    snprintf(command, sizeof command,
+             "cd '%s/shards' && test $(ls -d *.rows.rejected | wc -l) = 4 && "
+             "test -f 000000010-000000019.rows && test -f 000000030-000000039.rows",
+             f->folder);
+    assert_int_equal(system(command), 0);
+}
+
+/* An executor whose shards end well and publish nothing. */
+typedef struct idle_executor {
+    bst_shard_job jobs[256];
+    int64_t count, started;
+} idle_executor;
+
+static int64_t idle_room(void *self) {
+    (void)self;
+    return 4;
+}
+static bst_status idle_start(bst_ctx *ctx, void *self, const bst_shard_job *jobs, int64_t count) {
+    (void)ctx;
+    idle_executor *e = self;
+    for (int64_t i = 0; i < count; i++) {
+        e->jobs[e->count++] = jobs[i];
+        e->started++;
+    }
+    return BST_OK;
+}
+static bst_status idle_poll(bst_ctx *ctx, void *self, int wait_ms, bst_shard_news *news, int room,
+                            int *count) {
+    (void)ctx;
+    (void)wait_ms;
+    idle_executor *e = self;
+    for (*count = 0; *count < room && e->count > 0; ++*count) {
+        const bst_shard_job *job = &e->jobs[--e->count];
+        news[*count] =
+            (bst_shard_news){.id = job->id, .kind = BST_SHARD_ENDED, .runs_done = job->count};
+    }
+    assert_true(e->started < 10000); /* it does not go on for ever */
+    return BST_OK;
+}
+static void idle_cancel(void *self, bool hard) {
+    (void)self;
+    (void)hard;
+}
+
+static void test_shards_that_gain_nothing(void **state) {
+    fixture *f = *state;
+    idle_executor idle = {.count = 0};
+    bst_executor executor = {.self = &idle,
+                             .room = idle_room,
+                             .start = idle_start,
+                             .poll = idle_poll,
+                             .cancel = idle_cancel};
+    const bst_driver_options options = {
+        .out = f->folder, .kind = &fake_kind, .shard_s = 1.0, .shard_runs = 10};
+    bst_driver_outcome outcome;
+    forget_rows(f);
+    bst_results_free(&f->results);
+    bst_assert_ok(&f->ctx, bst_results_create(&f->ctx, &f->study, &fake_kind, &f->results));
+    bst_assert_ok(&f->ctx, bst_driver_run(&f->ctx, &f->results, &executor, &options, &outcome));
+    assert_int_equal(outcome.done, 0);
+    assert_in_range(outcome.attempts_lost, 1, 100);
+    assert_non_null(strstr(outcome.why, "none of its rows could be read"));
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_same_tables, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_deadly_run, set_up, tear_down),
         cmocka_unit_test_setup_teardown(test_no_room, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_wrong_shards, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(test_shards_that_gain_nothing, set_up, tear_down),
     };
     signal(SIGPIPE, SIG_IGN);
     return cmocka_run_group_tests(tests, NULL, NULL);

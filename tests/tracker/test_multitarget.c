@@ -538,9 +538,43 @@ static void a_common_rate_is_no_motion(void **state) {
     }
 }
 
+/* One detection beside another, equally far from where the track is expected: brightness decides.
+ * The misfit counts in standard deviations of both magnitudes. */
+static void brightness_counts_by_its_uncertainty(void **state) {
+    (void)state;
+    for (int side = -1; side <= 1; side += 2) {
+        bst_mtt_params params = defaults();
+        params.merge_rad = 0.0;
+        bench *b = start(31, &params);
+        for (int k = 0; k < 8; k++) {
+            see(b, 3.0 * k, 0, 0.3, 12.0);
+            frame(b, k);
+        }
+        int64_t id = track_at(b, 21.0, 0.0);
+        assert_true(id > 0);
+        /* 1.2 mag off and known to 1 mag: 1.2 sigma. 0.8 mag off and known to 0.01 mag: 2.6 sigma,
+         * with the 0.3 mag by which any object may change */
+        see(b, 24.0, 0.5 * side, 1e-3, 12.0);
+        b->detections[0].v_mag = 13.2;
+        b->detections[0].v_mag_sigma = 1.0;
+        see(b, 24.0, -0.5 * side, 1e-3, 12.0);
+        b->detections[1].v_mag = 12.8;
+        b->detections[1].v_mag_sigma = 0.01;
+        for (int i = 0; i < 2; i++) {
+            b->detections[i].sky.cov_11 = b->detections[i].sky.cov_22 = pow(0.5 * PX, 2);
+        }
+        frame(b, 8);
+        const bst_mtt_track *track = bst_mtt_find(b->mtt, id);
+        assert_non_null(track);
+        bst_assert_close(track->y_px, 0.5 * side, 1e-9); /* that very detection */
+        bst_mtt_free(b->mtt);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(crossing_targets_keep_identity),
                                        cmocka_unit_test(false_tracks_are_rare),
+                                       cmocka_unit_test(brightness_counts_by_its_uncertainty),
                                        cmocka_unit_test(five_hundred_tracks),
                                        cmocka_unit_test(heavy_clutter_overflows_gracefully),
                                        cmocka_unit_test(coasting_and_deletion),

@@ -143,16 +143,52 @@ static void integrated_motion(void **state) {
     static bst_od_observation items[400];
     bst_od_solution got;
     observe(&s, 3, items);
-    const bst_od_options options = {.motion = s.motion, .widen = true};
+    const bst_od_options options = {.motion = s.motion, .scale_variance = true};
     bst_assert_ok(&ctx, bst_od_determine(&ctx, items, s.count, &options, NULL, &got, NULL));
     assert_true(nees(&s, &got) < FAR);
     bst_assert_close(got.chi2 / got.dof, 1.0, 5.0 * sqrt(2.0 / got.dof)); /* five sigma */
-    assert_true(got.widened == 1.0);
+    bst_assert_close(got.variance_factor, 1.0, 5.0 * sqrt(2.0 / got.dof));
     /* two bodies do not explain that arc, and say so by the factor on their covariance */
-    const bst_od_options plain = {.widen = true};
+    const bst_od_options plain = {.scale_variance = true};
     bst_assert_ok(&ctx, bst_od_determine(&ctx, items, s.count, &plain, NULL, &got, NULL));
-    assert_true(got.widened > 100.0);
+    assert_true(got.variance_factor > 100.0);
     bst_gravity_free(gravity);
+}
+
+/* An error that all directions of an arc share is part of the covariance where it is stated. */
+static void shared_errors_count(void **state) {
+    (void)state;
+    enum { RUNS = 60 };
+    const scene s = {{0}, geo(), leo_eye(), EARTH, 0, 900, 100, 0.2 * ARCSEC};
+    const double shared[2] = {0.1 * ARCSEC, 0.06 * ARCSEC};
+    static bst_od_observation items[100];
+    double sum[2] = {0.0};
+    for (int run = 0; run < RUNS; run++) {
+        bst_ctx ctx = {0};
+        double draw[2];
+        observe(&s, 3000 + run, items);
+        bst_rng_normal2(bst_rng_make_key(5, 0, "test", "shared"), (uint64_t)run, 0, draw);
+        for (int stated = 0; stated < 2; stated++) {
+            for (int i = 0; i < s.count; i++) {
+                bst_tangent axes = bst_tangent_at(items[i].direction);
+                for (int k = 0; k < 2; k++) {
+                    items[i].shared_rad[k][k] = stated ? shared[k] : 0.0;
+                }
+                if (!stated) {
+                    items[i].direction = bst_tangent_exp(
+                        items[i].direction,
+                        bst_tangent_vector(&axes, shared[0] * draw[0], shared[1] * draw[1]));
+                }
+            }
+            bst_od_solution got;
+            bst_assert_ok(
+                &ctx, bst_od_fit(&ctx, items, s.count, &(bst_od_options){0}, &s.body, NULL, &got));
+            sum[stated] += nees(&s, &got) / (6.0 * RUNS);
+        }
+    }
+    print_message("NEES / 6: %.2f, stated %.3f\n", sum[0], sum[1]);
+    assert_true(sum[0] > 1.5);
+    bst_assert_close(sum[1], 1.0, 4.0 * sqrt(2.0 / (6.0 * RUNS))); /* four sigma */
 }
 
 /* ------------------------------------------------------------------ textbook examples */
@@ -378,13 +414,13 @@ static void wrong_observations_are_left_out(void **state) {
         items[i].direction =
             bst_tangent_exp(items[i].direction, bst_tangent_vector(&axes, 40.0 * ARCSEC, 1e-4));
     }
-    const bst_od_options options = {.reject_chi2 = 25.0, .widen = true};
+    const bst_od_options options = {.reject_chi2 = 25.0, .scale_variance = true};
     bst_assert_ok(&ctx, bst_od_determine(&ctx, items, 100, &options, chi2, &got, NULL));
     assert_int_equal(got.rejected, 5);
     assert_int_equal(got.used, 95);
     assert_true(chi2[5] > 100.0 && chi2[6] < 25.0);
     assert_true(nees(&s, &got) < FAR);
-    assert_true(got.widened == 1.0);
+    bst_assert_close(got.variance_factor, 1.0, 5.0 * sqrt(2.0 / got.dof)); /* five sigma */
 }
 
 /* Without noise the orbit comes out as it went in. */
@@ -485,6 +521,7 @@ int main(void) {
         cmocka_unit_test(arcs_of_all_lengths),
         cmocka_unit_test(covariance_is_true),
         cmocka_unit_test(integrated_motion),
+        cmocka_unit_test(shared_errors_count),
         cmocka_unit_test(vallado_example_7_2),
         cmocka_unit_test(curtis_example_5_12),
         cmocka_unit_test(three_sights_in_the_orbits_plane),

@@ -272,11 +272,213 @@ static void a_million_ill_conditioned_updates(void **state) {
     bst_assert_close(bst_vec3_dot(s.direction, s.rate_radps), 0.0, 1e-18);
 }
 
+static void invert(double a[4][4], double out[4][4]) {
+    /* Gauss-Jordan without pivots: the matrices here are positive definite */
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < 4; j++) {
+            out[i][j] = i == j;
+        }
+    }
+    for (int k = 0; k < 4; k++) {
+        double pivot = a[k][k];
+        for (int j = 0; j < 4; j++) {
+            a[k][j] /= pivot;
+            out[k][j] /= pivot;
+        }
+        for (int i = 0; i < 4; i++) {
+            double factor = a[i][k];
+            for (int j = 0; i != k && j < 4; j++) {
+                a[i][j] -= factor * a[k][j];
+                out[i][j] -= factor * out[k][j];
+            }
+        }
+    }
+}
+
+/* Covariance of a vector in space that a 2x2 covariance in the axes at a direction stands for. */
+static void tensor_of(bst_vec3 direction, const double c[3], double out[3][3]) {
+    bst_tangent axes = bst_tangent_at(direction);
+    const double e[2][3] = {{axes.e1.x, axes.e1.y, axes.e1.z}, {axes.e2.x, axes.e2.y, axes.e2.z}};
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) {
+            out[i][j] = c[0] * e[0][i] * e[0][j] + c[2] * e[1][i] * e[1][j] +
+                        c[1] * (e[0][i] * e[1][j] + e[1][i] * e[0][j]);
+        }
+    }
+}
+
+/* The same covariance in the axes at another direction, 11, 12, 22. */
+static void in_axes_at(bst_vec3 direction, const double tensor[3][3], double out[3]) {
+    bst_tangent axes = bst_tangent_at(direction);
+    const double e[2][3] = {{axes.e1.x, axes.e1.y, axes.e1.z}, {axes.e2.x, axes.e2.y, axes.e2.z}};
+    for (int k = 0; k < 3; k++) {
+        const double *a = e[k == 2], *b = e[k > 0];
+        out[k] = 0.0;
+        for (int i = 0; i < 3; i++) {
+            for (int j = 0; j < 3; j++) {
+                out[k] += a[i] * tensor[i][j] * b[j];
+            }
+        }
+    }
+}
+
+/* White acceleration of density q: P(t) = q [[t^3/3, t^2/2], [t^2/2, t]] on each axis (Bar-Shalom,
+ * Li, Kirubarajan 2001, section 6.2.2). Back in time position and rate are correlated the other
+ * way. */
+static void noise_is_that_of_white_acceleration(void **state) {
+    (void)state;
+    const double q = 3.0 * AS * AS, steps[] = {0.5, 2.0, -2.0};
+    for (int k = 0; k < 3; k++) {
+        double dt = steps[k], t = fabs(dt);
+        bst_sky_state s = make(50, 35, 0.0, 0.0);
+        memset(s.covariance, 0, sizeof s.covariance);
+        bst_sky_predict(&s, dt, q);
+        for (int i = 0; i < 4; i++) {
+            for (int j = 0; j < 4; j++) {
+                double expected = i % 2 != j % 2   ? 0.0
+                                  : i / 2 != j / 2 ? q * t * dt / 2.0
+                                  : i < 2          ? q * t * t * t / 3.0
+                                                   : q * t;
+                bst_assert_close(s.covariance[i][j] / q, expected / q, 1e-12); /* rounding */
+            }
+        }
+    }
+    /* two steps are one, also along a curved path with an uneven prior */
+    bst_sky_state one = make(50, 35, 50 * AS, 0.7), two = one;
+    bst_sky_predict(&one, 3.0, q);
+    bst_sky_predict(&two, 1.2, q);
+    bst_sky_predict(&two, 1.8, q);
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < 4; j++) {
+            /* the curvature over 150 arcsec acts on the noise: relative (150 arcsec)^2 */
+            bst_assert_close(two.covariance[i][j] / (AS * AS), one.covariance[i][j] / (AS * AS),
+                             1e-5);
+        }
+    }
+}
+
+/* Near the pole the axes of two directions 20 arcsec apart differ by tens of degrees. */
+static void innovations_are_seen_in_the_axes_of_the_state(void **state) {
+    (void)state;
+    const double decs[] = {10.0, 89.99, -89.995};
+    for (int k = 0; k < 3; k++) {
+        bst_sky_state s = make(20, decs[k], 0.0, 0.0);
+        bst_tangent axes = bst_tangent_at(s.direction);
+        const double step[2] = {14 * AS, -9 * AS}, cov[3] = {5 * AS * AS, 2 * AS * AS, 3 * AS * AS};
+        const double extra[3] = {0.5 * AS * AS, -0.25 * AS * AS, 0.75 * AS * AS};
+        bst_sky_measurement z = {
+            .direction = bst_tangent_exp(s.direction, bst_tangent_vector(&axes, step[0], step[1])),
+            .cov_11 = cov[0],
+            .cov_12 = cov[1],
+            .cov_22 = cov[2]};
+        double tensor[3][3], r[3];
+        tensor_of(z.direction, cov, tensor);
+        in_axes_at(s.direction, tensor, r);
+        bst_sky_innovation innovation;
+        assert_true(bst_sky_innovate(&s, &z, extra, &innovation));
+        double expected[3];
+        for (int i = 0; i < 3; i++) {
+            expected[i] = r[i] + extra[i];
+            /* projection shortens by the square of 20 arcsec; rounding of 1 in 1e-5 */
+            bst_assert_close(innovation.r[i] / (AS * AS), expected[i] / (AS * AS), 1e-6);
+            expected[i] += s.covariance[i == 2][i > 0];
+            bst_assert_close(innovation.s[i] / (AS * AS), expected[i] / (AS * AS), 1e-6);
+        }
+        bst_assert_close(innovation.nu[0] / AS, step[0] / AS, 1e-7);
+        bst_assert_close(innovation.nu[1] / AS, step[1] / AS, 1e-7);
+        double det = expected[0] * expected[2] - expected[1] * expected[1];
+        double chi2 = (expected[2] * step[0] * step[0] - 2 * expected[1] * step[0] * step[1] +
+                       expected[0] * step[1] * step[1]) /
+                      det;
+        bst_assert_close(innovation.chi2, chi2, 1e-5 * chi2);
+        bst_assert_close(innovation.log_det_s, log(det), 1e-5);
+    }
+}
+
+/* P+ = (P^-1 + H^T R^-1 H)^-1, x+ = P+ H^T R^-1 z: the information form of the same update. */
+static void an_update_is_that_of_the_information_form(void **state) {
+    (void)state;
+    bst_sky_state s = make(20, 10, 0.0, 0.0), prior = s;
+    bst_tangent axes = bst_tangent_at(s.direction);
+    const double z[2] = {1.5 * AS, -2.5 * AS}, r[3] = {2 * AS * AS, 0.7 * AS * AS, 1 * AS * AS};
+    bst_sky_measurement measured = {
+        .direction = bst_tangent_exp(s.direction, bst_tangent_vector(&axes, z[0], z[1])),
+        .cov_11 = r[0],
+        .cov_12 = r[1],
+        .cov_22 = r[2]};
+    bst_sky_innovation innovation;
+    assert_true(bst_sky_innovate(&s, &measured, NULL, &innovation));
+    bst_sky_update(&s, &innovation);
+    double p[4][4], information[4][4], expected[4][4], det = r[0] * r[2] - r[1] * r[1];
+    const double w[2][2] = {{r[2] / det, -r[1] / det}, {-r[1] / det, r[0] / det}};
+    memcpy(p, prior.covariance, sizeof p);
+    invert(p, information);
+    for (int i = 0; i < 2; i++) {
+        for (int j = 0; j < 2; j++) {
+            information[i][j] += w[i][j];
+        }
+    }
+    invert(information, expected);
+    double mean[4];
+    for (int i = 0; i < 4; i++) {
+        mean[i] = 0.0;
+        for (int j = 0; j < 2; j++) {
+            mean[i] += expected[i][j] * (w[j][0] * z[0] + w[j][1] * z[1]);
+        }
+    }
+    bst_vec3 moved = bst_tangent_log(prior.direction, s.direction);
+    bst_vec3 rate = bst_tangent_carry(s.direction, prior.direction, s.rate_radps);
+    /* axes at 10 degrees turn by 3 arcsec x tan(10 degrees): 3e-6 */
+    bst_assert_close(bst_vec3_dot(moved, axes.e1) / AS, mean[0] / AS, 1e-5);
+    bst_assert_close(bst_vec3_dot(moved, axes.e2) / AS, mean[1] / AS, 1e-5);
+    bst_assert_close(bst_vec3_dot(rate, axes.e1) / AS, mean[2] / AS, 1e-5);
+    bst_assert_close(bst_vec3_dot(rate, axes.e2) / AS, mean[3] / AS, 1e-5);
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < 4; j++) {
+            bst_assert_close(s.covariance[i][j] / (AS * AS), expected[i][j] / (AS * AS), 2e-5);
+        }
+    }
+}
+
+/* Position of the second, rate (second - first) / dt: covariances B, B / dt, (A + B) / dt^2, and
+ * what white acceleration adds to a mean rate, q dt / 3. */
+static void a_pair_has_the_covariance_of_its_differences(void **state) {
+    (void)state;
+    const double dt = 4.0, q = 0.02 * AS * AS, a[3] = {5 * AS * AS, -2 * AS * AS, 3 * AS * AS},
+                 b[3] = {2 * AS * AS, 0.5 * AS * AS, 4 * AS * AS};
+    bst_vec3 second = bst_vec3_from_radec(0.3, 89.99 * BST_DEG_RAD);
+    bst_tangent axes = bst_tangent_at(second);
+    bst_vec3 first = bst_tangent_exp(second, bst_tangent_vector(&axes, -12 * AS, 20 * AS));
+    bst_sky_measurement one = {first, a[0], a[1], a[2]}, two = {second, b[0], b[1], b[2]};
+    bst_sky_state s;
+    bst_sky_from_pair(&one, &two, dt, q, &s);
+    bst_assert_close(bst_vec3_dot(s.rate_radps, axes.e1) / AS, 3.0, 1e-6);
+    bst_assert_close(bst_vec3_dot(s.rate_radps, axes.e2) / AS, -5.0, 1e-6);
+    double tensor[3][3], turned[3];
+    tensor_of(first, a, tensor);
+    in_axes_at(second, tensor, turned);
+    for (int i = 0; i < 2; i++) {
+        for (int j = 0; j < 2; j++) {
+            double noise = i == j ? q * dt / 3.0 : 0.0;
+            bst_assert_close(s.covariance[i][j] / (AS * AS), b[i + j] / (AS * AS), 1e-12);
+            bst_assert_close(s.covariance[i][j + 2] / (AS * AS), b[i + j] / dt / (AS * AS), 1e-12);
+            bst_assert_close(s.covariance[i + 2][j] / (AS * AS), b[i + j] / dt / (AS * AS), 1e-12);
+            bst_assert_close(s.covariance[i + 2][j + 2] / (AS * AS),
+                             ((turned[i + j] + b[i + j]) / (dt * dt) + noise) / (AS * AS), 1e-6);
+        }
+    }
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(motion_is_a_great_circle),
-                                       cmocka_unit_test(covariance_moves_with_the_state),
-                                       cmocka_unit_test(there_and_back),
-                                       cmocka_unit_test(estimates_are_consistent),
-                                       cmocka_unit_test(a_million_ill_conditioned_updates)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(motion_is_a_great_circle),
+        cmocka_unit_test(covariance_moves_with_the_state),
+        cmocka_unit_test(there_and_back),
+        cmocka_unit_test(noise_is_that_of_white_acceleration),
+        cmocka_unit_test(innovations_are_seen_in_the_axes_of_the_state),
+        cmocka_unit_test(an_update_is_that_of_the_information_form),
+        cmocka_unit_test(a_pair_has_the_covariance_of_its_differences),
+        cmocka_unit_test(estimates_are_consistent),
+        cmocka_unit_test(a_million_ill_conditioned_updates)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

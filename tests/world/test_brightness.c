@@ -422,7 +422,7 @@ static void into_the_umbra_mid_exposure(void **state) {
     assert_true(bst_source_light(l.source, 0.5) > 0.9);
     bst_truth_item item;
     bst_window window = {0, 0, 1024, 1024};
-    bst_field_truth_item(l.field, &l.track, l.source, window, &l.truth, &item);
+    bst_field_truth_item(l.field, &l.track, l.source, window, 1, &l.truth, &item);
     bst_assert_close(item.electrons / (mean * seconds), 1, 1e-4);
     if (isfinite(item.x_start_px) && isfinite(item.x_chief_px)) {
         /* the light is near the start of the path */
@@ -431,6 +431,50 @@ static void into_the_umbra_mid_exposure(void **state) {
         assert_true(early < 0.7 * late);
     }
     bst_field_free(l.field);
+    bst_view_free(view);
+    bst_world_free(world);
+}
+
+/* What is seen at t left the object at t - range / c, and shows the light of that instant: a light
+ * curve that grows by its first value every second, seen over 40,000 km (0.13 s). */
+static void light_curves_are_those_of_the_instant_of_emission(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    char path[BST_TEST_PATH], object[600];
+    bst_brightness_config c;
+    write_curve(path, "time_s,factor\n0,1\n1000,1001\n", &c);
+    snprintf(object, sizeof object,
+             "{\"name\": \"GX5\", \"brightness\": {\"model\": \"light_curve\", "
+             "\"light_curve_file\": \"%s\"}, " TEST_GX5 "}, {\"name\": \"steady\", " TEST_GX5 "}",
+             path);
+    bst_world *world = test_world_with(object, "");
+    unlink(path);
+    bst_view *view;
+    bst_assert_ok(&ctx, bst_view_create(&ctx, world, &view));
+    for (double t = 5.0; t < 80.0; t += 25.0) {
+        bst_sight varying, steady;
+        bst_assert_ok(&ctx, bst_view_sight(&ctx, view, 0, 0, t, &varying));
+        bst_assert_ok(&ctx, bst_view_sight(&ctx, view, 0, 1, t, &steady));
+        assert_true(steady.range_m > 3e7);
+        double factor = pow(10.0, -0.4 * (varying.v_mag - steady.v_mag));
+        /* the instant to 1e-4 s; its sign would make 0.2 s */
+        bst_assert_close(factor - 1.0, t - steady.range_m / BST_LIGHT_SPEED_MPS, 1e-4);
+        /* and within an exposure of 2 s about it */
+        bst_source_path path_of;
+        bst_path_light light;
+        bst_sight mid;
+        bst_assert_ok(&ctx,
+                      bst_view_path(&ctx, view, 0, 0, t - 1.0, t + 1.0, &path_of, &light, &mid));
+        for (double u = 0.0; u <= 1.0; u += 0.25) {
+            bst_sight then;
+            bst_view_light(view, 0, &path_of, &light, t - 1.0, t + 1.0, u, &then);
+            double at = t - 1.0 + 2.0 * u;
+            bst_assert_ok(&ctx, bst_view_sight(&ctx, view, 0, 1, at, &steady));
+            factor = pow(10.0, -0.4 * (then.v_mag - steady.v_mag));
+            /* light time changes by 2 km in a second: 7e-6 s */
+            bst_assert_close(factor - 1.0, at - steady.range_m / BST_LIGHT_SPEED_MPS, 1e-3);
+        }
+    }
     bst_view_free(view);
     bst_world_free(world);
 }
@@ -476,6 +520,7 @@ int main(void) {
         cmocka_unit_test(the_ends_of_all_scales),
         cmocka_unit_test(standard_magnitudes),
         cmocka_unit_test(light_curves),
+        cmocka_unit_test(light_curves_are_those_of_the_instant_of_emission),
         cmocka_unit_test(wrong_curves_are_refused),
         cmocka_unit_test(earthshine_from_far_and_near),
         cmocka_unit_test(near_spheres),

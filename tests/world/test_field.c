@@ -140,7 +140,7 @@ static void expect_means(scene *s, double tolerance_px) {
             y += y_of[k] / n;
         }
         bst_truth_item item;
-        bst_field_truth_item(s->field, &s->track, &s->sources[i], full, &s->truth, &item);
+        bst_field_truth_item(s->field, &s->track, &s->sources[i], full, 1, &s->truth, &item);
         bst_assert_close(item.x_chief_px, x, tolerance_px);
         bst_assert_close(item.y_chief_px, y, tolerance_px);
         assert_int_equal((item.flags & BST_TRUTH_IN_FIELD) != 0,
@@ -217,7 +217,7 @@ static void snr_is_that_of_the_smeared_image(void **state) {
             double squared =
                 brute_squared_image(n, bst_camera_psf_sigma_px(bst_world_camera(s.world, 0, 0)));
             bst_truth_item item;
-            bst_field_truth_item(s.field, &s.track, &s.sources[i], full, &s.truth, &item);
+            bst_field_truth_item(s.field, &s.track, &s.sources[i], full, 1, &s.truth, &item);
             bst_assert_close(item.electrons, s.sources[i].electrons_per_s * 0.5, 1e-9);
             bst_assert_close(item.snr / (item.electrons * sqrt(squared / variance)), 1, 0.02);
         }
@@ -242,7 +242,7 @@ static void truth_follows_the_optics(void **state) {
     double variance = s.truth.background_e + s.truth.dark_e + 64, least = 1.0, most = 0.0;
     for (int i = 0; i < s.count; i++) {
         bst_truth_item item;
-        bst_field_truth_item(s.field, &s.track, &s.sources[i], full, &s.truth, &item);
+        bst_field_truth_item(s.field, &s.track, &s.sources[i], full, 1, &s.truth, &item);
         double dx = item.x_chief_px - bst_camera_centre_x(camera),
                dy = item.y_chief_px - bst_camera_centre_y(camera);
         double share = 1.0 - 0.4 * (dx * dx + dy * dy) / (2.0 * 512.0 * 512.0);
@@ -332,7 +332,7 @@ static void an_exposure_of_no_length(void **state) {
     assert_true(s.count > 10);
     for (int i = 0; i < s.count; i++) {
         bst_truth_item item;
-        bst_field_truth_item(s.field, &s.track, &s.sources[i], full, &s.truth, &item);
+        bst_field_truth_item(s.field, &s.track, &s.sources[i], full, 1, &s.truth, &item);
         assert_true(item.electrons == 0 && item.snr == 0);
         bst_assert_close(item.x_chief_px, item.x_mid_px, 1e-9);
         bst_assert_close(item.x_start_px, item.x_mid_px, 1e-9);
@@ -355,7 +355,7 @@ static void the_target_is_where_the_sight_says(void **state) {
     bst_assert_ok(&s.ctx, bst_view_sight(&s.ctx, view, 0, 0, 0.25, &mid));
     bst_assert_ok(&s.ctx, bst_view_sight(&s.ctx, view, 0, 0, 0.5, &end));
     bst_truth_item item;
-    bst_field_truth_item(s.field, &s.track, object, full, &s.truth, &item);
+    bst_field_truth_item(s.field, &s.track, object, full, 1, &s.truth, &item);
     const bst_camera *camera = bst_world_camera(s.world, 0, 0);
     double x = NAN, y = NAN;
     assert_true(bst_camera_project(camera, bst_quat_rotate(s.target, mid.apparent), &x, &y));
@@ -391,7 +391,7 @@ static void the_earth_hides_stars(void **state) {
     assert_true(s.count > 0);
     for (int i = 0; i < s.count; i++) {
         bst_truth_item item;
-        bst_field_truth_item(s.field, &s.track, &s.sources[i], full, &s.truth, &item);
+        bst_field_truth_item(s.field, &s.track, &s.sources[i], full, 1, &s.truth, &item);
         assert_true(item.flags & BST_TRUTH_OCCULTED);
         assert_true(item.electrons == 0 && item.snr == 0 && isfinite(item.v_mag));
     }

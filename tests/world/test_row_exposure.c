@@ -157,7 +157,7 @@ static void truth_is_that_of_each_row(void **state) {
     double exposure = 0.2, stretch = 1.0 / (1.0 - vy * row_s);
     for (int i = 0; i < count; i++) {
         bst_truth_item item;
-        bst_field_truth_item(field, &track, &sources[i], full, &truth, &item);
+        bst_field_truth_item(field, &track, &sources[i], full, 1, &truth, &item);
         if (!(item.flags & BST_TRUTH_IN_FIELD) || fabs(item.y_mid_px - 511.5) > 490 ||
             item.flags & BST_TRUTH_OCCULTED) {
             continue;

@@ -1,0 +1,84 @@
+#include "sim/io/run_files.h"
+
+#include <fnmatch.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "sim/core/draft.h"
+
+/* Frames and planes of a sensor of several are WHAT_OBSERVER_SENSOR.fits (sim/engine/recorder.c).
+ */
+static const char *const run_names[] = {"run.sqlite",
+                                        "run.sqlite-wal",
+                                        "run.sqlite-shm",
+                                        "run.sqlite-journal",
+                                        "manifest.json",
+                                        "scenario.json",
+                                        "link.packets",
+                                        "quicklook.png",
+                                        "pointing.png",
+                                        "lock",
+                                        "frames.fits",
+                                        "frames.fits.rows",
+                                        "stars.fits",
+                                        "targets.fits",
+                                        "background.fits",
+                                        "segmentation.fits",
+                                        "saturation.fits",
+                                        "frames_*_*.fits",
+                                        "frames_*_*.fits.rows",
+                                        "stars_*_*.fits",
+                                        "targets_*_*.fits",
+                                        "background_*_*.fits",
+                                        "segmentation_*_*.fits",
+                                        "saturation_*_*.fits",
+                                        NULL};
+
+static const char *const study_names[] = {
+    "study.sqlite", "study.sqlite-*", "study.json",  "plugins.json",
+    "lock",         "card.json",      "train.txt",   "val.txt",
+    "test.txt",     "*.csv",          "shards",      "runs",
+    "slurm",        "ImageFiles",     "Annotations", NULL};
+
+/* A draft has the name of what it becomes, and an ending. */
+static bool matches(const char *const *patterns, const char *name) {
+    char base[256];
+    int n = snprintf(base, sizeof base, "%s", name);
+    if (n < 0 || (size_t)n >= sizeof base) {
+        return false;
+    }
+    if (bst_draft_is_name(base)) {
+        *(strrchr(base, '.') - strlen(".tmp")) = '\0';
+    }
+    for (; *patterns; patterns++) {
+        if (fnmatch(*patterns, base, 0) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+bool bst_run_owns(const char *name) {
+    return matches(run_names, name);
+}
+
+bool bst_study_owns(const char *name) {
+    return matches(study_names, name);
+}
+
+static bool has(const char *folder, const char *name) {
+    char path[4200];
+    struct stat info;
+    int n = snprintf(path, sizeof path, "%s/%s", folder, name);
+    return n > 0 && (size_t)n < sizeof path && lstat(path, &info) == 0;
+}
+
+bool bst_folder_is_run(const char *folder) {
+    return has(folder, "run.sqlite") ||
+           (has(folder, "manifest.json") && has(folder, "scenario.json"));
+}
+
+bool bst_folder_is_study(const char *folder) {
+    return has(folder, "study.sqlite") || has(folder, "shards");
+}

@@ -1,0 +1,29 @@
+/* Names of the files that runs and studies write into their folders. */
+#ifndef BST_IO_RUN_FILES_H
+#define BST_IO_RUN_FILES_H
+
+#include <stdbool.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* The page that "boresight report" puts into the folder of a run or a study. */
+#define BST_RUN_PAGE "report.html"
+
+/* Whether `name` (without a folder) is that of a file that a run writes into its folder: tables,
+ * manifest, scenario, frames and planes, pictures, recorded packets, lock, and drafts of these. */
+bool bst_run_owns(const char *name);
+
+/* The same of a study's folder: tables, CSV files, description, lock, shards and kept runs. */
+bool bst_study_owns(const char *name);
+
+/* Whether `folder` is that of a run (complete or not), and of a study. */
+bool bst_folder_is_run(const char *folder);
+bool bst_folder_is_study(const char *folder);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,182 @@
+#!/usr/bin/env python3
+"""The figures of summary and report against a recomputation from run.sqlite (figures.py),
+on scenes that are not shipped: a turned camera with its boresight off the centre, and one that
+loses the stars, the target behind the Earth and the track again and again.
+
+Usage, from the repository root: /usr/bin/python3 tests/e2e/test_figures.py BORESIGHT
+"""
+import json
+import math
+import os
+import re
+import subprocess
+import unittest
+
+import figures
+import runs
+from test_report import Page
+
+CATALOGUE, GX5, EPOCH = "scenarios/catalogue_2022-06.tle", 44801, "2022-06-16T22:10:00Z"
+CAMERA = runs.SENSOR + "/camera"
+# with the stars in the program alone the attitude is lost after 8 minutes
+ROUGH = (CAMERA + "/rotation_deg=37", CAMERA + "/boresight_offset_px=[40,-25]",
+         CAMERA + "/pixel_scale_arcsec=2.5", "/record/detections_of=all")
+CLEAN = (CAMERA + "/rotation_deg=-110", CAMERA + "/pixel_scale_arcsec=4",
+         runs.SENSOR + "/cue/offset_deg=0.3", "/record/detections_of=all")
+# exact but for the rounding of the recorded angles (1e-16 of a turn in degrees: 1e-11 px) and the
+# same formulae in another order
+EXACT = ("time_to_confirm_s", "time_to_acquire_s", "time_to_settle_s", "custody", "track_fraction",
+         "pointing_rms_px", "pointing_max_px", "pointing_bias_px", "detected_fraction",
+         "track_rms_px", "track_max_px")
+COUNTS = ("frames", "visible_frames", "breaks", "pointing_frames", "track_frames")
+PERCENTILES = ("pointing_median_px", "pointing_p95_px", "pointing_p99_px", "track_median_px",
+               "track_p95_px")
+
+
+class Figures(unittest.TestCase):
+    def play(self, rotation_deg, duration, seed, *sets):
+        out = os.path.join(runs.scratch(), "run")
+        summary = runs.run("scenarios/day_generator.json", out, *sets, duration=duration,
+                           seed=seed)["summary"]
+        frames = figures.Frames(runs.database(out), figures.Orbit(CATALOGUE, GX5, EPOCH), GX5,
+                                rotation_deg)
+        # 10 m at the distance of the belt: precession and nutation of another model
+        self.assertLess(frames.disagreement, 0.1 * figures.ARCSEC)
+        mine, unclear = figures.judge(frames)
+        self.assertEqual(unclear, 0)
+        self.nees = figures.nees(frames)
+        return out, summary, mine
+
+    def compare(self, mine, summary):
+        for key in COUNTS:
+            self.assertEqual(mine[key], summary[key], key)
+        for key in EXACT:
+            self.assertAlmostEqual(mine[key], summary[key], delta=1e-8 + 1e-9 * mine[key], msg=key)
+        for key in PERCENTILES:  # nearest rank, from bins of 0.1 %
+            self.assertAlmostEqual(mine[key] / summary[key], 1, delta=0.00051, msg=key)
+
+    def read_page(self, out):
+        made = subprocess.run([runs.BORESIGHT, "report", out], capture_output=True, text=True,
+                              timeout=120)
+        self.assertEqual((made.returncode, made.stderr), (0, ""))
+        return Page(out + "/report.html")
+
+    def near(self, text, value, digits=3):
+        """A printed number, `digits` of which are shown."""
+        self.assertLessEqual(abs(float(text) - value),
+                             0.51 * 10 ** (math.floor(math.log10(abs(value))) + 1 - digits), text)
+
+    def check_page(self, page, mine):
+        """Cards and captions say the same, and it is that."""
+        cards = page.cards()
+        self.near(cards["custody"], 100 * mine["custody"], 4)
+        self.near(cards["time to acquire"], mine["time_to_acquire_s"], 4)
+        self.near(cards["pointing RMS"], mine["pointing_rms_px"])
+        pointing = re.search(r"In the (\d+) frames in mode track with the visible target, from "
+                             r"settling on: RMS ([\d.]+), .*? largest ([\d.]+) px", page.text)
+        self.assertEqual(int(pointing[1]), mine["pointing_frames"])
+        self.assertEqual(pointing[2], cards["pointing RMS"].strip())
+        self.near(pointing[3], mine["pointing_max_px"])
+        track = re.search(r"In the (\d+) processed frames with the target in the field and in "
+                          r"track: RMS ([\d.]+), .*? largest ([\d.]+) px", page.text)
+        self.assertEqual(int(track[1]), mine["track_frames"])
+        self.near(track[2], mine["track_rms_px"])
+        self.near(track[3], mine["track_max_px"])
+
+    def test_rough(self):
+        out, summary, mine = self.play(37, 4500, 7, *ROUGH)
+        print("rough:", mine)
+        # the scene is worth it: lost more than once, the axes far apart
+        self.assertGreater(mine["breaks"], 2)
+        self.assertLess(mine["custody"], 0.8)
+        self.assertGreater(mine["pointing_max_px"], 5)
+        self.compare(mine, summary)
+        page = self.read_page(out)
+        self.check_page(page, mine)
+        # shares per interval, not solid bars: in most of the time there is an attitude in some
+        # frames and none in others
+        line = [part for part in page.root.iter("svg")
+                if part.get("aria-label", "").startswith("Timeline of the mode")][0]
+        shares = [re.search(r"attitude: ([\d.]+) % of (\d+) frames", title.text)
+                  for title in line.iter("title") if title.text.startswith("attitude: ")]
+        shares = [(float(m[1]) / 100, int(m[2])) for m in shares if m]
+        self.assertGreater(len(shares), 3)
+        self.assertTrue(all(0 < share < 1 for share, _ in shares))
+        # without its summary, as of a run that was killed, the page comes to the same
+        os.remove(out + "/report.html")
+        with open(out + "/manifest.json", encoding="utf-8") as file:
+            manifest = json.load(file)
+        del manifest["summary"]
+        with open(out + "/manifest.json", "w", encoding="utf-8") as file:
+            json.dump(manifest, file)
+        cards = self.read_page(out).cards()
+        self.near(cards["custody"], 100 * mine["custody"], 4)
+        self.near(cards["time to acquire"], mine["time_to_acquire_s"], 4)
+        self.near(cards["pointing RMS"], mine["pointing_rms_px"])
+
+    def test_clean(self):
+        out, summary, mine = self.play(-110, 240, 3, *CLEAN)
+        print("clean:", mine)
+        self.assertEqual(mine["breaks"], 0)
+        self.assertLess(mine["time_to_confirm_s"], mine["time_to_acquire_s"])
+        self.compare(mine, summary)
+        page = self.read_page(out)
+        self.check_page(page, mine)
+        found = re.search(r"In the (\d+) frames that gave it a detection: mean ([\d.]+), median "
+                          r"([\d.]+) \(1.39\), (\d+) % between", page.text)
+        self.assertEqual(int(found[1]), len(self.nees))
+        self.near(found[2], self.nees.mean())
+        self.near(found[3], sorted(self.nees)[math.ceil(0.5 * len(self.nees)) - 1])
+        inside = ((self.nees >= -2 * math.log(0.975)) & (self.nees <= -2 * math.log(0.025))).mean()
+        self.assertLessEqual(abs(int(found[4]) - 100 * inside), 0.51)
+
+
+class Losses(unittest.TestCase):
+    """What a run lost: in the tables, in the manifest, at the end of `run` and on the page."""
+
+    def test_crowded(self):
+        out = os.path.join(runs.scratch(), "run")
+        done = subprocess.run(
+            runs.command("scenarios/crowded_geo_track.json", out, runs.NO_FRAMES,
+                         runs.SENSOR + "/modules/imgproc/capacity=200",
+                         runs.SENSOR + "/modules/scenegen/truth_capacity=300", duration=12),
+            capture_output=True, text=True, timeout=300)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        with runs.database(out) as tables:
+            def sums(what, table):
+                return tuple(tables.execute(f"SELECT {what} FROM {table}").fetchone())
+            frames, = sums("count(*)", "exposures")
+            cut, cut_frames = sums("sum(lost), sum(lost > 0)", "detection_frames")
+            truth, truth_frames = sums("sum(lost), sum(lost > 0)", "exposures")
+            blind, = sums("sum(stars_identified = 0)", "detection_frames")
+            lame, = sums("sum(attitude_valid = 0)", "track_frames")
+        self.assertGreater(min(cut, truth, blind), 0)
+        losses = runs.manifest(out)["losses"]["neossat/telescope"]
+        self.assertEqual(losses, {"frames": frames, "detections": cut, "detection_frames": cut_frames,
+                                  "truth": truth, "truth_frames": truth_frames,
+                                  "no_attitude_frames": lame, "no_stars_frames": blind})
+        lines = (f"cut to imgproc's capacity: {cut} detections in {cut_frames} of {frames} frames",
+                 "cut to truth_capacity, labels are missing: "
+                 f"{truth} sources of the truth in {truth_frames} of {frames} frames",
+                 f"no star identified: {blind} of {frames} frames")
+        self.assertEqual(subprocess.run([runs.BORESIGHT, "report", out],
+                                        capture_output=True, timeout=120).returncode, 0)
+        page = Page(out + "/report.html")
+        for line in lines:
+            self.assertIn(line + "\n", done.stdout)
+            self.assertTrue(any(line + "." in warning for warning in page.warnings()), line)
+
+    def test_nothing_lost(self):
+        out = os.path.join(runs.scratch(), "run")
+        done = subprocess.run(runs.command("scenarios/day_generator.json", out, duration=60),
+                              capture_output=True, text=True, timeout=300)
+        self.assertNotIn("losses", done.stdout)
+        self.assertEqual(runs.manifest(out)["losses"], {"neossat/telescope": {"frames": 30}})
+
+
+def tearDownModule():
+    runs.clean()
+
+
+if __name__ == "__main__":
+    unittest.main()

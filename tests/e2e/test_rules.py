@@ -1,0 +1,85 @@
+#!/usr/bin/env python3
+"""What `boresight check` and `boresight run` say of scenarios that hardly mean what they say.
+
+Usage, from the repository root: /usr/bin/python3 tests/e2e/test_rules.py BORESIGHT
+"""
+import os
+import subprocess
+import unittest
+
+import runs
+
+MODULES = runs.SENSOR + "/modules"
+# rule, override, words of the warning
+CASES = [("duration", "/duration_s=0", "/duration_s: the run lasts 0 s"),
+         ("element_age", '/epoch_utc="2022-08-16T22:10:00Z"', "2 of 2 element sets are more than 14 days"),
+         ("earth_orientation", '/epoch_utc="2030-06-16T22:10:00Z"', "/world/earth_orientation"),
+         ("modules", MODULES + "={}", "nothing is seen or recorded"),
+         ("exposure_period", runs.SENSOR + "/exposure/exposure_s=2", "longer than the period_s of 1 s"),
+         ("wide_field", runs.SENSOR + "/camera/pixel_scale_arcsec=300", "diagonal is 93 degrees"),
+         ("short_times", MODULES + "/tracker/initiation_gap_s=0.5", "no track can begin"),
+         ("short_times", MODULES + "/tracker/max_coast_s=0.5", "every track ends"),
+         ("short_times", MODULES + "/control/dwell_timeout_s=4", "(5 s here)"),
+         ("short_times", MODULES + "/control/acquire_timeout_s=1", "before it can be confirmed"),
+         ("loops", MODULES + '/control/compensator={"type": "pi", "crossover_hz": 0.07, '
+          '"phase_margin_deg": 45, "gain_scale": 3}', "has thin margins"),
+         ("reach", "/duration_s=86400", "the cue is out of reach from"),
+         ("reach", MODULES + "/gimbal/accel_limit_degps2=0.001", "for a step of the search")]
+
+
+def check(*words):
+    return subprocess.run([runs.BORESIGHT, "check", *words], capture_output=True, text=True, check=False)
+
+
+class Rules(unittest.TestCase):
+    def test_each_rule_speaks_and_is_listed(self):
+        listed = {line.split()[0] for line in check("--rules").stdout.splitlines()}
+        self.assertEqual(listed, {rule for rule, _, _ in CASES})
+        for rule, override, words in CASES:
+            said = check(runs.TRACK, "--quiet", "--set", override)
+            self.assertEqual(said.returncode, 0, said.stderr)
+            self.assertIn(words, said.stderr, rule)
+            self.assertIn("warning", said.stderr, rule)
+
+    def test_the_shipped_scenario_is_not_warned_of(self):
+        self.assertEqual(check(runs.TRACK, "--quiet").stderr, "")
+
+    def test_a_field_beyond_the_projection_is_an_error(self):
+        said = check(runs.TRACK, "--quiet", "--set", runs.SENSOR + "/camera/width_px=16384", "--set",
+                     runs.SENSOR + "/camera/height_px=16384", "--set",
+                     runs.SENSOR + "/camera/pixel_scale_arcsec=600")
+        self.assertEqual(said.returncode, 1)
+        self.assertIn("/observers/0/sensors/0/camera: the field's diagonal is", said.stderr)
+
+    def test_run_says_it_too(self):
+        out = os.path.join(runs.scratch(), "run")
+        said = subprocess.run(runs.command(runs.TRACK, out, runs.NO_FRAMES, MODULES + "/tracker/initiation_gap_s=0.5",
+                                           duration=2), capture_output=True, text=True, check=True)
+        self.assertIn("no track can begin", said.stderr)
+
+    def test_a_run_that_does_not_fit_is_refused_before_it_starts(self):
+        out = os.path.join(runs.scratch(), "run")
+        # 33 TB of frames: more than is free anywhere
+        said = subprocess.run(runs.command(runs.TRACK, out, runs.SENSOR + "/camera/width_px=8192",
+                                           runs.SENSOR + "/camera/height_px=8192", duration=250000),
+                              capture_output=True, text=True, check=False)
+        self.assertEqual(said.returncode, 1)
+        self.assertIn("--force", said.stderr)
+        self.assertFalse(os.path.exists(out + ".partial"))
+
+    def test_a_window_is_read_out(self):
+        out = os.path.join(runs.scratch(), "run")
+        runs.run(runs.STARE, out, runs.SENSOR + "/exposure/window_px=[128, 64, 512, 384]", runs.NO_FRAMES, duration=3)
+        for row in runs.database(out).execute("SELECT x0_px, y0_px, width_px, height_px FROM frames"):
+            self.assertEqual(tuple(row), (128, 64, 512, 384))
+        said = check(runs.STARE, "--quiet", "--set", runs.SENSOR + "/exposure/window_px=[1000, 0, 512, 10]")
+        self.assertEqual(said.returncode, 1)
+        self.assertIn("is no window of the sensor", said.stderr)
+
+
+def tearDownModule():
+    runs.clean()
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,225 @@
+/* Figures of detections and tracks on made-up messages, errors on both axes and between them. */
+#include "sim/eval/run_metrics.h"
+
+#include "tests/world/world_support.h"
+
+#define PX_RAD (3.0 * BST_ARCSEC_RAD)
+#define OBJECT(name) "{\"name\": \"" name "\", " TEST_GX5 "}"
+
+enum { RATE = 6000, OBJECTS = 3 };
+
+typedef struct fixture {
+    bst_ctx ctx;
+    bst_world *world;
+    bst_run_metrics *metrics;
+    bst_truth *truth;
+    bst_tracks *tracks;
+    bst_detections *detections;
+} fixture;
+
+static int set_up(void **state) {
+    fixture *f = calloc(1, sizeof *f);
+    assert_non_null(f);
+    f->world = test_world_with(OBJECT("A") ", " OBJECT("B") ", " OBJECT("C"), "");
+    bst_assert_ok(&f->ctx, bst_run_metrics_create(&f->ctx, f->world, 0, 0, 1, &f->metrics));
+    f->truth = calloc(1, sizeof *f->truth + 8 * sizeof *f->truth->items);
+    f->tracks = calloc(1, sizeof *f->tracks + 8 * sizeof *f->tracks->items);
+    f->detections = calloc(1, sizeof *f->detections + 8 * sizeof *f->detections->items);
+    assert_true(f->truth && f->tracks && f->detections);
+    *state = f;
+    return 0;
+}
+
+static int tear_down(void **state) {
+    fixture *f = *state;
+    bst_run_metrics_free(f->metrics);
+    bst_world_free(f->world);
+    free(f->truth);
+    free(f->tracks);
+    free(f->detections);
+    free(f);
+    return 0;
+}
+
+/* Objects are 100 px apart in declination and lie at (100, 200 + 100 i) px. */
+static double dec_of(int object) {
+    return 0.6 + object * 100 * PX_RAD;
+}
+
+static void show_truth(fixture *f, int64_t id, int objects, uint32_t flags, double snr) {
+    f->truth->exposure_id = id;
+    f->truth->count = objects;
+    for (int i = 0; i < objects; i++) {
+        f->truth->items[i] = (bst_truth_item){.kind = BST_SOURCE_OBJECT,
+                                              .id = (uint32_t)i,
+                                              .flags = flags,
+                                              .ra_rad = 2.0,
+                                              .dec_rad = dec_of(i),
+                                              .x_centroid_px = 100,
+                                              .y_centroid_px = 200 + 100 * i,
+                                              .snr = snr};
+    }
+    bst_assert_ok(&f->ctx, bst_run_metrics_truth(&f->ctx, f->metrics, f->truth));
+}
+
+/* The direction (east, north) px from an object, along the great circle. */
+static bst_vec3 beside(int object, double east_px, double north_px) {
+    double dec = dec_of(object), angle = hypot(east_px, north_px) * PX_RAD;
+    bst_vec3 d = bst_vec3_from_radec(2.0, dec), east = {-sin(2.0), cos(2.0), 0},
+             north = {-sin(dec) * cos(2.0), -sin(dec) * sin(2.0), cos(dec)};
+    bst_vec3 way = bst_vec3_scale(east, angle > 0 ? east_px * PX_RAD / angle : 0);
+    way = bst_vec3_axpy(way, angle > 0 ? north_px * PX_RAD / angle : 0, north);
+    return bst_vec3_axpy(bst_vec3_scale(d, cos(angle)), sin(angle), way);
+}
+
+static void show_track(fixture *f, int64_t exposure, int64_t id, int status, bool of_interest,
+                       bst_vec3 direction) {
+    f->tracks->exposure_id = exposure;
+    f->tracks->count = 1;
+    f->tracks->items[0] = (bst_track){
+        .id = id, .status = status, .target_of_interest = of_interest, .direction_gcrf = direction};
+    bst_assert_ok(&f->ctx, bst_run_metrics_tracks(&f->ctx, f->metrics, f->tracks));
+}
+
+/* Closed forms of errors along rows, along columns and across. */
+static void track_errors(void **state) {
+    fixture *f = *state;
+    const double errors[][2] = {{0, 0.3}, {0.4, 0}, {-1.2, 0.9}, {3.0, -3.9}, {0, -0.02}};
+    enum { N = sizeof errors / sizeof *errors };
+    double sum2 = 0;
+    for (int i = 0; i < N; i++) {
+        show_truth(f, i, OBJECTS, BST_TRUTH_IN_FIELD, 10);
+        show_track(f, i, 7, i == 2 ? BST_TRACK_COASTING : BST_TRACK_CONFIRMED, true,
+                   beside(1, errors[i][0], errors[i][1]));
+        sum2 += errors[i][0] * errors[i][0] + errors[i][1] * errors[i][1];
+    }
+    /* none of these counts: not of interest, tentative, beyond 5 px, of another object */
+    show_truth(f, N, OBJECTS, BST_TRUTH_IN_FIELD, 10);
+    show_track(f, N, 8, BST_TRACK_CONFIRMED, false, beside(1, 0, 2));
+    show_track(f, N, 7, BST_TRACK_TENTATIVE, true, beside(1, 0, 2));
+    show_track(f, N, 7, BST_TRACK_CONFIRMED, true, beside(1, 3.6, 3.6));
+    show_track(f, N, 7, BST_TRACK_CONFIRMED, true, beside(2, 0, 0.1));
+    bst_run_metric_figures m;
+    bst_run_metrics_figures(f->metrics, &m);
+    assert_int_equal(m.track_frames, N);
+    /* 5 px are 7e-5 rad: chord and arc differ by 2e-10 of it */
+    bst_assert_close(m.track_rms_px, sqrt(sum2 / N), 1e-8);
+    bst_assert_close(m.track_max_px, hypot(3.0, 3.9), 1e-8);
+    /* nearest rank of 5 values: the third and the fifth, to half a bin of 0.1 % */
+    bst_assert_close(m.track_median_px / 0.4, 1, 0.00051);
+    bst_assert_close(m.track_p95_px / hypot(3.0, 3.9), 1, 0.00051);
+}
+
+/* A track is false when most of its frames are near no object; what coasts near none is no frame.
+ */
+static void false_tracks(void **state) {
+    fixture *f = *state;
+    for (int i = 0; i < 4; i++) {
+        show_truth(f, i, OBJECTS, BST_TRUTH_IN_FIELD, 10);
+        show_track(f, i, 1, BST_TRACK_CONFIRMED, false, beside(0, 0, i < 2 ? 4.9 : 5.1)); /* half */
+        show_track(f, i, 2, BST_TRACK_CONFIRMED, false, beside(2, i < 1 ? 4.9 : 0, i < 1 ? 0 : 8));
+        show_track(f, i, 3, i < 1 ? BST_TRACK_CONFIRMED : BST_TRACK_COASTING, false,
+                   beside(2, -3.5, i < 1 ? 3.5 : 80));
+    }
+    bst_run_metric_figures m;
+    bst_run_metrics_figures(f->metrics, &m);
+    assert_int_equal(m.tracks, 3);
+    assert_int_equal(m.false_tracks, 1);
+    assert_int_equal(m.objects_seen, 3);
+    assert_int_equal(m.objects_tracked, 2); /* 0 and 2 */
+    assert_true(isnan(m.track_rms_px) && m.track_frames == 0);
+}
+
+static void show_detections(fixture *f, int64_t id, double x_px, double y_px) {
+    f->detections->exposure_id = id;
+    f->detections->count = 2;
+    f->detections->items[0] = (bst_detection){.x_px = 100, .y_px = 200}; /* object 0's */
+    f->detections->items[1] = (bst_detection){.x_px = x_px, .y_px = y_px};
+    bst_run_metrics_detections(f->metrics, f->detections);
+}
+
+/* The share of the frames with the visible target in the field that have a detection within 5 px
+ * of it, on either axis. */
+static void detected_fraction(void **state) {
+    fixture *f = *state;
+    const struct {
+        double dx, dy;
+        bool on;
+    } places[] = {{0, 4.9, true},    {4.9, 0, true},    {0, -5.1, false}, {-5.1, 0, false},
+                  {3.5, -3.5, true}, {3.6, 3.6, false}, {0, 300, false}};
+    enum { N = sizeof places / sizeof *places };
+    int on = 0;
+    for (int i = 0; i < N; i++) {
+        show_truth(f, i, OBJECTS, BST_TRUTH_IN_FIELD, 10);
+        show_detections(f, i, 100 + places[i].dx, 300 + places[i].dy);
+        bst_run_metrics_frame(f->metrics, &(bst_loop_frame){.visible = true, .target_snr = 10});
+        on += places[i].on;
+    }
+    /* behind the Earth or dark, a detection there is not the target's */
+    show_truth(f, N, OBJECTS, BST_TRUTH_IN_FIELD | BST_TRUTH_OCCULTED, 10);
+    show_detections(f, N, 100, 300);
+    show_truth(f, N + 1, OBJECTS, BST_TRUTH_IN_FIELD, 0);
+    show_detections(f, N + 1, 100, 300);
+    /* out of the field */
+    bst_run_metrics_frame(f->metrics, &(bst_loop_frame){.visible = true, .target_snr = 0});
+    bst_run_metric_figures m;
+    bst_run_metrics_figures(f->metrics, &m);
+    assert_int_equal(m.in_field_frames, N);
+    assert_int_equal(m.detected_frames, on);
+    bst_assert_close(m.detected_fraction, (double)on / N, 1e-15);
+    assert_int_equal(m.detections, 2 * (N + 2));
+}
+
+/* Amounts and frames are counted apart. */
+static void losses(void **state) {
+    fixture *f = *state;
+    for (int i = 0; i < 10; i++) {
+        f->truth->lost = i == 3 ? 40 : i == 4 ? 2 : 0;
+        f->truth->dropped = i >= 8;
+        show_truth(f, i, OBJECTS, BST_TRUTH_IN_FIELD, 10);
+        f->detections->lost = i < 3 ? 100 : 0;
+        f->detections->stars_identified = i == 5 ? 0 : 20;
+        show_detections(f, i, 0, 0);
+        f->tracks->lost = i == 7 ? 5 : 0;
+        f->tracks->attitude.valid = i % 2 == 0;
+        show_track(f, i, 1, BST_TRACK_TENTATIVE, false, beside(0, 0, 0));
+    }
+    bst_run_metric_figures m;
+    bst_run_metrics_figures(f->metrics, &m);
+    assert_int_equal(m.losses.frames, 10);
+    assert_int_equal(m.losses.detections, 300);
+    assert_int_equal(m.losses.detection_frames, 3);
+    assert_int_equal(m.losses.truth, 42);
+    assert_int_equal(m.losses.truth_frames, 2);
+    assert_int_equal(m.losses.tracks, 5);
+    assert_int_equal(m.losses.track_frames, 1);
+    assert_int_equal(m.losses.dropped_frames, 2);
+    assert_int_equal(m.losses.no_stars_frames, 1);
+    assert_int_equal(m.losses.no_attitude_frames, 5);
+}
+
+/* After a change of the target the other object counts. */
+static void another_target(void **state) {
+    fixture *f = *state;
+    for (int i = 0; i < 2; i++) {
+        show_truth(f, i, OBJECTS, BST_TRUTH_IN_FIELD, 10);
+        show_track(f, i, 1, BST_TRACK_CONFIRMED, true, beside(i == 0 ? 1 : 2, 0, 0.5));
+        show_detections(f, i, 100, i == 0 ? 300 : 400);
+        bst_run_metrics_retarget(f->metrics, 2);
+    }
+    bst_run_metric_figures m;
+    bst_run_metrics_figures(f->metrics, &m);
+    assert_int_equal(m.track_frames, 2);
+    assert_int_equal(m.detected_frames, 2);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(track_errors, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(false_tracks, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(detected_fraction, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(losses, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(another_target, set_up, tear_down),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
