@@ -338,6 +338,9 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
     truth->hits_e = stats.hits_e;
     truth->error_sigma = stats.predicted_sigma;
     truth->nodes = stats.nodes;
+    if (stats.tolerance_missed && !e->dropped) {
+        bst_step_count(step, "tolerance_missed");
+    }
     truth->one_track = stats.single_kernel;
     /* while the device renders */
     const bst_truth_request items = {.field = s->field,
