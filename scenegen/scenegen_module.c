@@ -36,7 +36,7 @@ static const bst_config_desc stage_table[] = {
 
 static const bst_config_desc fidelity_table[] = {
     BST_REAL(fidelity_config, tolerance_sigma, "sigma", 1e-4, 1.0, "0.05",
-             "Error of each source's image in any pixel that is allowed, in that pixel's noise. "
+             "Error of the image that is allowed in any pixel, in that pixel's noise. "
              "Nodes and stamps follow from it."),
     BST_INT(fidelity_config, temporal_oversample, "", 0, 100000, "0",
             "Equal parts of the exposure whose middles stand for it, for comparison with other "
