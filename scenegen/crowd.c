@@ -88,8 +88,8 @@ bst_crowd_motion bst_crowd_motion_of(const bst_path_point *path, int count, bool
 void bst_crowd_begin(bst_crowd *c, const bst_crowd_motion *motion) {
     c->motion = *motion;
     double psf = 3.0 * motion->sigma_px + 1.0;
-    c->motion.overlap = fmin(1.0, (motion->way_px + psf) * psf /
-                                      ((motion->length_px + psf) * (motion->width_px + psf)));
+    c->motion.overlap = fmin(
+        1.0, (motion->way_px + psf) * psf / ((motion->length_px + psf) * (motion->width_px + psf)));
     c->count = 0;
     c->missing_e = 0.0;
     c->error = -1.0;

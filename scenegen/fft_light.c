@@ -274,7 +274,8 @@ int bst_fft_light_spectra(const bst_fft_light *l) {
 double bst_fft_light_error_sigma(const bst_fft_light *l, bool fine, bool wings, bst_window window,
                                  double peak_e, double dark_variance_e2) {
     bool whole = window.width == l->camera.width_px && window.height == l->camera.height_px;
-    return bst_light_error_sigma(&l->error[fine ? FINE : PLAIN][whole], wings, peak_e, dark_variance_e2);
+    return bst_light_error_sigma(&l->error[fine ? FINE : PLAIN][whole], wings, peak_e,
+                                 dark_variance_e2);
 }
 
 double bst_fft_light_mixing_error(const bst_fft_light *l) {

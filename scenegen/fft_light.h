@@ -45,8 +45,8 @@ double bst_fft_light_widest(const bst_fft_light *light);
 int bst_fft_light_spectra(const bst_fft_light *light);
 
 /* Bound of an image's error by grid and cut-off, in sigma of the worst pixel, of a source with
- * `peak_e` electrons in its brightest one (light_error.h). fine: with the finer of two grids. wings:
- * the window has no more than them of it. */
+ * `peak_e` electrons in its brightest one (light_error.h). fine: with the finer of two grids.
+ * wings: the window has no more than them of it. */
 double bst_fft_light_error_sigma(const bst_fft_light *light, bool fine, bool wings,
                                  bst_window window, double peak_e, double dark_variance_e2);
 

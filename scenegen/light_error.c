@@ -39,12 +39,12 @@ static void find_aliases(lattice *l, const bst_light_axis *axis, int a) {
         double nu = frequency(l, i) / density;
         double own = fabs(bst_spread_transform(&axis->spread, nu));
         /* beyond the grid's band all is lost */
-        l->alias[a][i] = fabs(nu) >= 0.5
-                             ? 1.0
-                             : fmin((fabs(bst_spread_transform(&axis->spread, nu + 1.0)) +
-                                     ROUNDED * whole) /
-                                        own,
-                                    1.0);
+        l->alias[a][i] =
+            fabs(nu) >= 0.5
+                ? 1.0
+                : fmin(
+                      (fabs(bst_spread_transform(&axis->spread, nu + 1.0)) + ROUNDED * whole) / own,
+                      1.0);
     }
 }
 

@@ -70,8 +70,9 @@ static double binned(double f, int binning) {
     return fabs(s) < 1e-9 ? 1.0 : sin(BST_PI * binning * f) / (binning * s);
 }
 
-/* Raises the parts of all binnings, over those of none, by those of a field node: the image's derivatives are at most
- * the sums of moduli, and its peak is at least what binned pixels about the PSF's peak have. */
+/* Raises the parts of all binnings, over those of none, by those of a field node: the image's
+ * derivatives are at most the sums of moduli, and its peak is at least what binned pixels about the
+ * PSF's peak have. */
 static void measure_parts(const bst_psf *psf, int node, const double peak_px[2],
                           bst_light_band *out) {
     enum { SIDE = LATTICE / 2 };

@@ -99,35 +99,3 @@ double bst_nodes_peak_share(const bst_node *nodes, int count, double psf_sigma_p
     double line = erf(0.5 / (psf_sigma_px * sqrt(2.0)));
     return best * line * line;
 }
-
-double bst_nodes_error_part(const bst_node *nodes, int count, double psf_sigma_px) {
-    enum { ANCHORS = 24 };
-    double scale = 0.5 / (psf_sigma_px * psf_sigma_px), worst = 0.0, least = INFINITY;
-    int brightest = 0;
-    for (int n = 0; n < count; n++) {
-        double error = nodes[n].error * nodes[n].weight;
-        brightest = error > nodes[brightest].error * nodes[brightest].weight ? n : brightest;
-        worst = fmax(worst, nodes[n].error);
-        least = fmin(least, nodes[n].error);
-    }
-    if (!(worst > 0.0) || least > 0.9 * worst) {
-        return 1.0;
-    }
-    double light = 0.0, error = 0.0;
-    int stride = count / ANCHORS + 1;
-    for (int a = -1; a < count; a = a < 0 ? 0 : a + stride) {
-        const bst_node *at = &nodes[a < 0 ? brightest : a];
-        double here = 0.0, missed = 0.0;
-        for (int n = 0; n < count; n++) {
-            const double *p = nodes[n].p;
-            double dx = p[0] - at->p[0], dy = p[1] - at->p[1], dz = p[2] - at->p[2];
-            double q = (dx * dx + dy * dy + dz * dz) * scale;
-            double share = q < 20.0 ? nodes[n].weight * exp(-q) : 0.0;
-            here += share;
-            missed += share * nodes[n].error;
-        }
-        light = fmax(light, here);
-        error = fmax(error, missed);
-    }
-    return fmin(error / (worst * light), 1.0);
-}

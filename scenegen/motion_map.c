@@ -7,10 +7,12 @@
 #include "scenegen/kernels/scene_shared.h"
 #include "sim/core/vec.h"
 
-/* Cells per axis: as many as it takes for a cell's stars to move alike, but for UNLIKE of the path's
- * length; and nodes about which light is summed. */
-enum { FEW_CELLS = 6, MANY_CELLS = 48, ANCHORS = 48 };
-#define UNLIKE 0.05
+/* Cells per axis: as many as it takes for a cell's stars to move alike, but for UNLIKE of the
+ * path's length, or where most cells would have to be filled, UNLIKE_MANY; and nodes about which
+ * light is summed. */
+enum { FEW_CELLS = 6, MANY_CELLS = 96, ANCHORS = 48, FEW_SOURCES = 256 };
+#define UNLIKE 0.01
+#define UNLIKE_MANY 0.06
 /* Nodes that are nearer to each other than this, in sigma, give no scale. */
 #define LEAST_STEP 0.02
 
@@ -56,8 +58,7 @@ static double other_motion(const bst_motion_map *map, const turn *a, const turn 
                            double apart_px) {
     double tangent = map->f.reach_px * map->f.scale_rad;
     double tilt = hypot(a->p[0] - b->p[0], a->p[1] - b->p[1]) / map->f.tilt_px;
-    return apart_px *
-           (fabs(a->roll_rad - b->roll_rad) + 2.0 * tangent * tilt * map->f.scale_rad);
+    return apart_px * (fabs(a->roll_rad - b->roll_rad) + 2.0 * tangent * tilt * map->f.scale_rad);
 }
 
 bst_status bst_motion_map_begin(bst_ctx *ctx, bst_motion_map *map,
@@ -97,11 +98,12 @@ bst_status bst_motion_map_begin(bst_ctx *ctx, bst_motion_map *map,
         from.roll_rad = low[2] / frame->roll_px;
         to.roll_rad = high[2] / frame->roll_px;
     }
-    double length = sqrt((high[0] - low[0]) * (high[0] - low[0]) +
-                         (high[1] - low[1]) * (high[1] - low[1]) +
-                         (high[2] - low[2]) * (high[2] - low[2]));
-    double side = sqrt(2.0) * other_motion(map, &from, &to, frame->reach_px) /
-                  (UNLIKE * fmax(length, map->f.sigma_px));
+    double length =
+        sqrt((high[0] - low[0]) * (high[0] - low[0]) + (high[1] - low[1]) * (high[1] - low[1]) +
+             (high[2] - low[2]) * (high[2] - low[2]));
+    double side =
+        sqrt(2.0) * other_motion(map, &from, &to, frame->reach_px) /
+        ((frame->sources <= FEW_SOURCES ? UNLIKE : UNLIKE_MANY) * fmax(length, map->f.sigma_px));
     map->side = (int)fmin(fmax(ceil(side), FEW_CELLS), MANY_CELLS);
     map->cell_px = 2.0 * frame->reach_px / map->side;
     return BST_OK;

@@ -12,9 +12,9 @@ typedef struct bst_motion_map bst_motion_map;
 
 /* What holds for all stars of a cell. */
 typedef struct bst_star_motion_cell {
-    double share;      /* at most, of a star's light on one pixel */
-    double read_share; /* the same of a pixel that is read, binned from the sensor's */
-    double scale; /* at most, of its motion over the path's */
+    double share;           /* at most, of a star's light on one pixel */
+    double read_share;      /* the same of a pixel that is read, binned from the sensor's */
+    double scale;           /* at most, of its motion over the path's */
     double low[2], high[2]; /* box of its places about the place at the reference attitude, px */
 } bst_star_motion_cell;
 
@@ -31,8 +31,9 @@ typedef struct bst_motion_map_frame {
     double reach_px;    /* stars further from the boresight give no light */
     double sensor_px;   /* and places that are */
     double shrink, stretch; /* least and largest scale of the image by distortion */
-    double sigma_px;    /* of the Gaussian that puts as much light on one pixel as the PSF */
+    double sigma_px;        /* of the Gaussian that puts as much light on one pixel as the PSF */
     int binning;
+    int sources; /* how many stars will be asked for */
 } bst_motion_map_frame;
 
 /* Largest share of a Gaussian's light on a pixel that is read, binned from `binning` x `binning` of

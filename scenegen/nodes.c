@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "scenegen/nodes_internal.h"
 #include "sim/core/vec.h"
 
 typedef struct maker {
@@ -19,8 +20,8 @@ typedef struct maker {
     double curvature;
     double pixel_part[3];
     double image_share; /* variance of the image per variance of the path, mean over the field */
-    double most;   /* spread of the next group, px^2 */
-    double limit;  /* of it */
+    double most;        /* spread of the next group, px^2 */
+    double limit;       /* of it */
 } maker;
 
 /* A group: the path from time `from` (in segment `first`) to `to`. */
@@ -49,9 +50,9 @@ typedef struct rule {
     double node[3], weight[3];
     double bend[3];  /* shift across the axis per unit of `curve` */
     double curve[3]; /* second orthogonal polynomial at the nodes */
-    double error;  /* all of it */
-    double missed; /* of it, what the quadrature misses of the last moment */
-    double fixed;  /* of it, the wrong widening of images that move by less than the path */
+    double error;    /* all of it */
+    double missed;   /* of it, what the quadrature misses of the last moment */
+    double fixed;    /* of it, the wrong widening of images that move by less than the path */
 } rule;
 
 static bst_status push(bst_ctx *ctx, bst_node_list *list, const double p[3], double weight,
@@ -67,32 +68,6 @@ static bst_status push(bst_ctx *ctx, bst_node_list *list, const double p[3], dou
     }
     list->items[list->count++] = (bst_node){{p[0], p[1], p[2]}, weight, variance, error};
     return BST_OK;
-}
-
-/* Direction of the largest eigenvalue of a symmetric matrix that is not negative: by squaring it
- * over and over, until one column is left. A tie gives some direction between. */
-static void main_axis(double a[3][3], double axis[3]) {
-    double p[3][3];
-    memcpy(p, a, sizeof p);
-    for (int round = 0; round < 6; round++) {
-        double q[3][3], trace = p[0][0] + p[1][1] + p[2][2], scale = 1.0 / (trace * trace);
-        for (int i = 0; i < 3; i++) {
-            for (int j = 0; j < 3; j++) {
-                q[i][j] = (p[i][0] * p[0][j] + p[i][1] * p[1][j] + p[i][2] * p[2][j]) * scale;
-            }
-        }
-        memcpy(p, q, sizeof p);
-    }
-    int most = p[1][1] > p[0][0] ? 1 : 0;
-    most = p[2][2] > p[most][most] ? 2 : most;
-    double length = 0.0;
-    for (int i = 0; i < 3; i++) {
-        axis[i] = p[i][most];
-        length += axis[i] * axis[i];
-    }
-    for (int i = 0; i < 3; i++) {
-        axis[i] /= sqrt(length);
-    }
 }
 
 /* The part of segment k inside the group, as its two ends; its duration. */
@@ -177,7 +152,7 @@ enum { MANY_SEGMENTS = 6 };
 /* Fills the axis and the moments about it. */
 static void high_moments(const maker *m, const group *g, moments *out) {
     double a[3], b[3], weight = 0.0;
-    main_axis(out->covariance, out->axis);
+    bst_nodes_main_axis(out->covariance, out->axis);
     int segments = 0;
     while (segments < MANY_SEGMENTS && reaches(m, g, g->first + segments)) {
         segments++;
@@ -374,7 +349,7 @@ static void try_rule(const maker *m, const moments *g, int n, bool widen, bool s
     }
     if (split) {
         double axis[3], length2 = 0.0;
-        main_axis(d, axis);
+        bst_nodes_main_axis(d, axis);
         for (int i = 0; i < 3; i++) {
             for (int j = 0; j < 3; j++) {
                 length2 += axis[i] * d[i][j] * axis[j];
@@ -435,24 +410,6 @@ static void try_rule(const maker *m, const moments *g, int n, bool widen, bool s
     r->error = error + r->missed;
 }
 
-double bst_nodes_error(const double error[BST_NODE_SCALES], double scale) {
-    double k = 2.0 * log2(fmax(scale, 1e-9)) + BST_NODE_SCALES - 2;
-    if (k <= 0.0) {
-        return error[0];
-    }
-    int n = (int)fmin(k, BST_NODE_SCALES - 1.0);
-    if (n == BST_NODE_SCALES - 1) { /* nor any more than the sixth */
-        return error[n] * exp2(3.0 * (k - n));
-    }
-    /* sums of powers are convex in logarithms: a chord is no less */
-    return error[n] > 0.0 ? error[n] * pow(error[n + 1] / error[n], k - n) : error[n + 1];
-}
-
-void bst_nodes_clear(bst_node_list *list) {
-    list->count = 0;
-    memset(list->error, 0, sizeof list->error);
-}
-
 static void raise_error(bst_node_list *list, const rule *r) {
     for (int k = 0; k < BST_NODE_SCALES; k++) {
         double square = exp2(k - (BST_NODE_SCALES - 2)), fourth = square * square;
@@ -474,9 +431,8 @@ static bst_status emit(bst_ctx *ctx, const maker *m, const moments *g, const rul
                 p[i] = g->mean[i] + r->node[n] * g->axis[i] + r->curve[n] * r->bend[i] +
                        (split ? side * r->pair[i] : 0.0);
             }
-            BST_TRY(
-                push(ctx, m->list, p, weight * r->weight[n] * (split ? 0.5 : 1.0),
-                     r->widening * m->image_share, r->error));
+            BST_TRY(push(ctx, m->list, p, weight * r->weight[n] * (split ? 0.5 : 1.0),
+                         r->widening * m->image_share, r->error));
             if (!split) {
                 break;
             }

@@ -47,9 +47,9 @@ typedef struct bst_node_list {
 /* What nodes are made for. */
 typedef struct bst_node_aim {
     double psf_sigma_px;
-    double tolerance; /* of the smeared image's peak */
-    double widest;    /* nodes are widened by at most so many PSF variances, BST_NODE_WIDEST at
-                         most; 0: jitter is followed by nodes */
+    double tolerance;  /* of the smeared image's peak */
+    double widest;     /* nodes are widened by at most so many PSF variances, BST_NODE_WIDEST at
+                          most; 0: jitter is followed by nodes */
     double wide_field; /* px of the path's tilts per px of image motion at the boresight: 1, or more
                           where they are px in the sensor's corners, which a tangent plane moves
                           further; 0 is 1 */

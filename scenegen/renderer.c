@@ -329,8 +329,9 @@ static bst_status begin_set(bst_ctx *ctx, bst_renderer *r) {
 /* The image that the tile kernel takes its light from, where the PSF is no Gaussian. */
 static bst_status make_light(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
                              bst_scene_params *p, cl_mem *light) {
-    bst_fft_light_nodes nodes = {r->sources, r->table,         r->block_box.buffer, r->source_box.buffer,
-                                 r->shares,  p->source_groups, r->plan.fine};
+    bst_fft_light_nodes nodes = {r->sources,           r->table,  r->block_box.buffer,
+                                 r->source_box.buffer, r->shares, p->source_groups,
+                                 r->plan.fine};
     bst_fft_light_image image;
     BST_TRY(bst_fft_light_render(ctx, r->fft_light, r->queue, q->window, &nodes, &image));
     p->light_first = image.first;

@@ -17,7 +17,7 @@
 typedef struct bst_renderer bst_renderer;
 
 typedef struct bst_renderer_options {
-    double tolerance_sigma; /* error of each source's image in any pixel that is allowed, in sigma
+    double tolerance_sigma; /* error of the image in any pixel that is allowed, in sigma
                                of that pixel (0.05) */
     bst_rng_key pattern;    /* of the detector's fixed patterns */
     bst_star_motion motion; /* whose track the stars follow (BST_STAR_MOTION_AUTO) */

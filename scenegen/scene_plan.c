@@ -56,9 +56,9 @@ typedef struct planning {
     const bst_fft_light *fft_light;
     const bst_render_request *request;
     double dark_e2;
-    double beyond; /* light that a pixel gets of a source beyond the margin, s */
-    int blocks;    /* at most */
-    bool fine;     /* with the finer grid */
+    double beyond;     /* light that a pixel gets of a source beyond the margin, s */
+    int blocks;        /* at most */
+    bool fine;         /* with the finer grid */
     double grid_sigma; /* largest error by the grid */
 } planning;
 
@@ -75,8 +75,7 @@ static bst_status add_error(bst_ctx *ctx, planning *m, const bst_source *source)
         error.nodes_e += (float)(grid * sqrt((double)error.peak_e + m->dark_e2));
         const float *colour = source->colour;
         if (colour[0] != 0.0F || colour[1] != 0.0F || colour[2] != 0.0F) {
-            error.excess_e +=
-                (float)(presence * bst_fft_light_mixing_error(m->fft_light) * peak_e);
+            error.excess_e += (float)(presence * bst_fft_light_mixing_error(m->fft_light) * peak_e);
         }
     }
     return bst_crowd_add(ctx, m->crowd, &error);
@@ -118,7 +117,10 @@ static bst_status plan_sources(bst_ctx *ctx, bst_scene_plan *p, planning *m, boo
  * far as that helps; or, where there are too many nodes, at a larger one. */
 static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m, double tolerance,
                                     int most_blocks) {
-    enum { ROUNDS = 8 };
+    enum { ROUNDS = 8, CROWD = 500 };
+    /* So many stars have some so near each other that their errors add up: at half the tolerance
+     * they need not be planned twice. */
+    static const double CROWD_AIM = 0.45;
     /* LESS: below the part that the prediction asks for; GAIN: what a round or the next must bring,
      * as levels of detail go by halves; GRID_SHARE: of the tolerance, beyond which the grid is
      * worth its refinement */
@@ -126,8 +128,9 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
                         GRID_SHARE = 0.25, COARSER = 16.0, COARSEST = 1e9;
     int64_t nodes = BST_SCENE_MOST_NODES / BST_BLOCK + (int64_t)m->request->count;
     m->blocks = (int)(nodes < most_blocks ? nodes : most_blocks);
-    double aim = 1.0, before = INFINITY;
+    double aim = m->request->count > CROWD ? CROWD_AIM : 1.0, before = INFINITY;
     bool fits, coarse = false;
+    bst_smear_restart(m->smear, aim);
     BST_TRY(plan_sources(ctx, p, m, &fits));
     for (; !fits && aim < COARSEST; aim *= COARSER) {
         coarse = true;
@@ -174,7 +177,13 @@ bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera
     double least_e = q->background_e + (q->background ? q->background->least_e : 0.0);
     int binning = q->binning > 1 ? q->binning : 1;
     double dark_e2 = fmax(binning * binning * least_e + read * read, 1e-2);
-    bst_smear_frame frame = {q->track, q->window, limits->margin_px, binning, dark_e2, brightest};
+    bst_smear_frame frame = {.track = q->track,
+                             .window = q->window,
+                             .margin_px = limits->margin_px,
+                             .binning = binning,
+                             .sources = q->count,
+                             .dark_variance_e2 = dark_e2,
+                             .brightest_e_per_s = brightest};
     BST_TRY(bst_smear_begin(ctx, smear, &frame));
     planning m = {.smear = smear,
                   .crowd = crowd,

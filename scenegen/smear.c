@@ -2,7 +2,6 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "scenegen/kernels/deposit_shared.h"
@@ -17,9 +16,6 @@
 #define NODE_SHARE 0.85
 #define CUT_SHARE 0.3
 #define SINGLE_SHARE 0.1
-/* Errors of nodes are greatest beside the middle, where a bright source's own noise is less: those
- * of third order where the light is this share of the peak. */
-#define FLANK 0.76
 
 enum { TABLE_FLOATS = BST_TABLE_ROWS * BST_BLOCK, MAX_TAPS = BST_PLACE_TAPS };
 
@@ -166,9 +162,8 @@ static bst_status append_nodes(bst_ctx *ctx, bst_smear *s, const bst_node_list *
     int blocks = (list->count + BST_BLOCK - 1) / BST_BLOCK;
     BST_TRY(bst_smear_reserve(ctx, (void **)&s->table, &s->table_capacity, s->table_blocks + blocks,
                               TABLE_FLOATS * sizeof(float)));
-    *out = (bst_smear_level){.first_block = s->table_blocks,
-                             .blocks = blocks,
-                             .profile_error = profile_error(s, list)};
+    *out = (bst_smear_level){
+        .first_block = s->table_blocks, .blocks = blocks, .profile_error = profile_error(s, list)};
     double part = bst_nodes_error_part(list->items, list->count, s->sigma_px);
     for (int k = 0; k < BST_NODE_SCALES; k++) {
         out->error[k] = part * list->error[k];
@@ -226,11 +221,9 @@ double bst_smear_largest_share(bst_smear *s, double *read_share) {
     double share = bst_nodes_peak_share(s->nodes.items, s->nodes.count, s->share_sigma_px);
     *read_share = share;
     if (s->binning > 1) {
-        double spread, own,
-            pixel = bst_motion_pixel_share(s->share_sigma_px, s->binning, &spread);
+        double spread, own, pixel = bst_motion_pixel_share(s->share_sigma_px, s->binning, &spread);
         double wider = bst_motion_pixel_share(spread, 1, &own);
-        *read_share =
-            bst_nodes_peak_share(s->nodes.items, s->nodes.count, spread) * pixel / wider;
+        *read_share = bst_nodes_peak_share(s->nodes.items, s->nodes.count, spread) * pixel / wider;
     }
     return share;
 }
@@ -264,22 +257,12 @@ bst_status bst_smear_path_nodes(bst_ctx *ctx, bst_smear *s, const bst_path_point
 static bst_status make_level(bst_ctx *ctx, bst_smear *s, int n) {
     if (s->levels[n].blocks == 0) {
         bst_nodes_clear(&s->nodes);
-        BST_TRY(bst_smear_path_nodes(ctx, s, s->path, s->path_count, 1.0, !s->single,
-                                     s->tolerance[n]));
+        BST_TRY(
+            bst_smear_path_nodes(ctx, s, s->path, s->path_count, 1.0, !s->single, s->tolerance[n]));
         BST_TRY(append_nodes(ctx, s, &s->nodes, s->single ? shift_to_table : attitude_to_table,
                              &s->levels[n]));
     }
     return BST_OK;
-}
-
-/* Error of a star `from_boresight_px` away that follows the boresight's track, in sigma of its
- * worst pixel: a Gaussian of amplitude A on dark noise d changes by at most 0.86 / sigma of A /
- * sqrt(A + d^2) per px of shift, and by all of its light when it lies elsewhere. */
-static double single_error(const bst_smear *s, double peak_e, double from_boresight_px) {
-    double part = s->half_diagonal_px > 0.0 ? from_boresight_px / s->half_diagonal_px : 0.0;
-    double moved = s->spread_px * part * fmax(part, 1.0) * s->stretch;
-    return fmin(0.86 * moved / s->sigma_px * peak_e / sqrt(peak_e + s->dark_variance_e2),
-                peak_e / sqrt(s->dark_variance_e2));
 }
 
 /* Lets the stars share one track where that is asked for, or good enough for the brightest. */
@@ -299,7 +282,7 @@ static void choose_motion(bst_smear *s, double brightest_e_per_s) {
     double line = bst_reference_pixel_share(0.0, s->share_sigma_px, 0);
     double peak_e = brightest_e_per_s * s->duration_s * line * line * s->binning * s->binning;
     s->single = s->options.motion == BST_STAR_MOTION_SINGLE ||
-                (small && single_error(s, peak_e, s->half_diagonal_px) <=
+                (small && bst_smear_single_error(s, peak_e, s->half_diagonal_px) <=
                               SINGLE_SHARE * s->options.tolerance_sigma);
     for (int k = 0; s->single && k < s->path_count; k++) {
         bst_motion_to_shift(&s->path[k], scale, s->stretch, roll_px);
@@ -335,44 +318,21 @@ static bool stays_beside(const bst_smear *s, double x, double y) {
 static bst_status begin_map(bst_ctx *ctx, bst_smear *s) {
     double tilt = s->tilt_rad / bst_camera_scale_rad(&s->camera) * s->wide_field;
     double from = s->half_diagonal_px / s->stretch;
-    bst_motion_map_frame frame = {.nodes = s->nodes.items,
-                                  .count = s->nodes.count,
-                                  .table = s->table + (size_t)s->levels[0].first_block *
-                                                          TABLE_FLOATS,
-                                  .scale_rad = bst_camera_scale_rad(&s->camera),
-                                  .tilt_px = s->stretch * s->wide_field,
-                                  .roll_px = s->half_diagonal_px,
-                                  .reach_px = fmin(from + tilt, 4.0 * s->far_px),
-                                  .sensor_px = from + 6.0 * s->sigma_px,
-                                  .binning = s->binning,
-                                  .shrink = bst_camera_shrink(&s->camera),
-                                  .stretch = s->stretch,
-                                  .sigma_px = s->share_sigma_px};
+    bst_motion_map_frame frame = {
+        .nodes = s->nodes.items,
+        .count = s->nodes.count,
+        .table = s->table + (size_t)s->levels[0].first_block * TABLE_FLOATS,
+        .scale_rad = bst_camera_scale_rad(&s->camera),
+        .tilt_px = s->stretch * s->wide_field,
+        .roll_px = s->half_diagonal_px,
+        .reach_px = fmin(from + tilt, 4.0 * s->far_px),
+        .sensor_px = from + 6.0 * s->sigma_px,
+        .binning = s->binning,
+        .sources = s->sources,
+        .shrink = bst_camera_shrink(&s->camera),
+        .stretch = s->stretch,
+        .sigma_px = s->share_sigma_px};
     return bst_motion_map_begin(ctx, s->map, &frame);
-}
-
-/* The parts of bst_node_aim for a Gaussian: its derivatives and itself, means over the side of
- * `binning` pixels; integrals of Hermite functions are those of the order below. */
-static void find_pixel_parts(double sigma_px, int binning, double part[3]) {
-    enum { STEPS = 48 };
-    static const double greatest[3] = {1.0, 3.0, 15.0};
-    double half = 0.5 * binning / sigma_px, most[3] = {0.0};
-    for (int k = 0; k <= STEPS; k++) {
-        double at = 3.5 * k / STEPS, side[2][3];
-        for (int end = 0; end < 2; end++) {
-            double x = at + (end ? half : -half), y = x * x, g = exp(-0.5 * y);
-            side[end][0] = -x * g;
-            side[end][1] = -(y - 3.0) * x * g;
-            side[end][2] = -((y - 10.0) * y + 15.0) * x * g;
-        }
-        for (int n = 0; n < 3; n++) {
-            most[n] = fmax(most[n], fabs(side[1][n] - side[0][n]));
-        }
-    }
-    double peak = sqrt(2.0 * BST_PI) * erf(half / sqrt(2.0));
-    for (int n = 0; n < 3; n++) {
-        part[n] = most[n] / (greatest[n] * peak);
-    }
 }
 
 bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *frame) {
@@ -386,8 +346,9 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *fr
     if (s->options.node_sigma_px > 0.0) {
         memcpy(s->pixel_part, s->options.pixel_part[binned - 1], sizeof s->pixel_part);
     } else {
-        find_pixel_parts(s->sigma_px, s->binning, s->pixel_part);
+        bst_smear_find_pixel_parts(s->sigma_px, s->binning, s->pixel_part);
     }
+    s->sources = frame->sources;
     s->aim = 1.0;
     s->duration_s = track->time_s[track->count - 1];
     s->q_reference = attitude_at(track, 0.5 * s->duration_s);
@@ -459,11 +420,6 @@ int bst_smear_choose_level(const bst_smear *s, double scale) {
     return n;
 }
 
-/* A level's error for an image that moves by `scale` of the path, over the peak. */
-static double level_error(const bst_smear_level *level, double scale) {
-    return bst_nodes_error(level->error, scale) + level->profile_error;
-}
-
 /* The level for a star: from the one that its tolerance promises on, the first that keeps it. */
 static bst_status star_level(bst_ctx *ctx, bst_smear *s, double scale,
                              const bst_smear_level **out) {
@@ -471,7 +427,7 @@ static bst_status star_level(bst_ctx *ctx, bst_smear *s, double scale,
     int n = bst_smear_choose_level(s, scale);
     BST_TRY(make_level(ctx, s, n));
     while (n + 1 < BST_SMEAR_LEVELS && s->options.temporal_oversample <= 0 &&
-           level_error(&s->levels[n], scale) > allowed) {
+           bst_smear_level_error(&s->levels[n], scale) > allowed) {
         BST_TRY(make_level(ctx, s, ++n));
     }
     *out = &s->levels[n];
@@ -500,73 +456,6 @@ bool bst_smear_project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, do
     *x -= bst_camera_centre_x(&s->camera);
     *y -= bst_camera_centre_y(&s->camera);
     return fabs(*x) < 1e6 && fabs(*y) < 1e6;
-}
-
-/* Errors of the image of a source at (x, y), wherever it falls. */
-static void set_error(bst_smear *s, double x, double y, const bst_smear_level *level, double scale,
-                      int radius, double travel_px, bool moving) {
-    double lost = bst_stamp_excess(&s->stamp, radius), peak_e = s->last_read_e;
-    double error = level_error(level, scale) + s->chord_error;
-    int border = radius + 1 < MAX_TAPS / 2 ? radius + 1 : radius;
-    /* places in parts of a pixel, the way to the node in float, and some additions of light */
-    double rounded =
-        0.86 / s->sigma_px * (1.0 / s->place_parts + 0x1p-24 * travel_px) + 0x1p-22;
-    double shared = s->single && !moving ? single_error(s, peak_e, sqrt(x * x + y * y)) : 0.0;
-    double sigma_e = sqrt(peak_e + s->dark_variance_e2);
-    double flank = sigma_e / sqrt(FLANK * peak_e + s->dark_variance_e2);
-    /* a border crosses a pixel that is read along its side at most */
-    double tail = s->stamp.tail[border] * s->binning;
-    if (getenv("DBG2")) fprintf(stderr, "lev %d blocks %d err %.3g scale %.3g at1 %.3g profile %.3g chord %.3g rounded %.3g flank %.3g read %.4g single %d allowed %.3g\n", (int)(level - s->levels), level->blocks, level_error(level, scale), scale, bst_nodes_error(level->error,1.0), level->profile_error, s->chord_error, rounded, flank, peak_e, s->single, bst_smear_allowed(s, peak_e));
-    s->last_error =
-        (bst_crowd_source){.x_px = (float)x,
-                           .y_px = (float)y,
-                           .peak_e = (float)peak_e,
-                           .nodes_e = (float)((flank * error + rounded) * peak_e),
-                           .shared_e = (float)(shared * sigma_e),
-                           .excess_e = (float)(lost * peak_e),
-                           .border_e = (float)(s->last_peak_e * tail),
-                           .apart = moving && travel_px > s->travel_px};
-}
-
-/* Beyond this many sigma of a node its errors fall: those of a Gaussian, the sixth derivative of
- * which is 0.07 of its greatest there, by more than the sixth power of the distance, those in the
- * wings of diffraction by the third. */
-#define NEAR_SIGMAS 3.0
-
-/* What of the last source's errors reaches the window, from where its places lie. */
-static void bring_to_window(bst_smear *s, double x, double y, const double low[2],
-                            const double high[2], int radius) {
-    bst_crowd_source *e = &s->last_error;
-    bool gaussian = s->options.node_sigma_px <= 0.0;
-    s->last_presence = 1.0;
-    s->last_leaves = true;
-    if (bst_camera_distorted(&s->camera)) {
-        return;
-    }
-    double px = x + bst_camera_centre_x(&s->camera) - s->window.x0,
-           py = y + bst_camera_centre_y(&s->camera) - s->window.y0;
-    double far = s->margin_px - 1.0;
-    s->last_leaves = px + low[0] < -far || py + low[1] < -far ||
-                     px + high[0] > s->window.width - 1.0 + far ||
-                     py + high[1] > s->window.height - 1.0 + far;
-    double gap_x = fmax(px + low[0] - s->window.width, -1.0 - px - high[0]),
-           gap_y = fmax(py + low[1] - s->window.height, -1.0 - py - high[1]);
-    double gap = fmax(gap_x, gap_y), near = NEAR_SIGMAS * s->sigma_px;
-    if (gap <= near) {
-        return;
-    }
-    double presence = gaussian ? 0.1 * pow(near / gap, 6.0) : 0.3 * pow(near / gap, 3.0);
-    /* there is none of its light's noise */
-    if (presence * sqrt((double)e->peak_e + s->dark_variance_e2) > sqrt(s->dark_variance_e2)) {
-        return;
-    }
-    s->last_presence = presence;
-    e->nodes_e *= (float)presence;
-    e->shared_e *= (float)presence;
-    e->peak_e = 0.0f;
-    if (gaussian && gap > radius + 2.0) {
-        e->excess_e = 0.0f;
-    }
 }
 
 bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source,
@@ -629,8 +518,17 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
         BST_TRY(star_level(ctx, s, scale, &used));
     }
     int radius = choose_radius(s, s->last_peak_e * s->binning);
-    set_error(s, x, y, used, scale, radius, travel_px, moving);
-    bring_to_window(s, x, y, low, high, radius);
+    bst_smear_drawn drawn = {.x = x,
+                             .y = y,
+                             .scale = scale,
+                             .travel_px = travel_px,
+                             .level = used,
+                             .radius = radius,
+                             .moving = moving};
+    memcpy(drawn.low, low, sizeof low);
+    memcpy(drawn.high, high, sizeof high);
+    bst_smear_set_error(s, &drawn);
+    bst_smear_bring_to_window(s, &drawn);
     double parts = s->place_parts;
     /* what the stamp leaves out is put on the stamp, so that no light is lost */
     electrons /= s->stamp.kept[radius] * s->stamp.kept[radius];

@@ -44,6 +44,7 @@ typedef struct bst_smear_frame {
     const bst_los_track *track; /* needed until the frame's last source */
     bst_window window;          /* of the sensor */
     double margin_px;           /* from which a source outside the window can still light it */
+    int sources;                /* how many there will be */
     int binning;                /* of the pixels that are read, 1 or more */
     double dark_variance_e2;    /* noise of a dark one: background, dark and read noise */
     double brightest_e_per_s;   /* of the stars */

@@ -8,6 +8,10 @@
 #include "scenegen/smear.h"
 #include "scenegen/stamp.h"
 
+/* Errors of nodes are greatest beside the middle, where a bright source's own noise is less: those
+ * of third order where the light is this share of the peak. */
+#define FLANK 0.76
+
 /* Fidelities: level n is right to about 0.08 * 2^-n of the smeared image's peak. */
 enum { BST_SMEAR_LEVELS = 14 };
 
@@ -34,7 +38,7 @@ struct bst_smear {
     bst_los_track track;
     bst_window window;
     double margin_px, dark_variance_e2, duration_s;
-    int binning;
+    int binning, sources;
     double pixel_part[3]; /* as in bst_node_aim */
     double aim;           /* part of the tolerance */
     bst_quat q_reference;
@@ -44,10 +48,10 @@ struct bst_smear {
     double tilt_rad, roll_rad; /* most of the camera's turn from the reference attitude */
     /* largest share of a star's light on one pixel and on one that is read, of one track */
     double star_share, read_share;
-    bst_motion_map *map;       /* the same, and more, of stars on tracks of their own */
-    bool single;               /* stars share one track */
-    double spread_px;          /* by which stars in the corners move otherwise */
-    double travel_px;          /* largest distance of a node from its source's place */
+    bst_motion_map *map; /* the same, and more, of stars on tracks of their own */
+    bool single;         /* stars share one track */
+    double spread_px;    /* by which stars in the corners move otherwise */
+    double travel_px;    /* largest distance of a node from its source's place */
     double last_peak_e, last_read_e, last_presence;
     bool last_leaves;
     double chord_error;     /* of the last source's path, over its peak */
@@ -92,9 +96,34 @@ double bst_smear_allowed(const bst_smear *s, double peak_e);
 int bst_smear_choose_level(const bst_smear *s, double scale);
 
 /* Makes the scratch nodes of a source that moves by itself, changes or is a disc, relative to the
- * place (x, y), last_peak_e and last_read_e; none when it gives the sensor no light. electrons: in the
- * exposure. */
+ * place (x, y), last_peak_e and last_read_e; none when it gives the sensor no light. electrons: in
+ * the exposure. */
 bst_status bst_smear_moving_nodes(bst_ctx *ctx, bst_smear *s, const bst_source *source,
                                   double electrons, double x, double y) BST_MUST_CHECK;
+
+/* The parts of bst_node_aim for a Gaussian whose pixels are binned. */
+void bst_smear_find_pixel_parts(double sigma_px, int binning, double part[3]);
+
+/* A level's error for an image that moves by `scale` of the path, over the peak. */
+double bst_smear_level_error(const bst_smear_level *level, double scale);
+
+/* Error of a star so far from the boresight that follows its track, in sigma of its worst pixel. */
+double bst_smear_single_error(const bst_smear *s, double peak_e, double from_boresight_px);
+
+/* The last source's drawing: its place (px from the boresight), nodes, and motion over theirs. */
+typedef struct bst_smear_drawn {
+    double x, y, scale, travel_px;
+    double low[2], high[2]; /* box of its places about (x, y) */
+    const bst_smear_level *level;
+    int radius; /* of the stamp */
+    bool moving;
+} bst_smear_drawn;
+
+/* Sets last_error of the image of that source, wherever it falls. */
+void bst_smear_set_error(bst_smear *s, const bst_smear_drawn *d);
+
+/* What of those errors reaches the window, from where the source's places lie: lowers last_error,
+ * sets last_presence and last_leaves. */
+void bst_smear_bring_to_window(bst_smear *s, const bst_smear_drawn *d);
 
 #endif

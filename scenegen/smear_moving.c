@@ -106,8 +106,8 @@ static bst_status own_nodes(bst_ctx *ctx, bst_smear *s, int count, double x0, do
         if (last > first) {
             int n = s->nodes.count;
             double part = total > 0.0 ? (p[last].s - p[first].s) / total : 1.0;
-            BST_TRY(bst_smear_path_nodes(ctx, s, p + first, last - first + 1, part, false,
-                                         tolerance));
+            BST_TRY(
+                bst_smear_path_nodes(ctx, s, p + first, last - first + 1, part, false, tolerance));
             for (; n < s->nodes.count && part < 1.0; n++) {
                 s->nodes.items[n].weight *= part;
             }

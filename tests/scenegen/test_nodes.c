@@ -224,7 +224,7 @@ static void no_duration_is_one_node(void **state) {
 static void peak_shares(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    bst_node point = {{0, 0, 0}, 1.0, 0.0};
+    bst_node point = {{0, 0, 0}, 1.0, 0.0, 0.0};
     double line = erf(0.5 / (sigma_px * sqrt(2.0)));
     bst_assert_close(bst_nodes_peak_share(&point, 1, sigma_px), line * line, 1e-15);
     const bst_path_point path[] = {{{0, 0, 0}, 0.0}, {{50, 0, 0}, 1.0}};
