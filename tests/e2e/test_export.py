@@ -208,6 +208,49 @@ class Exported(unittest.TestCase):
             self.assertAlmostEqual(math.dist(rays[0], rays[2]) / 2, math.sin(math.atan(half)),
                                    delta=1e-7)
 
+    def test_orbits_of_what_was_seen(self):
+        """Of a large catalogue only what came into a field, and what is asked for."""
+        made, out = os.path.join(runs.scratch(), "many"), self.out()
+        runs.run("scenarios/constellation_quick.json", made, duration=20)
+        rows = runs.database(made).execute
+        seen = {row[0] for row in rows(
+            "SELECT o.name FROM truth t JOIN objects o ON o.id = t.id"
+            " WHERE t.kind = 'object' AND t.in_field = 1"
+            " UNION SELECT name FROM sightings UNION SELECT target FROM sensors")} - {"", None}
+        observers = ["neossat", "stss1", "stss2", "geo1", "geo2"]
+        self.assertGreater(len(seen), 3)
+
+        def objects(*words):
+            said = export(made, "--orbits", "oem", "--step", "10", "--out", out, *words)
+            names = [meta["OBJECT_NAME"] for meta, _ in read_oem(out + "/orbits.oem")]
+            self.assertEqual(names[:5], observers)
+            return names[5:], said
+
+        names, said = objects()
+        self.assertEqual(set(names), seen)
+        self.assertIn(f"{5018 - len(seen)} objects that came into no field are left out", said)
+        self.assertEqual(objects("--objects", "seen")[0], names)
+        # by name or number, in the scenario's order, each once
+        number = rows("SELECT norad FROM objects WHERE name = ?", (names[1],)).fetchone()[0]
+        self.assertEqual(objects("--objects", f"{names[2]}, {number},{names[1]}")[0], names[1:3])
+        failed = call("export", made, "--orbits", "czml", "--objects", f"{number},NOBODY", "--out",
+                      out)
+        self.assertEqual(failed.returncode, 1)
+        self.assertIn('no object "NOBODY" among its 5018', failed.stderr)
+        export(made, "--orbits", "czml", "--out", out)
+        with open(out + "/orbits.czml", encoding="utf-8") as file:
+            packets = json.load(file)
+        self.assertEqual({p["name"] for p in packets if p["id"].startswith("object/")}, seen)
+        failed = call("export", made, "--table", "csv", "--objects", "all", "--out", out)
+        self.assertEqual(failed.returncode, 2)
+        # a small scenario is written whole, seen or not
+        self.assertEqual(len(read_oem(self.all_orbits())), 2)
+
+    def all_orbits(self):
+        out = self.out()
+        self.assertNotIn("left out", export(self.made, "--orbits", "oem", "--out", out))
+        return out + "/orbits.oem"
+
     def test_segments_meet_at_burns(self):
         """An OEM's reader must not interpolate over a jump of velocity."""
         folder = runs.scratch()
