@@ -456,7 +456,7 @@ class Exported(unittest.TestCase):
         folder = runs.scratch()
         schema = json.loads(call("schema").stdout)
         extensions = "/record/frames=extensions"
-        kinds = {"raw": (extensions,), "cube": ("/record/frames=cube",)}
+        kinds = {"raw": (extensions, "/record/compression=none"), "cube": ("/record/frames=cube",)}
         if "compression" in schema["properties"]["record"]["properties"]:
             kinds["rice"] = (extensions, "/record/compression=rice")
         pictures = {}
