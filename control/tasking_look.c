@@ -126,8 +126,7 @@ bst_status bst_tasking_look(bst_ctx *ctx, const bst_tasking *t, int sensor, int 
     bst_state eye;
     bst_bodies bodies;
     *snr = 0.0;
-    int own = bst_knowledge_own_norad(s->knowledge);
-    if (own != 0 && own == bst_knowledge_object(s->knowledge, object)->norad) {
+    if (bst_knowledge_is_itself(s->knowledge, object)) {
         *why = BST_WHY_ITSELF;
         return BST_OK;
     }

@@ -79,7 +79,12 @@ bool bst_frame_observer(const bst_tracker *t, const bst_nav_telemetry *nav, doub
     double dt = seconds - (double)nav->tick / t->tick_rate_hz;
     out->time_s = seconds;
     out->earth_bary_mps = bst_vec3_sub(nav->velocity_bary_mps, nav->velocity_gcrf_mps);
-    return bst_kepler_propagate(&quiet, BST_EARTH_MU_M3PS2, nav->position_gcrf_m,
-                                nav->velocity_gcrf_mps, dt, &out->position_m,
-                                &out->velocity_mps) == BST_OK;
+    if (bst_kepler_propagate(&quiet, BST_EARTH_MU_M3PS2, nav->position_gcrf_m,
+                             nav->velocity_gcrf_mps, dt, &out->position_m,
+                             &out->velocity_mps) != BST_OK) {
+        /* at rest, or straight up: no orbit; frames are a second apart or so */
+        out->position_m = bst_vec3_axpy(nav->position_gcrf_m, dt, nav->velocity_gcrf_mps);
+        out->velocity_mps = nav->velocity_gcrf_mps;
+    }
+    return isfinite(bst_vec3_norm(out->position_m)) && bst_vec3_norm(out->position_m) > 0.0;
 }

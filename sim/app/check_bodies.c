@@ -67,7 +67,8 @@ static gaze gaze_of(const bst_scenario *scenario, looking *l) {
         return l->object >= 0 || l->ideal->target == BST_IDEAL_DIRECTION ? GAZE_IDEAL
                                                                          : GAZE_UNKNOWN;
     }
-    if (!gimbal || !control || has_tasking(scenario) || control->desc->config != bst_control_config_table ||
+    if (!gimbal || !control || has_tasking(scenario) ||
+        control->desc->config != bst_control_config_table ||
         strcmp(gimbal->desc->type, "scripted") == 0 ||
         strcmp(gimbal->desc->type, "external") == 0) {
         return GAZE_UNKNOWN;
@@ -263,14 +264,4 @@ bst_status bst_check_bodies(bst_ctx *ctx, const bst_scenario *scenario,
         }
     }
     return BST_OK;
-}
-
-void bst_warn_of_bodies(bst_ctx *ctx, const char *scope, const bst_loop_figures *f) {
-    const int64_t frames[BST_FIELD_BODIES] = {f->earth_frames, f->moon_frames, f->sun_frames};
-    for (int b = 0; b < BST_FIELD_BODIES; b++) {
-        if (frames[b] > 0) {
-            bst_log(ctx, BST_LOG_WARNING, "%s: the %s is in %lld of %lld frames", scope,
-                    body_names[b], (long long)frames[b], (long long)f->frames);
-        }
-    }
 }

@@ -1,10 +1,9 @@
-/* When the Earth, the Moon or the Sun is in a sensor's field: foreseen without simulating, and
- * counted after a run. */
+/* When the Earth, the Moon or the Sun is in a sensor's field, foreseen without simulating. */
 #ifndef BST_APP_CHECK_BODIES_H
 #define BST_APP_CHECK_BODIES_H
 
 #include "sim/engine/simulation.h"
-#include "sim/eval/loop_summary.h"
+#include "sim/world/world.h"
 
 typedef enum bst_field_body {
     BST_FIELD_EARTH,
@@ -39,8 +38,5 @@ bst_status bst_check_bodies_in_field(bst_ctx *ctx, const bst_scenario *scenario,
  * number and sum of all. */
 bst_status bst_check_bodies(bst_ctx *ctx, const bst_scenario *scenario,
                             const bst_simulation *simulation) BST_MUST_CHECK;
-
-/* Logs a warning for each body that was in frames of a sensor. */
-void bst_warn_of_bodies(bst_ctx *ctx, const char *scope, const bst_loop_figures *figures);
 
 #endif

@@ -92,9 +92,6 @@ static void take_summary(bst_report_sensor *s, const cJSON *summary) {
                   {"wrong_target_frames", &f->wrong_target_frames},
                   {"pointing_frames", &f->pointing_frames},
                   {"bad_pixels", &s->bad_pixels},
-                  {"earth_frames", &f->earth_frames},
-                  {"moon_frames", &f->moon_frames},
-                  {"sun_frames", &f->sun_frames},
                   {"track_frames", &s->track_frames}};
     for (size_t k = 0; k < sizeof reals / sizeof *reals; k++) {
         take_real(summary, reals[k].key, reals[k].value);

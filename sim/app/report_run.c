@@ -350,7 +350,7 @@ static bst_status put_page(bst_ctx *ctx, page *p) {
     }
     BST_TRY(put_events(ctx, p));
     fprintf(p->out,
-            "<p class=\"note\">Made by Boresight %s. boresight info tells the folder's tables and "
+            "<p class=\"note\">Made by Boresight %s. boresight info lists the folder's tables and "
             "files, boresight export takes them out.</p>\n",
             bst_version());
     bst_page_end(p->out);

@@ -154,14 +154,14 @@ static void add_tables(const bst_run_reader *run, const bst_report_sensor *senso
     } checks[] = {
         {"SELECT count(*) FROM mount WHERE sensor = ?1 AND"
          " ((axis0_flags | axis1_flags | axis2_flags) & 1) = 1",
-         BST_SEVERITY_PROBLEM, "Rows of telemetry that tell of a stuck axis"},
+         BST_SEVERITY_PROBLEM, "Rows of telemetry with a stuck axis"},
         {"SELECT count(*) FROM exposures WHERE sensor = ?1 AND error_sigma > 0.3",
          BST_SEVERITY_WARNING,
          "Frames rendered with an expected error above 0.3 of a pixel's noise"},
         {"SELECT count(*) FROM pointing WHERE sensor = ?1 AND limited = 1", BST_SEVERITY_WARNING,
-         "Rows of telemetry that tell of an axis at a limit"},
+         "Rows of telemetry with an axis at a limit"},
         {"SELECT count(*) FROM mount WHERE sensor = ?1 AND wheels_saturated = 1",
-         BST_SEVERITY_WARNING, "Rows of telemetry that tell of saturated reaction wheels"},
+         BST_SEVERITY_WARNING, "Rows of telemetry with saturated reaction wheels"},
         {"SELECT count(*) FROM exposures WHERE sensor = ?1 AND hits > 0", BST_SEVERITY_NOTE,
          "Frames with radiation hits"},
     };
@@ -185,14 +185,14 @@ static void add_events(const bst_run_reader *run, bst_warnings *w) {
         bst_severity severity;
         const char *text;
     } known[] = {
-        {"mode", -1, ""}, /* told by the charts */
+        {"mode", -1, ""}, /* shown by the charts */
         {"target_selected", -1, ""},
         {"track_confirmed", -1, ""},
         {"track_resumed", -1, ""},
         {"target_lost", BST_SEVERITY_WARNING, "the track of the target was given up"},
         {"track_lost", BST_SEVERITY_NOTE, "a track was given up"},
         {"attitude_lost", BST_SEVERITY_WARNING, "stars no longer gave an attitude"},
-        {"guidance", BST_SEVERITY_NOTE, "guidance told of what is out of reach"},
+        {"guidance", BST_SEVERITY_NOTE, "guidance announced what is out of reach"},
         {"wheels", BST_SEVERITY_WARNING, "reaction wheels came to a limit, or left it"},
         {"star_trackers", BST_SEVERITY_WARNING, "star trackers lost the stars, or found them"},
         {"manoeuvre", BST_SEVERITY_NOTE, "the tracker noticed a manoeuvre"},

@@ -7,7 +7,6 @@
 #include <cjson/cJSON.h>
 
 #include "sim/app/app.h"
-#include "sim/app/check_bodies.h"
 #include "sim/app/json_number.h"
 #include "sim/app/plugins.h"
 #include "sim/app/run_link.h"
@@ -460,9 +459,6 @@ static bst_status step_through(run_state *run, bst_simulation *sim, double *wall
     ctx->warnings += run->hooks.warnings;
     for (int i = 0; i < run->sensor_count; i++) {
         bst_loop_summary_finish(run->sensors[i].summary);
-        bst_loop_figures figures;
-        bst_loop_summary_figures(run->sensors[i].summary, &figures);
-        bst_warn_of_bodies(ctx, run->sensors[i].scope, &figures);
     }
     show_progress(run, bst_engine_tick(bst_simulation_engine(sim)), true);
     return status;

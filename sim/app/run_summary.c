@@ -35,9 +35,9 @@ cJSON *bst_run_summary_json(const bst_run_sensor_figures *figures, double real_t
     bst_json_add_number(node, "pointing_p95_px", f->pointing_p95_px);
     bst_json_add_number(node, "pointing_max_px", f->pointing_max_px);
     bst_json_add_number(node, "pointing_bias_px", f->pointing_bias_px);
-    add_count(node, "earth_frames", f->earth_frames);
-    add_count(node, "moon_frames", f->moon_frames);
-    add_count(node, "sun_frames", f->sun_frames);
+    add_count(node, "earth_frames", m->losses.earth_frames);
+    add_count(node, "moon_frames", m->losses.moon_frames);
+    add_count(node, "sun_frames", m->losses.sun_frames);
     add_count(node, "detections", m->detections);
     bst_json_add_number(node, "detected_fraction", m->detected_fraction);
     add_count(node, "track_frames", m->track_frames);

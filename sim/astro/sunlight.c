@@ -1,5 +1,5 @@
 #include "sim/astro/earth_limb.h"
-#include "sim/astro/limb_table.h"
+#include "sim/astro/limb_table.inc"
 
 const double bst_sunlight_wavelength_m[BST_SUNLIGHT_COLOURS] = {0.40e-6, 0.55e-6, 0.70e-6, 1.00e-6};
 

@@ -163,8 +163,7 @@ static bst_status read_list(const reader *r, const cJSON *value, const char *pat
 static bst_status read_seed(const reader *r, const cJSON *value, const char *path, uint64_t *out) {
     const char *allowed =
         "a hexadecimal string such as \"0x1F\" or a decimal one such as \"31\", up to 64 bits, or "
-        "an "
-        "integer from 0 to 9007199254740992";
+        "an integer from 0 to 9007199254740992";
     /* integers up to 2^53 are exact in JSON's numbers */
     if (cJSON_IsNumber(value) && value->valuedouble >= 0.0 && value->valuedouble <= 0x1p53 &&
         value->valuedouble == floor(value->valuedouble)) {
@@ -172,7 +171,12 @@ static bst_status read_seed(const reader *r, const cJSON *value, const char *pat
         return BST_OK;
     }
     if (!cJSON_IsString(value)) {
-        return wrong(r, path, value, cJSON_IsNumber(value) ? "not a seed" : "wrong type", allowed);
+        bool whole = cJSON_IsNumber(value) && value->valuedouble == floor(value->valuedouble);
+        return wrong(r, path, value,
+                     whole                   ? "out of range"
+                     : cJSON_IsNumber(value) ? "not an integer"
+                                             : "wrong type",
+                     allowed);
     }
     const char *text = value->valuestring;
     bool hexadecimal = strncmp(text, "0x", 2) == 0;

@@ -210,9 +210,6 @@ bst_status bst_loop_summary_truth(bst_ctx *ctx, bst_loop_summary *s, const bst_t
     }
     f->settled = s->settle_tick >= 0;
     s->figures.frames++;
-    s->figures.earth_frames += truth->earth_fraction > 0.0;
-    s->figures.moon_frames += truth->moon_fraction > 0.0;
-    s->figures.sun_frames += truth->sun_fraction > 0.0;
     s->newest = *f;
     s->newest.in_track = s->last_in_track;
     s->next++;

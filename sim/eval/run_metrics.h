@@ -18,6 +18,7 @@ typedef struct bst_run_losses {
     int64_t dropped_frames;               /* lost between camera and image processing */
     int64_t no_stars_frames;              /* processed, and no star was identified */
     int64_t no_attitude_frames;           /* seen by the tracker without an attitude from stars */
+    int64_t earth_frames, moon_frames, sun_frames; /* covered in part by that body's disc */
 } bst_run_losses;
 
 typedef struct bst_run_metric_figures {

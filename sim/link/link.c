@@ -217,6 +217,7 @@ static const char *const event_names[LINK_EVENTS] = {
     [LINK_STRANGER] = "link_stranger",
     [LINK_REFUSED] = "link_refused",
     [LINK_FLOODED] = "link_flooded",
+    [LINK_OVERSIZED] = "link_oversized",
     [LINK_NO_KEY] = "link_no_key",
     [LINK_TAKEOVER] = "link_takeover",
     [LINK_HELLO_TAKEN] = "link_hello",

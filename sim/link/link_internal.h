@@ -20,6 +20,12 @@ enum {
     LINK_FLOOD = 10000,            /* messages of a peer in a step, after which it is not heard */
     LINK_QUEUE = 64,               /* messages that wait in each direction, per peer */
     LINK_MESSAGE_BYTES = 16 << 20, /* of a part that a peer sends; beyond, it is disconnected */
+    /* received by TCP and not taken, whole messages or parts of one: beyond, the worst connection
+       is closed. The answer to a step is a few MiB at most. */
+    LINK_WAITING_BYTES = 64 << 20,
+    LINK_WAITING_ALL = 256 << 20,
+    LINK_LOOK_MS = 10, /* between looks at them while waiting */
+    LINK_FLOWS = 256,  /* connections at a time */
     LINK_ID_BYTES = 255,
     LINK_AHEAD = 2, /* steps of a part that its peer may have to answer, where answers are not
                        awaited */
@@ -39,7 +45,8 @@ typedef enum link_event {
     LINK_STRANGER,
     LINK_REFUSED,
     LINK_FLOODED,
-    LINK_NO_KEY, /* peers without the keys that the link asks for */
+    LINK_OVERSIZED, /* more bytes that are not taken than allowed */
+    LINK_NO_KEY,    /* peers without the keys that the link asks for */
     LINK_TAKEOVER,
     LINK_HELLO_TAKEN,
     LINK_LEFT,
@@ -76,6 +83,12 @@ typedef struct link_answer {
     int output_count, taken;
 } link_answer;
 
+/* A connection by TCP, and the bytes of it that have been taken. */
+typedef struct link_flow {
+    int fd;
+    int64_t taken;
+} link_flow;
+
 typedef struct link_part {
     bst_link_part about;
     int peer; /* -1: none */
@@ -103,6 +116,9 @@ struct bst_link {
     void *context, *router, *monitor;
     void *asker; /* where ZeroMQ asks about peers' keys; NULL: there are none */
     bst_curve_keys keys;
+    link_flow flows[LINK_FLOWS];
+    int flow_count;
+    double flow_looked; /* wall time */
     bst_ipc_socket ipc; /* path "": none */
     bst_shared_frames *shared;
     link_peer peers[LINK_PEERS];
@@ -162,6 +178,14 @@ bool bst_link_send_end(bst_link *link, int peer, uint8_t *room);
 /* An `error` in answer to a message. */
 void bst_link_reply(bst_link *link, const link_id *id, link_peer *peer, const char *fault,
                     int64_t sequence, const char *text);
+/* link_flow.c */
+/* Connections come and go; a part is taken; and the one that sends too much is closed. */
+void bst_link_flow_open(bst_link *link, int fd);
+void bst_link_flow_close(bst_link *link, int fd);
+void bst_link_flow_take(bst_link *link, zmq_msg_t *part);
+void bst_link_flow_check(bst_link *link, bst_ctx *ctx);
+/* Whether there are connections to be looked at while waiting. */
+bool bst_link_flow_watched(const bst_link *link);
 /* link_receive.c */
 /* Waits up to wait_ms for one message and takes it, or says what is wrong with it. */
 bst_status bst_link_take(bst_link *link, link_exchange *x, int wait_ms) BST_MUST_CHECK;

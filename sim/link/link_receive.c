@@ -427,6 +427,7 @@ static bool receive(bst_link *link, message *m) {
             break;
         }
         more = zmq_msg_more(part);
+        bst_link_flow_take(link, part);
         if (part == &spare) {
             m->more = true;
             zmq_msg_close(&spare);
@@ -452,7 +453,14 @@ static void watch(bst_link *link) {
             return;
         }
         uint16_t kind;
+        int32_t fd;
         memcpy(&kind, event, sizeof kind);
+        memcpy(&fd, event + sizeof kind, sizeof fd);
+        if (kind == ZMQ_EVENT_ACCEPTED) {
+            bst_link_flow_open(link, fd);
+        } else {
+            bst_link_flow_close(link, fd);
+        }
         link->counts[kind == ZMQ_EVENT_ACCEPTED ? LINK_CONNECTED : LINK_DISCONNECTED]++;
     }
 }
@@ -461,6 +469,10 @@ bst_status bst_link_take(bst_link *link, link_exchange *x, int wait_ms) {
     zmq_pollitem_t items[3] = {{.socket = link->router, .events = ZMQ_POLLIN},
                                {.socket = link->monitor, .events = ZMQ_POLLIN},
                                {.socket = link->asker, .events = ZMQ_POLLIN}};
+    /* parts of a message that never ends wake nobody up */
+    if (bst_link_flow_watched(link) && wait_ms > LINK_LOOK_MS) {
+        wait_ms = LINK_LOOK_MS;
+    }
     int ready = zmq_poll(items, link->asker ? 3 : 2, wait_ms);
     if (ready < 0 && errno != EINTR) {
         return bst_fail(x->ctx, BST_ERR_IO, "link: %s", zmq_strerror(errno));
@@ -472,6 +484,7 @@ bst_status bst_link_take(bst_link *link, link_exchange *x, int wait_ms) {
         bst_curve_answer(link->asker, &link->keys)) {
         bst_link_event(link, x->ctx, LINK_NO_KEY, "a peer that has not the keys is refused");
     }
+    bst_link_flow_check(link, x->ctx);
     message m;
     x->quiet = true;
     if (ready > 0 && items[0].revents && receive(link, &m)) {

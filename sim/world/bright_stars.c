@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-#include "sim/world/bright_stars_table.h"
+#include "sim/world/bright_stars_table.inc"
 
 bool bst_bright_star(uint32_t id, float *v_mag, float *b_minus_v) {
     int low = 0, high = (int)(sizeof bright_stars / sizeof *bright_stars) - 1;

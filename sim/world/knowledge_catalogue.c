@@ -16,8 +16,10 @@ int bst_knowledge_find_object(const bst_knowledge *k, const char *name) {
     return bst_world_find_object(k->world, name);
 }
 
-int bst_knowledge_own_norad(const bst_knowledge *k) {
-    return k->world->observers[k->observer].norad;
+bool bst_knowledge_is_itself(const bst_knowledge *k, int object) {
+    const world_observer *own = &k->world->observers[k->observer];
+    return object == own->own_object ||
+           (own->norad != 0 && own->norad == k->world->objects[object].info.norad);
 }
 
 bool bst_knowledge_apsides(bst_knowledge_view *view, int object, double *perigee_m,

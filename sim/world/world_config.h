@@ -9,7 +9,16 @@
 #include "sim/world/camera.h"
 #include "sim/world/region.h"
 
-enum { BST_ORBIT_SGP4, BST_ORBIT_RELATIVE, BST_ORBIT_OEM, BST_ORBIT_INJECTED, BST_ORBIT_NUMERICAL };
+enum {
+    BST_ORBIT_SGP4,
+    BST_ORBIT_RELATIVE,
+    BST_ORBIT_OEM,
+    BST_ORBIT_INJECTED,
+    BST_ORBIT_NUMERICAL,
+    BST_ORBIT_CONSTELLATION
+};
+
+enum { BST_WALKER_DELTA, BST_WALKER_STAR };
 
 enum { BST_STATES_GCRF, BST_STATES_TEME };
 
@@ -56,7 +65,9 @@ typedef struct bst_orbit_config {
     char oem_object[64];
     char states_file[512]; /* injected: path as above */
     char states_object[64];
-    int32_t states_frame; /* BST_STATES_... */
+    int32_t states_frame;   /* BST_STATES_... */
+    char constellation[40]; /* constellation: its name */
+    double member[2];       /* plane and slot, from 1 */
     /* numerical */
     bst_initial_state_config state;
     bst_force_config forces;
@@ -84,6 +95,18 @@ typedef struct bst_catalogue_config {
     bst_brightness_config brightness;
 } bst_catalogue_config;
 
+/* A Walker constellation, each satellite of which becomes an object (constellation.h). */
+typedef struct bst_constellation_config {
+    char name[40];
+    int32_t pattern; /* BST_WALKER_... */
+    int64_t satellites, planes, phasing;
+    double inclination_deg, semi_major_axis_m, eccentricity;
+    double raan_deg, arg_perigee_deg, mean_anomaly_deg; /* of satellite 1-1 */
+    double at_s;
+    double area_m2, albedo;
+    bst_brightness_config brightness;
+} bst_constellation_config;
+
 enum { BST_FAINT_NONE, BST_FAINT_STATISTICAL };
 
 struct bst_stars;
@@ -97,6 +120,7 @@ typedef struct bst_world_config {
     bool shadow_atmosphere;      /* the air bends, reddens and weakens light at the shadow's edge */
     bst_config_list objects;     /* bst_object_config */
     bst_config_list catalogues;  /* bst_catalogue_config */
+    bst_config_list constellations; /* bst_constellation_config */
     /* not in the table: star_catalogue, open already, which outlives the world; NULL: it is opened
      */
     const struct bst_stars *opened_stars;

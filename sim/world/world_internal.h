@@ -63,7 +63,8 @@ typedef struct world_sensor {
 
 typedef struct world_observer {
     char name[64];
-    int norad; /* 0: none */
+    int norad;      /* 0: none */
+    int own_object; /* that this observer is, of a constellation; -1: none */
     bst_orbit orbit;
     world_sensor *sensors;
     int sensor_count;

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes sim/astro/limb_table.h: what the atmosphere does to a ray that grazes the Earth.
+"""Makes sim/astro/limb_table.inc: what the atmosphere does to a ray that grazes the Earth.
 
 Density: U.S. Standard Atmosphere 1976, equations 33 to 42, to 86 km; above, exponential with the
 last scale height. Ozone: 300 Dobson units as a Gaussian layer at 22 km, 5 km wide (1 sigma).

@@ -38,8 +38,18 @@ def ipc():
 
 def start_run(scenario, out, address, external, *more, duration=SECONDS, frames=False):
     words = runs.command(scenario, out, *([] if frames else [runs.NO_FRAMES]), duration=duration)
+    words.remove("--quiet")  # it says when it waits for peers
     return subprocess.Popen(words + ["--link", address, "--external", external, *more],
                             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def wait_until_open(run):
+    """Returns when the run waits for its peers."""
+    line = run.stderr.readline()
+    while "waiting for peers" not in line:
+        if not line:
+            raise AssertionError(f"{run.args}: ended before it waited for peers")
+        line = run.stderr.readline()
 
 
 def serve(scenario, address, part, *more):
@@ -277,7 +287,7 @@ class Examples(unittest.TestCase):
                       (truth["snr"] > 30) & (truth["saturated"] == 0) &
                       (np.hypot(truth["x_end_px"] - truth["x_start_px"],
                                 truth["y_end_px"] - truth["y_start_px"]) < 3))
-            for x, y in zip(truth["x_mean_px"][bright], truth["y_mean_px"][bright]):
+            for x, y in zip(truth["x_chief_px"][bright], truth["y_chief_px"][bright]):
                 if not (3 < x < 1020 and 3 < y < 1020):
                     continue
                 total += 1
@@ -532,8 +542,7 @@ class BadPeers(unittest.TestCase):
     def test_interrupted_while_waiting(self):
         # control steps first: no kernel is being built, which a signal would disturb
         process = start_run(runs.TRACK, runs.scratch() + "/run", ipc(), "control")
-        while "waiting for peers" not in process.stderr.readline():
-            pass
+        wait_until_open(process)
         time.sleep(0.3)
         process.send_signal(signal.SIGINT)
         ended(process, expected=130)
@@ -554,13 +563,41 @@ class BadPeers(unittest.TestCase):
                 self.assertEqual(file.read(), "mine")
         address = f"ipc://{folder}/socket"
         first = start_run(runs.TRACK, runs.scratch() + "/run", address, "control")
-        while "waiting for peers" not in first.stderr.readline():
-            pass
+        wait_until_open(first)
         said = ended(start_run(runs.TRACK, runs.scratch() + "/run", address, "control"), expected=1)
         self.assertIn("another program listens there; choose another path", said)
         first.send_signal(signal.SIGINT)
         ended(first, expected=130)
         self.assertEqual(os.listdir(folder), ["thesis.tex"])
+
+    def test_a_message_of_endless_parts(self):
+        """Each part is within the bound, the message has no end: the run does not keep it."""
+        port = free_port()
+        out = runs.scratch() + "/run"
+        run = start_run(runs.TRACK, out, f"tcp://127.0.0.1:{port}", "control", "--set",
+                        "/link/connect_timeout_s=20")
+        wait_until_open(run)
+        # ZMTP 3.0 (RFC 23): greeting, READY, then parts of 1 MiB that all say that more come
+        name, kind = b"Socket-Type", b"DEALER"
+        ready = (b"\x05READY" + bytes([len(name)]) + name + len(kind).to_bytes(4, "big") + kind)
+        with socket.create_connection(("127.0.0.1", port)) as peer:
+            peer.sendall(b"\xff" + bytes(8) + b"\x7f\x03\x00NULL" + bytes(16 + 32))
+            peer.sendall(bytes([4, len(ready)]) + ready)
+            part, sent = b"\x03" + (1 << 20).to_bytes(8, "big") + bytes(1 << 20), 0
+            try:
+                while sent < 600:
+                    peer.sendall(part)
+                    sent += 1
+            except OSError:
+                pass
+        self.assertLess(sent, 400)
+        peer = serve(runs.TRACK, f"tcp://127.0.0.1:{port}", "control")
+        with open(f"/proc/{run.pid}/status", encoding="ascii") as file:
+            peak = int(re.search(r"VmHWM:\s+(\d+) kB", file.read()).group(1))
+        ended(run)
+        ended(peer)
+        self.assertLess(peak, 600 << 10)  # the run itself takes about 200 MiB
+        self.assertEqual(counters(out)["link_oversized"], 1)
 
     def test_a_recording_that_is_a_pipe(self):
         folder = runs.scratch()
@@ -618,7 +655,8 @@ class BadPeers(unittest.TestCase):
             peer.stdout.readline()
         peer.kill()
         peer.communicate()
-        ended(run, timeout=240)
+        said = ended(run, timeout=240)
+        self.assertIn("of neossat/telescope/imgproc is not answered: no peer plays it", said)
         found = boresight_link.read_run(out).table("detection_frames")
         self.assertGreater(len(found["exposure_id"]), 0)
         self.assertLess(len(found["exposure_id"]), 300)

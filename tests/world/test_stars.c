@@ -148,7 +148,7 @@ static void test_order_within_cells(void **state) {
  * the stars whose V is the limit to the digit: those are the difference between the two counts. */
 static void test_counts_per_magnitude(void **state) {
     fixture *f = *state;
-    /* companions whose light is in the published V of their primaries (bright_stars_table.h) */
+    /* companions whose light is in the published V of their primaries (bright_stars_table.inc) */
     enum { DARK = 4 };
     static const struct {
         double v;
