@@ -203,7 +203,7 @@ static bst_status work_out(bst_ctx *ctx, const bst_control *c, int64_t tick,
     BST_TRY(bst_control_aim(ctx, c, tick, &valid, &d));
     if (valid && !held_in_body(c)) { /* else, where the stars are does not matter */
         bst_aberration aberration = aberration_at(c, tick);
-        bst_quat error = bst_pointing_error_at(&c->pointing_error, tick, c->env.tick_rate_hz);
+        bst_quat error = bst_control_correction_at(c, tick);
         d = bst_quat_rotate(error, bst_aberrate(&aberration, d));
     }
     keep(c, aimed, tick, valid, d);

@@ -39,6 +39,11 @@ const bst_config_desc bst_control_config_table[] = {
     BST_REAL(C, servo_lag_s, "s", 0, 10, "0.025",
              "How late the mount follows a change of its command (second_order: 0.025), for a "
              "compensator's specification."),
+    BST_BOOL(C, robust_observer, "true",
+             "Compensator observer: lower its gains where the frame period and the latency ask for "
+             "it, until its loop has a gain margin of 6 dB, a phase margin of 30 deg and a "
+             "sensitivity peak of at most 2; false: the gains of the disturbance below, whatever "
+             "the margins."),
     BST_REAL(C, disturbance_px_rms, "px", 1e-6, 1000, "0.5",
              "Expected slow jitter (radial RMS), for the compensator's gains."),
     BST_REAL(C, disturbance_cutoff_hz, "Hz", 1e-6, 100, "0.05",

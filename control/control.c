@@ -23,18 +23,29 @@ static bool on_image_error(const bst_control *c) {
            (c->config.compensator.plug.desc || c->config.compensator.type != BST_CONTROL_OBSERVER);
 }
 
-static bst_status start_image_loop(bst_ctx *ctx, bst_control *c) {
-    if (!on_image_error(c)) {
-        return BST_OK;
-    }
+static bst_status start_compensator(bst_ctx *ctx, bst_control *c) {
+    const bst_control_config *config = &c->config;
     bst_image_loop_env env = {.tick_rate_hz = c->env.tick_rate_hz,
                               .frame_period_s = c->env.frame_period_s,
                               .frame_exposure_s = c->env.frame_exposure_s,
                               .frame_latency_s = c->env.frame_latency_s,
-                              .command_latency_s = c->config.command_latency_s,
-                              .servo_lag_s = c->config.servo_lag_s,
-                              .jump_rad = c->config.arrive_tolerance_px * c->env.pixel_rad};
-    bst_status status = bst_image_loop_init(ctx, &c->image_loop, &c->config.compensator, &env);
+                              .command_latency_s = config->command_latency_s,
+                              .servo_lag_s = config->servo_lag_s,
+                              .jump_rad = config->arrive_tolerance_px * c->env.pixel_rad};
+    bst_status status = BST_OK;
+    if (on_image_error(c)) {
+        status = bst_image_loop_init(ctx, &c->image_loop, &config->compensator, &env);
+    } else if (config->compensate_attitude) {
+        status = bst_control_observer_density(ctx, config, &env, c->env.pixel_rad,
+                                              &c->pointing_error.density);
+        const bst_model_error_env model = {.gain = config->compensator.gain_scale,
+                                           .late_s = config->compensator.delay_s,
+                                           .exposure_s = env.frame_exposure_s,
+                                           .latency_s = env.frame_latency_s,
+                                           .tick_rate_hz = env.tick_rate_hz,
+                                           .jump_rad = env.jump_rad};
+        bst_model_error_init(&c->model_error, &model);
+    }
     return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "compensator");
 }
 
@@ -81,7 +92,7 @@ bst_status bst_control_init(bst_ctx *ctx, bst_control *control, const bst_contro
                                        .range = guidance_range,
                                        .user = control};
     bst_guidance_init(&control->guidance, &config->guidance, &guidance);
-    return start_image_loop(ctx, control);
+    return start_compensator(ctx, control);
 }
 
 /* The body's attitude, and its rate smoothed against the noise of the attitude's estimate. */
@@ -109,6 +120,7 @@ void bst_control_telemetry(bst_control *c, const bst_pointing_telemetry *pointin
         take_body(c, c->pointing.tick, pointing->q_body_from_gcrf);
         c->pointing_valid = true;
         c->settled = pointing->settled;
+        bst_model_error_telemetry(&c->model_error, pointing);
     }
     if (nav && (!c->nav_valid || nav->tick != c->nav.tick)) {
         c->nav = *nav;
@@ -124,7 +136,9 @@ bst_status bst_control_observe(bst_ctx *ctx, bst_control *c, int64_t tick,
     if (on_image_error(c)) {
         bst_image_loop_update(&c->image_loop, &c->pointing_error, tick, &tracks->attitude);
     } else if (c->config.compensate_attitude) {
-        bst_pointing_error_update(&c->pointing_error, &tracks->attitude, c->env.tick_rate_hz);
+        bst_attitude_fix fix =
+            bst_model_error_apply(&c->model_error, &c->pointing_error, &tracks->attitude);
+        bst_pointing_error_update(&c->pointing_error, &fix, c->env.tick_rate_hz);
     }
     if (c->frame_tick != INT64_MIN && tracks->tick > c->frame_tick) {
         int64_t interval = tracks->tick - c->frame_tick;
@@ -208,9 +222,10 @@ bst_status bst_control_update(bst_ctx *ctx, bst_control *c, int64_t tick, bool *
         bst_vec3 bend = bst_vec3_axpy(bst_vec3_add(ahead, behind), -2.0, d);
         command->accel_gcrf_radps2 = bst_vec3_scale(bend, per_s2 * per_s2);
     }
-    if (on_image_error(c) &&
-        bst_image_loop_commanded(&c->image_loop, &c->pointing_error, effect, half,
-                                 (bst_vec3[]){d, ahead, behind}, arrived, c->pointing.tick)) {
+    const bst_vec3 corrected[3] = {d, ahead, behind};
+    bst_model_error_commanded(&c->model_error, &c->pointing_error, effect, half, corrected);
+    if (on_image_error(c) && bst_image_loop_commanded(&c->image_loop, &c->pointing_error, effect,
+                                                      half, corrected, arrived, c->pointing.tick)) {
         bst_control_forget_aims(c);
     }
     bst_vec3 boresight = {0.0, 0.0, 0.0};
@@ -219,9 +234,7 @@ bst_status bst_control_update(bst_ctx *ctx, bst_control *c, int64_t tick, bool *
             bst_quat_rotate(bst_quat_conj(c->pointing.q_cam_from_gcrf), (bst_vec3){0, 0, 1});
     }
     if (!c->guidance.nav_known || c->guidance.nav.tick != c->nav.tick) {
-        bst_guidance_see_sky(
-            &c->guidance, &c->nav,
-            bst_pointing_error_at(&c->pointing_error, effect, c->env.tick_rate_hz));
+        bst_guidance_see_sky(&c->guidance, &c->nav, bst_control_correction_at(c, effect));
     }
     return bst_guidance_command(ctx, &c->guidance, c->pointing_valid ? &boresight : NULL, command,
                                 commanded);

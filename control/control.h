@@ -5,6 +5,7 @@
 
 #include "control/guidance.h"
 #include "control/image_loop.h"
+#include "control/model_error.h"
 #include "control/pointing_error.h"
 #include "control/search.h"
 #include "sim/core/config.h"
@@ -42,6 +43,7 @@ typedef struct bst_control_config {
     bool compensate_attitude;
     bst_compensator_config compensator; /* of type BST_CONTROL_OBSERVER: pointing_error's own */
     double servo_lag_s;
+    bool robust_observer;
     double disturbance_px_rms, disturbance_cutoff_hz;
     double fix_sigma_floor_px;
     double attitude_sigma_arcsec, drift_sigma_arcsec_per_s;
@@ -144,7 +146,8 @@ typedef struct bst_control {
     bst_control_env env;
     int64_t latency_ticks, rate_half_ticks;
     bst_pointing_error pointing_error;
-    bst_image_loop image_loop; /* sets pointing_error, unless the compensator is the observer */
+    bst_image_loop image_loop;   /* sets pointing_error, unless the compensator is the observer */
+    bst_model_error model_error; /* of the observer */
     int mode;
     int64_t mode_tick; /* since when */
     bst_control_transition transitions[BST_CONTROL_TRANSITIONS];
@@ -187,6 +190,13 @@ typedef struct bst_control {
     bst_control_aimed aimed[BST_CONTROL_AIMED];
     bst_control_piece pieces[BST_CONTROL_PIECES]; /* by index modulo their number */
 } bst_control;
+
+/* The density of disturbance (rad^2/s^3) that the observer's gains are made for: that of the
+ * configuration, or with robust_observer what bst_observer_design leaves of it. `timing` as the
+ * loop's: command and servo delays are the configuration's. Errors of bst_observer_design. */
+bst_status bst_control_observer_density(bst_ctx *ctx, const bst_control_config *config,
+                                        const bst_image_loop_env *timing, double pixel_rad,
+                                        double *density) BST_MUST_CHECK;
 
 /* Copies config and env; does not move afterwards. BST_ERR_CONFIG for settings that do not fit
  * together. */

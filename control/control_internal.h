@@ -12,6 +12,12 @@ static inline int64_t bst_control_ticks(const bst_control *c, double seconds) {
     return (int64_t)llround(seconds * c->env.tick_rate_hz);
 }
 
+/* The rotation that takes a direction among the stars to where telemetry's boresight has to be. */
+static inline bst_quat bst_control_correction_at(const bst_control *c, int64_t tick) {
+    return bst_model_error_correction(&c->model_error, &c->pointing_error, tick,
+                                      c->env.tick_rate_hz);
+}
+
 /* ---- aim.c ---- */
 
 bst_status bst_control_cue_at(bst_ctx *ctx, const bst_control *c, int64_t tick,

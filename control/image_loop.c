@@ -8,10 +8,20 @@ static int64_t ticks_of(const bst_image_loop *loop, double seconds) {
     return (int64_t)llround(seconds * loop->env.tick_rate_hz);
 }
 
+/* Frame periods without a frame after which the latest error is no longer acted on. */
+#define PATIENCE 1.5
+
+/* From the middle of an exposure until then. */
+static double longest_wait_s(const bst_image_loop_env *env) {
+    return env->frame_latency_s + 0.5 * env->frame_exposure_s + PATIENCE * env->frame_period_s;
+}
+
 bst_status bst_image_loop_init(bst_ctx *ctx, bst_image_loop *loop,
                                const bst_compensator_config *config,
                                const bst_image_loop_env *env) {
     *loop = (bst_image_loop){.env = *env, .frame_tick = INT64_MIN, .rest_tick = INT64_MIN};
+    bst_aim_history_init(&loop->aims, env->tick_rate_hz,
+                         longest_wait_s(env) + env->command_latency_s);
     if (!(env->frame_period_s > 0.0)) {
         return bst_fail(ctx, BST_ERR_CONFIG,
                         "a compensator on the image error needs frames at a known period");
@@ -23,8 +33,9 @@ bst_status bst_image_loop_init(bst_ctx *ctx, bst_image_loop *loop,
                                   .effect_s = arrival + env->command_latency_s,
                                   .switch_s = arrival + env->command_latency_s};
     bst_servo_response servo = {.delay_s = env->servo_lag_s};
+    const bst_tracking_observer none = {.motion_gain = 1.0};
     bst_tracking_loop *plant;
-    BST_TRY(bst_tracking_loop_create(ctx, &timing, &servo, NULL, 0.0, 0.0, &plant));
+    BST_TRY(bst_tracking_loop_create(ctx, &timing, &servo, NULL, &none, &plant));
     bst_status status = bst_compensator_init(ctx, &loop->axis[0], config, env->frame_period_s,
                                              bst_tracking_plant, plant);
     bst_tracking_loop_free(plant);
@@ -32,9 +43,6 @@ bst_status bst_image_loop_init(bst_ctx *ctx, bst_image_loop *loop,
     loop->axis[1] = loop->axis[2] = loop->axis[0];
     return BST_OK;
 }
-
-/* Frame periods without a frame after which the latest error is no longer acted on. */
-#define PATIENCE 1.5
 
 static void turn_at(bst_image_loop *loop, bst_pointing_error *correction, int64_t effect_tick,
                     const double u[3]) {
@@ -59,54 +67,31 @@ static void coast(bst_image_loop *loop, bst_pointing_error *correction, int64_t 
 bool bst_image_loop_commanded(bst_image_loop *loop, bst_pointing_error *correction,
                               int64_t effect_tick, int64_t half_ticks, const bst_vec3 corrected[3],
                               bool arrived, int64_t arrived_tick) {
-    const int64_t at[3] = {effect_tick, effect_tick + half_ticks, effect_tick - half_ticks};
-    bst_vec3 d[3];
-    for (int i = 0; i < 3; i++) {
-        bst_quat q = bst_pointing_error_at(correction, at[i], loop->env.tick_rate_hz);
-        d[i] = bst_quat_rotate(bst_quat_conj(bst_quat_unit(q)), corrected[i]);
-    }
-    bst_vec3 rate =
-        bst_vec3_scale(bst_vec3_sub(d[1], d[2]), 0.5 * loop->env.tick_rate_hz / (double)half_ticks);
+    const double hz = loop->env.tick_rate_hz;
+    const bst_quat taken[3] = {bst_pointing_error_at(correction, effect_tick, hz),
+                               bst_pointing_error_at(correction, effect_tick + half_ticks, hz),
+                               bst_pointing_error_at(correction, effect_tick - half_ticks, hz)};
+    bst_vec3 direction, rate;
+    bst_pointing_error_uncorrect(taken, corrected, (double)half_ticks / hz, &direction, &rate);
     if (loop->slewing && arrived && arrived_tick > loop->slew_tick) {
         loop->slewing = false;
         loop->rest_tick = arrived_tick;
     }
-    const bst_image_loop_aim *last =
-        loop->aims > 0 ? &loop->aim[(loop->aims - 1) % BST_IMAGE_LOOP_COMMANDS] : NULL;
-    double dt = last ? (double)(effect_tick - last->tick) / loop->env.tick_rate_hz : 0.0;
-    if (!last || bst_vec3_angle(bst_vec3_axpy(last->direction, dt, last->rate_radps), d[0]) >
-                     loop->env.jump_rad) {
+    bst_vec3 expected;
+    bool jumped = !bst_aim_history_predict(&loop->aims, effect_tick, &expected) ||
+                  bst_vec3_angle(expected, direction) > loop->env.jump_rad;
+    if (jumped) {
         loop->slewing = true;
         loop->slew_tick = effect_tick;
     }
-    if (last && effect_tick <= last->tick) {
-        loop->aims--; /* said anew for the same time */
-    }
-    loop->aim[loop->aims++ % BST_IMAGE_LOOP_COMMANDS] =
-        (bst_image_loop_aim){effect_tick, d[0], rate};
+    bst_aim_history_add(&loop->aims, effect_tick, direction, rate, jumped);
 
     int64_t now = effect_tick - ticks_of(loop, loop->env.command_latency_s);
-    double wait_s = loop->env.frame_latency_s + 0.5 * loop->env.frame_exposure_s +
-                    PATIENCE * loop->env.frame_period_s;
-    bool overdue = correction->started && now - loop->frame_tick > ticks_of(loop, wait_s);
+    bool overdue =
+        correction->started && now - loop->frame_tick > ticks_of(loop, longest_wait_s(&loop->env));
     if (correction->started && !loop->coasting && (loop->slewing || overdue)) {
         coast(loop, correction, effect_tick);
         return true;
-    }
-    return false;
-}
-
-/* The uncorrected direction that was commanded for a tick. */
-static bool aim_at(const bst_image_loop *loop, int64_t tick, bst_vec3 *out) {
-    int64_t oldest =
-        loop->aims > BST_IMAGE_LOOP_COMMANDS ? loop->aims - BST_IMAGE_LOOP_COMMANDS : 0;
-    for (int64_t i = loop->aims - 1; i >= oldest; i--) {
-        const bst_image_loop_aim *aim = &loop->aim[i % BST_IMAGE_LOOP_COMMANDS];
-        if (aim->tick <= tick) {
-            double dt = (double)(tick - aim->tick) / loop->env.tick_rate_hz;
-            *out = bst_vec3_unit(bst_vec3_axpy(aim->direction, dt, aim->rate_radps));
-            return true;
-        }
     }
     return false;
 }
@@ -116,7 +101,7 @@ bool bst_image_loop_update(bst_image_loop *loop, bst_pointing_error *correction,
     bst_vec3 aim;
     int64_t half = ticks_of(loop, 0.5 * loop->env.frame_exposure_s);
     if (!fix->valid || loop->slewing || fix->tick <= loop->frame_tick ||
-        fix->tick - half < loop->rest_tick || !aim_at(loop, fix->tick, &aim)) {
+        fix->tick - half < loop->rest_tick || !bst_aim_history_at(&loop->aims, fix->tick, &aim)) {
         return false;
     }
     loop->frame_tick = fix->tick;

@@ -3,6 +3,7 @@
 #ifndef BST_CONTROL_IMAGE_LOOP_H
 #define BST_CONTROL_IMAGE_LOOP_H
 
+#include "control/aim_history.h"
 #include "control/pointing_error.h"
 #include "sim/core/compensator.h"
 
@@ -20,14 +21,6 @@ typedef struct bst_image_loop_env {
     double jump_rad;          /* an aim that moves by more between two commands starts a slew */
 } bst_image_loop_env;
 
-enum { BST_IMAGE_LOOP_COMMANDS = 256 };
-
-/* A commanded direction without the correction. */
-typedef struct bst_image_loop_aim {
-    int64_t tick; /* of effect */
-    bst_vec3 direction, rate_radps;
-} bst_image_loop_aim;
-
 /* One loop per axis of GCRF, all alike, so that the two across the boresight are the image's: the
  * compensator's output is the rate at which the correction turns, so that a compensator without an
  * integrator leaves no constant error and one with leaves none of a constant drift. The correction
@@ -36,13 +29,12 @@ typedef struct bst_image_loop_aim {
 typedef struct bst_image_loop {
     bst_image_loop_env env;
     bst_compensator axis[3];
-    bst_image_loop_aim aim[BST_IMAGE_LOOP_COMMANDS]; /* ring */
-    int64_t aims;
-    int64_t slew_tick;  /* the latest jump of the aim */
-    bool slewing;       /* the mount has not been seen to arrive since */
-    int64_t rest_tick;  /* frames that began before do not count */
-    int64_t frame_tick; /* of the latest that was used */
-    bool coasting;      /* the rate is the integrators' alone */
+    bst_aim_history aims; /* uncorrected */
+    int64_t slew_tick;    /* the latest jump of the aim */
+    bool slewing;         /* the mount has not been seen to arrive since */
+    int64_t rest_tick;    /* frames that began before do not count */
+    int64_t frame_tick;   /* of the latest that was used */
+    bool coasting;        /* the rate is the integrators' alone */
 } bst_image_loop;
 
 /* BST_ERR_CONFIG as bst_compensator_init: a specification is designed against the delays of the

@@ -32,9 +32,8 @@ static double off_boresight_px(const bst_control *c, const bst_tracks *tracks,
     if (tracks->attitude.valid) {
         q = tracks->attitude.q_cam_from_gcrf;
     } else if (c->pointing_valid) {
-        q = bst_quat_mul(
-            c->pointing.q_cam_from_gcrf,
-            bst_pointing_error_at(&c->pointing_error, c->pointing.tick, c->env.tick_rate_hz));
+        q = bst_quat_mul(c->pointing.q_cam_from_gcrf,
+                         bst_control_correction_at(c, c->pointing.tick));
         dt = (double)(c->pointing.tick - tracks->tick) / c->env.tick_rate_hz;
     } else {
         return INFINITY;

@@ -83,3 +83,13 @@ bool bst_pointing_error_update(bst_pointing_error *e, const bst_attitude_fix *fi
 bst_quat bst_pointing_error_at(const bst_pointing_error *e, int64_t tick, double tick_rate_hz) {
     return e->started ? predicted(e, (double)(tick - e->tick) / tick_rate_hz) : e->error;
 }
+
+void bst_pointing_error_uncorrect(const bst_quat correction[3], const bst_vec3 corrected[3],
+                                  double half_s, bst_vec3 *direction, bst_vec3 *rate_radps) {
+    bst_vec3 d[3];
+    for (int i = 0; i < 3; i++) {
+        d[i] = bst_quat_rotate(bst_quat_conj(bst_quat_unit(correction[i])), corrected[i]);
+    }
+    *direction = d[0];
+    *rate_radps = bst_vec3_scale(bst_vec3_sub(d[1], d[2]), 0.5 / half_s);
+}

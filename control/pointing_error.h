@@ -58,4 +58,9 @@ bool bst_pointing_error_update(bst_pointing_error *e, const bst_attitude_fix *fi
 /* The error predicted to a tick (any, before or after the last fix). */
 bst_quat bst_pointing_error_at(const bst_pointing_error *e, int64_t tick, double tick_rate_hz);
 
+/* Takes corrections off commanded directions: [0] of a tick, [1] and [2] half_s seconds later
+ * and earlier. Gives the direction without its correction and its rate, rad/s. */
+void bst_pointing_error_uncorrect(const bst_quat correction[3], const bst_vec3 corrected[3],
+                                  double half_s, bst_vec3 *direction, bst_vec3 *rate_radps);
+
 #endif

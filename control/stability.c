@@ -198,6 +198,31 @@ static void finish(const walk *w, bst_loop_margins *out) {
     out->bandwidth_hz = bandwidth(w->loop, w->crossover_hz);
 }
 
+static double complex numerator_and_denominator(const void *user, double omega) {
+    const bst_loop *loop = user;
+    return loop->denominator(loop->user, omega) * (1.0 + open_at(loop, omega));
+}
+
+/* Poles outside the unit circle of the open and of the closed loop, by the turns of 1 + L. */
+static bst_status count_poles(bst_ctx *ctx, const bst_loop *loop, int turns, int *open_poles,
+                              int *closed) {
+    *open_poles = loop->unstable_poles;
+    int counted = 0;
+    if (loop->denominator) {
+        BST_TRY(bst_loop_zeros_outside(ctx, loop->denominator, loop->user, loop->dt_s, open_poles));
+        BST_TRY(bst_loop_zeros_outside(ctx, numerator_and_denominator, loop, loop->dt_s, &counted));
+    }
+    *closed = *open_poles - turns;
+    if (*closed < 0 || (loop->denominator && *closed != counted)) {
+        return bst_fail(ctx, BST_ERR_NUMERIC,
+                        "the poles outside the unit circle cannot be counted: %d of the open loop "
+                        "less %d turns about -1%s; a compensator or plant is unstable by itself",
+                        *open_poles, turns,
+                        loop->denominator ? ", and another number as zeros of 1 + L" : "");
+    }
+    return BST_OK;
+}
+
 bst_status bst_loop_analyse(bst_ctx *ctx, const bst_loop *loop, bst_loop_margins *out) {
     double end = BST_PI / loop->dt_s, omega = LOWEST_SHARE * end;
     enum { ROUND_HINT = 5 };
@@ -251,10 +276,14 @@ bst_status bst_loop_analyse(bst_ctx *ctx, const bst_loop *loop, bst_loop_margins
         return status;
     }
     *out = (bst_loop_margins){0};
+    int open_poles;
     int turns = (int)lround((closing + 2.0 * w.turned) / two_pi);
-    out->unstable_closed = loop->unstable_poles - turns;
+    BST_TRY(count_poles(ctx, loop, turns, &open_poles, &out->unstable_closed));
     out->stable = out->unstable_closed == 0;
     finish(&w, out);
+    if (loop->open_later && out->stable && isfinite(out->delay_margin_s)) {
+        BST_TRY(bst_loop_delay_margin(ctx, loop, open_poles, w.delay_margin, &out->delay_margin_s));
+    }
     return BST_OK;
 }
 

@@ -72,7 +72,8 @@ bst_tasking_why bst_tasking_glance(const bst_tasking_sensor *s, bst_vec3 place_m
     bst_tasking_why why = zone_reason(s->zones, s->zone_cosines, s->zone_count, *direction);
     if (why == BST_WHY_NOT) {
         bst_vec3 sun_m = bst_vec3_add(s->nav.sun_m, s->nav.position_gcrf_m);
-        why = bst_sun_fraction(place_m, sun_m) > 0.5 ? BST_WHY_NOT : BST_WHY_SHADOW;
+        why = bst_sun_fraction(place_m, sun_m, BST_EARTH_POLE_J2000) > 0.5 ? BST_WHY_NOT
+                                                                           : BST_WHY_SHADOW;
     }
     return why;
 }
@@ -125,8 +126,7 @@ bst_status bst_tasking_look(bst_ctx *ctx, const bst_tasking *t, int sensor, int 
     bst_state eye;
     bst_bodies bodies;
     *snr = 0.0;
-    int own = bst_knowledge_own_norad(s->knowledge);
-    if (own != 0 && own == bst_knowledge_object(s->knowledge, object)->norad) {
+    if (bst_knowledge_is_itself(s->knowledge, object)) {
         *why = BST_WHY_ITSELF;
         return BST_OK;
     }

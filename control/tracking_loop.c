@@ -19,7 +19,7 @@ struct bst_tracking_loop {
     int count;
     deficit step, ramp;
     bool observes;
-    double alpha, beta;
+    bst_tracking_observer observer;
     bst_compensator compensator;
 };
 
@@ -40,7 +40,8 @@ static bst_status fill(bst_ctx *ctx, deficit *d, const double *source, double si
 
 bst_status bst_tracking_loop_create(bst_ctx *ctx, const bst_tracking_timing *timing,
                                     const bst_servo_response *servo,
-                                    const bst_compensator *compensator, double alpha, double beta,
+                                    const bst_compensator *compensator,
+                                    const bst_tracking_observer *observer,
                                     bst_tracking_loop **out) {
     *out = NULL;
     bst_tracking_loop *loop = calloc(1, sizeof *loop);
@@ -51,11 +52,11 @@ bst_status bst_tracking_loop_create(bst_ctx *ctx, const bst_tracking_timing *tim
     loop->dt_s = servo->dt_s;
     loop->delay_s = servo->delay_s;
     loop->count = servo->count;
-    loop->alpha = alpha;
-    loop->beta = beta;
     loop->observes = compensator == NULL;
     if (compensator) {
         loop->compensator = *compensator;
+    } else {
+        loop->observer = *observer;
     }
     bst_status status = BST_OK;
     if (servo->count > 0) {
@@ -142,41 +143,82 @@ static double complex angle_mean(const bst_tracking_loop *loop, double w, double
     return sum;
 }
 
-double complex bst_tracking_plant(const void *user, double w) {
-    const bst_tracking_loop *loop = user;
+static double complex plant_later(const bst_tracking_loop *loop, double w, double later_s) {
     double period = loop->timing.period_s, half = 0.5 * loop->timing.exposure_s;
     double complex back = cexp(-I * w * period);
-    return angle_mean(loop, w, period * back / (1.0 - back), 1.0, -half, half);
+    return angle_mean(loop, w, period * back / (1.0 - back), 1.0, -half - later_s, half - later_s);
+}
+
+double complex bst_tracking_plant(const void *user, double w) {
+    return plant_later(user, w, 0.0);
+}
+
+/* What a measurement gives the observer: the correction's angle at its time of effect, and its
+ * rate. */
+static void observed(const bst_tracking_loop *loop, double w, double complex *c,
+                     double complex *r) {
+    double period = loop->timing.period_s, alpha = loop->observer.alpha, beta = loop->observer.beta;
+    double complex back = cexp(-I * w * period);
+    double complex predicted = back * (alpha + beta / (1.0 - back)) / (1.0 - back);
+    double complex innovation = 1.0 / (1.0 + predicted);
+    *r = beta / period / (1.0 - back) * innovation;
+    *c = (predicted + alpha) * innovation + *r * loop->timing.effect_s;
+}
+
+/* H: the motion in the frames, late_s late, over the observer's measurement. */
+static double complex shown(const bst_tracking_loop *loop, double w, double late_s) {
+    double half = 0.5 * loop->timing.exposure_s;
+    double complex c, r;
+    observed(loop, w, &c, &r);
+    return angle_mean(loop, w, c, r, -half - late_s, half - late_s);
+}
+
+double complex bst_tracking_denominator(const void *user, double w) {
+    const bst_tracking_loop *loop = user;
+    return loop->observes ? 1.0 - shown(loop, w, 0.0) : 1.0;
+}
+
+double complex bst_tracking_open_later(const void *user, double w, double later_s) {
+    const bst_tracking_loop *loop = user;
+    if (!loop->observes) {
+        return bst_compensator_response(&loop->compensator, w) * plant_later(loop, w, later_s);
+    }
+    const bst_tracking_observer *o = &loop->observer;
+    return o->motion_gain * shown(loop, w, o->motion_late_s + later_s) /
+           bst_tracking_denominator(loop, w);
+}
+
+double complex bst_tracking_open(const void *user, double w) {
+    return bst_tracking_open_later(user, w, 0.0);
+}
+
+bst_loop bst_tracking_as_loop(const bst_tracking_loop *tracking) {
+    return (bst_loop){.open = bst_tracking_open,
+                      .user = tracking,
+                      .dt_s = tracking->timing.period_s,
+                      .denominator = tracking->observes ? bst_tracking_denominator : NULL,
+                      .open_later = tracking->observes ? bst_tracking_open_later : NULL};
 }
 
 /* What a frame's measurement without the mount's own part gives: the correction's angle at its
  * time of effect, and its rate. */
 static void corrected_by(const bst_tracking_loop *loop, double w, double complex *c,
                          double complex *r) {
+    if (loop->observes) {
+        const bst_tracking_observer *o = &loop->observer;
+        observed(loop, w, c, r);
+        if (o->motion_gain != 1.0 || o->motion_late_s != 0.0) {
+            double complex wrong =
+                o->motion_gain * shown(loop, w, o->motion_late_s) - shown(loop, w, 0.0);
+            *c /= 1.0 + wrong;
+            *r /= 1.0 + wrong;
+        }
+        return;
+    }
     double period = loop->timing.period_s;
     double complex back = cexp(-I * w * period);
-    if (loop->observes) {
-        double complex predicted = back * (loop->alpha + loop->beta / (1.0 - back)) / (1.0 - back);
-        double complex innovation = 1.0 / (1.0 + predicted);
-        *r = loop->beta / period / (1.0 - back) * innovation;
-        *c = (predicted + loop->alpha) * innovation + *r * loop->timing.effect_s;
-    } else {
-        *r = bst_compensator_response(&loop->compensator, w) / (1.0 + bst_tracking_open(loop, w));
-        *c = *r * period * back / (1.0 - back);
-    }
-}
-
-double complex bst_tracking_open(const void *user, double w) {
-    const bst_tracking_loop *loop = user;
-    if (!loop->observes) {
-        return bst_compensator_response(&loop->compensator, w) * bst_tracking_plant(loop, w);
-    }
-    /* internal model control: closed round by what telemetry says of the mount's motion */
-    double half = 0.5 * loop->timing.exposure_s;
-    double complex c, r;
-    corrected_by(loop, w, &c, &r);
-    double complex seen = angle_mean(loop, w, c, r, -half, half);
-    return seen / (1.0 - seen);
+    *r = bst_compensator_response(&loop->compensator, w) / (1.0 + bst_tracking_open(loop, w));
+    *c = *r * period * back / (1.0 - back);
 }
 
 /* The mount's angle at an offset over what the frames measure without the mount's own part. */

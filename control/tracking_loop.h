@@ -23,16 +23,23 @@ typedef struct bst_tracking_timing {
     double switch_s;  /* the same until the mount acts on it */
 } bst_tracking_timing;
 
+/* An alpha-beta filter of the disturbance, and what is wrong with its model of the mount: the
+ * frames show motion_gain times the motion that telemetry reports, motion_late_s later. */
+typedef struct bst_tracking_observer {
+    double alpha, beta;
+    double motion_gain, motion_late_s; /* 1, 0: nothing */
+} bst_tracking_observer;
+
 typedef struct bst_tracking_loop bst_tracking_loop;
 
 /* Per axis: the measured error m_k of frame k, d averaged over the exposure and, with a
  * compensator, less the mount's angle; then either the compensator's output as the rate of the
- * correction, or the observer's estimate of d (gains alpha, beta of an alpha-beta filter) carried
- * along with its rate. Copies the servo's response and the compensator (NULL: observer).
- * BST_ERR_MEMORY. */
+ * correction, or the observer's estimate of d carried along with its rate. Copies the servo's
+ * response and the compensator or, where that is NULL, the observer. BST_ERR_MEMORY. */
 bst_status bst_tracking_loop_create(bst_ctx *ctx, const bst_tracking_timing *timing,
                                     const bst_servo_response *servo,
-                                    const bst_compensator *compensator, double alpha, double beta,
+                                    const bst_compensator *compensator,
+                                    const bst_tracking_observer *observer,
                                     bst_tracking_loop **out) BST_MUST_CHECK;
 /* NULL is allowed. */
 void bst_tracking_loop_free(bst_tracking_loop *loop);
@@ -43,12 +50,23 @@ double complex bst_tracking_plant(const void *user, double omega_radps);
 
 /* The open loop, broken where the mount's motion shows in the frames: compensator times plant. The
  * observer takes from each measurement what telemetry says of that motion, and so has no loop as
- * long as telemetry is right; its open loop is H / (1 - H), H from a measurement to the motion that
- * it brings about in the frames: its margins tell how much more, or later, the image may move than
- * telemetry says (internal model control: Morari and Zafiriou, Robust Process Control, 1989,
- * chapter 3). When a correction acts before the next exposure begins, that is the observer's own
- * loop broken at the innovation. `user` is a bst_tracking_loop. */
+ * long as telemetry is right; its open loop is g H(tau) / (1 - H(0)), H(tau) from a measurement to
+ * the motion that it brings about in the frames tau later, g and tau the error of the model: its
+ * margins are how much more, or later, the image may move than telemetry says (internal model
+ * control: Morari and Zafiriou, Robust Process Control, 1989, chapter 3). When a correction acts
+ * before the next exposure begins, that is the observer's own loop broken at the innovation. With
+ * more latency the open loop has poles outside the unit circle, the zeros of 1 - H(0) there.
+ * `user` is a bst_tracking_loop. */
 double complex bst_tracking_open(const void *user, double omega_radps);
+
+/* The same when the frames show the motion later_s later still. */
+double complex bst_tracking_open_later(const void *user, double omega_radps, double later_s);
+
+/* Response of 1 - H(0), the denominator of the observer's open loop; 1 with a compensator. */
+double complex bst_tracking_denominator(const void *user, double omega_radps);
+
+/* The loop for bst_loop_analyse; it refers to `tracking`. */
+bst_loop bst_tracking_as_loop(const bst_tracking_loop *tracking);
 
 /* Pointing error over disturbance at omega rad/s (any), at offset_s from the middle of each
  * exposure: the disturbance of unit amplitude less what the mount makes up for. */

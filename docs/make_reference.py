@@ -22,6 +22,8 @@ def kind_of(node):
     if "enum" in node:
         return ", ".join(f"`{choice}`" for choice in node["enum"])
     kind = node.get("type", "object")
+    if kind == ["number", "null"]:
+        return "number or `null`"
     if "pattern" in node:
         return "seed: `\"0x…\"`, decimal string or integer"
     if kind == "array" and node["items"].get("type") == "object":

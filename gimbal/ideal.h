@@ -5,8 +5,20 @@
 
 #include <stdint.h>
 
+#include "gimbal/platform.h"
 #include "sim/core/status.h"
 #include "sim/core/vec.h"
+
+/* What the module "ideal" keeps the boresight on. */
+enum { BST_IDEAL_OBJECT, BST_IDEAL_DIRECTION, BST_IDEAL_STAR };
+typedef struct bst_ideal_config {
+    int32_t target;         /* BST_IDEAL_... */
+    char object[64];        /* its name in the scenario */
+    double ra_deg, dec_deg; /* ICRS */
+    double star_tyc[3];     /* Tycho-2 identity */
+    bst_platform_config platform;
+} bst_ideal_config;
+extern const bst_config_desc bst_ideal_config_table[];
 
 /* Nodes per second. The cubic through four nodes is off by at most 9/384 h^4 |d4 u/dt4|; a pass at
  * 0.03 rad/s (500 km range, 15 km/s) has about 2e-5 rad/s^4: below 1e-10 rad. */

@@ -7,18 +7,11 @@
 
 static const bst_port ports[BST_GIMBAL_PORTS] = {BST_GIMBAL_PORTS_ALL};
 
-enum { TARGET_OBJECT, TARGET_DIRECTION, TARGET_STAR };
 static const char *const target_names[] = {"object", "direction", "star", NULL};
 
-typedef struct config {
-    int32_t target;
-    char object[64];
-    double ra_deg, dec_deg;
-    double star_tyc[3];
-    bst_platform_config platform;
-} config;
+typedef bst_ideal_config config;
 
-static const bst_config_desc config_table[] = {
+const bst_config_desc bst_ideal_config_table[] = {
     BST_ENUM(config, target, target_names, "\"object\"", "What the boresight is kept on."),
     BST_STRING(config, object, "\"\"", "target object: its name in the scenario."),
     BST_REAL(config, ra_deg, "deg", -360, 360, "0", "target direction: ICRS right ascension."),
@@ -43,7 +36,7 @@ typedef struct module {
 static bst_status apparent(void *user, bst_ctx *ctx, double seconds, bst_vec3 *direction) {
     module *m = user;
     bst_view *view = m->base.view;
-    if (m->target == TARGET_OBJECT) {
+    if (m->target == BST_IDEAL_OBJECT) {
         bst_sight sight;
         BST_TRY(bst_view_sight(ctx, view, m->base.observer, m->object, seconds, &sight));
         *direction = sight.apparent;
@@ -60,7 +53,7 @@ static bst_status apparent(void *user, bst_ctx *ctx, double seconds, bst_vec3 *d
 
 static bst_status find_target(const bst_module_env *env, const config *c, module *m) {
     m->target = c->target;
-    if (c->target == TARGET_OBJECT) {
+    if (c->target == BST_IDEAL_OBJECT) {
         m->object = bst_world_find_object(env->world, c->object);
         if (m->object < 0) {
             return bst_fail(env->ctx, BST_ERR_CONFIG,
@@ -69,7 +62,7 @@ static bst_status find_target(const bst_module_env *env, const config *c, module
         }
         return BST_OK;
     }
-    if (c->target == TARGET_DIRECTION) {
+    if (c->target == BST_IDEAL_DIRECTION) {
         m->icrs = bst_vec3_from_radec(c->ra_deg * BST_DEG_RAD, c->dec_deg * BST_DEG_RAD);
         return BST_OK;
     }
@@ -145,7 +138,7 @@ const bst_module_desc bst_gimbal_ideal_module = {
         "Keeps the boresight exactly on the true apparent place of an object, a direction or a "
         "star; drift and jitter, where configured, come on top.",
     .flags = BST_MODULE_READS_TRUTH,
-    .config = config_table,
+    .config = bst_ideal_config_table,
     .config_bytes = sizeof(config),
     .default_rate_hz = 1000.0,
     .ports = ports,

@@ -27,7 +27,8 @@ const bst_config_desc bst_platform_config_table[] = {
     BST_REAL(P, telemetry_rate_hz, "Hz", 0.01, 10000, "100",
              "Rate of pointing telemetry; divides the plant's rate."),
     BST_REAL(P, telemetry_history_s, "s", 0.01, 3600, "8",
-             "Time that the ring of pointing telemetry covers."),
+             "Time that the ring of pointing telemetry covers at least; where frames come later "
+             "than this, it covers their latency."),
     BST_REAL(P, nav_rate_hz, "Hz", 0.001, 10000, "10",
              "Rate of navigation telemetry; divides the plant's rate."),
     BST_OBJECT(P, spacecraft, bst_craft_config_table, "{}",

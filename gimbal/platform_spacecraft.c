@@ -19,7 +19,8 @@ static bst_status sky_at(void *user, bst_ctx *ctx, double seconds, bst_craft_sky
     BST_TRY(bst_view_bodies(ctx, sky->view, seconds, &bodies));
     out->position_m = state.position_m;
     out->sun_m = bst_vec3_sub(bodies.sun_m, state.position_m);
-    out->sunlit = bst_sun_fraction(state.position_m, bodies.sun_m);
+    out->sunlit =
+        bst_sun_fraction(state.position_m, bst_bodies_sunlight_from(&bodies), bodies.pole);
 
     BST_TRY(
         bst_view_believed(ctx, sky->view, sky->observer, sky->sensor, seconds, &state, &bodies));

@@ -55,8 +55,11 @@ bst_status bst_gimbal_base_init(const bst_module_env *env, const bst_platform_co
                                  &base->nav_steps));
     BST_TRY(bst_view_create(env->ctx, env->world, &base->view));
     bst_env_set_capacity(env, BST_GIMBAL_HISTORY, ring(config->history_s, rate_hz) + history_more);
-    bst_env_set_capacity(env, BST_GIMBAL_POINTING,
-                         ring(config->telemetry_history_s, config->telemetry_rate_hz));
+    /* the tracker asks for the attitude in the middle of a frame that comes late */
+    double late_s = exposure_s + env->frame_latency_s + 2.0 / config->telemetry_rate_hz;
+    bst_env_set_capacity(
+        env, BST_GIMBAL_POINTING,
+        ring(fmax(config->telemetry_history_s, late_s), config->telemetry_rate_hz));
     return BST_OK;
 }
 

@@ -17,7 +17,7 @@ typedef struct bst_columns {
 } bst_columns;
 
 /* Whether the levels are to be taken off: the configuration says so, or leaves it to the camera and
- * that has a frame transfer. */
+ * that has a frame transfer, or offsets of its columns above a fifth of the read noise. */
 bool bst_columns_wanted(const bst_imgproc_config *config, const bst_camera *camera);
 
 /* Room for a frame of `width` columns. BST_ERR_MEMORY. */

@@ -55,7 +55,8 @@ const bst_config_desc bst_imgproc_config_table[] = {
     BST_ENUM(bst_imgproc_config, column_level, column_levels, "\"auto\"",
              "Whether each column's level over the others' is taken off, with the noise that it "
              "brings: the smear of a frame transfer under light, offsets of columns. auto: where "
-             "the onboard camera has frame_transfer_s."),
+             "the onboard camera has frame_transfer_s, or column_offset_rms_e above a fifth of its "
+             "read noise."),
     BST_OBJECT(bst_imgproc_config, bad_pixel_learning, bst_pixel_learner_config_table, "{}",
                "The bad-pixel map that is learned on board, besides bad_pixels and bad_pixel_file; "
                "not with a detector of one's own."),

@@ -3,17 +3,15 @@
 #include <string.h>
 
 #include "imgproc/bad_map.h"
-#include "imgproc/electrons.h"
-#include "imgproc/imgproc.h"
-#include "imgproc/locate.h"
+#include "imgproc/detect_internal.h"
 #include "imgproc/pixel_learner.h"
 #include "imgproc/rows.h"
 #include "imgproc/sensor_order.h"
 #include "imgproc/streak_locate.h"
 #include "imgproc/streak_motion.h"
-#include "imgproc/tail.h"
 #include "imgproc/windows.h"
 #include "sim/core/pages.h"
+#include "sim/core/threshold_statistics.h"
 
 /* Maxima are looked at in between the pixels from this share of the threshold on at the least. */
 static const double LOOK_SHARE = 0.65;
@@ -29,34 +27,6 @@ static const float STAR_SNR = 3.0f;
 static const double LEAST_OPEN = 0.02;
 /* Above the threshold by this no skewness of noise matters. */
 static const double CERTAIN_ABOVE = 1.5;
-
-struct bst_imgproc {
-    bst_camera camera;
-    bst_imgproc_config config;
-    bst_imgproc_maps maps;
-    uint8_t *bad; /* [height_px][width_px]: the maps' and the list's bad pixels; NULL: none */
-    double electrons_per_s_v0;
-    float *electrons; /* [height][width] of the frame; signal once filtered */
-    bst_background background;
-    bst_filter filter;
-    bst_candidates candidates;
-    bst_locator locator;
-    bst_streak_motion streak_motion;
-    bst_streak_locator streaks; /* only when config.streak_search_px > 0 */
-    bst_parallel *pool;
-    int *order, *order_swap, *row;
-    uint16_t *cropped; /* a window's pixels */
-    /* of the latest frame */
-    bst_locate_frame view;
-    bst_motion motion;
-    double exposure_s, binning, streak_px;
-    bool smeared, windowed;
-    bst_stack_frame left;
-    bst_known_psf *known;     /* NULL: the PSF is a Gaussian */
-    const bst_pixel_map *map; /* learned; NULL: none */
-    bst_columns columns;      /* of the latest frame; capacity 0: not wanted, count 0 */
-    bst_pixel_shows shows;    /* of the latest frame; capacity 0: not wanted */
-};
 
 static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     int width = (int)ip->camera.width_px, height = (int)ip->camera.height_px;
@@ -187,9 +157,9 @@ typedef struct judge {
     double normal_variance; /* of a pixel's noise that is not counted electrons, e-^2 */
 } judge;
 
-static bool exceeds(double peak, const judge *g, const bst_tail_weights *weights,
-                    const bst_tail_noise *noise) {
-    return peak > g->threshold && peak > bst_tail_quantile(g->threshold, weights, noise);
+static bool exceeds(double peak, const judge *g, const bst_threshold_weights *weights,
+                    const bst_threshold_noise *noise) {
+    return peak > g->threshold && peak > bst_threshold_quantile(g->threshold, weights, noise);
 }
 
 /* A maximum counts when the output between the pixels exceeds what the noise there exceeds as
@@ -205,7 +175,7 @@ static bool stands_out(const void *user, const bst_candidate *c) {
         /* steps wider than the noise of reading add none: what is counted is the level then */
         counted = fmax(counted, fmin(level_e, variance));
     }
-    bst_tail_noise noise = {noise_e, counted, g->ip->camera.gain_e_per_dn};
+    bst_threshold_noise noise = {noise_e, counted, g->ip->camera.gain_e_per_dn};
     double point = bst_filter_peak(f, g->ip->electrons, noise_e, false, c->x, c->y);
     if (exceeds(point, g, &f->point_weights, &noise)) {
         return true;
@@ -311,6 +281,35 @@ typedef struct part {
     bool search;
 } part;
 
+/* What the locator and stacks see of a frame that was searched. */
+static void set_view(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_motion *motion,
+                     double sigma, const float *column_noise, bst_parallel *pool) {
+    if (motion) {
+        ip->motion = *motion;
+    }
+    ip->view = (bst_locate_frame){.signal = ip->electrons,
+                                  .width = frame->window.width / frame->binning,
+                                  .height = frame->window.height / frame->binning,
+                                  .background = &ip->background,
+                                  .filter = &ip->filter,
+                                  .column_noise = column_noise,
+                                  .sigma_px = sigma,
+                                  .motion = motion ? &ip->motion : NULL,
+                                  .camera = &ip->camera,
+                                  .binning = frame->binning,
+                                  .pool = pool};
+    ip->view.origin_x_px = frame->window.x0 + 0.5 * (frame->binning - 1);
+    ip->view.origin_y_px = frame->window.y0 + 0.5 * (frame->binning - 1);
+    ip->left = (bst_stack_frame){.signal = ip->electrons,
+                                 .background = &ip->background,
+                                 .width = frame->window.width / frame->binning,
+                                 .height = frame->window.height / frame->binning,
+                                 .sigma_px = sigma,
+                                 .origin_x_px = ip->view.origin_x_px,
+                                 .origin_y_px = ip->view.origin_y_px,
+                                 .binning = frame->binning};
+}
+
 /* Finds the candidates of `frame` and sets ip->view. `whole` is the frame of which it is a window,
  * itself else: the density of false alarms and the filter are the whole frame's. */
 static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgproc_frame *whole,
@@ -364,35 +363,13 @@ static void find(bst_imgproc *ip, const bst_imgproc_frame *frame, const bst_imgp
                        (float)look_from(ip, threshold));
     }
     double look = look_from(ip, threshold);
-    judge noise = {ip, columns ? columns->noise + first_column : NULL, threshold, read_variance};
+    const float *column_noise = columns ? columns->noise + first_column : NULL;
+    judge noise = {ip, column_noise, threshold, read_variance};
     double certain = ip->smeared ? threshold : threshold + CERTAIN_ABOVE;
     bst_candidates_find(&ip->candidates, pool, &ip->filter,
                         (int)ceil(6.0 * sigma + hypot(dx, dy)) + 2, (float)look, (float)certain,
                         stands_out, &noise);
-    if (motion) {
-        ip->motion = *motion;
-    }
-    ip->view = (bst_locate_frame){.signal = ip->electrons,
-                                  .width = width,
-                                  .height = height,
-                                  .background = &ip->background,
-                                  .filter = &ip->filter,
-                                  .column_noise = columns ? columns->noise + first_column : NULL,
-                                  .sigma_px = sigma,
-                                  .motion = motion ? &ip->motion : NULL,
-                                  .camera = &ip->camera,
-                                  .binning = frame->binning,
-                                  .pool = pool};
-    ip->view.origin_x_px = frame->window.x0 + 0.5 * (frame->binning - 1);
-    ip->view.origin_y_px = frame->window.y0 + 0.5 * (frame->binning - 1);
-    ip->left = (bst_stack_frame){.signal = ip->electrons,
-                                 .background = &ip->background,
-                                 .width = width,
-                                 .height = height,
-                                 .sigma_px = sigma,
-                                 .origin_x_px = ip->view.origin_x_px,
-                                 .origin_y_px = ip->view.origin_y_px,
-                                 .binning = frame->binning};
+    set_view(ip, frame, motion, sigma, column_noise, pool);
     *out = (part){threshold, false_alarms, search};
 }
 
@@ -435,51 +412,10 @@ static void take(bst_imgproc *ip, const part *p, bst_detections *out, int capaci
     out->threshold_snr = p->threshold;
 }
 
-bst_status bst_imgproc_collect_shows(bst_ctx *ctx, bst_imgproc *ip, int capacity) {
-    return bst_pixel_shows_create(ctx, capacity, &ip->shows);
-}
-
-void bst_imgproc_use_map(bst_imgproc *ip, const bst_pixel_map *map) {
-    ip->map = map;
-}
-
-const bst_pixel_shows *bst_imgproc_shows(const bst_imgproc *ip) {
-    return &ip->shows;
-}
-
 static void measure_columns(bst_imgproc *ip, bst_parallel *pool, const bst_imgproc_frame *frame) {
     if (ip->columns.capacity > 0) {
         bst_columns_measure(&ip->columns, pool, &ip->camera, frame);
     }
-}
-
-static void begin_shows(bst_imgproc *ip) {
-    ip->shows.count = ip->shows.check_count = ip->shows.maxima = 0;
-    ip->shows.pixels = 0.0;
-    ip->shows.usable = ip->shows.capacity > 0;
-}
-
-/* Evidence of defective pixels in a frame, or a window of one, that was searched. */
-static void add_shows(bst_imgproc *ip, const bst_imgproc_frame *frame,
-                      const bst_imgproc_frame *whole) {
-    ip->shows.usable = ip->shows.usable && !ip->smeared;
-    if (!ip->shows.usable) {
-        return;
-    }
-    bst_electrons read = {&ip->camera,
-                          &ip->maps,
-                          ip->bad,
-                          frame,
-                          NULL,
-                          ip->columns.count > 0 ? &ip->columns : NULL,
-                          (frame->window.x0 - whole->window.x0) / frame->binning};
-    bst_locate_prepare(&ip->locator, &ip->view);
-    bst_pixel_shows_add(&ip->shows, &ip->locator, &ip->view, &ip->candidates);
-    if (ip->map) {
-        bst_pixel_map_check(ip->map, &ip->view, &frame->window, bst_electrons_read, &read,
-                            &ip->shows);
-    }
-    ip->shows.pixels += (double)ip->view.width * ip->view.height;
 }
 
 static void empty(bst_detections *out) {
@@ -503,8 +439,8 @@ bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_f
         bst_streak_motion_add(&ip->streak_motion, &ip->view, &ip->candidates);
         correct_motion(ip, frame->binning, &ip->motion);
     }
-    begin_shows(ip);
-    add_shows(ip, frame, frame);
+    bst_imgproc_begin_shows(ip);
+    bst_imgproc_add_shows(ip, frame, frame);
     bst_pixel_shows_sort(&ip->shows);
     take(ip, &whole, out, capacity);
     out->background_e = (double)ip->background.median_level;
@@ -542,12 +478,12 @@ bst_status bst_imgproc_detect_windows(bst_ctx *ctx, bst_imgproc *ip, const bst_i
             correct_motion(ip, frame->binning, &used);
         }
     }
-    begin_shows(ip);
+    bst_imgproc_begin_shows(ip);
     for (int i = 0; i < count; i++) {
         part p;
         bst_imgproc_frame window = bst_windows_crop(frame, &windows[i], ip->cropped);
         find(ip, &window, frame, motion ? &used : NULL, NULL, &p);
-        add_shows(ip, &window, frame);
+        bst_imgproc_add_shows(ip, &window, frame);
         take(ip, &p, out, capacity);
         double n = (double)windows[i].width * (double)windows[i].height;
         pixels += n;
@@ -599,55 +535,4 @@ double bst_imgproc_streak_px(const bst_imgproc *ip) {
 
 bool bst_imgproc_smeared(const bst_imgproc *ip) {
     return ip->smeared;
-}
-
-bst_stack_frame bst_imgproc_stack_frame(const bst_imgproc *ip, double time_s,
-                                        bst_quat q_cam_from_gcrf) {
-    bst_stack_frame frame = ip->left;
-    frame.time_s = time_s;
-    frame.q_cam_from_gcrf = q_cam_from_gcrf;
-    return frame;
-}
-
-void bst_imgproc_append_stack(const bst_imgproc *ip, const bst_stack_found *found, int count,
-                              double reach_px, bst_detections *out, int capacity) {
-    int before = out->count;
-    for (int i = 0; i < count; i++) {
-        const bst_stack_found *f = &found[i];
-        double reach = fmax(reach_px, 3.0 * sqrt(fmax(f->cov_xx, f->cov_yy)));
-        bool known = false;
-        for (int k = 0; k < before && !known; k++) {
-            known = hypot(out->items[k].x_px - f->x_px, out->items[k].y_px - f->y_px) < reach;
-        }
-        if (known) {
-            continue;
-        }
-        if (out->count == capacity) {
-            out->lost++;
-            continue;
-        }
-        bst_detection *d = &out->items[out->count++];
-        double width = 2.3548200450309493 * ip->left.sigma_px * ip->left.binning;
-        /* a stack's filter is the Gaussian that is like the PSF */
-        double like = ip->known ? ip->known->like_flux : 1.0;
-        *d = (bst_detection){.x_px = f->x_px,
-                             .y_px = f->y_px,
-                             .cov_xx = f->cov_xx,
-                             .cov_xy = f->cov_xy,
-                             .cov_yy = f->cov_yy,
-                             .flux_e = f->flux_e / like,
-                             .flux_sigma_e = f->flux_sigma_e / like,
-                             .snr = f->snr,
-                             .length_px = width,
-                             .width_px = width,
-                             .flags = BST_DETECTION_STACK,
-                             .label = f->at_rest ? BST_LABEL_STAR : BST_LABEL_OBJECT,
-                             .label_probability = 0.9,
-                             .rate_x_pxps = f->rate_x_pxps,
-                             .rate_y_pxps = f->rate_y_pxps,
-                             .rate_sigma_pxps = f->rate_sigma_pxps};
-        double rate = d->flux_e / fmax(ip->exposure_s, 1e-9);
-        d->v_mag = -2.5 * log10(rate / ip->electrons_per_s_v0);
-        d->v_mag_sigma = bst_photometry_noise_mag(d);
-    }
 }

@@ -19,9 +19,9 @@ static const double SAME_MAG = 0.75;
 static const double MAX_GATE_PX = 3.0;
 static const double STREAK_PX = 3.0;  /* stars that move further are told from points */
 static const double LONG_SHARE = 3.0; /* length over width that no pair of points has */
-/* Odds of 1000: of light at rest in the frame no more than one in a thousand is ever taken for a
- * hot pixel. */
-static const double SUSPICIOUS = 6.9;
+/* Odds of 200: of light at rest in the frame at most one in two hundred is ever taken for a hot
+ * pixel. */
+static const double SUSPICIOUS = 5.3;
 static const double FAINT_SNR = 8.0; /* below, a hot pixel may look like light */
 static const double STAR_REDETECTED = 0.6;
 

@@ -34,7 +34,7 @@ void bst_discriminator_free(bst_discriminator *discriminator);
  * UNKNOWN. Charge is a HOT_PIXEL where the same sensor pixel held charge in an earlier frame, a HIT
  * where it did not although an earlier frame covered it; a source below SNR 8 on a pixel that held
  * charge in two frames is a HOT_PIXEL too, and so is a source on a pixel that learning suspects
- * with odds of 1000 (pixel_learner.h). Of the rest, in this order: cut by the edge, an ARTEFACT; at
+ * with odds of 200 (pixel_learner.h). Of the rest, in this order: cut by the edge, an ARTEFACT; at
  * a moving track's predicted place, an OBJECT; drawn as the stars are in a frame that follows
  * something else, a STAR, and a point there an OBJECT; three times as long as wide where stars are
  * points, and not at rest there before, an OBJECT; where earlier frames had a source of its

@@ -8,7 +8,7 @@
 #include "imgproc/background.h"
 #include "imgproc/known_psf.h"
 #include "imgproc/rows.h"
-#include "imgproc/tail.h"
+#include "sim/core/threshold_statistics.h"
 
 enum {
     BST_FILTER_MAX_RADIUS = 24,
@@ -72,7 +72,7 @@ typedef struct bst_filter {
     double overlap;     /* correlation of both outputs at one place */
     /* of the kernels with unit norm: sums of powers, and the expected density of maxima (see
      * bst_filter_threshold) */
-    bst_tail_weights point_weights, streak_weights;
+    bst_threshold_weights point_weights, streak_weights;
     double point_density, streak_density;
     double corner; /* output for a point between four pixels at one of them, over its greatest */
     double threshold, threshold_density; /* the latest, and the false alarms per pixel of it */

@@ -89,7 +89,7 @@ static void axis_shares(double sigma_px, double shift, int radius, double *out) 
 
 static void add_powers(double k, double *powers) {
     double power = k * k;
-    for (int i = 0; i < BST_TAIL_POWERS; i++) {
+    for (int i = 0; i < BST_THRESHOLD_POWERS; i++) {
         power *= k;
         powers[i] += power;
     }
@@ -99,7 +99,7 @@ static void add_powers(double k, double *powers) {
  * covariance is that of unit-norm kernels by shift, averaged over the phases. */
 static void describe_point(bst_filter *f, double sigma_px) {
     int n = 2 * f->radius + 3;
-    double roughness = 0.0, powers[BST_TAIL_POWERS] = {0.0};
+    double roughness = 0.0, powers[BST_THRESHOLD_POWERS] = {0.0};
     for (int p = 0; p < BST_FILTER_PHASES; p++) {
         double here[SIZE], before[SIZE], after[SIZE], h = 1e-3, squares[3] = {0}, metric = 0.0;
         double shift = -0.5 + (double)p / (BST_FILTER_PHASES - 1);
@@ -128,7 +128,7 @@ static void describe_point(bst_filter *f, double sigma_px) {
     }
     f->corner = half * half;
     f->point_density = roughness; /* sqrt of the product over both axes, which are alike */
-    for (int i = 0; i < BST_TAIL_POWERS; i++) {
+    for (int i = 0; i < BST_THRESHOLD_POWERS; i++) {
         double one_axis = powers[i] / BST_FILTER_PHASES;
         f->point_weights.power[i] = one_axis * one_axis;
     }
@@ -152,7 +152,7 @@ static void describe_streak(bst_filter *f) {
         reach_x = abs(f->tap_x[t]) > reach_x ? abs(f->tap_x[t]) : reach_x;
         reach_y = abs(f->tap_y[t]) > reach_y ? abs(f->tap_y[t]) : reach_y;
     }
-    f->streak_weights = (bst_tail_weights){{0.0}};
+    f->streak_weights = (bst_threshold_weights){{0.0}};
     for (int y = -reach_y - f->radius; y <= reach_y + f->radius; y++) {
         for (int x = -reach_x - f->radius; x <= reach_x + f->radius; x++) {
             double k = 0.0;
@@ -227,7 +227,7 @@ static void describe_known(bst_filter *f, int binning, double *work) {
            *side[4] = {work + PLANE, work + 2 * PLANE, work + 3 * PLANE, work + 4 * PLANE};
     double *middle = work + 5 * PLANE, metric[3] = {0.0}, norm2 = 0.0;
     f->phase_stride = (n + BST_ROW_LANES - 1) / BST_ROW_LANES * BST_ROW_LANES;
-    f->point_weights = (bst_tail_weights){{0.0}};
+    f->point_weights = (bst_threshold_weights){{0.0}};
     known_shares(f, binning, 0.0, 0.0, n, middle);
     (void)scale_to_unit(middle, count);
     for (int p = 0; p < BST_FILTER_PHASES * BST_FILTER_PHASES; p++) {
@@ -242,7 +242,7 @@ static void describe_known(bst_filter *f, int binning, double *work) {
         }
         /* the two ends are one phase */
         double weight = (px % last ? 1.0 : 0.5) * (py % last ? 1.0 : 0.5) / (last * last);
-        double powers[BST_TAIL_POWERS] = {0.0}, with_middle = 0.0;
+        double powers[BST_THRESHOLD_POWERS] = {0.0}, with_middle = 0.0;
         for (int i = 0; i < count; i++) {
             double gx = (side[1][i] - side[0][i]) / (2.0 * STEP_PX);
             double gy = (side[3][i] - side[2][i]) / (2.0 * STEP_PX);
@@ -254,7 +254,7 @@ static void describe_known(bst_filter *f, int binning, double *work) {
             f->phases[(size_t)(p * n + i / n) * (size_t)f->phase_stride + (size_t)(i % n)] =
                 (float)here[i];
         }
-        for (int i = 0; i < BST_TAIL_POWERS; i++) {
+        for (int i = 0; i < BST_THRESHOLD_POWERS; i++) {
             f->point_weights.power[i] += weight * powers[i];
         }
         norm2 += weight * norm * norm;
@@ -380,9 +380,9 @@ double bst_filter_threshold(bst_filter *f, double false_alarms, double pixels) {
     double lo = 2.5, hi = 9.0;
     for (int i = 0; i < 24; i++) {
         double u = 0.5 * (lo + hi);
-        double rate = bst_tail_maxima(u, f->point_density);
+        double rate = bst_threshold_maxima(u, f->point_density);
         if (f->streak) {
-            rate += bst_tail_maxima(u, f->streak_density) * (1.0 - bst_tail_both(u, u, f->overlap));
+            rate += bst_threshold_maxima(u, f->streak_density) * (1.0 - bst_threshold_exceeds_too(u, u, f->overlap));
         }
         if (SEEN * rate * pixels > false_alarms) {
             lo = u;

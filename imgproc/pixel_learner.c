@@ -120,14 +120,23 @@ void bst_pixel_learner_note_star(bst_pixel_learner *l, bool sharp) {
 
 /* ---- evidence ---- */
 
-/* log p(deviation | the pixel's charge alone) / p(deviation | light). */
+/* p(deviation | the pixel's charge alone) / p(deviation | light). `tries`: of how many deviations
+ * it is the greatest; `any`: share of light that has any deviation. */
+static double sharp_ratio(double deviation, double alone, double tries, double any) {
+    double d = fmax(deviation, 0.0), off = deviation - alone;
+    double light = (1.0 - any) * fmin(1.0, tries * exp(-0.5 * d * d)) + any;
+    return ((1.0 - any) * exp(-0.5 * off * off) + any) / light;
+}
+
+/* Log-likelihood ratio of a maximum's shape: half of the defects stand alone among their
+ * neighbours, of half a pair of neighbours is enough to tell. */
 static double shape_ratio(const bst_pixel_learner *l, const bst_pixel_show *show) {
+    const bst_sharpness_test *t = &show->sharp;
     double any = (l->sharp_stars + 1.0) / (l->stars + SHARP_PRIOR);
-    double d = fmax((double)show->deviation, 0.0), off = d - (double)show->alone;
-    /* the deviation is the greatest of five groups': light exceeds d up to five times as often */
-    double light = (1.0 - any) * fmin(1.0, BST_SHARP_GROUPS * exp(-0.5 * d * d)) + any;
-    double charge = (1.0 - any) * exp(-0.5 * off * off) + any;
-    return fmin(fmax(log(charge / light), -SHAPE_MOST), SHAPE_MOST);
+    double ratio =
+        0.5 * sharp_ratio((double)t->all, (double)t->all_alone, 1.0, any) +
+        0.5 * sharp_ratio((double)t->worst, (double)t->worst_alone, (double)BST_SHARP_GROUPS, any);
+    return fmin(fmax(log(ratio), -SHAPE_MOST), SHAPE_MOST);
 }
 
 static bst_vec3 direction_at(const bst_pixel_learner *l, const bst_pixel_frame *f, int32_t pixel) {

@@ -49,14 +49,14 @@ typedef struct adder {
     double noise_e; /* at the maximum */
 } adder;
 
-static void add(const adder *a, int x, int y, double deviation, double alone) {
+static void add(const adder *a, int x, int y, const bst_sharpness_test *sharp) {
     const bst_locate_frame *f = a->f;
     double to_corner = 0.5 * (f->binning - 1.0);
     int64_t u = llround(f->origin_x_px - to_corner + f->binning * x);
     int64_t v = llround(f->origin_y_px - to_corner + f->binning * y);
     if (a->shows->count < a->shows->capacity) {
-        a->shows->items[a->shows->count++] = (bst_pixel_show){
-            (int32_t)(v * f->camera->width_px + u), (float)deviation, (float)alone};
+        a->shows->items[a->shows->count++] =
+            (bst_pixel_show){(int32_t)(v * f->camera->width_px + u), *sharp};
     }
 }
 
@@ -65,9 +65,9 @@ static bool is_open(const adder *a, int x, int y) {
                                  (float)a->noise_e, x, y);
 }
 
-static double compare(const adder *a, int x, int y, double *alone) {
+static bst_sharpness_test compare(const adder *a, int x, int y) {
     return bst_sharpness_compare(&a->l->sharpness, a->f->signal, a->f->width, a->f->height,
-                                 a->noise_e, x, y, alone);
+                                 a->noise_e, x, y);
 }
 
 /* The other pixels about one that holds charge that hold charge too: what the filter shows as one
@@ -76,11 +76,10 @@ static void add_cluster(const adder *a, int x, int y) {
     for (int v = y - CLUSTER_PX; v <= y + CLUSTER_PX; v++) {
         for (int u = x - CLUSTER_PX; u <= x + CLUSTER_PX; u++) {
             bool inside = u >= 0 && v >= 0 && u < a->f->width && v < a->f->height;
-            double alone;
             if (inside && (u != x || v != y) && is_open(a, u, v)) {
-                double deviation = compare(a, u, v, &alone);
-                if (deviation > BST_SHARP_DEVIATION) {
-                    add(a, u, v, deviation, alone);
+                bst_sharpness_test sharp = compare(a, u, v);
+                if ((double)sharp.worst > BST_SHARP_DEVIATION) {
+                    add(a, u, v, &sharp);
                 }
             }
         }
@@ -93,15 +92,14 @@ void bst_pixel_shows_add(bst_pixel_shows *shows, const bst_locator *l, const bst
     shows->maxima += candidates->count;
     for (int i = 0; i < candidates->count; i++) {
         int x = candidates->items[i].x, y = candidates->items[i].y;
-        double alone;
         a.noise_e = bst_locate_noise_at(f, x, y);
         find_highest(f, &x, &y);
         if (candidates->items[i].snr > CLEAR_SNR && !is_open(&a, x, y)) {
             continue;
         }
-        double deviation = compare(&a, x, y, &alone);
-        add(&a, x, y, deviation, alone);
-        if (deviation > BST_SHARP_DEVIATION) {
+        bst_sharpness_test sharp = compare(&a, x, y);
+        add(&a, x, y, &sharp);
+        if ((double)sharp.worst > BST_SHARP_DEVIATION) {
             add_cluster(&a, x, y);
         }
     }

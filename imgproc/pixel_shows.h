@@ -8,9 +8,8 @@
 
 /* A maximum of a frame. */
 typedef struct bst_pixel_show {
-    int32_t pixel;   /* y * width + x of the sensor; of a binned pixel its first one */
-    float deviation; /* from light, standard deviations: see sharpness.h */
-    float alone;     /* the mean of that if the pixel's charge were all there is */
+    int32_t pixel; /* y * width + x of the sensor; of a binned pixel its first one */
+    bst_sharpness_test sharp;
 } bst_pixel_show;
 
 /* A pixel that is left out, looked at all the same. */

@@ -20,7 +20,8 @@ static void note_stars(bst_pixel_learner *learner, const bst_camera *camera,
         }
         int64_t pixel = llround(d->y_px) * camera->width_px + llround(d->x_px);
         const bst_pixel_show *show = bst_pixel_shows_find(shows, (int32_t)pixel);
-        bst_pixel_learner_note_star(learner, show && (double)show->deviation > BST_SHARP_DEVIATION);
+        bst_pixel_learner_note_star(learner,
+                                    show && (double)show->sharp.worst > BST_SHARP_DEVIATION);
     }
 }
 

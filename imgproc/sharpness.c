@@ -177,19 +177,28 @@ double bst_sharpness_at(const bst_sharpness *s, const float *signal, int width, 
     return suspicious ? worst_of(s, &p, noise_e) : 0.0;
 }
 
-double bst_sharpness_compare(const bst_sharpness *s, const float *signal, int width, int height,
-                             double noise_e, int x, int y, double *alone) {
-    *alone = 0.0;
+bst_sharpness_test bst_sharpness_compare(const bst_sharpness *s, const float *signal, int width,
+                                         int height, double noise_e, int x, int y) {
+    bst_sharpness_test out = {0};
     if (x < 0 || y < 0 || x >= width || y >= height ||
         !((double)signal[(long)y * width + x] > 3.0 * noise_e)) {
-        return 0.0;
+        return out;
     }
     surroundings p = look_around(signal, width, height, x, y);
+    double alone = 0.0;
     for (int g = 0; g < BST_SHARP_GROUPS; g++) {
-        if (is_whole(&p, g)) {
-            *alone = fmax(*alone,
-                          s->floor[g] * p.centre / deviation_of(s, g, p.centre, noise_e * noise_e));
+        if (!is_whole(&p, g)) {
+            continue;
+        }
+        double light = s->floor[g] * p.centre;
+        double deviation = deviation_of(s, g, p.centre, noise_e * noise_e);
+        alone = fmax(alone, light / deviation);
+        if (g == 0) {
+            out.all = (float)((light - estimate(s, g, p.at)) / deviation);
+            out.all_alone = (float)(light / deviation);
         }
     }
-    return worst_of(s, &p, noise_e);
+    out.worst = (float)worst_of(s, &p, noise_e);
+    out.worst_alone = (float)alone;
+    return out;
 }

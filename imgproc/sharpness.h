@@ -50,10 +50,17 @@ bool bst_sharpness_is_open(const bst_sharpness *sharpness, const float *signal, 
 double bst_sharpness_at(const bst_sharpness *sharpness, const float *signal, int width, int height,
                         double noise_e, int x, int y);
 
-/* The same deviation, and in *alone the one that charge in this pixel alone would have on average:
- * 0 where the neighbours cannot be compared, small where the PSF is so narrow that a point looks
- * like charge. */
-double bst_sharpness_compare(const bst_sharpness *sharpness, const float *signal, int width,
-                             int height, double noise_e, int x, int y, double *alone);
+/* Deviations from light, and the mean that each has if the pixel's charge is all there is: 0 where
+ * the neighbours cannot be compared, small where the PSF is so narrow that a point looks like
+ * charge.
+ */
+typedef struct bst_sharpness_test {
+    float worst, worst_alone; /* the greatest of the five groups', at least 0 */
+    float all, all_alone;     /* of all eight neighbours; may be below 0 */
+} bst_sharpness_test;
+
+/* Compares a pixel with its neighbours, as bst_sharpness_at. */
+bst_sharpness_test bst_sharpness_compare(const bst_sharpness *sharpness, const float *signal,
+                                         int width, int height, double noise_e, int x, int y);
 
 #endif

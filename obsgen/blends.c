@@ -8,6 +8,11 @@ static const double FWHM_PER_SIGMA = 2.3548200450309493;
 /* Image processing tells two sources apart where the saddle between them is so much lower than the
  * fainter one; and two places closer than this share of the FWHM are one. */
 static const double SADDLE_SIGMA = 3.0, SADDLE_SHARE = 0.15, CLOSEST_FWHM = 0.6;
+/* It looks at what is above these shares of the threshold: that which a source between four pixels
+ * shows on one of them, or the other one. */
+static const double LOOK_CORNER = 0.93, LOOK_SHARE = 0.65;
+/* Further apart than this, and their streaks, no two share a maximum. */
+static const double FAR_SIGMAS = 8.0;
 /* Sources below this share of the threshold are no detections, but light. */
 static const double FAINTEST_SHARE = 0.3;
 /* Errors of places grow by no more than this between sources that are seen as one. */
@@ -15,6 +20,9 @@ static const double FLATTEST = 6.0;
 /* Deviation along a streak, in sigmas of the PSF, from which on the place is not that of the
  * nearest top any more; noise of its filters over white noise's that is believed. */
 static const double WANDERS = 0.2, LEAST_NOISE = 0.7, MOST_NOISE = 1.6, UNLIFTED_SNR = 10.0;
+/* Bright sources that nothing else is fitted beside are fitted with their width, up to so many of
+ * the PSF's variances more. */
+static const double WIDTH_FIT_SNR = 20.0, MOST_FREE_WIDENING = 1.8;
 /* Keys of such streaks. */
 static const uint64_t WANDER = (uint64_t)1 << 52;
 
@@ -25,7 +33,47 @@ static double overlap(const bst_generator *g, const generator_source *a,
     double c = a->length > 0.0 ? a->path.dx / a->length : 1.0;
     double s = a->length > 0.0 ? a->path.dy / a->length : 0.0;
     double length = a->as_streak ? g->streak : a->length;
-    return bst_matched_falloff(dx * c + dy * s, dy * c - dx * s, length, g->total_sigma);
+    return bst_matched_falloff(dx * c + dy * s, dy * c - dx * s, length, g->cross_sigma);
+}
+
+double bst_generator_output_variance(const bst_generator *g, const generator_source *s) {
+    const bst_generator_filter *filter = &g->filters[s->as_streak];
+    return filter->variance + filter->shot * fmax(s->amplitude, 0.0);
+}
+
+/* The filter's output for two sources at a pixel. */
+static double output_of(const bst_generator *g, const generator_source *a,
+                        const generator_source *b, int x, int y) {
+    generator_source pixel = {.x = x, .y = y};
+    return a->level * overlap(g, a, &pixel) + b->level * overlap(g, b, &pixel);
+}
+
+typedef struct grid_place {
+    int x, y;
+    double value;
+} grid_place;
+
+/* The pixel of the output's maximum about source s, one of both. */
+static grid_place climb(const bst_generator *g, const generator_source *a,
+                        const generator_source *b, const generator_source *s) {
+    enum { MOST = 8 };
+    grid_place at = {(int)lround(s->x), (int)lround(s->y), 0.0};
+    at.value = output_of(g, a, b, at.x, at.y);
+    for (int step = 0; step < MOST; step++) {
+        grid_place best = at;
+        for (int k = 0; k < 9; k++) {
+            int x = at.x + k % 3 - 1, y = at.y + k / 3 - 1;
+            double value = output_of(g, a, b, x, y);
+            if (value > best.value) {
+                best = (grid_place){x, y, value};
+            }
+        }
+        if (best.x == at.x && best.y == at.y) {
+            break;
+        }
+        at = best;
+    }
+    return at;
 }
 
 /* Whether image processing would find two maxima: the fainter source b beside a. */
@@ -37,18 +85,27 @@ static bool told_apart(const bst_generator *g, const generator_source *a,
     if (hypot(dx, dy) < CLOSEST_FWHM * FWHM_PER_SIGMA * g->sigma) {
         return false;
     }
+    if (hypot(dx, dy) > FAR_SIGMAS * g->cross_sigma + fmax(a->length, b->length)) {
+        return true;
+    }
     at.x = a->x + dx;
     at.y = a->y + dy;
-    double top = b->level + a->level * overlap(g, a, &at), saddle = top;
-    enum { STEPS = 12 };
-    for (int i = 1; i < STEPS; i++) {
-        generator_source p = *a;
-        p.x = a->x + dx * i / STEPS;
-        p.y = a->y + dy * i / STEPS;
-        double value = a->level * overlap(g, a, &p) + b->level * overlap(g, &at, &p);
-        saddle = fmin(saddle, value);
+    grid_place bright = climb(g, a, &at, a), faint = climb(g, a, &at, &at);
+    int steps = abs(faint.x - bright.x) > abs(faint.y - bright.y) ? abs(faint.x - bright.x)
+                                                                  : abs(faint.y - bright.y);
+    /* between the pixels a source between four of them is looked at */
+    double corner = exp(-0.125 / (g->filter_sigma * g->filter_sigma));
+    double least = fmax(faint.value - fmax(SADDLE_SIGMA, SADDLE_SHARE * faint.value),
+                        fmax(LOOK_CORNER * corner, LOOK_SHARE) * g->threshold);
+    for (int i = 1; i < steps; i++) {
+        double t = (double)i / steps;
+        int x = bright.x + (int)lround(t * (faint.x - bright.x));
+        int y = bright.y + (int)lround(t * (faint.y - bright.y));
+        if (output_of(g, a, &at, x, y) < least) {
+            return true;
+        }
     }
-    return top - saddle > fmax(SADDLE_SIGMA, SADDLE_SHARE * top);
+    return false;
 }
 
 /* Calls for every other source whose light reaches number i. */
@@ -80,7 +137,8 @@ void bst_generator_decide(bst_generator *g) {
         generator_source *s = &g->sources[i];
         if (s->amplitude > FAINTEST_SHARE * g->threshold) {
             s->noise = bst_generator_draw(g, s, GENERATOR_PEAK);
-            s->level = s->amplitude + s->noise / g->calibration.slope;
+            s->spread = sqrt(bst_generator_output_variance(g, s));
+            s->level = s->amplitude + s->spread * s->noise / g->calibration.slope;
             g->ranks[ranks++] = (generator_rank){s->level, i};
         }
     }
@@ -113,7 +171,9 @@ void bst_generator_decide(bst_generator *g) {
         if (merged) {
             continue;
         }
-        s->found = g->calibration.slope * (peak - g->threshold) + s->noise > 0.0;
+        s->found = g->calibration.slope * (peak - g->filters[s->as_streak].threshold) +
+                       s->spread * s->noise >
+                   0.0;
         s->peak = peak;
     }
 }
@@ -180,7 +240,7 @@ static void wander(const bst_generator *g, const generator_source *s,
     }
     bst_philox_words words = bst_rng_words(g->key, (uint64_t)g->exposure_id, WANDER | s->name);
     const bst_rng_key key = {{words.w[0], words.w[1]}};
-    double threshold = g->threshold - beside;
+    double threshold = g->filters[1].threshold - beside;
     bst_wander_top top = bst_wander_draw(g->wander, key, sources, used, noise, threshold);
     if (!(top.snr > threshold)) {
         return; /* so faint that it is seen for another reason */
@@ -213,7 +273,7 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
             continue;
         }
         double share = overlap(g, s, o);
-        if (o->found) {
+        if (o->found && !g->smeared) { /* in smeared frames nothing is fitted beside another */
             beside += o->amplitude * share;
             out.near = out.near || (fabs(dx) <= half_x && fabs(dy) <= half_y);
             /* both fluxes and places are free: what they have in common is not known */
@@ -228,19 +288,35 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
         }
     }
     generator_source at = *s;
+    double narrow = 1.0; /* variance of the PSF over that of the fitted width */
+    bool width_is_free = !g->smeared && !out.near && s->amplitude > WIDTH_FIT_SNR;
     for (int round = 0; round < ROUNDS && count > 0; round++) {
         at.x = out.x;
         at.y = out.y;
-        double own = s->flux_e * overlap(g, s, &at), sum = own, x = 0.0, y = 0.0;
+        /* the fitted light's brightest pixel, over the noise's variance */
+        double bright =
+            g->smeared ? 0.0 : out.flux_e * bst_bound_norm(&g->bound, s->length) * g->fit_light;
+        double own = s->flux_e *
+                     bst_blend_weight(&g->blend_weights, bright, pow(overlap(g, s, &at), narrow));
+        double sum = own, x = 0.0, y = 0.0, square = 0.0;
         for (int k = 0; k < count; k++) {
-            double light = merged[k].flux_e * overlap(g, &at, &merged[k]);
+            double seen = pow(overlap(g, &at, &merged[k]), narrow);
+            double light = merged[k].flux_e * bst_blend_weight(&g->blend_weights, bright, seen);
+            double dx = merged[k].x - s->x, dy = merged[k].y - s->y;
             sum += light;
-            x += light * (merged[k].x - s->x);
-            y += light * (merged[k].y - s->y);
+            x += light * dx;
+            y += light * dy;
+            square += light * (dx * dx + dy * dy);
         }
         out.flux_e = sum;
         out.x = s->x + x / sum;
         out.y = s->y + y / sum;
+        if (width_is_free) { /* the mean of both axes */
+            double own_variance = g->cross_sigma * g->cross_sigma;
+            double spread = 0.5 * (square / sum - (x * x + y * y) / (sum * sum));
+            spread = fmin(spread, MOST_FREE_WIDENING * own_variance);
+            narrow = own_variance / (own_variance + spread);
+        }
     }
     if (count > 0 && s->length > 1.0) {
         /* two streaks on one line have a flat top between them, where noise decides the place */

@@ -4,7 +4,7 @@
 
 #include "sim/core/config.h"
 
-enum { BST_OBSGEN_CALIBRATION_VERSION = 3, BST_OBSGEN_LENGTHS = 4, BST_OBSGEN_SNRS = 6 };
+enum { BST_OBSGEN_CALIBRATION_VERSION = 4, BST_OBSGEN_LENGTHS = 4, BST_OBSGEN_SNRS = 6 };
 
 /* Streak lengths (px) and SNRs at which the tables below stand; between them straight, beyond them
  * the ends hold. */

@@ -45,15 +45,35 @@ bst_detection bst_generator_point(const bst_generator *g, double x, double y, do
     return d;
 }
 
+/* False alarms where offsets of rows and columns are part of the noise, over those of white noise
+ * of the same variance, which the threshold is for: the output varies by more, but less from one
+ * row or column to the next. */
+static double more_alarms(const bst_generator *g) {
+    double more = 0.0;
+    for (int k = 0; k < 2; k++) {
+        double share = k == 1 ? g->streak_share : 1.0 - g->streak_share;
+        double v = g->filters[k].variance, t = g->threshold;
+        if (!(g->streak > 0.0)) {
+            share = k == 0 ? 1.0 : 0.0;
+        }
+        /* maxima go with sqrt(det of the gradient's covariance) u exp(-u^2 / 2), u in deviations;
+         * the offsets' part has no gradient along them */
+        more += share * sqrt(g->white_share / v) / sqrt(v) * exp(0.5 * t * t * (1.0 - 1.0 / v));
+    }
+    return more;
+}
+
 void bst_generator_false_alarms(bst_generator *g) {
     double expected = g->settings.false_alarms_per_frame * g->calibration.false_alarm_factor;
     /* background that is found too bright takes from noise */
     double taken = g->background_bias_e / (bst_bound_norm(&g->bound, 0.0) * g->noise_e);
     expected *= exp(-taken * (g->threshold + 0.5 * taken));
+    expected *= more_alarms(g);
     if (g->smeared) { /* nothing is looked at between the pixels */
         double least = g->threshold * g->noise_e / g->dark_noise_e +
                        g->background_bias_e / (bst_bound_norm(&g->bound, 0.0) * g->dark_noise_e);
-        expected = bst_matched_pixel_maxima(g->total_sigma, least) * g->width * g->height;
+        least /= sqrt(g->filters[0].variance);
+        expected = bst_matched_pixel_maxima(g->filter_sigma, least) * g->width * g->height;
     }
     double arrival = 0.0;
     for (uint64_t i = 0; i < 1000000; i++) {
@@ -64,15 +84,18 @@ void bst_generator_false_alarms(bst_generator *g) {
         }
         double x = g->width * uniform(g, draw + 1) - 0.5;
         double y = g->height * uniform(g, draw + 2) - 0.5;
+        bool streak = g->streak > 0.0 && uniform(g, draw + 4) < g->streak_share;
+        const bst_generator_filter *filter = &g->filters[streak];
         double energy = -2.0 * log(uniform(g, draw + 3)) / g->calibration.false_alarm_tail;
-        double snr = sqrt(g->threshold * g->threshold + energy);
+        double snr = sqrt(filter->threshold * filter->threshold + filter->variance * energy);
         if (g->smeared) {
             bst_generator_keep_rough(g, (int)lround(x), (int)lround(y), snr, -1);
             continue;
         }
-        bool streak = g->streak > 0.0 && uniform(g, draw + 4) < g->streak_share;
-        bst_generated item = {bst_generator_point(g, x, y, snr, streak ? g->streak : 0.0), -1,
-                              false};
+        bst_generated item = {
+            .detection = bst_generator_point(g, x, y, snr, streak ? g->streak : 0.0),
+            .item = -1,
+            .drawn = streak};
         bst_generator_keep(g, &item);
     }
 }
@@ -108,11 +131,12 @@ void bst_generator_hits(bst_generator *g) {
         double seen = length > 0.05 ? s * sqrt(BST_PI) * erf(0.5 * length / s) / length : 1.0;
         double snr = charge * kernel * fmin(seen, 1.0);
         double peak = snr + bst_rng_normal(g->key, (uint64_t)g->exposure_id, draw + 6);
-        if (!(peak > g->threshold) || x < -0.5 || y < -0.5 || x > g->width - 0.5 ||
+        if (!(peak > g->filters[0].threshold) || x < -0.5 || y < -0.5 || x > g->width - 0.5 ||
             y > g->height - 0.5) {
             continue;
         }
-        bst_generated item = {bst_generator_point(g, x, y, peak, 0.0), -1, true};
+        bst_generated item = {
+            .detection = bst_generator_point(g, x, y, peak, 0.0), .item = -1, .hit = true};
         bst_detection *d = &item.detection;
         double hottest = charge / fmax(length, 1.0) / g->noise_e;
         bool stands_out = hottest > HOT_SHARE * peak + HOT_SIGMA;

@@ -275,13 +275,13 @@ static void set_alarms(bst_generator *g) {
     /* the squares of the filter average a line's electrons over 1 / (sqrt(3 pi) S) px of it; they
      * are the output times the noise of a pixel */
     w->shot = 1.0 / (sqrt(3.0 * BST_PI) * g->total_sigma * g->noise_e);
-    if (w->maxima_sigma != g->total_sigma) {
+    if (w->maxima_sigma != g->filter_sigma) {
         for (int i = 0; i < OUTPUTS; i++) {
-            w->log_maxima[i] = log(bst_matched_pixel_maxima(g->total_sigma, 1.0 + i / 8.0));
+            w->log_maxima[i] = log(bst_matched_pixel_maxima(g->filter_sigma, 1.0 + i / 8.0));
         }
-        w->maxima_sigma = g->total_sigma;
+        w->maxima_sigma = g->filter_sigma;
     }
-    double threshold = g->threshold + w->taken, fall = 0.25 / (g->total_sigma * g->total_sigma);
+    double threshold = g->threshold + w->taken, fall = 0.25 / (g->cross_sigma * g->cross_sigma);
     double alone = exp(log_maxima_above(w, threshold));
     for (int i = 0; i < LIGHTS; i++) {
         double more[FLANK + 1]; /* at so many half pixels from the way */
@@ -441,7 +441,7 @@ bst_status bst_generator_reserve_streaks(bst_ctx *ctx, bst_generator *g, int wid
 bst_status bst_generator_fragments(bst_ctx *ctx, bst_generator *g) {
     BST_TRY(bst_generator_reserve_streaks(ctx, g, g->width, g->height));
     struct generator_streaks *w = g->streaks;
-    bst_streak_noise_set(&w->noise, g->total_sigma);
+    bst_streak_noise_set(&w->noise, g->filter_sigma);
     set_taken(g);
     set_alarms(g);
     bst_streak_light_begin(&w->light, g->width, g->height,

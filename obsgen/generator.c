@@ -30,9 +30,11 @@ bst_status bst_generator_create(bst_ctx *ctx, const bst_camera *camera, const bs
     }
     g->camera = camera;
     g->electrons_per_s_v0 = bst_camera_electrons_per_s(knowledge, 0.0);
+    g->onboard_sigma_px = hypot(bst_camera_psf_sigma_px(knowledge), settings->jitter_px);
     g->settings = *settings;
     g->settings.mesh_px = settings->mesh_px > 0 ? settings->mesh_px : 64;
     g->calibration = *calibration;
+    bst_blend_weights_init(&g->blend_weights);
     g->key = key;
     g->items = calloc((size_t)settings->capacity, sizeof *g->items);
     g->wander = calloc(1, sizeof *g->wander);
@@ -156,14 +158,18 @@ static bool place_source(const bst_generator *g, const bst_generator_frame *f,
                          const bst_truth_item *item, generator_source *s) {
     double b = g->binning;
     if (!(item->electrons > 0.0) || (item->flags & BST_TRUTH_OCCULTED) ||
-        !isfinite(item->x_mean_px) || !isfinite(item->x_start_px) || !isfinite(item->x_end_px)) {
+        !isfinite(item->x_centroid_px) || !isfinite(item->x_start_px) || !isfinite(item->x_end_px)) {
         return false;
     }
     double x0 = f->window.x0 + 0.5 * (b - 1.0), y0 = f->window.y0 + 0.5 * (b - 1.0);
     s->path.dx = (item->x_end_px - item->x_start_px) / b;
     s->path.dy = (item->y_end_px - item->y_start_px) / b;
-    s->x = (item->x_mean_px - x0) / b;
-    s->y = (item->y_mean_px - y0) / b;
+    s->x = (item->x_centroid_px - x0) / b;
+    s->y = (item->y_centroid_px - y0) / b;
+    if (!g->smeared) { /* ends that tremble are no path */
+        s->path.dx += g->straight_path.dx - g->whole_path.dx;
+        s->path.dy += g->straight_path.dy - g->whole_path.dy;
+    }
     s->length = hypot(s->path.dx, s->path.dy);
     s->flux_e = item->electrons;
     s->sharp = sharpness(g, f, item, s->length);
@@ -184,27 +190,30 @@ static void respond(const bst_generator *g, generator_source *s) {
                                      s->length);
     double ideal =
         s->sharp * s->flux_e * bst_bound_norm(&g->bound, s->length) / g->noise_e * sqrt(s->visible);
-    double efficiency = 1.0;
+    double efficiency = g->filters[0].efficiency;
     s->as_streak = false;
     if (s->broken) { /* at rest */
-        s->amplitude = s->flux_e * bst_bound_norm(&g->bound, 0.0) / g->noise_e;
+        s->amplitude = efficiency * s->flux_e * bst_bound_norm(&g->bound, 0.0) / g->noise_e;
         return;
     }
-    if (s->star) {
-        s->as_streak = g->streak > 0.0;
-        if (!s->as_streak && s->length > 0.5) {
-            efficiency = bst_matched_efficiency(s->path, point, g->total_sigma);
-        }
-    } else {
-        if (s->length > 0.5) {
-            efficiency = bst_matched_efficiency(s->path, point, g->total_sigma);
-        }
+    s->as_streak = s->star && g->streak > 0.0;
+    if (s->as_streak) {
+        efficiency = g->filters[1].efficiency;
+    } else if (!s->star) {
+        efficiency = bst_response_efficiency(&g->response, s->path, point);
         if (g->streak > 0.0) {
-            double other = bst_matched_efficiency(s->path, g->star_path, g->total_sigma);
+            double other = bst_response_efficiency(&g->response, s->path, g->star_path);
             s->as_streak = other > efficiency;
             efficiency = fmax(other, efficiency);
         }
     }
+    if (g->response.source.across_px != g->response.source.along_px) {
+        ideal *= bst_response_norm_ratio(&g->response, s->length);
+    }
+    /* noise lifts the greatest output near a source the more, the flatter the image makes its top
+     */
+    double flatness = g->cross_sigma / g->filter_sigma;
+    gain = g->smeared ? 1.0 : 1.0 + (gain - 1.0) * flatness * flatness;
     s->amplitude = gain * efficiency * ideal;
 }
 
@@ -238,12 +247,13 @@ static void set_noise(bst_generator *g, const bst_generator_frame *f) {
     const bst_detector_config *d = &c->detector;
     double added = (double)g->binning * g->binning;
     double level = (f->truth->background_e + f->truth->dark_e) * added;
-    double variance = level + c->read_noise_e * c->read_noise_e +
-                      c->gain_e_per_dn * c->gain_e_per_dn / 12.0 + d->row_noise_e * d->row_noise_e +
-                      d->row_offset_rms_e * d->row_offset_rms_e +
-                      d->column_offset_rms_e * d->column_offset_rms_e +
-                      d->read_tail_fraction * d->read_tail_rms_e * d->read_tail_rms_e +
-                      level * level * d->prnu_rms * d->prnu_rms / added;
+    double uneven_dark = f->truth->dark_e * d->dsnu_rms;
+    double variance =
+        level + c->read_noise_e * c->read_noise_e + c->gain_e_per_dn * c->gain_e_per_dn / 12.0 +
+        d->row_noise_e * d->row_noise_e + d->row_offset_rms_e * d->row_offset_rms_e +
+        d->column_offset_rms_e * d->column_offset_rms_e +
+        d->read_tail_fraction * d->read_tail_rms_e * d->read_tail_rms_e +
+        level * level * d->prnu_rms * d->prnu_rms / added + added * uneven_dark * uneven_dark;
     g->background_e = level;
     g->noise_e = sqrt(fmax(variance, 1e-6)) * g->calibration.noise_factor;
 }
@@ -287,25 +297,6 @@ static void add_crowding(bst_generator *g) {
             s->amplitude -= g->background_bias_e / (bst_bound_norm(&g->bound, length) * g->noise_e);
         }
     }
-}
-
-/* The threshold, kept by streak length. Streaks count in steps of half a pixel, as the filters do.
- */
-static void set_threshold(bst_generator *g) {
-    struct generator_thresholds *t = &g->thresholds;
-    if (t->width != g->width || t->height != g->height || t->sigma != g->total_sigma) {
-        *t = (struct generator_thresholds){
-            .width = g->width, .height = g->height, .sigma = g->total_sigma};
-    }
-    int step = (int)floor(2.0 * g->streak + 0.5);
-    step = step < GENERATOR_STEPS ? step : GENERATOR_STEPS - 1;
-    if (!(t->threshold[step] > 0.0)) {
-        t->threshold[step] =
-            bst_matched_threshold(g->total_sigma, 0.5 * step, g->settings.false_alarms_per_frame,
-                                  (double)g->width * g->height, &t->streak_share[step]);
-    }
-    g->threshold = fmax(t->threshold[step] + g->calibration.threshold_offset, 1.0);
-    g->streak_share = t->streak_share[step];
 }
 
 static bst_status reserve_path(bst_ctx *ctx, bst_generator *g, int count) {
@@ -355,7 +346,7 @@ static bst_status set_path(bst_ctx *ctx, bst_generator *g, const bst_generator_f
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the way of stars");
         }
     }
-    g->route_count = bst_route_lay(&g->path, g->total_sigma, g->route);
+    g->route_count = bst_route_lay(&g->path, g->cross_sigma, g->route);
     double *box = g->route_box;
     box[0] = box[2] = INFINITY;
     box[1] = box[3] = -INFINITY;
@@ -390,7 +381,11 @@ static bst_status set_frame(bst_ctx *ctx, bst_generator *g, const bst_generator_
                        ? (bst_path_px){f->streak_dx_px / g->binning, f->streak_dy_px / g->binning}
                        : (bst_path_px){0.0, 0.0};
     g->streak = filtered ? length : 0.0;
-    return set_path(ctx, g, f);
+    g->path.count = 0;
+    bst_generator_set_response(g, f);
+    BST_TRY(set_path(ctx, g, f));
+    bst_generator_set_response(g, f); /* with the path */
+    return BST_OK;
 }
 
 static bst_status collect(bst_ctx *ctx, bst_generator *g, const bst_generator_frame *f) {
@@ -407,8 +402,8 @@ static bst_status collect(bst_ctx *ctx, bst_generator *g, const bst_generator_fr
         respond(g, s);
         g->source_count++;
     }
-    set_threshold(g);
     add_crowding(g);
+    bst_generator_set_filters(g);
     qsort(g->sources, (size_t)g->source_count, sizeof *g->sources, by_row);
     return BST_OK;
 }
@@ -434,7 +429,7 @@ void bst_generator_keep(bst_generator *g, const bst_generated *item) {
     }
 }
 
-void bst_generator_keep_rough(bst_generator *g, int x, int y, double snr, int item) {
+void bst_generator_keep_rough(bst_generator *g, double x, double y, double snr, int item) {
     double b = g->binning, norm = bst_bound_norm(&g->bound, 0.0), sigma = g->noise_e / norm;
     bst_generated out = {.item = item};
     bst_detection *d = &out.detection;
@@ -449,14 +444,24 @@ void bst_generator_keep_rough(bst_generator *g, int x, int y, double snr, int it
     bst_generator_keep(g, &out);
 }
 
-/* A source that hardly moved in a frame that nothing is fitted in: its pixel shows it. */
-static void keep_whole_rough(bst_generator *g, const generator_source *s) {
-    int x = (int)lround(s->x), y = (int)lround(s->y);
-    double value = s->peak * bst_matched_falloff(x - s->x, y - s->y, 0.0, g->total_sigma) +
-                   s->noise / g->calibration.slope;
-    if (value > g->threshold && x >= 0 && y >= 0 && x < g->width && y < g->height) {
-        bst_generator_keep_rough(g, x, y, value, s->item);
+/* A source that hardly moved in a frame that nothing is fitted in: its brightest pixel shows it,
+ * and the outputs about that say where its top is. */
+static void keep_whole_rough(bst_generator *g, int i) {
+    const generator_source *s = &g->sources[i];
+    generator_blend b = bst_generator_blend_of(g, i);
+    int x = (int)lround(b.x), y = (int)lround(b.y);
+    double peak = fmax(s->peak, s->amplitude * b.flux_e / s->flux_e);
+    double value = peak * bst_matched_falloff(x - b.x, y - b.y, 0.0, g->cross_sigma) +
+                   s->spread * s->noise / g->calibration.slope;
+    if (!(value > g->threshold) || x < 0 || y < 0 || x >= g->width || y >= g->height) {
+        return;
     }
+    /* the top of noise and light: gradient of the one over curvature of the other */
+    double off[2], both = g->cross_sigma * g->cross_sigma;
+    double sigma = sqrt(2.0) * both / (g->filter_sigma * fmax(peak, g->threshold));
+    bst_rng_normal2(g->key, (uint64_t)g->exposure_id, s->name * GENERATOR_DRAWS + GENERATOR_PLACE,
+                    off);
+    bst_generator_keep_rough(g, b.x + sigma * off[0], b.y + sigma * off[1], value, s->item);
 }
 
 static int generated_by_row(const void *a, const void *b) {
@@ -488,10 +493,12 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
             continue;
         }
         if (s->found && g->smeared) {
-            keep_whole_rough(g, s);
+            keep_whole_rough(g, i);
         } else if (s->found) {
             generator_blend b = bst_generator_blend_of(g, i);
-            bst_generated item = {bst_generator_measure(g, s, &b), s->item, false};
+            bst_generated item = {.detection = bst_generator_measure(g, s, &b),
+                                  .item = s->item,
+                                  .drawn = s->as_streak && !b.point};
             bst_generator_keep(g, &item);
         }
     }
@@ -502,9 +509,9 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
     bst_generator_hits(g);
     for (int i = 0; i < g->count; i++) {
         bst_detection *d = &g->items[i].detection;
-        bool followed = !g->smeared && g->streak > 0.0 && (d->flags & BST_DETECTION_STREAK);
-        bst_motion_widen(f->bend_x_px, f->bend_y_px, followed ? f->bend_x_px : 0.0,
-                         followed ? f->bend_y_px : 0.0, d);
+        bool drawn = g->items[i].drawn;
+        bst_motion_widen(f->bend_x_px, f->bend_y_px, drawn ? f->bend_x_px : 0.0,
+                         drawn ? f->bend_y_px : 0.0, d);
     }
     qsort(g->items, (size_t)g->count, sizeof *g->items, generated_by_row);
     *out = (bst_generator_result){.items = g->items,
@@ -513,6 +520,7 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
                                   .background_e = g->background_e,
                                   .noise_e = g->noise_e,
                                   .threshold_snr = g->threshold,
+                                  .filter = g->filters[g->streak > 0.0],
                                   .faint_light_e = g->faint_light_e,
                                   .faint_square_e2 = g->faint_square_e2,
                                   .streak_px = g->streak * g->binning,

@@ -5,6 +5,7 @@
 #include "obsgen/bound.h"
 #include "obsgen/calibration.h"
 #include "obsgen/matched.h"
+#include "obsgen/response.h"
 #include "sim/core/messages.h"
 #include "sim/core/rng.h"
 #include "sim/world/camera.h"
@@ -13,7 +14,7 @@
 typedef struct bst_generator_settings {
     int capacity;
     double false_alarms_per_frame;
-    double jitter_px;                    /* that widens the onboard PSF */
+    double jitter_px;                    /* RMS per axis, sensor px: widens the onboard PSF */
     double streak_min_px, streak_max_px; /* star streaks that are filtered for */
     int mesh_px;                         /* side of the meshes of background and noise; 0: 64 */
 } bst_generator_settings;
@@ -23,11 +24,13 @@ typedef struct bst_generated {
     bst_detection detection;
     int32_t item; /* of the truth, the brightest that is in it; -1: none */
     bool hit;     /* a radiation hit */
+    bool drawn;   /* fitted with the stars' path, its bend too */
 } bst_generated;
 
 typedef struct bst_generator bst_generator;
 
-/* camera: the true one, borrowed; knowledge: the onboard one. */
+/* camera: the true one, borrowed; knowledge: the onboard one, whose PSF and settings->jitter_px the
+ * filters are made for. */
 bst_status bst_generator_create(bst_ctx *ctx, const bst_camera *camera, const bst_camera *knowledge,
                                 const bst_generator_settings *settings,
                                 const bst_obsgen_calibration *calibration, bst_rng_key key,
@@ -44,7 +47,9 @@ typedef struct bst_generator_frame {
     bst_window window;
     int binning;
     double exposure_s;
-    double sigma_px; /* of the true PSF, a Gaussian, without the pixel's width; sensor px */
+    double sigma_px; /* of the Gaussian of the true PSF's noise-equivalent area, without the pixel's
+                        width; sensor px */
+    const bst_response *response; /* of the filter to that PSF; NULL: both are Gaussians */
     /* path of the stars in the middle of the window and its bend (bst_motion_bend) as image
      * processing takes them from telemetry, sensor px */
     double streak_dx_px, streak_dy_px, bend_x_px, bend_y_px;
@@ -54,10 +59,21 @@ typedef struct bst_generator_frame {
     int path_count;
 } bst_generator_frame;
 
+/* What image processing asks of a filter's output, and what noise does to it. */
+typedef struct bst_generator_filter {
+    double threshold; /* that the output of such noise exceeds as rarely as a normal one the frame's
+                         threshold, SNR */
+    double variance;  /* of the output, whose pixels share the offsets of rows and columns; 1: of
+                         independent pixels */
+    double shot;      /* variance that a source of SNR 1 adds by its own photons */
+    double efficiency; /* SNR for a star over that of the filter for its real image */
+} bst_generator_filter;
+
 typedef struct bst_generator_result {
     const bst_generated *items; /* by row, then column; held until the next call */
     int count, lost;
     double background_e, noise_e, threshold_snr;
+    bst_generator_filter filter; /* of the stars */
     /* per pixel, of sources below the clip of background and noise: mean light, mean of its square
      */
     double faint_light_e, faint_square_e2;

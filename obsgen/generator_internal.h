@@ -2,6 +2,7 @@
 #ifndef BST_OBSGEN_GENERATOR_INTERNAL_H
 #define BST_OBSGEN_GENERATOR_INTERNAL_H
 
+#include "obsgen/blend_weight.h"
 #include "obsgen/generator.h"
 #include "obsgen/route.h"
 #include "obsgen/wander.h"
@@ -17,7 +18,7 @@ typedef struct generator_source {
     double sharp;          /* of its amplitude: 1 for the PSF alone */
     double amplitude;      /* SNR at the filter's output, without noise */
     double peak;           /* the same with the light of neighbours */
-    double noise;          /* drawn for the peak */
+    double noise, spread;  /* drawn for the peak; its deviation */
     double level;          /* amplitude with it */
     uint64_t name;         /* of its draws */
     int item, head;        /* head: seen in one with this source; -1: not */
@@ -55,7 +56,21 @@ struct bst_generator {
     int binning, width, height;
     double origin_x, origin_y, exposure_s;
     double sigma, total_sigma; /* of the PSF without and with the pixel's width */
+    double onboard_sigma_px;   /* of the PSF that the filters are made for, sensor px */
+    bst_response response;     /* of these to the frame's images */
+    double filter_sigma;       /* of the filters' image of a point, with the pixel's width */
+    double cross_sigma; /* of what filters show of a source beside its place: sqrt(2) of it */
+    bst_generator_filter filters[2]; /* for points, for the stars' streaks */
+    double white_share;              /* of the noise's variance that pixels have each for itself */
+    double
+        fit_light; /* brightest pixel over the noise's variance, per sqrt(sum p^2) and electron */
+    bst_path_px straight_path; /* nearest to the true one */
+    double widening;           /* width of the images over the PSF's: the path is not straight */
+    double place_ratio2;       /* variance of a place over that of a Gaussian of the PSF's
+                                              noise-equivalent             area */
+    double norm_ratio[2];      /* sqrt(sum p^2) of the filters' images over the bound's */
     bst_bound bound;
+    bst_blend_weights blend_weights;
     bst_path_px star_path;
     double bend_x, bend_y;
     bst_route_path path; /* the true one; count 0: not known */
@@ -90,6 +105,12 @@ struct bst_generator {
 
 /* Share of the frame that a Gaussian's light at (x, y) has. */
 double bst_generator_inside(const bst_generator *g, double x, double y, double sigma);
+/* The response of the frame's filters, after its path was set, and, after its noise was, their
+ * thresholds and noise. */
+void bst_generator_set_response(bst_generator *g, const bst_generator_frame *f);
+void bst_generator_set_filters(bst_generator *g);
+/* Variance of the filter's output at a source, SNR 1. */
+double bst_generator_output_variance(const bst_generator *g, const generator_source *s);
 /* Finds which sources are detected, and which are seen in one with a brighter one. */
 void bst_generator_decide(bst_generator *g);
 /* What is seen in source number i and fitted beside it. */
@@ -103,9 +124,9 @@ double bst_generator_draw(const bst_generator *g, const generator_source *s, int
 /* Draws of one source. */
 enum { GENERATOR_PEAK, GENERATOR_PLACE, GENERATOR_FLUX, GENERATOR_DRAWS = 8 };
 
-/* Takes a maximum of the filter's output that is not fitted: at the pixel itself. item: of the
- * truth, or -1. */
-void bst_generator_keep_rough(bst_generator *g, int x, int y, double snr, int item);
+/* Takes a maximum of the filter's output that is not fitted, at its top (x, y), pixels that are
+ * read. item: of the truth, or -1. */
+void bst_generator_keep_rough(bst_generator *g, double x, double y, double snr, int item);
 
 /* Takes a detection, in place of the faintest where there is no room. */
 void bst_generator_keep(bst_generator *g, const bst_generated *item);

@@ -5,6 +5,9 @@
 static const double FWHM_PER_SIGMA = 2.3548200450309493;
 /* From here on extents and a source's own streak are measured. */
 static const double MOMENTS_SNR = 10.0;
+/* Image processing fits a bright source's width with its place, and takes what the bright ones are
+ * wider than the PSF for all, up to this share of its variance. */
+static const double WIDTH_FIT_SNR = 20.0, MOST_WIDENING = 0.5;
 /* Errors do not grow further with what of a source is off the frame. */
 static const double LEAST_SEEN = 0.02;
 
@@ -16,7 +19,8 @@ static void shared_bias(const bst_generator *g, const generator_source *s, doubl
     if (s->star || s->broken || g->path.count < 3) {
         return;
     }
-    double dx = s->path.dx - g->whole_path.dx, dy = s->path.dy - g->whole_path.dy;
+    const bst_path_px *stars = g->smeared ? &g->whole_path : &g->straight_path;
+    double dx = s->path.dx - stars->dx, dy = s->path.dy - stars->dy;
     for (int k = 0; k < g->path.count; k++) {
         double u = (double)k / (g->path.count - 1) - 0.5;
         g->object_x[k] = g->path_x[k] + u * dx;
@@ -26,6 +30,17 @@ static void shared_bias(const bst_generator *g, const generator_source *s, doubl
     const bst_path_px model = s->as_streak ? g->star_path : (bst_path_px){0.0, 0.0};
     bst_route_bias(&path, model.dx, model.dy, s->as_streak ? g->bend_x : 0.0,
                    s->as_streak ? g->bend_y : 0.0, g->total_sigma, bias);
+}
+
+/* Deviation of a place that is fitted with another width than the image's, over that with its own:
+ * sum (q')^2 sum (p')^2 over (sum p' q')^2, of Gaussians at rest. */
+static double misfit(const bst_generator *g, double snr) {
+    const bst_image_width *p = &g->response.source, *q = &g->response.filter;
+    double image = p->across_px * p->along_px, model = q->across_px * q->along_px;
+    double both = g->cross_sigma * g->cross_sigma / sqrt(image * model);
+    bool fitted =
+        snr > WIDTH_FIT_SNR || fabs(image - model) < MOST_WIDENING * fmax(model - 1.0 / 12.0, 0.0);
+    return fitted ? 1.0 : both * both;
 }
 
 /* Place with error and covariance, along and across the path. */
@@ -41,10 +56,13 @@ static void measure_place(const bst_generator *g, const generator_source *s,
     bst_rng_normal2(g->key, (uint64_t)g->exposure_id, s->name * GENERATOR_DRAWS + GENERATOR_PLACE,
                     error);
     /* what of the image is off the frame says nothing; the place along a streak is in its ends */
-    double widen_along = b->widen / fmax(length > 1.0 ? s->ends : s->visible, LEAST_SEEN);
-    double widen_across = b->widen / fmax(s->visible, LEAST_SEEN);
+    double widen_along =
+        b->widen * g->place_ratio2 / fmax(length > 1.0 ? s->ends : s->visible, LEAST_SEEN);
+    double widen_across = b->widen * g->place_ratio2 / fmax(s->visible, LEAST_SEEN);
     double worse = (s->saturated ? 4.0 : 1.0) / fmin(s->sharp, 1.0);
-    double open = b->drawn ? 0.0 : worse;
+    double open = b->drawn ? 0.0 : worse * misfit(g, snr);
+    error[0] *= length > 1.0 ? 1.0 : g->widening;
+    error[1] *= g->widening;
     error[0] *= along * open * b->flat * sqrt(truth->var_along_px2 * widen_along);
     error[1] *= across * open * sqrt(truth->var_across_px2 * widen_across);
     double c = s->length > 0.0 ? s->path.dx / s->length : 1.0;
@@ -120,7 +138,7 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
     }
     bst_bound_at told = bst_bound_of(&g->bound, d.flux_e, g->noise_e, length);
     d.flux_sigma_e = sqrt(told.flux_variance * b->widen / seen);
-    d.snr = d.flux_e * told.norm / g->noise_e;
+    d.snr = d.flux_e * told.norm * g->norm_ratio[own && s->as_streak] / g->noise_e;
     measure_place(g, s, b, &truth, &told, b->flux_e * truth.norm / g->noise_e, length, &d);
     d.v_mag = -2.5 * log10(d.flux_e / (fmax(g->exposure_s, 1e-9) * g->electrons_per_s_v0));
     set_extent(g, s, s->as_streak && !b->point, &d);

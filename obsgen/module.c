@@ -86,6 +86,8 @@ typedef struct pending {
     bst_truth *truth;
     int room;
     double sigma_px;
+    bst_response response;         /* where `own_response` */
+    bool own_response;             /* one of the PSFs is no Gaussian */
     double *path_x_px, *path_y_px; /* of a star in the middle, less its mean */
     int path_count, path_room;
 } pending;
@@ -107,6 +109,8 @@ typedef struct obsgen {
     bst_camera camera;            /* at the pixel scale and jitter of the latest exposure */
     bst_psf *psf;                 /* of it, if it is wider than the world's */
     double jitter_rad2, sigma_px; /* sigma: of the Gaussian that the PSF is or stands for */
+    bst_response response; /* of the onboard filter to it, at response_binning (0: not made) */
+    int response_binning;
     bst_photometer photometer;
     pending waiting[PENDING];
 } obsgen;
@@ -208,7 +212,32 @@ static bst_status set_camera(bst_ctx *ctx, obsgen *o, double scale_arcsec, doubl
     o->jitter_rad2 = jitter_rad2;
     bst_field_set_camera(o->field, &o->camera);
     o->sigma_px = gaussian_px(&o->camera);
+    o->response_binning = 0;
     return BST_OK;
+}
+
+/* Sets the response of the onboard filter to the exposure's PSF where one of them is no Gaussian:
+ * the generator has it else. */
+static void set_response(obsgen *o, int binning, pending *p) {
+    const bst_camera *known = bst_knowledge_camera(o->knowledge);
+    double sigma_px;
+    bool gaussian = !o->camera.psf || bst_psf_gaussian(o->camera.psf, &sigma_px);
+    const bst_psf *onboard = bst_knowledge_psf(o->knowledge);
+    p->own_response = !gaussian || onboard;
+    if (!p->own_response) {
+        return;
+    }
+    if (o->response_binning != binning) {
+        const bst_response_side source = {gaussian ? NULL : o->camera.psf,
+                                          gaussian ? o->sigma_px : 0.0};
+        double own = onboard ? 0.0 : bst_camera_psf_sigma_px(known);
+        const bst_response_side filter = {onboard, hypot(own, o->config->jitter_px)};
+        bst_response_set(&o->response, &source, &filter, binning,
+                         0.5 * (double)(o->camera.width_px - 1),
+                         0.5 * (double)(o->camera.height_px - 1));
+        o->response_binning = binning;
+    }
+    p->response = o->response;
 }
 
 static double peak_e(const void *user, int index, const bst_truth_item *item) {
@@ -327,6 +356,7 @@ static bst_status expose(obsgen *o, struct bst_step *step, const bst_exposure *e
     }
     BST_TRY(star_path(ctx, o, &track, options.lead_s, e->window, p));
     p->sigma_px = o->sigma_px;
+    set_response(o, e->binning > 1 ? e->binning : 1, p);
     BST_TRY(reserve(ctx, p, count));
     if (truth->lost == 0) {
         memcpy(p->truth, truth, sizeof *truth + (size_t)count * sizeof truth->items[0]);
@@ -397,6 +427,7 @@ static bst_status process(obsgen *o, struct bst_step *step, const bst_exposure *
         .binning = e->binning,
         .exposure_s = (double)(e->end_tick - e->start_tick) / (double)o->tick_rate_hz,
         .sigma_px = p->sigma_px,
+        .response = p->own_response ? &p->response : NULL,
         .path_x_px = p->path_x_px,
         .path_y_px = p->path_y_px,
         .path_count = p->path_count};

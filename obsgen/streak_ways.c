@@ -209,7 +209,7 @@ static bst_status run_along(bst_ctx *ctx, const bst_generator *g, const bst_stre
     making m = {.light = light,
                 .source = source,
                 .amplitude = g->sources[source].amplitude,
-                .fall = 0.25 / (g->total_sigma * g->total_sigma)};
+                .fall = 0.25 / (g->cross_sigma * g->cross_sigma)};
     for (int i = 0; i < way->parts; i++) {
         int first = way->first[i], last = way->first[i + 1], from = -1;
         m.by_row = way->by_row[i];
@@ -258,7 +258,7 @@ bst_status bst_streak_ways_add(bst_ctx *ctx, bst_streak_ways *w, bst_generator *
         g->object_y[k] = g->path_y[k] + u * by.dy;
     }
     const bst_route_path own = {g->object_x, g->object_y, g->path.count};
-    set_way(&w->own, g->way, bst_route_lay(&own, g->total_sigma, g->way));
+    set_way(&w->own, g->way, bst_route_lay(&own, g->cross_sigma, g->way));
     by.dx = by.dy = 0.0;
     return run_along(ctx, g, &w->limits, index, &w->own, &by, light);
 }

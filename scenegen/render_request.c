@@ -66,10 +66,10 @@ bst_status bst_render_request_check(bst_ctx *ctx, const bst_camera *camera,
                         "a request has row_time_s %g, but the camera's rows are exposed at once",
                         q->row_time_s);
     }
-    if (q->background && !bst_skylight_varies(camera)) {
+    if (q->background && !bst_skylight_may_vary(camera)) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "a request has a map of the background, but the camera's background is the "
-                        "same all over the sensor (bst_skylight_varies)");
+                        "same all over the sensor (bst_skylight_may_vary)");
     }
     if (q->background && !covers(q->background, columns_of(camera, w))) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,

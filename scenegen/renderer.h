@@ -17,7 +17,7 @@
 typedef struct bst_renderer bst_renderer;
 
 typedef struct bst_renderer_options {
-    double tolerance_sigma; /* error of each source's image in any pixel that is allowed, in sigma
+    double tolerance_sigma; /* error of the image in any pixel that is allowed, in sigma
                                of that pixel (0.05) */
     bst_rng_key pattern;    /* of the detector's fixed patterns */
     bst_star_motion motion; /* whose track the stars follow (BST_STAR_MOTION_AUTO) */
@@ -54,7 +54,7 @@ typedef struct bst_render_request {
     double background_e; /* expected electrons per sensor pixel: sky and dark current */
     double dark_e;       /* of them, dark current (a map of it, if there is one, takes its place) */
     const struct bst_skylight_map *background; /* added to background_e, per sensor pixel; NULL:
-                    none. Only where bst_skylight_varies. It covers the window, and its whole
+                    none. Only where bst_skylight_may_vary. It covers the window, and its whole
                     columns where charge or light runs along them
                     (bst_detector_config_whole_columns) */
     int binning; /* 2 or more: so many pixels per side are added before they are read, and the
@@ -70,6 +70,8 @@ typedef struct bst_render_stats {
     double predicted_sigma; /* largest error of the image that is expected in any pixel, in its
                                sigma (crowd.h); NAN with temporal_oversample, spatial_oversample or
                                four fft_taps */
+    bool tolerance_missed;  /* that is above the tolerance: the Fourier path's grid, or as many
+                               nodes as may be, are too coarse */
     bool single_kernel;     /* the stars followed one track */
     int hits;               /* radiation hits on the sensor */
     double hits_e;          /* their charge */

@@ -17,7 +17,7 @@ void bst_scene_build_options(const bst_camera *camera, const bst_renderer_option
                           settings->tile_width, settings->tile_height, settings->group, taps,
                           1.0 / (sqrt(2.0) * sigma_px), fft_light ? " -DFFT_LIGHT" : "",
                           settings->group == 1 ? " -DNEAR_CACHE" : "",
-                          bst_skylight_varies(camera) ? " -DBACKGROUND" : "");
+                          bst_skylight_may_vary(camera) ? " -DBACKGROUND" : "");
     if (law_degree > 0) {
         length += snprintf(text + length, bytes - (size_t)length,
                            " -DDEGREE=%d -DBARELY_WIDER=%.9ef", law_degree, law_widest);

@@ -27,7 +27,8 @@ bool bst_frame_in_field(const void *user, bst_vec3 direction) {
 bool bst_frame_is_expected(const void *user, const bst_mtt_track *track) {
     const bst_frame_view *f = user;
     const bst_tracker *t = f->tracker;
-    return bst_target_is_expected(&t->target_params, &f->cue, track, track->id == t->target.id);
+    return bst_target_is_expected(&t->target_params, &f->cue, track,
+                                  track->id == t->target.id ? &t->target : NULL);
 }
 
 /* Range rates of orbits about the Earth, 1 sigma. */
@@ -78,7 +79,12 @@ bool bst_frame_observer(const bst_tracker *t, const bst_nav_telemetry *nav, doub
     double dt = seconds - (double)nav->tick / t->tick_rate_hz;
     out->time_s = seconds;
     out->earth_bary_mps = bst_vec3_sub(nav->velocity_bary_mps, nav->velocity_gcrf_mps);
-    return bst_kepler_propagate(&quiet, BST_EARTH_MU_M3PS2, nav->position_gcrf_m,
-                                nav->velocity_gcrf_mps, dt, &out->position_m,
-                                &out->velocity_mps) == BST_OK;
+    if (bst_kepler_propagate(&quiet, BST_EARTH_MU_M3PS2, nav->position_gcrf_m,
+                             nav->velocity_gcrf_mps, dt, &out->position_m,
+                             &out->velocity_mps) != BST_OK) {
+        /* at rest, or straight up: no orbit; frames are a second apart or so */
+        out->position_m = bst_vec3_axpy(nav->position_gcrf_m, dt, nav->velocity_gcrf_mps);
+        out->velocity_mps = nav->velocity_gcrf_mps;
+    }
+    return isfinite(bst_vec3_norm(out->position_m)) && bst_vec3_norm(out->position_m) > 0.0;
 }

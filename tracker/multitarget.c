@@ -178,6 +178,17 @@ static void shift(bst_mtt_track *track, const bst_mtt_frame *frame, bst_vec3 ste
                      bst_tangent_carry(frame->cue_direction, d, rate));
 }
 
+/* The filter for a track: one that is no IMM has the noise of its manoeuvring model while the
+ * innovations show a manoeuvre (adjustable process noise: Bar-Shalom, Li and Kirubarajan,
+ * Estimation with Applications to Tracking and Navigation, 2001, section 11.2). */
+static bst_filter_params filter_of(const bst_mtt *m, const bst_mtt_track *track) {
+    bst_filter_params filter = m->filter;
+    if (filter.kind != BST_FILTER_IMM && m->seconds < track->manoeuvre_end_s) {
+        filter.noise_rad2ps3 = fmax(filter.noise_rad2ps3, filter.manoeuvre_noise_rad2ps3);
+    }
+    return filter;
+}
+
 static void predict(bst_mtt *m, const bst_mtt_frame *frame) {
     double dt = frame->seconds - m->seconds;
     bst_vec3 step = {0}, rate = {0};
@@ -196,7 +207,8 @@ static void predict(bst_mtt *m, const bst_mtt_frame *frame) {
             continue;
         }
         if (!bst_mtt_predict_orbit(m, track, frame)) {
-            bst_filter_predict(&m->filter, dt, &track->state, &track->models);
+            const bst_filter_params filter = filter_of(m, track);
+            bst_filter_predict(&filter, dt, &track->state, &track->models);
             if (forward && bst_mtt_shares_acceleration(m, track, frame)) {
                 shift(track, frame, step, rate);
             }
@@ -317,6 +329,7 @@ static void hit(bst_mtt *m, int t) {
     if (track->status != BST_TRACK_TENTATIVE && !track->star &&
         bst_mtt_note_innovation(&m->params, track, &fit.innovation, dt, &statistic)) {
         record(m, BST_MTT_MANOEUVRE, track, statistic);
+        track->manoeuvre_end_s = m->now.seconds + m->params.manoeuvre_s;
     }
     if (!outshines) { /* the other one's light is in it */
         take_brightness(m, track, detection, dt);

@@ -34,7 +34,7 @@ bst_mtt_sight bst_sight_of(bst_vec3 object_m, bst_vec3 observer_m, bst_vec3 sun_
                            const bst_sight_seen *seen, double threshold_snr, bst_mtt_light *light) {
     bst_vec3 to_eye = bst_vec3_sub(observer_m, object_m);
     double phase = bst_vec3_angle(to_eye, bst_vec3_sub(sun_m, object_m));
-    light->sunlight = bst_sun_fraction(object_m, sun_m);
+    light->sunlight = bst_sun_fraction(object_m, sun_m, BST_EARTH_POLE_J2000);
     light->glow = bst_sphere_phase(0.0, phase) / bst_vec3_dot(to_eye, to_eye);
     double kept = seen->glow > 0.0 ? light->glow / seen->glow : 1.0;
     light->snr = seen->snr * light->sunlight * kept;
@@ -44,14 +44,15 @@ bst_mtt_sight bst_sight_of(bst_vec3 object_m, bst_vec3 observer_m, bst_vec3 sun_
         return BST_MTT_EARTH;
     }
     bst_vec3 farther = bst_vec3_scale(object_m, 1.0 + LIMB_SHARE);
-    if (bst_sun_fraction(farther, sun_m) == 0.0) {
+    if (bst_sun_fraction(farther, sun_m, BST_EARTH_POLE_J2000) == 0.0) {
         return BST_MTT_DARK;
     }
     if (seen->snr > 0.0 ? light->snr < DARK_SHARE * threshold_snr : light->sunlight == 0.0) {
         return BST_MTT_SHADOW;
     }
     bst_vec3 nearer = bst_vec3_scale(object_m, 1.0 / (1.0 + LIMB_SHARE));
-    bool in_full_light = bst_sun_fraction(nearer, sun_m) == 1.0 && !seen->was_bright;
+    bool in_full_light =
+        bst_sun_fraction(nearer, sun_m, BST_EARTH_POLE_J2000) == 1.0 && !seen->was_bright;
     bool dim = !in_full_light && !light->bright;
     return dim || distance < 1.0 + LIMB_SHARE ? BST_MTT_FAINT : BST_MTT_CLEAR;
 }

@@ -24,20 +24,35 @@ bst_vec3 bst_target_expected_rate(const bst_target_cue *cue, bst_vec3 direction)
                              bst_tangent_project(cue->direction, cue->rate_radps));
 }
 
-/* Rate of the track less that of the cue, and its covariance (11, 12, 22), in the track's axes. */
-static void rate_difference(const bst_target_params *params, const bst_target_cue *cue,
-                            const bst_mtt_track *track, double x[2], double p[3]) {
+/* Rate of the track less that of the cue. */
+static bst_vec3 departure_of(const bst_target_cue *cue, const bst_mtt_track *track) {
+    const bst_sky_state *s = &track->state;
+    return bst_vec3_sub(s->rate_radps, bst_target_expected_rate(cue, s->direction));
+}
+
+/* A rate, and its covariance (11, 12, 22) with `more` variance, in the track's axes. */
+static void in_axes(const bst_mtt_track *track, bst_vec3 rate, double more, double x[2],
+                    double p[3]) {
     const bst_sky_state *s = &track->state;
     bst_tangent axes = bst_tangent_at(s->direction);
-    bst_vec3 cue_rate = bst_target_expected_rate(cue, s->direction);
-    bst_vec3 difference = bst_vec3_sub(s->rate_radps, cue_rate);
-    double own = cue->rate_sigma_radps * cue->rate_sigma_radps +
-                 params->rate_floor_radps * params->rate_floor_radps;
-    x[0] = bst_vec3_dot(difference, axes.e1);
-    x[1] = bst_vec3_dot(difference, axes.e2);
-    p[0] = s->covariance[2][2] + own;
+    x[0] = bst_vec3_dot(rate, axes.e1);
+    x[1] = bst_vec3_dot(rate, axes.e2);
+    p[0] = s->covariance[2][2] + more;
     p[1] = s->covariance[2][3];
-    p[2] = s->covariance[3][3] + own;
+    p[2] = s->covariance[3][3] + more;
+}
+
+/* Variance per axis of the cue's rate. */
+static double cue_variance(const bst_target_params *params, const bst_target_cue *cue) {
+    return cue->rate_sigma_radps * cue->rate_sigma_radps +
+           params->rate_floor_radps * params->rate_floor_radps;
+}
+
+static double chi2_of(const bst_mtt_track *track, bst_vec3 rate, double more) {
+    double x[2], p[3];
+    in_axes(track, rate, more, x, p);
+    double det = p[0] * p[2] - p[1] * p[1];
+    return (p[2] * x[0] * x[0] - 2.0 * p[1] * x[0] * x[1] + p[0] * x[1] * x[1]) / det;
 }
 
 /* Misfit of any track to a valid cue. */
@@ -46,7 +61,7 @@ static bst_target_fit misfit(const bst_target_params *params, const bst_target_c
     const bst_sky_state *s = &track->state;
     bst_target_fit fit = {.chi2 = 0.0};
     double x[2], p[3];
-    rate_difference(params, cue, track, x, p);
+    in_axes(track, departure_of(cue, track), cue_variance(params, cue), x, p);
     add2(&fit, x, p[0], p[1], p[2], params->rate_chi2);
     bst_tangent axes = bst_tangent_at(s->direction);
     bst_vec3 to = bst_tangent_log(s->direction, cue->direction);
@@ -63,14 +78,17 @@ static bst_target_fit misfit(const bst_target_params *params, const bst_target_c
     return fit;
 }
 
-bst_target_fit bst_target_misfit(const bst_target_params *params, const bst_target_cue *cue,
-                                 const bst_mtt_track *track) {
+static bool rate_is_known(const bst_target_params *params, const bst_mtt_track *track) {
     const bst_sky_state *s = &track->state;
     double limit2 = params->max_rate_sigma_radps * params->max_rate_sigma_radps;
+    return s->covariance[2][2] <= limit2 && s->covariance[3][3] <= limit2;
+}
+
+bst_target_fit bst_target_misfit(const bst_target_params *params, const bst_target_cue *cue,
+                                 const bst_mtt_track *track) {
     int dof = 2 * (track->hits - 2);
     if (!cue->valid || track->at_rest || track->status == BST_TRACK_TENTATIVE ||
-        s->covariance[2][2] > limit2 || s->covariance[3][3] > limit2 ||
-        (dof > 0 && track->chi2 > params->max_chi2 * dof)) {
+        !rate_is_known(params, track) || (dof > 0 && track->chi2 > params->max_chi2 * dof)) {
         return (bst_target_fit){.chi2 = INFINITY};
     }
     return misfit(params, cue, track);
@@ -85,35 +103,53 @@ static const bst_mtt_track *find(const bst_mtt_track *tracks, int count, int64_t
     return NULL;
 }
 
-/* A kept target is let go only when its rate has become that of something else: a star, say. */
-static bool is_released(const bst_target_params *params, const bst_target_cue *cue,
-                        const bst_mtt_track *track) {
+/* A kept target is let go only when its rate has become that of something else: of a star, or, over
+ * frames in which it was not seen alone, of another object. */
+static bool is_released(const bst_target *target, const bst_target_params *params,
+                        const bst_target_cue *cue, const bst_mtt_track *track) {
     if (!cue->valid) {
         return false;
     }
-    double x[2], p[3];
-    rate_difference(params, cue, track, x, p);
-    double det = p[0] * p[2] - p[1] * p[1];
-    return (p[2] * x[0] * x[0] - 2.0 * p[1] * x[0] * x[1] + p[0] * x[1] * x[1]) / det >
+    bst_vec3 departure = departure_of(cue, track);
+    double variance = cue_variance(params, cue);
+    if (chi2_of(track, departure, variance) <= params->release_chi2) {
+        return false;
+    }
+    double floor = params->rate_floor_radps * params->rate_floor_radps;
+    if (!target->departed ||
+        (rate_is_known(params, track) &&
+         chi2_of(track, track->state.rate_radps, floor) <= params->rate_chi2)) {
+        return true;
+    }
+    return chi2_of(track, bst_vec3_sub(departure, target->departure_radps), variance) >
            params->release_chi2;
 }
 
 bool bst_target_is_expected(const bst_target_params *params, const bst_target_cue *cue,
-                            const bst_mtt_track *track, bool is_target) {
+                            const bst_mtt_track *track, const bst_target *target) {
     if (!cue->valid) {
         return false;
     }
-    return is_target ? !is_released(params, cue, track)
-                     : misfit(params, cue, track).chi2 < INFINITY;
+    return target ? !is_released(target, params, cue, track)
+                  : misfit(params, cue, track).chi2 < INFINITY;
+}
+
+static void keep(bst_target *target, const bst_target_cue *cue, double seconds,
+                 const bst_mtt_track *track) {
+    target->memory = track->state;
+    target->memory_seconds = seconds;
+    if (cue->valid && track->misses_in_row == 0 && track->merged_in_row == 0) {
+        target->departed = true;
+        target->departure_radps = departure_of(cue, track);
+    }
 }
 
 void bst_target_step(bst_target *target, const bst_target_params *params, const bst_target_cue *cue,
                      double seconds, const bst_mtt_track *tracks, int count) {
     if (target->id != 0) {
         const bst_mtt_track *kept = find(tracks, count, target->id);
-        if (kept && !kept->at_rest && !is_released(params, cue, kept)) {
-            target->memory = kept->state;
-            target->memory_seconds = seconds;
+        if (kept && !kept->at_rest && !is_released(target, params, cue, kept)) {
+            keep(target, cue, seconds, kept);
             return;
         }
         /* what let itself be mistaken for the target says nothing about where the target is */
@@ -149,8 +185,8 @@ void bst_target_step(bst_target *target, const bst_target_params *params, const 
     }
     if (best && (0.5 * (second - lowest) >= params->margin || best->hits >= params->margin_hits)) {
         target->id = best->id;
-        target->memory = best->state;
-        target->memory_seconds = seconds;
         target->remembered = false;
+        target->departed = false;
+        keep(target, cue, seconds, best);
     }
 }

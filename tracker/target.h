@@ -6,11 +6,12 @@
 #include "tracker/multitarget.h"
 
 typedef struct bst_target_params {
-    double direction_chi2;       /* largest misfit of the cue's direction, 2 degrees of freedom */
-    double rate_chi2;            /* of the rate, 2 */
-    double magnitude_chi2;       /* of the brightness, 1 */
-    double release_chi2;         /* a kept target whose rate misfits the cue by more is let go */
-    double rate_floor_radps;     /* 1 sigma per axis by which any cue's rate may be wrong */
+    double direction_chi2;   /* largest misfit of the cue's direction, 2 degrees of freedom */
+    double rate_chi2;        /* of the rate, 2 */
+    double magnitude_chi2;   /* of the brightness, 1 */
+    double release_chi2;     /* a kept target is let go when its rate misfits the cue by more and
+                                is a star's, or has changed by more while it was not seen alone */
+    double rate_floor_radps; /* 1 sigma per axis by which any cue's rate may be wrong */
     double max_rate_sigma_radps; /* a track is judged once its rate is known to this */
     double max_chi2; /* a track whose mean innovation (per degree of freedom) exceeds this is
                         not taken */
@@ -43,6 +44,9 @@ typedef struct bst_target {
     bst_sky_state memory; /* of the present or last target, at memory_seconds */
     double memory_seconds;
     double lost_seconds; /* when the last target was lost */
+    /* rate less the cue's when the present target was last seen alone: a manoeuvre adds to it */
+    bool departed;
+    bst_vec3 departure_radps;
 } bst_target;
 
 /* Misfit of a track to the cue over direction, rate and brightness. */
@@ -56,13 +60,16 @@ bst_target_fit bst_target_misfit(const bst_target_params *params, const bst_targ
                                  const bst_mtt_track *track);
 
 /* Does the cue's rate speak for the track, so that its slowness does not make it a star? For the
- * target of interest by release_chi2, for others by direction, rate and brightness, each within its
- * limit. */
+ * track of the target of interest (`target`, else NULL) unless it is to be let go, for others by
+ * direction, rate and brightness, each within its limit. */
 bool bst_target_is_expected(const bst_target_params *params, const bst_target_cue *cue,
-                            const bst_mtt_track *track, bool is_target);
+                            const bst_mtt_track *track, const bst_target *target);
 
-/* Keeps the target while its track lives; else chooses among the tracks by the cue and, after a
- * loss, by the lost target's extrapolation. Without a cue nothing new is chosen. */
+/* Keeps the target while its track lives and is not another object's. A manoeuvre takes the rate
+ * away from that of the cue, as far as it lasts, but frame by frame: a target that is detected and
+ * shares no detection may change its rate at will, within the gate of its filter. Else chooses
+ * among the tracks by the cue and, after a loss, by the lost target's extrapolation. Without a cue
+ * nothing new is chosen. */
 void bst_target_step(bst_target *target, const bst_target_params *params, const bst_target_cue *cue,
                      double seconds, const bst_mtt_track *tracks, int count);
 

@@ -323,28 +323,27 @@ static void choose_target(bst_tracker *t, const bst_target_cue *cue, double seco
 static void write_track(const bst_tracker *t, const bst_target_cue *cue, const bst_mtt_track *track,
                         bst_track *out) {
     bool is_target = track->id == t->target.id;
-    *out =
-        (bst_track){.id = track->id,
-                    .status = (int32_t)track->status,
-                    .target_of_interest = is_target,
-                    .direction_gcrf = track->state.direction,
-                    .rate_gcrf_radps = track->state.rate_radps,
-                    .v_mag = track->v_mag,
-                    .snr = track->snr,
-                    .score = track->score,
-                    .hits = track->hits,
-                    .misses_in_row = track->misses_in_row,
-                    .first_tick = track->first_tick,
-                    .last_update_tick = track->last_update_tick,
-                    .x_px = track->x_px,
-                    .y_px = track->y_px,
-                    .uncorrelated = !is_target && track->status != BST_TRACK_TENTATIVE &&
-                                    !bst_target_is_expected(&t->target_params, cue, track, false),
-                    .hidden = !track->asleep                  ? BST_HIDDEN_NOT
-                              : track->sight == BST_MTT_EARTH ? BST_HIDDEN_EARTH
-                              : track->sight == BST_MTT_CLEAR ? BST_HIDDEN_AWAITED
-                              : track->light.sunlight < 1.0   ? BST_HIDDEN_SHADOW
-                                                              : BST_HIDDEN_DIM};
+    *out = (bst_track){.id = track->id,
+                       .status = (int32_t)track->status,
+                       .target_of_interest = is_target,
+                       .direction_gcrf = track->state.direction,
+                       .rate_gcrf_radps = track->state.rate_radps,
+                       .v_mag = track->v_mag,
+                       .snr = track->snr,
+                       .score = track->score,
+                       .hits = track->hits,
+                       .misses_in_row = track->misses_in_row,
+                       .first_tick = track->first_tick,
+                       .last_update_tick = track->last_update_tick,
+                       .x_px = track->x_px,
+                       .y_px = track->y_px,
+                       .uncorrelated = !is_target && track->status != BST_TRACK_TENTATIVE &&
+                                       !bst_target_is_expected(&t->target_params, cue, track, NULL),
+                       .hidden = !track->asleep                  ? BST_HIDDEN_NOT
+                                 : track->sight == BST_MTT_EARTH ? BST_HIDDEN_EARTH
+                                 : track->sight == BST_MTT_CLEAR ? BST_HIDDEN_AWAITED
+                                 : track->light.sunlight < 1.0   ? BST_HIDDEN_SHADOW
+                                                                 : BST_HIDDEN_DIM};
     memcpy(out->covariance, track->state.covariance, sizeof out->covariance);
 }
 

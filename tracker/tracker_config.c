@@ -66,8 +66,12 @@ const bst_config_desc bst_tracker_config_table[] = {
              "Largest misfit of the target's rate to the cue, 2 degrees of freedom."),
     BST_REAL(C, target_magnitude_chi2, "", 0, 1e6, "16",
              "Largest misfit of the target's brightness to the cue."),
-    BST_REAL(C, target_release_chi2, "", 0, 1e9, "200",
-             "A kept target whose rate misfits the cue by more is let go."),
+    BST_REAL(
+        C, target_release_chi2, "", 0, 1e9, "200",
+        "A kept target whose rate misfits the cue by more is let go when it has become a star's, "
+        "or "
+        "has jumped by more while the target was not seen alone; a manoeuvre seen frame by frame "
+        "lets nothing go."),
     BST_REAL(C, target_rate_floor_arcsec_per_s, "arcsec/s", 0, 1e4, "0.1",
              "Standard deviation of the cue's rate beyond what the cue states."),
     BST_REAL(C, target_max_rate_sigma_arcsec_per_s, "arcsec/s", 1e-6, 1e4, "0.8",
@@ -108,10 +112,12 @@ const bst_config_desc bst_tracker_config_table[] = {
              "Motion orbit: square root of the power spectral density of the acceleration beside "
              "two-body motion."),
     BST_REAL(C, manoeuvre_noise_arcsec_per_s15, "arcsec/s^1.5", 0, 1e5, "3",
-             "Type imm: the same as process_noise_arcsec_per_s15 while an object manoeuvres."),
+             "The same as process_noise_arcsec_per_s15 while an object manoeuvres: of the second "
+             "model of "
+             "type imm; of ekf and ukf for manoeuvre_s after an event `manoeuvre`."),
     BST_REAL(C, quiet_s, "s", 1e-3, 1e9, "3600",
              "Type imm: mean time between the end of a manoeuvre and the next one."),
-    BST_REAL(C, manoeuvre_s, "s", 1e-3, 1e9, "60", "Type imm: mean length of a manoeuvre."),
+    BST_REAL(C, manoeuvre_s, "s", 1e-3, 1e9, "60", "Mean length of a manoeuvre."),
     BST_REAL(C, brightness_floor_mag, "mag", 0, 10, "0.2",
              "Standard deviation added to every magnitude."),
     BST_REAL(C, brightness_walk_mag, "mag", 0, 10, "0.05",

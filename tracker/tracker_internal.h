@@ -66,8 +66,8 @@ bool bst_frame_range_of(const void *user, const bst_mtt_track *track, bst_orbit_
 bst_mtt_sight bst_frame_sight_of(const void *user, const bst_mtt_track *track,
                                  bst_mtt_light *light);
 
-/* The observer in mid-exposure, from navigation telemetry of about that time; false when that is no
- * orbit. */
+/* The observer in mid-exposure, from navigation telemetry of about that time; false when that is
+ * not there. One that is on no orbit is carried on in a straight line. */
 bool bst_frame_observer(const bst_tracker *tracker, const bst_nav_telemetry *nav, double seconds,
                         bst_od_observer *out);
 

@@ -53,6 +53,9 @@ static void add_pixels(local float *sum, bst_scene_params p, int tile_x, int til
 
 static void add_background(local float *sum, bst_scene_params p, int tile_x, int tile_y, int rows,
                            int columns, global const float *background) {
+    if (p.map_step > 32768) {
+        return; /* this frame has no map */
+    }
     if (p.map_step == 1) {
         add_pixels(sum, p, tile_x, tile_y, rows, columns, background);
     } else {

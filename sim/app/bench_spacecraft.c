@@ -15,7 +15,7 @@ static bst_status sky_at(void *user, bst_ctx *ctx, double seconds, bst_craft_sky
     double r = 7e6, n = sqrt(BST_EARTH_MU_M3PS2 / (r * r * r)), a = n * seconds;
     bst_vec3 u = {cos(a), sin(a), 0.0}, v = {-sin(a), cos(a), 0.0}, sun = {BST_AU_M, 0, 0};
     *out = (bst_craft_sky){.position_m = bst_vec3_scale(u, r), .sun_m = sun};
-    out->sunlit = bst_sun_fraction(out->position_m, sun);
+    out->sunlit = bst_sun_fraction(out->position_m, sun, BST_EARTH_POLE_J2000);
     out->known = (bst_law_inputs){
         .position_m = out->position_m, .velocity_mps = bst_vec3_scale(v, n * r), .sun_m = sun};
     return BST_OK;

@@ -38,6 +38,7 @@ bst_status bst_calibrator_begin(bst_ctx *ctx, bst_calibrator *c, const bst_calib
     theory.crowding = theory.background_share = 0.0;
     const bst_generator_settings settings = {.capacity = CAPACITY,
                                              .false_alarms_per_frame = path->false_alarms_per_frame,
+                                             .jitter_px = path->jitter_px,
                                              .streak_min_px = path->streak_min_px,
                                              .streak_max_px = path->streak_max_px};
     bst_generator_free(c->theory);
@@ -89,7 +90,7 @@ static bool star_path(const bst_truth *truth, double x, double y, double *dx, do
     *dx = *dy = 0.0;
     for (int i = 0; i < truth->count; i++) {
         const bst_truth_item *t = &truth->items[i];
-        double distance = hypot(t->x_mean_px - x, t->y_mean_px - y);
+        double distance = hypot(t->x_centroid_px - x, t->y_centroid_px - y);
         if (t->kind == BST_SOURCE_STAR && distance < nearest && isfinite(t->x_end_px) &&
             isfinite(t->x_start_px)) {
             nearest = distance;
@@ -109,7 +110,7 @@ static bool is_free(const bst_truth *truth, double x, double y, double reach, in
             continue;
         }
         double away = reach * fmin(1.0 + t->snr / 1000.0, 4.0) + 0.5 * length_of(t);
-        if (fabs(t->x_mean_px - x) < away && fabs(t->y_mean_px - y) < away) {
+        if (fabs(t->x_centroid_px - x) < away && fabs(t->y_centroid_px - y) < away) {
             return false;
         }
     }
@@ -144,8 +145,8 @@ static void add_place(bst_calibrator *c, const bst_truth_item *t, const bst_dete
         return;
     }
     double free_part = 1.0 / sqrt(1.0 - own);
-    double length = length_of(t), dx = (d->x_px - t->x_mean_px - common->x) * free_part,
-           dy = (d->y_px - t->y_mean_px - common->y) * free_part;
+    double length = length_of(t), dx = (d->x_px - t->x_centroid_px - common->x) * free_part,
+           dy = (d->y_px - t->y_centroid_px - common->y) * free_part;
     double cosine = length > 0.0 ? (t->x_end_px - t->x_start_px) / length : 1.0;
     double sine = length > 0.0 ? (t->y_end_px - t->y_start_px) / length : 0.0;
     bst_bound_at at = bst_bound_of(&c->bound, t->electrons, noise_e, length);
@@ -162,7 +163,7 @@ static void add_place(bst_calibrator *c, const bst_truth_item *t, const bst_dete
         }
     }
     double weight = 1.0 / (at.var_across_px2 + 1e-6);
-    const double place[2] = {t->x_mean_px, t->y_mean_px}, off[2] = {dx, dy};
+    const double place[2] = {t->x_centroid_px, t->y_centroid_px}, off[2] = {dx, dy};
     for (int k = 0; k < 2 && length < 1.0; k++) {
         double wave = sin(2.0 * BST_PI * place[k]);
         c->bias_sum += weight * wave * off[k];
@@ -171,18 +172,25 @@ static void add_place(bst_calibrator *c, const bst_truth_item *t, const bst_dete
 }
 
 static bst_status add_trial(bst_ctx *ctx, bst_calibrator *c, const bst_truth_item *t,
-                            double amplitude, double threshold, bool detected) {
+                            double amplitude, double threshold, const bst_generator_filter *filter,
+                            bool detected) {
     if (fabs(amplitude - threshold) > PD_REACH) {
         return BST_OK;
     }
     BST_TRY(grow(ctx, (void **)&c->trials, c->trial_count, &c->trial_room, sizeof *c->trials));
-    c->trials[c->trial_count++] =
-        (calibrate_trial){(float)amplitude, (float)threshold, (float)length_of(t), detected};
+    c->trials[c->trial_count++] = (calibrate_trial){.amplitude = (float)amplitude,
+                                                    .threshold = (float)threshold,
+                                                    .length = (float)length_of(t),
+                                                    .variance = (float)filter->variance,
+                                                    .shot = (float)filter->shot,
+                                                    .detected = detected};
     return BST_OK;
 }
 
+/* above: of the threshold at the pixels' own noise over that for normal noise. */
 static bst_status add_alarms(bst_ctx *ctx, bst_calibrator *c, const bst_truth *truth,
-                             const bst_detections *detections, double reach, double taken) {
+                             const bst_detections *detections, double reach, double taken,
+                             double above) {
     double width = (double)c->path.camera->width_px, height = (double)c->path.camera->height_px;
     int open = 0;
     for (int k = 0; k < GRID * GRID; k++) {
@@ -198,7 +206,7 @@ static bst_status add_alarms(bst_ctx *ctx, bst_calibrator *c, const bst_truth *t
         if (c->pairing.item_of[i] >= 0 || !is_free(truth, d->x_px, d->y_px, reach, -1, 1.0)) {
             continue;
         }
-        double T = detections->threshold_snr;
+        double T = detections->threshold_snr + above;
         if (truth->hits > 0 && d->snr > 1.5 * T) {
             c->hits++;
             c->hits_told += d->label == BST_LABEL_HIT || d->label == BST_LABEL_HOT_PIXEL;
@@ -229,7 +237,7 @@ static void add_noise(bst_calibrator *c, const bst_detections *detections,
 static bool stands_alone(const bst_calibrator *c, const bst_truth *truth, int i, double reach) {
     const bst_truth_item *t = &truth->items[i];
     const bst_camera *camera = c->path.camera;
-    double x = t->x_mean_px, y = t->y_mean_px, edge = reach + 0.5 * length_of(t);
+    double x = t->x_centroid_px, y = t->y_centroid_px, edge = reach + 0.5 * length_of(t);
     bool whole = x > edge && y > edge && x < (double)camera->width_px - edge &&
                  y < (double)camera->height_px - edge;
     bool dark = !(t->flags & BST_TRUTH_IN_FIELD) || (t->flags & BST_TRUTH_OCCULTED) ||
@@ -250,8 +258,9 @@ static bst_status add_star(bst_ctx *ctx, bst_calibrator *c, const bst_truth_item
     /* what its background has too much is missing from the output */
     double missing = (detections->background_e - theory->background_e) /
                      (bst_bound_norm(&c->bound, length_of(t)) * detections->noise_e);
-    BST_TRY(add_trial(ctx, c, t, t->snr * plain / detections->noise_e,
-                      detections->threshold_snr + missing, k >= 0));
+    double threshold = theory->filter.threshold + detections->threshold_snr - theory->threshold_snr;
+    BST_TRY(add_trial(ctx, c, t, t->snr * plain / detections->noise_e, threshold + missing,
+                      &theory->filter, k >= 0));
     if (k < 0) {
         return BST_OK;
     }
@@ -275,8 +284,8 @@ static bool is_beside(const bst_truth *truth, int i, double reach) {
     }
     for (int k = 0; k < truth->count; k++) {
         const bst_truth_item *o = &truth->items[k];
-        if (k != i && o->snr > t->snr && fabs(o->x_mean_px - t->x_mean_px) < reach &&
-            fabs(o->y_mean_px - t->y_mean_px) < reach) {
+        if (k != i && o->snr > t->snr && fabs(o->x_centroid_px - t->x_centroid_px) < reach &&
+            fabs(o->y_centroid_px - t->y_centroid_px) < reach) {
             return true;
         }
     }
@@ -340,8 +349,8 @@ bst_status bst_calibrator_add(bst_ctx *ctx, bst_calibrator *c, const bst_truth *
             }
             if (pass == 0) {
                 double weight = place_weight(c, t, detections->noise_e);
-                common.x += weight * (detections->items[k].x_px - t->x_mean_px);
-                common.y += weight * (detections->items[k].y_px - t->y_mean_px);
+                common.x += weight * (detections->items[k].x_px - t->x_centroid_px);
+                common.y += weight * (detections->items[k].y_px - t->y_centroid_px);
                 common.weight += weight;
                 common.count++;
             } else {
@@ -356,5 +365,6 @@ bst_status bst_calibrator_add(bst_ctx *ctx, bst_calibrator *c, const bst_truth *
     }
     double taken = (detections->background_e - theory.background_e) /
                    (bst_bound_norm(&c->bound, 0.0) * detections->noise_e);
-    return add_alarms(ctx, c, truth, detections, reach, taken);
+    double above = theory.filter.threshold - theory.threshold_snr;
+    return add_alarms(ctx, c, truth, detections, reach, taken, above);
 }

@@ -20,7 +20,9 @@ static double likelihood(const bst_calibrator *c, int node, double gain, double 
         if (own != node) {
             continue;
         }
-        double z = slope * (gain * (double)t->amplitude - (double)t->threshold);
+        double snr = gain * (double)t->amplitude;
+        double z = slope * (snr - (double)t->threshold) /
+                   sqrt((double)t->variance + (double)t->shot * snr);
         double p = 0.5 * erfc(-z * 0.70710678118654752);
         sum += log(fmax(t->detected ? p : 1.0 - p, 1e-4)); /* a few are paired by mistake */
     }

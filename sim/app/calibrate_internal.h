@@ -15,6 +15,8 @@ static const double CALIBRATE_MOST_SIGMAS = 2.5;
 /* A source that stands alone, near the threshold. */
 typedef struct calibrate_trial {
     float amplitude, threshold, length;
+    float variance,
+        shot; /* of the filter's output: without the source, and by its photons, SNR 1 */
     bool detected;
 } calibrate_trial;
 

@@ -6,14 +6,14 @@
 #include "control/control.h"
 #include "gimbal/mount.h"
 #include "gimbal/two_axis.h"
+#include "sim/app/check_moves.h"
+#include "sim/engine/loop_timing.h"
 #include "sim/world/knowledge.h"
 #include "sim/world/world_config.h"
 
 /* Steps of the look: a thousandth of the run within these. */
 #define LEAST_STEP_S 0.5
 #define MOST_STEP_S 10.0
-/* Longer runs are looked at so far: a look at a day takes a fifth of a second. */
-#define MOST_LOOKED_S (3.0 * 86400.0)
 /* What the limits lose is followed from so long before to so long after they are exceeded. */
 #define RUN_UP_S 5.0
 #define RUN_OUT_S 120.0
@@ -201,6 +201,50 @@ static const bst_module_config *module_of(const bst_scenario *scenario, const se
     return NULL;
 }
 
+/* Where the boresight is at the start, in the body. */
+static bst_vec3 start_boresight(const bst_mount_status *mount) {
+    bst_quat q = BST_QUAT_IDENTITY;
+    for (int a = 0; a < mount->axes; a++) {
+        const bst_mount_axis *axis = &mount->axis[a];
+        q = bst_quat_mul(q, bst_quat_from_rotvec(bst_vec3_scale(axis->axis_body, axis->angle_rad)));
+    }
+    return bst_quat_rotate(bst_quat_mul(q, mount->q_body_from_cam_at_zero), (bst_vec3){0, 0, 1});
+}
+
+/* Slew, search and scan under the limits of the mount. */
+static bst_status moves(bst_ctx *ctx, const bst_scenario *scenario, seeing *s,
+                        const bst_control_config *config, const char *name) {
+    if (s->mount.axes == 0) {
+        return BST_OK;
+    }
+    bst_loop_timing timing;
+    bst_loop_timing_of(scenario, s->observer, s->sensor, &timing);
+    const bst_camera *camera = bst_knowledge_camera(s->knowledge);
+    double pixel = bst_camera_scale_rad(camera), width_px, height_px;
+    bst_camera_field_px(camera, &width_px, &height_px);
+    bst_cue cue;
+    BST_TRY(bst_knowledge_cue_at(ctx, s->cue, 0.0, &cue));
+    bst_mount_moves request = {.control = config,
+                               .mount = &s->mount,
+                               .period_s = timing.period_s,
+                               .exposure_s = timing.exposure_s,
+                               .width_rad = width_px * pixel,
+                               .height_rad = height_px * pixel,
+                               .cue_sigma_rad = cue.valid ? cue.sigma_rad : 0.0,
+                               .duration_s = scenario->duration_s};
+    bst_knowledge_region(s->knowledge, &request.region);
+    (void)bst_check_moves(ctx, name, &request);
+    bst_reach_look first;
+    BST_TRY(look(s, ctx, 0.0, &first));
+    bool goes = config->strategy == BST_CONTROL_TRACK || config->strategy == BST_CONTROL_RATE;
+    if (goes && first.valid) {
+        bst_vec3 wanted = bst_quat_rotate(first.q_body_from_gcrf, first.direction_gcrf);
+        (void)bst_check_first_slew(ctx, name, &request,
+                                   bst_vec3_angle(start_boresight(&s->mount), wanted));
+    }
+    return BST_OK;
+}
+
 static bst_status check_sensor(bst_ctx *ctx, const bst_scenario *scenario, const bst_world *world,
                                seeing *s, const char *name) {
     const bst_module_config *gimbal = module_of(scenario, s, "gimbal");
@@ -211,23 +255,22 @@ static bst_status check_sensor(bst_ctx *ctx, const bst_scenario *scenario, const
         return BST_OK;
     }
     const bst_control_config *config = control->config;
-    if (config->strategy != BST_CONTROL_TRACK && config->strategy != BST_CONTROL_RATE) {
-        return BST_OK;
-    }
     s->guidance = &config->guidance;
     BST_TRY(bst_knowledge_create(ctx, world, s->observer, s->sensor, &s->knowledge));
-    bst_region region;
-    bst_knowledge_region(s->knowledge, &region);
-    if (region.kind != BST_REGION_NONE) {
-        return BST_OK;
-    }
     BST_TRY(bst_knowledge_view_create(ctx, s->knowledge, &s->cue));
     BST_TRY(bst_view_create(ctx, world, &s->view));
     BST_TRY(set_mount(ctx, gimbal, (double)gimbal->period_ticks / (double)scenario->tick_rate_hz,
                       bst_knowledge_body_attitude(s->knowledge), s));
+    BST_TRY(moves(ctx, scenario, s, config, name));
+    bst_region region;
+    bst_knowledge_region(s->knowledge, &region);
+    if ((config->strategy != BST_CONTROL_TRACK && config->strategy != BST_CONTROL_RATE) ||
+        region.kind != BST_REGION_NONE) {
+        return BST_OK;
+    }
     double pixel = bst_camera_scale_rad(bst_knowledge_camera(s->knowledge));
     found f = {.count = {0}};
-    double looked_s = fmin(scenario->duration_s, MOST_LOOKED_S);
+    double looked_s = fmin(scenario->duration_s, BST_CHECK_LOOKED_S);
     BST_TRY(spans(ctx, s, looked_s, config->guidance.loss_tolerance_px * pixel, &f));
     tell(ctx, name, &f, looked_s,
          s->turns && s->law.law != BST_LAW_FREE && config->guidance.body_roll,

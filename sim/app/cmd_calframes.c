@@ -14,6 +14,7 @@
 #include "sim/app/stop_signals.h"
 #include "sim/core/draft.h"
 #include "sim/core/folder.h"
+#include "sim/core/text.h"
 #include "sim/core/version.h"
 #include "sim/io/fits_frames.h"
 
@@ -122,7 +123,9 @@ static bst_status write_series(bst_ctx *ctx, const job *j, const series *s) {
     if (status != BST_OK) {
         unlink(draft);
     } else {
-        printf("%s: %lld frames of %g s\n", path, (long long)s->count, s->exposure_s);
+        printf("%s: %s of %g s\n", path,
+               bst_count_text((char[BST_COUNT_TEXT]){0}, s->count, "frame", "frames"),
+               s->exposure_s);
     }
     return status;
 }

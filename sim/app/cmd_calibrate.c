@@ -73,6 +73,9 @@ static bst_status collect(bst_ctx *ctx, const errand *e, const char *file, int64
                          &path.false_alarms_per_frame);
     }
     if (status == BST_OK) {
+        status = setting(ctx, &scenario, "imgproc", "jitter_px", &path.jitter_px);
+    }
+    if (status == BST_OK) {
         status = setting(ctx, &scenario, "imgproc", "streak_min_px", &path.streak_min_px);
     }
     if (status == BST_OK) {

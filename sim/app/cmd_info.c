@@ -12,6 +12,7 @@
 #include "sim/app/json_number.h"
 #include "sim/app/options.h"
 #include "sim/astro/time.h"
+#include "sim/core/text.h"
 #include "sim/io/fits_reader.h"
 #include "sim/io/run_reader.h"
 
@@ -342,8 +343,9 @@ static void print_identity(const cJSON *info) {
         line("star catalogue", text);
     }
     if (isfinite(number_of(info, "wall_time_s"))) {
-        snprintf(text, sizeof text, "%.2f s, %.0f warnings", number_of(info, "wall_time_s"),
-                 number_of(info, "warnings"));
+        double warnings = number_of(info, "warnings");
+        snprintf(text, sizeof text, "%.2f s, %.0f warning%s", number_of(info, "wall_time_s"),
+                 warnings, warnings == 1.0 ? "" : "s");
         line("wall time", text);
     }
 }
@@ -352,8 +354,9 @@ static void print_sensors(const cJSON *info) {
     const cJSON *sensor;
     printf("sensors\n");
     cJSON_ArrayForEach(sensor, get(info, "sensors")) {
-        printf("  %s/%s: %.0f frames, %.0f x %.0f px", text_of(sensor, "observer", ""),
-               text_of(sensor, "name", ""), number_of(sensor, "frames"),
+        double frames = number_of(sensor, "frames");
+        printf("  %s/%s: %.0f frame%s, %.0f x %.0f px", text_of(sensor, "observer", ""),
+               text_of(sensor, "name", ""), frames, frames == 1.0 ? "" : "s",
                number_of(sensor, "width_px"), number_of(sensor, "height_px"));
         if (number_of(sensor, "bits") > 0) {
             printf(", %.0f bit", number_of(sensor, "bits"));

@@ -11,6 +11,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "sim/core/text.h"
+
 #include "sim/app/app.h"
 #include "sim/app/cmd_study.h"
 #include "sim/app/options.h"
@@ -154,8 +156,9 @@ static void show(void *user, const bst_driver_progress *p) {
 static void print_end(const bst_results *r, const bst_driver_outcome *o, double wall,
                       const char *out) {
     const bst_study *s = r->study;
-    printf("%s: %" PRId64 " of %" PRId64 " runs in %" PRId64 " settings, %.1f s\n", s->config.name,
-           r->done, s->runs, s->settings, wall);
+    printf("%s: %" PRId64 " of %s in %s, %.1f s\n", s->config.name, r->done,
+           bst_count_text((char[BST_COUNT_TEXT]){0}, s->runs, "run", "runs"),
+           bst_count_text((char[BST_COUNT_TEXT]){0}, s->settings, "setting", "settings"), wall);
     for (int64_t i = 0; i < r->error_count && i < FAILURES_SHOWN; i++) {
         printf("  run %" PRId64 " failed: %s\n", r->errors[i].run, r->errors[i].text);
     }
@@ -164,13 +167,16 @@ static void print_end(const bst_results *r, const bst_driver_outcome *o, double 
                r->error_count - FAILURES_SHOWN);
     }
     if (o->missing > 0) {
-        printf("  %" PRId64 " runs are missing%s%s\n", o->missing, *o->why ? ": " : "", o->why);
+        printf("  %s %s missing%s%s\n",
+               bst_count_text((char[BST_COUNT_TEXT]){0}, o->missing, "run", "runs"),
+               o->missing == 1 ? "is" : "are", *o->why ? ": " : "", o->why);
         printf("  go on: boresight study %s --resume\n", out);
     } else {
         printf("  results in %s/study.sqlite and CSV files beside it\n", out);
     }
     if (r->differing > 0) {
-        printf("  warning: %" PRId64 " runs that were made twice differ\n", r->differing);
+        printf("  warning: made twice with different results: %s\n",
+               bst_count_text((char[BST_COUNT_TEXT]){0}, r->differing, "run", "runs"));
     }
 }
 
@@ -188,8 +194,8 @@ static void forget_what_is_gone(bst_ctx *ctx, bst_results *results, const bst_st
         }
     }
     if (gone > 0) {
-        bst_log(ctx, BST_LOG_WARNING,
-                "the files of %" PRId64 " runs are gone or cut short; they are made again", gone);
+        bst_log(ctx, BST_LOG_WARNING, "files of %s are gone or cut short; they are made again",
+                bst_count_text((char[BST_COUNT_TEXT]){0}, gone, "run", "runs"));
     }
 }
 

@@ -136,15 +136,17 @@ static bst_status write_frame(cube *c, const bst_frame_message *m, const bst_tru
     int64_t rate = c->scenario->tick_rate_hz;
     bst_camera camera = *c->camera;
     char utc[48];
-    bst_fits_frame frame = {.id = m->exposure_id,
-                            .start = bst_time_at_tick(c->scenario->epoch, m->start_tick, rate),
-                            .exposure_s = (double)(m->end_tick - m->start_tick) / (double)rate,
-                            .window = m->window,
-                            .binning = m->binning,
-                            .bits = m->bits,
-                            .has_observer = true,
-                            .observer_gcrf_m = truth->observer_gcrf_m,
-                            .observer_gcrf_mps = truth->observer_gcrf_mps};
+    bst_fits_frame frame = {
+        .id = m->exposure_id,
+        .start = bst_time_at_tick(c->scenario->epoch, m->start_tick, rate),
+        .exposure_s = (double)(m->end_tick - m->start_tick) / (double)rate,
+        .window = m->window,
+        .binning = m->binning,
+        .bits = m->bits,
+        .has_observer = true,
+        .observer_gcrf_m = truth->observer_gcrf_m,
+        .observer_gcrf_mps = truth->observer_gcrf_mps,
+        .body_fraction = {truth->earth_fraction, truth->moon_fraction, truth->sun_fraction}};
     const bst_light light = {.velocity_mps = truth->velocity_bary_mps, .sun_m = truth->sun_m};
     if (truth->pixel_scale_arcsec > 0.0 && truth->pixel_scale_arcsec != camera.pixel_scale_arcsec) {
         BST_TRY(bst_camera_at_scale(ctx, c->camera, truth->pixel_scale_arcsec, &camera));

@@ -33,13 +33,18 @@ enum {
     METRICS
 };
 
+/* The ideal detector knows the place, and has one test for each pixel of the frame. */
+#define BELOW_ZERO                                                                               \
+    " of known place and shape. Below 0: noise of the trials (loss_db_sigma), or the gain of a " \
+    "detector that takes the highest of several places where the ideal one tests one."
+
 static const bst_metric metrics[METRICS] = {
     [SNR_PD50] = {"snr_pd50", "", "SNR at which half of the targets are detected.", 0},
     [SNR_PD90] = {"snr_pd90", "", "SNR at which 90 % of the targets are detected.", 0},
     [V_PD50] = {"v_mag_pd50", "mag", "V magnitude of targets of snr_pd50.", 0},
     [V_PD90] = {"v_mag_pd90", "mag", "V magnitude of targets of snr_pd90.", 0},
-    [LOSS_PD50] = {"loss_db_pd50", "dB", "snr_pd50 over that of the ideal detector.", 0},
-    [LOSS_PD90] = {"loss_db_pd90", "dB", "snr_pd90 over that of the ideal detector.", 0},
+    [LOSS_PD50] = {"loss_db_pd50", "dB", "snr_pd50 over that of the ideal detector" BELOW_ZERO, 0},
+    [LOSS_PD90] = {"loss_db_pd90", "dB", "snr_pd90 over that of the ideal detector" BELOW_ZERO, 0},
     [LOSS_SIGMA_PD50] = {"loss_db_sigma_pd50", "dB", "Standard deviation of loss_db_pd50.", 0},
     [LOSS_SIGMA_PD90] = {"loss_db_sigma_pd90", "dB", "Standard deviation of loss_db_pd90.", 0},
     [FALSE_ALARMS] = {"false_alarms_per_frame", "", "Measured without targets.", 0},

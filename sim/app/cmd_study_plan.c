@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "sim/app/cmd_study.h"
+#include "sim/core/text.h"
 #include "sim/io/run_store.h"
 #include "sim/studies/local_pool.h"
 #include "sim/studies/shard_run.h"
@@ -149,10 +150,12 @@ static void print_axes(const bst_study *study) {
 void bst_study_print_plan(const bst_study *study, const bst_study_kind *kind, int workers,
                           const char *device, const char *out) {
     double bytes = 0.0, row_bytes = 60.0 * (kind->metric_count + study->axis_count + 8);
-    printf("%s, kind %s: %" PRId64 " runs, %" PRId64 " settings x %" PRId64
-           " replicates, of %d %s\n",
-           study->config.name, kind->name, study->runs, study->settings, study->config.replicates,
-           study->base_count, study->base_count == 1 ? "scenario" : "scenarios");
+    printf("%s, kind %s: %s, %s x %s, of %s\n", study->config.name, kind->name,
+           bst_count_text((char[BST_COUNT_TEXT]){0}, study->runs, "run", "runs"),
+           bst_count_text((char[BST_COUNT_TEXT]){0}, study->settings, "setting", "settings"),
+           bst_count_text((char[BST_COUNT_TEXT]){0}, study->config.replicates, "replicate",
+                          "replicates"),
+           bst_count_text((char[BST_COUNT_TEXT]){0}, study->base_count, "scenario", "scenarios"));
     print_axes(study);
     trial t = attempt(study, kind, workers, device, &bytes);
     if (*t.error) {

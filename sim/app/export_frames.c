@@ -9,6 +9,7 @@
 #include "sim/app/progress.h"
 #include "sim/app/video.h"
 #include "sim/core/folder.h"
+#include "sim/core/text.h"
 #include "sim/io/fits_reader.h"
 
 enum { STRETCH_FRAMES = 9 };
@@ -162,8 +163,8 @@ static bst_status export_sensor(bst_ctx *ctx, job *j) {
     BST_TRY(choose(ctx, j));
     const bst_fits_file_info *info = bst_fits_reader_info(j->fits);
     if (j->count == 0) {
-        bst_log(ctx, BST_LOG_WARNING, "%s: none of its %lld frames is among those asked for", path,
-                (long long)info->frames);
+        bst_log(ctx, BST_LOG_WARNING, "%s: of its %s none is among those asked for", path,
+                bst_count_text((char[BST_COUNT_TEXT]){0}, info->frames, "frame", "frames"));
         return BST_OK;
     }
     double longest = info->width > info->height ? info->width : info->height;
@@ -176,7 +177,8 @@ static bst_status export_sensor(bst_ctx *ctx, job *j) {
     snprintf(j->stem, sizeof j->stem, "%.*s", (int)strcspn(j->sensor->file, "."), j->sensor->file);
     BST_TRY(open_output(ctx, j));
     BST_TRY(write_frames(ctx, j));
-    printf("%s%s: %lld frames\n", j->path, j->e->film ? "" : "/", (long long)j->count);
+    printf("%s%s: %s\n", j->path, j->e->film ? "" : "/",
+           bst_count_text((char[BST_COUNT_TEXT]){0}, j->count, "frame", "frames"));
     return BST_OK;
 }
 

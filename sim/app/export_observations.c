@@ -4,6 +4,7 @@
 
 #include "sim/app/progress.h"
 #include "sim/app/track_files.h"
+#include "sim/core/text.h"
 #include "sim/io/draft_file.h"
 #include "sim/io/tdm_writer.h"
 
@@ -89,7 +90,9 @@ bst_status bst_export_observations(bst_ctx *ctx, const bst_export *e) {
     }
     bst_run_scene_close(&scene);
     BST_TRY(status);
-    printf("%s: %" PRId64 " observations of %" PRId64 " tracks\n", path, o.observations, o.tracks);
+    printf("%s: %s of %s\n", path,
+           bst_count_text((char[BST_COUNT_TEXT]){0}, o.observations, "observation", "observations"),
+           bst_count_text((char[BST_COUNT_TEXT]){0}, o.tracks, "track", "tracks"));
     if (o.skipped > 0) {
         bst_log(ctx, BST_LOG_WARNING,
                 "%" PRId64

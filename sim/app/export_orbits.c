@@ -13,6 +13,7 @@
 #include "sim/app/plugins.h"
 #include "sim/app/progress.h"
 #include "sim/app/run_observations.h"
+#include "sim/core/text.h"
 #include "sim/io/czml_writer.h"
 #include "sim/io/draft_file.h"
 #include "sim/io/oem_writer.h"
@@ -316,7 +317,8 @@ static bst_status orbits_of(bst_ctx *ctx, const bst_export *e, const bst_scenari
         status = bst_draft_close(ctx, &draft, status);
     }
     if (status == BST_OK) {
-        printf("%s: %d orbits\n", path, written);
+        printf("%s: %s\n", path,
+               bst_count_text((char[BST_COUNT_TEXT]){0}, written, "orbit", "orbits"));
     }
     bst_view_free(view);
     bst_world_free(world);

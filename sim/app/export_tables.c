@@ -3,6 +3,7 @@
 
 #include "sim/app/export.h"
 #include "sim/app/progress.h"
+#include "sim/core/text.h"
 #include "sim/io/csv.h"
 
 /* Whether `name` is a word of the list "a,b". */
@@ -87,7 +88,7 @@ static bst_status export_table(bst_ctx *ctx, const bst_export *e, int64_t number
     bst_status status = bst_csv_write(ctx, e->run, sql, path, report, &progress, &rows);
     bst_progress_end(&progress);
     if (status == BST_OK) {
-        printf("%s: %lld rows\n", path, (long long)rows);
+        printf("%s: %s\n", path, bst_count_text((char[BST_COUNT_TEXT]){0}, rows, "row", "rows"));
     }
     return status;
 }

@@ -127,29 +127,36 @@ static bst_status platform_bands(bst_ctx *ctx, const bst_platform_config *platfo
 
 /* ---- the tracking loop ---- */
 
-static void observer_gains(const bst_control_config *control, const bst_loop_options *options,
-                           bst_loop_model *model) {
-    bst_pointing_error e;
-    bst_pointing_error_init(&e, control->disturbance_px_rms, control->disturbance_cutoff_hz,
-                            control->fix_sigma_floor_px, 1.0, 1.0);
+static bst_status observer_gains(bst_ctx *ctx, const bst_control_config *control,
+                                 const bst_image_loop_env *env, const bst_loop_options *options,
+                                 bst_loop_model *model) {
+    double density, asked;
+    bst_control_config plain = *control;
+    plain.robust_observer = false;
+    BST_TRY(bst_control_observer_density(ctx, &plain, env, 1.0, &asked));
+    BST_TRY(bst_control_observer_density(ctx, control, env, 1.0, &density));
     double sigma_px = fmax(options->fix_sigma_px, control->fix_sigma_floor_px);
-    bst_tracking_observer_gains(e.density, sigma_px, model->timing.period_s, &model->alpha,
-                                &model->beta);
+    model->observes = true;
+    model->lowered = density < asked;
+    model->alpha_beta.motion_gain = control->compensator.gain_scale;
+    model->alpha_beta.motion_late_s = control->compensator.delay_s;
+    bst_tracking_observer_gains(density, sigma_px, model->timing.period_s, &model->alpha_beta.alpha,
+                                &model->alpha_beta.beta);
+    return BST_OK;
 }
 
 static bst_status control_gains(bst_ctx *ctx, const bst_control_config *control,
                                 const bst_loop_options *options, bst_loop_model *model) {
+    const bst_image_loop_env env = {.tick_rate_hz = 1.0,
+                                    .frame_period_s = model->timing.period_s,
+                                    .frame_exposure_s = model->timing.exposure_s,
+                                    .frame_latency_s = model->timing.frame_latency_s,
+                                    .command_latency_s = control->command_latency_s,
+                                    .servo_lag_s = control->servo_lag_s};
     if (control->compensator.type == BST_CONTROL_OBSERVER && !control->compensator.plug.desc) {
-        observer_gains(control, options, model);
-        model->observes = true;
-        return BST_OK;
+        bst_status status = observer_gains(ctx, control, &env, options, model);
+        return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "control/compensator");
     }
-    bst_image_loop_env env = {.tick_rate_hz = 1.0,
-                              .frame_period_s = model->timing.period_s,
-                              .frame_exposure_s = model->timing.exposure_s,
-                              .frame_latency_s = model->timing.frame_latency_s,
-                              .command_latency_s = control->command_latency_s,
-                              .servo_lag_s = control->servo_lag_s};
     bst_image_loop *loop = malloc(sizeof *loop);
     if (!loop) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a compensator");
@@ -207,9 +214,9 @@ bst_status bst_loop_close_tracking(bst_ctx *ctx, const bst_control_config *contr
                                   .effect_s = arrival + control->command_latency_s,
                                   .switch_s = arrival + t->command_delay_s};
     BST_TRY(bst_tracking_loop_create(ctx, &timing, servo, model->observes ? NULL : &model->gains,
-                                     model->alpha, model->beta, &axis->tracking));
+                                     &model->alpha_beta, &axis->tracking));
     axis->tracked = true;
-    axis->loop = (bst_loop){.open = bst_tracking_open, .user = axis->tracking, .dt_s = t->period_s};
+    axis->loop = bst_tracking_as_loop(axis->tracking);
     BST_TRY(bst_loop_analyse(ctx, &axis->loop, &axis->margins));
     predict(axis, drift_pxps, options, t->period_s);
     return BST_OK;

@@ -65,7 +65,8 @@ typedef struct bst_loop_model {
     bst_loop_timing timing;
     double command_latency_s;
     bool observes; /* the observer: margins as of bst_tracking_open */
-    double alpha, beta;
+    bst_tracking_observer alpha_beta;
+    bool lowered;          /* its gains are those of robust_observer */
     bst_compensator gains; /* else */
     int bodies;            /* 0: the spacecraft has no loop */
     bst_loop_body body[BST_LOOP_BODY];

@@ -48,9 +48,10 @@ void bst_loop_print(const bst_loop_model *model) {
         const bst_loop_axis *axis = &model->axis[a];
         if (axis->tracked && model->observes) {
             printf(
-                "  %s axis, tracking loop: observer (alpha %.3g, beta %.3g), broken where the "
+                "  %s axis, tracking loop: observer (alpha %.3g, beta %.3g%s), broken where the "
                 "mount's motion shows in the frames\n",
-                axis->name, model->alpha, model->beta);
+                axis->name, model->alpha_beta.alpha, model->alpha_beta.beta,
+                model->lowered ? ", lowered for the latency" : "");
         } else if (axis->tracked) {
             printf("  %s axis, tracking loop: %s\n", axis->name, model->compensator);
         }

@@ -4,6 +4,7 @@
 
 #include "sim/app/json_number.h"
 #include "sim/app/pd.h"
+#include "sim/core/text.h"
 #include "sim/eval/detection_theory.h"
 #include "sim/io/plot.h"
 
@@ -61,6 +62,11 @@ static void print_loss(const char *name, bst_pd_needed needed, double ideal, dou
             "matched filter\n",
             name, needed.snr, ideal, loss, loss - BST_NORMAL_95 * sigma,
             loss + BST_NORMAL_95 * sigma, over_matched);
+        if (loss < 0.0) {
+            printf(
+                "    below 0: noise of the trials, or the gain of taking the highest of several "
+                "places where the ideal detector tests one\n");
+        }
     } else if (isfinite(needed.snr)) {
         printf(
             "  Pd %s at SNR %.3f; no loss without a false alarm: give more --empty-frames or "
@@ -85,10 +91,10 @@ static void print_head(const bst_pd_scene *s, const bst_pd_result *r) {
         printf("points\n");
     }
     printf(
-        "%lld frames with up to %d targets, %lld without; processing %.1f ms a frame, %.1f s in "
+        "%s with up to %d targets, %lld without; processing %.1f ms a frame, %.1f s in "
         "all\n\n",
-        (long long)r->frames, bst_pd_scene_room(s), (long long)r->empty_frames, 1e3 * r->process_s,
-        r->wall_s);
+        bst_count_text((char[BST_COUNT_TEXT]){0}, r->frames, "frame", "frames"),
+        bst_pd_scene_room(s), (long long)r->empty_frames, 1e3 * r->process_s, r->wall_s);
     const char *const axes[2] = {s->sharpness ? "along" : "x", s->sharpness ? "across" : "y"};
     printf("%56s RMS error over bound\n%7s %7s %8s %7s  %-16s %6s %7s  %7s %7s %7s %6s %9s", "",
            "SNR", "V", "trials", "Pd", "95 %", "ideal", "matched", axes[0], axes[1], "flux", "chi2",
@@ -132,7 +138,8 @@ void bst_pd_print(const bst_pd_scene *s, const bst_pd_result *r, const bst_pd_fi
             f->gain_db_pd90, f->gain_over_single_db_pd90);
     }
     if (r->lost > 0) {
-        printf("  %lld detections found no room and are missing\n", (long long)r->lost);
+        printf("  no room for %s, which are missing\n",
+               bst_count_text((char[BST_COUNT_TEXT]){0}, r->lost, "detection", "detections"));
     }
 }
 

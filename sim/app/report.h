@@ -64,6 +64,7 @@ void bst_warnings_write(FILE *out, const bst_warnings *warnings);
 typedef struct bst_report_frame {
     int64_t exposure_id;
     double mid_s, end_s;
+    double tracked_s; /* when its tracks were published */
     double boresight_x_px, boresight_y_px;
     double error_px, error_x_px, error_y_px;
     double snr;               /* true one of the target, in the field and shining */
@@ -107,10 +108,11 @@ typedef struct bst_report_sensor {
     size_t count;
     bst_report_mode *modes; /* changes of mode */
     size_t mode_count;
-    /* of the run's summary, and those it lacks (a run that was killed) by the same rules from
-     * `frames`; times of a run without a summary are those of mid-exposure */
+    /* of the run's summary; of a run without one (it was killed) by the same rules from `frames`,
+     * but for the time to confirm and wrong_target_frames */
     bst_loop_figures loop;
     double real_time_factor; /* NAN: not known */
+    int64_t bad_pixels;      /* that image processing had learned at the end */
     int64_t track_frames;    /* track errors of the summary; 0: none */
     double track_rms_px, track_median_px, track_p95_px, track_max_px;
     bool has_truth;    /* the target's true place is known in some frame */

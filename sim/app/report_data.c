@@ -30,7 +30,8 @@ typedef struct reading {
     bst_report_sensor *out;
 } reading;
 
-static const bst_report_frame unknown = {.boresight_x_px = NAN,
+static const bst_report_frame unknown = {.tracked_s = NAN,
+                                         .boresight_x_px = NAN,
                                          .boresight_y_px = NAN,
                                          .error_px = NAN,
                                          .error_x_px = NAN,

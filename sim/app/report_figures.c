@@ -24,22 +24,27 @@ bst_loop_frame bst_report_loop_frame(const bst_report_frame *f) {
 
 /* Marks the frames and notes the times, as sim/eval/loop_summary.c does when it gets messages. */
 static void mark(bst_report_sensor *s) {
-    bool acquired = false, settled = false;
+    double acquired_s = NAN;
+    bool settled = false;
     for (size_t i = 0; i < s->count; i++) {
         bst_report_frame *f = &s->frames[i];
         if (f->task_begins) {
-            acquired = settled = false;
+            acquired_s = NAN;
+            settled = false;
         }
-        settled = settled || bst_loop_settles(acquired, bst_report_loop_frame(f).mode, f->error_px);
+        settled = settled || bst_loop_settles(acquired_s <= f->end_s, bst_report_loop_frame(f).mode,
+                                              f->error_px);
         if (settled && isnan(s->loop.time_to_settle_s)) {
-            s->loop.time_to_settle_s = f->mid_s;
+            s->loop.time_to_settle_s = 2.0 * f->mid_s - f->end_s; /* start of the exposure */
         }
-        f->acquired = acquired; /* by the frame before: its tracks came after this exposure began */
+        if (f->in_track && isnan(acquired_s)) {
+            acquired_s = isfinite(f->tracked_s) ? f->tracked_s : f->mid_s;
+            if (isnan(s->loop.time_to_acquire_s)) {
+                s->loop.time_to_acquire_s = acquired_s;
+            }
+        }
+        f->acquired = f->mid_s >= acquired_s;
         f->settled = settled;
-        if (f->in_track && isnan(s->loop.time_to_acquire_s)) {
-            s->loop.time_to_acquire_s = f->mid_s;
-        }
-        acquired = acquired || f->in_track;
         s->loop.final_mode = f->mode;
     }
 }
@@ -86,7 +91,7 @@ static void take_summary(bst_report_sensor *s, const cJSON *summary) {
                   {"breaks", &f->breaks},
                   {"wrong_target_frames", &f->wrong_target_frames},
                   {"pointing_frames", &f->pointing_frames},
-                  {"bad_pixels", &f->bad_pixels},
+                  {"bad_pixels", &s->bad_pixels},
                   {"track_frames", &s->track_frames}};
     for (size_t k = 0; k < sizeof reals / sizeof *reals; k++) {
         take_real(summary, reals[k].key, reals[k].value);

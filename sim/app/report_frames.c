@@ -5,6 +5,7 @@
 
 #include "sim/app/frame_marks.h"
 #include "sim/app/report.h"
+#include "sim/core/text.h"
 #include "sim/io/fits_reader.h"
 #include "sim/io/frame_picture.h"
 
@@ -181,7 +182,9 @@ static void put_facts(FILE *out, const bst_report_frame *f, bool tracked, double
         }
     }
     if (isfinite(f->detections)) {
-        snprintf(lines[2], sizeof lines[2], "%.0f detections, %.0f stars", f->detections, f->stars);
+        snprintf(lines[2], sizeof lines[2], "%.0f detection%s, %.0f star%s identified",
+                 f->detections, f->detections == 1.0 ? "" : "s", f->stars,
+                 f->stars == 1.0 ? "" : "s");
     }
     if (f->known && tracked) {
         snprintf(lines[3], sizeof lines[3], "%s", f->in_track ? "in track" : "not in track");

@@ -1,3 +1,4 @@
+#include <ctype.h>
 #include <math.h>
 #include <stdarg.h>
 #include <string.h>
@@ -33,7 +34,8 @@ static const char style[] =
     ".scroll{overflow-x:auto}table{border-collapse:collapse;font-size:.9rem;margin:.4rem 0}"
     "th,td{text-align:left;vertical-align:top;padding:.22rem .9rem .22rem 0;"
     "border-bottom:1px solid var(--grid)}th{font-weight:600}td.n,th.n{text-align:right;"
-    "font-variant-numeric:tabular-nums}table.two th{font-weight:400;color:var(--soft);"
+    "font-variant-numeric:tabular-nums}td.n,.w{white-space:nowrap}table.two "
+    "th{font-weight:400;color:var(--soft);"
     "white-space:nowrap}\n"
     "details>summary{cursor:pointer;margin:.4rem 0}\n"
     ".frame{display:block;width:100%;height:auto}.frame text{font:12px system-ui,sans-serif;"
@@ -63,6 +65,32 @@ void bst_page_end(FILE *out) {
     fputs("</body>\n</html>\n", out);
 }
 
+/* Text in which a number such as 1.6e-05 is not broken at its hyphen. */
+static void put_prose(FILE *out, const char *text) {
+    while (*text) {
+        size_t space = strspn(text, " "), word = strcspn(text + space, " ");
+        const char *from = text + space;
+        bool number = false;
+        for (size_t i = 1; i + 2 < word && !number; i++) {
+            number = from[i] == 'e' && from[i + 1] == '-' && isdigit((unsigned char)from[i - 1]) &&
+                     isdigit((unsigned char)from[i + 2]);
+        }
+        fprintf(out, "%.*s%s", (int)space, text, number ? "<span class=\"w\">" : "");
+        char part[400];
+        for (size_t i = 0, n; i < word; i += n) {
+            n = word - i < sizeof part - 1 ? word - i : sizeof part - 1;
+            while (n < word - i && n > 1 && ((unsigned char)from[i + n] & 0xC0) == 0x80) {
+                n--; /* not inside a character */
+            }
+            memcpy(part, from + i, n);
+            part[n] = '\0';
+            bst_html_text(out, part);
+        }
+        fputs(number ? "</span>" : "", out);
+        text = from + word;
+    }
+}
+
 void bst_page_section(FILE *out, int level, const char *heading) {
     fprintf(out, "<section>\n<h%d>", level);
     bst_html_text(out, heading);
@@ -89,7 +117,7 @@ void bst_page_figure(FILE *out, bst_page_width width) {
 
 void bst_page_figure_end(FILE *out, const char *caption) {
     fputs("<figcaption>", out);
-    bst_html_text(out, caption);
+    put_prose(out, caption);
     fputs("</figcaption>\n</figure>\n", out);
 }
 
@@ -98,7 +126,7 @@ void bst_page_card(FILE *out, const char *value, const char *unit, const char *n
     fputs("<div class=\"card\"><small>", out);
     bst_html_text(out, name);
     fputs("</small><b>", out);
-    bst_html_text(out, value);
+    put_prose(out, value);
     if (unit[0]) {
         fputs(" <small>", out);
         bst_html_text(out, unit);
@@ -107,7 +135,7 @@ void bst_page_card(FILE *out, const char *value, const char *unit, const char *n
     fputs("</b>", out);
     if (note[0]) {
         fputs("<small>", out);
-        bst_html_text(out, note);
+        put_prose(out, note);
         fputs("</small>", out);
     }
     fputs("</div>\n", out);
@@ -122,7 +150,7 @@ void bst_page_row(FILE *out, const char *name, const char *format, ...) {
     fputs("<tr><th scope=\"row\">", out);
     bst_html_text(out, name);
     fputs("</th><td>", out);
-    bst_html_text(out, text[0] ? text : "-");
+    put_prose(out, text[0] ? text : "-");
     fputs("</td></tr>\n", out);
 }
 
@@ -165,7 +193,7 @@ void bst_warnings_write(FILE *out, const bst_warnings *w) {
             for (int i = 0; i < w->count; i++) {
                 if ((int)w->items[i].severity == severity) {
                     fprintf(out, "<li class=\"%s\"><b>%s:</b>", classes[severity], words[severity]);
-                    bst_html_text(out, w->items[i].text);
+                    put_prose(out, w->items[i].text);
                     fputs("</li>\n", out);
                 }
             }

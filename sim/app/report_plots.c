@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/core/text.h"
+
 /* ------------------------------------------------------------------ helpers */
 
 size_t bst_report_fill(const bst_report_drawing *d, bst_report_quantity quantity, double *series) {
@@ -273,10 +275,10 @@ static void plot_pointing(const bst_report_drawing *d) {
     char text[200], caption[500];
     describe(text, f->pointing_rms_px, f->pointing_median_px, f->pointing_p95_px,
              f->pointing_p99_px, f->pointing_max_px, "px");
-    snprintf(caption, sizeof caption,
-             POINTING_ERROR " In the %" PRId64
-                            " frames in mode track with the visible target, from settling on: %s.",
-             f->pointing_frames, text);
+    snprintf(
+        caption, sizeof caption,
+        POINTING_ERROR " In the %s in mode track with the visible target, from settling on: %s.",
+        bst_count_text((char[BST_COUNT_TEXT]){0}, f->pointing_frames, "frame", "frames"), text);
     bst_page_figure_end(d->out, f->pointing_frames > 0 ? caption : POINTING_ERROR);
 }
 

@@ -6,6 +6,7 @@
 #include <cjson/cJSON.h>
 
 #include "sim/app/report.h"
+#include "sim/core/text.h"
 #include "sim/core/version.h"
 
 enum { MOST_EVENTS = 400 };
@@ -140,12 +141,15 @@ static void put_objects(const page *p) {
                      text_of(object, "name", "?"));
         }
     }
-    bst_page_row(p->out, "objects", "%d%s%s%s", count, count ? ": " : "", names,
-                 count > 8 ? " ..." : "");
     const cJSON *catalogues = get(world, "catalogues"), *catalogue;
+    if (count > 0 || cJSON_GetArraySize(catalogues) == 0) {
+        bst_page_row(p->out, "objects", "%d%s%s%s", count, count ? ": " : "", names,
+                     count > 8 ? " ..." : "");
+    }
     cJSON_ArrayForEach(catalogue, catalogues) {
         const char *file = text_of(catalogue, "elements_file", "?"), *slash = strrchr(file, '/');
-        bst_page_row(p->out, "and all of", "%s", slash ? slash + 1 : file);
+        bst_page_row(p->out, count > 0 ? "and all of" : "objects: all of", "%s",
+                     slash ? slash + 1 : file);
     }
 }
 
@@ -257,8 +261,8 @@ static bst_status put_events(bst_ctx *ctx, const page *p) {
         bst_page_section_end(p->out);
         return BST_OK;
     }
-    fprintf(p->out, "<details%s><summary>%" PRId64 " events</summary>\n",
-            total <= 40 ? " open=\"open\"" : "", total);
+    fprintf(p->out, "<details%s><summary>%s</summary>\n", total <= 40 ? " open=\"open\"" : "",
+            bst_count_text((char[BST_COUNT_TEXT]){0}, total, "event", "events"));
     fputs(
         "<div class=\"scroll\"><table>\n<thead><tr><th class=\"n\">s</th><th>UTC</th>"
         "<th>from</th><th>kind</th><th>what</th></tr></thead>\n<tbody>\n",
@@ -271,7 +275,7 @@ static bst_status put_events(bst_ctx *ctx, const page *p) {
         if (!middle) {
             put_event(p->out, rows);
         } else if (shown == MOST_EVENTS / 2) {
-            fprintf(p->out, "<tr><td colspan=\"5\">%" PRId64 " events are left out</td></tr>\n",
+            fprintf(p->out, "<tr><td colspan=\"5\">%" PRId64 " events more</td></tr>\n",
                     total - MOST_EVENTS);
         }
         shown++;
@@ -346,7 +350,7 @@ static bst_status put_page(bst_ctx *ctx, page *p) {
     }
     BST_TRY(put_events(ctx, p));
     fprintf(p->out,
-            "<p class=\"note\">Made by Boresight %s. boresight info tells the folder's tables and "
+            "<p class=\"note\">Made by Boresight %s. boresight info lists the folder's tables and "
             "files, boresight export takes them out.</p>\n",
             bst_version());
     bst_page_end(p->out);

@@ -7,6 +7,7 @@
 #include <cjson/cJSON.h>
 
 #include "sim/app/report_plots.h"
+#include "sim/core/text.h"
 
 /* Objects in the timeline and in the table; sensors with a colour of their own; points of the
  * curves. */
@@ -125,10 +126,11 @@ static bst_status put_passes(bst_ctx *ctx, const bst_chart *c, const bst_run_rea
         double from = bst_rows_real(rows, 1) / unit_s, to = bst_rows_real(rows, 2) / unit_s;
         double least = 1.5 * (c->x.high - c->x.low) / c->inner_width; /* that can be seen */
         char title[200];
-        snprintf(title, sizeof title,
-                 "%s: %.6g s to %.6g s, detected in %" PRId64 " of %" PRId64 " frames",
-                 sensor >= 0 && sensor < names->count ? names->names[sensor] : "a sensor",
-                 from * unit_s, to * unit_s, detected, bst_rows_int(rows, 4));
+        snprintf(
+            title, sizeof title, "%s: %.6g s to %.6g s, detected in %" PRId64 " of %s",
+            sensor >= 0 && sensor < names->count ? names->names[sensor] : "a sensor", from * unit_s,
+            to * unit_s, detected,
+            bst_count_text((char[BST_COUNT_TEXT]){0}, bst_rows_int(rows, 4), "frame", "frames"));
         bst_chart_bar(c, from, fmax(to, from + least), row + 0.15, row + 0.85,
                       detected > 0 ? colour_of(sensor) : BST_CHART_GREY, title);
     }
@@ -167,8 +169,8 @@ static bst_status put_timeline(bst_ctx *ctx, FILE *out, const bst_run_reader *ru
     }
     bst_chart_end(&c);
     put_legend(out, names, BST_KEY_GROUND, true);
-    snprintf(caption, sizeof caption,
-             "Who saw what, when: passes of the %d objects with most detections.", count);
+    snprintf(caption, sizeof caption, "Who saw what, when: passes of the %s with most detections.",
+             bst_count_text((char[BST_COUNT_TEXT]){0}, count, "object", "objects"));
     bst_page_figure_end(out, caption);
     return status;
 }

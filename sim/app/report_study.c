@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/core/text.h"
 #include "sim/core/version.h"
 
 /* Rows of tables that are shown at most; figures in a table of settings. */
@@ -43,6 +44,7 @@ static int64_t numbers_of(const bst_study_view *v, const bst_study_metric_view *
 
 static void gather_warnings(const bst_study_view *v, bst_warnings *w) {
     int64_t failed = 0, done = 0;
+    char text[BST_COUNT_TEXT];
     for (int64_t r = 0; r < v->runs; r++) {
         failed += !v->done[r];
         done += v->done[r];
@@ -66,7 +68,7 @@ static void gather_warnings(const bst_study_view *v, bst_warnings *w) {
     if (never > 0) {
         bst_warnings_add(w, BST_SEVERITY_WARNING,
                          "In %" PRId64 " of %" PRId64
-                         " runs the target was never in confirmed track: "
+                         " runs the target was never acquired: "
                          "figures of pointing and track are of the others alone.",
                          never, done);
     }
@@ -76,8 +78,8 @@ static void gather_warnings(const bst_study_view *v, bst_warnings *w) {
     }
     if (lost > 0) {
         bst_warnings_add(w, BST_SEVERITY_WARNING,
-                         "In %" PRId64 " runs the target was acquired and not in track at the end.",
-                         lost);
+                         "In %s the target was acquired and not in track at the end.",
+                         bst_count_text(text, lost, "run", "runs"));
     }
     static const struct {
         const char *metric, *text;
@@ -90,8 +92,9 @@ static void gather_warnings(const bst_study_view *v, bst_warnings *w) {
             n += m->of_run[r] > 0.0;
         }
         if (n > 0) {
-            bst_warnings_add(w, BST_SEVERITY_WARNING, "%" PRId64 " runs have %s (%s).", n,
-                             counts[k].text, counts[k].metric);
+            bst_warnings_add(w, BST_SEVERITY_WARNING, "%s with %s (%s).",
+                             bst_count_text(text, n, "run", "runs"), counts[k].text,
+                             counts[k].metric);
         }
     }
     for (int i = 0; i < v->metric_count; i++) {
@@ -186,6 +189,13 @@ static bst_status put_overall(bst_ctx *ctx, FILE *out, const bst_study_view *v) 
                                         "std",    "least",   "median", "95 %",      "greatest",
                                         "runs",   "missing", "meaning"};
     bst_page_section(out, 2, "Figures of all runs");
+    if (v->settings > 1) {
+        fputs(
+            "<p class=\"note\">All settings together, each as often as it was run: the figures "
+            "depend on the values that were swept. Those of each setting are in "
+            "statistics.csv.</p>\n",
+            out);
+    }
     fputs("<div class=\"scroll\"><table>\n<thead><tr>", out);
     for (int k = 0; k < 13; k++) {
         put_head_cell(out, k > 1 && k < 12, heads[k]);
@@ -370,10 +380,45 @@ static void put_worst(FILE *out, const bst_study_view *v) {
 
 /* ------------------------------------------------------------------ cards */
 
-static void put_cards(FILE *out, const bst_study_view *v) {
+/* The mean over all runs of a study with one setting, with its interval. */
+static void put_mean_card(FILE *out, const bst_study_view *v, const bst_study_metric_view *m) {
     bst_rows *rows;
     bst_ctx unheard = {0};
     bool more;
+    char text[32], note[120], ends[2][32];
+    if (bst_rows_open(&unheard, v->tables,
+                      "SELECT metric, mean, low, high FROM statistics WHERE setting IS NULL", 0, 0,
+                      &rows) != BST_OK) {
+        return;
+    }
+    while (bst_rows_next(&unheard, rows, &more) == BST_OK && more) {
+        if (strcmp(bst_rows_text(rows, 0), m->name) == 0) {
+            snprintf(note, sizeof note, "95 %%: %s to %s",
+                     bst_page_number(ends[0], bst_rows_real(rows, 2), 3),
+                     bst_page_number(ends[1], bst_rows_real(rows, 3), 3));
+            bst_page_card(out, bst_page_number(text, bst_rows_real(rows, 1), 3), m->unit, m->name,
+                          note);
+        }
+    }
+    bst_rows_close(rows);
+}
+
+/* From the least to the greatest mean of a setting: a mean over settings would depend on the values
+ * that were swept. */
+static void put_range_card(FILE *out, const bst_study_view *v, const bst_study_metric_view *m) {
+    double low = INFINITY, high = -INFINITY;
+    char text[80], ends[2][32];
+    bst_chart_widen(m->mean, (size_t)v->settings, false, &low, &high);
+    if (low <= high) {
+        bst_page_number(ends[0], low, 3);
+        bst_page_number(ends[1], high, 3);
+        bool same = strcmp(ends[0], ends[1]) == 0;
+        snprintf(text, sizeof text, "%s%s%s", ends[0], same ? "" : " to ", same ? "" : ends[1]);
+        bst_page_card(out, text, m->unit, m->name, "");
+    }
+}
+
+static void put_cards(FILE *out, const bst_study_view *v) {
     char text[32], note[120];
     int metrics[COLUMNS], count = bst_study_key_metrics(v, metrics, 5);
     fputs("<div class=\"cards\">\n", out);
@@ -381,27 +426,17 @@ static void put_cards(FILE *out, const bst_study_view *v) {
     snprintf(note, sizeof note, "of %" PRId64 "; %" PRId64 " failed", v->expected_runs, v->failed);
     bst_page_card(out, text, "", "runs done", note);
     for (int k = 0; k < count; k++) {
-        const bst_study_metric_view *m = &v->metrics[metrics[k]];
-        if (bst_rows_open(&unheard, v->tables,
-                          "SELECT metric, mean, low, high FROM statistics WHERE setting IS NULL", 0,
-                          0, &rows) != BST_OK) {
-            break;
-        }
-        while (bst_rows_next(&unheard, rows, &more) == BST_OK && more) {
-            if (strcmp(bst_rows_text(rows, 0), m->name) == 0) {
-                char ends[2][32], label[128];
-                snprintf(note, sizeof note, "95 %%: %s to %s",
-                         bst_page_number(ends[0], bst_rows_real(rows, 2), 3),
-                         bst_page_number(ends[1], bst_rows_real(rows, 3), 3));
-                bst_study_label(m, label);
-                label[strcspn(label, ",")] = '\0';
-                bst_page_card(out, bst_page_number(text, bst_rows_real(rows, 1), 3), m->unit, label,
-                              note);
-            }
-        }
-        bst_rows_close(rows);
+        (v->settings > 1 ? put_range_card : put_mean_card)(out, v, &v->metrics[metrics[k]]);
     }
     fputs("</div>\n", out);
+    if (v->settings > 1) {
+        fprintf(out,
+                "<p class=\"note\">From the least to the greatest mean of the %" PRId64
+                " settings.</p>\n",
+                v->settings);
+    } else {
+        fputs("<p class=\"note\">Means over all runs that have a number.</p>\n", out);
+    }
 }
 
 /* ------------------------------------------------------------------ all of it */
@@ -431,7 +466,6 @@ static bst_status put_page(bst_ctx *ctx, FILE *out, const bst_study_view *v) {
     put_identity(out, v);
     bst_page_section(out, 2, "In short");
     put_cards(out, v);
-    fputs("<p class=\"note\">Means over all runs that have a number.</p>\n", out);
     bst_page_section_end(out);
     BST_TRY(bst_study_plot_sensitivity(ctx, out, v));
     BST_TRY(bst_study_plot_curves(ctx, out, v));

@@ -57,7 +57,8 @@ const char *bst_study_word(const bst_study_axis_view *axis, double value, char t
 
 /* Up to `room` metrics that say most, of those in which runs differ: their numbers. */
 int bst_study_key_metrics(const bst_study_view *view, int *metrics, int room);
-/* "pointing_rms_px" as "pointing rms, px". */
+/* The metric's name as tables have it, with the unit where that does not end it: "loss_db_pd50,
+ * dB", "pointing_rms_px". */
 const char *bst_study_label(const bst_study_metric_view *metric, char text[128]);
 
 /* ---- charts (report_study_plots.c, report_study_curves.c) ---- */

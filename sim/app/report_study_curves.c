@@ -147,7 +147,10 @@ static bst_status put_chart(bst_ctx *ctx, FILE *out, const bst_study_view *v, co
                              "ideal, place and shape known");
         }
         fputs("</ul>\n", out);
-        snprintf(caption, sizeof caption, "%s%sOf all trials of the runs, with 95 %% intervals.",
+        snprintf(caption, sizeof caption,
+                 "%s%sOf all trials of the runs, with 95 %% intervals. The ideal detector is told "
+                 "the place: noise "
+                 "of the trials, or the highest of several places, can lie above it.",
                  where, where[0] ? ". " : "");
         bst_page_figure_end(out, caption);
     }

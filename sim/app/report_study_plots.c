@@ -4,6 +4,7 @@
 
 #include "sim/app/report_plots.h"
 #include "sim/app/report_study.h"
+#include "sim/core/text.h"
 
 /* Lines in a chart; metrics that are drawn. */
 enum { LINES = 6, KEY_METRICS = 6 };
@@ -35,17 +36,10 @@ int bst_study_key_metrics(const bst_study_view *v, int *metrics, int room) {
 }
 
 const char *bst_study_label(const bst_study_metric_view *m, char text[128]) {
-    char name[BST_STUDY_WORD];
-    snprintf(name, sizeof name, "%s", m->name);
-    size_t n = strlen(name), unit = strlen(m->unit);
-    if (unit > 0 && n > unit + 1 && strcmp(name + n - unit, m->unit) == 0 &&
-        name[n - unit - 1] == '_') {
-        name[n - unit - 1] = '\0';
-    }
-    for (char *c = name; *c; c++) {
-        *c = *c == '_' ? ' ' : *c;
-    }
-    snprintf(text, 128, "%s%s%s", name, unit > 0 ? ", " : "", m->unit);
+    size_t n = strlen(m->name), unit = strlen(m->unit);
+    bool said = unit > 0 && n > unit + 1 && strcmp(m->name + n - unit, m->unit) == 0 &&
+                m->name[n - unit - 1] == '_';
+    snprintf(text, 128, "%s%s%s", m->name, unit > 0 && !said ? ", " : "", said ? "" : m->unit);
     return text;
 }
 
@@ -306,8 +300,10 @@ void bst_study_plot_histograms(FILE *out, const bst_study_view *v) {
                              high + 1e-9 * (high - low), 30, BST_CHART_BLUE, NULL, NULL);
         /* a meaning that refers to the metric before it says nothing here */
         bool refers = strncmp(m->doc, "The same", 8) == 0;
-        int used = snprintf(caption, sizeof caption, "%s%s%zu runs", refers ? "" : m->doc,
-                            refers || !m->doc[0] ? "" : " ", n - outside);
+        int used = snprintf(
+            caption, sizeof caption, "%s%s%s", refers ? "" : m->doc,
+            refers || !m->doc[0] ? "" : " ",
+            bst_count_text((char[BST_COUNT_TEXT]){0}, (int64_t)(n - outside), "run", "runs"));
         snprintf(caption + used, sizeof caption - (size_t)used,
                  outside > 0 ? "; %zu more lie outside." : ".", outside);
         bst_page_figure_end(out, caption);

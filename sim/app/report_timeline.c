@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "sim/app/report_plots.h"
+#include "sim/core/text.h"
 
 /* A run of more than EXACT frames is drawn as shares of INTERVALS intervals. */
 enum { LANES = 4, ROWS = LANES + 1, STATES = 4, INTERVALS = 230, EXACT = 2 * INTERVALS };
@@ -111,8 +112,10 @@ static void put_shares(const bst_report_drawing *d, const bst_chart *c, const la
         }
         double share = (double)v->in[k] / (double)v->frames;
         char title[160];
-        snprintf(title, sizeof title, "%s: %.1f %% of %" PRId64 " frames from %.6g s to %.6g s",
-                 l->states[k].word, 100.0 * share, v->frames, from * d->unit_s, to * d->unit_s);
+        snprintf(title, sizeof title, "%s: %.1f %% of %s from %.6g s to %.6g s", l->states[k].word,
+                 100.0 * share,
+                 bst_count_text((char[BST_COUNT_TEXT]){0}, v->frames, "frame", "frames"),
+                 from * d->unit_s, to * d->unit_s);
         bst_chart_bar(c, from, to, bottom, bottom + share * height, l->states[k].colour, title);
         bottom += share * height;
     }

@@ -93,6 +93,7 @@ static bst_status walk(bst_ctx *ctx, cursor *frames, cursor *tracks, bst_report_
         if (answered) {
             s->has_tracks = true;
             f->attitude = bst_rows_int(frames->rows, 1) == 1;
+            f->tracked_s = bst_rows_real(frames->rows, 2);
             latest.there = false;
         }
         for (;;) {
@@ -115,7 +116,8 @@ bst_status bst_report_read_tracks(bst_ctx *ctx, const bst_run_reader *run, bst_r
     bst_ctx unheard = {0};
     cursor frames = {0}, tracks = {0};
     if (bst_rows_open(&unheard, run,
-                      "SELECT exposure_id, attitude_valid FROM track_frames WHERE sensor = ?1",
+                      "SELECT exposure_id, attitude_valid, CAST(written_tick AS REAL) /"
+                      " (SELECT tick_rate_hz FROM run) FROM track_frames WHERE sensor = ?1",
                       s->sensor.index, 0, &frames.rows) != BST_OK ||
         bst_rows_open(&unheard, run,
                       "SELECT exposure_id, time_s, status, ra_deg, dec_deg, rate_east_arcsec_per_s,"

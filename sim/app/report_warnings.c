@@ -7,6 +7,7 @@
 #include "sim/app/loop_model.h"
 #include "sim/app/report.h"
 #include "sim/app/run_losses.h"
+#include "sim/core/text.h"
 
 static const cJSON *get(const cJSON *node, const char *key) {
     return cJSON_GetObjectItemCaseSensitive(node, key);
@@ -100,12 +101,12 @@ static void judge_sensor(const bst_report_sensor *s, bool complete, bst_warnings
                          "%s: in %" PRId64 " frame%s the track of interest was not the target's.",
                          s->name, f->wrong_target_frames, f->wrong_target_frames == 1 ? "" : "s");
     }
-    if (f->bad_pixels > 0) {
+    if (s->bad_pixels > 0) {
         bst_warnings_add(w, BST_SEVERITY_NOTE,
                          "%s: image processing learned that %" PRId64
                          " pixel%s bad, and left %s out.",
-                         s->name, f->bad_pixels, f->bad_pixels == 1 ? " is" : "s are",
-                         f->bad_pixels == 1 ? "it" : "them");
+                         s->name, s->bad_pixels, s->bad_pixels == 1 ? " is" : "s are",
+                         s->bad_pixels == 1 ? "it" : "them");
     }
     /* with tasks there is always a next target to slew to */
     if (complete && s->task_count < 2 && acquired && f->final_mode >= 0 &&
@@ -153,14 +154,14 @@ static void add_tables(const bst_run_reader *run, const bst_report_sensor *senso
     } checks[] = {
         {"SELECT count(*) FROM mount WHERE sensor = ?1 AND"
          " ((axis0_flags | axis1_flags | axis2_flags) & 1) = 1",
-         BST_SEVERITY_PROBLEM, "Rows of telemetry that tell of a stuck axis"},
+         BST_SEVERITY_PROBLEM, "Rows of telemetry with a stuck axis"},
         {"SELECT count(*) FROM exposures WHERE sensor = ?1 AND error_sigma > 0.3",
          BST_SEVERITY_WARNING,
          "Frames rendered with an expected error above 0.3 of a pixel's noise"},
         {"SELECT count(*) FROM pointing WHERE sensor = ?1 AND limited = 1", BST_SEVERITY_WARNING,
-         "Rows of telemetry that tell of an axis at a limit"},
+         "Rows of telemetry with an axis at a limit"},
         {"SELECT count(*) FROM mount WHERE sensor = ?1 AND wheels_saturated = 1",
-         BST_SEVERITY_WARNING, "Rows of telemetry that tell of saturated reaction wheels"},
+         BST_SEVERITY_WARNING, "Rows of telemetry with saturated reaction wheels"},
         {"SELECT count(*) FROM exposures WHERE sensor = ?1 AND hits > 0", BST_SEVERITY_NOTE,
          "Frames with radiation hits"},
     };
@@ -184,14 +185,14 @@ static void add_events(const bst_run_reader *run, bst_warnings *w) {
         bst_severity severity;
         const char *text;
     } known[] = {
-        {"mode", -1, ""}, /* told by the charts */
+        {"mode", -1, ""}, /* shown by the charts */
         {"target_selected", -1, ""},
         {"track_confirmed", -1, ""},
         {"track_resumed", -1, ""},
         {"target_lost", BST_SEVERITY_WARNING, "the track of the target was given up"},
         {"track_lost", BST_SEVERITY_NOTE, "a track was given up"},
         {"attitude_lost", BST_SEVERITY_WARNING, "stars no longer gave an attitude"},
-        {"guidance", BST_SEVERITY_NOTE, "guidance told of what is out of reach"},
+        {"guidance", BST_SEVERITY_NOTE, "guidance announced what is out of reach"},
         {"wheels", BST_SEVERITY_WARNING, "reaction wheels came to a limit, or left it"},
         {"star_trackers", BST_SEVERITY_WARNING, "star trackers lost the stars, or found them"},
         {"manoeuvre", BST_SEVERITY_NOTE, "the tracker noticed a manoeuvre"},

@@ -6,10 +6,7 @@
 
 #include <cjson/cJSON.h>
 
-const char *bst_count_text(char text[64], int64_t count, const char *one, const char *many) {
-    snprintf(text, 64, "%" PRId64 " %s", count, count == 1 ? one : many);
-    return text;
-}
+#include "sim/core/text.h"
 
 /* A loss of a sensor: an amount of something in some of the frames, or (noun NULL) frames alone. */
 typedef struct kind {
@@ -37,6 +34,15 @@ static const kind kinds[] = {
     {NULL, "no_attitude_frames", 0, AT(no_attitude_frames), BST_SEVERITY_WARNING,
      "no attitude from stars that is good enough to measure directions with", NULL, NULL,
      "SELECT 0, sum(attitude_valid = 0) FROM track_frames WHERE sensor = ?1"},
+    {NULL, "earth_frames", 0, AT(earth_frames), BST_SEVERITY_WARNING,
+     "the Earth covers part of the image", NULL, NULL,
+     "SELECT 0, sum(earth_fraction > 0) FROM exposures WHERE sensor = ?1"},
+    {NULL, "moon_frames", 0, AT(moon_frames), BST_SEVERITY_WARNING,
+     "the Moon covers part of the image", NULL, NULL,
+     "SELECT 0, sum(moon_fraction > 0) FROM exposures WHERE sensor = ?1"},
+    {NULL, "sun_frames", 0, AT(sun_frames), BST_SEVERITY_WARNING,
+     "the Sun covers part of the image", NULL, NULL,
+     "SELECT 0, sum(sun_fraction > 0) FROM exposures WHERE sensor = ?1"},
     {NULL, "no_stars_frames", 0, AT(no_stars_frames), BST_SEVERITY_NOTE, "no star identified", NULL,
      NULL, "SELECT 0, sum(stars_identified = 0) FROM detection_frames WHERE sensor = ?1"},
 };
@@ -100,7 +106,10 @@ void bst_losses_tell_counter(const char *name, int64_t count, bst_loss_fn fn, vo
         {"bad_pixels_overflow", BST_SEVERITY_WARNING,
          "the learned bad-pixel map had no room (bad_pixel_learning.capacity)", "frame", "frames"},
         {"bad_pixels_sky_at_rest", BST_SEVERITY_NOTE,
-         "pixels looked bad but cannot be learned while the sky does not move over them", "frame",
+         "pixels look bad that cannot be learned, because the sky does not move over them", "frame",
+         "frames"},
+        {"tolerance_missed", BST_SEVERITY_WARNING,
+         "the image's predicted error (error_sigma) is above fidelity.tolerance_sigma", "frame",
          "frames"},
         {"saturated", BST_SEVERITY_NOTE, "full pixels in the image", "frame", "frames"},
     };

@@ -9,9 +9,6 @@
 
 struct cJSON;
 
-/* "1 frame", "5 frames": a count with its noun. */
-const char *bst_count_text(char text[64], int64_t count, const char *one, const char *many);
-
 typedef void (*bst_loss_fn)(void *user, bst_severity severity, const char *text);
 
 /* A line for each kind of loss of a sensor, such as "cut to imgproc's capacity: 5120 detections in

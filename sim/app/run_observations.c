@@ -107,7 +107,7 @@ typedef struct gathering {
 /* Of the standard deviation of an attitude from stars: what stays the same from frame to frame, as
  * neighbours that stars are not resolved from move their places. Measured with generator and
  * images, 0.1 to 0.3, by tests/e2e/test_orbit_consistency.py. */
-static const double SHARED_ATTITUDE = 0.3;
+static const double SHARED_ATTITUDE = 0.2;
 
 /* The detection's place on the sky, and what its errors and the attitude's make of it. */
 static void measure(const gathering *g, const bst_rows *rows, const bst_light *light,

@@ -95,7 +95,6 @@ static bst_status judge(run_state *run, watched_sensor *sensor, const char *chan
         return bst_run_metrics_tracks(&run->hooks, sensor->metrics, payload);
     }
     if (strcmp(channel, BST_CHANNEL_DETECTIONS) == 0) {
-        bst_loop_summary_detections(sensor->summary, payload);
         bst_run_metrics_detections(sensor->metrics, payload);
     } else if (strcmp(channel, BST_CHANNEL_CONTROL_STATUS) == 0) {
         bst_loop_summary_status(sensor->summary, payload);

@@ -35,7 +35,9 @@ cJSON *bst_run_summary_json(const bst_run_sensor_figures *figures, double real_t
     bst_json_add_number(node, "pointing_p95_px", f->pointing_p95_px);
     bst_json_add_number(node, "pointing_max_px", f->pointing_max_px);
     bst_json_add_number(node, "pointing_bias_px", f->pointing_bias_px);
-    add_count(node, "bad_pixels", f->bad_pixels);
+    add_count(node, "earth_frames", m->losses.earth_frames);
+    add_count(node, "moon_frames", m->losses.moon_frames);
+    add_count(node, "sun_frames", m->losses.sun_frames);
     add_count(node, "detections", m->detections);
     bst_json_add_number(node, "detected_fraction", m->detected_fraction);
     add_count(node, "track_frames", m->track_frames);
@@ -45,6 +47,7 @@ cJSON *bst_run_summary_json(const bst_run_sensor_figures *figures, double real_t
     bst_json_add_number(node, "track_max_px", m->track_max_px);
     add_count(node, "tracks", m->tracks);
     add_count(node, "false_tracks", m->false_tracks);
+    add_count(node, "bad_pixels", m->bad_pixels);
     return node;
 }
 
@@ -69,7 +72,7 @@ void bst_run_summary_print(const bst_run_sensor_figures *figures) {
                       "% of visible frames since then in track");
     bst_run_print_row("pointing RMS", "%.3f", f->pointing_rms_px, "px");
     bst_run_print_row("pointing 99th percentile", "%.3f", f->pointing_p99_px, "px");
-    if (f->bad_pixels > 0) {
-        bst_run_print_row("bad pixels learned", "%.0f", (double)f->bad_pixels, "");
+    if (figures->metrics.bad_pixels > 0) {
+        bst_run_print_row("bad pixels learned", "%.0f", (double)figures->metrics.bad_pixels, "");
     }
 }

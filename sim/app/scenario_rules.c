@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "sim/app/check_bodies.h"
 #include "sim/app/check_reach.h"
 #include "sim/app/loop_model.h"
 #include "sim/engine/loop_timing.h"
@@ -256,8 +257,10 @@ static const rule rules[] = {
     {"loops", "loops that are unstable or have thin margins", NULL, NULL, loops},
     {"reach",
      "times at which the cue is out of reach: Earth, keep-out cones, travel, limits, "
-     "keyhole",
+     "keyhole; slews, steps of a search and scans that the mount's limits do not allow",
      NULL, NULL, bst_check_reach},
+    {"bodies", "times at which the Earth, the Moon or the Sun lies in the field", NULL, NULL,
+     bst_check_bodies},
 };
 
 static bst_status apply_to_sensors(bst_ctx *ctx, const rule *r, const bst_scenario *scenario,

@@ -8,7 +8,7 @@ static bst_vec3 scaled(const double v[3], double scale) {
 }
 
 void bst_bodies_at(bst_time t, bst_bodies *out) {
-    double tt1, tt2, earth_helio[2][3], earth_bary[2][3], moon[2][3];
+    double tt1, tt2, earth_helio[2][3], earth_bary[2][3], moon[2][3], of_date[3][3];
     bst_time_tt(t, &tt1, &tt2);
     /* Its status warns of dates outside 1900..2100, where the model only loses accuracy. */
     (void)eraEpv00(tt1, tt2, earth_helio, earth_bary);
@@ -17,4 +17,6 @@ void bst_bodies_at(bst_time t, bst_bodies *out) {
     out->moon_m = scaled(moon[0], BST_AU_M);
     out->earth_bary_m = scaled(earth_bary[0], BST_AU_M);
     out->earth_bary_mps = scaled(earth_bary[1], BST_AU_M / ERFA_DAYSEC);
+    eraPmat06(tt1, tt2, of_date);
+    out->pole = scaled(of_date[2], 1.0);
 }

@@ -18,22 +18,75 @@ typedef struct bst_bodies {
     bst_vec3 moon_m;         /* Earth's centre to the Moon, GCRF */
     bst_vec3 earth_bary_mps; /* Earth's velocity relative to the solar-system barycentre, ICRS */
     bst_vec3 earth_bary_m;   /* Earth's position relative to the barycentre, ICRS */
+    bst_vec3 pole;           /* the Earth's axis (unit), GCRF: the symmetry axis of its figure */
 } bst_bodies;
 
 /* Sun and Earth by eraEpv00 (heliocentric 14 km, barycentric 8 mm/s at most against DE405), Moon by
- * eraMoon98 (about 3 arcsec rms). TT serves as TDB. */
+ * eraMoon98 (about 3 arcsec rms). The pole is the mean one of date (eraPmat06): nutation moves it
+ * by 9 arcsec, the limb by less than 2 m. TT serves as TDB. */
 void bst_bodies_at(bst_time t, bst_bodies *out);
 
-/* Fraction of the Sun's disc, 0 to 1, that a point at position_m (geocentric) sees past a spherical
- * Earth of the WGS-84 equatorial radius: 1 in full light, 0 in umbra and inside the Earth, the
- * uncovered area in between and in annular eclipse. The discs are plane circles of the two angular
- * radii (Montenbruck and Gill, Satellite Orbits, section 3.4.2). */
-double bst_sun_fraction(bst_vec3 position_m, bst_vec3 sun_m);
+/* Where the sunlight comes from that arrives at the Earth: the Sun at the time when the light left
+ * it, seen from the moving Earth. It stands 20.5 arcsec beside the geometric Sun, so that the
+ * shadow at geostationary distance lies up to 4 km beside the line of the centres. GCRF axes, m. */
+static inline bst_vec3 bst_bodies_sunlight_from(const bst_bodies *b) {
+    return bst_vec3_axpy(b->sun_m, bst_vec3_norm(b->sun_m) / BST_LIGHT_SPEED_MPS,
+                         b->earth_bary_mps);
+}
 
-/* True when the segment between two geocentric points (GCRF) passes through the WGS-84 ellipsoid,
- * also when an end lies inside it. A touch less than 1 cm deep does not count, so that a point on
- * the surface sees what is above its horizon. */
-bool bst_earth_occults(bst_vec3 a_m, bst_vec3 b_m, const bst_mat3 *itrf_from_gcrf);
+/* The pole where the date is not known: that of J2000. In 2030 the limb is off by 60 m at most. */
+#define BST_EARTH_POLE_J2000 ((bst_vec3){0.0, 0.0, 1.0})
+
+/* Depth in Earth radii, 1 cm, up to which a point or a line only touches the Earth. */
+#define BST_EARTH_TOUCH 1.5e-9
+
+/* Fraction of the Sun's disc by area, 0 to 1, that a point sees past the WGS-84 ellipsoid without
+ * air.
+ *
+ * Given:    position_m  geocentric, GCRF axes
+ *           sun_m       geocentric place that the sunlight comes from (bst_bodies_sunlight_from)
+ *           pole        the Earth's axis, unit
+ * Returned: 1 in full light, 0 in umbra and inside the Earth, the uncovered area in between and in
+ *           annular eclipse.
+ * Notes: the Sun is a circle and the limb next to it the circle that osculates it, both in the
+ * plane that is tangent to the sky at the Sun. Contacts agree with rays round the ellipsoid to 1 ms
+ * (tests/astro/test_shadow_rays.c). */
+double bst_sun_fraction(bst_vec3 position_m, bst_vec3 sun_m, bst_vec3 pole);
+
+/* Wavelengths of bst_sunlight; the second stands for V. */
+enum { BST_SUNLIGHT_COLOURS = 4, BST_SUNLIGHT_V = 1 };
+extern const double bst_sunlight_wavelength_m[BST_SUNLIGHT_COLOURS];
+
+typedef struct bst_sunlight {
+    double disc;                        /* bst_sun_fraction */
+    double light[BST_SUNLIGHT_COLOURS]; /* irradiance over that of the whole Sun, by wavelength */
+} bst_sunlight;
+
+/* Sunlight at a point, with the Sun's limb darkening and, if asked for, the refraction and
+ * extinction of the Earth's atmosphere.
+ *
+ * Given:    as bst_sun_fraction; atmosphere: whether the Earth has air
+ * Returned: *out
+ * Notes: rays are bent and spread as in geometric optics, weakened by Rayleigh scattering and
+ * ozone, and end at the cloud tops (8 km). What passes below 12 km, most of the light
+ * in the inner penumbra of low orbits and in all umbrae, depends on clouds and aerosols of
+ * the place, which are not known: it may be wrong by a factor of 2. Within the air (below 80 km)
+ * there is no refraction.
+ * Reference: Baum and Code, AJ 58, 108 (1953); Link, Eclipse Phenomena in
+ * Astronomy (1969), chapter 2; limb darkening: Cox, Allen's Astrophysical Quantities (4th edition),
+ * table 14.17. */
+void bst_sunlight_at(bst_vec3 position_m, bst_vec3 sun_m, bst_vec3 pole, bool atmosphere,
+                     bst_sunlight *out);
+
+/* Angle (rad) of a direction from the WGS-84 ellipsoid's limb, seen from position_m; negative where
+ * the Earth is in the way, pi where the direction is more than a right angle beyond, -pi inside of
+ * the Earth. Exact at the limb. */
+double bst_earth_limb_angle(bst_vec3 position_m, bst_vec3 pole, bst_vec3 direction);
+
+/* True when the segment between two geocentric points (GCRF) passes through the WGS-84 ellipsoid
+ * about `pole`, also when an end lies inside it. A touch less than 1 cm deep does not count, so
+ * that a point on the surface sees what is above its horizon. */
+bool bst_earth_occults(bst_vec3 a_m, bst_vec3 b_m, bst_vec3 pole);
 
 /* What turns a geometric direction into the one that an observer measures. */
 typedef struct bst_light {

@@ -24,6 +24,7 @@ struct bst_forces {
     bool turns;            /* the Earth's rotation counts */
     bool has_bodies;       /* the Sun's or Moon's place counts */
     double light_accel_au; /* m/s^2 at 1 au */
+    bst_vec3 pole;         /* at the epoch */
     double drag_factor;    /* m^2/kg: cd A / (2 m), times density_scale */
     node nodes[NODES];
 };
@@ -63,6 +64,9 @@ bst_status bst_forces_create(bst_ctx *ctx, const bst_force_model *model, bst_tim
     f->epoch = epoch;
     f->turns = model->eop && (bst_gravity_degree(model->gravity) >= 2 || model->drag);
     f->has_bodies = model->sun || model->moon || model->solar_pressure;
+    bst_bodies bodies;
+    bst_bodies_at(epoch, &bodies);
+    f->pole = bodies.pole; /* it moves by 0.06 arcsec a day, the limb by 6 mm */
     const bst_spacecraft *s = &model->spacecraft;
     if (model->solar_pressure) {
         f->light_accel_au =
@@ -186,7 +190,8 @@ bst_status bst_forces_at(bst_ctx *ctx, bst_forces *f, double seconds, bst_vec3 r
         if (m->solar_pressure) {
             bst_vec3 d = bst_vec3_sub(r, sun);
             double d2 = bst_vec3_dot(d, d);
-            double size = f->light_accel_au * bst_sun_fraction(r, sun) * BST_AU_M * BST_AU_M / d2;
+            double size =
+                f->light_accel_au * bst_sun_fraction(r, sun, f->pole) * BST_AU_M * BST_AU_M / d2;
             a = bst_vec3_axpy(a, size / sqrt(d2), d);
         }
     }
@@ -200,5 +205,5 @@ double bst_forces_sunlight(bst_forces *f, double seconds, bst_vec3 position_m) {
     }
     bst_vec3 sun, moon;
     sun_and_moon(f, seconds, &sun, &moon);
-    return bst_sun_fraction(position_m, sun);
+    return bst_sun_fraction(position_m, sun, f->pole);
 }

@@ -184,6 +184,7 @@ bst_status bst_sky_clock_at(bst_ctx *ctx, bst_sky_clock *clock, bst_time t, bst_
     out->bodies.moon_m = lerp(a->bodies.moon_m, b->bodies.moon_m, f);
     out->bodies.earth_bary_m = lerp(a->bodies.earth_bary_m, b->bodies.earth_bary_m, f);
     out->bodies.earth_bary_mps = lerp(a->bodies.earth_bary_mps, b->bodies.earth_bary_mps, f);
+    out->bodies.pole = lerp(a->bodies.pole, b->bodies.pole, f);
     clock->asked = true;
     clock->last = t;
     clock->sky = *out;

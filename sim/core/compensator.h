@@ -144,10 +144,13 @@ extern const bst_config_desc bst_compensator_config_table[];
                  "Time in which the integrator follows a limited output (back-calculation); 0: "   \
                  "by the gains."),                                                                 \
         BST_REAL(bst_compensator_config, gain_scale, "", 0, 1e6, "1",                              \
-                 "Factor on the output, after any design: for finding gain margins."),             \
+                 "Factor on the output, after any design: for finding gain margins. Of control's " \
+                 "observer: how many times the motion that telemetry reports of its correction "   \
+                 "the frames show."),                                                              \
         BST_REAL(bst_compensator_config, delay_s, "s", 0, 1e3, "0",                                \
                  "Delay of the output, on top of any design: for finding delay margins. Between "  \
-                 "samples it is interpolated."),                                                   \
+                 "samples it is interpolated. Of control's observer: how much later than "         \
+                 "telemetry reports it the frames show the motion, to the tick."),                 \
         BST_STAGE(bst_compensator_config, plug, bst_compensator_kinds,                             \
                   "A shared library with a compensator of one's own, relative to the folder of "   \
                   "the file that says so; the other keys are then that one's.")

@@ -67,6 +67,11 @@ static bst_status wrong(const reader *r, const char *path, const cJSON *value, c
     return bst_config_fail(r->ctx, r->file, path, value, what, allowed);
 }
 
+bool bst_config_is_open(const bst_config_desc *desc) {
+    return desc->type == BST_CONFIG_REAL && desc->fallback &&
+           strcmp(desc->fallback, BST_CONFIG_OPEN) == 0;
+}
+
 static void range_text(const bst_config_desc *d, char *buffer, size_t bytes) {
     const char *unit = d->unit && *d->unit ? d->unit : "";
     if (d->type == BST_CONFIG_INT && d->minimum == d->maximum) {
@@ -75,8 +80,8 @@ static void range_text(const bst_config_desc *d, char *buffer, size_t bytes) {
         snprintf(buffer, bytes, "an integer from %.0f to %.0f%s%s", d->minimum, d->maximum,
                  *unit ? " " : "", unit);
     } else {
-        snprintf(buffer, bytes, "a number from %.15g to %.15g%s%s", d->minimum, d->maximum,
-                 *unit ? " " : "", unit);
+        snprintf(buffer, bytes, "a number from %.15g to %.15g%s%s%s", d->minimum, d->maximum,
+                 *unit ? " " : "", unit, bst_config_is_open(d) ? ", or null" : "");
     }
 }
 
@@ -158,8 +163,7 @@ static bst_status read_list(const reader *r, const cJSON *value, const char *pat
 static bst_status read_seed(const reader *r, const cJSON *value, const char *path, uint64_t *out) {
     const char *allowed =
         "a hexadecimal string such as \"0x1F\" or a decimal one such as \"31\", up to 64 bits, or "
-        "an "
-        "integer from 0 to 9007199254740992";
+        "an integer from 0 to 9007199254740992";
     /* integers up to 2^53 are exact in JSON's numbers */
     if (cJSON_IsNumber(value) && value->valuedouble >= 0.0 && value->valuedouble <= 0x1p53 &&
         value->valuedouble == floor(value->valuedouble)) {
@@ -167,7 +171,12 @@ static bst_status read_seed(const reader *r, const cJSON *value, const char *pat
         return BST_OK;
     }
     if (!cJSON_IsString(value)) {
-        return wrong(r, path, value, cJSON_IsNumber(value) ? "not a seed" : "wrong type", allowed);
+        bool whole = cJSON_IsNumber(value) && value->valuedouble == floor(value->valuedouble);
+        return wrong(r, path, value,
+                     whole                   ? "out of range"
+                     : cJSON_IsNumber(value) ? "not an integer"
+                                             : "wrong type",
+                     allowed);
     }
     const char *text = value->valuestring;
     bool hexadecimal = strncmp(text, "0x", 2) == 0;
@@ -234,6 +243,10 @@ static bst_status read_value(const reader *r, const cJSON *value, const char *pa
             *(int64_t *)(void *)member = (int64_t)number;
             return BST_OK;
         case BST_CONFIG_REAL:
+            if (cJSON_IsNull(value) && bst_config_is_open(d)) {
+                *(double *)(void *)member = NAN;
+                return BST_OK;
+            }
             BST_TRY(read_number(r, value, path, d, &number));
             *(double *)(void *)member = number;
             return BST_OK;
@@ -457,13 +470,16 @@ static cJSON *exact_numbers(const double *values, size_t count) {
 
 static cJSON *echo_value(const bst_config_desc *d, const void *object) {
     const char *member = (const char *)object + d->offset;
+    double number;
     switch (d->type) {
         case BST_CONFIG_BOOL:
             return cJSON_CreateBool(*(const bool *)(const void *)member);
         case BST_CONFIG_INT:
             return exact_number((double)*(const int64_t *)(const void *)member);
         case BST_CONFIG_REAL:
-            return exact_number(*(const double *)(const void *)member);
+            number = *(const double *)(const void *)member;
+            return isnan(number) && bst_config_is_open(d) ? cJSON_CreateNull()
+                                                          : exact_number(number);
         case BST_CONFIG_STRING:
         case BST_CONFIG_PATH:
             return cJSON_CreateString(member);

@@ -54,6 +54,10 @@ typedef struct bst_config_desc {
         .key = #m, .type = BST_CONFIG_REAL, .unit = unit_, .minimum = min_, .maximum = max_, \
         .fallback = def_, .doc = doc_, BST_FIELD_(s, m)                                      \
     }
+/* A number that may be left open: null, the default, is NAN in the struct. */
+#define BST_OPEN_REAL(s, m, unit_, min_, max_, doc_) \
+    BST_REAL(s, m, unit_, min_, max_, BST_CONFIG_OPEN, doc_)
+#define BST_CONFIG_OPEN "null"
 #define BST_INT(s, m, unit_, min_, max_, def_, doc_)                                        \
     {                                                                                       \
         .key = #m, .type = BST_CONFIG_INT, .unit = unit_, .minimum = min_, .maximum = max_, \
@@ -173,6 +177,8 @@ void bst_config_free(const bst_config_desc *table, void *object);
 bst_status bst_config_defaults(bst_ctx *ctx, const bst_config_desc *table,
                                void *object) BST_MUST_CHECK;
 
+/* Whether a key may be null. */
+bool bst_config_is_open(const bst_config_desc *desc);
 /* The object as JSON with every default written out; the caller frees with cJSON_Delete. NULL when
  * out of memory. For printing: numbers are raw items whose text reads back as the same bits. */
 struct cJSON *bst_config_echo(const bst_config_desc *table, const void *object);

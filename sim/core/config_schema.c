@@ -35,6 +35,13 @@ static cJSON *value_schema(const bst_config_desc *d) {
             break;
         case BST_CONFIG_INT:
         case BST_CONFIG_REAL:
+            if (bst_config_is_open(d)) {
+                cJSON *types = cJSON_AddArrayToObject(node, "type");
+                cJSON_AddItemToArray(types, cJSON_CreateString("number"));
+                cJSON_AddItemToArray(types, cJSON_CreateString("null"));
+                add_range(node, d);
+                break;
+            }
             cJSON_AddStringToObject(node, "type", d->type == BST_CONFIG_INT ? "integer" : "number");
             add_range(node, d);
             break;

@@ -1,5 +1,6 @@
 #include "sim/core/text.h"
 
+#include <stdio.h>
 #include <string.h>
 
 enum { LONGEST_WORD = 64, FARTHEST_SUGGESTION = 3 };
@@ -38,6 +39,12 @@ bool bst_text_is_nearer(const char *word, const char *candidate, size_t *best) {
     }
     *best = distance;
     return true;
+}
+
+const char *bst_count_text(char text[BST_COUNT_TEXT], int64_t count, const char *one,
+                           const char *many) {
+    snprintf(text, BST_COUNT_TEXT, "%lld %s", (long long)count, count == 1 ? one : many);
+    return text;
 }
 
 bool bst_text_is_file_name(const char *word) {

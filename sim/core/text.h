@@ -4,6 +4,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -17,6 +18,11 @@ size_t bst_text_distance(const char *a, const char *b);
  * *best; then *best becomes its distance. Start with *best = SIZE_MAX. A word that lacks only the
  * unit ("rate" for "rate_hz") counts as 1. */
 bool bst_text_is_nearer(const char *word, const char *candidate, size_t *best);
+
+/* A count with its noun, "1 frame" or "5 frames", in `text`, which is returned. */
+enum { BST_COUNT_TEXT = 64 };
+const char *bst_count_text(char text[BST_COUNT_TEXT], int64_t count, const char *one,
+                           const char *many);
 
 /* Whether a word can be the name of a file or folder that is made: 1 to 255 bytes without "/" and
  * control characters, not beginning with "." (which also refuses "." and ".."). */

@@ -261,6 +261,7 @@ static void solve_wcs(bst_ctx *ctx, bst_recorder_state *s, const bst_truth_head 
     frame->has_observer = true;
     frame->observer_gcrf_m = head->observer_gcrf_m;
     frame->observer_gcrf_mps = head->observer_gcrf_mps;
+    memcpy(frame->body_fraction, head->body_fraction, sizeof frame->body_fraction);
 }
 
 /* Writes a frame and its row. head NULL: its truth never came. */
@@ -379,6 +380,7 @@ static bst_status take_truth(bst_ctx *ctx, bst_recorder *recorder, int sensor, c
                            .observer_gcrf_m = t->observer_gcrf_m,
                            .observer_gcrf_mps = t->observer_gcrf_mps,
                            .pixel_scale_arcsec = t->pixel_scale_arcsec,
+                           .body_fraction = {t->earth_fraction, t->moon_fraction, t->sun_fraction},
                            .light = {.velocity_mps = t->velocity_bary_mps, .sun_m = t->sun_m}};
     if (s->frame_waits && s->frame.exposure_id == t->exposure_id) {
         BST_TRY(write_waiting(ctx, recorder, sensor, &head));

@@ -37,6 +37,7 @@ typedef struct bst_truth_head {
     bst_vec3 observer_gcrf_m, observer_gcrf_mps;
     bst_light light;
     double pixel_scale_arcsec;
+    double body_fraction[3]; /* as bst_fits_frame */
 } bst_truth_head;
 
 /* Truth may run ahead of its frame by the readout delay: so many exposures at most. */

@@ -155,6 +155,9 @@ static bst_status exposure_row(bst_ctx *ctx, bst_recorder *recorder, int sensor,
     put_vector(&r, t->sun_m);
     put_real(&r, t->background_e);
     put_real(&r, t->dark_e);
+    put_real(&r, t->earth_fraction);
+    put_real(&r, t->moon_fraction);
+    put_real(&r, t->sun_fraction);
     put_real(&r, t->pixel_scale_arcsec);
     put_int(&r, t->count);
     put_int(&r, t->lost);
@@ -214,8 +217,10 @@ bst_status bst_recorder_truth_rows(bst_ctx *ctx, bst_recorder *recorder, int sen
         put_real(&r, item->y_mid_px);
         put_real(&r, item->x_end_px);
         put_real(&r, item->y_end_px);
-        put_real(&r, item->x_mean_px);
-        put_real(&r, item->y_mean_px);
+        put_real(&r, item->x_chief_px);
+        put_real(&r, item->y_chief_px);
+        put_real(&r, item->x_centroid_px);
+        put_real(&r, item->y_centroid_px);
         put_real(&r, item->ra_rad * DEG);
         put_real(&r, item->dec_rad * DEG);
         put_real(&r, item->v_mag);

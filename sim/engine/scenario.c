@@ -72,6 +72,10 @@ static bst_status prepare_cameras(bst_ctx *ctx, bst_scenario *s) {
     for (int i = 0; i < s->observers.count; i++) {
         for (int k = 0; k < observers[i].sensors.count; k++) {
             bst_camera *camera = &((bst_sensor_config *)observers[i].sensors.items)[k].camera;
+            if (bst_camera_resolve_scale(ctx, camera) != BST_OK) {
+                return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: /observers/%d/sensors/%d/camera",
+                                       s->file, i, k);
+            }
             bool image = bst_camera_prepare(ctx, camera) == BST_OK;
             if (!image || bst_detector_config_check(ctx, &camera->detector) != BST_OK) {
                 return bst_fail_prefix(ctx, BST_ERR_CONFIG,
@@ -79,6 +83,29 @@ static bst_status prepare_cameras(bst_ctx *ctx, bst_scenario *s) {
                                        image ? "detector" : "distortion");
             }
         }
+    }
+    return BST_OK;
+}
+
+/* Fills in what Keplerian elements leave open, so that the resolved scenario shows it. */
+static bst_status resolve_state(bst_ctx *ctx, const bst_scenario *s, const char *list, int index,
+                                bst_orbit_config *orbit) {
+    bool keplerian =
+        orbit->source == BST_ORBIT_NUMERICAL && orbit->state.from == BST_STATE_KEPLERIAN;
+    if (keplerian && bst_keplerian_resolve(ctx, &orbit->state) != BST_OK) {
+        return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: %s/%d/orbit/state", s->file, list, index);
+    }
+    return BST_OK;
+}
+
+static bst_status resolve_states(bst_ctx *ctx, bst_scenario *s) {
+    bst_observer_config *observers = s->observers.items;
+    bst_object_config *objects = s->world.objects.items;
+    for (int i = 0; i < s->observers.count; i++) {
+        BST_TRY(resolve_state(ctx, s, "/observers", i, &observers[i].orbit));
+    }
+    for (int i = 0; i < s->world.objects.count; i++) {
+        BST_TRY(resolve_state(ctx, s, "/world/objects", i, &objects[i].orbit));
     }
     return BST_OK;
 }
@@ -150,6 +177,7 @@ static bst_status read_scenario(bst_ctx *ctx, const bst_json *json, const bst_re
         return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s", out->file);
     }
     BST_TRY(prepare_cameras(ctx, out));
+    BST_TRY(resolve_states(ctx, out));
     BST_TRY(check_names(ctx, out));
     BST_TRY(bst_scenario_paths(ctx, json, out, "", bst_scenario_table, out, false));
     return bst_scenario_modules(ctx, json, registry, out);

@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-#define BIN_RATIO 1.01
+#define BIN_RATIO 1.001
 #define BIN_FIRST_PX 1e-5
 
 void bst_error_statistics_add(bst_error_statistics *s, double x_px, double y_px) {

@@ -5,9 +5,9 @@
 
 #include <stdint.h>
 
-/* Logarithmic bins of 1 % from 1e-5 px to 9e7 px, which is more than 180 degrees at 0.01 arcsec a
+/* Logarithmic bins of 0.1 % from 1e-5 px to 1e8 px, which is more than 180 degrees at 0.01 arcsec a
  * pixel. */
-enum { BST_ERROR_BINS = 3000 };
+enum { BST_ERROR_BINS = 30000 };
 
 typedef struct bst_error_statistics {
     int64_t count, bins[BST_ERROR_BINS];
@@ -21,7 +21,7 @@ double bst_error_statistics_rms(const bst_error_statistics *statistics);
 /* Length of the mean vector, px; NAN without errors. */
 double bst_error_statistics_bias(const bst_error_statistics *statistics);
 /* Percentile of the sizes by nearest rank (the smallest size that at least a share q of all does
- * not exceed), px, right to 0.5 %; NAN without errors. Sizes below 1e-5 px are one bin. */
+ * not exceed), px, right to 0.05 %; NAN without errors. Sizes below 1e-5 px are one bin. */
 double bst_error_statistics_quantile(const bst_error_statistics *statistics, double q);
 /* Largest size, px; NAN without errors. */
 double bst_error_statistics_largest(const bst_error_statistics *statistics);

@@ -48,7 +48,6 @@ typedef struct bst_loop_figures {
     int64_t pointing_frames;
     double pointing_rms_px, pointing_median_px, pointing_p95_px, pointing_p99_px, pointing_max_px;
     double pointing_bias_px; /* length of the mean error vector */
-    int64_t bad_pixels;      /* that image processing had learned by the latest frame */
 } bst_loop_figures;
 
 /* What the figures of a run need of its frames. Zero it to begin. */

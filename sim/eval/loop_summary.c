@@ -254,10 +254,6 @@ void bst_loop_summary_tracks(bst_loop_summary *s, const bst_tracks *tracks, int6
     }
 }
 
-void bst_loop_summary_detections(bst_loop_summary *s, const bst_detections *detections) {
-    s->figures.bad_pixels = detections->bad_pixels;
-}
-
 void bst_loop_summary_status(bst_loop_summary *s, const bst_control_status *status) {
     s->mode = status->mode;
     s->figures.final_mode = status->mode;

@@ -24,7 +24,6 @@ void bst_loop_summary_on_frame(bst_loop_summary *summary, bst_loop_frame_fn fn, 
 bst_status bst_loop_summary_truth(bst_ctx *ctx, bst_loop_summary *summary,
                                   const bst_truth *truth) BST_MUST_CHECK;
 void bst_loop_summary_tracks(bst_loop_summary *summary, const bst_tracks *tracks, int64_t tick);
-void bst_loop_summary_detections(bst_loop_summary *summary, const bst_detections *detections);
 void bst_loop_summary_status(bst_loop_summary *summary, const bst_control_status *status);
 
 /* The target is another one from now on, -1: none: acquisition and settling begin anew; the times

@@ -84,6 +84,9 @@ bst_status bst_run_metrics_truth(bst_ctx *ctx, bst_run_metrics *m, const bst_tru
     lost->dropped_frames += truth->dropped;
     lost->truth += truth->lost;
     lost->truth_frames += truth->lost > 0;
+    lost->earth_frames += truth->earth_fraction > 0.0;
+    lost->moon_frames += truth->moon_fraction > 0.0;
+    lost->sun_frames += truth->sun_fraction > 0.0;
     m->newest = (m->newest + 1) % WAITING;
     known_frame *f = &m->frames[m->newest];
     f->exposure_id = truth->exposure_id;
@@ -106,8 +109,8 @@ bst_status bst_run_metrics_truth(bst_ctx *ctx, bst_run_metrics *m, const bst_tru
             (known_object){item->id,
                            {cos(item->dec_rad) * cos(item->ra_rad),
                             cos(item->dec_rad) * sin(item->ra_rad), sin(item->dec_rad)},
-                           item->x_mean_px,
-                           item->y_mean_px,
+                           item->x_centroid_px,
+                           item->y_centroid_px,
                            !(item->flags & BST_TRUTH_OCCULTED) && item->snr > 0.0};
         if (item->id < (uint32_t)m->object_count) {
             m->objects[item->id] |= 1;
@@ -119,6 +122,7 @@ bst_status bst_run_metrics_truth(bst_ctx *ctx, bst_run_metrics *m, const bst_tru
 void bst_run_metrics_detections(bst_run_metrics *m, const bst_detections *detections) {
     bst_run_losses *lost = &m->figures.losses;
     m->figures.detections += detections->count;
+    m->figures.bad_pixels = detections->bad_pixels;
     lost->detections += detections->lost;
     lost->detection_frames += detections->lost > 0;
     lost->no_stars_frames += detections->stars_identified == 0;

@@ -18,6 +18,7 @@ typedef struct bst_run_losses {
     int64_t dropped_frames;               /* lost between camera and image processing */
     int64_t no_stars_frames;              /* processed, and no star was identified */
     int64_t no_attitude_frames;           /* seen by the tracker without an attitude from stars */
+    int64_t earth_frames, moon_frames, sun_frames; /* covered in part by that body's disc */
 } bst_run_losses;
 
 typedef struct bst_run_metric_figures {
@@ -32,6 +33,7 @@ typedef struct bst_run_metric_figures {
     double track_rms_px, track_median_px, track_p95_px, track_max_px;
     /* confirmed tracks, by identity; false: near no object in most of its frames */
     int64_t tracks, false_tracks;
+    int64_t bad_pixels;      /* that image processing had learned by the latest frame */
     int64_t objects_seen;    /* objects that were in the field */
     int64_t objects_tracked; /* of them: ever near a confirmed track */
     bst_run_losses losses;

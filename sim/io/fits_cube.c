@@ -143,7 +143,7 @@ bst_status bst_fits_cube_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_fram
     return status;
 }
 
-enum { TABLE_COLUMNS = 21 };
+enum { TABLE_COLUMNS = 24 };
 
 static void make_table(fitsfile *file, LONGLONG rows, int *code) {
     static const char *const columns[TABLE_COLUMNS][3] = {
@@ -154,6 +154,7 @@ static void make_table(fitsfile *file, LONGLONG rows, int *code) {
         {"CRVAL2", "1D", "deg"},      {"CD1_1", "1D", "deg/pixel"}, {"CD1_2", "1D", "deg/pixel"},
         {"CD2_1", "1D", "deg/pixel"}, {"CD2_2", "1D", "deg/pixel"}, {"WCSRESID", "1D", "pixel"},
         {"OBSPOS", "3D", "m"},        {"OBSVEL", "3D", "m/s"},      {"BITS", "1J", "bit"},
+        {"EARTHFRC", "1D", ""},       {"MOONFRC", "1D", ""},        {"SUNFRC", "1D", ""},
     };
     char *names[TABLE_COLUMNS], *forms[TABLE_COLUMNS], *units[TABLE_COLUMNS];
     for (int i = 0; i < TABLE_COLUMNS; i++) {
@@ -212,6 +213,10 @@ static void put_row(fitsfile *file, LONGLONG row, const bst_fits_frame *f, int *
     fits_write_col(file, TDOUBLE, 19, row, 1, 3, observer, code);
     fits_write_col(file, TDOUBLE, 20, row, 1, 3, observer + 3, code);
     fits_write_col(file, TINT, 21, row, 1, 1, &bits, code);
+    for (int k = 0; k < 3; k++) {
+        double share = f->has_observer ? f->body_fraction[k] : NAN;
+        fits_write_col(file, TDOUBLE, 22 + k, row, 1, 1, &share, code);
+    }
 }
 
 bst_status bst_fits_cube_finish(bst_ctx *ctx, bst_fits *fits) {

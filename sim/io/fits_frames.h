@@ -49,6 +49,7 @@ typedef struct bst_fits_frame {
     bool has_wcs, has_observer;
     bst_wcs wcs; /* of the whole sensor: the writer shifts and scales it to the window */
     bst_vec3 observer_gcrf_m, observer_gcrf_mps; /* mid exposure, geocentric */
+    double body_fraction[3]; /* of the image that Earth, Moon and Sun cover; with has_observer */
 } bst_fits_frame;
 
 typedef struct bst_fits bst_fits;

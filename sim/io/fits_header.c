@@ -191,5 +191,12 @@ void bst_fits_put_frame_keys(fitsfile *file, const bst_fits_names *names,
                            : "[m/s] observer, geocentric GCRF, mid exposure",
                      code);
         }
+        static const char *const bodies[3] = {"EARTHFRC", "MOONFRC", "SUNFRC"};
+        static const char *const meant[3] = {"[0..1] of the image that the Earth covers",
+                                             "[0..1] of the image that the Moon covers",
+                                             "[0..1] of the image that the Sun covers"};
+        for (int k = 0; k < 3; k++) {
+            put_real(file, bodies[k], frame->body_fraction[k], meant[k], code);
+        }
     }
 }

@@ -62,7 +62,8 @@ bst_status bst_plot_begin(bst_ctx *ctx, bst_plot *plot, const char *path, int wi
                 "}\n",
                 width, height, width, height);
     }
-    fputs("set encoding utf8\nset output ", plot->script);
+    /* names keep their underscores */
+    fputs("set termoption noenhanced\nset encoding utf8\nset output ", plot->script);
     put_quoted(plot->script, plot->draft);
     fputc('\n', plot->script);
     return BST_OK;

@@ -30,12 +30,13 @@ typedef struct bst_pointing_point {
     double dx_px, dy_px; /* true target from the boresight, mean of the exposure */
     int mode;            /* bst_mode */
     bool in_track;       /* the right target is in confirmed track */
+    bool counted;        /* among the frames of the pointing figures */
     bool visible;        /* false: the point is not drawn */
 } bst_pointing_point;
 
 /* Plots the pointing error against time: radial error on a logarithmic scale with the modes as
- * coloured ground, and both components of the points in track. `title` and `label`, a line of
- * figures, may be NULL; `limit_px` > 0 draws a line at the error that is asked for. */
+ * coloured ground, and both components of the points that are counted. `title` and `label`, a line
+ * of figures, may be NULL; `limit_px` > 0 draws a line at the error that is asked for. */
 bst_status bst_pointing_plot(bst_ctx *ctx, const char *path, const char *title, const char *label,
                              const bst_pointing_point *points, int count, double limit_px,
                              bool *made) BST_MUST_CHECK;

@@ -14,9 +14,9 @@ static const char *const mode_colours[BST_MODE_COUNT] = {
 
 /* Extent of what is drawn. */
 typedef struct extent {
-    int in_track;  /* visible points in track */
+    int counted;   /* points that are counted */
     double top;    /* largest radial error */
-    double spread; /* largest component of points in track */
+    double spread; /* largest component of points that are counted */
 } extent;
 
 static double radial(const bst_pointing_point *p) {
@@ -24,7 +24,7 @@ static double radial(const bst_pointing_point *p) {
 }
 
 static extent measure(const bst_pointing_point *points, int count) {
-    extent e = {.in_track = 0};
+    extent e = {.counted = 0};
     for (int i = 0; i < count; i++) {
         const bst_pointing_point *p = &points[i];
         double r = radial(p);
@@ -32,8 +32,8 @@ static extent measure(const bst_pointing_point *points, int count) {
             continue;
         }
         e.top = fmax(e.top, r);
-        if (p->in_track) {
-            e.in_track++;
+        if (p->counted) {
+            e.counted++;
             e.spread = fmax(e.spread, fmax(fabs(p->dx_px), fabs(p->dy_px)));
         }
     }
@@ -52,8 +52,8 @@ static void put_data(FILE *s, const bst_pointing_point *points, int count) {
     for (int i = 0; i < count; i++) {
         const bst_pointing_point *p = &points[i];
         if (p->visible && isfinite(radial(p))) {
-            fprintf(s, "%.9g %.9g %.9g %.9g %d\n", p->time_s, fmax(radial(p), FLOOR_PX), p->dx_px,
-                    p->dy_px, p->in_track ? 1 : 0);
+            fprintf(s, "%.9g %.9g %.9g %.9g %d %d\n", p->time_s, fmax(radial(p), FLOOR_PX),
+                    p->dx_px, p->dy_px, p->in_track ? 1 : 0, p->counted ? 1 : 0);
         } else {
             fputc('\n', s);
         }
@@ -123,11 +123,11 @@ static void put_upper(FILE *s, const char *title, const bst_pointing_point *poin
 }
 
 static void put_lower(FILE *s, const char *label, double limit_px, const extent *e) {
-    double span = e->in_track ? fmax(1.45 * e->spread, limit_px > 0.0 ? 1.5 * limit_px : 0.1) : 1.0;
+    double span = e->counted ? fmax(1.45 * e->spread, limit_px > 0.0 ? 1.5 * limit_px : 0.1) : 1.0;
     fputs(
         "unset title\nunset object\nunset logscale y\nset tmargin 0.6\nset bmargin 3.4\n"
         "set format x '%g'\nset xlabel 'time since the epoch  [s]'\n"
-        "set ylabel 'in track  [px]' offset 0.5,0\n",
+        "set ylabel 'settled, mode track  [px]' offset 0.5,0\n",
         s);
     fprintf(s, "set yrange [%.9g:%.9g]\n", -span, span);
     if (label) {
@@ -143,9 +143,9 @@ static void put_lower(FILE *s, const char *label, double limit_px, const extent 
                 limit_px, -limit_px);
     }
     fputs(
-        "$points using 1:($5 == 1 ? $3 : NaN) with linespoints pointtype 7 pointsize 0.35 "
+        "$points using 1:($6 == 1 ? $3 : NaN) with linespoints pointtype 7 pointsize 0.35 "
         "linecolor rgb '#1f77b4' title 'x', "
-        "$points using 1:($5 == 1 ? $4 : NaN) with linespoints pointtype 7 pointsize 0.35 "
+        "$points using 1:($6 == 1 ? $4 : NaN) with linespoints pointtype 7 pointsize 0.35 "
         "linecolor rgb '#e08214' title 'y'\n",
         s);
 }

@@ -8,9 +8,10 @@
 
 #define PANEL 640 /* width and greatest height of a panel */
 #define MARGIN 20
-#define HEAD 58     /* title */
-#define CAPTION 58  /* above each panel */
-#define LEGEND 44   /* below */
+#define HEAD 58    /* title */
+#define CAPTION 58 /* above each panel */
+#define LEGEND 44  /* below */
+#define LEGEND_ROW 24
 #define INSET 208   /* side of the inset */
 #define INSET_PX 48 /* pixels of the frame in it */
 
@@ -201,8 +202,11 @@ static bst_status draw_panel(bst_ctx *ctx, bst_picture *p, const bst_quicklook_f
     return BST_OK;
 }
 
-static void draw_legend(bst_picture *p, double x, double y) {
-    const double h = 9.5, gap = 22;
+/* `single`: there is one panel, under which the legend takes two rows. */
+static void draw_legend(bst_picture *p, double left, double y, bool single) {
+    const double h = 9.5, gap = 30;
+    double x = left;
+    y -= single ? LEGEND_ROW : 0;
     double mid = y - 4;
     bst_picture_rectangle(p, x, mid - 7, 14, 14, target_colour, 1.6);
     x += 22 + bst_picture_text(p, x + 22, y, h, soft, false, "target (truth)") + gap;
@@ -210,6 +214,11 @@ static void draw_legend(bst_picture *p, double x, double y) {
     x += 24 + bst_picture_text(p, x + 24, y, h, soft, false, "track") + gap;
     bst_picture_circle(p, x + 7, mid, 6.5, object_colour, 1.5);
     x += 22 + bst_picture_text(p, x + 22, y, h, soft, false, "detection") + gap;
+    if (single) {
+        x = left;
+        y += LEGEND_ROW;
+        mid += LEGEND_ROW;
+    }
     bst_picture_circle(p, x + 7, mid, 6.5, star_colour, 1.2);
     x += 22 + bst_picture_text(p, x + 22, y, h, soft, false, "identified star") + gap;
     bst_picture_circle(p, x + 7, mid, 6.5, rest_colour, 1.2);
@@ -229,7 +238,7 @@ bst_status bst_quicklook_write(bst_ctx *ctx, const char *path, const char *title
         }
     }
     int width = MARGIN + panels * (PANEL + MARGIN);
-    int height = HEAD + CAPTION + PANEL + LEGEND;
+    int height = HEAD + CAPTION + PANEL + LEGEND + (second ? 0 : LEGEND_ROW);
     bst_picture *p;
     BST_TRY(bst_picture_create(ctx, width, height, ground, &p));
     bst_picture_text(p, MARGIN, 36, 16.0, white, true, title ? title : "");
@@ -238,7 +247,7 @@ bst_status bst_quicklook_write(bst_ctx *ctx, const char *path, const char *title
         status = draw_panel(ctx, p, frames[i], MARGIN + i * (PANEL + MARGIN), HEAD);
     }
     if (status == BST_OK) {
-        draw_legend(p, MARGIN, height - 16);
+        draw_legend(p, MARGIN, height - 16, !second);
         status = bst_picture_save(ctx, p, path);
     }
     bst_picture_free(p);

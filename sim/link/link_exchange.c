@@ -45,9 +45,14 @@ static void send_step(bst_link *link, link_exchange *x, sending *s) {
 static bst_status silent(bst_link *link, link_exchange *x, double waited_s, bool *answered) {
     link_part *part = &link->parts[x->part];
     int peer = part->peer;
-    bst_link_event(link, x->ctx, LINK_UNANSWERED, "%s has not answered step %lld of %s",
-                   peer >= 0 ? link->peers[peer].name : "nobody", (long long)part->step - 1,
-                   part->about.instance);
+    if (peer >= 0) {
+        bst_link_event(link, x->ctx, LINK_UNANSWERED, "%s has not answered step %lld of %s",
+                       link->peers[peer].name, (long long)part->step - 1, part->about.instance);
+    } else {
+        bst_link_event(link, x->ctx, LINK_UNANSWERED,
+                       "step %lld of %s is not answered: no peer plays it",
+                       (long long)part->step - 1, part->about.instance);
+    }
     *answered = false;
     for (int i = 0; i < x->answer.output_count; i++) {
         x->answer.outputs[i].given = false; /* half of an answer is none */

@@ -23,11 +23,15 @@ const bst_config_desc bst_background_config_table[] = {
              "sky: starlight scattered by dust, over the light of all stars of that place fainter "
              "than V 6."),
     BST_BOOL(bst_background_config, earth, "true",
-             "sky: the Earth's disc in the field, and its stray light where there is a table."),
-    BST_BOOL(bst_background_config, moon, "true", "sky: the same of the Moon."),
-    BST_BOOL(bst_background_config, sun, "true", "sky: the same of the Sun."),
+             "The Earth's disc in the field, by day and by night, in both models; sky: and its "
+             "stray light where there is a table. false: only what is behind it is hidden."),
+    BST_BOOL(bst_background_config, moon, "true", "The same of the Moon, which hides nothing."),
+    BST_BOOL(bst_background_config, sun, "true", "The same of the Sun, which hides nothing."),
     BST_REAL(bst_background_config, earth_albedo, "", 0, 1, "0.3",
-             "Diffuse albedo of the Earth, a Lambertian ellipsoid."),
+             "Diffuse albedo of the Earth, a Lambertian ellipsoid in the light of Sun and Moon."),
+    BST_REAL(bst_background_config, earth_night_mag_arcsec2, "mag", 10, 40, "22",
+             "Brightness of the Earth's night side without moonlight, V per square arcsecond: "
+             "airglow at its median (Leinert et al. 1998). It is on the day side too."),
     BST_REAL(bst_background_config, earth_temperature_k, "K", 0, 400, "255",
              "Temperature that the Earth emits with, day and night, in bands with a spectrum."),
     BST_REAL(bst_background_config, limb_scale_height_m, "m", 0, 1e5, "8000",

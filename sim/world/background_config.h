@@ -18,8 +18,8 @@ typedef struct bst_background_config {
     int32_t model; /* BST_BACKGROUND_... */
     bool zodiacal, starlight;
     double diffuse_galactic_fraction;
-    bool earth, moon, sun; /* their discs and, through the PST, their stray light */
-    double earth_albedo, earth_temperature_k, limb_scale_height_m;
+    bool earth, moon, sun; /* their discs and, in `sky` through the PST, their stray light */
+    double earth_albedo, earth_night_mag_arcsec2, earth_temperature_k, limb_scale_height_m;
     bst_config_list pst; /* bst_pst_point; empty: no stray light */
     char pst_file[512];  /* the same from a CSV file; "": none */
     double pixel_um;     /* pitch, for stray light; 0: that of the optics */

@@ -45,6 +45,7 @@ struct bst_band {
     int count[2];
     quadrature rule; /* weights hold the response */
     double sun, mean_m;
+    double sun_share[BST_SUNLIGHT_COLOURS]; /* of `sun`, next to each wavelength of bst_sunlight */
     double log_star[COLOURS];
 };
 
@@ -230,6 +231,20 @@ static double star_scale(double temperature_k) {
     return V0_IRRADIANCE * width / through;
 }
 
+/* Shares `light` of one wavelength among the two of bst_sunlight_wavelength_m that it lies between.
+ */
+static void add_sunlight(bst_band *band, double wavelength_m, double light) {
+    const double *w = bst_sunlight_wavelength_m;
+    int k = 0;
+    while (k + 2 < BST_SUNLIGHT_COLOURS && wavelength_m > w[k + 1]) {
+        k++;
+    }
+    double u = fmin(fmax((wavelength_m - w[k]) / (w[k + 1] - w[k]), 0.0), 1.0);
+    band->sun += light;
+    band->sun_share[k] += (1.0 - u) * light;
+    band->sun_share[k + 1] += u * light;
+}
+
 static bst_status prepare(bst_ctx *ctx, bst_band *band) {
     BST_TRY(make_rule(ctx, band));
     const quadrature *q = &band->rule;
@@ -237,13 +252,17 @@ static bst_status prepare(bst_ctx *ctx, bst_band *band) {
     for (int i = 0; i < q->count; i++) {
         total += q->weight[i];
         band->mean_m += q->weight[i] * q->place[i];
-        band->sun += q->weight[i] * bst_sun_irradiance(q->place[i]) / photon_energy_j(q->place[i]);
+        add_sunlight(band, q->place[i],
+                     q->weight[i] * bst_sun_irradiance(q->place[i]) / photon_energy_j(q->place[i]));
     }
     if (!(total > 0.0)) {
         return bst_fail(ctx, BST_ERR_CONFIG,
                         "response: response times transmission is zero at all wavelengths");
     }
     band->mean_m /= total;
+    for (int k = 0; k < BST_SUNLIGHT_COLOURS; k++) {
+        band->sun_share[k] = band->sun > 0.0 ? band->sun_share[k] / band->sun : 0.0;
+    }
     for (int i = 0; i < COLOURS; i++) {
         double temperature = bst_star_temperature_k(COLOUR_FIRST + COLOUR_STEP * i);
         band->log_star[i] = log(bst_band_radiance(band, temperature) * star_scale(temperature));
@@ -364,6 +383,14 @@ double bst_band_star(const bst_band *band, double b_minus_v) {
 
 double bst_band_sun(const bst_band *band) {
     return band->sun;
+}
+
+double bst_band_reddened_sun(const bst_band *band, const double light[BST_SUNLIGHT_COLOURS]) {
+    double sum = 0.0;
+    for (int k = 0; k < BST_SUNLIGHT_COLOURS; k++) {
+        sum += band->sun_share[k] * light[k];
+    }
+    return sum;
 }
 
 double bst_band_radiance(const bst_band *band, double temperature_k) {

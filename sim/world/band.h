@@ -5,6 +5,7 @@
 #ifndef BST_WORLD_BAND_H
 #define BST_WORLD_BAND_H
 
+#include "sim/astro/bodies.h"
 #include "sim/core/status.h"
 #include "sim/world/band_config.h"
 
@@ -33,6 +34,10 @@ double bst_band_star(const bst_band *band, double b_minus_v);
 
 /* Sunlight at 1 au, 1/s/m2, from bst_sun_irradiance. */
 double bst_band_sun(const bst_band *band);
+
+/* Sunlight that has passed the Earth's air over unweakened sunlight in the band, `light` being that
+ * ratio at bst_sunlight_wavelength_m; between them straight, beyond them constant. */
+double bst_band_reddened_sun(const bst_band *band, const double light[BST_SUNLIGHT_COLOURS]);
 
 /* A black body's radiance, 1/s/m2/sr; 0 for a temperature that is not above 0. */
 double bst_band_radiance(const bst_band *band, double temperature_k);

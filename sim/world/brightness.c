@@ -224,9 +224,12 @@ void bst_brightness_at(const bst_brightness *b, const bst_lighting *l, bst_glow 
     bst_vec3 to_sun = bst_vec3_sub(l->sun_m, l->object_m);
     double range_m = bst_vec3_norm(to_eye), phase = bst_vec3_angle(to_eye, to_sun);
     double full = full_v_mag(b, l, phase, range_m, bst_vec3_norm(to_sun));
-    *out = (bst_glow){.v_mag = l->sunlit_fraction > 0.0 ? full - 2.5 * log10(l->sunlit_fraction)
-                                                        : (double)INFINITY,
+    double sunlight = l->sunlight ? l->sunlight->light[BST_SUNLIGHT_V] : l->sunlit_fraction;
+    *out = (bst_glow){.v_mag = sunlight > 0.0 ? full - 2.5 * log10(sunlight) : (double)INFINITY,
                       .resolved = c->resolved};
+    for (int k = 0; k < BST_SUNLIGHT_COLOURS; k++) {
+        out->redness[k] = l->sunlight && sunlight > 0.0 ? l->sunlight->light[k] / sunlight : 1.0;
+    }
     double law = bst_sphere_phase(c->specular_fraction, phase);
     out->specular_share = law > 0.0 ? c->specular_fraction / (4.0 * BST_PI) / law : 0.0;
     double ratio = sqrt(l->area_m2 / BST_PI) / range_m, disc = 1.0;
@@ -265,6 +268,10 @@ void bst_brightness_at(const bst_brightness *b, const bst_lighting *l, bst_glow 
 double bst_glow_electrons_per_s(const bst_camera *camera, const bst_glow *glow, double *reflected) {
     bool thermal = camera->spectrum && bst_band_is_thermal(camera->spectrum);
     double sunlight = isinf(glow->v_mag) ? 0.0 : bst_camera_electrons_per_s(camera, glow->v_mag);
+    if (camera->spectrum) {
+        double red = bst_band_reddened_sun(camera->spectrum, glow->redness);
+        sunlight *= glow->earth_share + (1.0 - glow->earth_share) * red;
+    }
     if (thermal) {
         sunlight *= glow->thermal_reflection;
     }

@@ -2,6 +2,7 @@
 #ifndef BST_WORLD_BRIGHTNESS_H
 #define BST_WORLD_BRIGHTNESS_H
 
+#include "sim/astro/bodies.h"
 #include "sim/core/vec.h"
 #include "sim/world/brightness_config.h"
 #include "sim/world/camera.h"
@@ -17,16 +18,20 @@ void bst_brightness_free(bst_brightness *brightness);
 
 /* Where the light comes from and goes to. Positions are geocentric, GCRF. */
 typedef struct bst_lighting {
-    double area_m2, albedo; /* of the sphere; cross-section */
-    bst_vec3 object_m;      /* when the light leaves */
-    bst_vec3 eye_m, sun_m;  /* when it arrives */
-    double seconds;         /* when it leaves, after the epoch */
-    double sunlit_fraction; /* of the Sun's disc that the object sees */
+    double area_m2, albedo;       /* of the sphere; cross-section */
+    bst_vec3 object_m;            /* when the light leaves */
+    bst_vec3 eye_m, sun_m;        /* when it arrives */
+    double seconds;               /* when it leaves, after the epoch */
+    double sunlit_fraction;       /* of the Sun's disc that the object sees */
+    const bst_sunlight *sunlight; /* with limb darkening and air; NULL: sunlit_fraction of the whole
+                                     Sun's light at all wavelengths */
 } bst_lighting;
 
-/* Light of an object. Reflected light has the Sun's spectrum. */
+/* Light of an object. Reflected light has the Sun's spectrum, reddened by the air at the edge of
+ * the Earth's shadow. */
 typedef struct bst_glow {
-    double v_mag;          /* all reflected light; +INFINITY: none */
+    double v_mag;                         /* all reflected light; +INFINITY: none */
+    double redness[BST_SUNLIGHT_COLOURS]; /* reflected sunlight by wavelength, over that in V */
     double specular_share; /* of the reflected light: the Sun's image in the mirror ball */
     double earth_share;    /* of the reflected light: from the Earth */
     bst_vec3 earth;        /* unit, from the object to the middle of the Earth's light, GCRF */

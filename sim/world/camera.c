@@ -16,8 +16,14 @@ const bst_config_desc bst_distortion_config[] = {
 const bst_config_desc bst_camera_config[] = {
     BST_INT(bst_camera, width_px, "px", 1, 16384, "1024", "Columns of the sensor."),
     BST_INT(bst_camera, height_px, "px", 1, 16384, "1024", "Rows of the sensor."),
-    BST_REAL(bst_camera, pixel_scale_arcsec, "arcsec/px", 1e-3, 600, NULL,
-             "Angle that a pixel spans at the boresight (gnomonic projection)."),
+    BST_OPEN_REAL(bst_camera, pixel_scale_arcsec, "arcsec/px", 1e-3, 600,
+                  "Angle that a pixel spans at the boresight (gnomonic projection). It, the focal "
+                  "length and the pixel's side follow from each other: two of them give the third; "
+                  "the scale alone is enough."),
+    BST_OPEN_REAL(bst_camera, focal_length_m, "m", 1e-4, 1e3, "Focal length."),
+    BST_OPEN_REAL(bst_camera, f_number, "", 0.1, 1e4,
+                  "Focal length over aperture_m, in its place."),
+    BST_OPEN_REAL(bst_camera, pixel_um, "um", 0.01, 1e4, "Side of a pixel."),
     BST_REAL(bst_camera, aperture_m, "m", 1e-3, 20, NULL, "Diameter of the entrance pupil."),
     BST_REAL(bst_camera, obscuration, "", 0, 0.99, "0",
              "Fraction of the pupil's area that is blocked."),

@@ -35,14 +35,15 @@ typedef struct bst_camera_geometry {
 
 typedef struct bst_camera {
     int64_t width_px, height_px;
-    double pixel_scale_arcsec;      /* at the boresight; tangent (gnomonic) projection */
-    double aperture_m;              /* diameter of the entrance pupil */
-    double obscuration;             /* fraction of the pupil's area that is blocked */
-    double throughput;              /* optics, 0..1 */
-    double quantum_efficiency;      /* band mean, 0..1 */
-    double photon_flux_v0_per_s_m2; /* photons of a V = 0 star in the camera's band */
-    double psf_fwhm_px;             /* Gaussian, Moffat */
-    double background_mag_arcsec2;  /* uniform sky, V per square arcsecond */
+    double pixel_scale_arcsec;                 /* at the boresight; tangent (gnomonic) projection */
+    double focal_length_m, f_number, pixel_um; /* NAN: not known; they serve the scale alone */
+    double aperture_m;                         /* diameter of the entrance pupil */
+    double obscuration;                        /* fraction of the pupil's area that is blocked */
+    double throughput;                         /* optics, 0..1 */
+    double quantum_efficiency;                 /* band mean, 0..1 */
+    double photon_flux_v0_per_s_m2;            /* photons of a V = 0 star in the camera's band */
+    double psf_fwhm_px;                        /* Gaussian, Moffat */
+    double background_mag_arcsec2;             /* uniform sky, V per square arcsecond */
     double dark_current_e_per_s;
     double read_noise_e;
     double full_well_e;
@@ -67,6 +68,13 @@ typedef struct bst_camera {
 
 extern const bst_config_desc bst_camera_config[];
 extern const bst_config_desc bst_distortion_config[];
+
+/* What a configuration leaves open (NAN) of pixel scale, focal length, focal ratio and pixel pitch,
+ * from what it gives; the scale is that of a gnomonic projection, pitch over focal length. Where
+ * more is given than is needed the scale counts. BST_ERR_CONFIG, with the keys but without their
+ * place, when the scale does not follow, or when keys contradict each other by more than a
+ * thousandth, those of the blocks `optics` and `background` too. */
+bst_status bst_camera_resolve_scale(bst_ctx *ctx, bst_camera *camera) BST_MUST_CHECK;
 
 /* Makes `geometry` from rotation and distortion; to be called once they are set, and again when
  * they or the sensor's size or scale change. A camera with neither needs no call.

@@ -81,6 +81,12 @@ static void make_earth(const bst_camera *camera, const bst_surroundings *a, bst_
     d->present = camera->background.earth;
     d->radiance = camera->background.earth_albedo / BST_PI *
                   sun_radiance_scale(bst_vec3_norm(a->bodies.sun_m));
+    d->night = pow(10.0, -0.4 * camera->background.earth_night_mag_arcsec2) /
+               (BST_ARCSEC_RAD * BST_ARCSEC_RAD);
+    d->moon = bst_vec3_unit(bst_mat3_mul_vec(&a->itrf_from_gcrf, a->bodies.moon_m));
+    bst_vec3 sun_from_moon = bst_vec3_sub(a->bodies.sun_m, a->bodies.moon_m);
+    d->moonlight = camera->background.earth_albedo / BST_PI *
+                   pow(10.0, -0.4 * bst_moon_v_mag(a->bodies.moon_m, sun_from_moon));
     /* aberration by the observer's motion about the Earth turns all directions near the boresight
      * alike */
     bst_light moving = {a->eye_mps, a->light.sun_m};
@@ -158,12 +164,36 @@ void bst_discs_make(const bst_camera *camera, const bst_surroundings *around, bs
                             ? LIMB_HEIGHTS * out->limb_scale /
                                   sqrt(fmax(bst_vec3_dot(d->eye[4], d->eye[4]) - 1.0, 1e-4))
                             : 0.0;
-        d->present = d->present && nearest < half + beyond + 50.0 * out->sigma_px * out->scale_rad;
+        d->near = nearest < half + beyond + 50.0 * out->sigma_px * out->scale_rad;
+        d->present = d->present && d->near;
     }
 }
 
 bool bst_discs_any(const bst_discs *discs) {
     return discs->body[0].present || discs->body[1].present || discs->body[2].present;
+}
+
+double bst_discs_share(const bst_discs *discs, const bst_camera *camera, int body, bst_window w) {
+    enum { PLACES = 33 };
+    const bst_body_disc *d = &discs->body[body];
+    const int middle = BST_DISC_PARTS / 2;
+    if (!d->near) {
+        return 0.0;
+    }
+    int covered = 0;
+    for (int i = 0; i < PLACES * PLACES; i++) {
+        double x = w.x0 - 0.5 + w.width * (i % PLACES) / (PLACES - 1.0);
+        double y = w.y0 - 0.5 + w.height * (i / PLACES) / (PLACES - 1.0);
+        covered += edge_at(d, body, middle, bst_camera_unproject(camera, x, y)) < 0.0;
+    }
+    double share = covered / (double)(PLACES * PLACES), x, y;
+    if (covered < 10 && body != BST_BODY_EARTH &&
+        bst_camera_project(camera, d->centre[middle], &x, &y) && x > w.x0 - 0.5 && y > w.y0 - 0.5 &&
+        x < w.x0 + w.width - 0.5 && y < w.y0 + w.height - 0.5) {
+        double radius_px = d->radius_rad / discs->scale_rad;
+        share = BST_PI * radius_px * radius_px / ((double)w.width * w.height);
+    }
+    return fmin(share, 1.0);
 }
 
 double bst_discs_edge_px(const bst_discs *discs, bst_vec3 direction) {
@@ -200,6 +230,28 @@ static double inside(double from, double to, double sigma) {
     return fmin(fmax((ramp(-from, sigma) - ramp(-to, sigma)) / (to - from), 0.0), 1.0);
 }
 
+/* Normal of the ellipsoid, unit, Earth axes: x / a, y / a, z / b of a point of the scaled
+ * sphere. */
+static bst_vec3 normal_at(bst_vec3 near) {
+    return bst_vec3_unit((bst_vec3){near.x, near.y, near.z / (1.0 - BST_EARTH_FLATTENING)});
+}
+
+bool bst_discs_terminator(const bst_discs *discs, const bst_vec3 directions[4]) {
+    const bst_body_disc *d = &discs->body[BST_BODY_EARTH];
+    bool day = false, night = false;
+    for (int i = 0; i < 4 && d->present; i++) {
+        for (int k = 0; k <= BST_DISC_PARTS; k += BST_DISC_PARTS / 2) {
+            bst_vec3 near;
+            double height;
+            (void)earth_edge(d, k, directions[i], &near, &height);
+            bool lit = bst_vec3_dot(normal_at(near), d->sun[k]) > 0.0;
+            day = day || lit;
+            night = night || !lit;
+        }
+    }
+    return day && night;
+}
+
 /* Light of the Earth's disc, or of its limb above it, at the middle of a stretch. */
 static double earth_radiance(const bst_discs *discs, int k, bst_vec3 direction, double share,
                              double *sunlight) {
@@ -207,12 +259,13 @@ static double earth_radiance(const bst_discs *discs, int k, bst_vec3 direction, 
     bst_vec3 near;
     double height;
     (void)earth_edge(d, k, direction, &near, &height);
-    /* the ellipsoid's normal: x / a, y / a, z / b of a point of the scaled sphere */
-    bst_vec3 normal = {near.x, near.y, near.z / (1.0 - BST_EARTH_FLATTENING)};
-    double lit = fmax(bst_vec3_dot(bst_vec3_unit(normal), d->sun[k]), 0.0);
+    bst_vec3 normal = normal_at(near);
+    double lit = fmax(bst_vec3_dot(normal, d->sun[k]), 0.0);
     double above = height > 0.0 && discs->limb_scale > 0.0 ? exp(-height / discs->limb_scale) : 0.0;
     above = height > 0.0 ? above : discs->limb_scale > 0.0 ? 1.0 : 0.0;
-    *sunlight += d->radiance * lit * (share + (1.0 - share) * above);
+    double moonlit = fmax(bst_vec3_dot(normal, d->moon), 0.0);
+    *sunlight += (d->radiance * lit + d->moonlight * moonlit) * (share + (1.0 - share) * above) +
+                 d->night * share;
     return share;
 }
 

@@ -3,6 +3,7 @@
 #define BST_WORLD_DISCS_H
 
 #include "sim/astro/bodies.h"
+#include "sim/core/messages.h"
 #include "sim/world/camera.h"
 
 /* Stretches of the exposure in which an edge is taken to move evenly. */
@@ -24,12 +25,16 @@ enum { BST_BODY_EARTH, BST_BODY_MOON, BST_BODY_SUN, BST_BODY_COUNT };
 
 /* One body as the camera sees it during the exposure. */
 typedef struct bst_body_disc {
-    bool present;      /* may touch the sensor */
+    bool near;         /* may touch the sensor */
+    bool present;      /* and is to be drawn */
     double radius_rad; /* of the Moon and the Sun */
     double radiance;   /* of full sunlight falling straight on it, or of the Sun itself; stars of
                           V = 0 per steradian */
-    double reach_px;   /* beyond the edge, to where there is light of it */
-    int parts;         /* stretches used */
+    /* Earth only, as radiance: of full moonlight falling straight on it; of the night side */
+    double moonlight, night;
+    bst_vec3 moon;                       /* towards the Moon, Earth axes */
+    double reach_px;                     /* beyond the edge, to where there is light of it */
+    int parts;                           /* stretches used */
     bst_vec3 centre[BST_DISC_PARTS + 1]; /* towards it (unit), camera axes: Moon, Sun */
     bst_vec3 sun[BST_DISC_PARTS + 1];    /* towards the Sun: camera axes (Moon), Earth axes */
     bst_vec3 eye[BST_DISC_PARTS + 1];    /* Earth: observer, in coordinates in which it is a sphere
@@ -48,6 +53,23 @@ typedef struct bst_discs {
  * the sensor, are not present. Directions are apparent ones. */
 void bst_discs_make(const bst_camera *camera, const bst_surroundings *around, bst_discs *out);
 bool bst_discs_any(const bst_discs *discs);
+
+/* Whether the background block asks for any disc. */
+static inline bool bst_discs_wanted(const bst_camera *camera) {
+    const bst_background_config *c = &camera->background;
+    return c->earth || c->moon || c->sun;
+}
+
+/* Share of a window's area that a body's disc covers at mid-exposure, 0 to 1, from a lattice of 33
+ * x 33 places; of a smaller disc whose middle is in the window, its area over the window's.
+ *
+ * Given: body, one of BST_BODY_EARTH ..., whether or not its disc is to be drawn. */
+double bst_discs_share(const bst_discs *discs, const bst_camera *camera, int body,
+                       bst_window window);
+
+/* Whether both day and night are among four places of the Earth's disc (unit, camera axes): its
+ * terminator passes between them. false where the Earth is not drawn. */
+bool bst_discs_terminator(const bst_discs *discs, const bst_vec3 directions[4]);
 
 /* Distance of a direction (unit, camera axes) from the nearest edge of a disc at any time of the
  * exposure, px at the boresight's scale, less how far the disc's light reaches beyond its edge. */

@@ -31,7 +31,7 @@ struct bst_field {
     bst_star *stars;
     int star_capacity;
     bst_faint_stars *faint;      /* NULL: none */
-    bst_skylight *skylight;      /* NULL: the same all over the sensor */
+    bst_skylight *skylight;      /* NULL: always the same all over the sensor */
     const bst_skylight_map *map; /* of the latest query */
     bst_source *sources;
     int source_capacity;
@@ -60,7 +60,7 @@ bst_status bst_field_create(bst_ctx *ctx, const bst_world *world, int observer, 
     bst_status status = field->stars && field->near
                             ? bst_view_create(ctx, world, &field->view)
                             : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a field query");
-    if (status == BST_OK && bst_skylight_varies(field->camera)) {
+    if (status == BST_OK && bst_skylight_may_vary(field->camera)) {
         status = bst_skylight_create(ctx, world, field->camera, &field->skylight);
     }
     if (status == BST_OK && world->faint && isfinite(world->faint_limit_v_mag)) {
@@ -227,6 +227,17 @@ static bst_status query_stars(bst_ctx *ctx, bst_field *field, bst_vec3 centre, d
     }
 }
 
+/* Notes in the truth how much of the window bright bodies cover; whether any is to be drawn. */
+static bool bodies_in_field(const bst_camera *camera, const bst_surroundings *around,
+                            bst_window window, bst_truth *truth) {
+    bst_discs discs;
+    bst_discs_make(camera, around, &discs);
+    truth->earth_fraction = bst_discs_share(&discs, camera, BST_BODY_EARTH, window);
+    truth->moon_fraction = bst_discs_share(&discs, camera, BST_BODY_MOON, window);
+    truth->sun_fraction = bst_discs_share(&discs, camera, BST_BODY_SUN, window);
+    return bst_discs_any(&discs);
+}
+
 static bst_status reserve_sources(bst_ctx *ctx, bst_field *field, int count) {
     if (count > field->source_capacity) {
         bst_source *more = realloc(field->sources, (size_t)count * sizeof *more);
@@ -267,6 +278,9 @@ static bool near_window(const bst_field *field, bst_quat q, bst_vec3 direction, 
  * not be the observer's to the metre. */
 static bool is_self(const bst_field *field, int index) {
     const world_object *object = &field->world->objects[index];
+    if (index == field->world->observers[field->observer].own_object) {
+        return true;
+    }
     return object->catalogued && object->info.norad != 0 &&
            object->info.norad == field->world->observers[field->observer].norad;
 }
@@ -333,19 +347,20 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     double tt1, tt2;
     bst_time_tt(bst_world_time(field->world, mid_s), &tt1, &tt2);
     int star_count;
+    field->map = NULL;
     double faint_limit = fmin(options->v_limit, field->world->faint_limit_v_mag);
-    if (field->skylight) {
-        bst_surroundings around = {.eye_m = eye.position_m,
-                                   .eye_mps = eye.velocity_mps,
-                                   .bodies = bodies,
-                                   .itrf_from_gcrf = frames.itrf_from_gcrf,
-                                   .light = light,
-                                   .exposure_s = exposure,
-                                   .v_limit = options->v_limit,
-                                   .faint_limit = faint_limit};
-        for (int k = 0; k <= BST_DISC_PARTS; k++) {
-            around.q[k] = bst_track_attitude(&own, exposure * k / BST_DISC_PARTS);
-        }
+    bst_surroundings around = {.eye_m = eye.position_m,
+                               .eye_mps = eye.velocity_mps,
+                               .bodies = bodies,
+                               .itrf_from_gcrf = frames.itrf_from_gcrf,
+                               .light = light,
+                               .exposure_s = exposure,
+                               .v_limit = options->v_limit,
+                               .faint_limit = faint_limit};
+    for (int k = 0; k <= BST_DISC_PARTS; k++) {
+        around.q[k] = bst_track_attitude(&own, exposure * k / BST_DISC_PARTS);
+    }
+    if (bodies_in_field(camera, &around, window, truth) || bst_skylight_varies(camera)) {
         bst_window lit = window;
         if (bst_detector_config_whole_columns(&camera->detector)) {
             lit.y0 = 0;
@@ -391,7 +406,7 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
          * move with the Earth, stands for the star */
         bst_vec3 ray = bst_light_apparent_star(&geocentric, star->icrs);
         s->occulted = bst_earth_occults(eye.position_m, bst_vec3_axpy(eye.position_m, 1e12, ray),
-                                        &frames.itrf_from_gcrf);
+                                        bodies.pole);
         if (s->occulted) {
             s->electrons_per_s = 0.0;
         }
@@ -511,8 +526,10 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
                             .y_mid_px = NAN,
                             .x_end_px = NAN,
                             .y_end_px = NAN,
-                            .x_mean_px = NAN,
-                            .y_mean_px = NAN};
+                            .x_chief_px = NAN,
+                            .y_chief_px = NAN,
+                            .x_centroid_px = NAN,
+                            .y_centroid_px = NAN};
     bst_image_moments image;
     bst_quat q_mid = field->q_mid;
     if (camera->detector.row_time_s != 0.0 && track->time_s[track->count - 1] > 0.0) {
@@ -526,11 +543,12 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
         image = source->rate ? bst_image_by_light(field->camera, track, source, 0.0, 1.0)
                              : smear_of(field, source);
     }
+    out->x_chief_px = image.x_mean;
+    out->y_chief_px = image.y_mean;
     if (source->shape) {
         bst_image_add_disc(field->camera, q_mid, source, &image);
     }
-    out->x_mean_px = image.x_mean;
-    out->y_mean_px = image.y_mean;
+    bst_image_centroid(camera, source, &image, &out->x_centroid_px, &out->y_centroid_px);
     if (isfinite(image.x_mean)) {
         out->electrons *= bst_camera_illumination(camera, image.x_mean, image.y_mean);
     }

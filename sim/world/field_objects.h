@@ -23,6 +23,7 @@ typedef struct bst_path_light {
     bst_vec3 lag_m;                 /* at mid-exposure: the object when the light left, from the
                                        object when it arrives */
     bst_vec3 sun_m[BST_PATH_NODES]; /* the Sun, likewise */
+    bst_vec3 earth_bary_mps, pole;  /* as in bst_bodies, at mid-exposure */
     double light_time_s;
 } bst_path_light;
 

@@ -87,8 +87,9 @@ int bst_knowledge_object_count(const bst_knowledge *knowledge);
 const bst_object_info *bst_knowledge_object(const bst_knowledge *knowledge, int object);
 /* -1: there is no object of this name. */
 int bst_knowledge_find_object(const bst_knowledge *knowledge, const char *name);
-/* Catalogue number of the spacecraft itself, 0: none. */
-int bst_knowledge_own_norad(const bst_knowledge *knowledge);
+/* Whether an object is the spacecraft itself: by catalogue number, or its place in a constellation.
+ */
+bool bst_knowledge_is_itself(const bst_knowledge *knowledge, int object);
 /* Distances from the Earth's centre of the osculating orbit's apsides at the epoch; false: the
  * object has no orbit then. */
 bool bst_knowledge_apsides(bst_knowledge_view *view, int object, double *perigee_m,

@@ -16,8 +16,10 @@ int bst_knowledge_find_object(const bst_knowledge *k, const char *name) {
     return bst_world_find_object(k->world, name);
 }
 
-int bst_knowledge_own_norad(const bst_knowledge *k) {
-    return k->world->observers[k->observer].norad;
+bool bst_knowledge_is_itself(const bst_knowledge *k, int object) {
+    const world_observer *own = &k->world->observers[k->observer];
+    return object == own->own_object ||
+           (own->norad != 0 && own->norad == k->world->objects[object].info.norad);
 }
 
 bool bst_knowledge_apsides(bst_knowledge_view *view, int object, double *perigee_m,
@@ -78,11 +80,14 @@ bst_status bst_knowledge_sight_at(bst_ctx *ctx, bst_knowledge_view *view, int ob
     bst_light light = bst_light_at(&sky.bodies, eye.position_m, eye.velocity_mps);
     bst_vec3 to_eye = bst_vec3_sub(eye.position_m, target.position_m);
     bst_vec3 to_sun = bst_vec3_sub(sky.bodies.sun_m, target.position_m);
+    bst_sunlight sunlight;
+    bst_sunlight_at(target.position_m, bst_bodies_sunlight_from(&sky.bodies), sky.bodies.pole,
+                    world->shadow_atmosphere, &sunlight);
     *out = (bst_sight){.geometric = bst_vec3_unit(line),
                        .range_m = bst_vec3_norm(to_eye),
                        .light_time_s = t - emission_s,
                        .phase_rad = bst_vec3_angle(to_eye, to_sun),
-                       .sunlit_fraction = bst_sun_fraction(target.position_m, sky.bodies.sun_m)};
+                       .sunlit_fraction = sunlight.disc};
     out->apparent = bst_light_aberrate(&light, out->geometric);
     bst_lighting lighting = {.area_m2 = info->area_m2,
                              .albedo = info->albedo,
@@ -90,11 +95,11 @@ bst_status bst_knowledge_sight_at(bst_ctx *ctx, bst_knowledge_view *view, int ob
                              .eye_m = eye.position_m,
                              .sun_m = sky.bodies.sun_m,
                              .seconds = emission_s,
-                             .sunlit_fraction = out->sunlit_fraction};
+                             .sunlit_fraction = sunlight.disc,
+                             .sunlight = &sunlight};
     bst_brightness_at(info->brightness, &lighting, &out->glow);
     out->v_mag = out->glow.v_mag;
-    out->occulted =
-        bst_earth_occults(eye.position_m, target.position_m, &sky.frames.itrf_from_gcrf);
+    out->occulted = bst_earth_occults(eye.position_m, target.position_m, sky.bodies.pole);
     return BST_OK;
 }
 

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/world/constellation.h"
 #include "sim/world/steering.h"
 #include "sim/world/world_build.h"
 
@@ -193,12 +194,58 @@ static bst_status list_candidates(const bst_world_builder *b, const bst_config_l
     return BST_OK;
 }
 
+static int members_of(const bst_config_list *constellations) {
+    const bst_constellation_config *list = constellations->items;
+    int64_t count = 0;
+    for (int i = 0; i < constellations->count; i++) {
+        count += list[i].satellites;
+    }
+    return (int)count;
+}
+
+static bst_status build_member(const bst_world_builder *b, const bst_constellation_config *config,
+                               int plane, int slot, const bst_brightness *brightness) {
+    bst_world *world = b->world;
+    world_object *object = &world->objects[world->object_count];
+    bst_constellation_name(config, plane, slot, object->info.name);
+    if (bst_world_find_object(world, object->info.name) >= 0) {
+        return bst_fail(b->ctx, BST_ERR_CONFIG, "name: \"%s\" is the name of another object",
+                        object->info.name);
+    }
+    const bst_elements set = bst_constellation_elements(config, world->epoch, plane, slot);
+    world->object_count++;
+    object->info.area_m2 = config->area_m2;
+    object->info.albedo = config->albedo;
+    object->info.brightness = brightness;
+    BST_TRY(bst_orbit_build_sgp4(b, &set, object->info.name, &object->orbit));
+    bst_name_index_add(world->object_names, object->info.name, world->object_count - 1);
+    return BST_OK;
+}
+
+static bst_status build_constellation(const bst_world_builder *b, int index) {
+    const bst_constellation_config *config =
+        (const bst_constellation_config *)b->constellations->items + index;
+    const bst_brightness *brightness = NULL;
+    BST_TRY(make_brightness(b, &config->brightness, "constellations", index, &brightness));
+    bst_status status = bst_constellation_check(b->ctx, config);
+    int slots = (int)(config->satellites / config->planes);
+    for (int plane = 1; plane <= config->planes && status == BST_OK; plane++) {
+        for (int slot = 1; slot <= slots && status == BST_OK; slot++) {
+            status = build_member(b, config, plane, slot, brightness);
+        }
+    }
+    return status == BST_OK ? BST_OK
+                            : bst_fail_prefix(b->ctx, BST_ERR_CONFIG,
+                                              "%s: /world/constellations/%d", b->scenario, index);
+}
+
 static bst_status build_all(const bst_world_builder *b, const bst_world_config *config,
                             const catalogue_sets *loaded, candidate *list, int *listed) {
-    BST_TRY(reserve(b, config->objects.count + loaded->total));
-    b->world->brightness =
-        calloc((size_t)config->objects.count + (size_t)config->catalogues.count + 1,
-               sizeof(bst_brightness *));
+    BST_TRY(
+        reserve(b, config->objects.count + loaded->total + members_of(&config->constellations)));
+    b->world->brightness = calloc((size_t)config->objects.count + (size_t)config->catalogues.count +
+                                      (size_t)config->constellations.count + 1,
+                                  sizeof(bst_brightness *));
     if (!b->world->brightness) {
         return bst_fail(b->ctx, BST_ERR_MEMORY, "out of memory for %d objects",
                         config->objects.count);
@@ -216,7 +263,11 @@ static bst_status build_all(const bst_world_builder *b, const bst_world_config *
     qsort(listed, (size_t)b->world->object_count, sizeof *listed, compare_numbers);
     BST_TRY(list_candidates(b, &config->catalogues, loaded, list));
     int count = choose(list, loaded->total, listed, b->world->object_count);
-    return build_candidates(b, list, count, first_brightness);
+    BST_TRY(build_candidates(b, list, count, first_brightness));
+    for (int i = 0; i < config->constellations.count; i++) {
+        BST_TRY(build_constellation(b, i));
+    }
+    return BST_OK;
 }
 
 bst_status bst_world_build_objects(const bst_world_builder *b, const bst_world_config *config) {

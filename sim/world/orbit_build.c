@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/world/constellation.h"
 #include "sim/world/steering.h"
 #include "sim/world/world_build.h"
 
@@ -80,6 +81,33 @@ static bst_status build_relative(const bst_world_builder *b, const bst_orbit_con
     return BST_OK;
 }
 
+static bst_status build_member(const bst_world_builder *b, const bst_orbit_config *config,
+                               const char *path, const char *name, bst_orbit *orbit) {
+    const bst_constellation_config *list = b->constellations->items, *found = NULL;
+    for (int i = 0; i < b->constellations->count && !found; i++) {
+        found = strcmp(list[i].name, config->constellation) == 0 ? &list[i] : NULL;
+    }
+    if (!found) {
+        return bst_fail(b->ctx, BST_ERR_CONFIG,
+                        "%s: %s/constellation: there is no \"%s\" in /world/constellations",
+                        b->scenario, path, config->constellation);
+    }
+    double plane = config->member[0], slot = config->member[1];
+    int64_t slots = found->satellites / found->planes;
+    if (plane != floor(plane) || slot != floor(slot) || plane > (double)found->planes ||
+        slot > (double)slots) {
+        return bst_fail(b->ctx, BST_ERR_CONFIG,
+                        "%s: %s/member: %s has no satellite %.6g-%.6g (allowed: planes 1 to %lld, "
+                        "slots 1 to %lld, whole numbers)",
+                        b->scenario, path, found->name, plane, slot, (long long)found->planes,
+                        (long long)slots);
+    }
+    const bst_elements set =
+        bst_constellation_elements(found, b->world->epoch, (int)plane, (int)slot);
+    bst_status status = bst_orbit_build_sgp4(b, &set, name, orbit);
+    return status == BST_OK ? BST_OK : bst_fail_prefix(b->ctx, status, "%s: %s", b->scenario, path);
+}
+
 /* `path` of the orbit is "OWNER/orbit"; burns are at "OWNER/burns". */
 static bst_status check_burns(const bst_world_builder *b, const bst_config_list *list, int source,
                               const char *path) {
@@ -117,6 +145,9 @@ bst_status bst_orbit_build(const bst_world_builder *b, const bst_orbit_config *c
         case BST_ORBIT_OEM:
         case BST_ORBIT_INJECTED:
             BST_TRY(bst_orbit_build_file(b, config, path, orbit));
+            break;
+        case BST_ORBIT_CONSTELLATION:
+            BST_TRY(build_member(b, config, path, name, orbit));
             break;
         case BST_ORBIT_NUMERICAL:
             return bst_orbit_build_numerical(b, config, burns, path, name, orbit, norad);

@@ -6,10 +6,13 @@
 #include "sim/world/kepler.h"
 #include "sim/world/world_build.h"
 
-/* How far beyond its ends a file is continued, by two-body motion: what light time before a run's
- * first exposure and a controller's look ahead need. Earth's oblateness makes 0.1 m of it at LEO.
+/* How far beyond its ends a file is continued: what light time before a run's first exposure and a
+ * controller's look ahead need. A body in free fall goes on by two-body motion (Earth's oblateness
+ * makes 0.1 m of it at LEO), any other, as one at rest or on the ground, by its own acceleration.
  */
 #define MARGIN_S 5.0
+/* Over which the acceleration at an end is taken. */
+#define ACCELERATION_S 1.0
 /* What of it injected states may leave out of a run at either end: their frames begin after the
  * epoch and end before the run does. The rest is for light time and the look ahead. */
 #define IDLE_S 2.5
@@ -107,6 +110,32 @@ static bst_status state_within(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clo
     return BST_OK;
 }
 
+/* Continues `end`, the state at end_s, by `beyond_s`. */
+static bst_status go_on(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *clock, bst_time epoch,
+                        double end_s, const bst_state *end, double beyond_s, bst_state *out) {
+    double step = fmin(ACCELERATION_S, orbit->to_s - orbit->from_s) * (beyond_s > 0.0 ? -1.0 : 1.0);
+    double r = bst_vec3_norm(end->position_m);
+    bst_vec3 gravity = bst_vec3_scale(end->position_m, -BST_EARTH_MU_M3PS2 / (r * r * r));
+    bst_vec3 acceleration = gravity;
+    if (fabs(step) > 1e-3 * ACCELERATION_S) {
+        bst_state inner;
+        BST_TRY(state_within(ctx, orbit, clock, epoch, end_s + step, &inner));
+        acceleration =
+            bst_vec3_scale(bst_vec3_sub(inner.velocity_mps, end->velocity_mps), 1.0 / step);
+    }
+    double other = bst_vec3_norm(bst_vec3_sub(acceleration, gravity));
+    bst_ctx quiet = {0};
+    if (other < 0.5 * bst_vec3_norm(gravity) &&
+        bst_kepler_propagate(&quiet, BST_EARTH_MU_M3PS2, end->position_m, end->velocity_mps,
+                             beyond_s, &out->position_m, &out->velocity_mps) == BST_OK) {
+        return BST_OK;
+    }
+    out->position_m = bst_vec3_axpy(bst_vec3_axpy(end->position_m, beyond_s, end->velocity_mps),
+                                    0.5 * beyond_s * beyond_s, acceleration);
+    out->velocity_mps = bst_vec3_axpy(end->velocity_mps, beyond_s, acceleration);
+    return BST_OK;
+}
+
 bst_status bst_orbit_file_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *clock,
                                 bst_time epoch, double seconds, bst_state *out) {
     double end_s = fmax(orbit->from_s, fmin(orbit->to_s, seconds));
@@ -118,8 +147,7 @@ bst_status bst_orbit_file_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_cl
     bst_status status = state_within(ctx, orbit, clock, epoch, end_s, out);
     if (status == BST_OK && beyond_s != 0.0) {
         bst_state end = *out;
-        status = bst_kepler_propagate(ctx, BST_EARTH_MU_M3PS2, end.position_m, end.velocity_mps,
-                                      beyond_s, &out->position_m, &out->velocity_mps);
+        status = go_on(ctx, orbit, clock, epoch, end_s, &end, beyond_s, out);
     }
     return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "orbit of %s", orbit->name);
 }
@@ -153,6 +181,37 @@ static bst_status check_span(bst_ctx *ctx, const char *scenario, const bst_world
                     clock_offset_s != 0.0 ? ", with the onboard clock's offset" : "");
 }
 
+/* Fails where the onboard orbit error lies along axes that the states of a file do not have: those
+ * of a body at rest, or in motion straight up. */
+static bst_status check_axes(bst_ctx *ctx, const char *scenario, const bst_world *world,
+                             int observer, int sensor) {
+    const bst_orbit *orbit = &world->observers[observer].orbit;
+    const bst_orbit_error_config *e =
+        &world->observers[observer].sensors[sensor].config.knowledge.orbit;
+    bool across = e->position_rtn_m[1] != 0.0 || e->position_rtn_m[2] != 0.0 ||
+                  e->velocity_rtn_mps[1] != 0.0 || e->velocity_rtn_mps[2] != 0.0 ||
+                  e->along_track_mps != 0.0;
+    if (!across || (orbit->source != BST_ORBIT_OEM && orbit->source != BST_ORBIT_INJECTED)) {
+        return BST_OK;
+    }
+    bst_sky_clock *clock;
+    bst_state at = {0};
+    BST_TRY(bst_sky_clock_create_on(ctx, world->sky_grid, &clock));
+    bst_status status = bst_orbit_file_state(ctx, orbit, clock, world->epoch, 0.0, &at);
+    bst_sky_clock_free(clock);
+    BST_TRY(status);
+    double h = bst_vec3_norm(bst_vec3_cross(at.position_m, at.velocity_mps));
+    if (h > 1e-9 * bst_vec3_norm(at.position_m) * bst_vec3_norm(at.velocity_mps)) {
+        return BST_OK;
+    }
+    return bst_fail(
+        ctx, BST_ERR_CONFIG,
+        "%s: /observers/%d/sensors/%d/knowledge/orbit: an error along the transverse or "
+        "normal axis needs an orbit, but \"%s\" is at rest or moves along its radius at "
+        "the epoch; give radial errors alone, or states of an orbit",
+        scenario, observer, sensor, orbit->name);
+}
+
 bst_status bst_world_check_spans(bst_ctx *ctx, const char *scenario, const bst_world *world,
                                  double duration_s) {
     char path[96];
@@ -163,6 +222,7 @@ bst_status bst_world_check_spans(bst_ctx *ctx, const char *scenario, const bst_w
             double offset_s = observer->sensors[s].config.knowledge.clock_offset_s;
             snprintf(path, sizeof path, "/observers/%d/orbit", i);
             BST_TRY(check_span(ctx, scenario, world, &observer->orbit, duration_s, offset_s, path));
+            BST_TRY(check_axes(ctx, scenario, world, i, s));
             snprintf(path, sizeof path, "/observers/%d/sensors/%d/cue/object", i, s);
             if (cue >= 0) {
                 BST_TRY(check_span(ctx, scenario, world, &world->objects[cue].orbit, duration_s,

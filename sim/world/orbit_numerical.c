@@ -17,8 +17,11 @@ const bst_config_desc bst_initial_state_table[] = {
               "cartesian: geocentric position."),
     BST_REALS(bst_initial_state_config, velocity_gcrf_mps, "m/s", -1e6, 1e6, "[0, 0, 0]",
               "cartesian: velocity."),
-    BST_REAL(bst_initial_state_config, perigee_radius_m, "m", 0, 1e10, "0",
-             "keplerian: distance of the perigee from the Earth's centre."),
+    BST_OPEN_REAL(
+        bst_initial_state_config, semi_major_axis_m, "m", -1e10, 1e10,
+        "keplerian: semi-major axis, negative for a hyperbola; or the radius of perigee."),
+    BST_OPEN_REAL(bst_initial_state_config, perigee_radius_m, "m", 0, 1e10,
+                  "keplerian: distance of the perigee from the Earth's centre."),
     BST_REAL(bst_initial_state_config, eccentricity, "", 0, 100, "0",
              "keplerian: any conic, hyperbolas too."),
     BST_REAL(bst_initial_state_config, inclination_deg, "deg", 0, 180, "0",
@@ -27,8 +30,10 @@ const bst_config_desc bst_initial_state_table[] = {
              "keplerian: right ascension of the ascending node."),
     BST_REAL(bst_initial_state_config, arg_perigee_deg, "deg", -360, 360, "0",
              "keplerian: argument of perigee."),
-    BST_REAL(bst_initial_state_config, true_anomaly_deg, "deg", -360, 360, "0",
-             "keplerian: true anomaly."),
+    BST_OPEN_REAL(bst_initial_state_config, true_anomaly_deg, "deg", -360, 360,
+                  "keplerian: true anomaly at at_s; or the mean anomaly. Neither: at the perigee."),
+    BST_OPEN_REAL(bst_initial_state_config, mean_anomaly_deg, "deg", -1e6, 1e6,
+                  "keplerian: mean anomaly at at_s, of a hyperbola the hyperbolic one."),
     BST_CONFIG_END,
 };
 
@@ -69,16 +74,15 @@ static bst_vec3 vec(const double v[3]) {
     return (bst_vec3){v[0], v[1], v[2]};
 }
 
-static bst_status keplerian(const bst_world_builder *b, const bst_initial_state_config *s,
+static bst_status keplerian(const bst_world_builder *b, const bst_initial_state_config *given,
                             const char *path, double gm, bst_state *out) {
+    bst_initial_state_config all = *given;
+    const bst_initial_state_config *s = &all;
+    if (bst_keplerian_resolve(b->ctx, &all) != BST_OK) {
+        return bst_fail_prefix(b->ctx, BST_ERR_CONFIG, "%s: %s/state", b->scenario, path);
+    }
     double p = s->perigee_radius_m * (1.0 + s->eccentricity);
     double nu = s->true_anomaly_deg * BST_DEG_RAD, opening = 1.0 + s->eccentricity * cos(nu);
-    if (!(p > 0.0) || !(opening > 1e-9)) {
-        return bst_fail(b->ctx, BST_ERR_CONFIG,
-                        "%s: %s/state: keplerian elements need \"perigee_radius_m\" above 0 and a "
-                        "true anomaly that the orbit reaches",
-                        b->scenario, path);
-    }
     double r = p / opening, speed = sqrt(gm / p);
     bst_vec3 position = {r * cos(nu), r * sin(nu), 0.0};
     bst_vec3 velocity = {-speed * sin(nu), speed * (s->eccentricity + cos(nu)), 0.0};

@@ -54,6 +54,10 @@ bool bst_skylight_varies(const bst_camera *camera) {
            v->limit_px > 0.0;
 }
 
+bool bst_skylight_may_vary(const bst_camera *camera) {
+    return bst_skylight_varies(camera) || bst_discs_wanted(camera);
+}
+
 /* Bilinear between the four nodes about a place; with a step of a power of two the weights are
  * exact, so that neighbouring lattices give the same bits. */
 static float interpolate(const float *value, int columns, int rows, int step, int x0, int y0,
@@ -222,10 +226,14 @@ static double edge_px(const painter *p, double x, double y) {
 static bool cell_has_edge(const painter *p, int x, int y) {
     int step = p->b->step;
     double near = INFINITY;
+    bst_vec3 corner[4];
     for (int k = 0; k < 4; k++) {
-        near = fmin(near, edge_px(p, x + (k & 1) * step, y + (k >> 1) * step));
+        int cx = x + (k & 1) * step, cy = y + (k >> 1) * step;
+        corner[k] = bst_camera_unproject(p->b->camera, cx, cy);
+        near = fmin(near, edge_px(p, cx, cy));
     }
-    return near < 1.06 * step / bst_camera_shrink(p->b->camera);
+    return bst_discs_terminator(&p->discs, corner) ||
+           near < 1.06 * step / bst_camera_shrink(p->b->camera);
 }
 
 static bool sensor_has_edge(const painter *p) {
@@ -234,13 +242,14 @@ static bool sensor_has_edge(const painter *p) {
     if (step == 1 || (!bst_discs_any(&p->discs) && !(camera->optics.vignetting.limit_px > 0.0))) {
         return false;
     }
-    double near = INFINITY;
-    for (int y = 0; y < camera->height_px + step; y += step) {
-        for (int x = 0; x < camera->width_px + step; x += step) {
-            near = fmin(near, edge_px(p, x, y));
+    for (int y = 0; y < camera->height_px; y += step) {
+        for (int x = 0; x < camera->width_px; x += step) {
+            if (cell_has_edge(p, x, y)) {
+                return true;
+            }
         }
     }
-    return near < 1.06 * step / bst_camera_shrink(camera);
+    return false;
 }
 
 /* The window pixel by pixel: by itself where there is an edge, else between the nodes. */
@@ -280,11 +289,8 @@ static void prepare(painter *p) {
     p->star_e = bst_camera_star_electrons_per_s(camera, 0.0, NAN) * pixel_sr;
     p->earth_e = bst_camera_thermal_electrons_per_s(camera, c->earth_temperature_k, pixel_sr);
     p->even_e = bst_camera_optics_e_per_s(camera);
-    if (c->model != BST_BACKGROUND_SKY) {
-        return;
-    }
     bst_discs_make(camera, a, &p->discs);
-    if (camera->pst) {
+    if (c->model == BST_BACKGROUND_SKY && camera->pst) {
         /* what a unit of irradiance gives per area of the detector is what it gives in all over the
          * light-gathering area and transmission of the optics, which the PST holds */
         double gathered = 0.25 * BST_PI * camera->aperture_m * camera->aperture_m *

@@ -26,6 +26,10 @@ double bst_skylight_at(const bst_skylight_map *map, double x_px, double y_px);
  * bst_camera_background_e_per_s is all there is. */
 bool bst_skylight_varies(const bst_camera *camera);
 
+/* Whether it may differ from pixel to pixel in some exposures: as above, or where discs of bright
+ * bodies come into the field. */
+bool bst_skylight_may_vary(const bst_camera *camera);
+
 /* Work space and the latest map of one camera. `world` must outlive it; not shareable between
  * threads. */
 typedef struct bst_skylight bst_skylight;
@@ -36,8 +40,8 @@ void bst_skylight_free(bst_skylight *skylight); /* NULL allowed */
 void bst_skylight_set_camera(bst_skylight *skylight, const bst_camera *camera);
 
 /* Makes the map of one exposure for a window. The nodes are 32 px apart, closer where that is more
- * than 0.3 degrees, and 1 px where the edge of a disc or of the vignetting is anywhere on the
- * sensor. *out is held in `skylight` until the next call. BST_ERR_MEMORY. */
+ * than 0.3 degrees, and 1 px where the edge of a disc, the terminator or the edge of the vignetting
+ * is anywhere on the sensor. *out is held in `skylight` until the next call. BST_ERR_MEMORY. */
 bst_status bst_skylight_make(bst_ctx *ctx, bst_skylight *skylight, const bst_surroundings *around,
                              bst_window window, const bst_skylight_map **out) BST_MUST_CHECK;
 

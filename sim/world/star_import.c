@@ -8,6 +8,7 @@
 
 #include "sim/core/draft.h"
 #include "sim/core/file.h"
+#include "sim/world/bright_stars.h"
 #include "sim/world/child.h"
 
 #define ROWS_PER_PROGRESS 20000
@@ -136,6 +137,7 @@ static bst_status read_rows(bst_ctx *ctx, FILE *rows, const bst_star_import_opti
         bst_star_record record;
         bst_status status = bst_star_parse_row(ctx, line, bytes, &values);
         if (status == BST_OK) {
+            bst_bright_star_correct(&values);
             status = bst_star_pack(ctx, &values, &record);
         }
         if (status == BST_OK && keeps(&options->subset, &record)) {

@@ -9,6 +9,7 @@
 
 #include "sim/core/file.h"
 #include "sim/core/rng.h"
+#include "sim/world/bright_stars.h"
 #include "sim/world/star_index.h"
 #include "sim/world/world_internal.h"
 
@@ -286,13 +287,30 @@ static radec_box box_around(bst_vec3 centre, double radius_rad) {
     return box;
 }
 
-static void unpack(const bst_star_record *r, uint32_t tyc1, bst_vec3 direction, bst_star *out) {
+/* Tycho-2's V less the published one, at most. */
+#define MOST_WRONG_MAG 0.5
+
+/* Whether the star has its magnitudes from the table of bright stars. */
+static bool unpack(const bst_star_record *r, uint32_t tyc1, bst_vec3 direction, bst_star *out) {
     int colour = (int)(r->pm_ra_colour & 0x3FFFu) - BST_STAR_COLOUR_OFFSET;
     out->icrs = direction;
     out->v_mag = (float)(bst_star_record_v(r) / 1e5);
     /* B-V = 0.850 (BT-VT): Tycho-2 ReadMe, note 7. */
     out->b_minus_v = r->pm_dec_flags & BST_STAR_NO_COLOUR ? NAN : (float)(0.850 * colour / 1000.0);
     out->id = tyc1 << 16 | (r->tyc_vt & 0xFFFFu);
+    /* a file may have been imported before there was a table */
+    return (double)out->v_mag < BST_BRIGHT_STARS_V &&
+           bst_bright_star(out->id, &out->v_mag, &out->b_minus_v);
+}
+
+/* Moves the last of count stars to its place among them, brightest first; Tycho-2's order is that
+ * but for stars of the table. */
+static void put_in_order(bst_star *stars, int count) {
+    for (int k = count - 1; k > 0 && stars[k - 1].v_mag > stars[k].v_mag; k--) {
+        bst_star swap = stars[k];
+        stars[k] = stars[k - 1];
+        stars[k - 1] = swap;
+    }
 }
 
 /* Whether a star of the group may lie within radius_rad of a unit vector after so many years. */
@@ -339,9 +357,13 @@ bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre
             continue;
         }
         radec_box box = box_around(centre, radius_rad + drift + slack);
+        bool out_of_order = false;
+        const int first = found;
         const bst_star_record *r = stars->view.records + cell->first;
         for (const bst_star_record *end = r + cell->count; r < end; r++) {
-            if (bst_star_record_v(r) / 1e5 > v_limit) {
+            double v_mag = bst_star_record_v(r) / 1e5;
+            if (v_mag > v_limit &&
+                (v_mag > BST_BRIGHT_STARS_V || v_mag > v_limit + MOST_WRONG_MAG)) {
                 break; /* brightest first */
             }
             if (r->dec < box.dec_min || r->dec > box.dec_max || r->ra - box.ra_min > box.ra_width) {
@@ -352,12 +374,22 @@ bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre
                 continue;
             }
             d = bst_vec3_sub(direction, centre);
-            if (bst_vec3_dot(d, d) <= chord2) {
-                if (found < capacity) {
-                    unpack(r, c, direction, &out[found]);
-                }
-                found++;
+            bst_star star;
+            if (bst_vec3_dot(d, d) > chord2) {
+                continue;
             }
+            bool published = unpack(r, c, direction, &star);
+            if (published ? (double)star.v_mag > v_limit : v_mag > v_limit) {
+                continue;
+            }
+            if (found < capacity) {
+                out[found] = star;
+                out_of_order = out_of_order || published;
+                if (out_of_order) {
+                    put_in_order(out + first, found - first + 1);
+                }
+            }
+            found++;
         }
     }
     *count = found;
@@ -377,7 +409,7 @@ bst_status bst_stars_find(bst_ctx *ctx, const bst_stars *stars, uint32_t id, dou
                 if (stars->altered && !alter(stars, id, &direction)) {
                     break;
                 }
-                unpack(r, c, direction, out);
+                (void)unpack(r, c, direction, out);
                 return BST_OK;
             }
         }

@@ -109,10 +109,11 @@ double bst_moon_v_mag(bst_vec3 moon_from_eye_m, bst_vec3 sun_from_moon_m) {
            5.0 * log10(range / 3.844e8 * (sun / BST_AU_M));
 }
 
-double bst_disc_fraction(bst_vec3 eye_m, bst_vec3 body_m, double radius_m) {
+double bst_disc_fraction(bst_vec3 eye_m, bst_vec3 body_m, double radius_m, bst_vec3 pole) {
     /* a body of the Sun's size in the same direction and as large in the sky */
     bst_vec3 from_eye = bst_vec3_sub(body_m, eye_m);
-    return bst_sun_fraction(eye_m, bst_vec3_axpy(eye_m, BST_SUN_RADIUS_M / radius_m, from_eye));
+    return bst_sun_fraction(eye_m, bst_vec3_axpy(eye_m, BST_SUN_RADIUS_M / radius_m, from_eye),
+                            pole);
 }
 
 /* Integral over the visible part of a sunlit Lambertian sphere, midpoints of cells that are equal
@@ -156,13 +157,14 @@ double bst_stray_irradiance(const bst_pst *pst, const bst_background_config *con
     bst_vec3 sun = bst_vec3_sub(bodies->sun_m, eye_m), moon = bst_vec3_sub(bodies->moon_m, eye_m);
     if (config->sun) {
         double au = bst_vec3_norm(sun) / BST_AU_M;
-        sum += bst_sun_fraction(eye_m, bodies->sun_m) * pow(10.0, -0.4 * BST_SUN_V_MAG) /
-               (au * au) * bst_pst_at(pst, bst_vec3_angle(sun, boresight));
+        sum += bst_sun_fraction(eye_m, bodies->sun_m, bodies->pole) *
+               pow(10.0, -0.4 * BST_SUN_V_MAG) / (au * au) *
+               bst_pst_at(pst, bst_vec3_angle(sun, boresight));
     }
     if (config->moon) {
         double v = bst_moon_v_mag(moon, bst_vec3_sub(bodies->sun_m, bodies->moon_m));
-        sum += bst_disc_fraction(eye_m, bodies->moon_m, BST_MOON_RADIUS_M) * pow(10.0, -0.4 * v) *
-               bst_pst_at(pst, bst_vec3_angle(moon, boresight));
+        sum += bst_disc_fraction(eye_m, bodies->moon_m, BST_MOON_RADIUS_M, bodies->pole) *
+               pow(10.0, -0.4 * v) * bst_pst_at(pst, bst_vec3_angle(moon, boresight));
     }
     if (config->earth) {
         sum += earth_irradiance(pst, config->earth_albedo, eye_m, bodies->sun_m, boresight);

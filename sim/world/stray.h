@@ -31,8 +31,8 @@ double bst_pst_pixel_m(const bst_pst *pst);
 double bst_moon_v_mag(bst_vec3 moon_from_eye_m, bst_vec3 sun_from_moon_m);
 
 /* Fraction of a body's disc (radius_m, at body_m from the Earth's centre) that a point at eye_m
- * sees past a spherical Earth, as bst_sun_fraction. */
-double bst_disc_fraction(bst_vec3 eye_m, bst_vec3 body_m, double radius_m);
+ * sees past the Earth, as bst_sun_fraction. */
+double bst_disc_fraction(bst_vec3 eye_m, bst_vec3 body_m, double radius_m, bst_vec3 pole);
 
 /* Irradiance of the Sun, the Moon and the Earth at a camera's entrance, weighted with the PST, in
  * units of one star of V = 0; the Earth as a Lambertian sphere of `albedo`. Uniform over the

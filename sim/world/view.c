@@ -222,18 +222,23 @@ static bst_status look(bst_ctx *ctx, bst_view *view, const eye *e, int object, f
 
 /* How bright an object is that the light left at `emitted_m` and is seen from `eye_m`. */
 static void shine_at(const bst_world *world, int object, bst_vec3 emitted_m, bst_vec3 eye_m,
-                     bst_vec3 sun_m, double seconds, bst_sight *out) {
+                     const bst_bodies *bodies, double seconds, bst_sight *out) {
     const bst_object_info *info = &world->objects[object].info;
-    bst_vec3 to_eye = bst_vec3_sub(eye_m, emitted_m), to_sun = bst_vec3_sub(sun_m, emitted_m);
+    bst_vec3 to_eye = bst_vec3_sub(eye_m, emitted_m);
+    bst_vec3 to_sun = bst_vec3_sub(bodies->sun_m, emitted_m);
+    bst_sunlight sunlight;
+    bst_sunlight_at(emitted_m, bst_bodies_sunlight_from(bodies), bodies->pole,
+                    world->shadow_atmosphere, &sunlight);
     out->phase_rad = bst_vec3_angle(to_eye, to_sun);
-    out->sunlit_fraction = bst_sun_fraction(emitted_m, sun_m);
+    out->sunlit_fraction = sunlight.disc;
     bst_lighting lighting = {.area_m2 = info->area_m2,
                              .albedo = info->albedo,
                              .object_m = emitted_m,
                              .eye_m = eye_m,
-                             .sun_m = sun_m,
+                             .sun_m = bodies->sun_m,
                              .seconds = seconds,
-                             .sunlit_fraction = out->sunlit_fraction};
+                             .sunlit_fraction = sunlight.disc,
+                             .sunlight = &sunlight};
     bst_brightness_at(info->brightness, &lighting, &out->glow);
     out->v_mag = out->glow.v_mag;
 }
@@ -241,10 +246,9 @@ static void shine_at(const bst_world *world, int object, bst_vec3 emitted_m, bst
 /* The same of a sight, and whether the Earth hides it. */
 static void shine(const bst_view *view, const eye *e, int object, bst_vec3 emitted_m,
                   bst_sight *out) {
-    shine_at(view->world, object, emitted_m, e->state.position_m, e->sky.bodies.sun_m,
+    shine_at(view->world, object, emitted_m, e->state.position_m, &e->sky.bodies,
              e->seconds - out->light_time_s, out);
-    out->occulted =
-        bst_earth_occults(e->state.position_m, emitted_m, &e->sky.frames.itrf_from_gcrf);
+    out->occulted = bst_earth_occults(e->state.position_m, emitted_m, e->sky.bodies.pole);
 }
 
 static bool too_near(bst_vec3 a_m, bst_vec3 b_m) {
@@ -292,6 +296,8 @@ static bst_status path_from(bst_ctx *ctx, bst_view *view, const eye *const eyes[
             shine(view, e, object, emitted, &sight);
             *mid = sight;
             light->lag_m = bst_vec3_sub(emitted, now);
+            light->earth_bary_mps = e->sky.bodies.earth_bary_mps;
+            light->pole = e->sky.bodies.pole;
             light->light_time_s = sight.light_time_s;
         }
     }
@@ -340,7 +346,10 @@ void bst_view_light(const bst_view *view, int object, const bst_source_path *pat
     bst_vec3 eye_m = quartic(light->eye_m, u);
     bst_vec3 emitted_m = bst_vec3_add(bst_vec3_add(eye_m, quartic(path->place, u)), light->lag_m);
     double seconds = start_s + u * (end_s - start_s) - light->light_time_s;
-    shine_at(view->world, object, emitted_m, eye_m, quartic(light->sun_m, u), seconds, out);
+    bst_bodies bodies = {.sun_m = quartic(light->sun_m, u),
+                         .earth_bary_mps = light->earth_bary_mps,
+                         .pole = light->pole};
+    shine_at(view->world, object, emitted_m, eye_m, &bodies, seconds, out);
 }
 
 bst_status bst_view_near(bst_ctx *ctx, bst_view *view, int observer, double start_s, double end_s,

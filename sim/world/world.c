@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/world/constellation.h"
 #include "sim/world/ephemeris.h"
 #include "sim/world/psf.h"
 #include "sim/world/stray.h"
@@ -75,8 +76,9 @@ static bst_status make_spectrum(const bst_world_builder *b, bst_camera *camera, 
 static bst_status make_pst(const bst_world_builder *b, bst_camera *camera, int observer,
                            int sensor) {
     bst_pst *pst;
-    bst_status status =
-        bst_pst_create(b->ctx, &camera->background, camera->optics.pixel_um, b->base_dir, &pst);
+    double own_um = camera->pixel_um > 0.0 ? camera->pixel_um : 0.0; /* NAN: not known */
+    double pixel_um = camera->optics.pixel_um > 0.0 ? camera->optics.pixel_um : own_um;
+    bst_status status = bst_pst_create(b->ctx, &camera->background, pixel_um, b->base_dir, &pst);
     if (status != BST_OK) {
         return bst_fail_prefix(b->ctx, BST_ERR_CONFIG,
                                "%s: /observers/%d/sensors/%d/camera/background", b->scenario,
@@ -85,6 +87,20 @@ static bst_status make_pst(const bst_world_builder *b, bst_camera *camera, int o
     camera->pst = pst;
     camera->background.pst = (bst_config_list){0}; /* as above */
     return BST_OK;
+}
+
+/* The object that an observer in a constellation is; -1: none. */
+static int own_object(const bst_world_builder *b, const bst_orbit_config *orbit) {
+    const bst_constellation_config *list = b->constellations->items;
+    char name[64];
+    for (int i = 0; i < b->constellations->count; i++) {
+        if (orbit->source == BST_ORBIT_CONSTELLATION &&
+            strcmp(list[i].name, orbit->constellation) == 0) {
+            bst_constellation_name(&list[i], (int)orbit->member[0], (int)orbit->member[1], name);
+            return bst_world_find_object(b->world, name);
+        }
+    }
+    return -1;
 }
 
 static bst_status make_observers(const bst_world_builder *b, const bst_config_list *list) {
@@ -103,6 +119,7 @@ static bst_status make_observers(const bst_world_builder *b, const bst_config_li
         memcpy(observer->name, config->name, sizeof observer->name);
         BST_TRY(bst_orbit_build(b, &config->orbit, &config->burns, path, observer->name,
                                 &observer->orbit, &observer->norad));
+        observer->own_object = own_object(b, &config->orbit);
         observer->sensor_count = config->sensors.count;
         observer->sensors = calloc((size_t)config->sensors.count + 1, sizeof *observer->sensors);
         if (!observer->sensors) {
@@ -160,6 +177,7 @@ static bst_status build(bst_world_builder *b, const bst_world_config *config,
     } else {
         BST_TRY(open_stars(b, config->star_catalogue, "/world/star_catalogue", &world->stars));
     }
+    world->shadow_atmosphere = config->shadow_atmosphere;
     world->faint_limit_v_mag =
         config->faint_stars == BST_FAINT_STATISTICAL ? config->faint_limit_v_mag : -INFINITY;
     if (config->faint_stars == BST_FAINT_STATISTICAL || needs_starlight(observers)) {
@@ -187,7 +205,7 @@ bst_status bst_world_create(bst_ctx *ctx, const char *scenario, const bst_world_
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the world");
     }
     world->epoch = epoch;
-    bst_world_builder b = {ctx, scenario, base_dir, world, NULL};
+    bst_world_builder b = {ctx, scenario, base_dir, world, NULL, &config->constellations};
     bst_status status = build(&b, config, observers);
     bst_sky_clock_free(b.clock);
     if (status != BST_OK) {

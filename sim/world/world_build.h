@@ -10,6 +10,7 @@ typedef struct bst_world_builder {
     const char *base_dir; /* folder that relative paths start from */
     bst_world *world;     /* being made; its epoch and Earth orientation are there */
     bst_sky_clock *clock;
+    const bst_config_list *constellations; /* bst_constellation_config */
 } bst_world_builder;
 
 /* A path that may be relative to the scenario's folder. */

@@ -4,8 +4,9 @@
 
 #include "sim/astro/elements.h"
 
-static const char *const orbit_sources[] = {"sgp4",     "relative",  "oem",
-                                            "injected", "numerical", NULL};
+static const char *const orbit_sources[] = {"sgp4",      "relative",      "oem", "injected",
+                                            "numerical", "constellation", NULL};
+static const char *const walker_patterns[] = {"delta", "star", NULL};
 static const char *const states_frames[] = {"gcrf", "teme", NULL};
 static const char *const faint_kinds[] = {"none", "statistical", NULL};
 static const char *const axes[] = {"x", "-x", "y", "-y", NULL};
@@ -14,7 +15,8 @@ static const bst_config_desc orbit_table[] = {
     BST_ENUM(
         bst_orbit_config, source, orbit_sources, "\"sgp4\"",
         "Where the orbit comes from: an element set, another object plus an offset, an ephemeris "
-        "file, states given per frame, or numerical integration from a state."),
+        "file, states given per frame, numerical integration from a state, or a place in one of "
+        "the world's constellations."),
     BST_PATH(bst_orbit_config, elements_file, "\"\"",
              "sgp4: file of element sets (TLE, or OMM as JSON or CSV), relative to the scenario's "
              "folder."),
@@ -39,6 +41,10 @@ static const bst_config_desc orbit_table[] = {
                "injected: the object in that file; empty: its only one."),
     BST_ENUM(bst_orbit_config, states_frame, states_frames, "\"gcrf\"",
              "injected: axes of the states, GCRF or true equator and mean equinox of date."),
+    BST_STRING(bst_orbit_config, constellation, "\"\"",
+               "constellation: the name of one of /world/constellations."),
+    BST_REALS(bst_orbit_config, member, "", 1, 10000, "[1, 1]",
+              "constellation: plane and slot of the satellite, from 1."),
     BST_OBJECT(bst_orbit_config, state, bst_initial_state_table, "{}",
                "numerical: what it starts from."),
     BST_OBJECT(bst_orbit_config, forces, bst_force_table, "{}", "numerical: what acts on it."),
@@ -86,6 +92,39 @@ static const bst_config_desc catalogue_table[] = {
     BST_CONFIG_END,
 };
 
+static const bst_config_desc constellation_table[] = {
+    BST_STRING(bst_constellation_config, name, NULL,
+               "Name; the satellites' are NAME PLANE-SLOT, as in \"NAME 2-5\"."),
+    BST_ENUM(bst_constellation_config, pattern, walker_patterns, "\"delta\"",
+             "Ascending nodes over 360 degrees (delta) or 180 degrees (star)."),
+    BST_INT(bst_constellation_config, satellites, "", 1, 20000, NULL,
+            "Number of satellites, t of i: t/p/f."),
+    BST_INT(bst_constellation_config, planes, "", 1, 10000, NULL,
+            "Number of planes, p; it divides t."),
+    BST_INT(bst_constellation_config, phasing, "", 0, 9999, "0",
+            "Phase from a plane to the next one to the east in units of 360 degrees / t: f, below "
+            "p."),
+    BST_REAL(bst_constellation_config, inclination_deg, "deg", 0, 179.9, NULL,
+             "Inclination, i, against the true equator of date."),
+    BST_REAL(bst_constellation_config, semi_major_axis_m, "m", 6.4e6, 1e9, NULL,
+             "Semi-major axis; the mean motion follows by Kepler's third law."),
+    BST_REAL(bst_constellation_config, eccentricity, "", 0, 0.9, "0", "Eccentricity."),
+    BST_REAL(bst_constellation_config, raan_deg, "deg", -360, 360, "0",
+             "Right ascension of the first plane's ascending node."),
+    BST_REAL(bst_constellation_config, arg_perigee_deg, "deg", -360, 360, "0",
+             "Argument of perigee of all orbits."),
+    BST_REAL(bst_constellation_config, mean_anomaly_deg, "deg", -360, 360, "0",
+             "Mean anomaly of satellite 1-1 at at_s."),
+    BST_REAL(bst_constellation_config, at_s, "s", -1e9, 1e9, "0",
+             "Time of the elements after the epoch; SGP4 carries them on without drag."),
+    BST_REAL(bst_constellation_config, area_m2, "m2", 0, 1e6, "4",
+             "Cross-section of the sphere that stands for each."),
+    BST_REAL(bst_constellation_config, albedo, "", 0, 1, "0.25", "Albedo of the sphere."),
+    BST_OBJECT(bst_constellation_config, brightness, bst_brightness_config_table, "{}",
+               "How the light of each follows from where it is."),
+    BST_CONFIG_END,
+};
+
 static const char *const catalogue_words[] = {"default", "embedded", NULL};
 static const char *const builtin_word[] = {"builtin", NULL};
 
@@ -104,10 +143,16 @@ const bst_config_desc bst_world_config_table[] = {
              "Seed of the statistical sky: the same sky in all runs."),
     BST_PATH_OR(bst_world_config, earth_orientation, builtin_word, "\"builtin\"",
                 "\"builtin\" or a file in the IERS EOP C04 format."),
+    BST_BOOL(bst_world_config, shadow_atmosphere, "true",
+             "Sunlight on objects at the edge of the Earth's shadow is refracted, weakened and "
+             "reddened by the air; false: an Earth without air. The column sunlit_fraction is the "
+             "geometric one in both cases."),
     BST_LIST(bst_world_config, objects, bst_object_config, object_table, 0, 100000, "[]",
              "The space objects."),
     BST_LIST(bst_world_config, catalogues, bst_catalogue_config, catalogue_table, 0, 16, "[]",
              "Files of element sets whose satellites are there as well."),
+    BST_LIST(bst_world_config, constellations, bst_constellation_config, constellation_table, 0, 64,
+             "[]", "Walker constellations whose satellites are there as well."),
     BST_CONFIG_END,
 };
 

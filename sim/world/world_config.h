@@ -9,7 +9,16 @@
 #include "sim/world/camera.h"
 #include "sim/world/region.h"
 
-enum { BST_ORBIT_SGP4, BST_ORBIT_RELATIVE, BST_ORBIT_OEM, BST_ORBIT_INJECTED, BST_ORBIT_NUMERICAL };
+enum {
+    BST_ORBIT_SGP4,
+    BST_ORBIT_RELATIVE,
+    BST_ORBIT_OEM,
+    BST_ORBIT_INJECTED,
+    BST_ORBIT_NUMERICAL,
+    BST_ORBIT_CONSTELLATION
+};
+
+enum { BST_WALKER_DELTA, BST_WALKER_STAR };
 
 enum { BST_STATES_GCRF, BST_STATES_TEME };
 
@@ -19,9 +28,17 @@ typedef struct bst_initial_state_config {
     int32_t from; /* BST_STATE_... */
     double at_s;
     double position_gcrf_m[3], velocity_gcrf_mps[3];
-    double perigee_radius_m, eccentricity;
-    double inclination_deg, raan_deg, arg_perigee_deg, true_anomaly_deg;
+    double semi_major_axis_m, perigee_radius_m; /* NAN: not given; at least one is */
+    double eccentricity;
+    double inclination_deg, raan_deg, arg_perigee_deg;
+    double true_anomaly_deg, mean_anomaly_deg; /* NAN: not given */
 } bst_initial_state_config;
+
+/* What Keplerian elements leave open (NAN) of semi-major axis and perigee, true and mean anomaly,
+ * from what they give; no anomaly: at the perigee. Of two that agree the radius of perigee and the
+ * true anomaly count. BST_ERR_CONFIG, with the keys but without their place, for elements that no
+ * orbit has, and when two contradict each other: by more than 1e-6 of the radius, 1e-6 degree. */
+bst_status bst_keplerian_resolve(bst_ctx *ctx, bst_initial_state_config *state) BST_MUST_CHECK;
 
 typedef struct bst_force_config {
     char gravity[512]; /* "builtin", "two_body", "j6" or a path as below */
@@ -48,7 +65,9 @@ typedef struct bst_orbit_config {
     char oem_object[64];
     char states_file[512]; /* injected: path as above */
     char states_object[64];
-    int32_t states_frame; /* BST_STATES_... */
+    int32_t states_frame;   /* BST_STATES_... */
+    char constellation[40]; /* constellation: its name */
+    double member[2];       /* plane and slot, from 1 */
     /* numerical */
     bst_initial_state_config state;
     bst_force_config forces;
@@ -76,6 +95,18 @@ typedef struct bst_catalogue_config {
     bst_brightness_config brightness;
 } bst_catalogue_config;
 
+/* A Walker constellation, each satellite of which becomes an object (constellation.h). */
+typedef struct bst_constellation_config {
+    char name[40];
+    int32_t pattern; /* BST_WALKER_... */
+    int64_t satellites, planes, phasing;
+    double inclination_deg, semi_major_axis_m, eccentricity;
+    double raan_deg, arg_perigee_deg, mean_anomaly_deg; /* of satellite 1-1 */
+    double at_s;
+    double area_m2, albedo;
+    bst_brightness_config brightness;
+} bst_constellation_config;
+
 enum { BST_FAINT_NONE, BST_FAINT_STATISTICAL };
 
 struct bst_stars;
@@ -86,8 +117,10 @@ typedef struct bst_world_config {
     double faint_limit_v_mag; /* single stars down to this V */
     uint64_t faint_seed;
     char earth_orientation[512]; /* "builtin" or a path as above */
+    bool shadow_atmosphere;      /* the air bends, reddens and weakens light at the shadow's edge */
     bst_config_list objects;     /* bst_object_config */
     bst_config_list catalogues;  /* bst_catalogue_config */
+    bst_config_list constellations; /* bst_constellation_config */
     /* not in the table: star_catalogue, open already, which outlives the world; NULL: it is opened
      */
     const struct bst_stars *opened_stars;

@@ -63,7 +63,8 @@ typedef struct world_sensor {
 
 typedef struct world_observer {
     char name[64];
-    int norad; /* 0: none */
+    int norad;      /* 0: none */
+    int own_object; /* that this observer is, of a constellation; -1: none */
     bst_orbit orbit;
     world_sensor *sensors;
     int sensor_count;
@@ -90,6 +91,7 @@ struct bst_world {
     bst_time epoch;
     bst_eop *eop;
     bst_sky_grid *sky_grid; /* of all clocks of the world */
+    bool shadow_atmosphere; /* the air at the edge of the Earth's shadow counts for light */
     bst_stars *stars;
     bst_faint_sky *faint;     /* NULL: neither statistical stars nor their light */
     double faint_limit_v_mag; /* single statistical stars down to this; -INFINITY: none */

@@ -128,8 +128,11 @@ static void exact_messages(void **state) {
     refuse("/tick_rate_hz=0.5",
            "/tick_rate_hz: not an integer (found 0.5; allowed: an integer from 1 to 1000000 Hz)");
     refuse("/seed=\"0xG\"",
-           "/seed: not a seed (found \"0xG\"; allowed: a hexadecimal string such as \"0x1F\", up "
-           "to 64 bits)");
+           "/seed: not a seed (found \"0xG\"; allowed: a hexadecimal string such as \"0x1F\" or a "
+           "decimal one such as \"31\", up to 64 bits, or an integer from 0 to 9007199254740992)");
+    refuse("/seed=-1",
+           "/seed: out of range (found -1; allowed: a hexadecimal string such as \"0x1F\" or a "
+           "decimal one such as \"31\", up to 64 bits, or an integer from 0 to 9007199254740992)");
     refuse("/world=[]", "/world: wrong type (found []; allowed: an object)");
     refuse("/world/objects={}",
            "/world/objects: wrong type (found {}; allowed: an array of 0 to 100000 objects)");
@@ -248,7 +251,13 @@ static void walk_value(walk *w, const cJSON *schema, const cJSON *instance, cons
     char below[512];
     schema = of_type(schema, instance);
     const cJSON *type_node = get(schema, "type");
-    const char *type = cJSON_IsString(type_node) ? type_node->valuestring : "string";
+    /* ["number", "null"]: may be left open; ["string", ...]: a seed */
+    const char *first = cJSON_GetStringValue(cJSON_GetArrayItem(type_node, 0)),
+               *second = cJSON_GetStringValue(cJSON_GetArrayItem(type_node, 1));
+    const char *type = cJSON_IsString(type_node) ? type_node->valuestring
+                       : first                   ? first
+                                                 : "string";
+    bool open = second && strcmp(second, "null") == 0;
     /* the type of a module, which may have two names: refused by those of its role */
     const char *last = strrchr(path, '/');
     if (get(schema, "const") || (strstr(path, "/modules/") && last && !strcmp(last, "/type"))) {
@@ -273,7 +282,9 @@ static void walk_value(walk *w, const cJSON *schema, const cJSON *instance, cons
         }
     } else {
         refuse_value(w, path, "[true]", "wrong type");
-        refuse_value(w, path, "null", "wrong type");
+        if (!open) {
+            refuse_value(w, path, "null", "wrong type");
+        }
         refuse_value(w, path, strcmp(type, "boolean") == 0 ? "1" : "true", "wrong type");
         refuse_beyond(w, path, get(schema, "minimum"), -1.0);
         refuse_beyond(w, path, get(schema, "maximum"), 1.0);

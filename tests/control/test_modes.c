@@ -238,7 +238,7 @@ static void without_frames_the_search_still_goes_on(void **state) {
     (void)state;
     rig r;
     rig_open(&r, NULL, true);
-    for (int64_t t = 0; t <= 16000; t += 50) {
+    for (int64_t t = 0; t <= 31000; t += 50) {
         step(&r, t, false);
     }
     assert_int_equal(r.status.mode, BST_MODE_SEARCH);

@@ -43,7 +43,7 @@ static bst_compensator pi_with(double crossover_hz, const bst_servo_response *se
     bst_ctx ctx = {0};
     bst_tracking_loop *plant;
     bst_compensator c = {.dt_s = timing.period_s, .stages = 1, .stage = {{.b0 = 1.0}}};
-    bst_assert_ok(&ctx, bst_tracking_loop_create(&ctx, &timing, servo, &c, 0.0, 0.0, &plant));
+    bst_assert_ok(&ctx, bst_tracking_loop_create(&ctx, &timing, servo, &c, NULL, &plant));
     bst_compensator_config config = {.type = BST_COMPENSATOR_PI,
                                      .crossover_hz = crossover_hz,
                                      .phase_margin_deg = 45.0,
@@ -60,17 +60,23 @@ typedef struct simulated {
     double growth;        /* of the error's envelope, last tenth over first tenth of a free run */
 } simulated;
 
+enum { PENDING = 64, MOTION = 4096 };
+
 /* Steps the loop. omega > 0: driven by a sinusoid that repeats after `frames` frames; 0: from an
- * error at the start. observer: alpha and beta, else NULL. */
-static simulated simulate(const bst_compensator *compensator, const double *observer, double omega,
-                          int frames) {
+ * error at the start. `timed` is `timing` but
+ * for its latencies. */
+static simulated simulate_at(const bst_tracking_timing *timed, const bst_compensator *compensator,
+                             const bst_tracking_observer *observer, double omega, int frames) {
     bst_axis axis;
     bst_axis_init(&axis, &spec);
     bst_compensator c = compensator ? *compensator : (bst_compensator){0};
-    int period = 100, half = 30, late = 150;        /* steps */
+    int period = 100, half = 30; /* steps */
+    int late = (int)lround(timed->switch_s / DT);
+    int shown_late = observer ? (int)lround(observer->motion_late_s / DT) : 0;
+    double motion[MOTION] = {0};                    /* of the mount, ring */
     double value = 0.0, rate = 0.0, value_at = 0.0; /* of the correction, at a time */
     double estimate = 0.0, estimate_rate = 0.0;
-    double sum = 0.0, pending[8];
+    double sum = 0.0, pending[PENDING];
     simulated out = {0};
     double first = 0.0, last = 0.0;
     int settle = omega > 0.0 ? 400 : 0, total = settle + frames;
@@ -78,24 +84,34 @@ static simulated simulate(const bst_compensator *compensator, const double *obse
         /* frame k is exposed from k period - half to k period + half, acted on `late` after it */
         int k = (n - late) / period;
         if (n >= late && (n - late) % period == 0) {
-            double m = pending[k % 8], effect = k * timing.period_s + timing.effect_s;
+            double m = pending[k % PENDING], effect = k * timing.period_s + timed->effect_s;
             if (compensator) {
                 value += rate * (effect - value_at);
                 rate = TINY * bst_compensator_step(&c, m / TINY, 0.0);
             } else {
                 double nu = m - (estimate + timing.period_s * estimate_rate);
-                estimate += timing.period_s * estimate_rate + observer[0] * nu;
-                estimate_rate += observer[1] / timing.period_s * nu;
-                value = estimate + estimate_rate * timing.effect_s;
+                estimate += timing.period_s * estimate_rate + observer->alpha * nu;
+                estimate_rate += observer->beta / timing.period_s * nu;
+                value = estimate + estimate_rate * timed->effect_s;
                 rate = estimate_rate;
             }
             value_at = effect;
         }
         double t = n * DT;
         bst_axis_step(&axis, value + rate * (t - value_at), rate, 0.0);
+        if (observer && fabs(axis.angle_rad) > 1e4 * TINY) { /* far from limits still */
+            return (simulated){.growth = INFINITY};
+        }
         assert_false(axis.limited);
         double d = omega > 0.0 ? TINY * cos(omega * t) : TINY;
         double e = d - axis.angle_rad;
+        /* the frames show more, and later, motion than telemetry, which the observer adds back */
+        motion[n % MOTION] = axis.angle_rad;
+        double seen = d;
+        if (observer) {
+            double shown = n >= shown_late ? motion[(n - shown_late) % MOTION] : 0.0;
+            seen += axis.angle_rad - observer->motion_gain * shown;
+        }
         int phase = n % period, frame = (n + half) / period;
         if (phase == 0 && n / period >= settle) {
             int i = n / period - settle;
@@ -108,9 +124,9 @@ static simulated simulate(const bst_compensator *compensator, const double *obse
         }
         if (phase >= period - half || phase <= half) {
             double weight = phase == half || phase == period - half ? 0.5 : 1.0; /* trapezoids */
-            sum += weight * (observer ? d : e) / (2 * half);
+            sum += weight * (observer ? seen : e) / (2 * half);
             if (phase == half) {
-                pending[frame % 8] = sum;
+                pending[frame % PENDING] = sum;
                 sum = 0.0;
             }
         }
@@ -120,9 +136,14 @@ static simulated simulate(const bst_compensator *compensator, const double *obse
     return out;
 }
 
+static simulated simulate(const bst_compensator *compensator, const bst_tracking_observer *observer,
+                          double omega, int frames) {
+    return simulate_at(&timing, compensator, observer, omega, frames);
+}
+
 /* cos = half a turn each way: of a frequency between 0 and half the frame rate only one is kept. */
-static double simulated_size(const bst_compensator *c, const double *observer, int turns,
-                             int frames) {
+static double simulated_size(const bst_compensator *c, const bst_tracking_observer *observer,
+                             int turns, int frames) {
     double omega = 2 * BST_PI * turns / (frames * timing.period_s);
     return 2.0 * cabs(simulate(c, observer, omega, frames).error);
 }
@@ -133,18 +154,17 @@ static void test_rejection(void **state) {
     responses r;
     bst_servo_response servo = servo_of(&r);
     bst_compensator c = pi_with(0.4, &servo, 1.0, 0.0);
-    const double gains[2] = {0.5, 0.2};
+    const bst_tracking_observer gains = {0.5, 0.2, 1.0, 0.0};
     bst_tracking_loop *image, *observer;
-    bst_assert_ok(&ctx, bst_tracking_loop_create(&ctx, &timing, &servo, &c, 0, 0, &image));
-    bst_assert_ok(
-        &ctx, bst_tracking_loop_create(&ctx, &timing, &servo, NULL, gains[0], gains[1], &observer));
+    bst_assert_ok(&ctx, bst_tracking_loop_create(&ctx, &timing, &servo, &c, NULL, &image));
+    bst_assert_ok(&ctx, bst_tracking_loop_create(&ctx, &timing, &servo, NULL, &gains, &observer));
     for (int turns = 1; turns < 100; turns = turns * 3 + 1) {
         double w = 2 * BST_PI * turns / 20.0;
         /* the exposure's mean by trapezoids of 1 ms, the response between steps by straight lines:
          * 1e-3 of what is made up for */
         bst_assert_close(simulated_size(&c, NULL, turns, 200),
                          cabs(bst_tracking_rejection(image, w, 0.0)), 2e-3);
-        bst_assert_close(simulated_size(NULL, gains, turns, 200),
+        bst_assert_close(simulated_size(NULL, &gains, turns, 200),
                          cabs(bst_tracking_rejection(observer, w, 0.0)), 2e-3);
     }
     /* both follow a steady drift without lag; so slowly, that only rounding is left */
@@ -161,8 +181,8 @@ static void test_margins(void **state) {
     bst_servo_response servo = servo_of(&r);
     bst_compensator c = pi_with(0.4, &servo, 1.0, 0.0);
     bst_tracking_loop *loop;
-    bst_assert_ok(&ctx, bst_tracking_loop_create(&ctx, &timing, &servo, &c, 0, 0, &loop));
-    bst_loop open = {bst_tracking_open, loop, timing.period_s, 0, NULL, 0};
+    bst_assert_ok(&ctx, bst_tracking_loop_create(&ctx, &timing, &servo, &c, NULL, &loop));
+    bst_loop open = bst_tracking_as_loop(loop);
     bst_loop_margins m;
     bst_assert_ok(&ctx, bst_loop_analyse(&ctx, &open, &m));
     assert_true(m.stable);
@@ -183,15 +203,64 @@ static void test_margins(void **state) {
     bst_tracking_loop_free(loop);
 }
 
+/* Whether the free loop grows. */
+static bool diverges(const bst_tracking_timing *timed, const bst_tracking_observer *observer) {
+    return simulate_at(timed, NULL, observer, 0.0, 1500).growth > 1.0;
+}
+
+/* The observer at latencies from a tenth of a frame period to ten: as long as telemetry is right it
+ * has no loop and is stable, and what it bears of a wrong model of the mount is that of the loop
+ * stepped in time, 1 % on both sides (the exposure's mean by trapezoids; 2 % of the delay, of which
+ * a step is up to 1 %). */
+static void test_observer_margins(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    responses r;
+    bst_servo_response servo = servo_of(&r);
+    static const double latency_periods[] = {0.1, 0.4, 0.7, 1.0, 1.3, 2.5, 5.0, 10.0};
+    for (size_t i = 0; i < sizeof latency_periods / sizeof *latency_periods; i++) {
+        double arrival = 0.03 + 0.1 * latency_periods[i];
+        const bst_tracking_timing timed = {0.1, 0.06, arrival, arrival + 0.01, arrival + 0.01};
+        bst_tracking_observer observer = {.alpha = 0.71, .beta = 0.42, .motion_gain = 1.0};
+        bst_tracking_loop *loop;
+        bst_assert_ok(&ctx, bst_tracking_loop_create(&ctx, &timed, &servo, NULL, &observer, &loop));
+        bst_loop open = bst_tracking_as_loop(loop);
+        bst_loop_margins m;
+        bst_assert_ok(&ctx, bst_loop_analyse(&ctx, &open, &m));
+        assert_true(m.stable);
+        assert_int_equal(m.unstable_closed, 0);
+        double factor = pow(10.0, m.gain_margin_db / 20.0);
+        bst_tracking_loop_free(loop);
+        for (int side = -1; side <= 1; side += 2) {
+            bst_tracking_observer wrong = observer;
+            wrong.motion_gain = factor * (1.0 + 0.01 * side);
+            assert_int_equal(diverges(&timed, &wrong), side > 0);
+            /* the linear model says the same of that loop, and never counts below none */
+            bst_assert_ok(&ctx,
+                          bst_tracking_loop_create(&ctx, &timed, &servo, NULL, &wrong, &loop));
+            open = bst_tracking_as_loop(loop);
+            bst_loop_margins beyond;
+            bst_assert_ok(&ctx, bst_loop_analyse(&ctx, &open, &beyond));
+            assert_int_equal(beyond.unstable_closed > 0, side > 0);
+            bst_tracking_loop_free(loop);
+            wrong = observer;
+            wrong.motion_late_s =
+                DT * round(m.delay_margin_s * (1.0 + 0.02 * side) / DT) + DT * side;
+            assert_int_equal(diverges(&timed, &wrong), side > 0);
+        }
+    }
+}
+
 static void test_variance(void **state) {
     (void)state;
     bst_ctx ctx = {0};
     bst_servo_response exact = {.delay_s = 0.0};
     /* alpha = 1, beta = 0 holds the latest fix: the error is d at the middle less the mean of the
      * exposure n frames before, n = 3 for an effect 0.25 to 0.35 s after the middle */
+    const bst_tracking_observer hold = {1.0, 0.0, 1.0, 0.0};
     const bst_tracking_timing held = {0.1, 1e-9, 0.2, 0.25, 0.25};
     bst_tracking_loop *loop;
-    bst_assert_ok(&ctx, bst_tracking_loop_create(&ctx, &held, &exact, NULL, 1.0, 0.0, &loop));
+    bst_assert_ok(&ctx, bst_tracking_loop_create(&ctx, &held, &exact, NULL, &hold, &loop));
     /* |1 - exp(-j w 3 T)|^2 = 2 - 2 cos(w 3 T) over a flat band from 0 to f: 2 - 2 sinc */
     bst_tracking_band band = {0.0, 0.7, 5.0};
     double x = 2 * BST_PI * 0.7 * 0.3;
@@ -218,9 +287,8 @@ static void test_observer_gains(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_rejection),
-        cmocka_unit_test(test_margins),
-        cmocka_unit_test(test_variance),
+        cmocka_unit_test(test_rejection),        cmocka_unit_test(test_margins),
+        cmocka_unit_test(test_observer_margins), cmocka_unit_test(test_variance),
         cmocka_unit_test(test_observer_gains),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

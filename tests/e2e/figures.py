@@ -156,6 +156,23 @@ class Frames:
                 field=field, detections=detections.get(number, [])))
 
 
+def nees(frames):
+    """NEES of the direction of the track of interest, of the frames that gave it a detection."""
+    out = []
+    for f in frames.list:
+        for track in f["tracks"]:
+            if not track["target_of_interest"] or track["last_update_tick"] != track["tick"]:
+                continue
+            ra, dec = np.radians(track["ra_deg"]), np.radians(track["dec_deg"])
+            axes = np.array([[-np.sin(ra), np.cos(ra), 0],
+                             [-np.sin(dec) * np.cos(ra), -np.sin(dec) * np.sin(ra), np.cos(dec)]])
+            error = axes @ (track_direction(track, f["mid"]) - f["direction"])
+            covariance = np.array([[track["cov_d1_d1_rad2"], track["cov_d1_d2_rad2"]],
+                                   [track["cov_d1_d2_rad2"], track["cov_d2_d2_rad2"]]])
+            out.append(error @ np.linalg.solve(covariance, error))
+    return np.array(out)
+
+
 def judge(frames):
     """The summary, and how many frames could be visible or not: the Earth's limb decides."""
     confirmed = acquired = settled = latest = None
@@ -194,7 +211,7 @@ def judge(frames):
                 errors.append(f["error"])
             if f["field"] and f["field"]["snr"] > 0:
                 in_field += 1
-                x, y = f["field"]["x_mean_px"], f["field"]["y_mean_px"]
+                x, y = f["field"]["x_centroid_px"], f["field"]["y_centroid_px"]
                 found += any(np.hypot(dx - x, dy - y) <= RIGHT_TARGET_PX
                              for dx, dy in f["detections"])
     errors, track_errors = np.array(errors).reshape(-1, 2), np.array(track_errors)

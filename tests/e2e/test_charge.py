@@ -1,5 +1,5 @@
 """The main job on a sensor with hot pixels and radiation hits that nobody told image processing of:
-no maps, no list of bad pixels.
+no maps, no list of bad pixels, and none learned (test_detector_effects.py has those).
 
 Usage, from the repository root: /usr/bin/python3 tests/e2e/test_charge.py BORESIGHT
 """
@@ -9,7 +9,8 @@ import runs
 
 DETECTOR = runs.SENSOR + "/camera/detector"
 CHARGE = [DETECTOR + "/hot_fraction=0.0005", DETECTOR + "/hot_median_e_per_s=1000",
-          DETECTOR + "/hits/rate_per_cm2_s=20"]
+          DETECTOR + "/hits/rate_per_cm2_s=20",
+          runs.SENSOR + "/modules/imgproc/bad_pixel_learning/enabled=false"]
 
 
 class Charge(unittest.TestCase):

@@ -81,7 +81,8 @@ class Exported(unittest.TestCase):
         names = [row[0] for row in self.database.execute('SELECT "table" FROM tables')]
         self.assertEqual(sorted(os.listdir(out)), sorted(f"{name}.csv" for name in names))
         for name in names:
-            self.assertIn(f"{out}/{name}.csv: {self.check_csv(self.database, out, name)} rows\n",
+            rows = self.check_csv(self.database, out, name)
+            self.assertIn(f"{out}/{name}.csv: {rows} row{'' if rows == 1 else 's'}\n",
                           said)
 
     def test_some_tables_and_hard_text(self):
@@ -397,7 +398,7 @@ class Exported(unittest.TestCase):
         self.assertGreater(len(changed), 1000)
         # the red square around the true place of the target, 11 px away at half the scale
         x, y = self.database.execute(
-            "SELECT x_mean_px, y_mean_px FROM truth WHERE kind = 'object' AND exposure_id = 27"
+            "SELECT x_chief_px, y_chief_px FROM truth WHERE kind = 'object' AND exposure_id = 27"
             ).fetchone()
         x, y = (x + 0.5) / 2 - 0.5, (y + 0.5) / 2 - 0.5
         red = [(u, v) for u, v in changed if pixel(b, u, v)[0] > 200 and pixel(b, u, v)[1] < 130 and

@@ -44,6 +44,7 @@ class Figures(unittest.TestCase):
         self.assertLess(frames.disagreement, 0.1 * figures.ARCSEC)
         mine, unclear = figures.judge(frames)
         self.assertEqual(unclear, 0)
+        self.nees = figures.nees(frames)
         return out, summary, mine
 
     def compare(self, mine, summary):
@@ -51,8 +52,8 @@ class Figures(unittest.TestCase):
             self.assertEqual(mine[key], summary[key], key)
         for key in EXACT:
             self.assertAlmostEqual(mine[key], summary[key], delta=1e-8 + 1e-9 * mine[key], msg=key)
-        for key in PERCENTILES:  # nearest rank, from bins of 1 %
-            self.assertAlmostEqual(mine[key] / summary[key], 1, delta=0.0051, msg=key)
+        for key in PERCENTILES:  # nearest rank, from bins of 0.1 %
+            self.assertAlmostEqual(mine[key] / summary[key], 1, delta=0.00051, msg=key)
 
     def read_page(self, out):
         made = subprocess.run([runs.BORESIGHT, "report", out], capture_output=True, text=True,
@@ -110,6 +111,7 @@ class Figures(unittest.TestCase):
             json.dump(manifest, file)
         cards = self.read_page(out).cards()
         self.near(cards["custody"], 100 * mine["custody"], 4)
+        self.near(cards["time to acquire"], mine["time_to_acquire_s"], 4)
         self.near(cards["pointing RMS"], mine["pointing_rms_px"])
 
     def test_clean(self):
@@ -118,7 +120,15 @@ class Figures(unittest.TestCase):
         self.assertEqual(mine["breaks"], 0)
         self.assertLess(mine["time_to_confirm_s"], mine["time_to_acquire_s"])
         self.compare(mine, summary)
-        self.check_page(self.read_page(out), mine)
+        page = self.read_page(out)
+        self.check_page(page, mine)
+        found = re.search(r"In the (\d+) frames that gave it a detection: mean ([\d.]+), median "
+                          r"([\d.]+) \(1.39\), (\d+) % between", page.text)
+        self.assertEqual(int(found[1]), len(self.nees))
+        self.near(found[2], self.nees.mean())
+        self.near(found[3], sorted(self.nees)[math.ceil(0.5 * len(self.nees)) - 1])
+        inside = ((self.nees >= -2 * math.log(0.975)) & (self.nees <= -2 * math.log(0.025))).mean()
+        self.assertLessEqual(abs(int(found[4]) - 100 * inside), 0.51)
 
 
 class Losses(unittest.TestCase):

@@ -287,7 +287,7 @@ class Examples(unittest.TestCase):
                       (truth["snr"] > 30) & (truth["saturated"] == 0) &
                       (np.hypot(truth["x_end_px"] - truth["x_start_px"],
                                 truth["y_end_px"] - truth["y_start_px"]) < 3))
-            for x, y in zip(truth["x_mean_px"][bright], truth["y_mean_px"][bright]):
+            for x, y in zip(truth["x_chief_px"][bright], truth["y_chief_px"][bright]):
                 if not (3 < x < 1020 and 3 < y < 1020):
                     continue
                 total += 1
@@ -657,7 +657,8 @@ class BadPeers(unittest.TestCase):
             peer.stdout.readline()
         peer.kill()
         peer.communicate()
-        ended(run, timeout=240)
+        said = ended(run, timeout=240)
+        self.assertIn("of neossat/telescope/imgproc is not answered: no peer plays it", said)
         found = boresight_link.read_run(out).table("detection_frames")
         self.assertGreater(len(found["exposure_id"]), 0)
         self.assertLess(len(found["exposure_id"]), 300)

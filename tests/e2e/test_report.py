@@ -304,7 +304,9 @@ class Others(OnePage):
         with open(made + "/manifest.json", encoding="utf-8") as file:
             text = file.read()
         with open(made + "/manifest.json", "w", encoding="utf-8") as file:
-            file.write(re.sub('"device":\t"[^"]*"', '"device": "<script>alert(1)</script>"', text))
+            text = re.sub('"device":\t"[^"]*"', '"device": "<script>alert(1)</script>"', text)
+            text = re.sub('"warnings":\t[0-9]+', '"warnings": 1', text)
+            file.write(text.replace("{", '{"error": "it is 1.589e-05 <px> off",', 1))
         self.assertEqual(report(made).returncode, 0)
         page = Page(made + "/report.html")
         self.check_alone(page)
@@ -312,6 +314,10 @@ class Others(OnePage):
         for name in ("neossat/narrow", "neossat/wide", "follower/narrow"):
             self.assertIn("Sensor " + name, headings)
         self.assertIn("<script>alert(1)</script>", page.text)
+        self.assertIn("Warning:1 warning on its standard error while it ran.", page.warnings())
+        # a number is in one piece for the browser, in text and in the cells of tables
+        self.assertIn("it is <span class=\"w\">1.589e-05</span> &lt;px&gt; off", page.source)
+        self.assertIn("td.n,.w{white-space:nowrap}", page.source)
         self.assertIn("two&<b>", page.root.find("head/title").text)
         self.assertEqual(len(page.pictures()), 2 * (6 + 3 + 6))
 

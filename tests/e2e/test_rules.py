@@ -21,8 +21,11 @@ CASES = [("duration", "/duration_s=0", "/duration_s: the run lasts 0 s"),
          ("short_times", MODULES + "/tracker/max_coast_s=0.5", "every track ends"),
          ("short_times", MODULES + "/control/dwell_timeout_s=4", "(5 s here)"),
          ("short_times", MODULES + "/control/acquire_timeout_s=1", "before it can be confirmed"),
-         ("loops", MODULES + "/control/delay_s/tracks=30", "loop"),
-         ("reach", "/duration_s=86400", "the cue is out of reach from")]
+         ("loops", MODULES + '/control/compensator={"type": "pi", "crossover_hz": 0.07, '
+          '"phase_margin_deg": 45, "gain_scale": 3}', "has thin margins"),
+         ("reach", "/duration_s=86400", "the cue is out of reach from"),
+         ("reach", MODULES + "/gimbal/accel_limit_degps2=0.001", "for a step of the search"),
+         ("bodies", "/duration_s=86400", "the Earth is in the field from")]
 
 
 def check(*words):

@@ -24,7 +24,7 @@ static inline bst_status sky_at(void *user, bst_ctx *c, double seconds, bst_craf
     bst_vec3 v = bst_vec3_axpy(bst_vec3_scale(p, -sin(phase)), cos(phase), q);
     bst_vec3 sun = {BST_AU_M, 0, 0};
     *out = (bst_craft_sky){.position_m = bst_vec3_scale(u, radius_m), .sun_m = sun};
-    out->sunlit = bst_sun_fraction(out->position_m, sun);
+    out->sunlit = bst_sun_fraction(out->position_m, sun, BST_EARTH_POLE_J2000);
     double a = 0.2 * BST_DEG_RAD * seconds;
     out->known = (bst_law_inputs){.position_m = out->position_m,
                                   .velocity_mps = bst_vec3_scale(v, n * radius_m),

@@ -69,7 +69,7 @@ static bst_status sky_at(void *user, bst_ctx *c, double seconds, bst_craft_sky *
     bst_vec3 v = {-sin(phase), 0.5 * cos(phase), 0.8660254037844386 * cos(phase)};
     bst_vec3 sun = {BST_AU_M, 0, 0};
     *out = (bst_craft_sky){.position_m = bst_vec3_scale(u, r), .sun_m = sun};
-    out->sunlit = bst_sun_fraction(out->position_m, sun);
+    out->sunlit = bst_sun_fraction(out->position_m, sun, BST_EARTH_POLE_J2000);
     out->known = (bst_law_inputs){
         .position_m = out->position_m, .velocity_mps = bst_vec3_scale(v, n * r), .sun_m = sun};
     return BST_OK;

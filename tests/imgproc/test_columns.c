@@ -95,9 +95,30 @@ static void false_alarms_and_sources(void **state) {
     synthetic_free(&s);
 }
 
+/* Left to the camera, levels are taken off a frame transfer's and uneven columns', and of no
+ * other; the configuration's word comes first. */
+static void wanted(void **state) {
+    (void)state;
+    synthetic s;
+    synthetic_init(&s, 64, 64);
+    for (int k = 0; k < 4; k++) {
+        s.camera.detector.frame_transfer_s = k == 1 ? 0.01 : 0.0;
+        /* of 8 e- of read noise: an eighth, and a quarter */
+        s.camera.detector.column_offset_rms_e = k == 2 ? 1.0 : k == 3 ? 2.0 : 0.0;
+        s.config.column_level = BST_COLUMNS_AUTO;
+        assert_int_equal(bst_columns_wanted(&s.config, &s.camera), k == 1 || k == 3);
+        s.config.column_level = BST_COLUMNS_ON;
+        assert_true(bst_columns_wanted(&s.config, &s.camera));
+        s.config.column_level = BST_COLUMNS_OFF;
+        assert_false(bst_columns_wanted(&s.config, &s.camera));
+    }
+    synthetic_free(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(levels),
+        cmocka_unit_test(wanted),
         cmocka_unit_test(false_alarms_and_sources),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -2,6 +2,7 @@
 #include <stdlib.h>
 
 #include "imgproc/discriminate.h"
+#include "imgproc/pixel_learner.h"
 #include "tests/imgproc/synthetic.h"
 #include "tests/test_support.h"
 
@@ -233,9 +234,47 @@ static void drawn_among_points(void **state) {
     end(&s);
 }
 
+/* A source on a pixel that learning suspects is a hot pixel before the pixel is bad, and no more
+ * once the map leaves it out: what shows there then is light about it. */
+static void suspected_pixels(void **state) {
+    (void)state;
+    scene s = make();
+    const bst_pixel_learner_config config = {.enabled = true, .capacity = 64, .false_rate = 1e-5};
+    bst_pixel_learner *learner;
+    bst_assert_ok(&s.ctx, bst_pixel_learner_create(&s.ctx, &s.s.camera, &config, &learner));
+    bst_pixel_show show = {.pixel = 200 * SIDE + 300, .sharp = {6, 6, 6, 6}};
+    const bst_pixel_shows shows = {
+        .items = &show, .count = 1, .maxima = 20, .usable = true, .pixels = SIDE * SIDE};
+    s.frame.learned = learner;
+    s.frame.left_out = bst_pixel_learner_map(learner, 0);
+    for (int frame = 0; frame < 5; frame++) {
+        next(&s, 7);
+        bst_detection *d = add(&s, 300.2, 199.8, 12, BST_LABEL_UNKNOWN);
+        bst_detection *other = add(&s, 302.2, 199.8, 12, BST_LABEL_UNKNOWN);
+        const bst_pixel_frame f = {.q_cam_from_gcrf = s.frame.q_cam_from_gcrf,
+                                   .time_s = frame,
+                                   .window = s.frame.window,
+                                   .binning = 1};
+        bst_pixel_learner_update(learner, &f, &shows);
+        label(&s);
+        /* shapes bring 5 each, a return ln((2/3) / (20 / 512^2)) = 9.1 against hits: 10 > 5.3 of
+         * two maxima, 15 > 11.5 of three */
+        bool bad = frame >= 2;
+        assert_int_equal(bst_pixel_learner_bad_count(learner), bad);
+        assert_int_equal(d->label == BST_LABEL_HOT_PIXEL, frame >= 1 && frame < 4);
+        assert_int_not_equal(other->label, BST_LABEL_HOT_PIXEL);
+        if (frame == 3) {
+            bst_pixel_learner_publish(learner, 0, frame);
+        }
+    }
+    bst_pixel_learner_free(learner);
+    end(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(hot_pixels_and_hits),
+        cmocka_unit_test(suspected_pixels),
         cmocka_unit_test(stars_without_catalogue_and_objects),
         cmocka_unit_test(slow_object_leaves_its_place),
         cmocka_unit_test(other_rules),

@@ -4,7 +4,7 @@
 
 #include "imgproc/background.h"
 #include "imgproc/stack.h"
-#include "imgproc/tail.h"
+#include "sim/core/threshold_statistics.h"
 #include "sim/core/rng.h"
 #include "tests/test_support.h"
 
@@ -218,7 +218,7 @@ static void threshold_in_closed_form(void **state) {
     const double side[2] = {2000.0, 1000.0}, roughness = 0.6;
     double u = bst_stack_threshold(3.0, side, 1e-9, roughness, 21.25);
     /* the frame's edges add sqrt(2 pi) / u / side per axis, 0.1 % */
-    bst_assert_close(bst_tail_maxima(u, roughness) * side[0] * side[1], 3.0, 0.01);
+    bst_assert_close(bst_threshold_maxima(u, roughness) * side[0] * side[1], 3.0, 0.01);
     /* a wide one over four: volume sqrt(det L) (2 pi)^(-5/2) (u^3 - 3 u) exp(-u^2 / 2); faces of
      * the rates add 2 sqrt(2 pi) / u in 2 * 20 * 4.6 * 0.77, 1.2 % together */
     u = bst_stack_threshold(3.0, side, 20.0, roughness, 21.25);

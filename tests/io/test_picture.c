@@ -131,7 +131,8 @@ static void test_quicklook(void **state) {
     memset(pixels[0], 0, sizeof(uint16_t) * SIZE * SIZE);
     bst_assert_ok(&ctx, bst_quicklook_write(&ctx, path, NULL, &frames[0], NULL));
     assert_true(png_size(path, one));
-    assert_true(one[0] < two[0] && one[1] == two[1]);
+    /* under one panel the legend takes a row more */
+    assert_true(one[0] < two[0] && one[1] == two[1] + 24);
     frames[0].width = 1;
     frames[0].height = 3;
     bst_assert_ok(&ctx, bst_quicklook_write(&ctx, path, NULL, &frames[0], NULL));
@@ -149,6 +150,22 @@ static void test_quicklook(void **state) {
     free(pixels[0]);
     free(pixels[1]);
     scratch_remove(&s);
+}
+
+/* Sorted by importance; equal ones and places that are not numbers do no harm. */
+static void test_mark_sort(void **state) {
+    (void)state;
+    bst_mark marks[5] = {{.importance = 3.0, .x_px = NAN},
+                         {.importance = INFINITY, .x_px = 1},
+                         {.importance = 0.0},
+                         {.importance = 7.5},
+                         {.importance = 3.0}};
+    bst_mark_sort(marks, 5);
+    const double expected[5] = {INFINITY, 7.5, 3.0, 3.0, 0.0};
+    for (int i = 0; i < 5; i++) {
+        assert_true(marks[i].importance == expected[i]);
+    }
+    assert_true(marks[0].x_px == 1);
 }
 
 static void test_stretch(void **state) {
@@ -227,6 +244,7 @@ static void test_pointing_plot(void **state) {
                                                  : i < 30 ? BST_MODE_ACQUIRE
                                                           : BST_MODE_TRACK,
                                          .in_track = i >= 34,
+                                         .counted = i >= 36,
                                          .visible = i != 100};
     }
     char path[700];
@@ -279,9 +297,8 @@ static void test_pointing_plot(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_quicklook),
-        cmocka_unit_test(test_stretch),
-        cmocka_unit_test(test_picture_errors),
+        cmocka_unit_test(test_quicklook),     cmocka_unit_test(test_mark_sort),
+        cmocka_unit_test(test_stretch),       cmocka_unit_test(test_picture_errors),
         cmocka_unit_test(test_pointing_plot),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

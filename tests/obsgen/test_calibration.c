@@ -48,8 +48,8 @@ static void what_is_wrong_is_said(void **state) {
     refuse("{}", "make one with `boresight calibrate-obsgen`");
     refuse("{\"boresight_obsgen\": 99}", "make the calibration anew");
     refuse("{\"boresight_obsgen\": \"1\"}", "make the calibration anew");
-    refuse("{\"boresight_obsgen\": 3}", "/threshold_offset: missing");
-    refuse("{\"boresight_obsgen\": 3, \"gian\": 2}", "did you mean \"gain\"");
+    refuse("{\"boresight_obsgen\": 4}", "/threshold_offset: missing");
+    refuse("{\"boresight_obsgen\": 4, \"gian\": 2}", "did you mean \"gain\"");
     refuse("not json", "");
     bst_ctx ctx = {0};
     bst_obsgen_calibration c;

@@ -1,108 +1,51 @@
 /* The generator's statistics against the laws that it states. */
-#include "obsgen/generator.h"
-#include "sim/core/vec.h"
-#include "tests/test_support.h"
-
-enum { SIDE = 1024, MOST = 1200 };
-
-typedef struct scene {
-    bst_ctx ctx;
-    bst_camera camera;
-    bst_generator_settings settings;
-    bst_obsgen_calibration calibration;
-    bst_truth *truth;
-    bst_generator_frame frame;
-    bst_generator *generator;
-} scene;
-
-static void open_scene(scene *s) {
-    memset(s, 0, sizeof *s);
-    s->camera = (bst_camera){.width_px = SIDE,
-                             .height_px = SIDE,
-                             .pixel_scale_arcsec = 3.0,
-                             .aperture_m = 0.15,
-                             .throughput = 0.7,
-                             .quantum_efficiency = 0.7,
-                             .photon_flux_v0_per_s_m2 = 3.6e10,
-                             .psf_fwhm_px = 2.0,
-                             .read_noise_e = 8.0,
-                             .full_well_e = 1e5,
-                             .gain_e_per_dn = 1.6,
-                             .bits = 16};
-    s->settings = (bst_generator_settings){.capacity = 2048,
-                                           .false_alarms_per_frame = 1e-6,
-                                           .streak_min_px = 1.5,
-                                           .streak_max_px = 64.0};
-    bst_obsgen_calibration_theory(&s->calibration);
-    s->truth = calloc(1, sizeof *s->truth + MOST * sizeof s->truth->items[0]);
-    assert_non_null(s->truth);
-    s->truth->background_e = 36.0;
-    s->frame = (bst_generator_frame){.truth = s->truth,
-                                     .window = {0, 0, SIDE, SIDE},
-                                     .binning = 1,
-                                     .exposure_s = 0.5,
-                                     .sigma_px = 2.0 / 2.3548200450309493};
-}
-
-static void start(scene *s) {
-    bst_generator_free(s->generator);
-    bst_assert_ok(
-        &s->ctx,
-        bst_generator_create(&s->ctx, &s->camera, &s->camera, &s->settings, &s->calibration,
-                             bst_rng_make_key(7, 0, "a/b/obsgen", "observations"), &s->generator));
-}
-
-static void close_scene(scene *s) {
-    bst_generator_free(s->generator);
-    free(s->truth);
-}
-
-/* Electrons of a point source of this SNR. */
-static double electrons_of(const scene *s, double snr) {
-    static bst_bound bound;
-    bst_bound_init(&bound, s->frame.sigma_px);
-    const bst_camera *c = &s->camera;
-    double noise = sqrt(s->truth->background_e + c->read_noise_e * c->read_noise_e +
-                        c->gain_e_per_dn * c->gain_e_per_dn / 12.0);
-    return snr * noise / bst_bound_norm(&bound, 0.0);
-}
-
-static bst_truth_item *add_source(scene *s, uint32_t id, double x, double y, double electrons) {
-    bst_truth_item *item = &s->truth->items[s->truth->count++];
-    *item = (bst_truth_item){.kind = BST_SOURCE_STAR,
-                             .id = id,
-                             .flags = BST_TRUTH_IN_FIELD,
-                             .x_start_px = x,
-                             .x_mid_px = x,
-                             .x_end_px = x,
-                             .x_mean_px = x,
-                             .y_start_px = y,
-                             .y_mid_px = y,
-                             .y_end_px = y,
-                             .y_mean_px = y,
-                             .electrons = electrons};
-    return item;
-}
-
-/* 900 sources, kept apart, all of one SNR, at many places in the pixel. */
-static void fill(scene *s, double snr) {
-    s->truth->count = 0;
-    double electrons = electrons_of(s, snr);
-    for (int i = 0; i < 900; i++) {
-        add_source(s, (uint32_t)i + 1, 20.0 + 33.0 * (i % 30) + 0.37 * (i % 7),
-                   20.0 + 33.0 * (i / 30) + 0.29 * (i % 11), electrons);
-    }
-}
-
-static bst_generator_result run(scene *s, int64_t exposure) {
-    bst_generator_result result;
-    s->truth->exposure_id = exposure;
-    bst_assert_ok(&s->ctx, bst_generator_run(&s->ctx, s->generator, &s->frame, &result));
-    return result;
-}
+#include "sim/core/threshold_statistics.h"
+#include "tests/obsgen/generator_scene.h"
 
 static double above(double z) {
     return 0.5 * erfc(z / sqrt(2.0));
+}
+
+/* The share of a Gaussian's light in a pixel. */
+static double pixel_share(double from, double sigma) {
+    double s = sigma * sqrt(2.0);
+    return 0.5 * (erf((from + 0.5) / s) - erf((from - 0.5) / s));
+}
+
+/* What image processing asks of the output of its filter on these pixels, and what the photons of a
+ * source of SNR 1 add to its variance: by sums over the pixels, mean over places in the pixel. */
+static void filter_by_sums(const scene *s, double threshold, double noise_e, double *asked,
+                           double *shot) {
+    enum { PHASES = 6, REACH = 5 };
+    bst_threshold_weights weights = {{0.0}};
+    *shot = 0.0;
+    for (int phase = 0; phase < PHASES * PHASES; phase++) {
+        double p[(2 * REACH + 1) * (2 * REACH + 1)], square = 0.0, cube = 0.0;
+        double px = (phase % PHASES + 0.5) / PHASES - 0.5;
+        double py = ((double)(phase / PHASES) + 0.5) / PHASES - 0.5;
+        int n = 0;
+        for (int y = -REACH; y <= REACH; y++) {
+            for (int x = -REACH; x <= REACH; x++, n++) {
+                p[n] =
+                    pixel_share(x - px, s->frame.sigma_px) * pixel_share(y - py, s->frame.sigma_px);
+                square += p[n] * p[n];
+                cube += p[n] * p[n] * p[n];
+            }
+        }
+        for (int k = 0; k < n; k++) {
+            double value = p[k] / sqrt(square), power = value * value;
+            for (int i = 0; i < BST_THRESHOLD_POWERS; i++) {
+                power *= value;
+                weights.power[i] += power / (PHASES * PHASES);
+            }
+        }
+        /* F = noise / sqrt(square) at SNR 1 */
+        *shot += cube / (square * sqrt(square)) / noise_e / (PHASES * PHASES);
+    }
+    double gain = s->camera.gain_e_per_dn;
+    double read = s->camera.read_noise_e * s->camera.read_noise_e + gain * gain / 12.0;
+    bst_threshold_noise noise = {noise_e, noise_e * noise_e - read, gain};
+    *asked = bst_threshold_quantile(threshold, &weights, &noise);
 }
 
 static void detection_follows_the_ideal_law(void **state) {
@@ -120,17 +63,21 @@ static void detection_follows_the_ideal_law(void **state) {
             enum { FRAMES = 10 };
             fill(&s, snr);
             int found = 0, trials = 0;
-            double threshold = 0.0;
+            double threshold = 0.0, noise_e = 1.0;
             for (int f = 0; f < FRAMES; f++) {
                 bst_generator_result r = run(&s, f);
                 found += r.count;
                 trials += s.truth->count;
                 threshold = r.threshold_snr;
+                noise_e = r.noise_e;
             }
-            double pd = above(s.calibration.slope * (threshold - s.calibration.gain[0] * snr));
-            /* four standard deviations of a binomial share */
+            double asked, shot, a = s.calibration.gain[0] * snr;
+            filter_by_sums(&s, threshold, noise_e, &asked, &shot);
+            double pd = above(s.calibration.slope * (asked - a) / sqrt(1.0 + shot * a));
+            /* four standard deviations of a binomial share, and 0.01 for integrals in the place of
+             * sums over pixels */
             double sigma = sqrt(fmax(pd * (1.0 - pd), 1e-4) / trials);
-            bst_assert_close((double)found / trials, pd, 4.0 * sigma);
+            bst_assert_close((double)found / trials, pd, 4.0 * sigma + 0.01);
         }
     }
     close_scene(&s);
@@ -156,7 +103,7 @@ static void places_scatter_by_the_bound(void **state) {
         for (int i = 0; i < r.count; i++) {
             const bst_detection *d = &r.items[i].detection;
             const bst_truth_item *t = &s.truth->items[r.items[i].item];
-            double dx = d->x_px - t->x_mean_px, dy = d->y_px - t->y_mean_px;
+            double dx = d->x_px - t->x_centroid_px, dy = d->y_px - t->y_centroid_px;
             sum2 += dx * dx + dy * dy;
             cross += dx * dy;
             told += d->cov_xx + d->cov_yy;
@@ -192,8 +139,8 @@ static void the_phase_bias_is_as_stated(void **state) {
     for (int i = 0; i < r.count; i++) {
         const bst_detection *d = &r.items[i].detection;
         const bst_truth_item *t = &s.truth->items[r.items[i].item];
-        double bias = 0.03 * sin(2.0 * BST_PI * t->x_mean_px);
-        worst = fmax(worst, fabs(d->x_px - t->x_mean_px - bias));
+        double bias = 0.03 * sin(2.0 * BST_PI * t->x_centroid_px);
+        worst = fmax(worst, fabs(d->x_px - t->x_centroid_px - bias));
     }
     /* five standard deviations of places of 1e5 electrons */
     assert_true(r.count == 900 && worst < 0.014);
@@ -207,15 +154,17 @@ static void false_alarms_are_poisson_with_a_gaussian_tail(void **state) {
     s.settings.false_alarms_per_frame = 5.0;
     start(&s);
     enum { FRAMES = 4000 };
-    double n = 0.0, n2 = 0.0, energy = 0.0, x = 0.0, y2 = 0.0;
+    double n = 0.0, n2 = 0.0, energy = 0.0, x = 0.0, y2 = 0.0, least = 1e9;
     for (int f = 0; f < FRAMES; f++) {
         bst_generator_result r = run(&s, f);
         n += r.count;
         n2 += (double)r.count * r.count;
         for (int i = 0; i < r.count; i++) {
             const bst_detection *d = &r.items[i].detection;
-            assert_true(d->snr >= r.threshold_snr && r.items[i].item == -1);
-            energy += 0.5 * (d->snr * d->snr - r.threshold_snr * r.threshold_snr);
+            double asked = r.filter.threshold;
+            assert_true(d->snr >= asked && r.items[i].item == -1);
+            energy += 0.5 * (d->snr * d->snr - asked * asked);
+            least = fmin(least, d->snr - asked);
             x += d->x_px;
             y2 += (d->y_px - 0.5 * (SIDE - 1)) * (d->y_px - 0.5 * (SIDE - 1));
         }
@@ -226,6 +175,7 @@ static void false_alarms_are_poisson_with_a_gaussian_tail(void **state) {
     bst_assert_close(mean, 5.0, 4.0 * sqrt(5.0 / FRAMES));
     bst_assert_close((n2 / FRAMES - mean * mean) / mean, 1.0, 4.0 * sqrt(2.0 / FRAMES));
     bst_assert_close(energy / n, 1.0, 4.0 / sqrt(n));
+    assert_true(least < 0.001);
     bst_assert_close(x / n, 0.5 * (SIDE - 1), 4.0 * SIDE / sqrt(12.0 * n));
     bst_assert_close(y2 / n / (SIDE * (double)SIDE / 12.0), 1.0, 4.0 * sqrt(0.8 / n));
     close_scene(&s);
@@ -344,7 +294,7 @@ static void the_edge_cuts(void **state) {
     double light = electrons_of(&s, 400.0);
     bst_truth_item *item = add_source(&s, 1, 0.0, 500.0, light);
     item->x_start_px = -20.0;
-    item->x_mean_px = 0.0;
+    item->x_centroid_px = 0.0;
     item->x_end_px = 20.0;
     s.frame.streak_dx_px = 40.0;
     bst_generator_result r = run(&s, 0);
@@ -356,7 +306,7 @@ static void the_edge_cuts(void **state) {
     bst_assert_close(d->x_px, 0.0, 0.2);
     bst_assert_close(d->flux_e, light, 0.05 * light);
     item->x_start_px = -36.0;
-    item->x_mean_px = -16.0;
+    item->x_centroid_px = -16.0;
     item->x_end_px = 4.0;
     r = run(&s, 0);
     assert_int_equal(r.count, 1);
@@ -365,7 +315,7 @@ static void the_edge_cuts(void **state) {
     /* -0.5 to 4 are on the frame */
     bst_assert_close(d->x_px, 1.75, 1.0);
     item->x_start_px = -60.0;
-    item->x_mean_px = -40.0;
+    item->x_centroid_px = -40.0;
     item->x_end_px = -20.0;
     assert_int_equal(run(&s, 0).count, 0);
     s.frame.streak_dx_px = 100.0;

@@ -1,5 +1,8 @@
 /* Focal-plane geometry, radiometry, and the brightness of a sphere, against numbers by hand. */
 #include "sim/world/camera.h"
+
+#include <string.h>
+
 #include "sim/world/world.h"
 #include "tests/test_support.h"
 
@@ -127,8 +130,75 @@ static void no_light_is_infinitely_faint(void **state) {
     assert_true(v > 30 && v < 45);
 }
 
+static bst_camera open_camera(void) {
+    return (bst_camera){.aperture_m = 0.15,
+                        .pixel_scale_arcsec = NAN,
+                        .focal_length_m = NAN,
+                        .f_number = NAN,
+                        .pixel_um = NAN};
+}
+
+/* The scale is pitch over focal length (gnomonic): 13 um over 0.9 m are 2.97936 arcsec. */
+static void scale_from_focal_length_and_pitch(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    const double scale = 13e-6 / 0.9 / (BST_PI / 648000.0);
+    for (int given = 0; given < 5; given++) {
+        bst_camera c = open_camera();
+        c.pixel_um = given == 4 ? NAN : 13.0;
+        c.focal_length_m = given == 0 || given == 2 || given == 4 ? 0.9 : NAN;
+        c.f_number = given == 1 || given == 2 ? 6.0 : NAN;
+        c.pixel_scale_arcsec = given >= 3 ? scale : NAN;
+        bst_assert_ok(&ctx, bst_camera_resolve_scale(&ctx, &c));
+        /* rounding */
+        bst_assert_close(c.pixel_scale_arcsec, scale, 1e-14);
+        bst_assert_close(c.focal_length_m, 0.9, 1e-14);
+        bst_assert_close(c.f_number, 6.0, 1e-13);
+        bst_assert_close(c.pixel_um, 13.0, 1e-12);
+        bst_camera again = c; /* the resolved scenario is read again */
+        bst_assert_ok(&ctx, bst_camera_resolve_scale(&ctx, &again));
+        assert_true(again.pixel_scale_arcsec == c.pixel_scale_arcsec);
+    }
+    bst_camera c = open_camera();
+    c.pixel_scale_arcsec = 3.0;
+    bst_assert_ok(&ctx, bst_camera_resolve_scale(&ctx, &c));
+    assert_true(isnan(c.focal_length_m) && isnan(c.pixel_um) && isnan(c.f_number));
+}
+
+static void scales_that_contradict(void **state) {
+    (void)state;
+    const struct {
+        double scale, focal, ratio, pitch, optics_ratio, background_pitch;
+        const char *says[2];
+    } cases[] = {{NAN, NAN, NAN, NAN, 0, 0, {"pixel_scale_arcsec", "pixel_um and f_number"}},
+                 {NAN, 0.9, NAN, NAN, 0, 0, {"the pixel scale is missing", "focal_length_m"}},
+                 {3.0, 0.9, NAN, 13, 0, 0, {"pixel_scale_arcsec gives 3 arcsec", "pixel_um over"}},
+                 {NAN, 0.9, 5, 13, 0, 0, {"focal_length_m gives 0.9 m", "f_number times aperture"}},
+                 {NAN, NAN, 6, 13, 8, 0, {"f_number gives 6", "optics/f_number gives 8"}},
+                 {NAN, NAN, 6, 13, 0, 10, {"pixel_um gives 13", "background/pixel_um gives 10"}},
+                 {NAN, 100, NAN, 0.01, 0, 0, {"pixel scale of 2.06265e-05", "0.001 to 600"}}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        bst_ctx ctx = {0};
+        bst_camera c = open_camera();
+        c.pixel_scale_arcsec = cases[i].scale;
+        c.focal_length_m = cases[i].focal;
+        c.f_number = cases[i].ratio;
+        c.pixel_um = cases[i].pitch;
+        c.optics.f_number = cases[i].optics_ratio;
+        c.background.pixel_um = cases[i].background_pitch;
+        assert_int_equal(bst_camera_resolve_scale(&ctx, &c), BST_ERR_CONFIG);
+        for (int k = 0; k < 2; k++) {
+            if (!strstr(ctx.message, cases[i].says[k])) {
+                fail_msg("%zu: %s", i, ctx.message);
+            }
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(scale_from_focal_length_and_pitch),
+        cmocka_unit_test(scales_that_contradict),
         cmocka_unit_test(projection_is_gnomonic),
         cmocka_unit_test(unproject_inverts_project),
         cmocka_unit_test(electrons_of_a_star_and_of_the_sky),

@@ -46,6 +46,50 @@ static void keplerian_elements_give_the_orbit(void **state) {
     bst_world_free(world);
 }
 
+static bst_initial_state_config open_state(double e) {
+    return (bst_initial_state_config){.semi_major_axis_m = NAN,
+                                      .perigee_radius_m = NAN,
+                                      .eccentricity = e,
+                                      .true_anomaly_deg = NAN,
+                                      .mean_anomaly_deg = NAN};
+}
+
+/* Semi-major axis and mean anomaly against closed forms, by way of the eccentric anomaly. */
+static void axis_and_mean_anomaly(void **state) {
+    (void)state;
+    const double deg = BST_DEG_RAD;
+    bst_ctx ctx = {0};
+    for (int k = 0; k < 4; k++) {
+        const double e = (const double[]){0.0, 0.1, 0.7, 0.99}[k];
+        for (int i = -700; i <= 700; i += 50) {
+            double u = i * deg; /* the eccentric anomaly, so that Kepler's equation is explicit */
+            bst_initial_state_config s = open_state(e);
+            s.semi_major_axis_m = 2e7;
+            s.mean_anomaly_deg = (u - e * sin(u)) / deg;
+            bst_assert_ok(&ctx, bst_keplerian_resolve(&ctx, &s));
+            /* 1e-15 of rounding over 1 - e */
+            bst_assert_close(s.perigee_radius_m, 2e7 * (1.0 - e), 1e-7);
+            double off = s.true_anomaly_deg * deg - atan2(sqrt(1.0 - e * e) * sin(u), cos(u) - e);
+            bst_assert_close(remainder(off, 2.0 * BST_PI), 0.0, 1e-12);
+            /* what is resolved is accepted, and stays */
+            bst_initial_state_config again = s;
+            bst_assert_ok(&ctx, bst_keplerian_resolve(&ctx, &again));
+            assert_memory_equal(&again, &s, sizeof s);
+        }
+    }
+    bst_initial_state_config s = open_state(2.0); /* hyperbola: M = e sinh H - H */
+    s.semi_major_axis_m = -1e7;
+    s.mean_anomaly_deg = (2.0 * sinh(0.8) - 0.8) / deg;
+    bst_assert_ok(&ctx, bst_keplerian_resolve(&ctx, &s));
+    bst_assert_close(s.perigee_radius_m, 1e7, 1e-6);
+    bst_assert_close(tan(0.5 * s.true_anomaly_deg * deg), sqrt(3.0) * tanh(0.4), 1e-12);
+    s = open_state(0.2);
+    s.perigee_radius_m = 8e6;
+    bst_assert_ok(&ctx, bst_keplerian_resolve(&ctx, &s));
+    bst_assert_close(s.semi_major_axis_m, 1e7, 1e-6);
+    assert_true(s.true_anomaly_deg == 0.0 && s.mean_anomaly_deg == 0.0);
+}
+
 static void element_sets_and_other_objects_start_one_too(void **state) {
     (void)state;
     bst_world *world = test_world_with(
@@ -117,13 +161,29 @@ static void wrong_ones_are_refused(void **state) {
            "test: /world/objects/0/orbit: the initial state lies at a height of -6378.1 km, orbits "
            "end below 80 km");
     refuse(NUMERICAL "\"state\": {\"from\": \"keplerian\"}}}",
-           "test: /world/objects/0/orbit/state: keplerian elements need \"perigee_radius_m\" above "
-           "0 and a true anomaly that the orbit reaches");
+           "test: /world/objects/0/orbit/state: keplerian elements need semi_major_axis_m or "
+           "perigee_radius_m");
     refuse(NUMERICAL
            "\"state\": {\"from\": \"keplerian\", \"perigee_radius_m\": 7e6, "
            "\"eccentricity\": 2, \"true_anomaly_deg\": 150}}}",
-           "test: /world/objects/0/orbit/state: keplerian elements need \"perigee_radius_m\" above "
-           "0 and a true anomaly that the orbit reaches");
+           "test: /world/objects/0/orbit/state: true_anomaly_deg 150: the hyperbola does not reach "
+           "it");
+    refuse(NUMERICAL
+           "\"state\": {\"from\": \"keplerian\", \"perigee_radius_m\": 7e6, "
+           "\"semi_major_axis_m\": 8e6, \"eccentricity\": 0.1}}}",
+           "test: /world/objects/0/orbit/state: semi_major_axis_m and eccentricity give a perigee "
+           "of 7200000 m, but perigee_radius_m gives 7000000 m; give one of the two");
+    refuse(NUMERICAL
+           "\"state\": {\"from\": \"keplerian\", \"semi_major_axis_m\": 8e6, "
+           "\"true_anomaly_deg\": 0, \"mean_anomaly_deg\": 90}}}",
+           "test: /world/objects/0/orbit/state: true_anomaly_deg 0 is a mean anomaly of 0 degrees, "
+           "but mean_anomaly_deg gives 90; give one of the two");
+    refuse(NUMERICAL
+           "\"state\": {\"from\": \"keplerian\", \"semi_major_axis_m\": 8e6, "
+           "\"eccentricity\": 1.5}}}",
+           "test: /world/objects/0/orbit/state: semi_major_axis_m 8000000 and eccentricity 1.5: no "
+           "orbit has them; an ellipse (eccentricity below 1) has an axis above 0, a hyperbola one "
+           "below 0, a parabola needs perigee_radius_m");
     refuse(NUMERICAL KEPLERIAN ", \"forces\": {\"degree\": 4, \"order\": 5}}}",
            "test: /world/objects/0/orbit/forces/order: at most the degree, 4 (found 5)");
     refuse(NUMERICAL KEPLERIAN ", \"forces\": {\"degree\": 30, \"order\": 5}}}",
@@ -194,6 +254,7 @@ static void the_rendezvous_closes_to_200_m(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(keplerian_elements_give_the_orbit),
+        cmocka_unit_test(axis_and_mean_anomaly),
         cmocka_unit_test(element_sets_and_other_objects_start_one_too),
         cmocka_unit_test(the_cue_leaves_burns_out),
         cmocka_unit_test(wrong_ones_are_refused),

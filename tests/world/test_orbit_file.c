@@ -219,11 +219,76 @@ static void frames_may_end_a_little_before_the_run(void **state) {
                         "s)");
 }
 
+/* An observer at rest is no orbit: it stays where it is, look-back and look-ahead beyond the file's
+ * ends included. One on a turntable goes on round. */
+static void a_body_at_rest_stays(void **state) {
+    (void)state;
+    static const double times[] = {-4.9, -0.5, 0.0, 7.3, 10.0, 12.6, 14.9};
+    const double turn = 7.292115e-5, radius = 6.378e6; /* rad/s, m: a place on the equator */
+    scratch s;
+    scratch_make(&s);
+    for (int turning = 0; turning < 2; turning++) {
+        const char *path = scratch_path(&s, "rest.csv");
+        FILE *file = fopen(path, "w");
+        assert_non_null(file);
+        fputs(
+            "object,start_s,end_s,start_x_m,start_y_m,start_z_m,start_vx_mps,start_vy_mps,"
+            "start_vz_mps,end_x_m,end_y_m,end_z_m,end_vx_mps,end_vy_mps,end_vz_mps\n",
+            file);
+        for (int k = 0; k < 10; k++) {
+            fprintf(file, "EYE,%d,%d", k, k + 1);
+            for (int end = 0; end < 2; end++) {
+                double a = turning * turn * (k + end), v = turning * turn * radius;
+                fprintf(file, ",%.9f,%.9f,0,%.9f,%.9f,0", radius * cos(a), radius * sin(a),
+                        -v * sin(a), v * cos(a));
+            }
+            fputc('\n', file);
+        }
+        fclose(file);
+        char text[4000];
+        bst_ctx ctx = {0};
+        bst_world *world;
+        for (int wrong = 0; wrong < 2; wrong++) {
+            snprintf(text, sizeof text,
+                     "{\"world\": {\"star_catalogue\": \"embedded\", \"objects\": [{\"name\": "
+                     "\"GX5\", " TEST_GX5
+                     "}]}, \"observers\": [{\"name\": \"eye\", \"orbit\": {\"source\": "
+                     "\"injected\", \"states_file\": \"%s\"}, \"sensors\": [{" TEST_CAMERA
+                     ", \"cue\": {\"object\": \"GX5\"}, \"knowledge\": {\"orbit\": "
+                     "{\"position_rtn_m\": [10, %d, 0]}}}]}]}",
+                     path, wrong);
+            bst_assert_ok(&ctx, test_world_try(&ctx, TEST_EPOCH, text, &world));
+            bst_status status = bst_world_check_spans(&ctx, "test", world, 10.0);
+            assert_int_equal(status, wrong && !turning ? BST_ERR_CONFIG : BST_OK);
+            if (status != BST_OK) {
+                assert_non_null(strstr(ctx.message,
+                                       "/observers/0/sensors/0/knowledge/orbit: an "
+                                       "error along the transverse"));
+            }
+            bst_view *view;
+            bst_assert_ok(&ctx, bst_view_create(&ctx, world, &view));
+            for (size_t i = 0; i < sizeof times / sizeof *times; i++) {
+                bst_state eye;
+                double a = turning * turn * times[i];
+                bst_assert_ok(&ctx, bst_view_observer_state(&ctx, view, 0, times[i], &eye));
+                /* 5 s beyond: third derivative 2.5e-6 m/s3 (5 s)^3 / 6 and half a second of its
+                 * acceleration's lag, 2.5e-6 0.5 (5 s)^2 / 2; falling would be 120 m */
+                const bst_vec3 there = {radius * cos(a), radius * sin(a), 0.0};
+                bst_assert_close(test_distance(eye.position_m, there), 0.0, 1e-4);
+            }
+            bst_view_free(view);
+            bst_world_free(world);
+        }
+    }
+    scratch_remove(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(an_oem_observer_sees_an_injected_target),
         cmocka_unit_test(injected_states_may_be_teme),
         cmocka_unit_test(frames_may_end_a_little_before_the_run),
+        cmocka_unit_test(a_body_at_rest_stays),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -111,7 +111,9 @@ static void the_earth_hides_and_shades(void **state) {
         hidden += s.occulted;
         dark += s.sunlit_fraction == 0.0;
         dim += s.sunlit_fraction > 0.0 && s.sunlit_fraction < 1.0;
-        assert_true(isinf(s.v_mag) == (s.sunlit_fraction == 0.0));
+        /* in the umbra there is the light that the air bends into it, less and less */
+        assert_true(isinf(s.v_mag) ? s.sunlit_fraction == 0.0
+                                   : s.sunlit_fraction > 0.0 || s.v_mag > 17.0);
     }
     /* the longest umbra of a geostationary orbit lasts 67 to 69 minutes, the penumbra 2 on either
      * side (Montenbruck and Gill, section 3.4: angles of 17.4 and 0.53 degrees) */

@@ -129,10 +129,11 @@ static void stray_light_by_hand(void **state) {
 
 /* A camera that looks along -x, columns along y, from `eye`. */
 static bst_surroundings look_down(bst_vec3 eye, double y_rad) {
-    bst_surroundings a = {.eye_m = eye,
-                          .bodies = {.sun_m = {BST_AU_M, 0, 0}, .moon_m = {0, 0, 3.844e8}},
-                          .itrf_from_gcrf = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
-                          .exposure_s = 1};
+    bst_surroundings a = {
+        .eye_m = eye,
+        .bodies = {.sun_m = {BST_AU_M, 0, 0}, .moon_m = {0, 0, 3.844e8}, .pole = {0, 0, 1}},
+        .itrf_from_gcrf = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
+        .exposure_s = 1};
     a.light.sun_m = bst_vec3_sub(a.bodies.sun_m, eye);
     /* rows of the rotation: camera axes in GCRF */
     double c = cos(y_rad), s = sin(y_rad);
@@ -223,13 +224,93 @@ static void stars_set_at_the_limb(void **state) {
         bst_vec3 star =
             bst_light_catalogue_star(&around.light, bst_quat_rotate(bst_quat_conj(around.q[0]), d));
         bst_vec3 far = bst_vec3_axpy(eye, 1e12, bst_light_apparent_star(&geocentric, star));
-        bool occulted = bst_earth_occults(eye, far, &around.itrf_from_gcrf);
+        bool occulted = bst_earth_occults(eye, far, around.bodies.pole);
         hidden += occulted;
         seen += !occulted;
         /* 0.05 px of an edge that the PSF softens to 0.9 px */
         assert_true(occulted ? share > 0.48 : share < 0.52);
     }
     assert_true(hidden > 50 && seen > 50);
+}
+
+/* Shares of windows that bodies cover, against every second pixel's ray by itself. */
+static void shares_of_windows(void **state) {
+    (void)state;
+    bst_camera camera = test_camera(60);
+    static const bst_window windows[] = {
+        {0, 0, 256, 256}, {100, 0, 40, 256}, {0, 130, 256, 60}, {10, 200, 80, 40}};
+    int partial = 0;
+    for (int turn = 0; turn < 6; turn++) {
+        bst_vec3 eye = {7.2e6 + 3e6 * turn, 0, 0};
+        bst_surroundings around = look_down(eye, 0);
+        around.exposure_s = 1e-3;
+        around.bodies.moon_m = (bst_vec3){-1.6e8, 3.5e8, 1e7};
+        double to = asin(BST_EARTH_RADIUS_M / eye.x) + 0.01 * (turn - 3);
+        bst_quat tilt = bst_quat_from_rotvec((bst_vec3){0, -to, 0});
+        bst_quat roll = bst_quat_from_rotvec((bst_vec3){0, 0, 0.8 * turn});
+        for (int k = 0; k <= BST_DISC_PARTS; k++) {
+            around.q[k] = bst_quat_mul(bst_quat_mul(roll, tilt), around.q[k]);
+        }
+        bst_discs discs;
+        bst_discs_make(&camera, &around, &discs);
+        for (size_t w = 0; w < sizeof windows / sizeof *windows; w++) {
+            bst_window at = windows[w];
+            int hidden = 0, all = 0;
+            for (int y = at.y0; y < at.y0 + at.height; y += 2) {
+                for (int x = at.x0; x < at.x0 + at.width; x += 2) {
+                    bst_vec3 d = bst_quat_rotate(bst_quat_conj(around.q[0]),
+                                                 bst_camera_unproject(&camera, x, y));
+                    hidden +=
+                        bst_earth_occults(eye, bst_vec3_axpy(eye, 1e12, d), around.bodies.pole);
+                    all++;
+                }
+            }
+            partial += hidden > 0 && hidden < all;
+            /* a lattice of 33 places a side, and pixel steps of a fortieth of the least window */
+            bst_assert_close(bst_discs_share(&discs, &camera, BST_BODY_EARTH, at),
+                             hidden / (double)all, 0.06);
+        }
+    }
+    assert_true(partial >= 6);
+    /* a Moon of 31 px in the middle: its area; its window's share; elsewhere none */
+    bst_vec3 origin = {0, 0, 0};
+    bst_surroundings around = look_down(origin, 0);
+    around.bodies.moon_m = (bst_vec3){-3.844e8, 0, 0};
+    around.bodies.sun_m = (bst_vec3){0, BST_AU_M, 0};
+    bst_discs discs;
+    bst_discs_make(&camera, &around, &discs);
+    double radius = asin(BST_MOON_RADIUS_M / 3.844e8) / bst_camera_scale_rad(&camera);
+    bst_assert_close(bst_discs_share(&discs, &camera, BST_BODY_MOON, windows[0]),
+                     BST_PI * radius * radius / (256.0 * 256.0), 0.002);
+    assert_true(bst_discs_share(&discs, &camera, BST_BODY_MOON, windows[3]) == 0.0);
+    assert_true(bst_discs_share(&discs, &camera, BST_BODY_SUN, windows[0]) == 0.0);
+}
+
+/* Angle from the limb: where an independent ray just passes. */
+static void angle_from_the_limb(void **state) {
+    (void)state;
+    bst_vec3 pole = bst_vec3_from_radec(0.4, 1.3);
+    for (int i = 0; i < 200; i++) {
+        bst_vec3 eye = bst_vec3_scale(bst_vec3_from_radec(0.7 * i, 1.5 * sin(1.1 * i)),
+                                      6.45e6 * pow(6.0, (i % 20) / 19.0));
+        bst_vec3 down = bst_vec3_scale(bst_vec3_unit(eye), -1.0);
+        bst_vec3 side = bst_quat_rotate(bst_quat_from_rotvec(bst_vec3_scale(down, 0.9 * i)),
+                                        bst_vec3_unit(bst_vec3_perpendicular(down)));
+        double low = 0.0, high = BST_PI;
+        for (int k = 0; k < 50; k++) {
+            double a = 0.5 * (low + high);
+            bst_vec3 d = bst_vec3_add(bst_vec3_scale(down, cos(a)), bst_vec3_scale(side, sin(a)));
+            *(bst_earth_occults(eye, bst_vec3_axpy(eye, 1e12, d), pole) ? &low : &high) = a;
+        }
+        for (int n = -2; n <= 2; n++) {
+            double a = low + 0.005 * n;
+            bst_vec3 d = bst_vec3_add(bst_vec3_scale(down, cos(a)), bst_vec3_scale(side, sin(a)));
+            /* next to the limb that is not straight at right angles to this plane: flattening */
+            bst_assert_close(bst_earth_limb_angle(eye, pole, d), 0.005 * n, 1e-4);
+        }
+    }
+    assert_true(bst_earth_limb_angle((bst_vec3){7e6, 0, 0}, pole, (bst_vec3){1, 0, 0}) > 1.0);
+    assert_true(bst_earth_limb_angle((bst_vec3){6e6, 0, 0}, pole, (bst_vec3){1, 0, 0}) < -1.0);
 }
 
 /* Light of a whole disc, summed over pixels much smaller than it. */
@@ -433,6 +514,8 @@ static void edges_are_drawn_pixel_by_pixel(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(shares_of_windows),
+        cmocka_unit_test(angle_from_the_limb),
         cmocka_unit_test(zodiacal_light_is_the_published_table),
         cmocka_unit_test(the_ecliptic_is_where_it_is),
         cmocka_unit_test(the_moon_has_its_phases),

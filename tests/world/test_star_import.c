@@ -8,6 +8,7 @@
 
 #include "sim/world/star_import.h"
 #include "sim/world/stars.h"
+#include "sim/world/world_internal.h"
 
 #define NORMAL                                                                                    \
     "0001 00008 1| |  2.31750494|  2.23184345|  -16.3|   -9.0| 68| 73| 1.7| 1.8|1958.89|1951.94|" \
@@ -141,8 +142,14 @@ static void test_one_magnitude_only(void **state) {
 static void test_supplement_is_moved_from_its_epoch(void **state) {
     bst_star sirius = find(*state, 5949, 2777, 1, 1991.25);
     assert_at(sirius, 101.28854105, -16.71314306);
-    bst_assert_close(sirius.v_mag, -1.088 - 0.063, 1e-6); /* float */
-    assert_true(isnan(sirius.b_minus_v));
+    /* the Bright Star Catalogue's, not those of the row (Hp -1.088), in the file as well */
+    bst_assert_close(sirius.v_mag, -1.46, 1e-6); /* float */
+    bst_assert_close(sirius.b_minus_v, 0.0, 1e-6);
+    const sample *file = *state;
+    const bst_star_view *view = bst_stars_records(file->stars);
+    bst_assert_close(bst_star_record_v(&view->records[view->cells[5949].first]) / 1e5, -1.46,
+                     0.001); /* rounding of VT */
+    assert_true((view->records[view->cells[5949].first].pm_dec_flags & BST_STAR_NO_COLOUR) == 0);
     /* Published for J2000 from the new reduction of Hipparcos, 06h45m08.91728 -16d42m58.0171:
      * 20 mas apart from the old one. */
     sirius = find(*state, 5949, 2777, 1, 2000.0);

@@ -1,10 +1,10 @@
-#include "imgproc/tail.h"
+#include "sim/core/threshold_statistics.h"
 
 #include <math.h>
 
 #include "sim/core/vec.h"
 
-double bst_tail_maxima(double u, double density) {
+double bst_threshold_maxima(double u, double density) {
     return density * u * exp(-0.5 * u * u) / (2.0 * BST_PI * sqrt(2.0 * BST_PI));
 }
 
@@ -14,7 +14,7 @@ static double upper_tail(double u) {
 
 /* The integral over the density of X beyond u by the midpoint rule in the exponential variable that
  * the tail suggests. */
-double bst_tail_both(double u, double v, double rho) {
+double bst_threshold_exceeds_too(double u, double v, double rho) {
     if (rho >= 1.0 - 1e-12) {
         return upper_tail(fmax(u, v)) / upper_tail(u);
     }
@@ -35,7 +35,7 @@ static void generate(const double *cumulant, double t, double out[3]) {
     out[0] = 0.5 * t * t;
     out[1] = t;
     out[2] = 1.0;
-    for (int i = 0; i < BST_TAIL_POWERS; i++) {
+    for (int i = 0; i < BST_THRESHOLD_POWERS; i++) {
         int n = i + 3;
         double before = term;
         term *= t / (n - 1);
@@ -45,11 +45,12 @@ static void generate(const double *cumulant, double t, double out[3]) {
     }
 }
 
-double bst_tail_quantile(double u, const bst_tail_weights *weights, const bst_tail_noise *noise) {
+double bst_threshold_quantile(double u, const bst_threshold_weights *weights,
+                              const bst_threshold_noise *noise) {
     enum { PASSES = 5 };
-    double cumulant[BST_TAIL_POWERS], step = noise->step_e / noise->noise_e, k[3];
+    double cumulant[BST_THRESHOLD_POWERS], step = noise->step_e / noise->noise_e, k[3];
     double scale = noise->counted_e2 / (noise->noise_e * noise->noise_e);
-    for (int i = 0; i < BST_TAIL_POWERS; i++) {
+    for (int i = 0; i < BST_THRESHOLD_POWERS; i++) {
         scale /= noise->noise_e;
         cumulant[i] = scale * weights->power[i];
     }

@@ -1,0 +1,166 @@
+/* The filters of a frame: their answer to its images, their threshold, the noise at their output.
+ */
+#include <math.h>
+
+#include "obsgen/generator_internal.h"
+#include "sim/core/threshold_statistics.h"
+#include "sim/core/vec.h"
+
+/* Shot noise of a source through its own filter, times the noise of a pixel, over sqrt(sum p^2):
+ * the sum of k^2 p for a Gaussian at rest, and for a long line of it. */
+static const double POINT_SHOT = 4.0 / 3.0, LINE_SHOT = 1.1547005383792515;
+
+/* The straight and uniform path nearest to the true one, and the mean square of what the true one
+ * is off it, per axis; of a frame whose filter draws streaks, across it. */
+static double straighten(bst_generator *g) {
+    g->straight_path = g->whole_path;
+    if (g->smeared || g->path.count < 3) {
+        return 0.0;
+    }
+    double moment = 0.0, x = 0.0, y = 0.0, sum = 0.0;
+    int last = g->path.count - 1;
+    for (int k = 0; k <= last; k++) {
+        double u = (double)k / last - 0.5, weight = k == 0 || k == last ? 0.5 : 1.0;
+        moment += weight * u * u;
+        x += weight * u * g->path_x[k];
+        y += weight * u * g->path_y[k];
+    }
+    g->straight_path = (bst_path_px){x / moment, y / moment};
+    double length = hypot(g->star_path.dx, g->star_path.dy);
+    double c = length > 0.0 ? g->star_path.dx / length : 1.0;
+    double s = length > 0.0 ? g->star_path.dy / length : 0.0;
+    for (int k = 0; k <= last; k++) {
+        double u = (double)k / last - 0.5, weight = k == 0 || k == last ? 0.5 : 1.0;
+        double dx = g->path_x[k] - u * g->straight_path.dx;
+        double dy = g->path_y[k] - u * g->straight_path.dy, across = dy * c - dx * s;
+        sum += weight * (length > 0.0 ? across * across : 0.5 * (dx * dx + dy * dy));
+    }
+    return sum / last;
+}
+
+static double mean_width(const bst_image_width *w) {
+    return sqrt(w->across_px * w->along_px);
+}
+
+void bst_generator_set_response(bst_generator *g, const bst_generator_frame *f) {
+    bst_response response;
+    if (f->response) {
+        response = *f->response;
+    } else {
+        const bst_response_side source = {NULL, g->sigma * g->binning};
+        const bst_response_side filter = {NULL, fmax(g->onboard_sigma_px, 0.2 * g->binning)};
+        bst_response_set(&response, &source, &filter, g->binning, 0.0, 0.0);
+    }
+    g->response = bst_response_widened(&response, straighten(g));
+    g->widening = mean_width(&g->response.source) / mean_width(&response.source);
+    g->cross_sigma = mean_width(&g->response.both);
+    g->filter_sigma = mean_width(&g->response.filter);
+    /* a place is known by the image's gradient */
+    double ratio = g->response.maxima_sigma_px / g->filter_sigma;
+    g->place_ratio2 = ratio * ratio;
+    const bst_path_px rest = {0.0, 0.0}, paths[2] = {rest, g->star_path};
+    for (int k = 0; k < (g->streak > 0.0 ? 2 : 1); k++) {
+        g->filters[k] = (bst_generator_filter){
+            .efficiency = bst_response_efficiency(&g->response,
+                                                  g->smeared ? rest : g->straight_path, paths[k])};
+        g->norm_ratio[k] =
+            sqrt(bst_response_product(&g->response.filter, paths[k], paths[k]) /
+                 bst_matched_product(paths[k], paths[k], mean_width(&response.source)));
+    }
+}
+
+/* The threshold, kept by streak length. Streaks count in steps of half a pixel, as the filters do.
+ */
+static void set_threshold(bst_generator *g) {
+    struct generator_thresholds *t = &g->thresholds;
+    double sigma = g->response.maxima_sigma_px;
+    if (t->width != g->width || t->height != g->height || t->sigma != sigma) {
+        *t = (struct generator_thresholds){.width = g->width, .height = g->height, .sigma = sigma};
+    }
+    int step = (int)floor(2.0 * g->streak + 0.5);
+    step = step < GENERATOR_STEPS ? step : GENERATOR_STEPS - 1;
+    if (!(t->threshold[step] > 0.0)) {
+        t->threshold[step] =
+            bst_matched_threshold(sigma, 0.5 * step, g->settings.false_alarms_per_frame,
+                                  (double)g->width * g->height, &t->streak_share[step]);
+    }
+    g->threshold = fmax(t->threshold[step] + g->calibration.threshold_offset, 1.0);
+    g->streak_share = t->streak_share[step];
+}
+
+/* Sum over an axis of the squares of the sums across it of a filter of unit norm, drawn along a
+ * path that moves by `moved` on that axis: what offsets of its rows or columns become. */
+static double summed_up(const bst_generator *g, double moved, double square) {
+    const bst_path_px shadow = {moved, 0.0};
+    double width = g->filter_sigma;
+    /* of a Gaussian the integral across is the product's over 1 / (2 sqrt(pi) width) */
+    return bst_matched_product(shadow, shadow, width) * 2.0 * sqrt(BST_PI) * width / square;
+}
+
+/* Variance of a filter's output over that of white noise of the frame's variance, of which the
+ * offsets of columns and rows are these shares. */
+static double output_variance(const bst_generator *g, const bst_path_px *path, double columns,
+                              double rows) {
+    if (!(columns + rows > 0.0)) {
+        return 1.0;
+    }
+    double square = bst_response_product(&g->response.filter, *path, *path);
+    return g->white_share + columns * summed_up(g, path->dx, square) +
+           rows * summed_up(g, path->dy, square);
+}
+
+/* Sums of powers of the values of a filter of unit norm: a Gaussian across, even along the streak.
+ */
+static void set_weights(const bst_generator *g, double length, bst_threshold_weights *out) {
+    double s = g->filter_sigma, even = sqrt(length * length + BST_PI * s * s);
+    double top = 1.0 / sqrt(sqrt(BST_PI) * s * even), power = top * top;
+    for (int i = 0; i < BST_THRESHOLD_POWERS; i++) {
+        int n = i + 3;
+        power *= top;
+        double along = length > 0.0 ? even : sqrt(2.0 * BST_PI / n) * s;
+        out->power[i] = power * sqrt(2.0 * BST_PI / n) * s * along;
+    }
+}
+
+/* What image processing takes for counted electrons: its noise less that of reading. */
+static bst_threshold_noise noise_law(const bst_generator *g) {
+    const bst_camera *c = g->camera;
+    double gain = c->gain_e_per_dn, variance = g->noise_e * g->noise_e;
+    double normal = c->read_noise_e * c->read_noise_e + gain * gain / 12.0;
+    double counted = fmax(variance - normal, 0.0);
+    if (normal < 1.0) {
+        counted = fmax(counted, fmin(g->background_e, variance));
+    }
+    return (bst_threshold_noise){g->noise_e, counted, gain};
+}
+
+void bst_generator_set_filters(bst_generator *g) {
+    /* a Gaussian's top over its sqrt(sum p^2) */
+    g->fit_light = 1.0 / (sqrt(BST_PI) * g->cross_sigma * g->noise_e * g->noise_e);
+    set_threshold(g);
+    const bst_path_px paths[2] = {{0.0, 0.0}, g->star_path};
+    const double lengths[2] = {0.0, g->streak};
+    const bst_threshold_noise law = noise_law(g);
+    const bst_detector_config *d = &g->camera->detector;
+    double variance = g->noise_e * g->noise_e;
+    double columns = d->column_offset_rms_e * d->column_offset_rms_e / variance;
+    double rows =
+        (d->row_offset_rms_e * d->row_offset_rms_e + d->row_noise_e * d->row_noise_e) / variance;
+    g->white_share = fmax(1.0 - columns - rows, 0.05);
+    for (int k = 0; k < 2; k++) {
+        bst_generator_filter *filter = &g->filters[k];
+        bst_threshold_weights weights;
+        set_weights(g, lengths[k], &weights);
+        /* of smeared frames no maximum is looked at twice */
+        filter->threshold =
+            g->smeared ? g->threshold
+                       : fmax(bst_threshold_quantile(g->threshold, &weights, &law), g->threshold);
+        filter->variance = output_variance(g, &paths[k], columns, rows);
+        double share = lengths[k] > g->filter_sigma ? LINE_SHOT : POINT_SHOT;
+        filter->shot = share * bst_bound_norm(&g->bound, lengths[k]) / g->noise_e;
+        if (!(g->streak > 0.0)) {
+            g->filters[1] = g->filters[0];
+            break;
+        }
+    }
+}

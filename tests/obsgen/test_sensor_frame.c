@@ -1,0 +1,292 @@
+/* The generator where frames are cut, binned, smeared or noisy in rows and columns, and where the
+ * filter was made for another PSF: against numbers that the test makes itself. */
+#include "tests/obsgen/generator_scene.h"
+
+static double above(double z) {
+    return 0.5 * erfc(z / sqrt(2.0));
+}
+
+static double pixel_share(double from, double sigma) {
+    double s = sigma * sqrt(2.0);
+    return 0.5 * (erf((from + 0.5) / s) - erf((from - 0.5) / s));
+}
+
+/* Places and covariances are those of the sensor, whatever part of it is read and however binned.
+ */
+static void places_are_those_of_the_sensor(void **state) {
+    (void)state;
+    const bst_window windows[] = {{0, 0, SIDE, SIDE}, {160, 96, 512, 320}};
+    const double x = 301.3, y = 207.8;
+    double variance[2][3];
+    for (int w = 0; w < 2; w++) {
+        for (int binning = 1; binning <= 4; binning *= 2) {
+            scene s;
+            open_scene(&s);
+            s.settings.false_alarms_per_frame = 1e-6;
+            s.frame.window = windows[w];
+            s.frame.binning = binning;
+            start(&s);
+            enum { FRAMES = 250 };
+            double sum[2] = {0.0}, square[2] = {0.0}, told = 0.0;
+            for (int f = 0; f < FRAMES; f++) {
+                s.truth->count = 0;
+                add_source(&s, 1, x, y, 4e4);
+                add_source(&s, 2, 100.0, 207.8, 4e4); /* beside the second window */
+                bst_generator_result r = run(&s, f);
+                assert_int_equal(r.count, 2 - w);
+                const bst_generated *seen = &r.items[r.items[0].item == 0 ? 0 : r.count - 1];
+                const bst_detection *d = &seen->detection;
+                sum[0] += d->x_px / FRAMES;
+                sum[1] += d->y_px / FRAMES;
+                square[0] += (d->x_px - x) * (d->x_px - x) / FRAMES;
+                square[1] += (d->y_px - y) * (d->y_px - y) / FRAMES;
+                told += 0.5 * (d->cov_xx + d->cov_yy) / FRAMES;
+            }
+            /* five standard deviations of the mean */
+            bst_assert_close(sum[0], x, 5.0 * sqrt(square[0] / FRAMES));
+            bst_assert_close(sum[1], y, 5.0 * sqrt(square[1] / FRAMES));
+            /* its own covariance is the scatter: four standard deviations of a mean square */
+            bst_assert_close(0.5 * (square[0] + square[1]) / told, 1.0, 4.0 / sqrt(FRAMES));
+            variance[w][binning / 2] = told;
+            close_scene(&s);
+        }
+        /* coarse pixels tell a place of 2 px FWHM worse */
+        assert_true(variance[w][0] < variance[w][1] && variance[w][1] < variance[w][2]);
+    }
+    bst_assert_close(variance[0][1], variance[1][1], 1e-3 * variance[0][1]);
+}
+
+/* Of a source on the frame's edge half of its light is there, and half of the squares: the filter,
+ * whose norm image processing takes from what is on the frame, gives sqrt(1/2) of its SNR. */
+static void half_of_the_light_gives_its_root(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    s.calibration.crowding = s.calibration.background_share = 0.0;
+    start(&s);
+    const double snr = 7.3, electrons = electrons_of(&s, snr);
+    int found = 0, trials = 0;
+    bst_generator_result r = {0};
+    for (int f = 0; f < 60; f++) {
+        s.truth->count = 0;
+        for (int i = 0; i < 25; i++) {
+            add_source(&s, (uint32_t)i + 1, i % 2 ? -0.5 : SIDE - 0.5, 40.0 * i + 20.0, electrons);
+        }
+        r = run(&s, f);
+        found += r.count;
+        trials += 25;
+    }
+    double seen = snr * sqrt(0.5);
+    double pd = above((r.filter.threshold - seen) / sqrt(1.0 + r.filter.shot * seen));
+    /* four standard deviations; with the share itself in the place of its root 0.03 were found */
+    bst_assert_close((double)found / trials, pd, 4.0 * sqrt(pd * (1.0 - pd) / trials));
+    close_scene(&s);
+}
+
+/* SNR that the filter for a Gaussian of `filter` px gives of one of `source` px, per electron. */
+static double snr_by_sums(double source, double filter, double noise_e) {
+    enum { PHASES = 8, REACH = 9 };
+    double both = 0.0, own = 0.0;
+    for (int k = 0; k < PHASES; k++) {
+        double at = (k + 0.5) / PHASES - 0.5;
+        for (int x = -REACH; x <= REACH; x++) {
+            double q = pixel_share(x - at, filter);
+            both += pixel_share(x - at, source) * q / PHASES;
+            own += q * q / PHASES;
+        }
+    }
+    return both * both / sqrt(own * own) / noise_e;
+}
+
+/* Jitter that the onboard side does not know of costs what the filter for the narrower PSF gives of
+ * the wider image; what it is told of costs nothing beside the image's own width. */
+static void unknown_jitter_costs_what_the_filter_misses(void **state) {
+    (void)state;
+    const double psf = 2.0 / 2.3548200450309493, jitter = 1.0;
+    for (int known = 0; known < 2; known++) {
+        scene s;
+        open_scene(&s);
+        s.calibration.crowding = s.calibration.background_share = 0.0;
+        s.settings.jitter_px = known ? jitter : 0.0;
+        s.frame.sigma_px = hypot(psf, jitter);
+        start(&s);
+        int found = 0, trials = 0;
+        bst_generator_result r = {0};
+        double electrons = electrons_of(&s, 5.4);
+        for (int f = 0; f < 6; f++) {
+            fill(&s, 5.4);
+            r = run(&s, f);
+            found += r.count;
+            trials += s.truth->count;
+        }
+        double filter = known ? s.frame.sigma_px : psf;
+        double seen = electrons * snr_by_sums(s.frame.sigma_px, filter, r.noise_e);
+        double pd = above((r.filter.threshold - seen) / sqrt(1.0 + r.filter.shot * seen));
+        /* four standard deviations, and 0.01 for 1/12 px^2 in the place of the pixel; the loss is
+         * 0.16 */
+        bst_assert_close((double)found / trials, pd, 4.0 * sqrt(pd * (1.0 - pd) / trials) + 0.01);
+        bst_assert_close(r.filter.efficiency, known ? 1.0 : 0.923, 0.003);
+        close_scene(&s);
+    }
+}
+
+/* Maxima above a threshold in filtered noise of unit variance per pixel, a part of which whole
+ * columns have in common. */
+static double maxima_in_noise(double columns, double threshold, double sigma) {
+    enum { N = 256, FIELDS = 10, REACH = 4 };
+    static double field[N][N], smooth[N][N];
+    double kernel[2 * REACH + 1], square = 0.0, count = 0.0;
+    for (int k = -REACH; k <= REACH; k++) {
+        kernel[k + REACH] = pixel_share(k, sigma);
+        square += kernel[k + REACH] * kernel[k + REACH];
+    }
+    bst_rng_key key = bst_rng_make_key(5, 0, "test", "columns");
+    for (int n = 0; n < FIELDS; n++) {
+        for (int x = 0; x < N; x++) {
+            double column = sqrt(columns) * bst_rng_normal(key, (uint64_t)n, (uint64_t)x << 32);
+            for (int y = 0; y < N; y++) {
+                field[y][x] =
+                    column + sqrt(1.0 - columns) *
+                                 bst_rng_normal(key, (uint64_t)n, 1 + (uint64_t)(y * N + x));
+            }
+        }
+        for (int pass = 0; pass < 2; pass++) {
+            for (int y = 0; y < N; y++) {
+                for (int x = 0; x < N; x++) {
+                    double sum = 0.0;
+                    for (int k = -REACH; k <= REACH; k++) {
+                        int u = pass ? x : (x + k + N) % N, v = pass ? (y + k + N) % N : y;
+                        sum += kernel[k + REACH] * (pass ? smooth[v][u] : field[v][u]);
+                    }
+                    (pass ? field : smooth)[y][x] = sum / sqrt(square);
+                }
+            }
+        }
+        for (int y = 1; y + 1 < N; y++) {
+            for (int x = 1; x + 1 < N; x++) {
+                bool top = field[y][x] > threshold;
+                for (int k = 0; k < 9 && top; k++) {
+                    top = k == 4 || field[y][x] > field[y + k / 3 - 1][x + k % 3 - 1];
+                }
+                count += top;
+            }
+        }
+    }
+    return count;
+}
+
+static void offsets_of_columns_make_alarms(void **state) {
+    (void)state;
+    double counts[2], thresholds[2], share = 0.0;
+    for (int with = 0; with < 2; with++) {
+        scene s;
+        open_scene(&s);
+        s.settings.false_alarms_per_frame = 250.0;
+        s.camera.detector.column_offset_rms_e = with ? 4.0 : 0.0;
+        start(&s);
+        counts[with] = 0.0;
+        for (int f = 0; f < 8; f++) {
+            bst_generator_result r = run(&s, f);
+            counts[with] += r.count;
+            thresholds[with] = r.threshold_snr;
+            share = 16.0 / (r.noise_e * r.noise_e);
+        }
+        close_scene(&s);
+    }
+    bst_assert_close(thresholds[0], thresholds[1], 0.0); /* image processing knows nothing of it */
+    double sigma = 2.0 / 2.3548200450309493;
+    double even = maxima_in_noise(0.0, thresholds[0], sigma);
+    double uneven = maxima_in_noise(share, thresholds[0], sigma);
+    double expected = uneven / even, sigma_of = expected * sqrt(1.0 / even + 1.0 / uneven);
+    assert_true(even > 50.0 && expected > 1.3);
+    /* three standard deviations of the counts in noise, and a tenth for maxima of pixels */
+    bst_assert_close(counts[1] / counts[0], expected, 3.0 * sigma_of + 0.1 * expected);
+}
+
+/* In a frame whose stars are longer than is filtered for, an object at rest is where the top of the
+ * filter's output is, between the pixels; one beside it draws that. */
+static void smeared_frames_place_objects_between_pixels(void **state) {
+    (void)state;
+    const double distances[] = {40.0, 4.0};
+    for (int k = 0; k < 2; k++) {
+        scene s;
+        open_scene(&s);
+        start(&s);
+        enum { FRAMES = 100 };
+        double square = 0.0, mean = 0.0, light = electrons_of(&s, 100.0);
+        for (int f = 0; f < FRAMES; f++) {
+            s.truth->count = 0;
+            double at = 500.0 + 0.01 * f;
+            for (uint32_t i = 0; i < 2; i++) {
+                bst_truth_item *item =
+                    add_source(&s, i + 1, at + i * distances[k], 512.4, i ? 0.75 * light : light);
+                item->kind = BST_SOURCE_OBJECT;
+            }
+            s.frame.streak_dx_px = 200.0;
+            bst_generator_result r = run(&s, f);
+            assert_true(r.smeared);
+            int near = 0;
+            for (int i = 0; i < r.count; i++) {
+                if (r.items[i].item == 0) {
+                    mean += (r.items[i].detection.x_px - at) / FRAMES;
+                    square += pow(r.items[i].detection.y_px - 512.4, 2.0) / FRAMES;
+                }
+                near += r.items[i].item >= 0;
+            }
+            assert_int_equal(near, 2);
+        }
+        /* a place at SNR 100 is good to sqrt(2) S / 100; a whole pixel to 0.29 */
+        double s2 = s.frame.sigma_px * s.frame.sigma_px + 1.0 / 12.0;
+        assert_true(sqrt(square) < 1.5 * sqrt(2.0 * s2) / 100.0);
+        /* top of two Gaussians of 2 S^2: to first order the other one's slope over the curvature */
+        double d = distances[k], pull = 0.75 * d * exp(-d * d / (4.0 * s2));
+        bst_assert_close(mean, pull, 0.01 + 0.2 * pull);
+        close_scene(&s);
+    }
+}
+
+/* A fit as a point does not draw the bend of the camera's path: the place is less certain by it,
+ * also where the source is so long that it is reported as a streak. */
+static void what_is_fitted_as_a_point_has_the_bend(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    start(&s);
+    double variance[2][2];
+    for (int bent = 0; bent < 2; bent++) {
+        s.truth->count = 0;
+        for (uint32_t i = 0; i < 2; i++) {
+            bst_truth_item *item =
+                add_source(&s, i + 1, 300.0 + 300.0 * i, 400.0, electrons_of(&s, 200.0));
+            item->kind = i ? BST_SOURCE_OBJECT : BST_SOURCE_STAR;
+            item->x_start_px -= i ? 0.0 : 10.0;
+            item->x_end_px += i ? 0.0 : 10.0;
+            item->y_start_px -= i ? 2.5 : 0.0; /* of its own, across the stars' */
+            item->y_end_px += i ? 2.5 : 0.0;
+        }
+        s.frame.streak_dx_px = 20.0;
+        s.frame.bend_y_px = bent ? 1.0 : 0.0;
+        bst_generator_result r = run(&s, 3);
+        assert_int_equal(r.count, 2);
+        for (int i = 0; i < 2; i++) {
+            assert_true(r.items[i].detection.flags & BST_DETECTION_STREAK);
+            variance[bent][r.items[i].item] = r.items[i].detection.cov_yy;
+        }
+    }
+    /* half a bend of 1 px, and the twentieth that is left of one that is drawn */
+    bst_assert_close(variance[1][0] - variance[0][0], 0.0, 0.01);
+    assert_true(variance[1][1] - variance[0][1] > 0.1);
+    close_scene(&s);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(places_are_those_of_the_sensor),
+        cmocka_unit_test(half_of_the_light_gives_its_root),
+        cmocka_unit_test(unknown_jitter_costs_what_the_filter_misses),
+        cmocka_unit_test(offsets_of_columns_make_alarms),
+        cmocka_unit_test(smeared_frames_place_objects_between_pixels),
+        cmocka_unit_test(what_is_fitted_as_a_point_has_the_bend),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
