@@ -441,7 +441,7 @@ class Help(unittest.TestCase):
         for bad in ("1F", "-1", "1.5", "18446744073709551616", "twelve"):
             result = call("check", runs.TRACK, "--seed", bad)
             self.assertEqual((result.returncode, result.stdout), (1, ""))
-            self.assertRegex(result.stderr, "/seed: (not a seed|out of range)")
+            self.assertRegex(result.stderr, "/seed: (not a seed|not an integer|out of range)")
 
     def test_no_plugins(self):
         """A scenario that names a shared library is refused before anything of it is loaded."""
