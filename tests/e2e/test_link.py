@@ -583,6 +583,7 @@ class BadPeers(unittest.TestCase):
         with socket.create_connection(("127.0.0.1", port)) as peer:
             peer.sendall(b"\xff" + bytes(8) + b"\x7f\x03\x00NULL" + bytes(16 + 32))
             peer.sendall(bytes([4, len(ready)]) + ready)
+            peer.settimeout(10)
             part, sent = b"\x03" + (1 << 20).to_bytes(8, "big") + bytes(1 << 20), 0
             try:
                 while sent < 600:
@@ -592,6 +593,7 @@ class BadPeers(unittest.TestCase):
                 pass
         self.assertLess(sent, 400)
         peer = serve(runs.TRACK, f"tcp://127.0.0.1:{port}", "control")
+        self.assertIsNone(run.poll(), run.poll() is not None and run.communicate())
         with open(f"/proc/{run.pid}/status", encoding="ascii") as file:
             peak = int(re.search(r"VmHWM:\s+(\d+) kB", file.read()).group(1))
         ended(run)
