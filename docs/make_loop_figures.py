@@ -79,7 +79,7 @@ def frames(program, folder, sets, fainter, seeds):
         for exposure, x, y in db.execute("select exposure_id, x_px, y_px from detections"):
             seen.setdefault(exposure, []).append((x, y))
         for exposure, v, snr, x, y, x0, y0 in db.execute(
-                "select exposure_id, v_mag, snr, x_mean_px, y_mean_px, x_start_px, y_start_px "
+                "select exposure_id, v_mag, snr, x_chief_px, y_chief_px, x_start_px, y_start_px "
                 "from truth where norad = ? and in_field = 1 and mid_s > ?", (NORAD, SETTLED_S)):
             half = math.hypot(x - x0, y - y0)
             out.append((v, snr, any(math.hypot(a - x, b - y) < DETECTED_PX + half

@@ -158,14 +158,14 @@ static bool place_source(const bst_generator *g, const bst_generator_frame *f,
                          const bst_truth_item *item, generator_source *s) {
     double b = g->binning;
     if (!(item->electrons > 0.0) || (item->flags & BST_TRUTH_OCCULTED) ||
-        !isfinite(item->x_mean_px) || !isfinite(item->x_start_px) || !isfinite(item->x_end_px)) {
+        !isfinite(item->x_centroid_px) || !isfinite(item->x_start_px) || !isfinite(item->x_end_px)) {
         return false;
     }
     double x0 = f->window.x0 + 0.5 * (b - 1.0), y0 = f->window.y0 + 0.5 * (b - 1.0);
     s->path.dx = (item->x_end_px - item->x_start_px) / b;
     s->path.dy = (item->y_end_px - item->y_start_px) / b;
-    s->x = (item->x_mean_px - x0) / b;
-    s->y = (item->y_mean_px - y0) / b;
+    s->x = (item->x_centroid_px - x0) / b;
+    s->y = (item->y_centroid_px - y0) / b;
     if (!g->smeared) { /* ends that tremble are no path */
         s->path.dx += g->straight_path.dx - g->whole_path.dx;
         s->path.dy += g->straight_path.dy - g->whole_path.dy;

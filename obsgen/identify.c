@@ -81,7 +81,7 @@ static bst_status mistake(bst_ctx *ctx, const bst_identify_options *o, const bst
     const bst_truth *t = f->truth;
     for (int i = 0; i < t->count; i++) {
         const bst_truth_item *item = &t->items[i];
-        double distance = hypot(item->x_mean_px - d->x_px, item->y_mean_px - d->y_px), off;
+        double distance = hypot(item->x_centroid_px - d->x_px, item->y_centroid_px - d->y_px), off;
         if (!(distance < nearest) || !consistent(d, item->v_mag)) {
             continue;
         }

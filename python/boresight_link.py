@@ -75,8 +75,8 @@ _TABLES = {
         "observer_gcrf_mps:f8x3 boresight_x_px:f8 boresight_y_px:f8 background_e:f8 "
         "dark_e:f8",
         "kind:i4 id:u4 norad:i4 flags:u4 x_start_px:f8 y_start_px:f8 x_mid_px:f8 "
-        "y_mid_px:f8 x_end_px:f8 y_end_px:f8 x_mean_px:f8 y_mean_px:f8 ra_rad:f8 "
-        "dec_rad:f8 v_mag:f8 electrons:f8 snr:f8 range_m:f8",
+        "y_mid_px:f8 x_end_px:f8 y_end_px:f8 x_chief_px:f8 y_chief_px:f8 "
+        "x_centroid_px:f8 y_centroid_px:f8 ra_rad:f8 dec_rad:f8 v_mag:f8 electrons:f8 snr:f8 range_m:f8",
     ),
     "pointing_telemetry": (
         "first:i8 capacity:i4 count:i4 q_body_from_gcrf:f8x4 settled:i4 limited:i4",

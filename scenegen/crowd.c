@@ -26,7 +26,7 @@ typedef struct cell {
     int64_t key;
     unsigned frame;
     int u, v;
-    float squares, worst, shared, excess, border, worst_border;
+    float squares, worst, second, shared, excess, worst_excess, border, worst_border;
 } cell;
 
 struct bst_crowd {
@@ -37,7 +37,8 @@ struct bst_crowd {
     cell *cells;
     int *used; /* the frame's spots, then its cells */
     unsigned frame, mask;
-    double error; /* negative: not known yet */
+    double missing_e; /* everywhere */
+    double error;     /* negative: not known yet */
 };
 
 bst_status bst_crowd_create(bst_ctx *ctx, bst_crowd **out) {
@@ -71,8 +72,14 @@ bst_crowd_motion bst_crowd_motion_of(const bst_path_point *path, int count, bool
         }
     }
     /* a tilt about x moves the image against y, one about y along x; roll moves corners any way */
-    double roll = high[2] - low[2];
+    double roll = high[2] - low[2], way = 0.0;
+    for (int k = 0; k + 1 < count; k++) {
+        const double *p = path[k].p, *q = path[k + 1].p;
+        way += sqrt((p[0] - q[0]) * (p[0] - q[0]) + (p[1] - q[1]) * (p[1] - q[1]) +
+                    (p[2] - q[2]) * (p[2] - q[2]));
+    }
     return (bst_crowd_motion){
+        .way_px = way,
         .direction = {shift ? along[0] : along[1], shift ? along[1] : -along[0]},
         .length_px = high[0] - low[0] + roll,
         .width_px = high[1] - low[1] + roll};
@@ -80,7 +87,16 @@ bst_crowd_motion bst_crowd_motion_of(const bst_path_point *path, int count, bool
 
 void bst_crowd_begin(bst_crowd *c, const bst_crowd_motion *motion) {
     c->motion = *motion;
+    double psf = 3.0 * motion->sigma_px + 1.0;
+    c->motion.overlap = fmin(
+        1.0, (motion->way_px + psf) * psf / ((motion->length_px + psf) * (motion->width_px + psf)));
     c->count = 0;
+    c->missing_e = 0.0;
+    c->error = -1.0;
+}
+
+void bst_crowd_miss(bst_crowd *c, double electrons) {
+    c->missing_e += electrons;
     c->error = -1.0;
 }
 
@@ -183,9 +199,11 @@ static int fill_cells(bst_crowd *c, int spots) {
         }
         float lit = 1.0f / sqrtf(s->peak + dark), nodes = s->nodes * lit;
         p->squares += nodes * nodes;
+        p->second = fmaxf(p->second, fminf(p->worst, nodes));
         p->worst = fmaxf(p->worst, nodes);
         p->shared += s->shared * lit;
         p->excess += s->excess * lit;
+        p->worst_excess = fmaxf(p->worst_excess, s->excess * lit);
         p->border += s->border * quiet;
         p->worst_border = fmaxf(p->worst_border, s->border * quiet);
     }
@@ -202,17 +220,21 @@ static float box_error(const bst_crowd *c, const cell *middle) {
                                 : &c->cells[find_cell(c, key_of(middle->u + u, middle->v + v))];
             if (p->frame == c->frame) {
                 sum.squares += p->squares;
+                sum.second = fmaxf(fmaxf(sum.second, p->second), fminf(sum.worst, p->worst));
                 sum.worst = fmaxf(sum.worst, p->worst);
                 sum.shared += p->shared;
                 sum.excess += p->excess;
+                sum.worst_excess = fmaxf(sum.worst_excess, p->worst_excess);
                 sum.border += p->border;
                 sum.worst_border = fmaxf(sum.worst_border, p->worst_border);
             }
         }
     }
-    float rest = sqrtf(fmaxf(sum.squares - sum.worst * sum.worst, 0.0f));
-    return fmaxf(sum.worst + sum.excess, sum.worst_border) + sum.shared + REST * rest +
-           BORDERS * (sum.border - sum.worst_border);
+    float part = (float)c->motion.overlap;
+    float others = sqrtf(part * fmaxf(sum.squares - sum.worst * sum.worst, 0.0f));
+    float excess = sum.worst_excess + part * (sum.excess - sum.worst_excess);
+    return fmaxf(sum.worst + excess, sum.worst_border) + sum.shared +
+           REST * fmaxf(others, sum.second) + BORDERS * (sum.border - sum.worst_border);
 }
 
 /* Error where the border of the stamps in a cell meets another, as two circles do that are no
@@ -247,7 +269,8 @@ double bst_crowd_error_sigma(bst_crowd *c) {
             const cell *p = &c->cells[c->used[i]];
             worst = p->worst_border + border > worst ? fmaxf(worst, crossing_error(c, p)) : worst;
         }
-        c->error = fmaxf(worst, apart) + REST * fminf(worst, apart);
+        c->error = fmaxf(worst, apart) + REST * fminf(worst, apart) +
+                   c->missing_e / sqrt(c->motion.dark_variance_e2);
     }
     return c->error;
 }

@@ -19,6 +19,8 @@ typedef struct bst_crowd bst_crowd;
 typedef struct bst_crowd_motion {
     double direction[2];        /* unit vector */
     double length_px, width_px; /* along it and across */
+    double way_px;              /* length of the way, at most */
+    double overlap;             /* part of length times width that a star's light falls on */
     double sigma_px;            /* of the PSF */
     double dark_variance_e2;    /* noise of a dark pixel */
 } bst_crowd_motion;
@@ -45,6 +47,9 @@ void bst_crowd_free(bst_crowd *crowd);
 void bst_crowd_begin(bst_crowd *crowd, const bst_crowd_motion *motion);
 bst_status bst_crowd_add(bst_ctx *ctx, bst_crowd *crowd,
                          const bst_crowd_source *source) BST_MUST_CHECK;
+
+/* Adds light that any pixel may lack, e-: of sources too far away to be drawn. */
+void bst_crowd_miss(bst_crowd *crowd, double electrons);
 
 /* Largest error expected in any pixel, in its sigma. The work is done at the first call. */
 double bst_crowd_error_sigma(bst_crowd *crowd);

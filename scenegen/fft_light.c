@@ -8,17 +8,24 @@
 
 #include "bst_scenegen_kernels.h"
 #include "scenegen/kernels/deposit_shared.h"
+#include "scenegen/light_error.h"
 #include "scenegen/light_fft.h"
 #include "scenegen/scene_options.h"
 
-enum { SETUPS = 4, FIELD_STEP_PX = 16, WRAP_PX = 96 };
+enum { SETUPS = 4, FIELD_STEP_PX = 16, WRAP_PX = 96, DENSITY_PX = 100000 };
 
 /* Error of a widened node's image that is allowed, over its peak. */
 static const double WIDEN_ERROR = 1e-3;
 
+/* Grids: the one for the tolerance, and a finer one for frames with brighter points. */
+enum { PLAIN, FINE, QUALITIES };
+
+/* Errors of the fine grid over those of the plain one. */
+static const double FINER = 1.0 / 16.0;
+
 /* What is ready for windows of one size. */
 typedef struct setup {
-    int width, height;
+    int width, height, quality;
     long long used; /* number of the call that used it last */
     bst_light_fft *fft;
     cl_mem table; /* [2][BST_SPREAD_TABLE] */
@@ -30,8 +37,9 @@ struct bst_fft_light {
     const bst_psf *psf;
     bst_fft_light_options options;
     bst_light_band band;
-    double density[2];
-    double error;
+    double density[QUALITIES][2];
+    /* of any window, and of the whole sensor, whose grid is denser */
+    bst_light_error error[QUALITIES][2];
     double widest; /* widening of nodes that the spreading kernel takes, of the node variance */
     int margin;
     bst_parallel *pool;
@@ -127,29 +135,48 @@ static bst_status make_fields(bst_ctx *ctx, bst_fft_light *l) {
     return status;
 }
 
+/* The grid of a window of so many pixels. */
+static void choose_axes(const bst_fft_light *l, int quality, int width, int height,
+                        bst_light_axis axis[2]) {
+    /* the least distance from which wings wrap around; nearer ones are not smooth */
+    int taps = l->options.taps, pad = l->margin + (l->margin < WRAP_PX ? l->margin : WRAP_PX);
+    axis[0] = bst_light_axis_choose(&l->band, 0, taps, width + pad, l->density[quality][0]);
+    axis[1] = bst_light_axis_choose(&l->band, 1, taps, height + pad, l->density[quality][1]);
+}
+
+/* Densities and errors of a grid; widenings that it takes. */
+static bst_status prepare_quality(bst_ctx *ctx, bst_fft_light *l, int quality) {
+    double tolerance = 0.45 * l->options.tolerance * (quality == FINE ? FINER : 1.0);
+    bst_light_axis axis[2]; /* as sparse as any window's */
+    for (int a = 0; a < 2; a++) {
+        bst_spread spread = {.taps = l->options.taps};
+        bst_spread_shape shape;
+        double density = bst_light_density(&l->band, a, l->options.taps, tolerance);
+        l->density[quality][a] = density;
+        (void)bst_spread_choose(&spread, &l->band.axis[a], density);
+        axis[a] = (bst_light_axis){DENSITY_PX, (int)floor(DENSITY_PX * density), spread, 0.0};
+        double sigma = l->band.node_sigma_px * density;
+        while (bst_spread_widen(&spread, &l->band.axis[a], density, l->widest * sigma * sigma,
+                                &shape) > WIDEN_ERROR) {
+            l->widest *= 0.8;
+        }
+    }
+    BST_TRY(bst_light_error_measure(ctx, l->psf, &l->band, axis, &l->error[quality][0]));
+    choose_axes(l, quality, (int)l->camera.width_px, (int)l->camera.height_px, axis);
+    return bst_light_error_measure(ctx, l->psf, &l->band, axis, &l->error[quality][1]);
+}
+
 static bst_status prepare(bst_ctx *ctx, bst_device *device, bst_fft_light *l) {
     int threads;
     BST_TRY(choose_tiles(ctx, device, l, &threads));
     BST_TRY(bst_parallel_create(ctx, threads, &l->pool));
     BST_TRY(build(ctx, device, l));
     BST_TRY(bst_light_band_measure(ctx, l->psf, 0.1 * l->options.tolerance, &l->band));
-    for (int a = 0; a < 2; a++) {
-        l->density[a] =
-            bst_light_density(&l->band, a, l->options.taps, 0.45 * l->options.tolerance);
-    }
-    l->error = l->band.lost;
     l->widest = BST_WIDEST;
-    for (int a = 0; a < 2; a++) {
-        bst_spread spread = {.taps = l->options.taps};
-        bst_spread_shape shape;
-        l->error += bst_spread_choose(&spread, &l->band.axis[a], l->density[a]);
-        double sigma = l->band.node_sigma_px * l->density[a];
-        while (bst_spread_widen(&spread, &l->band.axis[a], l->density[a], l->widest * sigma * sigma,
-                                &shape) > WIDEN_ERROR) {
-            l->widest *= 0.8;
-        }
-    }
     l->margin = (l->band.reach_px + 15) / 16 * 16;
+    for (int q = 0; q < QUALITIES; q++) {
+        BST_TRY(prepare_quality(ctx, l, q));
+    }
     return make_fields(ctx, l);
 }
 
@@ -170,6 +197,7 @@ bst_status bst_fft_light_create(bst_ctx *ctx, bst_device *device, const bst_came
     }
     /* several simulations of one process may plan at a time */
     fftwf_make_planner_thread_safe();
+    fftw_make_planner_thread_safe();
     l->camera = *camera;
     l->psf = psf;
     l->options = o;
@@ -231,7 +259,7 @@ int bst_fft_light_margin_px(const bst_fft_light *l) {
 }
 
 void bst_fft_light_stamp(const bst_fft_light *l, bst_scene_source *source) {
-    double least = fmin(l->density[0], l->density[1]);
+    double least = fmin(l->density[PLAIN][0], l->density[PLAIN][1]);
     source->radius = (int)ceil(0.5 * l->options.taps / least) + 1;
 }
 
@@ -243,8 +271,11 @@ int bst_fft_light_spectra(const bst_fft_light *l) {
     return l->nodes / l->field_nodes;
 }
 
-double bst_fft_light_error(const bst_fft_light *l) {
-    return l->error;
+double bst_fft_light_error_sigma(const bst_fft_light *l, bool fine, bool wings, bst_window window,
+                                 double peak_e, double dark_variance_e2) {
+    bool whole = window.width == l->camera.width_px && window.height == l->camera.height_px;
+    return bst_light_error_sigma(&l->error[fine ? FINE : PLAIN][whole], wings, peak_e,
+                                 dark_variance_e2);
 }
 
 double bst_fft_light_mixing_error(const bst_fft_light *l) {
@@ -272,16 +303,17 @@ static void tabulate(const bst_fft_light *l, int a, const bst_light_axis *axis, 
     }
 }
 
-static bst_status make_setup(bst_ctx *ctx, bst_fft_light *l, bst_window window, setup *s) {
-    int taps = l->options.taps;
+static bst_status make_setup(bst_ctx *ctx, bst_fft_light *l, int quality, bst_window window,
+                             setup *s) {
     bst_light_shape shape = {.width = window.width, .height = window.height, .margin = l->margin};
-    /* the least distance from which wings wrap around; nearer ones are not smooth */
-    int pad = l->margin + (l->margin < WRAP_PX ? l->margin : WRAP_PX);
-    shape.x = bst_light_axis_choose(&l->band, 0, taps, window.width + pad, l->density[0]);
-    shape.y = bst_light_axis_choose(&l->band, 1, taps, window.height + pad, l->density[1]);
+    bst_light_axis axis[2];
+    choose_axes(l, quality, window.width, window.height, axis);
+    shape.x = axis[0];
+    shape.y = axis[1];
     BST_TRY(bst_light_fft_create(ctx, l->psf, l->band.cutoff, &shape, l->pool, &s->fft));
     s->width = window.width;
     s->height = window.height;
+    s->quality = quality;
     size_t table_bytes = 2 * BST_SPREAD_TABLE * sizeof(float);
     float *table = malloc(table_bytes);
     if (!table) {
@@ -299,12 +331,14 @@ static bst_status make_setup(bst_ctx *ctx, bst_fft_light *l, bst_window window, 
 }
 
 /* The setup for a window's size; an old one makes room for a new one. */
-static bst_status find_setup(bst_ctx *ctx, bst_fft_light *l, bst_window window, setup **out) {
+static bst_status find_setup(bst_ctx *ctx, bst_fft_light *l, int quality, bst_window window,
+                             setup **out) {
     setup *oldest = &l->setups[0];
     l->calls++;
     for (int i = 0; i < SETUPS; i++) {
         setup *s = &l->setups[i];
-        if (s->fft && s->width == window.width && s->height == window.height) {
+        if (s->fft && s->width == window.width && s->height == window.height &&
+            s->quality == quality) {
             s->used = l->calls;
             *out = s;
             return BST_OK;
@@ -312,7 +346,7 @@ static bst_status find_setup(bst_ctx *ctx, bst_fft_light *l, bst_window window, 
         oldest = s->used < oldest->used ? s : oldest;
     }
     free_setup(oldest);
-    bst_status status = make_setup(ctx, l, window, oldest);
+    bst_status status = make_setup(ctx, l, quality, window, oldest);
     if (status != BST_OK) {
         free_setup(oldest);
         return status;
@@ -367,7 +401,7 @@ bst_status bst_fft_light_render(bst_ctx *ctx, bst_fft_light *l, cl_command_queue
                                 bst_window window, const bst_fft_light_nodes *nodes,
                                 bst_fft_light_image *out) {
     setup *s;
-    BST_TRY(find_setup(ctx, l, window, &s));
+    BST_TRY(find_setup(ctx, l, nodes->fine ? FINE : PLAIN, window, &s));
     size_t bytes = bst_light_fft_floats(s->fft) * sizeof(float);
     for (int n = 0; n < l->nodes; n++) {
         BST_TRY(deposit(ctx, l, queue, window, nodes, s, n));

@@ -44,10 +44,14 @@ double bst_fft_light_widest(const bst_fft_light *light);
 /* Spectra of the PSF (bst_psf_spectra). */
 int bst_fft_light_spectra(const bst_fft_light *light);
 
-/* Bound of an image's error by grid and cut-off, over a source's peak. */
-double bst_fft_light_error(const bst_fft_light *light);
+/* Bound of an image's error by grid and cut-off, in sigma of the worst pixel, of a source with
+ * `peak_e` electrons in its brightest one (light_error.h). fine: with the finer of two grids.
+ * wings: the window has no more than them of it. */
+double bst_fft_light_error_sigma(const bst_fft_light *light, bool fine, bool wings,
+                                 bst_window window, double peak_e, double dark_variance_e2);
 
-/* The same by mixing spectra (bst_psf_mixing_error), of a source that has one of its own. */
+/* Bound of its error by mixing spectra (bst_psf_mixing_error), over the peak of a source that has
+ * one of its own. */
 double bst_fft_light_mixing_error(const bst_fft_light *light);
 
 /* The frame's sources and node table on the device, and the boxes that the nodes kernel made. */
@@ -55,6 +59,7 @@ typedef struct bst_fft_light_nodes {
     cl_mem sources, table, block_box, source_box;
     cl_mem shares; /* float [sources][BST_SPECTRA], where the PSF has several spectra */
     int source_groups;
+    bool fine; /* on the finer grid */
 } bst_fft_light_nodes;
 
 /* Expected electrons of the window's pixels: pixel (i, j) at buffer[first + j * pitch + i]. Valid

@@ -17,6 +17,9 @@ enum {
 static const double WIDE_CELL_PX = 4.0, REACH_SHARE = 3e-7, LEAST_DENSITY = 0.25,
                     MOST_DENSITY = 5.0;
 
+/* Derivatives of order 2, 4 and 6 of a Gaussian at sigma 1, over its peak. */
+static const double GAUSSIAN[3] = {1.0, 3.0, 15.0};
+
 static double modulus(const bst_psf *psf, int node, double fx, double fy) {
     double v[2];
     bst_psf_otf(psf, node, fx, fy, v);
@@ -61,11 +64,60 @@ static bst_status invert(bst_ctx *ctx, fftwf_complex *data, int n) {
     return BST_OK;
 }
 
+/* Mean of exp(2 pi i f x) over `binning` pixels in a row, about their middle. */
+static double binned(double f, int binning) {
+    double s = sin(BST_PI * f);
+    return fabs(s) < 1e-9 ? 1.0 : sin(BST_PI * binning * f) / (binning * s);
+}
+
+/* Raises the parts of all binnings, over those of none, by those of a field node: the image's
+ * derivatives are at most the sums of moduli, and its peak is at least what binned pixels about the
+ * PSF's peak have. */
+static void measure_parts(const bst_psf *psf, int node, const double peak_px[2],
+                          bst_light_band *out) {
+    enum { SIDE = LATTICE / 2 };
+    double along[BST_PIXEL_PARTS][DIRECTIONS][3];
+    double step = 2.0 * out->cutoff / SIDE, top[BST_PIXEL_PARTS] = {0.0};
+    memset(along, 0, sizeof along);
+    for (int k = 0; k < SIDE * SIDE; k++) {
+        double fx = (k % SIDE - SIDE / 2) * step, fy = (k / SIDE - SIDE / 2) * step, v[2];
+        double phase = 2.0 * BST_PI * (fx * peak_px[0] + fy * peak_px[1]);
+        bst_psf_otf(psf, node, fx, fy, v);
+        double light = v[0] * cos(phase) - v[1] * sin(phase), size = hypot(v[0], v[1]);
+        double w2[DIRECTIONS];
+        for (int d = 0; d < DIRECTIONS; d++) {
+            double angle = BST_PI * d / DIRECTIONS;
+            double w = 2.0 * BST_PI * (fx * cos(angle) + fy * sin(angle));
+            w2[d] = w * w;
+        }
+        for (int b = 0; b < BST_PIXEL_PARTS; b++) {
+            double mean = binned(fx, b + 1) * binned(fy, b + 1), m = size * fabs(mean);
+            top[b] += mean * light;
+            for (int d = 0; d < DIRECTIONS; d++) {
+                along[b][d][0] += w2[d] * m;
+                along[b][d][1] += w2[d] * w2[d] * m;
+                along[b][d][2] += w2[d] * w2[d] * w2[d] * m;
+            }
+        }
+    }
+    for (int b = 0; b < BST_PIXEL_PARTS; b++) {
+        for (int d = 0; d < DIRECTIONS; d++) {
+            for (int k = 0; k < 3; k++) {
+                double part = along[b][d][k] / along[0][d][k] * top[0] / top[b];
+                out->pixel_part[b][k] = fmax(out->pixel_part[b][k], part);
+            }
+        }
+    }
+}
+
 /* Peak, sensitivity to coarse nodes and the strength of frequencies along x and y. */
 static bst_status measure_core(bst_ctx *ctx, const bst_psf *psf, fftwf_complex *room,
                                bst_light_band *out) {
     double step = 2.0 * out->cutoff / LATTICE, area = step * step, peak = 0.0;
-    static const double gaussian[3] = {1.0, 3.0, 15.0}; /* derivatives 2, 4, 6 at sigma 1 */
+    double(*peak_px)[2] = calloc((size_t)bst_psf_nodes(psf), sizeof *peak_px);
+    if (!peak_px) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the band of a PSF");
+    }
     out->node_sigma_px = INFINITY;
     for (int a = 0; a < 2; a++) {
         out->axis[a].step = out->cutoff / BST_SPREAD_BINS;
@@ -95,19 +147,33 @@ static bst_status measure_core(bst_ctx *ctx, const bst_psf *psf, fftwf_complex *
                 }
             }
         }
-        BST_TRY(invert(ctx, room, IMAGE));
+        bst_status status = invert(ctx, room, IMAGE);
+        if (status != BST_OK) {
+            free(peak_px);
+            return status;
+        }
         double top = 0.0;
         for (int i = 0; i < IMAGE * IMAGE; i++) {
-            top = fmax(top, room[i][0]);
+            if (room[i][0] > top) {
+                int x = i % IMAGE, y = i / IMAGE;
+                top = room[i][0];
+                peak_px[n][0] = (x < IMAGE / 2 ? x : x - IMAGE) / (IMAGE * step);
+                peak_px[n][1] = (y < IMAGE / 2 ? y : y - IMAGE) / (IMAGE * step);
+            }
         }
         peak = fmax(peak, top);
         for (int d = 0; d < DIRECTIONS; d++) {
             for (int k = 0; k < 3; k++) {
-                double sigma = pow(gaussian[k] * top / along[d][k], 0.5 / (k + 1));
+                double sigma = pow(GAUSSIAN[k] * top / along[d][k], 0.5 / (k + 1));
                 out->node_sigma_px = fmin(out->node_sigma_px, sigma);
             }
         }
     }
+    memset(out->pixel_part, 0, sizeof out->pixel_part);
+    for (int n = 0; n < bst_psf_nodes(psf); n++) {
+        measure_parts(psf, n, peak_px[n], out);
+    }
+    free(peak_px);
     out->peak = peak;
     out->lost /= peak;
     for (int a = 0; a < 2; a++) {
@@ -128,6 +194,8 @@ static bst_status measure_core(bst_ctx *ctx, const bst_psf *psf, fftwf_complex *
 static bst_status measure_reach(bst_ctx *ctx, const bst_psf *psf, fftwf_complex *room,
                                 bst_light_band *out) {
     double step = 1.0 / (WIDE * WIDE_CELL_PX), area = step * step, reach = 0.0;
+    enum { RINGS = WIDE };
+    double ring[RINGS] = {0.0}; /* by whole cells of distance */
     for (int n = 0; n < bst_psf_nodes(psf); n++) {
         for (int j = -WIDE / 2; j < WIDE / 2; j++) {
             for (int i = -WIDE / 2; i < WIDE / 2; i++) {
@@ -145,13 +213,19 @@ static bst_status measure_reach(bst_ctx *ctx, const bst_psf *psf, fftwf_complex 
         for (int j = -WIDE / 2; j < WIDE / 2; j++) {
             for (int i = -WIDE / 2; i < WIDE / 2; i++) {
                 float p = room[((j + WIDE) % WIDE) * WIDE + (i + WIDE) % WIDE][0];
-                if (fabs((double)p) > REACH_SHARE) {
-                    reach = fmax(reach, WIDE_CELL_PX * hypot(i, j));
+                double share = fabs((double)p), cells = hypot(i, j);
+                if (share > REACH_SHARE) {
+                    reach = fmax(reach, WIDE_CELL_PX * cells);
                 }
+                ring[(int)cells] = fmax(ring[(int)cells], share);
             }
         }
     }
     out->reach_px = (int)fmin(fmax(ceil(reach), 16.0), 160.0);
+    out->beyond = 0.0;
+    for (int k = (int)(out->reach_px / WIDE_CELL_PX); k < RINGS; k++) {
+        out->beyond = fmax(out->beyond, ring[k]);
+    }
     return BST_OK;
 }
 

@@ -7,16 +7,23 @@
 #include "sim/core/status.h"
 #include "sim/world/psf.h"
 
+/* Binnings of pixels that are told apart, the last for all above. */
+enum { BST_PIXEL_PARTS = 8 };
+
 /* Independent of the window. */
 typedef struct bst_light_band {
-    double cutoff;         /* cycles/px that are kept */
-    double lost;           /* bound of the error of those that are not, over the PSF's peak */
-    double peak;           /* largest share of a point's light in one pixel */
-    double node_sigma_px;  /* of the Gaussian that is as sensitive to coarse nodes: its derivatives
-                              over its peak, of order 2, 4 and 6 (1, 3 and 15 over sigma to that
-                              order), are at least the PSF's anywhere */
+    double cutoff;        /* cycles/px that are kept */
+    double lost;          /* bound of the error of those that are not, over the PSF's peak */
+    double peak;          /* largest share of a point's light in one pixel */
+    double node_sigma_px; /* of the Gaussian that is as sensitive to coarse nodes: its derivatives
+                             over its peak, of order 2, 4 and 6 (1, 3 and 15 over sigma to that
+                             order), are at least the PSF's anywhere */
+    /* what pixels binned n + 1 times show of the derivatives of order 2, 4 and 6, over their peak,
+     * in parts of what those of the sensor show */
+    double pixel_part[BST_PIXEL_PARTS][3];
     double share_sigma_px; /* of the Gaussian with the same peak */
     int reach_px;          /* beyond, a pixel gets less than 3e-7 of a point's light (16 to 160) */
+    double beyond;         /* largest share of a point's light in a pixel beyond that */
     bst_spread_band axis[2];
 } bst_light_band;
 

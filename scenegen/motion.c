@@ -83,3 +83,19 @@ double bst_motion_stretch(const bst_source *source, double begin_s, double lengt
     *parts = wanted > 1.0 ? (int)ceil(wanted) : 1;
     return to;
 }
+
+double bst_nodes_peak_share(const bst_node *nodes, int count, double psf_sigma_px) {
+    double scale = 0.5 / (psf_sigma_px * psf_sigma_px), best = 0.0;
+    int stride = count / 128 + 1;
+    for (int a = 0; a < count; a += stride) {
+        double sum = 0.0;
+        for (int n = 0; n < count; n++) {
+            double dx = nodes[n].p[0] - nodes[a].p[0], dy = nodes[n].p[1] - nodes[a].p[1];
+            double q = (dx * dx + dy * dy) * scale;
+            sum += q < 20.0 ? nodes[n].weight * exp(-q) : 0.0;
+        }
+        best = fmax(best, sum);
+    }
+    double line = erf(0.5 / (psf_sigma_px * sqrt(2.0)));
+    return best * line * line;
+}

@@ -23,6 +23,14 @@ void bst_motion_to_shift(bst_path_point *point, double scale_rad, double stretch
 bst_status bst_motion_midpoints(bst_ctx *ctx, const bst_path_point *path, int count, int parts,
                                 bst_node_list *list) BST_MUST_CHECK;
 
+/* Largest share of a source's light that falls on one pixel when smeared over nodes[count], PSF
+ * centred on a pixel at best; takes at most 128 places of the path. */
+double bst_nodes_peak_share(const bst_node *nodes, int count, double psf_sigma_px);
+
+/* The largest error of a smeared image over its peak, by groups where they are, as part of that of
+ * the worst group: 1 where all have the same, less where the worst are faint for their speed. */
+double bst_nodes_error_part(const bst_node *nodes, int count, double psf_sigma_px);
+
 /* Of the way between two samples of the track, which begins at begin_s of duration_s and takes
  * length_s: the stretch that begins at the share `from` and ends at the share that is returned, 1
  * or that of the source's next knot of brightness. *parts: as many as it takes to follow its light.

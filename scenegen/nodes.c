@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "scenegen/nodes_internal.h"
 #include "sim/core/vec.h"
 
 typedef struct maker {
@@ -14,9 +15,13 @@ typedef struct maker {
     double tolerance;
     bool widen;
     bst_node_list *list;
-    double widest; /* px^2 */
-    double most;   /* spread of the next group, px^2 */
-    double limit;  /* of it */
+    double widest;     /* px^2 */
+    double wide_field; /* as in bst_node_aim */
+    double curvature;
+    double pixel_part[3];
+    double image_share; /* variance of the image per variance of the path, mean over the field */
+    double most;        /* spread of the next group, px^2 */
+    double limit;       /* of it */
 } maker;
 
 /* A group: the path from time `from` (in segment `first`) to `to`. */
@@ -45,11 +50,13 @@ typedef struct rule {
     double node[3], weight[3];
     double bend[3];  /* shift across the axis per unit of `curve` */
     double curve[3]; /* second orthogonal polynomial at the nodes */
-    double error;
+    double error;    /* all of it */
+    double missed;   /* of it, what the quadrature misses of the last moment */
+    double fixed;    /* of it, the wrong widening of images that move by less than the path */
 } rule;
 
 static bst_status push(bst_ctx *ctx, bst_node_list *list, const double p[3], double weight,
-                       double variance) {
+                       double variance, double error) {
     if (list->count == list->capacity) {
         int capacity = list->capacity ? 2 * list->capacity : 256;
         bst_node *items = realloc(list->items, (size_t)capacity * sizeof *items);
@@ -59,34 +66,8 @@ static bst_status push(bst_ctx *ctx, bst_node_list *list, const double p[3], dou
         list->items = items;
         list->capacity = capacity;
     }
-    list->items[list->count++] = (bst_node){{p[0], p[1], p[2]}, weight, variance};
+    list->items[list->count++] = (bst_node){{p[0], p[1], p[2]}, weight, variance, error};
     return BST_OK;
-}
-
-/* Direction of the largest eigenvalue of a symmetric matrix that is not negative: by squaring it
- * over and over, until one column is left. A tie gives some direction between. */
-static void main_axis(double a[3][3], double axis[3]) {
-    double p[3][3];
-    memcpy(p, a, sizeof p);
-    for (int round = 0; round < 6; round++) {
-        double q[3][3], trace = p[0][0] + p[1][1] + p[2][2], scale = 1.0 / (trace * trace);
-        for (int i = 0; i < 3; i++) {
-            for (int j = 0; j < 3; j++) {
-                q[i][j] = (p[i][0] * p[0][j] + p[i][1] * p[1][j] + p[i][2] * p[2][j]) * scale;
-            }
-        }
-        memcpy(p, q, sizeof p);
-    }
-    int most = p[1][1] > p[0][0] ? 1 : 0;
-    most = p[2][2] > p[most][most] ? 2 : most;
-    double length = 0.0;
-    for (int i = 0; i < 3; i++) {
-        axis[i] = p[i][most];
-        length += axis[i] * axis[i];
-    }
-    for (int i = 0; i < 3; i++) {
-        axis[i] /= sqrt(length);
-    }
 }
 
 /* The part of segment k inside the group, as its two ends; its duration. */
@@ -171,7 +152,7 @@ enum { MANY_SEGMENTS = 6 };
 /* Fills the axis and the moments about it. */
 static void high_moments(const maker *m, const group *g, moments *out) {
     double a[3], b[3], weight = 0.0;
-    main_axis(out->covariance, out->axis);
+    bst_nodes_main_axis(out->covariance, out->axis);
     int segments = 0;
     while (segments < MANY_SEGMENTS && reaches(m, g, g->first + segments)) {
         segments++;
@@ -264,22 +245,34 @@ static double quadrature(int n, const double e[7], rule *r) {
  * when the covariance d of tilts and roll is left out and `widening` put in its place: half the
  * covariance's contraction with the PSF's second derivatives, which are at most 1 / variance on the
  * diagonal and exp(-1) / variance off it. More than `limit` may be less than it is. */
-static double covariance_error(double d[3][3], double widening, double variance, double limit) {
+static double covariance_error(const maker *m, double d[3][3], double widening, double limit) {
     static const double place[5][2] = {{0, 0},
                                        {0.70710678118654752, 0.70710678118654752},
                                        {-0.70710678118654752, 0.70710678118654752},
                                        {-0.70710678118654752, -0.70710678118654752},
                                        {0.70710678118654752, -0.70710678118654752}};
-    double worst = 0.0;
-    for (int k = 0; k < 5 && worst <= limit * variance; k++) {
+    double worst = 0.0, per = 1.0 / m->wide_field, more = m->wide_field - 1.0;
+    for (int k = 0; k < 5 && m->pixel_part[0] * worst <= limit * m->variance; k++) {
         double x = place[k][0], y = place[k][1];
-        double xx = d[1][1] - 2.0 * y * d[1][2] + y * y * d[2][2] - widening;
-        double yy = d[0][0] - 2.0 * x * d[0][2] + x * x * d[2][2] - widening;
-        double xy = -d[0][1] + x * d[1][2] + y * d[0][2] - x * y * d[2][2];
-        double error = 0.5 * (fabs(xx) + fabs(yy)) + 0.37 * fabs(xy);
+        /* image motion by the tilts and the roll; in a corner of a wide field more along the way
+         * from the boresight, as (1 + r r^T) of the tangent plane has it */
+        double row[2][3] = {{-more * x * y * per, (1.0 + more * x * x) * per, -y},
+                            {-(1.0 + more * y * y) * per, more * x * y * per, x}};
+        double moved[3] = {-widening, 0.0, -widening}; /* xx, xy, yy */
+        for (int i = 0; i < 3; i++) {
+            double to[2] = {0.0, 0.0};
+            for (int j = 0; j < 3; j++) {
+                to[0] += d[i][j] * row[0][j];
+                to[1] += d[i][j] * row[1][j];
+            }
+            moved[0] += row[0][i] * to[0];
+            moved[1] += row[0][i] * to[1];
+            moved[2] += row[1][i] * to[1];
+        }
+        double error = 0.5 * (fabs(moved[0]) + fabs(moved[2])) + 0.37 * fabs(moved[1]);
         worst = error > worst ? error : worst;
     }
-    return worst / variance;
+    return worst / m->variance;
 }
 
 /* Squared norm of the second orthogonal polynomial of the moments along the axis that, convolved
@@ -356,7 +349,7 @@ static void try_rule(const maker *m, const moments *g, int n, bool widen, bool s
     }
     if (split) {
         double axis[3], length2 = 0.0;
-        main_axis(d, axis);
+        bst_nodes_main_axis(d, axis);
         for (int i = 0; i < 3; i++) {
             for (int j = 0; j < 3; j++) {
                 length2 += axis[i] * d[i][j] * axis[j];
@@ -386,11 +379,18 @@ static void try_rule(const maker *m, const moments *g, int n, bool widen, bool s
     error += 0.15 * wide * wide / (var * var);
     /* Groups are shorter than the PSF is wide, so that what jitter leaves over in neighbours adds
      * up; on straight paths it nearly cancels (factors measured on random paths) */
-    error *= 1.8;
+    error *= 1.8 * m->pixel_part[0];
     if (!(error <= limit)) {
         return;
     }
-    error += covariance_error(d, r->widening, var, limit - error);
+    double left_out =
+        m->pixel_part[0] * covariance_error(m, d, r->widening * m->image_share, limit - error);
+    r->fixed = r->widening > 0.0 ? left_out : 0.0;
+    error += left_out;
+    /* the mean of places is no place of the mean: by half the second derivative of what is left of
+     * the variance, at 0.607 / sigma per px */
+    double left = n == 1 ? g->along[2] + g->across : g->across;
+    error += 0.304 * m->curvature * left / sqrt(var);
     if (!(error <= limit)) {
         return;
     }
@@ -406,13 +406,24 @@ static void try_rule(const maker *m, const moments *g, int n, bool widen, bool s
     }
     static const double factor[4] = {0, 0, 8.0 / 1.08, 48.0 / 1.08}; /* 2^n n!, margin */
     double power = n == 3 ? var * var * var : var * var;
-    r->error = n == 1 ? error : error + missed / (factor[n] * power);
+    r->missed = n == 1 ? 0.0 : m->pixel_part[n - 1] * missed / (factor[n] * power);
+    r->error = error + r->missed;
+}
+
+static void raise_error(bst_node_list *list, const rule *r) {
+    for (int k = 0; k < BST_NODE_SCALES; k++) {
+        double square = exp2(k - (BST_NODE_SCALES - 2)), fourth = square * square;
+        double low = square * (square > 1.0 ? sqrt(square) : 1.0);
+        double error = r->fixed * fmax(low, 1.0) + (r->error - r->missed - r->fixed) * low +
+                       r->missed * (r->nodes == 3 ? fourth * square : fourth);
+        list->error[k] = fmax(list->error[k], error);
+    }
 }
 
 static bst_status emit(bst_ctx *ctx, const maker *m, const moments *g, const rule *r,
                        double weight) {
     bool split = r->pair[0] != 0.0 || r->pair[1] != 0.0 || r->pair[2] != 0.0;
-    m->list->error = fmax(m->list->error, r->error);
+    raise_error(m->list, r);
     for (int n = 0; n < r->nodes; n++) {
         for (int side = -1; side <= 1; side += 2) {
             double p[3];
@@ -420,8 +431,8 @@ static bst_status emit(bst_ctx *ctx, const maker *m, const moments *g, const rul
                 p[i] = g->mean[i] + r->node[n] * g->axis[i] + r->curve[n] * r->bend[i] +
                        (split ? side * r->pair[i] : 0.0);
             }
-            BST_TRY(
-                push(ctx, m->list, p, weight * r->weight[n] * (split ? 0.5 : 1.0), r->widening));
+            BST_TRY(push(ctx, m->list, p, weight * r->weight[n] * (split ? 0.5 : 1.0),
+                         r->widening * m->image_share, r->error));
             if (!split) {
                 break;
             }
@@ -467,7 +478,7 @@ static bst_status close_group(bst_ctx *ctx, maker *m, group g, int depth) {
     double spread = t.covariance[0][0] + t.covariance[1][1] + t.covariance[2][2];
     double weight = (g.to - g.from) / m->total;
     if (!(spread > 1e-12 * m->variance)) {
-        return push(ctx, m->list, t.mean, weight, 0.0);
+        return push(ctx, m->list, t.mean, weight, 0.0, 0.0);
     }
     high_moments(m, &g, &t);
     choose_rule(m, &t, m->tolerance, &best);
@@ -520,21 +531,29 @@ static double spread_of(const extent *e) {
 }
 
 bst_status bst_nodes_from_path(bst_ctx *ctx, const bst_path_point *path, int count,
-                               double psf_sigma_px, double tolerance, double widest,
-                               bst_node_list *list) {
+                               const bst_node_aim *aim, bst_node_list *list) {
+    double variance = aim->psf_sigma_px * aim->psf_sigma_px, tolerance = aim->tolerance;
+    double wide = fmax(aim->wide_field, 1.0);
     maker m = {.path = path,
                .count = count,
                .total = path[count - 1].s - path[0].s,
-               .variance = psf_sigma_px * psf_sigma_px,
+               .variance = variance,
                .tolerance = tolerance,
-               .widen = widest > 0.0,
+               .widen = aim->widest > 0.0,
                .list = list,
-               .widest = widest * psf_sigma_px * psf_sigma_px};
+               .widest = aim->widest * variance,
+               .wide_field = wide,
+               .curvature = aim->curvature,
+               /* of the boresight and four corners: all, and all along with 1 / wide^2 across */
+               .image_share = (2.0 + 3.0 / (wide * wide)) / 5.0};
     if (!(m.total > 0.0)) {
-        return push(ctx, list, path[0].p, 1.0, 0.0);
+        return push(ctx, list, path[0].p, 1.0, 0.0, 0.0);
     }
     /* three nodes on a uniform stretch of variance v miss 0.617 v^3 of the sixth moment */
-    m.limit = m.most = 0.95 * m.variance * cbrt(tolerance * 48.0 / 0.617);
+    for (int k = 0; k < 3; k++) {
+        m.pixel_part[k] = aim->pixel_part[k] > 0.0 ? aim->pixel_part[k] : 1.0;
+    }
+    m.limit = m.most = 0.95 * m.variance * cbrt(tolerance / m.pixel_part[2] * 48.0 / 0.617);
     group g = {0, path[0].s, path[0].s};
     extent e = {0};
     for (int k = 0; k + 1 < count; k++) {
@@ -575,20 +594,4 @@ bst_status bst_nodes_from_path(bst_ctx *ctx, const bst_path_point *path, int cou
         extend(&e, a, b, step);
     }
     return close_group(ctx, &m, g, 0);
-}
-
-double bst_nodes_peak_share(const bst_node *nodes, int count, double psf_sigma_px) {
-    double scale = 0.5 / (psf_sigma_px * psf_sigma_px), best = 0.0;
-    int stride = count / 128 + 1;
-    for (int a = 0; a < count; a += stride) {
-        double sum = 0.0;
-        for (int n = 0; n < count; n++) {
-            double dx = nodes[n].p[0] - nodes[a].p[0], dy = nodes[n].p[1] - nodes[a].p[1];
-            double q = (dx * dx + dy * dy) * scale;
-            sum += q < 20.0 ? nodes[n].weight * exp(-q) : 0.0;
-        }
-        best = fmax(best, sum);
-    }
-    double line = erf(0.5 / (psf_sigma_px * sqrt(2.0)));
-    return best * line * line;
 }

@@ -26,29 +26,49 @@ typedef struct bst_node {
     double p[3];
     double weight;   /* share of the exposure; all nodes together: 1 */
     double variance; /* px^2, by which the node's PSF is wider per axis */
+    double error;    /* of its group, over the peak that the group has alone */
 } bst_node;
 
-/* A growing array; zero-initialise, free `items`. To use it again, set count and error to 0. */
+/* Motions, over the path's, for which the error is estimated; see bst_nodes_error. */
+enum { BST_NODE_SCALES = 9 };
+
+/* A growing array; zero-initialise, free `items`. To use it again, bst_nodes_clear. */
 typedef struct bst_node_list {
     bst_node *items;
     int count, capacity;
-    double error; /* largest estimate over the groups, in the units of the tolerance */
+    /* largest estimate over the groups, in the units of the tolerance, for images that move by
+     * scales of the path: 2^((k - BST_NODE_SCALES + 2) / 2), so that the last but one is 1 */
+    double error[BST_NODE_SCALES];
 } bst_node_list;
 
 /* Nodes are widened by at most this many PSF variances. */
 #define BST_NODE_WIDEST 1.0
 
-/* Appends the nodes of a path of `count` >= 2 points (two points at one time: a single node), for a
- * PSF whose standard deviation is psf_sigma_px, so that the image is right to about `tolerance` of
- * the smeared image's peak. Nodes are widened by at most `widest` <= BST_NODE_WIDEST PSF variances;
- * with 0, jitter is followed by nodes.
- * Raises list->error. BST_ERR_MEMORY. */
-bst_status bst_nodes_from_path(bst_ctx *ctx, const bst_path_point *path, int count,
-                               double psf_sigma_px, double tolerance, double widest,
-                               bst_node_list *list) BST_MUST_CHECK;
+/* What nodes are made for. */
+typedef struct bst_node_aim {
+    double psf_sigma_px;
+    double tolerance;  /* of the smeared image's peak */
+    double widest;     /* nodes are widened by at most so many PSF variances, BST_NODE_WIDEST at
+                          most; 0: jitter is followed by nodes */
+    double wide_field; /* px of the path's tilts per px of image motion at the boresight: 1, or more
+                          where they are px in the sensor's corners, which a tangent plane moves
+                          further; 0 is 1 */
+    double curvature;  /* bound of the second derivative of the image's place by the path, 1/px */
+    /* what pixels show, over their peak, of the PSF's second, fourth and sixth derivatives, over
+     * those of a Gaussian of psf_sigma_px; 0 is 1 */
+    double pixel_part[3];
+} bst_node_aim;
 
-/* Largest share of a source's light that falls on one pixel when smeared over nodes[count], PSF
- * centred on a pixel at best; takes at most 128 places of the path. */
-double bst_nodes_peak_share(const bst_node *nodes, int count, double psf_sigma_px);
+/* Appends the nodes of a path of `count` >= 2 points (two points at one time: a single node), so
+ * that the image is right to about the tolerance. Raises list->error. BST_ERR_MEMORY. */
+bst_status bst_nodes_from_path(bst_ctx *ctx, const bst_path_point *path, int count,
+                               const bst_node_aim *aim, bst_node_list *list) BST_MUST_CHECK;
+
+/* Empties the list. */
+void bst_nodes_clear(bst_node_list *list);
+
+/* The error of an image that moves by `scale` of the path's motion: at least that of any group,
+ * whose parts go with the second to sixth power of it. */
+double bst_nodes_error(const double error[BST_NODE_SCALES], double scale);
 
 #endif

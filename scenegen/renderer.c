@@ -54,7 +54,8 @@ struct bst_renderer {
     bool rolled;               /* the latest request */
     bool map;                  /* the background differs from pixel to pixel */
     long long saturated_pixels, saturated_frames;
-    uint64_t most_bytes; /* of one buffer on the device */
+    uint64_t most_bytes;    /* of one buffer on the device */
+    double tolerance_sigma; /* without the part that a rolling shutter's bands take */
     bst_render_stats stats;
 };
 
@@ -115,6 +116,8 @@ static bst_status open_psf(bst_ctx *ctx, bst_device *device, bst_renderer *r,
     smear->widest = bst_fft_light_widest(r->fft_light);
     smear->node_sigma_px = bst_fft_light_band(r->fft_light)->node_sigma_px;
     smear->share_sigma_px = bst_fft_light_band(r->fft_light)->share_sigma_px;
+    memcpy(smear->pixel_part, bst_fft_light_band(r->fft_light)->pixel_part,
+           sizeof smear->pixel_part);
     return BST_OK;
 }
 
@@ -144,6 +147,7 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
         .motion = r->options.motion,
         .temporal_oversample = r->options.temporal_oversample,
         .stamp_radius_px = r->options.stamp_radius_px};
+    r->tolerance_sigma = smear.tolerance_sigma;
     bst_status status = bst_tiles_choose(ctx, device, &r->options, &r->most_bytes);
     if (status == BST_OK) {
         status = open_psf(ctx, device, r, &smear);
@@ -231,10 +235,21 @@ void bst_renderer_free(bst_renderer *r) {
     free(r);
 }
 
+/* Whether the errors of what was asked for can be predicted. */
+static bool foreseen(const bst_renderer *r) {
+    const bst_renderer_options *o = &r->options;
+    return o->temporal_oversample <= 0 && o->spatial_oversample <= 0 &&
+           !(r->fft_light && o->fft_taps == 4);
+}
+
 /* Chooses nodes and stamps of all sources: fills plan and stats. */
 static bst_status make_plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q) {
+    const bst_scene_plan_limits limits = {
+        .tolerance_sigma = foreseen(r) ? r->tolerance_sigma : INFINITY,
+        .margin_px = bst_renderer_margin_px(r),
+        .bytes = r->most_bytes};
     BST_TRY(bst_scene_plan_make(ctx, &r->plan, &r->camera, r->smear, r->crowd, r->fft_light,
-                                r->most_bytes, bst_renderer_margin_px(r), q));
+                                &limits, q));
     r->stats = (bst_render_stats){.sources = r->plan.count,
                                   .nodes = (long long)r->plan.blocks * BST_BLOCK,
                                   .single_kernel = bst_smear_single(r->smear)};
@@ -315,7 +330,8 @@ static bst_status begin_set(bst_ctx *ctx, bst_renderer *r) {
 static bst_status make_light(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
                              bst_scene_params *p, cl_mem *light) {
     bst_fft_light_nodes nodes = {r->sources,           r->table,  r->block_box.buffer,
-                                 r->source_box.buffer, r->shares, p->source_groups};
+                                 r->source_box.buffer, r->shares, p->source_groups,
+                                 r->plan.fine};
     bst_fft_light_image image;
     BST_TRY(bst_fft_light_render(ctx, r->fft_light, r->queue, q->window, &nodes, &image));
     p->light_first = image.first;
@@ -539,14 +555,12 @@ long long bst_renderer_saturated_frames(const bst_renderer *r) {
 }
 
 void bst_renderer_get_stats(const bst_renderer *r, bst_render_stats *out) {
-    const bst_renderer_options *o = &r->options;
-    bool foreseen = o->temporal_oversample <= 0 && o->spatial_oversample <= 0 &&
-                    !(r->fft_light && o->fft_taps == 4);
     *out = r->stats;
     if (!r->rolled) {
         out->predicted_sigma = bst_crowd_error_sigma(r->crowd);
     }
-    out->predicted_sigma = foreseen ? out->predicted_sigma : NAN;
+    out->predicted_sigma = foreseen(r) ? out->predicted_sigma : NAN;
+    out->tolerance_missed = out->predicted_sigma > r->options.tolerance_sigma;
 }
 
 double bst_renderer_peak_e(const bst_renderer *r, int index) {

@@ -17,7 +17,7 @@
 typedef struct bst_renderer bst_renderer;
 
 typedef struct bst_renderer_options {
-    double tolerance_sigma; /* error of each source's image in any pixel that is allowed, in sigma
+    double tolerance_sigma; /* error of the image in any pixel that is allowed, in sigma
                                of that pixel (0.05) */
     bst_rng_key pattern;    /* of the detector's fixed patterns */
     bst_star_motion motion; /* whose track the stars follow (BST_STAR_MOTION_AUTO) */
@@ -70,6 +70,8 @@ typedef struct bst_render_stats {
     double predicted_sigma; /* largest error of the image that is expected in any pixel, in its
                                sigma (crowd.h); NAN with temporal_oversample, spatial_oversample or
                                four fft_taps */
+    bool tolerance_missed;  /* that is above the tolerance: the Fourier path's grid, or as many
+                               nodes as may be, are too coarse */
     bool single_kernel;     /* the stars followed one track */
     int hits;               /* radiation hits on the sensor */
     double hits_e;          /* their charge */

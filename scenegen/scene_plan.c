@@ -49,55 +49,156 @@ static void put_in_order(bst_scene_plan *p, const bst_camera *camera, const bst_
     }
 }
 
+/* What one planning of the sources is given. */
+typedef struct planning {
+    bst_smear *smear;
+    bst_crowd *crowd;
+    const bst_fft_light *fft_light;
+    const bst_render_request *request;
+    double dark_e2;
+    double beyond;     /* light that a pixel gets of a source beyond the margin, s */
+    int blocks;        /* at most */
+    bool fine;         /* with the finer grid */
+    double grid_sigma; /* largest error by the grid */
+} planning;
+
+/* Adds a drawn source's error to those of the frame. */
+static bst_status add_error(bst_ctx *ctx, planning *m, const bst_source *source) {
+    bst_crowd_source error = *bst_smear_last_error(m->smear);
+    if (m->fft_light) { /* of its grid, on dark pixels too */
+        double peak_e = bst_smear_last_read_e(m->smear),
+               presence = bst_smear_last_presence(m->smear);
+        double grid = bst_fft_light_error_sigma(m->fft_light, m->fine, presence < 1.0,
+                                                m->request->window, peak_e, m->dark_e2);
+        m->grid_sigma = fmax(m->grid_sigma, grid);
+        /* of either sign, as those of nodes */
+        error.nodes_e += (float)(grid * sqrt((double)error.peak_e + m->dark_e2));
+        const float *colour = source->colour;
+        if (colour[0] != 0.0F || colour[1] != 0.0F || colour[2] != 0.0F) {
+            error.excess_e += (float)(presence * bst_fft_light_mixing_error(m->fft_light) * peak_e);
+        }
+    }
+    return bst_crowd_add(ctx, m->crowd, &error);
+}
+
+/* Chooses nodes and stamps of all sources. *fits: false when they need more blocks than there may
+ * be; the plan is then good for nothing. */
+static bst_status plan_sources(bst_ctx *ctx, bst_scene_plan *p, planning *m, bool *fits) {
+    const bst_render_request *q = m->request;
+    bst_crowd_motion motion = bst_smear_motion(m->smear);
+    bst_crowd_begin(m->crowd, &motion);
+    p->count = p->blocks = 0;
+    m->grid_sigma = 0.0;
+    *fits = true;
+    for (int i = 0; i < q->count && *fits; i++) {
+        bst_scene_source *s = &p->list[p->count];
+        bool visible;
+        BST_TRY(bst_smear_source(ctx, m->smear, &q->sources[i], s, &visible));
+        p->peak_e[i] = bst_smear_last_peak_e(m->smear);
+        if (m->fft_light && !q->sources[i].occulted && bst_smear_last_leaves(m->smear)) {
+            bst_crowd_miss(m->crowd, m->beyond * q->sources[i].electrons_per_s);
+        }
+        if (!visible) {
+            continue;
+        }
+        *fits = s->blocks <= m->blocks - p->blocks;
+        p->blocks += *fits ? s->blocks : 0;
+        s->first_box = i;
+        p->count++;
+        if (m->fft_light) {
+            bst_fft_light_stamp(m->fft_light, s);
+        }
+        BST_TRY(add_error(ctx, m, &q->sources[i]));
+    }
+    return BST_OK;
+}
+
+/* Plans until the predicted error is within the tolerance: each time at a smaller part of it, as
+ * far as that helps; or, where there are too many nodes, at a larger one. */
+static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m, double tolerance,
+                                    int most_blocks) {
+    enum { ROUNDS = 8, CROWD = 500 };
+    /* So many stars have some so near each other that their errors add up: at half the tolerance
+     * they need not be planned twice. */
+    static const double CROWD_AIM = 0.45;
+    /* LESS: below the part that the prediction asks for; GAIN: what a round or the next must bring,
+     * as levels of detail go by halves; GRID_SHARE: of the tolerance, beyond which the grid is
+     * worth its refinement */
+    static const double LESS = 0.97, GAIN = 0.98, MOST_STEP = 0.2, LEAST_STEP = 0.85,
+                        GRID_SHARE = 0.25, COARSER = 16.0, COARSEST = 1e9;
+    int64_t nodes = BST_SCENE_MOST_NODES / BST_BLOCK + (int64_t)m->request->count;
+    m->blocks = (int)(nodes < most_blocks ? nodes : most_blocks);
+    double aim = m->request->count > CROWD ? CROWD_AIM : 1.0, before = INFINITY;
+    bool fits, coarse = false;
+    bst_smear_restart(m->smear, aim);
+    BST_TRY(plan_sources(ctx, p, m, &fits));
+    for (; !fits && aim < COARSEST; aim *= COARSER) {
+        coarse = true;
+        bst_smear_restart(m->smear, COARSER * aim);
+        BST_TRY(plan_sources(ctx, p, m, &fits));
+    }
+    if (!fits) {
+        return bst_fail(ctx, BST_ERR_RANGE,
+                        "the sources move too far in one exposure to be drawn: %d of %d need %.0f "
+                        "million points already; expose for a shorter time, turn more slowly, or "
+                        "draw fewer stars (v_limit)",
+                        p->count, m->request->count, 1e-6 * BST_BLOCK * p->blocks);
+    }
+    for (int round = 0, idle = 0; round < ROUNDS && idle < 2 && !coarse; round++) {
+        double error = bst_crowd_error_sigma(m->crowd), last = aim;
+        if (error <= tolerance) {
+            break;
+        }
+        idle = error > GAIN * before ? idle + 1 : 0;
+        before = error;
+        if (m->fft_light && !m->fine && m->grid_sigma > GRID_SHARE * tolerance) {
+            m->fine = true;
+        } else {
+            aim *= fmin(fmax(LESS * tolerance / error, MOST_STEP), LEAST_STEP);
+        }
+        bst_smear_restart(m->smear, aim);
+        BST_TRY(plan_sources(ctx, p, m, &fits));
+        if (!fits) { /* as it was before */
+            bst_smear_restart(m->smear, last);
+            return plan_sources(ctx, p, m, &fits);
+        }
+    }
+    return BST_OK;
+}
+
 bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera *camera,
                                bst_smear *smear, bst_crowd *crowd, const bst_fft_light *fft_light,
-                               uint64_t most_bytes, double margin_px, const bst_render_request *q) {
+                               const bst_scene_plan_limits *limits, const bst_render_request *q) {
     double read = camera->read_noise_e, brightest = 0.0;
     BST_TRY(reserve(ctx, p, q->count, fft_light && bst_fft_light_spectra(fft_light) > 1));
     for (int i = 0; i < q->count; i++) {
         brightest = q->sources[i].path ? brightest : fmax(brightest, q->sources[i].electrons_per_s);
     }
     double least_e = q->background_e + (q->background ? q->background->least_e : 0.0);
-    double dark_e2 = fmax(least_e + read * read, 1e-2);
-    bst_smear_frame frame = {q->track, q->window, margin_px, dark_e2, brightest};
+    int binning = q->binning > 1 ? q->binning : 1;
+    double dark_e2 = fmax(binning * binning * least_e + read * read, 1e-2);
+    bst_smear_frame frame = {.track = q->track,
+                             .window = q->window,
+                             .margin_px = limits->margin_px,
+                             .binning = binning,
+                             .sources = q->count,
+                             .dark_variance_e2 = dark_e2,
+                             .brightest_e_per_s = brightest};
     BST_TRY(bst_smear_begin(ctx, smear, &frame));
-    bst_crowd_motion motion = bst_smear_motion(smear);
-    bst_crowd_begin(crowd, &motion);
+    planning m = {.smear = smear,
+                  .crowd = crowd,
+                  .fft_light = fft_light,
+                  .request = q,
+                  .dark_e2 = dark_e2,
+                  .beyond = fft_light ? bst_fft_light_band(fft_light)->beyond * binning * binning *
+                                            q->track->time_s[q->track->count - 1]
+                                      : 0.0};
     const uint64_t counted = (uint64_t)INT32_MAX * sizeof(float); /* by the kernels, in int */
-    uint64_t most = most_bytes < counted ? most_bytes : counted;
+    uint64_t most = limits->bytes < counted ? limits->bytes : counted;
     /* two blocks have a whole group of boxes */
     int most_blocks = (int)(most / (BST_BLOCK / 2 * BST_BOX_BYTES));
-    p->count = 0;
-    for (int i = 0, blocks = 0; i < q->count; i++) {
-        bst_scene_source *s = &p->list[p->count];
-        bool visible;
-        BST_TRY(bst_smear_source(ctx, smear, &q->sources[i], s, &visible));
-        p->peak_e[i] = bst_smear_last_peak_e(smear);
-        if (!visible) {
-            continue;
-        }
-        if (s->blocks > most_blocks - blocks) {
-            return bst_fail(ctx, BST_ERR_RANGE,
-                            "the sources move too far in one exposure to be drawn: %d of %d need "
-                            "%.0f million points already; expose for a shorter time, turn more "
-                            "slowly, or draw fewer stars (v_limit)",
-                            p->count, q->count, 1e-6 * BST_BLOCK * blocks);
-        }
-        blocks += s->blocks;
-        s->first_box = i;
-        p->count++;
-        bst_crowd_source error = *bst_smear_last_error(smear);
-        if (fft_light) { /* of its grid, on dark pixels too */
-            const float *colour = q->sources[i].colour;
-            double grid_e = bst_fft_light_error(fft_light) * p->peak_e[i];
-            error.excess_e += (float)(grid_e * sqrt(1.0 + p->peak_e[i] / dark_e2));
-            if (colour[0] != 0.0F || colour[1] != 0.0F || colour[2] != 0.0F) {
-                error.excess_e += (float)(bst_fft_light_mixing_error(fft_light) * p->peak_e[i]);
-            }
-            bst_fft_light_stamp(fft_light, s);
-        }
-        BST_TRY(bst_crowd_add(ctx, crowd, &error));
-    }
+    BST_TRY(plan_to_tolerance(ctx, p, &m, limits->tolerance_sigma, most_blocks));
+    p->fine = m.fine;
     put_in_order(p, camera, q->sources);
     return BST_OK;
 }

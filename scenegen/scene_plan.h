@@ -13,17 +13,29 @@ typedef struct bst_scene_plan {
     int count;
     int blocks;     /* of their nodes */
     int boxes;      /* of the blocks, by groups of BST_BLOCK */
+    bool fine;      /* on the finer grid of the Fourier path */
     double *peak_e; /* of all sources of the request: most expected electrons on one pixel */
     bst_scene_source *list; /* scratch */
     int capacity;
 } bst_scene_plan;
 
-/* Plans a request with a smear and a crowd, which are begun for it. fft_light: the Fourier path, or
- * NULL where stamps are drawn. most_bytes: of one buffer on the device; BST_ERR_RANGE when the
- * nodes would need more. margin_px: reach of the light of a source. */
+/* More nodes than this, beyond a block for each source, are not drawn: the sources then get fewer
+ * than the tolerance asks for. */
+enum { BST_SCENE_MOST_NODES = 1 << 24 };
+
+typedef struct bst_scene_plan_limits {
+    double tolerance_sigma; /* of the frame's predicted error; INFINITY: any will do */
+    double margin_px;       /* reach of the light of a source */
+    uint64_t bytes;         /* of one buffer on the device */
+} bst_scene_plan_limits;
+
+/* Plans a request with a smear and a crowd, which are begun for it, so that the predicted error is
+ * within the tolerance where the number of nodes and the Fourier path's grid allow it. fft_light:
+ * the Fourier path, or NULL where stamps are drawn. BST_ERR_RANGE when the coarsest nodes need more
+ * than a buffer. */
 bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *plan, const bst_camera *camera,
                                bst_smear *smear, bst_crowd *crowd, const bst_fft_light *fft_light,
-                               uint64_t most_bytes, double margin_px,
+                               const bst_scene_plan_limits *limits,
                                const bst_render_request *request) BST_MUST_CHECK;
 
 /* Frees what the plan holds. */

@@ -36,7 +36,7 @@ static const bst_config_desc stage_table[] = {
 
 static const bst_config_desc fidelity_table[] = {
     BST_REAL(fidelity_config, tolerance_sigma, "sigma", 1e-4, 1.0, "0.05",
-             "Error of each source's image in any pixel that is allowed, in that pixel's noise. "
+             "Error of the image that is allowed in any pixel, in that pixel's noise. "
              "Nodes and stamps follow from it."),
     BST_INT(fidelity_config, temporal_oversample, "", 0, 100000, "0",
             "Equal parts of the exposure whose middles stand for it, for comparison with other "
@@ -338,6 +338,9 @@ static bst_status expose(scenegen *s, struct bst_step *step, const bst_exposure 
     truth->hits_e = stats.hits_e;
     truth->error_sigma = stats.predicted_sigma;
     truth->nodes = stats.nodes;
+    if (stats.tolerance_missed && !e->dropped) {
+        bst_step_count(step, "tolerance_missed");
+    }
     truth->one_track = stats.single_kernel;
     /* while the device renders */
     const bst_truth_request items = {.field = s->field,

@@ -2,7 +2,9 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
+#include "scenegen/kernels/deposit_shared.h"
 #include "scenegen/motion.h"
 #include "scenegen/place.h"
 #include "scenegen/profile_law.h"
@@ -14,9 +16,6 @@
 #define NODE_SHARE 0.85
 #define CUT_SHARE 0.3
 #define SINGLE_SHARE 0.1
-/* Errors of nodes are greatest beside the middle, where a bright source's own noise is less: those
- * of third order where the light is this share of the peak. */
-#define FLANK 0.76
 
 enum { TABLE_FLOATS = BST_TABLE_ROWS * BST_BLOCK, MAX_TAPS = BST_PLACE_TAPS };
 
@@ -48,9 +47,22 @@ bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
     s->half_diagonal_px =
         tan(bst_camera_half_diagonal_rad(camera)) / bst_camera_scale_rad(camera) * s->stretch;
     if (!camera->geometry.general) {
-        s->half_diagonal_px = 0.5 * hypot((double)camera->width_px, (double)camera->height_px);
+        s->half_diagonal_px =
+            0.5 * hypot((double)camera->width_px + 2.0 * fabs(camera->boresight_offset_px[0]),
+                        (double)camera->height_px + 2.0 * fabs(camera->boresight_offset_px[1]));
     }
-    return BST_OK;
+    /* a tilt by t moves the image at the tangent R by (1 + R^2) t along the way from the boresight,
+     * and what is left of the second order by R (1 + R^2) t^2 */
+    double tangent = s->half_diagonal_px / s->stretch * bst_camera_scale_rad(camera);
+    s->wide_field = 1.0 + tangent * tangent;
+    s->curvature = 2.0 * tangent / s->wide_field * bst_camera_scale_rad(camera) +
+                   camera->geometry.curvature * bst_camera_scale_rad(camera) / s->stretch;
+    bst_status status = bst_motion_map_create(ctx, &s->map);
+    if (status != BST_OK) {
+        bst_smear_free(s);
+        *out = NULL;
+    }
+    return status;
 }
 
 void bst_smear_free(bst_smear *s) {
@@ -62,6 +74,7 @@ void bst_smear_free(bst_smear *s) {
         free(s->nodes.items);
         free(s->points.items);
         free(s->table);
+        bst_motion_map_free(s->map);
         free(s);
     }
 }
@@ -131,7 +144,10 @@ static double profile_error(const bst_smear *s, const bst_node_list *list) {
         table = fmax(table, 0.75 * w / (wide * wide));
     }
     if (s->options.node_sigma_px > 0.0) {
-        return table / (BST_WIDTHS * BST_WIDTHS); /* by the widths of the Fourier path */
+        /* by the widths of the Fourier path, and by the phases of its kernel, between which linear
+         * interpolation widens by up to a quarter of a step squared, a half of that on each axis */
+        double step = 1.0 / (BST_SPREAD_PHASES * s->sigma_px);
+        return table / (BST_WIDTHS * BST_WIDTHS) + 0.25 * step * step;
     }
     if (widest > s->options.law_widest) {
         return fmax(s->edge_error, s->point_error);
@@ -146,7 +162,12 @@ static bst_status append_nodes(bst_ctx *ctx, bst_smear *s, const bst_node_list *
     int blocks = (list->count + BST_BLOCK - 1) / BST_BLOCK;
     BST_TRY(bst_smear_reserve(ctx, (void **)&s->table, &s->table_capacity, s->table_blocks + blocks,
                               TABLE_FLOATS * sizeof(float)));
-    *out = (bst_smear_level){s->table_blocks, blocks, list->error + profile_error(s, list)};
+    *out = (bst_smear_level){
+        .first_block = s->table_blocks, .blocks = blocks, .profile_error = profile_error(s, list)};
+    double part = bst_nodes_error_part(list->items, list->count, s->sigma_px);
+    for (int k = 0; k < BST_NODE_SCALES; k++) {
+        out->error[k] = part * list->error[k];
+    }
     s->table_blocks += blocks;
     for (int n = 0; n < blocks * BST_BLOCK; n++) {
         float *block = s->table + (size_t)(out->first_block + n / BST_BLOCK) * TABLE_FLOATS;
@@ -169,7 +190,7 @@ static double widening(const bst_smear *s, const bst_node *node) {
  * pixels and the focal plane's axes,
  * x' - x = ((m00 - m22) x + m01 y + m02 / a - x d) / (d + m22), d = a (m20 x + m21 y). */
 static void attitude_to_table(const bst_smear *s, const bst_node *node, float *t) {
-    double a = bst_camera_scale_rad(&s->camera), tilt = a / s->stretch;
+    double a = bst_camera_scale_rad(&s->camera), tilt = a / (s->stretch * s->wide_field);
     bst_quat q = bst_quat_from_rotvec(
         (bst_vec3){node->p[0] * tilt, node->p[1] * tilt, node->p[2] / s->half_diagonal_px});
     bst_mat3 m = bst_quat_to_mat3(q);
@@ -191,43 +212,57 @@ static void shift_to_table(const bst_smear *s, const bst_node *node, float *t) {
     }
 }
 
-double bst_smear_largest_share(bst_smear *s) {
+double bst_smear_largest_share(bst_smear *s, double *read_share) {
     double least = bst_camera_shrink(&s->camera) / s->stretch;
     for (int n = 0; n < s->nodes.count && least < 1.0; n++) {
         s->nodes.items[n].p[0] *= least;
         s->nodes.items[n].p[1] *= least;
     }
-    return bst_nodes_peak_share(s->nodes.items, s->nodes.count, s->share_sigma_px);
+    double share = bst_nodes_peak_share(s->nodes.items, s->nodes.count, s->share_sigma_px);
+    *read_share = share;
+    if (s->binning > 1) {
+        double spread, own, pixel = bst_motion_pixel_share(s->share_sigma_px, s->binning, &spread);
+        double wider = bst_motion_pixel_share(spread, 1, &own);
+        *read_share = bst_nodes_peak_share(s->nodes.items, s->nodes.count, spread) * pixel / wider;
+    }
+    return share;
+}
+
+void bst_smear_nodes_box(const bst_smear *s, double low[2], double high[2]) {
+    for (int i = 0; i < 2; i++) {
+        low[i] = INFINITY;
+        high[i] = -INFINITY;
+        for (int n = 0; n < s->nodes.count; n++) {
+            low[i] = fmin(low[i], s->nodes.items[n].p[i] / s->stretch);
+            high[i] = fmax(high[i], s->nodes.items[n].p[i] / s->stretch);
+        }
+    }
 }
 
 bst_status bst_smear_path_nodes(bst_ctx *ctx, bst_smear *s, const bst_path_point *path, int count,
-                                double part, double tolerance) {
+                                double part, bool turns, double tolerance) {
     double parts = ceil(part * s->options.temporal_oversample - 1e-9);
     if (parts > 0.0) {
         return bst_motion_midpoints(ctx, path, count, (int)parts, &s->nodes);
     }
-    return bst_nodes_from_path(ctx, path, count, s->sigma_px, tolerance, s->widest, &s->nodes);
+    bst_node_aim aim = {.psf_sigma_px = s->sigma_px,
+                        .tolerance = tolerance,
+                        .widest = s->widest,
+                        .wide_field = turns ? s->wide_field : 1.0,
+                        .curvature = turns ? s->curvature : 0.0};
+    memcpy(aim.pixel_part, s->pixel_part, sizeof aim.pixel_part);
+    return bst_nodes_from_path(ctx, path, count, &aim, &s->nodes);
 }
 
 static bst_status make_level(bst_ctx *ctx, bst_smear *s, int n) {
     if (s->levels[n].blocks == 0) {
-        s->nodes.count = 0;
-        s->nodes.error = 0.0;
-        BST_TRY(bst_smear_path_nodes(ctx, s, s->path, s->path_count, 1.0, s->tolerance[n]));
+        bst_nodes_clear(&s->nodes);
+        BST_TRY(
+            bst_smear_path_nodes(ctx, s, s->path, s->path_count, 1.0, !s->single, s->tolerance[n]));
         BST_TRY(append_nodes(ctx, s, &s->nodes, s->single ? shift_to_table : attitude_to_table,
                              &s->levels[n]));
     }
     return BST_OK;
-}
-
-/* Error of a star `from_boresight_px` away that follows the boresight's track, in sigma of its
- * worst pixel: a Gaussian of amplitude A on dark noise d changes by at most 0.86 / sigma of A /
- * sqrt(A + d^2) per px of shift, and by all of its light when it lies elsewhere. */
-static double single_error(const bst_smear *s, double peak_e, double from_boresight_px) {
-    double part = s->half_diagonal_px > 0.0 ? from_boresight_px / s->half_diagonal_px : 0.0;
-    double moved = s->spread_px * part * fmax(part, 1.0) * s->stretch;
-    return fmin(0.86 * moved / s->sigma_px * peak_e / sqrt(peak_e + s->dark_variance_e2),
-                peak_e / sqrt(s->dark_variance_e2));
 }
 
 /* Lets the stars share one track where that is asked for, or good enough for the brightest. */
@@ -245,9 +280,9 @@ static void choose_motion(bst_smear *s, double brightest_e_per_s) {
         small &= hypot(s->path[k].p[0], s->path[k].p[1]) < half_turn_px;
     }
     double line = bst_reference_pixel_share(0.0, s->share_sigma_px, 0);
-    double peak_e = brightest_e_per_s * s->duration_s * line * line;
+    double peak_e = brightest_e_per_s * s->duration_s * line * line * s->binning * s->binning;
     s->single = s->options.motion == BST_STAR_MOTION_SINGLE ||
-                (small && single_error(s, peak_e, s->half_diagonal_px) <=
+                (small && bst_smear_single_error(s, peak_e, s->half_diagonal_px) <=
                               SINGLE_SHARE * s->options.tolerance_sigma);
     for (int k = 0; s->single && k < s->path_count; k++) {
         bst_motion_to_shift(&s->path[k], scale, s->stretch, roll_px);
@@ -279,12 +314,42 @@ static bool stays_beside(const bst_smear *s, double x, double y) {
     return x < -far || y < -far || x > s->window.width + far || y > s->window.height + far;
 }
 
+/* The map of how stars move, from the nodes of the coarsest level, which were made last. */
+static bst_status begin_map(bst_ctx *ctx, bst_smear *s) {
+    double tilt = s->tilt_rad / bst_camera_scale_rad(&s->camera) * s->wide_field;
+    double from = s->half_diagonal_px / s->stretch;
+    bst_motion_map_frame frame = {
+        .nodes = s->nodes.items,
+        .count = s->nodes.count,
+        .table = s->table + (size_t)s->levels[0].first_block * TABLE_FLOATS,
+        .scale_rad = bst_camera_scale_rad(&s->camera),
+        .tilt_px = s->stretch * s->wide_field,
+        .roll_px = s->half_diagonal_px,
+        .reach_px = fmin(from + tilt, 4.0 * s->far_px),
+        .sensor_px = from + 6.0 * s->sigma_px,
+        .binning = s->binning,
+        .sources = s->sources,
+        .shrink = bst_camera_shrink(&s->camera),
+        .stretch = s->stretch,
+        .sigma_px = s->share_sigma_px};
+    return bst_motion_map_begin(ctx, s->map, &frame);
+}
+
 bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *frame) {
     const bst_los_track *track = frame->track;
     s->track = *track;
     s->window = frame->window;
     s->margin_px = frame->margin_px;
     s->dark_variance_e2 = fmax(frame->dark_variance_e2, 1e-2);
+    s->binning = frame->binning > 1 ? frame->binning : 1;
+    int binned = s->binning < BST_PIXEL_PARTS ? s->binning : BST_PIXEL_PARTS;
+    if (s->options.node_sigma_px > 0.0) {
+        memcpy(s->pixel_part, s->options.pixel_part[binned - 1], sizeof s->pixel_part);
+    } else {
+        bst_smear_find_pixel_parts(s->sigma_px, s->binning, s->pixel_part);
+    }
+    s->sources = frame->sources;
+    s->aim = 1.0;
     s->duration_s = track->time_s[track->count - 1];
     s->q_reference = attitude_at(track, 0.5 * s->duration_s);
     s->table_blocks = s->path_count = 0;
@@ -315,26 +380,62 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *fr
     }
     measure_turn(s);
     choose_motion(s, frame->brightest_e_per_s);
+    for (int k = 0; k < s->path_count && !s->single; k++) {
+        s->path[k].p[0] *= s->wide_field;
+        s->path[k].p[1] *= s->wide_field;
+    }
     BST_TRY(make_level(ctx, s, 0));
-    s->star_share = bst_smear_largest_share(s);
+    if (!s->single) {
+        return begin_map(ctx, s);
+    }
+    bst_smear_nodes_box(s, s->low, s->high);
+    s->star_share = bst_smear_largest_share(s, &s->read_share);
     return BST_OK;
 }
 
-int bst_smear_choose_level(const bst_smear *s, double peak_e) {
-    double sigmas = peak_e / sqrt(FLANK * peak_e + s->dark_variance_e2);
+void bst_smear_restart(bst_smear *s, double aim) {
+    s->aim = aim;
+    s->table_blocks = s->levels[0].first_block + s->levels[0].blocks;
+    for (int n = 1; n < BST_SMEAR_LEVELS; n++) {
+        s->levels[n].blocks = 0;
+    }
+}
+
+double bst_smear_allowed(const bst_smear *s, double peak_e) {
+    return s->aim * s->options.tolerance_sigma * sqrt(FLANK * peak_e + s->dark_variance_e2) /
+           fmax(peak_e, 1e-9);
+}
+
+int bst_smear_choose_level(const bst_smear *s, double scale) {
+    double allowed = NODE_SHARE * bst_smear_allowed(s, s->last_read_e);
     int n = 0;
     if (s->options.temporal_oversample > 0) {
         return n;
     }
-    while (n + 1 < BST_SMEAR_LEVELS &&
-           (s->tolerance[n] + s->point_error) * sigmas > NODE_SHARE * s->options.tolerance_sigma) {
+    /* mostly three nodes: errors of sixth order, of motions up to the path's */
+    double power = scale * scale * scale, part = fmin(power * power, 1.0);
+    while (n + 1 < BST_SMEAR_LEVELS && part * s->tolerance[n] + s->point_error > allowed) {
         n++;
     }
     return n;
 }
 
+/* The level for a star: from the one that its tolerance promises on, the first that keeps it. */
+static bst_status star_level(bst_ctx *ctx, bst_smear *s, double scale,
+                             const bst_smear_level **out) {
+    double allowed = NODE_SHARE * bst_smear_allowed(s, s->last_read_e);
+    int n = bst_smear_choose_level(s, scale);
+    BST_TRY(make_level(ctx, s, n));
+    while (n + 1 < BST_SMEAR_LEVELS && s->options.temporal_oversample <= 0 &&
+           bst_smear_level_error(&s->levels[n], scale) > allowed) {
+        BST_TRY(make_level(ctx, s, ++n));
+    }
+    *out = &s->levels[n];
+    return BST_OK;
+}
+
 static int choose_radius(const bst_smear *s, double peak_e) {
-    double limit = CUT_SHARE * s->options.tolerance_sigma * sqrt(s->dark_variance_e2);
+    double limit = CUT_SHARE * s->aim * s->options.tolerance_sigma * sqrt(s->dark_variance_e2);
     int most = s->options.taps / 2 - 1, asked = s->options.stamp_radius_px;
     return asked > 0 ? (asked < most ? asked : most)
                      : bst_stamp_radius(&s->stamp, peak_e, limit, most);
@@ -360,7 +461,8 @@ bool bst_smear_project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, do
 bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source,
                             bst_scene_source *out, bool *visible) {
     double x, y, electrons = source->electrons_per_s * s->duration_s;
-    s->last_peak_e = 0.0;
+    s->last_peak_e = s->last_read_e = s->chord_error = 0.0;
+    s->last_leaves = true;
     bool moving = source->path || source->rate || source->shape;
     s->disc_px =
         source->shape ? tan(asin(source->shape->radius)) / bst_camera_scale_rad(&s->camera) : 0.0;
@@ -372,8 +474,20 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
     if (!*visible) {
         return BST_OK;
     }
+    double scale = 1.0;
+    double low[2] = {s->low[0], s->low[1]}, high[2] = {s->high[0], s->high[1]};
     if (!moving) {
-        s->last_peak_e = electrons * s->star_share;
+        double share = s->star_share, read_share = s->read_share;
+        if (!s->single) {
+            const bst_star_motion_cell *cell = bst_motion_map_at(s->map, x, y);
+            scale = cell->scale;
+            share = cell->share;
+            read_share = cell->read_share;
+            memcpy(low, cell->low, sizeof low);
+            memcpy(high, cell->high, sizeof high);
+        }
+        s->last_peak_e = electrons * share;
+        s->last_read_e = electrons * read_share;
         *visible = !stays_beside(s, x, y);
         if (!*visible) {
             return BST_OK;
@@ -397,32 +511,25 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_source *source
             const double *p = s->nodes.items[n].p;
             travel_px = fmax(travel_px, fabs(p[0]) + fabs(p[1]));
         }
+        bst_smear_nodes_box(s, low, high);
         BST_TRY(append_nodes(ctx, s, &s->nodes, shift_to_table, &own));
         used = &own;
     } else {
-        int n = bst_smear_choose_level(s, s->last_peak_e);
-        BST_TRY(make_level(ctx, s, n));
-        used = &s->levels[n];
+        BST_TRY(star_level(ctx, s, scale, &used));
     }
-    int radius = choose_radius(s, s->last_peak_e);
-    double lost = bst_stamp_excess(&s->stamp, radius);
-    int border = radius + 1 < MAX_TAPS / 2 ? radius + 1 : radius;
-    /* places in parts of a pixel, the way to the node in float, and some additions of light */
+    int radius = choose_radius(s, s->last_peak_e * s->binning);
+    bst_smear_drawn drawn = {.x = x,
+                             .y = y,
+                             .scale = scale,
+                             .travel_px = travel_px,
+                             .level = used,
+                             .radius = radius,
+                             .moving = moving};
+    memcpy(drawn.low, low, sizeof low);
+    memcpy(drawn.high, high, sizeof high);
+    bst_smear_set_error(s, &drawn);
+    bst_smear_bring_to_window(s, &drawn);
     double parts = s->place_parts;
-    double rounded = 0.86 / s->sigma_px * (1.0 / parts + 0x1p-24 * travel_px) + 0x1p-22;
-    double shared =
-        s->single && !moving ? single_error(s, s->last_peak_e, sqrt(x * x + y * y)) : 0.0;
-    double sigma_e = sqrt(s->last_peak_e + s->dark_variance_e2);
-    double flank = sigma_e / sqrt(FLANK * s->last_peak_e + s->dark_variance_e2);
-    s->last_error =
-        (bst_crowd_source){.x_px = (float)x,
-                           .y_px = (float)y,
-                           .peak_e = (float)s->last_peak_e,
-                           .nodes_e = (float)((flank * used->error + rounded) * s->last_peak_e),
-                           .shared_e = (float)(shared * sigma_e),
-                           .excess_e = (float)(lost * s->last_peak_e),
-                           .border_e = (float)(s->last_peak_e * s->stamp.tail[border]),
-                           .apart = moving && travel_px > s->travel_px};
     /* what the stamp leaves out is put on the stamp, so that no light is lost */
     electrons /= s->stamp.kept[radius] * s->stamp.kept[radius];
     *out = (bst_scene_source){.x_px = (float)x,
@@ -442,6 +549,18 @@ bool bst_smear_single(const bst_smear *s) {
 
 double bst_smear_last_peak_e(const bst_smear *s) {
     return s->last_peak_e;
+}
+
+double bst_smear_last_read_e(const bst_smear *s) {
+    return s->last_read_e;
+}
+
+double bst_smear_last_presence(const bst_smear *s) {
+    return s->last_presence;
+}
+
+bool bst_smear_last_leaves(const bst_smear *s) {
+    return s->last_leaves;
 }
 
 const bst_crowd_source *bst_smear_last_error(const bst_smear *s) {

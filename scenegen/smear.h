@@ -7,6 +7,7 @@
 
 #include "scenegen/crowd.h"
 #include "scenegen/kernels/scene_shared.h"
+#include "scenegen/light_grid.h"
 #include "sim/world/field.h"
 
 typedef struct bst_smear bst_smear;
@@ -30,6 +31,7 @@ typedef struct bst_smear_options {
     /* for a PSF that is no Gaussian, else 0: those that need nodes as fine, and that put as much of
      * a point's light in one pixel */
     double node_sigma_px, share_sigma_px;
+    double pixel_part[BST_PIXEL_PARTS][3]; /* of it as in bst_node_aim, by binning from 1 on */
     double widest; /* widening of nodes, PSF variances; 0: as much as nodes may be */
 } bst_smear_options;
 
@@ -42,12 +44,17 @@ typedef struct bst_smear_frame {
     const bst_los_track *track; /* needed until the frame's last source */
     bst_window window;          /* of the sensor */
     double margin_px;           /* from which a source outside the window can still light it */
-    double dark_variance_e2;    /* noise of a dark pixel: background, dark and read noise */
+    int sources;                /* how many there will be */
+    int binning;                /* of the pixels that are read, 1 or more */
+    double dark_variance_e2;    /* noise of a dark one: background, dark and read noise */
     double brightest_e_per_s;   /* of the stars */
 } bst_smear_frame;
 
 bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *smear,
                            const bst_smear_frame *frame) BST_MUST_CHECK;
+
+/* Starts again with the sources, aiming at `aim` (0 to 1) of the tolerance. */
+void bst_smear_restart(bst_smear *smear, double aim);
 
 /* The frame's stars follow one track as a shift. */
 bool bst_smear_single(const bst_smear *smear);
@@ -58,8 +65,14 @@ bool bst_smear_single(const bst_smear *smear);
 bst_status bst_smear_source(bst_ctx *ctx, bst_smear *smear, const bst_source *source,
                             bst_scene_source *out, bool *visible) BST_MUST_CHECK;
 
-/* Largest expected electrons in one pixel of the source given last. */
+/* Largest expected electrons in one pixel of the source given last; and in one that is read, if the
+ * window holds it. */
 double bst_smear_last_peak_e(const bst_smear *smear);
+double bst_smear_last_read_e(const bst_smear *smear);
+/* What is left of that source's errors at the window: 1 unless it stays beside it. */
+double bst_smear_last_presence(const bst_smear *smear);
+/* Whether that source may be further from the window, at times, than margin_px. */
+bool bst_smear_last_leaves(const bst_smear *smear);
 
 /* Predicted error of the image of the source given last: in its worst pixel at most tolerance_sigma
  * of that pixel's sigma, unless the brightest level of detail does not reach it or a knob other

@@ -9,10 +9,18 @@ static double far_px(const bst_smear *s) {
     return s->far_px + s->disc_px;
 }
 
-/* How many chords the curved motion over the image wants: of a parabola they miss
- * (its bend) / chords^2. Seen at 17 instants; those that are off the sensor do not count, but a
- * chord must not step over it. */
-static double chords_of(const bst_smear *s, const bst_source *source) {
+/* Largest distance of a path from its chords, px; as small as rounding of places allows. */
+#define CHORD_PX 2e-3
+#define LEAST_CHORD_PX 1e-6
+/* Share of the tolerance for chords. A parabola lies beside its chord by two thirds of the largest
+ * distance in the mean, and a Gaussian changes by 0.607 / sigma of its peak per px. */
+#define CHORD_SHARE 0.05
+#define CHORD_ERROR (0.607 * 2.0 / 3.0)
+
+/* How many chords the curved motion over the image wants so that none is off by more than miss_px:
+ * of a parabola they miss (its bend) / chords^2. Seen at 17 instants; those that are off the sensor
+ * do not count, but a chord must not step over it. */
+static double chords_of(const bst_smear *s, const bst_source *source, double miss_px) {
     enum { N = 16 };
     double x[N + 1], y[N + 1], far = far_px(s), chords = 0.0;
     bool front[N + 1];
@@ -30,7 +38,7 @@ static double chords_of(const bst_smear *s, const bst_source *source) {
         chords = fmax(chords, near ? N * step / far : 0.0);
         if (near && k > 0 && front[k - 1]) {
             double bend = hypot(x[k - 1] - 2.0 * x[k] + x[k + 1], y[k - 1] - 2.0 * y[k] + y[k + 1]);
-            chords = fmax(chords, N * sqrt(0.125 * bend * s->stretch / 0.002));
+            chords = fmax(chords, N * sqrt(0.125 * bend * s->stretch / miss_px));
         }
     }
     return fmin(chords, 1e4);
@@ -47,10 +55,10 @@ static bool passes_by(const bst_smear *s, const bst_path_point *a, const bst_pat
 
 /* A moving source's path over the image, relative to (x0, y0); NAN where the source is not in front
  * of the camera. */
-static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_source *source, double x0,
-                           double y0, int *count) {
+static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_source *source, double miss_px,
+                           double x0, double y0, int *count) {
     const bst_los_track *track = &s->track;
-    int chords = (int)chords_of(s, source) / (track->count - 1) + 1;
+    int chords = (int)chords_of(s, source, miss_px) / (track->count - 1) + 1;
     const bst_quat *turn = s->turn;
     *count = 0;
     for (int k = 0; k + 1 < track->count; turn += s->parts[k++]) {
@@ -88,8 +96,7 @@ static bst_status own_nodes(bst_ctx *ctx, bst_smear *s, int count, double x0, do
                             double tolerance) {
     const bst_path_point *p = s->own_path;
     double far = far_px(s), total = p[count - 1].s - p[0].s;
-    s->nodes.count = 0;
-    s->nodes.error = 0.0;
+    bst_nodes_clear(&s->nodes);
     for (int first = 0, last; first + 1 < count; first = last > first ? last : first + 1) {
         last = first;
         while (last + 1 < count && !isnan(p[last].p[0]) && !isnan(p[last + 1].p[0]) &&
@@ -99,7 +106,8 @@ static bst_status own_nodes(bst_ctx *ctx, bst_smear *s, int count, double x0, do
         if (last > first) {
             int n = s->nodes.count;
             double part = total > 0.0 ? (p[last].s - p[first].s) / total : 1.0;
-            BST_TRY(bst_smear_path_nodes(ctx, s, p + first, last - first + 1, part, tolerance));
+            BST_TRY(
+                bst_smear_path_nodes(ctx, s, p + first, last - first + 1, part, false, tolerance));
             for (; n < s->nodes.count && part < 1.0; n++) {
                 s->nodes.items[n].weight *= part;
             }
@@ -148,19 +156,27 @@ static bst_status shape_points(bst_ctx *ctx, bst_smear *s, const bst_source *sou
 bst_status bst_smear_moving_nodes(bst_ctx *ctx, bst_smear *s, const bst_source *source,
                                   double electrons, double x, double y) {
     int count;
-    BST_TRY(own_path(ctx, s, source, x, y, &count));
+    BST_TRY(own_path(ctx, s, source, CHORD_PX, x, y, &count));
     BST_TRY(own_nodes(ctx, s, count, x, y, s->tolerance[0]));
     if (s->nodes.count == 0) {
         return BST_OK;
     }
-    double share = bst_smear_largest_share(s), peak;
+    double read_share, share = bst_smear_largest_share(s, &read_share), peak;
     if (source->shape) {
         BST_TRY(own_nodes(ctx, s, count, x, y, s->tolerance[0]));
         BST_TRY(shape_points(ctx, s, source, x, y, &peak));
         share = fmin(share, peak);
+        read_share = fmin(read_share, peak * s->binning * s->binning);
     }
     s->last_peak_e = electrons * share;
-    int level = bst_smear_choose_level(s, s->last_peak_e);
+    s->last_read_e = electrons * read_share;
+    double miss_px = bst_smear_allowed(s, s->last_read_e) * CHORD_SHARE * s->sigma_px / CHORD_ERROR;
+    miss_px = fmin(fmax(miss_px, LEAST_CHORD_PX), CHORD_PX);
+    if (source->path && miss_px < CHORD_PX) {
+        BST_TRY(own_path(ctx, s, source, miss_px, x, y, &count));
+    }
+    s->chord_error = source->path ? CHORD_ERROR * miss_px / s->sigma_px : 0.0;
+    int level = bst_smear_choose_level(s, 1.0);
     BST_TRY(own_nodes(ctx, s, count, x, y, s->tolerance[level]));
     return source->shape ? bst_shape_spread(ctx, &s->points, s->stretch, &s->nodes) : BST_OK;
 }

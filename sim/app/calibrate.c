@@ -90,7 +90,7 @@ static bool star_path(const bst_truth *truth, double x, double y, double *dx, do
     *dx = *dy = 0.0;
     for (int i = 0; i < truth->count; i++) {
         const bst_truth_item *t = &truth->items[i];
-        double distance = hypot(t->x_mean_px - x, t->y_mean_px - y);
+        double distance = hypot(t->x_centroid_px - x, t->y_centroid_px - y);
         if (t->kind == BST_SOURCE_STAR && distance < nearest && isfinite(t->x_end_px) &&
             isfinite(t->x_start_px)) {
             nearest = distance;
@@ -110,7 +110,7 @@ static bool is_free(const bst_truth *truth, double x, double y, double reach, in
             continue;
         }
         double away = reach * fmin(1.0 + t->snr / 1000.0, 4.0) + 0.5 * length_of(t);
-        if (fabs(t->x_mean_px - x) < away && fabs(t->y_mean_px - y) < away) {
+        if (fabs(t->x_centroid_px - x) < away && fabs(t->y_centroid_px - y) < away) {
             return false;
         }
     }
@@ -145,8 +145,8 @@ static void add_place(bst_calibrator *c, const bst_truth_item *t, const bst_dete
         return;
     }
     double free_part = 1.0 / sqrt(1.0 - own);
-    double length = length_of(t), dx = (d->x_px - t->x_mean_px - common->x) * free_part,
-           dy = (d->y_px - t->y_mean_px - common->y) * free_part;
+    double length = length_of(t), dx = (d->x_px - t->x_centroid_px - common->x) * free_part,
+           dy = (d->y_px - t->y_centroid_px - common->y) * free_part;
     double cosine = length > 0.0 ? (t->x_end_px - t->x_start_px) / length : 1.0;
     double sine = length > 0.0 ? (t->y_end_px - t->y_start_px) / length : 0.0;
     bst_bound_at at = bst_bound_of(&c->bound, t->electrons, noise_e, length);
@@ -163,7 +163,7 @@ static void add_place(bst_calibrator *c, const bst_truth_item *t, const bst_dete
         }
     }
     double weight = 1.0 / (at.var_across_px2 + 1e-6);
-    const double place[2] = {t->x_mean_px, t->y_mean_px}, off[2] = {dx, dy};
+    const double place[2] = {t->x_centroid_px, t->y_centroid_px}, off[2] = {dx, dy};
     for (int k = 0; k < 2 && length < 1.0; k++) {
         double wave = sin(2.0 * BST_PI * place[k]);
         c->bias_sum += weight * wave * off[k];
@@ -237,7 +237,7 @@ static void add_noise(bst_calibrator *c, const bst_detections *detections,
 static bool stands_alone(const bst_calibrator *c, const bst_truth *truth, int i, double reach) {
     const bst_truth_item *t = &truth->items[i];
     const bst_camera *camera = c->path.camera;
-    double x = t->x_mean_px, y = t->y_mean_px, edge = reach + 0.5 * length_of(t);
+    double x = t->x_centroid_px, y = t->y_centroid_px, edge = reach + 0.5 * length_of(t);
     bool whole = x > edge && y > edge && x < (double)camera->width_px - edge &&
                  y < (double)camera->height_px - edge;
     bool dark = !(t->flags & BST_TRUTH_IN_FIELD) || (t->flags & BST_TRUTH_OCCULTED) ||
@@ -284,8 +284,8 @@ static bool is_beside(const bst_truth *truth, int i, double reach) {
     }
     for (int k = 0; k < truth->count; k++) {
         const bst_truth_item *o = &truth->items[k];
-        if (k != i && o->snr > t->snr && fabs(o->x_mean_px - t->x_mean_px) < reach &&
-            fabs(o->y_mean_px - t->y_mean_px) < reach) {
+        if (k != i && o->snr > t->snr && fabs(o->x_centroid_px - t->x_centroid_px) < reach &&
+            fabs(o->y_centroid_px - t->y_centroid_px) < reach) {
             return true;
         }
     }
@@ -349,8 +349,8 @@ bst_status bst_calibrator_add(bst_ctx *ctx, bst_calibrator *c, const bst_truth *
             }
             if (pass == 0) {
                 double weight = place_weight(c, t, detections->noise_e);
-                common.x += weight * (detections->items[k].x_px - t->x_mean_px);
-                common.y += weight * (detections->items[k].y_px - t->y_mean_px);
+                common.x += weight * (detections->items[k].x_px - t->x_centroid_px);
+                common.y += weight * (detections->items[k].y_px - t->y_centroid_px);
                 common.weight += weight;
                 common.count++;
             } else {

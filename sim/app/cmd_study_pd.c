@@ -33,7 +33,7 @@ enum {
     METRICS
 };
 
-/* The ideal detector is told the place, and has one test for each pixel of the frame. */
+/* The ideal detector knows the place, and has one test for each pixel of the frame. */
 #define BELOW_ZERO                                                                               \
     " of known place and shape. Below 0: noise of the trials (loss_db_sigma), or the gain of a " \
     "detector that takes the highest of several places where the ideal one tests one."

@@ -56,7 +56,7 @@ static bst_status on_frame(void *user, bst_ctx *ctx, const bst_truth *truth,
         /* what has a pixel's place or worse was not fitted */
         const bst_detection *d = k >= 0 ? &detections->items[k] : NULL;
         if (d && t->snr >= 5.0 && fmax(d->cov_xx, d->cov_yy) < 1.0) {
-            double dx = d->x_px - t->x_mean_px, dy = d->y_px - t->y_mean_px;
+            double dx = d->x_px - t->x_centroid_px, dy = d->y_px - t->y_centroid_px;
             s->figure[PLACES].sum += dx * dx + dy * dy;
             s->figure[PLACES].count += 2.0;
         }

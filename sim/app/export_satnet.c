@@ -131,7 +131,8 @@ static void put_axis(cJSON *node, char axis, const double v[3], double box) {
 static const char truth_sql[] =
     "SELECT t.exposure_id, t.kind, t.id, t.norad, t.x_start_px, t.x_mid_px, t.x_end_px,"
     " t.y_start_px, t.y_mid_px, t.y_end_px, t.v_mag, t.electrons, t.snr, t.ra_deg, t.dec_deg,"
-    " t.item, o.name FROM truth t LEFT JOIN objects o ON t.kind = 'object' AND o.id = t.id"
+    " t.item, o.name, t.x_chief_px, t.y_chief_px, t.x_centroid_px, t.y_centroid_px FROM truth t "
+    "LEFT JOIN objects o ON t.kind = 'object' AND o.id = t.id"
     " WHERE t.sensor = ?1 ORDER BY t.rowid";
 
 /* The label of the current row of the truth; NULL when it is none of the frame's. */
@@ -140,9 +141,12 @@ static cJSON *label(const job *j, const bst_fits_frame *f, int width, int height
     bool star = strcmp(bst_rows_text(r, 1), "star") == 0;
     double x[3], y[3], v_mag = bst_rows_real(r, 10), electrons = bst_rows_real(r, 11);
     double binning = f->binning > 1 ? f->binning : 1;
+    double chief_x = bst_rows_real(r, 17), chief_y = bst_rows_real(r, 18);
+    /* boxes hold the light, which the optics put beside the chief ray */
+    double beside_x = bst_rows_real(r, 19) - chief_x, beside_y = bst_rows_real(r, 20) - chief_y;
     for (int k = 0; k < 3; k++) {
-        x[k] = (bst_rows_real(r, 4 + k) - f->window.x0 + 0.5) / binning / width;
-        y[k] = (bst_rows_real(r, 7 + k) - f->window.y0 + 0.5) / binning / height;
+        x[k] = (bst_rows_real(r, 4 + k) + beside_x - f->window.x0 + 0.5) / binning / width;
+        y[k] = (bst_rows_real(r, 7 + k) + beside_y - f->window.y0 + 0.5) / binning / height;
         if (!isfinite(x[k]) || !isfinite(y[k])) {
             return NULL;
         }
@@ -157,6 +161,12 @@ static cJSON *label(const job *j, const bst_fits_frame *f, int width, int height
     cJSON_AddNumberToObject(node, "class_id", star ? 2 : 1);
     put_axis(node, 'y', y, j->e->box_px / height);
     put_axis(node, 'x', x, j->e->box_px / width);
+    bst_json_add_number(node, "x_centroid",
+                        (chief_x + beside_x - f->window.x0 + 0.5) / binning / width);
+    bst_json_add_number(node, "y_centroid",
+                        (chief_y + beside_y - f->window.y0 + 0.5) / binning / height);
+    bst_json_add_number(node, "x_chief", (chief_x - f->window.x0 + 0.5) / binning / width);
+    bst_json_add_number(node, "y_chief", (chief_y - f->window.y0 + 0.5) / binning / height);
     cJSON_AddStringToObject(node, "source", "boresight");
     bst_json_add_number(node, "magnitude", v_mag);
     bst_json_add_number(node, "pe_per_sec", f->exposure_s > 0.0 ? electrons / f->exposure_s : NAN);

@@ -28,7 +28,7 @@ static const char *const queries[CURSORS] = {
         "SELECT exposure_id, boresight_x_px, boresight_y_px FROM exposures"
         " WHERE sensor = ?1",
     [OBJECTS] =
-        "SELECT exposure_id, id, norad, x_mean_px, y_mean_px FROM truth"
+        "SELECT exposure_id, id, norad, x_centroid_px, y_centroid_px FROM truth"
         " WHERE sensor = ?1 AND kind = 'object' AND in_field = 1",
     [DETECTIONS] =
         "SELECT exposure_id, label, x_px, y_px, length_px, star_id, flux_e FROM detections"

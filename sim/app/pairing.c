@@ -28,7 +28,7 @@ static bst_status reserve(bst_ctx *ctx, bst_pairing *p, int items, int detection
 
 /* Distance of a detection from a source in units of what is allowed; above 1: not its. */
 static double off(const bst_truth_item *t, const bst_detection *d, double fwhm_px) {
-    double dx = d->x_px - t->x_mean_px, dy = d->y_px - t->y_mean_px;
+    double dx = d->x_px - t->x_centroid_px, dy = d->y_px - t->y_centroid_px;
     double lx = t->x_end_px - t->x_start_px, ly = t->y_end_px - t->y_start_px;
     double length = hypot(lx, ly), c = length > 0.0 ? lx / length : 1.0,
            s = length > 0.0 ? ly / length : 0.0;
@@ -65,8 +65,8 @@ bst_status bst_pairing_make(bst_ctx *ctx, bst_pairing *p, const bst_truth *truth
         double reach = fwhm_px + 0.5 * length;
         for (int i = 0; i < detections->count; i++) {
             const bst_detection *d = &detections->items[i];
-            if (p->item_of[i] >= 0 || fabs(d->x_px - t->x_mean_px) > reach ||
-                fabs(d->y_px - t->y_mean_px) > reach) {
+            if (p->item_of[i] >= 0 || fabs(d->x_px - t->x_centroid_px) > reach ||
+                fabs(d->y_px - t->y_centroid_px) > reach) {
                 continue;
             }
             double distance = off(t, d, fwhm_px);

@@ -65,7 +65,7 @@ static void print_loss(const char *name, bst_pd_needed needed, double ideal, dou
         if (loss < 0.0) {
             printf(
                 "    below 0: noise of the trials, or the gain of taking the highest of several "
-                "places where the ideal detector is told one\n");
+                "places where the ideal detector tests one\n");
         }
     } else if (isfinite(needed.snr)) {
         printf(

@@ -130,11 +130,11 @@ bst_status bst_pd_sky_stars(bst_ctx *ctx, bst_pd_sky *sky, const bst_los_track *
     for (int i = 0; i < count; i++) {
         bst_truth_item item;
         bst_field_truth_item(sky->field, track, &stars[i], window, 1, &sky->header, &item);
-        if (!(item.snr >= BST_PD_STAR_SNR) || !isfinite(item.x_mean_px)) {
+        if (!(item.snr >= BST_PD_STAR_SNR) || !isfinite(item.x_centroid_px)) {
             continue;
         }
         bst_match_target *place = &sky->unsorted[out->count++];
-        *place = (bst_match_target){item.x_mean_px, item.y_mean_px, item.x_end_px - item.x_start_px,
+        *place = (bst_match_target){item.x_centroid_px, item.y_centroid_px, item.x_end_px - item.x_start_px,
                                     item.y_end_px - item.y_start_px};
         out->first[cell_of(out, place->x_px, place->y_px) + 1]++;
     }

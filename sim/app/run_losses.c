@@ -108,6 +108,9 @@ void bst_losses_tell_counter(const char *name, int64_t count, bst_loss_fn fn, vo
         {"bad_pixels_sky_at_rest", BST_SEVERITY_NOTE,
          "pixels look bad that cannot be learned, because the sky does not move over them", "frame",
          "frames"},
+        {"tolerance_missed", BST_SEVERITY_WARNING,
+         "the image's predicted error (error_sigma) is above fidelity.tolerance_sigma", "frame",
+         "frames"},
         {"saturated", BST_SEVERITY_NOTE, "full pixels in the image", "frame", "frames"},
     };
     char text[300], amount[64];

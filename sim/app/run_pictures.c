@@ -106,8 +106,8 @@ static void mark_truth(const bst_run_pictures *p, picture *pic, const bst_truth 
         if (item->kind == BST_SOURCE_OBJECT && (int)item->id == p->target &&
             (item->flags & BST_TRUTH_IN_FIELD)) {
             pic->has_target = true;
-            pic->target_x_px = pixel_of(pic, item->x_mean_px, pic->window.x0);
-            pic->target_y_px = pixel_of(pic, item->y_mean_px, pic->window.y0);
+            pic->target_x_px = pixel_of(pic, item->x_centroid_px, pic->window.x0);
+            pic->target_y_px = pixel_of(pic, item->y_centroid_px, pic->window.y0);
         }
     }
 }

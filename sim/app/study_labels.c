@@ -53,9 +53,12 @@ static bool put_object(bst_labels *l, const bst_frame_message *f, double exposur
     const double xs[3] = {item->x_start_px, item->x_mid_px, item->x_end_px};
     const double ys[3] = {item->y_start_px, item->y_mid_px, item->y_end_px};
     double x[3], y[3];
+    /* boxes hold the light, which the optics put beside the chief ray */
+    double beside_x = item->x_centroid_px - item->x_chief_px,
+           beside_y = item->y_centroid_px - item->y_chief_px;
     for (int k = 0; k < 3; k++) {
-        x[k] = (xs[k] - f->window.x0 + 0.5) / binning / width;
-        y[k] = (ys[k] - f->window.y0 + 0.5) / binning / height;
+        x[k] = (xs[k] + beside_x - f->window.x0 + 0.5) / binning / width;
+        y[k] = (ys[k] + beside_y - f->window.y0 + 0.5) / binning / height;
         if (!isfinite(x[k]) || !isfinite(y[k])) {
             return false;
         }
@@ -69,6 +72,10 @@ static bool put_object(bst_labels *l, const bst_frame_message *f, double exposur
             star ? "Star" : "Satellite", star ? 2 : 1);
     put_axis(s, 'y', y, l->box_px / height);
     put_axis(s, 'x', x, l->box_px / width);
+    put_number(s, "x_centroid", (item->x_centroid_px - f->window.x0 + 0.5) / binning / width);
+    put_number(s, "y_centroid", (item->y_centroid_px - f->window.y0 + 0.5) / binning / height);
+    put_number(s, "x_chief", (item->x_chief_px - f->window.x0 + 0.5) / binning / width);
+    put_number(s, "y_chief", (item->y_chief_px - f->window.y0 + 0.5) / binning / height);
     put_text(s, "source", "boresight");
     put_number(s, "magnitude", item->v_mag);
     put_number(s, "pe_per_sec", exposure_s > 0.0 ? item->electrons / exposure_s : NAN);

@@ -68,12 +68,13 @@ typedef struct bst_sunlight {
  * Given:    as bst_sun_fraction; atmosphere: whether the Earth has air
  * Returned: *out
  * Notes: rays are bent and spread as in geometric optics, weakened by Rayleigh scattering and
- * ozone, and end at the cloud tops (8 km). What lights the umbra depends on clouds and aerosols of
- * the place, which are not known: it may be wrong by a factor of 2. The light of the penumbra that
- * comes below 12 km is 1 % of full sunlight at most. Within the air (below 80 km) there is no
- * refraction.
- * Reference: Baum and Code, AJ 58, 108 (1953); Link, Eclipse Phenomena in Astronomy (1969),
- * chapter 2; limb darkening: Cox, Allen's Astrophysical Quantities (4th edition), table 14.17. */
+ * ozone, and end at the cloud tops (8 km). What passes below 12 km, most of the light
+ * in the inner penumbra of low orbits and in all umbrae, depends on clouds and aerosols of
+ * the place, which are not known: it may be wrong by a factor of 2. Within the air (below 80 km)
+ * there is no refraction.
+ * Reference: Baum and Code, AJ 58, 108 (1953); Link, Eclipse Phenomena in
+ * Astronomy (1969), chapter 2; limb darkening: Cox, Allen's Astrophysical Quantities (4th edition),
+ * table 14.17. */
 void bst_sunlight_at(bst_vec3 position_m, bst_vec3 sun_m, bst_vec3 pole, bool atmosphere,
                      bst_sunlight *out);
 

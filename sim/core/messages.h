@@ -183,7 +183,10 @@ typedef struct bst_truth_item {
     int32_t norad; /* object: catalogue number, else 0 */
     uint32_t flags;
     double x_start_px, y_start_px, x_mid_px, y_mid_px, x_end_px, y_end_px;
-    double x_mean_px, y_mean_px; /* mean over the exposure: where the light's centroid is */
+    /* Means over the exposure, weighted with the source's light in time: of the chief ray, whose
+     * the other places are too and whose place the WCS gives; and of the light on the focal plane,
+     * which coma and other odd aberrations, the phase of a disc and vignetting move from there. */
+    double x_chief_px, y_chief_px, x_centroid_px, y_centroid_px;
     double delay_s; /* rolling shutter: the exposure of the source's own row, whose these places
                        are, has its middle so much later than the header's ticks; else 0 */
     double ra_rad,

@@ -217,8 +217,10 @@ bst_status bst_recorder_truth_rows(bst_ctx *ctx, bst_recorder *recorder, int sen
         put_real(&r, item->y_mid_px);
         put_real(&r, item->x_end_px);
         put_real(&r, item->y_end_px);
-        put_real(&r, item->x_mean_px);
-        put_real(&r, item->y_mean_px);
+        put_real(&r, item->x_chief_px);
+        put_real(&r, item->y_chief_px);
+        put_real(&r, item->x_centroid_px);
+        put_real(&r, item->y_centroid_px);
         put_real(&r, item->ra_rad * DEG);
         put_real(&r, item->dec_rad * DEG);
         put_real(&r, item->v_mag);

@@ -109,8 +109,8 @@ bst_status bst_run_metrics_truth(bst_ctx *ctx, bst_run_metrics *m, const bst_tru
             (known_object){item->id,
                            {cos(item->dec_rad) * cos(item->ra_rad),
                             cos(item->dec_rad) * sin(item->ra_rad), sin(item->dec_rad)},
-                           item->x_mean_px,
-                           item->y_mean_px,
+                           item->x_centroid_px,
+                           item->y_centroid_px,
                            !(item->flags & BST_TRUTH_OCCULTED) && item->snr > 0.0};
         if (item->id < (uint32_t)m->object_count) {
             m->objects[item->id] |= 1;

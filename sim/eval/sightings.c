@@ -286,8 +286,8 @@ bst_status bst_sightings_truth(bst_ctx *ctx, bst_sightings *s, int sensor_index,
             pass->v_mag = item->v_mag;
         }
         if (item->electrons > 0.0 && f->count < IN_FRAME && !truth->dropped) {
-            f->targets[f->count] = (bst_match_target){.x_px = item->x_mean_px,
-                                                      .y_px = item->y_mean_px,
+            f->targets[f->count] = (bst_match_target){.x_px = item->x_centroid_px,
+                                                      .y_px = item->y_centroid_px,
                                                       .dx_px = item->x_end_px - item->x_start_px,
                                                       .dy_px = item->y_end_px - item->y_start_px};
             f->objects[f->count++] = (seen_object){

@@ -526,8 +526,10 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
                             .y_mid_px = NAN,
                             .x_end_px = NAN,
                             .y_end_px = NAN,
-                            .x_mean_px = NAN,
-                            .y_mean_px = NAN};
+                            .x_chief_px = NAN,
+                            .y_chief_px = NAN,
+                            .x_centroid_px = NAN,
+                            .y_centroid_px = NAN};
     bst_image_moments image;
     bst_quat q_mid = field->q_mid;
     if (camera->detector.row_time_s != 0.0 && track->time_s[track->count - 1] > 0.0) {
@@ -541,11 +543,12 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
         image = source->rate ? bst_image_by_light(field->camera, track, source, 0.0, 1.0)
                              : smear_of(field, source);
     }
+    out->x_chief_px = image.x_mean;
+    out->y_chief_px = image.y_mean;
     if (source->shape) {
         bst_image_add_disc(field->camera, q_mid, source, &image);
     }
-    out->x_mean_px = image.x_mean;
-    out->y_mean_px = image.y_mean;
+    bst_image_centroid(camera, source, &image, &out->x_centroid_px, &out->y_centroid_px);
     if (isfinite(image.x_mean)) {
         out->electrons *= bst_camera_illumination(camera, image.x_mean, image.y_mean);
     }

@@ -1,6 +1,7 @@
 #include "sim/world/field_image.h"
 
 #include "sim/world/disc.h"
+#include "sim/world/psf.h"
 
 bst_image_moments bst_image_by_light(const bst_camera *camera, const bst_los_track *track,
                                      const bst_source *source, double u0, double u1) {
@@ -86,6 +87,35 @@ void bst_image_add_disc(const bst_camera *camera, bst_quat q_mid, const bst_sour
         m->xy += xy / sum - ex * ey / (sum * sum);
         m->yy += yy / sum - ey * ey / (sum * sum);
     }
+}
+
+void bst_image_centroid(const bst_camera *camera, const bst_source *source,
+                        const bst_image_moments *m, double *x_px, double *y_px) {
+    double shift[2] = {0.0, 0.0}, sigma = bst_camera_psf_sigma_px(camera);
+    *x_px = m->x_mean;
+    *y_px = m->y_mean;
+    if (!isfinite(m->x_mean) || !isfinite(m->y_mean)) {
+        return;
+    }
+    if (camera->psf) {
+        bst_psf_centroid_px(camera->psf, source->colour, m->x_mean, m->y_mean, shift);
+        sigma = bst_psf_coloured_fwhm_px(camera->psf, source->colour, m->x_mean, m->y_mean) /
+                2.3548200450309493;
+    }
+    /* light of variance v on an illumination of slope s per px: by v s */
+    double here = bst_camera_illumination(camera, m->x_mean, m->y_mean), variance = sigma * sigma;
+    if (here > 0.0) {
+        double sx = 0.5 / here *
+                    (bst_camera_illumination(camera, m->x_mean + 1.0, m->y_mean) -
+                     bst_camera_illumination(camera, m->x_mean - 1.0, m->y_mean));
+        double sy = 0.5 / here *
+                    (bst_camera_illumination(camera, m->x_mean, m->y_mean + 1.0) -
+                     bst_camera_illumination(camera, m->x_mean, m->y_mean - 1.0));
+        shift[0] += (m->xx + variance) * sx + m->xy * sy;
+        shift[1] += m->xy * sx + (m->yy + variance) * sy;
+    }
+    *x_px += shift[0];
+    *y_px += shift[1];
 }
 
 double bst_image_squared(double along, double across, double length) {

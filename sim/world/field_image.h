@@ -15,6 +15,12 @@ typedef struct bst_image_moments {
 bst_image_moments bst_image_by_light(const bst_camera *camera, const bst_los_track *track,
                                      const bst_source *source, double u0, double u1);
 
+/* Where the centroid of the light is of a source whose chief ray has these moments: the PSF's own
+ * centroid lies beside it, and where the illumination falls over the image, light is lost on one
+ * side. NAN when the moments are. */
+void bst_image_centroid(const bst_camera *camera, const bst_source *source,
+                        const bst_image_moments *m, double *x_px, double *y_px);
+
 /* Moves and widens the moments of a point by the places of the light on the source's disc, seen
  * with attitude q_mid. */
 void bst_image_add_disc(const bst_camera *camera, bst_quat q_mid, const bst_source *source,

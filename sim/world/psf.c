@@ -144,6 +144,37 @@ double bst_psf_equivalent_fwhm_px(const bst_psf *psf, double x_px, double y_px) 
     return bst_psf_coloured_fwhm_px(psf, sun, x_px, y_px);
 }
 
+/* The first moments of the image are the slopes of the OTF's phase at 0. Extrapolated to it: wings
+ * of hard apertures bend the phase in proportion to the frequency. */
+static void find_centroid(const bst_psf *psf, int node, double out[2]) {
+    static const double f = 2e-3; /* cycles/px */
+    for (int a = 0; a < 2; a++) {
+        double at[2];
+        for (int k = 0; k < 2; k++) {
+            double h[2], g = f * (k + 1);
+            bst_psf_otf(psf, node, a == 0 ? g : 0.0, a == 0 ? 0.0 : g, h);
+            at[k] = -atan2(h[1], h[0]) / (2.0 * BST_PI * g);
+        }
+        out[a] = 2.0 * at[0] - at[1];
+    }
+}
+
+void bst_psf_centroid_px(const bst_psf *psf, const float colour[BST_PSF_COLOURS], double x_px,
+                         double y_px, double out[2]) {
+    int node[4], fields = psf->columns * psf->rows;
+    double weight[4];
+    int nodes = bst_psf_weights(psf, x_px, y_px, node, weight);
+    out[0] = out[1] = 0.0;
+    for (int k = 0; k < nodes; k++) {
+        for (int s = 0; s < psf->spectra; s++) {
+            double share = psf->spectra > 1 ? bst_psf_share(colour, s) : 1.0;
+            for (int a = 0; a < 2; a++) {
+                out[a] += weight[k] * share * psf->nodes[s * fields + node[k]].centroid_px[a];
+            }
+        }
+    }
+}
+
 void bst_psf_free(bst_psf *psf) {
     if (!psf || atomic_fetch_sub(&psf->owners, 1) > 1) {
         return;
@@ -242,6 +273,9 @@ static bst_status fill_in(bst_ctx *ctx, const bst_camera *camera, const bst_psf_
     }
     psf->reach_px += 1.0;
     widen(psf, psf->diffusion_px);
+    for (int k = 0; k < bst_psf_nodes(psf); k++) {
+        find_centroid(psf, k, psf->nodes[k].centroid_px);
+    }
     return BST_OK;
 }
 

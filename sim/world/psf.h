@@ -115,6 +115,11 @@ bool bst_psf_gaussian(const bst_psf *psf, double *sigma_px);
  * white noise of variance v per pixel is E / sqrt(v area). */
 double bst_psf_noise_area_px2(const bst_psf *psf, int node);
 
+/* Centroid of the image of a point of light of a colour at a pixel place, px from that place (of
+ * its chief ray): what tilt, coma and other odd aberrations of the PSF make. */
+void bst_psf_centroid_px(const bst_psf *psf, const float colour[BST_PSF_COLOURS], double x_px,
+                         double y_px, double out[2]);
+
 /* Full width at half maximum of the Gaussian that has, integrated over full pixels, the same
  * noise-equivalent area as the PSF at a pixel place (mean of the nodes that mix there): the width
  * for a Gaussian filter, and for the signal-to-noise ratio of a smeared image. At least 0.1. */

@@ -48,6 +48,7 @@ void bst_grid_otf_add(const bst_grid_otf *table, double fx, double fy, double ou
 /* One node of the field grid. */
 typedef struct bst_psf_node {
     double equivalent_fwhm_px;
+    double centroid_px[2];        /* of a point's image, from its place */
     double sigma_px;              /* Gaussian part: the profile itself, or 0 */
     const bst_radial_otf *radial; /* NULL: none; lent by the PSF */
     bst_radial_otf own_radial;    /* where nodes differ in it */

@@ -81,7 +81,7 @@ bst_status bst_truth_list_fill(bst_ctx *ctx, bst_truth_list *list, const bst_tru
         if (source_of) {
             source_of[i] = k;
         }
-        double x = item->x_mean_px, y = item->y_mean_px;
+        double x = item->x_chief_px, y = item->y_chief_px;
         double light = isfinite(x) ? bst_camera_illumination(camera, x, y) : 1.0;
         double dark_e = truth->dark_e + bst_field_background_e(q->field, truth, x, y);
         double peak_e = light * q->peak_e(q->user, k, item);

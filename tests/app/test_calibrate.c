@@ -39,10 +39,10 @@ static void fill(bst_truth *truth, const bst_bound *bound, int64_t exposure) {
                                            .id = (uint32_t)(i + 1),
                                            .flags = BST_TRUTH_IN_FIELD,
                                            .x_start_px = x,
-                                           .x_mean_px = x,
+                                           .x_centroid_px = x,
                                            .x_end_px = x,
                                            .y_start_px = y,
-                                           .y_mean_px = y,
+                                           .y_centroid_px = y,
                                            .y_end_px = y,
                                            .snr = snr,
                                            .electrons = snr * noise / bst_bound_norm(bound, 0.0)};

@@ -211,7 +211,7 @@ def judge(frames):
                 errors.append(f["error"])
             if f["field"] and f["field"]["snr"] > 0:
                 in_field += 1
-                x, y = f["field"]["x_mean_px"], f["field"]["y_mean_px"]
+                x, y = f["field"]["x_centroid_px"], f["field"]["y_centroid_px"]
                 found += any(np.hypot(dx - x, dy - y) <= RIGHT_TARGET_PX
                              for dx, dy in f["detections"])
     errors, track_errors = np.array(errors).reshape(-1, 2), np.array(track_errors)

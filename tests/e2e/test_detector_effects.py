@@ -30,7 +30,7 @@ def bright(v_mag):
 def false_tracks(db):
     """Confirmed tracks whose places are not those of an object, for most of their frames."""
     place = {row["exposure_id"]: (row["x"], row["y"]) for row in db.execute(
-        "SELECT exposure_id, x_mean_px AS x, y_mean_px AS y FROM truth WHERE kind = 'object'")}
+        "SELECT exposure_id, x_centroid_px AS x, y_centroid_px AS y FROM truth WHERE kind = 'object'")}
     frames, right = {}, {}
     for row in db.execute("SELECT exposure_id, track_id, x_px, y_px FROM tracks WHERE status = "
                           "'confirmed'"):
@@ -46,9 +46,9 @@ def target_errors(db, first):
     """Of frames from exposure `first` on with the target well in the field: the detection nearest
     to it, and its error over its standard deviation, both axes."""
     found = db.execute(
-        "SELECT t.exposure_id AS e, t.x_mean_px AS x, t.y_mean_px AS y, d.* FROM truth t JOIN "
-        "detections d ON d.exposure_id = t.exposure_id AND abs(d.x_px - t.x_mean_px) < 2 AND "
-        "abs(d.y_px - t.y_mean_px) < 2 WHERE t.kind = 'object' AND t.in_field AND t.exposure_id >= ?"
+        "SELECT t.exposure_id AS e, t.x_centroid_px AS x, t.y_centroid_px AS y, d.* FROM truth t JOIN "
+        "detections d ON d.exposure_id = t.exposure_id AND abs(d.x_px - t.x_centroid_px) < 2 AND "
+        "abs(d.y_px - t.y_centroid_px) < 2 WHERE t.kind = 'object' AND t.in_field AND t.exposure_id >= ?"
         " ORDER BY e, d.snr DESC", (first,)).fetchall()
     best = {}
     for row in found:

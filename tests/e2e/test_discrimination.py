@@ -87,8 +87,8 @@ class Discrimination(unittest.TestCase):
                                                                     d["label"]])
         labels = {"star": collections.Counter(), "object": collections.Counter()}
         for t in self.db.execute(
-                "SELECT kind, x_mean_px AS x, y_mean_px AS y FROM truth WHERE exposure_id = ? AND"
-                " in_field AND snr >= ? AND x_mean_px BETWEEN 3 AND ? AND y_mean_px BETWEEN 3 AND ?"
+                "SELECT kind, x_chief_px AS x, y_chief_px AS y FROM truth WHERE exposure_id = ? AND"
+                " in_field AND snr >= ? AND x_chief_px BETWEEN 3 AND ? AND y_chief_px BETWEEN 3 AND ?"
                 " ORDER BY snr DESC", (frame, threshold, SIDE - 4, SIDE - 4)):
             near = [d for i in (-1, 0, 1) for j in (-1, 0, 1)
                     for d in cells[int(t["x"]) // 4 + i, int(t["y"]) // 4 + j]
@@ -129,7 +129,7 @@ class BrightStars(unittest.TestCase):
         angle = np.radians(28)  # of the first of four vanes
         vanes = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
         for frame, in db.execute("SELECT DISTINCT exposure_id FROM detections").fetchall():
-            truth = np.array(db.execute("SELECT x_mean_px, y_mean_px, v_mag FROM truth WHERE snr > 2.5 "
+            truth = np.array(db.execute("SELECT x_chief_px, y_chief_px, v_mag FROM truth WHERE snr > 2.5 "
                                         "AND exposure_id = ?", (frame,)).fetchall())
             bright = truth[truth[:, 2] < 3]
             self.assertEqual(len(bright), 2)

@@ -195,7 +195,7 @@ class Hidden(unittest.TestCase):
         self.assertGreater(len(rows), 5)
         for exposure, x, y in rows:
             near = db.execute("SELECT occulted FROM truth WHERE exposure_id = ? AND "
-                              "abs(x_mean_px - ?) < 3 AND abs(y_mean_px - ?) < 3",
+                              "abs(x_centroid_px - ?) < 3 AND abs(y_centroid_px - ?) < 3",
                               (exposure, x, y)).fetchall()
             self.assertTrue(not near or any(not o for o, in near), (exposure, x, y))
 

@@ -398,7 +398,7 @@ class Exported(unittest.TestCase):
         self.assertGreater(len(changed), 1000)
         # the red square around the true place of the target, 11 px away at half the scale
         x, y = self.database.execute(
-            "SELECT x_mean_px, y_mean_px FROM truth WHERE kind = 'object' AND exposure_id = 27"
+            "SELECT x_chief_px, y_chief_px FROM truth WHERE kind = 'object' AND exposure_id = 27"
             ).fetchone()
         x, y = (x + 0.5) / 2 - 0.5, (y + 0.5) / 2 - 0.5
         red = [(u, v) for u, v in changed if pixel(b, u, v)[0] > 200 and pixel(b, u, v)[1] < 130 and

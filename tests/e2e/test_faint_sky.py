@@ -106,7 +106,7 @@ class MainJob(unittest.TestCase):
         rows = runs.database(self.out).execute(
             "SELECT k.track_id, count(*) AS n FROM tracks k JOIN truth t USING (sensor, exposure_id) "
             "WHERE t.kind='object' AND t.id=1 AND k.status='confirmed' "
-            "AND abs(k.x_px - t.x_mean_px) < 3 AND abs(k.y_px - t.y_mean_px) < 3 "
+            "AND abs(k.x_px - t.x_chief_px) < 3 AND abs(k.y_px - t.y_chief_px) < 3 "
             "GROUP BY k.track_id").fetchall()
         self.assertEqual(len(rows), 1)
         self.assertGreater(rows[0]["n"], 15)

@@ -222,7 +222,7 @@ class Track(unittest.TestCase):
             place = frame.pixels([truth["ra_deg"]], [truth["dec_deg"]])[0]
             # our own truth, from the same attitude: what remains is the fit of the WCS (header
             # WCSRESID, below 1e-3 px) and the motion's curvature during 0.5 s
-            self.assertLess(np.hypot(*(place - [truth["x_mean_px"], truth["y_mean_px"]])), 0.01)
+            self.assertLess(np.hypot(*(place - [truth["x_chief_px"], truth["y_chief_px"]])), 0.01)
             found, _ = found_in(frame)
             distance = np.hypot(*(found - place).T)
             if len(found) and distance.min() < 3:
@@ -277,7 +277,7 @@ class Moving(unittest.TestCase):
             sky = sky_of(header, row)
             heads.append(sky.wcs.crval.copy())
             stars = np.array([tuple(r) for r in db.execute(
-                "SELECT ra_deg, dec_deg, x_mean_px, y_mean_px, hypot_px FROM (SELECT *, "
+                "SELECT ra_deg, dec_deg, x_chief_px, y_chief_px, hypot_px FROM (SELECT *, "
                 "(x_end_px - x_start_px) * (x_end_px - x_start_px) + (y_end_px - y_start_px) * "
                 "(y_end_px - y_start_px) AS hypot_px FROM truth) WHERE kind = 'star' AND in_field "
                 "AND exposure_id = ?", (number,))])

@@ -53,7 +53,7 @@ class Generator(unittest.TestCase):
                      *[f"{runs.SENSOR}/observation_source={source}"])
             db = runs.database(out)
             truths.append([tuple(row) for row in db.execute(
-                "SELECT exposure_id, kind, id, in_field, x_mean_px, y_mean_px, electrons, snr "
+                "SELECT exposure_id, kind, id, in_field, x_chief_px, y_chief_px, electrons, snr "
                 "FROM truth")])
         self.assertTrue(truths[0])
         # the generator asks for a margin of its own beyond the window

@@ -183,7 +183,7 @@ class Loop(unittest.TestCase):
         which the onboard camera is wrong (function of the offsets from the boresight, px), after
         the attitude has taken its three parameters of it."""
         true = {(row[0], row[1]): row[2:] for row in runs.database(self.out[name]).execute(
-            "SELECT exposure_id, id, x_mean_px, y_mean_px FROM truth WHERE kind = 'star'")}
+            "SELECT exposure_id, id, x_chief_px, y_chief_px FROM truth WHERE kind = 'star'")}
         seen, right, expected = [], [], []
         for i in self.common(name):
             frame, stars = self.frames[name][i], self.stars[name][i]
@@ -413,7 +413,7 @@ class Several(unittest.TestCase):
 
     def check_places(self, db, sensor, exposure, wcs):
         rows = np.array([tuple(r) for r in db.execute(
-            "SELECT ra_deg, dec_deg, x_mean_px, y_mean_px FROM truth WHERE in_field AND sensor = ? "
+            "SELECT ra_deg, dec_deg, x_chief_px, y_chief_px FROM truth WHERE in_field AND sensor = ? "
             "AND exposure_id = ?", (sensor, exposure))])
         self.assertGreater(len(rows), 0)
         places = wcs.all_world2pix(rows[:, :2], 0, tolerance=1e-6, maxiter=60)

@@ -287,7 +287,7 @@ class Examples(unittest.TestCase):
                       (truth["snr"] > 30) & (truth["saturated"] == 0) &
                       (np.hypot(truth["x_end_px"] - truth["x_start_px"],
                                 truth["y_end_px"] - truth["y_start_px"]) < 3))
-            for x, y in zip(truth["x_mean_px"][bright], truth["y_mean_px"][bright]):
+            for x, y in zip(truth["x_chief_px"][bright], truth["y_chief_px"][bright]):
                 if not (3 < x < 1020 and 3 < y < 1020):
                     continue
                 total += 1

@@ -110,8 +110,9 @@ def spread(rows, start, stop):
 def diverges(sets, duration):
     rows = base.pointing(sets, duration)
     before, after = (spread(rows, a * duration, b * duration) for a, b in ((0.3, 0.5), (0.8, 1)))
-    # an observer that diverges begins afresh again and again, at 0.3 px or more
-    return after > 0.15 or after > max(3 * before, 0.1)
+    # an observer that diverges begins afresh again and again, at 0.3 px or more; the spread of a
+    # calm loop over some hundred frames varies by a quarter
+    return after > 0.15 or after > 1.8 * before
 
 
 class Latency(unittest.TestCase):
@@ -127,11 +128,11 @@ class Latency(unittest.TestCase):
         law = {"type": compensator}
         if compensator == "observer":
             sets[MODULES + "/control/robust_observer"] = robust
-            duration = int((500 + 200 * share) * period)
+            duration = int((600 + 250 * share) * period)
         else:
             law["crossover_hz"] = 0.07 / (share * period + period)
             law["phase_margin_deg"] = 45
-            duration = int(40 / law["crossover_hz"])
+            duration = int(50 / law["crossover_hz"])
         sets[LAW] = law
         axes = base.loop(runs.TRACK, sets)["axes"]
         self.assertTrue(all(axis["stable"] for axis in axes))
@@ -180,8 +181,16 @@ class Observer(unittest.TestCase):
                 # jitter
                 self.assertLess(base.rms(base.pointing(sets, 150), 100, 150), 0.2)
 
+    def test_no_motion_is_refused(self):
+        sets = dict(self.QUIET, **{LAW: {"type": "observer", "gain_scale": 0}})
+        for command in ("loop", "check"):
+            result = subprocess.run([runs.BORESIGHT, command, runs.TRACK, *base.words(sets)],
+                                    capture_output=True, text=True, timeout=60)
+            self.assertEqual(result.returncode, 1)
+            self.assertIn("gain_scale: 0 leaves an observer no motion", result.stderr)
+
     def test_never_negative(self):
-        for share in (0.1, 0.5, 1, 2, 5, 10):
+        for share in (0.1, 0.5, 1, 2, 5, 10, 58):
             for law in ({"type": "observer"}, {"type": "observer", "gain_scale": 4},
                         {"type": "observer", "delay_s": 3}):
                 sets = dict(self.QUIET, **{MODULES + "/control/delay_s/tracks": share, LAW: law})

@@ -23,7 +23,7 @@ LOST_PX = 2.0    # guidance's loss_tolerance_px
 def errors(out):
     """Middle of each frame and distance of the target from the boresight, px; infinite outside."""
     rows = runs.database(out).execute(
-        "SELECT e.mid_s, t.x_mean_px - e.boresight_x_px, t.y_mean_px - e.boresight_y_px"
+        "SELECT e.mid_s, t.x_chief_px - e.boresight_x_px, t.y_chief_px - e.boresight_y_px"
         " FROM exposures e LEFT JOIN truth t ON t.exposure_id = e.exposure_id AND t.kind = 'object'"
         " WHERE e.mid_s > ? ORDER BY e.mid_s", (SETTLED_S,)).fetchall()
     return (np.array([r[0] for r in rows]),

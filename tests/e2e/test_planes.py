@@ -9,6 +9,7 @@ import unittest
 
 import numpy as np
 from astropy.io import fits
+from astropy.wcs import WCS
 
 import runs
 
@@ -92,9 +93,9 @@ class Planes(unittest.TestCase):
             y, x = np.indices(data.shape)
             x, y = (self.on_sensor(c) for c in (x, y))
             self.assertAlmostEqual((data * x).sum() / data.sum() + header["WINX0"],
-                                   row["x_mean_px"], delta=0.01)
+                                   row["x_centroid_px"], delta=0.01)
             self.assertAlmostEqual((data * y).sum() / data.sum() + header["WINY0"],
-                                   row["y_mean_px"], delta=0.01)
+                                   row["y_centroid_px"], delta=0.01)
 
     def test_the_mask(self):
         with fits.open(os.path.join(self.out, "frames.fits")) as hdus:
@@ -122,8 +123,8 @@ class Planes(unittest.TestCase):
             for i in found:
                 y, x = np.nonzero(mask == i)
                 row = items[i]
-                near = np.hypot(self.on_sensor(x) + header["WINX0"] - row["x_mean_px"],
-                                self.on_sensor(y) + header["WINY0"] - row["y_mean_px"])
+                near = np.hypot(self.on_sensor(x) + header["WINX0"] - row["x_chief_px"],
+                                self.on_sensor(y) + header["WINY0"] - row["y_chief_px"])
                 self.assertLess(near.min(), 4.0)
 
     def test_saturated_pixels(self):
@@ -178,7 +179,7 @@ class BinnedPlanes(Planes):
             # sources whose light alone is well above or below the top, by the planes
             for row in tables.execute("SELECT * FROM truth WHERE exposure_id = ? AND in_field",
                                       (header["FRAMEID"],)):
-                x, y = ((row[f"{c}_mean_px"] - header[f"WIN{c.upper()}0"] + 0.5) / 2 - 0.5
+                x, y = ((row[f"{c}_chief_px"] - header[f"WIN{c.upper()}0"] + 0.5) / 2 - 0.5
                         for c in "xy")
                 box = light[k][max(int(y) - 2, 0):int(y) + 4, max(int(x) - 2, 0):int(x) + 4]
                 if box.max() < 0.6 * top:
@@ -187,6 +188,38 @@ class BinnedPlanes(Planes):
                     self.assertTrue(row["saturated"])
                     seen += 1
         self.assertGreater(seen, 2)
+
+
+class Comatic(unittest.TestCase):
+    """Coma moves the light from the chief ray: truth has both places."""
+
+    def test_the_chief_ray_is_the_wcs_and_the_centroid_is_the_light(self):
+        out = os.path.join(runs.scratch(), "comatic")
+        optics = ('{"psf": "diffraction", "q": 1.5, "wavelengths": 1, "zernike_nm": 550, '
+                  '"zernike_waves": {"z7": -0.03, "z8": 0.05}}')
+        runs.run(SCENARIO, out, '/record/planes=["targets"]',
+                 f"{runs.SENSOR}/camera/optics={optics}")
+        rows = runs.database(out).execute(
+            "SELECT * FROM truth WHERE kind = 'object' ORDER BY exposure_id").fetchall()
+        seen = 0
+        for row, (header, data) in zip(rows, images(out, "targets")):
+            y, x = np.indices(data.shape)
+            light = np.array([(data * x).sum() / data.sum() + header["WINX0"],
+                              (data * y).sum() / data.sum() + header["WINY0"]])
+            chief = np.array([row["x_chief_px"], row["y_chief_px"]])
+            centroid = np.array([row["x_centroid_px"], row["y_centroid_px"]])
+            # the mean slope of 2 sqrt(2) (3 r^3 - 2 r) cos(a) over the aperture is 2 sqrt(2) waves
+            # per radius, and a wave per radius moves light by 2 lambda F, 2 Q px at 551 nm
+            shift = 2 * 1.5 * 550 / 551 * np.sqrt(8) * np.array([0.05, -0.03])
+            np.testing.assert_allclose(centroid - chief, shift, atol=0.002)  # of the OTF's table
+            place = WCS(header).all_world2pix([[row["ra_deg"], row["dec_deg"]]], 0)[0]
+            place += [header["WINX0"], header["WINY0"]]
+            np.testing.assert_allclose(chief, place, atol=0.02)  # of a visitor at 300 km
+            # the wings of a hard aperture hold 0.9 px / R of the moment beyond R px
+            if min(data.shape) == 512 and row["electrons"] > 0:
+                np.testing.assert_allclose(light, centroid, atol=0.005)
+                seen += 1
+        self.assertGreater(seen, 1)
 
 
 if __name__ == "__main__":

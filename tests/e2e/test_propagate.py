@@ -132,6 +132,19 @@ class Numbers(unittest.TestCase):
         # UT1 moves the equation of the equinoxes by 1e-11 rad/s. 2 m as above, at 42,000 km
         self.assertLess(np.linalg.norm(state(row)[:3] - gcrs.cartesian.xyz.to_value(u.km)), 2e-3)
 
+    def test_scenario_in_2030(self):
+        """A mission in 2030 runs, and says how well the Earth's orientation is known at its end."""
+        with tempfile.TemporaryDirectory() as folder:
+            result = subprocess.run(
+                [BORESIGHT, "run", "scenarios/neossat_geo_track.json", "--quiet", "--duration", "3",
+                 "--out", folder + "/run", "--set", '/epoch_utc="2030-06-16T22:10:00Z"', "--set",
+                 "/world/star_catalogue=embedded", "--set", "/record/frames=none", "--set",
+                 '/observers/0/sensors/0/observation_source="generator"'],
+                capture_output=True, text=True, timeout=60)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertRegex(result.stderr, r"/world/earth_orientation: .* 1628 days earlier: UT1 is "
+                                        r"predicted to within 1688 ms .* 0.12 arcsec")
+
     def test_leap_second_is_a_row(self):
         sets = element_sets(CATALOGUE)
         result = run("--elements", CATALOGUE, "--norad", "44801", "--start", "2016-12-31T23:59:58Z",

@@ -37,7 +37,7 @@ class RollingShutter(unittest.TestCase):
         runs.run(runs.RATE_OPEN, cls.out, SHUTTER, *COMMON, '/record/planes=["stars"]',
                  duration=5)
         cls.rows = rows(cls.out, "SELECT exposure_id, mid_s, x_start_px, y_start_px, x_mid_px,"
-                             " y_mid_px, x_end_px, y_end_px, x_mean_px, y_mean_px, electrons"
+                             " y_mid_px, x_end_px, y_end_px, x_chief_px, y_chief_px, electrons"
                              " FROM truth WHERE kind = 'star' AND in_field AND NOT occulted")
 
     def test_light_is_where_the_truth_has_it(self):

@@ -24,7 +24,8 @@ CASES = [("duration", "/duration_s=0", "/duration_s: the run lasts 0 s"),
          ("loops", MODULES + '/control/compensator={"type": "pi", "crossover_hz": 0.07, '
           '"phase_margin_deg": 45, "gain_scale": 3}', "has thin margins"),
          ("reach", "/duration_s=86400", "the cue is out of reach from"),
-         ("reach", MODULES + "/gimbal/accel_limit_degps2=0.001", "for a step of the search")]
+         ("reach", MODULES + "/gimbal/accel_limit_degps2=0.001", "for a step of the search"),
+         ("bodies", "/duration_s=86400", "the Earth is in the field from")]
 
 
 def check(*words):

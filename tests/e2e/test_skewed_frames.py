@@ -106,9 +106,9 @@ def scenario(folder, generator):
     return path
 
 
-ROWS = """SELECT d.exposure_id, d.x_px - t.x_mean_px AS dx, d.y_px - t.y_mean_px AS dy, d.cov_xx_px2 AS xx,
+ROWS = """SELECT d.exposure_id, d.x_px - t.x_centroid_px AS dx, d.y_px - t.y_centroid_px AS dy, d.cov_xx_px2 AS xx,
     d.cov_xy_px2 AS xy, d.cov_yy_px2 AS yy, t.snr AS snr, d.snr AS seen, d.flux_e AS flux, d.flux_sigma_e AS sigma,
-    t.electrons AS electrons, t.x_mean_px AS x, t.y_mean_px AS y
+    t.electrons AS electrons, t.x_centroid_px AS x, t.y_centroid_px AS y
     FROM detections d JOIN truth t ON d.exposure_id = t.exposure_id AND t.kind = 'star' AND t.id = d.star_id
     WHERE NOT (d.saturated OR d.edge OR d.blend) AND t.snr > 12"""
 
@@ -117,7 +117,7 @@ def lonely(db):
     """Rows whose star has no other of a tenth of its light within 45 px."""
     stars = {}
     for e, i, x, y, electrons in db.execute(
-            "SELECT exposure_id, id, x_mean_px, y_mean_px, electrons FROM truth WHERE kind = 'star'"):
+            "SELECT exposure_id, id, x_centroid_px, y_centroid_px, electrons FROM truth WHERE kind = 'star'"):
         stars.setdefault(e, []).append((x, y, electrons))
     kept = []
     for row in db.execute(ROWS):

@@ -88,12 +88,12 @@ static void send_truth(bst_ctx *ctx, bst_recorder *recorder, int64_t id, bool dr
     t->sun_m = (bst_vec3){0, -1e22, 0}; /* so far away that it bends nothing */
     t->observer_gcrf_m = (bst_vec3){7e6, 0, 0};
     t->count = 2;
-    t->items[0] = (bst_truth_item){.kind = BST_SOURCE_STAR, .id = 77, .x_mean_px = 1.5};
+    t->items[0] = (bst_truth_item){.kind = BST_SOURCE_STAR, .id = 77, .x_chief_px = 1.5};
     t->items[1] = (bst_truth_item){.kind = BST_SOURCE_OBJECT,
                                    .id = 3,
                                    .norad = 44801,
                                    .flags = BST_TRUTH_IN_FIELD,
-                                   .x_mean_px = 2.25,
+                                   .x_chief_px = 2.25,
                                    .phase_rad = BST_PI / 6,
                                    .ra_rad = 1.0};
     send(ctx, recorder, BST_CHANNEL_TRUTH, t, t->end_tick);
@@ -264,7 +264,7 @@ static void test_tables(void **state) {
         /* rounding of degrees */
         bst_assert_close(number(db, "SELECT boresight_ra_deg FROM exposures"), 0.5 / BST_DEG_RAD,
                          1e-12);
-        assert_is(db, "SELECT x_mean_px FROM truth WHERE kind = 'star' AND id = 77", 1.5);
+        assert_is(db, "SELECT x_chief_px FROM truth WHERE kind = 'star' AND id = 77", 1.5);
         bst_assert_close(
             number(db, "SELECT phase_deg FROM truth WHERE norad = 44801 AND in_field = 1"), 30.0,
             1e-12);

@@ -55,8 +55,8 @@ static void show_truth(fixture *f, int64_t id, int objects, uint32_t flags, doub
                                               .flags = flags,
                                               .ra_rad = 2.0,
                                               .dec_rad = dec_of(i),
-                                              .x_mean_px = 100,
-                                              .y_mean_px = 200 + 100 * i,
+                                              .x_centroid_px = 100,
+                                              .y_centroid_px = 200 + 100 * i,
                                               .snr = snr};
     }
     bst_assert_ok(&f->ctx, bst_run_metrics_truth(&f->ctx, f->metrics, f->truth));

@@ -79,11 +79,11 @@ static inline bst_truth_item *add_source(scene *s, uint32_t id, double x, double
                              .x_start_px = x,
                              .x_mid_px = x,
                              .x_end_px = x,
-                             .x_mean_px = x,
+                             .x_centroid_px = x,
                              .y_start_px = y,
                              .y_mid_px = y,
                              .y_end_px = y,
-                             .y_mean_px = y,
+                             .y_centroid_px = y,
                              .electrons = electrons};
     return item;
 }

@@ -103,7 +103,7 @@ static void places_scatter_by_the_bound(void **state) {
         for (int i = 0; i < r.count; i++) {
             const bst_detection *d = &r.items[i].detection;
             const bst_truth_item *t = &s.truth->items[r.items[i].item];
-            double dx = d->x_px - t->x_mean_px, dy = d->y_px - t->y_mean_px;
+            double dx = d->x_px - t->x_centroid_px, dy = d->y_px - t->y_centroid_px;
             sum2 += dx * dx + dy * dy;
             cross += dx * dy;
             told += d->cov_xx + d->cov_yy;
@@ -139,8 +139,8 @@ static void the_phase_bias_is_as_stated(void **state) {
     for (int i = 0; i < r.count; i++) {
         const bst_detection *d = &r.items[i].detection;
         const bst_truth_item *t = &s.truth->items[r.items[i].item];
-        double bias = 0.03 * sin(2.0 * BST_PI * t->x_mean_px);
-        worst = fmax(worst, fabs(d->x_px - t->x_mean_px - bias));
+        double bias = 0.03 * sin(2.0 * BST_PI * t->x_centroid_px);
+        worst = fmax(worst, fabs(d->x_px - t->x_centroid_px - bias));
     }
     /* five standard deviations of places of 1e5 electrons */
     assert_true(r.count == 900 && worst < 0.014);
@@ -294,7 +294,7 @@ static void the_edge_cuts(void **state) {
     double light = electrons_of(&s, 400.0);
     bst_truth_item *item = add_source(&s, 1, 0.0, 500.0, light);
     item->x_start_px = -20.0;
-    item->x_mean_px = 0.0;
+    item->x_centroid_px = 0.0;
     item->x_end_px = 20.0;
     s.frame.streak_dx_px = 40.0;
     bst_generator_result r = run(&s, 0);
@@ -306,7 +306,7 @@ static void the_edge_cuts(void **state) {
     bst_assert_close(d->x_px, 0.0, 0.2);
     bst_assert_close(d->flux_e, light, 0.05 * light);
     item->x_start_px = -36.0;
-    item->x_mean_px = -16.0;
+    item->x_centroid_px = -16.0;
     item->x_end_px = 4.0;
     r = run(&s, 0);
     assert_int_equal(r.count, 1);
@@ -315,7 +315,7 @@ static void the_edge_cuts(void **state) {
     /* -0.5 to 4 are on the frame */
     bst_assert_close(d->x_px, 1.75, 1.0);
     item->x_start_px = -60.0;
-    item->x_mean_px = -40.0;
+    item->x_centroid_px = -40.0;
     item->x_end_px = -20.0;
     assert_int_equal(run(&s, 0).count, 0);
     s.frame.streak_dx_px = 100.0;

@@ -424,10 +424,10 @@ static void into_the_umbra_mid_exposure(void **state) {
     bst_window window = {0, 0, 1024, 1024};
     bst_field_truth_item(l.field, &l.track, l.source, window, 1, &l.truth, &item);
     bst_assert_close(item.electrons / (mean * seconds), 1, 1e-4);
-    if (isfinite(item.x_start_px) && isfinite(item.x_mean_px)) {
+    if (isfinite(item.x_start_px) && isfinite(item.x_chief_px)) {
         /* the light is near the start of the path */
-        double early = hypot(item.x_mean_px - item.x_start_px, item.y_mean_px - item.y_start_px);
-        double late = hypot(item.x_mean_px - item.x_end_px, item.y_mean_px - item.y_end_px);
+        double early = hypot(item.x_chief_px - item.x_start_px, item.y_chief_px - item.y_start_px);
+        double late = hypot(item.x_chief_px - item.x_end_px, item.y_chief_px - item.y_end_px);
         assert_true(early < 0.7 * late);
     }
     bst_field_free(l.field);

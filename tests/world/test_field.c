@@ -141,8 +141,8 @@ static void expect_means(scene *s, double tolerance_px) {
         }
         bst_truth_item item;
         bst_field_truth_item(s->field, &s->track, &s->sources[i], full, 1, &s->truth, &item);
-        bst_assert_close(item.x_mean_px, x, tolerance_px);
-        bst_assert_close(item.y_mean_px, y, tolerance_px);
+        bst_assert_close(item.x_chief_px, x, tolerance_px);
+        bst_assert_close(item.y_chief_px, y, tolerance_px);
         assert_int_equal((item.flags & BST_TRUTH_IN_FIELD) != 0,
                          x >= -0.5 && x < 1023.5 && y >= -0.5 && y < 1023.5);
         object |= item.kind == BST_SOURCE_OBJECT;
@@ -243,11 +243,11 @@ static void truth_follows_the_optics(void **state) {
     for (int i = 0; i < s.count; i++) {
         bst_truth_item item;
         bst_field_truth_item(s.field, &s.track, &s.sources[i], full, 1, &s.truth, &item);
-        double dx = item.x_mean_px - bst_camera_centre_x(camera),
-               dy = item.y_mean_px - bst_camera_centre_y(camera);
+        double dx = item.x_chief_px - bst_camera_centre_x(camera),
+               dy = item.y_chief_px - bst_camera_centre_y(camera);
         double share = 1.0 - 0.4 * (dx * dx + dy * dy) / (2.0 * 512.0 * 512.0);
         bst_assert_close(item.electrons, share * s.sources[i].electrons_per_s * 0.5, 1e-9);
-        double u = fmin(fmax(item.x_mean_px / 1023.0, 0.0), 1.0);
+        double u = fmin(fmax(item.x_chief_px / 1023.0, 0.0), 1.0);
         double area = (1.0 - u) * bst_psf_noise_area_px2(camera->psf, 0) +
                       u * bst_psf_noise_area_px2(camera->psf, 1);
         if (s.sources[i].kind == BST_SOURCE_STAR) { /* at rest */
@@ -334,7 +334,7 @@ static void an_exposure_of_no_length(void **state) {
         bst_truth_item item;
         bst_field_truth_item(s.field, &s.track, &s.sources[i], full, 1, &s.truth, &item);
         assert_true(item.electrons == 0 && item.snr == 0);
-        bst_assert_close(item.x_mean_px, item.x_mid_px, 1e-9);
+        bst_assert_close(item.x_chief_px, item.x_mid_px, 1e-9);
         bst_assert_close(item.x_start_px, item.x_mid_px, 1e-9);
         bst_assert_close(item.y_end_px, item.y_mid_px, 1e-9);
     }

@@ -173,8 +173,8 @@ static void truth_is_that_of_each_row(void **state) {
         bst_assert_close(item.y_mid_px, y + vy * delay, 2e-3);
         bst_assert_close(item.x_end_px - item.x_start_px, vx * exposure * stretch, 2e-3);
         bst_assert_close(item.y_end_px - item.y_start_px, vy * exposure * stretch, 2e-3);
-        bst_assert_close(item.x_mean_px, item.x_mid_px, 2e-3);
-        bst_assert_close(item.y_mean_px, item.y_mid_px, 2e-3);
+        bst_assert_close(item.x_chief_px, item.x_mid_px, 2e-3);
+        bst_assert_close(item.y_chief_px, item.y_mid_px, 2e-3);
         double e = sources[i].electrons_per_s * exposure * stretch;
         bst_assert_close(item.electrons, e, 1e-4 * e);
     }

@@ -1,0 +1,366 @@
+/* The tolerance is a promise about the image: random scenes of all kinds of motion and PSF.
+ *
+ * In every scene: measured error <= predicted error <= tolerance. A scene that cannot be drawn to
+ * the tolerance with the nodes that a frame may have says so, and its prediction still holds. The
+ * median of predicted over measured error is at most 3, and no scene has more than
+ * BST_SCENE_MOST_NODES nodes and a block for each source. Usage: test_tolerance_sweep [slow]
+ * [scenes [first scene]]. */
+#include <string.h>
+
+#include "scenegen/reference.h"
+#include "scenegen/renderer.h"
+#include "scenegen/scene_plan.h"
+#include "sim/world/psf.h"
+#include "tests/scenegen/device_fixture.h"
+#include "tests/scenegen/scene_support.h"
+#include "tests/test_support.h"
+
+static int scenes = 12, first_scene = 0, stride = 7; /* all motions and PSFs */
+
+typedef enum motion_kind {
+    STARE,
+    SLEW,
+    ROLL_ABOUT_CORNER,
+    REVERSAL,
+    JITTER,
+    ACCELERATION,
+    FULL_TURN,
+    WIDE_FIELD,
+    MOVING_TARGETS,
+    MOTIONS
+} motion_kind;
+static const char *const motion_name[MOTIONS] = {"stare",     "slew",       "roll about a corner",
+                                                 "reversal",  "jitter",     "acceleration",
+                                                 "full turn", "wide field", "moving targets"};
+
+typedef enum psf_kind { GAUSSIAN, MOFFAT, DIFFRACTION_Q1, DIFFRACTION_Q2, PSF_FILE, PSFS } psf_kind;
+static const char *const psf_name[PSFS] = {"Gaussian", "Moffat", "diffraction Q 1",
+                                           "diffraction Q 2", "file"};
+
+enum { WIDTH = 128, HEIGHT = 96, MOST_SOURCES = 48, FILE_SIDE = 63 };
+
+typedef struct scene {
+    bst_rng_key key;
+    uint64_t draws;
+    motion_kind motion;
+    psf_kind psf_kind;
+    bst_camera camera;
+    bst_psf *psf;
+    scene_track track;
+    bst_window window;
+    int binning;
+    bst_source sources[MOST_SOURCES];
+    bst_source_path paths[MOST_SOURCES];
+    int count;
+    double background_e, tolerance_sigma;
+} scene;
+
+/* Uniform in [low, high). */
+static double draw(scene *s, double low, double high) {
+    return low + (high - low) * bst_rng_uniform(s->key, s->draws++, 0);
+}
+
+static double draw_log(scene *s, double low, double high) {
+    return low * pow(high / low, draw(s, 0.0, 1.0));
+}
+
+static double draw_sign(scene *s) {
+    return draw(s, 0.0, 1.0) < 0.5 ? -1.0 : 1.0;
+}
+
+/* A skew, two-lobed image, three samples per pixel. */
+static void make_file_psf(fixture *f, scene *s) {
+    static float samples[FILE_SIDE * FILE_SIDE];
+    double a = draw(s, 0.6, 1.4), b = draw(s, 0.6, 1.4), dx = draw(s, -2.0, 2.0),
+           dy = draw(s, -2.0, 2.0), share = draw(s, 0.1, 0.5);
+    for (int j = 0; j < FILE_SIDE; j++) {
+        for (int i = 0; i < FILE_SIDE; i++) {
+            double x = (i - FILE_SIDE / 2) / 3.0, y = (j - FILE_SIDE / 2) / 3.0;
+            double main_lobe = exp(-0.5 * (x * x / (a * a) + y * y / (b * b)));
+            double side_lobe = exp(-0.5 * ((x - dx) * (x - dx) + (y - dy) * (y - dy)));
+            samples[j * FILE_SIDE + i] = (float)(main_lobe + share * side_lobe);
+        }
+    }
+    bst_psf_samples image = {samples, FILE_SIDE, FILE_SIDE, 1, 3.0};
+    bst_psf_inputs inputs = {.samples = &image};
+    s->camera.optics.psf = BST_PSF_FILE;
+    bst_assert_ok(&f->ctx, bst_psf_create_from(&f->ctx, &s->camera, &inputs, &s->psf));
+    s->camera.psf = s->psf;
+}
+
+static void make_psf(fixture *f, scene *s) {
+    bst_optics_config *o = &s->camera.optics;
+    switch (s->psf_kind) {
+        case GAUSSIAN:
+            s->camera.psf_fwhm_px = draw_log(s, 0.8, 6.0);
+            break;
+        case MOFFAT:
+            s->camera.psf_fwhm_px = draw_log(s, 1.2, 4.0);
+            o->psf = BST_PSF_MOFFAT;
+            o->moffat_beta = draw(s, 2.2, 4.5);
+            break;
+        case PSF_FILE:
+            make_file_psf(f, s);
+            break;
+        default:
+            o->psf = BST_PSF_DIFFRACTION;
+            o->q = s->psf_kind == DIFFRACTION_Q1 ? 1.0 : 2.0;
+            o->central_obstruction = draw(s, 0.0, 0.4);
+            o->wavelengths = 1;
+            for (int j = 0; j < 6; j++) { /* Noll 4 to 9 */
+                o->zernike_waves.waves[j + 2] = draw(s, -0.05, 0.05);
+            }
+            break;
+    }
+}
+
+/* Motion of the camera at u in [-1/2, 1/2] of the exposure. */
+typedef struct camera_motion {
+    double direction, travel_px, acceleration, roll_rad, pivot[2], phase;
+    scene_motion jitter;
+} camera_motion;
+
+/* Image motion at the boresight for the kinds that move it along a line. */
+static double along_line(const scene *s, const camera_motion *m, double u) {
+    switch (s->motion) {
+        case REVERSAL:
+            return 0.5 * m->travel_px * sin(2.0 * BST_PI * m->acceleration * u + m->phase);
+        case ACCELERATION:
+            return m->travel_px * (u + m->acceleration * u * u);
+        default:
+            return m->travel_px * u;
+    }
+}
+
+static bst_quat attitude(const scene *s, const camera_motion *m, double u) {
+    double a = bst_camera_scale_rad(&s->camera), d = along_line(s, m, u);
+    double t = (u + 0.5) * m->jitter.duration_s;
+    double x = d * cos(m->direction) + scene_jitter(&m->jitter, 0, t);
+    double y = d * sin(m->direction) + scene_jitter(&m->jitter, 1, t);
+    bst_quat tilt = bst_quat_from_rotvec((bst_vec3){-y * a, x * a, 0.0});
+    bst_vec3 pivot = bst_camera_unproject(&s->camera, m->pivot[0], m->pivot[1]);
+    bst_quat roll = bst_quat_from_rotvec(bst_vec3_scale(pivot, m->roll_rad * u));
+    return bst_quat_mul(tilt, roll);
+}
+
+static void choose_motion(scene *s, camera_motion *m) {
+    m->direction = draw(s, 0.0, 2.0 * BST_PI);
+    m->pivot[0] = 0.5 * (WIDTH - 1);
+    m->pivot[1] = 0.5 * (HEIGHT - 1);
+    switch (s->motion) {
+        case STARE:
+        case MOVING_TARGETS:
+            m->travel_px = draw(s, 0.0, 1.0) < 0.5 ? 0.0 : draw_log(s, 0.5, 60.0);
+            m->travel_px = s->motion == STARE ? 0.0 : m->travel_px;
+            break;
+        case SLEW:
+            m->travel_px = draw_log(s, 0.5, 200.0);
+            break;
+        case ROLL_ABOUT_CORNER:
+            m->roll_rad = draw_sign(s) * draw_log(s, 0.02, 0.6);
+            m->pivot[0] = draw(s, 0.0, 1.0) < 0.5 ? -0.5 : WIDTH - 0.5;
+            m->pivot[1] = draw(s, 0.0, 1.0) < 0.5 ? -0.5 : HEIGHT - 0.5;
+            break;
+        case REVERSAL:
+            m->travel_px = draw_log(s, 1.0, 80.0);
+            m->acceleration = draw(s, 0.4, 2.5); /* turns back so many times */
+            m->phase = draw(s, 0.0, 2.0 * BST_PI);
+            break;
+        case JITTER:
+            m->travel_px = draw(s, 0.0, 1.0) < 0.5 ? 0.0 : draw_log(s, 0.5, 60.0);
+            m->jitter.jitter_px = draw_log(s, 0.05, 1.5);
+            break;
+        case ACCELERATION:
+            m->travel_px = draw_log(s, 2.0, 150.0);
+            m->acceleration = draw(s, -1.0, 1.0);
+            m->roll_rad = draw(s, -0.05, 0.05);
+            break;
+        case FULL_TURN:
+            m->roll_rad = draw_sign(s) * draw(s, BST_PI, 2.0 * BST_PI);
+            break;
+        default: /* WIDE_FIELD */
+            s->camera.pixel_scale_arcsec =
+                2.0 * tan(draw(s, 5.0, 45.0) * BST_DEG_RAD) / WIDTH / BST_ARCSEC_RAD;
+            m->travel_px = draw_log(s, 0.5, 60.0);
+            m->roll_rad = draw(s, -0.2, 0.2);
+            break;
+    }
+}
+
+static void make_track(scene *s) {
+    static const int samples[] = {51, 101, 201, 501};
+    camera_motion m = {.jitter = {.duration_s = 1.0, .seed = s->key.k[0]}};
+    choose_motion(s, &m);
+    bool straight = s->motion == STARE || s->motion == SLEW || s->motion == MOVING_TARGETS;
+    int n = straight && draw(s, 0.0, 1.0) < 0.3 ? 2 : samples[(int)draw(s, 0.0, 4.0)];
+    n = s->motion == JITTER || s->motion == FULL_TURN ? 501 : n;
+    s->track = (scene_track){
+        {n, NULL, NULL}, malloc((size_t)n * sizeof(double)), malloc((size_t)n * sizeof(bst_quat))};
+    for (int k = 0; k < n; k++) {
+        double u = (double)k / (n - 1);
+        s->track.time_s[k] = u * m.jitter.duration_s;
+        s->track.q[k] = attitude(s, &m, u - 0.5);
+    }
+    s->track.track.time_s = s->track.time_s;
+    s->track.track.q_cam_from_gcrf = s->track.q;
+}
+
+static void make_sources(scene *s) {
+    double brightest = draw_log(s, 1e3, 1e6), top = pow(10.0, 0.4 * draw(s, 1.0, 7.0));
+    s->count = (int)draw_log(s, 3.0, MOST_SOURCES);
+    for (int i = 0; i < s->count; i++) {
+        double x = draw(s, -20.0, WIDTH + 20.0), y = draw(s, -20.0, HEIGHT + 20.0);
+        double light = i == 0 ? brightest : brightest / (1.0 + draw(s, 0.0, 1.0) * (top - 1.0));
+        x = i == 0 ? draw(s, 5.0, WIDTH - 5.0) : x;
+        y = i == 0 ? draw(s, 5.0, HEIGHT - 5.0) : y;
+        s->sources[i] = scene_star(&s->camera, x, y, light);
+        if (s->motion == MOVING_TARGETS && i % 2 == 0) {
+            double length = draw_log(s, 0.5, 80.0), angle = draw(s, 0.0, 2.0 * BST_PI);
+            double dx = 0.5 * length * cos(angle), dy = 0.5 * length * sin(angle);
+            double bend = 0.1 * length * draw(s, -1.0, 1.0);
+            s->paths[i] = bst_source_path_through(
+                bst_camera_unproject(&s->camera, x - dx, y - dy),
+                bst_camera_unproject(&s->camera, x - bend * sin(angle), y + bend * cos(angle)),
+                bst_camera_unproject(&s->camera, x + dx, y + dy));
+            s->sources[i].kind = BST_SOURCE_OBJECT;
+            s->sources[i].path = &s->paths[i];
+            s->sources[i].apparent_mid = bst_vec3_unit(bst_source_place(&s->paths[i], 0.5));
+        }
+    }
+}
+
+static void open_scene(fixture *f, scene *s, int index) {
+    static const double tolerances[] = {0.02, 0.05, 0.05, 0.2};
+    memset(s, 0, sizeof *s);
+    s->key = bst_rng_make_key((uint64_t)index, 0, "test", "tolerance sweep");
+    s->motion = (motion_kind)(index % MOTIONS);
+    s->psf_kind = (psf_kind)(index / MOTIONS * 2 + index % MOTIONS) % PSFS;
+    s->camera = scene_camera(WIDTH, HEIGHT);
+    s->camera.read_noise_e = draw_log(s, 2.0, 15.0);
+    s->background_e = draw_log(s, 0.5, 300.0);
+    s->tolerance_sigma = tolerances[(int)draw(s, 0.0, 4.0)];
+    make_psf(f, s);
+    make_track(s);
+    make_sources(s);
+    s->window = (bst_window){0, 0, WIDTH, HEIGHT};
+    if (draw(s, 0.0, 1.0) < 0.2) {
+        int x0 = (int)draw(s, 0.0, WIDTH - 48), y0 = (int)draw(s, 0.0, HEIGHT - 40);
+        s->window = (bst_window){x0, y0, 48, 40};
+    }
+    s->binning = draw(s, 0.0, 1.0) < 0.2 ? 2 : 1;
+}
+
+static void close_scene(scene *s) {
+    scene_track_free(&s->track);
+    bst_psf_free(s->psf);
+}
+
+/* Largest error in sigma of a pixel that is read: the sum of binning x binning of the sensor's. */
+static double largest_error(const scene *s, const float *fast, const double *reference) {
+    double worst = 0.0, read = s->camera.read_noise_e;
+    int b = s->binning, width = s->window.width;
+    for (int y = 0; y + b <= s->window.height; y += b) {
+        for (int x = 0; x + b <= width; x += b) {
+            double error = 0.0, light = 0.0;
+            for (int k = 0; k < b * b; k++) {
+                size_t at = (size_t)(y + k / b) * (size_t)width + (size_t)(x + k % b);
+                assert_true(isfinite(fast[at]));
+                error += (double)fast[at] - s->background_e - reference[at];
+                light += fmax(reference[at], 0.0) + s->background_e;
+            }
+            worst = fmax(worst, fabs(error) / sqrt(light + read * read));
+        }
+    }
+    return worst;
+}
+
+typedef struct outcome {
+    double measured, predicted;
+    long long nodes;
+    bool missed;
+} outcome;
+
+static outcome render(fixture *f, scene *s) {
+    bst_renderer_options options = bst_renderer_default_options();
+    options.tolerance_sigma = s->tolerance_sigma;
+    bst_renderer *r;
+    bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, &s->camera, &options, &r));
+    bst_render_request q = {.window = s->window,
+                            .track = &s->track.track,
+                            .sources = s->sources,
+                            .count = s->count,
+                            .background_e = s->background_e,
+                            .binning = s->binning};
+    size_t pixels = (size_t)s->window.width * (size_t)s->window.height;
+    float *fast = malloc(pixels * sizeof *fast);
+    double *reference = calloc(pixels, sizeof *reference);
+    bst_assert_ok(&f->ctx, bst_renderer_render_noise_free(&f->ctx, r, &q, fast));
+    bst_assert_ok(&f->ctx, bst_reference_render(&f->ctx, &s->camera, s->window, &s->track.track,
+                                                s->sources, s->count, 1e-9, reference));
+    bst_render_stats stats;
+    bst_renderer_get_stats(r, &stats);
+    outcome o = {.measured = largest_error(s, fast, reference),
+                 .predicted = stats.predicted_sigma,
+                 .nodes = stats.nodes,
+                 .missed = stats.tolerance_missed};
+    free(fast);
+    free(reference);
+    bst_renderer_free(r);
+    return o;
+}
+
+static int ascending(const void *a, const void *b) {
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static void the_tolerance_is_kept(void **state) {
+    fixture *f = *state;
+    static scene s;
+    double *ratio = malloc((size_t)scenes * sizeof *ratio);
+    int broken = 0, above = 0, missed = 0, lit = 0;
+    for (int i = 0; i < scenes; i++) {
+        open_scene(f, &s, first_scene + i * stride);
+        outcome o = render(f, &s);
+        assert_true(o.nodes <= BST_SCENE_MOST_NODES + (long long)BST_BLOCK * s.count);
+        bool bad = !(o.measured <= o.predicted), over = !(o.predicted <= s.tolerance_sigma);
+        /* below 1e-3 of the tolerance floats round, and there is no light to speak of */
+        if (o.measured > 1e-3 * s.tolerance_sigma) {
+            ratio[lit++] = o.predicted / o.measured;
+        }
+        print_message(
+            "%3d %-19s %-15s bin %d win %3d tol %5.3f measured %8.5f predicted %8.5f "
+            "ratio %6.2f nodes %8lld%s%s\n",
+            first_scene + i * stride, motion_name[s.motion], psf_name[s.psf_kind], s.binning,
+            s.window.width, s.tolerance_sigma, o.measured, o.predicted, o.predicted / o.measured,
+            o.nodes, bad ? " MEASURED > PREDICTED" : "", over ? " PREDICTED > TOLERANCE" : "");
+        broken += bad;
+        above += over && !o.missed;
+        missed += o.missed;
+        close_scene(&s);
+    }
+    qsort(ratio, (size_t)lit, sizeof *ratio, ascending);
+    print_message(
+        "%d scenes: %d above the prediction, %d predicted above the tolerance, %d said "
+        "so; predicted / measured: least %.2f, median %.2f, largest %.2f\n",
+        scenes, broken, above, missed, ratio[0], ratio[lit / 2], ratio[lit - 1]);
+    assert_int_equal(broken, 0);
+    assert_int_equal(above, 0);
+    if (scenes >= 100) { /* enough for a median */
+        assert_true(ratio[lit / 2] <= 3.0);
+    }
+    free(ratio);
+}
+
+int main(int argc, char **argv) {
+    int next = 1;
+    if (argc > next && strcmp(argv[next], "slow") == 0) {
+        scenes = 200;
+        stride = 1;
+        next++;
+    }
+    scenes = argc > next ? atoi(argv[next]) : scenes;
+    first_scene = argc > next + 1 ? atoi(argv[next + 1]) : first_scene;
+    const struct CMUnitTest tests[] = {cmocka_unit_test(the_tolerance_is_kept)};
+    return cmocka_run_group_tests(tests, open_device, close_device);
+}
