@@ -117,7 +117,7 @@ static bst_status plan_sources(bst_ctx *ctx, bst_scene_plan *p, planning *m, boo
  * far as that helps; or, where there are too many nodes, at a larger one. */
 static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m, double tolerance,
                                     int most_blocks) {
-    enum { ROUNDS = 8, CROWD = 500 };
+    enum { ROUNDS = 8, CROWD = 500, TOO_MANY = 20000 };
     /* So many stars have some so near each other that their errors add up: at half the tolerance
      * they need not be planned twice. */
     static const double CROWD_AIM = 0.45;
@@ -144,6 +144,9 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
                         "draw fewer stars (v_limit)",
                         p->count, m->request->count, 1e-6 * BST_BLOCK * p->blocks);
     }
+    /* the errors of very many sources take as long to add up as the frame to draw: at CROWD_AIM the
+     * prediction, made when it is asked for, says what came of it */
+    coarse = coarse || m->request->count > TOO_MANY;
     for (int round = 0, idle = 0; round < ROUNDS && idle < 2 && !coarse; round++) {
         double error = bst_crowd_error_sigma(m->crowd), last = aim;
         if (error <= tolerance) {
