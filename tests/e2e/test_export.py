@@ -489,14 +489,14 @@ with open(words[-1][5:], "wb") as file:
     file.write(repr((words, len(data), data[:3])).encode())
 """
 
-    def with_fake(self, out, encoder="libx264", broken=False):
+    def with_fake(self, out, encoder="libx264", broken=False, rate="12.5"):
         """Exports a film with a program in ffmpeg's place."""
         folder = runs.scratch()
         path = os.path.join(folder, "ffmpeg")
         with open(path, "w", encoding="ascii") as file:
             file.write(self.FAKE.format(python=sys.executable, encoder=encoder, broken=broken))
         os.chmod(path, 0o755)
-        return call("export", self.made, "--frames", "mp4", "--size", "101", "--fps", "12.5",
+        return call("export", self.made, "--frames", "mp4", "--size", "101", "--fps", rate,
                     "--last", "6", "--out", out, env={**os.environ, "PATH": folder})
 
     def test_film_is_fed_rightly(self):
@@ -512,6 +512,27 @@ with open(words[-1][5:], "wb") as file:
             after = dict(zip(words, words[1:]))
             self.assertEqual((after["-video_size"], after["-framerate"], after["-c:v"],
                               after["-pixel_format"]), ("101x101", "12.5", expected, "bgr24"))
+
+    def test_film_is_bounded(self):
+        """By the encoder's buffer model: the rate times the film's length, and the buffer once."""
+        for encoder in ("libx264", "libfoo"):
+            for rate in ("0.5", "12.5", "240"):
+                out = self.out()
+                result = self.with_fake(out, encoder, rate=rate)
+                self.assertEqual((result.returncode, result.stderr), (0, ""))
+                with open(out + "/frames.mp4", encoding="ascii") as file:
+                    words = eval(file.read())[0]
+                after = dict(zip(words, words[1:]))
+                longest = max(1.0, 1.0 / float(rate))  # of a second and a frame
+                bits = float(after["-maxrate"]) * longest + float(after["-bufsize"])
+                self.assertLessEqual(bits, 8e6 * longest)
+
+    @unittest.skipUnless(shutil.which("ffmpeg"), "needs ffmpeg")
+    def test_film_of_noise_is_small(self):
+        out = self.out()
+        export(self.made, "--frames", "mp4", "--annotate", "--stretch", "frame", "--out", out)
+        frames = len(list(self.database.execute("SELECT 1 FROM frames")))
+        self.assertLess(os.path.getsize(out + "/frames.mp4"), 1e6 * frames / 10)
 
     def test_film_that_fails(self):
         out = self.out()
