@@ -73,9 +73,10 @@ static bst_status make_folder(bst_ctx *ctx, const char *given, const bst_run_rea
     return BST_OK;
 }
 
-/* The folder of --satnet: a relative one lies in that of --out, where there is one. */
-static bst_status make_satnet_folder(bst_ctx *ctx, const char *given, const char *base,
-                                     const bst_run_reader *run, char *out, size_t bytes) {
+/* The folder of --satnet, --coco or --yolo: a relative one lies in that of --out, where there is
+ * one. */
+static bst_status make_set_folder(bst_ctx *ctx, const char *given, const char *base,
+                                  const bst_run_reader *run, char *out, size_t bytes) {
     char path[4096];
     if (!base || given[0] == '/') {
         return make_folder(ctx, given, run, out, bytes);
@@ -115,7 +116,7 @@ int bst_cmd_export(int argc, char **argv) {
     bool help = false;
     double split[3];
     int frames = NOT_ASKED, table_format = NOT_ASKED, orbits = NOT_ASKED, observations = NOT_ASKED;
-    int stretch = 0, angles = 0;
+    int stretch = 0, angles = 0, bits = 0;
     const char *out = NULL, *tables = NULL;
     bst_export e = {.last = INT64_C(9007199254740992),
                     .every = 1,
@@ -156,6 +157,26 @@ int bst_cmd_export(int argc, char **argv) {
          .doc =
              "a FITS file and a JSON annotation per frame, for training networks: ImageFiles/ and "
              "Annotations/ in FOLDER, which lies in that of --out where that is given"},
+        {.name = "coco",
+         .kind = BST_OPTION_TEXT,
+         .target = &e.coco,
+         .path = BST_PATH_OUTPUT_FOLDER,
+         .argument = "FOLDER",
+         .doc = "PNG images with bounding boxes as COCO has them: images/ and annotations.json; "
+                "FOLDER as for --satnet"},
+        {.name = "yolo",
+         .kind = BST_OPTION_TEXT,
+         .target = &e.yolo,
+         .path = BST_PATH_OUTPUT_FOLDER,
+         .argument = "FOLDER",
+         .doc = "the same as YOLO has them: images/, labels/ and data.yaml"},
+        {.name = "bits",
+         .kind = BST_OPTION_CHOICE,
+         .target = &bits,
+         .argument = "16|8",
+         .doc =
+             "coco, yolo: images of the counts as they are (16, default), or of grey levels, each "
+             "frame's own (8)"},
         {.name = "out",
          .kind = BST_OPTION_TEXT,
          .target = &out,
@@ -240,14 +261,16 @@ int bst_cmd_export(int argc, char **argv) {
          .kind = BST_OPTION_REAL,
          .target = &e.box_px,
          .argument = "PX",
-         .doc = "satnet: side of the boxes (default 20); 0: the extent of each track",
+         .doc =
+             "satnet: side of the boxes (default 20); 0: the extent of each track. coco, yolo: the "
+             "way of the light, grown by half of it on each side",
          .minimum = 0,
          .maximum = 65536},
         {.name = "star-limit",
          .kind = BST_OPTION_REAL,
          .target = &e.star_limit,
          .argument = "MAG",
-         .doc = "satnet: faintest V of the stars that are labelled (default 10)",
+         .doc = "satnet, coco, yolo: faintest V of the stars that are labelled (default 10)",
          .minimum = -30,
          .maximum = 40},
         {.name = "help", .kind = BST_OPTION_FLAG, .target = &help, .doc = "print this"},
@@ -276,9 +299,10 @@ int bst_cmd_export(int argc, char **argv) {
         return bst_options_misuse(&ctx, "export");
     }
     if (frames == NOT_ASKED && table_format == NOT_ASKED && orbits == NOT_ASKED &&
-        observations == NOT_ASKED && !e.satnet) {
+        observations == NOT_ASKED && !e.satnet && !e.coco && !e.yolo) {
         bst_fail(&ctx, BST_ERR_ARGUMENT,
-                 "nothing to export: add --frames, --table, --orbits, --observations or --satnet");
+                 "nothing to export: add --frames, --table, --orbits, --observations, --satnet, "
+                 "--coco or --yolo");
         return bst_options_misuse(&ctx, "export");
     }
     if (e.objects && orbits == NOT_ASKED) {
@@ -292,6 +316,7 @@ int bst_cmd_export(int argc, char **argv) {
     e.observation_format = observations;
     e.filtered = angles == 1;
     e.each_stretch = stretch == 1;
+    e.image_bits = bits == 1 ? 8 : 16;
     bst_stop_catch_signals();
     bst_run_reader *run = NULL;
     char folder[4096];
@@ -305,12 +330,15 @@ int bst_cmd_export(int argc, char **argv) {
         }
         status = others ? make_folder(&ctx, out, run, folder, sizeof folder) : BST_OK;
     }
-    char satnet[4096];
-    if (status == BST_OK && e.satnet) {
-        status = make_satnet_folder(&ctx, e.satnet, out, run, satnet, sizeof satnet);
-        e.satnet = satnet;
-        for (size_t n = strlen(satnet); n > 1 && satnet[n - 1] == '/';) {
-            satnet[--n] = '\0';
+    char sets[3][4096];
+    const char **const of_sets[] = {&e.satnet, &e.coco, &e.yolo};
+    for (int k = 0; k < 3 && status == BST_OK; k++) {
+        if (*of_sets[k]) {
+            status = make_set_folder(&ctx, *of_sets[k], out, run, sets[k], sizeof sets[k]);
+            *of_sets[k] = sets[k];
+            for (size_t n = strlen(sets[k]); n > 1 && sets[k][n - 1] == '/';) {
+                sets[k][--n] = '\0';
+            }
         }
     }
     if (status == BST_OK && table_format != NOT_ASKED) {
@@ -330,6 +358,9 @@ int bst_cmd_export(int argc, char **argv) {
     }
     if (status == BST_OK && e.satnet) {
         status = bst_export_satnet(&ctx, &e);
+    }
+    if (status == BST_OK && (e.coco || e.yolo)) {
+        status = bst_export_boxes(&ctx, &e);
     }
     bst_run_reader_close(run);
     if (status != BST_OK) {

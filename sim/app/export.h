@@ -43,7 +43,10 @@ typedef struct bst_export {
     const char *satnet; /* folder */
     double box_px;      /* side of a box; 0: the extent of the track */
     double star_limit;  /* faintest V of the stars that are labelled */
-    const char *split;  /* "80,10,10": shares of training, validation and test; NULL: none */
+    /* boxes */
+    const char *coco, *yolo; /* folders; NULL: not asked for */
+    int image_bits;          /* 16, or 8 */
+    const char *split;       /* "80,10,10": shares of training, validation and test; NULL: none */
 } bst_export;
 
 enum { BST_EXPORT_SENSORS = 64 };
@@ -66,6 +69,12 @@ bst_status bst_export_views(bst_ctx *ctx, const bst_export *e, const bst_scenari
 bst_status bst_export_split(bst_ctx *ctx, const char *text, double shares[3]) BST_MUST_CHECK;
 /* Images and annotations as SatNet has them, below e->satnet. */
 bst_status bst_export_satnet(bst_ctx *ctx, const bst_export *e) BST_MUST_CHECK;
+/* PNG images with bounding boxes, as COCO and YOLO have them, below e->coco and e->yolo. */
+bst_status bst_export_boxes(bst_ctx *ctx, const bst_export *e) BST_MUST_CHECK;
+/* Name of a set of frames: that of the run's folder, with the sensor's (NULL: without). */
+void bst_export_set_name(const bst_run_reader *run, const bst_export_sensor *sensor, char out[256]);
+/* BST_ERR_NOT_FOUND for a run without truth, by which frames are labelled. */
+bst_status bst_export_need_truth(bst_ctx *ctx, const bst_run_reader *run) BST_MUST_CHECK;
 /* observations.tdm, .json or .csv: what sensors measured of tracks. */
 bst_status bst_export_observations(bst_ctx *ctx, const bst_export *e) BST_MUST_CHECK;
 /* observers.oem: the observers' orbits as they are known on board, which a TDM refers to. */

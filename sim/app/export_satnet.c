@@ -329,9 +329,9 @@ static bst_status write_frames(bst_ctx *ctx, job *j) {
     return status;
 }
 
-/* Name of the set: that of the run's folder, and of the sensor where there are several. */
-static void name_set(job *j, int sensors) {
-    const char *folder = bst_run_reader_folder(j->e->run);
+void bst_export_set_name(const bst_run_reader *run, const bst_export_sensor *sensor,
+                         char out[256]) {
+    const char *folder = bst_run_reader_folder(run);
     size_t length = strlen(folder);
     while (length > 1 && folder[length - 1] == '/') {
         length--;
@@ -340,10 +340,19 @@ static void name_set(job *j, int sensors) {
     while (start > 0 && folder[start - 1] != '/') {
         start--;
     }
-    snprintf(j->set, sizeof j->set, "%.*s%s%s%s%s",
-             (int)(length - start < 100 ? length - start : 100), folder + start,
-             sensors > 1 ? "_" : "", sensors > 1 ? j->sensor->observer : "", sensors > 1 ? "_" : "",
-             sensors > 1 ? j->sensor->name : "");
+    snprintf(out, 256, "%.*s%s%s%s%s", (int)(length - start < 100 ? length - start : 100),
+             folder + start, sensor ? "_" : "", sensor ? sensor->observer : "", sensor ? "_" : "",
+             sensor ? sensor->name : "");
+}
+
+bst_status bst_export_need_truth(bst_ctx *ctx, const bst_run_reader *run) {
+    if (bst_run_reader_has_tables(run) &&
+        bst_run_reader_int(run, "SELECT count(*) FROM exposures", 0, -1) >= 0) {
+        return BST_OK;
+    }
+    return bst_fail(ctx, BST_ERR_NOT_FOUND,
+                    "%s: holds no truth to label frames by; run it with /record/truth=true",
+                    bst_run_reader_folder(run));
 }
 
 static bst_status export_sensor(bst_ctx *ctx, job *j, int sensors) {
@@ -358,7 +367,7 @@ static bst_status export_sensor(bst_ctx *ctx, job *j, int sensors) {
                         bst_run_reader_folder(j->e->run), j->sensor->observer, j->sensor->name);
     }
     j->camera = &((const bst_sensor_config *)observers[observer].sensors.items)[sensor].camera;
-    name_set(j, sensors);
+    bst_export_set_name(j->e->run, sensors > 1 ? j->sensor : NULL, j->set);
     BST_TRY(bst_run_reader_file(ctx, j->e->run, j->sensor->file, path, sizeof path));
     BST_TRY(bst_fits_reader_open(ctx, path, &j->fits));
     bst_status status = write_frames(ctx, j);
@@ -382,12 +391,7 @@ static bst_status export_all(bst_ctx *ctx, job *j) {
     int count, kept = 0;
     int64_t several = bst_run_reader_int(j->e->run, "SELECT count(*) FROM sensors", 0, 1);
     BST_TRY(bst_export_sensors(ctx, j->e, sensors, &count));
-    if (bst_run_reader_int(j->e->run, "SELECT count(*) FROM exposures", 0, -1) < 0 ||
-        !bst_run_reader_has_tables(j->e->run)) {
-        return bst_fail(ctx, BST_ERR_NOT_FOUND,
-                        "%s: holds no truth to label frames by; run it with /record/truth=true",
-                        bst_run_reader_folder(j->e->run));
-    }
+    BST_TRY(bst_export_need_truth(ctx, j->e->run));
     for (int i = 0; i < count; i++) {
         if (sensors[i].file[0]) {
             kept++;

@@ -6,7 +6,7 @@ import zlib
 
 
 def read_png(path):
-    """Width, height and rows of RGB or grey bytes of a PNG of 8 bits (ISO 15948)."""
+    """Width, height and rows of bytes of a PNG (ISO 15948): RGB or grey of 8 bits, or grey of 16."""
     with open(path, "rb") as file:
         data = file.read()
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
@@ -17,11 +17,11 @@ def read_png(path):
         assert zlib.crc32(kind + part) == struct.unpack(">I", data[at + 8 + size:at + 12 + size])[0]
         if kind == b"IHDR":
             width, height, depth, colour = struct.unpack(">IIBB", part[:10])
-            assert (depth, colour) in ((8, 2), (8, 0)), (depth, colour)
+            assert (depth, colour) in ((8, 2), (8, 0), (16, 0)), (depth, colour)
         body += part if kind == b"IDAT" else b""
         at += 12 + size
     assert kind == b"IEND"
-    return width, height, unfilter(zlib.decompress(body), width, height, 3 if colour == 2 else 1)
+    return width, height, unfilter(zlib.decompress(body), width, height, 3 if colour == 2 else depth // 8)
 
 
 def unfilter(data, width, height, channels):

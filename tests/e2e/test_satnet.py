@@ -21,7 +21,9 @@ OBJECT_KEYS = {
     "class_name", "class_id", "y_min", "x_min", "y_max", "x_max", "y_center", "x_center",
     "bbox_height", "bbox_width", "source", "magnitude", "pe_per_sec", "y_start", "x_start", "y_mid",
     "x_mid", "y_end", "x_end", "seg_id", "object_name", "object_id", "pixels", "snr",
-    "snr_aperture", "ra", "dec"}
+    "snr_aperture", "ra", "dec"} | {
+        # and of Boresight alone
+        "x_centroid", "y_centroid", "x_chief", "y_chief"}
 
 
 def tearDownModule():

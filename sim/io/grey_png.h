@@ -1,0 +1,17 @@
+/* Grey pixels as PNG, one pixel for each. */
+#ifndef BST_IO_GREY_PNG_H
+#define BST_IO_GREY_PNG_H
+
+#include <stdint.h>
+
+#include "sim/core/status.h"
+
+/* Writes width x height pixels, row 0 at the top, whole or not at all: of 16 bits, values as they
+ * are (their scale is linear, and the file says so), or of 8 bits. Errors: BST_ERR_MEMORY,
+ * BST_ERR_IO. Format: ISO/IEC 15948. */
+bst_status bst_grey_png_write16(bst_ctx *ctx, const char *path, const uint16_t *pixels, int width,
+                                int height) BST_MUST_CHECK;
+bst_status bst_grey_png_write8(bst_ctx *ctx, const char *path, const uint8_t *pixels, int width,
+                               int height) BST_MUST_CHECK;
+
+#endif
