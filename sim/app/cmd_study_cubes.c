@@ -31,6 +31,7 @@ enum {
     BACKGROUND,
     BYTES,
     LABEL_BYTES,
+    MASK_BYTES,
     PART,
     METRICS
 };
@@ -44,6 +45,7 @@ static const bst_metric metrics[METRICS] = {
     [BACKGROUND] = {"background_e", "e-", "Sky and dark current per pixel, mean of the frames.", 0},
     [BYTES] = {"bytes", "", "Bytes of the file of frames.", 0},
     [LABEL_BYTES] = {"label_bytes", "", "Bytes of the file of labels.", 0},
+    [MASK_BYTES] = {"mask_bytes", "", "Bytes of the file of masks; 0: none.", 0},
     [PART] = {"part", "", "0: training, 1: validation, 2: test.", 0},
 };
 
@@ -57,6 +59,8 @@ typedef struct cube {
     char scope[160];
     const char *target; /* FITS OBJECT; NULL: none */
     bst_fits *fits;
+    bst_fits *masks;           /* NULL: none */
+    bst_fits_frame mask_frame; /* the newest frame, without what its truth adds */
     bst_labels labels;
     double background;
     bst_frame_message waiting; /* the frame whose truth has not come */
@@ -166,7 +170,25 @@ static bst_status write_frame(cube *c, const bst_frame_message *m, const bst_tru
     return BST_OK;
 }
 
+/* The mask of the newest frame, whose message comes before that of its planes. */
+static bst_status take_planes(cube *c, const bst_planes *p) {
+    if (!c->masks || !p->segmentation || p->exposure_id != c->mask_frame.id) {
+        return BST_OK;
+    }
+    return bst_fits_write_plane(c->ctx, c->masks, &c->mask_frame, "SEGMENTATION", p->segmentation,
+                                p->width, p->height, NULL);
+}
+
 static bst_status take_frame(cube *c, const bst_frame_message *m) {
+    int64_t rate = c->scenario->tick_rate_hz;
+    c->mask_frame =
+        (bst_fits_frame){.id = m->exposure_id,
+                         .start = bst_time_at_tick(c->scenario->epoch, m->start_tick, rate),
+                         .exposure_s = (double)(m->end_tick - m->start_tick) / (double)rate,
+                         .window = m->window,
+                         .binning = m->binning,
+                         .bits = m->bits,
+                         .pixel_scale_arcsec = c->camera->pixel_scale_arcsec};
     for (int i = 0; i < KEPT; i++) {
         if (c->truths[i] && c->truths[i]->exposure_id == m->exposure_id) {
             return write_frame(c, m, c->truths[i]);
@@ -209,7 +231,8 @@ static bool wants(void *user, const char *scope, const char *channel, const void
     (void)tick;
     if (!mark->of) {
         bool looked_at = strcmp(scope, c->scope) == 0 && (strcmp(channel, BST_CHANNEL_FRAME) == 0 ||
-                                                          strcmp(channel, BST_CHANNEL_TRUTH) == 0);
+                                                          strcmp(channel, BST_CHANNEL_TRUTH) == 0 ||
+                                                          strcmp(channel, BST_CHANNEL_PLANES) == 0);
         mark->of = c;
         mark->unwanted_before = looked_at ? 0 : INT64_MAX;
     }
@@ -220,8 +243,9 @@ static bst_status on_message(void *user, const char *scope, const char *channel,
                              const void *payload, int64_t tick) {
     (void)scope;
     (void)tick;
-    return strcmp(channel, BST_CHANNEL_FRAME) == 0 ? take_frame(user, payload)
-                                                   : take_truth(user, payload);
+    return strcmp(channel, BST_CHANNEL_FRAME) == 0    ? take_frame(user, payload)
+           : strcmp(channel, BST_CHANNEL_PLANES) == 0 ? take_planes(user, payload)
+                                                      : take_truth(user, payload);
 }
 
 static bool interrupted(void *user, int64_t tick) {
@@ -240,9 +264,9 @@ static bst_status path_of(bst_ctx *ctx, const bst_study_run *run, const char *fo
     return n > 0 && n < 4096 ? BST_OK : bst_fail(ctx, BST_ERR_ARGUMENT, "%s: too long", run->out);
 }
 
-static bst_status make_folders(bst_ctx *ctx, const char *out) {
-    static const char *const names[] = {"ImageFiles", "Annotations"};
-    for (int k = 0; k < 2; k++) {
+static bst_status make_folders(bst_ctx *ctx, const char *out, bool masks) {
+    static const char *const names[] = {"ImageFiles", "Annotations", "MaskFiles"};
+    for (int k = 0; k < 2 + masks; k++) {
         char path[4200];
         snprintf(path, sizeof path, "%.4000s/%s", out, names[k]);
         BST_TRY(bst_folder_make(ctx, path));
@@ -251,23 +275,29 @@ static bst_status make_folders(bst_ctx *ctx, const char *out) {
 }
 
 static bst_status step_through(bst_ctx *ctx, cube *c, bst_simulation *sim, const char *fits,
-                               const char *labels, const bst_study_run *run) {
+                               const char *labels, const char *masks, const bst_study_run *run) {
     char program[64];
     snprintf(program, sizeof program, "boresight %s", bst_version());
     const char *slash = strchr(c->scope, '/');
     char observer[160];
     snprintf(observer, sizeof observer, "%.*s", (int)(slash - c->scope), c->scope);
-    const bst_fits_info info = {.observer = observer,
-                                .instrument = slash + 1,
-                                .object = c->target,
-                                .program = program,
-                                .camera = c->camera,
-                                .checksums = c->scenario->record.checksums,
-                                .compression = c->config->compress ? BST_FITS_RICE : BST_FITS_RAW,
-                                .content = BST_FITS_COUNTS};
+    bst_fits_info info = {.observer = observer,
+                          .instrument = slash + 1,
+                          .object = c->target,
+                          .program = program,
+                          .camera = c->camera,
+                          .checksums = c->scenario->record.checksums,
+                          .compression = c->config->compress ? BST_FITS_RICE : BST_FITS_RAW,
+                          .content = BST_FITS_COUNTS};
     unlink(fits);
     BST_TRY(bst_fits_create(ctx, fits, c->config->compress ? BST_FITS_EXTENSIONS : BST_FITS_CUBE,
                             &info, &c->fits));
+    if (c->config->masks) {
+        info.compression = BST_FITS_RAW;
+        info.content = BST_FITS_ITEMS;
+        unlink(masks);
+        BST_TRY(bst_fits_create(ctx, masks, BST_FITS_EXTENSIONS, &info, &c->masks));
+    }
     int fd;
     BST_TRY(bst_draft_make_at(ctx, labels, &fd));
     c->labels.stream = fdopen(fd, "w");
@@ -294,6 +324,8 @@ static bst_status step_through(bst_ctx *ctx, cube *c, bst_simulation *sim, const
 static bst_status close_files(bst_ctx *ctx, cube *c, bst_status status) {
     bst_ctx quiet = {0};
     bst_status closed = bst_fits_close(status == BST_OK ? ctx : &quiet, c->fits);
+    bst_status masks_closed = bst_fits_close(status == BST_OK ? ctx : &quiet, c->masks);
+    closed = closed == BST_OK ? masks_closed : closed;
     if (c->labels.stream) {
         fprintf(c->labels.stream,
                 "\n],\"stats\":{\"num_frames\":%" PRId64 ",\"num_satellite_labels\":%" PRId64
@@ -319,8 +351,8 @@ int bst_study_part(const bst_study_cubes_config *c, uint64_t seed, int64_t run) 
     return u < c->train ? 0 : u < c->train + c->validation ? 1 : 2;
 }
 
-static void fill(const cube *c, const char *fits, const char *labels, const bst_study_run *run,
-                 double *m) {
+static void fill(const cube *c, const char *fits, const char *labels, const char *masks,
+                 const bst_study_run *run, double *m) {
     const bst_labels *l = &c->labels;
     m[FRAMES] = (double)l->frames;
     m[SATELLITES] = (double)l->satellites;
@@ -330,19 +362,23 @@ static void fill(const cube *c, const char *fits, const char *labels, const bst_
     m[BACKGROUND] = l->frames > 0 ? c->background / (double)l->frames : NAN;
     m[BYTES] = file_bytes(fits);
     m[LABEL_BYTES] = file_bytes(labels);
+    m[MASK_BYTES] = c->config->masks ? file_bytes(masks) : 0.0;
     m[PART] = bst_study_part(c->config, c->scenario->seed, run->place.run);
 }
 
 static bst_status make_cube(bst_ctx *ctx, cube *c, bst_simulation *sim, const bst_study_run *run,
                             bst_study_result *out) {
-    char fits[4096], labels[4096], fits_draft[4096], labels_draft[4096];
+    char fits[4096], labels[4096], fits_draft[4096], labels_draft[4096], masks[4096],
+        masks_draft[4096];
     BST_TRY(path_of(ctx, run, "ImageFiles", ".fits", fits));
     BST_TRY(path_of(ctx, run, "ImageFiles", ".fits.partial", fits_draft));
     BST_TRY(path_of(ctx, run, "Annotations", ".json", labels));
     BST_TRY(path_of(ctx, run, "Annotations", ".json.partial", labels_draft));
-    bst_status status = make_folders(ctx, run->out);
+    BST_TRY(path_of(ctx, run, "MaskFiles", ".fits", masks));
+    BST_TRY(path_of(ctx, run, "MaskFiles", ".fits.partial", masks_draft));
+    bst_status status = make_folders(ctx, run->out, c->config->masks);
     if (status == BST_OK) {
-        status = step_through(ctx, c, sim, fits_draft, labels_draft, run);
+        status = step_through(ctx, c, sim, fits_draft, labels_draft, masks_draft, run);
     }
     status = close_files(ctx, c, status);
     if (status == BST_OK && c->labels.frames == 0) {
@@ -351,8 +387,9 @@ static bst_status make_cube(bst_ctx *ctx, cube *c, bst_simulation *sim, const bs
                      "%s: no frame ends within the run; make duration_s longer", c->scenario->file);
     }
     if (status == BST_OK) {
-        fill(c, fits_draft, labels_draft, run, out->metrics);
-        if (rename(fits_draft, fits) != 0 || rename(labels_draft, labels) != 0) {
+        fill(c, fits_draft, labels_draft, masks_draft, run, out->metrics);
+        if ((c->config->masks && rename(masks_draft, masks) != 0) ||
+            rename(fits_draft, fits) != 0 || rename(labels_draft, labels) != 0) {
             status = bst_fail(ctx, BST_ERR_IO, "%s: cannot be put in its place: %s", fits,
                               strerror(errno));
         }
@@ -360,8 +397,15 @@ static bst_status make_cube(bst_ctx *ctx, cube *c, bst_simulation *sim, const bs
     if (status != BST_OK) {
         unlink(fits_draft);
         unlink(labels_draft);
+        unlink(masks_draft);
     }
     return status;
+}
+
+static void ask_for_masks(const bst_study_cubes_config *config, bst_scenario *scenario) {
+    if (config->masks) {
+        scenario->record.planes |= UINT32_C(1) << BST_PLANE_SEGMENTATION;
+    }
 }
 
 static bst_status run_cubes(bst_ctx *ctx, void *worker, const bst_study_run *run,
@@ -374,6 +418,7 @@ static bst_status run_cubes(bst_ctx *ctx, void *worker, const bst_study_run *run
     BST_TRY(read_settings(ctx, run, &config));
     bst_status status = bst_study_read_scenario(ctx, run, &scenario);
     if (status == BST_OK) {
+        ask_for_masks(&config, &scenario);
         sensor = find_sensor(&scenario, config.sensor, &observer, c.scope);
         status = sensor >= 0 ? bst_study_simulation(ctx, worker, &scenario, &sim)
                              : bst_fail(ctx, BST_ERR_CONFIG, "%s: there is no sensor %s",
@@ -385,8 +430,10 @@ static bst_status run_cubes(bst_ctx *ctx, void *worker, const bst_study_run *run
         const bst_observer_config *observers = scenario.observers.items;
         const bst_sensor_config *sensors = observers[observer].sensors.items;
         c.target = *sensors[sensor].cue.object ? sensors[sensor].cue.object : NULL;
-        c.labels = (bst_labels){
-            .world = world, .box_px = config.box_px, .star_limit_v_mag = config.star_limit_v_mag};
+        c.labels = (bst_labels){.world = world,
+                                .box_px = config.box_px,
+                                .star_limit_v_mag = config.star_limit_v_mag,
+                                .mask = config.masks};
         status = make_cube(ctx, &c, sim, run, out);
     }
     if (c.waits) {
@@ -410,6 +457,7 @@ static bst_status emit_cubes(bst_ctx *ctx, void *user, const bst_study_run *run,
     BST_TRY(read_settings(ctx, run, &config));
     bst_status status = bst_plugins_scenario_read(ctx, run->scenario, &scenario);
     if (status == BST_OK) {
+        ask_for_masks(&config, &scenario);
         scenario.record.frames = config.compress ? BST_RECORD_EXTENSIONS : BST_RECORD_CUBE;
         scenario.record.compression = config.compress ? BST_FITS_RICE : BST_FITS_RAW;
         status = bst_study_print_scenario(ctx, &scenario, stream);
@@ -428,7 +476,9 @@ static bool intact(void *user, const bst_study_run *run, const double *m) {
     return path_of(NULL, run, "ImageFiles", ".fits", path) == BST_OK &&
            file_bytes(path) == m[BYTES] &&
            path_of(NULL, run, "Annotations", ".json", path) == BST_OK &&
-           file_bytes(path) == m[LABEL_BYTES];
+           file_bytes(path) == m[LABEL_BYTES] &&
+           (m[MASK_BYTES] == 0.0 || (path_of(NULL, run, "MaskFiles", ".fits", path) == BST_OK &&
+                                     file_bytes(path) == m[MASK_BYTES]));
 }
 
 static bst_status finish(bst_ctx *ctx, void *user, const struct bst_results *results,

@@ -46,7 +46,7 @@ static void put_axis(FILE *stream, char axis, const double v[3], double box) {
 }
 
 static bool put_object(bst_labels *l, const bst_frame_message *f, double exposure_s,
-                       const bst_truth_item *item, bool first) {
+                       const bst_truth_item *item, int number, bool first) {
     bool star = item->kind == BST_SOURCE_STAR;
     double binning = f->binning > 1 ? f->binning : 1;
     double width = f->frame->width, height = f->frame->height;
@@ -79,7 +79,7 @@ static bool put_object(bst_labels *l, const bst_frame_message *f, double exposur
     put_text(s, "source", "boresight");
     put_number(s, "magnitude", item->v_mag);
     put_number(s, "pe_per_sec", exposure_s > 0.0 ? item->electrons / exposure_s : NAN);
-    fprintf(s, ",\"seg_id\":-1");
+    fprintf(s, ",\"seg_id\":%d", number);
     put_text(s, "object_name", star ? "" : bst_world_object(l->world, (int)item->id)->name);
     fprintf(s, ",\"object_id\":\"%" PRId64 "\"",
             star || item->norad == 0 ? (int64_t)item->id : (int64_t)item->norad);
@@ -106,7 +106,8 @@ void bst_labels_frame(bst_labels *l, const bst_frame_message *frame, const char 
     fprintf(l->stream, ",\"objects\":[");
     bool first = true;
     for (int i = 0; i < truth->count; i++) {
-        first = !put_object(l, frame, exposure_s, &truth->items[i], first) && first;
+        first = !put_object(l, frame, exposure_s, &truth->items[i], l->mask ? i + 1 : -1, first) &&
+                first;
     }
     fprintf(l->stream, "]}");
     l->frames++;

@@ -17,6 +17,8 @@ import sys
 import time
 import unittest
 
+from astropy.io import fits
+
 import runs
 
 KILLS = int(sys.argv.pop(1)) if len(sys.argv) > 1 and sys.argv[1].isdigit() else 2
@@ -437,7 +439,7 @@ class Cubes(unittest.TestCase):
                               "/observers/0/sensors/0/camera/width_px": 160,
                               "/observers/0/sensors/0/camera/height_px": 128},
                          dispersions=[{"path": NOISE, "from": 5, "to": 12}],
-                         cubes={"train": 60, "validation": 20, "test": 20})
+                         cubes={"train": 60, "validation": 20, "test": 20, "masks": True})
         cls.out = os.path.join(cls.folder, "out")
         cls.result = study(cls.path, "--out", cls.out)
 
@@ -457,6 +459,7 @@ class Cubes(unittest.TestCase):
         with open(os.path.join(out, "frames.fits"), "rb") as file:
             self.assertEqual(file.read(), self.read("ImageFiles", "000002.fits"))
         labels = json.loads(self.read("Annotations", "000002.json"))["data"]
+        self.check_masks(out, labels)
         self.assertEqual(len(labels["frames"]), int(rows(self.out)[2]["frames"]))
         self.assertGreaterEqual(len(labels["frames"]), 3)
         with runs.database(out) as database:
@@ -476,6 +479,27 @@ class Cubes(unittest.TestCase):
                     self.assertAlmostEqual(item["snr_aperture"], row["snr"],
                                            delta=1e-9 * row["snr"])
                 self.assertEqual(seen, 1)
+
+    def check_masks(self, out, labels):
+        """Masks are those of the run by hand; where an object's light is, its number is."""
+        with fits.open(os.path.join(out, "segmentation.fits")) as theirs, \
+                fits.open(os.path.join(self.out, "MaskFiles", "000002.fits")) as ours:
+            self.assertEqual(len(ours), len(labels["frames"]) + 1)
+            found = 0
+            for one, other, frame in zip(ours[1:], theirs[1:], labels["frames"], strict=True):
+                self.assertTrue((one.data == other.data).all())
+                self.assertEqual(one.header["FRAMEID"], frame["sequence_id"])
+                numbers = [item["seg_id"] for item in frame["objects"]]
+                self.assertEqual(len(set(numbers)), len(numbers))
+                self.assertGreater(min(numbers), 0)
+                for item in frame["objects"]:
+                    x, y = int(item["x_mid"] * 160), int(item["y_mid"] * 128)
+                    if item["snr_aperture"] > 50 and 0 <= x < 160 and 0 <= y < 128:
+                        self.assertIn(item["seg_id"], one.data)
+                        found += 1
+            self.assertGreater(found, 0)
+        self.assertEqual(int(rows(self.out)[2]["mask_bytes"]),
+                         os.path.getsize(os.path.join(self.out, "MaskFiles", "000002.fits")))
 
     def test_parts_and_card(self):
         listed = []
