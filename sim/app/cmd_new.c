@@ -192,13 +192,14 @@ static bst_status judge(void *user, bst_ctx *ctx, const bst_new_scene *scene, bo
         return status;
     }
     bst_ctx quiet;
-    bst_ctx_init(&quiet, note_warning, &found, BST_LOG_WARNING);
+    bst_ctx_init(&quiet, note_warning, &found, BST_LOG_ERROR);
     status = bst_plugins_scenario_read(&quiet, json, &scenario);
     if (status == BST_OK) {
         status =
             bst_simulation_create(&quiet, &scenario, &(bst_simulation_options){0}, &simulation);
     }
     if (status == BST_OK) {
+        quiet.log_level = BST_LOG_WARNING;
         status = bst_rules_apply(&quiet, &scenario, simulation);
     }
     bst_simulation_free(simulation);
@@ -216,12 +217,10 @@ typedef struct words {
     bool help, overwrite;
 } words;
 
-/* "NEOSSAT", "INMARSAT GX5" -> "neossat_inmarsat_gx5" */
-static void name_of(const bst_new_request *q, char *out, size_t bytes) {
-    char both[160];
+/* "NEOSSAT (X)" -> "neossat_x": what names of scenarios and observers may hold. */
+static void plain_name(const char *name, char *out, size_t bytes) {
     size_t n = 0;
-    snprintf(both, sizeof both, "%s_%s", q->observer.name, q->target.name);
-    for (const char *c = both; *c && n + 1 < bytes; c++) {
+    for (const char *c = name; *c && n + 1 < bytes; c++) {
         if (isalnum((unsigned char)*c)) {
             out[n++] = (char)tolower((unsigned char)*c);
         } else if (n > 0 && out[n - 1] != '_') {
@@ -252,8 +251,12 @@ static bst_status make(bst_ctx *ctx, const words *w, const bst_option *table, bs
                         "--target-tle %.200s: is the observer itself; name another satellite",
                         w->target);
     }
-    name_of(q, name, sizeof name);
+    char observer[28], target[28];
+    plain_name(q->observer.name, observer, sizeof observer);
+    plain_name(q->target.name, target, sizeof target);
+    snprintf(name, sizeof name, "%s_%s", observer, target);
     q->name = name;
+    q->observer_label = observer;
     snprintf(file, sizeof file, "%s.json", name);
     const char *out = w->out ? w->out : file;
     BST_TRY(bst_outputs_spare(ctx, table, q->observer.file, "--observer-tle names it"));

@@ -17,9 +17,14 @@
 #define DURATION_S 120.0
 #define LEAST_FRAMES 60.0
 /* How near to the boresight bodies may be: stray light of the bright ones is not simulated. */
-#define SUN_CLEAR_DEG 45.0
-#define EARTH_CLEAR_DEG 8.0
-#define MOON_CLEAR_DEG 8.0
+#define SUN_CLEAR_DEG 30.0
+#define EARTH_CLEAR_DEG 0.4
+#define EARTH_WISHED_DEG 5.0
+/* Between a body and the corner of the field. */
+#define MARGIN_DEG 0.15
+#define SIDE_PX 1024
+#define SMALL_SIDE_PX 512
+#define MOON_CLEAR_DEG 3.0
 /* Nearer ones are discs, not points, to a telescope. */
 #define LEAST_RANGE_M 20e3
 /* Twice as fast is what the mount of leo_leo_pass.json follows. */
@@ -46,9 +51,9 @@ typedef enum reason {
 static const char *const reason_words[REASONS] = {
     "in view",
     "behind the Earth",
-    "less than 8 degrees from the Earth's limb",
-    "less than 45 degrees from the Sun",
-    "less than 8 degrees from the Moon",
+    "less than 0.4 degrees from the Earth's limb",
+    "less than 30 degrees from the Sun",
+    "less than 3 degrees from the Moon",
     "in the Earth's shadow",
     "nearer than 20 km",
     "faster than 1 degree a second",
@@ -57,7 +62,7 @@ static const char *const reason_words[REASONS] = {
 
 typedef struct look {
     reason why;
-    double v_mag, range_m, rate_arcsec_per_s;
+    double v_mag, range_m, rate_arcsec_per_s, limb_rad;
 } look;
 
 typedef struct search {
@@ -68,6 +73,7 @@ typedef struct search {
     double *cost; /* of a run that begins at a look; INFINITY: none can */
     bst_world *world;
     bst_view *view;
+    int near_earth;    /* runs with the Earth in the field only */
     double best_v_mag; /* of what was too faint only */
 } search;
 
@@ -145,11 +151,11 @@ static bst_status look_at(bst_ctx *ctx, const search *s, double seconds, look *o
         (look){.v_mag = now.v_mag,
                .range_m = now.range_m,
                .rate_arcsec_per_s = bst_vec3_angle(now.geometric, then.geometric) / BST_ARCSEC_RAD};
-    double limb = bst_earth_limb_angle(eye.position_m, bodies.pole, now.geometric);
+    out->limb_rad = bst_earth_limb_angle(eye.position_m, bodies.pole, now.geometric);
     double sun = bst_vec3_angle(now.geometric, bst_vec3_sub(bodies.sun_m, eye.position_m));
     double moon = bst_vec3_angle(now.geometric, bst_vec3_sub(bodies.moon_m, eye.position_m));
     out->why = now.occulted                                      ? BEHIND_EARTH
-               : limb < EARTH_CLEAR_DEG * BST_DEG_RAD            ? NEAR_EARTH
+               : out->limb_rad < EARTH_CLEAR_DEG * BST_DEG_RAD   ? NEAR_EARTH
                : sun < SUN_CLEAR_DEG * BST_DEG_RAD               ? NEAR_SUN
                : moon < MOON_CLEAR_DEG * BST_DEG_RAD             ? NEAR_MOON
                : now.sunlit_fraction < 1.0                       ? IN_SHADOW
@@ -157,6 +163,11 @@ static bst_status look_at(bst_ctx *ctx, const search *s, double seconds, look *o
                : out->rate_arcsec_per_s > MOST_RATE_ARCSEC_PER_S ? TOO_FAST
                                                                  : IN_VIEW;
     return BST_OK;
+}
+
+/* How far from the limb the boresight is to be. */
+static double free_of_earth(const bst_new_scene *s) {
+    return s->side_px * s->pixel_arcsec * BST_ARCSEC_RAD * sqrt(0.5) + MARGIN_DEG * BST_DEG_RAD;
 }
 
 /* The run that begins at look i; false: something is in the way or it is too faint. */
@@ -169,19 +180,29 @@ static bool scene_at(search *s, int i, bst_new_scene *out) {
     *out = (bst_new_scene){.duration_s = duration,
                            .v_mag = s->looks[i].v_mag,
                            .faintest_v_mag = -INFINITY,
-                           .range_m = INFINITY};
+                           .range_m = INFINITY,
+                           .limb_rad = INFINITY};
     for (int k = i; k <= last; k++) {
         if (k >= s->count || s->looks[k].why != IN_VIEW) {
             return false;
         }
         brightest = fmin(brightest, s->looks[k].v_mag);
         out->faintest_v_mag = fmax(out->faintest_v_mag, s->looks[k].v_mag);
+        out->limb_rad = fmin(out->limb_rad, s->looks[k].limb_rad);
         out->range_m = fmin(out->range_m, s->looks[k].range_m);
         out->rate_arcsec_per_s = fmax(out->rate_arcsec_per_s, s->looks[k].rate_arcsec_per_s);
     }
     out->epoch = bst_time_add(s->start, LOOK_S * i);
     out->pixel_arcsec = pixel_of(q, out->rate_arcsec_per_s);
     out->period_s = period_of(q, out->rate_arcsec_per_s, out->pixel_arcsec);
+    out->side_px = SIDE_PX;
+    if (out->limb_rad < free_of_earth(out)) {
+        out->side_px = SMALL_SIDE_PX;
+        if (out->limb_rad < free_of_earth(out)) {
+            s->near_earth++;
+            return false;
+        }
+    }
     out->exposure_s = exposure_of(q, out, brightest);
     if (out->exposure_s == 0.0) {
         s->best_v_mag = fmin(s->best_v_mag, out->faintest_v_mag);
@@ -192,13 +213,15 @@ static bool scene_at(search *s, int i, bst_new_scene *out) {
 
 /* Of two times the one with the slower and brighter target is better. */
 static double cost_of(const bst_new_scene *scene) {
-    return log(scene->rate_arcsec_per_s + 10.0) + 0.3 * scene->faintest_v_mag;
+    double near = scene->limb_rad < EARTH_WISHED_DEG * BST_DEG_RAD ? 2.0 : 0.0;
+    return near + log(scene->rate_arcsec_per_s + 10.0) + 0.3 * scene->faintest_v_mag;
 }
 
 /* ------------------------------------------------------------------ the search */
 
 static bst_status open_world(bst_ctx *ctx, search *s) {
-    const bst_new_scene first = {.epoch = s->start,
+    const bst_new_scene first = {.side_px = SIDE_PX,
+                                 .epoch = s->start,
                                  .duration_s = 1.0,
                                  .period_s = 1.0,
                                  .exposure_s = 0.5,

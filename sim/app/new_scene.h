@@ -23,12 +23,15 @@ typedef struct bst_new_request {
     double duration_s;   /* 0: chosen */
     const char *start;   /* UTC from which a time is looked for; NULL: near the element sets */
     const char *name;    /* of the scenario */
+    const char *observer_label; /* name of the observer in it: letters, digits, _ - . */
 } bst_new_request;
 
 /* A time at which the target is in view for the whole run, and what the loop needs for it. */
 typedef struct bst_new_scene {
     bst_time epoch;
     double duration_s, period_s, exposure_s, pixel_arcsec;
+    double limb_rad;          /* least angle from the Earth's limb */
+    int side_px;              /* of the square detector */
     double v_mag;             /* at the epoch */
     double faintest_v_mag;    /* in the run */
     double range_m;           /* least */

@@ -47,8 +47,9 @@ static void put_camera(FILE *f, const bst_new_request *q, const bst_new_scene *s
             "                        \"description\": \"A silicon detector behind a telescope of "
             "this aperture. photon_flux_v0_per_s_m2: of a star of V = 0 over the band, above the "
             "air.\",\n"
-            "                        \"width_px\": 1024,\n"
-            "                        \"height_px\": 1024,\n");
+            "                        \"width_px\": %d,\n"
+            "                        \"height_px\": %d,\n",
+            s->side_px, s->side_px);
     if (q->focal_m > 0.0) {
         fprintf(f,
                 "                        \"pixel_um\": %.6g,\n"
@@ -78,7 +79,7 @@ static void put_camera(FILE *f, const bst_new_request *q, const bst_new_scene *s
 }
 
 static void put_cue(FILE *f, const bst_new_request *q, const bst_new_scene *s) {
-    double field_deg = 1024.0 * s->pixel_arcsec / 3600.0;
+    double field_deg = s->side_px * s->pixel_arcsec / 3600.0;
     fprintf(f,
             "                    \"exposure\": {\"exposure_s\": %.6g, \"period_s\": %.6g},\n"
             "                    \"cue\": {\n"
@@ -107,7 +108,7 @@ static void put_modules(FILE *f, const bst_new_scene *s) {
             "                    \"modules\": {\n"
             "                        \"gimbal\": {\n"
             "                            \"description\": \"A two-axis mount on a platform that "
-            "drifts and shakes. delay_s, here and below: how long it works and waits.\",\n"
+            "shakes. delay_s, here and below: how long it works and waits.\",\n"
             "                            \"type\": \"second_order\",\n");
     if (orbit) {
         fprintf(f,
@@ -129,8 +130,10 @@ static void put_modules(FILE *f, const bst_new_scene *s) {
         "                        \"imgproc\": {\"type\": \"standard\", \"delay_s\": {\"frame\": "
         "%.4g}},\n",
         command_s, image_s);
-    fprintf(f, "                        \"tracker\": {\"type\": \"ekf\"%s",
-            orbit ? ", \"motion\": \"orbit\"" : "");
+    fprintf(f,
+            "                        \"tracker\": {\"type\": \"ekf\", "
+            "\"telemetry_sigma_arcsec\": %.3g%s",
+            fmin(3.0, s->pixel_arcsec), orbit ? ", \"motion\": \"orbit\"" : "");
     if (period > 1.5) {
         fprintf(f, ", \"initiation_gap_s\": %.6g", 3.5 * period);
     }
@@ -170,7 +173,7 @@ void bst_new_scene_write(FILE *f, const bst_new_request *q, const bst_new_scene 
             "                \"area_m2\": %g,\n                \"albedo\": %g\n            }\n"
             "        ]\n    },\n    \"observers\": [\n        {\n",
             BST_NEW_AREA_M2, BST_NEW_ALBEDO);
-    put_text(f, "            \"name\": ", q->observer.name, ",\n");
+    put_text(f, "            \"name\": ", q->observer_label, ",\n");
     put_orbit(f, "            \"orbit\": {\"source\": \"sgp4\", \"elements_file\": ", &q->observer);
     fprintf(f,
             "            \"sensors\": [\n                {\n"
