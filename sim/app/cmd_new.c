@@ -387,6 +387,11 @@ int bst_cmd_new(int argc, char **argv) {
                  "--pixel-scale and --focal-length say the same; give one of them");
         return bst_options_misuse(&ctx, "new");
     }
+    bst_time start;
+    if (q.start && bst_time_from_utc(&ctx, q.start, &start) != BST_OK) {
+        bst_fail_prefix(&ctx, BST_ERR_ARGUMENT, "--start");
+        return bst_options_misuse(&ctx, "new");
+    }
     if (make(&ctx, &w, table, &q) != BST_OK) {
         fprintf(stderr, "boresight: %s\n", ctx.message);
         return BST_EXIT_FAILED;

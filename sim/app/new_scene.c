@@ -22,6 +22,12 @@
 #define EARTH_WISHED_DEG 5.0
 /* Between a body and the corner of the field. */
 #define MARGIN_DEG 0.15
+/* There are 3 stars of V < 9, the limit of those built into the program, in a square degree, and 30
+ * of V < 11.5: the attitude needs some 8 in the field. */
+#define ENOUGH_STARS_V_MAG 11.0
+#define FEW_STARS_ARCSEC 8.0
+/* Slower targets are followed by the attitude telemetry alone. */
+#define STARLESS_RATE_ARCSEC_PER_S 60.0
 #define SIDE_PX 1024
 #define SMALL_SIDE_PX 512
 #define MOON_CLEAR_DEG 3.0
@@ -63,6 +69,7 @@ static const char *const reason_words[REASONS] = {
 typedef struct look {
     reason why;
     double v_mag, range_m, rate_arcsec_per_s, limb_rad;
+    bst_vec3 direction;
 } look;
 
 typedef struct search {
@@ -73,8 +80,8 @@ typedef struct search {
     double *cost; /* of a run that begins at a look; INFINITY: none can */
     bst_world *world;
     bst_view *view;
-    int near_earth;    /* runs with the Earth in the field only */
-    double best_v_mag; /* of what was too faint only */
+    int near_earth, few_stars; /* runs with the Earth in the field; without an attitude */
+    double best_v_mag;         /* of what was too faint only */
 } search;
 
 /* ------------------------------------------------------------------ sensor */
@@ -94,14 +101,15 @@ static double snr_of(double aperture_m, double pixel_arcsec, double v_mag, doubl
     return s / sqrt(s + noise2);
 }
 
-static double pixel_of(const bst_new_request *q, double rate) {
+static double pixel_of(const bst_new_request *q, double rate, double complete_v_mag) {
     if (q->focal_m > 0.0) {
         return 1e-6 * BST_NEW_PIXEL_UM / q->focal_m / BST_ARCSEC_RAD;
     }
     if (q->pixel_arcsec > 0.0) {
         return q->pixel_arcsec;
     }
-    return rate <= 60.0 ? 3.0 : rate <= 600.0 ? 5.0 : 10.0;
+    double least = complete_v_mag < ENOUGH_STARS_V_MAG ? FEW_STARS_ARCSEC : 0.0;
+    return fmax(rate <= 60.0 ? 3.0 : rate <= 600.0 ? 5.0 : 10.0, least);
 }
 
 /* The mount follows the target, so that it is the stars that are streaks. */
@@ -150,6 +158,7 @@ static bst_status look_at(bst_ctx *ctx, const search *s, double seconds, look *o
     *out =
         (look){.v_mag = now.v_mag,
                .range_m = now.range_m,
+               .direction = now.geometric,
                .rate_arcsec_per_s = bst_vec3_angle(now.geometric, then.geometric) / BST_ARCSEC_RAD};
     out->limb_rad = bst_earth_limb_angle(eye.position_m, bodies.pole, now.geometric);
     double sun = bst_vec3_angle(now.geometric, bst_vec3_sub(bodies.sun_m, eye.position_m));
@@ -168,6 +177,31 @@ static bst_status look_at(bst_ctx *ctx, const search *s, double seconds, look *o
 /* How far from the limb the boresight is to be. */
 static double free_of_earth(const bst_new_scene *s) {
     return s->side_px * s->pixel_arcsec * BST_ARCSEC_RAD * sqrt(0.5) + MARGIN_DEG * BST_DEG_RAD;
+}
+
+/* The widest field, of those that have the stars for an attitude, without the Earth in it. */
+static bool fit_field(search *s, bst_vec3 direction, bst_new_scene *out) {
+    const bst_new_request *q = s->request;
+    const double rate = out->rate_arcsec_per_s;
+    double half = 0.5 * SIDE_PX * FEW_STARS_ARCSEC * BST_ARCSEC_RAD;
+    double complete = bst_stars_complete_to(bst_world_stars(s->world), direction, half);
+    const double pixel[] = {pixel_of(q, rate, complete), pixel_of(q, rate, complete),
+                            pixel_of(q, rate, ENOUGH_STARS_V_MAG)};
+    const int side[] = {SIDE_PX, SMALL_SIDE_PX, SMALL_SIDE_PX};
+    for (size_t k = 0; k < sizeof side / sizeof *side; k++) {
+        out->pixel_arcsec = pixel[k];
+        out->side_px = side[k];
+        if (out->limb_rad < free_of_earth(out)) {
+            continue;
+        }
+        if (pixel[k] >= pixel[0] || rate <= STARLESS_RATE_ARCSEC_PER_S) {
+            return true;
+        }
+        s->few_stars++;
+        return false;
+    }
+    s->near_earth++;
+    return false;
 }
 
 /* The run that begins at look i; false: something is in the way or it is too faint. */
@@ -193,16 +227,10 @@ static bool scene_at(search *s, int i, bst_new_scene *out) {
         out->rate_arcsec_per_s = fmax(out->rate_arcsec_per_s, s->looks[k].rate_arcsec_per_s);
     }
     out->epoch = bst_time_add(s->start, LOOK_S * i);
-    out->pixel_arcsec = pixel_of(q, out->rate_arcsec_per_s);
-    out->period_s = period_of(q, out->rate_arcsec_per_s, out->pixel_arcsec);
-    out->side_px = SIDE_PX;
-    if (out->limb_rad < free_of_earth(out)) {
-        out->side_px = SMALL_SIDE_PX;
-        if (out->limb_rad < free_of_earth(out)) {
-            s->near_earth++;
-            return false;
-        }
+    if (!fit_field(s, s->looks[(i + last) / 2].direction, out)) {
+        return false;
     }
+    out->period_s = period_of(q, out->rate_arcsec_per_s, out->pixel_arcsec);
     out->exposure_s = exposure_of(q, out, brightest);
     if (out->exposure_s == 0.0) {
         s->best_v_mag = fmin(s->best_v_mag, out->faintest_v_mag);
@@ -307,8 +335,8 @@ static bst_status nothing(bst_ctx *ctx, const search *s, const char *judged) {
     if (isfinite(s->best_v_mag)) {
         double needed = s->request->aperture_m;
         double period = s->request->period_s > 0.0 ? s->request->period_s : 1.0;
-        while (needed < 20.0 &&
-               snr_of(needed, pixel_of(s->request, 0.0), s->best_v_mag, 0.5 * period) < LEAST_SNR) {
+        while (needed < 20.0 && snr_of(needed, pixel_of(s->request, 0.0, ENOUGH_STARS_V_MAG),
+                                       s->best_v_mag, 0.5 * period) < LEAST_SNR) {
             needed *= 1.05;
         }
         return bst_fail(
@@ -317,6 +345,20 @@ static bst_status nothing(bst_ctx *ctx, const search *s, const char *judged) {
             "from %s; an --aperture of %.2g would do",
             s->request->target.name, s->request->aperture_m, s->best_v_mag,
             s->count * LOOK_S / 86400.0, utc, needed);
+    }
+    if (s->few_stars > 0) {
+        return bst_fail(ctx, BST_ERR_NOT_FOUND,
+                        "%s is seen from %s only so near to the Earth's limb that the field holds "
+                        "too few of the stars built into the program for an attitude; get the full "
+                        "star catalogue: boresight stars fetch",
+                        s->request->target.name, s->request->observer.name);
+    }
+    if (s->near_earth > 0) {
+        return bst_fail(
+            ctx, BST_ERR_NOT_FOUND,
+            "in the %.3g days from %s %s sees %s only with the Earth in the field; choose "
+            "a smaller --pixel-scale, a shorter --duration or another target",
+            s->count * LOOK_S / 86400.0, utc, s->request->observer.name, s->request->target.name);
     }
     return bst_fail(ctx, BST_ERR_NOT_FOUND,
                     "in the %.3g days from %s %s never sees %s for a whole run: it is %s of the "

@@ -262,6 +262,7 @@ class Outputs(unittest.TestCase):
                            "2022-06-16T22:00:00Z", "--stop", "2022-06-16T22:00:00Z", "--step", "1"],
              "calframes": ["{scenario}", "--bias", "1", "--dark", "0", "--flat", "0"],
              "calibrate-obsgen": ["{scenario}", "--check", "--seeds", "1"], "bench": ["crc32c"],
+             "new": ["--observer-tle", "{elements}"],
              "study": ["{study}"], "pd": ["{scenario}", "--trials", "1"]}
     # options that name what is read
     INPUTS = {("run", "replay"), ("schema", "plugin"), ("orbit", "observer"),
