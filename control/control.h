@@ -193,7 +193,8 @@ typedef struct bst_control {
 
 /* The density of disturbance (rad^2/s^3) that the observer's gains are made for: that of the
  * configuration, or with robust_observer what bst_observer_design leaves of it. `timing` as the
- * loop's: command and servo delays are the configuration's. Errors of bst_observer_design. */
+ * loop's: command and servo delays are the configuration's. BST_ERR_CONFIG of
+ * a gain_scale of 0, and errors of bst_observer_design. */
 bst_status bst_control_observer_density(bst_ctx *ctx, const bst_control_config *config,
                                         const bst_image_loop_env *timing, double pixel_rad,
                                         double *density) BST_MUST_CHECK;

@@ -11,7 +11,7 @@
 #define SENSITIVITY_PEAK 1.95
 
 /* Powers of ten down to which a density is looked for, and halvings of the last one. */
-enum { DECADES = 12, HALVINGS = 7 };
+enum { DECADES = 40, HALVINGS = 7 };
 
 static bst_status is_robust(bst_ctx *ctx, const bst_observer_request *r, double density,
                             bool *out) {
@@ -63,6 +63,11 @@ bst_status bst_observer_design(bst_ctx *ctx, const bst_observer_request *request
 bst_status bst_control_observer_density(bst_ctx *ctx, const bst_control_config *config,
                                         const bst_image_loop_env *timing, double pixel_rad,
                                         double *density) {
+    if (config->compensator.gain_scale == 0.0) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "gain_scale: 0 leaves an observer no motion that the frames show; give "
+                        "more than 0");
+    }
     bst_pointing_error e;
     double floor_rad = config->fix_sigma_floor_px * pixel_rad;
     bst_pointing_error_init(&e, config->disturbance_px_rms * pixel_rad,

@@ -126,8 +126,12 @@ static int by_value(const void *a, const void *b) {
 }
 
 /* The next frequency of the walk: the grid's, or round a hint before it. */
-static double next_omega(const double *stops, int stop_count, int *stop, double omega, double end) {
+static double next_omega(const bst_loop *loop, const double *stops, int stop_count, int *stop,
+                         double omega, double end) {
     double next = fmin(omega * GRID_RATIO, end);
+    if (loop->delay_s > 0.0) {
+        next = fmin(next, omega + BST_LOOP_PHASE_STEP / loop->delay_s);
+    }
     while (*stop < stop_count && stops[*stop] <= omega) {
         ++*stop;
     }
@@ -209,8 +213,10 @@ static bst_status count_poles(bst_ctx *ctx, const bst_loop *loop, int turns, int
     *open_poles = loop->unstable_poles;
     int counted = 0;
     if (loop->denominator) {
-        BST_TRY(bst_loop_zeros_outside(ctx, loop->denominator, loop->user, loop->dt_s, open_poles));
-        BST_TRY(bst_loop_zeros_outside(ctx, numerator_and_denominator, loop, loop->dt_s, &counted));
+        BST_TRY(bst_loop_zeros_outside(ctx, loop->denominator, loop->user, loop->dt_s,
+                                       loop->delay_s, open_poles));
+        BST_TRY(bst_loop_zeros_outside(ctx, numerator_and_denominator, loop, loop->dt_s,
+                                       loop->delay_s, &counted));
     }
     *closed = *open_poles - turns;
     if (*closed < 0 || (loop->denominator && *closed != counted)) {
@@ -248,7 +254,7 @@ bst_status bst_loop_analyse(bst_ctx *ctx, const bst_loop *loop, bst_loop_margins
     double closing = 0.0;
     bst_status status = BST_OK;
     for (bool start = true; status == BST_OK && a.omega < end; start = false) {
-        point b = {.omega = next_omega(stops, stop_count, &stop, a.omega, end)};
+        point b = {.omega = next_omega(loop, stops, stop_count, &stop, a.omega, end)};
         b.l = open_at(loop, b.omega);
         if (!isfinite(creal(b.l)) || !isfinite(cimag(b.l)) || !isfinite(cabs(a.l))) {
             status = bst_fail(ctx, BST_ERR_NUMERIC,

@@ -13,7 +13,8 @@ typedef double complex (*bst_later_response_fn)(const void *user, double omega_r
 typedef struct bst_loop {
     bst_response_fn open; /* L(exp(j omega dt_s)) at omega rad/s, up to half the rate */
     const void *user;
-    double dt_s; /* sampling interval; for a continuous loop one far shorter than its dynamics */
+    double dt_s;    /* sampling interval; for a continuous loop one far shorter than its dynamics */
+    double delay_s; /* in L, so that the walk is fine enough for its phase; 0: short */
     int unstable_poles;    /* of L, strictly outside the unit circle; see `denominator` */
     const double *hint_hz; /* frequencies of resonances too narrow to be met by chance */
     int hints;
@@ -56,21 +57,26 @@ bst_status bst_loop_analyse(bst_ctx *ctx, const bst_loop *loop,
                             bst_loop_margins *out) BST_MUST_CHECK;
 
 /* Zeros outside the unit circle of a function without poles there that tends to 1 at infinity,
- * given on the circle at omega rad/s; zeros at z = 1 do not count. By the argument principle, so
- * never negative. BST_ERR_NUMERIC: the function is not finite, is zero on the circle, or has poles
- * outside. */
+ * given on the circle at omega rad/s, with a delay of up to delay_s in it; zeros at z = 1 do not
+ * count. By the argument principle, so never negative. BST_ERR_NUMERIC: the function is not finite,
+ * is zero on the circle, or has poles outside. */
 bst_status bst_loop_zeros_outside(bst_ctx *ctx, bst_response_fn of, const void *user, double dt_s,
-                                  int *out) BST_MUST_CHECK;
+                                  double delay_s, int *out) BST_MUST_CHECK;
 
 /* ---- what stability.c and winding.c share ---- */
 
 /* Turns about zero of a function on the unit circle, zeros and poles at z = 1 passed by on the
  * outside: zeros less poles inside. Errors as above. */
 bst_status bst_loop_turns(bst_ctx *ctx, bst_response_fn of, const void *user, double dt_s,
-                          int *out) BST_MUST_CHECK;
+                          double delay_s, int *out) BST_MUST_CHECK;
+
+/* Greatest change of the phase of a delay between two points of a walk, rad: what is more could be
+ * taken for a turn the other way. */
+#define BST_LOOP_PHASE_STEP 0.5
 
 /* Least delay that makes a stable loop with open_later unstable, by bisection. estimate_s > 0:
- * where the search may begin to be coarser. INFINITY: none up to 50 sampling intervals. */
+ * where the search may begin to be coarser. INFINITY: none up to 50 sampling intervals;
+ * an estimate beyond that is returned as it is. */
 bst_status bst_loop_delay_margin(bst_ctx *ctx, const bst_loop *loop, int unstable_poles,
                                  double estimate_s, double *out) BST_MUST_CHECK;
 

@@ -196,6 +196,8 @@ bst_loop bst_tracking_as_loop(const bst_tracking_loop *tracking) {
     return (bst_loop){.open = bst_tracking_open,
                       .user = tracking,
                       .dt_s = tracking->timing.period_s,
+                      .delay_s = tracking->timing.switch_s + 0.5 * tracking->timing.exposure_s +
+                                 (tracking->observes ? tracking->observer.motion_late_s : 0.0),
                       .denominator = tracking->observes ? bst_tracking_denominator : NULL,
                       .open_later = tracking->observes ? bst_tracking_open_later : NULL};
 }

@@ -34,13 +34,14 @@ static double turned(const curve *c, double low, double complex a, double high, 
 }
 
 bst_status bst_loop_turns(bst_ctx *ctx, bst_response_fn of, const void *user, double dt_s,
-                          int *out) {
+                          double delay_s, int *out) {
     const curve c = {of, user};
     double end = BST_PI / dt_s, omega = LOWEST_SHARE * end;
     double complex a = of(user, omega), start = a;
     double sum = 0.0, at_one = 0.0;
     for (bool first = true; omega < end; first = false) {
         double next = fmin(omega * GRID_RATIO, end);
+        next = delay_s > 0.0 ? fmin(next, omega + BST_LOOP_PHASE_STEP / delay_s) : next;
         double complex b = of(user, next);
         if (!isfinite(cabs(b)) || !(cabs(a) > 0.0)) {
             return bst_fail(ctx, BST_ERR_NUMERIC,
@@ -61,9 +62,9 @@ bst_status bst_loop_turns(bst_ctx *ctx, bst_response_fn of, const void *user, do
 }
 
 bst_status bst_loop_zeros_outside(bst_ctx *ctx, bst_response_fn of, const void *user, double dt_s,
-                                  int *out) {
-    int turns;
-    BST_TRY(bst_loop_turns(ctx, of, user, dt_s, &turns));
+                                  double delay_s, int *out) {
+    int turns = 0;
+    BST_TRY(bst_loop_turns(ctx, of, user, dt_s, delay_s, &turns));
     *out = -turns;
     return turns <= 0 ? BST_OK
                       : bst_fail(ctx, BST_ERR_NUMERIC,
@@ -86,8 +87,8 @@ static double complex one_plus_delayed(const void *user, double omega) {
 static bst_status is_unstable(bst_ctx *ctx, const bst_loop *loop, int unstable_poles,
                               double later_s, bool *out) {
     const delayed_loop d = {loop, later_s};
-    int turns;
-    BST_TRY(bst_loop_turns(ctx, one_plus_delayed, &d, loop->dt_s, &turns));
+    int turns = 0;
+    BST_TRY(bst_loop_turns(ctx, one_plus_delayed, &d, loop->dt_s, loop->delay_s + later_s, &turns));
     *out = unstable_poles - turns != 0;
     return BST_OK;
 }
@@ -112,6 +113,9 @@ bst_status bst_loop_delay_margin(bst_ctx *ctx, const bst_loop *loop, int unstabl
         } else {
             low = next;
         }
+    }
+    if (isinf(high)) { /* so long a delay that its estimate by the phase serves */
+        *out = estimate_s > low ? estimate_s : INFINITY;
     }
     for (int i = 0; i < HALVINGS && isfinite(high); i++) {
         double middle = 0.5 * (low + high);

@@ -258,8 +258,12 @@ int bst_fft_light_margin_px(const bst_fft_light *l) {
     return l->margin;
 }
 
+double bst_fft_light_density(const bst_fft_light *l) {
+    return fmin(l->density[PLAIN][0], l->density[PLAIN][1]);
+}
+
 void bst_fft_light_stamp(const bst_fft_light *l, bst_scene_source *source) {
-    double least = fmin(l->density[PLAIN][0], l->density[PLAIN][1]);
+    double least = bst_fft_light_density(l);
     source->radius = (int)ceil(0.5 * l->options.taps / least) + 1;
 }
 

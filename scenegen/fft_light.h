@@ -35,6 +35,9 @@ const bst_light_band *bst_fft_light_band(const bst_fft_light *light);
 /* Pixels outside the window from which a source's light is still drawn. */
 int bst_fft_light_margin_px(const bst_fft_light *light);
 
+/* Least samples of its grid per px and axis. */
+double bst_fft_light_density(const bst_fft_light *light);
+
 /* Sets the part of a source's record that says how far its nodes reach. */
 void bst_fft_light_stamp(const bst_fft_light *light, bst_scene_source *source);
 

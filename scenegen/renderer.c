@@ -116,6 +116,7 @@ static bst_status open_psf(bst_ctx *ctx, bst_device *device, bst_renderer *r,
     smear->widest = bst_fft_light_widest(r->fft_light);
     smear->node_sigma_px = bst_fft_light_band(r->fft_light)->node_sigma_px;
     smear->share_sigma_px = bst_fft_light_band(r->fft_light)->share_sigma_px;
+    smear->grid_per_px = bst_fft_light_density(r->fft_light);
     memcpy(smear->pixel_part, bst_fft_light_band(r->fft_light)->pixel_part,
            sizeof smear->pixel_part);
     return BST_OK;

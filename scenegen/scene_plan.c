@@ -113,11 +113,17 @@ static bst_status plan_sources(bst_ctx *ctx, bst_scene_plan *p, planning *m, boo
     return BST_OK;
 }
 
+/* Blocks of so many nodes and one more per source, as far as there is room. */
+static int blocks_of(int64_t nodes, int sources, int most_blocks) {
+    int64_t blocks = nodes / BST_BLOCK + sources;
+    return (int)(blocks < most_blocks ? blocks : most_blocks);
+}
+
 /* Plans until the predicted error is within the tolerance: each time at a smaller part of it, as
  * far as that helps; or, where there are too many nodes, at a larger one. */
 static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m, double tolerance,
                                     int most_blocks) {
-    enum { ROUNDS = 8, CROWD = 500 };
+    enum { ROUNDS = 8, CROWD = 500, TOO_MANY = 20000 };
     /* So many stars have some so near each other that their errors add up: at half the tolerance
      * they need not be planned twice. */
     static const double CROWD_AIM = 0.45;
@@ -126,14 +132,18 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
      * worth its refinement */
     static const double LESS = 0.97, GAIN = 0.98, MOST_STEP = 0.2, LEAST_STEP = 0.85,
                         GRID_SHARE = 0.25, COARSER = 16.0, COARSEST = 1e9;
-    int64_t nodes = BST_SCENE_MOST_NODES / BST_BLOCK + (int64_t)m->request->count;
-    m->blocks = (int)(nodes < most_blocks ? nodes : most_blocks);
+    m->blocks = blocks_of(BST_SCENE_MOST_NODES, m->request->count, most_blocks);
     double aim = m->request->count > CROWD ? CROWD_AIM : 1.0, before = INFINITY;
     bool fits, coarse = false;
     bst_smear_restart(m->smear, aim);
     BST_TRY(plan_sources(ctx, p, m, &fits));
-    for (; !fits && aim < COARSEST; aim *= COARSER) {
+    if (!fits) { /* crowds along the paths of a slew, which no tolerance makes shorter */
         coarse = true;
+        m->blocks = blocks_of(BST_SCENE_SLEW_NODES, m->request->count, most_blocks);
+        bst_smear_restart(m->smear, aim);
+        BST_TRY(plan_sources(ctx, p, m, &fits));
+    }
+    for (; !fits && aim < COARSEST; aim *= COARSER) {
         bst_smear_restart(m->smear, COARSER * aim);
         BST_TRY(plan_sources(ctx, p, m, &fits));
     }
@@ -144,6 +154,9 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
                         "draw fewer stars (v_limit)",
                         p->count, m->request->count, 1e-6 * BST_BLOCK * p->blocks);
     }
+    /* the errors of very many sources take as long to add up as the frame to draw: at CROWD_AIM the
+     * prediction, made when it is asked for, says what came of it */
+    coarse = coarse || m->request->count > TOO_MANY;
     for (int round = 0, idle = 0; round < ROUNDS && idle < 2 && !coarse; round++) {
         double error = bst_crowd_error_sigma(m->crowd), last = aim;
         if (error <= tolerance) {

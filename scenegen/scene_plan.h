@@ -19,9 +19,10 @@ typedef struct bst_scene_plan {
     int capacity;
 } bst_scene_plan;
 
-/* More nodes than this, beyond a block for each source, are not drawn: the sources then get fewer
- * than the tolerance asks for. */
-enum { BST_SCENE_MOST_NODES = 1 << 24 };
+/* More nodes than MOST, beyond a block for each source, are not spent on the tolerance. Where the
+ * paths of a slew need more whatever the tolerance is, as many as SLEW are drawn: sources then get
+ * what the first plan gave them, or fewer. */
+enum { BST_SCENE_MOST_NODES = 1 << 24, BST_SCENE_SLEW_NODES = 1 << 26 };
 
 typedef struct bst_scene_plan_limits {
     double tolerance_sigma; /* of the frame's predicted error; INFINITY: any will do */

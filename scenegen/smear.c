@@ -146,7 +146,7 @@ static double profile_error(const bst_smear *s, const bst_node_list *list) {
     if (s->options.node_sigma_px > 0.0) {
         /* by the widths of the Fourier path, and by the phases of its kernel, between which linear
          * interpolation widens by up to a quarter of a step squared, a half of that on each axis */
-        double step = 1.0 / (BST_SPREAD_PHASES * s->sigma_px);
+        double step = 1.0 / (BST_SPREAD_PHASES * s->options.grid_per_px * s->sigma_px);
         return table / (BST_WIDTHS * BST_WIDTHS) + 0.25 * step * step;
     }
     if (widest > s->options.law_widest) {

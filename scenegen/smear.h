@@ -31,6 +31,7 @@ typedef struct bst_smear_options {
     /* for a PSF that is no Gaussian, else 0: those that need nodes as fine, and that put as much of
      * a point's light in one pixel */
     double node_sigma_px, share_sigma_px;
+    double grid_per_px;                    /* least samples per px that its nodes are spread on */
     double pixel_part[BST_PIXEL_PARTS][3]; /* of it as in bst_node_aim, by binning from 1 on */
     double widest; /* widening of nodes, PSF variances; 0: as much as nodes may be */
 } bst_smear_options;

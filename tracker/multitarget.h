@@ -141,7 +141,8 @@ typedef struct bst_mtt_track {
     /* normalised innovations of the latest hits: two of place, one of brightness; rings */
     double innovations[BST_MTT_EVENT_WINDOW][2], brightness[BST_MTT_EVENT_WINDOW];
     int innovation_count, brightness_count; /* since the start or the latest event */
-    double manoeuvre_end_s; /* the filter follows a manoeuvre that the innovations show until then */
+    double
+        manoeuvre_end_s; /* the filter follows a manoeuvre that the innovations show until then */
 } bst_mtt_track;
 
 /* What one frame brings. */

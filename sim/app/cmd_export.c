@@ -104,6 +104,7 @@ static const char help_text[] =
     "  boresight export runs/demo --frames mp4 --annotate --size 800 --fps 25\n"
     "  boresight export runs/demo --table csv --tables truth,tracks --out csv\n"
     "  boresight export runs/demo --orbits oem --observations tdm\n"
+    "  boresight export runs/demo --orbits czml --objects 33278,42741\n"
     "  boresight export runs/demo --satnet training --split 80,10,10\n"
     "\n"
     "what and options:\n";
@@ -222,6 +223,13 @@ int bst_cmd_export(int argc, char **argv) {
          .doc = "time between states of an orbit (default 60, or a twentieth of a short run)",
          .minimum = 1e-3,
          .maximum = 86400},
+        {.name = "objects",
+         .kind = BST_OPTION_TEXT,
+         .target = &e.objects,
+         .argument = "A,B|seen|all",
+         .doc =
+             "orbits: of these objects, by name or NORAD number, of those that came into a field "
+             "and the targets, or of all (default all of up to 100 objects, else seen)"},
         {.name = "split",
          .kind = BST_OPTION_TEXT,
          .target = &e.split,
@@ -271,6 +279,10 @@ int bst_cmd_export(int argc, char **argv) {
         observations == NOT_ASKED && !e.satnet) {
         bst_fail(&ctx, BST_ERR_ARGUMENT,
                  "nothing to export: add --frames, --table, --orbits, --observations or --satnet");
+        return bst_options_misuse(&ctx, "export");
+    }
+    if (e.objects && orbits == NOT_ASKED) {
+        bst_fail(&ctx, BST_ERR_ARGUMENT, "--objects needs --orbits oem|czml");
         return bst_options_misuse(&ctx, "export");
     }
     bool others = frames != NOT_ASKED || table_format != NOT_ASKED || orbits != NOT_ASKED ||

@@ -35,6 +35,7 @@ typedef struct bst_export {
     /* orbits */
     bool czml;
     double step_s;
+    const char *objects; /* see bst_orbit_selection_make; NULL: its default */
     /* observations */
     int observation_format; /* bst_observation_format */
     bool filtered;          /* the tracker's states instead of measured directions */

@@ -10,6 +10,7 @@
 #include <cjson/cJSON.h>
 
 #include "sim/app/export.h"
+#include "sim/app/orbit_selection.h"
 #include "sim/app/plugins.h"
 #include "sim/app/progress.h"
 #include "sim/app/run_observations.h"
@@ -31,7 +32,7 @@ static double recorded_s(const bst_run_reader *run, const bst_scenario *scenario
 
 /* ------------------------------------------------------------------ orbits */
 
-enum { MOST_BREAKS = 4096 };
+enum { MOST_BREAKS = 4096, MOST_KEPT_ROWS = 65536 };
 
 /* One orbit, a stretch of it without a burn inside, on a grid of times. */
 typedef struct track {
@@ -45,6 +46,7 @@ typedef struct track {
     double from_s, to_s; /* of the stretch */
     int64_t inner;       /* first row of the grid after from_s */
     int64_t first;       /* row of the stretch that a series begins with */
+    bst_state *kept;     /* the first rows of the stretch, up to MOST_KEPT_ROWS; NULL: none */
 } track;
 
 static bst_status state_of(const track *t, bst_ctx *ctx, double seconds, bst_state *out) {
@@ -82,8 +84,13 @@ static bst_status row_of(void *user, bst_ctx *ctx, int64_t row, bst_time *time,
                          bst_vec3 *position_m, bst_vec3 *velocity_mps) {
     const track *t = user;
     bst_state state;
-    double seconds = seconds_of(t, row + t->first);
-    BST_TRY(row_state(t, ctx, seconds, &state));
+    row += t->first;
+    double seconds = seconds_of(t, row);
+    if (t->kept && row < MOST_KEPT_ROWS) {
+        state = t->kept[row];
+    } else {
+        BST_TRY(row_state(t, ctx, seconds, &state));
+    }
     *time = bst_world_time(t->world, seconds);
     *position_m = state.position_m;
     *velocity_mps = state.velocity_mps;
@@ -196,6 +203,9 @@ static bst_status write_one(bst_ctx *ctx, const bst_export *e, const bst_scenari
             bst_state state;
             t->first = row;
             while (row < rows && row_state(t, ctx, seconds_of(t, row), &state) == BST_OK) {
+                if (t->kept && row < MOST_KEPT_ROWS) {
+                    t->kept[row] = state;
+                }
                 row++;
             }
             if (row < rows && !*why) {
@@ -218,8 +228,32 @@ static bst_status write_one(bst_ctx *ctx, const bst_export *e, const bst_scenari
     return BST_OK;
 }
 
+/* All observers, and the objects that are chosen. */
+static bst_status write_tracks(bst_ctx *ctx, const bst_export *e, const bst_scenario *scenario,
+                               FILE *stream, track *t, const bst_orbit_selection *s, int *written) {
+    int observers = bst_world_observer_count(t->world), objects = bst_world_object_count(t->world);
+    int64_t done = 0;
+    bst_progress progress;
+    bst_progress_start(&progress, e->czml ? "orbits.czml" : "orbits.oem", "orbits",
+                       observers + s->count);
+    bst_status status = BST_OK;
+    for (int i = 0; i < observers + objects && status == BST_OK; i++) {
+        t->observer = i < observers ? i : -1;
+        t->object = i < observers ? -1 : i - observers;
+        if (t->object >= 0 && !s->chosen[t->object]) {
+            continue;
+        }
+        status = bst_export_check(ctx);
+        status = status == BST_OK ? write_one(ctx, e, scenario, stream, t, written) : status;
+        bst_progress_update(&progress, ++done);
+    }
+    bst_progress_end(&progress);
+    return status;
+}
+
 static bst_status write_orbits(bst_ctx *ctx, const bst_export *e, const bst_scenario *scenario,
-                               const bst_world *world, bst_view *view, FILE *stream, int *written) {
+                               const bst_world *world, bst_view *view, const bst_orbit_selection *s,
+                               FILE *stream, int *written) {
     track t = {.view = view, .world = world, .sensor = -1, .span_s = recorded_s(e->run, scenario)};
     t.step_s = e->step_s > 0.0 ? e->step_s : fmin(60.0, t.span_s / 20.0);
     if (!(t.span_s > 0.0)) {
@@ -235,19 +269,9 @@ static bst_status write_orbits(bst_ctx *ctx, const bst_export *e, const bst_scen
         BST_TRY(bst_oem_write_head(ctx, stream, created, "BORESIGHT",
                                    "true states of a simulated run"));
     }
-    int observers = bst_world_observer_count(world), objects = bst_world_object_count(world);
-    bst_progress progress;
-    bst_progress_start(&progress, e->czml ? "orbits.czml" : "orbits.oem", "orbits",
-                       observers + objects);
-    bst_status status = BST_OK;
-    for (int i = 0; i < observers + objects && status == BST_OK; i++) {
-        t.observer = i < observers ? i : -1;
-        t.object = i < observers ? -1 : i - observers;
-        status = bst_export_check(ctx);
-        status = status == BST_OK ? write_one(ctx, e, scenario, stream, &t, written) : status;
-        bst_progress_update(&progress, i + 1);
-    }
-    bst_progress_end(&progress);
+    t.kept = malloc(MOST_KEPT_ROWS * sizeof *t.kept); /* without it states are computed twice */
+    bst_status status = write_tracks(ctx, e, scenario, stream, &t, s, written);
+    free(t.kept);
     if (status == BST_OK && e->czml) {
         status = bst_export_views(ctx, e, scenario, world, view, stream);
     }
@@ -259,8 +283,9 @@ static bst_status write_orbits(bst_ctx *ctx, const bst_export *e, const bst_scen
 
 /* The observers' orbits as they believe them; of several sensors the first that is asked for. */
 static bst_status write_believed(bst_ctx *ctx, const bst_export *e, const bst_scenario *scenario,
-                                 const bst_world *world, bst_view *view, FILE *stream,
-                                 int *written) {
+                                 const bst_world *world, bst_view *view,
+                                 const bst_orbit_selection *s, FILE *stream, int *written) {
+    (void)s; /* no objects */
     track t = {.view = view, .world = world, .object = -1, .span_s = recorded_s(e->run, scenario)};
     bst_export_sensor sensors[BST_EXPORT_SENSORS];
     char created[32];
@@ -295,6 +320,7 @@ static bst_status orbits_of(bst_ctx *ctx, const bst_export *e, const bst_scenari
     bst_draft draft;
     bst_world *world = NULL;
     bst_view *view = NULL;
+    bst_orbit_selection selection = {0};
     int written = 0;
     /* orbits need no stars */
     bst_world_config config = scenario->world;
@@ -308,18 +334,29 @@ static bst_status orbits_of(bst_ctx *ctx, const bst_export *e, const bst_scenari
     BST_TRY(bst_world_create(ctx, scenario->file, &config, &scenario->observers, scenario->base_dir,
                              scenario->epoch, &world));
     bst_status status = bst_view_create(ctx, world, &view);
+    if (status == BST_OK && !believed) {
+        status = bst_orbit_selection_make(ctx, e->run, world, e->objects, &selection);
+    }
     if (status == BST_OK) {
         status = bst_draft_open(ctx, path, &draft);
     }
     if (status == BST_OK) {
         status = (believed ? write_believed : write_orbits)(ctx, e, scenario, world, view,
-                                                            draft.stream, &written);
+                                                            &selection, draft.stream, &written);
         status = bst_draft_close(ctx, &draft, status);
     }
     if (status == BST_OK) {
-        printf("%s: %s\n", path,
+        printf("%s: %s", path,
                bst_count_text((char[BST_COUNT_TEXT]){0}, written, "orbit", "orbits"));
+        if (selection.left_out > 0) {
+            printf(
+                "; %s that came into no field %s left out (--objects all)",
+                bst_count_text((char[BST_COUNT_TEXT]){0}, selection.left_out, "object", "objects"),
+                selection.left_out == 1 ? "is" : "are");
+        }
+        printf("\n");
     }
+    bst_orbit_selection_free(&selection);
     bst_view_free(view);
     bst_world_free(world);
     return status;

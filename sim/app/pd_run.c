@@ -206,7 +206,7 @@ bst_status bst_pd_run(bst_ctx *ctx, bst_pd_scene *s, bst_pd_detector *detector,
     empty = (empty + stacked - 1) / stacked * stacked;
     bst_progress progress;
     bst_progress_start(&progress, s->name, "frames", frames + empty);
-    progress.on = progress.on && !s->options.quiet;
+    progress.off = s->options.quiet;
     if (status == BST_OK) {
         status = do_frames(ctx, &r, empty, false, &progress, 0);
     }

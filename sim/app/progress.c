@@ -10,26 +10,33 @@ void bst_progress_start(bst_progress *progress, const char *what, const char *un
     *progress = (bst_progress){.what = what,
                                .unit = unit,
                                .total = total,
-                               .on = isatty(STDERR_FILENO) == 1,
+                               .terminal = isatty(STDERR_FILENO) == 1,
                                .started = bst_wall_seconds()};
     progress->newest = progress->started;
 }
 
+/* Seconds between lines in a file, which cannot be overwritten as those of a terminal are. */
+#define PLAIN_PERIOD_S 10.0
+
 void bst_progress_update(bst_progress *progress, int64_t done) {
     double now = bst_wall_seconds(), elapsed = now - progress->started;
-    if (!progress->on || elapsed < 2.0 || now - progress->newest < 0.2) {
+    if (progress->off || elapsed < 2.0 ||
+        now - progress->newest < (progress->terminal ? 0.2 : PLAIN_PERIOD_S)) {
         return;
     }
     progress->newest = now;
-    progress->shown = true;
+    progress->shown = progress->terminal;
     double rate = (double)done / elapsed;
-    fprintf(stderr, "\r\033[K%s: %" PRId64, progress->what, done);
+    fprintf(stderr, "%s%s: %" PRId64, progress->terminal ? "\r\033[K" : "", progress->what, done);
     if (progress->total > 0) {
         fprintf(stderr, " of %" PRId64, progress->total);
     }
     fprintf(stderr, " %s, %.0f a second", progress->unit, rate);
     if (progress->total > 0 && rate > 0.0) {
         fprintf(stderr, ", %.0f s left", (double)(progress->total - done) / rate);
+    }
+    if (!progress->terminal) {
+        fputs("\n", stderr);
     }
     fflush(stderr);
 }

@@ -11,9 +11,9 @@
 static double frame_bytes(const bst_scenario *scenario) {
     const bst_observer_config *observers = scenario->observers.items;
     const bst_record_config *record = &scenario->record;
-    /* Rice takes 8-bit noise to about half */
+    /* Rice takes noise of some DN to about half */
     double bytes = 0.0, per_pixel = record->frames == BST_RECORD_NO_FRAMES ? 0.0
-                                    : record->compression                  ? 1.0
+                                    : bst_record_compresses(record)        ? 1.0
                                                                            : 2.0;
     for (uint32_t planes = record->planes; planes; planes &= planes - 1) {
         per_pixel += planes == UINT32_C(1) << BST_PLANE_SATURATION ? 1.0 : 4.0;
@@ -46,7 +46,7 @@ bst_status bst_run_check_space(bst_ctx *ctx, const bst_scenario *scenario, const
         return BST_OK;
     }
     static const char advice[] =
-        "shorten the run (--duration), set /record/compression=rice or /record/frames=none, or "
+        "shorten the run (--duration), set /record/frames=none, or "
         "choose another output folder";
     if (!force) {
         return bst_fail(ctx, BST_ERR_IO,

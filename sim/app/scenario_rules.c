@@ -12,6 +12,8 @@
 /* Errors of element sets near their epoch grow to 1 to 3 km a day along low orbits, less in high
  * ones (Vallado et al. 2006, AIAA 2006-6753, section VII). */
 #define OLD_ELEMENTS_DAYS 14.0
+/* Share of a catalogue's sets. */
+#define MANY_OLD 0.1
 /* From the axis at which a pixel of a gnomonic projection covers half as much sky as at the middle,
  * cos^3 = 1/2; and the one beyond which no optics is drawn as a plane. */
 #define WIDE_HALF_FIELD_DEG 37.5
@@ -69,50 +71,54 @@ static bst_status no_duration(bst_ctx *ctx, const bst_scenario *scenario, const 
     return BST_OK;
 }
 
-static void note_age(double seconds, const char *name, int *old, double *oldest_days,
-                     const char **oldest) {
-    double days = fabs(seconds) / 86400.0;
-    if (days > OLD_ELEMENTS_DAYS) {
-        ++*old;
-        if (days > *oldest_days) {
-            *oldest_days = days;
-            *oldest = name;
-        }
-    }
-}
+/* Element sets that are old, and how old the oldest is. */
+typedef struct ages {
+    int old, sets;
+    double most_days;
+    const char *oldest;
+} ages;
 
-/* The longest time between a body's elements and an instant of the run; false: no element set. */
-static bool longest_age(const bst_world *world, int body, double duration_s, double *seconds) {
+static void note_age(ages *a, const bst_world *world, int body, const char *name,
+                     double duration_s) {
     double offset_s;
     if (!bst_world_element_age(world, body, &offset_s)) {
-        return false;
+        return;
     }
-    *seconds = fmax(fabs(offset_s), fabs(offset_s + duration_s));
-    return true;
+    double days = fmax(fabs(offset_s), fabs(offset_s + duration_s)) / 86400.0;
+    a->sets++;
+    a->old += days > OLD_ELEMENTS_DAYS;
+    if (days > a->most_days) {
+        a->most_days = days;
+        a->oldest = name;
+    }
 }
 
+static void warn_of_age(bst_ctx *ctx, const char *what, const ages *a) {
+    bst_log(ctx, BST_LOG_WARNING,
+            "/epoch_utc: %d of %d element sets of %s are more than %.0f days away from the run "
+            "(%s: %.0f days); SGP4 errs by kilometres a day then: as truth they are orbits like "
+            "any other, as places of real objects they are not; take element sets of that time",
+            a->old, a->sets, what, OLD_ELEMENTS_DAYS, a->oldest, a->most_days);
+}
+
+/* Observers and objects that the scenario lists count singly; of a whole catalogue a few old sets
+ * are normal. */
 static bst_status old_elements(bst_ctx *ctx, const bst_scenario *scenario, const bst_world *world) {
-    int objects = bst_world_object_count(world), old = 0, sets = 0;
-    double most = 0.0, seconds;
-    const char *oldest = "";
+    int objects = bst_world_object_count(world), listed_count = scenario->world.objects.count;
+    ages listed = {0}, catalogued = {0};
     for (int o = 0; o < bst_world_observer_count(world); o++) {
-        if (longest_age(world, objects + o, scenario->duration_s, &seconds)) {
-            sets++;
-            note_age(seconds, bst_world_observer_name(world, o), &old, &most, &oldest);
-        }
+        note_age(&listed, world, objects + o, bst_world_observer_name(world, o),
+                 scenario->duration_s);
     }
     for (int o = 0; o < objects; o++) {
-        if (longest_age(world, o, scenario->duration_s, &seconds)) {
-            sets++;
-            note_age(seconds, bst_world_object(world, o)->name, &old, &most, &oldest);
-        }
+        note_age(o < listed_count ? &listed : &catalogued, world, o,
+                 bst_world_object(world, o)->name, scenario->duration_s);
     }
-    if (old > 0) {
-        bst_log(ctx, BST_LOG_WARNING,
-                "/epoch_utc: %d of %d element sets are more than %.0f days away from the run (%s: "
-                "%.0f days); SGP4 errs by kilometres a day then: as truth they are orbits like any "
-                "other, as places of real objects they are not; take element sets of that time",
-                old, sets, OLD_ELEMENTS_DAYS, oldest, most);
+    if (listed.old > 0) {
+        warn_of_age(ctx, "observers and listed objects", &listed);
+    }
+    if (catalogued.old > MANY_OLD * catalogued.sets) {
+        warn_of_age(ctx, "the catalogues", &catalogued);
     }
     return BST_OK;
 }

@@ -1,6 +1,7 @@
 #include "sim/app/video.h"
 
 #include <errno.h>
+#include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,6 +10,12 @@
 
 #include "sim/core/draft.h"
 #include "sim/world/child.h"
+
+/* A film takes at most 1 MB for each second that it lasts, if it lasts a second and a frame: the
+ * buffer model of H.264 (ITU-T H.264, annex C) bounds any stretch of T seconds by rate T + buffer.
+ */
+#define MOST_BITS_PER_S 6e6
+#define BUFFER_BITS 2e6
 
 struct bst_video {
     char path[4096], draft[4160], words[4160];
@@ -72,41 +79,20 @@ bst_status bst_video_begin(bst_ctx *ctx, const char *path, int width, int height
         return status;
     }
     v->bytes = 3 * (size_t)width * (size_t)height;
-    char size[32], rate[32], output[4200];
+    char size[32], rate[32], output[4200], most[32], buffer[32];
     snprintf(size, sizeof size, "%dx%d", width, height);
     snprintf(rate, sizeof rate, "%.6g", frame_rate);
     snprintf(output, sizeof output, "file:%s", v->draft);
-    const char *const argv[] = {"ffmpeg",
-                                "-hide_banner",
-                                "-nostdin",
-                                "-loglevel",
-                                "error",
-                                "-y",
-                                "-f",
-                                "rawvideo",
-                                "-pixel_format",
-                                "bgr24",
-                                "-video_size",
-                                size,
-                                "-framerate",
-                                rate,
-                                "-i",
-                                "pipe:0",
-                                "-an",
-                                "-vf",
-                                "pad=ceil(iw/2)*2:ceil(ih/2)*2",
-                                "-pix_fmt",
-                                "yuv420p",
-                                "-c:v",
-                                x264 ? "libx264" : "mpeg4",
-                                x264 ? "-crf" : "-q:v",
-                                x264 ? "18" : "3",
-                                "-movflags",
-                                "+faststart",
-                                "-f",
-                                "mp4",
-                                output,
-                                NULL};
+    snprintf(most, sizeof most, "%.0f", MOST_BITS_PER_S);
+    snprintf(buffer, sizeof buffer, "%.0f", BUFFER_BITS * fmax(1.0, 1.0 / frame_rate));
+    const char *const argv[] = {
+        "ffmpeg", "-hide_banner", "-nostdin", "-loglevel", "error", "-y", "-f", "rawvideo",
+        "-pixel_format", "bgr24", "-video_size", size, "-framerate", rate, "-i", "pipe:0", "-an",
+        "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", "-c:v",
+        x264 ? "libx264" : "mpeg4", x264 ? "-crf" : "-b:v", x264 ? "20" : most,
+        /* the marks' colours stay, which the grey noise does not need */
+        x264 ? "-x264-params" : "-qmin", x264 ? "chroma-qp-offset=-12" : "2", "-maxrate", most,
+        "-bufsize", buffer, "-movflags", "+faststart", "-f", "mp4", output, NULL};
     status = bst_child_start_fed(ctx, argv, v->words, &v->child);
     if (status != BST_OK) {
         unlink(v->draft);

@@ -9,8 +9,9 @@
 typedef struct bst_video bst_video;
 
 /* Begins an MP4 file of width x height pixels (H.264, or MPEG-4 where ffmpeg lacks libx264; 4:2:0,
- * sides made even) at `path`, which appears when bst_video_end succeeds. BST_ERR_NOT_FOUND when
- * there is no ffmpeg: the message says what to install. Ignore SIGPIPE. */
+ * sides made even; at most 1 MB per second of film, at a quality that this allows) at `path`, which
+ * appears when bst_video_end succeeds. BST_ERR_NOT_FOUND when there is no ffmpeg: the message says
+ * what to install. Ignore SIGPIPE. */
 bst_status bst_video_begin(bst_ctx *ctx, const char *path, int width, int height, double frame_rate,
                            bst_video **out) BST_MUST_CHECK;
 /* Adds a frame of 3 * width * height bytes, blue first. BST_ERR_IO when ffmpeg ended. */

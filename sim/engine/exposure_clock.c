@@ -19,6 +19,8 @@ typedef struct exposure_clock {
     bst_frame_cursor
         updates; /* what drives the sensor frame by frame; none: updates.updates NULL */
     double dropped_fraction;
+    double burst_begins, burst_ends; /* probability from one frame to the next; ends 0: no bursts */
+    bool in_burst;                   /* the frame before was lost */
     bst_rng_key drop_key;
     int64_t id;
     int64_t start_tick; /* of the running or the next exposure */
@@ -85,6 +87,45 @@ static bst_status check_rows(const bst_module_env *env, const exposure_clock *cl
     return BST_OK;
 }
 
+/* Gilbert's channel: a frame is lost when the state is "burst". Bursts end with probability 1/L
+ * from one frame to the next, so that they last L frames on average, and begin as often as gives
+ * the fraction. Source: E. N. Gilbert, "Capacity of a Burst-Noise Channel", Bell System Technical
+ * Journal 39 (1960), with all frames lost in the bad state and none in the good one. */
+static bst_status set_losses(const bst_module_env *env, const bst_exposure_config *c,
+                             exposure_clock *clock) {
+    double share = c->dropped_fraction, frames = c->dropped_burst_frames;
+    clock->dropped_fraction = share;
+    clock->drop_key = bst_env_rng(env, "dropped_frames");
+    if (frames == 0.0 || share == 0.0 || share == 1.0) {
+        return BST_OK;
+    }
+    /* between two bursts there is one frame at least */
+    double fewest = fmax(1.0, share / (1.0 - share));
+    if (frames < fewest) {
+        return bst_fail(env->ctx, BST_ERR_CONFIG,
+                        "exposure/dropped_burst_frames: %.9g (allowed: 0, or %.9g and more, with a "
+                        "frame between two bursts and a dropped_fraction of %.9g)",
+                        frames, fewest, share);
+    }
+    clock->burst_ends = 1.0 / frames;
+    clock->burst_begins = share / (1.0 - share) * clock->burst_ends;
+    return BST_OK;
+}
+
+/* Whether the frame that ends is lost. */
+static bool loses_frame(exposure_clock *clock) {
+    if (!(clock->dropped_fraction > 0.0)) {
+        return false;
+    }
+    double u = bst_rng_uniform(clock->drop_key, (uint64_t)clock->id, 0);
+    if (clock->burst_ends == 0.0 || clock->id == 0) {
+        clock->in_burst = u < clock->dropped_fraction;
+    } else {
+        clock->in_burst = clock->in_burst ? u >= clock->burst_ends : u < clock->burst_begins;
+    }
+    return clock->in_burst;
+}
+
 static bst_status create(const bst_module_env *env, const void *config, void **self) {
     const bst_exposure_config *c = config;
     exposure_clock *clock = calloc(1, sizeof *clock);
@@ -95,10 +136,10 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
     clock->tick_rate_hz = env->tick_rate_hz;
     clock->full = (bst_window){0, 0, (int)camera->width_px, (int)camera->height_px};
     clock->binning = c->binning > 1 ? (int)c->binning : 1;
-    clock->dropped_fraction = c->dropped_fraction;
-    clock->drop_key = bst_env_rng(env, "dropped_frames");
-    bst_status status =
-        bst_exposure_window(env->ctx, c, camera->width_px, camera->height_px, &clock->own);
+    bst_status status = set_losses(env, c, clock);
+    if (status == BST_OK) {
+        status = bst_exposure_window(env->ctx, c, camera->width_px, camera->height_px, &clock->own);
+    }
     clock->window = clock->own;
     if (status == BST_OK) {
         status = bst_seconds_to_ticks(env->ctx, env->tick_rate_hz, c->exposure_s,
@@ -205,15 +246,14 @@ static void open_exposure(exposure_clock *clock, bst_sample command) {
 
 /* `late`: the run is behind its clock, and does without the frame. */
 static void close_exposure(exposure_clock *clock, bool late, bst_exposure *out) {
+    bool lost = loses_frame(clock);
     *out = (bst_exposure){.id = clock->id,
                           .start_tick = clock->start_tick,
                           .end_tick = clock->start_tick + clock->exposure_ticks,
                           .window = clock->window,
                           .binning = clock->binning,
                           .pixel_scale_arcsec = clock->pixel_scale_arcsec,
-                          .dropped = late || (clock->dropped_fraction > 0.0 &&
-                                              bst_rng_uniform(clock->drop_key, (uint64_t)clock->id,
-                                                              0) < clock->dropped_fraction)};
+                          .dropped = late || lost};
     if (clock->updates.updates) {
         bst_frame_cursor_next(&clock->updates);
     }

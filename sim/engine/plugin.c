@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "sim/core/version.h"
 #include "sim/world/stages.h"
@@ -59,6 +60,20 @@ static bst_status check_stages(bst_ctx *ctx, const bst_plugin *plugin) {
     return BST_OK;
 }
 
+/* Loads the libboresight that is installed with the running program, where the dynamic linker finds
+ * none: it then takes it for every library that needs one of this name. False: there is none. */
+static bool load_own_library(void) {
+    char path[8192];
+    ssize_t length = readlink("/proc/self/exe", path, 4096);
+    if (length <= 0 || length >= 4096) {
+        return false;
+    }
+    path[length] = '\0';
+    char *end = BST_LIBRARY_FROM_PROGRAM[0] == '/' ? path : strrchr(path, '/') + 1;
+    snprintf(end, sizeof path - (size_t)(end - path), "%s", BST_LIBRARY_FROM_PROGRAM);
+    return dlopen(path, RTLD_NOW | RTLD_LOCAL) != NULL;
+}
+
 bst_status bst_plugin_open(bst_ctx *ctx, const char *path, bst_plugin *out) {
     *out = (bst_plugin){.modules = NULL};
     char *full = realpath(path, NULL);
@@ -77,6 +92,9 @@ bst_status bst_plugin_open(bst_ctx *ctx, const char *path, bst_plugin *out) {
         return bst_fail_prefix(ctx, BST_ERR_IO, "plug-in");
     }
     void *library = dlopen(out->file, RTLD_NOW | RTLD_LOCAL);
+    if (!library && load_own_library()) {
+        library = dlopen(out->file, RTLD_NOW | RTLD_LOCAL);
+    }
     if (!library) {
         return bst_fail(ctx, BST_ERR_IO,
                         "plug-in %s cannot be loaded (%s); is it a shared library, built with "

@@ -12,7 +12,8 @@ static const char *const frame_choices[] = {"extensions", "cube", "none", NULL};
 
 static const char *const detection_choices[] = {"all", "no_stars", "objects", NULL};
 
-static const char *const compression_choices[] = {"none", "rice", NULL};
+/* bst_fits_compression, and auto */
+static const char *const compression_choices[] = {"none", "rice", "auto", NULL};
 
 /* in the order of bst_plane; also the names of their files */
 static const char *const plane_choices[] = {"stars",        "targets",    "background",
@@ -26,9 +27,10 @@ const bst_config_desc bst_record_config_table[] = {
     BST_ENUM(bst_record_config, frames, frame_choices, "\"extensions\"",
              "Frames in FITS: an image extension each, one datacube with a table of times and "
              "WCS, or none."),
-    BST_ENUM(bst_record_config, compression, compression_choices, "\"none\"",
+    BST_ENUM(bst_record_config, compression, compression_choices, "\"auto\"",
              "Of frames in extensions: \"rice\" is lossless FITS tile compression, done beside "
-             "the simulation by a thread of its own."),
+             "the simulation by a thread of its own; \"auto\" is rice for extensions and none for "
+             "a cube."),
     BST_BOOL(bst_record_config, checksums, "true",
              "CHECKSUM and DATASUM in each HDU; they take about 0.1 ms per million pixels."),
     BST_CHOICES(
@@ -59,11 +61,16 @@ const bst_config_desc bst_record_config_table[] = {
     BST_CONFIG_END,
 };
 
+bool bst_record_compresses(const bst_record_config *config) {
+    return config->frames == BST_RECORD_EXTENSIONS && config->compression != BST_FITS_RAW;
+}
+
 bst_status bst_record_config_check(bst_ctx *ctx, const bst_record_config *config) {
-    if (config->compression != BST_FITS_RAW && config->frames == BST_RECORD_CUBE) {
-        return bst_fail(ctx, BST_ERR_CONFIG,
-                        "/record/compression: \"rice\" compresses frames in extensions only; give "
-                        "/record/frames \"extensions\", or /record/compression \"none\"");
+    if (config->compression == BST_FITS_RICE && config->frames == BST_RECORD_CUBE) {
+        return bst_fail(
+            ctx, BST_ERR_CONFIG,
+            "/record/compression: \"rice\" compresses frames in extensions only; give "
+            "/record/frames \"extensions\", or /record/compression \"auto\" or \"none\"");
     }
     return BST_OK;
 }
@@ -232,7 +239,7 @@ static bst_status open_file(bst_ctx *ctx, bst_recorder *recorder, bst_recorder_s
                           .program = recorder->program,
                           .camera = &s->camera,
                           .checksums = recorder->config.checksums,
-                          .compression = frames && recorder->config.compression == BST_FITS_RICE
+                          .compression = frames && bst_record_compresses(&recorder->config)
                                              ? BST_FITS_RICE
                                              : BST_FITS_RAW,
                           .content = content};

@@ -23,7 +23,7 @@ typedef enum bst_record_detections {
 /* The scenario's "record" block. */
 typedef struct bst_record_config {
     int32_t frames;      /* bst_record_frames */
-    int32_t compression; /* bst_fits_compression, of extensions */
+    int32_t compression; /* bst_fits_compression, or 2: auto; of extensions */
     bool checksums;      /* of each HDU */
     uint32_t planes;     /* bit k: the bst_plane k */
     double mask_threshold_sigma;
@@ -43,6 +43,9 @@ extern const bst_config_desc bst_record_config_table[];
 
 /* Checks what the table cannot: BST_ERR_CONFIG when a cube is to be compressed. */
 bst_status bst_record_config_check(bst_ctx *ctx, const bst_record_config *config) BST_MUST_CHECK;
+
+/* Whether frames are Rice compressed: "auto" does so for extensions. */
+bool bst_record_compresses(const bst_record_config *config);
 
 /* A sensor whose channels are recorded. Names and camera are copied or used in create only. */
 typedef struct bst_recorder_sensor {

@@ -22,6 +22,14 @@ static link_flow *find(bst_link *link, int fd) {
     return NULL;
 }
 
+/* Ends a connection; ZeroMQ closes the socket. Without lingering the peer is told at once (RST),
+ * and does not wait for a window that never opens. */
+static void cut(int fd) {
+    const struct linger none = {.l_onoff = 1, .l_linger = 0};
+    (void)setsockopt(fd, SOL_SOCKET, SO_LINGER, &none, sizeof none);
+    (void)shutdown(fd, SHUT_RDWR);
+}
+
 bool bst_link_flow_watched(const bst_link *link) {
     return link->flow_count > 0;
 }
@@ -33,7 +41,7 @@ void bst_link_flow_open(bst_link *link, int fd) {
     }
     link_flow *flow = find(link, fd);
     if (!flow && link->flow_count == LINK_FLOWS) {
-        (void)shutdown(fd, SHUT_RDWR);
+        cut(fd);
         return;
     }
     flow = flow ? flow : &link->flows[link->flow_count++];
@@ -97,7 +105,7 @@ void bst_link_flow_check(bst_link *link, bst_ctx *ctx) {
                        "a peer with %lld MiB that are not taken is disconnected (allowed: %d of a "
                        "peer, %d of all)",
                        (long long)(most >> 20), LINK_WAITING_BYTES >> 20, LINK_WAITING_ALL >> 20);
-        (void)shutdown(link->flows[worst].fd, SHUT_RDWR);
+        cut(link->flows[worst].fd);
         bst_link_flow_close(link, link->flows[worst].fd);
     }
 }

@@ -110,9 +110,10 @@ static bst_status state_within(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clo
     return BST_OK;
 }
 
-/* Continues `end`, the state at end_s, by `beyond_s`. */
+/* Continues `end`, the state at the file's end that is nearer, by `beyond_s`. */
 static bst_status go_on(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_clock *clock, bst_time epoch,
-                        double end_s, const bst_state *end, double beyond_s, bst_state *out) {
+                        const bst_state *end, double beyond_s, bst_state *out) {
+    double end_s = beyond_s > 0.0 ? orbit->to_s : orbit->from_s;
     double step = fmin(ACCELERATION_S, orbit->to_s - orbit->from_s) * (beyond_s > 0.0 ? -1.0 : 1.0);
     double r = bst_vec3_norm(end->position_m);
     bst_vec3 gravity = bst_vec3_scale(end->position_m, -BST_EARTH_MU_M3PS2 / (r * r * r));
@@ -147,7 +148,7 @@ bst_status bst_orbit_file_state(bst_ctx *ctx, const bst_orbit *orbit, bst_sky_cl
     bst_status status = state_within(ctx, orbit, clock, epoch, end_s, out);
     if (status == BST_OK && beyond_s != 0.0) {
         bst_state end = *out;
-        status = go_on(ctx, orbit, clock, epoch, end_s, &end, beyond_s, out);
+        status = go_on(ctx, orbit, clock, epoch, &end, beyond_s, out);
     }
     return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "orbit of %s", orbit->name);
 }

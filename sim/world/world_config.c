@@ -163,6 +163,9 @@ static const bst_config_desc exposure_table[] = {
     BST_REAL(bst_exposure_config, first_s, "s", 0, 1e9, "0", "Start of the first exposure."),
     BST_REAL(bst_exposure_config, dropped_fraction, "", 0, 1, "0",
              "Fraction of the frames that are lost between sensor and processing, at random."),
+    BST_REAL(bst_exposure_config, dropped_burst_frames, "", 0, 1e6, "0",
+             "Mean number of frames that are lost in a row (Gilbert's two-state channel): 1 or "
+             "more; 0: each frame is lost or not by itself."),
     BST_INT(
         bst_exposure_config, binning, "px", 1, 8, "1",
         "Sensor pixels per side of a frame's pixel, added before they are read; control may ask "

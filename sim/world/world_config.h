@@ -148,8 +148,9 @@ typedef struct bst_cue_config {
 typedef struct bst_exposure_config {
     double exposure_s, period_s, first_s;
     double dropped_fraction;
-    int64_t binning;     /* sensor pixels per side of a pixel that is read */
-    double window_px[4]; /* x0, y0, width, height read out; width 0: all of the sensor */
+    double dropped_burst_frames; /* mean length of a run of lost frames; 0: each by itself */
+    int64_t binning;             /* sensor pixels per side of a pixel that is read */
+    double window_px[4];         /* x0, y0, width, height read out; width 0: all of the sensor */
 } bst_exposure_config;
 
 /* The part of a sensor of width_px x height_px that is read unless control asks for another.

@@ -52,7 +52,7 @@ static void test_discrete_integrator(void **state) {
     (void)state;
     /* k / (z - 1): closed-loop pole 1 - k */
     rational r = {.num = {0.5}, .den = {-1.0, 1.0}, .dt_s = 0.1};
-    bst_loop loop = {rational_at, &r, r.dt_s, 0, NULL, 0, NULL, NULL};
+    bst_loop loop = {rational_at, &r, r.dt_s, 0.0, 0, NULL, 0, NULL, NULL};
     bst_loop_margins m = margins_of(&loop);
     assert_true(m.stable);
     bst_assert_close(m.gain_margin_db, db(4.0), 1e-9); /* at z = -1: rounding */
@@ -92,7 +92,7 @@ static void test_delay(void **state) {
     (void)state;
     /* K exp(-s T) / s: -180 deg at pi / (2 T), crossover at K */
     delayed d = {2.0, 0.2};
-    bst_loop loop = {integrator_with_delay, &d, 1e-3, 0, NULL, 0, NULL, NULL};
+    bst_loop loop = {integrator_with_delay, &d, 1e-3, 0.0, 0, NULL, 0, NULL, NULL};
     bst_loop_margins m = margins_of(&loop);
     assert_true(m.stable);
     bst_assert_close(m.gain_margin_db, db(BST_PI / 2 / 0.4), 1e-6);
@@ -116,7 +116,7 @@ static void test_conditionally_stable(void **state) {
     (void)state;
     /* s^3 + K (s + 1)^2: Routh says stable for K > 1/2 */
     double k = 2.0;
-    bst_loop loop = {conditional, &k, 1e-4, 0, NULL, 0, NULL, NULL};
+    bst_loop loop = {conditional, &k, 1e-4, 0.0, 0, NULL, 0, NULL, NULL};
     bst_loop_margins m = margins_of(&loop);
     assert_true(m.stable && isinf(m.gain_margin_db));
     bst_assert_close(m.gain_reduction_db, db(4.0), 1e-6);
@@ -129,7 +129,7 @@ static void test_conditionally_stable(void **state) {
 static void test_no_crossover(void **state) {
     (void)state;
     rational r = {.num = {0.4}, .den = {0.0, 1.0}, .dt_s = 1.0};
-    bst_loop loop = {rational_at, &r, r.dt_s, 0, NULL, 0, NULL, NULL};
+    bst_loop loop = {rational_at, &r, r.dt_s, 0.0, 0, NULL, 0, NULL, NULL};
     bst_loop_margins m = margins_of(&loop);
     assert_true(m.stable && isinf(m.phase_margin_deg) && isinf(m.delay_margin_s));
     assert_true(m.crossover_hz == 0.0 && m.bandwidth_hz == 0.0);
@@ -213,14 +213,14 @@ static void test_against_roots(void **state) {
         if (nearest < 1e-4) {
             continue; /* closed-loop pole on the circle, or so slow that the walk starts above it */
         }
-        bst_loop loop = {rational_at, &r, r.dt_s, unstable, NULL, 0, NULL, NULL};
+        bst_loop loop = {rational_at, &r, r.dt_s, 0.0, unstable, NULL, 0, NULL, NULL};
         bst_loop_margins m = margins_of(&loop);
         if (m.unstable_closed != outside) {
             fail_msg("loop %d: %d poles outside by Nyquist, %d by roots", (int)n, m.unstable_closed,
                      outside);
         }
         /* the open loop's poles counted from its denominator: both counts are the roots' */
-        bst_loop counted = {rational_at, &r, r.dt_s, -1, NULL, 0, monic_denominator, NULL};
+        bst_loop counted = {rational_at, &r, r.dt_s, 0.0, -1, NULL, 0, monic_denominator, NULL};
         assert_int_equal(margins_of(&counted).unstable_closed, outside);
         loop.unstable_poles = 0;
         if (outside < unstable) { /* a pole that nobody declared is an error, not a count below 0 */
@@ -265,7 +265,7 @@ static void test_narrow_mode(void **state) {
     /* round the mode the loop runs through a circle of the diameter share / (2 damping w_m) to the
      * left of -j / w_m, whose far side it meets the axis on */
     modal p = {1.0, 7.0, 1e-6, 1e-5, 1e-3};
-    bst_loop loop = {modal_at, &p, p.dt_s, 0, &p.mode_hz, 1, NULL, NULL};
+    bst_loop loop = {modal_at, &p, p.dt_s, 0.0, 0, &p.mode_hz, 1, NULL, NULL};
     bst_loop_margins m = margins_of(&loop);
     double wm = 2 * BST_PI * 7.0, radius = 0.5e-5 / (2e-6 * wm);
     double at_axis = radius + sqrt(radius * radius - 1.0 / (wm * wm));
@@ -278,7 +278,7 @@ static void test_narrow_mode(void **state) {
 static void test_step_response(void **state) {
     (void)state;
     rational r = {.num = {0.3}, .den = {-1.0, 1.0}, .dt_s = 0.1};
-    bst_loop loop = {rational_at, &r, r.dt_s, 0, NULL, 0, NULL, NULL};
+    bst_loop loop = {rational_at, &r, r.dt_s, 0.0, 0, NULL, 0, NULL, NULL};
     double out[40];
     bst_loop_step_response(&loop, 256, NAN, out, 40);
     for (int n = 0; n < 40; n++) {

@@ -208,6 +208,49 @@ class Exported(unittest.TestCase):
             self.assertAlmostEqual(math.dist(rays[0], rays[2]) / 2, math.sin(math.atan(half)),
                                    delta=1e-7)
 
+    def test_orbits_of_what_was_seen(self):
+        """Of a large catalogue only what came into a field, and what is asked for."""
+        made, out = os.path.join(runs.scratch(), "many"), self.out()
+        runs.run("scenarios/constellation_quick.json", made, duration=20)
+        rows = runs.database(made).execute
+        seen = {row[0] for row in rows(
+            "SELECT o.name FROM truth t JOIN objects o ON o.id = t.id"
+            " WHERE t.kind = 'object' AND t.in_field = 1"
+            " UNION SELECT name FROM sightings UNION SELECT target FROM sensors")} - {"", None}
+        observers = ["neossat", "stss1", "stss2", "geo1", "geo2"]
+        self.assertGreater(len(seen), 3)
+
+        def objects(*words):
+            said = export(made, "--orbits", "oem", "--step", "10", "--out", out, *words)
+            names = [meta["OBJECT_NAME"] for meta, _ in read_oem(out + "/orbits.oem")]
+            self.assertEqual(names[:5], observers)
+            return names[5:], said
+
+        names, said = objects()
+        self.assertEqual(set(names), seen)
+        self.assertIn(f"{5018 - len(seen)} objects that came into no field are left out", said)
+        self.assertEqual(objects("--objects", "seen")[0], names)
+        # by name or number, in the scenario's order, each once
+        number = rows("SELECT norad FROM objects WHERE name = ?", (names[1],)).fetchone()[0]
+        self.assertEqual(objects("--objects", f"{names[2]}, {number},{names[1]}")[0], names[1:3])
+        failed = call("export", made, "--orbits", "czml", "--objects", f"{number},NOBODY", "--out",
+                      out)
+        self.assertEqual(failed.returncode, 1)
+        self.assertIn('no object "NOBODY" among its 5018', failed.stderr)
+        export(made, "--orbits", "czml", "--out", out)
+        with open(out + "/orbits.czml", encoding="utf-8") as file:
+            packets = json.load(file)
+        self.assertEqual({p["name"] for p in packets if p["id"].startswith("object/")}, seen)
+        failed = call("export", made, "--table", "csv", "--objects", "all", "--out", out)
+        self.assertEqual(failed.returncode, 2)
+        # a small scenario is written whole, seen or not
+        self.assertEqual(len(read_oem(self.all_orbits())), 2)
+
+    def all_orbits(self):
+        out = self.out()
+        self.assertNotIn("left out", export(self.made, "--orbits", "oem", "--out", out))
+        return out + "/orbits.oem"
+
     def test_segments_meet_at_burns(self):
         """An OEM's reader must not interpolate over a jump of velocity."""
         folder = runs.scratch()
@@ -413,7 +456,7 @@ class Exported(unittest.TestCase):
         folder = runs.scratch()
         schema = json.loads(call("schema").stdout)
         extensions = "/record/frames=extensions"
-        kinds = {"raw": (extensions,), "cube": ("/record/frames=cube",)}
+        kinds = {"raw": (extensions, "/record/compression=none"), "cube": ("/record/frames=cube",)}
         if "compression" in schema["properties"]["record"]["properties"]:
             kinds["rice"] = (extensions, "/record/compression=rice")
         pictures = {}
@@ -446,14 +489,14 @@ with open(words[-1][5:], "wb") as file:
     file.write(repr((words, len(data), data[:3])).encode())
 """
 
-    def with_fake(self, out, encoder="libx264", broken=False):
+    def with_fake(self, out, encoder="libx264", broken=False, rate="12.5"):
         """Exports a film with a program in ffmpeg's place."""
         folder = runs.scratch()
         path = os.path.join(folder, "ffmpeg")
         with open(path, "w", encoding="ascii") as file:
             file.write(self.FAKE.format(python=sys.executable, encoder=encoder, broken=broken))
         os.chmod(path, 0o755)
-        return call("export", self.made, "--frames", "mp4", "--size", "101", "--fps", "12.5",
+        return call("export", self.made, "--frames", "mp4", "--size", "101", "--fps", rate,
                     "--last", "6", "--out", out, env={**os.environ, "PATH": folder})
 
     def test_film_is_fed_rightly(self):
@@ -469,6 +512,27 @@ with open(words[-1][5:], "wb") as file:
             after = dict(zip(words, words[1:]))
             self.assertEqual((after["-video_size"], after["-framerate"], after["-c:v"],
                               after["-pixel_format"]), ("101x101", "12.5", expected, "bgr24"))
+
+    def test_film_is_bounded(self):
+        """By the encoder's buffer model: the rate times the film's length, and the buffer once."""
+        for encoder in ("libx264", "libfoo"):
+            for rate in ("0.5", "12.5", "240"):
+                out = self.out()
+                result = self.with_fake(out, encoder, rate=rate)
+                self.assertEqual((result.returncode, result.stderr), (0, ""))
+                with open(out + "/frames.mp4", encoding="ascii") as file:
+                    words = eval(file.read())[0]
+                after = dict(zip(words, words[1:]))
+                longest = max(1.0, 1.0 / float(rate))  # of a second and a frame
+                bits = float(after["-maxrate"]) * longest + float(after["-bufsize"])
+                self.assertLessEqual(bits, 8e6 * longest)
+
+    @unittest.skipUnless(shutil.which("ffmpeg"), "needs ffmpeg")
+    def test_film_of_noise_is_small(self):
+        out = self.out()
+        export(self.made, "--frames", "mp4", "--annotate", "--stretch", "frame", "--out", out)
+        frames = len(list(self.database.execute("SELECT 1 FROM frames")))
+        self.assertLess(os.path.getsize(out + "/frames.mp4"), 1e6 * frames / 10)
 
     def test_film_that_fails(self):
         out = self.out()

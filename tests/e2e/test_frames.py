@@ -252,9 +252,9 @@ class Moving(unittest.TestCase):
     """A spacecraft that drifts and turns about the line of sight during the exposures, and a
     telescope that slews between them: the WCS of every frame holds."""
     DRIFT = runs.SENSOR + "/modules/gimbal/platform/drift_arcsec_per_s=[200, -150, 1200]"
-    FORMS = {"extensions": ["/record/frames=extensions"],
+    FORMS = {"extensions": ["/record/frames=extensions", "/record/compression=none"],
              "rice": ["/record/frames=extensions", "/record/compression=rice"],
-             "cube": ["/record/frames=cube"]}
+             "cube": ["/record/frames=cube"], "default": []}
 
     @classmethod
     def setUpClass(cls):
@@ -316,6 +316,17 @@ class Moving(unittest.TestCase):
 
     def test_cube(self):
         self.check("cube")
+
+    def test_default_is_compressed(self):
+        path = {form: os.path.join(self.out[form], "frames.fits") for form in self.FORMS}
+        self.assertEqual(os.path.getsize(path["default"]), os.path.getsize(path["rice"]))
+        with fits.open(path["default"]) as packed, fits.open(path["extensions"]) as raw:
+            self.assertIsInstance(packed[1], fits.CompImageHDU)
+            for one, other in zip(packed[1:], raw[1:], strict=True):
+                np.testing.assert_array_equal(one.data, other.data)
+        # read noise of 5 DN: about log2(5 sqrt(2 pi e)) = 4.4 bits of entropy of 16, and what the
+        # code and the headers add
+        self.assertLess(os.path.getsize(path["default"]), 0.4 * os.path.getsize(path["extensions"]))
 
 
 def tearDownModule():

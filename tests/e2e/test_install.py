@@ -106,7 +106,8 @@ class Installed(unittest.TestCase):
         words = [CC, "-std=c17", "-Wall", "-Wextra", "-Werror", "-O2", "-shared", "-fPIC",
                  "box_detector.c", *flags, "-lm", "-o"]
         call(*words, "box_detector.so", cwd=work)
-        environment = {**os.environ, "LD_LIBRARY_PATH": self.libdir}
+        # the installed program finds the installed library for the plug-in
+        environment = {k: v for k, v in os.environ.items() if k != "LD_LIBRARY_PATH"}
         sensor = "/observers/0/sensors/0"
         imgproc = (sensor + '/modules/imgproc/detector={"plugin": ' +
                    json.dumps(work + "/box_detector.so") + ', "threshold_sigma": 5}')
@@ -139,6 +140,37 @@ class Installed(unittest.TestCase):
                 capture_output=True, text=True, timeout=60, cwd=work, env=environment)
             self.assertIn(message, result.stderr)
             self.assertIn(result.returncode, (1, 2))
+
+    @unittest.skipUnless(shutil.which("pkg-config"), "needs pkg-config")
+    def test_every_example_runs(self):
+        """A run of the installed program with each example, built by the command in its first
+        lines, in an environment that names no folder of libraries."""
+        environment = {k: v for k, v in os.environ.items()
+                       if k not in ("LD_LIBRARY_PATH", "BORESIGHT_PLUGINS")}
+        build = {**environment, "PKG_CONFIG_PATH": self.libdir + "/pkgconfig"}
+        modules = runs.SENSOR + "/modules/"
+        examples = self.stage + "/share/doc/boresight/docs/examples/"
+        cases = [("plugin_detector/box_detector.c", modules + "imgproc/detector=", {}),
+                 ("plugin_compensator/leaky.c", modules + "control/compensator=", {}),
+                 ("plugin_frame_stage/banding.c", modules + "scenegen/frame_stage=", {}),
+                 ("stare_at.c", modules + "control=", {"ra_deg": 252.36, "dec_deg": -8.82})]
+        for example, where, keys in cases:
+            work = runs.scratch()
+            source = shutil.copy(examples + example, work)
+            with open(source, encoding="utf-8") as file:
+                command = re.search(r"^ \*\s+(cc -shared .*)$", file.read(), re.MULTILINE)[1]
+            # the installed tree lies in a folder with a space here, which $(...) splits
+            flags = call("pkg-config", "--cflags", "--libs", "boresight", env=build)
+            words = re.sub(r"\$\(pkg-config [^)]*\)", "@FLAGS@", command).split()[1:]
+            at = words.index("@FLAGS@")
+            call(CC, *words[:at], *flags.split(), *words[at + 1:], cwd=work)
+            library = only(work + "/*.so")
+            call(self.stage + "/bin/boresight", "run", self.scenario, "--out", "run", "--quiet",
+                 "--duration", "2", "--threads", "1", "--set", runs.NO_FRAMES, "--set",
+                 where + json.dumps({"plugin": library, **keys}), cwd=work, env=environment)
+            with open(work + "/run/manifest.json", encoding="utf-8") as file:
+                loaded = json.load(file)["plugins"]
+            self.assertEqual([p["file"] for p in loaded], [os.path.realpath(library)])
 
     def test_cmake_package(self):
         work = os.path.join(self.folder, "by cmake")

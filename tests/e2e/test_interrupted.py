@@ -22,7 +22,7 @@ import runs
 
 KILLS = int(sys.argv.pop(1)) if len(sys.argv) > 1 and sys.argv[1].isdigit() else 9
 FORMS = {
-    "extensions": ["/record/frames=extensions"],
+    "extensions": ["/record/frames=extensions", "/record/compression=none"],
     "rice": ["/record/frames=extensions", "/record/compression=rice"],
     "cube": ["/record/frames=cube"],
 }

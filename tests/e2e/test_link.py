@@ -12,64 +12,18 @@ import unittest
 import numpy as np
 
 import runs
+from link_runs import (EMBEDDED, SECONDS, ended, free_port, ipc, python, serve, start_run,
+                       wait_until_open)
 
 sys.path.insert(0, "python")
 import boresight_link  # noqa: E402
 
-EMBEDDED = ["--set", "/world/star_catalogue=embedded"]
-SECONDS = 20
 SOURCES = [os.path.join("python", "examples", name)
            for name in ("own_detector.py", "own_controller.py")]
 
 
 def tearDownModule():
     runs.clean()
-
-
-def free_port():
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        return one.getsockname()[1]
-
-
-def ipc():
-    return f"ipc://{runs.scratch()}/link"
-
-
-def start_run(scenario, out, address, external, *more, duration=SECONDS, frames=False):
-    words = runs.command(scenario, out, *([] if frames else [runs.NO_FRAMES]), duration=duration)
-    words.remove("--quiet")  # it says when it waits for peers
-    return subprocess.Popen(words + ["--link", address, "--external", external, *more],
-                            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-
-
-def wait_until_open(run):
-    """Returns when the run waits for its peers."""
-    line = run.stderr.readline()
-    while "waiting for peers" not in line:
-        if not line:
-            raise AssertionError(f"{run.args}: ended before it waited for peers")
-        line = run.stderr.readline()
-
-
-def serve(scenario, address, part, *more):
-    return subprocess.Popen(
-        [runs.BORESIGHT, "serve", scenario, "--link", address, "--part", part, "--threads", "1",
-         "--duration", str(SECONDS), *EMBEDDED, *more],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-
-
-def python(script, *words):
-    return subprocess.Popen(["/usr/bin/python3", script, *words], stdout=subprocess.PIPE,
-                            stderr=subprocess.PIPE, text=True,
-                            env=dict(os.environ, PYTHONPATH="python"))
-
-
-def ended(process, expected=0, timeout=120):
-    out, err = process.communicate(timeout=timeout)
-    if process.returncode != expected:
-        raise AssertionError(f"{process.args}: exit code {process.returncode}: {out}{err}")
-    return out + err
 
 
 def counters(folder):
@@ -460,74 +414,6 @@ class Driver(unittest.TestCase):
         self.assertFalse(np.any(commanded == 0.1))
 
 
-class Keys(unittest.TestCase):
-    """A link with keys takes the peers that have them, in C and in Python, and no others."""
-
-    @classmethod
-    def setUpClass(cls):
-        cls.folder = runs.scratch()
-        cls.keys = cls.make("link.keys")
-
-    @classmethod
-    def make(cls, name):
-        path = os.path.join(cls.folder, name)
-        subprocess.run([runs.BORESIGHT, "link-keys", "--out", path], check=True,
-                       stdout=subprocess.DEVNULL, timeout=60)
-        return path
-
-    def test_file(self):
-        self.assertEqual(os.stat(self.keys).st_mode & 0o777, 0o600)
-        result = subprocess.run([runs.BORESIGHT, "link-keys", "--out", self.keys],
-                                capture_output=True, text=True, timeout=60)
-        self.assertEqual(result.returncode, 1)
-        self.assertIn("cannot be made: File exists", result.stderr)
-        known = self.make("known.keys")
-        os.chmod(known, 0o640)
-        said = ended(start_run(runs.TRACK, runs.scratch() + "/run", ipc(), "control", "--link-keys",
-                               known), expected=1)
-        self.assertIn("others than this user can read or change it (found mode 0640", said)
-        with self.assertRaisesRegex(boresight_link.LinkError, "found mode 0640"):
-            boresight_link.read_keys(known)
-
-    def test_peers_with_the_keys(self):
-        address = f"tcp://127.0.0.1:{free_port()}"
-        run = start_run(runs.TRACK, runs.scratch() + "/run", address, "control", "--link-keys",
-                        self.keys, duration=3)
-        peer = serve(runs.TRACK, address, "control", "--link-keys", self.keys, "--duration", "3")
-        ended(run)
-        ended(peer)
-        address = ipc()
-        out = runs.scratch() + "/run"
-        run = start_run(runs.STARE, out, address, "imgproc", "--link-keys", self.keys, duration=3)
-        with boresight_link.Link(address, serves="imgproc", keys_file=self.keys) as link:
-            for step in link.steps():
-                step.send_detections(x_px=[10.0], y_px=[20.0], flux_e=1000.0, snr=10.0)
-        ended(run)
-        self.assertGreater(runs.manifest(out)["counters"]["link_messages"], 3)
-        self.assertEqual(runs.manifest(out)["counters"].get("link_no_key", 0), 0)
-
-    def test_peers_without_the_keys(self):
-        """One with no keys, one with others, one that knows the run's public key but not the peer's."""
-        other = self.make("other.keys")
-        with open(self.keys, encoding="ascii") as a, open(other, encoding="ascii") as b:
-            own, foreign = a.read().splitlines(), b.read().splitlines()
-        mixed = os.path.join(self.folder, "mixed.keys")
-        with open(os.open(mixed, os.O_WRONLY | os.O_CREAT, 0o600), "w", encoding="ascii") as file:
-            file.write("\n".join([line for line in own if line.startswith("simulation")] +
-                                 [line for line in foreign if line.startswith("peer")]) + "\n")
-        for keys, refused in ((None, False), (other, False), (mixed, True)):
-            address, out = f"tcp://127.0.0.1:{free_port()}", runs.scratch() + "/run"
-            run = start_run(runs.TRACK, out, address, "control", "--link-keys", self.keys, "--set",
-                            "/link/connect_timeout_s=1.5")
-            link = boresight_link.Link(address, serves="*", keys_file=keys)
-            said = ended(run, expected=1)
-            link._socket.close(linger=0)
-            self.assertIn("nobody plays neossat/telescope/control", said)
-            counters = runs.manifest(out + ".partial")["counters"]
-            self.assertEqual(counters.get("link_hello", 0), 0)
-            self.assertEqual(counters.get("link_no_key", 0) > 0, refused, counters)
-
-
 class BadPeers(unittest.TestCase):
     def test_nobody_comes(self):
         out = runs.scratch() + "/run"
@@ -583,6 +469,7 @@ class BadPeers(unittest.TestCase):
         with socket.create_connection(("127.0.0.1", port)) as peer:
             peer.sendall(b"\xff" + bytes(8) + b"\x7f\x03\x00NULL" + bytes(16 + 32))
             peer.sendall(bytes([4, len(ready)]) + ready)
+            peer.settimeout(10)
             part, sent = b"\x03" + (1 << 20).to_bytes(8, "big") + bytes(1 << 20), 0
             try:
                 while sent < 600:
@@ -592,6 +479,7 @@ class BadPeers(unittest.TestCase):
                 pass
         self.assertLess(sent, 400)
         peer = serve(runs.TRACK, f"tcp://127.0.0.1:{port}", "control")
+        self.assertIsNone(run.poll(), run.poll() is not None and run.communicate())
         with open(f"/proc/{run.pid}/status", encoding="ascii") as file:
             peak = int(re.search(r"VmHWM:\s+(\d+) kB", file.read()).group(1))
         ended(run)

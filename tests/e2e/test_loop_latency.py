@@ -181,8 +181,16 @@ class Observer(unittest.TestCase):
                 # jitter
                 self.assertLess(base.rms(base.pointing(sets, 150), 100, 150), 0.2)
 
+    def test_no_motion_is_refused(self):
+        sets = dict(self.QUIET, **{LAW: {"type": "observer", "gain_scale": 0}})
+        for command in ("loop", "check"):
+            result = subprocess.run([runs.BORESIGHT, command, runs.TRACK, *base.words(sets)],
+                                    capture_output=True, text=True, timeout=60)
+            self.assertEqual(result.returncode, 1)
+            self.assertIn("gain_scale: 0 leaves an observer no motion", result.stderr)
+
     def test_never_negative(self):
-        for share in (0.1, 0.5, 1, 2, 5, 10):
+        for share in (0.1, 0.5, 1, 2, 5, 10, 58):
             for law in ({"type": "observer"}, {"type": "observer", "gain_scale": 4},
                         {"type": "observer", "delay_s": 3}):
                 sets = dict(self.QUIET, **{MODULES + "/control/delay_s/tracks": share, LAW: law})

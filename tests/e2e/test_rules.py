@@ -12,7 +12,7 @@ import runs
 MODULES = runs.SENSOR + "/modules"
 # rule, override, words of the warning
 CASES = [("duration", "/duration_s=0", "/duration_s: the run lasts 0 s"),
-         ("element_age", '/epoch_utc="2022-08-16T22:10:00Z"', "2 of 2 element sets are more than 14 days"),
+         ("element_age", '/epoch_utc="2022-08-16T22:10:00Z"', "2 of 2 element sets of observers and listed objects are more than 14 days"),
          ("earth_orientation", '/epoch_utc="2030-06-16T22:10:00Z"', "/world/earth_orientation"),
          ("modules", MODULES + "={}", "nothing is seen or recorded"),
          ("exposure_period", runs.SENSOR + "/exposure/exposure_s=2", "longer than the period_s of 1 s"),

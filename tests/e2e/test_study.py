@@ -17,11 +17,6 @@ import sys
 import time
 import unittest
 
-try:
-    import jsonschema
-except ImportError:
-    jsonschema = None
-
 import runs
 
 KILLS = int(sys.argv.pop(1)) if len(sys.argv) > 1 and sys.argv[1].isdigit() else 2
@@ -566,32 +561,6 @@ def children(pid):
             return [int(word) for word in file.read().split()]
     except OSError:
         return []
-
-
-class Ready(unittest.TestCase):
-    def test_ready_studies_are_right(self):
-        for path in sorted(glob.glob("scenarios/studies/*.json")):
-            result = study(path, "--dry-run")
-            # where there is no full catalogue, the warning of that is right
-            said = [line for line in result.stderr.splitlines() if "star catalogue" not in line]
-            self.assertEqual((result.returncode, said), (0, []), path)
-
-
-class Schema(unittest.TestCase):
-    def test_shipped_schema_is_current(self):
-        result = study("--schema")
-        with open("scenarios/study.schema.json", encoding="utf-8") as file:
-            self.assertEqual(file.read(), result.stdout, "to make it current: build/boresight "
-                             "study --schema > scenarios/study.schema.json")
-
-    @unittest.skipIf(jsonschema is None, "needs python3-jsonschema")
-    def test_studies_fit_the_schema(self):
-        with open("scenarios/study.schema.json", encoding="utf-8") as file:
-            schema = json.load(file)
-        folder = runs.scratch()
-        for path in [write(folder), *glob.glob("scenarios/studies/*.json")]:
-            with open(path, encoding="utf-8") as file:
-                jsonschema.validate(json.load(file), schema)
 
 
 def tearDownModule():

@@ -299,6 +299,44 @@ static void dropped_frames_follow_the_seed(void **state) {
     assert_int_equal(a.count, 10);
 }
 
+/* Gilbert's channel in numbers of its own: bursts are geometric of mean L = 5, and of 20 % of the
+ * frames; the good stretches between them of mean L (1 - f) / f = 20. */
+static void dropped_frames_come_in_bursts(void **state) {
+    (void)state;
+    train l;
+    int count = 0, lost = 0, bursts = 0, singles = 0;
+    for (int number = 0; number < 10; number++) {
+        char extra[40];
+        snprintf(extra, sizeof extra, "\"run\": %d, ", number);
+        run("\"exposure_s\": 0.5, \"period_s\": 1, \"dropped_fraction\": 0.2, "
+            "\"dropped_burst_frames\": 5",
+            "", extra, 1800000, &l);
+        assert_int_equal(l.count, 300);
+        count += l.count;
+        lost += dropped(&l);
+        for (int i = 0; i < l.count; i++) {
+            bool first = l.items[i].dropped && (i == 0 || !l.items[i - 1].dropped);
+            bursts += first;
+            singles += first && i + 1 < l.count && !l.items[i + 1].dropped;
+        }
+    }
+    /* Markov chain of eigenvalue 1 - 1/5 - 1/20 = 0.75: the share's variance is
+     * f (1 - f) (1 + 0.75) / (1 - 0.75) / n, sigma 0.0193 */
+    bst_assert_close((double)lost / count, 0.2, 4.0 * 0.0193);
+    /* n (1 - f) / 20 = 120 bursts, nearly Poisson: their mean length has sigma
+     * sqrt(20 / 120) = 0.41; without bursts it is 1 / 0.8. The ends of ten runs cut two bursts. */
+    bst_assert_close((double)lost / bursts, 5.0, 4.0 * 0.41);
+    /* a fifth of them last one frame: sigma sqrt(0.2 * 0.8 / 120) = 0.037 */
+    bst_assert_close((double)singles / bursts, 0.2, 4.0 * 0.037);
+    /* at the limit every second frame is lost, in turn */
+    run("\"exposure_s\": 0.5, \"period_s\": 1, \"dropped_fraction\": 0.5, "
+        "\"dropped_burst_frames\": 1",
+        "", "", 60000, &l);
+    for (int i = 1; i < l.count; i++) {
+        assert_int_equal(l.items[i].dropped, !l.items[i - 1].dropped);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(exposures_start_and_end_at_exact_ticks),
@@ -307,6 +345,7 @@ int main(void) {
         cmocka_unit_test(odd_commands_do_no_harm),
         cmocka_unit_test(rolling_shutters_take_their_time),
         cmocka_unit_test(dropped_frames_follow_the_seed),
+        cmocka_unit_test(dropped_frames_come_in_bursts),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,50 @@
+#!/usr/bin/env python3
+"""The studies that ship, and the schema of studies.
+
+Usage, from the repository root: /usr/bin/python3 tests/e2e/test_study_files.py BORESIGHT
+"""
+import glob
+import json
+import unittest
+
+try:
+    import jsonschema
+except ImportError:
+    jsonschema = None
+
+import runs
+from test_study import study, write
+
+
+class Ready(unittest.TestCase):
+    def test_ready_studies_are_right(self):
+        for path in sorted(glob.glob("scenarios/studies/*.json")):
+            result = study(path, "--dry-run")
+            # where there is no full catalogue, the warning of that is right
+            said = [line for line in result.stderr.splitlines() if "star catalogue" not in line]
+            self.assertEqual((result.returncode, said), (0, []), path)
+
+
+class Schema(unittest.TestCase):
+    def test_shipped_schema_is_current(self):
+        result = study("--schema")
+        with open("scenarios/study.schema.json", encoding="utf-8") as file:
+            self.assertEqual(file.read(), result.stdout, "to make it current: build/boresight "
+                             "study --schema > scenarios/study.schema.json")
+
+    @unittest.skipIf(jsonschema is None, "needs python3-jsonschema")
+    def test_studies_fit_the_schema(self):
+        with open("scenarios/study.schema.json", encoding="utf-8") as file:
+            schema = json.load(file)
+        folder = runs.scratch()
+        for path in [write(folder), *glob.glob("scenarios/studies/*.json")]:
+            with open(path, encoding="utf-8") as file:
+                jsonschema.validate(json.load(file), schema)
+
+
+def tearDownModule():
+    runs.clean()
+
+
+if __name__ == "__main__":
+    unittest.main()
