@@ -51,7 +51,8 @@ if(NOT BORESIGHT_SANITIZE AND NOT BORESIGHT_FUZZ)
     PATTERN "sim/astro/eop_table.h" EXCLUDE
     PATTERN "sim/*/data" EXCLUDE
     ${inner})
-  foreach(header control/modules.h gimbal/modules.h imgproc/imgproc.h imgproc/pixel_learner_config.h imgproc/stack.h obsgen/obsgen.h
+  foreach(header control/modules.h gimbal/modules.h imgproc/imgproc.h
+      imgproc/pixel_learner_config.h imgproc/stack.h obsgen/obsgen.h
       scenegen/module.h sim/app/registry.h tracker/module.h)
     get_filename_component(folder ${header} DIRECTORY)
     install(FILES ${header} DESTINATION ${headers}/${folder})

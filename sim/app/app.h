@@ -14,6 +14,7 @@ enum {
     BST_EXIT_INTERRUPTED = 130
 };
 
+int bst_cmd_new(int argc, char **argv);
 int bst_cmd_run(int argc, char **argv);
 int bst_cmd_info(int argc, char **argv);
 int bst_cmd_export(int argc, char **argv);

@@ -16,6 +16,7 @@ typedef struct command {
 } command;
 
 static const command commands[] = {
+    {"new", bst_cmd_new, "write a first scenario for two satellites"},
     {"run", bst_cmd_run, "run a scenario"},
     {"info", bst_cmd_info, "what the folder of a run holds"},
     {"report", bst_cmd_report, "a page of HTML about a run or a study"},

@@ -367,7 +367,9 @@ class Resolved(unittest.TestCase):
             result = call("check", path, "--quiet")
             said = [line for line in result.stderr.splitlines()
                     if "the cue is out of reach from" not in line
-                    and " is in the field from " not in line]
+                    and " is in the field from " not in line
+                    # the eclipse season is 100 days after the catalogue
+                    and "element sets of observers and listed objects" not in line]
             self.assertEqual((result.returncode, said), (0, []), path)
 
 

@@ -31,6 +31,7 @@ class Outputs(unittest.TestCase):
              "calframes": ["{scenario}", "--bias", "1", "--dark", "0", "--flat", "0"],
              "link-keys": [],
              "calibrate-obsgen": ["{scenario}", "--check", "--seeds", "1"], "bench": ["crc32c"],
+             "new": ["--observer-tle", "{elements}"],
              "study": ["{study}"], "pd": ["{scenario}", "--trials", "1"]}
     # options that name what is read
     INPUTS = {("run", "replay"), ("run", "link-keys"), ("serve", "link-keys"),

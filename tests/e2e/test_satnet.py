@@ -21,9 +21,7 @@ OBJECT_KEYS = {
     "class_name", "class_id", "y_min", "x_min", "y_max", "x_max", "y_center", "x_center",
     "bbox_height", "bbox_width", "source", "magnitude", "pe_per_sec", "y_start", "x_start", "y_mid",
     "x_mid", "y_end", "x_end", "seg_id", "object_name", "object_id", "pixels", "snr",
-    "snr_aperture", "ra", "dec"} | {
-        # and of Boresight alone
-        "x_centroid", "y_centroid", "x_chief", "y_chief"}
+    "snr_aperture", "ra", "dec", "x_chief", "y_chief", "x_centroid", "y_centroid"}
 
 
 def tearDownModule():
@@ -104,7 +102,7 @@ class SatNet(unittest.TestCase):
                                    (k, o["seg_id"])).fetchone()
                 self.assertEqual(o["class_name"], "Star" if row["kind"] == "star" else "Satellite")
                 self.assertEqual(o["class_id"], 2 if row["kind"] == "star" else 1)
-                for when in ("start", "mid", "end"):
+                for when in ("start", "mid", "end", "chief", "centroid"):
                     self.assertAlmostEqual(o[f"x_{when}"] * width - 0.5 + keys["WINX0"],
                                            row[f"x_{when}_px"], delta=1e-9)
                     self.assertAlmostEqual(o[f"y_{when}"] * height - 0.5 + keys["WINY0"],

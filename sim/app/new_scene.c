@@ -1,0 +1,424 @@
+#include "sim/app/new_scene.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/app/new_sensor.h"
+#include "sim/app/plugins.h"
+#include "sim/world/world.h"
+#include "sim/world/world_config.h"
+
+/* The search: an instant every LOOK_S for two days; check warns of element sets older than two
+ * weeks. */
+#define SEARCH_S (2.0 * 86400.0)
+#define LOOK_S 20.0
+#define AGE_S (13.9 * 86400.0)
+#define DURATION_S 120.0
+#define LEAST_FRAMES 60.0
+/* How near to the boresight bodies may be: stray light of the bright ones is not simulated. */
+#define SUN_CLEAR_DEG 30.0
+#define EARTH_CLEAR_DEG 0.4
+#define EARTH_WISHED_DEG 5.0
+/* Between a body and the corner of the field. */
+#define MARGIN_DEG 0.15
+/* There are 3 stars of V < 9, the limit of those built into the program, in a square degree, and 30
+ * of V < 11.5: the attitude needs some 8 in the field. */
+#define ENOUGH_STARS_V_MAG 11.0
+#define FEW_STARS_ARCSEC 8.0
+/* Slower targets are followed by the attitude telemetry alone. */
+#define STARLESS_RATE_ARCSEC_PER_S 60.0
+#define SIDE_PX 1024
+#define SMALL_SIDE_PX 512
+#define MOON_CLEAR_DEG 3.0
+/* Nearer ones are discs, not points, to a telescope. */
+#define LEAST_RANGE_M 20e3
+/* Twice as fast is what the mount of leo_leo_pass.json follows. */
+#define MOST_RATE_ARCSEC_PER_S 3600.0
+#define LEAST_SNR 12.0
+#define MOST_EXPOSURE_S 2.0
+#define LEAST_EXPOSURE_S 0.005
+#define MOST_STREAK_PX 12.0
+enum { LOOKS = (int)(SEARCH_S / LOOK_S) + 1, MOST_JUDGED = 12 };
+
+typedef enum reason {
+    IN_VIEW,
+    BEHIND_EARTH,
+    NEAR_EARTH,
+    NEAR_SUN,
+    NEAR_MOON,
+    IN_SHADOW,
+    TOO_NEAR,
+    TOO_FAST,
+    TOO_FAINT,
+    REASONS
+} reason;
+
+static const char *const reason_words[REASONS] = {
+    "in view",
+    "behind the Earth",
+    "less than 0.4 degrees from the Earth's limb",
+    "less than 30 degrees from the Sun",
+    "less than 3 degrees from the Moon",
+    "in the Earth's shadow",
+    "nearer than 20 km",
+    "faster than 1 degree a second",
+    "too faint",
+};
+
+typedef struct look {
+    reason why;
+    double v_mag, range_m, rate_arcsec_per_s, limb_rad;
+    bst_vec3 direction;
+} look;
+
+typedef struct search {
+    const bst_new_request *request;
+    bst_time start;
+    int count;
+    look *looks;
+    double *cost; /* of a run that begins at a look; INFINITY: none can */
+    bst_world *world;
+    bst_view *view;
+    int near_earth, few_stars; /* runs with the Earth in the field; without an attitude */
+    double best_v_mag;         /* of what was too faint only */
+} search;
+
+/* ------------------------------------------------------------------ sensor */
+
+static double signal_e_per_s(double aperture_m, double v_mag) {
+    return BST_NEW_FLUX_V0 * 0.25 * BST_PI * aperture_m * aperture_m * BST_NEW_THROUGHPUT *
+           BST_NEW_QUANTUM_EFFICIENCY * pow(10.0, -0.4 * v_mag);
+}
+
+/* Of a point in the pixels of a circle twice the FWHM wide. */
+static double snr_of(double aperture_m, double pixel_arcsec, double v_mag, double exposure_s) {
+    double pixels = BST_PI * BST_NEW_FWHM_PX * BST_NEW_FWHM_PX;
+    double s = signal_e_per_s(aperture_m, v_mag) * exposure_s;
+    double sky = signal_e_per_s(aperture_m, BST_NEW_SKY_MAG_ARCSEC2) * pixel_arcsec * pixel_arcsec;
+    double noise2 = pixels * (BST_NEW_READ_NOISE_E * BST_NEW_READ_NOISE_E +
+                              (sky + BST_NEW_DARK_E_PER_S) * exposure_s);
+    return s / sqrt(s + noise2);
+}
+
+static double pixel_of(const bst_new_request *q, double rate, double complete_v_mag) {
+    if (q->focal_m > 0.0) {
+        return 1e-6 * BST_NEW_PIXEL_UM / q->focal_m / BST_ARCSEC_RAD;
+    }
+    if (q->pixel_arcsec > 0.0) {
+        return q->pixel_arcsec;
+    }
+    double least = complete_v_mag < ENOUGH_STARS_V_MAG ? FEW_STARS_ARCSEC : 0.0;
+    return fmax(rate <= 60.0 ? 3.0 : rate <= 600.0 ? 5.0 : 10.0, least);
+}
+
+/* The mount follows the target, so that it is the stars that are streaks. */
+static double period_of(const bst_new_request *q, double rate, double pixel) {
+    static const double steps[] = {1.0, 0.5, 0.2};
+    if (q->period_s > 0.0) {
+        return q->period_s;
+    }
+    for (size_t i = 0; i < sizeof steps / sizeof *steps; i++) {
+        if (rate * steps[i] <= 2.0 * MOST_STREAK_PX * pixel) {
+            return steps[i];
+        }
+    }
+    return 0.1;
+}
+
+/* Exposure that has LEAST_SNR at the faintest; 0: none has. Two digits. */
+static double exposure_of(const bst_new_request *q, const bst_new_scene *s, double brightest) {
+    const double peak = 0.2; /* share of a point's light in its brightest pixel, FWHM of 2 px */
+    double most = fmin(MOST_EXPOSURE_S, 0.5 * s->period_s);
+    double wanted = fmin(MOST_STREAK_PX * s->pixel_arcsec / fmax(s->rate_arcsec_per_s, 1e-3), most);
+    wanted =
+        fmin(wanted, 0.5 * BST_NEW_FULL_WELL_E / peak / signal_e_per_s(q->aperture_m, brightest));
+    wanted = fmin(fmax(wanted, LEAST_EXPOSURE_S), most);
+    double longest = q->period_s > 0.0 ? fmin(MOST_EXPOSURE_S, 0.8 * s->period_s) : most;
+    while (snr_of(q->aperture_m, s->pixel_arcsec, s->faintest_v_mag, wanted) < LEAST_SNR) {
+        if (wanted >= longest) {
+            return 0.0;
+        }
+        wanted = fmin(1.2 * wanted, longest);
+    }
+    double unit = fmax(pow(10.0, floor(log10(wanted)) - 1.0), 1e-3); /* whole ticks */
+    return fmax(ceil(wanted / unit - 1e-9) * unit, LEAST_EXPOSURE_S);
+}
+
+/* ------------------------------------------------------------------ what is seen */
+
+static bst_status look_at(bst_ctx *ctx, const search *s, double seconds, look *out) {
+    bst_sight now, then;
+    bst_state eye;
+    bst_bodies bodies;
+    BST_TRY(bst_view_sight(ctx, s->view, 0, 0, seconds, &now));
+    BST_TRY(bst_view_sight(ctx, s->view, 0, 0, seconds + 1.0, &then));
+    BST_TRY(bst_view_observer_state(ctx, s->view, 0, seconds, &eye));
+    BST_TRY(bst_view_bodies(ctx, s->view, seconds, &bodies));
+    *out =
+        (look){.v_mag = now.v_mag,
+               .range_m = now.range_m,
+               .direction = now.geometric,
+               .rate_arcsec_per_s = bst_vec3_angle(now.geometric, then.geometric) / BST_ARCSEC_RAD};
+    out->limb_rad = bst_earth_limb_angle(eye.position_m, bodies.pole, now.geometric);
+    double sun = bst_vec3_angle(now.geometric, bst_vec3_sub(bodies.sun_m, eye.position_m));
+    double moon = bst_vec3_angle(now.geometric, bst_vec3_sub(bodies.moon_m, eye.position_m));
+    out->why = now.occulted                                      ? BEHIND_EARTH
+               : out->limb_rad < EARTH_CLEAR_DEG * BST_DEG_RAD   ? NEAR_EARTH
+               : sun < SUN_CLEAR_DEG * BST_DEG_RAD               ? NEAR_SUN
+               : moon < MOON_CLEAR_DEG * BST_DEG_RAD             ? NEAR_MOON
+               : now.sunlit_fraction < 1.0                       ? IN_SHADOW
+               : now.range_m < LEAST_RANGE_M                     ? TOO_NEAR
+               : out->rate_arcsec_per_s > MOST_RATE_ARCSEC_PER_S ? TOO_FAST
+                                                                 : IN_VIEW;
+    return BST_OK;
+}
+
+/* How far from the limb the boresight is to be. */
+static double free_of_earth(const bst_new_scene *s) {
+    return s->side_px * s->pixel_arcsec * BST_ARCSEC_RAD * sqrt(0.5) + MARGIN_DEG * BST_DEG_RAD;
+}
+
+/* The widest field, of those that have the stars for an attitude, without the Earth in it. */
+static bool fit_field(search *s, bst_vec3 direction, bst_new_scene *out) {
+    const bst_new_request *q = s->request;
+    const double rate = out->rate_arcsec_per_s;
+    double half = 0.5 * SIDE_PX * FEW_STARS_ARCSEC * BST_ARCSEC_RAD;
+    double complete = bst_stars_complete_to(bst_world_stars(s->world), direction, half);
+    const double pixel[] = {pixel_of(q, rate, complete), pixel_of(q, rate, complete),
+                            pixel_of(q, rate, ENOUGH_STARS_V_MAG)};
+    const int side[] = {SIDE_PX, SMALL_SIDE_PX, SMALL_SIDE_PX};
+    for (size_t k = 0; k < sizeof side / sizeof *side; k++) {
+        out->pixel_arcsec = pixel[k];
+        out->side_px = side[k];
+        if (out->limb_rad < free_of_earth(out)) {
+            continue;
+        }
+        if (pixel[k] >= pixel[0] || rate <= STARLESS_RATE_ARCSEC_PER_S) {
+            return true;
+        }
+        s->few_stars++;
+        return false;
+    }
+    s->near_earth++;
+    return false;
+}
+
+/* The run that begins at look i; false: something is in the way or it is too faint. */
+static bool scene_at(search *s, int i, bst_new_scene *out) {
+    const bst_new_request *q = s->request;
+    double period = q->period_s > 0.0 ? q->period_s : 1.0;
+    double duration = q->duration_s > 0.0 ? q->duration_s : fmax(DURATION_S, LEAST_FRAMES * period);
+    int last = i + (int)ceil(duration / LOOK_S);
+    double brightest = INFINITY;
+    *out = (bst_new_scene){.duration_s = duration,
+                           .v_mag = s->looks[i].v_mag,
+                           .faintest_v_mag = -INFINITY,
+                           .range_m = INFINITY,
+                           .limb_rad = INFINITY};
+    for (int k = i; k <= last; k++) {
+        if (k >= s->count || s->looks[k].why != IN_VIEW) {
+            return false;
+        }
+        brightest = fmin(brightest, s->looks[k].v_mag);
+        out->faintest_v_mag = fmax(out->faintest_v_mag, s->looks[k].v_mag);
+        out->limb_rad = fmin(out->limb_rad, s->looks[k].limb_rad);
+        out->range_m = fmin(out->range_m, s->looks[k].range_m);
+        out->rate_arcsec_per_s = fmax(out->rate_arcsec_per_s, s->looks[k].rate_arcsec_per_s);
+    }
+    out->epoch = bst_time_add(s->start, LOOK_S * i);
+    if (!fit_field(s, s->looks[(i + last) / 2].direction, out)) {
+        return false;
+    }
+    out->period_s = period_of(q, out->rate_arcsec_per_s, out->pixel_arcsec);
+    out->exposure_s = exposure_of(q, out, brightest);
+    if (out->exposure_s == 0.0) {
+        s->best_v_mag = fmin(s->best_v_mag, out->faintest_v_mag);
+        return false;
+    }
+    return true;
+}
+
+/* Of two times the one with the slower and brighter target is better. */
+static double cost_of(const bst_new_scene *scene) {
+    double near = scene->limb_rad < EARTH_WISHED_DEG * BST_DEG_RAD ? 2.0 : 0.0;
+    return near + log(scene->rate_arcsec_per_s + 10.0) + 0.3 * scene->faintest_v_mag;
+}
+
+/* ------------------------------------------------------------------ the search */
+
+static bst_status open_world(bst_ctx *ctx, search *s) {
+    const bst_new_scene first = {.side_px = SIDE_PX,
+                                 .epoch = s->start,
+                                 .duration_s = 1.0,
+                                 .period_s = 1.0,
+                                 .exposure_s = 0.5,
+                                 .pixel_arcsec = 3.0};
+    char *text = NULL;
+    size_t bytes = 0;
+    FILE *stream = open_memstream(&text, &bytes);
+    if (!stream) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the scenario");
+    }
+    bst_new_scene_write(stream, s->request, &first);
+    fclose(stream);
+    bst_json *json = NULL;
+    bst_scenario scenario;
+    bst_status status = bst_json_parse(ctx, s->request->name, text, bytes, &json);
+    free(text);
+    if (status != BST_OK) {
+        return status;
+    }
+    status = bst_plugins_scenario_read(ctx, json, &scenario);
+    if (status == BST_OK) {
+        status = bst_world_create(ctx, scenario.file, &scenario.world, &scenario.observers,
+                                  scenario.base_dir, scenario.epoch, &s->world);
+    }
+    bst_scenario_free(&scenario);
+    bst_json_free(json);
+    return status == BST_OK ? bst_view_create(ctx, s->world, &s->view) : status;
+}
+
+/* The first of the two days, within two weeks of both element sets. */
+static bst_status choose_days(bst_ctx *ctx, search *s) {
+    const bst_elements *a = &s->request->observer.elements, *b = &s->request->target.elements;
+    bst_time one, two;
+    BST_TRY(bst_time_from_utc_jd(ctx, a->epoch_utc_jd1, a->epoch_utc_jd2, &one));
+    BST_TRY(bst_time_from_utc_jd(ctx, b->epoch_utc_jd1, b->epoch_utc_jd2, &two));
+    double apart = bst_time_diff(two, one);
+    bst_time earlier = apart > 0.0 ? one : two;
+    double until = AGE_S; /* after the earlier epoch */
+    double from = fmax(fmin(fabs(apart), until - SEARCH_S), fabs(apart) - AGE_S);
+    s->start = bst_time_add(earlier, from);
+    if (s->request->start) {
+        BST_TRY(bst_time_from_utc(ctx, s->request->start, &s->start));
+        until = bst_time_diff(s->start, earlier) + SEARCH_S;
+        from = until - SEARCH_S;
+    }
+    if (until - from < LOOK_S) {
+        return bst_fail(ctx, BST_ERR_RANGE,
+                        "the element sets of %s and %s are %.0f days apart: none of them is good "
+                        "for longer than 14 days; take sets of nearer dates, or give --start",
+                        s->request->observer.name, s->request->target.name, fabs(apart) / 86400.0);
+    }
+    /* a scenario's epoch in whole seconds */
+    char text[48];
+    bst_time_to_utc(s->start, 0, text, sizeof text);
+    BST_TRY(bst_time_from_utc(ctx, text, &s->start));
+    s->count = (int)(fmin(SEARCH_S, until - from) / LOOK_S);
+    return BST_OK;
+}
+
+static bst_status nothing(bst_ctx *ctx, const search *s, const char *judged) {
+    int count[REASONS] = {0};
+    char list[512] = "";
+    size_t used = 0;
+    for (int i = 0; i < s->count; i++) {
+        count[s->looks[i].why]++;
+    }
+    for (int r = BEHIND_EARTH; r < REASONS; r++) {
+        if (count[r] > 0 && used < sizeof list) {
+            used +=
+                (size_t)snprintf(list + used, sizeof list - used, "%s%s %.1f %%", used ? ", " : "",
+                                 reason_words[r], 100.0 * count[r] / s->count);
+        }
+    }
+    char utc[48];
+    bst_time_to_utc(s->start, 0, utc, sizeof utc);
+    if (*judged) {
+        return bst_fail(ctx, BST_ERR_NOT_FOUND,
+                        "%s sees %s in the %.3g days from %s, but at none of the best times would "
+                        "the loop hold: %s; choose another --start, --duration or target",
+                        s->request->observer.name, s->request->target.name,
+                        s->count * LOOK_S / 86400.0, utc, judged);
+    }
+    if (isfinite(s->best_v_mag)) {
+        double needed = s->request->aperture_m;
+        double period = s->request->period_s > 0.0 ? s->request->period_s : 1.0;
+        while (needed < 20.0 && snr_of(needed, pixel_of(s->request, 0.0, ENOUGH_STARS_V_MAG),
+                                       s->best_v_mag, 0.5 * period) < LEAST_SNR) {
+            needed *= 1.05;
+        }
+        return bst_fail(
+            ctx, BST_ERR_NOT_FOUND,
+            "%s is too faint for an aperture of %.3g m: V %.1f at best in the %.3g days "
+            "from %s; an --aperture of %.2g would do",
+            s->request->target.name, s->request->aperture_m, s->best_v_mag,
+            s->count * LOOK_S / 86400.0, utc, needed);
+    }
+    if (s->few_stars > 0) {
+        return bst_fail(ctx, BST_ERR_NOT_FOUND,
+                        "%s is seen from %s only so near to the Earth's limb that the field holds "
+                        "too few of the stars built into the program for an attitude; get the full "
+                        "star catalogue: boresight stars fetch",
+                        s->request->target.name, s->request->observer.name);
+    }
+    if (s->near_earth > 0) {
+        return bst_fail(
+            ctx, BST_ERR_NOT_FOUND,
+            "in the %.3g days from %s %s sees %s only with the Earth in the field; choose "
+            "a smaller --pixel-scale, a shorter --duration or another target",
+            s->count * LOOK_S / 86400.0, utc, s->request->observer.name, s->request->target.name);
+    }
+    return bst_fail(ctx, BST_ERR_NOT_FOUND,
+                    "in the %.3g days from %s %s never sees %s for a whole run: it is %s of the "
+                    "time; choose a shorter --duration, another --start or another target",
+                    s->count * LOOK_S / 86400.0, utc, s->request->observer.name,
+                    s->request->target.name, *list ? list : "in view too short a part");
+}
+
+static bst_status choose(bst_ctx *ctx, search *s, bst_new_judge judge, void *user,
+                         bst_new_scene *out) {
+    char why[256] = "";
+    for (int i = 0; i < s->count; i++) {
+        s->cost[i] = scene_at(s, i, out) ? cost_of(out) : (double)INFINITY;
+    }
+    for (int judged = 0; judged < MOST_JUDGED; judged++) {
+        int best = 0;
+        bool holds = false;
+        for (int i = 1; i < s->count; i++) {
+            best = s->cost[i] < s->cost[best] ? i : best;
+        }
+        if (isinf(s->cost[best]) || !scene_at(s, best, out)) {
+            break;
+        }
+        BST_TRY(judge(user, ctx, out, &holds, why));
+        if (holds) {
+            return BST_OK;
+        }
+        /* what is wrong at a time is wrong next to it too */
+        int apart = (int)ceil(fmax(out->duration_s, 300.0) / LOOK_S);
+        for (int i = best - apart; i <= best + apart; i++) {
+            if (i >= 0 && i < s->count) {
+                s->cost[i] = INFINITY;
+            }
+        }
+    }
+    return nothing(ctx, s, why);
+}
+
+static bst_status find(bst_ctx *ctx, search *s, bst_new_judge judge, void *user,
+                       bst_new_scene *out) {
+    s->looks = calloc(LOOKS, sizeof *s->looks);
+    s->cost = calloc(LOOKS, sizeof *s->cost);
+    if (!s->looks || !s->cost) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the search");
+    }
+    BST_TRY(choose_days(ctx, s));
+    BST_TRY(open_world(ctx, s));
+    for (int i = 0; i < s->count; i++) {
+        BST_TRY(look_at(ctx, s, LOOK_S * i, &s->looks[i]));
+    }
+    return choose(ctx, s, judge, user, out);
+}
+
+bst_status bst_new_scene_find(bst_ctx *ctx, const bst_new_request *request, bst_new_judge judge,
+                              void *user, bst_new_scene *out) {
+    search s = {.request = request, .best_v_mag = INFINITY};
+    bst_status status = find(ctx, &s, judge, user, out);
+    bst_view_free(s.view);
+    bst_world_free(s.world);
+    free(s.looks);
+    free(s.cost);
+    return status;
+}

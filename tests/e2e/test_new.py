@@ -1,0 +1,145 @@
+#!/usr/bin/env python3
+"""`boresight new`: scenarios for random pairs of the shipped element sets, whose loop holds.
+
+Usage, from the repository root: /usr/bin/python3 tests/e2e/test_new.py BORESIGHT [PAIRS]
+With PAIRS so many pairs with the runs as they are written, else a few short ones.
+"""
+import json
+import os
+import random
+import shutil
+import subprocess
+import sys
+import unittest
+from concurrent.futures import ThreadPoolExecutor
+
+PAIRS = int(sys.argv.pop(2)) if len(sys.argv) > 2 and sys.argv[2].isdigit() else 0
+
+import runs  # noqa: E402
+
+SETS = ["scenarios/catalogue_2022-06.tle", "scenarios/objects_2022-06.tle"]
+SEED = 20220616
+EMPTY = runs.scratch()
+# what `new` says of pairs of which one never sees the other for a whole run
+UNSEEN = ("never sees", "too faint", "days apart", "with the Earth in the field", "too few of the stars")
+
+
+def numbers():
+    found = set()
+    for path in SETS:
+        with open(path, encoding="ascii") as file:
+            found |= {line[2:7] for line in file if line.startswith("2 ")}
+    return sorted(found)
+
+
+def call(*words):
+    # without the full star catalogue, whether or not it is there: the harder case
+    return subprocess.run([runs.BORESIGHT, *words], capture_output=True, text=True, check=False,
+                          env=dict(os.environ, XDG_DATA_HOME=EMPTY))
+
+
+def follow(folder, index, pair, *options):
+    """What becomes of a pair: (kind, words), kind "unseen", "held" or "failed"."""
+    path = os.path.join(folder, f"{index}.json")
+    made = call("new", path, "--observer-tle", pair[0], "--target-tle", pair[1], *options)
+    if made.returncode != 0:
+        unseen = made.returncode == 1 and any(word in made.stderr for word in UNSEEN)
+        return ("unseen" if unseen else "failed"), made.stderr.strip()
+    said = call("check", "--quiet", path)
+    if said.returncode != 0 or said.stderr:
+        return "failed", "check: " + said.stderr.strip()
+    summary = runs.run(path, os.path.join(folder, str(index)), runs.NO_FRAMES)["summary"]
+    figures = summary["sensors"][0] if "sensors" in summary else summary
+    text = " ".join(made.stdout.split("\n")[i].strip() for i in (1, 2))
+    text += f"; RMS {figures['pointing_rms_px']} px, ends in {figures['final_mode']}"
+    held = figures["final_mode"] == "track" and (figures["pointing_rms_px"] or 1e9) < 3.0
+    return ("held" if held else "failed"), text
+
+
+def sample(count, *options):
+    """The first `count` random pairs that see each other, and the others met on the way."""
+    draw, folder, pool = random.Random(SEED), runs.scratch(), numbers()
+    results = []
+    with ThreadPoolExecutor(2) as workers:
+        while sum(kind != "unseen" for _, (kind, _) in results) < count:
+            missing = count - sum(kind != "unseen" for _, (kind, _) in results)
+            pairs = [draw.sample(pool, 2) for _ in range(missing)]
+            jobs = [workers.submit(follow, folder, len(results) + i, pair, *options)
+                    for i, pair in enumerate(pairs)]
+            results += [(pair, job.result()) for pair, job in zip(pairs, jobs)]
+    return results
+
+
+class New(unittest.TestCase):
+    def test_random_pairs(self):
+        results = sample(PAIRS) if PAIRS else sample(3, "--duration", "30")
+        counts = {kind: sum(k == kind for _, (k, _) in results) for kind in ("held", "failed", "unseen")}
+        print(f"seed {SEED}: {counts}")
+        for pair, (kind, words) in results:
+            print(kind, *pair, words)
+        self.assertEqual(counts["failed"], 0)
+        # most pairs of low satellites see each other within two days
+        self.assertGreater(counts["held"], counts["unseen"])
+
+    def test_without_options(self):
+        path = os.path.join(runs.scratch(), "first.json")
+        self.assertEqual(call("new", path).returncode, 0)
+        with open(path, encoding="utf-8") as file:
+            scenario = json.load(file)
+        self.assertEqual(scenario["name"], "neossat_inmarsat_gx5")
+        self.assertIn("INMARSAT GX5", scenario["description"])
+        said = call("new", path)
+        self.assertEqual(said.returncode, 1)
+        self.assertIn("the file is there already", said.stderr)
+        self.assertEqual(call("new", "--out", path, "--overwrite").returncode, 0)
+
+    def test_options_are_in_the_scenario(self):
+        path = os.path.join(runs.scratch(), "first.json")
+        sets = os.path.abspath(SETS[0])
+        made = call("new", path, "--observer-tle", sets + ":39089", "--target-tle", "inmarsat gx5",
+                    "--aperture", "0.2", "--focal-length", "0.9", "--period", "5")
+        self.assertEqual(made.returncode, 0, made.stderr)
+        said = call("check", path)
+        self.assertEqual(said.stderr, "")
+        scenario = json.loads(said.stdout)
+        sensor = scenario["observers"][0]["sensors"][0]
+        self.assertEqual(sensor["camera"]["aperture_m"], 0.2)
+        self.assertEqual(sensor["camera"]["focal_length_m"], 0.9)
+        self.assertEqual(sensor["exposure"]["period_s"], 5)
+        self.assertEqual(scenario["duration_s"], 300)
+
+    def test_errors_say_why(self):
+        path = os.path.join(runs.scratch(), "first.json")
+        for words, code, text in (
+                (["--target-tle", "INMARSAT GX6"], 1, 'did you mean "INMARSAT GX5"?'),
+                (["--target-tle", "39089"], 1, "is the observer itself"),
+                (["--target-tle", SETS[0]], 1, "more than one satellite; say which"),
+                (["--aperture", "0.002"], 1, "an --aperture of 0.0"),
+                (["--observer-tle", "46290", "--target-tle", "44772"], 1, "behind the Earth 100.0 %"),
+                (["--start", "yesterday"], 2, "yesterday"),
+                (["--pixel-scale", "3", "--focal-length", "1"], 2, "give one of them"),
+                (["--out", path], 2, "one FILE.json is written, 2 were named")):
+            said = call("new", path, *words)
+            self.assertEqual(said.returncode, code, (words, said.stderr))
+            self.assertIn(text, said.stderr)
+            self.assertFalse(os.path.exists(path))
+
+    def test_element_sets_are_not_written_over(self):
+        sets = os.path.join(runs.scratch(), "sets.tle")
+        shutil.copy(SETS[0], sets)
+        for link in (sets, sets + ".link"):
+            if link != sets:
+                os.symlink(sets, link)
+            said = call("new", link, "--overwrite", "--observer-tle", sets + ":39089")
+            self.assertEqual(said.returncode, 1)
+            self.assertIn("which is read: --observer-tle names it", said.stderr)
+        with open(sets, encoding="ascii") as made, open(SETS[0], encoding="ascii") as before:
+            self.assertEqual(made.read(), before.read())
+
+
+def tearDownModule():
+    runs.clean()
+
+
+if __name__ == "__main__":
+    unittest.main()
