@@ -103,7 +103,7 @@ static bst_status set_losses(const bst_module_env *env, const bst_exposure_confi
     double fewest = fmax(1.0, share / (1.0 - share));
     if (frames < fewest) {
         return bst_fail(env->ctx, BST_ERR_CONFIG,
-                        "exposure/dropped_burst_frames: %.9g (allowed: 0, or %.9g and more, with a "
+                        "dropped_burst_frames: %.9g (allowed: 0, or %.9g and more, with a "
                         "frame between two bursts and a dropped_fraction of %.9g)",
                         frames, fewest, share);
     }

@@ -190,7 +190,7 @@ bst_status bst_exposure_window(bst_ctx *ctx, const bst_exposure_config *config, 
     if (!whole || w[3] < 1.0 || w[0] + w[2] > (double)width_px || w[1] + w[3] > (double)height_px ||
         fmin(w[2], w[3]) < (double)config->binning) {
         return bst_fail(ctx, BST_ERR_CONFIG,
-                        "exposure/window_px: [%g, %g, %g, %g] is no window of the sensor (allowed: "
+                        "window_px: [%g, %g, %g, %g] is no window of the sensor (allowed: "
                         "whole numbers x0, y0, width, height within %lld x %lld pixels, at least "
                         "the binning of %lld wide and high)",
                         w[0], w[1], w[2], w[3], (long long)width_px, (long long)height_px,
