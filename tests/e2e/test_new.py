@@ -112,6 +112,7 @@ class New(unittest.TestCase):
         path = os.path.join(runs.scratch(), "first.json")
         for words, code, text in (
                 (["--target-tle", "INMARSAT GX6"], 1, 'did you mean "INMARSAT GX5"?'),
+                (["--target-tle", "SL-3 R/B"], 1, "several satellites are called so"),
                 (["--target-tle", "39089"], 1, "is the observer itself"),
                 (["--target-tle", SETS[0]], 1, "more than one satellite; say which"),
                 (["--aperture", "0.002"], 1, "an --aperture of 0.0"),
