@@ -124,7 +124,7 @@ static double period_of(const bst_new_request *q, double rate, double pixel) {
         return q->period_s;
     }
     for (size_t i = 0; i < sizeof steps / sizeof *steps; i++) {
-        if (rate * steps[i] <= MOST_STEP_PX * pixel) {
+        if (rate * steps[i] <= (rate > 600.0 ? 0.5 : 1.0) * MOST_STEP_PX * pixel) {
             return steps[i];
         }
     }

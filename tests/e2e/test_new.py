@@ -52,7 +52,7 @@ def follow(folder, index, pair, *options):
     figures = summary["sensors"][0] if "sensors" in summary else summary
     text = " ".join(made.stdout.split("\n")[i].strip() for i in (1, 2))
     text += f"; RMS {figures['pointing_rms_px']} px, ends in {figures['final_mode']}"
-    held = figures["final_mode"] == "track" and (figures["pointing_rms_px"] or 1e9) < 3.0
+    held = figures["final_mode"] == "track" and (figures["pointing_rms_px"] or 1e9) < 1.0
     return ("held" if held else "failed"), text
 
 
