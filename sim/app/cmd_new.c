@@ -73,21 +73,34 @@ static bst_status take(bst_ctx *ctx, const char *option, const char *file,
     return BST_OK;
 }
 
-/* By number or name in a file; *found false: not there. *near: the nearest name so far. */
-static bst_status seek(bst_ctx *ctx, const char *option, const char *file, const char *which,
-                       bst_new_satellite *out, bool *found, char near[32], size_t *best) {
+/* What is looked for in the shipped element sets, and what was found. */
+typedef struct wanted {
+    const char *option, *which;
+    bool found;
+    char near[32]; /* the nearest other name, "": none */
+    size_t best;
+} wanted;
+
+/* By number or name in a file. */
+static bst_status seek(bst_ctx *ctx, const char *file, wanted *w, bst_new_satellite *out) {
     bst_elements *sets = NULL;
     int count = 0, norad = 0;
-    bool number = bst_tle_decode_number(which, &norad);
+    bool number = bst_tle_decode_number(w->which, &norad);
     BST_TRY(bst_elements_load(ctx, file, &(bst_elements_options){.skip_bad_sets = true}, &sets,
                               &count));
     bst_status status = BST_OK;
-    for (int i = 0; i < count && !*found && status == BST_OK; i++) {
-        if ((number && sets[i].norad == norad) || same_name(sets[i].name, which)) {
-            *found = true;
-            status = take(ctx, option, file, &sets[i], out);
-        } else if (bst_text_is_nearer(which, sets[i].name, best)) {
-            memcpy(near, sets[i].name, 32);
+    for (int i = 0; i < count && status == BST_OK; i++) {
+        bool named = same_name(sets[i].name, w->which);
+        if (named && w->found && out->elements.norad != sets[i].norad) {
+            status = bst_fail(ctx, BST_ERR_ARGUMENT,
+                              "--%s %.100s: several satellites are called so (%d and %d, ...); "
+                              "give the catalogue number",
+                              w->option, w->which, out->elements.norad, sets[i].norad);
+        } else if (!w->found && (named || (number && sets[i].norad == norad))) {
+            w->found = true;
+            status = take(ctx, w->option, file, &sets[i], out);
+        } else if (bst_text_is_nearer(w->which, sets[i].name, &w->best)) {
+            memcpy(w->near, sets[i].name, sizeof w->near);
         }
     }
     free(sets);
@@ -113,8 +126,13 @@ static bst_status from_file(bst_ctx *ctx, const char *option, const char *file, 
         }
     }
     if (status == BST_OK) {
-        /* of several sets of one satellite the scenario takes what the world takes: the file's */
-        status = take(ctx, option, file, &sets[0], out);
+        int latest = 0;
+        for (int i = 1; i < count; i++) {
+            double days = sets[i].epoch_utc_jd1 - sets[latest].epoch_utc_jd1 +
+                          sets[i].epoch_utc_jd2 - sets[latest].epoch_utc_jd2;
+            latest = days > 0.0 ? i : latest;
+        }
+        status = take(ctx, option, file, &sets[latest], out);
     }
     free(sets);
     return status;
@@ -122,9 +140,8 @@ static bst_status from_file(bst_ctx *ctx, const char *option, const char *file, 
 
 static bst_status find_satellite(bst_ctx *ctx, const char *option, const char *which,
                                  bst_new_satellite *out) {
-    char file[4096], near[32] = "";
-    size_t best = SIZE_MAX;
-    bool found = false;
+    char file[4096];
+    wanted w = {.option = option, .which = which, .best = SIZE_MAX};
     int norad = 0;
     const char *colon = strrchr(which, ':');
     if (access(which, F_OK) == 0) {
@@ -135,16 +152,16 @@ static bst_status find_satellite(bst_ctx *ctx, const char *option, const char *w
         snprintf(file, sizeof file, "%.*s", (int)(colon - which), which);
         return from_file(ctx, option, file, norad, out);
     }
-    for (int i = 0; i < SHIPPED_SETS && !found; i++) {
+    for (int i = 0; i < SHIPPED_SETS; i++) {
         bst_app_shipped_file(shipped_sets[i], file, sizeof file);
-        BST_TRY(seek(ctx, option, file, which, out, &found, near, &best));
+        BST_TRY(seek(ctx, file, &w, out));
     }
-    return found ? BST_OK
-                 : bst_fail(ctx, BST_ERR_NOT_FOUND,
-                            "--%s %.200s: there is no such file, and no such catalogue number or "
-                            "name in the element sets that come with Boresight (%s, %s)%s%s%s",
-                            option, which, shipped_sets[0], shipped_sets[1],
-                            *near ? "; did you mean \"" : "", near, *near ? "\"?" : "");
+    return w.found ? BST_OK
+                   : bst_fail(ctx, BST_ERR_NOT_FOUND,
+                              "--%s %.200s: there is no such file, and no such catalogue number or "
+                              "name in the element sets that come with Boresight (%s, %s)%s%s%s",
+                              option, which, shipped_sets[0], shipped_sets[1],
+                              *w.near ? "; did you mean \"" : "", w.near, *w.near ? "\"?" : "");
 }
 
 /* ------------------------------------------------------------------ the judge */
@@ -299,102 +316,76 @@ static bst_status take_out(bst_ctx *ctx, const bst_option *table, int arguments,
     return bst_outputs_check(ctx, table, given, 0, NULL);
 }
 
-int bst_cmd_new(int argc, char **argv) {
-    words w = {.observer = "39089", .target = "44801"};
-    bst_new_request q = {.aperture_m = 0.15};
-    const bst_option table[] = {
-        {.name = "out",
-         .kind = BST_OPTION_TEXT,
-         .target = &w.out,
-         .path = BST_PATH_OUTPUT,
-         .argument = "FILE",
-         .doc = "the same as FILE.json"},
-        {.name = "overwrite",
-         .kind = BST_OPTION_FLAG,
-         .target = &w.overwrite,
-         .doc = "replace the file where there is one"},
-        {.name = "observer-tle",
-         .kind = BST_OPTION_TEXT,
-         .target = &w.observer,
-         .path = BST_PATH_INPUT,
-         .argument = "SATELLITE",
-         .doc = "who looks (default 39089, NEOSSat)"},
-        {.name = "target-tle",
-         .kind = BST_OPTION_TEXT,
-         .target = &w.target,
-         .path = BST_PATH_INPUT,
-         .argument = "SATELLITE",
-         .doc = "at what (default 44801, INMARSAT GX5)"},
-        {.name = "aperture",
-         .kind = BST_OPTION_REAL,
-         .target = &q.aperture_m,
-         .argument = "M",
-         .doc = "diameter of the telescope in metres (default 0.15)",
-         .minimum = 0.001,
-         .maximum = 20},
-        {.name = "pixel-scale",
-         .kind = BST_OPTION_REAL,
-         .target = &q.pixel_arcsec,
-         .argument = "ARCSEC",
-         .doc = "size of a pixel in the sky (default 3, 5 or 10 by the target's rate)",
-         .minimum = 0.01,
-         .maximum = 120},
-        {.name = "focal-length",
-         .kind = BST_OPTION_REAL,
-         .target = &q.focal_m,
-         .argument = "M",
-         .doc = "instead of it: focal length in metres, with pixels of 13 um",
-         .minimum = 0.01,
-         .maximum = 200},
-        {.name = "period",
-         .kind = BST_OPTION_REAL,
-         .target = &q.period_s,
-         .argument = "S",
-         .doc = "seconds from frame to frame (default 1 to 0.1 by the target's rate)",
-         .minimum = 0.02,
-         .maximum = 10},
-        {.name = "duration",
-         .kind = BST_OPTION_REAL,
-         .target = &q.duration_s,
-         .argument = "S",
-         .doc = "simulated time in seconds (default 120, or 60 periods)",
-         .minimum = 10,
-         .maximum = 86400},
-        {.name = "start",
-         .kind = BST_OPTION_TEXT,
-         .target = &q.start,
-         .argument = "UTC",
-         .doc = "look for a time in the two days from then, as 2022-06-16T22:10:00Z"},
-        {.name = "help", .kind = BST_OPTION_FLAG, .target = &w.help, .doc = "print this"},
-        {.name = NULL},
-    };
+static int carry_out(const bst_option *table, int argc, char **argv, words *w, bst_new_request *q) {
     bst_ctx ctx;
+    bst_time start;
     bst_ctx_init(&ctx, bst_app_log, NULL, BST_LOG_WARNING);
     int arguments = 0;
     if (bst_options_parse(&ctx, table, argc, argv, &arguments) != BST_OK) {
         return bst_options_misuse(&ctx, "new");
     }
-    if (w.help) {
+    if (w->help) {
         fputs(help_text, stdout);
         bst_options_print(stdout, table);
         return BST_EXIT_OK;
     }
-    if (take_out(&ctx, table, arguments, argv, &w) != BST_OK) {
+    bst_status status = take_out(&ctx, table, arguments, argv, w);
+    if (status == BST_OK && q->focal_m > 0.0 && q->pixel_arcsec > 0.0) {
+        status = bst_fail(&ctx, BST_ERR_ARGUMENT,
+                          "--pixel-scale and --focal-length say the same; give one of them");
+    }
+    if (status == BST_OK && q->start && bst_time_from_utc(&ctx, q->start, &start) != BST_OK) {
+        status = bst_fail_prefix(&ctx, BST_ERR_ARGUMENT, "--start");
+    }
+    if (status != BST_OK) {
         return bst_options_misuse(&ctx, "new");
     }
-    if (q.focal_m > 0.0 && q.pixel_arcsec > 0.0) {
-        bst_fail(&ctx, BST_ERR_ARGUMENT,
-                 "--pixel-scale and --focal-length say the same; give one of them");
-        return bst_options_misuse(&ctx, "new");
-    }
-    bst_time start;
-    if (q.start && bst_time_from_utc(&ctx, q.start, &start) != BST_OK) {
-        bst_fail_prefix(&ctx, BST_ERR_ARGUMENT, "--start");
-        return bst_options_misuse(&ctx, "new");
-    }
-    if (make(&ctx, &w, table, &q) != BST_OK) {
+    if (make(&ctx, w, table, q) != BST_OK) {
         fprintf(stderr, "boresight: %s\n", ctx.message);
         return BST_EXIT_FAILED;
     }
     return BST_EXIT_OK;
+}
+
+#define TEXT_OPTION(name_, target_, path_, argument_, doc_)                          \
+    {                                                                                \
+        .name = name_, .kind = BST_OPTION_TEXT, .target = &(target_), .path = path_, \
+        .argument = argument_, .doc = doc_                                           \
+    }
+#define REAL_OPTION(name_, target_, argument_, least, most, doc_)                       \
+    {                                                                                   \
+        .name = name_, .kind = BST_OPTION_REAL, .target = &(target_), .minimum = least, \
+        .maximum = most, .argument = argument_, .doc = doc_                             \
+    }
+
+int bst_cmd_new(int argc, char **argv) {
+    words w = {.observer = "39089", .target = "44801"};
+    bst_new_request q = {.aperture_m = 0.15};
+    const bst_option table[] = {
+        TEXT_OPTION("out", w.out, BST_PATH_OUTPUT, "FILE", "the same as FILE.json"),
+        {.name = "overwrite",
+         .kind = BST_OPTION_FLAG,
+         .target = &w.overwrite,
+         .doc = "replace the file where there is one"},
+        TEXT_OPTION("observer-tle", w.observer, BST_PATH_INPUT, "SATELLITE",
+                    "who looks (default 39089, NEOSSat)"),
+        TEXT_OPTION("target-tle", w.target, BST_PATH_INPUT, "SATELLITE",
+                    "at what (default 44801, INMARSAT GX5)"),
+        REAL_OPTION("aperture", q.aperture_m, "M", 0.001, 20,
+                    "diameter of the telescope in metres (default 0.15)"),
+        REAL_OPTION("pixel-scale", q.pixel_arcsec, "ARCSEC", 0.01, 120,
+                    "size of a pixel in the sky (default 3 to 10, by the target's rate and the "
+                    "known stars)"),
+        REAL_OPTION("focal-length", q.focal_m, "M", 0.01, 200,
+                    "instead of it: focal length in metres, with pixels of 13 um"),
+        REAL_OPTION("period", q.period_s, "S", 0.02, 10,
+                    "seconds from frame to frame (default 1 to 0.1 by the target's rate)"),
+        REAL_OPTION("duration", q.duration_s, "S", 10, 86400,
+                    "simulated time in seconds (default 120, or 60 periods)"),
+        TEXT_OPTION("start", q.start, BST_PATH_NONE, "UTC",
+                    "look for a time in the two days from then, as 2022-06-16T22:10:00Z"),
+        {.name = "help", .kind = BST_OPTION_FLAG, .target = &w.help, .doc = "print this"},
+        {.name = NULL},
+    };
+    return carry_out(table, argc, argv, &w, &q);
 }

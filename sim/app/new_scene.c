@@ -26,6 +26,7 @@
  * of V < 11.5: the attitude needs some 8 in the field. */
 #define ENOUGH_STARS_V_MAG 11.0
 #define FEW_STARS_ARCSEC 8.0
+#define FEW_STARS_FAST_ARCSEC 10.0
 /* Slower targets are followed by the attitude telemetry alone. */
 #define STARLESS_RATE_ARCSEC_PER_S 60.0
 #define SIDE_PX 1024
@@ -38,7 +39,9 @@
 #define LEAST_SNR 12.0
 #define MOST_EXPOSURE_S 2.0
 #define LEAST_EXPOSURE_S 0.005
-#define MOST_STREAK_PX 12.0
+/* Of stars: in an exposure, and from one to the next. */
+#define MOST_STREAK_PX 6.0
+#define MOST_STEP_PX 24.0
 enum { LOOKS = (int)(SEARCH_S / LOOK_S) + 1, MOST_JUDGED = 12 };
 
 typedef enum reason {
@@ -108,7 +111,9 @@ static double pixel_of(const bst_new_request *q, double rate, double complete_v_
     if (q->pixel_arcsec > 0.0) {
         return q->pixel_arcsec;
     }
-    double least = complete_v_mag < ENOUGH_STARS_V_MAG ? FEW_STARS_ARCSEC : 0.0;
+    double least = complete_v_mag >= ENOUGH_STARS_V_MAG ? 0.0
+                   : rate <= STARLESS_RATE_ARCSEC_PER_S ? FEW_STARS_ARCSEC
+                                                        : FEW_STARS_FAST_ARCSEC;
     return fmax(rate <= 60.0 ? 3.0 : rate <= 600.0 ? 5.0 : 10.0, least);
 }
 
@@ -119,7 +124,7 @@ static double period_of(const bst_new_request *q, double rate, double pixel) {
         return q->period_s;
     }
     for (size_t i = 0; i < sizeof steps / sizeof *steps; i++) {
-        if (rate * steps[i] <= 2.0 * MOST_STREAK_PX * pixel) {
+        if (rate * steps[i] <= (rate > 600.0 ? 0.5 : 1.0) * MOST_STEP_PX * pixel) {
             return steps[i];
         }
     }

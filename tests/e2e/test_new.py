@@ -52,7 +52,7 @@ def follow(folder, index, pair, *options):
     figures = summary["sensors"][0] if "sensors" in summary else summary
     text = " ".join(made.stdout.split("\n")[i].strip() for i in (1, 2))
     text += f"; RMS {figures['pointing_rms_px']} px, ends in {figures['final_mode']}"
-    held = figures["final_mode"] == "track" and (figures["pointing_rms_px"] or 1e9) < 3.0
+    held = figures["final_mode"] == "track" and (figures["pointing_rms_px"] or 1e9) < 1.0
     return ("held" if held else "failed"), text
 
 
@@ -112,6 +112,7 @@ class New(unittest.TestCase):
         path = os.path.join(runs.scratch(), "first.json")
         for words, code, text in (
                 (["--target-tle", "INMARSAT GX6"], 1, 'did you mean "INMARSAT GX5"?'),
+                (["--target-tle", "SL-3 R/B"], 1, "several satellites are called so"),
                 (["--target-tle", "39089"], 1, "is the observer itself"),
                 (["--target-tle", SETS[0]], 1, "more than one satellite; say which"),
                 (["--aperture", "0.002"], 1, "an --aperture of 0.0"),
