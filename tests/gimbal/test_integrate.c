@@ -93,9 +93,43 @@ static void test_symmetric_in_time(void **state) {
     bst_assert_close(pi[1], -0.3, 1e-12);
 }
 
+/* Principal axes of bodies turned in all directions: orthonormal, right-handed, ascending, and
+ * v_k turned back is an axis of the body. */
+static void principal_axes_are_right_handed(void **state) {
+    (void)state;
+    const double inertia[3] = {2.0, 3.0, 5.0};
+    for (int turn = 0; turn < 60; turn++) {
+        double angle = 0.1 * turn;
+        bst_quat q = bst_quat_from_rotvec(
+            (bst_vec3){angle * cos(1.3 * turn), angle * sin(0.7 * turn), 0.5 - 0.05 * turn});
+        const bst_vec3 axes[3] = {bst_quat_rotate(q, (bst_vec3){1, 0, 0}),
+                                  bst_quat_rotate(q, (bst_vec3){0, 1, 0}),
+                                  bst_quat_rotate(q, (bst_vec3){0, 0, 1})};
+        double a[9] = {0}, value[3], v[9];
+        for (int k = 0; k < 3; k++) {
+            /* which of the axes has which moment changes from turn to turn */
+            const double e[3] = {axes[k].x, axes[k].y, axes[k].z};
+            for (int i = 0; i < 9; i++) {
+                a[i] += inertia[(k + turn) % 3] * e[i / 3] * e[i % 3];
+            }
+        }
+        bst_symmetric_eigen(3, a, value, v);
+        bst_vec3 x = {v[0], v[3], v[6]}, y = {v[1], v[4], v[7]}, z = {v[2], v[5], v[8]};
+        const bst_vec3 found[3] = {x, y, z};
+        bst_assert_close(bst_vec3_dot(bst_vec3_cross(x, y), z), 1.0, 1e-14); /* rounding */
+        for (int k = 0; k < 3; k++) {
+            bst_assert_close(value[k], inertia[k], 1e-14);
+            /* the body's axis of this moment, up to its sign */
+            double along = bst_vec3_dot(found[k], axes[(k - turn % 3 + 3) % 3]);
+            bst_assert_close(fabs(along), 1.0, 1e-14);
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_rk4_order), cmocka_unit_test(test_matrix_exp_is_exact),
-        cmocka_unit_test(test_eigen), cmocka_unit_test(test_symmetric_in_time)};
+        cmocka_unit_test(test_eigen), cmocka_unit_test(principal_axes_are_right_handed),
+        cmocka_unit_test(test_symmetric_in_time)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
