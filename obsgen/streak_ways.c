@@ -149,7 +149,7 @@ static bst_status make_places(bst_ctx *ctx, const bst_streak_limits *limits, con
             bst_streak_place *p = &l->places[l->place_count];
             bool here = way * (end - at) > 0.0, near = place_on(s, lights, b, k, at, m, p);
             bst_streak_light_take(l, here & near);
-            at += here & near ? way : 0.0;
+            at += (here & near) ? way : 0.0;
             if (here <= near && !(way * (end - at) > 0.0)) {
                 continue;
             }

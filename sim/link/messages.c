@@ -56,7 +56,7 @@ static const bst_wire_field welcome[] = {
     TEXT(bst_link_welcome, shared_memory,
          "Name of the object that frames lie in (a file of /dev/shm); empty: they come by the "
          "socket."),
-    NUMBER(bst_link_welcome, slot_bytes, 0, "Bytes of each of its slots."),
+    NUMBER(bst_link_welcome, slot_bytes, 0, "Bytes of each of its slots, a multiple of 8."),
     INT(bst_link_welcome, slots, 0, 64, "", "Its slots."),
     COUNT(bst_link_welcome, "Parts that this peer plays now."),
     END};

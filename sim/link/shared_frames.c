@@ -119,8 +119,11 @@ bst_status bst_shared_frames_open(bst_ctx *ctx, const char *name, int64_t slot_b
     *out = NULL;
     bst_shared_frames f = {.slots = slots};
     if (strncmp(name, "/boresight-", 11) != 0 || strchr(name + 1, '/') || slots < 1 || slots > 64 ||
-        slot_bytes <= BST_LINK_PIXELS_AT || slot_bytes > INT64_C(1) << 34) {
-        return bst_fail(ctx, BST_ERR_FORMAT, "link: \"%.64s\" with %d slots of %lld bytes is none",
+        slot_bytes <= BST_LINK_PIXELS_AT || slot_bytes > INT64_C(1) << 34 || slot_bytes % 8 != 0) {
+        return bst_fail(ctx, BST_ERR_FORMAT,
+                        "link: \"%.64s\" with %d slots of %lld bytes is no shared memory for "
+                        "frames (allowed: \"/boresight-...\" with 1 to 64 slots of 4104 to 2^34 "
+                        "bytes, a multiple of 8)",
                         name, slots, (long long)slot_bytes);
     }
     f.slot_bytes = (size_t)slot_bytes;

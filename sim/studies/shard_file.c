@@ -216,8 +216,10 @@ static bst_status take_line(bst_ctx *ctx, bst_results *r, char *line, int64_t *r
                             bool *good) {
     int metrics = r->kind->metric_count, columns = r->kind->series_count;
     double values[BST_STUDY_METRICS];
+    /* a part is there for the latest row if its run did what it should and the kind has series */
+    bool has_part = r->part_count > 0 && r->parts[r->part_count - 1].run == *run;
     *good = false;
-    if (line[0] == 'S' && *run >= 0) {
+    if (line[0] == 'S' && (*skip || has_part)) {
         if (!*skip) {
             size_t bytes = (size_t)columns * sizeof *r->series;
             if (r->series_rows == r->series_room) {
@@ -231,8 +233,8 @@ static bst_status take_line(bst_ctx *ctx, bst_results *r, char *line, int64_t *r
             }
             char *at = line + 1;
             *good = read_numbers(&at, columns, r->series + r->series_rows * (size_t)columns);
-            r->series_rows++;
-            r->parts[r->part_count - 1].rows++;
+            r->series_rows += *good;
+            r->parts[r->part_count - 1].rows += *good;
         }
         *good = *good || *skip;
         return BST_OK;
