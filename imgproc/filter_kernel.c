@@ -382,7 +382,8 @@ double bst_filter_threshold(bst_filter *f, double false_alarms, double pixels) {
         double u = 0.5 * (lo + hi);
         double rate = bst_threshold_maxima(u, f->point_density);
         if (f->streak) {
-            rate += bst_threshold_maxima(u, f->streak_density) * (1.0 - bst_threshold_exceeds_too(u, u, f->overlap));
+            rate += bst_threshold_maxima(u, f->streak_density) *
+                    (1.0 - bst_threshold_exceeds_too(u, u, f->overlap));
         }
         if (SEEN * rate * pixels > false_alarms) {
             lo = u;

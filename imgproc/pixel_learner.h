@@ -1,10 +1,10 @@
 /* The bad-pixel map that the onboard side learns: pixels that go on showing a maximum while the sky
  * moves over them.
  *
- * A defective pixel is told from three other causes of a maximum by sequential likelihood ratios,
- * one against each: light of the sky, which leaves the pixel when the camera turns; a radiation
- * hit, which does not return; and light at rest in the frame, as of a target that the camera
- * follows, whose image is a PSF. The sum over frames of log p1 / p0 has two kinds of terms:
+ * A defective pixel is distinguished from three other causes of a maximum by sequential likelihood
+ * ratios, one against each: light of the sky, which leaves the pixel when the camera turns; a
+ * radiation hit, which does not return; and light at rest in the frame, as of a target that the
+ * camera follows, whose image is a PSF. The sum over frames of log p1 / p0 has two kinds of terms:
  *
  * - Return. A pixel that showed k maxima in n looks shows another with P = (k + 1) / (n + 2), a
  * good one with the share of the frame's pixels that hold a maximum, q: log(P / q), or log((1 - P)

@@ -158,7 +158,8 @@ static bool place_source(const bst_generator *g, const bst_generator_frame *f,
                          const bst_truth_item *item, generator_source *s) {
     double b = g->binning;
     if (!(item->electrons > 0.0) || (item->flags & BST_TRUTH_OCCULTED) ||
-        !isfinite(item->x_centroid_px) || !isfinite(item->x_start_px) || !isfinite(item->x_end_px)) {
+        !isfinite(item->x_centroid_px) || !isfinite(item->x_start_px) ||
+        !isfinite(item->x_end_px)) {
         return false;
     }
     double x0 = f->window.x0 + 0.5 * (b - 1.0), y0 = f->window.y0 + 0.5 * (b - 1.0);

@@ -7,7 +7,7 @@
 #include "sim/core/status.h"
 #include "sim/world/psf.h"
 
-/* Binnings of pixels that are told apart, the last for all above. */
+/* Binnings of pixels that are distinguished, the last for all above. */
 enum { BST_PIXEL_PARTS = 8 };
 
 /* Independent of the window. */

@@ -17,7 +17,7 @@ static double far_px(const bst_smear *s) {
 #define CHORD_SHARE 0.05
 #define CHORD_ERROR (0.607 * 2.0 / 3.0)
 
-/* How many chords the curved motion over the image wants so that none is off by more than miss_px:
+/* How many chords the curved motion over the image wants for all to be off by at most miss_px:
  * of a parabola they miss (its bend) / chords^2. Seen at 17 instants; those that are off the sensor
  * do not count, but a chord must not step over it. */
 static double chords_of(const bst_smear *s, const bst_source *source, double miss_px) {

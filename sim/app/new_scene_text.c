@@ -80,13 +80,13 @@ static void put_camera(FILE *f, const bst_new_request *q, const bst_new_scene *s
 
 static void put_cue(FILE *f, const bst_new_request *q, const bst_new_scene *s) {
     double field_deg = s->side_px * s->pixel_arcsec / 3600.0;
-    fprintf(f,
-            "                    \"exposure\": {\"exposure_s\": %.6g, \"period_s\": %.6g},\n"
-            "                    \"cue\": {\n"
-            "                        \"description\": \"What the sensor is told of the target "
-            "beforehand: its predicted direction, wrong by offset_deg, with the uncertainties that "
-            "it is told with it.\",\n",
-            s->exposure_s, s->period_s);
+    fprintf(
+        f,
+        "                    \"exposure\": {\"exposure_s\": %.6g, \"period_s\": %.6g},\n"
+        "                    \"cue\": {\n"
+        "                        \"description\": \"What the sensor knows of the target "
+        "beforehand: its predicted direction, wrong by offset_deg, and how uncertain it is.\",\n",
+        s->exposure_s, s->period_s);
     put_text(f, "                        \"object\": ", q->target.name, ",\n");
     fprintf(f,
             "                        \"offset_deg\": %.3g,\n"

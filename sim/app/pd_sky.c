@@ -134,8 +134,9 @@ bst_status bst_pd_sky_stars(bst_ctx *ctx, bst_pd_sky *sky, const bst_los_track *
             continue;
         }
         bst_match_target *place = &sky->unsorted[out->count++];
-        *place = (bst_match_target){item.x_centroid_px, item.y_centroid_px, item.x_end_px - item.x_start_px,
-                                    item.y_end_px - item.y_start_px};
+        *place =
+            (bst_match_target){item.x_centroid_px, item.y_centroid_px,
+                               item.x_end_px - item.x_start_px, item.y_end_px - item.y_start_px};
         out->first[cell_of(out, place->x_px, place->y_px) + 1]++;
     }
     for (int c = 0; c < cells; c++) {

@@ -148,7 +148,7 @@ static bst_status put_chart(bst_ctx *ctx, FILE *out, const bst_study_view *v, co
         }
         fputs("</ul>\n", out);
         snprintf(caption, sizeof caption,
-                 "%s%sOf all trials of the runs, with 95 %% intervals. The ideal detector is told "
+                 "%s%sOf all trials of the runs, with 95 %% intervals. The ideal detector knows "
                  "the place: noise "
                  "of the trials, or the highest of several places, can lie above it.",
                  where, where[0] ? ". " : "");

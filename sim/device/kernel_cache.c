@@ -86,8 +86,8 @@ bst_status bst_kernel_cache_prepare(bst_ctx *ctx) {
     BST_TRY(choose(ctx, path));
     int removed = bst_kernel_cache_repair(path);
     if (removed > 0) {
-        bst_log(ctx, BST_LOG_WARNING, "%.500s: %d damaged program%s removed, to be built anew", path,
-                removed, removed == 1 ? "" : "s");
+        bst_log(ctx, BST_LOG_WARNING, "%.500s: %d damaged program%s removed, to be built anew",
+                path, removed, removed == 1 ? "" : "s");
     }
     return BST_OK;
 }

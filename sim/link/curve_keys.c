@@ -39,7 +39,7 @@ bst_status bst_curve_keys_make(bst_ctx *ctx, const char *path) {
     if (!file) {
         return bst_fail(ctx, BST_ERR_IO, "%s: cannot be made: %s", path, strerror(errno));
     }
-    fputs("# Keys of Boresight's link: whoever has them may play parts of a run.\n", file);
+    fputs("# Keys of Boresight's link: their holder may play parts of a run.\n", file);
     for (int i = 0; i < NAMES; i++) {
         fprintf(file, "%s %s\n", names[i], key_of(&keys, i));
     }

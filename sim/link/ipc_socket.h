@@ -8,7 +8,7 @@
 #include "sim/core/status.h"
 
 typedef struct bst_ipc_socket {
-    int fd; /* listening; whoever is given it closes it */
+    int fd; /* listening; the receiver closes it */
     char path[108];
     dev_t device;
     ino_t inode;

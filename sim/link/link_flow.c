@@ -22,7 +22,7 @@ static link_flow *find(bst_link *link, int fd) {
     return NULL;
 }
 
-/* Ends a connection; ZeroMQ closes the socket. Without lingering the peer is told at once (RST),
+/* Ends a connection; ZeroMQ closes the socket. Without lingering the peer sees it at once (RST),
  * and does not wait for a window that never opens. */
 static void cut(int fd) {
     const struct linger none = {.l_onoff = 1, .l_linger = 0};

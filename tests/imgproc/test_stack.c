@@ -4,8 +4,8 @@
 
 #include "imgproc/background.h"
 #include "imgproc/stack.h"
-#include "sim/core/threshold_statistics.h"
 #include "sim/core/rng.h"
+#include "sim/core/threshold_statistics.h"
 #include "tests/test_support.h"
 
 enum { SIDE = 512, FRAMES = 16, MOST = 64 };

@@ -43,8 +43,9 @@ static void what_is_made_is_read(void **state) {
 
 static void what_is_no_file_of_keys_is_refused(void **state) {
     (void)state;
-#define KEY "rq:rM>}U?@Lns47E1%kR.o@n%FcmmsL/@{H8]yf7" /* RFC 32's Z85, as zmq_curve(7) prints it \
-                                                        */
+#define KEY                                                                               \
+    "rq:rM>}U?@Lns47E1%kR.o@n%FcmmsL/@{H8]yf7" /* RFC 32's Z85, as zmq_curve(7) prints it \
+                                                */
     static const char *const texts[][2] = {
         {"", "has no line simulation_public"},
         {"garbage\n", ":1: is no line of a file of keys"},

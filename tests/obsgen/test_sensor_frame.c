@@ -99,7 +99,7 @@ static double snr_by_sums(double source, double filter, double noise_e) {
 }
 
 /* Jitter that the onboard side does not know of costs what the filter for the narrower PSF gives of
- * the wider image; what it is told of costs nothing beside the image's own width. */
+ * the wider image; what it knows costs nothing beside the image's own width. */
 static void unknown_jitter_costs_what_the_filter_misses(void **state) {
     (void)state;
     const double psf = 2.0 / 2.3548200450309493, jitter = 1.0;
