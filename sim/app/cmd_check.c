@@ -87,7 +87,6 @@ int bst_cmd_check(int argc, char **argv) {
     } else {
         ctx.log_level = BST_LOG_WARNING;
         if (bst_rules_apply(&ctx, &scenario, sim) != BST_OK) {
-            bst_json_name_file(&ctx, json);
             fprintf(stderr, "boresight: %s\n", ctx.message);
             code = BST_EXIT_FAILED;
         } else {

@@ -111,9 +111,6 @@ int bst_cmd_run(int argc, char **argv) {
     }
     if (status == BST_OK) {
         status = bst_rules_apply(&ctx, &scenario, sim);
-        if (status != BST_OK) {
-            bst_json_name_file(&ctx, json);
-        }
     }
     if (status == BST_OK) {
         status = bst_run_scenario(&ctx, &scenario, sim, &request, NULL);

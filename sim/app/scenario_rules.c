@@ -26,7 +26,7 @@ typedef struct subject {
     const bst_world *world;
     const bst_sensor_config *sensor;
     int observer, number;
-    char place[64]; /* JSON pointer */
+    char place[600]; /* file and JSON pointer */
 } subject;
 
 static const bst_module_config *module_of(const subject *s, const char *role) {
@@ -63,10 +63,10 @@ static bool number_of(const bst_module_config *module, const char *key, double *
 static bst_status no_duration(bst_ctx *ctx, const bst_scenario *scenario, const bst_world *world) {
     (void)world;
     if (scenario->duration_ticks == 0) {
-        bst_log(
-            ctx, BST_LOG_WARNING,
-            "/duration_s: the run lasts 0 s: no exposure ends in it and nothing is seen; give a "
-            "duration_s of at least one period of the exposures");
+        bst_log(ctx, BST_LOG_WARNING,
+                "%s: /duration_s: the run lasts 0 s: no exposure ends in it and nothing is seen; "
+                "give a duration_s of at least one period of the exposures",
+                scenario->file);
     }
     return BST_OK;
 }
@@ -93,12 +93,12 @@ static void note_age(ages *a, const bst_world *world, int body, const char *name
     }
 }
 
-static void warn_of_age(bst_ctx *ctx, const char *what, const ages *a) {
+static void warn_of_age(bst_ctx *ctx, const char *file, const char *what, const ages *a) {
     bst_log(ctx, BST_LOG_WARNING,
-            "/epoch_utc: %d of %d element sets of %s are more than %.0f days away from the run "
+            "%s: /epoch_utc: %d of %d element sets of %s are more than %.0f days away from the run "
             "(%s: %.0f days); SGP4 errs by kilometres a day then: as truth they are orbits like "
             "any other, as places of real objects they are not; take element sets of that time",
-            a->old, a->sets, what, OLD_ELEMENTS_DAYS, a->oldest, a->most_days);
+            file, a->old, a->sets, what, OLD_ELEMENTS_DAYS, a->oldest, a->most_days);
 }
 
 /* Observers and objects that the scenario lists count singly; of a whole catalogue a few old sets
@@ -115,10 +115,10 @@ static bst_status old_elements(bst_ctx *ctx, const bst_scenario *scenario, const
                  bst_world_object(world, o)->name, scenario->duration_s);
     }
     if (listed.old > 0) {
-        warn_of_age(ctx, "observers and listed objects", &listed);
+        warn_of_age(ctx, scenario->file, "observers and listed objects", &listed);
     }
     if (catalogued.old > MANY_OLD * catalogued.sets) {
-        warn_of_age(ctx, "the catalogues", &catalogued);
+        warn_of_age(ctx, scenario->file, "the catalogues", &catalogued);
     }
     return BST_OK;
 }
@@ -276,7 +276,7 @@ static bst_status apply_to_sensors(bst_ctx *ctx, const rule *r, const bst_scenar
         const bst_sensor_config *sensors = observers[o].sensors.items;
         for (int i = 0; i < observers[o].sensors.count; i++) {
             subject s = {ctx, scenario, world, &sensors[i], o, i, ""};
-            snprintf(s.place, sizeof s.place, "/observers/%d/sensors/%d", o, i);
+            snprintf(s.place, sizeof s.place, "%s: /observers/%d/sensors/%d", scenario->file, o, i);
             BST_TRY(r->of_sensor(&s));
         }
     }
