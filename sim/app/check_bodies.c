@@ -34,18 +34,6 @@ typedef struct looking {
     double half_rad; /* from the boresight to the farthest corner */
 } looking;
 
-static const bst_module_config *module_of(const bst_scenario *scenario, const looking *l,
-                                          const char *role) {
-    for (int m = 0; m < scenario->module_count; m++) {
-        const bst_module_config *module = &scenario->modules[m];
-        if (module->observer == l->observer && module->sensor == l->sensor && !module->off &&
-            strcmp(module->desc->role, role) == 0) {
-            return module;
-        }
-    }
-    return NULL;
-}
-
 /* Whether a module gives sensors other targets than their cues while a run goes. */
 static bool has_tasking(const bst_scenario *scenario) {
     for (int m = 0; m < scenario->module_count; m++) {
@@ -57,8 +45,10 @@ static bool has_tasking(const bst_scenario *scenario) {
 }
 
 static gaze gaze_of(const bst_scenario *scenario, looking *l) {
-    const bst_module_config *gimbal = module_of(scenario, l, "gimbal");
-    const bst_module_config *control = module_of(scenario, l, "control");
+    const bst_module_config *gimbal =
+        bst_scenario_module(scenario, l->observer, l->sensor, "gimbal");
+    const bst_module_config *control =
+        bst_scenario_module(scenario, l->observer, l->sensor, "control");
     if (gimbal && gimbal->desc->config == bst_ideal_config_table) {
         l->ideal = gimbal->config;
         l->object = l->ideal->target == BST_IDEAL_OBJECT

@@ -189,18 +189,6 @@ static bst_status set_mount(bst_ctx *ctx, const bst_module_config *gimbal, doubl
     return BST_OK;
 }
 
-static const bst_module_config *module_of(const bst_scenario *scenario, const seeing *s,
-                                          const char *role) {
-    for (int m = 0; m < scenario->module_count; m++) {
-        const bst_module_config *module = &scenario->modules[m];
-        if (module->observer == s->observer && module->sensor == s->sensor && !module->off &&
-            strcmp(module->desc->role, role) == 0) {
-            return module;
-        }
-    }
-    return NULL;
-}
-
 /* Where the boresight is at the start, in the body. */
 static bst_vec3 start_boresight(const bst_mount_status *mount) {
     bst_quat q = BST_QUAT_IDENTITY;
@@ -247,8 +235,10 @@ static bst_status moves(bst_ctx *ctx, const bst_scenario *scenario, seeing *s,
 
 static bst_status check_sensor(bst_ctx *ctx, const bst_scenario *scenario, const bst_world *world,
                                seeing *s, const char *name) {
-    const bst_module_config *gimbal = module_of(scenario, s, "gimbal");
-    const bst_module_config *control = module_of(scenario, s, "control");
+    const bst_module_config *gimbal =
+        bst_scenario_module(scenario, s->observer, s->sensor, "gimbal");
+    const bst_module_config *control =
+        bst_scenario_module(scenario, s->observer, s->sensor, "control");
     if (!gimbal || !control || control->desc->config != bst_control_config_table ||
         (gimbal->desc->config != bst_two_axis_config_table &&
          gimbal->desc->config != bst_mount_config_table)) {

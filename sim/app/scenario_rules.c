@@ -30,14 +30,7 @@ typedef struct subject {
 } subject;
 
 static const bst_module_config *module_of(const subject *s, const char *role) {
-    for (int m = 0; m < s->scenario->module_count; m++) {
-        const bst_module_config *module = &s->scenario->modules[m];
-        if (module->observer == s->observer && module->sensor == s->number && !module->off &&
-            strcmp(module->desc->role, role) == 0) {
-            return module;
-        }
-    }
-    return NULL;
+    return bst_scenario_module(s->scenario, s->observer, s->number, role);
 }
 
 /* A number of a module's configuration; false when it has no such key. */

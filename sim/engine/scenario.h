@@ -82,6 +82,11 @@ bst_status bst_scenario_read(bst_ctx *ctx, const bst_json *json, const bst_regis
                              bst_scenario *out) BST_MUST_CHECK;
 void bst_scenario_free(bst_scenario *scenario);
 
+/* The module of a role ("gimbal", "control") that steps for a sensor; NULL: there is none, or
+ * another stands in for it. Lent by the scenario. */
+const bst_module_config *bst_scenario_module(const bst_scenario *scenario, int observer, int sensor,
+                                             const char *role);
+
 /* The scenario with every default written out; the caller deletes it. NULL when out of memory. */
 struct cJSON *bst_scenario_echo(const bst_scenario *scenario);
 /* JSON Schema (draft 2020-12) of scenarios for these modules; the caller deletes it. */

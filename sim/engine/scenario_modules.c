@@ -312,3 +312,15 @@ bst_status bst_scenario_modules(bst_ctx *ctx, const bst_json *json, const bst_re
     }
     return BST_OK;
 }
+
+const bst_module_config *bst_scenario_module(const bst_scenario *scenario, int observer, int sensor,
+                                             const char *role) {
+    for (int m = 0; m < scenario->module_count; m++) {
+        const bst_module_config *module = &scenario->modules[m];
+        if (module->observer == observer && module->sensor == sensor && !module->off &&
+            strcmp(module->desc->role, role) == 0) {
+            return module;
+        }
+    }
+    return NULL;
+}
